@@ -1,0 +1,142 @@
+//! The central type: what a `.geo` file says, with equal surfaces made one.
+
+use crate::{Point, Solid, Surface};
+
+/// Declares the id of one kind of geometric entity: an index into the list of its kind.
+macro_rules! entity_id {
+    ($(#[$doc:meta])* $name:ident) => {
+        $(#[$doc])*
+        #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
+        pub struct $name(pub u32);
+
+        impl $name {
+            /// The id as an index.
+            #[inline]
+            pub fn index(self) -> usize {
+                self.0 as usize
+            }
+
+            /// The id of the entity at `index`.
+            ///
+            /// # Panics
+            /// Past `u32::MAX` entities.
+            #[inline]
+            pub fn new(index: usize) -> Self {
+                Self(u32::try_from(index).expect("more than 2^32 geometric entities"))
+            }
+        }
+    };
+}
+
+entity_id!(
+    /// A surface of a [`Geometry`]; equal surfaces of the file have one id.
+    SurfaceId
+);
+entity_id!(
+    /// A corner: a point where curves end.
+    CornerId
+);
+entity_id!(
+    /// A curve: a piece of the intersection of two surfaces, between two corners or closed.
+    CurveId
+);
+entity_id!(
+    /// A patch: the pieces of one surface that separate the same two regions.
+    PatchId
+);
+entity_id!(
+    /// A body: a solid that is meshed. `BodyId(0)` is the first `tlo` of the file that is a solid.
+    BodyId
+);
+
+/// An axis-parallel box.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Aabb {
+    /// The corner with the least coordinates.
+    pub min: Point,
+    /// The corner with the largest coordinates.
+    pub max: Point,
+}
+
+impl Aabb {
+    /// The length of the diagonal, the unit in which tolerances are given.
+    pub fn diagonal(&self) -> f64 {
+        (self.max - self.min).norm()
+    }
+
+    /// The middle of the box.
+    pub fn center(&self) -> Point {
+        nalgebra::center(&self.min, &self.max)
+    }
+}
+
+/// A place in the source text, from 1.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub struct Span {
+    /// The line, from 1.
+    pub line: u32,
+    /// The column in characters, from 1.
+    pub column: u32,
+}
+
+/// What the file says of one surface beside its shape.
+#[derive(Clone, Debug, Default)]
+pub struct SurfaceInfo {
+    /// Upper bound of the mesh size on it, if given (`-maxh` of a solid that has it).
+    pub maxh: Option<f64>,
+    /// Boundary-condition number (`-bc`).
+    pub bc: Option<u32>,
+    /// Boundary name (`-bcname`).
+    pub bc_name: Option<String>,
+    /// The named solid in which the surface first occurs, for messages.
+    pub solid: String,
+    /// Where its primitive stands in the file.
+    pub span: Span,
+}
+
+/// A body: a top-level object that is a solid.
+#[derive(Clone, Debug)]
+pub struct Body {
+    /// The name of its solid.
+    pub name: String,
+    /// Its inside.
+    pub solid: Solid,
+    /// The number NETGEN gives it: 1 + position among all top-level objects of the file.
+    pub number: u32,
+    /// Upper bound of the mesh size inside (`-maxh` of the tlo, else of the solid).
+    pub maxh: Option<f64>,
+    /// Material name (`-material`).
+    pub material: Option<String>,
+    /// Colour, 0 to 1 each (`-col`).
+    pub color: Option<[f64; 3]>,
+    /// `-transparent`
+    pub transparent: bool,
+    /// `-layer`
+    pub layer: i32,
+    /// Where it stands in the file.
+    pub span: Span,
+}
+
+/// A point that is to be a mesh vertex (`point`).
+#[derive(Clone, Copy, Debug)]
+pub struct UserPoint {
+    /// Where the vertex is to be.
+    pub point: Point,
+    /// Where it stands in the file.
+    pub span: Span,
+}
+
+/// What a `.geo` file says.
+#[derive(Clone, Debug, Default)]
+pub struct Geometry {
+    /// The surfaces, equal ones made one.
+    pub surfaces: Vec<Surface>,
+    /// Beside each surface what the file says of it.
+    pub surface_info: Vec<SurfaceInfo>,
+    /// The bodies in file order.
+    pub bodies: Vec<Body>,
+    /// Points to be kept as mesh vertices.
+    pub user_points: Vec<UserPoint>,
+    /// The `boundingbox` statement: an override, never needed.
+    pub stated_box: Option<Aabb>,
+}

@@ -1,0 +1,97 @@
+//! Exact signs (adaptive predicates: Shewchuk 1997), the only place where they come from.
+//!
+//! Exact as long as products of the coordinates' differences neither overflow nor underflow:
+//! callers bring their input to a box of ordinary size first.
+
+use crate::Point;
+use robust::Coord3D;
+
+/// The sign of a determinant.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Sign {
+    /// Below zero.
+    Negative,
+    /// Exactly zero.
+    Zero,
+    /// Above zero.
+    Positive,
+}
+
+impl Sign {
+    /// The sign of a number that was computed exactly enough for its sign to be right.
+    fn of(value: f64) -> Self {
+        if value > 0.0 {
+            Self::Positive
+        } else if value < 0.0 {
+            Self::Negative
+        } else {
+            Self::Zero
+        }
+    }
+
+    /// Positive becomes negative and the other way round.
+    #[must_use]
+    pub fn flipped(self) -> Self {
+        match self {
+            Self::Negative => Self::Positive,
+            Self::Zero => Self::Zero,
+            Self::Positive => Self::Negative,
+        }
+    }
+}
+
+#[inline]
+fn coord(p: &Point) -> Coord3D<f64> {
+    Coord3D { x: p.x, y: p.y, z: p.z }
+}
+
+/// The sign of (b−a)×(c−a)·(d−a): positive where the tet a, b, c, d is positively oriented.
+#[inline]
+pub fn orient3d(a: &Point, b: &Point, c: &Point, d: &Point) -> Sign {
+    Sign::of(-robust::orient3d(coord(a), coord(b), coord(c), coord(d)))
+}
+
+/// Positive where `e` lies inside the circumsphere of the positively oriented tet a, b, c, d.
+#[inline]
+pub fn insphere(a: &Point, b: &Point, c: &Point, d: &Point, e: &Point) -> Sign {
+    Sign::of(-robust::insphere(coord(a), coord(b), coord(c), coord(d), coord(e)))
+}
+
+/// The sign of the area of the planar triangle a, b, c: positive counter-clockwise.
+#[inline]
+pub fn orient2d(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> Sign {
+    let coord = |p: [f64; 2]| robust::Coord { x: p[0], y: p[1] };
+    Sign::of(robust::orient2d(coord(a), coord(b), coord(c)))
+}
+
+/// Positive where `d` lies inside the circumcircle of the counter-clockwise triangle a, b, c.
+#[inline]
+pub fn incircle(a: [f64; 2], b: [f64; 2], c: [f64; 2], d: [f64; 2]) -> Sign {
+    let coord = |p: [f64; 2]| robust::Coord { x: p[0], y: p[1] };
+    Sign::of(robust::incircle(coord(a), coord(b), coord(c), coord(d)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_unit_tet_is_positive_and_holds_its_centre() {
+        let [o, x, y, z] =
+            [Point::new(0., 0., 0.), Point::new(1., 0., 0.), Point::new(0., 1., 0.), Point::new(0., 0., 1.)];
+        assert_eq!(orient3d(&o, &x, &y, &z), Sign::Positive);
+        assert_eq!(orient3d(&o, &y, &x, &z), Sign::Negative);
+        assert_eq!(orient3d(&o, &x, &y, &Point::new(0.3, 0.3, 0.)), Sign::Zero);
+        assert_eq!(insphere(&o, &x, &y, &z, &Point::new(0.5, 0.5, 0.5)), Sign::Positive);
+        assert_eq!(insphere(&o, &x, &y, &z, &Point::new(1., 1., 1.)), Sign::Zero);
+        assert_eq!(insphere(&o, &x, &y, &z, &Point::new(2., 1., 1.)), Sign::Negative);
+    }
+
+    #[test]
+    fn a_counter_clockwise_triangle_is_positive() {
+        let [a, b, c] = [[0., 0.], [1., 0.], [0., 1.]];
+        assert_eq!(orient2d(a, b, c), Sign::Positive);
+        assert_eq!(incircle(a, b, c, [0.9, 0.9]), Sign::Positive);
+        assert_eq!(incircle(a, b, c, [1., 1.]), Sign::Zero);
+    }
+}

@@ -1,0 +1,55 @@
+//! Volumes, areas and angles of simplices.
+
+use crate::{Point, Vector};
+
+/// Six times the signed volume of the tet a, b, c, d: (b−a)×(c−a)·(d−a). Not an exact sign.
+#[inline]
+pub fn volume6(a: &Point, b: &Point, c: &Point, d: &Point) -> f64 {
+    (b - a).cross(&(c - a)).dot(&(d - a))
+}
+
+/// The signed volume of the tet a, b, c, d.
+#[inline]
+pub fn volume(a: &Point, b: &Point, c: &Point, d: &Point) -> f64 {
+    volume6(a, b, c, d) / 6.0
+}
+
+/// Twice the area of the triangle a, b, c times its normal by the right-hand rule.
+#[inline]
+pub fn area_vector(a: &Point, b: &Point, c: &Point) -> Vector {
+    (b - a).cross(&(c - a))
+}
+
+/// The area of the triangle a, b, c.
+#[inline]
+pub fn area(a: &Point, b: &Point, c: &Point) -> f64 {
+    0.5 * area_vector(a, b, c).norm()
+}
+
+/// The six dihedral angles of a positively oriented tet in degrees, in the order of
+/// [`TET_EDGES`](crate::mesh::TET_EDGES).
+pub fn dihedral_angles(p: &[Point; 4]) -> [f64; 6] {
+    let normals = crate::mesh::TET_FACES.map(|[a, b, c]| {
+        let n = area_vector(&p[a], &p[b], &p[c]);
+        n / n.norm().max(f64::MIN_POSITIVE)
+    });
+    // The edge between vertices i and j lies on the faces opposite the other two.
+    const OTHER: [[usize; 2]; 6] = [[2, 3], [1, 3], [1, 2], [0, 3], [0, 2], [0, 1]];
+    OTHER.map(|[k, l]| (-normals[k].dot(&normals[l])).clamp(-1.0, 1.0).acos().to_degrees())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_corner_of_the_cube_has_three_right_angles() {
+        let p = [[0., 0., 0.], [1., 0., 0.], [0., 1., 0.], [0., 0., 1.]].map(Point::from);
+        assert_eq!(volume(&p[0], &p[1], &p[2], &p[3]), 1.0 / 6.0);
+        let angles = dihedral_angles(&p);
+        for (k, angle) in angles.iter().enumerate() {
+            let expected = if k < 3 { 90.0 } else { 54.735_610_317_245_346 };
+            assert!((angle - expected).abs() < 1e-9, "edge {k}: {angle}");
+        }
+    }
+}

@@ -1,0 +1,17 @@
+//! tetmill: from solid geometry to very large, partitioned tetrahedral meshes, in parallel.
+#![forbid(unsafe_code)]
+
+pub mod check;
+pub mod comm;
+pub mod dist;
+pub mod improve;
+pub mod io;
+pub mod kernel;
+pub mod mesh;
+pub mod partition;
+pub mod refine;
+pub mod size;
+pub mod surface;
+pub mod volume;
+
+pub use csg::{Point, Vector};

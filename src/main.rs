@@ -1,0 +1,6 @@
+//! The command `tetmill`.
+
+use csg as _;
+use tetmill as _;
+
+fn main() {}

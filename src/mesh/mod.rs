@@ -1,0 +1,75 @@
+//! Meshes: flat arrays of vertices and tets, classified on the geometry.
+
+pub mod ids;
+pub mod stream;
+
+pub use ids::{EdgeId, FaceId, GlobalId, Rank, TetId, VertexId};
+
+use crate::Point;
+use csg::{BodyId, CornerId, CurveId, PatchId};
+
+/// The faces of a tet, each opposite the vertex of its index, outward for a positively oriented tet.
+pub const TET_FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
+
+/// The edges of a tet, in lexicographic order.
+pub const TET_EDGES: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
+
+/// The geometric entity that a mesh entity lies on: the one of lowest dimension.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Hash, PartialOrd, Ord)]
+pub enum Class {
+    /// On a corner.
+    Corner(CornerId),
+    /// In the relative interior of a curve.
+    Curve(CurveId),
+    /// In the relative interior of a patch.
+    Patch(PatchId),
+    /// Inside a body.
+    Body(BodyId),
+}
+
+/// A triangle of the mesh that lies on a patch.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct BoundaryTriangle {
+    /// Its vertices; its normal by the right-hand rule is the patch's, from `inside` to `outside`.
+    pub vertices: [VertexId; 3],
+    /// The patch.
+    pub patch: PatchId,
+}
+
+/// An edge of the mesh that lies on a curve.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Segment {
+    /// Its end points in the direction of the curve.
+    pub vertices: [VertexId; 2],
+    /// The curve.
+    pub curve: CurveId,
+}
+
+/// A classified tetrahedral mesh on one rank.
+///
+/// An edge is on a curve only if it is one of `segments`; else on a patch only if it is an edge of a
+/// boundary triangle of it; else in a body. Faces likewise.
+#[derive(Clone, Debug, Default)]
+pub struct Mesh {
+    /// The vertices' coordinates.
+    pub points: Vec<Point>,
+    /// What each vertex lies on.
+    pub classes: Vec<Class>,
+    /// The tets, positively oriented: (v1−v0)×(v2−v0)·(v3−v0) > 0.
+    pub tets: Vec<[VertexId; 4]>,
+    /// The body of each tet.
+    pub bodies: Vec<BodyId>,
+    /// The triangles on patches, each once.
+    pub triangles: Vec<BoundaryTriangle>,
+    /// The edges on curves, each once.
+    pub segments: Vec<Segment>,
+}
+
+/// Numbers and names of bodies and boundaries, as the formats write them.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Names {
+    /// By [`BodyId`]: the body's number and its name (material, else the name of its solid).
+    pub bodies: Vec<(u32, String)>,
+    /// By [`PatchId`]: boundary number and name.
+    pub patches: Vec<(u32, String)>,
+}

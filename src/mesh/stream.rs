@@ -1,0 +1,94 @@
+//! Meshes as streams: what the checker, the statistics and the writers see of a part.
+//!
+//! A refined part is a function of its coarse mesh; its tets are produced block by block and never
+//! stored. A plain part is the same with blocks of one tet. Consumers ask for blocks, in any order
+//! and from several threads.
+//!
+//! ```text
+//! vertex block  = the fine vertices inside one coarse vertex, edge, face or tet: contiguous local
+//!                 indices, contiguous global ids, one list of holders
+//! tet block     = the children of one coarse tet: contiguous global ids, one body
+//! boundary block= the children of one boundary triangle, with the fine tets beside them
+//! ```
+
+use super::{GlobalId, Rank};
+use csg::{BodyId, PatchId};
+use std::ops::Range;
+
+/// Counts of one part or of the whole mesh.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// Vertices (copies counted, in a part).
+    pub vertices: u64,
+    /// Tets.
+    pub tets: u64,
+    /// Triangles on patches (an interface triangle between two parts counts in both).
+    pub boundary: u64,
+}
+
+/// Fine vertices inside one coarse entity.
+#[derive(Clone, Debug)]
+pub struct VertexBlock<'a> {
+    /// Local indices.
+    pub local: Range<u32>,
+    /// Global id of the first; the others follow one by one.
+    pub first_id: GlobalId,
+    /// All ranks that hold them, ascending; empty where only this rank does.
+    pub holders: &'a [Rank],
+    /// Whether they lie on the boundary (corner, curve or patch).
+    pub on_boundary: bool,
+}
+
+/// The children of one coarse tet.
+#[derive(Clone, Debug, Default)]
+pub struct TetBlock {
+    /// Vertices by local index, positively oriented.
+    pub tets: Vec<[u32; 4]>,
+    /// Global id of the first; the others follow one by one.
+    pub first_id: GlobalId,
+    /// Index of the first within the part; the others follow one by one.
+    pub first_local: u64,
+    /// The body of all.
+    pub body: Option<BodyId>,
+}
+
+/// The children of one boundary triangle.
+#[derive(Clone, Debug, Default)]
+pub struct BoundaryBlock {
+    /// Vertices by local index; normals from the patch's inside to its outside.
+    pub triangles: Vec<[u32; 3]>,
+    /// For each the fine tets of this part behind and in front of it, as indices within the part
+    /// (`first_local` + position); `u64::MAX` where there is none.
+    pub parents: Vec<[u64; 2]>,
+    /// The patch of all.
+    pub patch: Option<PatchId>,
+}
+
+/// No fine tet on this side, in [`BoundaryBlock::parents`].
+pub const NO_TET: u64 = u64::MAX;
+
+/// One rank's part of a mesh, as a stream of blocks. All functions are local.
+pub trait MeshStream: Sync {
+    /// This rank.
+    fn rank(&self) -> Rank;
+    /// The number of parts.
+    fn ranks(&self) -> u32;
+    /// Counts of this part.
+    fn counts(&self) -> Counts;
+    /// Counts of the whole mesh (each vertex once; `boundary` as the sum over patches, each triangle once).
+    fn totals(&self) -> Counts;
+    /// Coordinates by local vertex index.
+    fn points(&self) -> &[[f64; 3]];
+    /// The number of vertex blocks; together they cover each local vertex once, in ascending order.
+    fn vertex_blocks(&self) -> usize;
+    /// One vertex block (may be empty).
+    fn vertex_block(&self, index: usize) -> VertexBlock<'_>;
+    /// The number of tet blocks.
+    fn tet_blocks(&self) -> usize;
+    /// Fills `block` with one tet block, reusing its memory.
+    fn tet_block(&self, index: usize, block: &mut TetBlock);
+    /// The number of boundary blocks.
+    fn boundary_blocks(&self) -> usize;
+    /// Fills `block` with one boundary block, reusing its memory.
+    fn boundary_block(&self, index: usize, block: &mut BoundaryBlock);
+}

@@ -1,0 +1,1 @@
+//! Curves cut into segments.

@@ -1,0 +1,1 @@
+//! TetGen for comparison in tests.
