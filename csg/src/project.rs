@@ -281,6 +281,8 @@ mod tests {
     }
 
     proptest! {
+        #![proptest_config(crate::seeded())]
+
         #[test]
         fn a_point_near_a_curve_goes_to_a_near_point_of_both_surfaces(
             curve in 0..6u32,
