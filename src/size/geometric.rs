@@ -2,7 +2,7 @@
 
 use super::{Preset, SizeField, Source, SourceTree};
 use crate::{Point, Vector};
-use csg::{BodyId, Curve, Features, Geometry, Interval, SurfaceId};
+use csg::{BodyId, Curve, Features, Geometry, Interval, Solid, SurfaceId};
 
 /// What the user asks of the size, beside what the geometry says.
 #[derive(Clone, Debug)]
@@ -64,7 +64,8 @@ impl<'a> GeometricSize<'a> {
     /// Samples curves and patches for the sources of the field.
     pub fn new(geometry: &'a Geometry, features: &Features, settings: &SizeSettings) -> Self {
         let diagonal = features.bounds.diagonal();
-        let maximum = settings.scaled_bound(settings.maxh.unwrap_or(f64::INFINITY)).min(diagonal * settings.scale);
+        let maximum =
+            settings.scaled_bound(settings.maxh.unwrap_or(f64::INFINITY)).min(diagonal * settings.scale);
         let body_bounds: Vec<(BodyId, f64)> = geometry
             .bodies
             .iter()
@@ -85,7 +86,8 @@ impl<'a> GeometricSize<'a> {
 
 impl SizeField for GeometricSize<'_> {
     fn size_at(&self, point: &Point) -> f64 {
-        let inside = |body: &BodyId| self.geometry.bodies[body.index()].solid.contains(self.geometry, point);
+        let inside =
+            |body: &BodyId| contains(self.geometry, &self.geometry.bodies[body.index()].solid, point);
         let size = self.tree.size_at(point);
         self.body_bounds
             .iter()
@@ -182,7 +184,8 @@ impl Sampler<'_> {
         if own >= self.maximum && constant {
             return;
         }
-        let coarsest = if constant { f64::INFINITY } else { COARSEST_SAMPLE * self.features.bounds.diagonal() };
+        let coarsest =
+            if constant { f64::INFINITY } else { COARSEST_SAMPLE * self.features.bounds.diagonal() };
         if edge > coarsest.min(SAMPLE_SPACING * own) {
             return self.split_cell(surface, min, edge, sources);
         }
@@ -197,8 +200,7 @@ impl Sampler<'_> {
             return;
         }
         for child in 0..8 {
-            let offset =
-                Vector::from_fn(|axis, _| if child >> axis & 1 == 1 { 0.5 * edge } else { 0.0 });
+            let offset = Vector::from_fn(|axis, _| if child >> axis & 1 == 1 { 0.5 * edge } else { 0.0 });
             self.sample_cell(surface, min + offset, 0.5 * edge, sources);
         }
     }
@@ -219,7 +221,7 @@ impl Sampler<'_> {
     fn size_of_sample(&self, surface: SurfaceId, point: &Point) -> Option<f64> {
         let step = SIDE_STEP * self.features.bounds.diagonal();
         let normal = self.geometry.surfaces[surface.index()].normal(point);
-        let sides = [point - step * normal, point + step * normal].map(|p| self.geometry.body_at(&p));
+        let sides = [point - step * normal, point + step * normal].map(|p| body_at(self.geometry, &p));
         if sides[0] == sides[1] {
             return None;
         }
@@ -227,6 +229,21 @@ impl Sampler<'_> {
         let size = bounds.map(|(_, b)| *b).fold(self.size_on(surface, point), f64::min);
         (size < self.maximum).then_some(size)
     }
+}
+
+fn contains(geometry: &Geometry, solid: &Solid, point: &Point) -> bool {
+    match solid {
+        Solid::Half { surface, positive } => {
+            (geometry.surfaces[surface.index()].value(point) > 0.0) == *positive
+        }
+        Solid::And(members) => members.iter().all(|m| contains(geometry, m, point)),
+        Solid::Or(members) => members.iter().any(|m| contains(geometry, m, point)),
+        Solid::Not(member) => !contains(geometry, member, point),
+    }
+}
+
+fn body_at(geometry: &Geometry, point: &Point) -> Option<BodyId> {
+    geometry.bodies.iter().position(|b| contains(geometry, &b.solid, point)).map(BodyId::new)
 }
 
 /// Curvature at each point of a trace: that of the circle through it and its neighbours.

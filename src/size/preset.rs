@@ -67,9 +67,11 @@ impl std::str::FromStr for Preset {
     /// Hyphens and underscores are the same.
     fn from_str(name: &str) -> Result<Self, String> {
         let name = name.replace('_', "-");
-        Self::ALL.iter().find(|(_, n)| *n == name).map(|(preset, _)| *preset).ok_or_else(|| {
-            format!("no preset `{name}`; there are {}", Self::ALL.map(|(_, n)| n).join(", "))
-        })
+        Self::ALL
+            .iter()
+            .find(|(_, n)| *n == name)
+            .map(|(preset, _)| *preset)
+            .ok_or_else(|| format!("no preset `{name}`; there are {}", Self::ALL.map(|(_, n)| n).join(", ")))
     }
 }
 

@@ -34,8 +34,7 @@ pub fn mesh_curves(
     size: &dyn SizeField,
 ) -> Result<SurfaceMesh, CurveError> {
     let samplings: Vec<Sampling> = features.curves.iter().map(|c| Sampling::new(c, size)).collect();
-    let mut counts: Vec<usize> =
-        features.curves.iter().zip(&samplings).map(|(c, s)| s.segments(c)).collect();
+    let mut counts: Vec<usize> = features.curves.iter().zip(&samplings).map(|(c, s)| s.segments(c)).collect();
     part_curves_with_the_same_ends(features, &mut counts);
 
     let mut mesh = SurfaceMesh::default();
@@ -162,7 +161,8 @@ fn turn(trace: &[Point], closed: bool) -> f64 {
     // The ends of an open trace turn on for half a step each.
     let turns: Vec<f64> =
         directions.windows(2).map(|w| w[0].cross(&w[1]).norm().atan2(w[0].dot(&w[1]))).collect();
-    let ends = if closed { 0.0 } else { 0.5 * (turns.first().unwrap_or(&0.0) + turns.last().unwrap_or(&0.0)) };
+    let ends =
+        if closed { 0.0 } else { 0.5 * (turns.first().unwrap_or(&0.0) + turns.last().unwrap_or(&0.0)) };
     turns.iter().sum::<f64>() + ends
 }
 
@@ -213,9 +213,8 @@ fn sagittas(mesh: &SurfaceMesh, features: &Features) -> Vec<f64> {
         let curve = features.curve(group[0].curve);
         // An arc of turning angle θ and chord c has the sagitta c/2·tan(θ/4).
         let angle = turn(&curve.trace, curve.ends.is_none()) / group.len() as f64;
-        let chord = |s: &Segment| {
-            (mesh.points[s.vertices[1].index()] - mesh.points[s.vertices[0].index()]).norm()
-        };
+        let chord =
+            |s: &Segment| (mesh.points[s.vertices[1].index()] - mesh.points[s.vertices[0].index()]).norm();
         // Equal metric lengths need not turn equally: doubled to be on the safe side.
         let share = if angle < 1e-9 { 0.0 } else { (0.5 * angle).min(1.2).tan() };
         out.extend(group.iter().map(|s| 0.5 * chord(s) * share));
@@ -271,10 +270,8 @@ mod tests {
                 0.1 + 0.3 * p.x
             }
         }
-        let line = curve(
-            vec![Point::new(0., 0., 0.), Point::new(1., 0., 0.)],
-            Some([CornerId(0), CornerId(1)]),
-        );
+        let line =
+            curve(vec![Point::new(0., 0., 0.), Point::new(1., 0., 0.)], Some([CornerId(0), CornerId(1)]));
         let sampling = Sampling::new(&line, &Growing);
         // The integral of dx / (0.1 + 0.3x) from 0 to 1 is ln(4)/0.3 = 4.62.
         assert!((sampling.metric.last().unwrap() - 4.621).abs() < 0.02);
