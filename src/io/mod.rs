@@ -1,1 +1,154 @@
-//! (to come)
+//! Files: one format per module, written from a [`MeshStream`](crate::mesh::stream::MeshStream), never from a
+//! whole mesh in memory.
+//!
+//! ```text
+//! elmer     DIR/partitioning.N/part.K.* and DIR/mesh.*      every rank writes its part; read back and judged
+//! vtu       STEM.vtu, or STEM.pvtu with a file per part      raw binary, for ParaView and meshio
+//! geomview  FILE.off / FILE.list: what the thesis looked at   the skin, a colour per part
+//! gmsh, medit, netgen                                         one part, one file
+//! ```
+//! All writers go through [`output`]: what is written stands in a temporary folder beside the target until every
+//! rank is done, and only then takes the place of what was there. A writer that fails leaves the old files as
+//! they were. Numbers in text read back to the same bits.
+
+pub mod chunks;
+pub mod elmer;
+pub mod output;
+pub mod plain;
+#[cfg(test)]
+mod testing;
+pub mod text;
+
+use crate::comm::{CommError, Communicator};
+use crate::mesh::Rank;
+use csg::{BodyId, PatchId};
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// What was written, summed over all ranks.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Written {
+    /// Files, hard links counted.
+    pub files: u64,
+    /// Bytes on disk.
+    pub bytes: u64,
+}
+
+impl std::ops::AddAssign for Written {
+    fn add_assign(&mut self, other: Self) {
+        self.files += other.files;
+        self.bytes += other.bytes;
+    }
+}
+
+/// Why nothing was written.
+#[derive(Debug, thiserror::Error)]
+pub enum WriteError {
+    /// The operating system refused.
+    #[error("cannot write {}: {source}", path.display())]
+    Io {
+        /// The file or folder.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// The disk is too small.
+    #[error(
+        "{} has {available} bytes free and about {needed} are needed; write elsewhere, or ask for fewer tets",
+        path.display()
+    )]
+    NoSpace {
+        /// The folder.
+        path: PathBuf,
+        /// The estimate.
+        needed: u64,
+        /// What is free.
+        available: u64,
+    },
+    /// More entities than the format can number.
+    #[error("the format {format} numbers {what} up to {limit}, and there are {count}; write another format")]
+    TooMany {
+        /// The format.
+        format: &'static str,
+        /// What there are too many of.
+        what: &'static str,
+        /// How many.
+        count: u64,
+        /// The most that it can number.
+        limit: u64,
+    },
+    /// A line that Elmer would cut.
+    #[error(
+        "Elmer reads 256 characters and 64 numbers of a line; vertex {vertex} is in {parts} parts, which takes \
+         {characters} characters: use fewer parts"
+    )]
+    SharedLine {
+        /// The vertex.
+        vertex: u64,
+        /// How many parts hold it.
+        parts: usize,
+        /// How long its line would be.
+        characters: usize,
+    },
+    /// A part without tets.
+    #[error("part {0} has no tets, which Elmer does not accept: use fewer parts or a finer mesh")]
+    EmptyPart(u32),
+    /// A body without number and name.
+    #[error("body {} has no number to be written", .0.0)]
+    UnknownBody(BodyId),
+    /// A patch without number and name.
+    #[error("patch {} has no boundary number to be written", .0.0)]
+    UnknownPatch(PatchId),
+    /// Something else stands where the output belongs.
+    #[error("{} is in the way: a folder where a file belongs, or a file where a folder belongs", .0.display())]
+    InTheWay(PathBuf),
+    /// The ranks could not agree.
+    #[error(transparent)]
+    Comm(#[from] CommError),
+    /// Another rank failed; it has the same message.
+    #[error("rank {rank}: {message}")]
+    OtherRank {
+        /// The first rank that failed.
+        rank: Rank,
+        /// Its message.
+        message: String,
+    },
+}
+
+impl WriteError {
+    /// Turns what the system said of `path` into an error.
+    pub fn io(path: &Path) -> impl FnOnce(io::Error) -> Self + '_ {
+        move |source| Self::Io { path: path.to_path_buf(), source }
+    }
+}
+
+/// **Collective.** The numbers that each rank gives, by rank.
+pub(crate) fn all_gather_numbers(
+    comm: &dyn Communicator,
+    numbers: &[u64],
+) -> Result<Vec<Vec<u64>>, CommError> {
+    let all = comm.all_gather_bytes(bytemuck::cast_slice(numbers))?;
+    Ok(all.iter().map(|bytes| numbers_of(bytes)).collect())
+}
+
+/// The numbers that a rank of this machine or its twin sent as bytes.
+pub(crate) fn numbers_of(bytes: &[u8]) -> Vec<u64> {
+    let (numbers, rest) = bytes.as_chunks::<8>();
+    assert!(rest.is_empty(), "a message of {} bytes holds no whole count of numbers", bytes.len());
+    numbers.iter().map(|&b| u64::from_ne_bytes(b)).collect()
+}
+
+/// **Collective.** Every rank's own result where all went well; else every rank gets an error, its own or that
+/// of the first rank that failed.
+pub(crate) fn agree<T>(comm: &dyn Communicator, result: Result<T, WriteError>) -> Result<T, WriteError> {
+    let message = result.as_ref().err().map(ToString::to_string).unwrap_or_default();
+    let all = comm.all_gather_bytes(message.as_bytes())?;
+    let value = result?;
+    match all.iter().position(|m| !m.is_empty()) {
+        None => Ok(value),
+        Some(rank) => Err(WriteError::OtherRank {
+            rank: rank as Rank,
+            message: String::from_utf8_lossy(&all[rank]).into_owned(),
+        }),
+    }
+}
