@@ -18,9 +18,10 @@ pub mod plain;
 #[cfg(test)]
 mod testing;
 pub mod text;
+pub mod vtu;
 
 use crate::comm::{CommError, Communicator};
-use crate::mesh::Rank;
+use crate::mesh::{GlobalId, Names, Rank};
 use csg::{BodyId, PatchId};
 use std::io;
 use std::path::{Path, PathBuf};
@@ -122,6 +123,31 @@ impl WriteError {
     }
 }
 
+/// The rank that numbers and writes a shared vertex: the rule of the whole project, even over ranks, and known to
+/// all holders without a message.
+pub(crate) fn owner(holders: &[Rank], id: GlobalId) -> Rank {
+    holders[(id % holders.len() as u64) as usize]
+}
+
+/// The largest number of a body or boundary: formats keep them in 32 bits.
+const MAX_NUMBER: u32 = i32::MAX as u32;
+
+/// The number of a block's body, at least 1.
+pub(crate) fn body_number(body: Option<BodyId>, names: &Names) -> Result<u64, WriteError> {
+    let body = body.expect("a tet block has a body");
+    number_of(&names.bodies, body.index()).ok_or(WriteError::UnknownBody(body))
+}
+
+/// The number of a block's patch, at least 1.
+pub(crate) fn patch_number(patch: Option<PatchId>, names: &Names) -> Result<u64, WriteError> {
+    let patch = patch.expect("a boundary block has a patch");
+    number_of(&names.patches, patch.index()).ok_or(WriteError::UnknownPatch(patch))
+}
+
+fn number_of(list: &[(u32, String)], index: usize) -> Option<u64> {
+    list.get(index).map(|(number, _)| *number).filter(|n| (1..=MAX_NUMBER).contains(n)).map(u64::from)
+}
+
 /// **Collective.** The numbers that each rank gives, by rank.
 pub(crate) fn all_gather_numbers(
     comm: &dyn Communicator,
@@ -129,6 +155,15 @@ pub(crate) fn all_gather_numbers(
 ) -> Result<Vec<Vec<u64>>, CommError> {
     let all = comm.all_gather_bytes(bytemuck::cast_slice(numbers))?;
     Ok(all.iter().map(|bytes| numbers_of(bytes)).collect())
+}
+
+/// **Collective.** What all ranks have written.
+pub(crate) fn sum_written(comm: &dyn Communicator, written: Written) -> Result<Written, WriteError> {
+    let mut sum = Written::default();
+    for of_rank in all_gather_numbers(comm, &[written.files, written.bytes])? {
+        sum += Written { files: of_rank[0], bytes: of_rank[1] };
+    }
+    Ok(sum)
 }
 
 /// The numbers that a rank of this machine or its twin sent as bytes.

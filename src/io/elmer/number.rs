@@ -1,7 +1,7 @@
 //! The numbers that Elmer's files bear: compact per part, since Elmer sizes its tables by the range of ids in a part.
 
 use crate::comm::Communicator;
-use crate::io::{WriteError, all_gather_numbers, numbers_of};
+use crate::io::{WriteError, all_gather_numbers, numbers_of, owner};
 use crate::mesh::stream::MeshStream;
 use crate::mesh::{GlobalId, Rank};
 
@@ -14,12 +14,6 @@ pub(super) struct Numbering {
     pub first_tet: u64,
     /// How many vertices of this part others hold too.
     pub shared: u64,
-}
-
-/// The rank that numbers and writes a vertex (the rule of the whole project: even over ranks, and known to all
-/// holders without a message).
-pub(super) fn owner(holders: &[Rank], id: GlobalId) -> Rank {
-    holders[(id % holders.len() as u64) as usize]
 }
 
 /// **Collective.** Numbers the vertices so that those that a part owns are neighbours, and the tets so that those

@@ -1,12 +1,12 @@
 //! Writing Elmer's files.
 
-use super::number::{Numbering, number, owner};
+use super::number::{Numbering, number};
 use super::{MAX_ID, MAX_LINE, TET, TRIANGLE};
 use crate::comm::Communicator;
 use crate::io::chunks::{items, split, write_chunks};
 use crate::io::output::{Output, write_text, write_together};
 use crate::io::text::{Line, digits};
-use crate::io::{WriteError, Written, agree, all_gather_numbers};
+use crate::io::{WriteError, Written, agree, body_number, owner, patch_number, sum_written};
 use crate::mesh::Names;
 use crate::mesh::stream::{BoundaryBlock, MeshStream, NO_TET, TetBlock};
 use std::fs;
@@ -52,11 +52,7 @@ pub fn write(
         }
         Ok(written)
     })?;
-    let all = all_gather_numbers(comm, &[written.files, written.bytes])?;
-    Ok(all.iter().fold(Written::default(), |mut sum, w| {
-        sum += Written { files: w[0], bytes: w[1] };
-        sum
-    }))
+    sum_written(comm, written)
 }
 
 /// The files of a replaced `partitioning.N` that may go.
@@ -79,10 +75,6 @@ fn check_limits(part: &dyn MeshStream) -> Result<(), WriteError> {
         return Err(WriteError::EmptyPart(part.rank() + 1));
     }
     Ok(())
-}
-
-fn number_of(list: &[(u32, String)], index: usize) -> Option<u64> {
-    list.get(index).map(|(number, _)| u64::from(*number)).filter(|&number| number > 0 && number <= MAX_ID)
 }
 
 /// The line of a shared vertex must survive the reader, whatever part it stands in.
@@ -177,8 +169,7 @@ fn write_elements(
         let mut block = TetBlock::default();
         for index in items(chunk, per_chunk, part.tet_blocks()) {
             part.tet_block(index, &mut block);
-            let body = block.body.expect("a tet block has a body");
-            let number = number_of(&names.bodies, body.index()).ok_or(WriteError::UnknownBody(body))?;
+            let number = body_number(block.body, names)?;
             for (id, tet) in (numbering.first_tet + block.first_local..).zip(&block.tets) {
                 line.int(id).blank().int(number).blank().int(TET.into());
                 for &v in tet {
@@ -206,8 +197,7 @@ fn write_boundary(
     let mut id = 0;
     for index in 0..part.boundary_blocks() {
         part.boundary_block(index, &mut block);
-        let patch = block.patch.expect("a boundary block has a patch");
-        let number = number_of(&names.patches, patch.index()).ok_or(WriteError::UnknownPatch(patch))?;
+        let number = patch_number(block.patch, names)?;
         for (triangle, parents) in block.triangles.iter().zip(&block.parents) {
             id += 1;
             line.int(id).blank().int(number);
