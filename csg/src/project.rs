@@ -53,6 +53,11 @@ impl Projector {
         &self.surfaces[self.patches[patch.index()].index()]
     }
 
+    /// The two surfaces of `curve`.
+    pub fn curve_surfaces(&self, curve: CurveId) -> [&Surface; 2] {
+        self.curves[curve.index()].map(|surface| &self.surfaces[surface.index()])
+    }
+
     /// Everything as plain numbers, to be sent to other ranks.
     pub fn encode(&self) -> Vec<f64> {
         todo!()

@@ -40,6 +40,15 @@ impl Sign {
     }
 }
 
+/// Bounds the error of a volume in floating point, to tell signs without the exact predicate.
+///
+/// For u, v, w the rounded differences of a tet's corners, the sum u·(v×w) is off by at most this times the same
+/// sum of absolute values (Shewchuk 1997, section 4.3, the bound A of `orient3d`: (7 + 56ε)ε, ε = 2⁻⁵³).
+pub const ORIENT3D_ERROR: f64 = (7.0 + 56.0 * HALF_ULP) * HALF_ULP;
+
+/// ε = 2⁻⁵³, the relative error of one rounding.
+const HALF_ULP: f64 = f64::EPSILON / 2.0;
+
 #[inline]
 fn coord(p: &Point) -> Coord3D<f64> {
     Coord3D { x: p.x, y: p.y, z: p.z }
