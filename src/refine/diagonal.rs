@@ -122,7 +122,7 @@ mod tests {
     #[test]
     fn the_best_diagonal_of_a_stretched_octahedron_is_its_shortest() {
         // Edges 01 and 23 nearly touch: their midpoints make the shortest diagonal. Renaming corners renames it.
-        let tet = [[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, -1.0, 0.4], [0.0, 1.0, 0.4]];
+        let tet = [[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.4], [0.0, -1.0, 0.4]];
         assert_eq!(best_of_tet(&tet), 0);
         assert_eq!(best_of_tet(&[tet[0], tet[2], tet[3], tet[1]]), 2);
         assert_eq!(best_of_tet(&[tet[0], tet[3], tet[1], tet[2]]), 1);
