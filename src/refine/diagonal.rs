@@ -71,9 +71,11 @@ pub fn best_of_tet(corners: &[Coordinates; 4]) -> u8 {
         };
         [0, 1, 2].map(|x| corners[p][x] + corners[q][x])
     };
-    best(OCTAHEDRON.map(|children| {
-        children.iter().map(|child| shape(child.map(twice))).fold(f64::INFINITY, f64::min)
-    }))
+    best(
+        OCTAHEDRON.map(|children| {
+            children.iter().map(|child| shape(child.map(twice))).fold(f64::INFINITY, f64::min)
+        }),
+    )
 }
 
 /// The diagonal with the largest worst shape, the first of equals.

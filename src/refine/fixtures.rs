@@ -8,7 +8,9 @@ use crate::mesh::{
 };
 use crate::refine::RefinedMesh;
 use csg::primitive::{Cylinder, Plane, Sphere};
-use csg::{Aabb, BodyId, CornerId, Curve, CurveId, Features, Geometry, Patch, PatchId, Projector, Surface, SurfaceId};
+use csg::{
+    Aabb, BodyId, CornerId, Curve, CurveId, Features, Geometry, Patch, PatchId, Projector, Surface, SurfaceId,
+};
 use csg::{Point as P, Vector};
 
 /// A mesh and what it is snapped to.
@@ -92,7 +94,8 @@ fn classified(
         .iter()
         .map(|t| BoundaryTriangle { vertices: t.3.map(VertexId::new), patch: PatchId(t.2) })
         .collect();
-    mesh.segments = segments.iter().map(|s| Segment { vertices: s.0.map(VertexId::new), curve: s.1 }).collect();
+    mesh.segments =
+        segments.iter().map(|s| Segment { vertices: s.0.map(VertexId::new), curve: s.1 }).collect();
     mesh
 }
 
@@ -116,7 +119,9 @@ pub fn cube(k: usize, halves: bool) -> Fixture {
     }
     let on: Vec<Vec<u32>> = points
         .iter()
-        .map(|p| (0..planes.len() as u32).filter(|i| p[planes[*i as usize].0] == planes[*i as usize].1).collect())
+        .map(|p| {
+            (0..planes.len() as u32).filter(|i| p[planes[*i as usize].0] == planes[*i as usize].1).collect()
+        })
         .collect();
     let (mut tets, mut bodies) = (Vec::new(), Vec::new());
     for z in 0..k {
@@ -239,7 +244,8 @@ pub fn cylinder(layers: usize) -> Fixture {
 pub fn as_mesh(refined: &RefinedMesh) -> Mesh {
     let coarse = refined.coarse();
     let n = refined.pieces();
-    let mut mesh = Mesh { points: refined.points().iter().map(|p| Point::from(*p)).collect(), ..Mesh::default() };
+    let mut mesh =
+        Mesh { points: refined.points().iter().map(|p| Point::from(*p)).collect(), ..Mesh::default() };
     let classes = coarse.vertex_classes.iter().map(|c| (c, 1));
     let classes = classes.chain(coarse.edge_classes.iter().map(|c| (c, n - 1)));
     let classes = classes.chain(coarse.face_classes.iter().map(|c| (c, (n - 1) * (n - 2) / 2)));
@@ -299,16 +305,10 @@ fn at<T: Ord>(all: &[T], one: &T) -> usize {
 
 impl Entities {
     fn new(mesh: &Mesh) -> Self {
-        let mut edges: Vec<_> = mesh
-            .tets
-            .iter()
-            .flat_map(|tet| TET_EDGES.map(|e| sorted(e.map(|k| tet[k].0))))
-            .collect();
-        let mut faces: Vec<_> = mesh
-            .tets
-            .iter()
-            .flat_map(|tet| TET_FACES.map(|f| sorted(f.map(|k| tet[k].0))))
-            .collect();
+        let mut edges: Vec<_> =
+            mesh.tets.iter().flat_map(|tet| TET_EDGES.map(|e| sorted(e.map(|k| tet[k].0)))).collect();
+        let mut faces: Vec<_> =
+            mesh.tets.iter().flat_map(|tet| TET_FACES.map(|f| sorted(f.map(|k| tet[k].0)))).collect();
         edges.sort_unstable();
         edges.dedup();
         faces.sort_unstable();
@@ -331,12 +331,8 @@ impl Entities {
     fn part(&self, mesh: &Mesh, rank_of: &[Rank], rank: Rank, ranks: u32) -> DistMesh {
         let mine: Vec<usize> = (0..mesh.tets.len()).filter(|t| rank_of[*t] == rank).collect();
         let vertices_of = |t: usize| mesh.tets[t].map(|v| v.index());
-        let edges_of = |t: usize| {
-            TET_EDGES.map(|e| at(&self.edges, &sorted(e.map(|k| mesh.tets[t][k].0))))
-        };
-        let faces_of = |t: usize| {
-            TET_FACES.map(|f| at(&self.faces, &sorted(f.map(|k| mesh.tets[t][k].0))))
-        };
+        let edges_of = |t: usize| TET_EDGES.map(|e| at(&self.edges, &sorted(e.map(|k| mesh.tets[t][k].0))));
+        let faces_of = |t: usize| TET_FACES.map(|f| at(&self.faces, &sorted(f.map(|k| mesh.tets[t][k].0))));
         let (vertices, shared_vertices) = used(mesh.points.len(), rank_of, rank, vertices_of);
         let (edges, shared_edges) = used(self.edges.len(), rank_of, rank, edges_of);
         let (faces, shared_faces) = used(self.faces.len(), rank_of, rank, faces_of);

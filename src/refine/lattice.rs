@@ -219,7 +219,9 @@ mod tests {
         let [p, q, r, s] = child.map(corner);
         let minus = |x: [i64; 3]| [x[0] - p[0], x[1] - p[1], x[2] - p[2]];
         let [u, v, w] = [minus(q), minus(r), minus(s)];
-        u[0] * (v[1] * w[2] - v[2] * w[1]) + u[1] * (v[2] * w[0] - v[0] * w[2]) + u[2] * (v[0] * w[1] - v[1] * w[0])
+        u[0] * (v[1] * w[2] - v[2] * w[1])
+            + u[1] * (v[2] * w[0] - v[0] * w[2])
+            + u[2] * (v[0] * w[1] - v[1] * w[0])
     }
 
     #[test]

@@ -27,7 +27,7 @@ pub use refined::RefinedMesh;
 pub use stored::StoredMesh;
 
 #[cfg(test)]
-mod fixtures;
+pub(crate) mod fixtures;
 #[cfg(test)]
 mod tests;
 
@@ -67,7 +67,10 @@ pub enum RefineError {
         needed: u128,
     },
     /// Local tet ids are 32-bit where tets are stored.
-    #[error("rank {rank} would store {needed} tets, above the {} of one part: take more parts or stream", u32::MAX)]
+    #[error(
+        "rank {rank} would store {needed} tets, above the {} of one part: take more parts or stream",
+        u32::MAX
+    )]
     TooManyTets {
         /// The rank.
         rank: Rank,

@@ -38,7 +38,9 @@ impl Place {
     fn of(class: Class, projector: &Projector) -> Self {
         let is_plane = |surface: &Surface| matches!(surface, Surface::Plane(_));
         match class {
-            Class::Curve(curve) if !projector.curve_surfaces(curve).into_iter().all(is_plane) => Self::Curve(curve),
+            Class::Curve(curve) if !projector.curve_surfaces(curve).into_iter().all(is_plane) => {
+                Self::Curve(curve)
+            }
             Class::Patch(patch) if !is_plane(projector.patch_surface(patch)) => Self::Patch(patch),
             _ => Self::Free,
         }
@@ -234,4 +236,3 @@ impl Triangle {
         Ok(())
     }
 }
-

@@ -1,7 +1,8 @@
 //! Refinement of a cube, a ball and a cylinder, whole and in parts.
 
-use super::fixtures::{Fixture, as_mesh, ball, cube, cylinder, whole};
+use super::fixtures::{Fixture, as_mesh, ball, cube, cylinder, split, whole};
 use super::*;
+use crate::check::{Checksum, PartReport, check_part, checksum};
 use crate::kernel::predicates::{Sign, orient3d};
 use crate::kernel::simplex::volume;
 use crate::mesh::TET_FACES;
@@ -61,7 +62,11 @@ fn check_conformity(mesh: &dyn MeshStream) {
             assert_eq!(beside.len(), parents.iter().filter(|p| **p != NO_TET).count());
             for (tet, face) in beside {
                 let behind = is_rotation(*face, *triangle);
-                assert_eq!(parents[usize::from(!behind)], *tet, "triangle {triangle:?}, {parents:?}, {beside:?}");
+                assert_eq!(
+                    parents[usize::from(!behind)],
+                    *tet,
+                    "triangle {triangle:?}, {parents:?}, {beside:?}"
+                );
             }
             assert!(boundary.insert(key, block.patch).is_none(), "{triangle:?} twice");
         }
@@ -74,8 +79,10 @@ fn check_conformity(mesh: &dyn MeshStream) {
         }
     }
     assert_eq!(mesh.counts().boundary, boundary.len() as u64);
-    let edges: std::collections::BTreeSet<_> =
-        tets.iter().flat_map(|t| crate::mesh::TET_EDGES.map(|[i, j]| [t[i].min(t[j]), t[i].max(t[j])])).collect();
+    let edges: std::collections::BTreeSet<_> = tets
+        .iter()
+        .flat_map(|t| crate::mesh::TET_EDGES.map(|[i, j]| [t[i].min(t[j]), t[i].max(t[j])]))
+        .collect();
     let euler = mesh.counts().vertices as i64 - edges.len() as i64 + sides.len() as i64 - tets.len() as i64;
     assert_eq!(euler, 1, "a ball, topologically");
 }
@@ -143,7 +150,10 @@ fn boundary_vertices_are_on_their_patches() {
             for vertex in block.triangles.iter().flatten() {
                 let point = Point::from(mesh.points()[*vertex as usize]);
                 let distance = fixture.projector.patch_distance(patch, &point);
-                assert!(distance <= fixture.projector.tolerance(), "{point} is {distance} off patch {patch:?}");
+                assert!(
+                    distance <= fixture.projector.tolerance(),
+                    "{point} is {distance} off patch {patch:?}"
+                );
             }
         }
     }
@@ -165,7 +175,10 @@ fn refining_twice_gives_the_points_of_refining_once_on_edges_and_faces_and_insid
         for index in 0..again.boundary_blocks() {
             again.boundary_block(index, &mut block);
             for vertex in block.triangles.iter().flatten() {
-                assert!(all.binary_search(&key(&again.points()[*vertex as usize])).is_ok(), "vertex {vertex}");
+                assert!(
+                    all.binary_search(&key(&again.points()[*vertex as usize])).is_ok(),
+                    "vertex {vertex}"
+                );
             }
         }
     }
@@ -213,6 +226,66 @@ fn pieces_that_are_no_power_of_two_are_refused() {
     for n in [0, 3, 6, 2048] {
         let fixture = cube(1, false);
         let error = refine(whole(&fixture.mesh), &fixture.projector, n, &Settings::default());
-        assert_eq!(error.expect_err("refused"), RefineError::Pieces { n });
+        assert_eq!(error.err(), Some(RefineError::Pieces { n }));
     }
+}
+
+/// The checksum of a mesh in parts, each refined by itself, and the merged report.
+fn in_parts(fixture: &Fixture, n: u32, ranks: u32) -> (Checksum, PartReport) {
+    // Slabs of tets dealt out in turn: ragged parts that touch in vertices, edges and faces alike.
+    let rank_of: Vec<Rank> = (0..fixture.mesh.tets.len() as u32).map(|t| t / 3 % ranks).collect();
+    let settings = crate::check::Settings::default();
+    let parts = split(&fixture.mesh, &rank_of, ranks).into_iter().map(|part| {
+        let part = refine(part, &fixture.projector, n, &Settings::default()).expect("refinable");
+        (checksum(&part), check_part(&part, Some(&fixture.projector), &settings))
+    });
+    parts.reduce(|a, b| (a.0.plus(b.0), a.1.merged(b.1, 8))).expect("a part")
+}
+
+#[test]
+fn every_number_of_ranks_makes_the_same_mesh() {
+    for fixture in [ball(1.0), cylinder(2), cube(2, true)] {
+        let (sum, report) = in_parts(&fixture, 4, 1);
+        assert_eq!(sum.open, 0, "each face is matched");
+        for ranks in [2, 3, 4, 7, 16] {
+            let (others, parts) = in_parts(&fixture, 4, ranks);
+            assert_eq!(others, sum, "{ranks} ranks");
+            assert_eq!(parts.faults, 0, "{:?}", parts.described);
+            let counts = |r: &PartReport| [r.vertices, r.tets, r.boundary];
+            assert_eq!(counts(&parts), counts(&report));
+            assert!((parts.volume / report.volume - 1.0).abs() < 1e-14);
+            let shape = |r: &PartReport| {
+                let s = r.shape.clone().expect("tets");
+                (s.worst_ratio, s.smallest_angle, s.largest_angle, s.smallest_angles, s.ratios)
+            };
+            assert_eq!(shape(&parts), shape(&report));
+        }
+    }
+}
+
+#[test]
+fn every_number_of_threads_makes_the_same_mesh_and_the_same_report() {
+    let fixture = cylinder(3);
+    let with = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+        pool.install(|| in_parts(&fixture, 8, 2))
+    };
+    assert_eq!(with(1), with(2));
+}
+
+#[test]
+fn coarse_tets_whose_children_would_invert_are_named() {
+    // One tet outside the sphere, so low over its face that the snapped face bulges through its tip.
+    let Fixture { mut mesh, projector } = ball(1.0);
+    let [_, p, q, r] = mesh.tets[7];
+    let centroid = [p, q, r].map(|v| mesh.points[v.index()].coords).iter().sum::<Vector>() / 3.0;
+    mesh.points[0] = Point::from(centroid * 1.05);
+    mesh.tets = vec![[crate::mesh::VertexId(0), p, r, q]];
+    mesh.triangles.retain(|t| t.vertices.iter().all(|v| [p, q, r].contains(v)));
+    let error = refine(whole(&mesh), &projector, 8, &Settings::default()).err().expect("inverted");
+    let RefineError::Inverted { children, coarse, faults } = &error else { panic!("{error}") };
+    assert!((1..512).contains(children));
+    assert_eq!(coarse, &[0]);
+    assert_eq!(faults.len(), 8.min(*children as usize));
+    assert!(matches!(faults[0], Fault::NotPositive { tet: 0..512, .. }), "{error}");
 }

@@ -12,7 +12,7 @@ use super::{RefineError, Settings};
 use crate::Point;
 use crate::check::Fault;
 use crate::dist::DistMesh;
-use crate::kernel::predicates::{ORIENT3D_ERROR, Sign, orient3d};
+use crate::kernel::predicates::{Sign, orient3d, volume6_and_error};
 use crate::mesh::{GlobalId, TetId};
 use csg::Projector;
 use rayon::iter::Either;
@@ -345,7 +345,7 @@ impl Run<'_> {
         let run = Run { axes: self.axes.map(|axis| axis.map(|corner| &corner[..self.count])), ..*self };
         let mut unsure = false;
         for i in 0..self.count {
-            let (volume, error) = volume6(run.edges(i));
+            let (volume, error) = volume6_and_error(run.edges(i));
             unsure |= !(volume > error);
         }
         !unsure
@@ -358,26 +358,13 @@ impl Run<'_> {
         let (shapes, certain) = (&mut shapes[..self.count], &mut certain[..self.count]);
         for i in 0..self.count {
             let edges = run.edges(i);
-            let (volume, error) = volume6(edges);
+            let (volume, error) = volume6_and_error(edges);
             let squares = sum_of_squares(edges);
             let shape = volume * volume.abs() / (squares * squares * squares);
             shapes[i] = if shape < shapes[i] { shape } else { shapes[i] };
             certain[i] = if volume > error { certain[i] } else { 0.0 };
         }
     }
-}
-
-/// Six times the volume of a tet, and a bound of its error.
-#[inline(always)]
-fn volume6([u, v, w]: [[f64; 3]; 3]) -> (f64, f64) {
-    let [a, b] = [v[1] * w[2], v[2] * w[1]];
-    let [c, d] = [v[2] * w[0], v[0] * w[2]];
-    let [e, f] = [v[0] * w[1], v[1] * w[0]];
-    let volume = u[0] * (a - b) + u[1] * (c - d) + u[2] * (e - f);
-    let size = u[0].abs() * (a.abs() + b.abs())
-        + u[1].abs() * (c.abs() + d.abs())
-        + u[2].abs() * (e.abs() + f.abs());
-    (volume, ORIENT3D_ERROR * size)
 }
 
 /// The sum of the squares of a tet's six edges, of which three are given.
