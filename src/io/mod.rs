@@ -20,8 +20,8 @@ mod testing;
 pub mod text;
 pub mod vtu;
 
-use crate::comm::{CommError, Communicator};
-use crate::mesh::{GlobalId, Names, Rank};
+use crate::comm::{Agreed, CommError, Communicator};
+use crate::mesh::{Names, Rank};
 use csg::{BodyId, PatchId};
 use std::io;
 use std::path::{Path, PathBuf};
@@ -123,12 +123,6 @@ impl WriteError {
     }
 }
 
-/// The rank that numbers and writes a shared vertex: the rule of the whole project, even over ranks, and known to
-/// all holders without a message.
-pub(crate) fn owner(holders: &[Rank], id: GlobalId) -> Rank {
-    holders[(id % holders.len() as u64) as usize]
-}
-
 /// The largest number of a body or boundary: formats keep them in 32 bits.
 const MAX_NUMBER: u32 = i32::MAX as u32;
 
@@ -148,42 +142,18 @@ fn number_of(list: &[(u32, String)], index: usize) -> Option<u64> {
     list.get(index).map(|(number, _)| *number).filter(|n| (1..=MAX_NUMBER).contains(n)).map(u64::from)
 }
 
-/// **Collective.** The numbers that each rank gives, by rank.
-pub(crate) fn all_gather_numbers(
-    comm: &dyn Communicator,
-    numbers: &[u64],
-) -> Result<Vec<Vec<u64>>, CommError> {
-    let all = comm.all_gather_bytes(bytemuck::cast_slice(numbers))?;
-    Ok(all.iter().map(|bytes| numbers_of(bytes)).collect())
-}
-
 /// **Collective.** What all ranks have written.
 pub(crate) fn sum_written(comm: &dyn Communicator, written: Written) -> Result<Written, WriteError> {
-    let mut sum = Written::default();
-    for of_rank in all_gather_numbers(comm, &[written.files, written.bytes])? {
-        sum += Written { files: of_rank[0], bytes: of_rank[1] };
-    }
-    Ok(sum)
-}
-
-/// The numbers that a rank of this machine or its twin sent as bytes.
-pub(crate) fn numbers_of(bytes: &[u8]) -> Vec<u64> {
-    let (numbers, rest) = bytes.as_chunks::<8>();
-    assert!(rest.is_empty(), "a message of {} bytes holds no whole count of numbers", bytes.len());
-    numbers.iter().map(|&b| u64::from_ne_bytes(b)).collect()
+    let [files, bytes] = comm.all_reduce_sum_u64([written.files, written.bytes])?;
+    Ok(Written { files, bytes })
 }
 
 /// **Collective.** Every rank's own result where all went well; else every rank gets an error, its own or that
 /// of the first rank that failed.
 pub(crate) fn agree<T>(comm: &dyn Communicator, result: Result<T, WriteError>) -> Result<T, WriteError> {
-    let message = result.as_ref().err().map(ToString::to_string).unwrap_or_default();
-    let all = comm.all_gather_bytes(message.as_bytes())?;
-    let value = result?;
-    match all.iter().position(|m| !m.is_empty()) {
-        None => Ok(value),
-        Some(rank) => Err(WriteError::OtherRank {
-            rank: rank as Rank,
-            message: String::from_utf8_lossy(&all[rank]).into_owned(),
-        }),
-    }
+    comm.agree(result).map_err(|agreed| match agreed {
+        Agreed::Failed { own: Some(error), .. } => error,
+        Agreed::Failed { rank, message, own: None } => WriteError::OtherRank { rank, message },
+        Agreed::Comm(error) => error.into(),
+    })
 }

@@ -15,7 +15,7 @@
 //! renames may show a new `partitioning.4` beside old names; a process killed by a signal leaves its staging
 //! folder, which no reader takes for a mesh.
 
-use super::{WriteError, agree, all_gather_numbers};
+use super::{WriteError, agree};
 use crate::comm::Communicator;
 use std::fs::{self, File};
 use std::io::{self, Seek, Write};
@@ -33,7 +33,7 @@ pub fn write_together<T>(
     ours: fn(&str) -> bool,
     write: impl FnOnce(&Path) -> Result<T, WriteError>,
 ) -> Result<T, WriteError> {
-    let needed = all_gather_numbers(comm, &[needed])?.iter().map(|n| n[0]).sum();
+    let [needed] = comm.all_reduce_sum_u64([needed])?;
     let staging = if comm.rank() == 0 { Some(Staging::begin(target, needed)).transpose() } else { Ok(None) };
     let staging = agree(comm, staging)?;
 
@@ -355,6 +355,22 @@ mod tests {
         for error in [&errors[0], &errors[2]] {
             assert!(matches!(error, WriteError::OtherRank { rank: 1, .. }), "{error}");
         }
+        assert!(!target.exists());
+    }
+
+    #[test]
+    fn a_rank_that_panics_leaves_nothing_new_on_any() {
+        let dir = tempfile::tempdir().unwrap();
+        let target = dir.path().join("mesh");
+        let outcome = crate::comm::thread::run(3, |comm| {
+            let write = |stage: &Path| {
+                assert_ne!(comm.rank(), 2, "a broken invariant");
+                write_text(&stage.join(format!("part.{}", comm.rank())), b"half")
+            };
+            let error = write_together(comm, &target, 10, is_part, write).unwrap_err();
+            assert!(matches!(error, WriteError::Comm(_)), "{error}");
+        });
+        assert!(outcome.is_err());
         assert!(!target.exists());
     }
 

@@ -1,71 +1,13 @@
 //! Small meshes and a communicator for the tests of the formats.
 
 use crate::Point;
-use crate::comm::{CommError, Communicator};
+use crate::comm::{Communicator, thread};
 use crate::mesh::{BoundaryTriangle, Class, Mesh, Names, Rank, TET_FACES, VertexId};
 use csg::{BodyId, CornerId, PatchId};
-use std::sync::{Barrier, Mutex};
-
-/// One of several ranks, each a thread. A rank that panics leaves the others waiting: good for tests of ranks that
-/// do not.
-struct Together<'a> {
-    rank: Rank,
-    board: &'a Mutex<Vec<Inbox>>,
-    barrier: &'a Barrier,
-}
-
-/// What was sent to a rank, with the senders.
-type Inbox = Vec<(Rank, Vec<u8>)>;
 
 /// Runs `f` on each rank; the results by rank.
 pub fn together<R: Send>(ranks: u32, f: impl Fn(&dyn Communicator) -> R + Sync) -> Vec<R> {
-    let board = Mutex::new(vec![Vec::new(); ranks as usize]);
-    let barrier = Barrier::new(ranks as usize);
-    let (board, barrier, f) = (&board, &barrier, &f);
-    std::thread::scope(|scope| {
-        let start = |rank| scope.spawn(move || f(&Together { rank, board, barrier }));
-        let handles: Vec<_> = (0..ranks).map(start).collect();
-        handles.into_iter().map(|handle| handle.join().unwrap()).collect()
-    })
-}
-
-impl Communicator for Together<'_> {
-    fn rank(&self) -> Rank {
-        self.rank
-    }
-    fn size(&self) -> u32 {
-        self.board.lock().unwrap().len() as u32
-    }
-    fn barrier(&self) -> Result<(), CommError> {
-        self.barrier.wait();
-        Ok(())
-    }
-    fn broadcast_bytes(&self, root: Rank, bytes: &mut Vec<u8>) -> Result<(), CommError> {
-        *bytes = self.all_gather_bytes(bytes)?.swap_remove(root as usize);
-        Ok(())
-    }
-    fn gather_bytes(&self, root: Rank, bytes: &[u8]) -> Result<Vec<Vec<u8>>, CommError> {
-        let all = self.all_gather_bytes(bytes)?;
-        Ok(if self.rank == root { all } else { Vec::new() })
-    }
-    fn all_gather_bytes(&self, bytes: &[u8]) -> Result<Vec<Vec<u8>>, CommError> {
-        let to_all = (0..self.size()).map(|to| (to, bytes.to_vec())).collect();
-        Ok(self.exchange_bytes(to_all)?.into_iter().map(|(_, bytes)| bytes).collect())
-    }
-    fn scatter_bytes(&self, root: Rank, messages: Option<Vec<Vec<u8>>>) -> Result<Vec<u8>, CommError> {
-        let mine = messages.filter(|_| self.rank == root).unwrap_or_default();
-        Ok(self.exchange_bytes((0..).zip(mine).collect())?.remove(0).1)
-    }
-    fn exchange_bytes(&self, messages: Vec<(Rank, Vec<u8>)>) -> Result<Vec<(Rank, Vec<u8>)>, CommError> {
-        for (to, bytes) in messages {
-            self.board.lock().unwrap()[to as usize].push((self.rank, bytes));
-        }
-        self.barrier.wait();
-        let mut received = std::mem::take(&mut self.board.lock().unwrap()[self.rank as usize]);
-        received.sort();
-        self.barrier.wait();
-        Ok(received)
-    }
+    thread::run(ranks, f).unwrap()
 }
 
 /// The layers of [`cube`] dealt out to ranks, a slab each.

@@ -1,9 +1,9 @@
 //! The numbers that Elmer's files bear: compact per part, since Elmer sizes its tables by the range of ids in a part.
 
 use crate::comm::Communicator;
-use crate::io::{WriteError, all_gather_numbers, numbers_of, owner};
-use crate::mesh::stream::MeshStream;
-use crate::mesh::{GlobalId, Rank};
+use crate::io::WriteError;
+use crate::mesh::GlobalId;
+use crate::mesh::stream::{MeshStream, VertexBlock};
 
 /// The numbers of one part's entities, all from 1.
 #[derive(Debug)]
@@ -26,30 +26,28 @@ pub(super) fn number(comm: &dyn Communicator, part: &dyn MeshStream) -> Result<N
     let mut vertices = vec![0; part.points().len()];
     let mut owned = 0;
     let mut shared = 0;
-    for_each_vertex(part, |local, id, holders| {
-        shared += u64::from(!holders.is_empty());
-        if holders.is_empty() || owner(holders, id) == rank {
+    for_each_vertex(part, |local, id, block| {
+        shared += u64::from(!block.holders.is_empty());
+        if block.owner(id, rank) == rank {
             owned += 1;
             vertices[local as usize] = owned;
         }
     });
 
-    let counts = all_gather_numbers(comm, &[u64::from(owned), part.counts().tets])?;
-    let before = |what: usize| counts[..rank as usize].iter().map(|c| c[what]).sum::<u64>();
-    let first_vertex = before(0) as u32;
+    let [vertices_before, tets_before] = comm.exclusive_scan([u64::from(owned), part.counts().tets])?;
     for number in vertices.iter_mut().filter(|number| **number > 0) {
-        *number += first_vertex;
+        *number += vertices_before as u32;
     }
     learn_from_owners(comm, part, &mut vertices)?;
-    Ok(Numbering { vertices, first_tet: 1 + before(1), shared })
+    Ok(Numbering { vertices, first_tet: 1 + tets_before, shared })
 }
 
-/// Calls `f(local index, global id, holders)` for each vertex in local order; no holders where only this rank is one.
-pub(super) fn for_each_vertex(part: &dyn MeshStream, mut f: impl FnMut(u32, GlobalId, &[Rank])) {
+/// Calls `f(local index, global id, its block)` for each vertex in local order.
+fn for_each_vertex(part: &dyn MeshStream, mut f: impl FnMut(u32, GlobalId, &VertexBlock)) {
     for index in 0..part.vertex_blocks() {
         let block = part.vertex_block(index);
         for (local, id) in block.local.clone().zip(block.first_id..) {
-            f(local, id, block.holders);
+            f(local, id, &block);
         }
     }
 }
@@ -63,10 +61,9 @@ fn learn_from_owners(
     let rank = part.rank();
     let mut to_each: Vec<Vec<u64>> = vec![Vec::new(); part.ranks() as usize];
     let mut to_learn: Vec<(GlobalId, u32)> = Vec::new();
-    for_each_vertex(part, |local, id, holders| {
-        if holders.is_empty() {
-        } else if owner(holders, id) == rank {
-            for &holder in holders.iter().filter(|&&holder| holder != rank) {
+    for_each_vertex(part, |local, id, block| {
+        if block.owner(id, rank) == rank {
+            for &holder in block.holders.iter().filter(|&&holder| holder != rank) {
                 to_each[holder as usize].extend([id, u64::from(vertices[local as usize])]);
             }
         } else {
@@ -75,11 +72,10 @@ fn learn_from_owners(
     });
     to_learn.sort_unstable();
 
-    let messages = (0..).zip(to_each).filter(|(_, numbers)| !numbers.is_empty());
-    let messages = messages.map(|(to, numbers)| (to, bytemuck::cast_slice(&numbers).to_vec())).collect();
+    let messages = (0..).zip(to_each).filter(|(_, numbers)| !numbers.is_empty()).collect();
     let mut learnt = 0;
-    for (from, bytes) in comm.exchange_bytes(messages)? {
-        for pair in numbers_of(&bytes).chunks_exact(2) {
+    for (from, numbers) in comm.exchange::<u64>(messages)? {
+        for pair in numbers.chunks_exact(2) {
             let place = to_learn.binary_search_by_key(&pair[0], |(id, _)| *id).unwrap_or_else(|_| {
                 panic!("rank {from} takes rank {rank} for a holder of vertex {}", pair[0])
             });

@@ -6,7 +6,7 @@ use crate::comm::Communicator;
 use crate::io::chunks::{items, split, write_chunks};
 use crate::io::output::{Output, write_text, write_together};
 use crate::io::text::{Line, digits};
-use crate::io::{WriteError, Written, agree, body_number, owner, patch_number, sum_written};
+use crate::io::{WriteError, Written, agree, body_number, patch_number, sum_written};
 use crate::mesh::Names;
 use crate::mesh::stream::{BoundaryBlock, MeshStream, NO_TET, TetBlock};
 use std::fs;
@@ -225,7 +225,7 @@ fn write_shared(part: &dyn MeshStream, numbering: &Numbering, path: &Path) -> Re
     for index in 0..part.vertex_blocks() {
         let block = part.vertex_block(index);
         for (local, id) in block.local.clone().zip(block.first_id..).filter(|_| !block.holders.is_empty()) {
-            let owner = owner(block.holders, id);
+            let owner = block.owner(id, part.rank());
             line.int(numbering.vertices[local as usize].into()).blank().int(block.holders.len() as u64);
             line.blank().int(u64::from(owner) + 1);
             for &holder in block.holders.iter().filter(|&&holder| holder != owner) {

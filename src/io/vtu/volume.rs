@@ -2,7 +2,7 @@
 
 use super::arrays::{Kind, Piece, Section};
 use crate::io::chunks::{items, split, write_chunks};
-use crate::io::{WriteError, body_number, owner};
+use crate::io::{WriteError, body_number};
 use crate::mesh::Names;
 use crate::mesh::stream::{MeshStream, TetBlock};
 use std::path::Path;
@@ -63,8 +63,7 @@ pub(super) fn write(
     let (chunks, per_chunk) = split(blocks, part.counts().vertices, PER_CHUNK);
     write_chunks(&mut [file.array("GlobalNodeId")?.0], chunks, |chunk, [ids]| {
         for index in items(chunk, per_chunk, blocks) {
-            let block = part.vertex_block(index);
-            block.local.zip(block.first_id..).for_each(|(_, global)| Kind::I64.push(global, ids));
+            part.vertex_block(index).ids().for_each(|global| Kind::I64.push(global, ids));
         }
         Ok(())
     })?;
@@ -72,8 +71,8 @@ pub(super) fn write(
         write_chunks(&mut [file.array("vtkGhostType")?.0], chunks, |chunk, [ghosts]| {
             for index in items(chunk, per_chunk, blocks) {
                 let block = part.vertex_block(index);
-                let copy = |global| !block.holders.is_empty() && owner(block.holders, global) != part.rank();
-                ghosts.extend(block.local.zip(block.first_id..).map(|(_, global)| u8::from(copy(global))));
+                let copy = |global| block.owner(global, part.rank()) != part.rank();
+                ghosts.extend(block.ids().map(|global| u8::from(copy(global))));
             }
             Ok(())
         })?;
