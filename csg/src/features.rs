@@ -1,6 +1,41 @@
 //! Corners, curves and patches of the bodies of a geometry.
+//!
+//! [`Features::find`] goes this way:
+//!
+//! 1. `bounds`: a box around all bodies, by pruning a huge cube.
+//! 2. `octree`: cells, in each the part of each body that matters there; split until any two surfaces in a
+//!    cell either cannot meet in it or meet in a curve that is monotone there, which interval arithmetic proves.
+//! 3. `trace`: from seeds in the cells, the intersection curves of all such pairs of surfaces.
+//! 4. `cross`: on them, the points where a third surface crosses: they cut the curves into arcs.
+//! 5. `around`: at a point of each arc, the regions (bodies or the exterior) around it, sector by sector.
+//!    An arc is part of a feature if it is more than a line on one smooth sheet.
+//! 6. `assemble`: arcs to curves and corners, sheets to patches; `number`: boundary numbers and names.
+//! 7. `check`: whether it all fits together; `contact`: whether places where surfaces are tangent matter.
+//!
+//! Why trace all pairs and classify afterwards, and not follow edges from special points like NETGEN: no
+//! decision depends on a tolerance while a curve is followed; surfaces in special position (three through
+//! one curve, four through one point, a plane through a seam between tangent surfaces) need no case of their own; and
+//! what was missed shows as an open end.
+//!
+//! What is refused, with its place: the apex of a cone on a boundary, surfaces that touch without crossing where both
+//! are boundaries (a ball on a plate), bodies that overlap or are not bounded.
 
-use crate::{Aabb, BodyId, CornerId, CurveId, PatchId, Point, SurfaceId};
+use crate::{Aabb, BodyId, CornerId, CurveId, Geometry, PatchId, Point, SurfaceId};
+
+mod around;
+mod assemble;
+mod bounds;
+mod check;
+mod contact;
+mod cross;
+mod error;
+mod number;
+mod octree;
+mod trace;
+
+pub use check::Inconsistency;
+pub use error::{FeatureError, Named, Place};
+pub use trace::{curve_curvature, curve_tangent};
 
 /// A point where curves end, or a vertex of its own (`point`, the apex of a cone).
 #[derive(Clone, Debug)]
@@ -85,7 +120,3 @@ impl Features {
         &self.corners[id.index()]
     }
 }
-
-/// Why the features could not be found.
-#[derive(Clone, Debug, thiserror::Error)]
-pub enum FeatureError {}
