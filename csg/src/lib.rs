@@ -30,3 +30,9 @@ pub use surface::Surface;
 pub type Point = nalgebra::Point3<f64>;
 /// A vector in space.
 pub type Vector = nalgebra::Vector3<f64>;
+
+/// Property tests that try the same cases on every run.
+#[cfg(test)]
+fn seeded() -> proptest::test_runner::Config {
+    proptest::test_runner::Config { rng_seed: proptest::test_runner::RngSeed::Fixed(1), ..Default::default() }
+}

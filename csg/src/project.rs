@@ -1,6 +1,7 @@
 //! Projection of points to patches and curves: all that refinement needs to know of a geometry.
 
-use crate::{CurveId, Features, Geometry, PatchId, Point, Surface, SurfaceId};
+use crate::primitive::{Cone, Cylinder, Ellipsoid, EllipticCone, EllipticCylinder, Plane, Sphere, Torus};
+use crate::{CurveId, Features, Geometry, PatchId, Point, Surface, SurfaceId, Vector};
 
 /// A projection that did not converge.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
@@ -10,42 +11,69 @@ pub struct ProjectionFailed(pub Point);
 /// The surfaces of patches and curves, and projection to them.
 ///
 /// Small, and made of plain numbers: every rank has one. Projection is a function of the point and the
-/// entity alone, bit for bit the same on all ranks and threads.
+/// entity alone, bit for bit the same on all ranks and threads. It allocates nothing.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Projector {
     surfaces: Vec<Surface>,
     curves: Vec<[SurfaceId; 2]>,
     patches: Vec<SurfaceId>,
+    /// How far a point may be from its surface, a length.
+    tolerance: f64,
 }
+
+/// A point is on a surface within this part of the diagonal of the box of the bodies, or within
+/// [`COORDINATE_ROUNDING`] of its largest coordinate, whichever is larger.
+const ON_SURFACE: f64 = 1e-12;
+/// Four units in the last place.
+const COORDINATE_ROUNDING: f64 = 4.0 * f64::EPSILON;
 
 impl Projector {
     /// Takes what it needs of a geometry.
     pub fn new(geometry: &Geometry, features: &Features) -> Self {
+        let bounds = &features.bounds;
+        let largest = bounds.min.coords.amax().max(bounds.max.coords.amax());
         Self {
             surfaces: geometry.surfaces.clone(),
             curves: features.curves.iter().map(|c| c.surfaces).collect(),
             patches: features.patches.iter().map(|p| p.surface).collect(),
+            tolerance: f64::max(ON_SURFACE * bounds.diagonal(), COORDINATE_ROUNDING * largest),
         }
     }
 
-    /// The point of the surface of `patch` nearest to `point`.
-    pub fn project_patch(&self, _patch: PatchId, _point: &Point) -> Result<Point, ProjectionFailed> {
-        todo!()
+    /// How far a projected point may be from its surfaces, a length: the larger of 10⁻¹² of the diagonal of the box
+    /// of the bodies and 4 units in the last place of its largest coordinate.
+    pub fn tolerance(&self) -> f64 {
+        self.tolerance
     }
 
-    /// The point of both surfaces of `curve` nearest to `point`.
-    pub fn project_curve(&self, _curve: CurveId, _point: &Point) -> Result<Point, ProjectionFailed> {
-        todo!()
+    /// The point of the surface of `patch` nearest to `point`.
+    ///
+    /// # Errors
+    /// Where there is no nearest one, as in the centre of a sphere.
+    pub fn project_patch(&self, patch: PatchId, point: &Point) -> Result<Point, ProjectionFailed> {
+        self.patch_surface(patch).project(point)
+    }
+
+    /// The point of both surfaces of `curve` near to `point` to which steps across the curve lead.
+    ///
+    /// It is the nearest one to first order: each step is orthogonal to the curve's direction where it begins.
+    ///
+    /// # Errors
+    /// If the steps end nowhere on both surfaces.
+    pub fn project_curve(&self, curve: CurveId, point: &Point) -> Result<Point, ProjectionFailed> {
+        let [a, b] = self.curve_surfaces(curve);
+        project_to_both(a, b, point, self.tolerance)
     }
 
     /// The distance of `point` from the surface of `patch`, to first order.
-    pub fn patch_distance(&self, _patch: PatchId, _point: &Point) -> f64 {
-        todo!()
+    pub fn patch_distance(&self, patch: PatchId, point: &Point) -> f64 {
+        self.patch_surface(patch).distance(point)
     }
 
     /// The larger of the distances of `point` from the two surfaces of `curve`, to first order.
-    pub fn curve_distance(&self, _curve: CurveId, _point: &Point) -> f64 {
-        todo!()
+    pub fn curve_distance(&self, curve: CurveId, point: &Point) -> f64 {
+        let [a, b] = self.curve_surfaces(curve);
+        a.distance(point).max(b.distance(point))
     }
 
     /// The surface of `patch`.
@@ -53,13 +81,262 @@ impl Projector {
         &self.surfaces[self.patches[patch.index()].index()]
     }
 
+    /// The two surfaces of `curve`.
+    pub fn curve_surfaces(&self, curve: CurveId) -> [&Surface; 2] {
+        self.curves[curve.index()].map(|s| &self.surfaces[s.index()])
+    }
+
     /// Everything as plain numbers, to be sent to other ranks.
+    ///
+    /// First the tolerance and the numbers of surfaces, curves and patches; then each surface as its kind and the
+    /// vectors and then the numbers of its primitive; the two surfaces of each curve; the surface of each patch.
     pub fn encode(&self) -> Vec<f64> {
-        todo!()
+        let counts = [self.surfaces.len(), self.curves.len(), self.patches.len()];
+        let mut out = vec![self.tolerance];
+        out.extend(counts.map(|n| n as f64));
+        for surface in &self.surfaces {
+            encode_surface(surface, &mut out);
+        }
+        out.extend(self.curves.iter().flatten().chain(&self.patches).map(|s| f64::from(s.0)));
+        out
     }
 
     /// The inverse of [`encode`](Self::encode); `None` for anything else.
-    pub fn decode(_numbers: &[f64]) -> Option<Self> {
-        todo!()
+    pub fn decode(numbers: &[f64]) -> Option<Self> {
+        let mut reader = Reader(numbers);
+        let tolerance = reader.number()?;
+        let [surfaces, curves, patches] = [reader.count()?, reader.count()?, reader.count()?];
+        let surfaces: Vec<_> = (0..surfaces).map(|_| reader.surface()).collect::<Option<_>>()?;
+        let id = |reader: &mut Reader| reader.count().filter(|&i| i < surfaces.len()).map(SurfaceId::new);
+        let curves =
+            (0..curves).map(|_| Some([id(&mut reader)?, id(&mut reader)?])).collect::<Option<_>>()?;
+        let patches = (0..patches).map(|_| id(&mut reader)).collect::<Option<_>>()?;
+        reader.0.is_empty().then_some(Self { surfaces, curves, patches, tolerance })
+    }
+}
+
+/// The point of both surfaces to which Newton's method leads from `point`, each step the shortest one that
+/// solves both linearised equations (it lies in the plane of the two gradients).
+///
+/// The steps go on until they no longer halve the distance; the result is the nearest to both surfaces that was met, and
+/// an error if that is more than `tolerance` from one of them.
+pub(crate) fn project_to_both(
+    a: &Surface,
+    b: &Surface,
+    point: &Point,
+    tolerance: f64,
+) -> Result<Point, ProjectionFailed> {
+    /// From afar the distance is halved each time, then squared: 50 steps cover all numbers.
+    const STEPS: usize = 60;
+    /// The first steps may lead away from strongly curved surfaces before they converge.
+    const FREE_STEPS: usize = 6;
+    let mut at = *point;
+    let mut best = (f64::INFINITY, at);
+    for step in 0..STEPS {
+        let (values, gradients) = ([a.value(&at), b.value(&at)], [a.gradient(&at), b.gradient(&at)]);
+        let squares = gradients.map(|g| g.norm_squared());
+        let distance = f64::max(
+            if values[0] == 0.0 { 0.0 } else { values[0].abs() / squares[0].sqrt() },
+            if values[1] == 0.0 { 0.0 } else { values[1].abs() / squares[1].sqrt() },
+        );
+        let halved = distance <= 0.5 * best.0;
+        if distance < best.0 {
+            best = (distance, at);
+        }
+        if distance == 0.0 || !(halved || (step < FREE_STEPS && best.0 > tolerance)) {
+            break;
+        }
+        match shortest_step(values, gradients, squares) {
+            Some(shift) => at += shift,
+            None => break,
+        }
+    }
+    if best.0 <= tolerance.max(COORDINATE_ROUNDING * best.1.coords.amax()) {
+        Ok(best.1)
+    } else {
+        Err(ProjectionFailed(*point))
+    }
+}
+
+/// The shortest vector s with gradientᵢ·s = -valueᵢ; `None` where the gradients are parallel.
+fn shortest_step(values: [f64; 2], gradients: [Vector; 2], squares: [f64; 2]) -> Option<Vector> {
+    /// The least square of the sine between the gradients: below it rounding of the values, 1e-16, would move
+    /// the point by more than 1e-9.
+    const LEAST_SINE_SQUARED: f64 = 1e-14;
+    let mixed = gradients[0].dot(&gradients[1]);
+    // As a cross product: squares[0] * squares[1] - mixed² loses half the digits where it is small.
+    let determinant = gradients[0].cross(&gradients[1]).norm_squared();
+    if determinant <= LEAST_SINE_SQUARED * squares[0] * squares[1] {
+        return None;
+    }
+    let first = (mixed * values[1] - squares[1] * values[0]) / determinant;
+    let second = (mixed * values[0] - squares[0] * values[1]) / determinant;
+    Some(gradients[0] * first + gradients[1] * second)
+}
+
+fn encode_surface(surface: &Surface, out: &mut Vec<f64>) {
+    let mut put = |kind: u8, vectors: &[Vector], numbers: &[f64]| {
+        out.push(f64::from(kind));
+        out.extend(vectors.iter().flat_map(|v| v.iter()));
+        out.extend(numbers);
+    };
+    match surface {
+        Surface::Plane(p) => put(0, &[p.point.coords, p.normal], &[]),
+        Surface::Sphere(s) => put(1, &[s.center.coords], &[s.radius]),
+        Surface::Cylinder(c) => put(2, &[c.point.coords, c.axis], &[c.radius]),
+        Surface::Cone(c) => put(3, &[c.point.coords, c.axis], &[c.radius, c.slope]),
+        Surface::Torus(t) => put(4, &[t.center.coords, t.axis], &[t.major, t.minor]),
+        Surface::Ellipsoid(e) => put(5, &[e.center.coords, e.axes[0], e.axes[1], e.axes[2]], &e.radii),
+        Surface::EllipticCylinder(e) => put(6, &[e.point.coords, e.axes[0], e.axes[1]], &e.radii),
+        Surface::EllipticCone(e) => {
+            put(7, &[e.point.coords, e.axes[0], e.axes[1], e.axis], &[e.radii[0], e.radii[1], e.rate]);
+        }
+    }
+}
+
+/// Takes numbers off the front of a slice.
+struct Reader<'a>(&'a [f64]);
+
+impl Reader<'_> {
+    fn number(&mut self) -> Option<f64> {
+        let (first, rest) = self.0.split_first()?;
+        self.0 = rest;
+        Some(*first)
+    }
+
+    /// A count or an index: a whole number that fits an id.
+    fn count(&mut self) -> Option<usize> {
+        let number = self.number()?;
+        (number.fract() == 0.0 && (0.0..=f64::from(u32::MAX)).contains(&number)).then_some(number as usize)
+    }
+
+    fn vector(&mut self) -> Option<Vector> {
+        Some(Vector::new(self.number()?, self.number()?, self.number()?))
+    }
+
+    fn point(&mut self) -> Option<Point> {
+        self.vector().map(Point::from)
+    }
+
+    fn surface(&mut self) -> Option<Surface> {
+        Some(match self.count()? {
+            0 => Surface::Plane(Plane { point: self.point()?, normal: self.vector()? }),
+            1 => Surface::Sphere(Sphere { center: self.point()?, radius: self.number()? }),
+            2 => Surface::Cylinder(Cylinder {
+                point: self.point()?,
+                axis: self.vector()?,
+                radius: self.number()?,
+            }),
+            3 => Surface::Cone(Cone {
+                point: self.point()?,
+                axis: self.vector()?,
+                radius: self.number()?,
+                slope: self.number()?,
+            }),
+            4 => Surface::Torus(Torus {
+                center: self.point()?,
+                axis: self.vector()?,
+                major: self.number()?,
+                minor: self.number()?,
+            }),
+            5 => Surface::Ellipsoid(Ellipsoid {
+                center: self.point()?,
+                axes: [self.vector()?, self.vector()?, self.vector()?],
+                radii: [self.number()?, self.number()?, self.number()?],
+            }),
+            6 => Surface::EllipticCylinder(EllipticCylinder {
+                point: self.point()?,
+                axes: [self.vector()?, self.vector()?],
+                radii: [self.number()?, self.number()?],
+            }),
+            7 => Surface::EllipticCone(EllipticCone {
+                point: self.point()?,
+                axes: [self.vector()?, self.vector()?],
+                axis: self.vector()?,
+                radii: [self.number()?, self.number()?],
+                rate: self.number()?,
+            }),
+            _ => return None,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// A plane, a sphere, a cylinder, and a cylinder across it; curves on each pair that meets.
+    fn projector() -> Projector {
+        let surfaces = vec![
+            Surface::Plane(Plane { point: Point::new(0.0, 0.0, 0.2), normal: Vector::z() }),
+            Surface::Sphere(Sphere { center: Point::new(0.1, 0.0, 0.0), radius: 1.0 }),
+            Surface::Cylinder(Cylinder { point: Point::origin(), axis: Vector::z(), radius: 0.6 }),
+            Surface::Cylinder(Cylinder { point: Point::origin(), axis: Vector::x(), radius: 0.4 }),
+        ];
+        let pair = |a, b| [SurfaceId(a), SurfaceId(b)];
+        let curves = vec![pair(0, 1), pair(0, 2), pair(0, 3), pair(1, 2), pair(1, 3), pair(2, 3)];
+        let patches = (0..4).map(SurfaceId).collect();
+        Projector { surfaces, curves, patches, tolerance: 2e-12 }
+    }
+
+    proptest! {
+        #![proptest_config(crate::seeded())]
+
+        #[test]
+        fn a_point_near_a_curve_goes_to_a_near_point_of_both_surfaces(
+            curve in 0..6u32,
+            start in [-1.0..1.0f64, -1.0..1.0f64, -1.0..1.0f64],
+            shift in [-0.05..0.05f64, -0.05..0.05f64, -0.05..0.05f64],
+        ) {
+            let projector = projector();
+            let Ok(on) = projector.project_curve(CurveId(curve), &start.into()) else { return Ok(()) };
+            let near = on + Vector::from(shift);
+            let back = projector.project_curve(CurveId(curve), &near).unwrap();
+            prop_assert!(projector.curve_distance(CurveId(curve), &back) <= 4.0 * f64::EPSILON);
+            // Not exactly nearest, but no farther than the known point by more than the curvature explains.
+            prop_assert!((near - back).norm() <= (near - on).norm() * 1.3);
+            let again = projector.project_curve(CurveId(curve), &back).unwrap();
+            prop_assert!((again - back).norm() <= 8.0 * f64::EPSILON);
+        }
+    }
+
+    #[test]
+    fn surfaces_that_do_not_meet_have_no_common_point() {
+        let mut projector = projector();
+        projector.surfaces[0] =
+            Surface::Plane(Plane { point: Point::new(0.0, 0.0, 3.0), normal: Vector::z() });
+        assert!(projector.project_curve(CurveId(0), &Point::new(0.5, 0.3, 1.5)).is_err());
+    }
+
+    #[test]
+    fn a_projector_survives_its_encoding_and_nothing_else_is_taken_for_one() {
+        let mut projector = projector();
+        let o = Point::origin();
+        let axes = [Vector::x(), Vector::y(), Vector::z()];
+        projector.surfaces.extend([
+            Surface::Cone(Cone { point: o, axis: axes[0], radius: 1.0, slope: 0.5 }),
+            Surface::Torus(Torus { center: o, axis: axes[1], major: 2.0, minor: 0.5 }),
+            Surface::Ellipsoid(Ellipsoid { center: o, axes, radii: [1.0, 2.0, 3.0] }),
+            Surface::EllipticCylinder(EllipticCylinder {
+                point: o,
+                axes: [axes[0], axes[1]],
+                radii: [1.0, 2.0],
+            }),
+            Surface::EllipticCone(EllipticCone {
+                point: o,
+                axes: [axes[0], axes[1]],
+                radii: [1.0, 2.0],
+                axis: axes[2],
+                rate: -0.25,
+            }),
+        ]);
+        let numbers = projector.encode();
+        assert_eq!(Projector::decode(&numbers), Some(projector));
+        assert_eq!(Projector::decode(&numbers[..numbers.len() - 1]), None);
+        assert_eq!(Projector::decode(&[&numbers[..], &[0.0]].concat()), None);
+        let mut wrong = numbers.clone();
+        wrong[4] = 9.0;
+        assert_eq!(Projector::decode(&wrong), None);
     }
 }

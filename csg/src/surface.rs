@@ -1,9 +1,12 @@
 //! Surfaces: value, gradient, curvature, projection, ranges over boxes.
 
+use crate::interval::{Cell, middle, offset};
+use crate::primitive::quadric::polish;
+use crate::primitive::{
+    Cone, Cylinder, Ellipsoid, EllipticCone, EllipticCylinder, Plane, Primitive, Sphere, Torus, same,
+};
 use crate::{Interval, Point, ProjectionFailed, Vector};
 use nalgebra::{Isometry3, Matrix3};
-
-use crate::primitive::{Cone, Cylinder, Ellipsoid, EllipticCone, EllipticCylinder, Plane, Sphere, Torus};
 
 /// The zero set of a smooth function that is negative inside.
 #[derive(Clone, Debug, PartialEq)]
@@ -26,57 +29,103 @@ pub enum Surface {
     EllipticCone(EllipticCone),
 }
 
+/// Asks the primitive inside the surface.
+macro_rules! ask {
+    ($surface:expr, $primitive:ident => $answer:expr) => {
+        match $surface {
+            Surface::Plane($primitive) => $answer,
+            Surface::Sphere($primitive) => $answer,
+            Surface::Cylinder($primitive) => $answer,
+            Surface::Cone($primitive) => $answer,
+            Surface::Torus($primitive) => $answer,
+            Surface::Ellipsoid($primitive) => $answer,
+            Surface::EllipticCylinder($primitive) => $answer,
+            Surface::EllipticCone($primitive) => $answer,
+        }
+    };
+}
+
 impl Surface {
     /// The function at `point`: zero on the surface, negative inside, with a gradient of unit length on
     /// the surface wherever the kind allows, so that `value / |gradient|` is the distance to first order.
-    pub fn value(&self, _point: &Point) -> f64 {
-        todo!()
+    pub fn value(&self, point: &Point) -> f64 {
+        ask!(self, p => p.value(point))
     }
 
     /// The gradient of the function at `point`: points outward.
-    pub fn gradient(&self, _point: &Point) -> Vector {
-        todo!()
+    pub fn gradient(&self, point: &Point) -> Vector {
+        ask!(self, p => p.gradient(point))
     }
 
     /// The second derivatives of the function at `point`.
-    pub fn hessian(&self, _point: &Point) -> Matrix3<f64> {
-        todo!()
+    pub fn hessian(&self, point: &Point) -> Matrix3<f64> {
+        ask!(self, p => p.hessian(point))
     }
 
-    /// The unit outward normal at a point on or near the surface.
-    pub fn normal(&self, _point: &Point) -> Vector {
-        todo!()
+    /// The unit outward normal at a point on or near the surface; zero where the gradient vanishes (the axis of a
+    /// cylinder, the apex of a cone).
+    pub fn normal(&self, point: &Point) -> Vector {
+        self.gradient(point).try_normalize(0.0).unwrap_or_default()
     }
 
     /// The largest absolute principal curvature at a point on or near the surface, 1/length.
-    pub fn curvature(&self, _point: &Point) -> f64 {
-        todo!()
+    pub fn curvature(&self, point: &Point) -> f64 {
+        ask!(self, p => p.curvature(point))
     }
 
-    /// The nearest point of the surface.
-    pub fn project(&self, _point: &Point) -> Result<Point, ProjectionFailed> {
-        todo!()
+    /// The nearest point of the surface, on it within a few units in the last place of the largest coordinate.
+    ///
+    /// # Errors
+    /// Where all points of a circle or a sphere are equally near (on the axis of a cylinder, in the centre of a sphere).
+    pub fn project(&self, point: &Point) -> Result<Point, ProjectionFailed> {
+        ask!(self, p => Ok(polish(p.project(point)?, |x| p.value(x), |x| p.gradient(x))))
+    }
+
+    /// The distance of `point` from the surface to first order; infinite where the gradient vanishes off it.
+    pub fn distance(&self, point: &Point) -> f64 {
+        let value = self.value(point).abs();
+        if value == 0.0 { 0.0 } else { value / self.gradient(point).norm() }
     }
 
     /// An interval that contains the function's values over a box.
-    pub fn value_range(&self, _cell: &[Interval; 3]) -> Interval {
-        todo!()
+    pub fn value_range(&self, cell: &Cell) -> Interval {
+        // The mean-value form closes in with the square of the size of the box, which the formula term
+        // for term does not in a skew frame; on large boxes the latter is better (Moore, Kearfott, Cloud
+        // 2009, section 6.4).
+        let natural = ask!(self, p => p.natural_range(cell));
+        if !natural.contains_zero() {
+            return natural;
+        }
+        let center = middle(cell);
+        let arm = offset(cell, &center);
+        let slope = self.gradient_range(cell);
+        let at_center = ask!(self, p => p.natural_range(&[0, 1, 2].map(|i| Interval::point(center[i]))));
+        natural.intersect(at_center + slope[0] * arm[0] + slope[1] * arm[1] + slope[2] * arm[2])
     }
 
     /// An interval for each component of the gradient over a box.
-    pub fn gradient_range(&self, _cell: &[Interval; 3]) -> [Interval; 3] {
-        todo!()
+    pub fn gradient_range(&self, cell: &Cell) -> Cell {
+        ask!(self, p => p.gradient_range(cell))
     }
 
     /// The surface moved.
     #[must_use]
-    pub fn transformed(&self, _motion: &Isometry3<f64>) -> Self {
-        todo!()
+    pub fn transformed(&self, motion: &Isometry3<f64>) -> Self {
+        match self {
+            Self::Plane(p) => Self::Plane(p.transformed(motion)),
+            Self::Sphere(p) => Self::Sphere(p.transformed(motion)),
+            Self::Cylinder(p) => Self::Cylinder(p.transformed(motion)),
+            Self::Cone(p) => Self::Cone(p.transformed(motion)),
+            Self::Torus(p) => Self::Torus(p.transformed(motion)),
+            Self::Ellipsoid(p) => Self::Ellipsoid(p.transformed(motion)),
+            Self::EllipticCylinder(p) => Self::EllipticCylinder(p.transformed(motion)),
+            Self::EllipticCone(p) => Self::EllipticCone(p.transformed(motion)),
+        }
     }
 
     /// Whether both are the same set of points within `tolerance` (a length), and if so whether their insides
     /// are the same side: `Some(true)` same side, `Some(false)` opposite sides, `None` different surfaces.
-    pub fn same_as(&self, _other: &Self, _tolerance: f64) -> Option<bool> {
-        todo!()
+    pub fn same_as(&self, other: &Self, tolerance: f64) -> Option<bool> {
+        same::same(self, other, tolerance)
     }
 }

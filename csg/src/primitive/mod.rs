@@ -1,6 +1,51 @@
 //! The primitive surfaces, one file each.
 
-use crate::{Point, Vector};
+use crate::interval::{Cell, Interval, dot};
+use crate::{Point, ProjectionFailed, Vector};
+use nalgebra::{Isometry3, Matrix3};
+
+mod cone;
+mod cylinder;
+mod ellipsoid;
+mod elliptic_cone;
+mod elliptic_cylinder;
+mod plane;
+pub(crate) mod quadric;
+pub(crate) mod same;
+mod sphere;
+mod torus;
+
+/// What each primitive answers; [`Surface`](crate::Surface) documents the meaning.
+pub(crate) trait Primitive: Sized {
+    /// The function.
+    fn value(&self, point: &Point) -> f64;
+    /// Its gradient.
+    fn gradient(&self, point: &Point) -> Vector;
+    /// Its second derivatives.
+    fn hessian(&self, point: &Point) -> Matrix3<f64>;
+    /// The largest absolute principal curvature.
+    fn curvature(&self, point: &Point) -> f64;
+    /// The nearest point of the surface, up to the rounding of the formula.
+    fn project(&self, point: &Point) -> Result<Point, ProjectionFailed>;
+    /// A range of the function over a box by its formula term for term.
+    fn natural_range(&self, cell: &Cell) -> Interval;
+    /// A range of the gradient over a box.
+    fn gradient_range(&self, cell: &Cell) -> Cell;
+    /// The primitive moved.
+    fn transformed(&self, motion: &Isometry3<f64>) -> Self;
+}
+
+/// The range over a box of vectors of their parts that are orthogonal to `axis`: each component is one
+/// linear form, so each is tight.
+fn reject_range(arm: &Cell, axis: &Vector) -> Cell {
+    [0, 1, 2].map(|i| {
+        let mut row = -axis * axis[i];
+        row[i] = (0..3).filter(|&j| j != i).map(|j| axis[j] * axis[j]).sum();
+        // The entries of the row are rounded, and the axis is a unit vector but for rounding: less than four units of 1.
+        let slack = 4.0 * f64::EPSILON * arm.iter().map(Interval::magnitude).fold(0.0, f64::max);
+        dot(&row, arm) + Interval::new(-slack, slack)
+    })
+}
 
 /// A plane; the inside is behind its normal.
 #[derive(Clone, Debug, PartialEq)]
@@ -94,3 +139,6 @@ pub struct EllipticCone {
     /// `radii * (1 + rate * height)`. Not zero.
     pub rate: f64,
 }
+
+#[cfg(test)]
+mod tests;

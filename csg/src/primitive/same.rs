@@ -1,0 +1,97 @@
+//! Whether two surfaces are the same set of points.
+
+use super::quadric::tangents;
+use super::{Ellipsoid, EllipticCone, EllipticCylinder, Plane, Torus};
+use crate::{Surface, Vector};
+use nalgebra::Matrix3;
+
+/// The largest sine of an angle, and the largest relative difference of slopes, that count as none.
+///
+/// Directions in files are typed with five or six digits: 1.5708 for a right angle is off by 3.7e-6 and
+/// means the same surface. Two surfaces that cross at less than this leave a wedge no mesh can resolve.
+/// (NETGEN takes 1.4e-4.)
+const SAME_DIRECTION: f64 = 1e-5;
+
+fn parallel(a: &Vector, b: &Vector) -> bool {
+    a.cross(b).norm() <= SAME_DIRECTION
+}
+
+/// Spheres as ellipsoids, circular cylinders and cones as elliptic ones.
+fn generalized(surface: &Surface) -> Surface {
+    match surface {
+        Surface::Sphere(s) => Surface::Ellipsoid(Ellipsoid {
+            center: s.center,
+            axes: [Vector::x(), Vector::y(), Vector::z()],
+            radii: [s.radius; 3],
+        }),
+        Surface::Cylinder(c) => {
+            let (u, v) = tangents(&c.axis);
+            Surface::EllipticCylinder(EllipticCylinder { point: c.point, axes: [u, v], radii: [c.radius; 2] })
+        }
+        Surface::Cone(c) => {
+            let (u, v) = tangents(&c.axis);
+            Surface::EllipticCone(EllipticCone {
+                point: c.point,
+                axes: [u, v],
+                radii: [c.radius; 2],
+                axis: c.axis,
+                rate: c.slope / c.radius,
+            })
+        }
+        other => other.clone(),
+    }
+}
+
+/// See [`Surface::same_as`].
+pub fn same(a: &Surface, b: &Surface, tolerance: f64) -> Option<bool> {
+    match (generalized(a), generalized(b)) {
+        (Surface::Plane(a), Surface::Plane(b)) => same_plane(&a, &b, tolerance),
+        (Surface::Torus(a), Surface::Torus(b)) => same_torus(&a, &b, tolerance).then_some(true),
+        (Surface::Ellipsoid(a), Surface::Ellipsoid(b)) => same_ellipsoid(&a, &b, tolerance).then_some(true),
+        (Surface::EllipticCylinder(a), Surface::EllipticCylinder(b)) => {
+            same_elliptic_cylinder(&a, &b, tolerance).then_some(true)
+        }
+        (Surface::EllipticCone(a), Surface::EllipticCone(b)) => {
+            same_elliptic_cone(&a, &b, tolerance).then_some(true)
+        }
+        _ => None,
+    }
+}
+
+fn same_plane(a: &Plane, b: &Plane, tolerance: f64) -> Option<bool> {
+    let between = b.point - a.point;
+    let apart = a.normal.dot(&between).abs().max(b.normal.dot(&between).abs());
+    (parallel(&a.normal, &b.normal) && apart <= tolerance).then(|| a.normal.dot(&b.normal) > 0.0)
+}
+
+fn same_torus(a: &Torus, b: &Torus, tolerance: f64) -> bool {
+    parallel(&a.axis, &b.axis)
+        && (a.center - b.center).norm() <= tolerance
+        && (a.major - b.major).abs() <= tolerance
+        && (a.minor - b.minor).abs() <= tolerance
+}
+
+/// The matrix with these eigenvectors and eigenvalues: does not depend on the order and choice of axes.
+fn shape(axes: &[Vector], radii: &[f64]) -> Matrix3<f64> {
+    axes.iter().zip(radii).map(|(axis, &radius)| axis * axis.transpose() * radius).sum()
+}
+
+fn same_ellipsoid(a: &Ellipsoid, b: &Ellipsoid, tolerance: f64) -> bool {
+    (a.center - b.center).norm() <= tolerance
+        && (shape(&a.axes, &a.radii) - shape(&b.axes, &b.radii)).amax() <= tolerance
+}
+
+fn same_elliptic_cylinder(a: &EllipticCylinder, b: &EllipticCylinder, tolerance: f64) -> bool {
+    let across = (b.point - a.point).cross(&a.axis()).norm();
+    parallel(&a.axis(), &b.axis())
+        && across <= tolerance
+        && (shape(&a.axes, &a.radii) - shape(&b.axes, &b.radii)).amax() <= tolerance
+}
+
+fn same_elliptic_cone(a: &EllipticCone, b: &EllipticCone, tolerance: f64) -> bool {
+    let slopes = |c: &EllipticCone| shape(&c.axes, &c.radii.map(|r| r * c.rate.abs()));
+    let (of_a, of_b) = (slopes(a), slopes(b));
+    parallel(&a.axis, &b.axis)
+        && (a.apex() - b.apex()).norm() <= tolerance
+        && (of_a - of_b).amax() <= SAME_DIRECTION * of_a.amax()
+}
