@@ -21,7 +21,9 @@
 //! are boundaries (a ball on a plate), bodies that overlap or are not bounded.
 
 use crate::{Aabb, BodyId, CornerId, CurveId, Geometry, PatchId, Point, SurfaceId};
+use around::Tolerances;
 
+mod arcs;
 mod around;
 mod assemble;
 mod bounds;
@@ -29,6 +31,7 @@ mod check;
 mod contact;
 mod cross;
 mod error;
+mod extent;
 mod number;
 mod octree;
 mod trace;
@@ -106,7 +109,35 @@ pub struct Features {
     pub bounds: Aabb,
 }
 
+impl Curve {
+    /// Its length, to second order in the angle between the points of its trace.
+    pub fn length(&self) -> f64 {
+        self.trace.windows(2).map(|ends| (ends[1] - ends[0]).norm()).sum()
+    }
+}
+
 impl Features {
+    /// Finds the features of a geometry.
+    ///
+    /// # Errors
+    /// What cannot be meshed is refused with its place, see [`FeatureError`].
+    pub fn find(geometry: &Geometry) -> Result<Self, FeatureError> {
+        let root = bounds::bounding_cell(geometry)?;
+        let diagonal = root.iter().map(|side| side.width().powi(2)).sum::<f64>().sqrt();
+        let largest = root.iter().map(crate::Interval::magnitude).fold(0.0, f64::max);
+        let tolerances = Tolerances::new(diagonal, largest);
+        let tree = octree::Octree::new(geometry, root)?;
+        contact::refuse_apexes(geometry, &tree)?;
+        let traces = trace::trace_all(geometry, &tree, &tolerances);
+        let (arcs, nodes) = arcs::feature_arcs(geometry, &tree, &traces, &tolerances)?;
+        let arcs = assemble::join(geometry, arcs, &nodes, &tolerances)?;
+        contact::check(geometry, &tree, &arcs, &tolerances)?;
+        let mut features = assemble::entities(geometry, &tree, &arcs, &nodes, &tolerances)?;
+        number::number(geometry, &mut features.patches);
+        features.check()?;
+        Ok(features)
+    }
+
     /// The curve with this id.
     pub fn curve(&self, id: CurveId) -> &Curve {
         &self.curves[id.index()]

@@ -156,19 +156,20 @@ mod tests {
     fn points_are_inside_outside_or_on_a_half_ball() {
         let solid = Solid::And(vec![half(0), half(1)]);
         let side = |x: f64| solid.side(&surfaces(), &Point::new(x, 0.1, 0.2), 1e-9);
-        assert_eq!([side(-0.5), side(0.5), side(0.0), side(-2.0)], [
-            Side::Inside,
-            Side::Outside,
-            Side::On,
-            Side::Outside
-        ]);
+        assert_eq!(
+            [side(-0.5), side(0.5), side(0.0), side(-2.0)],
+            [Side::Inside, Side::Outside, Side::On, Side::Outside]
+        );
     }
 
     #[test]
     fn a_surface_that_is_buried_in_the_solid_does_not_count() {
         let solid = Solid::Or(vec![half(0), half(1)]);
         assert_eq!(solid.side(&surfaces(), &Point::new(0.0, 0.1, 0.2), 1e-9), Side::Inside);
-        assert_eq!(Solid::Not(Box::new(solid)).side(&surfaces(), &Point::new(0.0, 0.1, 0.2), 1e-9), Side::Outside);
+        assert_eq!(
+            Solid::Not(Box::new(solid)).side(&surfaces(), &Point::new(0.0, 0.1, 0.2), 1e-9),
+            Side::Outside
+        );
     }
 
     #[test]

@@ -87,6 +87,22 @@ impl Sheet {
     }
 }
 
+/// The sheet of a surface at one of its points, `None` if it is no boundary there.
+pub(super) fn sheet_at(
+    geometry: &Geometry,
+    tree: &Octree,
+    id: SurfaceId,
+    at: &Point,
+) -> Result<Option<Sheet>, FeatureError> {
+    let Some(leaf) = tree.leaf(at).filter(|leaf| leaf.surfaces.contains(&id)) else { return Ok(None) };
+    let side = |positive: bool| {
+        region(geometry, leaf, at, &|s| {
+            if s == id { positive } else { geometry.surfaces[s.index()].value(at) > 0.0 }
+        })
+    };
+    Ok(Sheet::between(id, side(false)?, side(true)?))
+}
+
 /// What is around a curve at one of its points.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Around {
@@ -153,7 +169,8 @@ pub(super) fn around(
 
     // The side of each surface in the widest sector, which is safe to tell; then around, ray by ray.
     let gap = |i: usize| {
-        let next = rays[(i + 1) % rays.len()].angle + if i + 1 == rays.len() { std::f64::consts::TAU } else { 0.0 };
+        let next =
+            rays[(i + 1) % rays.len()].angle + if i + 1 == rays.len() { std::f64::consts::TAU } else { 0.0 };
         next - rays[i].angle
     };
     let widest = (0..rays.len()).fold(0, |best, i| if gap(i) > gap(best) { i } else { best });
@@ -226,7 +243,8 @@ fn sorted_rays(
     rays.sort_by(|x, y| x.angle.total_cmp(&y.angle));
     let mut start = 0;
     while start < rays.len() {
-        let end = start + rays[start..].iter().take_while(|r| r.angle - rays[start].angle <= SAME_ANGLE).count();
+        let end =
+            start + rays[start..].iter().take_while(|r| r.angle - rays[start].angle <= SAME_ANGLE).count();
         rays[start..end].sort_by(|x, y| x.bend.total_cmp(&y.bend));
         for two in rays[start..end].windows(2) {
             if two[1].bend - two[0].bend <= SAME_BEND * (two[1].bend.abs() + two[0].bend.abs()) {

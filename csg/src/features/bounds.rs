@@ -43,7 +43,8 @@ pub(super) fn bounding_cell(geometry: &Geometry) -> Result<Cell, FeatureError> {
             touches && undecided && part.cell[0].width() > RESOLUTION * longest
         };
         if !parts.iter().any(is_rough) {
-            let at_face = |part: &&Part| (0..3).any(|i| part.cell[i].lo == cube[i].lo || part.cell[i].hi == cube[i].hi);
+            let at_face =
+                |part: &&Part| (0..3).any(|i| part.cell[i].lo == cube[i].lo || part.cell[i].hi == cube[i].hi);
             if let Some(part) = parts.iter().find(at_face) {
                 return Err(FeatureError::Unbounded(Named::body(geometry, part.bodies[0].0)));
             }
@@ -86,7 +87,8 @@ pub(super) fn split(cell: &Cell) -> [Cell; 8] {
         let middle = side.middle();
         [Interval::new(side.lo, middle), Interval::new(middle, side.hi)]
     });
-    [0, 1, 2, 3, 4, 5, 6, 7].map(|child| [halves[0][child & 1], halves[1][child >> 1 & 1], halves[2][child >> 2]])
+    [0, 1, 2, 3, 4, 5, 6, 7]
+        .map(|child| [halves[0][child & 1], halves[1][child >> 1 & 1], halves[2][child >> 2]])
 }
 
 /// A cube around the points that define the primitives, far larger than they are apart.
@@ -106,10 +108,7 @@ fn huge_cube(geometry: &Geometry) -> Cell {
             Surface::EllipticCone(e) => (e.point, e.radii[0].max(e.radii[1]).max(1.0 / e.rate.abs())),
         })
         .collect();
-    let mut hull = Aabb {
-        min: Point::from([f64::INFINITY; 3]),
-        max: Point::from([f64::NEG_INFINITY; 3]),
-    };
+    let mut hull = Aabb { min: Point::from([f64::INFINITY; 3]), max: Point::from([f64::NEG_INFINITY; 3]) };
     for (point, reach) in &extents {
         hull.min = hull.min.inf(&(point.map(|x| x - reach)));
         hull.max = hull.max.sup(&(point.map(|x| x + reach)));

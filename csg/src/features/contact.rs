@@ -1,5 +1,6 @@
 //! Places where two surfaces are tangent: whether they matter.
 
+use super::arcs::Arc;
 use super::around::Tolerances;
 use super::octree::{Leaf, Octree};
 use super::{FeatureError, Named, Place};
@@ -91,7 +92,7 @@ fn least_squares_step(a: &Surface, b: &Surface, at: &Point) -> Option<crate::Vec
 ///
 /// Where the sheets are tangent and one bends more, a wedge lies between them. Below, in the wedge and above
 /// there are up to three different regions; the contact matters if both sheets separate some.
-pub(super) fn is_harmless(
+fn is_harmless(
     geometry: &Geometry,
     tree: &Octree,
     contact: &Contact,
@@ -131,11 +132,13 @@ fn depends_on_one(
     other_side: &dyn Fn(SurfaceId) -> bool,
 ) -> Result<bool, FeatureError> {
     let region = |sides: &[bool; 2]| {
-        super::around::region(geometry, leaf, &contact.point, &|s| {
-            match contact.pair.iter().position(|&p| p == s) {
-                Some(i) => sides[i],
-                None => other_side(s),
-            }
+        super::around::region(geometry, leaf, &contact.point, &|s| match contact
+            .pair
+            .iter()
+            .position(|&p| p == s)
+        {
+            Some(i) => sides[i],
+            None => other_side(s),
         })
     };
     let regions = wedges.iter().map(region).collect::<Result<Vec<_>, _>>()?;
@@ -191,8 +194,54 @@ fn possible_wedges(geometry: &Geometry, contact: &Contact) -> Vec<[bool; 2]> {
     sides
 }
 
+/// Refuses contacts that matter and are no part of the features found.
+///
+/// A contact is part of them if a curve of which both surfaces are known runs through it (a ball that ends a pipe), or
+/// ends there (two pipes of one radius that cross).
+pub(super) fn check(
+    geometry: &Geometry,
+    tree: &Octree,
+    arcs: &[Arc],
+    tolerances: &Tolerances,
+) -> Result<(), FeatureError> {
+    for contact in &tree.contacts {
+        let knows = |arc: &&Arc| contact.pair.iter().all(|s| arc.around.surfaces.binary_search(s).is_ok());
+        let near = |arc: &Arc| {
+            let reach = 2.0 * contact.reach;
+            arc.points.windows(2).any(|ends| distance(ends, &contact.point) <= reach)
+        };
+        if !is_harmless(geometry, tree, contact, tolerances)? && !arcs.iter().filter(knows).any(near) {
+            return Err(refusal(geometry, contact));
+        }
+    }
+    Ok(())
+}
+
+/// The distance of a point from a line segment.
+fn distance(ends: &[Point], point: &Point) -> f64 {
+    let chord = ends[1] - ends[0];
+    let part = ((point - ends[0]).dot(&chord) / chord.norm_squared()).clamp(0.0, 1.0);
+    (point - (ends[0] + chord * part)).norm()
+}
+
+/// Refuses cones whose apex is on the boundary of a body.
+pub(super) fn refuse_apexes(geometry: &Geometry, tree: &Octree) -> Result<(), FeatureError> {
+    for (i, surface) in geometry.surfaces.iter().enumerate() {
+        if let Some(apex) = surface.apex() {
+            let id = SurfaceId::new(i);
+            if super::around::sheet_at(geometry, tree, id, &apex)?.is_some() {
+                return Err(FeatureError::ConeApex {
+                    cone: Named::surface(geometry, id),
+                    place: Place(apex),
+                });
+            }
+        }
+    }
+    Ok(())
+}
+
 /// The error for a contact that matters.
-pub(super) fn refusal(geometry: &Geometry, contact: &Contact) -> FeatureError {
+fn refusal(geometry: &Geometry, contact: &Contact) -> FeatureError {
     let [first, second] = contact.pair.map(|s| Named::surface(geometry, s));
     FeatureError::Tangent { first, second, place: Place(contact.point) }
 }

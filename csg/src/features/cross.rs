@@ -4,7 +4,7 @@ use super::around::Tolerances;
 use super::octree::Octree;
 use super::trace::{Trace, along, step_box};
 use crate::project::project_to_both;
-use crate::{Geometry, Interval, Point, Surface, SurfaceId, Vector};
+use crate::{Geometry, Interval, Point, Surface, Vector};
 use nalgebra::Matrix3;
 
 /// A point where another surface crosses or touches a trace.
@@ -32,7 +32,8 @@ pub(super) fn crossings(
             if trace.pair.contains(&id) {
                 continue;
             }
-            let mut finder = Finder { a, b, third: &geometry.surfaces[id.index()], tolerances, found: Vec::new() };
+            let mut finder =
+                Finder { a, b, third: &geometry.surfaces[id.index()], tolerances, found: Vec::new() };
             if !finder.contains_curve(ends) {
                 finder.find(&ends[0], &ends[1], 0);
             }

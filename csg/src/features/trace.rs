@@ -118,7 +118,12 @@ struct Tracer<'a> {
 }
 
 impl<'a> Tracer<'a> {
-    fn new(geometry: &'a Geometry, tree: &'a Octree, pair: [SurfaceId; 2], tolerances: &'a Tolerances) -> Self {
+    fn new(
+        geometry: &'a Geometry,
+        tree: &'a Octree,
+        pair: [SurfaceId; 2],
+        tolerances: &'a Tolerances,
+    ) -> Self {
         let surfaces = pair.map(|s| &geometry.surfaces[s.index()]);
         let diagonal = tree.root.iter().map(|side| side.width().powi(2)).sum::<f64>().sqrt();
         let branch_points = tree.contacts.iter().filter(|c| c.pair == pair).map(|c| c.point).collect();
@@ -248,7 +253,9 @@ pub fn curve_tangent(geometry: &Geometry, curve: &Curve, at: &Point) -> Vector {
     // surfaces may be tangent.
     let middle = curve.trace.len() / 2;
     let chord = curve.trace[middle] - curve.trace[middle - 1];
-    if tangent(a, b, &curve.trace[middle - 1]).dot(&chord) + tangent(a, b, &curve.trace[middle]).dot(&chord) < 0.0 {
+    if tangent(a, b, &curve.trace[middle - 1]).dot(&chord) + tangent(a, b, &curve.trace[middle]).dot(&chord)
+        < 0.0
+    {
         -along
     } else {
         along
