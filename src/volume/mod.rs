@@ -1,6 +1,9 @@
 //! Volume meshing: Delaunay tetrahedra inside a closed surface that is kept exactly.
 
+mod cavity;
 pub mod closed_surface;
+mod delaunay;
+mod tetrahedra;
 
 pub use closed_surface::ClosedSurface;
 
