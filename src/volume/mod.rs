@@ -3,6 +3,7 @@
 mod cavity;
 pub mod closed_surface;
 mod delaunay;
+mod sectors;
 mod tetrahedra;
 
 pub use closed_surface::ClosedSurface;
