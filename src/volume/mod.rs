@@ -8,7 +8,9 @@ mod crossing;
 mod delaunay;
 mod finish;
 mod flips;
+mod polygon;
 mod recover;
+mod relocate;
 #[cfg(test)]
 mod samples;
 mod sectors;
@@ -133,6 +135,7 @@ pub fn mesh(
     let mut constraints = Constraints::new(&surface.triangles);
     let mut recovery = Recovery::new(&mut mesh, &mut constraints, points.len() + 100);
     let recovered = recovery.run();
+    let steiner = std::mem::take(&mut recovery.steiner);
     (report.missing_edges, report.missing_faces) =
         (recovery.counts.missing_edges, recovery.counts.missing_faces);
     report.steiner_on_surface = recovery.counts.steiner;
@@ -145,6 +148,13 @@ pub fn mesh(
         place: surface.points[surface.triangles[d.triangle as usize][0] as usize],
         regions: d.regions,
     })?;
+    let (inside, stayed) = relocate::relocate(&mut mesh, &mut constraints, &surface.triangles, &steiner);
+    if !stayed.is_empty() {
+        let facets = stayed.iter().flat_map(|&p| constraints.facets_at(p)).collect();
+        let left = recover::Unrecovered { facets, intersections: Vec::new() };
+        return Err(finish::not_recovered(surface, &constraints, &left, scale));
+    }
+    report.steiner_inside = inside.len();
     let _ = settings;
     Ok((finish::finish(surface, &mesh, scale), report))
 }

@@ -123,3 +123,32 @@ fn extreme_units_change_nothing() {
     assert_eq!(build(1.0), build(2f64.powi(-300)));
     assert_eq!(build(1.0), build(2f64.powi(300)));
 }
+
+/// The Schönhardt polyhedron: a prism whose top is turned so that its sides bend inward along their diagonals. It has no
+/// tetrahedralisation without a point inside.
+fn schoenhardt(turn: f64) -> Soup {
+    let at = |angle: f64, z: f64| Point::new(angle.cos(), angle.sin(), z);
+    let third = std::f64::consts::TAU / 3.0;
+    let low: Vec<Point> = (0..3).map(|i| at(third * f64::from(i), 0.0)).collect();
+    let high: Vec<Point> = (0..3).map(|i| at(third * f64::from(i) + turn, 1.0)).collect();
+    let mut soup = Soup::default();
+    soup.add([low[0], low[2], low[1]], INSIDE);
+    soup.add([high[0], high[1], high[2]], INSIDE);
+    for i in 0..3 {
+        let j = (i + 1) % 3;
+        // The diagonal that makes the side concave for a turn in the positive sense.
+        soup.add([low[i], low[j], high[i]], INSIDE);
+        soup.add([low[j], high[j], high[i]], INSIDE);
+    }
+    soup
+}
+
+#[test]
+fn the_schoenhardt_polyhedron_gets_one_point_inside() {
+    for degrees in [1.0f64, 10.0, 30.0, 45.0, 55.0] {
+        for sign in [1.0, -1.0] {
+            let report = recovered(schoenhardt(sign * degrees.to_radians()));
+            eprintln!("{degrees} {sign} {report:?}");
+        }
+    }
+}

@@ -323,6 +323,45 @@ impl Tetrahedra {
         }
     }
 
+    /// Replaces tets by others, each with its body, where the outside and the facets among them change too.
+    ///
+    /// Faces of facets are locked; a new face that is alone must be one, and borders the outside then.
+    ///
+    /// # Panics
+    /// Where the new tets leave a face alone that is no facet.
+    pub fn rebuild(&mut self, old: &[u32], new: &[([u32; 4], u32)], is_facet: &dyn Fn([u32; 3]) -> bool) {
+        let mut faces = Vec::new();
+        self.clear_marks();
+        for &t in old {
+            self.mark(t);
+        }
+        for half_face in old.iter().flat_map(|&t| 4 * t..4 * t + 4) {
+            let other = self.across(half_face);
+            if other != NONE && !self.is_marked(other >> 2) {
+                faces.push((sorted(self.face(half_face)), other));
+            }
+        }
+        for &t in old {
+            self.remove_tet(t);
+        }
+        for &(tet, body) in new {
+            let t = self.add_tet(tet, body);
+            faces.extend((4 * t..4 * t + 4).map(|h| (sorted(self.face(h)), h)));
+        }
+        faces.sort_unstable();
+        for same in faces.chunk_by(|a, b| a.0 == b.0) {
+            let facet = is_facet(same[0].0);
+            match *same {
+                [(_, one), (_, other)] => self.link(one, other),
+                [_] if facet => {}
+                _ => panic!("face {:?} left alone", same[0].0),
+            }
+            if facet {
+                self.lock(same[0].1);
+            }
+        }
+    }
+
     /// Every broken promise of the structure, as sentences; empty when all is well.
     pub fn check(&self) -> Vec<String> {
         let mut faults = Vec::new();
