@@ -36,7 +36,9 @@ struct Sector {
     tets: Vec<u32>,
     /// Its surface once p is gone, outward.
     skin: Vec<[u32; 3]>,
-    /// Those of `skin` that p does not see.
+    /// The half-faces of `tets` that are in `skin`.
+    walls: Vec<u32>,
+    /// Those of `skin` in place of facets at p, which p does not see.
     fresh: Vec<[u32; 3]>,
 }
 
@@ -88,10 +90,16 @@ fn take_off(
             None => return false,
         };
     }
-    let sectors = sectors(mesh, constraints, p, &patches);
-    let Some(apexes) = sectors.iter().map(|s| find_apex(mesh, s, p)).collect::<Option<Vec<_>>>() else {
+    let mut sectors = sectors(mesh, constraints, p, &patches);
+    let Some(apexes) = sectors.iter_mut().map(|s| grow_and_find(mesh, s, p)).collect::<Option<Vec<_>>>() else {
         return false;
     };
+    let mut ball: Vec<u32> = sectors.iter().flat_map(|s| s.tets.iter().copied()).collect();
+    ball.sort_unstable();
+    if ball.windows(2).any(|pair| pair[0] == pair[1]) {
+        // Two sectors took in the same tet.
+        return false;
+    }
     for f in old {
         constraints.remove(f);
     }
@@ -100,7 +108,6 @@ fn take_off(
             constraints.add(vertices, triangle);
         }
     }
-    let ball: Vec<u32> = sectors.iter().flat_map(|s| s.tets.iter().copied()).collect();
     let mut new = Vec::new();
     for (sector, apex) in sectors.iter().zip(apexes) {
         let apex = match apex {
@@ -161,7 +168,7 @@ fn sectors(
                 let face = mesh.face(half_face);
                 let other = mesh.across(half_face);
                 if !face.contains(&p) {
-                    sector.skin.push(face);
+                    sector.walls.push(half_face);
                 } else if mesh.is_locked(half_face) {
                     let facet = constraints.facet(face).expect("a locked face is a facet");
                     let facet = &constraints.facets[facet as usize];
@@ -177,7 +184,7 @@ fn sectors(
             let turned = |&[a, b, c]: &[u32; 3]| if outward { [a, b, c] } else { [a, c, b] };
             sector.fresh.extend(patches[&triangle].iter().map(turned));
         }
-        sector.skin.extend_from_slice(&sector.fresh);
+        sector.set_skin(mesh);
         sectors.push(sector);
     }
     sectors
@@ -205,7 +212,64 @@ fn worst(mesh: &Tetrahedra, skin: &[[u32; 3]], apex: &Point, own: u32, floor: f6
     worst
 }
 
-/// From where to fill a sector.
+impl Sector {
+    fn set_skin(&mut self, mesh: &Tetrahedra) {
+        self.skin.clear();
+        self.skin.extend(self.walls.iter().map(|&w| mesh.face(w)));
+        self.skin.extend_from_slice(&self.fresh);
+    }
+
+    /// Takes in the tets behind those walls that a point does not see; false where there are none to take.
+    fn grow(&mut self, mesh: &Tetrahedra, point: &Point) -> bool {
+        let unseen = |wall: &u32| {
+            let [a, b, c] = mesh.face(*wall).map(|v| mesh.point(v));
+            orient3d(point, a, b, c) != Sign::Positive
+        };
+        let before = self.tets.len();
+        for wall in self.walls.clone() {
+            let behind = mesh.across(wall);
+            if unseen(&wall) && behind != NONE && !mesh.is_locked(wall) && !self.tets.contains(&(behind >> 2)) {
+                self.tets.push(behind >> 2);
+            }
+        }
+        let half_faces = self.tets[before..].iter().flat_map(|&t| 4 * t..4 * t + 4);
+        self.walls.extend(half_faces);
+        let inner = |w: &u32| {
+            let behind = mesh.across(*w);
+            behind != NONE && !mesh.is_locked(*w) && self.tets.contains(&(behind >> 2))
+        };
+        self.walls.retain(|w| !inner(w));
+        self.set_skin(mesh);
+        self.tets.len() > before
+    }
+
+    /// Whether every vertex of its tets but p is on its surface.
+    fn keeps_vertices(&self, mesh: &Tetrahedra, p: u32) -> bool {
+        self.tets.iter().flat_map(|&t| mesh.tets[t as usize]).all(|v| v == p || self.skin.iter().any(|f| f.contains(&v)))
+    }
+}
+
+/// From where to fill a sector, which takes in tets behind walls as long as no place sees it all: where the
+/// surface is flat up to rounding, p may lie on the wrong side of an edge of the mesh.
+fn grow_and_find(mesh: &Tetrahedra, sector: &mut Sector, p: u32) -> Option<Apex> {
+    /// Each time the walls around move one tet away; what lies that far is no matter of rounding.
+    const GROWTHS: usize = 6;
+    /// Where to look from: this fraction of the sector's size off the surface.
+    const OFF: f64 = 0.01;
+    for _ in 0..GROWTHS {
+        if let Some(apex) = find_apex(mesh, sector, p) {
+            return Some(apex);
+        }
+        let (inward, _) = directions(mesh, sector, p);
+        let grown = sector.grow(mesh, &(mesh.point(p) + inward * OFF));
+        if !grown || !sector.keeps_vertices(mesh, p) {
+            return None;
+        }
+    }
+    None
+}
+
+/// From where to fill a sector as it is.
 fn find_apex(mesh: &Tetrahedra, sector: &Sector, p: u32) -> Option<Apex> {
     let mut own: Vec<u32> = sector.skin.iter().flatten().copied().collect();
     own.sort_unstable();
@@ -233,12 +297,7 @@ fn find_place(mesh: &Tetrahedra, sector: &Sector, p: u32, own: &[u32]) -> Option
     let start = *mesh.point(p);
     let n = own.len() as f64;
     let to_center = own.iter().map(|&v| mesh.point(v) - start).sum::<Vector>() / n;
-    let reach = own.iter().map(|&v| (mesh.point(v) - start).norm()).fold(0.0, f64::max);
-    let inward = sector.fresh.iter().fold(Vector::zeros(), |sum, face| {
-        let [a, b, c] = face.map(|v| mesh.point(v));
-        sum - (b - a).cross(&(c - a)).normalize()
-    });
-    let inward = inward.try_normalize(0.0).unwrap_or_else(Vector::zeros) * reach;
+    let (inward, reach) = directions(mesh, sector, p);
     let mut best = (f64::NEG_INFINITY, start);
     for k in 0..HALVINGS {
         let step = 0.5f64.powi(k);
@@ -254,6 +313,17 @@ fn find_place(mesh: &Tetrahedra, sector: &Sector, p: u32, own: &[u32]) -> Option
         return None;
     }
     Some(climb(mesh, sector, best, reach))
+}
+
+/// Away from the facets at p, as long as the sector reaches; and how far that is.
+fn directions(mesh: &Tetrahedra, sector: &Sector, p: u32) -> (Vector, f64) {
+    let start = mesh.point(p);
+    let reach = sector.skin.iter().flatten().map(|&v| (mesh.point(v) - start).norm()).fold(0.0, f64::max);
+    let inward = sector.fresh.iter().fold(Vector::zeros(), |sum, face| {
+        let [a, b, c] = face.map(|v| mesh.point(v));
+        sum - (b - a).cross(&(c - a)).normalize()
+    });
+    (inward.try_normalize(0.0).unwrap_or_else(Vector::zeros) * reach, reach)
 }
 
 /// Moves a place along the axes as long as the worst mean ratio grows.
