@@ -8,6 +8,7 @@ mod crossing;
 mod delaunay;
 mod finish;
 mod flips;
+mod points;
 mod polygon;
 mod recover;
 mod relocate;
@@ -127,7 +128,6 @@ pub fn mesh(
     size: &dyn SizeField,
     settings: &Settings,
 ) -> Result<(VolumeMesh, Report), VolumeError> {
-    let _ = size;
     let scale = finish::scale_of(&surface.points);
     let points: Vec<Point> = surface.points.iter().map(|p| p * scale).collect();
     let mut report = Report::default();
@@ -155,7 +155,9 @@ pub fn mesh(
         return Err(finish::not_recovered(surface, &constraints, &left, scale));
     }
     report.steiner_inside = inside.len();
-    let _ = settings;
+    if settings.fill {
+        report.points_inside = points::fill(&mut mesh, size, scale, settings.max_tets);
+    }
     Ok((finish::finish(surface, &mesh, scale), report))
 }
 
