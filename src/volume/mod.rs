@@ -1,11 +1,29 @@
 //! Volume meshing: Delaunay tetrahedra inside a closed surface that is kept exactly.
 
+mod carve;
+mod cavity;
 pub mod closed_surface;
+mod constraints;
+mod crossing;
+mod delaunay;
+mod finish;
+mod flips;
+mod points;
+mod polygon;
+mod recover;
+mod relocate;
+#[cfg(test)]
+mod samples;
+mod sectors;
+mod tetrahedra;
 
-pub use closed_surface::ClosedSurface;
+pub use closed_surface::{ClosedSurface, SurfaceFault, SurfaceFaults};
 
 use crate::Point;
+use crate::size::SizeField;
+use constraints::Constraints;
 use csg::BodyId;
+use recover::{Recovery, lock_facets};
 
 /// Tets that fill the bodies of a [`ClosedSurface`].
 #[derive(Clone, Debug, Default)]
@@ -17,3 +35,131 @@ pub struct VolumeMesh {
     /// The body of each tet.
     pub bodies: Vec<BodyId>,
 }
+
+/// Choices of the volume mesher.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// Whether to add points inside by the size field. Without: only what the boundary needs.
+    pub fill: bool,
+    /// The largest number of tets; more end with an error.
+    pub max_tets: usize,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self { fill: true, max_tets: tetrahedra::MAX_TETS }
+    }
+}
+
+/// What the volume mesher met and did.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Report {
+    /// Edges of the surface that the Delaunay mesh of its points did not have.
+    pub missing_edges: usize,
+    /// Triangles of the surface that the Delaunay mesh of its points did not have.
+    pub missing_faces: usize,
+    /// Points put on the surface for a while, because flips alone did not recover it.
+    pub steiner_on_surface: usize,
+    /// Points left inside the bodies to replace them.
+    pub steiner_inside: usize,
+    /// Points added inside by the size field.
+    pub points_inside: usize,
+}
+
+/// Why there is no volume mesh.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum VolumeError {
+    /// The surface meets itself where it must not.
+    #[error("the surface intersects itself: {}", list_places(triangles, places))]
+    SelfIntersection {
+        /// The triangles that meet others.
+        triangles: Vec<u32>,
+        /// Where each does.
+        places: Vec<Point>,
+    },
+    /// Some triangles could not be made faces of the mesh.
+    #[error("{} triangles could not be recovered: {}", triangles.len(), list_places(triangles, places))]
+    NotRecovered {
+        /// The triangles.
+        triangles: Vec<u32>,
+        /// A corner of each.
+        places: Vec<Point>,
+    },
+    /// Two triangles name different regions for one and the same.
+    #[error(
+        "triangle {triangle} at ({}, {}, {}) says {regions:?} for a region that another triangle names otherwise",
+        place.x, place.y, place.z
+    )]
+    Inconsistent {
+        /// The triangle.
+        triangle: u32,
+        /// A corner of it.
+        place: Point,
+        /// What it names, and what the other does.
+        regions: [Option<BodyId>; 2],
+    },
+}
+
+/// The first few triangles with their places, for messages.
+fn list_places(triangles: &[u32], places: &[Point]) -> String {
+    const SHOWN: usize = 5;
+    let mut text: Vec<String> = triangles
+        .iter()
+        .zip(places)
+        .take(SHOWN)
+        .map(|(t, p)| format!("triangle {t} at ({}, {}, {})", p.x, p.y, p.z))
+        .collect();
+    if triangles.len() > SHOWN {
+        text.push(format!("and {} more", triangles.len() - SHOWN));
+    }
+    text.join(", ")
+}
+
+/// Fills the bodies of a surface with tets whose edges are about as long as `size` says.
+///
+/// The surface stays as it is: its triangles are the faces of the tets on it, exactly. All tets are
+/// positively oriented by exact sign. The same input gives the same mesh.
+///
+/// # Errors
+/// Surfaces that intersect themselves, regions that disagree, and triangles that could not be recovered,
+/// each with places.
+pub fn mesh(
+    surface: &ClosedSurface,
+    size: &dyn SizeField,
+    settings: &Settings,
+) -> Result<(VolumeMesh, Report), VolumeError> {
+    let scale = finish::scale_of(&surface.points);
+    let points: Vec<Point> = surface.points.iter().map(|p| p * scale).collect();
+    let mut report = Report::default();
+    let mut mesh = delaunay::delaunay(&points);
+    let mut constraints = Constraints::new(&surface.triangles);
+    let mut recovery = Recovery::new(&mut mesh, &mut constraints, points.len() + 100);
+    let recovered = recovery.run();
+    let steiner = std::mem::take(&mut recovery.steiner);
+    (report.missing_edges, report.missing_faces) =
+        (recovery.counts.missing_edges, recovery.counts.missing_faces);
+    report.steiner_on_surface = recovery.counts.steiner;
+    if let Err(left) = recovered {
+        return Err(finish::not_recovered(surface, &constraints, &left, scale));
+    }
+    lock_facets(&mut mesh, &constraints);
+    carve::carve(&mut mesh, &constraints, &surface.regions).map_err(|d| VolumeError::Inconsistent {
+        triangle: d.triangle,
+        place: surface.points[surface.triangles[d.triangle as usize][0] as usize],
+        regions: d.regions,
+    })?;
+    let (inside, stayed) = relocate::relocate(&mut mesh, &mut constraints, &surface.triangles, &steiner);
+    if !stayed.is_empty() {
+        let facets = stayed.iter().flat_map(|&p| constraints.facets_at(p)).collect();
+        let left = recover::Unrecovered { facets, intersections: Vec::new() };
+        return Err(finish::not_recovered(surface, &constraints, &left, scale));
+    }
+    report.steiner_inside = inside.len();
+    if settings.fill {
+        report.points_inside = points::fill(&mut mesh, size, scale, settings.max_tets);
+    }
+    Ok((finish::finish(surface, &mesh, scale), report))
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,233 @@
+//! Points inside, placed by the size field.
+//!
+//! Frontal Delaunay refinement (Rebay 1993). A tet is **fine** if its circumsphere is not much larger than that of
+//! a regular tet of the wanted size. The **front** are the faces between fine tets, or the boundary, and
+//! tets that are not. Over a front face stands the ideal point: on its axis, so far that the new edges have the
+//! wanted length. It is inserted by a Delaunay cavity that stops at the boundary, unless it is too near to
+//! another vertex or to the boundary. Wave by wave the front moves inward; what is still coarse when it has
+//! passed gets its circumcentre, under the same filter.
+
+use super::cavity::{Cavity, Walk, walk};
+use super::tetrahedra::{NONE, Tetrahedra};
+use crate::kernel::simplex::area_vector;
+use crate::size::SizeField;
+use crate::{Point, Vector};
+
+/// The circumradius of a regular tet of edge 1.
+const REGULAR: f64 = 0.612_372_435_695_794_5;
+
+/// A tet is fine up to this many times the circumradius of a regular tet of the wanted size. Below 1.2
+/// the filter refuses most candidates; above 1.5 tets are visibly too large.
+const FINE: f64 = 1.3;
+
+/// No vertex is inserted nearer to another than this fraction of the wanted size. At 0.6 short edges make
+/// flat tets, at 0.8 holes stay in the front.
+const NEAREST: f64 = 0.7;
+
+/// No vertex is inserted nearer to the boundary than this fraction of the wanted size (a regular tet is 0.82 high).
+const NEAREST_FACE: f64 = 0.4;
+
+/// Wanted sizes grow from a vertex by at most this per unit of distance, so that a skin finer than the size
+/// field asks passes into the inside gradually.
+const GROWTH: f64 = 0.5;
+
+/// Edges of a skin made for a size h vary; up to this many times its mean edge at a vertex is taken for the same h.
+const SKIN_TOLERANCE: f64 = 1.25;
+
+/// The working state of the point placement.
+struct Filler<'a> {
+    mesh: &'a mut Tetrahedra,
+    size: &'a dyn SizeField,
+    scale: f64,
+    /// The wanted size at each vertex, in the mesher's units.
+    sizes: Vec<f64>,
+    /// Tets of which no candidate is left; by slot, with the vertices they had.
+    settled: Vec<[u32; 4]>,
+    cavity: Cavity,
+    max_tets: usize,
+}
+
+/// Adds points inside all bodies; returns how many. Stops at `max_tets` tets.
+pub(super) fn fill(mesh: &mut Tetrahedra, size: &dyn SizeField, scale: f64, max_tets: usize) -> usize {
+    let before = mesh.points.len();
+    let sizes = vertex_sizes(mesh, size, scale);
+    let mut filler =
+        Filler { mesh, size, scale, sizes, settled: Vec::new(), cavity: Cavity::default(), max_tets };
+    filler.advance();
+    filler.finish();
+    filler.mesh.points.len() - before
+}
+
+/// The wanted size at each vertex: the field's, or what the edges of the skin there suggest if that is less.
+fn vertex_sizes(mesh: &Tetrahedra, size: &dyn SizeField, scale: f64) -> Vec<f64> {
+    let mut skin = vec![(0.0, 0u32); mesh.points.len()];
+    for t in mesh.alive() {
+        for half_face in (4 * t..4 * t + 4).filter(|&h| mesh.is_locked(h)) {
+            let [a, b, c] = mesh.face(half_face);
+            for [u, v] in [[a, b], [b, c], [c, a]] {
+                let length = (mesh.point(u) - mesh.point(v)).norm();
+                for w in [u, v] {
+                    skin[w as usize].0 += length;
+                    skin[w as usize].1 += 1;
+                }
+            }
+        }
+    }
+    let wanted = |(v, &(sum, count)): (usize, &(f64, u32))| {
+        if mesh.at_vertex[v] == NONE {
+            return 0.0;
+        }
+        let size = size.size_at(&(mesh.points[v] / scale)) * scale;
+        if count == 0 { size } else { size.min(SKIN_TOLERANCE * sum / f64::from(count)) }
+    };
+    skin.iter().enumerate().map(wanted).collect()
+}
+
+/// The centre of the sphere through the corners of a tet; not finite where it is flat.
+fn circumcenter([a, b, c, d]: [&Point; 4]) -> Point {
+    let (u, v, w) = (b - a, c - a, d - a);
+    let numerator = u.norm_squared() * v.cross(&w) + v.norm_squared() * w.cross(&u) + w.norm_squared() * u.cross(&v);
+    a + numerator / (2.0 * u.cross(&v).dot(&w))
+}
+
+impl Filler<'_> {
+    /// Waves of ideal points, until no front is left.
+    fn advance(&mut self) {
+        let mut coarse: Vec<u32> = self.mesh.alive().filter(|&t| !self.is_fine(t)).collect();
+        while !coarse.is_empty() {
+            let mut next = Vec::new();
+            let mut moved = false;
+            for t in coarse {
+                if !self.mesh.is_alive(t) || self.is_settled(t) || self.is_fine(t) {
+                    continue;
+                }
+                let front: Vec<u32> = (4 * t..4 * t + 4).filter(|&h| self.is_front(h)).collect();
+                if front.is_empty() {
+                    next.push(t);
+                    continue;
+                }
+                moved = true;
+                let inserted = front.iter().any(|&h| {
+                    let (point, size) = self.ideal_point(h);
+                    self.insert(t, point, size)
+                });
+                if inserted {
+                    next.extend_from_slice(&self.cavity.filled);
+                } else {
+                    self.settle(t);
+                }
+            }
+            if !moved || self.mesh.len() > self.max_tets {
+                break;
+            }
+            coarse = next;
+        }
+    }
+
+    /// Circumcentres of what is still coarse.
+    fn finish(&mut self) {
+        let mut coarse: Vec<u32> = self.mesh.alive().collect();
+        while let Some(t) = coarse.pop() {
+            if self.mesh.len() > self.max_tets {
+                break;
+            }
+            if !self.mesh.is_alive(t) || self.is_fine(t) {
+                continue;
+            }
+            let center = circumcenter(self.mesh.corners(t));
+            let size = self.size_near(t, &center);
+            if self.insert(t, center, size) {
+                coarse.extend_from_slice(&self.cavity.filled);
+            }
+        }
+    }
+
+    fn is_settled(&self, t: u32) -> bool {
+        self.settled.get(t as usize).is_some_and(|tet| *tet == self.mesh.tets[t as usize])
+    }
+
+    fn settle(&mut self, t: u32) {
+        if self.settled.len() <= t as usize {
+            self.settled.resize(self.mesh.tets.len(), [NONE; 4]);
+        }
+        self.settled[t as usize] = self.mesh.tets[t as usize];
+    }
+
+    fn is_fine(&self, t: u32) -> bool {
+        let corners = self.mesh.corners(t);
+        let radius2 = (circumcenter(corners) - corners[0]).norm_squared();
+        let size = 0.25 * self.mesh.tets[t as usize].iter().map(|&v| self.sizes[v as usize]).sum::<f64>();
+        radius2 <= (FINE * REGULAR * size).powi(2)
+    }
+
+    /// Whether the front is at this face of a tet that is not fine.
+    fn is_front(&self, half_face: u32) -> bool {
+        let other = self.mesh.across(half_face);
+        other == NONE
+            || self.mesh.is_locked(half_face)
+            || self.is_settled(other >> 2)
+            || self.is_fine(other >> 2)
+    }
+
+    /// The wanted size at a point in or near a tet.
+    fn size_near(&self, t: u32, point: &Point) -> f64 {
+        let asked = self.size.size_at(&(point / self.scale)) * self.scale;
+        self.mesh.tets[t as usize].iter().fold(asked, |size, &v| {
+            size.min(self.sizes[v as usize] + GROWTH * (point - self.mesh.point(v)).norm())
+        })
+    }
+
+    /// The point over a face, into its tet, whose edges to the face have the wanted length; and that length.
+    fn ideal_point(&self, half_face: u32) -> (Point, f64) {
+        let [a, b, c] = self.mesh.face(half_face).map(|v| self.mesh.point(v));
+        let (u, v) = (b - a, c - a);
+        let normal: Vector = -area_vector(a, b, c);
+        let squares = normal.norm_squared();
+        let to_center = (u.norm_squared() * v - v.norm_squared() * u).cross(&u.cross(&v)) / (2.0 * squares);
+        let (center, radius2) = (a + to_center, to_center.norm_squared());
+        let inward = normal / squares.sqrt();
+        let mut size = self.mesh.face(half_face).iter().map(|&v| self.sizes[v as usize]).sum::<f64>() / 3.0;
+        let mut point = center;
+        // The size at the point decides where it is, and where it is decides the size: twice is enough.
+        for _ in 0..2 {
+            let height = (size * size - radius2).max(0.25 * size * size).sqrt();
+            point = center + inward * height;
+            size = self.size_near(half_face >> 2, &point);
+        }
+        (point, size)
+    }
+
+    /// Inserts a point near tet `t` unless it is too near to something; the new tets are in `cavity.filled`.
+    fn insert(&mut self, t: u32, point: Point, size: f64) -> bool {
+        let near = (NEAREST * size).powi(2);
+        let too_near = |mesh: &Tetrahedra, t: u32| mesh.corners(t).iter().any(|p| (point - **p).norm_squared() < near);
+        if !point.iter().all(|x| x.is_finite()) || too_near(self.mesh, t) {
+            return false;
+        }
+        let Walk::Inside(seed) = walk(self.mesh, t, &point) else { return false };
+        if too_near(self.mesh, seed) {
+            return false;
+        }
+        self.cavity.grow(self.mesh, seed, &point);
+        if self.cavity.tets.iter().any(|&t| too_near(self.mesh, t))
+            || !self.cavity.make_star_shaped(self.mesh, seed, &point)
+            || self.cavity.walls.iter().any(|&w| self.is_skin_near(w, &point, size))
+        {
+            return false;
+        }
+        let body = self.mesh.bodies[seed as usize];
+        let v = self.mesh.add_point(point);
+        self.sizes.push(size);
+        self.cavity.fill(self.mesh, v, body);
+        true
+    }
+
+    fn is_skin_near(&self, wall: u32, point: &Point, size: f64) -> bool {
+        if !self.mesh.is_locked(wall) {
+            return false;
+        }
+        let [a, b, c] = self.mesh.face(wall).map(|v| self.mesh.point(v));
+        let normal = area_vector(a, b, c);
+        (a - point).dot(&normal) < NEAREST_FACE * size * normal.norm()
+    }
+}
