@@ -1,0 +1,1 @@
+//! Meshes to be improved in tests.
