@@ -16,7 +16,7 @@
 //! Compare NETGEN's illegal tets and Zienkiewicz's rule for curved quadratic elements, which
 //! forbid the same for the same reason.
 
-use crate::mesh::{Mesh, VertexId};
+use crate::mesh::{Mesh, TET_FACES, VertexId};
 use crate::{Point, Vector};
 use csg::{CurveId, Features, Geometry, PatchId, Surface};
 
@@ -99,6 +99,8 @@ pub(super) struct Legality {
     /// The spokes of vertex v are `spokes[starts[v]..starts[v + 1]]`.
     starts: Vec<u32>,
     spokes: Vec<Spoke>,
+    /// The boundary triangles with two edges on one curve, sorted.
+    hopeless: Vec<[u32; 3]>,
 }
 
 impl Legality {
@@ -119,7 +121,8 @@ impl Legality {
         }
         incidences.sort_unstable();
         incidences.dedup();
-        let mut legality = Self { starts: vec![0; mesh.points.len() + 1], spokes: Vec::new() };
+        let mut legality =
+            Self { starts: vec![0; mesh.points.len() + 1], spokes: Vec::new(), hopeless: Vec::new() };
         for at_vertex in incidences.chunk_by(|a, b| a.0 == b.0) {
             let vertex = at_vertex[0].0.index();
             let at = &mesh.points[vertex];
@@ -144,6 +147,11 @@ impl Legality {
         for v in 0..mesh.points.len() {
             legality.starts[v + 1] = legality.starts[v + 1].max(legality.starts[v]);
         }
+        let triangles = mesh.triangles.iter().map(|t| sorted(t.vertices.map(|v| v.0)));
+        let mut hopeless: Vec<[u32; 3]> = triangles.filter(|&t| legality.is_illegal_triangle(t)).collect();
+        hopeless.sort_unstable();
+        hopeless.dedup();
+        legality.hopeless = hopeless;
         legality
     }
 
@@ -160,7 +168,12 @@ impl Legality {
         spoke.map_or((0, 0), |s| (s.planes, s.lines))
     }
 
-    /// Whether the tet flattens when refined.
+    /// The boundary triangles that flatten at a vertex when refined: no change inside can mend them or the tets behind them.
+    pub fn illegal_triangles(&self) -> usize {
+        self.hopeless.len()
+    }
+
+    /// Whether the tet flattens when refined, and not by an illegal boundary triangle alone.
     pub fn is_illegal(&self, tet: [u32; 4]) -> bool {
         // Three vertices on the boundary are the least that either rule needs.
         if tet.iter().filter(|&&v| self.spokes(v).is_empty()).count() > 1 {
@@ -168,18 +181,25 @@ impl Legality {
         }
         (0..4).any(|k| {
             let others = [tet[(k + 1) % 4], tet[(k + 2) % 4], tet[(k + 3) % 4]];
-            let [a, b, c] = others.map(|to| self.tangents(tet[k], to));
-            (a.0 & b.0 & c.0) | (a.1 & b.1) | (b.1 & c.1) | (c.1 & a.1) != 0
-        })
+            let [a, b, c] = others.map(|to| self.tangents(tet[k], to).0);
+            a & b & c != 0
+        }) || TET_FACES.iter().any(|face| self.is_illegal_triangle(face.map(|k| tet[k])))
     }
 
-    /// Whether two of the triangle's edges lie on curves tangent at their common vertex, so that all tets with it are illegal.
+    /// Whether two of the triangle's edges lie on curves tangent at their common vertex, so that all tets with it
+    /// are illegal; not for a boundary triangle, which is no fault of a tet.
     pub fn is_illegal_triangle(&self, triangle: [u32; 3]) -> bool {
-        (0..3).any(|k| {
-            let [a, b] = [1, 2].map(|m| self.tangents(triangle[k], triangle[(k + m) % 3]));
-            a.1 & b.1 != 0
-        })
+        let flattens = (0..3).any(|k| {
+            let [a, b] = [1, 2].map(|m| self.tangents(triangle[k], triangle[(k + m) % 3]).1);
+            a & b != 0
+        });
+        flattens && self.hopeless.binary_search(&sorted(triangle)).is_err()
     }
+}
+
+fn sorted(mut key: [u32; 3]) -> [u32; 3] {
+    key.sort_unstable();
+    key
 }
 
 /// The different directions at one vertex, up to sign; parallel ones are one. At most 64: more tangent planes

@@ -45,8 +45,22 @@ impl Objective<'_> {
         if shape > 0.0 { shape - self.penalty(tet) } else { INVERTED }
     }
 
+    /// The score of the tet of a point inside a body and a face that looks at it.
+    pub fn score_with_point(&self, points: &[Point], point: &Point, face: [u32; 3]) -> f64 {
+        let [a, b, c] = face.map(|v| points[v as usize]);
+        let shape = self.shape(&[*point, a, b, c]);
+        // No edge at the point lies on the boundary, so that only the face can make the tet illegal.
+        let illegal = self.legality.is_some_and(|l| l.is_illegal_triangle(face));
+        if shape > 0.0 { shape - if illegal { ILLEGAL } else { 0.0 } } else { INVERTED }
+    }
+
+    /// The shape that a score stands for, whether the tet is legal or not.
+    pub fn shape_of_score(score: f64) -> f64 {
+        if score > 0.0 { score } else { score + ILLEGAL }
+    }
+
     /// What legality takes off a tet's score.
-    pub fn penalty(&self, tet: [u32; 4]) -> f64 {
+    fn penalty(&self, tet: [u32; 4]) -> f64 {
         if self.legality.is_some_and(|l| l.is_illegal(tet)) { ILLEGAL } else { 0.0 }
     }
 

@@ -46,7 +46,13 @@ pub(super) struct Smoother {
 impl Smoother {
     /// Moves a free vertex if the worst shape of its star improves; legality does not depend on where vertices are.
     /// Stars whose worst shape is `enough` or more are left alone.
-    pub fn improve(&mut self, complex: &mut Complex, objective: &Objective, vertex: u32, enough: f64) -> bool {
+    pub fn improve(
+        &mut self,
+        complex: &mut Complex,
+        objective: &Objective,
+        vertex: u32,
+        enough: f64,
+    ) -> bool {
         if !complex.free[vertex as usize] {
             return false;
         }
@@ -54,10 +60,8 @@ impl Smoother {
         if self.star.is_empty() {
             return false;
         }
-        // An illegal tet's score has had 1 taken off.
-        let shape = |score: f64| if score > 0.0 { score } else { score + 1.0 };
-        let before =
-            self.star.iter().map(|&t| shape(complex.scores[t as usize])).fold(f64::INFINITY, f64::min);
+        let shape = |t: &u32| Objective::shape_of_score(complex.scores[*t as usize]);
+        let before = self.star.iter().map(shape).fold(f64::INFINITY, f64::min);
         if before >= enough {
             return false;
         }
@@ -71,6 +75,22 @@ impl Smoother {
         }
         let (at, worst) = self.ascend(objective, at, worst);
         worst > before + LEAST_GAIN && self.commit(complex, objective, vertex, at)
+    }
+
+    /// Where in the hole bounded by `faces`, which all look at `start`, a vertex makes the worst tet best.
+    pub fn best_place(
+        &mut self,
+        complex: &Complex,
+        objective: &Objective,
+        faces: impl Iterator<Item = [u32; 3]>,
+        start: Point,
+    ) -> Point {
+        self.others.clear();
+        self.others.extend(faces.map(|f| f.map(|v| complex.points[v as usize])));
+        match self.worst_above(objective, &start, 0.0) {
+            Some(worst) => self.ascend(objective, start, worst).0,
+            None => start,
+        }
     }
 
     fn load(&mut self, complex: &Complex, vertex: u32) {
@@ -101,8 +121,8 @@ impl Smoother {
     }
 
     fn ascend(&mut self, objective: &Objective, mut at: Point, mut worst: f64) -> (Point, f64) {
-        let reach =
-            self.others.iter().flatten().map(|p| (p - at).norm()).sum::<f64>() / (3 * self.others.len()) as f64;
+        let reach = self.others.iter().flatten().map(|p| (p - at).norm()).sum::<f64>()
+            / (3 * self.others.len()) as f64;
         for _ in 0..STEPS {
             self.values.clear();
             self.gradients.clear();
@@ -204,8 +224,12 @@ mod tests {
         let mut weights = Vec::new();
         let v = [Vector::new(1., 2., 0.), Vector::new(1., -1., 0.), Vector::new(3., 0., 0.)];
         assert!((shortest_in_hull(&v, &mut weights) - Vector::new(1., 0., 0.)).norm() < 1e-3);
-        let around =
-            [Vector::new(1., 0., 0.), Vector::new(-1., 1., 0.), Vector::new(-1., -1., 0.), Vector::new(2., 0., 1.)];
+        let around = [
+            Vector::new(1., 0., 0.),
+            Vector::new(-1., 1., 0.),
+            Vector::new(-1., -1., 0.),
+            Vector::new(2., 0., 1.),
+        ];
         assert!(shortest_in_hull(&around, &mut weights).norm() < 0.05, "the origin is inside");
     }
 }

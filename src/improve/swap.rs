@@ -23,13 +23,13 @@ pub(super) const LEAST_GAIN: f64 = 1e-4;
 
 /// A better filling of a hole.
 #[derive(Default)]
-pub(super) struct Swap {
+struct Swap {
     /// The tets to take out.
-    pub old: Vec<u32>,
+    old: Vec<u32>,
     /// The tets to put in, with scores.
-    pub new: Vec<([u32; 4], f64)>,
+    new: Vec<([u32; 4], f64)>,
     /// What is gained: the least new score less the least old one.
-    pub gain: f64,
+    gain: f64,
 }
 
 /// Space for the search, kept to spare allocations.
@@ -48,6 +48,11 @@ struct Table([[(f64, u8); LONGEST_RING]; LONGEST_RING]);
 impl Swapper {
     /// Makes the best swap that takes `tet` out and raises the worst score of its hole. False if there is none.
     pub fn improve(&mut self, complex: &mut Complex, objective: &Objective, tet: u32) -> bool {
+        self.find(complex, objective, tet) && self.commit(complex)
+    }
+
+    /// Finds that swap. False if there is none.
+    pub fn find(&mut self, complex: &Complex, objective: &Objective, tet: u32) -> bool {
         self.best.gain = LEAST_GAIN;
         let mut better = false;
         for [i, j] in TET_EDGES {
@@ -62,7 +67,17 @@ impl Swapper {
                 better = true;
             }
         }
-        better && commit(complex, &self.best.old, &self.best.new)
+        better
+    }
+
+    /// The least score among the new tets of the swap that was found.
+    pub fn worst(&self) -> f64 {
+        self.best.new.iter().map(|n| n.1).fold(f64::INFINITY, f64::min)
+    }
+
+    /// Makes the swap that was found, unless a new tet would not be exactly positive.
+    pub fn commit(&self, complex: &mut Complex) -> bool {
+        commit(complex, &self.best.old, &self.best.new)
     }
 
     /// The best filling without the edge between the local vertices `i` and `j`, left in `found`.
@@ -102,13 +117,7 @@ impl Swapper {
     }
 
     /// The best filling without the face opposite the local vertex `face`, and perhaps without faces beside it, left in `found`.
-    fn find_face_removal(
-        &mut self,
-        complex: &Complex,
-        objective: &Objective,
-        tet: u32,
-        face: usize,
-    ) -> bool {
+    fn find_face_removal(&mut self, complex: &Complex, objective: &Objective, tet: u32, face: usize) -> bool {
         let Some((other, far)) = complex.neighbour(tet, face) else { return false };
         let low = complex.tets[tet as usize][face];
         let high = complex.tets[other as usize][far];
@@ -223,7 +232,8 @@ impl Sandwich<'_> {
         let corners = self.complex.tets[lower as usize];
         let face = corners.iter().position(|&c| c == self.low)?;
         let joined = beyond == same && self.complex.neighbour(lower, face).map(|n| n.0) == Some(upper);
-        (joined && !self.old.contains(&lower) && !self.old.contains(&upper)).then_some(([lower, upper], beyond))
+        (joined && !self.old.contains(&lower) && !self.old.contains(&upper))
+            .then_some(([lower, upper], beyond))
     }
 }
 
@@ -235,4 +245,3 @@ pub(super) fn commit(complex: &mut Complex, old: &[u32], new: &[([u32; 4], f64)]
     }
     positive
 }
-
