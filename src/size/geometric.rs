@@ -232,14 +232,7 @@ impl Sampler<'_> {
 }
 
 fn contains(geometry: &Geometry, solid: &Solid, point: &Point) -> bool {
-    match solid {
-        Solid::Half { surface, positive } => {
-            (geometry.surfaces[surface.index()].value(point) > 0.0) == *positive
-        }
-        Solid::And(members) => members.iter().all(|m| contains(geometry, m, point)),
-        Solid::Or(members) => members.iter().any(|m| contains(geometry, m, point)),
-        Solid::Not(member) => !contains(geometry, member, point),
-    }
+    solid.holds(&|surface| geometry.surfaces[surface.index()].value(point) > 0.0)
 }
 
 fn body_at(geometry: &Geometry, point: &Point) -> Option<BodyId> {

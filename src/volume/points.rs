@@ -86,7 +86,8 @@ fn vertex_sizes(mesh: &Tetrahedra, size: &dyn SizeField, scale: f64) -> Vec<f64>
 /// The centre of the sphere through the corners of a tet; not finite where it is flat.
 fn circumcenter([a, b, c, d]: [&Point; 4]) -> Point {
     let (u, v, w) = (b - a, c - a, d - a);
-    let numerator = u.norm_squared() * v.cross(&w) + v.norm_squared() * w.cross(&u) + w.norm_squared() * u.cross(&v);
+    let numerator =
+        u.norm_squared() * v.cross(&w) + v.norm_squared() * w.cross(&u) + w.norm_squared() * u.cross(&v);
     a + numerator / (2.0 * u.cross(&v).dot(&w))
 }
 
@@ -200,7 +201,8 @@ impl Filler<'_> {
     /// Inserts a point near tet `t` unless it is too near to something; the new tets are in `cavity.filled`.
     fn insert(&mut self, t: u32, point: Point, size: f64) -> bool {
         let near = (NEAREST * size).powi(2);
-        let too_near = |mesh: &Tetrahedra, t: u32| mesh.corners(t).iter().any(|p| (point - **p).norm_squared() < near);
+        let too_near =
+            |mesh: &Tetrahedra, t: u32| mesh.corners(t).iter().any(|p| (point - **p).norm_squared() < near);
         if !point.iter().all(|x| x.is_finite()) || too_near(self.mesh, t) {
             return false;
         }

@@ -87,8 +87,7 @@ impl<'a> Recovery<'a> {
             self.recover_edges(&missing, first);
             first = false;
             let intersects = !self.intersections.is_empty();
-            let mut left: Vec<u32> =
-                missing.iter().copied().filter(|&f| !self.recover_facet(f, 0)).collect();
+            let mut left: Vec<u32> = missing.iter().copied().filter(|&f| !self.recover_facet(f, 0)).collect();
             if !intersects && self.intersections.is_empty() {
                 // The neighbourhood has changed: what failed at first may work now.
                 for depth in 1..=DEEPEST {
@@ -222,9 +221,7 @@ impl<'a> Recovery<'a> {
     fn clear_crossing(&mut self, a: u32, b: u32, crossing: Crossing, depth: u32) -> bool {
         match crossing {
             Crossing::Vertex(_) => false,
-            Crossing::Edge(tet, edge) => {
-                self.remove_edge(tet, edge, [a, b], depth)
-            }
+            Crossing::Edge(tet, edge) => self.remove_edge(tet, edge, [a, b], depth),
             Crossing::Face(half_face) => {
                 let [x, y, z] = self.mesh.face(half_face);
                 let (tet, other) = (half_face >> 2, self.mesh.across(half_face));
@@ -235,9 +232,7 @@ impl<'a> Recovery<'a> {
                 {
                     return true;
                 }
-                [[x, y], [y, z], [z, x]].into_iter().any(|edge| {
-                    self.remove_edge(tet, edge, [a, b], depth)
-                })
+                [[x, y], [y, z], [z, x]].into_iter().any(|edge| self.remove_edge(tet, edge, [a, b], depth))
             }
         }
     }
@@ -305,7 +300,8 @@ impl<'a> Recovery<'a> {
     fn add_steiner(&mut self, tets: &[u32], point: Point) -> Option<u32> {
         let seed = *tets.first()?;
         self.cavity.take(self.mesh, tets);
-        let whole = self.cavity.make_star_shaped(self.mesh, seed, &point) && self.cavity.tets.len() == tets.len();
+        let whole =
+            self.cavity.make_star_shaped(self.mesh, seed, &point) && self.cavity.tets.len() == tets.len();
         if !whole || self.steiner.len() >= self.most_steiner {
             return None;
         }
@@ -328,9 +324,7 @@ impl<'a> Recovery<'a> {
             };
             // Ends of piercing edges are never corners of the facet: no chord is wanted.
             let [a, _, c] = facet.vertices;
-            let flipped = edges.iter().any(|&(tet, edge)| {
-                self.remove_edge(tet, edge, [a, c], depth)
-            });
+            let flipped = edges.iter().any(|&(tet, edge)| self.remove_edge(tet, edge, [a, c], depth));
             if !flipped {
                 return false;
             }

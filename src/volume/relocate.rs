@@ -91,7 +91,8 @@ fn take_off(
         };
     }
     let mut sectors = sectors(mesh, constraints, p, &patches);
-    let Some(apexes) = sectors.iter_mut().map(|s| grow_and_find(mesh, s, p)).collect::<Option<Vec<_>>>() else {
+    let Some(apexes) = sectors.iter_mut().map(|s| grow_and_find(mesh, s, p)).collect::<Option<Vec<_>>>()
+    else {
         return false;
     };
     let mut ball: Vec<u32> = sectors.iter().flat_map(|s| s.tets.iter().copied()).collect();
@@ -131,7 +132,15 @@ fn take_off(
 fn outline(fan: &[[u32; 3]], p: u32) -> Vec<u32> {
     let links: Vec<[u32; 2]> = fan
         .iter()
-        .map(|&[a, b, c]| if a == p { [b, c] } else if b == p { [c, a] } else { [a, b] })
+        .map(|&[a, b, c]| {
+            if a == p {
+                [b, c]
+            } else if b == p {
+                [c, a]
+            } else {
+                [a, b]
+            }
+        })
         .collect();
     let start = links.iter().map(|l| l[0]).find(|v| links.iter().all(|l| l[1] != *v));
     let mut outline = vec![start.unwrap_or(links[0][0])];
@@ -146,7 +155,7 @@ fn outline(fan: &[[u32; 3]], p: u32) -> Vec<u32> {
 
 /// The sectors of the ball of p, with the patches in place of the facets at p.
 fn sectors(
-    mesh: & Tetrahedra,
+    mesh: &Tetrahedra,
     constraints: &Constraints,
     p: u32,
     patches: &BTreeMap<u32, Vec<[u32; 3]>>,
@@ -228,7 +237,8 @@ impl Sector {
         let before = self.tets.len();
         for wall in self.walls.clone() {
             let behind = mesh.across(wall);
-            if unseen(&wall) && behind != NONE && !mesh.is_locked(wall) && !self.tets.contains(&(behind >> 2)) {
+            if unseen(&wall) && behind != NONE && !mesh.is_locked(wall) && !self.tets.contains(&(behind >> 2))
+            {
                 self.tets.push(behind >> 2);
             }
         }
@@ -245,7 +255,10 @@ impl Sector {
 
     /// Whether every vertex of its tets but p is on its surface.
     fn keeps_vertices(&self, mesh: &Tetrahedra, p: u32) -> bool {
-        self.tets.iter().flat_map(|&t| mesh.tets[t as usize]).all(|v| v == p || self.skin.iter().any(|f| f.contains(&v)))
+        self.tets
+            .iter()
+            .flat_map(|&t| mesh.tets[t as usize])
+            .all(|v| v == p || self.skin.iter().any(|f| f.contains(&v)))
     }
 }
 
