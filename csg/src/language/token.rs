@@ -116,7 +116,11 @@ impl<'a> Scanner<'a> {
         match text.parse::<f64>() {
             Ok(value) if value.is_finite() => TokenKind::Number(value),
             Ok(_) => {
-                report.syntax(span, format!("the number {text} is too large"), "the largest is about 1.8e308");
+                report.syntax(
+                    span,
+                    format!("the number {text} is too large"),
+                    "the largest is about 1.8e308",
+                );
                 TokenKind::Bad
             }
             Err(_) => {

@@ -202,7 +202,9 @@ impl<'a> Parser<'a, '_> {
     fn broken_definition(&self, start: usize) -> Option<Statement> {
         let [first, second] = [self.tokens.get(start)?, self.tokens.get(start + 1)?];
         match (first.kind, second.kind) {
-            (TokenKind::Word("solid"), TokenKind::Word(word)) if !is_reserved(word) => {
+            (TokenKind::Word("solid" | "curve2d" | "curve3d"), TokenKind::Word(word))
+                if !is_reserved(word) =>
+            {
                 let name = Name { text: word.to_owned(), span: second.span };
                 Some(Statement::Broken { name })
             }
@@ -217,7 +219,9 @@ impl<'a> Parser<'a, '_> {
             let after_singular = self.tokens[self.at - 1].kind == TokenKind::Word("singular");
             match self.peek().kind {
                 TokenKind::End => break,
-                TokenKind::Word(word) if begins_statement(word) && !(word == "point" && after_singular) => break,
+                TokenKind::Word(word) if begins_statement(word) && !(word == "point" && after_singular) => {
+                    break;
+                }
                 _ => {
                     self.next();
                 }
@@ -231,7 +235,8 @@ impl<'a> Parser<'a, '_> {
             TokenKind::Word(word) => did_you_mean(word, STATEMENTS),
             _ => String::new(),
         };
-        let help = if help.is_empty() { format!("statements begin with {}", STATEMENTS.join(", ")) } else { help };
+        let help =
+            if help.is_empty() { format!("statements begin with {}", STATEMENTS.join(", ")) } else { help };
         self.expected_with_help("a statement", &help)
     }
 }
