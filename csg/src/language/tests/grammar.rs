@@ -54,7 +54,7 @@ fn box_points_and_flags_are_read() {
     let stated = geometry.stated_box.unwrap();
     assert_eq!((stated.min, stated.max), (Point::new(-1., -1., -1.), Point::new(2., 2., 2.5)));
     assert_eq!(geometry.user_points[0].point, Point::new(0.5, 0.0, 0.0));
-    assert_eq!(geometry.user_points[1].span.column, 52);
+    assert_eq!(geometry.user_points[1].span.column, 53);
 }
 
 #[test]

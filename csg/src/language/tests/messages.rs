@@ -39,18 +39,18 @@ fn arguments_that_are_wrong_are_met_with_the_right_form() {
 
 #[test]
 fn misspelt_words_are_guessed() {
-    says("sold a = sphere (0,0,0; 1);", 1, &["expected a statement, found `sold`", "did you mean `solid`?"]);
+    says(
+        "sold a = sphere (0,0,0; 1); tlo a;",
+        1,
+        &["expected a statement, found `sold`", "did you mean `solid`?"],
+    );
     says("solid a = spehre (0,0,0; 1);", 11, &["unknown primitive `spehre`", "did you mean `sphere`?"]);
     says(
         "solid ball = sphere (0,0,0; 1); tlo bal;",
         37,
         &["there is no solid `bal`", "did you mean `ball`?"],
     );
-    says(
-        "solid a = box and not b;",
-        11,
-        &["there is no solid `box`", "defined before it is used"][..1].as_ref(),
-    );
+    says("solid a = box;", 11, &["there is no solid `box`", "defined before it is used"]);
     says("identify perodic a b;", 10, &["`closesurfaces` or `periodic`", "did you mean `periodic`?"]);
     says("singular egde a b;", 10, &["expected `face` or `edge` or `point`", "did you mean `edge`?"]);
     says("define konstant a = 1;", 8, &["expected `constant`", "did you mean `constant`?"]);
@@ -172,7 +172,7 @@ fn wrong_polyhedra_are_located() {
         let text = error(&format!("solid a = polyhedron ({points} {faces}); tlo a;"));
         assert!(text.contains(message), "{faces}: {text}");
     }
-    says("solid a = polyhedron (0,0,0; 1,0,0; 1,2,3);", 37, &[]);
+    says("solid a = polyhedron (0,0,0; 1,0,0; 1,2,3);", 42, &["x, y, z; ... ;; i, j, k"]);
 }
 
 #[test]
@@ -266,7 +266,7 @@ fn a_boundary_number_begins_with_one() {
 
 #[test]
 fn very_many_errors_are_cut_off() {
-    let errors = errors(&"nonsense;\n".repeat(10_000));
+    let errors = errors(&"solid = sphere (0,0,0; 1);\n".repeat(10_000));
     assert_eq!(errors.messages.len(), 20);
     assert!(errors.to_string().contains("more than 20 errors"));
 }

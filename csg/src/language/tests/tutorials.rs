@@ -36,7 +36,7 @@ const COUNTS: [(&str, usize, usize); 23] = [
     ("matrix", 14, 2),
     ("ortho", 6, 1),
     ("sculpture", 5, 1),
-    ("shaft", 40, 1),
+    ("shaft", 27, 1),
     ("shell", 2, 1),
     ("sphere", 1, 1),
     ("sphereincube", 7, 2),

@@ -31,7 +31,7 @@ fn equal_surfaces_of_every_kind_are_one() {
         "torus (0,0,0; 0,0,1; 2; 1) or torus (0,0,0; 0,0,-1; 2; 1)",
         "ellipsoid (0,0,0; 1,0,0; 0,2,0; 0,0,3) or ellipsoid (0,0,0; 0,-2,0; 0,0,3; 1,0,0)",
         "ellipticcylinder (0,0,0; 1,0,0; 0,2,0) or ellipticcylinder (0,0,9; 0,2,0; 1,0,0)",
-        "ellipticcone (0,0,0; 2,0,0; 0,1,0; 2; 0.5) or ellipticcone (0,0,2; 1,0,0; 0,-0.5,0; -2; 2)",
+        "ellipticcone (0,0,0; 2,0,0; 0,1,0; 2; 0.5) or ellipticcone (0,0,2; 1,0,0; 0,-0.5,0; 2; 2)",
         "ellipticcylinder (0,0,0; 1,0,0; 0,1,0) or cylinder (0,0,0; 0,0,1; 1)",
     ] {
         assert_eq!(solid(pair).surfaces.len(), 1, "{pair}");
