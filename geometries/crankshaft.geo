@@ -17,7 +17,7 @@ solid pin = cylinder (0, 0, 24; 1, 0, 24; 12)
         and plane (-5, 0, 0; -1, 0, 0)
         and plane (45, 0, 0; 1, 0, 0);
 
-solid bore = cylinder (0, 0, 24; 1, 0, 24; 4);
+solid bore = cylinder (0, 0, 24; 1, 0, 24; 3);
 
 solid crankshaft = (journals or weba or webb or pin) and not bore;
 

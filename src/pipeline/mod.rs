@@ -1,7 +1,6 @@
 //! The stages in order: the one place that knows all of them.
 
 pub mod coarse;
-pub mod mend;
 pub mod names;
 pub mod target;
 
