@@ -9,6 +9,7 @@ pub mod io;
 pub mod kernel;
 pub mod mesh;
 pub mod partition;
+pub mod picture;
 pub mod refine;
 pub mod size;
 pub mod surface;
