@@ -10,6 +10,7 @@ pub mod kernel;
 pub mod memory;
 pub mod mesh;
 pub mod partition;
+pub mod picture;
 pub mod pipeline;
 pub mod progress;
 pub mod refine;

@@ -13,8 +13,10 @@
 
 pub mod chunks;
 pub mod elmer;
+pub mod geomview;
 pub mod output;
 pub mod plain;
+pub mod skin;
 #[cfg(test)]
 mod testing;
 pub mod text;

@@ -95,6 +95,15 @@ impl Output {
         self.file.write_all(bytes).map_err(WriteError::io(&self.path))
     }
 
+    /// Writes and empties `text` if it is longer than `limit`.
+    pub fn flush_past(&mut self, limit: usize, text: &mut Vec<u8>) -> Result<(), WriteError> {
+        if text.len() > limit {
+            self.write(text)?;
+            text.clear();
+        }
+        Ok(())
+    }
+
     /// Waits until the file is on the disk, and returns its length.
     pub fn finish(self) -> Result<u64, WriteError> {
         let length = self.file.sync_all().and_then(|()| self.file.metadata()).map(|m| m.len());

@@ -1,10 +1,13 @@
 //! Files as they are written, read back, and broken in every way that is looked for.
 
 use super::*;
+use crate::comm::Communicator;
 use crate::io::plain::PlainPart;
 use crate::io::testing::{cube, names, scattered, slabs, together, two_tets};
 use crate::io::{WriteError, Written};
-use crate::mesh::{Mesh, Rank};
+use crate::mesh::{Mesh, Names, Rank};
+use crate::refine::fixtures::{self, Fixture, ball, split};
+use crate::refine::refine;
 use std::fs;
 use std::path::Path;
 
@@ -84,6 +87,36 @@ fn cubes_in_one_to_seven_parts_have_no_faults() {
                     assert!(mesh.points.contains(&node.point), "{}", node.point);
                 }
             }
+        }
+    }
+}
+
+/// Refines each part of a mesh on its rank and writes it.
+fn write_refined(fixture: &Fixture, n: u32, ranks: u32, dir: &Path) -> Written {
+    let parts = split(&fixture.mesh, &slabs(&fixture.mesh, ranks), ranks);
+    let named = |k: u32| (k, format!("number {k}"));
+    let names = Names { bodies: (1..3).map(named).collect(), patches: (1..8).map(named).collect() };
+    let write_part = |comm: &dyn Communicator| {
+        let part = parts[comm.rank() as usize].clone();
+        let refined = refine(part, &fixture.projector, n, &Default::default()).unwrap();
+        write(comm, &refined, &names, dir).unwrap()
+    };
+    together(ranks, write_part).remove(0)
+}
+
+#[test]
+fn refined_balls_and_cubes_have_no_faults() {
+    for fixture in [ball(2.5), fixtures::cube(2, true)] {
+        for ranks in [1, 2, 5] {
+            let dir = tempfile::tempdir().unwrap();
+            let written = write_refined(&fixture, 4, ranks, dir.path());
+            for (layout, faults) in check_elmer(dir.path()).unwrap() {
+                assert!(faults.is_empty(), "{layout:?}\n{faults}");
+            }
+            let mesh = read(dir.path()).unwrap();
+            let tets: usize = mesh.parts.iter().map(|part| part.elements.len()).sum();
+            assert_eq!(tets, 64 * fixture.mesh.tets.len());
+            assert_eq!(written.files, if ranks == 1 { 10 } else { 5 * u64::from(ranks) + 1 });
         }
     }
 }

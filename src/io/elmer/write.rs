@@ -212,9 +212,9 @@ fn write_boundary(
             }
             line.end(&mut text);
         }
-        flush(&mut file, &mut text, FLUSH_AT)?;
+        file.flush_past(FLUSH_AT, &mut text)?;
     }
-    flush(&mut file, &mut text, 0)?;
+    file.flush_past(0, &mut text)?;
     file.finish()
 }
 
@@ -233,19 +233,10 @@ fn write_shared(part: &dyn MeshStream, numbering: &Numbering, path: &Path) -> Re
             }
             line.end(&mut text);
         }
-        flush(&mut file, &mut text, FLUSH_AT)?;
+        file.flush_past(FLUSH_AT, &mut text)?;
     }
-    flush(&mut file, &mut text, 0)?;
+    file.flush_past(0, &mut text)?;
     file.finish()
-}
-
-/// Writes the text if it is longer than `limit`.
-fn flush(file: &mut Output, text: &mut Vec<u8>, limit: usize) -> Result<(), WriteError> {
-    if text.len() > limit {
-        file.write(text)?;
-        text.clear();
-    }
-    Ok(())
 }
 
 /// `DIR/mesh.*` beside `partitioning.1`: the same files under a second name, but for the header.
