@@ -1,0 +1,119 @@
+//! Refinement, streamed check, checksum and storage: tets per second and peak memory.
+//!
+//! `cargo bench --bench refine [-- CASE COARSE N]`, CASE one of `cube`, `ball`, `cylinder`; COARSE the pieces of a first
+//! refinement that makes the coarse mesh. Threads by `RAYON_NUM_THREADS`. Results are kept in `benches/results`.
+#![forbid(unsafe_code)]
+#![allow(missing_docs)]
+
+use std::time::Instant;
+use tetmill::{Point, check, dist, mesh, refine};
+
+#[path = "../src/refine/fixtures.rs"]
+#[allow(dead_code)]
+mod fixtures;
+
+use fixtures::Fixture;
+use mesh::stream::{MeshStream, TetBlock};
+use rayon::prelude::*;
+
+fn main() {
+    let args: Vec<String> = std::env::args().skip(1).filter(|a| a != "--bench").collect();
+    println!("{} threads, version {}", rayon::current_num_threads(), env!("CARGO_PKG_VERSION"));
+    println!("| case | coarse tets | n | tets | stage | s | M tets/s | peak MB | bytes/tet |");
+    println!("|---|---|---|---|---|---|---|---|---|");
+    match &args[..] {
+        [case, coarse, n] => {
+            run(case, coarse.parse().expect("a number"), n.parse().expect("a number"));
+        }
+        _ => [("cube", 4, 16), ("ball", 4, 16), ("cylinder", 2, 16)].iter().for_each(|&(c, k, n)| run(c, k, n)),
+    }
+}
+
+fn fixture(case: &str, coarse: u32) -> Fixture {
+    let base = match case {
+        "cube" => return fixtures::cube(coarse as usize * 2, false),
+        "ball" => fixtures::ball(1.0),
+        _ => fixtures::cylinder(4),
+    };
+    let settings = refine::Settings::default();
+    let first = refine::refine(fixtures::whole(&base.mesh), &base.projector, coarse, &settings);
+    Fixture { mesh: fixtures::as_mesh(&first.expect("refinable")), projector: base.projector }
+}
+
+fn run(case: &str, coarse: u32, n: u32) {
+    let fixture = fixture(case, coarse);
+    let dist = fixtures::whole(&fixture.mesh);
+    let coarse_tets = dist.tets.len();
+    let tets = coarse_tets as u64 * u64::from(n).pow(3);
+    let row = |stage: &str, start: Instant| {
+        let seconds = start.elapsed().as_secs_f64();
+        let peak = peak_bytes();
+        println!(
+            "| {case} | {coarse_tets} | {n} | {tets} | {stage} | {seconds:.2} | {:.1} | {:.0} | {:.1} |",
+            tets as f64 / seconds / 1e6,
+            peak as f64 / 1e6,
+            peak as f64 / tets as f64
+        );
+    };
+    let start = Instant::now();
+    let refined = refine::refine(dist, &fixture.projector, n, &refine::Settings::default()).expect("refinable");
+    row("coordinates, diagonals, exact signs", start);
+
+    let start = Instant::now();
+    let volume = volume(&refined);
+    row("connectivity streamed, volume summed", start);
+
+    let start = Instant::now();
+    let settings = check::Settings { shapes: false, ..check::Settings::default() };
+    let report = check::check_part(&refined, Some(&fixture.projector), &settings);
+    assert!(report.faults == 0 && (report.volume / volume - 1.0).abs() < 1e-12, "{:?}", report.described);
+    row("check without shapes", start);
+
+    let start = Instant::now();
+    let report = check::check_part(&refined, Some(&fixture.projector), &check::Settings::default());
+    row("check with shapes", start);
+
+    let start = Instant::now();
+    let sum = check::checksum(&refined);
+    assert_eq!(sum.open, 0);
+    row("checksum", start);
+
+    let start = Instant::now();
+    if let Ok(stored) = refined.materialize() {
+        row("tets stored", start);
+        drop(stored);
+    }
+    let shape = report.shape.expect("tets");
+    println!(
+        "{case}: checksum {sum}, volume {}, mean ratio worst {:.3} mean {:.3}, dihedral {:.1} (p1 {:.1}) to {:.1}",
+        report.volume,
+        shape.worst_ratio.value,
+        shape.sum_of_ratios / report.tets as f64,
+        shape.smallest_angle.value,
+        shape.smallest_angle_percentile(0.01),
+        shape.largest_angle.value
+    );
+}
+
+/// The simplest consumer: what a solver's loop over elements costs.
+fn volume(mesh: &dyn MeshStream) -> f64 {
+    let points = mesh.points();
+    let of_block = |block: &mut TetBlock, index| {
+        mesh.tet_block(index, block);
+        let six_fold: f64 = block.tets.iter().map(|tet| volume6(tet.map(|v| points[v as usize]))).sum();
+        six_fold / 6.0
+    };
+    (0..mesh.tet_blocks()).into_par_iter().map_init(TetBlock::default, of_block).sum()
+}
+
+fn volume6(corners: [[f64; 3]; 4]) -> f64 {
+    let [p, q, r, s] = corners.map(Point::from);
+    (q - p).cross(&(r - p)).dot(&(s - p))
+}
+
+/// Peak resident memory of the process.
+fn peak_bytes() -> u64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
+    line.and_then(|l| l.split_whitespace().next()?.parse::<u64>().ok()).unwrap_or(0) * 1024
+}
