@@ -349,7 +349,8 @@ impl Entities {
             for &(_, t) in beside[first..].iter().take_while(|b| b.0 == global) {
                 let tet = mesh.tets[mine[t]];
                 let mut outward = TET_FACES.iter().map(|f| f.map(|k| tet[k]));
-                let behind = outward.any(|[p, q, r]| [[p, q, r], [q, r, p], [r, p, q]].contains(&triangle.vertices));
+                let behind =
+                    outward.any(|[p, q, r]| [[p, q, r], [q, r, p], [r, p, q]].contains(&triangle.vertices));
                 parents[usize::from(!behind)] = Some(TetId::new(t));
             }
             boundary.push(BoundaryFace { face: FaceId::new(face), patch: triangle.patch, parents });

@@ -264,16 +264,22 @@ fn push_row(
 ) {
     // The last row of a layer has no fourth row of points beside it; none of its children asks for one.
     let rows = rows.map(|start| &ids[start..]);
-    let child = |corners: [u8; 4], cell: usize| {
-        corners.map(|code| {
-            let (row, shift) = corner_place(code);
-            rows[row][cell + shift]
-        })
+    let at = |code: u8, cell: usize| {
+        let (row, shift) = corner_place(code);
+        rows[row][cell + shift]
     };
-    tets.extend((0..cells).map(|cell| child(UPRIGHT, cell)));
+    let [p, q, r, s] = UPRIGHT;
+    tets.extend((0..cells).map(|cell| [at(p, cell), at(q, cell), at(r, cell), at(s, cell)]));
     for cell in 0..cells - 1 {
-        let children = OCTAHEDRON[usize::from(diagonal(cell as u32))];
-        tets.extend(children.map(|corners| child(corners, cell)));
+        // By corner code; an octahedron has neither the first nor the last corner of its cell.
+        let corners = [0, at(1, cell), at(2, cell), at(3, cell), at(4, cell), at(5, cell), at(6, cell), 0];
+        for [p, q, r, s] in OCTAHEDRON[usize::from(diagonal(cell as u32))] {
+            let at = |code: u8| corners[usize::from(code & 7)];
+            tets.push([at(p), at(q), at(r), at(s)]);
+        }
     }
-    tets.extend((0..cells.saturating_sub(2)).map(|cell| child(UPSIDE_DOWN, cell)));
+    let [p, q, r, s] = UPSIDE_DOWN;
+    tets.extend(
+        (0..cells.saturating_sub(2)).map(|cell| [at(p, cell), at(q, cell), at(r, cell), at(s, cell)]),
+    );
 }
