@@ -12,12 +12,24 @@ use crate::mesh::{GlobalId, Rank, TET_FACES, TetId};
 ///
 /// Tet blocks and boundary blocks are those of the coarse tets and of the coarse boundary triangles, in
 /// their order. Vertex blocks are the coarse vertices, then edges, then faces, then tets.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub struct RefinedMesh {
     coarse: DistMesh,
     numbering: Numbering,
     points: Box<[Coordinates]>,
     diagonals: Diagonals,
+}
+
+impl std::fmt::Debug for RefinedMesh {
+    /// Its size alone: coordinates are gigabytes.
+    fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let (rank, pieces, counts) = (self.rank(), self.pieces(), self.counts());
+        out.debug_struct("RefinedMesh")
+            .field("rank", &rank)
+            .field("pieces", &pieces)
+            .field("counts", &counts)
+            .finish()
+    }
 }
 
 impl RefinedMesh {
@@ -52,7 +64,7 @@ impl RefinedMesh {
         self.coarse.tets.len() as u64 * u64::from(self.numbering.lattice().children())
     }
 
-    /// The index within the part of the child of `tet` on the child (j, k) of its face opposite corner `face`.
+    /// Appends the indices within the part of the children of `tet` on the children of its face opposite corner `face`.
     fn parents_on_face(&self, tet: TetId, face: usize, parents: &mut Vec<u64>) {
         let lattice = self.numbering.lattice();
         let vertices = self.coarse.tets[tet.index()];

@@ -282,10 +282,17 @@ fn coarse_tets_whose_children_would_invert_are_named() {
     mesh.points[0] = Point::from(centroid * 1.05);
     mesh.tets = vec![[crate::mesh::VertexId(0), p, r, q]];
     mesh.triangles.retain(|t| t.vertices.iter().all(|v| [p, q, r].contains(v)));
-    let error = refine(whole(&mesh), &projector, 8, &Settings::default()).err().expect("inverted");
+    let error = refine(whole(&mesh), &projector, 8, &Settings::default()).expect_err("inverted");
     let RefineError::Inverted { children, coarse, faults } = &error else { panic!("{error}") };
     assert!((1..512).contains(children));
     assert_eq!(coarse, &[0]);
     assert_eq!(faults.len(), 8.min(*children as usize));
     assert!(matches!(faults[0], Fault::NotPositive { tet: 0..512, .. }), "{error}");
+}
+
+#[test]
+fn more_vertices_than_local_ids_are_refused_before_memory_is_asked_for() {
+    let fixture = cube(2, false);
+    let error = refine(whole(&fixture.mesh), &fixture.projector, 1024, &Settings::default());
+    assert!(matches!(error, Err(RefineError::TooManyVertices { rank: 0, needed }) if needed > 1 << 33));
 }

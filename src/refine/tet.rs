@@ -348,7 +348,7 @@ impl Run<'_> {
     /// The same run; its slices, cut to its length once more, let the compiler drop its bounds checks.
     #[inline(always)]
     fn trimmed(&self) -> Run<'_> {
-        fn trim<'a>([p, q, r, s]: [&'a [f64]; 4], count: usize) -> [&'a [f64]; 4] {
+        fn trim([p, q, r, s]: [&[f64]; 4], count: usize) -> [&[f64]; 4] {
             [&p[..count], &q[..count], &r[..count], &s[..count]]
         }
         let [x, y, z] = self.axes;
@@ -360,12 +360,12 @@ impl Run<'_> {
     #[inline]
     fn all_positive(&self) -> bool {
         let run = self.trimmed();
-        let mut unsure = false;
+        let mut certain = true;
         for i in 0..self.count {
             let (volume, error) = volume6_and_error(run.edges(i));
-            unsure |= !(volume > error);
+            certain &= volume > error;
         }
-        !unsure
+        certain
     }
 
     /// Lowers `shapes` to those of these tets where they are worse, and `certain` to 0 where a sign is not.
