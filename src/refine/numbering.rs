@@ -51,7 +51,7 @@ pub struct Entity {
 impl Numbering {
     /// Numbers the vertices of the lattices with `n` pieces.
     pub fn new(mesh: &DistMesh, n: u32) -> Result<Self, RefineError> {
-        if !n.is_power_of_two() || n > MAX_PIECES {
+        if n == 0 || n > MAX_PIECES {
             return Err(RefineError::Pieces { n });
         }
         let lattice = Lattice::new(n);

@@ -1,6 +1,7 @@
 //! Coordinates by the dyadic rule, those on curves and patches projected there.
 //!
-//! At step s = n/2, n/4, …, 1 a new lattice point is the mean of its two neighbours at distance s along the lattice
+//! n is m·2ᵏ with m odd. Points at multiples of 2ᵏ, if m > 1, are placed by [`blend`](super::blend). From there on,
+//! at step s = 2ᵏ/2, …, 2, 1, a new lattice point is the mean of its two neighbours at distance s along the lattice
 //! edge whose midpoint it is; the centre of an octahedron is the mean of its six corners. These are the points of
 //! L rounds of 1:8 refinement. Edges come first, then faces, then tets, each a function of its own
 //! coarse entity and of what bounds it, in the order of global ids: all holders compute the same bits.
@@ -12,6 +13,7 @@
 //! thousand box diagonals away from the origin.
 
 use super::RefineError;
+use super::blend::{barycentric, blended, split};
 use super::lattice::Lattice;
 use super::numbering::Numbering;
 use crate::Point;
@@ -116,7 +118,11 @@ fn fill_edge(
     snap: impl Fn(Coordinates) -> Result<Coordinates, ProjectionFailed>,
 ) -> Result<(), ProjectionFailed> {
     let n = inside.len() + 1;
-    let mut step = n / 2;
+    let (m, power) = split(n as u32);
+    for j in 1..m {
+        inside[(j * power) as usize - 1] = snap(barycentric(&ends, [m - j, j]))?;
+    }
+    let mut step = power as usize / 2;
     while step > 0 {
         for k in (step..n).step_by(2 * step) {
             let before = if k == step { ends[0] } else { inside[k - step - 1] };
@@ -217,7 +223,17 @@ impl Triangle {
         snap: impl Fn(Coordinates) -> Result<Coordinates, ProjectionFailed>,
     ) -> Result<(), ProjectionFailed> {
         let n = self.n;
-        let mut step = n / 2;
+        let (m, power) = split(n as u32);
+        let power = power as usize;
+        let corners = [self.get(0, 0), self.get(n, 0), self.get(0, n)];
+        for k in 1..m {
+            for j in 1..m - k {
+                let at = |[_, j, k]: [u32; 3]| self.get(j as usize * power, k as usize * power);
+                let point = snap(blended(&corners, [m - j - k, j, k], at))?;
+                self.set(j as usize * power, k as usize * power, point);
+            }
+        }
+        let mut step = power / 2;
         while step > 0 {
             for k in (step..n).step_by(step) {
                 for j in (step..n - k).step_by(step) {

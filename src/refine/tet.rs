@@ -4,6 +4,7 @@
 //! which each row of cells has its children's corners in runs of consecutive numbers: plain loops that
 //! the compiler turns into vector instructions.
 
+use super::blend::{barycentric, blended, split};
 use super::diagonal::{self, Diagonals};
 use super::lattice::{Lattice, OCTAHEDRON, UPRIGHT, UPSIDE_DOWN, corner_place};
 use super::numbering::Numbering;
@@ -38,11 +39,13 @@ pub fn fill(
     let fill_one = |block: &mut Block, ((tet, inside), bytes): ((usize, &mut [Coordinates]), &mut [u8])| {
         let tet = TetId::new(tet);
         block.gather(mesh, numbering, tet, before);
+        let corners = mesh.tets[tet.index()].map(|v| before[v.index()]);
+        let flat = is_flat(mesh, projector, tet);
+        block.fill_odd_part(&plan, &corners, flat);
         block.fill_inside(&plan);
         block.scatter(lattice, inside);
         block.bad.clear();
-        if is_flat(mesh, projector, tet) {
-            let corners = mesh.tets[tet.index()].map(|v| before[v.index()]);
+        if flat {
             block.cut_evenly(&plan, diagonal::best_of_tet(&corners), bytes);
         } else {
             block.cut_each_best(&plan, bytes);
@@ -155,10 +158,30 @@ impl Block {
         }
     }
 
+    /// The points inside the tet that the dyadic rule begins with.
+    fn fill_odd_part(&mut self, plan: &Plan, corners: &[Coordinates; 4], flat: bool) {
+        let (m, power) = split(plan.lattice.n());
+        let index = |b: u32, c: u32, d: u32| plan.row(c * power, d * power) + (b * power) as usize;
+        for d in 1..m {
+            for c in 1..m - d {
+                for b in 1..(m - d).saturating_sub(c) {
+                    let weights = [m - b - c - d, b, c, d];
+                    let [x, y, z] = if flat {
+                        barycentric(corners, weights)
+                    } else {
+                        blended(corners, weights, |[_, b, c, d]| self.coordinates(index(b, c, d)))
+                    };
+                    let i = index(b, c, d);
+                    (self.axes[0][i], self.axes[1][i], self.axes[2][i]) = (x, y, z);
+                }
+            }
+        }
+    }
+
     /// The dyadic rule inside the tet.
     fn fill_inside(&mut self, plan: &Plan) {
         let n = plan.lattice.n();
-        let mut step = n / 2;
+        let mut step = split(n).1 / 2;
         while step > 0 {
             for d in (step..n).step_by(step as usize) {
                 for c in (step..n - d).step_by(step as usize) {
@@ -277,8 +300,12 @@ impl Block {
         }
     }
 
+    fn coordinates(&self, i: usize) -> Coordinates {
+        [self.axes[0][i], self.axes[1][i], self.axes[2][i]]
+    }
+
     fn point(&self, i: usize) -> Point {
-        Point::new(self.axes[0][i], self.axes[1][i], self.axes[2][i])
+        self.coordinates(i).into()
     }
 
     /// The corners of the children with these corner codes in the first `count` cells of a row.
