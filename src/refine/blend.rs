@@ -16,7 +16,9 @@
 //!   F(λ) = Σ λ_i r(point of face ijk with weights λ_j, λ_k at j, k)  over all i and pairs jk without i
 //! ```
 
+use super::lattice::Lattice;
 use super::snap::Coordinates;
+use crate::mesh::TET_FACES;
 
 /// Splits n into its odd part m and the power of two 2ᵏ.
 pub fn split(n: u32) -> (u32, u32) {
@@ -35,74 +37,111 @@ pub fn barycentric<const N: usize>(corners: &[Coordinates; N], weights: [u32; N]
     point
 }
 
-/// A point with these weights, displaced as the edges are, and in a tet as the faces are. `at` gives the points that
-/// have a zero weight.
-pub fn blended<const N: usize>(
-    corners: &[Coordinates; N],
-    weights: [u32; N],
-    at: impl Fn([u32; N]) -> Coordinates,
-) -> Coordinates {
-    let mut displacement = from_edges(corners, weights, &at);
-    if N == 4 {
-        add(&mut displacement, 1.0, from_faces(corners, weights, &at));
+/// The displacement of the boundary of a triangle (N = 3) or tet (N = 4), ready to be blended inside.
+pub struct Blend<const N: usize> {
+    m: u32,
+    /// Where rows of points begin in `lacking`, by c + (m + 1)·d, as in [`Lattice`].
+    rows: Vec<u32>,
+    /// At points of edges d, at points of faces r.
+    lacking: Vec<Coordinates>,
+}
+
+impl<const N: usize> Blend<N> {
+    /// For the lattice with m pieces to an edge.
+    pub fn new(m: u32) -> Self {
+        let lattice = Lattice::new(m);
+        let row = |d, c| if c + d <= m { lattice.row(c, d) } else { 0 };
+        let layers = if N == 4 { m + 1 } else { 1 };
+        let points = if N == 4 { lattice.points() } else { (m + 1) * (m + 2) / 2 };
+        Self {
+            m,
+            rows: (0..layers).flat_map(|d| (0..=m).map(move |c| row(d, c))).collect(),
+            lacking: vec![[0.0; 3]; points as usize],
+        }
     }
-    let mut point = barycentric(corners, weights);
-    add(&mut point, 1.0, displacement);
-    point
+
+    fn index(&self, weights: [u32; N]) -> usize {
+        let layer = if N == 4 { weights[3] * (self.m + 1) } else { 0 };
+        (self.rows[(weights[2] + layer) as usize] + weights[1]) as usize
+    }
+
+    /// Takes the displacements of an entity; `at` gives its points on the boundary.
+    pub fn take(&mut self, corners: &[Coordinates; N], at: impl Fn([u32; N]) -> Coordinates) {
+        let m = self.m;
+        let displacement = |weights| {
+            let mut displacement = at(weights);
+            add(&mut displacement, -1.0, barycentric(corners, weights));
+            displacement
+        };
+        for i in 0..N {
+            for j in i + 1..N {
+                for k in 1..m {
+                    let mut weights = [0; N];
+                    (weights[i], weights[j]) = (m - k, k);
+                    let index = self.index(weights);
+                    self.lacking[index] = displacement(weights);
+                }
+            }
+        }
+        if N < 4 {
+            return;
+        }
+        for face in TET_FACES {
+            for (j, k) in Lattice::new(m).face_interior() {
+                let mut weights = [0; N];
+                (weights[face[0]], weights[face[1]], weights[face[2]]) = (m - j - k, j, k);
+                let mut lacking = displacement(weights);
+                add(&mut lacking, -1.0, self.from_edges(weights));
+                let index = self.index(weights);
+                self.lacking[index] = lacking;
+            }
+        }
+    }
+
+    /// The point with these weights.
+    pub fn point(&self, corners: &[Coordinates; N], weights: [u32; N]) -> Coordinates {
+        let mut point = barycentric(corners, weights);
+        add(&mut point, 1.0, self.from_edges(weights));
+        if N == 4 {
+            add(&mut point, 1.0, self.from_faces(weights));
+        }
+        point
+    }
+
+    /// E of the module's text.
+    fn from_edges(&self, weights: [u32; N]) -> Coordinates {
+        let mut sum = [0.0; 3];
+        for i in 0..N {
+            for j in (0..N).filter(|&j| j != i && weights[j] > 0) {
+                let mut on_edge = [0; N];
+                (on_edge[i], on_edge[j]) = (self.m - weights[j], weights[j]);
+                add(&mut sum, f64::from(weights[i]), self.lacking[self.index(on_edge)]);
+            }
+        }
+        sum.map(|x| x / f64::from(self.m))
+    }
+
+    /// F of the module's text: for each face and each of its corners.
+    fn from_faces(&self, weights: [u32; N]) -> Coordinates {
+        let mut sum = [0.0; 3];
+        for opposite in 0..N {
+            for i in (0..N).filter(|&i| i != opposite) {
+                let mut on_face = weights;
+                on_face[opposite] = 0;
+                on_face[i] += weights[opposite];
+                // On an edge nothing is lacking (there d is kept, not r).
+                if (0..N).any(|j| j != opposite && on_face[j] == 0) {
+                    continue;
+                }
+                add(&mut sum, f64::from(weights[i]), self.lacking[self.index(on_face)]);
+            }
+        }
+        sum.map(|x| x / f64::from(self.m))
+    }
 }
 
 fn add(sum: &mut Coordinates, factor: f64, vector: Coordinates) {
     sum.iter_mut().zip(vector).for_each(|(s, v)| *s += factor * v);
-}
-
-/// How far a point that is there lies from its barycentric place.
-fn displacement<const N: usize>(
-    corners: &[Coordinates; N],
-    weights: [u32; N],
-    at: &impl Fn([u32; N]) -> Coordinates,
-) -> Coordinates {
-    let mut displacement = at(weights);
-    add(&mut displacement, -1.0, barycentric(corners, weights));
-    displacement
-}
-
-/// E of the module's text.
-fn from_edges<const N: usize>(
-    corners: &[Coordinates; N],
-    weights: [u32; N],
-    at: &impl Fn([u32; N]) -> Coordinates,
-) -> Coordinates {
-    let m: u32 = weights.iter().sum();
-    let mut sum = [0.0; 3];
-    for i in (0..N).filter(|&i| weights[i] > 0) {
-        for j in (0..N).filter(|&j| j != i && weights[j] > 0) {
-            let mut on_edge = [0; N];
-            (on_edge[i], on_edge[j]) = (m - weights[j], weights[j]);
-            add(&mut sum, f64::from(weights[i]) / f64::from(m), displacement(corners, on_edge, at));
-        }
-    }
-    sum
-}
-
-/// F of the module's text: for each face and each of its corners.
-fn from_faces<const N: usize>(
-    corners: &[Coordinates; N],
-    weights: [u32; N],
-    at: &impl Fn([u32; N]) -> Coordinates,
-) -> Coordinates {
-    let m: u32 = weights.iter().sum();
-    let mut sum = [0.0; 3];
-    for opposite in 0..N {
-        for i in (0..N).filter(|&i| i != opposite) {
-            let mut on_face = weights;
-            on_face[opposite] = 0;
-            on_face[i] += weights[opposite];
-            let mut lacking = displacement(corners, on_face, at);
-            add(&mut lacking, -1.0, from_edges(corners, on_face, at));
-            add(&mut sum, f64::from(weights[i]) / f64::from(m), lacking);
-        }
-    }
-    sum
 }
 
 #[cfg(test)]
@@ -123,12 +162,15 @@ mod tests {
             add(&mut point, 1.0, [p * q - r * r * s * p, p * q * r + s * q, 2.0 * s * p]);
             point
         };
+        // Asked for a point of its boundary, the blend must give what it was given there.
+        let mut blend = Blend::new(7);
+        blend.take(&corners, bend);
         for weights in [[0, 2, 4, 1], [3, 0, 1, 3], [2, 2, 0, 3], [1, 3, 3, 0], [0, 0, 5, 2], [7, 0, 0, 0]] {
-            let (kept, given) = (blended(&corners, weights, bend), bend(weights));
+            let (kept, given) = (blend.point(&corners, weights), bend(weights));
             assert!((0..3).all(|x| (kept[x] - given[x]).abs() < 1e-15), "{kept:?} {given:?}");
         }
-        let flat = |w: [u32; 4]| barycentric(&corners, w);
-        let (inside, given) = (blended(&corners, [1, 2, 3, 1], flat), flat([1, 2, 3, 1]));
+        blend.take(&corners, |w| barycentric(&corners, w));
+        let (inside, given) = (blend.point(&corners, [1, 2, 3, 1]), barycentric(&corners, [1, 2, 3, 1]));
         assert!((0..3).all(|x| (inside[x] - given[x]).abs() < 1e-15));
     }
 }

@@ -13,7 +13,7 @@
 //! thousand box diagonals away from the origin.
 
 use super::RefineError;
-use super::blend::{barycentric, blended, split};
+use super::blend::{Blend, barycentric, split};
 use super::lattice::Lattice;
 use super::numbering::Numbering;
 use crate::Point;
@@ -200,11 +200,13 @@ fn face_edges(mesh: &DistMesh) -> Vec<[EdgeId; 3]> {
 struct Triangle {
     n: usize,
     points: Vec<Coordinates>,
+    blend: Blend<3>,
 }
 
 impl Triangle {
     fn new(n: usize) -> Self {
-        Self { n, points: vec![[0.0; 3]; (n + 1) * (n + 1)] }
+        let blend = Blend::new(split(n as u32).0);
+        Self { n, points: vec![[0.0; 3]; (n + 1) * (n + 1)], blend }
     }
 
     #[inline]
@@ -225,11 +227,12 @@ impl Triangle {
         let n = self.n;
         let (m, power) = split(n as u32);
         let power = power as usize;
-        let corners = [self.get(0, 0), self.get(n, 0), self.get(0, n)];
-        for k in 1..m {
-            for j in 1..m - k {
-                let at = |[_, j, k]: [u32; 3]| self.get(j as usize * power, k as usize * power);
-                let point = snap(blended(&corners, [m - j - k, j, k], at))?;
+        if m > 1 {
+            let corners = [self.get(0, 0), self.get(n, 0), self.get(0, n)];
+            let points = &self.points;
+            self.blend.take(&corners, |[_, j, k]| points[(k as usize * (n + 1) + j as usize) * power]);
+            for (j, k) in Lattice::new(m).face_interior() {
+                let point = snap(self.blend.point(&corners, [m - j - k, j, k]))?;
                 self.set(j as usize * power, k as usize * power, point);
             }
         }

@@ -4,7 +4,7 @@
 //! which each row of cells has its children's corners in runs of consecutive numbers: plain loops that
 //! the compiler turns into vector instructions.
 
-use super::blend::{barycentric, blended, split};
+use super::blend::{Blend, barycentric, split};
 use super::diagonal::{self, Diagonals};
 use super::lattice::{Lattice, OCTAHEDRON, UPRIGHT, UPSIDE_DOWN, corner_place};
 use super::numbering::Numbering;
@@ -126,6 +126,8 @@ struct Block {
     ids: Vec<u32>,
     /// x, y, z of all points.
     axes: [Vec<f64>; 3],
+    /// For the odd part of n.
+    blend: Blend<4>,
     /// For a row of octahedra and each diagonal: the worst shape, and 1 if all signs are certain, else 0.
     shapes: [Vec<f64>; 3],
     certain: [Vec<f64>; 3],
@@ -140,6 +142,7 @@ impl Block {
         Self {
             ids: Vec::new(),
             axes: [points(), points(), points()],
+            blend: Blend::new(split(lattice.n()).0),
             shapes: [row(), row(), row()],
             certain: [row(), row(), row()],
             bad: Vec::new(),
@@ -161,16 +164,23 @@ impl Block {
     /// The points inside the tet that the dyadic rule begins with.
     fn fill_odd_part(&mut self, plan: &Plan, corners: &[Coordinates; 4], flat: bool) {
         let (m, power) = split(plan.lattice.n());
+        if m == 1 {
+            return;
+        }
         let index = |b: u32, c: u32, d: u32| plan.row(c * power, d * power) + (b * power) as usize;
+        if !flat {
+            let [x, y, z] = &self.axes;
+            self.blend.take(corners, |[_, b, c, d]| {
+                let i = index(b, c, d);
+                [x[i], y[i], z[i]]
+            });
+        }
         for d in 1..m {
             for c in 1..m - d {
                 for b in 1..(m - d).saturating_sub(c) {
                     let weights = [m - b - c - d, b, c, d];
-                    let [x, y, z] = if flat {
-                        barycentric(corners, weights)
-                    } else {
-                        blended(corners, weights, |[_, b, c, d]| self.coordinates(index(b, c, d)))
-                    };
+                    let [x, y, z] =
+                        if flat { barycentric(corners, weights) } else { self.blend.point(corners, weights) };
                     let i = index(b, c, d);
                     (self.axes[0][i], self.axes[1][i], self.axes[2][i]) = (x, y, z);
                 }
@@ -300,12 +310,8 @@ impl Block {
         }
     }
 
-    fn coordinates(&self, i: usize) -> Coordinates {
-        [self.axes[0][i], self.axes[1][i], self.axes[2][i]]
-    }
-
     fn point(&self, i: usize) -> Point {
-        self.coordinates(i).into()
+        Point::new(self.axes[0][i], self.axes[1][i], self.axes[2][i])
     }
 
     /// The corners of the children with these corner codes in the first `count` cells of a row.
