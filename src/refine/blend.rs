@@ -91,7 +91,7 @@ impl<const N: usize> Blend<N> {
                 let mut weights = [0; N];
                 (weights[face[0]], weights[face[1]], weights[face[2]]) = (m - j - k, j, k);
                 let mut lacking = displacement(weights);
-                add(&mut lacking, -1.0, self.from_edges(weights));
+                add(&mut lacking, -1.0, self.by_edges(weights));
                 let index = self.index(weights);
                 self.lacking[index] = lacking;
             }
@@ -101,15 +101,15 @@ impl<const N: usize> Blend<N> {
     /// The point with these weights.
     pub fn point(&self, corners: &[Coordinates; N], weights: [u32; N]) -> Coordinates {
         let mut point = barycentric(corners, weights);
-        add(&mut point, 1.0, self.from_edges(weights));
+        add(&mut point, 1.0, self.by_edges(weights));
         if N == 4 {
-            add(&mut point, 1.0, self.from_faces(weights));
+            add(&mut point, 1.0, self.by_faces(weights));
         }
         point
     }
 
     /// E of the module's text.
-    fn from_edges(&self, weights: [u32; N]) -> Coordinates {
+    fn by_edges(&self, weights: [u32; N]) -> Coordinates {
         let mut sum = [0.0; 3];
         for i in 0..N {
             for j in (0..N).filter(|&j| j != i && weights[j] > 0) {
@@ -122,7 +122,7 @@ impl<const N: usize> Blend<N> {
     }
 
     /// F of the module's text: for each face and each of its corners.
-    fn from_faces(&self, weights: [u32; N]) -> Coordinates {
+    fn by_faces(&self, weights: [u32; N]) -> Coordinates {
         let mut sum = [0.0; 3];
         for opposite in 0..N {
             for i in (0..N).filter(|&i| i != opposite) {
