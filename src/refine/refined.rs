@@ -12,12 +12,24 @@ use crate::mesh::{GlobalId, Rank, TET_FACES, TetId};
 ///
 /// Tet blocks and boundary blocks are those of the coarse tets and of the coarse boundary triangles, in
 /// their order. Vertex blocks are the coarse vertices, then edges, then faces, then tets.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub struct RefinedMesh {
     coarse: DistMesh,
     numbering: Numbering,
     points: Box<[Coordinates]>,
     diagonals: Diagonals,
+}
+
+impl std::fmt::Debug for RefinedMesh {
+    /// Its size alone: coordinates are gigabytes.
+    fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let (rank, pieces, counts) = (self.rank(), self.pieces(), self.counts());
+        out.debug_struct("RefinedMesh")
+            .field("rank", &rank)
+            .field("pieces", &pieces)
+            .field("counts", &counts)
+            .finish()
+    }
 }
 
 impl RefinedMesh {
@@ -52,7 +64,7 @@ impl RefinedMesh {
         self.coarse.tets.len() as u64 * u64::from(self.numbering.lattice().children())
     }
 
-    /// The index within the part of the child of `tet` on the child (j, k) of its face opposite corner `face`.
+    /// Appends the indices within the part of the children of `tet` on the children of its face opposite corner `face`.
     fn parents_on_face(&self, tet: TetId, face: usize, parents: &mut Vec<u64>) {
         let lattice = self.numbering.lattice();
         let vertices = self.coarse.tets[tet.index()];
@@ -264,16 +276,22 @@ fn push_row(
 ) {
     // The last row of a layer has no fourth row of points beside it; none of its children asks for one.
     let rows = rows.map(|start| &ids[start..]);
-    let child = |corners: [u8; 4], cell: usize| {
-        corners.map(|code| {
-            let (row, shift) = corner_place(code);
-            rows[row][cell + shift]
-        })
+    let at = |code: u8, cell: usize| {
+        let (row, shift) = corner_place(code);
+        rows[row][cell + shift]
     };
-    tets.extend((0..cells).map(|cell| child(UPRIGHT, cell)));
+    let [p, q, r, s] = UPRIGHT;
+    tets.extend((0..cells).map(|cell| [at(p, cell), at(q, cell), at(r, cell), at(s, cell)]));
     for cell in 0..cells - 1 {
-        let children = OCTAHEDRON[usize::from(diagonal(cell as u32))];
-        tets.extend(children.map(|corners| child(corners, cell)));
+        // By corner code; an octahedron has neither the first nor the last corner of its cell.
+        let corners = [0, at(1, cell), at(2, cell), at(3, cell), at(4, cell), at(5, cell), at(6, cell), 0];
+        for [p, q, r, s] in OCTAHEDRON[usize::from(diagonal(cell as u32))] {
+            let at = |code: u8| corners[usize::from(code & 7)];
+            tets.push([at(p), at(q), at(r), at(s)]);
+        }
     }
-    tets.extend((0..cells.saturating_sub(2)).map(|cell| child(UPSIDE_DOWN, cell)));
+    let [p, q, r, s] = UPSIDE_DOWN;
+    tets.extend(
+        (0..cells.saturating_sub(2)).map(|cell| [at(p, cell), at(q, cell), at(r, cell), at(s, cell)]),
+    );
 }
