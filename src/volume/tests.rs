@@ -8,10 +8,11 @@ use csg::BodyId;
 const A: Option<BodyId> = Some(BodyId(0));
 const B: Option<BodyId> = Some(BodyId(1));
 
+const EMPTY: Settings = Settings { fill: false, max_tets: 1 << 20 };
+
 fn recovered(soup: Soup) -> Report {
     let surface = soup.surface().unwrap();
-    let settings = Settings { fill: false, ..Settings::default() };
-    let (mesh, report) = mesh(&surface, &UniformSize(1.0), &settings).unwrap();
+    let (mesh, report) = mesh(&surface, &UniformSize(1.0), &EMPTY).unwrap();
     eprintln!("{} triangles: {report:?}", surface.triangles().len());
     check_fills(&surface, &mesh);
     report
@@ -117,8 +118,7 @@ fn extreme_units_change_nothing() {
         soup.torus([1.0, 0.4], [12, 6], INSIDE);
         soup.map(|p| p * scale);
         let surface = soup.surface().unwrap();
-        let settings = Settings { fill: false, ..Settings::default() };
-        mesh(&surface, &UniformSize(1.0), &settings).unwrap().0.tets
+        mesh(&surface, &UniformSize(1.0), &EMPTY).unwrap().0.tets
     };
     assert_eq!(build(1.0), build(2f64.powi(-300)));
     assert_eq!(build(1.0), build(2f64.powi(300)));
@@ -150,5 +150,63 @@ fn the_schoenhardt_polyhedron_gets_one_point_inside() {
             let report = recovered(schoenhardt(sign * degrees.to_radians()));
             eprintln!("{degrees} {sign} {report:?}");
         }
+    }
+}
+
+/// Any surface between tets of some mesh can be filled. A lattice of n³ cubes of six tets each, squeezed and sheared so
+/// that it is far from Delaunay, each tet in one of two bodies or in none: surfaces that touch themselves everywhere.
+fn lattice_skin(n: u32, squeeze: [f64; 3], shear: f64, bend: f64, mut body: impl FnMut() -> Option<BodyId>) -> Soup {
+    let at = |c: [u32; 3]| {
+        let [x, y, z] = [0, 1, 2].map(|k| f64::from(c[k]) * squeeze[k]);
+        // Triangular, so every tet keeps its volume.
+        Point::new(x, y + shear * x, z + shear * y + bend * (x * x + y * y))
+    };
+    let mut sides = std::collections::BTreeMap::<[[u32; 3]; 3], Vec<([[u32; 3]; 3], Option<BodyId>)>>::new();
+    for i in 0..n * n * n {
+        let base = [i % n, i / n % n, i / n / n];
+        for path in [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]] {
+            let mut tet = [base; 4];
+            for (k, &axis) in path.iter().enumerate() {
+                tet[k + 1] = tet[k];
+                tet[k + 1][axis] += 1;
+            }
+            let [a, b, c, d] = tet.map(at);
+            if crate::kernel::simplex::volume6(&a, &b, &c, &d) < 0.0 {
+                tet.swap(0, 1);
+            }
+            let body = body();
+            for face in crate::mesh::TET_FACES {
+                let face = face.map(|k| tet[k]);
+                let mut key = face;
+                key.sort_unstable();
+                sides.entry(key).or_default().push((face, body));
+            }
+        }
+    }
+    let mut soup = Soup::default();
+    for found in sides.values() {
+        let (face, behind) = found[0];
+        let front = found.get(1).and_then(|other| other.1);
+        if behind != front {
+            soup.add(face.map(at), [behind, front]);
+        }
+    }
+    soup
+}
+
+#[test]
+fn skins_of_random_bodies_in_a_bent_lattice_are_filled() {
+    let mut random = crate::kernel::random::Random::new(11);
+    for case in 0..60 {
+        let squeeze = [0, 1, 2].map(|_| 0.15 + random.unit());
+        let (shear, bend) = (2.0 * random.unit() - 1.0, 0.3 * random.unit() * f64::from(case % 2));
+        let n = 2 + case % 3;
+        let soup = lattice_skin(n, squeeze, shear, bend, || match random.bits() % 4 {
+            0 | 1 => None,
+            2 => A,
+            _ => B,
+        });
+        eprintln!("case {case}");
+        recovered(soup);
     }
 }
