@@ -10,8 +10,9 @@ use super::cavity::Cavity;
 use super::constraints::{Constraints, edges};
 use super::crossing::{Crossing, Piercing, crossings, piercing, tets_around};
 use super::flips::Flips;
-use super::tetrahedra::{NO_BODY, Tetrahedra, sorted};
+use super::tetrahedra::{NO_BODY, NONE, Tetrahedra, sorted};
 use crate::Point;
+use crate::kernel::predicates::{Sign, orient3d};
 use crate::kernel::simplex::volume6;
 
 /// How often flips may change what a missing edge or face meets before it is set aside. Of the
@@ -301,12 +302,27 @@ impl<'a> Recovery<'a> {
         Some(p)
     }
 
-    /// Stars tets from a new point, if all of their surface sees it.
+    /// Stars tets from a new point. Tets behind faces that do not see it are taken in first: near slivers the
+    /// point may be, by rounding, on the wrong side of some.
     fn add_steiner(&mut self, tets: &[u32], point: Point) -> Option<u32> {
-        let seed = *tets.first()?;
-        self.cavity.take(self.mesh, tets);
-        let whole = self.cavity.make_star_shaped(self.mesh, seed, &point) && self.cavity.tets.len() == tets.len();
-        if !whole || self.steiner.len() >= self.most_steiner {
+        /// More than a split of an edge with its usual ring needs, by far.
+        const MOST_TETS: usize = 64;
+        let mut tets = tets.to_vec();
+        if tets.is_empty() || self.steiner.len() >= self.most_steiner {
+            return None;
+        }
+        loop {
+            self.cavity.take(self.mesh, &tets);
+            if self.cavity.make_star_shaped(self.mesh, tets[0], &point) && self.cavity.tets.len() == tets.len() {
+                break;
+            }
+            let grown = self.behind_unseen(&tets, &point)?;
+            tets.extend(grown);
+            if tets.len() > MOST_TETS {
+                return None;
+            }
+        }
+        if !self.keeps_edges(&tets) {
             return None;
         }
         let p = self.mesh.add_point(point);
@@ -314,6 +330,41 @@ impl<'a> Recovery<'a> {
         self.steiner.push(p);
         self.counts.steiner += 1;
         Some(p)
+    }
+
+    /// The tets behind those faces around `tets` that do not see a point; `None` if there are none, or one of the
+    /// faces must stay.
+    fn behind_unseen(&self, tets: &[u32], point: &Point) -> Option<Vec<u32>> {
+        let mut behind = Vec::new();
+        for half_face in tets.iter().flat_map(|&t| 4 * t..4 * t + 4) {
+            let other = self.mesh.across(half_face);
+            let [a, b, c] = self.mesh.face(half_face).map(|v| self.mesh.point(v));
+            if (other != NONE && tets.contains(&(other >> 2))) || orient3d(a, b, c, point) == Sign::Negative {
+                continue;
+            }
+            if other == NONE || self.constraints.facet(self.mesh.face(half_face)).is_some() {
+                return None;
+            }
+            behind.push(other >> 2);
+        }
+        behind.sort_unstable();
+        behind.dedup();
+        (!behind.is_empty()).then_some(behind)
+    }
+
+    /// Whether the facets and their edges among some tets are all on the surface of the cavity they make.
+    fn keeps_edges(&self, tets: &[u32]) -> bool {
+        let outer = |h: &u32| {
+            let other = self.mesh.across(*h);
+            other == NONE || !tets.contains(&(other >> 2))
+        };
+        let half_faces = || tets.iter().flat_map(|&t| 4 * t..4 * t + 4);
+        let kept: Vec<[u32; 2]> = half_faces().filter(outer).flat_map(|h| edges(self.mesh.face(h))).collect();
+        half_faces().filter(|h| !outer(h)).all(|h| {
+            let face = self.mesh.face(h);
+            self.constraints.facet(face).is_none()
+                && edges(face).iter().all(|e| !self.constraints.has_edge(e[0], e[1]) || kept.contains(e))
+        })
     }
 
     /// Makes a facet a face of the mesh by flips alone; its edges may still be missing.

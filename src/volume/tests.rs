@@ -12,7 +12,9 @@ const EMPTY: Settings = Settings { fill: false, max_tets: 1 << 20 };
 
 fn recovered(soup: Soup) -> Report {
     let surface = soup.surface().unwrap();
-    let (mesh, report) = mesh(&surface, &UniformSize(1.0), &EMPTY).unwrap();
+    let r0 = mesh(&surface, &UniformSize(1.0), &EMPTY);
+    if let Err(e) = &r0 { eprintln!("FAILED {e:?}"); if std::env::var("GO").is_ok() { return Report::default(); } }
+    let (mesh, report) = r0.unwrap();
     eprintln!("{} triangles: {report:?}", surface.triangles().len());
     check_fills(&surface, &mesh);
     report
@@ -197,9 +199,9 @@ fn lattice_skin(n: u32, squeeze: [f64; 3], shear: f64, bend: f64, mut body: impl
 #[test]
 fn skins_of_random_bodies_in_a_bent_lattice_are_filled() {
     let mut random = crate::kernel::random::Random::new(11);
-    for case in 0..60 {
+    for case in 0..1500 {
         let squeeze = [0, 1, 2].map(|_| 0.15 + random.unit());
-        let (shear, bend) = (2.0 * random.unit() - 1.0, 0.3 * random.unit() * f64::from(case % 2));
+        let (shear, bend) = (5.0 * random.unit() - 2.5, 1.0 * random.unit() * f64::from(case % 2));
         let n = 2 + case % 3;
         let soup = lattice_skin(n, squeeze, shear, bend, || match random.bits() % 4 {
             0 | 1 => None,
