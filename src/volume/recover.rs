@@ -13,6 +13,7 @@ use super::flips::Flips;
 use super::tetrahedra::{NO_BODY, NONE, Tetrahedra, sorted};
 use crate::Point;
 use crate::kernel::predicates::{Sign, orient3d};
+use crate::kernel::random::mix;
 use crate::kernel::simplex::volume6;
 
 /// How often flips may change what a missing edge or face meets before it is set aside. Of the
@@ -32,7 +33,7 @@ pub(super) struct Intersection {
 }
 
 /// What is left undone.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Unrecovered {
     pub facets: Vec<u32>,
     pub intersections: Vec<Intersection>,
@@ -59,11 +60,18 @@ pub(super) struct Recovery<'a> {
     found: Vec<Crossing>,
     intersections: Vec<Intersection>,
     most_steiner: usize,
+    attempt: u64,
 }
 
 impl<'a> Recovery<'a> {
-    /// A recovery that gives up beyond `most_steiner` Steiner points.
-    pub fn new(mesh: &'a mut Tetrahedra, constraints: &'a mut Constraints, most_steiner: usize) -> Self {
+    /// A recovery that gives up beyond `most_steiner` Steiner points. Each `attempt` takes edges and facets in another
+    /// order: one may end where another does not.
+    pub fn new(
+        mesh: &'a mut Tetrahedra,
+        constraints: &'a mut Constraints,
+        most_steiner: usize,
+        attempt: u64,
+    ) -> Self {
         Self {
             mesh,
             constraints,
@@ -75,6 +83,7 @@ impl<'a> Recovery<'a> {
             found: Vec::new(),
             intersections: Vec::new(),
             most_steiner,
+            attempt,
         }
     }
 
@@ -97,7 +106,7 @@ impl<'a> Recovery<'a> {
                 }
                 left.retain(|&f| !self.split_facet(f));
             }
-            missing = self.still_missing();
+            missing = self.missing_facets();
             let progress = self.steiner.len() > before;
             if !missing.is_empty() && (!progress || !self.intersections.is_empty()) {
                 let intersections = std::mem::take(&mut self.intersections);
@@ -119,11 +128,11 @@ impl<'a> Recovery<'a> {
                 }
             }
         }
-        self.constraints.alive().filter(|&f| !present[f as usize]).collect()
-    }
-
-    fn still_missing(&self) -> Vec<u32> {
-        self.missing_facets()
+        let mut missing: Vec<u32> = self.constraints.alive().filter(|&f| !present[f as usize]).collect();
+        if self.attempt > 0 {
+            missing.sort_by_key(|&f| mix(mix(self.attempt) ^ u64::from(f)));
+        }
+        missing
     }
 
     /// Makes the edges of these facets edges of the mesh, with Steiner points where flips fail.
@@ -132,6 +141,9 @@ impl<'a> Recovery<'a> {
             facets.iter().flat_map(|&f| edges(self.constraints.facets[f as usize].vertices)).collect();
         wanted.sort_unstable();
         wanted.dedup();
+        if self.attempt > 0 {
+            wanted.sort_by_key(|&[a, b]| mix(mix(self.attempt ^ u64::from(a)) ^ u64::from(b)));
+        }
         wanted.retain(|&[a, b]| self.mesh.tet_at_edge(a, b, &mut self.star).is_none());
         if count {
             self.counts.missing_edges = wanted.len();
