@@ -16,14 +16,16 @@ pub(super) struct Disagreement {
     pub regions: [Option<BodyId>; 2],
 }
 
-/// Gives each tet its body and removes those outside of all. All facets must be locked faces.
+/// Gives each tet its body and removes those outside of all. All facets must be locked faces; `far` is a vertex outside.
 pub(super) fn carve(
     mesh: &mut Tetrahedra,
     constraints: &Constraints,
     regions: &[[Option<BodyId>; 2]],
+    far: u32,
 ) -> Result<(), Disagreement> {
     let slots = mesh.tets.len() as u32;
     let mut open = Vec::new();
+    flood(mesh, mesh.at_vertex[far as usize], OUTSIDE, &mut open);
     for t in 0..slots {
         if mesh.is_alive(t) {
             for half_face in 4 * t..4 * t + 4 {

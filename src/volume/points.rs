@@ -45,42 +45,60 @@ struct Filler<'a> {
     settled: Vec<[u32; 4]>,
     cavity: Cavity,
     max_tets: usize,
+    /// Why the placement stops early, if it does.
+    stopped: Option<Stopped>,
 }
 
-/// Adds points inside all bodies; returns how many. Stops at `max_tets` tets.
-pub(super) fn fill(mesh: &mut Tetrahedra, size: &dyn SizeField, scale: f64, max_tets: usize) -> usize {
+/// Why no more points are placed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Stopped {
+    /// The size field gave a size that is not positive and finite.
+    BadSize { place: Point, size: f64 },
+    /// There are more tets than allowed.
+    TooManyTets,
+}
+
+/// Adds points inside all bodies; returns how many.
+pub(super) fn fill(
+    mesh: &mut Tetrahedra,
+    size: &dyn SizeField,
+    scale: f64,
+    max_tets: usize,
+) -> Result<usize, Stopped> {
     let before = mesh.points.len();
-    let sizes = vertex_sizes(mesh, size, scale);
-    let mut filler =
-        Filler { mesh, size, scale, sizes, settled: Vec::new(), cavity: Cavity::default(), max_tets };
+    let mut filler = Filler {
+        mesh,
+        size,
+        scale,
+        sizes: Vec::new(),
+        settled: Vec::new(),
+        cavity: Cavity::default(),
+        max_tets,
+        stopped: None,
+    };
+    filler.size_vertices();
     filler.advance();
     filler.finish();
-    filler.mesh.points.len() - before
+    match filler.stopped {
+        Some(stopped) => Err(stopped),
+        None => Ok(mesh.points.len() - before),
+    }
 }
 
-/// The wanted size at each vertex: the field's, or what the edges of the skin there suggest if that is less.
-fn vertex_sizes(mesh: &Tetrahedra, size: &dyn SizeField, scale: f64) -> Vec<f64> {
+/// The sum and the number of the lengths of the skin's edges at each vertex, each edge counted once per triangle.
+fn skin_edges(mesh: &Tetrahedra) -> Vec<(f64, u32)> {
     let mut skin = vec![(0.0, 0u32); mesh.points.len()];
-    for t in mesh.alive() {
-        for half_face in (4 * t..4 * t + 4).filter(|&h| mesh.is_locked(h)) {
-            let [a, b, c] = mesh.face(half_face);
-            for [u, v] in [[a, b], [b, c], [c, a]] {
-                let length = (mesh.point(u) - mesh.point(v)).norm();
-                for w in [u, v] {
-                    skin[w as usize].0 += length;
-                    skin[w as usize].1 += 1;
-                }
+    for half_face in mesh.alive().flat_map(|t| 4 * t..4 * t + 4).filter(|&h| mesh.is_locked(h)) {
+        let [a, b, c] = mesh.face(half_face);
+        for [u, v] in [[a, b], [b, c], [c, a]] {
+            let length = (mesh.point(u) - mesh.point(v)).norm();
+            for w in [u, v] {
+                skin[w as usize].0 += length;
+                skin[w as usize].1 += 1;
             }
         }
     }
-    let wanted = |(v, &(sum, count)): (usize, &(f64, u32))| {
-        if mesh.at_vertex[v] == NONE {
-            return 0.0;
-        }
-        let size = size.size_at(&(mesh.points[v] / scale)) * scale;
-        if count == 0 { size } else { size.min(SKIN_TOLERANCE * sum / f64::from(count)) }
-    };
-    skin.iter().enumerate().map(wanted).collect()
+    skin
 }
 
 /// The centre of the sphere through the corners of a tet; not finite where it is flat.
@@ -92,6 +110,38 @@ fn circumcenter([a, b, c, d]: [&Point; 4]) -> Point {
 }
 
 impl Filler<'_> {
+    /// Finds the wanted size at each vertex: the field's, or what the edges of the skin suggest if that is less.
+    fn size_vertices(&mut self) {
+        for (v, (sum, count)) in skin_edges(self.mesh).into_iter().enumerate() {
+            let mut size = 0.0;
+            if self.mesh.at_vertex[v] != NONE {
+                size = self.ask(&self.mesh.points[v].clone());
+                if count > 0 {
+                    size = size.min(SKIN_TOLERANCE * sum / f64::from(count));
+                }
+            }
+            self.sizes.push(size);
+        }
+    }
+
+    /// What the size field says, in the mesher's units.
+    fn ask(&mut self, point: &Point) -> f64 {
+        let place = point / self.scale;
+        let size = self.size.size_at(&place);
+        if !(size > 0.0 && size.is_finite()) {
+            self.stopped = self.stopped.or(Some(Stopped::BadSize { place, size }));
+        }
+        size * self.scale
+    }
+
+    /// Whether to stop early.
+    fn stops(&mut self) -> bool {
+        if self.mesh.len() > self.max_tets {
+            self.stopped = self.stopped.or(Some(Stopped::TooManyTets));
+        }
+        self.stopped.is_some()
+    }
+
     /// Waves of ideal points, until no front is left.
     fn advance(&mut self) {
         let mut coarse: Vec<u32> = self.mesh.alive().filter(|&t| !self.is_fine(t)).collect();
@@ -99,6 +149,9 @@ impl Filler<'_> {
             let mut next = Vec::new();
             let mut moved = false;
             for t in coarse {
+                if self.stops() {
+                    return;
+                }
                 if !self.mesh.is_alive(t) || self.is_settled(t) || self.is_fine(t) {
                     continue;
                 }
@@ -118,7 +171,7 @@ impl Filler<'_> {
                     self.settle(t);
                 }
             }
-            if !moved || self.mesh.len() > self.max_tets {
+            if !moved {
                 break;
             }
             coarse = next;
@@ -129,8 +182,8 @@ impl Filler<'_> {
     fn finish(&mut self) {
         let mut coarse: Vec<u32> = self.mesh.alive().collect();
         while let Some(t) = coarse.pop() {
-            if self.mesh.len() > self.max_tets {
-                break;
+            if self.stops() {
+                return;
             }
             if !self.mesh.is_alive(t) || self.is_fine(t) {
                 continue;
@@ -171,15 +224,15 @@ impl Filler<'_> {
     }
 
     /// The wanted size at a point in or near a tet.
-    fn size_near(&self, t: u32, point: &Point) -> f64 {
-        let asked = self.size.size_at(&(point / self.scale)) * self.scale;
+    fn size_near(&mut self, t: u32, point: &Point) -> f64 {
+        let asked = self.ask(point);
         self.mesh.tets[t as usize].iter().fold(asked, |size, &v| {
             size.min(self.sizes[v as usize] + GROWTH * (point - self.mesh.point(v)).norm())
         })
     }
 
     /// The point over a face, into its tet, whose edges to the face have the wanted length; and that length.
-    fn ideal_point(&self, half_face: u32) -> (Point, f64) {
+    fn ideal_point(&mut self, half_face: u32) -> (Point, f64) {
         let [a, b, c] = self.mesh.face(half_face).map(|v| self.mesh.point(v));
         let (u, v) = (b - a, c - a);
         let normal: Vector = -area_vector(a, b, c);

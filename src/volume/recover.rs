@@ -10,8 +10,10 @@ use super::cavity::Cavity;
 use super::constraints::{Constraints, edges};
 use super::crossing::{Crossing, Piercing, crossings, piercing, tets_around};
 use super::flips::Flips;
-use super::tetrahedra::{NO_BODY, Tetrahedra, sorted};
+use super::tetrahedra::{NO_BODY, NONE, Tetrahedra, sorted};
 use crate::Point;
+use crate::kernel::predicates::{Sign, orient3d};
+use crate::kernel::random::mix;
 use crate::kernel::simplex::volume6;
 
 /// How often flips may change what a missing edge or face meets before it is set aside. Of the
@@ -31,7 +33,7 @@ pub(super) struct Intersection {
 }
 
 /// What is left undone.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Unrecovered {
     pub facets: Vec<u32>,
     pub intersections: Vec<Intersection>,
@@ -58,11 +60,18 @@ pub(super) struct Recovery<'a> {
     found: Vec<Crossing>,
     intersections: Vec<Intersection>,
     most_steiner: usize,
+    attempt: u64,
 }
 
 impl<'a> Recovery<'a> {
-    /// A recovery that gives up beyond `most_steiner` Steiner points.
-    pub fn new(mesh: &'a mut Tetrahedra, constraints: &'a mut Constraints, most_steiner: usize) -> Self {
+    /// A recovery that gives up beyond `most_steiner` Steiner points. Each `attempt` takes edges and facets in another
+    /// order: one may end where another does not.
+    pub fn new(
+        mesh: &'a mut Tetrahedra,
+        constraints: &'a mut Constraints,
+        most_steiner: usize,
+        attempt: u64,
+    ) -> Self {
         Self {
             mesh,
             constraints,
@@ -74,6 +83,7 @@ impl<'a> Recovery<'a> {
             found: Vec::new(),
             intersections: Vec::new(),
             most_steiner,
+            attempt,
         }
     }
 
@@ -87,7 +97,8 @@ impl<'a> Recovery<'a> {
             self.recover_edges(&missing, first);
             first = false;
             let intersects = !self.intersections.is_empty();
-            let mut left: Vec<u32> = missing.iter().copied().filter(|&f| !self.recover_facet(f, 0)).collect();
+            let mut left: Vec<u32> =
+                missing.iter().copied().filter(|&f| !self.recover_facet(f, 0)).collect();
             if !intersects && self.intersections.is_empty() {
                 // The neighbourhood has changed: what failed at first may work now.
                 for depth in 1..=DEEPEST {
@@ -95,7 +106,7 @@ impl<'a> Recovery<'a> {
                 }
                 left.retain(|&f| !self.split_facet(f));
             }
-            missing = self.still_missing();
+            missing = self.missing_facets();
             let progress = self.steiner.len() > before;
             if !missing.is_empty() && (!progress || !self.intersections.is_empty()) {
                 let intersections = std::mem::take(&mut self.intersections);
@@ -117,11 +128,11 @@ impl<'a> Recovery<'a> {
                 }
             }
         }
-        self.constraints.alive().filter(|&f| !present[f as usize]).collect()
-    }
-
-    fn still_missing(&self) -> Vec<u32> {
-        self.missing_facets()
+        let mut missing: Vec<u32> = self.constraints.alive().filter(|&f| !present[f as usize]).collect();
+        if self.attempt > 0 {
+            missing.sort_by_key(|&f| mix(mix(self.attempt) ^ u64::from(f)));
+        }
+        missing
     }
 
     /// Makes the edges of these facets edges of the mesh, with Steiner points where flips fail.
@@ -130,6 +141,9 @@ impl<'a> Recovery<'a> {
             facets.iter().flat_map(|&f| edges(self.constraints.facets[f as usize].vertices)).collect();
         wanted.sort_unstable();
         wanted.dedup();
+        if self.attempt > 0 {
+            wanted.sort_by_key(|&[a, b]| mix(mix(self.attempt ^ u64::from(a)) ^ u64::from(b)));
+        }
         wanted.retain(|&[a, b]| self.mesh.tet_at_edge(a, b, &mut self.star).is_none());
         if count {
             self.counts.missing_edges = wanted.len();
@@ -221,7 +235,9 @@ impl<'a> Recovery<'a> {
     fn clear_crossing(&mut self, a: u32, b: u32, crossing: Crossing, depth: u32) -> bool {
         match crossing {
             Crossing::Vertex(_) => false,
-            Crossing::Edge(tet, edge) => self.remove_edge(tet, edge, [a, b], depth),
+            Crossing::Edge(tet, edge) => {
+                self.remove_edge(tet, edge, [a, b], depth)
+            }
             Crossing::Face(half_face) => {
                 let [x, y, z] = self.mesh.face(half_face);
                 let (tet, other) = (half_face >> 2, self.mesh.across(half_face));
@@ -232,7 +248,9 @@ impl<'a> Recovery<'a> {
                 {
                     return true;
                 }
-                [[x, y], [y, z], [z, x]].into_iter().any(|edge| self.remove_edge(tet, edge, [a, b], depth))
+                [[x, y], [y, z], [z, x]].into_iter().any(|edge| {
+                    self.remove_edge(tet, edge, [a, b], depth)
+                })
             }
         }
     }
@@ -296,13 +314,27 @@ impl<'a> Recovery<'a> {
         Some(p)
     }
 
-    /// Stars tets from a new point, if all of their surface sees it.
+    /// Stars tets from a new point. Tets behind faces that do not see it are taken in first: near slivers the
+    /// point may be, by rounding, on the wrong side of some.
     fn add_steiner(&mut self, tets: &[u32], point: Point) -> Option<u32> {
-        let seed = *tets.first()?;
-        self.cavity.take(self.mesh, tets);
-        let whole =
-            self.cavity.make_star_shaped(self.mesh, seed, &point) && self.cavity.tets.len() == tets.len();
-        if !whole || self.steiner.len() >= self.most_steiner {
+        /// More than a split of an edge with its usual ring needs, by far.
+        const MOST_TETS: usize = 64;
+        let mut tets = tets.to_vec();
+        if tets.is_empty() || self.steiner.len() >= self.most_steiner {
+            return None;
+        }
+        loop {
+            self.cavity.take(self.mesh, &tets);
+            if self.cavity.make_star_shaped(self.mesh, tets[0], &point) && self.cavity.tets.len() == tets.len() {
+                break;
+            }
+            let grown = self.behind_unseen(&tets, &point)?;
+            tets.extend(grown);
+            if tets.len() > MOST_TETS {
+                return None;
+            }
+        }
+        if !self.keeps_edges(&tets) {
             return None;
         }
         let p = self.mesh.add_point(point);
@@ -310,6 +342,41 @@ impl<'a> Recovery<'a> {
         self.steiner.push(p);
         self.counts.steiner += 1;
         Some(p)
+    }
+
+    /// The tets behind those faces around `tets` that do not see a point; `None` if there are none, or one of the
+    /// faces must stay.
+    fn behind_unseen(&self, tets: &[u32], point: &Point) -> Option<Vec<u32>> {
+        let mut behind = Vec::new();
+        for half_face in tets.iter().flat_map(|&t| 4 * t..4 * t + 4) {
+            let other = self.mesh.across(half_face);
+            let [a, b, c] = self.mesh.face(half_face).map(|v| self.mesh.point(v));
+            if (other != NONE && tets.contains(&(other >> 2))) || orient3d(a, b, c, point) == Sign::Negative {
+                continue;
+            }
+            if other == NONE || self.constraints.facet(self.mesh.face(half_face)).is_some() {
+                return None;
+            }
+            behind.push(other >> 2);
+        }
+        behind.sort_unstable();
+        behind.dedup();
+        (!behind.is_empty()).then_some(behind)
+    }
+
+    /// Whether the facets and their edges among some tets are all on the surface of the cavity they make.
+    fn keeps_edges(&self, tets: &[u32]) -> bool {
+        let outer = |h: &u32| {
+            let other = self.mesh.across(*h);
+            other == NONE || !tets.contains(&(other >> 2))
+        };
+        let half_faces = || tets.iter().flat_map(|&t| 4 * t..4 * t + 4);
+        let kept: Vec<[u32; 2]> = half_faces().filter(outer).flat_map(|h| edges(self.mesh.face(h))).collect();
+        half_faces().filter(|h| !outer(h)).all(|h| {
+            let face = self.mesh.face(h);
+            self.constraints.facet(face).is_none()
+                && edges(face).iter().all(|e| !self.constraints.has_edge(e[0], e[1]) || kept.contains(e))
+        })
     }
 
     /// Makes a facet a face of the mesh by flips alone; its edges may still be missing.
@@ -324,7 +391,9 @@ impl<'a> Recovery<'a> {
             };
             // Ends of piercing edges are never corners of the facet: no chord is wanted.
             let [a, _, c] = facet.vertices;
-            let flipped = edges.iter().any(|&(tet, edge)| self.remove_edge(tet, edge, [a, c], depth));
+            let flipped = edges.iter().any(|&(tet, edge)| {
+                self.remove_edge(tet, edge, [a, c], depth)
+            });
             if !flipped {
                 return false;
             }
