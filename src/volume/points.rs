@@ -41,12 +41,24 @@ struct Filler<'a> {
     scale: f64,
     /// The wanted size at each vertex, in the mesher's units.
     sizes: Vec<f64>,
-    /// Tets of which no candidate is left; by slot, with the vertices they had.
-    settled: Vec<[u32; 4]>,
+    /// By slot.
+    states: Vec<State>,
     cavity: Cavity,
     max_tets: usize,
     /// Why the placement stops early, if it does.
     stopped: Option<Stopped>,
+}
+
+/// How far a tet is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+enum State {
+    /// To be made smaller.
+    #[default]
+    Coarse,
+    /// Too large, but no ideal point of it was accepted: the front passes on.
+    Settled,
+    /// As small as wanted.
+    Fine,
 }
 
 /// Why no more points are placed.
@@ -71,7 +83,7 @@ pub(super) fn fill(
         size,
         scale,
         sizes: Vec::new(),
-        settled: Vec::new(),
+        states: Vec::new(),
         cavity: Cavity::default(),
         max_tets,
         stopped: None,
@@ -142,69 +154,12 @@ impl Filler<'_> {
         self.stopped.is_some()
     }
 
-    /// Waves of ideal points, until no front is left.
-    fn advance(&mut self) {
-        let mut coarse: Vec<u32> = self.mesh.alive().filter(|&t| !self.is_fine(t)).collect();
-        while !coarse.is_empty() {
-            let mut next = Vec::new();
-            let mut moved = false;
-            for t in coarse {
-                if self.stops() {
-                    return;
-                }
-                if !self.mesh.is_alive(t) || self.is_settled(t) || self.is_fine(t) {
-                    continue;
-                }
-                let front: Vec<u32> = (4 * t..4 * t + 4).filter(|&h| self.is_front(h)).collect();
-                if front.is_empty() {
-                    next.push(t);
-                    continue;
-                }
-                moved = true;
-                let inserted = front.iter().any(|&h| {
-                    let (point, size) = self.ideal_point(h);
-                    self.insert(t, point, size)
-                });
-                if inserted {
-                    next.extend_from_slice(&self.cavity.filled);
-                } else {
-                    self.settle(t);
-                }
-            }
-            if !moved {
-                break;
-            }
-            coarse = next;
+    /// Finds out how far some tets are.
+    fn judge(&mut self, tets: &[u32]) {
+        self.states.resize(self.mesh.tets.len(), State::Coarse);
+        for &t in tets {
+            self.states[t as usize] = if self.is_fine(t) { State::Fine } else { State::Coarse };
         }
-    }
-
-    /// Circumcentres of what is still coarse.
-    fn finish(&mut self) {
-        let mut coarse: Vec<u32> = self.mesh.alive().collect();
-        while let Some(t) = coarse.pop() {
-            if self.stops() {
-                return;
-            }
-            if !self.mesh.is_alive(t) || self.is_fine(t) {
-                continue;
-            }
-            let center = circumcenter(self.mesh.corners(t));
-            let size = self.size_near(t, &center);
-            if self.insert(t, center, size) {
-                coarse.extend_from_slice(&self.cavity.filled);
-            }
-        }
-    }
-
-    fn is_settled(&self, t: u32) -> bool {
-        self.settled.get(t as usize).is_some_and(|tet| *tet == self.mesh.tets[t as usize])
-    }
-
-    fn settle(&mut self, t: u32) {
-        if self.settled.len() <= t as usize {
-            self.settled.resize(self.mesh.tets.len(), [NONE; 4]);
-        }
-        self.settled[t as usize] = self.mesh.tets[t as usize];
     }
 
     fn is_fine(&self, t: u32) -> bool {
@@ -214,13 +169,71 @@ impl Filler<'_> {
         radius2 <= (FINE * REGULAR * size).powi(2)
     }
 
-    /// Whether the front is at this face of a tet that is not fine.
+    fn state(&self, t: u32) -> State {
+        self.states[t as usize]
+    }
+
+    /// Waves of ideal points, until no front is left.
+    fn advance(&mut self) {
+        let mut coarse: Vec<u32> = self.mesh.alive().collect();
+        self.judge(&coarse);
+        while !coarse.is_empty() {
+            let mut next = Vec::new();
+            let mut moved = false;
+            for t in coarse {
+                if self.stops() {
+                    return;
+                }
+                // A slot may hold another tet by now, which is in the next wave too: no harm, it is coarse as well.
+                if !self.mesh.is_alive(t) || self.state(t) != State::Coarse {
+                    continue;
+                }
+                let mut has_front = false;
+                let inserted = (4 * t..4 * t + 4).any(|h| {
+                    self.is_front(h) && {
+                        has_front = true;
+                        let (point, size) = self.ideal_point(h);
+                        self.insert(t, point, size)
+                    }
+                });
+                moved |= has_front;
+                if inserted {
+                    next.extend(self.cavity.filled.iter().filter(|&&t| self.states[t as usize] == State::Coarse));
+                } else if has_front {
+                    self.states[t as usize] = State::Settled;
+                } else {
+                    next.push(t);
+                }
+            }
+            if !moved {
+                break;
+            }
+            coarse = next;
+        }
+    }
+
+    /// Circumcentres of what is still too large.
+    fn finish(&mut self) {
+        let mut open: Vec<u32> = self.mesh.alive().collect();
+        while let Some(t) = open.pop() {
+            if self.stops() {
+                return;
+            }
+            if !self.mesh.is_alive(t) || self.state(t) == State::Fine {
+                continue;
+            }
+            let center = circumcenter(self.mesh.corners(t));
+            let size = self.size_near(t, &center);
+            if self.insert(t, center, size) {
+                open.extend_from_slice(&self.cavity.filled);
+            }
+        }
+    }
+
+    /// Whether the front is at this face of a coarse tet.
     fn is_front(&self, half_face: u32) -> bool {
         let other = self.mesh.across(half_face);
-        other == NONE
-            || self.mesh.is_locked(half_face)
-            || self.is_settled(other >> 2)
-            || self.is_fine(other >> 2)
+        other == NONE || self.mesh.is_locked(half_face) || self.state(other >> 2) != State::Coarse
     }
 
     /// The wanted size at a point in or near a tet.
@@ -274,6 +287,9 @@ impl Filler<'_> {
         let v = self.mesh.add_point(point);
         self.sizes.push(size);
         self.cavity.fill(self.mesh, v, body);
+        let filled = std::mem::take(&mut self.cavity.filled);
+        self.judge(&filled);
+        self.cavity.filled = filled;
         true
     }
 
