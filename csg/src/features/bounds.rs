@@ -8,7 +8,7 @@ use crate::{Aabb, BodyId, Geometry, Interval, Point, Solid, Surface};
 /// A body that reaches this many times the extent of all primitives is taken for unbounded.
 const HUGE: f64 = 1e4;
 /// A box is good when the cells at its faces are smaller than this part of its longest side.
-const RESOLUTION: f64 = 1.0 / 64.0;
+const RESOLUTION: f64 = 1.0 / 16.0;
 
 /// Part of the huge cube, and what bodies may be in it (`None`: the whole cell is in the body).
 struct Part {

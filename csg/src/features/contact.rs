@@ -36,16 +36,20 @@ fn diagonal(cell: &Cell) -> f64 {
 
 /// The point in (or just beside) a cell where both surfaces meet and are tangent, if there is one.
 pub(super) fn find(geometry: &Geometry, pair: [SurfaceId; 2], cell: &Cell) -> Option<Contact> {
-    /// At a double root each step halves the distance.
-    const STEPS: usize = 60;
+    /// The steps converge with the square: more than this many lead elsewhere.
+    const STEPS: usize = 12;
     let [a, b] = pair.map(|s| &geometry.surfaces[s.index()]);
     let center = middle(cell);
     let reach = diagonal(cell);
     let mut at = center;
     for _ in 0..STEPS {
-        at += least_squares_step(a, b, &at)?;
+        let step = least_squares_step(a, b, &at)?;
+        at += step;
         if (at - center).norm() > 2.0 * reach {
             return None;
+        }
+        if step.norm() <= f64::EPSILON * at.coords.amax() {
+            break;
         }
     }
     let rounding = 1e3 * f64::EPSILON * (at.coords.amax() + reach);

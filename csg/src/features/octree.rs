@@ -48,8 +48,9 @@ const CROWD: usize = 6;
 /// How many levels.
 const CROWD_DEPTH: u32 = 7;
 /// If gradients vary by less than this part over a cell and still are not told apart from parallel, the cell is
-/// looked at for contact. Smaller: more cells along a curve of contact; larger: contact is found where there is none.
-const FLAT: f64 = 1e-3;
+/// searched for a point of contact. Larger: curves so short that they fit beside a contact in a cell are lost; smaller:
+/// more cells along a curve of contact (ten thousands at 10⁻³).
+const FLAT: f64 = 0.05;
 
 impl Octree {
     /// The cells of the bodies in the box `root`.
@@ -194,7 +195,7 @@ fn judge_pairs(geometry: &Geometry, cell: &Cell, surfaces: &[SurfaceId], depth: 
 ///
 /// Beside the ranges of both functions, the range of that combination of them is asked whose gradient is
 /// least in the middle: it tells nearly parallel sheets apart.
-fn can_meet(a: &Surface, b: &Surface, cell: &Cell) -> bool {
+pub(super) fn can_meet(a: &Surface, b: &Surface, cell: &Cell) -> bool {
     let center = middle(cell);
     let (ga, gb) = (a.gradient(&center), b.gradient(&center));
     let factor = ga.dot(&gb) / gb.norm_squared();

@@ -2,7 +2,7 @@
 
 use super::around::Tolerances;
 use super::bounds::split;
-use super::octree::{Leaf, Octree, is_monotone};
+use super::octree::{Leaf, Octree, can_meet, is_monotone};
 use crate::interval::{Cell, middle};
 use crate::project::{project_to_both, shortest_step};
 use crate::{Curve, Geometry, Interval, Point, Surface, SurfaceId, Vector};
@@ -59,12 +59,12 @@ fn seeds(geometry: &Geometry, leaf: &Leaf, pair: [SurfaceId; 2], tolerances: &To
     let mut open = vec![(leaf.cell, 0)];
     let mut found = Vec::new();
     while let Some((cell, depth)) = open.pop() {
-        let meets = a.value_range(&cell).contains_zero() && b.value_range(&cell).contains_zero();
-        if !meets {
+        if !can_meet(a, b, &cell) {
             continue;
         }
         let parts = split(&cell);
-        let starts = std::iter::once(middle(&cell)).chain(parts.iter().map(middle));
+        let others = if depth == 0 { &parts[..] } else { &[] };
+        let starts = std::iter::once(&cell).chain(others).map(middle);
         let before = found.len();
         for start in starts {
             if let Ok(point) = project_to_both(a, b, &start, tolerances.exact) {
