@@ -52,5 +52,9 @@ fn cut(sheet: &Sheet, t: u32) -> Option<Point> {
         .filter(|&i| x.segment[i] == NONE)
         .map(|i| (sheet.length(x.v[next(i)], x.v[last(i)]), i))
         .max_by(|p, q| p.0.total_cmp(&q.0))?;
-    (longest.0 > LARGE).then(|| nalgebra::center(&corners[next(longest.1)].point, &corners[last(longest.1)].point))
+    if longest.0 <= LARGE {
+        return None;
+    }
+    // The nearest point to the middle of a long chord may be anywhere: the chart's middle is between the ends.
+    sheet.chart.middle(&corners[next(longest.1)].site, &corners[last(longest.1)].site)
 }

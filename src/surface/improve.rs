@@ -28,15 +28,19 @@ pub(super) struct Improved {
 /// Improves a sheet.
 pub(super) fn improve(sheet: &mut Sheet, settings: &Settings) -> Result<Improved, Stop> {
     let mut done = Improved { swaps: sheet.legalise_all(), ..Improved::default() };
+    let mut restless = Vec::new();
     for round in 0..settings.rounds {
-        let changing = round + 1 < settings.rounds;
-        if changing {
+        if round + 1 < settings.rounds {
             done.collapses += collapse_all(sheet);
             done.splits += split_all(sheet)?;
+            done.swaps += sheet.legalise_all();
         }
-        done.swaps += sheet.legalise_all();
-        done.moves += smooth_all(sheet);
-        done.moves += smooth_all(sheet);
+        // What others do to a vertex moves it little: two passes, then only those that still move.
+        restless.clear();
+        restless.resize(sheet.nodes.len(), true);
+        for _ in 0..2 {
+            done.moves += smooth_all(sheet, &mut restless);
+        }
         done.swaps += sheet.legalise_all();
     }
     Ok(done)
@@ -47,14 +51,23 @@ fn is_free(node: &Node) -> bool {
     matches!(node.kind, Kind::Free | Kind::Helper)
 }
 
-/// Moves each free vertex to where its triangles are better.
-fn smooth_all(sheet: &mut Sheet) -> usize {
+/// Moves each free vertex that is restless to where its triangles are better; those that stay come to rest until a
+/// neighbour moves.
+fn smooth_all(sheet: &mut Sheet, restless: &mut [bool]) -> usize {
     let mut moves = 0;
     let mut ring = Vec::new();
     for v in 0..sheet.nodes.len() as u32 {
-        if is_free(&sheet.nodes[v as usize]) {
-            sheet.mesh.around(v, &mut ring);
-            moves += usize::from(!ring.is_empty() && smooth(sheet, v, &ring));
+        if !is_free(&sheet.nodes[v as usize]) || !std::mem::replace(&mut restless[v as usize], false) {
+            continue;
+        }
+        sheet.mesh.around(v, &mut ring);
+        if !ring.is_empty() && smooth(sheet, v, &ring) {
+            moves += 1;
+            for &t in &ring {
+                for w in sheet.mesh.at(t).v {
+                    restless[w as usize] = true;
+                }
+            }
         }
     }
     moves
