@@ -18,8 +18,7 @@ const STEPS: usize = 1000;
 
 /// Cuts large triangles that do not follow the surface; the vertices are helpers, which the front may move.
 pub(super) fn condition(sheet: &mut Sheet, limit: usize) -> Result<usize, Stop> {
-    let mut queue: VecDeque<(u32, [u32; 3])> =
-        sheet.mesh.living().map(|t| (t, sheet.mesh.at(t).v)).collect();
+    let mut queue: VecDeque<(u32, [u32; 3])> = sheet.mesh.living().map(|t| (t, sheet.mesh.at(t).v)).collect();
     let mut inserted = 0;
     let mut ring = Vec::new();
     while let Some((t, v)) = queue.pop_front() {
