@@ -190,6 +190,8 @@ mod tests {
     }
 
     proptest! {
+        #![proptest_config(crate::seeded())]
+
         #[test]
         fn operations_on_intervals_contain_the_operations_on_their_numbers(
             (x, a) in interval(), (y, b) in interval(), factor in -5.0..5.0f64,

@@ -18,7 +18,9 @@ pub mod solid;
 pub mod surface;
 
 pub use features::{Corner, Curve, FeatureError, Features, Fin, Patch};
-pub use geometry::{Aabb, Body, BodyId, CornerId, CurveId, Geometry, PatchId, SurfaceId};
+pub use geometry::{
+    Aabb, Body, BodyId, BoundaryLabel, BoundaryOverride, CornerId, CurveId, Geometry, PatchId, SurfaceId,
+};
 pub use interval::Interval;
 pub use project::{ProjectionFailed, Projector};
 pub use solid::Solid;
@@ -28,3 +30,9 @@ pub use surface::Surface;
 pub type Point = nalgebra::Point3<f64>;
 /// A vector in space.
 pub type Vector = nalgebra::Vector3<f64>;
+
+/// Property tests that try the same cases on every run.
+#[cfg(test)]
+fn seeded() -> proptest::test_runner::Config {
+    proptest::test_runner::Config { rng_seed: proptest::test_runner::RngSeed::Fixed(1), ..Default::default() }
+}

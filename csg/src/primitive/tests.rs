@@ -45,6 +45,8 @@ fn on_torus_axis(surface: &Surface, point: &Point) -> bool {
 }
 
 proptest! {
+    #![proptest_config(crate::seeded())]
+
     #[test]
     fn gradient_and_hessian_are_those_of_finite_differences(s in surface(), p in point()) {
         prop_assume!(!on_torus_axis(&s, &p));
