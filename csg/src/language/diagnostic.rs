@@ -224,8 +224,7 @@ mod tests {
     #[test]
     fn a_message_shows_place_line_caret_and_help() {
         let text = diagnostic(5, "tlo x;").to_string();
-        let expected =
-            "a.geo:7:5: error: it is wrong\n    7 | tlo x;\n      |     ^\n      = help: mend it";
+        let expected = "a.geo:7:5: error: it is wrong\n    7 | tlo x;\n      |     ^\n      = help: mend it";
         assert_eq!(text, expected);
     }
 
