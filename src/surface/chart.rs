@@ -142,6 +142,11 @@ impl Chart {
         self.shape == Shape::Flat
     }
 
+    /// Whether its surface is closed, so that vertices of a start are points of it.
+    pub fn is_closed(&self) -> bool {
+        matches!(self.shape, Shape::Central | Shape::Around { .. })
+    }
+
     /// Whether a site is a pole.
     pub fn is_pole(&self, site: &Site) -> bool {
         matches!(self.shape, Shape::Straight | Shape::Conic { .. }) && site[2] != 0.0
@@ -240,7 +245,7 @@ impl Chart {
         match self.shape {
             Shape::Flat => Start { sites: Vec::new(), triangles: Vec::new() },
             Shape::Central => icosahedron(shift),
-            Shape::Around { .. } => torus_grid(shift),
+            Shape::Around { major } => torus_grid(shift, major / self.radii[0]),
             Shape::Straight | Shape::Conic { .. } => {
                 let margin = 1.0 + (heights[1] - heights[0]);
                 let apex = self.apex_pole();
@@ -250,16 +255,30 @@ impl Chart {
         }
     }
 
-    /// The point of a site of the start, near the surface; `None` for a site that only marks the outside.
+    /// The point of the surface at a site, within rounding; `None` for a site of a flat chart or a pole.
     pub fn point(&self, site: &Site) -> Option<Point> {
+        let round = |radius: f64| {
+            let (sin, cos) = (TAU * site[0]).sin_cos();
+            [radius * cos, radius * sin]
+        };
         let [x, y, z] = match self.shape {
+            Shape::Flat => return None,
             Shape::Central => *site,
             Shape::Around { major } => {
-                let ((s, c), (sin, cos)) = ((TAU * site[0]).sin_cos(), (TAU * site[1]).sin_cos());
-                let radius = major / self.radii[0] + cos;
-                [radius * c, radius * s, sin * self.radii[0]]
+                let (sin, cos) = (TAU * site[1]).sin_cos();
+                let [x, y] = round(major / self.radii[0] + cos);
+                [x, y, sin * self.radii[0]]
             }
-            _ => return None,
+            _ if site[2] != 0.0 => return None,
+            Shape::Straight => {
+                let [x, y] = round(1.0);
+                [x, y, site[1]]
+            }
+            Shape::Conic { rate, nappe } => {
+                let radius = ((rate * nappe).signum() * site[1]).exp();
+                let [x, y] = round(radius);
+                [x, y, (nappe * radius - 1.0) / rate]
+            }
         };
         Some(
             self.origin
@@ -267,6 +286,24 @@ impl Chart {
                 + self.axes[1] * (y * self.radii[1])
                 + self.axes[2] * (z * self.radii[2]),
         )
+    }
+
+    /// The point of the surface in the middle of an edge of the chart, within rounding; `None` where
+    /// [`point`](Self::point) has none.
+    pub fn middle(&self, a: &Site, b: &Site) -> Option<Point> {
+        if self.is_pole(a) || self.is_pole(b) {
+            return None;
+        }
+        let half = |i: usize| a[i] + 0.5 * wrap(b[i] - a[i]);
+        self.point(&match self.shape {
+            Shape::Flat => return None,
+            Shape::Central => {
+                let direction = (Vector::from(*a) + Vector::from(*b)).try_normalize(0.0)?;
+                [direction.x, direction.y, direction.z]
+            }
+            Shape::Around { .. } => [half(0), half(1), 0.0],
+            Shape::Straight | Shape::Conic { .. } => [half(0), 0.5 * (a[1] + b[1]), 0.0],
+        })
     }
 }
 
@@ -311,26 +348,27 @@ fn bipyramid(height: f64, shift: f64, apex: f64) -> Start {
     Start { sites, triangles }
 }
 
-/// Four by four vertices, the rows shifted against each other by half a step.
-fn torus_grid(shift: f64) -> Start {
+/// Rows of vertices around the axis, four of them around the tube, shifted against each other by half a step; as many in
+/// a row as make the triangles about as long as they are wide.
+fn torus_grid(shift: f64, ratio: f64) -> Start {
+    /// Nobody needs more; a tube thinner than that is cut where it matters.
+    const MOST: f64 = 10_000.0;
     let on_grid = |t: f64| (t.fract() * TURN_GRID).floor() / TURN_GRID;
-    let sites = (0..16)
+    let count = (2.0 * (ratio + 1.0)).ceil().clamp(4.0, MOST) as u32;
+    let sites = (0..4 * count)
         .map(|k| {
-            let (i, j) = (f64::from(k % 4), f64::from(k / 4));
-            [on_grid(shift + i * 0.25 + (j % 2.0) * 0.125), on_grid(0.7 * shift + j * 0.25), 0.0]
+            let (i, j) = (k % count, k / count);
+            let along = (f64::from(i) + 0.5 * f64::from(j % 2)) / f64::from(count);
+            [on_grid(shift + along), on_grid(0.7 * shift + f64::from(j) * 0.25), 0.0]
         })
         .collect();
-    let at = |i: u32, j: u32| (i % 4) + 4 * (j % 4);
+    let at = |i: u32, j: u32| (i % count) + count * (j % 4);
     let mut triangles = Vec::new();
     for j in 0..4 {
-        for i in 0..4 {
+        for i in 0..count {
             // Odd rows stand half a step to the right.
             let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i, j + 1), at(i + 1, j + 1)];
-            if j % 2 == 0 {
-                triangles.extend([[a, b, c], [b, d, c]]);
-            } else {
-                triangles.extend([[a, d, c], [a, b, d]]);
-            }
+            triangles.extend(if j % 2 == 0 { [[a, b, c], [b, d, c]] } else { [[a, d, c], [a, b, d]] });
         }
     }
     Start { sites, triangles }
@@ -422,6 +460,11 @@ mod tests {
                 let [a, b, c] = [a, b, c].map(|p| chart.site(&surface, &p));
                 assert_eq!(chart.orient(&a, &b, &c), Sign::Positive, "{surface:?} at {near}");
                 assert_ne!(chart.orient(&a, &c, &b), Sign::Positive);
+                let back = chart.point(&b).expect("a point that is no pole");
+                assert_eq!(chart.orient(&a, &b, &c), Sign::Positive);
+                assert!((surface.project(&back).expect("near the surface") - back).norm() < 1e-12);
+                let middle = chart.middle(&a, &b).expect("no poles");
+                assert!(surface.distance(&middle) < 1e-12, "{surface:?}");
             }
         }
     }

@@ -110,7 +110,7 @@ fn triangulate_round(sheet: &mut Sheet, attempt: u32) -> Result<(), Fault> {
 
 /// A vertex of the start.
 fn helper(sheet: &Sheet, site: &Site) -> Result<Node, Fault> {
-    let Some(near) = sheet.chart.point(site) else {
+    let Some(near) = sheet.chart.point(site).filter(|_| sheet.chart.is_closed()) else {
         let (point, normal) = (Point::origin(), Vector::zeros());
         return Ok(Node { point, normal, site: *site, size: 1.0, kind: Kind::Outside });
     };

@@ -1,7 +1,7 @@
 //! Better triangles: swaps, moves, collapses and splits, each only where it lowers the price.
 
 use super::Settings;
-use super::sheet::{DEGENERATE_PRICE, GAIN, Kind, Node, Place, Sheet, Stop};
+use super::sheet::{DEGENERATE_PRICE, GAIN, Kind, NORMAL_PRICE, Node, Place, Sheet, Stop};
 use super::topology::{NONE, last, next};
 use crate::kernel::predicates::Sign;
 use crate::{Point, Vector};
@@ -28,15 +28,19 @@ pub(super) struct Improved {
 /// Improves a sheet.
 pub(super) fn improve(sheet: &mut Sheet, settings: &Settings) -> Result<Improved, Stop> {
     let mut done = Improved { swaps: sheet.legalise_all(), ..Improved::default() };
+    let mut restless = Vec::new();
     for round in 0..settings.rounds {
-        let changing = round + 1 < settings.rounds;
-        if changing {
+        if round + 1 < settings.rounds {
             done.collapses += collapse_all(sheet);
             done.splits += split_all(sheet)?;
+            done.swaps += sheet.legalise_all();
         }
-        done.swaps += sheet.legalise_all();
-        done.moves += smooth_all(sheet);
-        done.moves += smooth_all(sheet);
+        // What others do to a vertex moves it little: two passes, then only those that still move.
+        restless.clear();
+        restless.resize(sheet.nodes.len(), true);
+        for _ in 0..2 {
+            done.moves += smooth_all(sheet, &mut restless);
+        }
         done.swaps += sheet.legalise_all();
     }
     Ok(done)
@@ -47,14 +51,23 @@ fn is_free(node: &Node) -> bool {
     matches!(node.kind, Kind::Free | Kind::Helper)
 }
 
-/// Moves each free vertex to where its triangles are better.
-fn smooth_all(sheet: &mut Sheet) -> usize {
+/// Moves each free vertex that is restless to where its triangles are better; those that stay come to rest until a
+/// neighbour moves.
+fn smooth_all(sheet: &mut Sheet, restless: &mut [bool]) -> usize {
     let mut moves = 0;
     let mut ring = Vec::new();
     for v in 0..sheet.nodes.len() as u32 {
-        if is_free(&sheet.nodes[v as usize]) {
-            sheet.mesh.around(v, &mut ring);
-            moves += usize::from(!ring.is_empty() && smooth(sheet, v, &ring));
+        if !is_free(&sheet.nodes[v as usize]) || !std::mem::replace(&mut restless[v as usize], false) {
+            continue;
+        }
+        sheet.mesh.around(v, &mut ring);
+        if !ring.is_empty() && smooth(sheet, v, &ring) {
+            moves += 1;
+            for &t in &ring {
+                for w in sheet.mesh.at(t).v {
+                    restless[w as usize] = true;
+                }
+            }
         }
     }
     moves
@@ -130,8 +143,10 @@ fn collapse_all(sheet: &mut Sheet) -> usize {
         } else {
             continue;
         };
+        // Rather a long edge than a folded triangle.
+        let longest = if worst > NORMAL_PRICE { f64::INFINITY } else { LONG };
         let best = (0..ends.len())
-            .filter_map(|k| collapsed_price(sheet, v, ends[k], &ring).map(|price| (price, k)))
+            .filter_map(|k| collapsed_price(sheet, v, ends[k], &ring, longest).map(|price| (price, k)))
             .min_by(|p, q| p.0.total_cmp(&q.0));
         if let Some((price, k)) = best {
             if price <= allowed {
@@ -145,8 +160,8 @@ fn collapse_all(sheet: &mut Sheet) -> usize {
 }
 
 /// The largest price around `w` among the triangles that a collapse of `v` into `w` changes; `None` if one would not fit or have
-/// an edge that is too long.
-fn collapsed_price(sheet: &Sheet, v: u32, w: u32, ring: &[u32]) -> Option<f64> {
+/// an edge longer than `longest`.
+fn collapsed_price(sheet: &Sheet, v: u32, w: u32, ring: &[u32], longest: f64) -> Option<f64> {
     // The sides at w of the two triangles that vanish keep their segments.
     let mut inherited = [(NONE, NONE); 2];
     let mut found = 0;
@@ -171,7 +186,7 @@ fn collapsed_price(sheet: &Sheet, v: u32, w: u32, ring: &[u32]) -> Option<f64> {
         }
         let k = x.corner(v);
         let (p, q) = (x.v[next(k)], x.v[last(k)]);
-        if !sheet.fits(w, p, q) || sheet.length(w, p).max(sheet.length(w, q)) > LONG {
+        if !sheet.fits(w, p, q) || sheet.length(w, p).max(sheet.length(w, q)) > longest {
             return None;
         }
         worst = worst.max(sheet.price_of([w, p, q], [x.segment[k], segment(q), segment(p)]));
@@ -208,25 +223,34 @@ pub(super) fn split(sheet: &mut Sheet, t: u32, i: usize, allowed: f64) -> Result
     let [p, a, b, d] = [x.v[i], x.v[next(i)], x.v[last(i)], sheet.mesh.at(u).v[j]];
     let [na, nb] = [a, b].map(|v| &sheet.nodes[v as usize]);
     let size = 0.5 * (na.size + nb.size);
-    let mut node = sheet.project(&nalgebra::center(&na.point, &nb.point))?;
-    node.size = node.size.min(size * (1.0 + sheet.settings.growth));
     let before = sheet.price_at(t).max(sheet.price_at(u));
-    let mut worst = 0.0_f64;
-    for (from, to) in [(p, a), (a, d), (d, b), (b, p)] {
-        let [from, to] = [from, to].map(|v| &sheet.nodes[v as usize]);
-        if sheet.chart.orient(&from.site, &to.site, &node.site) != Sign::Positive {
-            return Ok(false);
+    // The nearest point to the middle of the chord; where that is beyond the triangles, the middle of the chart's edge.
+    let places = [Some(nalgebra::center(&na.point, &nb.point)), sheet.chart.middle(&na.site, &nb.site)];
+    for place in places.into_iter().flatten() {
+        let mut node = sheet.project(&place)?;
+        node.size = node.size.min(size * (1.0 + sheet.settings.growth));
+        if fan_price(sheet, [p, a, d, b], &node).is_some_and(|worst| worst <= before.max(allowed)) {
+            let v = sheet.nodes.len() as u32;
+            sheet.nodes.push(node);
+            sheet.mesh.add_vertex();
+            sheet.insert_vertex(v, Place::OnSide(t, i));
+            return Ok(true);
         }
-        worst = worst.max(sheet.price([from, to, &node]));
     }
-    if worst > before.max(allowed) {
-        return Ok(false);
+    Ok(false)
+}
+
+/// The largest price of the triangles from the edges of a quadrilateral to a vertex; `None` if one does not fit the chart.
+fn fan_price(sheet: &Sheet, quadrilateral: [u32; 4], node: &Node) -> Option<f64> {
+    let mut worst = 0.0_f64;
+    for k in 0..4 {
+        let [from, to] = [k, (k + 1) % 4].map(|k| &sheet.nodes[quadrilateral[k] as usize]);
+        if sheet.chart.orient(&from.site, &to.site, &node.site) != Sign::Positive {
+            return None;
+        }
+        worst = worst.max(sheet.price([from, to, node]));
     }
-    let v = sheet.nodes.len() as u32;
-    sheet.nodes.push(node);
-    sheet.mesh.add_vertex();
-    sheet.insert_vertex(v, Place::OnSide(t, i));
-    Ok(true)
+    Some(worst)
 }
 
 /// Splits triangles that have two sides on one smooth curve, which would flatten as they are refined. Returns how many

@@ -4,8 +4,9 @@
 //! the **chart** of its surface (`chart`), in which the signs of triangles are exact:
 //!
 //! 1. `embed`: the triangulation of its boundary vertices in which all segments are edges, carved to the inside;
-//! 2. `front`: new vertices advance in layers from the boundary inward, at the distance that the size field wants;
-//! 3. `improve`: swaps, moves, collapses and splits, and the repair of triangles that would flatten in refinement.
+//! 2. `condition`: where that is far from parallel to the surface, it is cut first;
+//! 3. `front`: new vertices advance in layers from the boundary inward, at the distance that the size field wants;
+//! 4. `improve`: swaps, moves, collapses and splits, and the repair of triangles that would flatten in refinement.
 //!
 //! At every moment the triangles are an embedding in the chart, so no stage can leave a hole or an overlap. What is
 //! *not* guaranteed is the shape of triangles where segments are far longer than the gaps between curves; segments that cross
@@ -13,6 +14,7 @@
 
 mod chart;
 pub mod check;
+mod condition;
 pub mod curves;
 mod embed;
 mod front;

@@ -1,6 +1,7 @@
 //! Each patch with its part of the segments: meshed by itself, and all put together.
 
 use super::chart::{Chart, nappe, sheets};
+use super::condition::condition;
 use super::embed::{Fault, embed};
 use super::front::{Advanced, advance};
 use super::improve::{Improved, improve, repair_flattening};
@@ -394,6 +395,7 @@ impl<'a> Part<'a> {
         let seeds: Vec<_> = self.seeds.iter().map(|p| sheet.chart.site(self.surface, p)).collect();
         embed(sheet, &self.uses, &seeds)?;
         sheet.legalise_all();
+        condition(sheet, settings.max_vertices)?;
         self.advanced = advance(sheet, settings.max_vertices)?;
         if sheet.nodes.len() >= settings.max_vertices {
             return Err(Trouble::TooMany);

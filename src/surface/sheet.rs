@@ -78,8 +78,8 @@ const SMOOTH_COSINE: f64 = -0.996;
 /// meshed with three segments per circle cannot do better than 60°, with four it has 45°.
 const NORMAL_COSINE: f64 = 0.5;
 /// The price of a triangle per unit of cosine missing; more than any shape that is not degenerate.
-const NORMAL_PRICE: f64 = 1e4;
-/// The price of a triangle that looks away from the surface's normal.
+pub(super) const NORMAL_PRICE: f64 = 1e4;
+/// The price of a triangle that looks away from the surface's normal, also per sum of squared edges over squared size.
 const FOLDED_PRICE: f64 = 1e6;
 /// The price of two sides on one smooth curve.
 const FLATTENING_PRICE: f64 = 1e5;
@@ -200,10 +200,16 @@ impl<'a> Sheet<'a> {
         }
         let lacking = NORMAL_COSINE - least / double;
         if lacking <= 0.0 {
-            inverse
-        } else {
-            inverse + NORMAL_PRICE * lacking + if lacking >= NORMAL_COSINE { FOLDED_PRICE } else { 0.0 }
+            return inverse;
         }
+        let turned = inverse + NORMAL_PRICE * lacking;
+        if lacking < NORMAL_COSINE {
+            return turned;
+        }
+        // Folds come where a long edge has other vertices beside it in the chart than in space. Short edges undo that,
+        // even where they need more folded triangles on the way.
+        let size = (a.size + b.size + c.size) / 3.0;
+        turned + FOLDED_PRICE * (1.0 + squares / (size * size))
     }
 
     /// The price of a triangle given by its corners and the segments on its sides.
