@@ -45,7 +45,7 @@ impl Objective<'_> {
         if shape > 0.0 { shape - self.penalty(tet) } else { INVERTED }
     }
 
-    /// The score of the tet of a point inside a body and a face that looks at it.
+    /// The score of the tet of a point inside a body and then a face, outward.
     pub fn score_with_point(&self, points: &[Point], point: &Point, face: [u32; 3]) -> f64 {
         let [a, b, c] = face.map(|v| points[v as usize]);
         let shape = self.shape(&[*point, a, b, c]);
