@@ -19,6 +19,9 @@ const LARGEST_HOLE: usize = 48;
 /// The point is moved whenever the hole has grown by so many tets.
 const TETS_BETWEEN_MOVES: usize = 4;
 
+/// Growing ends when so many tets more did not give a better hole.
+const PATIENCE: usize = 16;
+
 /// The hole that is being grown and the best one seen; kept to spare allocations.
 #[derive(Default)]
 pub(super) struct Inserter {
@@ -57,13 +60,14 @@ impl Inserter {
             if self.hole.len() == seeds.len() || self.hole.len().is_multiple_of(TETS_BETWEEN_MOVES) {
                 self.move_point(complex, objective, smoother);
             }
-            let worst = self.worst_face();
-            if worst.score > self.worst {
-                self.worst = worst.score;
+            let worst = worst(self.faces.iter()).map_or(f64::NEG_INFINITY, |f| f.score);
+            if worst > self.worst {
+                self.worst = worst;
                 best = (self.hole.len(), self.point);
             }
-            let Some((next, _)) = worst.beyond else { break };
-            if self.hole.len() >= LARGEST_HOLE {
+            let open = self.faces.iter().filter(|f| f.beyond.is_some());
+            let Some((next, _)) = self::worst(open).and_then(|f| f.beyond) else { break };
+            if self.hole.len() >= LARGEST_HOLE || self.hole.len() > best.0 + PATIENCE {
                 break;
             }
             self.take(complex, objective, next);
@@ -119,11 +123,6 @@ impl Inserter {
         }
     }
 
-    /// The first of the faces with the least score.
-    fn worst_face(&self) -> Face {
-        self.faces[1..].iter().fold(self.faces[0], |worst, f| if f.score < worst.score { *f } else { worst })
-    }
-
     /// Adds a tet to the hole: faces that it shares with the hole vanish, its others become the hole's.
     fn take(&mut self, complex: &Complex, objective: &Objective, tet: u32) {
         self.hole.push(tet);
@@ -143,5 +142,59 @@ impl Inserter {
     fn keeps_fixed_vertices(&self, complex: &Complex) -> bool {
         let kept = |v: u32| complex.free[v as usize] || self.faces.iter().any(|f| f.vertices.contains(&v));
         self.hole.iter().all(|&t| complex.tets[t as usize].iter().all(|&v| kept(v)))
+    }
+}
+
+/// The first of the faces with the least score.
+fn worst<'a>(faces: impl Iterator<Item = &'a Face>) -> Option<&'a Face> {
+    faces.reduce(|worst, f| if f.score < worst.score { f } else { worst })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::improve::objective::Measure;
+    use crate::improve::samples::{cube, icosahedron};
+
+    const SHAPES: Objective = Objective { measure: Measure::MeanRatio, legality: None };
+
+    fn middle(complex: &Complex, tet: u32) -> Point {
+        let sum: crate::Vector = complex.corners(complex.tets[tet as usize]).iter().map(|p| p.coords).sum();
+        Point::from(sum / 4.0)
+    }
+
+    #[test]
+    fn an_icosahedron_gets_a_vertex_inside() {
+        for tet in 0..15 {
+            let mut complex = Complex::new(&icosahedron());
+            complex.score_all(&SHAPES);
+            let (mut inserter, mut smoother) = (Inserter::default(), Smoother::default());
+            let start = middle(&complex, tet);
+            assert!(inserter.find(&complex, &SHAPES, &mut smoother, &[tet], start), "from tet {tet}");
+            assert!(inserter.commit(&mut complex));
+            complex.check().unwrap();
+            // From some tets the first vertex leaves one of the fifteen tets standing.
+            assert!([20, 21].contains(&complex.living().count()), "from tet {tet}");
+        }
+    }
+
+    #[test]
+    fn insertions_raise_the_worst_and_keep_the_complex_valid() {
+        let mut complex = Complex::new(&cube(4, 1));
+        complex.score_all(&SHAPES);
+        let (mut inserter, mut smoother) = (Inserter::default(), Smoother::default());
+        let mut done = 0;
+        for tet in 0..complex.tets.len() as u32 {
+            if !complex.is_alive(tet) {
+                continue;
+            }
+            let start = middle(&complex, tet);
+            if inserter.find(&complex, &SHAPES, &mut smoother, &[tet], start) {
+                assert!(inserter.worst() > complex.worst_of(&inserter.hole));
+                done += usize::from(inserter.commit(&mut complex));
+            }
+        }
+        assert!(done > 0);
+        complex.check().unwrap();
     }
 }

@@ -190,3 +190,52 @@ impl Smoothness for UnitSphere {
         Vector::z().cross(&at.coords).try_normalize(0.0)
     }
 }
+
+/// An edge along z of length 2·`half`, vertices 0 above and 1 below, and `n` tets round it over the unit circle.
+/// Every face outside is a boundary triangle.
+pub(super) fn fan(n: usize, half: f64) -> Mesh {
+    let mut mesh = Mesh::default();
+    mesh.points.extend([Point::new(0., 0., half), Point::new(0., 0., -half)]);
+    for k in 0..n {
+        let (y, x) = (k as f64 * std::f64::consts::TAU / n as f64).sin_cos();
+        mesh.points.push(Point::new(x, y, 0.0));
+        mesh.tets.push([1, 0, 2 + k, 2 + (k + 1) % n].map(VertexId::new));
+    }
+    mesh.bodies = vec![BodyId(0); n];
+    mesh.classes = vec![Class::Body(BodyId(0)); n + 2];
+    classify(&mut mesh, |_, _| PatchId(0));
+    mesh
+}
+
+/// A regular icosahedron without a vertex inside: fifteen tets from one of its twelve vertices.
+pub(super) fn icosahedron() -> Mesh {
+    let mut mesh = Mesh::default();
+    let (one, golden) = (1.0, 0.5 + 1.25_f64.sqrt());
+    for [s, t] in [[1., 1.], [1., -1.], [-1., 1.], [-1., -1.]] {
+        mesh.points.push(Point::new(0.0, s * one, t * golden));
+        mesh.points.push(Point::new(s * one, t * golden, 0.0));
+        mesh.points.push(Point::new(t * golden, 0.0, s * one));
+    }
+    let near = |a: usize, b: usize| ((mesh.points[a] - mesh.points[b]).norm() - 2.0).abs() < 1e-9;
+    for a in 1..12 {
+        for b in a + 1..12 {
+            for c in b + 1..12 {
+                if near(a, b) && near(b, c) && near(a, c) && ![a, b, c].iter().all(|&v| near(0, v)) {
+                    let p = [a, b, c].map(|v| mesh.points[v]);
+                    let outward =
+                        crate::kernel::simplex::volume6(&Point::origin(), &p[0], &p[1], &p[2]) > 0.0;
+                    let tet = if outward { [0, a, b, c] } else { [0, a, c, b] };
+                    mesh.tets.push(tet.map(VertexId::new));
+                }
+            }
+        }
+    }
+    mesh.tets.retain(|t| {
+        let [a, b, c, d] = t.map(|v| mesh.points[v.index()]);
+        crate::kernel::simplex::volume6(&a, &b, &c, &d) > 1e-9
+    });
+    mesh.bodies = vec![BodyId(0); mesh.tets.len()];
+    mesh.classes = vec![Class::Body(BodyId(0)); 12];
+    classify(&mut mesh, |_, _| PatchId(0));
+    mesh
+}

@@ -55,6 +55,10 @@ pub struct Report {
     pub illegal_before: usize,
     /// Illegal tets that are left.
     pub illegal_left: usize,
+    /// Tets with a corner that would turn over, though they are legal, when refined and snapped; before.
+    pub folding_before: usize,
+    /// Such tets that are left.
+    pub folding_left: usize,
     /// Boundary triangles with two edges on one curve: they flatten too, and with them the tets behind them, which
     /// are not counted above. Only the surface mesh can mend them.
     pub illegal_triangles: usize,
@@ -101,13 +105,12 @@ fn run(mesh: &mut Mesh, size: &dyn SizeField, legality: Option<&Legality>, setti
     let mut report = Report { before: QualitySummary::of(mesh), ..Report::default() };
     let mut complex = Complex::new(mesh);
     let objective = Objective { measure: settings.measure, legality };
-    for t in 0..complex.tets.len() {
-        complex.scores[t] = objective.score(&complex.points, complex.tets[t]);
-    }
+    complex.score_all(&objective);
     let mut tools = Tools::default();
     if let Some(legality) = legality {
         report.illegal_before = illegal(&complex).count();
         report.illegal_triangles = legality.illegal_triangles();
+        report.folding_before = folding(&complex, legality);
         let Tools { swapper, smoother, inserter, .. } = &mut tools;
         let repairs = repair(&mut complex, &objective, swapper, inserter, smoother);
         report.swaps += repairs.swaps;
@@ -121,7 +124,10 @@ fn run(mesh: &mut Mesh, size: &dyn SizeField, legality: Option<&Legality>, setti
             break;
         }
     }
-    report.illegal_left = illegal(&complex).count();
+    if let Some(legality) = legality {
+        report.illegal_left = illegal(&complex).count();
+        report.folding_left = folding(&complex, legality);
+    }
     complex.store(mesh);
     report.after = QualitySummary::of(mesh);
     report
@@ -130,6 +136,15 @@ fn run(mesh: &mut Mesh, size: &dyn SizeField, legality: Option<&Legality>, setti
 /// The tets that are illegal by their score.
 fn illegal(complex: &Complex) -> impl Iterator<Item = u32> + '_ {
     complex.living().filter(|&t| complex.scores[t as usize] <= 0.0)
+}
+
+/// How many legal tets have a corner that turns over in the limit of refinement.
+fn folding(complex: &Complex, legality: &Legality) -> usize {
+    let turns = |t: u32| {
+        let tet = complex.tets[t as usize];
+        legality.limits(tet).is_some_and(|l| l.least_corner(&complex.corners(tet)) <= 0.0)
+    };
+    complex.living().filter(|&t| complex.scores[t as usize] > 0.0 && turns(t)).count()
 }
 
 /// The tets whose score is below `least` and that saw a change since the last pass began, the worst first.
