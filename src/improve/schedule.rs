@@ -106,21 +106,24 @@ fn run(mesh: &mut Mesh, size: &dyn SizeField, legality: Option<&Legality>, setti
     let mut complex = Complex::new(mesh);
     let objective = Objective { measure: settings.measure, legality };
     complex.score_all(&objective);
-    let mut tools = Tools::default();
     if let Some(legality) = legality {
         report.illegal_before = illegal(&complex).count();
         report.illegal_triangles = legality.illegal_triangles();
         report.folding_before = folding(&complex, legality);
-        let Tools { swapper, smoother, inserter, .. } = &mut tools;
-        let repairs = repair(&mut complex, &objective, swapper, inserter, smoother);
-        report.swaps += repairs.swaps;
-        report.insertions += repairs.splits;
     }
+    let mut tools = Tools::default();
     for pass in 1..=settings.passes {
         complex.pass = pass;
-        let changes = tools.pass(&mut complex, &objective, size, settings, &mut report);
         report.passes = pass;
-        if (changes as f64) < FEW_CHANGES * complex.tets.len() as f64 && pass > 1 {
+        let before = report.changes();
+        tools.smooth_and_swap(&mut complex, &objective, settings, &mut report);
+        if pass == 1 && legality.is_some() {
+            // After the swaps, which mend many without a new vertex.
+            tools.repair(&mut complex, &objective, &mut report);
+        }
+        tools.collapse_and_insert(&mut complex, &objective, size, settings, &mut report);
+        let changes = report.changes() - before;
+        if pass > 1 && (changes as f64) < FEW_CHANGES * complex.tets.len() as f64 {
             break;
         }
     }
@@ -163,32 +166,55 @@ fn is_fresh(complex: &Complex, vertex: u32) -> bool {
     complex.touched[vertex as usize] + 1 >= complex.pass
 }
 
+/// Whether the slot holds the tet that had this score: ids are used again.
+fn is_still(complex: &Complex, score: f64, tet: u32) -> bool {
+    complex.is_alive(tet) && complex.scores[tet as usize].to_bits() == score.to_bits()
+}
+
+impl Report {
+    fn changes(&self) -> usize {
+        self.moves + self.swaps + self.collapses + self.insertions
+    }
+}
+
 impl Tools {
-    /// Moves all vertices, then swaps, then collapses and inserts, the worst tets first. Gives the number of changes.
-    fn pass(
+    /// Moves all vertices, then swaps, the worst tets first.
+    fn smooth_and_swap(
+        &mut self,
+        complex: &mut Complex,
+        objective: &Objective,
+        settings: &Settings,
+        report: &mut Report,
+    ) {
+        for v in 0..complex.points.len() as u32 {
+            if is_fresh(complex, v) {
+                report.moves += usize::from(self.smoother.improve(complex, objective, v, settings.target));
+            }
+        }
+        for (score, t) in worst_first(complex, settings.target) {
+            if is_still(complex, score, t) {
+                report.swaps += usize::from(self.swapper.improve(complex, objective, t));
+            }
+        }
+    }
+
+    fn repair(&mut self, complex: &mut Complex, objective: &Objective, report: &mut Report) {
+        let repairs = repair(complex, objective, &mut self.swapper, &mut self.inserter, &mut self.smoother);
+        report.swaps += repairs.swaps;
+        report.insertions += repairs.splits;
+    }
+
+    /// Merges vertices and adds some, the worst tets first.
+    fn collapse_and_insert(
         &mut self,
         complex: &mut Complex,
         objective: &Objective,
         size: &dyn SizeField,
         settings: &Settings,
         report: &mut Report,
-    ) -> usize {
-        let before = report.moves + report.swaps + report.collapses + report.insertions;
-        for v in 0..complex.points.len() as u32 {
-            if is_fresh(complex, v) {
-                report.moves += usize::from(self.smoother.improve(complex, objective, v, settings.target));
-            }
-        }
-        let still = |complex: &Complex, score: f64, t: u32| {
-            complex.is_alive(t) && complex.scores[t as usize].to_bits() == score.to_bits()
-        };
-        for (score, t) in worst_first(complex, settings.target) {
-            if still(complex, score, t) {
-                report.swaps += usize::from(self.swapper.improve(complex, objective, t));
-            }
-        }
+    ) {
         for (score, t) in worst_first(complex, settings.change_below) {
-            if !still(complex, score, t) {
+            if !is_still(complex, score, t) {
                 continue;
             }
             if self.collapser.improve(complex, objective, size, t) {
@@ -197,7 +223,6 @@ impl Tools {
                 report.insertions += 1;
             }
         }
-        report.moves + report.swaps + report.collapses + report.insertions - before
     }
 
     fn insert(
