@@ -89,3 +89,38 @@ impl Collapser {
             .all(|&v| fits(complex.points[v as usize]))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::improve::objective::Measure;
+    use crate::improve::samples::cube;
+    use crate::size::UniformSize;
+
+    const SHAPES: Objective = Objective { measure: Measure::MeanRatio, legality: None };
+
+    fn collapse_all(size: f64) -> (usize, usize) {
+        let mut complex = Complex::new(&cube(5, 3));
+        complex.score_all(&SHAPES);
+        let (before, mut done) = (complex.living().count(), 0);
+        let mut collapser = Collapser::default();
+        for tet in 0..complex.tets.len() as u32 {
+            if complex.is_alive(tet) {
+                done += usize::from(collapser.improve(&mut complex, &SHAPES, &UniformSize(size), tet));
+            }
+        }
+        complex.check().unwrap();
+        (done, before - complex.living().count())
+    }
+
+    #[test]
+    fn collapses_take_tets_out_and_keep_the_complex_valid() {
+        let (done, fewer) = collapse_all(1.0);
+        assert!(done > 0 && fewer > done);
+    }
+
+    #[test]
+    fn no_collapse_makes_edges_too_long() {
+        assert_eq!(collapse_all(0.1), (0, 0));
+    }
+}

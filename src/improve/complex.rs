@@ -1,6 +1,7 @@
 //! The mesh while it is being improved: tets with neighbours, of which any cavity can be filled anew.
 
 use crate::Point;
+use crate::improve::objective::Objective;
 use crate::kernel::predicates::{Sign, orient3d};
 use crate::mesh::{Class, Mesh, TET_FACES, VertexId};
 use csg::BodyId;
@@ -238,7 +239,14 @@ impl Complex {
         tets.iter().map(|&t| self.scores[t as usize]).fold(f64::INFINITY, f64::min)
     }
 
-    /// Exactly positive.
+    /// Computes all scores.
+    pub fn score_all(&mut self, objective: &Objective) {
+        for (score, tet) in self.scores.iter_mut().zip(&self.tets).filter(|(_, tet)| tet[0] != NONE) {
+            *score = objective.score(&self.points, *tet);
+        }
+    }
+
+    /// Whether a tet, which need not be one of the complex, stands exactly positively.
     pub fn is_positive(&self, tet: [u32; 4]) -> bool {
         let [a, b, c, d] = self.corners(tet);
         orient3d(&a, &b, &c, &d) == Sign::Positive
@@ -447,4 +455,64 @@ pub(super) struct Ring {
     pub tets: Vec<u32>,
     /// The vertices, as many.
     pub vertices: Vec<u32>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::improve::samples::{cube, half_ball, two_boxes};
+    use crate::mesh::TET_EDGES;
+
+    #[test]
+    fn a_mesh_survives_being_taken_apart() {
+        for before in [cube(3, 1), two_boxes(4, 1), half_ball(4)] {
+            let complex = Complex::new(&before);
+            complex.check().unwrap();
+            let mut after = before.clone();
+            complex.store(&mut after);
+            assert_eq!(format!("{before:?}"), format!("{after:?}"));
+        }
+    }
+
+    #[test]
+    fn the_tets_of_a_ring_follow_its_vertices() {
+        let complex = Complex::new(&cube(3, 1));
+        let (mut ring, mut closed) = (Ring::default(), 0);
+        for tet in complex.living() {
+            for [i, j] in TET_EDGES {
+                if !complex.ring(tet, i, j, usize::MAX, &mut ring) {
+                    continue;
+                }
+                closed += 1;
+                let [a, b] = [i, j].map(|k| complex.tets[tet as usize][k]);
+                assert_eq!(ring.tets.len(), ring.vertices.len());
+                for (k, &t) in ring.tets.iter().enumerate() {
+                    let next = ring.vertices[(k + 1) % ring.vertices.len()];
+                    let expected = [a, b, ring.vertices[k], next];
+                    assert!(complex.is_positive(expected));
+                    assert!(expected.iter().all(|v| complex.tets[t as usize].contains(v)));
+                }
+            }
+        }
+        assert!(closed > 0);
+        assert!(!complex.ring(0, 0, 1, usize::MAX, &mut ring), "an edge of the cube has no closed ring");
+    }
+
+    #[test]
+    fn faces_between_bodies_and_of_the_hull_are_locked() {
+        let mesh = two_boxes(4, 1);
+        let complex = Complex::new(&mesh);
+        let faces = complex.living().flat_map(|t| (0..4).map(move |k| (t, k)));
+        let locked = faces.filter(|&(t, k)| complex.is_locked(t, k)).count();
+        let between = mesh.triangles.iter().filter(|t| t.patch.0 == 6).count();
+        assert_eq!(locked, mesh.triangles.len() + between);
+    }
+
+    #[test]
+    #[should_panic(expected = "leave the face")]
+    fn a_filling_with_other_faces_than_the_hole_is_refused() {
+        let mut complex = Complex::new(&cube(2, 1));
+        let tet = complex.tets[0];
+        complex.replace(&[0, 1], &[(tet, 0.5)]);
+    }
 }

@@ -16,6 +16,12 @@ use crate::mesh::TET_FACES;
 /// Tets in a hole at most: twice an ordinary star. Larger holes were not seen to win.
 const LARGEST_HOLE: usize = 48;
 
+/// The point is moved whenever the hole has grown by so many tets.
+const TETS_BETWEEN_MOVES: usize = 4;
+
+/// Growing ends when so many tets more did not give a better hole.
+const PATIENCE: usize = 16;
+
 /// The hole that is being grown and the best one seen; kept to spare allocations.
 #[derive(Default)]
 pub(super) struct Inserter {
@@ -36,8 +42,8 @@ struct Face {
 }
 
 impl Inserter {
-    /// Finds a hole that contains `seeds`, and a place in it for a vertex, near `point` at first, so that the
-    /// worst score rises. `point` must lie in the seeds, in the interior of their union. False if there is none.
+    /// Finds a hole that contains `seeds`, and a place in it for a vertex, `point` at first, so that the
+    /// worst score rises. `point` must lie in the interior of the seeds' union. False if there is none.
     pub fn find(
         &mut self,
         complex: &Complex,
@@ -47,17 +53,29 @@ impl Inserter {
         point: Point,
     ) -> bool {
         self.point = point;
-        self.grow(complex, objective, seeds);
-        if self.worst == f64::NEG_INFINITY {
-            return false;
+        self.begin(complex, objective, seeds);
+        self.worst = f64::NEG_INFINITY;
+        let mut best = (0, point);
+        loop {
+            if self.hole.len() == seeds.len() || self.hole.len().is_multiple_of(TETS_BETWEEN_MOVES) {
+                self.move_point(complex, objective, smoother);
+            }
+            let worst = worst(self.faces.iter()).map_or(f64::NEG_INFINITY, |f| f.score);
+            if worst > self.worst {
+                self.worst = worst;
+                best = (self.hole.len(), self.point);
+            }
+            let open = self.faces.iter().filter(|f| f.beyond.is_some());
+            let Some((next, _)) = self::worst(open).and_then(|f| f.beyond) else { break };
+            if self.hole.len() >= LARGEST_HOLE || self.hole.len() > best.0 + PATIENCE {
+                break;
+            }
+            self.take(complex, objective, next);
         }
-        // Once more from the place that suits this hole: it may want another hole.
-        self.point = smoother.best_place(complex, objective, self.faces.iter().map(|f| f.vertices), point);
-        self.grow(complex, objective, seeds);
-        if self.worst <= complex.worst_of(&self.hole) + LEAST_GAIN {
-            return false;
-        }
-        self.keeps_fixed_vertices(complex)
+        let hole: Vec<u32> = self.hole[..best.0].to_vec();
+        self.point = best.1;
+        self.begin(complex, objective, &hole);
+        self.worst > complex.worst_of(&self.hole) + LEAST_GAIN && self.keeps_fixed_vertices(complex)
     }
 
     /// The least score among the tets round the new vertex.
@@ -88,43 +106,21 @@ impl Inserter {
         done
     }
 
-    /// Grows the hole from the seeds and cuts it back to the best one seen.
-    fn grow(&mut self, complex: &Complex, objective: &Objective, seeds: &[u32]) {
+    fn begin(&mut self, complex: &Complex, objective: &Objective, tets: &[u32]) {
         self.hole.clear();
         self.faces.clear();
-        for &tet in seeds {
+        for &tet in tets {
             self.take(complex, objective, tet);
         }
-        let mut best = (f64::NEG_INFINITY, self.hole.len());
-        loop {
-            let worst = self.worst_face();
-            if worst.1 > best.0 {
-                best = (worst.1, self.hole.len());
-            }
-            let Some((next, _)) = self.faces[worst.0].beyond else { break };
-            if self.hole.len() == LARGEST_HOLE {
-                break;
-            }
-            self.take(complex, objective, next);
-        }
-        if best.1 < self.hole.len() {
-            self.faces.clear();
-            let tets: Vec<u32> = self.hole.drain(..).take(best.1).collect();
-            for tet in tets {
-                self.take(complex, objective, tet);
-            }
-        }
-        self.worst = best.0;
     }
 
-    fn worst_face(&self) -> (usize, f64) {
-        let mut worst = (0, f64::INFINITY);
-        for (k, face) in self.faces.iter().enumerate() {
-            if face.score < worst.1 {
-                worst = (k, face.score);
-            }
+    /// Moves the point to where it suits the present hole: with it, the hole may want to grow elsewhere.
+    fn move_point(&mut self, complex: &Complex, objective: &Objective, smoother: &mut Smoother) {
+        let faces = self.faces.iter().map(|f| f.vertices);
+        self.point = smoother.best_place(complex, objective, faces, self.point);
+        for face in &mut self.faces {
+            face.score = objective.score_with_point(&complex.points, &self.point, face.vertices);
         }
-        worst
     }
 
     /// Adds a tet to the hole: faces that it shares with the hole vanish, its others become the hole's.
@@ -135,9 +131,8 @@ impl Inserter {
                 self.faces.swap_remove(old);
                 continue;
             }
-            // Outward of the tet, so that the tet of the reversed face and a point inside is positive.
-            let [a, b, c] = corners.map(|i| complex.tets[tet as usize][i]);
-            let vertices = [a, c, b];
+            // Outward of the hole: a point inside and then the face make a positive tet.
+            let vertices = corners.map(|i| complex.tets[tet as usize][i]);
             let score = objective.score_with_point(&complex.points, &self.point, vertices);
             self.faces.push(Face { vertices, beyond: complex.neighbour(tet, k), score });
         }
@@ -147,5 +142,59 @@ impl Inserter {
     fn keeps_fixed_vertices(&self, complex: &Complex) -> bool {
         let kept = |v: u32| complex.free[v as usize] || self.faces.iter().any(|f| f.vertices.contains(&v));
         self.hole.iter().all(|&t| complex.tets[t as usize].iter().all(|&v| kept(v)))
+    }
+}
+
+/// The first of the faces with the least score.
+fn worst<'a>(faces: impl Iterator<Item = &'a Face>) -> Option<&'a Face> {
+    faces.reduce(|worst, f| if f.score < worst.score { f } else { worst })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::improve::objective::Measure;
+    use crate::improve::samples::{cube, icosahedron};
+
+    const SHAPES: Objective = Objective { measure: Measure::MeanRatio, legality: None };
+
+    fn middle(complex: &Complex, tet: u32) -> Point {
+        let sum: crate::Vector = complex.corners(complex.tets[tet as usize]).iter().map(|p| p.coords).sum();
+        Point::from(sum / 4.0)
+    }
+
+    #[test]
+    fn an_icosahedron_gets_a_vertex_inside() {
+        for tet in 0..15 {
+            let mut complex = Complex::new(&icosahedron());
+            complex.score_all(&SHAPES);
+            let (mut inserter, mut smoother) = (Inserter::default(), Smoother::default());
+            let start = middle(&complex, tet);
+            assert!(inserter.find(&complex, &SHAPES, &mut smoother, &[tet], start), "from tet {tet}");
+            assert!(inserter.commit(&mut complex));
+            complex.check().unwrap();
+            // From some tets the first vertex leaves one of the fifteen tets standing.
+            assert!([20, 21].contains(&complex.living().count()), "from tet {tet}");
+        }
+    }
+
+    #[test]
+    fn insertions_raise_the_worst_and_keep_the_complex_valid() {
+        let mut complex = Complex::new(&cube(4, 1));
+        complex.score_all(&SHAPES);
+        let (mut inserter, mut smoother) = (Inserter::default(), Smoother::default());
+        let mut done = 0;
+        for tet in 0..complex.tets.len() as u32 {
+            if !complex.is_alive(tet) {
+                continue;
+            }
+            let start = middle(&complex, tet);
+            if inserter.find(&complex, &SHAPES, &mut smoother, &[tet], start) {
+                assert!(inserter.worst() > complex.worst_of(&inserter.hole));
+                done += usize::from(inserter.commit(&mut complex));
+            }
+        }
+        assert!(done > 0);
+        complex.check().unwrap();
     }
 }

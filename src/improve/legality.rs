@@ -13,6 +13,10 @@
 //! as no tangent plane is there: [`Smoothness::normal`] says so. A tet whose four vertices
 //! lie on one patch is legal as long as enough of its edges run inside.
 //!
+//! Where fewer edges lie on the boundary a corner of a tet may still turn over, for instance over a hollow surface
+//! that is steeper than the tet's edge inside. [`TetLimits`] holds the directions that all edges tend to,
+//! and measures what is left of each corner.
+//!
 //! Compare NETGEN's illegal tets and Zienkiewicz's rule for curved quadratic elements, which
 //! forbid the same for the same reason.
 
@@ -48,6 +52,10 @@ const TANGENT_SURFACES: f64 = 1e-4;
 /// Planes and lines at less than this angle (as a sine; 5°) count as tangent. Tangent blends come with
 /// rounding errors only (10⁻⁸); a corner of 175° can be meshed, but no tet should bridge it.
 const TANGENT_SINE: f64 = 0.087;
+
+/// Edges that turn by less than this (as a sine; half a degree) when refined count as straight: the measure would
+/// change by less than that.
+const STRAIGHT_SINE: f64 = 0.0087;
 
 impl Smoothness for GeometrySmoothness<'_> {
     fn normal(&self, patch: PatchId, at: &Point) -> Option<Vector> {
@@ -92,6 +100,8 @@ struct Spoke {
     planes: u64,
     /// The tangent lines likewise.
     lines: u64,
+    /// The direction in which the refined edge will leave the vertex, if not as it does now.
+    limit: Option<Vector>,
 }
 
 /// The boundary edges of a mesh and what they are tangent to at their ends. Improvement keeps the boundary, so it stays true.
@@ -133,13 +143,20 @@ impl Legality {
                 lines.add(curve.and_then(|c| smoothness.tangent(c, at)));
             }
             for edge in at_vertex.chunk_by(|a, b| a.1 == b.1) {
-                let mut spoke = Spoke { to: edge[0].1.0, planes: 0, lines: 0 };
+                let along = mesh.points[edge[0].1.index()] - at;
+                let mut spoke = Spoke { to: edge[0].1.0, planes: 0, lines: 0, limit: None };
                 for (_, _, patch, curve) in edge {
-                    spoke.planes |= planes.bits(patch.and_then(|p| smoothness.normal(p, at)));
+                    let normal = patch.and_then(|p| smoothness.normal(p, at));
+                    spoke.planes |= planes.bits(normal);
                     let tangent = curve.and_then(|c| smoothness.tangent(c, at));
                     spoke.lines |= lines.bits(tangent);
                     spoke.planes |= planes.bits_orthogonal(tangent);
+                    // A curve comes after the patches (`None` is less), and knows better.
+                    let in_plane = normal.map(|n| along - n * n.dot(&along));
+                    let limit = tangent.map(|t| t * t.dot(&along)).or(in_plane);
+                    spoke.limit = limit.and_then(|l| l.try_normalize(0.0)).or(spoke.limit);
                 }
+                spoke.limit = spoke.limit.filter(|l| l.cross(&along).norm() > STRAIGHT_SINE * along.norm());
                 legality.spokes.push(spoke);
             }
             legality.starts[vertex + 1] = legality.spokes.len() as u32;
@@ -163,9 +180,27 @@ impl Legality {
         }
     }
 
+    fn spoke(&self, from: u32, to: u32) -> Option<&Spoke> {
+        self.spokes(from).iter().find(|s| s.to == to)
+    }
+
     fn tangents(&self, from: u32, to: u32) -> (u64, u64) {
-        let spoke = self.spokes(from).iter().find(|s| s.to == to);
-        spoke.map_or((0, 0), |s| (s.planes, s.lines))
+        self.spoke(from, to).map_or((0, 0), |s| (s.planes, s.lines))
+    }
+
+    /// Where the edges of a tet tend to; `None` if all of them stay straight. A vertex that is not in
+    /// the mesh yet counts as one inside.
+    pub fn limits(&self, tet: [u32; 4]) -> Option<TetLimits> {
+        if tet.iter().filter(|&&v| self.spokes(v).is_empty()).count() > 2 {
+            return None;
+        }
+        let mut limits = TetLimits([[None; 3]; 4]);
+        for (k, corner) in limits.0.iter_mut().enumerate() {
+            for (m, limit) in corner.iter_mut().enumerate() {
+                *limit = self.spoke(tet[k], tet[(k + 1 + m) % 4]).and_then(|s| s.limit);
+            }
+        }
+        limits.0.iter().flatten().any(Option::is_some).then_some(limits)
     }
 
     /// The boundary triangles that flatten at a vertex when refined: no change inside can mend them or the tets behind them.
@@ -202,6 +237,40 @@ fn sorted(mut key: [u32; 3]) -> [u32; 3] {
     key
 }
 
+/// The directions in which the edges of a tet leave its corner k, to the vertices k+1, k+2, k+3 (mod 4), when it has
+/// been refined and snapped for ever; `None` for as they do now.
+#[derive(Clone, Debug)]
+pub(super) struct TetLimits([[Option<Vector>; 3]; 4]);
+
+/// What must be left of a corner for it to count as unharmed.
+const UNHARMED: f64 = 0.5;
+
+/// How much less a tet is worth as its worst corner shrinks below [`UNHARMED`]: at zero a fifth.
+const HARM: f64 = 8.0;
+
+impl TetLimits {
+    /// The least part of a corner that is left in the limit, where a corner is measured by the volume that
+    /// its three unit vectors span: 1 if nothing bends, 0 or less if a corner flattens or turns over.
+    pub fn least_corner(&self, p: &[Point; 4]) -> f64 {
+        let mut least = 1.0_f64;
+        for (k, corner) in self.0.iter().enumerate() {
+            if corner.iter().all(Option::is_none) {
+                continue;
+            }
+            let now = [1, 2, 3].map(|m| (p[(k + m) % 4] - p[k]).normalize());
+            let then = [0, 1, 2].map(|m| corner[m].unwrap_or(now[m]));
+            let span = |d: &[Vector; 3]| d[0].cross(&d[1]).dot(&d[2]);
+            least = least.min(span(&then) / span(&now));
+        }
+        least
+    }
+
+    /// What the shape of the tet is to be multiplied with: 1 if no corner suffers much, never 0.
+    pub fn factor(&self, p: &[Point; 4]) -> f64 {
+        1.0 / (1.0 + HARM * (UNHARMED - self.least_corner(p)).max(0.0))
+    }
+}
+
 /// The different directions at one vertex, up to sign; parallel ones are one. At most 64: more tangent planes
 /// than bits do not meet at a vertex of any solid we know; those beyond would only go unnoticed.
 #[derive(Default)]
@@ -228,5 +297,95 @@ impl Directions {
     fn matching(&self, direction: Option<Vector>, test: impl Fn(&Vector, &Vector) -> bool) -> u64 {
         let Some(d) = direction else { return 0 };
         self.0.iter().enumerate().filter(|(_, e)| test(&d, e)).map(|(k, _)| 1 << k).sum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::improve::samples::{UnitSphere, ball, half_ball};
+    use crate::mesh::Mesh;
+
+    /// Corners of three orthogonal edges on a patch each, or on curves: patch k has the normal k says.
+    struct Planes([Vector; 4]);
+
+    impl Smoothness for Planes {
+        fn normal(&self, patch: PatchId, _: &Point) -> Option<Vector> {
+            Some(self.0[patch.index()])
+        }
+        fn tangent(&self, _: CurveId, _: &Point) -> Option<Vector> {
+            None
+        }
+    }
+
+    /// One tet, its four faces on patches 0 to 3, opposite the vertex of the same number.
+    fn one_tet() -> Mesh {
+        let mut mesh = crate::improve::samples::fan(3, 1.0);
+        let tet = mesh.tets[0];
+        mesh.tets.truncate(1);
+        mesh.triangles = (0..4)
+            .map(|k| crate::mesh::BoundaryTriangle {
+                vertices: TET_FACES[k].map(|i| tet[i]),
+                patch: PatchId(k as u32),
+            })
+            .collect();
+        mesh
+    }
+
+    #[test]
+    fn two_faces_on_tangent_patches_are_illegal() {
+        let mesh = one_tet();
+        let tet = mesh.tets[0].map(|v| v.0);
+        let (x, y, z) = (Vector::x(), Vector::y(), Vector::z());
+        let other = Vector::new(0.6, 0.0, 0.8);
+        assert!(!Legality::new(&mesh, &Planes([x, y, z, other])).is_illegal(tet));
+        assert!(Legality::new(&mesh, &Planes([x, y, z, z])).is_illegal(tet), "tangent");
+        assert!(Legality::new(&mesh, &Planes([x, y, z, -z])).is_illegal(tet), "of either sign");
+        let nearly = Vector::new(0.02, 0.0, 1.0).normalize();
+        assert!(Legality::new(&mesh, &Planes([x, y, z, nearly])).is_illegal(tet), "nearly tangent");
+    }
+
+    #[test]
+    fn the_apex_of_a_cone_has_no_tangent_plane() {
+        let cone =
+            csg::primitive::Cone { point: Point::origin(), axis: Vector::z(), radius: 1.0, slope: -0.5 };
+        let geometry = Geometry { surfaces: vec![Surface::Cone(cone)], ..Geometry::default() };
+        let bounds = csg::Aabb { min: Point::origin(), max: Point::origin() };
+        let features = Features { corners: vec![], curves: vec![], patches: vec![], bounds };
+        let smoothness = GeometrySmoothness { geometry: &geometry, features: &features };
+        assert_eq!(smoothness.surface_normal(&geometry.surfaces[0], &Point::new(0.0, 0.0, 2.0)), None);
+    }
+
+    #[test]
+    fn the_tets_along_the_edges_of_a_cube_made_round_are_illegal() {
+        let mesh = ball(4);
+        let legality = Legality::new(&mesh, &UnitSphere);
+        let on_sphere = |t: &[VertexId; 4]| {
+            let key = |f: [usize; 3]| sorted(f.map(|k| t[k].0));
+            let faces: Vec<_> = mesh.triangles.iter().map(|t| sorted(t.vertices.map(|v| v.0))).collect();
+            TET_FACES.iter().filter(|f| faces.contains(&key(**f))).count()
+        };
+        let mut illegal = 0;
+        for tet in &mesh.tets {
+            let verdict = legality.is_illegal(tet.map(|v| v.0));
+            illegal += usize::from(verdict);
+            assert!(verdict || on_sphere(tet) < 2, "{tet:?} has two faces on the sphere");
+        }
+        assert!(illegal > 0);
+        assert_eq!(legality.illegal_triangles(), 0, "a sphere has no curves");
+    }
+
+    #[test]
+    fn triangles_with_two_edges_on_a_rim_are_counted() {
+        let mesh = half_ball(4);
+        let legality = Legality::new(&mesh, &UnitSphere);
+        let triangles = mesh.triangles.iter().filter(|t| {
+            let on = |a: VertexId, b: VertexId| {
+                mesh.segments.iter().any(|s| s.vertices == [a, b] || s.vertices == [b, a])
+            };
+            let [a, b, c] = t.vertices;
+            usize::from(on(a, b)) + usize::from(on(b, c)) + usize::from(on(c, a)) > 1
+        });
+        assert_eq!(legality.illegal_triangles(), triangles.count());
     }
 }

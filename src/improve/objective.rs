@@ -1,7 +1,8 @@
 //! What a tet is worth: its shape, and below every shape the illegal ones.
 
 use crate::Point;
-use crate::improve::legality::Legality;
+use crate::improve::complex::NONE;
+use crate::improve::legality::{Legality, TetLimits};
 use crate::kernel::quality::{Diagonal, squared_lengths, worst_child_squares};
 use crate::kernel::simplex::{area_vector, volume6};
 use crate::{Vector, mesh::TET_FACES};
@@ -26,6 +27,9 @@ pub(super) const INVERTED: f64 = f64::NEG_INFINITY;
 /// What is taken off the score of an illegal tet: more than any shape can make up for.
 const ILLEGAL: f64 = 1.0;
 
+/// The step of a difference quotient, in units of an edge: half the digits for the step, half for the difference.
+const DIFFERENCE: f64 = 1e-7;
+
 /// Refined quality of the regular tet.
 const REGULAR_REFINED: f64 = 6.0 / 7.0;
 
@@ -41,14 +45,20 @@ pub(super) struct Objective<'a> {
 impl Objective<'_> {
     /// The score of a tet.
     pub fn score(&self, points: &[Point], tet: [u32; 4]) -> f64 {
-        let shape = self.shape(&tet.map(|v| points[v as usize]));
+        let shape = self.shape_with_limits(&tet.map(|v| points[v as usize]), self.limits(tet).as_ref());
         if shape > 0.0 { shape - self.penalty(tet) } else { INVERTED }
     }
 
-    /// The score of the tet of a point inside a body and a face that looks at it.
+    /// Where the edges of a tet tend to, if any bends and legality matters.
+    pub fn limits(&self, tet: [u32; 4]) -> Option<TetLimits> {
+        self.legality.and_then(|l| l.limits(tet))
+    }
+
+    /// The score of the tet of a point inside a body and then a face, outward.
     pub fn score_with_point(&self, points: &[Point], point: &Point, face: [u32; 3]) -> f64 {
         let [a, b, c] = face.map(|v| points[v as usize]);
-        let shape = self.shape(&[*point, a, b, c]);
+        let limits = self.limits([NONE, face[0], face[1], face[2]]);
+        let shape = self.shape_with_limits(&[*point, a, b, c], limits.as_ref());
         // No edge at the point lies on the boundary, so that only the face can make the tet illegal.
         let illegal = self.legality.is_some_and(|l| l.is_illegal_triangle(face));
         if shape > 0.0 { shape - if illegal { ILLEGAL } else { 0.0 } } else { INVERTED }
@@ -64,9 +74,32 @@ impl Objective<'_> {
         if self.legality.is_some_and(|l| l.is_illegal(tet)) { ILLEGAL } else { 0.0 }
     }
 
+    /// The shape of a tet, less what its corners lose in the limit of refinement.
+    pub fn shape_with_limits(&self, p: &[Point; 4], limits: Option<&TetLimits>) -> f64 {
+        let shape = self.shape(p);
+        match limits {
+            Some(limits) if shape > 0.0 => shape * limits.factor(p),
+            _ => shape,
+        }
+    }
+
+    /// The same, and how it changes as the first vertex moves.
+    pub fn gradient_with_limits(&self, p: &[Point; 4], limits: Option<&TetLimits>) -> (f64, Vector) {
+        let (shape, gradient) = self.shape_and_gradient(p);
+        let Some(limits) = limits.filter(|_| shape > 0.0) else { return (shape, gradient) };
+        let factor = limits.factor(p);
+        let step = DIFFERENCE * (p[1] - p[0]).norm();
+        let ahead = Vector::from_fn(|axis, _| {
+            let mut q = *p;
+            q[0][axis] += step;
+            limits.factor(&q)
+        });
+        (shape * factor, gradient * factor + ahead.add_scalar(-factor) * (shape / step))
+    }
+
     /// The shape of a tet, not positive if it does not stand positively.
     #[inline]
-    pub fn shape(&self, p: &[Point; 4]) -> f64 {
+    fn shape(&self, p: &[Point; 4]) -> f64 {
         let v6 = volume6(&p[0], &p[1], &p[2], &p[3]);
         if v6.is_nan() || v6 <= 0.0 {
             return 0.0;
@@ -76,7 +109,7 @@ impl Objective<'_> {
     }
 
     /// The shape, and how it changes as the first vertex moves.
-    pub fn shape_and_gradient(&self, p: &[Point; 4]) -> (f64, Vector) {
+    fn shape_and_gradient(&self, p: &[Point; 4]) -> (f64, Vector) {
         let v6 = volume6(&p[0], &p[1], &p[2], &p[3]);
         if v6.is_nan() || v6 <= 0.0 {
             return (0.0, Vector::zeros());

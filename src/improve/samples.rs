@@ -1,6 +1,7 @@
 //! Meshes to be improved in tests.
 
 use crate::improve::Smoothness;
+use crate::kernel::quality::mean_ratio;
 use crate::mesh::{BoundaryTriangle, Class, Mesh, Segment, TET_FACES, VertexId};
 use crate::{Point, Vector};
 use csg::{BodyId, CurveId, PatchId};
@@ -189,4 +190,126 @@ impl Smoothness for UnitSphere {
     fn tangent(&self, _: CurveId, at: &Point) -> Option<Vector> {
         Vector::z().cross(&at.coords).try_normalize(0.0)
     }
+}
+
+/// An edge along z of length 2·`half`, vertices 0 above and 1 below, and `n` tets round it over the unit circle.
+/// Every face outside is a boundary triangle.
+pub(super) fn fan(n: usize, half: f64) -> Mesh {
+    let mut mesh = Mesh::default();
+    mesh.points.extend([Point::new(0., 0., half), Point::new(0., 0., -half)]);
+    for k in 0..n {
+        let (y, x) = (k as f64 * std::f64::consts::TAU / n as f64).sin_cos();
+        mesh.points.push(Point::new(x, y, 0.0));
+        mesh.tets.push([1, 0, 2 + k, 2 + (k + 1) % n].map(VertexId::new));
+    }
+    mesh.bodies = vec![BodyId(0); n];
+    mesh.classes = vec![Class::Body(BodyId(0)); n + 2];
+    classify(&mut mesh, |_, _| PatchId(0));
+    mesh
+}
+
+/// A regular icosahedron without a vertex inside: fifteen tets from one of its twelve vertices.
+pub(super) fn icosahedron() -> Mesh {
+    let mut mesh = Mesh::default();
+    let (one, golden) = (1.0, 0.5 + 1.25_f64.sqrt());
+    for [s, t] in [[1., 1.], [1., -1.], [-1., 1.], [-1., -1.]] {
+        mesh.points.push(Point::new(0.0, s * one, t * golden));
+        mesh.points.push(Point::new(s * one, t * golden, 0.0));
+        mesh.points.push(Point::new(t * golden, 0.0, s * one));
+    }
+    let near = |a: usize, b: usize| ((mesh.points[a] - mesh.points[b]).norm() - 2.0).abs() < 1e-9;
+    for a in 1..12 {
+        for b in a + 1..12 {
+            for c in b + 1..12 {
+                if near(a, b) && near(b, c) && near(a, c) && ![a, b, c].iter().all(|&v| near(0, v)) {
+                    let p = [a, b, c].map(|v| mesh.points[v]);
+                    let outward =
+                        crate::kernel::simplex::volume6(&Point::origin(), &p[0], &p[1], &p[2]) > 0.0;
+                    let tet = if outward { [0, a, b, c] } else { [0, a, c, b] };
+                    mesh.tets.push(tet.map(VertexId::new));
+                }
+            }
+        }
+    }
+    mesh.tets.retain(|t| {
+        let [a, b, c, d] = t.map(|v| mesh.points[v.index()]);
+        crate::kernel::simplex::volume6(&a, &b, &c, &d) > 1e-9
+    });
+    mesh.bodies = vec![BodyId(0); mesh.tets.len()];
+    mesh.classes = vec![Class::Body(BodyId(0)); 12];
+    classify(&mut mesh, |_, _| PatchId(0));
+    mesh
+}
+
+/// Patch 0 is a sphere round the origin, the others are the sides of a cube.
+pub(super) struct HollowCube;
+
+impl Smoothness for HollowCube {
+    fn normal(&self, patch: PatchId, at: &Point) -> Option<Vector> {
+        match patch.0 {
+            0 => at.coords.try_normalize(0.0),
+            k => Some([Vector::x(), Vector::y(), Vector::z()][(k as usize - 1) / 2]),
+        }
+    }
+
+    fn tangent(&self, _: CurveId, _: &Point) -> Option<Vector> {
+        None
+    }
+}
+
+/// A cube with a hole: a ball of radius 1/2 on patch 0, the sides on patches 1 to 6. `n` is a multiple of 4.
+pub(super) fn hollow_cube(n: usize) -> Mesh {
+    let mut mesh = lattice(n);
+    let inside = |t: &[VertexId; 4]| {
+        let middle: Vector = t.iter().map(|v| mesh.points[v.index()].coords).sum();
+        middle.amax() < 4.0 * 0.5
+    };
+    mesh.tets = mesh.tets.iter().copied().filter(|t| !inside(t)).collect();
+    mesh.bodies.truncate(mesh.tets.len());
+    let on_ball = |p: &[Point; 3]| p.iter().all(|q| q.coords.amax() < 0.75);
+    classify(&mut mesh, |p, _| if on_ball(&p) { PatchId(0) } else { PatchId(1 + cube_side(&p).0) });
+    for p in &mut mesh.points {
+        let shell = p.coords.amax().clamp(0.5, 1.0);
+        let round = p.coords * (shell / p.coords.norm().max(0.1));
+        let outward = 2.0 * shell - 1.0;
+        p.coords = p.coords * outward + round * (1.0 - outward);
+    }
+    mesh
+}
+
+/// Each tet cut into eight at its midpoints; those on patch 0 are moved to the sphere of that radius.
+pub(super) fn refined_on_sphere(mesh: &Mesh, radius: f64) -> Mesh {
+    let mut fine = Mesh { points: mesh.points.clone(), bodies: vec![], ..Mesh::default() };
+    let mut middles: BTreeMap<[VertexId; 2], VertexId> = BTreeMap::new();
+    let mut middle = |points: &mut Vec<Point>, a: VertexId, b: VertexId, round: bool| {
+        *middles.entry([a.min(b), a.max(b)]).or_insert_with(|| {
+            let p = nalgebra::center(&points[a.index()], &points[b.index()]);
+            points.push(if round { p * (radius / p.coords.norm()) } else { p });
+            VertexId::new(points.len() - 1)
+        })
+    };
+    for round in [true, false] {
+        for t in mesh.triangles.iter().filter(|t| (t.patch == PatchId(0)) == round) {
+            let [a, b, c] = t.vertices;
+            let [ab, bc, ca] = [(a, b), (b, c), (c, a)].map(|(a, b)| middle(&mut fine.points, a, b, round));
+            for vertices in [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]] {
+                fine.triangles.push(BoundaryTriangle { vertices, patch: t.patch });
+            }
+        }
+    }
+    for &[a, b, c, d] in &mesh.tets {
+        let pairs = [(a, b), (a, c), (a, d), (b, c), (b, d), (c, d)];
+        let [ab, ac, ad, bc, bd, cd] = pairs.map(|(a, b)| middle(&mut fine.points, a, b, false));
+        fine.tets.extend([[a, ab, ac, ad], [ab, b, bc, bd], [ac, bc, c, cd], [ad, bd, cd, d]]);
+        let rings = [(ab, cd, [ac, bc, bd, ad]), (ac, bd, [ad, cd, bc, ab]), (ad, bc, [ab, bd, cd, ac])];
+        let four = rings.map(|(p, q, r)| [0, 1, 2, 3].map(|k| [p, q, r[(k + 1) % 4], r[k]]));
+        let worst = |tets: &[[VertexId; 4]; 4]| {
+            let corners = tets.iter().map(|t| t.map(|v| fine.points[v.index()]));
+            corners.map(|[a, b, c, d]| mean_ratio(&a, &b, &c, &d)).fold(f64::INFINITY, f64::min)
+        };
+        let best = four.iter().max_by(|a, b| worst(a).total_cmp(&worst(b)));
+        fine.tets.extend(best.into_iter().flatten());
+    }
+    fine.bodies = vec![BodyId(0); fine.tets.len()];
+    fine
 }

@@ -55,6 +55,10 @@ pub struct Report {
     pub illegal_before: usize,
     /// Illegal tets that are left.
     pub illegal_left: usize,
+    /// Tets with a corner that would turn over, though they are legal, when refined and snapped; before.
+    pub folding_before: usize,
+    /// Such tets that are left.
+    pub folding_left: usize,
     /// Boundary triangles with two edges on one curve: they flatten too, and with them the tets behind them, which
     /// are not counted above. Only the surface mesh can mend them.
     pub illegal_triangles: usize,
@@ -101,27 +105,32 @@ fn run(mesh: &mut Mesh, size: &dyn SizeField, legality: Option<&Legality>, setti
     let mut report = Report { before: QualitySummary::of(mesh), ..Report::default() };
     let mut complex = Complex::new(mesh);
     let objective = Objective { measure: settings.measure, legality };
-    for t in 0..complex.tets.len() {
-        complex.scores[t] = objective.score(&complex.points, complex.tets[t]);
-    }
-    let mut tools = Tools::default();
+    complex.score_all(&objective);
     if let Some(legality) = legality {
         report.illegal_before = illegal(&complex).count();
         report.illegal_triangles = legality.illegal_triangles();
-        let Tools { swapper, smoother, inserter, .. } = &mut tools;
-        let repairs = repair(&mut complex, &objective, swapper, inserter, smoother);
-        report.swaps += repairs.swaps;
-        report.insertions += repairs.splits;
+        report.folding_before = folding(&complex, legality);
     }
+    let mut tools = Tools::default();
     for pass in 1..=settings.passes {
         complex.pass = pass;
-        let changes = tools.pass(&mut complex, &objective, size, settings, &mut report);
         report.passes = pass;
-        if (changes as f64) < FEW_CHANGES * complex.tets.len() as f64 && pass > 1 {
+        let before = report.changes();
+        tools.smooth_and_swap(&mut complex, &objective, settings, &mut report);
+        if pass == 1 && legality.is_some() {
+            // After the swaps, which mend many without a new vertex.
+            tools.repair(&mut complex, &objective, &mut report);
+        }
+        tools.collapse_and_insert(&mut complex, &objective, size, settings, &mut report);
+        let changes = report.changes() - before;
+        if pass > 1 && (changes as f64) < FEW_CHANGES * complex.tets.len() as f64 {
             break;
         }
     }
-    report.illegal_left = illegal(&complex).count();
+    if let Some(legality) = legality {
+        report.illegal_left = illegal(&complex).count();
+        report.folding_left = folding(&complex, legality);
+    }
     complex.store(mesh);
     report.after = QualitySummary::of(mesh);
     report
@@ -130,6 +139,15 @@ fn run(mesh: &mut Mesh, size: &dyn SizeField, legality: Option<&Legality>, setti
 /// The tets that are illegal by their score.
 fn illegal(complex: &Complex) -> impl Iterator<Item = u32> + '_ {
     complex.living().filter(|&t| complex.scores[t as usize] <= 0.0)
+}
+
+/// How many legal tets have a corner that turns over in the limit of refinement.
+fn folding(complex: &Complex, legality: &Legality) -> usize {
+    let turns = |t: u32| {
+        let tet = complex.tets[t as usize];
+        legality.limits(tet).is_some_and(|l| l.least_corner(&complex.corners(tet)) <= 0.0)
+    };
+    complex.living().filter(|&t| complex.scores[t as usize] > 0.0 && turns(t)).count()
 }
 
 /// The tets whose score is below `least` and that saw a change since the last pass began, the worst first.
@@ -148,32 +166,55 @@ fn is_fresh(complex: &Complex, vertex: u32) -> bool {
     complex.touched[vertex as usize] + 1 >= complex.pass
 }
 
+/// Whether the slot holds the tet that had this score: ids are used again.
+fn is_still(complex: &Complex, score: f64, tet: u32) -> bool {
+    complex.is_alive(tet) && complex.scores[tet as usize].to_bits() == score.to_bits()
+}
+
+impl Report {
+    fn changes(&self) -> usize {
+        self.moves + self.swaps + self.collapses + self.insertions
+    }
+}
+
 impl Tools {
-    /// Moves all vertices, then swaps, then collapses and inserts, the worst tets first. Gives the number of changes.
-    fn pass(
+    /// Moves all vertices, then swaps, the worst tets first.
+    fn smooth_and_swap(
+        &mut self,
+        complex: &mut Complex,
+        objective: &Objective,
+        settings: &Settings,
+        report: &mut Report,
+    ) {
+        for v in 0..complex.points.len() as u32 {
+            if is_fresh(complex, v) {
+                report.moves += usize::from(self.smoother.improve(complex, objective, v, settings.target));
+            }
+        }
+        for (score, t) in worst_first(complex, settings.target) {
+            if is_still(complex, score, t) {
+                report.swaps += usize::from(self.swapper.improve(complex, objective, t));
+            }
+        }
+    }
+
+    fn repair(&mut self, complex: &mut Complex, objective: &Objective, report: &mut Report) {
+        let repairs = repair(complex, objective, &mut self.swapper, &mut self.inserter, &mut self.smoother);
+        report.swaps += repairs.swaps;
+        report.insertions += repairs.splits;
+    }
+
+    /// Merges vertices and adds some, the worst tets first.
+    fn collapse_and_insert(
         &mut self,
         complex: &mut Complex,
         objective: &Objective,
         size: &dyn SizeField,
         settings: &Settings,
         report: &mut Report,
-    ) -> usize {
-        let before = report.moves + report.swaps + report.collapses + report.insertions;
-        for v in 0..complex.points.len() as u32 {
-            if is_fresh(complex, v) {
-                report.moves += usize::from(self.smoother.improve(complex, objective, v, settings.target));
-            }
-        }
-        let still = |complex: &Complex, score: f64, t: u32| {
-            complex.is_alive(t) && complex.scores[t as usize].to_bits() == score.to_bits()
-        };
-        for (score, t) in worst_first(complex, settings.target) {
-            if still(complex, score, t) {
-                report.swaps += usize::from(self.swapper.improve(complex, objective, t));
-            }
-        }
+    ) {
         for (score, t) in worst_first(complex, settings.change_below) {
-            if !still(complex, score, t) {
+            if !is_still(complex, score, t) {
                 continue;
             }
             if self.collapser.improve(complex, objective, size, t) {
@@ -182,7 +223,6 @@ impl Tools {
                 report.insertions += 1;
             }
         }
-        report.moves + report.swaps + report.collapses + report.insertions - before
     }
 
     fn insert(

@@ -5,7 +5,8 @@
 //! section 3): the worst of several smooth functions rises fastest along the shortest vector of the convex
 //! hull of the worst ones' gradients; the step goes to where, by the gradients, another tet becomes the worst.
 
-use crate::improve::complex::{Complex, place};
+use crate::improve::complex::{Complex, NONE, place};
+use crate::improve::legality::TetLimits;
 use crate::improve::objective::Objective;
 use crate::improve::swap::LEAST_GAIN;
 use crate::{Point, Vector};
@@ -37,6 +38,9 @@ const TO_FRONT: [[usize; 4]; 4] = [[0, 1, 2, 3], [1, 0, 3, 2], [2, 3, 0, 1], [3,
 pub(super) struct Smoother {
     star: Vec<u32>,
     others: Vec<[Point; 3]>,
+    /// For each tet the place of its limits in the next list, or [`NONE`].
+    limit_of: Vec<u32>,
+    limits: Vec<TetLimits>,
     values: Vec<f64>,
     gradients: Vec<Vector>,
     active: Vec<Vector>,
@@ -65,7 +69,12 @@ impl Smoother {
         if before >= enough {
             return false;
         }
-        self.load(complex, vertex);
+        self.clear();
+        for k in 0..self.star.len() {
+            let tet = complex.tets[self.star[k] as usize];
+            let [_, a, b, c] = TO_FRONT[place(tet, vertex)].map(|k| tet[k]);
+            self.push(complex, objective, vertex, [a, b, c]);
+        }
         let start = complex.points[vertex as usize];
         let (mut at, mut worst) = (start, before);
         let middle = self.middle();
@@ -85,21 +94,34 @@ impl Smoother {
         faces: impl Iterator<Item = [u32; 3]>,
         start: Point,
     ) -> Point {
-        self.others.clear();
-        self.others.extend(faces.map(|f| f.map(|v| complex.points[v as usize])));
+        self.clear();
+        for face in faces {
+            self.push(complex, objective, NONE, face);
+        }
         match self.worst_above(objective, &start, 0.0) {
             Some(worst) => self.ascend(objective, start, worst).0,
             None => start,
         }
     }
 
-    fn load(&mut self, complex: &Complex, vertex: u32) {
+    fn clear(&mut self) {
         self.others.clear();
-        for &t in &self.star {
-            let tet = complex.tets[t as usize];
-            let [_, a, b, c] = TO_FRONT[place(tet, vertex)].map(|k| complex.points[tet[k] as usize]);
-            self.others.push([a, b, c]);
-        }
+        self.limit_of.clear();
+        self.limits.clear();
+    }
+
+    /// Adds the tet of the vertex that is to move, [`NONE`] for a new one, and three others.
+    fn push(&mut self, complex: &Complex, objective: &Objective, vertex: u32, others: [u32; 3]) {
+        self.others.push(others.map(|v| complex.points[v as usize]));
+        let limits = objective.limits([vertex, others[0], others[1], others[2]]);
+        self.limit_of.push(if limits.is_some() { self.limits.len() as u32 } else { NONE });
+        self.limits.extend(limits);
+    }
+
+    /// The tets as seen from the vertex at `at`: their corners, and what their edges tend to.
+    fn tets(&self, at: Point) -> impl Iterator<Item = ([Point; 4], Option<&TetLimits>)> {
+        let limits = self.limit_of.iter().map(|&k| self.limits.get(k as usize));
+        self.others.iter().zip(limits).map(move |(&[a, b, c], limits)| ([at, a, b, c], limits))
     }
 
     /// The mean of the neighbours, each weighted by its tets in the star.
@@ -111,8 +133,8 @@ impl Smoother {
     /// The worst shape of the star with its vertex at `at`, if above `least`.
     fn worst_above(&self, objective: &Objective, at: &Point, least: f64) -> Option<f64> {
         let mut worst = f64::INFINITY;
-        for &[a, b, c] in &self.others {
-            worst = worst.min(objective.shape(&[*at, a, b, c]));
+        for (p, limits) in self.tets(*at) {
+            worst = worst.min(objective.shape_with_limits(&p, limits));
             if worst <= least {
                 return None;
             }
@@ -124,13 +146,16 @@ impl Smoother {
         let reach = self.others.iter().flatten().map(|p| (p - at).norm()).sum::<f64>()
             / (3 * self.others.len()) as f64;
         for _ in 0..STEPS {
-            self.values.clear();
-            self.gradients.clear();
-            for &[a, b, c] in &self.others {
-                let (value, gradient) = objective.shape_and_gradient(&[at, a, b, c]);
-                self.values.push(value);
-                self.gradients.push(gradient);
+            let mut values = std::mem::take(&mut self.values);
+            let mut gradients = std::mem::take(&mut self.gradients);
+            values.clear();
+            gradients.clear();
+            for (p, limits) in self.tets(at) {
+                let (value, gradient) = objective.gradient_with_limits(&p, limits);
+                values.push(value);
+                gradients.push(gradient);
             }
+            (self.values, self.gradients) = (values, gradients);
             self.active.clear();
             let band = self.values.iter().zip(&self.gradients).filter(|(v, _)| **v <= worst + ACTIVE_BAND);
             self.active.extend(band.map(|(_, g)| *g));

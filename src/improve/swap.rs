@@ -245,3 +245,68 @@ pub(super) fn commit(complex: &mut Complex, old: &[u32], new: &[([u32; 4], f64)]
     }
     positive
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::improve::objective::Measure;
+    use crate::improve::samples::{cube, fan};
+
+    const SHAPES: Objective = Objective { measure: Measure::MeanRatio, legality: None };
+
+    /// Swaps wherever it helps; after each swap the worst of the swapped tets must be better.
+    fn swap_all(complex: &mut Complex) -> usize {
+        complex.score_all(&SHAPES);
+        let mut swapper = Swapper::default();
+        let mut swaps = 0;
+        for tet in 0..complex.tets.len() as u32 {
+            if complex.is_alive(tet) && swapper.find(complex, &SHAPES, tet) {
+                let before = complex.worst_of(&swapper.best.old);
+                assert!(before <= complex.scores[tet as usize]);
+                assert!(swapper.worst() > before);
+                assert!((swapper.worst() - before - swapper.best.gain).abs() < 1e-12);
+                swaps += usize::from(swapper.commit(complex));
+            }
+        }
+        complex.check().unwrap();
+        swaps
+    }
+
+    #[test]
+    fn an_edge_with_flat_tets_round_it_is_removed() {
+        // Rings of 3, 4, … vertices round an edge that is far too long: 3-2, 4-4, 5-6, …
+        for (ring, tets) in [(3, 2), (4, 4), (5, 6), (6, 8), (7, 10)] {
+            let mut complex = Complex::new(&fan(ring, 4.0));
+            assert!(swap_all(&mut complex) > 0);
+            assert_eq!(complex.living().count(), tets);
+        }
+    }
+
+    #[test]
+    fn faces_between_two_near_vertices_are_removed() {
+        // One face is the flip 2-3; four round a vertex cannot be, as it would lose all its tets.
+        for ring in [3, 4, 5, 6] {
+            let mut complex = Complex::new(&fan(ring, 4.0));
+            swap_all(&mut complex);
+            // The ends of the edge come near: the edge is wanted back.
+            complex.points[0].z = 0.35;
+            complex.points[1].z = -0.35;
+            assert!(swap_all(&mut complex) > 0);
+            assert_eq!(complex.living().count(), ring, "the fan is back");
+        }
+    }
+
+    #[test]
+    fn good_tets_are_left_alone() {
+        let mut complex = Complex::new(&fan(5, 0.6));
+        assert_eq!(swap_all(&mut complex), 0);
+    }
+
+    #[test]
+    fn swaps_in_bad_cubes_keep_the_complex_valid() {
+        for seed in 0..8 {
+            let mut complex = Complex::new(&cube(4, seed));
+            assert!(swap_all(&mut complex) > 10);
+        }
+    }
+}
