@@ -350,7 +350,3 @@ fn join(meet: bool, first: Solid, second: Solid) -> Solid {
     }
     if meet { Solid::And(members) } else { Solid::Or(members) }
 }
-
-#[cfg(test)]
-#[path = "polyhedron_tests.rs"]
-mod tests;
