@@ -11,6 +11,29 @@ const IN_PLANE: usize = 0;
 /// Index of the curves of space.
 const IN_SPACE: usize = 1;
 
+/// How far the ends of a closed profile may lie apart, as in NETGEN.
+const CLOSED: f64 = 1e-7;
+
+/// What is needed to check the uses of a curve.
+#[derive(Clone, Debug)]
+pub(super) struct Curve {
+    segments: usize,
+    /// Its first and its last point.
+    ends: [Vec<f64>; 2],
+}
+
+impl Curve {
+    fn is_closed(&self) -> bool {
+        let [first, last] = &self.ends;
+        first.iter().zip(last).all(|(a, b)| (a - b).abs() < CLOSED)
+    }
+
+    /// Whether both ends are on the axis of a revolution, or beyond.
+    fn is_on_axis(&self) -> bool {
+        self.ends.iter().all(|end| end[1] <= 0.0)
+    }
+}
+
 impl Lowering<'_> {
     /// `curve2d` or `curve3d`
     pub(super) fn define_curve(
@@ -21,11 +44,12 @@ impl Lowering<'_> {
     ) -> Result<(), Reported> {
         let checked = self.check_segments(text);
         let curves = &mut self.curves[if in_space { IN_SPACE } else { IN_PLANE }];
-        curves.insert(name.text.clone(), checked.is_ok().then_some(text.segments.len()));
-        checked
+        curves.insert(name.text.clone(), checked.clone().ok());
+        checked.map(drop)
     }
 
-    fn check_segments(&mut self, text: &CurveText) -> Result<(), Reported> {
+    fn check_segments(&mut self, text: &CurveText) -> Result<Curve, Reported> {
+        let mut first = None;
         let mut end: Option<usize> = None;
         for segment in &text.segments {
             let indices = self.segment_points(segment, text.points.len())?;
@@ -38,9 +62,11 @@ impl Lowering<'_> {
                     format!("this segment begins at point {}, the one before ends at {}", start + 1, end + 1);
                 return Err(self.report.meaning(segment.kind.span, message, "segments follow one another"));
             }
+            first = first.or(Some(start));
             end = indices.last().copied();
         }
-        Ok(())
+        let point = |index: Option<usize>| index.map_or_else(Vec::new, |i| text.points[i].clone());
+        Ok(Curve { segments: text.segments.len(), ends: [point(first), point(end)] })
     }
 
     /// The points of a segment, from 0.
@@ -76,7 +102,7 @@ impl Lowering<'_> {
         match primitive {
             Primitive::Extrusion { path, profile, up } => {
                 self.curve_named(path, IN_SPACE)?;
-                let segments = self.curve_named(profile, IN_PLANE)?;
+                let segments = self.curve_named(profile, IN_PLANE)?.segments;
                 if up.amax() == 0.0 {
                     let help = "it is the direction in space of the profile's y";
                     return Err(self.report.meaning(span, "the vector of `extrusion` is zero", help));
@@ -84,21 +110,25 @@ impl Lowering<'_> {
                 Ok(Some(("extrusion", segments)))
             }
             Primitive::Revolution { from, to, profile } => {
-                let segments = self.curve_named(profile, IN_PLANE)?;
+                let curve = self.curve_named(profile, IN_PLANE)?;
+                if !curve.is_closed() && !curve.is_on_axis() {
+                    let message = "the profile of `revolution` is open, and not closed by the axis either";
+                    let help = "it returns to its first point, or begins and ends at y = 0";
+                    return Err(self.report.meaning(profile.span, message, help));
+                }
                 if from == to {
                     let message = "the two points on the axis of `revolution` coincide";
                     return Err(self.report.meaning(span, message, "they give the direction of the axis"));
                 }
-                Ok(Some(("revolution", segments)))
+                Ok(Some(("revolution", curve.segments)))
             }
             _ => Ok(None),
         }
     }
 
-    /// The number of segments of a curve.
-    fn curve_named(&mut self, name: &Name, dimension: usize) -> Result<usize, Reported> {
+    fn curve_named(&mut self, name: &Name, dimension: usize) -> Result<Curve, Reported> {
         if let Some(known) = self.curves[dimension].get(&name.text) {
-            return known.ok_or(Reported);
+            return known.clone().ok_or(Reported);
         }
         let kind = if dimension == IN_PLANE { "curve2d" } else { "curve3d" };
         let other = self.curves[1 - dimension].contains_key(&name.text);

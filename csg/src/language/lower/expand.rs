@@ -54,14 +54,14 @@ pub(super) fn expand(forest: &Forest, classes: &Classes, root: NodeId) -> Result
             *uses.entry(member).or_default() += 1;
         }
     }
+    let absorbed = absorbed(forest, &order, &uses)?;
     let mut trees: HashMap<NodeId, Measured> = HashMap::new();
     let mut halves = 0;
-    for &id in &order {
+    for id in order.into_iter().filter(|id| !absorbed.contains(id)) {
         let mut members = Vec::new();
-        for member in distinct_members(forest, id)? {
+        for member in members_of_chain(forest, id, &absorbed)? {
             let left = uses.get_mut(&member).expect("each use was counted");
             *left -= 1;
-            // The last user takes the tree itself: chains of definitions cost no copies.
             let tree = if *left == 0 {
                 trees.remove(&member).expect("members come first")
             } else {
@@ -74,8 +74,8 @@ pub(super) fn expand(forest: &Forest, classes: &Classes, root: NodeId) -> Result
             Node::Primitive(index) => {
                 let primitive = &forest.primitives[*index];
                 let first = primitive.surfaces.start;
-                let solid = relabel(&primitive.inside, &|local| classes.half_space(first + local.index()));
-                let measured = measure(solid);
+                let half_space = |local: SurfaceId| classes.half_space(first + local.index());
+                let measured = measure(relabel(&primitive.inside, &half_space));
                 halves += measured.halves;
                 measured
             }
@@ -94,6 +94,47 @@ pub(super) fn expand(forest: &Forest, classes: &Classes, root: NodeId) -> Result
     }
     let root = resolved(forest, root)?;
     Ok(trees.remove(&root).expect("the root comes last").solid)
+}
+
+/// The nodes that have a single user, of the same kind: their members are its members. So a chain of
+/// thousands of unions, each of the one before and a little more, takes linear time.
+fn absorbed(
+    forest: &Forest,
+    order: &[NodeId],
+    uses: &HashMap<NodeId, usize>,
+) -> Result<HashSet<NodeId>, ExpandError> {
+    let mut absorbed = HashSet::new();
+    for &id in order {
+        for member in distinct_members(forest, id)? {
+            let same_kind = matches!(
+                (forest.node(id), forest.node(member)),
+                (Node::And(_), Node::And(_)) | (Node::Or(_), Node::Or(_))
+            );
+            if same_kind && uses[&member] == 1 {
+                absorbed.insert(member);
+            }
+        }
+    }
+    Ok(absorbed)
+}
+
+/// The members of a node and of all that it absorbs, from left to right.
+fn members_of_chain(
+    forest: &Forest,
+    id: NodeId,
+    absorbed: &HashSet<NodeId>,
+) -> Result<Vec<NodeId>, ExpandError> {
+    let mut members = Vec::new();
+    let mut open = distinct_members(forest, id)?;
+    open.reverse();
+    while let Some(member) = open.pop() {
+        if absorbed.contains(&member) {
+            open.extend(distinct_members(forest, member)?.into_iter().rev());
+        } else {
+            members.push(member);
+        }
+    }
+    Ok(members)
 }
 
 /// What a node stands for, if it is a name.

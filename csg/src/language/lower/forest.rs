@@ -66,6 +66,8 @@ pub(super) struct Definition {
     pub root: Option<NodeId>,
     /// `-maxh`
     pub maxh: Option<f64>,
+    /// Whether all its surfaces have a boundary number, and a boundary name.
+    pub labelled: [bool; 2],
 }
 
 #[derive(Debug, Default)]
@@ -79,8 +81,8 @@ pub(super) struct Forest {
 /// Why there is no order, or no copy.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum ForestError {
-    /// This definition needs itself.
-    Cycle(usize),
+    /// A definition needs itself.
+    Cycle,
     /// A definition with an error is used.
     Broken,
     /// More than [`MOST_SURFACES`] surfaces.
@@ -117,6 +119,15 @@ impl Forest {
 
     /// All nodes under `root`, each once, members before what they make up, from left to right.
     pub fn post_order(&self, root: NodeId) -> Result<Vec<NodeId>, ForestError> {
+        self.post_order_except(root, |_| false)
+    }
+
+    /// The same without what is under the definitions that `skip` names.
+    fn post_order_except(
+        &self,
+        root: NodeId,
+        skip: impl Fn(&Definition) -> bool,
+    ) -> Result<Vec<NodeId>, ForestError> {
         enum Step {
             Enter(NodeId),
             Leave(NodeId),
@@ -130,10 +141,11 @@ impl Forest {
                     is_open.insert(id, false);
                     order.push(id);
                 }
+                Step::Enter(id) if matches!(self.node(id), Node::Named(d) if skip(&self.definitions[*d])) => {
+                }
                 Step::Enter(id) => match is_open.get(&id) {
                     Some(false) => {}
-                    // Only names lead back, so that the loop of open nodes has one.
-                    Some(true) => return Err(ForestError::Cycle(self.name_in_loop(id))),
+                    Some(true) => return Err(ForestError::Cycle),
                     None => {
                         is_open.insert(id, true);
                         steps.push(Step::Leave(id));
@@ -145,26 +157,31 @@ impl Forest {
         Ok(order)
     }
 
-    /// The definition whose tree begins or is named at a node that leads back to itself.
-    fn name_in_loop(&self, id: NodeId) -> usize {
-        match self.node(id) {
-            Node::Named(index) => *index,
-            _ => self.definitions.iter().position(|d| d.root == Some(id)).unwrap_or_default(),
-        }
-    }
-
     /// The primitives under `root`, each once, from left to right.
     pub fn primitives_of(&self, root: NodeId) -> Result<Vec<usize>, ForestError> {
-        let primitive = |id: NodeId| match self.node(id) {
+        Ok(self.primitives_among(&self.post_order(root)?))
+    }
+
+    fn primitives_among(&self, nodes: &[NodeId]) -> Vec<usize> {
+        let primitive = |id: &NodeId| match self.node(*id) {
             Node::Primitive(index) => Some(*index),
             _ => None,
         };
-        Ok(self.post_order(root)?.into_iter().filter_map(primitive).collect())
+        nodes.iter().filter_map(primitive).collect()
     }
 
     /// The surfaces under `root`, each once, from left to right.
     pub fn surfaces_of(&self, root: NodeId) -> Result<Vec<usize>, ForestError> {
-        let primitives = self.primitives_of(root)?;
+        self.surfaces_except(root, |_| false)
+    }
+
+    /// The same without those of the definitions that `skip` names.
+    pub fn surfaces_except(
+        &self,
+        root: NodeId,
+        skip: impl Fn(&Definition) -> bool,
+    ) -> Result<Vec<usize>, ForestError> {
+        let primitives = self.primitives_among(&self.post_order_except(root, skip)?);
         Ok(primitives.into_iter().flat_map(|p| self.primitives[p].surfaces.clone()).collect())
     }
 

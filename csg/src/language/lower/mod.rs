@@ -36,6 +36,7 @@ pub(super) fn lower(statements: &[Statement], report: &mut Report) -> Geometry {
         overrides: Vec::new(),
         stated_box: None,
         losses_known: false,
+        is_redefined: false,
     };
     for statement in statements {
         // What is wrong with it is in the report; the next statement may be wrong too.
@@ -50,14 +51,16 @@ struct Lowering<'r> {
     forest: Forest,
     /// Index of each named solid among the definitions.
     solids: BTreeMap<String, usize>,
-    /// For the curves of the plane and of space how many segments each has; `None` for one with an error.
-    curves: [BTreeMap<String, Option<usize>>; 2],
+    /// The curves of the plane and those of space; `None` for one with an error.
+    curves: [BTreeMap<String, Option<curve::Curve>>; 2],
     tlos: Vec<Tlo>,
     user_points: Vec<UserPoint>,
     overrides: Vec<Override>,
     stated_box: Option<Aabb>,
     /// Whether it has been said that copies lose flags.
     losses_known: bool,
+    /// Whether a solid was defined a second time.
+    is_redefined: bool,
 }
 
 /// A top-level object.

@@ -206,7 +206,7 @@ impl Builder {
             }
             let cut = self.best_cut(&pieces)?;
             let half = self.half(&pieces[cut]);
-            let (inner, outer) = self.split(&pieces, cut);
+            let (inner, outer) = self.split(pieces, cut);
             match (inner.is_empty(), outer.is_empty()) {
                 (true, true) => break half,
                 (false, true) => {
@@ -231,10 +231,12 @@ impl Builder {
         Some(solid)
     }
 
-    /// Among some of the pieces the one whose plane has all others on one side, or else cuts few and balances.
+    /// Among some of the pieces the first whose plane has all others on one side, or else one that cuts few and
+    /// balances.
     fn best_cut(&self, pieces: &[Piece]) -> Option<usize> {
         let stride = pieces.len().div_ceil(CANDIDATES).max(1);
-        let cost = |&candidate: &usize| {
+        let mut best: Option<(usize, usize)> = None;
+        for candidate in (0..pieces.len()).step_by(stride) {
             let (mut inner, mut outer, mut cut) = (0_usize, 0_usize, 0_usize);
             for piece in pieces {
                 let [behind, before] = self.sides(pieces[candidate].plane, piece);
@@ -242,10 +244,15 @@ impl Builder {
                 outer += usize::from(before);
                 cut += usize::from(behind && before);
             }
-            let cost = if inner == 0 || outer == 0 { 0 } else { 1 + 8 * cut + inner.abs_diff(outer) };
-            (cost, candidate)
-        };
-        (0..pieces.len()).step_by(stride).min_by_key(cost)
+            if inner == 0 || outer == 0 {
+                return Some(candidate);
+            }
+            let cost = 8 * cut + inner.abs_diff(outer);
+            if best.is_none_or(|(least, _)| cost < least) {
+                best = Some((cost, candidate));
+            }
+        }
+        best.map(|(_, candidate)| candidate)
     }
 
     /// Whether the piece has points behind the plane, and before it.
@@ -258,16 +265,18 @@ impl Builder {
     }
 
     /// The pieces on the inner and on the outer side of one of them; those in its plane are done.
-    fn split(&self, pieces: &[Piece], cut: usize) -> (Vec<Piece>, Vec<Piece>) {
+    fn split(&self, pieces: Vec<Piece>, cut: usize) -> (Vec<Piece>, Vec<Piece>) {
         let Piece { plane, flipped, .. } = pieces[cut];
         let (mut behind, mut before) = (Vec::new(), Vec::new());
         for piece in pieces {
-            let sides = self.sides(plane, piece);
-            if sides[0] {
-                behind.push(self.clipped(piece, plane, -1.0));
-            }
-            if sides[1] {
-                before.push(self.clipped(piece, plane, 1.0));
+            match self.sides(plane, &piece) {
+                [true, true] => {
+                    behind.push(self.clipped(&piece, plane, -1.0));
+                    before.push(self.clipped(&piece, plane, 1.0));
+                }
+                [true, false] => behind.push(piece),
+                [false, true] => before.push(piece),
+                [false, false] => {}
             }
         }
         if flipped { (before, behind) } else { (behind, before) }
@@ -341,7 +350,3 @@ fn join(meet: bool, first: Solid, second: Solid) -> Solid {
     }
     if meet { Solid::And(members) } else { Solid::Or(members) }
 }
-
-#[cfg(test)]
-#[path = "polyhedron_tests.rs"]
-mod tests;

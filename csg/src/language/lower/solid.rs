@@ -23,22 +23,17 @@ impl Lowering<'_> {
     /// `solid name = body flags;`
     pub(super) fn define_solid(&mut self, name: &Name, body: &Expr, flags: &[Flag]) -> Result<(), Reported> {
         let root = self.expression(body, &name.text);
-        let index = match self.solids.get(&name.text) {
-            Some(&index) => {
-                self.redefined(index, name);
-                index
-            }
-            None => {
-                let definition =
-                    Definition { name: name.text.clone(), span: name.span, root: None, maxh: None };
-                self.forest.definitions.push(definition);
-                self.solids.insert(name.text.clone(), self.forest.definitions.len() - 1);
-                self.forest.definitions.len() - 1
-            }
-        };
+        let known = self.solids.get(&name.text).copied();
+        let index = known.unwrap_or_else(|| self.declare(name));
+        if known.is_some() {
+            self.redefined(index, name);
+        }
         self.forest.definitions[index].root = root.ok();
         let root = root?;
-        if let Err(ForestError::Cycle(_)) = self.forest.post_order(root) {
+        // Only what is defined again can come into itself: names are known from their definition on.
+        if known.is_some()
+            && let Err(ForestError::Cycle) = self.forest.post_order(root)
+        {
             self.forest.definitions[index].root = None;
             let message = format!("the solid `{}` is made of itself", name.text);
             return Err(self.report.meaning(name.span, message, "give the new solid a name of its own"));
@@ -51,9 +46,22 @@ impl Lowering<'_> {
         for curves in &mut self.curves {
             curves.insert(name.text.clone(), None);
         }
-        let definition = Definition { name: name.text.clone(), span: name.span, root: None, maxh: None };
+        self.declare(name);
+    }
+
+    /// A new definition that has no tree yet.
+    fn declare(&mut self, name: &Name) -> usize {
+        let definition = Definition {
+            name: name.text.clone(),
+            span: name.span,
+            root: None,
+            maxh: None,
+            labelled: [false; 2],
+        };
         self.forest.definitions.push(definition);
-        self.solids.insert(name.text.clone(), self.forest.definitions.len() - 1);
+        let index = self.forest.definitions.len() - 1;
+        self.solids.insert(name.text.clone(), index);
+        index
     }
 
     fn redefined(&mut self, index: usize, name: &Name) {
@@ -61,6 +69,8 @@ impl Lowering<'_> {
         let message = format!("`{}` was defined in line {} already", name.text, definition.span.line);
         definition.span = name.span;
         definition.maxh = None;
+        definition.labelled = [false; 2];
+        self.is_redefined = true;
         self.report.warn(name.span, message, "what was made of it before now changes too, as in NETGEN");
     }
 
@@ -76,10 +86,24 @@ impl Lowering<'_> {
         if maxh.is_none() && numbers.is_none() && names.is_none() {
             return Ok(());
         }
-        let Ok(surfaces) = self.forest.surfaces_of(root) else {
-            return Err(Reported);
+        let is_list = |length: Option<usize>| length.is_some();
+        let lists = [
+            numbers.as_ref().is_some_and(|n| is_list(n.len())),
+            names.as_ref().is_some_and(|n| is_list(n.len())),
+        ];
+        let labels = [numbers.is_some(), names.is_some()];
+        // Definitions that have all that is given here keep it: a chain of definitions with flags takes linear
+        // time. Lists must be counted, and after a second definition nothing is sure.
+        let must_walk = self.is_redefined || lists.contains(&true);
+        let has_all = |d: &Definition| {
+            let fine = maxh.is_none_or(|maxh| d.maxh.is_some_and(|known| known <= maxh));
+            fine && (0..2).all(|i| d.labelled[i] || !labels[i])
         };
-        let entries = self.list_entries(root, &surfaces);
+        let surfaces =
+            self.forest.surfaces_except(root, |d| !must_walk && has_all(d)).map_err(|_| Reported)?;
+        self.forest.definitions[index].labelled = [0, 1].map(|i| labels[i] && !lists[i]);
+        let entries =
+            if lists.contains(&true) { self.list_entries(root, &surfaces) } else { vec![0; surfaces.len()] };
         let count = entries.last().map_or(0, |last| last + 1);
         let lengths = [
             ("bc", numbers.as_ref().and_then(PerSurface::len)),
@@ -128,7 +152,7 @@ impl Lowering<'_> {
                 let message = format!("the primitives have more than {MOST_SURFACES} surfaces");
                 self.report.meaning(span, message, "transforms within transforms multiply")
             }
-            ForestError::Broken | ForestError::Cycle(_) => Reported,
+            ForestError::Broken | ForestError::Cycle => Reported,
         })
     }
 
@@ -214,7 +238,12 @@ impl Lowering<'_> {
                 (std::iter::successors(Some(motion), next).take(turns).collect(), true)
             }
         };
-        self.warn_of_losses(inner, span)?;
+        let surfaces = self.forest.surfaces_of(inner);
+        let surfaces = self.located(surfaces, span)?;
+        if self.forest.surfaces.len() + surfaces.len() * motions.len() > MOST_SURFACES {
+            return self.located(Err(ForestError::TooLarge), span);
+        }
+        self.warn_of_losses(&surfaces, span);
         let mut members = if keeps_original { vec![inner] } else { Vec::new() };
         for motion in &motions {
             let copy = self.forest.copy(inner, motion, solid);
@@ -257,21 +286,14 @@ impl Lowering<'_> {
     }
 
     /// Copies have none of the flags of their original; said once a file.
-    fn warn_of_losses(&mut self, original: NodeId, span: Span) -> Result<(), Reported> {
-        if self.losses_known {
-            return Ok(());
+    fn warn_of_losses(&mut self, originals: &[usize], span: Span) {
+        let infos = originals.iter().map(|&surface| &self.forest.surfaces[surface].info);
+        let mut flagged = infos.filter(|i| i.maxh.is_some() || i.bc.is_some() || i.bc_name.is_some());
+        if let (false, Some(info)) = (self.losses_known, flagged.next()) {
+            let message = format!("moved copies do not have the -bc, -bcname and -maxh of `{}`", info.solid);
+            self.losses_known = true;
+            self.report.warn(span, message, "as in NETGEN; give flags to the solid that is defined here");
         }
-        let surfaces = self.forest.surfaces_of(original);
-        for surface in self.located(surfaces, span)? {
-            let SurfaceInfo { maxh, bc, bc_name, solid, .. } = &self.forest.surfaces[surface].info;
-            if maxh.is_some() || bc.is_some() || bc_name.is_some() {
-                self.losses_known = true;
-                let message = format!("moved copies do not have the -bc, -bcname and -maxh of `{solid}`");
-                self.report.warn(span, message, "as in NETGEN; give flags to the solid that is defined here");
-                break;
-            }
-        }
-        Ok(())
     }
 }
 

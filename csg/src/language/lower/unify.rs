@@ -122,45 +122,42 @@ impl Place {
 
     /// The cell of a surface; equal ones are in the same one or in neighbours.
     fn cell(&self, surface: &Surface) -> Cell {
-        // Any direction will do; this one seldom maps the points of a regular grid to one place.
-        let generic = Vector::new(0.618, 0.414, 0.732);
-        let along = |point: &Point| ((point - self.center).dot(&generic), 0.0);
-        let axis = |point: &Point, axis: &Vector| {
-            ((self.center - point).cross(axis).norm(), axis.dot(&generic).abs())
+        // Equal surfaces have this point in common, nearly: those that turn a little against each other drift
+        // apart towards the centre.
+        let foot_on_axis = |point: &Point, axis: &Vector| {
+            let arm = self.center - point;
+            point + axis * (arm.dot(axis) / axis.norm_squared())
         };
-        let (kind, (place, direction)) = match surface {
-            Surface::Plane(p) => {
-                (0, (p.normal.dot(&(self.center - p.point)).abs(), p.normal.dot(&generic).abs()))
-            }
-            Surface::Sphere(sphere) => (1, along(&sphere.center)),
-            Surface::Ellipsoid(ellipsoid) => (1, along(&ellipsoid.center)),
-            Surface::Torus(torus) => (2, along(&torus.center)),
-            Surface::Cylinder(c) => (3, axis(&c.point, &c.axis)),
-            Surface::EllipticCylinder(c) => (3, axis(&c.point, &c.axes[0].cross(&c.axes[1]))),
-            Surface::Cone(cone) => (4, along(&cone.apex())),
-            Surface::EllipticCone(cone) => (4, along(&cone.apex())),
+        let (kind, point) = match surface {
+            Surface::Plane(p) => (0, self.center - p.normal * p.normal.dot(&(self.center - p.point))),
+            Surface::Sphere(sphere) => (1, sphere.center),
+            Surface::Ellipsoid(ellipsoid) => (1, ellipsoid.center),
+            Surface::Torus(torus) => (2, torus.center),
+            Surface::Cylinder(c) => (3, foot_on_axis(&c.point, &c.axis)),
+            Surface::EllipticCylinder(c) => (3, foot_on_axis(&c.point, &c.axes[0].cross(&c.axes[1]))),
+            Surface::Cone(cone) => (4, cone.apex()),
+            Surface::EllipticCone(cone) => (4, cone.apex()),
         };
-        // Surfaces that turn a little against each other drift apart towards the centre.
         let width = (4.0 * (EQUAL_SURFACES + LARGEST_ANGLE) * self.size).max(f64::MIN_POSITIVE);
-        let index = |key: f64, width: f64| (key / width).floor() as i64;
-        Cell { kind, place: index(place, width), direction: index(direction, 4.0 * LARGEST_ANGLE) }
+        // Any directions will do; these seldom map points of a regular grid to one place.
+        let directions = [Vector::new(0.618, 0.414, 0.666), Vector::new(-0.532, 0.771, 0.351)];
+        let place = directions.map(|d| ((point - self.center).dot(&d) / width).floor() as i64);
+        Cell { kind, place }
     }
 }
 
-/// Surfaces of one kind, about as far from the centre and in about the same direction.
+/// Surfaces of one kind at about the same place.
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
 struct Cell {
     kind: u8,
-    place: i64,
-    direction: i64,
+    place: [i64; 2],
 }
 
 impl Cell {
     fn with_neighbours(self) -> [Self; 9] {
-        std::array::from_fn(|i| Self {
-            place: self.place.saturating_add(i as i64 / 3 - 1),
-            direction: self.direction.saturating_add(i as i64 % 3 - 1),
-            ..self
+        std::array::from_fn(|i| {
+            let shift = [i as i64 / 3 - 1, i as i64 % 3 - 1];
+            Self { place: [0, 1].map(|k| self.place[k].saturating_add(shift[k])), ..self }
         })
     }
 }

@@ -205,6 +205,8 @@ fn wrong_curves_are_located() {
         let text = error(curve);
         assert!(text.contains(message), "{curve}: {text}");
     }
+    let open = "curve2d f = (2; 0,0; 1,1; 1; 2,1,2); solid a = revolution (0,0,0; 1,0,0; f); tlo a;";
+    assert!(error(open).contains("is open, and not closed by the axis either"));
     let order = "curve2d f = (2; 0,0; 1,1; 1; 2,1,2); curve3d p = (2; 0,0,0; 1,1,1; 1; 2,1,2); solid a = extrusion (f; p; 0,0,1); tlo a;";
     assert!(error(order).contains("takes a curve of space first"));
 }

@@ -235,11 +235,11 @@ fn transforms_nest() {
 #[test]
 fn a_chain_of_thousands_of_definitions_is_one_union() {
     let mut text = String::from("solid a0 = sphere (0,0,0; 0.5);\n");
-    for i in 1..3000 {
+    for i in 1..20_000 {
         text += &format!("solid a{i} = a{} or sphere ({i},0,0; 0.5);\n", i - 1);
     }
-    let geometry = geometry(&(text + "tlo a2999;"));
-    assert!(matches!(&geometry.bodies[0].solid, Solid::Or(members) if members.len() == 3000));
+    let geometry = geometry(&(text + "tlo a19999;"));
+    assert!(matches!(&geometry.bodies[0].solid, Solid::Or(members) if members.len() == 20_000));
 }
 
 #[test]
