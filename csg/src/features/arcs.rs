@@ -73,8 +73,11 @@ pub(super) fn feature_arcs(
     tolerances: &Tolerances,
 ) -> Result<(Vec<Arc>, Nodes), FeatureError> {
     let mut nodes = Nodes::default();
-    let cuts: Vec<_> =
+    let mut cuts: Vec<_> =
         traces.iter().map(|trace| cuts(geometry, tree, trace, &mut nodes, tolerances)).collect();
+    for (trace, cuts) in traces.iter().zip(&mut cuts) {
+        cut_at_known_nodes(geometry, trace, &nodes, cuts, tolerances);
+    }
     let mut arcs = Vec::new();
     for (trace, cuts) in traces.iter().zip(&cuts) {
         for (points, ends) in pieces(trace, cuts, &nodes, tolerances) {
@@ -122,6 +125,33 @@ fn cuts(
         }
     }
     cuts
+}
+
+/// Cuts a trace also at the nodes on it that were found on other traces.
+///
+/// Two traces may go over one piece of curve; a surface that matters nowhere near it may have been met by the
+/// longer steps of one and not of the other. Cut alike, they are known to be the same.
+fn cut_at_known_nodes(
+    geometry: &Geometry,
+    trace: &Trace,
+    nodes: &Nodes,
+    cuts: &mut Vec<(f64, usize)>,
+    tolerances: &Tolerances,
+) {
+    let lowest = trace.points.iter().fold(trace.points[0], |m, p| m.inf(p));
+    let highest = trace.points.iter().fold(trace.points[0], |m, p| m.sup(p));
+    let room = 0.1 * (highest - lowest).norm();
+    for (node, (point, _)) in nodes.points.iter().enumerate() {
+        let is_near = (0..3).all(|i| lowest[i] - room <= point[i] && point[i] <= highest[i] + room);
+        let is_on = |s: &SurfaceId| geometry.surfaces[s.index()].distance(point) <= tolerances.on_surface;
+        if !is_near || cuts.iter().any(|c| c.1 == node) || !trace.pair.iter().all(is_on) {
+            continue;
+        }
+        let steps = trace.points.windows(2).enumerate();
+        let position = steps.filter_map(|(i, ends)| along(ends, point).map(|part| i as f64 + part)).next();
+        cuts.extend(position.map(|position| (position, node)));
+    }
+    cuts.sort_by(|x, y| x.0.total_cmp(&y.0));
 }
 
 /// The length of a trace between two positions.

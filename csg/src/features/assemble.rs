@@ -5,7 +5,7 @@ use super::around::{Sheet, Tolerances, sheet_at};
 use super::octree::Octree;
 use super::{Corner, Curve, FeatureError, Features, Fin, Named, Patch, Place};
 use crate::geometry::UserPoint;
-use crate::{Aabb, CornerId, CurveId, Geometry, Interval, PatchId, Point, SurfaceId, Vector};
+use crate::{Aabb, BodyId, CornerId, CurveId, Geometry, Interval, PatchId, Point, SurfaceId, Vector};
 use std::collections::{BTreeMap, HashMap};
 
 /// Joins arcs that continue each other at nodes where nothing else is, and returns them as chains:
@@ -110,6 +110,13 @@ pub(super) fn entities(
         patches.entry(sheet).or_insert_with(|| patch(&sheet)).seeds.push(seed);
     }
     let patches: Vec<Patch> = patches.into_values().collect();
+    // What the rough cells around the bodies did not show: a body of no volume has no boundary.
+    for i in 0..geometry.bodies.len() {
+        let id = BodyId::new(i);
+        if !patches.iter().any(|p| p.inside == Some(id) || p.outside == Some(id)) {
+            return Err(FeatureError::Empty(Named::body(geometry, id)));
+        }
+    }
     for (i, patch) in patches.iter().enumerate() {
         for &(curve, forward) in &patch.boundary {
             curves[curve.index()].fins.push(Fin { patch: PatchId::new(i), forward });

@@ -29,10 +29,9 @@ pub(super) fn bounding_cell(geometry: &Geometry) -> Result<Cell, FeatureError> {
     let all = bodies.map(|(i, body)| (BodyId::new(i), Some(body.solid.clone()))).collect();
     let mut parts: Vec<Part> = prune(geometry, Part { cell: cube, bodies: all }).into_iter().collect();
     loop {
-        for (i, body) in geometry.bodies.iter().enumerate() {
-            let id = BodyId::new(i);
+        for id in (0..geometry.bodies.len()).map(BodyId::new) {
             if !parts.iter().any(|part| part.bodies.iter().any(|b| b.0 == id)) {
-                return Err(FeatureError::Empty(Named { solid: body.name.clone(), line: body.span.line }));
+                return Err(FeatureError::Empty(Named::body(geometry, id)));
             }
         }
         let hull = hull(&parts);
