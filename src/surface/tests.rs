@@ -374,7 +374,9 @@ fn segments_that_cross_are_named() {
         &Settings::default(),
     )
     .expect_err("the triangles cross");
-    assert!(matches!(error, SurfaceError::CurvesCross { .. }), "{error}");
+    let SurfaceError::TooCoarse { segments, other, .. } = error else { panic!("{error}") };
+    assert_eq!(segments, [0, 1, 2, 3, 4, 5]);
+    assert!(other.is_some());
 }
 
 #[test]
