@@ -40,6 +40,28 @@ impl Sign {
     }
 }
 
+/// ε = 2⁻⁵³, the relative error of one rounding.
+const HALF_ULP: f64 = f64::EPSILON / 2.0;
+
+/// The bound A of Shewchuk's `orient3d` (1997, section 4.3), relative to the sum of absolute values.
+const ORIENT3D_ERROR: f64 = (7.0 + 56.0 * HALF_ULP) * HALF_ULP;
+
+/// Six times the volume of a tet in floating point, and a bound of its error; from the edges that leave one corner.
+///
+/// A filter for loops over many tets: where the volume exceeds the bound its sign is certain, elsewhere
+/// [`orient3d`] settles it. The edges must be single rounded differences of coordinates.
+#[inline(always)]
+pub fn volume6_and_error([u, v, w]: [[f64; 3]; 3]) -> (f64, f64) {
+    let [a, b] = [v[1] * w[2], v[2] * w[1]];
+    let [c, d] = [v[2] * w[0], v[0] * w[2]];
+    let [e, f] = [v[0] * w[1], v[1] * w[0]];
+    let volume = u[0] * (a - b) + u[1] * (c - d) + u[2] * (e - f);
+    let size = u[0].abs() * (a.abs() + b.abs())
+        + u[1].abs() * (c.abs() + d.abs())
+        + u[2].abs() * (e.abs() + f.abs());
+    (volume, ORIENT3D_ERROR * size)
+}
+
 #[inline]
 fn coord(p: &Point) -> Coord3D<f64> {
     Coord3D { x: p.x, y: p.y, z: p.z }
@@ -85,6 +107,14 @@ mod tests {
         assert_eq!(insphere(&o, &x, &y, &z, &Point::new(0.5, 0.5, 0.5)), Sign::Positive);
         assert_eq!(insphere(&o, &x, &y, &z, &Point::new(1., 1., 1.)), Sign::Zero);
         assert_eq!(insphere(&o, &x, &y, &z, &Point::new(2., 1., 1.)), Sign::Negative);
+    }
+
+    #[test]
+    fn the_filter_is_certain_of_a_plain_tet_and_doubts_a_flat_one() {
+        let (volume, error) = volume6_and_error([[1., 0., 0.], [0., 1., 0.], [0., 0., 1.]]);
+        assert!(volume == 1.0 && error < 1e-15);
+        let (volume, error) = volume6_and_error([[0.1, 0.2, 0.3], [0.4, 0.5, 0.6], [0.7, 0.8, 0.9]]);
+        assert!(volume.abs() <= error, "{volume} {error}");
     }
 
     #[test]

@@ -58,7 +58,8 @@ pub struct BoundaryBlock {
     /// Vertices by local index; normals from the patch's inside to its outside.
     pub triangles: Vec<[u32; 3]>,
     /// For each the fine tets of this part behind and in front of it, as indices within the part
-    /// (`first_local` + position); `u64::MAX` where there is none.
+    /// (`first_local` + position); [`NO_TET`] where there is none. On each side either all triangles of a block
+    /// have a tet or none, and these tets lie in one tet block.
     pub parents: Vec<[u64; 2]>,
     /// The patch of all.
     pub patch: Option<PatchId>,
@@ -83,6 +84,14 @@ pub trait MeshStream: Sync {
     fn vertex_blocks(&self) -> usize;
     /// One vertex block (may be empty).
     fn vertex_block(&self, index: usize) -> VertexBlock<'_>;
+    /// The global id of the vertex with this local index.
+    ///
+    /// # Panics
+    /// If there is no such vertex.
+    fn vertex_id(&self, local: u32) -> GlobalId {
+        let block = self.vertex_block(vertex_block_of(self, local));
+        block.first_id + u64::from(local - block.local.start)
+    }
     /// The number of tet blocks.
     fn tet_blocks(&self) -> usize;
     /// Fills `block` with one tet block, reusing its memory.
@@ -91,4 +100,41 @@ pub trait MeshStream: Sync {
     fn boundary_blocks(&self) -> usize;
     /// Fills `block` with one boundary block, reusing its memory.
     fn boundary_block(&self, index: usize, block: &mut BoundaryBlock);
+}
+
+/// The vertex block that has the vertex with this local index, by binary search.
+///
+/// # Panics
+/// If there is no such vertex.
+pub fn vertex_block_of<S: MeshStream + ?Sized>(stream: &S, local: u32) -> usize {
+    let (mut low, mut high) = (0, stream.vertex_blocks());
+    while low < high {
+        let middle = low + (high - low) / 2;
+        let range = stream.vertex_block(middle).local;
+        if range.contains(&local) {
+            return middle;
+        }
+        if range.end <= local {
+            low = middle + 1;
+        } else {
+            high = middle;
+        }
+    }
+    panic!("no vertex {local} in this part");
+}
+
+impl VertexBlock<'_> {
+    /// The global ids of its vertices.
+    pub fn ids(&self) -> Range<GlobalId> {
+        self.first_id..self.first_id + u64::from(self.local.end - self.local.start)
+    }
+
+    /// The rank that owns the vertex with this global id: `holders[id mod holders]`, so that
+    /// every holder knows without a message, and the vertices of one block are spread evenly.
+    pub fn owner(&self, id: GlobalId, rank: Rank) -> Rank {
+        match self.holders.len() as u64 {
+            0 => rank,
+            count => self.holders[(id % count) as usize],
+        }
+    }
 }

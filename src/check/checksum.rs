@@ -1,0 +1,207 @@
+//! A checksum that does not depend on ranks, threads or order, and tells whether every face is matched.
+//!
+//! Sums, modulo 2⁶⁴, of strong hashes of each vertex (global id and the bits of its coordinates; counted by its owner),
+//! each tet (global id, vertices, body) and each side of a boundary triangle (patch, vertices, which side). They
+//! add across ranks. (The idea: p4est's and Omega_h's checksums that are independent of the partition.)
+//!
+//! [`Checksum::open`] is a sum with signs. Each face of each tet adds the hash of its vertices, negative if it is seen
+//! the other way round; each side of a boundary triangle takes one away again. So two tets that share a face cancel, and the
+//! sum over all ranks is 0 for a conforming mesh whose boundary is exactly its boundary triangles;
+//! for any other mesh it is 0 with probability 2⁻⁶⁴. This is the identity "the boundary of the chain of all tets
+//! is the chain of all boundary triangles", tested on a random cochain: no table of faces is needed.
+
+use crate::comm::{CommError, Communicator};
+use crate::mesh::stream::{BoundaryBlock, MeshStream, NO_TET, TetBlock};
+use rayon::prelude::*;
+
+/// See the [module](self).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
+pub struct Checksum {
+    /// Of the vertices.
+    pub vertices: u64,
+    /// Of the tets.
+    pub tets: u64,
+    /// Of the boundary triangles.
+    pub boundary: u64,
+    /// Of the unmatched faces: 0, over all ranks, if there are none.
+    pub open: u64,
+}
+
+impl Checksum {
+    /// The checksum of both together.
+    #[must_use]
+    pub fn plus(self, other: Self) -> Self {
+        Self {
+            vertices: self.vertices.wrapping_add(other.vertices),
+            tets: self.tets.wrapping_add(other.tets),
+            boundary: self.boundary.wrapping_add(other.boundary),
+            open: self.open.wrapping_add(other.open),
+        }
+    }
+}
+
+impl std::fmt::Display for Checksum {
+    fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(out, "{:016x}-{:016x}-{:016x}", self.vertices, self.tets, self.boundary)
+    }
+}
+
+/// **Collective.** The checksum of the whole mesh, on every rank.
+///
+/// # Errors
+/// If another rank fails.
+pub fn checksum_of_all(comm: &dyn Communicator, stream: &dyn MeshStream) -> Result<Checksum, CommError> {
+    let mine = checksum(stream);
+    let bytes = [mine.vertices, mine.tets, mine.boundary, mine.open].map(u64::to_le_bytes).concat();
+    let all = comm.all_gather_bytes(&bytes)?;
+    let sum = |sum: Checksum, bytes: &Vec<u8>| {
+        let number = |k: usize| {
+            u64::from_le_bytes(bytes[8 * k..8 * k + 8].try_into().expect("four numbers from every rank"))
+        };
+        sum.plus(Checksum { vertices: number(0), tets: number(1), boundary: number(2), open: number(3) })
+    };
+    Ok(all.iter().fold(Checksum::default(), sum))
+}
+
+/// *Local.* The checksum of this rank's part.
+pub fn checksum(stream: &dyn MeshStream) -> Checksum {
+    let vertices = (0..stream.vertex_blocks()).into_par_iter().map(|index| of_vertices(stream, index));
+    let tets = (0..stream.tet_blocks())
+        .into_par_iter()
+        .map_init(TetBlock::default, |block, index| of_tets(stream, index, block));
+    let boundary = (0..stream.boundary_blocks())
+        .into_par_iter()
+        .map_init(BoundaryBlock::default, |block, index| of_boundary(stream, index, block));
+    vertices.chain(tets).chain(boundary).reduce(Checksum::default, Checksum::plus)
+}
+
+fn of_vertices(stream: &dyn MeshStream, index: usize) -> Checksum {
+    let block = stream.vertex_block(index);
+    let mut sum = 0_u64;
+    for (local, id) in block.local.clone().zip(block.ids()) {
+        if block.owner(id, stream.rank()) == stream.rank() {
+            let [x, y, z] = stream.points()[local as usize].map(f64::to_bits);
+            sum = sum.wrapping_add(hash([id, x, y, z]));
+        }
+    }
+    Checksum { vertices: sum, ..Checksum::default() }
+}
+
+fn of_tets(stream: &dyn MeshStream, index: usize, block: &mut TetBlock) -> Checksum {
+    stream.tet_block(index, block);
+    let body = block.body.map_or(u64::MAX, |body| u64::from(body.0));
+    let mut sum = Checksum::default();
+    for (id, tet) in (block.first_id..).zip(&block.tets) {
+        let [p, q, r, s] = tet.map(|vertex| stream.vertex_id(vertex));
+        sum.tets = sum.tets.wrapping_add(hash([id, p, q, r, s, body]));
+        sum.open = sum.open.wrapping_add(boundary_of([p, q, r, s]));
+    }
+    sum
+}
+
+fn of_boundary(stream: &dyn MeshStream, index: usize, block: &mut BoundaryBlock) -> Checksum {
+    stream.boundary_block(index, block);
+    let patch = block.patch.map_or(u64::MAX, |patch| u64::from(patch.0));
+    let mut sum = Checksum::default();
+    for (triangle, parents) in block.triangles.iter().zip(&block.parents) {
+        let ids = triangle.map(|vertex| stream.vertex_id(vertex));
+        let [p, q, r] = ids;
+        let face = oriented(ids);
+        // The tet behind sees the triangle as it is, the one in front the other way round.
+        for (side, seen) in [(0, face), (1, face.wrapping_neg())] {
+            if parents[side] != NO_TET {
+                sum.boundary = sum.boundary.wrapping_add(hash([patch, p, q, r, side as u64]));
+                sum.open = sum.open.wrapping_sub(seen);
+            }
+        }
+    }
+    sum
+}
+
+/// The sum of a tet's faces, seen from outside.
+fn boundary_of(tet: [u64; 4]) -> u64 {
+    let (sorted, odd) = sort(tet);
+    let [p, q, r, s] = sorted;
+    // ∂[pqrs] = [qrs] − [prs] + [pqs] − [pqr]
+    let sum = hash([q, r, s])
+        .wrapping_sub(hash([p, r, s]))
+        .wrapping_add(hash([p, q, s]))
+        .wrapping_sub(hash([p, q, r]));
+    if odd { sum.wrapping_neg() } else { sum }
+}
+
+/// The hash of a face, negative if its vertices are an odd permutation of ascending order.
+fn oriented(face: [u64; 3]) -> u64 {
+    let (sorted, odd) = sort(face);
+    if odd { hash(sorted).wrapping_neg() } else { hash(sorted) }
+}
+
+/// Sorts, and tells whether by an odd number of exchanges.
+#[inline]
+fn sort<const N: usize>(mut ids: [u64; N]) -> ([u64; N], bool) {
+    let mut odd = false;
+    for end in (1..N).rev() {
+        for k in 0..end {
+            let exchange = ids[k] > ids[k + 1];
+            odd ^= exchange;
+            (ids[k], ids[k + 1]) = if exchange { (ids[k + 1], ids[k]) } else { (ids[k], ids[k + 1]) };
+        }
+    }
+    (ids, odd)
+}
+
+/// Digits of π: no structure that ids could have.
+const KEYS: [u64; 6] = [
+    0x2438_6A88_85A3_08D3,
+    0x1319_8A2E_0370_7344,
+    0xA409_3822_299F_31D0,
+    0x082E_FA98_EC4E_6C89,
+    0x4528_21E6_38D0_1377,
+    0xBE54_66CF_34E9_0C6C,
+];
+
+/// A hash of a few numbers: each enters through a multiplication to 128 bits whose halves are folded together.
+#[inline]
+fn hash<const N: usize>(numbers: [u64; N]) -> u64 {
+    let mut state = KEYS[5] ^ N as u64;
+    for (number, key) in numbers.into_iter().zip(KEYS) {
+        let product = u128::from(number ^ key) * u128::from(state | 1);
+        state = state.rotate_left(32) ^ product as u64 ^ (product >> 64) as u64;
+    }
+    // The last number too is spread over all bits.
+    let product = u128::from(state ^ KEYS[0]) * u128::from(KEYS[3]);
+    product as u64 ^ (product >> 64) as u64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_hash_changes_half_of_its_bits_with_any_bit_of_its_input() {
+        let flips = |numbers: [u64; 4], word: usize, bit: u32| {
+            let mut other = numbers;
+            other[word] ^= 1 << bit;
+            (hash(numbers) ^ hash(other)).count_ones()
+        };
+        let mut total = 0;
+        for word in 0..4 {
+            for bit in 0..64 {
+                let changed = flips([3, 1, 4, 1], word, bit);
+                assert!((8..=56).contains(&changed), "word {word}, bit {bit}: {changed}");
+                total += changed;
+            }
+        }
+        assert!((total / 256).abs_diff(32) <= 1, "{total}");
+    }
+
+    #[test]
+    fn faces_of_two_tets_that_share_one_cancel() {
+        let sum = boundary_of([0, 1, 2, 3]).wrapping_add(boundary_of([1, 2, 3, 4]));
+        let left = [[0, 1, 2], [0, 3, 1], [0, 2, 3]].map(|[p, q, r]| oriented([p, r, q]));
+        let right = [[1, 2, 4], [2, 3, 4], [3, 1, 4]].map(oriented);
+        let outside = left.into_iter().chain(right).fold(0_u64, u64::wrapping_add);
+        assert_eq!(sum, outside);
+        assert_ne!(sum, 0);
+    }
+}

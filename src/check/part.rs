@@ -1,0 +1,249 @@
+//! The check of a part: its vertex blocks, boundary and tets, each in one parallel pass.
+
+use super::boundary::{Side, check_block, check_parents, check_range, sides_of};
+use super::report::{Extreme, PartReport, RATIO_BINS, ShapeReport};
+use super::shape::{Batch, Shapes};
+use super::{Fault, angles};
+use crate::comm::{CommError, Communicator};
+use crate::mesh::stream::{BoundaryBlock, MeshStream, TetBlock};
+use csg::Projector;
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// What to check.
+#[derive(Clone, Copy, Debug)]
+pub struct Settings {
+    /// Whether to measure the shapes of the tets.
+    pub shapes: bool,
+    /// How many faults to describe one by one.
+    pub described: usize,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self { shapes: true, described: 8 }
+    }
+}
+
+/// Blocks are checked in at most this many chunks, whose sums are added in order: enough to keep any
+/// number of threads busy, few enough that their reports take no memory to speak of.
+const CHUNKS: usize = 1024;
+
+/// *Local.* Checks this rank's part: exact orientation of every tet, blocks without gaps, boundary triangles on their
+/// patches (if `projector` is given) and on the tets they name. The report is the same for any number of threads.
+///
+/// Not checked here: whether faces match between tets. The [`checksum`](super::checksum()) tells.
+pub fn check_part(stream: &dyn MeshStream, projector: Option<&Projector>, settings: &Settings) -> PartReport {
+    let mut report = check_vertices(stream, settings);
+    let (boundary, sides) = check_boundary(stream, projector, settings);
+    report = report.merged(boundary, settings.described);
+    check_range(stream, &sides, settings, &mut report);
+    report.merged(check_tets(stream, &sides, settings), settings.described)
+}
+
+/// **Collective.** Checks all parts; every rank gets the report of the whole mesh, its counts compared with what the
+/// parts state.
+///
+/// # Errors
+/// If another rank fails.
+pub fn check(
+    comm: &dyn Communicator,
+    stream: &dyn MeshStream,
+    projector: Option<&Projector>,
+    settings: &Settings,
+) -> Result<PartReport, CommError> {
+    let mine = check_part(stream, projector, settings);
+    let bytes = serde_json::to_vec(&mine).expect("plain data with text keys");
+    let all = comm.all_gather_bytes(&bytes)?;
+    // Its own report too goes through text, so that all ranks merge the same numbers.
+    let all = all.iter().map(|bytes| serde_json::from_slice(bytes).expect("what this program wrote"));
+    let merged = all.reduce(|a: PartReport, b| a.merged(b, settings.described));
+    let mut report = merged.unwrap_or_default();
+    let totals = stream.totals();
+    let found = [report.vertices, report.tets, report.boundary];
+    let stated = [totals.vertices, totals.tets, totals.boundary];
+    if found != stated {
+        report.add_fault(Fault::Count { found, stated }, settings.described);
+    }
+    Ok(report)
+}
+
+/// Cuts `count` blocks into chunks, whatever the number of threads.
+fn chunks(count: usize) -> impl IndexedParallelIterator<Item = Range<usize>> {
+    let size = count.div_ceil(CHUNKS).max(1);
+    (0..count.div_ceil(size)).into_par_iter().map(move |chunk| chunk * size..count.min((chunk + 1) * size))
+}
+
+/// Merges reports in order.
+fn merge_all(reports: Vec<PartReport>, settings: &Settings) -> PartReport {
+    reports.into_iter().fold(PartReport::default(), |all, one| all.merged(one, settings.described))
+}
+
+/// Counts owned vertices; vertex blocks must follow each other without gaps.
+fn check_vertices(stream: &dyn MeshStream, settings: &Settings) -> PartReport {
+    let blocks = stream.vertex_blocks();
+    let count = |range: Range<usize>| {
+        let mut report = PartReport::default();
+        for index in range {
+            let block = stream.vertex_block(index);
+            let next = match index + 1 {
+                next if next < blocks => stream.vertex_block(next).local.start,
+                _ => stream.points().len() as u32,
+            };
+            if block.local.end != next || index == 0 && block.local.start != 0 {
+                let at = u64::from(block.local.end);
+                report.add_fault(Fault::Gap { rank: stream.rank(), at }, settings.described);
+            }
+            let owned = block.ids().filter(|&id| block.owner(id, stream.rank()) == stream.rank());
+            report.vertices +=
+                if block.holders.is_empty() { block.local.len() as u64 } else { owned.count() as u64 };
+        }
+        report
+    };
+    merge_all(chunks(blocks).map(count).collect(), settings)
+}
+
+fn check_boundary(
+    stream: &dyn MeshStream,
+    projector: Option<&Projector>,
+    settings: &Settings,
+) -> (PartReport, Vec<Side>) {
+    let check = |block: &mut BoundaryBlock, range: Range<usize>| {
+        let mut sides = Vec::new();
+        let reports =
+            range.map(|index| check_block(stream, projector, index, block, &mut sides, settings)).collect();
+        (merge_all(reports, settings), sides)
+    };
+    let checked: Vec<_> = chunks(stream.boundary_blocks()).map_init(BoundaryBlock::default, check).collect();
+    let (reports, sides): (Vec<_>, Vec<_>) = checked.into_iter().unzip();
+    let mut sides = sides.concat();
+    sides.par_sort_unstable();
+    (merge_all(reports, settings), sides)
+}
+
+/// Scratch space of one thread.
+#[derive(Default)]
+struct Scratch {
+    tets: TetBlock,
+    boundary: BoundaryBlock,
+    batch: Batch,
+    shapes: Shapes,
+}
+
+fn check_tets(stream: &dyn MeshStream, sides: &[Side], settings: &Settings) -> PartReport {
+    let check = |scratch: &mut Scratch, range| check_chunk(stream, sides, settings, scratch, range);
+    let checked: Vec<_> = chunks(stream.tet_blocks()).map_init(Scratch::default, check).collect();
+    let mut report = PartReport::default();
+    let mut next = 0;
+    for (tets, chunk) in checked {
+        if tets.start != next {
+            report.add_fault(Fault::Gap { rank: stream.rank(), at: next }, settings.described);
+        }
+        next = tets.end;
+        report = report.merged(chunk, settings.described);
+    }
+    report
+}
+
+/// Checks the tets of some blocks; also returns their range.
+fn check_chunk(
+    stream: &dyn MeshStream,
+    sides: &[Side],
+    settings: &Settings,
+    scratch: &mut Scratch,
+    blocks: Range<usize>,
+) -> (Range<u64>, PartReport) {
+    let mut report = PartReport::default();
+    let mut covered: Option<Range<u64>> = None;
+    let points = stream.points();
+    let mut body = None;
+    for index in blocks {
+        let Scratch { tets, boundary, batch, shapes } = &mut *scratch;
+        stream.tet_block(index, tets);
+        let range = tets.first_local..tets.first_local + tets.tets.len() as u64;
+        if let Some(before) = covered.as_ref().filter(|before| before.end != range.start) {
+            report.add_fault(Fault::Gap { rank: stream.rank(), at: before.end }, settings.described);
+        }
+        covered = Some(covered.map_or(range.start, |before| before.start)..range.end);
+        if tets.body != body {
+            flush(batch, shapes, body, settings, &mut report);
+            body = tets.body;
+        }
+        for (id, tet) in (tets.first_id..).zip(&tets.tets) {
+            if let Some(&vertex) = tet.iter().find(|v| **v as usize >= points.len()) {
+                report.add_fault(Fault::NoSuchVertex { rank: stream.rank(), vertex }, settings.described);
+                continue;
+            }
+            let at = |k: usize| points[tet[k] as usize];
+            batch.push(id, [at(0), at(1), at(2), at(3)]);
+            if batch.is_full() {
+                flush(batch, shapes, body, settings, &mut report);
+            }
+        }
+        for side in sides_of(sides, tets) {
+            check_parents(stream, *side, tets, boundary, settings, &mut report);
+        }
+    }
+    flush(&mut scratch.batch, &mut scratch.shapes, body, settings, &mut report);
+    (covered.unwrap_or(0..0), report)
+}
+
+/// Takes the tets of a batch into the report and empties it.
+fn flush(
+    batch: &mut Batch,
+    shapes: &mut Shapes,
+    body: Option<csg::BodyId>,
+    settings: &Settings,
+    report: &mut PartReport,
+) {
+    if batch.is_empty() {
+        return;
+    }
+    batch.volumes(shapes);
+    let mut volume6 = 0.0;
+    for lane in 0..batch.len() {
+        volume6 += shapes.volume6[lane];
+        if !batch.is_positive(shapes, lane) {
+            let fault = Fault::NotPositive { tet: batch.id(lane), place: batch.centroid(lane) };
+            report.add_fault(fault, settings.described);
+        }
+    }
+    report.tets += batch.len() as u64;
+    report.volume += volume6 / 6.0;
+    if let Some(body) = body {
+        if report.body_volumes.len() <= body.index() {
+            report.body_volumes.resize(body.index() + 1, 0.0);
+        }
+        report.body_volumes[body.index()] += volume6 / 6.0;
+    }
+    if settings.shapes {
+        batch.shapes(shapes);
+        add_shapes(batch, shapes, &mut report.shape);
+    }
+    batch.clear();
+}
+
+fn add_shapes(batch: &Batch, shapes: &Shapes, report: &mut Option<ShapeReport>) {
+    let extreme = |value, lane| Extreme { value, tet: batch.id(lane), place: batch.centroid(lane) };
+    let degrees = |cosine: f64| cosine.clamp(-1.0, 1.0).acos().to_degrees();
+    // Cosines fall with the angle: the smallest angle has the largest. Only extremes become angles.
+    let (mut worst, mut smallest, mut largest) = (0, 0, 0);
+    for lane in 1..batch.len() {
+        let less = |values: &[f64], than: usize| if values[lane] < values[than] { lane } else { than };
+        worst = less(&shapes.mean_ratio, worst);
+        largest = less(&shapes.largest, largest);
+        smallest = if shapes.smallest[lane] > shapes.smallest[smallest] { lane } else { smallest };
+    }
+    let worst = extreme(shapes.mean_ratio[worst], worst);
+    let smallest = extreme(degrees(shapes.smallest[smallest]), smallest);
+    let largest = extreme(degrees(shapes.largest[largest]), largest);
+    let report = report.get_or_insert_with(|| ShapeReport::of(worst, smallest, largest));
+    report.take_extremes(worst, smallest, largest);
+    for lane in 0..batch.len() {
+        let ratio = shapes.mean_ratio[lane];
+        report.sum_of_ratios += ratio;
+        report.ratios[((ratio * RATIO_BINS as f64) as usize).min(RATIO_BINS - 1)] += 1;
+        report.smallest_angles[angles::whole_degrees(shapes.smallest[lane])] += 1;
+        report.largest_angles[angles::whole_degrees(shapes.largest[lane])] += 1;
+    }
+}

@@ -1,0 +1,189 @@
+//! What a check found, as plain data that merges.
+
+use super::Fault;
+use super::angles::DEGREES;
+use crate::mesh::GlobalId;
+use serde::{Deserialize, Serialize};
+
+/// A largest or smallest value, and the tet that has it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Extreme {
+    /// The value.
+    pub value: f64,
+    /// The global id of the tet; of equals the lowest.
+    pub tet: GlobalId,
+    /// Its centroid.
+    pub place: [f64; 3],
+}
+
+impl Extreme {
+    /// The smaller one.
+    fn least(self, other: Self) -> Self {
+        let first = self.value < other.value || self.value == other.value && self.tet <= other.tet;
+        if first { self } else { other }
+    }
+
+    /// The larger one.
+    fn greatest(self, other: Self) -> Self {
+        let first = self.value > other.value || self.value == other.value && self.tet <= other.tet;
+        if first { self } else { other }
+    }
+}
+
+/// Bins of the mean ratio from 0 to 1.
+pub const RATIO_BINS: usize = 20;
+
+/// The shapes of tets.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ShapeReport {
+    /// The worst mean ratio.
+    pub worst_ratio: Extreme,
+    /// The sum of the mean ratios.
+    pub sum_of_ratios: f64,
+    /// The smallest dihedral angle, degrees.
+    pub smallest_angle: Extreme,
+    /// The largest dihedral angle, degrees.
+    pub largest_angle: Extreme,
+    /// Tets by mean ratio: 0 to 0.05 (and below), 0.05 to 0.1, ….
+    pub ratios: Vec<u64>,
+    /// Tets by the whole degrees of their smallest dihedral angle.
+    pub smallest_angles: Vec<u64>,
+    /// Tets by the whole degrees of their largest dihedral angle.
+    pub largest_angles: Vec<u64>,
+}
+
+impl ShapeReport {
+    /// With these extremes, and no tet counted yet.
+    pub fn of(worst_ratio: Extreme, smallest_angle: Extreme, largest_angle: Extreme) -> Self {
+        Self {
+            worst_ratio,
+            sum_of_ratios: 0.0,
+            smallest_angle,
+            largest_angle,
+            ratios: vec![0; RATIO_BINS],
+            smallest_angles: vec![0; DEGREES],
+            largest_angles: vec![0; DEGREES],
+        }
+    }
+
+    /// The degrees below which a fraction of the tets has its smallest dihedral angle, linear within a bin of one degree.
+    pub fn smallest_angle_percentile(&self, fraction: f64) -> f64 {
+        let wanted = fraction * self.smallest_angles.iter().sum::<u64>() as f64;
+        let mut below = 0.0;
+        for (degrees, &count) in self.smallest_angles.iter().enumerate() {
+            if count > 0 && below + count as f64 >= wanted {
+                return degrees as f64 + (wanted - below) / count as f64;
+            }
+            below += count as f64;
+        }
+        DEGREES as f64
+    }
+
+    /// Keeps the more extreme ones.
+    pub fn take_extremes(&mut self, worst_ratio: Extreme, smallest_angle: Extreme, largest_angle: Extreme) {
+        self.worst_ratio = self.worst_ratio.least(worst_ratio);
+        self.smallest_angle = self.smallest_angle.least(smallest_angle);
+        self.largest_angle = self.largest_angle.greatest(largest_angle);
+    }
+
+    fn merge(&mut self, other: &Self) {
+        self.take_extremes(other.worst_ratio, other.smallest_angle, other.largest_angle);
+        self.sum_of_ratios += other.sum_of_ratios;
+        let bins = [
+            (&mut self.ratios, &other.ratios),
+            (&mut self.smallest_angles, &other.smallest_angles),
+            (&mut self.largest_angles, &other.largest_angles),
+        ];
+        for (mine, others) in bins {
+            mine.iter_mut().zip(others).for_each(|(m, o)| *m += o);
+        }
+    }
+}
+
+/// The boundary vertex furthest from its patch.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct OffSurface {
+    /// How far, a length.
+    pub distance: f64,
+    /// Its global id; of equals the lowest.
+    pub vertex: GlobalId,
+    /// The patch, as an index.
+    pub patch: u32,
+    /// Where it is.
+    pub place: [f64; 3],
+}
+
+impl OffSurface {
+    /// The one further off.
+    pub fn further(self, other: Self) -> Self {
+        let key = |o: &Self| (o.vertex, o.patch);
+        let first =
+            self.distance > other.distance || self.distance == other.distance && key(&self) <= key(&other);
+        if first { self } else { other }
+    }
+}
+
+/// What a check found in a part, or in several.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct PartReport {
+    /// Vertices, each counted where it is owned.
+    pub vertices: u64,
+    /// Tets.
+    pub tets: u64,
+    /// Boundary triangles, each counted where the tet behind it is.
+    pub boundary: u64,
+    /// The sum of the volumes of the tets.
+    pub volume: f64,
+    /// The same for each body, by its index.
+    pub body_volumes: Vec<f64>,
+    /// The number of faults. (A vertex off its surface counts on each rank that holds it.)
+    pub faults: u64,
+    /// The first of them.
+    pub described: Vec<Fault>,
+    /// The shapes of the tets; absent if there are none, or if they were not asked for.
+    pub shape: Option<ShapeReport>,
+    /// The boundary vertex furthest from its patch; absent if there is none, or no geometry was given.
+    pub furthest: Option<OffSurface>,
+}
+
+impl PartReport {
+    /// Takes up what was found in another part, which comes after this one.
+    ///
+    /// Associative but for the rounding of the sums of volumes and mean ratios.
+    #[must_use]
+    pub fn merged(mut self, other: Self, described: usize) -> Self {
+        self.vertices += other.vertices;
+        self.tets += other.tets;
+        self.boundary += other.boundary;
+        self.volume += other.volume;
+        if self.body_volumes.len() < other.body_volumes.len() {
+            self.body_volumes.resize(other.body_volumes.len(), 0.0);
+        }
+        self.body_volumes.iter_mut().zip(&other.body_volumes).for_each(|(m, o)| *m += o);
+        self.faults += other.faults;
+        self.described.extend(other.described);
+        self.described.truncate(described);
+        match (&mut self.shape, other.shape) {
+            (Some(mine), Some(others)) => mine.merge(&others),
+            (mine, others) => *mine = mine.take().or(others),
+        }
+        self.furthest = match (self.furthest, other.furthest) {
+            (Some(mine), Some(others)) => Some(mine.further(others)),
+            (mine, others) => mine.or(others),
+        };
+        self
+    }
+
+    /// Adds a fault; the first `described` are kept.
+    pub fn add_fault(&mut self, fault: Fault, described: usize) {
+        self.faults += 1;
+        if self.described.len() < described {
+            self.described.push(fault);
+        }
+    }
+
+    /// The mean of the mean ratios.
+    pub fn mean_ratio(&self) -> Option<f64> {
+        self.shape.as_ref().map(|shape| shape.sum_of_ratios / self.tets as f64)
+    }
+}

@@ -1,0 +1,233 @@
+//! Volume, mean ratio and dihedral angles of many tets at a time.
+//!
+//! Tets are taken in batches, coordinate by coordinate, so that the compiler can turn the loops over a batch into
+//! vector instructions. Every operation is a basic one of IEEE arithmetic: the numbers are the same on all machines.
+
+use crate::Point;
+use crate::kernel::predicates::{Sign, orient3d, volume6_and_error};
+
+/// Tets in a batch: enough to fill vector registers, few enough to stay in the first cache.
+pub const BATCH: usize = 64;
+
+/// Tets by coordinate.
+#[derive(Clone, Debug)]
+pub struct Batch {
+    count: usize,
+    /// By corner, then by axis.
+    corners: [[[f64; BATCH]; 3]; 4],
+    ids: [u64; BATCH],
+}
+
+/// What a batch of tets is like; entries from the batch's length on mean nothing.
+#[derive(Clone, Debug)]
+pub struct Shapes {
+    /// Six times the volumes.
+    pub volume6: [f64; BATCH],
+    /// Bounds of the errors of `volume6`.
+    pub error: [f64; BATCH],
+    /// Mean ratios: 1 for the regular tet, negative for an inverted one.
+    pub mean_ratio: [f64; BATCH],
+    /// Cosine of the smallest dihedral angle.
+    pub smallest: [f64; BATCH],
+    /// Cosine of the largest dihedral angle.
+    pub largest: [f64; BATCH],
+}
+
+impl Default for Shapes {
+    fn default() -> Self {
+        let zero = [0.0; BATCH];
+        Self { volume6: zero, error: zero, mean_ratio: zero, smallest: zero, largest: zero }
+    }
+}
+
+impl Default for Batch {
+    fn default() -> Self {
+        Self { count: 0, corners: [[[0.0; BATCH]; 3]; 4], ids: [0; BATCH] }
+    }
+}
+
+impl Batch {
+    /// The number of tets.
+    pub fn len(&self) -> usize {
+        self.count
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.count == 0
+    }
+
+    /// Whether there is room for no more.
+    pub fn is_full(&self) -> bool {
+        self.count == BATCH
+    }
+
+    /// Empties the batch.
+    pub fn clear(&mut self) {
+        self.count = 0;
+    }
+
+    /// Adds a tet.
+    ///
+    /// # Panics
+    /// If the batch is full.
+    #[inline]
+    pub fn push(&mut self, id: u64, corners: [[f64; 3]; 4]) {
+        let lane = self.count;
+        self.ids[lane] = id;
+        for (axes, corner) in self.corners.iter_mut().zip(corners) {
+            for (axis, coordinate) in axes.iter_mut().zip(corner) {
+                axis[lane] = coordinate;
+            }
+        }
+        self.count += 1;
+    }
+
+    /// The id of a tet.
+    pub fn id(&self, lane: usize) -> u64 {
+        self.ids[lane]
+    }
+
+    /// The corners of a tet.
+    pub fn tet(&self, lane: usize) -> [Point; 4] {
+        [0, 1, 2, 3].map(|k| Point::from([0, 1, 2].map(|x| self.corners[k][x][lane])))
+    }
+
+    /// The centroid of a tet.
+    pub fn centroid(&self, lane: usize) -> [f64; 3] {
+        let [p, q, r, s] = self.tet(lane).map(|p| p.coords);
+        ((p + q + r + s) / 4.0).into()
+    }
+
+    #[inline(always)]
+    fn edge(&self, from: usize, to: usize, lane: usize) -> [f64; 3] {
+        // Written out: closures in `map` are not always inlined, and this is the innermost loop.
+        let (p, q) = (&self.corners[from], &self.corners[to]);
+        [q[0][lane] - p[0][lane], q[1][lane] - p[1][lane], q[2][lane] - p[2][lane]]
+    }
+
+    /// Volumes and their error bounds.
+    pub fn volumes(&self, shapes: &mut Shapes) {
+        for lane in 0..BATCH {
+            let edges = [self.edge(0, 1, lane), self.edge(0, 2, lane), self.edge(0, 3, lane)];
+            (shapes.volume6[lane], shapes.error[lane]) = volume6_and_error(edges);
+        }
+    }
+
+    /// Whether a tet is positively oriented, exactly; after [`volumes`](Self::volumes).
+    #[inline]
+    pub fn is_positive(&self, shapes: &Shapes, lane: usize) -> bool {
+        if shapes.volume6[lane] > shapes.error[lane] {
+            return true;
+        }
+        let [p, q, r, s] = self.tet(lane);
+        orient3d(&p, &q, &r, &s) == Sign::Positive
+    }
+
+    /// Mean ratios and dihedral angles; after [`volumes`](Self::volumes).
+    pub fn shapes(&self, shapes: &mut Shapes) {
+        for lane in 0..BATCH {
+            let length = |p, q| square(self.edge(p, q, lane));
+            let squares =
+                length(0, 1) + length(0, 2) + length(0, 3) + length(1, 2) + length(1, 3) + length(2, 3);
+            let half = 0.5 * shapes.volume6[lane];
+            // 12 (6V/2)^⅔ / Σl² = 12 ((6V/2)² / (Σl²)³)^⅓, free of units under the root.
+            shapes.mean_ratio[lane] = half * half / (squares * squares * squares);
+        }
+        for lane in 0..BATCH {
+            shapes.mean_ratio[lane] =
+                (12.0 * cube_root(shapes.mean_ratio[lane])).copysign(shapes.volume6[lane]);
+        }
+        for lane in 0..BATCH {
+            (shapes.smallest[lane], shapes.largest[lane]) = self.extreme_cosines(lane);
+        }
+    }
+
+    /// The cosines of the smallest and largest dihedral angle.
+    #[inline(always)]
+    fn extreme_cosines(&self, lane: usize) -> (f64, f64) {
+        let [u, v, w] = [self.edge(0, 1, lane), self.edge(0, 2, lane), self.edge(0, 3, lane)];
+        let opposite = [self.edge(1, 2, lane), self.edge(1, 3, lane)];
+        // Outward, each of the face opposite its corner.
+        let normals = [cross(opposite[0], opposite[1]), cross(w, v), cross(u, w), cross(v, u)];
+        let length = |k: usize| 1.0 / square(normals[k]).sqrt();
+        let inverse = [length(0), length(1), length(2), length(3)];
+        let cosine = |p: usize, q: usize| -dot(normals[p], normals[q]) * (inverse[p] * inverse[q]);
+        let cosines = [cosine(0, 1), cosine(0, 2), cosine(0, 3), cosine(1, 2), cosine(1, 3), cosine(2, 3)];
+        let more = |p: f64, q: f64| if q > p { q } else { p };
+        let less = |p: f64, q: f64| if q < p { q } else { p };
+        let [a, b, c, d, e, f] = cosines;
+        (more(more(more(a, b), more(c, d)), more(e, f)), less(less(less(a, b), less(c, d)), less(e, f)))
+    }
+}
+
+#[inline(always)]
+fn dot(p: [f64; 3], q: [f64; 3]) -> f64 {
+    p[0] * q[0] + p[1] * q[1] + p[2] * q[2]
+}
+
+#[inline(always)]
+fn square(p: [f64; 3]) -> f64 {
+    dot(p, p)
+}
+
+#[inline(always)]
+fn cross(p: [f64; 3], q: [f64; 3]) -> [f64; 3] {
+    [p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]]
+}
+
+/// The cube root of a number that is not negative, to within 10⁻¹⁵ relative (below 10⁻²⁹⁰: zero).
+///
+/// A third of the exponent, from the bits, is within 5 %; each step of Halley's method cubes the error.
+#[inline(always)]
+fn cube_root(x: f64) -> f64 {
+    /// Two thirds of the exponent's bias, less what halves the worst error.
+    const BIAS: u64 = 0x2A9F_7893_782D_A1CE;
+    let mut root = f64::from_bits(x.to_bits() / 3 + BIAS);
+    for _ in 0..3 {
+        let cube = root * root * root;
+        root *= (cube + 2.0 * x) / (2.0 * cube + x);
+    }
+    if x > 1e-290 { root } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::kernel::quality::mean_ratio;
+    use crate::kernel::simplex::{dihedral_angles, volume6};
+    use proptest::prelude::*;
+
+    #[test]
+    fn cube_roots_are_those_of_the_standard_library() {
+        for k in 1..4000 {
+            let x = 1.01_f64.powi(k - 4000);
+            assert!((cube_root(x) / x.cbrt() - 1.0).abs() < 1e-15, "{x}");
+        }
+        assert_eq!(cube_root(0.0), 0.0);
+    }
+
+    proptest! {
+        #[test]
+        fn a_batch_measures_what_the_kernel_measures(p in prop::array::uniform4(prop::array::uniform3(-1.0..1.0))) {
+            let points = p.map(Point::from);
+            let [a, b, c, d] = &points;
+            prop_assume!(volume6(a, b, c, d).abs() > 1e-3);
+            let (mut batch, mut shapes) = (Batch::default(), Shapes::default());
+            batch.push(7, p);
+            batch.volumes(&mut shapes);
+            batch.shapes(&mut shapes);
+            prop_assert!((shapes.volume6[0] - volume6(a, b, c, d)).abs() < 1e-14);
+            prop_assert!((shapes.mean_ratio[0] - mean_ratio(a, b, c, d)).abs() < 1e-13);
+            let positive = volume6(a, b, c, d) > 0.0;
+            prop_assert_eq!(batch.is_positive(&shapes, 0), positive);
+            if positive {
+                let angles = dihedral_angles(&points);
+                let smallest = angles.iter().copied().fold(180.0, f64::min);
+                let largest = angles.iter().copied().fold(0.0, f64::max);
+                prop_assert!((shapes.smallest[0].acos().to_degrees() - smallest).abs() < 1e-6);
+                prop_assert!((shapes.largest[0].acos().to_degrees() - largest).abs() < 1e-6);
+            }
+        }
+    }
+}

@@ -1,0 +1,220 @@
+//! The verdict on Elmer files: every fault of the mesh they hold, with its file and line.
+//!
+//! Judged is what Elmer and its users rely on, from the files alone: tables of ids that fit each other, shared
+//! nodes known to all their holders, positive tets that fill the body without gap or overlap, and a boundary that
+//! covers each outer face once with the parent beside it. That the outer surface is closed need not be looked at:
+//! it is the boundary of a set of tets.
+
+use super::parse::ReadError;
+use super::read::{ElmerMesh, Layout, layouts, read_layout};
+use super::{faults_faces, faults_nodes};
+use std::collections::BTreeMap;
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+/// What can be wrong.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum FaultKind {
+    /// `partitioning.N` does not hold N parts.
+    PartCount,
+    /// A count in a header is not that of the file.
+    Count,
+    /// A part has no elements.
+    EmptyPart,
+    /// A body or boundary number is 0.
+    ZeroNumber,
+    /// A node stands twice in a part.
+    NodeTwice,
+    /// A coordinate is no finite number.
+    NotFinite,
+    /// Copies of a node differ in their coordinates.
+    CopiesDiffer,
+    /// A node belongs to no element of its part.
+    UnusedNode,
+    /// An element or boundary element uses a node that its part lacks.
+    NoSuchNode,
+    /// A node in several parts is not in the `.shared` of each.
+    NotShared,
+    /// The parts listed in `.shared` are not those that hold the node.
+    WrongHolders,
+    /// Parts name different owners of a node.
+    OwnersDiffer,
+    /// A node in `.shared` is in no other part.
+    NeedlesslyShared,
+    /// An element id stands twice in the mesh.
+    ElementTwice,
+    /// Two elements have the same nodes.
+    SameElement,
+    /// An element is not positively oriented.
+    Inverted,
+    /// More than two elements have a face in common.
+    CrowdedFace,
+    /// Two elements lie on the same side of their common face.
+    Overlap,
+    /// An outer face, or an interface face on one of its two sides, has no boundary element.
+    NoBoundary,
+    /// A boundary element is no face of an element of its part.
+    NoFace,
+    /// A boundary element stands twice in its part.
+    BoundaryTwice,
+    /// Two parts give an interface face different boundary numbers.
+    NumbersDiffer,
+    /// A parent is missing, or is not beside the boundary element.
+    WrongParent,
+    /// The normal of an outer boundary element points inward.
+    Inward,
+}
+
+impl fmt::Display for FaultKind {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str(match self {
+            Self::PartCount => "folder named for another number of parts",
+            Self::Count => "wrong count in a header",
+            Self::EmptyPart => "part without elements",
+            Self::ZeroNumber => "body or boundary number 0",
+            Self::NodeTwice => "node twice in a part",
+            Self::NotFinite => "coordinate that is no number",
+            Self::CopiesDiffer => "node with different coordinates in different parts",
+            Self::UnusedNode => "node of no element",
+            Self::NoSuchNode => "node that the part lacks",
+            Self::NotShared => "shared node missing in .shared",
+            Self::WrongHolders => "wrong holders in .shared",
+            Self::OwnersDiffer => "node with different owners in different parts",
+            Self::NeedlesslyShared => "node in .shared that is in one part only",
+            Self::ElementTwice => "element id twice",
+            Self::SameElement => "two elements with the same nodes",
+            Self::Inverted => "element inverted or flat",
+            Self::CrowdedFace => "face of more than two elements",
+            Self::Overlap => "two elements on the same side of a face",
+            Self::NoBoundary => "face without its boundary element",
+            Self::NoFace => "boundary element that is no face",
+            Self::BoundaryTwice => "boundary element twice",
+            Self::NumbersDiffer => "different boundary numbers on the two sides",
+            Self::WrongParent => "wrong or missing parent",
+            Self::Inward => "boundary element with inward normal",
+        })
+    }
+}
+
+/// One fault.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Fault {
+    /// Its kind.
+    pub kind: FaultKind,
+    /// The file that has it, or the folder.
+    pub file: PathBuf,
+    /// The line, from 1; 0 where no line has it.
+    pub line: u64,
+    /// The ids.
+    pub what: String,
+}
+
+impl fmt::Display for Fault {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        write!(f, "{}", self.file.display())?;
+        if self.line > 0 {
+            write!(f, ":{}", self.line)?;
+        }
+        write!(f, ": {}", self.what)
+    }
+}
+
+/// The faults of a mesh: how many of each kind, and the first few of each.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Faults {
+    /// How many of each kind.
+    pub counts: BTreeMap<FaultKind, u64>,
+    /// At most [`Self::SHOWN`] of each kind, in the order of the files.
+    pub first: Vec<Fault>,
+}
+
+impl Faults {
+    /// How many faults of a kind are kept.
+    pub const SHOWN: u64 = 10;
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.counts.is_empty()
+    }
+
+    /// How many of a kind.
+    pub fn count(&self, kind: FaultKind) -> u64 {
+        self.counts.get(&kind).copied().unwrap_or(0)
+    }
+
+    /// Notes a fault; `what` is asked only if it is kept.
+    pub(super) fn add(&mut self, kind: FaultKind, file: PathBuf, line: usize, what: impl FnOnce() -> String) {
+        let count = self.counts.entry(kind).or_default();
+        *count += 1;
+        if *count <= Self::SHOWN {
+            self.first.push(Fault { kind, file, line: line as u64, what: what() });
+        }
+    }
+}
+
+impl fmt::Display for Faults {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        for (kind, count) in &self.counts {
+            writeln!(f, "{kind}: {count}")?;
+            for fault in self.first.iter().filter(|fault| fault.kind == *kind) {
+                writeln!(f, "  {fault}")?;
+            }
+            if *count > Self::SHOWN {
+                writeln!(f, "  … and {} more", count - Self::SHOWN)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Reads each mesh in a folder (see [`layouts`]) and judges it.
+pub fn check_elmer(dir: &Path) -> Result<Vec<(Layout, Faults)>, ReadError> {
+    let judge = |layout: Layout| read_layout(&layout).map(|mesh| (layout, faults(&mesh)));
+    layouts(dir)?.into_iter().map(judge).collect()
+}
+
+/// All faults of a mesh.
+pub fn faults(mesh: &ElmerMesh) -> Faults {
+    let mut faults = Faults::default();
+    check_counts(mesh, &mut faults);
+    let tables = faults_nodes::check_nodes(mesh, &mut faults);
+    faults_nodes::check_shared(mesh, &mut faults);
+    faults_faces::check_elements_and_boundary(mesh, &tables, &mut faults);
+    faults
+}
+
+fn check_counts(mesh: &ElmerMesh, faults: &mut Faults) {
+    if let Layout::Partitioned { folder, parts } = &mesh.layout {
+        let name = folder.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+        if name.strip_prefix("partitioning.").is_some_and(|n| n != parts.to_string()) {
+            faults.add(FaultKind::PartCount, folder.clone(), 0, || format!("holds {parts} parts"));
+        }
+    }
+    for part in &mesh.parts {
+        let header = &part.header;
+        let mut types = vec![(super::TRIANGLE, part.boundary.len()), (super::TET, part.elements.len())];
+        types.retain(|(_, count)| *count > 0);
+        let mut stated: Vec<_> = header.types.iter().map(|&(code, n)| (code, n as usize)).collect();
+        stated.retain(|(_, count)| *count > 0);
+        stated.sort_unstable();
+        let mut count = |line: usize, what: &str, said: u32, found: usize| {
+            if said as usize != found {
+                let text = || format!("says {said} {what}, the file has {found}");
+                faults.add(FaultKind::Count, part.file("header"), line, text);
+            }
+        };
+        count(1, "nodes", header.nodes, part.nodes.len());
+        count(1, "elements", header.elements, part.elements.len());
+        count(1, "boundary elements", header.boundary, part.boundary.len());
+        if let Some(shared) = header.shared {
+            count(3 + header.types.len(), "shared nodes", shared, part.shared.len());
+        }
+        if stated != types {
+            let text = || format!("says {stated:?} of the types, the files have {types:?}");
+            faults.add(FaultKind::Count, part.file("header"), 2, text);
+        }
+        if part.elements.is_empty() {
+            faults.add(FaultKind::EmptyPart, part.file("elements"), 0, || "no elements".into());
+        }
+    }
+}

@@ -1,0 +1,248 @@
+//! Faults of elements and boundary elements: ids, orientation, what lies beside each face.
+
+use super::faults::{FaultKind, Faults};
+use super::faults_nodes::NodeTable;
+use super::read::{BoundaryElement, Element, ElmerMesh};
+use crate::kernel::predicates::{Sign, orient3d};
+use crate::mesh::TET_FACES;
+use rayon::prelude::*;
+
+/// Nodes of a face, ascending.
+type Key = [u32; 3];
+
+/// An element or boundary element: part and place in its file.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Place {
+    part: u32,
+    index: u32,
+}
+
+/// A face as one element, or one boundary element, has it.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Side {
+    key: Key,
+    place: Place,
+    /// Whether the face, with its normal outward from the element (or that of the boundary element), is an even
+    /// permutation of its key.
+    even: bool,
+}
+
+pub(super) fn check_elements_and_boundary(mesh: &ElmerMesh, tables: &[NodeTable], faults: &mut Faults) {
+    check_element_ids(mesh, faults);
+    let signs = check_orientation(mesh, tables, faults);
+    let judge = Judge { mesh, sides: element_sides(mesh, &signs), boundary: boundary_sides(mesh) };
+    judge.check_faces(faults);
+    judge.check_boundary(faults);
+}
+
+fn check_element_ids(mesh: &ElmerMesh, faults: &mut Faults) {
+    let mut ids: Vec<(u32, Place)> = Vec::new();
+    for (part, p) in mesh.parts.iter().zip(0..) {
+        ids.extend(part.elements.iter().zip(0..).map(|(e, index)| (e.id, Place { part: p, index })));
+    }
+    ids.par_sort_unstable();
+    for pair in ids.windows(2).filter(|pair| pair[0].0 == pair[1].0) {
+        let (before, here) = (pair[0].1, pair[1].1);
+        let part = &mesh.parts[here.part as usize];
+        let what = || {
+            format!("element {} stands in part {}, line {} too", pair[1].0, before.part + 1, before.index + 1)
+        };
+        faults.add(FaultKind::ElementTwice, part.file("elements"), here.index as usize + 1, what);
+    }
+}
+
+/// The exact sign of each element, by part. `Zero` where a node is missing.
+fn check_orientation(mesh: &ElmerMesh, tables: &[NodeTable], faults: &mut Faults) -> Vec<Vec<Sign>> {
+    let mut signs = Vec::new();
+    for (part, table) in mesh.parts.iter().zip(tables) {
+        let sign = |element: &Element| {
+            let [a, b, c, d] = element.nodes.map(|id| table.find(id).map(|k| &part.nodes[k].point));
+            Some(orient3d(a?, b?, c?, d?))
+        };
+        let of_part: Vec<Option<Sign>> = part.elements.par_iter().map(sign).collect();
+        for (k, sign) in of_part.iter().enumerate() {
+            let Some(sign @ (Sign::Negative | Sign::Zero)) = sign else { continue };
+            let state = if *sign == Sign::Zero { "flat" } else { "inverted" };
+            let what = || format!("element {} is {state}", part.elements[k].id);
+            faults.add(FaultKind::Inverted, part.file("elements"), k + 1, what);
+        }
+        signs.push(of_part.into_iter().map(|sign| sign.unwrap_or(Sign::Zero)).collect());
+    }
+    signs
+}
+
+/// Sorts a face; true where that takes an even number of swaps.
+fn sorted(mut face: Key) -> (Key, bool) {
+    let mut even = true;
+    for (a, b) in [(0, 1), (1, 2), (0, 1)] {
+        if face[a] > face[b] {
+            face.swap(a, b);
+            even = !even;
+        }
+    }
+    (face, even)
+}
+
+fn element_sides(mesh: &ElmerMesh, signs: &[Vec<Sign>]) -> Vec<Side> {
+    let mut sides = Vec::with_capacity(4 * mesh.parts.iter().map(|p| p.elements.len()).sum::<usize>());
+    for ((part, p), signs) in mesh.parts.iter().zip(0..).zip(signs) {
+        for ((element, index), sign) in part.elements.iter().zip(0..).zip(signs) {
+            for face in TET_FACES {
+                let (key, even) = sorted(face.map(|k| element.nodes[k]));
+                let inverted = *sign == Sign::Negative;
+                sides.push(Side { key, place: Place { part: p, index }, even: even != inverted });
+            }
+        }
+    }
+    sides.par_sort_unstable();
+    sides
+}
+
+fn boundary_sides(mesh: &ElmerMesh) -> Vec<Side> {
+    let mut sides = Vec::new();
+    for (part, p) in mesh.parts.iter().zip(0..) {
+        for (element, index) in part.boundary.iter().zip(0..) {
+            let (key, even) = sorted(element.nodes);
+            sides.push(Side { key, place: Place { part: p, index }, even });
+        }
+    }
+    sides.par_sort_unstable();
+    sides
+}
+
+/// The sides of one face among all.
+fn of_face(sides: &[Side], key: Key) -> &[Side] {
+    let start = sides.partition_point(|side| side.key < key);
+    let end = start + sides[start..].iter().take_while(|side| side.key == key).count();
+    &sides[start..end]
+}
+
+/// All sides by face.
+struct Judge<'a> {
+    mesh: &'a ElmerMesh,
+    sides: Vec<Side>,
+    boundary: Vec<Side>,
+}
+
+impl Judge<'_> {
+    fn element(&self, side: &Side) -> &Element {
+        &self.mesh.parts[side.place.part as usize].elements[side.place.index as usize]
+    }
+
+    fn boundary_element(&self, side: &Side) -> &BoundaryElement {
+        &self.mesh.parts[side.place.part as usize].boundary[side.place.index as usize]
+    }
+
+    fn add_at(
+        &self,
+        faults: &mut Faults,
+        kind: FaultKind,
+        file: &str,
+        at: &Side,
+        what: impl FnOnce() -> String,
+    ) {
+        let part = &self.mesh.parts[at.place.part as usize];
+        faults.add(kind, part.file(file), at.place.index as usize + 1, what);
+    }
+
+    /// What lies on both sides of each face of the elements.
+    fn check_faces(&self, faults: &mut Faults) {
+        for sides in self.sides.chunk_by(|a, b| a.key == b.key) {
+            let key = sides[0].key;
+            match sides {
+                [one] => self.check_bounded(one, faults),
+                [a, b] => {
+                    if a.even == b.even {
+                        self.check_overlap(a, b, faults);
+                    }
+                    let bounded = of_face(&self.boundary, key);
+                    if !bounded.is_empty() && a.place.part != b.place.part {
+                        self.check_bounded(a, faults);
+                        self.check_bounded(b, faults);
+                    }
+                }
+                [.., last] => {
+                    let ids: Vec<u32> = sides.iter().map(|side| self.element(side).id).collect();
+                    let what = || format!("face {key:?} belongs to elements {ids:?}");
+                    self.add_at(faults, FaultKind::CrowdedFace, "elements", last, what);
+                }
+                [] => {}
+            }
+        }
+    }
+
+    /// The part of this element must have a boundary element here.
+    fn check_bounded(&self, side: &Side, faults: &mut Faults) {
+        if !of_face(&self.boundary, side.key).iter().any(|b| b.place.part == side.place.part) {
+            let what = || format!("face {:?} of element {} has none here", side.key, self.element(side).id);
+            self.add_at(faults, FaultKind::NoBoundary, "elements", side, what);
+        }
+    }
+
+    fn check_overlap(&self, a: &Side, b: &Side, faults: &mut Faults) {
+        let nodes = |side: &Side| {
+            let mut nodes = self.element(side).nodes;
+            nodes.sort_unstable();
+            nodes
+        };
+        let same = nodes(a) == nodes(b);
+        let kind = if same { FaultKind::SameElement } else { FaultKind::Overlap };
+        let (before, here) = (self.element(a).id, self.element(b).id);
+        let what = || format!("elements {before} and {here}, at face {:?}", a.key);
+        // Elements with the same nodes meet at four faces: count them once.
+        if !same || a.key == nodes(a)[..3] {
+            self.add_at(faults, kind, "elements", b, what);
+        }
+    }
+
+    fn check_boundary(&self, faults: &mut Faults) {
+        for bounded in self.boundary.chunk_by(|a, b| a.key == b.key) {
+            for pair in bounded.windows(2) {
+                let [before, here] = [0, 1].map(|k| self.boundary_element(&pair[k]));
+                if pair[0].place.part == pair[1].place.part {
+                    let what = || format!("face {:?} is boundary element {} too", pair[0].key, before.id);
+                    self.add_at(faults, FaultKind::BoundaryTwice, "boundary", &pair[1], what);
+                } else if before.boundary != here.boundary {
+                    let numbers = (before.boundary, here.boundary);
+                    let what = || format!("face {:?} has numbers {numbers:?}", pair[0].key);
+                    self.add_at(faults, FaultKind::NumbersDiffer, "boundary", &pair[1], what);
+                }
+            }
+            let beside = of_face(&self.sides, bounded[0].key);
+            for boundary in bounded {
+                self.check_beside(boundary, beside, faults);
+            }
+        }
+    }
+
+    /// A boundary element and the elements that have its face.
+    fn check_beside(&self, boundary: &Side, beside: &[Side], faults: &mut Faults) {
+        let element = self.boundary_element(boundary);
+        let here = |side: &&Side| side.place.part == boundary.place.part;
+        if !beside.iter().any(|side| here(&side)) {
+            let what = || format!("boundary element {}, face {:?}", element.id, boundary.key);
+            return self.add_at(faults, FaultKind::NoFace, "boundary", boundary, what);
+        }
+        let parents = element.parents;
+        let mut wrong = parents.iter().filter(|&&parent| {
+            // An element of another part may be named: Elmer's own writer does.
+            parent != 0 && !beside.iter().any(|side| self.element(side).id == parent)
+        });
+        if let Some(parent) = wrong.next() {
+            let what = || format!("element {parent} is not beside boundary element {}", element.id);
+            self.add_at(faults, FaultKind::WrongParent, "boundary", boundary, what);
+        }
+        for id in
+            beside.iter().filter(here).map(|side| self.element(side).id).filter(|id| !parents.contains(id))
+        {
+            let what = || format!("boundary element {} does not name its parent {id}", element.id);
+            self.add_at(faults, FaultKind::WrongParent, "boundary", boundary, what);
+        }
+        if let [one] = beside
+            && one.even != boundary.even
+        {
+            let what = || format!("boundary element {}, parent {}", element.id, self.element(one).id);
+            self.add_at(faults, FaultKind::Inward, "boundary", boundary, what);
+        }
+    }
+}

@@ -1,0 +1,37 @@
+//! Elmer's mesh format, serial and partitioned: text files with whole-mesh ids from 1.
+//!
+//! ```text
+//! DIR/mesh.names                    names of bodies and boundaries
+//! DIR/partitioning.N/part.K.header  counts                      K = 1 … N, rank K−1
+//!                        .nodes     id -1 x y z                 of every vertex the part uses
+//!                        .elements  id body 504 v v v v
+//!                        .boundary  id bc parent parent 303 v v v
+//!                        .shared    vertex count part part …    the owner first
+//! DIR/mesh.{header,nodes,elements,boundary}                     where there is one part
+//! ```
+//! What Elmer reads and where it would stumble was found in its reader, `fem/src/MeshUtils.F90`.
+
+mod faults;
+mod faults_faces;
+mod faults_nodes;
+mod number;
+mod parse;
+mod read;
+#[cfg(test)]
+mod tests;
+mod write;
+
+pub use faults::{Fault, FaultKind, Faults, check_elmer, faults};
+pub use parse::ReadError;
+pub use read::{BoundaryElement, Element, ElmerMesh, ElmerPart, Header, Layout, Node, SharedNode};
+pub use read::{layouts, read, read_layout};
+pub use write::write;
+
+/// Elmer's code of a tet with four vertices.
+const TET: u32 = 504;
+/// The longest line that Elmer reads of `.elements`, `.boundary` and `.shared`, in characters and in numbers.
+const MAX_LINE: (usize, usize) = (256, 64);
+/// The largest id: Elmer's integers have 32 bits.
+const MAX_ID: u64 = i32::MAX as u64;
+/// Elmer's code of a triangle with three vertices.
+const TRIANGLE: u32 = 303;

@@ -1,0 +1,311 @@
+//! Reading Elmer's files: all of a mesh, with nothing set right.
+
+use super::parse::{Fields, ReadError, read_lines, refuse_what_elmer_cuts};
+use super::{MAX_LINE, TET, TRIANGLE};
+use crate::Point;
+use rayon::prelude::*;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Where a mesh stands.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Layout {
+    /// `FOLDER/mesh.*`
+    Serial(PathBuf),
+    /// `FOLDER/part.1.*` to `FOLDER/part.N.*`
+    Partitioned {
+        /// The folder `partitioning.N`.
+        folder: PathBuf,
+        /// N, by the files.
+        parts: u32,
+    },
+}
+
+impl Layout {
+    /// The folder with the files.
+    pub fn folder(&self) -> &Path {
+        match self {
+            Self::Serial(folder) | Self::Partitioned { folder, .. } => folder,
+        }
+    }
+}
+
+/// What the files say.
+#[derive(Clone, Debug)]
+pub struct ElmerMesh {
+    /// Where they stand.
+    pub layout: Layout,
+    /// The parts in order; one of a serial mesh.
+    pub parts: Vec<ElmerPart>,
+}
+
+/// The files of one part. The value with index k stands on line k + 1 of its file.
+#[derive(Clone, Debug)]
+pub struct ElmerPart {
+    /// The files' common beginning: `DIR/mesh` or `DIR/partitioning.N/part.K`.
+    pub stem: PathBuf,
+    /// `.header`
+    pub header: Header,
+    /// `.nodes`
+    pub nodes: Vec<Node>,
+    /// `.elements`
+    pub elements: Vec<Element>,
+    /// `.boundary`
+    pub boundary: Vec<BoundaryElement>,
+    /// `.shared`; empty for a serial mesh.
+    pub shared: Vec<SharedNode>,
+}
+
+impl ElmerPart {
+    /// The path of one of its files.
+    pub fn file(&self, kind: &str) -> PathBuf {
+        file(&self.stem, kind)
+    }
+}
+
+fn file(stem: &Path, kind: &str) -> PathBuf {
+    let mut path = stem.as_os_str().to_owned();
+    path.push(".");
+    path.push(kind);
+    path.into()
+}
+
+/// The counts of a part.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Header {
+    /// Nodes.
+    pub nodes: u32,
+    /// Elements.
+    pub elements: u32,
+    /// Boundary elements.
+    pub boundary: u32,
+    /// Types and how many there are of each.
+    pub types: Vec<(u32, u32)>,
+    /// Shared nodes; not in a serial mesh.
+    pub shared: Option<u32>,
+}
+
+/// A node.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Node {
+    /// Its id in the whole mesh.
+    pub id: u32,
+    /// Where it is.
+    pub point: Point,
+}
+
+/// A tet.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Element {
+    /// Its id in the whole mesh.
+    pub id: u32,
+    /// Its body.
+    pub body: u32,
+    /// Its nodes by id.
+    pub nodes: [u32; 4],
+}
+
+/// A triangle with a boundary number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct BoundaryElement {
+    /// Its id, good for messages only.
+    pub id: u32,
+    /// Its boundary number.
+    pub boundary: u32,
+    /// The elements beside it by id, 0 where there is none here.
+    pub parents: [u32; 2],
+    /// Its nodes by id.
+    pub nodes: [u32; 3],
+}
+
+/// Who holds a node.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SharedNode {
+    /// The node.
+    pub id: u32,
+    /// The parts that hold it, from 1, its owner first.
+    pub parts: Vec<u32>,
+}
+
+/// The meshes in a folder: `mesh.*` and each `partitioning.N` in it, or the folder itself if it is a `partitioning.N`.
+///
+/// # Errors
+/// Where there is none, or the numbers of its parts have a gap.
+pub fn layouts(dir: &Path) -> Result<Vec<Layout>, ReadError> {
+    if dir.join("part.1.header").exists() {
+        return Ok(vec![partitioned(dir.to_path_buf())?]);
+    }
+    let mut found = Vec::new();
+    if dir.join("mesh.header").exists() {
+        found.push(Layout::Serial(dir.to_path_buf()));
+    }
+    let mut folders = Vec::new();
+    for entry in fs::read_dir(dir).map_err(ReadError::io(dir))? {
+        let name = entry.map_err(ReadError::io(dir))?.file_name();
+        let number = name.to_str().and_then(|n| n.strip_prefix("partitioning.")).and_then(|n| n.parse().ok());
+        folders.extend(number.map(|n: u32| (n, dir.join(name))));
+    }
+    folders.sort();
+    for (_, folder) in folders {
+        found.push(partitioned(folder)?);
+    }
+    if found.is_empty() { Err(ReadError::NoMesh(dir.to_path_buf())) } else { Ok(found) }
+}
+
+/// The parts of a folder `partitioning.N`, which must be 1 … N.
+fn partitioned(folder: PathBuf) -> Result<Layout, ReadError> {
+    let mut numbers = Vec::new();
+    for entry in fs::read_dir(&folder).map_err(ReadError::io(&folder))? {
+        let name = entry.map_err(ReadError::io(&folder))?.file_name();
+        let number =
+            name.to_str().and_then(|n| n.strip_prefix("part.")?.strip_suffix(".header")?.parse().ok());
+        numbers.extend(number.map(|n: u32| n));
+    }
+    numbers.sort_unstable();
+    match (1..).zip(&numbers).find(|(expected, number)| expected != *number) {
+        None if !numbers.is_empty() => Ok(Layout::Partitioned { folder, parts: numbers.len() as u32 }),
+        None => Err(ReadError::NoMesh(folder)),
+        Some((expected, _)) => {
+            let path = folder.join(format!("part.{expected}.header"));
+            Err(ReadError::io(&path)(std::io::ErrorKind::NotFound.into()))
+        }
+    }
+}
+
+/// Reads the mesh of a folder: its only partition, else `mesh.*`.
+///
+/// # Errors
+/// Where the folder holds several partitions, or a file is missing or has a line that is no part of a mesh of
+/// tets. Faults of a mesh that can be read are found by [`faults`](super::faults).
+pub fn read(dir: &Path) -> Result<ElmerMesh, ReadError> {
+    let found = layouts(dir)?;
+    let partitions: Vec<&Layout> = found.iter().filter(|l| matches!(l, Layout::Partitioned { .. })).collect();
+    match partitions[..] {
+        [] => read_layout(&found[0]),
+        [one] => read_layout(one),
+        _ => {
+            let found = partitions.iter().map(|l| l.folder().to_path_buf()).collect();
+            Err(ReadError::Several { dir: dir.to_path_buf(), found })
+        }
+    }
+}
+
+/// Reads one mesh; several threads read its parts.
+pub fn read_layout(layout: &Layout) -> Result<ElmerMesh, ReadError> {
+    let parts = match layout {
+        Layout::Serial(folder) => vec![read_part(folder.join("mesh"), false)?],
+        Layout::Partitioned { folder, parts } => {
+            let read = |k: u32| read_part(folder.join(format!("part.{k}")), true);
+            let parts: Vec<_> = (1..=*parts).into_par_iter().map(read).collect();
+            parts.into_iter().collect::<Result<_, _>>()?
+        }
+    };
+    Ok(ElmerMesh { layout: layout.clone(), parts })
+}
+
+fn read_part(stem: PathBuf, partitioned: bool) -> Result<ElmerPart, ReadError> {
+    Ok(ElmerPart {
+        header: read_header(&file(&stem, "header"), partitioned)?,
+        nodes: read_lines(&file(&stem, "nodes"), node)?,
+        elements: read_lines(&file(&stem, "elements"), element)?,
+        boundary: read_lines(&file(&stem, "boundary"), boundary_element)?,
+        shared: if partitioned { read_lines(&file(&stem, "shared"), shared_node)? } else { Vec::new() },
+        stem,
+    })
+}
+
+fn read_header(path: &Path, partitioned: bool) -> Result<Header, ReadError> {
+    let lines = read_lines(path, |line| {
+        let mut fields = Fields::new(line);
+        let mut numbers = Vec::new();
+        while !fields.is_empty() {
+            numbers.push(fields.int("count")?);
+        }
+        Ok(numbers)
+    })?;
+    let error = |line: usize, message: &str| ReadError::Line {
+        path: path.to_path_buf(),
+        line: line as u64 + 1,
+        message: message.into(),
+    };
+    let [nodes, elements, boundary] = lines.first().map_or(&[][..], |l| &l[..]) else {
+        return Err(error(0, "expected the numbers of nodes, elements and boundary elements"));
+    };
+    let [type_count] = lines.get(1).map_or(&[][..], |l| &l[..]) else {
+        return Err(error(1, "expected the number of element types"));
+    };
+    let mut types = Vec::new();
+    for k in 2..2 + *type_count as usize {
+        let [code, count] = lines.get(k).map_or(&[][..], |l| &l[..]) else {
+            return Err(error(k, "expected an element type and its count"));
+        };
+        types.push((*code, *count));
+    }
+    let last = 2 + types.len();
+    let shared = match (partitioned, lines.get(last).map_or(&[][..], |l| &l[..])) {
+        (false, _) => None,
+        (true, [shared] | [shared, _]) => Some(*shared),
+        (true, _) => return Err(error(last, "expected the number of shared nodes")),
+    };
+    Ok(Header { nodes: *nodes, elements: *elements, boundary: *boundary, types, shared })
+}
+
+fn node(line: &[u8]) -> Result<Node, String> {
+    let blanks: Vec<u8>;
+    let mut fields = if line.contains(&b'\t') {
+        // Only this file is read by Fortran's own rules, where a tab is a blank.
+        blanks = line.iter().map(|&b| if b == b'\t' { b' ' } else { b }).collect();
+        Fields::new(&blanks)
+    } else {
+        Fields::new(line)
+    };
+    let id = fields.int("node")?;
+    fields.float("tag")?;
+    let point = Point::new(fields.float("x")?, fields.float("y")?, fields.float("z")?);
+    fields.end()?;
+    Ok(Node { id, point })
+}
+
+fn ids<const N: usize>(fields: &mut Fields, what: &str) -> Result<[u32; N], String> {
+    let mut ids = [0; N];
+    for id in &mut ids {
+        *id = fields.int(what)?;
+    }
+    Ok(ids)
+}
+
+fn element(line: &[u8]) -> Result<Element, String> {
+    refuse_what_elmer_cuts(line)?;
+    let mut fields = Fields::new(line);
+    let id = fields.int("element (halo elements, ID/PART, are not read)")?;
+    let body = fields.int("body")?;
+    fields.expect("element type", &TET.to_string())?;
+    let nodes = ids(&mut fields, "node")?;
+    fields.end()?;
+    Ok(Element { id, body, nodes })
+}
+
+fn boundary_element(line: &[u8]) -> Result<BoundaryElement, String> {
+    refuse_what_elmer_cuts(line)?;
+    let mut fields = Fields::new(line);
+    let id = fields.int("boundary element")?;
+    let boundary = fields.int("boundary number")?;
+    let parents = ids(&mut fields, "parent")?;
+    fields.expect("element type", &TRIANGLE.to_string())?;
+    let nodes = ids(&mut fields, "node")?;
+    fields.end()?;
+    Ok(BoundaryElement { id, boundary, parents, nodes })
+}
+
+fn shared_node(line: &[u8]) -> Result<SharedNode, String> {
+    refuse_what_elmer_cuts(line)?;
+    let mut fields = Fields::new(line);
+    let id = fields.int("node")?;
+    let count = fields.int("number of parts")?;
+    if !(2..=MAX_LINE.1 as u32 - 2).contains(&count) {
+        return Err(format!("{count} parts share the node; Elmer reads 2 to {}", MAX_LINE.1 - 2));
+    }
+    let parts = (0..count).map(|_| fields.int("part")).collect::<Result<_, _>>()?;
+    fields.end()?;
+    Ok(SharedNode { id, parts })
+}

@@ -1,0 +1,298 @@
+//! Writing Elmer's files.
+
+use super::number::{Numbering, number};
+use super::{MAX_ID, MAX_LINE, TET, TRIANGLE};
+use crate::comm::Communicator;
+use crate::io::chunks::{items, split, write_chunks};
+use crate::io::output::{Output, write_text, write_together};
+use crate::io::text::{Line, digits};
+use crate::io::{WriteError, Written, agree, body_number, patch_number, sum_written};
+use crate::mesh::Names;
+use crate::mesh::stream::{BoundaryBlock, MeshStream, NO_TET, TetBlock};
+use std::fs;
+use std::path::Path;
+
+/// Lines that one thread formats at a time: some 100 KiB of text.
+const LINES_PER_CHUNK: u64 = 4096;
+/// Text that is gathered before it is written, in bytes.
+const FLUSH_AT: usize = 1 << 20;
+/// What a shortest round-trip coordinate takes on average, with its blank (17 digits are the rule on curved surfaces).
+const MEAN_FLOAT: u64 = 19;
+
+/// **Collective.** Writes `DIR/partitioning.N/part.K.*` and `DIR/mesh.names`, with one part also `DIR/mesh.*`
+/// (hard links, where the disk has them). Each rank gets the sums over all ranks.
+///
+/// Ids in the files are Elmer's own: from 1, those that a part owns without a gap. The canonical ids are in VTU.
+///
+/// # Errors
+/// Before anything is written: more ids than 2³¹−1, a `.shared` line that Elmer would cut, a part without tets,
+/// a body or patch without a number, a full disk. Later: what the system says. On all ranks alike, and `DIR` stays as it was.
+pub fn write(
+    comm: &dyn Communicator,
+    part: &dyn MeshStream,
+    names: &Names,
+    dir: &Path,
+) -> Result<Written, WriteError> {
+    agree(comm, check_limits(part))?;
+    let numbering = number(comm, part)?;
+    agree(comm, check_shared_lines(part, &numbering))?;
+
+    let needed = estimate(part, numbering.shared);
+    let written = write_together(comm, dir, needed, is_part_file, |stage| {
+        let folder = stage.join(format!("partitioning.{}", part.ranks()));
+        // Each rank makes it: another machine may see rank 0's only later.
+        fs::create_dir_all(&folder).map_err(WriteError::io(&folder))?;
+        let mut written = write_part(part, names, &numbering, &folder)?;
+        if part.rank() == 0 {
+            let bytes = write_text(&stage.join("mesh.names"), names_text(names).as_bytes())?;
+            written += Written { files: 1, bytes };
+        }
+        if part.ranks() == 1 {
+            written += link_serial_files(part, stage, &folder)?;
+        }
+        Ok(written)
+    })?;
+    sum_written(comm, written)
+}
+
+/// The files of a replaced `partitioning.N` that may go.
+fn is_part_file(name: &str) -> bool {
+    let Some((number, kind)) = name.strip_prefix("part.").and_then(|rest| rest.split_once('.')) else {
+        return false;
+    };
+    number.bytes().all(|b| b.is_ascii_digit())
+        && ["header", "nodes", "elements", "boundary", "shared"].contains(&kind)
+}
+
+fn check_limits(part: &dyn MeshStream) -> Result<(), WriteError> {
+    let totals = part.totals();
+    for (what, count) in [("vertices", totals.vertices), ("tets", totals.tets)] {
+        if count > MAX_ID {
+            return Err(WriteError::TooMany { format: "Elmer", what, count, limit: MAX_ID });
+        }
+    }
+    if part.counts().tets == 0 {
+        return Err(WriteError::EmptyPart(part.rank() + 1));
+    }
+    Ok(())
+}
+
+/// The line of a shared vertex must survive the reader, whatever part it stands in.
+fn check_shared_lines(part: &dyn MeshStream, numbering: &Numbering) -> Result<(), WriteError> {
+    for index in 0..part.vertex_blocks() {
+        let block = part.vertex_block(index);
+        let Some(last) = block.local.end.checked_sub(1).filter(|_| !block.local.is_empty()) else { continue };
+        let parts: usize = block.holders.iter().map(|&rank| 1 + digits(u64::from(rank) + 1)).sum();
+        let count = block.holders.len();
+        let longest = block.local.map(|v| numbering.vertices[v as usize]).max().unwrap_or(0);
+        let characters = digits(longest.into()) + 1 + digits(count as u64) + parts;
+        if characters > MAX_LINE.0 || 2 + count > MAX_LINE.1 {
+            let vertex = numbering.vertices[last as usize].into();
+            return Err(WriteError::SharedLine { vertex, parts: count, characters });
+        }
+    }
+    Ok(())
+}
+
+/// About how many bytes a part takes.
+fn estimate(part: &dyn MeshStream, shared: u64) -> u64 {
+    let (counts, totals) = (part.counts(), part.totals());
+    let vertex = digits(totals.vertices) as u64 + 1;
+    let tet = digits(totals.tets) as u64 + 1;
+    counts.vertices * (vertex + 3 + 3 * MEAN_FLOAT)
+        + counts.tets * (tet + 6 + 4 * vertex)
+        + counts.boundary * (tet + 17 + 3 * vertex)
+        + shared * (vertex + 8)
+}
+
+/// Writes the five files of a part.
+fn write_part(
+    part: &dyn MeshStream,
+    names: &Names,
+    numbering: &Numbering,
+    folder: &Path,
+) -> Result<Written, WriteError> {
+    let path = |kind: &str| folder.join(format!("part.{}.{kind}", part.rank() + 1));
+    let bytes = write_text(&path("header"), header_text(part, Some(numbering.shared)).as_bytes())?
+        + write_nodes(part, numbering, &path("nodes"))?
+        + write_elements(part, names, numbering, &path("elements"))?
+        + write_boundary(part, names, numbering, &path("boundary"))?
+        + write_shared(part, numbering, &path("shared"))?;
+    Ok(Written { files: 5, bytes })
+}
+
+/// The counts; without `shared` as a serial mesh has them.
+fn header_text(part: &dyn MeshStream, shared: Option<u64>) -> String {
+    let counts = part.counts();
+    let mut text = format!("{} {} {}\n", counts.vertices, counts.tets, counts.boundary);
+    if counts.boundary > 0 {
+        text += &format!("2\n{TRIANGLE} {}\n", counts.boundary);
+    } else {
+        text += "1\n";
+    }
+    text += &format!("{TET} {}\n", counts.tets);
+    if let Some(shared) = shared {
+        text += &format!("{shared} 0\n");
+    }
+    text
+}
+
+fn write_nodes(part: &dyn MeshStream, numbering: &Numbering, path: &Path) -> Result<u64, WriteError> {
+    let points = part.points();
+    let (chunks, per_chunk) = split(points.len(), points.len() as u64, LINES_PER_CHUNK);
+    let mut file = [Output::create(path)?];
+    write_chunks(&mut file, chunks, |chunk, [text]| {
+        let mut line = Line::default();
+        for v in items(chunk, per_chunk, points.len()) {
+            line.int(numbering.vertices[v].into()).bytes(b" -1");
+            for &x in &points[v] {
+                line.blank().float(x);
+            }
+            line.end(text);
+        }
+        Ok(())
+    })?;
+    let [file] = file;
+    file.finish()
+}
+
+fn write_elements(
+    part: &dyn MeshStream,
+    names: &Names,
+    numbering: &Numbering,
+    path: &Path,
+) -> Result<u64, WriteError> {
+    let (chunks, per_chunk) = split(part.tet_blocks(), part.counts().tets, LINES_PER_CHUNK);
+    let mut file = [Output::create(path)?];
+    write_chunks(&mut file, chunks, |chunk, [text]| {
+        let mut line = Line::default();
+        let mut block = TetBlock::default();
+        for index in items(chunk, per_chunk, part.tet_blocks()) {
+            part.tet_block(index, &mut block);
+            let number = body_number(block.body, names)?;
+            for (id, tet) in (numbering.first_tet + block.first_local..).zip(&block.tets) {
+                line.int(id).blank().int(number).blank().int(TET.into());
+                for &v in tet {
+                    line.blank().int(numbering.vertices[v as usize].into());
+                }
+                line.end(text);
+            }
+        }
+        Ok(())
+    })?;
+    let [file] = file;
+    file.finish()
+}
+
+fn write_boundary(
+    part: &dyn MeshStream,
+    names: &Names,
+    numbering: &Numbering,
+    path: &Path,
+) -> Result<u64, WriteError> {
+    let mut file = Output::create(path)?;
+    let mut block = BoundaryBlock::default();
+    let mut line = Line::default();
+    let mut text = Vec::new();
+    let mut id = 0;
+    for index in 0..part.boundary_blocks() {
+        part.boundary_block(index, &mut block);
+        let number = patch_number(block.patch, names)?;
+        for (triangle, parents) in block.triangles.iter().zip(&block.parents) {
+            id += 1;
+            line.int(id).blank().int(number);
+            // The parent that is here goes first: solvers look there for the body of the boundary.
+            let here = parents.iter().filter(|&&tet| tet != NO_TET).map(|tet| numbering.first_tet + tet);
+            for parent in here.chain([0, 0]).take(2) {
+                line.blank().int(parent);
+            }
+            line.blank().int(TRIANGLE.into());
+            for &v in triangle {
+                line.blank().int(numbering.vertices[v as usize].into());
+            }
+            line.end(&mut text);
+        }
+        file.flush_past(FLUSH_AT, &mut text)?;
+    }
+    file.flush_past(0, &mut text)?;
+    file.finish()
+}
+
+fn write_shared(part: &dyn MeshStream, numbering: &Numbering, path: &Path) -> Result<u64, WriteError> {
+    let mut file = Output::create(path)?;
+    let mut line = Line::default();
+    let mut text = Vec::new();
+    for index in 0..part.vertex_blocks() {
+        let block = part.vertex_block(index);
+        for (local, id) in block.local.clone().zip(block.first_id..).filter(|_| !block.holders.is_empty()) {
+            let owner = block.owner(id, part.rank());
+            line.int(numbering.vertices[local as usize].into()).blank().int(block.holders.len() as u64);
+            line.blank().int(u64::from(owner) + 1);
+            for &holder in block.holders.iter().filter(|&&holder| holder != owner) {
+                line.blank().int(u64::from(holder) + 1);
+            }
+            line.end(&mut text);
+        }
+        file.flush_past(FLUSH_AT, &mut text)?;
+    }
+    file.flush_past(0, &mut text)?;
+    file.finish()
+}
+
+/// `DIR/mesh.*` beside `partitioning.1`: the same files under a second name, but for the header.
+fn link_serial_files(part: &dyn MeshStream, stage: &Path, folder: &Path) -> Result<Written, WriteError> {
+    let bytes = write_text(&stage.join("mesh.header"), header_text(part, None).as_bytes())?;
+    let mut written = Written { files: 1, bytes };
+    for kind in ["nodes", "elements", "boundary"] {
+        let (from, to) = (folder.join(format!("part.1.{kind}")), stage.join(format!("mesh.{kind}")));
+        if fs::hard_link(&from, &to).is_err() {
+            written.bytes += fs::copy(&from, &to).map_err(WriteError::io(&to))?;
+        }
+        written.files += 1;
+    }
+    Ok(written)
+}
+
+/// `mesh.names`: each name once with all its numbers.
+///
+/// Elmer folds the case of names, ends them at `=`, and finds bodies and boundaries in one list: a boundary that
+/// is named as a body gets `_boundary` behind its name.
+pub(super) fn names_text(names: &Names) -> String {
+    let bodies = by_name(&names.bodies, "body");
+    let mut boundaries = by_name(&names.patches, "boundary");
+    for (name, _) in &mut boundaries {
+        while bodies.iter().any(|(body, _)| body.eq_ignore_ascii_case(name)) {
+            name.push_str("_boundary");
+        }
+    }
+    let mut text = String::new();
+    for (title, list) in [("bodies", bodies), ("boundaries", boundaries)] {
+        text += &format!("! ----- names for {title} -----\n");
+        for (name, numbers) in list {
+            let numbers: Vec<String> = numbers.iter().map(u32::to_string).collect();
+            text += &format!("$ {name} = {}\n", numbers.join(" "));
+        }
+    }
+    text
+}
+
+/// Names that Elmer can read, in their first order, each with its numbers, ascending.
+fn by_name(list: &[(u32, String)], kind: &str) -> Vec<(String, Vec<u32>)> {
+    let mut named: Vec<(String, Vec<u32>)> = Vec::new();
+    for (number, name) in list {
+        let readable = |c: char| if c.is_control() || "=$!".contains(c) { '_' } else { c };
+        let mut name: String = name.trim().chars().map(readable).collect();
+        if name.is_empty() {
+            name = format!("{kind}{number}");
+        }
+        match named.iter_mut().find(|(known, _)| known.eq_ignore_ascii_case(&name)) {
+            Some((_, numbers)) => {
+                if let Err(place) = numbers.binary_search(number) {
+                    numbers.insert(place, *number);
+                }
+            }
+            None => named.push((name, vec![*number])),
+        }
+    }
+    named
+}

@@ -1,0 +1,210 @@
+//! The frame of a `.vtu` file: tags that say where each array begins, and the arrays behind each other.
+
+use crate::io::WriteError;
+use crate::io::chunks::{items, split, write_chunks};
+use crate::io::output::Output;
+use std::path::{Path, PathBuf};
+
+/// What the numbers of an array are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Kind {
+    U8,
+    I32,
+    I64,
+    F64,
+}
+
+impl Kind {
+    fn name(self) -> &'static str {
+        match self {
+            Self::U8 => "UInt8",
+            Self::I32 => "Int32",
+            Self::I64 => "Int64",
+            Self::F64 => "Float64",
+        }
+    }
+
+    fn bytes(self) -> u64 {
+        match self {
+            Self::U8 => 1,
+            Self::I32 => 4,
+            Self::I64 | Self::F64 => 8,
+        }
+    }
+
+    /// Appends a number in this kind.
+    #[inline]
+    pub fn push(self, number: u64, bytes: &mut Vec<u8>) {
+        match self {
+            Self::U8 => bytes.push(number as u8),
+            Self::I32 => bytes.extend_from_slice(&(number as u32).to_ne_bytes()),
+            Self::I64 => bytes.extend_from_slice(&number.to_ne_bytes()),
+            Self::F64 => bytes.extend_from_slice(&(number as f64).to_ne_bytes()),
+        }
+    }
+}
+
+/// Where an array belongs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Section {
+    Points,
+    Cells,
+    PointData,
+    CellData,
+}
+
+/// One array of a piece.
+#[derive(Clone, Debug)]
+pub(super) struct Array {
+    pub section: Section,
+    pub name: &'static str,
+    pub kind: Kind,
+    /// How many numbers.
+    pub len: u64,
+}
+
+impl Array {
+    /// The attributes that pieces and their list have in common.
+    pub fn attributes(&self) -> String {
+        let components = if self.section == Section::Points { " NumberOfComponents=\"3\"" } else { "" };
+        format!("type=\"{}\" Name=\"{}\"{components}", self.kind.name(), self.name)
+    }
+
+    fn bytes(&self) -> u64 {
+        self.len * self.kind.bytes()
+    }
+}
+
+/// The arrays of one `.vtu` file, section by section.
+#[derive(Clone, Debug)]
+pub(super) struct Piece {
+    pub points: u64,
+    pub cells: u64,
+    pub arrays: Vec<Array>,
+    /// The attributes of sections that have some: which array is the global id.
+    pub attributes: Vec<(Section, &'static str)>,
+}
+
+/// Each array begins with its length in bytes.
+const LENGTH: u64 = 8;
+const END: &str = "\n </AppendedData>\n</VTKFile>\n";
+
+/// The first lines of a file.
+pub(super) fn file_tag(kind: &str) -> String {
+    let order = if cfg!(target_endian = "big") { "BigEndian" } else { "LittleEndian" };
+    format!(
+        "<?xml version=\"1.0\"?>\n<VTKFile type=\"{kind}\" version=\"1.0\" byte_order=\"{order}\" \
+         header_type=\"UInt64\">\n"
+    )
+}
+
+/// A text as the value of an attribute.
+pub(super) fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('"', "&quot;")
+}
+
+impl Piece {
+    /// The points and cells that each piece has: `per_cell` vertices a cell, in numbers of 32 bits where they fit.
+    pub fn new(points: u64, cells: u64, per_cell: u64) -> Self {
+        let fits = points.max(cells * per_cell) <= i32::MAX as u64;
+        let id = if fits { Kind::I32 } else { Kind::I64 };
+        let mut piece = Self { points, cells, arrays: Vec::new(), attributes: Vec::new() };
+        piece.add(Section::Points, "Points", Kind::F64, 3 * points);
+        piece.add(Section::Cells, "connectivity", id, cells * per_cell);
+        piece.add(Section::Cells, "offsets", id, cells);
+        piece.add(Section::Cells, "types", Kind::U8, cells);
+        piece
+    }
+
+    pub fn add(&mut self, section: Section, name: &'static str, kind: Kind, len: u64) {
+        self.arrays.push(Array { section, name, kind, len });
+    }
+
+    /// Calls `f(name, attributes, arrays)` for each section.
+    pub fn for_each_section(&self, mut f: impl FnMut(&str, &str, &[Array])) {
+        for arrays in self.arrays.chunk_by(|a, b| a.section == b.section) {
+            let section = arrays[0].section;
+            let found = self.attributes.iter().find(|(of, _)| *of == section);
+            f(&format!("{section:?}"), found.map_or("", |(_, attributes)| attributes), arrays);
+        }
+    }
+
+    /// All that comes before the arrays.
+    fn head(&self) -> String {
+        let mut text = file_tag("UnstructuredGrid") + " <UnstructuredGrid>\n";
+        text += &format!("  <Piece NumberOfPoints=\"{}\" NumberOfCells=\"{}\">\n", self.points, self.cells);
+        let mut offset = 0;
+        self.for_each_section(|section, attributes, arrays| {
+            text += &format!("   <{section}{attributes}>\n");
+            for array in arrays {
+                let attributes = array.attributes();
+                text += &format!("    <DataArray {attributes} format=\"appended\" offset=\"{offset}\"/>\n");
+                offset += LENGTH + array.bytes();
+            }
+            text += &format!("   </{section}>\n");
+        });
+        text + "  </Piece>\n </UnstructuredGrid>\n <AppendedData encoding=\"raw\">\n_"
+    }
+
+    /// The length of the file.
+    pub fn bytes(&self) -> u64 {
+        let arrays: u64 = self.arrays.iter().map(|array| LENGTH + array.bytes()).sum();
+        (self.head().len() + END.len()) as u64 + arrays
+    }
+
+    /// Creates the file with all but the numbers.
+    pub fn create(&self, path: &Path) -> Result<PieceFile<'_>, WriteError> {
+        let head = self.head();
+        let mut file = Output::create(path)?;
+        file.write(head.as_bytes())?;
+        let mut position = head.len() as u64;
+        for array in &self.arrays {
+            let mut at = Output::at(path, position)?;
+            at.write(&array.bytes().to_ne_bytes())?;
+            position += LENGTH + array.bytes();
+        }
+        Output::at(path, position)?.write(END.as_bytes())?;
+        Ok(PieceFile { piece: self, file, head: head.len() as u64, path: path.to_path_buf() })
+    }
+}
+
+/// A `.vtu` file whose arrays are being filled.
+pub(super) struct PieceFile<'a> {
+    piece: &'a Piece,
+    file: Output,
+    head: u64,
+    path: PathBuf,
+}
+
+impl PieceFile<'_> {
+    /// The array of this name, ready to be written from its beginning.
+    pub fn array(&self, name: &str) -> Result<(Output, Kind), WriteError> {
+        let arrays = &self.piece.arrays;
+        let place = arrays.iter().position(|array| array.name == name).expect("an array of the piece");
+        let before: u64 = arrays[..place].iter().map(|array| LENGTH + array.bytes()).sum();
+        Ok((Output::at(&self.path, self.head + before + LENGTH)?, arrays[place].kind))
+    }
+
+    /// Fills an array with one number per cell.
+    pub fn fill(&self, name: &str, number: impl Fn(u64) -> u64 + Sync) -> Result<(), WriteError> {
+        const PER_CHUNK: u64 = 1 << 16;
+        let (file, kind) = self.array(name)?;
+        let cells = self.piece.cells as usize;
+        let (chunks, per_chunk) = split(cells, cells as u64, PER_CHUNK);
+        write_chunks(&mut [file], chunks, |chunk, [bytes]| {
+            items(chunk, per_chunk, cells).for_each(|cell| kind.push(number(cell as u64), bytes));
+            Ok(())
+        })
+    }
+
+    /// Fills what cells of one type with so many vertices have in common.
+    pub fn fill_cells(&self, per_cell: u64, vtk_type: u64) -> Result<(), WriteError> {
+        self.fill("offsets", |cell| (cell + 1) * per_cell)?;
+        self.fill("types", |_| vtk_type)
+    }
+
+    /// Waits until all is on the disk; returns the length.
+    pub fn finish(self) -> Result<u64, WriteError> {
+        self.file.finish()
+    }
+}

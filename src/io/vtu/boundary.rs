@@ -1,0 +1,101 @@
+//! The triangles on patches of a part.
+
+use super::arrays::{Kind, Piece, Section};
+use crate::io::{WriteError, patch_number};
+use crate::mesh::Names;
+use crate::mesh::stream::{BoundaryBlock, MeshStream, NO_TET};
+use std::path::Path;
+
+/// VTK's number for a triangle.
+const VTK_TRIANGLE: u64 = 5;
+/// A vertex that no triangle uses.
+const UNUSED: u32 = u32::MAX;
+
+/// The vertices that a part's boundary triangles use, numbered anew.
+pub(super) struct Surface {
+    /// By local index: the place among the surface's vertices.
+    to_surface: Vec<u32>,
+    vertices: u64,
+    triangles: u64,
+    several_parts: bool,
+}
+
+impl Surface {
+    pub fn of(part: &dyn MeshStream) -> Self {
+        let mut to_surface = vec![UNUSED; part.points().len()];
+        let mut block = BoundaryBlock::default();
+        for index in 0..part.boundary_blocks() {
+            part.boundary_block(index, &mut block);
+            block.triangles.iter().flatten().for_each(|&v| to_surface[v as usize] = 0);
+        }
+        let mut vertices = 0;
+        for place in to_surface.iter_mut().filter(|place| **place != UNUSED) {
+            *place = vertices;
+            vertices += 1;
+        }
+        Self {
+            to_surface,
+            vertices: vertices.into(),
+            triangles: part.counts().boundary,
+            several_parts: part.ranks() > 1,
+        }
+    }
+
+    /// The arrays of the triangles.
+    pub fn piece(&self) -> Piece {
+        let mut piece = Piece::new(self.vertices, self.triangles, 3);
+        piece.add(Section::PointData, "GlobalNodeId", Kind::I64, self.vertices);
+        piece.add(Section::CellData, "BoundaryId", Kind::I32, self.triangles);
+        piece.add(Section::CellData, "PartitionId", Kind::I32, self.triangles);
+        if self.several_parts {
+            piece.add(Section::CellData, "vtkGhostType", Kind::U8, self.triangles);
+        }
+        piece.attributes = vec![(Section::PointData, " GlobalIds=\"GlobalNodeId\"")];
+        piece
+    }
+
+    /// Writes the file; returns its length. Surfaces are small beside their bodies: one array at a time in memory.
+    pub fn write(
+        &self,
+        piece: &Piece,
+        part: &dyn MeshStream,
+        names: &Names,
+        path: &Path,
+    ) -> Result<u64, WriteError> {
+        let used = |v: &u32| self.to_surface[*v as usize] != UNUSED;
+        let file = piece.create(path)?;
+        let points: Vec<[f64; 3]> =
+            (0..part.points().len() as u32).filter(used).map(|v| part.points()[v as usize]).collect();
+        file.array("Points")?.0.write(bytemuck::cast_slice(&points))?;
+
+        let mut ids = Vec::new();
+        for index in 0..part.vertex_blocks() {
+            let block = part.vertex_block(index);
+            let globals = block.local.zip(block.first_id..).filter(|(v, _)| used(v));
+            globals.for_each(|(_, global)| Kind::I64.push(global, &mut ids));
+        }
+        file.array("GlobalNodeId")?.0.write(&ids)?;
+
+        let (mut connectivity, id) = file.array("connectivity")?;
+        let (mut triangles, mut numbers, mut ghosts) = (Vec::new(), Vec::new(), Vec::new());
+        let mut block = BoundaryBlock::default();
+        for index in 0..part.boundary_blocks() {
+            part.boundary_block(index, &mut block);
+            let number = patch_number(block.patch, names)?;
+            for (triangle, parents) in block.triangles.iter().zip(&block.parents) {
+                triangle.iter().for_each(|&v| id.push(self.to_surface[v as usize].into(), &mut triangles));
+                Kind::I32.push(number, &mut numbers);
+                // An outer patch has its body behind it: with nothing behind, the other part has this triangle too.
+                ghosts.push(u8::from(parents[0] == NO_TET));
+            }
+        }
+        connectivity.write(&triangles)?;
+        file.array("BoundaryId")?.0.write(&numbers)?;
+        if self.several_parts {
+            file.array("vtkGhostType")?.0.write(&ghosts)?;
+        }
+        file.fill("PartitionId", |_| u64::from(part.rank()) + 1)?;
+        file.fill_cells(3, VTK_TRIANGLE)?;
+        file.finish()
+    }
+}

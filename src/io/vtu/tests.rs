@@ -1,0 +1,134 @@
+//! The files' frame is read by a few lines of our own; ParaView's reader accepts the same files.
+
+use super::*;
+use crate::io::plain::PlainPart;
+use crate::io::testing::{cube, names, scattered, slabs, together, two_tets};
+use crate::mesh::{Mesh, Rank};
+use std::collections::BTreeMap;
+
+fn write_parts(mesh: &Mesh, tet_to_rank: &[Rank], ranks: u32, stem: &Path) -> Written {
+    let results = together(ranks, |comm| {
+        write(comm, &PlainPart::part(mesh, tet_to_rank, ranks, comm.rank()), &names(), stem)
+    });
+    results.into_iter().map(Result::unwrap).last().unwrap()
+}
+
+/// The value of an attribute in a tag.
+fn attribute<'a>(tag: &'a str, name: &str) -> &'a str {
+    let start =
+        tag.find(&format!(" {name}=\"")).unwrap_or_else(|| panic!("{name} in {tag}")) + name.len() + 3;
+    tag[start..].split('"').next().unwrap()
+}
+
+/// The arrays of a `.vtu` file as numbers, with a check of every offset and length.
+fn arrays(path: &Path) -> BTreeMap<String, Vec<f64>> {
+    let bytes = fs::read(path).unwrap();
+    let marker = b"<AppendedData encoding=\"raw\">\n_";
+    let data = bytes.windows(marker.len()).position(|w| w == marker).unwrap() + marker.len();
+    let head = std::str::from_utf8(&bytes[..data]).unwrap();
+    let mut arrays = BTreeMap::new();
+    let mut end = 0;
+    for tag in head.split('<').filter(|tag| tag.starts_with("DataArray")) {
+        let offset: usize = attribute(tag, "offset").parse().unwrap();
+        assert_eq!(offset, end, "arrays stand behind each other: {tag}");
+        let len = u64::from_le_bytes(bytes[data + offset..][..8].try_into().unwrap()) as usize;
+        let values = &bytes[data + offset + 8..][..len];
+        end = offset + 8 + len;
+        let numbers: Vec<f64> = match attribute(tag, "type") {
+            "UInt8" => values.iter().map(|&b| f64::from(b)).collect(),
+            "Int32" => values.as_chunks().0.iter().map(|&b| f64::from(i32::from_le_bytes(b))).collect(),
+            "Int64" => values.as_chunks().0.iter().map(|&b| i64::from_le_bytes(b) as f64).collect(),
+            "Float64" => values.as_chunks().0.iter().map(|&b| f64::from_le_bytes(b)).collect(),
+            other => panic!("{other}"),
+        };
+        arrays.insert(attribute(tag, "Name").to_string(), numbers);
+    }
+    assert_eq!(&bytes[data + end..], b"\n </AppendedData>\n</VTKFile>\n");
+    let piece = head.split('<').find(|tag| tag.starts_with("Piece")).unwrap();
+    let count = |name: &str| attribute(piece, name).parse::<usize>().unwrap();
+    assert_eq!(arrays["Points"].len(), 3 * count("NumberOfPoints"));
+    assert_eq!(arrays["types"].len(), count("NumberOfCells"));
+    arrays
+}
+
+#[test]
+#[cfg(target_endian = "little")]
+fn two_tets_are_written_to_the_letter() {
+    let dir = tempfile::tempdir().unwrap();
+    let written = write_parts(&two_tets(), &[0, 0], 1, &dir.path().join("m.vtu"));
+    let bytes = fs::read(dir.path().join("m.vtu")).unwrap();
+    let head = "<?xml version=\"1.0\"?>\n\
+        <VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\">\n \
+        <UnstructuredGrid>\n  <Piece NumberOfPoints=\"5\" NumberOfCells=\"2\">\n   \
+        <Points>\n    \
+        <DataArray type=\"Float64\" Name=\"Points\" NumberOfComponents=\"3\" format=\"appended\" offset=\"0\"/>\n   \
+        </Points>\n   <Cells>\n    \
+        <DataArray type=\"Int32\" Name=\"connectivity\" format=\"appended\" offset=\"128\"/>\n    \
+        <DataArray type=\"Int32\" Name=\"offsets\" format=\"appended\" offset=\"168\"/>\n    \
+        <DataArray type=\"UInt8\" Name=\"types\" format=\"appended\" offset=\"184\"/>\n   \
+        </Cells>\n   <PointData GlobalIds=\"GlobalNodeId\">\n    \
+        <DataArray type=\"Int64\" Name=\"GlobalNodeId\" format=\"appended\" offset=\"194\"/>\n   \
+        </PointData>\n   <CellData GlobalIds=\"GlobalElementId\">\n    \
+        <DataArray type=\"Int64\" Name=\"GlobalElementId\" format=\"appended\" offset=\"242\"/>\n    \
+        <DataArray type=\"Int32\" Name=\"BodyId\" format=\"appended\" offset=\"266\"/>\n    \
+        <DataArray type=\"Int32\" Name=\"PartitionId\" format=\"appended\" offset=\"282\"/>\n   \
+        </CellData>\n  </Piece>\n </UnstructuredGrid>\n <AppendedData encoding=\"raw\">\n_";
+    assert_eq!(String::from_utf8_lossy(&bytes[..head.len()]), head);
+    assert_eq!(bytes.len(), head.len() + 282 + 16 + "\n </AppendedData>\n</VTKFile>\n".len());
+    let tets = arrays(&dir.path().join("m.vtu"));
+    assert_eq!(tets["Points"][3..9], [1., 0., 0., 0., 1., 0.]);
+    assert_eq!(tets["connectivity"], [0., 1., 2., 3., 1., 2., 3., 4.]);
+    assert_eq!(tets["offsets"], [4., 8.]);
+    assert_eq!(tets["types"], [10., 10.]);
+    assert_eq!(tets["GlobalNodeId"], [0., 1., 2., 3., 4.]);
+    assert_eq!(tets["GlobalElementId"], [0., 1.]);
+    assert_eq!((&tets["BodyId"], &tets["PartitionId"]), (&vec![1., 1.], &vec![1., 1.]));
+    let triangles = arrays(&dir.path().join("m.boundary.vtu"));
+    assert_eq!(triangles["connectivity"][..6], [0., 2., 1., 0., 1., 3.]);
+    assert_eq!(triangles["offsets"], [3., 6., 9., 12., 15., 18.]);
+    assert_eq!(triangles["types"], [5.; 6]);
+    assert_eq!(triangles["BoundaryId"], [1., 1., 1., 2., 2., 2.]);
+    let length = fs::metadata(dir.path().join("m.boundary.vtu")).unwrap().len();
+    assert_eq!(written, Written { files: 2, bytes: bytes.len() as u64 + length });
+}
+
+#[test]
+#[cfg(target_endian = "little")]
+fn the_pieces_of_a_cube_make_the_cube() {
+    let mesh = cube(4);
+    for (ranks, tet_to_rank) in [(2, slabs(&mesh, 2)), (3, scattered(&mesh, 3))] {
+        let dir = tempfile::tempdir().unwrap();
+        write_parts(&mesh, &tet_to_rank, ranks, &dir.path().join("a&b"));
+        let (mut tet_ids, mut vertex_ids, mut areas) = (Vec::new(), Vec::new(), [0; 4]);
+        for part in 1..=ranks {
+            let tets = arrays(&dir.path().join(format!("a&b.parts/part.{part}.vtu")));
+            for (k, &tet) in tets["GlobalElementId"].iter().enumerate() {
+                let vertices = mesh.tets[tet as usize].map(|v| f64::from(v.0));
+                let found = &tets["connectivity"][4 * k..4 * k + 4];
+                assert!(found.iter().map(|&v| tets["GlobalNodeId"][v as usize]).eq(vertices));
+                assert_eq!(tets["BodyId"][k], f64::from(mesh.bodies[tet as usize].0 + 1));
+                tet_ids.push(tet as usize);
+            }
+            for (k, &vertex) in tets["GlobalNodeId"].iter().enumerate() {
+                assert_eq!(tets["Points"][3 * k..][..3], mesh.points[vertex as usize].coords.as_slice()[..]);
+                if tets["vtkGhostType"][k] == 0.0 {
+                    vertex_ids.push(vertex as usize);
+                }
+            }
+            let triangles = arrays(&dir.path().join(format!("a&b.parts/boundary.{part}.vtu")));
+            for (number, _) in
+                triangles["BoundaryId"].iter().zip(&triangles["vtkGhostType"]).filter(|(_, g)| **g == 0.)
+            {
+                areas[*number as usize] += 1;
+            }
+        }
+        tet_ids.sort_unstable();
+        vertex_ids.sort_unstable();
+        assert!(tet_ids.into_iter().eq(0..384), "each tet stands in one piece");
+        assert!(vertex_ids.into_iter().eq(0..125), "each vertex has one copy that is no ghost");
+        assert_eq!(areas, [0, 96, 96, 32], "each triangle has one copy that is no ghost");
+        let list = fs::read_to_string(dir.path().join("a&b.pvtu")).unwrap();
+        assert!(list.contains(&format!("<Piece Source=\"a&amp;b.parts/part.{ranks}.vtu\"/>")), "{list}");
+        assert!(list.contains("<PDataArray type=\"UInt8\" Name=\"vtkGhostType\"/>"), "{list}");
+    }
+}

@@ -1,0 +1,81 @@
+//! The tets of a part.
+
+use super::arrays::{Kind, Piece, Section};
+use crate::io::chunks::{items, split, write_chunks};
+use crate::io::{WriteError, body_number};
+use crate::mesh::Names;
+use crate::mesh::stream::{MeshStream, TetBlock};
+use std::path::Path;
+
+/// VTK's number for a tet.
+const VTK_TETRA: u64 = 10;
+/// Tets or vertices that one thread turns to bytes at a time.
+const PER_CHUNK: u64 = 1 << 14;
+
+/// The arrays of a part's tets.
+pub(super) fn piece(part: &dyn MeshStream) -> Piece {
+    let counts = part.counts();
+    let mut piece = Piece::new(counts.vertices, counts.tets, 4);
+    piece.add(Section::PointData, "GlobalNodeId", Kind::I64, counts.vertices);
+    if part.ranks() > 1 {
+        piece.add(Section::PointData, "vtkGhostType", Kind::U8, counts.vertices);
+    }
+    piece.add(Section::CellData, "GlobalElementId", Kind::I64, counts.tets);
+    piece.add(Section::CellData, "BodyId", Kind::I32, counts.tets);
+    piece.add(Section::CellData, "PartitionId", Kind::I32, counts.tets);
+    piece.attributes = vec![
+        (Section::PointData, " GlobalIds=\"GlobalNodeId\""),
+        (Section::CellData, " GlobalIds=\"GlobalElementId\""),
+    ];
+    piece
+}
+
+/// Writes the file; returns its length.
+pub(super) fn write(
+    piece: &Piece,
+    part: &dyn MeshStream,
+    names: &Names,
+    path: &Path,
+) -> Result<u64, WriteError> {
+    let file = piece.create(path)?;
+    file.array("Points")?.0.write(bytemuck::cast_slice(part.points()))?;
+
+    let (connectivity, id) = file.array("connectivity")?;
+    let mut files = [connectivity, file.array("GlobalElementId")?.0, file.array("BodyId")?.0];
+    let (chunks, per_chunk) = split(part.tet_blocks(), part.counts().tets, PER_CHUNK);
+    write_chunks(&mut files, chunks, |chunk, [connectivity, ids, bodies]| {
+        let mut block = TetBlock::default();
+        for index in items(chunk, per_chunk, part.tet_blocks()) {
+            part.tet_block(index, &mut block);
+            let body = body_number(block.body, names)?;
+            for (tet, global) in block.tets.iter().zip(block.first_id..) {
+                tet.iter().for_each(|&v| id.push(v.into(), connectivity));
+                Kind::I64.push(global, ids);
+                Kind::I32.push(body, bodies);
+            }
+        }
+        Ok(())
+    })?;
+    file.fill_cells(4, VTK_TETRA)?;
+    file.fill("PartitionId", |_| u64::from(part.rank()) + 1)?;
+
+    let blocks = part.vertex_blocks();
+    let (chunks, per_chunk) = split(blocks, part.counts().vertices, PER_CHUNK);
+    write_chunks(&mut [file.array("GlobalNodeId")?.0], chunks, |chunk, [ids]| {
+        for index in items(chunk, per_chunk, blocks) {
+            part.vertex_block(index).ids().for_each(|global| Kind::I64.push(global, ids));
+        }
+        Ok(())
+    })?;
+    if part.ranks() > 1 {
+        write_chunks(&mut [file.array("vtkGhostType")?.0], chunks, |chunk, [ghosts]| {
+            for index in items(chunk, per_chunk, blocks) {
+                let block = part.vertex_block(index);
+                let copy = |global| block.owner(global, part.rank()) != part.rank();
+                ghosts.extend(block.ids().map(|global| u8::from(copy(global))));
+            }
+            Ok(())
+        })?;
+    }
+    file.finish()
+}

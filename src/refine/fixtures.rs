@@ -1,0 +1,418 @@
+//! Small coarse meshes with their geometry, and parts of them.
+
+use crate::Point;
+use crate::dist::{BoundaryFace, DistMesh, Shared, Totals};
+use crate::mesh::stream::{BoundaryBlock, MeshStream, TetBlock};
+use crate::mesh::{
+    BoundaryTriangle, Class, EdgeId, FaceId, Mesh, Rank, Segment, TET_EDGES, TET_FACES, TetId, VertexId,
+};
+use crate::refine::RefinedMesh;
+use csg::primitive::{Cylinder, Plane, Sphere};
+use csg::{
+    Aabb, BodyId, CornerId, Curve, CurveId, Features, Geometry, Patch, PatchId, Projector, Surface, SurfaceId,
+};
+use csg::{Point as P, Vector};
+
+/// A mesh and what it is snapped to.
+pub struct Fixture {
+    pub mesh: Mesh,
+    pub projector: Projector,
+}
+
+/// One patch for each surface, and curves where two of them meet.
+fn projector(surfaces: Vec<Surface>, curves: &[[u32; 2]], bounds: [P; 2]) -> Projector {
+    let patch = |surface: usize| Patch {
+        surface: SurfaceId::new(surface),
+        flipped: false,
+        inside: Some(BodyId(0)),
+        outside: None,
+        boundary: Vec::new(),
+        seeds: Vec::new(),
+        bc: surface as u32 + 1,
+        name: String::new(),
+    };
+    let curve = |surfaces: &[u32; 2]| Curve {
+        surfaces: surfaces.map(SurfaceId),
+        ends: None,
+        trace: Vec::new(),
+        fins: Vec::new(),
+    };
+    let features = Features {
+        corners: Vec::new(),
+        curves: curves.iter().map(curve).collect(),
+        patches: (0..surfaces.len()).map(patch).collect(),
+        bounds: Aabb { min: bounds[0], max: bounds[1] },
+    };
+    Projector::new(&Geometry { surfaces, ..Geometry::default() }, &features)
+}
+
+/// A classified mesh from points, tets, and the patches that each vertex lies on; curves are pairs of patches.
+fn classified(
+    points: Vec<Point>,
+    tets: Vec<[usize; 4]>,
+    bodies: Vec<BodyId>,
+    on: &[Vec<u32>],
+    curves: &[[u32; 2]],
+) -> Mesh {
+    let curve = |patches: &[u32]| CurveId::new(curves.iter().position(|c| c == patches).expect("a curve"));
+    let common = |vertices: &[usize]| -> Vec<u32> {
+        let first = &on[vertices[0]];
+        first.iter().copied().filter(|p| vertices.iter().all(|v| on[*v].contains(p))).collect()
+    };
+    let classes = on.iter().enumerate().map(|(v, patches)| match patches[..] {
+        [] => Class::Body(BodyId(0)),
+        [patch] => Class::Patch(PatchId(patch)),
+        [_, _] => Class::Curve(curve(patches)),
+        _ => Class::Corner(CornerId(v as u32)),
+    });
+    let mut mesh = Mesh { points, classes: classes.collect(), bodies, ..Mesh::default() };
+    let (mut triangles, mut segments) = (Vec::new(), Vec::new());
+    for (tet, &body) in tets.iter().zip(&mesh.bodies) {
+        for face in TET_FACES {
+            let vertices = face.map(|k| tet[k]);
+            if let [patch] = common(&vertices)[..] {
+                let mut key = vertices;
+                key.sort_unstable();
+                triangles.push((key, body, patch, vertices));
+            }
+        }
+        for edge in TET_EDGES {
+            let mut vertices = edge.map(|k| tet[k]);
+            vertices.sort_unstable();
+            if let patches @ [_, _] = &common(&vertices)[..] {
+                segments.push((vertices, curve(patches)));
+            }
+        }
+    }
+    // Of a triangle between two bodies the one seen from the lower body stays: its normal points outward.
+    triangles.sort_unstable();
+    triangles.dedup_by_key(|t| t.0);
+    segments.sort_unstable();
+    segments.dedup();
+    mesh.tets = tets.iter().map(|tet| tet.map(VertexId::new)).collect();
+    mesh.triangles = triangles
+        .iter()
+        .map(|t| BoundaryTriangle { vertices: t.3.map(VertexId::new), patch: PatchId(t.2) })
+        .collect();
+    mesh.segments =
+        segments.iter().map(|s| Segment { vertices: s.0.map(VertexId::new), curve: s.1 }).collect();
+    mesh
+}
+
+/// The unit cube as k³ cubes of six tets; two bodies that meet at x = 1/2 if `k` is even and `halves` is set.
+pub fn cube(k: usize, halves: bool) -> Fixture {
+    let mut planes: Vec<(usize, f64, f64)> =
+        (0..3).flat_map(|axis| [(axis, 0.0, -1.0), (axis, 1.0, 1.0)]).collect();
+    if halves {
+        planes.push((0, 0.5, 1.0));
+    }
+    let curves: Vec<[u32; 2]> = (0..planes.len() as u32)
+        .flat_map(|i| (i + 1..planes.len() as u32).map(move |j| [i, j]))
+        .filter(|[i, j]| planes[*i as usize].0 != planes[*j as usize].0)
+        .collect();
+    let at = |x: usize, y: usize, z: usize| x + (k + 1) * (y + (k + 1) * z);
+    let mut points = Vec::new();
+    for z in 0..=k {
+        for y in 0..=k {
+            points.extend((0..=k).map(|x| Point::new(x as f64, y as f64, z as f64) / k as f64));
+        }
+    }
+    let on: Vec<Vec<u32>> = points
+        .iter()
+        .map(|p| {
+            (0..planes.len() as u32).filter(|i| p[planes[*i as usize].0] == planes[*i as usize].1).collect()
+        })
+        .collect();
+    let (mut tets, mut bodies) = (Vec::new(), Vec::new());
+    for z in 0..k {
+        for y in 0..k {
+            for x in 0..k {
+                // The six tets around the diagonal of a cube, one for each order of the axes.
+                for order in [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]] {
+                    let mut here = [x, y, z];
+                    let mut tet = [at(x, y, z); 4];
+                    for (corner, axis) in order.into_iter().enumerate() {
+                        here[axis] += 1;
+                        tet[corner + 1] = at(here[0], here[1], here[2]);
+                    }
+                    if matches!(order, [0, 2, 1] | [1, 0, 2] | [2, 1, 0]) {
+                        tet.swap(2, 3);
+                    }
+                    tets.push(tet);
+                    bodies.push(BodyId(u32::from(halves && x >= k / 2)));
+                }
+            }
+        }
+    }
+    let surface = |&(axis, at, sign): &(usize, f64, f64)| {
+        let (mut point, mut normal) = (P::origin(), Vector::zeros());
+        (point[axis], normal[axis]) = (at, sign);
+        Surface::Plane(Plane { point, normal })
+    };
+    let surfaces = planes.iter().map(surface).collect();
+    Fixture {
+        mesh: classified(points, tets, bodies, &on, &curves),
+        projector: projector(surfaces, &curves, [P::origin(), P::new(1.0, 1.0, 1.0)]),
+    }
+}
+
+/// A ball about the origin: the faces of an icosahedron, joined to its centre.
+pub fn ball(radius: f64) -> Fixture {
+    let golden = f64::midpoint(1.0, 5.0_f64.sqrt());
+    let scale = radius / golden.hypot(1.0);
+    let mut points = vec![Point::origin()];
+    for axis in 0..3 {
+        for (one, two) in [(1.0, golden), (1.0, -golden), (-1.0, golden), (-1.0, -golden)] {
+            let mut point = Point::origin();
+            (point[axis], point[(axis + 1) % 3]) = (one * scale, two * scale);
+            points.push(point);
+        }
+    }
+    let near = |a: usize, b: usize| (points[a] - points[b]).norm() < 2.1 * scale;
+    let mut tets = Vec::new();
+    for a in 1..points.len() {
+        for b in (a + 1..points.len()).filter(|&b| near(a, b)) {
+            for c in (b + 1..points.len()).filter(|&c| near(a, c) && near(b, c)) {
+                let outward = points[a].coords.cross(&points[b].coords).dot(&points[c].coords) > 0.0;
+                tets.push(if outward { [0, a, b, c] } else { [0, a, c, b] });
+            }
+        }
+    }
+    let on: Vec<Vec<u32>> = (0..points.len()).map(|v| if v == 0 { vec![] } else { vec![0] }).collect();
+    let bodies = vec![BodyId(0); tets.len()];
+    let corner = P::new(radius, radius, radius);
+    Fixture {
+        mesh: classified(points, tets, bodies, &on, &[]),
+        projector: projector(
+            vec![Surface::Sphere(Sphere { center: P::origin(), radius })],
+            &[],
+            [-corner, corner],
+        ),
+    }
+}
+
+/// A cylinder of radius 1 about the z axis, `layers` high: eight prisms to a layer, each of three tets.
+pub fn cylinder(layers: usize) -> Fixture {
+    const RING: usize = 8;
+    let top = layers as f64;
+    let (mut points, mut on) = (Vec::new(), Vec::new());
+    for layer in 0..=layers {
+        let height = layer as f64;
+        let ends: Vec<u32> = [(0, 1), (layers, 2)].iter().filter(|e| e.0 == layer).map(|e| e.1).collect();
+        points.push(Point::new(0.0, 0.0, height));
+        on.push(ends.clone());
+        for k in 0..RING {
+            let (sin, cos) = (std::f64::consts::TAU * k as f64 / RING as f64).sin_cos();
+            points.push(Point::new(cos, sin, height));
+            on.push([vec![0], ends.clone()].concat());
+        }
+    }
+    let mut tets = Vec::new();
+    for layer in 0..layers {
+        for k in 0..RING {
+            let (a, b) = (1 + k, 1 + (k + 1) % RING);
+            let columns = [0, a.min(b), a.max(b)];
+            let at = |corner: usize, up: usize| columns[corner] + (layer + up) * (RING + 1);
+            for mut tet in [
+                [at(0, 0), at(1, 0), at(2, 0), at(2, 1)],
+                [at(0, 0), at(1, 0), at(1, 1), at(2, 1)],
+                [at(0, 0), at(0, 1), at(1, 1), at(2, 1)],
+            ] {
+                let [p, q, r, s] = tet.map(|v| points[v]);
+                if (q - p).cross(&(r - p)).dot(&(s - p)) < 0.0 {
+                    tet.swap(2, 3);
+                }
+                tets.push(tet);
+            }
+        }
+    }
+    let (up, origin) = (Vector::z(), P::origin());
+    let surfaces = vec![
+        Surface::Cylinder(Cylinder { point: origin, axis: up, radius: 1.0 }),
+        Surface::Plane(Plane { point: origin, normal: -up }),
+        Surface::Plane(Plane { point: P::new(0.0, 0.0, top), normal: up }),
+    ];
+    let curves = [[0, 1], [0, 2]];
+    let bodies = vec![BodyId(0); tets.len()];
+    Fixture {
+        mesh: classified(points, tets, bodies, &on, &curves),
+        projector: projector(surfaces, &curves, [P::new(-1.0, -1.0, 0.0), P::new(1.0, 1.0, top)]),
+    }
+}
+
+/// A refined whole mesh as a coarse one.
+pub fn as_mesh(refined: &RefinedMesh) -> Mesh {
+    let coarse = refined.coarse();
+    let n = refined.pieces();
+    let mut mesh =
+        Mesh { points: refined.points().iter().map(|p| Point::from(*p)).collect(), ..Mesh::default() };
+    let classes = coarse.vertex_classes.iter().map(|c| (c, 1));
+    let classes = classes.chain(coarse.edge_classes.iter().map(|c| (c, n - 1)));
+    let classes = classes.chain(coarse.face_classes.iter().map(|c| (c, (n - 1) * (n - 2) / 2)));
+    mesh.classes = classes.flat_map(|(class, count)| std::iter::repeat_n(*class, count as usize)).collect();
+    mesh.classes.resize(mesh.points.len(), Class::Body(BodyId(0)));
+    for (e, (ends, class)) in coarse.edges.iter().zip(&coarse.edge_classes).enumerate() {
+        if let Class::Curve(curve) = *class {
+            let first = coarse.points.len() as u32 + e as u32 * (n - 1);
+            let mut line = vec![ends[0]];
+            line.extend((first..first + n - 1).map(VertexId));
+            line.push(ends[1]);
+            mesh.segments.extend(line.windows(2).map(|w| Segment { vertices: [w[0], w[1]], curve }));
+        }
+    }
+    let (mut tets, mut boundary) = (TetBlock::default(), BoundaryBlock::default());
+    for index in 0..refined.tet_blocks() {
+        refined.tet_block(index, &mut tets);
+        mesh.tets.extend(tets.tets.iter().map(|tet| tet.map(VertexId)));
+        mesh.bodies.extend(tets.tets.iter().map(|_| tets.body.expect("a body")));
+    }
+    for index in 0..refined.boundary_blocks() {
+        refined.boundary_block(index, &mut boundary);
+        let patch = boundary.patch.expect("a patch");
+        let triangle = |t: &[u32; 3]| BoundaryTriangle { vertices: t.map(VertexId), patch };
+        mesh.triangles.extend(boundary.triangles.iter().map(triangle));
+    }
+    mesh
+}
+
+/// The whole mesh as one part.
+pub fn whole(mesh: &Mesh) -> DistMesh {
+    split(mesh, &vec![0; mesh.tets.len()], 1).remove(0)
+}
+
+/// The parts of a mesh, tet `t` on rank `rank_of[t]`.
+pub fn split(mesh: &Mesh, rank_of: &[Rank], ranks: u32) -> Vec<DistMesh> {
+    let all = Entities::new(mesh);
+    (0..ranks).map(|rank| all.part(mesh, rank_of, rank, ranks)).collect()
+}
+
+/// Edges and faces of a mesh in lexicographic order.
+struct Entities {
+    edges: Vec<[u32; 2]>,
+    faces: Vec<[u32; 3]>,
+    edge_classes: Vec<Class>,
+    face_classes: Vec<Class>,
+}
+
+fn sorted<const N: usize>(mut vertices: [u32; N]) -> [u32; N] {
+    vertices.sort_unstable();
+    vertices
+}
+
+fn at<T: Ord>(all: &[T], one: &T) -> usize {
+    all.binary_search(one).expect("an entity of the mesh")
+}
+
+impl Entities {
+    fn new(mesh: &Mesh) -> Self {
+        let mut edges: Vec<_> =
+            mesh.tets.iter().flat_map(|tet| TET_EDGES.map(|e| sorted(e.map(|k| tet[k].0)))).collect();
+        let mut faces: Vec<_> =
+            mesh.tets.iter().flat_map(|tet| TET_FACES.map(|f| sorted(f.map(|k| tet[k].0)))).collect();
+        edges.sort_unstable();
+        edges.dedup();
+        faces.sort_unstable();
+        faces.dedup();
+        let mut edge_classes = vec![Class::Body(BodyId(0)); edges.len()];
+        let mut face_classes = vec![Class::Body(BodyId(0)); faces.len()];
+        for triangle in &mesh.triangles {
+            let face = sorted(triangle.vertices.map(|v| v.0));
+            face_classes[at(&faces, &face)] = Class::Patch(triangle.patch);
+            for [p, q] in [[0, 1], [0, 2], [1, 2]] {
+                edge_classes[at(&edges, &[face[p], face[q]])] = Class::Patch(triangle.patch);
+            }
+        }
+        for segment in &mesh.segments {
+            edge_classes[at(&edges, &sorted(segment.vertices.map(|v| v.0)))] = Class::Curve(segment.curve);
+        }
+        Self { edges, faces, edge_classes, face_classes }
+    }
+
+    fn part(&self, mesh: &Mesh, rank_of: &[Rank], rank: Rank, ranks: u32) -> DistMesh {
+        let mine: Vec<usize> = (0..mesh.tets.len()).filter(|t| rank_of[*t] == rank).collect();
+        let vertices_of = |t: usize| mesh.tets[t].map(|v| v.index());
+        let edges_of = |t: usize| TET_EDGES.map(|e| at(&self.edges, &sorted(e.map(|k| mesh.tets[t][k].0))));
+        let faces_of = |t: usize| TET_FACES.map(|f| at(&self.faces, &sorted(f.map(|k| mesh.tets[t][k].0))));
+        let (vertices, shared_vertices) = used(mesh.points.len(), rank_of, rank, vertices_of);
+        let (edges, shared_edges) = used(self.edges.len(), rank_of, rank, edges_of);
+        let (faces, shared_faces) = used(self.faces.len(), rank_of, rank, faces_of);
+        let local = |v: u32| VertexId::new(at(&vertices, &(v as usize)));
+        let mut beside: Vec<(usize, usize)> =
+            (0..mine.len()).flat_map(|t| faces_of(mine[t]).map(|face| (face, t))).collect();
+        beside.sort_unstable();
+        let mut boundary: Vec<BoundaryFace> = Vec::new();
+        for triangle in &mesh.triangles {
+            let global = at(&self.faces, &sorted(triangle.vertices.map(|v| v.0)));
+            let Ok(face) = faces.binary_search(&global) else { continue };
+            let mut parents = [None; 2];
+            let first = beside.partition_point(|b| b.0 < global);
+            for &(_, t) in beside[first..].iter().take_while(|b| b.0 == global) {
+                let tet = mesh.tets[mine[t]];
+                let mut outward = TET_FACES.iter().map(|f| f.map(|k| tet[k]));
+                let behind =
+                    outward.any(|[p, q, r]| [[p, q, r], [q, r, p], [r, p, q]].contains(&triangle.vertices));
+                parents[usize::from(!behind)] = Some(TetId::new(t));
+            }
+            boundary.push(BoundaryFace { face: FaceId::new(face), patch: triangle.patch, parents });
+        }
+        let ids = |kept: &[usize]| kept.iter().map(|&i| i as u64).collect();
+        DistMesh {
+            rank,
+            ranks,
+            totals: Totals {
+                vertices: mesh.points.len() as u64,
+                edges: self.edges.len() as u64,
+                faces: self.faces.len() as u64,
+                tets: mesh.tets.len() as u64,
+                boundary: mesh.triangles.len() as u64,
+            },
+            points: vertices.iter().map(|v| mesh.points[*v]).collect(),
+            vertex_ids: ids(&vertices),
+            vertex_classes: vertices.iter().map(|v| mesh.classes[*v]).collect(),
+            edges: edges.iter().map(|e| self.edges[*e].map(local)).collect(),
+            edge_ids: ids(&edges),
+            edge_classes: edges.iter().map(|e| self.edge_classes[*e]).collect(),
+            faces: faces.iter().map(|f| self.faces[*f].map(local)).collect(),
+            face_ids: ids(&faces),
+            face_classes: faces.iter().map(|f| self.face_classes[*f]).collect(),
+            tets: mine.iter().map(|t| mesh.tets[*t].map(|v| local(v.0))).collect(),
+            tet_ids: ids(&mine),
+            tet_bodies: mine.iter().map(|t| mesh.bodies[*t]).collect(),
+            tet_edges: mine.iter().map(|t| edges_of(*t).map(|e| EdgeId::new(at(&edges, &e)))).collect(),
+            tet_faces: mine.iter().map(|t| faces_of(*t).map(|f| FaceId::new(at(&faces, &f)))).collect(),
+            boundary,
+            shared_vertices,
+            shared_edges,
+            shared_faces,
+        }
+    }
+}
+
+/// The entities of one kind that a rank's tets use, and which of them others use too.
+fn used<const N: usize>(
+    count: usize,
+    rank_of: &[Rank],
+    rank: Rank,
+    of: impl Fn(usize) -> [usize; N],
+) -> (Vec<usize>, Shared) {
+    let mut ranks_of = vec![Vec::new(); count];
+    for (tet, rank) in rank_of.iter().enumerate() {
+        of(tet).iter().for_each(|entity| ranks_of[*entity].push(*rank));
+    }
+    let mut shared = Shared { offsets: vec![0], ..Shared::default() };
+    let mut kept = Vec::new();
+    for (entity, ranks) in ranks_of.iter_mut().enumerate() {
+        ranks.sort_unstable();
+        ranks.dedup();
+        if !ranks.contains(&rank) {
+            continue;
+        }
+        if ranks.len() > 1 {
+            shared.ids.push(kept.len() as u32);
+            shared.holders.extend(&*ranks);
+            shared.offsets.push(shared.holders.len() as u32);
+        }
+        kept.push(entity);
+    }
+    (kept, shared)
+}

@@ -1,0 +1,287 @@
+//! The lattice that refinement fills a tet with: counts, indices, and the corners of its children.
+//!
+//! Each edge of a tet is cut into `n` pieces. The **points** are those with integer barycentric
+//! coordinates (a, b, c, d), a + b + c + d = n; since a follows from the others, a point is (b, c, d).
+//! A **cell** is the unit cube of (b, c, d) that begins at a point, as far as it lies in the tet: it holds one
+//! **upright** child, which stands as the parent does; behind it an **octahedron** of four children; and
+//! behind that the child that stands **upside down** (Freudenthal 1942; Bey 1995).
+//!
+//! ```text
+//!   in a face:   2                    along a row, with n = 3:
+//!               / \                   cells        0   1   2
+//!              5---4                  upright      x   x   x
+//!             / \ / \                 octahedron   x   x
+//!            0---3---1                upside down  x
+//! ```
+//!
+//! Points and children are counted **row by row**: d outermost, then c, then b. Within a row the children
+//! are first the upright ones, then each octahedron's four, then those upside down. So the index of
+//! a child depends on nothing but its place, whatever the diagonals are, and a row's children
+//! have their corners in runs of consecutive points.
+
+use crate::mesh::TET_FACES;
+
+/// Corner codes of the upright child of a cell: bit 0 is b + 1, bit 1 is c + 1, bit 2 is d + 1.
+pub const UPRIGHT: [u8; 4] = [0, 1, 2, 4];
+
+/// Corner codes of the child upside down.
+pub const UPSIDE_DOWN: [u8; 4] = [6, 7, 5, 3];
+
+/// Corner codes of the midpoint between corners i and j of the parent of an octahedron, `MIDPOINT[i][j]`.
+pub const MIDPOINT: [[u8; 4]; 4] = [[0, 1, 2, 4], [1, 1, 3, 5], [2, 3, 2, 6], [4, 5, 6, 4]];
+
+/// Corner codes of an octahedron's four children, for each of its three diagonals.
+///
+/// Diagonal 0 joins the midpoints of the parent's edges 01 and 23, diagonal 1 those of 02 and 13,
+/// diagonal 2 those of 03 and 12.
+pub const OCTAHEDRON: [[[u8; 4]; 4]; 3] = [
+    [[1, 6, 3, 2], [1, 6, 5, 3], [1, 6, 4, 5], [1, 6, 2, 4]],
+    [[2, 5, 1, 3], [2, 5, 3, 6], [2, 5, 6, 4], [2, 5, 4, 1]],
+    [[4, 3, 5, 1], [4, 3, 6, 5], [4, 3, 2, 6], [4, 3, 1, 2]],
+];
+
+/// The unit steps of (b, c, d) toward each corner of the tet.
+const STEP: [[u32; 3]; 4] = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]];
+
+/// How finely tets are cut.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Lattice {
+    n: u32,
+}
+
+/// The most pieces an edge may be cut into: 1024³ children are still numbered by `u32`.
+pub const MAX_PIECES: u32 = 1024;
+
+fn choose2(k: u32) -> u32 {
+    k * k.saturating_sub(1) / 2
+}
+
+fn choose3(k: u32) -> u32 {
+    let k = u64::from(k);
+    u32::try_from(k * k.saturating_sub(1) * k.saturating_sub(2) / 6).expect("at most C(1027, 3)")
+}
+
+impl Lattice {
+    /// The lattice with `n` pieces to an edge.
+    ///
+    /// # Panics
+    /// Unless 1 ≤ n ≤ [`MAX_PIECES`].
+    pub fn new(n: u32) -> Self {
+        assert!((1..=MAX_PIECES).contains(&n), "a lattice of {n} pieces");
+        Self { n }
+    }
+
+    /// Pieces to an edge.
+    pub fn n(self) -> u32 {
+        self.n
+    }
+
+    /// Points in the tet, its boundary included.
+    pub fn points(self) -> u32 {
+        choose3(self.n + 3)
+    }
+
+    /// Points inside an edge.
+    pub fn edge_points(self) -> u32 {
+        self.n - 1
+    }
+
+    /// Points inside a face.
+    pub fn face_points(self) -> u32 {
+        choose2(self.n - 1)
+    }
+
+    /// Points inside a tet.
+    pub fn tet_points(self) -> u32 {
+        choose3(self.n - 1)
+    }
+
+    /// Children of a tet.
+    pub fn children(self) -> u32 {
+        self.n.pow(3)
+    }
+
+    /// Children of a boundary triangle.
+    pub fn face_children(self) -> u32 {
+        self.n.pow(2)
+    }
+
+    /// Octahedra in a tet.
+    pub fn octahedra(self) -> u32 {
+        choose3(self.n + 1)
+    }
+
+    /// The index of the point (0, c, d); (b, c, d) is b further on.
+    #[inline]
+    pub fn row(self, c: u32, d: u32) -> u32 {
+        let m = self.n - d;
+        choose3(self.n + 3) - choose3(m + 3) + c * (m + 1) - choose2(c)
+    }
+
+    /// The index of a point.
+    #[inline]
+    pub fn index(self, [b, c, d]: [u32; 3]) -> u32 {
+        self.row(c, d) + b
+    }
+
+    /// The index of the first child of the row of cells (0…, c, d).
+    #[inline]
+    pub fn child_row(self, c: u32, d: u32) -> u32 {
+        // Layer d is the difference of two cubes; a row of m cells has 6m − 6 children, the last one has 1.
+        let layer = |k: u32| if k == 0 { 0 } else { 3 * k * (k - 1) + 1 };
+        let m = self.n - d;
+        self.n.pow(3) - m.pow(3) + layer(m) - layer(m - c)
+    }
+
+    /// The index of the first octahedron of the row of cells (0…, c, d).
+    #[inline]
+    pub fn octahedron_row(self, c: u32, d: u32) -> u32 {
+        let m = self.n - d;
+        choose3(self.n + 1) - choose3(m + 1) + choose2(m) - choose2(m - c)
+    }
+
+    /// The rows of cells in order: (c, d, cells in the row). All have an upright child, all but the last an
+    /// octahedron, all but the last two a child upside down.
+    pub fn rows(self) -> impl Iterator<Item = (u32, u32, u32)> {
+        let n = self.n;
+        (0..n).flat_map(move |d| (0..n - d).map(move |c| (c, d, n - d - c)))
+    }
+
+    /// The index of the point at position `k` of the edge from corner `from` to corner `to`.
+    pub fn on_edge(self, [from, to]: [usize; 2], k: u32) -> u32 {
+        self.index([0, 1, 2].map(|x| (self.n - k) * STEP[from][x] + k * STEP[to][x]))
+    }
+
+    /// The index of the point of a face with weights `j` and `k` at its second and third corner.
+    #[inline]
+    pub fn on_face(self, [p, q, r]: [usize; 3], j: u32, k: u32) -> u32 {
+        self.index([0, 1, 2].map(|x| (self.n - j - k) * STEP[p][x] + j * STEP[q][x] + k * STEP[r][x]))
+    }
+
+    /// The interior points of a face in their order: (j, k), k outermost.
+    pub fn face_interior(self) -> impl Iterator<Item = (u32, u32)> {
+        let n = self.n;
+        (1..n).flat_map(move |k| (1..n - k).map(move |j| (j, k)))
+    }
+
+    /// The rows of interior points of the tet in their order: (index of the first, count).
+    pub fn interior_rows(self) -> impl Iterator<Item = (u32, u32)> {
+        let n = self.n;
+        (1..n).flat_map(move |d| {
+            (1..n - d).filter(move |c| c + d + 1 < n).map(move |c| (self.index([1, c, d]), n - 1 - c - d))
+        })
+    }
+
+    /// The index of the child that has the upright child (j, k) of a face.
+    pub fn upright_behind_face(self, [p, q, r]: [usize; 3], j: u32, k: u32) -> u32 {
+        let i = self.n - 1 - j - k;
+        let [b, c, d] = [0, 1, 2].map(|x| i * STEP[p][x] + j * STEP[q][x] + k * STEP[r][x]);
+        self.child_row(c, d) + b
+    }
+
+    /// The cell (b, c, d) of the octahedron that has the child (j, k) of a face that stands upside down.
+    pub fn octahedron_behind_face(self, [p, q, r]: [usize; 3], j: u32, k: u32) -> [u32; 3] {
+        let i = self.n - 2 - j - k;
+        [0, 1, 2].map(|x| i * STEP[p][x] + j * STEP[q][x] + k * STEP[r][x])
+    }
+
+    /// The index of the first of the four children of the octahedron of a cell.
+    pub fn octahedron_child(self, [b, c, d]: [u32; 3]) -> u32 {
+        self.child_row(c, d) + (self.n - c - d) + 4 * b
+    }
+}
+
+/// Which of an octahedron's four children has its face on the parent's face opposite corner `face`.
+pub fn octahedron_child_on_face(diagonal: u8, face: usize) -> u32 {
+    let [i, j, k] = TET_FACES[face];
+    let corners = [MIDPOINT[i][j], MIDPOINT[i][k], MIDPOINT[j][k]];
+    let children = &OCTAHEDRON[usize::from(diagonal)];
+    let child = children.iter().position(|child| corners.iter().all(|c| child.contains(c)));
+    child.expect("each diagonal leaves the faces of the octahedron whole") as u32
+}
+
+/// Where in a run of cells a corner code lies: which of the four rows of points (bit 0: c + 1, bit 1: d + 1),
+/// and how far along.
+#[inline]
+pub fn corner_place(code: u8) -> (usize, usize) {
+    (usize::from(code >> 1), usize::from(code & 1))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn corner(code: u8) -> [i64; 3] {
+        [0, 1, 2].map(|x| i64::from(code >> x & 1))
+    }
+
+    fn volume6(child: [u8; 4]) -> i64 {
+        let [p, q, r, s] = child.map(corner);
+        let minus = |x: [i64; 3]| [x[0] - p[0], x[1] - p[1], x[2] - p[2]];
+        let [u, v, w] = [minus(q), minus(r), minus(s)];
+        u[0] * (v[1] * w[2] - v[2] * w[1])
+            + u[1] * (v[2] * w[0] - v[0] * w[2])
+            + u[2] * (v[0] * w[1] - v[1] * w[0])
+    }
+
+    #[test]
+    fn every_child_is_positive_and_has_the_same_volume() {
+        assert_eq!(volume6(UPRIGHT), 1);
+        assert_eq!(volume6(UPSIDE_DOWN), 1);
+        for child in OCTAHEDRON.as_flattened() {
+            assert_eq!(volume6(*child), 1, "{child:?}");
+        }
+    }
+
+    #[test]
+    fn points_rows_children_and_octahedra_are_counted_without_gaps() {
+        for n in 1..=12 {
+            let lattice = Lattice::new(n);
+            let (mut points, mut children, mut octahedra) = (0, 0, 0);
+            for d in 0..=n {
+                for c in 0..=n - d {
+                    assert_eq!(lattice.row(c, d), points, "n = {n}, c = {c}, d = {d}");
+                    points += n - d - c + 1;
+                }
+            }
+            assert_eq!(points, lattice.points());
+            for (c, d, cells) in lattice.rows() {
+                assert_eq!(lattice.child_row(c, d), children, "n = {n}, c = {c}, d = {d}");
+                assert_eq!(lattice.octahedron_row(c, d), octahedra);
+                children += cells + 4 * (cells - 1) + cells.saturating_sub(2);
+                octahedra += cells - 1;
+            }
+            assert_eq!(children, lattice.children());
+            assert_eq!(octahedra, lattice.octahedra());
+            assert_eq!(lattice.face_interior().count() as u32, lattice.face_points());
+            assert_eq!(lattice.interior_rows().map(|r| r.1).sum::<u32>(), lattice.tet_points());
+        }
+    }
+
+    #[test]
+    fn points_inside_edges_faces_and_the_tet_cover_the_lattice_once() {
+        let lattice = Lattice::new(7);
+        let mut seen = vec![0; lattice.points() as usize];
+        for k in 0..4 {
+            seen[lattice.index(STEP[k].map(|x| x * 7)) as usize] += 1;
+        }
+        for edge in crate::mesh::TET_EDGES {
+            (1..7).for_each(|k| seen[lattice.on_edge(edge, k) as usize] += 1);
+        }
+        for face in TET_FACES {
+            lattice.face_interior().for_each(|(j, k)| seen[lattice.on_face(face, j, k) as usize] += 1);
+        }
+        for (first, count) in lattice.interior_rows() {
+            (first..first + count).for_each(|i| seen[i as usize] += 1);
+        }
+        assert!(seen.iter().all(|&times| times == 1), "{seen:?}");
+    }
+
+    #[test]
+    fn the_largest_lattice_is_numbered_by_u32() {
+        let lattice = Lattice::new(MAX_PIECES);
+        assert_eq!(lattice.points(), 180_007_425);
+        assert_eq!(lattice.children(), 1 << 30);
+        assert_eq!(lattice.child_row(0, MAX_PIECES - 1), (1 << 30) - 1);
+    }
+}

@@ -1,0 +1,180 @@
+//! Local and global ids of fine vertices: arithmetic on the ids of the coarse entities they lie in.
+//!
+//! ```text
+//!   local and global alike:
+//!   | coarse vertices | n−1 for each edge | C(n−1,2) for each face | C(n−1,3) for each tet |
+//! ```
+//! Inside an edge or a face the points are counted in the direction of its vertices by ascending global id,
+//! inside a tet in the order of its vertices. So all holders of an entity agree, without a message.
+
+use super::RefineError;
+use super::lattice::{Lattice, MAX_PIECES};
+use crate::dist::DistMesh;
+use crate::mesh::stream::Counts;
+use crate::mesh::{GlobalId, TET_EDGES, TET_FACES, TetId};
+use std::ops::Range;
+
+/// A kind of coarse entity, and how many fine vertices lie inside each.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Kind {
+    /// Coarse entities of this part.
+    count: u32,
+    /// Fine vertices inside each.
+    size: u32,
+    /// Local id of the first vertex inside the first of them.
+    local: u32,
+    /// Global id of the first vertex inside the first of all parts.
+    global: GlobalId,
+}
+
+/// The numbering of the fine vertices of one part.
+#[derive(Clone, Debug)]
+pub struct Numbering {
+    lattice: Lattice,
+    /// Vertices, edges, faces, tets.
+    kinds: [Kind; 4],
+    /// Local vertices.
+    vertices: u32,
+    /// Counts of the whole fine mesh.
+    totals: Counts,
+}
+
+/// A coarse entity: dimension (0 vertex, 1 edge, 2 face, 3 tet) and local id.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Entity {
+    /// 0 for a vertex, 1 for an edge, 2 for a face, 3 for a tet.
+    pub dimension: usize,
+    /// Local id.
+    pub id: u32,
+}
+
+impl Numbering {
+    /// Numbers the vertices of the lattices with `n` pieces.
+    pub fn new(mesh: &DistMesh, n: u32) -> Result<Self, RefineError> {
+        if n == 0 || n > MAX_PIECES {
+            return Err(RefineError::Pieces { n });
+        }
+        let lattice = Lattice::new(n);
+        let sizes = [1, lattice.edge_points(), lattice.face_points(), lattice.tet_points()];
+        let counts = [mesh.points.len(), mesh.edges.len(), mesh.faces.len(), mesh.tets.len()];
+        let all = [mesh.totals.vertices, mesh.totals.edges, mesh.totals.faces, mesh.totals.tets];
+        let needed: u128 = counts.iter().zip(sizes).map(|(&c, s)| c as u128 * u128::from(s)).sum();
+        if needed > u128::from(u32::MAX) {
+            return Err(RefineError::TooManyVertices { rank: mesh.rank, needed });
+        }
+        let (mut local, mut global) = (0, 0);
+        let kinds = [0, 1, 2, 3].map(|dimension| {
+            let kind = Kind { count: counts[dimension] as u32, size: sizes[dimension], local, global };
+            local += kind.count * kind.size;
+            global += all[dimension] * u64::from(kind.size);
+            kind
+        });
+        let totals = Counts {
+            vertices: global,
+            tets: mesh.totals.tets * u64::from(lattice.children()),
+            boundary: mesh.totals.boundary * u64::from(lattice.face_children()),
+        };
+        Ok(Self { lattice, kinds, vertices: local, totals })
+    }
+
+    /// The lattice.
+    pub fn lattice(&self) -> Lattice {
+        self.lattice
+    }
+
+    /// Fine vertices of this part.
+    pub fn vertices(&self) -> u32 {
+        self.vertices
+    }
+
+    /// Counts of the whole fine mesh.
+    pub fn totals(&self) -> Counts {
+        self.totals
+    }
+
+    /// Local ids of the first vertex inside an edge, a face, a tet: where their blocks begin.
+    pub fn bases(&self) -> [usize; 3] {
+        [1, 2, 3].map(|dimension| self.kinds[dimension].local as usize)
+    }
+
+    /// The number of blocks: one for each coarse entity that can have vertices inside.
+    pub fn blocks(&self) -> usize {
+        self.kinds.iter().filter(|k| k.size > 0).map(|k| k.count as usize).sum()
+    }
+
+    /// The coarse entity of a block.
+    pub fn block(&self, mut index: usize) -> Entity {
+        for (dimension, kind) in self.kinds.iter().enumerate().filter(|(_, k)| k.size > 0) {
+            match index.checked_sub(kind.count as usize) {
+                Some(rest) => index = rest,
+                None => return Entity { dimension, id: index as u32 },
+            }
+        }
+        panic!("a vertex block beyond the last of {}", self.blocks());
+    }
+
+    /// Local ids of the vertices inside a coarse entity.
+    pub fn inside(&self, entity: Entity) -> Range<u32> {
+        let kind = self.kinds[entity.dimension];
+        let first = kind.local + entity.id * kind.size;
+        first..first + kind.size
+    }
+
+    /// Global id of the first vertex inside the coarse entity of this dimension and global id.
+    pub fn first_id(&self, dimension: usize, id: GlobalId) -> GlobalId {
+        let kind = self.kinds[dimension];
+        kind.global + id * u64::from(kind.size)
+    }
+
+    /// The coarse entity that a fine vertex lies in, and its index among the vertices inside.
+    #[inline]
+    pub fn locate(&self, local: u32) -> (Entity, u32) {
+        // Kinds without vertices inside begin where the part's vertices end: no vertex reaches them.
+        let [_, edge, face, tet] = &self.kinds;
+        let dimension = usize::from(local >= edge.local)
+            + usize::from(local >= face.local)
+            + usize::from(local >= tet.local);
+        let kind = self.kinds[dimension];
+        let offset = local - kind.local;
+        (Entity { dimension, id: offset / kind.size }, offset % kind.size)
+    }
+
+    /// Local ids of all lattice points of a tet, in the order of [`Lattice`].
+    pub fn lattice_ids(&self, mesh: &DistMesh, tet: TetId, ids: &mut Vec<u32>) {
+        let lattice = self.lattice;
+        let n = lattice.n();
+        let corners = mesh.tets[tet.index()];
+        ids.clear();
+        ids.resize(lattice.points() as usize, 0);
+        for (corner, at) in [[0, 0, 0], [n, 0, 0], [0, n, 0], [0, 0, n]].into_iter().enumerate() {
+            ids[lattice.index(at) as usize] = corners[corner].0;
+        }
+        for (edge, id) in TET_EDGES.into_iter().zip(mesh.tet_edges[tet.index()]) {
+            let edge = ascending(edge, |corner| corners[corner].0);
+            let inside = self.inside(Entity { dimension: 1, id: id.0 });
+            for (vertex, k) in inside.zip(1..) {
+                ids[lattice.on_edge(edge, k) as usize] = vertex;
+            }
+        }
+        for (face, id) in TET_FACES.into_iter().zip(mesh.tet_faces[tet.index()]) {
+            let face = ascending(face, |corner| corners[corner].0);
+            let inside = self.inside(Entity { dimension: 2, id: id.0 });
+            for (vertex, (j, k)) in inside.zip(lattice.face_interior()) {
+                ids[lattice.on_face(face, j, k) as usize] = vertex;
+            }
+        }
+        let mut next = self.inside(Entity { dimension: 3, id: tet.0 }).start;
+        for (first, count) in lattice.interior_rows() {
+            for (id, vertex) in ids[first as usize..][..count as usize].iter_mut().zip(next..) {
+                *id = vertex;
+            }
+            next += count;
+        }
+    }
+}
+
+/// Corners of a tet by ascending key.
+pub fn ascending<const N: usize>(mut corners: [usize; N], key: impl Fn(usize) -> u32) -> [usize; N] {
+    corners.sort_unstable_by_key(|&corner| key(corner));
+    corners
+}

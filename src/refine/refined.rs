@@ -1,0 +1,297 @@
+//! The refined part: coordinates kept, everything else computed as it is asked for.
+
+use super::diagonal::Diagonals;
+use super::lattice::{OCTAHEDRON, UPRIGHT, UPSIDE_DOWN, corner_place, octahedron_child_on_face};
+use super::numbering::{Entity, Numbering, ascending};
+use super::snap::Coordinates;
+use crate::dist::{BoundaryFace, DistMesh, Shared};
+use crate::mesh::stream::{BoundaryBlock, Counts, MeshStream, NO_TET, TetBlock, VertexBlock};
+use crate::mesh::{GlobalId, Rank, TET_FACES, TetId};
+
+/// One rank's part of a refined mesh: see [`refine`](super::refine()).
+///
+/// Tet blocks and boundary blocks are those of the coarse tets and of the coarse boundary triangles, in
+/// their order. Vertex blocks are the coarse vertices, then edges, then faces, then tets.
+#[derive(Clone)]
+pub struct RefinedMesh {
+    coarse: DistMesh,
+    numbering: Numbering,
+    points: Box<[Coordinates]>,
+    diagonals: Diagonals,
+}
+
+impl std::fmt::Debug for RefinedMesh {
+    /// Its size alone: coordinates are gigabytes.
+    fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let (rank, pieces, counts) = (self.rank(), self.pieces(), self.counts());
+        out.debug_struct("RefinedMesh")
+            .field("rank", &rank)
+            .field("pieces", &pieces)
+            .field("counts", &counts)
+            .finish()
+    }
+}
+
+impl RefinedMesh {
+    pub(super) fn new(
+        coarse: DistMesh,
+        numbering: Numbering,
+        points: Box<[Coordinates]>,
+        diagonals: Diagonals,
+    ) -> Self {
+        assert_eq!(points.len(), numbering.vertices() as usize, "one point for each fine vertex");
+        Self { coarse, numbering, points, diagonals }
+    }
+
+    /// The coarse mesh.
+    pub fn coarse(&self) -> &DistMesh {
+        &self.coarse
+    }
+
+    /// Pieces of each coarse edge.
+    pub fn pieces(&self) -> u32 {
+        self.numbering.lattice().n()
+    }
+
+    /// Bytes kept beside the coarse mesh.
+    pub fn bytes(&self) -> u64 {
+        let coordinates = size_of_val(&*self.points) as u64;
+        coordinates + (self.coarse.tets.len() * self.diagonals.bytes_per_tet()) as u64
+    }
+
+    /// The number of fine tets of this part.
+    pub fn tets(&self) -> u64 {
+        self.coarse.tets.len() as u64 * u64::from(self.numbering.lattice().children())
+    }
+
+    /// Appends the indices within the part of the children of `tet` on the children of its face opposite corner `face`.
+    fn parents_on_face(&self, tet: TetId, face: usize, parents: &mut Vec<u64>) {
+        let lattice = self.numbering.lattice();
+        let vertices = self.coarse.tets[tet.index()];
+        let corners = ascending(TET_FACES[face], |corner| vertices[corner].0);
+        let diagonals = self.diagonals.of_tet(tet.0);
+        let first = u64::from(tet.0) * u64::from(lattice.children());
+        for_each_face_child(lattice.n(), |j, k, upright| {
+            let child = if upright {
+                lattice.upright_behind_face(corners, j, k)
+            } else {
+                let cell = lattice.octahedron_behind_face(corners, j, k);
+                let diagonal = diagonals.get(lattice.octahedron_row(cell[1], cell[2]) + cell[0]);
+                lattice.octahedron_child(cell) + octahedron_child_on_face(diagonal, face)
+            };
+            parents.push(first + u64::from(child));
+        });
+    }
+
+    /// Which face of `tet` a boundary face is.
+    fn face_of(&self, tet: TetId, boundary: &BoundaryFace) -> usize {
+        let faces = &self.coarse.tet_faces[tet.index()];
+        faces.iter().position(|f| *f == boundary.face).expect("a boundary face is a face of its parents")
+    }
+
+    /// Whether the normal of the patch is that of the face with its vertices in ascending order.
+    fn ascending_is_outward(&self, boundary: &BoundaryFace) -> bool {
+        let ascending = self.coarse.faces[boundary.face.index()];
+        let (tet, behind) = match boundary.parents {
+            [Some(tet), _] => (tet, true),
+            [None, Some(tet)] => (tet, false),
+            [None, None] => panic!("boundary face {:?} has no tet in this part", boundary.face),
+        };
+        let vertices = self.coarse.tets[tet.index()];
+        let [p, q, r] = TET_FACES[self.face_of(tet, boundary)].map(|corner| vertices[corner]);
+        let even = [[p, q, r], [q, r, p], [r, p, q]].contains(&ascending);
+        even == behind
+    }
+
+    /// Local ids of all lattice points of a face, by j + (n + 1)·k.
+    fn face_ids(&self, face: &BoundaryFace, ids: &mut Vec<u32>) {
+        let lattice = self.numbering.lattice();
+        let tet = face.parents[0].or(face.parents[1]).expect("a boundary face has a tet in this part");
+        let vertices = self.coarse.tets[tet.index()];
+        let corners = ascending(TET_FACES[self.face_of(tet, face)], |corner| vertices[corner].0);
+        let mut all = Vec::new();
+        self.numbering.lattice_ids(&self.coarse, tet, &mut all);
+        let n = lattice.n();
+        ids.clear();
+        for k in 0..=n {
+            for j in 0..=n {
+                ids.push(if j + k <= n { all[lattice.on_face(corners, j, k) as usize] } else { u32::MAX });
+            }
+        }
+    }
+}
+
+/// Calls `visit(j, k, upright)` for each child of a triangle, row by row: the upright ones, then those upside down.
+fn for_each_face_child(n: u32, mut visit: impl FnMut(u32, u32, bool)) {
+    for k in 0..n {
+        (0..n - k).for_each(|j| visit(j, k, true));
+        (0..n - k - 1).for_each(|j| visit(j, k, false));
+    }
+}
+
+/// All holders of a coarse entity, empty where only this rank holds it.
+fn holders(shared: &Shared, id: u32) -> &[Rank] {
+    match shared.ids.binary_search(&id) {
+        Ok(at) => &shared.holders[shared.offsets[at] as usize..shared.offsets[at + 1] as usize],
+        Err(_) => &[],
+    }
+}
+
+impl MeshStream for RefinedMesh {
+    fn rank(&self) -> Rank {
+        self.coarse.rank
+    }
+
+    fn ranks(&self) -> u32 {
+        self.coarse.ranks
+    }
+
+    fn counts(&self) -> Counts {
+        let children = u64::from(self.numbering.lattice().face_children());
+        Counts {
+            vertices: u64::from(self.numbering.vertices()),
+            tets: self.tets(),
+            boundary: self.coarse.boundary.len() as u64 * children,
+        }
+    }
+
+    fn totals(&self) -> Counts {
+        self.numbering.totals()
+    }
+
+    fn points(&self) -> &[[f64; 3]] {
+        &self.points
+    }
+
+    fn vertex_blocks(&self) -> usize {
+        self.numbering.blocks()
+    }
+
+    fn vertex_block(&self, index: usize) -> VertexBlock<'_> {
+        let entity = self.numbering.block(index);
+        let id = entity.id as usize;
+        let (class, holders) = match entity.dimension {
+            0 => (self.coarse.vertex_classes[id], holders(&self.coarse.shared_vertices, entity.id)),
+            1 => (self.coarse.edge_classes[id], holders(&self.coarse.shared_edges, entity.id)),
+            2 => (self.coarse.face_classes[id], holders(&self.coarse.shared_faces, entity.id)),
+            _ => (crate::mesh::Class::Body(self.coarse.tet_bodies[id]), &[][..]),
+        };
+        VertexBlock {
+            local: self.numbering.inside(entity),
+            first_id: self.numbering.first_id(entity.dimension, self.coarse_id(entity)),
+            holders,
+            on_boundary: !matches!(class, crate::mesh::Class::Body(_)),
+        }
+    }
+
+    fn vertex_id(&self, local: u32) -> GlobalId {
+        let (entity, within) = self.numbering.locate(local);
+        self.numbering.first_id(entity.dimension, self.coarse_id(entity)) + u64::from(within)
+    }
+
+    fn tet_blocks(&self) -> usize {
+        self.coarse.tets.len()
+    }
+
+    fn tet_block(&self, index: usize, block: &mut TetBlock) {
+        let lattice = self.numbering.lattice();
+        let children = lattice.children();
+        let tet = TetId::new(index);
+        let mut ids = Vec::new();
+        self.numbering.lattice_ids(&self.coarse, tet, &mut ids);
+        let diagonals = self.diagonals.of_tet(tet.0);
+        block.tets.clear();
+        block.tets.reserve(children as usize);
+        for (c, d, cells) in lattice.rows() {
+            push_row(&ids, rows_around(lattice, c, d), cells as usize, &mut block.tets, |octahedron| {
+                diagonals.get(lattice.octahedron_row(c, d) + octahedron)
+            });
+        }
+        block.first_id = self.coarse.tet_ids[index] * u64::from(children);
+        block.first_local = index as u64 * u64::from(children);
+        block.body = Some(self.coarse.tet_bodies[index]);
+    }
+
+    fn boundary_blocks(&self) -> usize {
+        self.coarse.boundary.len()
+    }
+
+    fn boundary_block(&self, index: usize, block: &mut BoundaryBlock) {
+        let face = &self.coarse.boundary[index];
+        let n = self.pieces();
+        let mut ids = Vec::new();
+        self.face_ids(face, &mut ids);
+        let outward = self.ascending_is_outward(face);
+        block.triangles.clear();
+        for_each_face_child(n, |j, k, upright| {
+            let at = |j: u32, k: u32| ids[(j + (n + 1) * k) as usize];
+            let [p, q, r] = if upright {
+                [at(j, k), at(j + 1, k), at(j, k + 1)]
+            } else {
+                [at(j + 1, k), at(j + 1, k + 1), at(j, k + 1)]
+            };
+            block.triangles.push(if outward { [p, q, r] } else { [p, r, q] });
+        });
+        let mut parents = [Vec::new(), Vec::new()];
+        for (parent, indices) in face.parents.iter().zip(&mut parents) {
+            match *parent {
+                Some(tet) => self.parents_on_face(tet, self.face_of(tet, face), indices),
+                None => indices.resize(block.triangles.len(), NO_TET),
+            }
+        }
+        let [behind, before] = parents;
+        block.parents.clear();
+        block.parents.extend(behind.into_iter().zip(before).map(|(p, q)| [p, q]));
+        block.patch = Some(face.patch);
+    }
+}
+
+impl RefinedMesh {
+    /// The global id of a coarse entity.
+    fn coarse_id(&self, Entity { dimension, id }: Entity) -> GlobalId {
+        let ids = match dimension {
+            0 => &self.coarse.vertex_ids,
+            1 => &self.coarse.edge_ids,
+            2 => &self.coarse.face_ids,
+            _ => &self.coarse.tet_ids,
+        };
+        ids[id as usize]
+    }
+}
+
+/// Where the four rows of points around a row of cells begin, as [`corner_place`] numbers them.
+fn rows_around(lattice: super::lattice::Lattice, c: u32, d: u32) -> [usize; 4] {
+    let inside = c + d + 2 <= lattice.n();
+    let row = |c, d| lattice.row(c, d) as usize;
+    [row(c, d), row(c + 1, d), row(c, d + 1), if inside { row(c + 1, d + 1) } else { 0 }]
+}
+
+/// Appends the children of a row of cells.
+fn push_row(
+    ids: &[u32],
+    rows: [usize; 4],
+    cells: usize,
+    tets: &mut Vec<[u32; 4]>,
+    diagonal: impl Fn(u32) -> u8,
+) {
+    // The last row of a layer has no fourth row of points beside it; none of its children asks for one.
+    let rows = rows.map(|start| &ids[start..]);
+    let at = |code: u8, cell: usize| {
+        let (row, shift) = corner_place(code);
+        rows[row][cell + shift]
+    };
+    let [p, q, r, s] = UPRIGHT;
+    tets.extend((0..cells).map(|cell| [at(p, cell), at(q, cell), at(r, cell), at(s, cell)]));
+    for cell in 0..cells - 1 {
+        // By corner code; an octahedron has neither the first nor the last corner of its cell.
+        let corners = [0, at(1, cell), at(2, cell), at(3, cell), at(4, cell), at(5, cell), at(6, cell), 0];
+        for [p, q, r, s] in OCTAHEDRON[usize::from(diagonal(cell as u32))] {
+            let at = |code: u8| corners[usize::from(code & 7)];
+            tets.push([at(p), at(q), at(r), at(s)]);
+        }
+    }
+    let [p, q, r, s] = UPSIDE_DOWN;
+    tets.extend(
+        (0..cells.saturating_sub(2)).map(|cell| [at(p, cell), at(q, cell), at(r, cell), at(s, cell)]),
+    );
+}

@@ -1,0 +1,427 @@
+//! Inside the coarse tets: coordinates, diagonals, and the sign of every child.
+//!
+//! One pass over the coarse tets. The lattice points of a tet are gathered into three short arrays (x, y, z), in
+//! which each row of cells has its children's corners in runs of consecutive numbers: plain loops that
+//! the compiler turns into vector instructions.
+
+use super::blend::{Blend, barycentric, split};
+use super::diagonal::{self, Diagonals};
+use super::lattice::{Lattice, OCTAHEDRON, UPRIGHT, UPSIDE_DOWN, corner_place};
+use super::numbering::Numbering;
+use super::snap::{Coordinates, is_flat};
+use super::{RefineError, Settings};
+use crate::Point;
+use crate::check::Fault;
+use crate::dist::DistMesh;
+use crate::kernel::predicates::{Sign, orient3d, volume6_and_error};
+use crate::mesh::{GlobalId, TetId};
+use csg::Projector;
+use rayon::iter::Either;
+use rayon::prelude::*;
+
+/// Fills the points inside the tets, chooses the diagonals, and checks every child.
+pub fn fill(
+    mesh: &DistMesh,
+    projector: &Projector,
+    numbering: &Numbering,
+    mut points: Box<[Coordinates]>,
+    settings: &Settings,
+) -> Result<(Box<[Coordinates]>, Diagonals), RefineError> {
+    let lattice = numbering.lattice();
+    let mut diagonals = Diagonals::new(mesh.tets.len(), lattice.octahedra());
+    let bytes_per_tet = diagonals.bytes_per_tet();
+    let (before, inside) = points.split_at_mut(numbering.bases()[2]);
+    let insides = match lattice.tet_points() as usize {
+        0 => Either::Left((0..mesh.tets.len()).into_par_iter().map(|_| &mut [] as &mut [Coordinates])),
+        size => Either::Right(inside.par_chunks_mut(size)),
+    };
+    let plan = Plan::new(lattice);
+    let fill_one = |block: &mut Block, ((tet, inside), bytes): ((usize, &mut [Coordinates]), &mut [u8])| {
+        let tet = TetId::new(tet);
+        block.gather(mesh, numbering, tet, before);
+        let corners = mesh.tets[tet.index()].map(|v| before[v.index()]);
+        let flat = is_flat(mesh, projector, tet);
+        block.fill_odd_part(&plan, &corners, flat);
+        block.fill_inside(&plan);
+        block.scatter(lattice, inside);
+        block.bad.clear();
+        if flat {
+            block.cut_evenly(&plan, diagonal::best_of_tet(&corners), bytes);
+        } else {
+            block.cut_each_best(&plan, bytes);
+        }
+        block.verdict(mesh.tet_ids[tet.index()], lattice, settings.described)
+    };
+    let bad: Vec<BadTet> = insides
+        .enumerate()
+        .zip(diagonals.bytes_mut().par_chunks_mut(bytes_per_tet))
+        .map_init(|| Block::new(lattice), fill_one)
+        .flatten_iter()
+        .collect();
+    if bad.is_empty() { Ok((points, diagonals)) } else { Err(inverted(&bad, settings.described)) }
+}
+
+/// A coarse tet with children that are not positive.
+struct BadTet {
+    tet: GlobalId,
+    children: u64,
+    faults: Vec<Fault>,
+}
+
+fn inverted(bad: &[BadTet], described: usize) -> RefineError {
+    RefineError::Inverted {
+        children: bad.iter().map(|b| b.children).sum(),
+        coarse: bad.iter().map(|b| b.tet).collect(),
+        faults: bad.iter().flat_map(|b| b.faults.iter().copied()).take(described).collect(),
+    }
+}
+
+/// Where the rows of points, children and octahedra begin, computed once.
+struct Plan {
+    lattice: Lattice,
+    /// By c + (n + 1)·d.
+    rows: Vec<u32>,
+}
+
+impl Plan {
+    fn new(lattice: Lattice) -> Self {
+        let n = lattice.n();
+        let row = |d, c| if c + d <= n { lattice.row(c, d) } else { 0 };
+        Self { lattice, rows: (0..=n).flat_map(|d| (0..=n).map(move |c| row(d, c))).collect() }
+    }
+
+    #[inline]
+    fn row(&self, c: u32, d: u32) -> usize {
+        self.rows[(c + (self.lattice.n() + 1) * d) as usize] as usize
+    }
+
+    /// The four rows of points around a row of cells, as [`corner_place`] numbers them; beyond the tet: 0.
+    fn around(&self, c: u32, d: u32) -> [usize; 4] {
+        let inside = c + d + 2 <= self.lattice.n();
+        [
+            self.row(c, d),
+            self.row(c + 1, d),
+            self.row(c, d + 1),
+            if inside { self.row(c + 1, d + 1) } else { 0 },
+        ]
+    }
+}
+
+/// What is odd of (b, c, d)/s, as three bits, to the points that a new point is the mean of, as steps of (b, c, d).
+///
+/// Two of the four weights (a, b, c, d) odd: the midpoint of a lattice edge. All four: the centre of an octahedron.
+const PARENTS: [&[[i32; 3]]; 8] = [
+    &[],
+    &[[-1, 0, 0], [1, 0, 0]],
+    &[[0, -1, 0], [0, 1, 0]],
+    &[[-1, 1, 0], [1, -1, 0]],
+    &[[0, 0, -1], [0, 0, 1]],
+    &[[-1, 0, 1], [1, 0, -1]],
+    &[[0, -1, 1], [0, 1, -1]],
+    &[[1, -1, -1], [-1, 1, 1], [-1, 1, -1], [1, -1, 1], [-1, -1, 1], [1, 1, -1]],
+];
+
+/// The lattice of one coarse tet: local ids and coordinates of its points, and scratch space.
+struct Block {
+    ids: Vec<u32>,
+    /// x, y, z of all points.
+    axes: [Vec<f64>; 3],
+    /// For the odd part of n.
+    blend: Blend<4>,
+    /// For a row of octahedra and each diagonal: the worst shape, and 1 if all signs are certain, else 0.
+    shapes: [Vec<f64>; 3],
+    certain: [Vec<f64>; 3],
+    /// Children that are not positive, and where they are.
+    bad: Vec<(u32, [usize; 4])>,
+}
+
+impl Block {
+    fn new(lattice: Lattice) -> Self {
+        let points = || vec![0.0; lattice.points() as usize];
+        let row = || vec![0.0; lattice.n() as usize];
+        Self {
+            ids: Vec::new(),
+            axes: [points(), points(), points()],
+            blend: Blend::new(split(lattice.n()).0),
+            shapes: [row(), row(), row()],
+            certain: [row(), row(), row()],
+            bad: Vec::new(),
+        }
+    }
+
+    /// Takes the points on the boundary of the tet.
+    fn gather(&mut self, mesh: &DistMesh, numbering: &Numbering, tet: TetId, before: &[Coordinates]) {
+        numbering.lattice_ids(mesh, tet, &mut self.ids);
+        let [x, y, z] = &mut self.axes;
+        for (i, &id) in self.ids.iter().enumerate() {
+            // Points inside the tet have higher ids; they are not there yet.
+            if let Some(point) = before.get(id as usize) {
+                (x[i], y[i], z[i]) = (point[0], point[1], point[2]);
+            }
+        }
+    }
+
+    /// The points inside the tet that the dyadic rule begins with.
+    fn fill_odd_part(&mut self, plan: &Plan, corners: &[Coordinates; 4], flat: bool) {
+        let (m, power) = split(plan.lattice.n());
+        if m == 1 {
+            return;
+        }
+        let index = |b: u32, c: u32, d: u32| plan.row(c * power, d * power) + (b * power) as usize;
+        if !flat {
+            let [x, y, z] = &self.axes;
+            self.blend.take(corners, |[_, b, c, d]| {
+                let i = index(b, c, d);
+                [x[i], y[i], z[i]]
+            });
+        }
+        for d in 1..m {
+            for c in 1..m - d {
+                for b in 1..(m - d).saturating_sub(c) {
+                    let weights = [m - b - c - d, b, c, d];
+                    let [x, y, z] =
+                        if flat { barycentric(corners, weights) } else { self.blend.point(corners, weights) };
+                    let i = index(b, c, d);
+                    (self.axes[0][i], self.axes[1][i], self.axes[2][i]) = (x, y, z);
+                }
+            }
+        }
+    }
+
+    /// The dyadic rule inside the tet.
+    fn fill_inside(&mut self, plan: &Plan) {
+        let n = plan.lattice.n();
+        let mut step = split(n).1 / 2;
+        while step > 0 {
+            for d in (step..n).step_by(step as usize) {
+                for c in (step..n - d).step_by(step as usize) {
+                    for first in [step, 2 * step] {
+                        self.fill_row(plan, step, [first, c, d]);
+                    }
+                }
+            }
+            step /= 2;
+        }
+    }
+
+    /// Fills every second point of a row, from `b` on.
+    fn fill_row(&mut self, plan: &Plan, step: u32, [b, c, d]: [u32; 3]) {
+        let odd = |x: u32| (x / step % 2) as usize;
+        let parents = PARENTS[odd(b) | odd(c) << 1 | odd(d) << 2];
+        let end = plan.lattice.n() - c - d;
+        if parents.is_empty() || b >= end {
+            return;
+        }
+        let moved = |x: u32, by: i32| x.wrapping_add_signed(by * step as i32);
+        let start = |by: &[i32; 3]| plan.row(moved(c, by[1]), moved(d, by[2])) + moved(b, by[0]) as usize;
+        let to = plan.row(c, d) + b as usize;
+        let along = (0..(end - b) as usize).step_by(2 * step as usize);
+        if let [p, q] = parents {
+            let [p, q] = [start(p), start(q)];
+            for axis in &mut self.axes {
+                along.clone().for_each(|i| axis[to + i] = 0.5 * (axis[p + i] + axis[q + i]));
+            }
+        } else {
+            let from = [0, 1, 2, 3, 4, 5].map(|k| start(&parents[k]));
+            for axis in &mut self.axes {
+                for i in along.clone() {
+                    let [p, q, r] = [0, 2, 4].map(|k| axis[from[k] + i] + axis[from[k + 1] + i]);
+                    axis[to + i] = (p + q + r) / 6.0;
+                }
+            }
+        }
+    }
+
+    /// Writes the points inside the tet.
+    fn scatter(&self, lattice: Lattice, inside: &mut [Coordinates]) {
+        let [x, y, z] = &self.axes;
+        let mut out = inside.iter_mut();
+        for (first, count) in lattice.interior_rows() {
+            for i in first as usize..(first + count) as usize {
+                *out.next().expect("as many points as interior rows have") = [x[i], y[i], z[i]];
+            }
+        }
+    }
+
+    /// Cuts all octahedra along one diagonal and checks the children.
+    fn cut_evenly(&mut self, plan: &Plan, diagonal: u8, bytes: &mut [u8]) {
+        // Four octahedra to a byte; bits beyond the last octahedron are never read.
+        bytes.fill(diagonal * 0b0101_0101);
+        for (c, d, cells) in plan.lattice.rows() {
+            let rows = plan.around(c, d);
+            self.check_others(plan, rows, [c, d, cells]);
+            let first = plan.lattice.octahedron_child([0, c, d]);
+            for (child, corners) in (0..).zip(OCTAHEDRON[usize::from(diagonal)]) {
+                self.check_run(rows, corners, cells - 1, first + child, 4);
+            }
+        }
+    }
+
+    /// Cuts each octahedron along its own best diagonal and checks the children.
+    fn cut_each_best(&mut self, plan: &Plan, bytes: &mut [u8]) {
+        for (c, d, cells) in plan.lattice.rows() {
+            let rows = plan.around(c, d);
+            self.check_others(plan, rows, [c, d, cells]);
+            let count = cells as usize - 1;
+            self.measure_octahedra(rows, count);
+            let first_child = plan.lattice.octahedron_child([0, c, d]);
+            let first = plan.lattice.octahedron_row(c, d);
+            for i in 0..count {
+                let best = diagonal::best([0, 1, 2].map(|k| self.shapes[k][i]));
+                diagonal::set(bytes, first + i as u32, best);
+                if self.certain[usize::from(best)][i] > 0.0 {
+                    continue;
+                }
+                for (child, corners) in (0..).zip(OCTAHEDRON[usize::from(best)]) {
+                    self.check_one(rows, corners, i, first_child + 4 * i as u32 + child);
+                }
+            }
+        }
+    }
+
+    /// Checks the children of a row of cells that lie in no octahedron.
+    fn check_others(&mut self, plan: &Plan, rows: [usize; 4], [c, d, cells]: [u32; 3]) {
+        let first = plan.lattice.child_row(c, d);
+        self.check_run(rows, UPRIGHT, cells, first, 1);
+        let first = first + cells + 4 * (cells - 1);
+        self.check_run(rows, UPSIDE_DOWN, cells.saturating_sub(2), first, 1);
+    }
+
+    /// Checks the children with these corners in the first `count` cells of a row; their indices begin at
+    /// `first` and are `stride` apart.
+    fn check_run(&mut self, rows: [usize; 4], corners: [u8; 4], count: u32, first: u32, stride: u32) {
+        if count == 0 || self.run(rows, corners, count as usize).all_positive() {
+            return;
+        }
+        for i in 0..count {
+            self.check_one(rows, corners, i as usize, first + stride * i);
+        }
+    }
+
+    /// The verdict on one child by exact sign.
+    fn check_one(&mut self, rows: [usize; 4], corners: [u8; 4], cell: usize, child: u32) {
+        let at = corners.map(|code| {
+            let (row, shift) = corner_place(code);
+            rows[row] + cell + shift
+        });
+        let [p, q, r, s] = at.map(|i| self.point(i));
+        if orient3d(&p, &q, &r, &s) != Sign::Positive {
+            self.bad.push((child, at));
+        }
+    }
+
+    fn point(&self, i: usize) -> Point {
+        Point::new(self.axes[0][i], self.axes[1][i], self.axes[2][i])
+    }
+
+    /// The corners of the children with these corner codes in the first `count` cells of a row.
+    #[inline]
+    fn run(&self, rows: [usize; 4], corners: [u8; 4], count: usize) -> Run<'_> {
+        let starts = corners.map(|code| {
+            let (row, shift) = corner_place(code);
+            rows[row] + shift
+        });
+        Run { axes: [0, 1, 2].map(|x| starts.map(|start| &self.axes[x][start..][..count])), count }
+    }
+
+    /// The worst shape and the least certain sign of the children of each octahedron, for each diagonal.
+    fn measure_octahedra(&mut self, rows: [usize; 4], count: usize) {
+        if count == 0 {
+            return;
+        }
+        let mut shapes = std::mem::take(&mut self.shapes);
+        let mut certain = std::mem::take(&mut self.certain);
+        for (diagonal, children) in OCTAHEDRON.into_iter().enumerate() {
+            let (shape, sure) = (&mut shapes[diagonal][..count], &mut certain[diagonal][..count]);
+            shape.fill(f64::INFINITY);
+            sure.fill(1.0);
+            for corners in children {
+                self.run(rows, corners, count).measure(shape, sure);
+            }
+        }
+        (self.shapes, self.certain) = (shapes, certain);
+    }
+
+    /// What is wrong with the tet, if anything is.
+    fn verdict(&mut self, tet: GlobalId, lattice: Lattice, described: usize) -> Option<BadTet> {
+        if self.bad.is_empty() {
+            return None;
+        }
+        self.bad.sort_unstable();
+        let first = tet * u64::from(lattice.children());
+        let describe = |&(child, at): &(u32, [usize; 4])| {
+            let [p, q, r, s] = at.map(|i| self.point(i).coords);
+            Fault::NotPositive { tet: first + u64::from(child), place: ((p + q + r + s) / 4.0).into() }
+        };
+        let faults = self.bad.iter().take(described).map(describe).collect();
+        Some(BadTet { tet, children: self.bad.len() as u64, faults })
+    }
+}
+
+/// The corners of `count` tets: by axis, then by corner.
+struct Run<'a> {
+    axes: [[&'a [f64]; 4]; 3],
+    count: usize,
+}
+
+impl Run<'_> {
+    /// The edges from the first corner to the others: by corner, then by axis.
+    #[inline(always)]
+    fn edges(&self, i: usize) -> [[f64; 3]; 3] {
+        // Written out: closures are not always inlined, and this is the innermost loop.
+        let [x, y, z] = &self.axes;
+        let (px, py, pz) = (x[0][i], y[0][i], z[0][i]);
+        [
+            [x[1][i] - px, y[1][i] - py, z[1][i] - pz],
+            [x[2][i] - px, y[2][i] - py, z[2][i] - pz],
+            [x[3][i] - px, y[3][i] - py, z[3][i] - pz],
+        ]
+    }
+
+    /// The same run; its slices, cut to its length once more, let the compiler drop its bounds checks.
+    #[inline(always)]
+    fn trimmed(&self) -> Run<'_> {
+        fn trim([p, q, r, s]: [&[f64]; 4], count: usize) -> [&[f64]; 4] {
+            [&p[..count], &q[..count], &r[..count], &s[..count]]
+        }
+        let [x, y, z] = self.axes;
+        let count = self.count;
+        Run { axes: [trim(x, count), trim(y, count), trim(z, count)], count }
+    }
+
+    /// Whether all are positive beyond doubt.
+    #[inline]
+    fn all_positive(&self) -> bool {
+        let run = self.trimmed();
+        let mut certain = true;
+        for i in 0..self.count {
+            let (volume, error) = volume6_and_error(run.edges(i));
+            certain &= volume > error;
+        }
+        certain
+    }
+
+    /// Lowers `shapes` to those of these tets where they are worse, and `certain` to 0 where a sign is not.
+    #[inline]
+    fn measure(&self, shapes: &mut [f64], certain: &mut [f64]) {
+        let run = self.trimmed();
+        let (shapes, certain) = (&mut shapes[..self.count], &mut certain[..self.count]);
+        for i in 0..self.count {
+            let edges = run.edges(i);
+            let (volume, error) = volume6_and_error(edges);
+            let squares = sum_of_squares(edges);
+            let shape = volume * volume.abs() / (squares * squares * squares);
+            shapes[i] = if shape < shapes[i] { shape } else { shapes[i] };
+            certain[i] = if volume > error { certain[i] } else { 0.0 };
+        }
+    }
+}
+
+/// The sum of the squares of a tet's six edges, of which three are given.
+#[inline(always)]
+fn sum_of_squares([u, v, w]: [[f64; 3]; 3]) -> f64 {
+    // |u−v|² + |v−w|² + |w−u|² = 3 (|u|² + |v|² + |w|²) − |u+v+w|²
+    let square = |p: [f64; 3]| p[0] * p[0] + p[1] * p[1] + p[2] * p[2];
+    let sum = [u[0] + v[0] + w[0], u[1] + v[1] + w[1], u[2] + v[2] + w[2]];
+    4.0 * (square(u) + square(v) + square(w)) - square(sum)
+}
