@@ -6,20 +6,28 @@ use super::sheet::{Kind, Node, Place, Sheet};
 use super::topology::{NONE, Topology, last, next};
 use crate::kernel::predicates::Sign;
 use crate::{Point, Vector};
+use std::collections::VecDeque;
 
-/// Why there is no first triangulation, in local numbers.
+/// A piece of curve that is too long for its surroundings, in local numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Fault {
-    /// A vertex of the start is in the way: begin with another start.
-    StartInTheWay,
-    /// Two vertices have the same site.
-    Coincident(u32, u32),
+pub(super) enum Conflict {
     /// The first piece crosses the second.
     Crossing(u32, u32),
     /// A piece runs over a vertex.
     Through(u32, u32),
     /// A piece spans half a turn or more.
     TooLong(u32),
+}
+
+/// Why there is no first triangulation, in local numbers.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum Fault {
+    /// A vertex of the start is in the way: begin with another start.
+    StartInTheWay,
+    /// Two vertices have the same site.
+    Coincident(u32, u32),
+    /// Pieces are too long: all that were found, at least one.
+    Coarse(Vec<Conflict>),
     /// To the left of the piece would be inside and outside.
     BothSides(u32),
     /// What is inside by a piece or a seed has no boundary there.
@@ -120,8 +128,9 @@ fn helper(sheet: &Sheet, site: &Site) -> Result<Node, Fault> {
     Ok(node)
 }
 
-/// Makes each piece an edge.
+/// Makes each piece an edge, and goes on after those that cannot be one, to name all.
 fn recover_all(sheet: &mut Sheet) -> Result<(), Fault> {
+    let mut conflicts = Vec::new();
     for s in 0..sheet.pieces.len() as u32 {
         // Around the end that is no pole there are few triangles.
         let [mut a, mut b] = sheet.pieces[s as usize].ends;
@@ -135,22 +144,33 @@ fn recover_all(sheet: &mut Sheet) -> Result<(), Fault> {
             found = sheet.mesh.find(b, a, &mut ring);
         }
         sheet.ring = ring;
-        let (t, i) = match found {
-            Some(side) => side,
-            None => recover(sheet, s, a, b)?,
-        };
-        let there = sheet.mesh.at(t).segment[i];
-        if there != NONE {
-            return Err(Fault::Crossing(s, there));
+        let recovered = found.map_or_else(|| recover(sheet, s, a, b), Ok);
+        match recovered.map(|(t, i)| (t, i, sheet.mesh.at(t).segment[i])) {
+            Ok((t, i, NONE)) => sheet.mesh.set_segment(t, i, s),
+            Ok((_, _, there)) => conflicts.push(Conflict::Crossing(s, there)),
+            Err(Obstacle::Start) => return Err(Fault::StartInTheWay),
+            Err(Obstacle::Conflict(conflict)) => conflicts.push(conflict),
         }
-        sheet.mesh.set_segment(t, i, s);
     }
-    Ok(())
+    if conflicts.is_empty() { Ok(()) } else { Err(Fault::Coarse(conflicts)) }
+}
+
+/// What keeps a piece from being an edge.
+enum Obstacle {
+    /// A vertex of the start.
+    Start,
+    Conflict(Conflict),
+}
+
+impl From<Conflict> for Obstacle {
+    fn from(conflict: Conflict) -> Self {
+        Self::Conflict(conflict)
+    }
 }
 
 /// Makes the piece `s` from `a` to `b` an edge by swapping the edges that cross it (Sloan 1993, "A fast algorithm for
 /// generating constrained Delaunay triangulations"), and returns its side.
-fn recover(sheet: &mut Sheet, s: u32, a: u32, b: u32) -> Result<(u32, usize), Fault> {
+fn recover(sheet: &mut Sheet, s: u32, a: u32, b: u32) -> Result<(u32, usize), Obstacle> {
     let mut crossing = crossed_edges(sheet, s, a, b)?;
     let site = |sheet: &Sheet, v: u32| sheet.nodes[v as usize].site;
     let (from, to) = (site(sheet, a), site(sheet, b));
@@ -159,11 +179,11 @@ fn recover(sheet: &mut Sheet, s: u32, a: u32, b: u32) -> Result<(u32, usize), Fa
     let mut ring = Vec::new();
     while let Some([x, y]) = crossing.pop_front() {
         if budget == 0 {
-            return Err(Fault::TooLong(s));
+            return Err(Conflict::TooLong(s).into());
         }
         budget -= 1;
-        let (t, i) = sheet.mesh.find(x, y, &mut ring).ok_or(Fault::TooLong(s))?;
-        let (u, j) = sheet.mesh.twin(t, i).ok_or(Fault::TooLong(s))?;
+        let (t, i) = sheet.mesh.find(x, y, &mut ring).ok_or(Conflict::TooLong(s))?;
+        let (u, j) = sheet.mesh.twin(t, i).ok_or(Conflict::TooLong(s))?;
         let (p, d) = (sheet.mesh.at(t).v[i], sheet.mesh.at(u).v[j]);
         if !sheet.fits(p, x, d) || !sheet.fits(p, d, y) {
             crossing.push_back([x, y]);
@@ -178,21 +198,16 @@ fn recover(sheet: &mut Sheet, s: u32, a: u32, b: u32) -> Result<(u32, usize), Fa
             crossing.push_back([p, d]);
         }
     }
-    sheet.mesh.find(a, b, &mut ring).ok_or(Fault::TooLong(s))
+    sheet.mesh.find(a, b, &mut ring).ok_or(Conflict::TooLong(s).into())
 }
 
 /// The edges that the piece `s` from `a` to `b` crosses, in order, each from its right to its left end.
-fn crossed_edges(
-    sheet: &Sheet,
-    s: u32,
-    a: u32,
-    b: u32,
-) -> Result<std::collections::VecDeque<[u32; 2]>, Fault> {
+fn crossed_edges(sheet: &Sheet, s: u32, a: u32, b: u32) -> Result<VecDeque<[u32; 2]>, Obstacle> {
     let site = |v: u32| &sheet.nodes[v as usize].site;
     let side = |v: u32| sheet.chart.orient(site(a), site(b), site(v));
     let through = |v: u32| {
         let start = matches!(sheet.nodes[v as usize].kind, Kind::Helper | Kind::Outside);
-        if start { Fault::StartInTheWay } else { Fault::Through(s, v) }
+        if start { Obstacle::Start } else { Conflict::Through(s, v).into() }
     };
     let mut ring = Vec::new();
     sheet.mesh.around(a, &mut ring);
@@ -211,16 +226,16 @@ fn crossed_edges(
             entry = Some((t, k));
         }
     }
-    let (mut t, mut i) = entry.ok_or(Fault::TooLong(s))?;
-    let mut crossed = std::collections::VecDeque::new();
+    let (mut t, mut i) = entry.ok_or(Conflict::TooLong(s))?;
+    let mut crossed = VecDeque::new();
     // More triangles than there are cannot be crossed.
     for _ in 0..sheet.mesh.triangles.len() {
         let x = sheet.mesh.at(t);
         if x.segment[i] != NONE {
-            return Err(Fault::Crossing(s, x.segment[i]));
+            return Err(Conflict::Crossing(s, x.segment[i]).into());
         }
         crossed.push_back([x.v[next(i)], x.v[last(i)]]);
-        let (u, j) = sheet.mesh.twin(t, i).ok_or(Fault::TooLong(s))?;
+        let (u, j) = sheet.mesh.twin(t, i).ok_or(Conflict::TooLong(s))?;
         let apex = sheet.mesh.at(u).v[j];
         if apex == b {
             return Ok(crossed);
@@ -232,7 +247,7 @@ fn crossed_edges(
             Sign::Negative => (u, last(j)),
         };
     }
-    Err(Fault::TooLong(s))
+    Err(Conflict::TooLong(s).into())
 }
 
 /// Keeps the triangles that are inside: to the left of a use of a piece or around a seed, and what is joined to them

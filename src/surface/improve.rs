@@ -16,6 +16,9 @@ const ACCEPTABLE: f64 = 2.0;
 /// A vertex with this few neighbours is collapsed if that makes nothing worse.
 const FEW: usize = 4;
 
+/// More rounds than asked for if triangles are still folded. One has always been enough where segments let them unfold.
+const MORE_ROUNDS: usize = 4;
+
 /// What was done.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Improved {
@@ -29,8 +32,11 @@ pub(super) struct Improved {
 pub(super) fn improve(sheet: &mut Sheet, settings: &Settings) -> Result<Improved, Stop> {
     let mut done = Improved { swaps: sheet.legalise_all(), ..Improved::default() };
     let mut restless = Vec::new();
-    for round in 0..settings.rounds {
-        if round + 1 < settings.rounds {
+    for round in 0..settings.rounds + MORE_ROUNDS {
+        if round >= settings.rounds && !sheet.mesh.living().any(|t| sheet.price_at(t) > NORMAL_PRICE) {
+            break;
+        }
+        if round + 1 != settings.rounds {
             done.collapses += collapse_all(sheet);
             done.splits += split_all(sheet)?;
             done.swaps += sheet.legalise_all();

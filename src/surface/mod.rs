@@ -65,6 +65,6 @@ pub struct Settings {
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { turn: 1.1, growth: 0.4, rounds: 5, max_vertices: 200_000_000 }
+        Self { turn: 1.1, growth: 0.4, rounds: 3, max_vertices: 200_000_000 }
     }
 }

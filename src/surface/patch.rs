@@ -2,7 +2,7 @@
 
 use super::chart::{Chart, nappe, sheets};
 use super::condition::condition;
-use super::embed::{Fault, embed};
+use super::embed::{Conflict, Fault, embed};
 use super::front::{Advanced, advance};
 use super::improve::{Improved, improve, repair_flattening};
 use super::sheet::{Kind, Node, Piece, Sheet, Stop};
@@ -19,31 +19,22 @@ use std::ops::Range;
 /// Why a patch could not be meshed. Segments are indices into [`SurfaceMesh::segments`].
 #[derive(Clone, Debug, thiserror::Error)]
 pub enum SurfaceError {
-    /// Two segments cross: the curves are cut too coarsely for the gap between them.
-    #[error("on patch {} the segments of curves {} and {} cross near ({}, {}, {}): cut them finer there",
-        .patch.0, .curves[0].0, .curves[1].0, .at.x, .at.y, .at.z)]
-    CurvesCross {
-        /// The patch.
+    /// Segments are too long for their surroundings: they cross each other, run over vertices, or span about half a turn
+    /// of the surface. Cut finer, they do not.
+    #[error("on patch {} the segments of curve {} are too long near ({}, {}, {}){}: cut them finer there",
+        .patch.0, .curve.0, .at.x, .at.y, .at.z,
+        .other.map_or(String::new(), |c| format!(", where they cross those of curve {}", c.0)))]
+    TooCoarse {
+        /// The patch, the first if there are several.
         patch: PatchId,
-        /// Their curves.
-        curves: [CurveId; 2],
-        /// The segments.
-        segments: [usize; 2],
-        /// The middle of the first.
-        at: Point,
-    },
-    /// A segment runs over a vertex that is none of its ends.
-    #[error("on patch {} a segment of curve {} runs over the vertex at ({}, {}, {}): cut it finer there",
-        .patch.0, .curve.0, .at.x, .at.y, .at.z)]
-    VertexOnSegment {
-        /// The patch.
-        patch: PatchId,
-        /// The curve of the segment.
+        /// The curve of a segment.
         curve: CurveId,
-        /// The segment.
-        segment: usize,
-        /// The vertex.
+        /// The curve that it crosses, if so.
+        other: Option<CurveId>,
+        /// The middle of the segment.
         at: Point,
+        /// All segments that are too long, on all patches, ascending.
+        segments: Vec<usize>,
     },
     /// Two vertices are at the same place.
     #[error("patch {} has two vertices at ({}, {}, {})", .patch.0, .at.x, .at.y, .at.z)]
@@ -51,19 +42,6 @@ pub enum SurfaceError {
         /// The patch.
         patch: PatchId,
         /// The place.
-        at: Point,
-    },
-    /// A segment spans about half a turn of the surface.
-    #[error("on patch {} a segment of curve {} near ({}, {}, {}) is too long for the curvature: cut it finer",
-        .patch.0, .curve.0, .at.x, .at.y, .at.z)]
-    SegmentTooLong {
-        /// The patch.
-        patch: PatchId,
-        /// The curve of the segment.
-        curve: CurveId,
-        /// The segment.
-        segment: usize,
-        /// Its middle.
         at: Point,
     },
     /// The curves contradict each other on which side of a curve the patch lies.
@@ -137,10 +115,16 @@ pub fn mesh_patches(
     let input = Input::new(geometry, features, &curves, size, settings);
     let meshed: Vec<Result<Meshed, SurfaceError>> =
         (0..features.patches.len()).into_par_iter().map(|p| input.mesh(PatchId::new(p))).collect();
+    let too_long: Vec<usize> = all_too_long(&meshed);
     let mut out = curves;
     let mut report = Report::default();
     for (p, meshed) in meshed.into_iter().enumerate() {
-        let Meshed { inputs, points, triangles, report: of_patch } = meshed?;
+        let Meshed { inputs, points, triangles, report: of_patch } = meshed.map_err(|error| match error {
+            SurfaceError::TooCoarse { patch, curve, other, at, .. } => {
+                SurfaceError::TooCoarse { patch, curve, other, at, segments: too_long.clone() }
+            }
+            error => error,
+        })?;
         let patch = PatchId::new(p);
         let first = out.points.len();
         let number = |v: u32| match inputs.get(v as usize) {
@@ -153,6 +137,22 @@ pub fn mesh_patches(
         report.patches.push(of_patch);
     }
     Ok((out, report))
+}
+
+/// The segments that are too long on any patch, ascending.
+fn all_too_long(meshed: &[Result<Meshed, SurfaceError>]) -> Vec<usize> {
+    let mut all: Vec<usize> = meshed
+        .iter()
+        .filter_map(|m| match m {
+            Err(SurfaceError::TooCoarse { segments, .. }) => Some(segments),
+            _ => None,
+        })
+        .flatten()
+        .copied()
+        .collect();
+    all.sort_unstable();
+    all.dedup();
+    all
 }
 
 /// What all patches are made of.
@@ -400,8 +400,11 @@ impl<'a> Part<'a> {
         if sheet.nodes.len() >= settings.max_vertices {
             return Err(Trouble::TooMany);
         }
+        let (found, _) = repair_flattening(sheet)?;
         self.improved = improve(sheet, settings)?;
-        self.flattening = repair_flattening(sheet)?;
+        // The improvement has a price on them and makes none, but where it had no other way.
+        let (more, left) = repair_flattening(sheet)?;
+        self.flattening = (found + more, left);
         Ok(())
     }
 
@@ -442,17 +445,17 @@ impl<'a> Part<'a> {
         };
         match fault {
             Fault::Coincident(v, _) => SurfaceError::Coincident { patch, at: vertex(v) },
-            Fault::Crossing(s, t) => SurfaceError::CurvesCross {
-                patch,
-                curves: [curve(s), curve(t)],
-                segments: [segment(s), segment(t)],
-                at: middle(s),
-            },
-            Fault::Through(s, v) => {
-                SurfaceError::VertexOnSegment { patch, curve: curve(s), segment: segment(s), at: vertex(v) }
-            }
-            Fault::TooLong(s) => {
-                SurfaceError::SegmentTooLong { patch, curve: curve(s), segment: segment(s), at: middle(s) }
+            Fault::Coarse(conflicts) => {
+                let (s, other) = match conflicts[0] {
+                    Conflict::Crossing(s, t) => (s, Some(curve(t))),
+                    Conflict::Through(s, _) | Conflict::TooLong(s) => (s, None),
+                };
+                let segments = conflicts.iter().flat_map(|c| match *c {
+                    Conflict::Crossing(s, t) => vec![segment(s), segment(t)],
+                    Conflict::Through(s, _) | Conflict::TooLong(s) => vec![segment(s)],
+                });
+                let (curve, at) = (curve(s), middle(s));
+                SurfaceError::TooCoarse { patch, curve, other, at, segments: segments.collect() }
             }
             Fault::BothSides(s) => SurfaceError::BothSides { patch, curve: curve(s), at: middle(s) },
             Fault::Open | Fault::StartInTheWay => SurfaceError::NotEnclosed(patch),

@@ -286,6 +286,10 @@ impl<'a> Sheet<'a> {
             waiting[t as usize] = false;
             for i in 0..3 {
                 let u = self.mesh.at(t).near[i];
+                // Its turn comes with the neighbour's.
+                if u != NONE && waiting[u as usize] {
+                    continue;
+                }
                 if self.try_flip(t, i) {
                     swaps += 1;
                     for s in [t, u] {
