@@ -16,15 +16,17 @@ use crate::{Point, Vector};
 /// The circumradius of a regular tet of edge 1.
 const REGULAR: f64 = 0.612_372_435_695_794_5;
 
-/// A tet is fine up to this many times the circumradius of a regular tet of the wanted size. Below 1.2
-/// the filter refuses most candidates; above 1.5 tets are visibly too large.
+/// A tet is fine up to this many times the circumradius of a regular tet of the wanted size. On the shaft's skin 1.2
+/// gives 1.25 times the tets of a space full of regular ones, with edges of the wanted length in the mean; 1.3 gives 1.04
+/// times as many and edges 7 % longer, 1.5 gives 0.83 times as many, less well shaped.
 const FINE: f64 = 1.3;
 
-/// No vertex is inserted nearer to another than this fraction of the wanted size. At 0.6 short edges make
-/// flat tets, at 0.8 holes stay in the front.
-const NEAREST: f64 = 0.7;
+/// No vertex is inserted nearer to another than this fraction of the wanted size. On the shaft's skin the worst hundredth
+/// of the dihedral angles is 12.3 degrees with 0.65 and 13.7 with 0.8; above, holes stay in the front.
+const NEAREST: f64 = 0.8;
 
-/// No vertex is inserted nearer to the boundary than this fraction of the wanted size (a regular tet is 0.82 high).
+/// No vertex is inserted nearer to the boundary than this fraction of the wanted size (a regular tet is 0.82 high). From
+/// 0.3 to 0.5 nothing changes on the skins tried, where ideal points are far enough; it matters where a skin is too coarse.
 const NEAREST_FACE: f64 = 0.4;
 
 /// Wanted sizes grow from a vertex by at most this per unit of distance, so that a skin finer than the size
