@@ -141,7 +141,7 @@ fn the_same_input_gives_the_same_mesh() {
 fn an_empty_mesh_and_a_single_tet_are_left_alone() {
     let mut empty = Mesh::default();
     assert_eq!(improve(&mut empty, &UniformSize(1.0), &Settings::default()).after.tets, 0);
-    let mut fan = fan(3, 1.0);
+    let mut fan = fan(5, 0.6);
     let before = format!("{fan:?}");
     improve(&mut fan, &UniformSize(1.0), &Settings { passes: 1, change_below: 0.0, ..Settings::default() });
     assert_eq!(before, format!("{fan:?}"));
