@@ -116,12 +116,15 @@ impl RefinedMesh {
             ids[at(j, k)] = vertices[corner].0;
         }
         // Both corners of each pair ascend, so the edge runs as it is numbered.
-        let sides: [([usize; 2], &dyn Fn(u32) -> usize); 3] =
-            [([0, 1], &|k| at(k, 0)), ([0, 2], &|k| at(0, k)), ([1, 2], &|k| at(n - k, k))];
-        for (pair, place) in sides {
+        for pair in [[0, 1], [0, 2], [1, 2]] {
             let edge = self.edge_of(tet, pair.map(|p| corners[p]));
             for (vertex, k) in self.numbering.inside(Entity { dimension: 1, id: edge.0 }).zip(1..) {
-                ids[place(k)] = vertex;
+                let place = match pair {
+                    [0, 1] => at(k, 0),
+                    [0, _] => at(0, k),
+                    _ => at(n - k, k),
+                };
+                ids[place] = vertex;
             }
         }
         let inside = self.numbering.inside(Entity { dimension: 2, id: face.face.0 });
