@@ -6,7 +6,7 @@ use super::numbering::{Entity, Numbering, ascending};
 use super::snap::Coordinates;
 use crate::dist::{BoundaryFace, DistMesh, Shared};
 use crate::mesh::stream::{BoundaryBlock, Counts, MeshStream, NO_TET, TetBlock, VertexBlock};
-use crate::mesh::{GlobalId, Rank, TET_FACES, TetId};
+use crate::mesh::{EdgeId, GlobalId, Rank, TET_EDGES, TET_FACES, TetId};
 
 /// One rank's part of a refined mesh: see [`refine`](super::refine()).
 ///
@@ -105,19 +105,39 @@ impl RefinedMesh {
 
     /// Local ids of all lattice points of a face, by j + (n + 1)·k.
     fn face_ids(&self, face: &BoundaryFace, ids: &mut Vec<u32>) {
-        let lattice = self.numbering.lattice();
+        let n = self.pieces();
         let tet = face.parents[0].or(face.parents[1]).expect("a boundary face has a tet in this part");
         let vertices = self.coarse.tets[tet.index()];
         let corners = ascending(TET_FACES[self.face_of(tet, face)], |corner| vertices[corner].0);
-        let mut all = Vec::new();
-        self.numbering.lattice_ids(&self.coarse, tet, &mut all);
-        let n = lattice.n();
+        let at = |j: u32, k: u32| (j + (n + 1) * k) as usize;
         ids.clear();
-        for k in 0..=n {
-            for j in 0..=n {
-                ids.push(if j + k <= n { all[lattice.on_face(corners, j, k) as usize] } else { u32::MAX });
+        ids.resize(at(n, n) + 1, u32::MAX);
+        for (corner, (j, k)) in corners.into_iter().zip([(0, 0), (n, 0), (0, n)]) {
+            ids[at(j, k)] = vertices[corner].0;
+        }
+        // Both corners of each pair ascend, so the edge runs as it is numbered.
+        for pair in [[0, 1], [0, 2], [1, 2]] {
+            let edge = self.edge_of(tet, pair.map(|p| corners[p]));
+            for (vertex, k) in self.numbering.inside(Entity { dimension: 1, id: edge.0 }).zip(1..) {
+                let place = match pair {
+                    [0, 1] => at(k, 0),
+                    [0, _] => at(0, k),
+                    _ => at(n - k, k),
+                };
+                ids[place] = vertex;
             }
         }
+        let inside = self.numbering.inside(Entity { dimension: 2, id: face.face.0 });
+        for (vertex, (j, k)) in inside.zip(self.numbering.lattice().face_interior()) {
+            ids[at(j, k)] = vertex;
+        }
+    }
+
+    /// The edge of `tet` between two of its corners.
+    fn edge_of(&self, tet: TetId, mut corners: [usize; 2]) -> EdgeId {
+        corners.sort_unstable();
+        let edge = TET_EDGES.iter().position(|e| *e == corners).expect("two corners make an edge");
+        self.coarse.tet_edges[tet.index()][edge]
     }
 }
 
