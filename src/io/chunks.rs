@@ -11,7 +11,7 @@ pub type Chunk<const K: usize> = [Vec<u8>; K];
 ///
 /// The result does not depend on the number of threads; of several errors the one of the first chunk counts.
 pub fn write_chunks<const K: usize>(
-    files: &mut [Output; K],
+    mut files: [&mut Output; K],
     chunks: usize,
     format: impl Fn(usize, &mut Chunk<K>) -> Result<(), WriteError> + Sync,
 ) -> Result<(), WriteError> {
@@ -27,7 +27,7 @@ pub fn write_chunks<const K: usize>(
             };
             making.par_iter_mut().enumerate().map(make_one).collect()
         };
-        let (written, made) = rayon::join(|| write(files, &writing), make);
+        let (written, made) = rayon::join(|| write(&mut files, &writing), make);
         written?;
         made.into_iter().collect::<Result<(), WriteError>>()?;
         std::mem::swap(&mut making, &mut writing);
@@ -35,7 +35,7 @@ pub fn write_chunks<const K: usize>(
     Ok(())
 }
 
-fn write<const K: usize>(files: &mut [Output; K], chunks: &[Chunk<K>]) -> Result<(), WriteError> {
+fn write<const K: usize>(files: &mut [&mut Output; K], chunks: &[Chunk<K>]) -> Result<(), WriteError> {
     chunks
         .iter()
         .try_for_each(|texts| files.iter_mut().zip(texts).try_for_each(|(file, text)| file.write(text)))
@@ -67,12 +67,12 @@ mod tests {
             for chunks in [0, 1, 2, 5, 100] {
                 let dir = tempfile::tempdir().unwrap();
                 let path = dir.path().join("f");
-                let mut files = [Output::create(&path).unwrap()];
+                let mut file = Output::create(&path).unwrap();
                 let format = |k: usize, [text]: &mut Chunk<1>| {
                     text.extend(format!("{k} ").bytes());
                     Ok(())
                 };
-                pool.install(|| write_chunks(&mut files, chunks, format)).unwrap();
+                pool.install(|| write_chunks([&mut file], chunks, format)).unwrap();
                 let expected: String = (0..chunks).map(|k| format!("{k} ")).collect();
                 assert_eq!(fs::read_to_string(&path).unwrap(), expected);
             }
@@ -82,10 +82,10 @@ mod tests {
     #[test]
     fn the_error_of_the_first_chunk_that_fails_counts() {
         let dir = tempfile::tempdir().unwrap();
-        let mut files = [Output::create(&dir.path().join("f")).unwrap()];
+        let mut file = Output::create(&dir.path().join("f")).unwrap();
         let format =
             |k: usize, _: &mut Chunk<1>| if k >= 3 { Err(WriteError::EmptyPart(k as u32)) } else { Ok(()) };
-        let error = write_chunks(&mut files, 10, format).unwrap_err();
+        let error = write_chunks([&mut file], 10, format).unwrap_err();
         assert!(matches!(error, WriteError::EmptyPart(3)), "{error}");
     }
 

@@ -6,6 +6,7 @@
 //! STEM.parts/part.K.off         K = 1 … N, rank K−1; each with its boundary and the faces where it was cut off
 //! ```
 
+use super::lines::FLUSH_AT;
 use super::output::{Output, folder_and_name, write_text, write_together};
 use super::skin::{SkinFace, skin};
 use super::text::{FLOAT_CHARS, Line};
@@ -28,9 +29,6 @@ impl Default for Settings {
         Self { shrink: 1.0 }
     }
 }
-
-/// Text that is gathered before it is written, in bytes.
-const FLUSH_AT: usize = 1 << 20;
 
 /// **Collective.** Writes the skin of each rank's part and, with several, the list of them. `stem` may end in
 /// `.off` or `.list`. Each rank gets the sums over all ranks.

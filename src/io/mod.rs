@@ -5,7 +5,7 @@
 //! elmer     DIR/partitioning.N/part.K.* and DIR/mesh.*      every rank writes its part; read back and judged
 //! vtu       STEM.vtu, or STEM.pvtu with a file per part      raw binary, for ParaView and meshio
 //! geomview  FILE.off / FILE.list: what the thesis looked at   the skin, a colour per part
-//! gmsh, medit, netgen                                         one part, one file
+//! serial    FILE.{vtu,msh,mesh,vol,off}                      one part; Gmsh, Medit, NETGEN
 //! ```
 //! All writers go through [`output`]: what is written stands in a temporary folder beside the target until every
 //! rank is done, and only then takes the place of what was there. A writer that fails leaves the old files as
@@ -14,8 +14,10 @@
 pub mod chunks;
 pub mod elmer;
 pub mod geomview;
+pub mod lines;
 pub mod output;
 pub mod plain;
+pub mod serial;
 pub mod skin;
 #[cfg(test)]
 mod testing;
@@ -105,6 +107,17 @@ pub enum WriteError {
     /// Something else stands where the output belongs.
     #[error("{} is in the way: a folder where a file belongs, or a file where a folder belongs", .0.display())]
     InTheWay(PathBuf),
+    /// A format that is not known by the end of the file's name.
+    #[error("cannot tell the format of {} by its name; known are {}", .0.display(), serial::KNOWN)]
+    UnknownFormat(PathBuf),
+    /// A format that holds one part.
+    #[error("{} can hold one part, and there are {parts} parts", path.display())]
+    SeveralParts {
+        /// The file.
+        path: PathBuf,
+        /// How many parts there are.
+        parts: u32,
+    },
     /// The ranks could not agree.
     #[error(transparent)]
     Comm(#[from] CommError),

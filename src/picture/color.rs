@@ -8,7 +8,7 @@ const STEP: f32 = 0.618_034;
 
 /// The colour of a part, patch or body.
 pub fn of_number(number: u32) -> Color {
-    from_hsv((number as f32 * STEP).fract(), 0.6, 0.95)
+    from_hsv((number as f32 * STEP).fract(), 0.5, 0.96)
 }
 
 /// A colour by hue, saturation and value, 0 to 1 each.

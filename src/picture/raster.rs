@@ -125,7 +125,7 @@ fn brightness(corners: &[[f32; 3]; 3]) -> f32 {
     let normal = normal / normal.norm().max(f32::MIN_POSITIVE);
     let normal = if normal.z > 0.0 { -normal } else { normal };
     let light = Vector3::new(-0.35_f32, -0.55, -0.76);
-    0.45 + 0.55 * normal.dot(&light).max(0.0)
+    0.58 + 0.42 * normal.dot(&light).max(0.0)
 }
 
 /// Some lines of the image, in samples.

@@ -3,19 +3,15 @@
 use super::number::{Numbering, number};
 use super::{MAX_ID, MAX_LINE, TET, TRIANGLE};
 use crate::comm::Communicator;
-use crate::io::chunks::{items, split, write_chunks};
+use crate::io::lines::{self, FLUSH_AT};
 use crate::io::output::{Output, write_text, write_together};
 use crate::io::text::{Line, digits};
-use crate::io::{WriteError, Written, agree, body_number, patch_number, sum_written};
+use crate::io::{WriteError, Written, agree, sum_written};
 use crate::mesh::Names;
-use crate::mesh::stream::{BoundaryBlock, MeshStream, NO_TET, TetBlock};
+use crate::mesh::stream::{MeshStream, NO_TET};
 use std::fs;
 use std::path::Path;
 
-/// Lines that one thread formats at a time: some 100 KiB of text.
-const LINES_PER_CHUNK: u64 = 4096;
-/// Text that is gathered before it is written, in bytes.
-const FLUSH_AT: usize = 1 << 20;
 /// What a shortest round-trip coordinate takes on average, with its blank (17 digits are the rule on curved surfaces).
 const MEAN_FLOAT: u64 = 19;
 
@@ -138,21 +134,11 @@ fn header_text(part: &dyn MeshStream, shared: Option<u64>) -> String {
 }
 
 fn write_nodes(part: &dyn MeshStream, numbering: &Numbering, path: &Path) -> Result<u64, WriteError> {
-    let points = part.points();
-    let (chunks, per_chunk) = split(points.len(), points.len() as u64, LINES_PER_CHUNK);
-    let mut file = [Output::create(path)?];
-    write_chunks(&mut file, chunks, |chunk, [text]| {
-        let mut line = Line::default();
-        for v in items(chunk, per_chunk, points.len()) {
-            line.int(numbering.vertices[v].into()).bytes(b" -1");
-            for &x in &points[v] {
-                line.blank().float(x);
-            }
-            line.end(text);
-        }
-        Ok(())
+    let mut file = Output::create(path)?;
+    lines::vertices(part, &mut file, |line, vertex| {
+        line.int(numbering.vertices[vertex.index].into()).bytes(b" -1");
+        vertex.point.iter().for_each(|&x| _ = line.blank().float(x));
     })?;
-    let [file] = file;
     file.finish()
 }
 
@@ -162,25 +148,11 @@ fn write_elements(
     numbering: &Numbering,
     path: &Path,
 ) -> Result<u64, WriteError> {
-    let (chunks, per_chunk) = split(part.tet_blocks(), part.counts().tets, LINES_PER_CHUNK);
-    let mut file = [Output::create(path)?];
-    write_chunks(&mut file, chunks, |chunk, [text]| {
-        let mut line = Line::default();
-        let mut block = TetBlock::default();
-        for index in items(chunk, per_chunk, part.tet_blocks()) {
-            part.tet_block(index, &mut block);
-            let number = body_number(block.body, names)?;
-            for (id, tet) in (numbering.first_tet + block.first_local..).zip(&block.tets) {
-                line.int(id).blank().int(number).blank().int(TET.into());
-                for &v in tet {
-                    line.blank().int(numbering.vertices[v as usize].into());
-                }
-                line.end(text);
-            }
-        }
-        Ok(())
+    let mut file = Output::create(path)?;
+    lines::tets(part, names, &mut file, |line, tet| {
+        line.int(numbering.first_tet + tet.index).blank().int(tet.number).blank().int(TET.into());
+        ids(line, numbering, tet.vertices);
     })?;
-    let [file] = file;
     file.finish()
 }
 
@@ -191,31 +163,19 @@ fn write_boundary(
     path: &Path,
 ) -> Result<u64, WriteError> {
     let mut file = Output::create(path)?;
-    let mut block = BoundaryBlock::default();
-    let mut line = Line::default();
-    let mut text = Vec::new();
-    let mut id = 0;
-    for index in 0..part.boundary_blocks() {
-        part.boundary_block(index, &mut block);
-        let number = patch_number(block.patch, names)?;
-        for (triangle, parents) in block.triangles.iter().zip(&block.parents) {
-            id += 1;
-            line.int(id).blank().int(number);
-            // The parent that is here goes first: solvers look there for the body of the boundary.
-            let here = parents.iter().filter(|&&tet| tet != NO_TET).map(|tet| numbering.first_tet + tet);
-            for parent in here.chain([0, 0]).take(2) {
-                line.blank().int(parent);
-            }
-            line.blank().int(TRIANGLE.into());
-            for &v in triangle {
-                line.blank().int(numbering.vertices[v as usize].into());
-            }
-            line.end(&mut text);
-        }
-        file.flush_past(FLUSH_AT, &mut text)?;
-    }
-    file.flush_past(0, &mut text)?;
+    lines::triangles(part, names, &mut file, |line, triangle| {
+        line.int(triangle.index + 1).blank().int(triangle.number);
+        // A parent that is here goes first: solvers look there for the body of the boundary.
+        let here = triangle.parents.iter().filter(|&&tet| tet != NO_TET).map(|tet| numbering.first_tet + tet);
+        here.chain([0, 0]).take(2).for_each(|parent| _ = line.blank().int(parent));
+        ids(line.blank().int(TRIANGLE.into()), numbering, triangle.vertices);
+    })?;
     file.finish()
+}
+
+/// Appends the numbers of vertices.
+fn ids(line: &mut Line, numbering: &Numbering, vertices: &[u32]) {
+    vertices.iter().for_each(|&v| _ = line.blank().int(numbering.vertices[v as usize].into()));
 }
 
 fn write_shared(part: &dyn MeshStream, numbering: &Numbering, path: &Path) -> Result<u64, WriteError> {

@@ -188,10 +188,10 @@ impl PieceFile<'_> {
     /// Fills an array with one number per cell.
     pub fn fill(&self, name: &str, number: impl Fn(u64) -> u64 + Sync) -> Result<(), WriteError> {
         const PER_CHUNK: u64 = 1 << 16;
-        let (file, kind) = self.array(name)?;
+        let (mut file, kind) = self.array(name)?;
         let cells = self.piece.cells as usize;
         let (chunks, per_chunk) = split(cells, cells as u64, PER_CHUNK);
-        write_chunks(&mut [file], chunks, |chunk, [bytes]| {
+        write_chunks([&mut file], chunks, |chunk, [bytes]| {
             items(chunk, per_chunk, cells).for_each(|cell| kind.push(number(cell as u64), bytes));
             Ok(())
         })

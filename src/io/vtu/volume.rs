@@ -40,10 +40,10 @@ pub(super) fn write(
     let file = piece.create(path)?;
     file.array("Points")?.0.write(bytemuck::cast_slice(part.points()))?;
 
-    let (connectivity, id) = file.array("connectivity")?;
-    let mut files = [connectivity, file.array("GlobalElementId")?.0, file.array("BodyId")?.0];
+    let (mut connectivity, id) = file.array("connectivity")?;
+    let files = [&mut connectivity, &mut file.array("GlobalElementId")?.0, &mut file.array("BodyId")?.0];
     let (chunks, per_chunk) = split(part.tet_blocks(), part.counts().tets, PER_CHUNK);
-    write_chunks(&mut files, chunks, |chunk, [connectivity, ids, bodies]| {
+    write_chunks(files, chunks, |chunk, [connectivity, ids, bodies]| {
         let mut block = TetBlock::default();
         for index in items(chunk, per_chunk, part.tet_blocks()) {
             part.tet_block(index, &mut block);
@@ -61,14 +61,14 @@ pub(super) fn write(
 
     let blocks = part.vertex_blocks();
     let (chunks, per_chunk) = split(blocks, part.counts().vertices, PER_CHUNK);
-    write_chunks(&mut [file.array("GlobalNodeId")?.0], chunks, |chunk, [ids]| {
+    write_chunks([&mut file.array("GlobalNodeId")?.0], chunks, |chunk, [ids]| {
         for index in items(chunk, per_chunk, blocks) {
             part.vertex_block(index).ids().for_each(|global| Kind::I64.push(global, ids));
         }
         Ok(())
     })?;
     if part.ranks() > 1 {
-        write_chunks(&mut [file.array("vtkGhostType")?.0], chunks, |chunk, [ghosts]| {
+        write_chunks([&mut file.array("vtkGhostType")?.0], chunks, |chunk, [ghosts]| {
             for index in items(chunk, per_chunk, blocks) {
                 let block = part.vertex_block(index);
                 let copy = |global| block.owner(global, part.rank()) != part.rank();

@@ -1,0 +1,115 @@
+//! The entities of a part as lines of a text file: what all text formats have in common.
+
+use super::chunks::{items, split, write_chunks};
+use super::output::Output;
+use super::text::Line;
+use super::{WriteError, body_number, patch_number};
+use crate::mesh::Names;
+use crate::mesh::stream::{BoundaryBlock, MeshStream, TetBlock};
+use csg::{BodyId, PatchId};
+
+/// Lines that one thread formats at a time: some 100 KiB of text.
+const PER_CHUNK: u64 = 4096;
+/// Text that is gathered before it is written, in bytes.
+pub const FLUSH_AT: usize = 1 << 20;
+
+/// A vertex.
+pub struct VertexLine<'a> {
+    /// Its local index.
+    pub index: usize,
+    /// Where it is.
+    pub point: &'a [f64; 3],
+}
+
+/// A tet.
+pub struct TetLine<'a> {
+    /// Its index within the part.
+    pub index: u64,
+    /// Its body.
+    pub body: BodyId,
+    /// The body's number.
+    pub number: u64,
+    /// Its vertices by local index.
+    pub vertices: &'a [u32; 4],
+}
+
+/// A boundary triangle.
+pub struct TriangleLine<'a> {
+    /// Its index within the part.
+    pub index: u64,
+    /// Its patch.
+    pub patch: PatchId,
+    /// The boundary number of the patch.
+    pub number: u64,
+    /// Its vertices by local index.
+    pub vertices: &'a [u32; 3],
+    /// The tets of the part behind it and in front of it.
+    pub parents: &'a [u64; 2],
+}
+
+/// Appends a line for each vertex.
+pub fn vertices(
+    part: &dyn MeshStream,
+    file: &mut Output,
+    format: impl Fn(&mut Line, VertexLine) + Sync,
+) -> Result<(), WriteError> {
+    let points = part.points();
+    let (chunks, per_chunk) = split(points.len(), points.len() as u64, PER_CHUNK);
+    write_chunks([file], chunks, |chunk, [text]| {
+        let mut line = Line::default();
+        for index in items(chunk, per_chunk, points.len()) {
+            format(&mut line, VertexLine { index, point: &points[index] });
+            line.end(text);
+        }
+        Ok(())
+    })
+}
+
+/// Appends a line for each tet.
+pub fn tets(
+    part: &dyn MeshStream,
+    names: &Names,
+    file: &mut Output,
+    format: impl Fn(&mut Line, TetLine) + Sync,
+) -> Result<(), WriteError> {
+    let (chunks, per_chunk) = split(part.tet_blocks(), part.counts().tets, PER_CHUNK);
+    write_chunks([file], chunks, |chunk, [text]| {
+        let mut line = Line::default();
+        let mut block = TetBlock::default();
+        for index in items(chunk, per_chunk, part.tet_blocks()) {
+            part.tet_block(index, &mut block);
+            let body = block.body.expect("a tet block has a body");
+            let number = body_number(block.body, names)?;
+            for (index, vertices) in (block.first_local..).zip(&block.tets) {
+                format(&mut line, TetLine { index, body, number, vertices });
+                line.end(text);
+            }
+        }
+        Ok(())
+    })
+}
+
+/// Appends a line for each boundary triangle. By one thread: they are few beside the tets, and count on.
+pub fn triangles(
+    part: &dyn MeshStream,
+    names: &Names,
+    file: &mut Output,
+    mut format: impl FnMut(&mut Line, TriangleLine),
+) -> Result<(), WriteError> {
+    let mut block = BoundaryBlock::default();
+    let mut line = Line::default();
+    let mut text = Vec::new();
+    let mut index = 0;
+    for of_block in 0..part.boundary_blocks() {
+        part.boundary_block(of_block, &mut block);
+        let patch = block.patch.expect("a boundary block has a patch");
+        let number = patch_number(block.patch, names)?;
+        for (vertices, parents) in block.triangles.iter().zip(&block.parents) {
+            format(&mut line, TriangleLine { index, patch, number, vertices, parents });
+            line.end(&mut text);
+            index += 1;
+        }
+        file.flush_past(FLUSH_AT, &mut text)?;
+    }
+    file.flush_past(0, &mut text)
+}
