@@ -4,7 +4,9 @@
 pub mod check;
 pub mod comm;
 pub mod dist;
+pub mod error;
 pub mod improve;
+pub mod inspect;
 pub mod io;
 pub mod kernel;
 pub mod memory;
@@ -14,6 +16,7 @@ pub mod picture;
 pub mod pipeline;
 pub mod progress;
 pub mod refine;
+pub mod report;
 pub mod size;
 pub mod surface;
 pub mod volume;

@@ -4,7 +4,8 @@ use super::coarse::{CoarseError, CoarseMesh, Model, mesh};
 use crate::size::SizeSettings;
 
 /// How a coarse mesh with a wanted number of tets came out.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Outcome {
     /// Between the number and one and a half times it.
     Reached,
