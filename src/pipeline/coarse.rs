@@ -3,7 +3,7 @@
 use crate::Point;
 use crate::improve::{self, GeometrySmoothness};
 use crate::kernel::quality::QualitySummary;
-use crate::mesh::{Class, Mesh, VertexId};
+use crate::mesh::{Class, Mesh, Segment, VertexId};
 use crate::size::{GeometricSize, SizeField, SizeSettings, Source};
 use crate::surface::curves::{CurveError, crowded, mesh_curves};
 use crate::surface::{self, SurfaceError, SurfaceMesh};
@@ -51,17 +51,20 @@ pub enum CoarseError {
 }
 
 impl CoarseError {
-    /// Places where a finer mesh may help.
-    fn places(&self) -> Vec<Point> {
+    /// Where a finer mesh may help: sources that ask for it. `segments` are the ends of the segments that
+    /// the mesh was begun with, `size` the size field that was used.
+    fn remedy(&self, segments: &[[Point; 2]], size: &dyn SizeField) -> Vec<Source> {
         match self {
-            Self::Surface(
-                SurfaceError::CurvesCross { at, .. }
-                | SurfaceError::VertexOnSegment { at, .. }
-                | SurfaceError::SegmentTooLong { at, .. },
-            ) => vec![*at],
+            Self::Surface(SurfaceError::TooCoarse { segments: long, .. }) => {
+                let shorter = |&s: &usize| {
+                    let [a, b] = segments[s];
+                    Source { point: nalgebra::center(&a, &b), size: LOWERED * (b - a).norm() }
+                };
+                long.iter().map(shorter).collect()
+            }
             Self::Volume(
                 VolumeError::SelfIntersection { places, .. } | VolumeError::NotRecovered { places, .. },
-            ) => places.clone(),
+            ) => places.iter().map(|&point| Source { point, size: LOWERED * size.size_at(&point) }).collect(),
             _ => Vec::new(),
         }
     }
@@ -119,6 +122,8 @@ pub fn mesh(model: &Model, settings: &mut SizeSettings) -> Result<CoarseMesh, Co
         let curves = mesh_curves(&model.features, &model.projector, &size)?;
         let mut lowered = crowded(&curves, &model.features);
         if lowered.is_empty() || corrections >= MOST_CORRECTIONS {
+            let ends = |s: &Segment| s.vertices.map(|v| curves.points[v.index()]);
+            let segments: Vec<[Point; 2]> = curves.segments.iter().map(ends).collect();
             let error = match fill(model, curves, &size) {
                 Ok(mut coarse) => {
                     coarse.report.size_corrections = corrections;
@@ -126,8 +131,7 @@ pub fn mesh(model: &Model, settings: &mut SizeSettings) -> Result<CoarseMesh, Co
                 }
                 Err(error) => error,
             };
-            let lower = |point: Point| Source { point, size: LOWERED * size.size_at(&point) };
-            lowered = error.places().into_iter().map(lower).collect();
+            lowered = error.remedy(&segments, &size);
             if lowered.is_empty() || corrections >= MOST_CORRECTIONS {
                 return Err(error);
             }
