@@ -1,0 +1,158 @@
+//! The command line: what users see when something is wrong, and what they get when nothing is.
+
+use crate::common::{own, read_json, succeed, tetmill};
+use std::path::Path;
+use std::process::Output;
+
+/// Runs `generate` on a text; gives what it said.
+fn generate_text(text: &str, arguments: &[&str]) -> (Output, String) {
+    let dir = tempfile::tempdir().unwrap();
+    let geometry = dir.path().join("input.geo");
+    std::fs::write(&geometry, text).unwrap();
+    let out = dir.path().join("out");
+    let output = tetmill().arg("generate").arg(&geometry).arg("-o").arg(&out).args(arguments).output().unwrap();
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    if !output.status.success() {
+        assert!(!out.exists(), "a failed run left {}", out.display());
+    }
+    (output, said)
+}
+
+#[track_caller]
+fn refused(text: &str, place: &str, reason: &str) {
+    let (output, said) = generate_text(text, &[]);
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    assert!(said.contains(&format!("input.geo{place}")), "no place {place} in: {said}");
+    assert!(said.contains(reason), "no `{reason}` in: {said}");
+    assert!(!said.contains("panicked"), "{said}");
+}
+
+#[test]
+fn broken_files_are_refused_with_their_place() {
+    refused("", ":1:1", "algebraic3d");
+    refused("solid a = sphere (0,0,0; 1);", ":1:1", "algebraic3d");
+    refused("algebraic3d\nsolid a = sphere (0,0,0 1);\ntlo a;", ":2:", "");
+    refused("algebraic3d\nsolid a = sphere (0,0,0; -1);\ntlo a;", ":2:", "radius");
+    refused("algebraic3d\nsolid a = sphere (0,0,0; 1)\ntlo a;", ":3:", "");
+    refused("algebraic3d\nsolid a = sphere (0,0,0; 1);\ntlo b;", ":3:5", "`b`");
+    refused("algebraic3d\nsolid a = spere (0,0,0; 1);\ntlo a;", ":2:", "spere");
+    refused("algebraic3d\nsolid a = sphere (0,0,0; 1e);\ntlo a;", ":2:", "");
+    refused("algebraic3d\nsolid a = sphere (0,0,0; 1) ? ;\ntlo a;", ":2:", "");
+    refused("algebraic3d\nsolid a = plane (0,0,0; 0,0,0);\ntlo a;", ":2:", "normal");
+    refused("algebraic3d\nsolid a = sphere (0,0,0; 1);\n", "", "tlo");
+    refused("algebraic3d\nsolid a = revolution (0,0,0; 1,0,0; c);\ntlo a;", ":2:", "c");
+}
+
+#[test]
+fn geometries_that_cannot_be_meshed_are_refused_with_their_place() {
+    refused("algebraic3d\nsolid a = plane (0,0,0; 0,0,1);\ntlo a;", "", "a");
+    let cone = "algebraic3d\nsolid a = cone (0,0,0; 1; 0,0,2; 0.2) and plane (0,0,0; 0,0,-1) and sphere (0,0,0; 2.8);\ntlo a;";
+    refused(cone, "", "apex");
+    let tangent = "algebraic3d\nsolid a = sphere (0,0,0; 1) or sphere (2,0,0; 1);\ntlo a;";
+    refused(tangent, "", "");
+}
+
+#[test]
+fn a_missing_file_is_bad_input() {
+    let output = tetmill().args(["generate", "no/such/file.geo"]).output().unwrap();
+    assert_eq!(output.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&output.stderr).contains("no/such/file.geo"));
+}
+
+const BALL: &str = "algebraic3d\nsolid a = sphere (0,0,0; 1);\ntlo a;";
+
+#[test]
+fn more_parts_than_tets_are_refused_with_both_numbers() {
+    let (output, said) = generate_text(BALL, &["--preset", "very-coarse", "-n", "3000"]);
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    assert!(said.contains("3000 parts"), "{said}");
+}
+
+#[test]
+fn a_wanted_number_of_tets_is_reached_within_half_more() {
+    for (name, wanted) in [("nozzle", 4000), ("bracket", 8000), ("dome", 3000)] {
+        let report = crate::common::report_of(&own(name), &["--coarse", &wanted.to_string()]);
+        let tets = report["coarse"]["tets"].as_u64().unwrap();
+        assert!((wanted..=wanted + wanted / 2).contains(&tets), "{name}: {wanted} wanted, {tets} made");
+    }
+}
+
+#[test]
+fn too_few_tets_for_a_geometry_are_said_aloud() {
+    let output = succeed(tetmill().arg("generate").arg(own("bracket")).args(["--coarse", "10", "-f", "none"]));
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(said.contains("the least"), "{said}");
+}
+
+#[test]
+fn every_format_is_written_and_the_report_counts_it() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().join("lens");
+    let report = dir.path().join("lens.json");
+    let picture = dir.path().join("lens.png");
+    let mut command = tetmill();
+    command.arg("generate").arg(own("lens")).args(["-n", "2", "-f", "elmer,vtu,geomview", "--check", "-o"]);
+    command.arg(&out).arg("--report").arg(&report).arg("--picture").arg(&picture);
+    let output = succeed(&mut command);
+    assert!(String::from_utf8_lossy(&output.stdout).contains("every tet positive"));
+    for file in ["partitioning.2/part.1.nodes", "partitioning.2/part.2.shared", "mesh.names", "lens.pvtu"] {
+        assert!(out.join(file).is_file(), "no {file}");
+    }
+    assert!(std::fs::read(&picture).unwrap().starts_with(b"\x89PNG"));
+    let report = read_json(&report);
+    assert!(report["bytes"].as_u64().unwrap() > 10_000, "{report}");
+    assert_eq!(report["partition"]["parts"], 2);
+}
+
+#[test]
+fn one_part_is_also_a_plain_elmer_mesh() {
+    let dir = tempfile::tempdir().unwrap();
+    succeed(tetmill().arg("generate").arg(own("lens")).arg("-q").arg("-o").arg(dir.path().join("lens")));
+    for file in ["mesh.header", "mesh.nodes", "mesh.elements", "mesh.boundary", "mesh.names"] {
+        assert!(dir.path().join("lens").join(file).is_file(), "no {file}");
+    }
+}
+
+#[test]
+fn a_coarse_mesh_goes_to_one_file() {
+    let dir = tempfile::tempdir().unwrap();
+    let file = dir.path().join("lens.vtu");
+    succeed(tetmill().arg("mesh").arg(own("lens")).arg("-q").arg("-o").arg(&file));
+    assert!(std::fs::read(&file).unwrap().starts_with(b"<"));
+    let output = tetmill().arg("mesh").arg(own("lens")).args(["-o", "lens.xyz"]).output().unwrap();
+    assert_eq!(output.status.code(), Some(2));
+}
+
+#[test]
+fn check_finds_a_broken_file_and_says_so_by_its_status() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().join("lens");
+    succeed(tetmill().arg("generate").arg(own("lens")).args(["-n", "2", "-q", "-o"]).arg(&out));
+    succeed(tetmill().arg("check").arg(&out));
+    swap_two_nodes_of_an_element(&out.join("partitioning.2/part.1.elements"));
+    let output = tetmill().arg("check").arg(&out).output().unwrap();
+    assert_eq!(output.status.code(), Some(1), "{}", String::from_utf8_lossy(&output.stdout));
+    let output = tetmill().arg("check").arg(dir.path().join("nowhere")).output().unwrap();
+    assert_eq!(output.status.code(), Some(2));
+}
+
+fn swap_two_nodes_of_an_element(file: &Path) {
+    let text = std::fs::read_to_string(file).unwrap();
+    let (first, rest) = text.split_once('\n').unwrap();
+    let mut words: Vec<&str> = first.split_whitespace().collect();
+    let last = words.len() - 1;
+    words.swap(last, last - 1);
+    std::fs::write(file, format!("{}\n{rest}", words.join(" "))).unwrap();
+}
+
+#[test]
+fn inspect_names_what_a_geometry_consists_of() {
+    let output = succeed(tetmill().arg("inspect").arg(own("fibres")));
+    let text = String::from_utf8_lossy(&output.stdout);
+    for word in ["4 bodies", "carbon", "epoxy", "cylinder of fibre1", "8 corners"] {
+        assert!(text.contains(word), "no `{word}` in\n{text}");
+    }
+    let output = succeed(tetmill().arg("inspect").arg(own("fibres")).arg("--json"));
+    let json: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(json["bodies"].as_array().unwrap().len(), 4);
+}

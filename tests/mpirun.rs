@@ -1,0 +1,79 @@
+//! The same program under `mpirun`.
+
+#[cfg(feature = "mpi")]
+mod with_mpi {
+    use crate::common::{judge, own, read_json, report_of, succeed};
+    use std::process::Command;
+
+    /// `mpirun -n RANKS tetmill`, or nothing, said aloud, where there is no `mpirun`.
+    fn mpirun(ranks: u32) -> Option<Command> {
+        if Command::new("mpirun").arg("--version").output().is_err() {
+            eprintln!("SKIPPED: there is no mpirun");
+            return None;
+        }
+        let mut command = Command::new("mpirun");
+        command.env("OMPI_ALLOW_RUN_AS_ROOT", "1").env("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1");
+        command.env("OMPI_MCA_rmaps_base_oversubscribe", "1").env("RAYON_NUM_THREADS", "1");
+        command.args(["-n", &ranks.to_string(), env!("CARGO_BIN_EXE_tetmill")]);
+        Some(command)
+    }
+
+    #[test]
+    fn mpi_ranks_write_a_partition_that_both_checkers_accept() {
+        for (name, levels) in [("fibres", "1"), ("crankshaft", "1"), ("bearing", "0")] {
+            let Some(mut command) = mpirun(4) else { return };
+            let dir = tempfile::tempdir().unwrap();
+            let out = dir.path().join("out");
+            command.arg("generate").arg(own(name)).args(["--levels", levels, "--preset", "very-coarse", "-q", "-o"]);
+            succeed(command.arg(&out));
+            judge(&out, 4);
+        }
+    }
+
+    #[test]
+    fn mpi_ranks_make_the_mesh_that_threads_make() {
+        let arguments = ["--levels", "2", "--preset", "coarse"];
+        let expected = report_of(&own("nozzle"), &arguments);
+        for ranks in [1, 2, 3, 4, 7] {
+            let Some(mut command) = mpirun(ranks) else { return };
+            let dir = tempfile::tempdir().unwrap();
+            let file = dir.path().join("report.json");
+            command.arg("generate").arg(own("nozzle")).args(arguments).args(["-q", "-f", "none", "--report"]);
+            succeed(command.arg(&file));
+            let report = read_json(&file);
+            assert_eq!(report["mesh"]["checksum"], expected["mesh"]["checksum"], "{ranks} ranks");
+            assert_eq!(report["ranks"], ranks);
+        }
+    }
+
+    #[test]
+    fn bad_input_ends_all_ranks_with_its_status_and_one_message() {
+        let Some(mut command) = mpirun(3) else { return };
+        let output = command.args(["generate", "no/such/file.geo"]).output().unwrap();
+        assert_eq!(output.status.code(), Some(2));
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(said.matches("cannot read no/such/file.geo").count(), 1, "{said}");
+    }
+
+    #[test]
+    fn a_number_of_ranks_that_contradicts_mpirun_is_refused() {
+        let Some(mut command) = mpirun(2) else { return };
+        let output = command.arg("generate").arg(own("lens")).args(["-n", "3", "-f", "none"]).output().unwrap();
+        assert_eq!(output.status.code(), Some(2));
+    }
+}
+
+#[cfg(not(feature = "mpi"))]
+mod without_mpi {
+    use crate::common::{own, tetmill};
+
+    #[test]
+    fn a_program_without_mpi_refuses_to_be_one_of_many_ranks() {
+        let mut command = tetmill();
+        command.arg("generate").arg(own("lens")).args(["-f", "none"]).env("OMPI_COMM_WORLD_SIZE", "4");
+        let output = command.output().unwrap();
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{said}");
+        assert!(said.contains("--features mpi"), "{said}");
+    }
+}

@@ -1,0 +1,8 @@
+//! tetmill as its users run it: geometries, ranks, the command line, MPI.
+
+mod cli;
+mod common;
+mod geometries;
+mod mpirun;
+mod ranks;
+mod tutorials;
