@@ -96,20 +96,74 @@ pub(super) enum FlagValue {
 /// A statement.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Statement {
-    Solid { name: Name, body: Expr, flags: Vec<Flag> },
-    /// A definition that could not be read: its name exists, so that uses of it give no further error.
-    Broken { name: Name },
-    Tlo { solid: Name, surface: Option<Name>, flags: Vec<Flag> },
-    Curve2d { name: Name, text: CurveText },
-    Curve3d { name: Name, text: CurveText },
-    BoundingBox { min: Point, max: Point, span: Span },
-    UserPoint { point: Point, flags: Vec<Flag>, span: Span },
-    IdentifyPeriodic { solids: [Name; 2], span: Span },
-    IdentifyCloseSurfaces { solids: [Name; 2], flags: Vec<Flag>, span: Span },
-    SingularFace { tlo: Name, solid: Name, flags: Vec<Flag>, span: Span },
-    SingularEdge { solids: [Name; 2], flags: Vec<Flag>, span: Span },
-    SingularPoint { solids: [Name; 3], flags: Vec<Flag>, span: Span },
-    Boundary { solid: Name, tlo: Name, number: Num },
-    BoundaryName { solid: Name, tlo: Name, word: Name },
-    Constant { name: Name },
+    Solid {
+        name: Name,
+        body: Expr,
+        flags: Vec<Flag>,
+    },
+    /// A solid or curve that could not be read: its name exists, so that uses of it give no further error.
+    Broken {
+        name: Name,
+    },
+    Tlo {
+        solid: Name,
+        surface: Option<Name>,
+        flags: Vec<Flag>,
+    },
+    Curve2d {
+        name: Name,
+        text: CurveText,
+    },
+    Curve3d {
+        name: Name,
+        text: CurveText,
+    },
+    BoundingBox {
+        min: Point,
+        max: Point,
+        span: Span,
+    },
+    UserPoint {
+        point: Point,
+        flags: Vec<Flag>,
+        span: Span,
+    },
+    IdentifyPeriodic {
+        solids: [Name; 2],
+        span: Span,
+    },
+    IdentifyCloseSurfaces {
+        solids: [Name; 2],
+        flags: Vec<Flag>,
+        span: Span,
+    },
+    SingularFace {
+        tlo: Name,
+        solid: Name,
+        flags: Vec<Flag>,
+        span: Span,
+    },
+    SingularEdge {
+        solids: [Name; 2],
+        flags: Vec<Flag>,
+        span: Span,
+    },
+    SingularPoint {
+        solids: [Name; 3],
+        flags: Vec<Flag>,
+        span: Span,
+    },
+    Boundary {
+        solid: Name,
+        tlo: Name,
+        number: Num,
+    },
+    BoundaryName {
+        solid: Name,
+        tlo: Name,
+        word: Name,
+    },
+    Constant {
+        name: Name,
+    },
 }

@@ -30,10 +30,10 @@ impl Kind {
 /// One message about one place of a file.
 ///
 /// ```text
-/// ball.geo:3:25: error: `sphere` needs a positive radius, not 0
+/// ball.geo:3:14: error: `sphere` needs a positive radius, not 0.0
 ///     3 | solid ball = sphere (0, 0, 0; 0);
 ///       |              ^
-///       = help: a solid without an inside cannot be meshed
+///       = help: radii are lengths from 1e-60 to 1e60
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Diagnostic {
@@ -224,8 +224,7 @@ mod tests {
     #[test]
     fn a_message_shows_place_line_caret_and_help() {
         let text = diagnostic(5, "tlo x;").to_string();
-        let expected =
-            "a.geo:7:5: error: it is wrong\n    7 | tlo x;\n      |     ^\n      = help: mend it";
+        let expected = "a.geo:7:5: error: it is wrong\n    7 | tlo x;\n      |     ^\n      = help: mend it";
         assert_eq!(text, expected);
     }
 

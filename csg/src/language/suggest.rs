@@ -63,7 +63,7 @@ pub(super) fn begins_statement(word: &str) -> bool {
 
 /// A help line that names the nearest of `candidates`, or nothing if none is near.
 pub(super) fn did_you_mean<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) -> String {
-    // A third of the letters may be wrong (at least one): `spere` gives `sphere`, `cube` does not give `tube`'s kin `torus`.
+    // A third of the letters may be wrong (at least one): `spere` means `sphere`, but `box` does not mean `cone`.
     let allowed = (word.chars().count() / 3).max(1);
     let distance = |candidate: &&str| edits(&word.to_lowercase(), &candidate.to_lowercase());
     let nearest = candidates.into_iter().map(|c| (distance(&c), c)).min();

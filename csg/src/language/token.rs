@@ -79,6 +79,16 @@ impl<'a> Scanner<'a> {
                 TokenKind::Word(self.take_while(|c| c.is_ascii_alphanumeric() || c == '_'))
             }
             c if c.is_ascii_digit() || c == '.' => self.number(report),
+            '"' => {
+                // The whole string, so that one mistake gives one message.
+                self.take_one();
+                self.take_while(|c| c != '"');
+                if self.rest().starts_with('"') {
+                    self.take_one();
+                }
+                report.syntax(span, "there are no quoted strings", "write -material=air");
+                TokenKind::Bad
+            }
             c => {
                 self.at += c.len_utf8();
                 self.span.column += 1;
@@ -116,7 +126,11 @@ impl<'a> Scanner<'a> {
         match text.parse::<f64>() {
             Ok(value) if value.is_finite() => TokenKind::Number(value),
             Ok(_) => {
-                report.syntax(span, format!("the number {text} is too large"), "the largest is about 1.8e308");
+                report.syntax(
+                    span,
+                    format!("the number {text} is too large"),
+                    "the largest is about 1.8e308",
+                );
                 TokenKind::Bad
             }
             Err(_) => {
@@ -140,7 +154,7 @@ fn is_blank(c: char) -> bool {
 
 fn stray_help(c: char) -> &'static str {
     match c {
-        '"' | '\'' => "there are no quoted strings: write -material=air",
+        '\'' => "there are no quoted strings: write -material=air",
         '+' => "numbers take no leading +, and there is no arithmetic",
         '*' | '/' | '^' => "there is no arithmetic: write the value itself; a comment begins with #",
         '{' | '}' => "solids are grouped by ( )",
@@ -210,9 +224,14 @@ mod tests {
 
     #[test]
     fn stray_characters_get_advice() {
-        assert!(first_message("-material=\"air\"").contains("no quoted strings"));
+        assert!(first_message("-material='air'").contains("no quoted strings"));
         assert!(first_message("_a").contains("begin with a letter"));
         assert!(first_message("1*2").contains("no arithmetic"));
+    }
+
+    #[test]
+    fn a_quoted_string_is_one_bad_token() {
+        assert_eq!(kinds("\"air and water\"; \"open\nend"), [Bad, Mark(';'), Bad, Word("end"), End]);
     }
 
     #[test]

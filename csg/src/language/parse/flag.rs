@@ -50,6 +50,7 @@ impl Parser<'_, '_> {
         let token = self.peek();
         match token.kind {
             TokenKind::Word(word) if is_reserved(word) => {
+                self.next();
                 let message = format!("`{word}` is a word of the language and cannot be the value of a flag");
                 Err(self.report.syntax(token.span, message, "choose another word"))
             }

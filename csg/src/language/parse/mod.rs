@@ -158,6 +158,11 @@ impl<'a> Parser<'a, '_> {
         let token = self.peek();
         match token.kind {
             TokenKind::Word(word) if is_reserved(word) => {
+                self.next();
+                if !(self.peek_mark('=') || self.peek_mark(';')) {
+                    // It begins the next statement perhaps, where reading goes on.
+                    self.at -= 1;
+                }
                 let message = format!("`{word}` is a word of the language and cannot name {what}");
                 Err(self.report.syntax(token.span, message, "choose another name"))
             }
@@ -198,13 +203,13 @@ impl<'a> Parser<'a, '_> {
         }
     }
 
-    /// What a statement that could not be read (it began at token `start`) would have defined.
+    /// What a statement that could not be read (it began at token `start`) would have defined: its first word may
+    /// be the wrong one.
     fn broken_definition(&self, start: usize) -> Option<Statement> {
-        let [first, second] = [self.tokens.get(start)?, self.tokens.get(start + 1)?];
-        match (first.kind, second.kind) {
-            (TokenKind::Word("solid"), TokenKind::Word(word)) if !is_reserved(word) => {
-                let name = Name { text: word.to_owned(), span: second.span };
-                Some(Statement::Broken { name })
+        let [word, name, mark] = self.tokens.get(start..start + 3)? else { return None };
+        match (word.kind, name.kind, mark.kind) {
+            (TokenKind::Word(_), TokenKind::Word(text), TokenKind::Mark('=')) if !is_reserved(text) => {
+                Some(Statement::Broken { name: Name { text: text.to_owned(), span: name.span } })
             }
             _ => None,
         }
@@ -217,7 +222,9 @@ impl<'a> Parser<'a, '_> {
             let after_singular = self.tokens[self.at - 1].kind == TokenKind::Word("singular");
             match self.peek().kind {
                 TokenKind::End => break,
-                TokenKind::Word(word) if begins_statement(word) && !(word == "point" && after_singular) => break,
+                TokenKind::Word(word) if begins_statement(word) && !(word == "point" && after_singular) => {
+                    break;
+                }
                 _ => {
                     self.next();
                 }
@@ -231,7 +238,8 @@ impl<'a> Parser<'a, '_> {
             TokenKind::Word(word) => did_you_mean(word, STATEMENTS),
             _ => String::new(),
         };
-        let help = if help.is_empty() { format!("statements begin with {}", STATEMENTS.join(", ")) } else { help };
+        let help =
+            if help.is_empty() { format!("statements begin with {}", STATEMENTS.join(", ")) } else { help };
         self.expected_with_help("a statement", &help)
     }
 }

@@ -67,7 +67,8 @@ impl Parser<'_, '_> {
             }
             TokenKind::Word(word) if self.tokens[self.at + 1].kind == TokenKind::Mark('(') => {
                 let help = did_you_mean(word, PRIMITIVES);
-                let help = if help.is_empty() { format!("there are {}", PRIMITIVES.join(", ")) } else { help };
+                let help =
+                    if help.is_empty() { format!("there are {}", PRIMITIVES.join(", ")) } else { help };
                 Err(self.report.syntax(span, format!("unknown primitive `{word}`"), &help))
             }
             TokenKind::Word(_) => Ok(Expr::Name(self.name("a solid")?)),

@@ -2,7 +2,7 @@
 
 use super::{Parsed, Parser};
 use crate::language::ast::Statement;
-use crate::language::suggest::did_you_mean;
+use crate::language::suggest::{did_you_mean, is_reserved};
 use crate::language::token::TokenKind;
 
 impl Parser<'_, '_> {
@@ -56,7 +56,8 @@ impl Parser<'_, '_> {
         self.next();
         let solid = self.name("a solid")?;
         let surface = match self.peek().kind {
-            TokenKind::Word(_) => Some(self.name("a surface's solid")?),
+            // A word of the language begins the next statement: the `;` is missing.
+            TokenKind::Word(word) if !is_reserved(word) => Some(self.name("a solid")?),
             _ => None,
         };
         let flags = self.flags()?;
