@@ -307,9 +307,18 @@ fn each_once(geometry: &Geometry, arcs: Vec<Arc>, tolerances: &Tolerances) -> Re
     Ok(kept.into_iter().map(|i| arcs[i].clone()).collect())
 }
 
-fn loose(geometry: &Geometry, pair: [SurfaceId; 2], at: &Point) -> FeatureError {
+/// The error for a curve that nothing ends: where its surfaces are nearly tangent, that is the reason.
+pub(super) fn loose(geometry: &Geometry, pair: [SurfaceId; 2], at: &Point) -> FeatureError {
+    /// The sine of an angle at which curves are followed without trouble.
+    const STEEP: f64 = 1e-2;
+    let [a, b] = pair.map(|s| geometry.surfaces[s.index()].normal(at));
     let [first, second] = pair.map(|s| Named::surface(geometry, s));
-    FeatureError::LooseCurve { first, second, place: Place(*at) }
+    let place = Place(*at);
+    if a.cross(&b).norm() < STEEP {
+        FeatureError::Tangent { first, second, place }
+    } else {
+        FeatureError::LooseCurve { first, second, place }
+    }
 }
 
 impl Arc {

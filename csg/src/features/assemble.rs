@@ -1,6 +1,6 @@
 //! Arcs to curves and corners, sheets to patches.
 
-use super::arcs::{Arc, Nodes};
+use super::arcs::{Arc, Nodes, loose};
 use super::around::{Sheet, Tolerances, sheet_at};
 use super::octree::Octree;
 use super::{Corner, Curve, FeatureError, Features, Fin, Named, Patch, Place};
@@ -26,8 +26,7 @@ pub(super) fn join(
     for (&node, ends) in &ends {
         let point = nodes.point(node);
         if let [(arc, _)] = ends[..] {
-            let [first, second] = arcs[arc].pair.map(|s| Named::surface(geometry, s));
-            return Err(FeatureError::LooseCurve { first, second, place: Place(point) });
+            return Err(loose(geometry, arcs[arc].pair, &point));
         }
         let is_user_point = geometry.user_points.iter().any(|u| (u.point - point).norm() <= tolerances.merge);
         if let ([first, second], false) = (&ends[..], is_user_point) {

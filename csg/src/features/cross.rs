@@ -83,14 +83,17 @@ impl Finder<'_> {
         near(&ends[0]) && near(&ends[1]) && between(0.31) && between(0.64)
     }
 
-    /// Splits the step until on each part the third function excludes zero or is monotone along the curve.
+    /// Splits the step until on each part the third function excludes zero or is monotone along the curve, or has one
+    /// extremum.
     fn find(&mut self, p: &Point, q: &Point, depth: u32) {
-        /// A part of 10⁻⁹ of a step on which the function is not monotone is a touching point.
+        /// A part of 10⁻⁹ of a step that is not resolved holds at most one point.
         const DEPTH: u32 = 30;
+        /// On a part of 1/32 of a step a derivative with different signs at its ends has one root.
+        const SHORT: u32 = 5;
         if depth == 0 {
             // An end of the step on the surface may be lost to rounding on both sides of it.
-            let tolerance = self.tolerances.on_surface;
-            self.found.extend([p, q].into_iter().filter(|x| self.third.distance(x) <= tolerance).copied());
+            let ends: Vec<Point> = [p, q].into_iter().filter(|x| self.is_on(x)).copied().collect();
+            self.found.extend(ends);
         }
         let cell = step_box(p, q);
         if !self.third.value_range(&cell).contains_zero() {
@@ -100,18 +103,27 @@ impl Finder<'_> {
         let w = self.third.gradient_range(&cell);
         let cross = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
         let slope: Interval = w[0] * cross[0] + w[1] * cross[1] + w[2] * cross[2];
-        let (at_p, at_q) = (self.third.value(p), self.third.value(q));
         if !slope.contains_zero() {
-            if (at_p < 0.0) != (at_q < 0.0) {
-                self.found.push(self.root(*p, *q));
+            self.find_between(p, q);
+            return;
+        }
+        if depth >= SHORT && self.slope(p) * self.slope(q) < 0.0 {
+            let extremum = self.bisect(*p, *q, |at| self.slope(at));
+            if self.is_on(&extremum) {
+                self.found.push(extremum);
+            } else {
+                self.find_between(p, &extremum);
+                self.find_between(&extremum, q);
             }
             return;
         }
-        let middle = nalgebra::center(p, q);
-        let middle = project_to_both(self.a, self.b, &middle, self.tolerances.exact).unwrap_or(middle);
-        if depth == DEPTH {
-            if (at_p < 0.0) != (at_q < 0.0) || self.third.distance(&middle) <= self.tolerances.on_surface {
+        let middle = self.middle(p, q);
+        // A curve that touches the surface to a high order is on it for a while: one node stands for all of that.
+        if depth == DEPTH || [p, &middle, q].into_iter().all(|x| self.is_on(x)) {
+            if self.is_on(&middle) {
                 self.found.push(middle);
+            } else {
+                self.find_between(p, q);
             }
             return;
         }
@@ -119,28 +131,48 @@ impl Finder<'_> {
         self.find(&middle, q, depth + 1);
     }
 
-    /// The one root between two points with values of opposite signs.
-    fn root(&self, mut p: Point, mut q: Point) -> Point {
-        /// Bisection halves the step to less than its rounding.
-        const STEPS: usize = 60;
-        let cell = step_box(&p, &q);
-        let (low, high) = (self.third.value(&p), self.third.value(&q));
-        let secant = p + (q - p) * (low / (low - high));
-        if let Some(point) = self.newton(secant) {
-            if (0..3).all(|i| cell[i].contains(point[i])) {
-                return point;
-            }
-        }
+    fn is_on(&self, point: &Point) -> bool {
+        self.third.distance(point) <= self.tolerances.on_surface
+    }
+
+    /// The derivative of the third function along the curve, up to a positive factor.
+    fn slope(&self, at: &Point) -> f64 {
+        self.third.gradient(at).dot(&self.a.gradient(at).cross(&self.b.gradient(at)))
+    }
+
+    /// The point of the curve halfway between two.
+    fn middle(&self, p: &Point, q: &Point) -> Point {
+        let middle = nalgebra::center(p, q);
+        project_to_both(self.a, self.b, &middle, self.tolerances.exact).unwrap_or(middle)
+    }
+
+    /// The root of a function with values of opposite signs at two points of the curve, between them.
+    fn bisect(&self, mut p: Point, mut q: Point, function: impl Fn(&Point) -> f64) -> Point {
+        /// They halve a step to less than its rounding.
+        const STEPS: usize = 56;
+        let negative = function(&p) < 0.0;
         for _ in 0..STEPS {
-            let middle = nalgebra::center(&p, &q);
-            let Ok(middle) = project_to_both(self.a, self.b, &middle, self.tolerances.exact) else { break };
-            if (self.third.value(&middle) < 0.0) == (low < 0.0) {
+            let middle = self.middle(&p, &q);
+            if (function(&middle) < 0.0) == negative {
                 p = middle;
             } else {
                 q = middle;
             }
         }
         p
+    }
+
+    /// The root between two points between which the third function is monotone, if the signs there differ.
+    fn find_between(&mut self, p: &Point, q: &Point) {
+        let (low, high) = (self.third.value(p), self.third.value(q));
+        if (low < 0.0) == (high < 0.0) {
+            return;
+        }
+        let cell = step_box(p, q);
+        let secant = p + (q - p) * (low / (low - high));
+        let newton = self.newton(secant).filter(|x| (0..3).all(|i| cell[i].contains(x[i])));
+        let root = newton.unwrap_or_else(|| self.bisect(*p, *q, |at| self.third.value(at)));
+        self.found.push(root);
     }
 
     /// Newton's method on the three equations.

@@ -42,8 +42,12 @@ pub(super) fn trace_all(geometry: &Geometry, tree: &Octree, tolerances: &Toleran
                 if known.iter().any(|&t| traces[t].passes(&seed)) {
                     continue;
                 }
-                known.push(traces.len());
-                traces.push(Tracer::new(geometry, tree, pair, tolerances).trace(&seed));
+                let trace = Tracer::new(geometry, tree, pair, tolerances).trace(&seed);
+                // A seed at a point of contact, from where no step leads on, is no curve.
+                if trace.points.len() > 1 {
+                    known.push(traces.len());
+                    traces.push(trace);
+                }
             }
         }
     }
