@@ -54,12 +54,8 @@ impl CoarseError {
     /// Places where a finer mesh may help.
     fn places(&self) -> Vec<Point> {
         match self {
-            Self::Surface(
-                SurfaceError::CurvesCross { at, .. }
-                | SurfaceError::VertexOnSegment { at, .. }
-                | SurfaceError::SegmentTooLong { at, .. },
-            ) => vec![*at],
-            Self::Volume(
+            Self::Surface(SurfaceError::TooCoarse { places, .. })
+            | Self::Volume(
                 VolumeError::SelfIntersection { places, .. } | VolumeError::NotRecovered { places, .. },
             ) => places.clone(),
             _ => Vec::new(),
