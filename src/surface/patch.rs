@@ -35,6 +35,8 @@ pub enum SurfaceError {
         at: Point,
         /// All segments that are too long, on all patches, ascending.
         segments: Vec<usize>,
+        /// Their middles: where a smaller size helps.
+        places: Vec<Point>,
     },
     /// Two vertices are at the same place.
     #[error("patch {} has two vertices at ({}, {}, {})", .patch.0, .at.x, .at.y, .at.z)]
@@ -119,12 +121,8 @@ pub fn mesh_patches(
     let mut out = curves;
     let mut report = Report::default();
     for (p, meshed) in meshed.into_iter().enumerate() {
-        let Meshed { inputs, points, triangles, report: of_patch } = meshed.map_err(|error| match error {
-            SurfaceError::TooCoarse { patch, curve, other, at, .. } => {
-                SurfaceError::TooCoarse { patch, curve, other, at, segments: too_long.clone() }
-            }
-            error => error,
-        })?;
+        let Meshed { inputs, points, triangles, report: of_patch } =
+            meshed.map_err(|error| with_all(error, &too_long, &out))?;
         let patch = PatchId::new(p);
         let first = out.points.len();
         let number = |v: u32| match inputs.get(v as usize) {
@@ -153,6 +151,25 @@ fn all_too_long(meshed: &[Result<Meshed, SurfaceError>]) -> Vec<usize> {
     all.sort_unstable();
     all.dedup();
     all
+}
+
+/// The error with the segments that are too long on all patches, if that is what it says.
+fn with_all(error: SurfaceError, too_long: &[usize], curves: &SurfaceMesh) -> SurfaceError {
+    let middle = |&s: &usize| {
+        let [a, b] = curves.segments[s].vertices.map(|v| &curves.points[v.index()]);
+        nalgebra::center(a, b)
+    };
+    match error {
+        SurfaceError::TooCoarse { patch, curve, other, at, .. } => SurfaceError::TooCoarse {
+            patch,
+            curve,
+            other,
+            at,
+            segments: too_long.to_vec(),
+            places: too_long.iter().map(middle).collect(),
+        },
+        error => error,
+    }
 }
 
 /// What all patches are made of.
@@ -455,7 +472,14 @@ impl<'a> Part<'a> {
                     Conflict::Through(s, _) | Conflict::TooLong(s) => vec![segment(s)],
                 });
                 let (curve, at) = (curve(s), middle(s));
-                SurfaceError::TooCoarse { patch, curve, other, at, segments: segments.collect() }
+                SurfaceError::TooCoarse {
+                    patch,
+                    curve,
+                    other,
+                    at,
+                    segments: segments.collect(),
+                    places: Vec::new(),
+                }
             }
             Fault::BothSides(s) => SurfaceError::BothSides { patch, curve: curve(s), at: middle(s) },
             Fault::Open | Fault::StartInTheWay => SurfaceError::NotEnclosed(patch),
