@@ -34,9 +34,7 @@ pub fn hilbert_key(cell: [u32; 3]) -> u64 {
         q >>= 1;
     }
     let x = x.map(|v| v ^ t);
-    (0..BITS).rev().fold(0u64, |key, bit| {
-        x.iter().fold(key, |key, v| (key << 1) | u64::from((v >> bit) & 1))
-    })
+    (0..BITS).rev().fold(0u64, |key, bit| x.iter().fold(key, |key, v| (key << 1) | u64::from((v >> bit) & 1)))
 }
 
 /// Keys of all points, relative to the smallest cube around them.

@@ -125,9 +125,8 @@ pub(super) fn piercing(mesh: &mut Tetrahedra, [a, b, c]: [u32; 3], star: &mut Ve
             continue;
         }
         for &t in &ring.tets {
-            let signs = mesh.tets[t as usize].map(|v| {
-                if [a, b, c].contains(&v) { Sign::Zero } else { mesh.side([a, b, c], v) }
-            });
+            let signs = mesh.tets[t as usize]
+                .map(|v| if [a, b, c].contains(&v) { Sign::Zero } else { mesh.side([a, b, c], v) });
             for i in 0..4 {
                 for j in i + 1..4 {
                     let (u, v) = (mesh.tets[t as usize][i], mesh.tets[t as usize][j]);

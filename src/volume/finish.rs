@@ -50,10 +50,8 @@ pub(super) fn not_recovered(
         let mut triangles: Vec<u32> = left.facets.iter().map(|&f| triangle(f)).collect();
         triangles.sort_unstable();
         triangles.dedup();
-        let places = triangles
-            .iter()
-            .map(|&t| surface.points[surface.triangles[t as usize][0] as usize])
-            .collect();
+        let places =
+            triangles.iter().map(|&t| surface.points[surface.triangles[t as usize][0] as usize]).collect();
         VolumeError::NotRecovered { triangles, places }
     } else {
         let triangles = left.intersections.iter().map(|i| triangle(i.facet)).collect();

@@ -124,7 +124,8 @@ impl Flips {
                 }
                 self.budget -= 1;
                 let mut star = Vec::new();
-                let still = mesh.is_alive(beside) && [end, r].iter().all(|v| mesh.tets[beside as usize].contains(v));
+                let still =
+                    mesh.is_alive(beside) && [end, r].iter().all(|v| mesh.tets[beside as usize].contains(v));
                 let at = if still { Some(beside) } else { mesh.tet_at_edge(end, r, &mut star) };
                 let helped = at.is_some_and(|tet| {
                     self.remove_edge_with_help(mesh, constraints, tet, [end, r], wanted, depth - 1).is_ok()

@@ -118,7 +118,8 @@ fn skin_edges(mesh: &Tetrahedra) -> Vec<(f64, u32)> {
 /// The centre of the sphere through the corners of a tet; not finite where it is flat.
 fn circumcenter([a, b, c, d]: [&Point; 4]) -> Point {
     let (u, v, w) = (b - a, c - a, d - a);
-    let numerator = u.norm_squared() * v.cross(&w) + v.norm_squared() * w.cross(&u) + w.norm_squared() * u.cross(&v);
+    let numerator =
+        u.norm_squared() * v.cross(&w) + v.norm_squared() * w.cross(&u) + w.norm_squared() * u.cross(&v);
     a + numerator / (2.0 * u.cross(&v).dot(&w))
 }
 
@@ -199,7 +200,9 @@ impl Filler<'_> {
                 });
                 moved |= has_front;
                 if inserted {
-                    next.extend(self.cavity.filled.iter().filter(|&&t| self.states[t as usize] == State::Coarse));
+                    next.extend(
+                        self.cavity.filled.iter().filter(|&&t| self.states[t as usize] == State::Coarse),
+                    );
                 } else if has_front {
                     self.states[t as usize] = State::Settled;
                 } else {
@@ -268,7 +271,8 @@ impl Filler<'_> {
     /// Inserts a point near tet `t` unless it is too near to something; the new tets are in `cavity.filled`.
     fn insert(&mut self, t: u32, point: Point, size: f64) -> bool {
         let near = (NEAREST * size).powi(2);
-        let too_near = |mesh: &Tetrahedra, t: u32| mesh.corners(t).iter().any(|p| (point - **p).norm_squared() < near);
+        let too_near =
+            |mesh: &Tetrahedra, t: u32| mesh.corners(t).iter().any(|p| (point - **p).norm_squared() < near);
         if !point.iter().all(|x| x.is_finite()) || too_near(self.mesh, t) {
             return false;
         }

@@ -92,7 +92,8 @@ fn take_off(
         };
     }
     let mut sectors = sectors(mesh, constraints, p, &patches);
-    let Some(apexes) = sectors.iter_mut().map(|s| grow_and_find(mesh, s, p)).collect::<Option<Vec<_>>>() else {
+    let Some(apexes) = sectors.iter_mut().map(|s| grow_and_find(mesh, s, p)).collect::<Option<Vec<_>>>()
+    else {
         return false;
     };
     let mut ball: Vec<u32> = sectors.iter().flat_map(|s| s.tets.iter().copied()).collect();
@@ -135,7 +136,15 @@ fn take_off(
 fn outline(fan: &[[u32; 3]], p: u32) -> Vec<u32> {
     let links: Vec<[u32; 2]> = fan
         .iter()
-        .map(|&[a, b, c]| if a == p { [b, c] } else if b == p { [c, a] } else { [a, b] })
+        .map(|&[a, b, c]| {
+            if a == p {
+                [b, c]
+            } else if b == p {
+                [c, a]
+            } else {
+                [a, b]
+            }
+        })
         .collect();
     let start = links.iter().map(|l| l[0]).find(|v| links.iter().all(|l| l[1] != *v));
     let mut outline = vec![start.unwrap_or(links[0][0])];
@@ -150,7 +159,7 @@ fn outline(fan: &[[u32; 3]], p: u32) -> Vec<u32> {
 
 /// The sectors of the ball of p, with the patches in place of the facets at p.
 fn sectors(
-    mesh: & Tetrahedra,
+    mesh: &Tetrahedra,
     constraints: &Constraints,
     p: u32,
     patches: &BTreeMap<u32, Vec<[u32; 3]>>,
@@ -239,7 +248,8 @@ impl Sector {
         let before = self.tets.len();
         for wall in self.walls.clone() {
             let behind = mesh.across(wall);
-            if unseen(&wall) && behind != NONE && !mesh.is_locked(wall) && !self.tets.contains(&(behind >> 2)) {
+            if unseen(&wall) && behind != NONE && !mesh.is_locked(wall) && !self.tets.contains(&(behind >> 2))
+            {
                 self.tets.push(behind >> 2);
             }
         }

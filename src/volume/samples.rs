@@ -101,7 +101,8 @@ impl Soup {
             faces = faces
                 .iter()
                 .flat_map(|&[p, q, r]| {
-                    let [a, b, c] = [nalgebra::center(&q, &r), nalgebra::center(&p, &r), nalgebra::center(&p, &q)];
+                    let [a, b, c] =
+                        [nalgebra::center(&q, &r), nalgebra::center(&p, &r), nalgebra::center(&p, &q)];
                     [[p, c, b], [c, q, a], [b, a, r], [a, b, c]]
                 })
                 .collect();

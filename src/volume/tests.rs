@@ -89,6 +89,12 @@ fn spheres_and_tori_are_filled() {
         soup.sphere(Point::new(0.1, 0.2, 0.3), 0.7, levels, INSIDE);
         filled(soup, 0.25);
     }
+    let mut links = Soup::default();
+    links.torus([1.0, 0.3], [20, 8], INSIDE);
+    links.map(|p| Point::new(p.x + 1.0, p.z, p.y));
+    links.triangles.iter_mut().for_each(|t| t.swap(1, 2));
+    links.torus([1.0, 0.3], [20, 8], [B, None]);
+    filled(links, 0.25);
     for (m, n) in [(3, 3), (8, 5), (24, 12), (60, 8), (10, 40)] {
         let mut soup = Soup::default();
         soup.torus([1.0, 0.4], [m, n], INSIDE);
@@ -160,7 +166,13 @@ fn the_schoenhardt_polyhedron_gets_one_point_inside() {
 
 /// Any surface between tets of some mesh can be filled. A lattice of n³ cubes of six tets each, squeezed and sheared so
 /// that it is far from Delaunay, each tet in one of two bodies or in none: surfaces that touch themselves everywhere.
-fn lattice_skin(n: u32, squeeze: [f64; 3], shear: f64, bend: f64, mut body: impl FnMut() -> Option<BodyId>) -> Soup {
+fn lattice_skin(
+    n: u32,
+    squeeze: [f64; 3],
+    shear: f64,
+    bend: f64,
+    mut body: impl FnMut() -> Option<BodyId>,
+) -> Soup {
     let at = |c: [u32; 3]| {
         let [x, y, z] = [0, 1, 2].map(|k| f64::from(c[k]) * squeeze[k]);
         // Triangular, so every tet keeps its volume.
@@ -311,7 +323,17 @@ fn surfaces_that_intersect_are_refused_with_the_place() {
     let mut needle = Soup::default();
     needle.brick([0.; 3], [1.; 3], 2, INSIDE);
     needle.brick([0.3, 0.31, -0.5], [0.32, 0.33, 1.5], 1, INSIDE);
-    for soup in [cubes, needle] {
+    // A torus drawn through another one, and a vertex that touches a face from inside.
+    let mut rings = Soup::default();
+    rings.torus([1.0, 0.3], [16, 8], INSIDE);
+    rings.map(|p| Point::new(p.x + 0.2, p.z, p.y));
+    rings.torus([1.0, 0.3], [16, 8], INSIDE);
+    let mut touching = Soup::default();
+    touching.brick([-1.; 3], [1.; 3], 1, INSIDE);
+    touching.sphere(Point::origin(), 0.5, 1, [None, A]);
+    let top = touching.points.len() - 1;
+    touching.points[top] = Point::new(0.25, 0.5, 1.0);
+    for soup in [cubes, needle, rings, touching] {
         let surface = soup.surface().unwrap();
         match mesh(&surface, &UniformSize(1.0), &Settings::default()).unwrap_err() {
             VolumeError::SelfIntersection { triangles, places } => {
@@ -369,7 +391,11 @@ fn notched_block(n: usize, gap: f64) -> Soup {
             outline.reverse();
         }
         let first = Point::origin();
-        let (u, v) = if outward.x != 0.0 { (crate::Vector::y(), crate::Vector::z()) } else { (crate::Vector::z(), crate::Vector::x()) };
+        let (u, v) = if outward.x != 0.0 {
+            (crate::Vector::y(), crate::Vector::z())
+        } else {
+            (crate::Vector::z(), crate::Vector::x())
+        };
         let (u, v) = if outward.sum() > 0.0 { (u, v) } else { (v, u) };
         let shadow = polygon::Shadow::of([&first, &(first + u), &(first + v)]);
         for t in polygon::triangulate(&outline, shadow, &corners).unwrap() {

@@ -318,8 +318,9 @@ impl Tetrahedra {
         // An outer face may be `NONE` and then cannot tell by itself that it is new: sort positions.
         let mut order: Vec<u32> = (0..faces.len() as u32).collect();
         order.sort_unstable_by_key(|&i| (faces[i as usize].0, i));
-        assert!(order.len() % 2 == 0, "the surface of a cavity changed");
-        for pair in order.chunks_exact(2) {
+        let pairs = order.chunks_exact(2);
+        assert!(pairs.remainder().is_empty(), "the surface of a cavity changed");
+        for pair in pairs {
             let (one, other) = (faces[pair[0] as usize], faces[pair[1] as usize]);
             assert!(one.0 == other.0 && pair[1] as usize >= outer, "face {:?} left alone", one.0);
             self.link(other.1, one.1);
