@@ -41,12 +41,13 @@ pub(super) enum Walk {
 }
 
 /// Walks from tet to tet towards a point (visibility walk: Devillers, Pion, Teillaud 2002), turning the
-/// order in which faces are asked with every step, so that no cycle repeats for ever.
+/// order in which faces are asked with every step. In a Delaunay mesh it always arrives; elsewhere it might go round
+/// in circles, and is taken for blocked after more steps than there are tets.
 pub(super) fn walk(mesh: &Tetrahedra, from: u32, target: &Point) -> Walk {
     let mut tet = from;
     let mut entry = NONE;
     let mut turn = 0u32;
-    'step: loop {
+    'step: for _ in 0..=mesh.tets.len() {
         for k in 0..4 {
             let half_face = 4 * tet + ((turn + k) & 3);
             if half_face == entry {
@@ -66,6 +67,7 @@ pub(super) fn walk(mesh: &Tetrahedra, from: u32, target: &Point) -> Walk {
         }
         return Walk::Inside(tet);
     }
+    Walk::Blocked(entry)
 }
 
 impl Cavity {

@@ -1,6 +1,6 @@
 //! What stands in the way of a missing edge or face: the faces and edges of the mesh that it crosses.
 
-use super::tetrahedra::{OPPOSITE_EDGE, Ring, Tetrahedra};
+use super::tetrahedra::{Ring, Tetrahedra};
 use crate::kernel::predicates::{Sign, orient2d};
 
 /// What a missing edge meets.
@@ -164,10 +164,4 @@ pub(super) fn tets_around(mesh: &Tetrahedra, crossing: Crossing) -> Vec<u32> {
         }
         Crossing::Vertex(_) => Vec::new(),
     }
-}
-
-/// The two vertices of a tet that are not on its edge a, b.
-pub(super) fn opposite(mesh: &Tetrahedra, tet: u32, a: u32, b: u32) -> Option<[u32; 2]> {
-    let (i, j) = (mesh.index_of(tet, a)?, mesh.index_of(tet, b)?);
-    Some(OPPOSITE_EDGE[i][j].map(|k| mesh.tets[tet as usize][k]))
 }

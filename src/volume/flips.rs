@@ -26,6 +26,8 @@ pub(super) enum Refused {
 pub(super) struct Flips {
     /// The tets that the last flip made.
     pub made: Vec<u32>,
+    /// How many more edges may be tried in order to help: see [`Flips::remove_edge_with_help`].
+    pub budget: u32,
     ring: Ring,
     new: Vec<[u32; 4]>,
     best: Vec<(f64, u32)>,
@@ -100,7 +102,7 @@ impl Flips {
 
     /// As [`Flips::remove_edge`]; where that is refused, edges from its ends to its ring are removed first, and
     /// theirs before, `depth` deep (recursive edge removal, as in Si 2015, section 4.2; we do not undo helping
-    /// flips that were in vain).
+    /// flips that were in vain), until the budget is spent.
     pub fn remove_edge_with_help(
         &mut self,
         mesh: &mut Tetrahedra,
@@ -115,10 +117,17 @@ impl Flips {
             other => return other,
         };
         // While edges at its ring are removed its tets change, and help for these may remove the edge itself.
-        for r in self.ring.vertices.clone() {
+        for (r, beside) in std::iter::zip(self.ring.vertices.clone(), self.ring.tets.clone()) {
             for end in [a, b] {
+                if self.budget == 0 {
+                    return Err(refused);
+                }
+                self.budget -= 1;
                 let mut star = Vec::new();
-                let helped = mesh.tet_at_edge(end, r, &mut star).is_some_and(|tet| {
+                let still =
+                    mesh.is_alive(beside) && [end, r].iter().all(|v| mesh.tets[beside as usize].contains(v));
+                let at = if still { Some(beside) } else { mesh.tet_at_edge(end, r, &mut star) };
+                let helped = at.is_some_and(|tet| {
                     self.remove_edge_with_help(mesh, constraints, tet, [end, r], wanted, depth - 1).is_ok()
                 });
                 if helped {

@@ -8,6 +8,7 @@ mod crossing;
 mod delaunay;
 mod finish;
 mod flips;
+mod intersect;
 mod keep;
 mod points;
 mod polygon;
@@ -161,15 +162,19 @@ pub fn mesh(
     let mut tets = bound(surface, &points, scale, &mut report)?;
     let mut cavity = cavity::Cavity::default();
     for (index, &place) in surface.kept_points.iter().enumerate() {
-        keep::keep(&mut tets, &mut cavity, place * scale)
-            .map_err(|fault| VolumeError::KeptPoint { index, place, fault })?;
+        keep::keep(&mut tets, &mut cavity, place * scale).map_err(|fault| VolumeError::KeptPoint {
+            index,
+            place,
+            fault,
+        })?;
     }
     if settings.fill {
         let limit = settings.max_tets.min(tetrahedra::MAX_TETS);
-        report.points_inside = points::fill(&mut tets, size, scale, limit).map_err(|stopped| match stopped {
-            points::Stopped::BadSize { place, size } => VolumeError::BadSize { place, size },
-            points::Stopped::TooManyTets => VolumeError::TooManyTets { limit },
-        })?;
+        report.points_inside =
+            points::fill(&mut tets, size, scale, limit).map_err(|stopped| match stopped {
+                points::Stopped::BadSize { place, size } => VolumeError::BadSize { place, size },
+                points::Stopped::TooManyTets => VolumeError::TooManyTets { limit },
+            })?;
     }
     Ok((finish::finish(surface, &tets, scale), report))
 }
@@ -188,7 +193,17 @@ fn bound(
     let mut attempt = 0;
     loop {
         match attempt_to_bound(surface, points, scale, attempt, report) {
-            Err(VolumeError::NotRecovered { .. }) if attempt + 1 < ATTEMPTS => attempt += 1,
+            Err(VolumeError::NotRecovered { triangles: suspects, places }) => {
+                let found = intersect::intersections(&surface.points, &surface.triangles, &suspects);
+                if !found.is_empty() {
+                    let (triangles, places) = found.into_iter().unzip();
+                    return Err(VolumeError::SelfIntersection { triangles, places });
+                }
+                attempt += 1;
+                if attempt == ATTEMPTS {
+                    return Err(VolumeError::NotRecovered { triangles: suspects, places });
+                }
+            }
             result => return result,
         }
     }

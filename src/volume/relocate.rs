@@ -13,9 +13,10 @@
 //!       w                w
 //! ```
 
+use super::carve::is_even;
 use super::constraints::Constraints;
 use super::polygon::{Shadow, triangulate};
-use super::tetrahedra::{NONE, Tetrahedra};
+use super::tetrahedra::{NONE, Tetrahedra, sorted};
 use crate::kernel::predicates::{Sign, orient3d};
 use crate::kernel::quality::mean_ratio;
 use crate::{Point, Vector};
@@ -101,6 +102,24 @@ fn take_off(
         // Two sectors took in the same tet.
         return false;
     }
+    let points = mesh.points.len();
+    let mut new = Vec::new();
+    for (sector, apex) in sectors.iter().zip(apexes) {
+        let apex = match apex {
+            Apex::Own(v) => v,
+            Apex::New(point) => mesh.add_point(point),
+        };
+        let seen = sector.skin.iter().filter(|face| !face.contains(&apex));
+        new.extend(seen.map(|&[a, b, c]| ([apex, a, b, c], sector.body)));
+    }
+    let fresh: Vec<[u32; 3]> = patches.values().flatten().map(|&face| sorted(face)).collect();
+    let is_facet = |face| fresh.contains(&sorted(face)) || constraints.facet(face).is_some();
+    if !mesh.rebuild(&ball, &new, &is_facet) {
+        mesh.forget_points(points);
+        return false;
+    }
+    inside.extend(points as u32..mesh.points.len() as u32);
+    mesh.at_vertex[p as usize] = NONE;
     for f in old {
         constraints.remove(f);
     }
@@ -109,21 +128,6 @@ fn take_off(
             constraints.add(vertices, triangle);
         }
     }
-    let mut new = Vec::new();
-    for (sector, apex) in sectors.iter().zip(apexes) {
-        let apex = match apex {
-            Apex::Own(v) => v,
-            Apex::New(point) => {
-                let v = mesh.add_point(point);
-                inside.push(v);
-                v
-            }
-        };
-        let seen = sector.skin.iter().filter(|face| !face.contains(&apex));
-        new.extend(seen.map(|&[a, b, c]| ([apex, a, b, c], sector.body)));
-    }
-    mesh.rebuild(&ball, &new, &|face| constraints.facet(face).is_some());
-    mesh.at_vertex[p as usize] = NONE;
     true
 }
 
@@ -181,7 +185,7 @@ fn sectors(
                 } else if mesh.is_locked(half_face) {
                     let facet = constraints.facet(face).expect("a locked face is a facet");
                     let facet = &constraints.facets[facet as usize];
-                    sides.push((facet.triangle, super::carve::is_even(face, facet.vertices)));
+                    sides.push((facet.triangle, is_even(face, facet.vertices)));
                 } else if sector_of.insert(other >> 2, sectors.len()).is_none() {
                     sector.tets.push(other >> 2);
                 }
@@ -225,7 +229,14 @@ impl Sector {
     fn set_skin(&mut self, mesh: &Tetrahedra) {
         self.skin.clear();
         self.skin.extend(self.walls.iter().map(|&w| mesh.face(w)));
-        self.skin.extend_from_slice(&self.fresh);
+        for &facet in &self.fresh {
+            // Only rounding parted a facet from a face with its corners: nothing is between them.
+            let turned = |face: &[u32; 3]| sorted(*face) == sorted(facet) && !is_even(*face, facet);
+            match self.skin.iter().position(turned) {
+                Some(i) => drop(self.skin.swap_remove(i)),
+                None => self.skin.push(facet),
+            }
+        }
     }
 
     /// Takes in the tets behind those walls that a point does not see; false where there are none to take.
@@ -255,10 +266,10 @@ impl Sector {
 
     /// Whether every vertex of its tets but p is on its surface.
     fn keeps_vertices(&self, mesh: &Tetrahedra, p: u32) -> bool {
-        self.tets
-            .iter()
-            .flat_map(|&t| mesh.tets[t as usize])
-            .all(|v| v == p || self.skin.iter().any(|f| f.contains(&v)))
+        let on_surface = |v: u32| {
+            self.walls.iter().any(|&w| mesh.face(w).contains(&v)) || self.fresh.iter().any(|f| f.contains(&v))
+        };
+        self.tets.iter().flat_map(|&t| mesh.tets[t as usize]).all(|v| v == p || on_surface(v))
     }
 }
 
@@ -284,6 +295,9 @@ fn grow_and_find(mesh: &Tetrahedra, sector: &mut Sector, p: u32) -> Option<Apex>
 
 /// From where to fill a sector as it is.
 fn find_apex(mesh: &Tetrahedra, sector: &Sector, p: u32) -> Option<Apex> {
+    if sector.skin.is_empty() {
+        return Some(Apex::Own(p));
+    }
     let mut own: Vec<u32> = sector.skin.iter().flatten().copied().collect();
     own.sort_unstable();
     own.dedup();

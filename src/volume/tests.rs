@@ -89,6 +89,12 @@ fn spheres_and_tori_are_filled() {
         soup.sphere(Point::new(0.1, 0.2, 0.3), 0.7, levels, INSIDE);
         filled(soup, 0.25);
     }
+    let mut links = Soup::default();
+    links.torus([1.0, 0.3], [20, 8], INSIDE);
+    links.map(|p| Point::new(p.x + 1.0, p.z, p.y));
+    links.triangles.iter_mut().for_each(|t| t.swap(1, 2));
+    links.torus([1.0, 0.3], [20, 8], [B, None]);
+    filled(links, 0.25);
     for (m, n) in [(3, 3), (8, 5), (24, 12), (60, 8), (10, 40)] {
         let mut soup = Soup::default();
         soup.torus([1.0, 0.4], [m, n], INSIDE);
@@ -160,7 +166,13 @@ fn the_schoenhardt_polyhedron_gets_one_point_inside() {
 
 /// Any surface between tets of some mesh can be filled. A lattice of n³ cubes of six tets each, squeezed and sheared so
 /// that it is far from Delaunay, each tet in one of two bodies or in none: surfaces that touch themselves everywhere.
-fn lattice_skin(n: u32, squeeze: [f64; 3], shear: f64, bend: f64, mut body: impl FnMut() -> Option<BodyId>) -> Soup {
+fn lattice_skin(
+    n: u32,
+    squeeze: [f64; 3],
+    shear: f64,
+    bend: f64,
+    mut body: impl FnMut() -> Option<BodyId>,
+) -> Soup {
     let at = |c: [u32; 3]| {
         let [x, y, z] = [0, 1, 2].map(|k| f64::from(c[k]) * squeeze[k]);
         // Triangular, so every tet keeps its volume.
@@ -311,7 +323,17 @@ fn surfaces_that_intersect_are_refused_with_the_place() {
     let mut needle = Soup::default();
     needle.brick([0.; 3], [1.; 3], 2, INSIDE);
     needle.brick([0.3, 0.31, -0.5], [0.32, 0.33, 1.5], 1, INSIDE);
-    for soup in [cubes, needle] {
+    // A torus drawn through another one, and a vertex that touches a face from inside.
+    let mut rings = Soup::default();
+    rings.torus([1.0, 0.3], [16, 8], INSIDE);
+    rings.map(|p| Point::new(p.x + 0.2, p.z, p.y));
+    rings.torus([1.0, 0.3], [16, 8], INSIDE);
+    let mut touching = Soup::default();
+    touching.brick([-1.; 3], [1.; 3], 1, INSIDE);
+    touching.sphere(Point::origin(), 0.5, 1, [None, A]);
+    let top = touching.points.len() - 1;
+    touching.points[top] = Point::new(0.25, 0.5, 1.0);
+    for soup in [cubes, needle, rings, touching] {
         let surface = soup.surface().unwrap();
         match mesh(&surface, &UniformSize(1.0), &Settings::default()).unwrap_err() {
             VolumeError::SelfIntersection { triangles, places } => {
@@ -337,4 +359,108 @@ fn bodies_inside_out_are_refused() {
     let surface = soup.surface().unwrap();
     let error = mesh(&surface, &UniformSize(1.0), &Settings::default()).unwrap_err();
     assert!(matches!(error, VolumeError::Inconsistent { .. }), "{error}");
+}
+
+/// A block with n notches from below along y and n from above along x, whose edges nearly meet on the saddle z = xy
+/// (after Chazelle 1984): any tetrahedralisation needs many points inside.
+fn notched_block(n: usize, gap: f64) -> Soup {
+    let side = n as f64 + 1.0;
+    // Far enough for the sides of the notches, bent along their diagonals, to stay clear of the saddle.
+    let (low, high) = (-side, side * side + side);
+    // The profile across the notches: position and, at the tip of a notch, its number.
+    let mut profile = vec![(0.0, None)];
+    for i in 1..=n {
+        let x = i as f64;
+        profile.extend([(x - 0.25, None), (x, Some(x)), (x + 0.25, None)]);
+    }
+    profile.push((side, None));
+    let below = |(x, tip): (f64, Option<f64>), y: f64| Point::new(x, y, tip.map_or(low, |i| i * y - gap));
+    let above = |(y, tip): (f64, Option<f64>), x: f64| Point::new(x, y, tip.map_or(high, |j| x * j + gap));
+    let mut soup = Soup::default();
+    for pair in profile.windows(2) {
+        let [p, q] = [pair[0], pair[1]];
+        soup.quad([below(p, 0.0), below(p, side), below(q, side), below(q, 0.0)], INSIDE);
+        soup.quad([above(p, 0.0), above(p, side), above(q, side), above(q, 0.0)], INSIDE);
+    }
+    let mut wall = |mut outline: Vec<Point>, outward: crate::Vector| {
+        let corners: Vec<u32> = (0..outline.len() as u32).collect();
+        let area: crate::Vector = (1..outline.len() - 1)
+            .map(|i| crate::kernel::simplex::area_vector(&outline[0], &outline[i], &outline[i + 1]))
+            .sum();
+        if area.dot(&outward) < 0.0 {
+            outline.reverse();
+        }
+        let first = Point::origin();
+        let (u, v) = if outward.x != 0.0 {
+            (crate::Vector::y(), crate::Vector::z())
+        } else {
+            (crate::Vector::z(), crate::Vector::x())
+        };
+        let (u, v) = if outward.sum() > 0.0 { (u, v) } else { (v, u) };
+        let shadow = polygon::Shadow::of([&first, &(first + u), &(first + v)]);
+        for t in polygon::triangulate(&outline, shadow, &corners).unwrap() {
+            soup.add(t.map(|i| outline[i as usize]), INSIDE);
+        }
+    };
+    for end in [0.0, side] {
+        let mut outline: Vec<Point> = profile.iter().map(|&p| below(p, end)).collect();
+        outline.extend([Point::new(side, end, high), Point::new(0.0, end, high)]);
+        wall(outline, crate::Vector::new(0.0, if end > 0.0 { 1.0 } else { -1.0 }, 0.0));
+        let mut outline: Vec<Point> = profile.iter().map(|&p| above(p, end)).collect();
+        outline.extend([Point::new(end, side, low), Point::new(end, 0.0, low)]);
+        wall(outline, crate::Vector::new(if end > 0.0 { 1.0 } else { -1.0 }, 0.0, 0.0));
+    }
+    soup
+}
+
+#[test]
+fn blocks_with_crossing_notches_are_filled() {
+    for n in [1, 2, 3, 5] {
+        for gap in [0.2, 0.01] {
+            filled(notched_block(n, gap), 1.0);
+        }
+    }
+}
+
+#[test]
+fn flat_ellipsoids_and_thin_shells_are_filled() {
+    for (levels, flat) in [(2, 0.1), (3, 0.01), (3, 1e-4), (2, 30.0)] {
+        let mut soup = Soup::default();
+        soup.sphere(Point::origin(), 1.0, levels, INSIDE);
+        soup.map(|p| Point::new(p.x + 0.3 * p.z, p.y, p.z * flat));
+        filled(soup, 0.2);
+    }
+    for thickness in [0.1, 0.01, 1e-5] {
+        let mut soup = Soup::default();
+        soup.sphere(Point::origin(), 1.0, 3, INSIDE);
+        soup.sphere(Point::origin(), 1.0 - thickness, 3, [None, A]);
+        filled(soup, 0.2);
+    }
+}
+
+/// The triangles of an ASCII STL file, equal points made one.
+fn read_stl(text: &str) -> Soup {
+    let numbers: Vec<f64> = text
+        .lines()
+        .filter_map(|line| line.trim().strip_prefix("vertex "))
+        .flat_map(|line| line.split_whitespace().map(|x| x.parse::<f64>().unwrap()))
+        .collect();
+    let mut soup = Soup::default();
+    for t in numbers.chunks_exact(9) {
+        soup.add([0, 3, 6].map(|i| Point::new(t[i], t[i + 1], t[i + 2])), INSIDE);
+    }
+    soup
+}
+
+#[test]
+fn machine_parts_of_needle_triangles_are_filled() {
+    let shared = std::env::var("TETMILL_SHARED")
+        .unwrap_or_else(|_| concat!(env!("CARGO_MANIFEST_DIR"), "/../shared").to_owned());
+    for part in ["hinge", "part1"] {
+        let path = format!("{shared}/netgen-tutorials/{part}.stl");
+        match std::fs::read_to_string(&path) {
+            Ok(text) => drop(filled(read_stl(&text), 5.0)),
+            Err(error) => eprintln!("SKIPPED, set TETMILL_SHARED: {path}: {error}"),
+        }
+    }
 }

@@ -89,6 +89,12 @@ impl Tetrahedra {
         (self.points.len() - 1) as u32
     }
 
+    /// Takes the last points away again, down to `count` of them; none may have tets.
+    pub fn forget_points(&mut self, count: usize) {
+        self.points.truncate(count);
+        self.at_vertex.truncate(count);
+    }
+
     /// The corners of a tet.
     #[inline]
     pub fn corners(&self, tet: u32) -> [&Point; 4] {
@@ -312,8 +318,9 @@ impl Tetrahedra {
         // An outer face may be `NONE` and then cannot tell by itself that it is new: sort positions.
         let mut order: Vec<u32> = (0..faces.len() as u32).collect();
         order.sort_unstable_by_key(|&i| (faces[i as usize].0, i));
-        assert!(order.len() % 2 == 0, "the surface of a cavity changed");
-        for pair in order.chunks_exact(2) {
+        let pairs = order.chunks_exact(2);
+        assert!(pairs.remainder().is_empty(), "the surface of a cavity changed");
+        for pair in pairs {
             let (one, other) = (faces[pair[0] as usize], faces[pair[1] as usize]);
             assert!(one.0 == other.0 && pair[1] as usize >= outer, "face {:?} left alone", one.0);
             self.link(other.1, one.1);
@@ -325,11 +332,14 @@ impl Tetrahedra {
 
     /// Replaces tets by others, each with its body, where the outside and the facets among them change too.
     ///
-    /// Faces of facets are locked; a new face that is alone must be one, and borders the outside then.
-    ///
-    /// # Panics
-    /// Where the new tets leave a face alone that is no facet.
-    pub fn rebuild(&mut self, old: &[u32], new: &[([u32; 4], u32)], is_facet: &dyn Fn([u32; 3]) -> bool) {
+    /// Faces of facets are locked; a new face that is alone must be one, and borders the outside then. Where the
+    /// new tets do not fit so, nothing is changed and the answer is false.
+    pub fn rebuild(
+        &mut self,
+        old: &[u32],
+        new: &[([u32; 4], u32)],
+        is_facet: &dyn Fn([u32; 3]) -> bool,
+    ) -> bool {
         let mut faces = Vec::new();
         self.clear_marks();
         for &t in old {
@@ -338,31 +348,41 @@ impl Tetrahedra {
         for half_face in old.iter().flat_map(|&t| 4 * t..4 * t + 4) {
             let other = self.across(half_face);
             if other != NONE && !self.is_marked(other >> 2) {
-                faces.push((sorted(self.face(half_face)), other));
+                faces.push((sorted(self.face(half_face)), Some(other)));
             }
+        }
+        let outer = faces.len();
+        for (tet, _) in new {
+            faces.extend(TET_FACES.map(|face| (sorted(face.map(|i| tet[i])), None)));
+        }
+        let mut keys: Vec<[u32; 3]> = faces.iter().map(|f| f.0).collect();
+        keys.sort_unstable();
+        let fits = |same: &[[u32; 3]]| same.len() == 2 || (same.len() == 1 && is_facet(same[0]));
+        if !keys.chunk_by(|a, b| a == b).all(fits) {
+            return false;
         }
         for &t in old {
             self.remove_tet(t);
         }
-        for &(tet, body) in new {
+        for (i, &(tet, body)) in new.iter().enumerate() {
             let t = self.add_tet(tet, body);
-            faces.extend((4 * t..4 * t + 4).map(|h| (sorted(self.face(h)), h)));
+            for k in 0..4 {
+                faces[outer + 4 * i + k].1 = Some(4 * t + k as u32);
+            }
         }
         faces.sort_unstable();
         for same in faces.chunk_by(|a, b| a.0 == b.0) {
-            let facet = is_facet(same[0].0);
-            match *same {
-                [(_, one), (_, other)] => self.link(one, other),
-                [_] if facet => {}
-                _ => panic!("face {:?} left alone", same[0].0),
-            }
-            if facet {
-                self.lock(same[0].1);
+            let one = same[0].1.expect("new tets have slots");
+            self.link(one, same.get(1).and_then(|f| f.1).unwrap_or(NONE));
+            if is_facet(same[0].0) {
+                self.lock(one);
             }
         }
+        true
     }
 
     /// Every broken promise of the structure, as sentences; empty when all is well.
+    #[cfg(test)]
     pub fn check(&self) -> Vec<String> {
         let mut faults = Vec::new();
         for t in self.alive() {
