@@ -68,7 +68,7 @@ impl Collapser {
                 continue;
             }
             tet[place(tet, vertex)] = into;
-            let score = objective.score(&complex.points, tet);
+            let score = objective.score_above(&complex.points, tet, least);
             if score <= least {
                 return None;
             }

@@ -83,10 +83,14 @@ impl Inserter {
         self.worst
     }
 
-    /// The distance from the new vertex to the nearest of its neighbours.
-    pub fn shortest_edge(&self, complex: &Complex) -> f64 {
-        let distance = |v: &u32| (complex.points[*v as usize] - self.point).norm();
-        self.faces.iter().flat_map(|f| &f.vertices).map(distance).fold(f64::INFINITY, f64::min)
+    /// The distance from the new vertex to the nearest of its neighbours, and the mean length of the hole's edges.
+    pub fn shortest_and_usual_edge(&self, complex: &Complex) -> (f64, f64) {
+        let at = |v: u32| complex.points[v as usize];
+        let distances = self.faces.iter().flat_map(|f| f.vertices).map(|v| (at(v) - self.point).norm());
+        let edges =
+            self.faces.iter().flat_map(|f| [0, 1, 2].map(|k| (f.vertices[k], f.vertices[(k + 1) % 3])));
+        let sum: f64 = edges.map(|(a, b)| (at(a) - at(b)).norm()).sum();
+        (distances.fold(f64::INFINITY, f64::min), sum / (3 * self.faces.len()) as f64)
     }
 
     /// The place of the new vertex.

@@ -14,15 +14,16 @@
 //! lie on one patch is legal as long as enough of its edges run inside.
 //!
 //! Where fewer edges lie on the boundary a corner of a tet may still turn over, for instance over a hollow surface
-//! that is steeper than the tet's edge inside. [`TetLimits`] holds the directions that all edges tend to,
-//! and measures what is left of each corner.
+//! that is steeper than the tet's edge inside: the module `limits` measures what is left of each corner.
 //!
 //! Compare NETGEN's illegal tets and Zienkiewicz's rule for curved quadratic elements, which
 //! forbid the same for the same reason.
 
-use crate::mesh::{Mesh, TET_FACES, VertexId};
+use crate::improve::limits::TetLimits;
+use crate::mesh::{Mesh, TET_EDGES, VertexId};
 use crate::{Point, Vector};
 use csg::{CurveId, Features, Geometry, PatchId, Surface};
+use std::ops::Range;
 
 /// Tells where patches and curves are smooth, and how they run.
 pub trait Smoothness: Sync {
@@ -95,112 +96,114 @@ impl GeometrySmoothness<'_> {
 
 /// A boundary edge, seen from one of its ends.
 struct Spoke {
-    to: u32,
     /// The tangent planes at the vertex that the edge lies in, as bits.
     planes: u64,
     /// The tangent lines likewise.
     lines: u64,
-    /// The direction in which the refined edge will leave the vertex, if not as it does now.
+    /// The direction in which the refined edge will leave the vertex, as long as the edge; `None` if as it does now.
     limit: Option<Vector>,
 }
 
 /// The boundary edges of a mesh and what they are tangent to at their ends. Improvement keeps the boundary, so it stays true.
 pub(super) struct Legality {
-    /// The spokes of vertex v are `spokes[starts[v]..starts[v + 1]]`.
+    /// The spokes of vertex v are those from `starts[v]` to `starts[v + 1]`.
     starts: Vec<u32>,
+    /// The other end of each spoke: apart from the rest, as most searches end here.
+    ends: Vec<u32>,
     spokes: Vec<Spoke>,
     /// The boundary triangles with two edges on one curve, sorted.
     hopeless: Vec<[u32; 3]>,
 }
 
+/// A boundary edge from the first vertex to the second, and one entity that it lies on.
+type Incidence = (VertexId, VertexId, Option<PatchId>, Option<CurveId>);
+
+fn incidences(mesh: &Mesh) -> Vec<Incidence> {
+    let mut incidences = Vec::with_capacity(6 * mesh.triangles.len() + 2 * mesh.segments.len());
+    for triangle in &mesh.triangles {
+        let v = triangle.vertices;
+        for [i, j] in [[0, 1], [1, 0], [1, 2], [2, 1], [2, 0], [0, 2]] {
+            incidences.push((v[i], v[j], Some(triangle.patch), None));
+        }
+    }
+    for segment in &mesh.segments {
+        let [a, b] = segment.vertices;
+        incidences.push((a, b, None, Some(segment.curve)));
+        incidences.push((b, a, None, Some(segment.curve)));
+    }
+    incidences.sort_unstable();
+    incidences.dedup();
+    incidences
+}
+
 impl Legality {
     /// Collects the boundary edges.
     pub fn new(mesh: &Mesh, smoothness: &dyn Smoothness) -> Self {
-        // (vertex, other end, patch or none, curve or none)
-        let mut incidences: Vec<(VertexId, VertexId, Option<PatchId>, Option<CurveId>)> = Vec::new();
-        for triangle in &mesh.triangles {
-            let v = triangle.vertices;
-            for [i, j] in [[0, 1], [1, 0], [1, 2], [2, 1], [2, 0], [0, 2]] {
-                incidences.push((v[i], v[j], Some(triangle.patch), None));
-            }
-        }
-        for segment in &mesh.segments {
-            let [a, b] = segment.vertices;
-            incidences.push((a, b, None, Some(segment.curve)));
-            incidences.push((b, a, None, Some(segment.curve)));
-        }
-        incidences.sort_unstable();
-        incidences.dedup();
-        let mut legality =
-            Self { starts: vec![0; mesh.points.len() + 1], spokes: Vec::new(), hopeless: Vec::new() };
-        for at_vertex in incidences.chunk_by(|a, b| a.0 == b.0) {
-            let vertex = at_vertex[0].0.index();
-            let at = &mesh.points[vertex];
-            let mut planes = Directions::default();
-            let mut lines = Directions::default();
-            for (_, _, patch, curve) in at_vertex {
-                planes.add(patch.and_then(|p| smoothness.normal(p, at)));
-                lines.add(curve.and_then(|c| smoothness.tangent(c, at)));
-            }
-            for edge in at_vertex.chunk_by(|a, b| a.1 == b.1) {
-                let along = mesh.points[edge[0].1.index()] - at;
-                let mut spoke = Spoke { to: edge[0].1.0, planes: 0, lines: 0, limit: None };
-                for (_, _, patch, curve) in edge {
-                    let normal = patch.and_then(|p| smoothness.normal(p, at));
-                    spoke.planes |= planes.bits(normal);
-                    let tangent = curve.and_then(|c| smoothness.tangent(c, at));
-                    spoke.lines |= lines.bits(tangent);
-                    spoke.planes |= planes.bits_orthogonal(tangent);
-                    // A curve comes after the patches (`None` is less), and knows better.
-                    let in_plane = normal.map(|n| along - n * n.dot(&along));
-                    let limit = tangent.map(|t| t * t.dot(&along)).or(in_plane);
-                    spoke.limit = limit.and_then(|l| l.try_normalize(0.0)).or(spoke.limit);
-                }
-                spoke.limit = spoke.limit.filter(|l| l.cross(&along).norm() > STRAIGHT_SINE * along.norm());
-                legality.spokes.push(spoke);
-            }
-            legality.starts[vertex + 1] = legality.spokes.len() as u32;
+        let mut legality = Self {
+            starts: vec![0; mesh.points.len() + 1],
+            ends: Vec::new(),
+            spokes: Vec::new(),
+            hopeless: Vec::new(),
+        };
+        for at_vertex in incidences(mesh).chunk_by(|a, b| a.0 == b.0) {
+            legality.add_vertex(mesh, smoothness, at_vertex);
         }
         for v in 0..mesh.points.len() {
             legality.starts[v + 1] = legality.starts[v + 1].max(legality.starts[v]);
         }
         let triangles = mesh.triangles.iter().map(|t| sorted(t.vertices.map(|v| v.0)));
-        let mut hopeless: Vec<[u32; 3]> = triangles.filter(|&t| legality.is_illegal_triangle(t)).collect();
+        let mut hopeless: Vec<[u32; 3]> = triangles.filter(|&t| legality.flattens(t)).collect();
         hopeless.sort_unstable();
         hopeless.dedup();
         legality.hopeless = hopeless;
         legality
     }
 
-    fn spokes(&self, vertex: u32) -> &[Spoke] {
-        // A vertex beyond the table was added inside a body.
+    /// Adds the spokes of one vertex; vertices come in ascending order.
+    fn add_vertex(&mut self, mesh: &Mesh, smoothness: &dyn Smoothness, at_vertex: &[Incidence]) {
+        let vertex = at_vertex[0].0.index();
+        let at = &mesh.points[vertex];
+        let mut planes = Directions::default();
+        let mut lines = Directions::default();
+        for (_, _, patch, curve) in at_vertex {
+            planes.add(patch.and_then(|p| smoothness.normal(p, at)));
+            lines.add(curve.and_then(|c| smoothness.tangent(c, at)));
+        }
+        for edge in at_vertex.chunk_by(|a, b| a.1 == b.1) {
+            let along = mesh.points[edge[0].1.index()] - at;
+            let mut spoke = Spoke { planes: 0, lines: 0, limit: None };
+            for (_, _, patch, curve) in edge {
+                let normal = patch.and_then(|p| smoothness.normal(p, at));
+                spoke.planes |= planes.bits(normal);
+                let tangent = curve.and_then(|c| smoothness.tangent(c, at));
+                spoke.lines |= lines.bits(tangent);
+                spoke.planes |= planes.bits_orthogonal(tangent);
+                // The curve's entry comes first (`None` is less than a patch), and knows better.
+                let in_plane = normal.map(|n| along - n * n.dot(&along));
+                let limit = tangent.map(|t| t * t.dot(&along)).or(in_plane);
+                spoke.limit = spoke.limit.or(limit.and_then(|l| l.try_normalize(0.0)));
+            }
+            let length = along.norm();
+            let bends = |limit: &Vector| limit.cross(&along).norm() > STRAIGHT_SINE * length;
+            spoke.limit = spoke.limit.filter(bends).map(|limit| limit * length);
+            self.spokes.push(spoke);
+            self.ends.push(edge[0].1.0);
+        }
+        self.starts[vertex + 1] = self.spokes.len() as u32;
+    }
+
+    /// Where the spokes of a vertex are; nowhere for one inside, or added since.
+    fn spokes(&self, vertex: u32) -> Range<usize> {
         match self.starts.get(vertex as usize + 1) {
-            Some(&end) => &self.spokes[self.starts[vertex as usize] as usize..end as usize],
-            None => &[],
+            Some(&end) => self.starts[vertex as usize] as usize..end as usize,
+            None => 0..0,
         }
     }
 
     fn spoke(&self, from: u32, to: u32) -> Option<&Spoke> {
-        self.spokes(from).iter().find(|s| s.to == to)
-    }
-
-    fn tangents(&self, from: u32, to: u32) -> (u64, u64) {
-        self.spoke(from, to).map_or((0, 0), |s| (s.planes, s.lines))
-    }
-
-    /// Where the edges of a tet tend to; `None` if all of them stay straight. A vertex that is not in
-    /// the mesh yet counts as one inside.
-    pub fn limits(&self, tet: [u32; 4]) -> Option<TetLimits> {
-        if tet.iter().filter(|&&v| self.spokes(v).is_empty()).count() > 2 {
-            return None;
-        }
-        let mut limits = TetLimits([[None; 3]; 4]);
-        for (k, corner) in limits.0.iter_mut().enumerate() {
-            for (m, limit) in corner.iter_mut().enumerate() {
-                *limit = self.spoke(tet[k], tet[(k + 1 + m) % 4]).and_then(|s| s.limit);
-            }
-        }
-        limits.0.iter().flatten().any(Option::is_some).then_some(limits)
+        let range = self.spokes(from);
+        let k = self.ends[range.clone()].iter().position(|&end| end == to)?;
+        Some(&self.spokes[range.start + k])
     }
 
     /// The boundary triangles that flatten at a vertex when refined: no change inside can mend them or the tets behind them.
@@ -208,67 +211,54 @@ impl Legality {
         self.hopeless.len()
     }
 
-    /// Whether the tet flattens when refined, and not by an illegal boundary triangle alone.
-    pub fn is_illegal(&self, tet: [u32; 4]) -> bool {
-        // Three vertices on the boundary are the least that either rule needs.
-        if tet.iter().filter(|&&v| self.spokes(v).is_empty()).count() > 1 {
-            return false;
+    /// Whether the tet flattens when refined, and not by an illegal boundary triangle alone; and where its
+    /// edges tend to, `None` if all of them stay straight. A vertex that is not in the mesh counts as one inside.
+    pub fn judge(&self, tet: [u32; 4]) -> (bool, Option<TetLimits>) {
+        // Most tets have no boundary edge: one needs two vertices on the boundary.
+        if tet.iter().filter(|&&v| self.spokes(v).is_empty()).count() > 2 {
+            return (false, None);
         }
-        (0..4).any(|k| {
-            let others = [tet[(k + 1) % 4], tet[(k + 2) % 4], tet[(k + 3) % 4]];
-            let [a, b, c] = others.map(|to| self.tangents(tet[k], to).0);
-            a & b & c != 0
-        }) || TET_FACES.iter().any(|face| self.is_illegal_triangle(face.map(|k| tet[k])))
+        let mut spokes = [[None; 3]; 4];
+        for [i, j] in TET_EDGES {
+            // From corner i, the vertex j = i + 1 + m (mod 4) has the place m.
+            spokes[i][j - i - 1] = self.spoke(tet[i], tet[j]);
+            if spokes[i][j - i - 1].is_some() {
+                spokes[j][3 + i - j] = self.spoke(tet[j], tet[i]);
+            }
+        }
+        let illegal = (0..4).any(|k| {
+            let planes = spokes[k].map(|s| s.map_or(0, |s| s.planes));
+            let lines = spokes[k].map(|s| s.map_or(0, |s| s.lines));
+            let vertex = |m: usize| tet[(k + 1 + m) % 4];
+            let collinear = |m: usize, n: usize| {
+                lines[m] & lines[n] != 0 && !self.is_hopeless([tet[k], vertex(m), vertex(n)])
+            };
+            planes[0] & planes[1] & planes[2] != 0 || collinear(0, 1) || collinear(1, 2) || collinear(0, 2)
+        });
+        (illegal, TetLimits::new(spokes.map(|corner| corner.map(|s| s.and_then(|s| s.limit)))))
     }
 
     /// Whether two of the triangle's edges lie on curves tangent at their common vertex, so that all tets with it
     /// are illegal; not for a boundary triangle, which is no fault of a tet.
     pub fn is_illegal_triangle(&self, triangle: [u32; 3]) -> bool {
-        let flattens = (0..3).any(|k| {
-            let [a, b] = [1, 2].map(|m| self.tangents(triangle[k], triangle[(k + m) % 3]).1);
-            a & b != 0
-        });
-        flattens && self.hopeless.binary_search(&sorted(triangle)).is_err()
+        self.flattens(triangle) && !self.is_hopeless(triangle)
+    }
+
+    fn flattens(&self, triangle: [u32; 3]) -> bool {
+        (0..3).any(|k| {
+            let lines = |m: usize| self.spoke(triangle[k], triangle[(k + m) % 3]).map_or(0, |s| s.lines);
+            lines(1) & lines(2) != 0
+        })
+    }
+
+    fn is_hopeless(&self, triangle: [u32; 3]) -> bool {
+        self.hopeless.binary_search(&sorted(triangle)).is_ok()
     }
 }
 
 fn sorted(mut key: [u32; 3]) -> [u32; 3] {
     key.sort_unstable();
     key
-}
-
-/// The directions in which the edges of a tet leave its corner k, to the vertices k+1, k+2, k+3 (mod 4), when it has
-/// been refined and snapped for ever; `None` for as they do now.
-#[derive(Clone, Debug)]
-pub(super) struct TetLimits([[Option<Vector>; 3]; 4]);
-
-/// What must be left of a corner for it to count as unharmed.
-const UNHARMED: f64 = 0.5;
-
-/// How much less a tet is worth as its worst corner shrinks below [`UNHARMED`]: at zero a fifth.
-const HARM: f64 = 8.0;
-
-impl TetLimits {
-    /// The least part of a corner that is left in the limit, where a corner is measured by the volume that
-    /// its three unit vectors span: 1 if nothing bends, 0 or less if a corner flattens or turns over.
-    pub fn least_corner(&self, p: &[Point; 4]) -> f64 {
-        let mut least = 1.0_f64;
-        for (k, corner) in self.0.iter().enumerate() {
-            if corner.iter().all(Option::is_none) {
-                continue;
-            }
-            let now = [1, 2, 3].map(|m| (p[(k + m) % 4] - p[k]).normalize());
-            let then = [0, 1, 2].map(|m| corner[m].unwrap_or(now[m]));
-            let span = |d: &[Vector; 3]| d[0].cross(&d[1]).dot(&d[2]);
-            least = least.min(span(&then) / span(&now));
-        }
-        least
-    }
-
-    /// What the shape of the tet is to be multiplied with: 1 if no corner suffers much, never 0.
-    pub fn factor(&self, p: &[Point; 4]) -> f64 {
-        1.0 / (1.0 + HARM * (UNHARMED - self.least_corner(p)).max(0.0))
-    }
 }
 
 /// The different directions at one vertex, up to sign; parallel ones are one. At most 64: more tangent planes
@@ -304,7 +294,7 @@ impl Directions {
 mod tests {
     use super::*;
     use crate::improve::samples::{UnitSphere, ball, half_ball};
-    use crate::mesh::Mesh;
+    use crate::mesh::{Mesh, TET_FACES};
 
     /// Corners of three orthogonal edges on a patch each, or on curves: patch k has the normal k says.
     struct Planes([Vector; 4]);
@@ -338,11 +328,11 @@ mod tests {
         let tet = mesh.tets[0].map(|v| v.0);
         let (x, y, z) = (Vector::x(), Vector::y(), Vector::z());
         let other = Vector::new(0.6, 0.0, 0.8);
-        assert!(!Legality::new(&mesh, &Planes([x, y, z, other])).is_illegal(tet));
-        assert!(Legality::new(&mesh, &Planes([x, y, z, z])).is_illegal(tet), "tangent");
-        assert!(Legality::new(&mesh, &Planes([x, y, z, -z])).is_illegal(tet), "of either sign");
+        assert!(!Legality::new(&mesh, &Planes([x, y, z, other])).judge(tet).0);
+        assert!(Legality::new(&mesh, &Planes([x, y, z, z])).judge(tet).0, "tangent");
+        assert!(Legality::new(&mesh, &Planes([x, y, z, -z])).judge(tet).0, "of either sign");
         let nearly = Vector::new(0.02, 0.0, 1.0).normalize();
-        assert!(Legality::new(&mesh, &Planes([x, y, z, nearly])).is_illegal(tet), "nearly tangent");
+        assert!(Legality::new(&mesh, &Planes([x, y, z, nearly])).judge(tet).0, "nearly tangent");
     }
 
     #[test]
@@ -367,7 +357,7 @@ mod tests {
         };
         let mut illegal = 0;
         for tet in &mesh.tets {
-            let verdict = legality.is_illegal(tet.map(|v| v.0));
+            let verdict = legality.judge(tet.map(|v| v.0)).0;
             illegal += usize::from(verdict);
             assert!(verdict || on_sphere(tet) < 2, "{tet:?} has two faces on the sphere");
         }

@@ -4,6 +4,7 @@ mod collapse;
 mod complex;
 mod insert;
 mod legality;
+mod limits;
 mod objective;
 mod repair;
 mod schedule;

@@ -2,7 +2,8 @@
 
 use crate::Point;
 use crate::improve::complex::NONE;
-use crate::improve::legality::{Legality, TetLimits};
+use crate::improve::legality::Legality;
+use crate::improve::limits::TetLimits;
 use crate::kernel::quality::{Diagonal, squared_lengths, worst_child_squares};
 use crate::kernel::simplex::{area_vector, volume6};
 use crate::{Vector, mesh::TET_FACES};
@@ -45,23 +46,39 @@ pub(super) struct Objective<'a> {
 impl Objective<'_> {
     /// The score of a tet.
     pub fn score(&self, points: &[Point], tet: [u32; 4]) -> f64 {
-        let shape = self.shape_with_limits(&tet.map(|v| points[v as usize]), self.limits(tet).as_ref());
-        if shape > 0.0 { shape - self.penalty(tet) } else { INVERTED }
+        self.score_above(points, tet, INVERTED)
+    }
+
+    /// The score of a tet if it is above `least`, else something that is not.
+    pub fn score_above(&self, points: &[Point], tet: [u32; 4], least: f64) -> f64 {
+        let p = tet.map(|v| points[v as usize]);
+        let shape = self.shape(&p);
+        if shape <= least || shape <= 0.0 {
+            // Legality and limits only ever lower it.
+            return if shape > 0.0 { shape } else { INVERTED };
+        }
+        let Some(legality) = self.legality else { return shape };
+        let (illegal, limits) = legality.judge(tet);
+        shape * limits.map_or(1.0, |l| l.factor(&p)) - if illegal { ILLEGAL } else { 0.0 }
     }
 
     /// Where the edges of a tet tend to, if any bends and legality matters.
     pub fn limits(&self, tet: [u32; 4]) -> Option<TetLimits> {
-        self.legality.and_then(|l| l.limits(tet))
+        self.legality.and_then(|l| l.judge(tet).1)
     }
 
     /// The score of the tet of a point inside a body and then a face, outward.
     pub fn score_with_point(&self, points: &[Point], point: &Point, face: [u32; 3]) -> f64 {
         let [a, b, c] = face.map(|v| points[v as usize]);
-        let limits = self.limits([NONE, face[0], face[1], face[2]]);
-        let shape = self.shape_with_limits(&[*point, a, b, c], limits.as_ref());
+        let p = [*point, a, b, c];
+        let shape = self.shape(&p);
+        if shape <= 0.0 {
+            return INVERTED;
+        }
+        let Some(legality) = self.legality else { return shape };
         // No edge at the point lies on the boundary, so that only the face can make the tet illegal.
-        let illegal = self.legality.is_some_and(|l| l.is_illegal_triangle(face));
-        if shape > 0.0 { shape - if illegal { ILLEGAL } else { 0.0 } } else { INVERTED }
+        let (illegal, limits) = legality.judge([NONE, face[0], face[1], face[2]]);
+        shape * limits.map_or(1.0, |l| l.factor(&p)) - if illegal { ILLEGAL } else { 0.0 }
     }
 
     /// The shape that a score stands for, whether the tet is legal or not.
@@ -69,25 +86,15 @@ impl Objective<'_> {
         if score > 0.0 { score } else { score + ILLEGAL }
     }
 
-    /// What legality takes off a tet's score.
-    fn penalty(&self, tet: [u32; 4]) -> f64 {
-        if self.legality.is_some_and(|l| l.is_illegal(tet)) { ILLEGAL } else { 0.0 }
-    }
-
-    /// The shape of a tet, less what its corners lose in the limit of refinement.
-    pub fn shape_with_limits(&self, p: &[Point; 4], limits: Option<&TetLimits>) -> f64 {
-        let shape = self.shape(p);
-        match limits {
-            Some(limits) if shape > 0.0 => shape * limits.factor(p),
-            _ => shape,
-        }
-    }
-
-    /// The same, and how it changes as the first vertex moves.
-    pub fn gradient_with_limits(&self, p: &[Point; 4], limits: Option<&TetLimits>) -> (f64, Vector) {
+    /// The shape of a tet and how it changes as the first vertex moves, both less what its corners lose in
+    /// the limit of refinement. Of a tet better than `enough` only the straight shape's change is taken.
+    pub fn gradient(&self, p: &[Point; 4], limits: Option<&TetLimits>, enough: f64) -> (f64, Vector) {
         let (shape, gradient) = self.shape_and_gradient(p);
         let Some(limits) = limits.filter(|_| shape > 0.0) else { return (shape, gradient) };
         let factor = limits.factor(p);
+        if shape * factor > enough {
+            return (shape * factor, gradient * factor);
+        }
         let step = DIFFERENCE * (p[1] - p[0]).norm();
         let ahead = Vector::from_fn(|axis, _| {
             let mut q = *p;
@@ -97,15 +104,19 @@ impl Objective<'_> {
         (shape * factor, gradient * factor + ahead.add_scalar(-factor) * (shape / step))
     }
 
-    /// The cube of [`shape_with_limits`](Self::shape_with_limits), which saves a root where shapes are only compared.
-    pub fn cubed_shape_with_limits(&self, p: &[Point; 4], limits: Option<&TetLimits>) -> f64 {
+    /// The cube of what [`gradient`](Self::gradient) calls shape, if above `least`, else something that is
+    /// not: it saves a root where shapes are only compared.
+    pub fn cubed_shape_above(&self, p: &[Point; 4], limits: Option<&TetLimits>, least: f64) -> f64 {
         let v6 = volume6(&p[0], &p[1], &p[2], &p[3]);
         if v6.is_nan() || v6 <= 0.0 {
             return 0.0;
         }
         let (sum, scale, _) = self.denominator(&squared_lengths(p));
-        let factor = limits.map_or(scale, |l| scale * l.factor(p));
-        (factor / sum).powi(3) * (0.25 * v6 * v6)
+        let cubed = (scale / sum).powi(3) * (0.25 * v6 * v6);
+        match limits {
+            Some(limits) if cubed > least => cubed * limits.factor(p).powi(3),
+            _ => cubed,
+        }
     }
 
     /// The shape of a tet, not positive if it does not stand positively.
@@ -188,7 +199,7 @@ mod tests {
             let quality = refined_quality(&p).0;
             prop_assume!(quality > 0.0);
             prop_assert!((objective.shape(&p) - quality * 7.0 / 6.0).abs() < 1e-12);
-            prop_assert!((objective.cubed_shape_with_limits(&p, None).cbrt() - objective.shape(&p)).abs() < 1e-12);
+            prop_assert!((objective.cubed_shape_above(&p, None, 0.0).cbrt() - objective.shape(&p)).abs() < 1e-12);
         }
     }
 }

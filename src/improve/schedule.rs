@@ -24,7 +24,7 @@ pub struct Settings {
     pub target: f64,
     /// Tets that stay below this are also tried to be removed by collapses and insertions.
     pub change_below: f64,
-    /// An insertion makes no edge shorter than this, in units of the wanted size there.
+    /// An insertion makes no edge shorter than this, in units of the wanted size or the usual edge there.
     pub shortest_edge: f64,
 }
 
@@ -145,7 +145,7 @@ fn illegal(complex: &Complex) -> impl Iterator<Item = u32> + '_ {
 fn folding(complex: &Complex, legality: &Legality) -> usize {
     let turns = |t: u32| {
         let tet = complex.tets[t as usize];
-        legality.limits(tet).is_some_and(|l| l.least_corner(&complex.corners(tet)) <= 0.0)
+        legality.judge(tet).1.is_some_and(|l| l.least_corner(&complex.corners(tet)) <= 0.0)
     };
     complex.living().filter(|&t| complex.scores[t as usize] > 0.0 && turns(t)).count()
 }
@@ -235,9 +235,12 @@ impl Tools {
     ) -> bool {
         let p = complex.corners(complex.tets[tet as usize]);
         let middle = crate::Point::from((p[0].coords + p[1].coords + p[2].coords + p[3].coords) * 0.25);
-        self.inserter.find(complex, objective, &mut self.smoother, &[tet], middle)
-            && self.inserter.shortest_edge(complex)
-                >= settings.shortest_edge * size.size_at(self.inserter.point())
-            && self.inserter.commit(complex)
+        if !self.inserter.find(complex, objective, &mut self.smoother, &[tet], middle) {
+            return false;
+        }
+        // The boundary may be finer than the size field, and what lies along it must be so too.
+        let (shortest, usual) = self.inserter.shortest_and_usual_edge(complex);
+        let wanted = size.size_at(self.inserter.point()).min(usual);
+        shortest >= settings.shortest_edge * wanted && self.inserter.commit(complex)
     }
 }

@@ -6,7 +6,7 @@
 //! hull of the worst ones' gradients; the step goes to where, by the gradients, another tet becomes the worst.
 
 use crate::improve::complex::{Complex, NONE, place};
-use crate::improve::legality::TetLimits;
+use crate::improve::limits::TetLimits;
 use crate::improve::objective::Objective;
 use crate::improve::swap::LEAST_GAIN;
 use crate::{Point, Vector};
@@ -134,7 +134,7 @@ impl Smoother {
     fn worst_above(&self, objective: &Objective, at: &Point, least: f64) -> Option<f64> {
         let (least, mut worst) = (least.powi(3), f64::INFINITY);
         for (p, limits) in self.tets(*at) {
-            worst = worst.min(objective.cubed_shape_with_limits(&p, limits));
+            worst = worst.min(objective.cubed_shape_above(&p, limits, least));
             if worst <= least {
                 return None;
             }
@@ -151,7 +151,7 @@ impl Smoother {
             values.clear();
             gradients.clear();
             for (p, limits) in self.tets(at) {
-                let (value, gradient) = objective.gradient_with_limits(&p, limits);
+                let (value, gradient) = objective.gradient(&p, limits, worst + 2.0 * ACTIVE_BAND);
                 values.push(value);
                 gradients.push(gradient);
             }

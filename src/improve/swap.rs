@@ -97,8 +97,9 @@ impl Swapper {
         let ring = &self.ring.vertices;
         let worst = self.table.fill(ring.len(), before, |a, b, c, least| {
             let [a, b, c] = [ring[a], ring[b], ring[c]];
-            let upper = objective.score(&complex.points, [a, b, c, high]);
-            if upper <= least { upper } else { upper.min(objective.score(&complex.points, [a, c, b, low])) }
+            let score = |tet| objective.score_above(&complex.points, tet, least);
+            let upper = score([a, b, c, high]);
+            if upper <= least { upper } else { upper.min(score([a, c, b, low])) }
         });
         if worst <= before + LEAST_GAIN {
             return false;

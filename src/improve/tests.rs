@@ -19,7 +19,7 @@ fn body_volume(mesh: &Mesh, body: BodyId) -> f64 {
 
 fn illegal(mesh: &Mesh, smoothness: &dyn Smoothness) -> usize {
     let legality = Legality::new(mesh, smoothness);
-    mesh.tets.iter().filter(|t| legality.is_illegal(t.map(|v| v.0))).count()
+    mesh.tets.iter().filter(|t| legality.judge(t.map(|v| v.0)).0).count()
 }
 
 /// What must hold after every run: a valid mesh, the same boundary, the same bodies, nothing worse.
