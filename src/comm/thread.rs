@@ -1,6 +1,6 @@
 //! Ranks as threads of this process: no system package, any number of ranks.
 //!
-//! All collective operations are one step, [`ThreadComm::meet`]: each rank deposits its messages, the
+//! All collective operations are one step: each rank deposits its messages, the
 //! last one to arrive sorts them into what each rank is to get and wakes the others. They sleep on
 //! a condition variable meanwhile. A rank that panics or leaves early wakes them too, with an error.
 //!

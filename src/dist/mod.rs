@@ -105,7 +105,7 @@ pub struct DistMesh {
     pub tet_bodies: Vec<BodyId>,
     /// The edges of each tet in the order of [`TET_EDGES`](crate::mesh::TET_EDGES).
     pub tet_edges: Vec<[EdgeId; 6]>,
-    /// The faces of each tet in the order of [`TET_FACES`](crate::mesh::TET_FACES).
+    /// The faces of each tet in the order of [`TET_FACES`].
     pub tet_faces: Vec<[FaceId; 4]>,
     /// The triangles on patches that have a tet of this part beside them, by ascending face. One that lies
     /// between two parts is on both ranks, with one parent each.
