@@ -1,7 +1,10 @@
 //! Meshes: flat arrays of vertices and tets, classified on the geometry.
 
+#[cfg(test)]
+pub(crate) mod fixtures;
 pub mod ids;
 pub mod stream;
+pub mod topology;
 
 pub use ids::{EdgeId, FaceId, GlobalId, Rank, TetId, VertexId};
 

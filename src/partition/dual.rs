@@ -1,0 +1,49 @@
+//! The dual graph: tets, and which of them share a face.
+
+use crate::mesh::FaceId;
+use crate::mesh::topology::{Faces, face_tets};
+
+/// The tets beside each tet, in compressed rows.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Dual {
+    /// Where the neighbours of each tet begin; one more entry than tets.
+    pub offsets: Vec<u32>,
+    /// The neighbours across the faces of each tet, in the order of its faces.
+    pub neighbours: Vec<u32>,
+}
+
+impl Dual {
+    /// The number of tets.
+    pub fn len(&self) -> usize {
+        self.offsets.len().saturating_sub(1)
+    }
+
+    /// Whether there are no tets.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The tets beside `tet`: at most four.
+    pub fn of(&self, tet: usize) -> &[u32] {
+        &self.neighbours[self.offsets[tet] as usize..self.offsets[tet + 1] as usize]
+    }
+}
+
+/// The dual graph of the tets whose faces are listed.
+///
+/// # Errors
+/// The first face that more than two tets have.
+pub fn dual(listed: &Faces) -> Result<Dual, FaceId> {
+    let face_tets = face_tets(listed.faces.len(), &listed.tet_faces)?;
+    let mut dual = Dual { offsets: Vec::with_capacity(listed.tet_faces.len() + 1), neighbours: Vec::new() };
+    dual.offsets.push(0);
+    for (tet, faces) in (0..).zip(&listed.tet_faces) {
+        let beside = faces.iter().map(|face| {
+            let [first, second] = face_tets[face.index()];
+            if first == tet { second } else { first }
+        });
+        dual.neighbours.extend(beside.filter(|&other| other != u32::MAX));
+        dual.offsets.push(dual.neighbours.len() as u32);
+    }
+    Ok(dual)
+}

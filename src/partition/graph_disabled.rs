@@ -1,0 +1,10 @@
+//! The twin of the graph partitioner in a build without METIS: it can only refuse.
+
+use super::PartitionError;
+use super::dual::Dual;
+use crate::mesh::Rank;
+
+/// Refuses: this build has no METIS.
+pub fn bisect(_dual: &Dual, _parts: u32, _seed: i32) -> Result<Vec<Rank>, PartitionError> {
+    Err(PartitionError::NoMetis)
+}
