@@ -22,6 +22,7 @@ pub use report::{Extreme, OffSurface, PartReport, ShapeReport};
 mod tests;
 
 use crate::mesh::GlobalId;
+use report::lenient;
 
 /// Something wrong with a mesh.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -31,6 +32,7 @@ pub enum Fault {
         /// The global id of the tet.
         tet: GlobalId,
         /// Its centroid.
+        #[serde(deserialize_with = "lenient::place")]
         place: [f64; 3],
     },
     /// A tet or boundary triangle names a vertex that its part does not have.
@@ -52,6 +54,7 @@ pub enum Fault {
         /// The global ids of its vertices.
         triangle: [GlobalId; 3],
         /// Its centroid.
+        #[serde(deserialize_with = "lenient::place")]
         place: [f64; 3],
     },
     /// A vertex of a boundary triangle is not on the triangle's patch.
@@ -61,8 +64,10 @@ pub enum Fault {
         /// The patch, as an index.
         patch: u32,
         /// How far off it is, a length.
+        #[serde(deserialize_with = "lenient::number")]
         distance: f64,
         /// Where it is.
+        #[serde(deserialize_with = "lenient::place")]
         place: [f64; 3],
     },
     /// All parts together do not have as many vertices, tets or boundary triangles as they say.

@@ -5,14 +5,33 @@ use super::angles::DEGREES;
 use crate::mesh::GlobalId;
 use serde::{Deserialize, Serialize};
 
+/// JSON has no word for "not a number" and infinity: they are written as null, and read as not a number.
+pub(super) mod lenient {
+    use serde::{Deserialize, Deserializer};
+
+    pub fn number<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
+        Ok(Option::deserialize(from)?.unwrap_or(f64::NAN))
+    }
+
+    pub fn place<'de, D: Deserializer<'de>>(from: D) -> Result<[f64; 3], D::Error> {
+        Ok(<[Option<f64>; 3]>::deserialize(from)?.map(|x| x.unwrap_or(f64::NAN)))
+    }
+
+    pub fn numbers<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<f64>, D::Error> {
+        Ok(Vec::<Option<f64>>::deserialize(from)?.into_iter().map(|x| x.unwrap_or(f64::NAN)).collect())
+    }
+}
+
 /// A largest or smallest value, and the tet that has it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Extreme {
     /// The value.
+    #[serde(deserialize_with = "lenient::number")]
     pub value: f64,
     /// The global id of the tet; of equals the lowest.
     pub tet: GlobalId,
     /// Its centroid.
+    #[serde(deserialize_with = "lenient::place")]
     pub place: [f64; 3],
 }
 
@@ -39,6 +58,7 @@ pub struct ShapeReport {
     /// The worst mean ratio.
     pub worst_ratio: Extreme,
     /// The sum of the mean ratios.
+    #[serde(deserialize_with = "lenient::number")]
     pub sum_of_ratios: f64,
     /// The smallest dihedral angle, degrees.
     pub smallest_angle: Extreme,
@@ -104,12 +124,14 @@ impl ShapeReport {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct OffSurface {
     /// How far, a length.
+    #[serde(deserialize_with = "lenient::number")]
     pub distance: f64,
     /// Its global id; of equals the lowest.
     pub vertex: GlobalId,
     /// The patch, as an index.
     pub patch: u32,
     /// Where it is.
+    #[serde(deserialize_with = "lenient::place")]
     pub place: [f64; 3],
 }
 
@@ -133,8 +155,10 @@ pub struct PartReport {
     /// Boundary triangles, each counted where the tet behind it is.
     pub boundary: u64,
     /// The sum of the volumes of the tets.
+    #[serde(deserialize_with = "lenient::number")]
     pub volume: f64,
     /// The same for each body, by its index.
+    #[serde(deserialize_with = "lenient::numbers")]
     pub body_volumes: Vec<f64>,
     /// The number of faults. (A vertex off its surface counts on each rank that holds it.)
     pub faults: u64,

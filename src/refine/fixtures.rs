@@ -1,11 +1,9 @@
-//! Small coarse meshes with their geometry, and parts of them.
+//! Small coarse meshes with their geometry.
 
 use crate::Point;
-use crate::dist::{BoundaryFace, DistMesh, Shared, Totals};
+use crate::dist::{DistMesh, from_serial};
 use crate::mesh::stream::{BoundaryBlock, MeshStream, TetBlock};
-use crate::mesh::{
-    BoundaryTriangle, Class, EdgeId, FaceId, Mesh, Rank, Segment, TET_EDGES, TET_FACES, TetId, VertexId,
-};
+use crate::mesh::{BoundaryTriangle, Class, Mesh, Segment, TET_EDGES, TET_FACES, VertexId};
 use crate::refine::RefinedMesh;
 use csg::primitive::{Cylinder, Plane, Sphere};
 use csg::{
@@ -99,16 +97,17 @@ fn classified(
     mesh
 }
 
-/// The unit cube as k³ cubes of six tets; two bodies that meet at x = 1/2 if `k` is even and `halves` is set.
-pub fn cube(k: usize, halves: bool) -> Fixture {
-    let mut planes: Vec<(usize, f64, f64)> =
-        (0..3).flat_map(|axis| [(axis, 0.0, -1.0), (axis, 1.0, 1.0)]).collect();
-    if halves {
-        planes.push((0, 0.5, 1.0));
+/// The unit cube as k³ cubes of six tets; with `core` (k a multiple of 4) the middle half is a body of its own.
+pub fn cube(k: usize, core: bool) -> Fixture {
+    let sides = |low: f64, high: f64| (0..3).flat_map(move |axis| [(axis, low, -1.0), (axis, high, 1.0)]);
+    let mut planes: Vec<(usize, f64, f64)> = sides(0.0, 1.0).collect();
+    if core {
+        planes.extend(sides(0.25, 0.75));
     }
+    let in_core = |p: &Point| p.iter().all(|x| (0.25..=0.75).contains(x));
     let curves: Vec<[u32; 2]> = (0..planes.len() as u32)
         .flat_map(|i| (i + 1..planes.len() as u32).map(move |j| [i, j]))
-        .filter(|[i, j]| planes[*i as usize].0 != planes[*j as usize].0)
+        .filter(|[i, j]| planes[*i as usize].0 != planes[*j as usize].0 && i / 6 == j / 6)
         .collect();
     let at = |x: usize, y: usize, z: usize| x + (k + 1) * (y + (k + 1) * z);
     let mut points = Vec::new();
@@ -117,12 +116,13 @@ pub fn cube(k: usize, halves: bool) -> Fixture {
             points.extend((0..=k).map(|x| Point::new(x as f64, y as f64, z as f64) / k as f64));
         }
     }
-    let on: Vec<Vec<u32>> = points
-        .iter()
-        .map(|p| {
-            (0..planes.len() as u32).filter(|i| p[planes[*i as usize].0] == planes[*i as usize].1).collect()
-        })
-        .collect();
+    let is_on = |p: &Point, plane: usize| {
+        let (axis, at, _) = planes[plane];
+        p[axis] == at && (plane < 6 || in_core(p))
+    };
+    let planes_of =
+        |p: &Point| (0..planes.len()).filter(|&plane| is_on(p, plane)).map(|plane| plane as u32).collect();
+    let on: Vec<Vec<u32>> = points.iter().map(planes_of).collect();
     let (mut tets, mut bodies) = (Vec::new(), Vec::new());
     for z in 0..k {
         for y in 0..k {
@@ -139,7 +139,8 @@ pub fn cube(k: usize, halves: bool) -> Fixture {
                         tet.swap(2, 3);
                     }
                     tets.push(tet);
-                    bodies.push(BodyId(u32::from(halves && x >= k / 2)));
+                    let middle = points[at(x, y, z)] + Vector::repeat(0.5 / k as f64);
+                    bodies.push(BodyId(u32::from(core && in_core(&middle))));
                 }
             }
         }
@@ -275,144 +276,25 @@ pub fn as_mesh(refined: &RefinedMesh) -> Mesh {
     mesh
 }
 
+/// One tet, its faces on planes; the face opposite the first corner on `base` if that is given.
+pub fn tet(corners: [[f64; 3]; 4], base: Option<Surface>) -> Fixture {
+    let points = corners.map(Point::from).to_vec();
+    let plane = |face: [usize; 3]| {
+        let [p, q, r] = face.map(|k| points[k]);
+        Surface::Plane(Plane { point: p, normal: (q - p).cross(&(r - p)).normalize() })
+    };
+    let mut surfaces = TET_FACES.map(plane).to_vec();
+    if let Some(base) = base {
+        surfaces[0] = base;
+    }
+    let curves: Vec<[u32; 2]> = (0..4).flat_map(|i| (i + 1..4).map(move |j| [i, j])).collect();
+    let on: Vec<Vec<u32>> = (0..4).map(|v| (0..4).filter(|face| *face != v).collect()).collect();
+    let mesh = classified(points, vec![[0, 1, 2, 3]], vec![BodyId(0)], &on, &curves);
+    let corner = P::new(1.0, 1.0, 1.0);
+    Fixture { mesh, projector: projector(surfaces, &curves, [-corner, corner]) }
+}
+
 /// The whole mesh as one part.
 pub fn whole(mesh: &Mesh) -> DistMesh {
-    split(mesh, &vec![0; mesh.tets.len()], 1).remove(0)
-}
-
-/// The parts of a mesh, tet `t` on rank `rank_of[t]`.
-pub fn split(mesh: &Mesh, rank_of: &[Rank], ranks: u32) -> Vec<DistMesh> {
-    let all = Entities::new(mesh);
-    (0..ranks).map(|rank| all.part(mesh, rank_of, rank, ranks)).collect()
-}
-
-/// Edges and faces of a mesh in lexicographic order.
-struct Entities {
-    edges: Vec<[u32; 2]>,
-    faces: Vec<[u32; 3]>,
-    edge_classes: Vec<Class>,
-    face_classes: Vec<Class>,
-}
-
-fn sorted<const N: usize>(mut vertices: [u32; N]) -> [u32; N] {
-    vertices.sort_unstable();
-    vertices
-}
-
-fn at<T: Ord>(all: &[T], one: &T) -> usize {
-    all.binary_search(one).expect("an entity of the mesh")
-}
-
-impl Entities {
-    fn new(mesh: &Mesh) -> Self {
-        let mut edges: Vec<_> =
-            mesh.tets.iter().flat_map(|tet| TET_EDGES.map(|e| sorted(e.map(|k| tet[k].0)))).collect();
-        let mut faces: Vec<_> =
-            mesh.tets.iter().flat_map(|tet| TET_FACES.map(|f| sorted(f.map(|k| tet[k].0)))).collect();
-        edges.sort_unstable();
-        edges.dedup();
-        faces.sort_unstable();
-        faces.dedup();
-        let mut edge_classes = vec![Class::Body(BodyId(0)); edges.len()];
-        let mut face_classes = vec![Class::Body(BodyId(0)); faces.len()];
-        for triangle in &mesh.triangles {
-            let face = sorted(triangle.vertices.map(|v| v.0));
-            face_classes[at(&faces, &face)] = Class::Patch(triangle.patch);
-            for [p, q] in [[0, 1], [0, 2], [1, 2]] {
-                edge_classes[at(&edges, &[face[p], face[q]])] = Class::Patch(triangle.patch);
-            }
-        }
-        for segment in &mesh.segments {
-            edge_classes[at(&edges, &sorted(segment.vertices.map(|v| v.0)))] = Class::Curve(segment.curve);
-        }
-        Self { edges, faces, edge_classes, face_classes }
-    }
-
-    fn part(&self, mesh: &Mesh, rank_of: &[Rank], rank: Rank, ranks: u32) -> DistMesh {
-        let mine: Vec<usize> = (0..mesh.tets.len()).filter(|t| rank_of[*t] == rank).collect();
-        let vertices_of = |t: usize| mesh.tets[t].map(|v| v.index());
-        let edges_of = |t: usize| TET_EDGES.map(|e| at(&self.edges, &sorted(e.map(|k| mesh.tets[t][k].0))));
-        let faces_of = |t: usize| TET_FACES.map(|f| at(&self.faces, &sorted(f.map(|k| mesh.tets[t][k].0))));
-        let (vertices, shared_vertices) = used(mesh.points.len(), rank_of, rank, vertices_of);
-        let (edges, shared_edges) = used(self.edges.len(), rank_of, rank, edges_of);
-        let (faces, shared_faces) = used(self.faces.len(), rank_of, rank, faces_of);
-        let local = |v: u32| VertexId::new(at(&vertices, &(v as usize)));
-        let mut beside: Vec<(usize, usize)> =
-            (0..mine.len()).flat_map(|t| faces_of(mine[t]).map(|face| (face, t))).collect();
-        beside.sort_unstable();
-        let mut boundary: Vec<BoundaryFace> = Vec::new();
-        for triangle in &mesh.triangles {
-            let global = at(&self.faces, &sorted(triangle.vertices.map(|v| v.0)));
-            let Ok(face) = faces.binary_search(&global) else { continue };
-            let mut parents = [None; 2];
-            let first = beside.partition_point(|b| b.0 < global);
-            for &(_, t) in beside[first..].iter().take_while(|b| b.0 == global) {
-                let tet = mesh.tets[mine[t]];
-                let mut outward = TET_FACES.iter().map(|f| f.map(|k| tet[k]));
-                let behind =
-                    outward.any(|[p, q, r]| [[p, q, r], [q, r, p], [r, p, q]].contains(&triangle.vertices));
-                parents[usize::from(!behind)] = Some(TetId::new(t));
-            }
-            boundary.push(BoundaryFace { face: FaceId::new(face), patch: triangle.patch, parents });
-        }
-        let ids = |kept: &[usize]| kept.iter().map(|&i| i as u64).collect();
-        DistMesh {
-            rank,
-            ranks,
-            totals: Totals {
-                vertices: mesh.points.len() as u64,
-                edges: self.edges.len() as u64,
-                faces: self.faces.len() as u64,
-                tets: mesh.tets.len() as u64,
-                boundary: mesh.triangles.len() as u64,
-            },
-            points: vertices.iter().map(|v| mesh.points[*v]).collect(),
-            vertex_ids: ids(&vertices),
-            vertex_classes: vertices.iter().map(|v| mesh.classes[*v]).collect(),
-            edges: edges.iter().map(|e| self.edges[*e].map(local)).collect(),
-            edge_ids: ids(&edges),
-            edge_classes: edges.iter().map(|e| self.edge_classes[*e]).collect(),
-            faces: faces.iter().map(|f| self.faces[*f].map(local)).collect(),
-            face_ids: ids(&faces),
-            face_classes: faces.iter().map(|f| self.face_classes[*f]).collect(),
-            tets: mine.iter().map(|t| mesh.tets[*t].map(|v| local(v.0))).collect(),
-            tet_ids: ids(&mine),
-            tet_bodies: mine.iter().map(|t| mesh.bodies[*t]).collect(),
-            tet_edges: mine.iter().map(|t| edges_of(*t).map(|e| EdgeId::new(at(&edges, &e)))).collect(),
-            tet_faces: mine.iter().map(|t| faces_of(*t).map(|f| FaceId::new(at(&faces, &f)))).collect(),
-            boundary,
-            shared_vertices,
-            shared_edges,
-            shared_faces,
-        }
-    }
-}
-
-/// The entities of one kind that a rank's tets use, and which of them others use too.
-fn used<const N: usize>(
-    count: usize,
-    rank_of: &[Rank],
-    rank: Rank,
-    of: impl Fn(usize) -> [usize; N],
-) -> (Vec<usize>, Shared) {
-    let mut ranks_of = vec![Vec::new(); count];
-    for (tet, rank) in rank_of.iter().enumerate() {
-        of(tet).iter().for_each(|entity| ranks_of[*entity].push(*rank));
-    }
-    let mut shared = Shared { offsets: vec![0], ..Shared::default() };
-    let mut kept = Vec::new();
-    for (entity, ranks) in ranks_of.iter_mut().enumerate() {
-        ranks.sort_unstable();
-        ranks.dedup();
-        if !ranks.contains(&rank) {
-            continue;
-        }
-        if ranks.len() > 1 {
-            shared.ids.push(kept.len() as u32);
-            shared.holders.extend(&*ranks);
-            shared.offsets.push(shared.holders.len() as u32);
-        }
-        kept.push(entity);
-    }
-    (kept, shared)
+    from_serial(mesh.clone()).expect("a classified mesh")
 }

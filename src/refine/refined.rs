@@ -4,9 +4,9 @@ use super::diagonal::Diagonals;
 use super::lattice::{OCTAHEDRON, UPRIGHT, UPSIDE_DOWN, corner_place, octahedron_child_on_face};
 use super::numbering::{Entity, Numbering, ascending};
 use super::snap::Coordinates;
-use crate::dist::{BoundaryFace, DistMesh, Shared};
+use crate::dist::{BoundaryFace, DistMesh};
 use crate::mesh::stream::{BoundaryBlock, Counts, MeshStream, NO_TET, TetBlock, VertexBlock};
-use crate::mesh::{EdgeId, GlobalId, Rank, TET_EDGES, TET_FACES, TetId};
+use crate::mesh::{Class, EdgeId, GlobalId, Rank, TET_EDGES, TET_FACES, TetId};
 
 /// One rank's part of a refined mesh: see [`refine`](super::refine()).
 ///
@@ -149,14 +149,6 @@ fn for_each_face_child(n: u32, mut visit: impl FnMut(u32, u32, bool)) {
     }
 }
 
-/// All holders of a coarse entity, empty where only this rank holds it.
-fn holders(shared: &Shared, id: u32) -> &[Rank] {
-    match shared.ids.binary_search(&id) {
-        Ok(at) => &shared.holders[shared.offsets[at] as usize..shared.offsets[at + 1] as usize],
-        Err(_) => &[],
-    }
-}
-
 impl MeshStream for RefinedMesh {
     fn rank(&self) -> Rank {
         self.coarse.rank
@@ -191,16 +183,16 @@ impl MeshStream for RefinedMesh {
         let entity = self.numbering.block(index);
         let id = entity.id as usize;
         let (class, holders) = match entity.dimension {
-            0 => (self.coarse.vertex_classes[id], holders(&self.coarse.shared_vertices, entity.id)),
-            1 => (self.coarse.edge_classes[id], holders(&self.coarse.shared_edges, entity.id)),
-            2 => (self.coarse.face_classes[id], holders(&self.coarse.shared_faces, entity.id)),
-            _ => (crate::mesh::Class::Body(self.coarse.tet_bodies[id]), &[][..]),
+            0 => (self.coarse.vertex_classes[id], self.coarse.shared_vertices.holders_of(entity.id)),
+            1 => (self.coarse.edge_classes[id], self.coarse.shared_edges.holders_of(entity.id)),
+            2 => (self.coarse.face_classes[id], self.coarse.shared_faces.holders_of(entity.id)),
+            _ => (Class::Body(self.coarse.tet_bodies[id]), None),
         };
         VertexBlock {
             local: self.numbering.inside(entity),
             first_id: self.numbering.first_id(entity.dimension, self.coarse_id(entity)),
-            holders,
-            on_boundary: !matches!(class, crate::mesh::Class::Body(_)),
+            holders: holders.unwrap_or_default(),
+            on_boundary: !matches!(class, Class::Body(_)),
         }
     }
 
