@@ -62,7 +62,9 @@ fn is_part_file(name: &str) -> bool {
 
 fn check_limits(part: &dyn MeshStream) -> Result<(), WriteError> {
     let totals = part.totals();
-    for (what, count) in [("vertices", totals.vertices), ("tets", totals.tets)] {
+    for (what, count) in
+        [("vertices", totals.vertices), ("tets", totals.tets), ("boundary triangles", totals.boundary)]
+    {
         if count > MAX_ID {
             return Err(WriteError::TooMany { format: "Elmer", what, count, limit: MAX_ID });
         }
