@@ -49,8 +49,7 @@ pub(super) fn check_block(
                 let this = OffSurface { distance, vertex, patch: patch.0, place };
                 report.furthest = Some(report.furthest.map_or(this, |f| f.further(this)));
             }
-            // Also where the distance is no number.
-            if !(distance <= projector.tolerance()) {
+            if distance > projector.tolerance() || distance.is_nan() {
                 off.push(vertex);
             }
         }

@@ -174,7 +174,8 @@ fn check_chunk(
                 report.add_fault(Fault::NoSuchVertex { rank: stream.rank(), vertex }, settings.described);
                 continue;
             }
-            batch.push(id, tet.map(|v| points[v as usize]));
+            let at = |k: usize| points[tet[k] as usize];
+            batch.push(id, [at(0), at(1), at(2), at(3)]);
             if batch.is_full() {
                 flush(batch, shapes, body, settings, &mut report);
             }

@@ -101,13 +101,15 @@ impl Batch {
 
     #[inline(always)]
     fn edge(&self, from: usize, to: usize, lane: usize) -> [f64; 3] {
-        [0, 1, 2].map(|x| self.corners[to][x][lane] - self.corners[from][x][lane])
+        // Written out: closures in `map` are not always inlined, and this is the innermost loop.
+        let (p, q) = (&self.corners[from], &self.corners[to]);
+        [q[0][lane] - p[0][lane], q[1][lane] - p[1][lane], q[2][lane] - p[2][lane]]
     }
 
     /// Volumes and their error bounds.
     pub fn volumes(&self, shapes: &mut Shapes) {
         for lane in 0..BATCH {
-            let edges = [1, 2, 3].map(|k| self.edge(0, k, lane));
+            let edges = [self.edge(0, 1, lane), self.edge(0, 2, lane), self.edge(0, 3, lane)];
             (shapes.volume6[lane], shapes.error[lane]) = volume6_and_error(edges);
         }
     }
@@ -125,8 +127,9 @@ impl Batch {
     /// Mean ratios and dihedral angles; after [`volumes`](Self::volumes).
     pub fn shapes(&self, shapes: &mut Shapes) {
         for lane in 0..BATCH {
-            let edges = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
-            let squares: f64 = edges.iter().map(|&[p, q]| square(self.edge(p, q, lane))).sum();
+            let length = |p, q| square(self.edge(p, q, lane));
+            let squares =
+                length(0, 1) + length(0, 2) + length(0, 3) + length(1, 2) + length(1, 3) + length(2, 3);
             let half = 0.5 * shapes.volume6[lane];
             // 12 (6V/2)^⅔ / Σl² = 12 ((6V/2)² / (Σl²)³)^⅓, free of units under the root.
             shapes.mean_ratio[lane] = half * half / (squares * squares * squares);
@@ -143,11 +146,12 @@ impl Batch {
     /// The cosines of the smallest and largest dihedral angle.
     #[inline(always)]
     fn extreme_cosines(&self, lane: usize) -> (f64, f64) {
-        let [u, v, w] = [1, 2, 3].map(|k| self.edge(0, k, lane));
+        let [u, v, w] = [self.edge(0, 1, lane), self.edge(0, 2, lane), self.edge(0, 3, lane)];
         let opposite = [self.edge(1, 2, lane), self.edge(1, 3, lane)];
         // Outward, each of the face opposite its corner.
         let normals = [cross(opposite[0], opposite[1]), cross(w, v), cross(u, w), cross(v, u)];
-        let inverse = normals.map(|normal| 1.0 / square(normal).sqrt());
+        let length = |k: usize| 1.0 / square(normals[k]).sqrt();
+        let inverse = [length(0), length(1), length(2), length(3)];
         let cosine = |p: usize, q: usize| -dot(normals[p], normals[q]) * (inverse[p] * inverse[q]);
         let cosines = [cosine(0, 1), cosine(0, 2), cosine(0, 3), cosine(1, 2), cosine(1, 3), cosine(2, 3)];
         let more = |p: f64, q: f64| if q > p { q } else { p };

@@ -1,10 +1,32 @@
 //! A distributed mesh: one part per rank, and who else holds what.
+//!
+//! A **part** is an ordinary mesh with tables of what is **shared**: of each vertex, edge and face that
+//! other ranks hold too, the list of all **holders**. Tets are never shared. From the holders and a sum of ids
+//! every rank can tell the **owner** without asking (see [`owner`]).
+//!
+//! ```text
+//!   rank 0 |\  rank 1       The edge between the two parts and its ends are shared: holders 0, 1.
+//!          | \             Each rank has its own copy, with the same coordinates,
+//!          |__\            the same global id and the same class.
+//! ```
+//!
+//! [`distribute()`] makes it from a mesh on rank 0; [`DistMesh::check`] says whether the ranks agree.
+
+mod check;
+mod classify;
+mod distribute;
+mod piece;
+mod shared;
+
+pub use check::Faults;
+pub use distribute::{DistError, distribute, from_serial};
+pub use shared::owner;
 
 use crate::Point;
-use crate::mesh::{Class, EdgeId, FaceId, GlobalId, Rank, TetId, VertexId};
+use crate::mesh::{Class, EdgeId, FaceId, GlobalId, Rank, TET_FACES, TetId, VertexId};
 use csg::{BodyId, PatchId};
 
-/// Entities of one kind that more than one rank holds, with all holders.
+/// Entities of one kind that more than one rank holds, with all holders: fewer than 2³² entries in all on a rank.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Shared {
     /// Local ids, ascending.
@@ -15,7 +37,7 @@ pub struct Shared {
     pub holders: Vec<Rank>,
 }
 
-/// A boundary triangle of a part.
+/// A boundary triangle of a part. Its direction follows from its parents: see [`DistMesh::boundary_vertices`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BoundaryFace {
     /// The face.
@@ -85,7 +107,8 @@ pub struct DistMesh {
     pub tet_edges: Vec<[EdgeId; 6]>,
     /// The faces of each tet in the order of [`TET_FACES`](crate::mesh::TET_FACES).
     pub tet_faces: Vec<[FaceId; 4]>,
-    /// The triangles on patches that have a tet of this part beside them.
+    /// The triangles on patches that have a tet of this part beside them, by ascending face. One that lies
+    /// between two parts is on both ranks, with one parent each.
     pub boundary: Vec<BoundaryFace>,
 
     /// Vertices on interfaces.
@@ -94,4 +117,32 @@ pub struct DistMesh {
     pub shared_edges: Shared,
     /// Faces on interfaces.
     pub shared_faces: Shared,
+}
+
+/// The vertices of a tet's face as seen from outside, from the face's place in the tet.
+fn outward(tet: &[VertexId; 4], face: usize) -> [VertexId; 3] {
+    TET_FACES[face].map(|i| tet[i])
+}
+
+impl DistMesh {
+    /// *Local.* The vertices of a boundary triangle, so that its normal by the right-hand rule points from
+    /// the patch's inside to its outside.
+    ///
+    /// # Panics
+    /// If it has no parent, or one that does not have the face.
+    pub fn boundary_vertices(&self, triangle: &BoundaryFace) -> [VertexId; 3] {
+        let outward_from = |tet: TetId| {
+            let faces = &self.tet_faces[tet.index()];
+            let place = faces.iter().position(|&face| face == triangle.face);
+            outward(&self.tets[tet.index()], place.expect("a parent has the face"))
+        };
+        match triangle.parents {
+            [Some(behind), _] => outward_from(behind),
+            [None, Some(front)] => {
+                let [a, b, c] = outward_from(front);
+                [a, c, b]
+            }
+            [None, None] => panic!("{triangle:?} on rank {} has no parent", self.rank),
+        }
+    }
 }

@@ -337,17 +337,21 @@ impl Entities {
         let (edges, shared_edges) = used(self.edges.len(), rank_of, rank, edges_of);
         let (faces, shared_faces) = used(self.faces.len(), rank_of, rank, faces_of);
         let local = |v: u32| VertexId::new(at(&vertices, &(v as usize)));
+        let mut beside: Vec<(usize, usize)> =
+            (0..mine.len()).flat_map(|t| faces_of(mine[t]).map(|face| (face, t))).collect();
+        beside.sort_unstable();
         let mut boundary: Vec<BoundaryFace> = Vec::new();
         for triangle in &mesh.triangles {
-            let key = sorted(triangle.vertices.map(|v| v.0));
-            let Ok(face) = faces.binary_search(&at(&self.faces, &key)) else { continue };
+            let global = at(&self.faces, &sorted(triangle.vertices.map(|v| v.0)));
+            let Ok(face) = faces.binary_search(&global) else { continue };
             let mut parents = [None; 2];
-            for (t, &tet) in mine.iter().enumerate() {
-                if let Some(f) = faces_of(tet).iter().position(|f| self.faces[*f] == key) {
-                    let [p, q, r] = TET_FACES[f].map(|k| mesh.tets[tet][k]);
-                    let behind = [[p, q, r], [q, r, p], [r, p, q]].contains(&triangle.vertices);
-                    parents[usize::from(!behind)] = Some(TetId::new(t));
-                }
+            let first = beside.partition_point(|b| b.0 < global);
+            for &(_, t) in beside[first..].iter().take_while(|b| b.0 == global) {
+                let tet = mesh.tets[mine[t]];
+                let mut outward = TET_FACES.iter().map(|f| f.map(|k| tet[k]));
+                let behind =
+                    outward.any(|[p, q, r]| [[p, q, r], [q, r, p], [r, p, q]].contains(&triangle.vertices));
+                parents[usize::from(!behind)] = Some(TetId::new(t));
             }
             boundary.push(BoundaryFace { face: FaceId::new(face), patch: triangle.patch, parents });
         }

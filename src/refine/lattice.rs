@@ -155,7 +155,9 @@ impl Lattice {
     /// The index of the point of a face with weights `j` and `k` at its second and third corner.
     #[inline]
     pub fn on_face(self, [p, q, r]: [usize; 3], j: u32, k: u32) -> u32 {
-        self.index([0, 1, 2].map(|x| (self.n - j - k) * STEP[p][x] + j * STEP[q][x] + k * STEP[r][x]))
+        let i = self.n - j - k;
+        let step = |x: usize| i * STEP[p][x] + j * STEP[q][x] + k * STEP[r][x];
+        self.index([step(0), step(1), step(2)])
     }
 
     /// The interior points of a face in their order: (j, k), k outermost.

@@ -15,6 +15,7 @@
 //!
 //! [`MeshStream`]: crate::mesh::stream::MeshStream
 
+pub mod blend;
 pub mod diagonal;
 pub mod lattice;
 pub mod numbering;
@@ -52,8 +53,8 @@ impl Default for Settings {
 /// Why a part cannot be refined.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RefineError {
-    /// Not a power of two, or beyond the finest lattice.
-    #[error("an edge cannot be cut into {n} pieces: 1, 2, 4, … up to {} are possible", lattice::MAX_PIECES)]
+    /// None, or beyond the finest lattice.
+    #[error("an edge cannot be cut into {n} pieces: 1 to {} are possible", lattice::MAX_PIECES)]
     Pieces {
         /// The pieces asked for.
         n: u32,
@@ -106,7 +107,7 @@ pub enum RefineError {
     },
 }
 
-/// *Local.* Refines this rank's part: each edge is cut into `n` pieces (a power of two; 1 leaves the coarse mesh).
+/// *Local.* Refines this rank's part: each edge is cut into `n` pieces (1 leaves the coarse mesh).
 ///
 /// Work and memory grow with the fine vertices, n³/6 for each coarse tet. Errors concern this rank
 /// alone: the caller agrees on them.
@@ -120,4 +121,12 @@ pub fn refine(
     let points = snap::boundary_first(&mesh, projector, &numbering)?;
     let (points, diagonals) = tet::fill(&mesh, projector, &numbering, points, settings)?;
     Ok(RefinedMesh::new(mesh, numbering, points, diagonals))
+}
+
+/// The least number of pieces to an edge with which `coarse` tets become at least `wanted`.
+///
+/// More than the finest lattice has if nothing less suffices: [`refine()`] then refuses it.
+pub fn pieces_for(coarse: u64, wanted: u64) -> u32 {
+    let enough = |n: &u32| u128::from(coarse) * u128::from(*n).pow(3) >= u128::from(wanted);
+    (1..=lattice::MAX_PIECES).find(enough).unwrap_or(lattice::MAX_PIECES + 1)
 }

@@ -51,7 +51,7 @@ pub struct Entity {
 impl Numbering {
     /// Numbers the vertices of the lattices with `n` pieces.
     pub fn new(mesh: &DistMesh, n: u32) -> Result<Self, RefineError> {
-        if !n.is_power_of_two() || n > MAX_PIECES {
+        if n == 0 || n > MAX_PIECES {
             return Err(RefineError::Pieces { n });
         }
         let lattice = Lattice::new(n);
@@ -129,7 +129,11 @@ impl Numbering {
     /// The coarse entity that a fine vertex lies in, and its index among the vertices inside.
     #[inline]
     pub fn locate(&self, local: u32) -> (Entity, u32) {
-        let dimension = self.kinds[1..].iter().take_while(|k| k.local <= local && k.size > 0).count();
+        // Kinds without vertices inside begin where the part's vertices end: no vertex reaches them.
+        let [_, edge, face, tet] = &self.kinds;
+        let dimension = usize::from(local >= edge.local)
+            + usize::from(local >= face.local)
+            + usize::from(local >= tet.local);
         let kind = self.kinds[dimension];
         let offset = local - kind.local;
         (Entity { dimension, id: offset / kind.size }, offset % kind.size)

@@ -6,18 +6,30 @@ use super::numbering::{Entity, Numbering, ascending};
 use super::snap::Coordinates;
 use crate::dist::{BoundaryFace, DistMesh, Shared};
 use crate::mesh::stream::{BoundaryBlock, Counts, MeshStream, NO_TET, TetBlock, VertexBlock};
-use crate::mesh::{GlobalId, Rank, TET_FACES, TetId};
+use crate::mesh::{EdgeId, GlobalId, Rank, TET_EDGES, TET_FACES, TetId};
 
 /// One rank's part of a refined mesh: see [`refine`](super::refine()).
 ///
 /// Tet blocks and boundary blocks are those of the coarse tets and of the coarse boundary triangles, in
 /// their order. Vertex blocks are the coarse vertices, then edges, then faces, then tets.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub struct RefinedMesh {
     coarse: DistMesh,
     numbering: Numbering,
     points: Box<[Coordinates]>,
     diagonals: Diagonals,
+}
+
+impl std::fmt::Debug for RefinedMesh {
+    /// Its size alone: coordinates are gigabytes.
+    fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let (rank, pieces, counts) = (self.rank(), self.pieces(), self.counts());
+        out.debug_struct("RefinedMesh")
+            .field("rank", &rank)
+            .field("pieces", &pieces)
+            .field("counts", &counts)
+            .finish()
+    }
 }
 
 impl RefinedMesh {
@@ -52,7 +64,7 @@ impl RefinedMesh {
         self.coarse.tets.len() as u64 * u64::from(self.numbering.lattice().children())
     }
 
-    /// The index within the part of the child of `tet` on the child (j, k) of its face opposite corner `face`.
+    /// Appends the indices within the part of the children of `tet` on the children of its face opposite corner `face`.
     fn parents_on_face(&self, tet: TetId, face: usize, parents: &mut Vec<u64>) {
         let lattice = self.numbering.lattice();
         let vertices = self.coarse.tets[tet.index()];
@@ -93,19 +105,39 @@ impl RefinedMesh {
 
     /// Local ids of all lattice points of a face, by j + (n + 1)·k.
     fn face_ids(&self, face: &BoundaryFace, ids: &mut Vec<u32>) {
-        let lattice = self.numbering.lattice();
+        let n = self.pieces();
         let tet = face.parents[0].or(face.parents[1]).expect("a boundary face has a tet in this part");
         let vertices = self.coarse.tets[tet.index()];
         let corners = ascending(TET_FACES[self.face_of(tet, face)], |corner| vertices[corner].0);
-        let mut all = Vec::new();
-        self.numbering.lattice_ids(&self.coarse, tet, &mut all);
-        let n = lattice.n();
+        let at = |j: u32, k: u32| (j + (n + 1) * k) as usize;
         ids.clear();
-        for k in 0..=n {
-            for j in 0..=n {
-                ids.push(if j + k <= n { all[lattice.on_face(corners, j, k) as usize] } else { u32::MAX });
+        ids.resize(at(n, n) + 1, u32::MAX);
+        for (corner, (j, k)) in corners.into_iter().zip([(0, 0), (n, 0), (0, n)]) {
+            ids[at(j, k)] = vertices[corner].0;
+        }
+        // Both corners of each pair ascend, so the edge runs as it is numbered.
+        for pair in [[0, 1], [0, 2], [1, 2]] {
+            let edge = self.edge_of(tet, pair.map(|p| corners[p]));
+            for (vertex, k) in self.numbering.inside(Entity { dimension: 1, id: edge.0 }).zip(1..) {
+                let place = match pair {
+                    [0, 1] => at(k, 0),
+                    [0, _] => at(0, k),
+                    _ => at(n - k, k),
+                };
+                ids[place] = vertex;
             }
         }
+        let inside = self.numbering.inside(Entity { dimension: 2, id: face.face.0 });
+        for (vertex, (j, k)) in inside.zip(self.numbering.lattice().face_interior()) {
+            ids[at(j, k)] = vertex;
+        }
+    }
+
+    /// The edge of `tet` between two of its corners.
+    fn edge_of(&self, tet: TetId, mut corners: [usize; 2]) -> EdgeId {
+        corners.sort_unstable();
+        let edge = TET_EDGES.iter().position(|e| *e == corners).expect("two corners make an edge");
+        self.coarse.tet_edges[tet.index()][edge]
     }
 }
 
@@ -264,16 +296,22 @@ fn push_row(
 ) {
     // The last row of a layer has no fourth row of points beside it; none of its children asks for one.
     let rows = rows.map(|start| &ids[start..]);
-    let child = |corners: [u8; 4], cell: usize| {
-        corners.map(|code| {
-            let (row, shift) = corner_place(code);
-            rows[row][cell + shift]
-        })
+    let at = |code: u8, cell: usize| {
+        let (row, shift) = corner_place(code);
+        rows[row][cell + shift]
     };
-    tets.extend((0..cells).map(|cell| child(UPRIGHT, cell)));
+    let [p, q, r, s] = UPRIGHT;
+    tets.extend((0..cells).map(|cell| [at(p, cell), at(q, cell), at(r, cell), at(s, cell)]));
     for cell in 0..cells - 1 {
-        let children = OCTAHEDRON[usize::from(diagonal(cell as u32))];
-        tets.extend(children.map(|corners| child(corners, cell)));
+        // By corner code; an octahedron has neither the first nor the last corner of its cell.
+        let corners = [0, at(1, cell), at(2, cell), at(3, cell), at(4, cell), at(5, cell), at(6, cell), 0];
+        for [p, q, r, s] in OCTAHEDRON[usize::from(diagonal(cell as u32))] {
+            let at = |code: u8| corners[usize::from(code & 7)];
+            tets.push([at(p), at(q), at(r), at(s)]);
+        }
     }
-    tets.extend((0..cells.saturating_sub(2)).map(|cell| child(UPSIDE_DOWN, cell)));
+    let [p, q, r, s] = UPSIDE_DOWN;
+    tets.extend(
+        (0..cells.saturating_sub(2)).map(|cell| [at(p, cell), at(q, cell), at(r, cell), at(s, cell)]),
+    );
 }

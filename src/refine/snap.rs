@@ -1,6 +1,7 @@
 //! Coordinates by the dyadic rule, those on curves and patches projected there.
 //!
-//! At step s = n/2, n/4, …, 1 a new lattice point is the mean of its two neighbours at distance s along the lattice
+//! n is m·2ᵏ with m odd. Points at multiples of 2ᵏ, if m > 1, are placed by [`blend`](super::blend). From there on,
+//! at step s = 2ᵏ/2, …, 2, 1, a new lattice point is the mean of its two neighbours at distance s along the lattice
 //! edge whose midpoint it is; the centre of an octahedron is the mean of its six corners. These are the points of
 //! L rounds of 1:8 refinement. Edges come first, then faces, then tets, each a function of its own
 //! coarse entity and of what bounds it, in the order of global ids: all holders compute the same bits.
@@ -12,6 +13,7 @@
 //! thousand box diagonals away from the origin.
 
 use super::RefineError;
+use super::blend::{Blend, barycentric, split};
 use super::lattice::Lattice;
 use super::numbering::Numbering;
 use crate::Point;
@@ -116,7 +118,11 @@ fn fill_edge(
     snap: impl Fn(Coordinates) -> Result<Coordinates, ProjectionFailed>,
 ) -> Result<(), ProjectionFailed> {
     let n = inside.len() + 1;
-    let mut step = n / 2;
+    let (m, power) = split(n as u32);
+    for j in 1..m {
+        inside[(j * power) as usize - 1] = snap(barycentric(&ends, [m - j, j]))?;
+    }
+    let mut step = power as usize / 2;
     while step > 0 {
         for k in (step..n).step_by(2 * step) {
             let before = if k == step { ends[0] } else { inside[k - step - 1] };
@@ -194,11 +200,13 @@ fn face_edges(mesh: &DistMesh) -> Vec<[EdgeId; 3]> {
 struct Triangle {
     n: usize,
     points: Vec<Coordinates>,
+    blend: Blend<3>,
 }
 
 impl Triangle {
     fn new(n: usize) -> Self {
-        Self { n, points: vec![[0.0; 3]; (n + 1) * (n + 1)] }
+        let blend = Blend::new(split(n as u32).0);
+        Self { n, points: vec![[0.0; 3]; (n + 1) * (n + 1)], blend }
     }
 
     #[inline]
@@ -217,7 +225,18 @@ impl Triangle {
         snap: impl Fn(Coordinates) -> Result<Coordinates, ProjectionFailed>,
     ) -> Result<(), ProjectionFailed> {
         let n = self.n;
-        let mut step = n / 2;
+        let (m, power) = split(n as u32);
+        let power = power as usize;
+        if m > 1 {
+            let corners = [self.get(0, 0), self.get(n, 0), self.get(0, n)];
+            let points = &self.points;
+            self.blend.take(&corners, |[_, j, k]| points[(k as usize * (n + 1) + j as usize) * power]);
+            for (j, k) in Lattice::new(m).face_interior() {
+                let point = snap(self.blend.point(&corners, [m - j - k, j, k]))?;
+                self.set(j as usize * power, k as usize * power, point);
+            }
+        }
+        let mut step = power / 2;
         while step > 0 {
             for k in (step..n).step_by(step) {
                 for j in (step..n - k).step_by(step) {

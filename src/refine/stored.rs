@@ -6,7 +6,7 @@ use crate::mesh::{GlobalId, Rank};
 use rayon::prelude::*;
 
 /// A [`RefinedMesh`] and its tets: 16 bytes for each beside the 4 to 5 of the coordinates.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub struct StoredMesh {
     refined: RefinedMesh,
     tets: Box<[[u32; 4]]>,

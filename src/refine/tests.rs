@@ -25,13 +25,13 @@ fn all_tets(mesh: &dyn MeshStream) -> Vec<[u32; 4]> {
     tets
 }
 
-fn corners(mesh: &dyn MeshStream, tet: [u32; 4]) -> [Point; 4] {
+fn corners_of(mesh: &dyn MeshStream, tet: [u32; 4]) -> [Point; 4] {
     tet.map(|v| Point::from(mesh.points()[v as usize]))
 }
 
 fn total_volume(mesh: &dyn MeshStream) -> f64 {
     let volumes = all_tets(mesh).into_iter().map(|tet| {
-        let [p, q, r, s] = corners(mesh, tet);
+        let [p, q, r, s] = corners_of(mesh, tet);
         assert_eq!(orient3d(&p, &q, &r, &s), Sign::Positive, "{tet:?}");
         volume(&p, &q, &r, &s)
     });
@@ -108,18 +108,18 @@ fn check_counts(fixture: &Fixture, mesh: &RefinedMesh) {
 
 #[test]
 fn a_refined_cube_conforms_and_fills_the_cube() {
-    for n in [1, 2, 4] {
+    for n in [1, 2, 3, 4, 5, 6] {
         let fixture = cube(2, true);
         let mesh = refined(&fixture, n);
         check_counts(&fixture, &mesh);
         check_conformity(&mesh);
-        assert!((total_volume(&mesh) - 1.0).abs() < 1e-13);
+        assert!((total_volume(&mesh) - 1.0).abs() < 1e-12);
     }
 }
 
 #[test]
 fn refined_balls_and_cylinders_conform() {
-    for n in [1, 2, 4, 8] {
+    for n in [1, 2, 3, 5, 6, 8] {
         for fixture in [ball(1.0), cylinder(2)] {
             let mesh = refined(&fixture, n);
             check_counts(&fixture, &mesh);
@@ -132,17 +132,19 @@ fn refined_balls_and_cylinders_conform() {
 fn the_volume_of_a_ball_converges_with_the_square_of_the_mesh_size() {
     let radius = 1.5_f64;
     let exact = 4.0 / 3.0 * std::f64::consts::PI * radius.powi(3);
-    let errors = [4, 8, 16].map(|n| exact - total_volume(&refined(&ball(radius), n)));
-    for pair in errors.windows(2) {
-        let ratio = pair[0] / pair[1];
-        assert!((3.8..4.2).contains(&ratio), "{errors:?}");
+    for series in [[4, 8, 16], [3, 6, 12], [5, 10, 20]] {
+        let errors = series.map(|n| exact - total_volume(&refined(&ball(radius), n)));
+        for pair in errors.windows(2) {
+            let ratio = pair[0] / pair[1];
+            assert!((3.8..4.2).contains(&ratio), "{errors:?}");
+        }
     }
 }
 
 #[test]
 fn boundary_vertices_are_on_their_patches() {
-    for fixture in [ball(1.0), cylinder(2)] {
-        let mesh = refined(&fixture, 8);
+    for (fixture, n) in [(ball(1.0), 8), (cylinder(2), 8), (ball(3.0), 7), (cylinder(1), 12)] {
+        let mesh = refined(&fixture, n);
         let mut block = BoundaryBlock::default();
         for index in 0..mesh.boundary_blocks() {
             mesh.boundary_block(index, &mut block);
@@ -186,23 +188,29 @@ fn refining_twice_gives_the_points_of_refining_once_on_edges_and_faces_and_insid
 
 #[test]
 fn points_inside_a_flat_tet_are_its_barycentric_lattice() {
+    for n in [5, 6, 8] {
+        flat_lattice(n);
+    }
+}
+
+fn flat_lattice(n: u32) {
     let mut fixture = cube(1, false);
     for point in &mut fixture.mesh.points {
         *point = Point::from(point.coords + Vector::new(0.3 * point.y, 0.1 * point.z, -0.2 * point.x));
     }
     fixture.mesh.triangles.clear();
     fixture.mesh.segments.clear();
-    let mesh = refined(&fixture, 8);
-    let lattice = lattice::Lattice::new(8);
+    let mesh = refined(&fixture, n);
+    let lattice = lattice::Lattice::new(n);
     for tet in 0..fixture.mesh.tets.len() {
         let corners = fixture.mesh.tets[tet].map(|v| fixture.mesh.points[v.index()].coords);
         let mut ids = Vec::new();
-        let numbering = numbering::Numbering::new(mesh.coarse(), 8).expect("small");
+        let numbering = numbering::Numbering::new(mesh.coarse(), n).expect("small");
         numbering.lattice_ids(mesh.coarse(), crate::mesh::TetId::new(tet), &mut ids);
-        for d in 0..=8 {
-            for c in 0..=8 - d {
-                for b in 0..=8 - d - c {
-                    let weights = [8 - b - c - d, b, c, d].map(|w| f64::from(w) / 8.0);
+        for d in 0..=n {
+            for c in 0..=n - d {
+                for b in 0..=n - d - c {
+                    let weights = [n - b - c - d, b, c, d].map(|w| f64::from(w) / f64::from(n));
                     let exact: Vector = corners.iter().zip(weights).map(|(p, w)| p * w).sum();
                     let point = Point::from(mesh.points()[ids[lattice.index([b, c, d]) as usize] as usize]);
                     assert!((point.coords - exact).norm() < 1e-14, "{point} at {weights:?}");
@@ -222,12 +230,20 @@ fn stored_tets_are_those_of_the_stream() {
 }
 
 #[test]
-fn pieces_that_are_no_power_of_two_are_refused() {
-    for n in [0, 3, 6, 2048] {
+fn pieces_beyond_the_finest_lattice_are_refused() {
+    for n in [0, 1025] {
         let fixture = cube(1, false);
         let error = refine(whole(&fixture.mesh), &fixture.projector, n, &Settings::default());
         assert_eq!(error.err(), Some(RefineError::Pieces { n }));
     }
+}
+
+#[test]
+fn the_least_pieces_that_make_enough_tets_are_chosen() {
+    assert_eq!(pieces_for(80_000, 1_000_000_000), 24);
+    assert_eq!(pieces_for(6, 6), 1);
+    assert_eq!(pieces_for(6, 7), 2);
+    assert_eq!(pieces_for(1, u64::MAX), 1025);
 }
 
 /// The checksum of a mesh in parts, each refined by itself, and the merged report.
@@ -245,20 +261,22 @@ fn in_parts(fixture: &Fixture, n: u32, ranks: u32) -> (Checksum, PartReport) {
 #[test]
 fn every_number_of_ranks_makes_the_same_mesh() {
     for fixture in [ball(1.0), cylinder(2), cube(2, true)] {
-        let (sum, report) = in_parts(&fixture, 4, 1);
-        assert_eq!(sum.open, 0, "each face is matched");
-        for ranks in [2, 3, 4, 7, 16] {
-            let (others, parts) = in_parts(&fixture, 4, ranks);
-            assert_eq!(others, sum, "{ranks} ranks");
-            assert_eq!(parts.faults, 0, "{:?}", parts.described);
-            let counts = |r: &PartReport| [r.vertices, r.tets, r.boundary];
-            assert_eq!(counts(&parts), counts(&report));
-            assert!((parts.volume / report.volume - 1.0).abs() < 1e-14);
-            let shape = |r: &PartReport| {
-                let s = r.shape.clone().expect("tets");
-                (s.worst_ratio, s.smallest_angle, s.largest_angle, s.smallest_angles, s.ratios)
-            };
-            assert_eq!(shape(&parts), shape(&report));
+        for n in [4, 7] {
+            let (sum, report) = in_parts(&fixture, n, 1);
+            assert_eq!(sum.open, 0, "each face is matched");
+            for ranks in [2, 3, 4, 7, 16] {
+                let (others, parts) = in_parts(&fixture, n, ranks);
+                assert_eq!(others, sum, "{ranks} ranks");
+                assert_eq!(parts.faults, 0, "{:?}", parts.described);
+                let counts = |r: &PartReport| [r.vertices, r.tets, r.boundary];
+                assert_eq!(counts(&parts), counts(&report));
+                assert!((parts.volume / report.volume - 1.0).abs() < 1e-14);
+                let shape = |r: &PartReport| {
+                    let s = r.shape.clone().expect("tets");
+                    (s.worst_ratio, s.smallest_angle, s.largest_angle, s.smallest_angles, s.ratios)
+                };
+                assert_eq!(shape(&parts), shape(&report));
+            }
         }
     }
 }
@@ -282,10 +300,70 @@ fn coarse_tets_whose_children_would_invert_are_named() {
     mesh.points[0] = Point::from(centroid * 1.05);
     mesh.tets = vec![[crate::mesh::VertexId(0), p, r, q]];
     mesh.triangles.retain(|t| t.vertices.iter().all(|v| [p, q, r].contains(v)));
-    let error = refine(whole(&mesh), &projector, 8, &Settings::default()).err().expect("inverted");
+    let error = refine(whole(&mesh), &projector, 8, &Settings::default()).expect_err("inverted");
     let RefineError::Inverted { children, coarse, faults } = &error else { panic!("{error}") };
     assert!((1..512).contains(children));
     assert_eq!(coarse, &[0]);
     assert_eq!(faults.len(), 8.min(*children as usize));
     assert!(matches!(faults[0], Fault::NotPositive { tet: 0..512, .. }), "{error}");
+}
+
+#[test]
+fn more_vertices_than_local_ids_are_refused_before_memory_is_asked_for() {
+    let fixture = cube(2, false);
+    let error = refine(whole(&fixture.mesh), &fixture.projector, 1024, &Settings::default());
+    assert!(matches!(error, Err(RefineError::TooManyVertices { rank: 0, needed }) if needed > 1 << 33));
+}
+
+/// The part of a mesh of one tet, and a geometry without surfaces.
+fn single(corners: [[f64; 3]; 4]) -> Fixture {
+    let mut fixture = ball(1.0);
+    fixture.mesh.points = corners.map(Point::from).to_vec();
+    fixture.mesh.classes = vec![crate::mesh::Class::Body(csg::BodyId(0)); 4];
+    fixture.mesh.tets = vec![[0, 1, 2, 3].map(crate::mesh::VertexId)];
+    fixture.mesh.bodies.truncate(1);
+    fixture.mesh.triangles.clear();
+    fixture
+}
+
+proptest::proptest! {
+    #[test]
+    fn children_of_a_flat_tet_are_of_three_classes_however_fine(
+        corners in proptest::prelude::prop::array::uniform4(proptest::prelude::prop::array::uniform3(-1.0..1.0)),
+        n in 2_u32..9,
+    ) {
+        let [p, q, r, s] = corners.map(Point::from);
+        proptest::prop_assume!(volume(&p, &q, &r, &s) > 0.02);
+        let mesh = refined(&single(corners), n);
+        let mut classes: Vec<[f64; 6]> = Vec::new();
+        for tet in all_tets(&mesh) {
+            let points = corners_of(&mesh, tet);
+            let edges = crate::mesh::TET_EDGES.map(|[i, j]| (points[i] - points[j]).norm_squared() * f64::from(n * n));
+            let mut edges = edges;
+            edges.sort_by(f64::total_cmp);
+            let same = |class: &[f64; 6]| class.iter().zip(edges).all(|(a, b)| (a - b).abs() < 1e-9);
+            if !classes.iter().any(same) {
+                classes.push(edges);
+            }
+        }
+        proptest::prop_assert!(classes.len() <= 3, "{classes:?}");
+    }
+
+    #[test]
+    fn the_best_diagonal_does_not_depend_on_the_names_of_the_corners(
+        corners in proptest::prelude::prop::array::uniform4(proptest::prelude::prop::array::uniform3(-1.0..1.0)),
+    ) {
+        let [p, q, r, s] = corners.map(Point::from);
+        proptest::prop_assume!(volume(&p, &q, &r, &s) > 0.02);
+        let [p, q, r, s] = corners;
+        let worst = |corners: [[f64; 3]; 4]| {
+            let mesh = refined(&single(corners), 2);
+            let report = check_part(&mesh, None, &crate::check::Settings::default());
+            report.shape.expect("tets").worst_ratio.value
+        };
+        let one = worst([p, q, r, s]);
+        for renamed in [[q, r, p, s], [q, p, s, r], [s, q, p, r]] {
+            proptest::prop_assert!((worst(renamed) - one).abs() < 1e-12);
+        }
+    }
 }

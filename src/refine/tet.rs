@@ -4,6 +4,7 @@
 //! which each row of cells has its children's corners in runs of consecutive numbers: plain loops that
 //! the compiler turns into vector instructions.
 
+use super::blend::{Blend, barycentric, split};
 use super::diagonal::{self, Diagonals};
 use super::lattice::{Lattice, OCTAHEDRON, UPRIGHT, UPSIDE_DOWN, corner_place};
 use super::numbering::Numbering;
@@ -38,11 +39,13 @@ pub fn fill(
     let fill_one = |block: &mut Block, ((tet, inside), bytes): ((usize, &mut [Coordinates]), &mut [u8])| {
         let tet = TetId::new(tet);
         block.gather(mesh, numbering, tet, before);
+        let corners = mesh.tets[tet.index()].map(|v| before[v.index()]);
+        let flat = is_flat(mesh, projector, tet);
+        block.fill_odd_part(&plan, &corners, flat);
         block.fill_inside(&plan);
         block.scatter(lattice, inside);
         block.bad.clear();
-        if is_flat(mesh, projector, tet) {
-            let corners = mesh.tets[tet.index()].map(|v| before[v.index()]);
+        if flat {
             block.cut_evenly(&plan, diagonal::best_of_tet(&corners), bytes);
         } else {
             block.cut_each_best(&plan, bytes);
@@ -123,6 +126,8 @@ struct Block {
     ids: Vec<u32>,
     /// x, y, z of all points.
     axes: [Vec<f64>; 3],
+    /// For the odd part of n.
+    blend: Blend<4>,
     /// For a row of octahedra and each diagonal: the worst shape, and 1 if all signs are certain, else 0.
     shapes: [Vec<f64>; 3],
     certain: [Vec<f64>; 3],
@@ -137,6 +142,7 @@ impl Block {
         Self {
             ids: Vec::new(),
             axes: [points(), points(), points()],
+            blend: Blend::new(split(lattice.n()).0),
             shapes: [row(), row(), row()],
             certain: [row(), row(), row()],
             bad: Vec::new(),
@@ -155,10 +161,37 @@ impl Block {
         }
     }
 
+    /// The points inside the tet that the dyadic rule begins with.
+    fn fill_odd_part(&mut self, plan: &Plan, corners: &[Coordinates; 4], flat: bool) {
+        let (m, power) = split(plan.lattice.n());
+        if m == 1 {
+            return;
+        }
+        let index = |b: u32, c: u32, d: u32| plan.row(c * power, d * power) + (b * power) as usize;
+        if !flat {
+            let [x, y, z] = &self.axes;
+            self.blend.take(corners, |[_, b, c, d]| {
+                let i = index(b, c, d);
+                [x[i], y[i], z[i]]
+            });
+        }
+        for d in 1..m {
+            for c in 1..m - d {
+                for b in 1..(m - d).saturating_sub(c) {
+                    let weights = [m - b - c - d, b, c, d];
+                    let [x, y, z] =
+                        if flat { barycentric(corners, weights) } else { self.blend.point(corners, weights) };
+                    let i = index(b, c, d);
+                    (self.axes[0][i], self.axes[1][i], self.axes[2][i]) = (x, y, z);
+                }
+            }
+        }
+    }
+
     /// The dyadic rule inside the tet.
     fn fill_inside(&mut self, plan: &Plan) {
         let n = plan.lattice.n();
-        let mut step = n / 2;
+        let mut step = split(n).1 / 2;
         while step > 0 {
             for d in (step..n).step_by(step as usize) {
                 for c in (step..n - d).step_by(step as usize) {
@@ -335,26 +368,43 @@ impl Run<'_> {
     /// The edges from the first corner to the others: by corner, then by axis.
     #[inline(always)]
     fn edges(&self, i: usize) -> [[f64; 3]; 3] {
-        [1, 2, 3].map(|k| [0, 1, 2].map(|x| self.axes[x][k][i] - self.axes[x][0][i]))
+        // Written out: closures are not always inlined, and this is the innermost loop.
+        let [x, y, z] = &self.axes;
+        let (px, py, pz) = (x[0][i], y[0][i], z[0][i]);
+        [
+            [x[1][i] - px, y[1][i] - py, z[1][i] - pz],
+            [x[2][i] - px, y[2][i] - py, z[2][i] - pz],
+            [x[3][i] - px, y[3][i] - py, z[3][i] - pz],
+        ]
     }
 
-    /// Whether all are positive beyond doubt. (The slices have length `count`, said again so that the
-    /// compiler can drop its bounds checks.)
+    /// The same run; its slices, cut to its length once more, let the compiler drop its bounds checks.
+    #[inline(always)]
+    fn trimmed(&self) -> Run<'_> {
+        fn trim([p, q, r, s]: [&[f64]; 4], count: usize) -> [&[f64]; 4] {
+            [&p[..count], &q[..count], &r[..count], &s[..count]]
+        }
+        let [x, y, z] = self.axes;
+        let count = self.count;
+        Run { axes: [trim(x, count), trim(y, count), trim(z, count)], count }
+    }
+
+    /// Whether all are positive beyond doubt.
     #[inline]
     fn all_positive(&self) -> bool {
-        let run = Run { axes: self.axes.map(|axis| axis.map(|corner| &corner[..self.count])), ..*self };
-        let mut unsure = false;
+        let run = self.trimmed();
+        let mut certain = true;
         for i in 0..self.count {
             let (volume, error) = volume6_and_error(run.edges(i));
-            unsure |= !(volume > error);
+            certain &= volume > error;
         }
-        !unsure
+        certain
     }
 
     /// Lowers `shapes` to those of these tets where they are worse, and `certain` to 0 where a sign is not.
     #[inline]
     fn measure(&self, shapes: &mut [f64], certain: &mut [f64]) {
-        let run = Run { axes: self.axes.map(|axis| axis.map(|corner| &corner[..self.count])), ..*self };
+        let run = self.trimmed();
         let (shapes, certain) = (&mut shapes[..self.count], &mut certain[..self.count]);
         for i in 0..self.count {
             let edges = run.edges(i);
@@ -372,6 +422,6 @@ impl Run<'_> {
 fn sum_of_squares([u, v, w]: [[f64; 3]; 3]) -> f64 {
     // |u−v|² + |v−w|² + |w−u|² = 3 (|u|² + |v|² + |w|²) − |u+v+w|²
     let square = |p: [f64; 3]| p[0] * p[0] + p[1] * p[1] + p[2] * p[2];
-    let sum = [0, 1, 2].map(|x| u[x] + v[x] + w[x]);
+    let sum = [u[0] + v[0] + w[0], u[1] + v[1] + w[1], u[2] + v[2] + w[2]];
     4.0 * (square(u) + square(v) + square(w)) - square(sum)
 }

@@ -1,0 +1,148 @@
+//! Refinement, streamed check, checksum and storage: tets per second and peak memory.
+//!
+//! `cargo bench --bench refine [-- CASE COARSE N]`, CASE one of `cube`, `ball`, `cylinder`; COARSE the pieces of a first
+//! refinement that makes the coarse mesh. Threads by `RAYON_NUM_THREADS`. Rates are by processor time. Results are kept in `benches/results`.
+#![forbid(unsafe_code)]
+#![allow(missing_docs)]
+
+use std::time::Instant;
+use tetmill::{Point, check, dist, mesh, refine};
+
+#[path = "../src/refine/fixtures.rs"]
+#[allow(dead_code)]
+mod fixtures;
+
+use fixtures::Fixture;
+use mesh::stream::{MeshStream, TetBlock};
+use rayon::prelude::*;
+
+/// Beyond these the stored tets are not measured: 16 bytes each.
+const MOST_STORED: u64 = 200_000_000;
+
+fn main() {
+    let args: Vec<String> = std::env::args().skip(1).filter(|a| a != "--bench").collect();
+    println!("{} threads, version {}", rayon::current_num_threads(), env!("CARGO_PKG_VERSION"));
+    println!(
+        "| case | coarse tets | n | tets | stage | wall s | cpu s | M tets/cpu s | peak MB | bytes/tet |"
+    );
+    println!("|---|---|---|---|---|---|---|---|---|---|");
+    match &args[..] {
+        [case, coarse, n] => {
+            run(case, coarse.parse().expect("a number"), n.parse().expect("a number"));
+        }
+        _ => {
+            [("cube", 4, 16), ("ball", 4, 16), ("cylinder", 2, 16)].iter().for_each(|&(c, k, n)| run(c, k, n))
+        }
+    }
+}
+
+fn fixture(case: &str, coarse: u32) -> Fixture {
+    let base = match case {
+        "cube" => return fixtures::cube(coarse as usize * 2, false),
+        "ball" => fixtures::ball(1.0),
+        _ => fixtures::cylinder(4),
+    };
+    let settings = refine::Settings::default();
+    let first = refine::refine(fixtures::whole(&base.mesh), &base.projector, coarse, &settings);
+    Fixture { mesh: fixtures::as_mesh(&first.expect("refinable")), projector: base.projector }
+}
+
+fn run(case: &str, coarse: u32, n: u32) {
+    let fixture = fixture(case, coarse);
+    let dist = fixtures::whole(&fixture.mesh);
+    let coarse_tets = dist.tets.len();
+    let tets = coarse_tets as u64 * u64::from(n).pow(3);
+    let row = |stage: &str, start: Start| {
+        let (wall, cpu) = (start.wall.elapsed().as_secs_f64(), cpu_seconds() - start.cpu);
+        let peak = peak_bytes();
+        println!(
+            "| {case} | {coarse_tets} | {n} | {tets} | {stage} | {wall:.2} | {cpu:.2} | {:.1} | {:.0} | {:.1} |",
+            tets as f64 / cpu / 1e6,
+            peak as f64 / 1e6,
+            peak as f64 / tets as f64
+        );
+    };
+    let start = Start::now();
+    let refined =
+        refine::refine(dist, &fixture.projector, n, &refine::Settings::default()).expect("refinable");
+    row("coordinates, diagonals, exact signs", start);
+
+    let start = Start::now();
+    let volume = volume(&refined);
+    row("connectivity streamed, volume summed", start);
+
+    let start = Start::now();
+    let settings = check::Settings { shapes: false, ..check::Settings::default() };
+    let report = check::check_part(&refined, Some(&fixture.projector), &settings);
+    assert!(report.faults == 0 && (report.volume / volume - 1.0).abs() < 1e-12, "{:?}", report.described);
+    row("check without shapes", start);
+
+    let start = Start::now();
+    let report = check::check_part(&refined, Some(&fixture.projector), &check::Settings::default());
+    row("check with shapes", start);
+
+    let start = Start::now();
+    let sum = check::checksum(&refined);
+    assert_eq!(sum.open, 0);
+    row("checksum", start);
+
+    let start = Start::now();
+    if tets <= MOST_STORED && refined.materialize().is_ok() {
+        row("tets stored", start);
+    }
+    let shape = report.shape.expect("tets");
+    println!(
+        "{case}: checksum {sum}, volume {}, mean ratio worst {:.3} mean {:.3}, dihedral {:.1} (p1 {:.1}) to {:.1}",
+        report.volume,
+        shape.worst_ratio.value,
+        shape.sum_of_ratios / report.tets as f64,
+        shape.smallest_angle.value,
+        shape.smallest_angle_percentile(0.01),
+        shape.largest_angle.value
+    );
+}
+
+/// The simplest consumer: what a solver's loop over elements costs.
+fn volume(mesh: &dyn MeshStream) -> f64 {
+    let points = mesh.points();
+    let of_block = |block: &mut TetBlock, index| {
+        mesh.tet_block(index, block);
+        let six_fold: f64 = block.tets.iter().map(|tet| volume6(tet.map(|v| points[v as usize]))).sum();
+        six_fold / 6.0
+    };
+    (0..mesh.tet_blocks()).into_par_iter().map_init(TetBlock::default, of_block).sum()
+}
+
+fn volume6(corners: [[f64; 3]; 4]) -> f64 {
+    let [p, q, r, s] = corners.map(Point::from);
+    (q - p).cross(&(r - p)).dot(&(s - p))
+}
+
+/// Wall and processor time when a stage began. On a machine that others use, only the latter means much.
+struct Start {
+    wall: Instant,
+    cpu: f64,
+}
+
+impl Start {
+    fn now() -> Self {
+        Self { wall: Instant::now(), cpu: cpu_seconds() }
+    }
+}
+
+/// Processor time of all threads so far.
+fn cpu_seconds() -> f64 {
+    let tasks = std::fs::read_dir("/proc/self/task").into_iter().flatten().flatten();
+    let nanoseconds = tasks.filter_map(|task| {
+        let text = std::fs::read_to_string(task.path().join("schedstat")).ok()?;
+        text.split_whitespace().next()?.parse::<f64>().ok()
+    });
+    nanoseconds.sum::<f64>() / 1e9
+}
+
+/// Peak resident memory of the process.
+fn peak_bytes() -> u64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
+    line.and_then(|l| l.split_whitespace().next()?.parse::<u64>().ok()).unwrap_or(0) * 1024
+}

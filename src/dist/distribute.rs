@@ -1,0 +1,336 @@
+//! From a mesh on rank 0 to a part on each rank.
+
+use super::classify::{Classified, Triangle, classify};
+use super::piece::{Entities, Piece};
+use super::{DistMesh, Shared, Totals};
+use crate::comm::{Agreed, CommError, Communicator};
+use crate::mesh::{Class, EdgeId, FaceId, GlobalId, Mesh, Rank, VertexId, topology};
+use rayon::prelude::*;
+
+/// Why a mesh cannot be distributed.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum DistError {
+    /// Rank 0 has no mesh to distribute.
+    #[error("rank 0 gave no mesh to distribute")]
+    NoMesh,
+    /// Not one part for each tet.
+    #[error("{tets} tets, but parts for {parts}")]
+    PartsMismatch {
+        /// Tets of the mesh.
+        tets: usize,
+        /// Entries of the partition.
+        parts: usize,
+    },
+    /// A tet is meant for a rank that does not exist.
+    #[error("tet {tet} is meant for rank {part} of {ranks}")]
+    NoSuchRank {
+        /// The tet.
+        tet: usize,
+        /// The rank it is meant for.
+        part: Rank,
+        /// The number of ranks.
+        ranks: u32,
+    },
+    /// More tets than can be numbered.
+    #[error("{tets} tets are more than {}, the most that can be distributed", topology::MAX_TETS)]
+    TooManyTets {
+        /// Tets of the mesh.
+        tets: usize,
+    },
+    /// A vertex that no rank would get.
+    #[error("vertex {vertex} belongs to no tet")]
+    UnusedVertex {
+        /// The vertex.
+        vertex: usize,
+    },
+    /// The mesh is no mesh.
+    #[error("face {vertices:?} belongs to more than two tets")]
+    FaceOfThreeTets {
+        /// Its vertices.
+        vertices: [u32; 3],
+    },
+    /// The boundary has a hole.
+    #[error("face {vertices:?} lies between two regions, but on no patch")]
+    FaceOnNoPatch {
+        /// Its vertices.
+        vertices: [u32; 3],
+    },
+    /// A boundary triangle off the mesh.
+    #[error("boundary triangle {triangle} with vertices {vertices:?} is no face of a tet")]
+    TriangleNotAFace {
+        /// Its index.
+        triangle: usize,
+        /// Its vertices.
+        vertices: [u32; 3],
+    },
+    /// A boundary triangle that repeats another.
+    #[error("boundary triangle {triangle} with vertices {vertices:?} is there twice")]
+    TriangleTwice {
+        /// Its index.
+        triangle: usize,
+        /// Its vertices.
+        vertices: [u32; 3],
+    },
+    /// A segment off the mesh.
+    #[error("segment {segment} with vertices {vertices:?} is no edge of a tet")]
+    SegmentNotAnEdge {
+        /// Its index.
+        segment: usize,
+        /// Its vertices.
+        vertices: [u32; 2],
+    },
+    /// A segment that repeats another.
+    #[error("segment {segment} with vertices {vertices:?} is there twice")]
+    SegmentTwice {
+        /// Its index.
+        segment: usize,
+        /// Its vertices.
+        vertices: [u32; 2],
+    },
+    /// Two patches meet where no curve is.
+    #[error("edge {vertices:?} lies on two patches, but on no curve")]
+    EdgeOnTwoPatches {
+        /// Its vertices.
+        vertices: [u32; 2],
+    },
+    /// Another rank met an error.
+    #[error("rank {rank}: {message}")]
+    Elsewhere {
+        /// Which.
+        rank: Rank,
+        /// What it says.
+        message: String,
+    },
+    /// The ranks cannot talk.
+    #[error(transparent)]
+    Comm(#[from] CommError),
+}
+
+impl From<Agreed<Self>> for DistError {
+    fn from(agreed: Agreed<Self>) -> Self {
+        match agreed {
+            Agreed::Failed { own: Some(error), .. } => error,
+            Agreed::Failed { rank, message, own: None } => Self::Elsewhere { rank, message },
+            Agreed::Comm(error) => Self::Comm(error),
+        }
+    }
+}
+
+/// **Collective.** Gives each rank the tets that `part` assigns to it. Rank 0 gives the mesh and the part of
+/// each tet; what other ranks give is ignored.
+///
+/// Global ids of vertices and tets are their places in `mesh`; those of edges and faces their places in the
+/// lexicographic order by global vertices. A rank may get no tets.
+///
+/// # Errors
+/// A mesh that is not one, or is not classified, with the place; the same on all ranks.
+pub fn distribute(comm: &dyn Communicator, mesh: Option<(Mesh, Vec<Rank>)>) -> Result<DistMesh, DistError> {
+    let plan = match mesh {
+        Some((mesh, part)) if comm.rank() == 0 => plan(mesh, &part, comm.size()).map(Some),
+        None if comm.rank() == 0 => Err(DistError::NoMesh),
+        _ => Ok(None),
+    };
+    let plan = comm.agree(plan)?;
+    if let (Some(plan), 1) = (&plan, comm.size()) {
+        return Ok(plan.piece(0, &mut Vec::new()).assemble(0, 1));
+    }
+    let messages = plan.map(|plan| {
+        let message = |scratch: &mut Vec<u32>, rank| plan.piece(rank, scratch).to_message();
+        (0..comm.size()).into_par_iter().map_init(Vec::new, message).collect()
+    });
+    let piece = Piece::from_message(&comm.scatter_bytes(0, messages)?);
+    Ok(piece.assemble(comm.rank(), comm.size()))
+}
+
+/// *Local.* The whole mesh as the only part.
+///
+/// # Errors
+/// As [`distribute`].
+pub fn from_serial(mesh: Mesh) -> Result<DistMesh, DistError> {
+    let part = vec![0; mesh.tets.len()];
+    distribute(&crate::comm::thread::alone(), Some((mesh, part)))
+}
+
+/// Lists of numbers, in compressed rows.
+struct Rows {
+    offsets: Vec<u32>,
+    items: Vec<u32>,
+}
+
+impl Rows {
+    /// The rows of (row, item) pairs, each with its items in the order in which `pairs` gives them. `pairs` is run twice.
+    fn collect(rows: usize, pairs: impl Fn(&mut dyn FnMut(u32, u32))) -> Self {
+        let mut offsets = vec![0; rows + 1];
+        pairs(&mut |row, _| offsets[row as usize + 1] += 1);
+        for row in 0..rows {
+            offsets[row + 1] += offsets[row];
+        }
+        let mut items = vec![0; offsets[rows] as usize];
+        let mut ends = offsets.clone();
+        pairs(&mut |row, item| {
+            let end = &mut ends[row as usize];
+            items[*end as usize] = item;
+            *end += 1;
+        });
+        Self { offsets, items }
+    }
+
+    fn len(&self) -> usize {
+        self.offsets.len() - 1
+    }
+
+    fn row(&self, row: usize) -> &[u32] {
+        &self.items[self.offsets[row] as usize..self.offsets[row + 1] as usize]
+    }
+
+    /// For each item the rows that have it, ascending.
+    fn transposed(&self, items: usize) -> Self {
+        Self::collect(items, |pair| {
+            for row in 0..self.len() {
+                self.row(row).iter().for_each(|&item| pair(item, row as u32));
+            }
+        })
+    }
+}
+
+/// Entities of one kind: who holds each, and which each rank holds, both ascending.
+struct Held {
+    holders: Rows,
+    by_rank: Rows,
+}
+
+/// Finds out who holds the entities that `of_tet` gives for each tet.
+fn held<const K: usize>(entities: usize, tets_by_rank: &Rows, of_tet: impl Fn(u32) -> [u32; K]) -> Held {
+    let holders = Rows::collect(entities, |pair| {
+        let mut last_holder = vec![Rank::MAX; entities];
+        for rank in 0..tets_by_rank.len() {
+            for &tet in tets_by_rank.row(rank) {
+                for entity in of_tet(tet) {
+                    if std::mem::replace(&mut last_holder[entity as usize], rank as Rank) != rank as Rank {
+                        pair(entity, rank as Rank);
+                    }
+                }
+            }
+        }
+    });
+    let by_rank = holders.transposed(tets_by_rank.len());
+    Held { holders, by_rank }
+}
+
+impl Held {
+    /// What `rank` holds.
+    fn entities(&self, rank: Rank, classes: &[Class]) -> Entities {
+        let ids = self.by_rank.row(rank as usize);
+        let mut shared = Shared::default();
+        for (local, &id) in (0..).zip(ids) {
+            let holders = self.holders.row(id as usize);
+            if holders.len() > 1 {
+                shared.push(local, holders.iter().copied());
+            }
+        }
+        Entities {
+            ids: ids.iter().map(|&id| GlobalId::from(id)).collect(),
+            classes: ids.iter().map(|&id| classes[id as usize]).collect(),
+            shared,
+        }
+    }
+}
+
+/// All that rank 0 knows when it cuts the mesh into pieces.
+struct Plan {
+    mesh: Mesh,
+    edge_classes: Vec<Class>,
+    face_classes: Vec<Class>,
+    triangles: Vec<Triangle>,
+    /// Indices into `triangles`.
+    triangles_by_rank: Rows,
+    tets_by_rank: Rows,
+    vertices: Held,
+    edges: Held,
+    faces: Held,
+}
+
+/// Lists, classifies and finds the holders.
+fn plan(mesh: Mesh, part: &[Rank], ranks: u32) -> Result<Plan, DistError> {
+    let tets = mesh.tets.len();
+    if part.len() != tets {
+        return Err(DistError::PartsMismatch { tets, parts: part.len() });
+    }
+    if tets > topology::MAX_TETS {
+        return Err(DistError::TooManyTets { tets });
+    }
+    if let Some(tet) = part.iter().position(|&rank| rank >= ranks) {
+        return Err(DistError::NoSuchRank { tet, part: part[tet], ranks });
+    }
+    let tets_by_rank =
+        Rows::collect(ranks as usize, |pair| (0..).zip(part).for_each(|(tet, &r)| pair(r, tet)));
+    let vertices = held(mesh.points.len(), &tets_by_rank, |t| mesh.tets[t as usize].map(|v| v.0));
+    if let Some(vertex) = (0..mesh.points.len()).find(|&v| vertices.holders.row(v).is_empty()) {
+        return Err(DistError::UnusedVertex { vertex });
+    }
+    let listed_edges = topology::edges(mesh.points.len(), &mesh.tets);
+    let listed_faces = topology::faces(mesh.points.len(), &mesh.tets);
+    let Classified { edge_classes, face_classes, triangles } = classify(&mesh, &listed_edges, &listed_faces)?;
+    let edge_ids = |t: u32| listed_edges.tet_edges[t as usize].map(|EdgeId(id)| id);
+    let face_ids = |t: u32| listed_faces.tet_faces[t as usize].map(|FaceId(id)| id);
+    let edges = held(edge_classes.len(), &tets_by_rank, edge_ids);
+    let faces = held(face_classes.len(), &tets_by_rank, face_ids);
+    let triangles_by_rank = Rows::collect(ranks as usize, |pair| {
+        for (index, triangle) in (0..).zip(&triangles) {
+            faces.holders.row(triangle.face.index()).iter().for_each(|&rank| pair(rank, index));
+        }
+    });
+    Ok(Plan {
+        mesh,
+        edge_classes,
+        face_classes,
+        triangles,
+        triangles_by_rank,
+        tets_by_rank,
+        vertices,
+        edges,
+        faces,
+    })
+}
+
+impl Plan {
+    fn totals(&self) -> Totals {
+        Totals {
+            vertices: self.mesh.points.len() as u64,
+            edges: self.edge_classes.len() as u64,
+            faces: self.face_classes.len() as u64,
+            tets: self.mesh.tets.len() as u64,
+            boundary: self.triangles.len() as u64,
+        }
+    }
+
+    /// What `rank` is sent. `local` is scratch: the local ids of this rank's vertices and faces by global id.
+    fn piece(&self, rank: Rank, local: &mut Vec<u32>) -> Piece {
+        local.resize(self.mesh.points.len().max(self.face_classes.len()), 0);
+        let vertices = self.vertices.by_rank.row(rank as usize);
+        let tets = self.tets_by_rank.row(rank as usize);
+        (0..).zip(vertices).for_each(|(index, &v)| local[v as usize] = index);
+        let local_tets =
+            tets.iter().map(|&t| self.mesh.tets[t as usize].map(|v| VertexId(local[v.index()]))).collect();
+        (0..).zip(self.faces.by_rank.row(rank as usize)).for_each(|(index, &f)| local[f as usize] = index);
+        let triangles = self.triangles_by_rank.row(rank as usize).iter().map(|&t| {
+            let triangle = self.triangles[t as usize];
+            Triangle { face: FaceId(local[triangle.face.index()]), ..triangle }
+        });
+        Piece {
+            totals: self.totals(),
+            points: vertices.iter().map(|&v| self.mesh.points[v as usize]).collect(),
+            vertices: self.vertices.entities(rank, &self.mesh.classes),
+            edges: self.edges.entities(rank, &self.edge_classes),
+            faces: self.faces.entities(rank, &self.face_classes),
+            tet_ids: tets.iter().map(|&t| GlobalId::from(t)).collect(),
+            tets: local_tets,
+            bodies: tets.iter().map(|&t| self.mesh.bodies[t as usize]).collect(),
+            triangles: triangles.collect(),
+        }
+    }
+}
+
+#[cfg(test)]
+#[path = "distribute_tests.rs"]
+mod tests;
