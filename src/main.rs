@@ -1,6 +1,24 @@
-//! The command `tetmill`.
+//! The command `tetmill`: from solid geometry to partitioned tetrahedral meshes, in parallel.
 
-use csg as _;
-use tetmill as _;
+mod cli;
+mod commands;
 
-fn main() {}
+use clap::Parser;
+use cli::{Cli, Command};
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    let done = match Cli::parse().command {
+        Command::Generate(options) => commands::run_generate(&options),
+        Command::Mesh(options) => commands::run_mesh(&options),
+        Command::Inspect(options) => commands::run_inspect(&options),
+        Command::Check(options) => commands::run_check(&options),
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            eprintln!("tetmill: {failure}");
+            ExitCode::from(failure.status as u8)
+        }
+    }
+}

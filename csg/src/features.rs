@@ -1,6 +1,44 @@
 //! Corners, curves and patches of the bodies of a geometry.
+//!
+//! [`Features::find`] goes this way:
+//!
+//! 1. `bounds`: a box around all bodies, by pruning a huge cube.
+//! 2. `octree`: cells, in each the part of each body that matters there; split until any two surfaces in a
+//!    cell either cannot meet in it or meet in a curve that is monotone there, which interval arithmetic proves.
+//! 3. `trace`: from seeds in the cells, the intersection curves of all such pairs of surfaces.
+//! 4. `cross`: on them, the points where a third surface crosses: they cut the curves into arcs.
+//! 5. `around`: at a point of each arc, the regions (bodies or the exterior) around it, sector by sector.
+//!    An arc is part of a feature if it is more than a line on one smooth sheet.
+//! 6. `assemble`: arcs to curves and corners, sheets to patches; `number`: boundary numbers and names.
+//! 7. `check`: whether it all fits together; `contact`: whether places where surfaces are tangent matter.
+//!
+//! Why trace all pairs and classify afterwards, and not follow edges from special points like NETGEN: no
+//! decision depends on a tolerance while a curve is followed; surfaces in special position (three through
+//! one curve, four through one point, a plane through a seam between tangent surfaces) need no case of their own; and
+//! what was missed shows as an open end.
+//!
+//! What is refused, with its place: the apex of a cone on a boundary, surfaces that touch without crossing where both
+//! are boundaries (a ball on a plate), bodies that overlap or are not bounded.
 
-use crate::{Aabb, BodyId, CornerId, CurveId, PatchId, Point, SurfaceId};
+use crate::{Aabb, BodyId, CornerId, CurveId, Geometry, PatchId, Point, SurfaceId};
+use around::Tolerances;
+
+mod arcs;
+mod around;
+mod assemble;
+mod bounds;
+mod check;
+mod contact;
+mod cross;
+mod error;
+mod extent;
+mod number;
+mod octree;
+mod trace;
+
+pub use check::Inconsistency;
+pub use error::{FeatureError, Named, Place};
+pub use trace::{curve_curvature, curve_tangent};
 
 /// A point where curves end, or a vertex of its own (`point`, the apex of a cone).
 #[derive(Clone, Debug)]
@@ -71,7 +109,35 @@ pub struct Features {
     pub bounds: Aabb,
 }
 
+impl Curve {
+    /// Its length, to second order in the angle between the points of its trace.
+    pub fn length(&self) -> f64 {
+        self.trace.windows(2).map(|ends| (ends[1] - ends[0]).norm()).sum()
+    }
+}
+
 impl Features {
+    /// Finds the features of a geometry.
+    ///
+    /// # Errors
+    /// What cannot be meshed is refused with its place, see [`FeatureError`].
+    pub fn find(geometry: &Geometry) -> Result<Self, FeatureError> {
+        let root = bounds::bounding_cell(geometry)?;
+        let diagonal = root.iter().map(|side| side.width().powi(2)).sum::<f64>().sqrt();
+        let largest = root.iter().map(crate::Interval::magnitude).fold(0.0, f64::max);
+        let tolerances = Tolerances::new(diagonal, largest);
+        let tree = octree::Octree::new(geometry, root)?;
+        contact::refuse_apexes(geometry, &tree)?;
+        let traces = trace::trace_all(geometry, &tree, &tolerances);
+        let (arcs, nodes) = arcs::feature_arcs(geometry, &tree, &traces, &tolerances)?;
+        let arcs = assemble::join(geometry, arcs, &nodes, &tolerances)?;
+        contact::check(geometry, &tree, &arcs, &tolerances)?;
+        let mut features = assemble::entities(geometry, &tree, &arcs, &nodes, &tolerances)?;
+        number::number(geometry, &mut features.patches);
+        features.check()?;
+        Ok(features)
+    }
+
     /// The curve with this id.
     pub fn curve(&self, id: CurveId) -> &Curve {
         &self.curves[id.index()]
@@ -85,7 +151,3 @@ impl Features {
         &self.corners[id.index()]
     }
 }
-
-/// Why the features could not be found.
-#[derive(Clone, Debug, thiserror::Error)]
-pub enum FeatureError {}

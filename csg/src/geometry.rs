@@ -126,6 +126,33 @@ pub struct UserPoint {
     pub span: Span,
 }
 
+/// A boundary-condition number or name for the part of some surfaces that bounds one body
+/// (`boundarycondition`, `boundaryconditionname`).
+///
+/// Overrides apply in file order, after patches have their numbers from [`SurfaceInfo::bc`] or the counter. A
+/// number replaces the patch's number; a name goes to the patch alone: where the number came from
+/// [`SurfaceInfo::bc`], which other patches may have too, the patch first gets a fresh one.
+#[derive(Clone, Debug)]
+pub struct BoundaryOverride {
+    /// The surfaces, ascending.
+    pub surfaces: Vec<SurfaceId>,
+    /// The body, which may be on either side of them.
+    pub body: BodyId,
+    /// The number or the name.
+    pub label: BoundaryLabel,
+    /// Where it stands in the file.
+    pub span: Span,
+}
+
+/// What a [`BoundaryOverride`] gives to its patches.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum BoundaryLabel {
+    /// A boundary-condition number, from 1.
+    Number(u32),
+    /// A boundary name.
+    Name(String),
+}
+
 /// What a `.geo` file says.
 #[derive(Clone, Debug, Default)]
 pub struct Geometry {
@@ -137,6 +164,8 @@ pub struct Geometry {
     pub bodies: Vec<Body>,
     /// Points to be kept as mesh vertices.
     pub user_points: Vec<UserPoint>,
+    /// Numbers and names for single boundaries of bodies, in file order.
+    pub boundary_overrides: Vec<BoundaryOverride>,
     /// The `boundingbox` statement: an override, never needed.
     pub stated_box: Option<Aabb>,
 }

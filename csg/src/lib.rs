@@ -18,7 +18,9 @@ pub mod solid;
 pub mod surface;
 
 pub use features::{Corner, Curve, FeatureError, Features, Fin, Patch};
-pub use geometry::{Aabb, Body, BodyId, CornerId, CurveId, Geometry, PatchId, SurfaceId};
+pub use geometry::{
+    Aabb, Body, BodyId, BoundaryLabel, BoundaryOverride, CornerId, CurveId, Geometry, PatchId, SurfaceId,
+};
 pub use interval::Interval;
 pub use project::{ProjectionFailed, Projector};
 pub use solid::Solid;

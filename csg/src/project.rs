@@ -159,7 +159,7 @@ pub(crate) fn project_to_both(
 }
 
 /// The shortest vector s with gradientᵢ·s = -valueᵢ; `None` where the gradients are parallel.
-fn shortest_step(values: [f64; 2], gradients: [Vector; 2], squares: [f64; 2]) -> Option<Vector> {
+pub(crate) fn shortest_step(values: [f64; 2], gradients: [Vector; 2], squares: [f64; 2]) -> Option<Vector> {
     /// The least square of the sine between the gradients: below it rounding of the values, 1e-16, would move
     /// the point by more than 1e-9.
     const LEAST_SINE_SQUARED: f64 = 1e-14;

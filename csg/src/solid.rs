@@ -1,6 +1,6 @@
 //! Boolean trees over half-spaces.
 
-use crate::SurfaceId;
+use crate::{Interval, Point, Surface, SurfaceId};
 
 /// A set of points of space.
 #[derive(Clone, Debug, PartialEq)]
@@ -18,4 +18,171 @@ pub enum Solid {
     Or(Vec<Solid>),
     /// The complement.
     Not(Box<Solid>),
+}
+
+/// Where a point is with respect to a solid.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Side {
+    /// In its interior.
+    Inside,
+    /// In the interior of its complement.
+    Outside,
+    /// On its boundary, or too near to tell.
+    On,
+}
+
+/// What a solid is inside a box.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Pruned {
+    /// Nothing.
+    Empty,
+    /// The whole box.
+    Full,
+    /// This solid, made of the surfaces only that may pass through the box.
+    Part(Solid),
+}
+
+impl Solid {
+    /// The surfaces of its half-spaces, ascending.
+    pub fn surfaces(&self) -> Vec<SurfaceId> {
+        fn collect(solid: &Solid, into: &mut Vec<SurfaceId>) {
+            match solid {
+                Solid::Half { surface, .. } => into.push(*surface),
+                Solid::And(members) | Solid::Or(members) => members.iter().for_each(|m| collect(m, into)),
+                Solid::Not(solid) => collect(solid, into),
+            }
+        }
+        let mut surfaces = Vec::new();
+        collect(self, &mut surfaces);
+        surfaces.sort_unstable();
+        surfaces.dedup();
+        surfaces
+    }
+
+    /// Whether a point is inside of which `positive` tells on which side of each surface it is.
+    pub fn holds(&self, positive: &dyn Fn(SurfaceId) -> bool) -> bool {
+        match self {
+            Self::Half { surface, positive: side } => positive(*surface) == *side,
+            Self::And(members) => members.iter().all(|m| m.holds(positive)),
+            Self::Or(members) => members.iter().any(|m| m.holds(positive)),
+            Self::Not(solid) => !solid.holds(positive),
+        }
+    }
+
+    /// Where `point` is; `On` if it is within `tolerance` (a length) of a surface that matters there.
+    pub fn side(&self, surfaces: &[Surface], point: &Point, tolerance: f64) -> Side {
+        let answer = self.prune(&mut |id| {
+            let surface = &surfaces[id.index()];
+            let value = surface.value(point);
+            let slack = tolerance * surface.gradient(point).norm();
+            Interval::new(value - slack, value + slack)
+        });
+        match answer {
+            Pruned::Empty => Side::Outside,
+            Pruned::Full => Side::Inside,
+            Pruned::Part(_) => Side::On,
+        }
+    }
+
+    /// What it is in a box over which each surface's function has the range that `range` gives.
+    ///
+    /// Three-valued evaluation that keeps what is undecided (Duff 1992, Interval arithmetic and recursive
+    /// subdivision for implicit functions and constructive solid geometry).
+    pub fn prune(&self, range: &mut dyn FnMut(SurfaceId) -> Interval) -> Pruned {
+        match self {
+            Self::Half { surface, positive } => {
+                let Interval { lo, hi } = range(*surface);
+                match (lo > 0.0, hi < 0.0) {
+                    (true, _) if *positive => Pruned::Full,
+                    (true, _) => Pruned::Empty,
+                    (_, true) if *positive => Pruned::Empty,
+                    (_, true) => Pruned::Full,
+                    _ => Pruned::Part(self.clone()),
+                }
+            }
+            Self::Not(solid) => match solid.prune(range) {
+                Pruned::Empty => Pruned::Full,
+                Pruned::Full => Pruned::Empty,
+                Pruned::Part(part) => Pruned::Part(Self::Not(Box::new(part))),
+            },
+            Self::And(members) => prune_members(members, range, Pruned::Empty, Pruned::Full, Self::And),
+            Self::Or(members) => prune_members(members, range, Pruned::Full, Pruned::Empty, Self::Or),
+        }
+    }
+}
+
+/// Prunes each member; one that is `decisive` decides, those that are `neutral` are left out.
+fn prune_members(
+    members: &[Solid],
+    range: &mut dyn FnMut(SurfaceId) -> Interval,
+    decisive: Pruned,
+    neutral: Pruned,
+    join: fn(Vec<Solid>) -> Solid,
+) -> Pruned {
+    let mut parts = Vec::new();
+    for member in members {
+        match member.prune(range) {
+            Pruned::Part(part) => parts.push(part),
+            answer if answer == decisive => return decisive,
+            _ => {}
+        }
+    }
+    match parts.len() {
+        0 => neutral,
+        1 => Pruned::Part(parts.remove(0)),
+        _ => Pruned::Part(join(parts)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Vector;
+    use crate::primitive::{Plane, Sphere};
+
+    /// The unit ball, and the half-space x < 0.
+    fn surfaces() -> Vec<Surface> {
+        vec![
+            Surface::Sphere(Sphere { center: Point::origin(), radius: 1.0 }),
+            Surface::Plane(Plane { point: Point::origin(), normal: Vector::x() }),
+        ]
+    }
+
+    fn half(id: u32) -> Solid {
+        Solid::Half { surface: SurfaceId(id), positive: false }
+    }
+
+    #[test]
+    fn points_are_inside_outside_or_on_a_half_ball() {
+        let solid = Solid::And(vec![half(0), half(1)]);
+        let side = |x: f64| solid.side(&surfaces(), &Point::new(x, 0.1, 0.2), 1e-9);
+        assert_eq!(
+            [side(-0.5), side(0.5), side(0.0), side(-2.0)],
+            [Side::Inside, Side::Outside, Side::On, Side::Outside]
+        );
+    }
+
+    #[test]
+    fn a_surface_that_is_buried_in_the_solid_does_not_count() {
+        let solid = Solid::Or(vec![half(0), half(1)]);
+        assert_eq!(solid.side(&surfaces(), &Point::new(0.0, 0.1, 0.2), 1e-9), Side::Inside);
+        assert_eq!(
+            Solid::Not(Box::new(solid)).side(&surfaces(), &Point::new(0.0, 0.1, 0.2), 1e-9),
+            Side::Outside
+        );
+    }
+
+    #[test]
+    fn pruning_keeps_only_the_surfaces_that_may_pass_through_the_box() {
+        let solid = Solid::And(vec![half(0), half(1)]);
+        let prune = |x: f64| {
+            let cell = [Interval::new(x, x + 0.3), Interval::new(0.0, 0.3), Interval::new(0.0, 0.3)];
+            solid.prune(&mut |id| surfaces()[id.index()].value_range(&cell))
+        };
+        assert_eq!(prune(-0.1), Pruned::Part(half(1)));
+        assert_eq!(prune(-1.1), Pruned::Part(half(0)));
+        assert_eq!(prune(0.2), Pruned::Empty);
+        assert_eq!(prune(-0.5), Pruned::Full);
+        assert_eq!(solid.surfaces(), [SurfaceId(0), SurfaceId(1)]);
+    }
 }

@@ -87,6 +87,26 @@ impl Surface {
         if value == 0.0 { 0.0 } else { value / self.gradient(point).norm() }
     }
 
+    /// The point of a closed surface (sphere, torus, ellipsoid) farthest in a direction, a unit vector, one of
+    /// them if there are more; `None` for other surfaces.
+    pub fn support(&self, direction: &Vector) -> Option<Point> {
+        match self {
+            Self::Sphere(s) => Some(s.center + direction * s.radius),
+            Self::Torus(t) => Some(t.support(direction)),
+            Self::Ellipsoid(e) => Some(e.support(direction)),
+            _ => None,
+        }
+    }
+
+    /// The apex of a cone; `None` for other surfaces.
+    pub fn apex(&self) -> Option<Point> {
+        match self {
+            Self::Cone(c) => Some(c.apex()),
+            Self::EllipticCone(c) => Some(c.apex()),
+            _ => None,
+        }
+    }
+
     /// An interval that contains the function's values over a box.
     pub fn value_range(&self, cell: &Cell) -> Interval {
         // The mean-value form closes in with the square of the size of the box, which the formula term

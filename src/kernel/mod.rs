@@ -1,5 +1,7 @@
 //! Geometry that every stage rests on: exact signs, simplices, shape measures, search, order.
 
+pub mod hilbert;
 pub mod predicates;
 pub mod quality;
+pub mod random;
 pub mod simplex;

@@ -1,6 +1,35 @@
 //! Surface meshing: curves into segments, patches into triangles.
+//!
+//! [`mesh_patches`] takes the segments of all curves and fills each patch with triangles. A patch is meshed by itself, in
+//! the **chart** of its surface (`chart`), in which the signs of triangles are exact:
+//!
+//! 1. `embed`: the triangulation of its boundary vertices in which all segments are edges, carved to the inside;
+//! 2. `condition`: where that is far from parallel to the surface, it is cut first;
+//! 3. `front`: new vertices advance in layers from the boundary inward, at the distance that the size field wants;
+//! 4. `improve`: swaps, moves, collapses and splits, and the repair of triangles that would flatten in refinement.
+//!
+//! At every moment the triangles are an embedding in the chart, so no stage can leave a hole or an overlap. What is
+//! *not* guaranteed is the shape of triangles where segments are far longer than the gaps between curves; segments that cross
+//! in the chart, because curves are cut too coarsely there, are an error that says where.
 
+mod chart;
+pub mod check;
+mod condition;
 pub mod curves;
+mod embed;
+mod front;
+mod improve;
+mod patch;
+mod plane;
+mod report;
+mod sheet;
+#[cfg(test)]
+mod tests;
+mod topology;
+
+pub use check::SurfaceFault;
+pub use patch::{SurfaceError, mesh_patches};
+pub use report::{PatchReport, Report};
 
 use crate::Point;
 use crate::mesh::{BoundaryTriangle, Class, Segment};
@@ -18,4 +47,24 @@ pub struct SurfaceMesh {
     pub segments: Vec<Segment>,
     /// The triangles, with normals from the patch's `inside` to its `outside`.
     pub triangles: Vec<BoundaryTriangle>,
+}
+
+/// How patches are meshed.
+#[derive(Clone, Debug)]
+pub struct Settings {
+    /// The most that the surface's normal may turn along an edge, in radians: bounds the size by `turn / curvature`, so that a
+    /// closed surface is closed whatever the size field wants. The regular icosahedron needs 1.05.
+    pub turn: f64,
+    /// How fast the size grows away from the segments, as a length per length.
+    pub growth: f64,
+    /// Rounds of collapses, splits, swaps and moves after the front.
+    pub rounds: usize,
+    /// The most vertices of one patch; more is an error.
+    pub max_vertices: usize,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self { turn: 1.1, growth: 0.4, rounds: 3, max_vertices: 200_000_000 }
+    }
 }

@@ -1,1 +1,72 @@
-//! (to come)
+//! The language of `.geo` files: from text to a [`Geometry`].
+//!
+//! A file begins with `algebraic3d`. A **solid** is named by `solid NAME = ...;`, where primitives (half-spaces,
+//! balls, infinite cylinders, ...) are combined by `and`, `or` and `not`. A **top-level object**, `tlo NAME;`, says
+//! that the solid is a body to be meshed. Flags as `-maxh=0.1` stand at the end of a statement.
+//!
+//! ```
+//! let source = "algebraic3d
+//! solid can = cylinder (0, 0, 0; 0, 0, 1; 0.5)   # infinite
+//!         and plane (0, 0, 0; 0, 0, -1)          # the normal points outward
+//!         and plane (0, 0, 2; 0, 0, 1);
+//! tlo can -material=tin;
+//! ";
+//! let parsed = csg::language::parse_geometry(source, "can.geo").unwrap();
+//! assert_eq!(parsed.geometry.surfaces.len(), 3);
+//! assert_eq!(parsed.geometry.bodies[0].material.as_deref(), Some("tin"));
+//!
+//! let errors = csg::language::parse_geometry("algebraic3d\ntlo can;", "can.geo").unwrap_err();
+//! assert!(errors.to_string().starts_with("can.geo:2:5: error: there is no solid `can`"));
+//! ```
+//!
+//! The language is NETGEN's. Where that program is silent about a mistake (unknown names, curves that do not
+//! join, a radius of zero, misspelt flags), this one says so; where it refuses to move a primitive, this one does.
+//! Numbers of bodies and boundaries are the same.
+//!
+//! Not done here: nothing tells whether bodies overlap or are unbounded; that needs [`Features`](crate::Features).
+
+mod ast;
+mod diagnostic;
+mod lower;
+mod parse;
+mod suggest;
+mod token;
+
+pub use diagnostic::{Diagnostic, Diagnostics, Kind};
+
+use crate::Geometry;
+use diagnostic::Report;
+
+/// What a file says, and what its author should know.
+#[derive(Clone, Debug)]
+pub struct Parsed {
+    /// What it says.
+    pub geometry: Geometry,
+    /// Warnings, in file order.
+    pub warnings: Vec<Diagnostic>,
+}
+
+/// Reads a geometry; `file_name` is for messages only.
+///
+/// # Errors
+/// All messages, warnings included, if one of them is an error, or if the file asks for something that
+/// cannot be meshed yet ([`Diagnostics::is_unsupported`]).
+pub fn parse_geometry(source: &str, file_name: &str) -> Result<Parsed, Diagnostics> {
+    let mut report = Report::default();
+    let statements = parse::parse(source, &mut report);
+    let geometry = lower::lower(&statements, &mut report);
+    let failed = report.has_errors();
+    let messages = report.finish(source, file_name);
+    if failed { Err(Diagnostics { messages }) } else { Ok(Parsed { geometry, warnings: messages }) }
+}
+
+/// Reads a geometry from the bytes of a file, which may have comments in any encoding.
+///
+/// # Errors
+/// As [`parse_geometry`]; bytes that are not UTF-8 outside comments are unknown characters.
+pub fn parse_geometry_bytes(source: &[u8], file_name: &str) -> Result<Parsed, Diagnostics> {
+    parse_geometry(&String::from_utf8_lossy(source), file_name)
+}
+
+#[cfg(test)]
+mod tests;

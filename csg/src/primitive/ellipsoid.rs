@@ -7,6 +7,13 @@ use crate::{Point, ProjectionFailed, Vector};
 use nalgebra::{Isometry3, Matrix3};
 
 impl Ellipsoid {
+    /// The point farthest in a direction.
+    pub(crate) fn support(&self, direction: &Vector) -> Point {
+        let weights = [0, 1, 2].map(|i| self.radii[i] * direction.dot(&self.axes[i]));
+        let length = weights.iter().map(|w| w * w).sum::<f64>().sqrt();
+        (0..3).fold(self.center, |p, i| p + self.axes[i] * (self.radii[i] * weights[i] / length))
+    }
+
     fn scale(&self) -> f64 {
         self.radii.iter().copied().fold(f64::INFINITY, f64::min)
     }

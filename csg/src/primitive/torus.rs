@@ -2,13 +2,20 @@
 //!
 //! Not smooth on the axis, which a ring torus keeps clear of.
 
-use super::quadric::reject;
+use super::quadric::{reject, tangents};
 use super::{Primitive, Torus, reject_range};
 use crate::interval::{Cell, Interval, dot, offset};
 use crate::{Point, ProjectionFailed, Vector};
 use nalgebra::{Isometry3, Matrix3};
 
 impl Torus {
+    /// The point farthest in a direction, a unit vector.
+    pub(crate) fn support(&self, direction: &Vector) -> Point {
+        let across = reject(direction, &self.axis);
+        let outward = across.try_normalize(1e-9).unwrap_or_else(|| tangents(&self.axis).0);
+        self.center + outward * self.major + direction * self.minor
+    }
+
     /// The vector from the axis, its length, and the height over the middle plane.
     #[inline]
     fn split(&self, point: &Point) -> (Vector, f64, f64) {

@@ -1,0 +1,348 @@
+//! Traces cut at crossings into arcs, classified by what is around them.
+
+use super::around::{Around, Tolerances, around};
+use super::cross::{Crossing, crossings};
+use super::octree::Octree;
+use super::trace::{Trace, along, tangent};
+use super::{FeatureError, Named, Place};
+use crate::project::project_to_both;
+use crate::{Geometry, Point, SurfaceId, Vector};
+use std::collections::HashMap;
+
+/// Points where traces are cut; those within the tolerance of merging are one.
+#[derive(Debug, Default)]
+pub(super) struct Nodes {
+    /// Where they are, and how well each is determined (the largest volume spanned by three normals there).
+    points: Vec<(Point, f64)>,
+    /// The nodes in each cell of a grid that is as wide as the tolerance.
+    grid: HashMap<[i64; 3], Vec<usize>>,
+}
+
+impl Nodes {
+    /// The node at a point, new or old.
+    fn add(&mut self, point: &Point, volume: f64, tolerances: &Tolerances) -> usize {
+        let size = tolerances.merge;
+        let key = [0, 1, 2].map(|i| (point[i] / size).floor() as i64);
+        for shift in 0..27 {
+            let near = [key[0] + shift % 3 - 1, key[1] + shift / 3 % 3 - 1, key[2] + shift / 9 - 1];
+            for &node in self.grid.get(&near).into_iter().flatten() {
+                if (self.points[node].0 - point).norm() <= size {
+                    if volume > self.points[node].1 {
+                        self.points[node] = (*point, volume);
+                    }
+                    return node;
+                }
+            }
+        }
+        self.grid.entry(key).or_default().push(self.points.len());
+        self.points.push((*point, volume));
+        self.points.len() - 1
+    }
+
+    /// Where a node is.
+    pub fn point(&self, node: usize) -> Point {
+        self.points[node].0
+    }
+}
+
+/// A piece of a trace between crossings, or a closed one without.
+#[derive(Clone, Debug)]
+pub(super) struct Arc {
+    /// The two surfaces that it is computed from.
+    pub pair: [SurfaceId; 2],
+    /// Points on it.
+    pub points: Vec<Point>,
+    /// The nodes at its ends, `None` where the trace was left; no ends at all where it is closed.
+    pub ends: Option<[Option<usize>; 2]>,
+    /// What is around it.
+    pub around: Around,
+    /// A point inside it.
+    pub middle: Point,
+    /// The sine of the angle between the surfaces in the middle.
+    sine: f64,
+}
+
+/// The arcs that are parts of features, each once, and the nodes at their ends.
+///
+/// # Errors
+/// If something is not the same all along an arc, or an arc ends where nothing ends it.
+pub(super) fn feature_arcs(
+    geometry: &Geometry,
+    tree: &Octree,
+    traces: &[Trace],
+    tolerances: &Tolerances,
+) -> Result<(Vec<Arc>, Nodes), FeatureError> {
+    let mut nodes = Nodes::default();
+    let mut cuts: Vec<_> =
+        traces.iter().map(|trace| cuts(geometry, tree, trace, &mut nodes, tolerances)).collect();
+    for (trace, cuts) in traces.iter().zip(&mut cuts) {
+        cut_at_known_nodes(geometry, trace, &nodes, cuts, tolerances);
+    }
+    let mut arcs = Vec::new();
+    for (trace, cuts) in traces.iter().zip(&cuts) {
+        for (points, ends) in pieces(trace, cuts, &nodes, tolerances) {
+            if let Some(arc) = classify(geometry, tree, trace.pair, points, ends, tolerances)? {
+                arcs.push(arc);
+            }
+        }
+    }
+    Ok((each_once(geometry, arcs, tolerances)?, nodes))
+}
+
+/// The positions on a trace where it is cut, ascending, and the nodes there.
+fn cuts(
+    geometry: &Geometry,
+    tree: &Octree,
+    trace: &Trace,
+    nodes: &mut Nodes,
+    tolerances: &Tolerances,
+) -> Vec<(f64, usize)> {
+    let last = trace.points.len() - 1;
+    let mut all: Vec<Crossing> = crossings(geometry, tree, trace, tolerances);
+    let end =
+        |position: usize| Crossing { position: position as f64, point: trace.points[position], volume: 0.0 };
+    if trace.branches[0] {
+        all.insert(0, end(0));
+    }
+    if trace.branches[1] {
+        all.push(end(last));
+    }
+    let mut cuts: Vec<(f64, usize)> = Vec::new();
+    for crossing in all {
+        let node = nodes.add(&crossing.point, crossing.volume, tolerances);
+        let again = cuts.last().is_some_and(|&(position, known)| {
+            known == node && length(trace, position, crossing.position) <= 4.0 * tolerances.merge
+        });
+        if !again {
+            cuts.push((crossing.position, node));
+        }
+    }
+    // On a closed trace the same crossing may stand at both ends.
+    if let (true, [first, .., end]) = (trace.closed, &cuts[..]) {
+        let around = length(trace, end.0, last as f64) + length(trace, 0.0, first.0);
+        if first.1 == end.1 && around <= 4.0 * tolerances.merge {
+            cuts.pop();
+        }
+    }
+    cuts
+}
+
+/// Cuts a trace also at the nodes on it that were found on other traces.
+///
+/// Two traces may go over one piece of curve; a surface that matters nowhere near it may have been met by the
+/// longer steps of one and not of the other. Cut alike, they are known to be the same.
+fn cut_at_known_nodes(
+    geometry: &Geometry,
+    trace: &Trace,
+    nodes: &Nodes,
+    cuts: &mut Vec<(f64, usize)>,
+    tolerances: &Tolerances,
+) {
+    let lowest = trace.points.iter().fold(trace.points[0], |m, p| m.inf(p));
+    let highest = trace.points.iter().fold(trace.points[0], |m, p| m.sup(p));
+    let room = 0.1 * (highest - lowest).norm();
+    for (node, (point, _)) in nodes.points.iter().enumerate() {
+        let is_near = (0..3).all(|i| lowest[i] - room <= point[i] && point[i] <= highest[i] + room);
+        let is_on = |s: &SurfaceId| geometry.surfaces[s.index()].distance(point) <= tolerances.on_surface;
+        if !is_near || cuts.iter().any(|c| c.1 == node) || !trace.pair.iter().all(is_on) {
+            continue;
+        }
+        let steps = trace.points.windows(2).enumerate();
+        let position = steps.filter_map(|(i, ends)| along(ends, point).map(|part| i as f64 + part)).next();
+        cuts.extend(position.map(|position| (position, node)));
+    }
+    cuts.sort_by(|x, y| x.0.total_cmp(&y.0));
+}
+
+/// The length of a trace between two positions.
+fn length(trace: &Trace, from: f64, to: f64) -> f64 {
+    let at = |position: f64| {
+        let step = (position as usize).min(trace.points.len() - 2);
+        trace.points[step] + (trace.points[step + 1] - trace.points[step]) * (position - step as f64)
+    };
+    let stops = (from as usize + 1..=to as usize).map(|i| trace.points[i]);
+    let (mut sum, mut last) = (0.0, at(from));
+    for stop in stops.chain([at(to)]) {
+        sum += (stop - last).norm();
+        last = stop;
+    }
+    sum
+}
+
+/// The points and ends of an arc.
+type Piece = (Vec<Point>, Option<[Option<usize>; 2]>);
+
+/// Cuts a trace.
+fn pieces(trace: &Trace, cuts: &[(f64, usize)], nodes: &Nodes, tolerances: &Tolerances) -> Vec<Piece> {
+    let last = trace.points.len() - 1;
+    if cuts.is_empty() {
+        let ends = if trace.closed { None } else { Some([None, None]) };
+        return vec![(trace.points.clone(), ends)];
+    }
+    let mut pieces = Vec::new();
+    for two in cuts.windows(2) {
+        let inner = inner_points(trace, two[0].0, two[1].0);
+        pieces.push((inner, Some([Some(two[0].1), Some(two[1].1)])));
+    }
+    let (first, end) = (cuts[0], cuts[cuts.len() - 1]);
+    if trace.closed {
+        let mut inner = inner_points(trace, end.0, last as f64);
+        inner.extend((end.0 < last as f64).then_some(trace.points[last]));
+        inner.extend(inner_points(trace, 0.0, first.0));
+        pieces.push((inner, Some([Some(end.1), Some(first.1)])));
+    } else {
+        if first.0 > 0.0 {
+            let inner = [&trace.points[..1], &inner_points(trace, 0.0, first.0)].concat();
+            pieces.push((inner, Some([None, Some(first.1)])));
+        }
+        if end.0 < last as f64 {
+            let mut inner = inner_points(trace, end.0, last as f64);
+            inner.push(trace.points[last]);
+            pieces.push((inner, Some([Some(end.1), None])));
+        }
+    }
+    for (points, ends) in &mut pieces {
+        let [start, end] = ends.expect("a cut trace has no closed pieces").map(|e| e.map(|n| nodes.point(n)));
+        // A point of the trace beside a node would make a step of no length.
+        let beside =
+            |p: &Point| [start, end].iter().flatten().any(|n| (n - p).norm() <= 4.0 * tolerances.merge);
+        points.retain(|p| !beside(p));
+        points.splice(0..0, start);
+        points.extend(end);
+    }
+    pieces
+        .retain(|(points, ends)| points.len() > 2 || ends.is_some_and(|[a, b]| a != b && points.len() == 2));
+    pieces
+}
+
+/// The points of a trace strictly between two positions.
+fn inner_points(trace: &Trace, from: f64, to: f64) -> Vec<Point> {
+    let (first, last) = (from.floor() as usize + 1, to.ceil() as usize);
+    trace.points[first.min(last)..last].to_vec()
+}
+
+/// The point at a part of the length of a polyline, on both surfaces, and the direction there.
+fn sample(
+    geometry: &Geometry,
+    pair: [SurfaceId; 2],
+    points: &[Point],
+    part: f64,
+    tolerances: &Tolerances,
+) -> (Point, Vector) {
+    let total: f64 = points.windows(2).map(|w| (w[1] - w[0]).norm()).sum();
+    let mut left = part * total;
+    let mut ends = &points[..2];
+    for step in points.windows(2) {
+        ends = step;
+        let length = (step[1] - step[0]).norm();
+        if left <= length {
+            break;
+        }
+        left -= length;
+    }
+    let chord = ends[1] - ends[0];
+    let start = ends[0] + chord * (left / chord.norm()).min(1.0);
+    let [a, b] = pair.map(|s| &geometry.surfaces[s.index()]);
+    (project_to_both(a, b, &start, tolerances.exact).unwrap_or(start), chord)
+}
+
+/// The arc of these points if it is part of a feature.
+fn classify(
+    geometry: &Geometry,
+    tree: &Octree,
+    pair: [SurfaceId; 2],
+    points: Vec<Point>,
+    ends: Option<[Option<usize>; 2]>,
+    tolerances: &Tolerances,
+) -> Result<Option<Arc>, FeatureError> {
+    /// Where else than in the middle an arc is looked at: all must agree.
+    const OTHER_PARTS: [f64; 2] = [0.27, 0.81];
+    let look = |part: f64| {
+        let (at, forward) = sample(geometry, pair, &points, part, tolerances);
+        around(geometry, tree, pair, &at, &forward, tolerances).map(|found| (at, found))
+    };
+    let (middle, found) = look(0.52)?;
+    let found = found.filter(Around::is_feature);
+    // Beyond where a trace was left nothing is known: only its middle counts.
+    let whole = ends.is_none_or(|ends| ends.iter().all(Option::is_some));
+    let mut surfaces = found.as_ref().map_or(Vec::new(), |f| f.surfaces.clone());
+    for part in if whole { &OTHER_PARTS[..] } else { &[] } {
+        let (at, other) = look(*part)?;
+        let other = other.filter(Around::is_feature);
+        if other.as_ref().map(|o| &o.sheets) != found.as_ref().map(|f| &f.sheets) {
+            return Err(loose(geometry, pair, &at));
+        }
+        surfaces.extend(other.into_iter().flat_map(|o| o.surfaces));
+    }
+    surfaces.sort_unstable();
+    surfaces.dedup();
+    let [a, b] = pair.map(|s| &geometry.surfaces[s.index()]);
+    let sine = a.normal(&middle).cross(&b.normal(&middle)).norm();
+    Ok(found.map(|around| Arc { pair, points, ends, around: Around { surfaces, ..around }, middle, sine }))
+}
+
+/// Keeps one of arcs that are the same: those of several pairs of surfaces through one curve, and
+/// those that two traces went over. The one whose surfaces cross most steeply stays.
+fn each_once(geometry: &Geometry, arcs: Vec<Arc>, tolerances: &Tolerances) -> Result<Vec<Arc>, FeatureError> {
+    let mut order: Vec<usize> = (0..arcs.len()).collect();
+    order.sort_by(|&x, &y| arcs[y].sine.total_cmp(&arcs[x].sine).then(x.cmp(&y)));
+    let key = |arc: &Arc| arc.ends.map(|[a, b]| (a.min(b), a.max(b)));
+    let (whole, open): (Vec<_>, Vec<_>) =
+        order.into_iter().partition(|&i| arcs[i].ends.is_none_or(|ends| ends.iter().all(Option::is_some)));
+    let mut kept: Vec<usize> = Vec::new();
+    let mut between: HashMap<_, Vec<usize>> = HashMap::new();
+    for i in whole {
+        let known = between.entry(key(&arcs[i])).or_default();
+        if !known.iter().any(|&k| arcs[k].passes(geometry, &arcs[i].middle, tolerances)) {
+            known.push(i);
+            kept.push(i);
+        }
+    }
+    for i in open {
+        if !kept.iter().any(|&k| arcs[k].passes(geometry, &arcs[i].middle, tolerances)) {
+            return Err(loose(geometry, arcs[i].pair, &arcs[i].middle));
+        }
+    }
+    kept.sort_unstable();
+    Ok(kept.into_iter().map(|i| arcs[i].clone()).collect())
+}
+
+fn loose(geometry: &Geometry, pair: [SurfaceId; 2], at: &Point) -> FeatureError {
+    let [first, second] = pair.map(|s| Named::surface(geometry, s));
+    FeatureError::LooseCurve { first, second, place: Place(*at) }
+}
+
+impl Arc {
+    /// Whether a point lies on it.
+    pub fn passes(&self, geometry: &Geometry, point: &Point, tolerances: &Tolerances) -> bool {
+        let on = |s: &SurfaceId| geometry.surfaces[s.index()].distance(point) <= tolerances.on_surface;
+        self.pair.iter().all(on) && self.points.windows(2).any(|ends| along(ends, point).is_some())
+    }
+
+    /// The same arc run the other way.
+    pub fn reversed(mut self) -> Self {
+        self.points.reverse();
+        self.ends = self.ends.map(|[a, b]| [b, a]);
+        for (_, left) in &mut self.around.sheets {
+            *left = !*left;
+        }
+        self.around.sheets.sort_unstable();
+        self
+    }
+
+    /// Whether it may be one curve with the arc `next` that begins where it ends.
+    pub fn continues_in(&self, geometry: &Geometry, next: &Self) -> bool {
+        /// The cosine of the least angle that is a corner where both lie on the same surfaces.
+        const STRAIGHT: f64 = 0.99;
+        let same = self.pair == next.pair || self.around.surfaces == next.around.surfaces;
+        let direction = |arc: &Self, at: &Point, chord: Vector| {
+            let [a, b] = arc.pair.map(|s| &geometry.surfaces[s.index()]);
+            let t = tangent(a, b, at);
+            if t.dot(&chord) < 0.0 { -t } else { t }
+        };
+        let n = self.points.len();
+        let end = direction(self, &self.points[n - 1], self.points[n - 1] - self.points[n - 2]);
+        let start = direction(next, &next.points[0], next.points[1] - next.points[0]);
+        same && self.around.sheets == next.around.sheets && end.dot(&start) > STRAIGHT
+    }
+}

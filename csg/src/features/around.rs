@@ -1,0 +1,258 @@
+//! The regions around a point of a curve, sector by sector.
+//!
+//! ```text
+//!            \ B |
+//!             \  |  exterior         Three sheets through a curve that comes out of the page:
+//!          A   \ |                   six rays, six sectors. A ray with different regions on its
+//!      -----------x-----------       sides is part of a patch; the others are no boundaries.
+//!          A     | \      A
+//!             A  |  \
+//!                | A \
+//! ```
+
+use super::octree::{Leaf, Octree};
+use super::trace::tangent;
+use super::{FeatureError, Named, Place};
+use crate::{BodyId, Geometry, Point, SurfaceId, Vector};
+
+/// The lengths below which things are the same.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Tolerances {
+    /// How near Newton's method must come to its surfaces.
+    pub exact: f64,
+    /// A point this near to a surface is on it.
+    pub on_surface: f64,
+    /// Corners this near to each other are one.
+    pub merge: f64,
+}
+
+impl Tolerances {
+    /// For bodies in a box of this diagonal and largest coordinate.
+    ///
+    /// The decimals of a file make three surfaces that are meant to share a curve miss each other by
+    /// 10⁻¹⁶ to 10⁻¹² of the size if they are written in full; real features are larger than 10⁻⁷ of it.
+    pub fn new(diagonal: f64, largest: f64) -> Self {
+        let rounding = 16.0 * f64::EPSILON * largest;
+        Self {
+            exact: f64::max(1e-13 * diagonal, rounding),
+            on_surface: f64::max(1e-9 * diagonal, 16.0 * rounding),
+            merge: f64::max(1e-8 * diagonal, 64.0 * rounding),
+        }
+    }
+}
+
+/// The body a place near `at` is in, or `None` for the exterior; `positive` tells its side of each surface.
+pub(super) fn region(
+    geometry: &Geometry,
+    leaf: &Leaf,
+    at: &Point,
+    positive: &dyn Fn(SurfaceId) -> bool,
+) -> Result<Option<BodyId>, FeatureError> {
+    let mut holding = leaf.bodies.iter().filter(|(_, solid)| solid.holds(positive)).map(|(body, _)| *body);
+    let first = holding.next();
+    match (first, holding.next()) {
+        (Some(a), Some(b)) => {
+            let [first, second] = [a, b].map(|body| Named::body(geometry, body));
+            Err(FeatureError::Overlap { first, second, place: Place(*at) })
+        }
+        _ => Ok(first),
+    }
+}
+
+/// One side of a surface beside a curve where the region changes: part of a patch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct Sheet {
+    /// The surface.
+    pub surface: SurfaceId,
+    /// The body behind the patch's normal.
+    pub inside: Option<BodyId>,
+    /// The body in front of it.
+    pub outside: Option<BodyId>,
+    /// Whether the normal is against the gradient.
+    pub flipped: bool,
+}
+
+impl Sheet {
+    /// The sheet between the regions behind and before a surface's gradient, if they differ.
+    ///
+    /// The normal points to the exterior, or to the body that comes later.
+    pub fn between(surface: SurfaceId, behind: Option<BodyId>, before: Option<BodyId>) -> Option<Self> {
+        let flipped = match (behind, before) {
+            (a, b) if a == b => return None,
+            (Some(a), Some(b)) => a > b,
+            (a, _) => a.is_none(),
+        };
+        let (inside, outside) = if flipped { (before, behind) } else { (behind, before) };
+        Some(Self { surface, inside, outside, flipped })
+    }
+}
+
+/// The sheet of a surface at one of its points, `None` if it is no boundary there.
+pub(super) fn sheet_at(
+    geometry: &Geometry,
+    tree: &Octree,
+    id: SurfaceId,
+    at: &Point,
+) -> Result<Option<Sheet>, FeatureError> {
+    let Some(leaf) = tree.leaf(at).filter(|leaf| leaf.surfaces.contains(&id)) else { return Ok(None) };
+    let side = |positive: bool| {
+        region(geometry, leaf, at, &|s| {
+            if s == id { positive } else { geometry.surfaces[s.index()].value(at) > 0.0 }
+        })
+    };
+    Ok(Sheet::between(id, side(false)?, side(true)?))
+}
+
+/// What is around a curve at one of its points.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Around {
+    /// The surfaces through the curve, ascending.
+    pub surfaces: Vec<SurfaceId>,
+    /// The sheets that leave it, and whether each lies to the left for one who walks along the curve with the sheet's
+    /// normal up; ascending.
+    pub sheets: Vec<(Sheet, bool)>,
+}
+
+impl Around {
+    /// Whether it is more than a line on one smooth sheet, or in no sheet at all.
+    pub fn is_feature(&self) -> bool {
+        match &self.sheets[..] {
+            [] => false,
+            [(first, left), (second, right)] => first != second || left == right,
+            _ => true,
+        }
+    }
+}
+
+/// Half of the intersection of a surface with the plane across the curve.
+struct Ray {
+    surface: SurfaceId,
+    /// Its unit direction.
+    direction: Vector,
+    /// The angle of its direction, radians.
+    angle: f64,
+    /// How it bends from there, counterclockwise positive, 1/length.
+    bend: f64,
+}
+
+/// Directions within this angle, in radians, are one, and the bend decides which comes first.
+const SAME_ANGLE: f64 = 1e-6;
+
+/// The regions around the point `at` on the intersection of a pair of surfaces, run along `forward`; `None` if the
+/// pair does not matter there.
+///
+/// # Errors
+/// If bodies overlap there, or two sheets leave the curve alike.
+pub(super) fn around(
+    geometry: &Geometry,
+    tree: &Octree,
+    pair: [SurfaceId; 2],
+    at: &Point,
+    forward: &Vector,
+    tolerances: &Tolerances,
+) -> Result<Option<Around>, FeatureError> {
+    let Some(leaf) = tree.leaf(at).filter(|leaf| pair.iter().all(|s| leaf.surfaces.contains(s))) else {
+        return Ok(None);
+    };
+    let surfaces: Vec<SurfaceId> = leaf
+        .surfaces
+        .iter()
+        .copied()
+        .filter(|&s| pair.contains(&s) || geometry.surfaces[s.index()].distance(at) <= tolerances.on_surface)
+        .collect();
+    let [a, b] = pair.map(|s| &geometry.surfaces[s.index()]);
+    let mut axis = tangent(a, b, at);
+    if axis.dot(forward) < 0.0 {
+        axis = -axis;
+    }
+    let rays = sorted_rays(geometry, &surfaces, at, &axis)?;
+
+    // The side of each surface in the widest sector, which is safe to tell; then around, ray by ray.
+    let gap = |i: usize| {
+        let next =
+            rays[(i + 1) % rays.len()].angle + if i + 1 == rays.len() { std::f64::consts::TAU } else { 0.0 };
+        next - rays[i].angle
+    };
+    let widest = (0..rays.len()).fold(0, |best, i| if gap(i) > gap(best) { i } else { best });
+    let (u, v) = frame(&axis);
+    let angle = rays[widest].angle + 0.5 * gap(widest);
+    let outward = u * angle.cos() + v * angle.sin();
+    let mut positive: Vec<bool> =
+        surfaces.iter().map(|s| geometry.surfaces[s.index()].gradient(at).dot(&outward) > 0.0).collect();
+    let region_of = |positive: &[bool]| {
+        region(geometry, leaf, at, &|s| match surfaces.binary_search(&s) {
+            Ok(i) => positive[i],
+            Err(_) => geometry.surfaces[s.index()].value(at) > 0.0,
+        })
+    };
+    let mut sheets = Vec::new();
+    let mut before = region_of(&positive)?;
+    for step in 1..=rays.len() {
+        let ray = &rays[(widest + step) % rays.len()];
+        let index = surfaces.binary_search(&ray.surface).expect("a ray of a surface through the curve");
+        positive[index] = !positive[index];
+        let after = region_of(&positive)?;
+        let up = axis.cross(&ray.direction);
+        let along_gradient = geometry.surfaces[ray.surface.index()].gradient(at).dot(&up) > 0.0;
+        let (behind, front) = if along_gradient { (before, after) } else { (after, before) };
+        if let Some(sheet) = Sheet::between(ray.surface, behind, front) {
+            // The sheet is to the left if its normal is `up`.
+            sheets.push((sheet, along_gradient != sheet.flipped));
+        }
+        before = after;
+    }
+    sheets.sort_unstable();
+    Ok(Some(Around { surfaces, sheets }))
+}
+
+/// Two unit vectors across `axis`, so that turning the first to the second is counterclockwise.
+fn frame(axis: &Vector) -> (Vector, Vector) {
+    crate::primitive::quadric::tangents(axis)
+}
+
+/// The two rays of each surface in counterclockwise order around `axis`.
+fn sorted_rays(
+    geometry: &Geometry,
+    surfaces: &[SurfaceId],
+    at: &Point,
+    axis: &Vector,
+) -> Result<Vec<Ray>, FeatureError> {
+    /// A relative difference of bends below this is none.
+    const SAME_BEND: f64 = 1e-6;
+    let (u, v) = frame(axis);
+    let mut rays = Vec::with_capacity(2 * surfaces.len());
+    for &id in surfaces {
+        let surface = &geometry.surfaces[id.index()];
+        let gradient = surface.gradient(at);
+        let normal = surface.normal(at);
+        let Some(tangent) = axis.cross(&normal).try_normalize(0.0) else { continue };
+        for direction in [tangent, -tangent] {
+            let up = axis.cross(&direction);
+            let bend = -0.5 * direction.dot(&(surface.hessian(at) * direction)) / gradient.dot(&up);
+            let angle = direction.dot(&v).atan2(direction.dot(&u));
+            rays.push(Ray { surface: id, direction, angle, bend });
+        }
+    }
+    // An angle just below π is the same direction as one just above -π.
+    let turn = std::f64::consts::TAU;
+    for ray in &mut rays {
+        if ray.angle > 0.5 * turn - SAME_ANGLE {
+            ray.angle -= turn;
+        }
+    }
+    rays.sort_by(|x, y| x.angle.total_cmp(&y.angle));
+    let mut start = 0;
+    while start < rays.len() {
+        let end =
+            start + rays[start..].iter().take_while(|r| r.angle - rays[start].angle <= SAME_ANGLE).count();
+        rays[start..end].sort_by(|x, y| x.bend.total_cmp(&y.bend));
+        for two in rays[start..end].windows(2) {
+            if two[1].bend - two[0].bend <= SAME_BEND * (two[1].bend.abs() + two[0].bend.abs()) {
+                let [first, second] = [0, 1].map(|i| Named::surface(geometry, two[i].surface));
+                return Err(FeatureError::Tangent { first, second, place: Place(*at) });
+            }
+        }
+        start = end;
+    }
+    Ok(rays)
+}

@@ -1,0 +1,215 @@
+//! Arcs to curves and corners, sheets to patches.
+
+use super::arcs::{Arc, Nodes};
+use super::around::{Sheet, Tolerances, sheet_at};
+use super::octree::Octree;
+use super::{Corner, Curve, FeatureError, Features, Fin, Named, Patch, Place};
+use crate::geometry::UserPoint;
+use crate::{Aabb, BodyId, CornerId, CurveId, Geometry, Interval, PatchId, Point, SurfaceId, Vector};
+use std::collections::{BTreeMap, HashMap};
+
+/// Joins arcs that continue each other at nodes where nothing else is, and returns them as chains:
+/// one arc each, whose ends are corners or which is closed.
+pub(super) fn join(
+    geometry: &Geometry,
+    arcs: Vec<Arc>,
+    nodes: &Nodes,
+    tolerances: &Tolerances,
+) -> Result<Vec<Arc>, FeatureError> {
+    let mut ends: BTreeMap<usize, Vec<(usize, usize)>> = BTreeMap::new();
+    for (i, arc) in arcs.iter().enumerate() {
+        for (end, node) in arc.ends.into_iter().flatten().flatten().enumerate() {
+            ends.entry(node).or_default().push((i, end));
+        }
+    }
+    let mut mates: HashMap<(usize, usize), (usize, usize)> = HashMap::new();
+    for (&node, ends) in &ends {
+        let point = nodes.point(node);
+        if let [(arc, _)] = ends[..] {
+            let [first, second] = arcs[arc].pair.map(|s| Named::surface(geometry, s));
+            return Err(FeatureError::LooseCurve { first, second, place: Place(point) });
+        }
+        let is_user_point = geometry.user_points.iter().any(|u| (u.point - point).norm() <= tolerances.merge);
+        if let ([first, second], false) = (&ends[..], is_user_point) {
+            let (into, out) = (taken(&arcs[first.0], 1 - first.1), taken(&arcs[second.0], second.1));
+            if into.continues_in(geometry, &out) {
+                mates.insert(*first, *second);
+                mates.insert(*second, *first);
+            }
+        }
+    }
+    Ok(chains(arcs, &mates))
+}
+
+/// Follows the mates from arc to arc.
+fn chains(arcs: Vec<Arc>, mates: &HashMap<(usize, usize), (usize, usize)>) -> Vec<Arc> {
+    let mut used = vec![false; arcs.len()];
+    let mut chains = Vec::new();
+    // First those that begin at a corner, then what is left: closed ones.
+    let begins = |i: usize| [0, 1].into_iter().find(|&end| !mates.contains_key(&(i, end)));
+    let starts = (0..arcs.len()).filter_map(|i| begins(i).map(|end| (i, end)));
+    let starts: Vec<_> = starts.chain((0..arcs.len()).map(|i| (i, 0))).collect();
+    for (mut arc, mut end) in starts {
+        if used[arc] {
+            continue;
+        }
+        let mut chain = taken(&arcs[arc], end);
+        used[arc] = true;
+        let is_closed = loop {
+            match mates.get(&(arc, 1 - end)) {
+                None => break chain.ends.is_none(),
+                Some(&(next, _)) if used[next] => break true,
+                Some(&mate) => (arc, end) = mate,
+            }
+            used[arc] = true;
+            let next = taken(&arcs[arc], end);
+            chain.points.extend_from_slice(&next.points[1..]);
+            chain.ends = chain.ends.zip(next.ends).map(|(a, b)| [a[0], b[1]]);
+        };
+        if is_closed {
+            chain.ends = None;
+        }
+        chains.push(chain);
+    }
+    chains
+}
+
+/// The arc, run from the end with this index.
+fn taken(arc: &Arc, end: usize) -> Arc {
+    if end == 0 { arc.clone() } else { arc.clone().reversed() }
+}
+
+/// Makes the geometric entities of joined arcs and of the surfaces without arcs.
+pub(super) fn entities(
+    geometry: &Geometry,
+    tree: &Octree,
+    arcs: &[Arc],
+    nodes: &Nodes,
+    tolerances: &Tolerances,
+) -> Result<Features, FeatureError> {
+    let mut corners: Vec<Corner> = Vec::new();
+    let mut corner_of: HashMap<usize, CornerId> = HashMap::new();
+    let mut curves = Vec::new();
+    let mut patches: BTreeMap<Sheet, Patch> = BTreeMap::new();
+    for (i, arc) in arcs.iter().enumerate() {
+        let ends = arc.ends.map(|ends| {
+            ends.map(|node| {
+                let node = node.expect("an arc of a feature ends at nodes");
+                *corner_of.entry(node).or_insert_with(|| {
+                    corners.push(corner(geometry, tree, nodes.point(node), tolerances));
+                    CornerId::new(corners.len() - 1)
+                })
+            })
+        });
+        curves.push(Curve { surfaces: arc.pair, ends, trace: arc.points.clone(), fins: Vec::new() });
+        for &(sheet, left) in &arc.around.sheets {
+            patches.entry(sheet).or_insert_with(|| patch(&sheet)).boundary.push((CurveId::new(i), left));
+        }
+    }
+    for (sheet, seed) in closed_sheets(geometry, tree, &patches, tolerances)? {
+        patches.entry(sheet).or_insert_with(|| patch(&sheet)).seeds.push(seed);
+    }
+    let patches: Vec<Patch> = patches.into_values().collect();
+    // What the rough cells around the bodies did not show: a body of no volume has no boundary.
+    for i in 0..geometry.bodies.len() {
+        let id = BodyId::new(i);
+        if !patches.iter().any(|p| p.inside == Some(id) || p.outside == Some(id)) {
+            return Err(FeatureError::Empty(Named::body(geometry, id)));
+        }
+    }
+    for (i, patch) in patches.iter().enumerate() {
+        for &(curve, forward) in &patch.boundary {
+            curves[curve.index()].fins.push(Fin { patch: PatchId::new(i), forward });
+        }
+    }
+    for user in &geometry.user_points {
+        if !corners.iter().any(|c| (c.point - user.point).norm() <= tolerances.merge) {
+            check_inside(geometry, tree, user, tolerances)?;
+            corners.push(corner(geometry, tree, user.point, tolerances));
+        }
+    }
+    let mut features =
+        Features { corners, curves, patches, bounds: Aabb { min: Point::origin(), max: Point::origin() } };
+    features.bounds = super::extent::extent(geometry, tree, &features, tolerances)?;
+    Ok(features)
+}
+
+/// A corner with the surfaces that matter there.
+fn corner(geometry: &Geometry, tree: &Octree, point: Point, tolerances: &Tolerances) -> Corner {
+    let near = |x: f64| Interval::new(x - tolerances.merge, x + tolerances.merge);
+    let mut surfaces = tree.surfaces_in(&[near(point.x), near(point.y), near(point.z)]);
+    surfaces.retain(|s| geometry.surfaces[s.index()].distance(&point) <= tolerances.merge);
+    Corner { point, surfaces }
+}
+
+fn patch(sheet: &Sheet) -> Patch {
+    Patch {
+        surface: sheet.surface,
+        flipped: sheet.flipped,
+        inside: sheet.inside,
+        outside: sheet.outside,
+        boundary: Vec::new(),
+        seeds: Vec::new(),
+        bc: 0,
+        name: String::new(),
+    }
+}
+
+/// The closed surfaces (spheres, tori, ellipsoids) that are boundaries and carry no curve, with a point on each.
+///
+/// The regions on both sides of a connected surface change at curves only, so one point tells.
+fn closed_sheets(
+    geometry: &Geometry,
+    tree: &Octree,
+    patches: &BTreeMap<Sheet, Patch>,
+    tolerances: &Tolerances,
+) -> Result<Vec<(Sheet, Point)>, FeatureError> {
+    let mut found = Vec::new();
+    for (i, surface) in geometry.surfaces.iter().enumerate() {
+        let id = SurfaceId::new(i);
+        if patches.keys().any(|sheet| sheet.surface == id) {
+            continue;
+        }
+        let is_clear = |point: &Point| {
+            let clear = |s: &SurfaceId| {
+                *s == id || geometry.surfaces[s.index()].distance(point) > 1e3 * tolerances.on_surface
+            };
+            tree.leaf(point).is_some_and(|leaf| leaf.surfaces.iter().all(clear))
+        };
+        let mut points = scattered_directions().filter_map(|d| surface.support(&d));
+        if let Some(seed) = points.find(is_clear) {
+            found.extend(sheet_at(geometry, tree, id, &seed)?.map(|sheet| (sheet, seed)));
+        }
+    }
+    Ok(found)
+}
+
+/// Directions all around, none of them special.
+fn scattered_directions() -> impl Iterator<Item = Vector> {
+    const COUNT: u32 = 32;
+    // A spiral from pole to pole that turns by the golden angle (Vogel 1979 for the disk).
+    let golden = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
+    (0..COUNT).map(move |i| {
+        let height = 0.9 - 1.7 * (f64::from(i) + 0.3) / f64::from(COUNT);
+        let angle = golden * f64::from(i) + 0.7;
+        let radius = (1.0 - height * height).sqrt();
+        Vector::new(radius * angle.cos(), height, radius * angle.sin())
+    })
+}
+
+/// Refuses a point that is in no body and on no boundary.
+fn check_inside(
+    geometry: &Geometry,
+    tree: &Octree,
+    user: &UserPoint,
+    tolerances: &Tolerances,
+) -> Result<(), FeatureError> {
+    let in_some_body = tree.leaf(&user.point).is_some_and(|leaf| {
+        let side = |solid: &crate::Solid| solid.side(&geometry.surfaces, &user.point, tolerances.on_surface);
+        leaf.bodies.iter().any(|(_, solid)| side(solid) != crate::solid::Side::Outside)
+    });
+    if in_some_body {
+        return Ok(());
+    }
+    Err(FeatureError::PointOutside { place: Place(user.point), line: user.span.line })
+}

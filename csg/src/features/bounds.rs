@@ -1,0 +1,125 @@
+//! A box around all bodies.
+
+use super::{FeatureError, Named};
+use crate::interval::Cell;
+use crate::solid::Pruned;
+use crate::{Aabb, BodyId, Geometry, Interval, Point, Solid, Surface};
+
+/// A body that reaches this many times the extent of all primitives is taken for unbounded.
+const HUGE: f64 = 1e4;
+/// A box is good when the cells at its faces are smaller than this part of its longest side.
+const RESOLUTION: f64 = 1.0 / 16.0;
+
+/// Part of the huge cube, and what bodies may be in it (`None`: the whole cell is in the body).
+struct Part {
+    cell: Cell,
+    bodies: Vec<(BodyId, Option<Solid>)>,
+}
+
+/// A box that contains all bodies with a little room around, by pruning a huge cube.
+///
+/// # Errors
+/// If there is no body, one is empty, or one reaches the faces of the cube.
+pub(super) fn bounding_cell(geometry: &Geometry) -> Result<Cell, FeatureError> {
+    if geometry.bodies.is_empty() {
+        return Err(FeatureError::NoBody);
+    }
+    let cube = huge_cube(geometry);
+    let bodies = geometry.bodies.iter().enumerate();
+    let all = bodies.map(|(i, body)| (BodyId::new(i), Some(body.solid.clone()))).collect();
+    let mut parts: Vec<Part> = prune(geometry, Part { cell: cube, bodies: all }).into_iter().collect();
+    loop {
+        for id in (0..geometry.bodies.len()).map(BodyId::new) {
+            if !parts.iter().any(|part| part.bodies.iter().any(|b| b.0 == id)) {
+                return Err(FeatureError::Empty(Named::body(geometry, id)));
+            }
+        }
+        let hull = hull(&parts);
+        let longest = hull.iter().map(Interval::width).fold(0.0, f64::max);
+        let is_rough = |part: &Part| {
+            let touches = (0..3).any(|i| part.cell[i].lo == hull[i].lo || part.cell[i].hi == hull[i].hi);
+            let undecided = part.bodies.iter().any(|b| b.1.is_some());
+            touches && undecided && part.cell[0].width() > RESOLUTION * longest
+        };
+        if !parts.iter().any(is_rough) {
+            let at_face =
+                |part: &&Part| (0..3).any(|i| part.cell[i].lo == cube[i].lo || part.cell[i].hi == cube[i].hi);
+            if let Some(part) = parts.iter().find(at_face) {
+                return Err(FeatureError::Unbounded(Named::body(geometry, part.bodies[0].0)));
+            }
+            // Uneven room, so that planes of symmetry do not fall on the borders of cells.
+            let room = [0.0123, 0.0217, 0.0181].map(|part| part * longest);
+            return Ok([0, 1, 2].map(|i| Interval::new(hull[i].lo - room[i], hull[i].hi + 1.3 * room[i])));
+        }
+        let (rough, fine): (Vec<_>, Vec<_>) = parts.into_iter().partition(is_rough);
+        parts = fine;
+        for part in rough {
+            let children = split(&part.cell).map(|cell| Part { cell, bodies: part.bodies.clone() });
+            parts.extend(children.into_iter().filter_map(|child| prune(geometry, child)));
+        }
+    }
+}
+
+/// What is left of the bodies in a part, `None` if nothing.
+fn prune(geometry: &Geometry, part: Part) -> Option<Part> {
+    let mut range = |id: crate::SurfaceId| geometry.surfaces[id.index()].value_range(&part.cell);
+    let left = |(id, solid): (BodyId, Option<Solid>)| match solid.map(|s| s.prune(&mut range)) {
+        None | Some(Pruned::Full) => Some((id, None)),
+        Some(Pruned::Part(solid)) => Some((id, Some(solid))),
+        Some(Pruned::Empty) => None,
+    };
+    let bodies: Vec<_> = part.bodies.into_iter().filter_map(left).collect();
+    (!bodies.is_empty()).then_some(Part { cell: part.cell, bodies })
+}
+
+/// The smallest box around all parts.
+fn hull(parts: &[Part]) -> Cell {
+    let first = parts[0].cell;
+    parts.iter().fold(first, |hull, part| {
+        [0, 1, 2].map(|i| Interval::new(hull[i].lo.min(part.cell[i].lo), hull[i].hi.max(part.cell[i].hi)))
+    })
+}
+
+/// The eight parts of a box, the x-halves alternating fastest.
+pub(super) fn split(cell: &Cell) -> [Cell; 8] {
+    let halves = cell.map(|side| {
+        let middle = side.middle();
+        [Interval::new(side.lo, middle), Interval::new(middle, side.hi)]
+    });
+    [0, 1, 2, 3, 4, 5, 6, 7]
+        .map(|child| [halves[0][child & 1], halves[1][child >> 1 & 1], halves[2][child >> 2]])
+}
+
+/// A cube around the points that define the primitives, far larger than they are apart.
+fn huge_cube(geometry: &Geometry) -> Cell {
+    let extents: Vec<(Point, f64)> = geometry
+        .bodies
+        .iter()
+        .flat_map(|body| body.solid.surfaces())
+        .map(|id| match &geometry.surfaces[id.index()] {
+            Surface::Plane(p) => (p.point, 0.0),
+            Surface::Sphere(s) => (s.center, s.radius),
+            Surface::Cylinder(c) => (c.point, c.radius),
+            Surface::Cone(c) => (c.point, c.radius.max((c.radius / c.slope).abs())),
+            Surface::Torus(t) => (t.center, t.major + t.minor),
+            Surface::Ellipsoid(e) => (e.center, e.radii.iter().copied().fold(0.0, f64::max)),
+            Surface::EllipticCylinder(e) => (e.point, e.radii[0].max(e.radii[1])),
+            Surface::EllipticCone(e) => (e.point, e.radii[0].max(e.radii[1]).max(1.0 / e.rate.abs())),
+        })
+        .collect();
+    let mut hull = Aabb { min: Point::from([f64::INFINITY; 3]), max: Point::from([f64::NEG_INFINITY; 3]) };
+    for (point, reach) in &extents {
+        hull.min = hull.min.inf(&(point.map(|x| x - reach)));
+        hull.max = hull.max.sup(&(point.map(|x| x + reach)));
+    }
+    if extents.is_empty() {
+        hull = Aabb { min: Point::origin(), max: Point::origin() };
+    }
+    // Planes alone may all be given by one point: then its coordinates are the only length known.
+    let size = match hull.diagonal() {
+        0.0 => hull.min.coords.amax().max(1.0),
+        diagonal => diagonal,
+    };
+    let center = hull.center();
+    [0, 1, 2].map(|i| Interval::new(center[i] - HUGE * size, center[i] + HUGE * size))
+}

@@ -1,0 +1,251 @@
+//! Places where two surfaces are tangent: whether they matter.
+
+use super::arcs::Arc;
+use super::around::Tolerances;
+use super::octree::{Leaf, Octree};
+use super::{FeatureError, Named, Place};
+use crate::interval::{Cell, middle};
+use crate::primitive::quadric::tangents;
+use crate::{Geometry, Interval, Point, Surface, SurfaceId};
+use nalgebra::{Matrix2, Vector2};
+
+/// A place where two surfaces are tangent, or not told apart from it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Contact {
+    /// The surfaces, ascending.
+    pub pair: [SurfaceId; 2],
+    /// Where.
+    pub point: Point,
+    /// The size of the cell in which it was found.
+    pub reach: f64,
+}
+
+/// Surfaces at an angle of less than this (its sine) where they meet are tangent there: a wedge so sharp has no mesh.
+const TANGENT: f64 = 1e-6;
+
+impl Contact {
+    /// Surfaces of a cell that could not be told apart.
+    pub fn at_middle(pair: [SurfaceId; 2], cell: &Cell) -> Self {
+        Self { pair, point: middle(cell), reach: diagonal(cell) }
+    }
+}
+
+fn diagonal(cell: &Cell) -> f64 {
+    cell.iter().map(|side| side.width().powi(2)).sum::<f64>().sqrt()
+}
+
+/// The point in (or just beside) a cell where both surfaces meet and are tangent, if there is one.
+pub(super) fn find(geometry: &Geometry, pair: [SurfaceId; 2], cell: &Cell) -> Option<Contact> {
+    /// The steps converge with the square: more than this many lead elsewhere.
+    const STEPS: usize = 12;
+    let [a, b] = pair.map(|s| &geometry.surfaces[s.index()]);
+    let center = middle(cell);
+    let reach = diagonal(cell);
+    let mut at = center;
+    for _ in 0..STEPS {
+        let step = least_squares_step(a, b, &at)?;
+        at += step;
+        if (at - center).norm() > 2.0 * reach {
+            return None;
+        }
+        if step.norm() <= f64::EPSILON * at.coords.amax() {
+            break;
+        }
+    }
+    let rounding = 1e3 * f64::EPSILON * (at.coords.amax() + reach);
+    let meets = a.distance(&at) <= rounding && b.distance(&at) <= rounding;
+    let inside = (0..3).all(|i| {
+        let room = 0.01 * cell[i].width();
+        Interval::new(cell[i].lo - room, cell[i].hi + room).contains(at[i])
+    });
+    let sine = a.normal(&at).cross(&b.normal(&at)).norm();
+    (meets && inside && sine <= TANGENT).then_some(Contact { pair, point: at, reach })
+}
+
+/// The shortest step that solves the two linearised equations and the one that the gradients be parallel in
+/// the least-squares sense.
+fn least_squares_step(a: &Surface, b: &Surface, at: &Point) -> Option<crate::Vector> {
+    let (ga, gb) = (a.gradient(at), b.gradient(at));
+    let (ha, hb) = (a.hessian(at), b.hessian(at));
+    let mut matrix = nalgebra::SMatrix::<f64, 5, 3>::zeros();
+    let mut values = nalgebra::SVector::<f64, 5>::zeros();
+    let (la, lb) = (ga.norm(), gb.norm());
+    if la == 0.0 || lb == 0.0 {
+        return None;
+    }
+    matrix.row_mut(0).copy_from(&(ga.transpose() / la));
+    matrix.row_mut(1).copy_from(&(gb.transpose() / lb));
+    values[0] = a.value(at) / la;
+    values[1] = b.value(at) / lb;
+    // The sines have no unit; a curvature makes them a length as the others.
+    let bend = ha.amax() / la + hb.amax() / lb;
+    if bend > 0.0 {
+        let cross = ga.cross(&gb) / (la * lb * bend);
+        for j in 0..3 {
+            let column = (ha.column(j).cross(&gb) + ga.cross(&hb.column(j))) / (la * lb * bend);
+            matrix.fixed_view_mut::<3, 1>(2, j).copy_from(&column);
+        }
+        values.fixed_rows_mut::<3>(2).copy_from(&cross);
+    }
+    // Along a curve of contact one direction is free: small singular values are left out.
+    let svd = matrix.svd(true, true);
+    svd.solve(&values, 1e-6).ok().map(|step| -step)
+}
+
+/// Whether the regions beside a contact are the same as if one of both surfaces were not there.
+///
+/// Where the sheets are tangent and one bends more, a wedge lies between them. Below, in the wedge and above
+/// there are up to three different regions; the contact matters if both sheets separate some.
+fn is_harmless(
+    geometry: &Geometry,
+    tree: &Octree,
+    contact: &Contact,
+    tolerances: &Tolerances,
+) -> Result<bool, FeatureError> {
+    let Some(leaf) = tree.leaf(&contact.point) else { return Ok(true) };
+    if !contact.pair.iter().all(|s| leaf.surfaces.contains(s)) {
+        return Ok(true);
+    }
+    let wedges = possible_wedges(geometry, contact);
+    // A surface through the point is tried on both sides.
+    let others: Vec<SurfaceId> = leaf
+        .surfaces
+        .iter()
+        .copied()
+        .filter(|s| !contact.pair.contains(s))
+        .filter(|s| geometry.surfaces[s.index()].distance(&contact.point) <= tolerances.on_surface)
+        .collect();
+    for sides in 0..1_u32 << others.len().min(8) {
+        let other_side = |s: SurfaceId| match others.iter().position(|&o| o == s) {
+            Some(i) => sides >> i & 1 == 1,
+            None => geometry.surfaces[s.index()].value(&contact.point) > 0.0,
+        };
+        if !depends_on_one(geometry, leaf, contact, &wedges, &other_side)? {
+            return Ok(false);
+        }
+    }
+    Ok(true)
+}
+
+/// Whether the region depends on the side of one of the two surfaces only, over the possible pairs of sides.
+fn depends_on_one(
+    geometry: &Geometry,
+    leaf: &Leaf,
+    contact: &Contact,
+    wedges: &[[bool; 2]],
+    other_side: &dyn Fn(SurfaceId) -> bool,
+) -> Result<bool, FeatureError> {
+    let region = |sides: &[bool; 2]| {
+        super::around::region(geometry, leaf, &contact.point, &|s| match contact
+            .pair
+            .iter()
+            .position(|&p| p == s)
+        {
+            Some(i) => sides[i],
+            None => other_side(s),
+        })
+    };
+    let regions = wedges.iter().map(region).collect::<Result<Vec<_>, _>>()?;
+    Ok((0..2).any(|i| {
+        let same_side = |side: bool| {
+            let mut on_it = wedges.iter().zip(&regions).filter(|(w, _)| w[i] == side).map(|(_, r)| r);
+            let first = on_it.next();
+            on_it.all(|r| Some(r) == first)
+        };
+        same_side(false) && same_side(true)
+    }))
+}
+
+/// The pairs of sides (positive or not) of the two surfaces that occur near a contact.
+fn possible_wedges(geometry: &Geometry, contact: &Contact) -> Vec<[bool; 2]> {
+    /// A difference of curvatures below this part of their sum is none.
+    const SAME_CURVATURE: f64 = 1e-6;
+    let [a, b] = contact.pair.map(|s| &geometry.surfaces[s.index()]);
+    let at = &contact.point;
+    let (na, nb) = (a.normal(at), b.normal(at));
+    let turned = na.dot(&nb) < 0.0;
+    let sign = if turned { -1.0 } else { 1.0 };
+    let (ha, hb) = (a.hessian(at) / a.gradient(at).norm(), b.hessian(at) / b.gradient(at).norm() * sign);
+    // The sheets' heights over the common tangent plane are minus half these forms.
+    let (u, v) = tangents(&na);
+    let form = |x: &Vector2<f64>| u * x.x + v * x.y;
+    let (e, f) = (form(&Vector2::x()), form(&Vector2::y()));
+    let difference = hb - ha;
+    let matrix = Matrix2::new(
+        e.dot(&(difference * e)),
+        e.dot(&(difference * f)),
+        f.dot(&(difference * e)),
+        f.dot(&(difference * f)),
+    );
+    let size = ha.amax() + hb.amax();
+    let eigenvalues = matrix.symmetric_eigenvalues();
+    let least = SAME_CURVATURE * size;
+    let (first_above, second_above) = (eigenvalues.max() > least, eigenvalues.min() < -least);
+    let osculating = !first_above && !second_above;
+    let mut sides = vec![[false, false], [true, true]];
+    // Between the sheets: below the upper one, above the lower one.
+    if first_above || osculating {
+        sides.push([false, true]);
+    }
+    if second_above || osculating {
+        sides.push([true, false]);
+    }
+    if turned {
+        for side in &mut sides {
+            side[1] = !side[1];
+        }
+    }
+    sides
+}
+
+/// Refuses contacts that matter and are no part of the features found.
+///
+/// A contact is part of them if a curve of which both surfaces are known runs through it (a ball that ends a pipe), or
+/// ends there (two pipes of one radius that cross).
+pub(super) fn check(
+    geometry: &Geometry,
+    tree: &Octree,
+    arcs: &[Arc],
+    tolerances: &Tolerances,
+) -> Result<(), FeatureError> {
+    for contact in &tree.contacts {
+        let knows = |arc: &&Arc| contact.pair.iter().all(|s| arc.around.surfaces.binary_search(s).is_ok());
+        let near = |arc: &Arc| {
+            let reach = 2.0 * contact.reach;
+            arc.points.windows(2).any(|ends| distance(ends, &contact.point) <= reach)
+        };
+        if !is_harmless(geometry, tree, contact, tolerances)? && !arcs.iter().filter(knows).any(near) {
+            return Err(refusal(geometry, contact));
+        }
+    }
+    Ok(())
+}
+
+/// The distance of a point from a line segment.
+fn distance(ends: &[Point], point: &Point) -> f64 {
+    let chord = ends[1] - ends[0];
+    let part = ((point - ends[0]).dot(&chord) / chord.norm_squared()).clamp(0.0, 1.0);
+    (point - (ends[0] + chord * part)).norm()
+}
+
+/// Refuses cones whose apex is on the boundary of a body.
+pub(super) fn refuse_apexes(geometry: &Geometry, tree: &Octree) -> Result<(), FeatureError> {
+    for (i, surface) in geometry.surfaces.iter().enumerate() {
+        if let Some(apex) = surface.apex() {
+            let id = SurfaceId::new(i);
+            if super::around::sheet_at(geometry, tree, id, &apex)?.is_some() {
+                return Err(FeatureError::ConeApex {
+                    cone: Named::surface(geometry, id),
+                    place: Place(apex),
+                });
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The error for a contact that matters.
+fn refusal(geometry: &Geometry, contact: &Contact) -> FeatureError {
+    let [first, second] = contact.pair.map(|s| Named::surface(geometry, s));
+    FeatureError::Tangent { first, second, place: Place(contact.point) }
+}

@@ -1,0 +1,79 @@
+//! The smallest box around all bodies.
+
+use super::around::{Tolerances, sheet_at};
+use super::octree::Octree;
+use super::{FeatureError, Features};
+use crate::project::project_to_both;
+use crate::{Aabb, Geometry, Point, Surface, SurfaceId, Vector};
+
+/// The box of corners, curves and closed surfaces.
+///
+/// A coordinate is largest at a corner, inside a curve, or inside a patch where the normal points along the axis. On
+/// planes, cylinders and cones the latter happens along whole lines, which end on curves.
+pub(super) fn extent(
+    geometry: &Geometry,
+    tree: &Octree,
+    features: &Features,
+    tolerances: &Tolerances,
+) -> Result<Aabb, FeatureError> {
+    let mut points: Vec<Point> = features.corners.iter().map(|c| c.point).collect();
+    for curve in &features.curves {
+        let closed = curve.ends.is_none();
+        let trace = &curve.trace;
+        points.extend(trace);
+        let last = trace.len() - 1;
+        let surfaces = curve.surfaces.map(|s| &geometry.surfaces[s.index()]);
+        for i in 0..last {
+            // Of a closed trace the first point has the last but one before it.
+            let before = match i {
+                0 if closed => trace[last - 1],
+                0 => continue,
+                _ => trace[i - 1],
+            };
+            for axis in 0..3 {
+                let steps = [trace[i][axis] - before[axis], trace[i + 1][axis] - trace[i][axis]];
+                if steps[0] * steps[1] <= 0.0 && steps != [0.0; 2] {
+                    let sign = if steps[0] > 0.0 || steps[1] < 0.0 { 1.0 } else { -1.0 };
+                    points.push(turning_point(surfaces, [before, trace[i + 1]], axis, sign, tolerances));
+                }
+            }
+        }
+    }
+    for (i, surface) in geometry.surfaces.iter().enumerate() {
+        for axis in [Vector::x(), Vector::y(), Vector::z()] {
+            for point in [surface.support(&axis), surface.support(&-axis)].into_iter().flatten() {
+                if sheet_at(geometry, tree, SurfaceId::new(i), &point)?.is_some() {
+                    points.push(point);
+                }
+            }
+        }
+    }
+    let mut bounds = Aabb { min: points[0], max: points[0] };
+    for point in &points {
+        bounds.min = bounds.min.inf(point);
+        bounds.max = bounds.max.sup(point);
+    }
+    Ok(bounds)
+}
+
+/// The point between two points of a curve where a coordinate times `sign` is largest.
+fn turning_point(
+    [a, b]: [&Surface; 2],
+    [mut from, mut to]: [Point; 2],
+    axis: usize,
+    sign: f64,
+    tolerances: &Tolerances,
+) -> Point {
+    /// Each step leaves two thirds; past 10⁻⁸ of the step the coordinate no longer changes.
+    const STEPS: usize = 45;
+    let on = |p: Point| project_to_both(a, b, &p, tolerances.exact).unwrap_or(p);
+    for _ in 0..STEPS {
+        let (p, q) = (on(from + (to - from) / 3.0), on(to + (from - to) / 3.0));
+        if sign * p[axis] < sign * q[axis] {
+            from = p;
+        } else {
+            to = q;
+        }
+    }
+    on(nalgebra::center(&from, &to))
+}

@@ -1,0 +1,228 @@
+//! Cells that separate surfaces: in each, what matters there.
+
+use super::bounds::split;
+use super::contact::{self, Contact};
+use super::{FeatureError, Named, Place};
+use crate::interval::{Cell, dot, middle, offset};
+use crate::solid::Pruned;
+use crate::{BodyId, Geometry, Interval, Point, Solid, Surface, SurfaceId, Vector};
+
+/// A cell in which any two surfaces are told apart.
+#[derive(Debug)]
+pub(super) struct Leaf {
+    /// Its box.
+    pub cell: Cell,
+    /// The surfaces that matter in it, ascending.
+    pub surfaces: Vec<SurfaceId>,
+    /// What is left of the bodies in it; a body that fills it is `And([])`.
+    pub bodies: Vec<(BodyId, Solid)>,
+    /// The pairs of its surfaces that may meet in it, in a curve monotone along its middle's direction.
+    pub pairs: Vec<[SurfaceId; 2]>,
+}
+
+/// An octree of such cells.
+#[derive(Debug)]
+pub(super) struct Octree {
+    /// The box of all.
+    pub root: Cell,
+    nodes: Vec<Node>,
+    /// Its leaves, in the order in which they were made.
+    pub leaves: Vec<Leaf>,
+    /// Places where surfaces of a cell touch or cross too flatly for curves to be monotone.
+    pub contacts: Vec<Contact>,
+}
+
+#[derive(Debug)]
+enum Node {
+    Inner { middle: Point, first: usize },
+    Leaf(usize),
+}
+
+/// No cell is split deeper: it would be smaller than rounding.
+const MAX_DEPTH: u32 = 44;
+/// More nodes than any real part needs (the densest example, a plate with 400 holes, needs some ten thousand).
+const MAX_NODES: usize = 4_000_000;
+/// Cells with more surfaces than this are split a few levels although their pairs are told apart: fewer pairs are followed
+/// where they do not matter.
+const CROWD: usize = 6;
+/// How many levels.
+const CROWD_DEPTH: u32 = 7;
+/// If gradients vary by less than this part over a cell and still are not told apart from parallel, the cell is
+/// searched for a point of contact. Larger: curves so short that they fit beside a contact in a cell are lost; smaller:
+/// more cells along a curve of contact (ten thousands at 10⁻³).
+const FLAT: f64 = 0.05;
+
+impl Octree {
+    /// The cells of the bodies in the box `root`.
+    ///
+    /// # Errors
+    /// If more cells are needed than memory should hold.
+    pub fn new(geometry: &Geometry, root: Cell) -> Result<Self, FeatureError> {
+        let bodies = geometry.bodies.iter().enumerate();
+        let bodies = bodies.map(|(i, body)| (BodyId::new(i), body.solid.clone())).collect();
+        let mut tree = Self { root, nodes: vec![Node::Leaf(0)], leaves: Vec::new(), contacts: Vec::new() };
+        let mut open = vec![(0, root, bodies, 0)];
+        while let Some((node, cell, bodies, depth)) = open.pop() {
+            let bodies = prune(geometry, &cell, bodies);
+            let surfaces = surfaces_of(&bodies);
+            let pairs = judge_pairs(geometry, &cell, &surfaces, depth);
+            let crowded = surfaces.len() > CROWD && depth < CROWD_DEPTH;
+            if depth < MAX_DEPTH && (crowded || pairs.undecided.is_some()) {
+                if let (Some(pair), true) = (pairs.undecided, tree.nodes.len() > MAX_NODES) {
+                    let [first, second] = pair.map(|s| Named::surface(geometry, s));
+                    return Err(FeatureError::TooIntricate { first, second, place: Place(middle(&cell)) });
+                }
+                let first = tree.nodes.len();
+                tree.nodes[node] = Node::Inner { middle: middle(&cell), first };
+                for (child, part) in split(&cell).into_iter().enumerate() {
+                    tree.nodes.push(Node::Leaf(usize::MAX));
+                    open.push((first + child, part, bodies.clone(), depth + 1));
+                }
+            } else {
+                tree.nodes[node] = Node::Leaf(tree.leaves.len());
+                tree.contacts.extend(pairs.contacts);
+                let at_the_end = pairs.undecided.map(|pair| Contact::at_middle(pair, &cell));
+                tree.contacts.extend(at_the_end);
+                tree.leaves.push(Leaf { cell, surfaces, bodies, pairs: pairs.regular });
+            }
+        }
+        Ok(tree)
+    }
+
+    /// The leaf that contains `point`, `None` outside the root.
+    pub fn leaf(&self, point: &Point) -> Option<&Leaf> {
+        if !(0..3).all(|i| self.root[i].contains(point[i])) {
+            return None;
+        }
+        let mut node = 0;
+        loop {
+            match &self.nodes[node] {
+                Node::Leaf(leaf) => return Some(&self.leaves[*leaf]),
+                Node::Inner { middle, first } => {
+                    let bit = |i: usize| usize::from(point[i] > middle[i]) << i;
+                    node = first + bit(0) + bit(1) + bit(2);
+                }
+            }
+        }
+    }
+
+    /// The surfaces that matter anywhere in a box, ascending.
+    pub fn surfaces_in(&self, cell: &Cell) -> Vec<SurfaceId> {
+        let mut found = Vec::new();
+        let mut open = vec![0];
+        while let Some(node) = open.pop() {
+            match &self.nodes[node] {
+                Node::Leaf(leaf) => found.extend(&self.leaves[*leaf].surfaces),
+                Node::Inner { middle, first } => {
+                    let on_side = |child: usize, i: usize| {
+                        if child >> i & 1 == 0 { cell[i].lo <= middle[i] } else { cell[i].hi >= middle[i] }
+                    };
+                    open.extend((0..8).filter(|&c| (0..3).all(|i| on_side(c, i))).map(|c| first + c));
+                }
+            }
+        }
+        found.sort_unstable();
+        found.dedup();
+        found
+    }
+}
+
+/// What is left of the bodies in a cell.
+fn prune(geometry: &Geometry, cell: &Cell, bodies: Vec<(BodyId, Solid)>) -> Vec<(BodyId, Solid)> {
+    let mut known: Vec<(SurfaceId, Interval)> = Vec::new();
+    let mut range = |id: SurfaceId| {
+        if let Some(range) = known.iter().find(|r| r.0 == id) {
+            return range.1;
+        }
+        let range = geometry.surfaces[id.index()].value_range(cell);
+        known.push((id, range));
+        range
+    };
+    let left = |(id, solid): (BodyId, Solid)| match solid.prune(&mut range) {
+        Pruned::Empty => None,
+        Pruned::Full => Some((id, Solid::And(Vec::new()))),
+        Pruned::Part(part) => Some((id, part)),
+    };
+    bodies.into_iter().filter_map(left).collect()
+}
+
+fn surfaces_of(bodies: &[(BodyId, Solid)]) -> Vec<SurfaceId> {
+    let mut surfaces: Vec<_> = bodies.iter().flat_map(|(_, solid)| solid.surfaces()).collect();
+    surfaces.sort_unstable();
+    surfaces.dedup();
+    surfaces
+}
+
+/// What is known of the pairs of surfaces in a cell.
+#[derive(Default)]
+struct Pairs {
+    regular: Vec<[SurfaceId; 2]>,
+    contacts: Vec<Contact>,
+    undecided: Option<[SurfaceId; 2]>,
+}
+
+fn judge_pairs(geometry: &Geometry, cell: &Cell, surfaces: &[SurfaceId], depth: u32) -> Pairs {
+    let mut pairs = Pairs::default();
+    for (i, &first) in surfaces.iter().enumerate() {
+        for &second in &surfaces[i + 1..] {
+            let pair = [first, second];
+            let [a, b] = pair.map(|s| &geometry.surfaces[s.index()]);
+            if !can_meet(a, b, cell) {
+                continue;
+            }
+            let center = middle(cell);
+            let direction = a.gradient(&center).cross(&b.gradient(&center));
+            if is_monotone(a, b, cell, &direction) {
+                pairs.regular.push(pair);
+                continue;
+            }
+            let flat = is_flat(a, cell) && is_flat(b, cell);
+            match if flat { contact::find(geometry, pair, cell) } else { None } {
+                Some(contact) => pairs.contacts.push(contact),
+                None => {
+                    pairs.undecided = Some(pair);
+                    if depth < MAX_DEPTH {
+                        return pairs;
+                    }
+                }
+            }
+        }
+    }
+    pairs
+}
+
+/// Whether two surfaces that both pass through a box may meet in it.
+///
+/// Beside the ranges of both functions, the range of that combination of them is asked whose gradient is
+/// least in the middle: it tells nearly parallel sheets apart.
+pub(super) fn can_meet(a: &Surface, b: &Surface, cell: &Cell) -> bool {
+    let center = middle(cell);
+    let (ga, gb) = (a.gradient(&center), b.gradient(&center));
+    let factor = ga.dot(&gb) / gb.norm_squared();
+    if !factor.is_finite() {
+        return true;
+    }
+    let at = [0, 1, 2].map(|i| Interval::point(center[i]));
+    let (ra, rb) = (a.gradient_range(cell), b.gradient_range(cell));
+    let arm = offset(cell, &center);
+    let slope = |i: usize| (ra[i] - rb[i] * factor) * arm[i];
+    let range = a.value_range(&at) - b.value_range(&at) * factor + slope(0) + slope(1) + slope(2);
+    range.contains_zero() && a.value_range(cell).contains_zero() && b.value_range(cell).contains_zero()
+}
+
+/// Whether the intersection of two surfaces runs forward along `direction` everywhere in a box.
+///
+/// It then has at most one point on each plane across `direction`: the two equations restricted to that plane have
+/// a regular Jacobian for any choice of gradients, row by row, in their ranges (Neumaier 1990, Interval methods for
+/// systems of equations, section 5.1).
+pub(super) fn is_monotone(a: &Surface, b: &Surface, cell: &Cell, direction: &Vector) -> bool {
+    let (u, v) = (a.gradient_range(cell), b.gradient_range(cell));
+    let cross = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
+    dot(direction, &cross).lo > 0.0
+}
+
+/// Whether a gradient hardly varies over a box.
+fn is_flat(surface: &Surface, cell: &Cell) -> bool {
+    let widest = surface.gradient_range(cell).iter().map(Interval::width).fold(0.0, f64::max);
+    widest <= FLAT * surface.gradient(&middle(cell)).norm()
+}

@@ -1,0 +1,269 @@
+//! Intersection curves of pairs of surfaces, followed from seeds.
+
+use super::around::Tolerances;
+use super::bounds::split;
+use super::octree::{Leaf, Octree, can_meet, is_monotone};
+use crate::interval::{Cell, middle};
+use crate::project::{project_to_both, shortest_step};
+use crate::{Curve, Geometry, Interval, Point, Surface, SurfaceId, Vector};
+
+/// A piece of the intersection of two surfaces.
+#[derive(Clone, Debug)]
+pub(super) struct Trace {
+    /// The surfaces, ascending.
+    pub pair: [SurfaceId; 2],
+    /// Points on it, along the cross product of the two gradients. A closed one repeats the first at the end.
+    pub points: Vec<Point>,
+    /// Whether it is a closed curve.
+    pub closed: bool,
+    /// Whether it starts and ends at a point where the surfaces are tangent.
+    pub branches: [bool; 2],
+}
+
+/// The largest angle, in radians, that a curve turns by from one point to the next: under the quarter that
+/// [`Curve::trace`] promises.
+const TURN: f64 = 0.2;
+/// By how much of a step the box around it is larger than the box of its ends: an arc that turns by [`TURN`] leaves
+/// its chord by less than a twentieth.
+const ROOM: f64 = 0.1;
+/// A step below this part of the diagonal gets nowhere.
+const LEAST_STEP: f64 = 1e-9;
+/// Near a branch point within this part of the radius of curvature, a curve that heads for it is taken to reach it.
+const NEAR_BRANCH: f64 = 1e-2;
+
+/// All pieces of intersection curves in the leaves of the tree where both surfaces matter.
+pub(super) fn trace_all(geometry: &Geometry, tree: &Octree, tolerances: &Tolerances) -> Vec<Trace> {
+    let mut traces: Vec<Trace> = Vec::new();
+    let mut of_pair: std::collections::HashMap<[SurfaceId; 2], Vec<usize>> = std::collections::HashMap::new();
+    for leaf in &tree.leaves {
+        for &pair in &leaf.pairs {
+            for seed in seeds(geometry, leaf, pair, tolerances) {
+                let known = of_pair.entry(pair).or_default();
+                if known.iter().any(|&t| traces[t].passes(&seed)) {
+                    continue;
+                }
+                known.push(traces.len());
+                traces.push(Tracer::new(geometry, tree, pair, tolerances).trace(&seed));
+            }
+        }
+    }
+    traces
+}
+
+/// Points of the intersection of two surfaces in a leaf: those to which Newton's method leads from the middle and
+/// from between it and the corners; if there is none, the same in its parts, where the surfaces may meet.
+fn seeds(geometry: &Geometry, leaf: &Leaf, pair: [SurfaceId; 2], tolerances: &Tolerances) -> Vec<Point> {
+    /// Curves that only clip a corner of a leaf are found on the other side of its faces; they are looked for to this depth.
+    const DEPTH: u32 = 3;
+    let [a, b] = pair.map(|s| &geometry.surfaces[s.index()]);
+    let mut open = vec![(leaf.cell, 0)];
+    let mut found = Vec::new();
+    while let Some((cell, depth)) = open.pop() {
+        if !can_meet(a, b, &cell) {
+            continue;
+        }
+        let parts = split(&cell);
+        let others = if depth == 0 { &parts[..] } else { &[] };
+        let starts = std::iter::once(&cell).chain(others).map(middle);
+        let before = found.len();
+        for start in starts {
+            if let Ok(point) = project_to_both(a, b, &start, tolerances.exact) {
+                if (0..3).all(|i| leaf.cell[i].contains(point[i])) {
+                    found.push(point);
+                }
+            }
+        }
+        if found.len() == before && depth < DEPTH {
+            open.extend(parts.map(|part| (part, depth + 1)));
+        }
+    }
+    found
+}
+
+impl Trace {
+    /// Whether a point of the intersection of its two surfaces lies on this piece.
+    ///
+    /// In the box around a step the curve has one point on each plane across the step (see [`is_monotone`]).
+    pub fn passes(&self, point: &Point) -> bool {
+        self.points.windows(2).any(|ends| along(ends, point).is_some())
+    }
+}
+
+/// The position of a point of the curve along a step, 0 to 1, if it is in the box of the step.
+pub(super) fn along(ends: &[Point], point: &Point) -> Option<f64> {
+    /// Rounding of the position.
+    const SLACK: f64 = 1e-9;
+    let chord = ends[1] - ends[0];
+    let position = (point - ends[0]).dot(&chord) / chord.norm_squared();
+    let cell = step_box(&ends[0], &ends[1]);
+    ((-SLACK..=1.0 + SLACK).contains(&position) && (0..3).all(|i| cell[i].contains(point[i])))
+        .then_some(position.clamp(0.0, 1.0))
+}
+
+/// The box around a step in which the curve stays between its ends.
+pub(super) fn step_box(p: &Point, q: &Point) -> Cell {
+    let room = ROOM * (q - p).norm();
+    [0, 1, 2].map(|i| Interval::new(p[i].min(q[i]) - room, p[i].max(q[i]) + room))
+}
+
+/// Follows one curve.
+struct Tracer<'a> {
+    tree: &'a Octree,
+    pair: [SurfaceId; 2],
+    surfaces: [&'a Surface; 2],
+    tolerances: &'a Tolerances,
+    diagonal: f64,
+    /// Where the two surfaces are tangent and the curve may branch.
+    branch_points: Vec<Point>,
+}
+
+impl<'a> Tracer<'a> {
+    fn new(
+        geometry: &'a Geometry,
+        tree: &'a Octree,
+        pair: [SurfaceId; 2],
+        tolerances: &'a Tolerances,
+    ) -> Self {
+        let surfaces = pair.map(|s| &geometry.surfaces[s.index()]);
+        let diagonal = tree.root.iter().map(|side| side.width().powi(2)).sum::<f64>().sqrt();
+        let branch_points = tree.contacts.iter().filter(|c| c.pair == pair).map(|c| c.point).collect();
+        Self { tree, pair, surfaces, tolerances, diagonal, branch_points }
+    }
+
+    fn trace(&self, seed: &Point) -> Trace {
+        let (mut points, end) = self.follow(seed, 1.0);
+        if end == End::Closed {
+            return Trace { pair: self.pair, points, closed: true, branches: [false; 2] };
+        }
+        let (mut backward, start) = self.follow(seed, -1.0);
+        backward.reverse();
+        backward.pop();
+        backward.append(&mut points);
+        let branches = [start, end].map(|e| e == End::Branch);
+        Trace { pair: self.pair, points: backward, closed: false, branches }
+    }
+
+    /// The points from the seed on, along the tangent times `sign`.
+    fn follow(&self, seed: &Point, sign: f64) -> (Vec<Point>, End) {
+        let mut points = vec![*seed];
+        let mut reach = f64::INFINITY;
+        loop {
+            let at = points[points.len() - 1];
+            let (tangent, curvature) = self.direction(&at, sign);
+            if let Some(branch) = self.branch_ahead(&at, &tangent) {
+                points.push(branch);
+                return (points, End::Branch);
+            }
+            let mut step = reach.min(TURN / curvature).min(self.diagonal);
+            let next = loop {
+                if step < LEAST_STEP * self.diagonal {
+                    return (points, End::Lost);
+                }
+                match self.step(&at, &tangent, step, sign) {
+                    Some(next) => break next,
+                    None => step *= 0.5,
+                }
+            };
+            // The start lies on this step: the curve is closed.
+            if points.len() > 1 && along(&[at, next], seed).is_some() {
+                points.push(*seed);
+                return (points, End::Closed);
+            }
+            points.push(next);
+            if !self.matters(&next) {
+                return (points, End::Left);
+            }
+            reach = 2.0 * step;
+        }
+    }
+
+    /// Whether both surfaces matter at a point.
+    fn matters(&self, point: &Point) -> bool {
+        self.tree.leaf(point).is_some_and(|leaf| self.pair.iter().all(|s| leaf.surfaces.contains(s)))
+    }
+
+    fn direction(&self, at: &Point, sign: f64) -> (Vector, f64) {
+        let [a, b] = self.surfaces;
+        (tangent(a, b, at) * sign, curvature(a, b, at))
+    }
+
+    /// A point one step on, if it is proved to be on the same piece and the curve turns little.
+    fn step(&self, at: &Point, tangent: &Vector, step: f64, sign: f64) -> Option<Point> {
+        let [a, b] = self.surfaces;
+        let next = project_to_both(a, b, &(at + tangent * step), self.tolerances.exact).ok()?;
+        let chord = next - at;
+        let length = chord.norm();
+        if !(0.5 * step..=1.5 * step).contains(&length) {
+            return None;
+        }
+        let turned = |u: &Vector, v: &Vector| u.dot(v).clamp(-1.0, 1.0).acos() > 1.2 * TURN;
+        let ahead = self.direction(&next, sign).0;
+        if turned(tangent, &ahead) || turned(tangent, &(chord / length)) {
+            return None;
+        }
+        is_monotone(a, b, &step_box(at, &next), &(chord * sign)).then_some(next)
+    }
+
+    /// The branch point that the curve is about to reach.
+    fn branch_ahead(&self, at: &Point, tangent: &Vector) -> Option<Point> {
+        let curvature = self.surfaces.iter().map(|s| s.curvature(at)).fold(0.0, f64::max);
+        self.branch_points.iter().copied().find(|branch| {
+            let way = branch - at;
+            let distance = way.norm();
+            distance * curvature <= NEAR_BRANCH && way.dot(tangent) > 0.995 * distance
+        })
+    }
+}
+
+/// How a curve ends.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum End {
+    /// Where it began.
+    Closed,
+    /// Where one of its surfaces no longer matters.
+    Left,
+    /// At a point where its surfaces are tangent.
+    Branch,
+    /// Where steps became too small.
+    Lost,
+}
+
+/// The unit tangent of the intersection of two surfaces, along the cross product of their gradients.
+pub(super) fn tangent(a: &Surface, b: &Surface, at: &Point) -> Vector {
+    a.gradient(at).cross(&b.gradient(at)).try_normalize(0.0).unwrap_or_default()
+}
+
+/// The curvature of the intersection of two surfaces, 1/length; infinite where they are tangent.
+///
+/// Along the curve by arc length, ∇f·c'' = -c'ᵀ(∇²f)c' for both functions, and c''·c' = 0
+/// (Goldman 2005, Curvature formulas for implicit curves and surfaces, section 5).
+fn curvature(a: &Surface, b: &Surface, at: &Point) -> f64 {
+    let t = tangent(a, b, at);
+    let gradients = [a.gradient(at), b.gradient(at)];
+    let values = [a, b].map(|s| t.dot(&(s.hessian(at) * t)));
+    let squares = gradients.map(|g| g.norm_squared());
+    shortest_step(values, gradients, squares).map_or(f64::INFINITY, |bend| bend.norm())
+}
+
+/// The unit tangent of a curve at a point on it, in its direction.
+pub fn curve_tangent(geometry: &Geometry, curve: &Curve, at: &Point) -> Vector {
+    let [a, b] = curve.surfaces.map(|s| &geometry.surfaces[s.index()]);
+    let along = tangent(a, b, at);
+    // All of a trace runs along the cross product of the gradients, or all against it; but at its ends the
+    // surfaces may be tangent.
+    let middle = curve.trace.len() / 2;
+    let chord = curve.trace[middle] - curve.trace[middle - 1];
+    if tangent(a, b, &curve.trace[middle - 1]).dot(&chord) + tangent(a, b, &curve.trace[middle]).dot(&chord)
+        < 0.0
+    {
+        -along
+    } else {
+        along
+    }
+}
+
+/// The curvature of a curve at a point on it, 1/length.
+pub fn curve_curvature(geometry: &Geometry, curve: &Curve, at: &Point) -> f64 {
+    let [a, b] = curve.surfaces.map(|s| &geometry.surfaces[s.index()]);
+    curvature(a, b, at)
+}

@@ -1,0 +1,164 @@
+//! The other statements.
+
+use super::flags::Flags;
+use super::primitive::LARGEST_LENGTH;
+use super::{Lowering, Tlo};
+use crate::geometry::{Aabb, Body, Span, UserPoint};
+use crate::language::ast::{Flag, Name, Statement};
+use crate::language::diagnostic::Reported;
+use crate::{Point, Solid};
+
+impl Lowering<'_> {
+    pub(super) fn statement(&mut self, statement: &Statement) -> Result<(), Reported> {
+        match statement {
+            Statement::Solid { name, body, flags } => self.define_solid(name, body, flags),
+            Statement::Broken { name } => {
+                self.define_broken(name);
+                Ok(())
+            }
+            Statement::Tlo { solid, surface: None, flags } => self.top_level_solid(solid, flags),
+            Statement::Tlo { solid, surface: Some(surface), flags } => {
+                self.top_level_surface(solid, surface, flags)
+            }
+            Statement::Curve2d { name, text } => self.define_curve(name, text, false),
+            Statement::Curve3d { name, text } => self.define_curve(name, text, true),
+            Statement::BoundingBox { min, max, span } => self.bounding_box(min, max, *span),
+            Statement::UserPoint { point, flags, span } => self.user_point(point, flags, *span),
+            Statement::IdentifyPeriodic { solids, span } => {
+                self.known_with_surfaces(solids)?;
+                Err(self.not_meshed("identify periodic", *span))
+            }
+            Statement::IdentifyCloseSurfaces { solids, flags, span } => {
+                self.known_with_surfaces(solids)?;
+                let known = ["tlo", "direction", "reflevels", "reflevels1", "reflevels2", "slices"];
+                let flags = Flags::new(flags, &known, &[], self.report);
+                if let (Some(tlo), Some(span)) = (flags.word("tlo", self.report), flags.span("tlo")) {
+                    self.tlo_named(&Name { text: tlo.to_owned(), span })?;
+                }
+                Err(self.not_meshed("identify closesurfaces", *span))
+            }
+            Statement::SingularFace { tlo, solid, flags, span } => {
+                self.tlo_named(tlo)?;
+                self.known_with_surfaces(std::slice::from_ref(solid))?;
+                self.singular(flags, *span)
+            }
+            Statement::SingularEdge { solids, flags, span } => {
+                self.known_with_surfaces(solids)?;
+                self.singular(flags, *span)
+            }
+            Statement::SingularPoint { solids, flags, span } => {
+                self.known_with_surfaces(solids)?;
+                self.singular(flags, *span)
+            }
+            Statement::Boundary { solid, tlo, number } => self.boundary_number(solid, tlo, *number),
+            Statement::BoundaryName { solid, tlo, word } => self.boundary_name(solid, tlo, word),
+            Statement::Constant { name } => {
+                let help = "constants cannot be used as values, and no identification needs a tolerance";
+                let message = format!("the constant `{}` has no effect", name.text);
+                self.report.warn(name.span, message, help);
+                Ok(())
+            }
+        }
+    }
+
+    fn not_meshed(&mut self, construct: &str, span: Span) -> Reported {
+        let message = format!("`{construct}` is understood, but cannot be meshed yet");
+        self.report.unsupported(span, message, "without this statement the rest can be meshed")
+    }
+
+    fn known_with_surfaces(&mut self, solids: &[Name]) -> Result<(), Reported> {
+        for name in solids {
+            self.solid_named(name)?;
+        }
+        Ok(())
+    }
+
+    /// `tlo solid flags;`
+    fn top_level_solid(&mut self, name: &Name, flags: &[Flag]) -> Result<(), Reported> {
+        const ON_SOLID: &str =
+            "it belongs on the `solid`; `boundarycondition` numbers the boundaries of a tlo";
+        let known = ["col", "transparent", "material", "layer", "maxh"];
+        let flags = Flags::new(flags, &known, &[("bc", ON_SOLID), ("bcname", ON_SOLID)], self.report);
+        let definition = self.solid_named(name)?;
+        let same = |tlo: &&Tlo| tlo.definition == definition && tlo.body.is_some();
+        if let Some(first) = self.tlos.iter().find(same) {
+            let message =
+                format!("`{}` is a top-level object already, in line {}", name.text, first.span.line);
+            return Err(self.report.meaning(name.span, message, "bodies must not overlap"));
+        }
+        let body = Body {
+            name: name.text.clone(),
+            solid: Solid::Or(Vec::new()),
+            number: self.tlos.len() as u32 + 1,
+            maxh: flags.maxh(self.report),
+            material: flags.word("material", self.report).map(str::to_owned),
+            color: flags.color(self.report),
+            transparent: flags.is_set("transparent", self.report),
+            layer: flags.layer(self.report).unwrap_or(1),
+            span: name.span,
+        };
+        if let Some(other) = self.tlos.iter().filter_map(|tlo| tlo.body.as_ref()).next()
+            && other.layer != body.layer
+        {
+            let message = format!("`{}` and `{}` are in different layers", other.name, body.name);
+            self.report.warn(name.span, message, "they are meshed together, conformingly, all the same");
+        }
+        self.tlos.push(Tlo { definition, body: Some(body), span: name.span });
+        Ok(())
+    }
+
+    /// `tlo solid surface flags;`
+    fn top_level_surface(&mut self, name: &Name, surface: &Name, flags: &[Flag]) -> Result<(), Reported> {
+        let known = ["col", "transparent", "maxh", "layer", "bc", "bcname"];
+        let idle = [("material", "a surface has none")];
+        Flags::new(flags, &known, &idle, self.report);
+        let definition = self.solid_named(name)?;
+        self.solid_named(surface)?;
+        // It takes a number like the others.
+        self.tlos.push(Tlo { definition, body: None, span: name.span });
+        let message = "a `tlo` of one surface is understood, but cannot be meshed yet";
+        Err(self.report.unsupported(surface.span, message, "without this statement the rest can be meshed"))
+    }
+
+    fn bounding_box(&mut self, min: &Point, max: &Point, span: Span) -> Result<(), Reported> {
+        if (0..3).any(|i| min[i] >= max[i]) {
+            let help = "the corner with the least coordinates comes first";
+            return Err(self.report.meaning(span, "the box of `boundingbox` is empty", help));
+        }
+        if self.stated_box.is_some() {
+            self.report.warn(span, "there was a `boundingbox` before; this one counts", "");
+        }
+        self.stated_box = Some(Aabb { min: *min, max: *max });
+        Ok(())
+    }
+
+    fn user_point(&mut self, point: &Point, flags: &[Flag], span: Span) -> Result<(), Reported> {
+        let flags = Flags::new(flags, &["factor"], &[], self.report);
+        if flags.has_factor(self.report) {
+            self.report.warn(span, "the -factor of the point has no effect", ONLY_HP);
+        }
+        if point.coords.amax() > LARGEST_LENGTH {
+            let message = format!("a coordinate is larger than {LARGEST_LENGTH:e}");
+            return Err(self.report.meaning(span, message, "choose another unit of length"));
+        }
+        self.user_points.push(UserPoint { point: *point, span });
+        Ok(())
+    }
+
+    fn singular(&mut self, flags: &[Flag], span: Span) -> Result<(), Reported> {
+        let flags = Flags::new(flags, &["factor", "maxh", "tlo"], &[], self.report);
+        if let (Some(tlo), Some(span)) = (flags.word("tlo", self.report), flags.span("tlo")) {
+            self.tlo_named(&Name { text: tlo.to_owned(), span })?;
+        }
+        flags.has_factor(self.report);
+        self.report.warn(span, "`singular` has no effect on the mesh", ONLY_HP);
+        if let (Some(_), Some(span)) = (flags.maxh(self.report), flags.span("maxh")) {
+            let help = "give -maxh to a solid whose surfaces meet there";
+            self.report.warn(span, "the mesh size along singular edges is not set", help);
+        }
+        Ok(())
+    }
+}
+
+/// What singularities are for.
+const ONLY_HP: &str = "it grades hp elements, and tetrahedra are written without grading";

@@ -1,0 +1,255 @@
+//! Tokens to statements.
+//!
+//! A statement with an error is reported once; reading goes on at the next word that begins a statement.
+//! Those words are reserved, so that one error seldom causes another.
+
+mod curve;
+mod flag;
+mod solid;
+mod statement;
+
+use super::ast::{Name, Num, Statement};
+use super::diagnostic::{Report, Reported};
+use super::suggest::{STATEMENTS, begins_statement, did_you_mean, is_reserved};
+use super::token::{Token, TokenKind, tokenize};
+use crate::geometry::Span;
+use crate::{Point, Vector};
+
+type Parsed<T> = Result<T, Reported>;
+
+/// The statements of `source`, those with errors left out (or [`Statement::Broken`] if they define a solid).
+pub(super) fn parse(source: &str, report: &mut Report) -> Vec<Statement> {
+    let tokens = tokenize(source, report);
+    let mut parser = Parser { tokens: &tokens, at: 0, report, depth: 0, usage: "" };
+    if parser.header().is_err() {
+        return Vec::new();
+    }
+    let mut statements = Vec::new();
+    while parser.peek().kind != TokenKind::End && !parser.report.is_full() {
+        let start = parser.at;
+        match parser.statement() {
+            Ok(Some(statement)) => statements.push(statement),
+            Ok(None) => {}
+            Err(Reported) => {
+                statements.extend(parser.broken_definition(start));
+                parser.skip_to_statement(start);
+            }
+        }
+    }
+    statements
+}
+
+struct Parser<'a, 'r> {
+    tokens: &'a [Token<'a>],
+    at: usize,
+    report: &'r mut Report,
+    /// How deep the expression being read is nested.
+    depth: usize,
+    /// How the construct being read is written, for the help line.
+    usage: &'static str,
+}
+
+impl<'a> Parser<'a, '_> {
+    fn peek(&self) -> Token<'a> {
+        self.tokens[self.at]
+    }
+
+    /// Takes a token; the end of the file stays.
+    fn next(&mut self) -> Token<'a> {
+        let token = self.peek();
+        self.at = (self.at + 1).min(self.tokens.len() - 1);
+        token
+    }
+
+    fn peek_mark(&self, mark: char) -> bool {
+        self.peek().kind == TokenKind::Mark(mark)
+    }
+
+    fn peek_word(&self, word: &str) -> bool {
+        self.peek().kind == TokenKind::Word(word)
+    }
+
+    /// Takes `mark` if it is next.
+    fn take_mark(&mut self, mark: char) -> bool {
+        let there = self.peek_mark(mark);
+        if there {
+            self.next();
+        }
+        there
+    }
+
+    /// Reports that the next token is not `wanted`.
+    fn expected(&mut self, wanted: &str) -> Reported {
+        let help = if self.usage.is_empty() { String::new() } else { format!("write {}", self.usage) };
+        self.expected_with_help(wanted, &help)
+    }
+
+    fn expected_with_help(&mut self, wanted: &str, help: &str) -> Reported {
+        let token = self.peek();
+        if token.kind == TokenKind::Bad {
+            return Reported;
+        }
+        self.report.syntax(token.span, format!("expected {wanted}, found {}", describe(token.kind)), help)
+    }
+
+    fn mark(&mut self, mark: char) -> Parsed<Span> {
+        if self.peek_mark(mark) { Ok(self.next().span) } else { Err(self.expected(&format!("`{mark}`"))) }
+    }
+
+    /// A number behind any count of minus signs.
+    fn number(&mut self) -> Parsed<Num> {
+        let span = self.peek().span;
+        let mut negative = false;
+        while self.take_mark('-') {
+            negative = !negative;
+        }
+        match self.peek().kind {
+            TokenKind::Number(value) => {
+                self.next();
+                Ok(Num { value: if negative { -value } else { value }, span })
+            }
+            TokenKind::Word(_) => {
+                Err(self.expected_with_help("a number", "there are no variables and no arithmetic"))
+            }
+            _ => Err(self.expected("a number")),
+        }
+    }
+
+    fn value(&mut self) -> Parsed<f64> {
+        Ok(self.number()?.value)
+    }
+
+    fn point(&mut self) -> Parsed<Point> {
+        let x = self.value()?;
+        self.mark(',')?;
+        let y = self.value()?;
+        self.mark(',')?;
+        Ok(Point::new(x, y, self.value()?))
+    }
+
+    fn vector(&mut self) -> Parsed<Vector> {
+        Ok(self.point()?.coords)
+    }
+
+    /// A `;` and then a number.
+    fn next_value(&mut self) -> Parsed<f64> {
+        self.mark(';')?;
+        self.value()
+    }
+
+    /// A `;` and then a number, to be a whole one.
+    fn next_number(&mut self) -> Parsed<Num> {
+        self.mark(';')?;
+        self.number()
+    }
+
+    fn next_point(&mut self) -> Parsed<Point> {
+        self.mark(';')?;
+        self.point()
+    }
+
+    fn next_vector(&mut self) -> Parsed<Vector> {
+        self.mark(';')?;
+        self.vector()
+    }
+
+    /// The name of `what`.
+    fn name(&mut self, what: &str) -> Parsed<Name> {
+        let token = self.peek();
+        match token.kind {
+            TokenKind::Word(word) if is_reserved(word) => {
+                self.next();
+                if !(self.peek_mark('=') || self.peek_mark(';')) {
+                    // It begins the next statement perhaps, where reading goes on.
+                    self.at -= 1;
+                }
+                let message = format!("`{word}` is a word of the language and cannot name {what}");
+                Err(self.report.syntax(token.span, message, "choose another name"))
+            }
+            TokenKind::Word(word) => {
+                self.next();
+                Ok(Name { text: word.to_owned(), span: token.span })
+            }
+            _ => {
+                let help = "names begin with a letter and go on with letters, digits and _";
+                Err(self.expected_with_help(&format!("the name of {what}"), help))
+            }
+        }
+    }
+
+    /// `algebraic3d`, with which every file begins.
+    fn header(&mut self) -> Parsed<()> {
+        let token = self.peek();
+        match token.kind {
+            TokenKind::Word("algebraic3d") => {
+                self.next();
+                Ok(())
+            }
+            TokenKind::Bad => Err(Reported),
+            TokenKind::End => {
+                let help = "write `algebraic3d`, solids, and `tlo NAME;` for each that is to be meshed";
+                Err(self.report.syntax(token.span, "the file is empty", help))
+            }
+            TokenKind::Word(word) if begins_statement(word) => {
+                let help = "make `algebraic3d` the first word of the file";
+                self.report.syntax(token.span, "a .geo file begins with the word `algebraic3d`", help);
+                Ok(())
+            }
+            _ => {
+                let help = "this is perhaps no solid geometry, but a file of another kind";
+                let message = "a .geo file begins with the word `algebraic3d`";
+                Err(self.report.syntax(token.span, message, help))
+            }
+        }
+    }
+
+    /// What a statement that could not be read (it began at token `start`) would have defined: its first word may
+    /// be the wrong one.
+    fn broken_definition(&self, start: usize) -> Option<Statement> {
+        let [word, name, mark] = self.tokens.get(start..start + 3)? else { return None };
+        match (word.kind, name.kind, mark.kind) {
+            (TokenKind::Word(_), TokenKind::Word(text), TokenKind::Mark('=')) if !is_reserved(text) => {
+                Some(Statement::Broken { name: Name { text: text.to_owned(), span: name.span } })
+            }
+            _ => None,
+        }
+    }
+
+    /// Goes to the next word that begins a statement and is not the one at `start`.
+    fn skip_to_statement(&mut self, start: usize) {
+        self.at = self.at.max(start + 1).min(self.tokens.len() - 1);
+        loop {
+            let after_singular = self.tokens[self.at - 1].kind == TokenKind::Word("singular");
+            match self.peek().kind {
+                TokenKind::End => break,
+                TokenKind::Word(word) if begins_statement(word) && !(word == "point" && after_singular) => {
+                    break;
+                }
+                _ => {
+                    self.next();
+                }
+            }
+        }
+    }
+
+    /// Reports a token that begins no statement.
+    fn no_statement(&mut self) -> Reported {
+        let help = match self.peek().kind {
+            TokenKind::Word(word) => did_you_mean(word, STATEMENTS),
+            _ => String::new(),
+        };
+        let help =
+            if help.is_empty() { format!("statements begin with {}", STATEMENTS.join(", ")) } else { help };
+        self.expected_with_help("a statement", &help)
+    }
+}
+
+fn describe(kind: TokenKind<'_>) -> String {
+    match kind {
+        TokenKind::Word(word) => format!("`{word}`"),
+        TokenKind::Number(value) => format!("the number {value}"),
+        TokenKind::Mark(mark) => format!("`{mark}`"),
+        TokenKind::Bad => "an unknown character".into(),
+        TokenKind::End => "the end of the file".into(),
+    }
+}

@@ -1,0 +1,146 @@
+//! The corners of the grammar.
+
+use super::*;
+
+#[test]
+fn layout_and_comments_mean_nothing() {
+    let text = "# comment; solid\n#\n\nalgebraic3d#x\r\nsolid\ta=sphere(0,#c ( [\r\n0 ,0;1)and\r\nplane(0,0,0;\n0,0,1);tlo a";
+    let parsed = parse_geometry(&format!("{text};"), "t.geo").unwrap();
+    assert_eq!(parsed.geometry.surfaces.len(), 2);
+}
+
+#[test]
+fn a_file_may_end_without_a_newline_and_after_a_comment() {
+    for end in ["", "\n", "# end", ";;; ; # end"] {
+        parsed(&format!("solid a = sphere (0,0,0; 1); tlo a;{end}"));
+    }
+}
+
+#[test]
+fn numbers_take_any_count_of_minus_signs_but_no_plus() {
+    let geometry = solid("sphere (--1, - - -2, .5; 1e0)");
+    let Surface::Sphere(sphere) = &geometry.surfaces[0] else { panic!() };
+    assert_eq!(sphere.center, Point::new(1.0, -2.0, 0.5));
+    assert!(error("solid a = sphere (+1, 0, 0; 1);").contains("no leading +"));
+}
+
+#[test]
+fn stray_semicolons_are_skipped_as_is_the_one_after_a_constant() {
+    let text =
+        "; define constant identprec = 1e-5 ; define constant k = -3 solid a = sphere (0,0,0; 1);; tlo a;";
+    let warnings = parsed(text).warnings;
+    assert_eq!(warnings.len(), 2);
+    assert!(warnings[0].message.contains("`identprec` has no effect"));
+}
+
+#[test]
+fn names_are_case_sensitive_and_may_begin_like_keywords() {
+    let text = "solid A = sphere (0,0,0; 1); solid a = sphere (5,0,0; 1); solid planet = A or a; solid or1 = planet; tlo or1;";
+    assert_eq!(geometry(text).surfaces.len(), 2);
+}
+
+#[test]
+fn the_same_name_may_be_a_solid_and_a_curve() {
+    let text = "curve2d a = (2; 0,0; 1,1; 1; 2,1,2); curve3d a = (2; 0,0,0; 1,1,1; 1; 2,1,2);
+                solid a = sphere (0,0,0; 1); tlo a;";
+    geometry(text);
+}
+
+#[test]
+fn box_points_and_flags_are_read() {
+    let text = "boundingbox (-1,-1,-1; 2,2,2.5); point (0.5, 0, 0); point (0,0,0) -factor=0;
+                solid a = sphere (0,0,0; 1); tlo a;";
+    let geometry = geometry(text);
+    let stated = geometry.stated_box.unwrap();
+    assert_eq!((stated.min, stated.max), (Point::new(-1., -1., -1.), Point::new(2., 2., 2.5)));
+    assert_eq!(geometry.user_points[0].point, Point::new(0.5, 0.0, 0.0));
+    assert_eq!(geometry.user_points[1].span.column, 53);
+}
+
+#[test]
+fn singularities_are_read_and_have_no_effect() {
+    let text = "solid a = sphere (0,0,0; 1); solid b = plane (0,0,0; 0,0,1); solid c = a and b; tlo c;
+                singular edge a b -factor=2 -tlo=c; singular face c a; singular point a b c -factor=1;";
+    let warnings = parsed(text).warnings;
+    assert_eq!(warnings.len(), 3);
+    assert!(warnings.iter().all(|w| w.message == "`singular` has no effect on the mesh"));
+}
+
+#[test]
+fn the_mesh_size_of_a_singular_edge_is_not_lost_silently() {
+    let text = "solid a = sphere (0,0,0; 1); tlo a; singular edge a a -maxh=0.1;";
+    assert!(parsed(text).warnings[1].message.contains("mesh size along singular edges is not set"));
+}
+
+const CURVES: &str = "curve2d ring = (4; 1,1; 1,2; 2,2; 2,1; 4; 2,1,2; 2,2,3; 2,3,4; 2,4,1);
+    curve3d path = (3; 0,0,0; 0,0,1; 1,0,1; 1; 3,1,2,3);";
+
+#[test]
+fn extrusions_and_revolutions_are_refused_only_where_they_are_used() {
+    let sphere = "solid a = sphere (0,0,0; 1); tlo a;";
+    geometry(&format!("{CURVES} solid e = extrusion (path; ring; 0,0,1) -bc=2; {sphere}"));
+    for text in ["extrusion (path; ring; 1,0,0)", "translate (1,0,0; revolution (0,0,0; 1,0,0; ring))"] {
+        let errors = errors(&format!("{CURVES} solid e = {text} and plane (0,0,0; 0,0,1); tlo e;"));
+        assert!(errors.is_unsupported(), "{errors}");
+        assert!(errors.to_string().contains("is understood, but cannot be meshed yet"), "{errors}");
+    }
+}
+
+#[test]
+fn identifications_and_surface_objects_are_refused_as_unsupported() {
+    let solids = "solid a = plane (0,0,0; 0,0,-1); solid b = orthobrick (0,0,0; 1,1,1); tlo b;";
+    for (text, construct) in [
+        ("identify periodic a b;", "identify periodic"),
+        ("identify closesurfaces a b -tlo=b -slices=[0.2,0.5] -direction=[0,0,1];", "identify closesurfaces"),
+        ("tlo b a -col=[1,0,0] -bc=5 -bcname=lid;", "a `tlo` of one surface"),
+    ] {
+        let errors = errors(&format!("{solids} {text}"));
+        assert!(errors.is_unsupported() && errors.to_string().contains(construct), "{errors}");
+    }
+}
+
+#[test]
+fn other_errors_beside_unsupported_ones_are_errors() {
+    let errors = errors("solid a = sphere (0,0,0; 1); tlo a; identify periodic a a; tlo b;");
+    assert_eq!(errors.errors().count(), 2);
+    assert!(!errors.is_unsupported());
+}
+
+#[test]
+fn comments_may_have_any_encoding() {
+    let source = b"algebraic3d # W\xfcrfel\nsolid a = sphere (0,0,0; 1); tlo a; # \xff\xfe";
+    assert!(parse_geometry_bytes(source, "t.geo").unwrap().warnings.is_empty());
+    let errors =
+        parse_geometry_bytes(b"algebraic3d\nsolid W\xfcrfel = sphere (0,0,0; 1);", "t.geo").unwrap_err();
+    assert!(errors.to_string().contains("not UTF-8"), "{errors}");
+}
+
+#[test]
+fn nesting_has_a_limit_that_people_do_not_reach() {
+    let nested = |depth: usize| format!("{}sphere (0,0,0; 1){}", "(".repeat(depth), ")".repeat(depth));
+    solid(&nested(150));
+    solid(&format!("{}sphere (0,0,0; 1)", "not ".repeat(150)));
+    assert!(error(&format!("solid a = {};", nested(100_000))).contains("nested more than 200 deep"));
+    assert!(error(&format!("solid a = {}b;", "not ".repeat(100_000))).contains("nested more than 200 deep"));
+}
+
+#[test]
+fn trees_have_limits() {
+    let mut doubled = String::from("solid a0 = sphere (0,0,0; 1) and plane (0,0,0; 0,0,1);");
+    let mut ladder = String::from("solid a0 = sphere (0,0,0; 1);");
+    for i in 1..1000 {
+        let word = if i % 2 == 0 { "and" } else { "or" };
+        if i < 60 {
+            doubled += &format!(
+                "solid a{i} = (a{0} and plane ({i},0,0; 1,0,0)) or (a{0} and plane (0,{i},0; 0,1,0));",
+                i - 1
+            );
+        }
+        ladder += &format!("solid a{i} = a{} {word} sphere ({i},0,0; 1);", i - 1);
+    }
+    assert!(error(&format!("{doubled} tlo a59;")).contains("more than 1000000 half-spaces"));
+    assert!(error(&format!("{ladder} tlo a999;")).contains("nested by turns more than 400 deep"));
+    let copies =
+        "solid b = multitranslate (1,0,0; 999; multitranslate (0,1,0; 2000; sphere (0,0,0; 1))); tlo b;";
+    assert!(error(copies).contains("more than 1000000 surfaces"));
+}

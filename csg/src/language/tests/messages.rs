@@ -1,0 +1,274 @@
+//! What is said, where, and what help is given.
+
+use super::*;
+
+/// The message of the only error has its place in line 2 and these parts.
+#[track_caller]
+fn says(statements: &str, column: u32, parts: &[&str]) {
+    let text = error(statements);
+    assert!(text.starts_with(&format!("t.geo:2:{column}: ")), "{text}");
+    for part in parts {
+        assert!(text.contains(part), "no {part:?} in\n{text}");
+    }
+}
+
+#[test]
+fn a_message_is_shown_whole() {
+    let text = errors("solid ball = sphere (0, 0, 0, 1);").to_string();
+    let expected = "t.geo:2:29: error: expected `;`, found `,`
+    2 | solid ball = sphere (0, 0, 0, 1);
+      |                             ^
+      = help: write sphere (cx, cy, cz; r)";
+    assert_eq!(text, expected);
+}
+
+#[test]
+fn arguments_that_are_wrong_are_met_with_the_right_form() {
+    says("solid a = plane (0,0; 0,0,1);", 21, &["expected `,`, found `;`", "plane (px, py, pz; nx, ny, nz)"]);
+    says("solid a = cone (0,0,0; 1; 1,0,0);", 32, &["expected `;`, found `)`", "cone (ax, ay, az; ra;"]);
+    says("solid a = torus 0,0,0;", 17, &["expected `(`, found the number 0", "torus (cx, cy, cz;"]);
+    says("solid a = sphere (0,0,r; 1);", 23, &["expected a number, found `r`", "no variables"]);
+    says("solid a = cylinder (0,0,0; 1,0,0; 1;", 36, &["expected `)`, found `;`"]);
+    says("solid a = translate (1,0,0, b);", 27, &["expected `;`", "translate (dx, dy, dz; SOLID)"]);
+    says(
+        "solid a = rotate (0,0,0; 1,0,0; sphere (0,0,0; 1);",
+        50,
+        &["expected `)` for the `(` of line 2, column 11"],
+    );
+}
+
+#[test]
+fn misspelt_words_are_guessed() {
+    says(
+        "sold a = sphere (0,0,0; 1); tlo a;",
+        1,
+        &["expected a statement, found `sold`", "did you mean `solid`?"],
+    );
+    says("solid a = spehre (0,0,0; 1);", 11, &["unknown primitive `spehre`", "did you mean `sphere`?"]);
+    says(
+        "solid ball = sphere (0,0,0; 1); tlo bal;",
+        37,
+        &["there is no solid `bal`", "did you mean `ball`?"],
+    );
+    says("solid a = box;", 11, &["there is no solid `box`", "defined before it is used"]);
+    says("identify perodic a b;", 10, &["`closesurfaces` or `periodic`", "did you mean `periodic`?"]);
+    says("singular egde a b;", 10, &["expected `face` or `edge` or `point`", "did you mean `edge`?"]);
+    says("define konstant a = 1;", 8, &["expected `constant`", "did you mean `constant`?"]);
+}
+
+#[test]
+fn words_of_the_language_are_no_names() {
+    says(
+        "solid plane = sphere (0,0,0; 1);",
+        7,
+        &["`plane` is a word of the language and cannot name a solid"],
+    );
+    says("solid a = tube (0,0,0; 1);", 11, &["`tube` is no solid"]);
+    says("solid my-box = sphere (0,0,0; 1);", 9, &["expected `=`, found `-`", "letters, digits and _"]);
+    says("solid 2a = sphere (0,0,0; 1);", 7, &["expected the name of a solid", "begin with a letter"]);
+    says("solid a = sphere (0,0,0; 1) -material=solid;", 39, &["`solid` is a word of the language"]);
+}
+
+#[test]
+fn a_missing_semicolon_is_found_at_the_next_word() {
+    says(
+        "solid a = sphere (0,0,0; 1) tlo a;",
+        29,
+        &["expected `;` at the end of the statement, found `tlo`"],
+    );
+    says("solid a = sphere (0,0,0; 1); tlo a", 35, &["expected `;`", "found the end of the file"]);
+    says("solid a = sphere (0,0,0; 1); tlo a solid b = a;", 36, &["expected `;`", "found `solid`"]);
+}
+
+#[test]
+fn flags_within_a_solid_are_explained() {
+    says("solid a = sphere (0,0,0; 1) -bc=1 or plane (0,0,0; 0,0,1);", 35, &["flags stand once"]);
+    says("solid a = (sphere (0,0,0; 1) -bc=1);", 30, &["expected `)`", "flags stand once"]);
+    says("solid a = sphere (0,0,0; 1) -material=\"air\";", 39, &["there are no quoted strings"]);
+    says("solid a = sphere (0,0,0; 1) -maxh=;", 35, &["expected the value of the flag"]);
+    says("solid a = sphere (0,0,0; 1) - -maxh=1;", 31, &["expected the name of a flag"]);
+    says("solid a = sphere (0,0,0; 1) -bc=[1,2;", 37, &["expected `]`, found `;`"]);
+    says("solid a = -b;", 11, &["expected a solid, found `-`", "write `a and not b`"]);
+}
+
+#[test]
+fn a_file_begins_with_its_word() {
+    let whole = |source: &str| parse_geometry(source, "t.geo").unwrap_err().to_string();
+    assert!(whole("").starts_with("t.geo:1:1: error: the file is empty"));
+    assert!(whole("# nothing\n").contains("the file is empty"));
+    assert!(whole("solid a = sphere (0,0,0; 1); tlo a;").contains("begins with the word `algebraic3d`"));
+    let stl = whole("facet normal 0 0 1\nouter loop\n");
+    assert_eq!(stl.matches("error:").count(), 1);
+    assert!(stl.contains("a file of another kind"), "{stl}");
+    assert!(whole("algebraic3d").contains("there is no top-level object, hence nothing to mesh"));
+}
+
+#[test]
+fn several_errors_are_reported_and_none_follows_from_another() {
+    let text = "solid a = sphere (0,0,0);\nsolid b = a and plane (0,0,0; 0,0,0);\nsolid c = a or b or ball;\ntlo c; tlo a;\nboundarycondition c d 1;";
+    let errors = errors(text);
+    let places: Vec<_> = errors.errors().map(|e| (e.span.line, e.span.column)).collect();
+    assert_eq!(places, [(2, 24), (3, 17), (4, 21), (6, 21)], "{errors}");
+}
+
+#[test]
+fn a_broken_curve_gives_one_error() {
+    error("curve2d p = (2; 0,0; 1; 2,1,2); solid a = revolution (0,0,0; 1,0,0; p); tlo a;");
+}
+
+#[test]
+fn degenerate_primitives_are_located() {
+    for (text, message) in [
+        ("sphere (0,0,0; 0)", "`sphere` needs a positive radius, not 0"),
+        ("sphere (0,0,0; -1)", "`sphere` needs a positive radius, not -1"),
+        ("plane (0,0,0; 0,0,0)", "the normal of the plane (0, 0, 0) has no direction"),
+        ("plane (1e99,0,0; 0,0,1)", "a coordinate is larger than 1e60"),
+        ("cylinder (1,2,3; 1,2,3; 1)", "the two points on the axis of `cylinder` coincide"),
+        ("cylinder (0.1,0.2,0.3; 0.1,0.2,0.3000000000000001; 1)", "coincide"),
+        ("cylinder (0,0,0; 0,0,1; 0)", "`cylinder` needs a positive radius"),
+        ("cone (0,0,0; 0; 0,0,1; 0)", "`cone` cannot have the radii 0 and 0"),
+        ("cone (0,0,0; 1; 0,0,1; -1)", "`cone` cannot have the radii 1 and -1"),
+        ("cone (0,0,0; 1; 0,0,0; 2)", "coincide"),
+        ("orthobrick (0,0,0; 1,0,1)", "`orthobrick` has no extent along y: from 0 to 0"),
+        ("orthobrick (1,0,0; 0,1,1)", "`orthobrick` has no extent along x: from 1 to 0"),
+        ("torus (0,0,0; 0,0,0; 2; 1)", "the axis of `torus` (0, 0, 0) has no direction"),
+        ("torus (0,0,0; 0,0,1; 1; 2)", "the tube of `torus` has radius 2"),
+        ("torus (0,0,0; 0,0,1; 1; 1)", "the tube of `torus` has radius 1"),
+        ("ellipsoid (0,0,0; 1,0,0; 0,0,0; 0,0,1)", "a semi-axis of `ellipsoid`"),
+        ("ellipsoid (0,0,0; 1,0,0; 1,1,0; 0,0,1)", "at 45.0000 degrees, not at right angles"),
+        ("ellipticcylinder (0,0,0; 1,0,0; -2,0,0)", "at 0.0000 degrees"),
+        ("ellipticcone (0,0,0; 1,0,0; 0,2,0; 0; 0.5)", "`ellipticcone` cannot have the height 0"),
+        ("ellipticcone (0,0,0; 2,0,0; 0,1,0; 1; -0.5)", "`ellipticcone` cannot have the ratio -0.5"),
+        ("multitranslate (1,0,0; -1; sphere (0,0,0; 1))", "there cannot be -1 copies"),
+        ("translate (1e300,0,0; sphere (0,0,0; 1))", "larger than 1e60"),
+    ] {
+        let text = error(&format!("solid a = {text}; tlo a;"));
+        assert!(text.contains(message) && text.starts_with("t.geo:2:"), "{message}\n{text}");
+    }
+}
+
+#[test]
+fn degenerate_primitives_are_refused_inside_transforms_too() {
+    says("solid a = translate (1,0,0; sphere (0,0,0; 0)); tlo a;", 29, &["positive radius"]);
+}
+
+#[test]
+fn almost_orthogonal_semi_axes_are_turned_with_a_warning() {
+    let text = warning("solid a = ellipsoid (0,0,0; 2,0.001,0; 0,1,0; 0,0,1); tlo a;");
+    assert!(text.contains("were turned to 90"), "{text}");
+}
+
+#[test]
+fn wrong_polyhedra_are_located() {
+    let points = "0,0,0; 1,0,0; 0,1,0; 0,0,1 ;;";
+    for (faces, message) in [
+        ("1,3,2; 1,2,4; 2,3,4", "do not close at the edge from point 1 to point 3"),
+        ("1,3,2; 1,2,4; 2,3,4; 1,3,4", "do not close at the edge from point 1 to point 3"),
+        ("1,2,3; 1,4,2; 2,4,3; 1,3,4", "enclose no volume from outside"),
+        ("1,3,2; 1,2,4; 2,3,5; 1,4,3", "there is no point 5 in this `polyhedron`"),
+        ("1,3,2; 1,2,2; 2,3,4; 1,4,3", "needs three different points"),
+        ("1,3,2; 1,2,1.5; 2,3,4; 1,4,3", "there is no point 1.5"),
+    ] {
+        let text = error(&format!("solid a = polyhedron ({points} {faces}); tlo a;"));
+        assert!(text.contains(message), "{faces}: {text}");
+    }
+    says("solid a = polyhedron (0,0,0; 1,0,0; 1,2,3);", 42, &["x, y, z; ... ;; i, j, k"]);
+}
+
+#[test]
+fn a_polyhedron_that_crosses_itself_is_refused() {
+    // A tetrahedron through another: closed and oriented, but no solid.
+    let text = "solid a = polyhedron (0,0,0; 3,0,0; 0,3,0; 0,0,3; 0.5,0.5,0.5; 0.5,0.5,-2; 2.5,0.5,0.4; 0.6,2.5,0.6 ;;
+        1,3,2; 1,2,4; 2,3,4; 1,4,3; 5,7,6; 5,6,8; 6,7,8; 5,8,7); tlo a;";
+    let message = error(text);
+    assert!(message.contains("cross") || message.contains("no volume"), "{message}");
+}
+
+#[test]
+fn wrong_curves_are_located() {
+    for (curve, message) in [
+        ("curve2d c = (2; 0,0; 1,1; 1; 2,1,3);", "there is no point 3 in this curve"),
+        ("curve2d c = (2; 0,0; 1,1; 1; 2,1,0);", "there is no point 0 in this curve"),
+        ("curve2d c = (3; 0,0; 1,1; 2,0; 1; 4,1,2,3);", "segments of kind 4 have no tangents"),
+        ("curve2d c = (2; 0,0; 1,1; 1; 3,1,2);", "no segment of kind 3 with 2 points"),
+        ("curve2d c = (2; 0,0; 1,1; 1; 7,1,2);", "no segment of kind 7"),
+        (
+            "curve2d c = (4; 0,0; 1,1; 2,2; 3,3; 2; 2,1,2; 2,3,4);",
+            "begins at point 3, the one before ends at 2",
+        ),
+        ("curve2d c = (3; 0,0; 1,1; 1; 2,1,2);", "another coordinate (2 of 3 points are complete)"),
+        ("curve2d c = (1; 0,0; 1,1; 1; 2,1,2);", "the count promised 1 points"),
+        ("curve2d c = (0; 1; 2,1,2);", "a curve cannot have 0 points"),
+        ("curve3d c = (2; 0,0; 1,1,1; 1; 2,1,2);", "another coordinate"),
+        ("curve3d c = (4e9; 0,0,0; 1,1,1; 1; 2,1,2);", "another coordinate"),
+    ] {
+        let text = error(curve);
+        assert!(text.contains(message), "{curve}: {text}");
+    }
+    let open = "curve2d f = (2; 0,0; 1,1; 1; 2,1,2); solid a = revolution (0,0,0; 1,0,0; f); tlo a;";
+    assert!(error(open).contains("is open, and not closed by the axis either"));
+    let order = "curve2d f = (2; 0,0; 1,1; 1; 2,1,2); curve3d p = (2; 0,0,0; 1,1,1; 1; 2,1,2); solid a = extrusion (f; p; 0,0,1); tlo a;";
+    assert!(error(order).contains("takes a curve of space first"));
+}
+
+#[test]
+fn unknown_names_everywhere_are_errors() {
+    let solid = "solid a = sphere (0,0,0; 1); tlo a; ";
+    for (text, name) in [
+        ("identify periodic a nix;", "nix"),
+        ("identify closesurfaces nix a;", "nix"),
+        ("identify closesurfaces a a -tlo=nix;", "nix"),
+        ("singular face nix a;", "nix"),
+        ("singular face a nix;", "nix"),
+        ("singular edge a nix;", "nix"),
+        ("singular edge a a -tlo=nix;", "nix"),
+        ("singular point a a nix;", "nix"),
+        ("boundarycondition nix a 1;", "nix"),
+        ("boundarycondition a nix 1;", "nix"),
+        ("boundaryconditionname a nix wall;", "nix"),
+        ("tlo a nix;", "nix"),
+        ("solid b = revolution (0,0,0; 1,0,0; nix);", "nix"),
+    ] {
+        let text = error(&format!("{solid}{text}"));
+        assert!(text.contains(&format!("`{name}`")) && text.contains("there is no"), "{text}");
+    }
+}
+
+#[test]
+fn solids_that_are_made_of_themselves_are_refused() {
+    assert!(
+        error("solid a = sphere (0,0,0; 1); solid a = a and plane (0,0,0; 0,0,1); tlo a;")
+            .contains("`a` is made of itself")
+    );
+    assert!(error("solid a = a; tlo a;").contains("there is no solid `a`"));
+    let around = "solid a = sphere (0,0,0; 1); solid b = not a; solid a = b or plane (0,0,0; 0,0,1); tlo b;";
+    assert!(error(around).contains("`a` is made of itself"));
+}
+
+#[test]
+fn twice_the_same_top_level_object_is_refused() {
+    assert!(
+        error("solid a = sphere (0,0,0; 1); tlo a; tlo a;")
+            .contains("`a` is a top-level object already, in line 2")
+    );
+}
+
+#[test]
+fn an_empty_box_is_refused() {
+    assert!(error("boundingbox (0,0,0; 1,-1,1);").contains("the box of `boundingbox` is empty"));
+}
+
+#[test]
+fn a_boundary_number_begins_with_one() {
+    assert!(
+        error("solid a = sphere (0,0,0; 1); tlo a; boundarycondition a a 0;")
+            .contains("0 is no boundary-condition number")
+    );
+}
+
+#[test]
+fn very_many_errors_are_cut_off() {
+    let errors = errors(&"solid = sphere (0,0,0; 1);\n".repeat(10_000));
+    assert_eq!(errors.messages.len(), 20);
+    assert!(errors.to_string().contains("more than 20 errors"));
+}

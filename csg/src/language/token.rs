@@ -1,0 +1,241 @@
+//! Text to tokens.
+
+use super::diagnostic::Report;
+use crate::geometry::Span;
+
+/// What a token is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum TokenKind<'a> {
+    /// A keyword or a name.
+    Word(&'a str),
+    /// A number: finite, never negative (the sign is a token of its own).
+    Number(f64),
+    /// One of `( ) [ ] - = , ;`.
+    Mark(char),
+    /// Something that is no token; it has been reported.
+    Bad,
+    /// The end of the file.
+    End,
+}
+
+/// A token and its place.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Token<'a> {
+    pub kind: TokenKind<'a>,
+    pub span: Span,
+}
+
+/// The lines of a text, which end in LF, CR LF or a lone CR.
+pub(super) fn lines(source: &str) -> impl Iterator<Item = &str> {
+    source.split('\n').flat_map(|line| line.strip_suffix('\r').unwrap_or(line).split('\r'))
+}
+
+/// The tokens of a text, the last of which is [`TokenKind::End`].
+///
+/// Comments run from `#` to the end of the line. A byte-order mark at the beginning is white space.
+pub(super) fn tokenize<'a>(source: &'a str, report: &mut Report) -> Vec<Token<'a>> {
+    let mut tokens = Vec::new();
+    let mut end = Span { line: 1, column: 1 };
+    for (line, text) in (1u32..).zip(lines(source)) {
+        let mut scanner = Scanner { text, at: 0, span: Span { line, column: 1 } };
+        while let Some(token) = scanner.next_token(report) {
+            tokens.push(token);
+        }
+        end = scanner.span;
+    }
+    tokens.push(Token { kind: TokenKind::End, span: end });
+    tokens
+}
+
+/// Scans one line: no token goes beyond it.
+struct Scanner<'a> {
+    text: &'a str,
+    /// Bytes scanned.
+    at: usize,
+    /// The place of the next character.
+    span: Span,
+}
+
+impl<'a> Scanner<'a> {
+    fn rest(&self) -> &'a str {
+        &self.text[self.at..]
+    }
+
+    /// Takes the characters that `accept`s, at least none.
+    fn take_while(&mut self, accept: impl Fn(char) -> bool) -> &'a str {
+        let rest = self.rest();
+        let taken = &rest[..rest.find(|c| !accept(c)).unwrap_or(rest.len())];
+        self.at += taken.len();
+        self.span.column += taken.chars().count() as u32;
+        taken
+    }
+
+    fn next_token(&mut self, report: &mut Report) -> Option<Token<'a>> {
+        self.take_while(is_blank);
+        let span = self.span;
+        let kind = match self.rest().chars().next()? {
+            '#' => return None,
+            c if c.is_ascii_alphabetic() => {
+                TokenKind::Word(self.take_while(|c| c.is_ascii_alphanumeric() || c == '_'))
+            }
+            c if c.is_ascii_digit() || c == '.' => self.number(report),
+            '"' => {
+                // The whole string, so that one mistake gives one message.
+                self.take_one();
+                self.take_while(|c| c != '"');
+                if self.rest().starts_with('"') {
+                    self.take_one();
+                }
+                report.syntax(span, "there are no quoted strings", "write -material=air");
+                TokenKind::Bad
+            }
+            c => {
+                self.at += c.len_utf8();
+                self.span.column += 1;
+                if "()[]-=,;".contains(c) {
+                    TokenKind::Mark(c)
+                } else {
+                    report.syntax(span, format!("the character {c:?} has no meaning here"), stray_help(c));
+                    TokenKind::Bad
+                }
+            }
+        };
+        Some(Token { kind, span })
+    }
+
+    /// Takes a number: digits, perhaps a point, perhaps an exponent.
+    fn number(&mut self, report: &mut Report) -> TokenKind<'a> {
+        let span = self.span;
+        let start = self.at;
+        self.take_while(|c| c.is_ascii_digit());
+        if self.rest().starts_with('.') {
+            self.take_one();
+            self.take_while(|c| c.is_ascii_digit());
+        }
+        if self.rest().starts_with(['e', 'E']) {
+            self.take_one();
+            if self.rest().starts_with(['+', '-']) {
+                self.take_one();
+            }
+            self.take_while(|c| c.is_ascii_digit());
+        }
+        if self.rest().starts_with('.') {
+            self.take_while(|c| c.is_ascii_digit() || c == '.');
+        }
+        let text = &self.text[start..self.at];
+        match text.parse::<f64>() {
+            Ok(value) if value.is_finite() => TokenKind::Number(value),
+            Ok(_) => {
+                report.syntax(
+                    span,
+                    format!("the number {text} is too large"),
+                    "the largest is about 1.8e308",
+                );
+                TokenKind::Bad
+            }
+            Err(_) => {
+                let help = "numbers look like 2, 0.5, .5, 1e-3 or 2.5E+4";
+                report.syntax(span, format!("`{text}` is not a number"), help);
+                TokenKind::Bad
+            }
+        }
+    }
+
+    fn take_one(&mut self) {
+        self.at += 1;
+        self.span.column += 1;
+    }
+}
+
+/// What C's `isspace` accepts within a line, and the byte-order mark.
+fn is_blank(c: char) -> bool {
+    matches!(c, ' ' | '\t' | '\u{b}' | '\u{c}' | '\u{feff}')
+}
+
+fn stray_help(c: char) -> &'static str {
+    match c {
+        '\'' => "there are no quoted strings: write -material=air",
+        '+' => "numbers take no leading +, and there is no arithmetic",
+        '*' | '/' | '^' => "there is no arithmetic: write the value itself; a comment begins with #",
+        '{' | '}' => "solids are grouped by ( )",
+        '&' | '|' | '!' => "solids are combined by `and`, `or`, `not`",
+        '_' => "names begin with a letter",
+        '\u{fffd}' => "the file is not UTF-8 text; other characters may stand in comments only",
+        c if !c.is_ascii() => "only comments may have characters beyond ASCII",
+        _ => "",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::TokenKind::{Bad, End, Mark, Number, Word};
+    use super::*;
+
+    fn kinds(source: &str) -> Vec<TokenKind<'_>> {
+        tokenize(source, &mut Report::default()).iter().map(|token| token.kind).collect()
+    }
+
+    fn first_message(source: &str) -> String {
+        let mut report = Report::default();
+        tokenize(source, &mut report);
+        report.finish(source, "t.geo").first().expect("a message").to_string()
+    }
+
+    #[test]
+    fn numbers_have_the_forms_that_c_streams_read() {
+        let expected: Vec<_> = [1., 1., 0.5, 1e-3, 2.5e4, 0.].into_iter().map(Number).chain([End]).collect();
+        assert_eq!(kinds("1 1. .5 1e-3 2.5E+4 1e-999"), expected);
+    }
+
+    #[test]
+    fn a_sign_is_a_token_of_its_own() {
+        assert_eq!(kinds("--5"), [Mark('-'), Mark('-'), Number(5.), End]);
+    }
+
+    #[test]
+    fn malformed_numbers_are_reported_once_and_do_not_stop_the_scanner() {
+        for text in ["1e", "1.2.3", ".", "1e+", "1e999", "1e5.5"] {
+            assert_eq!(kinds(&format!("{text};")), [Bad, Mark(';'), End], "{text}");
+        }
+    }
+
+    #[test]
+    fn comments_end_with_the_line_whatever_ends_the_line() {
+        for end in ["\n", "\r\n", "\r"] {
+            let source = format!("a # solid ä \u{fffd}{end}b#");
+            let tokens = tokenize(&source, &mut Report::default());
+            assert_eq!(tokens[1], Token { kind: Word("b"), span: Span { line: 2, column: 1 } }, "{end:?}");
+            assert_eq!(tokens.len(), 3);
+        }
+    }
+
+    #[test]
+    fn a_file_may_end_right_after_a_word() {
+        assert_eq!(kinds("tlo a_1"), [Word("tlo"), Word("a_1"), End]);
+    }
+
+    #[test]
+    fn columns_count_characters() {
+        let message = first_message("é$");
+        assert!(message.starts_with("t.geo:1:1: "), "{message}");
+        let tokens = tokenize("é;", &mut Report::default());
+        assert_eq!(tokens[1].span, Span { line: 1, column: 2 });
+    }
+
+    #[test]
+    fn stray_characters_get_advice() {
+        assert!(first_message("-material='air'").contains("no quoted strings"));
+        assert!(first_message("_a").contains("begin with a letter"));
+        assert!(first_message("1*2").contains("no arithmetic"));
+    }
+
+    #[test]
+    fn a_quoted_string_is_one_bad_token() {
+        assert_eq!(kinds("\"air and water\"; \"open\nend"), [Bad, Mark(';'), Bad, Word("end"), End]);
+    }
+
+    #[test]
+    fn a_byte_order_mark_is_skipped() {
+        assert_eq!(kinds("\u{feff}a"), [Word("a"), End]);
+    }
+}

@@ -1,0 +1,208 @@
+//! The command line: the only file that knows clap.
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use std::path::PathBuf;
+use tetmill::size::Preset;
+
+/// From solid geometry to partitioned tetrahedral meshes, in parallel.
+#[derive(Parser, Debug)]
+#[command(name = "tetmill", version, about, max_term_width = 100, arg_required_else_help = true)]
+pub struct Cli {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// The commands.
+#[derive(Subcommand, Debug)]
+pub enum Command {
+    /// Make a partitioned mesh: mesh the geometry, partition, refine, check, write
+    #[command(after_help = STATUS)]
+    Generate(Generate),
+    /// Make the coarse mesh alone, in one part and one file
+    #[command(after_help = STATUS)]
+    Mesh(MeshFile),
+    /// Show the bodies, corners, curves, patches, boundary numbers and names of a geometry
+    Inspect(Inspect),
+    /// Check a written Elmer mesh: every fault, with ids and places
+    #[command(after_help = "Exit status: 0 no fault, 1 faults were found, 2 the files cannot be read.")]
+    Check(Check),
+}
+
+const STATUS: &str = "Exit status: 0 done; 2 bad input, or a geometry refused with its place; \
+3 no valid mesh reached; 4 memory or disk; 5 a rank failed.";
+
+/// How the sizes are chosen.
+#[derive(Args, Debug, Clone)]
+pub struct SizeOptions {
+    /// Fineness: very-coarse, coarse, moderate, fine or very-fine
+    #[arg(long, value_name = "NAME", default_value = "moderate")]
+    pub preset: Preset,
+    /// Largest element size (length)
+    #[arg(long, value_name = "H", value_parser = positive)]
+    pub maxh: Option<f64>,
+    /// Smallest element size that curvature and short curves may ask for (length)
+    #[arg(long, value_name = "H", value_parser = positive)]
+    pub minh: Option<f64>,
+    /// Growth of the size per unit of distance, instead of the preset's
+    #[arg(long, value_name = "G", value_parser = positive)]
+    pub grading: Option<f64>,
+    /// Number of tets of the coarse mesh: COUNT to 1.5 COUNT, or the least that the geometry allows
+    #[arg(long, value_name = "COUNT", value_parser = count)]
+    pub coarse: Option<u64>,
+}
+
+/// `tetmill generate`
+#[derive(Args, Debug)]
+pub struct Generate {
+    /// The geometry, a NETGEN CSG file (.geo)
+    pub geometry: PathBuf,
+    /// Folder to write to [default: the geometry's name without .geo, in the current folder]
+    #[arg(short, long, value_name = "DIR")]
+    pub output: Option<PathBuf>,
+    /// How the fine mesh is made
+    #[arg(short, long, value_enum, default_value_t = Method::Refine)]
+    pub method: Method,
+    /// Number of in-process ranks [default: 1; under mpirun the ranks are MPI's]
+    #[arg(short = 'n', long, value_name = "RANKS", value_parser = clap::value_parser!(u32).range(1..))]
+    pub ranks: Option<u32>,
+    /// Number of parts to write [default: the ranks]
+    #[arg(long, value_name = "P", value_parser = clap::value_parser!(u32).range(1..))]
+    pub parts: Option<u32>,
+    /// Number of threads in all [default: the cores]
+    #[arg(short, long, value_name = "THREADS", value_parser = clap::value_parser!(u32).range(1..))]
+    pub threads: Option<u32>,
+    /// Number of tets wanted in all (1e9 is understood): chooses --coarse and --levels
+    #[arg(short, long, value_name = "COUNT", value_parser = count, conflicts_with_all = ["coarse", "levels"])]
+    pub elements: Option<u64>,
+    /// Levels of uniform refinement: each makes eight tets of one
+    #[arg(long, value_name = "L", default_value_t = 0)]
+    pub levels: u32,
+    /// Sizes of the coarse mesh
+    #[command(flatten)]
+    pub size: SizeOptions,
+    /// What to write, with commas between, or none
+    #[arg(short, long, value_enum, value_delimiter = ',', default_value = "elmer")]
+    pub format: Vec<Format>,
+    /// Read the written Elmer mesh again and check it
+    #[arg(long)]
+    pub check: bool,
+    /// Write the summary as JSON
+    #[arg(long, value_name = "FILE.json")]
+    pub report: Option<PathBuf>,
+    /// Draw the coarse mesh, its parts in colours
+    #[arg(long, value_name = "FILE.png")]
+    pub picture: Option<PathBuf>,
+    /// Say nothing but errors
+    #[arg(short, long)]
+    pub quiet: bool,
+}
+
+/// `tetmill mesh`
+#[derive(Args, Debug)]
+pub struct MeshFile {
+    /// The geometry, a NETGEN CSG file (.geo)
+    pub geometry: PathBuf,
+    /// File to write; its ending names the format (.vtu)
+    #[arg(short, long, value_name = "FILE")]
+    pub output: PathBuf,
+    /// Sizes of the mesh
+    #[command(flatten)]
+    pub size: SizeOptions,
+    /// Number of threads [default: the cores]
+    #[arg(short, long, value_name = "THREADS", value_parser = clap::value_parser!(u32).range(1..))]
+    pub threads: Option<u32>,
+    /// Write the summary as JSON
+    #[arg(long, value_name = "FILE.json")]
+    pub report: Option<PathBuf>,
+    /// Draw the mesh
+    #[arg(long, value_name = "FILE.png")]
+    pub picture: Option<PathBuf>,
+    /// Say nothing but errors
+    #[arg(short, long)]
+    pub quiet: bool,
+}
+
+/// `tetmill inspect`
+#[derive(Args, Debug)]
+pub struct Inspect {
+    /// The geometry, a NETGEN CSG file (.geo)
+    pub geometry: PathBuf,
+    /// As JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `tetmill check`
+#[derive(Args, Debug)]
+pub struct Check {
+    /// A folder with an Elmer mesh: mesh.* or partitioning.N
+    pub directory: PathBuf,
+    /// As JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// How the fine mesh is made.
+#[derive(ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Method {
+    /// Coarse mesh, partitioned, refined uniformly with boundary vertices on the geometry
+    Refine,
+    /// Refine the skins of the parts, mesh each inside (not yet)
+    Surface,
+    /// Cut the geometry into parts, mesh each (not yet)
+    Decompose,
+}
+
+/// What is written.
+#[derive(ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Format {
+    /// partitioning.N/part.K.*, ready for ElmerSolver_mpi
+    Elmer,
+    /// VTK: one .vtu for each part and a .pvtu
+    Vtu,
+    /// Geomview OFF: the boundary, one colour for each part
+    Geomview,
+    /// Nothing
+    None,
+}
+
+/// A positive finite length.
+fn positive(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(number) if number > 0.0 && number.is_finite() => Ok(number),
+        _ => Err("a positive number is needed".into()),
+    }
+}
+
+/// A count, also written as 1e9 or 2.5e6.
+fn count(text: &str) -> Result<u64, String> {
+    let text = text.replace('_', "");
+    if let Ok(number) = text.parse::<u64>() {
+        return if number > 0 { Ok(number) } else { Err("at least 1 is needed".into()) };
+    }
+    match text.parse::<f64>() {
+        // Counts above 2^53 are not exact in a float, nor within reach.
+        Ok(number) if (1.0..9e15).contains(&number) => Ok(number.round() as u64),
+        _ => Err("a count such as 50000 or 1e9 is needed".into()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn counts_are_read_as_people_write_them() {
+        assert_eq!(count("1e9"), Ok(1_000_000_000));
+        assert_eq!(count("2.5e6"), Ok(2_500_000));
+        assert_eq!(count("1_000"), Ok(1000));
+        assert!(count("0").is_err() && count("-3").is_err() && count("many").is_err());
+    }
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        use clap::CommandFactory;
+        Cli::command().debug_assert();
+    }
+}

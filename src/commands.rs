@@ -1,0 +1,307 @@
+//! What the commands do: from the options to a written mesh and a summary.
+
+use crate::cli::{Check, Format, Generate, Inspect, MeshFile, Method, SizeOptions};
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+use tetmill::comm::{Communicator, mpi, thread};
+use tetmill::error::{Failure, Status, agree};
+use tetmill::io::{self, Written, elmer};
+use tetmill::mesh::stream::MeshStream;
+use tetmill::pipeline::target::Outcome;
+use tetmill::pipeline::{GenerateSettings, Generated, Model, Wanted, generate};
+use tetmill::progress::Progress;
+use tetmill::report::{Entities, MeshReport, PartitionReport, Report};
+use tetmill::size::SizeSettings;
+use tetmill::{memory, picture};
+
+/// `tetmill generate`
+pub fn run_generate(options: &Generate) -> Result<(), Failure> {
+    refuse_unfinished(options)?;
+    set_threads(options.threads)?;
+    let start = Instant::now();
+    if mpi::launched() {
+        let ranks_given = options.ranks.or(options.parts);
+        return mpi::run(|comm| match ranks_given {
+            Some(ranks) if ranks != comm.size() => Err(Failure::input(format!(
+                "{ranks} ranks are asked for, but mpirun started {}: leave out -n and --parts",
+                comm.size()
+            ))),
+            _ => generate_on(comm, options, start),
+        })
+        .map_err(Failure::input)?;
+    }
+    let ranks = options.parts.or(options.ranks).unwrap_or(1);
+    let results = thread::run(ranks, |comm| generate_on(comm, options, start))?;
+    results.into_iter().collect()
+}
+
+fn refuse_unfinished(options: &Generate) -> Result<(), Failure> {
+    match options.method {
+        Method::Refine => Ok(()),
+        Method::Surface | Method::Decompose => {
+            Err(Failure::input("this version knows the method `refine` only: leave out -m"))
+        }
+    }
+}
+
+fn set_threads(threads: Option<u32>) -> Result<(), Failure> {
+    let threads = threads.unwrap_or(0) as usize;
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build_global()
+        .map_err(|error| Failure::new(Status::Resources, format!("cannot start {threads} threads: {error}")))
+}
+
+/// Stages that a progress bar counts: read, mesh, partition, distribute, refine, check, write.
+const STAGES: u64 = 7;
+
+/// **Collective.**
+fn generate_on(comm: &dyn Communicator, options: &Generate, start: Instant) -> Result<(), Failure> {
+    let first = comm.rank() == 0;
+    let progress = Progress::new(options.quiet || !first, STAGES);
+    let model =
+        first.then(|| progress.stage("read", || read_model(&options.geometry, &progress))).transpose();
+    let model = agree(comm, model)?;
+    let settings = GenerateSettings { size: size_settings(&options.size), wanted: wanted(options) };
+    let made = generate(comm, model.as_ref(), &settings, &progress)?;
+    let target = options.output.clone().unwrap_or_else(|| {
+        options.geometry.with_extension("").file_name().map_or_else(|| "mesh".into(), PathBuf::from)
+    });
+    let written = progress.stage("write", || write_all(comm, options, &made, &target))?;
+    if options.check && options.format.contains(&Format::Elmer) {
+        let checked = if first { progress.stage("read back", || check_written(&target)) } else { Ok(()) };
+        agree(comm, checked)?;
+    }
+    if let Some(file) = &options.picture {
+        draw(comm, &made.part, file)?;
+    }
+    let shared = shared_vertices(comm, &made.part)?;
+    let memory = total_memory(comm)?;
+    let Some(model) = model else { return Ok(()) };
+    let mut report = summary(&model, &options.geometry, &made, comm.size(), shared);
+    report.stages = progress.finish();
+    report.seconds = start.elapsed().as_secs_f64();
+    report.peak_memory = memory;
+    report.add_written(written);
+    tell(&report, options.report.as_deref(), options.quiet, wanted_count(options))
+}
+
+/// Reads a geometry and finds its features; warnings are shown.
+fn read_model(path: &Path, progress: &Progress) -> Result<Model, Failure> {
+    let bytes = std::fs::read(path)
+        .map_err(|error| Failure::input(format!("cannot read {}: {error}", path.display())))?;
+    let parsed = csg::language::parse_geometry_bytes(&bytes, &path.display().to_string())?;
+    parsed.warnings.iter().for_each(|warning| progress.note(&warning.to_string()));
+    Model::new(parsed.geometry).map_err(|error| Failure::input(format!("{}: {error}", path.display())))
+}
+
+fn size_settings(options: &SizeOptions) -> SizeSettings {
+    let mut settings = SizeSettings::from(options.preset);
+    settings.maxh = options.maxh;
+    settings.minh = options.minh.unwrap_or(settings.minh);
+    settings.grading = options.grading.unwrap_or(settings.grading);
+    settings
+}
+
+fn wanted(options: &Generate) -> Wanted {
+    match (options.elements, options.size.coarse) {
+        (Some(count), _) => Wanted::Elements(count),
+        (None, Some(tets)) => Wanted::Coarse { tets, levels: options.levels },
+        (None, None) => Wanted::Sizes { levels: options.levels },
+    }
+}
+
+fn wanted_count(options: &Generate) -> Option<u64> {
+    options.elements.or(options.size.coarse)
+}
+
+/// **Collective.** Writes each format.
+fn write_all(
+    comm: &dyn Communicator,
+    options: &Generate,
+    made: &Generated,
+    dir: &Path,
+) -> Result<Written, Failure> {
+    let mut written = Written::default();
+    let stem = dir.join(options.geometry.file_stem().unwrap_or("mesh".as_ref()));
+    for format in &options.format {
+        written += match format {
+            Format::Elmer => elmer::write(comm, &made.part, &made.names, dir)?,
+            Format::Vtu => io::vtu::write(comm, &made.part, &made.names, &stem)?,
+            Format::Geomview => {
+                io::geomview::write(comm, &made.part, &io::geomview::Settings::default(), &stem)?
+            }
+            Format::None => Written::default(),
+        };
+    }
+    Ok(written)
+}
+
+/// Reads the written Elmer mesh again.
+fn check_written(dir: &Path) -> Result<(), Failure> {
+    let checked = elmer::check_elmer(dir).map_err(|error| Failure::new(Status::Faults, error))?;
+    match checked.iter().find(|(_, faults)| !faults.is_empty()) {
+        None => Ok(()),
+        Some((layout, faults)) => {
+            Err(Failure::new(Status::Faults, format!("{}: {faults}", layout.folder().display())))
+        }
+    }
+}
+
+/// **Collective.** A picture of the skin, parts in colours (patches if there is one part).
+fn draw(comm: &dyn Communicator, part: &dyn MeshStream, file: &Path) -> Result<(), Failure> {
+    let color_by = if comm.size() > 1 { picture::ColorBy::Part } else { picture::ColorBy::Patch };
+    let scene = picture::scene_of_part(part, &picture::Look { color_by, cut: None });
+    let drawn = match picture::gather(comm, &scene)? {
+        Some(scene) => picture::write_png(&picture::render(&scene, &picture::Settings::default()), file),
+        None => Ok(()),
+    };
+    agree(comm, drawn.map_err(Failure::from))
+}
+
+/// **Collective.** Fine vertices in more than one part, each counted by its owner.
+fn shared_vertices(comm: &dyn Communicator, part: &dyn MeshStream) -> Result<u64, Failure> {
+    let mut mine = 0;
+    for index in 0..part.vertex_blocks() {
+        let block = part.vertex_block(index);
+        let owned = |k: u64| tetmill::dist::owner(block.holders, block.first_id + k) == part.rank();
+        if !block.holders.is_empty() {
+            mine += (0..block.local.len() as u64).filter(|&k| owned(k)).count() as u64;
+        }
+    }
+    Ok(comm.all_reduce_sum_u64([mine])?[0])
+}
+
+/// **Collective.** Peak memory: of this process for in-process ranks, of all processes under MPI.
+fn total_memory(comm: &dyn Communicator) -> Result<Option<u64>, Failure> {
+    let mine = memory::peak_bytes();
+    if !mpi::launched() {
+        return Ok(mine);
+    }
+    let [sum] = comm.all_reduce_sum_u64([mine.unwrap_or(0)])?;
+    Ok((sum > 0).then_some(sum))
+}
+
+fn summary(model: &Model, path: &Path, made: &Generated, ranks: u32, shared: u64) -> Report {
+    let coarse = made.coarse.as_ref().expect("rank 0 made the coarse mesh");
+    let Model { geometry, features, .. } = model;
+    Report {
+        version: env!("CARGO_PKG_VERSION").into(),
+        geometry: path.display().to_string(),
+        entities: Entities {
+            bodies: geometry.bodies.len(),
+            corners: features.corners.len(),
+            curves: features.curves.len(),
+            patches: features.patches.len(),
+        },
+        ranks,
+        threads: rayon::current_num_threads(),
+        levels: made.levels,
+        coarse: coarse.report.clone(),
+        wanted: coarse.outcome,
+        mesh: MeshReport::new(&made.check, made.checksum.to_string()),
+        partition: PartitionReport::new(&coarse.partition, shared),
+        stages: Vec::new(),
+        seconds: 0.0,
+        peak_memory: None,
+        files: 0,
+        bytes: 0,
+    }
+}
+
+/// Shows the summary and writes it where it was asked for.
+fn tell(report: &Report, file: Option<&Path>, quiet: bool, wanted: Option<u64>) -> Result<(), Failure> {
+    if !quiet {
+        println!("{report}");
+    }
+    if let (Some(wanted), Some(outcome)) = (wanted, report.wanted) {
+        let got = report.coarse.tets;
+        match outcome {
+            Outcome::Reached => {}
+            Outcome::Least => eprintln!(
+                "note: {wanted} tets were asked for; {got} coarse tets are the least that this geometry allows"
+            ),
+            Outcome::Jumped => eprintln!(
+                "note: {wanted} tets were asked for; no size gives so many, {got} coarse tets are the next above"
+            ),
+        }
+    }
+    if let Some(file) = file {
+        let json = serde_json::to_string_pretty(report).expect("plain data") + "\n";
+        io::output::write_file(file, json.len() as u64, |temporary| {
+            io::output::write_text(temporary, json.as_bytes())
+        })?;
+    }
+    Ok(())
+}
+
+/// `tetmill mesh`
+pub fn run_mesh(options: &MeshFile) -> Result<(), Failure> {
+    let start = Instant::now();
+    let ending = options.output.extension().and_then(|e| e.to_str()).unwrap_or("");
+    if ending != "vtu" {
+        return Err(Failure::input(format!(
+            "{}: the ending names the format, and `.{ending}` is not known: use .vtu",
+            options.output.display()
+        )));
+    }
+    set_threads(options.threads)?;
+    let comm = thread::alone();
+    let progress = Progress::new(options.quiet, STAGES);
+    let model = progress.stage("read", || read_model(&options.geometry, &progress))?;
+    let wanted = match options.size.coarse {
+        Some(tets) => Wanted::Coarse { tets, levels: 0 },
+        None => Wanted::Sizes { levels: 0 },
+    };
+    let settings = GenerateSettings { size: size_settings(&options.size), wanted };
+    let made = generate(&comm, Some(&model), &settings, &progress)?;
+    let stem = options.output.with_extension("");
+    let written = progress.stage("write", || io::vtu::write(&comm, &made.part, &made.names, &stem))?;
+    if let Some(file) = &options.picture {
+        draw(&comm, &made.part, file)?;
+    }
+    let mut report = summary(&model, &options.geometry, &made, 1, 0);
+    report.stages = progress.finish();
+    report.seconds = start.elapsed().as_secs_f64();
+    report.peak_memory = memory::peak_bytes();
+    report.add_written(written);
+    tell(&report, options.report.as_deref(), options.quiet, options.size.coarse)
+}
+
+/// `tetmill check`
+pub fn run_check(options: &Check) -> Result<(), Failure> {
+    let checked = elmer::check_elmer(&options.directory).map_err(Failure::input)?;
+    let mut faulty = Vec::new();
+    for (layout, faults) in &checked {
+        let folder = layout.folder().display();
+        if options.json {
+            println!(
+                "{}",
+                serde_json::json!({ "mesh": folder.to_string(), "ok": faults.is_empty(), "text": faults.to_string() })
+            );
+        } else {
+            println!("{folder}: {faults}");
+        }
+        if !faults.is_empty() {
+            faulty.push(folder.to_string());
+        }
+    }
+    if faulty.is_empty() {
+        Ok(())
+    } else {
+        Err(Failure::new(Status::Faults, format!("faults in {}", faulty.join(", "))))
+    }
+}
+
+/// `tetmill inspect`
+pub fn run_inspect(options: &Inspect) -> Result<(), Failure> {
+    let progress = Progress::new(true, 1);
+    let model = read_model(&options.geometry, &progress)?;
+    let seen = tetmill::inspect::Inspection::new(&model);
+    if options.json {
+        println!("{}", serde_json::to_string_pretty(&seen).expect("plain data"));
+    } else {
+        print!("{seen}");
+    }
+    Ok(())
+}

@@ -1,0 +1,518 @@
+//! The mesh while it is being improved: tets with neighbours, of which any cavity can be filled anew.
+
+use crate::Point;
+use crate::improve::objective::Objective;
+use crate::kernel::predicates::{Sign, orient3d};
+use crate::mesh::{Class, Mesh, TET_FACES, VertexId};
+use csg::BodyId;
+
+/// No tet, no vertex.
+pub(super) const NONE: u32 = u32::MAX;
+
+/// Tets that share faces, over points.
+///
+/// A **locked** face separates bodies or a body from the exterior: it stays, and so do its vertices. All
+/// changes go through [`replace`](Self::replace), which takes tets out and puts others into the same hole.
+/// Ids of tets are slots: one that was taken out is dead until its slot is used again.
+///
+/// Not kept here: vertex stars and edges. Rings and stars are walked from a tet when needed.
+pub(super) struct Complex {
+    /// The vertices' coordinates.
+    pub points: Vec<Point>,
+    /// What each vertex lies on.
+    pub classes: Vec<Class>,
+    /// Whether the vertex may be moved or taken out.
+    pub free: Vec<bool>,
+    /// The vertices of each tet, positively oriented; all [`NONE`] in a dead slot.
+    pub tets: Vec<[u32; 4]>,
+    /// What each tet is worth, as the objective has it.
+    pub scores: Vec<f64>,
+    /// The body of each tet.
+    pub bodies: Vec<BodyId>,
+    /// The pass in which a vertex last saw a change among its tets.
+    pub touched: Vec<u32>,
+    /// The present pass.
+    pub pass: u32,
+    /// Across the face opposite each vertex: four times the tet, plus its face's number; or [`NONE`].
+    across: Vec<[u32; 4]>,
+    /// Bit k: the face opposite vertex k is locked.
+    locked: Vec<u8>,
+    /// A tet of each vertex, or [`NONE`].
+    vertex_tet: Vec<u32>,
+    /// Free slots, the last one is used first.
+    dead: Vec<u32>,
+    /// Stamps of the walk over a star that is under way.
+    marks: Vec<u32>,
+    mark: u32,
+    /// Faces waiting for their partner; kept to spare allocations.
+    open: Vec<OpenFace>,
+}
+
+struct OpenFace {
+    key: [u32; 3],
+    across: u32,
+    locked: bool,
+}
+
+/// For local vertices i and j the other two, k and l, so that i, j, k, l is an even permutation.
+const OTHERS: [[[usize; 2]; 4]; 4] = [
+    [[0, 0], [2, 3], [3, 1], [1, 2]],
+    [[3, 2], [0, 0], [0, 3], [2, 0]],
+    [[1, 3], [3, 0], [0, 0], [0, 1]],
+    [[2, 1], [0, 2], [1, 0], [0, 0]],
+];
+
+fn sorted(mut key: [u32; 3]) -> [u32; 3] {
+    key.sort_unstable();
+    key
+}
+
+fn face_of(tet: [u32; 4], face: usize) -> [u32; 3] {
+    TET_FACES[face].map(|k| tet[k])
+}
+
+/// The place of `vertex` in a tet that has it.
+pub(super) fn place(tet: [u32; 4], vertex: u32) -> usize {
+    tet.iter().position(|&v| v == vertex).unwrap_or_else(|| panic!("tet {tet:?} has no vertex {vertex}"))
+}
+
+impl Complex {
+    /// Takes a mesh apart. Scores are left at zero.
+    ///
+    /// # Panics
+    /// If a tet is not positively oriented, a face has three tets, or a boundary triangle is no tet's face.
+    pub fn new(mesh: &Mesh) -> Self {
+        let tets: Vec<[u32; 4]> = mesh.tets.iter().map(|t| t.map(|v| v.0)).collect();
+        assert!(tets.len() < (1 << 30), "{} tets: the coarse mesh can have 2^30 at most", tets.len());
+        let count = mesh.points.len();
+        let mut complex = Self {
+            points: mesh.points.clone(),
+            classes: mesh.classes.clone(),
+            free: mesh.classes.iter().map(|c| matches!(c, Class::Body(_))).collect(),
+            scores: vec![0.0; tets.len()],
+            bodies: mesh.bodies.clone(),
+            touched: vec![0; count],
+            pass: 0,
+            across: vec![[NONE; 4]; tets.len()],
+            locked: vec![0; tets.len()],
+            vertex_tet: vec![NONE; count],
+            dead: Vec::new(),
+            marks: vec![0; tets.len()],
+            mark: 0,
+            open: Vec::new(),
+            tets,
+        };
+        for (t, tet) in complex.tets.iter().enumerate() {
+            let p = tet.map(|v| complex.points[v as usize]);
+            let sign = orient3d(&p[0], &p[1], &p[2], &p[3]);
+            assert_eq!(sign, Sign::Positive, "tet {t} of vertices {tet:?} is not positively oriented");
+            for &v in tet {
+                complex.vertex_tet[v as usize] = t as u32;
+            }
+        }
+        complex.join_neighbours(mesh);
+        for (v, &tet) in complex.vertex_tet.iter().enumerate() {
+            complex.free[v] &= tet != NONE;
+        }
+        complex
+    }
+
+    /// Finds the neighbour across each face, and locks the faces on patches, between bodies and of the hull.
+    fn join_neighbours(&mut self, mesh: &Mesh) {
+        let mut triangles: Vec<[u32; 3]> =
+            mesh.triangles.iter().map(|t| sorted(t.vertices.map(|v| v.0))).collect();
+        triangles.sort_unstable();
+        // Faces by their lowest vertex, by counting: `faces[starts[v]..starts[v + 1]]`.
+        let mut starts = vec![0_u32; self.points.len() + 1];
+        let lowest = |tet: [u32; 4], face: usize| face_of(tet, face).into_iter().min().unwrap_or(NONE);
+        for &tet in &self.tets {
+            for face in 0..4 {
+                starts[lowest(tet, face) as usize + 1] += 1;
+            }
+        }
+        for v in 0..self.points.len() {
+            starts[v + 1] += starts[v];
+        }
+        let mut faces = vec![NONE; 4 * self.tets.len()];
+        let mut next = starts.clone();
+        for (t, &tet) in self.tets.iter().enumerate() {
+            for face in 0..4 {
+                let slot = &mut next[lowest(tet, face) as usize];
+                faces[*slot as usize] = 4 * t as u32 + face as u32;
+                *slot += 1;
+            }
+        }
+        let mut found = 0;
+        for v in 0..self.points.len() {
+            let mut here: Vec<([u32; 3], u32)> = faces[starts[v] as usize..starts[v + 1] as usize]
+                .iter()
+                .map(|&f| (sorted(face_of(self.tets[f as usize / 4], f as usize % 4)), f))
+                .collect();
+            here.sort_unstable();
+            for group in here.chunk_by(|a, b| a.0 == b.0) {
+                let on_patch = triangles.binary_search(&group[0].0).is_ok();
+                found += usize::from(on_patch);
+                self.join_face(group, on_patch);
+            }
+        }
+        assert_eq!(found, triangles.len(), "boundary triangles that are no tet's face, or given twice");
+    }
+
+    fn join_face(&mut self, group: &[([u32; 3], u32)], on_patch: bool) {
+        let locked = match group {
+            [(_, f)] => {
+                self.across[*f as usize / 4][*f as usize % 4] = NONE;
+                true
+            }
+            [(_, f), (_, g)] => {
+                self.across[*f as usize / 4][*f as usize % 4] = *g;
+                self.across[*g as usize / 4][*g as usize % 4] = *f;
+                on_patch || self.bodies[*f as usize / 4] != self.bodies[*g as usize / 4]
+            }
+            _ => panic!("the face {:?} has {} tets", group[0].0, group.len()),
+        };
+        if locked {
+            for (key, f) in group {
+                self.locked[*f as usize / 4] |= 1 << (f % 4);
+                for v in key {
+                    self.free[*v as usize] = false;
+                }
+            }
+        }
+    }
+
+    /// Puts the improved tets and vertices back into the mesh: surviving vertices in their old order, then new ones.
+    pub fn store(self, mesh: &mut Mesh) {
+        let gone = |v: usize| self.free[v] && self.vertex_tet[v] == NONE;
+        let mut old_to_new = vec![VertexId(NONE); self.points.len()];
+        mesh.points.clear();
+        mesh.classes.clear();
+        for v in 0..self.points.len() {
+            if !gone(v) {
+                old_to_new[v] = VertexId::new(mesh.points.len());
+                mesh.points.push(self.points[v]);
+                mesh.classes.push(self.classes[v]);
+            }
+        }
+        let living = || (0..self.tets.len()).filter(|&t| self.tets[t][0] != NONE);
+        mesh.tets = living().map(|t| self.tets[t].map(|v| old_to_new[v as usize])).collect();
+        mesh.bodies = living().map(|t| self.bodies[t]).collect();
+        for triangle in &mut mesh.triangles {
+            triangle.vertices = triangle.vertices.map(|v| old_to_new[v.index()]);
+        }
+        for segment in &mut mesh.segments {
+            segment.vertices = segment.vertices.map(|v| old_to_new[v.index()]);
+        }
+    }
+
+    /// Whether the slot holds a tet.
+    pub fn is_alive(&self, tet: u32) -> bool {
+        self.tets[tet as usize][0] != NONE
+    }
+
+    /// The ids of all living tets, ascending.
+    pub fn living(&self) -> impl Iterator<Item = u32> + '_ {
+        (0..self.tets.len() as u32).filter(|&t| self.is_alive(t))
+    }
+
+    /// The corners of a tet.
+    pub fn corners(&self, tet: [u32; 4]) -> [Point; 4] {
+        tet.map(|v| self.points[v as usize])
+    }
+
+    /// Whether the face opposite vertex `face` of `tet` must stay.
+    pub fn is_locked(&self, tet: u32, face: usize) -> bool {
+        self.locked[tet as usize] & (1 << face) != 0
+    }
+
+    /// The tet across a face that is not locked, and which of its faces it is.
+    pub fn neighbour(&self, tet: u32, face: usize) -> Option<(u32, usize)> {
+        if self.is_locked(tet, face) {
+            return None;
+        }
+        let across = self.across[tet as usize][face];
+        Some((across / 4, across as usize % 4))
+    }
+
+    /// The least score of some tets.
+    pub fn worst_of(&self, tets: &[u32]) -> f64 {
+        tets.iter().map(|&t| self.scores[t as usize]).fold(f64::INFINITY, f64::min)
+    }
+
+    /// Computes all scores.
+    pub fn score_all(&mut self, objective: &Objective) {
+        for (score, tet) in self.scores.iter_mut().zip(&self.tets).filter(|(_, tet)| tet[0] != NONE) {
+            *score = objective.score(&self.points, *tet);
+        }
+    }
+
+    /// Whether a tet, which need not be one of the complex, stands exactly positively.
+    pub fn is_positive(&self, tet: [u32; 4]) -> bool {
+        let [a, b, c, d] = self.corners(tet);
+        orient3d(&a, &b, &c, &d) == Sign::Positive
+    }
+
+    /// Walks round the edge between the local vertices `i` and `j` of `tet`. Gives its tets, and the vertices
+    /// r₀, r₁, … of the ring so that tet k is i, j, rₖ, rₖ₊₁ up to an even permutation. False, with the
+    /// walk cut short, if the edge lies on a locked face or the ring has more than `limit` tets.
+    pub fn ring(&self, tet: u32, i: usize, j: usize, limit: usize, ring: &mut Ring) -> bool {
+        ring.tets.clear();
+        ring.vertices.clear();
+        let [k, l] = OTHERS[i][j];
+        let (mut t, mut leave, mut behind) = (tet, k, self.tets[tet as usize][k]);
+        let mut ahead = self.tets[tet as usize][l];
+        loop {
+            if ring.tets.len() == limit {
+                return false;
+            }
+            ring.tets.push(t);
+            ring.vertices.push(behind);
+            let Some((next, face)) = self.neighbour(t, leave) else { return false };
+            if next == tet {
+                return true;
+            }
+            behind = ahead;
+            ahead = self.tets[next as usize][face];
+            leave = place(self.tets[next as usize], behind);
+            t = next;
+        }
+    }
+
+    /// All tets of a vertex that can be reached from one of them without crossing a locked face: all of
+    /// them for a free vertex.
+    pub fn star(&mut self, vertex: u32, star: &mut Vec<u32>) {
+        star.clear();
+        let first = self.vertex_tet[vertex as usize];
+        if first == NONE {
+            return;
+        }
+        self.mark += 1;
+        self.marks[first as usize] = self.mark;
+        star.push(first);
+        let mut done = 0;
+        while let Some(&t) = star.get(done) {
+            done += 1;
+            for face in 0..4 {
+                if self.tets[t as usize][face] == vertex {
+                    continue;
+                }
+                if let Some((next, _)) = self.neighbour(t, face)
+                    && self.marks[next as usize] != self.mark
+                {
+                    self.marks[next as usize] = self.mark;
+                    star.push(next);
+                }
+            }
+        }
+    }
+
+    /// Adds a vertex inside a body; it has no tets yet.
+    pub fn add_vertex(&mut self, point: Point, body: BodyId) -> u32 {
+        let id = VertexId::new(self.points.len()).0;
+        self.points.push(point);
+        self.classes.push(Class::Body(body));
+        self.free.push(true);
+        self.touched.push(self.pass);
+        self.vertex_tet.push(NONE);
+        id
+    }
+
+    /// Takes the last vertex back, which must have no tets.
+    pub fn withdraw_vertex(&mut self) {
+        assert_eq!(self.vertex_tet.pop(), Some(NONE), "the last vertex has a tet");
+        self.points.pop();
+        self.classes.pop();
+        self.free.pop();
+        self.touched.pop();
+    }
+
+    /// Takes the tets `old` out and fills their hole with `new` ones and their scores.
+    ///
+    /// # Panics
+    /// If the new tets do not have the hole's faces, each exactly once.
+    pub fn replace(&mut self, old: &[u32], new: &[([u32; 4], f64)]) {
+        let body = self.bodies[old[0] as usize];
+        self.take_out(old);
+        let mut waiting = std::mem::take(&mut self.open);
+        for &(tet, score) in new {
+            let slot = self.new_slot();
+            self.tets[slot as usize] = tet;
+            self.scores[slot as usize] = score;
+            self.bodies[slot as usize] = body;
+            self.locked[slot as usize] = 0;
+            for v in tet {
+                self.vertex_tet[v as usize] = slot;
+                self.touched[v as usize] = self.pass;
+            }
+            for face in 0..4 {
+                self.meet(&mut waiting, slot, face);
+            }
+        }
+        assert!(waiting.is_empty(), "new tets {new:?} leave the face {:?} open", waiting[0].key);
+        self.open = waiting;
+    }
+
+    /// Frees the slots of `old` and leaves the faces of their hole in `open`.
+    fn take_out(&mut self, old: &[u32]) {
+        self.mark += 1;
+        for &t in old {
+            self.marks[t as usize] = self.mark;
+        }
+        self.open.clear();
+        for &t in old {
+            let tet = self.tets[t as usize];
+            for face in 0..4 {
+                let across = self.across[t as usize][face];
+                let locked = self.is_locked(t, face);
+                if locked || self.marks[across as usize / 4] != self.mark {
+                    self.open.push(OpenFace { key: sorted(face_of(tet, face)), across, locked });
+                }
+            }
+        }
+        for &t in old {
+            for v in self.tets[t as usize] {
+                self.touched[v as usize] = self.pass;
+                self.vertex_tet[v as usize] = NONE;
+            }
+            self.tets[t as usize] = [NONE; 4];
+        }
+        self.dead.extend_from_slice(old);
+    }
+
+    fn new_slot(&mut self) -> u32 {
+        if let Some(slot) = self.dead.pop() {
+            return slot;
+        }
+        assert!(self.tets.len() < (1 << 30) - 1, "more than 2^30 tets");
+        self.tets.push([NONE; 4]);
+        self.across.push([NONE; 4]);
+        self.locked.push(0);
+        self.scores.push(0.0);
+        self.bodies.push(BodyId(0));
+        self.marks.push(0);
+        self.tets.len() as u32 - 1
+    }
+
+    /// Joins a face of a new tet to its partner if that waits, else lets it wait.
+    fn meet(&mut self, waiting: &mut Vec<OpenFace>, slot: u32, face: usize) {
+        let key = sorted(face_of(self.tets[slot as usize], face));
+        let here = 4 * slot + face as u32;
+        let Some(k) = waiting.iter().position(|open| open.key == key) else {
+            waiting.push(OpenFace { key, across: here, locked: false });
+            return;
+        };
+        let partner = waiting.swap_remove(k);
+        self.across[slot as usize][face] = partner.across;
+        if partner.locked {
+            self.locked[slot as usize] |= 1 << face;
+        }
+        if partner.across != NONE {
+            self.across[partner.across as usize / 4][partner.across as usize % 4] = here;
+        }
+    }
+
+    /// Every broken promise of the structure: none, or the first found.
+    #[cfg(test)]
+    pub fn check(&self) -> Result<(), String> {
+        for t in self.living() {
+            let tet = self.tets[t as usize];
+            if !self.is_positive(tet) {
+                return Err(format!("tet {t} {tet:?} is not positive"));
+            }
+            for face in 0..4 {
+                let across = self.across[t as usize][face];
+                if across == NONE {
+                    if !self.is_locked(t, face) {
+                        return Err(format!("tet {t} has an open face {face}"));
+                    }
+                    continue;
+                }
+                let (n, g) = (across / 4, across as usize % 4);
+                if !self.is_alive(n) || self.across[n as usize][g] != 4 * t + face as u32 {
+                    return Err(format!("tets {t} and {n} disagree on being neighbours"));
+                }
+                if sorted(face_of(tet, face)) != sorted(face_of(self.tets[n as usize], g)) {
+                    return Err(format!("tets {t} and {n} disagree on their face"));
+                }
+                if self.is_locked(t, face) != self.is_locked(n, g) {
+                    return Err(format!("tets {t} and {n} disagree on a lock"));
+                }
+            }
+        }
+        for (v, &t) in self.vertex_tet.iter().enumerate() {
+            if t != NONE && !self.tets[t as usize].contains(&(v as u32)) {
+                return Err(format!("vertex {v} thinks it is in tet {t}"));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The tets round an edge, and the vertices opposite it: see [`Complex::ring`].
+#[derive(Default)]
+pub(super) struct Ring {
+    /// The tets, in the order of the walk.
+    pub tets: Vec<u32>,
+    /// The vertices, as many.
+    pub vertices: Vec<u32>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::improve::samples::{cube, half_ball, two_boxes};
+    use crate::mesh::TET_EDGES;
+
+    #[test]
+    fn a_mesh_survives_being_taken_apart() {
+        for before in [cube(3, 1), two_boxes(4, 1), half_ball(4)] {
+            let complex = Complex::new(&before);
+            complex.check().unwrap();
+            let mut after = before.clone();
+            complex.store(&mut after);
+            assert_eq!(format!("{before:?}"), format!("{after:?}"));
+        }
+    }
+
+    #[test]
+    fn the_tets_of_a_ring_follow_its_vertices() {
+        let complex = Complex::new(&cube(3, 1));
+        let (mut ring, mut closed) = (Ring::default(), 0);
+        for tet in complex.living() {
+            for [i, j] in TET_EDGES {
+                if !complex.ring(tet, i, j, usize::MAX, &mut ring) {
+                    continue;
+                }
+                closed += 1;
+                let [a, b] = [i, j].map(|k| complex.tets[tet as usize][k]);
+                assert_eq!(ring.tets.len(), ring.vertices.len());
+                for (k, &t) in ring.tets.iter().enumerate() {
+                    let next = ring.vertices[(k + 1) % ring.vertices.len()];
+                    let expected = [a, b, ring.vertices[k], next];
+                    assert!(complex.is_positive(expected));
+                    assert!(expected.iter().all(|v| complex.tets[t as usize].contains(v)));
+                }
+            }
+        }
+        assert!(closed > 0);
+        assert!(!complex.ring(0, 0, 1, usize::MAX, &mut ring), "an edge of the cube has no closed ring");
+    }
+
+    #[test]
+    fn faces_between_bodies_and_of_the_hull_are_locked() {
+        let mesh = two_boxes(4, 1);
+        let complex = Complex::new(&mesh);
+        let faces = complex.living().flat_map(|t| (0..4).map(move |k| (t, k)));
+        let locked = faces.filter(|&(t, k)| complex.is_locked(t, k)).count();
+        let between = mesh.triangles.iter().filter(|t| t.patch.0 == 6).count();
+        assert_eq!(locked, mesh.triangles.len() + between);
+    }
+
+    #[test]
+    #[should_panic(expected = "leave the face")]
+    fn a_filling_with_other_faces_than_the_hole_is_refused() {
+        let mut complex = Complex::new(&cube(2, 1));
+        let tet = complex.tets[0];
+        complex.replace(&[0, 1], &[(tet, 0.5)]);
+    }
+}

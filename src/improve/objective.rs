@@ -1,0 +1,194 @@
+//! What a tet is worth: its shape, and below every shape the illegal ones.
+
+use crate::Point;
+use crate::improve::complex::NONE;
+use crate::improve::legality::{Legality, TetLimits};
+use crate::kernel::quality::{Diagonal, squared_lengths, worst_child_squares};
+use crate::kernel::simplex::{area_vector, volume6};
+use crate::{Vector, mesh::TET_FACES};
+
+/// How the shape of a tet is measured: 1 at most, more than 0 for every positively oriented tet.
+///
+/// The mean ratio is chosen over angles because it is smooth where it is not zero, falls for every kind of
+/// bad tet (an angle measure does not see needles), and costs six lengths and a volume.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub enum Measure {
+    /// The mean ratio of the tet.
+    MeanRatio,
+    /// The mean ratio of the worst child at any level of refinement, see
+    /// [`refined_quality`](crate::kernel::quality::refined_quality), in units of the regular tet's 6/7.
+    #[default]
+    Refined,
+}
+
+/// The score of a tet that does not stand positively: below all others.
+pub(super) const INVERTED: f64 = f64::NEG_INFINITY;
+
+/// What is taken off the score of an illegal tet: more than any shape can make up for.
+const ILLEGAL: f64 = 1.0;
+
+/// The step of a difference quotient, in units of an edge: half the digits for the step, half for the difference.
+const DIFFERENCE: f64 = 1e-7;
+
+/// Refined quality of the regular tet.
+const REGULAR_REFINED: f64 = 6.0 / 7.0;
+
+/// Scores tets. Every score of a legal tet is positive, of an illegal one negative.
+#[derive(Clone, Copy)]
+pub(super) struct Objective<'a> {
+    /// How shapes are measured.
+    pub measure: Measure,
+    /// Which tets are illegal, if that matters.
+    pub legality: Option<&'a Legality>,
+}
+
+impl Objective<'_> {
+    /// The score of a tet.
+    pub fn score(&self, points: &[Point], tet: [u32; 4]) -> f64 {
+        let shape = self.shape_with_limits(&tet.map(|v| points[v as usize]), self.limits(tet).as_ref());
+        if shape > 0.0 { shape - self.penalty(tet) } else { INVERTED }
+    }
+
+    /// Where the edges of a tet tend to, if any bends and legality matters.
+    pub fn limits(&self, tet: [u32; 4]) -> Option<TetLimits> {
+        self.legality.and_then(|l| l.limits(tet))
+    }
+
+    /// The score of the tet of a point inside a body and then a face, outward.
+    pub fn score_with_point(&self, points: &[Point], point: &Point, face: [u32; 3]) -> f64 {
+        let [a, b, c] = face.map(|v| points[v as usize]);
+        let limits = self.limits([NONE, face[0], face[1], face[2]]);
+        let shape = self.shape_with_limits(&[*point, a, b, c], limits.as_ref());
+        // No edge at the point lies on the boundary, so that only the face can make the tet illegal.
+        let illegal = self.legality.is_some_and(|l| l.is_illegal_triangle(face));
+        if shape > 0.0 { shape - if illegal { ILLEGAL } else { 0.0 } } else { INVERTED }
+    }
+
+    /// The shape that a score stands for, whether the tet is legal or not.
+    pub fn shape_of_score(score: f64) -> f64 {
+        if score > 0.0 { score } else { score + ILLEGAL }
+    }
+
+    /// What legality takes off a tet's score.
+    fn penalty(&self, tet: [u32; 4]) -> f64 {
+        if self.legality.is_some_and(|l| l.is_illegal(tet)) { ILLEGAL } else { 0.0 }
+    }
+
+    /// The shape of a tet, less what its corners lose in the limit of refinement.
+    pub fn shape_with_limits(&self, p: &[Point; 4], limits: Option<&TetLimits>) -> f64 {
+        let shape = self.shape(p);
+        match limits {
+            Some(limits) if shape > 0.0 => shape * limits.factor(p),
+            _ => shape,
+        }
+    }
+
+    /// The same, and how it changes as the first vertex moves.
+    pub fn gradient_with_limits(&self, p: &[Point; 4], limits: Option<&TetLimits>) -> (f64, Vector) {
+        let (shape, gradient) = self.shape_and_gradient(p);
+        let Some(limits) = limits.filter(|_| shape > 0.0) else { return (shape, gradient) };
+        let factor = limits.factor(p);
+        let step = DIFFERENCE * (p[1] - p[0]).norm();
+        let ahead = Vector::from_fn(|axis, _| {
+            let mut q = *p;
+            q[0][axis] += step;
+            limits.factor(&q)
+        });
+        (shape * factor, gradient * factor + ahead.add_scalar(-factor) * (shape / step))
+    }
+
+    /// The cube of [`shape_with_limits`](Self::shape_with_limits), which saves a root where shapes are only compared.
+    pub fn cubed_shape_with_limits(&self, p: &[Point; 4], limits: Option<&TetLimits>) -> f64 {
+        let v6 = volume6(&p[0], &p[1], &p[2], &p[3]);
+        if v6.is_nan() || v6 <= 0.0 {
+            return 0.0;
+        }
+        let (sum, scale, _) = self.denominator(&squared_lengths(p));
+        let factor = limits.map_or(scale, |l| scale * l.factor(p));
+        (factor / sum).powi(3) * (0.25 * v6 * v6)
+    }
+
+    /// The shape of a tet, not positive if it does not stand positively.
+    #[inline]
+    fn shape(&self, p: &[Point; 4]) -> f64 {
+        let v6 = volume6(&p[0], &p[1], &p[2], &p[3]);
+        if v6.is_nan() || v6 <= 0.0 {
+            return 0.0;
+        }
+        let (sum, scale, _) = self.denominator(&squared_lengths(p));
+        scale * (0.5 * v6).cbrt().powi(2) / sum
+    }
+
+    /// The shape, and how it changes as the first vertex moves.
+    fn shape_and_gradient(&self, p: &[Point; 4]) -> (f64, Vector) {
+        let v6 = volume6(&p[0], &p[1], &p[2], &p[3]);
+        if v6.is_nan() || v6 <= 0.0 {
+            return (0.0, Vector::zeros());
+        }
+        let (sum, scale, weights) = self.denominator(&squared_lengths(p));
+        let shape = scale * (0.5 * v6).cbrt().powi(2) / sum;
+        let [a, b, c] = TET_FACES[0];
+        let volume_part = area_vector(&p[a], &p[b], &p[c]) * (-2.0 / (3.0 * v6));
+        let length_part = (1..4).map(|k| (p[0] - p[k]) * (2.0 * weights[k - 1])).sum::<Vector>() / sum;
+        (shape, (volume_part - length_part) * shape)
+    }
+
+    /// The sum that the volume is compared with, the factor before, and the sum's derivatives by the first
+    /// three squared lengths.
+    #[inline]
+    fn denominator(&self, squares: &[f64; 6]) -> (f64, f64, [f64; 3]) {
+        let own: f64 = squares.iter().sum();
+        let mut best = (own, 12.0, [1.0; 3]);
+        if self.measure == Measure::Refined {
+            let worst = Diagonal::ALL.map(|d| worst_child_squares(squares, d));
+            let k = (1..3).fold(0, |best, k| if worst[k] < worst[best] { k } else { best });
+            best = (worst[k], 12.0 / REGULAR_REFINED, [1.0; 3]);
+            if worst[k] > own {
+                // 2S − 2(a+b) − min(a,b): see `worst_child_squares`.
+                best.2 = [2.0; 3];
+                best.2[k] = if squares[k] < squares[5 - k] { -1.0 } else { 0.0 };
+            }
+        }
+        best
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::kernel::quality::refined_quality;
+    use proptest::prelude::*;
+
+    fn any_tet() -> impl Strategy<Value = [Point; 4]> {
+        prop::array::uniform4(prop::array::uniform3(-1.0..1.0f64)).prop_map(|p| p.map(Point::from))
+    }
+
+    proptest! {
+        #[test]
+        fn the_gradient_is_the_difference_quotient(p in any_tet(), x in -1.0..1.0f64, y in -1.0..1.0f64) {
+            for measure in [Measure::MeanRatio, Measure::Refined] {
+                let objective = Objective { measure, legality: None };
+                let shape = objective.shape(&p);
+                prop_assume!(shape > 0.05);
+                let (same, gradient) = objective.shape_and_gradient(&p);
+                prop_assert_eq!(shape, same);
+                let step = Vector::new(x, y, 0.5) * 1e-6;
+                let ahead = objective.shape(&[p[0] + step, p[1], p[2], p[3]]);
+                let back = objective.shape(&[p[0] - step, p[1], p[2], p[3]]);
+                // Off the kinks, where another child becomes the worst.
+                let (left, right) = (shape - back, ahead - shape);
+                prop_assume!((left - right).abs() < 1e-8);
+                prop_assert!((gradient.dot(&step) - 0.5 * (left + right)).abs() < 1e-7);
+            }
+        }
+
+        #[test]
+        fn the_refined_measure_is_the_refined_quality(p in any_tet()) {
+            let objective = Objective { measure: Measure::Refined, legality: None };
+            let quality = refined_quality(&p).0;
+            prop_assume!(quality > 0.0);
+            prop_assert!((objective.shape(&p) - quality * 7.0 / 6.0).abs() < 1e-12);
+            prop_assert!((objective.cubed_shape_with_limits(&p, None).cbrt() - objective.shape(&p)).abs() < 1e-12);
+        }
+    }
+}

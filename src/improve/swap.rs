@@ -1,0 +1,312 @@
+//! Swaps: the same vertices, other tets.
+//!
+//! **Edge removal** takes out an edge and fills the polyhedron of its tets with a triangulation of the
+//! ring round it, joined to both of its ends; the best triangulation is found by dynamic programming
+//! (Klincsek 1980; for tets Shewchuk 2002, "Two discrete optimization algorithms for the topological
+//! improvement of tetrahedral meshes", section 2). It contains the flips 3-2 and 4-4. **Face removal** is its
+//! inverse: faces sandwiched between two vertices are replaced by the edge between these (Shewchuk 2002,
+//! section 3; with one face it is the flip 2-3).
+
+use crate::improve::complex::{Complex, Ring, place};
+use crate::improve::objective::{INVERTED, Objective};
+use crate::mesh::{TET_EDGES, TET_FACES};
+
+/// Rings with more tets are left alone: the triangulations grow as n³, and good ones are not known of
+/// edges with many tets (Shewchuk 2002 found no gain beyond 7).
+const LONGEST_RING: usize = 8;
+
+/// The most faces that one face removal takes: their new edge must not have too many tets either.
+const MOST_FACES: usize = 6;
+
+/// A swap must raise the worst score by this much: less is not worth the work, and rounding must not make cycles.
+pub(super) const LEAST_GAIN: f64 = 1e-4;
+
+/// A better filling of a hole.
+#[derive(Default)]
+struct Swap {
+    /// The tets to take out.
+    old: Vec<u32>,
+    /// The tets to put in, with scores.
+    new: Vec<([u32; 4], f64)>,
+    /// What is gained: the least new score less the least old one.
+    gain: f64,
+}
+
+/// Space for the search, kept to spare allocations.
+#[derive(Default)]
+pub(super) struct Swapper {
+    ring: Ring,
+    table: Table,
+    found: Swap,
+    best: Swap,
+}
+
+/// The dynamic programme's table: for a piece of the ring from i to j, the worst tet of its best triangulation and its apex.
+#[derive(Default)]
+struct Table([[(f64, u8); LONGEST_RING]; LONGEST_RING]);
+
+impl Swapper {
+    /// Makes the best swap that takes `tet` out and raises the worst score of its hole. False if there is none.
+    pub fn improve(&mut self, complex: &mut Complex, objective: &Objective, tet: u32) -> bool {
+        self.find(complex, objective, tet) && self.commit(complex)
+    }
+
+    /// Finds that swap. False if there is none.
+    pub fn find(&mut self, complex: &Complex, objective: &Objective, tet: u32) -> bool {
+        self.best.gain = LEAST_GAIN;
+        let mut better = false;
+        for [i, j] in TET_EDGES {
+            if self.find_edge_removal(complex, objective, tet, i, j) && self.found.gain > self.best.gain {
+                std::mem::swap(&mut self.found, &mut self.best);
+                better = true;
+            }
+        }
+        for face in 0..4 {
+            if self.find_face_removal(complex, objective, tet, face) && self.found.gain > self.best.gain {
+                std::mem::swap(&mut self.found, &mut self.best);
+                better = true;
+            }
+        }
+        better
+    }
+
+    /// The least score among the new tets of the swap that was found.
+    pub fn worst(&self) -> f64 {
+        self.best.new.iter().map(|n| n.1).fold(f64::INFINITY, f64::min)
+    }
+
+    /// Makes the swap that was found, unless a new tet would not be exactly positive.
+    pub fn commit(&self, complex: &mut Complex) -> bool {
+        commit(complex, &self.best.old, &self.best.new)
+    }
+
+    /// The best filling without the edge between the local vertices `i` and `j`, left in `found`.
+    fn find_edge_removal(
+        &mut self,
+        complex: &Complex,
+        objective: &Objective,
+        tet: u32,
+        i: usize,
+        j: usize,
+    ) -> bool {
+        if !complex.ring(tet, i, j, LONGEST_RING, &mut self.ring) {
+            return false;
+        }
+        let [low, high] = [i, j].map(|k| complex.tets[tet as usize][k]);
+        let before = complex.worst_of(&self.ring.tets);
+        let ring = &self.ring.vertices;
+        let worst = self.table.fill(ring.len(), before, |a, b, c, least| {
+            let [a, b, c] = [ring[a], ring[b], ring[c]];
+            let upper = objective.score(&complex.points, [a, b, c, high]);
+            if upper <= least { upper } else { upper.min(objective.score(&complex.points, [a, c, b, low])) }
+        });
+        if worst <= before + LEAST_GAIN {
+            return false;
+        }
+        self.found.gain = worst - before;
+        self.found.old.clone_from(&self.ring.tets);
+        self.found.new.clear();
+        let new = &mut self.found.new;
+        self.table.triangles(0, ring.len() - 1, &mut |a, b, c| {
+            let [a, b, c] = [ring[a], ring[b], ring[c]];
+            for tet in [[a, b, c, high], [a, c, b, low]] {
+                new.push((tet, objective.score(&complex.points, tet)));
+            }
+        });
+        true
+    }
+
+    /// The best filling without the face opposite the local vertex `face`, and perhaps without faces beside it, left in `found`.
+    fn find_face_removal(&mut self, complex: &Complex, objective: &Objective, tet: u32, face: usize) -> bool {
+        let Some((other, far)) = complex.neighbour(tet, face) else { return false };
+        let low = complex.tets[tet as usize][face];
+        let high = complex.tets[other as usize][far];
+        let mut sandwich = Sandwich { complex, objective, low, high, old: vec![tet, other], new: Vec::new() };
+        let [a, b, c] = TET_FACES[face].map(|k| complex.tets[tet as usize][k]);
+        let mut worst = f64::INFINITY;
+        let mut before = complex.worst_of(&[tet, other]);
+        for [u, v, w] in [[a, b, c], [b, c, a], [c, a, b]] {
+            let side = sandwich.best_side([tet, other], [u, v], w, before);
+            worst = worst.min(side.new);
+            before = before.min(side.old);
+            if worst <= before + LEAST_GAIN {
+                return false;
+            }
+        }
+        self.found.gain = worst - before;
+        self.found.old = sandwich.old;
+        self.found.new = sandwich.new;
+        true
+    }
+}
+
+impl Table {
+    /// Finds the best triangulation of a ring of `n` vertices. `quality(a, b, c, least)` is the worst tet
+    /// of a triangle; it may answer anything not above `least` for one that is not above it.
+    fn fill(&mut self, n: usize, least: f64, quality: impl Fn(usize, usize, usize, f64) -> f64) -> f64 {
+        for i in 0..n - 1 {
+            self.0[i][i + 1] = (f64::INFINITY, 0);
+        }
+        for length in 2..n {
+            for i in 0..n - length {
+                let j = i + length;
+                let mut best = (INVERTED, 0);
+                for k in i + 1..j {
+                    let sides = self.0[i][k].0.min(self.0[k][j].0);
+                    let needed = best.0.max(least);
+                    if sides > needed {
+                        let worst = sides.min(quality(i, k, j, needed));
+                        if worst > needed {
+                            best = (worst, k as u8);
+                        }
+                    }
+                }
+                self.0[i][j] = best;
+            }
+        }
+        self.0[0][n - 1].0
+    }
+
+    fn triangles(&self, i: usize, j: usize, take: &mut impl FnMut(usize, usize, usize)) {
+        if j > i + 1 {
+            let k = self.0[i][j].1 as usize;
+            take(i, k, j);
+            self.triangles(i, k, take);
+            self.triangles(k, j, take);
+        }
+    }
+}
+
+/// Faces between two vertices that are being taken out together.
+struct Sandwich<'a> {
+    complex: &'a Complex,
+    objective: &'a Objective<'a>,
+    low: u32,
+    high: u32,
+    old: Vec<u32>,
+    new: Vec<([u32; 4], f64)>,
+}
+
+/// The worst new tet beyond an edge of a sandwiched face, and the worst tet that goes there.
+struct Side {
+    new: f64,
+    old: f64,
+}
+
+impl Sandwich<'_> {
+    /// What is best at the edge `u`, `v` of the face u, v, `w` between the `pair` of tets below and above:
+    /// to end there with the tet low, high, u, v, or to take the face beyond too.
+    fn best_side(&mut self, pair: [u32; 2], [u, v]: [u32; 2], w: u32, before: f64) -> Side {
+        let tet = [self.low, self.high, u, v];
+        let ending = Side { new: self.objective.score(&self.complex.points, tet), old: f64::INFINITY };
+        let (olds, news) = (self.old.len(), self.new.len());
+        if ending.new <= before + LEAST_GAIN
+            && let Some((next, beyond)) = self.across(pair, w)
+            && olds + 2 <= 2 * MOST_FACES
+        {
+            self.old.extend(next);
+            let gone = self.complex.worst_of(&next);
+            let least = before.min(gone);
+            let left = self.best_side(next, [u, beyond], v, least);
+            let right = self.best_side(next, [beyond, v], u, least);
+            let wider = Side { new: left.new.min(right.new), old: gone.min(left.old).min(right.old) };
+            if wider.new > ending.new {
+                return wider;
+            }
+            self.old.truncate(olds);
+            self.new.truncate(news);
+        }
+        self.new.push((tet, ending.new));
+        ending
+    }
+
+    /// The tets below and above the face beyond the edge opposite `w`, and its third vertex, if that face too lies between the two ends.
+    fn across(&self, [below, above]: [u32; 2], w: u32) -> Option<([u32; 2], u32)> {
+        let step = |tet: u32| {
+            let corners = self.complex.tets[tet as usize];
+            let (next, face) = self.complex.neighbour(tet, place(corners, w))?;
+            Some((next, self.complex.tets[next as usize][face]))
+        };
+        let (lower, beyond) = step(below)?;
+        let (upper, same) = step(above)?;
+        let corners = self.complex.tets[lower as usize];
+        let face = corners.iter().position(|&c| c == self.low)?;
+        let joined = beyond == same && self.complex.neighbour(lower, face).map(|n| n.0) == Some(upper);
+        (joined && !self.old.contains(&lower) && !self.old.contains(&upper))
+            .then_some(([lower, upper], beyond))
+    }
+}
+
+/// Fills a hole anew if all its new tets are exactly positive, else leaves all as it is.
+pub(super) fn commit(complex: &mut Complex, old: &[u32], new: &[([u32; 4], f64)]) -> bool {
+    let positive = new.iter().all(|&(tet, _)| complex.is_positive(tet));
+    if positive {
+        complex.replace(old, new);
+    }
+    positive
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::improve::objective::Measure;
+    use crate::improve::samples::{cube, fan};
+
+    const SHAPES: Objective = Objective { measure: Measure::MeanRatio, legality: None };
+
+    /// Swaps wherever it helps; after each swap the worst of the swapped tets must be better.
+    fn swap_all(complex: &mut Complex) -> usize {
+        complex.score_all(&SHAPES);
+        let mut swapper = Swapper::default();
+        let mut swaps = 0;
+        for tet in 0..complex.tets.len() as u32 {
+            if complex.is_alive(tet) && swapper.find(complex, &SHAPES, tet) {
+                let before = complex.worst_of(&swapper.best.old);
+                assert!(before <= complex.scores[tet as usize]);
+                assert!(swapper.worst() > before);
+                assert!((swapper.worst() - before - swapper.best.gain).abs() < 1e-12);
+                swaps += usize::from(swapper.commit(complex));
+            }
+        }
+        complex.check().unwrap();
+        swaps
+    }
+
+    #[test]
+    fn an_edge_with_flat_tets_round_it_is_removed() {
+        // Rings of 3, 4, … vertices round an edge that is far too long: 3-2, 4-4, 5-6, …
+        for (ring, tets) in [(3, 2), (4, 4), (5, 6), (6, 8), (7, 10)] {
+            let mut complex = Complex::new(&fan(ring, 4.0));
+            assert!(swap_all(&mut complex) > 0);
+            assert_eq!(complex.living().count(), tets);
+        }
+    }
+
+    #[test]
+    fn faces_between_two_near_vertices_are_removed() {
+        // One face is the flip 2-3; four round a vertex cannot be, as it would lose all its tets.
+        for ring in [3, 4, 5, 6] {
+            let mut complex = Complex::new(&fan(ring, 4.0));
+            swap_all(&mut complex);
+            // The ends of the edge come near: the edge is wanted back.
+            complex.points[0].z = 0.35;
+            complex.points[1].z = -0.35;
+            assert!(swap_all(&mut complex) > 0);
+            assert_eq!(complex.living().count(), ring, "the fan is back");
+        }
+    }
+
+    #[test]
+    fn good_tets_are_left_alone() {
+        let mut complex = Complex::new(&fan(5, 0.6));
+        assert_eq!(swap_all(&mut complex), 0);
+    }
+
+    #[test]
+    fn swaps_in_bad_cubes_keep_the_complex_valid() {
+        for seed in 0..8 {
+            let mut complex = Complex::new(&cube(4, seed));
+            assert!(swap_all(&mut complex) > 10);
+        }
+    }
+}

@@ -1,0 +1,156 @@
+//! Whole runs on small meshes.
+
+use super::complex::Complex;
+use super::legality::Legality;
+use super::samples::{
+    HollowCube, UnitSphere, ball, cube, fan, half_ball, hollow_cube, refined_on_sphere, two_boxes,
+};
+use super::{Measure, Report, Settings, Smoothness, improve, make_refinable};
+use crate::kernel::quality::QualitySummary;
+use crate::kernel::simplex::volume;
+use crate::mesh::{Class, Mesh};
+use crate::size::UniformSize;
+use csg::BodyId;
+
+fn body_volume(mesh: &Mesh, body: BodyId) -> f64 {
+    let tets = mesh.tets.iter().zip(&mesh.bodies).filter(|(_, b)| **b == body);
+    tets.map(|(t, _)| t.map(|v| mesh.points[v.index()])).map(|p| volume(&p[0], &p[1], &p[2], &p[3])).sum()
+}
+
+fn illegal(mesh: &Mesh, smoothness: &dyn Smoothness) -> usize {
+    let legality = Legality::new(mesh, smoothness);
+    mesh.tets.iter().filter(|t| legality.is_illegal(t.map(|v| v.0))).count()
+}
+
+/// What must hold after every run: a valid mesh, the same boundary, the same bodies, nothing worse.
+fn check(before: &Mesh, after: &Mesh, report: &Report) {
+    Complex::new(after).check().unwrap();
+    assert_eq!(after.points.len(), after.classes.len());
+    assert_eq!(after.tets.len(), after.bodies.len());
+    let triangles = |m: &Mesh| -> Vec<_> {
+        m.triangles.iter().map(|t| (t.patch, t.vertices.map(|v| m.points[v.index()]))).collect()
+    };
+    assert_eq!(triangles(before), triangles(after), "the boundary moved");
+    let segments = |m: &Mesh| -> Vec<_> {
+        m.segments.iter().map(|s| (s.curve, s.vertices.map(|v| m.points[v.index()]))).collect()
+    };
+    assert_eq!(segments(before), segments(after), "a segment moved");
+    for body in [BodyId(0), BodyId(1)] {
+        let (old, new) = (body_volume(before, body), body_volume(after, body));
+        assert!((old - new).abs() < 1e-9 * (1.0 + old), "body {body:?} had volume {old}, has {new}");
+    }
+    for (tet, body) in after.tets.iter().zip(&after.bodies) {
+        for v in tet {
+            if let Class::Body(b) = after.classes[v.index()] {
+                assert_eq!(b, *body, "vertex {v:?} in the wrong body");
+            }
+        }
+    }
+    assert_eq!(report.after, QualitySummary::of(after));
+}
+
+#[test]
+fn a_shaken_cube_gets_good_angles_and_keeps_its_boundary() {
+    for seed in 1..4 {
+        for measure in [Measure::MeanRatio, Measure::Refined] {
+            let before = cube(6, seed);
+            let mut mesh = before.clone();
+            let report = improve(&mut mesh, &UniformSize(0.4), &Settings { measure, ..Settings::default() });
+            check(&before, &mesh, &report);
+            assert!(report.after.worst_mean_ratio >= report.before.worst_mean_ratio);
+
+            assert!(report.after.smallest_dihedral > 25.0, "{:?}", report.after);
+        }
+    }
+}
+
+#[test]
+fn interfaces_between_bodies_stay() {
+    let before = two_boxes(6, 1);
+    let mut mesh = before.clone();
+    let report = improve(&mut mesh, &UniformSize(0.4), &Settings::default());
+    check(&before, &mesh, &report);
+    assert!(report.after.smallest_dihedral > 25.0, "{:?}", report.after);
+}
+
+#[test]
+fn a_ball_has_no_tet_left_that_flattens_on_the_sphere() {
+    for n in [2, 3, 6] {
+        let before = ball(n);
+        assert!(illegal(&before, &UnitSphere) > 0);
+        let mut mesh = before.clone();
+        let report =
+            make_refinable(&mut mesh, &UniformSize(2.0 / n as f64), &UnitSphere, &Settings::default());
+        check(&before, &mesh, &report);
+
+        assert_eq!(report.illegal_before, illegal(&before, &UnitSphere));
+        assert_eq!((report.illegal_left, illegal(&mesh, &UnitSphere)), (0, 0));
+    }
+}
+
+#[test]
+fn a_half_ball_has_no_tet_left_that_flattens_at_its_rim() {
+    let before = half_ball(6);
+    let mut mesh = before.clone();
+    let report = make_refinable(&mut mesh, &UniformSize(0.4), &UnitSphere, &Settings::default());
+    check(&before, &mesh, &report);
+
+    assert!(report.illegal_before > 0);
+    assert_eq!((report.illegal_left, illegal(&mesh, &UnitSphere)), (0, 0));
+    assert_eq!(report.illegal_triangles, 2, "two corners of the disc have both edges on the rim");
+}
+
+/// The worst mean ratio after refining and snapping so often.
+fn worst_after(mesh: &Mesh, radius: f64, levels: usize) -> f64 {
+    let mut fine = mesh.clone();
+    for _ in 0..levels {
+        fine = refined_on_sphere(&fine, radius);
+    }
+    QualitySummary::of(&fine).worst_mean_ratio
+}
+
+#[test]
+fn refined_and_snapped_tets_stay_good() {
+    // The ball has illegal tets; the hollow cube has legal ones that suffer, as its hole bends towards them.
+    let ball = (1.0, ball(2), 1.0, &UnitSphere as &dyn Smoothness);
+    let hollow = (0.5, hollow_cube(4), 0.5, &HollowCube as &dyn Smoothness);
+    for (size, before, radius, smoothness) in [ball, hollow] {
+        let mut mesh = before.clone();
+        let report = make_refinable(&mut mesh, &UniformSize(size), smoothness, &Settings::default());
+        check(&before, &mesh, &report);
+        assert_eq!((report.illegal_left, report.folding_left), (0, 0));
+        let [old, new] = [&before, &mesh].map(|m| worst_after(m, radius, 3));
+        assert!(old < 0.3 && new > 0.45, "from {old} to {new}");
+        let mut plain = before.clone();
+        improve(&mut plain, &UniformSize(size), &Settings::default());
+        assert!(worst_after(&plain, radius, 3) < new + 1e-9, "no better when only straight shapes count");
+    }
+}
+
+#[test]
+fn the_same_input_gives_the_same_mesh() {
+    let run = || {
+        let mut mesh = half_ball(6);
+        make_refinable(&mut mesh, &UniformSize(0.4), &UnitSphere, &Settings::default());
+        format!("{mesh:?}")
+    };
+    assert!(run() == run());
+}
+
+#[test]
+fn an_empty_mesh_and_a_single_tet_are_left_alone() {
+    let mut empty = Mesh::default();
+    assert_eq!(improve(&mut empty, &UniformSize(1.0), &Settings::default()).after.tets, 0);
+    let mut fan = fan(5, 0.6);
+    let before = format!("{fan:?}");
+    improve(&mut fan, &UniformSize(1.0), &Settings { passes: 1, change_below: 0.0, ..Settings::default() });
+    assert_eq!(before, format!("{fan:?}"));
+}
+
+#[test]
+#[should_panic(expected = "not positively oriented")]
+fn an_inverted_tet_is_refused_with_its_id() {
+    let mut mesh = cube(2, 1);
+    mesh.tets[3].swap(0, 1);
+    improve(&mut mesh, &UniformSize(1.0), &Settings::default());
+}

@@ -1,0 +1,233 @@
+//! Method 2 on all ranks: a coarse mesh, partitioned, distributed, refined, checked.
+
+use super::coarse::{CoarseMesh, CoarseReport, Model};
+use super::target::{Outcome, mesh_to_target};
+use super::{coarse, mend, names};
+use crate::check::{self, Checksum, PartReport};
+use crate::comm::Communicator;
+use crate::dist;
+use crate::error::{Failure, Status, agree};
+use crate::mesh::{GlobalId, Mesh, Names, Rank};
+use crate::partition::{self, Metrics};
+use crate::progress::Progress;
+use crate::refine::{self, RefineError, RefinedMesh};
+use crate::size::{SizeSettings, Source};
+use csg::Projector;
+
+/// How many tets are wanted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Wanted {
+    /// What the sizes give, with this many levels of refinement.
+    Sizes {
+        /// Levels.
+        levels: u32,
+    },
+    /// A coarse mesh with this many, and this many levels of refinement.
+    Coarse {
+        /// Tets of the coarse mesh.
+        tets: u64,
+        /// Levels.
+        levels: u32,
+    },
+    /// This many in all: levels are chosen.
+    Elements(u64),
+}
+
+/// What is to be made.
+#[derive(Clone, Debug)]
+pub struct GenerateSettings {
+    /// The sizes of the coarse mesh.
+    pub size: SizeSettings,
+    /// How many tets.
+    pub wanted: Wanted,
+}
+
+/// What rank 0 found out on the way.
+#[derive(Clone, Debug)]
+pub struct CoarseResult {
+    /// The coarse mesh, and the part of each of its tets.
+    pub mesh: Mesh,
+    /// The part of each tet.
+    pub parts: Vec<Rank>,
+    /// Its numbers.
+    pub report: CoarseReport,
+    /// How the wanted number came out, if one was wanted.
+    pub outcome: Option<Outcome>,
+    /// How good the partition is.
+    pub partition: Metrics,
+}
+
+/// A refined, checked mesh on each rank.
+#[derive(Debug)]
+pub struct Generated {
+    /// This rank's part.
+    pub part: RefinedMesh,
+    /// Levels of refinement.
+    pub levels: u32,
+    /// Numbers and names of bodies and boundaries.
+    pub names: Names,
+    /// The check of the whole mesh, the same on all ranks.
+    pub check: PartReport,
+    /// What identifies the mesh, whatever the ranks: the same on all.
+    pub checksum: Checksum,
+    /// On rank 0 alone.
+    pub coarse: Option<CoarseResult>,
+}
+
+/// Levels of refinement at most: with more, even one tet would pass 2³² vertices.
+pub const MOST_LEVELS: u32 = 10;
+
+/// Below this many coarse tets a mesh that is to have many is not refined, but made finer.
+const LEAST_COARSE: u64 = 5_000;
+
+/// Rounds in which the coarse mesh is made finer because refined tets turned out inverted only now.
+const MOST_ROUNDS: usize = 4;
+
+/// **Collective.** Makes the mesh; only rank 0 needs the `model` and shows `progress`.
+///
+/// # Errors
+/// The same on all ranks: no coarse mesh, more parts than tets, too many vertices on a rank, inverted
+/// tets that no finer coarse mesh mends, a faulty mesh.
+pub fn generate(
+    comm: &dyn Communicator,
+    model: Option<&Model>,
+    settings: &GenerateSettings,
+    progress: &Progress,
+) -> Result<Generated, Failure> {
+    let mut sources: Vec<Source> = Vec::new();
+    for round in 0.. {
+        let made = model.map(|model| coarse_mesh(comm.size(), model, settings, &sources, progress));
+        let mut coarse = agree(comm, made.transpose())?;
+        let levels = broadcast_levels(comm, coarse.as_ref().map(|(levels, _)| *levels))?;
+        let (names, projector) = broadcast_geometry(comm, model)?;
+        let given = coarse.as_ref().map(|(_, made)| (made.mesh.clone(), made.parts.clone()));
+        let dist = progress.stage("distribute", || dist::distribute(comm, given))?;
+        let pieces = 1 << levels;
+        let refined = progress
+            .stage("refine", || refine::refine(dist, &projector, pieces, &refine::Settings::default()));
+        let bad = inverted_anywhere(comm, &refined)?;
+        if !bad.is_empty() && round < MOST_ROUNDS {
+            if let Some((_, made)) = &coarse {
+                sources.extend(mend::lowered(&made.mesh, &bad));
+            }
+            continue;
+        }
+        let part = agree(comm, refined.map_err(Failure::from))?;
+        let (check, checksum) = progress.stage("check", || verdict(comm, &part, &projector))?;
+        let coarse = coarse.take().map(|(_, made)| made);
+        return Ok(Generated { part, levels, names, check, checksum, coarse });
+    }
+    unreachable!("the loop ends by itself")
+}
+
+/// The coarse mesh, partitioned, and the levels of its refinement.
+fn coarse_mesh(
+    parts: u32,
+    model: &Model,
+    settings: &GenerateSettings,
+    sources: &[Source],
+    progress: &Progress,
+) -> Result<(u32, CoarseResult), Failure> {
+    let (levels, made, outcome) =
+        progress.stage("mesh", || mesh_as_wanted(parts, model, settings, sources))?;
+    let (assigned, metrics) = progress
+        .stage("partition", || partition::partition(&made.mesh, parts, &partition::Settings::default()))?;
+    let CoarseMesh { mesh, report } = made;
+    Ok((levels, CoarseResult { mesh, parts: assigned, report, outcome, partition: metrics }))
+}
+
+fn mesh_as_wanted(
+    parts: u32,
+    model: &Model,
+    settings: &GenerateSettings,
+    sources: &[Source],
+) -> Result<(u32, CoarseMesh, Option<Outcome>), Failure> {
+    let with = |more: &[Source]| {
+        let mut size = settings.size.clone();
+        size.sources.extend(sources.iter().chain(more));
+        size
+    };
+    let to_target = |tets: u64, levels: u32| {
+        let mut outcome = Outcome::Reached;
+        let made = mend::refinable(model, 1 << levels, |more| {
+            let (made, how) = mesh_to_target(model, &mut with(more), tets)?;
+            outcome = how;
+            Ok(made)
+        });
+        made.map(|made| (made, outcome))
+    };
+    match settings.wanted {
+        Wanted::Sizes { levels } => {
+            let made = mend::refinable(model, 1 << levels, |more| coarse::mesh(model, &mut with(more)))?;
+            Ok((levels, made, None))
+        }
+        Wanted::Coarse { tets, levels } => {
+            let (made, outcome) = to_target(tets, levels)?;
+            Ok((levels, made, Some(outcome)))
+        }
+        Wanted::Elements(count) => {
+            let enough = LEAST_COARSE.max(100 * u64::from(parts));
+            let fits = |levels: &u32| count >> (3 * levels) >= enough;
+            let mut levels = (0..=MOST_LEVELS).rev().find(fits).unwrap_or(0);
+            loop {
+                let (made, outcome) = to_target(count.div_ceil(1 << (3 * levels)), levels)?;
+                // Too fine a coarse mesh for so many levels: fewer levels reach the number.
+                if outcome == Outcome::Reached || levels == 0 {
+                    return Ok((levels, made, Some(outcome)));
+                }
+                levels -= 1;
+            }
+        }
+    }
+}
+
+/// **Collective.** The levels that rank 0 chose.
+fn broadcast_levels(comm: &dyn Communicator, levels: Option<u32>) -> Result<u32, Failure> {
+    let mut levels = vec![levels.unwrap_or(0)];
+    comm.broadcast(0, &mut levels)?;
+    Ok(levels[0])
+}
+
+/// **Collective.** The names and the surfaces that rank 0 has read.
+fn broadcast_geometry(comm: &dyn Communicator, model: Option<&Model>) -> Result<(Names, Projector), Failure> {
+    let mut numbers = model.map(|m| m.projector.encode()).unwrap_or_default();
+    comm.broadcast(0, &mut numbers)?;
+    let names = model.map(|m| names(&m.geometry, &m.features)).unwrap_or_default();
+    let mut text = serde_json::to_vec(&(&names.bodies, &names.patches)).expect("plain data");
+    comm.broadcast_bytes(0, &mut text)?;
+    let (bodies, patches) = serde_json::from_slice(&text).expect("what rank 0 wrote");
+    let projector = Projector::decode(&numbers).expect("what rank 0 encoded");
+    Ok((Names { bodies, patches }, projector))
+}
+
+/// **Collective.** The coarse tets with inverted children on any rank.
+fn inverted_anywhere(
+    comm: &dyn Communicator,
+    refined: &Result<RefinedMesh, RefineError>,
+) -> Result<Vec<GlobalId>, Failure> {
+    let mine: &[GlobalId] = match refined {
+        Err(RefineError::Inverted { coarse, .. }) => coarse,
+        _ => &[],
+    };
+    Ok(comm.all_gather(mine)?.concat())
+}
+
+/// **Collective.** Checks every child, every boundary vertex and every face between tets.
+fn verdict(
+    comm: &dyn Communicator,
+    part: &RefinedMesh,
+    projector: &Projector,
+) -> Result<(PartReport, Checksum), Failure> {
+    let report = check::check(comm, part, Some(projector), &check::Settings::default())?;
+    let checksum = check::checksum_of_all(comm, part)?;
+    if report.faults > 0 {
+        let faults: Vec<String> = report.described.iter().map(ToString::to_string).collect();
+        let message =
+            format!("the mesh has {} faults, nothing was written:\n  {}", report.faults, faults.join("\n  "));
+        return Err(Failure::new(Status::NoValidMesh, message));
+    }
+    if checksum.open != 0 {
+        return Err(Failure::new(Status::NoValidMesh, "faces of the mesh do not match; nothing was written"));
+    }
+    Ok((report, checksum))
+}

@@ -1,0 +1,105 @@
+//! Sizes that give a wanted number of tets.
+
+use super::coarse::{CoarseError, CoarseMesh, Model, mesh};
+use crate::size::SizeSettings;
+
+/// How a coarse mesh with a wanted number of tets came out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Outcome {
+    /// Between the number and one and a half times it.
+    Reached,
+    /// The least that the geometry allows is more.
+    Least,
+    /// The number jumps over the range: this is the next above.
+    Jumped,
+}
+
+/// Meshes made to find the sizes at most: a bracket is cut by half or better each time.
+const MOST_TRIES: usize = 24;
+
+/// Sizes that are this many times larger than what the settings say change nothing any more.
+const LARGEST_SCALE: f64 = 1e3;
+
+/// A bracket of sizes narrower than this factor will not come to lie on another number.
+const NARROW: f64 = 1.002;
+
+/// Makes a coarse mesh of `target` to 1.5·`target` tets by scaling all sizes, or the least above it.
+///
+/// Bounds that the user or the file sets (`maxh`) stay upper bounds.
+///
+/// # Errors
+/// As [`mesh`].
+pub fn mesh_to_target(
+    model: &Model,
+    settings: &mut SizeSettings,
+    target: u64,
+) -> Result<(CoarseMesh, Outcome), CoarseError> {
+    let goal = 1.2 * target as f64;
+    let sources = settings.sources.len();
+    let mut fine: Option<(f64, CoarseMesh)> = None;
+    let mut coarse: Option<(f64, f64)> = None;
+    let mut finest_failure: Option<CoarseError> = None;
+    for _ in 0..MOST_TRIES {
+        settings.sources.truncate(sources);
+        let made = match mesh(model, settings) {
+            Ok(made) => made,
+            // Sizes that are too large for the geometry, whatever was corrected: as too few tets.
+            Err(error) => {
+                coarse = Some((settings.scale, 0.5 * target as f64));
+                finest_failure = Some(error);
+                settings.scale = next_scale(settings.scale, goal, 0.5 * goal, fine.as_ref(), coarse);
+                continue;
+            }
+        };
+        let count = made.report.tets as f64;
+        if made.report.tets >= target && made.report.tets <= target + target / 2 {
+            return Ok((made, Outcome::Reached));
+        }
+        let scale = settings.scale;
+        if made.report.tets < target {
+            coarse = Some((scale, count));
+        } else {
+            if scale >= LARGEST_SCALE {
+                return Ok((made, Outcome::Least));
+            }
+            fine = Some((scale, made));
+        }
+        if let (Some((low, _)), Some((high, _))) = (&fine, coarse)
+            && high / low < NARROW
+        {
+            break;
+        }
+        settings.scale = next_scale(scale, goal, count, fine.as_ref(), coarse);
+    }
+    match (fine, finest_failure) {
+        (Some((scale, made)), _) => {
+            settings.scale = scale;
+            Ok((made, Outcome::Jumped))
+        }
+        (None, Some(error)) => Err(error),
+        (None, None) => mesh(model, settings).map(|made| (made, Outcome::Jumped)),
+    }
+}
+
+/// The scale to try next: the number of tets goes with its third power, within what is known.
+fn next_scale(
+    scale: f64,
+    goal: f64,
+    count: f64,
+    fine: Option<&(f64, CoarseMesh)>,
+    coarse: Option<(f64, f64)>,
+) -> f64 {
+    match (fine, coarse) {
+        (Some((low, made)), Some((high, few))) => {
+            // Linear between the logarithms, kept off the ends so that the bracket shrinks.
+            let (low_log, high_log) = (low.ln(), high.ln());
+            let (many, few) = ((made.report.tets as f64).ln(), few.max(1.0).ln());
+            let share = ((many - goal.ln()) / (many - few)).clamp(0.15, 0.85);
+            (low_log + share * (high_log - low_log)).exp()
+        }
+        // Still too many: coarser, faster and faster, as some numbers hardly depend on the sizes.
+        (Some(_), None) => (scale * (count / goal).cbrt().max(1.5).powi(2).min(16.0)).min(LARGEST_SCALE),
+        _ => scale * (count / goal).cbrt().clamp(0.05, 0.9),
+    }
+}

@@ -1,0 +1,250 @@
+//! The summary of a run, for people and as JSON. The JSON keys are stable: they are only added to.
+
+use crate::check::PartReport;
+use crate::io::Written;
+use crate::partition::Metrics;
+use crate::pipeline::CoarseReport;
+use crate::pipeline::target::Outcome;
+use crate::progress::Stage;
+use serde::Serialize;
+use std::fmt;
+
+/// What a run did.
+#[derive(Clone, Debug, Serialize)]
+pub struct Report {
+    /// Version of tetmill.
+    pub version: String,
+    /// The input file.
+    pub geometry: String,
+    /// The geometry's entities.
+    pub entities: Entities,
+    /// In-process ranks or MPI's; as many parts.
+    pub ranks: u32,
+    /// Threads in each process.
+    pub threads: usize,
+    /// Levels of uniform refinement.
+    pub levels: u32,
+    /// The coarse mesh.
+    pub coarse: CoarseReport,
+    /// Whether the wanted number of coarse tets was reached: `reached`, `least` or `jumped`; null if none was wanted.
+    pub wanted: Option<Outcome>,
+    /// The fine mesh.
+    pub mesh: MeshReport,
+    /// The partition.
+    pub partition: PartitionReport,
+    /// The stages in order.
+    pub stages: Vec<Stage>,
+    /// Seconds from start to end.
+    pub seconds: f64,
+    /// Peak resident memory of all processes together, bytes; null where the system does not tell.
+    pub peak_memory: Option<u64>,
+    /// Files written.
+    pub files: u64,
+    /// Bytes written.
+    pub bytes: u64,
+}
+
+/// Numbers of geometric entities.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct Entities {
+    /// Bodies.
+    pub bodies: usize,
+    /// Corners.
+    pub corners: usize,
+    /// Curves.
+    pub curves: usize,
+    /// Patches.
+    pub patches: usize,
+}
+
+/// The mesh that was made.
+#[derive(Clone, Debug, Serialize)]
+pub struct MeshReport {
+    /// Vertices.
+    pub vertices: u64,
+    /// Tets.
+    pub tets: u64,
+    /// Triangles on patches.
+    pub boundary: u64,
+    /// Volume.
+    pub volume: f64,
+    /// Volume of each body.
+    pub body_volumes: Vec<f64>,
+    /// The least mean ratio.
+    pub worst_mean_ratio: f64,
+    /// The mean of the mean ratios.
+    pub mean_mean_ratio: f64,
+    /// The smallest dihedral angle, degrees.
+    pub smallest_dihedral: f64,
+    /// The 1st percentile of each tet's smallest dihedral angle, degrees.
+    pub first_percentile_dihedral: f64,
+    /// The largest dihedral angle, degrees.
+    pub largest_dihedral: f64,
+    /// The largest distance of a boundary vertex from its patch; null where none was measured.
+    pub furthest_off_surface: Option<f64>,
+    /// Identifies the mesh, whatever the number of ranks and threads.
+    pub checksum: String,
+}
+
+impl MeshReport {
+    /// From the check of a mesh.
+    pub fn new(check: &PartReport, checksum: String) -> Self {
+        let shape = check.shape.as_ref();
+        Self {
+            vertices: check.vertices,
+            tets: check.tets,
+            boundary: check.boundary,
+            volume: check.volume,
+            body_volumes: check.body_volumes.clone(),
+            worst_mean_ratio: shape.map_or(0.0, |s| s.worst_ratio.value),
+            mean_mean_ratio: check.mean_ratio().unwrap_or(0.0),
+            smallest_dihedral: shape.map_or(0.0, |s| s.smallest_angle.value),
+            first_percentile_dihedral: shape.map_or(0.0, |s| s.smallest_angle_percentile(0.01)),
+            largest_dihedral: shape.map_or(0.0, |s| s.largest_angle.value),
+            furthest_off_surface: check.furthest.map(|f| f.distance),
+            checksum,
+        }
+    }
+}
+
+/// The partition of the mesh.
+#[derive(Clone, Debug, Serialize)]
+pub struct PartitionReport {
+    /// How it was made.
+    pub method: String,
+    /// The number of parts.
+    pub parts: u32,
+    /// Tets in the largest part over the mean.
+    pub imbalance: f64,
+    /// Coarse faces between parts.
+    pub edge_cut: u64,
+    /// Connected pieces of all parts.
+    pub pieces: u64,
+    /// Fine vertices in more than one part, each once.
+    pub shared_vertices: u64,
+}
+
+impl PartitionReport {
+    /// From the metrics of a partition.
+    pub fn new(metrics: &Metrics, shared_vertices: u64) -> Self {
+        Self {
+            method: metrics.method.to_string(),
+            parts: metrics.parts,
+            imbalance: metrics.imbalance,
+            edge_cut: metrics.edge_cut as u64,
+            pieces: metrics.pieces as u64,
+            shared_vertices,
+        }
+    }
+}
+
+impl Report {
+    /// Adds what was written.
+    pub fn add_written(&mut self, written: Written) {
+        self.files += written.files;
+        self.bytes += written.bytes;
+    }
+}
+
+/// A count with blanks between groups of three digits.
+fn grouped(count: u64) -> String {
+    let digits = count.to_string();
+    let first = digits.len() % 3;
+    let (head, tail) = digits.split_at(first);
+    let mut groups: Vec<&str> = if head.is_empty() { Vec::new() } else { vec![head] };
+    groups.extend((0..tail.len() / 3).map(|i| &tail[3 * i..3 * i + 3]));
+    groups.join(" ")
+}
+
+/// Bytes in the unit that suits.
+fn sized(bytes: u64) -> String {
+    let units = ["B", "kB", "MB", "GB", "TB"];
+    let power = (bytes.max(1).ilog10() / 3).min(4);
+    let value = bytes as f64 / 1000f64.powi(power as i32);
+    let decimals = if power == 0 { 0 } else { 1 };
+    format!("{value:.decimals$} {}", units[power as usize])
+}
+
+impl fmt::Display for Report {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Entities { bodies, corners, curves, patches } = self.entities;
+        writeln!(
+            f,
+            "geometry   {}: {bodies} bodies, {patches} patches, {curves} curves, {corners} corners",
+            self.geometry
+        )?;
+        let coarse = &self.coarse;
+        write!(f, "coarse     {} tets, {} vertices", grouped(coarse.tets), grouped(coarse.vertices))?;
+        writeln!(
+            f,
+            ", worst mean ratio {:.3}, mean {:.3}",
+            coarse.quality.worst_mean_ratio, coarse.quality.average_mean_ratio
+        )?;
+        if coarse.illegal_repaired + coarse.illegal_left > 0 {
+            writeln!(
+                f,
+                "           {} tets that refinement would flatten repaired, {} left",
+                coarse.illegal_repaired, coarse.illegal_left
+            )?;
+        }
+        let mesh = &self.mesh;
+        writeln!(
+            f,
+            "mesh       {} tets, {} vertices, {} boundary triangles, {} levels",
+            grouped(mesh.tets),
+            grouped(mesh.vertices),
+            grouped(mesh.boundary),
+            self.levels
+        )?;
+        writeln!(
+            f,
+            "quality    mean ratio {:.3} at worst, {:.3} in the mean; dihedral angles {:.1}° to {:.1}°, 1st percentile {:.1}°",
+            mesh.worst_mean_ratio,
+            mesh.mean_mean_ratio,
+            mesh.smallest_dihedral,
+            mesh.largest_dihedral,
+            mesh.first_percentile_dihedral
+        )?;
+        write!(f, "checked    every tet positive; volume {}", mesh.volume)?;
+        if let Some(distance) = mesh.furthest_off_surface {
+            write!(f, "; boundary vertices within {distance:.1e} of their patch")?;
+        }
+        writeln!(f)?;
+        if self.ranks > 1 {
+            let p = &self.partition;
+            writeln!(
+                f,
+                "partition  {} parts by {}, imbalance {:.3}, {} coarse faces cut, {} vertices shared",
+                p.parts,
+                p.method,
+                p.imbalance,
+                grouped(p.edge_cut),
+                grouped(p.shared_vertices)
+            )?;
+        }
+        let stages: Vec<String> =
+            self.stages.iter().map(|s| format!("{} {:.2}", s.name, s.seconds)).collect();
+        writeln!(f, "seconds    {} in all: {}", format_args!("{:.2}", self.seconds), stages.join(", "))?;
+        if let Some(bytes) = self.peak_memory {
+            writeln!(f, "memory     {} at the peak", sized(bytes))?;
+        }
+        if self.files > 0 {
+            writeln!(f, "written    {} files, {}", self.files, sized(self.bytes))?;
+        }
+        write!(f, "checksum   {}", mesh.checksum)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_told_as_people_read_them() {
+        assert_eq!(grouped(1_234_567), "1 234 567");
+        assert_eq!(grouped(12), "12");
+        assert_eq!(grouped(123_456), "123 456");
+        assert_eq!(sized(999), "999 B");
+        assert_eq!(sized(1_500_000), "1.5 MB");
+    }
+}

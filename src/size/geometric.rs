@@ -1,0 +1,281 @@
+//! The size field that a geometry and a user's settings ask for.
+
+use super::{Preset, SizeField, Source, SourceTree};
+use crate::{Point, Vector};
+use csg::{BodyId, Curve, Features, Geometry, Interval, Solid, SurfaceId};
+
+/// What the user asks of the size, beside what the geometry says.
+#[derive(Clone, Debug)]
+pub struct SizeSettings {
+    /// Upper bound everywhere (length), if any.
+    pub maxh: Option<f64>,
+    /// Lower bound of what curvature, short curves and grading ask for (length).
+    pub minh: f64,
+    /// Elements per radius of curvature.
+    pub curvature_safety: f64,
+    /// The least number of segments wanted on a curve.
+    pub segments_per_curve: f64,
+    /// Growth of the size per unit of distance.
+    pub grading: f64,
+    /// All sizes but the bounds `maxh` are multiplied by this; below 1 those too. How a wanted number of
+    /// tets is reached.
+    pub scale: f64,
+    /// Further sources, taken as they are.
+    pub sources: Vec<Source>,
+}
+
+impl From<Preset> for SizeSettings {
+    fn from(preset: Preset) -> Self {
+        Self {
+            maxh: None,
+            minh: 0.0,
+            curvature_safety: preset.curvature_safety(),
+            segments_per_curve: preset.segments_per_curve(),
+            grading: preset.grading(),
+            scale: 1.0,
+            sources: Vec::new(),
+        }
+    }
+}
+
+impl Default for SizeSettings {
+    fn default() -> Self {
+        Preset::default().into()
+    }
+}
+
+impl SizeSettings {
+    /// A bound set by the user or the file under [`scale`](Self::scale).
+    fn scaled_bound(&self, bound: f64) -> f64 {
+        bound * self.scale.min(1.0)
+    }
+}
+
+/// Sizes from the bounds in the file, curvature, short curves and the user's settings.
+#[derive(Clone, Debug)]
+pub struct GeometricSize<'a> {
+    geometry: &'a Geometry,
+    tree: SourceTree,
+    /// Bodies with a bound of their own.
+    body_bounds: Vec<(BodyId, f64)>,
+}
+
+impl<'a> GeometricSize<'a> {
+    /// Samples curves and patches for the sources of the field.
+    pub fn new(geometry: &'a Geometry, features: &Features, settings: &SizeSettings) -> Self {
+        let diagonal = features.bounds.diagonal();
+        let maximum =
+            settings.scaled_bound(settings.maxh.unwrap_or(f64::INFINITY)).min(diagonal * settings.scale);
+        let body_bounds: Vec<(BodyId, f64)> = geometry
+            .bodies
+            .iter()
+            .enumerate()
+            .filter_map(|(i, body)| Some((BodyId::new(i), settings.scaled_bound(body.maxh?))))
+            .filter(|(_, bound)| *bound < maximum)
+            .collect();
+        let sampler = Sampler { geometry, features, settings, maximum, body_bounds: &body_bounds };
+        let mut sources = settings.sources.clone();
+        for curve in &features.curves {
+            sampler.sample_curve(curve, &mut sources);
+        }
+        sampler.sample_patches(&mut sources);
+        let tree = SourceTree::new(features.bounds, settings.grading, maximum, &sources);
+        Self { geometry, tree, body_bounds }
+    }
+}
+
+impl SizeField for GeometricSize<'_> {
+    fn size_at(&self, point: &Point) -> f64 {
+        let inside =
+            |body: &BodyId| contains(self.geometry, &self.geometry.bodies[body.index()].solid, point);
+        let size = self.tree.size_at(point);
+        self.body_bounds
+            .iter()
+            .filter(|(body, bound)| *bound < size && inside(body))
+            .fold(size, |size, (_, bound)| size.min(*bound))
+    }
+}
+
+/// Distance of neighbouring samples, as a fraction of the size there: the field between them is then
+/// too large by at most a quarter of the grading.
+const SAMPLE_SPACING: f64 = 0.5;
+
+/// Distance of samples at most, as a fraction of the diagonal, where a surface's curvature varies: what
+/// lies between is not seen.
+const COARSEST_SAMPLE: f64 = 1.0 / 32.0;
+
+/// How far beside a surface a point is taken to tell the regions on both sides, as a fraction of the diagonal.
+const SIDE_STEP: f64 = 1e-6;
+
+struct Sampler<'a> {
+    geometry: &'a Geometry,
+    features: &'a Features,
+    settings: &'a SizeSettings,
+    maximum: f64,
+    body_bounds: &'a [(BodyId, f64)],
+}
+
+impl Sampler<'_> {
+    /// The size that a curvature (1/length) asks for.
+    fn size_of_curvature(&self, curvature: f64) -> f64 {
+        (self.settings.scale / (self.settings.curvature_safety * curvature)).max(self.settings.minh)
+    }
+
+    /// The size that a surface asks for at a point on it.
+    fn size_on(&self, surface: SurfaceId, point: &Point) -> f64 {
+        let bound = self.geometry.surface_info[surface.index()].maxh.unwrap_or(f64::INFINITY);
+        let curvature = self.geometry.surfaces[surface.index()].curvature(point);
+        self.settings.scaled_bound(bound).min(self.size_of_curvature(curvature))
+    }
+
+    /// Sources along a curve: its own curvature, its length, and the surfaces of the patches beside it.
+    fn sample_curve(&self, curve: &Curve, sources: &mut Vec<Source>) {
+        let trace = &curve.trace;
+        let length: f64 = trace.windows(2).map(|w| (w[1] - w[0]).norm()).sum();
+        let whole = (self.settings.scale * length / self.settings.segments_per_curve).max(self.settings.minh);
+        let curvatures = trace_curvatures(trace, curve.ends.is_none());
+        for (i, w) in trace.windows(2).enumerate() {
+            let beside = curve.fins.iter().map(|fin| self.features.patch(fin.patch).surface);
+            let size = beside
+                .map(|surface| self.size_on(surface, &w[0]))
+                .fold(whole.min(self.size_of_curvature(curvatures[i].max(curvatures[i + 1]))), f64::min);
+            if size >= self.maximum {
+                continue;
+            }
+            let pieces = ((w[1] - w[0]).norm() / (SAMPLE_SPACING * size)).ceil().max(1.0) as usize;
+            for piece in 0..=pieces {
+                let point = w[0] + (w[1] - w[0]) * (piece as f64 / pieces as f64);
+                sources.push(Source { point, size });
+            }
+        }
+    }
+
+    /// Sources on the patches whose size is below the maximum: cells around the surfaces are split until
+    /// they are small against the size, and hold one source each.
+    fn sample_patches(&self, sources: &mut Vec<Source>) {
+        let mut surfaces: Vec<SurfaceId> = self.features.patches.iter().map(|p| p.surface).collect();
+        surfaces.sort_unstable();
+        surfaces.dedup();
+        let bounds = &self.features.bounds;
+        // Room around it, so that no patch lies on the rim of the outermost cell.
+        let edge = 1.02 * (bounds.max - bounds.min).max();
+        let min = bounds.center() - Vector::repeat(0.5 * edge);
+        for surface in surfaces {
+            self.sample_cell(surface, min, edge, sources);
+        }
+    }
+
+    fn sample_cell(&self, surface: SurfaceId, min: Point, edge: f64, sources: &mut Vec<Source>) {
+        let shape = &self.geometry.surfaces[surface.index()];
+        let cell = [0, 1, 2].map(|axis| Interval { lo: min[axis], hi: min[axis] + edge });
+        let range = shape.value_range(&cell);
+        if range.lo > 0.0 || range.hi < 0.0 {
+            return;
+        }
+        let center = min + Vector::repeat(0.5 * edge);
+        let Ok(point) = shape.project(&center) else {
+            return self.split_cell(surface, min, edge, sources);
+        };
+        if (point - center).norm() > edge {
+            return;
+        }
+        let own = self.size_on(surface, &point).min(self.least_body_bound());
+        let constant = self.constant_size(surface);
+        if own >= self.maximum && constant {
+            return;
+        }
+        let coarsest =
+            if constant { f64::INFINITY } else { COARSEST_SAMPLE * self.features.bounds.diagonal() };
+        if edge > coarsest.min(SAMPLE_SPACING * own) {
+            return self.split_cell(surface, min, edge, sources);
+        }
+        if let Some(size) = self.size_of_sample(surface, &point) {
+            sources.push(Source { point, size });
+        }
+    }
+
+    fn split_cell(&self, surface: SurfaceId, min: Point, edge: f64, sources: &mut Vec<Source>) {
+        // Where a surface is singular (apex of a cone) the size there is nearly zero: no cell is worth going on.
+        if edge < 1e-3 * self.features.bounds.diagonal() * self.settings.scale.min(1.0) {
+            return;
+        }
+        for child in 0..8 {
+            let offset = Vector::from_fn(|axis, _| if child >> axis & 1 == 1 { 0.5 * edge } else { 0.0 });
+            self.sample_cell(surface, min + offset, 0.5 * edge, sources);
+        }
+    }
+
+    fn least_body_bound(&self) -> f64 {
+        self.body_bounds.iter().map(|(_, bound)| *bound).fold(f64::INFINITY, f64::min)
+    }
+
+    /// Whether the size is the same all over a surface, so that one look tells.
+    fn constant_size(&self, surface: SurfaceId) -> bool {
+        matches!(
+            self.geometry.surfaces[surface.index()],
+            csg::Surface::Plane(_) | csg::Surface::Sphere(_) | csg::Surface::Cylinder(_)
+        )
+    }
+
+    /// The size at a point of a surface, if a patch is there.
+    fn size_of_sample(&self, surface: SurfaceId, point: &Point) -> Option<f64> {
+        let step = SIDE_STEP * self.features.bounds.diagonal();
+        let normal = self.geometry.surfaces[surface.index()].normal(point);
+        let sides = [point - step * normal, point + step * normal].map(|p| body_at(self.geometry, &p));
+        if sides[0] == sides[1] {
+            return None;
+        }
+        let bounds = self.body_bounds.iter().filter(|(body, _)| sides.contains(&Some(*body)));
+        let size = bounds.map(|(_, b)| *b).fold(self.size_on(surface, point), f64::min);
+        (size < self.maximum).then_some(size)
+    }
+}
+
+fn contains(geometry: &Geometry, solid: &Solid, point: &Point) -> bool {
+    solid.holds(&|surface| geometry.surfaces[surface.index()].value(point) > 0.0)
+}
+
+fn body_at(geometry: &Geometry, point: &Point) -> Option<BodyId> {
+    geometry.bodies.iter().position(|b| contains(geometry, &b.solid, point)).map(BodyId::new)
+}
+
+/// Curvature at each point of a trace: that of the circle through it and its neighbours.
+fn trace_curvatures(trace: &[Point], closed: bool) -> Vec<f64> {
+    let last = trace.len() - 1;
+    let at = |i: usize| {
+        let (before, after) = match i {
+            0 if closed => (last - 1, 1),
+            _ if i == last && closed => (last - 1, 1),
+            0 => (0, 1),
+            _ if i == last => (last - 1, last),
+            _ => (i - 1, i + 1),
+        };
+        let (u, v) = (trace[i] - trace[before], trace[after] - trace[i]);
+        let w = trace[after] - trace[before];
+        let product = u.norm() * v.norm() * w.norm();
+        if product > 0.0 { 2.0 * u.cross(&v).norm() / product } else { 0.0 }
+    };
+    (0..=last).map(at).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_circle_has_the_curvature_of_its_radius() {
+        let trace: Vec<Point> = (0..=32)
+            .map(|i| f64::from(i % 32) * std::f64::consts::TAU / 32.0)
+            .map(|a| Point::new(2.0 * a.cos(), 2.0 * a.sin(), 1.0))
+            .collect();
+        for curvature in trace_curvatures(&trace, true) {
+            assert!((curvature - 0.5).abs() < 1e-9, "{curvature}");
+        }
+    }
+
+    #[test]
+    fn a_straight_trace_of_two_points_has_no_curvature() {
+        let trace = [Point::new(0., 0., 0.), Point::new(1., 0., 0.)];
+        assert_eq!(trace_curvatures(&trace, false), [0.0, 0.0]);
+    }
+}

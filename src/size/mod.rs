@@ -1,0 +1,31 @@
+//! Target edge length anywhere.
+//!
+//! The wanted size is the smallest of a global bound and of **sources**: places where geometry or user
+//! ask for a size, from where it may grow by the **grading** per unit of distance. The field is therefore
+//! Lipschitz: `|size(p) − size(q)| ≤ grading·|p − q|`, except across a body's own bound.
+
+mod geometric;
+mod preset;
+mod source_tree;
+
+pub use geometric::{GeometricSize, SizeSettings};
+pub use preset::Preset;
+pub use source_tree::{Source, SourceTree};
+
+use crate::Point;
+
+/// Gives the target edge length at any point.
+pub trait SizeField: Sync {
+    /// The wanted edge length at `point`, positive and finite.
+    fn size_at(&self, point: &Point) -> f64;
+}
+
+/// The same size everywhere.
+#[derive(Clone, Copy, Debug)]
+pub struct UniformSize(pub f64);
+
+impl SizeField for UniformSize {
+    fn size_at(&self, _: &Point) -> f64 {
+        self.0
+    }
+}

@@ -1,0 +1,96 @@
+//! The named fineness levels that NETGEN's users know, with NETGEN's numbers.
+
+/// A named fineness.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Preset {
+    /// Curvature radius × 1, grading 0.7.
+    VeryCoarse,
+    /// Curvature radius / 1.5, grading 0.5.
+    Coarse,
+    /// Curvature radius / 2, grading 0.3.
+    #[default]
+    Moderate,
+    /// Curvature radius / 3, grading 0.2.
+    Fine,
+    /// Curvature radius / 5, grading 0.1.
+    VeryFine,
+}
+
+impl Preset {
+    /// All, from coarse to fine, with their names.
+    pub const ALL: [(Self, &str); 5] = [
+        (Self::VeryCoarse, "very-coarse"),
+        (Self::Coarse, "coarse"),
+        (Self::Moderate, "moderate"),
+        (Self::Fine, "fine"),
+        (Self::VeryFine, "very-fine"),
+    ];
+
+    /// Elements per radius of curvature: the size there is `1 / (safety · curvature)`.
+    pub fn curvature_safety(self) -> f64 {
+        match self {
+            Self::VeryCoarse => 1.0,
+            Self::Coarse => 1.5,
+            Self::Moderate => 2.0,
+            Self::Fine => 3.0,
+            Self::VeryFine => 5.0,
+        }
+    }
+
+    /// The least number of segments wanted on a curve.
+    pub fn segments_per_curve(self) -> f64 {
+        match self {
+            Self::VeryCoarse => 0.3,
+            Self::Coarse => 0.5,
+            Self::Moderate => 1.0,
+            Self::Fine => 2.0,
+            Self::VeryFine => 3.0,
+        }
+    }
+
+    /// Growth of the size per unit of distance.
+    pub fn grading(self) -> f64 {
+        match self {
+            Self::VeryCoarse => 0.7,
+            Self::Coarse => 0.5,
+            Self::Moderate => 0.3,
+            Self::Fine => 0.2,
+            Self::VeryFine => 0.1,
+        }
+    }
+}
+
+impl std::str::FromStr for Preset {
+    type Err = String;
+
+    /// Hyphens and underscores are the same.
+    fn from_str(name: &str) -> Result<Self, String> {
+        let name = name.replace('_', "-");
+        Self::ALL
+            .iter()
+            .find(|(_, n)| *n == name)
+            .map(|(preset, _)| *preset)
+            .ok_or_else(|| format!("no preset `{name}`; there are {}", Self::ALL.map(|(_, n)| n).join(", ")))
+    }
+}
+
+impl std::fmt::Display for Preset {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let name = Self::ALL.iter().find(|(preset, _)| preset == self).map_or("", |(_, name)| name);
+        f.write_str(name)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_preset_is_found_by_either_spelling() {
+        assert_eq!("very_fine".parse(), Ok(Preset::VeryFine));
+        assert_eq!("very-fine".parse(), Ok(Preset::VeryFine));
+        assert_eq!(Preset::VeryCoarse.to_string(), "very-coarse");
+        assert!("finest".parse::<Preset>().unwrap_err().contains("very-coarse"));
+    }
+}

@@ -1,0 +1,471 @@
+//! Flat pictures of surfaces in which orientation is decided exactly.
+//!
+//! A **chart** gives each point of a surface a **site**, a few numbers, such that the triangle of three sites has
+//! an exact sign. What is an embedded triangulation in the chart is one on the surface, however coarse: all
+//! decisions about topology are taken here, all about shape and size in space.
+//!
+//! * **Flat** (planes): coordinates in a fixed orthonormal frame of the plane.
+//! * **Central** (spheres, ellipsoids): directions from the centre; edges are great circles, and chords of the
+//!   surface project to them exactly, so the sign is that of a tet with the centre.
+//! * **Unrolled** (cylinders, one nappe of a cone, tori): the turn about the axis, kept in multiples of 2⁻⁵⁰ so that
+//!   differences modulo one turn are exact, and a height; with two symbolic **poles** infinitely far up and down,
+//!   one of which is the apex of a cone. On the torus the height is a turn too.
+
+use crate::kernel::predicates::{Sign, orient2d, orient3d};
+use crate::{Point, Vector};
+use csg::Surface;
+use std::f64::consts::TAU;
+
+/// Where a point lies in a chart.
+///
+/// Flat: x, y, 0. Central: direction and length in half-axes. Unrolled: turn, height, and −1, 0 or 1 for the lower
+/// pole, a point, the upper pole.
+pub(super) type Site = [f64; 3];
+
+/// The grid of turns: 2⁵⁰ per turn. Sums of two are exact, and no two vertices of a mesh are so near.
+const TURN_GRID: f64 = (1_u64 << 50) as f64;
+
+/// A flat picture of one connected sheet of a surface.
+#[derive(Clone, Debug)]
+pub(super) struct Chart {
+    origin: Point,
+    axes: [Vector; 3],
+    radii: [f64; 3],
+    shape: Shape,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Shape {
+    Flat,
+    Central,
+    /// The height is the coordinate along the axis.
+    Straight,
+    /// Radii grow as `1 + rate·height`, which has the sign of `nappe` here.
+    Conic {
+        rate: f64,
+        nappe: f64,
+    },
+    /// A torus with these radii.
+    Around {
+        major: f64,
+    },
+}
+
+/// What the triangulation of a whole sheet begins with.
+pub(super) struct Start {
+    /// The sites of its vertices.
+    pub sites: Vec<Site>,
+    /// Its triangles, counter-clockwise.
+    pub triangles: Vec<[u32; 3]>,
+}
+
+/// Which sheets a surface has: one, but the two nappes of a cone.
+pub(super) fn sheets(surface: &Surface) -> &'static [f64] {
+    match surface {
+        Surface::Cone(_) | Surface::EllipticCone(_) => &[1.0, -1.0],
+        _ => &[1.0],
+    }
+}
+
+/// The nappe of a cone on which a point lies: 1 or −1, or 0 for the apex (within rounding); 1 for other surfaces.
+pub(super) fn nappe(surface: &Surface, point: &Point) -> f64 {
+    let (along, apex) = match surface {
+        Surface::Cone(c) => (c.axis * c.slope.signum(), c.apex()),
+        Surface::EllipticCone(c) => (c.axis * c.rate.signum(), c.apex()),
+        _ => return 1.0,
+    };
+    if is_apex(surface, point) { 0.0 } else { (point - apex).dot(&along).signum() }
+}
+
+/// Whether a point is the apex of the cone, within the rounding of its coordinates.
+fn is_apex(surface: &Surface, point: &Point) -> bool {
+    /// The apex is computed from the parameters; features find it by Newton's method: both are off by some ulp.
+    const APEX: f64 = 1e-10;
+    let (apex, length) = match surface {
+        Surface::Cone(c) => (c.apex(), c.radius.abs().max((c.radius / c.slope).abs())),
+        Surface::EllipticCone(c) => (c.apex(), c.radii[0].max(c.radii[1]).max(1.0 / c.rate.abs())),
+        _ => return false,
+    };
+    (point - apex).norm() <= APEX * (length + apex.coords.amax())
+}
+
+impl Chart {
+    /// The chart of a surface; of a cone, that of the nappe where the radius has the sign of `nappe`.
+    pub fn new(surface: &Surface, nappe: f64) -> Self {
+        let round = |origin: Point, axis: &Vector, radius: f64, shape| {
+            let [x, y] = frame(axis);
+            Self { origin, axes: [x, y, *axis], radii: [radius, radius, 1.0], shape }
+        };
+        match surface {
+            Surface::Plane(p) => {
+                let [x, y] = frame(&p.normal);
+                Self { origin: Point::origin(), axes: [x, y, p.normal], radii: [1.0; 3], shape: Shape::Flat }
+            }
+            Surface::Sphere(s) => Self {
+                origin: s.center,
+                axes: [Vector::x(), Vector::y(), Vector::z()],
+                radii: [s.radius; 3],
+                shape: Shape::Central,
+            },
+            Surface::Ellipsoid(e) => {
+                let [x, y, z] = e.axes;
+                // Right-handed, so that orientation is as seen from outside.
+                let z = if x.cross(&y).dot(&z) < 0.0 { -z } else { z };
+                Self { origin: e.center, axes: [x, y, z], radii: e.radii, shape: Shape::Central }
+            }
+            Surface::Cylinder(c) => round(c.point, &c.axis, c.radius, Shape::Straight),
+            Surface::EllipticCylinder(c) => Self {
+                origin: c.point,
+                axes: [c.axes[0], c.axes[1], c.axis()],
+                radii: [c.radii[0], c.radii[1], 1.0],
+                shape: Shape::Straight,
+            },
+            Surface::Cone(c) => {
+                round(c.point, &c.axis, c.radius, Shape::Conic { rate: c.slope / c.radius, nappe })
+            }
+            Surface::EllipticCone(c) => {
+                let [x, y] = c.axes;
+                let y = if x.cross(&y).dot(&c.axis) < 0.0 { -y } else { y };
+                Self {
+                    origin: c.point,
+                    axes: [x, y, c.axis],
+                    radii: [c.radii[0], c.radii[1], 1.0],
+                    shape: Shape::Conic { rate: c.rate, nappe },
+                }
+            }
+            Surface::Torus(t) => round(t.center, &t.axis, t.minor, Shape::Around { major: t.major }),
+        }
+    }
+
+    /// Whether it is flat: sites are plane coordinates.
+    pub fn is_flat(&self) -> bool {
+        self.shape == Shape::Flat
+    }
+
+    /// Whether its surface is closed, so that vertices of a start are points of it.
+    pub fn is_closed(&self) -> bool {
+        matches!(self.shape, Shape::Central | Shape::Around { .. })
+    }
+
+    /// Whether a site is a pole.
+    pub fn is_pole(&self, site: &Site) -> bool {
+        matches!(self.shape, Shape::Straight | Shape::Conic { .. }) && site[2] != 0.0
+    }
+
+    /// The pole that stands for the apex of a cone: 1 above, −1 below.
+    fn apex_pole(&self) -> f64 {
+        match self.shape {
+            Shape::Conic { rate, nappe } => -(rate * nappe).signum(),
+            _ => 0.0,
+        }
+    }
+
+    /// The site of a point of the surface.
+    pub fn site(&self, surface: &Surface, point: &Point) -> Site {
+        let arm = point - self.origin;
+        let [x, y, z] = [0, 1, 2].map(|i| arm.dot(&self.axes[i]) / self.radii[i]);
+        match self.shape {
+            Shape::Flat => [x, y, 0.0],
+            Shape::Central => [x, y, z],
+            Shape::Straight => [turn(x, y), z, 0.0],
+            Shape::Conic { .. } if is_apex(surface, point) => [0.0, 0.0, self.apex_pole()],
+            // The logarithm keeps angles; its sign lets the coordinate grow along the axis on both nappes.
+            Shape::Conic { rate, nappe } => [turn(x, y), (rate * nappe).signum() * x.hypot(y).ln(), 0.0],
+            Shape::Around { major } => {
+                let radial = x.hypot(y) - major / self.radii[0];
+                [turn(x, y), turn(radial, z / self.radii[0]), 0.0]
+            }
+        }
+    }
+
+    /// The sign of the triangle of three sites, counter-clockwise positive as seen from where the gradient points.
+    /// Negative too where three sites enclose no triangle because their edges together go round the axis.
+    pub fn orient(&self, a: &Site, b: &Site, c: &Site) -> Sign {
+        match self.shape {
+            Shape::Flat => orient2d([a[0], a[1]], [b[0], b[1]], [c[0], c[1]]),
+            Shape::Central => orient3d(&Point::origin(), &(*a).into(), &(*b).into(), &(*c).into()),
+            Shape::Around { .. } => {
+                let [(x1, y1), (x2, y2), (x3, y3)] =
+                    [(a, b), (a, c), (b, c)].map(|(p, q)| (wrap(q[0] - p[0]), wrap(q[1] - p[1])));
+                let wide = [x1, x2, x3, y1, y2, y3].iter().any(|d| d.abs() >= 0.5);
+                if wide || x2 - x1 != x3 || y2 - y1 != y3 {
+                    return Sign::Negative;
+                }
+                orient2d([0.0, 0.0], [x1, y1], [x2, y2])
+            }
+            Shape::Straight | Shape::Conic { .. } => match [a[2], b[2], c[2]] {
+                [0.0, 0.0, 0.0] => {
+                    let [x1, x2, x3] = [(a, b), (a, c), (b, c)].map(|(p, q)| wrap(q[0] - p[0]));
+                    if [x1, x2, x3].iter().any(|d| d.abs() >= 0.5) || x2 - x1 != x3 {
+                        return Sign::Negative;
+                    }
+                    orient2d([0.0, a[1]], [x1, b[1]], [x2, c[1]])
+                }
+                [0.0, 0.0, pole] => with_pole(a, b, pole),
+                [0.0, pole, 0.0] => with_pole(c, a, pole),
+                [pole, 0.0, 0.0] => with_pole(b, c, pole),
+                _ => Sign::Negative,
+            },
+        }
+    }
+
+    /// Whether `x`, on the line through `a` and `b`, lies on the same side of `a` as `b`.
+    pub fn ahead(&self, a: &Site, b: &Site, x: &Site) -> bool {
+        match self.shape {
+            Shape::Flat => (b[0] - a[0]) * (x[0] - a[0]) + (b[1] - a[1]) * (x[1] - a[1]) > 0.0,
+            Shape::Central => {
+                let [a, b, x] = [a, b, x].map(|s| Vector::from(*s));
+                a.cross(&b).dot(&a.cross(&x)) > 0.0
+            }
+            Shape::Around { .. } => {
+                let step = |p: &Site| [wrap(p[0] - a[0]), wrap(p[1] - a[1])];
+                let ([b0, b1], [x0, x1]) = (step(b), step(x));
+                b0 * x0 + b1 * x1 > 0.0
+            }
+            Shape::Straight | Shape::Conic { .. } => {
+                if a[2] != 0.0 {
+                    return true;
+                }
+                let step = |p: &Site| {
+                    if p[2] == 0.0 { [wrap(p[0] - a[0]), p[1] - a[1]] } else { [0.0, p[2]] }
+                };
+                let ([b0, b1], [x0, x1]) = (step(b), step(x));
+                b0 * x0 + b1 * x1 > 0.0
+            }
+        }
+    }
+
+    /// A triangulation that covers the whole sheet, to insert vertices into; none for a flat chart.
+    ///
+    /// `heights` is the range of heights of what will be inserted. Different `attempt`s have their vertices at
+    /// different places, should one be in the way.
+    pub fn start(&self, heights: [f64; 2], attempt: u32) -> Start {
+        // Irrational fractions keep the start off the places that people put things at.
+        let shift = (0.137_213_1 + f64::from(attempt) * 0.618_033_988_749).fract();
+        match self.shape {
+            Shape::Flat => Start { sites: Vec::new(), triangles: Vec::new() },
+            Shape::Central => icosahedron(shift),
+            Shape::Around { major } => torus_grid(shift, major / self.radii[0]),
+            Shape::Straight | Shape::Conic { .. } => {
+                let margin = 1.0 + (heights[1] - heights[0]);
+                let apex = self.apex_pole();
+                let height = if apex < 0.0 { heights[1] + margin } else { heights[0] - margin };
+                bipyramid(height, shift, apex)
+            }
+        }
+    }
+
+    /// The point of the surface at a site, within rounding; `None` for a site of a flat chart or a pole.
+    pub fn point(&self, site: &Site) -> Option<Point> {
+        let round = |radius: f64| {
+            let (sin, cos) = (TAU * site[0]).sin_cos();
+            [radius * cos, radius * sin]
+        };
+        let [x, y, z] = match self.shape {
+            Shape::Flat => return None,
+            Shape::Central => *site,
+            Shape::Around { major } => {
+                let (sin, cos) = (TAU * site[1]).sin_cos();
+                let [x, y] = round(major / self.radii[0] + cos);
+                [x, y, sin * self.radii[0]]
+            }
+            _ if site[2] != 0.0 => return None,
+            Shape::Straight => {
+                let [x, y] = round(1.0);
+                [x, y, site[1]]
+            }
+            Shape::Conic { rate, nappe } => {
+                let radius = ((rate * nappe).signum() * site[1]).exp();
+                let [x, y] = round(radius);
+                [x, y, (nappe * radius - 1.0) / rate]
+            }
+        };
+        Some(
+            self.origin
+                + self.axes[0] * (x * self.radii[0])
+                + self.axes[1] * (y * self.radii[1])
+                + self.axes[2] * (z * self.radii[2]),
+        )
+    }
+
+    /// The point of the surface in the middle of an edge of the chart, within rounding; `None` where
+    /// [`point`](Self::point) has none.
+    pub fn middle(&self, a: &Site, b: &Site) -> Option<Point> {
+        if self.is_pole(a) || self.is_pole(b) {
+            return None;
+        }
+        let half = |i: usize| a[i] + 0.5 * wrap(b[i] - a[i]);
+        self.point(&match self.shape {
+            Shape::Flat => return None,
+            Shape::Central => {
+                let direction = (Vector::from(*a) + Vector::from(*b)).try_normalize(0.0)?;
+                [direction.x, direction.y, direction.z]
+            }
+            Shape::Around { .. } => [half(0), half(1), 0.0],
+            Shape::Straight | Shape::Conic { .. } => [half(0), 0.5 * (a[1] + b[1]), 0.0],
+        })
+    }
+}
+
+/// The sign of the triangle a, b and a pole.
+fn with_pole(a: &Site, b: &Site, pole: f64) -> Sign {
+    let across = wrap(b[0] - a[0]);
+    if across.abs() >= 0.5 {
+        return Sign::Negative;
+    }
+    orient2d([0.0, 0.0], [across, 0.0], [0.0, pole])
+}
+
+/// A turn difference brought to −1/2 … 1/2; exact for multiples of the grid.
+fn wrap(turns: f64) -> f64 {
+    turns - turns.round()
+}
+
+/// The angle of (x, y) in turns from 0 to 1, on the grid.
+fn turn(x: f64, y: f64) -> f64 {
+    let turns = ((y.atan2(x) / TAU).rem_euclid(1.0) * TURN_GRID).round() / TURN_GRID;
+    if turns >= 1.0 { 0.0 } else { turns }
+}
+
+/// Two unit vectors that form a right-handed frame with a unit normal; coordinate axes where the normal is one.
+fn frame(normal: &Vector) -> [Vector; 2] {
+    let k = if normal.x.abs() < 0.6 { 0 } else { 1 };
+    let mut x = Vector::zeros();
+    x[k] = 1.0;
+    let x = (x - normal * normal[k]).normalize();
+    [x, normal.cross(&x)]
+}
+
+/// A ring of four vertices that marks the outside, between the two poles; vertex 4 is the pole of an apex if any.
+fn bipyramid(height: f64, shift: f64, apex: f64) -> Start {
+    let on_grid = |t: f64| (t.fract() * TURN_GRID).floor() / TURN_GRID;
+    let mut sites: Vec<Site> = (0..4).map(|k| [on_grid(shift + f64::from(k) * 0.25), height, 0.0]).collect();
+    let first = if apex == 0.0 { -1.0 } else { apex };
+    sites.push([0.0, 0.0, first]);
+    sites.push([0.0, 0.0, -first]);
+    let (up, down) = if first > 0.0 { (4, 5) } else { (5, 4) };
+    let triangles = (0..4).flat_map(|k| [[k, (k + 1) % 4, up], [(k + 1) % 4, k, down]]).collect();
+    Start { sites, triangles }
+}
+
+/// Rows of vertices around the axis, four of them around the tube, shifted against each other by half a step; as many in
+/// a row as make the triangles about as long as they are wide.
+fn torus_grid(shift: f64, ratio: f64) -> Start {
+    /// Nobody needs more; a tube thinner than that is cut where it matters.
+    const MOST: f64 = 10_000.0;
+    let on_grid = |t: f64| (t.fract() * TURN_GRID).floor() / TURN_GRID;
+    let count = (2.0 * (ratio + 1.0)).ceil().clamp(4.0, MOST) as u32;
+    let sites = (0..4 * count)
+        .map(|k| {
+            let (i, j) = (k % count, k / count);
+            let along = (f64::from(i) + 0.5 * f64::from(j % 2)) / f64::from(count);
+            [on_grid(shift + along), on_grid(0.7 * shift + f64::from(j) * 0.25), 0.0]
+        })
+        .collect();
+    let at = |i: u32, j: u32| (i % count) + count * (j % 4);
+    let mut triangles = Vec::new();
+    for j in 0..4 {
+        for i in 0..count {
+            // Odd rows stand half a step to the right.
+            let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i, j + 1), at(i + 1, j + 1)];
+            triangles.extend(if j % 2 == 0 { [[a, b, c], [b, d, c]] } else { [[a, d, c], [a, b, d]] });
+        }
+    }
+    Start { sites, triangles }
+}
+
+/// The icosahedron, turned.
+fn icosahedron(shift: f64) -> Start {
+    let g = 0.5 * (1.0 + 5.0_f64.sqrt());
+    let turned = nalgebra::Rotation3::from_euler_angles(TAU * shift, 1.0 + shift, 2.0 - shift);
+    let base = [[0.0, 1.0, g], [1.0, g, 0.0], [g, 0.0, 1.0]];
+    let mut corners: Vec<Vector> = Vec::new();
+    for [x, y, z] in base {
+        for (s, t) in [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)] {
+            // The zero coordinate keeps its place; the other two take both signs.
+            let v = if x == 0.0 {
+                [0.0, s * y, t * z]
+            } else if z == 0.0 {
+                [s * x, t * y, 0.0]
+            } else {
+                [s * x, 0.0, t * z]
+            };
+            corners.push(turned * (Vector::from(v) / (1.0 + g * g).sqrt()));
+        }
+    }
+    // Faces are the triples at mutual edge distance 2/√(1+g²), outward by the sign of their determinant.
+    let edge = 4.0 / (1.0 + g * g);
+    let close = |a: usize, b: usize| (corners[a] - corners[b]).norm_squared() < 1.2 * edge;
+    let mut triangles = Vec::new();
+    for a in 0..12 {
+        for b in a + 1..12 {
+            for c in b + 1..12 {
+                if close(a, b) && close(b, c) && close(c, a) {
+                    let outward = corners[a].dot(&corners[b].cross(&corners[c])) > 0.0;
+                    let [b, c] = if outward { [b, c] } else { [c, b] };
+                    triangles.push([a as u32, b as u32, c as u32]);
+                }
+            }
+        }
+    }
+    Start { sites: corners.iter().map(|v| [v.x, v.y, v.z]).collect(), triangles }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use csg::primitive::{Cone, Cylinder, Sphere, Torus};
+
+    fn surfaces() -> Vec<Surface> {
+        let axis = Vector::new(1.0, 2.0, -0.5).normalize();
+        let point = Point::new(0.3, 0.1, 0.2);
+        vec![
+            Surface::Sphere(Sphere { center: point, radius: 2.0 }),
+            Surface::Cylinder(Cylinder { point, axis, radius: 0.7 }),
+            Surface::Cone(Cone { point, axis, radius: 0.7, slope: 0.4 }),
+            Surface::Cone(Cone { point, axis, radius: 0.7, slope: -0.4 }),
+            Surface::Torus(Torus { center: point, axis, major: 2.0, minor: 0.5 }),
+        ]
+    }
+
+    #[test]
+    fn a_start_has_only_positive_triangles_and_is_closed() {
+        for surface in surfaces() {
+            let chart = Chart::new(&surface, 1.0);
+            for attempt in 0..3 {
+                let start = chart.start([0.0, 1.0], attempt);
+                for t in &start.triangles {
+                    let [a, b, c] = t.map(|v| start.sites[v as usize]);
+                    assert_eq!(chart.orient(&a, &b, &c), Sign::Positive, "{surface:?} {t:?}");
+                }
+                let edges = |t: &[u32; 3]| [[t[0], t[1]], [t[1], t[2]], [t[2], t[0]]];
+                let all: Vec<_> = start.triangles.iter().flat_map(edges).collect();
+                assert!(all.iter().all(|&[a, b]| all.contains(&[b, a])));
+            }
+        }
+    }
+
+    #[test]
+    fn a_small_triangle_turns_in_the_chart_as_it_does_in_space() {
+        for surface in surfaces() {
+            for k in 0..40 {
+                let t = f64::from(k);
+                let near =
+                    Point::new(0.3 + t.sin() * 2.0, 0.1 + (2.3 * t).cos(), 0.2 + (1.7 * t).sin() * 0.9);
+                let Ok(a) = surface.project(&near) else { continue };
+                let n = surface.normal(&a);
+                let [x, y] = frame(&n);
+                let [b, c] = [x, y].map(|d| surface.project(&(a + d * 1e-3)).expect("near the surface"));
+                let chart = Chart::new(&surface, nappe(&surface, &a));
+                let [a, b, c] = [a, b, c].map(|p| chart.site(&surface, &p));
+                assert_eq!(chart.orient(&a, &b, &c), Sign::Positive, "{surface:?} at {near}");
+                assert_ne!(chart.orient(&a, &c, &b), Sign::Positive);
+                let back = chart.point(&b).expect("a point that is no pole");
+                assert_eq!(chart.orient(&a, &b, &c), Sign::Positive);
+                assert!((surface.project(&back).expect("near the surface") - back).norm() < 1e-12);
+                let middle = chart.middle(&a, &b).expect("no poles");
+                assert!(surface.distance(&middle) < 1e-12, "{surface:?}");
+            }
+        }
+    }
+}

@@ -1,0 +1,567 @@
+//! Each patch with its part of the segments: meshed by itself, and all put together.
+
+use super::chart::{Chart, nappe, sheets};
+use super::condition::condition;
+use super::embed::{Conflict, Fault, embed};
+use super::front::{Advanced, advance};
+use super::improve::{Improved, improve, repair_flattening};
+use super::sheet::{Kind, Node, Piece, Sheet, Stop};
+use super::topology::NONE;
+use super::{PatchReport, Report, Settings, SurfaceMesh};
+use crate::kernel::simplex::area_vector;
+use crate::mesh::{BoundaryTriangle, Class, VertexId};
+use crate::size::SizeField;
+use crate::{Point, Vector};
+use csg::{CurveId, Features, Geometry, PatchId, ProjectionFailed, Surface};
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// Why a patch could not be meshed. Segments are indices into [`SurfaceMesh::segments`].
+#[derive(Clone, Debug, thiserror::Error)]
+pub enum SurfaceError {
+    /// Segments are too long for their surroundings: they cross each other, run over vertices, or span about half a turn
+    /// of the surface. Cut finer, they do not.
+    #[error("on patch {} the segments of curve {} are too long near ({}, {}, {}){}: cut them finer there",
+        .patch.0, .curve.0, .at.x, .at.y, .at.z,
+        .other.map_or(String::new(), |c| format!(", where they cross those of curve {}", c.0)))]
+    TooCoarse {
+        /// The patch, the first if there are several.
+        patch: PatchId,
+        /// The curve of a segment.
+        curve: CurveId,
+        /// The curve that it crosses, if so.
+        other: Option<CurveId>,
+        /// The middle of the segment.
+        at: Point,
+        /// All segments that are too long, on all patches, ascending.
+        segments: Vec<usize>,
+    },
+    /// Two vertices are at the same place.
+    #[error("patch {} has two vertices at ({}, {}, {})", .patch.0, .at.x, .at.y, .at.z)]
+    Coincident {
+        /// The patch.
+        patch: PatchId,
+        /// The place.
+        at: Point,
+    },
+    /// The curves contradict each other on which side of a curve the patch lies.
+    #[error("the boundary of patch {} says of curve {} near ({}, {}, {}) that the patch is on the wrong side",
+        .patch.0, .curve.0, .at.x, .at.y, .at.z)]
+    BothSides {
+        /// The patch.
+        patch: PatchId,
+        /// The curve.
+        curve: CurveId,
+        /// The middle of one of its segments.
+        at: Point,
+    },
+    /// The boundary does not enclose the patch.
+    #[error("the boundary curves of patch {} do not enclose it", .0.0)]
+    NotEnclosed(PatchId),
+    /// Coordinates that are too large or no numbers.
+    #[error("patch {} has vertices with coordinates that are too large or no numbers", .0.0)]
+    NotNumbers(PatchId),
+    /// A point of the patch has no projection.
+    #[error("on patch {}: {source}", .patch.0)]
+    Projection {
+        /// The patch.
+        patch: PatchId,
+        /// The point.
+        source: ProjectionFailed,
+    },
+    /// The size field is not positive and finite.
+    #[error("the mesh size at ({}, {}, {}) on patch {} is {size}", .at.x, .at.y, .at.z, .patch.0)]
+    BadSize {
+        /// The patch.
+        patch: PatchId,
+        /// Where.
+        at: Point,
+        /// What the size field gave.
+        size: f64,
+    },
+    /// The size field asks for more vertices than allowed.
+    #[error("patch {} needs more than {limit} vertices: the mesh size is too small for it", .patch.0)]
+    TooManyVertices {
+        /// The patch.
+        patch: PatchId,
+        /// The most allowed.
+        limit: usize,
+    },
+}
+
+/// A meshed patch: new vertices, and triangles in local numbers.
+struct Meshed {
+    /// For the first local vertices the vertex of the input; the others are new.
+    inputs: Vec<u32>,
+    points: Vec<Point>,
+    triangles: Vec<[u32; 3]>,
+    report: PatchReport,
+}
+
+/// Fills all patches with triangles.
+///
+/// `curves` has the vertices on corners and curves and the segments, and keeps them unchanged; the vertices on
+/// patches follow, patch by patch. Patches are meshed in parallel, with the same result for any number of threads.
+///
+/// # Errors
+/// The first patch, by number, that could not be meshed, and where.
+pub fn mesh_patches(
+    geometry: &Geometry,
+    features: &Features,
+    curves: SurfaceMesh,
+    size: &dyn SizeField,
+    settings: &Settings,
+) -> Result<(SurfaceMesh, Report), SurfaceError> {
+    let input = Input::new(geometry, features, &curves, size, settings);
+    let meshed: Vec<Result<Meshed, SurfaceError>> =
+        (0..features.patches.len()).into_par_iter().map(|p| input.mesh(PatchId::new(p))).collect();
+    let too_long: Vec<usize> = all_too_long(&meshed);
+    let mut out = curves;
+    let mut report = Report::default();
+    for (p, meshed) in meshed.into_iter().enumerate() {
+        let Meshed { inputs, points, triangles, report: of_patch } = meshed.map_err(|error| match error {
+            SurfaceError::TooCoarse { patch, curve, other, at, .. } => {
+                SurfaceError::TooCoarse { patch, curve, other, at, segments: too_long.clone() }
+            }
+            error => error,
+        })?;
+        let patch = PatchId::new(p);
+        let first = out.points.len();
+        let number = |v: u32| match inputs.get(v as usize) {
+            Some(&input) => VertexId(input),
+            None => VertexId::new(first + v as usize - inputs.len()),
+        };
+        out.triangles.extend(triangles.iter().map(|t| BoundaryTriangle { vertices: t.map(number), patch }));
+        out.classes.extend(points.iter().map(|_| Class::Patch(patch)));
+        out.points.extend(points);
+        report.patches.push(of_patch);
+    }
+    Ok((out, report))
+}
+
+/// The segments that are too long on any patch, ascending.
+fn all_too_long(meshed: &[Result<Meshed, SurfaceError>]) -> Vec<usize> {
+    let mut all: Vec<usize> = meshed
+        .iter()
+        .filter_map(|m| match m {
+            Err(SurfaceError::TooCoarse { segments, .. }) => Some(segments),
+            _ => None,
+        })
+        .flatten()
+        .copied()
+        .collect();
+    all.sort_unstable();
+    all.dedup();
+    all
+}
+
+/// What all patches are made of.
+struct Input<'a> {
+    geometry: &'a Geometry,
+    features: &'a Features,
+    curves: &'a SurfaceMesh,
+    size: &'a dyn SizeField,
+    settings: &'a Settings,
+    /// By curve: its segments.
+    ranges: Vec<Range<usize>>,
+    /// By segment: the directions of the curve at its ends, into the segment.
+    tangents: Vec<[Vector; 2]>,
+    /// Vertices on corners at which no curve ends, with their corners.
+    lonely: Vec<(u32, usize)>,
+}
+
+impl<'a> Input<'a> {
+    fn new(
+        geometry: &'a Geometry,
+        features: &'a Features,
+        curves: &'a SurfaceMesh,
+        size: &'a dyn SizeField,
+        settings: &'a Settings,
+    ) -> Self {
+        let mut ranges = vec![0..0; features.curves.len()];
+        let mut ends_here = vec![false; curves.points.len()];
+        for (s, segment) in curves.segments.iter().enumerate() {
+            let range = &mut ranges[segment.curve.index()];
+            *range = if range.end == 0 { s..s + 1 } else { range.start..s + 1 };
+            for v in segment.vertices {
+                ends_here[v.index()] = true;
+            }
+        }
+        let lonely = curves
+            .classes
+            .iter()
+            .enumerate()
+            .filter_map(|(v, class)| match class {
+                Class::Corner(c) if !ends_here[v] => Some((v as u32, c.index())),
+                _ => None,
+            })
+            .collect();
+        let mut input =
+            Self { geometry, features, curves, size, settings, ranges, tangents: Vec::new(), lonely };
+        input.tangents = (0..curves.segments.len()).map(|s| input.tangents_of(s)).collect();
+        input
+    }
+
+    /// The directions of the curve at the ends of a segment, into the segment.
+    fn tangents_of(&self, s: usize) -> [Vector; 2] {
+        let segment = &self.curves.segments[s];
+        let point = |v: VertexId| &self.curves.points[v.index()];
+        let [a, b] = segment.vertices.map(point);
+        let range = &self.ranges[segment.curve.index()];
+        let closed = self.features.curve(segment.curve).ends.is_none();
+        let neighbour = |back: bool| {
+            let t = match (back, s == range.start, s + 1 == range.end) {
+                (true, true, _) => closed.then(|| range.end - 1),
+                (true, false, _) => Some(s - 1),
+                (false, _, true) => closed.then_some(range.start),
+                (false, _, false) => Some(s + 1),
+            };
+            t.map(|t| point(self.curves.segments[t].vertices[usize::from(!back)]))
+        };
+        // Within a curve both segments get the same line; at corners it is that of the two surfaces.
+        [(neighbour(true), a, b), (neighbour(false), b, a)].map(|(before, at, other)| match before {
+            Some(before) => (other - before).try_normalize(0.0).unwrap_or_default(),
+            None => self.direction_at_corner(segment.curve, at, &(other - at)),
+        })
+    }
+
+    /// The direction of a curve at a corner where it ends, on the side of the chord.
+    fn direction_at_corner(&self, curve: CurveId, at: &Point, chord: &Vector) -> Vector {
+        /// Surfaces that meet at less than half a degree give a direction of their own only with much noise.
+        const TRANSVERSAL: f64 = 0.01;
+        let [m, n] =
+            self.features.curve(curve).surfaces.map(|s| self.geometry.surfaces[s.index()].normal(at));
+        let line = m.cross(&n);
+        let direction = if line.norm() > TRANSVERSAL { line * line.dot(chord).signum() } else { *chord };
+        direction.try_normalize(0.0).unwrap_or_default()
+    }
+
+    fn mesh(&self, id: PatchId) -> Result<Meshed, SurfaceError> {
+        let patch = self.features.patch(id);
+        let surface = &self.geometry.surfaces[patch.surface.index()];
+        let mut out = Meshed {
+            inputs: Vec::new(),
+            points: Vec::new(),
+            triangles: Vec::new(),
+            report: blank_report(id),
+        };
+        let mut parts = Vec::new();
+        for &side in sheets(surface) {
+            let part = Part::new(self, id, surface, side);
+            if part.uses.is_empty() && part.seeds.is_empty() {
+                continue;
+            }
+            parts.push(part.mesh()?);
+        }
+        // The inputs of all parts first, then the new vertices of all.
+        out.inputs = parts.iter().flat_map(|(part, _)| part.vertices.iter().copied()).collect();
+        let total = out.inputs.len();
+        let mut fixed_before = 0;
+        for (part, sheet) in &parts {
+            let fixed = part.vertices.len();
+            let (offset, new) = (fixed_before, total + out.points.len());
+            let number = |v: u32| {
+                let v = v as usize;
+                (if v < fixed { offset + v } else { new + v - fixed }) as u32
+            };
+            let (used, triangles) = finished(sheet, fixed);
+            out.points.extend(used);
+            for t in triangles {
+                let [a, b, c] = t.map(number);
+                out.triangles.push(if patch.flipped { [a, c, b] } else { [a, b, c] });
+            }
+            measure(&mut out.report, sheet);
+            fixed_before += fixed;
+        }
+        for (part, _) in parts {
+            part.count(&mut out.report);
+        }
+        out.report.vertices = out.points.len();
+        finish_report(&mut out.report);
+        Ok(out)
+    }
+}
+
+/// One sheet of a patch with its part of the input.
+struct Part<'a> {
+    input: &'a Input<'a>,
+    id: PatchId,
+    surface: &'a Surface,
+    chart: Chart,
+    /// The input's vertices, by local number.
+    vertices: Vec<u32>,
+    pieces: Vec<Piece>,
+    /// By piece, the segment of the input.
+    segments: Vec<usize>,
+    uses: Vec<(u32, bool)>,
+    seeds: Vec<Point>,
+    advanced: Advanced,
+    improved: Improved,
+    flattening: (usize, usize),
+}
+
+impl<'a> Part<'a> {
+    fn new(input: &'a Input<'a>, id: PatchId, surface: &'a Surface, side: f64) -> Self {
+        let patch = input.features.patch(id);
+        let here = |p: &Point| {
+            let n = nappe(surface, p);
+            n == side || n == 0.0
+        };
+        let point = |v: VertexId| &input.curves.points[v.index()];
+        let mut segments: Vec<usize> = patch
+            .boundary
+            .iter()
+            .flat_map(|&(curve, _)| input.ranges[curve.index()].clone())
+            .filter(|&s| {
+                let [a, b] = input.curves.segments[s].vertices.map(point);
+                here(&nalgebra::center(a, b))
+            })
+            .collect();
+        segments.sort_unstable();
+        segments.dedup();
+        let ends = segments.iter().flat_map(|&s| input.curves.segments[s].vertices).map(|v| v.0);
+        let lonely = input.lonely.iter().filter(|&&(v, corner)| {
+            input.features.corners[corner].surfaces.contains(&patch.surface) && here(point(VertexId(v)))
+        });
+        // In the order of the segments: each vertex is near the one before.
+        let mut vertices: Vec<u32> = Vec::new();
+        let mut sorted: Vec<(u32, usize)> =
+            ends.chain(lonely.map(|&(v, _)| v)).enumerate().map(|(k, v)| (v, k)).collect();
+        sorted.sort_unstable();
+        sorted.dedup_by_key(|(v, _)| *v);
+        sorted.sort_unstable_by_key(|&(_, k)| k);
+        vertices.extend(sorted.iter().map(|&(v, _)| v));
+        let mut lookup: Vec<(u32, u32)> = vertices.iter().enumerate().map(|(k, &v)| (v, k as u32)).collect();
+        lookup.sort_unstable();
+        let local =
+            |v: VertexId| lookup[lookup.binary_search_by_key(&v.0, |&(v, _)| v).expect("listed above")].1;
+        let pieces = segments
+            .iter()
+            .map(|&s| Piece {
+                ends: input.curves.segments[s].vertices.map(local),
+                tangents: input.tangents[s],
+            })
+            .collect();
+        // The chart looks along the gradient; a flipped patch lies on the other side of its curves there.
+        let mut uses = Vec::new();
+        for &(curve, forward) in &patch.boundary {
+            for s in input.ranges[curve.index()].clone() {
+                if let Ok(k) = segments.binary_search(&s) {
+                    uses.push((k as u32, forward != patch.flipped));
+                }
+            }
+        }
+        Self {
+            input,
+            id,
+            surface,
+            chart: Chart::new(surface, side),
+            vertices,
+            pieces,
+            segments,
+            uses,
+            seeds: patch.seeds.iter().filter(|p| here(p)).copied().collect(),
+            advanced: Advanced::default(),
+            improved: Improved::default(),
+            flattening: (0, 0),
+        }
+    }
+
+    fn mesh(mut self) -> Result<(Self, Sheet<'a>), SurfaceError> {
+        let settings = self.input.settings;
+        let mut sheet = Sheet::new(self.surface, self.chart.clone(), self.input.size, settings);
+        let meshed = self.fill(&mut sheet);
+        match meshed {
+            Ok(()) => Ok((self, sheet)),
+            Err(Trouble::Fault(fault)) => Err(self.located(fault)),
+            Err(Trouble::Stop(Stop::Projection(source))) => {
+                Err(SurfaceError::Projection { patch: self.id, source })
+            }
+            Err(Trouble::Stop(Stop::Size(at, size))) => {
+                Err(SurfaceError::BadSize { patch: self.id, at, size })
+            }
+            Err(Trouble::TooMany) => {
+                Err(SurfaceError::TooManyVertices { patch: self.id, limit: settings.max_vertices })
+            }
+        }
+    }
+
+    fn fill(&mut self, sheet: &mut Sheet<'a>) -> Result<(), Trouble> {
+        let settings = self.input.settings;
+        for node in self.fixed_nodes(sheet)? {
+            sheet.nodes.push(node);
+        }
+        sheet.pieces = self.pieces.clone();
+        let seeds: Vec<_> = self.seeds.iter().map(|p| sheet.chart.site(self.surface, p)).collect();
+        embed(sheet, &self.uses, &seeds)?;
+        sheet.legalise_all();
+        condition(sheet, settings.max_vertices)?;
+        self.advanced = advance(sheet, settings.max_vertices)?;
+        if sheet.nodes.len() >= settings.max_vertices {
+            return Err(Trouble::TooMany);
+        }
+        let (found, _) = repair_flattening(sheet)?;
+        self.improved = improve(sheet, settings)?;
+        // The improvement has a price on them and makes none, but where it had no other way.
+        let (more, left) = repair_flattening(sheet)?;
+        self.flattening = (found + more, left);
+        Ok(())
+    }
+
+    /// The vertices on corners and curves. Their size is at most a little more than their longest segment, so that the first
+    /// layer fits the segments.
+    fn fixed_nodes(&self, sheet: &Sheet) -> Result<Vec<Node>, Stop> {
+        /// Segments are shorter than wanted because a whole number of them makes a curve.
+        const LONGER: f64 = 1.25;
+        let mut longest = vec![0.0_f64; self.vertices.len()];
+        let point = |v: u32| self.input.curves.points[self.vertices[v as usize] as usize];
+        for piece in &self.pieces {
+            let [a, b] = piece.ends;
+            for v in [a, b] {
+                longest[v as usize] = longest[v as usize].max((point(b) - point(a)).norm());
+            }
+        }
+        longest
+            .iter()
+            .enumerate()
+            .map(|(v, &length)| {
+                let point = point(v as u32);
+                let size = sheet.wanted_size(&point)?;
+                let size = if length > 0.0 { size.min(LONGER * length) } else { size };
+                Ok(sheet.node(point, size, Kind::Fixed))
+            })
+            .collect()
+    }
+
+    /// A fault in the numbers and places of the input.
+    fn located(&self, fault: Fault) -> SurfaceError {
+        let patch = self.id;
+        let segment = |s: u32| self.segments[s as usize];
+        let curve = |s: u32| self.input.curves.segments[segment(s)].curve;
+        let vertex = |v: u32| self.input.curves.points[self.vertices[v as usize] as usize];
+        let middle = |s: u32| {
+            let [a, b] = self.pieces[s as usize].ends.map(vertex);
+            nalgebra::center(&a, &b)
+        };
+        match fault {
+            Fault::Coincident(v, _) => SurfaceError::Coincident { patch, at: vertex(v) },
+            Fault::Coarse(conflicts) => {
+                let (s, other) = match conflicts[0] {
+                    Conflict::Crossing(s, t) => (s, Some(curve(t))),
+                    Conflict::Through(s, _) | Conflict::TooLong(s) => (s, None),
+                };
+                let segments = conflicts.iter().flat_map(|c| match *c {
+                    Conflict::Crossing(s, t) => vec![segment(s), segment(t)],
+                    Conflict::Through(s, _) | Conflict::TooLong(s) => vec![segment(s)],
+                });
+                let (curve, at) = (curve(s), middle(s));
+                SurfaceError::TooCoarse { patch, curve, other, at, segments: segments.collect() }
+            }
+            Fault::BothSides(s) => SurfaceError::BothSides { patch, curve: curve(s), at: middle(s) },
+            Fault::Open | Fault::StartInTheWay => SurfaceError::NotEnclosed(patch),
+            Fault::NotNumbers => SurfaceError::NotNumbers(patch),
+        }
+    }
+
+    fn count(&self, report: &mut PatchReport) {
+        report.refused += self.advanced.refused;
+        report.swaps += self.improved.swaps;
+        report.moves += self.improved.moves;
+        report.collapses += self.improved.collapses;
+        report.splits += self.improved.splits;
+        report.flattening_repaired += self.flattening.0 - self.flattening.1;
+        report.flattening_left += self.flattening.1;
+    }
+}
+
+/// Why a part was not filled.
+enum Trouble {
+    Fault(Fault),
+    Stop(Stop),
+    TooMany,
+}
+
+impl From<Fault> for Trouble {
+    fn from(fault: Fault) -> Self {
+        Self::Fault(fault)
+    }
+}
+
+impl From<Stop> for Trouble {
+    fn from(stop: Stop) -> Self {
+        Self::Stop(stop)
+    }
+}
+
+/// The new points of a sheet that are in triangles, and its triangles, with the new points numbered after the fixed.
+fn finished(sheet: &Sheet, fixed: usize) -> (Vec<Point>, Vec<[u32; 3]>) {
+    let mut old_to_new: Vec<u32> =
+        (0..sheet.nodes.len() as u32).map(|v| if (v as usize) < fixed { v } else { NONE }).collect();
+    let mut triangles: Vec<[u32; 3]> = sheet.mesh.living().map(|t| sheet.mesh.at(t).v).collect();
+    for v in triangles.iter().flatten() {
+        old_to_new[*v as usize] = *v;
+    }
+    let mut points = Vec::new();
+    for v in fixed..sheet.nodes.len() {
+        if old_to_new[v] != NONE {
+            old_to_new[v] = (fixed + points.len()) as u32;
+            points.push(sheet.nodes[v].point);
+        }
+    }
+    for v in triangles.iter_mut().flatten() {
+        *v = old_to_new[*v as usize];
+    }
+    (points, triangles)
+}
+
+fn blank_report(patch: PatchId) -> PatchReport {
+    PatchReport {
+        patch,
+        triangles: 0,
+        vertices: 0,
+        worst_quality: 1.0,
+        mean_quality: 0.0,
+        min_angle: 60.0,
+        worst_normal: 0.0,
+        flattening_repaired: 0,
+        flattening_left: 0,
+        refused: 0,
+        swaps: 0,
+        moves: 0,
+        collapses: 0,
+        splits: 0,
+    }
+}
+
+/// Adds the triangles of a sheet; the mean quality is a sum until [`finish_report`].
+fn measure(report: &mut PatchReport, sheet: &Sheet) {
+    for t in sheet.mesh.living() {
+        let corners = sheet.corners(t);
+        let p = corners.map(|n| n.point);
+        let quality = triangle_quality(&p);
+        report.triangles += 1;
+        report.worst_quality = report.worst_quality.min(quality);
+        report.mean_quality += quality;
+        report.min_angle = report.min_angle.min(least_angle(&p));
+        let normal = area_vector(&p[0], &p[1], &p[2]);
+        for node in corners.iter().filter(|n| n.normal != Vector::zeros()) {
+            report.worst_normal = report.worst_normal.max(normal.angle(&node.normal).to_degrees());
+        }
+    }
+}
+
+fn finish_report(report: &mut PatchReport) {
+    report.mean_quality /= report.triangles.max(1) as f64;
+}
+
+/// 4√3·area/Σl²: 1 for the regular triangle, 0 for one without area.
+fn triangle_quality(p: &[Point; 3]) -> f64 {
+    let squares = (p[1] - p[0]).norm_squared() + (p[2] - p[1]).norm_squared() + (p[0] - p[2]).norm_squared();
+    let double_area = area_vector(&p[0], &p[1], &p[2]).norm();
+    if squares > 0.0 { 2.0 * 3.0_f64.sqrt() * double_area / squares } else { 0.0 }
+}
+
+/// The least angle of a triangle, degrees.
+fn least_angle(p: &[Point; 3]) -> f64 {
+    (0..3).map(|i| (p[(i + 1) % 3] - p[i]).angle(&(p[(i + 2) % 3] - p[i])).to_degrees()).fold(180.0, f64::min)
+}

@@ -1,0 +1,418 @@
+//! A triangulation of one connected sheet of a surface while it is being made.
+
+use super::Settings;
+use super::chart::{Chart, Site};
+use super::topology::{NONE, Topology, last, next};
+use crate::kernel::predicates::Sign;
+use crate::kernel::simplex::area_vector;
+use crate::size::SizeField;
+use crate::{Point, Vector};
+use csg::{ProjectionFailed, Surface};
+
+/// Why meshing a sheet stopped.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Stop {
+    /// A point has no nearest one on the surface.
+    Projection(ProjectionFailed),
+    /// The size field gave this at a point.
+    Size(Point, f64),
+}
+
+impl From<ProjectionFailed> for Stop {
+    fn from(failed: ProjectionFailed) -> Self {
+        Self::Projection(failed)
+    }
+}
+
+/// What may be done with a vertex.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Kind {
+    /// On a corner or a curve: it stays.
+    Fixed,
+    /// Inside the patch.
+    Free,
+    /// Inside the patch, left over from the start: the front may move it to where it wants a vertex.
+    Helper,
+    /// No point of the surface: it marks the outside.
+    Outside,
+}
+
+/// A vertex.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Node {
+    /// Where it is.
+    pub point: Point,
+    /// Unit normal of the surface there; zero at the apex of a cone.
+    pub normal: Vector,
+    /// Where it is in the chart.
+    pub site: Site,
+    /// The wanted length of edges there.
+    pub size: f64,
+    /// What may be done with it.
+    pub kind: Kind,
+}
+
+/// A piece of curve that triangles may not cross.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Piece {
+    /// Its end vertices.
+    pub ends: [u32; 2],
+    /// Directions of the curve at the ends, into the piece; zero where unknown.
+    pub tangents: [Vector; 2],
+}
+
+impl Piece {
+    /// The direction in which it leaves one of its ends.
+    fn leaving(&self, v: u32) -> Option<&Vector> {
+        self.ends.iter().position(|&e| e == v).map(|k| &self.tangents[k])
+    }
+}
+
+/// Two pieces of curve that enclose more than this angle at a common end are one smooth curve there: a triangle
+/// with both on its sides would flatten as it is refined. Arcs that meet smoothly at a corner enclose 180° within
+/// rounding; a triangle at a corner of 170° still has a child with an angle of 170° for ever, which is what the
+/// geometry says.
+const SMOOTH_COSINE: f64 = -0.996;
+
+/// The cosine between a triangle's normal and the surface's at a vertex below which it is penalised: 60°. A wall
+/// meshed with three segments per circle cannot do better than 60°, with four it has 45°.
+const NORMAL_COSINE: f64 = 0.5;
+/// The price of a triangle per unit of cosine missing; more than any shape that is not degenerate.
+pub(super) const NORMAL_PRICE: f64 = 1e4;
+/// The price of a triangle that looks away from the surface's normal, also per sum of squared edges over squared size.
+const FOLDED_PRICE: f64 = 1e6;
+/// The price of two sides on one smooth curve.
+const FLATTENING_PRICE: f64 = 1e5;
+/// The price of a triangle without area.
+pub(super) const DEGENERATE_PRICE: f64 = 1e12;
+/// Changes are made for gains above this fraction only, so that rounding cannot make them go in a circle.
+pub(super) const GAIN: f64 = 1e-9;
+
+/// A triangulation of one connected sheet of a surface.
+pub(super) struct Sheet<'a> {
+    /// The surface.
+    pub surface: &'a Surface,
+    /// Its chart.
+    pub chart: Chart,
+    /// The wanted size, before curvature.
+    pub field: &'a dyn SizeField,
+    /// What the caller wants.
+    pub settings: &'a Settings,
+    /// The vertices.
+    pub nodes: Vec<Node>,
+    /// The triangles.
+    pub mesh: Topology,
+    /// The pieces of curve; sides refer to them.
+    pub pieces: Vec<Piece>,
+    /// Memory for stars.
+    pub ring: Vec<u32>,
+    stack: Vec<u32>,
+}
+
+/// Where a site lies.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Place {
+    /// Inside a triangle.
+    Inside(u32),
+    /// Inside a side.
+    OnSide(u32, usize),
+    /// On a vertex.
+    OnVertex(u32),
+}
+
+impl<'a> Sheet<'a> {
+    /// A sheet without vertices.
+    pub fn new(surface: &'a Surface, chart: Chart, field: &'a dyn SizeField, settings: &'a Settings) -> Self {
+        Self {
+            surface,
+            chart,
+            field,
+            settings,
+            nodes: Vec::new(),
+            mesh: Topology::default(),
+            pieces: Vec::new(),
+            ring: Vec::new(),
+            stack: Vec::new(),
+        }
+    }
+
+    /// The size wanted at a point of the surface: the size field's, but never so large that the surface turns too far
+    /// along an edge.
+    pub fn wanted_size(&self, point: &Point) -> Result<f64, Stop> {
+        let size = self.field.size_at(point);
+        if size.is_nan() || size <= 0.0 || size.is_infinite() {
+            return Err(Stop::Size(*point, size));
+        }
+        // At the apex of a cone the curvature is infinite or no number; there is no bound then.
+        let bound = self.settings.turn / self.surface.curvature(point);
+        Ok(if bound > 0.0 { size.min(bound) } else { size })
+    }
+
+    /// A vertex at a point that lies on the surface.
+    pub fn node(&self, point: Point, size: f64, kind: Kind) -> Node {
+        let site = self.chart.site(self.surface, &point);
+        // The computed apex is some ulp off the true one: a normal there would be noise.
+        let normal = if self.chart.is_pole(&site) { Vector::zeros() } else { self.surface.normal(&point) };
+        Node { point, normal, site, size, kind }
+    }
+
+    /// A free vertex at the surface's point nearest to `point`, with the size wanted there.
+    pub fn project(&self, point: &Point) -> Result<Node, Stop> {
+        let point = self.surface.project(point)?;
+        Ok(self.node(point, self.wanted_size(&point)?, Kind::Free))
+    }
+
+    /// The vertices of a triangle.
+    #[inline]
+    pub fn corners(&self, t: u32) -> [&Node; 3] {
+        self.mesh.at(t).v.map(|v| &self.nodes[v as usize])
+    }
+
+    /// Whether three vertices make a triangle of the chart, counter-clockwise.
+    #[inline]
+    pub fn fits(&self, a: u32, b: u32, c: u32) -> bool {
+        let site = |v: u32| &self.nodes[v as usize].site;
+        self.chart.orient(site(a), site(b), site(c)) == Sign::Positive
+    }
+
+    /// The price of a triangle with these corners: at least 1, the regular triangle, growing with Σl²/area, and with
+    /// large additions for what must not be. The sum over all triangles is what swaps and moves lower; in the plane,
+    /// the least sum of Σl²/area is that of the Delaunay triangulation (Musin 1997, "Properties of the Delaunay
+    /// triangulation"), so a swap that lowers it is a Delaunay flip, and swaps come to an end on any surface.
+    pub fn price(&self, corners: [&Node; 3]) -> f64 {
+        let [a, b, c] = corners;
+        let area = area_vector(&a.point, &b.point, &c.point);
+        let double = area.norm();
+        let squares = (b.point - a.point).norm_squared()
+            + (c.point - b.point).norm_squared()
+            + (a.point - c.point).norm_squared();
+        // q = 4√3·area / Σl² is 1 for the regular triangle.
+        let inverse = squares / (2.0 * 3.0_f64.sqrt() * double);
+        if inverse.is_nan() || inverse > DEGENERATE_PRICE {
+            return DEGENERATE_PRICE;
+        }
+        let mut least = double;
+        for node in corners {
+            // The apex of a cone has no normal, and forbids nothing.
+            if node.normal != Vector::zeros() {
+                least = least.min(area.dot(&node.normal));
+            }
+        }
+        let lacking = NORMAL_COSINE - least / double;
+        if lacking <= 0.0 {
+            return inverse;
+        }
+        let turned = inverse + NORMAL_PRICE * lacking;
+        if lacking < NORMAL_COSINE {
+            return turned;
+        }
+        // Folds come where a long edge has other vertices beside it in the chart than in space. Short edges undo that,
+        // even where they need more folded triangles on the way.
+        let size = (a.size + b.size + c.size) / 3.0;
+        turned + FOLDED_PRICE * (1.0 + squares / (size * size))
+    }
+
+    /// The price of a triangle given by its corners and the segments on its sides.
+    pub fn price_of(&self, v: [u32; 3], segments: [u32; 3]) -> f64 {
+        let shape = self.price(v.map(|v| &self.nodes[v as usize]));
+        shape + FLATTENING_PRICE * self.flattenings(v, segments) as f64
+    }
+
+    /// The price of a triangle of the mesh.
+    pub fn price_at(&self, t: u32) -> f64 {
+        let x = self.mesh.at(t);
+        self.price_of(x.v, x.segment)
+    }
+
+    /// The number of corners of a triangle at which it has both sides on one smooth curve.
+    pub fn flattenings(&self, v: [u32; 3], segments: [u32; 3]) -> usize {
+        let straight = |i: usize| {
+            let (x, y) = (segments[next(i)], segments[last(i)]);
+            if x == NONE || y == NONE {
+                return false;
+            }
+            let leaving = [x, y].map(|s| self.pieces[s as usize].leaving(v[i]));
+            matches!(leaving, [Some(p), Some(q)] if p.dot(q) < SMOOTH_COSINE)
+        };
+        (0..3).filter(|&i| straight(i)).count()
+    }
+
+    /// Swaps the diagonal at a side if that lowers the price and is possible.
+    pub fn try_flip(&mut self, t: u32, i: usize) -> bool {
+        let x = *self.mesh.at(t);
+        if x.segment[i] != NONE || x.near[i] == NONE {
+            return false;
+        }
+        let (u, j) = self.mesh.twin(t, i).expect("a side with two triangles");
+        let y = *self.mesh.at(u);
+        let [p, a, b, d] = [x.v[i], x.v[next(i)], x.v[last(i)], y.v[j]];
+        if [p, a, b, d].iter().any(|&v| self.nodes[v as usize].kind == Kind::Outside) {
+            return false;
+        }
+        let before = self.price_of(x.v, x.segment) + self.price_of(y.v, y.segment);
+        let after = self.price_of([p, a, d], [y.segment[next(j)], NONE, x.segment[last(i)]])
+            + self.price_of([p, d, b], [y.segment[last(j)], x.segment[next(i)], NONE]);
+        if after >= before * (1.0 - GAIN) || !self.fits(p, a, d) || !self.fits(p, d, b) {
+            return false;
+        }
+        self.mesh.flip(t, i);
+        true
+    }
+
+    /// Swaps diagonals around a new vertex until none gains: Lawson's algorithm. Leaves in `self.ring` nothing of use.
+    pub fn legalise(&mut self, v: u32, parts: &[u32]) {
+        let mut stack = std::mem::take(&mut self.stack);
+        stack.extend_from_slice(parts);
+        while let Some(t) = stack.pop() {
+            let x = self.mesh.at(t);
+            if !x.v.contains(&v) {
+                continue;
+            }
+            let i = x.corner(v);
+            let u = x.near[i];
+            if self.try_flip(t, i) {
+                stack.extend([t, u]);
+            }
+        }
+        self.stack = stack;
+    }
+
+    /// Swaps diagonals everywhere until none gains.
+    pub fn legalise_all(&mut self) -> usize {
+        let mut queue: std::collections::VecDeque<u32> = self.mesh.living().collect();
+        let mut waiting = vec![true; self.mesh.triangles.len()];
+        let mut swaps = 0;
+        while let Some(t) = queue.pop_front() {
+            waiting[t as usize] = false;
+            for i in 0..3 {
+                let u = self.mesh.at(t).near[i];
+                // Its turn comes with the neighbour's.
+                if u != NONE && waiting[u as usize] {
+                    continue;
+                }
+                if self.try_flip(t, i) {
+                    swaps += 1;
+                    for s in [t, u] {
+                        if !std::mem::replace(&mut waiting[s as usize], true) {
+                            queue.push_back(s);
+                        }
+                    }
+                    break;
+                }
+            }
+        }
+        swaps
+    }
+
+    /// Where a site lies in a triangle, if it does.
+    fn place_in(&self, t: u32, site: &Site) -> Option<Place> {
+        let v = self.mesh.at(t).v;
+        let mut on = [false; 3];
+        for i in 0..3 {
+            let [a, b] = [v[next(i)], v[last(i)]].map(|v| &self.nodes[v as usize].site);
+            match self.chart.orient(a, b, site) {
+                Sign::Negative => return None,
+                Sign::Zero => on[i] = true,
+                Sign::Positive => {}
+            }
+        }
+        Some(match on {
+            [false, false, false] => Place::Inside(t),
+            [true, false, false] => Place::OnSide(t, 0),
+            [false, true, false] => Place::OnSide(t, 1),
+            [false, false, true] => Place::OnSide(t, 2),
+            // On two sides: at the corner that both have.
+            [true, true, _] => Place::OnVertex(v[2]),
+            [_, true, true] => Place::OnVertex(v[0]),
+            [true, _, true] => Place::OnVertex(v[1]),
+        })
+    }
+
+    /// Walks from a triangle to the place of a site, not across segments; `None` if it lies beyond one, or the walk
+    /// is longer than `limit`.
+    pub fn walk(&self, from: u32, site: &Site, limit: usize) -> Option<Place> {
+        let mut t = from;
+        let mut came_from = NONE;
+        for _ in 0..limit {
+            let x = self.mesh.at(t);
+            let out = (0..3).find(|&i| {
+                let [a, b] = [x.v[next(i)], x.v[last(i)]].map(|v| &self.nodes[v as usize].site);
+                x.near[i] != came_from && self.chart.orient(a, b, site) == Sign::Negative
+            });
+            match out {
+                None => return self.place_in(t, site),
+                Some(i) if x.segment[i] != NONE || x.near[i] == NONE => return None,
+                Some(i) => (came_from, t) = (t, x.near[i]),
+            }
+        }
+        None
+    }
+
+    /// The place of a site anywhere: by walking, and if that fails by looking at each triangle.
+    pub fn locate(&self, from: u32, site: &Site) -> Option<Place> {
+        /// Vertices come in the order of curves: the next one is near.
+        const STEPS: usize = 1000;
+        let walked = if from == NONE { None } else { self.walk(from, site, STEPS) };
+        walked.or_else(|| self.mesh.living().find_map(|t| self.place_in(t, site)))
+    }
+
+    /// Puts a new vertex into the triangulation and swaps around it; returns its number, or `None` where it would lie
+    /// on a vertex or a segment.
+    pub fn insert(&mut self, node: Node, place: Place) -> Option<u32> {
+        let free = match place {
+            Place::OnVertex(_) => false,
+            Place::OnSide(t, i) => self.mesh.at(t).segment[i] == NONE && self.mesh.at(t).near[i] != NONE,
+            Place::Inside(_) => true,
+        };
+        if !free {
+            return None;
+        }
+        let v = self.nodes.len() as u32;
+        self.nodes.push(node);
+        self.mesh.add_vertex();
+        self.insert_vertex(v, place);
+        Some(v)
+    }
+
+    /// Puts a vertex that is in no triangle yet to its place and swaps around it.
+    ///
+    /// # Panics
+    /// If the place is a vertex.
+    pub fn insert_vertex(&mut self, v: u32, place: Place) {
+        match place {
+            Place::OnSide(t, i) => {
+                let parts = self.mesh.split_side(t, i, v);
+                self.legalise(v, &parts);
+            }
+            Place::Inside(t) => {
+                let parts = self.mesh.split_triangle(t, v);
+                self.legalise(v, &parts);
+            }
+            Place::OnVertex(w) => panic!("vertex {v} lies on vertex {w}"),
+        }
+    }
+
+    /// The length of an edge in units of the wanted size at its ends.
+    pub fn length(&self, a: u32, b: u32) -> f64 {
+        let [a, b] = [a, b].map(|v| &self.nodes[v as usize]);
+        2.0 * (b.point - a.point).norm() / (a.size + b.size)
+    }
+
+    /// The price of the triangles around a vertex if it were `node`: the largest and the sum of squares, or `None` if one
+    /// of them would not fit the chart.
+    pub fn star_price(&self, v: u32, node: &Node, ring: &[u32]) -> Option<(f64, f64)> {
+        let (mut worst, mut sum) = (0.0_f64, 0.0);
+        for &t in ring {
+            let x = self.mesh.at(t);
+            let k = x.corner(v);
+            let (a, b) = (&self.nodes[x.v[next(k)] as usize], &self.nodes[x.v[last(k)] as usize]);
+            if self.chart.orient(&node.site, &a.site, &b.site) != Sign::Positive {
+                return None;
+            }
+            let price = self.price([node, a, b]);
+            worst = worst.max(price);
+            sum += price * price;
+        }
+        Some((worst, sum))
+    }
+}

@@ -1,0 +1,112 @@
+//! Which edges and faces of the mesh must stay: the surface's, and pieces of those that had to be split.
+
+use super::tetrahedra::sorted;
+use std::collections::HashMap;
+use std::hash::{BuildHasherDefault, Hasher};
+
+/// A piece of a triangle of the surface: the whole, unless Steiner points split it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Facet {
+    /// Its vertices, in the order of its triangle.
+    pub vertices: [u32; 3],
+    /// The triangle of the surface that it is part of.
+    pub triangle: u32,
+    /// Whether it was split or joined: then other facets are in its place.
+    pub gone: bool,
+}
+
+/// The facets and their edges. A vertex, edge or face here is looked up, never iterated in hash order.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Constraints {
+    pub facets: Vec<Facet>,
+    by_vertices: HashMap<[u32; 3], u32, BuildHasherDefault<VertexHasher>>,
+    /// How many facets use each edge.
+    edge_uses: HashMap<[u32; 2], u32, BuildHasherDefault<VertexHasher>>,
+}
+
+impl Constraints {
+    /// One facet for each triangle.
+    pub fn new(triangles: &[[u32; 3]]) -> Self {
+        let mut constraints = Self::default();
+        constraints.by_vertices.reserve(triangles.len());
+        constraints.edge_uses.reserve(triangles.len() * 3 / 2);
+        for (t, &vertices) in triangles.iter().enumerate() {
+            constraints.add(vertices, t as u32);
+        }
+        constraints
+    }
+
+    /// Adds a facet of a triangle.
+    pub fn add(&mut self, vertices: [u32; 3], triangle: u32) -> u32 {
+        let facet = self.facets.len() as u32;
+        self.facets.push(Facet { vertices, triangle, gone: false });
+        self.by_vertices.insert(sorted(vertices), facet);
+        for edge in edges(vertices) {
+            *self.edge_uses.entry(edge).or_insert(0) += 1;
+        }
+        facet
+    }
+
+    /// Takes a facet away; its edges go with the last facet that uses them.
+    pub fn remove(&mut self, facet: u32) {
+        let f = &mut self.facets[facet as usize];
+        f.gone = true;
+        self.by_vertices.remove(&sorted(f.vertices));
+        for edge in edges(f.vertices) {
+            let uses = self.edge_uses.get_mut(&edge).expect("an edge of a facet");
+            *uses -= 1;
+            if *uses == 0 {
+                self.edge_uses.remove(&edge);
+            }
+        }
+    }
+
+    /// The facet with these vertices.
+    #[inline]
+    pub fn facet(&self, face: [u32; 3]) -> Option<u32> {
+        self.by_vertices.get(&sorted(face)).copied()
+    }
+
+    /// Whether these are the ends of an edge of a facet.
+    #[inline]
+    pub fn has_edge(&self, a: u32, b: u32) -> bool {
+        self.edge_uses.contains_key(&[a.min(b), a.max(b)])
+    }
+
+    /// The facets in use, in ascending order.
+    pub fn alive(&self) -> impl Iterator<Item = u32> + '_ {
+        (0..self.facets.len() as u32).filter(|&f| !self.facets[f as usize].gone)
+    }
+
+    /// The facets at a vertex, in ascending order. Looks at all: for the few vertices that were added.
+    pub fn facets_at(&self, vertex: u32) -> Vec<u32> {
+        self.alive().filter(|&f| self.facets[f as usize].vertices.contains(&vertex)).collect()
+    }
+}
+
+/// The edges of a face, each with its lower vertex first.
+pub(super) fn edges([a, b, c]: [u32; 3]) -> [[u32; 2]; 3] {
+    [[a, b], [b, c], [c, a]].map(|[p, q]| [p.min(q), p.max(q)])
+}
+
+/// Mixes a few vertex numbers: much faster than the standard hash, and the numbers are our own.
+#[derive(Clone, Copy, Debug, Default)]
+struct VertexHasher(u64);
+
+impl Hasher for VertexHasher {
+    fn finish(&self) -> u64 {
+        self.0 ^ (self.0 >> 29)
+    }
+
+    fn write(&mut self, bytes: &[u8]) {
+        for chunk in bytes.chunks(8) {
+            let mut word = [0; 8];
+            word[..chunk.len()].copy_from_slice(chunk);
+            self.0 = (self.0.rotate_left(23) ^ u64::from_le_bytes(word)).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        }
+    }
+
+    fn write_usize(&mut self, _: usize) {
+        // Array lengths: always the same.
+    }
+}

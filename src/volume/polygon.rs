@@ -1,0 +1,84 @@
+//! A polygon in the plane of a triangle, into triangles.
+
+use crate::Point;
+use crate::kernel::predicates::{Sign, orient2d};
+use crate::kernel::simplex::area_vector;
+
+/// A coordinate plane on which a triangle has a counter-clockwise shadow.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Shadow([usize; 2]);
+
+impl Shadow {
+    /// The coordinate plane on which the shadow of the triangle is largest.
+    pub fn of(corners: [&Point; 3]) -> Self {
+        let normal = area_vector(corners[0], corners[1], corners[2]);
+        let axis = normal.iamax();
+        let (i, j) = ((axis + 1) % 3, (axis + 2) % 3);
+        Self(if normal[axis] > 0.0 { [i, j] } else { [j, i] })
+    }
+
+    fn cast(self, p: &Point) -> [f64; 2] {
+        self.0.map(|k| p[k])
+    }
+
+    fn turn(self, a: &Point, b: &Point, c: &Point) -> Sign {
+        orient2d(self.cast(a), self.cast(b), self.cast(c))
+    }
+}
+
+/// The triangles of a counter-clockwise polygon, by cutting its best ear first; `None` if there is no ear.
+pub(super) fn triangulate(points: &[Point], shadow: Shadow, polygon: &[u32]) -> Option<Vec<[u32; 3]>> {
+    let mut left = polygon.to_vec();
+    let mut triangles = Vec::with_capacity(left.len().saturating_sub(2));
+    while left.len() >= 3 {
+        let n = left.len();
+        let (mut best, mut best_shape) = (None, 0.0);
+        for i in 0..n {
+            let ear = [left[(i + n - 1) % n], left[i], left[(i + 1) % n]];
+            let shape = shape(points, ear);
+            if shape > best_shape && is_ear(points, shadow, &left, ear) {
+                (best, best_shape) = (Some((i, ear)), shape);
+            }
+        }
+        let (i, ear) = best?;
+        triangles.push(ear);
+        left.remove(i);
+    }
+    Some(triangles)
+}
+
+/// Area over the square of the longest edge: larger is better.
+fn shape(points: &[Point], triangle: [u32; 3]) -> f64 {
+    let [a, b, c] = triangle.map(|v| &points[v as usize]);
+    let longest = (b - a).norm_squared().max((c - b).norm_squared()).max((a - c).norm_squared());
+    area_vector(a, b, c).norm() / longest
+}
+
+fn is_ear(points: &[Point], shadow: Shadow, polygon: &[u32], ear: [u32; 3]) -> bool {
+    let [a, b, c] = ear.map(|v| &points[v as usize]);
+    shadow.turn(a, b, c) == Sign::Positive
+        && polygon.iter().filter(|v| !ear.contains(v)).all(|&v| {
+            let p = &points[v as usize];
+            [[a, b], [b, c], [c, a]].iter().any(|&[s, t]| shadow.turn(s, t, p) == Sign::Negative)
+        })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_polygon_with_a_notch_and_a_point_on_its_side_is_triangulated() {
+        let points: Vec<Point> = [[0., 0.], [2., 0.], [4., 0.], [4., 3.], [2., 1.], [0., 3.]]
+            .map(|[x, y]| Point::new(1.0, x, y))
+            .to_vec();
+        let shadow = Shadow::of([&points[0], &points[2], &points[3]]);
+        let triangles = triangulate(&points, shadow, &[0, 1, 2, 3, 4, 5]).unwrap();
+        assert_eq!(triangles.len(), 4);
+        for t in triangles {
+            let [a, b, c] = t.map(|v| &points[v as usize]);
+            assert_eq!(shadow.turn(a, b, c), Sign::Positive);
+        }
+        assert_eq!(triangulate(&points, shadow, &[0, 1, 2]), None);
+    }
+}

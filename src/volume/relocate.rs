@@ -1,0 +1,364 @@
+//! Steiner points leave the surface again.
+//!
+//! A point p that splits a triangle or an edge of the surface is taken off it so (George, Borouchaki, Saltel
+//! 2003, section 5): the **ball** of p, all tets at it, falls into **sectors** between the facets at p. The
+//! facets at p are replaced by facets without it; then each sector is a polyhedron, seen from p but for
+//! these new facets, in whose planes p lies. A point a little inside sees them too. So each sector is
+//! filled anew, from one of its own vertices if one sees all of it, else from a new point inside.
+//!
+//! ```text
+//!   u───p───v        u───────v         Outside of the bodies there is no sector any more, so a point
+//!    ╲  │  ╱    ─►    ╲╲ q ╱╱          on the outer skin leaves one new point or none, a point on an
+//!     ╲ │ ╱            ╲╲│╱╱           interface one on either side.
+//!       w                w
+//! ```
+
+use super::constraints::Constraints;
+use super::polygon::{Shadow, triangulate};
+use super::tetrahedra::{NONE, Tetrahedra};
+use crate::kernel::predicates::{Sign, orient3d};
+use crate::kernel::quality::mean_ratio;
+use crate::{Point, Vector};
+use std::collections::BTreeMap;
+
+/// A sector is filled from one of its own vertices, without a new point, if the worst mean ratio is at least
+/// this. A sliver of 0.001 is worse to mend than one vertex more; most sectors reach 0.1 or more.
+const GOOD_ENOUGH: f64 = 0.05;
+
+/// How near to the old point a new one may be: 2 to the power of minus this many, of the size of the ball. Nearer,
+/// coordinates round to the point itself.
+const HALVINGS: i32 = 48;
+
+/// The part of a ball between facets.
+#[derive(Clone, Debug, Default)]
+struct Sector {
+    body: u32,
+    tets: Vec<u32>,
+    /// Its surface once p is gone, outward.
+    skin: Vec<[u32; 3]>,
+    /// The half-faces of `tets` that are in `skin`.
+    walls: Vec<u32>,
+    /// Those of `skin` in place of facets at p, which p does not see.
+    fresh: Vec<[u32; 3]>,
+}
+
+/// What a sector is filled from.
+#[derive(Clone, Copy, Debug)]
+enum Apex {
+    Own(u32),
+    New(Point),
+}
+
+/// Takes all Steiner points off the surface, the last first. Returns the new points inside, and the
+/// points that stayed.
+pub(super) fn relocate(
+    mesh: &mut Tetrahedra,
+    constraints: &mut Constraints,
+    triangles: &[[u32; 3]],
+    steiner: &[u32],
+) -> (Vec<u32>, Vec<u32>) {
+    let mut inside = Vec::new();
+    let mut left: Vec<u32> = steiner.iter().rev().copied().collect();
+    loop {
+        let before = left.len();
+        left.retain(|&p| !take_off(mesh, constraints, triangles, p, &mut inside));
+        if left.is_empty() || left.len() == before {
+            return (inside, left);
+        }
+    }
+}
+
+/// Takes one point off the surface if all its sectors can be filled without it.
+fn take_off(
+    mesh: &mut Tetrahedra,
+    constraints: &mut Constraints,
+    triangles: &[[u32; 3]],
+    p: u32,
+    inside: &mut Vec<u32>,
+) -> bool {
+    let old = constraints.facets_at(p);
+    let mut fans: BTreeMap<u32, Vec<[u32; 3]>> = BTreeMap::new();
+    for &f in &old {
+        let facet = &constraints.facets[f as usize];
+        fans.entry(facet.triangle).or_default().push(facet.vertices);
+    }
+    let mut patches: BTreeMap<u32, Vec<[u32; 3]>> = BTreeMap::new();
+    for (&triangle, fan) in &fans {
+        let shadow = Shadow::of(triangles[triangle as usize].map(|v| mesh.point(v)));
+        match triangulate(&mesh.points, shadow, &outline(fan, p)) {
+            Some(patch) => patches.insert(triangle, patch),
+            None => return false,
+        };
+    }
+    let mut sectors = sectors(mesh, constraints, p, &patches);
+    let Some(apexes) = sectors.iter_mut().map(|s| grow_and_find(mesh, s, p)).collect::<Option<Vec<_>>>()
+    else {
+        return false;
+    };
+    let mut ball: Vec<u32> = sectors.iter().flat_map(|s| s.tets.iter().copied()).collect();
+    ball.sort_unstable();
+    if ball.windows(2).any(|pair| pair[0] == pair[1]) {
+        // Two sectors took in the same tet.
+        return false;
+    }
+    for f in old {
+        constraints.remove(f);
+    }
+    for (triangle, patch) in patches {
+        for vertices in patch {
+            constraints.add(vertices, triangle);
+        }
+    }
+    let mut new = Vec::new();
+    for (sector, apex) in sectors.iter().zip(apexes) {
+        let apex = match apex {
+            Apex::Own(v) => v,
+            Apex::New(point) => {
+                let v = mesh.add_point(point);
+                inside.push(v);
+                v
+            }
+        };
+        let seen = sector.skin.iter().filter(|face| !face.contains(&apex));
+        new.extend(seen.map(|&[a, b, c]| ([apex, a, b, c], sector.body)));
+    }
+    mesh.rebuild(&ball, &new, &|face| constraints.facet(face).is_some());
+    mesh.at_vertex[p as usize] = NONE;
+    true
+}
+
+/// The vertices round a point in its facets of one triangle, in the triangle's sense; they begin at
+/// its edge if the point lies on one.
+fn outline(fan: &[[u32; 3]], p: u32) -> Vec<u32> {
+    let links: Vec<[u32; 2]> = fan
+        .iter()
+        .map(|&[a, b, c]| {
+            if a == p {
+                [b, c]
+            } else if b == p {
+                [c, a]
+            } else {
+                [a, b]
+            }
+        })
+        .collect();
+    let start = links.iter().map(|l| l[0]).find(|v| links.iter().all(|l| l[1] != *v));
+    let mut outline = vec![start.unwrap_or(links[0][0])];
+    while let Some(link) = links.iter().find(|l| Some(&l[0]) == outline.last()) {
+        if link[1] == outline[0] {
+            break;
+        }
+        outline.push(link[1]);
+    }
+    outline
+}
+
+/// The sectors of the ball of p, with the patches in place of the facets at p.
+fn sectors(
+    mesh: &Tetrahedra,
+    constraints: &Constraints,
+    p: u32,
+    patches: &BTreeMap<u32, Vec<[u32; 3]>>,
+) -> Vec<Sector> {
+    let ball = ball(mesh, p);
+    let mut sector_of: BTreeMap<u32, usize> = BTreeMap::new();
+    let mut sectors: Vec<Sector> = Vec::new();
+    for &first in &ball {
+        if sector_of.contains_key(&first) {
+            continue;
+        }
+        let mut sector = Sector { body: mesh.bodies[first as usize], tets: vec![first], ..Sector::default() };
+        sector_of.insert(first, sectors.len());
+        let mut next = 0;
+        let mut sides: Vec<(u32, bool)> = Vec::new();
+        while let Some(&t) = sector.tets.get(next) {
+            next += 1;
+            for half_face in 4 * t..4 * t + 4 {
+                let face = mesh.face(half_face);
+                let other = mesh.across(half_face);
+                if !face.contains(&p) {
+                    sector.walls.push(half_face);
+                } else if mesh.is_locked(half_face) {
+                    let facet = constraints.facet(face).expect("a locked face is a facet");
+                    let facet = &constraints.facets[facet as usize];
+                    sides.push((facet.triangle, super::carve::is_even(face, facet.vertices)));
+                } else if sector_of.insert(other >> 2, sectors.len()).is_none() {
+                    sector.tets.push(other >> 2);
+                }
+            }
+        }
+        sides.sort_unstable();
+        sides.dedup();
+        for (triangle, outward) in sides {
+            let turned = |&[a, b, c]: &[u32; 3]| if outward { [a, b, c] } else { [a, c, b] };
+            sector.fresh.extend(patches[&triangle].iter().map(turned));
+        }
+        sector.set_skin(mesh);
+        sectors.push(sector);
+    }
+    sectors
+}
+
+/// All tets at a vertex, also where locked faces and the outside part them.
+fn ball(mesh: &Tetrahedra, p: u32) -> Vec<u32> {
+    // A walk through faces might miss tets behind the outside: points on the skin are few, look at all.
+    mesh.alive().filter(|&t| mesh.tets[t as usize].contains(&p)).collect()
+}
+
+/// The worst mean ratio of a sector filled from a point; negative if some tet were not positive.
+fn worst(mesh: &Tetrahedra, skin: &[[u32; 3]], apex: &Point, own: u32, floor: f64) -> f64 {
+    let mut worst = f64::INFINITY;
+    for face in skin.iter().filter(|face| !face.contains(&own)) {
+        let [a, b, c] = face.map(|v| mesh.point(v));
+        if orient3d(apex, a, b, c) != Sign::Positive {
+            return f64::NEG_INFINITY;
+        }
+        worst = worst.min(mean_ratio(apex, a, b, c).max(0.0));
+        if worst < floor {
+            return worst;
+        }
+    }
+    worst
+}
+
+impl Sector {
+    fn set_skin(&mut self, mesh: &Tetrahedra) {
+        self.skin.clear();
+        self.skin.extend(self.walls.iter().map(|&w| mesh.face(w)));
+        self.skin.extend_from_slice(&self.fresh);
+    }
+
+    /// Takes in the tets behind those walls that a point does not see; false where there are none to take.
+    fn grow(&mut self, mesh: &Tetrahedra, point: &Point) -> bool {
+        let unseen = |wall: &u32| {
+            let [a, b, c] = mesh.face(*wall).map(|v| mesh.point(v));
+            orient3d(point, a, b, c) != Sign::Positive
+        };
+        let before = self.tets.len();
+        for wall in self.walls.clone() {
+            let behind = mesh.across(wall);
+            if unseen(&wall) && behind != NONE && !mesh.is_locked(wall) && !self.tets.contains(&(behind >> 2))
+            {
+                self.tets.push(behind >> 2);
+            }
+        }
+        let half_faces = self.tets[before..].iter().flat_map(|&t| 4 * t..4 * t + 4);
+        self.walls.extend(half_faces);
+        let inner = |w: &u32| {
+            let behind = mesh.across(*w);
+            behind != NONE && !mesh.is_locked(*w) && self.tets.contains(&(behind >> 2))
+        };
+        self.walls.retain(|w| !inner(w));
+        self.set_skin(mesh);
+        self.tets.len() > before
+    }
+
+    /// Whether every vertex of its tets but p is on its surface.
+    fn keeps_vertices(&self, mesh: &Tetrahedra, p: u32) -> bool {
+        self.tets
+            .iter()
+            .flat_map(|&t| mesh.tets[t as usize])
+            .all(|v| v == p || self.skin.iter().any(|f| f.contains(&v)))
+    }
+}
+
+/// From where to fill a sector, which takes in tets behind walls as long as no place sees it all: where the
+/// surface is flat up to rounding, p may lie on the wrong side of an edge of the mesh.
+fn grow_and_find(mesh: &Tetrahedra, sector: &mut Sector, p: u32) -> Option<Apex> {
+    /// Each time the walls around move one tet away; what lies that far is no matter of rounding.
+    const GROWTHS: usize = 6;
+    /// Where to look from: this fraction of the sector's size off the surface.
+    const OFF: f64 = 0.01;
+    for _ in 0..GROWTHS {
+        if let Some(apex) = find_apex(mesh, sector, p) {
+            return Some(apex);
+        }
+        let (inward, _) = directions(mesh, sector, p);
+        let grown = sector.grow(mesh, &(mesh.point(p) + inward * OFF));
+        if !grown || !sector.keeps_vertices(mesh, p) {
+            return None;
+        }
+    }
+    None
+}
+
+/// From where to fill a sector as it is.
+fn find_apex(mesh: &Tetrahedra, sector: &Sector, p: u32) -> Option<Apex> {
+    let mut own: Vec<u32> = sector.skin.iter().flatten().copied().collect();
+    own.sort_unstable();
+    own.dedup();
+    let mut best = (f64::NEG_INFINITY, None);
+    for &v in &own {
+        let quality = worst(mesh, &sector.skin, mesh.point(v), v, best.0);
+        if quality > best.0 {
+            best = (quality, Some(Apex::Own(v)));
+        }
+    }
+    if best.0 >= GOOD_ENOUGH {
+        return best.1;
+    }
+    if let Some((quality, point)) = find_place(mesh, sector, p, &own)
+        && quality > best.0
+    {
+        best = (quality, Some(Apex::New(point)));
+    }
+    best.1
+}
+
+/// A place inside a sector that sees all of its skin, and the worst mean ratio from there.
+fn find_place(mesh: &Tetrahedra, sector: &Sector, p: u32, own: &[u32]) -> Option<(f64, Point)> {
+    let start = *mesh.point(p);
+    let n = own.len() as f64;
+    let to_center = own.iter().map(|&v| mesh.point(v) - start).sum::<Vector>() / n;
+    let (inward, reach) = directions(mesh, sector, p);
+    let mut best = (f64::NEG_INFINITY, start);
+    for k in 0..HALVINGS {
+        let step = 0.5f64.powi(k);
+        for way in [to_center, inward, 0.5 * (to_center + inward)] {
+            let point = start + way * step;
+            let quality = worst(mesh, &sector.skin, &point, NONE, best.0);
+            if quality > best.0 {
+                best = (quality, point);
+            }
+        }
+    }
+    if best.0 < 0.0 {
+        return None;
+    }
+    Some(climb(mesh, sector, best, reach))
+}
+
+/// Away from the facets at p, as long as the sector reaches; and how far that is.
+fn directions(mesh: &Tetrahedra, sector: &Sector, p: u32) -> (Vector, f64) {
+    let start = mesh.point(p);
+    let reach = sector.skin.iter().flatten().map(|&v| (mesh.point(v) - start).norm()).fold(0.0, f64::max);
+    let inward = sector.fresh.iter().fold(Vector::zeros(), |sum, face| {
+        let [a, b, c] = face.map(|v| mesh.point(v));
+        sum - (b - a).cross(&(c - a)).normalize()
+    });
+    (inward.try_normalize(0.0).unwrap_or_else(Vector::zeros) * reach, reach)
+}
+
+/// Moves a place along the axes as long as the worst mean ratio grows.
+fn climb(mesh: &Tetrahedra, sector: &Sector, from: (f64, Point), reach: f64) -> (f64, Point) {
+    /// Enough for the steps to shrink well below the distances that matter for shape.
+    const STEPS: usize = 60;
+    let mut best = from;
+    let mut step = 0.25 * reach;
+    for _ in 0..STEPS {
+        let before = best.0;
+        for way in [Vector::x(), Vector::y(), Vector::z()] {
+            for sign in [1.0, -1.0] {
+                let point = best.1 + way * (sign * step);
+                let quality = worst(mesh, &sector.skin, &point, NONE, best.0);
+                if quality > best.0 {
+                    best = (quality, point);
+                }
+            }
+        }
+        if best.0 == before {
+            step *= 0.5;
+        }
+    }
+    best
+}

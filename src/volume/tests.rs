@@ -1,0 +1,340 @@
+//! Whole surfaces through the volume mesher.
+
+use super::samples::{INSIDE, Soup, check_fills};
+use super::*;
+use crate::size::UniformSize;
+use csg::BodyId;
+
+const A: Option<BodyId> = Some(BodyId(0));
+const B: Option<BodyId> = Some(BodyId(1));
+
+const EMPTY: Settings = Settings { fill: false, max_tets: 1 << 20 };
+
+/// Meshes a surface without and with points inside, checks both and returns the report of the latter.
+fn filled(soup: Soup, size: f64) -> Report {
+    let surface = soup.surface().unwrap();
+    let (empty, bare) = mesh(&surface, &UniformSize(size), &EMPTY).unwrap();
+    check_fills(&surface, &empty);
+    let (full, report) = mesh(&surface, &UniformSize(size), &Settings::default()).unwrap();
+    check_fills(&surface, &full);
+    assert_eq!(report, Report { points_inside: report.points_inside, ..bare });
+    assert_eq!(full.points.len(), surface.points().len() + report.steiner_inside + report.points_inside);
+    report
+}
+
+#[test]
+fn cubes_with_any_number_of_squares_are_filled() {
+    for n in [1, 2, 3, 8, 13u32] {
+        let mut soup = Soup::default();
+        soup.brick([0.; 3], [1.; 3], n as usize, INSIDE);
+        assert_eq!(filled(soup, 1.0 / f64::from(n)).steiner_inside, 0, "{n} squares a side");
+    }
+}
+
+#[test]
+fn turned_cubes_whose_sides_are_flat_up_to_rounding_are_filled() {
+    for k in 0..10 {
+        let mut soup = Soup::default();
+        soup.brick([-1.; 3], [1.; 3], 6, INSIDE);
+        let turn = nalgebra::Rotation3::from_euler_angles(0.1 * f64::from(k), 0.7, 0.3 * f64::from(k));
+        soup.map(|p| turn * p);
+        filled(soup, 0.25);
+    }
+}
+
+#[test]
+fn a_cube_in_a_cube_is_a_hole_or_a_body() {
+    for inner in [None, B] {
+        for (n, m) in [(1, 1), (4, 1), (1, 4), (6, 5)] {
+            let mut soup = Soup::default();
+            soup.brick([0.; 3], [1.; 3], n, INSIDE);
+            soup.brick([0.3; 3], [0.6; 3], m, [inner, A]);
+            filled(soup, 0.25);
+        }
+    }
+}
+
+#[test]
+fn two_cubes_share_a_face() {
+    for n in [1, 2, 5] {
+        let mut soup = Soup::default();
+        for (axis, upper) in [(0, false), (1, false), (1, true), (2, false), (2, true)] {
+            soup.brick_side([0.; 3], [1.; 3], n, axis, upper, [A, None]);
+        }
+        for (axis, upper) in [(0, true), (1, false), (1, true), (2, false), (2, true)] {
+            soup.brick_side([1., 0., 0.], [2., 1., 1.], n, axis, upper, [B, None]);
+        }
+        soup.brick_side([0.; 3], [1.; 3], n, 0, true, [A, B]);
+        filled(soup, 0.25);
+    }
+}
+
+#[test]
+fn cubes_that_touch_in_a_vertex_or_an_edge_are_filled() {
+    for high in [[2.; 3], [2., 2., 1.]] {
+        for n in [1, 3] {
+            let mut soup = Soup::default();
+            soup.brick([0.; 3], [1.; 3], n, INSIDE);
+            let low = [1., 1., high[2] - 1.];
+            soup.brick(low, high, n, INSIDE);
+            filled(soup, 0.25);
+        }
+    }
+}
+
+#[test]
+fn spheres_and_tori_are_filled() {
+    for levels in 0..5 {
+        let mut soup = Soup::default();
+        soup.sphere(Point::new(0.1, 0.2, 0.3), 0.7, levels, INSIDE);
+        filled(soup, 0.25);
+    }
+    for (m, n) in [(3, 3), (8, 5), (24, 12), (60, 8), (10, 40)] {
+        let mut soup = Soup::default();
+        soup.torus([1.0, 0.4], [m, n], INSIDE);
+        filled(soup, 0.25);
+    }
+}
+
+#[test]
+fn a_sphere_in_a_cube_is_filled_from_both_sides() {
+    for (n, levels) in [(1, 0), (1, 3), (6, 1), (8, 3)] {
+        let mut soup = Soup::default();
+        soup.brick([-1.; 3], [1.; 3], n, INSIDE);
+        soup.sphere(Point::origin(), 0.6, levels, [B, A]);
+        filled(soup, 0.25);
+    }
+}
+
+#[test]
+fn thin_plates_are_filled() {
+    for thickness in [1e-1, 1e-2, 1e-3, 1e-6, 1e-9] {
+        let mut soup = Soup::default();
+        soup.brick([0.; 3], [1., 1., thickness], 8, INSIDE);
+        filled(soup, 0.25);
+    }
+}
+
+#[test]
+fn extreme_units_change_nothing() {
+    let build = |scale: f64| {
+        let mut soup = Soup::default();
+        soup.torus([1.0, 0.4], [12, 6], INSIDE);
+        soup.map(|p| p * scale);
+        let surface = soup.surface().unwrap();
+        mesh(&surface, &UniformSize(1.0), &EMPTY).unwrap().0.tets
+    };
+    assert_eq!(build(1.0), build(2f64.powi(-300)));
+    assert_eq!(build(1.0), build(2f64.powi(300)));
+}
+
+/// The Schönhardt polyhedron: a prism whose top is turned so that its sides bend inward along their diagonals. It has no
+/// tetrahedralisation without a point inside.
+fn schoenhardt(turn: f64) -> Soup {
+    let at = |angle: f64, z: f64| Point::new(angle.cos(), angle.sin(), z);
+    let third = std::f64::consts::TAU / 3.0;
+    let low: Vec<Point> = (0..3).map(|i| at(third * f64::from(i), 0.0)).collect();
+    let high: Vec<Point> = (0..3).map(|i| at(third * f64::from(i) + turn, 1.0)).collect();
+    let mut soup = Soup::default();
+    soup.add([low[0], low[2], low[1]], INSIDE);
+    soup.add([high[0], high[1], high[2]], INSIDE);
+    for i in 0..3 {
+        let j = (i + 1) % 3;
+        // The diagonal that makes the side concave for a turn in the negative sense.
+        soup.add([low[i], low[j], high[i]], INSIDE);
+        soup.add([low[j], high[j], high[i]], INSIDE);
+    }
+    soup
+}
+
+#[test]
+fn the_schoenhardt_polyhedron_gets_one_point_inside() {
+    for degrees in [1.0f64, 10.0, 30.0, 45.0, 55.0] {
+        for sign in [1.0, -1.0] {
+            let report = filled(schoenhardt(sign * degrees.to_radians()), 2.0);
+            // Turned the other way it is convex.
+            assert_eq!(report.steiner_inside, usize::from(sign < 0.0), "{degrees} degrees");
+        }
+    }
+}
+
+/// Any surface between tets of some mesh can be filled. A lattice of n³ cubes of six tets each, squeezed and sheared so
+/// that it is far from Delaunay, each tet in one of two bodies or in none: surfaces that touch themselves everywhere.
+fn lattice_skin(n: u32, squeeze: [f64; 3], shear: f64, bend: f64, mut body: impl FnMut() -> Option<BodyId>) -> Soup {
+    let at = |c: [u32; 3]| {
+        let [x, y, z] = [0, 1, 2].map(|k| f64::from(c[k]) * squeeze[k]);
+        // Triangular, so every tet keeps its volume.
+        Point::new(x, y + shear * x, z + shear * y + bend * (x * x + y * y))
+    };
+    let mut sides = std::collections::BTreeMap::<[[u32; 3]; 3], Vec<([[u32; 3]; 3], Option<BodyId>)>>::new();
+    for i in 0..n * n * n {
+        let base = [i % n, i / n % n, i / n / n];
+        for path in [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]] {
+            let mut tet = [base; 4];
+            for (k, &axis) in path.iter().enumerate() {
+                tet[k + 1] = tet[k];
+                tet[k + 1][axis] += 1;
+            }
+            let [a, b, c, d] = tet.map(at);
+            if crate::kernel::simplex::volume6(&a, &b, &c, &d) < 0.0 {
+                tet.swap(0, 1);
+            }
+            let body = body();
+            for face in crate::mesh::TET_FACES {
+                let face = face.map(|k| tet[k]);
+                let mut key = face;
+                key.sort_unstable();
+                sides.entry(key).or_default().push((face, body));
+            }
+        }
+    }
+    let mut soup = Soup::default();
+    for found in sides.values() {
+        let (face, behind) = found[0];
+        let front = found.get(1).and_then(|other| other.1);
+        if behind != front {
+            soup.add(face.map(at), [behind, front]);
+        }
+    }
+    soup
+}
+
+#[test]
+fn skins_of_random_bodies_in_a_bent_lattice_are_filled() {
+    let mut random = crate::kernel::random::Random::new(11);
+    for case in 0..60 {
+        let squeeze = [0, 1, 2].map(|_| 0.15 + random.unit());
+        let (shear, bend) = (5.0 * random.unit() - 2.5, 1.0 * random.unit() * f64::from(case % 2));
+        let n = 2 + case % 3;
+        let soup = lattice_skin(n, squeeze, shear, bend, || match random.bits() % 4 {
+            0 | 1 => None,
+            2 => A,
+            _ => B,
+        });
+        filled(soup, 0.25);
+    }
+}
+
+#[test]
+fn the_same_input_gives_the_same_mesh_and_the_wanted_number_of_tets() {
+    let size = 0.1;
+    let build = || {
+        let mut soup = Soup::default();
+        soup.sphere(Point::origin(), 1.0, 4, INSIDE);
+        let surface = soup.surface().unwrap();
+        mesh(&surface, &UniformSize(size), &Settings::default()).unwrap().0
+    };
+    let (one, other) = (build(), build());
+    assert_eq!(one.points, other.points);
+    assert_eq!(one.tets, other.tets);
+    let volume = 4.0 / 3.0 * std::f64::consts::PI;
+    let ratio = one.tets.len() as f64 / (6.0 * 2f64.sqrt() * volume / size.powi(3));
+    assert!((0.7..1.3).contains(&ratio), "{ratio}");
+}
+
+struct Graded;
+
+impl SizeField for Graded {
+    fn size_at(&self, point: &Point) -> f64 {
+        0.03 + 0.2 * (point - Point::origin()).norm()
+    }
+}
+
+#[test]
+fn tets_follow_a_graded_size() {
+    let mut soup = Soup::default();
+    soup.brick([-1.; 3], [1.; 3], 8, INSIDE);
+    let surface = soup.surface().unwrap();
+    let (mesh, _) = mesh(&surface, &Graded, &Settings::default()).unwrap();
+    check_fills(&surface, &mesh);
+    let mut ratios: Vec<f64> = Vec::new();
+    for tet in &mesh.tets {
+        for [i, j] in crate::mesh::TET_EDGES {
+            let [p, q] = [tet[i], tet[j]].map(|v| mesh.points[v as usize]);
+            let middle = nalgebra::center(&p, &q);
+            if middle.coords.amax() < 0.7 {
+                ratios.push((p - q).norm() / Graded.size_at(&middle));
+            }
+        }
+    }
+    ratios.sort_by(f64::total_cmp);
+    let (low, median, high) = (ratios[0], ratios[ratios.len() / 2], ratios[ratios.len() - 1]);
+    assert!(low > 0.5 && (0.85..1.15).contains(&median) && high < 2.0, "{low} {median} {high}");
+}
+
+#[test]
+fn kept_points_become_vertices_and_others_are_refused() {
+    let mut soup = Soup::default();
+    soup.brick([0.; 3], [1.; 3], 3, INSIDE);
+    let surface = soup.surface().unwrap();
+    let kept = vec![Point::new(0.5, 0.5, 0.5), Point::new(0.51, 0.5, 0.5), Point::new(0.01, 0.3, 0.4)];
+    let wanted = surface.clone().with_kept_points(kept.clone());
+    for settings in [EMPTY, Settings::default()] {
+        let (mesh, _) = mesh(&wanted, &UniformSize(0.3), &settings).unwrap();
+        check_fills(&wanted, &mesh);
+        for p in &kept {
+            assert!(mesh.points.contains(p));
+        }
+    }
+    for (point, fault) in [
+        (Point::new(2.0, 0.5, 0.5), KeptPointFault::Outside),
+        (Point::new(0.0, 0.5, 0.5), KeptPointFault::OnSurface),
+        (Point::new(1.0, 1.0, 0.5), KeptPointFault::OnSurface),
+        (Point::new(1.0, 1.0, 1.0), KeptPointFault::Twice),
+    ] {
+        let refused = surface.clone().with_kept_points(vec![kept[0], point]);
+        let error = mesh(&refused, &UniformSize(0.3), &EMPTY).unwrap_err();
+        assert_eq!(error, VolumeError::KeptPoint { index: 1, place: point, fault });
+    }
+}
+
+#[test]
+fn bad_sizes_and_too_many_tets_are_errors() {
+    let mut soup = Soup::default();
+    soup.brick([0.; 3], [1.; 3], 2, INSIDE);
+    let surface = soup.surface().unwrap();
+    for size in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        let error = mesh(&surface, &UniformSize(size), &Settings::default()).unwrap_err();
+        assert!(matches!(error, VolumeError::BadSize { .. }), "{error}");
+    }
+    let few = Settings { max_tets: 1000, ..Settings::default() };
+    let error = mesh(&surface, &UniformSize(1e-3), &few).unwrap_err();
+    assert_eq!(error, VolumeError::TooManyTets { limit: 1000 });
+}
+
+#[test]
+fn surfaces_that_intersect_are_refused_with_the_place() {
+    // Two cubes, one shifted into the other; and a cube pierced by a needle.
+    let mut cubes = Soup::default();
+    cubes.brick([0.; 3], [1.; 3], 2, INSIDE);
+    cubes.brick([0.7, 0.6, 0.55], [1.7, 1.6, 1.55], 2, INSIDE);
+    let mut needle = Soup::default();
+    needle.brick([0.; 3], [1.; 3], 2, INSIDE);
+    needle.brick([0.3, 0.31, -0.5], [0.32, 0.33, 1.5], 1, INSIDE);
+    for soup in [cubes, needle] {
+        let surface = soup.surface().unwrap();
+        match mesh(&surface, &UniformSize(1.0), &Settings::default()).unwrap_err() {
+            VolumeError::SelfIntersection { triangles, places } => {
+                assert!(!triangles.is_empty() && triangles.len() == places.len());
+            }
+            other => panic!("{other}"),
+        }
+    }
+}
+
+#[test]
+fn bodies_inside_out_are_refused() {
+    // A void that names another body than the one around it.
+    let mut soup = Soup::default();
+    soup.brick([0.; 3], [1.; 3], 1, INSIDE);
+    soup.brick([0.3; 3], [0.6; 3], 1, [None, B]);
+    let surface = soup.surface().unwrap();
+    let error = mesh(&surface, &UniformSize(1.0), &Settings::default()).unwrap_err();
+    assert!(matches!(error, VolumeError::Inconsistent { .. }), "{error}");
+    // A body on the outside.
+    let mut soup = Soup::default();
+    soup.brick([0.; 3], [1.; 3], 1, [None, A]);
+    let surface = soup.surface().unwrap();
+    let error = mesh(&surface, &UniformSize(1.0), &Settings::default()).unwrap_err();
+    assert!(matches!(error, VolumeError::Inconsistent { .. }), "{error}");
+}
