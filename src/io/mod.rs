@@ -20,7 +20,7 @@ pub mod plain;
 pub mod serial;
 pub mod skin;
 #[cfg(test)]
-mod testing;
+pub(crate) mod testing;
 pub mod text;
 pub mod vtu;
 

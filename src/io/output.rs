@@ -13,10 +13,11 @@
 //! ```
 //! Not promised: two folders are not swapped in the same instant, so a machine that loses power between two
 //! renames may show a new `partitioning.4` beside old names; a process killed by a signal leaves its staging
-//! folder, which no reader takes for a mesh.
+//! folder, which no reader takes for a mesh, and which the next writer to the target removes.
 
 use super::{WriteError, agree};
 use crate::comm::Communicator;
+use fs4::FileExt;
 use std::fs::{self, File};
 use std::io::{self, Seek, Write};
 use std::path::{Path, PathBuf};
@@ -123,6 +124,8 @@ struct Staging {
     target: PathBuf,
     target_is_new: bool,
     stage: PathBuf,
+    /// Locked as long as this process works on the stage; see [`remove_abandoned`].
+    lock: Option<File>,
     /// Set where the old files could not be put back: they are in the stage, which must then stay.
     keep: bool,
 }
@@ -131,13 +134,14 @@ impl Staging {
     fn begin(target: &Path, needed: u64) -> Result<Self, WriteError> {
         let target_is_new = !target.exists();
         fs::create_dir_all(target).map_err(WriteError::io(target))?;
+        remove_abandoned(target);
+        let stage = new_folder(target)?;
         let mut staging =
-            Self { target: target.to_path_buf(), target_is_new, stage: target.to_path_buf(), keep: true };
-        staging.stage = new_folder(target)?;
-        staging.keep = false;
+            Self { target: target.to_path_buf(), target_is_new, stage, lock: None, keep: false };
         for folder in [staging.new_entries(), staging.old_entries()] {
             fs::create_dir(&folder).map_err(WriteError::io(&folder))?;
         }
+        staging.lock = Some(lock(&staging.stage)?);
         let available = fs4::available_space(target).map_err(WriteError::io(target))?;
         if needed > available {
             return Err(WriteError::NoSpace { path: target.to_path_buf(), needed, available });
@@ -227,6 +231,7 @@ impl Drop for Staging {
         if self.keep {
             return;
         }
+        self.lock = None;
         // Nothing can be done here about a folder that does not go: it bears a name that no reader takes for a mesh.
         let _ = fs::remove_dir_all(&self.stage);
         if self.target_is_new {
@@ -235,10 +240,13 @@ impl Drop for Staging {
     }
 }
 
+/// How the name of a staging folder begins and ends.
+const STAGE: (&str, &str) = (".tetmill-", ".partial");
+
 /// A new folder in `target` with a name that no process has.
 fn new_folder(target: &Path) -> Result<PathBuf, WriteError> {
     for attempt in 0_u32.. {
-        let path = target.join(format!(".tetmill-{}-{attempt}.partial", std::process::id()));
+        let path = target.join(format!("{}{}-{attempt}{}", STAGE.0, std::process::id(), STAGE.1));
         match fs::create_dir(&path) {
             Ok(()) => return Ok(path),
             Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
@@ -246,6 +254,31 @@ fn new_folder(target: &Path) -> Result<PathBuf, WriteError> {
         }
     }
     unreachable!("one of 2^32 names is free")
+}
+
+/// Creates the stage's lock. It gets its name when it is held, so that nobody takes the stage for abandoned before.
+fn lock(stage: &Path) -> Result<File, WriteError> {
+    let (early, path) = (stage.join("lock.new"), stage.join("lock"));
+    let file = File::create(&early).map_err(WriteError::io(&early))?;
+    // Some file systems know no locks: there an abandoned stage looks as one in use, if anyone asks.
+    let _ = FileExt::lock(&file);
+    fs::rename(&early, &path).map_err(WriteError::io(&path))?;
+    Ok(file)
+}
+
+/// Removes stages whose process ended without tidying up (a signal, a crash), unless they hold old files that
+/// were moved aside. Whatever can't be looked into or removed stays: it does no harm but take room.
+fn remove_abandoned(target: &Path) {
+    for name in entries(target).unwrap_or_default() {
+        let is_stage = name.to_str().is_some_and(|name| name.starts_with(STAGE.0) && name.ends_with(STAGE.1));
+        let stage = target.join(&name);
+        if !is_stage || !entries(&stage.join("old")).is_ok_and(|old| old.is_empty()) {
+            continue;
+        }
+        if File::open(stage.join("lock")).is_ok_and(|lock| FileExt::try_lock(&lock).is_ok()) {
+            let _ = fs::remove_dir_all(&stage);
+        }
+    }
 }
 
 /// The names in a folder, sorted.
@@ -421,6 +454,27 @@ mod tests {
         drop(staging);
         assert_eq!(names(dir.path()), ["a"]);
         assert_eq!(fs::read_to_string(dir.path().join("a")).unwrap(), "old");
+    }
+
+    #[test]
+    fn what_a_killed_process_left_goes_and_what_a_living_one_writes_stays() {
+        let dir = tempfile::tempdir().unwrap();
+        let abandoned = |name: &str| {
+            let stage = dir.path().join(name);
+            fs::create_dir_all(stage.join("new")).unwrap();
+            fs::create_dir_all(stage.join("old")).unwrap();
+            fs::write(stage.join("lock"), "").unwrap();
+            stage
+        };
+        abandoned(".tetmill-1-0.partial");
+        let aside = abandoned(".tetmill-2-0.partial");
+        fs::write(aside.join("old/mesh.names"), "the last copy").unwrap();
+        let living = Staging::begin(dir.path(), 0).unwrap();
+        let own = living.stage.file_name().unwrap().to_str().unwrap().to_string();
+        write_file(&dir.path().join("f"), 0, |path| write_text(path, b"new")).unwrap();
+        let mut expected = vec![".tetmill-2-0.partial".to_string(), own, "f".to_string()];
+        expected.sort();
+        assert_eq!(names(dir.path()), expected);
     }
 
     #[test]

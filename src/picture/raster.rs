@@ -1,7 +1,7 @@
 //! Triangles to pixels: a depth buffer, flat shading, and the triangles' edges as thin lines.
 
 use super::color::Color;
-use super::scene::Scene;
+use super::scene::{Scene, Triangle};
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
@@ -84,8 +84,8 @@ struct Drawn {
 }
 
 /// The directions to the right and down in the image, and away from the viewer.
-fn directions(settings: &Settings) -> [Vector3<f32>; 3] {
-    let (a, e) = (settings.azimuth.to_radians() as f32, settings.elevation.to_radians() as f32);
+fn directions(settings: &Settings) -> [Vector3<f64>; 3] {
+    let (a, e) = (settings.azimuth.to_radians(), settings.elevation.to_radians());
     let away = -Vector3::new(a.cos() * e.cos(), a.sin() * e.cos(), e.sin());
     let right = Vector3::new(-a.sin(), a.cos(), 0.0);
     [right, away.cross(&right), away]
@@ -94,26 +94,27 @@ fn directions(settings: &Settings) -> [Vector3<f32>; 3] {
 /// Brings the scene to the image and shades it.
 fn place(scene: &Scene, settings: &Settings, width: u32, height: u32) -> Vec<Drawn> {
     let axes = directions(settings);
-    let turn = |corner: [f32; 3]| axes.map(|axis| axis.dot(&Vector3::from(corner)));
-    let turned: Vec<[[f32; 3]; 3]> = scene.triangles.iter().map(|t| t.corners.map(turn)).collect();
-    let (mut low, mut high) = ([f32::INFINITY; 2], [f32::NEG_INFINITY; 2]);
+    let turn = |corner: [f64; 3]| axes.map(|axis| axis.dot(&Vector3::from(corner)));
+    let turned: Vec<[[f64; 3]; 3]> = scene.triangles.iter().map(|t| t.corners.map(turn)).collect();
+    let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
     for corner in turned.iter().flatten() {
-        for k in 0..2 {
+        for k in 0..3 {
             low[k] = low[k].min(corner[k]);
             high[k] = high[k].max(corner[k]);
         }
     }
-    let size = [width as f32, height as f32];
-    let room = 1.0 - 2.0 * settings.margin;
-    let fit = |k: usize| room * size[k] / (high[k] - low[k]).max(f32::MIN_POSITIVE);
+    let size = [f64::from(width), f64::from(height)];
+    let room = 1.0 - 2.0 * f64::from(settings.margin);
+    let fit = |k: usize| room * size[k] / (high[k] - low[k]).max(f64::MIN_POSITIVE);
     let scale = fit(0).min(fit(1));
-    let to_pixel = |c: [f32; 3]| {
-        let at = |k: usize| 0.5 * size[k] + scale * (c[k] - 0.5 * (low[k] + high[k]));
-        [at(0), at(1), scale * c[2]]
+    // In single precision only from here on, where numbers are as small as the image.
+    let to_pixel = |c: [f64; 3]| {
+        let from_middle = |k: usize| scale * (c[k] - 0.5 * (low[k] + high[k]));
+        [0.5 * size[0] + from_middle(0), 0.5 * size[1] + from_middle(1), from_middle(2)].map(|x| x as f32)
     };
-    let draw = |(corners, triangle): (&[[f32; 3]; 3], &super::scene::Triangle)| Drawn {
-        corners: corners.map(to_pixel),
-        color: triangle.color.map(|c| c * brightness(corners)),
+    let draw = |(corners, triangle): (&[[f64; 3]; 3], &Triangle)| {
+        let corners = corners.map(to_pixel);
+        Drawn { corners, color: triangle.color.map(|c| c * brightness(&corners)) }
     };
     turned.iter().zip(&scene.triangles).map(draw).collect()
 }
@@ -222,7 +223,6 @@ fn mixed(color: Color, other: Color, share: f32) -> Color {
 
 #[cfg(test)]
 mod tests {
-    use super::super::scene::Triangle;
     use super::*;
 
     const RED: Color = [1.0, 0.0, 0.0];
@@ -242,7 +242,7 @@ mod tests {
     }
 
     /// Half the square −1 … 1 in y and z, at this x.
-    fn half(x: f32, color: Color) -> Triangle {
+    fn half(x: f64, color: Color) -> Triangle {
         Triangle { corners: [[x, -1., -1.], [x, 1., -1.], [x, -1., 1.]], color }
     }
 
@@ -278,7 +278,8 @@ mod tests {
 
     #[test]
     fn every_number_of_threads_draws_the_same() {
-        let triangles = (0..50).map(|k| half((k as f32).sin(), super::super::color::of_number(k))).collect();
+        let triangles =
+            (0..50).map(|k| half(f64::from(k).sin(), super::super::color::of_number(k))).collect();
         let scene = Scene { triangles };
         let draw = |threads: usize| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();

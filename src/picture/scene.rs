@@ -10,7 +10,7 @@ use csg::PatchId;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Triangle {
     /// Its corners, in the mesh's unit of length.
-    pub corners: [[f32; 3]; 3],
+    pub corners: [[f64; 3]; 3],
     /// Its colour.
     pub color: Color,
 }
@@ -59,7 +59,7 @@ pub fn scene_of_part(part: &dyn MeshStream, look: &Look) -> Scene {
         ColorBy::Part | ColorBy::Body => vec![None; faces.len()],
     };
     let triangle = |(face, patch): (&SkinFace, Option<PatchId>)| Triangle {
-        corners: face.vertices.map(|v| part.points()[v as usize].map(|x| x as f32)),
+        corners: face.vertices.map(|v| part.points()[v as usize]),
         color: match (look.color_by, patch) {
             (ColorBy::Part, _) => of_number(part.rank()),
             (ColorBy::Body, _) => of_number(face.body.0),
@@ -78,13 +78,51 @@ fn is_behind(cut: &Cut, tet: &[[f64; 3]; 4]) -> bool {
 /// **Collective.** Rank 0 gets the scenes of all ranks as one, the others `None`.
 pub fn gather(comm: &dyn Communicator, scene: &Scene) -> Result<Option<Scene>, CommError> {
     const NUMBERS: usize = 12;
-    let pack = |t: &Triangle| t.corners.into_iter().flatten().chain(t.color).collect::<Vec<f32>>();
-    let numbers: Vec<f32> = scene.triangles.iter().flat_map(pack).collect();
-    let all = comm.gather::<f32>(0, &numbers)?;
-    let unpack = |n: &[f32; NUMBERS]| Triangle {
+    let mut numbers: Vec<f64> = Vec::with_capacity(NUMBERS * scene.triangles.len());
+    for triangle in &scene.triangles {
+        numbers.extend(triangle.corners.as_flattened());
+        numbers.extend(triangle.color.map(f64::from));
+    }
+    let all = comm.gather(0, &numbers)?;
+    let unpack = |n: &[f64; NUMBERS]| Triangle {
         corners: [[n[0], n[1], n[2]], [n[3], n[4], n[5]], [n[6], n[7], n[8]]],
-        color: [n[9], n[10], n[11]],
+        color: [n[9] as f32, n[10] as f32, n[11] as f32],
     };
     let triangles = all.iter().flat_map(|numbers| numbers.as_chunks().0.iter().map(unpack)).collect();
     Ok((comm.rank() == 0).then_some(Scene { triangles }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::io::plain::PlainPart;
+    use crate::io::testing::{cube, slabs, together};
+
+    #[test]
+    fn rank_0_gets_the_scenes_of_all_parts_in_their_colours() {
+        let mesh = cube(2);
+        let look = Look { color_by: ColorBy::Part, cut: None };
+        let scenes = together(2, |comm| {
+            let part = PlainPart::part(&mesh, &slabs(&mesh, 2), 2, comm.rank());
+            let own = scene_of_part(&part, &look);
+            let all = gather(comm, &own).unwrap();
+            (own, all)
+        });
+        assert!(scenes[1].1.is_none());
+        let all = scenes[0].1.as_ref().unwrap();
+        let expected: Vec<Triangle> = scenes.iter().flat_map(|(own, _)| own.triangles.clone()).collect();
+        assert_eq!(all.triangles, expected);
+        assert_ne!(scenes[0].0.triangles[0].color, scenes[1].0.triangles[0].color);
+    }
+
+    #[test]
+    fn a_cut_shows_the_tets_behind_it() {
+        let look = Look {
+            color_by: ColorBy::Body,
+            cut: Some(Cut { point: [0.0, 0.0, 1.0 / 3.0], normal: [0.0, 0.0, 2.0] }),
+        };
+        let scene = scene_of_part(&PlainPart::whole(&cube(2)), &look);
+        assert_eq!(scene.triangles.len(), 8 + 4 * 4 + 8, "the lower half");
+        assert!(scene.triangles.iter().all(|t| t.color == of_number(0)));
+    }
 }

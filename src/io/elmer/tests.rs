@@ -5,6 +5,7 @@ use crate::comm::Communicator;
 use crate::io::plain::PlainPart;
 use crate::io::testing::{cube, names, scattered, slabs, together, two_tets};
 use crate::io::{WriteError, Written};
+use crate::mesh::stream::Counts;
 use crate::mesh::{Mesh, Names, Rank};
 use crate::refine::fixtures::{self, Fixture, ball, split};
 use crate::refine::refine;
@@ -197,6 +198,15 @@ fn what_elmer_cannot_read_is_refused_before_anything_is_written() {
     let error = write_parts(&fan, &ranks, 63, &target).unwrap_err().to_string();
     assert!(error.contains("in 63 parts"), "{error}");
     assert!(!target.exists());
+
+    let small = Counts { vertices: 10, tets: 10, boundary: 10 };
+    let limit = 2_147_483_647;
+    assert!(super::write::check_limits(Counts { tets: limit, ..small }, small, 0).is_ok());
+    let error = super::write::check_limits(Counts { vertices: limit + 1, ..small }, small, 0).unwrap_err();
+    assert!(
+        error.to_string().contains("numbers vertices up to 2147483647, and there are 2147483648"),
+        "{error}"
+    );
 
     let mut unknown = two_tets();
     unknown.bodies[1] = csg::BodyId(7);

@@ -7,8 +7,8 @@ use crate::io::lines::{self, FLUSH_AT};
 use crate::io::output::{Output, write_text, write_together};
 use crate::io::text::{Line, digits};
 use crate::io::{WriteError, Written, agree, sum_written};
-use crate::mesh::Names;
-use crate::mesh::stream::{MeshStream, NO_TET};
+use crate::mesh::stream::{Counts, MeshStream, NO_TET};
+use crate::mesh::{Names, Rank};
 use std::fs;
 use std::path::Path;
 
@@ -29,7 +29,7 @@ pub fn write(
     names: &Names,
     dir: &Path,
 ) -> Result<Written, WriteError> {
-    agree(comm, check_limits(part))?;
+    agree(comm, check_limits(part.totals(), part.counts(), part.rank()))?;
     let numbering = number(comm, part)?;
     agree(comm, check_shared_lines(part, &numbering))?;
 
@@ -60,15 +60,16 @@ fn is_part_file(name: &str) -> bool {
         && ["header", "nodes", "elements", "boundary", "shared"].contains(&kind)
 }
 
-fn check_limits(part: &dyn MeshStream) -> Result<(), WriteError> {
-    let totals = part.totals();
-    for (what, count) in [("vertices", totals.vertices), ("tets", totals.tets)] {
+pub(super) fn check_limits(totals: Counts, part: Counts, rank: Rank) -> Result<(), WriteError> {
+    for (what, count) in
+        [("vertices", totals.vertices), ("tets", totals.tets), ("boundary triangles", totals.boundary)]
+    {
         if count > MAX_ID {
             return Err(WriteError::TooMany { format: "Elmer", what, count, limit: MAX_ID });
         }
     }
-    if part.counts().tets == 0 {
-        return Err(WriteError::EmptyPart(part.rank() + 1));
+    if part.tets == 0 {
+        return Err(WriteError::EmptyPart(rank + 1));
     }
     Ok(())
 }
