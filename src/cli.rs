@@ -2,6 +2,7 @@
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
+use tetmill::picture::Cut;
 use tetmill::size::Preset;
 
 /// From solid geometry to partitioned tetrahedral meshes, in parallel.
@@ -90,9 +91,12 @@ pub struct Generate {
     /// Write the summary as JSON
     #[arg(long, value_name = "FILE.json")]
     pub report: Option<PathBuf>,
-    /// Draw the coarse mesh, its parts in colours
+    /// Draw the mesh: its parts in colours, or its patches if there is one
     #[arg(long, value_name = "FILE.png")]
     pub picture: Option<PathBuf>,
+    /// Draw only the tets behind a plane, given by a point on it and its normal
+    #[arg(long, value_name = "X,Y,Z,NX,NY,NZ", value_parser = cut, allow_hyphen_values = true, requires = "picture")]
+    pub cut: Option<Cut>,
     /// Say nothing but errors
     #[arg(short, long)]
     pub quiet: bool,
@@ -118,6 +122,9 @@ pub struct MeshFile {
     /// Draw the mesh
     #[arg(long, value_name = "FILE.png")]
     pub picture: Option<PathBuf>,
+    /// Draw only the tets behind a plane, given by a point on it and its normal
+    #[arg(long, value_name = "X,Y,Z,NX,NY,NZ", value_parser = cut, allow_hyphen_values = true, requires = "picture")]
+    pub cut: Option<Cut>,
     /// Say nothing but errors
     #[arg(short, long)]
     pub quiet: bool,
@@ -172,6 +179,17 @@ fn positive(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(number) if number > 0.0 && number.is_finite() => Ok(number),
         _ => Err("a positive number is needed".into()),
+    }
+}
+
+/// A plane as six numbers.
+fn cut(text: &str) -> Result<Cut, String> {
+    let numbers: Result<Vec<f64>, _> = text.split(',').map(|n| n.trim().parse::<f64>()).collect();
+    match numbers.as_deref() {
+        Ok(&[x, y, z, nx, ny, nz]) if [nx, ny, nz] != [0.0; 3] => {
+            Ok(Cut { point: [x, y, z], normal: [nx, ny, nz] })
+        }
+        _ => Err("six numbers are needed: a point, and a normal that is not zero".into()),
     }
 }
 

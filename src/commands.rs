@@ -73,7 +73,7 @@ fn generate_on(comm: &dyn Communicator, options: &Generate, start: Instant) -> R
         agree(comm, checked)?;
     }
     if let Some(file) = &options.picture {
-        draw(comm, &made.part, file)?;
+        draw(comm, &made.part, options.cut, file)?;
     }
     let shared = shared_vertices(comm, &made.part)?;
     let memory = total_memory(comm)?;
@@ -148,10 +148,16 @@ fn check_written(dir: &Path) -> Result<(), Failure> {
     }
 }
 
-/// **Collective.** A picture of the skin, parts in colours (patches if there is one part).
-fn draw(comm: &dyn Communicator, part: &dyn MeshStream, file: &Path) -> Result<(), Failure> {
+/// **Collective.** A picture of the skin, or of what a plane leaves of the mesh: parts in colours, patches if
+/// there is one part.
+fn draw(
+    comm: &dyn Communicator,
+    part: &dyn MeshStream,
+    cut: Option<picture::Cut>,
+    file: &Path,
+) -> Result<(), Failure> {
     let color_by = if comm.size() > 1 { picture::ColorBy::Part } else { picture::ColorBy::Patch };
-    let scene = picture::scene_of_part(part, &picture::Look { color_by, cut: None });
+    let scene = picture::scene_of_part(part, &picture::Look { color_by, cut });
     let drawn = match picture::gather(comm, &scene)? {
         Some(scene) => picture::write_png(&picture::render(&scene, &picture::Settings::default()), file),
         None => Ok(()),
@@ -258,7 +264,7 @@ pub fn run_mesh(options: &MeshFile) -> Result<(), Failure> {
     let stem = options.output.with_extension("");
     let written = progress.stage("write", || io::vtu::write(&comm, &made.part, &made.names, &stem))?;
     if let Some(file) = &options.picture {
-        draw(&comm, &made.part, file)?;
+        draw(&comm, &made.part, options.cut, file)?;
     }
     let mut report = summary(&model, &options.geometry, &made, 1, 0);
     report.stages = progress.finish();

@@ -107,7 +107,12 @@ impl From<MendError> for Failure {
 
 impl From<PartitionError> for Failure {
     fn from(error: PartitionError) -> Self {
-        Self::input(error)
+        match error {
+            PartitionError::MoreParts { parts, .. } => {
+                Self::input(format!("{error}; --coarse {parts} suffices"))
+            }
+            error => Self::input(error),
+        }
     }
 }
 

@@ -22,7 +22,7 @@ pub enum MendError {
 }
 
 /// Rounds of lowering sizes before the mender gives up.
-const MOST_ROUNDS: u64 = 8;
+const MOST_ROUNDS: u64 = 20;
 
 /// Lattices are tried with as many pieces an edge at most: what inverts, does so by then, but for rare
 /// cases that the check of all children finds.
