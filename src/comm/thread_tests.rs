@@ -1,5 +1,8 @@
 use super::*;
 use crate::comm::conformance::conformance;
+use proptest::collection::vec;
+use proptest::prelude::*;
+use proptest::test_runner::RngSeed;
 
 #[test]
 fn threads_conform() {
@@ -68,4 +71,24 @@ fn ranks_that_go_separate_ways_are_told_so() {
 #[test]
 fn no_ranks_are_refused() {
     assert!(matches!(run(0, |_| ()), Err(CommError::NotStarted { ranks: 0, .. })));
+}
+
+/// Messages that each rank sends: some to some.
+fn letters() -> impl Strategy<Value = Vec<Vec<(Rank, Vec<u8>)>>> {
+    (1..6u32).prop_flat_map(|ranks| vec(vec((0..ranks, vec(any::<u8>(), 0..9)), 0..7), ranks as usize))
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 64, rng_seed: RngSeed::Fixed(1), ..ProptestConfig::default() })]
+    #[test]
+    fn an_exchange_delivers_each_message_once_by_sender_and_in_order(letters in letters()) {
+        let received = run(letters.len() as u32, |comm| {
+            comm.exchange_bytes(letters[comm.rank() as usize].clone()).unwrap()
+        });
+        for (to, received) in (0..).zip(received.unwrap()) {
+            let sent = (0..).zip(&letters).flat_map(|(from, letters)| letters.iter().map(move |l| (from, l)));
+            let expected = sent.filter(|(_, letter)| letter.0 == to).map(|(from, letter)| (from, letter.1.clone()));
+            prop_assert_eq!(received, expected.collect::<Vec<_>>());
+        }
+    }
 }

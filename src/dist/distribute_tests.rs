@@ -4,6 +4,9 @@ use crate::mesh::fixtures::{lattice_box, lattice_cube};
 use crate::mesh::{BoundaryTriangle, Class, Segment};
 use crate::partition::{self, Method, Settings};
 use csg::{BodyId, CurveId, PatchId};
+use proptest::collection::vec;
+use proptest::prelude::*;
+use proptest::test_runner::RngSeed;
 use std::collections::BTreeMap;
 
 /// Distributes over threads and checks.
@@ -177,6 +180,15 @@ fn an_edge_on_a_curve_is_known_also_where_the_triangles_beside_it_are_elsewhere(
     assert_eq!((edge, middle.edge_classes[0]), ([0, 1], Class::Curve(CurveId(0))));
     assert_eq!(middle.edge_holders(crate::mesh::EdgeId(0)), [0, 1, 2]);
     assert!(middle.boundary.iter().all(|triangle| triangle.patch == PatchId(2)));
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 64, rng_seed: RngSeed::Fixed(1), ..ProptestConfig::default() })]
+    #[test]
+    fn any_partition_whatever_is_distributed_so_that_all_agree(part in vec(0..5u32, 96)) {
+        let sizes: Vec<usize> = parts(&two_bodies(2), &part, 5).iter().map(|part| part.tets.len()).collect();
+        prop_assert_eq!(sizes, (0..5).map(|rank| part.iter().filter(|&&p| p == rank).count()).collect::<Vec<_>>());
+    }
 }
 
 #[test]
