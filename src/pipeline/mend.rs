@@ -2,10 +2,9 @@
 
 use super::coarse::{CoarseError, CoarseMesh, Model};
 use crate::dist::{self, DistError};
-use crate::mesh::{GlobalId, Mesh};
+use crate::mesh::{GlobalId, Mesh, TET_EDGES};
 use crate::refine::{self, RefineError};
 use crate::size::Source;
-use crate::{Point, Vector};
 
 /// Why no coarse mesh was found that can be refined.
 #[derive(Debug, thiserror::Error)]
@@ -75,14 +74,15 @@ fn inverted(
     }
 }
 
-/// Sources that ask for smaller tets where these are.
+/// Sources that ask for smaller tets where these are: at their corners and the middles of their edges, as
+/// one in the middle would not reach the boundary through the grading.
 pub fn lowered(mesh: &Mesh, tets: &[GlobalId]) -> Vec<Source> {
-    let source = |tet: &GlobalId| {
+    let sources = |tet: &GlobalId| {
         let corners = mesh.tets[*tet as usize].map(|v| mesh.points[v.index()]);
-        let middle = corners.iter().map(|p| p.coords).sum::<Vector>() / 4.0;
-        let pairs = crate::mesh::TET_EDGES.map(|[i, j]| (corners[j] - corners[i]).norm());
-        let mean = pairs.iter().sum::<f64>() / 6.0;
-        Source { point: Point::from(middle), size: LOWERED * mean }
+        let lengths = TET_EDGES.map(|[i, j]| (corners[j] - corners[i]).norm());
+        let size = LOWERED * lengths.iter().sum::<f64>() / 6.0;
+        let middles = TET_EDGES.map(|[i, j]| nalgebra::center(&corners[i], &corners[j]));
+        corners.into_iter().chain(middles).map(move |point| Source { point, size })
     };
-    tets.iter().map(source).collect()
+    tets.iter().flat_map(sources).collect()
 }
