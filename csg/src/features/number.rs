@@ -1,24 +1,84 @@
 //! Boundary-condition numbers and names.
 
 use super::Patch;
-use crate::Geometry;
+use crate::{BoundaryLabel, Geometry};
 
 /// The name of a boundary that the file does not name.
 const DEFAULT_NAME: &str = "default";
 
-/// Gives each patch its number and name: those of its surface; else the next free number.
+/// Gives each patch its number and name: those of its surface, else the next free number; then come the
+/// statements for single boundaries of bodies, in file order.
 ///
-/// Unlike NETGEN's, the counter starts after the numbers of all statements, so that a number that the file does
-/// not give twice is not given twice.
+/// Free numbers start above all that the file gives. NETGEN's start above those of surfaces, so that one of them may be
+/// given again by a `boundarycondition`.
 pub(super) fn number(geometry: &Geometry, patches: &mut [Patch]) {
-    let given = geometry.surface_info.iter().filter_map(|info| info.bc);
-    let mut last = given.max().unwrap_or(0);
+    let of_surfaces = geometry.surface_info.iter().filter_map(|info| info.bc);
+    let of_overrides = geometry.boundary_overrides.iter().filter_map(|over| match over.label {
+        BoundaryLabel::Number(number) => Some(number),
+        BoundaryLabel::Name(_) => None,
+    });
+    let mut last = of_surfaces.chain(of_overrides).max().unwrap_or(0);
+    let mut next = || {
+        last += 1;
+        last
+    };
     for patch in &mut *patches {
         let info = &geometry.surface_info[patch.surface.index()];
-        patch.bc = info.bc.unwrap_or_else(|| {
-            last += 1;
-            last
-        });
+        patch.bc = info.bc.unwrap_or_else(&mut next);
         patch.name = info.bc_name.clone().unwrap_or_else(|| DEFAULT_NAME.to_owned());
+    }
+    for over in &geometry.boundary_overrides {
+        let sides = |patch: &Patch| [patch.inside, patch.outside].contains(&Some(over.body));
+        for patch in patches.iter_mut().filter(|p| over.surfaces.contains(&p.surface) && sides(p)) {
+            match &over.label {
+                BoundaryLabel::Number(number) => patch.bc = *number,
+                BoundaryLabel::Name(name) => {
+                    patch.name.clone_from(name);
+                    // The number may be that of other patches, which keep their name.
+                    if geometry.surface_info[patch.surface.index()].bc == Some(patch.bc) {
+                        patch.bc = next();
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::{Features, language};
+
+    fn labels(statements: &str) -> Vec<(u32, String)> {
+        let source = format!(
+            "algebraic3d
+            solid right = plane (0.5, 0, 0; -1, 0, 0);
+            solid low = orthobrick (0, 0, 0; 1, 1, 1) -bc=2;
+            solid high = orthobrick (0, 0, 1; 1, 1, 2) -bcname=high;
+            tlo low; tlo high; {statements}"
+        );
+        let geometry = language::parse_geometry(&source, "bricks.geo").unwrap().geometry;
+        let features = Features::find(&geometry).unwrap();
+        features.patches.into_iter().map(|p| (p.bc, p.name)).collect()
+    }
+
+    #[test]
+    fn patches_take_the_numbers_of_their_surfaces_or_the_next_free_ones() {
+        let labels = labels("");
+        // Five sides of the low brick and the interface; of the high brick its top, while its sides are
+        // in the planes of the low one.
+        assert_eq!(labels.iter().filter(|l| l.0 == 2).count(), 10);
+        assert_eq!(labels.iter().filter(|l| **l == (3, "high".to_owned())).count(), 1);
+    }
+
+    #[test]
+    fn statements_for_one_body_change_its_patches_only() {
+        let labels = labels("boundarycondition low high 7; boundaryconditionname low low bottom;");
+        // The sides of the high brick and the interface get 7; then all patches of the low one a name; those
+        // that still had the number of the surface, the five outer ones, a number of their own. (8 is the top of the high one.)
+        assert_eq!(labels.iter().filter(|l| l.0 == 7).count(), 5);
+        assert_eq!(labels.iter().filter(|l| l.1 == "bottom").count(), 6);
+        let mut own: Vec<u32> = labels.iter().filter(|l| l.1 == "bottom" && l.0 != 7).map(|l| l.0).collect();
+        own.sort_unstable();
+        assert_eq!(own, [9, 10, 11, 12, 13]);
     }
 }
