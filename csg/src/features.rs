@@ -151,3 +151,6 @@ impl Features {
         &self.corners[id.index()]
     }
 }
+
+#[cfg(test)]
+mod tests;
