@@ -153,4 +153,6 @@ impl Features {
 }
 
 #[cfg(test)]
+mod random_tests;
+#[cfg(test)]
 mod tests;
