@@ -151,3 +151,8 @@ impl Features {
         &self.corners[id.index()]
     }
 }
+
+#[cfg(test)]
+mod random_tests;
+#[cfg(test)]
+mod tests;

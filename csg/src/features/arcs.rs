@@ -6,7 +6,8 @@ use super::octree::Octree;
 use super::trace::{Trace, along, tangent};
 use super::{FeatureError, Named, Place};
 use crate::project::project_to_both;
-use crate::{Geometry, Point, SurfaceId, Vector};
+use crate::{Geometry, Interval, Point, Surface, SurfaceId, Vector};
+use nalgebra::Matrix3;
 use std::collections::HashMap;
 
 /// Points where traces are cut; those within the tolerance of merging are one.
@@ -39,10 +40,58 @@ impl Nodes {
         self.points.len() - 1
     }
 
+    /// Moves nodes that are not on all surfaces through them: those that stand for points that are not quite the same,
+    /// and those where surfaces are tangent.
+    fn settle(&mut self, geometry: &Geometry, tree: &Octree, tolerances: &Tolerances) {
+        for (point, _) in &mut self.points {
+            let near = |x: f64| Interval::new(x - tolerances.merge, x + tolerances.merge);
+            let surfaces: Vec<&Surface> = tree
+                .surfaces_in(&[near(point.x), near(point.y), near(point.z)])
+                .into_iter()
+                .map(|s| &geometry.surfaces[s.index()])
+                .filter(|s| s.distance(point) <= tolerances.merge)
+                .collect();
+            let distance = |p: &Point| surfaces.iter().map(|s| s.distance(p)).fold(0.0, f64::max);
+            let mut best = distance(point);
+            for _ in 0..SETTLING_STEPS {
+                let Some(step) = common_step(&surfaces, point).filter(|_| best > tolerances.exact) else {
+                    break;
+                };
+                let next = *point + step;
+                let at_next = distance(&next);
+                if at_next >= best {
+                    break;
+                }
+                (*point, best) = (next, at_next);
+            }
+        }
+    }
+
     /// Where a node is.
     pub fn point(&self, node: usize) -> Point {
         self.points[node].0
     }
+}
+
+/// Tangent surfaces make the steps halve the distance only: this many make 10⁻⁸ to rounding.
+const SETTLING_STEPS: usize = 30;
+
+/// The shortest step that leads nearest to all surfaces, to first order.
+fn common_step(surfaces: &[&Surface], at: &Point) -> Option<Vector> {
+    /// Directions in which the surfaces hardly differ are left alone.
+    const LEAST_SINGULAR: f64 = 1e-6;
+    let mut normal_matrix = Matrix3::zeros();
+    let mut right = Vector::zeros();
+    for surface in surfaces {
+        let gradient = surface.gradient(at);
+        let length = gradient.norm();
+        if length > 0.0 {
+            normal_matrix += gradient * gradient.transpose() / (length * length);
+            right += gradient * (surface.value(at) / (length * length));
+        }
+    }
+    let inverse = normal_matrix.pseudo_inverse(LEAST_SINGULAR).ok()?;
+    Some(-(inverse * right))
 }
 
 /// A piece of a trace between crossings, or a closed one without.
@@ -75,6 +124,7 @@ pub(super) fn feature_arcs(
     let mut nodes = Nodes::default();
     let mut cuts: Vec<_> =
         traces.iter().map(|trace| cuts(geometry, tree, trace, &mut nodes, tolerances)).collect();
+    nodes.settle(geometry, tree, tolerances);
     for (trace, cuts) in traces.iter().zip(&mut cuts) {
         cut_at_known_nodes(geometry, trace, &nodes, cuts, tolerances);
     }

@@ -87,19 +87,18 @@ impl Sheet {
     }
 }
 
-/// The sheet of a surface at one of its points, `None` if it is no boundary there.
+/// The sheet of a surface at one of its points, `None` if it is no boundary there; `other_side` tells
+/// on which side of each other surface the point is (whether on the positive one).
 pub(super) fn sheet_at(
     geometry: &Geometry,
     tree: &Octree,
     id: SurfaceId,
     at: &Point,
+    other_side: &dyn Fn(SurfaceId) -> bool,
 ) -> Result<Option<Sheet>, FeatureError> {
     let Some(leaf) = tree.leaf(at).filter(|leaf| leaf.surfaces.contains(&id)) else { return Ok(None) };
-    let side = |positive: bool| {
-        region(geometry, leaf, at, &|s| {
-            if s == id { positive } else { geometry.surfaces[s.index()].value(at) > 0.0 }
-        })
-    };
+    let side =
+        |positive: bool| region(geometry, leaf, at, &|s| if s == id { positive } else { other_side(s) });
     Ok(Sheet::between(id, side(false)?, side(true)?))
 }
 

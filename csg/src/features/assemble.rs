@@ -177,7 +177,8 @@ fn closed_sheets(
         };
         let mut points = scattered_directions().filter_map(|d| surface.support(&d));
         if let Some(seed) = points.find(is_clear) {
-            found.extend(sheet_at(geometry, tree, id, &seed)?.map(|sheet| (sheet, seed)));
+            let other_side = |s: SurfaceId| geometry.surfaces[s.index()].value(&seed) > 0.0;
+            found.extend(sheet_at(geometry, tree, id, &seed, &other_side)?.map(|sheet| (sheet, seed)));
         }
     }
     Ok(found)

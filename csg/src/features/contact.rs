@@ -1,7 +1,7 @@
 //! Places where two surfaces are tangent: whether they matter.
 
 use super::arcs::Arc;
-use super::around::Tolerances;
+use super::around::{Tolerances, region, sheet_at};
 use super::octree::{Leaf, Octree};
 use super::{FeatureError, Named, Place};
 use crate::interval::{Cell, middle};
@@ -135,17 +135,13 @@ fn depends_on_one(
     wedges: &[[bool; 2]],
     other_side: &dyn Fn(SurfaceId) -> bool,
 ) -> Result<bool, FeatureError> {
-    let region = |sides: &[bool; 2]| {
-        super::around::region(geometry, leaf, &contact.point, &|s| match contact
-            .pair
-            .iter()
-            .position(|&p| p == s)
-        {
+    let region_at = |sides: &[bool; 2]| {
+        region(geometry, leaf, &contact.point, &|s| match contact.pair.iter().position(|&p| p == s) {
             Some(i) => sides[i],
             None => other_side(s),
         })
     };
-    let regions = wedges.iter().map(region).collect::<Result<Vec<_>, _>>()?;
+    let regions = wedges.iter().map(region_at).collect::<Result<Vec<_>, _>>()?;
     Ok((0..2).any(|i| {
         let same_side = |side: bool| {
             let mut on_it = wedges.iter().zip(&regions).filter(|(w, _)| w[i] == side).map(|(_, r)| r);
@@ -233,7 +229,8 @@ pub(super) fn refuse_apexes(geometry: &Geometry, tree: &Octree) -> Result<(), Fe
     for (i, surface) in geometry.surfaces.iter().enumerate() {
         if let Some(apex) = surface.apex() {
             let id = SurfaceId::new(i);
-            if super::around::sheet_at(geometry, tree, id, &apex)?.is_some() {
+            let other_side = |s: SurfaceId| geometry.surfaces[s.index()].value(&apex) > 0.0;
+            if sheet_at(geometry, tree, id, &apex, &other_side)?.is_some() {
                 return Err(FeatureError::ConeApex {
                     cone: Named::surface(geometry, id),
                     place: Place(apex),

@@ -42,7 +42,7 @@ pub(super) fn extent(
     for (i, surface) in geometry.surfaces.iter().enumerate() {
         for axis in [Vector::x(), Vector::y(), Vector::z()] {
             for point in [surface.support(&axis), surface.support(&-axis)].into_iter().flatten() {
-                if sheet_at(geometry, tree, SurfaceId::new(i), &point)?.is_some() {
+                if may_be_boundary(geometry, tree, SurfaceId::new(i), &point, tolerances)? {
                     points.push(point);
                 }
             }
@@ -54,6 +54,30 @@ pub(super) fn extent(
         bounds.max = bounds.max.sup(point);
     }
     Ok(bounds)
+}
+
+/// Whether a surface is a boundary at a point, for some choice of sides of other surfaces that touch it there.
+fn may_be_boundary(
+    geometry: &Geometry,
+    tree: &Octree,
+    id: SurfaceId,
+    point: &Point,
+    tolerances: &Tolerances,
+) -> Result<bool, FeatureError> {
+    let Some(leaf) = tree.leaf(point) else { return Ok(false) };
+    let touches =
+        |s: &SurfaceId| *s != id && geometry.surfaces[s.index()].distance(point) <= tolerances.on_surface;
+    let touching: Vec<SurfaceId> = leaf.surfaces.iter().copied().filter(touches).collect();
+    for sides in 0..1_u32 << touching.len().min(8) {
+        let other_side = |s: SurfaceId| match touching.iter().position(|&t| t == s) {
+            Some(i) => sides >> i & 1 == 1,
+            None => geometry.surfaces[s.index()].value(point) > 0.0,
+        };
+        if sheet_at(geometry, tree, id, point, &other_side)?.is_some() {
+            return Ok(true);
+        }
+    }
+    Ok(false)
 }
 
 /// The point between two points of a curve where a coordinate times `sign` is largest.

@@ -1,47 +1,43 @@
 //! Boundary-condition numbers and names.
 
 use super::Patch;
-use crate::Geometry;
-use crate::geometry::BoundaryLabel;
+use crate::{BoundaryLabel, Geometry};
 
 /// The name of a boundary that the file does not name.
 const DEFAULT_NAME: &str = "default";
 
-/// Gives each patch its number and name: those of its surface, else the next free number; then what the file
-/// says of single boundaries of bodies ([`BoundaryOverride`](crate::geometry::BoundaryOverride)).
+/// Gives each patch its number and name: those of its surface, else the next free number; then come the
+/// statements for single boundaries of bodies, in file order.
 ///
-/// Unlike NETGEN's, the counter starts after the numbers of all statements, so that a number that the file does
-/// not give twice is not given twice.
+/// Free numbers start above all that the file gives. NETGEN's start above those of surfaces, so that one of them may be
+/// given again by a `boundarycondition`.
 pub(super) fn number(geometry: &Geometry, patches: &mut [Patch]) {
     let of_surfaces = geometry.surface_info.iter().filter_map(|info| info.bc);
-    let of_overrides = geometry.boundary_overrides.iter().filter_map(|o| match o.label {
+    let of_overrides = geometry.boundary_overrides.iter().filter_map(|over| match over.label {
         BoundaryLabel::Number(number) => Some(number),
         BoundaryLabel::Name(_) => None,
     });
     let mut last = of_surfaces.chain(of_overrides).max().unwrap_or(0);
-    let mut fresh = || {
+    let mut next = || {
         last += 1;
         last
     };
     for patch in &mut *patches {
         let info = &geometry.surface_info[patch.surface.index()];
-        patch.bc = info.bc.unwrap_or_else(&mut fresh);
+        patch.bc = info.bc.unwrap_or_else(&mut next);
         patch.name = info.bc_name.clone().unwrap_or_else(|| DEFAULT_NAME.to_owned());
     }
     for over in &geometry.boundary_overrides {
-        let named = |patch: &&mut Patch| {
-            [patch.inside, patch.outside].contains(&Some(over.body))
-                && over.surfaces.binary_search(&patch.surface).is_ok()
-        };
-        for patch in patches.iter_mut().filter(named) {
+        let sides = |patch: &Patch| [patch.inside, patch.outside].contains(&Some(over.body));
+        for patch in patches.iter_mut().filter(|p| over.surfaces.contains(&p.surface) && sides(p)) {
             match &over.label {
                 BoundaryLabel::Number(number) => patch.bc = *number,
                 BoundaryLabel::Name(name) => {
-                    // A number that other patches have too would get their names mixed up.
-                    if geometry.surface_info[patch.surface.index()].bc == Some(patch.bc) {
-                        patch.bc = fresh();
-                    }
                     patch.name.clone_from(name);
+                    // The number may be that of other patches, which keep their name.
+                    if geometry.surface_info[patch.surface.index()].bc == Some(patch.bc) {
+                        patch.bc = next();
+                    }
                 }
             }
         }
@@ -50,30 +46,39 @@ pub(super) fn number(geometry: &Geometry, patches: &mut [Patch]) {
 
 #[cfg(test)]
 mod tests {
-    use crate::Features;
-    use crate::language::parse_geometry;
+    use crate::{Features, language};
 
-    fn boundaries(statements: &str) -> Vec<(u32, String)> {
+    fn labels(statements: &str) -> Vec<(u32, String)> {
         let source = format!(
-            "algebraic3d\nsolid low = orthobrick (0,0,0; 1,1,1);\nsolid high = orthobrick (0,0,1; 1,1,2);\n\
-             solid top = plane (0,0,2; 0,0,1);\ntlo low;\ntlo high;\n{statements}"
+            "algebraic3d
+            solid right = plane (0.5, 0, 0; -1, 0, 0);
+            solid low = orthobrick (0, 0, 0; 1, 1, 1) -bc=2;
+            solid high = orthobrick (0, 0, 1; 1, 1, 2) -bcname=high;
+            tlo low; tlo high; {statements}"
         );
-        let geometry = parse_geometry(&source, "two.geo").unwrap().geometry;
+        let geometry = language::parse_geometry(&source, "bricks.geo").unwrap().geometry;
         let features = Features::find(&geometry).unwrap();
-        features.patches.iter().map(|p| (p.bc, p.name.clone())).collect()
+        features.patches.into_iter().map(|p| (p.bc, p.name)).collect()
     }
 
     #[test]
-    fn each_patch_has_a_number_of_its_own_unless_the_file_says_otherwise() {
-        let mut numbers: Vec<u32> = boundaries("").into_iter().map(|(bc, _)| bc).collect();
-        numbers.sort_unstable();
-        assert_eq!(numbers, (1..=11).collect::<Vec<_>>());
+    fn patches_take_the_numbers_of_their_surfaces_or_the_next_free_ones() {
+        let labels = labels("");
+        // Five sides of the low brick and the interface; of the high brick its top, while its sides are
+        // in the planes of the low one.
+        assert_eq!(labels.iter().filter(|l| l.0 == 2).count(), 10);
+        assert_eq!(labels.iter().filter(|l| **l == (3, "high".to_owned())).count(), 1);
     }
 
     #[test]
-    fn a_statement_gives_one_boundary_of_a_body_its_number_and_name() {
-        let named = boundaries("boundarycondition top high 40;\nboundaryconditionname top high lid;\n");
-        assert_eq!(named.iter().filter(|(bc, name)| (*bc, name.as_str()) == (40, "lid")).count(), 1, "{named:?}");
-        assert_eq!(named.iter().filter(|(bc, _)| *bc > 40).count(), 10, "{named:?}");
+    fn statements_for_one_body_change_its_patches_only() {
+        let labels = labels("boundarycondition low high 7; boundaryconditionname low low bottom;");
+        // The sides of the high brick and the interface get 7; then all patches of the low one a name; those
+        // that still had the number of the surface, the five outer ones, a number of their own. (8 is the top of the high one.)
+        assert_eq!(labels.iter().filter(|l| l.0 == 7).count(), 5);
+        assert_eq!(labels.iter().filter(|l| l.1 == "bottom").count(), 6);
+        let mut own: Vec<u32> = labels.iter().filter(|l| l.1 == "bottom" && l.0 != 7).map(|l| l.0).collect();
+        own.sort_unstable();
+        assert_eq!(own, [9, 10, 11, 12, 13]);
     }
 }

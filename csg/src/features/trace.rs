@@ -71,11 +71,8 @@ fn seeds(geometry: &Geometry, leaf: &Leaf, pair: [SurfaceId; 2], tolerances: &To
         let starts = std::iter::once(&cell).chain(others).map(middle);
         let before = found.len();
         for start in starts {
-            if let Ok(point) = project_to_both(a, b, &start, tolerances.exact) {
-                if (0..3).all(|i| leaf.cell[i].contains(point[i])) {
-                    found.push(point);
-                }
-            }
+            let point = project_to_both(a, b, &start, tolerances.exact);
+            found.extend(point.ok().filter(|p| (0..3).all(|i| leaf.cell[i].contains(p[i]))));
         }
         if found.len() == before && depth < DEPTH {
             open.extend(parts.map(|part| (part, depth + 1)));
@@ -250,24 +247,48 @@ fn curvature(a: &Surface, b: &Surface, at: &Point) -> f64 {
 }
 
 /// The unit tangent of a curve at a point on it, in its direction.
+///
+/// At an end where its surfaces are tangent, that of the trace there.
 pub fn curve_tangent(geometry: &Geometry, curve: &Curve, at: &Point) -> Vector {
     let [a, b] = curve.surfaces.map(|s| &geometry.surfaces[s.index()]);
-    let along = tangent(a, b, at);
-    // All of a trace runs along the cross product of the gradients, or all against it; but at its ends the
-    // surfaces may be tangent.
-    let middle = curve.trace.len() / 2;
-    let chord = curve.trace[middle] - curve.trace[middle - 1];
-    if tangent(a, b, &curve.trace[middle - 1]).dot(&chord) + tangent(a, b, &curve.trace[middle]).dot(&chord)
-        < 0.0
-    {
-        -along
-    } else {
-        along
+    let chord = chord_near(curve, at);
+    if !cross_well(a, b, at) {
+        return chord.normalize();
     }
+    let along = tangent(a, b, at);
+    if along.dot(&chord) < 0.0 { -along } else { along }
 }
 
 /// The curvature of a curve at a point on it, 1/length.
+///
+/// At an end where its surfaces are tangent, that at the middle of the step of the trace there.
 pub fn curve_curvature(geometry: &Geometry, curve: &Curve, at: &Point) -> f64 {
     let [a, b] = curve.surfaces.map(|s| &geometry.surfaces[s.index()]);
-    curvature(a, b, at)
+    if cross_well(a, b, at) { curvature(a, b, at) } else { curvature(a, b, &(at + inward(curve, at) * 0.5)) }
+}
+
+/// Whether two surfaces cross at an angle at which their gradients tell the tangent of the intersection.
+fn cross_well(a: &Surface, b: &Surface, at: &Point) -> bool {
+    /// The sine; the second derivatives of the intersection lose twice its digits.
+    const LEAST_SINE: f64 = 1e-4;
+    a.normal(at).cross(&b.normal(at)).norm() > LEAST_SINE
+}
+
+/// The step of the trace that is nearest to a point.
+fn nearest_step(curve: &Curve, at: &Point) -> usize {
+    let middle = |i: usize| nalgebra::center(&curve.trace[i], &curve.trace[i + 1]);
+    let distance = |i: usize| (middle(i) - at).norm() - 0.5 * (curve.trace[i + 1] - curve.trace[i]).norm();
+    (1..curve.trace.len() - 1).fold(0, |best, i| if distance(i) < distance(best) { i } else { best })
+}
+
+fn chord_near(curve: &Curve, at: &Point) -> Vector {
+    let i = nearest_step(curve, at);
+    curve.trace[i + 1] - curve.trace[i]
+}
+
+/// The way from a point at an end of a step of the trace to its other end.
+fn inward(curve: &Curve, at: &Point) -> Vector {
+    let i = nearest_step(curve, at);
+    let ends = [curve.trace[i] - at, curve.trace[i + 1] - at];
+    if ends[0].norm_squared() > ends[1].norm_squared() { ends[0] } else { ends[1] }
 }
