@@ -66,8 +66,7 @@ fn triangulate_flat(sheet: &mut Sheet) -> Result<(), Fault> {
     sheet.mesh = Topology::from_triangles(points.len(), &triangles).ok_or(Fault::NotNumbers)?;
     // Whatever spade could not do is found again here, with its reason.
     for v in 0..points.len() as u32 {
-        sheet.mesh.around(v, &mut sheet.ring);
-        if sheet.ring.is_empty() {
+        if !sheet.mesh.is_used(v) {
             let site = sheet.nodes[v as usize].site;
             return match sheet.locate(NONE, &site) {
                 Some(Place::OnVertex(w)) => Err(Fault::Coincident(v, w)),

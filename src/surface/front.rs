@@ -130,12 +130,11 @@ impl Front<'_, '_> {
             }
         }
         let Some((_, i)) = base else { return Ok(()) };
-        if let Some(node) = self.ideal(t, i)? {
-            if let Some(place) = self.sheet.walk(t, &node.site, STEPS) {
-                if self.put(&node, place) {
-                    return Ok(());
-                }
-            }
+        if let Some(node) = self.ideal(t, i)?
+            && let Some(place) = self.sheet.walk(t, &node.site, STEPS)
+            && self.put(&node, place)
+        {
+            return Ok(());
         }
         self.counts.refused += 1;
         self.known(t).blocked[i] = true;

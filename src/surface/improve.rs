@@ -90,11 +90,12 @@ fn smooth(sheet: &mut Sheet, v: u32, ring: &[u32]) -> bool {
         // A point that has no nearest one on the surface is no place to go.
         let Ok(point) = sheet.surface.project(&place) else { continue };
         let moved = sheet.node(point, node.size, node.kind);
-        if let Some((new_worst, new_sum)) = sheet.star_price(v, &moved, ring) {
-            if new_sum < sum * (1.0 - GAIN) && new_worst <= worst.max(ACCEPTABLE) {
-                sheet.nodes[v as usize] = moved;
-                return true;
-            }
+        if let Some((new_worst, new_sum)) = sheet.star_price(v, &moved, ring)
+            && new_sum < sum * (1.0 - GAIN)
+            && new_worst <= worst.max(ACCEPTABLE)
+        {
+            sheet.nodes[v as usize] = moved;
+            return true;
         }
     }
     false
@@ -154,12 +155,12 @@ fn collapse_all(sheet: &mut Sheet) -> usize {
         let best = (0..ends.len())
             .filter_map(|k| collapsed_price(sheet, v, ends[k], &ring, longest).map(|price| (price, k)))
             .min_by(|p, q| p.0.total_cmp(&q.0));
-        if let Some((price, k)) = best {
-            if price <= allowed {
-                let (t, i) = sheet.mesh.find(v, ends[k], &mut ring).expect("a neighbour");
-                sheet.mesh.collapse(t, i, &mut ring);
-                collapses += 1;
-            }
+        if let Some((price, k)) = best
+            && price <= allowed
+        {
+            let (t, i) = sheet.mesh.find(v, ends[k], &mut ring).expect("a neighbour");
+            sheet.mesh.collapse(t, i, &mut ring);
+            collapses += 1;
         }
     }
     collapses
@@ -213,10 +214,11 @@ fn split_all(sheet: &mut Sheet) -> Result<usize, Stop> {
             .filter(|&i| x.segment[i] == NONE && x.near[i] != NONE)
             .map(|i| (sheet.length(x.v[next(i)], x.v[last(i)]), i))
             .max_by(|p, q| p.0.total_cmp(&q.0));
-        if let Some((length, i)) = longest {
-            if length > LONG && split(sheet, t, i, ACCEPTABLE)? {
-                splits += 1;
-            }
+        if let Some((length, i)) = longest
+            && length > LONG
+            && split(sheet, t, i, ACCEPTABLE)?
+        {
+            splits += 1;
         }
     }
     Ok(splits)

@@ -134,15 +134,23 @@ impl Topology {
                 break;
             }
         }
+        // An open fan: what lies clockwise of the first triangle goes before it.
+        ring.reverse();
         t = first;
         loop {
             let triangle = self.at(t);
             t = triangle.near[last(triangle.corner(v))];
             if t == NONE {
-                return;
+                break;
             }
-            ring.insert(0, t);
+            ring.push(t);
         }
+        ring.reverse();
+    }
+
+    /// Whether a vertex is in a triangle.
+    pub fn is_used(&self, v: u32) -> bool {
+        self.star[v as usize] != NONE
     }
 
     /// The side that runs from `a` to `b`, looked for around `a`.

@@ -1,169 +1,8 @@
-//! Surface meshes of small geometries made by hand.
+//! Each kind of surface and boundary once, from as coarse as can be to fine.
 
 use super::*;
-use crate::mesh::{BoundaryTriangle, VertexId};
-use crate::size::{SizeField, UniformSize};
-use crate::{Point, Vector};
-use csg::primitive::{Cone, Cylinder, Ellipsoid, EllipticCone, EllipticCylinder, Plane, Sphere, Torus};
-use csg::{
-    Aabb, BodyId, Corner, CornerId, Curve, CurveId, Features, Fin, Geometry, Patch, PatchId, Projector,
-    Surface, SurfaceId,
-};
-use std::f64::consts::TAU;
-
-/// A geometry made by hand, with its curves cut.
-struct Made {
-    geometry: Geometry,
-    features: Features,
-    curves: SurfaceMesh,
-}
-
-impl Made {
-    fn new(surfaces: Vec<Surface>) -> Self {
-        let bounds = Aabb { min: Point::new(-5., -5., -5.), max: Point::new(5., 5., 5.) };
-        Self {
-            geometry: Geometry { surfaces, ..Geometry::default() },
-            features: Features { corners: Vec::new(), curves: Vec::new(), patches: Vec::new(), bounds },
-            curves: SurfaceMesh::default(),
-        }
-    }
-
-    fn corner(&mut self, point: Point, surfaces: &[u32]) -> CornerId {
-        let id = CornerId::new(self.features.corners.len());
-        self.features
-            .corners
-            .push(Corner { point, surfaces: surfaces.iter().map(|&s| SurfaceId(s)).collect() });
-        self.curves.points.push(point);
-        self.curves.classes.push(Class::Corner(id));
-        id
-    }
-
-    /// A closed curve through `n` points, where `at` takes turns.
-    fn ring(&mut self, surfaces: [u32; 2], n: usize, at: impl Fn(f64) -> Point) -> CurveId {
-        let id = CurveId::new(self.features.curves.len());
-        let points: Vec<Point> = (0..n).map(|k| at(k as f64 / n as f64)).collect();
-        let first = self.curves.points.len();
-        for k in 0..n {
-            let vertices = [VertexId::new(first + k), VertexId::new(first + (k + 1) % n)];
-            self.curves.segments.push(Segment { vertices, curve: id });
-            self.curves.classes.push(Class::Curve(id));
-        }
-        let mut trace: Vec<Point> = (0..=64).map(|k| at(f64::from(k) / 64.0)).collect();
-        trace[64] = trace[0];
-        self.curves.points.extend(points);
-        self.features.curves.push(Curve {
-            surfaces: surfaces.map(SurfaceId),
-            ends: None,
-            trace,
-            fins: Vec::new(),
-        });
-        id
-    }
-
-    /// A curve between two corners, in `n` segments; corners are the first vertices.
-    fn arc(
-        &mut self,
-        surfaces: [u32; 2],
-        ends: [CornerId; 2],
-        n: usize,
-        at: impl Fn(f64) -> Point,
-    ) -> CurveId {
-        let id = CurveId::new(self.features.curves.len());
-        let mut vertices = vec![VertexId(ends[0].0)];
-        for k in 1..n {
-            vertices.push(VertexId::new(self.curves.points.len()));
-            self.curves.points.push(at(k as f64 / n as f64));
-            self.curves.classes.push(Class::Curve(id));
-        }
-        vertices.push(VertexId(ends[1].0));
-        for w in vertices.windows(2) {
-            self.curves.segments.push(Segment { vertices: [w[0], w[1]], curve: id });
-        }
-        let trace = (0..=64).map(|k| at(f64::from(k) / 64.0)).collect();
-        self.features.curves.push(Curve {
-            surfaces: surfaces.map(SurfaceId),
-            ends: Some(ends),
-            trace,
-            fins: Vec::new(),
-        });
-        id
-    }
-
-    fn patch(&mut self, surface: u32, flipped: bool, boundary: &[(CurveId, bool)], seeds: &[Point]) {
-        let id = PatchId::new(self.features.patches.len());
-        for &(curve, forward) in boundary {
-            self.features.curves[curve.index()].fins.push(Fin { patch: id, forward });
-        }
-        self.features.patches.push(Patch {
-            surface: SurfaceId(surface),
-            flipped,
-            inside: Some(BodyId(0)),
-            outside: None,
-            boundary: boundary.to_vec(),
-            seeds: seeds.to_vec(),
-            bc: 1,
-            name: String::new(),
-        });
-    }
-
-    /// Meshes it and checks the result.
-    fn mesh(&self, size: &dyn SizeField) -> (SurfaceMesh, Report) {
-        let settings = Settings::default();
-        let (mesh, report) =
-            mesh_patches(&self.geometry, &self.features, self.curves.clone(), size, &settings)
-                .expect("a mesh");
-        let projector = Projector::new(&self.geometry, &self.features);
-        assert_eq!(mesh.check(&self.features, &projector), []);
-        assert_eq!(mesh.points[..self.curves.points.len()], self.curves.points[..]);
-        assert_eq!(report.flattening_left(), 0);
-        if std::env::var_os("TETMILL_SHOW").is_some() {
-            for p in &report.patches {
-                eprintln!("{p:?}");
-            }
-        }
-        (mesh, report)
-    }
-}
-
-fn euler(mesh: &SurfaceMesh) -> i64 {
-    let mut used: Vec<VertexId> = mesh.triangles.iter().flat_map(|t| t.vertices).collect();
-    used.sort_unstable();
-    used.dedup();
-    let mut edges: Vec<[VertexId; 2]> = mesh
-        .triangles
-        .iter()
-        .flat_map(|t| {
-            let [a, b, c] = t.vertices;
-            [[a, b], [b, c], [c, a]].map(|[a, b]| [a.min(b), a.max(b)])
-        })
-        .collect();
-    edges.sort_unstable();
-    edges.dedup();
-    used.len() as i64 - edges.len() as i64 + mesh.triangles.len() as i64
-}
-
-fn area(mesh: &SurfaceMesh) -> f64 {
-    let of = |t: &BoundaryTriangle| {
-        let [a, b, c] = t.vertices.map(|v| mesh.points[v.index()]);
-        crate::kernel::simplex::area(&a, &b, &c)
-    };
-    mesh.triangles.iter().map(of).sum()
-}
-
-fn circle(center: Point, radius: f64, height: f64) -> impl Fn(f64) -> Point {
-    move |t| {
-        let (s, c) = (TAU * t).sin_cos();
-        center + Vector::new(radius * c, radius * s, height)
-    }
-}
-
-fn plane(z: f64, up: f64) -> Surface {
-    Surface::Plane(Plane { point: Point::new(0.0, 0.0, z), normal: Vector::new(0.0, 0.0, up) })
-}
-
-fn z_cylinder(radius: f64) -> Surface {
-    Surface::Cylinder(Cylinder { point: Point::origin(), axis: Vector::z(), radius })
-}
+use crate::size::UniformSize;
+use csg::primitive::{Cone, Ellipsoid, EllipticCone, EllipticCylinder, Sphere, Torus};
 
 /// A square of side 4 with a round hole of radius 1 in `n` segments.
 fn square_with_hole(n: usize, side: usize, normal: f64) -> Made {
@@ -235,10 +74,10 @@ fn a_torus_and_an_ellipsoid_are_closed_at_any_size() {
         radii: [2.0, 1.0, 0.7],
     };
     let ellipsoid = whole(Surface::Ellipsoid(ellipsoid), Point::new(2.5, 0.0, 0.0));
-    for h in [1e10, 0.5, 0.1] {
+    for (h, normal) in [(1e10, 70.0), (0.5, 60.0), (0.1, 20.0)] {
         let (mesh, report) = ellipsoid.mesh(&UniformSize(h));
         assert_eq!(euler(&mesh), 2);
-        assert!(report.worst_normal() < 60.0 && report.min_angle() > 20.0, "{report:?}");
+        assert!(report.worst_normal() < normal && report.min_angle() > 20.0, "{report:?}");
     }
 }
 
@@ -349,6 +188,50 @@ fn a_disk_in_three_segments_gets_a_vertex_inside() {
     // One triangle would have all its edges on one circle.
     assert_eq!(mesh.triangles.iter().filter(|t| t.patch == PatchId(1)).count(), 3);
     assert_eq!(report.flattening_repaired(), 2);
+}
+
+#[test]
+fn points_and_curves_inside_a_patch_are_kept() {
+    let mut made = square_with_hole(12, 4, 1.0);
+    let at = [(-1.8, -1.5), (-1.2, 1.7)].map(|(x, y)| Point::new(x, y, 0.0));
+    // Corners are the first vertices of the others here: the new ones have numbers of their own.
+    let first = made.curves.points.len();
+    let corners = at.map(|p| made.corner(p, &[0]));
+    let alone = made.corner(Point::new(1.5, 1.5, 0.0), &[0]);
+    assert_eq!(alone.index(), 6);
+    let vertices = [VertexId::new(first), VertexId::new(first + 1)];
+    let curve = CurveId::new(made.features.curves.len());
+    made.curves.segments.push(Segment { vertices, curve });
+    let fins = [true, false].map(|forward| Fin { patch: PatchId(0), forward }).to_vec();
+    let surfaces = [SurfaceId(0), SurfaceId(0)];
+    made.features.curves.push(Curve { surfaces, ends: Some(corners), trace: at.to_vec(), fins });
+    made.features.patches[0].boundary.extend([(curve, true), (curve, false)]);
+    let (mesh, _) = made.mesh(&UniformSize(0.5));
+    assert!(mesh.triangles.iter().any(|t| t.vertices.contains(&VertexId::new(first + 2))));
+    assert_eq!(euler(&mesh), 0);
+}
+
+#[test]
+fn a_circle_with_the_same_patch_on_both_sides_is_kept() {
+    let sphere = Surface::Sphere(Sphere { center: Point::origin(), radius: 1.0 });
+    let mut made = Made::new(vec![sphere, plane(0.2, 1.0)]);
+    let rim = made.ring([0, 1], 9, circle(Point::origin(), 0.96_f64.sqrt(), 0.2));
+    made.patch(0, false, &[(rim, true), (rim, false)], &[]);
+    let (mesh, _) = made.mesh(&UniformSize(0.4));
+    assert_eq!(euler(&mesh), 2);
+}
+
+#[test]
+fn both_nappes_of_a_cone_meet_at_the_apex() {
+    let cone = Cone { point: Point::origin(), axis: Vector::z(), radius: 1.0, slope: -0.5 };
+    let mut made = Made::new(vec![Surface::Cone(cone), plane(0.0, -1.0), plane(3.5, 1.0)]);
+    made.corner(Point::new(0.0, 0.0, 2.0), &[0]);
+    let bottom = made.ring([0, 1], 20, circle(Point::origin(), 1.0, 0.0));
+    let top = made.ring([0, 2], 15, circle(Point::origin(), 0.75, 3.5));
+    made.patch(0, false, &[(bottom, true), (top, false)], &[]);
+    let (mesh, _) = made.mesh(&UniformSize(0.3));
+    // Two disks with one vertex in common.
+    assert_eq!(euler(&mesh), 1);
 }
 
 #[test]

@@ -1,0 +1,85 @@
+//! NETGEN's tutorials from the text to triangles, where the folder with them is.
+
+use super::*;
+use crate::size::{GeometricSize, SizeSettings};
+use crate::surface::curves::mesh_curves;
+use std::path::PathBuf;
+
+/// The folder with the tutorials, if it is there.
+fn folder() -> Option<PathBuf> {
+    let shared = std::env::var_os("TETMILL_SHARED")
+        .map_or_else(|| PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared")), PathBuf::from);
+    let folder = shared.join("netgen-tutorials");
+    folder.is_dir().then_some(folder)
+}
+
+/// The triangles that NETGEN makes of some with its default preset: orientation, not targets.
+const TUTORIALS: [(&str, usize); 14] = [
+    ("boxcyl", 450),
+    ("cone", 718),
+    ("cube", 12),
+    ("cubeandspheres", 144),
+    ("cubemsphere", 570),
+    ("cylinder", 0),
+    ("ellipsoid", 694),
+    ("fichera", 36),
+    ("matrix", 1070),
+    ("sculpture", 358),
+    ("shaft", 1656),
+    ("sphere", 108),
+    ("torus", 2526),
+    ("trafo", 1662),
+];
+
+#[test]
+fn tutorials_are_meshed_without_a_fault() {
+    let Some(folder) = folder() else {
+        eprintln!("SKIPPED: there is no folder with the tutorials; set TETMILL_SHARED");
+        return;
+    };
+    for (name, netgen) in TUTORIALS {
+        let text = std::fs::read_to_string(folder.join(name).with_extension("geo")).expect(name);
+        let geometry = csg::language::parse_geometry(&text, name).expect(name).geometry;
+        let features = Features::find(&geometry).expect(name);
+        let projector = Projector::new(&geometry, &features);
+        let size = GeometricSize::new(&geometry, &features, &SizeSettings::default());
+        let curves = mesh_curves(&features, &projector, &size).expect(name);
+        let (mesh, report) =
+            mesh_patches(&geometry, &features, curves, &size, &Settings::default()).expect(name);
+        assert_eq!(mesh.check(&features, &projector), [], "{name}");
+        eprintln!(
+            "{name}: {} triangles (NETGEN {netgen}), quality {:.3} {:.4}, angle {:.1}, normal {:.1}",
+            report.triangles(),
+            report.worst_quality(),
+            report.mean_quality(),
+            report.min_angle(),
+            report.worst_normal()
+        );
+        assert_eq!(report.flattening_left(), 0, "{name}");
+        assert!(report.worst_normal() < 60.0, "{name}: {report:?}");
+        // The corners of the wedges of cubeandspheres are sharper than that.
+        assert!(report.min_angle() > 15.0, "{name}: {report:?}");
+    }
+}
+
+#[test]
+fn the_result_does_not_depend_on_the_number_of_threads() {
+    let Some(folder) = folder() else {
+        eprintln!("SKIPPED: there is no folder with the tutorials; set TETMILL_SHARED");
+        return;
+    };
+    let text = std::fs::read_to_string(folder.join("trafo.geo")).expect("trafo.geo");
+    let geometry = csg::language::parse_geometry(&text, "trafo.geo").expect("a geometry").geometry;
+    let features = Features::find(&geometry).expect("features");
+    let projector = Projector::new(&geometry, &features);
+    let size = GeometricSize::new(&geometry, &features, &SizeSettings::default());
+    let curves = mesh_curves(&features, &projector, &size).expect("curves");
+    let run = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+        let settings = Settings::default();
+        pool.install(|| mesh_patches(&geometry, &features, curves.clone(), &size, &settings)).expect("a mesh")
+    };
+    let ((one, first), (three, second)) = (run(1), run(3));
+    assert_eq!((one.points, one.triangles), (three.points, three.triangles));
+    assert_eq!(first, second);
+}
