@@ -1,5 +1,6 @@
 //! Volume meshing: Delaunay tetrahedra inside a closed surface that is kept exactly.
 
+mod bound;
 mod carve;
 mod cavity;
 pub mod closed_surface;
@@ -24,10 +25,7 @@ pub use keep::KeptPointFault;
 
 use crate::Point;
 use crate::size::SizeField;
-use constraints::Constraints;
 use csg::BodyId;
-use recover::{Recovery, Unrecovered, lock_facets};
-use tetrahedra::Tetrahedra;
 
 /// Tets that fill the bodies of a [`ClosedSurface`].
 #[derive(Clone, Debug, Default)]
@@ -159,7 +157,7 @@ pub fn mesh(
     let scale = finish::scale_of(&surface.points);
     let points: Vec<Point> = surface.points.iter().map(|p| p * scale).collect();
     let mut report = Report::default();
-    let mut tets = bound(surface, &points, scale, &mut report)?;
+    let mut tets = bound::bound(surface, points, scale, &mut report)?;
     let mut cavity = cavity::Cavity::default();
     for (index, &place) in surface.kept_points.iter().enumerate() {
         keep::keep(&mut tets, &mut cavity, place * scale).map_err(|fault| VolumeError::KeptPoint {
@@ -177,70 +175,6 @@ pub fn mesh(
             })?;
     }
     Ok((finish::finish(surface, &tets, scale), report))
-}
-
-/// How often the recovery is begun anew, in another order, where it fails. Of 1500 skins of random bodies with
-/// hundreds of coplanar points, 4 fail once.
-const ATTEMPTS: u64 = 4;
-
-/// The bodies in as few tets as the surface needs: its facets locked, nothing outside of them.
-fn bound(
-    surface: &ClosedSurface,
-    points: &[Point],
-    scale: f64,
-    report: &mut Report,
-) -> Result<Tetrahedra, VolumeError> {
-    let mut attempt = 0;
-    loop {
-        match attempt_to_bound(surface, points, scale, attempt, report) {
-            Err(VolumeError::NotRecovered { triangles: suspects, places }) => {
-                let found = intersect::intersections(&surface.points, &surface.triangles, &suspects);
-                if !found.is_empty() {
-                    let (triangles, places) = found.into_iter().unzip();
-                    return Err(VolumeError::SelfIntersection { triangles, places });
-                }
-                attempt += 1;
-                if attempt == ATTEMPTS {
-                    return Err(VolumeError::NotRecovered { triangles: suspects, places });
-                }
-            }
-            result => return result,
-        }
-    }
-}
-
-fn attempt_to_bound(
-    surface: &ClosedSurface,
-    points: &[Point],
-    scale: f64,
-    attempt: u64,
-    report: &mut Report,
-) -> Result<Tetrahedra, VolumeError> {
-    let mut tets = delaunay::delaunay(points);
-    let mut constraints = Constraints::new(&surface.triangles);
-    // Each Steiner point brings an end nearer, but rounding may spoil that: stop where there are many more than points.
-    let mut recovery = Recovery::new(&mut tets, &mut constraints, 2 * points.len() + 100, attempt);
-    let recovered = recovery.run();
-    let (counts, steiner) = (recovery.counts, std::mem::take(&mut recovery.steiner));
-    report.missing_edges = counts.missing_edges;
-    report.missing_faces = counts.missing_faces;
-    report.steiner_on_surface = steiner.len();
-    recovered.map_err(|left| finish::not_recovered(surface, &constraints, &left, scale))?;
-    lock_facets(&mut tets, &constraints);
-    let far = points.len() as u32;
-    carve::carve(&mut tets, &constraints, &surface.regions, far).map_err(|d| VolumeError::Inconsistent {
-        triangle: d.triangle,
-        place: surface.points[surface.triangles[d.triangle as usize][0] as usize],
-        regions: d.regions,
-    })?;
-    let (inside, stayed) = relocate::relocate(&mut tets, &mut constraints, &surface.triangles, &steiner);
-    report.steiner_inside = inside.len();
-    if !stayed.is_empty() {
-        let facets = stayed.iter().flat_map(|&p| constraints.facets_at(p)).collect();
-        let left = Unrecovered { facets, intersections: Vec::new() };
-        return Err(finish::not_recovered(surface, &constraints, &left, scale));
-    }
-    Ok(tets)
 }
 
 #[cfg(test)]

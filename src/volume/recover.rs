@@ -64,7 +64,7 @@ pub(super) struct Recovery<'a> {
     found: Vec<Crossing>,
     intersections: Vec<Intersection>,
     most_steiner: usize,
-    attempt: u64,
+    attempt: u32,
     /// The vertices of the surface are those below.
     surface_points: u32,
 }
@@ -76,7 +76,7 @@ impl<'a> Recovery<'a> {
         mesh: &'a mut Tetrahedra,
         constraints: &'a mut Constraints,
         most_steiner: usize,
-        attempt: u64,
+        attempt: u32,
     ) -> Self {
         let surface_points = 1 + constraints.facets.iter().flat_map(|f| f.vertices).max().unwrap_or(0);
         Self {
@@ -137,7 +137,7 @@ impl<'a> Recovery<'a> {
         }
         let mut missing: Vec<u32> = self.constraints.alive().filter(|&f| !present[f as usize]).collect();
         if self.attempt > 0 {
-            missing.sort_by_key(|&f| mix(mix(self.attempt) ^ u64::from(f)));
+            missing.sort_by_key(|&f| mix(mix(u64::from(self.attempt)) ^ u64::from(f)));
         }
         missing
     }
@@ -149,7 +149,7 @@ impl<'a> Recovery<'a> {
         wanted.sort_unstable();
         wanted.dedup();
         if self.attempt > 0 {
-            wanted.sort_by_key(|&[a, b]| mix(mix(self.attempt ^ u64::from(a)) ^ u64::from(b)));
+            wanted.sort_by_key(|&[a, b]| mix(mix(u64::from(self.attempt ^ a)) ^ u64::from(b)));
         }
         wanted.retain(|&[a, b]| self.mesh.tet_at_edge(a, b, &mut self.star).is_none());
         if count {
