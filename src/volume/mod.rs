@@ -161,15 +161,19 @@ pub fn mesh(
     let mut tets = bound(surface, &points, scale, &mut report)?;
     let mut cavity = cavity::Cavity::default();
     for (index, &place) in surface.kept_points.iter().enumerate() {
-        keep::keep(&mut tets, &mut cavity, place * scale)
-            .map_err(|fault| VolumeError::KeptPoint { index, place, fault })?;
+        keep::keep(&mut tets, &mut cavity, place * scale).map_err(|fault| VolumeError::KeptPoint {
+            index,
+            place,
+            fault,
+        })?;
     }
     if settings.fill {
         let limit = settings.max_tets.min(tetrahedra::MAX_TETS);
-        report.points_inside = points::fill(&mut tets, size, scale, limit).map_err(|stopped| match stopped {
-            points::Stopped::BadSize { place, size } => VolumeError::BadSize { place, size },
-            points::Stopped::TooManyTets => VolumeError::TooManyTets { limit },
-        })?;
+        report.points_inside =
+            points::fill(&mut tets, size, scale, limit).map_err(|stopped| match stopped {
+                points::Stopped::BadSize { place, size } => VolumeError::BadSize { place, size },
+                points::Stopped::TooManyTets => VolumeError::TooManyTets { limit },
+            })?;
     }
     Ok((finish::finish(surface, &tets, scale), report))
 }

@@ -200,7 +200,9 @@ impl Filler<'_> {
                 });
                 moved |= has_front;
                 if inserted {
-                    next.extend(self.cavity.filled.iter().filter(|&&t| self.states[t as usize] == State::Coarse));
+                    next.extend(
+                        self.cavity.filled.iter().filter(|&&t| self.states[t as usize] == State::Coarse),
+                    );
                 } else if has_front {
                     self.states[t as usize] = State::Settled;
                 } else {

@@ -97,8 +97,7 @@ impl<'a> Recovery<'a> {
             self.recover_edges(&missing, first);
             first = false;
             let intersects = !self.intersections.is_empty();
-            let mut left: Vec<u32> =
-                missing.iter().copied().filter(|&f| !self.recover_facet(f, 0)).collect();
+            let mut left: Vec<u32> = missing.iter().copied().filter(|&f| !self.recover_facet(f, 0)).collect();
             if !intersects && self.intersections.is_empty() {
                 // The neighbourhood has changed: what failed at first may work now.
                 for depth in 1..=DEEPEST {
@@ -235,9 +234,7 @@ impl<'a> Recovery<'a> {
     fn clear_crossing(&mut self, a: u32, b: u32, crossing: Crossing, depth: u32) -> bool {
         match crossing {
             Crossing::Vertex(_) => false,
-            Crossing::Edge(tet, edge) => {
-                self.remove_edge(tet, edge, [a, b], depth)
-            }
+            Crossing::Edge(tet, edge) => self.remove_edge(tet, edge, [a, b], depth),
             Crossing::Face(half_face) => {
                 let [x, y, z] = self.mesh.face(half_face);
                 let (tet, other) = (half_face >> 2, self.mesh.across(half_face));
@@ -248,9 +245,7 @@ impl<'a> Recovery<'a> {
                 {
                     return true;
                 }
-                [[x, y], [y, z], [z, x]].into_iter().any(|edge| {
-                    self.remove_edge(tet, edge, [a, b], depth)
-                })
+                [[x, y], [y, z], [z, x]].into_iter().any(|edge| self.remove_edge(tet, edge, [a, b], depth))
             }
         }
     }
@@ -325,7 +320,9 @@ impl<'a> Recovery<'a> {
         }
         loop {
             self.cavity.take(self.mesh, &tets);
-            if self.cavity.make_star_shaped(self.mesh, tets[0], &point) && self.cavity.tets.len() == tets.len() {
+            if self.cavity.make_star_shaped(self.mesh, tets[0], &point)
+                && self.cavity.tets.len() == tets.len()
+            {
                 break;
             }
             let grown = self.behind_unseen(&tets, &point)?;
@@ -391,9 +388,7 @@ impl<'a> Recovery<'a> {
             };
             // Ends of piercing edges are never corners of the facet: no chord is wanted.
             let [a, _, c] = facet.vertices;
-            let flipped = edges.iter().any(|&(tet, edge)| {
-                self.remove_edge(tet, edge, [a, c], depth)
-            });
+            let flipped = edges.iter().any(|&(tet, edge)| self.remove_edge(tet, edge, [a, c], depth));
             if !flipped {
                 return false;
             }

@@ -160,7 +160,13 @@ fn the_schoenhardt_polyhedron_gets_one_point_inside() {
 
 /// Any surface between tets of some mesh can be filled. A lattice of n³ cubes of six tets each, squeezed and sheared so
 /// that it is far from Delaunay, each tet in one of two bodies or in none: surfaces that touch themselves everywhere.
-fn lattice_skin(n: u32, squeeze: [f64; 3], shear: f64, bend: f64, mut body: impl FnMut() -> Option<BodyId>) -> Soup {
+fn lattice_skin(
+    n: u32,
+    squeeze: [f64; 3],
+    shear: f64,
+    bend: f64,
+    mut body: impl FnMut() -> Option<BodyId>,
+) -> Soup {
     let at = |c: [u32; 3]| {
         let [x, y, z] = [0, 1, 2].map(|k| f64::from(c[k]) * squeeze[k]);
         // Triangular, so every tet keeps its volume.
