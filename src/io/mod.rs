@@ -2,10 +2,10 @@
 //! whole mesh in memory.
 //!
 //! ```text
-//! elmer     DIR/partitioning.N/part.K.* and DIR/mesh.*      every rank writes its part; read back and judged
-//! vtu       STEM.vtu, or STEM.pvtu with a file per part      raw binary, for ParaView and meshio
-//! geomview  FILE.off / FILE.list: what the thesis looked at   the skin, a colour per part
-//! serial    FILE.{vtu,msh,mesh,vol,off}                      one part; Gmsh, Medit, NETGEN
+//! elmer     DIR/partitioning.N/part.K.*, DIR/mesh.*       every rank writes its part; read back and judged
+//! vtu       STEM.vtu, or STEM.pvtu with a file per part   raw binary, for ParaView and meshio
+//! geomview  STEM.off, or STEM.list with a file per part   the skin, a colour per part
+//! serial    FILE.{vtu,msh,mesh,vol,off}                   one part: Gmsh, Medit and NETGEN too
 //! ```
 //! All writers go through [`output`]: what is written stands in a temporary folder beside the target until every
 //! rank is done, and only then takes the place of what was there. A writer that fails leaves the old files as

@@ -10,7 +10,7 @@ use crate::mesh::stream::{MeshStream, NO_TET, TetBlock};
 use std::ffi::OsStr;
 use std::path::Path;
 
-/// The ends of names that [`write`] knows.
+/// The ends of names that [`write()`] knows.
 pub const KNOWN: &str =
     ".vtu, .msh (Gmsh 2.2), .mesh (Medit), .vol (NETGEN), .off (Geomview: the boundary alone)";
 

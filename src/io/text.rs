@@ -2,7 +2,7 @@
 
 use std::io::Write;
 
-/// The longest text that [`push_float`] writes: sign, 17 digits, point, `e-308`.
+/// The longest text that [`Line::float`] writes: sign, 17 digits, point, `e-308`.
 pub const FLOAT_CHARS: usize = 24;
 
 /// Two decimal digits of each number below 100.

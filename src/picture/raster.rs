@@ -55,6 +55,10 @@ pub struct Image {
 /// Each pixel is the mean of this many in each direction.
 const SAMPLES: u32 = 2;
 
+/// Edges are drawn in their full colour in triangles that are so many line widths across. At 4 a mesh of 3-pixel
+/// triangles turns grey, at 12 lines are pale where there is room for them.
+const FULL_LINES_AT: f32 = 8.0;
+
 /// Lines of pixels that one thread draws at a time.
 const BAND: u32 = 32;
 
@@ -168,9 +172,9 @@ impl<'a> Canvas<'a> {
         // Heights over the edges opposite a, b, c: a barycentric coordinate times its height is a distance.
         let heights = [(b, c), (c, a), (a, b)].map(|(p, q)| area.abs() / (q[0] - p[0]).hypot(q[1] - p[1]));
         let line = self.settings.edge_width * SAMPLES as f32;
-        // Where triangles are as small as the lines are wide, lines fade lest all become dark.
-        let smallest = heights[0].min(heights[1]).min(heights[2]);
-        let strength = (smallest / (4.0 * line) - 0.25).clamp(0.0, 1.0);
+        // Lines fade with the size of the triangle, lest small ones become all dark. The size is that of the area:
+        // heights differ more from one triangle to the next, which looked blotched.
+        let strength = (area.abs().sqrt() / (FULL_LINES_AT * line)).min(1.0);
         for y in lines {
             for x in columns.clone() {
                 let p = [x as f32 + 0.5, y as f32 + 0.5, 0.0];
