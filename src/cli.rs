@@ -107,7 +107,7 @@ pub struct Generate {
 pub struct MeshFile {
     /// The geometry, a NETGEN CSG file (.geo)
     pub geometry: PathBuf,
-    /// File to write; its ending names the format (.vtu)
+    /// File to write; its ending names the format: .vtu, .msh (Gmsh 2.2), .mesh (Medit), .vol (NETGEN), .off
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
     /// Sizes of the mesh

@@ -244,11 +244,12 @@ fn tell(report: &Report, file: Option<&Path>, quiet: bool, wanted: Option<u64>) 
 /// `tetmill mesh`
 pub fn run_mesh(options: &MeshFile) -> Result<(), Failure> {
     let start = Instant::now();
-    let ending = options.output.extension().and_then(|e| e.to_str()).unwrap_or("");
-    if ending != "vtu" {
+    let known = ["vtu", "msh", "mesh", "vol", "off"];
+    if !options.output.extension().is_some_and(|ending| known.iter().any(|k| ending == *k)) {
         return Err(Failure::input(format!(
-            "{}: the ending names the format, and `.{ending}` is not known: use .vtu",
-            options.output.display()
+            "the end of {} names no format; known are {}",
+            options.output.display(),
+            io::serial::KNOWN
         )));
     }
     set_threads(options.threads)?;
@@ -261,8 +262,8 @@ pub fn run_mesh(options: &MeshFile) -> Result<(), Failure> {
     };
     let settings = GenerateSettings { size: size_settings(&options.size), wanted };
     let made = generate(&comm, Some(&model), &settings, &progress)?;
-    let stem = options.output.with_extension("");
-    let written = progress.stage("write", || io::vtu::write(&comm, &made.part, &made.names, &stem))?;
+    let written =
+        progress.stage("write", || io::serial::write(&made.part, &made.names, &options.output))?;
     if let Some(file) = &options.picture {
         draw(&comm, &made.part, options.cut, file)?;
     }

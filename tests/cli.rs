@@ -116,9 +116,11 @@ fn one_part_is_also_a_plain_elmer_mesh() {
 #[test]
 fn a_coarse_mesh_goes_to_one_file() {
     let dir = tempfile::tempdir().unwrap();
-    let file = dir.path().join("lens.vtu");
-    succeed(tetmill().arg("mesh").arg(own("lens")).arg("-q").arg("-o").arg(&file));
-    assert!(std::fs::read(&file).unwrap().starts_with(b"<"));
+    for (ending, start) in [("vtu", "<"), ("msh", "$MeshFormat"), ("mesh", "MeshVersionFormatted"), ("vol", "mesh3d")] {
+        let file = dir.path().join("lens").with_extension(ending);
+        succeed(tetmill().arg("mesh").arg(own("lens")).args(["--preset", "coarse", "-q", "-o"]).arg(&file));
+        assert!(std::fs::read(&file).unwrap().starts_with(start.as_bytes()), "{ending}");
+    }
     let output = tetmill().arg("mesh").arg(own("lens")).args(["-o", "lens.xyz"]).output().unwrap();
     assert_eq!(output.status.code(), Some(2));
 }

@@ -4,5 +4,7 @@ mod cli;
 mod common;
 mod geometries;
 mod mpirun;
+mod mpirun_comm;
 mod ranks;
 mod tutorials;
+mod writers;

@@ -2,12 +2,13 @@
 
 use super::*;
 use crate::comm::Communicator;
+use crate::dist::distribute;
 use crate::io::plain::PlainPart;
 use crate::io::testing::{cube, names, scattered, slabs, together, two_tets};
 use crate::io::{WriteError, Written};
 use crate::mesh::stream::Counts;
 use crate::mesh::{Mesh, Names, Rank};
-use crate::refine::fixtures::{self, Fixture, ball, split};
+use crate::refine::fixtures::{self, Fixture, ball};
 use crate::refine::refine;
 use std::fs;
 use std::path::Path;
@@ -94,11 +95,11 @@ fn cubes_in_one_to_seven_parts_have_no_faults() {
 
 /// Refines each part of a mesh on its rank and writes it.
 fn write_refined(fixture: &Fixture, n: u32, ranks: u32, dir: &Path) -> Written {
-    let parts = split(&fixture.mesh, &slabs(&fixture.mesh, ranks), ranks);
     let named = |k: u32| (k, format!("number {k}"));
     let names = Names { bodies: (1..3).map(named).collect(), patches: (1..8).map(named).collect() };
     let write_part = |comm: &dyn Communicator| {
-        let part = parts[comm.rank() as usize].clone();
+        let mesh = (comm.rank() == 0).then(|| (fixture.mesh.clone(), slabs(&fixture.mesh, ranks)));
+        let part = distribute(comm, mesh).unwrap();
         let refined = refine(part, &fixture.projector, n, &Default::default()).unwrap();
         write(comm, &refined, &names, dir).unwrap()
     };
