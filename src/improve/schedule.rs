@@ -30,7 +30,7 @@ pub struct Settings {
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { measure: Measure::default(), passes: 8, target: 0.85, change_below: 0.6, shortest_edge: 0.5 }
+        Self { measure: Measure::default(), passes: 8, target: 0.85, change_below: 0.6, shortest_edge: 0.6 }
     }
 }
 
