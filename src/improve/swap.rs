@@ -285,7 +285,7 @@ mod tests {
 
     #[test]
     fn faces_between_two_near_vertices_are_removed() {
-        // One face is the flip 2-3; four round a vertex cannot be, as it would lose all its tets.
+        // A ring of n leaves n − 2 faces between the ends: one is the flip 2-3.
         for ring in [3, 4, 5, 6] {
             let mut complex = Complex::new(&fan(ring, 4.0));
             swap_all(&mut complex);
