@@ -11,8 +11,8 @@ use crate::improve::complex::{Complex, Ring, place};
 use crate::improve::objective::{INVERTED, Objective};
 use crate::mesh::{TET_EDGES, TET_FACES};
 
-/// Rings with more tets are left alone: the triangulations grow as n³, and good ones are not known of
-/// edges with many tets (Shewchuk 2002 found no gain beyond 7).
+/// Rings with more tets are left alone: the work grows as n³, and so long rings seldom have a better filling
+/// (Freitag, Ollivier-Gooch 1997 stop at 7).
 const LONGEST_RING: usize = 8;
 
 /// The most faces that one face removal takes: their new edge must not have too many tets either.
