@@ -187,9 +187,9 @@ impl Complex {
         let mut old_to_new = vec![VertexId(NONE); self.points.len()];
         mesh.points.clear();
         mesh.classes.clear();
-        for v in 0..self.points.len() {
+        for (v, new) in old_to_new.iter_mut().enumerate() {
             if !gone(v) {
-                old_to_new[v] = VertexId::new(mesh.points.len());
+                *new = VertexId::new(mesh.points.len());
                 mesh.points.push(self.points[v]);
                 mesh.classes.push(self.classes[v]);
             }

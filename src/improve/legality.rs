@@ -238,12 +238,8 @@ impl Legality {
         (illegal, TetLimits::new(spokes.map(|corner| corner.map(|s| s.and_then(|s| s.limit)))))
     }
 
-    /// Whether two of the triangle's edges lie on curves tangent at their common vertex, so that all tets with it
-    /// are illegal; not for a boundary triangle, which is no fault of a tet.
-    pub fn is_illegal_triangle(&self, triangle: [u32; 3]) -> bool {
-        self.flattens(triangle) && !self.is_hopeless(triangle)
-    }
-
+    /// Whether two of the triangle's edges lie on curves tangent at their common vertex, so that it flattens there,
+    /// and all tets with it.
     fn flattens(&self, triangle: [u32; 3]) -> bool {
         (0..3).any(|k| {
             let lines = |m: usize| self.spoke(triangle[k], triangle[(k + m) % 3]).map_or(0, |s| s.lines);

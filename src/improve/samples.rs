@@ -88,7 +88,7 @@ pub(super) fn shake(mesh: &mut Mesh, cell: f64, amount: f64, seed: u64) {
         }
     }
     let mut state = seed;
-    for v in 0..mesh.points.len() {
+    for (v, tets) in tets_of.iter().enumerate() {
         let by = Vector::from_fn(|_, _| noise(&mut state)) * (amount * cell);
         if !matches!(mesh.classes[v], Class::Body(_)) {
             continue;
@@ -99,7 +99,7 @@ pub(super) fn shake(mesh: &mut Mesh, cell: f64, amount: f64, seed: u64) {
             let [a, b, c, d] = mesh.tets[*t].map(|w| mesh.points[w.index()]);
             crate::kernel::simplex::volume6(&a, &b, &c, &d) > 1e-4 * cell.powi(3)
         };
-        if !tets_of[v].iter().all(positive) {
+        if !tets.iter().all(positive) {
             mesh.points[v] = from;
         }
     }

@@ -30,7 +30,7 @@ pub struct Settings {
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { measure: Measure::default(), passes: 8, target: 0.85, change_below: 0.6, shortest_edge: 0.5 }
+        Self { measure: Measure::default(), passes: 8, target: 0.85, change_below: 0.6, shortest_edge: 0.6 }
     }
 }
 
@@ -78,7 +78,8 @@ const FEW_CHANGES: f64 = 1e-3;
 
 /// Improves the shapes of the tets of all bodies. Boundary triangles, segments and their vertices stay as they are.
 ///
-/// The worst tet of the mesh never gets worse. Ids of vertices and tets change.
+/// By the measure, the worst tet of the mesh never gets worse. Ids of vertices and tets change; surviving vertices keep
+/// their order. The same mesh gives the same result.
 ///
 /// # Panics
 /// If the mesh is broken: a tet is not positively oriented, a face has three tets, a boundary triangle is no tet's face.
@@ -87,7 +88,8 @@ pub fn improve(mesh: &mut Mesh, size: &dyn SizeField, settings: &Settings) -> Re
 }
 
 /// Like [`improve`], but first of all mends the **illegal** tets, those which would flatten when refined and
-/// snapped (see [`Smoothness`] and the module `legality`), and makes no new ones.
+/// snapped (see the [module](crate::improve) and [`Smoothness`]), and makes no new ones. Scores, the corners' losses included, never
+/// fall, but the straight shape of a tet may, where a corner gains by it.
 ///
 /// # Panics
 /// As [`improve`].

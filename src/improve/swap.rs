@@ -11,8 +11,8 @@ use crate::improve::complex::{Complex, Ring, place};
 use crate::improve::objective::{INVERTED, Objective};
 use crate::mesh::{TET_EDGES, TET_FACES};
 
-/// Rings with more tets are left alone: the triangulations grow as n³, and good ones are not known of
-/// edges with many tets (Shewchuk 2002 found no gain beyond 7).
+/// Rings with more tets are left alone: the work grows as n³, and so long rings seldom have a better filling
+/// (Freitag, Ollivier-Gooch 1997 stop at 7).
 const LONGEST_RING: usize = 8;
 
 /// The most faces that one face removal takes: their new edge must not have too many tets either.
@@ -285,7 +285,7 @@ mod tests {
 
     #[test]
     fn faces_between_two_near_vertices_are_removed() {
-        // One face is the flip 2-3; four round a vertex cannot be, as it would lose all its tets.
+        // A ring of n leaves n − 2 faces between the ends: one is the flip 2-3.
         for ring in [3, 4, 5, 6] {
             let mut complex = Complex::new(&fan(ring, 4.0));
             swap_all(&mut complex);
