@@ -3,7 +3,7 @@
 use super::around::{Around, Tolerances, around};
 use super::cross::{Crossing, crossings};
 use super::octree::Octree;
-use super::trace::{Trace, along, tangent};
+use super::trace::{Trace, along, tangent_along};
 use super::{FeatureError, Named, Place};
 use crate::project::project_to_both;
 use crate::{Geometry, Interval, Point, Surface, SurfaceId, Vector};
@@ -206,13 +206,9 @@ fn cut_at_known_nodes(
 
 /// The length of a trace between two positions.
 fn length(trace: &Trace, from: f64, to: f64) -> f64 {
-    let at = |position: f64| {
-        let step = (position as usize).min(trace.points.len() - 2);
-        trace.points[step] + (trace.points[step + 1] - trace.points[step]) * (position - step as f64)
-    };
     let stops = (from as usize + 1..=to as usize).map(|i| trace.points[i]);
-    let (mut sum, mut last) = (0.0, at(from));
-    for stop in stops.chain([at(to)]) {
+    let (mut sum, mut last) = (0.0, trace.at(from));
+    for stop in stops.chain([trace.at(to)]) {
         sum += (stop - last).norm();
         last = stop;
     }
@@ -391,13 +387,12 @@ impl Arc {
 
     /// Whether it may be one curve with the arc `next` that begins where it ends.
     pub fn continues_in(&self, geometry: &Geometry, next: &Self) -> bool {
-        /// The cosine of the least angle that is a corner where both lie on the same surfaces.
-        const STRAIGHT: f64 = 0.99;
+        /// The cosine of the least angle that is a corner where both lie on the same surfaces: more than two steps turn by.
+        const STRAIGHT: f64 = 0.9;
         let same = self.pair == next.pair || self.around.surfaces == next.around.surfaces;
         let direction = |arc: &Self, at: &Point, chord: Vector| {
             let [a, b] = arc.pair.map(|s| &geometry.surfaces[s.index()]);
-            let t = tangent(a, b, at);
-            if t.dot(&chord) < 0.0 { -t } else { t }
+            tangent_along(a, b, at, &chord)
         };
         let n = self.points.len();
         let end = direction(self, &self.points[n - 1], self.points[n - 1] - self.points[n - 2]);
