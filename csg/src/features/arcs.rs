@@ -307,24 +307,28 @@ fn classify(
         let (at, forward) = sample(geometry, pair, &points, part, tolerances);
         around(geometry, tree, pair, &at, &forward, tolerances).map(|found| (at, found))
     };
-    let (middle, found) = look(0.52)?;
-    let found = found.filter(Around::is_feature);
+    // Where the pair does not matter, the feature, if there is one, is that of other surfaces through the same curve.
+    let (middle, Some(found)) = look(0.52)? else { return Ok(None) };
+    let sheets = |around: &Around| if around.is_feature() { around.sheets.clone() } else { Vec::new() };
+    let mut surfaces = found.surfaces.clone();
     // Beyond where a trace was left nothing is known: only its middle counts.
     let whole = ends.is_none_or(|ends| ends.iter().all(Option::is_some));
-    let mut surfaces = found.as_ref().map_or(Vec::new(), |f| f.surfaces.clone());
     for part in if whole { &OTHER_PARTS[..] } else { &[] } {
-        let (at, other) = look(*part)?;
-        let other = other.filter(Around::is_feature);
-        if other.as_ref().map(|o| &o.sheets) != found.as_ref().map(|f| &f.sheets) {
+        let (at, Some(other)) = look(*part)? else { return Ok(None) };
+        if sheets(&other) != sheets(&found) {
             return Err(loose(geometry, pair, &at));
         }
-        surfaces.extend(other.into_iter().flat_map(|o| o.surfaces));
+        surfaces.extend(other.surfaces);
+    }
+    if !found.is_feature() {
+        return Ok(None);
     }
     surfaces.sort_unstable();
     surfaces.dedup();
     let [a, b] = pair.map(|s| &geometry.surfaces[s.index()]);
     let sine = a.normal(&middle).cross(&b.normal(&middle)).norm();
-    Ok(found.map(|around| Arc { pair, points, ends, around: Around { surfaces, ..around }, middle, sine }))
+    let around = Around { surfaces, ..found };
+    Ok(Some(Arc { pair, points, ends, around, middle, sine }))
 }
 
 /// Keeps one of arcs that are the same: those of several pairs of surfaces through one curve, and

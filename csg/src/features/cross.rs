@@ -51,7 +51,15 @@ pub(super) fn crossings(
             }
         }
     }
-    for (id, crossings) in by_surface {
+    for (id, mut crossings) in by_surface {
+        // A surface through a branch point is tangent there too, and crossings beside it are rounding.
+        let last = trace.points.len() - 1;
+        for (position, _) in [0, last].into_iter().zip(trace.branches).filter(|end| end.1) {
+            let point = trace.points[position];
+            if geometry.surfaces[id.index()].distance(&point) <= tolerances.on_surface {
+                crossings.push(Crossing { position: position as f64, point, volume: 0.0 });
+            }
+        }
         found.extend(distinct(&geometry.surfaces[id.index()], crossings, tolerances));
     }
     found.sort_by(|x, y| x.position.total_cmp(&y.position));
@@ -64,6 +72,8 @@ pub(super) fn crossings(
 /// Rounding makes of a touching point two crossings nearby, or one and an extremum beside it. The extremum is
 /// kept, else the one that is nearest to the surface.
 fn distinct(third: &Surface, mut crossings: Vec<Crossing>, tolerances: &Tolerances) -> Vec<Crossing> {
+    /// Crossings nearer to each other than this many lengths of merging may be one: a thousandth of the diagonal.
+    const NEAR: f64 = 1e5;
     /// The volume at an extremum found by bisection is rounding.
     const EXTREMUM: f64 = 1e-10;
     crossings.sort_by(|x, y| x.position.total_cmp(&y.position));
@@ -73,7 +83,8 @@ fn distinct(third: &Surface, mut crossings: Vec<Crossing>, tolerances: &Toleranc
     for crossing in crossings {
         let repeats = last.is_some_and(|last| {
             let middle = nalgebra::center(&last.point, &crossing.point);
-            crossing.position - last.position < SHORT_PART && third.distance(&middle) <= tolerances.on_surface
+            let near = (crossing.point - last.point).norm() <= NEAR * tolerances.merge;
+            near && third.distance(&middle) <= tolerances.on_surface
         });
         last = Some(crossing);
         match kept.last_mut().filter(|_| repeats) {
@@ -84,10 +95,6 @@ fn distinct(third: &Surface, mut crossings: Vec<Crossing>, tolerances: &Toleranc
     }
     kept
 }
-
-/// Crossings nearer to each other than this part of a step may be one: the curve between them is straight enough to
-/// tell by the middle of its chord.
-const SHORT_PART: f64 = 0.01;
 
 fn nearer_end(ends: &[Point], point: &Point) -> f64 {
     if (point - ends[0]).norm_squared() <= (point - ends[1]).norm_squared() { 0.0 } else { 1.0 }
