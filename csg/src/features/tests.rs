@@ -240,6 +240,11 @@ fn what_cannot_be_meshed_is_refused_with_its_place() {
             "solid `a` (line 2) is not bounded",
         ),
         ("solid a = sphere (0,0,0; 1) and sphere (5,0,0; 1); tlo a;", "solid `a` (line 2) contains nothing"),
+        ("solid a = sphere (0,0,0; 1) and sphere (2,0,0; 1); tlo a;", "solid `a` (line 2) contains nothing"),
+        (
+            "solid a = cylinder (0,0,0; 1,0,0; 1) and plane (0,0,1; 0,0,-1) and sphere (0,0,0; 3); tlo a;",
+            "solid `a` (line 2) contains nothing",
+        ),
         (
             "solid a = cone (0,0,0; 1; 0,0,1; 0.5) and plane (0,0,0; 0,0,-1) and plane (0,0,2; 0,0,1); tlo a;",
             "the apex of the cone of solid `a` (line 2) at (0.000000, 0.000000, 2.000000)",

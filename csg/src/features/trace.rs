@@ -28,6 +28,8 @@ const TURN: f64 = 0.2;
 const ROOM: f64 = 0.1;
 /// A step below this part of the diagonal gets nowhere.
 const LEAST_STEP: f64 = 1e-9;
+/// A curve with more points than this does not end.
+const MOST_POINTS: usize = 1_000_000;
 /// Near a branch point within this part of the radius of curvature, a curve that heads for it is taken to reach it.
 const NEAR_BRANCH: f64 = 1e-2;
 
@@ -169,7 +171,7 @@ impl<'a> Tracer<'a> {
             }
             let mut step = reach.min(TURN / curvature).min(self.diagonal);
             let next = loop {
-                if step < LEAST_STEP * self.diagonal {
+                if step < LEAST_STEP * self.diagonal || points.len() > MOST_POINTS {
                     return (points, End::Lost);
                 }
                 match self.step(&at, &tangent, step, sign) {
