@@ -22,6 +22,7 @@
 
 use crate::{Aabb, BodyId, CornerId, CurveId, Geometry, PatchId, Point, SurfaceId};
 use around::Tolerances;
+use octree::Octree;
 
 mod arcs;
 mod around;
@@ -126,16 +127,10 @@ impl Features {
         let diagonal = root.iter().map(|side| side.width().powi(2)).sum::<f64>().sqrt();
         let largest = root.iter().map(crate::Interval::magnitude).fold(0.0, f64::max);
         let tolerances = Tolerances::new(diagonal, largest);
-        let tree = octree::Octree::new(geometry, root)?;
+        let tree = Octree::new(geometry, root)?;
         contact::refuse_apexes(geometry, &tree)?;
-        let traces = trace::trace_all(geometry, &tree, &tolerances);
-        let (arcs, nodes) = arcs::feature_arcs(geometry, &tree, &traces, &tolerances)?;
-        let arcs = assemble::join(geometry, arcs, &nodes, &tolerances)?;
-        contact::check(geometry, &tree, &arcs, &tolerances)?;
-        let mut features = assemble::entities(geometry, &tree, &arcs, &nodes, &tolerances)?;
-        number::number(geometry, &mut features.patches);
-        features.check()?;
-        Ok(features)
+        find_in(geometry, &tree, &tolerances)
+            .map_err(|error| contact::explain(geometry, &tree, error, &tolerances))
     }
 
     /// The curve with this id.
@@ -150,6 +145,18 @@ impl Features {
     pub fn corner(&self, id: CornerId) -> &Corner {
         &self.corners[id.index()]
     }
+}
+
+/// The features in the cells of a tree.
+fn find_in(geometry: &Geometry, tree: &Octree, tolerances: &Tolerances) -> Result<Features, FeatureError> {
+    let traces = trace::trace_all(geometry, tree, tolerances);
+    let (arcs, nodes) = arcs::feature_arcs(geometry, tree, &traces, tolerances)?;
+    let arcs = assemble::join(geometry, arcs, &nodes, tolerances)?;
+    contact::check(geometry, tree, &arcs, tolerances)?;
+    let mut features = assemble::entities(geometry, tree, &arcs, &nodes, tolerances)?;
+    number::number(geometry, &mut features.patches);
+    features.check()?;
+    Ok(features)
 }
 
 #[cfg(test)]

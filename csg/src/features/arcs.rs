@@ -3,7 +3,7 @@
 use super::around::{Around, Tolerances, around};
 use super::cross::{Crossing, crossings};
 use super::octree::Octree;
-use super::trace::{Trace, along, tangent};
+use super::trace::{Trace, along, tangent_along};
 use super::{FeatureError, Named, Place};
 use crate::project::project_to_both;
 use crate::{Geometry, Interval, Point, Surface, SurfaceId, Vector};
@@ -206,13 +206,9 @@ fn cut_at_known_nodes(
 
 /// The length of a trace between two positions.
 fn length(trace: &Trace, from: f64, to: f64) -> f64 {
-    let at = |position: f64| {
-        let step = (position as usize).min(trace.points.len() - 2);
-        trace.points[step] + (trace.points[step + 1] - trace.points[step]) * (position - step as f64)
-    };
     let stops = (from as usize + 1..=to as usize).map(|i| trace.points[i]);
-    let (mut sum, mut last) = (0.0, at(from));
-    for stop in stops.chain([at(to)]) {
+    let (mut sum, mut last) = (0.0, trace.at(from));
+    for stop in stops.chain([trace.at(to)]) {
         sum += (stop - last).norm();
         last = stop;
     }
@@ -311,24 +307,28 @@ fn classify(
         let (at, forward) = sample(geometry, pair, &points, part, tolerances);
         around(geometry, tree, pair, &at, &forward, tolerances).map(|found| (at, found))
     };
-    let (middle, found) = look(0.52)?;
-    let found = found.filter(Around::is_feature);
+    // Where the pair does not matter, the feature, if there is one, is that of other surfaces through the same curve.
+    let (middle, Some(found)) = look(0.52)? else { return Ok(None) };
+    let sheets = |around: &Around| if around.is_feature() { around.sheets.clone() } else { Vec::new() };
+    let mut surfaces = found.surfaces.clone();
     // Beyond where a trace was left nothing is known: only its middle counts.
     let whole = ends.is_none_or(|ends| ends.iter().all(Option::is_some));
-    let mut surfaces = found.as_ref().map_or(Vec::new(), |f| f.surfaces.clone());
     for part in if whole { &OTHER_PARTS[..] } else { &[] } {
-        let (at, other) = look(*part)?;
-        let other = other.filter(Around::is_feature);
-        if other.as_ref().map(|o| &o.sheets) != found.as_ref().map(|f| &f.sheets) {
+        let (at, Some(other)) = look(*part)? else { return Ok(None) };
+        if sheets(&other) != sheets(&found) {
             return Err(loose(geometry, pair, &at));
         }
-        surfaces.extend(other.into_iter().flat_map(|o| o.surfaces));
+        surfaces.extend(other.surfaces);
+    }
+    if !found.is_feature() {
+        return Ok(None);
     }
     surfaces.sort_unstable();
     surfaces.dedup();
     let [a, b] = pair.map(|s| &geometry.surfaces[s.index()]);
     let sine = a.normal(&middle).cross(&b.normal(&middle)).norm();
-    Ok(found.map(|around| Arc { pair, points, ends, around: Around { surfaces, ..around }, middle, sine }))
+    let around = Around { surfaces, ..found };
+    Ok(Some(Arc { pair, points, ends, around, middle, sine }))
 }
 
 /// Keeps one of arcs that are the same: those of several pairs of surfaces through one curve, and
@@ -391,13 +391,12 @@ impl Arc {
 
     /// Whether it may be one curve with the arc `next` that begins where it ends.
     pub fn continues_in(&self, geometry: &Geometry, next: &Self) -> bool {
-        /// The cosine of the least angle that is a corner where both lie on the same surfaces.
-        const STRAIGHT: f64 = 0.99;
+        /// The cosine of the least angle that is a corner where both lie on the same surfaces: more than two steps turn by.
+        const STRAIGHT: f64 = 0.9;
         let same = self.pair == next.pair || self.around.surfaces == next.around.surfaces;
         let direction = |arc: &Self, at: &Point, chord: Vector| {
             let [a, b] = arc.pair.map(|s| &geometry.surfaces[s.index()]);
-            let t = tangent(a, b, at);
-            if t.dot(&chord) < 0.0 { -t } else { t }
+            tangent_along(a, b, at, &chord)
         };
         let n = self.points.len();
         let end = direction(self, &self.points[n - 1], self.points[n - 1] - self.points[n - 2]);

@@ -10,6 +10,10 @@ const HUGE: f64 = 1e4;
 /// A box is good when the cells at its faces are smaller than this part of its longest side.
 const RESOLUTION: f64 = 1.0 / 16.0;
 
+/// What is smaller than this part of the huge cube, a ten-thousand-millionth of the extent of the primitives, is nothing:
+/// two balls that touch have a point in common.
+const NOTHING: f64 = 1e-14;
+
 /// Part of the huge cube, and what bodies may be in it (`None`: the whole cell is in the body).
 struct Part {
     cell: Cell,
@@ -36,6 +40,9 @@ pub(super) fn bounding_cell(geometry: &Geometry) -> Result<Cell, FeatureError> {
         }
         let hull = hull(&parts);
         let longest = hull.iter().map(Interval::width).fold(0.0, f64::max);
+        if longest < NOTHING * cube[0].width() {
+            return Err(FeatureError::Empty(Named::body(geometry, parts[0].bodies[0].0)));
+        }
         let is_rough = |part: &Part| {
             let touches = (0..3).any(|i| part.cell[i].lo == hull[i].lo || part.cell[i].hi == hull[i].hi);
             let undecided = part.bodies.iter().any(|b| b.1.is_some());

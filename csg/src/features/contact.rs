@@ -3,7 +3,7 @@
 use super::arcs::Arc;
 use super::around::{Tolerances, region, sheet_at};
 use super::octree::{Leaf, Octree};
-use super::{FeatureError, Named, Place};
+use super::{FeatureError, Inconsistency, Named, Place};
 use crate::interval::{Cell, middle};
 use crate::primitive::quadric::tangents;
 use crate::{Geometry, Interval, Point, Surface, SurfaceId};
@@ -215,6 +215,24 @@ pub(super) fn check(
         }
     }
     Ok(())
+}
+
+/// Names the contact of surfaces near the place of an error, if there is one that matters, as its reason.
+pub(super) fn explain(
+    geometry: &Geometry,
+    tree: &Octree,
+    error: FeatureError,
+    tolerances: &Tolerances,
+) -> FeatureError {
+    let (FeatureError::LooseCurve { place, .. }
+    | FeatureError::Inconsistent(Inconsistency::OpenBoundary { place, .. })) = error
+    else {
+        return error;
+    };
+    let is_near = |contact: &&Contact| (contact.point - place.0).norm() <= 2.0 * contact.reach;
+    let matters = |contact: &&Contact| matches!(is_harmless(geometry, tree, contact, tolerances), Ok(false));
+    let reason = tree.contacts.iter().filter(is_near).find(matters);
+    reason.map_or(error, |contact| refusal(geometry, contact))
 }
 
 /// The distance of a point from a line segment.

@@ -4,8 +4,9 @@ use super::around::Tolerances;
 use super::octree::Octree;
 use super::trace::{Trace, along, step_box};
 use crate::project::project_to_both;
-use crate::{Geometry, Interval, Point, Surface, Vector};
+use crate::{Geometry, Interval, Point, Surface, SurfaceId, Vector};
 use nalgebra::Matrix3;
+use std::collections::BTreeMap;
 
 /// A point where another surface crosses or touches a trace.
 #[derive(Clone, Copy, Debug)]
@@ -26,21 +27,22 @@ pub(super) fn crossings(
     tolerances: &Tolerances,
 ) -> Vec<Crossing> {
     let [a, b] = trace.pair.map(|s| &geometry.surfaces[s.index()]);
+    let mut by_surface: BTreeMap<SurfaceId, Vec<Crossing>> = BTreeMap::new();
     let mut found = Vec::new();
     for (index, ends) in trace.points.windows(2).enumerate() {
         for id in tree.surfaces_in(&step_box(&ends[0], &ends[1])) {
             if trace.pair.contains(&id) {
                 continue;
             }
-            let mut finder =
-                Finder { a, b, third: &geometry.surfaces[id.index()], tolerances, found: Vec::new() };
+            let third = &geometry.surfaces[id.index()];
+            let mut finder = Finder { a, b, third, tolerances, found: Vec::new() };
             if !finder.contains_curve(ends) {
                 finder.find(&ends[0], &ends[1], 0);
             }
-            for point in finder.found {
+            by_surface.entry(id).or_default().extend(finder.found.iter().map(|&point| {
                 let position = index as f64 + along(ends, &point).unwrap_or_else(|| nearer_end(ends, &point));
-                found.push(Crossing { position, point, volume: volume(&[a, b, finder.third], &point) });
-            }
+                Crossing { position, point, volume: volume(&[a, b, third], &point) }
+            }));
         }
         for user in &geometry.user_points {
             let on_both = a.distance(&user.point).max(b.distance(&user.point)) <= tolerances.on_surface;
@@ -49,8 +51,49 @@ pub(super) fn crossings(
             }
         }
     }
+    for (id, mut crossings) in by_surface {
+        // A surface through a branch point is tangent there too, and crossings beside it are rounding.
+        let last = trace.points.len() - 1;
+        for (position, _) in [0, last].into_iter().zip(trace.branches).filter(|end| end.1) {
+            let point = trace.points[position];
+            if geometry.surfaces[id.index()].distance(&point) <= tolerances.on_surface {
+                crossings.push(Crossing { position: position as f64, point, volume: 0.0 });
+            }
+        }
+        found.extend(distinct(&geometry.surfaces[id.index()], crossings, tolerances));
+    }
     found.sort_by(|x, y| x.position.total_cmp(&y.position));
     found
+}
+
+/// The crossings of one surface without repetitions: where the trace is on the surface all the way between two of them,
+/// they are one.
+///
+/// Rounding makes of a touching point two crossings nearby, or one and an extremum beside it. The extremum is
+/// kept, else the one that is nearest to the surface.
+fn distinct(third: &Surface, mut crossings: Vec<Crossing>, tolerances: &Tolerances) -> Vec<Crossing> {
+    /// Crossings nearer to each other than this many lengths of merging may be one: a thousandth of the diagonal.
+    const NEAR: f64 = 1e5;
+    /// The volume at an extremum found by bisection is rounding.
+    const EXTREMUM: f64 = 1e-10;
+    crossings.sort_by(|x, y| x.position.total_cmp(&y.position));
+    let rank = |c: &Crossing| if c.volume <= EXTREMUM { -1.0 } else { third.distance(&c.point) };
+    let mut kept: Vec<Crossing> = Vec::new();
+    let mut last: Option<Crossing> = None;
+    for crossing in crossings {
+        let repeats = last.is_some_and(|last| {
+            let middle = nalgebra::center(&last.point, &crossing.point);
+            let near = (crossing.point - last.point).norm() <= NEAR * tolerances.merge;
+            near && third.distance(&middle) <= tolerances.on_surface
+        });
+        last = Some(crossing);
+        match kept.last_mut().filter(|_| repeats) {
+            Some(best) if rank(&crossing) < rank(best) => *best = crossing,
+            Some(_) => {}
+            None => kept.push(crossing),
+        }
+    }
+    kept
 }
 
 fn nearer_end(ends: &[Point], point: &Point) -> f64 {

@@ -28,6 +28,8 @@ const TURN: f64 = 0.2;
 const ROOM: f64 = 0.1;
 /// A step below this part of the diagonal gets nowhere.
 const LEAST_STEP: f64 = 1e-9;
+/// A curve with more points than this does not end.
+const MOST_POINTS: usize = 1_000_000;
 /// Near a branch point within this part of the radius of curvature, a curve that heads for it is taken to reach it.
 const NEAR_BRANCH: f64 = 1e-2;
 
@@ -88,6 +90,12 @@ impl Trace {
     pub fn passes(&self, point: &Point) -> bool {
         self.points.windows(2).any(|ends| along(ends, point).is_some())
     }
+
+    /// The point at a position: a step, plus the part of the step before it. On the chord of that step.
+    pub fn at(&self, position: f64) -> Point {
+        let step = (position.max(0.0) as usize).min(self.points.len() - 2);
+        self.points[step] + (self.points[step + 1] - self.points[step]) * (position - step as f64)
+    }
 }
 
 /// The position of a point of the curve along a step, 0 to 1, if it is in the box of the step.
@@ -132,20 +140,26 @@ impl<'a> Tracer<'a> {
     }
 
     fn trace(&self, seed: &Point) -> Trace {
-        let (mut points, end) = self.follow(seed, 1.0);
+        let closed = |points| Trace { pair: self.pair, points, closed: true, branches: [false; 2] };
+        let (mut points, end) = self.follow(seed, seed, 1.0);
         if end == End::Closed {
-            return Trace { pair: self.pair, points, closed: true, branches: [false; 2] };
+            return closed(points);
         }
-        let (mut backward, start) = self.follow(seed, -1.0);
+        // Steps the other way may pass over the gap where this end was left.
+        let stop = if end == End::Left { points[points.len() - 1] } else { *seed };
+        let (mut backward, start) = self.follow(seed, &stop, -1.0);
         backward.reverse();
         backward.pop();
         backward.append(&mut points);
+        if start == End::Closed {
+            return closed(backward);
+        }
         let branches = [start, end].map(|e| e == End::Branch);
         Trace { pair: self.pair, points: backward, closed: false, branches }
     }
 
-    /// The points from the seed on, along the tangent times `sign`.
-    fn follow(&self, seed: &Point, sign: f64) -> (Vec<Point>, End) {
+    /// The points from the seed on, along the tangent times `sign`, at most to `stop`.
+    fn follow(&self, seed: &Point, stop: &Point, sign: f64) -> (Vec<Point>, End) {
         let mut points = vec![*seed];
         let mut reach = f64::INFINITY;
         loop {
@@ -157,7 +171,7 @@ impl<'a> Tracer<'a> {
             }
             let mut step = reach.min(TURN / curvature).min(self.diagonal);
             let next = loop {
-                if step < LEAST_STEP * self.diagonal {
+                if step < LEAST_STEP * self.diagonal || points.len() > MOST_POINTS {
                     return (points, End::Lost);
                 }
                 match self.step(&at, &tangent, step, sign) {
@@ -165,9 +179,9 @@ impl<'a> Tracer<'a> {
                     None => step *= 0.5,
                 }
             };
-            // The start lies on this step: the curve is closed.
-            if points.len() > 1 && along(&[at, next], seed).is_some() {
-                points.push(*seed);
+            // The first step begins at the stop if that is the seed.
+            if (points.len() > 1 || stop != seed) && along(&[at, next], stop).is_some() {
+                points.push(*stop);
                 return (points, End::Closed);
             }
             points.push(next);
@@ -219,7 +233,7 @@ impl<'a> Tracer<'a> {
 /// How a curve ends.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum End {
-    /// Where it began.
+    /// Where it was to stop.
     Closed,
     /// Where one of its surfaces no longer matters.
     Left,
@@ -251,12 +265,19 @@ fn curvature(a: &Surface, b: &Surface, at: &Point) -> f64 {
 /// At an end where its surfaces are tangent, that of the trace there.
 pub fn curve_tangent(geometry: &Geometry, curve: &Curve, at: &Point) -> Vector {
     let [a, b] = curve.surfaces.map(|s| &geometry.surfaces[s.index()]);
-    let chord = chord_near(curve, at);
-    if !cross_well(a, b, at) {
-        return chord.normalize();
-    }
+    let step = nearest_step(curve, at);
+    tangent_along(a, b, at, &(curve.trace[step + 1] - curve.trace[step]))
+}
+
+/// The unit tangent of the intersection of two surfaces in the direction of a chord nearby; the chord's own where the
+/// surfaces are tangent.
+pub(super) fn tangent_along(a: &Surface, b: &Surface, at: &Point, chord: &Vector) -> Vector {
     let along = tangent(a, b, at);
-    if along.dot(&chord) < 0.0 { -along } else { along }
+    match (cross_well(a, b, at), along.dot(chord) < 0.0) {
+        (false, _) => chord.normalize(),
+        (true, true) => -along,
+        (true, false) => along,
+    }
 }
 
 /// The curvature of a curve at a point on it, 1/length.
@@ -279,11 +300,6 @@ fn nearest_step(curve: &Curve, at: &Point) -> usize {
     let middle = |i: usize| nalgebra::center(&curve.trace[i], &curve.trace[i + 1]);
     let distance = |i: usize| (middle(i) - at).norm() - 0.5 * (curve.trace[i + 1] - curve.trace[i]).norm();
     (1..curve.trace.len() - 1).fold(0, |best, i| if distance(i) < distance(best) { i } else { best })
-}
-
-fn chord_near(curve: &Curve, at: &Point) -> Vector {
-    let i = nearest_step(curve, at);
-    curve.trace[i + 1] - curve.trace[i]
 }
 
 /// The way from a point at an end of a step of the trace to its other end.
