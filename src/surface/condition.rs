@@ -11,7 +11,8 @@ use std::collections::VecDeque;
 
 /// Triangles are cut that are at more than 25° to the surface. At 60° fine tori kept needles, from 45° down none did.
 const PARALLEL: f64 = 0.906;
-/// Triangles are cut that have an edge longer than this many wanted ones: the front makes the others anyway.
+/// Triangles are cut that have an edge longer than this many times the least size wanted at their corners: the front makes
+/// the others anyway.
 const LARGE: f64 = 2.5;
 /// A walk over the first triangulation, which is coarse.
 const STEPS: usize = 1000;
@@ -49,9 +50,10 @@ fn cut(sheet: &Sheet, t: u32) -> Option<Point> {
     }
     let longest = (0..3)
         .filter(|&i| x.segment[i] == NONE)
-        .map(|i| (sheet.length(x.v[next(i)], x.v[last(i)]), i))
+        .map(|i| ((corners[last(i)].point - corners[next(i)].point).norm(), i))
         .max_by(|p, q| p.0.total_cmp(&q.0))?;
-    if longest.0 <= LARGE {
+    let size = corners.iter().map(|n| n.size).fold(f64::INFINITY, f64::min);
+    if longest.0 <= LARGE * size {
         return None;
     }
     // The nearest point to the middle of a long chord may be anywhere: the chart's middle is between the ends.

@@ -10,13 +10,18 @@
 use super::sheet::{Kind, Node, Place, Sheet, Stop};
 use super::topology::{NONE, last, next};
 use crate::Vector;
-use crate::kernel::simplex::area;
+use crate::kernel::simplex::{area, area_vector};
 use std::collections::VecDeque;
 
 /// A triangle is done if its circumradius is below this fraction of the wanted size; the regular triangle of that size has
 /// 0.577. On a square, 0.7 makes 12 % more triangles than regular ones of the wanted size would be, 0.75 makes 5 % more; with
 /// 0.8 holes stay open, which the improvement has to split.
 const DONE: f64 = 0.75;
+/// A triangle with an edge this many times the least size wanted at its corners is not done as long as it is at more than 45°
+/// (cosine [`FOLLOWS`]) to the surface. Sizes that are not graded, as at the rim of a flat ellipsoid, ask for that.
+const SPAN: f64 = 2.0;
+/// See [`SPAN`].
+const FOLLOWS: f64 = 0.7;
 /// No new vertex comes nearer to another than this fraction of the wanted size. From 0.75 on the front leaves holes, below
 /// 0.5 it leaves edges that the improvement has to collapse.
 const CLOSE: f64 = 0.65;
@@ -100,12 +105,21 @@ impl Front<'_, '_> {
         &mut self.known[t as usize]
     }
 
-    /// Whether a triangle has the wanted size.
+    /// Whether a triangle has the wanted size, or is so small that it need not follow the surface better.
     fn is_small(&self, t: u32) -> bool {
-        let [a, b, c] = self.sheet.corners(t);
+        let corners = self.sheet.corners(t);
+        let [a, b, c] = corners;
         let [la, lb, lc] = [(b, c), (c, a), (a, b)].map(|(p, q)| (q.point - p.point).norm());
-        let radius = la * lb * lc / (4.0 * area(&a.point, &b.point, &c.point));
-        radius <= DONE * (a.size + b.size + c.size) / 3.0
+        let area = area_vector(&a.point, &b.point, &c.point);
+        let radius = la * lb * lc / (2.0 * area.norm());
+        if radius.is_nan() || radius > DONE * (a.size + b.size + c.size) / 3.0 {
+            return false;
+        }
+        let least = a.size.min(b.size).min(c.size);
+        la.max(lb).max(lc) <= SPAN * least
+            || corners
+                .iter()
+                .all(|n| n.normal == Vector::zeros() || area.dot(&n.normal) >= FOLLOWS * area.norm())
     }
 
     /// Tries to place a vertex from one side of a triangle.

@@ -17,6 +17,7 @@ pub mod check;
 mod condition;
 pub mod curves;
 mod embed;
+mod error;
 mod front;
 mod improve;
 mod patch;
@@ -28,7 +29,8 @@ mod tests;
 mod topology;
 
 pub use check::SurfaceFault;
-pub use patch::{SurfaceError, mesh_patches};
+pub use error::SurfaceError;
+pub use patch::mesh_patches;
 pub use report::{PatchReport, Report};
 
 use crate::Point;

@@ -3,93 +3,18 @@
 use super::chart::{Chart, nappe, sheets};
 use super::condition::condition;
 use super::embed::{Conflict, Fault, embed};
+use super::error::joined;
 use super::front::{Advanced, advance};
 use super::improve::{Improved, improve, repair_flattening};
 use super::sheet::{Kind, Node, Piece, Sheet, Stop};
 use super::topology::NONE;
-use super::{PatchReport, Report, Settings, SurfaceMesh};
-use crate::kernel::simplex::area_vector;
+use super::{PatchReport, Report, Settings, SurfaceError, SurfaceMesh};
 use crate::mesh::{BoundaryTriangle, Class, VertexId};
 use crate::size::SizeField;
 use crate::{Point, Vector};
-use csg::{CurveId, Features, Geometry, PatchId, ProjectionFailed, Surface};
+use csg::{CurveId, Features, Geometry, PatchId, Surface};
 use rayon::prelude::*;
 use std::ops::Range;
-
-/// Why a patch could not be meshed. Segments are indices into [`SurfaceMesh::segments`].
-#[derive(Clone, Debug, thiserror::Error)]
-pub enum SurfaceError {
-    /// Segments are too long for their surroundings: they cross each other, run over vertices, or span about half a turn
-    /// of the surface. Cut finer, they do not.
-    #[error("on patch {} the segments of curve {} are too long near ({}, {}, {}){}: cut them finer there",
-        .patch.0, .curve.0, .at.x, .at.y, .at.z,
-        .other.map_or(String::new(), |c| format!(", where they cross those of curve {}", c.0)))]
-    TooCoarse {
-        /// The patch, the first if there are several.
-        patch: PatchId,
-        /// The curve of a segment.
-        curve: CurveId,
-        /// The curve that it crosses, if so.
-        other: Option<CurveId>,
-        /// The middle of the segment.
-        at: Point,
-        /// All segments that are too long, on all patches, ascending.
-        segments: Vec<usize>,
-        /// Their middles: where a smaller size helps.
-        places: Vec<Point>,
-    },
-    /// Two vertices are at the same place.
-    #[error("patch {} has two vertices at ({}, {}, {})", .patch.0, .at.x, .at.y, .at.z)]
-    Coincident {
-        /// The patch.
-        patch: PatchId,
-        /// The place.
-        at: Point,
-    },
-    /// The curves contradict each other on which side of a curve the patch lies.
-    #[error("the boundary of patch {} says of curve {} near ({}, {}, {}) that the patch is on the wrong side",
-        .patch.0, .curve.0, .at.x, .at.y, .at.z)]
-    BothSides {
-        /// The patch.
-        patch: PatchId,
-        /// The curve.
-        curve: CurveId,
-        /// The middle of one of its segments.
-        at: Point,
-    },
-    /// The boundary does not enclose the patch.
-    #[error("the boundary curves of patch {} do not enclose it", .0.0)]
-    NotEnclosed(PatchId),
-    /// Coordinates that are too large or no numbers.
-    #[error("patch {} has vertices with coordinates that are too large or no numbers", .0.0)]
-    NotNumbers(PatchId),
-    /// A point of the patch has no projection.
-    #[error("on patch {}: {source}", .patch.0)]
-    Projection {
-        /// The patch.
-        patch: PatchId,
-        /// The point.
-        source: ProjectionFailed,
-    },
-    /// The size field is not positive and finite.
-    #[error("the mesh size at ({}, {}, {}) on patch {} is {size}", .at.x, .at.y, .at.z, .patch.0)]
-    BadSize {
-        /// The patch.
-        patch: PatchId,
-        /// Where.
-        at: Point,
-        /// What the size field gave.
-        size: f64,
-    },
-    /// The size field asks for more vertices than allowed.
-    #[error("patch {} needs more than {limit} vertices: the mesh size is too small for it", .patch.0)]
-    TooManyVertices {
-        /// The patch.
-        patch: PatchId,
-        /// The most allowed.
-        limit: usize,
-    },
-}
 
 /// A meshed patch: new vertices, and triangles in local numbers.
 struct Meshed {
@@ -115,14 +40,22 @@ pub fn mesh_patches(
     settings: &Settings,
 ) -> Result<(SurfaceMesh, Report), SurfaceError> {
     let input = Input::new(geometry, features, &curves, size, settings);
-    let meshed: Vec<Result<Meshed, SurfaceError>> =
+    let results: Vec<Result<Meshed, SurfaceError>> =
         (0..features.patches.len()).into_par_iter().map(|p| input.mesh(PatchId::new(p))).collect();
-    let too_long: Vec<usize> = all_too_long(&meshed);
+    let (mut meshed, mut errors) = (Vec::new(), Vec::new());
+    for result in results {
+        match result {
+            Ok(patch) => meshed.push(patch),
+            Err(error) => errors.push(error),
+        }
+    }
+    if let Some(error) = joined(errors, &curves) {
+        return Err(error);
+    }
     let mut out = curves;
     let mut report = Report::default();
     for (p, meshed) in meshed.into_iter().enumerate() {
-        let Meshed { inputs, points, triangles, report: of_patch } =
-            meshed.map_err(|error| with_all(error, &too_long, &out))?;
+        let Meshed { inputs, points, triangles, report: of_patch } = meshed;
         let patch = PatchId::new(p);
         let first = out.points.len();
         let number = |v: u32| match inputs.get(v as usize) {
@@ -135,41 +68,6 @@ pub fn mesh_patches(
         report.patches.push(of_patch);
     }
     Ok((out, report))
-}
-
-/// The segments that are too long on any patch, ascending.
-fn all_too_long(meshed: &[Result<Meshed, SurfaceError>]) -> Vec<usize> {
-    let mut all: Vec<usize> = meshed
-        .iter()
-        .filter_map(|m| match m {
-            Err(SurfaceError::TooCoarse { segments, .. }) => Some(segments),
-            _ => None,
-        })
-        .flatten()
-        .copied()
-        .collect();
-    all.sort_unstable();
-    all.dedup();
-    all
-}
-
-/// The error with the segments that are too long on all patches, if that is what it says.
-fn with_all(error: SurfaceError, too_long: &[usize], curves: &SurfaceMesh) -> SurfaceError {
-    let middle = |&s: &usize| {
-        let [a, b] = curves.segments[s].vertices.map(|v| &curves.points[v.index()]);
-        nalgebra::center(a, b)
-    };
-    match error {
-        SurfaceError::TooCoarse { patch, curve, other, at, .. } => SurfaceError::TooCoarse {
-            patch,
-            curve,
-            other,
-            at,
-            segments: too_long.to_vec(),
-            places: too_long.iter().map(middle).collect(),
-        },
-        error => error,
-    }
 }
 
 /// What all patches are made of.
@@ -260,7 +158,7 @@ impl<'a> Input<'a> {
             inputs: Vec::new(),
             points: Vec::new(),
             triangles: Vec::new(),
-            report: blank_report(id),
+            report: PatchReport::blank(id),
         };
         let mut parts = Vec::new();
         for &side in sheets(surface) {
@@ -287,14 +185,14 @@ impl<'a> Input<'a> {
                 let [a, b, c] = t.map(number);
                 out.triangles.push(if patch.flipped { [a, c, b] } else { [a, b, c] });
             }
-            measure(&mut out.report, sheet);
+            out.report.measure(sheet);
             fixed_before += fixed;
         }
         for (part, _) in parts {
             part.count(&mut out.report);
         }
         out.report.vertices = out.points.len();
-        finish_report(&mut out.report);
+        out.report.finish();
         Ok(out)
     }
 }
@@ -526,66 +424,14 @@ fn finished(sheet: &Sheet, fixed: usize) -> (Vec<Point>, Vec<[u32; 3]>) {
         old_to_new[*v as usize] = *v;
     }
     let mut points = Vec::new();
-    for v in fixed..sheet.nodes.len() {
-        if old_to_new[v] != NONE {
-            old_to_new[v] = (fixed + points.len()) as u32;
-            points.push(sheet.nodes[v].point);
+    for (new, node) in old_to_new.iter_mut().zip(&sheet.nodes).skip(fixed) {
+        if *new != NONE {
+            *new = (fixed + points.len()) as u32;
+            points.push(node.point);
         }
     }
     for v in triangles.iter_mut().flatten() {
         *v = old_to_new[*v as usize];
     }
     (points, triangles)
-}
-
-fn blank_report(patch: PatchId) -> PatchReport {
-    PatchReport {
-        patch,
-        triangles: 0,
-        vertices: 0,
-        worst_quality: 1.0,
-        mean_quality: 0.0,
-        min_angle: 60.0,
-        worst_normal: 0.0,
-        flattening_repaired: 0,
-        flattening_left: 0,
-        refused: 0,
-        swaps: 0,
-        moves: 0,
-        collapses: 0,
-        splits: 0,
-    }
-}
-
-/// Adds the triangles of a sheet; the mean quality is a sum until [`finish_report`].
-fn measure(report: &mut PatchReport, sheet: &Sheet) {
-    for t in sheet.mesh.living() {
-        let corners = sheet.corners(t);
-        let p = corners.map(|n| n.point);
-        let quality = triangle_quality(&p);
-        report.triangles += 1;
-        report.worst_quality = report.worst_quality.min(quality);
-        report.mean_quality += quality;
-        report.min_angle = report.min_angle.min(least_angle(&p));
-        let normal = area_vector(&p[0], &p[1], &p[2]);
-        for node in corners.iter().filter(|n| n.normal != Vector::zeros()) {
-            report.worst_normal = report.worst_normal.max(normal.angle(&node.normal).to_degrees());
-        }
-    }
-}
-
-fn finish_report(report: &mut PatchReport) {
-    report.mean_quality /= report.triangles.max(1) as f64;
-}
-
-/// 4√3·area/Σl²: 1 for the regular triangle, 0 for one without area.
-fn triangle_quality(p: &[Point; 3]) -> f64 {
-    let squares = (p[1] - p[0]).norm_squared() + (p[2] - p[1]).norm_squared() + (p[0] - p[2]).norm_squared();
-    let double_area = area_vector(&p[0], &p[1], &p[2]).norm();
-    if squares > 0.0 { 2.0 * 3.0_f64.sqrt() * double_area / squares } else { 0.0 }
-}
-
-/// The least angle of a triangle, degrees.
-fn least_angle(p: &[Point; 3]) -> f64 {
-    (0..3).map(|i| (p[(i + 1) % 3] - p[i]).angle(&(p[(i + 2) % 3] - p[i])).to_degrees()).fold(180.0, f64::min)
 }

@@ -1,5 +1,8 @@
 //! What surface meshing tells of its result.
 
+use super::sheet::Sheet;
+use crate::kernel::simplex::area_vector;
+use crate::{Point, Vector};
 use csg::PatchId;
 
 /// One patch.
@@ -78,4 +81,60 @@ impl Report {
     pub fn flattening_repaired(&self) -> usize {
         self.patches.iter().map(|p| p.flattening_repaired).sum()
     }
+}
+
+impl PatchReport {
+    /// Of a patch without triangles yet.
+    pub(super) fn blank(patch: PatchId) -> Self {
+        Self {
+            patch,
+            triangles: 0,
+            vertices: 0,
+            worst_quality: 1.0,
+            mean_quality: 0.0,
+            min_angle: 60.0,
+            worst_normal: 0.0,
+            flattening_repaired: 0,
+            flattening_left: 0,
+            refused: 0,
+            swaps: 0,
+            moves: 0,
+            collapses: 0,
+            splits: 0,
+        }
+    }
+
+    /// Adds the triangles of a sheet; the mean quality is a sum until [`finish`](Self::finish).
+    pub(super) fn measure(&mut self, sheet: &Sheet) {
+        for t in sheet.mesh.living() {
+            let corners = sheet.corners(t);
+            let p = corners.map(|n| n.point);
+            let quality = triangle_quality(&p);
+            self.triangles += 1;
+            self.worst_quality = self.worst_quality.min(quality);
+            self.mean_quality += quality;
+            self.min_angle = self.min_angle.min(least_angle(&p));
+            let normal = area_vector(&p[0], &p[1], &p[2]);
+            for node in corners.iter().filter(|n| n.normal != Vector::zeros()) {
+                self.worst_normal = self.worst_normal.max(normal.angle(&node.normal).to_degrees());
+            }
+        }
+    }
+
+    /// Makes the sum of qualities their mean.
+    pub(super) fn finish(&mut self) {
+        self.mean_quality /= self.triangles.max(1) as f64;
+    }
+}
+
+/// 4√3·area/Σl²: 1 for the regular triangle, 0 for one without area.
+fn triangle_quality(p: &[Point; 3]) -> f64 {
+    let squares = (p[1] - p[0]).norm_squared() + (p[2] - p[1]).norm_squared() + (p[0] - p[2]).norm_squared();
+    let double_area = area_vector(&p[0], &p[1], &p[2]).norm();
+    if squares > 0.0 { 2.0 * 3.0_f64.sqrt() * double_area / squares } else { 0.0 }
+}
+
+/// The least angle of a triangle, degrees.
+fn least_angle(p: &[Point; 3]) -> f64 {
+    (0..3).map(|i| (p[(i + 1) % 3] - p[i]).angle(&(p[(i + 2) % 3] - p[i])).to_degrees()).fold(180.0, f64::min)
 }

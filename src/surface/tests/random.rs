@@ -1,8 +1,8 @@
-//! Random arrangements of holes on planes, spheres and cylinders, anywhere in space and of any size.
+//! Random arrangements of holes on planes, spheres, tori and ellipsoids, and pipes with wavy ends, anywhere in space and of any size.
 
 use super::*;
 use crate::size::UniformSize;
-use csg::primitive::Sphere;
+use csg::primitive::{Ellipsoid, Sphere, Torus};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
@@ -24,7 +24,7 @@ fn hole() -> impl Strategy<Value = (f64, f64, f64, usize)> {
 
 fn seeded() -> ProptestConfig {
     ProptestConfig {
-        cases: 24,
+        cases: 400,
         failure_persistence: None,
         rng_seed: RngSeed::Fixed(7),
         ..ProptestConfig::default()
@@ -121,4 +121,70 @@ proptest! {
         prop_assert_eq!(euler(&mesh), 0);
         prop_assert!(report.worst_normal() < 75.0, "{:?}", report);
     }
+
+    #[test]
+    fn a_torus_with_random_holes_is_filled(
+        (motion, scale) in placement(),
+        holes in prop::collection::vec(hole(), 12),
+        minor in 0.05..0.9_f64,
+        (fineness, flipped) in (0.1..2.0_f64, any::<bool>()),
+    ) {
+        let (center, axis) = (motion * Point::origin(), motion * Vector::z());
+        let torus = Surface::Torus(Torus { center, axis, major: scale, minor: minor * scale });
+        let spots = holes.iter().enumerate().map(|(k, &(x, y, _, _))| {
+            // Four around the axis, three around the tube.
+            let angle = |cell: usize, of: f64, t: f64| TAU * (cell as f64 + 0.2 * t) / of;
+            let (u, v) = (angle(k % 4, 4.0, x), angle(k / 4, 3.0, y));
+            let radius = 1.0 + minor * v.cos();
+            motion * (Point::new(radius * u.cos(), radius * u.sin(), minor * v.sin()) * scale)
+        });
+        // No hole is wider than the torus has room for in its middle.
+        let room = 0.5 * scale * minor.min(1.0 - minor);
+        let made = pierced(torus, spots.collect(), &holes, room, flipped);
+        let (mesh, _) = made.mesh(&UniformSize(fineness * scale));
+        prop_assert_eq!(euler(&mesh), 0 - 12);
+    }
+
+    #[test]
+    fn an_ellipsoid_with_random_holes_is_filled(
+        (motion, scale) in placement(),
+        holes in prop::collection::vec(hole(), 6),
+        (a, b) in (0.2..5.0_f64, 0.2..5.0_f64),
+        (fineness, flipped) in (0.1..2.0_f64, any::<bool>()),
+    ) {
+        let axes = [Vector::x(), Vector::y(), Vector::z()].map(|axis| motion * axis);
+        let radii = [scale, a * scale, b * scale];
+        let center = motion * Point::origin();
+        let spots = (0..6).map(|k| center + axes[k / 2] * (radii[k / 2] * if k % 2 == 0 { 1.0 } else { -1.0 }));
+        let least = 1.0_f64.min(a).min(b);
+        let room = 0.5 * scale * least * least / 1.0_f64.max(a).max(b);
+        let ellipsoid = Surface::Ellipsoid(Ellipsoid { center, axes, radii });
+        let made = pierced(ellipsoid, spots.collect(), &holes, room, flipped);
+        let (mesh, _) = made.mesh(&UniformSize(fineness * scale));
+        prop_assert_eq!(euler(&mesh), 2 - 6);
+    }
+}
+
+/// A closed surface with holes of at most the given radius around some of its points.
+fn pierced(
+    surface: Surface,
+    spots: Vec<Point>,
+    holes: &[(f64, f64, f64, usize)],
+    room: f64,
+    flipped: bool,
+) -> Made {
+    let mut made = Made::new(vec![surface.clone()]);
+    let mut boundary = Vec::new();
+    for (spot, &(_, _, size, n)) in spots.iter().zip(holes) {
+        let normal = surface.normal(spot);
+        let u = normal.cross(&normal.yzx()).normalize();
+        let v = normal.cross(&u);
+        let ring = made.ring([0, 0], n, |t| {
+            let (s, c) = (TAU * t).sin_cos();
+            surface.project(&(spot + (u * c + v * s) * (room * size))).expect("near the surface")
+        });
+        boundary.push((ring, flipped));
+    }
+    made.patch(0, flipped, &boundary, &[]);
+    made
 }

@@ -13,22 +13,22 @@ fn folder() -> Option<PathBuf> {
     folder.is_dir().then_some(folder)
 }
 
-/// The triangles that NETGEN makes of some with its default preset: orientation, not targets.
-const TUTORIALS: [(&str, usize); 14] = [
-    ("boxcyl", 450),
-    ("cone", 718),
-    ("cube", 12),
-    ("cubeandspheres", 144),
-    ("cubemsphere", 570),
-    ("cylinder", 0),
-    ("ellipsoid", 694),
-    ("fichera", 36),
-    ("matrix", 1070),
-    ("sculpture", 358),
-    ("shaft", 1656),
-    ("sphere", 108),
-    ("torus", 2526),
-    ("trafo", 1662),
+/// Those with primitives that can be meshed, one of each sort.
+const TUTORIALS: [&str; 14] = [
+    "boxcyl",
+    "cone",
+    "cube",
+    "cubeandspheres",
+    "cubemsphere",
+    "cylinder",
+    "ellipsoid",
+    "fichera",
+    "matrix",
+    "sculpture",
+    "shaft",
+    "sphere",
+    "torus",
+    "trafo",
 ];
 
 #[test]
@@ -37,7 +37,7 @@ fn tutorials_are_meshed_without_a_fault() {
         eprintln!("SKIPPED: there is no folder with the tutorials; set TETMILL_SHARED");
         return;
     };
-    for (name, netgen) in TUTORIALS {
+    for name in TUTORIALS {
         let text = std::fs::read_to_string(folder.join(name).with_extension("geo")).expect(name);
         let geometry = csg::language::parse_geometry(&text, name).expect(name).geometry;
         let features = Features::find(&geometry).expect(name);
@@ -47,18 +47,10 @@ fn tutorials_are_meshed_without_a_fault() {
         let (mesh, report) =
             mesh_patches(&geometry, &features, curves, &size, &Settings::default()).expect(name);
         assert_eq!(mesh.check(&features, &projector), [], "{name}");
-        eprintln!(
-            "{name}: {} triangles (NETGEN {netgen}), quality {:.3} {:.4}, angle {:.1}, normal {:.1}",
-            report.triangles(),
-            report.worst_quality(),
-            report.mean_quality(),
-            report.min_angle(),
-            report.worst_normal()
-        );
         assert_eq!(report.flattening_left(), 0, "{name}");
-        assert!(report.worst_normal() < 60.0, "{name}: {report:?}");
-        // The corners of the wedges of cubeandspheres are sharper than that.
-        assert!(report.min_angle() > 15.0, "{name}: {report:?}");
+        assert!(report.worst_normal() < 40.0, "{name}: {report:?}");
+        // The least is 28°, in cubeandspheres, between curves that are near each other.
+        assert!(report.min_angle() > 25.0 && report.mean_quality() > 0.85, "{name}: {report:?}");
     }
 }
 
