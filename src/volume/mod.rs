@@ -18,6 +18,7 @@ mod relocate;
 #[cfg(test)]
 mod samples;
 mod sectors;
+mod steiner;
 mod tetrahedra;
 
 pub use closed_surface::{ClosedSurface, SurfaceFault, SurfaceFaults};
@@ -157,7 +158,7 @@ pub fn mesh(
     let scale = finish::scale_of(&surface.points);
     let points: Vec<Point> = surface.points.iter().map(|p| p * scale).collect();
     let mut report = Report::default();
-    let mut tets = bound::bound(surface, points, scale, &mut report)?;
+    let mut tets = bound::bound(surface, &points, scale, &mut report)?;
     let mut cavity = cavity::Cavity::default();
     for (index, &place) in surface.kept_points.iter().enumerate() {
         keep::keep(&mut tets, &mut cavity, place * scale).map_err(|fault| VolumeError::KeptPoint {
