@@ -8,7 +8,7 @@ use csg::BodyId;
 const A: Option<BodyId> = Some(BodyId(0));
 const B: Option<BodyId> = Some(BodyId(1));
 
-const EMPTY: Settings = Settings { fill: false, max_tets: 1 << 20 };
+const EMPTY: Settings = Settings { fill: false, growth: 0.5, max_tets: 1 << 20 };
 
 /// Meshes a surface without and with points inside, checks both and returns the report of the latter.
 fn filled(soup: Soup, size: f64) -> Report {
