@@ -322,3 +322,102 @@ impl fmt::Display for SurfaceFaults {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::samples::{INSIDE, Soup};
+    use super::*;
+
+    fn cube() -> Soup {
+        let mut soup = Soup::default();
+        soup.brick([0.; 3], [1.; 3], 1, INSIDE);
+        soup
+    }
+
+    /// The faults of a cube after a change; their sentences name no place outside of it.
+    fn faults(change: impl FnOnce(&mut Soup)) -> Vec<SurfaceFault> {
+        let mut soup = cube();
+        change(&mut soup);
+        let faults = soup.surface().unwrap_err();
+        assert!(!faults.to_string().is_empty());
+        faults.0
+    }
+
+    #[test]
+    fn a_cube_is_closed_and_a_box_of_two_bodies_with_a_crack_is_too() {
+        assert!(cube().surface().is_ok());
+        let mut cracked = cube();
+        let corners = [[0.2, 0.2, 0.5], [0.8, 0.2, 0.5], [0.8, 0.8, 0.5], [0.2, 0.8, 0.5]];
+        cracked.quad(corners.map(Point::from), [INSIDE[0]; 2]);
+        assert!(cracked.surface().is_ok());
+    }
+
+    #[test]
+    fn wrong_indices_and_numbers_are_found() {
+        assert_eq!(ClosedSurface::new(vec![], vec![], vec![]).unwrap_err().0, [SurfaceFault::Empty]);
+        assert_eq!(
+            faults(|c| c.regions.truncate(11)),
+            [SurfaceFault::RegionCount { triangles: 12, regions: 11 }]
+        );
+        assert_eq!(
+            faults(|c| c.triangles[3] = [0, 1, 99]),
+            [SurfaceFault::NoSuchPoint { triangle: 3, point: 99 }]
+        );
+        assert_eq!(faults(|c| c.points[2].y = f64::NAN), [SurfaceFault::NotFinite { point: 2 }]);
+        let place = Point::new(9., 9., 9.);
+        assert_eq!(faults(|c| c.points.push(place)), [SurfaceFault::UnusedPoint { point: 8, place }]);
+    }
+
+    #[test]
+    fn wrong_shapes_are_found() {
+        let found = faults(|c| {
+            // A corner once more, with the other zero.
+            c.points.push(c.points[0].map(|x| if x == 0.0 { -0.0 } else { x }));
+            let twin = c.triangles.iter_mut().find(|t| t[0] == 0).unwrap();
+            twin[0] = 8;
+        });
+        assert!(matches!(found[..], [SurfaceFault::SamePlace { points: [0, 8], .. }]), "{found:?}");
+        let found = faults(|c| c.triangles[5][1] = c.triangles[5][0]);
+        assert!(matches!(found[..], [SurfaceFault::Flat { triangle: 5, .. }]), "{found:?}");
+        let found = faults(|c| c.regions[7] = [None, None]);
+        assert!(matches!(found[..], [SurfaceFault::BoundsNothing { triangle: 7, .. }]), "{found:?}");
+        let found = faults(|c| {
+            c.triangles.push(c.triangles[4]);
+            c.regions.push(c.regions[4]);
+        });
+        assert!(matches!(found[..], [SurfaceFault::Twice { triangles: [4, 12], .. }]), "{found:?}");
+    }
+
+    #[test]
+    fn gaps_and_turned_triangles_are_found_at_their_edges() {
+        let found = faults(|c| {
+            c.triangles.remove(6);
+            c.regions.remove(6);
+        });
+        assert_eq!(found.len(), 3);
+        assert!(found.iter().all(|f| matches!(f, SurfaceFault::NotClosed { .. })), "{found:?}");
+        let found = faults(|c| c.triangles[6].swap(0, 1));
+        assert_eq!(found.len(), 3);
+        // A flap that lies on a side of the cube.
+        let found = faults(|c| {
+            let [a, b, _] = c.triangles[0].map(|v| c.points[v as usize]);
+            let [_, _, inner] = c.triangles[0].map(|v| c.points[v as usize]);
+            let middle = nalgebra::center(&nalgebra::center(&a, &b), &inner);
+            c.add([a, b, middle], INSIDE);
+        });
+        assert!(found.iter().any(|f| matches!(f, SurfaceFault::Overlap { .. })), "{found:?}");
+    }
+
+    #[test]
+    fn four_triangles_at_an_edge_are_ordered_round_it() {
+        for regions in [INSIDE, [Some(BodyId(7)), None]] {
+            let mut soup = cube();
+            soup.brick([1., 1., 0.], [2., 2., 1.], 1, regions);
+            assert!(soup.surface().is_ok());
+        }
+        // The second cube inside out: its sector and the first one's surroundings disagree.
+        let mut soup = cube();
+        soup.brick([1., 1., 0.], [2., 2., 1.], 1, [None, Some(BodyId(1))]);
+        assert!(soup.surface().is_err());
+    }
+}

@@ -1,4 +1,34 @@
 //! Volume meshing: Delaunay tetrahedra inside a closed surface that is kept exactly.
+//!
+//! A [`ClosedSurface`] bounds **bodies**; [`mesh`] fills them with tets whose faces on the surface are its
+//! triangles, none split, none turned. So parts that were meshed apart still fit.
+//!
+//! ```
+//! use tetmill::size::UniformSize;
+//! use tetmill::volume::{ClosedSurface, Settings, mesh};
+//! use tetmill::{Point, volume};
+//!
+//! // A tet's four faces, outward: body 0 behind, nothing in front.
+//! let corners = [[0., 0., 0.], [1., 0., 0.], [0., 1., 0.], [0., 0., 1.]].map(Point::from);
+//! let triangles = vec![[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
+//! let regions = vec![[Some(csg::BodyId(0)), None]; 4];
+//! let surface = ClosedSurface::new(corners.to_vec(), triangles, regions).unwrap();
+//! let (filled, report) = mesh(&surface, &UniformSize(1.0), &Settings::default()).unwrap();
+//! assert_eq!(filled.tets.len(), 1);
+//! assert_eq!(report, volume::Report::default());
+//! ```
+//!
+//! The steps, one file each:
+//! 1. `delaunay`: the boundary points, by exact cavities (`cavity`), in random rounds along the Hilbert curve.
+//! 2. `recover`: edges, then facets, by `flips`; where none is left, by Steiner points for a while (`steiner`).
+//! 3. `carve`: a flood from the triangles gives each tet its body and removes the outside.
+//! 4. `relocate`: Steiner points leave the surface: none or one stays inside on either side.
+//! 5. `keep`: points that the caller wants.
+//! 6. `points`: the inside by the size field, frontal Delaunay.
+//!
+//! Not promised: good shape. Steps 1 to 5 leave whatever the surface allows; step 6 places points so that nearly all tets are well
+//! shaped, but slivers remain: see [`improve`](crate::improve). Whether a surface intersects itself is found out
+//! only where the recovery meets it, always before a mesh is handed out.
 
 mod bound;
 mod carve;
@@ -18,6 +48,7 @@ mod relocate;
 #[cfg(test)]
 mod samples;
 mod sectors;
+mod steiner;
 mod tetrahedra;
 
 pub use closed_surface::{ClosedSurface, SurfaceFault, SurfaceFaults};
@@ -43,13 +74,15 @@ pub struct VolumeMesh {
 pub struct Settings {
     /// Whether to add points inside by the size field. Without: only what the boundary needs.
     pub fill: bool,
+    /// How much the wanted size may grow per unit of distance from a skin that is finer than the size field asks.
+    pub growth: f64,
     /// The largest number of tets; more end with an error.
     pub max_tets: usize,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { fill: true, max_tets: tetrahedra::MAX_TETS }
+        Self { fill: true, growth: 0.5, max_tets: tetrahedra::MAX_TETS }
     }
 }
 
@@ -157,7 +190,7 @@ pub fn mesh(
     let scale = finish::scale_of(&surface.points);
     let points: Vec<Point> = surface.points.iter().map(|p| p * scale).collect();
     let mut report = Report::default();
-    let mut tets = bound::bound(surface, points, scale, &mut report)?;
+    let mut tets = bound::bound(surface, &points, scale, &mut report)?;
     let mut cavity = cavity::Cavity::default();
     for (index, &place) in surface.kept_points.iter().enumerate() {
         keep::keep(&mut tets, &mut cavity, place * scale).map_err(|fault| VolumeError::KeptPoint {
@@ -169,10 +202,11 @@ pub fn mesh(
     if settings.fill {
         let limit = settings.max_tets.min(tetrahedra::MAX_TETS);
         report.points_inside =
-            points::fill(&mut tets, size, scale, limit).map_err(|stopped| match stopped {
-                points::Stopped::BadSize { place, size } => VolumeError::BadSize { place, size },
-                points::Stopped::TooManyTets => VolumeError::TooManyTets { limit },
-            })?;
+            points::fill(&mut tets, size, scale, points::Limits { growth: settings.growth, max_tets: limit })
+                .map_err(|stopped| match stopped {
+                    points::Stopped::BadSize { place, size } => VolumeError::BadSize { place, size },
+                    points::Stopped::TooManyTets => VolumeError::TooManyTets { limit },
+                })?;
     }
     Ok((finish::finish(surface, &tets, scale), report))
 }

@@ -8,24 +8,25 @@
 
 use super::cavity::Cavity;
 use super::constraints::{Constraints, edges};
-use super::crossing::{Crossing, Piercing, crossings, piercing, tets_around};
+use super::crossing::{Crossing, Piercing, crossings, piercing};
 use super::flips::Flips;
-use super::tetrahedra::{NO_BODY, NONE, Tetrahedra, sorted};
+use super::tetrahedra::Tetrahedra;
 use crate::Point;
-use crate::kernel::predicates::{Sign, orient3d};
 use crate::kernel::random::mix;
-use crate::kernel::simplex::volume6;
 
 /// How often flips may change what a missing edge or face meets before it is set aside. Of the
 /// real surfaces tried, an edge that succeeds at all does so within 12.
 const ROUNDS: usize = 40;
 
 /// How deep helping flips go, see [`Flips::remove_edge_with_help`].
-const DEEPEST: u32 = 2;
+pub(super) const DEEPEST: u32 = 2;
 
 /// How many edges may be tried to help to recover one edge or facet. On the hinge of NETGEN's tutorials 30 leave 70
 /// Steiner points for a while, 1000 leave 37 in the same time.
 const HELP: u32 = 1000;
+
+/// How often helping points are tried where a recovery is stuck.
+const HELPS: u32 = 3;
 
 /// Where two parts of the surface meet that must not.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -53,17 +54,19 @@ pub(super) struct Counts {
 
 /// The state of a recovery.
 pub(super) struct Recovery<'a> {
-    mesh: &'a mut Tetrahedra,
-    constraints: &'a mut Constraints,
+    pub(super) mesh: &'a mut Tetrahedra,
+    pub(super) constraints: &'a mut Constraints,
     /// Steiner points on the surface, in the order in which they were added.
     pub steiner: Vec<u32>,
+    /// Helping points off the surface.
+    pub helping: Vec<u32>,
     pub counts: Counts,
     flips: Flips,
-    cavity: Cavity,
-    star: Vec<u32>,
-    found: Vec<Crossing>,
+    pub(super) cavity: Cavity,
+    pub(super) star: Vec<u32>,
+    pub(super) found: Vec<Crossing>,
     intersections: Vec<Intersection>,
-    most_steiner: usize,
+    pub(super) most_steiner: usize,
     attempt: u32,
     /// The vertices of the surface are those below.
     surface_points: u32,
@@ -84,6 +87,7 @@ impl<'a> Recovery<'a> {
             constraints,
             surface_points,
             steiner: Vec::new(),
+            helping: Vec::new(),
             counts: Counts::default(),
             flips: Flips::default(),
             cavity: Cavity::default(),
@@ -99,7 +103,7 @@ impl<'a> Recovery<'a> {
     pub fn run(&mut self) -> Result<(), Unrecovered> {
         let mut missing = self.missing_facets();
         self.counts.missing_faces = missing.len();
-        let mut first = true;
+        let (mut first, mut helps) = (true, 0);
         while !missing.is_empty() {
             let before = self.steiner.len();
             self.recover_edges(&missing, first);
@@ -114,13 +118,20 @@ impl<'a> Recovery<'a> {
                 left.retain(|&f| !self.split_facet(f));
             }
             missing = self.missing_facets();
-            let progress = self.steiner.len() > before;
-            if !missing.is_empty() && (!progress || !self.intersections.is_empty()) {
+            let stuck = !missing.is_empty() && self.steiner.len() == before;
+            let helped = stuck && helps < HELPS && self.add_helping_points(&missing, helps);
+            helps += u32::from(helped);
+            if !self.intersections.is_empty() || (stuck && !helped) {
                 let intersections = std::mem::take(&mut self.intersections);
                 return Err(Unrecovered { facets: missing, intersections });
             }
         }
         Ok(())
+    }
+
+    /// Locks those facets that are faces of the mesh.
+    pub(super) fn lock_present_facets(&mut self) {
+        lock_present(self.mesh, self.constraints);
     }
 
     /// The facets that are no faces of the mesh, by one pass over it.
@@ -279,125 +290,8 @@ impl<'a> Recovery<'a> {
         })
     }
 
-    /// The point of the edge a, b at a crossing, rounded.
-    fn crossing_point(&self, a: u32, b: u32, crossing: Crossing) -> Point {
-        let [p, q] = [a, b].map(|v| *self.mesh.point(v));
-        let fraction = match crossing {
-            Crossing::Face(half_face) => {
-                let [x, y, z] = self.mesh.face(half_face).map(|v| self.mesh.point(v));
-                let (below, above) = (volume6(x, y, z, &p), volume6(x, y, z, &q));
-                below / (below - above)
-            }
-            Crossing::Edge(_, [u, v]) => {
-                // Where the plane through u, v and across both edges cuts a, b.
-                let [u, v] = [u, v].map(|v| *self.mesh.point(v));
-                let normal = (v - u).cross(&(v - u).cross(&(q - p)));
-                (u - p).dot(&normal) / (q - p).dot(&normal)
-            }
-            Crossing::Vertex(v) => (self.mesh.point(v) - p).norm() / (q - p).norm(),
-        };
-        p + (q - p) * fraction.clamp(0.0, 1.0)
-    }
-
-    /// Puts a Steiner point on a missing edge where it crosses the mesh, the crossing in the middle first.
-    fn split_edge(&mut self, a: u32, b: u32) -> Option<u32> {
-        let mut found = std::mem::take(&mut self.found);
-        crossings(self.mesh, a, b, &mut self.star, &mut found);
-        let mut order: Vec<usize> = (0..found.len()).collect();
-        order.sort_by_key(|&i| (2 * i + 1).abs_diff(found.len()));
-        let added = order.into_iter().find_map(|i| {
-            let point = self.crossing_point(a, b, found[i]);
-            let tets = tets_around(self.mesh, found[i]);
-            self.add_steiner(&tets, point)
-        });
-        self.found = found;
-        let p = added?;
-        let split: Vec<u32> = self
-            .constraints
-            .facets_at(a)
-            .into_iter()
-            .filter(|&f| self.constraints.facets[f as usize].vertices.contains(&b))
-            .collect();
-        for f in split {
-            let facet = self.constraints.facets[f as usize];
-            self.constraints.remove(f);
-            for end in [a, b] {
-                let half = facet.vertices.map(|v| if v == end { p } else { v });
-                self.constraints.add(half, facet.triangle);
-            }
-        }
-        Some(p)
-    }
-
-    /// Stars tets from a new point. Tets behind faces that do not see it are taken in first: near slivers the
-    /// point may be, by rounding, on the wrong side of some.
-    fn add_steiner(&mut self, tets: &[u32], point: Point) -> Option<u32> {
-        /// More than a split of an edge with its usual ring needs, by far.
-        const MOST_TETS: usize = 64;
-        let mut tets = tets.to_vec();
-        if tets.is_empty() || self.steiner.len() >= self.most_steiner {
-            return None;
-        }
-        loop {
-            self.cavity.take(self.mesh, &tets);
-            if self.cavity.make_star_shaped(self.mesh, tets[0], &point)
-                && self.cavity.tets.len() == tets.len()
-            {
-                break;
-            }
-            let grown = self.behind_unseen(&tets, &point)?;
-            tets.extend(grown);
-            if tets.len() > MOST_TETS {
-                return None;
-            }
-        }
-        if !self.keeps_edges(&tets) {
-            return None;
-        }
-        let p = self.mesh.add_point(point);
-        self.cavity.fill(self.mesh, p, NO_BODY);
-        self.steiner.push(p);
-        self.counts.steiner += 1;
-        Some(p)
-    }
-
-    /// The tets behind those faces around `tets` that do not see a point; `None` if there are none, or one of the
-    /// faces must stay.
-    fn behind_unseen(&self, tets: &[u32], point: &Point) -> Option<Vec<u32>> {
-        let mut behind = Vec::new();
-        for half_face in tets.iter().flat_map(|&t| 4 * t..4 * t + 4) {
-            let other = self.mesh.across(half_face);
-            let [a, b, c] = self.mesh.face(half_face).map(|v| self.mesh.point(v));
-            if (other != NONE && tets.contains(&(other >> 2))) || orient3d(a, b, c, point) == Sign::Negative {
-                continue;
-            }
-            if other == NONE || self.constraints.facet(self.mesh.face(half_face)).is_some() {
-                return None;
-            }
-            behind.push(other >> 2);
-        }
-        behind.sort_unstable();
-        behind.dedup();
-        (!behind.is_empty()).then_some(behind)
-    }
-
-    /// Whether the facets and their edges among some tets are all on the surface of the cavity they make.
-    fn keeps_edges(&self, tets: &[u32]) -> bool {
-        let outer = |h: &u32| {
-            let other = self.mesh.across(*h);
-            other == NONE || !tets.contains(&(other >> 2))
-        };
-        let half_faces = || tets.iter().flat_map(|&t| 4 * t..4 * t + 4);
-        let kept: Vec<[u32; 2]> = half_faces().filter(outer).flat_map(|h| edges(self.mesh.face(h))).collect();
-        half_faces().filter(|h| !outer(h)).all(|h| {
-            let face = self.mesh.face(h);
-            self.constraints.facet(face).is_none()
-                && edges(face).iter().all(|e| !self.constraints.has_edge(e[0], e[1]) || kept.contains(e))
-        })
-    }
-
     /// Makes a facet a face of the mesh by flips alone; its edges may still be missing.
-    fn recover_facet(&mut self, f: u32, depth: u32) -> bool {
+    pub(super) fn recover_facet(&mut self, f: u32, depth: u32) -> bool {
         let facet = self.constraints.facets[f as usize];
         if facet.gone {
             return true;
@@ -419,7 +313,7 @@ impl<'a> Recovery<'a> {
 
     /// The edges that pierce a facet; `None` where it is there, or an edge of it is missing, or it
     /// meets another part of the surface (which is noted).
-    fn obstacles(&mut self, f: u32) -> Option<Vec<(u32, [u32; 2])>> {
+    pub(super) fn obstacles(&mut self, f: u32) -> Option<Vec<(u32, [u32; 2])>> {
         let vertices = self.constraints.facets[f as usize].vertices;
         if self.mesh.find_face(vertices, &mut self.star).is_some() {
             return None;
@@ -445,52 +339,25 @@ impl<'a> Recovery<'a> {
             }
         }
     }
-
-    /// Where an edge pierces a face, rounded.
-    fn piercing_point(&self, face: [u32; 3], [u, v]: [u32; 2]) -> Point {
-        let [x, y, z] = face.map(|v| self.mesh.point(v));
-        let [p, q] = [u, v].map(|v| self.mesh.point(v));
-        let (below, above) = (volume6(x, y, z, p), volume6(x, y, z, q));
-        p + (q - p) * (below / (below - above)).clamp(0.0, 1.0)
-    }
-
-    /// Puts a Steiner point on a missing facet where an edge pierces it. True where nothing is left to do now.
-    fn split_facet(&mut self, f: u32) -> bool {
-        if self.recover_facet(f, DEEPEST) {
-            return true;
-        }
-        let Some(edges) = self.obstacles(f) else { return false };
-        let facet = self.constraints.facets[f as usize];
-        for (tet, edge) in edges {
-            let point = self.piercing_point(facet.vertices, edge);
-            let tets = tets_around(self.mesh, Crossing::Edge(tet, edge));
-            if let Some(p) = self.add_steiner(&tets, point) {
-                self.constraints.remove(f);
-                let [a, b, c] = facet.vertices;
-                for part in [[a, b, p], [b, c, p], [c, a, p]] {
-                    self.constraints.add(part, facet.triangle);
-                }
-                return true;
-            }
-        }
-        false
-    }
 }
 
 /// Locks the faces that are facets; all of them must be there.
 pub(super) fn lock_facets(mesh: &mut Tetrahedra, constraints: &Constraints) {
+    let locked = lock_present(mesh, constraints);
+    assert_eq!(locked, constraints.alive().count(), "a facet is no face of the mesh");
+}
+
+/// Locks the faces that are facets; returns how many.
+fn lock_present(mesh: &mut Tetrahedra, constraints: &Constraints) -> usize {
     let mut locked = 0;
-    for t in 0..mesh.tets.len() as u32 {
-        if !mesh.is_alive(t) {
-            continue;
-        }
-        for half_face in 4 * t..4 * t + 4 {
-            let face = mesh.face(half_face);
-            if half_face < mesh.across(half_face) && constraints.facet(sorted(face)).is_some() {
-                mesh.lock(half_face);
-                locked += 1;
-            }
+    for half_face in (0..mesh.tets.len() as u32).flat_map(|t| 4 * t..4 * t + 4) {
+        if mesh.is_alive(half_face >> 2)
+            && half_face < mesh.across(half_face)
+            && constraints.facet(mesh.face(half_face)).is_some()
+        {
+            mesh.lock(half_face);
+            locked += 1;
         }
     }
-    assert_eq!(locked, constraints.alive().count(), "a facet is no face of the mesh");
+    locked
 }
