@@ -2,7 +2,7 @@
 
 use super::fixtures::{Fixture, as_mesh, ball, cube, cylinder, shell, tet, whole};
 use super::*;
-use crate::check::{Checksum, PartReport, check, check_part, checksum, checksum_of_all};
+use crate::check::{Checksum, PartReport, check, check_part, checksum_of_all};
 use crate::comm::thread;
 use crate::dist::distribute;
 use crate::kernel::predicates::{Sign, orient3d};
