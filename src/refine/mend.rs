@@ -140,9 +140,13 @@ impl Trial<'_> {
                 |edge: &EdgeId| snap::may_bend(self.mesh.edge_classes[edge.index()], self.projector);
             let edges: Vec<EdgeId> = edges.into_iter().filter(may_bend).collect();
             let stars = self.stars(&edges);
+            let mut changed = false;
             for (edge, star) in edges.into_iter().zip(&stars) {
-                self.bend(edge, star)?;
+                changed |= self.bend(edge, star)?;
                 touched.extend(star);
+            }
+            if !changed {
+                break;
             }
             bad = self.poor(&Vec::from_iter(touched.iter().copied()))?;
         }
@@ -187,13 +191,14 @@ impl Trial<'_> {
     }
 
     /// Bends an edge so that the children around it become as good as they can: a search along the axes with steps
-    /// that halve.
-    fn bend(&mut self, edge: EdgeId, star: &[u32]) -> Result<(), RefineError> {
+    /// that halve. Returns whether the edge is bent otherwise now.
+    fn bend(&mut self, edge: EdgeId, star: &[u32]) -> Result<bool, RefineError> {
         let part = extract(self.mesh, star);
         let id = self.mesh.edge_ids[edge.index()];
         let [p, q] = self.mesh.edges[edge.index()].map(|v| self.mesh.points[v.index()]);
         let length = (p - q).norm();
-        let mut best = (self.badness(&part)?, self.bends.get(id));
+        let before = self.bends.get(id);
+        let mut best = (self.badness(&part)?, before);
         let mut step = STEPS[0];
         while step > STEPS[1] && best.0 > 0.0 {
             let mut better = best;
@@ -212,8 +217,9 @@ impl Trial<'_> {
                 step /= 2.0;
             }
         }
+        let changed = best.1 != before;
         self.bends.set(id, best.1);
-        Ok(())
+        Ok(changed)
     }
 }
 
