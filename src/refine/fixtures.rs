@@ -298,3 +298,35 @@ pub fn tet(corners: [[f64; 3]; 4], base: Option<Surface>) -> Fixture {
 pub fn whole(mesh: &Mesh) -> DistMesh {
     from_serial(mesh.clone()).expect("a classified mesh")
 }
+
+/// The shell between two spheres about the origin, one prism of three tets on each face of an icosahedron. Its interior
+/// edges leave the inner sphere below its tangent planes unless it is very thick.
+pub fn shell(inner: f64, outer: f64) -> Fixture {
+    let ball = ball(1.0).mesh;
+    let count = ball.points.len() - 1;
+    let sphere = |radius: f64| ball.points[1..].iter().map(move |p| p * radius);
+    let points: Vec<Point> = sphere(inner).chain(sphere(outer)).collect();
+    let mut tets = Vec::new();
+    for tet in &ball.tets {
+        let mut columns = [1, 2, 3].map(|k| tet[k].index() - 1);
+        columns.sort_unstable();
+        let [p, q, r] = columns;
+        for mut tet in
+            [[p, q, r, r + count], [p, q, q + count, r + count], [p, p + count, q + count, r + count]]
+        {
+            let [p, q, r, s] = tet.map(|v| points[v]);
+            if (q - p).cross(&(r - p)).dot(&(s - p)) < 0.0 {
+                tet.swap(2, 3);
+            }
+            tets.push(tet);
+        }
+    }
+    let on: Vec<Vec<u32>> = (0..2 * count).map(|v| vec![u32::from(v >= count)]).collect();
+    let bodies = vec![BodyId(0); tets.len()];
+    let sphere = |radius| Surface::Sphere(Sphere { center: P::origin(), radius });
+    let corner = P::new(outer, outer, outer);
+    Fixture {
+        mesh: classified(points, tets, bodies, &on, &[]),
+        projector: projector(vec![sphere(inner), sphere(outer)], &[], [-corner, corner]),
+    }
+}

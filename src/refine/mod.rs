@@ -10,20 +10,24 @@
 //! ```
 //!
 //! What [`refine()`] promises: no child is inverted or flat, by exact sign, and each boundary vertex is where
-//! projection to its curve or patch put it. What it does not: to mend a coarse mesh whose snapped children
-//! invert. It says where they are; the cure belongs to the coarse mesh, before it is distributed.
+//! projection to its curve or patch put it. Where snapped children would invert it says so and where. The cure
+//! belongs to the coarse mesh, before it is distributed: [`mend()`] bends edges there.
 //!
 //! [`MeshStream`]: crate::mesh::stream::MeshStream
 
+pub mod bend;
 pub mod blend;
 pub mod diagonal;
 pub mod lattice;
+pub mod mend;
 pub mod numbering;
 pub mod refined;
 pub mod snap;
 pub mod stored;
 mod tet;
 
+pub use bend::Bends;
+pub use mend::{Mended, mend};
 pub use refined::RefinedMesh;
 pub use stored::StoredMesh;
 
@@ -38,15 +42,17 @@ use crate::mesh::{GlobalId, Rank};
 use csg::{ProjectionFailed, Projector};
 
 /// How to refine.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Settings {
     /// How many faults an error describes one by one.
     pub described: usize,
+    /// Coarse edges to be bent, the same on all ranks.
+    pub bends: Bends,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { described: 8 }
+        Self { described: 8, bends: Bends::default() }
     }
 }
 
@@ -117,10 +123,21 @@ pub fn refine(
     n: u32,
     settings: &Settings,
 ) -> Result<RefinedMesh, RefineError> {
+    let (refined, bad) = refine_unchecked(mesh, projector, n, settings)?;
+    if bad.is_empty() { Ok(refined) } else { Err(tet::inverted(&bad, settings.described)) }
+}
+
+/// Refines, and hands out the mesh whatever its children are like, with the coarse tets that have bad ones.
+fn refine_unchecked(
+    mesh: DistMesh,
+    projector: &Projector,
+    n: u32,
+    settings: &Settings,
+) -> Result<(RefinedMesh, Vec<tet::BadTet>), RefineError> {
     let numbering = numbering::Numbering::new(&mesh, n)?;
-    let points = snap::boundary_first(&mesh, projector, &numbering)?;
-    let (points, diagonals) = tet::fill(&mesh, projector, &numbering, points, settings)?;
-    Ok(RefinedMesh::new(mesh, numbering, points, diagonals))
+    let points = snap::boundary_first(&mesh, projector, &numbering, &settings.bends)?;
+    let (points, diagonals, bad) = tet::fill(&mesh, projector, &numbering, points, settings);
+    Ok((RefinedMesh::new(mesh, numbering, points, diagonals), bad))
 }
 
 /// The least number of pieces to an edge with which `coarse` tets become at least `wanted`.

@@ -13,6 +13,7 @@
 //! thousand box diagonals away from the origin.
 
 use super::RefineError;
+use super::bend::Bends;
 use super::blend::{Blend, barycentric, split};
 use super::lattice::Lattice;
 use super::numbering::Numbering;
@@ -60,10 +61,17 @@ impl Place {
 }
 
 /// Whether all children of a tet are images of the lattice under one affine map.
-pub fn is_flat(mesh: &DistMesh, projector: &Projector, tet: TetId) -> bool {
+pub fn is_flat(mesh: &DistMesh, projector: &Projector, bends: &Bends, tet: TetId) -> bool {
     let free = |class| Place::of(class, projector) == Place::Free;
-    mesh.tet_edges[tet.index()].iter().all(|edge| free(mesh.edge_classes[edge.index()]))
+    let bent = |edge: &EdgeId| bends.get(mesh.edge_ids[edge.index()]).is_some();
+    (bends.is_empty() || !mesh.tet_edges[tet.index()].iter().any(bent))
+        && mesh.tet_edges[tet.index()].iter().all(|edge| free(mesh.edge_classes[edge.index()]))
         && mesh.tet_faces[tet.index()].iter().all(|face| free(mesh.face_classes[face.index()]))
+}
+
+/// Whether an edge may be bent: inside a body, or on a patch that it is snapped to.
+pub fn may_bend(class: Class, projector: &Projector) -> bool {
+    matches!(class, Class::Body(_)) || matches!(Place::of(class, projector), Place::Patch(_))
 }
 
 /// The fine vertices, with the coordinates of those in coarse vertices, edges and faces.
@@ -71,6 +79,7 @@ pub fn boundary_first(
     mesh: &DistMesh,
     projector: &Projector,
     numbering: &Numbering,
+    bends: &Bends,
 ) -> Result<Box<[Coordinates]>, RefineError> {
     let count = numbering.vertices() as usize;
     let mut points: Box<[Coordinates]> = bytemuck::allocation::try_zeroed_slice_box(count).map_err(|()| {
@@ -82,7 +91,7 @@ pub fn boundary_first(
         *coordinates = (*point).into();
     }
     let (edges, rest) = rest.split_at_mut(face_base - edge_base);
-    let mut failed = fill_edges(mesh, projector, numbering.lattice(), vertices, edges);
+    let mut failed = fill_edges(mesh, projector, bends, vertices, edges);
     if failed.is_empty() {
         let faces = &mut rest[..tet_base - face_base];
         failed = fill_faces(mesh, projector, numbering, &*vertices, &*edges, faces);
@@ -96,38 +105,48 @@ pub fn boundary_first(
 fn fill_edges(
     mesh: &DistMesh,
     projector: &Projector,
-    lattice: Lattice,
+    bends: &Bends,
     vertices: &[Coordinates],
     edges: &mut [Coordinates],
 ) -> Vec<ProjectionFailed> {
     if edges.is_empty() {
         return Vec::new();
     }
+    let edge_points = edges.len() / mesh.edges.len();
     let fill = |(edge, inside): (usize, &mut [Coordinates])| {
         let ends = mesh.edges[edge].map(|v| vertices[v.index()]);
         let place = Place::of(mesh.edge_classes[edge], projector);
-        fill_edge(ends, inside, |point| place.snap(projector, point)).err()
+        let bend = bends.get(mesh.edge_ids[edge]).filter(|_| may_bend(mesh.edge_classes[edge], projector));
+        fill_edge(ends, inside, bend, |point| place.snap(projector, point)).err()
     };
-    edges.par_chunks_mut(lattice.edge_points() as usize).enumerate().filter_map(fill).collect()
+    edges.par_chunks_mut(edge_points).enumerate().filter_map(fill).collect()
 }
 
 /// Fills the points inside an edge between its ends.
 fn fill_edge(
     ends: [Coordinates; 2],
     inside: &mut [Coordinates],
+    bend: Option<Coordinates>,
     snap: impl Fn(Coordinates) -> Result<Coordinates, ProjectionFailed>,
 ) -> Result<(), ProjectionFailed> {
     let n = inside.len() + 1;
     let (m, power) = split(n as u32);
+    // The parabola 4t(1−t) is off the mean of its values at t − h and t + h by 4h², everywhere.
+    let bent = |point: Coordinates, factor: f64| match bend {
+        Some(bend) => [0, 1, 2].map(|x| point[x] + factor * bend[x]),
+        None => point,
+    };
     for j in 1..m {
-        inside[(j * power) as usize - 1] = snap(barycentric(&ends, [m - j, j]))?;
+        let t = f64::from(j) / f64::from(m);
+        inside[(j * power) as usize - 1] = snap(bent(barycentric(&ends, [m - j, j]), 4.0 * t * (1.0 - t)))?;
     }
     let mut step = power as usize / 2;
     while step > 0 {
         for k in (step..n).step_by(2 * step) {
             let before = if k == step { ends[0] } else { inside[k - step - 1] };
             let after = if k + step == n { ends[1] } else { inside[k + step - 1] };
-            inside[k - 1] = snap(mean(before, after))?;
+            let h = step as f64 / n as f64;
+            inside[k - 1] = snap(bent(mean(before, after), 4.0 * h * h))?;
         }
         step /= 2;
     }

@@ -1,8 +1,8 @@
 //! Refinement of a cube, a ball and a cylinder, whole and in parts.
 
-use super::fixtures::{Fixture, as_mesh, ball, cube, cylinder, tet, whole};
+use super::fixtures::{Fixture, as_mesh, ball, cube, cylinder, shell, tet, whole};
 use super::*;
-use crate::check::{Checksum, PartReport, check, check_part, checksum, checksum_of_all};
+use crate::check::{Checksum, PartReport, check, check_part, checksum_of_all};
 use crate::comm::thread;
 use crate::dist::distribute;
 use crate::kernel::predicates::{Sign, orient3d};
@@ -248,6 +248,10 @@ fn the_least_pieces_that_make_enough_tets_are_chosen() {
 
 /// The checksum and the report of a mesh that is refined in parts.
 fn in_parts(fixture: &Fixture, n: u32, ranks: u32) -> (Checksum, PartReport) {
+    with_bends(fixture, n, ranks, &Bends::default())
+}
+
+fn with_bends(fixture: &Fixture, n: u32, ranks: u32, bends: &Bends) -> (Checksum, PartReport) {
     // Tets dealt out in threes: ragged parts that touch in vertices, edges and faces alike.
     let rank_of: Vec<Rank> = (0..fixture.mesh.tets.len() as u32).map(|t| t / 3 % ranks).collect();
     let settings = crate::check::Settings::default();
@@ -255,7 +259,8 @@ fn in_parts(fixture: &Fixture, n: u32, ranks: u32) -> (Checksum, PartReport) {
         let mesh = (comm.rank() == 0).then(|| (fixture.mesh.clone(), rank_of.clone()));
         let part = distribute(comm, mesh).expect("a classified mesh");
         part.check(comm).expect("a distributed mesh");
-        let part = refine(part, &fixture.projector, n, &Settings::default()).expect("refinable");
+        let bent = Settings { bends: bends.clone(), ..Settings::default() };
+        let part = refine(part, &fixture.projector, n, &bent).expect("refinable");
         let report = check(comm, &part, Some(&fixture.projector), &settings).expect("all ranks");
         (checksum_of_all(comm, &part).expect("all ranks"), report)
     });
@@ -318,6 +323,29 @@ fn more_vertices_than_local_ids_are_refused_before_memory_is_asked_for() {
     let fixture = cube(2, false);
     let error = refine(whole(&fixture.mesh), &fixture.projector, 1024, &Settings::default());
     assert!(matches!(error, Err(RefineError::TooManyVertices { rank: 0, needed }) if needed > 1 << 33));
+}
+
+#[test]
+fn bent_edges_make_room_beside_a_hollow_sphere() {
+    let fixture = shell(1.0, 1.95);
+    let coarse = whole(&fixture.mesh);
+    let failed = refine(coarse.clone(), &fixture.projector, 8, &Settings::default());
+    let Err(RefineError::Inverted { coarse: bad, .. }) = failed else {
+        panic!("a shell that needs no mending")
+    };
+    let settings = mend::Settings { pieces: 8, ..mend::Settings::default() };
+    let mended = mend(&coarse, &fixture.projector, &settings).expect("projects");
+    assert_eq!((mended.before, mended.left), (bad, vec![]));
+    let (sum, report) = with_bends(&fixture, 8, 1, &mended.bends);
+    assert_eq!((report.faults, sum.open), (0, 0), "{:?}", report.described);
+    assert_eq!(with_bends(&fixture, 8, 3, &mended.bends).0, sum);
+}
+
+#[test]
+fn a_sound_mesh_needs_no_mending() {
+    let fixture = cylinder(2);
+    let mended = mend(&whole(&fixture.mesh), &fixture.projector, &mend::Settings::default());
+    assert_eq!(mended, Ok(Mended::default()));
 }
 
 proptest::proptest! {

@@ -19,14 +19,15 @@ use csg::Projector;
 use rayon::iter::Either;
 use rayon::prelude::*;
 
-/// Fills the points inside the tets, chooses the diagonals, and checks every child.
+/// Fills the points inside the tets, chooses the diagonals, and checks every child. Also returns the coarse tets with
+/// children that are not positive.
 pub fn fill(
     mesh: &DistMesh,
     projector: &Projector,
     numbering: &Numbering,
     mut points: Box<[Coordinates]>,
     settings: &Settings,
-) -> Result<(Box<[Coordinates]>, Diagonals), RefineError> {
+) -> (Box<[Coordinates]>, Diagonals, Vec<BadTet>) {
     let lattice = numbering.lattice();
     let mut diagonals = Diagonals::new(mesh.tets.len(), lattice.octahedra());
     let bytes_per_tet = diagonals.bytes_per_tet();
@@ -40,7 +41,7 @@ pub fn fill(
         let tet = TetId::new(tet);
         block.gather(mesh, numbering, tet, before);
         let corners = mesh.tets[tet.index()].map(|v| before[v.index()]);
-        let flat = is_flat(mesh, projector, tet);
+        let flat = is_flat(mesh, projector, &settings.bends, tet);
         block.fill_odd_part(&plan, &corners, flat);
         block.fill_inside(&plan);
         block.scatter(lattice, inside);
@@ -58,17 +59,19 @@ pub fn fill(
         .map_init(|| Block::new(lattice), fill_one)
         .flatten_iter()
         .collect();
-    if bad.is_empty() { Ok((points, diagonals)) } else { Err(inverted(&bad, settings.described)) }
+    (points, diagonals, bad)
 }
 
 /// A coarse tet with children that are not positive.
-struct BadTet {
-    tet: GlobalId,
+pub struct BadTet {
+    /// Its global id.
+    pub tet: GlobalId,
     children: u64,
     faults: Vec<Fault>,
 }
 
-fn inverted(bad: &[BadTet], described: usize) -> RefineError {
+/// The error of such tets.
+pub fn inverted(bad: &[BadTet], described: usize) -> RefineError {
     RefineError::Inverted {
         children: bad.iter().map(|b| b.children).sum(),
         coarse: bad.iter().map(|b| b.tet).collect(),
