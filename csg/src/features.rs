@@ -6,10 +6,11 @@
 //! 2. `octree`: cells, in each the part of each body that matters there; split until any two surfaces in a
 //!    cell either cannot meet in it or meet in a curve that is monotone there, which interval arithmetic proves.
 //! 3. `trace`: from seeds in the cells, the intersection curves of all such pairs of surfaces.
-//! 4. `cross`: on them, the points where a third surface crosses: they cut the curves into arcs.
+//! 4. `cross`: on them, the points where a third surface crosses or touches; `arcs`: cut there, into arcs.
 //! 5. `around`: at a point of each arc, the regions (bodies or the exterior) around it, sector by sector.
 //!    An arc is part of a feature if it is more than a line on one smooth sheet.
-//! 6. `assemble`: arcs to curves and corners, sheets to patches; `number`: boundary numbers and names.
+//! 6. `assemble`: arcs to curves and corners, sheets to patches; `extent`: their box; `number`: boundary
+//!    numbers and names.
 //! 7. `check`: whether it all fits together; `contact`: whether places where surfaces are tangent matter.
 //!
 //! Why trace all pairs and classify afterwards, and not follow edges from special points like NETGEN: no
@@ -17,8 +18,13 @@
 //! one curve, four through one point, a plane through a seam between tangent surfaces) need no case of their own; and
 //! what was missed shows as an open end.
 //!
-//! What is refused, with its place: the apex of a cone on a boundary, surfaces that touch without crossing where both
-//! are boundaries (a ball on a plate), bodies that overlap or are not bounded.
+//! What is refused, with its place: the apex of a cone on a boundary; surfaces that are tangent where both are boundaries with
+//! a wedge of no angle between them (a ball on a plate); bodies that overlap or are not bounded.
+//!
+//! What is not proved: that every curve gets a seed. In a cell in which two surfaces may meet, points are looked
+//! for by Newton's method from a few starts, so a closed curve that is met only in corners of cells could be missed;
+//! an open one would show in the check. Three or more surfaces that touch in one point to a high order are refused,
+//! but not always with that reason.
 
 use crate::{Aabb, BodyId, CornerId, CurveId, Geometry, PatchId, Point, SurfaceId};
 use around::Tolerances;

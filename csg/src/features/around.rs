@@ -185,6 +185,7 @@ pub(super) fn around(
         })
     };
     let mut sheets = Vec::new();
+    let mut leaving: Vec<&Ray> = Vec::new();
     let mut before = region_of(&positive)?;
     for step in 1..=rays.len() {
         let ray = &rays[(widest + step) % rays.len()];
@@ -195,6 +196,11 @@ pub(super) fn around(
         let along_gradient = geometry.surfaces[ray.surface.index()].gradient(at).dot(&up) > 0.0;
         let (behind, front) = if along_gradient { (before, after) } else { (after, before) };
         if let Some(sheet) = Sheet::between(ray.surface, behind, front) {
+            // Two sheets that leave alike have a wedge of no angle between them.
+            if let Some(other) = leaving.iter().find(|r| (r.direction - ray.direction).norm() <= SAME_ANGLE) {
+                return Err(tangent_rays(geometry, [other, ray], at));
+            }
+            leaving.push(ray);
             // The sheet is to the left if its normal is `up`.
             sheets.push((sheet, along_gradient != sheet.flipped));
         }
@@ -202,6 +208,11 @@ pub(super) fn around(
     }
     sheets.sort_unstable();
     Ok(Some(Around { surfaces, sheets }))
+}
+
+fn tangent_rays(geometry: &Geometry, rays: [&Ray; 2], at: &Point) -> FeatureError {
+    let [first, second] = rays.map(|ray| Named::surface(geometry, ray.surface));
+    FeatureError::Tangent { first, second, place: Place(*at) }
 }
 
 /// Two unit vectors across `axis`, so that turning the first to the second is counterclockwise.
@@ -247,8 +258,7 @@ fn sorted_rays(
         rays[start..end].sort_by(|x, y| x.bend.total_cmp(&y.bend));
         for two in rays[start..end].windows(2) {
             if two[1].bend - two[0].bend <= SAME_BEND * (two[1].bend.abs() + two[0].bend.abs()) {
-                let [first, second] = [0, 1].map(|i| Named::surface(geometry, two[i].surface));
-                return Err(FeatureError::Tangent { first, second, place: Place(*at) });
+                return Err(tangent_rays(geometry, [&two[0], &two[1]], at));
             }
         }
         start = end;
