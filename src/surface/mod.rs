@@ -10,7 +10,9 @@
 //!
 //! At every moment the triangles are an embedding in the chart, so no stage can leave a hole or an overlap. What is
 //! *not* guaranteed is the shape of triangles where segments are far longer than the gaps between curves; segments that cross
-//! in the chart, because curves are cut too coarsely there, are an error that says where.
+//! in the chart, because curves are cut too coarsely there, are an error that says where. Where a surface bends sharply and the
+//! size field is not graded accordingly (the rim of a very flat ellipsoid), triangles may look away from the surface:
+//! [`Report::worst_normal`] is 90° or more then, and [`SurfaceMesh::check`] names them.
 
 mod chart;
 pub mod check;
