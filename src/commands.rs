@@ -262,8 +262,7 @@ pub fn run_mesh(options: &MeshFile) -> Result<(), Failure> {
     };
     let settings = GenerateSettings { size: size_settings(&options.size), wanted };
     let made = generate(&comm, Some(&model), &settings, &progress)?;
-    let written =
-        progress.stage("write", || io::serial::write(&made.part, &made.names, &options.output))?;
+    let written = progress.stage("write", || io::serial::write(&made.part, &made.names, &options.output))?;
     if let Some(file) = &options.picture {
         draw(&comm, &made.part, options.cut, file)?;
     }

@@ -10,7 +10,8 @@ fn generate_text(text: &str, arguments: &[&str]) -> (Output, String) {
     let geometry = dir.path().join("input.geo");
     std::fs::write(&geometry, text).unwrap();
     let out = dir.path().join("out");
-    let output = tetmill().arg("generate").arg(&geometry).arg("-o").arg(&out).args(arguments).output().unwrap();
+    let output =
+        tetmill().arg("generate").arg(&geometry).arg("-o").arg(&out).args(arguments).output().unwrap();
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
     if !output.status.success() {
         assert!(!out.exists(), "a failed run left {}", out.display());
@@ -79,7 +80,8 @@ fn a_wanted_number_of_tets_is_reached_within_half_more() {
 
 #[test]
 fn too_few_tets_for_a_geometry_are_said_aloud() {
-    let output = succeed(tetmill().arg("generate").arg(own("bracket")).args(["--coarse", "10", "-f", "none"]));
+    let output =
+        succeed(tetmill().arg("generate").arg(own("bracket")).args(["--coarse", "10", "-f", "none"]));
     let said = String::from_utf8_lossy(&output.stderr);
     assert!(said.contains("the least"), "{said}");
 }
@@ -116,7 +118,9 @@ fn one_part_is_also_a_plain_elmer_mesh() {
 #[test]
 fn a_coarse_mesh_goes_to_one_file() {
     let dir = tempfile::tempdir().unwrap();
-    for (ending, start) in [("vtu", "<"), ("msh", "$MeshFormat"), ("mesh", "MeshVersionFormatted"), ("vol", "mesh3d")] {
+    for (ending, start) in
+        [("vtu", "<"), ("msh", "$MeshFormat"), ("mesh", "MeshVersionFormatted"), ("vol", "mesh3d")]
+    {
         let file = dir.path().join("lens").with_extension(ending);
         succeed(tetmill().arg("mesh").arg(own("lens")).args(["--preset", "coarse", "-q", "-o"]).arg(&file));
         assert!(std::fs::read(&file).unwrap().starts_with(start.as_bytes()), "{ending}");

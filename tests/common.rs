@@ -62,7 +62,9 @@ pub fn succeed(command: &mut Command) -> Output {
 pub fn judge(dir: &Path, parts: u32) {
     succeed(tetmill().arg("check").arg(dir));
     if let Some(checker) = shared("tools/check_partition.py") {
-        succeed(Command::new("python3").arg(checker).arg(dir.join(format!("partitioning.{parts}"))).arg("--json"));
+        succeed(
+            Command::new("python3").arg(checker).arg(dir.join(format!("partitioning.{parts}"))).arg("--json"),
+        );
     }
 }
 

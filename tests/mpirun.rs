@@ -24,7 +24,14 @@ mod with_mpi {
             let Some(mut command) = mpirun(4) else { return };
             let dir = tempfile::tempdir().unwrap();
             let out = dir.path().join("out");
-            command.arg("generate").arg(own(name)).args(["--levels", levels, "--preset", "very-coarse", "-q", "-o"]);
+            command.arg("generate").arg(own(name)).args([
+                "--levels",
+                levels,
+                "--preset",
+                "very-coarse",
+                "-q",
+                "-o",
+            ]);
             succeed(command.arg(&out));
             judge(&out, 4);
         }
@@ -58,7 +65,8 @@ mod with_mpi {
     #[test]
     fn a_number_of_ranks_that_contradicts_mpirun_is_refused() {
         let Some(mut command) = mpirun(2) else { return };
-        let output = command.arg("generate").arg(own("lens")).args(["-n", "3", "-f", "none"]).output().unwrap();
+        let output =
+            command.arg("generate").arg(own("lens")).args(["-n", "3", "-f", "none"]).output().unwrap();
         assert_eq!(output.status.code(), Some(2));
     }
 }

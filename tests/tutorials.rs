@@ -41,7 +41,15 @@ fn tutorials_are_meshed_or_refused_by_name_and_line() {
         let dir = tempfile::tempdir().unwrap();
         let out = dir.path().join("out");
         let mut command = tetmill();
-        command.arg("generate").arg(&geometry).args(["-n", "4", "--levels", "1", "--preset", "very-coarse", "-q"]);
+        command.arg("generate").arg(&geometry).args([
+            "-n",
+            "4",
+            "--levels",
+            "1",
+            "--preset",
+            "very-coarse",
+            "-q",
+        ]);
         command.arg("-o").arg(&out);
         if MESHED.contains(&name) {
             succeed(&mut command);
