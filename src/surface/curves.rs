@@ -1,7 +1,7 @@
 //! Curves cut into segments.
 //!
 //! A curve of metric length L = ∫ ds/h gets round(L) segments of equal metric length (Schöberl 1997,
-//! section 3), but never so few that a segment turns by more than [`MAX_TURN`], that two curves share
+//! section 3), but never so few that a segment turns by more than 60°, that two curves share
 //! an edge, or that its chord comes near another curve.
 
 use super::SurfaceMesh;
