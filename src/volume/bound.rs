@@ -6,8 +6,8 @@ use super::tetrahedra::{NONE, Tetrahedra};
 use super::{ClosedSurface, Report, VolumeError, carve, delaunay, finish, intersect, relocate};
 use crate::Point;
 
-/// How often the recovery is begun anew, taking edges and facets in another order, where it fails. Of 1500 skins of
-/// random bodies in a lattice none needed a third attempt.
+/// How often the recovery is begun anew, taking edges and facets in another order, where it fails. 1500 skins of random
+/// bodies in a bent lattice were all recovered within these; with one attempt and no helping points 4 were not.
 const ATTEMPTS: u32 = 3;
 
 /// The bodies in as few tets as the surface needs: its facets locked, nothing outside of them.

@@ -116,7 +116,8 @@ pub(super) fn piercing(mesh: &mut Tetrahedra, [a, b, c]: [u32; 3], star: &mut Ve
             _ => {}
         }
     }
-    let Some(first) = first else { panic!("face {a} {b} {c} leads nowhere") };
+    // A facet whose corners lie on one line, by the rounding of a Steiner point, leads nowhere.
+    let Some(first) = first else { return Piercing::Edges(Vec::new()) };
     let mut edges = vec![first];
     let mut next = 0;
     while let Some(&(tet, [r, s])) = edges.get(next) {

@@ -12,8 +12,8 @@ use crate::kernel::hilbert::random_rounds;
 use crate::kernel::predicates::{Sign, orient3d};
 
 /// The far vertices lie on a cube with this many times the half-diagonal of the points' box as
-/// half-side. The tet then has an inscribed sphere of 10/√3 half-diagonals: every point is inside. Nearer, the far
-/// tets would spoil the skin; much farther, their spheres need the slow exact predicates (1000: twice the time).
+/// half-side. The tet then has an inscribed sphere of 10/√3 half-diagonals: every point is inside. Nearer than √3, points would
+/// lie outside; much farther, the spheres of far tets become so large that their signs need the slow exact predicates.
 const FAR: f64 = 10.0;
 
 /// Inserts all points into one large tet; the far vertices come after them.

@@ -9,7 +9,7 @@ use crate::kernel::predicates::{Sign, orient3d};
 use crate::kernel::quality::mean_ratio;
 
 /// Rings with more tets are left alone: the search is cubic, and long rings belong to edges that
-/// are better removed after their neighbours. Rings of 6 are the usual ones, above 12 they are rare.
+/// are better removed after their neighbours. A usual ring has five or six tets.
 const LONGEST_RING: usize = 16;
 
 /// Why a flip was not made.

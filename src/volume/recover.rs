@@ -14,8 +14,8 @@ use super::tetrahedra::Tetrahedra;
 use crate::Point;
 use crate::kernel::random::mix;
 
-/// How often flips may change what a missing edge or face meets before it is set aside. Of the
-/// real surfaces tried, an edge that succeeds at all does so within 12.
+/// How often flips may change what a missing edge or face meets before it is set aside: flips may go round in
+/// circles, so there must be a bound. It was not tuned.
 const ROUNDS: usize = 40;
 
 /// How deep helping flips go, see [`Flips::remove_edge_with_help`].

@@ -23,7 +23,7 @@ use crate::{Point, Vector};
 use std::collections::BTreeMap;
 
 /// A sector is filled from one of its own vertices, without a new point, if the worst mean ratio is at least
-/// this. A sliver of 0.001 is worse to mend than one vertex more; most sectors reach 0.1 or more.
+/// this; else from where it is better. A sliver of 0.001 is worse to mend than one vertex more.
 const GOOD_ENOUGH: f64 = 0.05;
 
 /// How near to the old point a new one may be: 2 to the power of minus this many, of the size of the ball. Nearer,

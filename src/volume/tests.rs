@@ -355,6 +355,37 @@ fn surfaces_that_intersect_are_refused_with_the_place() {
 }
 
 #[test]
+fn crumpled_surfaces_are_refused_or_filled_but_never_worse() {
+    let mut random = crate::kernel::random::Random::new(3);
+    let (mut refused, mut whole) = (0, 0);
+    for case in 0..200 {
+        let mut soup = Soup::default();
+        if case % 2 == 0 {
+            soup.torus([1.0, 0.4], [5, 4], INSIDE);
+        } else {
+            soup.sphere(Point::origin(), 1.0, 1, INSIDE);
+        }
+        // From a dent to a tangle; on a coarse lattice, where corners meet faces and edges exactly.
+        let (amount, cells) = (0.02 * f64::from(case), if case % 3 == 0 { 8.0 } else { 1e9 });
+        soup.points.iter_mut().for_each(|p| {
+            *p = p.map(|x| ((x + amount * (random.unit() - 0.5)) * cells).round() / cells);
+        });
+        let Ok(surface) = soup.surface() else { continue };
+        match mesh(&surface, &UniformSize(0.5), &Settings::default()) {
+            Ok((mesh, _)) => {
+                check_fills(&surface, &mesh);
+                whole += 1;
+            }
+            Err(VolumeError::SelfIntersection { .. }) => refused += 1,
+            // An inverted but whole surface has its body outside.
+            Err(VolumeError::Inconsistent { .. }) => {}
+            Err(other) => panic!("case {case}: {other}"),
+        }
+    }
+    assert!(refused > 50 && whole > 10, "{refused} refused, {whole} whole");
+}
+
+#[test]
 fn bodies_inside_out_are_refused() {
     // A void that names another body than the one around it.
     let mut soup = Soup::default();
