@@ -21,14 +21,18 @@ pub fn run_generate(options: &Generate) -> Result<(), Failure> {
     let start = Instant::now();
     if mpi::launched() {
         let ranks_given = options.ranks.or(options.parts);
-        return mpi::run(|comm| match ranks_given {
-            Some(ranks) if ranks != comm.size() => Err(Failure::input(format!(
-                "{ranks} ranks are asked for, but mpirun started {}: leave out -n and --parts",
-                comm.size()
-            ))),
-            _ => generate_on(comm, options, start),
-        })
-        .map_err(Failure::input)?;
+        let done = mpi::run(|comm| {
+            let done = match ranks_given {
+                Some(ranks) if ranks != comm.size() => Err(Failure::input(format!(
+                    "{ranks} ranks are asked for, but mpirun started {}: leave out -n and --parts",
+                    comm.size()
+                ))),
+                _ => generate_on(comm, options, start),
+            };
+            // All ranks fail alike: one tells.
+            done.map_err(|failure| if comm.rank() == 0 { failure } else { Failure::new(failure.status, "") })
+        });
+        return done.map_err(Failure::input)?;
     }
     let ranks = options.parts.or(options.ranks).unwrap_or(1);
     let results = thread::run(ranks, |comm| generate_on(comm, options, start))?;

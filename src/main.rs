@@ -17,7 +17,9 @@ fn main() -> ExitCode {
     match done {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
-            eprintln!("tetmill: {failure}");
+            if !failure.message.is_empty() {
+                eprintln!("tetmill: {failure}");
+            }
             ExitCode::from(failure.status as u8)
         }
     }

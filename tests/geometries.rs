@@ -1,6 +1,7 @@
 //! Our own geometries: every rank count and level of the plan, judged by both checkers.
 
-use crate::common::{judge, own_geometries, succeed, tetmill};
+use crate::common::{judge, own, own_geometries, report_of, succeed, tetmill};
+use std::f64::consts::PI;
 
 /// All geometries at some rank count and level, so that the rank counts and levels together see them all.
 fn all_at(ranks: u32, levels: u32) {
@@ -33,4 +34,28 @@ fn four_ranks_and_two_levels() {
 #[test]
 fn sixteen_ranks_and_one_level() {
     all_at(16, 1);
+}
+
+/// A circular frustum's volume.
+fn frustum(height: f64, r: f64, s: f64) -> f64 {
+    PI * height / 3.0 * (r * r + r * s + s * s)
+}
+
+#[test]
+fn volumes_converge_to_the_true_ones_with_the_second_order() {
+    let cases = [
+        ("dome", 2.0 / 3.0 * PI * (3.0 * 2.0 * 1.5 - 2.4 * 1.4 * 1.0)),
+        ("ring_segment", 0.5 * PI * PI * 3.0 * (1.0 - 0.36)),
+        ("nozzle", frustum(3.0, 2.0, 0.8) + PI * 0.64 + frustum(4.0, 0.8, 1.6)),
+    ];
+    for (name, exact) in cases {
+        let error = |levels: &str| {
+            let report = report_of(&own(name), &["--levels", levels, "--preset", "coarse"]);
+            (report["mesh"]["volume"].as_f64().unwrap() - exact).abs()
+        };
+        let [once, twice] = [error("2"), error("3")];
+        // Halving all edges divides what the chords cut off by four.
+        assert!((3.5..4.5).contains(&(once / twice)), "{name}: {once}, then {twice}");
+        assert!(twice < 1e-3 * exact, "{name}: {twice} of {exact}");
+    }
 }
