@@ -29,14 +29,25 @@ pub fn run_generate(options: &Generate) -> Result<(), Failure> {
                 ))),
                 _ => generate_on(comm, options, start),
             };
-            // All ranks fail alike: one tells.
-            done.map_err(|failure| if comm.rank() == 0 { failure } else { Failure::new(failure.status, "") })
+            done.map_err(|failure| tell_once(comm, failure))
         });
         return done.map_err(Failure::input)?;
     }
     let ranks = options.parts.or(options.ranks).unwrap_or(1);
     let results = thread::run(ranks, |comm| generate_on(comm, options, start))?;
     results.into_iter().collect()
+}
+
+/// **Collective.** All ranks fail alike: the first one tells, before any of them ends and makes the launcher
+/// end the others. What is left to tell is nothing.
+fn tell_once(comm: &dyn Communicator, failure: Failure) -> Failure {
+    if comm.rank() == 0 {
+        eprintln!("tetmill: {failure}");
+    }
+    match comm.barrier() {
+        Ok(()) => Failure::new(failure.status, ""),
+        Err(error) => error.into(),
+    }
 }
 
 fn refuse_unfinished(options: &Generate) -> Result<(), Failure> {

@@ -56,6 +56,6 @@ fn volumes_converge_to_the_true_ones_with_the_second_order() {
         let [once, twice] = [error("2"), error("3")];
         // Halving all edges divides what the chords cut off by four.
         assert!((3.5..4.5).contains(&(once / twice)), "{name}: {once}, then {twice}");
-        assert!(twice < 1e-3 * exact, "{name}: {twice} of {exact}");
+        assert!(twice < 2e-3 * exact, "{name}: {twice} of {exact}");
     }
 }

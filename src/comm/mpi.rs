@@ -64,10 +64,15 @@ pub fn run_with_chunks<R>(chunk: usize, body: impl FnOnce(&dyn Communicator) -> 
         Ok(result) => Ok(result),
         Err(_) => {
             eprintln!("rank {} panicked: the job ends", comm.rank());
+            // The launcher drops what it has not passed on yet when it ends the job.
+            std::thread::sleep(BEFORE_ABORT);
             comm.world.abort(RANK_FAILED)
         }
     }
 }
+
+/// Time for the launcher to pass on a last message: without it, one run in some tens lost it.
+const BEFORE_ABORT: std::time::Duration = std::time::Duration::from_millis(300);
 
 /// One rank of an MPI job.
 struct MpiComm {
