@@ -3,6 +3,7 @@
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
 use tetmill::picture::Cut;
+use tetmill::pipeline::generate::MOST_LEVELS;
 use tetmill::size::Preset;
 
 /// From solid geometry to partitioned tetrahedral meshes, in parallel.
@@ -77,7 +78,7 @@ pub struct Generate {
     #[arg(short, long, value_name = "COUNT", value_parser = count, conflicts_with_all = ["coarse", "levels"])]
     pub elements: Option<u64>,
     /// Levels of uniform refinement: each makes eight tets of one
-    #[arg(long, value_name = "L", default_value_t = 0)]
+    #[arg(long, value_name = "L", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=i64::from(MOST_LEVELS)))]
     pub levels: u32,
     /// Sizes of the coarse mesh
     #[command(flatten)]

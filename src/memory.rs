@@ -1,4 +1,4 @@
-//! How much memory this process has used.
+//! How much memory this process has used, and how much the machine has left.
 
 /// The largest resident set of this process so far in bytes; `None` where the system does not say.
 pub fn peak_bytes() -> Option<u64> {
@@ -6,6 +6,19 @@ pub fn peak_bytes() -> Option<u64> {
     let line = status.lines().find(|line| line.starts_with("VmHWM:"))?;
     let kib: u64 = line.split_whitespace().nth(1)?.parse().ok()?;
     Some(kib * 1024)
+}
+
+/// The memory that this machine can still give, bytes; `None` where the system does not say.
+pub fn available_bytes() -> Option<u64> {
+    let text = std::fs::read_to_string("/proc/meminfo").ok()?;
+    let line = text.lines().find(|line| line.starts_with("MemAvailable:"))?;
+    let kib: u64 = line.split_whitespace().nth(1)?.parse().ok()?;
+    Some(kib * 1024)
+}
+
+/// A name for this machine, to tell which ranks share its memory; empty where the system does not say.
+pub fn machine() -> String {
+    std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default()
 }
 
 #[cfg(test)]

@@ -70,6 +70,14 @@ fn more_parts_than_tets_are_refused_with_both_numbers() {
 }
 
 #[test]
+fn a_mesh_beyond_the_memory_is_refused_before_it_is_made() {
+    // 163 tets, 512 pieces an edge: 89 GB of coordinates, or 4 GB at 9 levels of one part's 32-bit ids.
+    let (output, said) = generate_text(BALL, &["--preset", "moderate", "--levels", "9", "-f", "none"]);
+    assert_eq!(output.status.code(), Some(4), "{said}");
+    assert!(said.contains(" GB") || said.contains("more parts"), "{said}");
+}
+
+#[test]
 fn a_wanted_number_of_tets_is_reached_within_half_more() {
     for (name, wanted) in [("nozzle", 4000), ("bracket", 8000), ("dome", 3000)] {
         let report = crate::common::report_of(&own(name), &["--coarse", &wanted.to_string()]);

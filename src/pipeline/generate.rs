@@ -5,8 +5,9 @@ use super::target::{Outcome, mesh_to_target};
 use super::{coarse, mend, names};
 use crate::check::{self, Checksum, PartReport};
 use crate::comm::Communicator;
-use crate::dist;
+use crate::dist::{self, DistMesh};
 use crate::error::{Failure, Status, agree};
+use crate::memory;
 use crate::mesh::{GlobalId, Mesh, Names, Rank};
 use crate::partition::{self, Metrics};
 use crate::progress::Progress;
@@ -103,8 +104,10 @@ pub fn generate(
         let given = coarse.as_ref().map(|(_, made)| (made.mesh.clone(), made.parts.clone()));
         let dist = progress.stage("distribute", || dist::distribute(comm, given))?;
         let pieces = 1 << levels;
-        let refined = progress
-            .stage("refine", || refine::refine(dist, &projector, pieces, &refine::Settings::default()));
+        refuse_without_memory(comm, &dist, pieces)?;
+        let refined = progress.stage("refine", || {
+            refine::refine(dist, &projector, pieces as u32, &refine::Settings::default())
+        });
         let bad = inverted_anywhere(comm, &refined)?;
         if !bad.is_empty() && round < MOST_ROUNDS {
             if let Some((_, made)) = &coarse {
@@ -198,6 +201,40 @@ fn broadcast_geometry(comm: &dyn Communicator, model: Option<&Model>) -> Result<
     let (bodies, patches) = serde_json::from_slice(&text).expect("what rank 0 wrote");
     let projector = Projector::decode(&numbers).expect("what rank 0 encoded");
     Ok((Names { bodies, patches }, projector))
+}
+
+/// Bytes of a fine vertex: three coordinates.
+const VERTEX_BYTES: f64 = 24.0;
+
+/// **Collective.** Refuses what the memory of a machine cannot hold, before anything is refined.
+fn refuse_without_memory(comm: &dyn Communicator, part: &DistMesh, pieces: u64) -> Result<(), Failure> {
+    let n = pieces as f64;
+    let on_edge = n - 1.0;
+    let on_face = on_edge * (n - 2.0) / 2.0;
+    let in_tet = on_face * (n - 3.0) / 3.0;
+    let count = |items: usize| items as f64;
+    let vertices = count(part.points.len())
+        + count(part.edges.len()) * on_edge
+        + count(part.faces.len()) * on_face
+        + count(part.tets.len()) * in_tet;
+    let machine = memory::machine();
+    let machines = comm.all_gather_bytes(machine.as_bytes())?;
+    let needs = comm.all_gather_one(VERTEX_BYTES * vertices)?;
+    let here = machines.iter().zip(&needs).filter(|(name, _)| **name == machine.as_bytes());
+    let needed: f64 = here.map(|(_, need)| need).sum();
+    let refused = match memory::available_bytes() {
+        Some(available) if needed > available as f64 => Err(Failure::new(
+            Status::Resources,
+            format!(
+                "the fine vertices take {:.1} GB and this machine has {:.1} GB left: take fewer levels or tets, \
+                 or more machines",
+                needed / 1e9,
+                available as f64 / 1e9
+            ),
+        )),
+        _ => Ok(()),
+    };
+    agree(comm, refused)
 }
 
 /// **Collective.** The coarse tets with inverted children on any rank.
