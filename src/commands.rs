@@ -300,6 +300,8 @@ pub fn run_check(options: &Check) -> Result<(), Failure> {
                 "{}",
                 serde_json::json!({ "mesh": folder.to_string(), "ok": faults.is_empty(), "text": faults.to_string() })
             );
+        } else if faults.is_empty() {
+            println!("{folder}: no faults");
         } else {
             println!("{folder}: {faults}");
         }
