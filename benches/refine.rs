@@ -6,7 +6,7 @@
 #![allow(missing_docs)]
 
 use std::time::Instant;
-use tetmill::{Point, check, dist, mesh, refine};
+use tetmill::{Point, check, dist, geometry, mesh, refine};
 
 #[path = "../src/refine/fixtures.rs"]
 #[allow(dead_code)]

@@ -10,7 +10,7 @@ use tetmill::mesh::stream::MeshStream;
 use tetmill::pipeline::target::Outcome;
 use tetmill::pipeline::{GenerateSettings, Generated, Model, Wanted, generate};
 use tetmill::progress::Progress;
-use tetmill::report::{Entities, MeshReport, PartitionReport, Report};
+use tetmill::report::{MeshReport, PartitionReport, Report};
 use tetmill::size::SizeSettings;
 use tetmill::{memory, picture};
 
@@ -107,7 +107,7 @@ fn read_model(path: &Path, progress: &Progress) -> Result<Model, Failure> {
         .map_err(|error| Failure::input(format!("cannot read {}: {error}", path.display())))?;
     let parsed = csg::language::parse_geometry_bytes(&bytes, &path.display().to_string())?;
     parsed.warnings.iter().for_each(|warning| progress.note(&warning.to_string()));
-    Model::new(parsed.geometry).map_err(|error| Failure::input(format!("{}: {error}", path.display())))
+    Model::from_csg(parsed.geometry).map_err(|error| Failure::input(format!("{}: {error}", path.display())))
 }
 
 fn size_settings(options: &SizeOptions) -> SizeSettings {
@@ -205,16 +205,10 @@ fn total_memory(comm: &dyn Communicator) -> Result<Option<u64>, Failure> {
 
 fn summary(model: &Model, path: &Path, made: &Generated, ranks: u32, shared: u64) -> Report {
     let coarse = made.coarse.as_ref().expect("rank 0 made the coarse mesh");
-    let Model { geometry, features, .. } = model;
     Report {
         version: env!("CARGO_PKG_VERSION").into(),
         geometry: path.display().to_string(),
-        entities: Entities {
-            bodies: geometry.bodies.len(),
-            corners: features.corners.len(),
-            curves: features.curves.len(),
-            patches: features.patches.len(),
-        },
+        entities: model.entities(),
         ranks,
         threads: rayon::current_num_threads(),
         levels: made.levels,
@@ -320,6 +314,10 @@ pub fn run_check(options: &Check) -> Result<(), Failure> {
 pub fn run_inspect(options: &Inspect) -> Result<(), Failure> {
     let progress = Progress::new(true, 1);
     let model = read_model(&options.geometry, &progress)?;
+    let Model::Csg(model) = model else {
+        let file = options.geometry.display();
+        return Err(Failure::input(format!("{file} is not a CSG geometry: there is nothing to inspect")));
+    };
     let seen = tetmill::inspect::Inspection::new(&model);
     if options.json {
         println!("{}", serde_json::to_string_pretty(&seen).expect("plain data"));

@@ -1,6 +1,6 @@
 //! What a geometry consists of, for people and as JSON.
 
-use crate::pipeline::Model;
+use crate::pipeline::CsgModel;
 use csg::{BodyId, Curve, PatchId};
 use serde::Serialize;
 use std::fmt;
@@ -67,8 +67,8 @@ pub struct CurveLine {
 
 impl Inspection {
     /// Looks at a geometry.
-    pub fn new(model: &Model) -> Self {
-        let Model { geometry, features, .. } = model;
+    pub fn new(model: &CsgModel) -> Self {
+        let CsgModel { geometry, features, .. } = model;
         let number = |body: Option<BodyId>| body.map_or(0, |b| geometry.bodies[b.index()].number);
         let patch = |patch: &csg::Patch| {
             let info = &geometry.surface_info[patch.surface.index()];

@@ -3,8 +3,8 @@
 use crate::check::PartReport;
 use crate::io::Written;
 use crate::partition::Metrics;
-use crate::pipeline::CoarseReport;
 use crate::pipeline::target::Outcome;
+use crate::pipeline::{CoarseReport, Entities};
 use crate::progress::Stage;
 use serde::Serialize;
 use std::fmt;
@@ -43,20 +43,6 @@ pub struct Report {
     /// Bytes written.
     pub bytes: u64,
 }
-
-/// Numbers of geometric entities.
-#[derive(Clone, Copy, Debug, Default, Serialize)]
-pub struct Entities {
-    /// Bodies.
-    pub bodies: usize,
-    /// Corners.
-    pub corners: usize,
-    /// Curves.
-    pub curves: usize,
-    /// Patches.
-    pub patches: usize,
-}
-
 /// The mesh that was made.
 #[derive(Clone, Debug, Serialize)]
 pub struct MeshReport {

@@ -2,9 +2,9 @@
 
 use super::{Fault, OffSurface, PartReport, Settings};
 use crate::Point;
+use crate::geometry::Projector;
 use crate::mesh::TET_FACES;
 use crate::mesh::stream::{BoundaryBlock, MeshStream, NO_TET, TetBlock};
-use csg::Projector;
 
 /// A side of a boundary block that has tets: the first of them, the block, and whether they are behind it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]

@@ -5,8 +5,8 @@ use super::report::{Extreme, PartReport, RATIO_BINS, ShapeReport};
 use super::shape::{Batch, Shapes};
 use super::{Fault, angles};
 use crate::comm::{CommError, Communicator};
+use crate::geometry::Projector;
 use crate::mesh::stream::{BoundaryBlock, MeshStream, TetBlock};
-use csg::Projector;
 use rayon::prelude::*;
 use std::ops::Range;
 

@@ -1,5 +1,6 @@
 //! From a geometry to one classified, refinable tetrahedral mesh, on one rank.
 
+use super::model::CsgModel;
 use crate::Point;
 use crate::improve::{self, GeometrySmoothness};
 use crate::kernel::quality::QualitySummary;
@@ -8,30 +9,7 @@ use crate::size::{GeometricSize, SizeField, SizeSettings, Source};
 use crate::surface::curves::{CurveError, crowded, mesh_curves};
 use crate::surface::{self, SurfaceError, SurfaceMesh};
 use crate::volume::{self, ClosedSurface, SurfaceFaults, VolumeError};
-use csg::{Features, Geometry, Projector};
-
-/// A geometry with everything that was found out about it.
-#[derive(Clone, Debug)]
-pub struct Model {
-    /// What the file says.
-    pub geometry: Geometry,
-    /// Its corners, curves and patches.
-    pub features: Features,
-    /// Projection to them.
-    pub projector: Projector,
-}
-
-impl Model {
-    /// Finds the features of a geometry.
-    ///
-    /// # Errors
-    /// What cannot be meshed, with its place.
-    pub fn new(geometry: Geometry) -> Result<Self, csg::FeatureError> {
-        let features = Features::find(&geometry)?;
-        let projector = Projector::new(&geometry, &features);
-        Ok(Self { geometry, features, projector })
-    }
-}
+use csg::Features;
 
 /// Why there is no coarse mesh.
 #[derive(Debug, thiserror::Error)]
@@ -115,7 +93,7 @@ const LOWERED: f64 = 0.6;
 ///
 /// # Errors
 /// What failed in the end, with its place.
-pub fn mesh(model: &Model, settings: &mut SizeSettings) -> Result<CoarseMesh, CoarseError> {
+pub fn mesh(model: &CsgModel, settings: &mut SizeSettings) -> Result<CoarseMesh, CoarseError> {
     let mut corrections = 0;
     loop {
         let size = GeometricSize::new(&model.geometry, &model.features, settings);
@@ -142,8 +120,8 @@ pub fn mesh(model: &Model, settings: &mut SizeSettings) -> Result<CoarseMesh, Co
 }
 
 /// Fills patches, then bodies, and improves the result.
-fn fill(model: &Model, curves: SurfaceMesh, size: &dyn SizeField) -> Result<CoarseMesh, CoarseError> {
-    let Model { geometry, features, .. } = model;
+fn fill(model: &CsgModel, curves: SurfaceMesh, size: &dyn SizeField) -> Result<CoarseMesh, CoarseError> {
+    let CsgModel { geometry, features, .. } = model;
     let segments = curves.segments.len() as u64;
     let (surface, _) =
         surface::mesh_patches(geometry, features, curves, size, &surface::Settings::default())?;

@@ -1,19 +1,20 @@
 //! Method 2 on all ranks: a coarse mesh, partitioned, distributed, refined, checked.
 
-use super::coarse::{CoarseMesh, CoarseReport, Model};
+use super::coarse::{CoarseMesh, CoarseReport};
+use super::mend;
+use super::model::Model;
 use super::target::{Outcome, mesh_to_target};
-use super::{coarse, mend, names};
 use crate::check::{self, Checksum, PartReport};
 use crate::comm::Communicator;
 use crate::dist::{self, DistMesh};
 use crate::error::{Failure, Status, agree};
+use crate::geometry::Projector;
 use crate::memory;
 use crate::mesh::{GlobalId, Mesh, Names, Rank};
 use crate::partition::{self, Metrics};
 use crate::progress::Progress;
 use crate::refine::{self, RefineError, RefinedMesh};
 use crate::size::{SizeSettings, Source};
-use csg::Projector;
 
 /// How many tets are wanted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -161,7 +162,7 @@ fn mesh_as_wanted(
     };
     match settings.wanted {
         Wanted::Sizes { levels } => {
-            let made = mend::refinable(model, 1 << levels, |more| coarse::mesh(model, &mut with(more)))?;
+            let made = mend::refinable(model, 1 << levels, |more| model.coarse_mesh(&mut with(more)))?;
             Ok((levels, made, None))
         }
         Wanted::Coarse { tets, levels } => {
@@ -193,13 +194,13 @@ fn broadcast_levels(comm: &dyn Communicator, levels: Option<u32>) -> Result<u32,
 
 /// **Collective.** The names and the surfaces that rank 0 has read.
 fn broadcast_geometry(comm: &dyn Communicator, model: Option<&Model>) -> Result<(Names, Projector), Failure> {
-    let mut numbers = model.map(|m| m.projector.encode()).unwrap_or_default();
-    comm.broadcast(0, &mut numbers)?;
-    let names = model.map(|m| names(&m.geometry, &m.features)).unwrap_or_default();
+    let mut bytes = model.map(|m| m.projector().encode()).unwrap_or_default();
+    comm.broadcast_bytes(0, &mut bytes)?;
+    let names = model.map(Model::names).unwrap_or_default();
     let mut text = serde_json::to_vec(&(&names.bodies, &names.patches)).expect("plain data");
     comm.broadcast_bytes(0, &mut text)?;
     let (bodies, patches) = serde_json::from_slice(&text).expect("what rank 0 wrote");
-    let projector = Projector::decode(&numbers).expect("what rank 0 encoded");
+    let projector = Projector::decode(&bytes).expect("what rank 0 encoded");
     Ok((Names { bodies, patches }, projector))
 }
 

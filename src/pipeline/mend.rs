@@ -1,6 +1,7 @@
 //! Coarse meshes whose snapped lattices are valid: where a child would be inverted, the sizes are lowered.
 
-use super::coarse::{CoarseError, CoarseMesh, Model};
+use super::coarse::{CoarseError, CoarseMesh};
+use super::model::Model;
 use crate::dist::{self, DistError};
 use crate::mesh::{GlobalId, Mesh, TET_EDGES};
 use crate::refine::{self, RefineError};
@@ -65,7 +66,7 @@ fn inverted(
         return Ok(None);
     }
     let part = dist::from_serial(mesh.clone())?;
-    match refine::refine(part, &model.projector, pieces, &refine::Settings::default()) {
+    match refine::refine(part, &model.projector(), pieces, &refine::Settings::default()) {
         Ok(_) => Ok(None),
         Err(RefineError::Inverted { coarse, children, faults }) => {
             Ok(Some((coarse.clone(), RefineError::Inverted { coarse, children, faults })))

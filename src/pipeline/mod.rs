@@ -3,9 +3,11 @@
 pub mod coarse;
 pub mod generate;
 pub mod mend;
+pub mod model;
 pub mod names;
 pub mod target;
 
-pub use coarse::{CoarseError, CoarseMesh, CoarseReport, Model};
+pub use coarse::{CoarseError, CoarseMesh, CoarseReport};
 pub use generate::{GenerateSettings, Generated, Wanted, generate};
+pub use model::{CsgModel, Entities, GivenMesh, Model};
 pub use names::names;

@@ -1,6 +1,7 @@
 //! Sizes that give a wanted number of tets.
 
-use super::coarse::{CoarseError, CoarseMesh, Model, mesh};
+use super::coarse::{CoarseError, CoarseMesh};
+use super::model::Model;
 use crate::size::SizeSettings;
 
 /// How a coarse mesh with a wanted number of tets came out.
@@ -29,7 +30,7 @@ const NARROW: f64 = 1.002;
 /// Bounds that the user or the file sets (`maxh`) stay upper bounds.
 ///
 /// # Errors
-/// As [`mesh`].
+/// As [`Model::coarse_mesh`].
 pub fn mesh_to_target(
     model: &Model,
     settings: &mut SizeSettings,
@@ -42,7 +43,7 @@ pub fn mesh_to_target(
     let mut finest_failure: Option<CoarseError> = None;
     for _ in 0..MOST_TRIES {
         settings.sources.truncate(sources);
-        let made = match mesh(model, settings) {
+        let made = match model.coarse_mesh(settings) {
             Ok(made) => made,
             // Sizes that are too large for the geometry, whatever was corrected: as too few tets.
             Err(error) => {
@@ -78,7 +79,7 @@ pub fn mesh_to_target(
             Ok((made, Outcome::Jumped))
         }
         (None, Some(error)) => Err(error),
-        (None, None) => mesh(model, settings).map(|made| (made, Outcome::Jumped)),
+        (None, None) => model.coarse_mesh(settings).map(|made| (made, Outcome::Jumped)),
     }
 }
 

@@ -2,13 +2,12 @@
 
 use crate::Point;
 use crate::dist::{DistMesh, from_serial};
+use crate::geometry::Projector;
 use crate::mesh::stream::{BoundaryBlock, MeshStream, TetBlock};
 use crate::mesh::{BoundaryTriangle, Class, Mesh, Segment, TET_EDGES, TET_FACES, VertexId};
 use crate::refine::RefinedMesh;
 use csg::primitive::{Cylinder, Plane, Sphere};
-use csg::{
-    Aabb, BodyId, CornerId, Curve, CurveId, Features, Geometry, Patch, PatchId, Projector, Surface, SurfaceId,
-};
+use csg::{Aabb, BodyId, CornerId, Curve, CurveId, Features, Geometry, Patch, PatchId, Surface, SurfaceId};
 use csg::{Point as P, Vector};
 
 /// A mesh and what it is snapped to.
@@ -41,7 +40,7 @@ fn projector(surfaces: Vec<Surface>, curves: &[[u32; 2]], bounds: [P; 2]) -> Pro
         patches: (0..surfaces.len()).map(patch).collect(),
         bounds: Aabb { min: bounds[0], max: bounds[1] },
     };
-    Projector::new(&Geometry { surfaces, ..Geometry::default() }, &features)
+    csg::Projector::new(&Geometry { surfaces, ..Geometry::default() }, &features).into()
 }
 
 /// A classified mesh from points, tets, and the patches that each vertex lies on; curves are pairs of patches.

@@ -19,9 +19,9 @@ use super::tet::BadTet;
 use super::{RefineError, RefinedMesh, Settings as RefineSettings, refine_unchecked};
 use crate::check::shape::{BATCH, Batch, Shapes};
 use crate::dist::DistMesh;
+use crate::geometry::Projector;
 use crate::mesh::stream::{MeshStream, TetBlock};
 use crate::mesh::{EdgeId, GlobalId, TetId};
-use csg::Projector;
 use std::collections::BTreeSet;
 
 /// How to mend.

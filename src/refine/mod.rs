@@ -38,8 +38,9 @@ mod tests;
 
 use crate::check::Fault;
 use crate::dist::DistMesh;
+use crate::geometry::Projector;
 use crate::mesh::{GlobalId, Rank};
-use csg::{ProjectionFailed, Projector};
+use csg::ProjectionFailed;
 
 /// How to refine.
 #[derive(Clone, Debug)]

@@ -19,8 +19,9 @@ use super::lattice::Lattice;
 use super::numbering::Numbering;
 use crate::Point;
 use crate::dist::DistMesh;
+use crate::geometry::Projector;
 use crate::mesh::{Class, EdgeId, TET_EDGES, TET_FACES, TetId};
-use csg::{CurveId, PatchId, ProjectionFailed, Projector, Surface};
+use csg::{CurveId, PatchId, ProjectionFailed};
 use rayon::prelude::*;
 
 /// A point as the fine mesh stores it.
@@ -39,12 +40,9 @@ enum Place {
 
 impl Place {
     fn of(class: Class, projector: &Projector) -> Self {
-        let is_plane = |surface: &Surface| matches!(surface, Surface::Plane(_));
         match class {
-            Class::Curve(curve) if !projector.curve_surfaces(curve).into_iter().all(is_plane) => {
-                Self::Curve(curve)
-            }
-            Class::Patch(patch) if !is_plane(projector.patch_surface(patch)) => Self::Patch(patch),
+            Class::Curve(curve) if !projector.is_straight_curve(curve) => Self::Curve(curve),
+            Class::Patch(patch) if !projector.is_flat_patch(patch) => Self::Patch(patch),
             _ => Self::Free,
         }
     }

@@ -309,7 +309,8 @@ fn coarse_tets_whose_children_would_invert_are_named() {
     let base = mesh.tets[7].map(|v| mesh.points[v.index()].coords);
     let tip = (base[1] + base[2] + base[3]) / 3.0 * 1.05;
     let corners = [tip, base[1], base[3], base[2]].map(Into::into);
-    let low = tet(corners, Some(projector.patch_surface(PatchId(0)).clone()));
+    let Projector::Csg(surfaces) = &projector else { panic!("{projector:?}") };
+    let low = tet(corners, Some(surfaces.patch_surface(PatchId(0)).clone()));
     let error = refine(whole(&low.mesh), &low.projector, 8, &Settings::default()).expect_err("inverted");
     let RefineError::Inverted { children, coarse, faults } = &error else { panic!("{error}") };
     assert!((1..512).contains(children));

@@ -13,9 +13,9 @@ use super::{RefineError, Settings};
 use crate::Point;
 use crate::check::Fault;
 use crate::dist::DistMesh;
+use crate::geometry::Projector;
 use crate::kernel::predicates::{Sign, orient3d, volume6_and_error};
 use crate::mesh::{GlobalId, TetId};
-use csg::Projector;
 use rayon::iter::Either;
 use rayon::prelude::*;
 

@@ -6,7 +6,7 @@ use tetgen_ffi::{available, tetrahedralize};
 use tetmill::kernel::quality::QualitySummary;
 use tetmill::kernel::simplex::volume;
 use tetmill::mesh::{Mesh, VertexId};
-use tetmill::pipeline::{Model, coarse};
+use tetmill::pipeline::Model;
 use tetmill::size::{Preset, SizeSettings};
 use thiserror as _;
 
@@ -14,8 +14,8 @@ use thiserror as _;
 fn ours(name: &str) -> Mesh {
     let path = format!("{}/../geometries/{name}.geo", env!("CARGO_MANIFEST_DIR"));
     let source = std::fs::read_to_string(&path).unwrap();
-    let model = Model::new(parse_geometry(&source, &path).unwrap().geometry).unwrap();
-    coarse::mesh(&model, &mut SizeSettings::from(Preset::Moderate)).unwrap().mesh
+    let model = Model::from_csg(parse_geometry(&source, &path).unwrap().geometry).unwrap();
+    model.coarse_mesh(&mut SizeSettings::from(Preset::Moderate)).unwrap().mesh
 }
 
 /// TetGen's mesh inside our surface; the boundary kept (`Y`), its best quality (`q1.4`).
