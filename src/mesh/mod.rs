@@ -1,5 +1,6 @@
 //! Meshes: flat arrays of vertices and tets, classified on the geometry.
 
+pub mod classify;
 #[cfg(test)]
 pub(crate) mod fixtures;
 pub mod ids;
