@@ -2,14 +2,14 @@
 
 use super::model::CsgModel;
 use crate::Point;
-use crate::improve::{self, GeometrySmoothness};
+use crate::improve::{self, GeometrySmoothness, Smoothness};
 use crate::kernel::quality::QualitySummary;
 use crate::mesh::{Class, Mesh, Segment, VertexId};
 use crate::size::{GeometricSize, SizeField, SizeSettings, Source};
 use crate::surface::curves::{CurveError, crowded, mesh_curves};
 use crate::surface::{self, SurfaceError, SurfaceMesh};
 use crate::volume::{self, ClosedSurface, SurfaceFaults, VolumeError};
-use csg::Features;
+use csg::{BodyId, PatchId};
 
 /// Why there is no coarse mesh.
 #[derive(Debug, thiserror::Error)]
@@ -94,45 +94,78 @@ const LOWERED: f64 = 0.6;
 /// # Errors
 /// What failed in the end, with its place.
 pub fn mesh(model: &CsgModel, settings: &mut SizeSettings) -> Result<CoarseMesh, CoarseError> {
+    corrected(settings, |settings, may_lower| attempt(model, settings, may_lower))
+}
+
+/// How one attempt at a coarse mesh ended.
+enum Attempt {
+    Made(CoarseMesh),
+    /// It takes smaller sizes.
+    Lower(Vec<Source>),
+    Failed(CoarseError),
+}
+
+/// Attempts until no sizes need to be lowered, or may be: the attempts are told whether they may ask for it.
+fn corrected(
+    settings: &mut SizeSettings,
+    attempt: impl Fn(&SizeSettings, bool) -> Attempt,
+) -> Result<CoarseMesh, CoarseError> {
     let mut corrections = 0;
     loop {
-        let size = GeometricSize::new(&model.geometry, &model.features, settings);
-        let curves = mesh_curves(&model.features, &model.projector, &size)?;
-        let mut lowered = crowded(&curves, &model.features);
-        if lowered.is_empty() || corrections >= MOST_CORRECTIONS {
-            let ends = |s: &Segment| s.vertices.map(|v| curves.points[v.index()]);
-            let segments: Vec<[Point; 2]> = curves.segments.iter().map(ends).collect();
-            let error = match fill(model, curves, &size) {
-                Ok(mut coarse) => {
-                    coarse.report.size_corrections = corrections;
-                    return Ok(coarse);
-                }
-                Err(error) => error,
-            };
-            lowered = error.remedy(&segments, &size);
-            if lowered.is_empty() || corrections >= MOST_CORRECTIONS {
-                return Err(error);
+        match attempt(settings, corrections < MOST_CORRECTIONS) {
+            Attempt::Made(mut coarse) => {
+                coarse.report.size_corrections = corrections;
+                return Ok(coarse);
             }
+            Attempt::Lower(sources) => settings.sources.extend(sources),
+            Attempt::Failed(error) => return Err(error),
         }
-        settings.sources.extend(lowered);
         corrections += 1;
     }
 }
 
-/// Fills patches, then bodies, and improves the result.
-fn fill(model: &CsgModel, curves: SurfaceMesh, size: &dyn SizeField) -> Result<CoarseMesh, CoarseError> {
-    let CsgModel { geometry, features, .. } = model;
-    let segments = curves.segments.len() as u64;
-    let (surface, _) =
-        surface::mesh_patches(geometry, features, curves, size, &surface::Settings::default())?;
-    let (mut mesh, volume) = fill_bodies(features, surface, size)?;
-    let smoothness = GeometrySmoothness { geometry, features };
-    let improved = improve::make_refinable(&mut mesh, size, &smoothness, &improve::Settings::default());
+fn attempt(model: &CsgModel, settings: &SizeSettings, may_lower: bool) -> Attempt {
+    let CsgModel { geometry, features, projector } = model;
+    let size = GeometricSize::new(geometry, features, settings);
+    let curves = match mesh_curves(features, projector, &size) {
+        Ok(curves) => curves,
+        Err(error) => return Attempt::Failed(error.into()),
+    };
+    let crowded = crowded(&curves, features);
+    if may_lower && !crowded.is_empty() {
+        return Attempt::Lower(crowded);
+    }
+    let ends = |s: &Segment| s.vertices.map(|v| curves.points[v.index()]);
+    let segments: Vec<[Point; 2]> = curves.segments.iter().map(ends).collect();
+    let filled = surface::mesh_patches(geometry, features, curves, &size, &surface::Settings::default())
+        .map_err(CoarseError::from)
+        .and_then(|(surface, _)| {
+            let regions = |id| [features.patch(id).inside, features.patch(id).outside];
+            fill(surface, regions, &size, &GeometrySmoothness { geometry, features })
+        });
+    match filled {
+        Ok(made) => Attempt::Made(made),
+        Err(error) => {
+            let lowered = if may_lower { error.remedy(&segments, &size) } else { Vec::new() };
+            if lowered.is_empty() { Attempt::Failed(error) } else { Attempt::Lower(lowered) }
+        }
+    }
+}
+
+/// Fills the bodies inside a surface mesh, and improves the result. `regions` are the bodies behind and in front of a patch.
+fn fill(
+    surface: SurfaceMesh,
+    regions: impl Fn(PatchId) -> [Option<BodyId>; 2],
+    size: &dyn SizeField,
+    smoothness: &dyn Smoothness,
+) -> Result<CoarseMesh, CoarseError> {
+    let (mut mesh, volume) = fill_bodies(surface, regions, size)?;
+    let improved = improve::make_refinable(&mut mesh, size, smoothness, &improve::Settings::default());
     let report = CoarseReport {
         vertices: mesh.points.len() as u64,
         tets: mesh.tets.len() as u64,
         boundary: mesh.triangles.len() as u64,
-        segments,
+        segments: mesh.segments.len() as u64,
         illegal_repaired: improved.illegal_before.saturating_sub(improved.illegal_left) as u64,
         illegal_left: improved.illegal_left as u64,
         quality: improved.after,
@@ -144,8 +177,8 @@ fn fill(model: &CsgModel, curves: SurfaceMesh, size: &dyn SizeField) -> Result<C
 
 /// Fills the bodies inside a surface mesh.
 fn fill_bodies(
-    features: &Features,
     surface: SurfaceMesh,
+    regions: impl Fn(PatchId) -> [Option<BodyId>; 2],
     size: &dyn SizeField,
 ) -> Result<(Mesh, volume::Report), CoarseError> {
     // Points of the user inside a body are on no triangle: the volume mesher gets them apart, and puts
@@ -170,14 +203,10 @@ fn fill_bodies(
     let mut segments = surface.segments;
     segments.iter_mut().for_each(|s| s.vertices = s.vertices.map(renumbered));
 
-    let regions = triangles.iter().map(|t| {
-        let patch = features.patch(t.patch);
-        [patch.inside, patch.outside]
-    });
     let closed = ClosedSurface::new(
         points[..on_surface].to_vec(),
         triangles.iter().map(|t| t.vertices.map(|v| v.0)).collect(),
-        regions.collect(),
+        triangles.iter().map(|t| regions(t.patch)).collect(),
     )?
     .with_kept_points(points[on_surface..].to_vec());
     let (filled, report) = volume::mesh(&closed, size, &volume::Settings::default())?;
