@@ -1,0 +1,70 @@
+//! From the files that a user names to what is to be meshed.
+
+use super::facet_model::FacetSolid;
+use super::model::{GivenMesh, Model};
+use crate::error::Failure;
+use crate::facets;
+use crate::io;
+use std::path::Path;
+
+/// How surfaces are taken.
+#[derive(Clone, Debug, Default)]
+pub struct InputSettings {
+    /// How patches, curves and corners of facets are told apart.
+    pub facets: facets::Settings,
+    /// Whether the triangles of surfaces stay as they are; else they are made anew by the size field.
+    pub keep_surface: bool,
+}
+
+/// What kind of thing a file holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
+    Csg,
+    Surface,
+    Mesh,
+}
+
+/// The kind by the end of the name; a folder is an Elmer mesh.
+fn kind(path: &Path) -> Result<Kind, Failure> {
+    let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
+    match ending.as_str() {
+        _ if path.is_dir() => Ok(Kind::Mesh),
+        "geo" | "csg" => Ok(Kind::Csg),
+        _ if io::surface::knows(path) => Ok(Kind::Surface),
+        _ if io::volume::knows(path) => Ok(Kind::Mesh),
+        _ => Err(Failure::input(format!(
+            "cannot tell by its name what {} holds; known are geometries (.geo), surfaces ({}) and meshes ({})",
+            path.display(),
+            io::surface::KNOWN,
+            io::volume::KNOWN
+        ))),
+    }
+}
+
+/// Reads a geometry, a mesh, or one or several surfaces; `note` gets what the user should know, a sentence each.
+///
+/// # Errors
+/// Files that cannot be read or meshed, with the place; several files of which one is no surface.
+pub fn read(
+    paths: &[impl AsRef<Path>],
+    settings: &InputSettings,
+    note: &mut dyn FnMut(&str),
+) -> Result<Model, Failure> {
+    let kinds = paths.iter().map(|path| kind(path.as_ref())).collect::<Result<Vec<_>, _>>()?;
+    match (kinds.as_slice(), paths) {
+        ([Kind::Csg], [path]) => read_csg(path.as_ref(), note),
+        ([Kind::Mesh], [path]) => read_mesh(path.as_ref(), note),
+        (kinds, _) if !kinds.is_empty() && kinds.iter().all(|kind| *kind == Kind::Surface) => {
+            FacetSolid::read(paths, settings, note).map(|solid| Model::Facets(Box::new(solid)))
+        }
+        _ => Err(Failure::input("several files are taken together only if all of them are surfaces")),
+    }
+}
+
+fn read_csg(path: &Path, note: &mut dyn FnMut(&str)) -> Result<Model, Failure> {
+    let bytes = std::fs::read(path)
+        .map_err(|error| Failure::input(format!("cannot read {}: {error}", path.display())))?;
+    let parsed = csg::language::parse_geometry_bytes(&bytes, &path.display().to_string())?;
+    parsed.warnings.iter().for_each(|warning| note(&warning.to_string()));
+    Model::from_csg(parsed.geometry).map_err(|error| Failure::input(format!("{}: {error}", path.display())))
+}
