@@ -14,14 +14,17 @@
 pub mod chunks;
 pub mod elmer;
 pub mod geomview;
+pub mod input;
 pub mod lines;
 pub mod output;
 pub mod plain;
 pub mod serial;
 pub mod skin;
+pub mod surface;
 #[cfg(test)]
 pub(crate) mod testing;
 pub mod text;
+pub mod volume;
 pub mod vtu;
 
 use crate::comm::{Agreed, CommError, Communicator};

@@ -23,7 +23,7 @@ mod error;
 mod front;
 mod improve;
 mod patch;
-mod plane;
+pub(crate) mod plane;
 mod report;
 mod sheet;
 #[cfg(test)]

@@ -25,7 +25,7 @@ const TINY: f64 = 1e-40;
 ///
 /// # Errors
 /// `None` for a coordinate that is not finite or too large.
-pub(super) fn triangulate(points: &[[f64; 2]], edges: &[[u32; 2]]) -> Option<Vec<[u32; 3]>> {
+pub(crate) fn triangulate(points: &[[f64; 2]], edges: &[[u32; 2]]) -> Option<Vec<[u32; 3]>> {
     let clean = |x: f64| if x.abs() < TINY { 0.0 } else { x };
     let vertices = points
         .iter()

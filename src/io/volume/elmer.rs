@@ -1,0 +1,82 @@
+//! An Elmer mesh, whole or in parts, by the reader that `check` uses.
+
+use super::assemble::assemble;
+use super::raw::{Label, Raw, Shape};
+use super::{VolumeMesh, gmsh::Ids};
+use crate::io::elmer::{ElmerMesh, read as read_elmer};
+use crate::io::input::{Fault, ReadError};
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+
+/// Reads the mesh of a folder; names from `mesh.names` there, or in the folder above a partition.
+pub(super) fn read(folder: &Path) -> Result<VolumeMesh, ReadError> {
+    let mesh = read_elmer(folder)?;
+    let at = mesh.layout.folder().to_path_buf();
+    let mut raw = joined(&mesh).map_err(|fault| fault.in_file(&at, b""))?;
+    let above = at.parent().map(|parent| parent.join("mesh.names"));
+    let names = [Some(at.join("mesh.names")), above].into_iter().flatten();
+    if let Some(text) = names.filter_map(|path| std::fs::read_to_string(path).ok()).next() {
+        read_names(&text, &mut raw);
+    }
+    assemble(raw).map_err(|fault| fault.in_file(&at, b""))
+}
+
+/// All parts in one: nodes in the order of their ids, elements in that of theirs.
+fn joined(mesh: &ElmerMesh) -> Result<Raw, Fault> {
+    let mut nodes: Vec<_> = mesh.parts.iter().flat_map(|part| &part.nodes).collect();
+    nodes.sort_by_key(|node| node.id);
+    nodes.dedup_by_key(|node| node.id);
+    if let Some(node) = nodes.iter().find(|node| node.point.iter().any(|x| !x.is_finite())) {
+        return Err(Fault::file(format!("node {} has a coordinate that is no finite number", node.id)));
+    }
+    let ids: Vec<u64> = nodes.iter().map(|node| node.id.into()).collect();
+    let ids = Ids::new(&ids)?;
+    let mut raw = Raw { points: nodes.iter().map(|node| node.point).collect(), ..Raw::default() };
+    let place = |id: u32, what: &str, of: u32| {
+        ids.place(id.into())
+            .ok_or_else(|| Fault::file(format!("{what} {of} names node {id}, which is not there")))
+    };
+    let mut elements: Vec<_> = mesh.parts.iter().flat_map(|part| &part.elements).collect();
+    elements.sort_by_key(|element| element.id);
+    for element in elements {
+        let mut corners = [0; 4];
+        for (corner, node) in corners.iter_mut().zip(element.nodes) {
+            *corner = place(node, "element", element.id)?;
+        }
+        raw.add(Shape::Tet, &corners, Label::number(element.body.into())).map_err(Fault::file)?;
+    }
+    let mut triangles: Vec<_> = mesh.parts.iter().flat_map(|part| &part.boundary).collect();
+    triangles.sort_by_key(|triangle| triangle.id);
+    let mut seen = BTreeSet::new();
+    for triangle in triangles {
+        // A triangle between two parts is in both.
+        let mut key = triangle.nodes;
+        key.sort_unstable();
+        if !seen.insert(key) {
+            continue;
+        }
+        let mut corners = [0; 3];
+        for (corner, node) in corners.iter_mut().zip(triangle.nodes) {
+            *corner = place(node, "boundary element", triangle.id)?;
+        }
+        raw.add(Shape::Triangle, &corners, Label::number(triangle.boundary.into())).map_err(Fault::file)?;
+    }
+    Ok(raw)
+}
+
+/// Lines `$ name = number …`, below a comment that says of what.
+fn read_names(text: &str, raw: &mut Raw) {
+    let mut of_bodies = true;
+    for line in text.lines() {
+        if let Some(comment) = line.trim().strip_prefix('!') {
+            of_bodies = !comment.contains("boundaries");
+        }
+        let entry = line.trim().strip_prefix('$').and_then(|entry| entry.split_once('='));
+        let Some((name, number)) = entry else { continue };
+        let names: &mut BTreeMap<i64, String> =
+            if of_bodies { &mut raw.body_names } else { &mut raw.patch_names };
+        for number in number.split_whitespace().filter_map(|number| number.parse().ok()) {
+            names.insert(number, name.trim().to_string());
+        }
+    }
+}

@@ -1,0 +1,318 @@
+//! Gmsh's MSH, versions 2.x and 4.1, text and binary.
+//!
+//! ```text
+//! $MeshFormat      version  0 text or 1 binary  size of a size_t      (binary: then the number 1)
+//! $PhysicalNames   dimension  tag  "name"
+//! $Nodes           2.x: id x y z              4.1: blocks, see `gmsh4`
+//! $Elements        2.x: id type tags… nodes…
+//! ```
+//! Physical tags are numbers of bodies and boundaries, elementary tags their entities. Other sections are skipped.
+
+use super::gmsh4;
+use super::raw::{Label, Raw, Shape};
+use crate::io::input::{Bytes, Fault, Words, shown};
+
+/// How numbers are stored.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) enum Storage {
+    Text,
+    Binary { big_endian: bool },
+}
+
+/// Ids of nodes, which may have gaps.
+pub(super) struct Ids {
+    first: u64,
+    count: usize,
+    /// Ids with their places, sorted, where the ids do not simply count on.
+    sorted: Vec<(u64, u32)>,
+}
+
+impl Ids {
+    pub fn new(ids: &[u64]) -> Result<Self, Fault> {
+        let first = ids.first().copied().unwrap_or(1);
+        let mut found = Self { first, count: ids.len(), sorted: Vec::new() };
+        if ids.iter().enumerate().all(|(k, &id)| id.checked_sub(first) == Some(k as u64)) {
+            return Ok(found);
+        }
+        found.sorted = ids.iter().copied().zip(0..).collect();
+        found.sorted.sort_unstable();
+        match found.sorted.windows(2).find(|pair| pair[0].0 == pair[1].0) {
+            Some(pair) => Err(Fault::file(format!("the node {} is there twice", pair[0].0))),
+            None => Ok(found),
+        }
+    }
+
+    pub fn place(&self, id: u64) -> Option<u32> {
+        if self.sorted.is_empty() {
+            return id.checked_sub(self.first).filter(|&k| k < self.count as u64).map(|k| k as u32);
+        }
+        let place = self.sorted.binary_search_by_key(&id, |(id, _)| *id).ok()?;
+        Some(self.sorted[place].1)
+    }
+}
+
+/// The shape and the number of nodes of an element type.
+pub(super) fn element_type(code: i64) -> Option<(Shape, usize)> {
+    Some(match code {
+        15 => (Shape::Point, 1),
+        1 => (Shape::Edge, 2),
+        8 => (Shape::Edge, 3),
+        26 => (Shape::Edge, 4),
+        27 => (Shape::Edge, 5),
+        28 => (Shape::Edge, 6),
+        2 => (Shape::Triangle, 3),
+        9 => (Shape::Triangle, 6),
+        20 => (Shape::Triangle, 9),
+        21 => (Shape::Triangle, 10),
+        4 => (Shape::Tet, 4),
+        11 => (Shape::Tet, 10),
+        29 => (Shape::Tet, 20),
+        30 => (Shape::Tet, 35),
+        31 => (Shape::Tet, 56),
+        3 => (Shape::Other("quadrangle"), 4),
+        10 => (Shape::Other("quadrangle"), 9),
+        16 => (Shape::Other("quadrangle"), 8),
+        5 => (Shape::Other("hexahedron"), 8),
+        12 => (Shape::Other("hexahedron"), 27),
+        17 => (Shape::Other("hexahedron"), 20),
+        6 => (Shape::Other("prism"), 6),
+        13 => (Shape::Other("prism"), 18),
+        18 => (Shape::Other("prism"), 15),
+        7 => (Shape::Other("pyramid"), 5),
+        14 => (Shape::Other("pyramid"), 14),
+        19 => (Shape::Other("pyramid"), 13),
+        _ => return None,
+    })
+}
+
+/// The shape and the number of nodes of a type that a file names.
+pub(super) fn known_type(code: i64) -> Result<(Shape, usize), String> {
+    element_type(code).ok_or_else(|| format!("the element type {code} is not known"))
+}
+
+pub(super) fn parse(content: &[u8]) -> Result<Raw, Fault> {
+    let mut words = Words::new(content);
+    let (version, storage) = header(&mut words, content)?;
+    let mut raw = Raw::default();
+    let mut file = gmsh4::Parts::default();
+    while let Some(section) = words.next() {
+        words.rest_of_line();
+        match (section, version, storage) {
+            (b"$PhysicalNames", ..) => physical_names(&mut words, &mut raw)?,
+            (b"$Nodes", Version::Two, Storage::Text) => file.ids = Some(nodes_text(&mut words, &mut raw)?),
+            (b"$Nodes", Version::Two, Storage::Binary { big_endian }) => {
+                file.ids = Some(nodes_binary(&mut words, content, big_endian, &mut raw)?);
+            }
+            (b"$Elements", Version::Two, Storage::Text) => elements_text(&mut words, &file.ids, &mut raw)?,
+            (b"$Elements", Version::Two, Storage::Binary { big_endian }) => {
+                elements_binary(&mut words, content, big_endian, &file.ids, &mut raw)?;
+            }
+            (b"$Entities" | b"$PartitionedEntities" | b"$Nodes" | b"$Elements", Version::Four, _) => {
+                gmsh4::section(section, &mut words, content, storage, &mut file, &mut raw)?;
+            }
+            (name, ..) if name.starts_with(b"$") => {
+                skip_to_end(&mut words, name)?;
+                continue;
+            }
+            (word, ..) => {
+                return Err(
+                    words.fault(format!("expected the beginning of a section, found `{}`", shown(word)))
+                );
+            }
+        }
+        words.expect(&format!("$End{}", String::from_utf8_lossy(&section[1..])))?;
+    }
+    if file.ids.is_none() {
+        return Err(Fault::file("the file has no section $Nodes"));
+    }
+    Ok(raw)
+}
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Version {
+    Two,
+    Four,
+}
+
+fn header(words: &mut Words, content: &[u8]) -> Result<(Version, Storage), Fault> {
+    let first = words.word("$MeshFormat")?;
+    if first == b"$NOD" {
+        return Err(words.fault("MSH of version 1 is not read; save it as version 4.1 or 2.2"));
+    }
+    if first != b"$MeshFormat" {
+        return Err(words.fault(format!("expected `$MeshFormat`, found `{}`", shown(first))));
+    }
+    let version = match words.word("the version")? {
+        b"4.1" => Version::Four,
+        b"2" | b"2.0" | b"2.1" | b"2.2" => Version::Two,
+        other => {
+            let message =
+                format!("MSH of version {} is not read; save it as version 4.1 or 2.2", shown(other));
+            return Err(words.fault(message));
+        }
+    };
+    let storage = match words.int("0 for text or 1 for binary")? {
+        0 => Storage::Text,
+        1 => Storage::Binary { big_endian: false },
+        other => return Err(words.fault(format!("expected 0 for text or 1 for binary, found {other}"))),
+    };
+    if words.int("the size of a size_t")? != 8 {
+        return Err(words.fault("numbers of other than 8 bytes are not read"));
+    }
+    words.rest_of_line();
+    let storage = if storage == Storage::Text {
+        storage
+    } else {
+        let mut bytes = Bytes::new(content, words.offset(), false);
+        let one = bytes.i32("the number 1")?;
+        words.go_to(bytes.offset());
+        match one {
+            1 => Storage::Binary { big_endian: false },
+            _ if one.swap_bytes() == 1 => Storage::Binary { big_endian: true },
+            _ => return Err(words.fault("the number 1 that tells the order of bytes is not there")),
+        }
+    };
+    words.expect("$EndMeshFormat")?;
+    Ok((version, storage))
+}
+
+fn physical_names(words: &mut Words, raw: &mut Raw) -> Result<(), Fault> {
+    let count = words.count("physical names", 3)?;
+    for _ in 0..count {
+        let dimension = words.int("a dimension")?;
+        let tag = words.int("a physical tag")?;
+        let name = String::from_utf8_lossy(words.rest_of_line()).into_owned();
+        let name = name.trim_matches('"').to_string();
+        match dimension {
+            2 => raw.patch_names.insert(tag, name),
+            3 => raw.body_names.insert(tag, name),
+            _ => None,
+        };
+    }
+    Ok(())
+}
+
+/// Goes behind the end of a section that is not read.
+fn skip_to_end(words: &mut Words, section: &[u8]) -> Result<(), Fault> {
+    let end = [b"$End", &section[1..]].concat();
+    let rest = words.rest();
+    match rest.windows(end.len()).position(|window| window == end) {
+        Some(place) => words.go_to(words.offset() + place + end.len()),
+        None => {
+            return Err(words.fault(format!("the section {} has no end: the file is cut off", shown(section))));
+        }
+    }
+    Ok(())
+}
+
+fn nodes_text(words: &mut Words, raw: &mut Raw) -> Result<Ids, Fault> {
+    let count = words.count("nodes", 4)?;
+    let mut ids = Vec::with_capacity(count);
+    raw.points.reserve(count);
+    for _ in 0..count {
+        ids.push(id(words)?);
+        raw.points.push(words.point("a coordinate")?);
+    }
+    Ids::new(&ids)
+}
+
+/// The id of a node.
+pub(super) fn id(words: &mut Words) -> Result<u64, Fault> {
+    let id = words.int("the id of a node")?;
+    u64::try_from(id).map_err(|_| words.fault("the id of a node is negative"))
+}
+
+fn nodes_binary(words: &mut Words, content: &[u8], big_endian: bool, raw: &mut Raw) -> Result<Ids, Fault> {
+    let count = words.count("nodes", 1)?;
+    words.rest_of_line();
+    let mut bytes = Bytes::new(content, words.offset(), big_endian);
+    let count = bytes.count(count as u64, "nodes", 28)?;
+    let mut ids = Vec::with_capacity(count);
+    raw.points.reserve(count);
+    for _ in 0..count {
+        let id = bytes.i32("the id of a node")?;
+        ids.push(u64::try_from(id).map_err(|_| bytes.fault("the id of a node is negative"))?);
+        raw.points.push(bytes.point_f64()?);
+    }
+    words.go_to(bytes.offset());
+    Ids::new(&ids)
+}
+
+const NO_NODES: &str = "elements stand before nodes";
+
+fn elements_text(words: &mut Words, ids: &Option<Ids>, raw: &mut Raw) -> Result<(), Fault> {
+    let ids = ids.as_ref().ok_or_else(|| words.fault(NO_NODES))?;
+    let count = words.count("elements", 4)?;
+    let mut nodes = Vec::new();
+    for _ in 0..count {
+        words.int("the id of an element")?;
+        let code = words.int("the type of an element")?;
+        let (shape, size) = known_type(code).map_err(|message| words.fault(message))?;
+        let tags = words.count("tags", 1)?;
+        let mut label = Label::default();
+        for k in 0..tags {
+            let tag = words.int("a tag")?;
+            match k {
+                0 => label.number = tag,
+                1 => label.entity = tag,
+                _ => {}
+            }
+        }
+        nodes.clear();
+        for _ in 0..size {
+            let id = id(words)?;
+            nodes.push(ids.place(id).ok_or_else(|| words.fault(format!("there is no node {id}")))?);
+        }
+        raw.add(shape, &nodes, label).map_err(|message| words.fault(message))?;
+    }
+    Ok(())
+}
+
+fn elements_binary(
+    words: &mut Words,
+    content: &[u8],
+    big_endian: bool,
+    ids: &Option<Ids>,
+    raw: &mut Raw,
+) -> Result<(), Fault> {
+    let ids = ids.as_ref().ok_or_else(|| words.fault(NO_NODES))?;
+    let total = words.count("elements", 1)?;
+    words.rest_of_line();
+    let mut bytes = Bytes::new(content, words.offset(), big_endian);
+    let mut nodes = Vec::new();
+    let mut done = 0;
+    while done < total {
+        let code = bytes.i32("the type of elements")?;
+        let (shape, size) = known_type(code.into()).map_err(|message| bytes.fault(message))?;
+        let count = bytes.i32("the number of elements")?;
+        let tags = bytes.i32("the number of tags")?;
+        let [count, tags] = [count, tags].map(|n| u64::try_from(n).unwrap_or(u64::MAX));
+        let tags = bytes.count(tags, "tags", 4)?;
+        let count = bytes.count(count, "elements", 4 * (1 + tags + size))?;
+        if count == 0 {
+            return Err(bytes.fault("a block of no elements"));
+        }
+        for _ in 0..count {
+            bytes.i32("the id of an element")?;
+            let mut label = Label::default();
+            for k in 0..tags {
+                let tag = bytes.i32("a tag")?.into();
+                match k {
+                    0 => label.number = tag,
+                    1 => label.entity = tag,
+                    _ => {}
+                }
+            }
+            nodes.clear();
+            for _ in 0..size {
+                let id = bytes.i32("the id of a node")?;
+                let place = u64::try_from(id).ok().and_then(|id| ids.place(id));
+                nodes.push(place.ok_or_else(|| bytes.fault(format!("there is no node {id}")))?);
+            }
+            raw.add(shape, &nodes, label).map_err(|message| bytes.fault(message))?;
+        }
+        done += count;
+    }
+    words.go_to(bytes.offset());
+    Ok(())
+}

@@ -1,0 +1,233 @@
+//! The sections of Gmsh's MSH 4.1 that its version 2 has not: entities, and nodes and elements in blocks.
+
+use super::gmsh::{Ids, Storage, known_type};
+use super::raw::{Label, Raw, Shape};
+use crate::Point;
+use crate::io::input::{Bytes, Fault, Words};
+use std::collections::BTreeMap;
+
+/// What the sections of a file tell each other.
+#[derive(Default)]
+pub(super) struct Parts {
+    /// Ids of nodes, once they are read.
+    pub ids: Option<Ids>,
+    /// By dimension and tag.
+    entities: BTreeMap<(i64, i64), Entity>,
+    has_physicals: bool,
+}
+
+/// What is said of a geometric entity.
+#[derive(Clone, Copy, Default)]
+struct Entity {
+    /// The first physical tag.
+    physical: Option<i64>,
+    /// The entity that it is a part of, by dimension and tag.
+    parent: Option<(i64, i64)>,
+}
+
+/// Numbers as text or binary.
+enum Source<'a, 'w> {
+    Text(&'w mut Words<'a>),
+    Binary { words: &'w mut Words<'a>, bytes: Bytes<'a> },
+}
+
+impl Source<'_, '_> {
+    /// A number that takes four bytes.
+    fn int(&mut self, what: &str) -> Result<i64, Fault> {
+        match self {
+            Self::Text(words) => words.int(what),
+            Self::Binary { bytes, .. } => bytes.i32(what).map(i64::from),
+        }
+    }
+
+    /// A number that takes eight bytes.
+    fn size(&mut self, what: &str) -> Result<u64, Fault> {
+        match self {
+            Self::Text(words) => {
+                let number = words.int(what)?;
+                u64::try_from(number).map_err(|_| words.fault(format!("{what} is negative")))
+            }
+            Self::Binary { bytes, .. } => bytes.u64(what),
+        }
+    }
+
+    fn point(&mut self) -> Result<Point, Fault> {
+        match self {
+            Self::Text(words) => words.point("a coordinate"),
+            Self::Binary { bytes, .. } => bytes.point_f64(),
+        }
+    }
+
+    /// A number of things that follow, each of at least so many numbers and bytes.
+    fn count(&mut self, what: &str, numbers: usize, bytes_each: usize) -> Result<usize, Fault> {
+        match self {
+            Self::Text(words) => words.count(what, numbers),
+            Self::Binary { bytes, .. } => {
+                let count = bytes.u64(what)?;
+                bytes.count(count, what, bytes_each)
+            }
+        }
+    }
+
+    fn fault(&self, message: impl Into<String>) -> Fault {
+        match self {
+            Self::Text(words) => words.fault(message),
+            Self::Binary { bytes, .. } => bytes.fault(message),
+        }
+    }
+
+    /// Goes on with text behind what was read.
+    fn finish(self) {
+        if let Self::Binary { words, bytes } = self {
+            words.go_to(bytes.offset());
+        }
+    }
+}
+
+/// Reads one section up to its end.
+pub(super) fn section<'a>(
+    name: &[u8],
+    words: &mut Words<'a>,
+    content: &'a [u8],
+    storage: Storage,
+    parts: &mut Parts,
+    raw: &mut Raw,
+) -> Result<(), Fault> {
+    let mut source = match storage {
+        Storage::Text => Source::Text(words),
+        Storage::Binary { big_endian } => {
+            let bytes = Bytes::new(content, words.offset(), big_endian);
+            Source::Binary { words, bytes }
+        }
+    };
+    match name {
+        b"$Entities" => entities(&mut source, false, parts)?,
+        b"$PartitionedEntities" => {
+            source.size("the number of partitions")?;
+            let ghosts = source.count("ghost entities", 2, 8)?;
+            for _ in 0..ghosts {
+                source.int("the tag of a ghost entity")?;
+                source.int("a partition")?;
+            }
+            entities(&mut source, true, parts)?;
+        }
+        b"$Nodes" => parts.ids = Some(nodes(&mut source, raw)?),
+        _ => elements(&mut source, parts, raw)?,
+    }
+    source.finish();
+    Ok(())
+}
+
+fn entities(source: &mut Source, partitioned: bool, parts: &mut Parts) -> Result<(), Fault> {
+    let mut counts = [0; 4];
+    for count in &mut counts {
+        *count = source.size("the number of entities")?;
+    }
+    for (dimension, count) in (0..).zip(counts) {
+        for _ in 0..count {
+            let tag = source.int("the tag of an entity")?;
+            let mut entity = Entity::default();
+            if partitioned {
+                entity.parent = Some((source.int("a dimension")?, source.int("the tag of an entity")?));
+                for _ in 0..source.count("partitions", 1, 4)? {
+                    source.int("a partition")?;
+                }
+            }
+            source.point()?;
+            if dimension > 0 {
+                source.point()?;
+            }
+            for k in 0..source.count("physical tags", 1, 4)? {
+                let physical = source.int("a physical tag")?;
+                if k == 0 {
+                    // The sign is the orientation.
+                    entity.physical = Some(physical.saturating_abs());
+                    parts.has_physicals |= dimension >= 2;
+                }
+            }
+            if dimension > 0 {
+                for _ in 0..source.count("bounding entities", 1, 4)? {
+                    source.int("the tag of an entity")?;
+                }
+            }
+            parts.entities.insert((dimension, tag), entity);
+        }
+    }
+    Ok(())
+}
+
+fn nodes(source: &mut Source, raw: &mut Raw) -> Result<Ids, Fault> {
+    let blocks = source.size("the number of blocks")?;
+    for what in ["the number of nodes", "the least id", "the largest id"] {
+        source.size(what)?;
+    }
+    let mut ids = Vec::new();
+    for _ in 0..blocks {
+        let dimension = source.int("a dimension")?;
+        source.int("the tag of an entity")?;
+        let parametric = source.int("0 or 1 for parameters")?;
+        let count = source.count("nodes", 4, 32)?;
+        for _ in 0..count {
+            ids.push(source.size("the id of a node")?);
+        }
+        for _ in 0..count {
+            raw.points.push(source.point()?);
+            // Parameters on the entity: as many numbers as it has dimensions.
+            for _ in 0..if parametric == 1 { dimension.clamp(0, 3) } else { 0 } {
+                match source {
+                    Source::Text(words) => _ = words.float("a parameter")?,
+                    Source::Binary { bytes, .. } => _ = bytes.f64("a parameter")?,
+                }
+            }
+        }
+    }
+    Ids::new(&ids)
+}
+
+fn elements(source: &mut Source, parts: &Parts, raw: &mut Raw) -> Result<(), Fault> {
+    let ids = parts.ids.as_ref().ok_or_else(|| source.fault("elements stand before nodes"))?;
+    let blocks = source.size("the number of blocks")?;
+    for what in ["the number of elements", "the least id", "the largest id"] {
+        source.size(what)?;
+    }
+    let mut nodes = Vec::new();
+    let mut between_parts = 0;
+    for _ in 0..blocks {
+        let dimension = source.int("a dimension")?;
+        let tag = source.int("the tag of an entity")?;
+        let code = source.int("the type of elements")?;
+        let (shape, size) = known_type(code).map_err(|message| source.fault(message))?;
+        let count = source.count("elements", 1 + size, 8 * (1 + size))?;
+        let label = label(parts, dimension, tag);
+        for _ in 0..count {
+            source.size("the id of an element")?;
+            nodes.clear();
+            for _ in 0..size {
+                let id = source.size("the id of a node")?;
+                nodes.push(ids.place(id).ok_or_else(|| source.fault(format!("there is no node {id}")))?);
+            }
+            match (label, shape) {
+                (Some(label), _) => raw.add(shape, &nodes, label).map_err(|message| source.fault(message))?,
+                (None, Shape::Triangle) => between_parts += 1,
+                (None, _) => {}
+            }
+        }
+    }
+    if between_parts > 0 {
+        raw.notes.push(format!("{between_parts} triangles between partitions left out"));
+    }
+    Ok(())
+}
+
+/// The label of the elements of an entity; `None` for what only separates partitions.
+fn label(parts: &Parts, dimension: i64, tag: i64) -> Option<Label> {
+    let entity = parts.entities.get(&(dimension, tag)).copied().unwrap_or_default();
+    let (whole_dimension, whole) = entity.parent.unwrap_or((dimension, tag));
+    if whole_dimension > dimension {
+        return None;
+    }
+    let of_whole = parts.entities.get(&(dimension, whole)).and_then(|entity| entity.physical);
+    let physical = entity.physical.or(of_whole);
+    let number = physical.unwrap_or(if parts.has_physicals { 0 } else { whole });
+    Some(Label { entity: whole, number })
+}

@@ -1,0 +1,90 @@
+//! A mesh as a file has it: vertices from 0, elements with labels, nothing checked but the kinds of elements.
+
+use crate::Point;
+use std::collections::BTreeMap;
+
+/// What a file says an element belongs to.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Default)]
+pub(super) struct Label {
+    /// The geometric entity, where the format tells it from the number; else 0.
+    pub entity: i64,
+    /// The number of the body or boundary; 0 for none.
+    pub number: i64,
+}
+
+impl Label {
+    /// A label of formats with one number.
+    pub fn number(number: i64) -> Self {
+        Self { entity: 0, number }
+    }
+}
+
+/// Shapes of elements.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) enum Shape {
+    /// A single vertex: left out.
+    Point,
+    /// Two corners.
+    Edge,
+    /// Three corners.
+    Triangle,
+    /// Four corners.
+    Tet,
+    /// What is not read.
+    Other(&'static str),
+}
+
+/// The content of a file.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Raw {
+    pub points: Vec<Point>,
+    pub tets: Vec<[u32; 4]>,
+    pub tet_labels: Vec<Label>,
+    pub triangles: Vec<[u32; 3]>,
+    pub triangle_labels: Vec<Label>,
+    pub edges: Vec<[u32; 2]>,
+    pub edge_labels: Vec<i64>,
+    /// Names of bodies by number.
+    pub body_names: BTreeMap<i64, String>,
+    /// Names of boundaries by number.
+    pub patch_names: BTreeMap<i64, String>,
+    /// Elements of higher order, whose corners alone are kept.
+    pub higher_order: usize,
+    pub notes: Vec<String>,
+}
+
+impl Raw {
+    /// Adds an element: its corners, and behind them what higher orders add.
+    ///
+    /// # Errors
+    /// Why a mesh with such elements is not read.
+    pub fn add(&mut self, shape: Shape, nodes: &[u32], label: Label) -> Result<(), String> {
+        let corners = match (shape, nodes) {
+            (Shape::Point, _) => nodes.len(),
+            (Shape::Edge, &[a, b, ..]) => {
+                self.edges.push([a, b]);
+                self.edge_labels.push(if label.entity == 0 { label.number } else { label.entity });
+                2
+            }
+            (Shape::Triangle, &[a, b, c, ..]) => {
+                self.triangles.push([a, b, c]);
+                self.triangle_labels.push(label);
+                3
+            }
+            (Shape::Tet, &[a, b, c, d, ..]) => {
+                self.tets.push([a, b, c, d]);
+                self.tet_labels.push(label);
+                4
+            }
+            (Shape::Other(name), _) => return Err(refusal(name)),
+            _ => return Err(format!("an element with {} vertices", nodes.len())),
+        };
+        self.higher_order += usize::from(nodes.len() > corners);
+        Ok(())
+    }
+}
+
+/// Why a mesh with such elements is not read.
+pub(super) fn refusal(name: &str) -> String {
+    format!("a {name}; only meshes of tetrahedra, with triangles and edges, are read")
+}

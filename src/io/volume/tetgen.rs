@@ -1,0 +1,88 @@
+//! TetGen's `.node`, `.ele` and, where it is there, `.face`.
+
+use super::raw::{Label, Raw, Shape};
+use super::{VolumeMesh, finish};
+use crate::io::input::tetgen_nodes;
+use crate::io::input::{Fault, ReadError, Words, float, load, shown};
+use std::path::Path;
+
+/// Reads the files that have the name of `path` but for its end.
+pub(super) fn read(path: &Path) -> Result<VolumeMesh, ReadError> {
+    let [node, ele, face] = ["node", "ele", "face"].map(|ending| path.with_extension(ending));
+    let content = load(&node)?;
+    let nodes = tetgen_nodes::read(&mut Words::with_comments(&content))
+        .map_err(|fault| fault.in_file(&node, &content))?;
+    let mut raw = Raw { points: nodes.points, ..Raw::default() };
+    if face.exists() {
+        let content = load(&face)?;
+        faces(&content, nodes.base, &mut raw).map_err(|fault| fault.in_file(&face, &content))?;
+    } else {
+        raw.notes.push(format!("there is no {}: no boundary numbers", face.display()));
+    }
+    let content = load(&ele)?;
+    tets(&content, nodes.base, &mut raw).map_err(|fault| fault.in_file(&ele, &content))?;
+    finish(Ok(raw), &ele, &content)
+}
+
+/// `count corners attributes`, then `id vertex… region`.
+fn tets(content: &[u8], base: i64, raw: &mut Raw) -> Result<(), Fault> {
+    let mut words = Words::with_comments(content);
+    let count = words.count("tetrahedra", 5)?;
+    let corners = words.int("the number of corners, 4 or 10")?;
+    if corners != 4 && corners != 10 {
+        return Err(words.fault(format!("elements of {corners} corners; 4 or 10 are expected")));
+    }
+    let has_region = words.next_in_line().is_some_and(|word| word != b"0");
+    words.rest_of_line();
+    let mut nodes = Vec::new();
+    for _ in 0..count {
+        words.int("the number of a tetrahedron")?;
+        read_nodes(&mut words, corners as usize, base, raw.points.len(), &mut nodes)?;
+        let label = if has_region { region(&mut words)? } else { Label::default() };
+        words.rest_of_line();
+        raw.add(Shape::Tet, &nodes, label).map_err(|message| words.fault(message))?;
+    }
+    Ok(())
+}
+
+/// An attribute, which may be written as `1.0`. Others than whole ones tell regions apart by their entity alone.
+fn region(words: &mut Words) -> Result<Label, Fault> {
+    let word = words.word("a region")?;
+    let value =
+        float(word).ok_or_else(|| words.fault(format!("expected a region, found `{}`", shown(word))))?;
+    if value.fract() == 0.0 && value.abs() < 1e15 {
+        return Ok(Label::number(value as i64));
+    }
+    Ok(Label { entity: value.to_bits() as i64, number: 0 })
+}
+
+/// `count marker`, then `id vertex vertex vertex marker`.
+fn faces(content: &[u8], base: i64, raw: &mut Raw) -> Result<(), Fault> {
+    let mut words = Words::with_comments(content);
+    let count = words.count("faces", 4)?;
+    let has_marker = words.next_in_line().is_some_and(|word| word != b"0");
+    words.rest_of_line();
+    let mut nodes = Vec::new();
+    for _ in 0..count {
+        words.int("the number of a face")?;
+        read_nodes(&mut words, 3, base, raw.points.len(), &mut nodes)?;
+        let marker = if has_marker { words.int("a marker")? } else { 0 };
+        words.rest_of_line();
+        raw.add(Shape::Triangle, &nodes, Label::number(marker)).map_err(|message| words.fault(message))?;
+    }
+    Ok(())
+}
+
+fn read_nodes(
+    words: &mut Words,
+    corners: usize,
+    base: i64,
+    count: usize,
+    nodes: &mut Vec<u32>,
+) -> Result<(), Fault> {
+    nodes.clear();
+    for _ in 0..corners {
+        nodes.push(words.vertex(base, count)?);
+    }
+    Ok(())
+}

@@ -1,0 +1,120 @@
+//! VTK's XML files of unstructured grids with one piece: tets, and triangles on their boundary.
+//!
+//! Arrays may be text, base64 (inline or appended) or raw, and compressed by zlib. Bodies and boundaries are told by
+//! the first known array of cells, see [`LABELS`]. Our own files keep the boundary in a second one, `STEM.boundary.vtu`,
+//! which is read with the first.
+
+use super::raw::{Label, Raw, Shape};
+use super::vtu_arrays::{Document, Section};
+use super::{VolumeMesh, finish};
+use crate::io::input::{Fault, ReadError, load};
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// Names of arrays of cells that hold numbers of bodies and boundaries: ours, Gmsh's, meshio's for Gmsh and for Medit,
+/// Elmer's.
+const LABELS: [&str; 6] =
+    ["BodyId", "CellEntityIds", "gmsh:physical", "medit:ref", "GeometryIds", "BoundaryId"];
+
+/// Reads the file and the boundary beside it.
+pub(super) fn read(path: &Path) -> Result<VolumeMesh, ReadError> {
+    let content = load(path)?;
+    let mut raw = parse(&content).map_err(|fault| fault.in_file(path, &content))?;
+    let beside = path.with_extension("boundary.vtu");
+    if raw.raw.triangles.is_empty() && !raw.vertex_ids.is_empty() && beside.exists() {
+        let content = load(&beside)?;
+        let boundary = parse(&content).map_err(|fault| fault.in_file(&beside, &content))?;
+        add_boundary(&mut raw, boundary).map_err(|fault| fault.in_file(&beside, &content))?;
+    }
+    finish(Ok(raw.raw), path, &content)
+}
+
+/// A file's mesh, and the ids of its vertices in the whole mesh, if it has such.
+struct Grid {
+    raw: Raw,
+    vertex_ids: Vec<i64>,
+}
+
+fn parse(content: &[u8]) -> Result<Grid, Fault> {
+    let document = Document::read(content)?;
+    let coordinates = document.required(Section::Points, None)?.floats()?;
+    let (points, rest) = coordinates.as_chunks::<3>();
+    if !rest.is_empty() {
+        return Err(Fault::file("the number of coordinates is no multiple of three"));
+    }
+    if points.iter().flatten().any(|x| !x.is_finite()) {
+        return Err(Fault::file("a coordinate is no finite number"));
+    }
+    let connectivity = document.required(Section::Cells, Some("connectivity"))?.ints()?;
+    let offsets = document.required(Section::Cells, Some("offsets"))?.ints()?;
+    let types = document.required(Section::Cells, Some("types"))?.ints()?;
+    if offsets.len() != types.len() {
+        return Err(Fault::file(format!("{} offsets and {} types of cells", offsets.len(), types.len())));
+    }
+    let label = LABELS.iter().find_map(|name| document.array(Section::CellData, Some(name)));
+    let labels = label.map(|array| array.ints()).transpose()?;
+    if labels.as_ref().is_some_and(|labels| labels.len() != types.len()) {
+        return Err(Fault::file("the numbers of bodies are not as many as the cells"));
+    }
+    let mut raw =
+        Raw { points: points.iter().map(|p| p.map(|x| x + 0.0).into()).collect(), ..Raw::default() };
+    let mut nodes = Vec::new();
+    let mut begin = 0;
+    for (cell, (&end, &kind)) in offsets.iter().zip(&types).enumerate() {
+        let vertices = usize::try_from(end).ok().and_then(|end| connectivity.get(begin..end));
+        let vertices =
+            vertices.ok_or_else(|| Fault::file(format!("the offset {end} of cell {cell} is wrong")))?;
+        nodes.clear();
+        for &vertex in vertices {
+            let index = u32::try_from(vertex).ok().filter(|&v| (v as usize) < points.len());
+            nodes.push(index.ok_or_else(|| {
+                Fault::file(format!(
+                    "cell {cell} names vertex {vertex}, and the file has {}, from 0",
+                    points.len()
+                ))
+            })?);
+        }
+        let label = Label::number(labels.as_ref().map_or(0, |labels| labels[cell]));
+        raw.add(shape(kind), &nodes, label)
+            .map_err(|message| Fault::file(format!("cell {cell} is {message}")))?;
+        begin = end as usize;
+    }
+    let ids = document.array(Section::PointData, Some("GlobalNodeId"));
+    let vertex_ids = ids.map(|array| array.ints()).transpose()?.unwrap_or_default();
+    Ok(Grid { raw, vertex_ids })
+}
+
+/// By VTK's numbers of cell types.
+fn shape(kind: i64) -> Shape {
+    match kind {
+        1 | 2 => Shape::Point,
+        3 | 4 | 21 => Shape::Edge,
+        5 | 22 => Shape::Triangle,
+        10 | 24 => Shape::Tet,
+        8 | 9 | 23 | 28 => Shape::Other("quadrangle"),
+        11 | 12 | 25 | 29 => Shape::Other("hexahedron"),
+        13 | 26 => Shape::Other("prism"),
+        14 | 27 => Shape::Other("pyramid"),
+        _ => Shape::Other("cell of another type"),
+    }
+}
+
+/// Adds the triangles of a file of their own, whose vertices are told by their ids.
+fn add_boundary(grid: &mut Grid, boundary: Grid) -> Result<(), Fault> {
+    let places: BTreeMap<i64, u32> = grid.vertex_ids.iter().copied().zip(0..).collect();
+    let to_place = |&v: &u32| {
+        let id = boundary.vertex_ids.get(v as usize);
+        let place =
+            id.and_then(|id| places.get(id)).filter(|&&place| (place as usize) < grid.raw.points.len());
+        place.copied().ok_or_else(|| Fault::file(format!("vertex {v} is none of the mesh beside the file")))
+    };
+    for (triangle, label) in boundary.raw.triangles.iter().zip(&boundary.raw.triangle_labels) {
+        let mut vertices = [0; 3];
+        for (place, v) in vertices.iter_mut().zip(triangle) {
+            *place = to_place(v)?;
+        }
+        grid.raw.triangles.push(vertices);
+        grid.raw.triangle_labels.push(*label);
+    }
+    Ok(())
+}

@@ -1,0 +1,356 @@
+//! The frame of a `.vtu` file, tag by tag, and the numbers of its arrays.
+//!
+//! The tags are read by hand: a file with raw appended data is no well-formed XML.
+
+use crate::io::input::{Bytes, Fault, Words, shown};
+use std::io::Read;
+
+/// Where an array stands.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) enum Section {
+    Points,
+    Cells,
+    PointData,
+    CellData,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Format {
+    Text,
+    Base64,
+    /// Offset behind the underscore.
+    Appended(usize),
+}
+
+/// A `DataArray`.
+pub(super) struct Array<'a> {
+    section: Section,
+    name: String,
+    kind: String,
+    format: Format,
+    /// What stands between its tags.
+    inline: &'a [u8],
+    /// Of the file, from where it stands.
+    frame: Frame<'a>,
+}
+
+/// What all arrays of a file have in common.
+#[derive(Clone, Copy, Default)]
+struct Frame<'a> {
+    content: &'a [u8],
+    big_endian: bool,
+    /// Lengths take eight bytes, not four.
+    long_lengths: bool,
+    compressed: bool,
+    /// Where appended data begins, behind the underscore, and whether it is base64.
+    appended: Option<(usize, bool)>,
+}
+
+/// A file's arrays.
+pub(super) struct Document<'a>(Vec<Array<'a>>);
+
+/// A tag: name and attributes, and where its text ends.
+struct Tag<'a> {
+    name: &'a str,
+    attributes: &'a str,
+    begin: usize,
+    end: usize,
+}
+
+impl Tag<'_> {
+    fn attribute(&self, name: &str) -> Option<&str> {
+        let mut rest = self.attributes;
+        while let Some((before, after)) = rest.split_once('=') {
+            let quote = after.trim_start().chars().next().filter(|c| *c == '"' || *c == '\'')?;
+            let (value, behind) = after.trim_start()[1..].split_once(quote)?;
+            if before.trim() == name {
+                return Some(value);
+            }
+            rest = behind;
+        }
+        None
+    }
+}
+
+/// The next tag from an offset on; declarations and comments are skipped.
+fn next_tag(content: &[u8], mut at: usize) -> Option<Tag<'_>> {
+    loop {
+        let begin = at + content[at..].iter().position(|&b| b == b'<')?;
+        if content[begin..].starts_with(b"<!--") {
+            at = begin + content[begin..].windows(3).position(|w| w == b"-->")? + 3;
+            continue;
+        }
+        let end = begin + content[begin..].iter().position(|&b| b == b'>')? + 1;
+        let text = std::str::from_utf8(&content[begin + 1..end - 1]).ok()?;
+        if text.starts_with(['?', '!']) {
+            at = end;
+            continue;
+        }
+        let (name, attributes) = text.split_once(char::is_whitespace).unwrap_or((text, ""));
+        return Some(Tag { name: name.trim_end_matches('/'), attributes, begin, end });
+    }
+}
+
+impl<'a> Document<'a> {
+    /// Reads all tags up to the appended data.
+    pub fn read(content: &'a [u8]) -> Result<Self, Fault> {
+        let mut frame = Frame { content, ..Frame::default() };
+        let mut arrays: Vec<Array> = Vec::new();
+        let mut section = None;
+        let (mut at, mut pieces, mut is_vtk) = (0, 0, false);
+        while let Some(tag) = next_tag(content, at) {
+            at = tag.end;
+            match tag.name {
+                "VTKFile" => {
+                    frame = header(&tag, frame)?;
+                    is_vtk = true;
+                }
+                "Piece" => {
+                    pieces += 1;
+                    if pieces > 1 {
+                        return Err(Fault::text(tag.begin, "a file of several pieces is not read"));
+                    }
+                }
+                "Points" => section = Some(Section::Points),
+                "Cells" => section = Some(Section::Cells),
+                "PointData" => section = Some(Section::PointData),
+                "CellData" => section = Some(Section::CellData),
+                "/Points" | "/Cells" | "/PointData" | "/CellData" => section = None,
+                "DataArray" => {
+                    let Some(section) = section else { continue };
+                    let inline = &content[tag.end..];
+                    let inline = &inline[..inline.iter().position(|&b| b == b'<').unwrap_or(inline.len())];
+                    arrays.push(Array::of(&tag, section, inline, frame)?);
+                }
+                "AppendedData" => {
+                    let base64 = tag.attribute("encoding") == Some("base64");
+                    let mark = content[at..].iter().position(|&b| b == b'_');
+                    let mark =
+                        mark.ok_or_else(|| Fault::text(at, "the appended data does not begin with `_`"))?;
+                    frame.appended = Some((at + mark + 1, base64));
+                    break;
+                }
+                _ => {}
+            }
+        }
+        if !is_vtk || pieces == 0 {
+            return Err(Fault::file(
+                "no piece of a VTK file of type UnstructuredGrid: cut off, or another format",
+            ));
+        }
+        arrays.iter_mut().for_each(|array| array.frame.appended = frame.appended);
+        Ok(Self(arrays))
+    }
+
+    /// The array of this name, or the first one of its section.
+    pub fn array(&self, section: Section, name: Option<&str>) -> Option<&Array<'a>> {
+        self.0.iter().find(|a| a.section == section && name.is_none_or(|name| a.name == name))
+    }
+
+    /// The same, which must be there.
+    pub fn required(&self, section: Section, name: Option<&str>) -> Result<&Array<'a>, Fault> {
+        let missing =
+            || Fault::file(format!("the file has no array {} in {section:?}", name.unwrap_or("at all")));
+        self.array(section, name).ok_or_else(missing)
+    }
+}
+
+fn header<'a>(tag: &Tag, frame: Frame<'a>) -> Result<Frame<'a>, Fault> {
+    if let Some(kind) = tag.attribute("type").filter(|kind| *kind != "UnstructuredGrid") {
+        return Err(Fault::text(tag.begin, format!("a VTK file of type {kind}; UnstructuredGrid is needed")));
+    }
+    let compressed = match tag.attribute("compressor") {
+        None | Some("") => false,
+        Some("vtkZLibDataCompressor") => true,
+        Some(other) => {
+            return Err(Fault::text(
+                tag.begin,
+                format!("compression by {other} is not read; zlib or none is"),
+            ));
+        }
+    };
+    let big_endian = tag.attribute("byte_order") == Some("BigEndian");
+    let long_lengths = tag.attribute("header_type") == Some("UInt64");
+    Ok(Frame { big_endian, long_lengths, compressed, ..frame })
+}
+
+impl<'a> Array<'a> {
+    fn of(tag: &Tag, section: Section, inline: &'a [u8], frame: Frame<'a>) -> Result<Self, Fault> {
+        let wrong = |message: String| Fault::text(tag.begin, message);
+        let format = match tag.attribute("format") {
+            Some("ascii") => Format::Text,
+            Some("binary") => Format::Base64,
+            Some("appended") => {
+                let offset = tag.attribute("offset").and_then(|offset| offset.parse().ok());
+                Format::Appended(offset.ok_or_else(|| wrong("the array has no offset".into()))?)
+            }
+            other => {
+                return Err(wrong(format!("the format `{}` of an array is not known", other.unwrap_or(""))));
+            }
+        };
+        let name = tag.attribute("Name").unwrap_or_default().to_string();
+        let kind = tag.attribute("type").unwrap_or_default().to_string();
+        Ok(Self { section, name, kind, format, inline, frame })
+    }
+
+    fn wrong(&self, message: &str) -> Fault {
+        Fault::file(format!("the array `{}`: {message}", self.name))
+    }
+
+    /// Its numbers as floats.
+    pub fn floats(&self) -> Result<Vec<f64>, Fault> {
+        if self.format == Format::Text {
+            let mut words = Words::new(self.inline);
+            let mut numbers = Vec::new();
+            while words.peek().is_some() {
+                numbers.push(
+                    words
+                        .float("a number")
+                        .map_err(|_| self.wrong("not all its words are finite numbers"))?,
+                );
+            }
+            return Ok(numbers);
+        }
+        let data = self.data()?;
+        let bytes = Bytes::new(&data, 0, self.frame.big_endian);
+        match self.kind.as_str() {
+            "Float32" => numbers(bytes, 4, |b| b.f32("a number").map(f64::from)),
+            "Float64" => numbers(bytes, 8, |b| b.f64("a number")),
+            _ => Ok(self.ints()?.into_iter().map(|n| n as f64).collect()),
+        }
+    }
+
+    /// Its numbers as whole ones.
+    pub fn ints(&self) -> Result<Vec<i64>, Fault> {
+        if self.format == Format::Text {
+            let mut words = Words::new(self.inline);
+            let mut numbers = Vec::new();
+            while words.peek().is_some() {
+                numbers.push(
+                    words.int("a number").map_err(|_| self.wrong("not all its words are whole numbers"))?,
+                );
+            }
+            return Ok(numbers);
+        }
+        let data = self.data()?;
+        let bytes = Bytes::new(&data, 0, self.frame.big_endian);
+        const WHAT: &str = "a number";
+        match self.kind.as_str() {
+            "Int8" => numbers(bytes, 1, |b| b.i8(WHAT).map(i64::from)),
+            "UInt8" => numbers(bytes, 1, |b| b.u8(WHAT).map(i64::from)),
+            "Int16" => numbers(bytes, 2, |b| b.i16(WHAT).map(i64::from)),
+            "UInt16" => numbers(bytes, 2, |b| b.u16(WHAT).map(i64::from)),
+            "Int32" => numbers(bytes, 4, |b| b.i32(WHAT).map(i64::from)),
+            "UInt32" => numbers(bytes, 4, |b| b.u32(WHAT).map(i64::from)),
+            "Int64" => numbers(bytes, 8, |b| b.i64(WHAT)),
+            "UInt64" => numbers(bytes, 8, |b| b.u64(WHAT).map(|n| n as i64)),
+            other => Err(self.wrong(&format!("its type is `{other}`, and whole numbers are needed"))),
+        }
+    }
+
+    /// Its bytes, uncompressed, without their length before them.
+    fn data(&self) -> Result<Vec<u8>, Fault> {
+        let decoded;
+        let stored: &[u8] = match (self.format, self.frame.appended) {
+            (Format::Appended(offset), Some((begin, base64))) => {
+                let content = self.frame.content;
+                let at = begin.checked_add(offset).filter(|&at| at <= content.len());
+                let rest =
+                    &content[at.ok_or_else(|| self.wrong("its offset is beyond the end of the file"))?..];
+                if base64 {
+                    decoded =
+                        self.decode(&rest[..rest.iter().position(|&b| b == b'<').unwrap_or(rest.len())])?;
+                    &decoded
+                } else {
+                    rest
+                }
+            }
+            (Format::Appended(_), None) => {
+                return Err(self.wrong("the file has no appended data: it is cut off"));
+            }
+            _ => {
+                decoded = self.decode(self.inline)?;
+                &decoded
+            }
+        };
+        let mut bytes = Bytes::new(stored, 0, self.frame.big_endian);
+        let data = if self.frame.compressed { self.inflated(&mut bytes) } else { self.plain(&mut bytes) };
+        data.map_err(|_| self.wrong("its data is cut off or not what its header says"))
+    }
+
+    fn length(&self, bytes: &mut Bytes) -> Result<u64, Fault> {
+        if self.frame.long_lengths { bytes.u64("a length") } else { bytes.u32("a length").map(u64::from) }
+    }
+
+    fn plain(&self, bytes: &mut Bytes) -> Result<Vec<u8>, Fault> {
+        let length = self.length(bytes)?;
+        let length = bytes.count(length, "bytes", 1)?;
+        Ok(bytes.take(length, "an array")?.to_vec())
+    }
+
+    /// Blocks, block size, size of the last block if it is less, compressed size of each; the blocks.
+    fn inflated(&self, bytes: &mut Bytes) -> Result<Vec<u8>, Fault> {
+        let blocks = self.length(bytes)?;
+        let size = self.length(bytes)?;
+        let _last = self.length(bytes)?;
+        let blocks = bytes.count(blocks, "blocks", if self.frame.long_lengths { 8 } else { 4 })?;
+        let mut lengths = Vec::with_capacity(blocks);
+        for _ in 0..blocks {
+            lengths.push(self.length(bytes)?);
+        }
+        let mut data = Vec::new();
+        for length in lengths {
+            let length = bytes.count(length, "bytes", 1)?;
+            let block = bytes.take(length, "a block")?;
+            let before = data.len() as u64;
+            // One byte more than there can be tells a block that is too long.
+            let inflated =
+                flate2::read::ZlibDecoder::new(block).take(size.saturating_add(1)).read_to_end(&mut data);
+            if inflated.is_err() || data.len() as u64 - before > size {
+                return Err(bytes.fault("a block that cannot be inflated"));
+            }
+        }
+        Ok(data)
+    }
+
+    /// Base64: pieces behind each other, each perhaps with padding at its end. What is no such character ends it.
+    fn decode(&self, text: &[u8]) -> Result<Vec<u8>, Fault> {
+        let mut bytes = Vec::with_capacity(text.len() / 4 * 3);
+        let (mut bits, mut count) = (0_u32, 0);
+        for &b in text.iter().filter(|b| !b.is_ascii_whitespace()) {
+            let value = match b {
+                b'A'..=b'Z' => b - b'A',
+                b'a'..=b'z' => b - b'a' + 26,
+                b'0'..=b'9' => b - b'0' + 52,
+                b'+' => 62,
+                b'/' => 63,
+                b'=' => {
+                    // The rest of a piece: 2 characters left are one byte, 3 are two.
+                    match count {
+                        2 => bytes.push((bits >> 4) as u8),
+                        3 => bytes.extend([(bits >> 10) as u8, (bits >> 2) as u8]),
+                        _ => {}
+                    }
+                    (bits, count) = (0, 0);
+                    continue;
+                }
+                _ => return Err(self.wrong(&format!("`{}` is no base64", shown(&[b])))),
+            };
+            bits = bits << 6 | u32::from(value);
+            count += 1;
+            if count == 4 {
+                bytes.extend([(bits >> 16) as u8, (bits >> 8) as u8, bits as u8]);
+                (bits, count) = (0, 0);
+            }
+        }
+        Ok(bytes)
+    }
+}
+
+fn numbers<T>(
+    mut bytes: Bytes,
+    size: usize,
+    next: impl Fn(&mut Bytes) -> Result<T, Fault>,
+) -> Result<Vec<T>, Fault> {
+    (0..bytes.left() / size).map(|_| next(&mut bytes)).collect()
+}
