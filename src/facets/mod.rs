@@ -8,8 +8,8 @@
 //! * **patches**, parted by sharp edges, by changes of group, and where other than two facets meet (`features`); the
 //!   **curves** between patches, and the **corners** at their ends.
 //!
-//! [`FacetProjector`] finds the nearest point on them. [`keep`] takes the triangles as the surface mesh, as they are: a
-//! [`SurfaceMesh`](crate::surface::SurfaceMesh) that goes into
+//! [`FacetProjector`] finds the nearest point on them. [`remesh`](remesh()) makes a surface mesh by a size field, by local changes of the
+//! given triangles; [`keep`] takes the triangles as they are. Both end in a [`SurfaceMesh`](crate::surface::SurfaceMesh) that goes into
 //! [`ClosedSurface`](crate::volume::ClosedSurface).
 //!
 //! What is *not* repaired: gaps, holes, facets that intersect. Those are refused with their place, here or by the volume mesher.
@@ -24,6 +24,7 @@ mod nearest;
 mod normals;
 mod projector;
 mod regions;
+mod remesh;
 #[cfg(test)]
 mod samples;
 mod size;
@@ -36,5 +37,6 @@ pub use error::FacetError;
 pub use keep::keep;
 pub use model::{FacetBody, FacetCurve, FacetModel, FacetPatch, Facets, Settings};
 pub use projector::FacetProjector;
+pub use remesh::{RemeshReport, RemeshSettings, remesh};
 pub use size::FacetSize;
 pub use smoothness::FacetSmoothness;

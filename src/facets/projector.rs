@@ -45,7 +45,8 @@ struct PatchFacets {
     normals: Vec<[Vector; 3]>,
     /// Bit k: the side opposite corner k is on the rim of the patch; bit 3 + k: corner k is.
     rim: Vec<u8>,
-    flat: bool,
+    /// The normal of the plane that all facets lie in, up to the tolerance.
+    flat: Option<Vector>,
 }
 
 /// The segments of one curve.
@@ -137,7 +138,7 @@ impl FacetProjector {
 
     /// Whether all facets of a patch are in one plane up to [`tolerance`](Self::tolerance): nothing need be projected then.
     pub fn is_flat_patch(&self, patch: PatchId) -> bool {
-        self.patches[patch.index()].flat
+        self.flat_normal(patch).is_some()
     }
 
     /// Whether a curve is straight up to [`tolerance`](Self::tolerance).
@@ -179,6 +180,11 @@ impl FacetProjector {
     /// All facets, patch by patch, with the normals of the patch at their corners.
     pub(super) fn facets(&self) -> impl Iterator<Item = (&[Point; 3], &[Vector; 3])> {
         self.patches.iter().flat_map(|p| p.facets.iter().zip(&p.normals))
+    }
+
+    /// The normal of a flat patch.
+    pub(super) fn flat_normal(&self, patch: PatchId) -> Option<Vector> {
+        self.patches[patch.index()].flat
     }
 
     pub(super) fn foot(&self, patch: PatchId, point: &Point) -> Foot {
@@ -276,7 +282,7 @@ impl PatchFacets {
                 *bits |= u8::from(on_rim.binary_search(v).is_ok()) << (3 + k);
             }
         }
-        let flat = is_flat(&facets, tolerance);
+        let flat = plane_normal(&facets, tolerance);
         let normals = normals::of_corners(&source.points, &triangles, normals, sliver);
         Self { tree: Tree::new(&boxes), facets, normals, rim, flat }
     }
@@ -309,14 +315,14 @@ impl PatchFacets {
     }
 }
 
-/// Whether all corners lie in the plane of the largest facet, up to `tolerance`.
-fn is_flat(facets: &[[Point; 3]], tolerance: f64) -> bool {
+/// The normal of the largest facet if all corners lie in its plane, up to `tolerance`.
+fn plane_normal(facets: &[[Point; 3]], tolerance: f64) -> Option<Vector> {
     let area = |f: &[Point; 3]| crate::kernel::simplex::area_vector(&f[0], &f[1], &f[2]);
-    let largest = facets.iter().max_by(|f, g| area(f).norm_squared().total_cmp(&area(g).norm_squared()));
-    let Some((facet, normal)) = largest.and_then(|f| Some((f, area(f).try_normalize(0.0)?))) else {
-        return false;
-    };
-    facets.iter().flatten().all(|p| normal.dot(&(p - facet[0])).abs() <= tolerance)
+    let largest =
+        facets.iter().max_by(|f, g| area(f).norm_squared().total_cmp(&area(g).norm_squared()))?;
+    let normal = area(largest).try_normalize(0.0)?;
+    let in_plane = |p: &Point| normal.dot(&(p - largest[0])).abs() <= tolerance;
+    facets.iter().flatten().all(in_plane).then_some(normal)
 }
 
 impl Polyline {

@@ -47,7 +47,8 @@ impl Soup {
         };
         let mut corners = [at(false, false), at(true, false), at(true, true), at(false, true)];
         if upper == inward {
-            corners.reverse();
+            // The diagonal stays, so that boxes side by side fit.
+            corners.swap(1, 3);
         }
         self.quad(corners);
     }

@@ -32,7 +32,24 @@ impl FacetSize {
         sample_curves(model, settings, maximum, &mut sources);
         Self(SourceTree::new(model.bounds, settings.grading, maximum, &sources))
     }
+
+    /// The size at which patches and curves turn by `turn` (radians) along an edge.
+    pub(super) fn of_turn(model: &FacetModel, turn: f64) -> Self {
+        let settings = SizeSettings {
+            maxh: None,
+            minh: 0.0,
+            curvature_safety: 1.0 / turn,
+            segments_per_curve: f64::MIN_POSITIVE,
+            grading: TURN_GRADING,
+            scale: 1.0,
+            sources: Vec::new(),
+        };
+        Self::new(model, &settings)
+    }
 }
+
+/// How fast sizes bounded by curvature alone may grow: a flat patch beside a round one soon has large triangles.
+const TURN_GRADING: f64 = 1.0;
 
 impl SizeField for FacetSize {
     fn size_at(&self, point: &Point) -> f64 {

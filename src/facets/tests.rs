@@ -190,3 +190,33 @@ fn the_tutorial_parts_have_one_body_each() {
     println!("shaft {:?} rounding {}", counts(&shaft), shaft.rounding);
     assert_eq!(shaft.bodies.len(), 1);
 }
+
+/// Sizes as for a geometry.
+fn sizes(scale: f64) -> crate::size::SizeSettings {
+    crate::size::SizeSettings { scale, ..crate::size::SizeSettings::default() }
+}
+
+fn remeshed(model: &FacetModel, scale: f64) -> (crate::surface::SurfaceMesh, RemeshReport) {
+    let size = FacetSize::new(model, &sizes(scale));
+    remesh(model, &size, &RemeshSettings::default())
+}
+
+#[test]
+fn simple_solids_are_remeshed_well() {
+    let solids = [
+        ("box", soup(|s| s.brick([0.0; 3], [1.0, 2.0, 3.0], false))),
+        ("cylinder", soup(|s| s.cylinder(1.0, 3.0, 40))),
+        ("sphere", soup(|s| s.sphere(Point::origin(), 1.0, 40, 20, false))),
+        ("torus", soup(|s| s.torus(3.0, 1.0, 40, 20))),
+        ("plate", soup(|s| s.plate_with_hole(2.0, 1.0, 0.5, 24))),
+        ("cone", soup(|s| s.cone(1.0, 2.0, 40))),
+    ];
+    for (name, solid) in solids {
+        let found = model(&[solid]);
+        for scale in [2.0, 1.0, 0.5, 0.2] {
+            let (mesh, report) = remeshed(&found, scale);
+            println!("{name} {scale}: {report:?}");
+            closed(&found, &mesh);
+        }
+    }
+}
