@@ -18,7 +18,7 @@ pub struct Cli {
 /// The commands.
 #[derive(Subcommand, Debug)]
 pub enum Command {
-    /// Make a partitioned mesh: mesh the geometry, partition, refine, check, write
+    /// Make a partitioned mesh: mesh the geometry or surface, or take a mesh; partition, refine, check, write
     #[command(after_help = STATUS)]
     Generate(Generate),
     /// Make the coarse mesh alone, in one part and one file
@@ -38,8 +38,10 @@ const STATUS: &str = "Exit status: 0 done; 2 bad input, or a geometry refused wi
 #[derive(Args, Debug, Clone)]
 pub struct SizeOptions {
     /// Fineness: very-coarse, coarse, moderate, fine or very-fine
-    #[arg(long, value_name = "NAME", default_value = "moderate")]
-    pub preset: Preset,
+    ///
+    /// [default: moderate]
+    #[arg(long, value_name = "NAME")]
+    pub preset: Option<Preset>,
     /// Largest element size (length)
     #[arg(long, value_name = "H", value_parser = positive)]
     pub maxh: Option<f64>,
@@ -54,12 +56,28 @@ pub struct SizeOptions {
     pub coarse: Option<u64>,
 }
 
+/// What is meshed.
+#[derive(Args, Debug, Clone)]
+pub struct InputOptions {
+    /// A geometry (.geo, NETGEN CSG), surfaces (.stl, .off, .obj, .ply, .poly, .smesh: several become
+    /// several bodies), or a mesh (.msh, .vol, .mesh, .meshb, .vtu, .ele, an Elmer folder), which is taken as it is
+    #[arg(required = true, value_name = "INPUT")]
+    pub files: Vec<PathBuf>,
+    /// Keep the triangles of surfaces as they are; else they are made anew by the sizes
+    #[arg(long)]
+    pub keep_surface: bool,
+    /// Patches of surfaces end where their triangles turn by more than this (degrees) [default: 40]
+    #[arg(long, value_name = "DEGREES", value_parser = angle)]
+    pub feature_angle: Option<f64>,
+}
+
 /// `tetmill generate`
 #[derive(Args, Debug)]
 pub struct Generate {
-    /// The geometry, a NETGEN CSG file (.geo)
-    pub geometry: PathBuf,
-    /// Folder to write to [default: the geometry's name without .geo, in the current folder]
+    /// What is meshed
+    #[command(flatten)]
+    pub input: InputOptions,
+    /// Folder to write to [default: the first input's name without its ending, in the current folder]
     #[arg(short, long, value_name = "DIR")]
     pub output: Option<PathBuf>,
     /// How the fine mesh is made
@@ -106,8 +124,9 @@ pub struct Generate {
 /// `tetmill mesh`
 #[derive(Args, Debug)]
 pub struct MeshFile {
-    /// The geometry, a NETGEN CSG file (.geo)
-    pub geometry: PathBuf,
+    /// What is meshed
+    #[command(flatten)]
+    pub input: InputOptions,
     /// File to write; its ending names the format: .vtu, .msh (Gmsh 2.2), .mesh (Medit), .vol (NETGEN), .off
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
@@ -134,8 +153,9 @@ pub struct MeshFile {
 /// `tetmill inspect`
 #[derive(Args, Debug)]
 pub struct Inspect {
-    /// The geometry, a NETGEN CSG file (.geo)
-    pub geometry: PathBuf,
+    /// What is looked at
+    #[command(flatten)]
+    pub input: InputOptions,
     /// As JSON
     #[arg(long)]
     pub json: bool,
@@ -180,6 +200,14 @@ fn positive(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(number) if number > 0.0 && number.is_finite() => Ok(number),
         _ => Err("a positive number is needed".into()),
+    }
+}
+
+/// An angle between facets.
+fn angle(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(number) if number > 0.0 && number <= 180.0 => Ok(number),
+        _ => Err("an angle above 0 and up to 180 degrees is needed".into()),
     }
 }
 

@@ -1,12 +1,14 @@
 //! What the commands do: from the options to a written mesh and a summary.
 
-use crate::cli::{Check, Format, Generate, Inspect, MeshFile, Method, SizeOptions};
+use crate::cli::{Check, Format, Generate, InputOptions, Inspect, MeshFile, Method, SizeOptions};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 use tetmill::comm::{Communicator, mpi, thread};
 use tetmill::error::{Failure, Status, agree};
+use tetmill::inspect::Inspection;
 use tetmill::io::{self, Written, elmer};
 use tetmill::mesh::stream::MeshStream;
+use tetmill::pipeline::input::{self, InputSettings};
 use tetmill::pipeline::target::Outcome;
 use tetmill::pipeline::{GenerateSettings, Generated, Model, Wanted, generate};
 use tetmill::progress::Progress;
@@ -74,13 +76,14 @@ const STAGES: u64 = 7;
 fn generate_on(comm: &dyn Communicator, options: &Generate, start: Instant) -> Result<(), Failure> {
     let first = comm.rank() == 0;
     let progress = Progress::new(options.quiet || !first, STAGES);
-    let model =
-        first.then(|| progress.stage("read", || read_model(&options.geometry, &progress))).transpose();
+    let model = first
+        .then(|| progress.stage("read", || read_sized_model(&options.input, &options.size, &progress)))
+        .transpose();
     let model = agree(comm, model)?;
     let settings = GenerateSettings { size: size_settings(&options.size), wanted: wanted(options) };
     let made = generate(comm, model.as_ref(), &settings, &progress)?;
     let target = options.output.clone().unwrap_or_else(|| {
-        options.geometry.with_extension("").file_name().map_or_else(|| "mesh".into(), PathBuf::from)
+        options.input.files[0].with_extension("").file_name().map_or_else(|| "mesh".into(), PathBuf::from)
     });
     let written = progress.stage("write", || write_all(comm, options, &made, &target))?;
     if options.check && options.format.contains(&Format::Elmer) {
@@ -93,7 +96,7 @@ fn generate_on(comm: &dyn Communicator, options: &Generate, start: Instant) -> R
     let shared = shared_vertices(comm, &made.part)?;
     let memory = total_memory(comm)?;
     let Some(model) = model else { return Ok(()) };
-    let mut report = summary(&model, &options.geometry, &made, comm.size(), shared);
+    let mut report = summary(&model, &name_of(&options.input), &made, comm.size(), shared);
     report.stages = progress.finish();
     report.seconds = start.elapsed().as_secs_f64();
     report.peak_memory = memory;
@@ -101,17 +104,41 @@ fn generate_on(comm: &dyn Communicator, options: &Generate, start: Instant) -> R
     tell(&report, options.report.as_deref(), options.quiet, wanted_count(options))
 }
 
-/// Reads a geometry and finds its features; warnings are shown.
-fn read_model(path: &Path, progress: &Progress) -> Result<Model, Failure> {
-    let bytes = std::fs::read(path)
-        .map_err(|error| Failure::input(format!("cannot read {}: {error}", path.display())))?;
-    let parsed = csg::language::parse_geometry_bytes(&bytes, &path.display().to_string())?;
-    parsed.warnings.iter().for_each(|warning| progress.note(&warning.to_string()));
-    Model::from_csg(parsed.geometry).map_err(|error| Failure::input(format!("{}: {error}", path.display())))
+/// Reads what is to be meshed; what the user should know is shown.
+fn read_model(options: &InputOptions, progress: &Progress) -> Result<Model, Failure> {
+    let mut settings = InputSettings { keep_surface: options.keep_surface, ..InputSettings::default() };
+    if let Some(degrees) = options.feature_angle {
+        settings.facets.feature_angle = degrees.to_radians();
+    }
+    input::read(&options.files, &settings, &mut |note| progress.note(note))
+}
+
+/// Reads what is to be meshed, and refuses sizes for what is a mesh already.
+fn read_sized_model(
+    options: &InputOptions,
+    size: &SizeOptions,
+    progress: &Progress,
+) -> Result<Model, Failure> {
+    let model = read_model(options, progress)?;
+    let SizeOptions { preset, maxh, minh, grading, coarse } = size;
+    let sized = [maxh, minh, grading].iter().any(|length| length.is_some());
+    if matches!(model, Model::Given(_)) && (sized || preset.is_some() || coarse.is_some()) {
+        return Err(Failure::input(format!(
+            "{} is a mesh already and is taken as it is: leave out --preset, --maxh, --minh, --grading and --coarse",
+            name_of(options)
+        )));
+    }
+    Ok(model)
+}
+
+/// The inputs' names in one text.
+fn name_of(options: &InputOptions) -> String {
+    let names: Vec<String> = options.files.iter().map(|file| file.display().to_string()).collect();
+    names.join(", ")
 }
 
 fn size_settings(options: &SizeOptions) -> SizeSettings {
-    let mut settings = SizeSettings::from(options.preset);
+    let mut settings = SizeSettings::from(options.preset.unwrap_or_default());
     settings.maxh = options.maxh;
     settings.minh = options.minh.unwrap_or(settings.minh);
     settings.grading = options.grading.unwrap_or(settings.grading);
@@ -138,7 +165,7 @@ fn write_all(
     dir: &Path,
 ) -> Result<Written, Failure> {
     let mut written = Written::default();
-    let stem = dir.join(options.geometry.file_stem().unwrap_or("mesh".as_ref()));
+    let stem = dir.join(options.input.files[0].file_stem().unwrap_or("mesh".as_ref()));
     for format in &options.format {
         written += match format {
             Format::Elmer => elmer::write(comm, &made.part, &made.names, dir)?,
@@ -203,11 +230,11 @@ fn total_memory(comm: &dyn Communicator) -> Result<Option<u64>, Failure> {
     Ok((sum > 0).then_some(sum))
 }
 
-fn summary(model: &Model, path: &Path, made: &Generated, ranks: u32, shared: u64) -> Report {
+fn summary(model: &Model, input: &str, made: &Generated, ranks: u32, shared: u64) -> Report {
     let coarse = made.coarse.as_ref().expect("rank 0 made the coarse mesh");
     Report {
         version: env!("CARGO_PKG_VERSION").into(),
-        geometry: path.display().to_string(),
+        geometry: input.to_owned(),
         entities: model.entities(),
         ranks,
         threads: rayon::current_num_threads(),
@@ -264,7 +291,7 @@ pub fn run_mesh(options: &MeshFile) -> Result<(), Failure> {
     set_threads(options.threads)?;
     let comm = thread::alone();
     let progress = Progress::new(options.quiet, STAGES);
-    let model = progress.stage("read", || read_model(&options.geometry, &progress))?;
+    let model = progress.stage("read", || read_sized_model(&options.input, &options.size, &progress))?;
     let wanted = match options.size.coarse {
         Some(tets) => Wanted::Coarse { tets, levels: 0 },
         None => Wanted::Sizes { levels: 0 },
@@ -275,7 +302,7 @@ pub fn run_mesh(options: &MeshFile) -> Result<(), Failure> {
     if let Some(file) = &options.picture {
         draw(&comm, &made.part, options.cut, file)?;
     }
-    let mut report = summary(&model, &options.geometry, &made, 1, 0);
+    let mut report = summary(&model, &name_of(&options.input), &made, 1, 0);
     report.stages = progress.finish();
     report.seconds = start.elapsed().as_secs_f64();
     report.peak_memory = memory::peak_bytes();
@@ -313,12 +340,15 @@ pub fn run_check(options: &Check) -> Result<(), Failure> {
 /// `tetmill inspect`
 pub fn run_inspect(options: &Inspect) -> Result<(), Failure> {
     let progress = Progress::new(true, 1);
-    let model = read_model(&options.geometry, &progress)?;
-    let Model::Csg(model) = model else {
-        let file = options.geometry.display();
-        return Err(Failure::input(format!("{file} is not a CSG geometry: there is nothing to inspect")));
+    let model = read_model(&options.input, &progress)?;
+    let seen = match &model {
+        Model::Csg(model) => Inspection::of_csg(model),
+        Model::Facets(solid) => Inspection::of_facets(solid),
+        Model::Given(_) => {
+            let name = name_of(&options.input);
+            return Err(Failure::input(format!("{name} is a mesh: `tetmill quality` tells of it")));
+        }
     };
-    let seen = tetmill::inspect::Inspection::new(&model);
     if options.json {
         println!("{}", serde_json::to_string_pretty(&seen).expect("plain data"));
     } else {

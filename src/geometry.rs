@@ -1,6 +1,7 @@
 //! What the boundary of a mesh lies on: all that refinement, the check and other ranks know of a geometry.
 
 use crate::Point;
+use crate::facets::FacetProjector;
 use csg::{CurveId, PatchId, ProjectionFailed};
 
 /// Projection of points to the patches and curves that they are classified on.
@@ -10,6 +11,8 @@ use csg::{CurveId, PatchId, ProjectionFailed};
 pub enum Projector {
     /// The surfaces of a CSG geometry.
     Csg(csg::Projector),
+    /// Triangles that stand for the true surface.
+    Facets(FacetProjector),
     /// The faces of a mesh that came without geometry: all that lies on them stays where it is.
     Flat,
 }
@@ -26,11 +29,23 @@ impl From<csg::Projector> for Projector {
     }
 }
 
+impl From<FacetProjector> for Projector {
+    fn from(projector: FacetProjector) -> Self {
+        Self::Facets(projector)
+    }
+}
+
+/// The first byte of an encoded projector.
+const CSG: u8 = 0;
+const FACETS: u8 = 1;
+const FLAT: u8 = 2;
+
 impl Projector {
     /// How far a projected point may be from its patch or curve, a length.
     pub fn tolerance(&self) -> f64 {
         match self {
             Self::Csg(projector) => projector.tolerance(),
+            Self::Facets(projector) => projector.tolerance(),
             Self::Flat => 0.0,
         }
     }
@@ -43,6 +58,7 @@ impl Projector {
     pub fn project_patch(&self, patch: PatchId, point: &Point) -> Result<Point, ProjectionFailed> {
         match self {
             Self::Csg(projector) => projector.project_patch(patch, point),
+            Self::Facets(projector) => Ok(projector.project_patch(patch, point)),
             Self::Flat => Ok(*point),
         }
     }
@@ -55,6 +71,7 @@ impl Projector {
     pub fn project_curve(&self, curve: CurveId, point: &Point) -> Result<Point, ProjectionFailed> {
         match self {
             Self::Csg(projector) => projector.project_curve(curve, point),
+            Self::Facets(projector) => Ok(projector.project_curve(curve, point)),
             Self::Flat => Ok(*point),
         }
     }
@@ -63,6 +80,7 @@ impl Projector {
     pub fn patch_distance(&self, patch: PatchId, point: &Point) -> f64 {
         match self {
             Self::Csg(projector) => projector.patch_distance(patch, point),
+            Self::Facets(projector) => projector.patch_distance(patch, point),
             Self::Flat => 0.0,
         }
     }
@@ -71,6 +89,7 @@ impl Projector {
     pub fn is_flat_patch(&self, patch: PatchId) -> bool {
         match self {
             Self::Csg(projector) => is_plane(projector.patch_surface(patch)),
+            Self::Facets(projector) => projector.is_flat_patch(patch),
             Self::Flat => true,
         }
     }
@@ -79,27 +98,31 @@ impl Projector {
     pub fn is_straight_curve(&self, curve: CurveId) -> bool {
         match self {
             Self::Csg(projector) => projector.curve_surfaces(curve).into_iter().all(is_plane),
+            Self::Facets(projector) => projector.is_straight_curve(curve),
             Self::Flat => true,
         }
     }
 
-    /// Everything as bytes, to be sent to other ranks.
+    /// Everything as bytes, to be sent to other ranks: one that tells the kind, then the projector's own.
     pub fn encode(&self) -> Vec<u8> {
-        match self {
-            Self::Csg(projector) => bytemuck::cast_slice(&projector.encode()).to_vec(),
-            Self::Flat => Vec::new(),
-        }
+        let (kind, content) = match self {
+            Self::Csg(projector) => (CSG, bytemuck::cast_slice(&projector.encode()).to_vec()),
+            Self::Facets(projector) => (FACETS, projector.encode()),
+            Self::Flat => (FLAT, Vec::new()),
+        };
+        [vec![kind], content].concat()
     }
 
     /// The inverse of [`encode`](Self::encode); `None` for anything else.
     pub fn decode(bytes: &[u8]) -> Option<Self> {
-        if bytes.is_empty() {
-            return Some(Self::Flat);
+        match bytes.split_first()? {
+            (&CSG, content) if content.len() % size_of::<f64>() == 0 => {
+                csg::Projector::decode(&bytemuck::pod_collect_to_vec::<u8, f64>(content)).map(Self::Csg)
+            }
+            (&FACETS, content) => FacetProjector::decode(content).map(Self::Facets),
+            (&FLAT, []) => Some(Self::Flat),
+            _ => None,
         }
-        if bytes.len() % size_of::<f64>() != 0 {
-            return None;
-        }
-        csg::Projector::decode(&bytemuck::pod_collect_to_vec::<u8, f64>(bytes)).map(Self::Csg)
     }
 }
 

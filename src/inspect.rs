@@ -1,6 +1,8 @@
 //! What a geometry consists of, for people and as JSON.
 
-use crate::pipeline::CsgModel;
+use crate::facets::FacetModel;
+use crate::mesh::VertexId;
+use crate::pipeline::{CsgModel, FacetSolid};
 use csg::{BodyId, Curve, PatchId};
 use serde::Serialize;
 use std::fmt;
@@ -29,8 +31,8 @@ pub struct BodyLine {
     pub name: String,
     /// Its largest element size, where the file gives one.
     pub maxh: Option<f64>,
-    /// The line of the file that makes it a body.
-    pub line: u32,
+    /// The line of the file that makes it a body; null for surfaces.
+    pub line: Option<u32>,
 }
 
 /// A patch.
@@ -42,10 +44,10 @@ pub struct PatchLine {
     pub name: String,
     /// The kind of its surface.
     pub surface: &'static str,
-    /// The solid and the line of the file where its surface stands.
-    pub solid: String,
-    /// The line.
-    pub line: u32,
+    /// The solid of the file where its surface stands; null for surfaces.
+    pub solid: Option<String>,
+    /// The line of the file likewise.
+    pub line: Option<u32>,
     /// The numbers of the bodies behind and in front of it; 0 is the exterior.
     pub bodies: [u32; 2],
     /// The curves of its boundary, by index.
@@ -67,7 +69,7 @@ pub struct CurveLine {
 
 impl Inspection {
     /// Looks at a geometry.
-    pub fn new(model: &CsgModel) -> Self {
+    pub fn of_csg(model: &CsgModel) -> Self {
         let CsgModel { geometry, features, .. } = model;
         let number = |body: Option<BodyId>| body.map_or(0, |b| geometry.bodies[b.index()].number);
         let patch = |patch: &csg::Patch| {
@@ -76,8 +78,8 @@ impl Inspection {
                 boundary: patch.bc,
                 name: patch.name.clone(),
                 surface: kind(&geometry.surfaces[patch.surface.index()]),
-                solid: info.solid.clone(),
-                line: info.span.line,
+                solid: Some(info.solid.clone()),
+                line: Some(info.span.line),
                 bodies: [number(patch.inside), number(patch.outside)],
                 curves: patch.boundary.iter().map(|(curve, _)| curve.index()).collect(),
                 maxh: info.maxh,
@@ -93,7 +95,7 @@ impl Inspection {
             number: body.number,
             name: body.material.clone().unwrap_or_else(|| body.name.clone()),
             maxh: body.maxh,
-            line: body.span.line,
+            line: Some(body.span.line),
         };
         Self {
             bounds: [features.bounds.min.into(), features.bounds.max.into()],
@@ -103,6 +105,62 @@ impl Inspection {
             corners: features.corners.iter().map(|c| c.point.into()).collect(),
         }
     }
+
+    /// Looks at solids of triangles.
+    pub fn of_facets(FacetSolid { model, names, .. }: &FacetSolid) -> Self {
+        let beside = patches_beside(model);
+        let number = |body: Option<BodyId>| body.map_or(0, |b| names.bodies[b.index()].0);
+        let patch = |(index, patch): (usize, &crate::facets::FacetPatch)| {
+            let id = PatchId::new(index);
+            PatchLine {
+                boundary: names.patches[index].0,
+                name: names.patches[index].1.clone(),
+                surface: if model.projector.is_flat_patch(id) { "plane" } else { "facets" },
+                solid: None,
+                line: None,
+                bodies: [number(patch.inside), number(patch.outside)],
+                curves: (0..beside.len()).filter(|&curve| beside[curve].contains(&id)).collect(),
+                maxh: None,
+            }
+        };
+        let point = |v: u32| model.points[v as usize];
+        let curve = |(index, curve): (usize, &crate::facets::FacetCurve)| CurveLine {
+            length: curve.vertices.windows(2).map(|w| (point(w[1]) - point(w[0])).norm()).sum(),
+            corners: curve.ends.map(|ends| ends.map(|c| c.index())),
+            boundaries: beside[index].iter().map(|patch| names.patches[patch.index()].0).collect(),
+        };
+        let body = |(number, name): &(u32, String)| BodyLine {
+            number: *number,
+            name: name.clone(),
+            maxh: None,
+            line: None,
+        };
+        Self {
+            bounds: [model.bounds.min.into(), model.bounds.max.into()],
+            bodies: names.bodies.iter().map(body).collect(),
+            patches: model.patches.iter().enumerate().map(patch).collect(),
+            curves: model.curves.iter().enumerate().map(curve).collect(),
+            corners: model.corners.iter().map(|&v| point(v).into()).collect(),
+        }
+    }
+}
+
+/// The patches on either side of each curve, by curve.
+fn patches_beside(model: &FacetModel) -> Vec<Vec<PatchId>> {
+    let mut sides: Vec<([VertexId; 2], PatchId)> = Vec::with_capacity(3 * model.triangles.len());
+    for triangle in &model.triangles {
+        let [a, b, c] = triangle.vertices;
+        sides.extend([[a, b], [b, c], [c, a]].map(|[v, w]| ([v.min(w), v.max(w)], triangle.patch)));
+    }
+    sides.sort_unstable();
+    let beside = |curve: &crate::facets::FacetCurve| {
+        let [v, w] = [curve.vertices[0], curve.vertices[1]].map(VertexId);
+        let edge = [v.min(w), v.max(w)];
+        let first = sides.partition_point(|side| side.0 < edge);
+        let at_edge = sides[first..].iter().take_while(|side| side.0 == edge);
+        at_edge.map(|side| side.1).collect()
+    };
+    model.curves.iter().map(beside).collect()
 }
 
 fn kind(surface: &csg::Surface) -> &'static str {
@@ -125,7 +183,8 @@ impl fmt::Display for Inspection {
         writeln!(f, "\n{} bodies", self.bodies.len())?;
         for body in &self.bodies {
             let maxh = body.maxh.map_or(String::new(), |h| format!("  maxh {h}"));
-            writeln!(f, "  {:>4}  {:20} line {}{maxh}", body.number, body.name, body.line)?;
+            let line = body.line.map_or(String::new(), |line| format!(" line {line}"));
+            writeln!(f, "  {:>4}  {:20}{line}{maxh}", body.number, body.name)?;
         }
         writeln!(
             f,
@@ -134,7 +193,10 @@ impl fmt::Display for Inspection {
         )?;
         for patch in &self.patches {
             let [behind, front] = patch.bodies;
-            let surface = format!("{} of {} (line {})", patch.surface, patch.solid, patch.line);
+            let surface = match (&patch.solid, patch.line) {
+                (Some(solid), Some(line)) => format!("{} of {solid} (line {line})", patch.surface),
+                _ => patch.surface.to_owned(),
+            };
             let maxh = patch.maxh.map_or(String::new(), |h| format!("  maxh {h}"));
             writeln!(
                 f,

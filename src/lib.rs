@@ -5,6 +5,7 @@ pub mod check;
 pub mod comm;
 pub mod dist;
 pub mod error;
+pub mod facets;
 pub mod geometry;
 pub mod improve;
 pub mod inspect;

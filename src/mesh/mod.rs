@@ -1,6 +1,5 @@
 //! Meshes: flat arrays of vertices and tets, classified on the geometry.
 
-pub mod classify;
 #[cfg(test)]
 pub(crate) mod fixtures;
 pub mod ids;

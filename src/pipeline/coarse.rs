@@ -31,7 +31,7 @@ pub enum CoarseError {
 impl CoarseError {
     /// Where a finer mesh may help: sources that ask for it. `segments` are the ends of the segments that
     /// the mesh was begun with, `size` the size field that was used.
-    fn remedy(&self, segments: &[[Point; 2]], size: &dyn SizeField) -> Vec<Source> {
+    pub(super) fn remedy(&self, segments: &[[Point; 2]], size: &dyn SizeField) -> Vec<Source> {
         match self {
             Self::Surface(SurfaceError::TooCoarse { segments: long, .. }) => {
                 let shorter = |&s: &usize| {
@@ -98,7 +98,7 @@ pub fn mesh(model: &CsgModel, settings: &mut SizeSettings) -> Result<CoarseMesh,
 }
 
 /// How one attempt at a coarse mesh ended.
-enum Attempt {
+pub(super) enum Attempt {
     Made(CoarseMesh),
     /// It takes smaller sizes.
     Lower(Vec<Source>),
@@ -106,7 +106,7 @@ enum Attempt {
 }
 
 /// Attempts until no sizes need to be lowered, or may be: the attempts are told whether they may ask for it.
-fn corrected(
+pub(super) fn corrected(
     settings: &mut SizeSettings,
     attempt: impl Fn(&SizeSettings, bool) -> Attempt,
 ) -> Result<CoarseMesh, CoarseError> {
@@ -141,7 +141,7 @@ fn attempt(model: &CsgModel, settings: &SizeSettings, may_lower: bool) -> Attemp
         .map_err(CoarseError::from)
         .and_then(|(surface, _)| {
             let regions = |id| [features.patch(id).inside, features.patch(id).outside];
-            fill(surface, regions, &size, &GeometrySmoothness { geometry, features })
+            fill(surface, regions, &size, Some(&GeometrySmoothness { geometry, features }))
         });
     match filled {
         Ok(made) => Attempt::Made(made),
@@ -152,15 +152,20 @@ fn attempt(model: &CsgModel, settings: &SizeSettings, may_lower: bool) -> Attemp
     }
 }
 
-/// Fills the bodies inside a surface mesh, and improves the result. `regions` are the bodies behind and in front of a patch.
-fn fill(
+/// Fills the bodies inside a surface mesh, and improves the result. `regions` are the bodies behind and in front of a patch;
+/// without `smoothness` all of the boundary stays as flat as it is.
+pub(super) fn fill(
     surface: SurfaceMesh,
     regions: impl Fn(PatchId) -> [Option<BodyId>; 2],
     size: &dyn SizeField,
-    smoothness: &dyn Smoothness,
+    smoothness: Option<&dyn Smoothness>,
 ) -> Result<CoarseMesh, CoarseError> {
     let (mut mesh, volume) = fill_bodies(surface, regions, size)?;
-    let improved = improve::make_refinable(&mut mesh, size, smoothness, &improve::Settings::default());
+    let settings = improve::Settings::default();
+    let improved = match smoothness {
+        Some(smoothness) => improve::make_refinable(&mut mesh, size, smoothness, &settings),
+        None => improve::improve(&mut mesh, size, &settings),
+    };
     let report = CoarseReport {
         vertices: mesh.points.len() as u64,
         tets: mesh.tets.len() as u64,

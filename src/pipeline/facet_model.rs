@@ -4,7 +4,7 @@ use super::coarse::{self, Attempt, CoarseError, CoarseMesh};
 use super::input::InputSettings;
 use crate::Point;
 use crate::error::Failure;
-use crate::facets::{FacetModel, FacetSize, FacetSmoothness, Facets, keep, remesh};
+use crate::facets::{FacetModel, FacetSize, FacetSmoothness, Facets, RemeshSettings, keep, remesh};
 use crate::geometry::Projector;
 use crate::improve::Smoothness;
 use crate::io::surface::{self, Surface};
@@ -48,8 +48,10 @@ impl FacetSolid {
             [path] => Failure::input(format!("{}: {error}", path.as_ref().display())),
             _ => Failure::input(error),
         })?;
-        let stems: Vec<String> =
-            paths.iter().map(|p| p.as_ref().file_stem().unwrap_or_default().to_string_lossy().into()).collect();
+        let stems: Vec<String> = paths
+            .iter()
+            .map(|p| p.as_ref().file_stem().unwrap_or_default().to_string_lossy().into())
+            .collect();
         let names = names(&model, &surfaces, &stems);
         let kept_points = surfaces.into_iter().flat_map(|surface| surface.loose_points).collect();
         Ok(Self { model, names, kept_points, keep_surface: settings.keep_surface })
@@ -59,5 +61,83 @@ impl FacetSolid {
     pub fn projector(&self) -> Projector {
         if self.keep_surface { Projector::Flat } else { self.model.projector.clone().into() }
     }
+
+    /// Makes a coarse mesh with the given sizes, which are lowered where surfaces come too near each other.
+    pub(super) fn coarse_mesh(&self, settings: &mut SizeSettings) -> Result<CoarseMesh, CoarseError> {
+        coarse::corrected(settings, |settings, may_lower| self.attempt(settings, may_lower))
+    }
+
+    fn attempt(&self, settings: &SizeSettings, may_lower: bool) -> Attempt {
+        let size = FacetSize::new(&self.model, settings);
+        let mut surface = if self.keep_surface {
+            keep(&self.model)
+        } else {
+            remesh(&self.model, &size, &RemeshSettings::default()).0
+        };
+        self.add_kept_points(&mut surface);
+        let smoothness = FacetSmoothness(&self.model.projector);
+        let smoothness: Option<&dyn Smoothness> = if self.keep_surface { None } else { Some(&smoothness) };
+        let regions = |id: PatchId| [self.model.patch(id).inside, self.model.patch(id).outside];
+        match coarse::fill(surface, regions, &size, smoothness) {
+            Ok(made) => Attempt::Made(made),
+            Err(error) => {
+                let may_lower = may_lower && !self.keep_surface;
+                let lowered = if may_lower { error.remedy(&[], &size) } else { Vec::new() };
+                if lowered.is_empty() { Attempt::Failed(error) } else { Attempt::Lower(lowered) }
+            }
+        }
+    }
+
+    /// Points on no triangle are kept as vertices inside.
+    fn add_kept_points(&self, surface: &mut SurfaceMesh) {
+        for (index, point) in self.kept_points.iter().enumerate() {
+            surface.points.push(*point);
+            surface.classes.push(Class::Corner(CornerId::new(self.model.corners.len() + index)));
+        }
+    }
 }
 
+fn facets_of(surface: &Surface) -> Facets {
+    Facets {
+        points: surface.points.clone(),
+        triangles: surface.triangles.clone(),
+        groups: surface.group.clone(),
+    }
+}
+
+/// Bodies are named as their files. Where files tell groups of triangles apart, these are the boundaries; elsewhere
+/// each patch is one.
+fn names(model: &FacetModel, surfaces: &[Surface], stems: &[String]) -> Names {
+    let mut bodies: Vec<(u32, String)> = Vec::new();
+    for body in &model.bodies {
+        let stem = &stems[body.file as usize];
+        let taken = |name: &String| bodies.iter().any(|(_, other)| other == name);
+        let numbered = (2..).map(|k| format!("{stem}_{k}"));
+        let name = std::iter::once(stem.clone()).chain(numbered).find(|name| !taken(name)).expect("endless");
+        bodies.push((bodies.len() as u32 + 1, name));
+    }
+    let groups: Vec<(usize, usize)> = surfaces
+        .iter()
+        .enumerate()
+        .flat_map(|(file, surface)| (0..surface.groups.len()).map(move |group| (file, group)))
+        .collect();
+    let has_groups = surfaces.iter().any(|surface| surface.groups.len() > 1);
+    let patch = |(index, patch): (usize, &crate::facets::FacetPatch)| {
+        let (file, group) = patch.labels.first().map_or((0, 0), |&(f, g)| (f as usize, g as usize));
+        let at = groups.binary_search(&(file, group)).ok().filter(|_| has_groups);
+        match at {
+            Some(at) => (group_number(surfaces, &groups, at), surfaces[file].groups[group].clone()),
+            None => (index as u32 + 1, format!("patch{}", index + 1)),
+        }
+    };
+    Names { bodies, patches: model.patches.iter().enumerate().map(patch).collect() }
+}
+
+/// The number that a file gives to a group, if it is the only file and gives each a positive one; else its place.
+fn group_number(surfaces: &[Surface], groups: &[(usize, usize)], at: usize) -> u32 {
+    let own = |&(file, group): &(usize, usize)| {
+        u32::try_from(surfaces[file].group_numbers[group]).ok().filter(|&number| number > 0)
+    };
+    let all_own = surfaces.len() == 1 && groups.iter().all(|group| own(group).is_some());
+    own(&groups[at]).filter(|_| all_own).unwrap_or(at as u32 + 1)
+}

@@ -1,7 +1,7 @@
 //! Method 2 on all ranks: a coarse mesh, partitioned, distributed, refined, checked.
 
 use super::coarse::{CoarseMesh, CoarseReport};
-use super::mend;
+use super::mend::{self, MendError};
 use super::model::Model;
 use super::target::{Outcome, mesh_to_target};
 use crate::check::{self, Checksum, PartReport};
@@ -161,6 +161,11 @@ fn mesh_as_wanted(
         made.map(|made| (made, outcome))
     };
     match settings.wanted {
+        Wanted::Elements(count) if let Model::Given(given) = model => {
+            let tets = given.mesh.tets.len() as u64;
+            let levels = (0..MOST_LEVELS).find(|levels| tets << (3 * levels) >= count).unwrap_or(MOST_LEVELS);
+            Ok((levels, model.coarse_mesh(&mut settings.size.clone()).map_err(MendError::from)?, None))
+        }
         Wanted::Sizes { levels } => {
             let made = mend::refinable(model, 1 << levels, |more| model.coarse_mesh(&mut with(more)))?;
             Ok((levels, made, None))

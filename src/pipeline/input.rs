@@ -29,9 +29,9 @@ fn kind(path: &Path) -> Result<Kind, Failure> {
     let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
     match ending.as_str() {
         _ if path.is_dir() => Ok(Kind::Mesh),
-        "geo" | "csg" => Ok(Kind::Csg),
-        _ if io::surface::knows(path) => Ok(Kind::Surface),
-        _ if io::volume::knows(path) => Ok(Kind::Mesh),
+        "geo" => Ok(Kind::Csg),
+        "stl" | "off" | "obj" | "ply" | "poly" | "smesh" => Ok(Kind::Surface),
+        "vtu" | "msh" | "vol" | "gz" | "mesh" | "meshb" | "ele" | "node" | "face" => Ok(Kind::Mesh),
         _ => Err(Failure::input(format!(
             "cannot tell by its name what {} holds; known are geometries (.geo), surfaces ({}) and meshes ({})",
             path.display(),
@@ -67,4 +67,23 @@ fn read_csg(path: &Path, note: &mut dyn FnMut(&str)) -> Result<Model, Failure> {
     let parsed = csg::language::parse_geometry_bytes(&bytes, &path.display().to_string())?;
     parsed.warnings.iter().for_each(|warning| note(&warning.to_string()));
     Model::from_csg(parsed.geometry).map_err(|error| Failure::input(format!("{}: {error}", path.display())))
+}
+
+fn read_mesh(path: &Path, note: &mut dyn FnMut(&str)) -> Result<Model, Failure> {
+    let read = io::volume::read(path).map_err(Failure::input)?;
+    read.notes.iter().for_each(|text| note(&format!("{}: {text}", path.display())));
+    if let Some(tet) = read.inverted.first() {
+        let corner = read.mesh.points[read.mesh.tets[tet.index()][0].index()];
+        return Err(Failure::input(format!(
+            "{}: {} tets are inverted or flat, the first of them number {} (counted from 1) at ({}, {}, {}); \
+             see them with `tetmill quality`",
+            path.display(),
+            read.inverted.len(),
+            tet.index() + 1,
+            corner.x,
+            corner.y,
+            corner.z
+        )));
+    }
+    Ok(Model::Given(GivenMesh { mesh: read.mesh, names: read.names }))
 }

@@ -3,6 +3,7 @@
 use super::coarse::{CoarseError, CoarseMesh};
 use super::model::Model;
 use crate::dist::{self, DistError};
+use crate::geometry::Projector;
 use crate::mesh::{GlobalId, Mesh, TET_EDGES};
 use crate::refine::{self, RefineError};
 use crate::size::Source;
@@ -62,11 +63,13 @@ fn inverted(
     mesh: &Mesh,
     pieces: u32,
 ) -> Result<Option<(Vec<GlobalId>, RefineError)>, MendError> {
-    if pieces == 1 {
+    // What is not snapped cannot invert.
+    let projector = model.projector();
+    if pieces == 1 || projector == Projector::Flat {
         return Ok(None);
     }
     let part = dist::from_serial(mesh.clone())?;
-    match refine::refine(part, &model.projector(), pieces, &refine::Settings::default()) {
+    match refine::refine(part, &projector, pieces, &refine::Settings::default()) {
         Ok(_) => Ok(None),
         Err(RefineError::Inverted { coarse, children, faults }) => {
             Ok(Some((coarse.clone(), RefineError::Inverted { coarse, children, faults })))

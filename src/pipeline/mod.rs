@@ -1,13 +1,16 @@
 //! The stages in order: the one place that knows all of them.
 
 pub mod coarse;
+mod facet_model;
 pub mod generate;
+pub mod input;
 pub mod mend;
 pub mod model;
 pub mod names;
 pub mod target;
 
 pub use coarse::{CoarseError, CoarseMesh, CoarseReport};
+pub use facet_model::FacetSolid;
 pub use generate::{GenerateSettings, Generated, Wanted, generate};
 pub use model::{CsgModel, Entities, GivenMesh, Model};
 pub use names::names;

@@ -1,6 +1,7 @@
 //! What is to be meshed.
 
 use super::coarse::{CoarseError, CoarseMesh, CoarseReport};
+use super::facet_model::FacetSolid;
 use crate::geometry::Projector;
 use crate::kernel::quality::QualitySummary;
 use crate::mesh::{Mesh, Names};
@@ -12,6 +13,8 @@ use csg::{Features, Geometry};
 pub enum Model {
     /// Solids of surfaces.
     Csg(Box<CsgModel>),
+    /// Solids of triangles.
+    Facets(Box<FacetSolid>),
     /// A mesh that came without its geometry.
     Given(GivenMesh),
 }
@@ -74,6 +77,7 @@ impl Model {
     pub fn projector(&self) -> Projector {
         match self {
             Self::Csg(model) => model.projector.clone().into(),
+            Self::Facets(solid) => solid.projector(),
             Self::Given(_) => Projector::Flat,
         }
     }
@@ -82,6 +86,7 @@ impl Model {
     pub fn names(&self) -> Names {
         match self {
             Self::Csg(model) => super::names(&model.geometry, &model.features),
+            Self::Facets(solid) => solid.names.clone(),
             Self::Given(given) => given.names.clone(),
         }
     }
@@ -95,6 +100,12 @@ impl Model {
                 curves: model.features.curves.len(),
                 patches: model.features.patches.len(),
             },
+            Self::Facets(solid) => Entities {
+                bodies: solid.model.bodies.len(),
+                corners: solid.model.corners.len(),
+                curves: solid.model.curves.len(),
+                patches: solid.model.patches.len(),
+            },
             Self::Given(given) => given.entities(),
         }
     }
@@ -106,6 +117,7 @@ impl Model {
     pub fn coarse_mesh(&self, settings: &mut SizeSettings) -> Result<CoarseMesh, CoarseError> {
         match self {
             Self::Csg(model) => super::coarse::mesh(model, settings),
+            Self::Facets(solid) => solid.coarse_mesh(settings),
             Self::Given(given) => Ok(given.coarse_mesh()),
         }
     }

@@ -1,0 +1,67 @@
+//! What facets cannot be.
+
+use crate::Point;
+
+/// Why facets bound no bodies.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum FacetError {
+    /// There are no triangles.
+    #[error("there are no triangles, or all have two equal corners")]
+    Empty,
+    /// More points or triangles than local ids.
+    #[error("{points} points and {triangles} triangles are more than 32-bit ids can number")]
+    TooLarge {
+        /// The number of points.
+        points: usize,
+        /// The number of triangles.
+        triangles: usize,
+    },
+    /// A coordinate is infinite or not a number.
+    #[error("a coordinate of point {point} of surface {file} is not a finite number")]
+    NotFinite {
+        /// The surface, from 0.
+        file: usize,
+        /// The point, from 0.
+        point: usize,
+    },
+    /// A triangle names a point that does not exist.
+    #[error("triangle {triangle} of surface {file} names point {point}, which does not exist")]
+    NoSuchPoint {
+        /// The surface, from 0.
+        file: usize,
+        /// The triangle, from 0.
+        triangle: usize,
+        /// The point it names.
+        point: u32,
+    },
+    /// Edges with a triangle on one side only.
+    #[error(
+        "the surface is not closed: {count} edges belong to one triangle only, the first of them at ({}, {}, {}); \
+         close the gap, or merge vertices that are meant to be one",
+        places[0].x, places[0].y, places[0].z
+    )]
+    Open {
+        /// How many.
+        count: usize,
+        /// The middles of the first of them.
+        places: Vec<Point>,
+    },
+    /// Two triangles at one edge lie on each other.
+    #[error("two triangles lie on each other at their common edge, at ({}, {}, {})", .0.x, .0.y, .0.z)]
+    Overlap(Point),
+    /// Neighbouring triangles cannot all be turned to agree.
+    #[error(
+        "the surface has one side only: triangles that meet at ({}, {}, {}) cannot be turned to agree",
+        .0.x, .0.y, .0.z
+    )]
+    NotOrientable(Point),
+    /// No ray from a triangle tells what is around it.
+    #[error(
+        "no ray from the triangle at ({}, {}, {}) tells what lies around it: surfaces touch or have no area there",
+        .0.x, .0.y, .0.z
+    )]
+    NoRay(Point),
+    /// The triangles bound no space.
+    #[error("the triangles bound no space")]
+    NoBody,
+}

@@ -1,0 +1,86 @@
+//! The nearest point of a triangle and of a segment.
+
+use crate::Point;
+
+/// A triangle lower than this part of its longest side is taken as its sides: its plane is rounding.
+const NEEDLE: f64 = 1e-9;
+
+/// The barycentric weights of the point of a triangle nearest to `p`; exactly 0 at corners that a side or corner is away from.
+///
+/// The regions of corners and sides by dot products as in Ericson 2005, section 5.1.5.
+#[inline]
+pub(super) fn in_triangle(p: &Point, [a, b, c]: &[Point; 3]) -> [f64; 3] {
+    let (ab, ac, ap) = (b - a, c - a, p - a);
+    let (d1, d2) = (ab.dot(&ap), ac.dot(&ap));
+    if d1 <= 0.0 && d2 <= 0.0 {
+        return [1.0, 0.0, 0.0];
+    }
+    let bp = p - b;
+    let (d3, d4) = (ab.dot(&bp), ac.dot(&bp));
+    if d3 >= 0.0 && d4 <= d3 {
+        return [0.0, 1.0, 0.0];
+    }
+    let cp = p - c;
+    let (d5, d6) = (ab.dot(&cp), ac.dot(&cp));
+    if d6 >= 0.0 && d5 <= d6 {
+        return [0.0, 0.0, 1.0];
+    }
+    // Twice the squared area times the weights of c, b and a.
+    let vc = d1 * d4 - d3 * d2;
+    let vb = d5 * d2 - d1 * d6;
+    let va = d3 * d6 - d5 * d4;
+    let scale = ab.norm_squared().max(ac.norm_squared());
+    if va + vb + vc <= NEEDLE * NEEDLE * scale * scale {
+        return in_sides(p, [a, b, c]);
+    }
+    if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
+        let t = d1 / (d1 - d3);
+        return [1.0 - t, t, 0.0];
+    }
+    if vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
+        let t = d2 / (d2 - d6);
+        return [1.0 - t, 0.0, t];
+    }
+    if va <= 0.0 && d4 >= d3 && d5 >= d6 {
+        let t = (d4 - d3) / ((d4 - d3) + (d5 - d6));
+        return [0.0, 1.0 - t, t];
+    }
+    let (v, w) = (vb / (va + vb + vc), vc / (va + vb + vc));
+    [1.0 - v - w, v, w]
+}
+
+/// The same for the sides alone.
+#[cold]
+fn in_sides(p: &Point, corners: [&Point; 3]) -> [f64; 3] {
+    let mut best = (f64::INFINITY, [0.0; 3]);
+    for (i, j) in [(0, 1), (1, 2), (2, 0)] {
+        let (t, squared) = in_segment(p, corners[i], corners[j]);
+        if squared < best.0 {
+            best = (squared, [0.0; 3]);
+            best.1[i] = 1.0 - t;
+            best.1[j] = t;
+        }
+    }
+    best.1
+}
+
+/// Where on a segment, from 0 to 1, its nearest point to `p` is, and its squared distance.
+#[inline]
+pub(super) fn in_segment(p: &Point, a: &Point, b: &Point) -> (f64, f64) {
+    let along = b - a;
+    let length = along.norm_squared();
+    let t = if length > 0.0 { (along.dot(&(p - a)) / length).clamp(0.0, 1.0) } else { 0.0 };
+    (t, (p - (a + along * t)).norm_squared())
+}
+
+/// The point with these weights. Exactly a corner where it is one.
+#[inline]
+pub(super) fn at(corners: &[Point; 3], weights: [f64; 3]) -> Point {
+    let [a, b, c] = corners;
+    match weights {
+        [_, 0.0, 0.0] => *a,
+        [0.0, _, 0.0] => *b,
+        [0.0, 0.0, _] => *c,
+        [_, v, w] => a + (b - a) * v + (c - a) * w,
+    }
+}

@@ -1,0 +1,347 @@
+//! Which part of space is on either side of each triangle, and which parts are bodies.
+//!
+//! Seen along an edge, its triangles stand like the pages of a book; the sides that face each other across a sector
+//! see the same **region** of space. Pieces of the surface that do not hang together are related by rays. So regions follow from
+//! where the triangles are alone, not from how they are turned; orientation then tells which regions are
+//! solid: those that a surface winds round (Jacobson, Kavan, Sorkine-Hornung 2013 call it the generalised
+//! winding number; here it is exact, as nothing is open).
+
+use super::FacetError;
+use super::edges::{Edges, Sets, Use};
+use super::join::{Joined, Layer};
+use crate::kernel::predicates::{Sign, orient3d};
+use crate::kernel::random::Random;
+use crate::kernel::simplex::{area_vector, volume6};
+use crate::{Point, Vector};
+use std::cmp::Ordering;
+
+/// The regions on both sides of the triangles.
+#[derive(Clone, Debug)]
+pub(super) struct Regions {
+    /// By triangle: the body behind it and the one in front of it.
+    pub sides: Vec<[Option<u32>; 2]>,
+    /// By body: the surface that it is named after.
+    pub files: Vec<u32>,
+}
+
+/// The side of a triangle that its normal points away from, or to.
+fn side_of(triangle: u32, front: bool) -> u32 {
+    2 * triangle + u32::from(front)
+}
+
+/// Finds the regions; may turn over triangles of surfaces that are not consistently oriented.
+pub(super) fn find(joined: &mut Joined) -> Result<Regions, FacetError> {
+    let edges = &Edges::new(&joined.triangles);
+    refuse_open(joined, edges)?;
+    let mut sets = Sets::new(2 * joined.triangles.len());
+    for edge in 0..edges.len() {
+        join_sectors(joined, edges.uses(edge), &mut sets)?;
+    }
+    let outside = nest(joined, edges, &mut sets)?;
+    let region: Vec<u32> = (0..2 * joined.triangles.len() as u32).map(|s| sets.find(s)).collect();
+    let outside = sets.find(outside);
+    let files = joined.layers.iter().flatten().map(|l| l.file + 1).max().unwrap_or(0);
+    let mut solid_in = vec![Vec::new(); region.len()];
+    for file in 0..files {
+        for r in solids(joined, edges, &region, outside, file)? {
+            solid_in[r as usize].push(file);
+        }
+    }
+    Ok(number(joined, &region, &solid_in))
+}
+
+/// Edges that an error about gaps shows at most.
+const SHOWN: usize = 20;
+
+fn refuse_open(joined: &Joined, edges: &Edges) -> Result<(), FacetError> {
+    let open = || (0..edges.len()).map(|e| edges.uses(e)).filter(|uses| uses.len() == 1);
+    let places: Vec<Point> = open().take(SHOWN).map(|uses| middle(joined, &uses[0])).collect();
+    if places.is_empty() { Ok(()) } else { Err(FacetError::Open { count: open().count(), places }) }
+}
+
+/// The middle of an edge.
+fn middle(joined: &Joined, edge: &Use) -> Point {
+    let [a, b] = edge.ends.map(|v| &joined.points[v as usize]);
+    nalgebra::center(a, b)
+}
+
+/// Joins the sides that see each other across the sectors at an edge.
+fn join_sectors(joined: &Joined, uses: &[Use], sets: &mut Sets) -> Result<(), FacetError> {
+    let mut pages: Vec<Use> = uses.to_vec();
+    if uses.len() > 2 && !sort_pages(joined, &mut pages) {
+        return Err(FacetError::Overlap(middle(joined, &uses[0])));
+    }
+    for i in 0..pages.len() {
+        let (page, next) = (&pages[i], &pages[(i + 1) % pages.len()]);
+        // A page that runs along the edge has its normal in the sense of the turn.
+        sets.join(side_of(page.triangle, page.along), side_of(next.triangle, !next.along));
+    }
+    Ok(())
+}
+
+/// Sorts the pages of an edge by a right-handed turn about it, from the first one; false if two coincide.
+fn sort_pages(joined: &Joined, pages: &mut [Use]) -> bool {
+    let point = |v: u32| &joined.points[v as usize];
+    let apex = |u: &Use| point(joined.triangles[u.triangle as usize][u.side as usize]);
+    let [a, b] = pages[0].ends.map(point);
+    let first = pages[0];
+    // A point beside the first page tells the two half-planes of its plane apart.
+    let step = (b - a).amax();
+    let aside = (0..3).map(|k| a + Vector::ith(k, step));
+    let Some(beside) = aside.into_iter().find(|p| orient3d(a, b, apex(&first), p) != Sign::Zero) else {
+        return false;
+    };
+    let home = orient3d(a, b, &beside, apex(&first));
+    // 0: with the first; 1: less than half a turn on; 2: half a turn; 3: more.
+    let quarter = |u: &Use| match orient3d(a, b, apex(&first), apex(u)) {
+        Sign::Positive => 1,
+        Sign::Negative => 3,
+        Sign::Zero if orient3d(a, b, &beside, apex(u)) == home => 0,
+        Sign::Zero => 2,
+    };
+    let compare = |u: &Use, w: &Use| {
+        quarter(u).cmp(&quarter(w)).then_with(|| match orient3d(a, b, apex(u), apex(w)) {
+            Sign::Positive => Ordering::Less,
+            Sign::Negative => Ordering::Greater,
+            Sign::Zero => Ordering::Equal,
+        })
+    };
+    pages.sort_by(compare);
+    pages.windows(2).all(|w| compare(&w[0], &w[1]) != Ordering::Equal)
+}
+
+/// Joins regions of pieces that do not hang together; returns a side that sees the outside of all.
+///
+/// A ray leaves each piece. Behind the last triangle of the piece that it meets begins the region around the piece,
+/// which is the one in front of whatever it meets next.
+fn nest(joined: &Joined, edges: &Edges, sets: &mut Sets) -> Result<u32, FacetError> {
+    let mut piece = Sets::new(joined.triangles.len());
+    for edge in 0..edges.len() {
+        edges.uses(edge).windows(2).for_each(|w| piece.join(w[0].triangle, w[1].triangle));
+    }
+    let pieces: Vec<u32> = (0..joined.triangles.len() as u32).map(|t| piece.find(t)).collect();
+    let mut largest: Vec<Option<(f64, u32)>> = vec![None; pieces.len()];
+    for (t, &p) in pieces.iter().enumerate() {
+        let area = normal(joined, t as u32).norm();
+        if largest[p as usize].is_none_or(|(most, _)| area > most) {
+            largest[p as usize] = Some((area, t as u32));
+        }
+    }
+    let mut outside = None;
+    for (p, start) in largest.iter().enumerate() {
+        let Some((_, start)) = *start else { continue };
+        let corner = joined.points[joined.triangles[start as usize][0] as usize];
+        let hits = shoot(joined, start).ok_or(FacetError::NoRay(corner))?;
+        let last = hits.iter().rposition(|h| pieces[h.triangle as usize] == p as u32).unwrap_or(0);
+        let around = side_of(hits[last].triangle, hits[last].along);
+        match (hits.get(last + 1), outside) {
+            (Some(next), _) => sets.join(around, side_of(next.triangle, !next.along)),
+            (None, Some(outside)) => sets.join(around, outside),
+            (None, None) => outside = Some(around),
+        }
+    }
+    outside.ok_or(FacetError::Empty)
+}
+
+/// Where a ray meets a triangle.
+struct Hit {
+    at: f64,
+    triangle: u32,
+    /// Whether it goes through from behind to the front.
+    along: bool,
+}
+
+/// Rays tried from a triangle before it is given up: each meets an edge, or two triangles within rounding, by chance only.
+const RAYS: usize = 64;
+
+/// Triangles that a ray meets nearer to each other than this part of its length are not told apart by floating point.
+const APART: f64 = 1e-13;
+
+/// The triangles that a ray from the middle of `start` meets, that one first, in order.
+fn shoot(joined: &Joined, start: u32) -> Option<Vec<Hit>> {
+    let corners = |t: u32| joined.triangles[t as usize].map(|v| &joined.points[v as usize]);
+    let [a, b, c] = corners(start);
+    let from = Point::from((a.coords + b.coords + c.coords) / 3.0);
+    let reach = joined.points.iter().map(|p| (p - from).norm()).fold(0.0, f64::max);
+    let up = normal(joined, start).try_normalize(0.0)?;
+    let mut random = Random::new(u64::from(start));
+    (0..RAYS).find_map(|_| {
+        let aside = Vector::from_fn(|_, _| random.unit() - 0.5);
+        let to = from + (up + aside).normalize() * (2.0 * reach);
+        let mut hits = vec![Hit { at: 0.0, triangle: start, along: true }];
+        for t in (0..joined.triangles.len() as u32).filter(|&t| t != start) {
+            hits.extend(meet(&from, &to, corners(t), t)?);
+        }
+        hits.sort_by(|g, h| g.at.total_cmp(&h.at));
+        hits.windows(2).all(|w| w[1].at - w[0].at > APART).then_some(hits)
+    })
+}
+
+/// Where a ray meets a triangle, if it does; nothing at all if that is not clear.
+fn meet(from: &Point, to: &Point, [a, b, c]: [&Point; 3], triangle: u32) -> Option<Option<Hit>> {
+    let (low, high) = (a.inf(b).inf(c), a.sup(b).sup(c));
+    if (0..3).any(|k| from[k].max(to[k]) < low[k] || from[k].min(to[k]) > high[k]) {
+        return Some(None);
+    }
+    let turns = [[a, b], [b, c], [c, a]].map(|[p, q]| orient3d(from, to, p, q));
+    if turns.contains(&Sign::Positive) && turns.contains(&Sign::Negative) {
+        return Some(None);
+    }
+    if turns.contains(&Sign::Zero) {
+        return None;
+    }
+    let ends = [orient3d(a, b, c, from), orient3d(a, b, c, to)];
+    if ends.contains(&Sign::Zero) {
+        return None;
+    }
+    if ends[0] == ends[1] {
+        return Some(None);
+    }
+    let [near, far] = [from, to].map(|p| volume6(a, b, c, p).abs());
+    Some(Some(Hit { at: near / (near + far), triangle, along: ends[1] == Sign::Positive }))
+}
+
+fn normal(joined: &Joined, t: u32) -> Vector {
+    let [a, b, c] = joined.triangles[t as usize].map(|v| &joined.points[v as usize]);
+    area_vector(a, b, c)
+}
+
+/// The regions that one surface winds round. If it is not consistently oriented, its triangles are turned over
+/// first where fewer of a connected sheet disagree; if that does not help, all regions but the outside are solid.
+fn solids(
+    joined: &mut Joined,
+    edges: &Edges,
+    region: &[u32],
+    outside: u32,
+    file: u32,
+) -> Result<Vec<u32>, FacetError> {
+    if let Some(solid) = winding(joined, region, outside, file) {
+        return Ok(solid);
+    }
+    orient(joined, edges, file)?;
+    Ok(winding(joined, region, outside, file).unwrap_or_else(|| {
+        let mut all: Vec<u32> = region.iter().copied().filter(|&r| r != outside).collect();
+        all.sort_unstable();
+        all.dedup();
+        all
+    }))
+}
+
+/// The regions with a winding number other than 0; `None` if it is not the same on all ways to a region.
+fn winding(joined: &Joined, region: &[u32], outside: u32, file: u32) -> Option<Vec<u32>> {
+    // From behind a triangle to its front the number falls by its layers.
+    let mut steps: Vec<(u32, u32, i32)> = Vec::with_capacity(2 * joined.triangles.len());
+    for (t, layers) in joined.layers.iter().enumerate() {
+        let fall = |l: &Layer| if l.even { 1 } else { -1 };
+        let jump: i32 = layers.iter().filter(|l| l.file == file).map(fall).sum();
+        let [behind, front] = [region[2 * t], region[2 * t + 1]];
+        steps.push((behind, front, -jump));
+        steps.push((front, behind, jump));
+    }
+    steps.sort_unstable();
+    steps.dedup();
+    let mut numbers: Vec<Option<i32>> = vec![None; region.len()];
+    numbers[outside as usize] = Some(0);
+    let mut queue = vec![outside];
+    while let Some(r) = queue.pop() {
+        let here = numbers[r as usize].unwrap_or(0);
+        let first = steps.partition_point(|s| s.0 < r);
+        for &(_, to, change) in steps[first..].iter().take_while(|s| s.0 == r) {
+            match numbers[to as usize] {
+                None => {
+                    numbers[to as usize] = Some(here + change);
+                    queue.push(to);
+                }
+                Some(n) if n != here + change => return None,
+                Some(_) => {}
+            }
+        }
+    }
+    let solid = |(r, n): (usize, &Option<i32>)| n.is_some_and(|n| n != 0).then_some(r as u32);
+    Some(numbers.iter().enumerate().filter_map(solid).collect())
+}
+
+/// Turns over triangles of a surface so that neighbours agree, the lesser area of each sheet.
+fn orient(joined: &mut Joined, edges: &Edges, file: u32) -> Result<(), FacetError> {
+    let has = |t: u32| joined.layers[t as usize].iter().any(|l| l.file == file);
+    let even = |t: u32| joined.layers[t as usize].iter().find(|l| l.file == file).is_some_and(|l| l.even);
+    let mut turned: Vec<Option<bool>> = vec![None; joined.triangles.len()];
+    let mut flips = Vec::new();
+    for seed in (0..joined.triangles.len() as u32).filter(|&t| has(t)) {
+        if turned[seed as usize].is_some() {
+            continue;
+        }
+        turned[seed as usize] = Some(false);
+        let mut sheet = vec![seed];
+        let mut next = 0;
+        while let Some(&t) = sheet.get(next) {
+            next += 1;
+            for edge in edges.of_side[t as usize] {
+                let here: Vec<&Use> = edges.uses(edge as usize).iter().filter(|u| has(u.triangle)).collect();
+                let [a, b] = here[..] else { continue };
+                let (own, other) = if a.triangle == t { (a, b) } else { (b, a) };
+                let agree = (own.along == even(t)) != (other.along == even(other.triangle));
+                let wanted = turned[t as usize].map(|x| x == agree);
+                match turned[other.triangle as usize] {
+                    None => {
+                        turned[other.triangle as usize] = wanted;
+                        sheet.push(other.triangle);
+                    }
+                    is if is != wanted => {
+                        return Err(FacetError::NotOrientable(middle(joined, own)));
+                    }
+                    _ => {}
+                }
+            }
+        }
+        let area = |yes: bool| -> f64 {
+            let some = sheet.iter().filter(|&&t| turned[t as usize] == Some(yes));
+            some.map(|&t| normal(joined, t).norm()).sum()
+        };
+        let minority = area(true) <= area(false);
+        flips.extend(sheet.iter().copied().filter(|&t| turned[t as usize] == Some(minority)));
+    }
+    for t in flips {
+        let own = joined.layers[t as usize].iter_mut().filter(|l| l.file == file);
+        own.for_each(|l| l.even = !l.even);
+    }
+    Ok(())
+}
+
+/// Numbers the solid regions as bodies, in the order of the triangles that see them.
+fn number(joined: &Joined, region: &[u32], solid_in: &[Vec<u32>]) -> Regions {
+    let volumes = file_volumes(joined);
+    let mut body_of: Vec<Option<u32>> = vec![None; region.len()];
+    let mut files = Vec::new();
+    let sides = (0..joined.triangles.len()).map(|t| {
+        [0, 1].map(|s| {
+            let r = region[2 * t + s] as usize;
+            // Where solids of several surfaces hold a region, the smallest surface is the one that marks it off.
+            let file = solid_in[r]
+                .iter()
+                .copied()
+                .min_by(|&f, &g| volumes[f as usize].total_cmp(&volumes[g as usize]))?;
+            if body_of[r].is_none() {
+                body_of[r] = Some(files.len() as u32);
+                files.push(file);
+            }
+            body_of[r]
+        })
+    });
+    Regions { sides: sides.collect(), files }
+}
+
+/// The volume inside each surface, by the surface integral.
+fn file_volumes(joined: &Joined) -> Vec<f64> {
+    let files = joined.layers.iter().flatten().map(|l| l.file as usize + 1).max().unwrap_or(0);
+    let mut volumes = vec![0.0; files];
+    let o = joined.points[0];
+    for (v, layers) in joined.triangles.iter().zip(&joined.layers) {
+        let [a, b, c] = v.map(|v| &joined.points[v as usize]);
+        let volume = volume6(&o, a, b, c);
+        for l in layers {
+            volumes[l.file as usize] += if l.even { volume } else { -volume };
+        }
+    }
+    volumes.iter().map(|v: &f64| v.abs()).collect()
+}

@@ -1,0 +1,166 @@
+//! Short edges vanish: one end is merged into the other.
+
+use super::rail::Rail;
+use super::sheet::{Kind, NONE, Sheet};
+
+/// A curve turns by no more than this (radians) along a segment: a circle keeps six.
+pub(super) const MOST_TURN: f64 = std::f64::consts::FRAC_PI_3 * 1.001;
+
+/// No edge becomes longer than this by a collapse, in units of the wanted size, if it was not.
+const LONG: f64 = 1.4;
+
+/// No triangle becomes worse than this by a collapse, if none there was. It is the shape of an isosceles triangle with an angle of 13°.
+const POOR: f64 = 0.35;
+
+/// Collapses edges shorter than `short`, in units of the wanted size, the shortest first. Returns how many.
+pub(super) fn collapse_short(sheet: &mut Sheet, short: f64) -> usize {
+    let mut collapsed = 0;
+    loop {
+        let mut edges: Vec<(f64, u32, u32)> = Vec::new();
+        for t in sheet.living() {
+            let v = sheet.at(t).v;
+            for [a, b] in [[v[0], v[1]], [v[1], v[2]], [v[2], v[0]]] {
+                let length = sheet.length(a, b);
+                if length < short {
+                    edges.push((length, a.min(b), a.max(b)));
+                }
+            }
+        }
+        edges.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.2).cmp(&(b.1, b.2))));
+        edges.dedup();
+        let before = collapsed;
+        for (_, a, b) in edges {
+            let both_live = !sheet.around[a as usize].is_empty() && !sheet.around[b as usize].is_empty();
+            if both_live && sheet.length(a, b) < short && collapse_either(sheet, a, b, LONG) {
+                collapsed += 1;
+            }
+        }
+        if collapsed == before {
+            return collapsed;
+        }
+    }
+}
+
+/// Merges one end of an edge into the other: that of the lower dimension stays.
+pub(super) fn collapse_either(sheet: &mut Sheet, a: u32, b: u32, long: f64) -> bool {
+    for (from, to) in [(a, b), (b, a)] {
+        if may_collapse(sheet, from, to, long) {
+            collapse(sheet, from, to);
+            return true;
+        }
+    }
+    false
+}
+
+/// Whether `from` can be merged into `to`.
+fn may_collapse(sheet: &Sheet, from: u32, to: u32, long: f64) -> bool {
+    let Some(first) = sheet.at_edge(from, to).next() else { return false };
+    let triangle = sheet.at(first);
+    let mark = triangle.side(from, to).map_or(NONE, |side| triangle.curve[side]);
+    match sheet.kinds[from as usize] {
+        Kind::Corner(_) => return false,
+        Kind::Curve(curve, _) if mark != curve.0 => return false,
+        Kind::Curve(..) if !may_shorten(sheet, from, to, mark) => return false,
+        _ => {}
+    }
+    keeps_topology(sheet, from, to) && keeps_shape(sheet, from, to, long)
+}
+
+/// Whether a curve stays itself without the vertex `from`, whose neighbour `to` is.
+fn may_shorten(sheet: &Sheet, from: u32, to: u32, curve: u32) -> bool {
+    let rail: &Rail = &sheet.rails[curve as usize];
+    let here = sheet.place_on(from, curve);
+    let next = here + rail.way(here, sheet.place_on(to, curve));
+    let Some(other) = along_curve(sheet, from, curve).into_iter().find(|&w| w != to) else {
+        return false;
+    };
+    let before = here + rail.way(here, sheet.place_on(other, curve));
+    // Both neighbours on one side of it: a loop of two, of which nothing would be left.
+    if (next - here) * (before - here) >= 0.0 {
+        return false;
+    }
+    rail.turn(before, next - before) <= MOST_TURN
+        && (!rail.is_loop() || (next - before).abs() < 0.4 * rail.length())
+}
+
+/// The neighbours of a vertex along a curve, ascending.
+pub(super) fn along_curve(sheet: &Sheet, v: u32, curve: u32) -> Vec<u32> {
+    let mut found = Vec::new();
+    for &t in &sheet.around[v as usize] {
+        let triangle = sheet.at(t);
+        for side in 0..3 {
+            let w = triangle.v[side];
+            if triangle.curve[side] == curve && w != v {
+                let other = triangle.v.into_iter().find(|&x| x != v && x != w);
+                found.extend(other);
+            }
+        }
+    }
+    found.sort_unstable();
+    found.dedup();
+    found
+}
+
+/// Whether the triangles without those at the edge are still a surface: the link condition (Dey, Edelsbrunner, Guha, Nekhayev
+/// 1999), and no two curves become one.
+fn keeps_topology(sheet: &Sheet, from: u32, to: u32) -> bool {
+    let (mut near, mut far) = (Vec::new(), Vec::new());
+    sheet.neighbours(from, &mut near);
+    sheet.neighbours(to, &mut far);
+    let common = near.iter().filter(|v| far.binary_search(v).is_ok()).count();
+    let mut apexes = Vec::new();
+    for t in sheet.at_edge(from, to) {
+        let triangle = sheet.at(t);
+        let (i, j) = (triangle.corner(from), triangle.corner(to));
+        let (Some(i), Some(j)) = (i, j) else { return false };
+        // The side at `from` vanishes into that at `to`: a curve on it would be lost.
+        if triangle.curve[j] != NONE {
+            return false;
+        }
+        apexes.push(triangle.v[3 - i - j]);
+    }
+    apexes.sort_unstable();
+    let different = apexes.len();
+    apexes.dedup();
+    common == different && apexes.len() == different && near.len() > 3
+}
+
+/// Whether the triangles around `from` still fit when it is in the place of `to`.
+fn keeps_shape(sheet: &Sheet, from: u32, to: u32, long: f64) -> bool {
+    let mut worst = 1.0_f64;
+    let mut before = 1.0_f64;
+    for &t in &sheet.around[from as usize] {
+        let triangle = sheet.at(t);
+        before = before.min(sheet.value_at(t));
+        if triangle.v.contains(&to) {
+            continue;
+        }
+        let v = triangle.v.map(|w| if w == from { to } else { w });
+        let p = sheet.corners(v);
+        for w in triangle.v.into_iter().filter(|&w| w != from) {
+            if sheet.length(to, w) > long.max(1.05 * sheet.length(from, w)) {
+                return false;
+            }
+        }
+        worst = worst.min(sheet.value(v, triangle.curve));
+        if worst < POOR.min(before) || !sheet.fits(triangle.patch, &p, sheet.mean_size(v)) {
+            return false;
+        }
+    }
+    worst >= POOR.min(before)
+}
+
+/// Merges `from` into `to`.
+fn collapse(sheet: &mut Sheet, from: u32, to: u32) {
+    let around = std::mem::take(&mut sheet.around[from as usize]);
+    for &t in &around {
+        if sheet.at(t).v.contains(&to) {
+            sheet.remove_triangle(t);
+            continue;
+        }
+        if let Some(k) = sheet.at(t).corner(from) {
+            sheet.triangles[t as usize].v[k] = to;
+            sheet.around[to as usize].push(t);
+        }
+    }
+}

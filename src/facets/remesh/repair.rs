@@ -1,0 +1,135 @@
+//! What the rounds left: bad triangles one by one, and those that would flatten in refinement.
+
+use super::report::{RemeshReport, least_angle};
+use super::sheet::{Kind, NONE, Sheet};
+use super::smooth::{smooth, try_place};
+use super::{collapse, flip, split};
+use crate::Vector;
+
+/// Angles below this (degrees) are worked on.
+const WANTED_ANGLE: f64 = 30.0;
+
+/// Rounds over the bad triangles.
+const ROUNDS: usize = 6;
+
+/// Works on triangles with small angles, then on those with two sides on one smooth curve.
+pub(super) fn repair(sheet: &mut Sheet, report: &mut RemeshReport) {
+    for _ in 0..ROUNDS {
+        let bad: Vec<(u32, [u32; 3])> = sheet
+            .living()
+            .filter(|&t| {
+                least_angle(&sheet.corners(sheet.at(t).v)) < WANTED_ANGLE || sheet.flattens(sheet.at(t).curve)
+            })
+            .map(|t| (t, sheet.at(t).v))
+            .collect();
+        for (t, v) in bad {
+            if sheet.at(t).v == v {
+                mend(sheet, t, report);
+            }
+        }
+        report.flips += flip::flip_all(sheet);
+        report.moves += smooth::smooth_all(sheet);
+    }
+    for _ in 0..ROUNDS {
+        let flat: Vec<u32> = sheet.living().filter(|&t| sheet.flattens(sheet.at(t).curve)).collect();
+        for t in flat {
+            if sheet.at(t).lives() && sheet.flattens(sheet.at(t).curve) {
+                open_ear(sheet, t, report);
+            }
+        }
+    }
+}
+
+use super::smooth;
+
+/// Longest edge that mending a bad triangle may leave, in units of the wanted size.
+const LONG: f64 = 1.7;
+
+/// Tries what makes a bad triangle better: its vertices moved, its shortest side collapsed, its longest side split.
+fn mend(sheet: &mut Sheet, t: u32, report: &mut RemeshReport) {
+    let v = sheet.at(t).v;
+    for w in v {
+        report.moves += usize::from(smooth(sheet, w)) + usize::from(probe(sheet, w));
+    }
+    if least_angle(&sheet.corners(v)) >= WANTED_ANGLE {
+        return;
+    }
+    let length = |k: usize| {
+        let p = sheet.corners(v);
+        (p[(k + 2) % 3] - p[(k + 1) % 3]).norm()
+    };
+    let mut sides = [0, 1, 2];
+    sides.sort_by(|&i, &j| length(i).total_cmp(&length(j)));
+    let ends = |k: usize| (v[(k + 1) % 3], v[(k + 2) % 3]);
+    let (a, b) = ends(sides[0]);
+    if sheet.length(a, b) < 1.0 && collapse::collapse_either(sheet, a, b, LONG) {
+        report.collapses += 1;
+        return;
+    }
+    let (a, b) = ends(sides[2]);
+    if sheet.length(a, b) > 1.0 && sheet.at(t).curve[sides[2]] == NONE {
+        report.splits += usize::from(split_if_better(sheet, a, b));
+    }
+}
+
+/// Moves a vertex on a patch a little in each direction if that is better.
+fn probe(sheet: &mut Sheet, v: u32) -> bool {
+    let Kind::Patch(patch) = sheet.kinds[v as usize] else { return false };
+    if sheet.around[v as usize].is_empty() {
+        return false;
+    }
+    let here = sheet.points[v as usize];
+    let normal = sheet.model.projector.normal(patch, &here);
+    let across = Vector::ith(normal.iamin(), 1.0).cross(&normal).normalize();
+    let up = normal.cross(&across);
+    let step = 0.1 * sheet.sizes[v as usize];
+    [across, up, -across, -up].iter().any(|d| try_place(sheet, v, patch, here + d * step))
+}
+
+/// Splits an edge inside a patch if the worst triangle there gets better.
+fn split_if_better(sheet: &mut Sheet, a: u32, b: u32) -> bool {
+    let Some(pair) = sheet.pair(a, b) else { return false };
+    let before = pair.iter().map(|&t| sheet.value_at(t)).fold(1.0, f64::min);
+    let (point, kind) = split::middle(sheet, a, b);
+    let mut after = 1.0_f64;
+    for t in pair {
+        let triangle = *sheet.at(t);
+        for end in [a, b] {
+            let Some(k) = triangle.corner(end) else { return false };
+            let mut p = sheet.corners(triangle.v);
+            p[k] = point;
+            after = after.min(super::sheet::shape(&p));
+            if !sheet.fits(triangle.patch, &p, sheet.mean_size(triangle.v)) {
+                return false;
+            }
+        }
+    }
+    if after <= before {
+        return false;
+    }
+    let v = split::split(sheet, a, b, point, kind);
+    smooth(sheet, v);
+    true
+}
+
+/// Flips or splits the third side of a triangle with two sides on one smooth curve.
+fn open_ear(sheet: &mut Sheet, t: u32, report: &mut RemeshReport) {
+    let triangle = *sheet.at(t);
+    let Some(k) = (0..3).find(|&k| {
+        let [i, j] = [(k + 1) % 3, (k + 2) % 3].map(|i| triangle.curve[i]);
+        i != NONE && i == j
+    }) else {
+        return;
+    };
+    let (a, b) = (triangle.v[(k + 1) % 3], triangle.v[(k + 2) % 3]);
+    if flip::flip(sheet, a, b).is_some() {
+        report.flips += 1;
+        return;
+    }
+    if triangle.curve[k] == NONE && sheet.pair(a, b).is_some() {
+        let (point, kind) = split::middle(sheet, a, b);
+        let v = split::split(sheet, a, b, point, kind);
+        smooth(sheet, v);
+        report.splits += 1;
+    }
+}
