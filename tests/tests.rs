@@ -3,6 +3,7 @@
 mod cli;
 mod common;
 mod geometries;
+mod inputs;
 mod mpirun;
 mod mpirun_comm;
 mod ranks;

@@ -1,0 +1,132 @@
+//! Surfaces and meshes of others as input.
+
+use crate::common::{judge, own, read_json, report_of, shared, succeed, tetmill};
+use std::fmt::Write;
+use std::path::Path;
+
+/// A box as an STL of 12 triangles.
+fn stl_box(name: &str, [low, high]: [[f64; 3]; 2]) -> String {
+    let corner = |i: usize| [0, 1, 2].map(|axis| if i >> axis & 1 == 1 { high[axis] } else { low[axis] });
+    let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    let mut text = format!("solid {name}\n");
+    for [a, b, c, d] in quads {
+        for triangle in [[a, b, c], [a, c, d]] {
+            text += "facet normal 0 0 0\nouter loop\n";
+            for v in triangle {
+                let [x, y, z] = corner(v);
+                writeln!(text, "vertex {x} {y} {z}").unwrap();
+            }
+            text += "endloop\nendfacet\n";
+        }
+    }
+    text + &format!("endsolid {name}\n")
+}
+
+fn write_box(dir: &Path, name: &str, corners: [[f64; 3]; 2]) -> std::path::PathBuf {
+    let file = dir.join(name).with_extension("stl");
+    std::fs::write(&file, stl_box(name, corners)).unwrap();
+    file
+}
+
+#[test]
+fn a_surface_is_meshed_refined_and_partitioned() {
+    let dir = tempfile::tempdir().unwrap();
+    let file = write_box(dir.path(), "brick", [[0., 0., 0.], [3., 1., 2.]]);
+    let out = dir.path().join("out");
+    let report = dir.path().join("report.json");
+    let mut command = tetmill();
+    command
+        .arg("generate")
+        .arg(&file)
+        .arg("-o")
+        .arg(&out)
+        .args(["-n", "3", "--levels", "1", "--maxh", "0.5"]);
+    succeed(command.arg("-q").arg("--report").arg(&report));
+    judge(&out, 3);
+    let report = read_json(&report);
+    assert_eq!(
+        report["entities"],
+        serde_json::json!({"bodies": 1, "corners": 8, "curves": 12, "patches": 6})
+    );
+    assert!((report["mesh"]["volume"].as_f64().unwrap() - 6.0).abs() < 1e-12);
+}
+
+#[test]
+fn two_files_that_share_a_face_become_two_bodies_with_an_interface() {
+    let dir = tempfile::tempdir().unwrap();
+    let left = write_box(dir.path(), "left", [[0., 0., 0.], [1., 1., 1.]]);
+    let right = write_box(dir.path(), "right", [[1., 0., 0.], [2., 1., 1.]]);
+    let out = dir.path().join("out");
+    let mut command = tetmill();
+    succeed(command.arg("generate").args([&left, &right]).arg("-o").arg(&out).args(["-n", "2", "-q"]));
+    judge(&out, 2);
+    let names = std::fs::read_to_string(out.join("mesh.names")).unwrap();
+    assert!(names.contains("left") && names.contains("right"), "{names}");
+    // Five faces of each, and the one between them.
+    let looked = succeed(tetmill().arg("inspect").args([&left, &right]).arg("--json"));
+    let seen: serde_json::Value = serde_json::from_slice(&looked.stdout).unwrap();
+    assert_eq!(seen["patches"].as_array().unwrap().len(), 11);
+    assert!(seen["patches"].as_array().unwrap().iter().any(|p| p["bodies"] == serde_json::json!([1, 2])));
+}
+
+#[test]
+fn kept_triangles_are_the_boundary_of_the_mesh() {
+    let dir = tempfile::tempdir().unwrap();
+    let file = write_box(dir.path(), "brick", [[0., 0., 0.], [1., 1., 1.]]);
+    let kept = report_of(&file, &["--keep-surface", "--maxh", "0.1"]);
+    assert_eq!(kept["mesh"]["boundary"], 12);
+    let remeshed = report_of(&file, &["--maxh", "0.1"]);
+    assert!(remeshed["mesh"]["boundary"].as_u64().unwrap() > 600);
+}
+
+#[test]
+fn a_written_mesh_is_taken_as_it_is_partitioned_and_refined() {
+    let dir = tempfile::tempdir().unwrap();
+    let reference = report_of(&own("layers"), &[]);
+    for ending in ["msh", "vol", "mesh", "vtu"] {
+        let file = dir.path().join(format!("layers.{ending}"));
+        succeed(tetmill().arg("mesh").arg(own("layers")).arg("-q").arg("-o").arg(&file));
+        let out = dir.path().join(ending);
+        let report = dir.path().join("report.json");
+        let mut command = tetmill();
+        command.arg("generate").arg(&file).arg("-o").arg(&out).args(["-n", "4", "--levels", "1", "-q"]);
+        succeed(command.arg("--report").arg(&report));
+        judge(&out, 4);
+        let report = read_json(&report);
+        assert_eq!(report["mesh"]["tets"], 8 * reference["mesh"]["tets"].as_u64().unwrap(), "{ending}");
+        assert_eq!(report["entities"]["bodies"], reference["entities"]["bodies"], "{ending}");
+        let volume = |report: &serde_json::Value| report["mesh"]["volume"].as_f64().unwrap();
+        assert!((volume(&report) / volume(&reference) - 1.0).abs() < 1e-12, "{ending}");
+    }
+}
+
+#[test]
+fn sizes_for_a_mesh_and_mixed_inputs_are_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    let mesh = dir.path().join("layers.mesh");
+    succeed(tetmill().arg("mesh").arg(own("layers")).arg("-q").arg("-o").arg(&mesh));
+    let brick = write_box(dir.path(), "brick", [[0., 0., 0.], [1., 1., 1.]]);
+    let refused = |arguments: &[&std::ffi::OsStr], reason: &str| {
+        let output = tetmill().arg("generate").args(arguments).output().unwrap();
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{said}");
+        assert!(said.contains(reason), "no `{reason}` in {said}");
+    };
+    refused(&[mesh.as_os_str(), "--maxh".as_ref(), "0.1".as_ref()], "--maxh");
+    refused(&[mesh.as_os_str(), brick.as_os_str()], "surfaces");
+    refused(&["part.step".as_ref()], ".stl");
+    let open = dir.path().join("open.stl");
+    let text = std::fs::read_to_string(&brick).unwrap();
+    let facets: Vec<&str> = text.split_inclusive("endfacet\n").collect();
+    std::fs::write(&open, facets[1..].concat().replacen("facet", "solid open\nfacet", 1)).unwrap();
+    refused(&[open.as_os_str()], "not closed");
+}
+
+#[test]
+fn the_stl_files_of_others_are_meshed() {
+    for name in ["part1.stl", "hinge.stl"] {
+        let Some(file) = shared(&format!("netgen-tutorials/{name}")) else { return };
+        let report = report_of(&file, &["--levels", "1"]);
+        assert!(report["mesh"]["smallest_dihedral"].as_f64().unwrap() > 10.0, "{name}: {report}");
+    }
+}
