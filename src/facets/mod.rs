@@ -14,6 +14,7 @@
 //!
 //! What is *not* repaired: gaps, holes, facets that intersect. Those are refused with their place, here or by the volume mesher.
 
+mod cross;
 mod edges;
 mod error;
 mod features;
@@ -23,10 +24,13 @@ mod model;
 mod nearest;
 mod normals;
 mod projector;
+#[cfg(test)]
+mod projector_tests;
 mod regions;
 mod remesh;
 #[cfg(test)]
 mod samples;
+mod sharp;
 mod size;
 mod smoothness;
 #[cfg(test)]

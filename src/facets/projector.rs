@@ -32,7 +32,7 @@ pub(super) struct Source {
     pub patches: u32,
     /// By curve: its vertices; a closed one ends where it begins.
     pub curves: Vec<Vec<u32>>,
-    /// Corners on no curve.
+    /// Corners on no curve, ascending.
     pub tips: Vec<u32>,
 }
 
@@ -283,7 +283,7 @@ impl PatchFacets {
             }
         }
         let flat = plane_normal(&facets, tolerance);
-        let normals = normals::of_corners(&source.points, &triangles, normals, sliver);
+        let normals = normals::of_corners(&source.points, &triangles, normals, sliver, &source.tips);
         Self { tree: Tree::new(&boxes), facets, normals, rim, flat }
     }
 

@@ -33,8 +33,8 @@ impl FacetSize {
         Self(SourceTree::new(model.bounds, settings.grading, maximum, &sources))
     }
 
-    /// The size at which patches and curves turn by `turn` (radians) along an edge.
-    pub(super) fn of_turn(model: &FacetModel, turn: f64) -> Self {
+    /// The size at which patches and curves turn by `turn` (radians) along an edge; and smaller at `sources`.
+    pub(super) fn of_turn(model: &FacetModel, turn: f64, sources: &[Source]) -> Self {
         let settings = SizeSettings {
             maxh: None,
             minh: 0.0,
@@ -42,7 +42,7 @@ impl FacetSize {
             segments_per_curve: f64::MIN_POSITIVE,
             grading: TURN_GRADING,
             scale: 1.0,
-            sources: Vec::new(),
+            sources: sources.to_vec(),
         };
         Self::new(model, &settings)
     }

@@ -2,8 +2,8 @@
 
 use super::report::{RemeshReport, least_angle};
 use super::sheet::{Kind, NONE, Sheet};
-use super::smooth::{smooth, try_place};
-use super::{collapse, flip, split};
+use super::smooth::try_place;
+use super::{collapse, flip, smooth, split};
 use crate::Vector;
 
 /// Angles below this (degrees) are worked on.
@@ -38,8 +38,6 @@ pub(super) fn repair(sheet: &mut Sheet, report: &mut RemeshReport) {
     }
 }
 
-use super::smooth;
-
 /// Longest edge that mending a bad triangle may leave, in units of the wanted size.
 const LONG: f64 = 1.7;
 
@@ -47,7 +45,7 @@ const LONG: f64 = 1.7;
 fn mend(sheet: &mut Sheet, t: u32, report: &mut RemeshReport) {
     let v = sheet.at(t).v;
     for w in v {
-        report.moves += usize::from(smooth(sheet, w)) + usize::from(probe(sheet, w));
+        report.moves += usize::from(smooth::smooth(sheet, w)) + usize::from(probe(sheet, w));
     }
     if least_angle(&sheet.corners(v)) >= WANTED_ANGLE {
         return;
@@ -106,7 +104,7 @@ fn split_if_better(sheet: &mut Sheet, a: u32, b: u32) -> bool {
         return false;
     }
     let v = split::split(sheet, a, b, point, kind);
-    smooth(sheet, v);
+    smooth::smooth(sheet, v);
     true
 }
 
@@ -127,7 +125,7 @@ fn open_ear(sheet: &mut Sheet, t: u32, report: &mut RemeshReport) {
     if triangle.curve[k] == NONE && sheet.pair(a, b).is_some() {
         let (point, kind) = split::middle(sheet, a, b);
         let v = split::split(sheet, a, b, point, kind);
-        smooth(sheet, v);
+        smooth::smooth(sheet, v);
         report.splits += 1;
     }
 }

@@ -1,7 +1,7 @@
 //! Vertices move on their patches and along their curves.
 
 use super::collapse::{MOST_TURN, along_curve};
-use super::sheet::{Kind, NONE, Sheet, shape};
+use super::sheet::{Kind, Sheet, shape};
 use crate::{Point, Vector};
 use csg::PatchId;
 
@@ -120,9 +120,4 @@ fn ideal_place(sheet: &Sheet, v: u32, patch: PatchId) -> Point {
         sum += nalgebra::center(&p, &q) - here + inward * height;
     }
     here + sum / around.len() as f64
-}
-
-/// Whether a triangle has a side on a curve.
-pub(super) fn has_segment(curve: [u32; 3]) -> bool {
-    curve.iter().any(|&c| c != NONE)
 }
