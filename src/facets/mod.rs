@@ -29,6 +29,8 @@ mod projector_tests;
 mod regions;
 mod remesh;
 #[cfg(test)]
+mod remesh_tests;
+#[cfg(test)]
 mod samples;
 mod sharp;
 mod size;
@@ -41,6 +43,6 @@ pub use error::FacetError;
 pub use keep::keep;
 pub use model::{FacetBody, FacetCurve, FacetModel, FacetPatch, Facets, Settings};
 pub use projector::FacetProjector;
-pub use remesh::{RemeshReport, RemeshSettings, remesh};
+pub use remesh::{RemeshReport, RemeshSettings, deviation, remesh};
 pub use size::FacetSize;
 pub use smoothness::FacetSmoothness;

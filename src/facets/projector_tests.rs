@@ -41,7 +41,9 @@ fn a_projected_point_stays_where_it_is_projected_again() {
         let projector = &solid.projector;
         for p in random_points(200, 3.0) {
             for patch in (0..projector.patches()).map(PatchId::new) {
-                let once = projector.project_patch(patch, &p);
+                // Near the patch, but also beside it.
+                let near = p + (projector.project_patch(patch, &p) - p) * 0.9;
+                let once = projector.project_patch(patch, &near);
                 let step = projector.patch_distance(patch, &once);
                 assert!(step <= projector.tolerance(), "{patch:?} {p} {step}");
             }
@@ -101,24 +103,4 @@ fn needles_and_points_are_triangles_too() {
     assert_eq!(at(&line, in_triangle(&p, &line)), Point::new(0.5, 0.0, 0.0));
     let point = [Point::new(1.0, 1.0, 1.0); 3];
     assert_eq!(at(&point, in_triangle(&p, &point)), point[0]);
-}
-
-#[test]
-fn speed() {
-    let torus = model(|s| s.torus(2.0, 0.7, 100, 50));
-    let mut random = Random::new(1);
-    let tau = std::f64::consts::TAU;
-    let q: Vec<Point> = (0..400_000)
-        .map(|_| {
-            let (u, v) = (random.unit() * tau, random.unit() * tau);
-            let e = 0.7 + 0.02 * (random.unit() - 0.5);
-            let r = 2.0 + e * v.cos();
-            Point::new(r * u.cos(), r * u.sin(), e * v.sin())
-        })
-        .collect();
-    for _ in 0..3 {
-        let began = std::time::Instant::now();
-        let s: f64 = q.iter().map(|p| torus.projector.project_patch(PatchId(0), p).x).sum();
-        println!("{} ns {s}", began.elapsed().as_nanos() as f64 / q.len() as f64);
-    }
 }

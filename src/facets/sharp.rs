@@ -108,8 +108,11 @@ fn leave(input: &Input, t: usize, entry: usize, from: &Point, direction: &Vector
             let share = left / (left - right);
             let through = p + (q - p) * share;
             let ahead = direction.dot(&(through - from));
-            ((0.0..=1.0).contains(&share) && ahead >= 0.0)
-                .then_some((ahead, input.edges.of_side[t][side] as usize, through))
+            ((0.0..=1.0).contains(&share) && ahead >= 0.0).then_some((
+                ahead,
+                input.edges.of_side[t][side] as usize,
+                through,
+            ))
         })
         .max_by(|a, b| a.0.total_cmp(&b.0))
         .map(|(_, edge, through)| (edge, through))

@@ -30,7 +30,7 @@ impl FacetSize {
         let mut sources = settings.sources.clone();
         sample_facets(model, settings, maximum, &mut sources);
         sample_curves(model, settings, maximum, &mut sources);
-        Self(SourceTree::new(model.bounds, settings.grading, maximum, &sources))
+        Self(SourceTree::new(model.bounds, settings.grading, maximum, &thinned(sources)))
     }
 
     /// The size at which patches and curves turn by `turn` (radians) along an edge; and smaller at `sources`.
@@ -55,6 +55,21 @@ impl SizeField for FacetSize {
     fn size_at(&self, point: &Point) -> f64 {
         self.0.size_at(point)
     }
+}
+
+/// Of sources in one cell of a grid that is as wide as they are large, or half so, the smallest: facets may be far smaller than
+/// the sizes that they ask for.
+fn thinned(sources: Vec<Source>) -> Vec<Source> {
+    let keyed = |s: Source| {
+        let level = s.size.log2().floor();
+        let width = level.exp2();
+        let cell = [s.point.x, s.point.y, s.point.z].map(|x| (x / width).floor() as i64);
+        (level as i32, cell, s)
+    };
+    let mut keyed: Vec<_> = sources.into_iter().map(keyed).collect();
+    keyed.sort_by(|a, b| (a.0, a.1).cmp(&(b.0, b.1)).then(a.2.size.total_cmp(&b.2.size)));
+    keyed.dedup_by_key(|(level, cell, _)| (*level, *cell));
+    keyed.into_iter().map(|(_, _, source)| source).collect()
 }
 
 fn size_of_curvature(settings: &SizeSettings, curvature: f64) -> f64 {

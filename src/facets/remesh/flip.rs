@@ -45,16 +45,10 @@ pub(super) fn flip(sheet: &mut Sheet, a: u32, b: u32) -> Option<[u32; 2]> {
     }
     let mark = |t: &Triangle, x: u32, y: u32| t.side(x, y).map_or(NONE, |side| t.curve[side]);
     // Opposite each vertex: p, a, q and q, b, p.
-    let left = Triangle {
-        v: [p, a, q],
-        patch: first.patch,
-        curve: [mark(&second, a, q), NONE, mark(&first, p, a)],
-    };
-    let right = Triangle {
-        v: [q, b, p],
-        patch: first.patch,
-        curve: [mark(&first, b, p), NONE, mark(&second, q, b)],
-    };
+    let left =
+        Triangle { v: [p, a, q], patch: first.patch, curve: [mark(&second, a, q), NONE, mark(&first, p, a)] };
+    let right =
+        Triangle { v: [q, b, p], patch: first.patch, curve: [mark(&first, b, p), NONE, mark(&second, q, b)] };
     let before = sheet.value_at(s).min(sheet.value_at(t));
     let after = sheet.value(left.v, left.curve).min(sheet.value(right.v, right.curve));
     if after <= before + GAIN {

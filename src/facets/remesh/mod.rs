@@ -7,6 +7,7 @@
 //! [`surface`](crate::surface) has for analytic ones), needs a parametrisation without folds, which noisy facets do not offer.
 
 mod collapse;
+mod deviation;
 mod finish;
 mod flip;
 mod rail;
@@ -16,6 +17,7 @@ mod sheet;
 mod smooth;
 mod split;
 
+pub use deviation::deviation;
 pub use report::RemeshReport;
 
 use super::{FacetModel, FacetSize, cross};

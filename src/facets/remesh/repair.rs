@@ -17,7 +17,9 @@ pub(super) fn repair(sheet: &mut Sheet, report: &mut RemeshReport) {
     for _ in 0..ROUNDS {
         let bad: Vec<(u32, [u32; 3])> = sheet
             .living()
-            .filter(|&t| least_angle(&sheet.corners(sheet.at(t).v)) < WANTED_ANGLE || sheet.flattens(sheet.at(t).curve))
+            .filter(|&t| {
+                least_angle(&sheet.corners(sheet.at(t).v)) < WANTED_ANGLE || sheet.flattens(sheet.at(t).curve)
+            })
             .map(|t| (t, sheet.at(t).v))
             .collect();
         for (t, v) in bad {
@@ -26,7 +28,6 @@ pub(super) fn repair(sheet: &mut Sheet, report: &mut RemeshReport) {
             }
         }
         report.flips += flip::flip_all(sheet);
-        report.moves += smooth::smooth_all(sheet);
     }
     for _ in 0..ROUNDS {
         let flat: Vec<u32> = sheet.living().filter(|&t| sheet.flattens(sheet.at(t).curve)).collect();

@@ -1,10 +1,10 @@
 //! The triangles that are being changed, with any number of them at an edge.
 
 use super::rail::Rail;
+use crate::Point;
 use crate::facets::FacetModel;
 use crate::kernel::simplex::area_vector;
 use crate::size::SizeField;
-use crate::Point;
 use csg::{CornerId, CurveId, PatchId};
 
 /// No curve, no triangle, no vertex.
@@ -100,8 +100,7 @@ impl<'a> Sheet<'a> {
         for (i, &v) in model.corners.iter().enumerate() {
             kinds[v as usize] = Kind::Corner(CornerId::new(i));
         }
-        let straight =
-            (0..rails.len()).map(|c| model.projector.is_straight_curve(CurveId::new(c))).collect();
+        let straight = (0..rails.len()).map(|c| model.projector.is_straight_curve(CurveId::new(c))).collect();
         let sizes = mesh.points.iter().map(|p| size.size_at(p)).collect();
         Self { model, size, points: mesh.points, kinds, sizes, around, triangles, rails, straight }
     }
