@@ -4,7 +4,7 @@ use super::edges::Edges;
 use super::features::{self, Found};
 use super::join::{self, Joined};
 use super::projector::{FacetProjector, Source};
-use super::{FacetError, normals, regions, tree};
+use super::{FacetError, cross, normals, regions, tree};
 use crate::Point;
 use crate::mesh::{BoundaryTriangle, VertexId};
 use csg::{Aabb, BodyId, CornerId, PatchId};
@@ -142,6 +142,12 @@ impl FacetModel {
             settings,
         );
         Ok(assemble(joined, &regions, found, bounds, rounding))
+    }
+
+    /// Where facets meet that must not, by exact signs. Remeshing may heal such places, where they come from rounding; kept facets
+    /// with any bound nothing.
+    pub fn crossings(&self) -> Vec<Point> {
+        cross::crossings(&self.points, &self.triangles)
     }
 
     /// The patch with this id.

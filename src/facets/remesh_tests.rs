@@ -144,42 +144,92 @@ fn inverted(model: &FacetModel, mesh: &Mesh) -> usize {
     mesh.tets.iter().filter(is_inverted).count()
 }
 
-/// Remeshes, checks and fills; the least angle of the surface, the smallest dihedral angle.
-fn run(name: &str, model: &FacetModel, scale: f64) -> (RemeshReport, improve::Report) {
+/// What came of remeshing and filling.
+struct Outcome {
+    surface: RemeshReport,
+    tets: improve::Report,
+    /// Distance of mesh and facets, the larger way, in units of the longest edge.
+    deviation: f64,
+}
+
+/// Remeshes and fills; checks what must hold for any solid.
+fn run(model: &FacetModel, scale: f64) -> Outcome {
     let size = sizes(model, scale);
-    let (surface, report) = remesh(model, &size, &RemeshSettings::default());
-    let deviation = deviation(model, &surface);
-    let (mesh, improved) = filled(model, &surface, &size);
-    println!("{name} {scale}: {report:?} deviation {deviation:?}");
+    let (mesh, surface) = remesh(model, &size, &RemeshSettings::default());
+    assert_eq!((surface.flattening_left, surface.misfits), (0, 0));
+    assert!(surface.crossings.is_empty());
+    let edges = mesh.triangles.iter().flat_map(|t| {
+        let p = t.vertices.map(|v| mesh.points[v.index()]);
+        [(p[1] - p[0]).norm(), (p[2] - p[1]).norm(), (p[0] - p[2]).norm()]
+    });
+    let [out, back] = deviation(model, &mesh);
+    let deviation = out.max(back) / edges.fold(0.0, f64::max);
+    let (mesh, tets) = filled(model, &mesh, &size);
     println!(
-        "{} tets, dihedral {} {} {}; inverted {}",
+        "scale {scale}: {} triangles, {} {} {}, deviation {deviation}, {} tets, {} {} folding {}",
+        surface.triangles,
+        surface.min_angle,
+        surface.below_20,
+        surface.mean_quality,
         mesh.tets.len(),
-        improved.after.smallest_dihedral,
-        improved.after.first_percentile,
-        improved.folding_left,
-        inverted(model, &mesh)
+        tets.after.smallest_dihedral,
+        tets.after.first_percentile,
+        tets.folding_left
     );
-    (report, improved)
+    assert_eq!(inverted(model, &mesh), 0, "tets turn over when they are refined");
+    if let Ok(folder) = std::env::var("LOOK") {
+        let part = crate::io::plain::PlainPart::whole(&mesh);
+        let scene = crate::picture::scene_of_part(
+            &part,
+            &crate::picture::Look { color_by: crate::picture::ColorBy::Patch, cut: None },
+        );
+        let image = crate::picture::render(&scene, &crate::picture::Settings::default());
+        crate::picture::write_png(&image, format!("{folder}/{}_{scale}.png", surface.triangles).as_ref())
+            .unwrap();
+    }
+    Outcome { surface, tets, deviation }
+}
+
+/// The outcome is good: no surface angle below `angle`, no dihedral angle below `dihedral` (degrees).
+fn assert_good(outcome: &Outcome, angle: f64, dihedral: f64) {
+    let Outcome { surface, tets, deviation } = outcome;
+    assert!(surface.min_angle > angle, "{surface:?}");
+    assert!(surface.mean_quality > 0.75, "{surface:?}");
+    assert!(tets.after.smallest_dihedral > dihedral, "{:?}", tets.after);
+    assert!(*deviation < 0.25, "{deviation}");
 }
 
 #[test]
 fn simple_solids_are_remeshed_well() {
     let solids = [
-        ("box", soup(|s| s.brick([0.0; 3], [1.0, 2.0, 3.0], false))),
-        ("cylinder", soup(|s| s.cylinder(1.0, 3.0, 40))),
-        ("fine cylinder", soup(|s| s.cylinder(1.0, 3.0, 400))),
-        ("coarse cylinder", soup(|s| s.cylinder(1.0, 3.0, 12))),
-        ("sphere", soup(|s| s.sphere(Point::origin(), 1.0, 40, 20, false))),
-        ("torus", soup(|s| s.torus(3.0, 1.0, 40, 20))),
-        ("plate", soup(|s| s.plate_with_hole(2.0, 1.0, 0.5, 24))),
-        ("thin plate", soup(|s| s.plate_with_hole(2.0, 1.0, 0.02, 24))),
-        ("cone", soup(|s| s.cone(1.0, 2.0, 40))),
+        soup(|s| s.brick([0.0; 3], [1.0, 2.0, 3.0], false)),
+        soup(|s| s.cylinder(1.0, 3.0, 12)),
+        soup(|s| s.cylinder(1.0, 3.0, 40)),
+        soup(|s| s.cylinder(1.0, 3.0, 400)),
+        soup(|s| s.sphere(Point::origin(), 1.0, 40, 20, false)),
+        soup(|s| s.torus(3.0, 1.0, 40, 20)),
+        soup(|s| s.plate_with_hole(2.0, 1.0, 0.5, 24)),
+        soup(|s| s.plate_with_hole(2.0, 1.0, 0.02, 24)),
+        soup(|s| s.cone(1.0, 2.0, 40)),
     ];
-    for (name, solid) in solids {
+    for solid in solids {
         let found = model(&[solid]);
         for scale in [2.0, 1.0, 0.5] {
-            let (report, improved) = run(name, &found, scale);
+            assert_good(&run(&found, scale), 20.0, 11.0);
         }
+    }
+}
+
+#[test]
+fn size_place_and_single_precision_do_not_matter() {
+    let plate = Soup { facets: soup(|s| s.plate_with_hole(2.0, 1.0, 0.5, 24)), group: 0 };
+    for scale in [1e-3, 1e6] {
+        let turn = nalgebra::Rotation3::from_euler_angles(0.4, -1.1, 2.0);
+        let moved = plate.clone().map(|p| {
+            let q = turn * p * scale + crate::Vector::new(3.0, -2.0, 1.0) * scale;
+            q.map(|x| f64::from(x as f32))
+        });
+        assert_good(&run(&model(&[moved.facets]), 1.0), 20.0, 15.0);
     }
 }
 
@@ -190,14 +240,16 @@ fn nested_and_neighbouring_bodies_are_remeshed_together() {
         s.sphere(Point::new(2.0, 2.0, 2.0), 1.5, 24, 12, true);
         s.sphere(Point::new(2.0, 2.0, 2.0), 1.0, 24, 12, false);
     })]);
-    run("nested", &nested, 1.0);
-    let side = |low: [f64; 3], high: [f64; 3]| soup(|s| s.brick(low, high, false));
+    assert_eq!(nested.bodies.len(), 2);
+    assert_good(&run(&nested, 1.0), 20.0, 15.0);
+    let brick = |low: [f64; 3], high: [f64; 3]| soup(|s| s.brick(low, high, false));
     let beside = model(&[
-        side([0.0; 3], [1.0; 3]),
-        side([1.0, 0.0, 0.0], [2.0, 1.0, 1.0]),
-        side([0.0, 1.0, 0.0], [1.0, 2.0, 1.0]),
+        brick([0.0; 3], [1.0; 3]),
+        brick([1.0, 0.0, 0.0], [2.0, 1.0, 1.0]),
+        brick([0.0, 1.0, 0.0], [1.0, 2.0, 1.0]),
     ]);
-    run("beside", &beside, 0.5);
+    assert_eq!(beside.bodies.len(), 3);
+    assert_good(&run(&beside, 0.5), 20.0, 15.0);
 }
 
 #[test]
@@ -206,15 +258,59 @@ fn the_tutorial_parts_are_remeshed_well() {
         let Some(file) = shared(name) else { continue };
         let found = model(&[read_stl(&std::fs::read_to_string(file).unwrap())]);
         for scale in [2.0, 1.0, 0.5] {
-            let (report, improved) = run(name, &found, scale);
+            assert_good(&run(&found, scale), 20.0, 15.0);
         }
     }
-    for name in ["surfaces/shaft_100k.ply", "surfaces/shaft_1M.ply", "surfaces/torus_100k.ply"] {
+}
+
+#[test]
+fn fine_surfaces_become_coarse_ones() {
+    for name in [
+        "surfaces/shaft_100k.ply",
+        "surfaces/shaft_1M.ply",
+        "surfaces/cube_100k.ply",
+        "surfaces/torus_100k.ply",
+    ] {
         let Some(file) = shared(name) else { continue };
-        let began = std::time::Instant::now();
         let found = model(&[read_ply(&std::fs::read(file).unwrap())]);
-        println!("{} facets {:?}", found.triangles.len(), began.elapsed());
-        let (report, improved) = run(name, &found, 1.0);
-        println!("{:?}", began.elapsed());
+        let outcome = run(&found, 1.0);
+        assert!(outcome.surface.triangles < found.triangles.len() / 7);
+        assert_good(&outcome, 15.0, 15.0);
     }
+}
+
+#[test]
+fn kept_facets_are_filled_as_they_are() {
+    let found = model(&[soup(|s| s.torus(3.0, 1.0, 40, 20))]);
+    let surface = keep(&found);
+    let (mesh, _) = filled(&found, &surface, &sizes(&found, 1.0));
+    assert_eq!(mesh.triangles, surface.triangles);
+    assert_eq!(mesh.points[..surface.points.len()], surface.points[..]);
+}
+
+#[test]
+fn facets_that_intersect_are_found_and_refused_by_the_mesher() {
+    let crossed = model(&[soup(|s| {
+        s.brick([0.0; 3], [2.0; 3], false);
+        s.brick([1.0, 0.5, 0.5], [3.0, 1.5, 1.5], false);
+    })]);
+    assert!(!crossed.crossings().is_empty());
+    let size = sizes(&crossed, 1.0);
+    let (surface, report) = remesh(&crossed, &size, &RemeshSettings::default());
+    assert!(!report.crossings.is_empty());
+    let refused = volume::mesh(&closed(&crossed, &surface), &size, &volume::Settings::default());
+    assert!(matches!(refused, Err(volume::VolumeError::SelfIntersection { .. })), "{refused:?}");
+}
+
+#[test]
+fn the_same_facets_give_the_same_mesh() {
+    let found = model(&[soup(|s| s.plate_with_hole(2.0, 1.0, 0.5, 24))]);
+    let size = sizes(&found, 0.5);
+    let mesh = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| remesh(&found, &size, &RemeshSettings::default()).0)
+    };
+    let (one, two) = (mesh(1), mesh(2));
+    assert_eq!(one.points, two.points);
+    assert_eq!(one.triangles, two.triangles);
 }

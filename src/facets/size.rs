@@ -3,8 +3,8 @@
 //! Curvature is that of normals over facets: along a side, the change of the patch's normal by length (compare Rusinkiewicz
 //! 2004, who fits a tensor to these). Slivers have no say: their neighbours cover them.
 
-use super::FacetModel;
 use super::normals::SLIVER_HEIGHT;
+use super::{FacetModel, close_curves};
 use crate::kernel::simplex::area_vector;
 use crate::size::{SizeField, SizeSettings, Source, SourceTree};
 use crate::{Point, Vector};
@@ -23,13 +23,14 @@ const MOST_SOURCES: f64 = 1000.0;
 const SHORT_SIDE: f64 = 200.0;
 
 impl FacetSize {
-    /// Samples facets and curves for the sources of the field.
+    /// Samples facets and curves for the sources of the field: curvature, short curves, and curves near each other.
     pub fn new(model: &FacetModel, settings: &SizeSettings) -> Self {
         let bound = settings.maxh.unwrap_or(f64::INFINITY) * settings.scale.min(1.0);
         let maximum = bound.min(model.bounds.diagonal() * settings.scale);
         let mut sources = settings.sources.clone();
         sample_facets(model, settings, maximum, &mut sources);
         sample_curves(model, settings, maximum, &mut sources);
+        close_curves::sample(model, settings, maximum, &mut sources);
         Self(SourceTree::new(model.bounds, settings.grading, maximum, &thinned(sources)))
     }
 

@@ -41,27 +41,32 @@ pub(super) fn repair(sheet: &mut Sheet, report: &mut RemeshReport) {
 
 /// Longest edge that mending a bad triangle may leave, in units of the wanted size.
 const LONG: f64 = 1.7;
+/// Sides of bad triangles are collapsed up to this length, in units of the wanted size.
+const COLLAPSIBLE: f64 = 1.1;
 
-/// Tries what makes a bad triangle better: its vertices moved, its shortest side collapsed, its longest side split.
+/// Tries what makes a bad triangle better: its vertices and their neighbours moved, its sides collapsed, the shortest first, its
+/// longest side split.
 fn mend(sheet: &mut Sheet, t: u32, report: &mut RemeshReport) {
     let v = sheet.at(t).v;
+    let mut near = Vec::new();
     for w in v {
+        sheet.neighbours(w, &mut near);
+        near.iter().for_each(|&n| report.moves += usize::from(smooth::smooth(sheet, n)));
         report.moves += usize::from(smooth::smooth(sheet, w)) + usize::from(probe(sheet, w));
     }
     if least_angle(&sheet.corners(v)) >= WANTED_ANGLE {
         return;
     }
-    let length = |k: usize| {
-        let p = sheet.corners(v);
-        (p[(k + 2) % 3] - p[(k + 1) % 3]).norm()
-    };
+    let p = sheet.corners(v);
+    let length = |k: usize| (p[(k + 2) % 3] - p[(k + 1) % 3]).norm();
     let mut sides = [0, 1, 2];
     sides.sort_by(|&i, &j| length(i).total_cmp(&length(j)));
     let ends = |k: usize| (v[(k + 1) % 3], v[(k + 2) % 3]);
-    let (a, b) = ends(sides[0]);
-    if sheet.length(a, b) < 1.0 && collapse::collapse_either(sheet, a, b, LONG) {
-        report.collapses += 1;
-        return;
+    for (a, b) in sides.map(ends) {
+        if sheet.length(a, b) < COLLAPSIBLE && collapse::collapse_either(sheet, a, b, LONG) {
+            report.collapses += 1;
+            return;
+        }
     }
     let (a, b) = ends(sides[2]);
     if sheet.length(a, b) > 1.0 && sheet.at(t).curve[sides[2]] == NONE {
