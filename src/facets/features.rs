@@ -1,13 +1,12 @@
 //! Patches, curves and corners of a triangulated surface.
 //!
-//! A **crease** is an edge at which facets turn by more than the feature angle, where regions or groups differ, or
-//! where other than two facets meet. Patches are what creases part, curves the chains of creases between corners. A
+//! A **crease** is a sharp edge (`sharp`), or one where regions or groups differ or other than two facets meet. Patches are what creases part, curves the chains of creases between corners. A
 //! corner is where other than two creases meet, where a chain turns sharply, where a patch touches itself in a vertex,
 //! and the tip of a cone. A chain that ends in the middle of a patch is cut back where it is short (noise); a longer one is
 //! kept as a curve with the same patch on both sides.
 
-use super::Settings;
 use super::edges::{Edges, Sets};
+use super::{Settings, sharp};
 use crate::{Point, Vector};
 
 /// The vertices of a chain of creases; a closed one ends where it begins.
@@ -42,22 +41,15 @@ pub(super) struct Input<'a> {
 
 /// Finds patches, curves and corners.
 pub(super) fn find(input: &Input, settings: &Settings) -> Found {
-    let mut crease: Vec<bool> = (0..input.edges.len()).map(|e| is_crease(input, settings, e)).collect();
+    let angles = sharp::angles(input);
+    let mut crease = sharp::sharp(input, &angles, settings.least_angle, settings.feature_angle);
+    close_gaps(input, &angles, &mut crease, settings);
     cut_back(input, &mut crease, settings.shortest_end * input.diagonal);
     let (patch_of, patches) = flood(input, &crease);
     let at_vertex = creases_at(input, &crease);
     let corners = corners(input, settings, &crease, &at_vertex, &patch_of);
     let chains = chains(input, &at_vertex, &corners);
     Found { patch_of, patches, chains, corners }
-}
-
-fn is_crease(input: &Input, settings: &Settings, edge: usize) -> bool {
-    let uses = input.edges.uses(edge);
-    let [a, b] = uses else { return true };
-    let (s, t) = (a.triangle as usize, b.triangle as usize);
-    let turned = a.along == b.along;
-    let other = if turned { -input.normals[t] } else { input.normals[t] };
-    input.keys[s] != input.keys[t] || input.normals[s].angle(&other) > settings.feature_angle
 }
 
 /// The creases at each vertex, as (vertex, edge, other end), sorted.
@@ -86,6 +78,44 @@ fn creases_at(input: &Input, crease: &[bool]) -> AtVertex {
         starts[v + 1] += starts[v];
     }
     AtVertex { starts, spokes: all.into_iter().map(|(_, edge, other)| (edge, other)).collect() }
+}
+
+/// Edges that a chain of creases is continued over at most, to reach another crease.
+const LONGEST_GAP: usize = 30;
+
+/// Continues chains with a free end over edges that turn half as much as theirs, in their direction, if that leads to
+/// another crease. So a chain has no gaps where the surface beside it is hard to tell.
+fn close_gaps(input: &Input, angles: &[f64], crease: &mut [bool], settings: &Settings) {
+    let at = creases_at(input, crease);
+    let is_end = |v: &u32| at.spokes(*v).len() == 1;
+    let ends: Vec<u32> = (0..input.points.len() as u32).filter(is_end).collect();
+    if ends.is_empty() {
+        return;
+    }
+    let all = creases_at(input, &angles.iter().map(|a| *a > 0.5 * settings.least_angle).collect::<Vec<_>>());
+    for end in ends {
+        let (edge, before) = at.spokes(end)[0];
+        let (mut here, mut came, mut path) = (end, before, Vec::new());
+        let least = 0.5 * angles[edge as usize].min(settings.feature_angle);
+        while path.len() < LONGEST_GAP {
+            let straight = input.points[here as usize] - input.points[came as usize];
+            let turn = |w: u32| straight.angle(&(input.points[w as usize] - input.points[here as usize]));
+            let next = all
+                .spokes(here)
+                .iter()
+                .filter(|(e, w)| {
+                    angles[*e as usize] >= least && *w != came && turn(*w) <= settings.corner_angle
+                })
+                .min_by(|p, q| turn(p.1).total_cmp(&turn(q.1)));
+            let Some(&(e, w)) = next else { break };
+            path.push(e);
+            if crease[e as usize] || !at.spokes(w).is_empty() {
+                path.iter().for_each(|&e| crease[e as usize] = true);
+                break;
+            }
+            (came, here) = (here, w);
+        }
+    }
 }
 
 /// Takes chains with a free end away that are no longer than `shortest`.

@@ -14,6 +14,8 @@
 //!
 //! What is *not* repaired: gaps, holes, facets that intersect. Those are refused with their place, here or by the volume mesher.
 
+mod close_curves;
+mod cross;
 mod edges;
 mod error;
 mod features;
@@ -23,10 +25,15 @@ mod model;
 mod nearest;
 mod normals;
 mod projector;
+#[cfg(test)]
+mod projector_tests;
 mod regions;
 mod remesh;
 #[cfg(test)]
+mod remesh_tests;
+#[cfg(test)]
 mod samples;
+mod sharp;
 mod size;
 mod smoothness;
 #[cfg(test)]
@@ -37,6 +44,6 @@ pub use error::FacetError;
 pub use keep::keep;
 pub use model::{FacetBody, FacetCurve, FacetModel, FacetPatch, Facets, Settings};
 pub use projector::FacetProjector;
-pub use remesh::{RemeshReport, RemeshSettings, remesh};
+pub use remesh::{RemeshReport, RemeshSettings, deviation, remesh};
 pub use size::FacetSize;
 pub use smoothness::FacetSmoothness;

@@ -4,7 +4,7 @@ use super::edges::Edges;
 use super::features::{self, Found};
 use super::join::{self, Joined};
 use super::projector::{FacetProjector, Source};
-use super::{FacetError, normals, regions, tree};
+use super::{FacetError, cross, normals, regions, tree};
 use crate::Point;
 use crate::mesh::{BoundaryTriangle, VertexId};
 use csg::{Aabb, BodyId, CornerId, PatchId};
@@ -26,6 +26,9 @@ pub struct Settings {
     /// Patches end where facets turn by more than this (radians). Coarse exports have 12 facets a circle or more, 30° each;
     /// chamfers turn by 45°.
     pub feature_angle: f64,
+    /// From this angle on (radians) patches end if no edge like it is beside, as there would be on a round surface. The feature
+    /// angle makes this rule void.
+    pub least_angle: f64,
     /// Curves have a corner where they turn by more than this (radians).
     pub corner_angle: f64,
     /// A vertex without sharp edges is a corner if the angles of its facets differ from a full turn by more than this (radians).
@@ -39,6 +42,7 @@ impl Default for Settings {
     fn default() -> Self {
         Self {
             feature_angle: 40_f64.to_radians(),
+            least_angle: 14_f64.to_radians(),
             corner_angle: 40_f64.to_radians(),
             tip_angle: 65_f64.to_radians(),
             shortest_end: 0.05,
@@ -138,6 +142,12 @@ impl FacetModel {
             settings,
         );
         Ok(assemble(joined, &regions, found, bounds, rounding))
+    }
+
+    /// Where facets meet that must not, by exact signs. Remeshing may heal such places, where they come from rounding; kept facets
+    /// with any bound nothing.
+    pub fn crossings(&self) -> Vec<Point> {
+        cross::crossings(&self.points, &self.triangles)
     }
 
     /// The patch with this id.

@@ -78,12 +78,13 @@ pub(super) fn trusted(
 const LONGEST_CHAIN: usize = 64;
 
 /// For each corner of each facet of one patch, the unit normal of the patch there: the mean over the patch's facets at the
-/// vertex, by their angles (Thürmer, Wüthrich 1998), slivers left out where there are others.
+/// vertex, by their angles (Thürmer, Wüthrich 1998), slivers left out where there are others. At `tips` (ascending), each facet's own.
 pub(super) fn of_corners(
     points: &[Point],
     facets: &[[u32; 3]],
     normals: &[Vector],
     sliver: &[bool],
+    tips: &[u32],
 ) -> Vec<[Vector; 3]> {
     let mut shares: Vec<(u32, usize, usize)> = Vec::with_capacity(3 * facets.len());
     for (t, v) in facets.iter().enumerate() {
@@ -101,6 +102,7 @@ pub(super) fn of_corners(
             some.map(|share| normals[share.1] * angle(share)).sum()
         };
         let normal = sum(false).try_normalize(1e-9).or_else(|| sum(true).try_normalize(0.0));
+        let normal = normal.filter(|_| tips.binary_search(&at_vertex[0].0).is_err());
         for &(_, t, k) in at_vertex {
             out[t][k] = normal.unwrap_or(normals[t]);
         }

@@ -32,7 +32,7 @@ pub(super) struct Source {
     pub patches: u32,
     /// By curve: its vertices; a closed one ends where it begins.
     pub curves: Vec<Vec<u32>>,
-    /// Corners on no curve.
+    /// Corners on no curve, ascending.
     pub tips: Vec<u32>,
 }
 
@@ -131,6 +131,13 @@ impl FacetProjector {
         (self.project_patch(patch, point) - point).norm()
     }
 
+    /// The distance of `point` from the facets of `patch` themselves.
+    pub fn facet_distance(&self, patch: PatchId, point: &Point) -> f64 {
+        let patch = &self.patches[patch.index()];
+        let (nearest, weights) = patch.nearest(point);
+        (at(&patch.facets[nearest], weights) - point).norm()
+    }
+
     /// The distance of `point` from `curve`.
     pub fn curve_distance(&self, curve: CurveId, point: &Point) -> f64 {
         (self.project_curve(curve, point) - point).norm()
@@ -188,7 +195,7 @@ impl FacetProjector {
     }
 
     pub(super) fn foot(&self, patch: PatchId, point: &Point) -> Foot {
-        self.patches[patch.index()].foot(point)
+        self.patches[patch.index()].foot(point, self.tolerance)
     }
 
     /// Everything as bytes, to be sent to other ranks: counts, then coordinates, then indices, all little-endian.
@@ -283,37 +290,58 @@ impl PatchFacets {
             }
         }
         let flat = plane_normal(&facets, tolerance);
-        let normals = normals::of_corners(&source.points, &triangles, normals, sliver);
+        let normals = normals::of_corners(&source.points, &triangles, normals, sliver, &source.tips);
         Self { tree: Tree::new(&boxes), facets, normals, rim, flat }
     }
 
-    fn foot(&self, point: &Point) -> Foot {
+    /// The nearest facet, and the weights of the nearest point on it.
+    fn nearest(&self, point: &Point) -> (usize, [f64; 3]) {
         let squared = |i: u32| {
             let facet = &self.facets[i as usize];
             (at(facet, in_triangle(point, facet)) - point).norm_squared()
         };
         let (nearest, _) = self.tree.nearest(point, squared).expect("a patch has facets");
-        let facet = &self.facets[nearest as usize];
-        let weights = in_triangle(point, facet);
-        let foot = at(facet, weights);
-        let [m, n, o] = &self.normals[nearest as usize];
-        let mean = m * weights[0] + n * weights[1] + o * weights[2];
-        let normal = mean.try_normalize(0.0).unwrap_or(*m);
-        let beyond = match weights.map(|w| w == 0.0) {
-            [true, false, false] => 1,
-            [false, true, false] => 2,
-            [false, false, true] => 4,
-            [false, true, true] => 8,
-            [true, false, true] => 16,
-            [true, true, false] => 32,
-            _ => 0,
-        };
-        if self.rim[nearest as usize] & beyond != 0 && point != &foot {
-            return Foot { point: point - normal * normal.dot(&(point - foot)), normal };
+        (nearest as usize, in_triangle(point, &self.facets[nearest as usize]))
+    }
+
+    fn foot(&self, point: &Point, tolerance: f64) -> Foot {
+        let mut here = *point;
+        for _ in 0..MOST_STEPS {
+            let (nearest, weights) = self.nearest(&here);
+            let facet = &self.facets[nearest];
+            let foot = at(facet, weights);
+            let [m, n, o] = &self.normals[nearest];
+            let mean = m * weights[0] + n * weights[1] + o * weights[2];
+            let mut normal = mean.try_normalize(0.0).unwrap_or(*m);
+            let side = weights.iter().position(|w| *w == 0.0);
+            let corner = weights.iter().position(|w| *w == 1.0);
+            let beyond = match (corner, side) {
+                (Some(k), _) => 8 << k,
+                (None, Some(k)) => 1 << k,
+                (None, None) => 0,
+            };
+            if self.rim[nearest] & beyond == 0 || here == foot {
+                return Foot { point: foot, normal };
+            }
+            if let (None, Some(k)) = (corner, side) {
+                // Orthogonal to the rim, so that the next step finds the same foot.
+                let along = facet[(k + 2) % 3] - facet[(k + 1) % 3];
+                let across = normal - along * (normal.dot(&along) / along.norm_squared());
+                normal = across.try_normalize(0.0).unwrap_or(normal);
+            }
+            let off = normal.dot(&(here - foot));
+            here -= normal * off;
+            if off.abs() <= 0.1 * tolerance {
+                return Foot { point: here, normal };
+            }
         }
-        Foot { point: foot, normal }
+        Foot { point: here, normal: self.normals[self.nearest(&here).0][0] }
     }
 }
+
+/// Steps to a point beyond the rim at most. Beside a side of it there are two; beside a corner each shortens the distance by the
+/// angle between the normals there.
+const MOST_STEPS: usize = 30;
 
 /// The normal of the largest facet if all corners lie in its plane, up to `tolerance`.
 fn plane_normal(facets: &[[Point; 3]], tolerance: f64) -> Option<Vector> {

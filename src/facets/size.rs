@@ -3,8 +3,8 @@
 //! Curvature is that of normals over facets: along a side, the change of the patch's normal by length (compare Rusinkiewicz
 //! 2004, who fits a tensor to these). Slivers have no say: their neighbours cover them.
 
-use super::FacetModel;
 use super::normals::SLIVER_HEIGHT;
+use super::{FacetModel, close_curves};
 use crate::kernel::simplex::area_vector;
 use crate::size::{SizeField, SizeSettings, Source, SourceTree};
 use crate::{Point, Vector};
@@ -23,18 +23,19 @@ const MOST_SOURCES: f64 = 1000.0;
 const SHORT_SIDE: f64 = 200.0;
 
 impl FacetSize {
-    /// Samples facets and curves for the sources of the field.
+    /// Samples facets and curves for the sources of the field: curvature, short curves, and curves near each other.
     pub fn new(model: &FacetModel, settings: &SizeSettings) -> Self {
         let bound = settings.maxh.unwrap_or(f64::INFINITY) * settings.scale.min(1.0);
         let maximum = bound.min(model.bounds.diagonal() * settings.scale);
         let mut sources = settings.sources.clone();
         sample_facets(model, settings, maximum, &mut sources);
         sample_curves(model, settings, maximum, &mut sources);
-        Self(SourceTree::new(model.bounds, settings.grading, maximum, &sources))
+        close_curves::sample(model, settings, maximum, &mut sources);
+        Self(SourceTree::new(model.bounds, settings.grading, maximum, &thinned(sources)))
     }
 
-    /// The size at which patches and curves turn by `turn` (radians) along an edge.
-    pub(super) fn of_turn(model: &FacetModel, turn: f64) -> Self {
+    /// The size at which patches and curves turn by `turn` (radians) along an edge; and smaller at `sources`.
+    pub(super) fn of_turn(model: &FacetModel, turn: f64, sources: &[Source]) -> Self {
         let settings = SizeSettings {
             maxh: None,
             minh: 0.0,
@@ -42,7 +43,7 @@ impl FacetSize {
             segments_per_curve: f64::MIN_POSITIVE,
             grading: TURN_GRADING,
             scale: 1.0,
-            sources: Vec::new(),
+            sources: sources.to_vec(),
         };
         Self::new(model, &settings)
     }
@@ -55,6 +56,21 @@ impl SizeField for FacetSize {
     fn size_at(&self, point: &Point) -> f64 {
         self.0.size_at(point)
     }
+}
+
+/// Of sources in one cell of a grid that is as wide as they are large, or half so, the smallest: facets may be far smaller than
+/// the sizes that they ask for.
+fn thinned(sources: Vec<Source>) -> Vec<Source> {
+    let keyed = |s: Source| {
+        let level = s.size.log2().floor();
+        let width = level.exp2();
+        let cell = [s.point.x, s.point.y, s.point.z].map(|x| (x / width).floor() as i64);
+        (level as i32, cell, s)
+    };
+    let mut keyed: Vec<_> = sources.into_iter().map(keyed).collect();
+    keyed.sort_by(|a, b| (a.0, a.1).cmp(&(b.0, b.1)).then(a.2.size.total_cmp(&b.2.size)));
+    keyed.dedup_by_key(|(level, cell, _)| (*level, *cell));
+    keyed.into_iter().map(|(_, _, source)| source).collect()
 }
 
 fn size_of_curvature(settings: &SizeSettings, curvature: f64) -> f64 {

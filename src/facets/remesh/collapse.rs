@@ -152,15 +152,24 @@ fn keeps_shape(sheet: &Sheet, from: u32, to: u32, long: f64) -> bool {
 
 /// Merges `from` into `to`.
 fn collapse(sheet: &mut Sheet, from: u32, to: u32) {
-    let around = std::mem::take(&mut sheet.around[from as usize]);
-    for &t in &around {
-        if sheet.at(t).v.contains(&to) {
+    let mut kept: Vec<(u32, u32)> = Vec::new();
+    for t in std::mem::take(&mut sheet.around[from as usize]) {
+        let triangle = sheet.at(t);
+        if let (Some(i), Some(j)) = (triangle.corner(from), triangle.corner(to)) {
+            // What is beside this triangle at `from` comes to lie along its side at `to`, on the curve there.
+            kept.push((triangle.v[3 - i - j], triangle.curve[i]));
             sheet.remove_triangle(t);
-            continue;
-        }
-        if let Some(k) = sheet.at(t).corner(from) {
+        } else if let Some(k) = triangle.corner(from) {
             sheet.triangles[t as usize].v[k] = to;
             sheet.around[to as usize].push(t);
+        }
+    }
+    for (apex, curve) in kept {
+        let beside: Vec<u32> = sheet.at_edge(to, apex).collect();
+        for t in beside {
+            if let Some(side) = sheet.at(t).side(to, apex) {
+                sheet.triangles[t as usize].curve[side] = curve;
+            }
         }
     }
 }

@@ -7,6 +7,7 @@
 //! [`surface`](crate::surface) has for analytic ones), needs a parametrisation without folds, which noisy facets do not offer.
 
 mod collapse;
+mod deviation;
 mod finish;
 mod flip;
 mod rail;
@@ -16,11 +17,12 @@ mod sheet;
 mod smooth;
 mod split;
 
+pub use deviation::deviation;
 pub use report::RemeshReport;
 
-use super::{FacetModel, FacetSize};
+use super::{FacetModel, FacetSize, cross};
 use crate::Point;
-use crate::size::SizeField;
+use crate::size::{SizeField, Source};
 use crate::surface::SurfaceMesh;
 use sheet::Sheet;
 
@@ -55,18 +57,45 @@ impl SizeField for Smaller<'_> {
 /// Rounds of splits until all edges are short enough: each halves them.
 const MOST_SPLITS: usize = 40;
 
+/// Times that sizes are lowered where triangles meet, before the mesh is handed out as it is.
+const MOST_CORRECTIONS: usize = 6;
+
+/// A place where triangles meet asks for this part of the size there.
+const LOWERED: f64 = 0.6;
+
 /// Makes a surface mesh of a model with edges of about the size wanted.
 ///
 /// Corners are vertices, in their order; then come the vertices on curves, curve by curve, and those on patches. Vertices
-/// lie on the facets and polylines up to rounding.
+/// lie on the facets and polylines up to rounding. Where triangles of patches near each other would intersect, the sizes are lowered;
+/// [`RemeshReport::crossings`] tells if some are left, as where the facets intersect themselves.
 pub fn remesh(
     model: &FacetModel,
     size: &dyn SizeField,
     settings: &RemeshSettings,
 ) -> (SurfaceMesh, RemeshReport) {
-    let size = Smaller(size, FacetSize::of_turn(model, settings.turn));
-    let mut sheet = Sheet::new(model, &size);
-    let mut report = RemeshReport::default();
+    let mut lowered = Vec::new();
+    for correction in 0.. {
+        let size = Smaller(size, FacetSize::of_turn(model, settings.turn, &lowered));
+        let mut report = RemeshReport { corrections: correction, ..RemeshReport::default() };
+        let mesh = pass(model, &size, settings, &mut report);
+        report.crossings = cross::crossings(&mesh.points, &mesh.triangles);
+        if report.crossings.is_empty() || correction == MOST_CORRECTIONS {
+            return (mesh, report);
+        }
+        let lower = |&point: &Point| Source { point, size: LOWERED * size.size_at(&point) };
+        lowered.extend(report.crossings.iter().map(lower));
+    }
+    unreachable!("the loop ends by itself")
+}
+
+/// Remeshes once.
+fn pass(
+    model: &FacetModel,
+    size: &dyn SizeField,
+    settings: &RemeshSettings,
+    report: &mut RemeshReport,
+) -> SurfaceMesh {
+    let mut sheet = Sheet::new(model, size);
     report.flips += flip::flip_all(&mut sheet);
     report.collapses += collapse::collapse_short(&mut sheet, settings.short);
     for _ in 0..settings.rounds {
@@ -84,7 +113,7 @@ pub fn remesh(
         report.flips += flip::flip_all(&mut sheet);
         report.moves += smooth::smooth_all(&mut sheet);
     }
-    repair::repair(&mut sheet, &mut report);
+    repair::repair(&mut sheet, report);
     report.measure(&sheet);
-    (finish::finish(&sheet), report)
+    finish::finish(&sheet)
 }

@@ -2,8 +2,8 @@
 
 use super::report::{RemeshReport, least_angle};
 use super::sheet::{Kind, NONE, Sheet};
-use super::smooth::{smooth, try_place};
-use super::{collapse, flip, split};
+use super::smooth::try_place;
+use super::{collapse, flip, smooth, split};
 use crate::Vector;
 
 /// Angles below this (degrees) are worked on.
@@ -28,7 +28,6 @@ pub(super) fn repair(sheet: &mut Sheet, report: &mut RemeshReport) {
             }
         }
         report.flips += flip::flip_all(sheet);
-        report.moves += smooth::smooth_all(sheet);
     }
     for _ in 0..ROUNDS {
         let flat: Vec<u32> = sheet.living().filter(|&t| sheet.flattens(sheet.at(t).curve)).collect();
@@ -40,31 +39,34 @@ pub(super) fn repair(sheet: &mut Sheet, report: &mut RemeshReport) {
     }
 }
 
-use super::smooth;
-
 /// Longest edge that mending a bad triangle may leave, in units of the wanted size.
 const LONG: f64 = 1.7;
+/// Sides of bad triangles are collapsed up to this length, in units of the wanted size.
+const COLLAPSIBLE: f64 = 1.1;
 
-/// Tries what makes a bad triangle better: its vertices moved, its shortest side collapsed, its longest side split.
+/// Tries what makes a bad triangle better: its vertices and their neighbours moved, its sides collapsed, the shortest first, its
+/// longest side split.
 fn mend(sheet: &mut Sheet, t: u32, report: &mut RemeshReport) {
     let v = sheet.at(t).v;
+    let mut near = Vec::new();
     for w in v {
-        report.moves += usize::from(smooth(sheet, w)) + usize::from(probe(sheet, w));
+        sheet.neighbours(w, &mut near);
+        near.iter().for_each(|&n| report.moves += usize::from(smooth::smooth(sheet, n)));
+        report.moves += usize::from(smooth::smooth(sheet, w)) + usize::from(probe(sheet, w));
     }
     if least_angle(&sheet.corners(v)) >= WANTED_ANGLE {
         return;
     }
-    let length = |k: usize| {
-        let p = sheet.corners(v);
-        (p[(k + 2) % 3] - p[(k + 1) % 3]).norm()
-    };
+    let p = sheet.corners(v);
+    let length = |k: usize| (p[(k + 2) % 3] - p[(k + 1) % 3]).norm();
     let mut sides = [0, 1, 2];
     sides.sort_by(|&i, &j| length(i).total_cmp(&length(j)));
     let ends = |k: usize| (v[(k + 1) % 3], v[(k + 2) % 3]);
-    let (a, b) = ends(sides[0]);
-    if sheet.length(a, b) < 1.0 && collapse::collapse_either(sheet, a, b, LONG) {
-        report.collapses += 1;
-        return;
+    for (a, b) in sides.map(ends) {
+        if sheet.length(a, b) < COLLAPSIBLE && collapse::collapse_either(sheet, a, b, LONG) {
+            report.collapses += 1;
+            return;
+        }
     }
     let (a, b) = ends(sides[2]);
     if sheet.length(a, b) > 1.0 && sheet.at(t).curve[sides[2]] == NONE {
@@ -108,7 +110,7 @@ fn split_if_better(sheet: &mut Sheet, a: u32, b: u32) -> bool {
         return false;
     }
     let v = split::split(sheet, a, b, point, kind);
-    smooth(sheet, v);
+    smooth::smooth(sheet, v);
     true
 }
 
@@ -129,7 +131,7 @@ fn open_ear(sheet: &mut Sheet, t: u32, report: &mut RemeshReport) {
     if triangle.curve[k] == NONE && sheet.pair(a, b).is_some() {
         let (point, kind) = split::middle(sheet, a, b);
         let v = split::split(sheet, a, b, point, kind);
-        smooth(sheet, v);
+        smooth::smooth(sheet, v);
         report.splits += 1;
     }
 }

@@ -1,7 +1,7 @@
 //! Vertices move on their patches and along their curves.
 
 use super::collapse::{MOST_TURN, along_curve};
-use super::sheet::{Kind, NONE, Sheet, shape};
+use super::sheet::{Kind, Sheet, shape};
 use crate::{Point, Vector};
 use csg::PatchId;
 
@@ -24,6 +24,7 @@ pub(super) fn smooth(sheet: &mut Sheet, v: u32) -> bool {
     match sheet.kinds[v as usize] {
         Kind::Corner(_) => false,
         Kind::Curve(curve, place) => slide(sheet, v, curve.0, place),
+        Kind::Patch(_) if is_good(sheet, v) => false,
         Kind::Patch(patch) => {
             let wanted = ideal_place(sheet, v, patch);
             let from = sheet.points[v as usize];
@@ -32,13 +33,23 @@ pub(super) fn smooth(sheet: &mut Sheet, v: u32) -> bool {
     }
 }
 
+/// Vertices whose triangles are all of this shape stay.
+const GOOD: f64 = 0.93;
+
+/// A move must lower the energy by this part.
+const GAIN: f64 = 5e-3;
+
+fn is_good(sheet: &Sheet, v: u32) -> bool {
+    sheet.around[v as usize].iter().all(|&t| shape(&sheet.corners(sheet.at(t).v)) > GOOD)
+}
+
 /// Moves a vertex on a patch to the foot of a point if that lowers the energy around it.
 pub(super) fn try_place(sheet: &mut Sheet, v: u32, patch: PatchId, to: Point) -> bool {
     let projector = &sheet.model.projector;
     let to = if projector.flat_normal(patch).is_some() { to } else { projector.project_patch(patch, &to) };
     let before = energy(sheet, v);
     let from = std::mem::replace(&mut sheet.points[v as usize], to);
-    if energy(sheet, v) < (1.0 - 1e-4) * before && around_fits(sheet, v) {
+    if energy(sheet, v) < (1.0 - GAIN) * before && around_fits(sheet, v) {
         sheet.sizes[v as usize] = sheet.size.size_at(&to);
         return true;
     }
@@ -119,9 +130,4 @@ fn ideal_place(sheet: &Sheet, v: u32, patch: PatchId) -> Point {
         sum += nalgebra::center(&p, &q) - here + inward * height;
     }
     here + sum / around.len() as f64
-}
-
-/// Whether a triangle has a side on a curve.
-pub(super) fn has_segment(curve: [u32; 3]) -> bool {
-    curve.iter().any(|&c| c != NONE)
 }
