@@ -5,6 +5,8 @@ mod common;
 mod geometries;
 mod mpirun;
 mod mpirun_comm;
+mod quality;
 mod ranks;
+mod readers;
 mod tutorials;
 mod writers;

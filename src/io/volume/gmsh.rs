@@ -199,7 +199,9 @@ fn skip_to_end(words: &mut Words, section: &[u8]) -> Result<(), Fault> {
     match rest.windows(end.len()).position(|window| window == end) {
         Some(place) => words.go_to(words.offset() + place + end.len()),
         None => {
-            return Err(words.fault(format!("the section {} has no end: the file is cut off", shown(section))));
+            return Err(
+                words.fault(format!("the section {} has no end: the file is cut off", shown(section)))
+            );
         }
     }
     Ok(())
