@@ -29,6 +29,9 @@ pub enum Command {
     /// Check a written Elmer mesh: every fault, with ids and places
     #[command(after_help = "Exit status: 0 no fault, 1 faults were found, 2 the files cannot be read.")]
     Check(Check),
+    /// Measure tetrahedral meshes of any program side by side
+    #[command(after_help = "Exit status: 0 no inverted tets, 1 some mesh has them, 2 a file cannot be read.")]
+    Quality(Quality),
 }
 
 const STATUS: &str = "Exit status: 0 done; 2 bad input, or a geometry refused with its place; \
@@ -169,6 +172,20 @@ pub struct Check {
     /// As JSON
     #[arg(long)]
     pub json: bool,
+}
+
+/// `tetmill quality`
+#[derive(Args, Debug)]
+pub struct Quality {
+    /// Meshes: .vtu, .msh (Gmsh), .vol (NETGEN), .mesh or .meshb (Medit), .ele (TetGen), or the folder of an Elmer mesh
+    #[arg(required = true)]
+    pub meshes: Vec<PathBuf>,
+    /// As JSON
+    #[arg(long)]
+    pub json: bool,
+    /// Draw histograms of the angles and of NETGEN's badness
+    #[arg(long, value_name = "FILE.svg")]
+    pub picture: Option<PathBuf>,
 }
 
 /// How the fine mesh is made.

@@ -1,6 +1,6 @@
 //! What the commands do: from the options to a written mesh and a summary.
 
-use crate::cli::{Check, Format, Generate, InputOptions, Inspect, MeshFile, Method, SizeOptions};
+use crate::cli::{Check, Format, Generate, InputOptions, Inspect, MeshFile, Method, Quality, SizeOptions};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 use tetmill::comm::{Communicator, mpi, thread};
@@ -14,7 +14,7 @@ use tetmill::pipeline::{GenerateSettings, Generated, Model, Wanted, generate};
 use tetmill::progress::Progress;
 use tetmill::report::{MeshReport, PartitionReport, Report};
 use tetmill::size::SizeSettings;
-use tetmill::{memory, picture};
+use tetmill::{memory, picture, quality};
 
 /// `tetmill generate`
 pub fn run_generate(options: &Generate) -> Result<(), Failure> {
@@ -269,11 +269,16 @@ fn tell(report: &Report, file: Option<&Path>, quiet: bool, wanted: Option<u64>) 
         }
     }
     if let Some(file) = file {
-        let json = serde_json::to_string_pretty(report).expect("plain data") + "\n";
-        io::output::write_file(file, json.len() as u64, |temporary| {
-            io::output::write_text(temporary, json.as_bytes())
-        })?;
+        write_whole(file, &(serde_json::to_string_pretty(report).expect("plain data") + "\n"))?;
     }
+    Ok(())
+}
+
+/// Writes a text file; the one before it stays if that fails.
+fn write_whole(file: &Path, text: &str) -> Result<(), Failure> {
+    io::output::write_file(file, text.len() as u64, |temporary| {
+        io::output::write_text(temporary, text.as_bytes())
+    })?;
     Ok(())
 }
 
@@ -335,6 +340,40 @@ pub fn run_check(options: &Check) -> Result<(), Failure> {
     } else {
         Err(Failure::new(Status::Faults, format!("faults in {}", faulty.join(", "))))
     }
+}
+
+/// `tetmill quality`
+pub fn run_quality(options: &Quality) -> Result<(), Failure> {
+    if let Some(file) = options.picture.as_deref().filter(|file| file.extension().is_none_or(|e| e != "svg"))
+    {
+        return Err(Failure::input(format!("histograms are drawn as .svg, not {}", file.display())));
+    }
+    let (mut meshes, mut unreadable) = (Vec::new(), Vec::new());
+    // One after the other: each is measured by all threads, and the largest one alone must fit the memory.
+    for path in &options.meshes {
+        match io::volume::read(path) {
+            Ok(read) => meshes.push(quality::Quality::of_file(path.display().to_string(), &read)),
+            Err(error) => unreadable.push(error.to_string()),
+        }
+    }
+    if options.json {
+        let json = serde_json::json!({ "version": env!("CARGO_PKG_VERSION"), "meshes": meshes });
+        println!("{}", serde_json::to_string_pretty(&json).expect("plain data"));
+    } else if !meshes.is_empty() {
+        print!("{}", quality::table(&meshes));
+    }
+    if let Some(file) = &options.picture {
+        write_whole(file, &quality::histograms(&meshes))?;
+    }
+    if !unreadable.is_empty() {
+        return Err(Failure::input(unreadable.join("\n")));
+    }
+    let faulty: Vec<String> = meshes
+        .iter()
+        .filter(|mesh| mesh.inverted > 0)
+        .map(|mesh| format!("{} inverted tets in {}", mesh.inverted, mesh.mesh))
+        .collect();
+    if faulty.is_empty() { Ok(()) } else { Err(Failure::new(Status::Faults, faulty.join(", "))) }
 }
 
 /// `tetmill inspect`

@@ -17,6 +17,7 @@ pub mod partition;
 pub mod picture;
 pub mod pipeline;
 pub mod progress;
+pub mod quality;
 pub mod refine;
 pub mod report;
 pub mod size;

@@ -13,6 +13,7 @@ fn main() -> ExitCode {
         Command::Mesh(options) => commands::run_mesh(&options),
         Command::Inspect(options) => commands::run_inspect(&options),
         Command::Check(options) => commands::run_check(&options),
+        Command::Quality(options) => commands::run_quality(&options),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

@@ -6,6 +6,8 @@ mod geometries;
 mod inputs;
 mod mpirun;
 mod mpirun_comm;
+mod quality;
 mod ranks;
+mod readers;
 mod tutorials;
 mod writers;

@@ -12,9 +12,8 @@ pub(super) fn parse(content: &[u8]) -> Result<Surface, Fault> {
     let count = words.count("points", 3)?;
     let faces = words.count("faces", 1)?;
     // The number of edges is never used, and some writers forget it.
-    let has_edges = words.next_in_line().is_some() || is_alone_in_line(&words);
-    if has_edges && words.peek().is_some() {
-        words.rest_of_line();
+    if words.next_in_line().is_none() && is_alone_in_line(&words) {
+        words.next();
     }
     let mut points = Vec::with_capacity(count);
     for _ in 0..count {

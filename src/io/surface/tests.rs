@@ -38,7 +38,9 @@ fn reads_tet(name: &str, content: impl AsRef<[u8]>) -> Surface {
 #[track_caller]
 fn refused(name: &str, content: impl AsRef<[u8]>, place: &str, reason: &str) {
     let said = read_as(name, content).expect_err("it is refused");
-    assert!(said.starts_with(&format!("{name}{place}: ")), "no `{name}{place}` in: {said}");
+    // A place that ends in a star is the beginning of one.
+    let start = place.strip_suffix('*').map_or(format!("{name}{place}: "), |place| format!("{name}{place}"));
+    assert!(said.starts_with(&start), "no `{start}` in: {said}");
     assert!(said.contains(reason), "no `{reason}` in: {said}");
 }
 
@@ -101,7 +103,7 @@ fn an_stl_that_was_rounded_apart_is_closed_and_says_so() {
 #[test]
 fn broken_stl_files_are_refused_with_their_place() {
     let text = stl_text("part", &FACES);
-    refused("a.stl", &text[..text.len() - 20], ":30", "cut off");
+    refused("a.stl", &text[..text.len() - 14], ":30", "cut off");
     refused("a.stl", text.replacen("vertex 1", "vertex nan", 1), ":5", "`nan`");
     refused("a.stl", text.replacen("endloop", "vertex 0 0 0", 1), ":7", "expected `endloop`, found `vertex`");
     refused("a.stl", "solid empty\nendsolid empty\n", "", "no triangles");
@@ -275,7 +277,7 @@ fn ply_is_read_as_text_and_in_both_orders_of_bytes() {
 fn broken_ply_files_are_refused_with_their_place() {
     let head = ply_text("ascii");
     refused("a.ply", &head, ":14", "4 elements `vertex` are announced");
-    refused("a.ply", head.replace("ascii", "binary_little_endian"), ", byte", "announced");
+    refused("a.ply", head.replace("ascii", "binary_little_endian"), ", byte *", "announced");
     refused("a.ply", head.replace("ascii", "utf8"), ":1", "`utf8` is not known");
     refused("a.ply", head.replace("property float x", "property real x"), ":6", "`real` is no type");
     refused("a.ply", head.replace("element vertex", "element v"), "", "no element `vertex`");
@@ -352,7 +354,7 @@ fn broken_poly_files_are_refused_with_their_place() {
     refused("a.poly", POLY.replacen("\n3 4 4 0", "\n4 4 4 0", 1), ":5", "expected point 3, found 4");
     refused("a.poly", POLY.replacen("\n12 3", "\n12 2", 1), ":2", "dimension");
     refused("a.poly", POLY.replacen("4 1 2 3 4", "4 1 3 2 4", 1), ":16", "crosses itself");
-    refused("a.poly", &POLY[..200], "", "");
+    refused("a.poly", &POLY[..200], ":*", "announced");
     refused("a.smesh", "3 3\n5 0 0 0\n6 1 0 0\n7 0 1 0\n1\n3 5 6 7\n", ":2", "0 or 1 is expected");
 }
 
