@@ -39,6 +39,7 @@
 //! Not promised: any angle. Where the boundary has bad triangles, or bodies are thinner than them, tets are bad too. Nor
 //! does it make edges as long as the size field says: it only keeps collapses and insertions from making them worse.
 
+mod blocks;
 mod collapse;
 mod complex;
 mod insert;

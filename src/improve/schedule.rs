@@ -1,16 +1,18 @@
 //! What is tried when: worst first, and only where something changed.
 
+use crate::improve::blocks::{Block, Cut, Finished, Triangles, forget, put_back};
 use crate::improve::collapse::Collapser;
-use crate::improve::complex::Complex;
+use crate::improve::complex::{Complex, NONE};
 use crate::improve::insert::Inserter;
 use crate::improve::legality::{Legality, Smoothness};
-use crate::improve::objective::{Measure, Objective};
+use crate::improve::objective::{Measure, Objective, score_of_ratio};
 use crate::improve::repair::repair;
 use crate::improve::smooth::Smoother;
 use crate::improve::swap::Swapper;
 use crate::kernel::quality::QualitySummary;
-use crate::mesh::Mesh;
+use crate::mesh::{Mesh, VertexId};
 use crate::size::SizeField;
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 /// How much is done, and by what measure.
@@ -26,11 +28,20 @@ pub struct Settings {
     pub change_below: f64,
     /// An insertion makes no edge shorter than this, in units of the wanted size or the usual edge there.
     pub shortest_edge: f64,
+    /// Tets that are improved together, apart from others, as a unit of parallel work: see [`improve`].
+    pub block: usize,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { measure: Measure::default(), passes: 8, target: 0.85, change_below: 0.6, shortest_edge: 0.6 }
+        Self {
+            measure: Measure::default(),
+            passes: 8,
+            target: 0.85,
+            change_below: 0.6,
+            shortest_edge: 0.6,
+            block: 1 << 15,
+        }
     }
 }
 
@@ -73,6 +84,9 @@ struct Tools {
     inserter: Inserter,
 }
 
+/// Rounds over the mesh: all of it, then what is left to be improved at the seams between blocks, then at the seams of these.
+const ROUNDS: usize = 3;
+
 /// A pass that changes less than this part of the tets is the last.
 const FEW_CHANGES: f64 = 1e-3;
 
@@ -105,51 +119,62 @@ pub fn make_refinable(
 
 fn run(mesh: &mut Mesh, size: &dyn SizeField, legality: Option<&Legality>, settings: &Settings) -> Report {
     let mut report = Report { before: QualitySummary::of(mesh), ..Report::default() };
-    let mut complex = Complex::new(mesh);
-    let objective = Objective { measure: settings.measure, legality };
-    complex.score_all(&objective);
     if let Some(legality) = legality {
-        report.illegal_before = illegal(&complex).count();
+        (report.illegal_before, report.folding_before) = verdicts(mesh, legality);
         report.illegal_triangles = legality.illegal_triangles();
-        report.folding_before = folding(&complex, legality);
     }
-    let mut tools = Tools::default();
-    for pass in 1..=settings.passes {
-        complex.pass = pass;
-        report.passes = pass;
-        let before = report.changes();
-        tools.smooth_and_swap(&mut complex, &objective, settings, &mut report);
-        if pass == 1 && legality.is_some() {
-            // After the swaps, which mend many without a new vertex.
-            tools.repair(&mut complex, &objective, &mut report);
+    let triangles = Triangles::new(mesh);
+    let mut gone = vec![false; mesh.points.len()];
+    let mut left = None;
+    for round in 0..ROUNDS {
+        let cut = Cut::new(mesh, left.as_deref(), round, settings.block);
+        let worker = || (vec![NONE; mesh.points.len()], Tools::default());
+        let blocks: Vec<(Finished, Counts, Vec<u32>)> = (0..cut.blocks())
+            .into_par_iter()
+            .map_init(worker, |(to_block, tools), block| {
+                let mut block = Block::new(mesh, &triangles, &cut, block, to_block);
+                let legality = legality.map(|l| l.of_block(&block.vertices, to_block));
+                let objective = Objective { measure: settings.measure, legality: legality.as_ref() };
+                let counts = tools.improve(&mut block.complex, &objective, size, settings);
+                let met = std::mem::take(&mut block.triangles);
+                (block.finish(&cut, |score| score < score_of_ratio(settings.target)), counts, met)
+            })
+            .collect();
+        if round == 0 {
+            check_triangles(mesh, blocks.iter().flat_map(|b| &b.2));
         }
-        tools.collapse_and_insert(&mut complex, &objective, size, settings, &mut report);
-        let changes = report.changes() - before;
-        if pass > 1 && (changes as f64) < FEW_CHANGES * complex.tets.len() as f64 {
+        blocks.iter().for_each(|b| report.add(&b.1));
+        let seeds = put_back(mesh, cut, blocks.into_iter().map(|b| b.0).collect(), &mut gone);
+        if seeds.is_empty() {
             break;
         }
+        left = Some(seeds);
     }
     if let Some(legality) = legality {
-        report.illegal_left = illegal(&complex).count();
-        report.folding_left = folding(&complex, legality);
+        (report.illegal_left, report.folding_left) = verdicts(mesh, legality);
     }
-    complex.store(mesh);
+    forget(mesh, &gone);
     report.after = QualitySummary::of(mesh);
     report
 }
 
-/// The tets that are illegal by their score.
-fn illegal(complex: &Complex) -> impl Iterator<Item = u32> + '_ {
-    complex.living().filter(|&t| complex.scores[t as usize] <= 0.0)
+/// Every boundary triangle must be the face of a tet.
+fn check_triangles<'a>(mesh: &Mesh, met: impl Iterator<Item = &'a u32>) {
+    let mut is_face = vec![false; mesh.triangles.len()];
+    met.for_each(|&t| is_face[t as usize] = true);
+    let lost = is_face.iter().position(|met| !met).map(|t| mesh.triangles[t]);
+    assert_eq!(lost, None, "a boundary triangle is no tet's face");
 }
 
-/// How many legal tets have a corner that turns over in the limit of refinement.
-fn folding(complex: &Complex, legality: &Legality) -> usize {
-    let turns = |t: u32| {
-        let tet = complex.tets[t as usize];
-        legality.judge(tet).1.is_some_and(|l| l.least_corner(&complex.corners(tet)) <= 0.0)
+/// How many tets are illegal, and how many legal ones have a corner that turns over in the limit of refinement.
+fn verdicts(mesh: &Mesh, legality: &Legality) -> (usize, usize) {
+    let verdict = |tet: &[VertexId; 4]| {
+        let (illegal, limits) = legality.judge(tet.map(|v| v.0));
+        let corners = || tet.map(|v| mesh.points[v.index()]);
+        let folds = !illegal && limits.is_some_and(|l| l.least_corner(&corners()) <= 0.0);
+        (usize::from(illegal), usize::from(folds))
     };
-    complex.living().filter(|&t| complex.scores[t as usize] > 0.0 && turns(t)).count()
+    mesh.tets.par_iter().map(verdict).reduce(|| (0, 0), |a, b| (a.0 + b.0, a.1 + b.1))
 }
 
 /// The tets whose score is below `least` and that saw a change since the last pass began, the worst first.
@@ -173,39 +198,102 @@ fn is_still(complex: &Complex, score: f64, tet: u32) -> bool {
     complex.is_alive(tet) && complex.scores[tet as usize].to_bits() == score.to_bits()
 }
 
-impl Report {
+/// What was done to a block.
+#[derive(Default)]
+struct Counts {
+    passes: u32,
+    moves: usize,
+    swaps: usize,
+    collapses: usize,
+    insertions: usize,
+}
+
+impl Counts {
     fn changes(&self) -> usize {
         self.moves + self.swaps + self.collapses + self.insertions
     }
 }
 
+impl Report {
+    fn add(&mut self, counts: &Counts) {
+        self.passes = self.passes.max(counts.passes);
+        self.moves += counts.moves;
+        self.swaps += counts.swaps;
+        self.collapses += counts.collapses;
+        self.insertions += counts.insertions;
+    }
+}
+
 impl Tools {
-    /// Moves all vertices, then swaps, the worst tets first.
-    fn smooth_and_swap(
+    /// Improves one block.
+    fn improve(
+        &mut self,
+        complex: &mut Complex,
+        objective: &Objective,
+        size: &dyn SizeField,
+        settings: &Settings,
+    ) -> Counts {
+        let mut counts = Counts::default();
+        complex.score_all(objective);
+        for pass in 1..=settings.passes {
+            complex.pass = pass;
+            counts.passes = pass;
+            let before = counts.changes();
+            self.swap(complex, objective, settings, &mut counts);
+            if pass == 1 && objective.legality.is_some() {
+                // After the swaps, which mend many without a new vertex.
+                self.repair(complex, objective, &mut counts);
+            }
+            self.smooth(complex, objective, settings, &mut counts);
+            self.collapse_and_insert(complex, objective, size, settings, &mut counts);
+            let changes = counts.changes() - before;
+            if pass > 1 && (changes as f64) < FEW_CHANGES * complex.tets.len() as f64 {
+                break;
+            }
+        }
+        counts
+    }
+
+    /// Swaps, the worst tets first.
+    fn swap(
         &mut self,
         complex: &mut Complex,
         objective: &Objective,
         settings: &Settings,
-        report: &mut Report,
+        counts: &mut Counts,
     ) {
-        for v in 0..complex.points.len() as u32 {
-            if is_fresh(complex, v) {
-                report.moves += usize::from(self.smoother.improve(complex, objective, v, settings.target));
-            }
-        }
-        for (score, t) in worst_first(complex, settings.target) {
+        for (score, t) in worst_first(complex, score_of_ratio(settings.target)) {
             if is_still(complex, score, t) {
-                report.swaps += usize::from(self.swapper.improve(complex, objective, t));
+                counts.swaps += usize::from(self.swapper.improve(complex, objective, t));
             }
         }
     }
 
-    fn repair(&mut self, complex: &mut Complex, objective: &Objective, report: &mut Report) {
-        let repairs = repair(complex, objective, &mut self.swapper, &mut self.inserter, &mut self.smoother);
-        report.swaps += repairs.swaps;
-        report.insertions += repairs.splits;
+    /// Moves the vertices of tets that are not good enough.
+    fn smooth(
+        &mut self,
+        complex: &mut Complex,
+        objective: &Objective,
+        settings: &Settings,
+        counts: &mut Counts,
+    ) {
+        let enough = score_of_ratio(settings.target);
+        let mut wanted = vec![false; complex.points.len()];
+        for t in complex.living().filter(|&t| complex.scores[t as usize] < enough) {
+            complex.tets[t as usize].iter().for_each(|&v| wanted[v as usize] = true);
+        }
+        for v in 0..complex.points.len() as u32 {
+            if wanted[v as usize] && is_fresh(complex, v) {
+                counts.moves += usize::from(self.smoother.improve(complex, objective, v, enough));
+            }
+        }
     }
 
+    fn repair(&mut self, complex: &mut Complex, objective: &Objective, counts: &mut Counts) {
+        let repairs = repair(complex, objective, &mut self.swapper, &mut self.inserter, &mut self.smoother);
+        counts.swaps += repairs.swaps;
+        counts.insertions += repairs.splits;
+    }
     /// Merges vertices and adds some, the worst tets first.
     fn collapse_and_insert(
         &mut self,
@@ -213,16 +301,16 @@ impl Tools {
         objective: &Objective,
         size: &dyn SizeField,
         settings: &Settings,
-        report: &mut Report,
+        counts: &mut Counts,
     ) {
-        for (score, t) in worst_first(complex, settings.change_below) {
+        for (score, t) in worst_first(complex, score_of_ratio(settings.change_below)) {
             if !is_still(complex, score, t) {
                 continue;
             }
             if self.collapser.improve(complex, objective, size, t) {
-                report.collapses += 1;
+                counts.collapses += 1;
             } else if self.insert(complex, objective, size, settings, t) {
-                report.insertions += 1;
+                counts.insertions += 1;
             }
         }
     }

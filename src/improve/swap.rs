@@ -250,6 +250,7 @@ pub(super) fn commit(complex: &mut Complex, old: &[u32], new: &[([u32; 4], f64)]
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::improve::blocks::whole;
     use crate::improve::objective::Measure;
     use crate::improve::samples::{cube, fan};
 
@@ -277,7 +278,7 @@ mod tests {
     fn an_edge_with_flat_tets_round_it_is_removed() {
         // Rings of 3, 4, … vertices round an edge that is far too long: 3-2, 4-4, 5-6, …
         for (ring, tets) in [(3, 2), (4, 4), (5, 6), (6, 8), (7, 10)] {
-            let mut complex = Complex::new(&fan(ring, 4.0));
+            let mut complex = whole(&fan(ring, 4.0));
             assert!(swap_all(&mut complex) > 0);
             assert_eq!(complex.living().count(), tets);
         }
@@ -287,7 +288,7 @@ mod tests {
     fn faces_between_two_near_vertices_are_removed() {
         // A ring of n leaves n − 2 faces between the ends: one is the flip 2-3.
         for ring in [3, 4, 5, 6] {
-            let mut complex = Complex::new(&fan(ring, 4.0));
+            let mut complex = whole(&fan(ring, 4.0));
             swap_all(&mut complex);
             // The ends of the edge come near: the edge is wanted back.
             complex.points[0].z = 0.35;
@@ -299,14 +300,14 @@ mod tests {
 
     #[test]
     fn good_tets_are_left_alone() {
-        let mut complex = Complex::new(&fan(5, 0.6));
+        let mut complex = whole(&fan(5, 0.6));
         assert_eq!(swap_all(&mut complex), 0);
     }
 
     #[test]
     fn swaps_in_bad_cubes_keep_the_complex_valid() {
         for seed in 0..8 {
-            let mut complex = Complex::new(&cube(4, seed));
+            let mut complex = whole(&cube(4, seed));
             assert!(swap_all(&mut complex) > 10);
         }
     }

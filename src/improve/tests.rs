@@ -1,6 +1,6 @@
 //! Whole runs on small meshes.
 
-use super::complex::Complex;
+use super::blocks::whole;
 use super::legality::Legality;
 use super::samples::{
     HollowCube, UnitSphere, ball, cube, fan, half_ball, hollow_cube, refined_on_sphere, two_boxes,
@@ -26,7 +26,7 @@ fn illegal(mesh: &Mesh, smoothness: &dyn Smoothness) -> usize {
 
 /// What must hold after every run: a valid mesh, the same boundary, the same bodies, nothing worse.
 fn check(before: &Mesh, after: &Mesh, report: &Report) {
-    Complex::new(after).check().unwrap();
+    whole(after).check().unwrap();
     assert_eq!(after.points.len(), after.classes.len());
     assert_eq!(after.tets.len(), after.bodies.len());
     let triangles = |m: &Mesh| -> Vec<_> {

@@ -7,7 +7,7 @@
 //! knows the worst of them before anything is refined, from the six edge lengths and the volume alone.
 
 use crate::Point;
-use crate::kernel::simplex::{dihedral_angles, volume6};
+use crate::kernel::simplex::{dihedral_cosines, volume6};
 use crate::mesh::{Mesh, VertexId};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -195,15 +195,26 @@ fn measure(points: &[Point], tets: &[[VertexId; 4]]) -> Part {
         worst_refined: f64::INFINITY,
         largest_angle: 0.0,
     };
+    let mut least_cosine = 1.0_f64;
     for tet in tets {
         let p = tet.map(|v| points[v.index()]);
-        let ratio = mean_ratio(&p[0], &p[1], &p[2], &p[3]);
+        let squares = squared_lengths(&p);
+        let v6 = volume6(&p[0], &p[1], &p[2], &p[3]);
+        let scaled = 12.0 * (0.5 * v6.abs()).cbrt().powi(2).copysign(v6);
+        let over = |sum: f64| if sum > 0.0 { scaled / sum } else { 0.0 };
+        let ratio = over(squares.iter().sum());
         part.worst_ratio = part.worst_ratio.min(ratio);
         part.sum_ratio += ratio;
-        part.worst_refined = part.worst_refined.min(refined_quality(&p).0);
-        let angles = if ratio > 0.0 { dihedral_angles(&p) } else { [0.0, 0.0, 0.0, 0.0, 0.0, 180.0] };
-        part.smallest_angles.push(angles.into_iter().fold(180.0, f64::min));
-        part.largest_angle = angles.into_iter().fold(part.largest_angle, f64::max);
+        let children = Diagonal::ALL.map(|d| worst_child_squares(&squares, d));
+        part.worst_refined = part.worst_refined.min(over(children.into_iter().fold(f64::INFINITY, f64::min)));
+        // Angles fall as cosines rise: one arc cosine a tet is enough.
+        let cosines = if ratio > 0.0 { dihedral_cosines(&p) } else { [1.0, -1.0, 0.0, 0.0, 0.0, 0.0] };
+        let angle = |cosine: f64| cosine.acos().to_degrees();
+        part.smallest_angles.push(angle(cosines.into_iter().fold(-1.0, f64::max)));
+        least_cosine = cosines.into_iter().fold(least_cosine, f64::min);
+    }
+    if !tets.is_empty() {
+        part.largest_angle = least_cosine.acos().to_degrees();
     }
     part
 }
@@ -211,6 +222,7 @@ fn measure(points: &[Point], tets: &[[VertexId; 4]]) -> Part {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::kernel::simplex::dihedral_angles;
     use proptest::prelude::*;
     use proptest::test_runner::RngSeed;
 
