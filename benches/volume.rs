@@ -123,6 +123,7 @@ impl Case {
                 ("target", Some(s)) => s.target = number(),
                 ("change", Some(s)) => s.change_below = number(),
                 ("passes", Some(s)) => s.passes = number() as u32,
+                ("straight", Some(s)) => s.measure = improve::Measure::MeanRatio,
                 ("block", Some(s)) => s.block = number() as usize,
                 _ => panic!("{word}: size=, threads=, none, target=, change=, passes= and block= are known"),
             }

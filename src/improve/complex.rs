@@ -1,7 +1,7 @@
 //! The mesh while it is being improved: tets with neighbours, of which any cavity can be filled anew.
 
 use crate::Point;
-use crate::improve::objective::Objective;
+use crate::improve::objective::{self, Objective};
 use crate::kernel::predicates::{Sign, orient3d, volume6_and_error};
 use crate::mesh::{TET_FACES, VertexId};
 use csg::BodyId;
@@ -60,13 +60,16 @@ const OTHERS: [[[usize; 2]; 4]; 4] = [
     [[2, 1], [0, 2], [1, 0], [0, 0]],
 ];
 
+#[inline(always)]
 fn sorted([a, b, c]: [u32; 3]) -> [u32; 3] {
     let (low, high) = (a.min(b), a.max(b));
     [low.min(c), high.min(c).max(low), high.max(c)]
 }
 
+#[inline(always)]
 fn face_of(tet: [u32; 4], face: usize) -> [u32; 3] {
-    TET_FACES[face].map(|k| tet[k])
+    let [a, b, c] = TET_FACES[face & 3];
+    [tet[a], tet[b], tet[c]]
 }
 
 /// Whether the tet of these corners stands exactly positively.
@@ -114,7 +117,7 @@ impl Complex {
             tets,
         };
         for (t, tet) in complex.tets.iter().enumerate() {
-            let p = tet.map(|v| complex.points[v as usize]);
+            let p = complex.corners(*tet);
             assert!(is_positive(&p), "tet {t} of vertices {tet:?} at {} is not positively oriented", p[0]);
             for &v in tet {
                 complex.vertex_tet[v as usize] = t as u32;
@@ -199,7 +202,7 @@ impl Complex {
 
     /// The corners of a tet.
     pub fn corners(&self, tet: [u32; 4]) -> [Point; 4] {
-        tet.map(|v| self.points[v as usize])
+        objective::corners(&self.points, tet)
     }
 
     /// Whether the face opposite vertex `face` of `tet` must stay.

@@ -4,7 +4,7 @@ use crate::Point;
 use crate::improve::complex::NONE;
 use crate::improve::legality::Legality;
 use crate::improve::limits::TetLimits;
-use crate::kernel::quality::{Diagonal, squared_lengths, worst_child_squares};
+use crate::kernel::quality::{Diagonal, squared_lengths, worst_child_of};
 use crate::kernel::simplex::{area_vector, volume6};
 use crate::{Vector, mesh::TET_FACES};
 
@@ -39,6 +39,13 @@ const OF_REGULAR: f64 = 20.784_609_690_826_528; // 12·√3
 /// The sum of the worst child of the regular tet is 7/6 of its own: that to the power 3/2.
 const REFINED_SUM: f64 = 1.260_144_024_690_417_4;
 
+/// The corners of a tet.
+#[inline(always)]
+pub(super) fn corners(points: &[Point], [a, b, c, d]: [u32; 4]) -> [Point; 4] {
+    // `map` is not always inlined here.
+    [points[a as usize], points[b as usize], points[c as usize], points[d as usize]]
+}
+
 /// The score of a mean ratio.
 pub(super) fn score_of_ratio(ratio: f64) -> f64 {
     ratio * ratio.max(0.0).sqrt()
@@ -61,7 +68,7 @@ impl Objective<'_> {
 
     /// The score of a tet if it is above `least`, else something that is not.
     pub fn score_above(&self, points: &[Point], tet: [u32; 4], least: f64) -> f64 {
-        let p = tet.map(|v| points[v as usize]);
+        let p = corners(points, tet);
         let shape = self.shape(&p);
         if shape <= least || shape <= 0.0 {
             // Legality and limits only ever lower it.
@@ -140,31 +147,39 @@ impl Objective<'_> {
         if v6.is_nan() || v6 <= 0.0 {
             return (0.0, Vector::zeros());
         }
-        let (sum, scale, weights) = self.denominator(&squared_lengths(p));
+        let squares = squared_lengths(p);
+        let (sum, scale, diagonal) = self.denominator(&squares);
+        // How the sum grows with the first three squares.
+        let mut weights = [1.0; 3];
+        if let Some(k) = diagonal {
+            // 2S − 2(a+b) − min(a,b): see `worst_child_squares`.
+            weights = [2.0; 3];
+            weights[k] = if squares[k] < squares[5 - k] { -1.0 } else { 0.0 };
+        }
         let shape = scale * v6 / (sum * sum.sqrt());
         let [a, b, c] = TET_FACES[0];
         let volume_part = area_vector(&p[a], &p[b], &p[c]) * (-1.0 / v6);
-        let length_part = (1..4).map(|k| (p[0] - p[k]) * (3.0 * weights[k - 1])).sum::<Vector>() / sum;
+        let [u, v, w] = [p[0] - p[1], p[0] - p[2], p[0] - p[3]];
+        let length_part = (u * weights[0] + v * weights[1] + w * weights[2]) * (3.0 / sum);
         (shape, (volume_part - length_part) * shape)
     }
 
-    /// The sum that the volume is compared with, the factor before, and the sum's derivatives by the first
-    /// three squared lengths.
-    #[inline]
-    fn denominator(&self, squares: &[f64; 6]) -> (f64, f64, [f64; 3]) {
-        let own: f64 = squares.iter().sum();
-        let mut best = (own, OF_REGULAR, [1.0; 3]);
-        if self.measure == Measure::Refined {
-            let worst = Diagonal::ALL.map(|d| worst_child_squares(squares, d));
-            let k = (1..3).fold(0, |best, k| if worst[k] < worst[best] { k } else { best });
-            best = (worst[k], OF_REGULAR * REFINED_SUM, [1.0; 3]);
-            if worst[k] > own {
-                // 2S − 2(a+b) − min(a,b): see `worst_child_squares`.
-                best.2 = [2.0; 3];
-                best.2[k] = if squares[k] < squares[5 - k] { -1.0 } else { 0.0 };
+    /// The sum that the volume is compared with, the factor before, and which diagonal makes it, if the tet's own sum does not.
+    #[inline(always)]
+    fn denominator(&self, squares: &[f64; 6]) -> (f64, f64, Option<usize>) {
+        let own = (squares[0] + squares[1]) + (squares[2] + squares[3]) + (squares[4] + squares[5]);
+        if self.measure == Measure::MeanRatio {
+            return (own, OF_REGULAR, None);
+        }
+        let worst = |d: Diagonal| worst_child_of(own, squares, d);
+        let mut best = (worst(Diagonal::Mid01To23), 0);
+        for (k, d) in [(1, Diagonal::Mid02To13), (2, Diagonal::Mid03To12)] {
+            let sum = worst(d);
+            if sum < best.0 {
+                best = (sum, k);
             }
         }
-        best
+        (best.0, OF_REGULAR * REFINED_SUM, (best.0 > own).then_some(best.1))
     }
 }
 

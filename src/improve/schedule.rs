@@ -113,6 +113,13 @@ const TERRIBLE: f64 = 0.35;
 /// See [`TERRIBLE`].
 const SHORTER: f64 = 0.5;
 
+/// So many tets of a block, and one of [`TETS_A_RESCUE`], may be tried so at length in each pass: skins full of needles leave
+/// nearly all tets terrible, and a try takes a quarter of a millisecond.
+const RESCUES: usize = 100;
+
+/// See [`RESCUES`].
+const TETS_A_RESCUE: usize = 50;
+
 /// Rounds over the mesh: all of it, then what is left to be improved at the seams between blocks, then at the seams of
 /// these, which is little and taken as one block.
 const ROUNDS: usize = 3;
@@ -336,15 +343,19 @@ impl Tools {
         settings: &Settings,
         counts: &mut Counts,
     ) {
-        for (score, t) in worst_first(complex, score_of_ratio(settings.change_below.min(settings.target))) {
+        let least = score_of_ratio(settings.change_below.min(settings.target));
+        let mut rescues = RESCUES + complex.tets.len() / TETS_A_RESCUE;
+        for (score, t) in worst_first(complex, least) {
             if !is_still(complex, score, t) {
                 continue;
             }
             if self.collapser.improve(complex, objective, size, t) {
                 counts.collapses += 1;
-            } else if self.insert(complex, objective, size, settings, t) {
-                counts.insertions += 1;
+                continue;
             }
+            let is_terrible = score < score_of_ratio(TERRIBLE) && rescues > 0;
+            rescues -= usize::from(is_terrible);
+            counts.insertions += usize::from(self.insert(complex, objective, size, settings, t, is_terrible));
         }
     }
 
@@ -356,8 +367,8 @@ impl Tools {
         size: &dyn SizeField,
         settings: &Settings,
         tet: u32,
+        is_terrible: bool,
     ) -> bool {
-        let is_terrible = complex.scores[tet as usize] < score_of_ratio(TERRIBLE);
         let (tries, least_edge) = if is_terrible { (usize::MAX, SHORTER) } else { (1, 1.0) };
         let mut best: Option<(f64, Candidate)> = None;
         for candidate in candidates(complex, tet).into_iter().take(tries) {

@@ -58,7 +58,12 @@ pub fn squared_lengths(p: &[Point; 4]) -> [f64; 6] {
 /// of each of the four other edges, and half of one of the two: at the worst the sum 2S − 2(a+b) − min(a,b).
 #[inline]
 pub fn worst_child_squares(squares: &[f64; 6], diagonal: Diagonal) -> f64 {
-    let sum: f64 = squares.iter().sum();
+    worst_child_of(squares.iter().sum(), squares, diagonal)
+}
+
+/// [`worst_child_squares`] where the sum of the squares is known.
+#[inline(always)]
+pub fn worst_child_of(sum: f64, squares: &[f64; 6], diagonal: Diagonal) -> f64 {
     let (a, b) = (squares[diagonal as usize], squares[5 - diagonal as usize]);
     sum.max(2.0 * sum - 2.0 * (a + b) - a.min(b))
 }
