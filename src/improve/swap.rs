@@ -46,23 +46,34 @@ pub(super) struct Swapper {
 struct Table([[(f64, u8); LONGEST_RING]; LONGEST_RING]);
 
 impl Swapper {
-    /// Makes the best swap that takes `tet` out and raises the worst score of its hole. False if there is none.
+    /// Makes the best swap that takes `tet` out as the worst of its hole and raises the worst score there. False if there is
+    /// none. Holes with a worse tet are left to that one: it comes first where tets are visited worst first.
     pub fn improve(&mut self, complex: &mut Complex, objective: &Objective, tet: u32) -> bool {
-        self.find(complex, objective, tet) && self.commit(complex)
+        let own = complex.scores[tet as usize];
+        self.find_above(complex, objective, tet, own) && self.commit(complex)
     }
 
-    /// Finds that swap. False if there is none.
+    /// Finds the best swap that takes `tet` out and raises the worst score of its hole. False if there is none.
     pub fn find(&mut self, complex: &Complex, objective: &Objective, tet: u32) -> bool {
+        self.find_above(complex, objective, tet, INVERTED)
+    }
+
+    /// [`find`](Self::find) among the holes without a tet worse than `least`.
+    fn find_above(&mut self, complex: &Complex, objective: &Objective, tet: u32, least: f64) -> bool {
         self.best.gain = LEAST_GAIN;
         let mut better = false;
         for [i, j] in TET_EDGES {
-            if self.find_edge_removal(complex, objective, tet, i, j) && self.found.gain > self.best.gain {
+            if self.find_edge_removal(complex, objective, tet, [i, j], least)
+                && self.found.gain > self.best.gain
+            {
                 std::mem::swap(&mut self.found, &mut self.best);
                 better = true;
             }
         }
         for face in 0..4 {
-            if self.find_face_removal(complex, objective, tet, face) && self.found.gain > self.best.gain {
+            if self.find_face_removal(complex, objective, tet, face, least)
+                && self.found.gain > self.best.gain
+            {
                 std::mem::swap(&mut self.found, &mut self.best);
                 better = true;
             }
@@ -86,14 +97,17 @@ impl Swapper {
         complex: &Complex,
         objective: &Objective,
         tet: u32,
-        i: usize,
-        j: usize,
+        [i, j]: [usize; 2],
+        least: f64,
     ) -> bool {
         if !complex.ring(tet, i, j, LONGEST_RING, &mut self.ring) {
             return false;
         }
         let [low, high] = [i, j].map(|k| complex.tets[tet as usize][k]);
         let before = complex.worst_of(&self.ring.tets);
+        if before < least {
+            return false;
+        }
         let ring = &self.ring.vertices;
         let worst = self.table.fill(ring.len(), before, |a, b, c, least| {
             let [a, b, c] = [ring[a], ring[b], ring[c]];
@@ -118,8 +132,18 @@ impl Swapper {
     }
 
     /// The best filling without the face opposite the local vertex `face`, and perhaps without faces beside it, left in `found`.
-    fn find_face_removal(&mut self, complex: &Complex, objective: &Objective, tet: u32, face: usize) -> bool {
+    fn find_face_removal(
+        &mut self,
+        complex: &Complex,
+        objective: &Objective,
+        tet: u32,
+        face: usize,
+        least: f64,
+    ) -> bool {
         let Some((other, far)) = complex.neighbour(tet, face) else { return false };
+        if complex.scores[other as usize] < least {
+            return false;
+        }
         let low = complex.tets[tet as usize][face];
         let high = complex.tets[other as usize][far];
         let mut sandwich = Sandwich { complex, objective, low, high, old: vec![tet, other], new: Vec::new() };

@@ -70,7 +70,7 @@ fn a_shaken_cube_gets_good_angles_and_keeps_its_boundary() {
 fn interfaces_between_bodies_stay() {
     let before = two_boxes(6, 1);
     let mut mesh = before.clone();
-    let report = improve(&mut mesh, &UniformSize(0.4), &Settings::default());
+    let report = improve(&mut mesh, &UniformSize(0.4), &Settings::of(Effort::Thorough));
     check(&before, &mesh, &report);
     assert!(report.after.smallest_dihedral > 25.0, "{:?}", report.after);
 }
@@ -160,7 +160,8 @@ fn blocks_leave_no_bad_tets_at_their_seams() {
     for block in [100, 500, usize::MAX] {
         let before = two_boxes(8, 1);
         let mut mesh = before.clone();
-        let report = improve(&mut mesh, &UniformSize(0.3), &Settings { block, ..Settings::default() });
+        let settings = Settings { block, ..Settings::of(Effort::Thorough) };
+        let report = improve(&mut mesh, &UniformSize(0.3), &settings);
         check(&before, &mesh, &report);
         assert!(report.after.smallest_dihedral > 25.0, "{:?}", report.after);
     }

@@ -143,11 +143,13 @@ const CHUNK: usize = 4096;
 
 /// Sums of one chunk of tets.
 struct Part {
-    smallest_angles: Vec<f64>,
+    /// Of each tet the cosine of the smallest angle: as angles fall cosines rise, and few arc cosines need be taken.
+    largest_cosines: Vec<f64>,
     worst_ratio: f64,
     sum_ratio: f64,
     worst_refined: f64,
-    largest_angle: f64,
+    least_cosine: f64,
+    histogram: [usize; HISTOGRAM_CLASSES],
 }
 
 impl QualitySummary {
@@ -169,21 +171,22 @@ impl QualitySummary {
             histogram: vec![0; HISTOGRAM_CLASSES],
             ..Self::default()
         };
-        let mut angles = Vec::with_capacity(tets.len());
+        let mut cosines = Vec::with_capacity(tets.len());
+        let mut least_cosine = 1.0_f64;
         for part in parts {
             summary.worst_mean_ratio = summary.worst_mean_ratio.min(part.worst_ratio);
             summary.average_mean_ratio += part.sum_ratio / tets.len() as f64;
             summary.worst_refined = summary.worst_refined.min(part.worst_refined);
-            summary.largest_dihedral = summary.largest_dihedral.max(part.largest_angle);
-            angles.extend(part.smallest_angles);
+            least_cosine = least_cosine.min(part.least_cosine);
+            summary.histogram.iter_mut().zip(part.histogram).for_each(|(sum, count)| *sum += count);
+            cosines.extend(part.largest_cosines);
         }
-        for angle in &angles {
-            summary.histogram[((angle / HISTOGRAM_STEP) as usize).min(HISTOGRAM_CLASSES - 1)] += 1;
-        }
+        let angle = |cosine: f64| cosine.acos().to_degrees();
+        summary.largest_dihedral = angle(least_cosine);
         // Nearest rank: the angle that k percent of the tets do not exceed.
         let mut rank = |percent: usize| {
-            let k = (angles.len() * percent).div_ceil(100).max(1) - 1;
-            *angles.select_nth_unstable_by(k, f64::total_cmp).1
+            let k = (cosines.len() * percent).div_ceil(100).max(1) - 1;
+            angle(*cosines.select_nth_unstable_by(k, |a, b| b.total_cmp(a)).1)
         };
         summary.smallest_dihedral = rank(0);
         summary.first_percentile = rank(1);
@@ -194,13 +197,15 @@ impl QualitySummary {
 
 fn measure(points: &[Point], tets: &[[VertexId; 4]]) -> Part {
     let mut part = Part {
-        smallest_angles: Vec::with_capacity(tets.len()),
+        largest_cosines: Vec::with_capacity(tets.len()),
         worst_ratio: f64::INFINITY,
         sum_ratio: 0.0,
         worst_refined: f64::INFINITY,
-        largest_angle: 0.0,
+        least_cosine: 1.0,
+        histogram: [0; HISTOGRAM_CLASSES],
     };
-    let mut least_cosine = 1.0_f64;
+    let bounds: [f64; HISTOGRAM_CLASSES - 1] =
+        std::array::from_fn(|k| ((k + 1) as f64 * HISTOGRAM_STEP).to_radians().cos());
     for tet in tets {
         let p = tet.map(|v| points[v.index()]);
         let squares = squared_lengths(&p);
@@ -212,14 +217,11 @@ fn measure(points: &[Point], tets: &[[VertexId; 4]]) -> Part {
         part.sum_ratio += ratio;
         let children = Diagonal::ALL.map(|d| worst_child_squares(&squares, d));
         part.worst_refined = part.worst_refined.min(over(children.into_iter().fold(f64::INFINITY, f64::min)));
-        // Angles fall as cosines rise: one arc cosine a tet is enough.
         let cosines = if ratio > 0.0 { dihedral_cosines(&p) } else { [1.0, -1.0, 0.0, 0.0, 0.0, 0.0] };
-        let angle = |cosine: f64| cosine.acos().to_degrees();
-        part.smallest_angles.push(angle(cosines.into_iter().fold(-1.0, f64::max)));
-        least_cosine = cosines.into_iter().fold(least_cosine, f64::min);
-    }
-    if !tets.is_empty() {
-        part.largest_angle = least_cosine.acos().to_degrees();
+        let largest = cosines.into_iter().fold(-1.0, f64::max);
+        part.largest_cosines.push(largest);
+        part.least_cosine = cosines.into_iter().fold(part.least_cosine, f64::min);
+        part.histogram[bounds.iter().filter(|&&bound| largest <= bound).count()] += 1;
     }
     part
 }

@@ -37,7 +37,7 @@ pub fn dihedral_cosines(p: &[Point; 4]) -> [f64; 6] {
     let normal = |face: usize| {
         let [a, b, c] = crate::mesh::TET_FACES[face];
         let n = area_vector(&p[a], &p[b], &p[c]);
-        n / n.norm().max(f64::MIN_POSITIVE)
+        n * (1.0 / n.norm().max(f64::MIN_POSITIVE))
     };
     let [n0, n1, n2, n3] = [normal(0), normal(1), normal(2), normal(3)];
     // The edge between vertices i and j lies on the faces opposite the other two.
