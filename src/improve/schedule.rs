@@ -50,6 +50,8 @@ pub enum Effort {
     /// All but the good tets.
     #[default]
     Standard,
+    /// The same with more patience: for coarse meshes, each of whose tets becomes many.
+    Careful,
     /// Nearly all tets, until little changes.
     Thorough,
 }
@@ -60,6 +62,7 @@ impl Settings {
         let (passes, target) = match effort {
             Effort::Quick => (1, 0.6),
             Effort::Standard => (3, 0.8),
+            Effort::Careful => (8, 0.85),
             Effort::Thorough => (8, 0.9),
         };
         let measure = Measure::default();

@@ -157,7 +157,7 @@ fn any_number_of_threads_gives_the_same_mesh() {
 
 #[test]
 fn blocks_leave_no_bad_tets_at_their_seams() {
-    for block in [100, 500, usize::MAX] {
+    for block in [500, 2000] {
         let before = two_boxes(8, 1);
         let mut mesh = before.clone();
         let settings = Settings { block, ..Settings::of(Effort::Thorough) };
@@ -192,7 +192,7 @@ fn a_boundary_triangle_off_the_tets_is_refused() {
 
 #[test]
 fn more_effort_gives_better_angles() {
-    let ends: Vec<f64> = [Effort::Quick, Effort::Standard, Effort::Thorough]
+    let ends: Vec<f64> = [Effort::Quick, Effort::Standard, Effort::Careful]
         .map(|effort| {
             let mut mesh = cube(8, 3);
             improve(&mut mesh, &UniformSize(0.3), &Settings::of(effort)).after.first_percentile

@@ -149,7 +149,8 @@ fn fill(model: &Model, curves: SurfaceMesh, size: &dyn SizeField) -> Result<Coar
         surface::mesh_patches(geometry, features, curves, size, &surface::Settings::default())?;
     let (mut mesh, volume) = fill_bodies(features, surface, size)?;
     let smoothness = GeometrySmoothness { geometry, features };
-    let improved = improve::make_refinable(&mut mesh, size, &smoothness, &improve::Settings::default());
+    let settings = improve::Settings::of(improve::Effort::Careful);
+    let improved = improve::make_refinable(&mut mesh, size, &smoothness, &settings);
     let report = CoarseReport {
         vertices: mesh.points.len() as u64,
         tets: mesh.tets.len() as u64,
