@@ -2,6 +2,7 @@
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
+use tetmill::improve::Effort;
 use tetmill::picture::Cut;
 use tetmill::pipeline::generate::MOST_LEVELS;
 use tetmill::size::Preset;
@@ -54,6 +55,9 @@ pub struct SizeOptions {
     /// Growth of the size per unit of distance, instead of the preset's
     #[arg(long, value_name = "G", value_parser = positive)]
     pub grading: Option<f64>,
+    /// How much is done for better shapes: quick, standard, careful or thorough [default: careful up to 100,000 tets, then standard]
+    #[arg(long, value_name = "NAME")]
+    pub effort: Option<Effort>,
     /// Number of tets of the coarse mesh: COUNT to 1.5 COUNT, or the least that the geometry allows
     #[arg(long, value_name = "COUNT", value_parser = count)]
     pub coarse: Option<u64>,

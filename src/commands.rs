@@ -10,7 +10,7 @@ use tetmill::io::{self, Written, elmer};
 use tetmill::mesh::stream::MeshStream;
 use tetmill::pipeline::input::{self, InputSettings};
 use tetmill::pipeline::target::Outcome;
-use tetmill::pipeline::{GenerateSettings, Generated, Model, Wanted, generate};
+use tetmill::pipeline::{CoarseSettings, GenerateSettings, Generated, Model, Wanted, generate};
 use tetmill::progress::Progress;
 use tetmill::report::{MeshReport, PartitionReport, Report};
 use tetmill::size::SizeSettings;
@@ -80,7 +80,7 @@ fn generate_on(comm: &dyn Communicator, options: &Generate, start: Instant) -> R
         .then(|| progress.stage("read", || read_sized_model(&options.input, &options.size, &progress)))
         .transpose();
     let model = agree(comm, model)?;
-    let settings = GenerateSettings { size: size_settings(&options.size), wanted: wanted(options) };
+    let settings = GenerateSettings { coarse: coarse_settings(&options.size), wanted: wanted(options) };
     let made = generate(comm, model.as_ref(), &settings, &progress)?;
     let target = options.output.clone().unwrap_or_else(|| {
         options.input.files[0].with_extension("").file_name().map_or_else(|| "mesh".into(), PathBuf::from)
@@ -120,11 +120,12 @@ fn read_sized_model(
     progress: &Progress,
 ) -> Result<Model, Failure> {
     let model = read_model(options, progress)?;
-    let SizeOptions { preset, maxh, minh, grading, coarse } = size;
+    let SizeOptions { preset, maxh, minh, grading, effort, coarse } = size;
     let sized = [maxh, minh, grading].iter().any(|length| length.is_some());
-    if matches!(model, Model::Given(_)) && (sized || preset.is_some() || coarse.is_some()) {
+    if matches!(model, Model::Given(_)) && (sized || preset.is_some() || effort.is_some() || coarse.is_some())
+    {
         return Err(Failure::input(format!(
-            "{} is a mesh already and is taken as it is: leave out --preset, --maxh, --minh, --grading and --coarse",
+            "{} is a mesh already and is taken as it is: leave out --preset, --maxh, --minh, --grading, --effort and --coarse",
             name_of(options)
         )));
     }
@@ -137,12 +138,12 @@ fn name_of(options: &InputOptions) -> String {
     names.join(", ")
 }
 
-fn size_settings(options: &SizeOptions) -> SizeSettings {
+fn coarse_settings(options: &SizeOptions) -> CoarseSettings {
     let mut settings = SizeSettings::from(options.preset.unwrap_or_default());
     settings.maxh = options.maxh;
     settings.minh = options.minh.unwrap_or(settings.minh);
     settings.grading = options.grading.unwrap_or(settings.grading);
-    settings
+    CoarseSettings { size: settings, effort: options.effort }
 }
 
 fn wanted(options: &Generate) -> Wanted {
@@ -301,7 +302,7 @@ pub fn run_mesh(options: &MeshFile) -> Result<(), Failure> {
         Some(tets) => Wanted::Coarse { tets, levels: 0 },
         None => Wanted::Sizes { levels: 0 },
     };
-    let settings = GenerateSettings { size: size_settings(&options.size), wanted };
+    let settings = GenerateSettings { coarse: coarse_settings(&options.size), wanted };
     let made = generate(&comm, Some(&model), &settings, &progress)?;
     let written = progress.stage("write", || io::serial::write(&made.part, &made.names, &options.output))?;
     if let Some(file) = &options.picture {

@@ -93,6 +93,7 @@ impl Collapser {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::improve::blocks::whole;
     use crate::improve::objective::Measure;
     use crate::improve::samples::cube;
     use crate::size::UniformSize;
@@ -100,7 +101,7 @@ mod tests {
     const SHAPES: Objective = Objective { measure: Measure::MeanRatio, legality: None };
 
     fn collapse_all(size: f64) -> (usize, usize) {
-        let mut complex = Complex::new(&cube(5, 3));
+        let mut complex = whole(&cube(5, 3));
         complex.score_all(&SHAPES);
         let (before, mut done) = (complex.living().count(), 0);
         let mut collapser = Collapser::default();

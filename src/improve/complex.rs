@@ -1,9 +1,9 @@
 //! The mesh while it is being improved: tets with neighbours, of which any cavity can be filled anew.
 
 use crate::Point;
-use crate::improve::objective::Objective;
-use crate::kernel::predicates::{Sign, orient3d};
-use crate::mesh::{Class, Mesh, TET_FACES, VertexId};
+use crate::improve::objective::{self, Objective};
+use crate::kernel::predicates::{Sign, orient3d, volume6_and_error};
+use crate::mesh::{TET_FACES, VertexId};
 use csg::BodyId;
 
 /// No tet, no vertex.
@@ -19,8 +19,6 @@ pub(super) const NONE: u32 = u32::MAX;
 pub(super) struct Complex {
     /// The vertices' coordinates.
     pub points: Vec<Point>,
-    /// What each vertex lies on.
-    pub classes: Vec<Class>,
     /// Whether the vertex may be moved or taken out.
     pub free: Vec<bool>,
     /// The vertices of each tet, positively oriented; all [`NONE`] in a dead slot.
@@ -62,13 +60,23 @@ const OTHERS: [[[usize; 2]; 4]; 4] = [
     [[2, 1], [0, 2], [1, 0], [0, 0]],
 ];
 
-fn sorted(mut key: [u32; 3]) -> [u32; 3] {
-    key.sort_unstable();
-    key
+#[inline(always)]
+fn sorted([a, b, c]: [u32; 3]) -> [u32; 3] {
+    let (low, high) = (a.min(b), a.max(b));
+    [low.min(c), high.min(c).max(low), high.max(c)]
 }
 
+#[inline(always)]
 fn face_of(tet: [u32; 4], face: usize) -> [u32; 3] {
-    TET_FACES[face].map(|k| tet[k])
+    let [a, b, c] = TET_FACES[face & 3];
+    [tet[a], tet[b], tet[c]]
+}
+
+/// Whether the tet of these corners stands exactly positively.
+fn is_positive(p: &[Point; 4]) -> bool {
+    let edge = |k: usize| [p[k].x - p[0].x, p[k].y - p[0].y, p[k].z - p[0].z];
+    let (volume, error) = volume6_and_error([edge(1), edge(2), edge(3)]);
+    volume > error || (volume >= -error && orient3d(&p[0], &p[1], &p[2], &p[3]) == Sign::Positive)
 }
 
 /// The place of `vertex` in a tet that has it.
@@ -77,20 +85,26 @@ pub(super) fn place(tet: [u32; 4], vertex: u32) -> usize {
 }
 
 impl Complex {
-    /// Takes a mesh apart. Scores are left at zero.
+    /// Joins tets over points; they need not be all tets of a mesh. `free` vertices may be moved unless one of
+    /// their faces is locked: faces without a tet beyond or between two bodies are, and those for which
+    /// `is_kept` says so, being given their sorted vertices. Scores are left at zero.
     ///
     /// # Panics
-    /// If a tet is not positively oriented, a face has three tets, or a boundary triangle is no tet's face.
-    pub fn new(mesh: &Mesh) -> Self {
-        let tets: Vec<[u32; 4]> = mesh.tets.iter().map(|t| t.map(|v| v.0)).collect();
-        assert!(tets.len() < (1 << 30), "{} tets: the coarse mesh can have 2^30 at most", tets.len());
-        let count = mesh.points.len();
+    /// If a tet is not positively oriented or a face has three tets.
+    pub fn new(
+        points: Vec<Point>,
+        free: Vec<bool>,
+        tets: Vec<[u32; 4]>,
+        bodies: Vec<BodyId>,
+        is_kept: impl FnMut([u32; 3]) -> bool,
+    ) -> Self {
+        assert!(tets.len() < (1 << 30), "{} tets: there can be 2^30 at most", tets.len());
+        let count = points.len();
         let mut complex = Self {
-            points: mesh.points.clone(),
-            classes: mesh.classes.clone(),
-            free: mesh.classes.iter().map(|c| matches!(c, Class::Body(_))).collect(),
+            points,
+            free,
             scores: vec![0.0; tets.len()],
-            bodies: mesh.bodies.clone(),
+            bodies,
             touched: vec![0; count],
             pass: 0,
             across: vec![[NONE; 4]; tets.len()],
@@ -103,106 +117,77 @@ impl Complex {
             tets,
         };
         for (t, tet) in complex.tets.iter().enumerate() {
-            let p = tet.map(|v| complex.points[v as usize]);
-            let sign = orient3d(&p[0], &p[1], &p[2], &p[3]);
-            assert_eq!(sign, Sign::Positive, "tet {t} of vertices {tet:?} is not positively oriented");
+            let p = complex.corners(*tet);
+            assert!(is_positive(&p), "tet {t} of vertices {tet:?} at {} is not positively oriented", p[0]);
             for &v in tet {
                 complex.vertex_tet[v as usize] = t as u32;
             }
         }
-        complex.join_neighbours(mesh);
-        for (v, &tet) in complex.vertex_tet.iter().enumerate() {
-            complex.free[v] &= tet != NONE;
-        }
+        complex.join_neighbours(is_kept);
         complex
     }
 
-    /// Finds the neighbour across each face, and locks the faces on patches, between bodies and of the hull.
-    fn join_neighbours(&mut self, mesh: &Mesh) {
-        let mut triangles: Vec<[u32; 3]> =
-            mesh.triangles.iter().map(|t| sorted(t.vertices.map(|v| v.0))).collect();
-        triangles.sort_unstable();
-        // Faces by their lowest vertex, by counting: `faces[starts[v]..starts[v + 1]]`.
+    /// Finds the neighbour across each face, and locks faces.
+    fn join_neighbours(&mut self, mut is_kept: impl FnMut([u32; 3]) -> bool) {
+        // Faces by their lowest vertex, by counting: `faces[starts[v]..starts[v + 1]]`; of each the other two and its place.
         let mut starts = vec![0_u32; self.points.len() + 1];
-        let lowest = |tet: [u32; 4], face: usize| face_of(tet, face).into_iter().min().unwrap_or(NONE);
         for &tet in &self.tets {
             for face in 0..4 {
-                starts[lowest(tet, face) as usize + 1] += 1;
+                starts[sorted(face_of(tet, face))[0] as usize + 1] += 1;
             }
         }
         for v in 0..self.points.len() {
             starts[v + 1] += starts[v];
         }
-        let mut faces = vec![NONE; 4 * self.tets.len()];
+        let mut faces = vec![(0_u64, NONE); 4 * self.tets.len()];
         let mut next = starts.clone();
         for (t, &tet) in self.tets.iter().enumerate() {
             for face in 0..4 {
-                let slot = &mut next[lowest(tet, face) as usize];
-                faces[*slot as usize] = 4 * t as u32 + face as u32;
+                let [low, middle, high] = sorted(face_of(tet, face));
+                let slot = &mut next[low as usize];
+                faces[*slot as usize] =
+                    (u64::from(middle) << 32 | u64::from(high), 4 * t as u32 + face as u32);
                 *slot += 1;
             }
         }
-        let mut found = 0;
         for v in 0..self.points.len() {
-            let mut here: Vec<([u32; 3], u32)> = faces[starts[v] as usize..starts[v + 1] as usize]
-                .iter()
-                .map(|&f| (sorted(face_of(self.tets[f as usize / 4], f as usize % 4)), f))
-                .collect();
-            here.sort_unstable();
-            for group in here.chunk_by(|a, b| a.0 == b.0) {
-                let on_patch = triangles.binary_search(&group[0].0).is_ok();
-                found += usize::from(on_patch);
-                self.join_face(group, on_patch);
-            }
-        }
-        assert_eq!(found, triangles.len(), "boundary triangles that are no tet's face, or given twice");
-    }
-
-    fn join_face(&mut self, group: &[([u32; 3], u32)], on_patch: bool) {
-        let locked = match group {
-            [(_, f)] => {
-                self.across[*f as usize / 4][*f as usize % 4] = NONE;
-                true
-            }
-            [(_, f), (_, g)] => {
-                self.across[*f as usize / 4][*f as usize % 4] = *g;
-                self.across[*g as usize / 4][*g as usize % 4] = *f;
-                on_patch || self.bodies[*f as usize / 4] != self.bodies[*g as usize / 4]
-            }
-            _ => panic!("the face {:?} has {} tets", group[0].0, group.len()),
-        };
-        if locked {
-            for (key, f) in group {
-                self.locked[*f as usize / 4] |= 1 << (f % 4);
-                for v in key {
-                    self.free[*v as usize] = false;
+            // A few dozen: searching them is faster than sorting them.
+            let mut here = &mut faces[starts[v] as usize..starts[v + 1] as usize];
+            while let Some((&mut (key, first), rest)) = here.split_first_mut() {
+                let vertices = [v as u32, (key >> 32) as u32, key as u32];
+                let second = rest.iter().position(|f| f.0 == key);
+                if let Some(k) = second {
+                    let third = rest[k + 1..].iter().find(|f| f.0 == key);
+                    assert!(third.is_none(), "the face {vertices:?} has three tets");
+                    self.join(first, rest[k].1, vertices, is_kept(vertices));
+                    rest.swap(0, k);
+                    here = &mut rest[1..];
+                } else {
+                    is_kept(vertices);
+                    self.lock(first, vertices);
+                    here = rest;
                 }
             }
         }
     }
 
-    /// Puts the improved tets and vertices back into the mesh: surviving vertices in their old order, then new ones.
-    pub fn store(self, mesh: &mut Mesh) {
-        let gone = |v: usize| self.free[v] && self.vertex_tet[v] == NONE;
-        let mut old_to_new = vec![VertexId(NONE); self.points.len()];
-        mesh.points.clear();
-        mesh.classes.clear();
-        for (v, new) in old_to_new.iter_mut().enumerate() {
-            if !gone(v) {
-                *new = VertexId::new(mesh.points.len());
-                mesh.points.push(self.points[v]);
-                mesh.classes.push(self.classes[v]);
-            }
+    fn join(&mut self, one: u32, other: u32, vertices: [u32; 3], is_kept: bool) {
+        self.across[one as usize / 4][one as usize % 4] = other;
+        self.across[other as usize / 4][other as usize % 4] = one;
+        if is_kept || self.bodies[one as usize / 4] != self.bodies[other as usize / 4] {
+            self.lock(one, vertices);
+            self.lock(other, vertices);
         }
-        let living = || (0..self.tets.len()).filter(|&t| self.tets[t][0] != NONE);
-        mesh.tets = living().map(|t| self.tets[t].map(|v| old_to_new[v as usize])).collect();
-        mesh.bodies = living().map(|t| self.bodies[t]).collect();
-        for triangle in &mut mesh.triangles {
-            triangle.vertices = triangle.vertices.map(|v| old_to_new[v.index()]);
-        }
-        for segment in &mut mesh.segments {
-            segment.vertices = segment.vertices.map(|v| old_to_new[v.index()]);
-        }
+    }
+
+    fn lock(&mut self, half_face: u32, vertices: [u32; 3]) {
+        self.locked[half_face as usize / 4] |= 1 << (half_face % 4);
+        vertices.into_iter().for_each(|v| self.free[v as usize] = false);
+    }
+
+    /// Whether the vertex has tets.
+    pub fn is_used(&self, vertex: u32) -> bool {
+        self.vertex_tet[vertex as usize] != NONE
     }
 
     /// Whether the slot holds a tet.
@@ -217,7 +202,7 @@ impl Complex {
 
     /// The corners of a tet.
     pub fn corners(&self, tet: [u32; 4]) -> [Point; 4] {
-        tet.map(|v| self.points[v as usize])
+        objective::corners(&self.points, tet)
     }
 
     /// Whether the face opposite vertex `face` of `tet` must stay.
@@ -248,8 +233,7 @@ impl Complex {
 
     /// Whether a tet, which need not be one of the complex, stands exactly positively.
     pub fn is_positive(&self, tet: [u32; 4]) -> bool {
-        let [a, b, c, d] = self.corners(tet);
-        orient3d(&a, &b, &c, &d) == Sign::Positive
+        is_positive(&self.corners(tet))
     }
 
     /// Walks round the edge between the local vertices `i` and `j` of `tet`. Gives its tets, and the vertices
@@ -306,11 +290,10 @@ impl Complex {
         }
     }
 
-    /// Adds a vertex inside a body; it has no tets yet.
-    pub fn add_vertex(&mut self, point: Point, body: BodyId) -> u32 {
+    /// Adds a free vertex; it has no tets yet.
+    pub fn add_vertex(&mut self, point: Point) -> u32 {
         let id = VertexId::new(self.points.len()).0;
         self.points.push(point);
-        self.classes.push(Class::Body(body));
         self.free.push(true);
         self.touched.push(self.pass);
         self.vertex_tet.push(NONE);
@@ -321,7 +304,6 @@ impl Complex {
     pub fn withdraw_vertex(&mut self) {
         assert_eq!(self.vertex_tet.pop(), Some(NONE), "the last vertex has a tet");
         self.points.pop();
-        self.classes.pop();
         self.free.pop();
         self.touched.pop();
     }
@@ -460,23 +442,13 @@ pub(super) struct Ring {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::improve::samples::{cube, half_ball, two_boxes};
+    use crate::improve::blocks::whole;
+    use crate::improve::samples::{cube, two_boxes};
     use crate::mesh::TET_EDGES;
 
     #[test]
-    fn a_mesh_survives_being_taken_apart() {
-        for before in [cube(3, 1), two_boxes(4, 1), half_ball(4)] {
-            let complex = Complex::new(&before);
-            complex.check().unwrap();
-            let mut after = before.clone();
-            complex.store(&mut after);
-            assert_eq!(format!("{before:?}"), format!("{after:?}"));
-        }
-    }
-
-    #[test]
     fn the_tets_of_a_ring_follow_its_vertices() {
-        let complex = Complex::new(&cube(3, 1));
+        let complex = whole(&cube(3, 1));
         let (mut ring, mut closed) = (Ring::default(), 0);
         for tet in complex.living() {
             for [i, j] in TET_EDGES {
@@ -501,7 +473,7 @@ mod tests {
     #[test]
     fn faces_between_bodies_and_of_the_hull_are_locked() {
         let mesh = two_boxes(4, 1);
-        let complex = Complex::new(&mesh);
+        let complex = whole(&mesh);
         let faces = complex.living().flat_map(|t| (0..4).map(move |k| (t, k)));
         let locked = faces.filter(|&(t, k)| complex.is_locked(t, k)).count();
         let between = mesh.triangles.iter().filter(|t| t.patch.0 == 6).count();
@@ -511,7 +483,7 @@ mod tests {
     #[test]
     #[should_panic(expected = "leave the face")]
     fn a_filling_with_other_faces_than_the_hole_is_refused() {
-        let mut complex = Complex::new(&cube(2, 1));
+        let mut complex = whole(&cube(2, 1));
         let tet = complex.tets[0];
         complex.replace(&[0, 1], &[(tet, 0.5)]);
     }

@@ -100,7 +100,7 @@ impl Inserter {
 
     /// Makes the insertion that was found, unless a new tet would not be exactly positive.
     pub fn commit(&self, complex: &mut Complex) -> bool {
-        let vertex = complex.add_vertex(self.point, complex.bodies[self.hole[0] as usize]);
+        let vertex = complex.add_vertex(self.point);
         let tet = |f: &Face| ([vertex, f.vertices[0], f.vertices[1], f.vertices[2]], f.score);
         let new: Vec<([u32; 4], f64)> = self.faces.iter().map(tet).collect();
         let done = commit(complex, &self.hole, &new);
@@ -157,6 +157,7 @@ fn worst<'a>(faces: impl Iterator<Item = &'a Face>) -> Option<&'a Face> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::improve::blocks::whole;
     use crate::improve::objective::Measure;
     use crate::improve::samples::{cube, icosahedron};
 
@@ -170,7 +171,7 @@ mod tests {
     #[test]
     fn an_icosahedron_gets_a_vertex_inside() {
         for tet in 0..15 {
-            let mut complex = Complex::new(&icosahedron());
+            let mut complex = whole(&icosahedron());
             complex.score_all(&SHAPES);
             let (mut inserter, mut smoother) = (Inserter::default(), Smoother::default());
             let start = middle(&complex, tet);
@@ -184,7 +185,7 @@ mod tests {
 
     #[test]
     fn insertions_raise_the_worst_and_keep_the_complex_valid() {
-        let mut complex = Complex::new(&cube(4, 1));
+        let mut complex = whole(&cube(4, 1));
         complex.score_all(&SHAPES);
         let (mut inserter, mut smoother) = (Inserter::default(), Smoother::default());
         let mut done = 0;

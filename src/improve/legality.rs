@@ -19,6 +19,7 @@
 //! Compare NETGEN's illegal tets and Zienkiewicz's rule for curved quadratic elements, which
 //! forbid the same for the same reason.
 
+use crate::improve::complex::NONE;
 use crate::improve::limits::TetLimits;
 use crate::mesh::{Mesh, TET_EDGES, VertexId};
 use crate::{Point, Vector};
@@ -95,6 +96,7 @@ impl GeometrySmoothness<'_> {
 }
 
 /// A boundary edge, seen from one of its ends.
+#[derive(Clone)]
 struct Spoke {
     /// The tangent planes at the vertex that the edge lies in, as bits.
     planes: u64,
@@ -190,6 +192,28 @@ impl Legality {
             self.ends.push(edge[0].1.0);
         }
         self.starts[vertex + 1] = self.spokes.len() as u32;
+    }
+
+    /// The same for some of the vertices under new numbers, their places in `vertices`. `to_block`, one entry a vertex, holds
+    /// [`NONE`] only, before and after.
+    pub fn of_block(&self, vertices: &[u32], to_block: &mut [u32]) -> Self {
+        (0..).zip(vertices).for_each(|(new, &v)| to_block[v as usize] = new);
+        let mut block = Self { starts: vec![0], ends: Vec::new(), spokes: Vec::new(), hopeless: Vec::new() };
+        for &v in vertices {
+            for k in self.spokes(v) {
+                let end = to_block[self.ends[k] as usize];
+                if end != NONE {
+                    block.ends.push(end);
+                    block.spokes.push(self.spokes[k].clone());
+                }
+            }
+            block.starts.push(block.ends.len() as u32);
+        }
+        let renumbered = self.hopeless.iter().map(|t| sorted(t.map(|v| to_block[v as usize])));
+        block.hopeless = renumbered.filter(|t| t[2] != NONE).collect();
+        block.hopeless.sort_unstable();
+        vertices.iter().for_each(|&v| to_block[v as usize] = NONE);
+        block
     }
 
     /// Where the spokes of a vertex are; nowhere for one inside, or added since.

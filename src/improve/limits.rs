@@ -1,5 +1,6 @@
 //! What becomes of the corners of a tet when it is refined and snapped for ever.
 
+use crate::improve::objective::score_of_ratio;
 use crate::kernel::simplex::volume6;
 use crate::{Point, Vector};
 
@@ -11,7 +12,7 @@ pub(super) struct TetLimits([[Option<Vector>; 3]; 4]);
 /// What must be left of a corner for it to count as unharmed.
 const UNHARMED: f64 = 0.5;
 
-/// How much less a tet is worth as its worst corner shrinks below [`UNHARMED`]: at zero two fifths are left.
+/// How much less a tet is worth as its worst corner shrinks below [`UNHARMED`]: at zero two fifths of its mean ratio are left.
 ///
 /// By trial on NETGEN's tutorials at their coarsest, refined twice and snapped: with 8 the worst fine tets of `trafo`,
 /// `shaft` and `sculpture` have mean ratios of 0.24, 0.22 and 0.26, as tets are flattened elsewhere to please
@@ -41,9 +42,9 @@ impl TetLimits {
         least
     }
 
-    /// What the shape of the tet is to be multiplied with: 1 if no corner suffers much, never 0.
+    /// What the score of the tet is to be multiplied with: 1 if no corner suffers much, never 0.
     pub fn factor(&self, p: &[Point; 4]) -> f64 {
-        1.0 / (1.0 + HARM * (UNHARMED - self.least_corner(p)).max(0.0))
+        score_of_ratio(1.0 / (1.0 + HARM * (UNHARMED - self.least_corner(p)).max(0.0)))
     }
 }
 
@@ -80,7 +81,7 @@ mod tests {
         }
         assert_eq!(bent(0.7).factor(&p), 1.0);
         assert!(bent(0.2).factor(&p) > bent(0.0).factor(&p));
-        assert_eq!(bent(0.0).factor(&p), 0.4);
+        assert_eq!(bent(0.0).factor(&p), score_of_ratio(0.4));
         assert!(bent(-0.3).factor(&p) > 0.0);
     }
 }

@@ -12,6 +12,9 @@
 //! * `insert` fills a hole round a new vertex;
 //! * `repair` uses the others where a tet is *illegal*.
 //!
+//! Swaps come first: a sliver is mostly a matter of how its neighbourhood is cut into tets, and to bend its neighbours
+//! instead costs more and leaves them worse. Large meshes are cut into `blocks`, which are improved in parallel.
+//!
 //! [`make_refinable`] is [`improve()`] for a coarse mesh that will be refined and snapped to the geometry. It also knows
 //! of **illegal** tets, which would flatten at a vertex whatever their shape is now (`legality`): their score is below
 //! that of every legal tet. And a tet loses score for corners that would shrink much, or turn over (`limits`).
@@ -39,6 +42,7 @@
 //! Not promised: any angle. Where the boundary has bad triangles, or bodies are thinner than them, tets are bad too. Nor
 //! does it make edges as long as the size field says: it only keeps collapses and insertions from making them worse.
 
+mod blocks;
 mod collapse;
 mod complex;
 mod insert;
@@ -55,7 +59,7 @@ mod samples;
 
 pub use legality::{GeometrySmoothness, Smoothness};
 pub use objective::Measure;
-pub use schedule::{Report, Settings, improve, make_refinable};
+pub use schedule::{Effort, Report, Settings, improve, make_refinable};
 
 #[cfg(test)]
 mod tests;

@@ -29,9 +29,11 @@ pub(super) struct Repairs {
 }
 
 /// A place for a new vertex, and the tets that surely go.
-struct Candidate {
-    seeds: Vec<u32>,
-    point: Point,
+pub(super) struct Candidate {
+    /// The tets.
+    pub seeds: Vec<u32>,
+    /// The place, inside them.
+    pub point: Point,
 }
 
 /// Mends what can be mended. Scores must be those of `objective`.
@@ -78,7 +80,7 @@ pub(super) fn repair(
 }
 
 /// The middles of the tet, of its faces and of its edges, as far as they are not on the boundary.
-fn candidates(complex: &Complex, tet: u32) -> Vec<Candidate> {
+pub(super) fn candidates(complex: &Complex, tet: u32) -> Vec<Candidate> {
     let corners = complex.tets[tet as usize];
     let middle = |vertices: &[u32]| {
         let sum: crate::Vector = vertices.iter().map(|&v| complex.points[v as usize].coords).sum();

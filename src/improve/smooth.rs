@@ -132,14 +132,14 @@ impl Smoother {
 
     /// The worst shape of the star with its vertex at `at`, if above `least`.
     fn worst_above(&self, objective: &Objective, at: &Point, least: f64) -> Option<f64> {
-        let (least, mut worst) = (least.powi(3), f64::INFINITY);
+        let mut worst = f64::INFINITY;
         for (p, limits) in self.tets(*at) {
-            worst = worst.min(objective.cubed_shape_above(&p, limits, least));
+            worst = worst.min(objective.shape_above(&p, limits, least));
             if worst <= least {
                 return None;
             }
         }
-        Some(worst.cbrt())
+        Some(worst)
     }
 
     fn ascend(&mut self, objective: &Objective, mut at: Point, mut worst: f64) -> (Point, f64) {

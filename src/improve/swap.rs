@@ -46,23 +46,34 @@ pub(super) struct Swapper {
 struct Table([[(f64, u8); LONGEST_RING]; LONGEST_RING]);
 
 impl Swapper {
-    /// Makes the best swap that takes `tet` out and raises the worst score of its hole. False if there is none.
+    /// Makes the best swap that takes `tet` out as the worst of its hole and raises the worst score there. False if there is
+    /// none. Holes with a worse tet are left to that one: it comes first where tets are visited worst first.
     pub fn improve(&mut self, complex: &mut Complex, objective: &Objective, tet: u32) -> bool {
-        self.find(complex, objective, tet) && self.commit(complex)
+        let own = complex.scores[tet as usize];
+        self.find_above(complex, objective, tet, own) && self.commit(complex)
     }
 
-    /// Finds that swap. False if there is none.
+    /// Finds the best swap that takes `tet` out and raises the worst score of its hole. False if there is none.
     pub fn find(&mut self, complex: &Complex, objective: &Objective, tet: u32) -> bool {
+        self.find_above(complex, objective, tet, INVERTED)
+    }
+
+    /// [`find`](Self::find) among the holes without a tet worse than `least`.
+    fn find_above(&mut self, complex: &Complex, objective: &Objective, tet: u32, least: f64) -> bool {
         self.best.gain = LEAST_GAIN;
         let mut better = false;
         for [i, j] in TET_EDGES {
-            if self.find_edge_removal(complex, objective, tet, i, j) && self.found.gain > self.best.gain {
+            if self.find_edge_removal(complex, objective, tet, [i, j], least)
+                && self.found.gain > self.best.gain
+            {
                 std::mem::swap(&mut self.found, &mut self.best);
                 better = true;
             }
         }
         for face in 0..4 {
-            if self.find_face_removal(complex, objective, tet, face) && self.found.gain > self.best.gain {
+            if self.find_face_removal(complex, objective, tet, face, least)
+                && self.found.gain > self.best.gain
+            {
                 std::mem::swap(&mut self.found, &mut self.best);
                 better = true;
             }
@@ -86,14 +97,17 @@ impl Swapper {
         complex: &Complex,
         objective: &Objective,
         tet: u32,
-        i: usize,
-        j: usize,
+        [i, j]: [usize; 2],
+        least: f64,
     ) -> bool {
         if !complex.ring(tet, i, j, LONGEST_RING, &mut self.ring) {
             return false;
         }
         let [low, high] = [i, j].map(|k| complex.tets[tet as usize][k]);
         let before = complex.worst_of(&self.ring.tets);
+        if before < least {
+            return false;
+        }
         let ring = &self.ring.vertices;
         let worst = self.table.fill(ring.len(), before, |a, b, c, least| {
             let [a, b, c] = [ring[a], ring[b], ring[c]];
@@ -118,8 +132,18 @@ impl Swapper {
     }
 
     /// The best filling without the face opposite the local vertex `face`, and perhaps without faces beside it, left in `found`.
-    fn find_face_removal(&mut self, complex: &Complex, objective: &Objective, tet: u32, face: usize) -> bool {
+    fn find_face_removal(
+        &mut self,
+        complex: &Complex,
+        objective: &Objective,
+        tet: u32,
+        face: usize,
+        least: f64,
+    ) -> bool {
         let Some((other, far)) = complex.neighbour(tet, face) else { return false };
+        if complex.scores[other as usize] < least {
+            return false;
+        }
         let low = complex.tets[tet as usize][face];
         let high = complex.tets[other as usize][far];
         let mut sandwich = Sandwich { complex, objective, low, high, old: vec![tet, other], new: Vec::new() };
@@ -250,6 +274,7 @@ pub(super) fn commit(complex: &mut Complex, old: &[u32], new: &[([u32; 4], f64)]
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::improve::blocks::whole;
     use crate::improve::objective::Measure;
     use crate::improve::samples::{cube, fan};
 
@@ -277,7 +302,7 @@ mod tests {
     fn an_edge_with_flat_tets_round_it_is_removed() {
         // Rings of 3, 4, … vertices round an edge that is far too long: 3-2, 4-4, 5-6, …
         for (ring, tets) in [(3, 2), (4, 4), (5, 6), (6, 8), (7, 10)] {
-            let mut complex = Complex::new(&fan(ring, 4.0));
+            let mut complex = whole(&fan(ring, 4.0));
             assert!(swap_all(&mut complex) > 0);
             assert_eq!(complex.living().count(), tets);
         }
@@ -287,7 +312,7 @@ mod tests {
     fn faces_between_two_near_vertices_are_removed() {
         // A ring of n leaves n − 2 faces between the ends: one is the flip 2-3.
         for ring in [3, 4, 5, 6] {
-            let mut complex = Complex::new(&fan(ring, 4.0));
+            let mut complex = whole(&fan(ring, 4.0));
             swap_all(&mut complex);
             // The ends of the edge come near: the edge is wanted back.
             complex.points[0].z = 0.35;
@@ -299,14 +324,14 @@ mod tests {
 
     #[test]
     fn good_tets_are_left_alone() {
-        let mut complex = Complex::new(&fan(5, 0.6));
+        let mut complex = whole(&fan(5, 0.6));
         assert_eq!(swap_all(&mut complex), 0);
     }
 
     #[test]
     fn swaps_in_bad_cubes_keep_the_complex_valid() {
         for seed in 0..8 {
-            let mut complex = Complex::new(&cube(4, seed));
+            let mut complex = whole(&cube(4, seed));
             assert!(swap_all(&mut complex) > 10);
         }
     }

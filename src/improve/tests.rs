@@ -1,14 +1,14 @@
 //! Whole runs on small meshes.
 
-use super::complex::Complex;
+use super::blocks::whole;
 use super::legality::Legality;
 use super::samples::{
     HollowCube, UnitSphere, ball, cube, fan, half_ball, hollow_cube, refined_on_sphere, two_boxes,
 };
-use super::{Measure, Report, Settings, Smoothness, improve, make_refinable};
+use super::{Effort, Measure, Report, Settings, Smoothness, improve, make_refinable};
 use crate::kernel::quality::QualitySummary;
 use crate::kernel::simplex::volume;
-use crate::mesh::{Class, Mesh};
+use crate::mesh::{Class, Mesh, VertexId};
 use crate::size::UniformSize;
 use csg::BodyId;
 use proptest::prelude::*;
@@ -26,7 +26,7 @@ fn illegal(mesh: &Mesh, smoothness: &dyn Smoothness) -> usize {
 
 /// What must hold after every run: a valid mesh, the same boundary, the same bodies, nothing worse.
 fn check(before: &Mesh, after: &Mesh, report: &Report) {
-    Complex::new(after).check().unwrap();
+    whole(after).check().unwrap();
     assert_eq!(after.points.len(), after.classes.len());
     assert_eq!(after.tets.len(), after.bodies.len());
     let triangles = |m: &Mesh| -> Vec<_> {
@@ -70,7 +70,7 @@ fn a_shaken_cube_gets_good_angles_and_keeps_its_boundary() {
 fn interfaces_between_bodies_stay() {
     let before = two_boxes(6, 1);
     let mut mesh = before.clone();
-    let report = improve(&mut mesh, &UniformSize(0.4), &Settings::default());
+    let report = improve(&mut mesh, &UniformSize(0.4), &Settings::of(Effort::Thorough));
     check(&before, &mesh, &report);
     assert!(report.after.smallest_dihedral > 25.0, "{:?}", report.after);
 }
@@ -140,6 +140,68 @@ fn the_same_input_gives_the_same_mesh() {
 }
 
 #[test]
+fn any_number_of_threads_gives_the_same_mesh() {
+    let run = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            let mut mesh = cube(8, 1);
+            let settings = Settings { block: 300, ..Settings::default() };
+            let report = improve(&mut mesh, &UniformSize(0.3), &settings);
+            (format!("{mesh:?}"), report)
+        })
+    };
+    let one = run(1);
+    assert!(one == run(2));
+    assert!(one == run(4));
+}
+
+#[test]
+fn blocks_leave_no_bad_tets_at_their_seams() {
+    for block in [500, 2000] {
+        let before = two_boxes(8, 1);
+        let mut mesh = before.clone();
+        let settings = Settings { block, ..Settings::of(Effort::Thorough) };
+        let report = improve(&mut mesh, &UniformSize(0.3), &settings);
+        check(&before, &mesh, &report);
+        assert!(report.after.smallest_dihedral > 25.0, "{:?}", report.after);
+    }
+}
+
+#[test]
+fn a_ball_in_blocks_has_no_tet_left_that_flattens() {
+    let before = ball(6);
+    for block in [60, 300] {
+        let mut mesh = before.clone();
+        let settings = Settings { block, ..Settings::default() };
+        let report = make_refinable(&mut mesh, &UniformSize(0.4), &UnitSphere, &settings);
+        check(&before, &mesh, &report);
+        assert_eq!(report.illegal_before, illegal(&before, &UnitSphere));
+        assert_eq!((report.illegal_left, illegal(&mesh, &UnitSphere)), (0, 0), "blocks of {block}");
+    }
+}
+
+#[test]
+#[should_panic(expected = "a boundary triangle is no tet's face")]
+fn a_boundary_triangle_off_the_tets_is_refused() {
+    let mut mesh = cube(2, 1);
+    let tet = mesh.tets[0];
+    let far = mesh.triangles[0].vertices[0].0.max(20);
+    mesh.triangles[0].vertices = [tet[0], tet[1], VertexId(far)];
+    improve(&mut mesh, &UniformSize(1.0), &Settings::default());
+}
+
+#[test]
+fn more_effort_gives_better_angles() {
+    let ends: Vec<f64> = [Effort::Quick, Effort::Standard, Effort::Careful]
+        .map(|effort| {
+            let mut mesh = cube(8, 3);
+            improve(&mut mesh, &UniformSize(0.3), &Settings::of(effort)).after.first_percentile
+        })
+        .to_vec();
+    assert!(ends.is_sorted(), "{ends:?}");
+}
+
+#[test]
 fn an_empty_mesh_and_a_single_tet_are_left_alone() {
     let mut empty = Mesh::default();
     assert_eq!(improve(&mut empty, &UniformSize(1.0), &Settings::default()).after.tets, 0);
@@ -174,12 +236,12 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 24, rng_seed: RngSeed::Fixed(1), ..ProptestConfig::default() })]
     #[test]
     fn any_shaken_mesh_stays_valid_and_gets_no_worse(
-        n in 1..4_usize, seed in 0..1000_u64, boxes: bool, below in 0.2..1.0, size in 0.2..2.0
+        n in 1..4_usize, seed in 0..1000_u64, boxes: bool, below in 0.2..1.0, size in 0.2..2.0, block in 20..800_usize
     ) {
         let before = if boxes { two_boxes(2 * n, seed) } else { cube(2 * n, seed) };
         let mut mesh = before.clone();
         let settings =
-            Settings { measure: Measure::MeanRatio, passes: 3, change_below: below, ..Settings::default() };
+            Settings { measure: Measure::MeanRatio, passes: 3, change_below: below, block, ..Settings::default() };
         let report = improve(&mut mesh, &UniformSize(size), &settings);
         check(&before, &mesh, &report);
         prop_assert!(report.after.worst_mean_ratio >= report.before.worst_mean_ratio);

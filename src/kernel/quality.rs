@@ -7,7 +7,7 @@
 //! knows the worst of them before anything is refined, from the six edge lengths and the volume alone.
 
 use crate::Point;
-use crate::kernel::simplex::{dihedral_angles, volume6};
+use crate::kernel::simplex::{dihedral_cosines, volume6};
 use crate::mesh::{Mesh, VertexId};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -58,7 +58,12 @@ pub fn squared_lengths(p: &[Point; 4]) -> [f64; 6] {
 /// of each of the four other edges, and half of one of the two: at the worst the sum 2S − 2(a+b) − min(a,b).
 #[inline]
 pub fn worst_child_squares(squares: &[f64; 6], diagonal: Diagonal) -> f64 {
-    let sum: f64 = squares.iter().sum();
+    worst_child_of(squares.iter().sum(), squares, diagonal)
+}
+
+/// [`worst_child_squares`] where the sum of the squares is known.
+#[inline(always)]
+pub fn worst_child_of(sum: f64, squares: &[f64; 6], diagonal: Diagonal) -> f64 {
     let (a, b) = (squares[diagonal as usize], squares[5 - diagonal as usize]);
     sum.max(2.0 * sum - 2.0 * (a + b) - a.min(b))
 }
@@ -138,11 +143,13 @@ const CHUNK: usize = 4096;
 
 /// Sums of one chunk of tets.
 struct Part {
-    smallest_angles: Vec<f64>,
+    /// Of each tet the cosine of the smallest angle: as angles fall cosines rise, and few arc cosines need be taken.
+    largest_cosines: Vec<f64>,
     worst_ratio: f64,
     sum_ratio: f64,
     worst_refined: f64,
-    largest_angle: f64,
+    least_cosine: f64,
+    histogram: [usize; HISTOGRAM_CLASSES],
 }
 
 impl QualitySummary {
@@ -164,21 +171,22 @@ impl QualitySummary {
             histogram: vec![0; HISTOGRAM_CLASSES],
             ..Self::default()
         };
-        let mut angles = Vec::with_capacity(tets.len());
+        let mut cosines = Vec::with_capacity(tets.len());
+        let mut least_cosine = 1.0_f64;
         for part in parts {
             summary.worst_mean_ratio = summary.worst_mean_ratio.min(part.worst_ratio);
             summary.average_mean_ratio += part.sum_ratio / tets.len() as f64;
             summary.worst_refined = summary.worst_refined.min(part.worst_refined);
-            summary.largest_dihedral = summary.largest_dihedral.max(part.largest_angle);
-            angles.extend(part.smallest_angles);
+            least_cosine = least_cosine.min(part.least_cosine);
+            summary.histogram.iter_mut().zip(part.histogram).for_each(|(sum, count)| *sum += count);
+            cosines.extend(part.largest_cosines);
         }
-        for angle in &angles {
-            summary.histogram[((angle / HISTOGRAM_STEP) as usize).min(HISTOGRAM_CLASSES - 1)] += 1;
-        }
+        let angle = |cosine: f64| cosine.acos().to_degrees();
+        summary.largest_dihedral = angle(least_cosine);
         // Nearest rank: the angle that k percent of the tets do not exceed.
         let mut rank = |percent: usize| {
-            let k = (angles.len() * percent).div_ceil(100).max(1) - 1;
-            *angles.select_nth_unstable_by(k, f64::total_cmp).1
+            let k = (cosines.len() * percent).div_ceil(100).max(1) - 1;
+            angle(*cosines.select_nth_unstable_by(k, |a, b| b.total_cmp(a)).1)
         };
         summary.smallest_dihedral = rank(0);
         summary.first_percentile = rank(1);
@@ -189,21 +197,31 @@ impl QualitySummary {
 
 fn measure(points: &[Point], tets: &[[VertexId; 4]]) -> Part {
     let mut part = Part {
-        smallest_angles: Vec::with_capacity(tets.len()),
+        largest_cosines: Vec::with_capacity(tets.len()),
         worst_ratio: f64::INFINITY,
         sum_ratio: 0.0,
         worst_refined: f64::INFINITY,
-        largest_angle: 0.0,
+        least_cosine: 1.0,
+        histogram: [0; HISTOGRAM_CLASSES],
     };
+    let bounds: [f64; HISTOGRAM_CLASSES - 1] =
+        std::array::from_fn(|k| ((k + 1) as f64 * HISTOGRAM_STEP).to_radians().cos());
     for tet in tets {
         let p = tet.map(|v| points[v.index()]);
-        let ratio = mean_ratio(&p[0], &p[1], &p[2], &p[3]);
+        let squares = squared_lengths(&p);
+        let v6 = volume6(&p[0], &p[1], &p[2], &p[3]);
+        let scaled = 12.0 * (0.5 * v6.abs()).cbrt().powi(2).copysign(v6);
+        let over = |sum: f64| if sum > 0.0 { scaled / sum } else { 0.0 };
+        let ratio = over(squares.iter().sum());
         part.worst_ratio = part.worst_ratio.min(ratio);
         part.sum_ratio += ratio;
-        part.worst_refined = part.worst_refined.min(refined_quality(&p).0);
-        let angles = if ratio > 0.0 { dihedral_angles(&p) } else { [0.0, 0.0, 0.0, 0.0, 0.0, 180.0] };
-        part.smallest_angles.push(angles.into_iter().fold(180.0, f64::min));
-        part.largest_angle = angles.into_iter().fold(part.largest_angle, f64::max);
+        let children = Diagonal::ALL.map(|d| worst_child_squares(&squares, d));
+        part.worst_refined = part.worst_refined.min(over(children.into_iter().fold(f64::INFINITY, f64::min)));
+        let cosines = if ratio > 0.0 { dihedral_cosines(&p) } else { [1.0, -1.0, 0.0, 0.0, 0.0, 0.0] };
+        let largest = cosines.into_iter().fold(-1.0, f64::max);
+        part.largest_cosines.push(largest);
+        part.least_cosine = cosines.into_iter().fold(part.least_cosine, f64::min);
+        part.histogram[bounds.iter().filter(|&&bound| largest <= bound).count()] += 1;
     }
     part
 }
@@ -211,6 +229,7 @@ fn measure(points: &[Point], tets: &[[VertexId; 4]]) -> Part {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::kernel::simplex::dihedral_angles;
     use proptest::prelude::*;
     use proptest::test_runner::RngSeed;
 

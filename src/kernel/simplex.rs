@@ -29,13 +29,27 @@ pub fn area(a: &Point, b: &Point, c: &Point) -> f64 {
 /// The six dihedral angles of a positively oriented tet in degrees, in the order of
 /// [`TET_EDGES`](crate::mesh::TET_EDGES).
 pub fn dihedral_angles(p: &[Point; 4]) -> [f64; 6] {
-    let normals = crate::mesh::TET_FACES.map(|[a, b, c]| {
+    dihedral_cosines(p).map(|cosine| cosine.acos().to_degrees())
+}
+
+/// The cosines of the [`dihedral_angles`].
+pub fn dihedral_cosines(p: &[Point; 4]) -> [f64; 6] {
+    let normal = |face: usize| {
+        let [a, b, c] = crate::mesh::TET_FACES[face];
         let n = area_vector(&p[a], &p[b], &p[c]);
-        n / n.norm().max(f64::MIN_POSITIVE)
-    });
+        n * (1.0 / n.norm().max(f64::MIN_POSITIVE))
+    };
+    let [n0, n1, n2, n3] = [normal(0), normal(1), normal(2), normal(3)];
     // The edge between vertices i and j lies on the faces opposite the other two.
-    const OTHER: [[usize; 2]; 6] = [[2, 3], [1, 3], [1, 2], [0, 3], [0, 2], [0, 1]];
-    OTHER.map(|[k, l]| (-normals[k].dot(&normals[l])).clamp(-1.0, 1.0).acos().to_degrees())
+    let between = |n: &crate::Vector, m: &crate::Vector| (-n.dot(m)).clamp(-1.0, 1.0);
+    [
+        between(&n2, &n3),
+        between(&n1, &n3),
+        between(&n1, &n2),
+        between(&n0, &n3),
+        between(&n0, &n2),
+        between(&n0, &n1),
+    ]
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 
 use super::model::CsgModel;
 use crate::Point;
-use crate::improve::{self, GeometrySmoothness, Smoothness};
+use crate::improve::{self, Effort, GeometrySmoothness, Smoothness};
 use crate::kernel::quality::QualitySummary;
 use crate::mesh::{Class, Mesh, Segment, VertexId};
 use crate::size::{GeometricSize, SizeField, SizeSettings, Source};
@@ -72,6 +72,28 @@ pub struct CoarseReport {
     pub size_corrections: u64,
 }
 
+/// How a coarse mesh is made.
+#[derive(Clone, Debug, Default)]
+pub struct CoarseSettings {
+    /// The sizes.
+    pub size: SizeSettings,
+    /// How much is done for better shapes; without it, as much as takes a second at most, then the standard.
+    pub effort: Option<Effort>,
+}
+
+impl From<SizeSettings> for CoarseSettings {
+    fn from(size: SizeSettings) -> Self {
+        Self { size, effort: None }
+    }
+}
+
+/// Up to so many tets patience costs less than a second, and each may become many.
+const FEW_TETS: usize = 100_000;
+
+fn effort_for(tets: usize) -> Effort {
+    if tets <= FEW_TETS { Effort::Careful } else { Effort::Standard }
+}
+
 /// A coarse mesh and what became of it.
 #[derive(Clone, Debug, Default)]
 pub struct CoarseMesh {
@@ -93,7 +115,7 @@ const LOWERED: f64 = 0.6;
 ///
 /// # Errors
 /// What failed in the end, with its place.
-pub fn mesh(model: &CsgModel, settings: &mut SizeSettings) -> Result<CoarseMesh, CoarseError> {
+pub fn mesh(model: &CsgModel, settings: &mut CoarseSettings) -> Result<CoarseMesh, CoarseError> {
     corrected(settings, |settings, may_lower| attempt(model, settings, may_lower))
 }
 
@@ -107,8 +129,8 @@ pub(super) enum Attempt {
 
 /// Attempts until no sizes need to be lowered, or may be: the attempts are told whether they may ask for it.
 pub(super) fn corrected(
-    settings: &mut SizeSettings,
-    attempt: impl Fn(&SizeSettings, bool) -> Attempt,
+    settings: &mut CoarseSettings,
+    attempt: impl Fn(&CoarseSettings, bool) -> Attempt,
 ) -> Result<CoarseMesh, CoarseError> {
     let mut corrections = 0;
     loop {
@@ -117,16 +139,16 @@ pub(super) fn corrected(
                 coarse.report.size_corrections = corrections;
                 return Ok(coarse);
             }
-            Attempt::Lower(sources) => settings.sources.extend(sources),
+            Attempt::Lower(sources) => settings.size.sources.extend(sources),
             Attempt::Failed(error) => return Err(error),
         }
         corrections += 1;
     }
 }
 
-fn attempt(model: &CsgModel, settings: &SizeSettings, may_lower: bool) -> Attempt {
+fn attempt(model: &CsgModel, settings: &CoarseSettings, may_lower: bool) -> Attempt {
     let CsgModel { geometry, features, projector } = model;
-    let size = GeometricSize::new(geometry, features, settings);
+    let size = GeometricSize::new(geometry, features, &settings.size);
     let curves = match mesh_curves(features, projector, &size) {
         Ok(curves) => curves,
         Err(error) => return Attempt::Failed(error.into()),
@@ -141,7 +163,8 @@ fn attempt(model: &CsgModel, settings: &SizeSettings, may_lower: bool) -> Attemp
         .map_err(CoarseError::from)
         .and_then(|(surface, _)| {
             let regions = |id| [features.patch(id).inside, features.patch(id).outside];
-            fill(surface, regions, &size, Some(&GeometrySmoothness { geometry, features }))
+            let smoothness = GeometrySmoothness { geometry, features };
+            fill(surface, regions, &size, Some(&smoothness), settings.effort)
         });
     match filled {
         Ok(made) => Attempt::Made(made),
@@ -159,9 +182,10 @@ pub(super) fn fill(
     regions: impl Fn(PatchId) -> [Option<BodyId>; 2],
     size: &dyn SizeField,
     smoothness: Option<&dyn Smoothness>,
+    effort: Option<Effort>,
 ) -> Result<CoarseMesh, CoarseError> {
     let (mut mesh, volume) = fill_bodies(surface, regions, size)?;
-    let settings = improve::Settings::default();
+    let settings = improve::Settings::of(effort.unwrap_or_else(|| effort_for(mesh.tets.len())));
     let improved = match smoothness {
         Some(smoothness) => improve::make_refinable(&mut mesh, size, smoothness, &settings),
         None => improve::improve(&mut mesh, size, &settings),

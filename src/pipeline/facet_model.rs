@@ -1,6 +1,6 @@
 //! Surfaces of triangles as what is to be meshed.
 
-use super::coarse::{self, Attempt, CoarseError, CoarseMesh};
+use super::coarse::{self, Attempt, CoarseError, CoarseMesh, CoarseSettings};
 use super::input::InputSettings;
 use crate::Point;
 use crate::error::Failure;
@@ -9,7 +9,6 @@ use crate::geometry::Projector;
 use crate::improve::Smoothness;
 use crate::io::surface::{self, Surface};
 use crate::mesh::{Class, Names};
-use crate::size::SizeSettings;
 use crate::surface::SurfaceMesh;
 use csg::{CornerId, PatchId};
 use std::path::Path;
@@ -63,12 +62,12 @@ impl FacetSolid {
     }
 
     /// Makes a coarse mesh with the given sizes, which are lowered where surfaces come too near each other.
-    pub(super) fn coarse_mesh(&self, settings: &mut SizeSettings) -> Result<CoarseMesh, CoarseError> {
+    pub(super) fn coarse_mesh(&self, settings: &mut CoarseSettings) -> Result<CoarseMesh, CoarseError> {
         coarse::corrected(settings, |settings, may_lower| self.attempt(settings, may_lower))
     }
 
-    fn attempt(&self, settings: &SizeSettings, may_lower: bool) -> Attempt {
-        let size = FacetSize::new(&self.model, settings);
+    fn attempt(&self, settings: &CoarseSettings, may_lower: bool) -> Attempt {
+        let size = FacetSize::new(&self.model, &settings.size);
         let mut surface = if self.keep_surface {
             keep(&self.model)
         } else {
@@ -78,7 +77,7 @@ impl FacetSolid {
         let smoothness = FacetSmoothness(&self.model.projector);
         let smoothness: Option<&dyn Smoothness> = if self.keep_surface { None } else { Some(&smoothness) };
         let regions = |id: PatchId| [self.model.patch(id).inside, self.model.patch(id).outside];
-        match coarse::fill(surface, regions, &size, smoothness) {
+        match coarse::fill(surface, regions, &size, smoothness, settings.effort) {
             Ok(made) => Attempt::Made(made),
             Err(error) => {
                 let may_lower = may_lower && !self.keep_surface;

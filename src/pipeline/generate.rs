@@ -1,6 +1,6 @@
 //! Method 2 on all ranks: a coarse mesh, partitioned, distributed, refined, checked.
 
-use super::coarse::{CoarseMesh, CoarseReport};
+use super::coarse::{CoarseMesh, CoarseReport, CoarseSettings};
 use super::mend::{self, MendError};
 use super::model::Model;
 use super::target::{Outcome, mesh_to_target};
@@ -14,7 +14,7 @@ use crate::mesh::{GlobalId, Mesh, Names, Rank};
 use crate::partition::{self, Metrics};
 use crate::progress::Progress;
 use crate::refine::{self, RefineError, RefinedMesh};
-use crate::size::{SizeSettings, Source};
+use crate::size::Source;
 
 /// How many tets are wanted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,8 +38,8 @@ pub enum Wanted {
 /// What is to be made.
 #[derive(Clone, Debug)]
 pub struct GenerateSettings {
-    /// The sizes of the coarse mesh.
-    pub size: SizeSettings,
+    /// How the coarse mesh is made.
+    pub coarse: CoarseSettings,
     /// How many tets.
     pub wanted: Wanted,
 }
@@ -147,9 +147,9 @@ fn mesh_as_wanted(
     sources: &[Source],
 ) -> Result<(u32, CoarseMesh, Option<Outcome>), Failure> {
     let with = |more: &[Source]| {
-        let mut size = settings.size.clone();
-        size.sources.extend(sources.iter().chain(more));
-        size
+        let mut coarse = settings.coarse.clone();
+        coarse.size.sources.extend(sources.iter().chain(more));
+        coarse
     };
     let to_target = |tets: u64, levels: u32| {
         let mut outcome = Outcome::Reached;
@@ -164,7 +164,7 @@ fn mesh_as_wanted(
         Wanted::Elements(count) if let Model::Given(given) = model => {
             let tets = given.mesh.tets.len() as u64;
             let levels = (0..MOST_LEVELS).find(|levels| tets << (3 * levels) >= count).unwrap_or(MOST_LEVELS);
-            Ok((levels, model.coarse_mesh(&mut settings.size.clone()).map_err(MendError::from)?, None))
+            Ok((levels, model.coarse_mesh(&mut settings.coarse.clone()).map_err(MendError::from)?, None))
         }
         Wanted::Sizes { levels } => {
             let made = mend::refinable(model, 1 << levels, |more| model.coarse_mesh(&mut with(more)))?;

@@ -9,7 +9,7 @@ pub mod model;
 pub mod names;
 pub mod target;
 
-pub use coarse::{CoarseError, CoarseMesh, CoarseReport};
+pub use coarse::{CoarseError, CoarseMesh, CoarseReport, CoarseSettings};
 pub use facet_model::FacetSolid;
 pub use generate::{GenerateSettings, Generated, Wanted, generate};
 pub use model::{CsgModel, Entities, GivenMesh, Model};

@@ -1,11 +1,10 @@
 //! What is to be meshed.
 
-use super::coarse::{CoarseError, CoarseMesh, CoarseReport};
+use super::coarse::{CoarseError, CoarseMesh, CoarseReport, CoarseSettings};
 use super::facet_model::FacetSolid;
 use crate::geometry::Projector;
 use crate::kernel::quality::QualitySummary;
 use crate::mesh::{Mesh, Names};
-use crate::size::SizeSettings;
 use csg::{Features, Geometry};
 
 /// What is to be meshed, or came meshed.
@@ -114,7 +113,7 @@ impl Model {
     ///
     /// # Errors
     /// What failed in the end, with its place.
-    pub fn coarse_mesh(&self, settings: &mut SizeSettings) -> Result<CoarseMesh, CoarseError> {
+    pub fn coarse_mesh(&self, settings: &mut CoarseSettings) -> Result<CoarseMesh, CoarseError> {
         match self {
             Self::Csg(model) => super::coarse::mesh(model, settings),
             Self::Facets(solid) => solid.coarse_mesh(settings),

@@ -1,8 +1,7 @@
 //! Sizes that give a wanted number of tets.
 
-use super::coarse::{CoarseError, CoarseMesh};
+use super::coarse::{CoarseError, CoarseMesh, CoarseSettings};
 use super::model::Model;
-use crate::size::SizeSettings;
 
 /// How a coarse mesh with a wanted number of tets came out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
@@ -33,23 +32,24 @@ const NARROW: f64 = 1.002;
 /// As [`Model::coarse_mesh`].
 pub fn mesh_to_target(
     model: &Model,
-    settings: &mut SizeSettings,
+    settings: &mut CoarseSettings,
     target: u64,
 ) -> Result<(CoarseMesh, Outcome), CoarseError> {
     let goal = 1.2 * target as f64;
-    let sources = settings.sources.len();
+    let sources = settings.size.sources.len();
     let mut fine: Option<(f64, CoarseMesh)> = None;
     let mut coarse: Option<(f64, f64)> = None;
     let mut finest_failure: Option<CoarseError> = None;
     for _ in 0..MOST_TRIES {
-        settings.sources.truncate(sources);
+        settings.size.sources.truncate(sources);
         let made = match model.coarse_mesh(settings) {
             Ok(made) => made,
             // Sizes that are too large for the geometry, whatever was corrected: as too few tets.
             Err(error) => {
-                coarse = Some((settings.scale, 0.5 * target as f64));
+                coarse = Some((settings.size.scale, 0.5 * target as f64));
                 finest_failure = Some(error);
-                settings.scale = next_scale(settings.scale, goal, 0.5 * goal, fine.as_ref(), coarse);
+                settings.size.scale =
+                    next_scale(settings.size.scale, goal, 0.5 * goal, fine.as_ref(), coarse);
                 continue;
             }
         };
@@ -57,7 +57,7 @@ pub fn mesh_to_target(
         if made.report.tets >= target && made.report.tets <= target + target / 2 {
             return Ok((made, Outcome::Reached));
         }
-        let scale = settings.scale;
+        let scale = settings.size.scale;
         if made.report.tets < target {
             coarse = Some((scale, count));
         } else {
@@ -71,11 +71,11 @@ pub fn mesh_to_target(
         {
             break;
         }
-        settings.scale = next_scale(scale, goal, count, fine.as_ref(), coarse);
+        settings.size.scale = next_scale(scale, goal, count, fine.as_ref(), coarse);
     }
     match (fine, finest_failure) {
         (Some((scale, made)), _) => {
-            settings.scale = scale;
+            settings.size.scale = scale;
             Ok((made, Outcome::Jumped))
         }
         (None, Some(error)) => Err(error),

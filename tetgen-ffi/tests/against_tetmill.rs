@@ -15,7 +15,7 @@ fn ours(name: &str) -> Mesh {
     let path = format!("{}/../geometries/{name}.geo", env!("CARGO_MANIFEST_DIR"));
     let source = std::fs::read_to_string(&path).unwrap();
     let model = Model::from_csg(parse_geometry(&source, &path).unwrap().geometry).unwrap();
-    model.coarse_mesh(&mut SizeSettings::from(Preset::Moderate)).unwrap().mesh
+    model.coarse_mesh(&mut SizeSettings::from(Preset::Moderate).into()).unwrap().mesh
 }
 
 /// TetGen's mesh inside our surface; the boundary kept (`Y`), its best quality (`q1.4`).
