@@ -39,7 +39,9 @@ fn one_mesh_in_several_formats_has_one_quality() {
             let [a, b] = [mesh, &meshes[0]].map(|m| m[key].as_f64().unwrap());
             assert!((a - b).abs() < 1e-9 * a.abs(), "{key}: {a} {b}");
         };
-        ["volume", "smallest_dihedral", "median_dihedral", "mean_mean_ratio", "mean_badness"].map(close);
+        ["volume", "smallest_dihedral", "median_dihedral", "mean_mean_ratio", "mean_badness"]
+            .into_iter()
+            .for_each(close);
     }
     let svg = std::fs::read_to_string(&picture).unwrap();
     assert!(svg.starts_with("<svg") && svg.contains("m.vol"));
