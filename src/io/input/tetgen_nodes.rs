@@ -14,10 +14,8 @@ pub(crate) struct Nodes {
 /// Reads `count dimension [attributes [marker]]` and the points; attributes and markers are skipped.
 pub(crate) fn read(words: &mut Words) -> Result<Nodes, Fault> {
     let count = words.count("points", 4)?;
-    if let Some(dimension) = words.next_in_line() {
-        if dimension != b"3" {
-            return Err(words.fault("the dimension of the points is not 3"));
-        }
+    if words.next_in_line().is_some_and(|dimension| dimension != b"3") {
+        return Err(words.fault("the dimension of the points is not 3"));
     }
     words.rest_of_line();
     let mut nodes = Nodes { base: 1, points: Vec::with_capacity(count) };

@@ -23,10 +23,10 @@ pub(super) enum PolygonFault {
 /// A polygon that runs along an edge twice, in both directions, as those do that reach their holes by a bridge, is
 /// cut as it looks: what is inside is told by parity.
 pub(super) fn triangulate(points: &[Point], corners: &[u32]) -> Result<Vec<[u32; 3]>, PolygonFault> {
-    if let &[a, b, c, d] = corners {
-        if let Some(triangles) = quadrangle(points, [a, b, c, d]) {
-            return Ok(triangles.to_vec());
-        }
+    if let &[a, b, c, d] = corners
+        && let Some(triangles) = quadrangle(points, [a, b, c, d])
+    {
+        return Ok(triangles.to_vec());
     }
     facet::triangulate(points, &[corners.to_vec()], &Fill::Parity)
 }

@@ -104,7 +104,7 @@ fn an_stl_that_was_rounded_apart_is_closed_and_says_so() {
 fn broken_stl_files_are_refused_with_their_place() {
     let text = stl_text("part", &FACES);
     refused("a.stl", &text[..text.len() - 14], ":30", "cut off");
-    refused("a.stl", text.replacen("vertex 1", "vertex nan", 1), ":5", "`nan`");
+    refused("a.stl", text.replacen("vertex 1", "vertex nan", 1), ":6", "`nan`");
     refused("a.stl", text.replacen("endloop", "vertex 0 0 0", 1), ":7", "expected `endloop`, found `vertex`");
     refused("a.stl", "solid empty\nendsolid empty\n", "", "no triangles");
     let binary = stl_binary(b"", &POINTS, &FACES);

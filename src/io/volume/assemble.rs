@@ -107,10 +107,8 @@ fn drop_unused(raw: &mut Raw) {
     if unused == 0 {
         return;
     }
-    let mut kept = 0;
-    for place in to_kept.iter_mut().filter(|place| **place != UNUSED) {
+    for (kept, place) in (0..).zip(to_kept.iter_mut().filter(|place| **place != UNUSED)) {
         *place = kept;
-        kept += 1;
     }
     let mut places = to_kept.iter();
     raw.points.retain(|_| places.next() != Some(&UNUSED));

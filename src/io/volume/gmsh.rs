@@ -142,12 +142,14 @@ fn header(words: &mut Words, content: &[u8]) -> Result<(Version, Storage), Fault
     if first != b"$MeshFormat" {
         return Err(words.fault(format!("expected `$MeshFormat`, found `{}`", shown(first))));
     }
-    let version = match words.word("the version")? {
-        b"4.1" => Version::Four,
-        b"2" | b"2.0" | b"2.1" | b"2.2" => Version::Two,
-        other => {
+    // NETGEN writes `2.000000`.
+    let version = words.word("the version")?;
+    let version = match crate::io::input::float(version) {
+        Some(4.1) => Version::Four,
+        Some(number) if (2.0..3.0).contains(&number) => Version::Two,
+        _ => {
             let message =
-                format!("MSH of version {} is not read; save it as version 4.1 or 2.2", shown(other));
+                format!("MSH of version {} is not read; save it as version 4.1 or 2.2", shown(version));
             return Err(words.fault(message));
         }
     };

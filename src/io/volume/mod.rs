@@ -24,6 +24,8 @@ mod netgen;
 mod orient;
 mod raw;
 #[cfg(test)]
+mod samples;
+#[cfg(test)]
 mod tests;
 mod tetgen;
 mod vtu;
