@@ -5,6 +5,7 @@ use super::*;
 use crate::Point;
 use crate::kernel::predicates::{Sign, orient3d};
 use crate::mesh::{Class, Mesh, Segment, TET_EDGES, VertexId};
+use crate::pipeline::coarse;
 use crate::size::{SizeField, SizeSettings};
 use crate::surface::SurfaceMesh;
 use crate::volume::ClosedSurface;
@@ -326,4 +327,32 @@ fn the_same_facets_give_the_same_mesh() {
     let (one, two) = (mesh(1), mesh(2));
     assert_eq!(one.points, two.points);
     assert_eq!(one.triangles, two.triangles);
+}
+
+#[test]
+fn skins_of_meshed_geometries_are_remeshed_well() {
+    for name in ["boundarycondition", "cone", "cubeandspheres", "sculpture", "trafo"] {
+        let Some(file) = shared(&format!("netgen-tutorials/{name}.geo")) else { continue };
+        let text = std::fs::read_to_string(file).unwrap();
+        let geometry = csg::language::parse_geometry(&text, name).unwrap().geometry;
+        let solid = coarse::Model::new(geometry).unwrap();
+        let skin = coarse::mesh(&solid, &mut SizeSettings::default()).unwrap().mesh;
+        let found = model(&[Facets {
+            points: skin.points,
+            triangles: skin.triangles.iter().map(|t| t.vertices.map(|v| v.0)).collect(),
+            groups: Vec::new(),
+        }]);
+        assert_good(&run(&found, 1.0), 20.0, 12.0);
+    }
+}
+
+#[test]
+fn curved_walls_near_each_other_are_kept_apart_by_smaller_sizes() {
+    let shell = model(&[soup(|s| {
+        s.sphere(Point::origin(), 1.0, 80, 40, false);
+        s.sphere(Point::origin(), 0.96, 80, 40, true);
+    })]);
+    let (mesh, report) = remesh(&shell, &sizes(&shell, 1.5), &RemeshSettings::default());
+    assert!(report.corrections > 0 && report.crossings.is_empty());
+    closed(&shell, &mesh);
 }
