@@ -122,7 +122,15 @@ fn keeps_topology(sheet: &Sheet, from: u32, to: u32) -> bool {
     apexes.sort_unstable();
     let different = apexes.len();
     apexes.dedup();
-    common == different && apexes.len() == different && near.len() > 3
+    // What is left of the triangles at `from` must not be there already, as on the last four triangles of a closed piece.
+    let is_new = |&t: &u32| {
+        let v = sheet.at(t).v;
+        v.contains(&to)
+            || !sheet.around[to as usize]
+                .iter()
+                .any(|&s| sheet.at(s).v.iter().all(|w| *w == to || (*w != from && v.contains(w))))
+    };
+    common == different && apexes.len() == different && sheet.around[from as usize].iter().all(is_new)
 }
 
 /// Whether the triangles around `from` still fit when it is in the place of `to`.

@@ -58,7 +58,7 @@ impl SizeField for Smaller<'_> {
 const MOST_SPLITS: usize = 40;
 
 /// Times that sizes are lowered where triangles meet, before the mesh is handed out as it is.
-const MOST_CORRECTIONS: usize = 6;
+const MOST_CORRECTIONS: usize = 14;
 
 /// A place where triangles meet asks for this part of the size there.
 const LOWERED: f64 = 0.6;
@@ -80,6 +80,10 @@ pub fn remesh(
         let mesh = pass(model, &size, settings, &mut report);
         report.crossings = cross::crossings(&mesh.points, &mesh.triangles);
         if report.crossings.is_empty() || correction == MOST_CORRECTIONS {
+            return (mesh, report);
+        }
+        // No size mends facets that intersect.
+        if correction == 0 && !model.crossings().is_empty() {
             return (mesh, report);
         }
         let lower = |&point: &Point| Source { point, size: LOWERED * size.size_at(&point) };
