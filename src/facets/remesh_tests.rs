@@ -5,7 +5,7 @@ use super::*;
 use crate::Point;
 use crate::kernel::predicates::{Sign, orient3d};
 use crate::mesh::{Class, Mesh, Segment, TET_EDGES, VertexId};
-use crate::pipeline::coarse;
+use crate::pipeline::{CoarseSettings, Model};
 use crate::size::{SizeField, SizeSettings};
 use crate::surface::SurfaceMesh;
 use crate::volume::ClosedSurface;
@@ -335,8 +335,8 @@ fn skins_of_meshed_geometries_are_remeshed_well() {
         let Some(file) = shared(&format!("netgen-tutorials/{name}.geo")) else { continue };
         let text = std::fs::read_to_string(file).unwrap();
         let geometry = csg::language::parse_geometry(&text, name).unwrap().geometry;
-        let solid = coarse::Model::new(geometry).unwrap();
-        let skin = coarse::mesh(&solid, &mut SizeSettings::default()).unwrap().mesh;
+        let solid = Model::from_csg(geometry).unwrap();
+        let skin = solid.coarse_mesh(&mut CoarseSettings::default()).unwrap().mesh;
         let found = model(&[Facets {
             points: skin.points,
             triangles: skin.triangles.iter().map(|t| t.vertices.map(|v| v.0)).collect(),
