@@ -120,14 +120,6 @@ fn skin_edges(mesh: &Tetrahedra) -> Vec<(f64, u32)> {
     skin
 }
 
-/// The centre of the sphere through the corners of a tet; not finite where it is flat.
-fn circumcenter([a, b, c, d]: [&Point; 4]) -> Point {
-    let (u, v, w) = (b - a, c - a, d - a);
-    let numerator =
-        u.norm_squared() * v.cross(&w) + v.norm_squared() * w.cross(&u) + w.norm_squared() * u.cross(&v);
-    a + numerator / (2.0 * u.cross(&v).dot(&w))
-}
-
 impl Filler<'_> {
     /// Finds the wanted size at each vertex: the field's, or what the edges of the skin suggest if that is less.
     fn size_vertices(&mut self) {
@@ -169,9 +161,8 @@ impl Filler<'_> {
         }
     }
 
-    fn is_fine(&self, t: u32) -> bool {
-        let corners = self.mesh.corners(t);
-        let radius2 = (circumcenter(corners) - corners[0]).norm_squared();
+    fn is_fine(&mut self, t: u32) -> bool {
+        let radius2 = self.mesh.sphere(t).squared_radius();
         let size = 0.25 * self.mesh.tets[t as usize].iter().map(|&v| self.sizes[v as usize]).sum::<f64>();
         radius2 <= (FINE * REGULAR * size).powi(2)
     }
@@ -243,7 +234,7 @@ impl Filler<'_> {
             if !self.mesh.is_alive(t) || self.state(t) == State::Fine {
                 continue;
             }
-            let center = circumcenter(self.mesh.corners(t));
+            let center = self.mesh.sphere(t).center();
             let size = self.size_near(t, &center);
             if self.insert(t, center, size) {
                 open.extend_from_slice(&self.cavity.filled);
@@ -298,7 +289,7 @@ impl Filler<'_> {
             return false;
         }
         self.cavity.grow(self.mesh, seed, &point);
-        if self.cavity.tets.iter().any(|&t| too_near(self.mesh, t))
+        if self.cavity.vertices.iter().any(|&v| (point - self.mesh.point(v)).norm_squared() < near)
             || !self.cavity.make_star_shaped(self.mesh, seed, &point)
             || self.cavity.walls.iter().any(|&w| self.is_skin_near(w, &point, size))
         {

@@ -5,7 +5,8 @@
 //! face also says where one arrives. A **locked** face belongs to the boundary and stays for ever.
 
 use crate::Point;
-use crate::kernel::predicates::{Sign, orient3d};
+use crate::kernel::predicates::{Sign, insphere, orient3d};
+use crate::kernel::sphere::Circumsphere;
 use crate::mesh::TET_FACES;
 
 /// No tet, no vertex, nothing across.
@@ -50,6 +51,8 @@ pub(super) struct Tetrahedra {
     /// Some tet at each vertex, or `NONE`.
     pub at_vertex: Vec<u32>,
     free: Vec<u32>,
+    /// The circumsphere of each tet, found when it is asked for first: points with tets must not move.
+    spheres: Vec<Circumsphere>,
     marks: Vec<u32>,
     epoch: u32,
     scratch: Vec<([u32; 3], u32, bool)>,
@@ -140,6 +143,30 @@ impl Tetrahedra {
         orient3d(self.point(a), self.point(b), self.point(c), self.point(d))
     }
 
+    /// The circumsphere of a tet.
+    #[inline]
+    pub fn sphere(&mut self, tet: u32) -> Circumsphere {
+        if !self.spheres[tet as usize].is_known() {
+            self.spheres[tet as usize] = Circumsphere::of(self.corners(tet));
+        }
+        self.spheres[tet as usize]
+    }
+
+    /// Whether a point lies strictly inside the circumsphere of a tet; exact.
+    #[inline]
+    pub fn is_in_sphere(&mut self, tet: u32, point: &Point) -> bool {
+        self.spheres[tet as usize].holds(point).unwrap_or_else(|| self.settle(tet, point))
+    }
+
+    /// As [`Tetrahedra::is_in_sphere`], where the sphere that is kept does not know.
+    #[inline(never)]
+    fn settle(&mut self, tet: u32, point: &Point) -> bool {
+        self.sphere(tet).holds(point).unwrap_or_else(|| {
+            let [a, b, c, d] = self.corners(tet);
+            insphere(a, b, c, d, point) == Sign::Positive
+        })
+    }
+
     /// The index of `vertex` in `tet`.
     #[inline]
     pub fn index_of(&self, tet: u32, vertex: u32) -> Option<usize> {
@@ -184,12 +211,14 @@ impl Tetrahedra {
             self.across[i] = [NONE; 4];
             self.locked[i] = 0;
             self.bodies[i] = body;
+            self.spheres[i] = Circumsphere::UNKNOWN;
             slot
         } else {
             self.tets.push(tet);
             self.across.push([NONE; 4]);
             self.locked.push(0);
             self.bodies.push(body);
+            self.spheres.push(Circumsphere::UNKNOWN);
             self.marks.push(0);
             (self.tets.len() - 1) as u32
         };
