@@ -24,7 +24,7 @@
 //! 3. `carve`: a flood from the triangles gives each tet its body and removes the outside.
 //! 4. `relocate`: Steiner points leave the surface: none or one stays inside on either side.
 //! 5. `keep`: points that the caller wants.
-//! 6. `points`: the inside by the size field, frontal Delaunay.
+//! 6. `points`: the inside by the size field: lattices where it is level (`lattice`), frontal Delaunay elsewhere.
 //!
 //! Not promised: good shape. Steps 1 to 5 leave whatever the surface allows; step 6 places points so that nearly all tets are well
 //! shaped, but slivers remain: see [`improve`](crate::improve). Whether a surface intersects itself is found out
@@ -41,6 +41,7 @@ mod finish;
 mod flips;
 mod intersect;
 mod keep;
+mod lattice;
 mod points;
 mod polygon;
 mod recover;

@@ -35,16 +35,16 @@ const NEAREST_FACE: f64 = 0.4;
 const SKIN_TOLERANCE: f64 = 1.25;
 
 /// The working state of the point placement.
-struct Filler<'a> {
-    mesh: &'a mut Tetrahedra,
+pub(super) struct Filler<'a> {
+    pub(super) mesh: &'a mut Tetrahedra,
     size: &'a dyn SizeField,
     scale: f64,
     /// The wanted size at each vertex, in the mesher's units.
     sizes: Vec<f64>,
     /// By slot.
     states: Vec<State>,
-    cavity: Cavity,
-    limits: Limits,
+    pub(super) cavity: Cavity,
+    pub(super) limits: Limits,
     /// Why the placement stops early, if it does.
     stopped: Option<Stopped>,
 }
@@ -96,6 +96,7 @@ pub(super) fn fill(
         stopped: None,
     };
     filler.size_vertices();
+    filler.add_lattices();
     filler.advance();
     filler.finish();
     match filler.stopped {
@@ -146,7 +147,7 @@ impl Filler<'_> {
     }
 
     /// Whether to stop early.
-    fn stops(&mut self) -> bool {
+    pub(super) fn stops(&mut self) -> bool {
         if self.mesh.len() > self.limits.max_tets {
             self.stopped = self.stopped.or(Some(Stopped::TooManyTets));
         }
@@ -161,7 +162,7 @@ impl Filler<'_> {
         }
     }
 
-    fn is_fine(&mut self, t: u32) -> bool {
+    pub(super) fn is_fine(&mut self, t: u32) -> bool {
         let radius2 = self.mesh.sphere(t).squared_radius();
         let size = 0.25 * self.mesh.tets[t as usize].iter().map(|&v| self.sizes[v as usize]).sum::<f64>();
         radius2 <= (FINE * REGULAR * size).powi(2)
@@ -249,8 +250,13 @@ impl Filler<'_> {
     }
 
     /// The wanted size at a point in or near a tet.
-    fn size_near(&mut self, t: u32, point: &Point) -> f64 {
+    pub(super) fn size_near(&mut self, t: u32, point: &Point) -> f64 {
         let asked = self.ask(point);
+        self.grown_size(t, point, asked)
+    }
+
+    /// What sizes at the corners of a tet leave of the size asked for at a point.
+    pub(super) fn grown_size(&self, t: u32, point: &Point, asked: f64) -> f64 {
         self.mesh.tets[t as usize].iter().fold(asked, |size, &v| {
             size.min(self.sizes[v as usize] + self.limits.growth * (point - self.mesh.point(v)).norm())
         })
@@ -277,7 +283,7 @@ impl Filler<'_> {
     }
 
     /// Inserts a point near tet `t` unless it is too near to something; the new tets are in `cavity.filled`.
-    fn insert(&mut self, t: u32, point: Point, size: f64) -> bool {
+    pub(super) fn insert(&mut self, t: u32, point: Point, size: f64) -> bool {
         let near = (NEAREST * size).powi(2);
         let too_near =
             |mesh: &Tetrahedra, t: u32| mesh.corners(t).iter().any(|p| (point - **p).norm_squared() < near);
