@@ -6,7 +6,7 @@
 //! all that rounding may have done to centre, radius and question. A point between them is left to
 //! [`predicates::insphere`](crate::kernel::predicates::insphere).
 
-use crate::Point;
+use crate::{Point, Vector};
 
 /// What is known of the sphere through the corners of a tet.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,13 +24,13 @@ const HALF_ULP: f64 = f64::EPSILON / 2.0;
 /// How much the squared radius may be wrong, relative to it, in units of ε·L³/V: L is the longest of the three edges
 /// at the first corner, V six times the volume.
 ///
-/// The centre is a + N/2V with N = u²·v×w + v²·w×u + w²·u×v. By the usual bounds the error of N is below 140·ε·L⁴, that of V
+/// The centre is a + N/2V with N = u²·v×w + v²·w×u + w²·u×v = u²·v×w + u×(w²v − v²w). By the usual bounds the error of N is below 140·ε·L⁴, that of V
 /// below 50·ε·L³, and L ≤ 2R; so the error e of the centre, but for its last addition, is below κR with κ = 200·ε·L³/V, and so is
 /// that of R. A point at the distance d has a computed squared distance within 6ε of (d ± e)². All this makes less than
 /// 4κ + 6ε; the rest of the constant is for terms of second order.
 const SHAPE_ERROR: f64 = 2000.0 * HALF_ULP;
 
-/// The same for the last addition, which rounds the centre's coordinates: in units of ε·(largest coordinate)/R.
+/// The same for the last addition, which rounds the centre's coordinates: in units of ε·(1 + |a|/R), for they are below |a| + R.
 const PLACE_ERROR: f64 = 16.0 * HALF_ULP;
 
 /// A sphere that is less certain than this, relative, is left to the exact sign always: the bounds above are of first order.
@@ -46,19 +46,20 @@ impl Circumsphere {
     /// Nothing is known yet.
     pub const UNKNOWN: Self = Self { center: [0.0; 3], inner: f32::NAN, outer: f32::NAN };
 
-    /// The sphere through four points; coordinates about 1 or less in size.
+    /// The sphere through four points.
     #[inline]
     pub fn of([a, b, c, d]: [&Point; 4]) -> Self {
-        let (u, v, w) = (b - a, c - a, d - a);
+        let (u, v, w): (Vector, Vector, Vector) = (b - a, c - a, d - a);
         let squares = [u.norm_squared(), v.norm_squared(), w.norm_squared()];
-        let (vw, wu, uv) = (v.cross(&w), w.cross(&u), u.cross(&v));
+        let vw = v.cross(&w);
         let volume = u.dot(&vw);
-        let offset = (squares[0] * vw + squares[1] * wu + squares[2] * uv) / (2.0 * volume);
+        // N of the bound above, its last two terms brought together.
+        let offset = (squares[0] * vw + u.cross(&(squares[2] * v - squares[1] * w))) * (0.5 / volume);
         let center = a + offset;
         let radius2 = offset.norm_squared();
         let longest2 = squares[0].max(squares[1]).max(squares[2]);
         let shape = SHAPE_ERROR * longest2 * longest2.sqrt() / volume.abs();
-        let place = PLACE_ERROR * center.coords.amax() / radius2.sqrt();
+        let place = PLACE_ERROR * (1.0 + (a.x.abs() + a.y.abs() + a.z.abs()) / radius2.sqrt());
         let error = shape + place;
         let center = [center.x, center.y, center.z];
         // Written so that NaN, from flat tets, is uncertain.

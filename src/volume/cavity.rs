@@ -59,7 +59,7 @@ pub(super) fn walk(mesh: &Tetrahedra, from: u32, target: &Point) -> Walk {
             if half_face == entry {
                 continue;
             }
-            let [a, b, c] = mesh.face(half_face).map(|v| mesh.point(v));
+            let [a, b, c] = mesh.face_points(half_face);
             if orient3d(a, b, c, target) == Sign::Positive {
                 let other = mesh.across(half_face);
                 if other == NONE || mesh.is_locked(half_face) {
@@ -128,7 +128,7 @@ impl Cavity {
         loop {
             let mut all_see = true;
             for &wall in &self.walls {
-                let [a, b, c] = mesh.face(wall).map(|v| mesh.point(v));
+                let [a, b, c] = mesh.face_points(wall);
                 if mesh.is_marked(wall >> 2) && orient3d(a, b, c, point) != Sign::Negative {
                     if wall >> 2 == seed {
                         return false;
@@ -181,30 +181,36 @@ impl Cavity {
     /// Correct signs are the caller's promise; see [`Cavity::make_star_shaped`].
     pub fn fill(&mut self, mesh: &mut Tetrahedra, vertex: u32, body: u32) {
         self.replaced.clear();
-        for &wall in &self.walls {
-            let vertices = mesh.face(wall);
-            self.replaced.push(Wall {
-                vertices,
-                numbers: vertices.map(|v| self.numbers.of(v)),
+        self.replaced.extend(self.walls.iter().map(|&wall| {
+            let [a, b, c] = mesh.face(wall);
+            Wall {
+                vertices: [a, b, c],
+                numbers: [self.numbers.of(a), self.numbers.of(b), self.numbers.of(c)],
                 behind: mesh.across(wall),
                 locked: mesh.is_locked(wall),
-            });
+            }
+        }));
+        self.filled.clear();
+        for (i, wall) in self.replaced.iter().enumerate() {
+            // Nearly always there are more walls than tets: their slots are taken as they are.
+            let t = self.tets.get(i).copied().unwrap_or_else(|| mesh.free_slot());
+            let [a, b, c] = wall.vertices;
+            mesh.write_tet(t, [vertex, a, b, c], body);
+            mesh.locked[t as usize] = u8::from(wall.locked);
+            mesh.link(4 * t, wall.behind);
+            self.filled.push(t);
         }
-        for &t in &self.tets {
+        for &t in self.tets.iter().skip(self.walls.len()) {
             mesh.remove_tet(t);
         }
-        self.filled.clear();
-        self.edges.reset(self.vertices.len());
-        for wall in &self.replaced {
-            let [a, b, c] = wall.vertices;
-            let t = mesh.add_tet([vertex, a, b, c], body);
-            self.filled.push(t);
-            mesh.link(4 * t, wall.behind);
-            mesh.locked[t as usize] = u8::from(wall.locked);
+        if !self.edges.reset(self.vertices.len()) {
+            return link_by_map(mesh, &self.replaced, &self.filled);
+        }
+        for (wall, &t) in self.replaced.iter().zip(&self.filled) {
             let [a, b, c] = wall.numbers;
-            for (i, from, to) in [(1, b, c), (2, c, a), (3, a, b)] {
-                self.edges.put(from, to, 4 * t + i);
-            }
+            self.edges.put(b, c, 4 * t + 1);
+            self.edges.put(c, a, 4 * t + 2);
+            self.edges.put(a, b, 4 * t + 3);
         }
         for (wall, &t) in self.replaced.iter().zip(&self.filled) {
             let [a, b, c] = wall.numbers;
@@ -259,14 +265,12 @@ impl Numbers {
     }
 }
 
-/// Which half-face stands on each directed edge of a cavity's surface: a square table, for there are few vertices; a map
-/// for a cavity with so many that the table would be large.
+/// Which half-face stands on each directed edge of a cavity's surface: a square table by the numbers of its ends. Never cleared,
+/// for only what was put is asked for.
 #[derive(Clone, Debug, Default)]
 struct EdgeTable {
-    /// By `from << shift | to`. Never cleared: only what was put is asked for.
     square: Vec<u32>,
     shift: u32,
-    map: Option<HashMap<[u32; 2], u32>>,
 }
 
 /// The table of the largest cavity takes 4 MiB. A usual cavity has 20 vertices; thousands come together where many points
@@ -274,32 +278,37 @@ struct EdgeTable {
 const LARGEST_SHIFT: u32 = 10;
 
 impl EdgeTable {
-    /// Makes room for edges between this many vertices.
-    fn reset(&mut self, vertices: usize) {
+    /// Makes room for edges between this many vertices; false where they are too many for a table.
+    fn reset(&mut self, vertices: usize) -> bool {
         self.shift = vertices.next_power_of_two().ilog2();
-        self.map = None;
-        if self.shift > LARGEST_SHIFT {
-            self.map = Some(HashMap::with_capacity(6 * vertices));
-        } else if self.square.len() < 1 << (2 * self.shift) {
+        let fits = self.shift <= LARGEST_SHIFT;
+        if fits && self.square.len() < 1 << (2 * self.shift) {
             self.square.resize(1 << (2 * self.shift), NONE);
         }
+        fits
     }
 
-    #[inline]
+    #[inline(always)]
     fn put(&mut self, from: u32, to: u32, half_face: u32) {
-        match &mut self.map {
-            None => self.square[(from << self.shift | to) as usize] = half_face,
-            Some(map) => {
-                map.insert([from, to], half_face);
-            }
-        }
+        self.square[(from << self.shift | to) as usize] = half_face;
     }
 
-    #[inline]
+    #[inline(always)]
     fn get(&self, from: u32, to: u32) -> u32 {
-        match &self.map {
-            None => self.square[(from << self.shift | to) as usize],
-            Some(map) => map[&[from, to]],
-        }
+        self.square[(from << self.shift | to) as usize]
+    }
+}
+
+/// As the table does, for a cavity with very many vertices.
+#[cold]
+fn link_by_map(mesh: &mut Tetrahedra, walls: &[Wall], tets: &[u32]) {
+    let mut map = HashMap::with_capacity(3 * walls.len());
+    for (wall, &t) in walls.iter().zip(tets) {
+        let [a, b, c] = wall.numbers;
+        map.extend([([b, c], 4 * t + 1), ([c, a], 4 * t + 2), ([a, b], 4 * t + 3)]);
+    }
+    for (wall, &t) in walls.iter().zip(tets) {
+        let [a, b, c] = wall.numbers;
+        mesh.across[t as usize][1..].copy_from_slice(&[map[&[c, b]], map[&[a, c]], map[&[b, a]]]);
     }
 }

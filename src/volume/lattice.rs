@@ -1,7 +1,7 @@
 //! Points of a body-centred cubic lattice, wherever the wanted size is level.
 //!
 //! The Delaunay tets of this lattice (Sommerville 1923) fill space in one shape, with dihedral angles of 60 and 90 degrees and a
-//! mean ratio of 0.945; cut in eight, such a tet has children of its own shape only, which even the regular one has
+//! mean ratio of 0.952; cut in eight, such a tet has children of its own shape only, which even the regular one has
 //! not. No front reaches that inside: its layers never quite fit, so that it leaves slivers everywhere. So where the
 //! size is the same over a region, lattice points go in first, and the front has only to fill the gap between them and the
 //! boundary (as in Fuchs 1998; Labelle, Shewchuk 2007 cut the lattice at the boundary instead, which moves it).
@@ -17,6 +17,7 @@ use crate::kernel::random::mix;
 use crate::kernel::simplex::{area_vector, volume};
 use crate::mesh::TET_FACES;
 use crate::{Point, Vector};
+use rayon::prelude::*;
 
 /// The side of the lattice's cube for the size 1: 2^(1/6), so that its tets have the volume of a regular tet of edge 1.
 const SIDE: f64 = 1.122_462_048_309_373;
@@ -30,6 +31,9 @@ const LEAST_SHARE: f64 = 0.2;
 
 /// Lattices at most. Each has a fifth of the tets or more.
 const MOST_LATTICES: usize = 4;
+
+/// A lattice is made if there are up to this many times its points in all the space that is to be filled.
+const PATIENCE: f64 = 50.0;
 
 /// Lattice points are moved at random by this part of the side: far less than shapes feel, far more than the filter of
 /// the in-sphere test needs. Else a lattice that is half there has thousands of exact ties, each of which costs microseconds.
@@ -58,6 +62,7 @@ impl Filler<'_> {
         let coarse: Vec<u32> = alive.into_iter().filter(|&t| !self.is_fine(t)).collect();
         let mut samples: Vec<Plateau> = coarse.iter().map(|&t| self.sample(t)).collect();
         let total: f64 = samples.iter().map(|s| s.tets).sum();
+        let space: f64 = coarse.iter().map(|&t| self.volume(t)).sum();
         if self.stops() || total > self.limits.max_tets as f64 {
             // The front will find out whether there are really too many.
             return;
@@ -69,7 +74,10 @@ impl Filler<'_> {
                 return;
             }
             samples.retain(|s| !is_level(s.size, plateau.size));
-            if let Some(candidates) = self.candidates(&coarse, plateau) {
+            // Looking at lattice points where the size is another is in vain: a part of the time that the front takes for a
+            // point, but for a size that is wanted in a small place only it would be thousands of times that.
+            if tets_of_size(space, plateau.size) < PATIENCE * plateau.tets {
+                let candidates = self.candidates(&coarse, plateau.size);
                 self.add_candidates(&candidates);
             }
         }
@@ -79,36 +87,37 @@ impl Filler<'_> {
     fn sample(&mut self, t: u32) -> Plateau {
         let [a, b, c, d] = self.mesh.corners(t);
         let middle = Point::from((a.coords + b.coords + c.coords + d.coords) * 0.25);
-        let volume = volume(a, b, c, d);
         let size = self.size_near(t, &middle);
-        Plateau { size, tets: 12.0 * volume / (SIDE * size).powi(3) }
+        self.note_size(&middle, size);
+        Plateau { size, tets: tets_of_size(self.volume(t), size) }
     }
 
-    /// The lattice points inside some tets where the size is the plateau's; `None` if that is so in a very small part of the
-    /// tets, where looking for them takes longer than the front does.
-    fn candidates(&mut self, tets: &[u32], plateau: Plateau) -> Option<Vec<Candidate>> {
-        /// A front point takes as long as looking at some hundred lattice points.
-        const PATIENCE: f64 = 50.0;
-        let side = SIDE * plateau.size;
-        // A lattice has six tets a point.
-        let most_seen = (PATIENCE * plateau.tets / 6.0) as usize + 10_000;
-        let (mut found, mut points, mut seen) = (Vec::new(), Vec::new(), 0);
-        for &t in tets {
-            points.clear();
-            lattice_points(self.mesh.corners(t), side, &mut points);
-            seen += points.len();
-            if seen > most_seen {
-                return None;
-            }
-            let vertex = self.mesh.tets[t as usize][0];
-            for &point in &points {
-                let size = self.size_near(t, &point);
-                if is_level(size, plateau.size) {
-                    found.push(Candidate { point, size, vertex });
+    fn volume(&self, t: u32) -> f64 {
+        let [a, b, c, d] = self.mesh.corners(t);
+        volume(a, b, c, d)
+    }
+
+    /// The lattice points inside some tets where the size is the plateau's, in the order of the tets.
+    fn candidates(&self, tets: &[u32], plateau: f64) -> Vec<Candidate> {
+        /// Tets that one task looks through.
+        const CHUNK: usize = 512;
+        let in_chunk = |chunk: &[u32]| {
+            let (mut found, mut points) = (Vec::new(), Vec::new());
+            for &t in chunk {
+                points.clear();
+                lattice_points(self.mesh.corners(t), SIDE * plateau, &mut points);
+                let vertex = self.mesh.tets[t as usize][0];
+                for &point in &points {
+                    let size = self.size_near(t, &point);
+                    if is_level(size, plateau) {
+                        found.push(Candidate { point, size, vertex });
+                    }
                 }
             }
-        }
-        Some(found)
+            found
+        };
+        let found: Vec<Vec<Candidate>> = tets.par_chunks(CHUNK).map(in_chunk).collect();
+        found.into_iter().flatten().collect()
     }
 
     /// Inserts points along the Hilbert curve, under the filter of the front.
@@ -165,6 +174,11 @@ fn widest_plateau(samples: &[Plateau]) -> Plateau {
     best
 }
 
+/// How many tets of the lattice for a size fill a volume.
+fn tets_of_size(volume: f64, size: f64) -> f64 {
+    12.0 * volume / (SIDE * size).powi(3)
+}
+
 fn is_level(size: f64, plateau: f64) -> bool {
     size <= LEVEL * plateau && plateau <= LEVEL * size
 }
@@ -184,16 +198,26 @@ fn lattice_points(corners: [&Point; 4], side: f64, found: &mut Vec<Point>) {
     // The corners of the cubes, then their middles.
     for shift in [0.0, 0.5] {
         let index = |x: f64| x / side - shift;
-        for k in index(low.z).ceil() as i64..=index(high.z).floor() as i64 {
-            for j in index(low.y).ceil() as i64..=index(high.y).floor() as i64 {
+        for k in ceil(index(low.z))..=floor(index(high.z)) {
+            for j in ceil(index(low.y))..=floor(index(high.y)) {
                 let [y, z] = [j, k].map(|i| (i as f64 + shift) * side);
                 let Some([from, to]) = clip(&planes, y, z, [low.x, high.x]) else { continue };
-                for i in index(from).ceil() as i64..=index(to).floor() as i64 {
+                for i in ceil(index(from))..=floor(index(to)) {
                     found.push(jittered([i, j, k], shift, side));
                 }
             }
         }
     }
+}
+
+/// The standard functions are calls on processors of the oldest kind, and these are half of the search.
+fn floor(x: f64) -> i64 {
+    let whole = x as i64;
+    whole - i64::from(whole as f64 > x)
+}
+
+fn ceil(x: f64) -> i64 {
+    -floor(-x)
 }
 
 /// The part of a line parallel to the x axis that is behind all planes.

@@ -83,7 +83,7 @@ pub struct Settings {
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { fill: true, growth: 0.5, max_tets: tetrahedra::MAX_TETS }
+        Self { fill: true, growth: 0.3, max_tets: tetrahedra::MAX_TETS }
     }
 }
 
@@ -144,7 +144,7 @@ pub enum VolumeError {
         /// Why not.
         fault: KeptPointFault,
     },
-    /// The size field does not give a length.
+    /// The size field gives something that is no length.
     #[error("the size wanted at ({}, {}, {}) is {size}, not a positive length", place.x, place.y, place.z)]
     BadSize {
         /// Where.
@@ -209,7 +209,7 @@ pub fn mesh(
                     points::Stopped::TooManyTets => VolumeError::TooManyTets { limit },
                 })?;
     }
-    Ok((finish::finish(surface, &tets, scale), report))
+    Ok((finish::finish(surface, tets, scale), report))
 }
 
 #[cfg(test)]
