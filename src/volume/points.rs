@@ -183,12 +183,13 @@ impl Filler<'_> {
         self.states.resize(self.mesh.tets.len(), State::Coarse);
         for t in tets {
             if self.mesh.is_alive(t) {
+                self.mesh.keep_sphere(t);
                 self.states[t as usize] = if self.is_fine(t) { State::Fine } else { State::Coarse };
             }
         }
     }
 
-    pub(super) fn is_fine(&mut self, t: u32) -> bool {
+    pub(super) fn is_fine(&self, t: u32) -> bool {
         let radius2 = self.mesh.sphere(t).squared_radius();
         let [a, b, c, d] = self.mesh.tets[t as usize];
         let [a, b, c, d] = [self.at(a), self.at(b), self.at(c), self.at(d)];

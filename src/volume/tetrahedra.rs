@@ -154,11 +154,17 @@ impl Tetrahedra {
 
     /// The circumsphere of a tet.
     #[inline]
-    pub fn sphere(&mut self, tet: u32) -> Circumsphere {
-        if !self.spheres[tet as usize].is_known() {
-            self.spheres[tet as usize] = Circumsphere::of(self.corners(tet));
-        }
-        self.spheres[tet as usize]
+    pub fn sphere(&self, tet: u32) -> Circumsphere {
+        let kept = self.spheres[tet as usize];
+        if kept.is_known() { kept } else { Circumsphere::of(self.corners(tet)) }
+    }
+
+    /// The circumsphere of a tet, kept from now on.
+    #[inline]
+    pub fn keep_sphere(&mut self, tet: u32) -> Circumsphere {
+        let sphere = self.sphere(tet);
+        self.spheres[tet as usize] = sphere;
+        sphere
     }
 
     /// Whether a point lies strictly inside the circumsphere of a tet; exact.
@@ -170,7 +176,7 @@ impl Tetrahedra {
     /// As [`Tetrahedra::is_in_sphere`], where the sphere that is kept does not know.
     #[inline(never)]
     fn settle(&mut self, tet: u32, point: &Point) -> bool {
-        self.sphere(tet).holds(point).unwrap_or_else(|| {
+        self.keep_sphere(tet).holds(point).unwrap_or_else(|| {
             let [a, b, c, d] = self.corners(tet);
             insphere(a, b, c, d, point) == Sign::Positive
         })
