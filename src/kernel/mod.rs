@@ -5,3 +5,4 @@ pub mod predicates;
 pub mod quality;
 pub mod random;
 pub mod simplex;
+pub mod sphere;

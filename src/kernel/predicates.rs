@@ -70,6 +70,19 @@ fn coord(p: &Point) -> Coord3D<f64> {
 /// The sign of (b−a)×(c−a)·(d−a): positive where the tet a, b, c, d is positively oriented.
 #[inline]
 pub fn orient3d(a: &Point, b: &Point, c: &Point, d: &Point) -> Sign {
+    let (volume, error) = volume6_and_error([b, c, d].map(|p| [p.x - a.x, p.y - a.y, p.z - a.z]));
+    // Nearly always certain: only the rest is worth a call.
+    if volume > error {
+        Sign::Positive
+    } else if volume < -error {
+        Sign::Negative
+    } else {
+        exact_orient3d(a, b, c, d)
+    }
+}
+
+#[cold]
+fn exact_orient3d(a: &Point, b: &Point, c: &Point, d: &Point) -> Sign {
     Sign::of(-robust::orient3d(coord(a), coord(b), coord(c), coord(d)))
 }
 

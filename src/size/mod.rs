@@ -16,7 +16,7 @@ use crate::Point;
 
 /// Gives the target edge length at any point.
 pub trait SizeField: Sync {
-    /// The wanted edge length at `point`, positive and finite.
+    /// The wanted edge length at `point`, positive. The volume mesher also takes infinity: let sizes grow from the surface.
     fn size_at(&self, point: &Point) -> f64;
 }
 

@@ -8,12 +8,15 @@
 
 use super::tetrahedra::{NONE, Tetrahedra};
 use crate::Point;
-use crate::kernel::predicates::{Sign, insphere, orient3d};
+use crate::kernel::predicates::{Sign, orient3d};
+use std::collections::HashMap;
 
 /// A face of the cavity's surface, outward, and what lies behind it.
 #[derive(Clone, Copy, Debug)]
 struct Wall {
     vertices: [u32; 3],
+    /// The numbers of the vertices in the cavity.
+    numbers: [u32; 3],
     behind: u32,
     locked: bool,
 }
@@ -23,12 +26,15 @@ struct Wall {
 pub(super) struct Cavity {
     /// The tets of the cavity.
     pub tets: Vec<u32>,
-    /// The half-faces, inside, of its surface; filled by [`Cavity::make_star_shaped`].
+    /// The half-faces, inside, of its surface.
     pub walls: Vec<u32>,
+    /// The vertices of its tets, each once.
+    pub vertices: Vec<u32>,
     /// The tets that fill it, after [`Cavity::fill`].
     pub filled: Vec<u32>,
+    numbers: Numbers,
     replaced: Vec<Wall>,
-    table: EdgeTable,
+    edges: EdgeTable,
 }
 
 /// Where a walk ended.
@@ -53,7 +59,7 @@ pub(super) fn walk(mesh: &Tetrahedra, from: u32, target: &Point) -> Walk {
             if half_face == entry {
                 continue;
             }
-            let [a, b, c] = mesh.face(half_face).map(|v| mesh.point(v));
+            let [a, b, c] = mesh.face_points(half_face);
             if orient3d(a, b, c, target) == Sign::Positive {
                 let other = mesh.across(half_face);
                 if other == NONE || mesh.is_locked(half_face) {
@@ -73,22 +79,32 @@ pub(super) fn walk(mesh: &Tetrahedra, from: u32, target: &Point) -> Walk {
 impl Cavity {
     /// Takes all tets whose circumsphere holds `point`, from `seed` on, not across locked faces.
     pub fn grow(&mut self, mesh: &mut Tetrahedra, seed: u32, point: &Point) {
-        self.tets.clear();
         mesh.clear_marks();
+        self.numbers.clear(mesh.points.len());
+        self.tets.clear();
+        self.walls.clear();
+        self.vertices.clear();
         mesh.mark(seed);
         self.tets.push(seed);
+        for v in mesh.tets[seed as usize] {
+            self.meet(v);
+        }
         let mut next = 0;
         while let Some(&t) = self.tets.get(next) {
             next += 1;
-            for half_face in 4 * t..4 * t + 4 {
-                let other = mesh.across(half_face);
-                if other == NONE || mesh.is_marked(other >> 2) || mesh.is_locked(half_face) {
-                    continue;
-                }
-                let [a, b, c, d] = mesh.corners(other >> 2);
-                if insphere(a, b, c, d, point) == Sign::Positive {
-                    mesh.mark(other >> 2);
-                    self.tets.push(other >> 2);
+            let across = mesh.across[t as usize];
+            let locked = mesh.locked[t as usize];
+            for (i, other) in (0u32..).zip(across) {
+                if other == NONE || locked >> i & 1 == 1 {
+                    self.walls.push(4 * t + i);
+                } else if !mesh.is_marked(other >> 2) {
+                    if mesh.is_in_sphere(other >> 2, point) {
+                        mesh.mark(other >> 2);
+                        self.tets.push(other >> 2);
+                        self.meet(mesh.apex(other));
+                    } else {
+                        self.walls.push(4 * t + i);
+                    }
                 }
             }
         }
@@ -102,53 +118,62 @@ impl Cavity {
         for &t in tets {
             mesh.mark(t);
         }
+        self.look_again(mesh);
     }
 
     /// Gives tets back until the whole surface of the cavity sees `point` strictly from inside.
     ///
-    /// False where `seed` would have to go, or where a vertex or a locked face would be lost. Afterwards
-    /// `walls` holds the surface.
+    /// False where `seed` would have to go, or where a vertex or a locked face would be lost.
     pub fn make_star_shaped(&mut self, mesh: &mut Tetrahedra, seed: u32, point: &Point) -> bool {
         loop {
-            self.find_walls(mesh);
-            let before = self.tets.len();
+            let mut all_see = true;
             for &wall in &self.walls {
-                let [a, b, c] = mesh.face(wall).map(|v| mesh.point(v));
+                let [a, b, c] = mesh.face_points(wall);
                 if mesh.is_marked(wall >> 2) && orient3d(a, b, c, point) != Sign::Negative {
                     if wall >> 2 == seed {
                         return false;
                     }
                     mesh.unmark(wall >> 2);
+                    all_see = false;
                 }
             }
-            self.tets.retain(|&t| mesh.is_marked(t));
-            if self.tets.len() == before {
-                return self.is_simple(mesh);
+            if all_see {
+                return self.is_simple();
             }
+            self.tets.retain(|&t| mesh.is_marked(t));
+            self.look_again(mesh);
         }
     }
 
-    /// Collects the surface of the marked tets.
-    fn find_walls(&mut self, mesh: &Tetrahedra) {
+    /// Collects the surface and the vertices of the marked tets.
+    fn look_again(&mut self, mesh: &Tetrahedra) {
         self.walls.clear();
-        for &t in &self.tets {
+        self.vertices.clear();
+        self.numbers.clear(mesh.points.len());
+        for i in 0..self.tets.len() {
+            let t = self.tets[i];
             for half_face in 4 * t..4 * t + 4 {
                 let other = mesh.across(half_face);
                 if other == NONE || !mesh.is_marked(other >> 2) || mesh.is_locked(half_face) {
                     self.walls.push(half_face);
                 }
+                self.meet(mesh.apex(half_face));
             }
         }
     }
 
-    /// Whether the cavity is a ball without a vertex inside: n tets have n + 3 vertices then, and its
-    /// surface has 2·(n + 3) − 4 = 2n + 2 triangles; a vertex inside means fewer of them.
-    fn is_simple(&self, mesh: &Tetrahedra) -> bool {
-        // Star-shaped, so a ball; with w walls it has w / 2 + 2 vertices on its surface. Count all of them.
-        let mut vertices: Vec<u32> = self.tets.iter().flat_map(|&t| mesh.tets[t as usize]).collect();
-        vertices.sort_unstable();
-        vertices.dedup();
-        self.walls.len() == 2 * vertices.len() - 4
+    /// Numbers a vertex unless it has a number.
+    #[inline]
+    fn meet(&mut self, vertex: u32) {
+        if self.numbers.give(vertex, self.vertices.len() as u32) {
+            self.vertices.push(vertex);
+        }
+    }
+
+    /// Whether the cavity is a ball without a vertex inside. Star-shaped, it is a ball; so its surface of w triangles has
+    /// w / 2 + 2 vertices, and there are no others.
+    fn is_simple(&self) -> bool {
+        self.walls.len() + 4 == 2 * self.vertices.len()
     }
 
     /// Stars the cavity from a vertex: new tets (vertex, wall), in `filled`.
@@ -156,69 +181,134 @@ impl Cavity {
     /// Correct signs are the caller's promise; see [`Cavity::make_star_shaped`].
     pub fn fill(&mut self, mesh: &mut Tetrahedra, vertex: u32, body: u32) {
         self.replaced.clear();
-        for &t in &self.tets {
-            for half_face in 4 * t..4 * t + 4 {
-                let behind = mesh.across(half_face);
-                let locked = mesh.is_locked(half_face);
-                if behind == NONE || !mesh.is_marked(behind >> 2) || locked {
-                    self.replaced.push(Wall { vertices: mesh.face(half_face), behind, locked });
-                }
+        self.replaced.extend(self.walls.iter().map(|&wall| {
+            let [a, b, c] = mesh.face(wall);
+            Wall {
+                vertices: [a, b, c],
+                numbers: [self.numbers.of(a), self.numbers.of(b), self.numbers.of(c)],
+                behind: mesh.across(wall),
+                locked: mesh.is_locked(wall),
             }
+        }));
+        self.filled.clear();
+        for (i, wall) in self.replaced.iter().enumerate() {
+            // Nearly always there are more walls than tets: their slots are taken as they are.
+            let t = self.tets.get(i).copied().unwrap_or_else(|| mesh.free_slot());
+            let [a, b, c] = wall.vertices;
+            mesh.write_tet(t, [vertex, a, b, c], body);
+            mesh.locked[t as usize] = u8::from(wall.locked);
+            mesh.link(4 * t, wall.behind);
+            self.filled.push(t);
         }
-        for &t in &self.tets {
+        for &t in self.tets.iter().skip(self.walls.len()) {
             mesh.remove_tet(t);
         }
-        self.table.reset(self.replaced.len());
-        self.filled.clear();
-        for wall in &self.replaced {
-            let [a, b, c] = wall.vertices;
-            let t = mesh.add_tet([vertex, a, b, c], body);
-            self.filled.push(t);
-            mesh.link(4 * t, wall.behind);
-            mesh.locked[t as usize] = u8::from(wall.locked);
-            for (i, edge) in [(1, [b, c]), (2, [a, c]), (3, [a, b])] {
-                if let Some(other) = self.table.meet(edge, 4 * t + i) {
-                    mesh.link(4 * t + i, other);
-                }
-            }
+        if !self.edges.reset(self.vertices.len()) {
+            return link_by_map(mesh, &self.replaced, &self.filled);
+        }
+        for (wall, &t) in self.replaced.iter().zip(&self.filled) {
+            let [a, b, c] = wall.numbers;
+            self.edges.put(b, c, 4 * t + 1);
+            self.edges.put(c, a, 4 * t + 2);
+            self.edges.put(a, b, 4 * t + 3);
+        }
+        for (wall, &t) in self.replaced.iter().zip(&self.filled) {
+            let [a, b, c] = wall.numbers;
+            let row = &mut mesh.across[t as usize];
+            row[1] = self.edges.get(c, b);
+            row[2] = self.edges.get(a, c);
+            row[3] = self.edges.get(b, a);
         }
     }
 }
 
-/// Brings together the two half-faces over each edge of a cavity's surface: open addressing, linear probes.
+/// Numbers for the few vertices at hand, taken away from all at once.
+#[derive(Clone, Debug, Default)]
+struct Numbers {
+    /// A vertex has the number `stamps[v] - base` where that is not negative.
+    stamps: Vec<u32>,
+    base: u32,
+    next: u32,
+}
+
+impl Numbers {
+    /// Takes all numbers away; there are `vertices` vertices.
+    #[inline]
+    fn clear(&mut self, vertices: usize) {
+        self.base = self.next;
+        if self.base > u32::MAX / 2 {
+            self.stamps.fill(0);
+            self.base = 0;
+        }
+        // Stamp 0 would be a number in the very first round.
+        self.base = self.base.max(1);
+        self.next = self.base;
+        self.stamps.resize(vertices.max(self.stamps.len()), 0);
+    }
+
+    /// Gives a vertex its number, the next one in turn; false if it has one.
+    #[inline]
+    fn give(&mut self, vertex: u32, number: u32) -> bool {
+        let stamp = &mut self.stamps[vertex as usize];
+        let fresh = *stamp < self.base;
+        if fresh {
+            *stamp = self.base + number;
+            self.next = *stamp + 1;
+        }
+        fresh
+    }
+
+    /// The number of a vertex that has one.
+    #[inline]
+    fn of(&self, vertex: u32) -> u32 {
+        self.stamps[vertex as usize] - self.base
+    }
+}
+
+/// Which half-face stands on each directed edge of a cavity's surface: a square table by the numbers of its ends. Never cleared,
+/// for only what was put is asked for.
 #[derive(Clone, Debug, Default)]
 struct EdgeTable {
-    slots: Vec<(u64, u32)>,
+    square: Vec<u32>,
     shift: u32,
 }
 
-impl EdgeTable {
-    /// Never a pair of different vertices.
-    const EMPTY: u64 = u64::MAX;
+/// The table of the largest cavity takes 4 MiB. A usual cavity has 20 vertices; thousands come together where many points
+/// lie on one sphere.
+const LARGEST_SHIFT: u32 = 10;
 
-    /// Empties the table and makes room for the edges of `faces` triangles.
-    fn reset(&mut self, faces: usize) {
-        let size = (4 * faces).next_power_of_two().max(16);
-        self.slots.clear();
-        self.slots.resize(size, (Self::EMPTY, NONE));
-        self.shift = 64 - size.ilog2();
+impl EdgeTable {
+    /// Makes room for edges between this many vertices; false where they are too many for a table.
+    fn reset(&mut self, vertices: usize) -> bool {
+        self.shift = vertices.next_power_of_two().ilog2();
+        let fits = self.shift <= LARGEST_SHIFT;
+        if fits && self.square.len() < 1 << (2 * self.shift) {
+            self.square.resize(1 << (2 * self.shift), NONE);
+        }
+        fits
     }
 
-    /// The half-face that came with this edge before, or `None` if this is the first.
-    #[inline]
-    fn meet(&mut self, [a, b]: [u32; 2], half_face: u32) -> Option<u32> {
-        let key = u64::from(a.min(b)) << 32 | u64::from(a.max(b));
-        let mut slot = (key.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> self.shift) as usize;
-        loop {
-            let (found, other) = self.slots[slot];
-            if found == key {
-                return Some(other);
-            }
-            if found == Self::EMPTY {
-                self.slots[slot] = (key, half_face);
-                return None;
-            }
-            slot = (slot + 1) & (self.slots.len() - 1);
-        }
+    #[inline(always)]
+    fn put(&mut self, from: u32, to: u32, half_face: u32) {
+        self.square[(from << self.shift | to) as usize] = half_face;
+    }
+
+    #[inline(always)]
+    fn get(&self, from: u32, to: u32) -> u32 {
+        self.square[(from << self.shift | to) as usize]
+    }
+}
+
+/// As the table does, for a cavity with very many vertices.
+#[cold]
+fn link_by_map(mesh: &mut Tetrahedra, walls: &[Wall], tets: &[u32]) {
+    let mut map = HashMap::with_capacity(3 * walls.len());
+    for (wall, &t) in walls.iter().zip(tets) {
+        let [a, b, c] = wall.numbers;
+        map.extend([([b, c], 4 * t + 1), ([c, a], 4 * t + 2), ([a, b], 4 * t + 3)]);
+    }
+    for (wall, &t) in walls.iter().zip(tets) {
+        let [a, b, c] = wall.numbers;
+        mesh.across[t as usize][1..].copy_from_slice(&[map[&[c, b]], map[&[a, c]], map[&[b, a]]]);
     }
 }

@@ -16,26 +16,33 @@ pub(super) fn scale_of(points: &[Point]) -> f64 {
     2f64.powi(-(largest.log2().ceil() as i32).clamp(-LARGEST, LARGEST))
 }
 
-/// The mesh without unused slots and vertices: the surface's points as given, then the others in order.
-pub(super) fn finish(surface: &ClosedSurface, mesh: &Tetrahedra, scale: f64) -> VolumeMesh {
-    let mut points = surface.points.clone();
-    let mut new_vertex: Vec<u32> = (0..points.len() as u32).collect();
-    for (v, &t) in mesh.at_vertex.iter().enumerate().skip(points.len()) {
-        if t == NONE {
-            new_vertex.push(NONE);
-        } else {
-            new_vertex.push(points.len() as u32);
-            points.push(mesh.points[v] / scale);
+/// The mesh without unused slots and vertices: the surface's points as given, then the others in order. Works in the arrays of
+/// `mesh`, once those that are not needed any more are gone: this is where memory is scarce.
+pub(super) fn finish(surface: &ClosedSurface, mesh: Tetrahedra, scale: f64) -> VolumeMesh {
+    let Tetrahedra { points: mut places, mut tets, mut bodies, at_vertex, .. } = mesh;
+    let given = surface.points.len();
+    let mut new_vertex: Vec<u32> = (0..given as u32).collect();
+    places[..given].copy_from_slice(&surface.points);
+    let mut kept = given;
+    for (v, &t) in at_vertex.iter().enumerate().skip(given) {
+        new_vertex.push(kept as u32);
+        if t != NONE {
+            places[kept] = places[v] / scale;
+            kept += 1;
         }
     }
-    let mut result = VolumeMesh { points, ..VolumeMesh::default() };
-    result.tets.reserve(mesh.len());
-    result.bodies.reserve(mesh.len());
-    for t in mesh.alive() {
-        result.tets.push(mesh.tets[t as usize].map(|v| new_vertex[v as usize]));
-        result.bodies.push(BodyId(mesh.bodies[t as usize]));
+    places.truncate(kept);
+    let mut kept = 0;
+    for slot in 0..tets.len() {
+        if tets[slot][0] != NONE {
+            tets[kept] = tets[slot].map(|v| new_vertex[v as usize]);
+            bodies[kept] = bodies[slot];
+            kept += 1;
+        }
     }
-    result
+    tets.truncate(kept);
+    bodies.truncate(kept);
+    VolumeMesh { points: places, tets, bodies: bodies.into_iter().map(BodyId).collect() }
 }
 
 /// The error for what a recovery left undone, in the surface's own units and triangles.

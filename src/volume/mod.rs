@@ -24,7 +24,7 @@
 //! 3. `carve`: a flood from the triangles gives each tet its body and removes the outside.
 //! 4. `relocate`: Steiner points leave the surface: none or one stays inside on either side.
 //! 5. `keep`: points that the caller wants.
-//! 6. `points`: the inside by the size field, frontal Delaunay.
+//! 6. `points`: the inside by the size field: lattices where it is level (`lattice`), frontal Delaunay elsewhere.
 //!
 //! Not promised: good shape. Steps 1 to 5 leave whatever the surface allows; step 6 places points so that nearly all tets are well
 //! shaped, but slivers remain: see [`improve`](crate::improve). Whether a surface intersects itself is found out
@@ -41,6 +41,7 @@ mod finish;
 mod flips;
 mod intersect;
 mod keep;
+mod lattice;
 mod points;
 mod polygon;
 mod recover;
@@ -82,7 +83,7 @@ pub struct Settings {
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { fill: true, growth: 0.5, max_tets: tetrahedra::MAX_TETS }
+        Self { fill: true, growth: 0.3, max_tets: tetrahedra::MAX_TETS }
     }
 }
 
@@ -143,7 +144,7 @@ pub enum VolumeError {
         /// Why not.
         fault: KeptPointFault,
     },
-    /// The size field does not give a length.
+    /// The size field gives something that is no length.
     #[error("the size wanted at ({}, {}, {}) is {size}, not a positive length", place.x, place.y, place.z)]
     BadSize {
         /// Where.
@@ -208,7 +209,7 @@ pub fn mesh(
                     points::Stopped::TooManyTets => VolumeError::TooManyTets { limit },
                 })?;
     }
-    Ok((finish::finish(surface, &tets, scale), report))
+    Ok((finish::finish(surface, tets, scale), report))
 }
 
 #[cfg(test)]

@@ -22,7 +22,7 @@ const REGULAR: f64 = 0.612_372_435_695_794_5;
 /// times as many and edges 7 % longer, 1.5 gives 0.83 times as many, less well shaped.
 const FINE: f64 = 1.3;
 
-/// No vertex is inserted nearer to another than this fraction of the wanted size. From 0.65 to 0.8 the worst twentieth of
+/// No vertex is inserted nearer to another than this fraction of the mean of the wanted sizes at both. From 0.65 to 0.8 the worst twentieth of
 /// the dihedral angles on the shaft's skin grows from 27.1 to 28.7 degrees; 0.9 leaves holes (26.4 degrees, edges
 /// 15 % too long in the mean).
 const NEAREST: f64 = 0.8;
@@ -35,16 +35,16 @@ const NEAREST_FACE: f64 = 0.4;
 const SKIN_TOLERANCE: f64 = 1.25;
 
 /// The working state of the point placement.
-struct Filler<'a> {
-    mesh: &'a mut Tetrahedra,
+pub(super) struct Filler<'a> {
+    pub(super) mesh: &'a mut Tetrahedra,
     size: &'a dyn SizeField,
     scale: f64,
     /// The wanted size at each vertex, in the mesher's units.
     sizes: Vec<f64>,
     /// By slot.
     states: Vec<State>,
-    cavity: Cavity,
-    limits: Limits,
+    pub(super) cavity: Cavity,
+    pub(super) limits: Limits,
     /// Why the placement stops early, if it does.
     stopped: Option<Stopped>,
 }
@@ -71,7 +71,7 @@ enum State {
 /// Why no more points are placed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Stopped {
-    /// The size field gave a size that is not positive and finite.
+    /// The size field gave a size that is not positive.
     BadSize { place: Point, size: f64 },
     /// There are more tets than allowed.
     TooManyTets,
@@ -96,6 +96,7 @@ pub(super) fn fill(
         stopped: None,
     };
     filler.size_vertices();
+    filler.add_lattices();
     filler.advance();
     filler.finish();
     match filler.stopped {
@@ -120,41 +121,57 @@ fn skin_edges(mesh: &Tetrahedra) -> Vec<(f64, u32)> {
     skin
 }
 
-/// The centre of the sphere through the corners of a tet; not finite where it is flat.
-fn circumcenter([a, b, c, d]: [&Point; 4]) -> Point {
-    let (u, v, w) = (b - a, c - a, d - a);
-    let numerator =
-        u.norm_squared() * v.cross(&w) + v.norm_squared() * w.cross(&u) + w.norm_squared() * u.cross(&v);
-    a + numerator / (2.0 * u.cross(&v).dot(&w))
-}
-
 impl Filler<'_> {
-    /// Finds the wanted size at each vertex: the field's, or what the edges of the skin suggest if that is less.
+    /// Finds the wanted size at each vertex: the field's, or what the edges of the skin suggest if that is less. Where neither
+    /// says anything, it grows from the neighbours.
     fn size_vertices(&mut self) {
         for (v, (sum, count)) in skin_edges(self.mesh).into_iter().enumerate() {
             let mut size = 0.0;
             if self.mesh.at_vertex[v] != NONE {
-                size = self.ask(&self.mesh.points[v].clone());
+                let point = self.mesh.points[v];
+                size = self.ask(&point);
+                self.note_size(&point, size);
                 if count > 0 {
                     size = size.min(SKIN_TOLERANCE * sum / f64::from(count));
                 }
             }
             self.sizes.push(size);
         }
+        let mut infinite: Vec<u32> =
+            (0u32..).zip(&self.sizes).filter(|&(_, &size)| size == f64::INFINITY).map(|(v, _)| v).collect();
+        let mut star = Vec::new();
+        while !infinite.is_empty() {
+            let before = infinite.len();
+            infinite.retain(|&v| {
+                self.mesh.star(v, &mut star);
+                let size = star.iter().fold(f64::INFINITY, |size, &t| {
+                    let growth =
+                        |u: u32| self.limits.growth * (self.mesh.point(u) - self.mesh.point(v)).norm();
+                    let from = |u: u32| self.sizes[u as usize] + growth(u);
+                    self.mesh.tets[t as usize].iter().fold(size, |size, &u| size.min(from(u)))
+                });
+                self.sizes[v as usize] = size;
+                size.is_infinite()
+            });
+            assert!(infinite.len() < before, "vertices {infinite:?} are not joined to the surface");
+        }
     }
 
     /// What the size field says, in the mesher's units.
-    fn ask(&mut self, point: &Point) -> f64 {
-        let place = point / self.scale;
-        let size = self.size.size_at(&place);
-        if !(size > 0.0 && size.is_finite()) {
-            self.stopped = self.stopped.or(Some(Stopped::BadSize { place, size }));
+    fn ask(&self, point: &Point) -> f64 {
+        self.size.size_at(&(point / self.scale)) * self.scale
+    }
+
+    /// Stops the placement if this is no size.
+    pub(super) fn note_size(&mut self, point: &Point, size: f64) {
+        if size.is_nan() || size <= 0.0 {
+            let stopped = Stopped::BadSize { place: point / self.scale, size: size / self.scale };
+            self.stopped = self.stopped.or(Some(stopped));
         }
-        size * self.scale
     }
 
     /// Whether to stop early.
-    fn stops(&mut self) -> bool {
+    pub(super) fn stops(&mut self) -> bool {
         if self.mesh.len() > self.limits.max_tets {
             self.stopped = self.stopped.or(Some(Stopped::TooManyTets));
         }
@@ -162,40 +179,46 @@ impl Filler<'_> {
     }
 
     /// Finds out how far some tets are.
-    fn judge(&mut self, tets: &[u32]) {
+    fn judge(&mut self, tets: impl IntoIterator<Item = u32>) {
         self.states.resize(self.mesh.tets.len(), State::Coarse);
-        for &t in tets {
-            self.states[t as usize] = if self.is_fine(t) { State::Fine } else { State::Coarse };
+        for t in tets {
+            if self.mesh.is_alive(t) {
+                self.mesh.keep_sphere(t);
+                self.states[t as usize] = if self.is_fine(t) { State::Fine } else { State::Coarse };
+            }
         }
     }
 
-    fn is_fine(&self, t: u32) -> bool {
-        let corners = self.mesh.corners(t);
-        let radius2 = (circumcenter(corners) - corners[0]).norm_squared();
-        let size = 0.25 * self.mesh.tets[t as usize].iter().map(|&v| self.sizes[v as usize]).sum::<f64>();
-        radius2 <= (FINE * REGULAR * size).powi(2)
+    pub(super) fn is_fine(&self, t: u32) -> bool {
+        let radius2 = self.mesh.sphere(t).squared_radius();
+        let [a, b, c, d] = self.mesh.tets[t as usize];
+        let [a, b, c, d] = [self.at(a), self.at(b), self.at(c), self.at(d)];
+        radius2 <= (FINE * REGULAR * 0.25 * (a + b + c + d)).powi(2)
+    }
+
+    /// The wanted size at a vertex.
+    fn at(&self, vertex: u32) -> f64 {
+        self.sizes[vertex as usize]
     }
 
     fn state(&self, t: u32) -> State {
         self.states[t as usize]
     }
 
-    /// All tets, near ones near each other. Later waves inherit the order of the first. It keeps the work in the
+    /// The coarse tets, near ones near each other. Later waves inherit the order of the first. It keeps the work in the
     /// cache: 2 million tets in the shaft take 3.7 s instead of 5.7 s.
     fn along_hilbert_curve(&self) -> Vec<u32> {
-        let mut place = vec![0u32; self.mesh.points.len()];
-        for (i, v) in hilbert_order(&self.mesh.points).into_iter().enumerate() {
-            place[v as usize] = i as u32;
-        }
-        let mut tets: Vec<u32> = self.mesh.alive().collect();
-        tets.sort_by_key(|&t| place[self.mesh.tets[t as usize][0] as usize]);
-        tets
+        let is_coarse = |t: &u32| self.state(*t) == State::Coarse;
+        let coarse: Vec<u32> = self.mesh.alive().filter(is_coarse).collect();
+        let places: Vec<Point> =
+            coarse.iter().map(|&t| *self.mesh.point(self.mesh.tets[t as usize][0])).collect();
+        hilbert_order(&places).into_iter().map(|i| coarse[i as usize]).collect()
     }
 
     /// Waves of ideal points, until no front is left.
     fn advance(&mut self) {
+        self.judge(0..self.mesh.tets.len() as u32);
         let mut coarse = self.along_hilbert_curve();
-        self.judge(&coarse);
         while !coarse.is_empty() {
             let mut next = Vec::new();
             let mut moved = false;
@@ -212,7 +235,7 @@ impl Filler<'_> {
                     self.is_front(h) && {
                         has_front = true;
                         let (point, size) = self.ideal_point(h);
-                        self.insert(t, point, size)
+                        self.insert_and_judge(t, point, size)
                     }
                 });
                 moved |= has_front;
@@ -243,9 +266,9 @@ impl Filler<'_> {
             if !self.mesh.is_alive(t) || self.state(t) == State::Fine {
                 continue;
             }
-            let center = circumcenter(self.mesh.corners(t));
+            let center = self.mesh.sphere(t).center();
             let size = self.size_near(t, &center);
-            if self.insert(t, center, size) {
+            if self.insert_and_judge(t, center, size) {
                 open.extend_from_slice(&self.cavity.filled);
             }
         }
@@ -258,47 +281,65 @@ impl Filler<'_> {
     }
 
     /// The wanted size at a point in or near a tet.
-    fn size_near(&mut self, t: u32, point: &Point) -> f64 {
+    pub(super) fn size_near(&self, t: u32, point: &Point) -> f64 {
         let asked = self.ask(point);
+        self.grown_size(t, point, asked)
+    }
+
+    /// What sizes at the corners of a tet leave of the size asked for at a point.
+    pub(super) fn grown_size(&self, t: u32, point: &Point, asked: f64) -> f64 {
         self.mesh.tets[t as usize].iter().fold(asked, |size, &v| {
-            size.min(self.sizes[v as usize] + self.limits.growth * (point - self.mesh.point(v)).norm())
+            let grown = self.at(v) + self.limits.growth * (point - self.mesh.point(v)).norm();
+            // What is no number stays so.
+            if grown < size { grown } else { size }
         })
     }
 
     /// The point over a face, into its tet, whose edges to the face have the wanted length; and that length.
-    fn ideal_point(&mut self, half_face: u32) -> (Point, f64) {
-        let [a, b, c] = self.mesh.face(half_face).map(|v| self.mesh.point(v));
+    fn ideal_point(&self, half_face: u32) -> (Point, f64) {
+        let [a, b, c] = self.mesh.face_points(half_face);
         let (u, v) = (b - a, c - a);
         let normal: Vector = -area_vector(a, b, c);
         let squares = normal.norm_squared();
         let to_center = (u.norm_squared() * v - v.norm_squared() * u).cross(&u.cross(&v)) / (2.0 * squares);
         let (center, radius2) = (a + to_center, to_center.norm_squared());
         let inward = normal / squares.sqrt();
-        let mut size = self.mesh.face(half_face).iter().map(|&v| self.sizes[v as usize]).sum::<f64>() / 3.0;
-        let mut point = center;
+        let at_face = self.mesh.face(half_face).iter().map(|&v| self.at(v)).sum::<f64>() / 3.0;
+        let (mut point, mut size) = (center, at_face);
         // The size at the point decides where it is, and where it is decides the size: twice is enough.
         for _ in 0..2 {
-            let height = (size * size - radius2).max(0.25 * size * size).sqrt();
+            let edge = 0.5 * (at_face + size);
+            let height = (edge * edge - radius2).max(0.25 * edge * edge).sqrt();
             point = center + inward * height;
             size = self.size_near(half_face >> 2, &point);
         }
         (point, size)
     }
 
+    /// As [`Filler::insert`], and finds out how far the new tets are.
+    fn insert_and_judge(&mut self, t: u32, point: Point, size: f64) -> bool {
+        let inserted = self.insert(t, point, size);
+        if inserted {
+            let filled = std::mem::take(&mut self.cavity.filled);
+            self.judge(filled.iter().copied());
+            self.cavity.filled = filled;
+        }
+        inserted
+    }
+
     /// Inserts a point near tet `t` unless it is too near to something; the new tets are in `cavity.filled`.
-    fn insert(&mut self, t: u32, point: Point, size: f64) -> bool {
-        let near = (NEAREST * size).powi(2);
-        let too_near =
-            |mesh: &Tetrahedra, t: u32| mesh.corners(t).iter().any(|p| (point - **p).norm_squared() < near);
-        if !point.iter().all(|x| x.is_finite()) || too_near(self.mesh, t) {
+    pub(super) fn insert(&mut self, t: u32, point: Point, size: f64) -> bool {
+        self.note_size(&point, size);
+        let finite = point.x.is_finite() && point.y.is_finite() && point.z.is_finite();
+        if !finite || self.is_corner_near(t, &point, size) {
             return false;
         }
         let Walk::Inside(seed) = walk(self.mesh, t, &point) else { return false };
-        if too_near(self.mesh, seed) {
+        if seed != t && self.is_corner_near(seed, &point, size) {
             return false;
         }
         self.cavity.grow(self.mesh, seed, &point);
-        if self.cavity.tets.iter().any(|&t| too_near(self.mesh, t))
+        if self.cavity.vertices.iter().any(|&v| self.is_near(v, &point, size))
             || !self.cavity.make_star_shaped(self.mesh, seed, &point)
             || self.cavity.walls.iter().any(|&w| self.is_skin_near(w, &point, size))
         {
@@ -308,17 +349,29 @@ impl Filler<'_> {
         let v = self.mesh.add_point(point);
         self.sizes.push(size);
         self.cavity.fill(self.mesh, v, body);
-        let filled = std::mem::take(&mut self.cavity.filled);
-        self.judge(&filled);
-        self.cavity.filled = filled;
         true
+    }
+
+    /// Whether a vertex is too near to a new point, by the wanted size half-way.
+    #[inline]
+    fn is_near(&self, vertex: u32, point: &Point, size: f64) -> bool {
+        let near = NEAREST * 0.5 * (size + self.at(vertex));
+        (point - self.mesh.point(vertex)).norm_squared() < near * near
+    }
+
+    fn is_corner_near(&self, t: u32, point: &Point, size: f64) -> bool {
+        let [a, b, c, d] = self.mesh.tets[t as usize];
+        self.is_near(a, point, size)
+            || self.is_near(b, point, size)
+            || self.is_near(c, point, size)
+            || self.is_near(d, point, size)
     }
 
     fn is_skin_near(&self, wall: u32, point: &Point, size: f64) -> bool {
         if !self.mesh.is_locked(wall) {
             return false;
         }
-        let [a, b, c] = self.mesh.face(wall).map(|v| self.mesh.point(v));
+        let [a, b, c] = self.mesh.face_points(wall);
         let normal = area_vector(a, b, c);
         (a - point).dot(&normal) < NEAREST_FACE * size * normal.norm()
     }

@@ -284,6 +284,62 @@ fn tets_follow_a_graded_size() {
     assert!(low > 0.5 && (0.85..1.15).contains(&median) && high < 2.0, "{low} {median} {high}");
 }
 
+/// Whether the edges of tets that share a vertex differ in length by less than this factor, but for one vertex in a thousand.
+fn grows_smoothly(mesh: &VolumeMesh, factor: f64) -> bool {
+    let mut range = vec![[f64::INFINITY, 0.0]; mesh.points.len()];
+    for tet in &mesh.tets {
+        for [i, j] in crate::mesh::TET_EDGES {
+            let length = (mesh.points[tet[i] as usize] - mesh.points[tet[j] as usize]).norm();
+            for v in [tet[i], tet[j]] {
+                let [low, high] = range[v as usize];
+                range[v as usize] = [low.min(length), f64::max(high, length)];
+            }
+        }
+    }
+    let abrupt = range.iter().filter(|[low, high]| *high > factor * low).count();
+    1000 * abrupt <= mesh.points.len()
+}
+
+#[test]
+fn without_a_size_field_tets_grow_from_the_skin() {
+    let mut soup = Soup::default();
+    soup.brick([0.; 3], [1.; 3], 20, INSIDE);
+    let surface = soup.surface().unwrap().with_kept_points(vec![Point::new(0.5, 0.52, 0.47)]);
+    let uniform = mesh(&surface, &UniformSize(0.05), &Settings::default()).unwrap().0;
+    let grown = mesh(&surface, &UniformSize(f64::INFINITY), &Settings::default()).unwrap().0;
+    check_fills(&surface, &grown);
+    assert!(grows_smoothly(&grown, 4.0));
+    assert!(2 * grown.tets.len() < uniform.tets.len(), "{} {}", grown.tets.len(), uniform.tets.len());
+}
+
+#[test]
+fn a_skin_of_very_different_edges_is_filled_smoothly() {
+    // Inversion at a point near a sphere: a sphere again, its triangles similar, their sizes in a ratio of 200.
+    let mut soup = Soup::default();
+    soup.sphere(Point::origin(), 1.0, 4, INSIDE);
+    let near = Point::new(0.0, 0.0, 1.15);
+    soup.map(|p| Point::from((p - near) / (p - near).norm_squared()));
+    soup.triangles.iter_mut().for_each(|t| t.swap(1, 2));
+    let surface = soup.surface().unwrap();
+    let mesh = mesh(&surface, &UniformSize(f64::INFINITY), &Settings::default()).unwrap().0;
+    check_fills(&surface, &mesh);
+    assert!(grows_smoothly(&mesh, 4.0));
+}
+
+#[test]
+fn where_the_size_is_level_most_tets_are_those_of_the_lattice() {
+    let mut soup = Soup::default();
+    soup.brick([0.; 3], [1.; 3], 16, INSIDE);
+    let surface = soup.surface().unwrap();
+    let mesh = mesh(&surface, &UniformSize(1.0 / 16.0), &Settings::default()).unwrap().0;
+    check_fills(&surface, &mesh);
+    let is_regular = |tet: &&[u32; 4]| {
+        let [a, b, c, d] = tet.map(|v| &mesh.points[v as usize]);
+        (crate::kernel::quality::mean_ratio(a, b, c, d) - 0.952).abs() < 0.001
+    };
+    assert!(3 * mesh.tets.iter().filter(is_regular).count() > mesh.tets.len());
+}
+
 #[test]
 fn kept_points_become_vertices_and_others_are_refused() {
     let mut soup = Soup::default();
@@ -315,7 +371,7 @@ fn bad_sizes_and_too_many_tets_are_errors() {
     let mut soup = Soup::default();
     soup.brick([0.; 3], [1.; 3], 2, INSIDE);
     let surface = soup.surface().unwrap();
-    for size in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+    for size in [0.0, -1.0, f64::NAN, f64::NEG_INFINITY] {
         let error = mesh(&surface, &UniformSize(size), &Settings::default()).unwrap_err();
         assert!(matches!(error, VolumeError::BadSize { .. }), "{error}");
     }

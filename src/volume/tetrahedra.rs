@@ -5,7 +5,8 @@
 //! face also says where one arrives. A **locked** face belongs to the boundary and stays for ever.
 
 use crate::Point;
-use crate::kernel::predicates::{Sign, orient3d};
+use crate::kernel::predicates::{Sign, insphere, orient3d};
+use crate::kernel::sphere::Circumsphere;
 use crate::mesh::TET_FACES;
 
 /// No tet, no vertex, nothing across.
@@ -50,6 +51,8 @@ pub(super) struct Tetrahedra {
     /// Some tet at each vertex, or `NONE`.
     pub at_vertex: Vec<u32>,
     free: Vec<u32>,
+    /// The circumsphere of each tet, found when it is asked for first: points with tets must not move.
+    spheres: Vec<Circumsphere>,
     marks: Vec<u32>,
     epoch: u32,
     scratch: Vec<([u32; 3], u32, bool)>,
@@ -98,14 +101,23 @@ impl Tetrahedra {
     /// The corners of a tet.
     #[inline]
     pub fn corners(&self, tet: u32) -> [&Point; 4] {
-        self.tets[tet as usize].map(|v| &self.points[v as usize])
+        let [a, b, c, d] = self.tets[tet as usize];
+        [self.point(a), self.point(b), self.point(c), self.point(d)]
     }
 
     /// The vertices of a half-face, outward from its tet.
     #[inline]
     pub fn face(&self, half_face: u32) -> [u32; 3] {
         let tet = &self.tets[(half_face >> 2) as usize];
-        TET_FACES[(half_face & 3) as usize].map(|i| tet[i])
+        let [i, j, k] = TET_FACES[(half_face & 3) as usize];
+        [tet[i], tet[j], tet[k]]
+    }
+
+    /// The corners of a half-face, outward from its tet.
+    #[inline]
+    pub fn face_points(&self, half_face: u32) -> [&Point; 3] {
+        let [a, b, c] = self.face(half_face);
+        [self.point(a), self.point(b), self.point(c)]
     }
 
     /// The vertex of the tet that is opposite to a half-face.
@@ -138,6 +150,36 @@ impl Tetrahedra {
     #[inline]
     pub fn side(&self, [a, b, c]: [u32; 3], d: u32) -> Sign {
         orient3d(self.point(a), self.point(b), self.point(c), self.point(d))
+    }
+
+    /// The circumsphere of a tet.
+    #[inline]
+    pub fn sphere(&self, tet: u32) -> Circumsphere {
+        let kept = self.spheres[tet as usize];
+        if kept.is_known() { kept } else { Circumsphere::of(self.corners(tet)) }
+    }
+
+    /// The circumsphere of a tet, kept from now on.
+    #[inline]
+    pub fn keep_sphere(&mut self, tet: u32) -> Circumsphere {
+        let sphere = self.sphere(tet);
+        self.spheres[tet as usize] = sphere;
+        sphere
+    }
+
+    /// Whether a point lies strictly inside the circumsphere of a tet; exact.
+    #[inline]
+    pub fn is_in_sphere(&mut self, tet: u32, point: &Point) -> bool {
+        self.spheres[tet as usize].holds(point).unwrap_or_else(|| self.settle(tet, point))
+    }
+
+    /// As [`Tetrahedra::is_in_sphere`], where the sphere that is kept does not know.
+    #[inline(never)]
+    fn settle(&mut self, tet: u32, point: &Point) -> bool {
+        self.keep_sphere(tet).holds(point).unwrap_or_else(|| {
+            let [a, b, c, d] = self.corners(tet);
+            insphere(a, b, c, d, point) == Sign::Positive
+        })
     }
 
     /// The index of `vertex` in `tet`.
@@ -176,27 +218,38 @@ impl Tetrahedra {
     }
 
     /// A slot for a new tet, nothing across yet.
-    #[inline]
     pub fn add_tet(&mut self, tet: [u32; 4], body: u32) -> u32 {
-        let slot = if let Some(slot) = self.free.pop() {
-            let i = slot as usize;
-            self.tets[i] = tet;
-            self.across[i] = [NONE; 4];
-            self.locked[i] = 0;
-            self.bodies[i] = body;
-            slot
-        } else {
-            self.tets.push(tet);
+        let slot = self.free_slot();
+        self.write_tet(slot, tet, body);
+        self.across[slot as usize] = [NONE; 4];
+        self.locked[slot as usize] = 0;
+        slot
+    }
+
+    /// A slot without a tet, which the caller fills at once.
+    #[inline]
+    pub fn free_slot(&mut self) -> u32 {
+        self.free.pop().unwrap_or_else(|| {
+            self.tets.push([NONE; 4]);
             self.across.push([NONE; 4]);
             self.locked.push(0);
-            self.bodies.push(body);
+            self.bodies.push(NO_BODY);
+            self.spheres.push(Circumsphere::UNKNOWN);
             self.marks.push(0);
             (self.tets.len() - 1) as u32
-        };
+        })
+    }
+
+    /// Puts a tet in a slot; what is across its faces, and which are locked, is left to the caller.
+    #[inline]
+    pub fn write_tet(&mut self, slot: u32, tet: [u32; 4], body: u32) {
+        let i = slot as usize;
+        self.tets[i] = tet;
+        self.bodies[i] = body;
+        self.spheres[i] = Circumsphere::UNKNOWN;
         for v in tet {
             self.at_vertex[v as usize] = slot;
         }
-        slot
     }
 
     /// Frees the slot of a tet. What was across it still points to it: the caller links anew.
