@@ -41,6 +41,9 @@ fn attempt_to_bound(
     report.missing_edges = counts.missing_edges;
     report.missing_faces = counts.missing_faces;
     report.steiner_on_surface = steiner.len();
+    if let Err(l) = &recovered {
+        eprintln!("RECOVERY left {} steiner {} helping {}", l.len(), steiner.len(), helping.len());
+    }
     recovered.map_err(|left| finish::not_recovered(surface, &constraints, &left))?;
     lock_facets(&mut tets, &constraints);
     carve::carve(&mut tets, &constraints, &surface.regions, points.len() as u32).map_err(|d| {
@@ -49,6 +52,7 @@ fn attempt_to_bound(
     })?;
     let (inside, stayed) = relocate::relocate(&mut tets, &mut constraints, &surface.triangles, &steiner);
     if !stayed.is_empty() {
+        eprintln!("RELOCATE stayed {} of {}", stayed.len(), steiner.len());
         let left: Vec<u32> = stayed.iter().flat_map(|&p| constraints.facets_at(p)).collect();
         return Err(finish::not_recovered(surface, &constraints, &left));
     }

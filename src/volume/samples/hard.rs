@@ -106,7 +106,7 @@ pub fn skin_of(points: &[Point], tets: &[([u32; 4], Option<BodyId>)], pieces: u3
         // From the lowest vertex on, so that neighbours cut a common edge at the same points.
         let place = |v: u32, w: u32, i: u32| {
             let (v, w, i) = if v < w { (v, w, i) } else { (w, v, pieces - i) };
-            at(v) + (at(w) - at(v)) * (f64::from(i) / f64::from(pieces))
+            if i == pieces { at(w) } else { at(v) + (at(w) - at(v)) * (f64::from(i) / f64::from(pieces)) }
         };
         let [a, b, c] = *key;
         let inner = |i: u32, j: u32| match (i, j) {
