@@ -61,13 +61,14 @@ impl<'a> Recovery<'a> {
         most_steiner: usize,
         attempt: u32,
     ) -> Self {
+        let flips = Flips::new(mesh.points.len() as u32);
         Self {
             mesh,
             constraints,
             steiner: Vec::new(),
             helping: Vec::new(),
             counts: Counts::default(),
-            flips: Flips::default(),
+            flips,
             cavity: Cavity::default(),
             star: Vec::new(),
             found: Vec::new(),

@@ -89,7 +89,8 @@ fn take_off(
     let mut patches: BTreeMap<u32, Vec<[u32; 3]>> = BTreeMap::new();
     for (&triangle, fan) in &fans {
         let shadow = Shadow::of(triangles[triangle as usize].map(|v| mesh.point(v)));
-        match triangulate(&mesh.points, shadow, &outline(fan, p)) {
+        let on_line = |ear| constraints.on_one_edge(ear);
+        match triangulate(&mesh.points, shadow, &outline(fan, p), on_line) {
             Some(patch) => patches.insert(triangle, patch),
             None => return false,
         };

@@ -7,15 +7,22 @@
 use super::cavity::{Walk, walk};
 use super::constraints::edges;
 use super::crossing::{Crossing, crossings, tets_around};
+use super::flips::FLAT;
 use super::recover::{DEEPEST, Recovery};
 use super::tetrahedra::{NO_BODY, NONE};
 use crate::Point;
 use crate::kernel::predicates::{Sign, orient3d};
+use crate::kernel::quality::mean_ratio;
 use crate::kernel::simplex::{area_vector, volume6};
 
 /// Helping points stand off the surface by this fraction of the root of a triangle's doubled area, then by half of it, and so
 /// on. Not a round number, so that they do not lie on the other side of a plate.
 const STAND_OFF: f64 = 0.37;
+
+/// Whether a point and a half-face that it lies behind make a tet that is positive, and not by rounding only.
+fn sees_well(point: &Point, a: &Point, b: &Point, c: &Point) -> bool {
+    orient3d(a, b, c, point) == Sign::Negative && mean_ratio(point, a, b, c) >= FLAT
+}
 
 impl Recovery<'_> {
     /// The point of the edge a, b at a crossing, rounded.
@@ -51,6 +58,7 @@ impl Recovery<'_> {
         });
         self.found = found;
         let p = added?;
+        self.constraints.set_on_edge(a, b, p);
         let split: Vec<u32> = self
             .constraints
             .facets_at(a)
@@ -81,6 +89,7 @@ impl Recovery<'_> {
             self.cavity.take(self.mesh, &tets);
             if self.cavity.make_star_shaped(self.mesh, tets[0], &point)
                 && self.cavity.tets.len() == tets.len()
+                && self.walls_are_seen_well(&point)
             {
                 break;
             }
@@ -100,14 +109,21 @@ impl Recovery<'_> {
         Some(p)
     }
 
-    /// The tets behind those faces around `tets` that do not see a point; `None` if there are none, or one of the
+    fn walls_are_seen_well(&self, point: &Point) -> bool {
+        self.cavity.walls.iter().all(|&wall| {
+            let [a, b, c] = self.mesh.face(wall).map(|v| self.mesh.point(v));
+            sees_well(point, a, b, c)
+        })
+    }
+
+    /// The tets behind those faces around `tets` that do not see a point well; `None` if there are none, or one of the
     /// faces must stay.
     fn behind_unseen(&self, tets: &[u32], point: &Point) -> Option<Vec<u32>> {
         let mut behind = Vec::new();
         for half_face in tets.iter().flat_map(|&t| 4 * t..4 * t + 4) {
             let other = self.mesh.across(half_face);
             let [a, b, c] = self.mesh.face(half_face).map(|v| self.mesh.point(v));
-            if (other != NONE && tets.contains(&(other >> 2))) || orient3d(a, b, c, point) == Sign::Negative {
+            if (other != NONE && tets.contains(&(other >> 2))) || sees_well(point, a, b, c) {
                 continue;
             }
             if other == NONE || self.constraints.facet(self.mesh.face(half_face)).is_some() {
