@@ -8,7 +8,7 @@ use crate::Point;
 
 /// How often the recovery is begun anew, taking edges and facets in another order, where it fails. 1500 skins of random
 /// bodies in a bent lattice were all recovered within these; with one attempt and no helping points 4 were not.
-const ATTEMPTS: u32 = 3;
+const ATTEMPTS: u32 = 12;
 
 /// The bodies in as few tets as the surface needs: its facets locked, nothing outside of them.
 pub(super) fn bound(

@@ -28,6 +28,8 @@ pub(super) struct Flips {
     pub made: Vec<u32>,
     /// How many more edges may be tried in order to help: see [`Flips::remove_edge_with_help`].
     pub budget: u32,
+    /// Tets at Steiner points with a smaller mean ratio are taken for flat.
+    pub flat: f64,
     /// The vertices from here on are Steiner points.
     first_steiner: u32,
     ring: Ring,
@@ -41,9 +43,10 @@ pub(super) struct Flips {
 pub(super) const FLAT: f64 = 1e-9;
 
 impl Flips {
-    /// For a mesh whose vertices from `first_steiner` on are Steiner points.
-    pub fn new(first_steiner: u32) -> Self {
-        Self { first_steiner, ..Self::default() }
+    /// For a mesh whose vertices from `first_steiner` on are Steiner points; tets at them that are flatter than `flat` are
+    /// not made.
+    pub fn new(first_steiner: u32, flat: f64) -> Self {
+        Self { first_steiner, flat, ..Self::default() }
     }
 
     /// The mean ratio of a positive tet, by exact sign; below every quality for any other, and for flat ones.
@@ -53,7 +56,7 @@ impl Flips {
             return f64::NEG_INFINITY;
         }
         let quality = mean_ratio(a, b, c, d).max(0.0);
-        let is_flat = quality < FLAT && tet.iter().any(|&v| v >= self.first_steiner);
+        let is_flat = quality < self.flat && tet.iter().any(|&v| v >= self.first_steiner);
         if is_flat { f64::NEG_INFINITY } else { quality }
     }
 

@@ -9,7 +9,7 @@
 use super::cavity::Cavity;
 use super::constraints::{Constraints, edges};
 use super::crossing::{Crossing, Piercing, crossings, piercing};
-use super::flips::Flips;
+use super::flips::{FLAT, Flips};
 use super::tetrahedra::Tetrahedra;
 use crate::kernel::random::mix;
 
@@ -44,7 +44,7 @@ pub(super) struct Recovery<'a> {
     /// Helping points off the surface.
     pub helping: Vec<u32>,
     pub counts: Counts,
-    flips: Flips,
+    pub(super) flips: Flips,
     pub(super) cavity: Cavity,
     pub(super) star: Vec<u32>,
     pub(super) found: Vec<Crossing>,
@@ -61,7 +61,9 @@ impl<'a> Recovery<'a> {
         most_steiner: usize,
         attempt: u32,
     ) -> Self {
-        let flips = Flips::new(mesh.points.len() as u32);
+        // Without flat tets the points can leave again, but some surfaces let none be put then.
+        let flat = if attempt % 2 == 0 { FLAT } else { 0.0 };
+        let flips = Flips::new(mesh.points.len() as u32, flat);
         Self {
             mesh,
             constraints,
