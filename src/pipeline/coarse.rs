@@ -40,12 +40,17 @@ impl CoarseError {
                 };
                 long.iter().map(shorter).collect()
             }
-            Self::Volume(
-                VolumeError::SelfIntersection { places, .. } | VolumeError::NotRecovered { places, .. },
-            ) => places.iter().map(|&point| Source { point, size: LOWERED * size.size_at(&point) }).collect(),
+            Self::NotClosed(faults) => faults.crossings().map(|point| smaller_at(point, size)).collect(),
+            Self::Volume(VolumeError::NotRecovered { places, .. }) => {
+                places.iter().map(|&point| smaller_at(point, size)).collect()
+            }
             _ => Vec::new(),
         }
     }
+}
+
+fn smaller_at(point: Point, size: &dyn SizeField) -> Source {
+    Source { point, size: LOWERED * size.size_at(&point) }
 }
 
 /// What became of the coarse mesh.

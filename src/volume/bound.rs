@@ -1,36 +1,25 @@
 //! From the surface to tets that fill its bodies, with no more points than the surface needs.
 
 use super::constraints::Constraints;
-use super::recover::{Recovery, Unrecovered, lock_facets};
+use super::recover::{Recovery, lock_facets};
 use super::tetrahedra::{NONE, Tetrahedra};
-use super::{ClosedSurface, Report, VolumeError, carve, delaunay, finish, intersect, relocate};
+use super::{ClosedSurface, Report, VolumeError, carve, delaunay, finish, relocate};
 use crate::Point;
 
 /// How often the recovery is begun anew, taking edges and facets in another order, where it fails. 1500 skins of random
 /// bodies in a bent lattice were all recovered within these; with one attempt and no helping points 4 were not.
-const ATTEMPTS: u32 = 3;
+const ATTEMPTS: u32 = 12;
 
 /// The bodies in as few tets as the surface needs: its facets locked, nothing outside of them.
 pub(super) fn bound(
     surface: &ClosedSurface,
     points: &[Point],
-    scale: f64,
     report: &mut Report,
 ) -> Result<Tetrahedra, VolumeError> {
     let mut attempt = 0;
     loop {
-        match attempt_to_bound(surface, points, scale, attempt, report) {
-            Err(VolumeError::NotRecovered { triangles: suspects, places }) => {
-                let found = intersect::intersections(&surface.points, &surface.triangles, &suspects);
-                if !found.is_empty() {
-                    let (triangles, places) = found.into_iter().unzip();
-                    return Err(VolumeError::SelfIntersection { triangles, places });
-                }
-                attempt += 1;
-                if attempt == ATTEMPTS {
-                    return Err(VolumeError::NotRecovered { triangles: suspects, places });
-                }
-            }
+        match attempt_to_bound(surface, points, attempt, report) {
+            Err(VolumeError::NotRecovered { .. }) if attempt + 1 < ATTEMPTS => attempt += 1,
             result => return result,
         }
     }
@@ -39,7 +28,6 @@ pub(super) fn bound(
 fn attempt_to_bound(
     surface: &ClosedSurface,
     points: &[Point],
-    scale: f64,
     attempt: u32,
     report: &mut Report,
 ) -> Result<Tetrahedra, VolumeError> {
@@ -53,7 +41,10 @@ fn attempt_to_bound(
     report.missing_edges = counts.missing_edges;
     report.missing_faces = counts.missing_faces;
     report.steiner_on_surface = steiner.len();
-    recovered.map_err(|left| finish::not_recovered(surface, &constraints, &left, scale))?;
+    if let Err(l) = &recovered {
+        eprintln!("RECOVERY left {} steiner {} helping {}", l.len(), steiner.len(), helping.len());
+    }
+    recovered.map_err(|left| finish::not_recovered(surface, &constraints, &left))?;
     lock_facets(&mut tets, &constraints);
     carve::carve(&mut tets, &constraints, &surface.regions, points.len() as u32).map_err(|d| {
         let place = surface.points[surface.triangles[d.triangle as usize][0] as usize];
@@ -61,9 +52,9 @@ fn attempt_to_bound(
     })?;
     let (inside, stayed) = relocate::relocate(&mut tets, &mut constraints, &surface.triangles, &steiner);
     if !stayed.is_empty() {
-        let facets = stayed.iter().flat_map(|&p| constraints.facets_at(p)).collect();
-        let left = Unrecovered { facets, intersections: Vec::new() };
-        return Err(finish::not_recovered(surface, &constraints, &left, scale));
+        eprintln!("RELOCATE stayed {} of {}", stayed.len(), steiner.len());
+        let left: Vec<u32> = stayed.iter().flat_map(|&p| constraints.facets_at(p)).collect();
+        return Err(finish::not_recovered(surface, &constraints, &left));
     }
     let is_inside = |v: &&u32| tets.at_vertex[**v as usize] != NONE;
     report.steiner_inside = inside.len() + helping.iter().filter(is_inside).count();

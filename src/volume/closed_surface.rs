@@ -1,18 +1,21 @@
 //! The input of the volume mesher: a triangulation that bounds bodies.
 
+use super::constraints::edges;
 use super::sectors::{self, EdgeFault};
+use super::surface_faults::{SurfaceFault, SurfaceFaults};
+use super::tetrahedra::sorted;
+use super::{finish, intersect};
 use crate::Point;
 use crate::kernel::predicates::{Sign, orient2d};
 use csg::BodyId;
-use std::fmt;
+use std::collections::BTreeSet;
 
 /// Triangles that bound bodies without gap: checked when made.
 ///
 /// Each triangle has a **region** on either side: a body, or `None` for what is outside of all. Going round
 /// any edge, the region in front of one triangle is the region behind the next. That allows several bodies with
 /// interfaces, holes, voids, surfaces that touch themselves along edges or at vertices, and triangles with one
-/// body on both sides (a crack). Not checked here: whether triangles intersect; the
-/// mesher finds out and says where.
+/// body on both sides (a crack). Triangles meet in common corners and edges only, by exact signs.
 #[derive(Clone, Debug, Default)]
 pub struct ClosedSurface {
     pub(crate) points: Vec<Point>,
@@ -20,98 +23,6 @@ pub struct ClosedSurface {
     pub(crate) regions: Vec<[Option<BodyId>; 2]>,
     pub(crate) kept_points: Vec<Point>,
 }
-
-/// What is wrong with a surface that was to bound bodies.
-#[derive(Clone, Debug, PartialEq)]
-pub enum SurfaceFault {
-    /// There are no triangles.
-    Empty,
-    /// As many pairs of regions as triangles are needed.
-    RegionCount {
-        /// The number of triangles.
-        triangles: usize,
-        /// The number of pairs of regions.
-        regions: usize,
-    },
-    /// More points or triangles than local ids.
-    TooLarge {
-        /// The number of points.
-        points: usize,
-        /// The number of triangles.
-        triangles: usize,
-    },
-    /// A triangle names a point that does not exist.
-    NoSuchPoint {
-        /// The triangle.
-        triangle: u32,
-        /// The index it names.
-        point: u32,
-    },
-    /// A coordinate is infinite or not a number.
-    NotFinite {
-        /// The point.
-        point: u32,
-    },
-    /// Two points have the same coordinates.
-    SamePlace {
-        /// The points.
-        points: [u32; 2],
-        /// Where.
-        place: Point,
-    },
-    /// No triangle uses a point.
-    UnusedPoint {
-        /// The point.
-        point: u32,
-        /// Where.
-        place: Point,
-    },
-    /// A triangle's corners lie on one line, exactly.
-    Flat {
-        /// The triangle.
-        triangle: u32,
-        /// Where: its first corner.
-        place: Point,
-    },
-    /// Neither side of a triangle is in a body.
-    BoundsNothing {
-        /// The triangle.
-        triangle: u32,
-        /// Where: its first corner.
-        place: Point,
-    },
-    /// Two triangles have the same corners.
-    Twice {
-        /// The triangles.
-        triangles: [u32; 2],
-        /// Where: their first corner.
-        place: Point,
-    },
-    /// Two triangles at one edge overlap: they lie in one plane on the same side of it.
-    Overlap {
-        /// The edge.
-        edge: [u32; 2],
-        /// The triangles.
-        triangles: [u32; 2],
-        /// Where: the middle of the edge.
-        place: Point,
-    },
-    /// Between two consecutive triangles round an edge the regions differ: a gap, or a triangle turned over.
-    NotClosed {
-        /// The edge.
-        edge: [u32; 2],
-        /// The triangles on both sides of the sector, the same one twice if it is alone.
-        triangles: [u32; 2],
-        /// The regions that they name for it.
-        regions: [Option<BodyId>; 2],
-        /// Where: the middle of the edge.
-        place: Point,
-    },
-}
-
-/// All faults of a surface, the gravest kind alone: indices before shapes before edges.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub struct SurfaceFaults(pub Vec<SurfaceFault>);
 
 impl ClosedSurface {
     /// Takes a surface if it bounds bodies without gap.
@@ -127,7 +38,7 @@ impl ClosedSurface {
         regions: Vec<[Option<BodyId>; 2]>,
     ) -> Result<Self, SurfaceFaults> {
         let surface = Self { points, triangles, regions, kept_points: Vec::new() };
-        for find in [Self::index_faults, Self::shape_faults, Self::edge_faults] {
+        for find in [Self::index_faults, Self::form_faults] {
             let faults = find(&surface);
             if !faults.is_empty() {
                 return Err(SurfaceFaults(faults));
@@ -200,55 +111,101 @@ impl ClosedSurface {
         faults
     }
 
-    fn shape_faults(&self) -> Vec<SurfaceFault> {
-        let mut faults = Vec::new();
-        // Zero is neither above nor below its negative: adding it makes one of both.
-        let key = |&i: &u32| self.points[i as usize].coords.add_scalar(0.0).data.0[0];
-        let mut order: Vec<u32> = (0..self.points.len() as u32).collect();
-        order.sort_unstable_by(|a, b| key(a).partial_cmp(&key(b)).expect("finite").then(a.cmp(b)));
-        for pair in order.windows(2) {
-            let place = self.points[pair[0] as usize];
-            if place == self.points[pair[1] as usize] {
-                faults.push(SurfaceFault::SamePlace { points: [pair[0], pair[1]], place });
+    /// The faults of shapes, edges and intersections.
+    ///
+    /// Triangles that are none, or are there before, are set aside, and nothing is said of their edges: a hole
+    /// where a flat triangle is would be told twice.
+    fn form_faults(&self) -> Vec<SurfaceFault> {
+        let scale = finish::scale_of(&self.points);
+        let points: Vec<Point> = self.points.iter().map(|p| p * scale).collect();
+        let (mut faults, first_at) = self.double_points();
+        let mut triangles: Vec<[u32; 3]> =
+            self.triangles.iter().map(|t| t.map(|v| first_at[v as usize])).collect();
+        let mut aside = Aside::default();
+        for (t, &triangle) in triangles.iter().enumerate() {
+            let (place, t) = (self.first_corner(t), t as u32);
+            if is_flat(triangle.map(|v| &points[v as usize])) {
+                faults.push(SurfaceFault::Flat { triangle: t, place });
+                aside.add(t, triangle);
+            } else if self.regions[t as usize] == [None, None] {
+                faults.push(SurfaceFault::BoundsNothing { triangle: t, place });
+                aside.add(t, triangle);
             }
         }
-        for (t, triangle) in self.triangles.iter().enumerate() {
-            let place = self.first_corner(t);
-            if is_flat(triangle.map(|v| &self.points[v as usize])) {
-                faults.push(SurfaceFault::Flat { triangle: t as u32, place });
-            } else if self.regions[t] == [None, None] {
-                faults.push(SurfaceFault::BoundsNothing { triangle: t as u32, place });
+        for [first, again] in doubles(&triangles) {
+            if !aside.triangles.contains(&first) && !aside.triangles.contains(&again) {
+                let place = self.first_corner(first as usize);
+                faults.push(SurfaceFault::Twice { triangles: [first, again], place });
+                aside.triangles.insert(again);
             }
+        }
+        let is_kept = |t: &u32| !aside.triangles.contains(t);
+        let kept: Vec<u32> = (0..triangles.len() as u32).filter(is_kept).collect();
+        triangles = kept.iter().map(|&t| triangles[t as usize]).collect();
+        let regions: Vec<_> = kept.iter().map(|&t| self.regions[t as usize]).collect();
+        let numbers = |pair: [u32; 2]| pair.map(|t| kept[t as usize]);
+        for (edge, fault) in sectors::edge_faults(&points, &triangles, &regions) {
+            let [a, b] = edge.map(|v| &self.points[v as usize]);
+            let place = nalgebra::center(a, b);
+            match fault {
+                EdgeFault::Overlap(pair) => {
+                    faults.push(SurfaceFault::Overlap { edge, triangles: numbers(pair), place });
+                }
+                EdgeFault::Open(pair, regions) if !aside.edges.contains(&edge) => {
+                    faults.push(SurfaceFault::NotClosed { edge, triangles: numbers(pair), regions, place });
+                }
+                EdgeFault::Open(..) => {}
+            }
+        }
+        for (pair, place) in intersect::intersections(&points, &triangles) {
+            faults.push(SurfaceFault::Intersect { triangles: numbers(pair), place: place / scale });
         }
         faults
     }
 
-    fn edge_faults(&self) -> Vec<SurfaceFault> {
+    /// Points in the place of others, and for each point the first one there.
+    fn double_points(&self) -> (Vec<SurfaceFault>, Vec<u32>) {
+        // Zero is neither above nor below its negative: adding it makes one of both.
+        let key = |&i: &u32| self.points[i as usize].coords.add_scalar(0.0).data.0[0];
+        let mut order: Vec<u32> = (0..self.points.len() as u32).collect();
+        order.sort_unstable_by(|a, b| key(a).partial_cmp(&key(b)).expect("finite").then(a.cmp(b)));
+        let mut first_at: Vec<u32> = (0..self.points.len() as u32).collect();
         let mut faults = Vec::new();
-        let mut order: Vec<u32> = (0..self.triangles.len() as u32).collect();
-        let key = |&t: &u32| super::tetrahedra::sorted(self.triangles[t as usize]);
-        order.sort_unstable_by_key(|t| (key(t), *t));
         for pair in order.windows(2) {
-            if key(&pair[0]) == key(&pair[1]) {
-                let place = self.first_corner(pair[0] as usize);
-                faults.push(SurfaceFault::Twice { triangles: [pair[0], pair[1]], place });
+            let place = self.points[pair[0] as usize];
+            if place == self.points[pair[1] as usize] {
+                faults.push(SurfaceFault::SamePlace { points: [pair[0], pair[1]], place });
+                first_at[pair[1] as usize] = first_at[pair[0] as usize];
             }
         }
-        if !faults.is_empty() {
-            return faults;
-        }
-        for (edge, fault) in sectors::edge_faults(&self.points, &self.triangles, &self.regions) {
-            let [a, b] = edge.map(|v| &self.points[v as usize]);
-            let place = nalgebra::center(a, b);
-            faults.push(match fault {
-                EdgeFault::Overlap(triangles) => SurfaceFault::Overlap { edge, triangles, place },
-                EdgeFault::Open(triangles, regions) => {
-                    SurfaceFault::NotClosed { edge, triangles, regions, place }
-                }
-            });
-        }
-        faults
+        (faults, first_at)
     }
+}
+
+/// Triangles that are set aside, and the edges of those that leave a hole.
+#[derive(Default)]
+struct Aside {
+    triangles: BTreeSet<u32>,
+    edges: BTreeSet<[u32; 2]>,
+}
+
+impl Aside {
+    fn add(&mut self, number: u32, triangle: [u32; 3]) {
+        self.triangles.insert(number);
+        self.edges.extend(edges(triangle));
+    }
+}
+
+/// Pairs of triangles with the same corners, by the first of them: each with the one before.
+fn doubles(triangles: &[[u32; 3]]) -> Vec<[u32; 2]> {
+    let mut order: Vec<([u32; 3], u32)> = triangles.iter().map(|&t| sorted(t)).zip(0..).collect();
+    order.sort_unstable();
+    let mut pairs: Vec<[u32; 2]> = order
+        .chunk_by(|a, b| a.0 == b.0)
+        .flat_map(|c| c[1..].iter().map(|again| [c[0].1, again.1]))
+        .collect();
+    pairs.sort_unstable();
+    pairs
 }
 
 /// Whether three points lie on one line: then their shadows do on all coordinate planes.
@@ -257,70 +214,6 @@ fn is_flat([a, b, c]: [&Point; 3]) -> bool {
         let shadow = |p: &Point| [p[i], p[j]];
         orient2d(shadow(a), shadow(b), shadow(c)) == Sign::Zero
     })
-}
-
-impl fmt::Display for SurfaceFault {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let at = |p: &Point| format!("at ({}, {}, {})", p.x, p.y, p.z);
-        let side = |region: &Option<BodyId>| match region {
-            Some(body) => format!("body {}", body.0),
-            None => "outside".to_owned(),
-        };
-        match self {
-            Self::Empty => write!(f, "the surface has no triangles"),
-            Self::RegionCount { triangles, regions } => {
-                write!(f, "{triangles} triangles, but {regions} pairs of regions")
-            }
-            Self::TooLarge { points, triangles } => {
-                write!(f, "{points} points and {triangles} triangles are too many for one part")
-            }
-            Self::NoSuchPoint { triangle, point } => {
-                write!(f, "triangle {triangle} names point {point}, which does not exist")
-            }
-            Self::NotFinite { point } => write!(f, "a coordinate of point {point} is not a finite number"),
-            Self::SamePlace { points: [a, b], place } => {
-                write!(f, "points {a} and {b} are in the same place, {}", at(place))
-            }
-            Self::UnusedPoint { point, place } => {
-                write!(f, "no triangle uses point {point} {}", at(place))
-            }
-            Self::Flat { triangle, place } => {
-                write!(f, "the corners of triangle {triangle} lie on one line, {}", at(place))
-            }
-            Self::BoundsNothing { triangle, place } => {
-                write!(f, "triangle {triangle} has no body on either side, {}", at(place))
-            }
-            Self::Twice { triangles: [a, b], place } => {
-                write!(f, "triangles {a} and {b} have the same corners, {}", at(place))
-            }
-            Self::Overlap { edge, triangles: [a, b], place } => {
-                write!(f, "triangles {a} and {b} overlap at edge {}-{}, {}", edge[0], edge[1], at(place))
-            }
-            Self::NotClosed { edge, triangles: [a, b], regions, place } => write!(
-                f,
-                "not closed at edge {}-{}: between triangles {a} and {b} one says {}, the other {}, {}",
-                edge[0],
-                edge[1],
-                side(&regions[0]),
-                side(&regions[1]),
-                at(place)
-            ),
-        }
-    }
-}
-
-impl fmt::Display for SurfaceFaults {
-    /// The first faults and the number of the others.
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        const SHOWN: usize = 5;
-        for (i, fault) in self.0.iter().take(SHOWN).enumerate() {
-            write!(f, "{}{fault}", if i == 0 { "" } else { "; " })?;
-        }
-        if self.0.len() > SHOWN {
-            write!(f, "; and {} more", self.0.len() - SHOWN)?;
-        }
-        Ok(())
-    }
 }
 
 #[cfg(test)]
@@ -377,8 +270,10 @@ mod tests {
             twin[0] = 8;
         });
         assert!(matches!(found[..], [SurfaceFault::SamePlace { points: [0, 8], .. }]), "{found:?}");
+        // Two edges have lost a triangle; the two others of the flat one cannot be told.
         let found = faults(|c| c.triangles[5][1] = c.triangles[5][0]);
-        assert!(matches!(found[..], [SurfaceFault::Flat { triangle: 5, .. }]), "{found:?}");
+        assert!(matches!(found[0], SurfaceFault::Flat { triangle: 5, .. }), "{found:?}");
+        assert!(matches!(found[1..], [SurfaceFault::NotClosed { .. }, SurfaceFault::NotClosed { .. }]));
         let found = faults(|c| c.regions[7] = [None, None]);
         assert!(matches!(found[..], [SurfaceFault::BoundsNothing { triangle: 7, .. }]), "{found:?}");
         let found = faults(|c| {

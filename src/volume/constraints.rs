@@ -1,7 +1,7 @@
 //! Which edges and faces of the mesh must stay: the surface's, and pieces of those that had to be split.
 
 use super::tetrahedra::sorted;
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::hash::{BuildHasherDefault, Hasher};
 
 /// A piece of a triangle of the surface: the whole, unless Steiner points split it.
@@ -22,12 +22,17 @@ pub(super) struct Constraints {
     by_vertices: HashMap<[u32; 3], u32, BuildHasherDefault<VertexHasher>>,
     /// How many facets use each edge.
     edge_uses: HashMap<[u32; 2], u32, BuildHasherDefault<VertexHasher>>,
+    /// The edge of the surface that a Steiner point lies on, if it lies on one.
+    on_edge: BTreeMap<u32, [u32; 2]>,
+    /// The vertices of the surface are those below.
+    surface_vertices: u32,
 }
 
 impl Constraints {
     /// One facet for each triangle.
     pub fn new(triangles: &[[u32; 3]]) -> Self {
-        let mut constraints = Self::default();
+        let surface_vertices = 1 + triangles.iter().flatten().copied().max().unwrap_or(0);
+        let mut constraints = Self { surface_vertices, ..Self::default() };
         constraints.by_vertices.reserve(triangles.len());
         constraints.edge_uses.reserve(triangles.len() * 3 / 2);
         for (t, &vertices) in triangles.iter().enumerate() {
@@ -71,6 +76,26 @@ impl Constraints {
     #[inline]
     pub fn has_edge(&self, a: u32, b: u32) -> bool {
         self.edge_uses.contains_key(&[a.min(b), a.max(b)])
+    }
+
+    /// Notes that p splits the edge a, b of facets: if that is part of an edge of the surface, p lies on it.
+    pub fn set_on_edge(&mut self, a: u32, b: u32, p: u32) {
+        let edge = match [a, b].map(|v| self.on_edge.get(&v).copied()) {
+            _ if a.max(b) < self.surface_vertices => Some([a.min(b), a.max(b)]),
+            [Some(edge), None] if edge.contains(&b) => Some(edge),
+            [None, Some(edge)] if edge.contains(&a) => Some(edge),
+            [Some(edge), Some(other)] if edge == other => Some(edge),
+            _ => None,
+        };
+        if let Some(edge) = edge {
+            self.on_edge.insert(p, edge);
+        }
+    }
+
+    /// Whether vertices lie on one edge of the surface.
+    pub fn on_one_edge(&self, vertices: [u32; 3]) -> bool {
+        let Some(edge) = vertices.iter().find_map(|v| self.on_edge.get(v)) else { return false };
+        vertices.iter().all(|v| edge.contains(v) || self.on_edge.get(v) == Some(edge))
     }
 
     /// The facets in use, in ascending order.

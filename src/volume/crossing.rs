@@ -95,7 +95,7 @@ pub(super) enum Piercing {
     /// Edges of the mesh, each with a tet, that go through its interior.
     Edges(Vec<(u32, [u32; 2])>),
     /// A vertex in its plane lies on it.
-    Vertex(u32),
+    Vertex,
 }
 
 /// The edges of the mesh that pierce a missing face whose own edges are all in the mesh.
@@ -112,7 +112,7 @@ pub(super) fn piercing(mesh: &mut Tetrahedra, [a, b, c]: [u32; 3], star: &mut Ve
         let (r, s) = (ring.vertices[i], ring.vertices[(i + 1) % n]);
         match (mesh.side([a, b, r], c), mesh.side([a, b, s], c)) {
             (Sign::Positive, Sign::Negative) => first = Some((ring.tets[i], [r, s])),
-            (Sign::Zero, _) if same_side(mesh, a, b, r, c) => return Piercing::Vertex(r),
+            (Sign::Zero, _) if same_side(mesh, a, b, r, c) => return Piercing::Vertex,
             _ => {}
         }
     }
@@ -138,7 +138,7 @@ pub(super) fn piercing(mesh: &mut Tetrahedra, [a, b, c]: [u32; 3], star: &mut Ve
                 }
                 let v = mesh.tets[t as usize][i];
                 if signs[i] == Sign::Zero && ![a, b, c].contains(&v) {
-                    return Piercing::Vertex(v);
+                    return Piercing::Vertex;
                 }
             }
         }

@@ -1,7 +1,6 @@
 //! Into the units of the mesher and back, and what its results look like outside.
 
 use super::constraints::Constraints;
-use super::recover::Unrecovered;
 use super::tetrahedra::{NONE, Tetrahedra};
 use super::{ClosedSurface, VolumeError, VolumeMesh};
 use crate::Point;
@@ -45,24 +44,12 @@ pub(super) fn finish(surface: &ClosedSurface, mesh: Tetrahedra, scale: f64) -> V
     VolumeMesh { points: places, tets, bodies: bodies.into_iter().map(BodyId).collect() }
 }
 
-/// The error for what a recovery left undone, in the surface's own units and triangles.
-pub(super) fn not_recovered(
-    surface: &ClosedSurface,
-    constraints: &Constraints,
-    left: &Unrecovered,
-    scale: f64,
-) -> VolumeError {
-    let triangle = |f: u32| constraints.facets[f as usize].triangle;
-    if left.intersections.is_empty() {
-        let mut triangles: Vec<u32> = left.facets.iter().map(|&f| triangle(f)).collect();
-        triangles.sort_unstable();
-        triangles.dedup();
-        let places =
-            triangles.iter().map(|&t| surface.points[surface.triangles[t as usize][0] as usize]).collect();
-        VolumeError::NotRecovered { triangles, places }
-    } else {
-        let triangles = left.intersections.iter().map(|i| triangle(i.facet)).collect();
-        let places = left.intersections.iter().map(|i| i.place / scale).collect();
-        VolumeError::SelfIntersection { triangles, places }
-    }
+/// The error for facets that a recovery left undone, by the surface's triangles.
+pub(super) fn not_recovered(surface: &ClosedSurface, constraints: &Constraints, left: &[u32]) -> VolumeError {
+    let mut triangles: Vec<u32> = left.iter().map(|&f| constraints.facets[f as usize].triangle).collect();
+    triangles.sort_unstable();
+    triangles.dedup();
+    let places =
+        triangles.iter().map(|&t| surface.points[surface.triangles[t as usize][0] as usize]).collect();
+    VolumeError::NotRecovered { triangles, places }
 }

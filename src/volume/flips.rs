@@ -28,18 +28,38 @@ pub(super) struct Flips {
     pub made: Vec<u32>,
     /// How many more edges may be tried in order to help: see [`Flips::remove_edge_with_help`].
     pub budget: u32,
+    /// Tets at Steiner points with a smaller mean ratio are taken for flat.
+    pub flat: f64,
+    /// The vertices from here on are Steiner points.
+    first_steiner: u32,
     ring: Ring,
     new: Vec<[u32; 4]>,
     best: Vec<(f64, u32)>,
 }
 
-/// The mean ratio of a positive tet, by exact sign; below every quality for any other.
-fn quality(mesh: &Tetrahedra, tet: [u32; 4]) -> f64 {
-    let [a, b, c, d] = tet.map(|v| mesh.point(v));
-    if orient3d(a, b, c, d) == Sign::Positive { mean_ratio(a, b, c, d).max(0.0) } else { f64::NEG_INFINITY }
-}
+/// Tets at a Steiner point with a smaller mean ratio are flat: the point lies on a line or in a plane of others up to
+/// rounding. It leaves volumes of some 10⁻¹⁶ of the longest edge's cube, so mean ratios near 10⁻¹⁰; a tet like that stands between
+/// the point and where it is to go (`relocate`). Tets of the surface's own points may be as thin as they like.
+pub(super) const FLAT: f64 = 1e-9;
 
 impl Flips {
+    /// For a mesh whose vertices from `first_steiner` on are Steiner points; tets at them that are flatter than `flat` are
+    /// not made.
+    pub fn new(first_steiner: u32, flat: f64) -> Self {
+        Self { first_steiner, flat, ..Self::default() }
+    }
+
+    /// The mean ratio of a positive tet, by exact sign; below every quality for any other, and for flat ones.
+    fn quality(&self, mesh: &Tetrahedra, tet: [u32; 4]) -> f64 {
+        let [a, b, c, d] = tet.map(|v| mesh.point(v));
+        if orient3d(a, b, c, d) != Sign::Positive {
+            return f64::NEG_INFINITY;
+        }
+        let quality = mean_ratio(a, b, c, d).max(0.0);
+        let is_flat = quality < self.flat && tet.iter().any(|&v| v >= self.first_steiner);
+        if is_flat { f64::NEG_INFINITY } else { quality }
+    }
+
     /// Replaces a face by the edge between the two vertices opposite to it (2-3).
     pub fn remove_face(
         &mut self,
@@ -54,7 +74,7 @@ impl Flips {
         }
         let (d, e) = (mesh.apex(half_face), mesh.apex(other));
         let new = [[d, e, a, b], [d, e, b, c], [d, e, c, a]];
-        if new.iter().any(|&tet| quality(mesh, tet) < 0.0) {
+        if new.iter().any(|&tet| self.quality(mesh, tet) < 0.0) {
             return Err(Refused::Inverted);
         }
         self.made.clear();
@@ -166,7 +186,7 @@ impl Flips {
                     if sides <= best.0 {
                         continue;
                     }
-                    let worst = tets(i, k, j).iter().fold(sides, |q, &tet| q.min(quality(mesh, tet)));
+                    let worst = tets(i, k, j).iter().fold(sides, |q, &tet| q.min(self.quality(mesh, tet)));
                     if worst > best.0 {
                         best = (worst, k as u32);
                     }

@@ -27,10 +27,11 @@
 //! 6. `points`: the inside by the size field: lattices where it is level (`lattice`), frontal Delaunay elsewhere.
 //!
 //! Not promised: good shape. Steps 1 to 5 leave whatever the surface allows; step 6 places points so that nearly all tets are well
-//! shaped, but slivers remain: see [`improve`](crate::improve). Whether a surface intersects itself is found out
-//! only where the recovery meets it, always before a mesh is handed out.
+//! shaped, but slivers remain: see [`improve`](crate::improve).
 
 mod bound;
+mod boxes;
+
 mod carve;
 mod cavity;
 pub mod closed_surface;
@@ -50,10 +51,12 @@ mod relocate;
 mod samples;
 mod sectors;
 mod steiner;
+mod surface_faults;
 mod tetrahedra;
 
-pub use closed_surface::{ClosedSurface, SurfaceFault, SurfaceFaults};
+pub use closed_surface::ClosedSurface;
 pub use keep::KeptPointFault;
+pub use surface_faults::{SurfaceFault, SurfaceFaults};
 
 use crate::Point;
 use crate::size::SizeField;
@@ -105,14 +108,6 @@ pub struct Report {
 /// Why there is no volume mesh.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum VolumeError {
-    /// The surface meets itself where it must not.
-    #[error("the surface intersects itself: {}", list_places(triangles, places))]
-    SelfIntersection {
-        /// The triangles that meet others.
-        triangles: Vec<u32>,
-        /// Where each does.
-        places: Vec<Point>,
-    },
     /// Some triangles could not be made faces of the mesh.
     #[error("{} triangles could not be recovered: {}", triangles.len(), list_places(triangles, places))]
     NotRecovered {
@@ -181,8 +176,7 @@ fn list_places(triangles: &[u32], places: &[Point]) -> String {
 /// positively oriented by exact sign. The same input gives the same mesh.
 ///
 /// # Errors
-/// Surfaces that intersect themselves, regions that disagree, and triangles that could not be recovered,
-/// each with places.
+/// Regions that disagree, kept features that cannot be, and triangles that could not be recovered, each with places.
 pub fn mesh(
     surface: &ClosedSurface,
     size: &dyn SizeField,
@@ -191,7 +185,7 @@ pub fn mesh(
     let scale = finish::scale_of(&surface.points);
     let points: Vec<Point> = surface.points.iter().map(|p| p * scale).collect();
     let mut report = Report::default();
-    let mut tets = bound::bound(surface, &points, scale, &mut report)?;
+    let mut tets = bound::bound(surface, &points, &mut report)?;
     let mut cavity = cavity::Cavity::default();
     for (index, &place) in surface.kept_points.iter().enumerate() {
         keep::keep(&mut tets, &mut cavity, place * scale).map_err(|fault| VolumeError::KeptPoint {

@@ -27,7 +27,14 @@ impl Shadow {
 }
 
 /// The triangles of a counter-clockwise polygon, by cutting its best ear first; `None` if there is no ear.
-pub(super) fn triangulate(points: &[Point], shadow: Shadow, polygon: &[u32]) -> Option<Vec<[u32; 3]>> {
+///
+/// `on_line` tells of vertices on one line, up to rounding only: they are no ear.
+pub(super) fn triangulate(
+    points: &[Point],
+    shadow: Shadow,
+    polygon: &[u32],
+    on_line: impl Fn([u32; 3]) -> bool,
+) -> Option<Vec<[u32; 3]>> {
     let mut left = polygon.to_vec();
     let mut triangles = Vec::with_capacity(left.len().saturating_sub(2));
     while left.len() >= 3 {
@@ -36,7 +43,7 @@ pub(super) fn triangulate(points: &[Point], shadow: Shadow, polygon: &[u32]) -> 
         for i in 0..n {
             let ear = [left[(i + n - 1) % n], left[i], left[(i + 1) % n]];
             let shape = shape(points, ear);
-            if shape > best_shape && is_ear(points, shadow, &left, ear) {
+            if shape > best_shape && !on_line(ear) && is_ear(points, shadow, &left, ear) {
                 (best, best_shape) = (Some((i, ear)), shape);
             }
         }
@@ -73,12 +80,12 @@ mod tests {
             .map(|[x, y]| Point::new(1.0, x, y))
             .to_vec();
         let shadow = Shadow::of([&points[0], &points[2], &points[3]]);
-        let triangles = triangulate(&points, shadow, &[0, 1, 2, 3, 4, 5]).unwrap();
+        let triangles = triangulate(&points, shadow, &[0, 1, 2, 3, 4, 5], |_| false).unwrap();
         assert_eq!(triangles.len(), 4);
         for t in triangles {
             let [a, b, c] = t.map(|v| &points[v as usize]);
             assert_eq!(shadow.turn(a, b, c), Sign::Positive);
         }
-        assert_eq!(triangulate(&points, shadow, &[0, 1, 2]), None);
+        assert_eq!(triangulate(&points, shadow, &[0, 1, 2], |_| false), None);
     }
 }

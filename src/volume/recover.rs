@@ -9,9 +9,8 @@
 use super::cavity::Cavity;
 use super::constraints::{Constraints, edges};
 use super::crossing::{Crossing, Piercing, crossings, piercing};
-use super::flips::Flips;
+use super::flips::{FLAT, Flips};
 use super::tetrahedra::Tetrahedra;
-use crate::Point;
 use crate::kernel::random::mix;
 
 /// How often flips may change what a missing edge or face meets before it is set aside: flips may go round in
@@ -27,22 +26,6 @@ const HELP: u32 = 1000;
 
 /// How often helping points are tried where a recovery is stuck.
 const HELPS: u32 = 3;
-
-/// Where two parts of the surface meet that must not.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Intersection {
-    /// A facet, or one with the edge that is in the way.
-    pub facet: u32,
-    /// The facet, edge end or vertex that it meets.
-    pub place: Point,
-}
-
-/// What is left undone.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct Unrecovered {
-    pub facets: Vec<u32>,
-    pub intersections: Vec<Intersection>,
-}
 
 /// Counts of what the recovery met and did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -61,15 +44,12 @@ pub(super) struct Recovery<'a> {
     /// Helping points off the surface.
     pub helping: Vec<u32>,
     pub counts: Counts,
-    flips: Flips,
+    pub(super) flips: Flips,
     pub(super) cavity: Cavity,
     pub(super) star: Vec<u32>,
     pub(super) found: Vec<Crossing>,
-    intersections: Vec<Intersection>,
     pub(super) most_steiner: usize,
     attempt: u32,
-    /// The vertices of the surface are those below.
-    surface_points: u32,
 }
 
 impl<'a> Recovery<'a> {
@@ -81,26 +61,26 @@ impl<'a> Recovery<'a> {
         most_steiner: usize,
         attempt: u32,
     ) -> Self {
-        let surface_points = 1 + constraints.facets.iter().flat_map(|f| f.vertices).max().unwrap_or(0);
+        // Without flat tets the points can leave again, but some surfaces let none be put then.
+        let flat = if attempt % 2 == 0 { FLAT } else { 0.0 };
+        let flips = Flips::new(mesh.points.len() as u32, flat);
         Self {
             mesh,
             constraints,
-            surface_points,
             steiner: Vec::new(),
             helping: Vec::new(),
             counts: Counts::default(),
-            flips: Flips::default(),
+            flips,
             cavity: Cavity::default(),
             star: Vec::new(),
             found: Vec::new(),
-            intersections: Vec::new(),
             most_steiner,
             attempt,
         }
     }
 
-    /// Recovers all facets. What it cannot is listed with the intersections of the surface that were met.
-    pub fn run(&mut self) -> Result<(), Unrecovered> {
+    /// Recovers all facets, or returns those that it cannot.
+    pub fn run(&mut self) -> Result<(), Vec<u32>> {
         let mut missing = self.missing_facets();
         self.counts.missing_faces = missing.len();
         let (mut first, mut helps) = (true, 0);
@@ -108,22 +88,18 @@ impl<'a> Recovery<'a> {
             let before = self.steiner.len();
             self.recover_edges(&missing, first);
             first = false;
-            let intersects = !self.intersections.is_empty();
             let mut left: Vec<u32> = missing.iter().copied().filter(|&f| !self.recover_facet(f, 0)).collect();
-            if !intersects && self.intersections.is_empty() {
-                // The neighbourhood has changed: what failed at first may work now.
-                for depth in 1..=DEEPEST {
-                    left.retain(|&f| !self.recover_facet(f, depth));
-                }
-                left.retain(|&f| !self.split_facet(f));
+            // The neighbourhood has changed: what failed at first may work now.
+            for depth in 1..=DEEPEST {
+                left.retain(|&f| !self.recover_facet(f, depth));
             }
+            left.retain(|&f| !self.split_facet(f));
             missing = self.missing_facets();
-            let stuck = !missing.is_empty() && self.steiner.len() == before;
-            let helped = stuck && helps < HELPS && self.add_helping_points(&missing, helps);
-            helps += u32::from(helped);
-            if !self.intersections.is_empty() || (stuck && !helped) {
-                let intersections = std::mem::take(&mut self.intersections);
-                return Err(Unrecovered { facets: missing, intersections });
+            if !missing.is_empty() && self.steiner.len() == before {
+                if helps == HELPS || !self.add_helping_points(&missing, helps) {
+                    return Err(missing);
+                }
+                helps += 1;
             }
         }
         Ok(())
@@ -167,9 +143,6 @@ impl<'a> Recovery<'a> {
             self.counts.missing_edges = wanted.len();
         }
         wanted.retain(|&[a, b]| !self.recover_edge(a, b, 0));
-        if !self.intersections.is_empty() {
-            return;
-        }
         for depth in 1..=DEEPEST {
             wanted.retain(|&[a, b]| !self.recover_edge(a, b, depth));
         }
@@ -194,7 +167,7 @@ impl<'a> Recovery<'a> {
             let (from, to) = if round % 2 == 0 { (a, b) } else { (b, a) };
             crossings(self.mesh, from, to, &mut self.star, &mut found);
             done = found.is_empty();
-            if done || self.note_intersection([a, b], &found) {
+            if done {
                 break;
             }
             stuck = if self.clear_one(from, to, depth, &mut found) { 0 } else { stuck + 1 };
@@ -220,45 +193,6 @@ impl<'a> Recovery<'a> {
             }
         }
         found.is_empty()
-    }
-
-    /// Whether an edge of the surface meets another part of it; noted if that is certain.
-    fn note_intersection(&mut self, [a, b]: [u32; 2], found: &[Crossing]) -> bool {
-        for &crossing in found {
-            let meets = match crossing {
-                Crossing::Face(half_face) => {
-                    let face = self.mesh.face(half_face);
-                    self.constraints.facet(face).map(|_| face.to_vec())
-                }
-                Crossing::Edge(_, edge) => {
-                    self.constraints.has_edge(edge[0], edge[1]).then_some(edge.to_vec())
-                }
-                Crossing::Vertex(v) => Some(vec![v]),
-            };
-            if let Some(mut vertices) = meets {
-                vertices.extend([a, b]);
-                let facet = self.facet_with_edge(a, b);
-                self.note(&vertices, facet, self.crossing_point(a, b, crossing));
-                return true;
-            }
-        }
-        false
-    }
-
-    /// Notes that a facet meets another part of the surface, unless it may be that only the rounding of a
-    /// Steiner point makes it seem so.
-    fn note(&mut self, vertices: &[u32], facet: u32, place: Point) {
-        if vertices.iter().all(|&v| v < self.surface_points) {
-            self.intersections.push(Intersection { facet, place });
-        }
-    }
-
-    fn facet_with_edge(&self, a: u32, b: u32) -> u32 {
-        let has = |f: &u32| {
-            let vertices = self.constraints.facets[*f as usize].vertices;
-            vertices.contains(&a) && vertices.contains(&b)
-        };
-        self.constraints.alive().find(has).unwrap_or_else(|| panic!("edge {a} {b} has no facet"))
     }
 
     /// Flips something of what the edge from `a` to `b` crosses there.
@@ -311,8 +245,8 @@ impl<'a> Recovery<'a> {
         false
     }
 
-    /// The edges that pierce a facet; `None` where it is there, or an edge of it is missing, or it
-    /// meets another part of the surface (which is noted).
+    /// The edges that pierce a facet; `None` where it is there, or an edge of it is missing, or the rounding of
+    /// Steiner points makes it meet another part of the surface.
     pub(super) fn obstacles(&mut self, f: u32) -> Option<Vec<(u32, [u32; 2])>> {
         let vertices = self.constraints.facets[f as usize].vertices;
         if self.mesh.find_face(vertices, &mut self.star).is_some() {
@@ -322,20 +256,10 @@ impl<'a> Recovery<'a> {
             self.mesh.tet_at_edge(a, b, &mut self.star)?;
         }
         match piercing(self.mesh, vertices, &mut self.star) {
-            Piercing::Vertex(v) => {
-                let [a, b, c] = vertices;
-                self.note(&[a, b, c, v], f, *self.mesh.point(v));
-                None
-            }
+            Piercing::Vertex => None,
             Piercing::Edges(edges) => {
-                for &(_, [u, v]) in &edges {
-                    if self.constraints.has_edge(u, v) {
-                        let ([a, b, c], place) = (vertices, self.piercing_point(vertices, [u, v]));
-                        self.note(&[a, b, c, u, v], f, place);
-                        return None;
-                    }
-                }
-                Some(edges)
+                let kept = edges.iter().any(|&(_, [u, v])| self.constraints.has_edge(u, v));
+                (!kept).then_some(edges)
             }
         }
     }

@@ -19,6 +19,7 @@ use super::polygon::{Shadow, triangulate};
 use super::tetrahedra::{NONE, Tetrahedra, sorted};
 use crate::kernel::predicates::{Sign, orient3d};
 use crate::kernel::quality::mean_ratio;
+use crate::kernel::simplex::area_vector;
 use crate::{Point, Vector};
 use std::collections::BTreeMap;
 
@@ -41,6 +42,8 @@ struct Sector {
     walls: Vec<u32>,
     /// Those of `skin` in place of facets at p, which p does not see.
     fresh: Vec<[u32; 3]>,
+    /// The triangles of the surface that they are parts of, outward.
+    sides: Vec<[u32; 3]>,
 }
 
 /// What a sector is filled from.
@@ -86,12 +89,13 @@ fn take_off(
     let mut patches: BTreeMap<u32, Vec<[u32; 3]>> = BTreeMap::new();
     for (&triangle, fan) in &fans {
         let shadow = Shadow::of(triangles[triangle as usize].map(|v| mesh.point(v)));
-        match triangulate(&mesh.points, shadow, &outline(fan, p)) {
+        let on_line = |ear| constraints.on_one_edge(ear);
+        match triangulate(&mesh.points, shadow, &outline(fan, p), on_line) {
             Some(patch) => patches.insert(triangle, patch),
             None => return false,
         };
     }
-    let mut sectors = sectors(mesh, constraints, p, &patches);
+    let mut sectors = sectors(mesh, constraints, triangles, p, &patches);
     let Some(apexes) = sectors.iter_mut().map(|s| grow_and_find(mesh, s, p)).collect::<Option<Vec<_>>>()
     else {
         return false;
@@ -161,6 +165,7 @@ fn outline(fan: &[[u32; 3]], p: u32) -> Vec<u32> {
 fn sectors(
     mesh: &Tetrahedra,
     constraints: &Constraints,
+    triangles: &[[u32; 3]],
     p: u32,
     patches: &BTreeMap<u32, Vec<[u32; 3]>>,
 ) -> Vec<Sector> {
@@ -195,6 +200,7 @@ fn sectors(
         sides.dedup();
         for (triangle, outward) in sides {
             let turned = |&[a, b, c]: &[u32; 3]| if outward { [a, b, c] } else { [a, c, b] };
+            sector.sides.push(turned(&triangles[triangle as usize]));
             sector.fresh.extend(patches[&triangle].iter().map(turned));
         }
         sector.set_skin(mesh);
@@ -273,21 +279,29 @@ impl Sector {
     }
 }
 
-/// From where to fill a sector, which takes in tets behind walls as long as no place sees it all: where the
-/// surface is flat up to rounding, p may lie on the wrong side of an edge of the mesh.
+/// From where to fill a sector. As long as no place sees it all it takes in tets behind walls: where points lie on one line or
+/// in one plane up to rounding, slivers of no thickness stand between p and what it should see.
 fn grow_and_find(mesh: &Tetrahedra, sector: &mut Sector, p: u32) -> Option<Apex> {
     /// Each time the walls around move one tet away; what lies that far is no matter of rounding.
-    const GROWTHS: usize = 6;
-    /// Where to look from: this fraction of the sector's size off the surface.
-    const OFF: f64 = 0.01;
-    for _ in 0..GROWTHS {
-        if let Some(apex) = find_apex(mesh, sector, p) {
-            return Some(apex);
-        }
-        let (inward, _) = directions(mesh, sector, p);
-        let grown = sector.grow(mesh, &(mesh.point(p) + inward * OFF));
-        if !grown || !sector.keeps_vertices(mesh, p) {
-            return None;
+    const GROWTHS: usize = 8;
+    /// Where to look from: these fractions of the sector's size off the surface. The first sees over what rounding
+    /// leaves in the way (10⁻¹⁶ of the size or a few times more) and over hardly more than that.
+    const OFF: [f64; 4] = [1e-12, 1e-9, 1e-6, 0.01];
+    if let Some(apex) = find_apex(mesh, sector, p) {
+        return Some(apex);
+    }
+    let (inward, _) = directions(mesh, sector, p);
+    let start = sector.clone();
+    for off in OFF {
+        sector.clone_from(&start);
+        for _ in 0..GROWTHS {
+            let grown = sector.grow(mesh, &(mesh.point(p) + inward * off));
+            if !grown || !sector.keeps_vertices(mesh, p) {
+                break;
+            }
+            if let Some(apex) = find_apex(mesh, sector, p) {
+                return Some(apex);
+            }
         }
     }
     None
@@ -343,12 +357,15 @@ fn find_place(mesh: &Tetrahedra, sector: &Sector, p: u32, own: &[u32]) -> Option
 }
 
 /// Away from the facets at p, as long as the sector reaches; and how far that is.
+///
+/// The facets lie in one plane or in two, however many pieces of each there are: half-way between two inward
+/// normals is inside of both planes, whatever the angle.
 fn directions(mesh: &Tetrahedra, sector: &Sector, p: u32) -> (Vector, f64) {
     let start = mesh.point(p);
     let reach = sector.skin.iter().flatten().map(|&v| (mesh.point(v) - start).norm()).fold(0.0, f64::max);
-    let inward = sector.fresh.iter().fold(Vector::zeros(), |sum, face| {
+    let inward = sector.sides.iter().fold(Vector::zeros(), |sum, face| {
         let [a, b, c] = face.map(|v| mesh.point(v));
-        sum - (b - a).cross(&(c - a)).normalize()
+        sum - area_vector(a, b, c).normalize()
     });
     (inward.try_normalize(0.0).unwrap_or_else(Vector::zeros) * reach, reach)
 }

@@ -11,11 +11,19 @@ use super::recover::{DEEPEST, Recovery};
 use super::tetrahedra::{NO_BODY, NONE};
 use crate::Point;
 use crate::kernel::predicates::{Sign, orient3d};
+use crate::kernel::quality::mean_ratio;
 use crate::kernel::simplex::{area_vector, volume6};
 
 /// Helping points stand off the surface by this fraction of the root of a triangle's doubled area, then by half of it, and so
 /// on. Not a round number, so that they do not lie on the other side of a plate.
 const STAND_OFF: f64 = 0.37;
+
+/// Whether a point and a half-face that it lies behind make a tet that is positive and whose mean ratio is no less
+///
+/// than `least` tells.
+fn sees_well(point: &Point, [a, b, c]: [&Point; 3], least: f64) -> bool {
+    orient3d(a, b, c, point) == Sign::Negative && mean_ratio(point, a, b, c) >= least
+}
 
 impl Recovery<'_> {
     /// The point of the edge a, b at a crossing, rounded.
@@ -49,8 +57,10 @@ impl Recovery<'_> {
             let tets = tets_around(self.mesh, found[i]);
             self.add_steiner(&tets, point)
         });
+        let added = added.or_else(|| self.split_between(a, b, &found));
         self.found = found;
         let p = added?;
+        self.constraints.set_on_edge(a, b, p);
         let split: Vec<u32> = self
             .constraints
             .facets_at(a)
@@ -68,6 +78,29 @@ impl Recovery<'_> {
         Some(p)
     }
 
+    /// Puts a Steiner point on a missing edge inside a tet that it goes through, the longest way first. Where the edge
+    /// passes close by other edges its crossings let no point be put on them: shorter pieces are easier.
+    fn split_between(&mut self, a: u32, b: u32, found: &[Crossing]) -> Option<u32> {
+        let Some(&Crossing::Face(first)) = found.first() else { return None };
+        let mut places = vec![(*self.mesh.point(a), first >> 2)];
+        for &crossing in found {
+            if let Crossing::Face(half_face) = crossing {
+                places.push((self.crossing_point(a, b, crossing), self.mesh.across(half_face) >> 2));
+            }
+        }
+        let ends: Vec<Point> = places.iter().skip(1).map(|p| p.0).collect();
+        let mut ways: Vec<(f64, Point, u32)> = std::iter::zip(&places, &ends)
+            .map(|((from, tet), to)| ((to - from).norm(), nalgebra::center(from, to), *tet))
+            .collect();
+        // A way that ends at an edge or vertex is not among them, the last one is.
+        if let (Some((from, tet)), Some(Crossing::Face(_))) = (places.last(), found.last()) {
+            let to = self.mesh.point(b);
+            ways.push(((to - from).norm(), nalgebra::center(from, to), *tet));
+        }
+        ways.sort_by(|one, other| other.0.total_cmp(&one.0));
+        ways.into_iter().find_map(|(_, point, tet)| self.add_steiner(&[tet], point))
+    }
+
     /// Stars tets from a new point. Tets behind faces that do not see it are taken in first: near slivers the
     /// point may be, by rounding, on the wrong side of some.
     fn add_steiner(&mut self, tets: &[u32], point: Point) -> Option<u32> {
@@ -81,6 +114,7 @@ impl Recovery<'_> {
             self.cavity.take(self.mesh, &tets);
             if self.cavity.make_star_shaped(self.mesh, tets[0], &point)
                 && self.cavity.tets.len() == tets.len()
+                && self.walls_are_seen_well(&point)
             {
                 break;
             }
@@ -100,14 +134,22 @@ impl Recovery<'_> {
         Some(p)
     }
 
-    /// The tets behind those faces around `tets` that do not see a point; `None` if there are none, or one of the
+    fn walls_are_seen_well(&self, point: &Point) -> bool {
+        self.cavity.walls.iter().all(|&wall| {
+            let [a, b, c] = self.mesh.face(wall).map(|v| self.mesh.point(v));
+            sees_well(point, [a, b, c], self.flips.flat)
+        })
+    }
+
+    /// The tets behind those faces around `tets` that do not see a point well; `None` if there are none, or one of the
     /// faces must stay.
     fn behind_unseen(&self, tets: &[u32], point: &Point) -> Option<Vec<u32>> {
         let mut behind = Vec::new();
         for half_face in tets.iter().flat_map(|&t| 4 * t..4 * t + 4) {
             let other = self.mesh.across(half_face);
             let [a, b, c] = self.mesh.face(half_face).map(|v| self.mesh.point(v));
-            if (other != NONE && tets.contains(&(other >> 2))) || orient3d(a, b, c, point) == Sign::Negative {
+            if (other != NONE && tets.contains(&(other >> 2))) || sees_well(point, [a, b, c], self.flips.flat)
+            {
                 continue;
             }
             if other == NONE || self.constraints.facet(self.mesh.face(half_face)).is_some() {

@@ -1,34 +1,41 @@
-//! Small closed surfaces for tests, and the check that a mesh fills one.
+//! Closed surfaces triangle by triangle: boxes, spheres, tori.
 
-use super::{ClosedSurface, SurfaceFaults, VolumeMesh};
-use crate::Point;
-use crate::kernel::predicates::{Sign, orient3d};
-use crate::kernel::simplex::volume6;
-use crate::mesh::TET_FACES;
-use csg::BodyId;
-use std::collections::BTreeMap;
+use super::{BodyId, ClosedSurface, Point, SurfaceFaults};
+use std::collections::HashMap;
 
 /// Triangles under construction, with regions behind and in front.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Soup {
+pub struct Soup {
     pub points: Vec<Point>,
     pub triangles: Vec<[u32; 3]>,
     pub regions: Vec<[Option<BodyId>; 2]>,
+    by_place: HashMap<[u64; 3], u32>,
 }
 
-pub(super) const INSIDE: [Option<BodyId>; 2] = [Some(BodyId(0)), None];
+pub const INSIDE: [Option<BodyId>; 2] = [Some(BodyId(0)), None];
 
 impl Soup {
     /// Points become one vertex where they are equal.
     pub fn add(&mut self, corners: [Point; 3], regions: [Option<BodyId>; 2]) {
+        let key = |p: &Point| [p.x, p.y, p.z].map(|x| (x + 0.0).to_bits());
+        if self.by_place.len() != self.points.len() {
+            self.by_place = self.points.iter().map(key).zip(0..).collect();
+        }
         let triangle = corners.map(|p| {
-            self.points.iter().position(|q| *q == p).unwrap_or_else(|| {
+            *self.by_place.entry(key(&p)).or_insert_with(|| {
                 self.points.push(p);
-                self.points.len() - 1
-            }) as u32
+                (self.points.len() - 1) as u32
+            })
         });
         self.triangles.push(triangle);
         self.regions.push(regions);
+    }
+
+    /// All triangles of another soup.
+    pub fn join(&mut self, other: &Self) {
+        for (t, &regions) in other.triangles.iter().zip(&other.regions) {
+            self.add(t.map(|v| other.points[v as usize]), regions);
+        }
     }
 
     pub fn quad(&mut self, [a, b, c, d]: [Point; 4], regions: [Option<BodyId>; 2]) {
@@ -91,7 +98,7 @@ impl Soup {
                 for k in j + 1..12 {
                     let [p, q, r] = [points[i], points[j], points[k]];
                     if near(&p, &q) && near(&q, &r) && near(&p, &r) {
-                        let out = volume6(&Point::origin(), &p, &q, &r) > 0.0;
+                        let out = p.coords.cross(&q.coords).dot(&r.coords) > 0.0;
                         faces.push(if out { [p, q, r] } else { [q, p, r] });
                     }
                 }
@@ -101,8 +108,8 @@ impl Soup {
             faces = faces
                 .iter()
                 .flat_map(|&[p, q, r]| {
-                    let [a, b, c] =
-                        [nalgebra::center(&q, &r), nalgebra::center(&p, &r), nalgebra::center(&p, &q)];
+                    let middle = |p: Point, q: Point| Point::from((p.coords + q.coords) / 2.0);
+                    let [a, b, c] = [middle(q, r), middle(p, r), middle(p, q)];
                     [[p, c, b], [c, q, a], [b, a, r], [a, b, c]]
                 })
                 .collect();
@@ -129,68 +136,10 @@ impl Soup {
 
     pub fn map(&mut self, f: impl Fn(&Point) -> Point) {
         self.points = self.points.iter().map(f).collect();
+        self.by_place.clear();
     }
 
     pub fn surface(self) -> Result<ClosedSurface, SurfaceFaults> {
         ClosedSurface::new(self.points, self.triangles, self.regions)
-    }
-}
-
-/// The volume of each body by the surface integral, and the sum of what cancels in it.
-fn volumes_by_surface(surface: &ClosedSurface) -> BTreeMap<BodyId, [f64; 2]> {
-    let mut volumes = BTreeMap::new();
-    let center = surface.points[0];
-    for (triangle, [behind, front]) in surface.triangles.iter().zip(&surface.regions) {
-        let [a, b, c] = triangle.map(|v| &surface.points[v as usize]);
-        let v = volume6(&center, a, b, c) / 6.0;
-        for (region, sign) in [(behind, 1.0), (front, -1.0)] {
-            if let Some(body) = region {
-                let [sum, all] = volumes.entry(*body).or_insert([0.0; 2]);
-                *sum += sign * v;
-                *all += v.abs();
-            }
-        }
-    }
-    volumes
-}
-
-/// Everything that a volume mesh promises of its surface; panics with what is broken.
-pub(super) fn check_fills(surface: &ClosedSurface, mesh: &VolumeMesh) {
-    assert_eq!(mesh.points[..surface.points.len()], surface.points[..]);
-    assert_eq!(mesh.tets.len(), mesh.bodies.len());
-    let mut used = vec![false; mesh.points.len()];
-    let mut sides: BTreeMap<[u32; 3], Vec<([u32; 3], BodyId)>> = BTreeMap::new();
-    let mut volumes: BTreeMap<BodyId, f64> = BTreeMap::new();
-    for (tet, &body) in mesh.tets.iter().zip(&mesh.bodies) {
-        let [a, b, c, d] = tet.map(|v| &mesh.points[v as usize]);
-        assert_eq!(orient3d(a, b, c, d), Sign::Positive, "tet {tet:?} at {a}");
-        *volumes.entry(body).or_insert(0.0) += volume6(a, b, c, d) / 6.0;
-        for face in TET_FACES {
-            let face = face.map(|i| tet[i]);
-            sides.entry(super::tetrahedra::sorted(face)).or_default().push((face, body));
-        }
-        tet.iter().for_each(|&v| used[v as usize] = true);
-    }
-    assert!(used.iter().all(|&u| u), "a vertex without tets");
-    for (&triangle, &[behind, front]) in surface.triangles.iter().zip(&surface.regions) {
-        let found = sides.remove(&super::tetrahedra::sorted(triangle)).unwrap_or_default();
-        for (region, outward) in [(behind, true), (front, false)] {
-            let here: Vec<BodyId> = found
-                .iter()
-                .filter(|(face, _)| super::carve::is_even(*face, triangle) == outward)
-                .map(|(_, body)| *body)
-                .collect();
-            assert_eq!(here, region.into_iter().collect::<Vec<_>>(), "beside triangle {triangle:?}");
-        }
-    }
-    for (face, found) in sides {
-        assert!(found.len() == 2 && found[0].1 == found[1].1, "face {face:?} inside has {found:?}");
-        assert!(!super::carve::is_even(found[0].0, found[1].0), "face {face:?} has one side twice");
-    }
-    let expected = volumes_by_surface(surface);
-    assert_eq!(expected.keys().collect::<Vec<_>>(), volumes.keys().collect::<Vec<_>>());
-    for (body, [v, all]) in expected {
-        let error = (volumes[&body] - v).abs() / all;
-        assert!(error < 1e-12, "body {body:?}: {} instead of {v}", volumes[&body]);
     }
 }
