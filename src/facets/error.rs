@@ -47,7 +47,11 @@ pub enum FacetError {
         places: Vec<Point>,
     },
     /// Two triangles at one edge lie on each other.
-    #[error("two triangles lie on each other at their common edge, at ({}, {}, {})", .0.x, .0.y, .0.z)]
+    #[error(
+        "two triangles lie on each other at their common edge, at ({}, {}, {}): surfaces that touch must have the same triangles \
+         there",
+        .0.x, .0.y, .0.z
+    )]
     Overlap(Point),
     /// Neighbouring triangles cannot all be turned to agree.
     #[error(
@@ -57,7 +61,8 @@ pub enum FacetError {
     NotOrientable(Point),
     /// No ray from a triangle tells what is around it.
     #[error(
-        "no ray from the triangle at ({}, {}, {}) tells what lies around it: surfaces touch or have no area there",
+        "no ray from the triangle at ({}, {}, {}) tells what lies around it: surfaces touch there without having the same \
+         triangles, or have no area",
         .0.x, .0.y, .0.z
     )]
     NoRay(Point),
