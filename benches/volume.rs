@@ -133,7 +133,9 @@ impl Case {
                 ("passes", Some(s)) => s.passes = number() as u32,
                 ("straight", Some(s)) => s.measure = improve::Measure::MeanRatio,
                 ("block", Some(s)) => s.block = number() as usize,
-                _ => panic!("{word}: size=, threads=, none, target=, change=, passes= and block= are known"),
+                _ => panic!(
+                    "{word}: size=, threads=, none, straight, target=, change=, passes= and block= are known"
+                ),
             }
         }
         case
