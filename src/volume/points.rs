@@ -5,7 +5,10 @@
 //! tets that are not. Over a front face stands the ideal point: on its axis, so far that the new edges have the
 //! wanted length. It is inserted by a Delaunay cavity that stops at the boundary, unless it is too near to
 //! another vertex or to the boundary. Wave by wave the front moves inward; what is still coarse when it has
-//! passed gets its circumcentre, under the same filter.
+//! passed gets its circumcentre, under the same filter. Where the size is level, a lattice went in before (`lattice`).
+//!
+//! The size at a point is the field's, but not above that of any vertex near it plus the growth from there; at vertices of the skin it is not
+//! much above their edges' mean.
 
 use super::cavity::{Cavity, Walk, walk};
 use super::tetrahedra::{NONE, Tetrahedra};
