@@ -12,7 +12,7 @@
 
 use super::cavity::{Walk, walk};
 use super::points::Filler;
-use crate::kernel::hilbert::hilbert_order;
+use crate::kernel::hilbert::random_rounds;
 use crate::kernel::random::mix;
 use crate::kernel::simplex::{area_vector, volume};
 use crate::mesh::TET_FACES;
@@ -129,10 +129,11 @@ impl Filler<'_> {
         found.into_iter().flatten().collect()
     }
 
-    /// Inserts points along the Hilbert curve, under the filter of the front.
+    /// Inserts points under the filter of the front, in random rounds along the Hilbert curve: cavities are smaller so, and a sixth
+    /// less is to be done than along the curve at once.
     fn add_candidates(&mut self, candidates: &[Candidate]) {
         let points: Vec<Point> = candidates.iter().map(|c| c.point).collect();
-        let order = hilbert_order(&points);
+        let order = random_rounds(&points);
         drop(points);
         let mut last = None;
         for i in order {

@@ -78,7 +78,8 @@ pub struct VolumeMesh {
 pub struct Settings {
     /// Whether to add points inside by the size field. Without: only what the boundary needs.
     pub fill: bool,
-    /// How much the wanted size may grow per unit of distance from a skin that is finer than the size field asks.
+    /// How much the wanted size may grow per unit of distance from a skin that is finer than the size field asks; the only
+    /// rule where the field is infinite.
     pub growth: f64,
     /// The largest number of tets; more end with an error.
     pub max_tets: usize,

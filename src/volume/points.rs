@@ -5,7 +5,10 @@
 //! tets that are not. Over a front face stands the ideal point: on its axis, so far that the new edges have the
 //! wanted length. It is inserted by a Delaunay cavity that stops at the boundary, unless it is too near to
 //! another vertex or to the boundary. Wave by wave the front moves inward; what is still coarse when it has
-//! passed gets its circumcentre, under the same filter.
+//! passed gets its circumcentre, under the same filter. Where the size is level, a lattice went in before (`lattice`).
+//!
+//! The size at a point is the field's, but not above that of any vertex near it plus the growth from there; at vertices of the skin it is not
+//! much above their edges' mean.
 
 use super::cavity::{Cavity, Walk, walk};
 use super::tetrahedra::{NONE, Tetrahedra};
@@ -22,7 +25,7 @@ const REGULAR: f64 = 0.612_372_435_695_794_5;
 /// times as many and edges 7 % longer, 1.5 gives 0.83 times as many, less well shaped.
 const FINE: f64 = 1.3;
 
-/// No vertex is inserted nearer to another than this fraction of the mean of the wanted sizes at both. From 0.65 to 0.8 the worst twentieth of
+/// No vertex is inserted nearer to another than this fraction of the wanted size. From 0.65 to 0.8 the worst twentieth of
 /// the dihedral angles on the shaft's skin grows from 27.1 to 28.7 degrees; 0.9 leaves holes (26.4 degrees, edges
 /// 15 % too long in the mean).
 const NEAREST: f64 = 0.8;
@@ -308,8 +311,7 @@ impl Filler<'_> {
         let (mut point, mut size) = (center, at_face);
         // The size at the point decides where it is, and where it is decides the size: twice is enough.
         for _ in 0..2 {
-            let edge = 0.5 * (at_face + size);
-            let height = (edge * edge - radius2).max(0.25 * edge * edge).sqrt();
+            let height = (size * size - radius2).max(0.25 * size * size).sqrt();
             point = center + inward * height;
             size = self.size_near(half_face >> 2, &point);
         }
@@ -352,10 +354,10 @@ impl Filler<'_> {
         true
     }
 
-    /// Whether a vertex is too near to a new point, by the wanted size half-way.
+    /// Whether a vertex is too near to a new point, by the wanted size there.
     #[inline]
     fn is_near(&self, vertex: u32, point: &Point, size: f64) -> bool {
-        let near = NEAREST * 0.5 * (size + self.at(vertex));
+        let near = NEAREST * size;
         (point - self.mesh.point(vertex)).norm_squared() < near * near
     }
 
