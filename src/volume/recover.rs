@@ -62,7 +62,7 @@ impl<'a> Recovery<'a> {
     /// A recovery. Each `attempt` takes edges and facets in another order: one may end where another does not.
     pub fn new(mesh: &'a mut Tetrahedra, constraints: &'a mut Constraints, attempt: u32) -> Self {
         // Without flat tets the points can leave again, but some surfaces let none be put then.
-        let flat = if attempt % 2 == 0 { FLAT } else { 0.0 };
+        let flat = if attempt.is_multiple_of(2) { FLAT } else { 0.0 };
         let flips = Flips::new(mesh.points.len() as u32, flat);
         Self {
             mesh,
