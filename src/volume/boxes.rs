@@ -99,24 +99,6 @@ impl Tree {
         self.within(root, test)
     }
 
-    /// What `test` finds among the items whose boxes meet this one.
-    pub fn find_at<T>(&self, place: &Box3, mut test: impl FnMut(u32) -> Option<T>) -> Vec<T> {
-        let mut found = Vec::new();
-        let mut open = vec![Node { at: 0, height: self.height, first: 0, last: self.items.len() }];
-        while let Some(node) = open.pop() {
-            if !self.nodes[node.at].meets(place) {
-                continue;
-            }
-            if node.height > 0 {
-                open.extend(node.children());
-                continue;
-            }
-            let items = self.items[node.first..node.last].iter().filter(|(b, _)| b.meets(place));
-            found.extend(items.filter_map(|&(_, i)| test(i)));
-        }
-        found
-    }
-
     fn within<T: Send>(&self, node: Node, test: &(impl Fn(u32, u32) -> Option<T> + Sync)) -> Vec<T> {
         if node.height == 0 {
             let items = &self.items[node.first..node.last];
@@ -206,7 +188,7 @@ mod tests {
     use crate::kernel::random::Random;
 
     #[test]
-    fn the_tree_finds_the_pairs_and_the_neighbours_that_all_pairs_have() {
+    fn the_tree_finds_the_pairs_that_a_test_of_all_pairs_finds() {
         let mut random = Random::new(1);
         for n in [1, 2, 3, 9, 100, 1000] {
             let boxes: Vec<Box3> = (0..n)
@@ -223,9 +205,6 @@ mod tests {
             let all: Vec<[u32; 2]> =
                 (0..n).flat_map(|i| (i + 1..n).map(move |j| [i, j])).filter(|p| meets(p[0], p[1])).collect();
             assert_eq!(found, all);
-            let mut beside = tree.find_at(&boxes[0], Some);
-            beside.sort_unstable();
-            assert_eq!(beside, (0..n).filter(|&i| meets(0, i)).collect::<Vec<_>>());
         }
     }
 }

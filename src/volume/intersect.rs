@@ -171,7 +171,7 @@ mod tests {
             // A common corner, and more than that or not.
             ([[0., 0., 0.], [2., 2., 1.], [2., 2., -1.]], true),
             ([[0., 0., 0.], [1., 1., 0.], [1., 1., 2.]], true),
-            ([[0., 0., 0.], [2., 2., 1.], [-2., 2., -1.]], false),
+            ([[0., 0., 0.], [2., 2., 1.], [-4., 2., -1.]], false),
             ([[0., 0., 0.], [2., 0., 0.], [2., 0., 2.]], true),
             // A common edge is nothing to complain of here.
             ([[0., 0., 0.], [4., 0., 0.], [1., 1., 2.]], false),
@@ -206,7 +206,7 @@ mod tests {
     #[test]
     fn whole_surfaces_have_no_intersections_and_crossing_ones_have_those_of_all_pairs() {
         let mut random = Random::new(4);
-        for shift in [5.0, 0.3, 0.0] {
+        for shift in [5.0, 0.3, 1.0] {
             let mut soup = Soup::default();
             soup.torus([1.0, 0.4], [24, 12], INSIDE);
             let mut other = Soup::default();

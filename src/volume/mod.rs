@@ -18,7 +18,7 @@
 //! assert_eq!(report, volume::Report::default());
 //! ```
 //!
-//! The steps, one file each:
+//! A surface that meets itself is refused when it is made (`intersect`, over the tree of `boxes`). The steps, one file each:
 //! 1. `delaunay`: the boundary points, by exact cavities (`cavity`), in random rounds along the Hilbert curve.
 //! 2. `recover`: edges, then facets, by `flips`; where none is left, by Steiner points for a while (`steiner`).
 //! 3. `carve`: a flood from the triangles gives each tet its body and removes the outside.

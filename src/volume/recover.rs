@@ -24,6 +24,10 @@ pub(super) const DEEPEST: u32 = 2;
 /// Steiner points for a while, 1000 leave 37 in the same time.
 const HELP: u32 = 1000;
 
+/// An attempt ends beyond this many Steiner points and as many as edges and facets were missing at first, later ones beyond
+/// some more: blocks with crossing notches need up to 0.8 times as many, those that come to no end would take thousands.
+const LEAST_STEINER: usize = 10;
+
 /// How often helping points are tried where a recovery is stuck.
 const HELPS: u32 = 3;
 
@@ -49,20 +53,16 @@ pub(super) struct Recovery<'a> {
     pub(super) star: Vec<u32>,
     pub(super) found: Vec<Crossing>,
     pub(super) most_steiner: usize,
+    /// How many edges may still be tried to help in all: where nothing goes on, the time must end.
+    help_left: u64,
     attempt: u32,
 }
 
 impl<'a> Recovery<'a> {
-    /// A recovery that gives up beyond `most_steiner` Steiner points. Each `attempt` takes edges and facets in another
-    /// order: one may end where another does not.
-    pub fn new(
-        mesh: &'a mut Tetrahedra,
-        constraints: &'a mut Constraints,
-        most_steiner: usize,
-        attempt: u32,
-    ) -> Self {
+    /// A recovery. Each `attempt` takes edges and facets in another order: one may end where another does not.
+    pub fn new(mesh: &'a mut Tetrahedra, constraints: &'a mut Constraints, attempt: u32) -> Self {
         // Without flat tets the points can leave again, but some surfaces let none be put then.
-        let flat = if attempt % 2 == 0 { FLAT } else { 0.0 };
+        let flat = if attempt.is_multiple_of(2) { FLAT } else { 0.0 };
         let flips = Flips::new(mesh.points.len() as u32, flat);
         Self {
             mesh,
@@ -74,7 +74,8 @@ impl<'a> Recovery<'a> {
             cavity: Cavity::default(),
             star: Vec::new(),
             found: Vec::new(),
-            most_steiner,
+            most_steiner: 0,
+            help_left: 0,
             attempt,
         }
     }
@@ -96,7 +97,10 @@ impl<'a> Recovery<'a> {
             left.retain(|&f| !self.split_facet(f));
             missing = self.missing_facets();
             if !missing.is_empty() && self.steiner.len() == before {
-                if helps == HELPS || !self.add_helping_points(&missing, helps) {
+                if helps == HELPS
+                    || missing.len() > self.most_steiner
+                    || !self.add_helping_points(&missing, helps)
+                {
                     return Err(missing);
                 }
                 helps += 1;
@@ -141,6 +145,10 @@ impl<'a> Recovery<'a> {
         wanted.retain(|&[a, b]| self.mesh.tet_at_edge(a, b, &mut self.star).is_none());
         if count {
             self.counts.missing_edges = wanted.len();
+            // Each Steiner point brings an end nearer, but rounding may spoil that.
+            let missing = wanted.len() + self.counts.missing_faces;
+            self.help_left = u64::from(HELP) * (20 + missing as u64 / 2);
+            self.most_steiner = LEAST_STEINER + missing * (4 + self.attempt as usize) / 4;
         }
         wanted.retain(|&[a, b]| !self.recover_edge(a, b, 0));
         for depth in 1..=DEEPEST {
@@ -156,9 +164,16 @@ impl<'a> Recovery<'a> {
         }
     }
 
+    /// Gives the flips their share of the help that is left, and takes back what was not used of the last.
+    fn take_help(&mut self) {
+        self.help_left += u64::from(self.flips.budget);
+        self.flips.budget = self.help_left.min(u64::from(HELP)) as u32;
+        self.help_left -= u64::from(self.flips.budget);
+    }
+
     /// Makes a, b an edge of the mesh by flips alone.
     fn recover_edge(&mut self, a: u32, b: u32, depth: u32) -> bool {
-        self.flips.budget = HELP;
+        self.take_help();
         let mut found = std::mem::take(&mut self.found);
         let mut stuck = 0;
         let mut done = false;
@@ -230,7 +245,7 @@ impl<'a> Recovery<'a> {
         if facet.gone {
             return true;
         }
-        self.flips.budget = HELP;
+        self.take_help();
         for _ in 0..ROUNDS {
             let Some(edges) = self.obstacles(f) else {
                 return self.mesh.find_face(facet.vertices, &mut self.star).is_some();

@@ -18,6 +18,14 @@ fn filled(soup: Soup, size: f64) -> Report {
     report
 }
 
+/// As [`filled`], without points by a size field.
+fn bare(soup: Soup) {
+    let surface = soup.surface().unwrap();
+    let (mesh, report) = mesh(&surface, &UniformSize(1.0), &EMPTY).unwrap();
+    check_fills(&surface, &mesh);
+    assert_eq!(mesh.points.len(), surface.points().len() + report.steiner_inside);
+}
+
 #[test]
 fn cubes_with_any_number_of_squares_are_filled() {
     for n in [1, 2, 3, 8, 13u32] {
@@ -383,6 +391,80 @@ fn bodies_inside_out_are_refused() {
     let surface = soup.surface().unwrap();
     let error = mesh(&surface, &UniformSize(1.0), &Settings::default()).unwrap_err();
     assert!(matches!(error, VolumeError::Inconsistent { .. }), "{error}");
+}
+
+#[test]
+fn stacks_of_prisms_twisted_nearly_to_their_limit_are_filled() {
+    for (sides, layers) in [(3, 1), (3, 4), (4, 2), (6, 1), (9, 2), (16, 1)] {
+        for part in [0.5, 0.9, 0.99] {
+            filled(twisted_prisms(sides, -part * twist_limit(sides), 1.0, layers), 2.0);
+        }
+    }
+}
+
+#[test]
+fn sheets_a_billionth_apart_with_other_triangles_are_filled_on_all_sides() {
+    let mut random = crate::kernel::random::Random::new(21);
+    for n in [3, 8, 14] {
+        for gap in [1e-3, 3e-9] {
+            for flips in [0, 4 * n * n] {
+                bare(lens(n, gap, flips, &mut random));
+            }
+        }
+    }
+}
+
+#[test]
+fn balls_of_spikes_and_turned_edges_are_filled() {
+    let mut random = crate::kernel::random::Random::new(22);
+    for (levels, reach) in [(0, 1e4), (1, 1e4), (2, 1e4), (2, 10.0), (3, 3.0)] {
+        for outer in [false, true] {
+            bare(spiked_ball(levels, reach, 60 << (2 * levels), outer, &mut random));
+        }
+    }
+}
+
+#[test]
+fn staircases_that_touch_themselves_are_filled() {
+    let mut random = crate::kernel::random::Random::new(23);
+    for case in 0..20 {
+        let shift = [0.0, 0.05, 0.1][case % 3];
+        let kinds = 2 + case as u64 % 3;
+        bare(staircase(2 + case as u32 % 3, shift, &mut random, |random| match random.bits() % kinds {
+            0 => A,
+            1 => B,
+            _ => None,
+        }));
+    }
+}
+
+#[test]
+fn skins_of_refined_tets_are_filled() {
+    let mut random = crate::kernel::random::Random::new(24);
+    for case in 0..6 {
+        let squeeze = [0, 1, 2].map(|_| 0.3 + random.unit());
+        let parts = 2 + case % 2;
+        bare(lattice_skin(2, squeeze, 0.5, 0.1, 4, || match random.bits() % parts {
+            0 => A,
+            1 => B,
+            _ => None,
+        }));
+    }
+}
+
+#[test]
+fn a_surface_graded_over_four_orders_of_magnitude_is_filled() {
+    bare(graded_ball(90, 60, 1e-4));
+    let mut random = crate::kernel::random::Random::new(25);
+    for offset in [1e6, -3e5] {
+        // Units of a millionth, or far from the origin: the surface is what rounding makes of it.
+        let mut far = spiked_ball(1, 3.0, 100, false, &mut random);
+        far.map(|p| p + crate::Vector::new(offset, 2.0 * offset, 0.0));
+        bare(far);
+        let mut tiny = spiked_ball(1, 3.0, 100, true, &mut random);
+        tiny.map(|p| p * 1e-6);
+        bare(tiny);
+    }
 }
 
 #[test]

@@ -31,13 +31,6 @@ impl Soup {
         self.regions.push(regions);
     }
 
-    /// All triangles of another soup.
-    pub fn join(&mut self, other: &Self) {
-        for (t, &regions) in other.triangles.iter().zip(&other.regions) {
-            self.add(t.map(|v| other.points[v as usize]), regions);
-        }
-    }
-
     pub fn quad(&mut self, [a, b, c, d]: [Point; 4], regions: [Option<BodyId>; 2]) {
         self.add([a, b, c], regions);
         self.add([a, c, d], regions);
