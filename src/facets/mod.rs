@@ -15,7 +15,6 @@
 //! What is *not* repaired: gaps, holes, facets that intersect. Those are refused with their place, here or by the volume mesher.
 
 mod close_curves;
-mod cross;
 mod edges;
 mod error;
 mod features;

@@ -4,9 +4,10 @@ use super::edges::Edges;
 use super::features::{self, Found};
 use super::join::{self, Joined};
 use super::projector::{FacetProjector, Source};
-use super::{FacetError, cross, normals, regions, tree};
+use super::{FacetError, normals, regions, tree};
 use crate::Point;
 use crate::mesh::{BoundaryTriangle, VertexId};
+use crate::volume::intersections;
 use csg::{Aabb, BodyId, CornerId, PatchId};
 
 /// A triangulated surface as a file gives it: closed, its triangles in any order.
@@ -147,7 +148,7 @@ impl FacetModel {
     /// Where facets meet that must not, by exact signs. Remeshing may heal such places, where they come from rounding; kept facets
     /// with any bound nothing.
     pub fn crossings(&self) -> Vec<Point> {
-        cross::crossings(&self.points, &self.triangles)
+        crossings(&self.points, &self.triangles)
     }
 
     /// The patch with this id.
@@ -235,4 +236,10 @@ fn assemble(
         projector,
         rounding,
     }
+}
+
+/// A place in each pair of triangles that meet elsewhere than in a common corner or edge.
+pub(super) fn crossings(points: &[Point], triangles: &[BoundaryTriangle]) -> Vec<Point> {
+    let corners: Vec<[u32; 3]> = triangles.iter().map(|t| t.vertices.map(|v| v.0)).collect();
+    intersections(points, &corners).into_iter().map(|(_, place)| place).collect()
 }

@@ -104,24 +104,6 @@ impl Tree {
         }
         (best.0 != u32::MAX).then_some(best)
     }
-
-    /// Calls `visit` with the items whose boxes may meet a box, in the order of the tree.
-    pub fn meeting(&self, with: &Aabb, visit: &mut impl FnMut(u32)) {
-        let mut stack = vec![0u32; usize::from(!self.nodes.is_empty())];
-        while let Some(node) = stack.pop() {
-            let node = &self.nodes[node as usize];
-            if (0..3).any(|k| node.low[k] > with.max[k] || node.high[k] < with.min[k]) {
-                continue;
-            }
-            if node.count == 0 {
-                stack.extend([node.first + 1, node.first]);
-            } else {
-                self.items[node.first as usize..(node.first + node.count) as usize]
-                    .iter()
-                    .for_each(|&item| visit(item));
-            }
-        }
-    }
 }
 
 /// The squared distance of a point from a box.

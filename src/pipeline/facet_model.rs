@@ -80,7 +80,9 @@ impl FacetSolid {
         match coarse::fill(surface, regions, &size, smoothness, settings.effort) {
             Ok(made) => Attempt::Made(made),
             Err(error) => {
-                let may_lower = may_lower && !self.keep_surface;
+                // Where triangles cross, smaller sizes were tried already.
+                let crossed = matches!(error, CoarseError::NotClosed(_));
+                let may_lower = may_lower && !self.keep_surface && !crossed;
                 let lowered = if may_lower { error.remedy(&[], &size) } else { Vec::new() };
                 if lowered.is_empty() { Attempt::Failed(error) } else { Attempt::Lower(lowered) }
             }

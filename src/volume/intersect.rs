@@ -10,7 +10,7 @@ use crate::Point;
 use crate::kernel::predicates::{Sign, orient2d, orient3d};
 
 /// All pairs of triangles that meet elsewhere than in a common corner or edge, ascending; each with a place where.
-pub(super) fn intersections(points: &[Point], triangles: &[[u32; 3]]) -> Vec<([u32; 2], Point)> {
+pub(crate) fn intersections(points: &[Point], triangles: &[[u32; 3]]) -> Vec<([u32; 2], Point)> {
     let boxes = triangles.iter().map(|t| Box3::of(t.map(|v| &points[v as usize]))).collect();
     let mut found = Tree::new(boxes).find_pairs(&|i, j| {
         let pair = [i.min(j), i.max(j)];

@@ -20,7 +20,8 @@ mod split;
 pub use deviation::deviation;
 pub use report::RemeshReport;
 
-use super::{FacetModel, FacetSize, cross};
+use super::model::crossings;
+use super::{FacetModel, FacetSize};
 use crate::Point;
 use crate::size::{SizeField, Source};
 use crate::surface::SurfaceMesh;
@@ -78,7 +79,7 @@ pub fn remesh(
         let size = Smaller(size, FacetSize::of_turn(model, settings.turn, &lowered));
         let mut report = RemeshReport { corrections: correction, ..RemeshReport::default() };
         let mesh = pass(model, &size, settings, &mut report);
-        report.crossings = cross::crossings(&mesh.points, &mesh.triangles);
+        report.crossings = crossings(&mesh.points, &mesh.triangles);
         if report.crossings.is_empty() || correction == MOST_CORRECTIONS {
             return (mesh, report);
         }
