@@ -130,3 +130,41 @@ fn the_stl_files_of_others_are_meshed() {
         assert!(report["mesh"]["smallest_dihedral"].as_f64().unwrap() > 10.0, "{name}: {report}");
     }
 }
+
+/// A `.poly` of a cube inside a cube, facets in no particular order of corners, with these holes and regions.
+fn nested_cubes(holes: &str, regions: &str) -> String {
+    let mut text = String::from("16 3 0 0\n");
+    for (cube, half) in [2.0, 1.0].into_iter().enumerate() {
+        for i in 0..8 {
+            let [x, y, z] = [0, 1, 2].map(|axis| if i >> axis & 1 == 1 { half } else { -half });
+            writeln!(text, "{} {x} {y} {z}", 8 * cube + i + 1).unwrap();
+        }
+    }
+    text += "12 0\n";
+    for cube in 0..2 {
+        for quad in [[0, 1, 3, 2], [4, 5, 7, 6], [0, 1, 5, 4], [2, 3, 7, 6], [0, 2, 6, 4], [1, 3, 7, 5]] {
+            let [a, b, c, d] = quad.map(|v| 8 * cube + v + 1);
+            writeln!(text, "1\n4 {a} {b} {c} {d}").unwrap();
+        }
+    }
+    text + holes + regions
+}
+
+#[test]
+fn holes_and_regions_of_a_poly_file_say_what_is_solid() {
+    let dir = tempfile::tempdir().unwrap();
+    let file = dir.path().join("nested.poly");
+    let volumes = |holes: &str, regions: &str| {
+        std::fs::write(&file, nested_cubes(holes, regions)).unwrap();
+        let report = report_of(&file, &[]);
+        let list = report["mesh"]["body_volumes"].as_array().unwrap().clone();
+        list.iter().map(|v| v.as_f64().unwrap().round()).collect::<Vec<_>>()
+    };
+    assert_eq!(volumes("0\n", "0\n"), [56., 8.]);
+    assert_eq!(volumes("1\n1 0 0 0\n", "0\n"), [56.]);
+    std::fs::write(&file, nested_cubes("0\n", "2\n1 1.5 0 0 7\n2 0 0 0 3\n")).unwrap();
+    let looked = succeed(tetmill().arg("inspect").arg(&file).arg("--json"));
+    let seen: serde_json::Value = serde_json::from_slice(&looked.stdout).unwrap();
+    let numbers: Vec<_> = seen["bodies"].as_array().unwrap().iter().map(|b| b["number"].clone()).collect();
+    assert_eq!(numbers, [7, 3]);
+}

@@ -26,6 +26,7 @@ mod normals;
 mod projector;
 #[cfg(test)]
 mod projector_tests;
+mod rays;
 mod regions;
 mod remesh;
 #[cfg(test)]
@@ -41,7 +42,7 @@ mod tree;
 
 pub use error::FacetError;
 pub use keep::keep;
-pub use model::{FacetBody, FacetCurve, FacetModel, FacetPatch, Facets, Settings};
+pub use model::{FacetBody, FacetCurve, FacetModel, FacetPatch, Facets, Marks, Settings};
 pub use projector::FacetProjector;
 pub use remesh::{RemeshReport, RemeshSettings, deviation, remesh};
 pub use size::FacetSize;

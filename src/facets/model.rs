@@ -4,10 +4,11 @@ use super::edges::Edges;
 use super::features::{self, Found};
 use super::join::{self, Joined};
 use super::projector::{FacetProjector, Source};
+use super::regions::Regions;
 use super::{FacetError, normals, regions, tree};
 use crate::Point;
 use crate::mesh::{BoundaryTriangle, VertexId};
-use crate::volume::intersections;
+use crate::volume::{intersections, middles_of_sides};
 use csg::{Aabb, BodyId, CornerId, PatchId};
 
 /// A triangulated surface as a file gives it: closed, its triangles in any order.
@@ -19,6 +20,17 @@ pub struct Facets {
     pub triangles: Vec<[u32; 3]>,
     /// By triangle: its group (the solid of an STL file). Where groups differ, patches end. Missing ones are 0.
     pub groups: Vec<u32>,
+    /// Points that say what is solid, in files whose triangles are not oriented; else orientation says it.
+    pub marks: Option<Marks>,
+}
+
+/// What a file says of the regions that its triangles part, by a point in each (TetGen's `.poly`). Without a mark they are bodies.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Marks {
+    /// Points in regions that are no bodies.
+    pub holes: Vec<Point>,
+    /// Points in bodies, and the numbers of these.
+    pub regions: Vec<(Point, i64)>,
 }
 
 /// How patches, curves and corners are told apart.
@@ -56,6 +68,8 @@ impl Default for Settings {
 pub struct FacetBody {
     /// The surface, as an index of those given, whose solid it is: the smallest one where several hold it.
     pub file: u32,
+    /// The number that its file gives to it.
+    pub number: Option<i64>,
 }
 
 /// A patch: facets that hang together and turn into each other smoothly.
@@ -113,7 +127,7 @@ impl FacetModel {
     /// volume mesher.
     pub fn new(files: &[Facets], settings: &Settings) -> Result<Self, FacetError> {
         let mut joined = join::join(files)?;
-        let mut regions = regions::find(&mut joined)?;
+        let mut regions = regions::find(&mut joined, files)?;
         if regions.files.is_empty() {
             return Err(FacetError::NoBody);
         }
@@ -145,7 +159,7 @@ impl FacetModel {
         Ok(assemble(joined, &regions, found, bounds, rounding))
     }
 
-    /// Where facets meet that must not, by exact signs. Remeshing may heal such places, where they come from rounding; kept facets
+    /// The middles of the sides of facets that meet others where they must not, by exact signs. Remeshing may heal such places, where they come from rounding; kept facets
     /// with any bound nothing.
     pub fn crossings(&self) -> Vec<Point> {
         crossings(&self.points, &self.triangles)
@@ -181,13 +195,7 @@ fn keys(joined: &Joined, sides: &[[Option<u32>; 2]]) -> Vec<u32> {
     all.iter().map(|k| different.binary_search(k).unwrap_or(0) as u32).collect()
 }
 
-fn assemble(
-    joined: Joined,
-    regions: &regions::Regions,
-    found: Found,
-    bounds: Aabb,
-    rounding: f64,
-) -> FacetModel {
+fn assemble(joined: Joined, regions: &Regions, found: Found, bounds: Aabb, rounding: f64) -> FacetModel {
     let mut patches: Vec<Option<FacetPatch>> = vec![None; found.patches];
     for (t, &patch) in found.patch_of.iter().enumerate() {
         patches[patch as usize].get_or_insert_with(|| {
@@ -231,15 +239,21 @@ fn assemble(
         corners: found.corners,
         curves,
         patches: patches.into_iter().flatten().collect(),
-        bodies: regions.files.iter().map(|&file| FacetBody { file }).collect(),
+        bodies: bodies_of(regions),
         bounds,
         projector,
         rounding,
     }
 }
 
-/// A place in each pair of triangles that meet elsewhere than in a common corner or edge.
+fn bodies_of(regions: &Regions) -> Vec<FacetBody> {
+    let Regions { files, numbers, .. } = regions;
+    files.iter().zip(numbers).map(|(&file, &number)| FacetBody { file, number }).collect()
+}
+
+/// The middles of the sides of triangles that meet others elsewhere than in a common corner or edge.
 pub(super) fn crossings(points: &[Point], triangles: &[BoundaryTriangle]) -> Vec<Point> {
     let corners: Vec<[u32; 3]> = triangles.iter().map(|t| t.vertices.map(|v| v.0)).collect();
-    intersections(points, &corners).into_iter().map(|(_, place)| place).collect()
+    let pairs = intersections(points, &corners);
+    middles_of_sides(points, &corners, pairs.into_iter().map(|(pair, _)| pair))
 }

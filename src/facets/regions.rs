@@ -9,8 +9,9 @@
 use super::FacetError;
 use super::edges::{Edges, Sets, Use};
 use super::join::{Joined, Layer};
+use super::rays::{shoot_from_point, shoot_from_triangle};
+use super::{Facets, Marks};
 use crate::kernel::predicates::{Sign, orient3d};
-use crate::kernel::random::Random;
 use crate::kernel::simplex::{area_vector, volume6};
 use crate::{Point, Vector};
 use std::cmp::Ordering;
@@ -22,6 +23,8 @@ pub(super) struct Regions {
     pub sides: Vec<[Option<u32>; 2]>,
     /// By body: the surface that it is named after.
     pub files: Vec<u32>,
+    /// By body: the number that a file gives to it.
+    pub numbers: Vec<Option<i64>>,
 }
 
 /// The side of a triangle that its normal points away from, or to.
@@ -30,7 +33,7 @@ fn side_of(triangle: u32, front: bool) -> u32 {
 }
 
 /// Finds the regions; may turn over triangles of surfaces that are not consistently oriented.
-pub(super) fn find(joined: &mut Joined) -> Result<Regions, FacetError> {
+pub(super) fn find(joined: &mut Joined, files: &[Facets]) -> Result<Regions, FacetError> {
     let edges = &Edges::new(&joined.triangles);
     refuse_open(joined, edges)?;
     let mut sets = Sets::new(2 * joined.triangles.len());
@@ -40,14 +43,54 @@ pub(super) fn find(joined: &mut Joined) -> Result<Regions, FacetError> {
     let outside = nest(joined, edges, &mut sets)?;
     let region: Vec<u32> = (0..2 * joined.triangles.len() as u32).map(|s| sets.find(s)).collect();
     let outside = sets.find(outside);
-    let files = joined.layers.iter().flatten().map(|l| l.file + 1).max().unwrap_or(0);
     let mut solid_in = vec![Vec::new(); region.len()];
-    for file in 0..files {
-        for r in solids(joined, edges, &region, outside, file)? {
-            solid_in[r as usize].push(file);
+    let mut numbered = Vec::new();
+    for (file, facets) in (0..).zip(files) {
+        let solid = match &facets.marks {
+            None => solids(joined, edges, &region, outside, file)?,
+            Some(marks) => {
+                for &(place, number) in &marks.regions {
+                    numbered.push((region_at(joined, &region, outside, place)?, number));
+                }
+                unmarked(joined, &region, outside, file, marks)?
+            }
+        };
+        solid.into_iter().for_each(|r| solid_in[r as usize].push(file));
+    }
+    Ok(number(joined, &region, &solid_in, &numbered))
+}
+
+/// The region that a point lies in.
+fn region_at(joined: &Joined, region: &[u32], outside: u32, place: Point) -> Result<u32, FacetError> {
+    let hits = shoot_from_point(joined, place).ok_or(FacetError::NoRay(place))?;
+    Ok(hits.first().map_or(outside, |hit| region[side_of(hit.triangle, !hit.along) as usize]))
+}
+
+/// The regions that one surface parts from the outside, but for the holes that are marked.
+fn unmarked(
+    joined: &Joined,
+    region: &[u32],
+    outside: u32,
+    file: u32,
+    marks: &Marks,
+) -> Result<Vec<u32>, FacetError> {
+    let mut open = vec![outside];
+    for &hole in &marks.holes {
+        open.push(region_at(joined, region, outside, hole)?);
+    }
+    // What other surfaces alone part is one.
+    let mut sets = Sets::new(region.len());
+    for (t, layers) in joined.layers.iter().enumerate() {
+        if layers.iter().all(|l| l.file != file) {
+            sets.join(region[2 * t], region[2 * t + 1]);
         }
     }
-    Ok(number(joined, &region, &solid_in))
+    let open: Vec<u32> = open.into_iter().map(|r| sets.find(r)).collect();
+    let mut solid: Vec<u32> = region.to_vec();
+    solid.sort_unstable();
+    solid.dedup();
+    solid.retain(|&r| !open.contains(&sets.find(r)));
+    Ok(solid)
 }
 
 /// Edges that an error about gaps shows at most.
@@ -131,7 +174,7 @@ fn nest(joined: &Joined, edges: &Edges, sets: &mut Sets) -> Result<u32, FacetErr
     for (p, start) in largest.iter().enumerate() {
         let Some((_, start)) = *start else { continue };
         let corner = joined.points[joined.triangles[start as usize][0] as usize];
-        let hits = shoot(joined, start).ok_or(FacetError::NoRay(corner))?;
+        let hits = shoot_from_triangle(joined, start).ok_or(FacetError::NoRay(corner))?;
         let last = hits.iter().rposition(|h| pieces[h.triangle as usize] == p as u32).unwrap_or(0);
         let around = side_of(hits[last].triangle, hits[last].along);
         match (hits.get(last + 1), outside) {
@@ -143,65 +186,7 @@ fn nest(joined: &Joined, edges: &Edges, sets: &mut Sets) -> Result<u32, FacetErr
     outside.ok_or(FacetError::Empty)
 }
 
-/// Where a ray meets a triangle.
-struct Hit {
-    at: f64,
-    triangle: u32,
-    /// Whether it goes through from behind to the front.
-    along: bool,
-}
-
-/// Rays tried from a triangle before it is given up: each meets an edge, or two triangles within rounding, by chance only.
-const RAYS: usize = 64;
-
-/// Triangles that a ray meets nearer to each other than this part of its length are not told apart by floating point.
-const APART: f64 = 1e-13;
-
-/// The triangles that a ray from the middle of `start` meets, that one first, in order.
-fn shoot(joined: &Joined, start: u32) -> Option<Vec<Hit>> {
-    let corners = |t: u32| joined.triangles[t as usize].map(|v| &joined.points[v as usize]);
-    let [a, b, c] = corners(start);
-    let from = Point::from((a.coords + b.coords + c.coords) / 3.0);
-    let reach = joined.points.iter().map(|p| (p - from).norm()).fold(0.0, f64::max);
-    let up = normal(joined, start).try_normalize(0.0)?;
-    let mut random = Random::new(u64::from(start));
-    (0..RAYS).find_map(|_| {
-        let aside = Vector::from_fn(|_, _| random.unit() - 0.5);
-        let to = from + (up + aside).normalize() * (2.0 * reach);
-        let mut hits = vec![Hit { at: 0.0, triangle: start, along: true }];
-        for t in (0..joined.triangles.len() as u32).filter(|&t| t != start) {
-            hits.extend(meet(&from, &to, corners(t), t)?);
-        }
-        hits.sort_by(|g, h| g.at.total_cmp(&h.at));
-        hits.windows(2).all(|w| w[1].at - w[0].at > APART).then_some(hits)
-    })
-}
-
-/// Where a ray meets a triangle, if it does; nothing at all if that is not clear.
-fn meet(from: &Point, to: &Point, [a, b, c]: [&Point; 3], triangle: u32) -> Option<Option<Hit>> {
-    let (low, high) = (a.inf(b).inf(c), a.sup(b).sup(c));
-    if (0..3).any(|k| from[k].max(to[k]) < low[k] || from[k].min(to[k]) > high[k]) {
-        return Some(None);
-    }
-    let turns = [[a, b], [b, c], [c, a]].map(|[p, q]| orient3d(from, to, p, q));
-    if turns.contains(&Sign::Positive) && turns.contains(&Sign::Negative) {
-        return Some(None);
-    }
-    if turns.contains(&Sign::Zero) {
-        return None;
-    }
-    let ends = [orient3d(a, b, c, from), orient3d(a, b, c, to)];
-    if ends.contains(&Sign::Zero) {
-        return None;
-    }
-    if ends[0] == ends[1] {
-        return Some(None);
-    }
-    let [near, far] = [from, to].map(|p| volume6(a, b, c, p).abs());
-    Some(Some(Hit { at: near / (near + far), triangle, along: ends[1] == Sign::Positive }))
-}
-
-fn normal(joined: &Joined, t: u32) -> Vector {
+pub(super) fn normal(joined: &Joined, t: u32) -> Vector {
     let [a, b, c] = joined.triangles[t as usize].map(|v| &joined.points[v as usize]);
     area_vector(a, b, c)
 }
@@ -309,7 +294,7 @@ fn orient(joined: &mut Joined, edges: &Edges, file: u32) -> Result<(), FacetErro
 }
 
 /// Numbers the solid regions as bodies, in the order of the triangles that see them.
-fn number(joined: &Joined, region: &[u32], solid_in: &[Vec<u32>]) -> Regions {
+fn number(joined: &Joined, region: &[u32], solid_in: &[Vec<u32>], numbered: &[(u32, i64)]) -> Regions {
     let volumes = file_volumes(joined);
     let mut body_of: Vec<Option<u32>> = vec![None; region.len()];
     let mut files = Vec::new();
@@ -328,7 +313,14 @@ fn number(joined: &Joined, region: &[u32], solid_in: &[Vec<u32>]) -> Regions {
             body_of[r]
         })
     });
-    Regions { sides: sides.collect(), files }
+    let sides = sides.collect();
+    let mut numbers = vec![None; files.len()];
+    for &(r, number) in numbered {
+        if let Some(body) = body_of[r as usize] {
+            numbers[body as usize] = Some(number);
+        }
+    }
+    Regions { sides, files, numbers }
 }
 
 /// The volume inside each surface, by the surface integral.

@@ -338,7 +338,7 @@ fn skins_of_meshed_geometries_are_remeshed_well() {
         let found = model(&[Facets {
             points: skin.points,
             triangles: skin.triangles.iter().map(|t| t.vertices.map(|v| v.0)).collect(),
-            groups: Vec::new(),
+            ..Facets::default()
         }]);
         assert_good(&run(&found, 1.0), 20.0, 12.0);
     }
@@ -351,6 +351,6 @@ fn curved_walls_near_each_other_are_kept_apart_by_smaller_sizes() {
         s.sphere(Point::origin(), 0.96, 80, 40, true);
     })]);
     let (mesh, report) = remesh(&shell, &sizes(&shell, 1.5), &RemeshSettings::default());
-    assert!(report.corrections > 0 && report.crossings.is_empty());
+    assert!(report.corrections > 0 && report.crossings.is_empty(), "{report:?}");
     closed(&shell, &mesh);
 }

@@ -203,5 +203,6 @@ pub(super) fn read_ply(bytes: &[u8]) -> Facets {
             .collect(),
         triangles: (0..triangles).map(|t| [0, 1, 2].map(|k| index(t, k))).collect(),
         groups: vec![0; triangles],
+        marks: None,
     }
 }

@@ -21,8 +21,13 @@ pub enum CoarseError {
     #[error(transparent)]
     Surface(#[from] SurfaceError),
     /// The surface mesh does not bound the bodies.
-    #[error("the surface mesh does not bound the bodies: {0}")]
-    NotClosed(#[from] SurfaceFaults),
+    #[error("the surface mesh does not bound the bodies: {faults}")]
+    NotClosed {
+        /// What is wrong.
+        faults: SurfaceFaults,
+        /// The middles of the sides of triangles that cross others.
+        crossing: Vec<Point>,
+    },
     /// A body could not be filled.
     #[error(transparent)]
     Volume(#[from] VolumeError),
@@ -40,8 +45,8 @@ impl CoarseError {
                 };
                 long.iter().map(shorter).collect()
             }
-            Self::NotClosed(faults) => faults.crossings().map(|point| smaller_at(point, size)).collect(),
-            Self::Volume(VolumeError::NotRecovered { places, .. }) => {
+            Self::NotClosed { crossing: places, .. }
+            | Self::Volume(VolumeError::NotRecovered { places, .. }) => {
                 places.iter().map(|&point| smaller_at(point, size)).collect()
             }
             _ => Vec::new(),
@@ -237,12 +242,14 @@ fn fill_bodies(
     let mut segments = surface.segments;
     segments.iter_mut().for_each(|s| s.vertices = s.vertices.map(renumbered));
 
-    let closed = ClosedSurface::new(
-        points[..on_surface].to_vec(),
-        triangles.iter().map(|t| t.vertices.map(|v| v.0)).collect(),
-        triangles.iter().map(|t| regions(t.patch)).collect(),
-    )?
-    .with_kept_points(points[on_surface..].to_vec());
+    let corners: Vec<[u32; 3]> = triangles.iter().map(|t| t.vertices.map(|v| v.0)).collect();
+    let beside = triangles.iter().map(|t| regions(t.patch)).collect();
+    let closed = ClosedSurface::new(points[..on_surface].to_vec(), corners.clone(), beside)
+        .map_err(|faults| {
+            let crossing = volume::middles_of_sides(&points, &corners, faults.crossings());
+            CoarseError::NotClosed { faults, crossing }
+        })?
+        .with_kept_points(points[on_surface..].to_vec());
     let (filled, report) = volume::mesh(&closed, size, &volume::Settings::default())?;
 
     classes.resize(filled.points.len(), Class::Corner(csg::CornerId(u32::MAX)));

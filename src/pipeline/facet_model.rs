@@ -4,7 +4,9 @@ use super::coarse::{self, Attempt, CoarseError, CoarseMesh, CoarseSettings};
 use super::input::InputSettings;
 use crate::Point;
 use crate::error::Failure;
-use crate::facets::{FacetModel, FacetSize, FacetSmoothness, Facets, RemeshSettings, keep, remesh};
+use crate::facets::{
+    FacetModel, FacetPatch, FacetSize, FacetSmoothness, Facets, Marks, RemeshSettings, keep, remesh,
+};
 use crate::geometry::Projector;
 use crate::improve::Smoothness;
 use crate::io::surface::{self, Surface};
@@ -39,7 +41,16 @@ impl FacetSolid {
         let mut surfaces = Vec::new();
         for path in paths {
             let surface = surface::read(path.as_ref()).map_err(Failure::input)?;
-            surface.notes.iter().for_each(|text| note(&format!("{}: {text}", path.as_ref().display())));
+            let name = path.as_ref().display();
+            surface.notes.iter().for_each(|text| note(&format!("{name}: {text}")));
+            if surface.regions.iter().any(|region| region.max_volume.is_some()) {
+                note(&format!(
+                    "{name}: the largest volumes of its regions are left out; sizes come from the options"
+                ));
+            }
+            if !surface.loose_edges.is_empty() {
+                note(&format!("{name}: {} edges on no facet are left out", surface.loose_edges.len()));
+            }
             surfaces.push(surface);
         }
         let facets: Vec<Facets> = surfaces.iter().map(facets_of).collect();
@@ -81,7 +92,7 @@ impl FacetSolid {
             Ok(made) => Attempt::Made(made),
             Err(error) => {
                 // Where triangles cross, smaller sizes were tried already.
-                let crossed = matches!(error, CoarseError::NotClosed(_));
+                let crossed = matches!(error, CoarseError::NotClosed { .. });
                 let may_lower = may_lower && !self.keep_surface && !crossed;
                 let lowered = if may_lower { error.remedy(&[], &size) } else { Vec::new() };
                 if lowered.is_empty() { Attempt::Failed(error) } else { Attempt::Lower(lowered) }
@@ -103,19 +114,28 @@ fn facets_of(surface: &Surface) -> Facets {
         points: surface.points.clone(),
         triangles: surface.triangles.clone(),
         groups: surface.group.clone(),
+        marks: surface.unoriented.then(|| marks_of(surface)),
     }
 }
 
-/// Bodies are named as their files. Where files tell groups of triangles apart, these are the boundaries; elsewhere
+fn marks_of(surface: &Surface) -> Marks {
+    // TetGen's attributes are numbers of any kind; those of regions are small whole ones.
+    let regions = surface.regions.iter().map(|region| (region.place, region.attribute.round() as i64));
+    Marks { holes: surface.holes.clone(), regions: regions.collect() }
+}
+
+/// Bodies have the numbers that their file gives to all of them, else their places; and are named as their files. Where files tell groups of triangles apart, these are the boundaries; elsewhere
 /// each patch is one.
 fn names(model: &FacetModel, surfaces: &[Surface], stems: &[String]) -> Names {
+    let all_numbered = surfaces.len() == 1 && model.bodies.iter().all(|b| b.number.is_some_and(|n| n > 0));
     let mut bodies: Vec<(u32, String)> = Vec::new();
     for body in &model.bodies {
         let stem = &stems[body.file as usize];
         let taken = |name: &String| bodies.iter().any(|(_, other)| other == name);
         let numbered = (2..).map(|k| format!("{stem}_{k}"));
         let name = std::iter::once(stem.clone()).chain(numbered).find(|name| !taken(name)).expect("endless");
-        bodies.push((bodies.len() as u32 + 1, name));
+        let number = body.number.filter(|_| all_numbered).and_then(|number| u32::try_from(number).ok());
+        bodies.push((number.unwrap_or(bodies.len() as u32 + 1), name));
     }
     let groups: Vec<(usize, usize)> = surfaces
         .iter()
@@ -123,7 +143,7 @@ fn names(model: &FacetModel, surfaces: &[Surface], stems: &[String]) -> Names {
         .flat_map(|(file, surface)| (0..surface.groups.len()).map(move |group| (file, group)))
         .collect();
     let has_groups = surfaces.iter().any(|surface| surface.groups.len() > 1);
-    let patch = |(index, patch): (usize, &crate::facets::FacetPatch)| {
+    let patch = |(index, patch): (usize, &FacetPatch)| {
         let (file, group) = patch.labels.first().map_or((0, 0), |&(f, g)| (f as usize, g as usize));
         let at = groups.binary_search(&(file, group)).ok().filter(|_| has_groups);
         match at {

@@ -21,6 +21,27 @@ pub(crate) fn intersections(points: &[Point], triangles: &[[u32; 3]]) -> Vec<([u
     found
 }
 
+/// The middles of the sides of the triangles of some pairs: where smaller sizes part them. A place inside a triangle
+/// asks its vertices for little, as sizes grow on the way to them.
+pub(crate) fn middles_of_sides(
+    points: &[Point],
+    triangles: &[[u32; 3]],
+    pairs: impl IntoIterator<Item = [u32; 2]>,
+) -> Vec<Point> {
+    let mut sides: Vec<[u32; 2]> = pairs
+        .into_iter()
+        .flatten()
+        .flat_map(|t| {
+            let [a, b, c] = triangles[t as usize];
+            [[a, b], [b, c], [c, a]].map(|[v, w]| [v.min(w), v.max(w)])
+        })
+        .collect();
+    sides.sort_unstable();
+    sides.dedup();
+    let middle = |[v, w]: [u32; 2]| nalgebra::center(&points[v as usize], &points[w as usize]);
+    sides.into_iter().map(middle).collect()
+}
+
 /// Where two triangles meet, common corners and edges left out.
 fn meeting(points: &[Point], one: [u32; 3], other: [u32; 3]) -> Option<Point> {
     let at = |triangle: [u32; 3]| triangle.map(|v| &points[v as usize]);

@@ -55,7 +55,7 @@ mod surface_faults;
 mod tetrahedra;
 
 pub use closed_surface::ClosedSurface;
-pub(crate) use intersect::intersections;
+pub(crate) use intersect::{intersections, middles_of_sides};
 pub use keep::KeptPointFault;
 pub use surface_faults::{SurfaceFault, SurfaceFaults};
 

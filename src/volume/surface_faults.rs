@@ -125,11 +125,14 @@ impl SurfaceFault {
 pub struct SurfaceFaults(pub Vec<SurfaceFault>);
 
 impl SurfaceFaults {
-    /// Where triangles intersect or overlap: what a finer triangulation of the same geometry may mend.
-    pub fn crossings(&self) -> impl Iterator<Item = Point> + '_ {
-        let crosses =
-            |f: &&SurfaceFault| matches!(f, SurfaceFault::Intersect { .. } | SurfaceFault::Overlap { .. });
-        self.0.iter().filter(crosses).filter_map(SurfaceFault::place)
+    /// The pairs of triangles that intersect or overlap: what a finer triangulation of the same geometry may mend.
+    pub fn crossings(&self) -> impl Iterator<Item = [u32; 2]> + '_ {
+        self.0.iter().filter_map(|fault| match fault {
+            SurfaceFault::Intersect { triangles, .. } | SurfaceFault::Overlap { triangles, .. } => {
+                Some(*triangles)
+            }
+            _ => None,
+        })
     }
 }
 

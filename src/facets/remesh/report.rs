@@ -22,7 +22,7 @@ pub struct RemeshReport {
     pub flattening_left: usize,
     /// Triangles that do not follow their facets: normals 60° off, or a fifth of an edge away.
     pub misfits: usize,
-    /// Places where triangles meet that must not.
+    /// The middles of the sides of triangles that meet others where they must not.
     pub crossings: Vec<Point>,
     /// Times the mesh was made anew with smaller sizes where triangles met.
     pub corrections: usize,

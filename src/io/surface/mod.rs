@@ -48,6 +48,8 @@ pub struct Surface {
     pub loose_points: Vec<Point>,
     /// Edges that belong to no polygon; in TetGen's formats they are to be edges of the mesh.
     pub loose_edges: Vec<[Point; 2]>,
+    /// Whether the order of corners says nothing of inside and outside, but points in holes do (TetGen).
+    pub unoriented: bool,
     /// Points in holes of the volume (TetGen).
     pub holes: Vec<Point>,
     /// What is said about regions of the volume (TetGen).

@@ -54,6 +54,7 @@ pub(super) fn parse(mut words: Words, nodes: Nodes, kind: Kind) -> Result<Surfac
     let regions = regions(&mut words)?;
     let mut surface = facets.builder.finish();
     (surface.holes, surface.regions, surface.loose_edges) = (holes, regions, facets.edges);
+    surface.unoriented = true;
     Ok(surface)
 }
 
