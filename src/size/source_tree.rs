@@ -56,12 +56,12 @@ impl SourceTree {
         let mut tree =
             Self { bounds: cube, grading, maximum, cells: vec![Cell::Listed(0, 0)], listed: Vec::new() };
         let useful: Vec<Source> = sources.iter().copied().filter(|s| s.size < maximum).collect();
-        tree.build(0, cube.min, side, useful);
+        tree.build(0, cube.min, side, &useful);
         tree
     }
 
-    fn build(&mut self, cell: usize, min: Point, edge: f64, sources: Vec<Source>) {
-        let sources = self.relevant(min, edge, sources);
+    fn build(&mut self, cell: usize, min: Point, edge: f64, around: &[Source]) {
+        let sources = self.relevant(min, edge, around);
         let center = min + Vector::repeat(0.5 * edge);
         let middle = self.least(&sources, &center);
         if sources.len() <= LEAF_SOURCES {
@@ -77,23 +77,33 @@ impl SourceTree {
             self.cells.extend([Cell::Listed(0, 0); 8]);
             self.cells[cell] = Cell::Split(first as u32);
             for child in 0..8 {
-                self.build(first + child, min + octant(child, 0.5 * edge), 0.5 * edge, sources.clone());
+                self.build(first + child, min + octant(child, 0.5 * edge), 0.5 * edge, &sources);
             }
         }
     }
 
-    /// Drops the sources that another one undercuts all over the cell.
-    fn relevant(&self, min: Point, edge: f64, mut sources: Vec<Source>) -> Vec<Source> {
-        let center = min + Vector::repeat(0.5 * edge);
-        let range = |s: &Source| {
-            let d = (s.point - center).map(f64::abs);
-            let near = d.map(|x| (x - 0.5 * edge).max(0.0)).norm();
-            let far = d.map(|x| x + 0.5 * edge).norm();
-            (s.size + self.grading * near, s.size + self.grading * far)
+    /// The sources that no other one undercuts all over the cell.
+    ///
+    /// Most are dropped at first sight, by the least upper bound so far and without a square root.
+    fn relevant(&self, min: Point, edge: f64, sources: &[Source]) -> Vec<Source> {
+        let half = 0.5 * edge;
+        let center = min + Vector::repeat(half);
+        let mut best = self.maximum;
+        let matters = |s: &Source, best: f64| {
+            let reach = (best - s.size) / self.grading;
+            let near = (s.point - center).map(|x| (x.abs() - half).max(0.0)).norm_squared();
+            reach > 0.0 && near < reach * reach
         };
-        let best = sources.iter().map(|s| range(s).1).fold(self.maximum, f64::min);
-        sources.retain(|s| range(s).0 < best);
-        sources
+        let mut kept = Vec::with_capacity(sources.len());
+        for s in sources {
+            if matters(s, best) {
+                let far = (s.point - center).map(|x| x.abs() + half).norm();
+                best = best.min(s.size + self.grading * far);
+                kept.push(*s);
+            }
+        }
+        kept.retain(|s| matters(s, best));
+        kept
     }
 
     /// The exact field of some sources.
