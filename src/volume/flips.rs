@@ -26,6 +26,8 @@ pub(super) enum Refused {
 pub(super) struct Flips {
     /// The tets that the last flip made.
     pub made: Vec<u32>,
+    /// How many flips were made.
+    pub count: u64,
     /// How many more edges may be tried in order to help: see [`Flips::remove_edge_with_help`].
     pub budget: u32,
     /// Tets at Steiner points with a smaller mean ratio are taken for flat.
@@ -78,6 +80,7 @@ impl Flips {
             return Err(Refused::Inverted);
         }
         self.made.clear();
+        self.count += 1;
         mesh.replace(&[half_face >> 2, other >> 2], &new, NO_BODY, &mut self.made);
         Ok(())
     }
@@ -116,6 +119,7 @@ impl Flips {
             }
         }
         self.made.clear();
+        self.count += 1;
         mesh.replace(&self.ring.tets, &self.new, NO_BODY, &mut self.made);
         Ok(())
     }

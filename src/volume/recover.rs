@@ -24,9 +24,21 @@ pub(super) const DEEPEST: u32 = 2;
 /// Steiner points for a while, 1000 leave 37 in the same time.
 const HELP: u32 = 1000;
 
-/// An attempt ends beyond this many Steiner points and as many as edges and facets were missing at first, later ones beyond
-/// some more: blocks with crossing notches need up to 0.8 times as many, those that come to no end would take thousands.
+/// Steiner points come in **generations**: those on the edges and facets missing at first, those on the edges from these points to
+/// the corners opposite, and so on. Where flips do their part each generation is much smaller than the one before (skins end after
+/// 50 and 0, say). Where it is not (240, 540, 727) the points make more work than they do, and the attempt ends: a generation may
+/// have this many points and a share of the one before, the first one a share of the edges and facets missing at first.
 const LEAST_STEINER: usize = 10;
+
+/// The share of the generation before, in eighths; every fourth attempt has one more, for very few inputs (5 of 200 blocks with
+/// notches) have no order that ends so soon.
+const LEAST_EIGHTHS: usize = 4;
+
+/// The share of what was missing at first, in eighths; likewise. Attempts that end well have needed 1 to 5.
+const LEAST_FIRST_EIGHTHS: usize = 4;
+
+/// How many generations an attempt may have, those with helping points counted: three or four is usual.
+const MOST_GENERATIONS: usize = 20;
 
 /// How often helping points are tried where a recovery is stuck.
 const HELPS: u32 = 3;
@@ -61,8 +73,9 @@ pub(super) struct Recovery<'a> {
 impl<'a> Recovery<'a> {
     /// A recovery. Each `attempt` takes edges and facets in another order: one may end where another does not.
     pub fn new(mesh: &'a mut Tetrahedra, constraints: &'a mut Constraints, attempt: u32) -> Self {
-        // Without flat tets the points can leave again, but some surfaces let none be put then.
-        let flat = if attempt.is_multiple_of(2) { FLAT } else { 0.0 };
+        // Without flat tets the points leave more easily, but some surfaces let none be put then. Skins of refined lattices
+        // need five times as many points so: not in the first attempt.
+        let flat = if attempt.is_multiple_of(2) { 0.0 } else { FLAT };
         let flips = Flips::new(mesh.points.len() as u32, flat);
         Self {
             mesh,
@@ -84,29 +97,49 @@ impl<'a> Recovery<'a> {
     pub fn run(&mut self) -> Result<(), Vec<u32>> {
         let mut missing = self.missing_facets();
         self.counts.missing_faces = missing.len();
-        let (mut first, mut helps) = (true, 0);
-        while !missing.is_empty() {
+        if missing.is_empty() {
+            return Ok(());
+        }
+        let (mut helps, mut generation) = (0, 0);
+        for round in 0..MOST_GENERATIONS {
             let before = self.steiner.len();
-            self.recover_edges(&missing, first);
-            first = false;
-            let mut left: Vec<u32> = missing.iter().copied().filter(|&f| !self.recover_facet(f, 0)).collect();
-            // The neighbourhood has changed: what failed at first may work now.
-            for depth in 1..=DEEPEST {
-                left.retain(|&f| !self.recover_facet(f, depth));
+            self.most_steiner = before + LEAST_STEINER + generation * self.patience(LEAST_EIGHTHS) / 8;
+            self.recover_edges(&missing, round == 0);
+            if self.steiner.len() < self.most_steiner {
+                self.recover_facets(&missing);
             }
-            left.retain(|&f| !self.split_facet(f));
             missing = self.missing_facets();
-            if !missing.is_empty() && self.steiner.len() == before {
-                if helps == HELPS
-                    || missing.len() > self.most_steiner
-                    || !self.add_helping_points(&missing, helps)
-                {
-                    return Err(missing);
+            if missing.is_empty() {
+                return Ok(());
+            }
+            generation = self.steiner.len() - before;
+            if self.steiner.len() >= self.most_steiner {
+                break;
+            }
+            if generation == 0 {
+                let few = missing.len() <= LEAST_STEINER + self.counts.missing_faces / 4;
+                if helps == HELPS || !few || !self.add_helping_points(&missing, helps) {
+                    break;
                 }
                 helps += 1;
             }
         }
-        Ok(())
+        Err(missing)
+    }
+
+    /// A share that grows with the attempts.
+    fn patience(&self, least: usize) -> usize {
+        least + self.attempt as usize / 4
+    }
+
+    /// Makes facets faces of the mesh, with Steiner points where flips fail.
+    fn recover_facets(&mut self, facets: &[u32]) {
+        let mut left: Vec<u32> = facets.iter().copied().filter(|&f| !self.recover_facet(f, 0)).collect();
+        // The neighbourhood has changed: what failed at first may work now.
+        for depth in 1..=DEEPEST {
+            left.retain(|&f| !self.recover_facet(f, depth));
+        }
+        left.retain(|&f| !self.split_facet(f));
     }
 
     /// Locks those facets that are faces of the mesh.
@@ -148,14 +181,17 @@ impl<'a> Recovery<'a> {
             // Each Steiner point brings an end nearer, but rounding may spoil that.
             let missing = wanted.len() + self.counts.missing_faces;
             self.help_left = u64::from(HELP) * (20 + missing as u64 / 2);
-            self.most_steiner = LEAST_STEINER + missing * (4 + self.attempt as usize) / 4;
+            self.most_steiner = LEAST_STEINER + missing * self.patience(LEAST_FIRST_EIGHTHS) / 8;
         }
         wanted.retain(|&[a, b]| !self.recover_edge(a, b, 0));
         for depth in 1..=DEEPEST {
             wanted.retain(|&[a, b]| !self.recover_edge(a, b, depth));
         }
         while let Some([a, b]) = wanted.pop() {
-            if self.recover_edge(a, b, DEEPEST) || self.steiner.len() >= self.most_steiner {
+            if self.steiner.len() >= self.most_steiner {
+                return;
+            }
+            if self.recover_edge(a, b, DEEPEST) {
                 continue;
             }
             if let Some(p) = self.split_edge(a, b) {
@@ -196,14 +232,15 @@ impl<'a> Recovery<'a> {
 
     /// Flips something of what the edge from `a` to `b` crosses.
     fn clear_one(&mut self, a: u32, b: u32, depth: u32, found: &mut Vec<Crossing>) -> bool {
-        let mut next = 0;
+        let (mut next, mut before) = (0, self.flips.count);
         while let Some(&crossing) = found.get(next) {
             if self.clear_crossing(a, b, crossing, depth) {
                 return true;
             }
             next += 1;
-            if depth > 0 {
-                // Helping flips may have changed the mesh in vain.
+            if self.flips.count != before {
+                // Helping flips have changed the mesh in vain.
+                before = self.flips.count;
                 crossings(self.mesh, a, b, &mut self.star, found);
             }
         }

@@ -18,11 +18,13 @@ use crate::kernel::simplex::{area_vector, volume6};
 /// on. Not a round number, so that they do not lie on the other side of a plate.
 const STAND_OFF: f64 = 0.37;
 
-/// Whether a point and a half-face that it lies behind make a tet that is positive and whose mean ratio is no less
-///
-/// than `least` tells.
+/// Where Steiner points are put between two crossings: the middle first.
+const WAYS: [f64; 3] = [0.5, 0.25, 0.75];
+
+/// Whether a point and a half-face that it lies behind make a tet that is positive and whose mean ratio is `least` or more
+/// (by rounding that of a positive tet may be below 0).
 fn sees_well(point: &Point, [a, b, c]: [&Point; 3], least: f64) -> bool {
-    orient3d(a, b, c, point) == Sign::Negative && mean_ratio(point, a, b, c) >= least
+    orient3d(a, b, c, point) == Sign::Negative && mean_ratio(point, a, b, c).max(0.0) >= least
 }
 
 impl Recovery<'_> {
@@ -81,7 +83,21 @@ impl Recovery<'_> {
     /// Puts a Steiner point on a missing edge inside a tet that it goes through, the longest way first. Where the edge
     /// passes close by other edges its crossings let no point be put on them: shorter pieces are easier.
     fn split_between(&mut self, a: u32, b: u32, found: &[Crossing]) -> Option<u32> {
-        let Some(&Crossing::Face(first)) = found.first() else { return None };
+        let first = match *found.first()? {
+            Crossing::Face(first) => first,
+            // The way to an edge lies in the face between: a little beside the crossing there is more room.
+            Crossing::Edge(tet, edge) => {
+                let to = self.crossing_point(a, b, found[0]);
+                let opposite =
+                    self.mesh.tets[tet as usize].iter().position(|v| *v != a && !edge.contains(v))?;
+                let tets = tets_around(self.mesh, Crossing::Face(4 * tet + opposite as u32));
+                return WAYS.iter().find_map(|part| {
+                    let point = self.mesh.point(a) + (to - self.mesh.point(a)) * *part;
+                    self.add_steiner(&tets, point)
+                });
+            }
+            Crossing::Vertex(_) => return None,
+        };
         let mut places = vec![(*self.mesh.point(a), first >> 2)];
         for &crossing in found {
             if let Crossing::Face(half_face) = crossing {

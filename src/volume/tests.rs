@@ -19,11 +19,12 @@ fn filled(soup: Soup, size: f64) -> Report {
 }
 
 /// As [`filled`], without points by a size field.
-fn bare(soup: Soup) {
+fn bare(soup: Soup) -> Report {
     let surface = soup.surface().unwrap();
     let (mesh, report) = mesh(&surface, &UniformSize(1.0), &EMPTY).unwrap();
     check_fills(&surface, &mesh);
     assert_eq!(mesh.points.len(), surface.points().len() + report.steiner_inside);
+    report
 }
 
 #[test]
@@ -473,6 +474,19 @@ fn blocks_with_crossing_notches_are_filled() {
         for gap in [0.2, 0.01] {
             filled(notched_block(n, gap), 1.0);
         }
+    }
+}
+
+#[test]
+fn blocks_with_many_notches_need_fewer_points_than_edges_and_triangles_were_missing() {
+    // An unlucky order of edges needed hundreds of points and came to no end.
+    let turn = nalgebra::Rotation3::from_euler_angles(0.4, -0.9, 1.7);
+    for gap in [0.3, 0.01, 1e-3] {
+        let mut soup = notched_block(6, gap);
+        soup.map(|p| turn * p);
+        let report = bare(soup);
+        assert!(report.missing_edges > 50, "{report:?}");
+        assert!(report.steiner_on_surface < report.missing_edges + report.missing_faces, "{report:?}");
     }
 }
 
