@@ -7,20 +7,15 @@ use csg::{CurveId, PatchId, ProjectionFailed};
 /// Projection of points to the patches and curves that they are classified on.
 ///
 /// A function of the point and the entity alone, bit for bit the same on all ranks and threads.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub enum Projector {
     /// The surfaces of a CSG geometry.
     Csg(csg::Projector),
     /// Triangles that stand for the true surface.
     Facets(FacetProjector),
     /// The faces of a mesh that came without geometry: all that lies on them stays where it is.
+    #[default]
     Flat,
-}
-
-impl Default for Projector {
-    fn default() -> Self {
-        Self::Flat
-    }
 }
 
 impl From<csg::Projector> for Projector {

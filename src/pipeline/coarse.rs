@@ -131,7 +131,7 @@ pub fn mesh(model: &CsgModel, settings: &mut CoarseSettings) -> Result<CoarseMes
 
 /// How one attempt at a coarse mesh ended.
 pub(super) enum Attempt {
-    Made(CoarseMesh),
+    Made(Box<CoarseMesh>),
     /// It takes smaller sizes.
     Lower(Vec<Source>),
     Failed(CoarseError),
@@ -147,7 +147,7 @@ pub(super) fn corrected(
         match attempt(settings, corrections < MOST_CORRECTIONS) {
             Attempt::Made(mut coarse) => {
                 coarse.report.size_corrections = corrections;
-                return Ok(coarse);
+                return Ok(*coarse);
             }
             Attempt::Lower(sources) => settings.size.sources.extend(sources),
             Attempt::Failed(error) => return Err(error),
@@ -177,7 +177,7 @@ fn attempt(model: &CsgModel, settings: &CoarseSettings, may_lower: bool) -> Atte
             fill(surface, regions, &size, Some(&smoothness), settings.effort)
         });
     match filled {
-        Ok(made) => Attempt::Made(made),
+        Ok(made) => Attempt::Made(Box::new(made)),
         Err(error) => {
             let lowered = if may_lower { error.remedy(&segments, &size) } else { Vec::new() };
             if lowered.is_empty() { Attempt::Failed(error) } else { Attempt::Lower(lowered) }

@@ -89,7 +89,7 @@ impl FacetSolid {
         let smoothness: Option<&dyn Smoothness> = if self.keep_surface { None } else { Some(&smoothness) };
         let regions = |id: PatchId| [self.model.patch(id).inside, self.model.patch(id).outside];
         match coarse::fill(surface, regions, &size, smoothness, settings.effort) {
-            Ok(made) => Attempt::Made(made),
+            Ok(made) => Attempt::Made(Box::new(made)),
             Err(error) => {
                 // Where triangles cross, smaller sizes were tried already.
                 let crossed = matches!(error, CoarseError::NotClosed { .. });

@@ -1,7 +1,7 @@
 //! What all readers of other programs' files have in common: the file in memory, its words or bytes, and errors
 //! that name the place.
 //!
-//! A reader of a format is a function of the file's bytes. It fails with a [`Fault`], which knows an offset; only
+//! A reader of a format is a function of the file's bytes. It fails with a `Fault`, which knows an offset; only
 //! when a fault is shown is the offset turned to a line. Counts in a file are believed no further than what is
 //! left of the file has room for, so that no header makes a reader reserve more than a few times the file's size.
 
