@@ -2,9 +2,9 @@
 //!
 //! The coordinates of a few points that are near each other are multiples of one power of two, and their differences are
 //! so few of these units that a determinant fits in a few machine words. Two's complement arithmetic on such words never rounds,
-//! knows no underflow, and costs the same for a tie as for a near tie: a tenth of a microsecond for an in-sphere
-//! test in the narrow width, half of one in the wide one, where floating-point expansions (Shewchuk 1997) need ten to
-//! twenty. Points for which even the wide one does not suffice have coordinates of very different size, and are
+//! knows no underflow, and costs the same for a tie as for a near tie: an in-sphere test near a sphere takes 0.12 µs in the narrow
+//! width and 0.2 µs in the wide one, filter included, where floating-point expansions (Shewchuk 1997) take 1.5 to
+//! 2.6 µs and more. Points for which even the wide one does not suffice have coordinates of very different size, and are
 //! left to the expansions.
 
 use super::predicates::Sign;
