@@ -1,6 +1,7 @@
 //! Geometry that every stage rests on: exact signs, simplices, shape measures, search, order.
 
 pub mod hilbert;
+mod integers;
 pub mod predicates;
 pub mod quality;
 pub mod random;

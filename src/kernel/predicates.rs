@@ -1,8 +1,13 @@
-//! Exact signs (adaptive predicates: Shewchuk 1997), the only place where they come from.
+//! Exact signs, the only place where they come from.
 //!
-//! Exact as long as products of the coordinates' differences neither overflow nor underflow:
-//! callers bring their input to a box of ordinary size first.
+//! In space: floating point with a bound of its error (Shewchuk 1997), then integers of fixed width (`integers`), and where the coordinates
+//! do not fit those, the adaptive expansions of Shewchuk. In the plane the latter alone.
+//!
+//! Exact as long as products of the coordinates' differences neither overflow nor underflow in floating point: callers bring their
+//! input to a box of ordinary size first. With the box near 1, as the volume mesher has it, products of five differences
+//! underflow only where points are nearer than 10⁻⁶⁰.
 
+use super::integers;
 use crate::Point;
 use robust::Coord3D;
 
@@ -46,6 +51,9 @@ const HALF_ULP: f64 = f64::EPSILON / 2.0;
 /// The bound A of Shewchuk's `orient3d` (1997, section 4.3), relative to the sum of absolute values.
 const ORIENT3D_ERROR: f64 = (7.0 + 56.0 * HALF_ULP) * HALF_ULP;
 
+/// The bound A of Shewchuk's `insphere` (1997, section 4.4), likewise.
+const IN_SPHERE_ERROR: f64 = (16.0 + 224.0 * HALF_ULP) * HALF_ULP;
+
 /// Six times the volume of a tet in floating point, and a bound of its error; from the edges that leave one corner.
 ///
 /// A filter for loops over many tets: where the volume exceeds the bound its sign is certain, elsewhere
@@ -83,13 +91,54 @@ pub fn orient3d(a: &Point, b: &Point, c: &Point, d: &Point) -> Sign {
 
 #[cold]
 fn exact_orient3d(a: &Point, b: &Point, c: &Point, d: &Point) -> Sign {
-    Sign::of(-robust::orient3d(coord(a), coord(b), coord(c), coord(d)))
+    integers::orient3d(a, b, c, d)
+        .unwrap_or_else(|| Sign::of(-robust::orient3d(coord(a), coord(b), coord(c), coord(d))))
 }
 
-/// Positive where `e` lies inside the circumsphere of the positively oriented tet a, b, c, d.
+/// Positive where `e` lies inside the circumsphere of the positively oriented tet a, b, c, d; negative where that is negatively
+/// oriented.
 #[inline]
 pub fn insphere(a: &Point, b: &Point, c: &Point, d: &Point, e: &Point) -> Sign {
-    Sign::of(-robust::insphere(coord(a), coord(b), coord(c), coord(d), coord(e)))
+    let (determinant, error) = in_sphere_and_error([a, b, c, d].map(|p| [p.x - e.x, p.y - e.y, p.z - e.z]));
+    if determinant > error {
+        Sign::Positive
+    } else if determinant < -error {
+        Sign::Negative
+    } else {
+        exact_insphere(a, b, c, d, e)
+    }
+}
+
+/// The determinant of the in-sphere test in floating point, and a bound of its error, from the edges that lead to four corners.
+#[inline]
+fn in_sphere_and_error(edges: [[f64; 3]; 4]) -> (f64, f64) {
+    let minor = |p: [f64; 3], q: [f64; 3]| {
+        let (x, y) = (p[0] * q[1], q[0] * p[1]);
+        (x - y, x.abs() + y.abs())
+    };
+    let [a, b, c, d] = edges;
+    let [ab, bc, cd, da, ac, bd] =
+        [minor(a, b), minor(b, c), minor(c, d), minor(d, a), minor(a, c), minor(b, d)];
+    let up = |p: [f64; 3], (minor, size): (f64, f64)| (p[2] * minor, p[2].abs() * size);
+    let plus = |x: (f64, f64), y: (f64, f64)| (x.0 + y.0, x.1 + y.1);
+    let minus = |x: (f64, f64), y: (f64, f64)| (x.0 - y.0, x.1 + y.1);
+    let abc = plus(minus(up(a, bc), up(b, ac)), up(c, ab));
+    let bcd = plus(minus(up(b, cd), up(c, bd)), up(d, bc));
+    let cda = plus(plus(up(c, da), up(d, ac)), up(a, cd));
+    let dab = plus(plus(up(d, ab), up(a, bd)), up(b, da));
+    let lifted = |p: [f64; 3], (volume, size): (f64, f64)| {
+        let lift = p[0] * p[0] + p[1] * p[1] + p[2] * p[2];
+        (lift * volume, lift * size)
+    };
+    let (determinant, size) =
+        plus(minus(lifted(a, bcd), lifted(b, cda)), minus(lifted(c, dab), lifted(d, abc)));
+    (determinant, IN_SPHERE_ERROR * size)
+}
+
+#[cold]
+fn exact_insphere(a: &Point, b: &Point, c: &Point, d: &Point, e: &Point) -> Sign {
+    integers::insphere(a, b, c, d, e)
+        .unwrap_or_else(|| Sign::of(-robust::insphere(coord(a), coord(b), coord(c), coord(d), coord(e))))
 }
 
 /// The sign of the area of the planar triangle a, b, c: positive counter-clockwise.

@@ -41,7 +41,7 @@ const LEAST_TETS: f64 = 300.0;
 const PATIENCE: f64 = 50.0;
 
 /// Lattice points are moved at random by this part of the side: far less than shapes feel, far more than the filter of
-/// the in-sphere test needs. Else a lattice that is half there has thousands of exact ties, each of which costs microseconds.
+/// the in-sphere test needs. Else a lattice that is half there has thousands of exact ties, each of which needs an exact determinant.
 const JITTER: f64 = 1e-4;
 
 /// A size and the number of tets that will have about this size.
