@@ -7,10 +7,12 @@
 mod geometric;
 mod preset;
 mod source_tree;
+mod sources;
 
 pub use geometric::{GeometricSize, SizeSettings};
 pub use preset::Preset;
-pub use source_tree::{Source, SourceTree};
+pub use source_tree::SourceTree;
+pub use sources::Source;
 
 use crate::Point;
 

@@ -1,48 +1,58 @@
 //! The smallest size over many graded sources, found fast.
 
+use super::Source;
+use super::sources::Sources;
 use crate::{Point, Vector};
 use csg::Aabb;
+use rayon::prelude::*;
+use std::collections::HashMap;
 
-/// A place that asks for a size: at distance d from it the size is at most `size + grading·d`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Source {
-    /// Where.
-    pub point: Point,
-    /// The size wanted there, positive.
-    pub size: f64,
-}
-
-/// An octree whose leaves know the few sources that can matter in them.
+/// An octree that interpolates the field of graded sources between the corners of its cells.
 ///
-/// A source matters in a cell if at some point of it, it may be the one that asks for least. Cells are
-/// split until few matter, or until they are small against the size in them; the value is then exact or
-/// (second case) interpolated between those at the corners of the cell.
+/// Cells are split until they are small against the least size in them, or until the
+/// field is nearly linear in them, which it is away from its sources.
 #[derive(Clone, Debug)]
 pub struct SourceTree {
     bounds: Aabb,
     grading: f64,
     maximum: f64,
     cells: Vec<Cell>,
-    listed: Vec<Source>,
 }
 
 #[derive(Clone, Copy, Debug)]
 enum Cell {
     /// Index of the first of eight children.
     Split(u32),
-    /// Range in `listed`.
-    Listed(u32, u32),
     /// The values at the corners: bit 0 of the index is x, bit 1 y, bit 2 z.
-    Interpolated([f32; 8]),
+    Leaf([f32; 8]),
 }
 
-/// A leaf lists this many sources at most: a handful is quicker to try than one more level.
-const LEAF_SOURCES: usize = 8;
+/// A cell whose edge is below this multiple of the least size in it is not split: with gradings up to 1 the field bends within it
+/// by some ten per cent at most.
+const SMALL: f64 = 0.7;
 
-/// A cell whose edge is below this fraction of the size in its middle interpolates. With gradings up to 1
-/// the field bends within such a cell by some ten per cent at most; at half of it, sources all over a
-/// sphere, a size apart, make eight times the cells.
-const SMALLEST_CELL: f64 = 0.7;
+/// A cell whose edge is above this multiple of the least size in it is split: what the middle and the corners do not show
+/// of the field is then less than `2·√3·grading` of it.
+const LARGE: f64 = 2.0;
+
+/// Between the two, a cell is split if its middle tells that interpolation is wrong by more than this part.
+const BENT: f64 = 0.03;
+
+/// The uppermost levels are built in parallel below this depth: 64 pieces.
+const PARALLEL_DEPTH: u32 = 2;
+
+/// A cell as it is built.
+#[derive(Clone, Copy)]
+struct Draft {
+    min: Point,
+    edge: f64,
+    corners: [f64; 8],
+    /// A source that asks for least nearby.
+    near: Option<u32>,
+}
+
+/// The field at corners where it is known, by the bits of their coordinates: cells share corners.
+type Known = HashMap<[u64; 3], f64>;
 
 impl SourceTree {
     /// Builds the tree over `bounds` (outside it, the value of the nearest point of the box is graded on).
@@ -53,63 +63,14 @@ impl SourceTree {
         let center = bounds.center();
         let half = Vector::repeat(0.5 * side);
         let cube = Aabb { min: center - half, max: center + half };
-        let mut tree =
-            Self { bounds: cube, grading, maximum, cells: vec![Cell::Listed(0, 0)], listed: Vec::new() };
-        let useful: Vec<Source> = sources.iter().copied().filter(|s| s.size < maximum).collect();
-        tree.build(0, cube.min, side, &useful);
-        tree
-    }
-
-    fn build(&mut self, cell: usize, min: Point, edge: f64, around: &[Source]) {
-        let sources = self.relevant(min, edge, around);
-        let center = min + Vector::repeat(0.5 * edge);
-        let middle = self.least(&sources, &center);
-        if sources.len() <= LEAF_SOURCES {
-            let begin = self.listed.len() as u32;
-            self.listed.extend(&sources);
-            self.cells[cell] = Cell::Listed(begin, self.listed.len() as u32);
-        } else if edge < SMALLEST_CELL * middle {
-            let corners =
-                [0, 1, 2, 3, 4, 5, 6, 7].map(|c| self.least(&sources, &(min + octant(c, edge))) as f32);
-            self.cells[cell] = Cell::Interpolated(corners);
-        } else {
-            let first = self.cells.len();
-            self.cells.extend([Cell::Listed(0, 0); 8]);
-            self.cells[cell] = Cell::Split(first as u32);
-            for child in 0..8 {
-                self.build(first + child, min + octant(child, 0.5 * edge), 0.5 * edge, &sources);
-            }
-        }
-    }
-
-    /// The sources that no other one undercuts all over the cell.
-    ///
-    /// Most are dropped at first sight, by the least upper bound so far and without a square root.
-    fn relevant(&self, min: Point, edge: f64, sources: &[Source]) -> Vec<Source> {
-        let half = 0.5 * edge;
-        let center = min + Vector::repeat(half);
-        let mut best = self.maximum;
-        let matters = |s: &Source, best: f64| {
-            let reach = (best - s.size) / self.grading;
-            let near = (s.point - center).map(|x| (x.abs() - half).max(0.0)).norm_squared();
-            reach > 0.0 && near < reach * reach
+        let sources = Sources::new(grading, maximum, sources);
+        let corner = |c: usize| {
+            let point = cube.min + octant(c, side);
+            sources.least_in(&point, &point, None).0
         };
-        let mut kept = Vec::with_capacity(sources.len());
-        for s in sources {
-            if matters(s, best) {
-                let far = (s.point - center).map(|x| x.abs() + half).norm();
-                best = best.min(s.size + self.grading * far);
-                kept.push(*s);
-            }
-        }
-        kept.retain(|s| matters(s, best));
-        kept
-    }
-
-    /// The exact field of some sources.
-    fn least(&self, sources: &[Source], point: &Point) -> f64 {
-        let graded = |s: &Source| s.size + self.grading * (point - s.point).norm();
-        sources.iter().map(graded).fold(self.maximum, f64::min)
+        let corners = [0, 1, 2, 3, 4, 5, 6, 7].map(corner);
+        let root = Draft { min: cube.min, edge: side, corners, near: None };
+        Self { bounds: cube, grading, maximum, cells: grow(&sources, root) }
     }
 
     /// The size at `point`.
@@ -118,20 +79,114 @@ impl SourceTree {
         let mut min = self.bounds.min;
         let mut edge = self.bounds.max.x - self.bounds.min.x;
         let mut cell = 0;
-        while let Cell::Split(first) = self.cells[cell] {
-            edge *= 0.5;
-            let child =
-                (0..3).filter(|&axis| inside[axis] >= min[axis] + edge).fold(0, |c, axis| c | 1 << axis);
-            min += octant(child, edge);
-            cell = first as usize + child;
-        }
-        let size = match &self.cells[cell] {
-            Cell::Listed(begin, end) => self.least(&self.listed[*begin as usize..*end as usize], &inside),
-            Cell::Interpolated(corners) => interpolate(corners, (inside - min) / edge),
-            Cell::Split(_) => unreachable!("descended to a leaf"),
+        let corners = loop {
+            match &self.cells[cell] {
+                Cell::Leaf(corners) => break corners,
+                Cell::Split(first) => {
+                    edge *= 0.5;
+                    let child = (0..3)
+                        .filter(|&axis| inside[axis] >= min[axis] + edge)
+                        .fold(0, |c, axis| c | 1 << axis);
+                    min += octant(child, edge);
+                    cell = *first as usize + child;
+                }
+            }
         };
+        let size = interpolate(corners, (inside - min) / edge);
         (size + self.grading * (point - inside).norm()).min(self.maximum)
     }
+}
+
+/// The cells of a draft and all below it, itself first.
+fn grow(sources: &Sources, root: Draft) -> Vec<Cell> {
+    let mut cells = vec![Cell::Split(0)];
+    let mut open = vec![(0, root)];
+    let mut known = Known::new();
+    for _ in 0..PARALLEL_DEPTH {
+        open = open.iter().flat_map(|draft| settle(sources, &mut cells, draft, &mut known)).collect();
+    }
+    let below = |(_, draft): &(usize, Draft)| {
+        let mut cells = vec![Cell::Split(0)];
+        let mut open = vec![(0, *draft)];
+        let mut known = Known::new();
+        while let Some(next) = open.pop() {
+            open.extend(settle(sources, &mut cells, &next, &mut known));
+        }
+        cells
+    };
+    let parts: Vec<Vec<Cell>> = open.par_iter().map(below).collect();
+    for ((at, _), part) in open.iter().zip(&parts) {
+        // The first of a part takes its place, the others follow all that are there.
+        let shift = cells.len() as u32 - 1;
+        let shifted = |cell: &Cell| match cell {
+            Cell::Split(first) => Cell::Split(first + shift),
+            Cell::Leaf(corners) => Cell::Leaf(*corners),
+        };
+        cells[*at] = shifted(&part[0]);
+        cells.extend(part[1..].iter().map(shifted));
+    }
+    cells
+}
+
+/// Makes a leaf of a cell, or splits it; the places and drafts of its parts.
+fn settle(
+    sources: &Sources,
+    cells: &mut Vec<Cell>,
+    (at, draft): &(usize, Draft),
+    known: &mut Known,
+) -> Vec<(usize, Draft)> {
+    match split(sources, draft, known) {
+        None => {
+            cells[*at] = Cell::Leaf(draft.corners.map(|value| value as f32));
+            Vec::new()
+        }
+        Some(parts) => {
+            let first = cells.len();
+            cells[*at] = Cell::Split(first as u32);
+            cells.extend([Cell::Split(0); 8]);
+            parts.into_iter().enumerate().map(|(i, part)| (first + i, part)).collect()
+        }
+    }
+}
+
+/// The eight parts of a cell in which interpolation is not good enough.
+fn split(sources: &Sources, draft: &Draft, known: &mut Known) -> Option<[Draft; 8]> {
+    let Draft { min, edge, corners, near } = *draft;
+    let (least, nearest) = sources.least_in(&min, &(min + Vector::repeat(edge)), near);
+    if nearest.is_none() || edge < SMALL * least {
+        return None;
+    }
+    let at = |point: Point| sources.least_in(&point, &point, nearest);
+    let (middle, near) = at(min + Vector::repeat(0.5 * edge));
+    let mean = corners.iter().sum::<f64>() / 8.0;
+    if edge < LARGE * least && (mean - middle).abs() < BENT * middle {
+        return None;
+    }
+    let lattice = lattice(draft, middle, &|point| at(point).0, known);
+    let part = |i: usize| {
+        let corner = |c: usize| {
+            let along = |axis: usize| (i >> axis & 1) + (c >> axis & 1);
+            lattice[along(0) + 3 * along(1) + 9 * along(2)]
+        };
+        let corners = [0, 1, 2, 3, 4, 5, 6, 7].map(corner);
+        Draft { min: min + octant(i, 0.5 * edge), edge: 0.5 * edge, corners, near: near.or(nearest) }
+    };
+    Some([0, 1, 2, 3, 4, 5, 6, 7].map(part))
+}
+
+/// The field at the 27 corners of the parts of a cell, x fastest.
+fn lattice(draft: &Draft, middle: f64, field: &dyn Fn(Point) -> f64, known: &mut Known) -> [f64; 27] {
+    std::array::from_fn(|i| {
+        let step = [i % 3, i / 3 % 3, i / 9];
+        if step.iter().all(|&s| s != 1) {
+            draft.corners[step[0] / 2 + step[1] + 2 * step[2]]
+        } else if step == [1, 1, 1] {
+            middle
+        } else {
+            let point = draft.min + 0.5 * draft.edge * Vector::from(step.map(|s| s as f64));
+            *known.entry([0, 1, 2].map(|axis| point[axis].to_bits())).or_insert_with(|| field(point))
+        }
+    })
 }
 
 /// The lower corner of an octant: bit 0 of `index` is x, bit 1 y, bit 2 z.
@@ -141,10 +196,10 @@ fn octant(index: usize, edge: f64) -> Vector {
 
 /// Trilinear interpolation at `at` in the unit cube.
 fn interpolate(corners: &[f32; 8], at: Vector) -> f64 {
-    let weight = |corner: usize| -> f64 {
-        (0..3).map(|axis| if corner >> axis & 1 == 1 { at[axis] } else { 1.0 - at[axis] }).product()
-    };
-    (0..8).map(|c| weight(c) * f64::from(corners[c])).sum()
+    let c = corners.map(f64::from);
+    let along = |a: f64, b: f64, t: f64| a + (b - a) * t;
+    let x = |i: usize| along(c[i], c[i + 1], at.x);
+    along(along(x(0), x(2), at.y), along(x(4), x(6), at.y), at.z)
 }
 
 #[cfg(test)]
