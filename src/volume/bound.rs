@@ -20,7 +20,10 @@ pub(super) fn bound(
     let mut attempt = 0;
     loop {
         match attempt_to_bound(surface, points, attempt, report) {
-            Err(VolumeError::NotRecovered { .. }) if attempt + 1 < ATTEMPTS => attempt += 1,
+            Err(VolumeError::NotRecovered { .. }) if attempt + 1 < ATTEMPTS => {
+                attempt += 1;
+                report.restarts += 1;
+            }
             result => return result,
         }
     }

@@ -34,11 +34,13 @@ mod boxes;
 
 mod carve;
 mod cavity;
+mod clearance;
 pub mod closed_surface;
 mod constraints;
 mod crossing;
 mod delaunay;
 mod finish;
+mod flat;
 mod flips;
 mod intersect;
 mod keep;
@@ -103,6 +105,8 @@ pub struct Report {
     pub steiner_on_surface: usize,
     /// Points left inside the bodies to replace them.
     pub steiner_inside: usize,
+    /// How often the recovery was begun anew in another order.
+    pub restarts: usize,
     /// Points added inside by the size field.
     pub points_inside: usize,
 }

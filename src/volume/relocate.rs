@@ -14,6 +14,7 @@
 //! ```
 
 use super::carve::is_even;
+use super::clearance::{Plane, most_inside};
 use super::constraints::Constraints;
 use super::polygon::{Shadow, triangulate};
 use super::tetrahedra::{NONE, Tetrahedra, sorted};
@@ -27,9 +28,8 @@ use std::collections::BTreeMap;
 /// this; else from where it is better. A sliver of 0.001 is worse to mend than one vertex more.
 const GOOD_ENOUGH: f64 = 0.05;
 
-/// How near to the old point a new one may be: 2 to the power of minus this many, of the size of the ball. Nearer,
-/// coordinates round to the point itself.
-const HALVINGS: i32 = 48;
+/// How often points that do not leave are tried again after those inside beside them have moved.
+const STUCK: usize = 3;
 
 /// The part of a ball between facets.
 #[derive(Clone, Debug, Default)]
@@ -63,11 +63,45 @@ pub(super) fn relocate(
 ) -> (Vec<u32>, Vec<u32>) {
     let mut inside = Vec::new();
     let mut left: Vec<u32> = steiner.iter().rev().copied().collect();
-    loop {
+    let mut stuck = 0;
+    while !left.is_empty() && stuck < STUCK {
         let before = left.len();
         left.retain(|&p| !take_off(mesh, constraints, triangles, p, &mut inside));
-        if left.is_empty() || left.len() == before {
-            return (inside, left);
+        if left.len() < before {
+            stuck = 0;
+        } else {
+            stuck += 1;
+            move_neighbours(mesh, constraints, &left, &mut inside);
+        }
+    }
+    (inside, left)
+}
+
+/// Gives the points inside at the balls of some points better places.
+fn move_neighbours(mesh: &mut Tetrahedra, constraints: &Constraints, of: &[u32], inside: &mut [u32]) {
+    for q in inside {
+        let ball = ball(mesh, *q);
+        let is_near = ball.iter().any(|&t| mesh.tets[t as usize].iter().any(|v| of.contains(v)));
+        let Some(&first) = ball.first().filter(|_| is_near) else { continue };
+        let mut sector = Sector { body: mesh.bodies[first as usize], ..Sector::default() };
+        sector.walls =
+            ball.iter().map(|&t| 4 * t + mesh.index_of(t, *q).expect("at the ball") as u32).collect();
+        sector.tets = ball;
+        sector.set_skin(mesh);
+        let now = worst(mesh, &sector.skin, mesh.point(*q), NONE, 0.0);
+        let Some((quality, place)) = find_place(mesh, &sector, *q) else { continue };
+        if quality <= now {
+            continue;
+        }
+        let points = mesh.points.len();
+        let new = mesh.add_point(place);
+        let tets: Vec<([u32; 4], u32)> =
+            sector.skin.iter().map(|&[a, b, c]| ([new, a, b, c], sector.body)).collect();
+        if mesh.rebuild(&sector.tets, &tets, &|face| constraints.facet(face).is_some()) {
+            mesh.at_vertex[*q as usize] = NONE;
+            *q = new;
+        } else {
+            mesh.forget_points(points);
         }
     }
 }
@@ -232,6 +266,12 @@ fn worst(mesh: &Tetrahedra, skin: &[[u32; 3]], apex: &Point, own: u32, floor: f6
 }
 
 impl Sector {
+    /// How far it reaches from p.
+    fn reach(&self, mesh: &Tetrahedra, p: u32) -> f64 {
+        let distance = |&v: &u32| (mesh.point(v) - mesh.point(p)).norm();
+        self.skin.iter().flatten().map(distance).fold(0.0, f64::max)
+    }
+
     fn set_skin(&mut self, mesh: &Tetrahedra) {
         self.skin.clear();
         self.skin.extend(self.walls.iter().map(|&w| mesh.face(w)));
@@ -325,7 +365,7 @@ fn find_apex(mesh: &Tetrahedra, sector: &Sector, p: u32) -> Option<Apex> {
     if best.0 >= GOOD_ENOUGH {
         return best.1;
     }
-    if let Some((quality, point)) = find_place(mesh, sector, p, &own)
+    if let Some((quality, point)) = find_place(mesh, sector, p)
         && quality > best.0
     {
         best = (quality, Some(Apex::New(point)));
@@ -334,26 +374,17 @@ fn find_apex(mesh: &Tetrahedra, sector: &Sector, p: u32) -> Option<Apex> {
 }
 
 /// A place inside a sector that sees all of its skin, and the worst mean ratio from there.
-fn find_place(mesh: &Tetrahedra, sector: &Sector, p: u32, own: &[u32]) -> Option<(f64, Point)> {
+fn find_place(mesh: &Tetrahedra, sector: &Sector, p: u32) -> Option<(f64, Point)> {
     let start = *mesh.point(p);
-    let n = own.len() as f64;
-    let to_center = own.iter().map(|&v| mesh.point(v) - start).sum::<Vector>() / n;
-    let (inward, reach) = directions(mesh, sector, p);
-    let mut best = (f64::NEG_INFINITY, start);
-    for k in 0..HALVINGS {
-        let step = 0.5f64.powi(k);
-        for way in [to_center, inward, 0.5 * (to_center + inward)] {
-            let point = start + way * step;
-            let quality = worst(mesh, &sector.skin, &point, NONE, best.0);
-            if quality > best.0 {
-                best = (quality, point);
-            }
-        }
-    }
-    if best.0 < 0.0 {
+    let reach = sector.reach(mesh, p);
+    let planes: Vec<Plane> = sector.skin.iter().filter_map(|f| Plane::of(f.map(|v| mesh.point(v)))).collect();
+    let axes = [Vector::x() * reach, Vector::y() * reach, Vector::z() * reach];
+    let (place, _) = most_inside(&start, &axes, &planes);
+    let quality = worst(mesh, &sector.skin, &place, NONE, 0.0);
+    if quality < 0.0 {
         return None;
     }
-    Some(climb(mesh, sector, best, reach))
+    Some(climb(mesh, sector, (quality, place), reach))
 }
 
 /// Away from the facets at p, as long as the sector reaches; and how far that is.
@@ -361,8 +392,7 @@ fn find_place(mesh: &Tetrahedra, sector: &Sector, p: u32, own: &[u32]) -> Option
 /// The facets lie in one plane or in two, however many pieces of each there are: half-way between two inward
 /// normals is inside of both planes, whatever the angle.
 fn directions(mesh: &Tetrahedra, sector: &Sector, p: u32) -> (Vector, f64) {
-    let start = mesh.point(p);
-    let reach = sector.skin.iter().flatten().map(|&v| (mesh.point(v) - start).norm()).fold(0.0, f64::max);
+    let reach = sector.reach(mesh, p);
     let inward = sector.sides.iter().fold(Vector::zeros(), |sum, face| {
         let [a, b, c] = face.map(|v| mesh.point(v));
         sum - area_vector(a, b, c).normalize()
