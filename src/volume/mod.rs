@@ -42,6 +42,7 @@ mod delaunay;
 mod finish;
 mod flat;
 mod flips;
+mod inside;
 mod intersect;
 mod keep;
 mod lattice;
@@ -52,6 +53,7 @@ mod relocate;
 #[cfg(test)]
 mod samples;
 mod sectors;
+mod small;
 mod steiner;
 mod surface_faults;
 mod tetrahedra;

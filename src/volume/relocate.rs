@@ -16,6 +16,7 @@
 use super::carve::is_even;
 use super::clearance::{Plane, most_inside};
 use super::constraints::Constraints;
+use super::inside;
 use super::polygon::{Shadow, triangulate};
 use super::tetrahedra::{NONE, Tetrahedra, sorted};
 use crate::kernel::predicates::{Sign, orient3d};
@@ -26,18 +27,18 @@ use std::collections::BTreeMap;
 
 /// A sector is filled from one of its own vertices, without a new point, if the worst mean ratio is at least
 /// this; else from where it is better. A sliver of 0.001 is worse to mend than one vertex more.
-const GOOD_ENOUGH: f64 = 0.05;
+pub(super) const GOOD_ENOUGH: f64 = 0.05;
 
 /// How often points that do not leave are tried again after those inside beside them have moved.
 const STUCK: usize = 3;
 
 /// The part of a ball between facets.
 #[derive(Clone, Debug, Default)]
-struct Sector {
-    body: u32,
-    tets: Vec<u32>,
+pub(super) struct Sector {
+    pub body: u32,
+    pub tets: Vec<u32>,
     /// Its surface once p is gone, outward.
-    skin: Vec<[u32; 3]>,
+    pub skin: Vec<[u32; 3]>,
     /// The half-faces of `tets` that are in `skin`.
     walls: Vec<u32>,
     /// Those of `skin` in place of facets at p, which p does not see.
@@ -71,39 +72,10 @@ pub(super) fn relocate(
             stuck = 0;
         } else {
             stuck += 1;
-            move_neighbours(mesh, constraints, &left, &mut inside);
+            inside::make_room(mesh, constraints, &left, &mut inside);
         }
     }
     (inside, left)
-}
-
-/// Gives the points inside at the balls of some points better places.
-fn move_neighbours(mesh: &mut Tetrahedra, constraints: &Constraints, of: &[u32], inside: &mut [u32]) {
-    for q in inside {
-        let ball = ball(mesh, *q);
-        let is_near = ball.iter().any(|&t| mesh.tets[t as usize].iter().any(|v| of.contains(v)));
-        let Some(&first) = ball.first().filter(|_| is_near) else { continue };
-        let mut sector = Sector { body: mesh.bodies[first as usize], ..Sector::default() };
-        sector.walls =
-            ball.iter().map(|&t| 4 * t + mesh.index_of(t, *q).expect("at the ball") as u32).collect();
-        sector.tets = ball;
-        sector.set_skin(mesh);
-        let now = worst(mesh, &sector.skin, mesh.point(*q), NONE, 0.0);
-        let Some((quality, place)) = find_place(mesh, &sector, *q) else { continue };
-        if quality <= now {
-            continue;
-        }
-        let points = mesh.points.len();
-        let new = mesh.add_point(place);
-        let tets: Vec<([u32; 4], u32)> =
-            sector.skin.iter().map(|&[a, b, c]| ([new, a, b, c], sector.body)).collect();
-        if mesh.rebuild(&sector.tets, &tets, &|face| constraints.facet(face).is_some()) {
-            mesh.at_vertex[*q as usize] = NONE;
-            *q = new;
-        } else {
-            mesh.forget_points(points);
-        }
-    }
 }
 
 /// Takes one point off the surface if all its sectors can be filled without it.
@@ -244,13 +216,13 @@ fn sectors(
 }
 
 /// All tets at a vertex, also where locked faces and the outside part them.
-fn ball(mesh: &Tetrahedra, p: u32) -> Vec<u32> {
+pub(super) fn ball(mesh: &Tetrahedra, p: u32) -> Vec<u32> {
     // A walk through faces might miss tets behind the outside: points on the skin are few, look at all.
     mesh.alive().filter(|&t| mesh.tets[t as usize].contains(&p)).collect()
 }
 
 /// The worst mean ratio of a sector filled from a point; negative if some tet were not positive.
-fn worst(mesh: &Tetrahedra, skin: &[[u32; 3]], apex: &Point, own: u32, floor: f64) -> f64 {
+pub(super) fn worst(mesh: &Tetrahedra, skin: &[[u32; 3]], apex: &Point, own: u32, floor: f64) -> f64 {
     let mut worst = f64::INFINITY;
     for face in skin.iter().filter(|face| !face.contains(&own)) {
         let [a, b, c] = face.map(|v| mesh.point(v));
@@ -266,6 +238,13 @@ fn worst(mesh: &Tetrahedra, skin: &[[u32; 3]], apex: &Point, own: u32, floor: f6
 }
 
 impl Sector {
+    /// Some tets of a body with no facet among them, and their outer half-faces.
+    pub fn inside(mesh: &Tetrahedra, body: u32, tets: Vec<u32>, walls: Vec<u32>) -> Self {
+        let mut sector = Self { body, tets, walls, ..Self::default() };
+        sector.set_skin(mesh);
+        sector
+    }
+
     /// How far it reaches from p.
     fn reach(&self, mesh: &Tetrahedra, p: u32) -> f64 {
         let distance = |&v: &u32| (mesh.point(v) - mesh.point(p)).norm();
@@ -374,7 +353,7 @@ fn find_apex(mesh: &Tetrahedra, sector: &Sector, p: u32) -> Option<Apex> {
 }
 
 /// A place inside a sector that sees all of its skin, and the worst mean ratio from there.
-fn find_place(mesh: &Tetrahedra, sector: &Sector, p: u32) -> Option<(f64, Point)> {
+pub(super) fn find_place(mesh: &Tetrahedra, sector: &Sector, p: u32) -> Option<(f64, Point)> {
     let start = *mesh.point(p);
     let reach = sector.reach(mesh, p);
     let planes: Vec<Plane> = sector.skin.iter().filter_map(|f| Plane::of(f.map(|v| mesh.point(v)))).collect();
