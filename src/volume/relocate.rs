@@ -40,7 +40,7 @@ pub(super) struct Sector {
     /// Its surface once p is gone, outward.
     pub skin: Vec<[u32; 3]>,
     /// The half-faces of `tets` that are in `skin`.
-    walls: Vec<u32>,
+    pub walls: Vec<u32>,
     /// Those of `skin` in place of facets at p, which p does not see.
     fresh: Vec<[u32; 3]>,
     /// The triangles of the surface that they are parts of, outward.
@@ -216,7 +216,7 @@ fn sectors(
 }
 
 /// All tets at a vertex, also where locked faces and the outside part them.
-pub(super) fn ball(mesh: &Tetrahedra, p: u32) -> Vec<u32> {
+fn ball(mesh: &Tetrahedra, p: u32) -> Vec<u32> {
     // A walk through faces might miss tets behind the outside: points on the skin are few, look at all.
     mesh.alive().filter(|&t| mesh.tets[t as usize].contains(&p)).collect()
 }
@@ -290,7 +290,7 @@ impl Sector {
     }
 
     /// Whether every vertex of its tets but p is on its surface.
-    fn keeps_vertices(&self, mesh: &Tetrahedra, p: u32) -> bool {
+    pub fn keeps_vertices(&self, mesh: &Tetrahedra, p: u32) -> bool {
         let on_surface = |v: u32| {
             self.walls.iter().any(|&w| mesh.face(w).contains(&v)) || self.fresh.iter().any(|f| f.contains(&v))
         };

@@ -17,20 +17,17 @@ use std::collections::HashMap;
 /// Polyhedra with more vertices are left alone: the search would end without an answer nearly always.
 const MOST_VERTICES: usize = 24;
 
-/// How many tets may be put before the search ends without an answer. Most that have one have it after a few more than there are
-/// faces.
-const MOST_TRIED: usize = 2000;
-
 /// What of the volume the tets on the way may be too large by, for rounding.
 const VOLUME_SLACK: f64 = 1e-9;
 
 /// Tets that fill a closed surface, each of mean ratio `least` or more, with its vertices only; `None` where none are found. The
-/// faces of `skin` look out; `refuse` says of four vertices that they must be no tet.
+/// faces of `skin` look out. `tries` is how many tets may be put before the search ends without an answer, and how many are left of that
+/// after it: most polyhedra that can be filled are so after a few more than they have faces.
 pub(super) fn fill(
     points: &[Point],
     skin: &[[u32; 3]],
     least: f64,
-    refuse: &dyn Fn([u32; 4]) -> bool,
+    tries: &mut usize,
 ) -> Option<Vec<[u32; 4]>> {
     let mut vertices: Vec<u32> = skin.iter().flatten().copied().collect();
     vertices.sort_unstable();
@@ -46,18 +43,15 @@ pub(super) fn fill(
         volume6(corners[0], a, b, c)
     };
     let room = skin.iter().map(volume).sum::<f64>() * (1.0 + VOLUME_SLACK);
-    let refuse = |tet: [u8; 4]| refuse(tet.map(|i| vertices[i as usize]));
-    let outside = segments_outside(&corners, &skin);
     let mut search = Search {
         corners: &corners,
-        outside: &outside,
+        skin: &skin,
         least,
-        refuse: &refuse,
         known: HashMap::new(),
-        open: skin,
+        open: skin.clone(),
         tets: Vec::new(),
         room,
-        tried: 0,
+        tries,
     };
     search.run().then(|| search.tets.iter().map(|tet| tet.map(|i| vertices[i as usize])).collect())
 }
@@ -76,27 +70,17 @@ fn turned([a, b, c]: Face) -> Face {
     }
 }
 
-/// For each two corners whether the segment between them goes through a face of the skin: then it is no edge.
-fn segments_outside(corners: &[&Point], skin: &[Face]) -> Vec<Vec<bool>> {
-    let n = corners.len();
-    let pierces = |u: usize, v: usize, face: &Face| {
+/// Whether the segment between two corners goes through a face of the skin: then it is no edge.
+fn is_outside(corners: &[&Point], skin: &[Face], [u, v]: [u8; 2]) -> bool {
+    let [p, q] = [u, v].map(|i| corners[i as usize]);
+    skin.iter().filter(|f| !f.contains(&u) && !f.contains(&v)).any(|face| {
         let [a, b, c] = face.map(|i| corners[i as usize]);
-        let (p, q) = (corners[u], corners[v]);
         let (one, other) = (orient3d(a, b, c, p), orient3d(a, b, c, q));
         one != Sign::Zero && one == other.flipped() && {
             let turns = [orient3d(p, q, a, b), orient3d(p, q, b, c), orient3d(p, q, c, a)];
             turns[0] != Sign::Zero && turns.iter().all(|&t| t == turns[0])
         }
-    };
-    let mut outside = vec![vec![false; n]; n];
-    for u in 0..n {
-        for v in u + 1..n {
-            let others = skin.iter().filter(|f| !f.contains(&(u as u8)) && !f.contains(&(v as u8)));
-            outside[u][v] = others.into_iter().any(|face| pierces(u, v, face));
-            outside[v][u] = outside[u][v];
-        }
-    }
-    outside
+    })
 }
 
 /// A tet that may be put on a face.
@@ -109,9 +93,8 @@ struct Choice {
 
 struct Search<'a> {
     corners: &'a [&'a Point],
-    outside: &'a [Vec<bool>],
+    skin: &'a [Face],
     least: f64,
-    refuse: &'a dyn Fn([u8; 4]) -> bool,
     /// What may be put on each face that was open, whatever else there is. Looked up only.
     known: HashMap<Face, Vec<Choice>>,
     /// The faces of what is not filled yet, outward.
@@ -119,7 +102,7 @@ struct Search<'a> {
     tets: Vec<[u8; 4]>,
     /// Six times the volume that is not filled yet.
     room: f64,
-    tried: usize,
+    tries: &'a mut usize,
 }
 
 impl Search<'_> {
@@ -127,10 +110,10 @@ impl Search<'_> {
     fn run(&mut self) -> bool {
         let Some((face, choices)) = self.tightest() else { return true };
         for choice in choices {
-            self.tried += 1;
-            if self.tried > MOST_TRIED {
+            if *self.tries == 0 {
                 return false;
             }
+            *self.tries -= 1;
             let (open, room) = (self.open.clone(), self.room);
             self.put(face, choice);
             if self.run() {
@@ -177,12 +160,12 @@ impl Search<'_> {
         let mut choices = Vec::new();
         for v in (0..self.corners.len() as u8).filter(|v| !face.contains(v)) {
             let [p, x, y, z] = [v, a, b, c].map(|i| self.corners[i as usize]);
-            let leaves = face.iter().any(|&i| self.outside[i as usize][v as usize]);
-            if leaves || orient3d(p, x, y, z) != Sign::Positive || (self.refuse)([v, a, b, c]) {
+            if orient3d(p, x, y, z) != Sign::Positive {
                 continue;
             }
             let quality = mean_ratio(p, x, y, z).max(0.0);
-            if quality >= self.least {
+            let leaves = || face.iter().any(|&i| is_outside(self.corners, self.skin, [i, v]));
+            if quality >= self.least && !leaves() {
                 choices.push(Choice { apex: v, quality, volume: volume6(p, x, y, z) });
             }
         }
@@ -237,14 +220,14 @@ mod tests {
     #[test]
     fn a_prism_bent_out_is_filled_with_three_tets_and_one_bent_in_with_none() {
         let (points, skin) = prism(0.3);
-        let tets = fill(&points, &skin, 0.0, &|_| false).unwrap();
+        let tets = fill(&points, &skin, 0.0, &mut 1000).unwrap();
         assert!(tets.len() == 3 || tets.len() == 4, "{tets:?}");
         let (points, skin) = prism(-0.3);
-        assert_eq!(fill(&points, &skin, 0.0, &|_| false), None);
+        assert_eq!(fill(&points, &skin, 0.0, &mut 1000), None);
     }
 
     #[test]
-    fn an_icosahedron_is_filled_without_gap_and_without_a_refused_tet() {
+    fn an_icosahedron_is_filled_without_gap_in_the_tries_allowed() {
         let g = 0.5 * (1.0 + 5f64.sqrt());
         let mut points = Vec::new();
         for [x, y] in [[1.0, g], [-1.0, g], [1.0, -g], [-1.0, -g]] {
@@ -263,7 +246,7 @@ mod tests {
             }
         }
         assert_eq!(skin.len(), 20);
-        let tets = fill(&points, &skin, 0.01, &|tet| tet.contains(&0) && tet.contains(&11)).unwrap();
+        let tets = fill(&points, &skin, 0.01, &mut 1000).unwrap();
         let whole: f64 = skin
             .iter()
             .map(|&[a, b, c]| {
@@ -272,6 +255,6 @@ mod tests {
             })
             .sum();
         assert!((volume(&points, &tets) - whole).abs() < 1e-12 * whole);
-        assert!(!tets.iter().any(|tet| tet.contains(&0) && tet.contains(&11)));
+        assert_eq!(fill(&points, &skin, 0.01, &mut 5), None);
     }
 }
