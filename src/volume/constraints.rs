@@ -195,3 +195,40 @@ impl Hasher for VertexHasher {
         // Array lengths: always the same.
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn vertices_on_one_edge_or_triangle_make_flat_tets() {
+        // Two triangles at the edge 0, 1; points 4 and 5 on it, 6 inside the first triangle, 7 on the edge 1, 2, 8 on no surface.
+        let mut constraints = Constraints::new(&[[0, 1, 2], [1, 0, 3]]);
+        for (p, place) in [
+            (4, Place::Edge([0, 1])),
+            (5, Place::Edge([0, 1])),
+            (6, Place::Triangle(0)),
+            (7, Place::Edge([1, 2])),
+        ] {
+            constraints.set_place(p, place);
+        }
+        for (tet, flat) in [
+            ([0, 1, 2, 3], false),
+            ([0, 4, 2, 3], false),
+            // Three on one line.
+            ([0, 4, 5, 8], true),
+            ([4, 5, 2, 8], false),
+            // Four in one plane.
+            ([0, 4, 2, 7], true),
+            ([0, 1, 2, 6], true),
+            ([4, 5, 7, 6], true),
+            ([4, 5, 7, 3], false),
+            ([0, 7, 6, 8], false),
+        ] {
+            assert_eq!(constraints.is_flat(&tet, None), flat, "{tet:?}");
+        }
+        assert!(constraints.is_flat(&[0, 4, 8], Some(Place::Edge([0, 1]))));
+        assert!(constraints.is_flat(&[4, 2, 7], Some(Place::Triangle(0))));
+        assert!(!constraints.is_flat(&[4, 2, 7], Some(Place::Triangle(1))));
+    }
+}

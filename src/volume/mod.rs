@@ -20,9 +20,11 @@
 //!
 //! A surface that meets itself is refused when it is made (`intersect`, over the tree of `boxes`). The steps, one file each:
 //! 1. `delaunay`: the boundary points, by exact cavities (`cavity`), in random rounds along the Hilbert curve.
-//! 2. `recover`: edges, then facets, by `flips`; where none is left, by Steiner points for a while (`steiner`).
+//! 2. `recover`: edges, then facets, by `flips`; where none is left, by Steiner points for a while (`steiner`), where their cavity has most
+//!    room (`clearance`); `flat` flips away tets that rounding alone makes positive.
 //! 3. `carve`: a flood from the triangles gives each tet its body and removes the outside.
-//! 4. `relocate`: Steiner points leave the surface: none or one stays inside on either side.
+//! 4. `relocate`: Steiner points leave the surface: none or one stays inside on either side. `inside` deletes those that are not needed,
+//!    by a search for tets that fill the hole (`small`).
 //! 5. `keep`: points that the caller wants.
 //! 6. `points`: the inside by the size field: lattices where it is level (`lattice`), frontal Delaunay elsewhere.
 //!
