@@ -3,7 +3,7 @@
 use super::constraints::Constraints;
 use super::recover::{Recovery, lock_facets};
 use super::tetrahedra::{NONE, Tetrahedra};
-use super::{ClosedSurface, Report, VolumeError, carve, delaunay, finish, relocate};
+use super::{ClosedSurface, Report, VolumeError, carve, delaunay, finish, inside, relocate};
 use crate::Point;
 
 /// How often the recovery is begun anew, taking edges and facets in another order, where it fails. Of some thousand prisms twisted
@@ -20,7 +20,10 @@ pub(super) fn bound(
     let mut attempt = 0;
     loop {
         match attempt_to_bound(surface, points, attempt, report) {
-            Err(VolumeError::NotRecovered { .. }) if attempt + 1 < ATTEMPTS => attempt += 1,
+            Err(VolumeError::NotRecovered { .. }) if attempt + 1 < ATTEMPTS => {
+                attempt += 1;
+                report.restarts += 1;
+            }
             result => return result,
         }
     }
@@ -52,7 +55,8 @@ fn attempt_to_bound(
         let left: Vec<u32> = stayed.iter().flat_map(|&p| constraints.facets_at(p)).collect();
         return Err(finish::not_recovered(surface, &constraints, &left));
     }
-    let is_inside = |v: &&u32| tets.at_vertex[**v as usize] != NONE;
-    report.steiner_inside = inside.len() + helping.iter().filter(is_inside).count();
+    let helping = helping.into_iter().filter(|&v| tets.at_vertex[v as usize] != NONE);
+    let inside = inside.into_iter().chain(helping.collect::<Vec<_>>()).collect();
+    report.steiner_inside = inside::delete(&mut tets, &constraints, inside);
     Ok(tets)
 }

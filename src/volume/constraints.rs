@@ -15,6 +15,15 @@ pub(super) struct Facet {
     pub gone: bool,
 }
 
+/// Where on the surface a Steiner point lies.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Place {
+    /// On the edge between these vertices of the surface, the lower first.
+    Edge([u32; 2]),
+    /// Inside this triangle.
+    Triangle(u32),
+}
+
 /// The facets and their edges. A vertex, edge or face here is looked up, never iterated in hash order.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Constraints {
@@ -24,6 +33,8 @@ pub(super) struct Constraints {
     edge_uses: HashMap<[u32; 2], u32, BuildHasherDefault<VertexHasher>>,
     /// The edge of the surface that a Steiner point lies on, if it lies on one.
     on_edge: BTreeMap<u32, [u32; 2]>,
+    /// The triangle of the surface that a Steiner point lies in, if on no edge.
+    in_triangle: BTreeMap<u32, u32>,
     /// The vertices of the surface are those below.
     surface_vertices: u32,
 }
@@ -78,18 +89,67 @@ impl Constraints {
         self.edge_uses.contains_key(&[a.min(b), a.max(b)])
     }
 
-    /// Notes that p splits the edge a, b of facets: if that is part of an edge of the surface, p lies on it.
-    pub fn set_on_edge(&mut self, a: u32, b: u32, p: u32) {
-        let edge = match [a, b].map(|v| self.on_edge.get(&v).copied()) {
+    /// The edge of the surface that an edge of facets is part of, if of any.
+    pub fn edge_of(&self, a: u32, b: u32) -> Option<[u32; 2]> {
+        match [a, b].map(|v| self.on_edge.get(&v).copied()) {
             _ if a.max(b) < self.surface_vertices => Some([a.min(b), a.max(b)]),
             [Some(edge), None] if edge.contains(&b) => Some(edge),
             [None, Some(edge)] if edge.contains(&a) => Some(edge),
             [Some(edge), Some(other)] if edge == other => Some(edge),
             _ => None,
-        };
-        if let Some(edge) = edge {
-            self.on_edge.insert(p, edge);
         }
+    }
+
+    /// Notes where on the surface a Steiner point lies.
+    pub fn set_place(&mut self, p: u32, place: Place) {
+        match place {
+            Place::Edge(edge) => drop(self.on_edge.insert(p, edge)),
+            Place::Triangle(triangle) => drop(self.in_triangle.insert(p, triangle)),
+        }
+    }
+
+    /// Whether vertices of a tet, or of a wall and a point at the given place, lie in one plane or three of them on one line but for
+    /// rounding: they lie on the same edge or triangle of the surface, or on what three of its vertices span. Such a tet may be
+    /// positive, yet nothing can be done with it.
+    pub fn is_flat(&self, vertices: &[u32], place: Option<Place>) -> bool {
+        // The vertices of the surface that span each, its own number for any other.
+        let mut spans = [[0u32; 3]; 4];
+        let mut lengths = [0; 4];
+        let places = vertices.iter().map(|&v| {
+            let edge = self.on_edge.get(&v).map(|&e| Place::Edge(e));
+            (v, edge.or_else(|| self.in_triangle.get(&v).map(|&t| Place::Triangle(t))))
+        });
+        for (i, (v, place)) in places.chain(place.map(|p| (0, Some(p)))).enumerate() {
+            lengths[i] = match place {
+                None => {
+                    spans[i][0] = v;
+                    1
+                }
+                Some(Place::Edge(edge)) => {
+                    spans[i][..2].copy_from_slice(&edge);
+                    2
+                }
+                Some(Place::Triangle(t)) => {
+                    spans[i] = self.facets[t as usize].vertices;
+                    3
+                }
+            };
+        }
+        let spanned = |which: &[usize]| {
+            let mut all = [0u32; 12];
+            let mut n = 0;
+            for &i in which {
+                for &v in &spans[i][..lengths[i]] {
+                    if !all[..n].contains(&v) {
+                        all[n] = v;
+                        n += 1;
+                    }
+                }
+            }
+            n
+        };
+        spanned(&[0, 1, 2, 3]) < 4
+            || [[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]].iter().any(|three| spanned(three) < 3)
     }
 
     /// Whether vertices lie on one edge of the surface.
@@ -133,5 +193,42 @@ impl Hasher for VertexHasher {
 
     fn write_usize(&mut self, _: usize) {
         // Array lengths: always the same.
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn vertices_on_one_edge_or_triangle_make_flat_tets() {
+        // Two triangles at the edge 0, 1; points 4 and 5 on it, 6 inside the first triangle, 7 on the edge 1, 2, 8 on no surface.
+        let mut constraints = Constraints::new(&[[0, 1, 2], [1, 0, 3]]);
+        for (p, place) in [
+            (4, Place::Edge([0, 1])),
+            (5, Place::Edge([0, 1])),
+            (6, Place::Triangle(0)),
+            (7, Place::Edge([1, 2])),
+        ] {
+            constraints.set_place(p, place);
+        }
+        for (tet, flat) in [
+            ([0, 1, 2, 3], false),
+            ([0, 4, 2, 3], false),
+            // Three on one line.
+            ([0, 4, 5, 8], true),
+            ([4, 5, 2, 8], false),
+            // Four in one plane.
+            ([0, 4, 2, 7], true),
+            ([0, 1, 2, 6], true),
+            ([4, 5, 7, 6], true),
+            ([4, 5, 7, 3], false),
+            ([0, 7, 6, 8], false),
+        ] {
+            assert_eq!(constraints.is_flat(&tet, None), flat, "{tet:?}");
+        }
+        assert!(constraints.is_flat(&[0, 4, 8], Some(Place::Edge([0, 1]))));
+        assert!(constraints.is_flat(&[4, 2, 7], Some(Place::Triangle(0))));
+        assert!(!constraints.is_flat(&[4, 2, 7], Some(Place::Triangle(1))));
     }
 }

@@ -155,6 +155,11 @@ fn same_side(mesh: &Tetrahedra, a: u32, b: u32, c: u32, d: u32) -> bool {
     })
 }
 
+/// The edges of a tet.
+pub(super) fn edges_of_tet([a, b, c, d]: [u32; 4]) -> [[u32; 2]; 6] {
+    [[a, b], [a, c], [a, d], [b, c], [b, d], [c, d]]
+}
+
 /// All tets around an edge or on both sides of a face: what a point on it has to be starred into.
 pub(super) fn tets_around(mesh: &Tetrahedra, crossing: Crossing) -> Vec<u32> {
     match crossing {

@@ -30,8 +30,9 @@ pub(super) struct Flips {
     pub count: u64,
     /// How many more edges may be tried in order to help: see [`Flips::remove_edge_with_help`].
     pub budget: u32,
-    /// Tets at Steiner points with a smaller mean ratio are taken for flat.
-    pub flat: f64,
+    /// Whether tets that rounding alone makes positive must not be made. They stand between Steiner points and where these are to go
+    /// (`relocate`), but as steps on the way they help: without them few blocks with notches are recovered in the first attempt.
+    pub never_flat: bool,
     /// The vertices from here on are Steiner points.
     first_steiner: u32,
     ring: Ring,
@@ -39,27 +40,28 @@ pub(super) struct Flips {
     best: Vec<(f64, u32)>,
 }
 
-/// Tets at a Steiner point with a smaller mean ratio are flat: the point lies on a line or in a plane of others up to
-/// rounding. It leaves volumes of some 10⁻¹⁶ of the longest edge's cube, so mean ratios near 10⁻¹⁰; a tet like that stands between
-/// the point and where it is to go (`relocate`). Tets of the surface's own points may be as thin as they like.
-pub(super) const FLAT: f64 = 1e-9;
-
 impl Flips {
-    /// For a mesh whose vertices from `first_steiner` on are Steiner points; tets at them that are flatter than `flat` are
-    /// not made.
-    pub fn new(first_steiner: u32, flat: f64) -> Self {
-        Self { first_steiner, flat, ..Self::default() }
+    /// For a mesh whose vertices from `first_steiner` on are Steiner points.
+    pub fn new(first_steiner: u32) -> Self {
+        Self { first_steiner, ..Self::default() }
     }
 
-    /// The mean ratio of a positive tet, by exact sign; below every quality for any other, and for flat ones.
-    fn quality(&self, mesh: &Tetrahedra, tet: [u32; 4]) -> f64 {
+    /// Whether rounding alone makes a tet at a Steiner point positive.
+    pub fn is_flat(&self, constraints: &Constraints, tet: [u32; 4]) -> bool {
+        tet.iter().any(|&v| v >= self.first_steiner) && constraints.is_flat(&tet, None)
+    }
+
+    /// The mean ratio of a positive tet, by exact sign; 0 for one that rounding alone makes positive; below every quality for any
+    /// that must not be made.
+    fn quality(&self, mesh: &Tetrahedra, constraints: &Constraints, tet: [u32; 4]) -> f64 {
         let [a, b, c, d] = tet.map(|v| mesh.point(v));
         if orient3d(a, b, c, d) != Sign::Positive {
             return f64::NEG_INFINITY;
         }
-        let quality = mean_ratio(a, b, c, d).max(0.0);
-        let is_flat = quality < self.flat && tet.iter().any(|&v| v >= self.first_steiner);
-        if is_flat { f64::NEG_INFINITY } else { quality }
+        if self.is_flat(constraints, tet) {
+            return if self.never_flat { f64::NEG_INFINITY } else { 0.0 };
+        }
+        mean_ratio(a, b, c, d).max(0.0)
     }
 
     /// Replaces a face by the edge between the two vertices opposite to it (2-3).
@@ -76,7 +78,7 @@ impl Flips {
         }
         let (d, e) = (mesh.apex(half_face), mesh.apex(other));
         let new = [[d, e, a, b], [d, e, b, c], [d, e, c, a]];
-        if new.iter().any(|&tet| self.quality(mesh, tet) < 0.0) {
+        if new.iter().any(|&tet| self.quality(mesh, constraints, tet) < 0.0) {
             return Err(Refused::Inverted);
         }
         self.made.clear();
@@ -108,13 +110,14 @@ impl Flips {
         let through_chord = match chord {
             [Some(i), Some(j)] if i.abs_diff(j) > 1 && i.abs_diff(j) < n - 1 => {
                 let (i, j) = (i.min(j), i.max(j));
-                self.fill_polygon(mesh, [a, b], i, j) && self.fill_polygon(mesh, [a, b], j, i + n)
+                self.fill_polygon(mesh, constraints, [a, b], i, j)
+                    && self.fill_polygon(mesh, constraints, [a, b], j, i + n)
             }
             _ => false,
         };
         if !through_chord {
             self.new.clear();
-            if !self.fill_polygon(mesh, [a, b], 0, n - 1) {
+            if !self.fill_polygon(mesh, constraints, [a, b], 0, n - 1) {
                 return Err(Refused::Inverted);
             }
         }
@@ -167,7 +170,14 @@ impl Flips {
 
     /// Triangulates the ring's vertices from `first` to `last` (counted on round the ring) and appends the tets
     /// on both sides to `new`; false where some tet would not be positive.
-    fn fill_polygon(&mut self, mesh: &Tetrahedra, edge: [u32; 2], first: usize, last: usize) -> bool {
+    fn fill_polygon(
+        &mut self,
+        mesh: &Tetrahedra,
+        constraints: &Constraints,
+        edge: [u32; 2],
+        first: usize,
+        last: usize,
+    ) -> bool {
         let n = last - first + 1;
         if n < 3 {
             return true;
@@ -190,7 +200,9 @@ impl Flips {
                     if sides <= best.0 {
                         continue;
                     }
-                    let worst = tets(i, k, j).iter().fold(sides, |q, &tet| q.min(self.quality(mesh, tet)));
+                    let worst = tets(i, k, j)
+                        .iter()
+                        .fold(sides, |q, &tet| q.min(self.quality(mesh, constraints, tet)));
                     if worst > best.0 {
                         best = (worst, k as u32);
                     }

@@ -20,9 +20,11 @@
 //!
 //! A surface that meets itself is refused when it is made (`intersect`, over the tree of `boxes`). The steps, one file each:
 //! 1. `delaunay`: the boundary points, by exact cavities (`cavity`), in random rounds along the Hilbert curve.
-//! 2. `recover`: edges, then facets, by `flips`; where none is left, by Steiner points for a while (`steiner`).
+//! 2. `recover`: edges, then facets, by `flips`; where none is left, by Steiner points for a while (`steiner`), where their cavity has most
+//!    room (`clearance`); `flat` flips away tets that rounding alone makes positive.
 //! 3. `carve`: a flood from the triangles gives each tet its body and removes the outside.
-//! 4. `relocate`: Steiner points leave the surface: none or one stays inside on either side.
+//! 4. `relocate`: Steiner points leave the surface: none or one stays inside on either side. `inside` deletes those that are not needed,
+//!    by a search for tets that fill the hole (`small`).
 //! 5. `keep`: points that the caller wants.
 //! 6. `points`: the inside by the size field: lattices where it is level (`lattice`), frontal Delaunay elsewhere.
 //!
@@ -34,12 +36,15 @@ mod boxes;
 
 mod carve;
 mod cavity;
+mod clearance;
 pub mod closed_surface;
 mod constraints;
 mod crossing;
 mod delaunay;
 mod finish;
+mod flat;
 mod flips;
+mod inside;
 mod intersect;
 mod keep;
 mod lattice;
@@ -50,6 +55,7 @@ mod relocate;
 #[cfg(test)]
 mod samples;
 mod sectors;
+mod small;
 mod steiner;
 mod surface_faults;
 mod tetrahedra;
@@ -103,6 +109,8 @@ pub struct Report {
     pub steiner_on_surface: usize,
     /// Points left inside the bodies to replace them.
     pub steiner_inside: usize,
+    /// How often the recovery was begun anew in another order.
+    pub restarts: usize,
     /// Points added inside by the size field.
     pub points_inside: usize,
 }

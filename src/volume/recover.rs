@@ -9,7 +9,7 @@
 use super::cavity::Cavity;
 use super::constraints::{Constraints, edges};
 use super::crossing::{Crossing, Piercing, crossings, piercing};
-use super::flips::{FLAT, Flips};
+use super::flips::Flips;
 use super::tetrahedra::Tetrahedra;
 use crate::kernel::random::mix;
 
@@ -73,10 +73,7 @@ pub(super) struct Recovery<'a> {
 impl<'a> Recovery<'a> {
     /// A recovery. Each `attempt` takes edges and facets in another order: one may end where another does not.
     pub fn new(mesh: &'a mut Tetrahedra, constraints: &'a mut Constraints, attempt: u32) -> Self {
-        // Without flat tets the points leave more easily, but some surfaces let none be put then. Skins of refined lattices
-        // need five times as many points so: not in the first attempt.
-        let flat = if attempt.is_multiple_of(2) { 0.0 } else { FLAT };
-        let flips = Flips::new(mesh.points.len() as u32, flat);
+        let flips = Flips::new(mesh.points.len() as u32);
         Self {
             mesh,
             constraints,
@@ -95,6 +92,14 @@ impl<'a> Recovery<'a> {
 
     /// Recovers all facets, or returns those that it cannot.
     pub fn run(&mut self) -> Result<(), Vec<u32>> {
+        self.recover()?;
+        if !self.steiner.is_empty() {
+            self.remove_flat_tets();
+        }
+        Ok(())
+    }
+
+    fn recover(&mut self) -> Result<(), Vec<u32>> {
         let mut missing = self.missing_facets();
         self.counts.missing_faces = missing.len();
         if missing.is_empty() {
@@ -201,7 +206,7 @@ impl<'a> Recovery<'a> {
     }
 
     /// Gives the flips their share of the help that is left, and takes back what was not used of the last.
-    fn take_help(&mut self) {
+    pub(super) fn take_help(&mut self) {
         self.help_left += u64::from(self.flips.budget);
         self.flips.budget = self.help_left.min(u64::from(HELP)) as u32;
         self.help_left -= u64::from(self.flips.budget);
@@ -268,7 +273,7 @@ impl<'a> Recovery<'a> {
     }
 
     /// Removes an edge in the way; helping flips may have changed its tets before.
-    fn remove_edge(&mut self, tet: u32, edge: [u32; 2], wanted: [u32; 2], depth: u32) -> bool {
+    pub(super) fn remove_edge(&mut self, tet: u32, edge: [u32; 2], wanted: [u32; 2], depth: u32) -> bool {
         let still = self.mesh.is_alive(tet) && edge.iter().all(|v| self.mesh.tets[tet as usize].contains(v));
         let tet = if still { Some(tet) } else { self.mesh.tet_at_edge(edge[0], edge[1], &mut self.star) };
         tet.is_some_and(|tet| {

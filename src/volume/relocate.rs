@@ -14,7 +14,9 @@
 //! ```
 
 use super::carve::is_even;
+use super::clearance::{Plane, most_inside};
 use super::constraints::Constraints;
+use super::inside;
 use super::polygon::{Shadow, triangulate};
 use super::tetrahedra::{NONE, Tetrahedra, sorted};
 use crate::kernel::predicates::{Sign, orient3d};
@@ -25,21 +27,20 @@ use std::collections::BTreeMap;
 
 /// A sector is filled from one of its own vertices, without a new point, if the worst mean ratio is at least
 /// this; else from where it is better. A sliver of 0.001 is worse to mend than one vertex more.
-const GOOD_ENOUGH: f64 = 0.05;
+pub(super) const GOOD_ENOUGH: f64 = 0.05;
 
-/// How near to the old point a new one may be: 2 to the power of minus this many, of the size of the ball. Nearer,
-/// coordinates round to the point itself.
-const HALVINGS: i32 = 48;
+/// How often points that do not leave are tried again after those inside beside them have moved.
+const STUCK: usize = 3;
 
 /// The part of a ball between facets.
 #[derive(Clone, Debug, Default)]
-struct Sector {
-    body: u32,
-    tets: Vec<u32>,
+pub(super) struct Sector {
+    pub body: u32,
+    pub tets: Vec<u32>,
     /// Its surface once p is gone, outward.
-    skin: Vec<[u32; 3]>,
+    pub skin: Vec<[u32; 3]>,
     /// The half-faces of `tets` that are in `skin`.
-    walls: Vec<u32>,
+    pub walls: Vec<u32>,
     /// Those of `skin` in place of facets at p, which p does not see.
     fresh: Vec<[u32; 3]>,
     /// The triangles of the surface that they are parts of, outward.
@@ -63,13 +64,18 @@ pub(super) fn relocate(
 ) -> (Vec<u32>, Vec<u32>) {
     let mut inside = Vec::new();
     let mut left: Vec<u32> = steiner.iter().rev().copied().collect();
-    loop {
+    let mut stuck = 0;
+    while !left.is_empty() && stuck < STUCK {
         let before = left.len();
         left.retain(|&p| !take_off(mesh, constraints, triangles, p, &mut inside));
-        if left.is_empty() || left.len() == before {
-            return (inside, left);
+        if left.len() < before {
+            stuck = 0;
+        } else {
+            stuck += 1;
+            inside::make_room(mesh, constraints, &left, &mut inside);
         }
     }
+    (inside, left)
 }
 
 /// Takes one point off the surface if all its sectors can be filled without it.
@@ -216,7 +222,7 @@ fn ball(mesh: &Tetrahedra, p: u32) -> Vec<u32> {
 }
 
 /// The worst mean ratio of a sector filled from a point; negative if some tet were not positive.
-fn worst(mesh: &Tetrahedra, skin: &[[u32; 3]], apex: &Point, own: u32, floor: f64) -> f64 {
+pub(super) fn worst(mesh: &Tetrahedra, skin: &[[u32; 3]], apex: &Point, own: u32, floor: f64) -> f64 {
     let mut worst = f64::INFINITY;
     for face in skin.iter().filter(|face| !face.contains(&own)) {
         let [a, b, c] = face.map(|v| mesh.point(v));
@@ -232,6 +238,19 @@ fn worst(mesh: &Tetrahedra, skin: &[[u32; 3]], apex: &Point, own: u32, floor: f6
 }
 
 impl Sector {
+    /// Some tets of a body with no facet among them, and their outer half-faces.
+    pub fn inside(mesh: &Tetrahedra, body: u32, tets: Vec<u32>, walls: Vec<u32>) -> Self {
+        let mut sector = Self { body, tets, walls, ..Self::default() };
+        sector.set_skin(mesh);
+        sector
+    }
+
+    /// How far it reaches from p.
+    fn reach(&self, mesh: &Tetrahedra, p: u32) -> f64 {
+        let distance = |&v: &u32| (mesh.point(v) - mesh.point(p)).norm();
+        self.skin.iter().flatten().map(distance).fold(0.0, f64::max)
+    }
+
     fn set_skin(&mut self, mesh: &Tetrahedra) {
         self.skin.clear();
         self.skin.extend(self.walls.iter().map(|&w| mesh.face(w)));
@@ -271,7 +290,7 @@ impl Sector {
     }
 
     /// Whether every vertex of its tets but p is on its surface.
-    fn keeps_vertices(&self, mesh: &Tetrahedra, p: u32) -> bool {
+    pub fn keeps_vertices(&self, mesh: &Tetrahedra, p: u32) -> bool {
         let on_surface = |v: u32| {
             self.walls.iter().any(|&w| mesh.face(w).contains(&v)) || self.fresh.iter().any(|f| f.contains(&v))
         };
@@ -325,7 +344,7 @@ fn find_apex(mesh: &Tetrahedra, sector: &Sector, p: u32) -> Option<Apex> {
     if best.0 >= GOOD_ENOUGH {
         return best.1;
     }
-    if let Some((quality, point)) = find_place(mesh, sector, p, &own)
+    if let Some((quality, point)) = find_place(mesh, sector, p)
         && quality > best.0
     {
         best = (quality, Some(Apex::New(point)));
@@ -334,26 +353,17 @@ fn find_apex(mesh: &Tetrahedra, sector: &Sector, p: u32) -> Option<Apex> {
 }
 
 /// A place inside a sector that sees all of its skin, and the worst mean ratio from there.
-fn find_place(mesh: &Tetrahedra, sector: &Sector, p: u32, own: &[u32]) -> Option<(f64, Point)> {
+pub(super) fn find_place(mesh: &Tetrahedra, sector: &Sector, p: u32) -> Option<(f64, Point)> {
     let start = *mesh.point(p);
-    let n = own.len() as f64;
-    let to_center = own.iter().map(|&v| mesh.point(v) - start).sum::<Vector>() / n;
-    let (inward, reach) = directions(mesh, sector, p);
-    let mut best = (f64::NEG_INFINITY, start);
-    for k in 0..HALVINGS {
-        let step = 0.5f64.powi(k);
-        for way in [to_center, inward, 0.5 * (to_center + inward)] {
-            let point = start + way * step;
-            let quality = worst(mesh, &sector.skin, &point, NONE, best.0);
-            if quality > best.0 {
-                best = (quality, point);
-            }
-        }
-    }
-    if best.0 < 0.0 {
+    let reach = sector.reach(mesh, p);
+    let planes: Vec<Plane> = sector.skin.iter().filter_map(|f| Plane::of(f.map(|v| mesh.point(v)))).collect();
+    let axes = [Vector::x() * reach, Vector::y() * reach, Vector::z() * reach];
+    let (place, _) = most_inside(&start, &axes, &planes);
+    let quality = worst(mesh, &sector.skin, &place, NONE, 0.0);
+    if quality < 0.0 {
         return None;
     }
-    Some(climb(mesh, sector, best, reach))
+    Some(climb(mesh, sector, (quality, place), reach))
 }
 
 /// Away from the facets at p, as long as the sector reaches; and how far that is.
@@ -361,8 +371,7 @@ fn find_place(mesh: &Tetrahedra, sector: &Sector, p: u32, own: &[u32]) -> Option
 /// The facets lie in one plane or in two, however many pieces of each there are: half-way between two inward
 /// normals is inside of both planes, whatever the angle.
 fn directions(mesh: &Tetrahedra, sector: &Sector, p: u32) -> (Vector, f64) {
-    let start = mesh.point(p);
-    let reach = sector.skin.iter().flatten().map(|&v| (mesh.point(v) - start).norm()).fold(0.0, f64::max);
+    let reach = sector.reach(mesh, p);
     let inward = sector.sides.iter().fold(Vector::zeros(), |sum, face| {
         let [a, b, c] = face.map(|v| mesh.point(v));
         sum - area_vector(a, b, c).normalize()

@@ -5,26 +5,26 @@
 //! points on both sides, inside the slivers' circumspheres, make them go.
 
 use super::cavity::{Walk, walk};
-use super::constraints::edges;
+use super::clearance::{Plane, most_inside};
+use super::constraints::{Facet, Place, edges};
 use super::crossing::{Crossing, crossings, tets_around};
 use super::recover::{DEEPEST, Recovery};
 use super::tetrahedra::{NO_BODY, NONE};
-use crate::Point;
 use crate::kernel::predicates::{Sign, orient3d};
-use crate::kernel::quality::mean_ratio;
 use crate::kernel::simplex::{area_vector, volume6};
+use crate::{Point, Vector};
 
 /// Helping points stand off the surface by this fraction of the root of a triangle's doubled area, then by half of it, and so
 /// on. Not a round number, so that they do not lie on the other side of a plate.
 const STAND_OFF: f64 = 0.37;
 
-/// Where Steiner points are put between two crossings: the middle first.
-const WAYS: [f64; 3] = [0.5, 0.25, 0.75];
-
-/// Whether a point and a half-face that it lies behind make a tet that is positive and whose mean ratio is `least` or more
-/// (by rounding that of a positive tet may be below 0).
-fn sees_well(point: &Point, [a, b, c]: [&Point; 3], least: f64) -> bool {
-    orient3d(a, b, c, point) == Sign::Negative && mean_ratio(point, a, b, c).max(0.0) >= least
+/// The edge or facet that a Steiner point is to split.
+struct Room {
+    place: Place,
+    /// The directions in which the point may move.
+    axes: Vec<Vector>,
+    /// How far.
+    ends: Vec<Plane>,
 }
 
 impl Recovery<'_> {
@@ -52,23 +52,20 @@ impl Recovery<'_> {
     pub(super) fn split_edge(&mut self, a: u32, b: u32) -> Option<u32> {
         let mut found = std::mem::take(&mut self.found);
         crossings(self.mesh, a, b, &mut self.star, &mut found);
+        let mut split = self.constraints.facets_at(a);
+        split.retain(|&f| self.constraints.facets[f as usize].vertices.contains(&b));
+        let triangle = self.constraints.facets[*split.first()? as usize].triangle;
+        let room = self.room_on_edge(a, b, triangle);
         let mut order: Vec<usize> = (0..found.len()).collect();
         order.sort_by_key(|&i| (2 * i + 1).abs_diff(found.len()));
         let added = order.into_iter().find_map(|i| {
             let point = self.crossing_point(a, b, found[i]);
             let tets = tets_around(self.mesh, found[i]);
-            self.add_steiner(&tets, point)
+            self.add_steiner(&tets, point, &room)
         });
-        let added = added.or_else(|| self.split_between(a, b, &found));
+        let added = added.or_else(|| self.split_between(a, b, &found, &room));
         self.found = found;
         let p = added?;
-        self.constraints.set_on_edge(a, b, p);
-        let split: Vec<u32> = self
-            .constraints
-            .facets_at(a)
-            .into_iter()
-            .filter(|&f| self.constraints.facets[f as usize].vertices.contains(&b))
-            .collect();
         for f in split {
             let facet = self.constraints.facets[f as usize];
             self.constraints.remove(f);
@@ -82,7 +79,7 @@ impl Recovery<'_> {
 
     /// Puts a Steiner point on a missing edge inside a tet that it goes through, the longest way first. Where the edge
     /// passes close by other edges its crossings let no point be put on them: shorter pieces are easier.
-    fn split_between(&mut self, a: u32, b: u32, found: &[Crossing]) -> Option<u32> {
+    fn split_between(&mut self, a: u32, b: u32, found: &[Crossing], room: &Room) -> Option<u32> {
         let first = match *found.first()? {
             Crossing::Face(first) => first,
             // The way to an edge lies in the face between: a little beside the crossing there is more room.
@@ -91,10 +88,7 @@ impl Recovery<'_> {
                 let opposite =
                     self.mesh.tets[tet as usize].iter().position(|v| *v != a && !edge.contains(v))?;
                 let tets = tets_around(self.mesh, Crossing::Face(4 * tet + opposite as u32));
-                return WAYS.iter().find_map(|part| {
-                    let point = self.mesh.point(a) + (to - self.mesh.point(a)) * *part;
-                    self.add_steiner(&tets, point)
-                });
+                return self.add_steiner(&tets, nalgebra::center(self.mesh.point(a), &to), room);
             }
             Crossing::Vertex(_) => return None,
         };
@@ -114,58 +108,88 @@ impl Recovery<'_> {
             ways.push(((to - from).norm(), nalgebra::center(from, to), *tet));
         }
         ways.sort_by(|one, other| other.0.total_cmp(&one.0));
-        ways.into_iter().find_map(|(_, point, tet)| self.add_steiner(&[tet], point))
+        ways.into_iter().find_map(|(_, point, tet)| self.add_steiner(&[tet], point, room))
     }
 
-    /// Stars tets from a new point. Tets behind faces that do not see it are taken in first: near slivers the
-    /// point may be, by rounding, on the wrong side of some.
-    fn add_steiner(&mut self, tets: &[u32], point: Point) -> Option<u32> {
+    fn room_on_edge(&self, a: u32, b: u32, triangle: u32) -> Room {
+        let [p, q] = [a, b].map(|v| self.mesh.point(v));
+        let place = self.constraints.edge_of(a, b).map_or(Place::Triangle(triangle), Place::Edge);
+        let ends = [Plane::across(&(p - q), p), Plane::across(&(q - p), q)];
+        Room { place, axes: vec![q - p], ends: ends.into_iter().flatten().collect() }
+    }
+
+    fn room_in_facet(&self, facet: Facet) -> Room {
+        let [a, b, c] = facet.vertices.map(|v| self.mesh.point(v));
+        let normal = area_vector(a, b, c);
+        let beside = |[p, q]: [&Point; 2]| Plane::across(&(q - p).cross(&normal), p);
+        let ends = [[a, b], [b, c], [c, a]].into_iter().filter_map(beside).collect();
+        let across = normal.cross(&(b - a)).try_normalize(0.0).unwrap_or_else(Vector::zeros);
+        let axes = vec![b - a, across * (b - a).norm().max((c - a).norm())];
+        Room { place: Place::Triangle(facet.triangle), axes, ends }
+    }
+
+    /// Stars tets from a new point near `point`, where it has most room. Tets behind faces that do not see it are taken in first:
+    /// near slivers the point may be, by rounding, on the wrong side of some.
+    fn add_steiner(&mut self, tets: &[u32], point: Point, room: &Room) -> Option<u32> {
         /// More than a split of an edge with its usual ring needs, by far.
         const MOST_TETS: usize = 64;
         let mut tets = tets.to_vec();
         if tets.is_empty() || self.steiner.len() >= self.most_steiner {
             return None;
         }
-        loop {
+        let point = loop {
             self.cavity.take(self.mesh, &tets);
-            if self.cavity.make_star_shaped(self.mesh, tets[0], &point)
-                && self.cavity.tets.len() == tets.len()
-                && self.walls_are_seen_well(&point)
+            let planes: Vec<Plane> = self
+                .cavity
+                .walls
+                .iter()
+                .filter_map(|&wall| Plane::of(self.mesh.face_points(wall)))
+                .chain(room.ends.iter().copied())
+                .collect();
+            // The crossing lies in the plane of what is crossed: flips could make flat tets of these later.
+            let best = most_inside(&point, &room.axes, &planes).0;
+            if let Some(seen) = [best, point].into_iter().find(|p| self.is_star_shaped(&tets, p, room.place))
             {
-                break;
+                break seen;
             }
-            let grown = self.behind_unseen(&tets, &point)?;
+            let grown = self.behind_unseen(&tets, &point, room.place)?;
             tets.extend(grown);
             if tets.len() > MOST_TETS {
                 return None;
             }
-        }
+        };
         if !self.keeps_edges(&tets) {
             return None;
         }
         let p = self.mesh.add_point(point);
         self.cavity.fill(self.mesh, p, NO_BODY);
+        self.constraints.set_place(p, room.place);
         self.steiner.push(p);
         self.counts.steiner += 1;
         Some(p)
     }
 
-    fn walls_are_seen_well(&self, point: &Point) -> bool {
-        self.cavity.walls.iter().all(|&wall| {
-            let [a, b, c] = self.mesh.face(wall).map(|v| self.mesh.point(v));
-            sees_well(point, [a, b, c], self.flips.flat)
-        })
+    /// Whether all walls around tets see a point; the cavity is these tets then.
+    fn is_star_shaped(&mut self, tets: &[u32], point: &Point, place: Place) -> bool {
+        self.cavity.take(self.mesh, tets);
+        self.cavity.walls.iter().all(|&wall| self.sees(point, place, wall))
+            && self.cavity.make_star_shaped(self.mesh, tets[0], point)
     }
 
-    /// The tets behind those faces around `tets` that do not see a point well; `None` if there are none, or one of the
+    /// Whether a point and a half-face that it lies behind make a tet that is positive, and not by rounding alone.
+    fn sees(&self, point: &Point, place: Place, half_face: u32) -> bool {
+        let [a, b, c] = self.mesh.face_points(half_face);
+        orient3d(a, b, c, point) == Sign::Negative
+            && !self.constraints.is_flat(&self.mesh.face(half_face), Some(place))
+    }
+
+    /// The tets behind those faces around `tets` that do not see a point; `None` if there are none, or one of the
     /// faces must stay.
-    fn behind_unseen(&self, tets: &[u32], point: &Point) -> Option<Vec<u32>> {
+    fn behind_unseen(&self, tets: &[u32], point: &Point, place: Place) -> Option<Vec<u32>> {
         let mut behind = Vec::new();
         for half_face in tets.iter().flat_map(|&t| 4 * t..4 * t + 4) {
             let other = self.mesh.across(half_face);
-            let [a, b, c] = self.mesh.face(half_face).map(|v| self.mesh.point(v));
-            if (other != NONE && tets.contains(&(other >> 2))) || sees_well(point, [a, b, c], self.flips.flat)
-            {
+            if (other != NONE && tets.contains(&(other >> 2))) || self.sees(point, place, half_face) {
                 continue;
             }
             if other == NONE || self.constraints.facet(self.mesh.face(half_face)).is_some() {
@@ -208,10 +232,11 @@ impl Recovery<'_> {
         }
         let Some(edges) = self.obstacles(f) else { return false };
         let facet = self.constraints.facets[f as usize];
+        let room = self.room_in_facet(facet);
         for (tet, edge) in edges {
             let point = self.piercing_point(facet.vertices, edge);
             let tets = tets_around(self.mesh, Crossing::Edge(tet, edge));
-            if let Some(p) = self.add_steiner(&tets, point) {
+            if let Some(p) = self.add_steiner(&tets, point, &room) {
                 self.constraints.remove(f);
                 let [a, b, c] = facet.vertices;
                 for part in [[a, b, p], [b, c, p], [c, a, p]] {

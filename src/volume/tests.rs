@@ -491,6 +491,24 @@ fn blocks_with_many_notches_need_fewer_points_than_edges_and_triangles_were_miss
 }
 
 #[test]
+fn steiner_points_leave_the_surface_at_the_first_attempt() {
+    // Of these 21 surfaces five took two attempts or more when points were put on the faces that they cross.
+    let mut restarts = 0;
+    for k in 0..7 {
+        let turn = nalgebra::Rotation3::from_euler_angles(0.4 * f64::from(k), -0.9, 1.7);
+        for mut soup in [
+            notched_block(4, 10f64.powi(-k)),
+            twisted_prisms(3 + k as u32, -0.9 * twist_limit(3 + k as u32), 1.0, 3),
+            twisted_prisms(9, -0.98 * twist_limit(9), 10f64.powf(0.3 * f64::from(k)), 2),
+        ] {
+            soup.map(|p| turn * p);
+            restarts += bare(soup).restarts;
+        }
+    }
+    assert!(restarts <= 2, "{restarts}");
+}
+
+#[test]
 fn flat_ellipsoids_and_thin_shells_are_filled() {
     for (levels, flat) in [(2, 0.1), (3, 0.01), (3, 1e-4), (2, 5.0)] {
         let mut soup = Soup::default();
@@ -528,7 +546,9 @@ fn machine_parts_of_needle_triangles_are_filled() {
         let path = format!("{shared}/netgen-tutorials/{part}.stl");
         match std::fs::read_to_string(&path) {
             Ok(text) => {
-                filled(read_stl(&text), 5.0);
+                let report = filled(read_stl(&text), 5.0);
+                // Half of those that leave the surface are not needed: of 36 on the hinge 12 stayed.
+                assert!(2 * report.steiner_inside <= 1 + report.steiner_on_surface.max(9), "{report:?}");
             }
             Err(error) => eprintln!("SKIPPED, set TETMILL_SHARED: {path}: {error}"),
         }

@@ -1,0 +1,104 @@
+//! Points that the recovery left inside: moved where they are in the way, deleted where they are not needed.
+
+use super::constraints::Constraints;
+use super::relocate::{GOOD_ENOUGH, Sector, find_place, worst};
+use super::small;
+use super::tetrahedra::{NONE, Tetrahedra};
+use crate::kernel::quality::mean_ratio;
+
+/// How often all points are tried: one that is gone may let others go.
+const ROUNDS: usize = 2;
+
+/// How many tets may be put in search of a ball's filling, all its cavities together.
+const TRIES: usize = 500;
+
+/// Balls of more tets are tried as they are only: those that can be filled mostly can be so without more tets, and the larger ones take
+/// the time.
+const MOST_TO_GROW: usize = 14;
+
+/// Gives the points inside at the balls of others better places.
+pub(super) fn make_room(mesh: &mut Tetrahedra, constraints: &Constraints, of: &[u32], inside: &mut [u32]) {
+    for q in inside {
+        let mut ball = Vec::new();
+        mesh.star(*q, &mut ball);
+        let sector = cavity(mesh, ball);
+        let is_near = sector.skin.iter().flatten().any(|v| of.contains(v));
+        let Some((quality, place)) = find_place(mesh, &sector, *q).filter(|_| is_near) else { continue };
+        if quality <= worst(mesh, &sector.skin, mesh.point(*q), NONE, 0.0) {
+            continue;
+        }
+        let points = mesh.points.len();
+        let new = mesh.add_point(place);
+        let tets: Vec<[u32; 4]> = sector.skin.iter().map(|&[a, b, c]| [new, a, b, c]).collect();
+        if refill(mesh, constraints, &sector, &tets) {
+            mesh.at_vertex[*q as usize] = NONE;
+            *q = new;
+        } else {
+            mesh.forget_points(points);
+        }
+    }
+}
+
+/// Deletes those points inside whose ball can be filled without them, with no worse a tet unless it is good enough. Returns how
+/// many are left.
+pub(super) fn delete(mesh: &mut Tetrahedra, constraints: &Constraints, mut inside: Vec<u32>) -> usize {
+    for _ in 0..ROUNDS {
+        let before = inside.len();
+        inside.retain(|&q| !delete_one(mesh, constraints, q));
+        if inside.len() == before {
+            break;
+        }
+    }
+    inside.len()
+}
+
+/// Fills the ball of a point without it, or the ball with one tet or all tets beside it: what stands around a point that is needed there
+/// is often not needed itself (a cavity that grows, as in Marot, Verhetsel, Remacle 2020).
+fn delete_one(mesh: &mut Tetrahedra, constraints: &Constraints, q: u32) -> bool {
+    let mut ball = Vec::new();
+    mesh.star(q, &mut ball);
+    let mut behind: Vec<u32> = cavity(mesh, ball.clone())
+        .walls
+        .iter()
+        .filter(|&&wall| !mesh.is_locked(wall) && mesh.across(wall) != NONE)
+        .map(|&wall| mesh.across(wall) >> 2)
+        .collect();
+    behind.sort_unstable();
+    behind.dedup();
+    let with = |more: &[u32]| [&ball[..], more].concat();
+    let mut choices = vec![with(&[])];
+    if ball.len() <= MOST_TO_GROW {
+        choices.extend(behind.iter().map(|&t| with(&[t])));
+        choices.push(with(&behind));
+    }
+    let mut tries = TRIES;
+    let filled = choices.into_iter().find_map(|tets| {
+        let old = cavity(mesh, tets);
+        let least = old.tets.iter().map(|&t| {
+            let [a, b, c, d] = mesh.corners(t);
+            mean_ratio(a, b, c, d).max(0.0)
+        });
+        let least = least.fold(GOOD_ENOUGH, f64::min);
+        let new =
+            old.keeps_vertices(mesh, q).then(|| small::fill(&mesh.points, &old.skin, least, &mut tries))?;
+        Some((old, new?))
+    });
+    let done = filled.is_some_and(|(old, new)| refill(mesh, constraints, &old, &new));
+    if done {
+        mesh.at_vertex[q as usize] = NONE;
+    }
+    done
+}
+
+/// Some tets of one body and what is around them.
+fn cavity(mesh: &Tetrahedra, tets: Vec<u32>) -> Sector {
+    let outer =
+        |h: &u32| mesh.is_locked(*h) || mesh.across(*h) == NONE || !tets.contains(&(mesh.across(*h) >> 2));
+    let walls = tets.iter().flat_map(|&t| 4 * t..4 * t + 4).filter(outer).collect();
+    Sector::inside(mesh, mesh.bodies[tets[0] as usize], tets, walls)
+}
+
+fn refill(mesh: &mut Tetrahedra, constraints: &Constraints, sector: &Sector, tets: &[[u32; 4]]) -> bool {
+    let tets: Vec<([u32; 4], u32)> = tets.iter().map(|&tet| (tet, sector.body)).collect();
+    mesh.rebuild(&sector.tets, &tets, &|face| constraints.facet(face).is_some())
+}

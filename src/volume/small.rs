@@ -1,0 +1,260 @@
+//! A small polyhedron in tets without a point inside, by search.
+//!
+//! The last hope where flips find no way, and how Steiner points are deleted (small polyhedron reconnection: Liu, Chen, Sun 2009;
+//! cavity re-triangulation: Marot, Verhetsel, Remacle 2020). Tets are put on one open face after the other, on the one with the
+//! fewest choices first, and taken away again where a face has no choice left.
+//!
+//! Nothing need be intersected with anything for the answer to be right: where all faces are matched, with the sense in which they are
+//! passed, and all tets are positive by exact sign, each place inside lies in one tet and each place outside in none, for the windings of
+//! the tets add up to that of the skin.
+
+use crate::Point;
+use crate::kernel::predicates::{Sign, orient3d};
+use crate::kernel::quality::mean_ratio;
+use crate::kernel::simplex::volume6;
+use std::collections::HashMap;
+
+/// Polyhedra with more vertices are left alone: the search would end without an answer nearly always.
+const MOST_VERTICES: usize = 24;
+
+/// What of the volume the tets on the way may be too large by, for rounding.
+const VOLUME_SLACK: f64 = 1e-9;
+
+/// Tets that fill a closed surface, each of mean ratio `least` or more, with its vertices only; `None` where none are found. The
+/// faces of `skin` look out. `tries` is how many tets may be put before the search ends without an answer, and how many are left of that
+/// after it: most polyhedra that can be filled are so after a few more than they have faces.
+pub(super) fn fill(
+    points: &[Point],
+    skin: &[[u32; 3]],
+    least: f64,
+    tries: &mut usize,
+) -> Option<Vec<[u32; 4]>> {
+    let mut vertices: Vec<u32> = skin.iter().flatten().copied().collect();
+    vertices.sort_unstable();
+    vertices.dedup();
+    if vertices.len() > MOST_VERTICES {
+        return None;
+    }
+    let corners: Vec<&Point> = vertices.iter().map(|&v| &points[v as usize]).collect();
+    let number = |v: u32| vertices.binary_search(&v).expect("a vertex of the skin") as u8;
+    let skin: Vec<Face> = skin.iter().map(|f| turned(f.map(number))).collect();
+    let volume = |&f: &Face| {
+        let [a, b, c] = f.map(|i| corners[i as usize]);
+        volume6(corners[0], a, b, c)
+    };
+    let room = skin.iter().map(volume).sum::<f64>() * (1.0 + VOLUME_SLACK);
+    let mut search = Search {
+        corners: &corners,
+        skin: &skin,
+        least,
+        known: HashMap::new(),
+        open: skin.clone(),
+        tets: Vec::new(),
+        room,
+        tries,
+    };
+    search.run().then(|| search.tets.iter().map(|tet| tet.map(|i| vertices[i as usize])).collect())
+}
+
+/// Numbers of corners; the lowest first.
+type Face = [u8; 3];
+
+/// A face with its lowest vertex first, in the same sense.
+fn turned([a, b, c]: Face) -> Face {
+    if a < b && a < c {
+        [a, b, c]
+    } else if b < c {
+        [b, c, a]
+    } else {
+        [c, a, b]
+    }
+}
+
+/// Whether the segment between two corners goes through a face of the skin: then it is no edge.
+fn is_outside(corners: &[&Point], skin: &[Face], [u, v]: [u8; 2]) -> bool {
+    let [p, q] = [u, v].map(|i| corners[i as usize]);
+    skin.iter().filter(|f| !f.contains(&u) && !f.contains(&v)).any(|face| {
+        let [a, b, c] = face.map(|i| corners[i as usize]);
+        let (one, other) = (orient3d(a, b, c, p), orient3d(a, b, c, q));
+        one != Sign::Zero && one == other.flipped() && {
+            let turns = [orient3d(p, q, a, b), orient3d(p, q, b, c), orient3d(p, q, c, a)];
+            turns[0] != Sign::Zero && turns.iter().all(|&t| t == turns[0])
+        }
+    })
+}
+
+/// A tet that may be put on a face.
+#[derive(Clone, Copy, Debug)]
+struct Choice {
+    apex: u8,
+    quality: f64,
+    volume: f64,
+}
+
+struct Search<'a> {
+    corners: &'a [&'a Point],
+    skin: &'a [Face],
+    least: f64,
+    /// What may be put on each face that was open, whatever else there is. Looked up only.
+    known: HashMap<Face, Vec<Choice>>,
+    /// The faces of what is not filled yet, outward.
+    open: Vec<Face>,
+    tets: Vec<[u8; 4]>,
+    /// Six times the volume that is not filled yet.
+    room: f64,
+    tries: &'a mut usize,
+}
+
+impl Search<'_> {
+    /// Fills what is open; what it put is taken away again where that fails.
+    fn run(&mut self) -> bool {
+        let Some((face, choices)) = self.tightest() else { return true };
+        for choice in choices {
+            if *self.tries == 0 {
+                return false;
+            }
+            *self.tries -= 1;
+            let (open, room) = (self.open.clone(), self.room);
+            self.put(face, choice);
+            if self.run() {
+                return true;
+            }
+            (self.open, self.room) = (open, room);
+            self.tets.pop();
+        }
+        false
+    }
+
+    /// The open face with the fewest choices, and these, the best first; `None` if no face is open.
+    fn tightest(&mut self) -> Option<(Face, Vec<Choice>)> {
+        let mut best: Option<(Face, Vec<Choice>)> = None;
+        for i in 0..self.open.len() {
+            let face = self.open[i];
+            self.learn(face);
+            let fits = |choice: &&Choice| {
+                let [a, b, c] = face;
+                let v = choice.apex;
+                // A face that is open already cannot be open twice.
+                let doubled =
+                    [[a, b, v], [b, c, v], [c, a, v]].iter().any(|&f| self.open.contains(&turned(f)));
+                choice.volume <= self.room && !doubled
+            };
+            let choices: Vec<Choice> = self.known[&face].iter().filter(fits).copied().collect();
+            if best.as_ref().is_none_or(|(_, other)| choices.len() < other.len()) {
+                let few = choices.len() < 2;
+                best = Some((face, choices));
+                if few {
+                    break;
+                }
+            }
+        }
+        best
+    }
+
+    /// Finds all tets that could be put on a face, the best first.
+    fn learn(&mut self, face: Face) {
+        if self.known.contains_key(&face) {
+            return;
+        }
+        let [a, b, c] = face;
+        let mut choices = Vec::new();
+        for v in (0..self.corners.len() as u8).filter(|v| !face.contains(v)) {
+            let [p, x, y, z] = [v, a, b, c].map(|i| self.corners[i as usize]);
+            if orient3d(p, x, y, z) != Sign::Positive {
+                continue;
+            }
+            let quality = mean_ratio(p, x, y, z).max(0.0);
+            let leaves = || face.iter().any(|&i| is_outside(self.corners, self.skin, [i, v]));
+            if quality >= self.least && !leaves() {
+                choices.push(Choice { apex: v, quality, volume: volume6(p, x, y, z) });
+            }
+        }
+        choices.sort_by(|one, other| other.quality.total_cmp(&one.quality).then(one.apex.cmp(&other.apex)));
+        self.known.insert(face, choices);
+    }
+
+    /// Puts a tet on an open face.
+    fn put(&mut self, face: Face, Choice { apex, volume, .. }: Choice) {
+        let [a, b, c] = face;
+        self.tets.push([apex, a, b, c]);
+        self.room -= volume;
+        self.open.retain(|&f| f != face);
+        // What is left sees the tet's other faces from behind; one that was open is closed.
+        for [u, v] in [[a, b], [b, c], [c, a]] {
+            match self.open.iter().position(|&f| f == turned([v, u, apex])) {
+                Some(i) => drop(self.open.swap_remove(i)),
+                None => self.open.push(turned([u, v, apex])),
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::TAU;
+
+    /// A prism on a triangle, its top turned, its sides bent in: the polyhedron of Schönhardt (1928).
+    fn prism(turn: f64) -> (Vec<Point>, Vec<[u32; 3]>) {
+        let at = |i: u32, z: f64| {
+            let angle = TAU / 3.0 * f64::from(i) + turn * z;
+            Point::new(angle.cos(), angle.sin(), z)
+        };
+        let points = (0..6).map(|i| at(i % 3, f64::from(i / 3))).collect();
+        let mut skin = vec![[0, 2, 1], [3, 4, 5]];
+        for i in 0..3 {
+            let (a, b, c, d) = (i, (i + 1) % 3, 3 + (i + 1) % 3, 3 + i);
+            skin.extend([[a, b, d], [b, c, d]]);
+        }
+        (points, skin)
+    }
+
+    fn volume(points: &[Point], tets: &[[u32; 4]]) -> f64 {
+        let six = |t: &[u32; 4]| {
+            let [a, b, c, d] = t.map(|v| &points[v as usize]);
+            volume6(a, b, c, d)
+        };
+        tets.iter().map(six).sum()
+    }
+
+    #[test]
+    fn a_prism_bent_out_is_filled_with_three_tets_and_one_bent_in_with_none() {
+        let (points, skin) = prism(0.3);
+        let tets = fill(&points, &skin, 0.0, &mut 1000).unwrap();
+        assert!(tets.len() == 3 || tets.len() == 4, "{tets:?}");
+        let (points, skin) = prism(-0.3);
+        assert_eq!(fill(&points, &skin, 0.0, &mut 1000), None);
+    }
+
+    #[test]
+    fn an_icosahedron_is_filled_without_gap_in_the_tries_allowed() {
+        let g = 0.5 * (1.0 + 5f64.sqrt());
+        let mut points = Vec::new();
+        for [x, y] in [[1.0, g], [-1.0, g], [1.0, -g], [-1.0, -g]] {
+            points.extend([[0.0, x, y], [x, y, 0.0], [y, 0.0, x]].map(Point::from));
+        }
+        let mut skin = Vec::new();
+        for a in 0..12u32 {
+            for b in a + 1..12 {
+                for c in b + 1..12 {
+                    let [p, q, r] = [a, b, c].map(|v| points[v as usize]);
+                    if [q - p, r - q, p - r].iter().all(|s| s.norm() < 2.1) {
+                        let outward = volume6(&Point::origin(), &p, &q, &r) > 0.0;
+                        skin.push(if outward { [a, b, c] } else { [a, c, b] });
+                    }
+                }
+            }
+        }
+        assert_eq!(skin.len(), 20);
+        let tets = fill(&points, &skin, 0.01, &mut 1000).unwrap();
+        let whole: f64 = skin
+            .iter()
+            .map(|&[a, b, c]| {
+                let [p, q, r] = [a, b, c].map(|v| points[v as usize]);
+                volume6(&Point::origin(), &p, &q, &r)
+            })
+            .sum();
+        assert!((volume(&points, &tets) - whole).abs() < 1e-12 * whole);
+        assert_eq!(fill(&points, &skin, 0.01, &mut 5), None);
+    }
+}
