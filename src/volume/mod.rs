@@ -19,7 +19,8 @@
 //! ```
 //!
 //! A surface that meets itself is refused when it is made (`intersect`, over the tree of `boxes`). The steps, one file each:
-//! 1. `delaunay`: the boundary points, by exact cavities (`cavity`), in random rounds along the Hilbert curve.
+//! 1. `delaunay`: the boundary points, by exact cavities (`cavity`), in random rounds along the Hilbert curve; `ties` make it have the diagonals
+//!    of grids.
 //! 2. `recover`: edges, then facets, by `flips`; where none is left, by Steiner points for a while (`steiner`).
 //! 3. `carve`: a flood from the triangles gives each tet its body and removes the outside.
 //! 4. `relocate`: Steiner points leave the surface: none or one stays inside on either side.
@@ -53,6 +54,7 @@ mod sectors;
 mod steiner;
 mod surface_faults;
 mod tetrahedra;
+mod ties;
 
 pub use closed_surface::ClosedSurface;
 pub(crate) use intersect::{intersections, middles_of_sides};
