@@ -44,6 +44,7 @@ mod flips;
 mod intersect;
 mod keep;
 mod lattice;
+mod legalize;
 mod points;
 mod polygon;
 mod recover;
@@ -51,6 +52,7 @@ mod relocate;
 #[cfg(test)]
 mod samples;
 mod sectors;
+mod sizes;
 mod steiner;
 mod surface_faults;
 mod tetrahedra;
