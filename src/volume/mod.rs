@@ -25,7 +25,8 @@
 //! 3. `carve`: a flood from the triangles gives each tet its body and removes the outside.
 //! 4. `relocate`: Steiner points leave the surface: none or one stays inside on either side.
 //! 5. `keep`: points that the caller wants.
-//! 6. `points`: the inside by the size field: lattices where it is level (`lattice`), frontal Delaunay elsewhere.
+//! 6. `points`: the inside by the size field: lattices where it is level (`lattice`), frontal Delaunay elsewhere, after flips that make
+//!    the mesh Delaunay again (`legalize`); sizes grow by a limited gradient whatever the field (`sizes`).
 //!
 //! Not promised: good shape. Steps 1 to 5 leave whatever the surface allows; step 6 places points so that nearly all tets are well
 //! shaped, but slivers remain: see [`improve`](crate::improve).
@@ -83,8 +84,8 @@ pub struct VolumeMesh {
 pub struct Settings {
     /// Whether to add points inside by the size field. Without: only what the boundary needs.
     pub fill: bool,
-    /// How much the wanted size may grow per unit of distance from a skin that is finer than the size field asks; the only
-    /// rule where the field is infinite.
+    /// How much the wanted size may grow per unit of distance, from a skin that is finer than the size field asks and from where the
+    /// field is finer; the only rule where the field is infinite.
     pub growth: f64,
     /// The largest number of tets; more end with an error.
     pub max_tets: usize,
