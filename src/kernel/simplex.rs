@@ -52,6 +52,21 @@ pub fn dihedral_cosines(p: &[Point; 4]) -> [f64; 6] {
     ]
 }
 
+/// The squared distance of a point from a triangle.
+pub fn squared_distance(point: &Point, corners: [&Point; 3]) -> f64 {
+    let [a, b, c] = corners;
+    let normal = area_vector(a, b, c);
+    let edges = [[a, b], [b, c], [c, a]];
+    if edges.iter().all(|[u, v]| normal.cross(&(*v - *u)).dot(&(point - *u)) >= 0.0) {
+        return (point - a).dot(&normal).powi(2) / normal.norm_squared();
+    }
+    let to_edge = |[u, v]: [&Point; 2]| {
+        let (along, to) = (v - u, point - u);
+        (to - along * (to.dot(&along) / along.norm_squared()).clamp(0.0, 1.0)).norm_squared()
+    };
+    edges.map(to_edge).into_iter().fold(f64::INFINITY, f64::min)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -64,6 +79,20 @@ mod tests {
         for (k, angle) in angles.iter().enumerate() {
             let expected = if k < 3 { 90.0 } else { 54.735_610_317_245_346 };
             assert!((angle - expected).abs() < 1e-9, "edge {k}: {angle}");
+        }
+    }
+
+    #[test]
+    fn the_distance_of_a_point_is_that_from_the_face_an_edge_or_a_corner() {
+        let corners = [[0., 0., 0.], [2., 0., 0.], [0., 2., 0.]].map(Point::from);
+        for (point, squared) in [
+            ([0.5, 0.5, 3.], 9.),
+            ([1., -1., 1.], 2.),
+            ([2., 2., 0.], 2.),
+            ([-3., -4., 0.], 25.),
+            ([4., 0., 1.], 5.),
+        ] {
+            assert!((squared_distance(&point.into(), corners.each_ref()) - squared).abs() < 1e-12);
         }
     }
 }

@@ -19,6 +19,9 @@ use crate::Point;
 /// Gives the target edge length at any point.
 pub trait SizeField: Sync {
     /// The wanted edge length at `point`, positive. The volume mesher also takes infinity: let sizes grow from the surface.
+    ///
+    /// The field may jump: the volume mesher limits its growth from the finer side. It is asked at points only, in the volume last of all in the
+    /// middle of each tet, so that a finer place is overlooked only if it is smaller than the tets around it.
     fn size_at(&self, point: &Point) -> f64;
 }
 

@@ -35,7 +35,7 @@ fn attempt_to_bound(
     attempt: u32,
     report: &mut Report,
 ) -> Result<Tetrahedra, VolumeError> {
-    let mut tets = delaunay::delaunay(points);
+    let mut tets = delaunay::delaunay(points, &surface.triangles);
     let mut constraints = Constraints::new(&surface.triangles);
     let mut recovery = Recovery::new(&mut tets, &mut constraints, attempt);
     let recovered = recovery.run();

@@ -9,7 +9,6 @@
 use super::tetrahedra::{NONE, Tetrahedra};
 use crate::Point;
 use crate::kernel::predicates::{Sign, orient3d};
-use std::collections::HashMap;
 
 /// A face of the cavity's surface, outward, and what lies behind it.
 #[derive(Clone, Copy, Debug)]
@@ -204,7 +203,7 @@ impl Cavity {
             mesh.remove_tet(t);
         }
         if !self.edges.reset(self.vertices.len()) {
-            return link_by_map(mesh, &self.replaced, &self.filled);
+            return link_by_sorting(mesh, &self.replaced, &self.filled);
         }
         for (wall, &t) in self.replaced.iter().zip(&self.filled) {
             let [a, b, c] = wall.numbers;
@@ -299,16 +298,17 @@ impl EdgeTable {
     }
 }
 
-/// As the table does, for a cavity with very many vertices.
+/// As the table does, for a cavity with very many vertices: each edge comes twice, and sorting brings the two together.
 #[cold]
-fn link_by_map(mesh: &mut Tetrahedra, walls: &[Wall], tets: &[u32]) {
-    let mut map = HashMap::with_capacity(3 * walls.len());
+fn link_by_sorting(mesh: &mut Tetrahedra, walls: &[Wall], tets: &[u32]) {
+    let mut sides: Vec<([u32; 2], u32)> = Vec::with_capacity(3 * walls.len());
     for (wall, &t) in walls.iter().zip(tets) {
         let [a, b, c] = wall.numbers;
-        map.extend([([b, c], 4 * t + 1), ([c, a], 4 * t + 2), ([a, b], 4 * t + 3)]);
+        let sorted = [[b, c], [c, a], [a, b]].map(|[p, q]| [p.min(q), p.max(q)]);
+        sides.extend(sorted.into_iter().zip(4 * t + 1..));
     }
-    for (wall, &t) in walls.iter().zip(tets) {
-        let [a, b, c] = wall.numbers;
-        mesh.across[t as usize][1..].copy_from_slice(&[map[&[c, b]], map[&[a, c]], map[&[b, a]]]);
+    sides.sort_unstable();
+    for pair in sides.chunks_exact(2) {
+        mesh.link(pair[0].1, pair[1].1);
     }
 }

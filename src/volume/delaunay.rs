@@ -3,10 +3,11 @@
 //! Four **far** vertices, after the points, take the place of a ghost vertex: hull, coplanar and
 //! collinear points are then cases like all others, also for the flips of the boundary recovery. The mesh
 //! is the Delaunay mesh of the points and the far vertices together; the hull of the points need not be in it,
-//! and need not be, for the boundary is recovered face by face whatever it is.
+//! and need not be, for the boundary is recovered face by face whatever it is. Where the points leave a choice, `ties` makes it.
 
 use super::cavity::{Cavity, Walk, walk};
 use super::tetrahedra::{NO_BODY, Tetrahedra};
+use super::ties;
 use crate::Point;
 use crate::kernel::hilbert::random_rounds;
 use crate::kernel::predicates::{Sign, orient3d};
@@ -16,12 +17,20 @@ use crate::kernel::predicates::{Sign, orient3d};
 /// lie outside; much farther, the spheres of far tets become so large that their signs need the slow exact predicates.
 const FAR: f64 = 10.0;
 
-/// Inserts all points into one large tet; the far vertices come after them.
+/// Inserts all points into one large tet; the far vertices come after them. Where there are several Delaunay meshes, it is one that has
+/// most of the triangles.
 ///
 /// No two points may be equal.
-pub(super) fn delaunay(points: &[Point]) -> Tetrahedra {
+pub(super) fn delaunay(points: &[Point], triangles: &[[u32; 3]]) -> Tetrahedra {
+    delaunay_by(points, ties::ranks(points, triangles))
+}
+
+/// The Delaunay mesh whose ties are settled by the ranks of the points.
+fn delaunay_by(points: &[Point], ranks: Vec<u32>) -> Tetrahedra {
     let mut mesh = Tetrahedra::new(points.to_vec());
     let first = far_tet(&mut mesh);
+    mesh.ranks = ranks;
+    mesh.ranks.extend(points.len() as u32..mesh.points.len() as u32);
     let mut cavity = Cavity::default();
     let mut hint = first;
     for v in random_rounds(points) {
@@ -29,10 +38,12 @@ pub(super) fn delaunay(points: &[Point]) -> Tetrahedra {
         let Walk::Inside(seed) = walk(&mesh, hint, &point) else {
             panic!("vertex {v} lies outside the far tet");
         };
+        mesh.newcomer = v;
         cavity.grow(&mut mesh, seed, &point);
         cavity.fill(&mut mesh, v, NO_BODY);
         hint = cavity.filled[0];
     }
+    mesh.ranks = Vec::new();
     mesh
 }
 
@@ -61,8 +72,16 @@ mod tests {
     use proptest::prelude::*;
 
     fn check_delaunay(points: &[Point]) {
-        let mesh = delaunay(points);
+        let mut random = Random::new(points.len() as u64);
+        let mut ranks: Vec<u32> = (0..points.len() as u32).collect();
+        ranks.sort_by_cached_key(|_| random.bits());
+        check_delaunay_by(points, delaunay(points, &[]));
+        check_delaunay_by(points, delaunay_by(points, ranks));
+    }
+
+    fn check_delaunay_by(points: &[Point], mesh: Tetrahedra) {
         assert_eq!(mesh.check(), Vec::<String>::new());
+        assert_eq!(mesh.points.len(), points.len() + 4);
         assert!(mesh.at_vertex.iter().all(|&t| t != super::super::tetrahedra::NONE));
         for t in mesh.alive() {
             let [a, b, c, d] = mesh.corners(t);

@@ -19,14 +19,16 @@
 //! ```
 //!
 //! A surface that meets itself is refused when it is made (`intersect`, over the tree of `boxes`). The steps, one file each:
-//! 1. `delaunay`: the boundary points, by exact cavities (`cavity`), in random rounds along the Hilbert curve.
+//! 1. `delaunay`: the boundary points, by exact cavities (`cavity`), in random rounds along the Hilbert curve; `ties` make it have the diagonals
+//!    of grids.
 //! 2. `recover`: edges, then facets, by `flips`; where none is left, by Steiner points for a while (`steiner`), where their cavity has most
 //!    room (`clearance`); `flat` flips away tets that rounding alone makes positive.
 //! 3. `carve`: a flood from the triangles gives each tet its body and removes the outside.
 //! 4. `relocate`: Steiner points leave the surface: none or one stays inside on either side. `inside` deletes those that are not needed,
 //!    by a search for tets that fill the hole (`small`).
 //! 5. `keep`: points that the caller wants.
-//! 6. `points`: the inside by the size field: lattices where it is level (`lattice`), frontal Delaunay elsewhere.
+//! 6. `points`: the inside by the size field: lattices where it is level (`lattice`), frontal Delaunay elsewhere, after flips that make
+//!    the mesh Delaunay again (`legalize`); sizes grow by a limited gradient whatever the field (`sizes`).
 //!
 //! Not promised: good shape. Steps 1 to 5 leave whatever the surface allows; step 6 places points so that nearly all tets are well
 //! shaped, but slivers remain: see [`improve`](crate::improve).
@@ -48,6 +50,7 @@ mod inside;
 mod intersect;
 mod keep;
 mod lattice;
+mod legalize;
 mod points;
 mod polygon;
 mod recover;
@@ -55,10 +58,12 @@ mod relocate;
 #[cfg(test)]
 mod samples;
 mod sectors;
+mod sizes;
 mod small;
 mod steiner;
 mod surface_faults;
 mod tetrahedra;
+mod ties;
 
 pub use closed_surface::ClosedSurface;
 pub(crate) use intersect::{intersections, middles_of_sides};
@@ -85,8 +90,8 @@ pub struct VolumeMesh {
 pub struct Settings {
     /// Whether to add points inside by the size field. Without: only what the boundary needs.
     pub fill: bool,
-    /// How much the wanted size may grow per unit of distance from a skin that is finer than the size field asks; the only
-    /// rule where the field is infinite.
+    /// How much the wanted size may grow per unit of distance, from a skin that is finer than the size field asks and from where the
+    /// field is finer; the only rule where the field is infinite.
     pub growth: f64,
     /// The largest number of tets; more end with an error.
     pub max_tets: usize,

@@ -7,15 +7,17 @@
 //! another vertex or to the boundary. Wave by wave the front moves inward; what is still coarse when it has
 //! passed gets its circumcentre, under the same filter. Where the size is level, a lattice went in before (`lattice`).
 //!
-//! The size at a point is the field's, but not above that of any vertex near it plus the growth from there; at vertices of the skin it is not
-//! much above their edges' mean.
+//! Sizes are those of `sizes`. The mesh is made Delaunay first (`legalize`), as far as the skin lets it be: what is said here of
+//! circumspheres relies on it.
 
 use super::cavity::{Cavity, Walk, walk};
+use super::legalize::legalize;
 use super::tetrahedra::{NONE, Tetrahedra};
-use crate::kernel::hilbert::hilbert_order;
-use crate::kernel::simplex::area_vector;
+use crate::kernel::hilbert::random_rounds;
+use crate::kernel::simplex::{area_vector, squared_distance};
 use crate::size::SizeField;
 use crate::{Point, Vector};
+use rayon::prelude::*;
 
 /// The circumradius of a regular tet of edge 1.
 const REGULAR: f64 = 0.612_372_435_695_794_5;
@@ -34,20 +36,26 @@ const NEAREST: f64 = 0.8;
 /// 0.3 to 0.5 nothing changes on the skins tried, where ideal points are far enough; it matters where a skin is too coarse.
 const NEAREST_FACE: f64 = 0.4;
 
-/// Edges of a skin made for a size h vary; up to this many times its mean edge at a vertex is taken for the same h.
-const SKIN_TOLERANCE: f64 = 1.25;
+/// No vertex is inserted nearer to a facet than this fraction of its least height either. Beside a skin much coarser than the wanted size a
+/// layer of small tets right at it can only be joined to the few corners of the skin by flat tets and by edges as long as the skin's.
+const NEAREST_COARSE: f64 = 0.2;
+
+/// The field dips in a tet where its circumradius is more than this many times that of a fine tet of the size in its middle.
+const DIP: f64 = 1.5;
 
 /// The working state of the point placement.
 pub(super) struct Filler<'a> {
     pub(super) mesh: &'a mut Tetrahedra,
-    size: &'a dyn SizeField,
-    scale: f64,
+    pub(super) size: &'a dyn SizeField,
+    pub(super) scale: f64,
     /// The wanted size at each vertex, in the mesher's units.
-    sizes: Vec<f64>,
+    pub(super) sizes: Vec<f64>,
     /// By slot.
-    states: Vec<State>,
+    pub(super) states: Vec<State>,
     pub(super) cavity: Cavity,
     pub(super) limits: Limits,
+    /// Tets that were fine before the size at a vertex of theirs was lowered.
+    pub(super) lowered: Vec<u32>,
     /// Why the placement stops early, if it does.
     stopped: Option<Stopped>,
 }
@@ -61,7 +69,7 @@ pub(super) struct Limits {
 
 /// How far a tet is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-enum State {
+pub(super) enum State {
     /// To be made smaller.
     #[default]
     Coarse,
@@ -88,6 +96,7 @@ pub(super) fn fill(
     limits: Limits,
 ) -> Result<usize, Stopped> {
     let before = mesh.points.len();
+    legalize(mesh);
     let mut filler = Filler {
         mesh,
         size,
@@ -96,75 +105,21 @@ pub(super) fn fill(
         states: Vec::new(),
         cavity: Cavity::default(),
         limits,
+        lowered: Vec::new(),
         stopped: None,
     };
     filler.size_vertices();
-    filler.add_lattices();
-    filler.advance();
-    filler.finish();
+    if !filler.stops() {
+        filler.add_lattices();
+        filler.place();
+    }
     match filler.stopped {
         Some(stopped) => Err(stopped),
         None => Ok(mesh.points.len() - before),
     }
 }
 
-/// The sum and the number of the lengths of the skin's edges at each vertex, each edge counted once per triangle.
-fn skin_edges(mesh: &Tetrahedra) -> Vec<(f64, u32)> {
-    let mut skin = vec![(0.0, 0u32); mesh.points.len()];
-    for half_face in mesh.alive().flat_map(|t| 4 * t..4 * t + 4).filter(|&h| mesh.is_locked(h)) {
-        let [a, b, c] = mesh.face(half_face);
-        for [u, v] in [[a, b], [b, c], [c, a]] {
-            let length = (mesh.point(u) - mesh.point(v)).norm();
-            for w in [u, v] {
-                skin[w as usize].0 += length;
-                skin[w as usize].1 += 1;
-            }
-        }
-    }
-    skin
-}
-
 impl Filler<'_> {
-    /// Finds the wanted size at each vertex: the field's, or what the edges of the skin suggest if that is less. Where neither
-    /// says anything, it grows from the neighbours.
-    fn size_vertices(&mut self) {
-        for (v, (sum, count)) in skin_edges(self.mesh).into_iter().enumerate() {
-            let mut size = 0.0;
-            if self.mesh.at_vertex[v] != NONE {
-                let point = self.mesh.points[v];
-                size = self.ask(&point);
-                self.note_size(&point, size);
-                if count > 0 {
-                    size = size.min(SKIN_TOLERANCE * sum / f64::from(count));
-                }
-            }
-            self.sizes.push(size);
-        }
-        let mut infinite: Vec<u32> =
-            (0u32..).zip(&self.sizes).filter(|&(_, &size)| size == f64::INFINITY).map(|(v, _)| v).collect();
-        let mut star = Vec::new();
-        while !infinite.is_empty() {
-            let before = infinite.len();
-            infinite.retain(|&v| {
-                self.mesh.star(v, &mut star);
-                let size = star.iter().fold(f64::INFINITY, |size, &t| {
-                    let growth =
-                        |u: u32| self.limits.growth * (self.mesh.point(u) - self.mesh.point(v)).norm();
-                    let from = |u: u32| self.sizes[u as usize] + growth(u);
-                    self.mesh.tets[t as usize].iter().fold(size, |size, &u| size.min(from(u)))
-                });
-                self.sizes[v as usize] = size;
-                size.is_infinite()
-            });
-            assert!(infinite.len() < before, "vertices {infinite:?} are not joined to the surface");
-        }
-    }
-
-    /// What the size field says, in the mesher's units.
-    fn ask(&self, point: &Point) -> f64 {
-        self.size.size_at(&(point / self.scale)) * self.scale
-    }
-
     /// Stops the placement if this is no size.
     pub(super) fn note_size(&mut self, point: &Point, size: f64) {
         if size.is_nan() || size <= 0.0 {
@@ -199,29 +154,39 @@ impl Filler<'_> {
         radius2 <= (FINE * REGULAR * 0.25 * (a + b + c + d)).powi(2)
     }
 
-    /// The wanted size at a vertex.
-    fn at(&self, vertex: u32) -> f64 {
-        self.sizes[vertex as usize]
-    }
-
-    fn state(&self, t: u32) -> State {
+    pub(super) fn state(&self, t: u32) -> State {
         self.states[t as usize]
     }
 
-    /// The coarse tets, near ones near each other. Later waves inherit the order of the first. It keeps the work in the
-    /// cache: 2 million tets in the shaft take 3.7 s instead of 5.7 s.
-    fn along_hilbert_curve(&self) -> Vec<u32> {
+    /// The coarse tets, near ones near each other, in random rounds along the Hilbert curve. Later waves inherit the order of the first. Along the curve it keeps
+    /// the work in the cache: 2 million tets in the shaft take 3.7 s instead of 5.7 s. In rounds it keeps cavities small where tets
+    /// reach from skin to skin: in a ball all have nearly the same circumsphere. With an infinite field time then grows by 2.25 for
+    /// each doubling of the skin, along the curve at once by 2.5. (Circumcentres of the largest tets first, as separators, cost as much as they save.)
+    fn in_random_rounds(&self) -> Vec<u32> {
         let is_coarse = |t: &u32| self.state(*t) == State::Coarse;
         let coarse: Vec<u32> = self.mesh.alive().filter(is_coarse).collect();
         let places: Vec<Point> =
             coarse.iter().map(|&t| *self.mesh.point(self.mesh.tets[t as usize][0])).collect();
-        hilbert_order(&places).into_iter().map(|i| coarse[i as usize]).collect()
+        random_rounds(&places).into_iter().map(|i| coarse[i as usize]).collect()
+    }
+
+    /// The front, what it leaves, and where the field dips; this again until there is no dip.
+    fn place(&mut self) {
+        self.lower_all();
+        self.judge(0..self.mesh.tets.len() as u32);
+        let mut open = self.in_random_rounds();
+        loop {
+            self.advance(open);
+            self.finish();
+            open = self.fill_dips();
+            if open.is_empty() {
+                break;
+            }
+        }
     }
 
     /// Waves of ideal points, until no front is left.
-    fn advance(&mut self) {
-        self.judge(0..self.mesh.tets.len() as u32);
-        let mut coarse = self.along_hilbert_curve();
+    fn advance(&mut self, mut coarse: Vec<u32>) {
         while !coarse.is_empty() {
             let mut next = Vec::new();
             let mut moved = false;
@@ -251,6 +216,7 @@ impl Filler<'_> {
                 } else {
                     next.push(t);
                 }
+                next.append(&mut self.lowered);
             }
             if !moved {
                 break;
@@ -263,10 +229,7 @@ impl Filler<'_> {
     ///
     /// Away from the boundary that leaves no hole: the circumcentre of a Delaunay tet is as far from all vertices as from its own, so
     /// where it is refused the circumradius is below [`NEAREST`] times the size there. Beside a skin that is much coarser than the
-    /// wanted size long edges remain, where circumcentres lie behind the skin. Ideal points of all faces and the middles of
-    /// long edges, tried too, were nearly all refused there, left as many long edges, and took up to twice the time.
-    ///
-    /// Sizes are asked for at vertices and circumcentres only: a dip of the field between the vertices of a fine tet is not seen.
+    /// wanted size long edges remain, where circumcentres lie behind the skin or too near to it: see [`NEAREST_COARSE`].
     fn finish(&mut self) {
         let mut open: Vec<u32> = self.mesh.alive().collect();
         while let Some(t) = open.pop() {
@@ -280,29 +243,44 @@ impl Filler<'_> {
             let size = self.size_near(t, &center);
             if self.insert_and_judge(t, center, size) {
                 open.extend_from_slice(&self.cavity.filled);
+                open.append(&mut self.lowered);
             }
         }
+    }
+
+    /// Middles of fine tets where the field asks for much less than at the corners; the tets that are coarse then.
+    ///
+    /// So no dip of the field is overlooked that is as wide as a tet around it.
+    fn fill_dips(&mut self) -> Vec<u32> {
+        let fine: Vec<u32> = self.mesh.alive().filter(|&t| self.state(t) == State::Fine).collect();
+        let dip = |&t: &u32| {
+            let [a, b, c, d] = self.mesh.corners(t);
+            let middle = Point::from((a.coords + b.coords + c.coords + d.coords) * 0.25);
+            let size = self.size_near(t, &middle);
+            let wanted = FINE * REGULAR * DIP * size;
+            // What is no size at all is noted, too.
+            (size.is_nan() || self.mesh.sphere(t).squared_radius() > wanted * wanted)
+                .then_some((t, middle, size))
+        };
+        let dips: Vec<(u32, Point, f64)> = fine.par_iter().filter_map(dip).collect();
+        let mut coarse = Vec::new();
+        for (t, middle, size) in dips {
+            if self.stops() {
+                break;
+            }
+            if self.mesh.is_alive(t) && self.insert_and_judge(t, middle, size) {
+                coarse.extend_from_slice(&self.cavity.filled);
+                coarse.append(&mut self.lowered);
+            }
+        }
+        coarse.retain(|&t| self.mesh.is_alive(t) && self.state(t) == State::Coarse);
+        coarse
     }
 
     /// Whether the front is at this face of a coarse tet.
     fn is_front(&self, half_face: u32) -> bool {
         let other = self.mesh.across(half_face);
         other == NONE || self.mesh.is_locked(half_face) || self.state(other >> 2) != State::Coarse
-    }
-
-    /// The wanted size at a point in or near a tet.
-    pub(super) fn size_near(&self, t: u32, point: &Point) -> f64 {
-        let asked = self.ask(point);
-        self.grown_size(t, point, asked)
-    }
-
-    /// What sizes at the corners of a tet leave of the size asked for at a point.
-    pub(super) fn grown_size(&self, t: u32, point: &Point, asked: f64) -> f64 {
-        self.mesh.tets[t as usize].iter().fold(asked, |size, &v| {
-            let grown = self.at(v) + self.limits.growth * (point - self.mesh.point(v)).norm();
-            // What is no number stays so.
-            if grown < size { grown } else { size }
-        })
     }
 
     /// The point over a face, into its tet, whose edges to the face have the wanted length; and that length.
@@ -332,6 +310,7 @@ impl Filler<'_> {
             let filled = std::mem::take(&mut self.cavity.filled);
             self.judge(filled.iter().copied());
             self.cavity.filled = filled;
+            self.lower_around(self.mesh.points.len() as u32 - 1);
         }
         inserted
     }
@@ -340,7 +319,7 @@ impl Filler<'_> {
     pub(super) fn insert(&mut self, t: u32, point: Point, size: f64) -> bool {
         self.note_size(&point, size);
         let finite = point.x.is_finite() && point.y.is_finite() && point.z.is_finite();
-        if !finite || self.is_corner_near(t, &point, size) {
+        if self.stopped.is_some() || !finite || self.is_corner_near(t, &point, size) {
             return false;
         }
         let Walk::Inside(seed) = walk(self.mesh, t, &point) else { return false };
@@ -348,6 +327,7 @@ impl Filler<'_> {
             return false;
         }
         self.cavity.grow(self.mesh, seed, &point);
+        let size = self.cavity.vertices.iter().fold(size, |size, &v| self.grown(size, v, &point));
         if self.cavity.vertices.iter().any(|&v| self.is_near(v, &point, size))
             || !self.cavity.make_star_shaped(self.mesh, seed, &point)
             || self.cavity.walls.iter().any(|&w| self.is_skin_near(w, &point, size))
@@ -382,7 +362,12 @@ impl Filler<'_> {
         }
         let [a, b, c] = self.mesh.face_points(wall);
         let normal = area_vector(a, b, c);
-        (a - point).dot(&normal) < NEAREST_FACE * size * normal.norm()
+        let area2 = normal.norm();
+        let height = (a - point).dot(&normal) / area2;
+        let longest2 = (b - a).norm_squared().max((c - b).norm_squared()).max((a - c).norm_squared());
+        let coarse = NEAREST_COARSE * area2 / longest2.sqrt();
+        height < NEAREST_FACE * size
+            || (height < coarse && squared_distance(point, [a, b, c]) < coarse * coarse)
     }
 }
 

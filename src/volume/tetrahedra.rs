@@ -50,6 +50,11 @@ pub(super) struct Tetrahedra {
     pub bodies: Vec<u32>,
     /// Some tet at each vertex, or `NONE`.
     pub at_vertex: Vec<u32>,
+    /// The ranks of the vertices, by which a vertex on a circumsphere counts as inside or not: see [`ties`](super::ties). Without
+    /// ranks it does not.
+    pub ranks: Vec<u32>,
+    /// The vertex that asks.
+    pub newcomer: u32,
     free: Vec<u32>,
     /// The circumsphere of each tet, found when it is asked for first: points with tets must not move.
     spheres: Vec<Circumsphere>,
@@ -167,7 +172,7 @@ impl Tetrahedra {
         sphere
     }
 
-    /// Whether a point lies strictly inside the circumsphere of a tet; exact.
+    /// Whether a point lies inside the circumsphere of a tet; exact. With [`ranks`](Self::ranks) it must be that of the newcomer.
     #[inline]
     pub fn is_in_sphere(&mut self, tet: u32, point: &Point) -> bool {
         self.spheres[tet as usize].holds(point).unwrap_or_else(|| self.settle(tet, point))
@@ -178,7 +183,10 @@ impl Tetrahedra {
     fn settle(&mut self, tet: u32, point: &Point) -> bool {
         self.keep_sphere(tet).holds(point).unwrap_or_else(|| {
             let [a, b, c, d] = self.corners(tet);
-            insphere(a, b, c, d, point) == Sign::Positive
+            match insphere(a, b, c, d, point) {
+                Sign::Zero => !self.ranks.is_empty() && super::ties::is_inside(self, tet, self.newcomer),
+                sign => sign == Sign::Positive,
+            }
         })
     }
 
