@@ -6,7 +6,7 @@
 use super::normals::SLIVER_HEIGHT;
 use super::{FacetModel, close_curves};
 use crate::kernel::simplex::area_vector;
-use crate::size::{SizeField, SizeSettings, Source, SourceTree};
+use crate::size::{Closeness, SizeField, SizeSettings, Source, SourceTree};
 use crate::{Point, Vector};
 
 /// Sizes from the curvature of facets and curves, from short curves, and from the user's settings.
@@ -42,6 +42,7 @@ impl FacetSize {
             curvature_safety: 1.0 / turn,
             segments_per_curve: f64::MIN_POSITIVE,
             grading: TURN_GRADING,
+            closeness: Closeness::OFF,
             scale: 1.0,
             sources: sources.to_vec(),
         };

@@ -9,7 +9,7 @@ mod preset;
 mod source_tree;
 
 pub use geometric::{GeometricSize, SizeSettings};
-pub use preset::Preset;
+pub use preset::{Closeness, Preset};
 pub use source_tree::{Source, SourceTree};
 
 use crate::Point;
