@@ -132,6 +132,20 @@ impl Report {
     }
 }
 
+/// What was done for thin walls, and what it would take to do more.
+fn write_thin_walls(f: &mut fmt::Formatter<'_>, coarse: &CoarseReport) -> fmt::Result {
+    let walls = &coarse.thin_walls;
+    let Some(thinnest) = walls.thinnest else { return Ok(()) };
+    write!(f, "           sizes lowered in thin walls, the thinnest {thinnest:.3e}")?;
+    if walls.limited > 0 {
+        write!(
+            f,
+            "; some are too thin for the sizes and stay badly shaped: --closeness resolves them, at the cost of many tets"
+        )?;
+    }
+    writeln!(f)
+}
+
 /// A count with blanks between groups of three digits.
 fn grouped(count: u64) -> String {
     let digits = count.to_string();
@@ -173,6 +187,7 @@ impl fmt::Display for Report {
                 coarse.illegal_repaired, coarse.illegal_left
             )?;
         }
+        write_thin_walls(f, coarse)?;
         let mesh = &self.mesh;
         writeln!(
             f,

@@ -34,8 +34,8 @@ impl FacetSize {
         Self(SourceTree::new(model.bounds, settings.grading, maximum, &thinned(sources)))
     }
 
-    /// The size at which patches and curves turn by `turn` (radians) along an edge; and smaller at `sources`.
-    pub(super) fn of_turn(model: &FacetModel, turn: f64, sources: &[Source]) -> Self {
+    /// The size at which patches and curves turn by `turn` (radians) along an edge.
+    pub(super) fn of_turn(model: &FacetModel, turn: f64) -> Self {
         let settings = SizeSettings {
             maxh: None,
             minh: 0.0,
@@ -44,7 +44,7 @@ impl FacetSize {
             grading: TURN_GRADING,
             closeness: Closeness::OFF,
             scale: 1.0,
-            sources: sources.to_vec(),
+            sources: Vec::new(),
         };
         Self::new(model, &settings)
     }

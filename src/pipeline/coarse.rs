@@ -29,6 +29,18 @@ pub enum CoarseError {
         /// The middles of the sides of triangles that cross others.
         crossing: Vec<Point>,
     },
+    /// The triangles that were given do not bound bodies.
+    #[error(
+        "the surface's own triangles intersect, or touch without being the same: {count} places, the first at ({}, {}, {}); where \
+         surfaces touch, give both the same triangles there (join them in the program that made them), or keep them apart",
+        first.x, first.y, first.z
+    )]
+    FacetsMeet {
+        /// Middles of sides of such triangles.
+        count: usize,
+        /// The first of them.
+        first: Point,
+    },
     /// A body could not be filled.
     #[error(transparent)]
     Volume(#[from] VolumeError),

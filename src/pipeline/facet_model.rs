@@ -101,6 +101,10 @@ impl FacetSolid {
             Err(error) => {
                 // Where triangles cross, smaller sizes were tried already.
                 let crossed = matches!(error, CoarseError::NotClosed { .. });
+                let meeting = if crossed { self.model.crossings() } else { Vec::new() };
+                if let Some(&first) = meeting.first() {
+                    return Attempt::Failed(CoarseError::FacetsMeet { count: meeting.len(), first });
+                }
                 let may_lower = allowed.lower && !self.keep_surface && !crossed;
                 let lowered = if may_lower { error.remedy(&[], &size) } else { Vec::new() };
                 if lowered.is_empty() { Attempt::Failed(error) } else { Attempt::Lower(lowered) }

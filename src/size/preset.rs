@@ -5,7 +5,8 @@
 pub struct Closeness {
     /// The size there at most, in units of the thickness; infinity leaves thin walls as they are.
     pub ratio: f64,
-    /// The size is lowered by this factor at most, so that a sheet of paper does not become a mesh of its thickness unasked.
+    /// The size is lowered by this factor at most, and less where more would be needed: so that a sheet of paper does not become a
+    /// mesh of its thickness unasked.
     pub most: f64,
 }
 
@@ -73,9 +74,9 @@ impl Preset {
         match self {
             Self::VeryCoarse => Closeness::OFF,
             Self::Coarse => Closeness { ratio: 3.0, most: 4.0 },
-            Self::Moderate => Closeness { ratio: 1.5, most: 8.0 },
-            Self::Fine => Closeness { ratio: 1.0, most: 16.0 },
-            Self::VeryFine => Closeness { ratio: 0.5, most: 32.0 },
+            Self::Moderate => Closeness { ratio: 2.0, most: 8.0 },
+            Self::Fine => Closeness { ratio: 1.5, most: 16.0 },
+            Self::VeryFine => Closeness { ratio: 1.0, most: 32.0 },
         }
     }
 

@@ -54,7 +54,7 @@ pub struct Walls<'a> {
 /// What was found of walls that are thin against the sizes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct ThinWalls {
-    /// Places at which the size was lowered.
+    /// Places at which the size is too large for the thickness.
     pub places: u64,
     /// Those of them that want a lower size than [`Closeness::most`] allows.
     pub limited: u64,
@@ -81,12 +81,12 @@ pub fn thin_walls(walls: &Walls) -> (Vec<Source>, ThinWalls) {
     found.places = places.len() as u64;
     found.limited = places.iter().filter(|place| place.limited).count() as u64;
     found.thinnest = places.iter().map(|place| place.thickness).min_by(f64::total_cmp);
-    (places.into_iter().map(|place| place.source).collect(), found)
+    (places.into_iter().filter_map(|place| place.source).collect(), found)
 }
 
 #[derive(Clone, Copy)]
 struct Place {
-    source: Source,
+    source: Option<Source>,
     thickness: f64,
     limited: bool,
 }
@@ -141,16 +141,16 @@ impl<'a> Prober<'a> {
             return;
         };
         let wanted = ratio * thickness;
-        let finest = size / most;
-        let spacing = SPACING * wanted.clamp(finest, size);
+        let lowered = lowered(size, wanted, most);
+        let spacing = SPACING * lowered;
         if length(longest) > spacing && halvings > 0 {
             let [i, j, k] = [longest, (longest + 1) % 3, (longest + 2) % 3];
             let cut = nalgebra::center(&part[j], &part[k]);
             self.probe(t, into, [part[i], part[j], cut], halvings - 1, places);
             self.probe(t, into, [part[i], cut, part[k]], halvings - 1, places);
         } else if wanted < WORTH * size {
-            let source = Source { point: middle, size: wanted.max(finest) };
-            places.push(Place { source, thickness, limited: wanted < finest });
+            let source = (lowered < WORTH * size).then_some(Source { point: middle, size: lowered });
+            places.push(Place { source, thickness, limited: wanted < lowered });
         }
     }
 
@@ -197,6 +197,13 @@ impl<'a> Prober<'a> {
     }
 }
 
+/// The size that becomes of one where a smaller one is wanted: that, if it is no more than `most` times smaller; else ever less is done,
+/// and nothing from about twice that on, as a little of it costs many tets that are flat still.
+fn lowered(size: f64, wanted: f64, most: f64) -> f64 {
+    let beyond = size / (wanted * most);
+    if beyond <= 1.0 { wanted } else { size * (beyond.powi(3) / most).min(1.0) }
+}
+
 /// By patch: those that a curve or corner is common to, ascending.
 fn adjacent_patches(mesh: &SurfaceMesh) -> Vec<Vec<PatchId>> {
     let patches = mesh.triangles.iter().map(|t| t.patch.index() + 1).max().unwrap_or(0);
@@ -224,4 +231,64 @@ fn adjacent_patches(mesh: &SurfaceMesh) -> Vec<Vec<PatchId>> {
         list.dedup();
     }
     adjacent
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::facets::{FacetModel, Facets, keep};
+    use crate::size::UniformSize;
+
+    /// A box as facets.
+    fn slab([x, y, z]: [f64; 3]) -> FacetModel {
+        let points = (0..8)
+            .map(|i| Point::new(x * f64::from(i & 1), y * f64::from(i >> 1 & 1), z * f64::from(i >> 2 & 1)));
+        let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+        let triangles = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+        let facets = Facets { points: points.collect(), triangles, ..Facets::default() };
+        FacetModel::new(&[facets], &crate::facets::Settings::default()).unwrap()
+    }
+
+    fn found(model: &FacetModel, size: f64, closeness: Closeness) -> (Vec<Source>, ThinWalls) {
+        thin_walls(&Walls {
+            mesh: &keep(model),
+            regions: &|patch| [model.patch(patch).inside, model.patch(patch).outside],
+            project: &|_, point| *point,
+            size: &UniformSize(size),
+            closeness,
+        })
+    }
+
+    #[test]
+    fn a_plate_gets_sources_all_over_and_a_block_none() {
+        let closeness = Closeness { ratio: 2.0, most: 8.0 };
+        let (sources, walls) = found(&slab([4.0, 4.0, 0.25]), 1.0, closeness);
+        assert!(walls.thinnest.is_some_and(|d| (d - 0.25).abs() < 1e-12), "{walls:?}");
+        assert_eq!(walls.limited, 0);
+        assert!(sources.iter().all(|s| (s.size - 0.5).abs() < 1e-12));
+        // No place on the large faces is further from a source than the spacing says.
+        for (i, j) in (0..9).flat_map(|i| (0..9).map(move |j| (i, j))) {
+            let p = Point::new(0.5 * f64::from(i), 0.5 * f64::from(j), 0.0);
+            let nearest = sources.iter().map(|s| (s.point - p).norm()).fold(f64::INFINITY, f64::min);
+            assert!(nearest < SPACING * 0.5, "{p}: {nearest}");
+        }
+        let (sources, walls) = found(&slab([1.0, 1.0, 1.0]), 1.0, closeness);
+        assert!(sources.is_empty() && walls == ThinWalls::default());
+    }
+
+    #[test]
+    fn what_cannot_be_resolved_is_counted_and_left_as_it_is() {
+        let paper = slab([4.0, 4.0, 0.001]);
+        let (sources, walls) = found(&paper, 1.0, Closeness { ratio: 2.0, most: 8.0 });
+        assert!(sources.is_empty() && walls.limited > 0 && walls.limited == walls.places, "{walls:?}");
+        assert!(found(&paper, 1.0, Closeness::OFF).1 == ThinWalls::default());
+    }
+
+    #[test]
+    fn less_is_done_the_more_would_be_needed() {
+        let factor = |needed: f64| 1.0 / lowered(1.0, 1.0 / needed, 8.0);
+        assert_eq!([factor(1.0), factor(4.0), factor(8.0)], [1.0, 4.0, 8.0]);
+        assert!((factor(12.0) - 8.0 / 1.5_f64.powi(3)).abs() < 1e-12);
+        assert_eq!([factor(16.0), factor(1e6)], [1.0, 1.0]);
+    }
 }
