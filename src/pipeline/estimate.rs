@@ -19,10 +19,10 @@ const LONGEST: f64 = 2.0;
 const MOST_HALVINGS: u32 = 30;
 
 /// Steps towards the wanted number at most.
-const MOST_STEPS: usize = 6;
+const MOST_STEPS: usize = 4;
 
-/// A number this near, as a logarithm, is as good as the estimate.
-const NEAR: f64 = 0.03;
+/// A number this near, as a logarithm, is as good as the estimate, and well inside what counts as reached.
+const NEAR: f64 = 0.08;
 
 /// The scale at which `goal` tets are to be expected, from a mesh `made` with these settings; `None` without a size field.
 pub(super) fn scale_for(
@@ -56,11 +56,12 @@ pub(super) fn scale_for(
     scale.is_finite().then_some(scale)
 }
 
-/// The settings at another scale: what was lowered on the way at this one is lowered in proportion.
+/// The settings at another scale: what was lowered on the way at this one is larger in proportion at a larger one, and small enough at
+/// a smaller one.
 fn at_scale(settings: &SizeSettings, scale: f64, own_sources: usize) -> SizeSettings {
     let mut sizes = SizeSettings { scale, ..settings.clone() };
     for source in &mut sizes.sources[own_sources..] {
-        source.size *= scale / settings.scale;
+        source.size *= (scale / settings.scale).max(1.0);
     }
     sizes
 }

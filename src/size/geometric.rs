@@ -48,9 +48,10 @@ impl Default for SizeSettings {
 }
 
 impl SizeSettings {
-    /// How small the sizes are in thin walls, under [`scale`](Self::scale).
+    /// How small the sizes are in thin walls, under [`scale`](Self::scale): where fewer tets are wanted, walls get fewer too; where
+    /// more are, the walls need no more than they have.
     pub fn scaled_closeness(&self) -> Closeness {
-        Closeness { ratio: self.closeness.ratio * self.scale, ..self.closeness }
+        Closeness { ratio: self.closeness.ratio * self.scale.max(1.0), ..self.closeness }
     }
 
     /// A bound set by the user or the file under [`scale`](Self::scale).

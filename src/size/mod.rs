@@ -10,6 +10,7 @@ mod source_tree;
 
 pub use geometric::{GeometricSize, SizeSettings};
 pub use preset::{Closeness, Preset};
+pub(crate) use source_tree::thinned;
 pub use source_tree::{Source, SourceTree};
 
 use crate::Point;

@@ -14,7 +14,7 @@ use crate::kernel::nearest::{at, in_triangle};
 use crate::kernel::simplex::area_vector;
 use crate::kernel::tree::{Tree, bounds};
 use crate::mesh::Class;
-use crate::size::{Closeness, SizeField, Source};
+use crate::size::{Closeness, SizeField, Source, thinned};
 use crate::{Point, Vector};
 use csg::{BodyId, PatchId};
 use rayon::prelude::*;
@@ -81,7 +81,7 @@ pub fn thin_walls(walls: &Walls) -> (Vec<Source>, ThinWalls) {
     found.places = places.len() as u64;
     found.limited = places.iter().filter(|place| place.limited).count() as u64;
     found.thinnest = places.iter().map(|place| place.thickness).min_by(f64::total_cmp);
-    (places.into_iter().filter_map(|place| place.source).collect(), found)
+    (thinned(places.into_iter().filter_map(|place| place.source).collect()), found)
 }
 
 #[derive(Clone, Copy)]
@@ -266,11 +266,11 @@ mod tests {
         assert!(walls.thinnest.is_some_and(|d| (d - 0.25).abs() < 1e-12), "{walls:?}");
         assert_eq!(walls.limited, 0);
         assert!(sources.iter().all(|s| (s.size - 0.5).abs() < 1e-12));
-        // No place on the large faces is further from a source than the spacing says.
+        // No place on the large faces is further from a source than a spacing and a cell of those that are thinned.
         for (i, j) in (0..9).flat_map(|i| (0..9).map(move |j| (i, j))) {
             let p = Point::new(0.5 * f64::from(i), 0.5 * f64::from(j), 0.0);
             let nearest = sources.iter().map(|s| (s.point - p).norm()).fold(f64::INFINITY, f64::min);
-            assert!(nearest < SPACING * 0.5, "{p}: {nearest}");
+            assert!(nearest < (SPACING + 1.0) * 0.5, "{p}: {nearest}");
         }
         let (sources, walls) = found(&slab([1.0, 1.0, 1.0]), 1.0, closeness);
         assert!(sources.is_empty() && walls == ThinWalls::default());
