@@ -136,12 +136,19 @@ impl Report {
 fn write_thin_walls(f: &mut fmt::Formatter<'_>, coarse: &CoarseReport) -> fmt::Result {
     let walls = &coarse.thin_walls;
     let Some(thinnest) = walls.thinnest else { return Ok(()) };
-    write!(f, "           sizes lowered in thin walls, the thinnest {thinnest:.3e}")?;
-    if walls.limited > 0 {
-        write!(
+    write!(f, "           walls as thin as {thinnest:.3e}: ")?;
+    match walls.limited {
+        0 => write!(f, "sizes lowered there")?,
+        limited if limited < walls.places => {
+            write!(
+                f,
+                "sizes lowered there, but for some that would take far more tets (--closeness insists)"
+            )?;
+        }
+        _ => write!(
             f,
-            "; some are too thin for the sizes and stay badly shaped: --closeness resolves them, at the cost of many tets"
-        )?;
+            "too thin for the sizes, left as they are (--closeness insists, at the cost of many tets)"
+        )?,
     }
     writeln!(f)
 }

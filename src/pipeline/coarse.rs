@@ -147,7 +147,7 @@ pub fn mesh(model: &CsgModel, settings: &mut CoarseSettings) -> Result<CoarseMes
 /// How one attempt at a coarse mesh ended.
 pub(super) enum Attempt {
     Made(Box<CoarseMesh>),
-    /// Walls were found to be thin.
+    /// Walls were found to be thin: sources for those that can be resolved.
     Thin(Vec<Source>, ThinWalls),
     /// It takes smaller sizes.
     Lower(Vec<Source>),
@@ -213,7 +213,7 @@ fn attempt(model: &CsgModel, settings: &CoarseSettings, allowed: Allowed) -> Att
             let walls =
                 Walls { mesh: &surface, regions: &regions, project: &project, size: &size, closeness };
             let (sources, found) = if allowed.thin { thin_walls(&walls) } else { Default::default() };
-            if !sources.is_empty() {
+            if found.places > 0 {
                 return Attempt::Thin(sources, found);
             }
             let smoothness = GeometrySmoothness { geometry, features };

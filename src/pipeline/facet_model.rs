@@ -84,7 +84,7 @@ impl FacetSolid {
         let regions = |id: PatchId| [self.model.patch(id).inside, self.model.patch(id).outside];
         if allowed.thin && !self.keep_surface {
             let (sources, found) = self.thin_walls(&size, &regions, settings.size.scaled_closeness());
-            if !sources.is_empty() {
+            if found.places > 0 {
                 return Attempt::Thin(sources, found);
             }
         }
