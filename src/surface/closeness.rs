@@ -174,13 +174,12 @@ impl<'a> Prober<'a> {
             let foot =
                 |s: u32| at(&self.corners[s as usize], in_triangle(&center, &self.corners[s as usize]));
             let squared = |s: u32| if faces(s) { (foot(s) - center).norm_squared() } else { f64::INFINITY };
-            let within = ((1.0 - SETTLED) * radius).powi(2);
-            let Some((s, _)) = self.tree.nearest_within(&center, within, squared) else { break };
+            let Some((s, _)) = self.tree.nearest_within(&center, radius * radius, squared) else { break };
             let point = foot(s);
             let way = point - from;
             let smaller = way.norm_squared() / (2.0 * into.dot(&way));
             touched = Some((s, point));
-            if !(smaller > 0.0 && smaller < radius) {
+            if !(smaller > 0.0 && smaller < (1.0 - SETTLED) * radius) {
                 break;
             }
             radius = smaller;
