@@ -55,6 +55,10 @@ pub struct SizeOptions {
     /// Growth of the size per unit of distance, instead of the preset's
     #[arg(long, value_name = "G", value_parser = positive)]
     pub grading: Option<f64>,
+    /// Largest element size in thin walls, in units of their thickness, instead of the preset's: 1 gives a layer of good
+    /// tets, 0.5 two; 0 leaves thin walls as they are
+    #[arg(long, value_name = "K", value_parser = closeness)]
+    pub closeness: Option<f64>,
     /// How much is done for better shapes: quick, standard, careful or thorough [default: careful up to 100,000 tets, then standard]
     #[arg(long, value_name = "NAME")]
     pub effort: Option<Effort>,
@@ -221,6 +225,14 @@ fn positive(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(number) if number > 0.0 && number.is_finite() => Ok(number),
         _ => Err("a positive number is needed".into()),
+    }
+}
+
+/// A size in units of the thickness of a wall.
+fn closeness(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(number) if number >= 0.0 && number.is_finite() => Ok(number),
+        _ => Err("a number that is not negative is needed".into()),
     }
 }
 

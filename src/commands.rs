@@ -13,7 +13,7 @@ use tetmill::pipeline::target::Outcome;
 use tetmill::pipeline::{CoarseSettings, GenerateSettings, Generated, Model, Wanted, generate};
 use tetmill::progress::Progress;
 use tetmill::report::{MeshReport, PartitionReport, Report};
-use tetmill::size::SizeSettings;
+use tetmill::size::{Closeness, SizeSettings};
 use tetmill::{memory, picture, quality};
 
 /// `tetmill generate`
@@ -120,12 +120,12 @@ fn read_sized_model(
     progress: &Progress,
 ) -> Result<Model, Failure> {
     let model = read_model(options, progress)?;
-    let SizeOptions { preset, maxh, minh, grading, effort, coarse } = size;
-    let sized = [maxh, minh, grading].iter().any(|length| length.is_some());
+    let SizeOptions { preset, maxh, minh, grading, closeness, effort, coarse } = size;
+    let sized = [maxh, minh, grading, closeness].iter().any(|length| length.is_some());
     if matches!(model, Model::Given(_)) && (sized || preset.is_some() || effort.is_some() || coarse.is_some())
     {
         return Err(Failure::input(format!(
-            "{} is a mesh already and is taken as it is: leave out --preset, --maxh, --minh, --grading, --effort and --coarse",
+            "{} is a mesh already and is taken as it is: leave out --preset, --maxh, --minh, --grading, --closeness, --effort and --coarse",
             name_of(options)
         )));
     }
@@ -143,6 +143,9 @@ fn coarse_settings(options: &SizeOptions) -> CoarseSettings {
     settings.maxh = options.maxh;
     settings.minh = options.minh.unwrap_or(settings.minh);
     settings.grading = options.grading.unwrap_or(settings.grading);
+    if let Some(ratio) = options.closeness {
+        settings.closeness = Closeness::of_ratio(ratio);
+    }
     CoarseSettings { size: settings, effort: options.effort }
 }
 

@@ -91,7 +91,11 @@ impl From<csg::FeatureError> for Failure {
 
 impl From<CoarseError> for Failure {
     fn from(error: CoarseError) -> Self {
-        Self::new(Status::NoValidMesh, error)
+        let status = match error {
+            CoarseError::FacetsMeet { .. } => Status::Input,
+            _ => Status::NoValidMesh,
+        };
+        Self::new(status, error)
     }
 }
 

@@ -132,6 +132,27 @@ impl Report {
     }
 }
 
+/// What was done for thin walls, and what it would take to do more.
+fn write_thin_walls(f: &mut fmt::Formatter<'_>, coarse: &CoarseReport) -> fmt::Result {
+    let walls = &coarse.thin_walls;
+    let Some(thinnest) = walls.thinnest else { return Ok(()) };
+    write!(f, "           walls as thin as {thinnest:.3e}: ")?;
+    match walls.limited {
+        0 => write!(f, "sizes lowered there")?,
+        limited if limited < walls.places => {
+            write!(
+                f,
+                "sizes lowered there, but for some that would take far more tets (--closeness insists)"
+            )?;
+        }
+        _ => write!(
+            f,
+            "too thin for the sizes, left as they are (--closeness insists, at the cost of many tets)"
+        )?,
+    }
+    writeln!(f)
+}
+
 /// A count with blanks between groups of three digits.
 fn grouped(count: u64) -> String {
     let digits = count.to_string();
@@ -173,6 +194,7 @@ impl fmt::Display for Report {
                 coarse.illegal_repaired, coarse.illegal_left
             )?;
         }
+        write_thin_walls(f, coarse)?;
         let mesh = &self.mesh;
         writeln!(
             f,

@@ -123,6 +123,29 @@ fn sizes_for_a_mesh_and_mixed_inputs_are_refused() {
 }
 
 #[test]
+fn surfaces_that_touch_without_the_same_triangles_are_refused_with_the_place() {
+    let dir = tempfile::tempdir().unwrap();
+    let large = write_box(dir.path(), "large", [[0., 0., 0.], [1., 1., 1.]]);
+    let small = write_box(dir.path(), "small", [[1., 0.25, 0.25], [2., 0.75, 0.75]]);
+    let output = tetmill().arg("generate").args([&large, &small]).output().unwrap();
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    assert!(said.contains("touch without being the same") && said.contains("the first at (1, "), "{said}");
+}
+
+#[test]
+fn a_thin_plate_gets_tets_as_small_as_it_is_thin() {
+    let dir = tempfile::tempdir().unwrap();
+    let plate = write_box(dir.path(), "plate", [[0., 0., 0.], [4., 4., 0.2]]);
+    let as_it_is = report_of(&plate, &["--closeness", "0"]);
+    let resolved = report_of(&plate, &["--closeness", "1.5"]);
+    assert_eq!(as_it_is["coarse"]["thin_walls"]["places"], 0);
+    assert!((resolved["coarse"]["thin_walls"]["thinnest"].as_f64().unwrap() - 0.2).abs() < 1e-12);
+    let first_percentile = |r: &serde_json::Value| r["mesh"]["first_percentile_dihedral"].as_f64().unwrap();
+    assert!(first_percentile(&resolved) > 25.0 && first_percentile(&resolved) > first_percentile(&as_it_is));
+}
+
+#[test]
 fn the_stl_files_of_others_are_meshed() {
     for name in ["part1.stl", "hinge.stl"] {
         let Some(file) = shared(&format!("netgen-tutorials/{name}")) else { return };

@@ -1,10 +1,10 @@
 //! Sizes where curves of one patch run near each other: triangles between them can only be good if they are not much
 //! longer than the gap is wide.
 
-use super::nearest::in_segment;
-use super::tree::{Tree, bounds};
 use super::{FacetCurve, FacetModel};
 use crate::Point;
+use crate::kernel::nearest::in_segment;
+use crate::kernel::tree::{Tree, bounds};
 use crate::size::{SizeSettings, Source};
 
 /// Edges may be this many times as long as the distance of two curves: a strip of such triangles, one across, has angles of 25°

@@ -21,7 +21,6 @@ mod features;
 mod join;
 mod keep;
 mod model;
-mod nearest;
 mod normals;
 mod projector;
 #[cfg(test)]
@@ -38,7 +37,6 @@ mod size;
 mod smoothness;
 #[cfg(test)]
 mod tests;
-mod tree;
 
 pub use error::FacetError;
 pub use keep::keep;

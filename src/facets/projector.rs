@@ -1,9 +1,9 @@
 //! Projection to the facets of a patch and to the polyline of a curve.
 
 use super::edges::Edges;
-use super::nearest::{at, in_segment, in_triangle};
 use super::normals;
-use super::tree::{Tree, bounds};
+use crate::kernel::nearest::{at, in_segment, in_triangle};
+use crate::kernel::tree::{Tree, bounds};
 use crate::{Point, Vector};
 use csg::{CurveId, PatchId};
 

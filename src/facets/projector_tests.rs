@@ -1,9 +1,9 @@
 //! Projection to facets, beside brute force.
 
-use super::nearest::{at, in_triangle};
 use super::samples::Soup;
 use super::{FacetModel, FacetProjector, Settings};
 use crate::Point;
+use crate::kernel::nearest::{at, in_triangle};
 use crate::kernel::random::Random;
 use csg::{CurveId, PatchId};
 

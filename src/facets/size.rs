@@ -6,7 +6,7 @@
 use super::normals::SLIVER_HEIGHT;
 use super::{FacetModel, close_curves};
 use crate::kernel::simplex::area_vector;
-use crate::size::{SizeField, SizeSettings, Source, SourceTree};
+use crate::size::{Closeness, SizeField, SizeSettings, Source, SourceTree, thinned};
 use crate::{Point, Vector};
 
 /// Sizes from the curvature of facets and curves, from short curves, and from the user's settings.
@@ -34,16 +34,17 @@ impl FacetSize {
         Self(SourceTree::new(model.bounds, settings.grading, maximum, &thinned(sources)))
     }
 
-    /// The size at which patches and curves turn by `turn` (radians) along an edge; and smaller at `sources`.
-    pub(super) fn of_turn(model: &FacetModel, turn: f64, sources: &[Source]) -> Self {
+    /// The size at which patches and curves turn by `turn` (radians) along an edge.
+    pub(super) fn of_turn(model: &FacetModel, turn: f64) -> Self {
         let settings = SizeSettings {
             maxh: None,
             minh: 0.0,
             curvature_safety: 1.0 / turn,
             segments_per_curve: f64::MIN_POSITIVE,
             grading: TURN_GRADING,
+            closeness: Closeness::OFF,
             scale: 1.0,
-            sources: sources.to_vec(),
+            sources: Vec::new(),
         };
         Self::new(model, &settings)
     }
@@ -56,21 +57,6 @@ impl SizeField for FacetSize {
     fn size_at(&self, point: &Point) -> f64 {
         self.0.size_at(point)
     }
-}
-
-/// Of sources in one cell of a grid that is as wide as they are large, or half so, the smallest: facets may be far smaller than
-/// the sizes that they ask for.
-fn thinned(sources: Vec<Source>) -> Vec<Source> {
-    let keyed = |s: Source| {
-        let level = s.size.log2().floor();
-        let width = level.exp2();
-        let cell = [s.point.x, s.point.y, s.point.z].map(|x| (x / width).floor() as i64);
-        (level as i32, cell, s)
-    };
-    let mut keyed: Vec<_> = sources.into_iter().map(keyed).collect();
-    keyed.sort_by(|a, b| (a.0, a.1).cmp(&(b.0, b.1)).then(a.2.size.total_cmp(&b.2.size)));
-    keyed.dedup_by_key(|(level, cell, _)| (*level, *cell));
-    keyed.into_iter().map(|(_, _, source)| source).collect()
 }
 
 fn size_of_curvature(settings: &SizeSettings, curvature: f64) -> f64 {

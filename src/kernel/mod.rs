@@ -2,8 +2,10 @@
 
 pub mod hilbert;
 mod integers;
+pub(crate) mod nearest;
 pub mod predicates;
 pub mod quality;
 pub mod random;
 pub mod simplex;
 pub mod sphere;
+pub(crate) mod tree;

@@ -6,6 +6,7 @@ use crate::improve::{self, Effort, GeometrySmoothness, Smoothness};
 use crate::kernel::quality::QualitySummary;
 use crate::mesh::{Class, Mesh, Segment, VertexId};
 use crate::size::{GeometricSize, SizeField, SizeSettings, Source};
+use crate::surface::closeness::{ThinWalls, Walls, thin_walls};
 use crate::surface::curves::{CurveError, crowded, mesh_curves};
 use crate::surface::{self, SurfaceError, SurfaceMesh};
 use crate::volume::{self, ClosedSurface, SurfaceFaults, VolumeError};
@@ -27,6 +28,18 @@ pub enum CoarseError {
         faults: SurfaceFaults,
         /// The middles of the sides of triangles that cross others.
         crossing: Vec<Point>,
+    },
+    /// The triangles that were given do not bound bodies.
+    #[error(
+        "the surface's own triangles intersect, or touch without being the same: {count} places, the first at ({}, {}, {}); where \
+         surfaces touch, give both the same triangles there (join them in the program that made them), or keep them apart",
+        first.x, first.y, first.z
+    )]
+    FacetsMeet {
+        /// Middles of sides of such triangles.
+        count: usize,
+        /// The first of them.
+        first: Point,
     },
     /// A body could not be filled.
     #[error(transparent)]
@@ -80,6 +93,8 @@ pub struct CoarseReport {
     /// Times the mesh was made anew with smaller sizes where surfaces came too near each other, or where
     /// refined tets would have been inverted.
     pub size_corrections: u64,
+    /// Walls in which the sizes were lowered since they are thin.
+    pub thin_walls: ThinWalls,
 }
 
 /// How a coarse mesh is made.
@@ -126,37 +141,57 @@ const LOWERED: f64 = 0.6;
 /// # Errors
 /// What failed in the end, with its place.
 pub fn mesh(model: &CsgModel, settings: &mut CoarseSettings) -> Result<CoarseMesh, CoarseError> {
-    corrected(settings, |settings, may_lower| attempt(model, settings, may_lower))
+    corrected(settings, |settings, allowed| attempt(model, settings, allowed))
 }
 
 /// How one attempt at a coarse mesh ended.
 pub(super) enum Attempt {
     Made(Box<CoarseMesh>),
+    /// Walls were found to be thin: sources for those that can be resolved.
+    Thin(Vec<Source>, ThinWalls),
     /// It takes smaller sizes.
     Lower(Vec<Source>),
     Failed(CoarseError),
 }
 
+/// What an attempt may answer beside a mesh.
+#[derive(Clone, Copy)]
+pub(super) struct Allowed {
+    /// That it takes smaller sizes.
+    pub lower: bool,
+    /// That walls are thin: only the first time, as each time may lower the sizes as far as the settings allow.
+    pub thin: bool,
+}
+
 /// Attempts until no sizes need to be lowered, or may be: the attempts are told whether they may ask for it.
 pub(super) fn corrected(
     settings: &mut CoarseSettings,
-    attempt: impl Fn(&CoarseSettings, bool) -> Attempt,
+    attempt: impl Fn(&CoarseSettings, Allowed) -> Attempt,
 ) -> Result<CoarseMesh, CoarseError> {
     let mut corrections = 0;
+    let mut thin_walls = None;
     loop {
-        match attempt(settings, corrections < MOST_CORRECTIONS) {
+        let allowed = Allowed { lower: corrections < MOST_CORRECTIONS, thin: thin_walls.is_none() };
+        match attempt(settings, allowed) {
             Attempt::Made(mut coarse) => {
                 coarse.report.size_corrections = corrections;
+                coarse.report.thin_walls = thin_walls.unwrap_or_default();
                 return Ok(*coarse);
             }
-            Attempt::Lower(sources) => settings.size.sources.extend(sources),
+            Attempt::Thin(sources, found) => {
+                settings.size.sources.extend(sources);
+                thin_walls = Some(found);
+            }
+            Attempt::Lower(sources) => {
+                settings.size.sources.extend(sources);
+                corrections += 1;
+            }
             Attempt::Failed(error) => return Err(error),
         }
-        corrections += 1;
     }
 }
 
-fn attempt(model: &CsgModel, settings: &CoarseSettings, may_lower: bool) -> Attempt {
+fn attempt(model: &CsgModel, settings: &CoarseSettings, allowed: Allowed) -> Attempt {
     let CsgModel { geometry, features, projector } = model;
     let size = GeometricSize::new(geometry, features, &settings.size);
     let curves = match mesh_curves(features, projector, &size) {
@@ -164,22 +199,32 @@ fn attempt(model: &CsgModel, settings: &CoarseSettings, may_lower: bool) -> Atte
         Err(error) => return Attempt::Failed(error.into()),
     };
     let crowded = crowded(&curves, features);
-    if may_lower && !crowded.is_empty() {
+    if allowed.lower && !crowded.is_empty() {
         return Attempt::Lower(crowded);
     }
     let ends = |s: &Segment| s.vertices.map(|v| curves.points[v.index()]);
     let segments: Vec<[Point; 2]> = curves.segments.iter().map(ends).collect();
-    let filled = surface::mesh_patches(geometry, features, curves, &size, &surface::Settings::default())
-        .map_err(CoarseError::from)
-        .and_then(|(surface, _)| {
-            let regions = |id| [features.patch(id).inside, features.patch(id).outside];
+    let regions = |id| [features.patch(id).inside, features.patch(id).outside];
+    let surface = surface::mesh_patches(geometry, features, curves, &size, &surface::Settings::default());
+    let filled = match surface {
+        Ok((surface, _)) => {
+            let project = |patch, point: &Point| projector.project_patch(patch, point).unwrap_or(*point);
+            let closeness = settings.size.scaled_closeness();
+            let walls =
+                Walls { mesh: &surface, regions: &regions, project: &project, size: &size, closeness };
+            let (sources, found) = if allowed.thin { thin_walls(&walls) } else { Default::default() };
+            if found.places > 0 {
+                return Attempt::Thin(sources, found);
+            }
             let smoothness = GeometrySmoothness { geometry, features };
             fill(surface, regions, &size, Some(&smoothness), settings.effort)
-        });
+        }
+        Err(error) => Err(error.into()),
+    };
     match filled {
         Ok(made) => Attempt::Made(Box::new(made)),
         Err(error) => {
-            let lowered = if may_lower { error.remedy(&segments, &size) } else { Vec::new() };
+            let lowered = if allowed.lower { error.remedy(&segments, &size) } else { Vec::new() };
             if lowered.is_empty() { Attempt::Failed(error) } else { Attempt::Lower(lowered) }
         }
     }
@@ -209,7 +254,7 @@ pub(super) fn fill(
         illegal_left: improved.illegal_left as u64,
         quality: improved.after,
         steiner_points: volume.steiner_inside as u64,
-        size_corrections: 0,
+        ..CoarseReport::default()
     };
     Ok(CoarseMesh { mesh, report })
 }

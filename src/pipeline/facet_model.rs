@@ -1,6 +1,6 @@
 //! Surfaces of triangles as what is to be meshed.
 
-use super::coarse::{self, Attempt, CoarseError, CoarseMesh, CoarseSettings};
+use super::coarse::{self, Allowed, Attempt, CoarseError, CoarseMesh, CoarseSettings};
 use super::input::InputSettings;
 use crate::Point;
 use crate::error::Failure;
@@ -11,8 +11,10 @@ use crate::geometry::Projector;
 use crate::improve::Smoothness;
 use crate::io::surface::{self, Surface};
 use crate::mesh::{Class, Names};
+use crate::size::{Closeness, Source};
 use crate::surface::SurfaceMesh;
-use csg::{CornerId, PatchId};
+use crate::surface::closeness::{ThinWalls, Walls, thin_walls};
+use csg::{BodyId, CornerId, PatchId};
 use std::path::Path;
 
 /// Solids bounded by facets, with what their files name.
@@ -74,11 +76,18 @@ impl FacetSolid {
 
     /// Makes a coarse mesh with the given sizes, which are lowered where surfaces come too near each other.
     pub(super) fn coarse_mesh(&self, settings: &mut CoarseSettings) -> Result<CoarseMesh, CoarseError> {
-        coarse::corrected(settings, |settings, may_lower| self.attempt(settings, may_lower))
+        coarse::corrected(settings, |settings, allowed| self.attempt(settings, allowed))
     }
 
-    fn attempt(&self, settings: &CoarseSettings, may_lower: bool) -> Attempt {
+    fn attempt(&self, settings: &CoarseSettings, allowed: Allowed) -> Attempt {
         let size = FacetSize::new(&self.model, &settings.size);
+        let regions = |id: PatchId| [self.model.patch(id).inside, self.model.patch(id).outside];
+        if allowed.thin && !self.keep_surface {
+            let (sources, found) = self.thin_walls(&size, &regions, settings.size.scaled_closeness());
+            if found.places > 0 {
+                return Attempt::Thin(sources, found);
+            }
+        }
         let mut surface = if self.keep_surface {
             keep(&self.model)
         } else {
@@ -87,17 +96,31 @@ impl FacetSolid {
         self.add_kept_points(&mut surface);
         let smoothness = FacetSmoothness(&self.model.projector);
         let smoothness: Option<&dyn Smoothness> = if self.keep_surface { None } else { Some(&smoothness) };
-        let regions = |id: PatchId| [self.model.patch(id).inside, self.model.patch(id).outside];
         match coarse::fill(surface, regions, &size, smoothness, settings.effort) {
             Ok(made) => Attempt::Made(Box::new(made)),
             Err(error) => {
                 // Where triangles cross, smaller sizes were tried already.
                 let crossed = matches!(error, CoarseError::NotClosed { .. });
-                let may_lower = may_lower && !self.keep_surface && !crossed;
+                let meeting = if crossed { self.model.crossings() } else { Vec::new() };
+                if let Some(&first) = meeting.first() {
+                    return Attempt::Failed(CoarseError::FacetsMeet { count: meeting.len(), first });
+                }
+                let may_lower = allowed.lower && !self.keep_surface && !crossed;
                 let lowered = if may_lower { error.remedy(&[], &size) } else { Vec::new() };
                 if lowered.is_empty() { Attempt::Failed(error) } else { Attempt::Lower(lowered) }
             }
         }
+    }
+
+    /// Thin walls between the facets themselves.
+    fn thin_walls(
+        &self,
+        size: &FacetSize,
+        regions: &(dyn Fn(PatchId) -> [Option<BodyId>; 2] + Sync),
+        closeness: Closeness,
+    ) -> (Vec<Source>, ThinWalls) {
+        let project = |_, point: &Point| *point;
+        thin_walls(&Walls { mesh: &keep(&self.model), regions, project: &project, size, closeness })
     }
 
     /// Points on no triangle are kept as vertices inside.

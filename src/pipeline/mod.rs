@@ -1,6 +1,7 @@
 //! The stages in order: the one place that knows all of them.
 
 pub mod coarse;
+mod estimate;
 mod facet_model;
 pub mod generate;
 pub mod input;

@@ -2,9 +2,11 @@
 
 use super::coarse::{CoarseError, CoarseMesh, CoarseReport, CoarseSettings};
 use super::facet_model::FacetSolid;
+use crate::facets::FacetSize;
 use crate::geometry::Projector;
 use crate::kernel::quality::QualitySummary;
 use crate::mesh::{Mesh, Names};
+use crate::size::{GeometricSize, SizeField, SizeSettings};
 use csg::{Features, Geometry};
 
 /// What is to be meshed, or came meshed.
@@ -106,6 +108,17 @@ impl Model {
                 patches: solid.model.patches.len(),
             },
             Self::Given(given) => given.entities(),
+        }
+    }
+
+    /// The sizes that a coarse mesh is made by, before they are lowered anywhere; `None` of a given mesh.
+    pub(super) fn size_field(&self, settings: &SizeSettings) -> Option<Box<dyn SizeField + '_>> {
+        match self {
+            Self::Csg(model) => {
+                Some(Box::new(GeometricSize::new(&model.geometry, &model.features, settings)))
+            }
+            Self::Facets(solid) => Some(Box::new(FacetSize::new(&solid.model, settings))),
+            Self::Given(_) => None,
         }
     }
 

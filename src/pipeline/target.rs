@@ -1,6 +1,7 @@
 //! Sizes that give a wanted number of tets.
 
 use super::coarse::{CoarseError, CoarseMesh, CoarseSettings};
+use super::estimate;
 use super::model::Model;
 
 /// How a coarse mesh with a wanted number of tets came out.
@@ -17,6 +18,9 @@ pub enum Outcome {
 
 /// Meshes made to find the sizes at most: a bracket is cut by half or better each time.
 const MOST_TRIES: usize = 24;
+
+/// Estimates are asked for so often.
+const TRUSTED_TRIES: usize = 4;
 
 /// Sizes that are this many times larger than what the settings say change nothing any more.
 const LARGEST_SCALE: f64 = 1e3;
@@ -40,7 +44,7 @@ pub fn mesh_to_target(
     let mut fine: Option<(f64, CoarseMesh)> = None;
     let mut coarse: Option<(f64, f64)> = None;
     let mut finest_failure: Option<CoarseError> = None;
-    for _ in 0..MOST_TRIES {
+    for tries in 0..MOST_TRIES {
         settings.size.sources.truncate(sources);
         let made = match model.coarse_mesh(settings) {
             Ok(made) => made,
@@ -49,7 +53,7 @@ pub fn mesh_to_target(
                 coarse = Some((settings.size.scale, 0.5 * target as f64));
                 finest_failure = Some(error);
                 settings.size.scale =
-                    next_scale(settings.size.scale, goal, 0.5 * goal, fine.as_ref(), coarse);
+                    next_scale(settings.size.scale, goal, 0.5 * goal, None, fine.as_ref(), coarse);
                 continue;
             }
         };
@@ -58,6 +62,10 @@ pub fn mesh_to_target(
             return Ok((made, Outcome::Reached));
         }
         let scale = settings.size.scale;
+        // A bracket that estimates do not narrow is narrowed without them.
+        let expected = (tries < TRUSTED_TRIES)
+            .then(|| estimate::scale_for(model, settings, &made, sources, goal))
+            .flatten();
         if made.report.tets < target {
             coarse = Some((scale, count));
         } else {
@@ -71,7 +79,7 @@ pub fn mesh_to_target(
         {
             break;
         }
-        settings.size.scale = next_scale(scale, goal, count, fine.as_ref(), coarse);
+        settings.size.scale = next_scale(scale, goal, count, expected, fine.as_ref(), coarse);
     }
     match (fine, finest_failure) {
         (Some((scale, made)), _) => {
@@ -83,11 +91,13 @@ pub fn mesh_to_target(
     }
 }
 
-/// The scale to try next: the number of tets goes with its third power, within what is known.
+/// The scale to try next: the one that is `expected` to give the number, where there is one within what is known; else by the third
+/// power of the scale, with which the number of tets goes.
 fn next_scale(
     scale: f64,
     goal: f64,
     count: f64,
+    expected: Option<f64>,
     fine: Option<&(f64, CoarseMesh)>,
     coarse: Option<(f64, f64)>,
 ) -> f64 {
@@ -96,11 +106,17 @@ fn next_scale(
             // Linear between the logarithms, kept off the ends so that the bracket shrinks.
             let (low_log, high_log) = (low.ln(), high.ln());
             let (many, few) = ((made.report.tets as f64).ln(), few.max(1.0).ln());
-            let share = ((many - goal.ln()) / (many - few)).clamp(0.15, 0.85);
-            (low_log + share * (high_log - low_log)).exp()
+            let share = match expected {
+                Some(expected) => (expected.ln() - low_log) / (high_log - low_log),
+                None => (many - goal.ln()) / (many - few),
+            };
+            (low_log + share.clamp(0.15, 0.85) * (high_log - low_log)).exp()
         }
         // Still too many: coarser, faster and faster, as some numbers hardly depend on the sizes.
         (Some(_), None) => (scale * (count / goal).cbrt().max(1.5).powi(2).min(16.0)).min(LARGEST_SCALE),
-        _ => scale * (count / goal).cbrt().clamp(0.05, 0.9),
+        _ => {
+            let finer = expected.map_or((count / goal).cbrt(), |expected| expected / scale);
+            scale * finer.clamp(0.05, 0.9)
+        }
     }
 }

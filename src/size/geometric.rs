@@ -1,6 +1,6 @@
 //! The size field that a geometry and a user's settings ask for.
 
-use super::{Preset, SizeField, Source, SourceTree};
+use super::{Closeness, Preset, SizeField, Source, SourceTree};
 use crate::{Point, Vector};
 use csg::{BodyId, Curve, Features, Geometry, Interval, Solid, SurfaceId};
 
@@ -17,6 +17,8 @@ pub struct SizeSettings {
     pub segments_per_curve: f64,
     /// Growth of the size per unit of distance.
     pub grading: f64,
+    /// How small the sizes are in thin walls.
+    pub closeness: Closeness,
     /// All sizes but the bounds `maxh` are multiplied by this; below 1 those too. How a wanted number of
     /// tets is reached.
     pub scale: f64,
@@ -32,6 +34,7 @@ impl From<Preset> for SizeSettings {
             curvature_safety: preset.curvature_safety(),
             segments_per_curve: preset.segments_per_curve(),
             grading: preset.grading(),
+            closeness: preset.closeness(),
             scale: 1.0,
             sources: Vec::new(),
         }
@@ -45,6 +48,12 @@ impl Default for SizeSettings {
 }
 
 impl SizeSettings {
+    /// How small the sizes are in thin walls, under [`scale`](Self::scale): where fewer tets are wanted, walls get fewer too; where
+    /// more are, the walls need no more than they have.
+    pub fn scaled_closeness(&self) -> Closeness {
+        Closeness { ratio: self.closeness.ratio * self.scale.max(1.0), ..self.closeness }
+    }
+
     /// A bound set by the user or the file under [`scale`](Self::scale).
     fn scaled_bound(&self, bound: f64) -> f64 {
         bound * self.scale.min(1.0)

@@ -10,9 +10,10 @@ mod source_tree;
 mod sources;
 
 pub use geometric::{GeometricSize, SizeSettings};
-pub use preset::Preset;
+pub use preset::{Closeness, Preset};
 pub use source_tree::SourceTree;
 pub use sources::Source;
+pub(crate) use sources::thinned;
 
 use crate::Point;
 

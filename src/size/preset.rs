@@ -1,5 +1,25 @@
 //! The named fineness levels that NETGEN's users know, with NETGEN's numbers.
 
+/// How small the sizes are where a body is thin.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Closeness {
+    /// The size there at most, in units of the thickness; infinity leaves thin walls as they are.
+    pub ratio: f64,
+    /// The size is lowered by this factor at most, and less where more would be needed: so that a sheet of paper does not become a
+    /// mesh of its thickness unasked.
+    pub most: f64,
+}
+
+impl Closeness {
+    /// Thin walls are not looked for.
+    pub const OFF: Self = Self { ratio: f64::INFINITY, most: 1.0 };
+
+    /// What a user asks for by a number: sizes of so many thicknesses, down to a 200th of what they would be; 0 for none.
+    pub fn of_ratio(ratio: f64) -> Self {
+        if ratio > 0.0 { Self { ratio, most: 200.0 } } else { Self::OFF }
+    }
+}
+
 /// A named fineness.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
@@ -46,6 +66,17 @@ impl Preset {
             Self::Moderate => 1.0,
             Self::Fine => 2.0,
             Self::VeryFine => 3.0,
+        }
+    }
+
+    /// How small the sizes are in thin walls.
+    pub fn closeness(self) -> Closeness {
+        match self {
+            Self::VeryCoarse => Closeness::OFF,
+            Self::Coarse => Closeness { ratio: 3.0, most: 4.0 },
+            Self::Moderate => Closeness { ratio: 2.0, most: 8.0 },
+            Self::Fine => Closeness { ratio: 1.5, most: 16.0 },
+            Self::VeryFine => Closeness { ratio: 1.0, most: 32.0 },
         }
     }
 

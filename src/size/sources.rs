@@ -117,3 +117,18 @@ impl Sources {
         best
     }
 }
+
+/// Of sources in one cell of a grid that is as wide as they are large, or half so, the smallest: facets may be far smaller than
+/// the sizes that they ask for, and both sides of a wall ask for the same.
+pub(crate) fn thinned(sources: Vec<Source>) -> Vec<Source> {
+    let keyed = |s: Source| {
+        let level = s.size.log2().floor();
+        let width = level.exp2();
+        let cell = [s.point.x, s.point.y, s.point.z].map(|x| (x / width).floor() as i64);
+        (level as i32, cell, s)
+    };
+    let mut keyed: Vec<_> = sources.into_iter().map(keyed).collect();
+    keyed.sort_by(|a, b| (a.0, a.1).cmp(&(b.0, b.1)).then(a.2.size.total_cmp(&b.2.size)));
+    keyed.dedup_by_key(|(level, cell, _)| (*level, *cell));
+    keyed.into_iter().map(|(_, _, source)| source).collect()
+}

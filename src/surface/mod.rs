@@ -16,6 +16,7 @@
 
 mod chart;
 pub mod check;
+pub mod closeness;
 mod condition;
 pub mod curves;
 mod embed;

@@ -23,7 +23,7 @@ pub use report::RemeshReport;
 use super::model::crossings;
 use super::{FacetModel, FacetSize};
 use crate::Point;
-use crate::size::{SizeField, Source};
+use crate::size::{SizeField, Source, SourceTree};
 use crate::surface::SurfaceMesh;
 use sheet::Sheet;
 
@@ -46,14 +46,23 @@ impl Default for RemeshSettings {
     }
 }
 
-/// The smaller of two sizes.
-struct Smaller<'a>(&'a dyn SizeField, FacetSize);
+/// What sizes are taken from while a surface is remeshed: the least of three.
+struct Sizes<'a> {
+    wanted: &'a dyn SizeField,
+    /// Bounds the turn along an edge.
+    turn: FacetSize,
+    /// Where triangles met so far.
+    lowered: SourceTree,
+}
 
-impl SizeField for Smaller<'_> {
+impl SizeField for Sizes<'_> {
     fn size_at(&self, point: &Point) -> f64 {
-        self.0.size_at(point).min(self.1.size_at(point))
+        self.wanted.size_at(point).min(self.turn.size_at(point)).min(self.lowered.size_at(point))
     }
 }
+
+/// How fast sizes may grow away from places where triangles met.
+const LOWERED_GRADING: f64 = 1.0;
 
 /// Rounds of splits until all edges are short enough: each halves them.
 const MOST_SPLITS: usize = 40;
@@ -61,64 +70,66 @@ const MOST_SPLITS: usize = 40;
 /// Times that sizes are lowered where triangles meet, before the mesh is handed out as it is.
 const MOST_CORRECTIONS: usize = 14;
 
+/// Rounds over the mesh after sizes were lowered.
+const CORRECTING_ROUNDS: usize = 3;
+
 /// A place where triangles meet asks for this part of the size there.
 const LOWERED: f64 = 0.6;
 
 /// Makes a surface mesh of a model with edges of about the size wanted.
 ///
 /// Corners are vertices, in their order; then come the vertices on curves, curve by curve, and those on patches. Vertices
-/// lie on the facets and polylines up to rounding. Where triangles of patches near each other would intersect, the sizes are lowered;
-/// [`RemeshReport::crossings`] tells if some are left, as where the facets intersect themselves.
+/// lie on the facets and polylines up to rounding. Where triangles of patches near each other would intersect, the sizes are lowered
+/// and the same mesh is worked on again; [`RemeshReport::crossings`] tells if some are left, as where the facets intersect themselves.
 pub fn remesh(
     model: &FacetModel,
     size: &dyn SizeField,
     settings: &RemeshSettings,
 ) -> (SurfaceMesh, RemeshReport) {
+    let tree = |sources: &[Source]| SourceTree::new(model.bounds, LOWERED_GRADING, f64::INFINITY, sources);
+    let sizes = Sizes { wanted: size, turn: FacetSize::of_turn(model, settings.turn), lowered: tree(&[]) };
+    let mut sheet = Sheet::new(model, sizes);
     let mut lowered = Vec::new();
+    let mut report = RemeshReport::default();
     for correction in 0.. {
-        let size = Smaller(size, FacetSize::of_turn(model, settings.turn, &lowered));
-        let mut report = RemeshReport { corrections: correction, ..RemeshReport::default() };
-        let mesh = pass(model, &size, settings, &mut report);
+        report.corrections = correction;
+        // What is not near a lower size has been done, so that a few rounds do.
+        let rounds = if correction == 0 { settings.rounds } else { settings.rounds.min(CORRECTING_ROUNDS) };
+        pass(&mut sheet, rounds, settings, &mut report);
+        let mesh = finish::finish(&sheet);
         report.crossings = crossings(&mesh.points, &mesh.triangles);
-        if report.crossings.is_empty() || correction == MOST_CORRECTIONS {
-            return (mesh, report);
-        }
         // No size mends facets that intersect.
-        if correction == 0 && !model.crossings().is_empty() {
+        let hopeless = correction == 0 && !report.crossings.is_empty() && !model.crossings().is_empty();
+        if report.crossings.is_empty() || correction == MOST_CORRECTIONS || hopeless {
+            report.measure(&sheet);
             return (mesh, report);
         }
-        let lower = |&point: &Point| Source { point, size: LOWERED * size.size_at(&point) };
-        lowered.extend(report.crossings.iter().map(lower));
+        let lower = |&point: &Point| Source { point, size: LOWERED * sheet.size.size_at(&point) };
+        lowered.extend(report.crossings.iter().map(lower).collect::<Vec<_>>());
+        sheet.size.lowered = tree(&lowered);
+        sheet.renew_sizes();
     }
     unreachable!("the loop ends by itself")
 }
 
-/// Remeshes once.
-fn pass(
-    model: &FacetModel,
-    size: &dyn SizeField,
-    settings: &RemeshSettings,
-    report: &mut RemeshReport,
-) -> SurfaceMesh {
-    let mut sheet = Sheet::new(model, size);
-    report.flips += flip::flip_all(&mut sheet);
-    report.collapses += collapse::collapse_short(&mut sheet, settings.short);
-    for _ in 0..settings.rounds {
+/// Goes over the whole sheet.
+fn pass(sheet: &mut Sheet, rounds: usize, settings: &RemeshSettings, report: &mut RemeshReport) {
+    report.flips += flip::flip_all(sheet);
+    report.collapses += collapse::collapse_short(sheet, settings.short);
+    for _ in 0..rounds {
         for _ in 0..MOST_SPLITS {
-            let splits = split::split_long(&mut sheet, settings.long);
+            let splits = split::split_long(sheet, settings.long);
             report.splits += splits;
-            report.flips += flip::flip_all(&mut sheet);
+            report.flips += flip::flip_all(sheet);
             if splits == 0 {
                 break;
             }
         }
-        report.collapses += collapse::collapse_short(&mut sheet, settings.short);
-        report.flips += flip::flip_all(&mut sheet);
-        report.moves += smooth::smooth_all(&mut sheet);
-        report.flips += flip::flip_all(&mut sheet);
-        report.moves += smooth::smooth_all(&mut sheet);
+        report.collapses += collapse::collapse_short(sheet, settings.short);
+        report.flips += flip::flip_all(sheet);
+        report.moves += smooth::smooth_all(sheet);
+        report.flips += flip::flip_all(sheet);
+        report.moves += smooth::smooth_all(sheet);
     }
-    repair::repair(&mut sheet, report);
-    report.measure(&sheet);
-    finish::finish(&sheet)
+    repair::repair(sheet, report);
 }

@@ -1,5 +1,6 @@
 //! The triangles that are being changed, with any number of them at an edge.
 
+use super::Sizes;
 use super::rail::Rail;
 use crate::Point;
 use crate::facets::FacetModel;
@@ -48,7 +49,7 @@ impl Triangle {
 /// The mesh.
 pub(super) struct Sheet<'a> {
     pub model: &'a FacetModel,
-    pub size: &'a dyn SizeField,
+    pub size: Sizes<'a>,
     pub points: Vec<Point>,
     pub kinds: Vec<Kind>,
     /// The wanted size at each vertex.
@@ -68,7 +69,7 @@ const FITTING_COSINE: f64 = 0.5;
 const FITTING_DISTANCE: f64 = 0.21;
 
 impl<'a> Sheet<'a> {
-    pub fn new(model: &'a FacetModel, size: &'a dyn SizeField) -> Self {
+    pub fn new(model: &'a FacetModel, size: Sizes<'a>) -> Self {
         let mesh = crate::facets::keep(model);
         let mut kinds = vec![Kind::Corner(CornerId(0)); mesh.points.len()];
         let mut triangles: Vec<Triangle> = mesh
@@ -103,6 +104,13 @@ impl<'a> Sheet<'a> {
         let straight = (0..rails.len()).map(|c| model.projector.is_straight_curve(CurveId::new(c))).collect();
         let sizes = mesh.points.iter().map(|p| size.size_at(p)).collect();
         Self { model, size, points: mesh.points, kinds, sizes, around, triangles, rails, straight }
+    }
+
+    /// Takes the sizes at all vertices anew.
+    pub fn renew_sizes(&mut self) {
+        for (size, point) in self.sizes.iter_mut().zip(&self.points) {
+            *size = self.size.size_at(point);
+        }
     }
 
     pub fn living(&self) -> impl Iterator<Item = u32> + '_ {

@@ -2,6 +2,7 @@
 
 use super::collapse::{MOST_TURN, along_curve};
 use super::sheet::{Kind, Sheet, shape};
+use crate::size::SizeField;
 use crate::{Point, Vector};
 use csg::PatchId;
 

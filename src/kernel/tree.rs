@@ -13,7 +13,7 @@ const LEAF: usize = 4;
 
 /// Boxes in a tree, each around two subtrees or a few items.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct Tree {
+pub(crate) struct Tree {
     nodes: Vec<Node>,
     /// The items, leaf by leaf.
     items: Vec<u32>,
@@ -69,8 +69,18 @@ impl Tree {
     /// The item nearest to a point by a squared distance that is nowhere less than that to its box; of equal ones the first.
     ///
     /// `None` only of an empty tree.
-    pub fn nearest(&self, point: &Point, mut distance: impl FnMut(u32) -> f64) -> Option<(u32, f64)> {
-        let mut best = (u32::MAX, f64::INFINITY);
+    pub fn nearest(&self, point: &Point, distance: impl FnMut(u32) -> f64) -> Option<(u32, f64)> {
+        self.nearest_within(point, f64::INFINITY, distance)
+    }
+
+    /// The same of items nearer than a squared distance, if there are any.
+    pub fn nearest_within(
+        &self,
+        point: &Point,
+        limit: f64,
+        mut distance: impl FnMut(u32) -> f64,
+    ) -> Option<(u32, f64)> {
+        let mut best = (u32::MAX, limit);
         let root = self.nodes.first()?;
         // The depth is that of halving 2³² items.
         let mut stack = [(0u32, 0.0f64); 64];
@@ -118,7 +128,7 @@ fn squared_gap(node: &Node, point: &Point) -> f64 {
 }
 
 /// The smallest box around points.
-pub(super) fn bounds<'a>(points: impl IntoIterator<Item = &'a Point>) -> Aabb {
+pub(crate) fn bounds<'a>(points: impl IntoIterator<Item = &'a Point>) -> Aabb {
     let (mut min, mut max) = (Point::from([f64::INFINITY; 3]), Point::from([f64::NEG_INFINITY; 3]));
     for p in points {
         (min, max) = (min.inf(p), max.sup(p));

@@ -9,7 +9,7 @@ const NEEDLE: f64 = 1e-9;
 ///
 /// The regions of corners and sides by dot products as in Ericson 2005, section 5.1.5.
 #[inline]
-pub(super) fn in_triangle(p: &Point, [a, b, c]: &[Point; 3]) -> [f64; 3] {
+pub(crate) fn in_triangle(p: &Point, [a, b, c]: &[Point; 3]) -> [f64; 3] {
     let (ab, ac, ap) = (b - a, c - a, p - a);
     let (d1, d2) = (ab.dot(&ap), ac.dot(&ap));
     if d1 <= 0.0 && d2 <= 0.0 {
@@ -66,7 +66,7 @@ fn in_sides(p: &Point, corners: [&Point; 3]) -> [f64; 3] {
 
 /// Where on a segment, from 0 to 1, its nearest point to `p` is, and its squared distance.
 #[inline]
-pub(super) fn in_segment(p: &Point, a: &Point, b: &Point) -> (f64, f64) {
+pub(crate) fn in_segment(p: &Point, a: &Point, b: &Point) -> (f64, f64) {
     let along = b - a;
     let length = along.norm_squared();
     let t = if length > 0.0 { (along.dot(&(p - a)) / length).clamp(0.0, 1.0) } else { 0.0 };
@@ -75,7 +75,7 @@ pub(super) fn in_segment(p: &Point, a: &Point, b: &Point) -> (f64, f64) {
 
 /// The point with these weights. Exactly a corner where it is one.
 #[inline]
-pub(super) fn at(corners: &[Point; 3], weights: [f64; 3]) -> Point {
+pub(crate) fn at(corners: &[Point; 3], weights: [f64; 3]) -> Point {
     let [a, b, c] = corners;
     match weights {
         [_, 0.0, 0.0] => *a,

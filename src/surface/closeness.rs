@@ -1,0 +1,293 @@
+//! Sizes where walls are thin.
+//!
+//! One layer of tets fills the space between two patches that face each other. Edges along the patches much longer than the wall is
+//! thick make these tets flat, so the size is lowered to a multiple of the thickness. The thickness is measured on a first
+//! triangulation, which serves analytic surfaces and facets alike: from points all over each triangle a **shrinking ball**
+//! (Ma, Bae, Choi 2012) that touches the triangle there is blown into the body until it touches a second patch; where the two touch
+//! it from opposite sides, their distance is the thickness. A ray would do where walls are parallel; the ball also finds the edge or
+//! the bend that comes near.
+//!
+//! Patches with a common curve or corner do not count: there they are a wedge, whose thickness falls to nothing whatever the size.
+
+use super::SurfaceMesh;
+use crate::kernel::nearest::{at, in_triangle};
+use crate::kernel::simplex::area_vector;
+use crate::kernel::tree::{Tree, bounds};
+use crate::mesh::Class;
+use crate::size::{Closeness, SizeField, Source, thinned};
+use crate::{Point, Vector};
+use csg::{BodyId, PatchId};
+use rayon::prelude::*;
+
+/// Sizes this near to what they should be stay.
+const WORTH: f64 = 0.85;
+
+/// Distance of neighbouring sources at most, in units of their size.
+const SPACING: f64 = 1.5;
+
+/// A triangle is halved at most so often in each direction.
+const MOST_HALVINGS: u32 = 24;
+
+/// A ball that shrinks by less than this part has found its place.
+const SETTLED: f64 = 0.01;
+
+/// Rounds of shrinking; each is to the nearest point so far, so that few are needed.
+const MOST_SHRINKS: usize = 12;
+
+/// Triangles of one patch face each other if the cosine between their normals is below this: a bend of 120°.
+const OPPOSITE: f64 = -0.5;
+
+/// A first surface mesh, and what is to be known of it.
+pub struct Walls<'a> {
+    /// The triangulation.
+    pub mesh: &'a SurfaceMesh,
+    /// The bodies behind and in front of each patch.
+    pub regions: &'a (dyn Fn(PatchId) -> [Option<BodyId>; 2] + Sync),
+    /// The nearest point on a patch itself.
+    pub project: &'a (dyn Fn(PatchId, &Point) -> Point + Sync),
+    /// The sizes so far.
+    pub size: &'a dyn SizeField,
+    /// What is wanted.
+    pub closeness: Closeness,
+}
+
+/// What was found of walls that are thin against the sizes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
+pub struct ThinWalls {
+    /// Places at which the size is too large for the thickness.
+    pub places: u64,
+    /// Those of them that want a lower size than [`Closeness::most`] allows.
+    pub limited: u64,
+    /// The least thickness there (length).
+    pub thinnest: Option<f64>,
+}
+
+/// The sizes that thin walls ask for.
+pub fn thin_walls(walls: &Walls) -> (Vec<Source>, ThinWalls) {
+    let mut found = ThinWalls::default();
+    if !walls.closeness.ratio.is_finite() {
+        return (Vec::new(), found);
+    }
+    let prober = Prober::new(walls);
+    let places: Vec<Vec<Place>> = (0..walls.mesh.triangles.len() as u32)
+        .into_par_iter()
+        .map(|t| {
+            let mut places = Vec::new();
+            prober.probe_triangle(t, &mut places);
+            places
+        })
+        .collect();
+    let places = places.concat();
+    found.places = places.len() as u64;
+    found.limited = places.iter().filter(|place| place.limited).count() as u64;
+    found.thinnest = places.iter().map(|place| place.thickness).min_by(f64::total_cmp);
+    (thinned(places.into_iter().filter_map(|place| place.source).collect()), found)
+}
+
+#[derive(Clone, Copy)]
+struct Place {
+    source: Option<Source>,
+    thickness: f64,
+    limited: bool,
+}
+
+struct Prober<'a> {
+    walls: &'a Walls<'a>,
+    corners: Vec<[Point; 3]>,
+    /// Unit normals; zero of triangles without area.
+    normals: Vec<Vector>,
+    tree: Tree,
+    /// By patch: those with a common curve or corner, ascending.
+    adjacent: Vec<Vec<PatchId>>,
+}
+
+impl<'a> Prober<'a> {
+    fn new(walls: &'a Walls<'a>) -> Self {
+        let mesh = walls.mesh;
+        let corners: Vec<[Point; 3]> =
+            mesh.triangles.iter().map(|t| t.vertices.map(|v| mesh.points[v.index()])).collect();
+        let normal = |[a, b, c]: &[Point; 3]| area_vector(a, b, c).try_normalize(0.0);
+        Self {
+            walls,
+            normals: corners.iter().map(|p| normal(p).unwrap_or_else(Vector::zeros)).collect(),
+            tree: Tree::new(&corners.iter().map(bounds).collect::<Vec<_>>()),
+            adjacent: adjacent_patches(mesh),
+            corners,
+        }
+    }
+
+    /// Adds the places on a triangle from which the opposite wall is too near.
+    fn probe_triangle(&self, t: u32, places: &mut Vec<Place>) {
+        let normal = self.normals[t as usize];
+        let [behind, before] = (self.walls.regions)(self.walls.mesh.triangles[t as usize].patch);
+        for (body, into) in [(behind, -normal), (before, normal)] {
+            if body.is_some() && normal != Vector::zeros() {
+                self.probe(t, into, self.corners[t as usize], 2 * MOST_HALVINGS, places);
+            }
+        }
+    }
+
+    /// The same for a part of a triangle, which is halved while it is long against the size that it asks for.
+    fn probe(&self, t: u32, into: Vector, part: [Point; 3], halvings: u32, places: &mut Vec<Place>) {
+        let Closeness { ratio, most } = self.walls.closeness;
+        let [a, b, c] = part;
+        let middle = Point::from((a.coords + b.coords + c.coords) / 3.0);
+        let size = self.walls.size.size_at(&middle);
+        let length = |k: usize| (part[(k + 2) % 3] - part[(k + 1) % 3]).norm();
+        let longest = (0..3).fold(0, |best, k| if length(k) > length(best) { k } else { best });
+        // Over the triangle, the thickness may differ by as much as the triangle is long.
+        let enough = size / ratio;
+        let Some(thickness) = self.thickness(t, &middle, into, enough + 0.5 * length(longest)) else {
+            return;
+        };
+        let wanted = ratio * thickness;
+        let lowered = lowered(size, wanted, most);
+        let spacing = SPACING * lowered;
+        if length(longest) > spacing && halvings > 0 {
+            let [i, j, k] = [longest, (longest + 1) % 3, (longest + 2) % 3];
+            let cut = nalgebra::center(&part[j], &part[k]);
+            self.probe(t, into, [part[i], part[j], cut], halvings - 1, places);
+            self.probe(t, into, [part[i], cut, part[k]], halvings - 1, places);
+        } else if wanted < WORTH * size {
+            let source = (lowered < WORTH * size).then_some(Source { point: middle, size: lowered });
+            places.push(Place { source, thickness, limited: wanted < lowered });
+        }
+    }
+
+    /// The distance from a point of a triangle to the wall opposite, if that is less than `limit`.
+    fn thickness(&self, t: u32, from: &Point, into: Vector, limit: f64) -> Option<f64> {
+        let patch = self.walls.mesh.triangles[t as usize].patch;
+        let normal = self.normals[t as usize];
+        let adjacent = &self.adjacent[patch.index()];
+        let faces = |s: u32| {
+            let other = self.walls.mesh.triangles[s as usize].patch;
+            if other == patch {
+                normal.dot(&self.normals[s as usize]) < OPPOSITE
+            } else {
+                adjacent.binary_search(&other).is_err()
+            }
+        };
+        let mut radius = 0.5 * limit;
+        let mut touched: Option<(u32, Point)> = None;
+        for _ in 0..MOST_SHRINKS {
+            let center = from + into * radius;
+            let foot =
+                |s: u32| at(&self.corners[s as usize], in_triangle(&center, &self.corners[s as usize]));
+            let squared = |s: u32| if faces(s) { (foot(s) - center).norm_squared() } else { f64::INFINITY };
+            let Some((s, _)) = self.tree.nearest_within(&center, radius * radius, squared) else { break };
+            let point = foot(s);
+            let way = point - from;
+            let smaller = way.norm_squared() / (2.0 * into.dot(&way));
+            touched = Some((s, point));
+            if !(smaller > 0.0 && smaller < (1.0 - SETTLED) * radius) {
+                break;
+            }
+            radius = smaller;
+        }
+        let (s, point) = touched?;
+        let center = from + into * radius;
+        if (from - center).dot(&(point - center)) > 0.0 {
+            return None;
+        }
+        // The triangles are chords: what counts is the surface.
+        let project = self.walls.project;
+        let ends = [project(patch, from), project(self.walls.mesh.triangles[s as usize].patch, &point)];
+        Some((ends[1] - ends[0]).norm()).filter(|&d| d > 0.0 && d < limit)
+    }
+}
+
+/// The size that becomes of one where a smaller one is wanted: that, if it is no more than `most` times smaller; else ever less is done,
+/// and nothing from about twice that on, as a little of it costs many tets that are flat still.
+fn lowered(size: f64, wanted: f64, most: f64) -> f64 {
+    let beyond = size / (wanted * most);
+    if beyond <= 1.0 { wanted } else { size * (beyond.powi(3) / most).min(1.0) }
+}
+
+/// By patch: those that a curve or corner is common to, ascending.
+fn adjacent_patches(mesh: &SurfaceMesh) -> Vec<Vec<PatchId>> {
+    let patches = mesh.triangles.iter().map(|t| t.patch.index() + 1).max().unwrap_or(0);
+    // Curves first, corners behind them.
+    let on = |class: Class| match class {
+        Class::Curve(curve) => Some((0, curve.0)),
+        Class::Corner(corner) => Some((1, corner.0)),
+        _ => None,
+    };
+    let mut uses: Vec<((u8, u32), PatchId)> = Vec::new();
+    for t in &mesh.triangles {
+        uses.extend(t.vertices.iter().filter_map(|v| Some((on(mesh.classes[v.index()])?, t.patch))));
+    }
+    // A curve of one segment has no vertex of its own: its ends tell.
+    uses.sort_unstable();
+    uses.dedup();
+    let mut adjacent = vec![Vec::new(); patches];
+    for group in uses.chunk_by(|a, b| a.0 == b.0) {
+        for (_, patch) in group {
+            adjacent[patch.index()].extend(group.iter().map(|(_, other)| *other).filter(|o| o != patch));
+        }
+    }
+    for list in &mut adjacent {
+        list.sort_unstable();
+        list.dedup();
+    }
+    adjacent
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::facets::{FacetModel, Facets, keep};
+    use crate::size::UniformSize;
+
+    /// A box as facets.
+    fn slab([x, y, z]: [f64; 3]) -> FacetModel {
+        let points = (0..8)
+            .map(|i| Point::new(x * f64::from(i & 1), y * f64::from(i >> 1 & 1), z * f64::from(i >> 2 & 1)));
+        let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+        let triangles = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+        let facets = Facets { points: points.collect(), triangles, ..Facets::default() };
+        FacetModel::new(&[facets], &crate::facets::Settings::default()).unwrap()
+    }
+
+    fn found(model: &FacetModel, size: f64, closeness: Closeness) -> (Vec<Source>, ThinWalls) {
+        thin_walls(&Walls {
+            mesh: &keep(model),
+            regions: &|patch| [model.patch(patch).inside, model.patch(patch).outside],
+            project: &|_, point| *point,
+            size: &UniformSize(size),
+            closeness,
+        })
+    }
+
+    #[test]
+    fn a_plate_gets_sources_all_over_and_a_block_none() {
+        let closeness = Closeness { ratio: 2.0, most: 8.0 };
+        let (sources, walls) = found(&slab([4.0, 4.0, 0.25]), 1.0, closeness);
+        assert!(walls.thinnest.is_some_and(|d| (d - 0.25).abs() < 1e-12), "{walls:?}");
+        assert_eq!(walls.limited, 0);
+        assert!(sources.iter().all(|s| (s.size - 0.5).abs() < 1e-12));
+        // No place on the large faces is further from a source than a spacing and a cell of those that are thinned.
+        for (i, j) in (0..9).flat_map(|i| (0..9).map(move |j| (i, j))) {
+            let p = Point::new(0.5 * f64::from(i), 0.5 * f64::from(j), 0.0);
+            let nearest = sources.iter().map(|s| (s.point - p).norm()).fold(f64::INFINITY, f64::min);
+            assert!(nearest < (SPACING + 1.0) * 0.5, "{p}: {nearest}");
+        }
+        let (sources, walls) = found(&slab([1.0, 1.0, 1.0]), 1.0, closeness);
+        assert!(sources.is_empty() && walls == ThinWalls::default());
+    }
+
+    #[test]
+    fn what_cannot_be_resolved_is_counted_and_left_as_it_is() {
+        let paper = slab([4.0, 4.0, 0.001]);
+        let (sources, walls) = found(&paper, 1.0, Closeness { ratio: 2.0, most: 8.0 });
+        assert!(sources.is_empty() && walls.limited > 0 && walls.limited == walls.places, "{walls:?}");
+        assert!(found(&paper, 1.0, Closeness::OFF).1 == ThinWalls::default());
+    }
+
+    #[test]
+    fn less_is_done_the_more_would_be_needed() {
+        let factor = |needed: f64| 1.0 / lowered(1.0, 1.0 / needed, 8.0);
+        assert_eq!([factor(1.0), factor(4.0), factor(8.0)], [1.0, 4.0, 8.0]);
+        assert!((factor(12.0) - 8.0 / 1.5_f64.powi(3)).abs() < 1e-12);
+        assert_eq!([factor(16.0), factor(1e6)], [1.0, 1.0]);
+    }
+}
