@@ -142,9 +142,9 @@ fn skins_of_refined_parts_are_filled_also_where_they_touch_themselves() {
 #[ignore = "a minute: its table is in benches/results/hard-inputs-2026-11-21.md"]
 fn skins_of_all_refined_parts_are_filled() {
     for name in NAMES {
-        for (preset, ranks, pieces) in
-            [(Preset::Moderate, 4, 2), (Preset::Coarse, 16, 2), (Preset::Coarse, 16, 4)]
-        {
+        // Refined, the coarse mesh of the tee would have inverted tets: `generate` makes it finer there.
+        let coarse = if name == "tee" { Preset::Moderate } else { Preset::Coarse };
+        for (preset, ranks, pieces) in [(Preset::Moderate, 4, 2), (coarse, 16, 2), (coarse, 16, 4)] {
             for (rank, surface) in surfaces_of_parts(name, preset, ranks, pieces).iter().enumerate() {
                 println!("{}", filled(&format!("{name}, part {rank} of {ranks}, {pieces} pieces"), surface));
             }
