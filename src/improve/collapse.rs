@@ -6,7 +6,7 @@
 use crate::Point;
 use crate::improve::complex::{Complex, place};
 use crate::improve::objective::Objective;
-use crate::improve::swap::{LEAST_GAIN, commit};
+use crate::improve::swap::{commit, least_after};
 use crate::size::SizeField;
 
 /// A collapse makes no edge longer than this, in units of the wanted size at its middle.
@@ -33,7 +33,7 @@ impl Collapser {
         let corners = complex.tets[tet as usize];
         for vertex in corners.into_iter().filter(|&v| complex.free[v as usize]).collect::<Vec<_>>() {
             complex.star(vertex, &mut self.star);
-            let mut worst = complex.worst_of(&self.star) + LEAST_GAIN;
+            let mut worst = least_after(complex.worst_of(&self.star));
             let mut found = false;
             for into in corners.into_iter().filter(|&v| v != vertex) {
                 if let Some(value) = self.merged(complex, objective, vertex, into, worst)

@@ -10,7 +10,7 @@ use crate::Point;
 use crate::improve::complex::Complex;
 use crate::improve::objective::Objective;
 use crate::improve::smooth::Smoother;
-use crate::improve::swap::{LEAST_GAIN, commit};
+use crate::improve::swap::{commit, least_after};
 use crate::mesh::TET_FACES;
 
 /// Tets in a hole at most: twice an ordinary star. Larger holes were not seen to win.
@@ -75,7 +75,7 @@ impl Inserter {
         let hole: Vec<u32> = self.hole[..best.0].to_vec();
         self.point = best.1;
         self.begin(complex, objective, &hole);
-        self.worst > complex.worst_of(&self.hole) + LEAST_GAIN && self.keeps_fixed_vertices(complex)
+        self.worst > least_after(complex.worst_of(&self.hole)) && self.keeps_fixed_vertices(complex)
     }
 
     /// The least score among the tets round the new vertex.

@@ -3,13 +3,14 @@
 //! Boundary triangles, segments and their vertices stay; everything else may change. The **score** of a tet is
 //! its shape: by default the mean ratio of the worst tet that ever comes of it by refinement
 //! ([`Measure::Refined`]). A change is made only if it raises the worst score of the tets that it touches, so
-//! the worst of the mesh never falls, and every tet stays positive by exact sign. There are five tools, all of which
+//! the worst of the mesh never falls, and every tet stays positive by exact sign. There are six tools, all of which
 //! but the first fill a **hole** anew:
 //!
 //! * `smooth` moves a vertex;
 //! * `swap` removes an edge, or the faces between two vertices;
 //! * `collapse` merges a vertex into a neighbour;
 //! * `insert` fills a hole round a new vertex;
+//! * `reconnect` fills a hole with the best tets between its vertices;
 //! * `repair` uses the others where a tet is *illegal*.
 //!
 //! Swaps come first: a sliver is mostly a matter of how its neighbourhood is cut into tets, and to bend its neighbours
@@ -49,6 +50,7 @@ mod insert;
 mod legality;
 mod limits;
 mod objective;
+mod reconnect;
 mod repair;
 mod schedule;
 mod smooth;

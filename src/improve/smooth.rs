@@ -8,7 +8,7 @@
 use crate::improve::complex::{Complex, NONE, place};
 use crate::improve::limits::TetLimits;
 use crate::improve::objective::Objective;
-use crate::improve::swap::LEAST_GAIN;
+use crate::improve::swap::least_after;
 use crate::{Point, Vector};
 
 /// Tets this close to the worst of the star take part in choosing the direction. Smaller bands zigzag
@@ -78,12 +78,12 @@ impl Smoother {
         let start = complex.points[vertex as usize];
         let (mut at, mut worst) = (start, before);
         let middle = self.middle();
-        let value = self.worst_above(objective, &middle, worst + LEAST_GAIN);
+        let value = self.worst_above(objective, &middle, least_after(worst));
         if let Some(value) = value {
             (at, worst) = (middle, value);
         }
         let (at, worst) = self.ascend(objective, at, worst);
-        worst > before + LEAST_GAIN && self.commit(complex, objective, vertex, at)
+        worst > least_after(before) && self.commit(complex, objective, vertex, at)
     }
 
     /// Where in the hole bounded by `faces`, which all look at `start`, a vertex makes the worst tet best.
@@ -175,7 +175,7 @@ impl Smoother {
             let mut next = None;
             for _ in 0..HALVINGS {
                 let there = at + direction * step;
-                if let Some(value) = self.worst_above(objective, &there, worst + LEAST_GAIN) {
+                if let Some(value) = self.worst_above(objective, &there, least_after(worst)) {
                     next = Some((there, value));
                     break;
                 }

@@ -18,8 +18,18 @@ const LONGEST_RING: usize = 8;
 /// The most faces that one face removal takes: their new edge must not have too many tets either.
 const MOST_FACES: usize = 6;
 
-/// A swap must raise the worst score by this much: less is not worth the work, and rounding must not make cycles.
-pub(super) const LEAST_GAIN: f64 = 1e-4;
+/// A change must raise the worst score by this much: less is not worth the work, and rounding must not make cycles.
+const LEAST_GAIN: f64 = 1e-4;
+
+/// Where all scores are tiny, by this part of the worst: inside skins of needles tets have mean ratios of 0.01 and less, scores of 0.001,
+/// and gains that are small only beside those of others.
+const LEAST_PART: f64 = 0.1;
+
+/// What the worst score must exceed after a change, if it is `before` now.
+#[inline]
+pub(super) fn least_after(before: f64) -> f64 {
+    before + LEAST_GAIN.min(LEAST_PART * before.abs())
+}
 
 /// A better filling of a hole.
 #[derive(Default)]
@@ -60,7 +70,7 @@ impl Swapper {
 
     /// [`find`](Self::find) among the holes without a tet worse than `least`.
     fn find_above(&mut self, complex: &Complex, objective: &Objective, tet: u32, least: f64) -> bool {
-        self.best.gain = LEAST_GAIN;
+        self.best.gain = 0.0;
         let mut better = false;
         for [i, j] in TET_EDGES {
             if self.find_edge_removal(complex, objective, tet, [i, j], least)
@@ -115,7 +125,7 @@ impl Swapper {
             let upper = score([a, b, c, high]);
             if upper <= least { upper } else { upper.min(score([a, c, b, low])) }
         });
-        if worst <= before + LEAST_GAIN {
+        if worst <= least_after(before) {
             return false;
         }
         self.found.gain = worst - before;
@@ -154,7 +164,7 @@ impl Swapper {
             let side = sandwich.best_side([tet, other], [u, v], w, before);
             worst = worst.min(side.new);
             before = before.min(side.old);
-            if worst <= before + LEAST_GAIN {
+            if worst <= least_after(before) {
                 return false;
             }
         }
@@ -225,7 +235,7 @@ impl Sandwich<'_> {
         let tet = [self.low, self.high, u, v];
         let ending = Side { new: self.objective.score(&self.complex.points, tet), old: f64::INFINITY };
         let (olds, news) = (self.old.len(), self.new.len());
-        if ending.new <= before + LEAST_GAIN
+        if ending.new <= least_after(before)
             && let Some((next, beyond)) = self.across(pair, w)
             && olds + 2 <= 2 * MOST_FACES
         {

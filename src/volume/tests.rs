@@ -454,6 +454,16 @@ fn skins_of_refined_tets_are_filled() {
 }
 
 #[test]
+fn needles_of_aspect_ten_thousand_are_filled() {
+    for sides in [5, 24, 100] {
+        for wall in [0.5, 1e-3] {
+            filled(needle_tube(sides, 1e4, wall), f64::INFINITY);
+        }
+        filled(needle_cone(sides, 1e4), f64::INFINITY);
+    }
+}
+
+#[test]
 fn a_surface_graded_over_four_orders_of_magnitude_is_filled() {
     bare(graded_ball(90, 60, 1e-4));
     let mut random = crate::kernel::random::Random::new(25);

@@ -1,25 +1,8 @@
 //! The check that a mesh fills a surface, by what callers can see of both.
 
-use super::{BodyId, ClosedSurface, Point, Sign, TET_FACES, VolumeMesh, orient3d, volume6};
+use super::volumes::{assert_same_volumes, volumes_by_surface, volumes_by_tets};
+use super::{BodyId, ClosedSurface, Sign, TET_FACES, VolumeMesh, orient3d};
 use std::collections::BTreeMap;
-
-/// The volume of each body by the surface integral, and the sum of what cancels in it.
-fn volumes_by_surface(surface: &ClosedSurface) -> BTreeMap<BodyId, [f64; 2]> {
-    let mut volumes = BTreeMap::new();
-    let center = surface.points()[0];
-    for (triangle, [behind, front]) in surface.triangles().iter().zip(surface.regions()) {
-        let [a, b, c] = triangle.map(|v| &surface.points()[v as usize]);
-        let v = volume6(&center, a, b, c) / 6.0;
-        for (region, sign) in [(behind, 1.0), (front, -1.0)] {
-            if let Some(body) = region {
-                let [sum, all] = volumes.entry(*body).or_insert([0.0; 2]);
-                *sum += sign * v;
-                *all += v.abs();
-            }
-        }
-    }
-    volumes
-}
 
 /// Everything that a volume mesh promises of its surface; panics with what is broken.
 pub fn check_fills(surface: &ClosedSurface, mesh: &VolumeMesh) {
@@ -27,11 +10,9 @@ pub fn check_fills(surface: &ClosedSurface, mesh: &VolumeMesh) {
     assert_eq!(mesh.tets.len(), mesh.bodies.len());
     let mut used = vec![false; mesh.points.len()];
     let mut sides: BTreeMap<[u32; 3], Vec<([u32; 3], BodyId)>> = BTreeMap::new();
-    let mut volumes: BTreeMap<BodyId, f64> = BTreeMap::new();
     for (tet, &body) in mesh.tets.iter().zip(&mesh.bodies) {
         let [a, b, c, d] = tet.map(|v| &mesh.points[v as usize]);
         assert_eq!(orient3d(a, b, c, d), Sign::Positive, "tet {tet:?} at {a}");
-        *volumes.entry(body).or_insert(0.0) += volume6(a, b, c, d) / 6.0;
         for face in TET_FACES {
             let face = face.map(|i| tet[i]);
             sides.entry(sorted(face)).or_default().push((face, body));
@@ -54,20 +35,9 @@ pub fn check_fills(surface: &ClosedSurface, mesh: &VolumeMesh) {
         assert!(found.len() == 2 && found[0].1 == found[1].1, "face {face:?} inside has {found:?}");
         assert!(!is_even(found[0].0, found[1].0), "face {face:?} has one side twice");
     }
-    let expected = volumes_by_surface(surface);
-    assert_eq!(expected.keys().collect::<Vec<_>>(), volumes.keys().collect::<Vec<_>>());
-    // A thin body's volume is known as well as its points are.
-    let diagonal = diagonal_of(surface.points());
-    for (body, [v, all]) in expected {
-        let error = (volumes[&body] - v).abs();
-        let allowed = 1e-12 * all + 1e-15 * diagonal.powi(3);
-        assert!(error < allowed, "body {body:?}: {} instead of {v}", volumes[&body]);
-    }
-}
-
-fn diagonal_of(points: &[Point]) -> f64 {
-    let (low, high) = points.iter().fold((points[0], points[0]), |(l, h), p| (l.inf(p), h.sup(p)));
-    (high - low).norm()
+    let by_surface = volumes_by_surface(surface.points(), surface.triangles(), surface.regions());
+    let by_tets = volumes_by_tets(&mesh.points, mesh.tets.iter().zip(mesh.bodies.iter().copied()));
+    assert_same_volumes("the surface and its tets", &by_surface, &by_tets);
 }
 
 fn sorted(mut face: [u32; 3]) -> [u32; 3] {

@@ -377,3 +377,43 @@ pub fn staircase(
     }
     soup
 }
+
+/// The corner of a ring of n points about the z axis.
+fn on_ring(sides: u32, i: u32, radius: f64, z: f64) -> Point {
+    let angle = TAU * f64::from(i % sides) / f64::from(sides);
+    Point::new(radius * angle.cos(), radius * angle.sin(), z)
+}
+
+/// A tube of n sides and radius 1 with a wall, whose sides are needles, `aspect` times as long as wide, from one end to the other, as
+/// programs that know no mesh export cylinders.
+pub fn needle_tube(sides: u32, aspect: f64, wall: f64) -> Soup {
+    let height = aspect * TAU / f64::from(sides);
+    let at = |i: u32, inner: bool, upper: bool| {
+        on_ring(sides, i, if inner { 1.0 - wall } else { 1.0 }, if upper { height } else { 0.0 })
+    };
+    let mut soup = Soup::default();
+    for i in 0..sides {
+        let quad = |inner: [bool; 4], upper: [bool; 4]| {
+            [0, 1, 2, 3].map(|k| at(i + u32::from(k == 1 || k == 2), inner[k], upper[k]))
+        };
+        soup.quad(quad([false; 4], [false, false, true, true]), INSIDE);
+        soup.quad(quad([true; 4], [true, true, false, false]), INSIDE);
+        soup.quad(quad([true, true, false, false], [false; 4]), INSIDE);
+        soup.quad(quad([false, false, true, true], [true; 4]), INSIDE);
+    }
+    soup
+}
+
+/// A cone of n sides and radius 1, all of them needles that meet in the apex, its base a fan of needles from one corner.
+pub fn needle_cone(sides: u32, aspect: f64) -> Soup {
+    let apex = Point::new(0.0, 0.0, aspect * TAU / f64::from(sides));
+    let at = |i: u32| on_ring(sides, i, 1.0, 0.0);
+    let mut soup = Soup::default();
+    for i in 0..sides {
+        soup.add([at(i), at(i + 1), apex], INSIDE);
+    }
+    for i in 1..sides - 1 {
+        soup.add([at(0), at(i + 1), at(i)], INSIDE);
+    }
+    soup
+}

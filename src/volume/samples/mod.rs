@@ -5,6 +5,7 @@
 mod check;
 mod hard;
 mod soup;
+mod volumes;
 
 pub(super) use check::check_fills;
 pub(super) use hard::*;
@@ -13,7 +14,6 @@ pub(super) use soup::{INSIDE, Soup};
 use super::{ClosedSurface, SurfaceFaults, VolumeMesh};
 use crate::kernel::predicates::{Sign, orient3d};
 use crate::kernel::random::Random;
-use crate::kernel::simplex::volume6;
 use crate::mesh::TET_FACES;
 use crate::{Point, Vector};
 use csg::BodyId;

@@ -6,6 +6,8 @@ pub mod hard;
 #[path = "../../../src/volume/samples/soup.rs"]
 #[allow(dead_code)]
 pub mod soup;
+#[path = "../../../src/volume/samples/volumes.rs"]
+pub mod volumes;
 
 use csg::BodyId;
 pub use soup::{INSIDE, Soup};

@@ -1,0 +1,334 @@
+//! Reconnection: some tets are taken out, and their hole is filled with the best tets that its vertices allow.
+//!
+//! A search with bounds over all fillings of a small polyhedron (Liu, Chen, Sun 2009, "Small polyhedron reconnection for mesh
+//! improvement and its implementation based on advancing front technique"; Marot, Verhetsel, Remacle 2020, "Reviving the
+//! search for optimal tetrahedralizations"): a face of the hole is joined to each vertex that gives a better tet than
+//! the worst so far, and what is left of the hole is filled likewise. It finds what no sequence of swaps finds whose every step is an
+//! improvement, and takes out free vertices where that is better.
+//!
+//! No two tets need be compared: they stand positively, and the faces that they do not share are the hole's. So every point in
+//! general position is in as many of them as the hole's surface winds round it, that is in one inside and in none outside.
+
+use crate::improve::complex::Complex;
+use crate::improve::objective::{INVERTED, Objective};
+use crate::improve::swap::{commit, least_after};
+use crate::mesh::TET_FACES;
+
+/// The sizes of the holes that are tried, in tets.
+const HOLES: [usize; 3] = [10, 18, 28];
+
+/// Vertices of a hole at most.
+const MOST_VERTICES: usize = 20;
+
+/// Partial fillings that are looked at before the search is given up.
+const PATIENCE: usize = 1500;
+
+/// Quadruples of vertices.
+const QUADRUPLES: usize =
+    MOST_VERTICES * (MOST_VERTICES - 1) * (MOST_VERTICES - 2) * (MOST_VERTICES - 3) / 24;
+
+/// The hole and the search in it; kept to spare allocations.
+#[derive(Default)]
+pub(super) struct Reconnector {
+    hole: Vec<u32>,
+    /// The hole's vertices: its faces and tets are written by their places here.
+    vertices: Vec<u32>,
+    scores: Scores,
+    /// The faces of what is not yet filled, outward, as [`face`] writes them.
+    front: Vec<[u8; 3]>,
+    /// The tets of the present partial filling and of the best whole one.
+    filling: Vec<([u8; 4], f64)>,
+    best: Vec<([u8; 4], f64)>,
+    /// What the worst tet must exceed.
+    least: f64,
+    patience: usize,
+}
+
+/// Scores of tets between the vertices of a hole, computed once each.
+#[derive(Default)]
+struct Scores {
+    /// For each quadruple in ascending order its score, and whether that order is the positive one; no number where not yet known.
+    known: Vec<(f64, bool)>,
+}
+
+/// A face from its lowest vertex on.
+fn face([a, b, c]: [u8; 3]) -> [u8; 3] {
+    if a < b && a < c {
+        [a, b, c]
+    } else if b < c {
+        [b, c, a]
+    } else {
+        [c, a, b]
+    }
+}
+
+fn other_side([a, b, c]: [u8; 3]) -> [u8; 3] {
+    [a, c, b]
+}
+
+impl Scores {
+    fn clear(&mut self) {
+        self.known.clear();
+        self.known.resize(QUADRUPLES, (f64::NAN, false));
+    }
+
+    /// The score of a tet, [`INVERTED`] if it does not stand positively.
+    fn of(&mut self, complex: &Complex, objective: &Objective, vertices: &[u32], tet: [u8; 4]) -> f64 {
+        let mut sorted = tet;
+        let mut even = true;
+        for [i, j] in [[0, 1], [2, 3], [0, 2], [1, 3], [1, 2]] {
+            if sorted[i] > sorted[j] {
+                sorted.swap(i, j);
+                even = !even;
+            }
+        }
+        let [a, b, c, d] = sorted.map(usize::from);
+        // The combinatorial number system.
+        let slot = a + b * (b - 1) / 2 + c * (c - 1) * (c - 2) / 6 + d * (d - 1) * (d - 2) * (d - 3) / 24;
+        let known = &mut self.known[slot];
+        if known.0.is_nan() {
+            let [a, b, c, d] = sorted.map(|k| vertices[usize::from(k)]);
+            *known = (objective.score(&complex.points, [a, b, c, d]), true);
+            if known.0 == INVERTED {
+                *known = (objective.score(&complex.points, [b, a, c, d]), false);
+            }
+        }
+        if known.1 == even { known.0 } else { INVERTED }
+    }
+}
+
+impl Reconnector {
+    /// Fills a hole round `tet` anew if that raises the worst score in it. Each partial filling that is looked at takes one of `steps`;
+    /// none is looked at when they are used up.
+    pub fn improve(
+        &mut self,
+        complex: &mut Complex,
+        objective: &Objective,
+        tet: u32,
+        steps: &mut usize,
+    ) -> bool {
+        if *steps == 0 {
+            return false;
+        }
+        self.hole.clear();
+        self.vertices.clear();
+        self.take(complex, tet);
+        for size in HOLES {
+            if !self.grow(complex, size) {
+                return false;
+            }
+            self.patience = PATIENCE.min(*steps);
+            *steps -= self.patience;
+            let found = self.search_in_hole(complex, objective);
+            *steps += self.patience;
+            if found {
+                let new: Vec<([u32; 4], f64)> = self.best.iter().map(|&(t, s)| (self.global(t), s)).collect();
+                if commit(complex, &self.hole, &new) {
+                    return true;
+                }
+            }
+        }
+        false
+    }
+
+    fn global(&self, tet: [u8; 4]) -> [u32; 4] {
+        tet.map(|k| self.vertices[usize::from(k)])
+    }
+
+    fn take(&mut self, complex: &Complex, tet: u32) {
+        self.hole.push(tet);
+        for v in complex.tets[tet as usize] {
+            if !self.vertices.contains(&v) {
+                self.vertices.push(v);
+            }
+        }
+    }
+
+    /// Grows the hole to `size` tets: tets that have all their vertices there first, then the worst. False if there is no more to take.
+    fn grow(&mut self, complex: &Complex, size: usize) -> bool {
+        while self.hole.len() < size {
+            let mut best: Option<(bool, f64, u32)> = None;
+            for &t in &self.hole {
+                for k in 0..4 {
+                    let Some((next, opposite)) = complex.neighbour(t, k) else { continue };
+                    if self.hole.contains(&next) {
+                        continue;
+                    }
+                    let is_new = !self.vertices.contains(&complex.tets[next as usize][opposite]);
+                    if is_new && self.vertices.len() == MOST_VERTICES {
+                        continue;
+                    }
+                    let score = complex.scores[next as usize];
+                    if best.is_none_or(|b| (is_new, score) < (b.0, b.1)) {
+                        best = Some((is_new, score, next));
+                    }
+                }
+            }
+            let Some((_, _, next)) = best else { return false };
+            self.take(complex, next);
+        }
+        true
+    }
+
+    /// Leaves the best filling of the hole in `best`. False if none is better than the present one.
+    fn search_in_hole(&mut self, complex: &Complex, objective: &Objective) -> bool {
+        self.front.clear();
+        for &t in &self.hole {
+            let local = complex.tets[t as usize].map(|v| {
+                let place = self.vertices.iter().position(|&w| w == v);
+                place.expect("the hole has its tets' vertices") as u8
+            });
+            for (k, corners) in TET_FACES.iter().enumerate() {
+                let is_inside = complex.neighbour(t, k).is_some_and(|(next, _)| self.hole.contains(&next));
+                if !is_inside {
+                    self.front.push(face(corners.map(|i| local[i])));
+                }
+            }
+        }
+        // Vertices that the hole encloses may go only if they are free; and both sides of a crack are not told apart.
+        let front = &self.front;
+        let kept =
+            |(k, &v): (usize, &u32)| complex.free[v as usize] || front.iter().any(|f| f.contains(&(k as u8)));
+        let has_crack = front.iter().any(|&f| front.contains(&other_side(f)));
+        if has_crack || !self.vertices.iter().enumerate().all(kept) {
+            return false;
+        }
+        self.scores.clear();
+        self.filling.clear();
+        self.best.clear();
+        self.least = least_after(complex.worst_of(&self.hole));
+        self.fill(complex, objective, f64::INFINITY);
+        !self.best.is_empty()
+    }
+
+    /// Fills what is left; `worst` is the least score so far.
+    fn fill(&mut self, complex: &Complex, objective: &Objective, worst: f64) {
+        if self.front.is_empty() {
+            self.best.clone_from(&self.filling);
+            self.least = worst;
+            return;
+        }
+        if self.patience == 0 {
+            return;
+        }
+        self.patience -= 1;
+        let mut apexes = self.apexes_of_narrowest(complex, objective);
+        apexes.1.sort_unstable_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+        let ([a, b, c], apexes) = apexes;
+        for (apex, score) in apexes {
+            // A better filling may have been found since.
+            if worst.min(score) <= self.least {
+                break;
+            }
+            let tet = [apex, a, b, c];
+            let before = self.front.clone();
+            self.filling.push((tet, score));
+            for corners in TET_FACES {
+                self.meet(face(corners.map(|k| tet[k])));
+            }
+            self.fill(complex, objective, worst.min(score));
+            self.filling.pop();
+            self.front = before;
+        }
+    }
+
+    /// A face of a new tet, outward: the front loses it or gets its other side.
+    fn meet(&mut self, outward: [u8; 3]) {
+        match self.front.iter().position(|&f| f == outward) {
+            Some(k) => {
+                self.front.swap_remove(k);
+            }
+            None => self.front.push(other_side(outward)),
+        }
+    }
+
+    /// The face of the front with the fewest vertices that it can be joined to, and these with their scores.
+    fn apexes_of_narrowest(&mut self, complex: &Complex, objective: &Objective) -> ([u8; 3], Vec<(u8, f64)>) {
+        let mut best: Option<([u8; 3], Vec<(u8, f64)>)> = None;
+        let mut apexes = Vec::with_capacity(MOST_VERTICES);
+        for &[a, b, c] in &self.front {
+            apexes.clear();
+            let fewest = best.as_ref().map_or(usize::MAX, |b| b.1.len());
+            for apex in 0..self.vertices.len() as u8 {
+                if apex == a || apex == b || apex == c {
+                    continue;
+                }
+                let score = self.scores.of(complex, objective, &self.vertices, [apex, a, b, c]);
+                // Its other faces must not be in the front the other way round: something is there already.
+                let sides = [[a, b, apex], [b, c, apex], [c, a, apex]];
+                if score > self.least && !sides.iter().any(|&s| self.front.contains(&face(s))) {
+                    apexes.push((apex, score));
+                    if apexes.len() >= fewest {
+                        break;
+                    }
+                }
+            }
+            if apexes.len() < fewest {
+                best = Some(([a, b, c], apexes.clone()));
+                if apexes.is_empty() {
+                    break;
+                }
+            }
+        }
+        best.expect("the front has a face")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::improve::blocks::whole;
+    use crate::improve::objective::Measure;
+    use crate::improve::samples::{cube, fan};
+    use crate::improve::swap::Swapper;
+
+    const SHAPES: Objective = Objective { measure: Measure::MeanRatio, legality: None };
+
+    #[test]
+    fn reconnection_goes_on_where_swaps_end() {
+        let mut done = 0;
+        for seed in 0..4 {
+            let mut complex = whole(&cube(4, seed));
+            complex.score_all(&SHAPES);
+            let (mut swapper, mut reconnector) = (Swapper::default(), Reconnector::default());
+            while (0..complex.tets.len() as u32)
+                .any(|t| complex.is_alive(t) && swapper.improve(&mut complex, &SHAPES, t))
+            {}
+            let worst =
+                |complex: &Complex| complex.living().map(|t| complex.scores[t as usize]).fold(1.0, f64::min);
+            let before = worst(&complex);
+            for tet in 0..complex.tets.len() as u32 {
+                if complex.is_alive(tet) && complex.scores[tet as usize] < 0.3 {
+                    let found = reconnector.improve(&mut complex, &SHAPES, tet, &mut 10_000);
+                    done += usize::from(found);
+                }
+            }
+            assert!(worst(&complex) >= before);
+            complex.check().unwrap();
+        }
+        assert!(done > 0);
+    }
+
+    #[test]
+    fn the_best_filling_of_a_fan_is_found_at_once() {
+        for (ring, tets) in [(3, 2), (4, 4), (5, 6), (6, 8)] {
+            let mut complex = whole(&fan(ring, 4.0));
+            complex.score_all(&SHAPES);
+            let mut reconnector = Reconnector::default();
+            reconnector.take(&complex, 0);
+            assert!(!reconnector.grow(&complex, 10), "the fan has fewer tets");
+            assert_eq!(reconnector.hole.len(), ring);
+            reconnector.patience = PATIENCE;
+            assert!(reconnector.search_in_hole(&complex, &SHAPES));
+            assert_eq!(reconnector.best.len(), tets);
+        }
+    }
+
+    #[test]
+    fn without_steps_nothing_is_done() {
+        let mut complex = whole(&cube(4, 1));
+        complex.score_all(&SHAPES);
+        let mut reconnector = Reconnector::default();
+        assert!((0..40).all(|tet| !reconnector.improve(&mut complex, &SHAPES, tet, &mut 0)));
+    }
+}
