@@ -30,6 +30,7 @@ use crate::{Aabb, BodyId, CornerId, CurveId, Geometry, PatchId, Point, SurfaceId
 use around::Tolerances;
 use octree::Octree;
 
+mod apex;
 mod arcs;
 mod around;
 mod assemble;
@@ -41,10 +42,12 @@ mod error;
 mod extent;
 mod number;
 mod octree;
+mod seam;
 mod trace;
 
 pub use check::Inconsistency;
 pub use error::{FeatureError, Named, Place};
+pub use seam::find_seams;
 pub use trace::{curve_curvature, curve_tangent};
 
 /// A point where curves end, or a vertex of its own (`point`, the apex of a cone).
@@ -133,8 +136,7 @@ impl Features {
         let diagonal = root.iter().map(|side| side.width().powi(2)).sum::<f64>().sqrt();
         let largest = root.iter().map(crate::Interval::magnitude).fold(0.0, f64::max);
         let tolerances = Tolerances::new(diagonal, largest);
-        let tree = Octree::new(geometry, root)?;
-        contact::refuse_apexes(geometry, &tree)?;
+        let tree = Octree::new(geometry, root, &tolerances)?;
         find_in(geometry, &tree, &tolerances)
             .map_err(|error| contact::explain(geometry, &tree, error, &tolerances))
     }

@@ -84,7 +84,9 @@ impl Surface {
     /// The distance of `point` from the surface to first order; infinite where the gradient vanishes off it.
     pub fn distance(&self, point: &Point) -> f64 {
         let value = self.value(point).abs();
-        if value == 0.0 { 0.0 } else { value / self.gradient(point).norm() }
+        let distance = if value == 0.0 { 0.0 } else { value / self.gradient(point).norm() };
+        // Beside the apex of a cone rounding leaves nothing of both.
+        self.apex().map_or(distance, |apex| distance.min((point - apex).norm()))
     }
 
     /// The point of a closed surface (sphere, torus, ellipsoid) farthest in a direction, a unit vector, one of
@@ -95,6 +97,20 @@ impl Surface {
             Self::Torus(t) => Some(t.support(direction)),
             Self::Ellipsoid(e) => Some(e.support(direction)),
             _ => None,
+        }
+    }
+
+    /// Whether its function is quadratic, so that its second derivatives are the same everywhere.
+    pub fn is_quadric(&self) -> bool {
+        match self {
+            Self::Plane(_)
+            | Self::Sphere(_)
+            | Self::Cylinder(_)
+            | Self::Cone(_)
+            | Self::Ellipsoid(_)
+            | Self::EllipticCylinder(_)
+            | Self::EllipticCone(_) => true,
+            Self::Torus(_) => false,
         }
     }
 

@@ -2,6 +2,7 @@
 
 use super::around::Tolerances;
 use super::bounds::split;
+use super::contact::{Contact, Kind};
 use super::octree::{Leaf, Octree, can_meet, is_monotone};
 use crate::interval::{Cell, middle};
 use crate::project::{project_to_both, shortest_step};
@@ -122,8 +123,8 @@ struct Tracer<'a> {
     surfaces: [&'a Surface; 2],
     tolerances: &'a Tolerances,
     diagonal: f64,
-    /// Where the two surfaces are tangent and the curve may branch.
-    branch_points: Vec<Point>,
+    /// Where the two surfaces are tangent and the curve may branch, and where it ends at an apex.
+    branch_points: Vec<Contact>,
 }
 
 impl<'a> Tracer<'a> {
@@ -135,7 +136,7 @@ impl<'a> Tracer<'a> {
     ) -> Self {
         let surfaces = pair.map(|s| &geometry.surfaces[s.index()]);
         let diagonal = tree.root.iter().map(|side| side.width().powi(2)).sum::<f64>().sqrt();
-        let branch_points = tree.contacts.iter().filter(|c| c.pair == pair).map(|c| c.point).collect();
+        let branch_points = tree.contacts.iter().filter(|c| c.pair == pair).copied().collect();
         Self { tree, pair, surfaces, tolerances, diagonal, branch_points }
     }
 
@@ -192,9 +193,9 @@ impl<'a> Tracer<'a> {
         }
     }
 
-    /// Whether both surfaces matter at a point.
+    /// Whether the intersection matters at a point.
     fn matters(&self, point: &Point) -> bool {
-        self.tree.leaf(point).is_some_and(|leaf| self.pair.iter().all(|s| leaf.surfaces.contains(s)))
+        self.tree.leaf(point).is_some_and(|leaf| self.tree.matters(leaf, self.pair))
     }
 
     fn direction(&self, at: &Point, sign: f64) -> (Vector, f64) {
@@ -222,11 +223,16 @@ impl<'a> Tracer<'a> {
     /// The branch point that the curve is about to reach.
     fn branch_ahead(&self, at: &Point, tangent: &Vector) -> Option<Point> {
         let curvature = self.surfaces.iter().map(|s| s.curvature(at)).fold(0.0, f64::max);
-        self.branch_points.iter().copied().find(|branch| {
-            let way = branch - at;
+        let is_ahead = |branch: &&Contact| {
+            let way = branch.point - at;
             let distance = way.norm();
-            distance * curvature <= NEAR_BRANCH && way.dot(tangent) > 0.995 * distance
-        })
+            let is_near = match branch.kind {
+                Kind::Tangent => distance * curvature <= NEAR_BRANCH,
+                Kind::Apex => distance <= branch.reach,
+            };
+            is_near && way.dot(tangent) > 0.995 * distance
+        };
+        self.branch_points.iter().find(is_ahead).map(|branch| branch.point)
     }
 }
 
