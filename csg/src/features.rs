@@ -160,7 +160,7 @@ fn find_in(geometry: &Geometry, tree: &Octree, tolerances: &Tolerances) -> Resul
     let traces = trace::trace_all(geometry, tree, tolerances);
     let (arcs, nodes) = arcs::feature_arcs(geometry, tree, &traces, tolerances)?;
     let arcs = assemble::join(geometry, arcs, &nodes, tolerances)?;
-    contact::check(geometry, tree, &arcs, tolerances)?;
+    contact::check(geometry, tree, tolerances)?;
     let mut features = assemble::entities(geometry, tree, &arcs, &nodes, tolerances)?;
     number::number(geometry, &mut features.patches);
     features.check()?;

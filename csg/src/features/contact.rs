@@ -1,6 +1,5 @@
 //! Places where two surfaces are tangent: whether they matter.
 
-use super::arcs::Arc;
 use super::around::{Tolerances, region};
 use super::octree::{Leaf, Octree, is_flat};
 use super::{FeatureError, Inconsistency, Named, Place};
@@ -234,26 +233,12 @@ fn possible_wedges(geometry: &Geometry, contact: &Contact) -> Vec<[bool; 2]> {
     sides
 }
 
-/// Refuses contacts that matter and are no part of the features found.
+/// Refuses contacts with a wedge of no angle between the sheets.
 ///
-/// A contact is part of them if a curve of which both surfaces are known runs through it (a ball that ends a pipe), or
-/// ends there (two pipes of one radius that cross).
-pub(super) fn check(
-    geometry: &Geometry,
-    tree: &Octree,
-    arcs: &[Arc],
-    tolerances: &Tolerances,
-) -> Result<(), FeatureError> {
+/// Where other surfaces through the contact leave it open which regions are beside it, it is looked around.
+pub(super) fn check(geometry: &Geometry, tree: &Octree, tolerances: &Tolerances) -> Result<(), FeatureError> {
     for contact in &tree.contacts {
-        let knows = |arc: &&Arc| contact.pair.iter().all(|s| arc.around.surfaces.binary_search(s).is_ok());
-        let near = |arc: &Arc| {
-            let reach = 2.0 * contact.reach;
-            arc.points.windows(2).any(|ends| distance(ends, &contact.point) <= reach)
-        };
-        if !is_harmless(geometry, tree, contact, tolerances)?
-            && !arcs.iter().filter(knows).any(near)
-            && has_wedge(geometry, contact)
-        {
+        if !is_harmless(geometry, tree, contact, tolerances)? && has_wedge(geometry, contact) {
             return Err(refusal(geometry, contact));
         }
     }
@@ -323,13 +308,6 @@ pub(super) fn explain(
     let matters = |contact: &&Contact| matches!(is_harmless(geometry, tree, contact, tolerances), Ok(false));
     let reason = tree.contacts.iter().filter(is_near).find(matters);
     reason.map_or(error, |contact| refusal(geometry, contact))
-}
-
-/// The distance of a point from a line segment.
-fn distance(ends: &[Point], point: &Point) -> f64 {
-    let chord = ends[1] - ends[0];
-    let part = ((point - ends[0]).dot(&chord) / chord.norm_squared()).clamp(0.0, 1.0);
-    (point - (ends[0] + chord * part)).norm()
 }
 
 /// The error for a contact that matters.
