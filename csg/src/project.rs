@@ -129,7 +129,7 @@ fn widest_gap(geometry: &Geometry, features: &Features) -> f64 {
             let surface = &geometry.surfaces[s.index()];
             curve.trace.iter().map(|p| surface.distance(p)).fold(0.0, f64::max)
         };
-        beside.filter(|s| !curve.surfaces.contains(s)).map(widest).fold(0.0, f64::max)
+        beside.map(widest).fold(0.0, f64::max)
     };
     features.curves.iter().map(gap).fold(0.0, f64::max)
 }

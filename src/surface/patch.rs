@@ -5,7 +5,7 @@ use super::condition::condition;
 use super::embed::{Conflict, Fault, embed};
 use super::error::joined;
 use super::front::{Advanced, advance};
-use super::improve::{Improved, improve, repair_flattening};
+use super::improve::{Improved, improve, repair_flattening, split};
 use super::sheet::{Kind, Node, Piece, Sheet, Stop};
 use super::topology::NONE;
 use super::{PatchReport, Report, Settings, SurfaceError, SurfaceMesh};
@@ -320,6 +320,7 @@ impl<'a> Part<'a> {
         // The improvement has a price on them and makes none, but where it had no other way.
         let (more, left) = repair_flattening(sheet)?;
         self.flattening = (found + more, left);
+        split_tip(sheet)?;
         Ok(())
     }
 
@@ -394,6 +395,19 @@ impl<'a> Part<'a> {
         report.flattening_repaired += self.flattening.0 - self.flattening.1;
         report.flattening_left += self.flattening.1;
     }
+}
+
+/// Splits the triangle at the apex of a cone if it is the only one there: a plane through the apex would have the same.
+fn split_tip(sheet: &mut Sheet) -> Result<(), Stop> {
+    let apex = sheet.nodes.iter().position(|n| n.kind == Kind::Fixed && sheet.chart.is_pole(&n.site));
+    if let Some(apex) = apex {
+        let mut ring = Vec::new();
+        sheet.mesh.around(apex as u32, &mut ring);
+        if let [t] = ring[..] {
+            split(sheet, t, sheet.mesh.at(t).corner(apex as u32), f64::INFINITY)?;
+        }
+    }
+    Ok(())
 }
 
 /// Why a part was not filled.

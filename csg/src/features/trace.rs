@@ -1,10 +1,9 @@
 //! Intersection curves of pairs of surfaces, followed from seeds.
 
 use super::around::Tolerances;
-use super::bounds::split;
 use super::contact::{Contact, Kind};
-use super::octree::{Leaf, Octree, can_meet, is_monotone};
-use crate::interval::{Cell, middle};
+use super::octree::{Octree, is_monotone};
+use crate::interval::Cell;
 use crate::project::{project_to_both, shortest_step};
 use crate::{Curve, Geometry, Interval, Point, Surface, SurfaceId, Vector};
 
@@ -33,56 +32,6 @@ const LEAST_STEP: f64 = 1e-9;
 const MOST_POINTS: usize = 1_000_000;
 /// Near a branch point within this part of the radius of curvature, a curve that heads for it is taken to reach it.
 const NEAR_BRANCH: f64 = 1e-2;
-
-/// All pieces of intersection curves in the leaves of the tree where both surfaces matter.
-pub(super) fn trace_all(geometry: &Geometry, tree: &Octree, tolerances: &Tolerances) -> Vec<Trace> {
-    let mut traces: Vec<Trace> = Vec::new();
-    let mut of_pair: std::collections::HashMap<[SurfaceId; 2], Vec<usize>> = std::collections::HashMap::new();
-    for leaf in &tree.leaves {
-        for &pair in &leaf.pairs {
-            for seed in seeds(geometry, leaf, pair, tolerances) {
-                let known = of_pair.entry(pair).or_default();
-                if known.iter().any(|&t| traces[t].passes(&seed)) {
-                    continue;
-                }
-                let trace = Tracer::new(geometry, tree, pair, tolerances).trace(&seed);
-                // A seed at a point of contact, from where no step leads on, is no curve.
-                if trace.points.len() > 1 {
-                    known.push(traces.len());
-                    traces.push(trace);
-                }
-            }
-        }
-    }
-    traces
-}
-
-/// Points of the intersection of two surfaces in a leaf: those to which Newton's method leads from the middle and
-/// from between it and the corners; if there is none, the same in its parts, where the surfaces may meet.
-fn seeds(geometry: &Geometry, leaf: &Leaf, pair: [SurfaceId; 2], tolerances: &Tolerances) -> Vec<Point> {
-    /// Curves that only clip a corner of a leaf are found on the other side of its faces; they are looked for to this depth.
-    const DEPTH: u32 = 3;
-    let [a, b] = pair.map(|s| &geometry.surfaces[s.index()]);
-    let mut open = vec![(leaf.cell, 0)];
-    let mut found = Vec::new();
-    while let Some((cell, depth)) = open.pop() {
-        if !can_meet(a, b, &cell) {
-            continue;
-        }
-        let parts = split(&cell);
-        let others = if depth == 0 { &parts[..] } else { &[] };
-        let starts = std::iter::once(&cell).chain(others).map(middle);
-        let before = found.len();
-        for start in starts {
-            let point = project_to_both(a, b, &start, tolerances.exact);
-            found.extend(point.ok().filter(|p| (0..3).all(|i| leaf.cell[i].contains(p[i]))));
-        }
-        if found.len() == before && depth < DEPTH {
-            open.extend(parts.map(|part| (part, depth + 1)));
-        }
-    }
-    found
-}
 
 impl Trace {
     /// Whether a point of the intersection of its two surfaces lies on this piece.
@@ -117,7 +66,7 @@ pub(super) fn step_box(p: &Point, q: &Point) -> Cell {
 }
 
 /// Follows one curve.
-struct Tracer<'a> {
+pub(super) struct Tracer<'a> {
     tree: &'a Octree,
     pair: [SurfaceId; 2],
     surfaces: [&'a Surface; 2],
@@ -128,7 +77,7 @@ struct Tracer<'a> {
 }
 
 impl<'a> Tracer<'a> {
-    fn new(
+    pub fn new(
         geometry: &'a Geometry,
         tree: &'a Octree,
         pair: [SurfaceId; 2],
@@ -140,7 +89,8 @@ impl<'a> Tracer<'a> {
         Self { tree, pair, surfaces, tolerances, diagonal, branch_points }
     }
 
-    fn trace(&self, seed: &Point) -> Trace {
+    /// The curve through a point of the intersection.
+    pub fn trace(&self, seed: &Point) -> Trace {
         let closed = |points| Trace { pair: self.pair, points, closed: true, branches: [false; 2] };
         let (mut points, end) = self.follow(seed, seed, 1.0);
         if end == End::Closed {
