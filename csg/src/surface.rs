@@ -123,6 +123,11 @@ impl Surface {
         }
     }
 
+    /// Whether its apex is within a length of a point: it has no normal there.
+    pub fn has_apex_at(&self, point: &Point, within: f64) -> bool {
+        self.apex().is_some_and(|apex| (point - apex).norm() <= within)
+    }
+
     /// An interval that contains the function's values over a box.
     pub fn value_range(&self, cell: &Cell) -> Interval {
         // The mean-value form closes in with the square of the size of the box, which the formula term

@@ -144,10 +144,13 @@ impl<'a> Input<'a> {
     fn direction_at_corner(&self, curve: CurveId, at: &Point, chord: &Vector) -> Vector {
         /// Surfaces that meet at less than half a degree give a direction of their own only with much noise.
         const TRANSVERSAL: f64 = 0.01;
-        let [m, n] =
-            self.features.curve(curve).surfaces.map(|s| self.geometry.surfaces[s.index()].normal(at));
-        let line = m.cross(&n);
-        let direction = if line.norm() > TRANSVERSAL { line * line.dot(chord).signum() } else { *chord };
+        /// An apex, which has no normal, is nearer than this part of the segment.
+        const APEX: f64 = 1e-6;
+        let surfaces = self.features.curve(curve).surfaces.map(|s| &self.geometry.surfaces[s.index()]);
+        let line = surfaces[0].normal(at).cross(&surfaces[1].normal(at));
+        let is_apex = surfaces.iter().any(|s| s.has_apex_at(at, APEX * chord.norm()));
+        let direction =
+            if !is_apex && line.norm() > TRANSVERSAL { line * line.dot(chord).signum() } else { *chord };
         direction.try_normalize(0.0).unwrap_or_default()
     }
 

@@ -1,19 +1,23 @@
 //! Pairs of surfaces that are tangent along a curve.
 //!
 //! Such pairs are told from their parameters, for their intersection is ill-conditioned: decimals that miss each other
-//! by 10⁻¹⁰ make a gap, or two curves 10⁻⁵ apart. What is meant is one curve, the **seam**; it is a line or a circle, and
+//! by 10⁻¹⁰ make a gap, or two curves 10⁻⁵ apart. What is meant is one curve, the **seam**; it is a line or an ellipse, and
 //! is described by one of the two surfaces and an auxiliary surface that crosses it (a plane, or a cylinder around the axis).
 //!
-//! Three families hold all cases of planes, spheres, circular cylinders, cones and tori:
+//! Three families hold nearly all cases of planes, spheres, circular cylinders, cones and tori:
 //!
 //! * lines: a plane and a surface of straight lines, parallel cylinders;
 //! * surfaces of revolution about one axis whose meridians (lines and circles in a half-plane) are tangent;
 //! * a tube of one radius that goes on in another way: a torus and a ball, a cylinder or another torus.
 //!
-//! Left to the cells: cones and cylinders tangent along a common line, and ellipsoids.
+//! A fourth is that of ellipsoids with the girth of a cylinder or of each other.
+//!
+//! Left to the cells: cones and cylinders tangent along a common line, and ellipsoids tangent elsewhere.
 
 use crate::geometry::SurfaceInfo;
-use crate::primitive::{Cylinder, EllipticCone, EllipticCylinder, Plane, Torus, quadric::tangents};
+use crate::primitive::{
+    Cylinder, Ellipsoid, EllipticCone, EllipticCylinder, Plane, Torus, quadric::tangents,
+};
 use crate::{Geometry, Point, Seam, Surface, SurfaceId, Vector};
 
 /// Surfaces that miss each other by less than this part of the size of all are tangent: as much as surfaces may lie apart
@@ -83,15 +87,14 @@ fn size(surfaces: &[Surface]) -> f64 {
 /// The seam of two surfaces, if there is one.
 fn seam(surfaces: [&Surface; 2], tolerance: f64) -> Option<Found> {
     let swapped = [surfaces[1], surfaces[0]];
-    line(surfaces, tolerance)
-        .or_else(|| tube(surfaces, tolerance))
-        .or_else(|| around_axis(surfaces, tolerance))
-        .or_else(|| {
-            let found = line(swapped, tolerance)
-                .or_else(|| tube(swapped, tolerance))
-                .or_else(|| around_axis(swapped, tolerance))?;
-            Some(Found { carrier: 1 - found.carrier, ..found })
-        })
+    let ordered = |surfaces| {
+        line(surfaces, tolerance)
+            .or_else(|| tube(surfaces, tolerance))
+            .or_else(|| around_axis(surfaces, tolerance))
+            .or_else(|| girth(surfaces, tolerance))
+    };
+    let turned = |found: Found| Found { carrier: 1 - found.carrier, ..found };
+    ordered(surfaces).or_else(|| ordered(swapped).map(turned))
 }
 
 fn is_parallel(a: &Vector, b: &Vector) -> bool {
@@ -222,6 +225,37 @@ fn where_circles_are_tangent(t: &Torus, s: &Torus, tolerance: f64) -> Option<(Po
     let (of_t, of_s) = (ends(t), ends(s));
     let point = of_t.into_iter().find(|p| of_s.iter().any(|q| (p - q).norm() <= tolerance))?;
     Some((point, direction))
+}
+
+/// An ellipsoid that has an ellipse around its centre in common with a cylinder along one of its axes, or with another one or a
+/// sphere about the same centre.
+fn girth([a, b]: [&Surface; 2], tolerance: f64) -> Option<Found> {
+    let Surface::Ellipsoid(e) = a else { return None };
+    let same_center = |center: &Point| (center - e.center).norm() <= tolerance;
+    (0..3).find_map(|k| {
+        let hull = hull(e, k);
+        let is_same = |other: &Surface| hull.same_as(other, tolerance).is_some();
+        let fits = match b {
+            Surface::Cylinder(_) | Surface::EllipticCylinder(_) => is_same(b),
+            Surface::Sphere(s) if same_center(&s.center) => {
+                is_same(&Surface::Cylinder(Cylinder { point: s.center, axis: e.axes[k], radius: s.radius }))
+            }
+            Surface::Ellipsoid(f) if same_center(&f.center) => (0..3).any(|l| is_same(&self::hull(f, l))),
+            _ => false,
+        };
+        let auxiliary = plane(e.center, e.axes[k])?;
+        fits.then_some(Found { carrier: 1, auxiliary, is_alone: true })
+    })
+}
+
+/// The cylinder around an ellipsoid along one of its axes.
+fn hull(e: &Ellipsoid, along: usize) -> Surface {
+    let [i, j] = [(along + 1) % 3, (along + 2) % 3];
+    Surface::EllipticCylinder(EllipticCylinder {
+        point: e.center,
+        axes: [e.axes[i], e.axes[j]],
+        radii: [e.radii[i], e.radii[j]],
+    })
 }
 
 /// The curve that makes a surface when it turns about an axis, in the half-plane of (radius, height).

@@ -24,6 +24,11 @@ fn fillets_and_caps_are_curves_between_two_patches_also_with_rounded_decimals() 
         ("solid s = torus (0,0,0; 0,0,1; 2; 0.5) and plane (0,0,0.5; 0,0,1) and plane (2.5,0,0; 1,0,0); tlo s;", [0, 0, 0, 1]),
         ("solid s = cylinder (0,0,0; 0,0,1; 1) and plane (0,0,0; 0,0,-1) and plane (0,0,1; 0,0,1)
             and plane (0.6000000003,0.8,0; 0.6,0.8,0); tlo s;", [0, 0, 2, 3]),
+        (
+            "solid rod = ellipticcylinder (0,0,0; 2,0,0; 0,1,0) and plane (0,0,0; 0,0,-1) and plane (0,0,3; 0,0,1);
+            solid s = rod or ellipsoid (0,0,0; 2,0,0; 0,1,0; 0,0,1.5) or ellipsoid (0,0,3; 2,0,0; 0,1,0; 0,0,0.3); tlo s;",
+            [0, 0, 2, 3],
+        ),
     ];
     for (source, expected) in cases {
         let features = find(source);

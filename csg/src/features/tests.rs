@@ -233,6 +233,18 @@ fn size_and_distance_from_the_origin_do_not_matter() {
 }
 
 #[test]
+fn thin_plates_and_sharp_wedges_are_bounded() {
+    let box_of = |source: &str| find(source).bounds;
+    let plate = box_of("solid s = orthobrick (0,0,0; 1,1,0.0001); tlo s;");
+    assert_eq!(plate.max, Point::new(1.0, 1.0, 0.0001));
+    let wedge = box_of(
+        "solid s = plane (0,0,0; -0.01,0,1) and plane (0,0,0; 0,0,-1) and plane (1,0,0; 1,0,0)
+        and plane (0,0,0; 0,-1,0) and plane (0,1,0; 0,1,0); tlo s;",
+    );
+    assert!((wedge.max - Point::new(1.0, 1.0, 0.01)).norm() < 1e-12);
+}
+
+#[test]
 fn what_cannot_be_meshed_is_refused_with_its_place() {
     let refusals = [
         (

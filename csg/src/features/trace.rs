@@ -229,7 +229,7 @@ pub fn curve_tangent(geometry: &Geometry, curve: &Curve, at: &Point) -> Vector {
 /// surfaces are tangent.
 pub(super) fn tangent_along(a: &Surface, b: &Surface, at: &Point, chord: &Vector) -> Vector {
     let along = tangent(a, b, at);
-    match (cross_well(a, b, at), along.dot(chord) < 0.0) {
+    match (cross_well(a, b, at, chord), along.dot(chord) < 0.0) {
         (false, _) => chord.normalize(),
         (true, true) => -along,
         (true, false) => along,
@@ -241,14 +241,20 @@ pub(super) fn tangent_along(a: &Surface, b: &Surface, at: &Point, chord: &Vector
 /// At an end where its surfaces are tangent, that at the middle of the step of the trace there.
 pub fn curve_curvature(geometry: &Geometry, curve: &Curve, at: &Point) -> f64 {
     let [a, b] = curve.surfaces.map(|s| &geometry.surfaces[s.index()]);
-    if cross_well(a, b, at) { curvature(a, b, at) } else { curvature(a, b, &(at + inward(curve, at) * 0.5)) }
+    let chord = inward(curve, at);
+    if cross_well(a, b, at, &chord) { curvature(a, b, at) } else { curvature(a, b, &(at + chord * 0.5)) }
 }
 
-/// Whether two surfaces cross at an angle at which their gradients tell the tangent of the intersection.
-fn cross_well(a: &Surface, b: &Surface, at: &Point) -> bool {
+/// Whether two surfaces cross at an angle at which their gradients tell the tangent of the intersection; a chord gives the size
+/// of things.
+fn cross_well(a: &Surface, b: &Surface, at: &Point, chord: &Vector) -> bool {
     /// The sine; the second derivatives of the intersection lose twice its digits.
     const LEAST_SINE: f64 = 1e-4;
-    a.normal(at).cross(&b.normal(at)).norm() > LEAST_SINE
+    /// An apex is nearer than this part of the chord, or it is elsewhere.
+    const APEX: f64 = 1e-6;
+    let within = APEX * chord.norm();
+    let is_regular = ![a, b].iter().any(|s| s.has_apex_at(at, within));
+    is_regular && a.normal(at).cross(&b.normal(at)).norm() > LEAST_SINE
 }
 
 /// The step of the trace that is nearest to a point.
