@@ -5,7 +5,7 @@
 //! 1. `bounds`: a box around all bodies, by pruning a huge cube.
 //! 2. `octree`: cells, in each the part of each body that matters there; split until any two surfaces in a
 //!    cell either cannot meet in it or meet in a curve that is monotone there, which interval arithmetic proves.
-//! 3. `trace`: from seeds in the cells, the intersection curves of all such pairs of surfaces.
+//! 3. `seed`, `trace`: from seeds in the cells, the intersection curves of all such pairs of surfaces.
 //! 4. `cross`: on them, the points where a third surface crosses or touches; `arcs`: cut there, into arcs.
 //! 5. `around`: at a point of each arc, the regions (bodies or the exterior) around it, sector by sector.
 //!    An arc is part of a feature if it is more than a line on one smooth sheet.
@@ -18,18 +18,21 @@
 //! one curve, four through one point, a plane through a seam between tangent surfaces) need no case of their own; and
 //! what was missed shows as an open end.
 //!
-//! What is refused, with its place: the apex of a cone on a boundary; surfaces that are tangent where both are boundaries with
-//! a wedge of no angle between them (a ball on a plate); bodies that overlap or are not bounded.
+//! Tangent surfaces are a case of their own (`seam`): a line or a circle along which two are tangent is found from
+//! their parameters. The apex of a cone is a corner (`apex`). Curves get their seeds by exclusion (`seed`): parts of cells are split
+//! until a trace covers them or no curve can be there.
 //!
-//! What is not proved: that every curve gets a seed. In a cell in which two surfaces may meet, points are looked
-//! for by Newton's method from a few starts, so a closed curve that is met only in corners of cells could be missed;
-//! an open one would show in the check. Three or more surfaces that touch in one point to a high order are refused,
-//! but not always with that reason.
+//! What is refused, with its place: surfaces that are tangent where both are boundaries with a wedge of no angle between
+//! them, along a line (two rods side by side) or in a point (a ball on a plate, a torus cut where a plane touches it); bodies that
+//! overlap or are not bounded.
+//!
+//! Three or more surfaces that touch in one point to a high order are refused, but not always with that reason.
 
 use crate::{Aabb, BodyId, CornerId, CurveId, Geometry, PatchId, Point, SurfaceId};
 use around::Tolerances;
 use octree::Octree;
 
+mod apex;
 mod arcs;
 mod around;
 mod assemble;
@@ -41,10 +44,13 @@ mod error;
 mod extent;
 mod number;
 mod octree;
+mod seam;
+mod seed;
 mod trace;
 
 pub use check::Inconsistency;
 pub use error::{FeatureError, Named, Place};
+pub use seam::find_seams;
 pub use trace::{curve_curvature, curve_tangent};
 
 /// A point where curves end, or a vertex of its own (`point`, the apex of a cone).
@@ -133,8 +139,7 @@ impl Features {
         let diagonal = root.iter().map(|side| side.width().powi(2)).sum::<f64>().sqrt();
         let largest = root.iter().map(crate::Interval::magnitude).fold(0.0, f64::max);
         let tolerances = Tolerances::new(diagonal, largest);
-        let tree = Octree::new(geometry, root)?;
-        contact::refuse_apexes(geometry, &tree)?;
+        let tree = Octree::new(geometry, root, &tolerances)?;
         find_in(geometry, &tree, &tolerances)
             .map_err(|error| contact::explain(geometry, &tree, error, &tolerances))
     }
@@ -155,10 +160,10 @@ impl Features {
 
 /// The features in the cells of a tree.
 fn find_in(geometry: &Geometry, tree: &Octree, tolerances: &Tolerances) -> Result<Features, FeatureError> {
-    let traces = trace::trace_all(geometry, tree, tolerances);
+    let traces = seed::trace_all(geometry, tree, tolerances);
     let (arcs, nodes) = arcs::feature_arcs(geometry, tree, &traces, tolerances)?;
     let arcs = assemble::join(geometry, arcs, &nodes, tolerances)?;
-    contact::check(geometry, tree, &arcs, tolerances)?;
+    contact::check(geometry, tree, tolerances)?;
     let mut features = assemble::entities(geometry, tree, &arcs, &nodes, tolerances)?;
     number::number(geometry, &mut features.patches);
     features.check()?;
@@ -167,5 +172,7 @@ fn find_in(geometry: &Geometry, tree: &Octree, tolerances: &Tolerances) -> Resul
 
 #[cfg(test)]
 mod random_tests;
+#[cfg(test)]
+mod tangent_tests;
 #[cfg(test)]
 mod tests;

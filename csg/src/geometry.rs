@@ -153,10 +153,24 @@ pub enum BoundaryLabel {
     Name(String),
 }
 
+/// A curve along which two surfaces are tangent: a fillet and its plane, a pipe and the ball that ends it.
+///
+/// The intersection of the two says little of such a curve: rounding moves it by the square root of itself. So it is
+/// carried by one of them and an **auxiliary** surface across it that bounds nothing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Seam {
+    /// The two surfaces, ascending.
+    pub pair: [SurfaceId; 2],
+    /// One of them and the auxiliary surface, ascending. Their intersection may have other pieces, where the two are apart.
+    pub carrier: [SurfaceId; 2],
+    /// Whether the two have no other points in common.
+    pub is_alone: bool,
+}
+
 /// What a `.geo` file says.
 #[derive(Clone, Debug, Default)]
 pub struct Geometry {
-    /// The surfaces, equal ones made one.
+    /// The surfaces, equal ones made one; after those of the file the auxiliary ones of seams.
     pub surfaces: Vec<Surface>,
     /// Beside each surface what the file says of it.
     pub surface_info: Vec<SurfaceInfo>,
@@ -168,4 +182,13 @@ pub struct Geometry {
     pub boundary_overrides: Vec<BoundaryOverride>,
     /// The `boundingbox` statement: an override, never needed.
     pub stated_box: Option<Aabb>,
+    /// Where surfaces are tangent along curves, by pair ([`find_seams`](crate::features::find_seams)).
+    pub seams: Vec<Seam>,
+}
+
+impl Geometry {
+    /// The seam of two surfaces, ascending, if they have one.
+    pub fn seam(&self, pair: [SurfaceId; 2]) -> Option<&Seam> {
+        self.seams.binary_search_by_key(&pair, |seam| seam.pair).ok().map(|i| &self.seams[i])
+    }
 }

@@ -19,7 +19,8 @@ pub mod surface;
 
 pub use features::{Corner, Curve, FeatureError, Features, Fin, Patch};
 pub use geometry::{
-    Aabb, Body, BodyId, BoundaryLabel, BoundaryOverride, CornerId, CurveId, Geometry, PatchId, SurfaceId,
+    Aabb, Body, BodyId, BoundaryLabel, BoundaryOverride, CornerId, CurveId, Geometry, PatchId, Seam,
+    SurfaceId,
 };
 pub use interval::Interval;
 pub use project::{ProjectionFailed, Projector};

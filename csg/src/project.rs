@@ -32,16 +32,19 @@ impl Projector {
     pub fn new(geometry: &Geometry, features: &Features) -> Self {
         let bounds = &features.bounds;
         let largest = bounds.min.coords.amax().max(bounds.max.coords.amax());
+        let rounding = f64::max(ON_SURFACE * bounds.diagonal(), COORDINATE_ROUNDING * largest);
+        let gap = GAP_ROOM * widest_gap(geometry, features);
         Self {
             surfaces: geometry.surfaces.clone(),
             curves: features.curves.iter().map(|c| c.surfaces).collect(),
             patches: features.patches.iter().map(|p| p.surface).collect(),
-            tolerance: f64::max(ON_SURFACE * bounds.diagonal(), COORDINATE_ROUNDING * largest),
+            tolerance: if gap > rounding { gap } else { rounding },
         }
     }
 
     /// How far a projected point may be from its surfaces, a length: the larger of 10⁻¹² of the diagonal of the box
-    /// of the bodies and 4 units in the last place of its largest coordinate.
+    /// of the bodies and 4 units in the last place of its largest coordinate; more where surfaces that are to meet in a curve
+    /// miss each other by more, as tangent ones do whose decimals are rounded.
     pub fn tolerance(&self) -> f64 {
         self.tolerance
     }
@@ -113,6 +116,22 @@ impl Projector {
         let patches = (0..patches).map(|_| id(&mut reader)).collect::<Option<_>>()?;
         reader.0.is_empty().then_some(Self { surfaces, curves, patches, tolerance })
     }
+}
+
+/// A gap between surfaces is at most so much wider between the points of a trace than at them.
+const GAP_ROOM: f64 = 1.25;
+
+/// How far the surfaces of patches are from the curves on their boundaries.
+fn widest_gap(geometry: &Geometry, features: &Features) -> f64 {
+    let gap = |curve: &crate::Curve| {
+        let beside = curve.fins.iter().map(|fin| features.patch(fin.patch).surface);
+        let widest = |s: SurfaceId| {
+            let surface = &geometry.surfaces[s.index()];
+            curve.trace.iter().map(|p| surface.distance(p)).fold(0.0, f64::max)
+        };
+        beside.map(widest).fold(0.0, f64::max)
+    };
+    features.curves.iter().map(gap).fold(0.0, f64::max)
 }
 
 /// The point of both surfaces to which Newton's method leads from `point`, each step the shortest one that

@@ -84,7 +84,9 @@ impl Surface {
     /// The distance of `point` from the surface to first order; infinite where the gradient vanishes off it.
     pub fn distance(&self, point: &Point) -> f64 {
         let value = self.value(point).abs();
-        if value == 0.0 { 0.0 } else { value / self.gradient(point).norm() }
+        let distance = if value == 0.0 { 0.0 } else { value / self.gradient(point).norm() };
+        // Beside the apex of a cone rounding leaves nothing of both.
+        self.apex().map_or(distance, |apex| distance.min((point - apex).norm()))
     }
 
     /// The point of a closed surface (sphere, torus, ellipsoid) farthest in a direction, a unit vector, one of
@@ -98,6 +100,20 @@ impl Surface {
         }
     }
 
+    /// Whether its function is quadratic, so that its second derivatives are the same everywhere.
+    pub fn is_quadric(&self) -> bool {
+        match self {
+            Self::Plane(_)
+            | Self::Sphere(_)
+            | Self::Cylinder(_)
+            | Self::Cone(_)
+            | Self::Ellipsoid(_)
+            | Self::EllipticCylinder(_)
+            | Self::EllipticCone(_) => true,
+            Self::Torus(_) => false,
+        }
+    }
+
     /// The apex of a cone; `None` for other surfaces.
     pub fn apex(&self) -> Option<Point> {
         match self {
@@ -105,6 +121,11 @@ impl Surface {
             Self::EllipticCone(c) => Some(c.apex()),
             _ => None,
         }
+    }
+
+    /// Whether its apex is within a length of a point: it has no normal there.
+    pub fn has_apex_at(&self, point: &Point, within: f64) -> bool {
+        self.apex().is_some_and(|apex| (point - apex).norm() <= within)
     }
 
     /// An interval that contains the function's values over a box.

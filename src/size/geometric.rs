@@ -116,6 +116,10 @@ const COARSEST_SAMPLE: f64 = 1.0 / 32.0;
 /// How far beside a surface a point is taken to tell the regions on both sides, as a fraction of the diagonal.
 const SIDE_STEP: f64 = 1e-6;
 
+/// What is nearer to the apex of a cone is the apex, as a fraction of the diagonal: corners there are within rounding, samples
+/// a thousandth away and more.
+const APEX: f64 = 1e-6;
+
 struct Sampler<'a> {
     geometry: &'a Geometry,
     features: &'a Features,
@@ -133,7 +137,11 @@ impl Sampler<'_> {
     /// The size that a surface asks for at a point on it.
     fn size_on(&self, surface: SurfaceId, point: &Point) -> f64 {
         let bound = self.geometry.surface_info[surface.index()].maxh.unwrap_or(f64::INFINITY);
-        let curvature = self.geometry.surfaces[surface.index()].curvature(point);
+        let shape = &self.geometry.surfaces[surface.index()];
+        // An apex has no curvature; the points beside it say how small is small enough.
+        let beside = APEX * self.features.bounds.diagonal();
+        let is_apex = shape.apex().is_some_and(|apex| (point - apex).norm() <= beside);
+        let curvature = if is_apex { 0.0 } else { shape.curvature(point) };
         self.settings.scaled_bound(bound).min(self.size_of_curvature(curvature))
     }
 

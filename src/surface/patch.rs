@@ -5,7 +5,7 @@ use super::condition::condition;
 use super::embed::{Conflict, Fault, embed};
 use super::error::joined;
 use super::front::{Advanced, advance};
-use super::improve::{Improved, improve, repair_flattening};
+use super::improve::{Improved, improve, repair_flattening, split};
 use super::sheet::{Kind, Node, Piece, Sheet, Stop};
 use super::topology::NONE;
 use super::{PatchReport, Report, Settings, SurfaceError, SurfaceMesh};
@@ -144,10 +144,13 @@ impl<'a> Input<'a> {
     fn direction_at_corner(&self, curve: CurveId, at: &Point, chord: &Vector) -> Vector {
         /// Surfaces that meet at less than half a degree give a direction of their own only with much noise.
         const TRANSVERSAL: f64 = 0.01;
-        let [m, n] =
-            self.features.curve(curve).surfaces.map(|s| self.geometry.surfaces[s.index()].normal(at));
-        let line = m.cross(&n);
-        let direction = if line.norm() > TRANSVERSAL { line * line.dot(chord).signum() } else { *chord };
+        /// An apex, which has no normal, is nearer than this part of the segment.
+        const APEX: f64 = 1e-6;
+        let surfaces = self.features.curve(curve).surfaces.map(|s| &self.geometry.surfaces[s.index()]);
+        let line = surfaces[0].normal(at).cross(&surfaces[1].normal(at));
+        let is_apex = surfaces.iter().any(|s| s.has_apex_at(at, APEX * chord.norm()));
+        let direction =
+            if !is_apex && line.norm() > TRANSVERSAL { line * line.dot(chord).signum() } else { *chord };
         direction.try_normalize(0.0).unwrap_or_default()
     }
 
@@ -320,6 +323,7 @@ impl<'a> Part<'a> {
         // The improvement has a price on them and makes none, but where it had no other way.
         let (more, left) = repair_flattening(sheet)?;
         self.flattening = (found + more, left);
+        split_tip(sheet)?;
         Ok(())
     }
 
@@ -394,6 +398,19 @@ impl<'a> Part<'a> {
         report.flattening_repaired += self.flattening.0 - self.flattening.1;
         report.flattening_left += self.flattening.1;
     }
+}
+
+/// Splits the triangle at the apex of a cone if it is the only one there: a plane through the apex would have the same.
+fn split_tip(sheet: &mut Sheet) -> Result<(), Stop> {
+    let apex = sheet.nodes.iter().position(|n| n.kind == Kind::Fixed && sheet.chart.is_pole(&n.site));
+    if let Some(apex) = apex {
+        let mut ring = Vec::new();
+        sheet.mesh.around(apex as u32, &mut ring);
+        if let [t] = ring[..] {
+            split(sheet, t, sheet.mesh.at(t).corner(apex as u32), f64::INFINITY)?;
+        }
+    }
+    Ok(())
 }
 
 /// Why a part was not filled.

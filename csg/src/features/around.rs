@@ -150,15 +150,16 @@ pub(super) fn around(
     forward: &Vector,
     tolerances: &Tolerances,
 ) -> Result<Option<Around>, FeatureError> {
-    let Some(leaf) = tree.leaf(at).filter(|leaf| pair.iter().all(|s| leaf.surfaces.contains(s))) else {
-        return Ok(None);
+    let Some(leaf) = tree.leaf(at).filter(|leaf| tree.matters(leaf, pair)) else { return Ok(None) };
+    /// In lengths of merging; seams are found within a part of the size of all primitives, which may be larger than the bodies.
+    const SEWN_GAP: f64 = 100.0;
+    let sewn: Vec<SurfaceId> = tree.sewn(leaf, pair).collect();
+    let is_through = |s: &SurfaceId| {
+        // Tangent surfaces miss each other by more than others may, but not where their carrier runs on without them.
+        let gap = if sewn.contains(s) { SEWN_GAP * tolerances.merge } else { tolerances.on_surface };
+        pair.contains(s) || geometry.surfaces[s.index()].distance(at) <= gap
     };
-    let surfaces: Vec<SurfaceId> = leaf
-        .surfaces
-        .iter()
-        .copied()
-        .filter(|&s| pair.contains(&s) || geometry.surfaces[s.index()].distance(at) <= tolerances.on_surface)
-        .collect();
+    let surfaces: Vec<SurfaceId> = leaf.surfaces.iter().copied().filter(is_through).collect();
     let [a, b] = pair.map(|s| &geometry.surfaces[s.index()]);
     let mut axis = tangent(a, b, at);
     if axis.dot(forward) < 0.0 {

@@ -121,6 +121,7 @@ pub(super) fn entities(
             curves[curve.index()].fins.push(Fin { patch: PatchId::new(i), forward });
         }
     }
+    super::apex::add_corners(geometry, tree, &mut corners, tolerances)?;
     for user in &geometry.user_points {
         if !corners.iter().any(|c| (c.point - user.point).norm() <= tolerances.merge) {
             check_inside(geometry, tree, user, tolerances)?;
@@ -134,7 +135,7 @@ pub(super) fn entities(
 }
 
 /// A corner with the surfaces that matter there.
-fn corner(geometry: &Geometry, tree: &Octree, point: Point, tolerances: &Tolerances) -> Corner {
+pub(super) fn corner(geometry: &Geometry, tree: &Octree, point: Point, tolerances: &Tolerances) -> Corner {
     let near = |x: f64| Interval::new(x - tolerances.merge, x + tolerances.merge);
     let mut surfaces = tree.surfaces_in(&[near(point.x), near(point.y), near(point.z)]);
     surfaces.retain(|s| geometry.surfaces[s.index()].distance(&point) <= tolerances.merge);

@@ -14,6 +14,10 @@ const RESOLUTION: f64 = 1.0 / 16.0;
 /// two balls that touch have a point in common.
 const NOTHING: f64 = 1e-14;
 
+/// Far out a sharp wedge that ends is told from one that goes on in small cells only: with so many parts a wedge of 10⁻³ is, and
+/// a slab, which goes on, is given up soon.
+const MOST_PARTS: usize = 20_000;
+
 /// Part of the huge cube, and what bodies may be in it (`None`: the whole cell is in the body).
 struct Part {
     cell: Cell,
@@ -49,22 +53,35 @@ pub(super) fn bounding_cell(geometry: &Geometry) -> Result<Cell, FeatureError> {
             touches && undecided && part.cell[0].width() > RESOLUTION * longest
         };
         if !parts.iter().any(is_rough) {
-            let at_face =
-                |part: &&Part| (0..3).any(|i| part.cell[i].lo == cube[i].lo || part.cell[i].hi == cube[i].hi);
-            if let Some(part) = parts.iter().find(at_face) {
+            let Some(part) = parts.iter().find(|part| is_at_face(part, &cube)) else {
+                // Uneven room, so that planes of symmetry do not fall on the borders of cells.
+                let room = [0.0123, 0.0217, 0.0181].map(|part| part * longest);
+                return Ok([0, 1, 2].map(|i| Interval::new(hull[i].lo - room[i], hull[i].hi + 1.3 * room[i])));
+            };
+            let goes_on = |part: &Part| is_at_face(part, &cube) && part.bodies.iter().any(|b| b.1.is_none());
+            if parts.len() > MOST_PARTS || parts.iter().any(goes_on) {
                 return Err(FeatureError::Unbounded(Named::body(geometry, part.bodies[0].0)));
             }
-            // Uneven room, so that planes of symmetry do not fall on the borders of cells.
-            let room = [0.0123, 0.0217, 0.0181].map(|part| part * longest);
-            return Ok([0, 1, 2].map(|i| Interval::new(hull[i].lo - room[i], hull[i].hi + 1.3 * room[i])));
+            parts = refined(geometry, parts, &|part: &Part| is_at_face(part, &cube));
+            continue;
         }
-        let (rough, fine): (Vec<_>, Vec<_>) = parts.into_iter().partition(is_rough);
-        parts = fine;
-        for part in rough {
-            let children = split(&part.cell).map(|cell| Part { cell, bodies: part.bodies.clone() });
-            parts.extend(children.into_iter().filter_map(|child| prune(geometry, child)));
-        }
+        parts = refined(geometry, parts, &is_rough);
     }
+}
+
+/// Whether a part reaches a face of the cube.
+fn is_at_face(part: &Part, cube: &Cell) -> bool {
+    (0..3).any(|i| part.cell[i].lo == cube[i].lo || part.cell[i].hi == cube[i].hi)
+}
+
+/// The parts with some of them split.
+fn refined(geometry: &Geometry, parts: Vec<Part>, is_rough: &dyn Fn(&Part) -> bool) -> Vec<Part> {
+    let (rough, mut parts): (Vec<_>, Vec<_>) = parts.into_iter().partition(is_rough);
+    for part in rough {
+        let children = split(&part.cell).map(|cell| Part { cell, bodies: part.bodies.clone() });
+        parts.extend(children.into_iter().filter_map(|child| prune(geometry, child)));
+    }
+    parts
 }
 
 /// What is left of the bodies in a part, `None` if nothing.

@@ -1,12 +1,12 @@
 //! Places where two surfaces are tangent: whether they matter.
 
-use super::arcs::Arc;
-use super::around::{Tolerances, region, sheet_at};
-use super::octree::{Leaf, Octree};
+use super::around::{Tolerances, region};
+use super::octree::{Leaf, Octree, is_flat};
 use super::{FeatureError, Inconsistency, Named, Place};
 use crate::interval::{Cell, middle};
 use crate::primitive::quadric::tangents;
-use crate::{Geometry, Interval, Point, Surface, SurfaceId};
+use crate::project::project_to_both;
+use crate::{Geometry, Interval, Point, Seam, Surface, SurfaceId};
 use nalgebra::{Matrix2, Vector2};
 
 /// A place where two surfaces are tangent, or not told apart from it.
@@ -18,6 +18,17 @@ pub(super) struct Contact {
     pub point: Point,
     /// The size of the cell in which it was found.
     pub reach: f64,
+    /// What it is.
+    pub kind: Kind,
+}
+
+/// What kind of place a contact is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Kind {
+    /// The surfaces are tangent.
+    Tangent,
+    /// One passes through the apex of the other.
+    Apex,
 }
 
 /// Surfaces at an angle of less than this (its sine) where they meet are tangent there: a wedge so sharp has no mesh.
@@ -26,16 +37,24 @@ const TANGENT: f64 = 1e-6;
 impl Contact {
     /// Surfaces of a cell that could not be told apart.
     pub fn at_middle(pair: [SurfaceId; 2], cell: &Cell) -> Self {
-        Self { pair, point: middle(cell), reach: diagonal(cell) }
+        Self { pair, point: middle(cell), reach: diagonal(cell), kind: Kind::Tangent }
     }
 }
 
-fn diagonal(cell: &Cell) -> f64 {
+/// The length of the diagonal of a cell.
+pub(super) fn diagonal(cell: &Cell) -> f64 {
     cell.iter().map(|side| side.width().powi(2)).sum::<f64>().sqrt()
 }
 
 /// The point in (or just beside) a cell where both surfaces meet and are tangent, if there is one.
-pub(super) fn find(geometry: &Geometry, pair: [SurfaceId; 2], cell: &Cell) -> Option<Contact> {
+///
+/// Where they miss each other by less than what counts as nothing, they are taken to meet.
+pub(super) fn find(
+    geometry: &Geometry,
+    pair: [SurfaceId; 2],
+    cell: &Cell,
+    tolerances: &Tolerances,
+) -> Option<Contact> {
     /// The steps converge with the square: more than this many lead elsewhere.
     const STEPS: usize = 12;
     let [a, b] = pair.map(|s| &geometry.surfaces[s.index()]);
@@ -52,14 +71,34 @@ pub(super) fn find(geometry: &Geometry, pair: [SurfaceId; 2], cell: &Cell) -> Op
             break;
         }
     }
-    let rounding = 1e3 * f64::EPSILON * (at.coords.amax() + reach);
-    let meets = a.distance(&at) <= rounding && b.distance(&at) <= rounding;
+    let meets = a.distance(&at).max(b.distance(&at)) <= tolerances.on_surface;
     let inside = (0..3).all(|i| {
         let room = 0.01 * cell[i].width();
         Interval::new(cell[i].lo - room, cell[i].hi + room).contains(at[i])
     });
     let sine = a.normal(&at).cross(&b.normal(&at)).norm();
-    (meets && inside && sine <= TANGENT).then_some(Contact { pair, point: at, reach })
+    (meets && inside && sine <= TANGENT).then_some(Contact { pair, point: at, reach, kind: Kind::Tangent })
+}
+
+/// Whether a seam passes through a cell in which both of its surfaces are flat; the place is noted as a contact.
+///
+/// Beside the seam the two may cross in other curves, which end on it.
+pub(super) fn on_seam(geometry: &Geometry, seam: &Seam, cell: &Cell, contacts: &mut Vec<Contact>) -> bool {
+    if !seam.pair.iter().all(|s| is_flat(&geometry.surfaces[s.index()], cell)) {
+        return false;
+    }
+    let [a, b] = seam.carrier.map(|s| &geometry.surfaces[s.index()]);
+    let center = middle(cell);
+    let reach = diagonal(cell);
+    let Ok(point) = project_to_both(a, b, &center, f64::EPSILON * center.coords.amax().max(reach)) else {
+        return false;
+    };
+    let is_on = seam.pair.iter().all(|s| geometry.surfaces[s.index()].distance(&point) <= TANGENT * reach);
+    let is_near = (point - center).norm() <= reach;
+    if is_on && is_near {
+        contacts.push(Contact { pair: seam.pair, point, reach, kind: Kind::Tangent });
+    }
+    is_on && is_near
 }
 
 /// The shortest step that solves the two linearised equations and the one that the gradients be parallel in
@@ -103,7 +142,7 @@ fn is_harmless(
     tolerances: &Tolerances,
 ) -> Result<bool, FeatureError> {
     let Some(leaf) = tree.leaf(&contact.point) else { return Ok(true) };
-    if !contact.pair.iter().all(|s| leaf.surfaces.contains(s)) {
+    if contact.kind == Kind::Apex || !leaf.has_both(contact.pair) {
         return Ok(true);
     }
     let wedges = possible_wedges(geometry, contact);
@@ -194,27 +233,63 @@ fn possible_wedges(geometry: &Geometry, contact: &Contact) -> Vec<[bool; 2]> {
     sides
 }
 
-/// Refuses contacts that matter and are no part of the features found.
+/// Refuses contacts with a wedge of no angle between the sheets.
 ///
-/// A contact is part of them if a curve of which both surfaces are known runs through it (a ball that ends a pipe), or
-/// ends there (two pipes of one radius that cross).
-pub(super) fn check(
-    geometry: &Geometry,
-    tree: &Octree,
-    arcs: &[Arc],
-    tolerances: &Tolerances,
-) -> Result<(), FeatureError> {
+/// Where other surfaces through the contact leave it open which regions are beside it, it is looked around.
+pub(super) fn check(geometry: &Geometry, tree: &Octree, tolerances: &Tolerances) -> Result<(), FeatureError> {
     for contact in &tree.contacts {
-        let knows = |arc: &&Arc| contact.pair.iter().all(|s| arc.around.surfaces.binary_search(s).is_ok());
-        let near = |arc: &Arc| {
-            let reach = 2.0 * contact.reach;
-            arc.points.windows(2).any(|ends| distance(ends, &contact.point) <= reach)
-        };
-        if !is_harmless(geometry, tree, contact, tolerances)? && !arcs.iter().filter(knows).any(near) {
+        if !is_harmless(geometry, tree, contact, tolerances)? && has_wedge(geometry, contact) {
             return Err(refusal(geometry, contact));
         }
     }
     Ok(())
+}
+
+/// Whether somewhere around a contact there is a wedge of no angle: both sheets are boundaries, one above the other.
+///
+/// Looked for on a small circle, where other surfaces through the contact are where they are: the plane, the ball and the rods
+/// of a block with round edges all touch in one point, and each is a boundary in its own sector.
+fn has_wedge(geometry: &Geometry, contact: &Contact) -> bool {
+    /// The radius of the circle, in radii of curvature: the sheets are apart by half its square.
+    const CIRCLE: f64 = 1e-3;
+    /// In how many directions is looked.
+    const DIRECTIONS: u32 = 61;
+    /// Sheets nearer than this part of the square of the radius are one another's continuation.
+    const APART: f64 = 1e-3;
+    let [a, b] = contact.pair.map(|s| &geometry.surfaces[s.index()]);
+    let at = &contact.point;
+    let curvature = a.curvature(at).max(b.curvature(at));
+    let normal = a.normal(at);
+    let (u, v) = tangents(&normal);
+    let radius = CIRCLE / curvature;
+    (0..DIRECTIONS).any(|k| {
+        let angle = std::f64::consts::TAU * f64::from(k) / f64::from(DIRECTIONS) + 0.1;
+        let beside = at + (u * angle.cos() + v * angle.sin()) * radius;
+        let (Some(p), Some(q)) = (on_line(a, &beside, &normal), on_line(b, &beside, &normal)) else {
+            return true;
+        };
+        let way = q - p;
+        if way.norm() <= APART * CIRCLE * radius {
+            return false;
+        }
+        let body = |place: Point| {
+            let positive = |s: SurfaceId| geometry.surfaces[s.index()].value(&place) > 0.0;
+            geometry.bodies.iter().position(|body| body.solid.holds(&positive))
+        };
+        let [below, between, above] = [-0.5, 0.5, 1.5].map(|part| body(p + way * part));
+        below != between && between != above
+    })
+}
+
+/// The point of a surface on a line across it.
+fn on_line(surface: &Surface, start: &Point, direction: &crate::Vector) -> Option<Point> {
+    /// Newton's method begins within a millionth of the radius of curvature.
+    const STEPS: usize = 5;
+    let mut at = *start;
+    for _ in 0..STEPS {
+        at -= direction * (surface.value(&at) / surface.gradient(&at).dot(direction));
+    }
+    at.coords.iter().all(|x| x.is_finite()).then_some(at)
 }
 
 /// Names the contact of surfaces near the place of an error, if there is one that matters, as its reason.
@@ -233,30 +308,6 @@ pub(super) fn explain(
     let matters = |contact: &&Contact| matches!(is_harmless(geometry, tree, contact, tolerances), Ok(false));
     let reason = tree.contacts.iter().filter(is_near).find(matters);
     reason.map_or(error, |contact| refusal(geometry, contact))
-}
-
-/// The distance of a point from a line segment.
-fn distance(ends: &[Point], point: &Point) -> f64 {
-    let chord = ends[1] - ends[0];
-    let part = ((point - ends[0]).dot(&chord) / chord.norm_squared()).clamp(0.0, 1.0);
-    (point - (ends[0] + chord * part)).norm()
-}
-
-/// Refuses cones whose apex is on the boundary of a body.
-pub(super) fn refuse_apexes(geometry: &Geometry, tree: &Octree) -> Result<(), FeatureError> {
-    for (i, surface) in geometry.surfaces.iter().enumerate() {
-        if let Some(apex) = surface.apex() {
-            let id = SurfaceId::new(i);
-            let other_side = |s: SurfaceId| geometry.surfaces[s.index()].value(&apex) > 0.0;
-            if sheet_at(geometry, tree, id, &apex, &other_side)?.is_some() {
-                return Err(FeatureError::ConeApex {
-                    cone: Named::surface(geometry, id),
-                    place: Place(apex),
-                });
-            }
-        }
-    }
-    Ok(())
 }
 
 /// The error for a contact that matters.

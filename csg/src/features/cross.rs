@@ -34,11 +34,24 @@ pub(super) fn crossings(
             if trace.pair.contains(&id) {
                 continue;
             }
+            if tree.is_seam(trace.pair, id) {
+                continue;
+            }
             let third = &geometry.surfaces[id.index()];
             let mut finder = Finder { a, b, third, tolerances, found: Vec::new() };
             if !finder.contains_curve(ends) {
-                finder.find(&ends[0], &ends[1], 0);
+                // Where it is tangent to one of the pair, what crosses their seam says where well.
+                if let Some(auxiliary) = auxiliary(geometry, trace.pair, id) {
+                    finder.third = auxiliary;
+                    if !finder.contains_curve(ends) {
+                        finder.find(&ends[0], &ends[1], 0);
+                    }
+                    finder.found.retain(|p| third.distance(p) <= tolerances.merge);
+                } else {
+                    finder.find(&ends[0], &ends[1], 0);
+                }
             }
+            let third = finder.third;
             by_surface.entry(id).or_default().extend(finder.found.iter().map(|&point| {
                 let position = index as f64 + along(ends, &point).unwrap_or_else(|| nearer_end(ends, &point));
                 Crossing { position, point, volume: volume(&[a, b, third], &point) }
@@ -64,6 +77,15 @@ pub(super) fn crossings(
     }
     found.sort_by(|x, y| x.position.total_cmp(&y.position));
     found
+}
+
+/// The surface that cuts the seam of a third surface and one of a pair, if that seam is all the two have in common.
+fn auxiliary(geometry: &Geometry, pair: [SurfaceId; 2], third: SurfaceId) -> Option<&Surface> {
+    pair.into_iter().find_map(|s| {
+        let seam = geometry.seam([s.min(third), s.max(third)]).filter(|seam| seam.is_alone)?;
+        let id = seam.carrier.into_iter().find(|c| !seam.pair.contains(c))?;
+        Some(&geometry.surfaces[id.index()])
+    })
 }
 
 /// The crossings of one surface without repetitions: where the trace is on the surface all the way between two of them,

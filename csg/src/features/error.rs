@@ -66,16 +66,6 @@ pub enum FeatureError {
         /// A place in or beside the overlap.
         place: Place,
     },
-    /// The tip of a cone would be a vertex where no normal exists.
-    #[error(
-        "the apex of the cone of {cone} at {place} is on the boundary of a body: cut it off, with a plane for example"
-    )]
-    ConeApex {
-        /// The cone.
-        cone: Named,
-        /// The apex.
-        place: Place,
-    },
     /// Two surfaces touch and both are boundaries there: the bodies have a wedge of no angle.
     #[error(
         "surfaces of {first} and {second} touch at {place} without crossing: move one of them or let them overlap"

@@ -1,11 +1,13 @@
 //! Cells that separate surfaces: in each, what matters there.
 
+use super::around::Tolerances;
 use super::bounds::split;
 use super::contact::{self, Contact};
-use super::{FeatureError, Named, Place};
+use super::{FeatureError, Named, Place, apex};
 use crate::interval::{Cell, dot, middle, offset};
 use crate::solid::Pruned;
 use crate::{BodyId, Geometry, Interval, Point, Solid, Surface, SurfaceId, Vector};
+use std::collections::BTreeMap;
 
 /// A cell in which any two surfaces are told apart.
 #[derive(Debug)]
@@ -20,6 +22,13 @@ pub(super) struct Leaf {
     pub pairs: Vec<[SurfaceId; 2]>,
 }
 
+impl Leaf {
+    /// Whether both surfaces matter in it.
+    pub fn has_both(&self, pair: [SurfaceId; 2]) -> bool {
+        pair.iter().all(|s| self.surfaces.binary_search(s).is_ok())
+    }
+}
+
 /// An octree of such cells.
 #[derive(Debug)]
 pub(super) struct Octree {
@@ -30,6 +39,8 @@ pub(super) struct Octree {
     pub leaves: Vec<Leaf>,
     /// Places where surfaces of a cell touch or cross too flatly for curves to be monotone.
     pub contacts: Vec<Contact>,
+    /// By the surfaces that carry seams: the pairs of which they are seams.
+    seams: BTreeMap<[SurfaceId; 2], Vec<[SurfaceId; 2]>>,
 }
 
 #[derive(Debug)]
@@ -57,15 +68,20 @@ impl Octree {
     ///
     /// # Errors
     /// If more cells are needed than memory should hold.
-    pub fn new(geometry: &Geometry, root: Cell) -> Result<Self, FeatureError> {
+    pub fn new(geometry: &Geometry, root: Cell, tolerances: &Tolerances) -> Result<Self, FeatureError> {
         let bodies = geometry.bodies.iter().enumerate();
         let bodies = bodies.map(|(i, body)| (BodyId::new(i), body.solid.clone())).collect();
-        let mut tree = Self { root, nodes: vec![Node::Leaf(0)], leaves: Vec::new(), contacts: Vec::new() };
+        let mut seams: BTreeMap<[SurfaceId; 2], Vec<[SurfaceId; 2]>> = BTreeMap::new();
+        for seam in &geometry.seams {
+            seams.entry(seam.carrier).or_default().push(seam.pair);
+        }
+        let nodes = vec![Node::Leaf(0)];
+        let mut tree = Self { root, nodes, leaves: Vec::new(), contacts: Vec::new(), seams };
         let mut open = vec![(0, root, bodies, 0)];
         while let Some((node, cell, bodies, depth)) = open.pop() {
             let bodies = prune(geometry, &cell, bodies);
             let surfaces = surfaces_of(&bodies);
-            let pairs = judge_pairs(geometry, &cell, &surfaces, depth);
+            let pairs = Judge { geometry, cell: &cell, depth, tolerances }.all(&surfaces);
             let crowded = surfaces.len() > CROWD && depth < CROWD_DEPTH;
             if depth < MAX_DEPTH && (crowded || pairs.undecided.is_some()) {
                 if let (Some(pair), true) = (pairs.undecided, tree.nodes.len() > MAX_NODES) {
@@ -104,6 +120,22 @@ impl Octree {
                 }
             }
         }
+    }
+
+    /// Whether the intersection of a pair of surfaces matters in a leaf: both do, or those do whose seam it carries.
+    pub fn matters(&self, leaf: &Leaf, pair: [SurfaceId; 2]) -> bool {
+        leaf.has_both(pair) || self.sewn(leaf, pair).next().is_some()
+    }
+
+    /// Whether a surface is one of those whose seam a pair carries.
+    pub fn is_seam(&self, pair: [SurfaceId; 2], surface: SurfaceId) -> bool {
+        self.seams.get(&pair).into_iter().flatten().flatten().any(|&s| s == surface)
+    }
+
+    /// The surfaces that matter in a leaf and are tangent along the intersection of a pair that carries their seams.
+    pub fn sewn<'a>(&'a self, leaf: &'a Leaf, pair: [SurfaceId; 2]) -> impl Iterator<Item = SurfaceId> + 'a {
+        let pairs = self.seams.get(&pair).into_iter().flatten().copied();
+        pairs.filter(|&sewn| leaf.has_both(sewn)).flatten()
     }
 
     /// The surfaces that matter anywhere in a box, ascending.
@@ -161,34 +193,67 @@ struct Pairs {
     undecided: Option<[SurfaceId; 2]>,
 }
 
-fn judge_pairs(geometry: &Geometry, cell: &Cell, surfaces: &[SurfaceId], depth: u32) -> Pairs {
-    let mut pairs = Pairs::default();
-    for (i, &first) in surfaces.iter().enumerate() {
-        for &second in &surfaces[i + 1..] {
-            let pair = [first, second];
-            let [a, b] = pair.map(|s| &geometry.surfaces[s.index()]);
-            if !can_meet(a, b, cell) {
-                continue;
-            }
-            let center = middle(cell);
-            let direction = a.gradient(&center).cross(&b.gradient(&center));
-            if is_monotone(a, b, cell, &direction) {
-                pairs.regular.push(pair);
-                continue;
-            }
-            let flat = is_flat(a, cell) && is_flat(b, cell);
-            match if flat { contact::find(geometry, pair, cell) } else { None } {
-                Some(contact) => pairs.contacts.push(contact),
-                None => {
-                    pairs.undecided = Some(pair);
-                    if depth < MAX_DEPTH {
+/// Judges the pairs of surfaces in a cell.
+struct Judge<'a> {
+    geometry: &'a Geometry,
+    cell: &'a Cell,
+    depth: u32,
+    tolerances: &'a Tolerances,
+}
+
+impl Judge<'_> {
+    /// Judges all pairs, up to the first that is not told apart.
+    fn all(&self, surfaces: &[SurfaceId]) -> Pairs {
+        let mut pairs = Pairs::default();
+        for (i, &first) in surfaces.iter().enumerate() {
+            for &second in &surfaces[i + 1..] {
+                if !self.pair([first, second], &mut pairs) {
+                    pairs.undecided = Some([first, second]);
+                    if self.depth < MAX_DEPTH {
                         return pairs;
                     }
                 }
             }
         }
+        pairs.regular.sort_unstable();
+        pairs.regular.dedup();
+        pairs
     }
-    pairs
+
+    /// Whether two surfaces of the cell are told apart in it.
+    fn pair(&self, pair: [SurfaceId; 2], pairs: &mut Pairs) -> bool {
+        match self.geometry.seam(pair) {
+            None => self.crossing(pair, pairs),
+            // Where the seam is all they have in common, its carrier stands for them.
+            Some(seam) if seam.is_alone => self.crossing(seam.carrier, pairs),
+            Some(seam) => {
+                self.crossing(seam.carrier, pairs)
+                    && (contact::on_seam(self.geometry, seam, self.cell, &mut pairs.contacts)
+                        || self.crossing(pair, pairs))
+            }
+        }
+    }
+
+    /// Whether what two surfaces have in common in the cell is known: nothing, a monotone curve, a point of contact, or an apex.
+    fn crossing(&self, pair: [SurfaceId; 2], pairs: &mut Pairs) -> bool {
+        let Self { geometry, cell, depth, tolerances } = *self;
+        let [a, b] = pair.map(|s| &geometry.surfaces[s.index()]);
+        if !can_meet(a, b, cell) {
+            return true;
+        }
+        let center = middle(cell);
+        let direction = a.gradient(&center).cross(&b.gradient(&center));
+        if is_monotone(a, b, cell, &direction) {
+            pairs.regular.push(pair);
+            return true;
+        }
+        let contact = match apex::in_cell(geometry, pair, cell, depth, tolerances) {
+            None if is_flat(a, cell) && is_flat(b, cell) => contact::find(geometry, pair, cell, tolerances),
+            apex => apex,
+        };
+        pairs.contacts.extend(contact);
+        contact.is_some()
+    }
 }
 
 /// Whether two surfaces that both pass through a box may meet in it.
@@ -202,12 +267,45 @@ pub(super) fn can_meet(a: &Surface, b: &Surface, cell: &Cell) -> bool {
     if !factor.is_finite() {
         return true;
     }
+    let difference =
+        if a.is_quadric() && b.is_quadric() { quadratic_difference } else { difference_by_mean_value };
+    difference(a, b, factor, cell).contains_zero()
+        && a.value_range(cell).contains_zero()
+        && b.value_range(cell).contains_zero()
+}
+
+/// A range of a - `factor` b over a box, by the mean-value form.
+fn difference_by_mean_value(a: &Surface, b: &Surface, factor: f64, cell: &Cell) -> Interval {
+    let center = middle(cell);
     let at = [0, 1, 2].map(|i| Interval::point(center[i]));
     let (ra, rb) = (a.gradient_range(cell), b.gradient_range(cell));
     let arm = offset(cell, &center);
     let slope = |i: usize| (ra[i] - rb[i] * factor) * arm[i];
-    let range = a.value_range(&at) - b.value_range(&at) * factor + slope(0) + slope(1) + slope(2);
-    range.contains_zero() && a.value_range(cell).contains_zero() && b.value_range(cell).contains_zero()
+    a.value_range(&at) - b.value_range(&at) * factor + slope(0) + slope(1) + slope(2)
+}
+
+/// The same for two quadrics, whose second derivatives are constant: what is alike in both cancels, so that the walls of a thin
+/// pipe are told apart in cells much larger than the wall.
+fn quadratic_difference(a: &Surface, b: &Surface, factor: f64, cell: &Cell) -> Interval {
+    let center = middle(cell);
+    let at = [0, 1, 2].map(|i| Interval::point(center[i]));
+    let (ra, rb) = (a.gradient_range(&at), b.gradient_range(&at));
+    let (ha, hb) = (a.hessian(&center), b.hessian(&center) * factor);
+    let bend = ha - hb;
+    // Rounding of the entries, which are sums of few products.
+    let slack = 16.0 * f64::EPSILON * (ha.amax() + hb.amax());
+    let slack = Interval::new(-slack, slack);
+    let arm = offset(cell, &center);
+    let mut range = a.value_range(&at) - b.value_range(&at) * factor;
+    for i in 0..3 {
+        range = range
+            + (ra[i] - rb[i] * factor) * arm[i]
+            + arm[i].square() * (slack + Interval::point(0.5 * bend[(i, i)]));
+        for j in i + 1..3 {
+            range = range + arm[i] * arm[j] * (slack + Interval::point(bend[(i, j)]));
+        }
+    }
+    range
 }
 
 /// Whether the intersection of two surfaces runs forward along `direction` everywhere in a box.
@@ -222,7 +320,7 @@ pub(super) fn is_monotone(a: &Surface, b: &Surface, cell: &Cell, direction: &Vec
 }
 
 /// Whether a gradient hardly varies over a box.
-fn is_flat(surface: &Surface, cell: &Cell) -> bool {
+pub(super) fn is_flat(surface: &Surface, cell: &Cell) -> bool {
     let widest = surface.gradient_range(cell).iter().map(Interval::width).fold(0.0, f64::max);
     widest <= FLAT * surface.gradient(&middle(cell)).norm()
 }

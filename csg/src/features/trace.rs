@@ -1,9 +1,9 @@
 //! Intersection curves of pairs of surfaces, followed from seeds.
 
 use super::around::Tolerances;
-use super::bounds::split;
-use super::octree::{Leaf, Octree, can_meet, is_monotone};
-use crate::interval::{Cell, middle};
+use super::contact::{Contact, Kind};
+use super::octree::{Octree, is_monotone};
+use crate::interval::Cell;
 use crate::project::{project_to_both, shortest_step};
 use crate::{Curve, Geometry, Interval, Point, Surface, SurfaceId, Vector};
 
@@ -32,56 +32,6 @@ const LEAST_STEP: f64 = 1e-9;
 const MOST_POINTS: usize = 1_000_000;
 /// Near a branch point within this part of the radius of curvature, a curve that heads for it is taken to reach it.
 const NEAR_BRANCH: f64 = 1e-2;
-
-/// All pieces of intersection curves in the leaves of the tree where both surfaces matter.
-pub(super) fn trace_all(geometry: &Geometry, tree: &Octree, tolerances: &Tolerances) -> Vec<Trace> {
-    let mut traces: Vec<Trace> = Vec::new();
-    let mut of_pair: std::collections::HashMap<[SurfaceId; 2], Vec<usize>> = std::collections::HashMap::new();
-    for leaf in &tree.leaves {
-        for &pair in &leaf.pairs {
-            for seed in seeds(geometry, leaf, pair, tolerances) {
-                let known = of_pair.entry(pair).or_default();
-                if known.iter().any(|&t| traces[t].passes(&seed)) {
-                    continue;
-                }
-                let trace = Tracer::new(geometry, tree, pair, tolerances).trace(&seed);
-                // A seed at a point of contact, from where no step leads on, is no curve.
-                if trace.points.len() > 1 {
-                    known.push(traces.len());
-                    traces.push(trace);
-                }
-            }
-        }
-    }
-    traces
-}
-
-/// Points of the intersection of two surfaces in a leaf: those to which Newton's method leads from the middle and
-/// from between it and the corners; if there is none, the same in its parts, where the surfaces may meet.
-fn seeds(geometry: &Geometry, leaf: &Leaf, pair: [SurfaceId; 2], tolerances: &Tolerances) -> Vec<Point> {
-    /// Curves that only clip a corner of a leaf are found on the other side of its faces; they are looked for to this depth.
-    const DEPTH: u32 = 3;
-    let [a, b] = pair.map(|s| &geometry.surfaces[s.index()]);
-    let mut open = vec![(leaf.cell, 0)];
-    let mut found = Vec::new();
-    while let Some((cell, depth)) = open.pop() {
-        if !can_meet(a, b, &cell) {
-            continue;
-        }
-        let parts = split(&cell);
-        let others = if depth == 0 { &parts[..] } else { &[] };
-        let starts = std::iter::once(&cell).chain(others).map(middle);
-        let before = found.len();
-        for start in starts {
-            let point = project_to_both(a, b, &start, tolerances.exact);
-            found.extend(point.ok().filter(|p| (0..3).all(|i| leaf.cell[i].contains(p[i]))));
-        }
-        if found.len() == before && depth < DEPTH {
-            open.extend(parts.map(|part| (part, depth + 1)));
-        }
-    }
-    found
-}
 
 impl Trace {
     /// Whether a point of the intersection of its two surfaces lies on this piece.
@@ -116,18 +66,18 @@ pub(super) fn step_box(p: &Point, q: &Point) -> Cell {
 }
 
 /// Follows one curve.
-struct Tracer<'a> {
+pub(super) struct Tracer<'a> {
     tree: &'a Octree,
     pair: [SurfaceId; 2],
     surfaces: [&'a Surface; 2],
     tolerances: &'a Tolerances,
     diagonal: f64,
-    /// Where the two surfaces are tangent and the curve may branch.
-    branch_points: Vec<Point>,
+    /// Where the two surfaces are tangent and the curve may branch, and where it ends at an apex.
+    branch_points: Vec<Contact>,
 }
 
 impl<'a> Tracer<'a> {
-    fn new(
+    pub fn new(
         geometry: &'a Geometry,
         tree: &'a Octree,
         pair: [SurfaceId; 2],
@@ -135,11 +85,12 @@ impl<'a> Tracer<'a> {
     ) -> Self {
         let surfaces = pair.map(|s| &geometry.surfaces[s.index()]);
         let diagonal = tree.root.iter().map(|side| side.width().powi(2)).sum::<f64>().sqrt();
-        let branch_points = tree.contacts.iter().filter(|c| c.pair == pair).map(|c| c.point).collect();
+        let branch_points = tree.contacts.iter().filter(|c| c.pair == pair).copied().collect();
         Self { tree, pair, surfaces, tolerances, diagonal, branch_points }
     }
 
-    fn trace(&self, seed: &Point) -> Trace {
+    /// The curve through a point of the intersection.
+    pub fn trace(&self, seed: &Point) -> Trace {
         let closed = |points| Trace { pair: self.pair, points, closed: true, branches: [false; 2] };
         let (mut points, end) = self.follow(seed, seed, 1.0);
         if end == End::Closed {
@@ -192,9 +143,9 @@ impl<'a> Tracer<'a> {
         }
     }
 
-    /// Whether both surfaces matter at a point.
+    /// Whether the intersection matters at a point.
     fn matters(&self, point: &Point) -> bool {
-        self.tree.leaf(point).is_some_and(|leaf| self.pair.iter().all(|s| leaf.surfaces.contains(s)))
+        self.tree.leaf(point).is_some_and(|leaf| self.tree.matters(leaf, self.pair))
     }
 
     fn direction(&self, at: &Point, sign: f64) -> (Vector, f64) {
@@ -222,11 +173,16 @@ impl<'a> Tracer<'a> {
     /// The branch point that the curve is about to reach.
     fn branch_ahead(&self, at: &Point, tangent: &Vector) -> Option<Point> {
         let curvature = self.surfaces.iter().map(|s| s.curvature(at)).fold(0.0, f64::max);
-        self.branch_points.iter().copied().find(|branch| {
-            let way = branch - at;
+        let is_ahead = |branch: &&Contact| {
+            let way = branch.point - at;
             let distance = way.norm();
-            distance * curvature <= NEAR_BRANCH && way.dot(tangent) > 0.995 * distance
-        })
+            let is_near = match branch.kind {
+                Kind::Tangent => distance * curvature <= NEAR_BRANCH,
+                Kind::Apex => distance <= branch.reach,
+            };
+            is_near && way.dot(tangent) > 0.995 * distance
+        };
+        self.branch_points.iter().find(is_ahead).map(|branch| branch.point)
     }
 }
 
@@ -273,7 +229,7 @@ pub fn curve_tangent(geometry: &Geometry, curve: &Curve, at: &Point) -> Vector {
 /// surfaces are tangent.
 pub(super) fn tangent_along(a: &Surface, b: &Surface, at: &Point, chord: &Vector) -> Vector {
     let along = tangent(a, b, at);
-    match (cross_well(a, b, at), along.dot(chord) < 0.0) {
+    match (cross_well(a, b, at, chord), along.dot(chord) < 0.0) {
         (false, _) => chord.normalize(),
         (true, true) => -along,
         (true, false) => along,
@@ -285,14 +241,20 @@ pub(super) fn tangent_along(a: &Surface, b: &Surface, at: &Point, chord: &Vector
 /// At an end where its surfaces are tangent, that at the middle of the step of the trace there.
 pub fn curve_curvature(geometry: &Geometry, curve: &Curve, at: &Point) -> f64 {
     let [a, b] = curve.surfaces.map(|s| &geometry.surfaces[s.index()]);
-    if cross_well(a, b, at) { curvature(a, b, at) } else { curvature(a, b, &(at + inward(curve, at) * 0.5)) }
+    let chord = inward(curve, at);
+    if cross_well(a, b, at, &chord) { curvature(a, b, at) } else { curvature(a, b, &(at + chord * 0.5)) }
 }
 
-/// Whether two surfaces cross at an angle at which their gradients tell the tangent of the intersection.
-fn cross_well(a: &Surface, b: &Surface, at: &Point) -> bool {
+/// Whether two surfaces cross at an angle at which their gradients tell the tangent of the intersection; a chord gives the size
+/// of things.
+fn cross_well(a: &Surface, b: &Surface, at: &Point, chord: &Vector) -> bool {
     /// The sine; the second derivatives of the intersection lose twice its digits.
     const LEAST_SINE: f64 = 1e-4;
-    a.normal(at).cross(&b.normal(at)).norm() > LEAST_SINE
+    /// An apex is nearer than this part of the chord, or it is elsewhere.
+    const APEX: f64 = 1e-6;
+    let within = APEX * chord.norm();
+    let is_regular = ![a, b].iter().any(|s| s.has_apex_at(at, within));
+    is_regular && a.normal(at).cross(&b.normal(at)).norm() > LEAST_SINE
 }
 
 /// The step of the trace that is nearest to a point.

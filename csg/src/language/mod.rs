@@ -54,7 +54,8 @@ pub struct Parsed {
 pub fn parse_geometry(source: &str, file_name: &str) -> Result<Parsed, Diagnostics> {
     let mut report = Report::default();
     let statements = parse::parse(source, &mut report);
-    let geometry = lower::lower(&statements, &mut report);
+    let mut geometry = lower::lower(&statements, &mut report);
+    crate::features::find_seams(&mut geometry);
     let failed = report.has_errors();
     let messages = report.finish(source, file_name);
     if failed { Err(Diagnostics { messages }) } else { Ok(Parsed { geometry, warnings: messages }) }

@@ -32,6 +32,7 @@ impl Lowering<'_> {
             user_points: self.user_points,
             boundary_overrides,
             stated_box: self.stated_box,
+            seams: Vec::new(),
         }
     }
 

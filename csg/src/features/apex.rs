@@ -1,0 +1,110 @@
+//! The apex of a cone, where it has no normal.
+//!
+//! It is a corner where the cone is a boundary beside it. Curves of a cone and another surface through its apex end there: near it
+//! they are nearly straight, and no closed ones are between them.
+
+use super::around::{Tolerances, sheet_at};
+use super::contact::{Contact, Kind, diagonal};
+use super::octree::{Octree, is_flat};
+use super::{Corner, FeatureError};
+use crate::interval::Cell;
+use crate::primitive::quadric::tangents;
+use crate::{Geometry, Interval, Surface, SurfaceId, Vector};
+
+/// Cells that hold an apex are split so often at least: beside them there are cells in which the curves are found that end
+/// at the apex.
+const LEAST_DEPTH: u32 = 6;
+
+/// The apex of one of two surfaces in (or just beside) a cell, if the other passes through it and is flat there or has the same
+/// apex.
+pub(super) fn in_cell(
+    geometry: &Geometry,
+    pair: [SurfaceId; 2],
+    cell: &Cell,
+    depth: u32,
+    tolerances: &Tolerances,
+) -> Option<Contact> {
+    if depth < LEAST_DEPTH {
+        return None;
+    }
+    let [a, b] = pair.map(|s| &geometry.surfaces[s.index()]);
+    [(a, b), (b, a)].into_iter().find_map(|(cone, other)| {
+        let point = cone.apex()?;
+        let is_inside = (0..3).all(|i| {
+            let room = 0.01 * cell[i].width();
+            Interval::new(cell[i].lo - room, cell[i].hi + room).contains(point[i])
+        });
+        let meets = is_inside && other.distance(&point) <= tolerances.on_surface;
+        let is_simple = || match other.apex() {
+            Some(apex) if (apex - point).norm() <= tolerances.on_surface => true,
+            _ => is_flat(other, cell),
+        };
+        (meets && is_simple()).then(|| Contact { pair, point, reach: diagonal(cell), kind: Kind::Apex })
+    })
+}
+
+/// Adds a corner at each apex where its cone is a boundary and no curve ends.
+pub(super) fn add_corners(
+    geometry: &Geometry,
+    tree: &Octree,
+    corners: &mut Vec<Corner>,
+    tolerances: &Tolerances,
+) -> Result<(), FeatureError> {
+    for (i, cone) in geometry.surfaces.iter().enumerate() {
+        let id = SurfaceId::new(i);
+        let Some(point) = cone.apex() else { continue };
+        if !is_boundary(geometry, tree, id, tolerances)? {
+            continue;
+        }
+        match corners.iter_mut().find(|c| (c.point - point).norm() <= tolerances.merge) {
+            Some(corner) if corner.surfaces.contains(&id) => {}
+            Some(corner) => {
+                corner.surfaces.push(id);
+                corner.surfaces.sort_unstable();
+            }
+            None => corners.push(super::assemble::corner(geometry, tree, point, tolerances)),
+        }
+    }
+    Ok(())
+}
+
+/// Whether a cone is a boundary beside its apex.
+fn is_boundary(
+    geometry: &Geometry,
+    tree: &Octree,
+    id: SurfaceId,
+    tolerances: &Tolerances,
+) -> Result<bool, FeatureError> {
+    /// How far from the apex, in lengths of merging: so near that no other surface comes between.
+    const BESIDE: f64 = 100.0;
+    let cone = &geometry.surfaces[id.index()];
+    let Some(apex) = cone.apex() else { return Ok(false) };
+    for line in lines(cone) {
+        let point = apex + line * (BESIDE * tolerances.merge);
+        let other_side = |s: SurfaceId| geometry.surfaces[s.index()].value(&point) > 0.0;
+        if sheet_at(geometry, tree, id, &point, &other_side)?.is_some() {
+            return Ok(true);
+        }
+    }
+    Ok(false)
+}
+
+/// Unit directions from the apex along lines of both nappes, none of them special.
+fn lines(cone: &Surface) -> Vec<Vector> {
+    const COUNT: u32 = 16;
+    let (axes, radii, rise) = match cone {
+        Surface::Cone(c) => {
+            let (u, v) = tangents(&c.axis);
+            ([u, v], [c.radius; 2], c.axis * (c.radius / c.slope))
+        }
+        Surface::EllipticCone(c) => (c.axes, c.radii, c.axis / c.rate),
+        _ => return Vec::new(),
+    };
+    let turns = (0..COUNT).map(|k| std::f64::consts::TAU * (f64::from(k) + 0.137) / f64::from(COUNT));
+    turns
+        .flat_map(|turn| {
+            let across = axes[0] * (radii[0] * turn.cos()) + axes[1] * (radii[1] * turn.sin());
+            [across + rise, across - rise].map(|line| line.normalize())
+        })
+        .collect()
+}

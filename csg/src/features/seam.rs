@@ -1,0 +1,356 @@
+//! Pairs of surfaces that are tangent along a curve.
+//!
+//! Such pairs are told from their parameters, for their intersection is ill-conditioned: decimals that miss each other
+//! by 10⁻¹⁰ make a gap, or two curves 10⁻⁵ apart. What is meant is one curve, the **seam**; it is a line or an ellipse, and
+//! is described by one of the two surfaces and an auxiliary surface that crosses it (a plane, or a cylinder around the axis).
+//!
+//! Three families hold nearly all cases of planes, spheres, circular cylinders, cones and tori:
+//!
+//! * lines: a plane and a surface of straight lines, parallel cylinders;
+//! * surfaces of revolution about one axis whose meridians (lines and circles in a half-plane) are tangent;
+//! * a tube of one radius that goes on in another way: a torus and a ball, a cylinder or another torus.
+//!
+//! A fourth is that of ellipsoids with the girth of a cylinder or of each other.
+//!
+//! Left to the cells: cones and cylinders tangent along a common line, and ellipsoids tangent elsewhere.
+
+use crate::geometry::SurfaceInfo;
+use crate::primitive::{
+    Cylinder, Ellipsoid, EllipticCone, EllipticCylinder, Plane, Torus, quadric::tangents,
+};
+use crate::{Geometry, Point, Seam, Surface, SurfaceId, Vector};
+
+/// Surfaces that miss each other by less than this part of the size of all are tangent: as much as surfaces may lie apart
+/// that are taken for one.
+const TANGENT_GAP: f64 = 1e-8;
+/// The largest sine of an angle that is none. Directions typed with nine digits are off by 10⁻⁹; over the
+/// length of a part 10⁻⁷ makes a gap ten times as wide as [`TANGENT_GAP`], which no shorter seam notices.
+const PARALLEL: f64 = 1e-7;
+
+/// A seam before it has ids.
+struct Found {
+    /// Which of the two surfaces carries it.
+    carrier: usize,
+    auxiliary: Surface,
+    is_alone: bool,
+}
+
+/// Finds the seams of all pairs of surfaces and adds their auxiliary surfaces to the geometry.
+pub fn find_seams(geometry: &mut Geometry) {
+    let count = geometry.surfaces.len();
+    let tolerance = TANGENT_GAP * size(&geometry.surfaces);
+    let (flat, curved): (Vec<usize>, Vec<usize>) =
+        (0..count).partition(|&i| matches!(geometry.surfaces[i], Surface::Plane(_)));
+    let mut seams = Vec::new();
+    for (k, &i) in curved.iter().enumerate() {
+        for &j in flat.iter().chain(&curved[k + 1..]) {
+            let Some(found) = seam([i, j].map(|s| &geometry.surfaces[s]), tolerance) else { continue };
+            let auxiliary = auxiliary_id(geometry, count, found.auxiliary, tolerance);
+            let pair = [i.min(j), i.max(j)].map(SurfaceId::new);
+            let carrier = [SurfaceId::new([i, j][found.carrier]), auxiliary];
+            seams.push(Seam { pair, carrier, is_alone: found.is_alone });
+        }
+    }
+    seams.sort_unstable_by_key(|seam| seam.pair);
+    geometry.seams = seams;
+}
+
+/// The id of an auxiliary surface, new or that of an equal one; `count` are surfaces of the file.
+fn auxiliary_id(geometry: &mut Geometry, count: usize, surface: Surface, tolerance: f64) -> SurfaceId {
+    let known = geometry.surfaces[count..].iter().position(|s| s.same_as(&surface, tolerance).is_some());
+    if known.is_none() {
+        geometry.surfaces.push(surface);
+        geometry.surface_info.push(SurfaceInfo::default());
+    }
+    SurfaceId::new(known.map_or(geometry.surfaces.len() - 1, |i| count + i))
+}
+
+/// The extent of the points and radii that define the surfaces.
+fn size(surfaces: &[Surface]) -> f64 {
+    let mut low = Vector::repeat(f64::INFINITY);
+    let mut high = -low;
+    for surface in surfaces {
+        let (point, reach) = match surface {
+            Surface::Plane(p) => (p.point, 0.0),
+            Surface::Sphere(s) => (s.center, s.radius),
+            Surface::Cylinder(c) => (c.point, c.radius),
+            Surface::Cone(c) => (c.point, c.radius),
+            Surface::Torus(t) => (t.center, t.major + t.minor),
+            _ => continue,
+        };
+        low = low.inf(&(point.coords - Vector::repeat(reach)));
+        high = high.sup(&(point.coords + Vector::repeat(reach)));
+    }
+    if low.x > high.x { 0.0 } else { (high - low).norm() }
+}
+
+/// The seam of two surfaces, if there is one.
+fn seam(surfaces: [&Surface; 2], tolerance: f64) -> Option<Found> {
+    let swapped = [surfaces[1], surfaces[0]];
+    let ordered = |surfaces| {
+        line(surfaces, tolerance)
+            .or_else(|| tube(surfaces, tolerance))
+            .or_else(|| around_axis(surfaces, tolerance))
+            .or_else(|| girth(surfaces, tolerance))
+    };
+    let turned = |found: Found| Found { carrier: 1 - found.carrier, ..found };
+    ordered(surfaces).or_else(|| ordered(swapped).map(turned))
+}
+
+fn is_parallel(a: &Vector, b: &Vector) -> bool {
+    a.cross(b).norm() <= PARALLEL
+}
+
+fn plane(point: Point, normal: Vector) -> Option<Surface> {
+    Some(Surface::Plane(Plane { point, normal: normal.try_normalize(PARALLEL)? }))
+}
+
+/// Tangent along a straight line.
+fn line([a, b]: [&Surface; 2], tolerance: f64) -> Option<Found> {
+    let (carrier, auxiliary) = match (a, b) {
+        (Surface::Cylinder(c), Surface::Cylinder(d)) => {
+            let between = across(&(d.point - c.point), &c.axis);
+            let distance = between.norm();
+            let gap =
+                (distance - (c.radius + d.radius)).abs().min((distance - (c.radius - d.radius).abs()).abs());
+            if !is_parallel(&c.axis, &d.axis) || gap > tolerance || distance <= tolerance {
+                return None;
+            }
+            (0, plane(c.point, c.axis.cross(&between) / distance)?)
+        }
+        (Surface::Cylinder(c), Surface::Plane(p)) => {
+            let (u, v) = tangents(&c.axis);
+            let round = EllipticCylinder { point: c.point, axes: [u, v], radii: [c.radius; 2] };
+            (1, plane_on_cylinder(&round, p, tolerance)?)
+        }
+        (Surface::EllipticCylinder(c), Surface::Plane(p)) => (1, plane_on_cylinder(c, p, tolerance)?),
+        (Surface::Cone(c), Surface::Plane(p)) => {
+            let (u, v) = tangents(&c.axis);
+            let (point, radii, rate) = (c.point, [c.radius; 2], c.slope / c.radius);
+            (
+                1,
+                plane_on_cone(
+                    &EllipticCone { point, axes: [u, v], radii, axis: c.axis, rate },
+                    p,
+                    tolerance,
+                )?,
+            )
+        }
+        (Surface::EllipticCone(c), Surface::Plane(p)) => (1, plane_on_cone(c, p, tolerance)?),
+        _ => return None,
+    };
+    Some(Found { carrier, auxiliary, is_alone: true })
+}
+
+/// The part of a vector across a unit vector.
+fn across(vector: &Vector, axis: &Vector) -> Vector {
+    vector - axis * vector.dot(axis)
+}
+
+/// The plane through the line where a plane touches a cylinder, across the plane.
+fn plane_on_cylinder(c: &EllipticCylinder, p: &Plane, tolerance: f64) -> Option<Surface> {
+    let axis = c.axis();
+    if p.normal.dot(&axis).abs() > PARALLEL {
+        return None;
+    }
+    // The point of the ellipse farthest along the normal is as far as its support function says.
+    let [x, y] = [0, 1].map(|i| c.radii[i] * p.normal.dot(&c.axes[i]));
+    let reach = x.hypot(y);
+    let height = (p.point - c.point).dot(&p.normal);
+    if (height.abs() - reach).abs() > tolerance {
+        return None;
+    }
+    let arm = (c.axes[0] * (c.radii[0] * x) + c.axes[1] * (c.radii[1] * y)) * (height.signum() / reach);
+    plane(c.point + arm, axis.cross(&p.normal))
+}
+
+/// The plane through the line where a plane touches a cone, across the plane.
+fn plane_on_cone(c: &EllipticCone, p: &Plane, tolerance: f64) -> Option<Surface> {
+    let apex = c.apex();
+    if (apex - p.point).dot(&p.normal).abs() > tolerance {
+        return None;
+    }
+    // Along the line from the apex to (x, y) of the base ellipse, one unit of 1/rate farther.
+    let [x, y] = [0, 1].map(|i| c.radii[i] * p.normal.dot(&c.axes[i]));
+    let (reach, rise) = (x.hypot(y), p.normal.dot(&c.axis) / c.rate);
+    let scale = c.radii[0].max(c.radii[1]).max(1.0 / c.rate.abs());
+    if (reach - rise.abs()).abs() > PARALLEL * scale || reach == 0.0 {
+        return None;
+    }
+    let foot = (c.axes[0] * (c.radii[0] * x) + c.axes[1] * (c.radii[1] * y)) * (-rise.signum() / reach);
+    let line = foot + c.axis / c.rate;
+    plane(apex, line.normalize().cross(&p.normal))
+}
+
+/// A tube of one radius that goes on in another way.
+fn tube([a, b]: [&Surface; 2], tolerance: f64) -> Option<Found> {
+    let Surface::Torus(t) = a else { return None };
+    let same = |x: f64, y: f64| (x - y).abs() <= tolerance;
+    match b {
+        Surface::Sphere(s) if same(s.radius, t.minor) => {
+            let arm = s.center - t.center;
+            let radial = across(&arm, &t.axis);
+            (same(radial.norm(), t.major) && same(arm.dot(&t.axis), 0.0)).then_some(())?;
+            let auxiliary = plane(s.center, t.axis.cross(&radial) / t.major)?;
+            Some(Found { carrier: 1, auxiliary, is_alone: true })
+        }
+        Surface::Cylinder(c) if same(c.radius, t.minor) => {
+            let arm = across(&(c.point - t.center), &c.axis);
+            let fits = c.axis.dot(&t.axis).abs() <= PARALLEL
+                && same(arm.dot(&t.axis), 0.0)
+                && same(arm.norm(), t.major);
+            let auxiliary = plane(t.center + arm, c.axis)?;
+            fits.then_some(Found { carrier: 1, auxiliary, is_alone: false })
+        }
+        Surface::Torus(s) if same(s.minor, t.minor) => {
+            let (point, direction) = where_circles_are_tangent(t, s, tolerance)?;
+            Some(Found { carrier: 0, auxiliary: plane(point, direction)?, is_alone: false })
+        }
+        _ => None,
+    }
+}
+
+/// The point where the centre lines of two tori are tangent, and their direction there.
+fn where_circles_are_tangent(t: &Torus, s: &Torus, tolerance: f64) -> Option<(Point, Vector)> {
+    let direction = if is_parallel(&t.axis, &s.axis) {
+        t.axis.cross(&(s.center - t.center))
+    } else {
+        t.axis.cross(&s.axis)
+    };
+    let direction = direction.try_normalize(tolerance)?;
+    let ends = |t: &Torus| {
+        let arm = direction.cross(&t.axis) * t.major;
+        [t.center + arm, t.center - arm]
+    };
+    let (of_t, of_s) = (ends(t), ends(s));
+    let point = of_t.into_iter().find(|p| of_s.iter().any(|q| (p - q).norm() <= tolerance))?;
+    Some((point, direction))
+}
+
+/// An ellipsoid that has an ellipse around its centre in common with a cylinder along one of its axes, or with another one or a
+/// sphere about the same centre.
+fn girth([a, b]: [&Surface; 2], tolerance: f64) -> Option<Found> {
+    let Surface::Ellipsoid(e) = a else { return None };
+    let same_center = |center: &Point| (center - e.center).norm() <= tolerance;
+    (0..3).find_map(|k| {
+        let hull = hull(e, k);
+        let is_same = |other: &Surface| hull.same_as(other, tolerance).is_some();
+        let fits = match b {
+            Surface::Cylinder(_) | Surface::EllipticCylinder(_) => is_same(b),
+            Surface::Sphere(s) if same_center(&s.center) => {
+                is_same(&Surface::Cylinder(Cylinder { point: s.center, axis: e.axes[k], radius: s.radius }))
+            }
+            Surface::Ellipsoid(f) if same_center(&f.center) => (0..3).any(|l| is_same(&self::hull(f, l))),
+            _ => false,
+        };
+        let auxiliary = plane(e.center, e.axes[k])?;
+        fits.then_some(Found { carrier: 1, auxiliary, is_alone: true })
+    })
+}
+
+/// The cylinder around an ellipsoid along one of its axes.
+fn hull(e: &Ellipsoid, along: usize) -> Surface {
+    let [i, j] = [(along + 1) % 3, (along + 2) % 3];
+    Surface::EllipticCylinder(EllipticCylinder {
+        point: e.center,
+        axes: [e.axes[i], e.axes[j]],
+        radii: [e.radii[i], e.radii[j]],
+    })
+}
+
+/// The curve that makes a surface when it turns about an axis, in the half-plane of (radius, height).
+#[derive(Clone, Copy)]
+enum Meridian {
+    Line { point: [f64; 2], direction: [f64; 2] },
+    Circle { center: [f64; 2], radius: f64 },
+}
+
+/// Tangent along a circle about a common axis.
+fn around_axis([a, b]: [&Surface; 2], tolerance: f64) -> Option<Found> {
+    let (origin, axis) = match a {
+        Surface::Torus(t) => (t.center, t.axis),
+        Surface::Cylinder(c) => (c.point, c.axis),
+        Surface::Cone(c) => (c.point, c.axis),
+        _ => return None,
+    };
+    let meridians = [meridian(a, &origin, &axis, tolerance)?, meridian(b, &origin, &axis, tolerance)?];
+    let ([radius, height], slope) = touching_point(meridians, tolerance)?;
+    if radius.abs() <= PARALLEL.sqrt() * tolerance / TANGENT_GAP {
+        return None;
+    }
+    /// The sine at which the plane across the axis still cuts well; else a cylinder around it does.
+    const STEEP: f64 = 0.5;
+    let auxiliary = if slope[1].abs() >= STEEP {
+        Surface::Plane(Plane { point: origin + axis * height, normal: axis })
+    } else {
+        Surface::Cylinder(Cylinder { point: origin, axis, radius: radius.abs() })
+    };
+    // The one of which the auxiliary surface cuts the fewest circles.
+    let rank = |s: &Surface| match s {
+        Surface::Plane(_) => 0,
+        Surface::Cylinder(_) | Surface::Cone(_) => 1,
+        Surface::Sphere(_) => 2,
+        _ => 3,
+    };
+    let carrier = usize::from(rank(b) < rank(a));
+    // The line of a cone goes on beyond its apex, where it may cut a circle once more.
+    let is_alone =
+        !matches!((a, b), (Surface::Cone(_), Surface::Torus(_)) | (Surface::Torus(_), Surface::Cone(_)));
+    Some(Found { carrier, auxiliary, is_alone })
+}
+
+/// The meridian of a surface of revolution about an axis, `None` for others.
+fn meridian(surface: &Surface, origin: &Point, axis: &Vector, tolerance: f64) -> Option<Meridian> {
+    let height = |p: &Point| (p - origin).dot(axis);
+    let on_axis = |p: &Point| across(&(p - origin), axis).norm() <= tolerance;
+    match surface {
+        Surface::Plane(p) if is_parallel(&p.normal, axis) => {
+            Some(Meridian::Line { point: [0.0, height(&p.point)], direction: [1.0, 0.0] })
+        }
+        Surface::Sphere(s) if on_axis(&s.center) => {
+            Some(Meridian::Circle { center: [0.0, height(&s.center)], radius: s.radius })
+        }
+        Surface::Cylinder(c) if on_axis(&c.point) && is_parallel(&c.axis, axis) => {
+            Some(Meridian::Line { point: [c.radius, 0.0], direction: [0.0, 1.0] })
+        }
+        Surface::Cone(c) if on_axis(&c.point) && is_parallel(&c.axis, axis) => {
+            let slope = c.slope * c.axis.dot(axis).signum();
+            let length = slope.hypot(1.0);
+            Some(Meridian::Line {
+                point: [c.radius, height(&c.point)],
+                direction: [slope / length, 1.0 / length],
+            })
+        }
+        Surface::Torus(t) if on_axis(&t.center) && is_parallel(&t.axis, axis) => {
+            Some(Meridian::Circle { center: [t.major, height(&t.center)], radius: t.minor })
+        }
+        _ => None,
+    }
+}
+
+/// Where two meridians are tangent, and their direction there.
+fn touching_point(meridians: [Meridian; 2], tolerance: f64) -> Option<([f64; 2], [f64; 2])> {
+    match meridians {
+        [Meridian::Line { point, direction }, Meridian::Circle { center, radius }]
+        | [Meridian::Circle { center, radius }, Meridian::Line { point, direction }] => {
+            let arm = [center[0] - point[0], center[1] - point[1]];
+            let along = arm[0] * direction[0] + arm[1] * direction[1];
+            let foot = [point[0] + along * direction[0], point[1] + along * direction[1]];
+            let distance = (center[0] - foot[0]).hypot(center[1] - foot[1]);
+            ((distance - radius).abs() <= tolerance).then_some((foot, direction))
+        }
+        [Meridian::Circle { center: p, radius: r }, Meridian::Circle { center: q, radius: s }] => {
+            let arm = [q[0] - p[0], q[1] - p[1]];
+            let distance = arm[0].hypot(arm[1]);
+            let reach =
+                if (distance - (r + s)).abs() <= tolerance || distance + s <= r + tolerance { r } else { -r };
+            let gap = (distance - (r + s)).abs().min((distance - (r - s).abs()).abs());
+            if gap > tolerance || distance <= tolerance {
+                return None;
+            }
+            let unit = [arm[0] / distance, arm[1] / distance];
+            Some(([p[0] + reach * unit[0], p[1] + reach * unit[1]], [-unit[1], unit[0]]))
+        }
+        _ => None,
+    }
+}

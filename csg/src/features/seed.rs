@@ -1,0 +1,195 @@
+//! A seed on every piece of curve.
+//!
+//! In a leaf the curve of a pair is monotone: it has at most one point on each plane across a direction. So a trace through
+//! the leaf **covers** the slab between the planes through its ends, and there is no other curve of the pair in that slab.
+//! A leaf is split until each part is excluded, or covered by traces, or so small that Newton's method
+//! from its middle finds whatever is in it.
+
+use super::around::Tolerances;
+use super::bounds::split;
+use super::octree::{Leaf, Octree, can_meet, is_monotone};
+use super::trace::{Trace, Tracer};
+use crate::interval::{Cell, dot, middle};
+use crate::project::project_to_both;
+use crate::{Geometry, Interval, Point, Surface, SurfaceId, Vector};
+use std::collections::{HashMap, VecDeque};
+
+/// A part of a leaf is split so often at most. A curve in a part of 1/256 of a cell in which it is monotone is nearly straight, and
+/// one step of Newton's method from the middle leads to it.
+const DEPTH: u32 = 8;
+/// Where surfaces are nearly tangent all along a leaf, parts are not excluded. Largest first, so many are looked at: all of
+/// 1/8 of the cell.
+const MOST_PARTS: usize = 600;
+/// So many for surfaces that are tangent along a curve beside the one that is looked for: a hundred cells along it have such a pair.
+const PARTS_BESIDE_SEAM: usize = 73;
+/// The sine between surfaces at which their intersection is taken to cross their seam, not to be the seam: Newton's method ends on the
+/// seam within 10⁻⁶ or so.
+const LEAST_SINE: f64 = 1e-4;
+/// The room around a leaf, as a part of its sides, in which the curve may be monotone too.
+const ROOMS: [f64; 4] = [0.5, 0.2, 0.08, 0.03];
+
+/// A trace, and how far its curve is from the chord of each of its steps.
+struct Known {
+    trace: Trace,
+    sagittas: Vec<f64>,
+}
+
+/// All pieces of intersection curves in the leaves of the tree where they matter.
+pub(super) fn trace_all(geometry: &Geometry, tree: &Octree, tolerances: &Tolerances) -> Vec<Trace> {
+    let mut known: HashMap<[SurfaceId; 2], Vec<usize>> = HashMap::new();
+    let mut all: Vec<Known> = Vec::new();
+    for leaf in &tree.leaves {
+        for &pair in &leaf.pairs {
+            let of_pair = known.entry(pair).or_default();
+            search(geometry, tree, leaf, pair, &mut all, of_pair, tolerances);
+        }
+    }
+    all.into_iter().map(|known| known.trace).collect()
+}
+
+/// Traces the curves of a pair in a leaf that are not known yet; `of_pair` are the traces of the pair among `all`.
+fn search(
+    geometry: &Geometry,
+    tree: &Octree,
+    leaf: &Leaf,
+    pair: [SurfaceId; 2],
+    all: &mut Vec<Known>,
+    of_pair: &mut Vec<usize>,
+    tolerances: &Tolerances,
+) {
+    let [a, b] = pair.map(|s| &geometry.surfaces[s.index()]);
+    let center = middle(&leaf.cell);
+    let direction = a.gradient(&center).cross(&b.gradient(&center));
+    // In a larger cell the slab of a trace reaches farther, beyond where it leaves the leaf.
+    let wider = ROOMS.into_iter().map(|room| widened(&leaf.cell, room));
+    let cell = wider.into_iter().find(|wide| is_monotone(a, b, wide, &direction)).unwrap_or(leaf.cell);
+    let mut covered = Vec::new();
+    of_pair.iter().for_each(|&t| cover(&all[t], &cell, &direction, &mut covered));
+    let reachable = widened(&leaf.cell, 1.0 / 64.0);
+    // On a seam of the pair, where Newton's method may end, no curve can be followed.
+    let has_seam = geometry.seam(pair).is_some();
+    let crosses = |p: &Point| !has_seam || a.normal(p).cross(&b.normal(p)).norm() > LEAST_SINE;
+    let is_here = |p: &Point| {
+        (0..3).all(|i| reachable[i].contains(p[i]))
+            && crosses(p)
+            && tree.leaf(p).is_some_and(|leaf| tree.matters(leaf, pair))
+    };
+    let mut open = VecDeque::from([(leaf.cell, 0)]);
+    let most = if has_seam { PARTS_BESIDE_SEAM } else { MOST_PARTS };
+    let mut count = 0;
+    while let Some((part, depth)) = open.pop_front() {
+        count += 1;
+        if is_covered(&slab(&part, &direction), &covered) || !can_meet(a, b, &part) {
+            continue;
+        }
+        let seed = project_to_both(a, b, &middle(&part), tolerances.exact).ok().filter(is_here);
+        if let Some(seed) = seed.filter(|seed| !of_pair.iter().any(|&t| all[t].trace.passes(seed))) {
+            let trace = Tracer::new(geometry, tree, pair, tolerances).trace(&seed);
+            // A seed at a point of contact, from where no step leads on, is no curve.
+            if trace.points.len() > 1 {
+                let known = Known { sagittas: sagittas(a, b, &trace, tolerances), trace };
+                cover(&known, &cell, &direction, &mut covered);
+                of_pair.push(all.len());
+                all.push(known);
+            }
+        }
+        if depth < DEPTH && count < most && !is_covered(&slab(&part, &direction), &covered) {
+            open.extend(split(&part).map(|part| (part, depth + 1)));
+        }
+    }
+}
+
+/// How far the curve is from the middle of each chord of a trace, with room for where it is farther.
+fn sagittas(a: &Surface, b: &Surface, trace: &Trace, tolerances: &Tolerances) -> Vec<f64> {
+    /// A step turns little: nowhere is the curve twice as far from the chord as in the middle.
+    const ROOM: f64 = 2.0;
+    let sagitta = |ends: &[Point]| {
+        let middle = nalgebra::center(&ends[0], &ends[1]);
+        let on = project_to_both(a, b, &middle, tolerances.exact);
+        on.map_or((ends[1] - ends[0]).norm(), |on| ROOM * (on - middle).norm())
+    };
+    trace.points.windows(2).map(sagitta).collect()
+}
+
+/// A cell with room around it, as a part of its sides.
+fn widened(cell: &Cell, part: f64) -> Cell {
+    cell.map(|side| Interval::new(side.lo - part * side.width(), side.hi + part * side.width()))
+}
+
+/// The range of a cell along a direction.
+fn slab(cell: &Cell, direction: &Vector) -> Interval {
+    dot(direction, cell)
+}
+
+/// Adds the slabs along a direction that a trace covers in a cell; those that touch become one.
+fn cover(known: &Known, cell: &Cell, direction: &Vector, covered: &mut Vec<Interval>) {
+    for (ends, &sagitta) in known.trace.points.windows(2).zip(&known.sagittas) {
+        if let Some([from, to]) = chord_in(ends, cell, sagitta) {
+            let [x, y] = [from, to].map(|p| p.coords.dot(direction));
+            covered.push(Interval::new(x.min(y), x.max(y)));
+        }
+    }
+    covered.sort_by(|x, y| x.lo.total_cmp(&y.lo));
+    // Rounding of the ends of steps that follow each other.
+    let slack = direction.norm() * f64::EPSILON * cell.iter().map(Interval::magnitude).fold(0.0, f64::max);
+    covered.dedup_by(|next, last| {
+        let touch = next.lo <= last.hi + 8.0 * slack;
+        if touch {
+            last.hi = last.hi.max(next.hi);
+        }
+        touch
+    });
+}
+
+/// The ends of the part of a chord that keeps a distance from the outside of a cell.
+fn chord_in(ends: &[Point], cell: &Cell, distance: f64) -> Option<[Point; 2]> {
+    let chord = ends[1] - ends[0];
+    let (mut from, mut to) = (0.0, 1.0);
+    for i in 0..3 {
+        let (low, high) = (cell[i].lo + distance - ends[0][i], cell[i].hi - distance - ends[0][i]);
+        if chord[i] == 0.0 {
+            if low > 0.0 || high < 0.0 {
+                return None;
+            }
+            continue;
+        }
+        let (enter, leave) = (low / chord[i], high / chord[i]);
+        from = f64::max(from, enter.min(leave));
+        to = f64::min(to, enter.max(leave));
+    }
+    (from < to).then(|| [ends[0] + chord * from, ends[0] + chord * to])
+}
+
+/// Whether a slab lies in one that is covered.
+fn is_covered(slab: &Interval, covered: &[Interval]) -> bool {
+    covered.iter().any(|c| c.lo <= slab.lo && slab.hi <= c.hi)
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::{Features, language};
+
+    fn closed_curves(source: &str) -> usize {
+        let geometry =
+            language::parse_geometry(&format!("algebraic3d {source}"), "test.geo").unwrap().geometry;
+        Features::find(&geometry).unwrap().curves.iter().filter(|c| c.ends.is_none()).count()
+    }
+
+    #[test]
+    fn tiny_caps_and_holes_anywhere_in_a_large_body_are_found() {
+        for k in 0..40 {
+            let (x, y) = (0.1 + 0.0201 * f64::from(k), 0.9 - 0.0173 * f64::from(k));
+            let r = 10_f64.powf(-2.0 - 0.1 * f64::from(k));
+            // A ball that looks out of a face by a tenth of its radius, and a hole of the same radius.
+            let source = format!(
+                "solid s = orthobrick (0, 0, 0; 1, 1, 1) or sphere ({x}, {y}, {z}; {r}); tlo s;",
+                z = 1.0 - 0.9 * r
+            );
+            assert_eq!(closed_curves(&source), 1, "a ball of radius {r} at {x}, {y}");
+            let source = format!(
+                "solid s = orthobrick (0, 0, 0; 1, 1, 1) and not cylinder ({x}, {y}, 0; {x}, {y}, 1; {r}); tlo s;"
+            );
+            assert_eq!(closed_curves(&source), 2, "a hole of radius {r} at {x}, {y}");
+        }
+    }
+}

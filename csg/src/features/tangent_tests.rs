@@ -1,0 +1,119 @@
+//! Features of surfaces that are tangent, and of cones with their tips.
+
+use super::tests::{counts, find, refused};
+
+#[test]
+fn fillets_and_caps_are_curves_between_two_patches_also_with_rounded_decimals() {
+    // Sources, and numbers of corners, of curves between corners, of closed curves, of patches.
+    let cases = [
+        ("solid s = cylinder (0,0,0; 0,0,1; 1) and plane (0,0,0; 0,0,-1) and plane (0,0,1; 0,0,1)
+            and plane (1,0,0; 1,0,0) and plane (0,-1.000000001,0; 0,-1,0); tlo s;", [0, 0, 2, 3]),
+        ("solid rod = cylinder (0,0,0; 0,0,1; 1) and plane (0,0,0; 0,0,-1) and plane (0,0,2; 0,0,1);
+            solid s = rod or sphere (0,0,0; 1.000000001) or sphere (0,0,2; 0.9999999995); tlo s;", [0, 0, 2, 3]),
+        ("solid up = cylinder (0,0,0; 0,0,1; 0.5000000001) and plane (0,0,0; 0,0,1) and plane (0,0,-2; 0,0,-1);
+            solid bend = torus (1.5,0,0; 0,1,0; 1.5000000002; 0.5) and plane (0,0,0; 0,0,-1) and plane (1.5,0,0; 1,0,0);
+            solid s = up or bend; tlo s;", [0, 0, 3, 4]),
+        ("solid a = torus (1,0,0; 0,1,0; 1; 0.3) and plane (0,0,0; 0,0,-1) and plane (1,0,0; 1,0,0);
+            solid b = torus (-1,0,0; 0,1,0; 1; 0.3) and plane (0,0,0; 0,0,1) and plane (-1,0,0; -1,0,0);
+            solid s = a or b; tlo s;", [0, 0, 3, 4]),
+        ("solid horn = cone (0,0,0; 1; 0,0,2; 0.5) and plane (0,0,0; 0,0,-1) and plane (0,0,2; 0,0,1);
+            solid s = horn or sphere (0,0,1.875; 0.515388203); tlo s;", [0, 0, 2, 3]),
+        ("solid box = orthobrick (0,0,0; 3,2,1);
+            solid corner = orthobrick (-1,-1,-1; 0.3,0.3,2) and not cylinder (0.3,0.3,0; 0.3,0.3,1; 0.3);
+            solid s = box and not corner; tlo s;", [10, 15, 0, 7]),
+        ("solid s = torus (0,0,0; 0,0,1; 2; 0.5) and plane (0,0,0.5; 0,0,1) and plane (2.5,0,0; 1,0,0); tlo s;", [0, 0, 0, 1]),
+        ("solid s = cylinder (0,0,0; 0,0,1; 1) and plane (0,0,0; 0,0,-1) and plane (0,0,1; 0,0,1)
+            and plane (0.6000000003,0.8,0; 0.6,0.8,0); tlo s;", [0, 0, 2, 3]),
+        (
+            "solid rod = ellipticcylinder (0,0,0; 2,0,0; 0,1,0) and plane (0,0,0; 0,0,-1) and plane (0,0,3; 0,0,1);
+            solid s = rod or ellipsoid (0,0,0; 2,0,0; 0,1,0; 0,0,1.5) or ellipsoid (0,0,3; 2,0,0; 0,1,0; 0,0,0.3); tlo s;",
+            [0, 0, 2, 3],
+        ),
+    ];
+    for (source, expected) in cases {
+        let features = find(source);
+        assert_eq!(counts(&features), expected, "{source}");
+        assert!(features.curves.iter().all(|c| c.fins.len() == 2), "{source}");
+    }
+}
+
+#[test]
+fn parts_with_seams_turned_any_way_have_the_same_features() {
+    let rim = "solid disk = cylinder (0,0,0; 0,0,1; 2) and plane (0,0,0; 0,0,-1) and plane (0,0,1; 0,0,1);
+        solid corner = cylinder (0,0,0; 0,0,1; 3) and not cylinder (0,0,0; 0,0,1; 1.7) and plane (0,0,0.7; 0,0,-1);
+        solid rim = disk and not corner or torus (0,0,0.7; 0,0,1; 1.7; 0.3);";
+    for k in 0..6 {
+        let turn = 0.37 * f64::from(k);
+        let source = format!(
+            "{rim} solid s = translate (3, {k}, -7; rotate ({turn}, 0.2, 0.3; 0.4, {turn}, 1.1; rim)); tlo s;"
+        );
+        assert_eq!(counts(&find(&source)), [0, 0, 3, 4], "turned by {turn}");
+    }
+}
+
+#[test]
+fn the_tip_of_a_cone_is_a_corner() {
+    let cone = "solid c = cone (0,0,0; 1; 0,0,1; 0.5) and plane (0,0,0; 0,0,-1)";
+    let cases = [
+        ("and plane (0,0,2; 0,0,1); tlo c;", [1, 0, 1, 2]),
+        ("and plane (0,0,4; 0,0,1); tlo c;", [1, 0, 2, 3]),
+        ("and plane (0,0,2; 0,0,1) and plane (0,0,0; 0,1,0); tlo c;", [3, 4, 0, 3]),
+        ("and plane (0,0,2; 0,0,1) and plane (0,0,0; 0,1,0) and plane (0,0,0; 1,0,0); tlo c;", [4, 6, 0, 4]),
+        ("and plane (0,0,2; 0,0,1); solid t = rotate (0.3,0.5,1.1; 0.4,0.7,1.1; c); tlo t;", [1, 0, 1, 2]),
+        // Buried in a ball it is nothing.
+        ("and plane (0,0,2.2; 0,0,1) or sphere (0,0,2; 0.5); tlo c;", [0, 0, 2, 3]),
+    ];
+    for (rest, expected) in cases {
+        assert_eq!(counts(&find(&format!("{cone} {rest}"))), expected, "{rest}");
+    }
+    let pit = "solid pit = cone (0,0,1; 1; 0,0,0.5; 0.5) and plane (0,0,-0.5; 0,0,-1);
+        solid s = orthobrick (-2,-2,0; 2,2,1) and not pit; tlo s;";
+    assert_eq!(counts(&find(pit)), [9, 12, 1, 7]);
+}
+
+#[test]
+fn a_plane_two_rods_and_a_ball_that_touch_in_a_point_make_a_round_corner() {
+    // One corner of a block with round edges, cut off.
+    let corner = "solid s = (orthobrick (0,0,0; 1,1,1) and not orthobrick (0.7,0.7,-1; 2,2,2) and not orthobrick (0.7,-1,0.7; 2,2,2)
+            and not orthobrick (-1,0.7,0.7; 2,2,2))
+        or cylinder (0.7,0.7,0; 0.7,0.7,1; 0.3) and plane (0,0,0; 0,0,-1) and plane (0,0,0.7; 0,0,1)
+        or cylinder (0.7,0,0.7; 0.7,1,0.7; 0.3) and plane (0,0,0; 0,-1,0) and plane (0,0.7,0; 0,1,0)
+        or cylinder (0,0.7,0.7; 1,0.7,0.7; 0.3) and plane (0,0,0; -1,0,0) and plane (0.7,0,0; 1,0,0)
+        or sphere (0.7,0.7,0.7; 0.3); tlo s;";
+    assert_eq!(counts(&find(corner)), [13, 21, 0, 10]);
+}
+
+#[test]
+fn wedges_of_no_angle_are_refused_with_both_names_and_the_place() {
+    let rod =
+        |x: f64| format!("cylinder ({x},0,0; {x},0,1; 1) and plane (0,0,0; 0,0,-1) and plane (0,0,1; 0,0,1)");
+    let rods = format!("solid a = {};\nsolid b = {}; tlo a; tlo b;", rod(0.0), rod(2.0));
+    let cases = [
+        (
+            "solid a = sphere (0,0,0; 1);\nsolid b = sphere (2,0,0; 1); tlo a; tlo b;",
+            "surfaces of solid `a` (line 2) and solid `b` (line 3) touch at (1.000000, ",
+        ),
+        (
+            "solid a = sphere (0,0,0; 1);\nsolid b = sphere (2.0000000005,0,0; 1); tlo a; tlo b;",
+            "surfaces of solid `a` (line 2) and solid `b` (line 3) touch at (1.000000, ",
+        ),
+        (
+            "solid a = sphere (0,0,0; 1) and not sphere (0.5,0,0; 0.5); tlo a;",
+            "surfaces of solid `a` (line 2) and solid `a` (line 2) touch at (1.000000, ",
+        ),
+        (&rods, "surfaces of solid `b` (line 3) and solid `a` (line 2) touch at (1.000000, "),
+        (
+            "solid a = torus (0,0,0.5; 0,0,1; 2; 0.5);\nsolid b = orthobrick (-3,-3,-1; 3,3,0); solid c = a or b; tlo c;",
+            "surfaces of solid `a` (line 2) and solid `b` (line 3) touch at (",
+        ),
+        // A plane that touches a torus from the hole cuts it into lobes that meet in a point.
+        (
+            "solid a = torus (0,0,0; 0,0,1; 2; 0.5) and plane (1.5,0,0; 1,0,0); tlo a;",
+            "surfaces of solid `a` (line 2) and solid `a` (line 2) touch at (1.500000, ",
+        ),
+    ];
+    for (source, message) in cases {
+        let said = refused(source);
+        assert!(said.starts_with(message), "{said} does not start with {message}");
+    }
+}
