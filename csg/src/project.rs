@@ -1,6 +1,8 @@
 //! Projection of points to patches and curves: all that refinement needs to know of a geometry.
 
-use crate::primitive::{Cone, Cylinder, Ellipsoid, EllipticCone, EllipticCylinder, Plane, Sphere, Torus};
+use crate::primitive::{
+    Cone, Cylinder, Ellipse, Ellipsoid, EllipticCone, EllipticCylinder, Nappe, Plane, Revolved, Sphere, Torus,
+};
 use crate::{CurveId, Features, Geometry, PatchId, Point, Surface, SurfaceId, Vector};
 
 /// A projection that did not converge.
@@ -191,7 +193,13 @@ fn encode_surface(surface: &Surface, out: &mut Vec<f64>) {
         Surface::EllipticCone(e) => {
             put(7, &[e.point.coords, e.axes[0], e.axes[1], e.axis], &[e.radii[0], e.radii[1], e.rate]);
         }
+        Surface::Nappe(c) => put(8, &[c.point.coords, c.axis], &[c.radius, c.slope]),
+        Surface::Revolved(r) => put(9, &[r.point.coords, r.axis], &ellipse_numbers(&r.profile)),
     }
+}
+
+fn ellipse_numbers(e: &Ellipse) -> [f64; 6] {
+    [e.center[0], e.center[1], e.axis[0], e.axis[1], e.radii[0], e.radii[1]]
 }
 
 /// Takes numbers off the front of a slice.
@@ -216,6 +224,11 @@ impl Reader<'_> {
 
     fn point(&mut self) -> Option<Point> {
         self.vector().map(Point::from)
+    }
+
+    fn ellipse(&mut self) -> Option<Ellipse> {
+        let mut pair = || Some([self.number()?, self.number()?]);
+        Some(Ellipse { center: pair()?, axis: pair()?, radii: pair()? })
     }
 
     fn surface(&mut self) -> Option<Surface> {
@@ -255,6 +268,17 @@ impl Reader<'_> {
                 axis: self.vector()?,
                 radii: [self.number()?, self.number()?],
                 rate: self.number()?,
+            }),
+            8 => Surface::Nappe(Nappe {
+                point: self.point()?,
+                axis: self.vector()?,
+                radius: self.number()?,
+                slope: self.number()?,
+            }),
+            9 => Surface::Revolved(Revolved {
+                point: self.point()?,
+                axis: self.vector()?,
+                profile: self.ellipse()?,
             }),
             _ => return None,
         })
@@ -330,13 +354,19 @@ mod tests {
                 axis: axes[2],
                 rate: -0.25,
             }),
+            Surface::Nappe(Nappe { point: o, axis: axes[0], radius: 1.0, slope: 0.5 }),
+            Surface::Revolved(Revolved {
+                point: o,
+                axis: axes[1],
+                profile: Ellipse { center: [3.0, 0.5], axis: [0.6, 0.8], radii: [1.0, 2.0] },
+            }),
         ]);
         let numbers = projector.encode();
         assert_eq!(Projector::decode(&numbers), Some(projector));
         assert_eq!(Projector::decode(&numbers[..numbers.len() - 1]), None);
         assert_eq!(Projector::decode(&[&numbers[..], &[0.0]].concat()), None);
         let mut wrong = numbers.clone();
-        wrong[4] = 9.0;
+        wrong[4] = 99.0;
         assert_eq!(Projector::decode(&wrong), None);
     }
 }
