@@ -3,8 +3,8 @@
 use crate::interval::{Cell, middle, offset};
 use crate::primitive::quadric::polish;
 use crate::primitive::{
-    Cone, Cylinder, Ellipsoid, EllipticCone, EllipticCylinder, Nappe, Plane, Primitive, Revolved, Sphere, Torus,
-    same,
+    Cone, Cylinder, Ellipsoid, EllipticCone, EllipticCylinder, Nappe, Plane, Primitive, Revolved, Sphere,
+    Torus, same,
 };
 use crate::{Interval, Point, ProjectionFailed, Vector};
 use nalgebra::{Isometry3, Matrix3};

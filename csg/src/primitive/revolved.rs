@@ -78,7 +78,9 @@ impl Primitive for Revolved {
         let [distance, height] = self.profile.nearest(at);
         if distance <= 0.0 {
             // The nearest point of the part that counts is where it ends, on the axis.
-            let Some((middle, half)) = self.profile.right_part() else { return Err(ProjectionFailed(*point)) };
+            let Some((middle, half)) = self.profile.right_part() else {
+                return Err(ProjectionFailed(*point));
+            };
             let ends = [middle - half, middle + half].map(|angle| self.profile.point(angle)[1]);
             let [first, second] = ends.map(|end| (end - at[1]).abs());
             return Ok(self.point + self.axis * if first <= second { ends[0] } else { ends[1] });

@@ -101,7 +101,8 @@ fn same_elliptic_cone(a: &EllipticCone, b: &EllipticCone, tolerance: f64) -> boo
 fn same_nappe(a: &Nappe, b: &Nappe, tolerance: f64) -> bool {
     // The direction along which the radius grows.
     let slopes = |c: &Nappe| c.axis * c.slope;
-    (a.apex() - b.apex()).norm() <= tolerance && (slopes(a) - slopes(b)).norm() <= SAME_DIRECTION * slopes(a).norm()
+    (a.apex() - b.apex()).norm() <= tolerance
+        && (slopes(a) - slopes(b)).norm() <= SAME_DIRECTION * slopes(a).norm()
 }
 
 fn same_revolved(a: &Revolved, b: &Revolved, tolerance: f64) -> bool {
