@@ -10,8 +10,16 @@ use crate::primitive::Ellipse;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Piece {
     Line([Vector; 2]),
+    Arc(Arc),
+}
+
+/// An arc of an ellipse of less than half a turn.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Arc {
     /// Its ends, and the control point between them where the tangents at the ends meet.
-    Arc([Vector; 3]),
+    pub points: [Vector; 3],
+    /// The weight of the control point.
+    weight: f64,
 }
 
 /// The part of the longest side of the control triangle below which its height is none: the arc is a line.
@@ -26,7 +34,7 @@ impl Piece {
                 let is_flat = (q - p).cross(&(r - q)).norm() <= FLAT * longest * longest;
                 // A control point beyond an end on the line of both would make it run back.
                 let is_between = (q - p).dot(&(r - q)) >= 0.0;
-                if is_flat && is_between { Self::Line([p, r]) } else { Self::Arc([p, q, r]) }
+                if is_flat && is_between { Self::Line([p, r]) } else { Self::Arc(Arc::new([p, q, r])) }
             }
             _ => Self::Line([points[0], points[points.len() - 1]]),
         }
@@ -35,14 +43,14 @@ impl Piece {
     pub fn ends(&self) -> [Vector; 2] {
         match *self {
             Self::Line(ends) => ends,
-            Self::Arc([p, _, r]) => [p, r],
+            Self::Arc(arc) => arc.ends(),
         }
     }
 
     pub fn reversed(&self) -> Self {
         match *self {
             Self::Line([p, q]) => Self::Line([q, p]),
-            Self::Arc([p, q, r]) => Self::Arc([r, q, p]),
+            Self::Arc(arc) => Self::Arc(arc.reversed()),
         }
     }
 
@@ -50,7 +58,7 @@ impl Piece {
     pub fn tangents(&self) -> [Vector; 2] {
         match *self {
             Self::Line([p, q]) => [q - p; 2],
-            Self::Arc([p, q, r]) => [q - p, r - q],
+            Self::Arc(Arc { points: [p, q, r], .. }) => [q - p, r - q],
         }
     }
 
@@ -58,8 +66,39 @@ impl Piece {
     pub fn control(&self) -> Vec<Vector> {
         match *self {
             Self::Line(ends) => ends.to_vec(),
-            Self::Arc(points) => points.to_vec(),
+            Self::Arc(arc) => arc.points.to_vec(),
         }
+    }
+}
+
+impl Arc {
+    fn new([p, q, r]: [Vector; 3]) -> Self {
+        let weight = (r - p).norm() / (2.0 * ((q - p).norm_squared() + (r - q).norm_squared())).sqrt();
+        Self { points: [p, q, r], weight }
+    }
+
+    pub fn ends(&self) -> [Vector; 2] {
+        [self.points[0], self.points[2]]
+    }
+
+    pub fn reversed(&self) -> Self {
+        let [p, q, r] = self.points;
+        Self { points: [r, q, p], ..*self }
+    }
+
+    /// The same arc in two, cut at t = 1/2 by De Casteljau's algorithm in homogeneous coordinates.
+    pub fn halves(&self) -> [Self; 2] {
+        let Self { points: [p, q, r], weight } = *self;
+        let (a, b) = ((p + q * weight) / (1.0 + weight), (q * weight + r) / (1.0 + weight));
+        let middle = (a + b) * 0.5;
+        let weight = (0.5 * (1.0 + weight)).sqrt();
+        [Self { points: [p, a, middle], weight }, Self { points: [middle, b, r], weight }]
+    }
+
+    /// The point at t = 1/2.
+    pub fn middle(&self) -> Vector {
+        let Self { points: [p, q, r], weight } = self;
+        ((p + r) * 0.5 + q * *weight) / (1.0 + weight)
     }
 }
 
@@ -74,13 +113,12 @@ const ROUND: f64 = 1e-6;
 
 impl SpaceEllipse {
     /// The ellipse of an arc; a circle where it is one but for the rounding of decimals.
-    pub fn of([p, q, r]: [Vector; 3]) -> Self {
-        let square = middle_weight([p, q, r]).powi(2);
+    pub fn of(arc: &Arc) -> Self {
+        let Arc { points: [p, q, r], weight } = *arc;
+        let square = weight * weight;
         let center = (p + r - q * (2.0 * square)) / (2.0 * (1.0 - square));
-        let weight = square.sqrt();
         // Conjugate half-diameters: to the shoulder of the arc, and along its chord.
-        let shoulder = ((p + r) * 0.5 + q * weight) / (1.0 + weight);
-        let (u, v) = (shoulder - center, (r - p) * (0.5 / (1.0 - square).sqrt()));
+        let (u, v) = (arc.middle() - center, (r - p) * (0.5 / (1.0 - square).sqrt()));
         let (mixed, difference) = (2.0 * u.dot(&v), u.norm_squared() - v.norm_squared());
         if mixed.hypot(difference) <= ROUND * (u.norm_squared() + v.norm_squared()) {
             let radius = 0.5 * ((p - center).norm() + (r - center).norm());
@@ -107,20 +145,6 @@ impl SpaceEllipse {
     }
 }
 
-fn middle_weight([p, q, r]: [Vector; 3]) -> f64 {
-    (r - p).norm() / (2.0 * ((q - p).norm_squared() + (r - q).norm_squared())).sqrt()
-}
-
-/// An arc between two points of its ellipse, given by them and by where the tangents there meet.
-pub(super) fn halves(points: [Vector; 3]) -> [[Vector; 3]; 2] {
-    let [p, q, r] = points;
-    let weight = middle_weight(points);
-    // De Casteljau's algorithm in homogeneous coordinates at t = 1/2.
-    let (a, b) = ((p + q * weight) / (1.0 + weight), (q * weight + r) / (1.0 + weight));
-    let middle = (a + b) * 0.5;
-    [[p, a, middle], [middle, b, r]]
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -136,17 +160,24 @@ mod tests {
             [v(1., 0.), v(1., 1.), v(0., 1.)],
             [v(0., 0.), v(1., 0.1), v(2., 0.)],
         ] {
-            let ellipse = SpaceEllipse::of(points).flat();
-            let [p, q, r] = points;
-            let weight = middle_weight(points);
+            let arc = Arc::new(points);
+            let ellipse = SpaceEllipse::of(&arc).flat();
+            let ([p, q, r], weight) = (arc.points, arc.weight);
             for i in 0..=10 {
                 let t = f64::from(i) / 10.0;
                 let [b, c, d] = [(1.0 - t) * (1.0 - t), 2.0 * weight * t * (1.0 - t), t * t];
                 let x = (p * b + q * c + r * d) / (b + c + d);
                 assert!(ellipse.value([x.x, x.y]).abs() < 1e-12, "{points:?} at {t}");
             }
-            let [first, second] = halves(points);
-            assert_eq!(first[2], second[0]);
+            let [first, second] = arc.halves();
+            assert_eq!(first.points[2], second.points[0]);
+            let parts = [first, second].map(|half| SpaceEllipse::of(&half).flat());
+            for part in &parts {
+                assert!(
+                    (part.center[0] - ellipse.center[0]).hypot(part.center[1] - ellipse.center[1]) < 1e-12
+                );
+            }
+            let first = first.points;
             assert!(ellipse.value([first[2].x, first[2].y]).abs() < 1e-12);
             // The tangents at the ends of the halves.
             let [gx, gy] = ellipse.gradient([first[2].x, first[2].y]);
@@ -156,9 +187,12 @@ mod tests {
 
     #[test]
     fn tangents_of_equal_length_make_a_circle() {
-        let arc =
-            SpaceEllipse::of([Vector::new(0., 0., 0.), Vector::new(10., 0., 5.), Vector::new(10., 10., 10.)]);
+        let arc = SpaceEllipse::of(&Arc::new([
+            Vector::zeros(),
+            Vector::new(10., 0., 5.),
+            Vector::new(10., 10., 10.),
+        ]));
         assert!(arc.radius().is_some_and(|r| (r - (arc.center).norm()).abs() < 1e-9));
-        assert!(SpaceEllipse::of([v(0., 0.), v(1., 0.), v(1., 2.)]).radius().is_none());
+        assert!(SpaceEllipse::of(&Arc::new([v(0., 0.), v(1., 0.), v(1., 2.)])).radius().is_none());
     }
 }

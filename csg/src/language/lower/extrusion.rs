@@ -6,7 +6,7 @@
 //! ends of an open path, and asks for planes that cut it; here the planes across its ends close it, and if one that
 //! the file cuts with is nearer, nothing is left of them.
 
-use super::conic::{Piece, SpaceEllipse};
+use super::conic::{Arc, Piece, SpaceEllipse};
 use super::primitive::Shape;
 use super::profile::{Bound, Profile, formula};
 use super::swept::{Assembly, NO_FACE, SweepError, Turn};
@@ -30,7 +30,7 @@ pub(super) fn shape(path: &[Piece], profile: &[Piece], up: Vector) -> Result<Sha
     for (index, piece) in path.iter().enumerate() {
         let mut member = match *piece {
             Piece::Line(ends) => along_line(&mut assembly, ends, &profile, up)?,
-            Piece::Arc(points) => along_arc(&mut assembly, index, points, &profile, up)?,
+            Piece::Arc(arc) => along_arc(&mut assembly, index, &arc, &profile, up)?,
         };
         let ([start, end], [first, last]) = (piece.ends(), piece.tangents());
         member.push(assembly.behind(start, -first, NO_FACE));
@@ -108,11 +108,12 @@ fn along_line(
 fn along_arc(
     into: &mut Assembly,
     index: usize,
-    points: [Vector; 3],
+    arc: &Arc,
     profile: &Profile,
     up: Vector,
 ) -> Result<Vec<Solid>, SweepError> {
-    let ellipse = SpaceEllipse::of(points);
+    let ellipse = SpaceEllipse::of(arc);
+    let points = arc.points;
     let Some(radius) = ellipse.radius() else {
         let message =
             format!("segment {} of the path is an arc of an ellipse, which cannot be meshed yet", index + 1);

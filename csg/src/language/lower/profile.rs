@@ -8,7 +8,7 @@
 //! ends of their arcs only. All holds if the control triangles of arcs and the edges meet in common ends only; arcs
 //! are halved until they do.
 
-use super::conic::{Piece, SpaceEllipse, halves};
+use super::conic::{Arc, Piece, SpaceEllipse};
 use crate::primitive::Ellipse;
 use crate::{Solid, SurfaceId, Vector};
 use std::f64::consts::PI;
@@ -54,7 +54,7 @@ struct Edge {
     ends: [Vector; 2],
     /// The convex hull of the segment and of its chord.
     hull: Vec<Vector>,
-    arc: Option<[Vector; 3]>,
+    arc: Option<(Arc, Ellipse)>,
     segment: usize,
     depth: u32,
 }
@@ -94,7 +94,7 @@ fn area(pieces: &[Piece]) -> f64 {
     let twice = |p: Vector, q: Vector| p.cross(&q).z;
     let each = pieces.iter().map(|piece| match *piece {
         Piece::Line([p, q]) => twice(p, q),
-        Piece::Arc(points) => halves(points).iter().map(|[p, _, r]| twice(*p, *r)).sum(),
+        Piece::Arc(arc) => arc.halves().iter().map(|half| twice(half.points[0], half.points[2])).sum(),
     });
     each.sum()
 }
@@ -114,14 +114,15 @@ impl Cutter {
         let mut found: Option<(Ellipse, f64)> = None;
         let mut turn = 0.0;
         for piece in pieces {
-            let Piece::Arc([p, q, r]) = *piece else { return None };
-            let ellipse = SpaceEllipse::of([p, q, r]).flat();
+            let Piece::Arc(arc) = *piece else { return None };
+            let ellipse = SpaceEllipse::of(&arc).flat();
+            let [p, q, r] = arc.points;
             let angle = (q - p).angle(&(r - q)) * (q - p).cross(&(r - q)).z.signum();
             turn += angle;
             let (first, sign) = *found.get_or_insert((ellipse, angle));
             let on = |x: Vector| first.value([x.x, x.y]).abs() <= self.tolerance;
             let near = (0..2).all(|i| (first.center[i] - ellipse.center[i]).abs() <= self.tolerance);
-            if !(near && on(p) && on(r) && on(halves([p, q, r])[0][2]) && sign * angle > 0.0) {
+            if !(near && on(p) && on(r) && on(arc.middle()) && sign * angle > 0.0) {
                 return None;
             }
         }
@@ -148,7 +149,7 @@ impl Cutter {
         };
         let settled = pieces.iter().map(|piece| match *piece {
             Piece::Line(ends) => Piece::Line(ends.map(on_axis)),
-            Piece::Arc([p, q, r]) => Piece::Arc([on_axis(p), q, on_axis(r)]),
+            Piece::Arc(Arc { points: [p, q, r], .. }) => Piece::new(&[on_axis(p), q, on_axis(r)]),
         });
         let mut all: Vec<(usize, Piece)> = settled.enumerate().filter(|(_, piece)| is_long(piece)).collect();
         let (Some(first), Some(last)) = (all.first(), all.last()) else { return Err(ProfileError::Empty) };
@@ -166,7 +167,11 @@ impl Cutter {
         let mut edges = Vec::new();
         for (segment, piece) in all {
             let piece = if area < 0.0 { piece.reversed() } else { piece };
-            edges.extend(self.edges_of(piece, segment, 0)?);
+            let arc = match piece {
+                Piece::Arc(arc) => Some((arc, SpaceEllipse::of(&arc).flat())),
+                Piece::Line(_) => None,
+            };
+            edges.extend(self.edges_of(piece.ends(), arc, segment, 0)?);
         }
         Ok(edges)
     }
@@ -175,13 +180,20 @@ impl Cutter {
     ///
     /// An arc that begins or ends on the axis gets a chord across the axis, from its other end; between its end and the
     /// chord's lies the axis. So the chord is never a cone with its tip on the surface.
-    fn edges_of(&self, piece: Piece, segment: usize, depth: u32) -> Result<Vec<Edge>, ProfileError> {
+    fn edges_of(
+        &self,
+        mut ends: [Vector; 2],
+        arc: Option<(Arc, Ellipse)>,
+        segment: usize,
+        depth: u32,
+    ) -> Result<Vec<Edge>, ProfileError> {
         /// The cosine of the angle with the axis.
         const SLANTED: f64 = 1e-6;
-        let (mut ends, mut hull) = (piece.ends(), piece.control());
-        let Piece::Arc([p, q, r]) = piece else {
-            return Ok(vec![Edge { ends, hull, arc: None, segment, depth }]);
+        let Some((arc, ellipse)) = arc else {
+            return Ok(vec![Edge { ends, hull: ends.to_vec(), arc: None, segment, depth }]);
         };
+        let [p, q, r] = arc.points;
+        let mut hull = arc.points.to_vec();
         let touches = ends.map(|end| self.by_axis && end.y <= self.tolerance);
         for (end, touches) in ends.into_iter().zip(touches) {
             if touches && (q - end).x.abs() > SLANTED * (q - end).norm() {
@@ -190,8 +202,10 @@ impl Cutter {
         }
         match touches {
             [true, true] => {
-                let [first, second] =
-                    halves([p, q, r]).map(|arc| self.edges_of(Piece::Arc(arc), segment, depth));
+                let parts = arc
+                    .halves()
+                    .map(|half| self.edges_of(half.ends(), Some((half, ellipse)), segment, depth));
+                let [first, second] = parts;
                 return Ok([first?, second?].concat());
             }
             [true, false] => ends[0] = Vector::new(r.x, 0.0, 0.0),
@@ -199,13 +213,15 @@ impl Cutter {
             [false, false] => {}
         }
         hull.extend(ends);
-        Ok(vec![Edge { ends, hull, arc: Some([p, q, r]), segment, depth }])
+        Ok(vec![Edge { ends, hull, arc: Some((arc, ellipse)), segment, depth }])
     }
 
     fn halved(&self, edge: &Edge) -> Result<Vec<Edge>, ProfileError> {
-        let parts = edge.arc.map_or_else(Vec::new, |arc| halves(arc).to_vec());
-        let edges = parts.into_iter().map(|arc| self.edges_of(Piece::Arc(arc), edge.segment, edge.depth + 1));
-        Ok(edges.collect::<Result<Vec<_>, _>>()?.concat())
+        let Some((arc, ellipse)) = edge.arc else { return Ok(vec![edge.clone()]) };
+        let [first, second] = arc
+            .halves()
+            .map(|half| self.edges_of(half.ends(), Some((half, ellipse)), edge.segment, edge.depth + 1));
+        Ok([first?, second?].concat())
     }
 
     /// Two edges whose hulls have more in common than the end of one that is the start of the other.
@@ -332,10 +348,9 @@ impl Builder<'_> {
     fn leaf(&mut self, index: usize, added: &mut Vec<Solid>, removed: &mut Vec<Solid>) -> Solid {
         let Edge { ends: [p, q], arc, segment, .. } = self.edges[index].clone();
         let line = self.literal(Bound::Left([p.x, p.y], [q.x, q.y]), segment);
-        let Some(arc) = arc else { return line };
-        let ellipse = self.literal(Bound::Inside(SpaceEllipse::of(arc).flat()), segment);
-        let middle = halves(arc)[0][2];
-        if (q - p).cross(&(middle - p)).z < 0.0 {
+        let Some((arc, ellipse)) = arc else { return line };
+        let ellipse = self.literal(Bound::Inside(ellipse), segment);
+        if (q - p).cross(&(arc.middle() - p)).z < 0.0 {
             added.push(Solid::And(vec![ellipse.clone(), not(line.clone())]));
             Solid::Or(vec![line, ellipse])
         } else {

@@ -1,6 +1,6 @@
 //! `revolution`: a profile turned about an axis.
 
-use super::conic::{Piece, halves};
+use super::conic::{Arc, Piece};
 use super::primitive::Shape;
 use super::profile::formula;
 use super::swept::{Assembly, SweepError, Turn};
@@ -44,16 +44,16 @@ fn cut_by_axis(piece: Piece) -> Piece {
 fn lowest(piece: &Piece) -> f64 {
     /// Pieces of an arc of which the ends are taken: 32.
     const DEPTH: u32 = 5;
-    fn least(points: [Vector; 3], depth: u32) -> f64 {
-        let ends = points[0].y.min(points[2].y);
-        if depth == 0 || points[1].y >= ends {
-            return ends;
+    fn least(arc: Arc, depth: u32) -> f64 {
+        let [p, q, r] = arc.points.map(|p| p.y);
+        if depth == 0 || q >= p.min(r) {
+            return p.min(r);
         }
-        let [first, second] = halves(points);
+        let [first, second] = arc.halves();
         least(first, depth - 1).min(least(second, depth - 1))
     }
     match *piece {
         Piece::Line([p, q]) => p.y.min(q.y),
-        Piece::Arc(points) => least(points, DEPTH),
+        Piece::Arc(arc) => least(arc, DEPTH),
     }
 }

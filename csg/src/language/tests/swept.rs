@@ -112,6 +112,15 @@ fn a_moved_circle_is_one_cylinder_between_planes() {
     assert_is(&geometry, |p| p.y > 0.0 && p.y < 2.0 && (p.x - 0.5).hypot(p.z) < 1.0);
 }
 
+/// A point of a segment of kind 3.
+fn at(points: [[f64; 2]; 3], t: f64) -> [f64; 2] {
+    let [p, q, r] = points.map(|[x, y]| crate::Vector::new(x, y, 0.0));
+    let w = (r - p).norm() / (0.5 * ((q - p).norm_squared() + (r - q).norm_squared())).sqrt();
+    let [b, c, d] = [(1.0 - t) * (1.0 - t), w * t * (1.0 - t), t * t];
+    let x = (p * b + q * c + r * d) / (b + c + d);
+    [x.x, x.y]
+}
+
 #[test]
 fn arcs_bulge_out_of_polygons_and_into_them() {
     // A stadium with a groove; the cap of the arc on the right reaches above the line at its top.
@@ -119,13 +128,6 @@ fn arcs_bulge_out_of_polygons_and_into_them() {
         6; 2,1,2; 3,2,3,4; 2,4,5; 3,5,6,7; 2,7,8; 3,8,9,1);";
     let geometry = swept(text, "revolution (0, 0, 0; 1, 0, 0; p)");
     // The same curve, cut into short lines.
-    let at = |points: [[f64; 2]; 3], t: f64| {
-        let [p, q, r] = points.map(|[x, y]| crate::Vector::new(x, y, 0.0));
-        let w = (r - p).norm() / (0.5 * ((q - p).norm_squared() + (r - q).norm_squared())).sqrt();
-        let [b, c, d] = [(1.0 - t) * (1.0 - t), w * t * (1.0 - t), t * t];
-        let x = (p * b + q * c + r * d) / (b + c + d);
-        [x.x, x.y]
-    };
     let mut fine = vec![[-1., 1.]];
     for arc in [
         [[1., 1.], [2.5, 2.5], [1., 3.]],
@@ -183,4 +185,16 @@ fn profiles_that_cross_and_paths_with_corners_are_named() {
     let corner =
         error(&format!("{path} {} solid s = extrusion (q; p; 0,0,1); tlo s;", ring(0.0, 0.0, 0.1, 0.1)));
     assert!(corner.contains("corner between its segments 1 and 2"), "{corner}");
+}
+#[test]
+fn thin_shells_between_arcs_have_their_arcs_halved() {
+    // Two arcs of different ellipses between the same points: the chords coincide.
+    let text = "curve2d p = (4; -2,1; 1,4; 2,1; 0.8,2.8; 2; 3,1,2,3; 3,3,4,1);";
+    let geometry = swept(text, "revolution (0, 0, 0; 1, 0, 0; p)");
+    let mut fine = Vec::new();
+    for arc in [[[-2., 1.], [1., 4.], [2., 1.]], [[2., 1.], [0.8, 2.8], [-2., 1.]]] {
+        fine.extend((0..4000).map(|i| at(arc, f64::from(i) / 4000.0)));
+    }
+    assert_is(&geometry, |p| is_in(&fine, [p.x, p.y.hypot(p.z)]));
+    assert_eq!(geometry.surfaces.iter().filter(|s| matches!(s, Surface::Revolved(_))).count(), 2);
 }
