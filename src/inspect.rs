@@ -175,6 +175,7 @@ fn kind(surface: &csg::Surface) -> &'static str {
         csg::Surface::EllipticCone(_) => "elliptic cone",
         csg::Surface::Nappe(_) => "nappe of a cone",
         csg::Surface::Revolved(_) => "turned ellipse",
+        csg::Surface::Sweep(_) => "section moved along a circle",
     }
 }
 

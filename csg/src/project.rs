@@ -1,7 +1,8 @@
 //! Projection of points to patches and curves: all that refinement needs to know of a geometry.
 
 use crate::primitive::{
-    Cone, Cylinder, Ellipse, Ellipsoid, EllipticCone, EllipticCylinder, Nappe, Plane, Revolved, Sphere, Torus,
+    Cone, Cylinder, Ellipse, Ellipsoid, EllipticCone, EllipticCylinder, Nappe, Plane, Revolved, Section,
+    Sphere, Sweep, Torus,
 };
 use crate::{CurveId, Features, Geometry, PatchId, Point, Surface, SurfaceId, Vector};
 
@@ -195,6 +196,16 @@ fn encode_surface(surface: &Surface, out: &mut Vec<f64>) {
         }
         Surface::Nappe(c) => put(8, &[c.point.coords, c.axis], &[c.radius, c.slope]),
         Surface::Revolved(r) => put(9, &[r.point.coords, r.axis], &ellipse_numbers(&r.profile)),
+        Surface::Sweep(s) => {
+            let vectors = [s.center.coords, s.axis, s.start, s.up];
+            match s.section {
+                Section::Line { normal: [x, y], offset } => put(10, &vectors, &[s.radius, x, y, offset]),
+                Section::Ellipse(e) => {
+                    let [a, b, c, d, e, f] = ellipse_numbers(&e);
+                    put(11, &vectors, &[s.radius, a, b, c, d, e, f]);
+                }
+            }
+        }
     }
 }
 
@@ -280,6 +291,17 @@ impl Reader<'_> {
                 axis: self.vector()?,
                 profile: self.ellipse()?,
             }),
+            kind @ (10 | 11) => {
+                let center = self.point()?;
+                let [axis, start, up] = [self.vector()?, self.vector()?, self.vector()?];
+                let radius = self.number()?;
+                let section = if kind == 10 {
+                    Section::Line { normal: [self.number()?, self.number()?], offset: self.number()? }
+                } else {
+                    Section::Ellipse(self.ellipse()?)
+                };
+                Surface::Sweep(Sweep { center, axis, start, radius, up, section })
+            }
             _ => return None,
         })
     }
@@ -361,6 +383,13 @@ mod tests {
                 profile: Ellipse { center: [3.0, 0.5], axis: [0.6, 0.8], radii: [1.0, 2.0] },
             }),
         ]);
+        let sections = [
+            Section::Line { normal: [0.6, 0.8], offset: 0.3 },
+            Section::Ellipse(Ellipse { center: [0.1, 0.2], axis: [0.6, 0.8], radii: [1.0, 2.0] }),
+        ];
+        let [axis, start, up] = [axes[2], axes[0], Vector::new(0.6, 0.0, 0.8)];
+        let sweep = |section| Surface::Sweep(Sweep { center: o, axis, start, radius: 5.0, up, section });
+        projector.surfaces.extend(sections.map(sweep));
         let numbers = projector.encode();
         assert_eq!(Projector::decode(&numbers), Some(projector));
         assert_eq!(Projector::decode(&numbers[..numbers.len() - 1]), None);

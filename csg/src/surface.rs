@@ -4,7 +4,7 @@ use crate::interval::{Cell, middle, offset};
 use crate::primitive::quadric::polish;
 use crate::primitive::{
     Cone, Cylinder, Ellipsoid, EllipticCone, EllipticCylinder, Nappe, Plane, Primitive, Revolved, Sphere,
-    Torus, same,
+    Sweep, Torus, same,
 };
 use crate::{Interval, Point, ProjectionFailed, Vector};
 use nalgebra::{Isometry3, Matrix3};
@@ -32,6 +32,8 @@ pub enum Surface {
     Nappe(Nappe),
     /// An ellipse turned about an axis in its plane.
     Revolved(Revolved),
+    /// A line or an ellipse moved along a circle and turned on the way.
+    Sweep(Sweep),
 }
 
 /// Asks the primitive inside the surface.
@@ -48,6 +50,7 @@ macro_rules! ask {
             Surface::EllipticCone($primitive) => $answer,
             Surface::Nappe($primitive) => $answer,
             Surface::Revolved($primitive) => $answer,
+            Surface::Sweep($primitive) => $answer,
         }
     };
 }
@@ -151,6 +154,7 @@ impl Surface {
             Self::EllipticCone(p) => Self::EllipticCone(p.transformed(motion)),
             Self::Nappe(p) => Self::Nappe(p.transformed(motion)),
             Self::Revolved(p) => Self::Revolved(p.transformed(motion)),
+            Self::Sweep(p) => Self::Sweep(p.transformed(motion)),
         }
     }
 

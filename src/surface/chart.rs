@@ -12,11 +12,13 @@
 //!   one of which is the apex of a cone. On the torus and on other turned ellipses the height is a turn too.
 //! * **Capped** (turned ellipses that meet their axis): as central, with latitudes from pole to pole in proportion to the
 //!   parameter of the ellipse.
+//! * **Swept** (sections moved along a circle): flat where the section is a line, with the angle along the circle and the
+//!   place on the line; unrolled where it is an ellipse, with its parameter as turn and the angle as height.
 
 use crate::kernel::predicates::{Sign, orient2d, orient3d};
 use crate::{Point, Vector};
 use csg::Surface;
-use csg::primitive::Ellipse;
+use csg::primitive::{Ellipse, Section, Sweep};
 use start::{Start, bipyramid, icosahedron, torus_grid};
 use std::f64::consts::{FRAC_PI_2, TAU};
 
@@ -65,6 +67,10 @@ enum Shape {
         middle: f64,
         half: f64,
     },
+    /// A line moved along a circle.
+    Strip(Sweep),
+    /// An ellipse moved along a circle.
+    Hose(Sweep),
 }
 
 /// Which sheets a surface has: one, but the two nappes of a cone.
@@ -155,12 +161,19 @@ impl Chart {
                 };
                 round(r.point, &r.axis, 1.0, shape)
             }
+            Surface::Sweep(s) => {
+                let shape = match s.section {
+                    Section::Line { .. } => Shape::Strip(*s),
+                    Section::Ellipse(_) => Shape::Hose(*s),
+                };
+                round(s.center, &s.axis, 1.0, shape)
+            }
         }
     }
 
-    /// Whether it is flat: sites are plane coordinates.
+    /// Whether it is flat: sites are coordinates in a plane, though the surface may be bent.
     pub fn is_flat(&self) -> bool {
-        self.shape == Shape::Flat
+        matches!(self.shape, Shape::Flat | Shape::Strip(_))
     }
 
     /// Whether its surface is closed, so that vertices of a start are points of it.
@@ -173,7 +186,7 @@ impl Chart {
 
     /// Whether a site is a pole.
     pub fn is_pole(&self, site: &Site) -> bool {
-        matches!(self.shape, Shape::Straight | Shape::Conic { .. }) && site[2] != 0.0
+        matches!(self.shape, Shape::Straight | Shape::Conic { .. } | Shape::Hose(_)) && site[2] != 0.0
     }
 
     /// The pole that stands for the apex of a cone: 1 above, −1 below.
@@ -207,6 +220,15 @@ impl Chart {
                 let [x, y] = if distance > 0.0 { [x, y].map(|c| c / distance * cos) } else { [0.0; 2] };
                 [x, y, sin]
             }
+            Shape::Strip(sweep) => {
+                let (angle, [x, y]) = sweep.coordinates(point);
+                let normal = line_normal(&sweep);
+                [angle * sweep.radius, normal[0] * y - normal[1] * x, 0.0]
+            }
+            Shape::Hose(sweep) => {
+                let (angle, at) = sweep.coordinates(point);
+                [on_grid(section_ellipse(&sweep).angle(at)), -angle * sweep.radius, 0.0]
+            }
         }
     }
 
@@ -214,7 +236,7 @@ impl Chart {
     /// Negative too where three sites enclose no triangle because their edges together go round the axis.
     pub fn orient(&self, a: &Site, b: &Site, c: &Site) -> Sign {
         match self.shape {
-            Shape::Flat => orient2d([a[0], a[1]], [b[0], b[1]], [c[0], c[1]]),
+            Shape::Flat | Shape::Strip(_) => orient2d([a[0], a[1]], [b[0], b[1]], [c[0], c[1]]),
             Shape::Central | Shape::Capped { .. } => {
                 orient3d(&Point::origin(), &(*a).into(), &(*b).into(), &(*c).into())
             }
@@ -227,7 +249,7 @@ impl Chart {
                 }
                 orient2d([0.0, 0.0], [x1, y1], [x2, y2])
             }
-            Shape::Straight | Shape::Conic { .. } => match [a[2], b[2], c[2]] {
+            Shape::Straight | Shape::Conic { .. } | Shape::Hose(_) => match [a[2], b[2], c[2]] {
                 [0.0, 0.0, 0.0] => {
                     let [x1, x2, x3] = [(a, b), (a, c), (b, c)].map(|(p, q)| wrap(q[0] - p[0]));
                     if [x1, x2, x3].iter().any(|d| d.abs() >= 0.5) || x2 - x1 != x3 {
@@ -246,7 +268,9 @@ impl Chart {
     /// Whether `x`, on the line through `a` and `b`, lies on the same side of `a` as `b`.
     pub fn ahead(&self, a: &Site, b: &Site, x: &Site) -> bool {
         match self.shape {
-            Shape::Flat => (b[0] - a[0]) * (x[0] - a[0]) + (b[1] - a[1]) * (x[1] - a[1]) > 0.0,
+            Shape::Flat | Shape::Strip(_) => {
+                (b[0] - a[0]) * (x[0] - a[0]) + (b[1] - a[1]) * (x[1] - a[1]) > 0.0
+            }
             Shape::Central | Shape::Capped { .. } => {
                 let [a, b, x] = [a, b, x].map(|s| Vector::from(*s));
                 a.cross(&b).dot(&a.cross(&x)) > 0.0
@@ -256,7 +280,7 @@ impl Chart {
                 let ([b0, b1], [x0, x1]) = (step(b), step(x));
                 b0 * x0 + b1 * x1 > 0.0
             }
-            Shape::Straight | Shape::Conic { .. } => {
+            Shape::Straight | Shape::Conic { .. } | Shape::Hose(_) => {
                 if a[2] != 0.0 {
                     return true;
                 }
@@ -277,13 +301,13 @@ impl Chart {
         // Irrational fractions keep the start off the places that people put things at.
         let shift = (0.137_213_1 + f64::from(attempt) * 0.618_033_988_749).fract();
         match self.shape {
-            Shape::Flat => Start { sites: Vec::new(), triangles: Vec::new() },
+            Shape::Flat | Shape::Strip(_) => Start { sites: Vec::new(), triangles: Vec::new() },
             Shape::Central | Shape::Capped { .. } => icosahedron(shift),
             Shape::Around { major } => torus_grid(shift, major / self.radii[0]),
             Shape::Tube { profile } => {
                 torus_grid(shift, profile.center[0] / profile.radii[0].max(profile.radii[1]))
             }
-            Shape::Straight | Shape::Conic { .. } => {
+            Shape::Straight | Shape::Conic { .. } | Shape::Hose(_) => {
                 let margin = 1.0 + (heights[1] - heights[0]);
                 let apex = self.apex_pole();
                 let height = if apex < 0.0 { heights[1] + margin } else { heights[0] - margin };
@@ -318,7 +342,17 @@ impl Chart {
                     if level > 0.0 { [site[0], site[1]].map(|c| c / level * distance) } else { [0.0; 2] };
                 [x, y, height]
             }
+            Shape::Strip(sweep) => {
+                let (normal, t) = (line_normal(&sweep), site[1]);
+                let Section::Line { offset, .. } = sweep.section else { return None };
+                let at = [offset * normal[0] - t * normal[1], offset * normal[1] + t * normal[0]];
+                return Some(sweep.place(site[0] / sweep.radius, at));
+            }
             _ if site[2] != 0.0 => return None,
+            Shape::Hose(sweep) => {
+                let at = section_ellipse(&sweep).point(TAU * site[0]);
+                return Some(sweep.place(-site[1] / sweep.radius, at));
+            }
             Shape::Straight => {
                 let [x, y] = round(1.0);
                 [x, y, site[1]]
@@ -350,9 +384,26 @@ impl Chart {
                 let direction = (Vector::from(*a) + Vector::from(*b)).try_normalize(0.0)?;
                 [direction.x, direction.y, direction.z]
             }
+            Shape::Strip(_) => [0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1]), 0.0],
             Shape::Around { .. } | Shape::Tube { .. } => [half(0), half(1), 0.0],
-            Shape::Straight | Shape::Conic { .. } => [half(0), 0.5 * (a[1] + b[1]), 0.0],
+            Shape::Straight | Shape::Conic { .. } | Shape::Hose(_) => [half(0), 0.5 * (a[1] + b[1]), 0.0],
         })
+    }
+}
+
+/// The normal of the line that a strip's section is.
+fn line_normal(sweep: &Sweep) -> [f64; 2] {
+    match sweep.section {
+        Section::Line { normal, .. } => normal,
+        Section::Ellipse(_) => [0.0; 2],
+    }
+}
+
+/// The ellipse that a hose's section is.
+fn section_ellipse(sweep: &Sweep) -> Ellipse {
+    match sweep.section {
+        Section::Ellipse(ellipse) => ellipse,
+        Section::Line { .. } => Ellipse { center: [0.0; 2], axis: [1.0, 0.0], radii: [1.0; 2] },
     }
 }
 
@@ -409,7 +460,13 @@ mod tests {
             revolved(1.5),
             revolved(0.3),
             revolved(-0.3),
+            sweep(Section::Ellipse(Ellipse { center: [0.1, 0.0], axis: [0.6, 0.8], radii: [0.5, 0.4] })),
         ]
+    }
+
+    fn sweep(section: Section) -> Surface {
+        let (axis, start, up) = (Vector::z(), Vector::x(), Vector::new(0.48, 0.36, 0.8));
+        Surface::Sweep(Sweep { center: Point::new(0.3, 0.1, 0.2), axis, start, radius: 1.2, up, section })
     }
 
     fn revolved(distance: f64) -> Surface {
@@ -436,7 +493,8 @@ mod tests {
 
     #[test]
     fn a_small_triangle_turns_in_the_chart_as_it_does_in_space() {
-        for surface in surfaces() {
+        let strip = sweep(Section::Line { normal: [0.28, 0.96], offset: 0.2 });
+        for surface in surfaces().into_iter().chain([strip]) {
             for k in 0..40 {
                 let t = f64::from(k);
                 let near =

@@ -16,6 +16,7 @@ pub(crate) mod quadric;
 mod revolved;
 pub(crate) mod same;
 mod sphere;
+mod sweep;
 mod torus;
 
 pub use ellipse::Ellipse;
@@ -176,6 +177,38 @@ pub struct Revolved {
     /// The ellipse in coordinates (distance from the axis, height above `point`); what of it has a negative distance
     /// does not count.
     pub profile: Ellipse,
+}
+
+/// What bounds a section on one side, in the coordinates of the section's plane.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Section {
+    /// A line: where normal·x = offset; the inside is behind the normal.
+    Line {
+        /// Unit normal.
+        normal: [f64; 2],
+        /// Distance of the line from the origin, along the normal.
+        offset: f64,
+    },
+    /// An ellipse.
+    Ellipse(Ellipse),
+}
+
+/// What a section sweeps that moves along a circle in the plane across it, and turns there so that its y points along a
+/// fixed direction as far as that plane allows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sweep {
+    /// The centre of the circle.
+    pub center: Point,
+    /// Unit direction of its axis; the section moves counter-clockwise around it.
+    pub axis: Vector,
+    /// Unit direction from the centre to where angles are zero.
+    pub start: Vector,
+    /// The radius of the circle.
+    pub radius: f64,
+    /// Unit direction of the section's y, neither in the plane of the circle nor across it.
+    pub up: Vector,
+    /// The section; its x is along (the circle's direction) × y.
+    pub section: Section,
 }
 
 #[cfg(test)]

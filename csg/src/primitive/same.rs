@@ -1,7 +1,7 @@
 //! Whether two surfaces are the same set of points.
 
 use super::quadric::tangents;
-use super::{Ellipsoid, EllipticCone, EllipticCylinder, Nappe, Plane, Revolved, Torus};
+use super::{Ellipsoid, EllipticCone, EllipticCylinder, Nappe, Plane, Revolved, Section, Sweep, Torus};
 use crate::{Surface, Vector};
 use nalgebra::Matrix3;
 
@@ -55,6 +55,7 @@ pub fn same(a: &Surface, b: &Surface, tolerance: f64) -> Option<bool> {
             same_elliptic_cone(&a, &b, tolerance).then_some(true)
         }
         (Surface::Nappe(a), Surface::Nappe(b)) => same_nappe(&a, &b, tolerance).then_some(true),
+        (Surface::Sweep(a), Surface::Sweep(b)) => same_sweep(&a, &b, tolerance).then_some(true),
         (Surface::Revolved(a), Surface::Revolved(b)) => same_revolved(&a, &b, tolerance).then_some(true),
         _ => None,
     }
@@ -103,6 +104,27 @@ fn same_nappe(a: &Nappe, b: &Nappe, tolerance: f64) -> bool {
     let slopes = |c: &Nappe| c.axis * c.slope;
     (a.apex() - b.apex()).norm() <= tolerance
         && (slopes(a) - slopes(b)).norm() <= SAME_DIRECTION * slopes(a).norm()
+}
+
+/// Those that run the same way only; of others nobody would say that they are the same.
+fn same_sweep(a: &Sweep, b: &Sweep, tolerance: f64) -> bool {
+    let near = |[p, q]: [f64; 2], [r, s]: [f64; 2], room: f64| (p - r).abs() <= room && (q - s).abs() <= room;
+    let sections = match (&a.section, &b.section) {
+        (Section::Line { normal, offset }, Section::Line { normal: other, offset: further }) => {
+            near(*normal, *other, SAME_DIRECTION) && (offset - further).abs() <= tolerance
+        }
+        (Section::Ellipse(e), Section::Ellipse(f)) => {
+            near(e.center, f.center, tolerance)
+                && near(e.radii, f.radii, tolerance)
+                && near(e.axis, f.axis, SAME_DIRECTION)
+        }
+        _ => false,
+    };
+    sections
+        && (a.center - b.center).norm() <= tolerance
+        && (a.radius - b.radius).abs() <= tolerance
+        && (a.axis - b.axis).norm() <= SAME_DIRECTION
+        && (a.up - b.up).norm() <= SAME_DIRECTION
 }
 
 fn same_revolved(a: &Revolved, b: &Revolved, tolerance: f64) -> bool {

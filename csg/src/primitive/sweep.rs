@@ -146,13 +146,15 @@ impl Primitive for Sweep {
     fn gradient(&self, point: &Point) -> Vector {
         let a = self.across(point);
         let [gx, gy] = self.section.gradient(a.at);
-        let round = if a.distance > 0.0 { a.turns[0] * (gy * a.at[0] - gx * a.at[1]) / a.distance } else { 0.0 };
+        let round =
+            if a.distance > 0.0 { a.turns[0] * (gy * a.at[0] - gx * a.at[1]) / a.distance } else { 0.0 };
         a.outward * (gx * a.cos + gy * a.sin) + self.axis * (gy * a.cos - gx * a.sin) + a.along * round
     }
 
     /// By the chain rule in cylinder coordinates.
     fn hessian(&self, point: &Point) -> Matrix3<f64> {
-        let Across { outward, along, distance, cos, sin, turns: [turn, bend], at: [x, y] } = self.across(point);
+        let Across { outward, along, distance, cos, sin, turns: [turn, bend], at: [x, y] } =
+            self.across(point);
         if distance == 0.0 {
             return Matrix3::zeros();
         }
@@ -176,12 +178,17 @@ impl Primitive for Sweep {
         largest_curvature(&self.gradient(point), &self.hessian(point))
     }
 
+    /// The nearest point if the point is near to the surface; else the nearest one in the plane across the circle will do.
+    ///
     /// From the nearest point in the plane across the circle by Newton's method for the point and the multiplier λ in
     /// x + λ ∇f(x) = p, f(x) = 0.
     fn project(&self, point: &Point) -> Result<Point, ProjectionFailed> {
         const STEPS: usize = 20;
+        /// The rest of the equations, as a part of the radius, of what counts as a solution.
+        const SOLVED: f64 = 1e-10;
         let (angle, at) = self.coordinates(point);
-        let mut foot = self.place(angle, self.section.nearest(at));
+        let across = self.place(angle, self.section.nearest(at));
+        let mut foot = across;
         let gradient = self.gradient(&foot);
         let mut factor = (point - foot).dot(&gradient) / gradient.norm_squared();
         let mut best = f64::INFINITY;
@@ -202,7 +209,8 @@ impl Primitive for Sweep {
             foot += step.xyz();
             factor += step.w;
         }
-        if foot.coords.iter().all(|x| x.is_finite()) { Ok(foot) } else { Err(ProjectionFailed(*point)) }
+        let is_better = (point - foot).norm() <= (point - across).norm() && best <= SOLVED * self.radius;
+        Ok(if is_better { foot } else { across })
     }
 
     fn natural_range(&self, cell: &Cell) -> Interval {

@@ -28,11 +28,19 @@ fn straight() -> Vec<Surface> {
         Surface::Nappe(Nappe { point: o, axis: z, radius: 0.7, slope: 0.4 }),
         Surface::Revolved(Revolved { point: o, axis: z, profile: ellipse([0.9, 0.1], [0.5, 0.3]) }),
         Surface::Revolved(Revolved { point: o, axis: z, profile: ellipse([0.2, 0.0], [0.5, 0.8]) }),
+        sweep(Section::Line { normal: [0.28, 0.96], offset: 0.2 }),
+        sweep(Section::Ellipse(ellipse([0.1, 0.0], [0.5, 0.4]))),
     ]
 }
 
 fn ellipse(center: [f64; 2], radii: [f64; 2]) -> Ellipse {
     Ellipse { center, axis: [0.8, 0.6], radii }
+}
+
+/// Along a circle about the origin.
+fn sweep(section: Section) -> Surface {
+    let (axis, start, up) = (Vector::z(), Vector::x(), Vector::new(0.48, 0.36, 0.8));
+    Surface::Sweep(Sweep { center: Point::origin(), axis, start, radius: 1.2, up, section })
 }
 
 fn surface() -> impl Strategy<Value = Surface> {
@@ -52,6 +60,7 @@ fn on_torus_axis(surface: &Surface, point: &Point) -> bool {
         Surface::Torus(t) => (t.center, t.axis),
         Surface::Nappe(n) => (n.point, n.axis),
         Surface::Revolved(r) => (r.point, r.axis),
+        Surface::Sweep(s) => (s.center, s.axis),
         _ => return false,
     };
     (point - center).cross(&axis).norm() < 0.05
@@ -86,6 +95,8 @@ proptest! {
     fn no_other_point_of_the_surface_is_nearer_than_the_projection(
         s in surface(), p in point(), others in prop::collection::vec(point(), 40),
     ) {
+        // The swept ones find it from nearby only.
+        prop_assume!(!matches!(s, Surface::Sweep(_)) || (s.distance(&p) < 0.2 && !on_torus_axis(&s, &p)));
         let q = s.project(&p).unwrap();
         for other in others {
             // Points near the foot are the dangerous ones, and far ones show a wrong branch.

@@ -10,7 +10,7 @@ use super::conic::{Arc, Piece, SpaceEllipse};
 use super::primitive::Shape;
 use super::profile::{Bound, Profile, formula};
 use super::swept::{Assembly, NO_FACE, SweepError, Turn};
-use crate::primitive::{Cylinder, Ellipse, EllipticCylinder};
+use crate::primitive::{Cylinder, Ellipse, EllipticCylinder, Section, Sweep, Torus};
 use crate::{Point, Solid, Surface, Vector};
 
 /// The sine of the angle up to which the tangents of two pieces of a path are the same: decimals typed with six digits.
@@ -127,9 +127,15 @@ fn along_arc(
     let [x, y] = frame(tangent, up)?;
     let height = up.dot(&axis).abs();
     if height > RIGID && height < 1.0 - RIGID {
-        let message =
-            format!("segment {} of the path turns the profile, which cannot be meshed yet", index + 1);
-        return Err(SweepError::Unsupported(message));
+        let circle = Sweep {
+            center: Point::from(ellipse.center),
+            axis,
+            start: outward,
+            radius,
+            up,
+            section: Section::Line { normal: [1.0, 0.0], offset: 0.0 },
+        };
+        return turning(into, index, profile, circle);
     }
     // Where the direction lies in the plane of the arc, y' changes sides where the path runs along it.
     let end = (points[2] - points[1]).normalize();
@@ -146,11 +152,14 @@ fn along_arc(
         let v = x * p[0] + y * p[1];
         [v.dot(&axis), radius + v.dot(&outward)]
     };
-    let size = radius.max(extent(profile));
+    let size = radius.max(profile.reach);
     let turn = Turn { point: ellipse.center, axis, tolerance: 1e-9 * size };
     let reaches_axis = |bound: &Bound| match bound {
         Bound::Left(from, to) => place(*from)[1].min(place(*to)[1]) <= turn.tolerance,
-        Bound::Inside(_) => false,
+        Bound::Inside(ellipse) => {
+            let whole = profile.literals.len() == 1;
+            whole && place(ellipse.center)[1] - ellipse.radii[0].max(ellipse.radii[1]) <= turn.tolerance
+        }
     };
     if profile.literals.iter().any(|literal| reaches_axis(&literal.bound)) {
         let message = format!("the profile reaches the centre of segment {} of the path", index + 1);
@@ -172,11 +181,32 @@ fn along_arc(
     Ok(vec![inside])
 }
 
-/// The largest coordinate of the profile.
-fn extent(profile: &Profile) -> f64 {
-    let each = profile.literals.iter().map(|literal| match literal.bound {
-        Bound::Left([a, b], [c, d]) => [a, b, c, d].into_iter().fold(0.0, |m: f64, x| m.max(x.abs())),
-        Bound::Inside(Ellipse { center: [a, b], radii: [r, s], .. }) => a.abs().max(b.abs()) + r.max(s),
-    });
-    each.fold(0.0, f64::max)
+/// What a profile sweeps that turns about the path on its way.
+fn turning(
+    into: &mut Assembly,
+    index: usize,
+    profile: &Profile,
+    circle: Sweep,
+) -> Result<Vec<Solid>, SweepError> {
+    let reach = profile.reach;
+    if reach >= 0.9 * circle.radius {
+        let message =
+            format!("the profile is too wide for segment {} of the path, which turns it", index + 1);
+        return Err(SweepError::Unsupported(message + ": it reaches too near to the centre of that arc"));
+    }
+    let inside = into.sweep(profile, |into, bound, face| {
+        let section = match *bound {
+            Bound::Left([a, b], [c, d]) => {
+                let length = (c - a).hypot(d - b);
+                let normal = [(d - b) / length, (a - c) / length];
+                Section::Line { normal, offset: 0.5 * (normal[0] * (a + c) + normal[1] * (b + d)) }
+            }
+            Bound::Inside(ellipse) => Section::Ellipse(ellipse),
+        };
+        Ok(into.side(Surface::Sweep(Sweep { section, ..circle }), false, face))
+    })?;
+    // All is inside this torus. Near the axis, where the section's sides come from all directions, nothing is.
+    let minor = f64::min(1.25 * reach, 0.5 * (reach + circle.radius));
+    let around = Torus { center: circle.center, axis: circle.axis, major: circle.radius, minor };
+    Ok(vec![into.side(Surface::Torus(around), false, NO_FACE), inside])
 }

@@ -35,6 +35,8 @@ pub(super) enum Bound {
 pub(super) struct Profile {
     pub literals: Vec<Literal>,
     pub inside: Solid,
+    /// How far from the origin it reaches at most.
+    pub reach: f64,
 }
 
 /// What is wrong with a profile.
@@ -70,7 +72,9 @@ pub(super) fn formula(pieces: &[Piece], by_axis: bool) -> Result<Profile, Profil
     let cutter = Cutter { by_axis, tolerance: SAME * size };
     if let Some(ellipse) = cutter.whole_ellipse(pieces) {
         let literals = vec![Literal { bound: Bound::Inside(ellipse), segment: 0 }];
-        return Ok(Profile { literals, inside: half(0) });
+        let [x, y] = ellipse.center;
+        let reach = x.hypot(y) + ellipse.radii[0].max(ellipse.radii[1]);
+        return Ok(Profile { literals, inside: half(0), reach });
     }
     let mut edges = cutter.edges(pieces)?;
     while let Some([i, j]) = cutter.conflict(&edges) {
@@ -333,7 +337,9 @@ impl Builder<'_> {
             removed.insert(0, inside);
             inside = Solid::And(removed);
         }
-        Profile { literals: self.literals, inside }
+        // The hulls have the arcs in them.
+        let reach = self.edges.iter().flat_map(|e| &e.hull).map(|p| p.norm()).fold(0.0, f64::max);
+        Profile { literals: self.literals, inside, reach }
     }
 
     fn literal(&mut self, bound: Bound, segment: usize) -> Solid {
