@@ -9,5 +9,6 @@ mod mpirun_comm;
 mod quality;
 mod ranks;
 mod readers;
+mod swept;
 mod tutorials;
 mod writers;

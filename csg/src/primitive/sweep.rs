@@ -196,7 +196,7 @@ impl Primitive for Sweep {
             let (gradient, hessian) = (self.gradient(&foot), self.hessian(&foot));
             let lack = point - foot - gradient * factor;
             let rest = lack.norm().max(self.value(&foot).abs());
-            if !(rest < 0.5 * best) {
+            if rest.is_nan() || rest >= 0.5 * best {
                 break;
             }
             best = rest;
