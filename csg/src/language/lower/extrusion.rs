@@ -25,6 +25,7 @@ pub(super) fn shape(path: &[Piece], profile: &[Piece], up: Vector) -> Result<Sha
     check_path(path)?;
     let profile = formula(profile, false)?;
     let up = up.normalize();
+    refuse_turning_joints(path, up)?;
     let mut assembly = Assembly::default();
     let mut members = Vec::new();
     for (index, piece) in path.iter().enumerate() {
@@ -58,6 +59,32 @@ fn check_path(path: &[Piece]) -> Result<(), SweepError> {
         return Err(SweepError::Wrong(message, "its points are distinct"));
     }
     Ok(())
+}
+
+/// Where an arc that turns the profile goes on in another piece, the surfaces of both touch along the whole joint, some to
+/// third order: such joints are not told apart.
+fn refuse_turning_joints(path: &[Piece], up: Vector) -> Result<(), SweepError> {
+    let turns = |piece: &Piece| match piece {
+        Piece::Line(_) => false,
+        Piece::Arc(arc) => {
+            let [p, q, r] = arc.points;
+            is_turning((q - p).cross(&(r - q)).normalize(), up)
+        }
+    };
+    match path.iter().position(turns).filter(|_| path.len() > 1) {
+        Some(index) => Err(SweepError::Unsupported(format!(
+            "segment {} of the path turns the profile, which cannot be meshed yet in a path of several segments: its plane \
+             is neither across the direction of the profile's y nor along it",
+            index + 1
+        ))),
+        None => Ok(()),
+    }
+}
+
+/// Whether a profile with its y along `up` turns about the path on an arc around this axis.
+fn is_turning(axis: Vector, up: Vector) -> bool {
+    let height = up.dot(&axis).abs();
+    height > RIGID && height < 1.0 - RIGID
 }
 
 /// The directions of the profile's x and y at a point of the path.
@@ -125,8 +152,7 @@ fn along_arc(
     let tangent = (points[1] - points[0]).normalize();
     let axis = outward.cross(&tangent).normalize();
     let [x, y] = frame(tangent, up)?;
-    let height = up.dot(&axis).abs();
-    if height > RIGID && height < 1.0 - RIGID {
+    if is_turning(axis, up) {
         let circle = Sweep {
             center: Point::from(ellipse.center),
             axis,
