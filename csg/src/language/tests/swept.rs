@@ -198,3 +198,21 @@ fn thin_shells_between_arcs_have_their_arcs_halved() {
     assert_is(&geometry, |p| is_in(&fine, [p.x, p.y.hypot(p.z)]));
     assert_eq!(geometry.surfaces.iter().filter(|s| matches!(s, Surface::Revolved(_))).count(), 2);
 }
+
+#[test]
+fn a_list_of_numbers_has_one_for_each_segment_of_the_profile() {
+    let square = polygon(&[[-1., 1.], [1., 1.], [1., 2.], [-1., 2.]], true);
+    let ring = geometry(&format!("{square} solid s = revolution (0,0,0; 1,0,0; p) -bc=[1,2,3,4]; tlo s;"));
+    let number = |geometry: &Geometry, is: fn(&Surface) -> bool| {
+        let index = geometry.surfaces.iter().position(is).expect("a surface of this kind");
+        geometry.surface_info[index].bc
+    };
+    assert_eq!(number(&ring, |s| matches!(s, Surface::Cylinder(c) if c.radius == 1.0)), Some(1));
+    assert_eq!(number(&ring, |s| matches!(s, Surface::Plane(p) if p.point.x == 1.0)), Some(2));
+    assert_eq!(number(&ring, |s| matches!(s, Surface::Cylinder(c) if c.radius == 2.0)), Some(3));
+    // The planes across the ends of a path have none.
+    let path = "curve3d q = (2; 0,0,0; 0,0,5; 1; 2,1,2);";
+    let bar = geometry(&format!("{path} {square} solid s = extrusion (q; p; 0,1,0) -bc=[1,2,3,4]; tlo s;"));
+    assert_eq!(bar.surfaces.len(), 6);
+    assert_eq!(bar.surface_info.iter().filter(|info| info.bc.is_none()).count(), 2);
+}
