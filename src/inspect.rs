@@ -173,6 +173,9 @@ fn kind(surface: &csg::Surface) -> &'static str {
         csg::Surface::Ellipsoid(_) => "ellipsoid",
         csg::Surface::EllipticCylinder(_) => "elliptic cylinder",
         csg::Surface::EllipticCone(_) => "elliptic cone",
+        csg::Surface::Nappe(_) => "nappe of a cone",
+        csg::Surface::Revolved(_) => "turned ellipse",
+        csg::Surface::Sweep(_) => "section moved along a circle",
     }
 }
 

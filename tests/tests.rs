@@ -11,5 +11,6 @@ mod quality;
 mod ranks;
 mod readers;
 mod samples;
+mod swept;
 mod tutorials;
 mod writers;

@@ -1,6 +1,9 @@
 //! Projection of points to patches and curves: all that refinement needs to know of a geometry.
 
-use crate::primitive::{Cone, Cylinder, Ellipsoid, EllipticCone, EllipticCylinder, Plane, Sphere, Torus};
+use crate::primitive::{
+    Cone, Cylinder, Ellipse, Ellipsoid, EllipticCone, EllipticCylinder, Nappe, Plane, Revolved, Section,
+    Sphere, Sweep, Torus,
+};
 use crate::{CurveId, Features, Geometry, PatchId, Point, Surface, SurfaceId, Vector};
 
 /// A projection that did not converge.
@@ -210,7 +213,23 @@ fn encode_surface(surface: &Surface, out: &mut Vec<f64>) {
         Surface::EllipticCone(e) => {
             put(7, &[e.point.coords, e.axes[0], e.axes[1], e.axis], &[e.radii[0], e.radii[1], e.rate]);
         }
+        Surface::Nappe(c) => put(8, &[c.point.coords, c.axis], &[c.radius, c.slope]),
+        Surface::Revolved(r) => put(9, &[r.point.coords, r.axis], &ellipse_numbers(&r.profile)),
+        Surface::Sweep(s) => {
+            let vectors = [s.center.coords, s.axis, s.start, s.up];
+            match s.section {
+                Section::Line { normal: [x, y], offset } => put(10, &vectors, &[s.radius, x, y, offset]),
+                Section::Ellipse(e) => {
+                    let [a, b, c, d, e, f] = ellipse_numbers(&e);
+                    put(11, &vectors, &[s.radius, a, b, c, d, e, f]);
+                }
+            }
+        }
     }
+}
+
+fn ellipse_numbers(e: &Ellipse) -> [f64; 6] {
+    [e.center[0], e.center[1], e.axis[0], e.axis[1], e.radii[0], e.radii[1]]
 }
 
 /// Takes numbers off the front of a slice.
@@ -235,6 +254,11 @@ impl Reader<'_> {
 
     fn point(&mut self) -> Option<Point> {
         self.vector().map(Point::from)
+    }
+
+    fn ellipse(&mut self) -> Option<Ellipse> {
+        let mut pair = || Some([self.number()?, self.number()?]);
+        Some(Ellipse { center: pair()?, axis: pair()?, radii: pair()? })
     }
 
     fn surface(&mut self) -> Option<Surface> {
@@ -275,6 +299,28 @@ impl Reader<'_> {
                 radii: [self.number()?, self.number()?],
                 rate: self.number()?,
             }),
+            8 => Surface::Nappe(Nappe {
+                point: self.point()?,
+                axis: self.vector()?,
+                radius: self.number()?,
+                slope: self.number()?,
+            }),
+            9 => Surface::Revolved(Revolved {
+                point: self.point()?,
+                axis: self.vector()?,
+                profile: self.ellipse()?,
+            }),
+            kind @ (10 | 11) => {
+                let center = self.point()?;
+                let [axis, start, up] = [self.vector()?, self.vector()?, self.vector()?];
+                let radius = self.number()?;
+                let section = if kind == 10 {
+                    Section::Line { normal: [self.number()?, self.number()?], offset: self.number()? }
+                } else {
+                    Section::Ellipse(self.ellipse()?)
+                };
+                Surface::Sweep(Sweep { center, axis, start, radius, up, section })
+            }
             _ => return None,
         })
     }
@@ -349,13 +395,26 @@ mod tests {
                 axis: axes[2],
                 rate: -0.25,
             }),
+            Surface::Nappe(Nappe { point: o, axis: axes[0], radius: 1.0, slope: 0.5 }),
+            Surface::Revolved(Revolved {
+                point: o,
+                axis: axes[1],
+                profile: Ellipse { center: [3.0, 0.5], axis: [0.6, 0.8], radii: [1.0, 2.0] },
+            }),
         ]);
+        let sections = [
+            Section::Line { normal: [0.6, 0.8], offset: 0.3 },
+            Section::Ellipse(Ellipse { center: [0.1, 0.2], axis: [0.6, 0.8], radii: [1.0, 2.0] }),
+        ];
+        let [axis, start, up] = [axes[2], axes[0], Vector::new(0.6, 0.0, 0.8)];
+        let sweep = |section| Surface::Sweep(Sweep { center: o, axis, start, radius: 5.0, up, section });
+        projector.surfaces.extend(sections.map(sweep));
         let numbers = projector.encode();
         assert_eq!(Projector::decode(&numbers), Some(projector));
         assert_eq!(Projector::decode(&numbers[..numbers.len() - 1]), None);
         assert_eq!(Projector::decode(&[&numbers[..], &[0.0]].concat()), None);
         let mut wrong = numbers.clone();
-        wrong[4] = 9.0;
+        wrong[4] = 99.0;
         assert_eq!(Projector::decode(&wrong), None);
     }
 }

@@ -3,7 +3,8 @@
 use crate::interval::{Cell, middle, offset};
 use crate::primitive::quadric::polish;
 use crate::primitive::{
-    Cone, Cylinder, Ellipsoid, EllipticCone, EllipticCylinder, Plane, Primitive, Sphere, Torus, same,
+    Cone, Cylinder, Ellipsoid, EllipticCone, EllipticCylinder, Nappe, Plane, Primitive, Revolved, Sphere,
+    Sweep, Torus, same,
 };
 use crate::{Interval, Point, ProjectionFailed, Vector};
 use nalgebra::{Isometry3, Matrix3};
@@ -27,6 +28,12 @@ pub enum Surface {
     EllipticCylinder(EllipticCylinder),
     /// A double cone over an ellipse.
     EllipticCone(EllipticCone),
+    /// One nappe of a circular cone.
+    Nappe(Nappe),
+    /// An ellipse turned about an axis in its plane.
+    Revolved(Revolved),
+    /// A line or an ellipse moved along a circle and turned on the way.
+    Sweep(Sweep),
 }
 
 /// Asks the primitive inside the surface.
@@ -41,6 +48,9 @@ macro_rules! ask {
             Surface::Ellipsoid($primitive) => $answer,
             Surface::EllipticCylinder($primitive) => $answer,
             Surface::EllipticCone($primitive) => $answer,
+            Surface::Nappe($primitive) => $answer,
+            Surface::Revolved($primitive) => $answer,
+            Surface::Sweep($primitive) => $answer,
         }
     };
 }
@@ -96,6 +106,7 @@ impl Surface {
             Self::Sphere(s) => Some(s.center + direction * s.radius),
             Self::Torus(t) => Some(t.support(direction)),
             Self::Ellipsoid(e) => Some(e.support(direction)),
+            Self::Revolved(r) => r.support(direction),
             _ => None,
         }
     }
@@ -119,6 +130,7 @@ impl Surface {
         match self {
             Self::Cone(c) => Some(c.apex()),
             Self::EllipticCone(c) => Some(c.apex()),
+            Self::Nappe(c) => Some(c.apex()),
             _ => None,
         }
     }
@@ -161,6 +173,9 @@ impl Surface {
             Self::Ellipsoid(p) => Self::Ellipsoid(p.transformed(motion)),
             Self::EllipticCylinder(p) => Self::EllipticCylinder(p.transformed(motion)),
             Self::EllipticCone(p) => Self::EllipticCone(p.transformed(motion)),
+            Self::Nappe(p) => Self::Nappe(p.transformed(motion)),
+            Self::Revolved(p) => Self::Revolved(p.transformed(motion)),
+            Self::Sweep(p) => Self::Sweep(p.transformed(motion)),
         }
     }
 

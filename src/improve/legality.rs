@@ -86,6 +86,7 @@ impl GeometrySmoothness<'_> {
         let apex = match surface {
             Surface::Cone(c) => Some((c.point - c.axis * (c.radius / c.slope), c.radius)),
             Surface::EllipticCone(c) => Some((c.point - c.axis / c.rate, c.radii[0].min(c.radii[1]))),
+            Surface::Nappe(c) => Some((c.apex(), c.radius)),
             _ => None,
         };
         if apex.is_some_and(|(apex, radius)| (at - apex).norm() <= APEX_RADIUS * radius) {

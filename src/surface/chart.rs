@@ -9,12 +9,20 @@
 //!   surface project to them exactly, so the sign is that of a tet with the centre.
 //! * **Unrolled** (cylinders, one nappe of a cone, tori): the turn about the axis, kept in multiples of 2⁻⁵⁰ so that
 //!   differences modulo one turn are exact, and a height; with two symbolic **poles** infinitely far up and down,
-//!   one of which is the apex of a cone. On the torus the height is a turn too.
+//!   one of which is the apex of a cone. On the torus and on other turned ellipses the height is a turn too.
+//! * **Capped** (turned ellipses that meet their axis): as central, with latitudes from pole to pole in proportion to the
+//!   parameter of the ellipse.
+//! * **Swept** (sections moved along a circle): flat where the section is a line, with the angle along the circle and the
+//!   place on the line; unrolled where it is an ellipse, with its parameter as turn and the angle as height.
 
 use crate::kernel::predicates::{Sign, orient2d, orient3d};
 use crate::{Point, Vector};
 use csg::Surface;
-use std::f64::consts::TAU;
+use csg::primitive::{Ellipse, Section, Sweep};
+use start::{Start, bipyramid, icosahedron, torus_grid};
+use std::f64::consts::{FRAC_PI_2, TAU};
+
+mod start;
 
 /// Where a point lies in a chart.
 ///
@@ -49,14 +57,20 @@ enum Shape {
     Around {
         major: f64,
     },
-}
-
-/// What the triangulation of a whole sheet begins with.
-pub(super) struct Start {
-    /// The sites of its vertices.
-    pub sites: Vec<Site>,
-    /// Its triangles, counter-clockwise.
-    pub triangles: Vec<[u32; 3]>,
+    /// An ellipse, in coordinates (distance from the axis, height), that turns about an axis clear of it.
+    Tube {
+        profile: Ellipse,
+    },
+    /// One that meets the axis: the parameter of the middle of what is off it, and from there to the poles.
+    Capped {
+        profile: Ellipse,
+        middle: f64,
+        half: f64,
+    },
+    /// A line moved along a circle.
+    Strip(Sweep),
+    /// An ellipse moved along a circle.
+    Hose(Sweep),
 }
 
 /// Which sheets a surface has: one, but the two nappes of a cone.
@@ -72,6 +86,7 @@ pub(super) fn nappe(surface: &Surface, point: &Point) -> f64 {
     let (along, apex) = match surface {
         Surface::Cone(c) => (c.axis * c.slope.signum(), c.apex()),
         Surface::EllipticCone(c) => (c.axis * c.rate.signum(), c.apex()),
+        Surface::Nappe(c) => (c.axis * c.slope.signum(), c.apex()),
         _ => return 1.0,
     };
     if is_apex(surface, point) { 0.0 } else { (point - apex).dot(&along).signum() }
@@ -84,6 +99,7 @@ fn is_apex(surface: &Surface, point: &Point) -> bool {
     let (apex, length) = match surface {
         Surface::Cone(c) => (c.apex(), c.radius.abs().max((c.radius / c.slope).abs())),
         Surface::EllipticCone(c) => (c.apex(), c.radii[0].max(c.radii[1]).max(1.0 / c.rate.abs())),
+        Surface::Nappe(c) => (c.apex(), c.radius.max((c.radius / c.slope).abs())),
         _ => return false,
     };
     (point - apex).norm() <= APEX * (length + apex.coords.amax())
@@ -134,22 +150,43 @@ impl Chart {
                 }
             }
             Surface::Torus(t) => round(t.center, &t.axis, t.minor, Shape::Around { major: t.major }),
+            Surface::Nappe(c) => {
+                round(c.point, &c.axis, c.radius, Shape::Conic { rate: c.slope / c.radius, nappe })
+            }
+            Surface::Revolved(r) => {
+                let profile = r.profile;
+                let shape = match profile.right_part() {
+                    None => Shape::Tube { profile },
+                    Some((middle, half)) => Shape::Capped { profile, middle, half },
+                };
+                round(r.point, &r.axis, 1.0, shape)
+            }
+            Surface::Sweep(s) => {
+                let shape = match s.section {
+                    Section::Line { .. } => Shape::Strip(*s),
+                    Section::Ellipse(_) => Shape::Hose(*s),
+                };
+                round(s.center, &s.axis, 1.0, shape)
+            }
         }
     }
 
-    /// Whether it is flat: sites are plane coordinates.
+    /// Whether it is flat: sites are coordinates in a plane, though the surface may be bent.
     pub fn is_flat(&self) -> bool {
-        self.shape == Shape::Flat
+        matches!(self.shape, Shape::Flat | Shape::Strip(_))
     }
 
     /// Whether its surface is closed, so that vertices of a start are points of it.
     pub fn is_closed(&self) -> bool {
-        matches!(self.shape, Shape::Central | Shape::Around { .. })
+        matches!(
+            self.shape,
+            Shape::Central | Shape::Around { .. } | Shape::Tube { .. } | Shape::Capped { .. }
+        )
     }
 
     /// Whether a site is a pole.
     pub fn is_pole(&self, site: &Site) -> bool {
-        matches!(self.shape, Shape::Straight | Shape::Conic { .. }) && site[2] != 0.0
+        matches!(self.shape, Shape::Straight | Shape::Conic { .. } | Shape::Hose(_)) && site[2] != 0.0
     }
 
     /// The pole that stands for the apex of a cone: 1 above, −1 below.
@@ -175,6 +212,23 @@ impl Chart {
                 let radial = x.hypot(y) - major / self.radii[0];
                 [turn(x, y), turn(radial, z / self.radii[0]), 0.0]
             }
+            Shape::Tube { profile } => [turn(x, y), on_grid(profile.angle([x.hypot(y), z])), 0.0],
+            Shape::Capped { profile, middle, half } => {
+                let distance = x.hypot(y);
+                let along = wrap((profile.angle([distance, z]) - middle) / TAU) * TAU;
+                let (sin, cos) = ((along / half).clamp(-1.0, 1.0) * FRAC_PI_2).sin_cos();
+                let [x, y] = if distance > 0.0 { [x, y].map(|c| c / distance * cos) } else { [0.0; 2] };
+                [x, y, sin]
+            }
+            Shape::Strip(sweep) => {
+                let (angle, [x, y]) = sweep.coordinates(point);
+                let normal = line_normal(&sweep);
+                [angle * sweep.radius, normal[0] * y - normal[1] * x, 0.0]
+            }
+            Shape::Hose(sweep) => {
+                let (angle, at) = sweep.coordinates(point);
+                [on_grid(section_ellipse(&sweep).angle(at)), -angle * sweep.radius, 0.0]
+            }
         }
     }
 
@@ -182,9 +236,11 @@ impl Chart {
     /// Negative too where three sites enclose no triangle because their edges together go round the axis.
     pub fn orient(&self, a: &Site, b: &Site, c: &Site) -> Sign {
         match self.shape {
-            Shape::Flat => orient2d([a[0], a[1]], [b[0], b[1]], [c[0], c[1]]),
-            Shape::Central => orient3d(&Point::origin(), &(*a).into(), &(*b).into(), &(*c).into()),
-            Shape::Around { .. } => {
+            Shape::Flat | Shape::Strip(_) => orient2d([a[0], a[1]], [b[0], b[1]], [c[0], c[1]]),
+            Shape::Central | Shape::Capped { .. } => {
+                orient3d(&Point::origin(), &(*a).into(), &(*b).into(), &(*c).into())
+            }
+            Shape::Around { .. } | Shape::Tube { .. } => {
                 let [(x1, y1), (x2, y2), (x3, y3)] =
                     [(a, b), (a, c), (b, c)].map(|(p, q)| (wrap(q[0] - p[0]), wrap(q[1] - p[1])));
                 let wide = [x1, x2, x3, y1, y2, y3].iter().any(|d| d.abs() >= 0.5);
@@ -193,7 +249,7 @@ impl Chart {
                 }
                 orient2d([0.0, 0.0], [x1, y1], [x2, y2])
             }
-            Shape::Straight | Shape::Conic { .. } => match [a[2], b[2], c[2]] {
+            Shape::Straight | Shape::Conic { .. } | Shape::Hose(_) => match [a[2], b[2], c[2]] {
                 [0.0, 0.0, 0.0] => {
                     let [x1, x2, x3] = [(a, b), (a, c), (b, c)].map(|(p, q)| wrap(q[0] - p[0]));
                     if [x1, x2, x3].iter().any(|d| d.abs() >= 0.5) || x2 - x1 != x3 {
@@ -212,17 +268,19 @@ impl Chart {
     /// Whether `x`, on the line through `a` and `b`, lies on the same side of `a` as `b`.
     pub fn ahead(&self, a: &Site, b: &Site, x: &Site) -> bool {
         match self.shape {
-            Shape::Flat => (b[0] - a[0]) * (x[0] - a[0]) + (b[1] - a[1]) * (x[1] - a[1]) > 0.0,
-            Shape::Central => {
+            Shape::Flat | Shape::Strip(_) => {
+                (b[0] - a[0]) * (x[0] - a[0]) + (b[1] - a[1]) * (x[1] - a[1]) > 0.0
+            }
+            Shape::Central | Shape::Capped { .. } => {
                 let [a, b, x] = [a, b, x].map(|s| Vector::from(*s));
                 a.cross(&b).dot(&a.cross(&x)) > 0.0
             }
-            Shape::Around { .. } => {
+            Shape::Around { .. } | Shape::Tube { .. } => {
                 let step = |p: &Site| [wrap(p[0] - a[0]), wrap(p[1] - a[1])];
                 let ([b0, b1], [x0, x1]) = (step(b), step(x));
                 b0 * x0 + b1 * x1 > 0.0
             }
-            Shape::Straight | Shape::Conic { .. } => {
+            Shape::Straight | Shape::Conic { .. } | Shape::Hose(_) => {
                 if a[2] != 0.0 {
                     return true;
                 }
@@ -243,10 +301,13 @@ impl Chart {
         // Irrational fractions keep the start off the places that people put things at.
         let shift = (0.137_213_1 + f64::from(attempt) * 0.618_033_988_749).fract();
         match self.shape {
-            Shape::Flat => Start { sites: Vec::new(), triangles: Vec::new() },
-            Shape::Central => icosahedron(shift),
+            Shape::Flat | Shape::Strip(_) => Start { sites: Vec::new(), triangles: Vec::new() },
+            Shape::Central | Shape::Capped { .. } => icosahedron(shift),
             Shape::Around { major } => torus_grid(shift, major / self.radii[0]),
-            Shape::Straight | Shape::Conic { .. } => {
+            Shape::Tube { profile } => {
+                torus_grid(shift, profile.center[0] / profile.radii[0].max(profile.radii[1]))
+            }
+            Shape::Straight | Shape::Conic { .. } | Shape::Hose(_) => {
                 let margin = 1.0 + (heights[1] - heights[0]);
                 let apex = self.apex_pole();
                 let height = if apex < 0.0 { heights[1] + margin } else { heights[0] - margin };
@@ -269,7 +330,29 @@ impl Chart {
                 let [x, y] = round(major / self.radii[0] + cos);
                 [x, y, sin * self.radii[0]]
             }
+            Shape::Tube { profile } => {
+                let [distance, height] = profile.point(TAU * site[1]);
+                let [x, y] = round(distance);
+                [x, y, height]
+            }
+            Shape::Capped { profile, middle, half } => {
+                let level = site[0].hypot(site[1]);
+                let [distance, height] = profile.point(middle + site[2].atan2(level) / FRAC_PI_2 * half);
+                let [x, y] =
+                    if level > 0.0 { [site[0], site[1]].map(|c| c / level * distance) } else { [0.0; 2] };
+                [x, y, height]
+            }
+            Shape::Strip(sweep) => {
+                let (normal, t) = (line_normal(&sweep), site[1]);
+                let Section::Line { offset, .. } = sweep.section else { return None };
+                let at = [offset * normal[0] - t * normal[1], offset * normal[1] + t * normal[0]];
+                return Some(sweep.place(site[0] / sweep.radius, at));
+            }
             _ if site[2] != 0.0 => return None,
+            Shape::Hose(sweep) => {
+                let at = section_ellipse(&sweep).point(TAU * site[0]);
+                return Some(sweep.place(-site[1] / sweep.radius, at));
+            }
             Shape::Straight => {
                 let [x, y] = round(1.0);
                 [x, y, site[1]]
@@ -297,13 +380,30 @@ impl Chart {
         let half = |i: usize| a[i] + 0.5 * wrap(b[i] - a[i]);
         self.point(&match self.shape {
             Shape::Flat => return None,
-            Shape::Central => {
+            Shape::Central | Shape::Capped { .. } => {
                 let direction = (Vector::from(*a) + Vector::from(*b)).try_normalize(0.0)?;
                 [direction.x, direction.y, direction.z]
             }
-            Shape::Around { .. } => [half(0), half(1), 0.0],
-            Shape::Straight | Shape::Conic { .. } => [half(0), 0.5 * (a[1] + b[1]), 0.0],
+            Shape::Strip(_) => [0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1]), 0.0],
+            Shape::Around { .. } | Shape::Tube { .. } => [half(0), half(1), 0.0],
+            Shape::Straight | Shape::Conic { .. } | Shape::Hose(_) => [half(0), 0.5 * (a[1] + b[1]), 0.0],
         })
+    }
+}
+
+/// The normal of the line that a strip's section is.
+fn line_normal(sweep: &Sweep) -> [f64; 2] {
+    match sweep.section {
+        Section::Line { normal, .. } => normal,
+        Section::Ellipse(_) => [0.0; 2],
+    }
+}
+
+/// The ellipse that a hose's section is.
+fn section_ellipse(sweep: &Sweep) -> Ellipse {
+    match sweep.section {
+        Section::Ellipse(ellipse) => ellipse,
+        Section::Line { .. } => Ellipse { center: [0.0; 2], axis: [1.0, 0.0], radii: [1.0; 2] },
     }
 }
 
@@ -323,7 +423,12 @@ fn wrap(turns: f64) -> f64 {
 
 /// The angle of (x, y) in turns from 0 to 1, on the grid.
 fn turn(x: f64, y: f64) -> f64 {
-    let turns = ((y.atan2(x) / TAU).rem_euclid(1.0) * TURN_GRID).round() / TURN_GRID;
+    on_grid(y.atan2(x))
+}
+
+/// An angle in turns from 0 to 1, on the grid.
+fn on_grid(angle: f64) -> f64 {
+    let turns = ((angle / TAU).rem_euclid(1.0) * TURN_GRID).round() / TURN_GRID;
     if turns >= 1.0 { 0.0 } else { turns }
 }
 
@@ -336,85 +441,10 @@ fn frame(normal: &Vector) -> [Vector; 2] {
     [x, normal.cross(&x)]
 }
 
-/// A ring of four vertices that marks the outside, between the two poles; vertex 4 is the pole of an apex if any.
-fn bipyramid(height: f64, shift: f64, apex: f64) -> Start {
-    let on_grid = |t: f64| (t.fract() * TURN_GRID).floor() / TURN_GRID;
-    let mut sites: Vec<Site> = (0..4).map(|k| [on_grid(shift + f64::from(k) * 0.25), height, 0.0]).collect();
-    let first = if apex == 0.0 { -1.0 } else { apex };
-    sites.push([0.0, 0.0, first]);
-    sites.push([0.0, 0.0, -first]);
-    let (up, down) = if first > 0.0 { (4, 5) } else { (5, 4) };
-    let triangles = (0..4).flat_map(|k| [[k, (k + 1) % 4, up], [(k + 1) % 4, k, down]]).collect();
-    Start { sites, triangles }
-}
-
-/// Rows of vertices around the axis, four of them around the tube, shifted against each other by half a step; as many in
-/// a row as make the triangles about as long as they are wide.
-fn torus_grid(shift: f64, ratio: f64) -> Start {
-    /// Nobody needs more; a tube thinner than that is cut where it matters.
-    const MOST: f64 = 10_000.0;
-    let on_grid = |t: f64| (t.fract() * TURN_GRID).floor() / TURN_GRID;
-    let count = (2.0 * (ratio + 1.0)).ceil().clamp(4.0, MOST) as u32;
-    let sites = (0..4 * count)
-        .map(|k| {
-            let (i, j) = (k % count, k / count);
-            let along = (f64::from(i) + 0.5 * f64::from(j % 2)) / f64::from(count);
-            [on_grid(shift + along), on_grid(0.7 * shift + f64::from(j) * 0.25), 0.0]
-        })
-        .collect();
-    let at = |i: u32, j: u32| (i % count) + count * (j % 4);
-    let mut triangles = Vec::new();
-    for j in 0..4 {
-        for i in 0..count {
-            // Odd rows stand half a step to the right.
-            let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i, j + 1), at(i + 1, j + 1)];
-            triangles.extend(if j % 2 == 0 { [[a, b, c], [b, d, c]] } else { [[a, d, c], [a, b, d]] });
-        }
-    }
-    Start { sites, triangles }
-}
-
-/// The icosahedron, turned.
-fn icosahedron(shift: f64) -> Start {
-    let g = 0.5 * (1.0 + 5.0_f64.sqrt());
-    let turned = nalgebra::Rotation3::from_euler_angles(TAU * shift, 1.0 + shift, 2.0 - shift);
-    let base = [[0.0, 1.0, g], [1.0, g, 0.0], [g, 0.0, 1.0]];
-    let mut corners: Vec<Vector> = Vec::new();
-    for [x, y, z] in base {
-        for (s, t) in [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)] {
-            // The zero coordinate keeps its place; the other two take both signs.
-            let v = if x == 0.0 {
-                [0.0, s * y, t * z]
-            } else if z == 0.0 {
-                [s * x, t * y, 0.0]
-            } else {
-                [s * x, 0.0, t * z]
-            };
-            corners.push(turned * (Vector::from(v) / (1.0 + g * g).sqrt()));
-        }
-    }
-    // Faces are the triples at mutual edge distance 2/√(1+g²), outward by the sign of their determinant.
-    let edge = 4.0 / (1.0 + g * g);
-    let close = |a: usize, b: usize| (corners[a] - corners[b]).norm_squared() < 1.2 * edge;
-    let mut triangles = Vec::new();
-    for a in 0..12 {
-        for b in a + 1..12 {
-            for c in b + 1..12 {
-                if close(a, b) && close(b, c) && close(c, a) {
-                    let outward = corners[a].dot(&corners[b].cross(&corners[c])) > 0.0;
-                    let [b, c] = if outward { [b, c] } else { [c, b] };
-                    triangles.push([a as u32, b as u32, c as u32]);
-                }
-            }
-        }
-    }
-    Start { sites: corners.iter().map(|v| [v.x, v.y, v.z]).collect(), triangles }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use csg::primitive::{Cone, Cylinder, Sphere, Torus};
+    use csg::primitive::{Cone, Cylinder, Nappe, Revolved, Sphere, Torus};
 
     fn surfaces() -> Vec<Surface> {
         let axis = Vector::new(1.0, 2.0, -0.5).normalize();
@@ -425,7 +455,23 @@ mod tests {
             Surface::Cone(Cone { point, axis, radius: 0.7, slope: 0.4 }),
             Surface::Cone(Cone { point, axis, radius: 0.7, slope: -0.4 }),
             Surface::Torus(Torus { center: point, axis, major: 2.0, minor: 0.5 }),
+            Surface::Nappe(Nappe { point, axis, radius: 0.7, slope: 0.4 }),
+            Surface::Nappe(Nappe { point, axis, radius: 0.7, slope: -0.4 }),
+            revolved(1.5),
+            revolved(0.3),
+            revolved(-0.3),
+            sweep(Section::Ellipse(Ellipse { center: [0.1, 0.0], axis: [0.6, 0.8], radii: [0.5, 0.4] })),
         ]
+    }
+
+    fn sweep(section: Section) -> Surface {
+        let (axis, start, up) = (Vector::z(), Vector::x(), Vector::new(0.48, 0.36, 0.8));
+        Surface::Sweep(Sweep { center: Point::new(0.3, 0.1, 0.2), axis, start, radius: 1.2, up, section })
+    }
+
+    fn revolved(distance: f64) -> Surface {
+        let profile = Ellipse { center: [distance, 0.1], axis: [0.8, 0.6], radii: [1.0, 0.6] };
+        Surface::Revolved(Revolved { point: Point::new(0.3, 0.1, 0.2), axis: Vector::z(), profile })
     }
 
     #[test]
@@ -447,7 +493,8 @@ mod tests {
 
     #[test]
     fn a_small_triangle_turns_in_the_chart_as_it_does_in_space() {
-        for surface in surfaces() {
+        let strip = sweep(Section::Line { normal: [0.28, 0.96], offset: 0.2 });
+        for surface in surfaces().into_iter().chain([strip]) {
             for k in 0..40 {
                 let t = f64::from(k);
                 let near =

@@ -129,6 +129,9 @@ fn huge_cube(geometry: &Geometry) -> Cell {
             Surface::Ellipsoid(e) => (e.center, e.radii.iter().copied().fold(0.0, f64::max)),
             Surface::EllipticCylinder(e) => (e.point, e.radii[0].max(e.radii[1])),
             Surface::EllipticCone(e) => (e.point, e.radii[0].max(e.radii[1]).max(1.0 / e.rate.abs())),
+            Surface::Nappe(c) => (c.point, c.radius.max((c.radius / c.slope).abs())),
+            Surface::Revolved(r) => (r.point, r.reach()),
+            Surface::Sweep(s) => (s.center, s.radius),
         })
         .collect();
     let mut hull = Aabb { min: Point::from([f64::INFINITY; 3]), max: Point::from([f64::NEG_INFINITY; 3]) };

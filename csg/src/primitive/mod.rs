@@ -6,14 +6,20 @@ use nalgebra::{Isometry3, Matrix3};
 
 mod cone;
 mod cylinder;
+mod ellipse;
 mod ellipsoid;
 mod elliptic_cone;
 mod elliptic_cylinder;
+mod nappe;
 mod plane;
 pub(crate) mod quadric;
+mod revolved;
 pub(crate) mod same;
 mod sphere;
+mod sweep;
 mod torus;
+
+pub use ellipse::Ellipse;
 
 /// What each primitive answers; [`Surface`](crate::Surface) documents the meaning.
 pub(crate) trait Primitive: Sized {
@@ -45,6 +51,14 @@ fn reject_range(arm: &Cell, axis: &Vector) -> Cell {
         let slack = 4.0 * f64::EPSILON * arm.iter().map(Interval::magnitude).fold(0.0, f64::max);
         dot(&row, arm) + Interval::new(-slack, slack)
     })
+}
+
+/// The range of the unit vectors along the vectors of a box, and that of their lengths; all unit vectors if zero is
+/// among them.
+fn direction_range(vectors: &Cell) -> (Cell, Interval) {
+    let [x, y, z] = vectors.map(Interval::square);
+    let length = (x + y + z).sqrt();
+    (vectors.map(|v| (v / length).intersect(Interval::new(-1.0, 1.0))), length)
 }
 
 /// A plane; the inside is behind its normal.
@@ -138,6 +152,63 @@ pub struct EllipticCone {
     /// Relative growth of the semi-axes per unit of length along the axis: they are
     /// `radii * (1 + rate * height)`. Not zero.
     pub rate: f64,
+}
+
+/// One nappe of a circular cone; its inside is around the axis, on the nappe's side of the apex.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Nappe {
+    /// A point on its axis, not the apex.
+    pub point: Point,
+    /// Unit direction of its axis.
+    pub axis: Vector,
+    /// The radius at `point`, positive.
+    pub radius: f64,
+    /// Growth of the radius per unit of length along the axis, not zero.
+    pub slope: f64,
+}
+
+/// The surface of an ellipse that turns about an axis in its plane.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Revolved {
+    /// A point on the axis.
+    pub point: Point,
+    /// Unit direction of the axis.
+    pub axis: Vector,
+    /// The ellipse in coordinates (distance from the axis, height above `point`); what of it has a negative distance
+    /// does not count.
+    pub profile: Ellipse,
+}
+
+/// What bounds a section on one side, in the coordinates of the section's plane.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Section {
+    /// A line: where normal·x = offset; the inside is behind the normal.
+    Line {
+        /// Unit normal.
+        normal: [f64; 2],
+        /// Distance of the line from the origin, along the normal.
+        offset: f64,
+    },
+    /// An ellipse.
+    Ellipse(Ellipse),
+}
+
+/// What a section sweeps that moves along a circle in the plane across it, and turns there so that its y points along a
+/// fixed direction as far as that plane allows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sweep {
+    /// The centre of the circle.
+    pub center: Point,
+    /// Unit direction of its axis; the section moves counter-clockwise around it.
+    pub axis: Vector,
+    /// Unit direction from the centre to where angles are zero.
+    pub start: Vector,
+    /// The radius of the circle.
+    pub radius: f64,
+    /// Unit direction of the section's y, neither in the plane of the circle nor across it.
+    pub up: Vector,
+    /// The section; its x is along (the circle's direction) × y.
+    pub section: Section,
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! Whether two surfaces are the same set of points.
 
 use super::quadric::tangents;
-use super::{Ellipsoid, EllipticCone, EllipticCylinder, Plane, Torus};
+use super::{Ellipsoid, EllipticCone, EllipticCylinder, Nappe, Plane, Revolved, Section, Sweep, Torus};
 use crate::{Surface, Vector};
 use nalgebra::Matrix3;
 
@@ -54,6 +54,9 @@ pub fn same(a: &Surface, b: &Surface, tolerance: f64) -> Option<bool> {
         (Surface::EllipticCone(a), Surface::EllipticCone(b)) => {
             same_elliptic_cone(&a, &b, tolerance).then_some(true)
         }
+        (Surface::Nappe(a), Surface::Nappe(b)) => same_nappe(&a, &b, tolerance).then_some(true),
+        (Surface::Sweep(a), Surface::Sweep(b)) => same_sweep(&a, &b, tolerance).then_some(true),
+        (Surface::Revolved(a), Surface::Revolved(b)) => same_revolved(&a, &b, tolerance).then_some(true),
         _ => None,
     }
 }
@@ -94,4 +97,49 @@ fn same_elliptic_cone(a: &EllipticCone, b: &EllipticCone, tolerance: f64) -> boo
     parallel(&a.axis, &b.axis)
         && (a.apex() - b.apex()).norm() <= tolerance
         && (of_a - of_b).amax() <= SAME_DIRECTION * of_a.amax()
+}
+
+fn same_nappe(a: &Nappe, b: &Nappe, tolerance: f64) -> bool {
+    // The direction along which the radius grows.
+    let slopes = |c: &Nappe| c.axis * c.slope;
+    (a.apex() - b.apex()).norm() <= tolerance
+        && (slopes(a) - slopes(b)).norm() <= SAME_DIRECTION * slopes(a).norm()
+}
+
+/// Those that run the same way only; of others nobody would say that they are the same.
+fn same_sweep(a: &Sweep, b: &Sweep, tolerance: f64) -> bool {
+    let near = |[p, q]: [f64; 2], [r, s]: [f64; 2], room: f64| (p - r).abs() <= room && (q - s).abs() <= room;
+    let sections = match (&a.section, &b.section) {
+        (Section::Line { normal, offset }, Section::Line { normal: other, offset: further }) => {
+            near(*normal, *other, SAME_DIRECTION) && (offset - further).abs() <= tolerance
+        }
+        (Section::Ellipse(e), Section::Ellipse(f)) => {
+            near(e.center, f.center, tolerance)
+                && near(e.radii, f.radii, tolerance)
+                && near(e.axis, f.axis, SAME_DIRECTION)
+        }
+        _ => false,
+    };
+    sections
+        && (a.center - b.center).norm() <= tolerance
+        && (a.radius - b.radius).abs() <= tolerance
+        && (a.axis - b.axis).norm() <= SAME_DIRECTION
+        && (a.up - b.up).norm() <= SAME_DIRECTION
+}
+
+fn same_revolved(a: &Revolved, b: &Revolved, tolerance: f64) -> bool {
+    // Both centres and shapes in the half-plane, upwards along the axis of `a`.
+    let up = if a.axis.dot(&b.axis) < 0.0 { -1.0 } else { 1.0 };
+    let center = |r: &Revolved, sign: f64| {
+        let foot = r.point + r.axis * r.profile.center[1];
+        (r.profile.center[0], foot, [r.profile.axis[0], sign * r.profile.axis[1]])
+    };
+    let ((distance_a, foot_a, axis_a), (distance_b, foot_b, axis_b)) = (center(a, 1.0), center(b, up));
+    let shape = |[c, s]: [f64; 2], [p, q]: [f64; 2]| {
+        Vector::new(c * c * p + s * s * q, c * s * (p - q), s * s * p + c * c * q)
+    };
+    parallel(&a.axis, &b.axis)
+        && (foot_a - foot_b).norm() <= tolerance
+        && (distance_a - distance_b).abs() <= tolerance
+        && (shape(axis_a, a.profile.radii) - shape(axis_b, b.profile.radii)).amax() <= tolerance
 }

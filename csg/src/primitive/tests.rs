@@ -25,7 +25,22 @@ fn straight() -> Vec<Surface> {
         Surface::Ellipsoid(Ellipsoid { center: o, axes: [x, y, z], radii: [1.2, 0.5, 0.8] }),
         Surface::EllipticCylinder(EllipticCylinder { point: o, axes: [x, y], radii: [0.4, 1.1] }),
         Surface::EllipticCone(EllipticCone { point: o, axes: [x, y], radii: [0.5, 0.9], axis: z, rate: 0.6 }),
+        Surface::Nappe(Nappe { point: o, axis: z, radius: 0.7, slope: 0.4 }),
+        Surface::Revolved(Revolved { point: o, axis: z, profile: ellipse([0.9, 0.1], [0.5, 0.3]) }),
+        Surface::Revolved(Revolved { point: o, axis: z, profile: ellipse([0.2, 0.0], [0.5, 0.8]) }),
+        sweep(Section::Line { normal: [0.28, 0.96], offset: 0.2 }),
+        sweep(Section::Ellipse(ellipse([0.1, 0.0], [0.5, 0.4]))),
     ]
+}
+
+fn ellipse(center: [f64; 2], radii: [f64; 2]) -> Ellipse {
+    Ellipse { center, axis: [0.8, 0.6], radii }
+}
+
+/// Along a circle about the origin.
+fn sweep(section: Section) -> Surface {
+    let (axis, start, up) = (Vector::z(), Vector::x(), Vector::new(0.48, 0.36, 0.8));
+    Surface::Sweep(Sweep { center: Point::origin(), axis, start, radius: 1.2, up, section })
 }
 
 fn surface() -> impl Strategy<Value = Surface> {
@@ -39,9 +54,16 @@ fn point() -> impl Strategy<Value = Point> {
     [-1.5..1.5f64, -1.5..1.5f64, -1.5..1.5f64].prop_map(Point::from)
 }
 
-/// Where derivatives are not defined: the axis of the torus.
+/// Where derivatives are not defined: the axis of a torus and of what else turns about one.
 fn on_torus_axis(surface: &Surface, point: &Point) -> bool {
-    matches!(surface, Surface::Torus(t) if (point - t.center).cross(&t.axis).norm() < 0.05)
+    let (center, axis) = match surface {
+        Surface::Torus(t) => (t.center, t.axis),
+        Surface::Nappe(n) => (n.point, n.axis),
+        Surface::Revolved(r) => (r.point, r.axis),
+        Surface::Sweep(s) => (s.center, s.axis),
+        _ => return false,
+    };
+    (point - center).cross(&axis).norm() < 0.05
 }
 
 proptest! {
@@ -73,6 +95,8 @@ proptest! {
     fn no_other_point_of_the_surface_is_nearer_than_the_projection(
         s in surface(), p in point(), others in prop::collection::vec(point(), 40),
     ) {
+        // The swept ones find it from nearby only.
+        prop_assume!(!matches!(s, Surface::Sweep(_)) || (s.distance(&p) < 0.2 && !on_torus_axis(&s, &p)));
         let q = s.project(&p).unwrap();
         for other in others {
             // Points near the foot are the dangerous ones, and far ones show a wrong branch.
@@ -145,7 +169,7 @@ fn gradients_are_unit_vectors_on_plane_sphere_cylinder_and_torus() {
 
 #[test]
 fn the_centre_of_an_ellipsoid_goes_to_the_end_of_its_shortest_axis() {
-    let [.., ellipsoid, cylinder, _] = &straight()[..] else { unreachable!() };
+    let [_, _, _, _, _, ellipsoid, cylinder, ..] = &straight()[..] else { unreachable!() };
     assert!((ellipsoid.project(&Point::origin()).unwrap() - Point::new(0.0, 0.5, 0.0)).norm() < 1e-15);
     assert!((cylinder.project(&Point::origin()).unwrap() - Point::new(0.4, 0.0, 0.0)).norm() < 1e-15);
 }

@@ -1,6 +1,10 @@
-//! Curves, and the solids swept along or around them: checked, not meshed yet.
+//! Curves, and the solids swept along or around them.
 
-use super::Lowering;
+use super::conic::Piece;
+use super::primitive::{LARGEST_LENGTH, Shape, direction};
+use super::swept::SweepError;
+use super::{Lowering, extrusion, revolution};
+use crate::Vector;
 use crate::geometry::Span;
 use crate::language::ast::{CurveText, Name, Num, Primitive, Segment};
 use crate::language::diagnostic::Reported;
@@ -14,23 +18,29 @@ const IN_SPACE: usize = 1;
 /// How far the ends of a closed profile may lie apart, as in NETGEN.
 const CLOSED: f64 = 1e-7;
 
-/// What is needed to check the uses of a curve.
+/// Segments that follow one another, at least one.
 #[derive(Clone, Debug)]
 pub(super) struct Curve {
-    segments: usize,
-    /// Its first and its last point.
-    ends: [Vec<f64>; 2],
+    pieces: Vec<Piece>,
 }
 
+/// A swept solid, or why it cannot be meshed; and the number of segments of its profile.
+type Swept = (Result<Shape, String>, usize);
+
 impl Curve {
+    /// Its first and its last point.
+    fn ends(&self) -> [Vector; 2] {
+        [self.pieces[0].ends()[0], self.pieces[self.pieces.len() - 1].ends()[1]]
+    }
+
     fn is_closed(&self) -> bool {
-        let [first, last] = &self.ends;
-        first.iter().zip(last).all(|(a, b)| (a - b).abs() < CLOSED)
+        let [first, last] = self.ends();
+        (first - last).amax() < CLOSED
     }
 
     /// Whether both ends are on the axis of a revolution, or beyond.
     fn is_on_axis(&self) -> bool {
-        self.ends.iter().all(|end| end[1] <= 0.0)
+        self.ends().iter().all(|end| end.y <= 0.0)
     }
 }
 
@@ -49,7 +59,8 @@ impl Lowering<'_> {
     }
 
     fn check_segments(&mut self, text: &CurveText) -> Result<Curve, Reported> {
-        let mut first = None;
+        let place = |&i: &usize| Vector::from_fn(|axis, _| text.points[i].get(axis).copied().unwrap_or(0.0));
+        let mut pieces = Vec::new();
         let mut end: Option<usize> = None;
         for segment in &text.segments {
             let indices = self.segment_points(segment, text.points.len())?;
@@ -62,11 +73,23 @@ impl Lowering<'_> {
                     format!("this segment begins at point {}, the one before ends at {}", start + 1, end + 1);
                 return Err(self.report.meaning(segment.kind.span, message, "segments follow one another"));
             }
-            first = first.or(Some(start));
             end = indices.last().copied();
+            let points: Vec<Vector> = indices.iter().map(place).collect();
+            if points.windows(2).any(|two| two[0] == two[1]) {
+                let message = "two points of this segment that follow one another are the same";
+                return Err(self.report.meaning(
+                    segment.kind.span,
+                    message,
+                    "a segment has a length and directions",
+                ));
+            }
+            if points.iter().any(|p| p.amax() > LARGEST_LENGTH) {
+                let message = format!("a coordinate is larger than {LARGEST_LENGTH:e}");
+                return Err(self.report.meaning(segment.kind.span, message, "choose another unit of length"));
+            }
+            pieces.push(Piece::new(&points));
         }
-        let point = |index: Option<usize>| index.map_or_else(Vec::new, |i| text.points[i].clone());
-        Ok(Curve { segments: text.segments.len(), ends: [point(first), point(end)] })
+        Ok(Curve { pieces })
     }
 
     /// The points of a segment, from 0.
@@ -93,21 +116,22 @@ impl Lowering<'_> {
         Ok(indices)
     }
 
-    /// For an extrusion or a revolution its name and how many surfaces it has; `None` for other primitives.
-    pub(super) fn swept(
-        &mut self,
-        primitive: &Primitive,
-        span: Span,
-    ) -> Result<Option<(&'static str, usize)>, Reported> {
-        match primitive {
+    /// An extrusion or a revolution; `None` for other primitives.
+    pub(super) fn swept(&mut self, primitive: &Primitive, span: Span) -> Result<Option<Swept>, Reported> {
+        let (profile, shape) = match primitive {
             Primitive::Extrusion { path, profile, up } => {
-                self.curve_named(path, IN_SPACE)?;
-                let segments = self.curve_named(profile, IN_PLANE)?.segments;
-                if up.amax() == 0.0 {
+                let path = self.curve_named(path, IN_SPACE)?;
+                let curve = self.curve_named(profile, IN_PLANE)?;
+                let Some(up) = direction(up) else {
                     let help = "it is the direction in space of the profile's y";
                     return Err(self.report.meaning(span, "the vector of `extrusion` is zero", help));
+                };
+                if !curve.is_closed() {
+                    let message = "the profile of `extrusion` is open";
+                    return Err(self.report.meaning(profile.span, message, "it returns to its first point"));
                 }
-                Ok(Some(("extrusion", segments)))
+                let shape = extrusion::shape(&path.pieces, &curve.pieces, up);
+                (curve, shape)
             }
             Primitive::Revolution { from, to, profile } => {
                 let curve = self.curve_named(profile, IN_PLANE)?;
@@ -116,13 +140,19 @@ impl Lowering<'_> {
                     let help = "it returns to its first point, or begins and ends at y = 0";
                     return Err(self.report.meaning(profile.span, message, help));
                 }
-                if from == to {
+                let Some(axis) = direction(&(to - from)) else {
                     let message = "the two points on the axis of `revolution` coincide";
                     return Err(self.report.meaning(span, message, "they give the direction of the axis"));
-                }
-                Ok(Some(("revolution", curve.segments)))
+                };
+                let shape = revolution::shape(from.coords, axis, &curve.pieces);
+                (curve, shape)
             }
-            _ => Ok(None),
+            _ => return Ok(None),
+        };
+        match shape {
+            Ok(shape) => Ok(Some((Ok(shape), profile.pieces.len()))),
+            Err(SweepError::Unsupported(message)) => Ok(Some((Err(message), profile.pieces.len()))),
+            Err(SweepError::Wrong(message, help)) => Err(self.report.meaning(span, message, help)),
         }
     }
 

@@ -54,10 +54,9 @@ impl Lowering<'_> {
         let mut refused = BTreeSet::new();
         for index in primitives {
             let primitive = &self.forest.primitives[index];
-            if let Some(construct) = primitive.unsupported
+            if let Some(message) = &primitive.unsupported
                 && refused.insert((primitive.span.line, primitive.span.column))
             {
-                let message = format!("`{construct}` is understood, but cannot be meshed yet");
                 self.report.unsupported(primitive.span, message, "a top-level object uses it");
             }
             used.extend(primitive.surfaces.clone());

@@ -42,8 +42,10 @@ pub(super) struct Primitive {
     pub surfaces: Range<usize>,
     /// Its inside; surface 0 is its first one.
     pub inside: Rc<Solid>,
-    /// The construct, if it cannot be meshed yet.
-    pub unsupported: Option<&'static str>,
+    /// Why it cannot be meshed, if so.
+    pub unsupported: Option<String>,
+    /// For a swept solid the number of segments of its profile.
+    pub segments: Option<usize>,
     pub span: Span,
 }
 
@@ -54,6 +56,7 @@ pub(super) struct RawSurface {
     pub surface: Option<Surface>,
     pub info: SurfaceInfo,
     /// Which face of the text it belongs to: the halves of a polyhedron's quadrilateral have the same.
+    /// [`NO_FACE`](super::swept::NO_FACE) for none.
     pub face: usize,
 }
 

@@ -4,15 +4,20 @@
 //! for each primitive that is written, until the end of the file; then equal ones become one and each body gets its tree.
 
 mod boundary;
+mod conic;
 mod curve;
 mod expand;
+mod extrusion;
 mod finish;
 mod flags;
 mod forest;
 mod polyhedron;
 mod primitive;
+mod profile;
+mod revolution;
 mod solid;
 mod statement;
+mod swept;
 mod unify;
 
 use std::collections::BTreeMap;

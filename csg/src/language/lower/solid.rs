@@ -9,6 +9,7 @@ use super::Lowering;
 use super::flags::{Flags, PerSurface};
 use super::forest::{Definition, ForestError, MOST_SURFACES, Node, NodeId, Primitive, RawSurface};
 use super::primitive::{self, LARGEST_LENGTH, Shape};
+use super::swept::NO_FACE;
 use crate::geometry::{Span, SurfaceInfo};
 use crate::language::ast::{self, Expr, Flag, Name, Num, Transform};
 use crate::language::diagnostic::Reported;
@@ -102,9 +103,8 @@ impl Lowering<'_> {
         let surfaces =
             self.forest.surfaces_except(root, |d| !must_walk && has_all(d)).map_err(|_| Reported)?;
         self.forest.definitions[index].labelled = [0, 1].map(|i| labels[i] && !lists[i]);
-        let entries =
-            if lists.contains(&true) { self.list_entries(root, &surfaces) } else { vec![0; surfaces.len()] };
-        let count = entries.last().map_or(0, |last| last + 1);
+        let (entries, count) =
+            if lists.contains(&true) { self.list_entries(root) } else { (vec![0; surfaces.len()], 1) };
         let lengths = [
             ("bc", numbers.as_ref().and_then(PerSurface::len)),
             ("bcname", names.as_ref().and_then(PerSurface::len)),
@@ -132,13 +132,26 @@ impl Lowering<'_> {
         Ok(())
     }
 
-    /// For each of the surfaces under `root` its place in a list of boundary numbers: its own, except that the
-    /// surfaces of a polyhedron alone count by faces of the text.
-    fn list_entries(&self, root: NodeId, surfaces: &[usize]) -> Vec<usize> {
-        let is_alone = matches!(self.forest.primitives_of(root).as_deref(), Ok([_]));
-        let face =
-            |(i, &surface): (usize, &usize)| if is_alone { self.forest.surfaces[surface].face } else { i };
-        surfaces.iter().enumerate().map(face).collect()
+    /// For each of the surfaces under `root` its place in a list of boundary numbers, none for a surface that belongs to no
+    /// segment, and how many places there are. A surface has a place of its own, except that those of a polyhedron alone
+    /// count by faces of the text and those of swept solids by segments of the profile.
+    fn list_entries(&self, root: NodeId) -> (Vec<usize>, usize) {
+        let primitives = self.forest.primitives_of(root).unwrap_or_default();
+        let (mut entries, mut count) = (Vec::new(), 0);
+        for &index in &primitives {
+            let Primitive { surfaces, segments, .. } = &self.forest.primitives[index];
+            let faces = self.forest.surfaces[surfaces.clone()].iter().map(|raw| raw.face);
+            let by_face = segments.is_some() || primitives.len() == 1;
+            let places = faces.clone().max().map_or(0, |last| last.saturating_add(1));
+            let entry = |(i, face): (usize, usize)| match (by_face, face) {
+                (false, _) => count + i,
+                (true, NO_FACE) => NO_FACE,
+                (true, face) => count + face,
+            };
+            entries.extend(faces.enumerate().map(entry));
+            count += if by_face { segments.unwrap_or(places) } else { surfaces.len() };
+        }
+        (entries, count)
     }
 
     fn add(&mut self, node: Node, span: Span) -> Result<NodeId, Reported> {
@@ -195,21 +208,25 @@ impl Lowering<'_> {
     fn primitive(&mut self, primitive: &ast::Primitive, span: Span, solid: &str) -> Result<NodeId, Reported> {
         let info = SurfaceInfo { solid: solid.to_owned(), span, ..SurfaceInfo::default() };
         let first = self.forest.surfaces.len();
-        let (inside, unsupported) = match self.swept(primitive, span)? {
-            Some((construct, segments)) => {
-                let raw = |face| RawSurface { surface: None, info: info.clone(), face };
-                self.forest.surfaces.extend((0..segments).map(raw));
-                (Solid::And(Vec::new()), Some(construct))
-            }
-            None => {
-                let Shape { surfaces, inside, faces } = primitive::shape(primitive, span, self.report)?;
+        let (shape, segments) = match self.swept(primitive, span)? {
+            Some((swept, segments)) => (swept, Some(segments)),
+            None => (Ok(primitive::shape(primitive, span, self.report)?), None),
+        };
+        let (inside, unsupported) = match shape {
+            Ok(Shape { surfaces, inside, faces }) => {
                 let raw = |(surface, face)| RawSurface { surface: Some(surface), info: info.clone(), face };
                 self.forest.surfaces.extend(surfaces.into_iter().zip(faces).map(raw));
                 (inside, None)
             }
+            Err(message) => {
+                let raw = |face| RawSurface { surface: None, info: info.clone(), face };
+                self.forest.surfaces.extend((0..segments.unwrap_or(0)).map(raw));
+                (Solid::And(Vec::new()), Some(message))
+            }
         };
         let surfaces = Range { start: first, end: self.forest.surfaces.len() };
-        self.forest.primitives.push(Primitive { surfaces, inside: Rc::new(inside), unsupported, span });
+        let inside = Rc::new(inside);
+        self.forest.primitives.push(Primitive { surfaces, inside, unsupported, segments, span });
         self.add(Node::Primitive(self.forest.primitives.len() - 1), span)
     }
 

@@ -137,6 +137,9 @@ impl Place {
             Surface::EllipticCylinder(c) => (3, foot_on_axis(&c.point, &c.axes[0].cross(&c.axes[1]))),
             Surface::Cone(cone) => (4, cone.apex()),
             Surface::EllipticCone(cone) => (4, cone.apex()),
+            Surface::Nappe(cone) => (5, cone.apex()),
+            Surface::Revolved(r) => (6, r.point + r.axis * r.profile.center[1]),
+            Surface::Sweep(s) => (7, s.center),
         };
         let width = (4.0 * (EQUAL_SURFACES + LARGEST_ANGLE) * self.size).max(f64::MIN_POSITIVE);
         // Any directions will do; these seldom map points of a regular grid to one place.
@@ -173,5 +176,8 @@ fn anchor(surface: &Surface) -> (Point, f64) {
         Surface::Ellipsoid(e) => (e.center, e.radii.iter().copied().fold(0.0, f64::max)),
         Surface::EllipticCylinder(c) => (c.point, c.radii[0].max(c.radii[1])),
         Surface::EllipticCone(c) => (c.point, c.radii[0].max(c.radii[1])),
+        Surface::Nappe(cone) => (cone.point, cone.radius),
+        Surface::Revolved(r) => (r.point, r.reach()),
+        Surface::Sweep(s) => (s.center, s.radius),
     }
 }

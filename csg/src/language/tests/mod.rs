@@ -6,6 +6,7 @@ mod grammar;
 mod messages;
 mod numbering;
 mod solids;
+mod swept;
 mod tutorials;
 mod unity;
 

@@ -1,0 +1,238 @@
+//! `extrusion`: a profile moved along a path.
+//!
+//! In the plane across the path the profile's y points along the part of the given direction in that plane (y'), its x
+//! along tangent × y'. Piece by piece of the path, the solid is what the profile sweeps between two planes across the path:
+//! prisms along lines, parts of bodies of revolution along circles. NETGEN has no faces at the
+//! ends of an open path, and asks for planes that cut it; here the planes across its ends close it, and if one that
+//! the file cuts with is nearer, nothing is left of them.
+
+use super::conic::{Arc, Piece, SpaceEllipse};
+use super::primitive::Shape;
+use super::profile::{Bound, Profile, formula};
+use super::swept::{Assembly, NO_FACE, SweepError, Turn};
+use crate::primitive::{Cylinder, Ellipse, EllipticCylinder, Section, Sweep, Torus};
+use crate::{Point, Solid, Surface, Vector};
+
+/// The sine of the angle up to which the tangents of two pieces of a path are the same: decimals typed with six digits.
+const SMOOTH: f64 = 1e-5;
+/// The sine of the angle between path and direction at least.
+const UPRIGHT: f64 = 1e-6;
+/// The sine of the angle up to which the direction lies in the plane of an arc or across it.
+const RIGID: f64 = 1e-9;
+
+/// The solid of a profile along a path; `up` is the direction of the profile's y.
+pub(super) fn shape(path: &[Piece], profile: &[Piece], up: Vector) -> Result<Shape, SweepError> {
+    check_path(path)?;
+    let profile = formula(profile, false)?;
+    let up = up.normalize();
+    refuse_turning_joints(path, up)?;
+    let mut assembly = Assembly::default();
+    let mut members = Vec::new();
+    for (index, piece) in path.iter().enumerate() {
+        let mut member = match *piece {
+            Piece::Line(ends) => along_line(&mut assembly, ends, &profile, up)?,
+            Piece::Arc(arc) => along_arc(&mut assembly, index, &arc, &profile, up)?,
+        };
+        let ([start, end], [first, last]) = (piece.ends(), piece.tangents());
+        member.push(assembly.behind(start, -first, NO_FACE));
+        member.push(assembly.behind(end, last, NO_FACE));
+        members.push(Solid::And(member));
+    }
+    let inside = if members.len() == 1 { members.swap_remove(0) } else { Solid::Or(members) };
+    Ok(assembly.shape(inside))
+}
+
+fn check_path(path: &[Piece]) -> Result<(), SweepError> {
+    for (index, two) in path.windows(2).enumerate() {
+        let (before, after) = (two[0].tangents()[1], two[1].tangents()[0]);
+        let sine = before.cross(&after).norm() / (before.norm() * after.norm());
+        if sine > SMOOTH || before.dot(&after) < 0.0 {
+            let message =
+                format!("the path has a corner between its segments {} and {}", index + 1, index + 2);
+            return Err(SweepError::Unsupported(
+                message + ", which cannot be meshed yet: round it with a segment of kind 3",
+            ));
+        }
+    }
+    if let Some(index) = path.iter().position(|piece| piece.tangents().iter().any(|t| t.norm() == 0.0)) {
+        let message = format!("segment {} of the path has no direction at an end", index + 1);
+        return Err(SweepError::Wrong(message, "its points are distinct"));
+    }
+    Ok(())
+}
+
+/// Where an arc that turns the profile goes on in another piece, the surfaces of both touch along the whole joint, some to
+/// third order: such joints are not told apart.
+fn refuse_turning_joints(path: &[Piece], up: Vector) -> Result<(), SweepError> {
+    let turns = |piece: &Piece| match piece {
+        Piece::Line(_) => false,
+        Piece::Arc(arc) => {
+            let [p, q, r] = arc.points;
+            is_turning((q - p).cross(&(r - q)).normalize(), up)
+        }
+    };
+    match path.iter().position(turns).filter(|_| path.len() > 1) {
+        Some(index) => Err(SweepError::Unsupported(format!(
+            "segment {} of the path turns the profile, which cannot be meshed yet in a path of several segments: its plane \
+             is neither across the direction of the profile's y nor along it",
+            index + 1
+        ))),
+        None => Ok(()),
+    }
+}
+
+/// Whether a profile with its y along `up` turns about the path on an arc around this axis.
+fn is_turning(axis: Vector, up: Vector) -> bool {
+    let height = up.dot(&axis).abs();
+    height > RIGID && height < 1.0 - RIGID
+}
+
+/// The directions of the profile's x and y at a point of the path.
+fn frame(tangent: Vector, up: Vector) -> Result<[Vector; 2], SweepError> {
+    let across = up - tangent * up.dot(&tangent);
+    if across.norm() <= UPRIGHT {
+        let message = "the path of the extrusion runs along the direction of the profile's y".into();
+        return Err(SweepError::Wrong(message, "the third argument is a direction across the path"));
+    }
+    let y = across.normalize();
+    Ok([tangent.cross(&y), y])
+}
+
+/// The prism of a profile along a line.
+fn along_line(
+    into: &mut Assembly,
+    ends: [Vector; 2],
+    profile: &Profile,
+    up: Vector,
+) -> Result<Vec<Solid>, SweepError> {
+    let tangent = (ends[1] - ends[0]).normalize();
+    let [x, y] = frame(tangent, up)?;
+    let place = |p: [f64; 2]| ends[0] + x * p[0] + y * p[1];
+    let inside = into.sweep(profile, |into, bound, face| {
+        Ok(match bound {
+            Bound::Left(from, to) => {
+                let [p, q] = [*from, *to].map(place);
+                // Right of the line, where x × y is against the path.
+                into.behind(p, tangent.cross(&(q - p)), face)
+            }
+            Bound::Inside(ellipse) => {
+                let Ellipse { center, axis: [c, s], radii } = *ellipse;
+                let point = Point::from(place(center));
+                let surface = if radii[0] == radii[1] {
+                    Surface::Cylinder(Cylinder { point, axis: tangent, radius: radii[0] })
+                } else {
+                    let axes = [x * c + y * s, y * c - x * s];
+                    Surface::EllipticCylinder(EllipticCylinder { point, axes, radii })
+                };
+                into.side(surface, false, face)
+            }
+        })
+    })?;
+    Ok(vec![inside])
+}
+
+/// What a profile sweeps that turns with an arc of the path.
+fn along_arc(
+    into: &mut Assembly,
+    index: usize,
+    arc: &Arc,
+    profile: &Profile,
+    up: Vector,
+) -> Result<Vec<Solid>, SweepError> {
+    let ellipse = SpaceEllipse::of(arc);
+    let points = arc.points;
+    let Some(radius) = ellipse.radius() else {
+        let message =
+            format!("segment {} of the path is an arc of an ellipse, which cannot be meshed yet", index + 1);
+        return Err(SweepError::Unsupported(
+            message + ": with tangents of equal length it is one of a circle",
+        ));
+    };
+    let outward = (points[0] - ellipse.center) / radius;
+    let tangent = (points[1] - points[0]).normalize();
+    let axis = outward.cross(&tangent).normalize();
+    let [x, y] = frame(tangent, up)?;
+    if is_turning(axis, up) {
+        let circle = Sweep {
+            center: Point::from(ellipse.center),
+            axis,
+            start: outward,
+            radius,
+            up,
+            section: Section::Line { normal: [1.0, 0.0], offset: 0.0 },
+        };
+        return turning(into, index, profile, circle);
+    }
+    // Where the direction lies in the plane of the arc, y' changes sides where the path runs along it.
+    let end = (points[2] - points[1]).normalize();
+    let end_outward = end.cross(&axis);
+    let [_, at_end] = frame(end, up)?;
+    let same =
+        |v: Vector, w: Vector, before: Vector, after: Vector| (v.dot(&before) - w.dot(&after)).abs() <= 1e-3;
+    if !same(y, at_end, axis, axis) || !same(y, at_end, outward, end_outward) {
+        let message =
+            format!("segment {} of the path turns into the direction of the profile's y", index + 1);
+        return Err(SweepError::Wrong(message, "the third argument is a direction across the path"));
+    }
+    let place = |p: [f64; 2]| {
+        let v = x * p[0] + y * p[1];
+        [v.dot(&axis), radius + v.dot(&outward)]
+    };
+    let size = radius.max(profile.reach);
+    let turn = Turn { point: ellipse.center, axis, tolerance: 1e-9 * size };
+    let reaches_axis = |bound: &Bound| match bound {
+        Bound::Left(from, to) => place(*from)[1].min(place(*to)[1]) <= turn.tolerance,
+        Bound::Inside(ellipse) => {
+            let whole = profile.literals.len() == 1;
+            whole && place(ellipse.center)[1] - ellipse.radii[0].max(ellipse.radii[1]) <= turn.tolerance
+        }
+    };
+    if profile.literals.iter().any(|literal| reaches_axis(&literal.bound)) {
+        let message = format!("the profile reaches the centre of segment {} of the path", index + 1);
+        return Err(SweepError::Wrong(message, "a path bends less than its profile is wide"));
+    }
+    let mirrored = x.dot(&axis) * y.dot(&outward) - x.dot(&outward) * y.dot(&axis) < 0.0;
+    let inside = into.sweep(profile, |into, bound, face| {
+        let moved = match bound {
+            Bound::Left(from, to) if mirrored => Bound::Left(place(*to), place(*from)),
+            Bound::Left(from, to) => Bound::Left(place(*from), place(*to)),
+            Bound::Inside(ellipse) => {
+                let [origin, tip] = [[0.0, 0.0], ellipse.axis].map(place);
+                let axis = [tip[0] - origin[0], tip[1] - origin[1]];
+                Bound::Inside(Ellipse { center: place(ellipse.center), axis, radii: ellipse.radii })
+            }
+        };
+        Ok(turn.turned(into, &moved, face))
+    })?;
+    Ok(vec![inside])
+}
+
+/// What a profile sweeps that turns about the path on its way.
+fn turning(
+    into: &mut Assembly,
+    index: usize,
+    profile: &Profile,
+    circle: Sweep,
+) -> Result<Vec<Solid>, SweepError> {
+    let reach = profile.reach;
+    if reach >= 0.9 * circle.radius {
+        let message =
+            format!("the profile is too wide for segment {} of the path, which turns it", index + 1);
+        return Err(SweepError::Unsupported(message + ": it reaches too near to the centre of that arc"));
+    }
+    let inside = into.sweep(profile, |into, bound, face| {
+        let section = match *bound {
+            Bound::Left([a, b], [c, d]) => {
+                let length = (c - a).hypot(d - b);
+                let normal = [(d - b) / length, (a - c) / length];
+                Section::Line { normal, offset: 0.5 * (normal[0] * (a + c) + normal[1] * (b + d)) }
+            }
+            Bound::Inside(ellipse) => Section::Ellipse(ellipse),
+        };
+        Ok(into.side(Surface::Sweep(Sweep { section, ..circle }), false, face))
+    })?;
+    // All is inside this torus. Near the axis, where the section's sides come from all directions, nothing is.
+    let minor = f64::min(1.25 * reach, 0.5 * (reach + circle.radius));
+    let around = Torus { center: circle.center, axis: circle.axis, major: circle.radius, minor };
+    Ok(vec![into.side(Surface::Torus(around), false, NO_FACE), inside])
+}

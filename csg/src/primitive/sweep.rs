@@ -1,0 +1,236 @@
+//! What a line or an ellipse sweeps that moves along a circle in the plane across it, and turns there.
+//!
+//! At an angle θ of the circle the plane across has the directions outward e and along the axis n. The section's y points
+//! along the part of a fixed vector `up` in that plane: (cos ψ, sin ψ) in the directions n and e with
+//! tan ψ = up·e / up·n. So (X, Y) = (q cos ψ - z sin ψ, q sin ψ + z cos ψ) with q the distance from the axis less the
+//! radius of the circle and z the height; the function is the section's, g(X, Y). Not smooth on the axis.
+
+use super::quadric::{largest_curvature, reject};
+use super::{Primitive, Section, Sweep, direction_range, reject_range};
+use crate::interval::{Cell, Interval, dot, offset};
+use crate::{Point, ProjectionFailed, Vector};
+use nalgebra::{Isometry3, Matrix3, Matrix4, Vector4};
+
+impl Section {
+    fn value(&self, [x, y]: [f64; 2]) -> f64 {
+        match self {
+            Self::Line { normal, offset } => normal[0] * x + normal[1] * y - offset,
+            Self::Ellipse(e) => e.value([x, y]),
+        }
+    }
+
+    fn gradient(&self, at: [f64; 2]) -> [f64; 2] {
+        match self {
+            Self::Line { normal, .. } => *normal,
+            Self::Ellipse(e) => e.gradient(at),
+        }
+    }
+
+    fn hessian(&self) -> [f64; 3] {
+        match self {
+            Self::Line { .. } => [0.0; 3],
+            Self::Ellipse(e) => e.hessian(),
+        }
+    }
+
+    fn value_range(&self, [x, y]: [Interval; 2]) -> Interval {
+        match self {
+            Self::Line { normal, offset } => x * normal[0] + y * normal[1] - Interval::point(*offset),
+            Self::Ellipse(e) => e.value_range([x, y]),
+        }
+    }
+
+    fn gradient_range(&self, at: [Interval; 2]) -> [Interval; 2] {
+        match self {
+            Self::Line { normal, .. } => normal.map(Interval::point),
+            Self::Ellipse(e) => e.gradient_range(at),
+        }
+    }
+
+    fn nearest(&self, at: [f64; 2]) -> [f64; 2] {
+        match self {
+            Self::Line { normal, .. } => {
+                let lack = self.value(at);
+                [at[0] - normal[0] * lack, at[1] - normal[1] * lack]
+            }
+            Self::Ellipse(e) => e.nearest(at),
+        }
+    }
+}
+
+/// The plane across the circle through a point, and where the point is in it.
+struct Across {
+    /// Outward and along the circle.
+    outward: Vector,
+    along: Vector,
+    distance: f64,
+    /// cos ψ, sin ψ and the first two derivatives of ψ by θ.
+    cos: f64,
+    sin: f64,
+    turns: [f64; 2],
+    /// The coordinates of the section.
+    at: [f64; 2],
+}
+
+impl Sweep {
+    fn across(&self, point: &Point) -> Across {
+        let arm = point - self.center;
+        let across = reject(&arm, &self.axis);
+        let distance = across.norm();
+        let outward = across.try_normalize(0.0).unwrap_or_default();
+        let [q, z] = [distance - self.radius, arm.dot(&self.axis)];
+        let mut found = self.frame(outward);
+        found.distance = distance;
+        found.at = [found.cos * q - found.sin * z, found.sin * q + found.cos * z];
+        found
+    }
+
+    fn frame(&self, outward: Vector) -> Across {
+        let along = self.axis.cross(&outward);
+        let [d, t, n] = [outward, along, self.axis].map(|v| self.up.dot(&v));
+        let square = d * d + n * n;
+        let length = square.sqrt();
+        let turns = [t * n / square, -n * d * (square + 2.0 * t * t) / (square * square)];
+        Across { outward, along, distance: 0.0, cos: n / length, sin: d / length, turns, at: [0.0; 2] }
+    }
+
+    /// The angle of a point around the circle from `start`, -π to π, and its place in the section.
+    pub fn coordinates(&self, point: &Point) -> (f64, [f64; 2]) {
+        let found = self.across(point);
+        let side = self.axis.cross(&self.start);
+        (found.outward.dot(&side).atan2(found.outward.dot(&self.start)), found.at)
+    }
+
+    /// The point with these coordinates.
+    pub fn place(&self, angle: f64, [x, y]: [f64; 2]) -> Point {
+        let (sin, cos) = angle.sin_cos();
+        let outward = self.start * cos + self.axis.cross(&self.start) * sin;
+        let frame = self.frame(outward);
+        let [q, z] = [frame.cos * x + frame.sin * y, frame.cos * y - frame.sin * x];
+        self.center + outward * (self.radius + q) + self.axis * z
+    }
+
+    /// The ranges over a box of: outward, the distance from the axis, along, cos ψ, sin ψ, ψ', and (X, Y).
+    fn ranges(&self, cell: &Cell) -> Ranges {
+        let arm = offset(cell, &self.center);
+        let (outward, distance) = direction_range(&reject_range(&arm, &self.axis));
+        let [a, b, c] = [self.axis.x, self.axis.y, self.axis.z];
+        let [x, y, z] = outward;
+        let along = [z * b - y * c, x * c - z * a, y * a - x * b];
+        let n = Interval::point(self.up.dot(&self.axis));
+        let (d, t) = (dot(&self.up, &outward), dot(&self.up, &along));
+        let square = d.square() + n.square();
+        let unit = Interval::new(-1.0, 1.0);
+        let [cos, sin] = [n, d].map(|v| (v / square.sqrt()).intersect(unit));
+        let [q, z] = [distance - Interval::point(self.radius), dot(&self.axis, &arm)];
+        let at = [q * cos - z * sin, q * sin + z * cos];
+        Ranges { outward, distance, along, cos, sin, turn: t * n / square, at }
+    }
+}
+
+struct Ranges {
+    outward: Cell,
+    distance: Interval,
+    along: Cell,
+    cos: Interval,
+    sin: Interval,
+    turn: Interval,
+    at: [Interval; 2],
+}
+
+impl Primitive for Sweep {
+    fn value(&self, point: &Point) -> f64 {
+        self.section.value(self.across(point).at)
+    }
+
+    fn gradient(&self, point: &Point) -> Vector {
+        let a = self.across(point);
+        let [gx, gy] = self.section.gradient(a.at);
+        let round =
+            if a.distance > 0.0 { a.turns[0] * (gy * a.at[0] - gx * a.at[1]) / a.distance } else { 0.0 };
+        a.outward * (gx * a.cos + gy * a.sin) + self.axis * (gy * a.cos - gx * a.sin) + a.along * round
+    }
+
+    /// By the chain rule in cylinder coordinates.
+    fn hessian(&self, point: &Point) -> Matrix3<f64> {
+        let Across { outward, along, distance, cos, sin, turns: [turn, bend], at: [x, y] } =
+            self.across(point);
+        if distance == 0.0 {
+            return Matrix3::zeros();
+        }
+        let ([gx, gy], [xx, xy, yy]) = (self.section.gradient([x, y]), self.section.hessian());
+        let form = |[a, b]: [f64; 2], [c, d]: [f64; 2]| xx * a * c + xy * (a * d + b * c) + yy * b * d;
+        // Derivatives of (X, Y) by q, z and θ.
+        let (by_q, by_z, by_t) = ([cos, sin], [-sin, cos], [-turn * y, turn * x]);
+        let slope = |[a, b]: [f64; 2]| gx * a + gy * b;
+        let (qq, qz, zz) = (form(by_q, by_q), form(by_q, by_z), form(by_z, by_z));
+        let qt = form(by_q, by_t) + turn * slope([-sin, cos]);
+        let zt = form(by_z, by_t) - turn * slope([cos, sin]);
+        let tt = form(by_t, by_t) + bend * slope([-y, x]) - turn * turn * slope([x, y]);
+        let (q, t) = (slope(by_q), slope(by_t));
+        let [rt, nt] = [qt / distance - t / (distance * distance), zt / distance];
+        let round = tt / (distance * distance) + q / distance;
+        let frame = Matrix3::from_columns(&[outward, along, self.axis]);
+        frame * Matrix3::new(qq, rt, qz, rt, round, nt, qz, nt, zz) * frame.transpose()
+    }
+
+    fn curvature(&self, point: &Point) -> f64 {
+        largest_curvature(&self.gradient(point), &self.hessian(point))
+    }
+
+    /// The nearest point if the point is near to the surface; else the nearest one in the plane across the circle will do.
+    ///
+    /// From the nearest point in the plane across the circle by Newton's method for the point and the multiplier λ in
+    /// x + λ ∇f(x) = p, f(x) = 0.
+    fn project(&self, point: &Point) -> Result<Point, ProjectionFailed> {
+        const STEPS: usize = 20;
+        /// The rest of the equations, as a part of the radius, of what counts as a solution.
+        const SOLVED: f64 = 1e-10;
+        let (angle, at) = self.coordinates(point);
+        let across = self.place(angle, self.section.nearest(at));
+        let mut foot = across;
+        let gradient = self.gradient(&foot);
+        let mut factor = (point - foot).dot(&gradient) / gradient.norm_squared();
+        let mut best = f64::INFINITY;
+        for _ in 0..STEPS {
+            let (gradient, hessian) = (self.gradient(&foot), self.hessian(&foot));
+            let lack = point - foot - gradient * factor;
+            let rest = lack.norm().max(self.value(&foot).abs());
+            if rest.is_nan() || rest >= 0.5 * best {
+                break;
+            }
+            best = rest;
+            let mut matrix = Matrix4::zeros();
+            matrix.fixed_view_mut::<3, 3>(0, 0).copy_from(&(Matrix3::identity() + hessian * factor));
+            matrix.fixed_view_mut::<3, 1>(0, 3).copy_from(&gradient);
+            matrix.fixed_view_mut::<1, 3>(3, 0).copy_from(&gradient.transpose());
+            let right = Vector4::new(lack.x, lack.y, lack.z, -self.value(&foot));
+            let Some(step) = matrix.lu().solve(&right) else { break };
+            foot += step.xyz();
+            factor += step.w;
+        }
+        let is_better = (point - foot).norm() <= (point - across).norm() && best <= SOLVED * self.radius;
+        Ok(if is_better { foot } else { across })
+    }
+
+    fn natural_range(&self, cell: &Cell) -> Interval {
+        self.section.value_range(self.ranges(cell).at)
+    }
+
+    fn gradient_range(&self, cell: &Cell) -> Cell {
+        let r = self.ranges(cell);
+        if r.distance.lo <= 0.0 {
+            return [Interval::new(f64::NEG_INFINITY, f64::INFINITY); 3];
+        }
+        let [gx, gy] = self.section.gradient_range(r.at);
+        let out = gx * r.cos + gy * r.sin;
+        let up = gy * r.cos - gx * r.sin;
+        let round = r.turn * (gy * r.at[0] - gx * r.at[1]) / r.distance;
+        [0, 1, 2].map(|i| r.outward[i] * out + up * self.axis[i] + r.along[i] * round)
+    }
+
+    fn transformed(&self, motion: &Isometry3<f64>) -> Self {
+        let [axis, start, up] = [self.axis, self.start, self.up].map(|v| (motion * v).normalize());
+        Self { center: motion * self.center, axis, start, up, ..*self }
+    }
+}
