@@ -54,6 +54,8 @@ pub struct PatchLine {
     pub curves: Vec<usize>,
     /// Largest element size on it, where the file gives one.
     pub maxh: Option<f64>,
+    /// The solid whose boundary it is cut out by, if it is a top-level object of its own.
+    pub cutout: Option<String>,
 }
 
 /// A curve.
@@ -74,6 +76,7 @@ impl Inspection {
         let number = |body: Option<BodyId>| body.map_or(0, |b| geometry.bodies[b.index()].number);
         let patch = |patch: &csg::Patch| {
             let info = &geometry.surface_info[patch.surface.index()];
+            let cutout = patch.cutout.map(|i| &geometry.cutouts[i as usize]);
             PatchLine {
                 boundary: patch.bc,
                 name: patch.name.clone(),
@@ -82,7 +85,8 @@ impl Inspection {
                 line: Some(info.span.line),
                 bodies: [number(patch.inside), number(patch.outside)],
                 curves: patch.boundary.iter().map(|(curve, _)| curve.index()).collect(),
-                maxh: info.maxh,
+                maxh: cutout.and_then(|cutout| cutout.maxh).or(info.maxh),
+                cutout: cutout.map(|cutout| cutout.name.clone()),
             }
         };
         let boundary = |id: PatchId| features.patch(id).bc;
@@ -121,6 +125,7 @@ impl Inspection {
                 bodies: [number(patch.inside), number(patch.outside)],
                 curves: (0..beside.len()).filter(|&curve| beside[curve].contains(&id)).collect(),
                 maxh: None,
+                cutout: None,
             }
         };
         let point = |v: u32| model.points[v as usize];
@@ -198,9 +203,10 @@ impl fmt::Display for Inspection {
                 _ => patch.surface.to_owned(),
             };
             let maxh = patch.maxh.map_or(String::new(), |h| format!("  maxh {h}"));
+            let cutout = patch.cutout.as_ref().map_or(String::new(), |solid| format!("  cut out by {solid}"));
             writeln!(
                 f,
-                "  {:>4}  {:16} {surface:36} {behind} | {front}  {} curves{maxh}",
+                "  {:>4}  {:16} {surface:36} {behind} | {front}  {} curves{maxh}{cutout}",
                 patch.boundary,
                 patch.name,
                 patch.curves.len()

@@ -3,9 +3,10 @@
 use crate::common::{geometries_in, judge, report_of, shared, succeed, tetmill};
 
 /// What this version meshes.
-const MESHED: [&str; 21] = [
+const MESHED: [&str; 22] = [
     "boundarycondition",
     "boxcyl",
+    "circle_on_cube",
     "cone",
     "cube",
     "cubeandspheres",

@@ -17,9 +17,9 @@ pub mod project;
 pub mod solid;
 pub mod surface;
 
-pub use features::{Corner, Curve, FeatureError, Features, Fin, Patch};
+pub use features::{Corner, Curve, FeatureError, Features, Fin, Identified, Origin, Origins, Patch};
 pub use geometry::{
-    Aabb, Body, BodyId, BoundaryLabel, BoundaryOverride, CornerId, CurveId, Geometry, PatchId, SurfaceId,
+    Aabb, Body, BodyId, BoundaryLabel, BoundaryOverride, CornerId, CurveId, Cutout, Geometry, Identification, PatchId, SurfaceId,
 };
 pub use interval::Interval;
 pub use project::{ProjectionFailed, Projector};

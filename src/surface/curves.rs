@@ -289,6 +289,7 @@ mod tests {
             curves,
             patches: vec![],
             bounds: csg::Aabb { min: Point::new(-1., -1., 0.), max: Point::new(1., 1., 0.) },
+            identified: vec![],
         };
         let cut = |h: f64| {
             let mut mesh = SurfaceMesh::default();

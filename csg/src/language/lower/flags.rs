@@ -152,6 +152,14 @@ impl<T> PerSurface<T> {
         }
     }
 
+    /// The value, if it is not a list.
+    pub fn single(self) -> Option<T> {
+        match self {
+            PerSurface::All(value) => Some(value),
+            PerSurface::Each(_) => None,
+        }
+    }
+
     /// The length of the list, if it is one.
     pub fn len(&self) -> Option<usize> {
         match self {

@@ -46,8 +46,7 @@ const COUNTS: [(&str, usize, usize); 21] = [
 ];
 
 /// The tutorials that cannot be meshed yet: the construct, and how often it is refused.
-const REFUSED: [(&str, &str, usize); 4] = [
-    ("circle_on_cube", "a `tlo` of one surface", 1),
+const REFUSED: [(&str, &str, usize); 3] = [
     ("extrusion", "`extrusion`", 1),
     ("period", "`identify periodic`", 3),
     ("revolution", "`revolution`", 1),
