@@ -3,7 +3,7 @@
 use crate::common::{geometries_in, judge, report_of, shared, succeed, tetmill};
 
 /// What this version meshes.
-const MESHED: [&str; 22] = [
+const MESHED: [&str; 23] = [
     "boundarycondition",
     "boxcyl",
     "circle_on_cube",
@@ -19,6 +19,7 @@ const MESHED: [&str; 22] = [
     "manyholes",
     "matrix",
     "ortho",
+    "period",
     "sculpture",
     "shaft",
     "sphere",

@@ -43,11 +43,13 @@ mod extent;
 mod number;
 mod octree;
 mod periodic;
+mod singular;
 mod trace;
 
 pub use check::Inconsistency;
 pub use error::{FeatureError, Named, Place};
 pub use periodic::{CurveImage, Identified, Origin, Origins};
+pub use singular::Singular;
 pub use trace::{curve_curvature, curve_tangent};
 
 /// A point where curves end, or a vertex of its own (`point`, the apex of a cone).

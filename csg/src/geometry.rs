@@ -152,6 +152,43 @@ pub struct Identification {
     pub span: Span,
 }
 
+/// A tag for solvers that grade elements towards singularities (`singular`).
+#[derive(Clone, Debug)]
+pub struct Singularity {
+    /// Where.
+    pub place: SingularPlace,
+    /// How strongly (`-factor`).
+    pub factor: i32,
+    /// Upper bound of the mesh size there; edges only (`-maxh`).
+    pub maxh: Option<f64>,
+    /// Where it stands in the file.
+    pub span: Span,
+}
+
+/// Where a [`Singularity`] is, by the surfaces of the solids that it names.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum SingularPlace {
+    /// Where some surfaces bound a body.
+    Face {
+        /// The surfaces.
+        surfaces: Vec<SurfaceId>,
+        /// The body.
+        body: BodyId,
+    },
+    /// On curves between a surface of the first list and one of the second, beside a body if one is named.
+    Edge {
+        /// The two lists.
+        surfaces: [Vec<SurfaceId>; 2],
+        /// The body.
+        body: Option<BodyId>,
+    },
+    /// At corners on a surface of each list.
+    Point {
+        /// The three lists.
+        surfaces: [Vec<SurfaceId>; 3],
+    },
+}
+
 /// A point that is to be a mesh vertex (`point`).
 #[derive(Clone, Copy, Debug)]
 pub struct UserPoint {
@@ -201,6 +238,8 @@ pub struct Geometry {
     pub cutouts: Vec<Cutout>,
     /// Periodic faces.
     pub identifications: Vec<Identification>,
+    /// Tags for solvers.
+    pub singularities: Vec<Singularity>,
     /// Points to be kept as mesh vertices.
     pub user_points: Vec<UserPoint>,
     /// Numbers and names for single boundaries of bodies, in file order.

@@ -17,9 +17,12 @@ pub mod project;
 pub mod solid;
 pub mod surface;
 
-pub use features::{Corner, Curve, FeatureError, Features, Fin, Identified, Origin, Origins, Patch};
+pub use features::{
+    Corner, Curve, FeatureError, Features, Fin, Identified, Origin, Origins, Patch, Singular,
+};
 pub use geometry::{
-    Aabb, Body, BodyId, BoundaryLabel, BoundaryOverride, CornerId, CurveId, Cutout, Geometry, Identification, PatchId, SurfaceId,
+    Aabb, Body, BodyId, BoundaryLabel, BoundaryOverride, CornerId, CurveId, Cutout, Geometry, Identification,
+    PatchId, SingularPlace, Singularity, SurfaceId,
 };
 pub use interval::Interval;
 pub use project::{ProjectionFailed, Projector};

@@ -97,9 +97,7 @@ impl Projector {
     /// Where there is no nearest one, as in the centre of a sphere.
     pub fn project_patch(&self, patch: PatchId, point: &Point) -> Result<Point, ProjectionFailed> {
         match Image::find(&self.patch_images, patch.0) {
-            Some(image) => {
-                image.project(point, |p| self.patch_surface(PatchId(image.ids[1])).project(p))
-            }
+            Some(image) => image.project(point, |p| self.patch_surface(PatchId(image.ids[1])).project(p)),
             None => self.patch_surface(patch).project(point),
         }
     }
@@ -175,7 +173,8 @@ impl Projector {
         let patches = (0..patches).map(|_| id(&mut reader)).collect::<Option<Vec<_>>>()?;
         let counts = [reader.count()?, reader.count()?];
         let lengths = [curves.len(), patches.len()];
-        let mut images = |i: usize| (0..counts[i]).map(|_| reader.image(lengths[i])).collect::<Option<Vec<_>>>();
+        let mut images =
+            |i: usize| (0..counts[i]).map(|_| reader.image(lengths[i])).collect::<Option<Vec<_>>>();
         let (curve_images, patch_images) = (images(0)?, images(1)?);
         let projector = Self { surfaces, curves, patches, curve_images, patch_images, tolerance };
         reader.0.is_empty().then_some(projector)

@@ -5,6 +5,7 @@ use crate::Point;
 use crate::improve::{self, Effort, GeometrySmoothness, Smoothness};
 use crate::kernel::quality::QualitySummary;
 use crate::mesh::{Class, Mesh, Segment, VertexId};
+use crate::periodic::PeriodicSize;
 use crate::size::{GeometricSize, SizeField, SizeSettings, Source};
 use crate::surface::curves::{CurveError, crowded, mesh_curves};
 use crate::surface::{self, SurfaceError, SurfaceMesh};
@@ -158,8 +159,10 @@ pub(super) fn corrected(
 
 fn attempt(model: &CsgModel, settings: &CoarseSettings, may_lower: bool) -> Attempt {
     let CsgModel { geometry, features, projector } = model;
-    let size = GeometricSize::new(geometry, features, &settings.size);
-    let curves = match mesh_curves(features, projector, &size) {
+    let own = GeometricSize::new(geometry, features, &settings.size);
+    let periodic = PeriodicSize::new(&own, features, settings.size.grading);
+    let size: &dyn SizeField = if features.identified.is_empty() { &own } else { &periodic };
+    let curves = match mesh_curves(features, projector, size) {
         Ok(curves) => curves,
         Err(error) => return Attempt::Failed(error.into()),
     };
@@ -169,17 +172,17 @@ fn attempt(model: &CsgModel, settings: &CoarseSettings, may_lower: bool) -> Atte
     }
     let ends = |s: &Segment| s.vertices.map(|v| curves.points[v.index()]);
     let segments: Vec<[Point; 2]> = curves.segments.iter().map(ends).collect();
-    let filled = surface::mesh_patches(geometry, features, curves, &size, &surface::Settings::default())
+    let filled = surface::mesh_patches(geometry, features, curves, size, &surface::Settings::default())
         .map_err(CoarseError::from)
         .and_then(|(surface, _)| {
             let regions = |id| [features.patch(id).inside, features.patch(id).outside];
             let smoothness = GeometrySmoothness { geometry, features };
-            fill(surface, regions, &size, Some(&smoothness), settings.effort)
+            fill(surface, regions, size, Some(&smoothness), settings.effort)
         });
     match filled {
         Ok(made) => Attempt::Made(Box::new(made)),
         Err(error) => {
-            let lowered = if may_lower { error.remedy(&segments, &size) } else { Vec::new() };
+            let lowered = if may_lower { error.remedy(&segments, size) } else { Vec::new() };
             if lowered.is_empty() { Attempt::Failed(error) } else { Attempt::Lower(lowered) }
         }
     }

@@ -2,7 +2,7 @@
 
 use super::{Preset, SizeField, Source, SourceTree};
 use crate::{Point, Vector};
-use csg::{BodyId, Curve, Cutout, Features, Geometry, Interval, Solid, SurfaceId};
+use csg::{BodyId, Curve, CurveId, Cutout, Features, Geometry, Interval, Solid, SurfaceId};
 
 /// What the user asks of the size, beside what the geometry says.
 #[derive(Clone, Debug)]
@@ -75,8 +75,9 @@ impl<'a> GeometricSize<'a> {
             .collect();
         let sampler = Sampler { geometry, features, settings, maximum, body_bounds: &body_bounds };
         let mut sources = settings.sources.clone();
-        for curve in &features.curves {
-            sampler.sample_curve(curve, &mut sources);
+        for (i, curve) in features.curves.iter().enumerate() {
+            let bound = settings.scaled_bound(features.edge_bound(geometry, CurveId::new(i)));
+            sampler.sample_curve(curve, bound, &mut sources);
         }
         sampler.sample_patches(&mut sources);
         let tree = SourceTree::new(features.bounds, settings.grading, maximum, &sources);
@@ -140,11 +141,14 @@ impl Sampler<'_> {
         cutouts.map(|(i, _)| self.cutout_bound(Some(i))).fold(f64::INFINITY, f64::min)
     }
 
-    /// Sources along a curve: its own curvature, its length, and the surfaces of the patches beside it.
-    fn sample_curve(&self, curve: &Curve, sources: &mut Vec<Source>) {
+    /// Sources along a curve: its own curvature, its length, the bound that the file sets for it, and the surfaces of the
+    /// patches beside it.
+    fn sample_curve(&self, curve: &Curve, bound: f64, sources: &mut Vec<Source>) {
         let trace = &curve.trace;
         let length: f64 = trace.windows(2).map(|w| (w[1] - w[0]).norm()).sum();
-        let whole = (self.settings.scale * length / self.settings.segments_per_curve).max(self.settings.minh);
+        let whole = (self.settings.scale * length / self.settings.segments_per_curve)
+            .max(self.settings.minh)
+            .min(bound);
         let curvatures = trace_curvatures(trace, curve.ends.is_none());
         for (i, w) in trace.windows(2).enumerate() {
             let beside = curve.fins.iter().map(|fin| self.features.patch(fin.patch));

@@ -27,7 +27,8 @@ pub struct CurveError {
     pub failed: ProjectionFailed,
 }
 
-/// Cuts all curves: vertices on corners (vertex i is corner i) and curves, segments in curve order.
+/// Cuts all curves: vertices on corners (vertex i is corner i) and curves, segments in curve order. Those that are
+/// periodic images are cut as their origins are.
 pub fn mesh_curves(
     features: &Features,
     projector: &Projector,
@@ -37,19 +38,36 @@ pub fn mesh_curves(
     let mut counts: Vec<usize> = features.curves.iter().zip(&samplings).map(|(c, s)| s.segments(c)).collect();
     part_curves_with_the_same_ends(features, &mut counts);
 
+    let origins = features.origins();
     let mut mesh = SurfaceMesh::default();
     for (i, corner) in features.corners.iter().enumerate() {
-        mesh.points.push(corner.point);
+        mesh.points.push(match origins.corners[i] {
+            Some(origin) => origin.motion * features.corners[origin.index].point,
+            None => corner.point,
+        });
         mesh.classes.push(Class::Corner(CornerId::new(i)));
     }
-    for (i, (curve, sampling)) in features.curves.iter().zip(&samplings).enumerate() {
+    let placed = |i: usize| {
         let id = CurveId::new(i);
-        let inner = sampling
-            .inner_points(counts[i], curve.ends.is_none())
+        samplings[i]
+            .inner_points(counts[i], features.curves[i].ends.is_none())
             .map(|p| projector.project_curve(id, &p))
             .collect::<Result<Vec<Point>, _>>()
-            .map_err(|failed| CurveError { curve: id, failed })?;
-        add_curve(&mut mesh, id, curve, inner);
+            .map_err(|failed| CurveError { curve: id, failed })
+    };
+    for (i, curve) in features.curves.iter().enumerate() {
+        let inner = match origins.curves[i] {
+            Some(origin) => {
+                let mut points: Vec<Point> =
+                    placed(origin.index)?.into_iter().map(|p| origin.motion * p).collect();
+                if origin.reversed {
+                    points.reverse();
+                }
+                points
+            }
+            None => placed(i)?,
+        };
+        add_curve(&mut mesh, CurveId::new(i), curve, inner);
     }
     Ok(mesh)
 }

@@ -10,9 +10,12 @@ use super::sheet::{Kind, Node, Piece, Sheet, Stop};
 use super::topology::NONE;
 use super::{PatchReport, Report, Settings, SurfaceError, SurfaceMesh};
 use crate::mesh::{BoundaryTriangle, Class, VertexId};
+use crate::periodic::SAME_PLACE;
+use crate::periodic::places::Places;
 use crate::size::SizeField;
 use crate::{Point, Vector};
 use csg::{CurveId, Features, Geometry, PatchId, Surface};
+use nalgebra::Isometry3;
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -28,7 +31,8 @@ struct Meshed {
 /// Fills all patches with triangles.
 ///
 /// `curves` has the vertices on corners and curves and the segments, and keeps them unchanged; the vertices on
-/// patches follow, patch by patch. Patches are meshed in parallel, with the same result for any number of threads.
+/// patches follow, patch by patch. Patches are meshed in parallel, with the same result for any number of threads; those that are
+/// periodic images get the triangles of their origins, moved.
 ///
 /// # Errors
 /// The first patch, by number, that could not be meshed, and where.
@@ -40,8 +44,16 @@ pub fn mesh_patches(
     settings: &Settings,
 ) -> Result<(SurfaceMesh, Report), SurfaceError> {
     let input = Input::new(geometry, features, &curves, size, settings);
+    let origins = features.origins().patches;
+    let made = |p: usize| match origins[p] {
+        Some(origin) => {
+            let of = input.mesh(PatchId::new(origin.index))?;
+            Ok(input.moved(of, PatchId::new(p), &origin.motion))
+        }
+        None => input.mesh(PatchId::new(p)),
+    };
     let results: Vec<Result<Meshed, SurfaceError>> =
-        (0..features.patches.len()).into_par_iter().map(|p| input.mesh(PatchId::new(p))).collect();
+        (0..features.patches.len()).into_par_iter().map(made).collect();
     let (mut meshed, mut errors) = (Vec::new(), Vec::new());
     for result in results {
         match result {
@@ -149,6 +161,44 @@ impl<'a> Input<'a> {
         let line = m.cross(&n);
         let direction = if line.norm() > TRANSVERSAL { line * line.dot(chord).signum() } else { *chord };
         direction.try_normalize(0.0).unwrap_or_default()
+    }
+
+    /// The mesh of a patch, moved to its image.
+    ///
+    /// # Panics
+    /// If its boundary vertices have no images.
+    fn moved(&self, of: Meshed, id: PatchId, motion: &Isometry3<f64>) -> Meshed {
+        let patch = self.features.patch(id);
+        let surface = &self.geometry.surfaces[patch.surface.index()];
+        let on_curves = patch.boundary.iter().flat_map(|(curve, _)| self.ranges[curve.index()].clone());
+        let ends = on_curves.flat_map(|s| self.curves.segments[s].vertices).map(|v| v.0);
+        let mut vertices: Vec<u32> = ends.chain(self.lonely.iter().map(|lonely| lonely.0)).collect();
+        vertices.sort_unstable();
+        vertices.dedup();
+        let place = |v: u32| self.curves.points[v as usize];
+        let distance = SAME_PLACE * self.features.bounds.diagonal();
+        let places = Places::new(vertices.into_iter().map(|v| (v, place(v))), distance);
+        let image = |&v: &u32| {
+            let found = places.find(&(motion * place(v)));
+            found.unwrap_or_else(|| panic!("vertex {v} has no image on patch {}", id.0))
+        };
+        let mut out = Meshed {
+            inputs: of.inputs.iter().map(image).collect(),
+            points: of.points.iter().map(|p| motion * p).collect(),
+            triangles: of.triangles,
+            report: PatchReport { patch: id, ..of.report },
+        };
+        let at = |v: u32| match out.inputs.get(v as usize) {
+            Some(&input) => place(input),
+            None => out.points[v as usize - out.inputs.len()],
+        };
+        if let Some([a, b, c]) = out.triangles.first().map(|t| t.map(at)) {
+            let normal = surface.normal(&a) * if patch.flipped { -1.0 } else { 1.0 };
+            if (b - a).cross(&(c - a)).dot(&normal) < 0.0 {
+                out.triangles.iter_mut().for_each(|t| t.swap(1, 2));
+            }
+        }
+        out
     }
 
     fn mesh(&self, id: PatchId) -> Result<Meshed, SurfaceError> {

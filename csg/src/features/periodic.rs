@@ -265,7 +265,8 @@ fn matched(
     let [from, to] = sides;
     for &of in &from.corners {
         let place = features.corner(of).point;
-        let is_image = |c: &&CornerId| (features.corner(**c).point - motion * place).norm() <= tolerances.merge;
+        let is_image =
+            |c: &&CornerId| (features.corner(**c).point - motion * place).norm() <= tolerances.merge;
         let image = to.corners.iter().find(is_image).ok_or(Unmatched { what: "corner", place })?;
         identified.corners.push([of, *image]);
     }
@@ -276,7 +277,8 @@ fn matched(
     for &of in &from.curves {
         let place = middle(features, of);
         let images = to.curves.iter().filter_map(|&image| {
-            let reversed = image_of(geometry, features, [of, image], &motion, &identified.corners, tolerances)?;
+            let reversed =
+                image_of(geometry, features, [of, image], &motion, &identified.corners, tolerances)?;
             Some(CurveImage { of, image, reversed })
         });
         let image = images.into_iter().next().ok_or(Unmatched { what: "curve", place })?;
@@ -287,7 +289,8 @@ fn matched(
         return Err(Unmatched { what: "curve", place: middle(features, curve) });
     }
     let boundary = |id: PatchId, moved: bool| {
-        let image = |c: CurveId| identified.curves.iter().find(|pair| pair.of == c).map_or(c, |pair| pair.image);
+        let image =
+            |c: CurveId| identified.curves.iter().find(|pair| pair.of == c).map_or(c, |pair| pair.image);
         let curves = features.patch(id).boundary.iter().map(|(c, _)| if moved { image(*c) } else { *c });
         let mut curves: Vec<CurveId> = curves.collect();
         curves.sort_unstable();
@@ -395,3 +398,7 @@ fn refuse_contradictions(
     }
     Ok(())
 }
+
+#[cfg(test)]
+#[path = "periodic_tests.rs"]
+mod tests;

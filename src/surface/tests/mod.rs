@@ -27,7 +27,13 @@ impl Made {
         let bounds = Aabb { min: Point::new(-5., -5., -5.), max: Point::new(5., 5., 5.) };
         Self {
             geometry: Geometry { surfaces, ..Geometry::default() },
-            features: Features { corners: Vec::new(), curves: Vec::new(), patches: Vec::new(), bounds, identified: Vec::new() },
+            features: Features {
+                corners: Vec::new(),
+                curves: Vec::new(),
+                patches: Vec::new(),
+                bounds,
+                identified: Vec::new(),
+            },
             curves: SurfaceMesh::default(),
         }
     }

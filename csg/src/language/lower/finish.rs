@@ -6,7 +6,9 @@ use super::expand::{ExpandError, expand};
 use super::forest::{ForestError, NodeId};
 use super::unify::Classes;
 use super::{Lowering, Override, Tlo, TloKind};
-use crate::geometry::{Body, BodyId, BoundaryOverride, Cutout, Identification, Span};
+use crate::geometry::{
+    Body, BodyId, BoundaryOverride, Cutout, Identification, SingularPlace, Singularity, Span,
+};
 use crate::{Geometry, Solid, SurfaceId};
 
 impl Lowering<'_> {
@@ -25,6 +27,7 @@ impl Lowering<'_> {
         let (bodies, cutouts) = self.top_level_objects(&classes);
         self.warn_of_idle_cutouts(&bodies, &cutouts);
         let identifications = self.identifications(&classes);
+        let singularities = self.singularities(&classes, &bodies);
         let boundary_overrides = self.boundary_overrides(&classes, &bodies);
         let (surfaces, surface_info) = classes.surfaces(&self.forest.surfaces, &used);
         Geometry {
@@ -33,6 +36,7 @@ impl Lowering<'_> {
             bodies,
             cutouts,
             identifications,
+            singularities,
             user_points: self.user_points,
             boundary_overrides,
             stated_box: self.stated_box,
@@ -120,7 +124,8 @@ impl Lowering<'_> {
                     identifications.push(Identification { surfaces: [first, second], solids, span });
                 }
                 (Some(_), Some(_)) => {
-                    let message = format!("the first surfaces of `{}` and `{}` are the same", solids[0], solids[1]);
+                    let message =
+                        format!("the first surfaces of `{}` and `{}` are the same", solids[0], solids[1]);
                     self.report.meaning(span, message, "a periodic face needs another one as its image");
                 }
                 (first, _) => {
@@ -138,6 +143,29 @@ impl Lowering<'_> {
         let root = self.forest.definitions[definition].root?;
         let surfaces = self.forest.surfaces_of(root).ok()?;
         classes.id(*surfaces.first()?)
+    }
+
+    /// The tags over unified surfaces.
+    fn singularities(&mut self, classes: &Classes, bodies: &[Body]) -> Vec<Singularity> {
+        let of_bodies = |raw: Vec<usize>| raw.into_iter().filter_map(|i| classes.id(i)).collect::<Vec<_>>();
+        let mut singularities = Vec::new();
+        for tag in std::mem::take(&mut self.singularities) {
+            let body_of = |tlo: usize| bodies.iter().position(|body| body.number == tlo as u32 + 1);
+            let body = tag.tlo.and_then(body_of).map(BodyId::new);
+            let mut lists = tag.surfaces.into_iter().map(of_bodies);
+            let place = match (lists.next(), lists.next(), lists.next(), body) {
+                (Some(first), Some(second), Some(third), _) => {
+                    SingularPlace::Point { surfaces: [first, second, third] }
+                }
+                (Some(first), Some(second), None, body) => {
+                    SingularPlace::Edge { surfaces: [first, second], body }
+                }
+                (Some(surfaces), None, None, Some(body)) => SingularPlace::Face { surfaces, body },
+                _ => continue,
+            };
+            singularities.push(Singularity { place, factor: tag.factor, maxh: tag.maxh, span: tag.span });
+        }
+        singularities
     }
 
     /// The overrides over unified surfaces; those that reach nothing are warned of.

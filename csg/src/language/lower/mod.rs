@@ -35,6 +35,7 @@ pub(super) fn lower(statements: &[Statement], report: &mut Report) -> Geometry {
         user_points: Vec::new(),
         overrides: Vec::new(),
         identifications: Vec::new(),
+        singularities: Vec::new(),
         stated_box: None,
         losses_known: false,
         is_redefined: false,
@@ -59,6 +60,7 @@ struct Lowering<'r> {
     overrides: Vec<Override>,
     /// The definitions whose first surfaces are identified, their names and where it says so.
     identifications: Vec<([usize; 2], [String; 2], Span)>,
+    singularities: Vec<Singularity>,
     stated_box: Option<Aabb>,
     /// Whether it has been said that copies lose flags.
     losses_known: bool,
@@ -79,6 +81,17 @@ enum TloKind {
     Body(Body),
     /// A surface, and the definition whose first surface it is.
     Cutout(Cutout, usize),
+}
+
+/// A `singular`, its surfaces not yet unified.
+struct Singularity {
+    /// The surfaces of each solid that it names.
+    surfaces: Vec<Vec<usize>>,
+    /// Among the top-level objects.
+    tlo: Option<usize>,
+    factor: i32,
+    maxh: Option<f64>,
+    span: Span,
 }
 
 /// A `boundarycondition` or `boundaryconditionname`, its surfaces not yet unified.

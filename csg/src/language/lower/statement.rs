@@ -2,7 +2,7 @@
 
 use super::flags::Flags;
 use super::primitive::LARGEST_LENGTH;
-use super::{Lowering, Tlo, TloKind};
+use super::{Lowering, Singularity, Tlo, TloKind};
 use crate::geometry::{Aabb, Body, Cutout, Span, SurfaceId, UserPoint};
 use crate::language::ast::{Flag, Name, Statement};
 use crate::language::diagnostic::Reported;
@@ -41,18 +41,11 @@ impl Lowering<'_> {
                 Err(self.not_meshed("identify closesurfaces", *span))
             }
             Statement::SingularFace { tlo, solid, flags, span } => {
-                self.tlo_named(tlo)?;
-                self.known_with_surfaces(std::slice::from_ref(solid))?;
-                self.singular(flags, *span)
+                let tlo = self.tlo_named(tlo)?;
+                self.singular(std::slice::from_ref(solid), Some(tlo), flags, *span)
             }
-            Statement::SingularEdge { solids, flags, span } => {
-                self.known_with_surfaces(solids)?;
-                self.singular(flags, *span)
-            }
-            Statement::SingularPoint { solids, flags, span } => {
-                self.known_with_surfaces(solids)?;
-                self.singular(flags, *span)
-            }
+            Statement::SingularEdge { solids, flags, span } => self.singular(solids, None, flags, *span),
+            Statement::SingularPoint { solids, flags, span } => self.singular(solids, None, flags, *span),
             Statement::Boundary { solid, tlo, number } => self.boundary_number(solid, tlo, *number),
             Statement::BoundaryName { solid, tlo, word } => self.boundary_name(solid, tlo, word),
             Statement::Constant { name } => {
@@ -131,9 +124,9 @@ impl Lowering<'_> {
             bc: flags.boundary_numbers(self.report).and_then(|number| {
                 number.single().ok_or_else(|| self.report.meaning(name.span, one_value, "")).ok()
             }),
-            bc_name: flags
-                .boundary_names(self.report)
-                .and_then(|word| word.single().ok_or_else(|| self.report.meaning(name.span, one_value, "")).ok()),
+            bc_name: flags.boundary_names(self.report).and_then(|word| {
+                word.single().ok_or_else(|| self.report.meaning(name.span, one_value, "")).ok()
+            }),
             span: name.span,
         };
         self.tlos.push(Tlo { definition, kind: TloKind::Cutout(cutout, of_surface), span: surface.span });
@@ -165,17 +158,35 @@ impl Lowering<'_> {
         Ok(())
     }
 
-    fn singular(&mut self, flags: &[Flag], span: Span) -> Result<(), Reported> {
-        let flags = Flags::new(flags, &["factor", "maxh", "tlo"], &[], self.report);
-        if let (Some(tlo), Some(span)) = (flags.word("tlo", self.report), flags.span("tlo")) {
-            self.tlo_named(&Name { text: tlo.to_owned(), span })?;
+    /// `singular face`, `singular edge` or `singular point`, told apart by the number of solids.
+    fn singular(
+        &mut self,
+        solids: &[Name],
+        tlo: Option<usize>,
+        flags: &[Flag],
+        span: Span,
+    ) -> Result<(), Reported> {
+        let is_edge = solids.len() == 2;
+        let known: &[&str] = if is_edge { &["factor", "maxh", "tlo"] } else { &["factor"] };
+        let idle =
+            [("maxh", "it bounds the size along singular edges"), ("tlo", "it selects singular edges")];
+        let flags = Flags::new(flags, known, if is_edge { &[] } else { &idle }, self.report);
+        let mut surfaces = Vec::new();
+        for solid in solids {
+            let definition = self.solid_named(solid)?;
+            let root = self.forest.definitions[definition].root.ok_or(Reported)?;
+            surfaces.push(self.forest.surfaces_of(root).map_err(|_| Reported)?);
         }
-        flags.has_factor(self.report);
-        self.report.warn(span, "`singular` has no effect on the mesh", ONLY_HP);
-        if let (Some(_), Some(span)) = (flags.maxh(self.report), flags.span("maxh")) {
-            let help = "give -maxh to a solid whose surfaces meet there";
-            self.report.warn(span, "the mesh size along singular edges is not set", help);
+        let tlo = match (flags.word("tlo", self.report), flags.span("tlo")) {
+            (Some(tlo), Some(span)) if is_edge => Some(self.tlo_named(&Name { text: tlo.to_owned(), span })?),
+            _ => tlo,
+        };
+        let factor = flags.factor(self.report).unwrap_or(1);
+        let maxh = if is_edge { flags.maxh(self.report) } else { None };
+        if maxh.is_none() {
+            self.report.warn(span, "`singular` has no effect on the mesh", ONLY_HP);
         }
+        self.singularities.push(Singularity { surfaces, tlo, factor, maxh, span });
         Ok(())
     }
 }
