@@ -45,28 +45,30 @@ pub fn mesh_patches(
 ) -> Result<(SurfaceMesh, Report), SurfaceError> {
     let input = Input::new(geometry, features, &curves, size, settings);
     let origins = features.origins().patches;
-    let made = |p: usize| match origins[p] {
-        Some(origin) => {
-            let of = input.mesh(PatchId::new(origin.index))?;
-            Ok(input.moved(of, PatchId::new(p), &origin.motion))
-        }
-        None => input.mesh(PatchId::new(p)),
-    };
-    let results: Vec<Result<Meshed, SurfaceError>> =
-        (0..features.patches.len()).into_par_iter().map(made).collect();
-    let (mut meshed, mut errors) = (Vec::new(), Vec::new());
-    for result in results {
+    let first = |p: usize| origins[p].is_none().then(|| input.mesh(PatchId::new(p)));
+    let firsts: Vec<Option<Result<Meshed, SurfaceError>>> =
+        (0..features.patches.len()).into_par_iter().map(first).collect();
+    let (mut meshed, mut errors): (Vec<Option<Meshed>>, Vec<SurfaceError>) = (Vec::new(), Vec::new());
+    for result in firsts {
         match result {
-            Ok(patch) => meshed.push(patch),
-            Err(error) => errors.push(error),
+            Some(Err(error)) => errors.push(error),
+            other => meshed.push(other.and_then(Result::ok)),
         }
     }
     if let Some(error) = joined(errors, &curves) {
         return Err(error);
     }
+    let images = origins.iter().enumerate().filter_map(|(p, origin)| Some((p, (*origin)?)));
+    let images: Vec<(usize, Meshed)> = images
+        .map(|(p, origin)| {
+            let of = meshed[origin.index].as_ref().expect("an origin is no image");
+            (p, input.moved(of, PatchId::new(p), &origin.motion))
+        })
+        .collect();
+    images.into_iter().for_each(|(p, image)| meshed[p] = Some(image));
     let mut out = curves;
     let mut report = Report::default();
-    for (p, meshed) in meshed.into_iter().enumerate() {
+    for (p, meshed) in meshed.into_iter().flatten().enumerate() {
         let Meshed { inputs, points, triangles, report: of_patch } = meshed;
         let patch = PatchId::new(p);
         let first = out.points.len();
@@ -167,7 +169,7 @@ impl<'a> Input<'a> {
     ///
     /// # Panics
     /// If its boundary vertices have no images.
-    fn moved(&self, of: Meshed, id: PatchId, motion: &Isometry3<f64>) -> Meshed {
+    fn moved(&self, of: &Meshed, id: PatchId, motion: &Isometry3<f64>) -> Meshed {
         let patch = self.features.patch(id);
         let surface = &self.geometry.surfaces[patch.surface.index()];
         let on_curves = patch.boundary.iter().flat_map(|(curve, _)| self.ranges[curve.index()].clone());
@@ -185,8 +187,8 @@ impl<'a> Input<'a> {
         let mut out = Meshed {
             inputs: of.inputs.iter().map(image).collect(),
             points: of.points.iter().map(|p| motion * p).collect(),
-            triangles: of.triangles,
-            report: PatchReport { patch: id, ..of.report },
+            triangles: of.triangles.clone(),
+            report: PatchReport { patch: id, ..of.report.clone() },
         };
         let at = |v: u32| match out.inputs.get(v as usize) {
             Some(&input) => place(input),

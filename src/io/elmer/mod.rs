@@ -7,7 +7,7 @@
 //!                        .elements  id body 504 v v v v
 //!                        .boundary  id bc parent parent 303 v v v
 //!                        .shared    vertex count part part …    the owner first
-//! DIR/mesh.periodic                 pairs of nodes of periodic faces, if there are any: not Elmer's
+//! DIR/partitioning.N/mesh.periodic  pairs of nodes of periodic faces, if there are any: not Elmer's
 //! DIR/mesh.{header,nodes,elements,boundary}                     where there is one part
 //! ```
 //! What Elmer reads and where it would stumble was found in its reader, `fem/src/MeshUtils.F90`.

@@ -2,14 +2,27 @@
 //! BC`); this one spares other programs the search.
 //!
 //! ```text
-//! # node, the node that it is the image of, identification; 1234 nodes in all
+//! # node, the node that it is the image of, identification
+//! # motion 1 1 0 0 1 0 1 0 0 0 0 1 0        identification, three rows of the matrix
 //! 87 3 1
 //! ```
 
+use super::faults::{FaultKind, Faults};
 use super::number::Numbering;
+use super::parse::ReadError;
+use super::read::ElmerMesh;
+use crate::Point;
 use crate::comm::Communicator;
 use crate::io::WriteError;
 use crate::mesh::stream::MeshStream;
+use nalgebra::Matrix3x4;
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// The file's name, in the folder of the parts: their numbers are those that it uses.
+pub(super) const NAME: &str = "mesh.periodic";
+/// How a line with a motion begins.
+const MOTION: &str = "# motion ";
 
 /// **Collective.** The text of the file, on rank 0, if faces are periodic.
 ///
@@ -67,4 +80,61 @@ pub(super) fn periodic_text(
         text += &format!("{image} {of} {identification}\n");
     }
     Ok(Some(text))
+}
+
+/// Judges the pairs of a mesh, if it has any: both nodes must be there, and where the motion says.
+///
+/// # Errors
+/// A file that cannot be read, or a line that is none of it.
+pub(super) fn check_pairs(mesh: &ElmerMesh, faults: &mut Faults) -> Result<(), ReadError> {
+    /// Nodes are on geometry within this part of the diagonal, and so are images.
+    const SAME_PLACE: f64 = 1e-12;
+    let path = mesh.layout.folder().join(NAME);
+    if !path.exists() {
+        return Ok(());
+    }
+    let text = std::fs::read_to_string(&path).map_err(ReadError::io(&path))?;
+    let points: BTreeMap<u32, Point> =
+        mesh.parts.iter().flat_map(|part| part.nodes.iter().map(|node| (node.id, node.point))).collect();
+    let low = points.values().fold(Point::from([f64::INFINITY; 3]), |low, p| low.inf(p));
+    let high = points.values().fold(Point::from([f64::NEG_INFINITY; 3]), |high, p| high.sup(p));
+    let tolerance = SAME_PLACE * (high - low).norm();
+    let mut motions: BTreeMap<u32, Matrix3x4<f64>> = BTreeMap::new();
+    for (index, line) in text.lines().enumerate() {
+        if let Some(rest) = line.strip_prefix(MOTION) {
+            let (number, matrix) = rest.split_once(' ').unwrap_or((rest, ""));
+            let entries: Vec<f64> = numbers(&path, index, matrix)?;
+            let [number] = numbers(&path, index, number)?[..] else { return Err(broken(&path, index)) };
+            if entries.len() != 12 {
+                return Err(broken(&path, index));
+            }
+            motions.insert(number, Matrix3x4::from_row_slice(&entries));
+        } else if !line.starts_with('#') {
+            let [image, of, number] = numbers(&path, index, line)?[..] else {
+                return Err(broken(&path, index));
+            };
+            let motion = motions.get(&number).ok_or_else(|| broken(&path, index))?;
+            let (Some(there), Some(here)) = (points.get(&image), points.get(&of)) else {
+                let what = || format!("of the pair of nodes {image} and {of} one is not in the mesh");
+                faults.add(FaultKind::NoSuchNode, path.clone(), index + 1, what);
+                continue;
+            };
+            let off = (motion * here.to_homogeneous() - there.coords).norm();
+            if off.is_nan() || off > tolerance {
+                let what = || format!("node {image} is {off:e} off the image of node {of}");
+                faults.add(FaultKind::NotPeriodic, path.clone(), index + 1, what);
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The numbers of a line.
+fn numbers<T: std::str::FromStr>(path: &Path, index: usize, line: &str) -> Result<Vec<T>, ReadError> {
+    line.split_whitespace().map(|word| word.parse().map_err(|_| broken(path, index))).collect()
+}
+
+fn broken(path: &Path, index: usize) -> ReadError {
+    let message = "neither two nodes and an identification nor the motion of one".into();
+    ReadError::Line { path: path.to_path_buf(), line: index as u64 + 1, message }
 }

@@ -1,7 +1,7 @@
 //! Writing Elmer's files.
 
 use super::number::{Numbering, number};
-use super::periodic::periodic_text;
+use super::periodic::{self, periodic_text};
 use super::{MAX_ID, MAX_LINE, TET, TRIANGLE};
 use crate::comm::Communicator;
 use crate::io::lines::{self, FLUSH_AT};
@@ -46,7 +46,7 @@ pub fn write(
             written += Written { files: 1, bytes };
         }
         if let Some(text) = &periodic {
-            let bytes = write_text(&stage.join("mesh.periodic"), text.as_bytes())?;
+            let bytes = write_text(&folder.join(periodic::NAME), text.as_bytes())?;
             written += Written { files: 1, bytes };
         }
         if part.ranks() == 1 {
@@ -59,6 +59,9 @@ pub fn write(
 
 /// The files of a replaced `partitioning.N` that may go.
 fn is_part_file(name: &str) -> bool {
+    if name == periodic::NAME {
+        return true;
+    }
     let Some((number, kind)) = name.strip_prefix("part.").and_then(|rest| rest.split_once('.')) else {
         return false;
     };
