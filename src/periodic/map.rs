@@ -5,7 +5,7 @@ use super::{Link, Pair, Pairs};
 use crate::Point;
 use crate::mesh::topology;
 use crate::mesh::{Mesh, VertexId};
-use csg::{Features, PatchId};
+use csg::{Aabb, Features, PatchId};
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 use std::collections::BTreeMap;
 
@@ -43,8 +43,17 @@ pub enum MapError {
     },
 }
 
-/// Vertices of an image are found within this part of the diagonal: far more than rounding, far less than the least edge.
-pub const SAME_PLACE: f64 = 1e-10;
+/// Vertices of an image are found within this part of the diagonal: far more than rounding near the origin, far less than the
+/// least edge.
+const SAME_PLACE: f64 = 1e-10;
+/// Far from the origin: so many units in the last place of the largest coordinate. Moving a point rounds a few times.
+const ROUNDINGS: f64 = 64.0;
+
+/// The distance within which a vertex is the image that is looked for.
+pub fn same_place(bounds: &Aabb) -> f64 {
+    let largest = bounds.min.coords.amax().max(bounds.max.coords.amax());
+    f64::max(SAME_PLACE * bounds.diagonal(), ROUNDINGS * f64::EPSILON * largest)
+}
 
 impl PeriodicMap {
     /// The pairs of a coarse mesh. Edges and faces are numbered as parts number them, see [`crate::dist::distribute`].
@@ -60,7 +69,7 @@ impl PeriodicMap {
             edges: topology::edges(mesh.points.len(), &mesh.tets).edges,
             faces: topology::faces(mesh.points.len(), &mesh.tets).faces,
         };
-        let distance = SAME_PLACE * features.bounds.diagonal();
+        let distance = same_place(&features.bounds);
         for (number, identified) in (1..).zip(&features.identified) {
             for &[of, image] in &identified.patches {
                 let link = Link { identification: number, of, image, motion: identified.motion };

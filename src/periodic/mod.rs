@@ -19,7 +19,7 @@ mod size;
 mod tests;
 
 pub use check::{Checked, check};
-pub use map::{MapError, PeriodicMap, SAME_PLACE};
+pub use map::{MapError, PeriodicMap, same_place};
 pub use pairs::{Pair, Pairs};
 pub use size::PeriodicSize;
 

@@ -225,3 +225,20 @@ fn netgen_files_hold_singular_points_and_faces() {
     assert_eq!(generated.part.points()[point[0] as usize - 1], [1.0, 0.0, 1.0]);
     assert!(block(&text, "singular_face_outside\n", "materials")[1][1] == 3.0);
 }
+
+#[test]
+fn cells_far_from_the_origin_and_of_any_size_are_periodic() {
+    for (at, size) in [(1e6, 1.0), (0.0, 1e-6), (-3e5, 1e6)] {
+        let far = at + size;
+        let source = format!(
+            "algebraic3d solid l = plane ({at},0,0; -1,0,0); solid r = plane ({far},0,0; 1,0,0);
+            solid ball = sphere ({at},{half},{half}; {radius});
+            solid b = l and r and plane (0,0,0; 0,-1,0) and plane (0,{size},0; 0,1,0) and plane (0,0,0; 0,0,-1)
+            and plane (0,0,{size}; 0,0,1) and not ball and not translate ({size},0,0; ball); tlo b; identify periodic l r;",
+            half = 0.5 * size,
+            radius = 0.3 * size,
+        );
+        let checked = made(&model_of(&source), 2, 1)[0].periodic.unwrap();
+        assert!(checked.lost == 0 && checked.pairs > 50, "{source}: {checked:?}");
+    }
+}

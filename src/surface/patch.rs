@@ -10,8 +10,8 @@ use super::sheet::{Kind, Node, Piece, Sheet, Stop};
 use super::topology::NONE;
 use super::{PatchReport, Report, Settings, SurfaceError, SurfaceMesh};
 use crate::mesh::{BoundaryTriangle, Class, VertexId};
-use crate::periodic::SAME_PLACE;
 use crate::periodic::places::Places;
+use crate::periodic::same_place;
 use crate::size::SizeField;
 use crate::{Point, Vector};
 use csg::{CurveId, Features, Geometry, PatchId, Surface};
@@ -178,7 +178,7 @@ impl<'a> Input<'a> {
         vertices.sort_unstable();
         vertices.dedup();
         let place = |v: u32| self.curves.points[v as usize];
-        let distance = SAME_PLACE * self.features.bounds.diagonal();
+        let distance = same_place(&self.features.bounds);
         let places = Places::new(vertices.into_iter().map(|v| (v, place(v))), distance);
         let image = |&v: &u32| {
             let found = places.find(&(motion * place(v)));

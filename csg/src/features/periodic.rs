@@ -355,9 +355,9 @@ fn image_of(
         let forward = motion * (a.trace[(at + 1).min(last)] - a.trace[at.saturating_sub(1)]);
         (surfaces[0].max(surfaces[1]) <= tolerances.merge).then(|| forward.dot(&(near[1] - near[0])) < 0.0)
     };
-    let reversed = [last / 4, last / 2, 3 * last / 4].map(|at| direction_at(at.max(1).min(last - last / 2)));
-    let [first, ..] = reversed;
-    (reversed.iter().all(Option::is_some)).then_some(first?)
+    let places = [last / 4, last / 2, 3 * last / 4].map(|at| at.max(1).min(last.max(2) - 1));
+    let reversed = direction_at(places[0])?;
+    places.iter().all(|&at| direction_at(at) == Some(reversed)).then_some(reversed)
 }
 
 /// Refuses motions that take one entity to different places on different ways.

@@ -87,8 +87,10 @@ pub(super) fn periodic_text(
 /// # Errors
 /// A file that cannot be read, or a line that is none of it.
 pub(super) fn check_pairs(mesh: &ElmerMesh, faults: &mut Faults) -> Result<(), ReadError> {
-    /// Nodes are on geometry within this part of the diagonal, and so are images.
-    const SAME_PLACE: f64 = 1e-12;
+    /// Images are where the motions put them within this part of the diagonal.
+    const SAME_PLACE: f64 = 4e-12;
+    /// Far from the origin: within this part of the largest coordinate, 16 units in the last place.
+    const ROUNDING: f64 = 16.0 * f64::EPSILON;
     let path = mesh.layout.folder().join(NAME);
     if !path.exists() {
         return Ok(());
@@ -98,7 +100,8 @@ pub(super) fn check_pairs(mesh: &ElmerMesh, faults: &mut Faults) -> Result<(), R
         mesh.parts.iter().flat_map(|part| part.nodes.iter().map(|node| (node.id, node.point))).collect();
     let low = points.values().fold(Point::from([f64::INFINITY; 3]), |low, p| low.inf(p));
     let high = points.values().fold(Point::from([f64::NEG_INFINITY; 3]), |high, p| high.sup(p));
-    let tolerance = SAME_PLACE * (high - low).norm();
+    let largest = low.coords.amax().max(high.coords.amax());
+    let tolerance = f64::max(SAME_PLACE * (high - low).norm(), ROUNDING * largest);
     let mut motions: BTreeMap<u32, Matrix3x4<f64>> = BTreeMap::new();
     for (index, line) in text.lines().enumerate() {
         if let Some(rest) = line.strip_prefix(MOTION) {
