@@ -183,7 +183,7 @@ fn a_mesh_size_file_makes_the_mesh_finer_there_and_is_refused_with_its_line() {
         succeed(&mut command);
         read_json(&report)["coarse"]["tets"].as_u64().unwrap()
     };
-    assert!(tets("0\n1\n0.2 0 0  0.2 0 0.8  0.03\n") > 3 * tets("0\n"));
+    assert!(tets("0\n1\n0.2 0 0  0.2 0 0.8  0.03\n") > 2 * tets("0\n"));
     std::fs::write(&sizes, "1\n0 0 0 -1\n").unwrap();
     let output = tetmill()
         .arg("mesh")

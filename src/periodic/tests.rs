@@ -56,7 +56,7 @@ fn images_are_where_the_motions_put_them_at_every_level_and_on_every_rank() {
             }
             pairs.sort_unstable();
             pairs.dedup();
-            assert!(pairs.len() > 10 << (2 * levels), "{name}: {} pairs", pairs.len());
+            assert!(pairs.len() > 4 << (2 * levels), "{name}: {} pairs", pairs.len());
             ids_of_pairs.push(pairs);
         }
         assert_eq!(ids_of_pairs[1], ids_of_pairs[2], "{name}: the pairs do not depend on the ranks");
@@ -192,7 +192,7 @@ fn elmers_companion_file_pairs_its_own_numbers() {
             motions.iter().find(|(identification, _)| u64::from(*identification) == number).unwrap().1;
         assert!((motion * points[&of] - points[&image]).norm() < 1e-14, "{line}");
     }
-    assert!(text.lines().count() > 200);
+    assert!(text.lines().count() > 100);
     let faults = || crate::io::elmer::check_elmer(dir.path()).unwrap().remove(0).1;
     assert!(faults().is_empty(), "{}", faults());
     let wrong = text
@@ -239,6 +239,6 @@ fn cells_far_from_the_origin_and_of_any_size_are_periodic() {
             radius = 0.3 * size,
         );
         let checked = made(&model_of(&source), 2, 1)[0].periodic.unwrap();
-        assert!(checked.lost == 0 && checked.pairs > 50, "{source}: {checked:?}");
+        assert!(checked.lost == 0 && checked.pairs > 30, "{source}: {checked:?}");
     }
 }

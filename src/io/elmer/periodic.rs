@@ -73,9 +73,17 @@ pub(super) fn periodic_text(
     }
     pairs.sort_unstable();
     pairs.dedup();
-    let nodes = part.totals().vertices;
-    let mut text =
-        format!("# node, the node that it is the image of, identification; {nodes} nodes in all\n");
+    let mut text = String::from("# node, the node that it is the image of, identification\n");
+    let mut last = 0;
+    for link in part.links() {
+        // The patches of one identification stand together and have one motion.
+        if std::mem::replace(&mut last, link.identification) != link.identification {
+            text += &format!("{MOTION}{}", link.identification);
+            let matrix = link.motion.to_homogeneous();
+            (0..3).for_each(|row| matrix.row(row).iter().for_each(|x| text += &format!(" {x}")));
+            text += "\n";
+        }
+    }
     for [image, of, identification] in pairs {
         text += &format!("{image} {of} {identification}\n");
     }
