@@ -59,6 +59,9 @@ pub struct SizeOptions {
     /// tets, 0.5 two; 0 leaves thin walls as they are
     #[arg(long, value_name = "K", value_parser = closeness)]
     pub closeness: Option<f64>,
+    /// NETGEN's mesh-size file: a count and lines `x y z h`, then a count and lines `x1 y1 z1 x2 y2 z2 h`
+    #[arg(long, value_name = "FILE")]
+    pub mesh_size_file: Option<PathBuf>,
     /// How much is done for better shapes: quick, standard, careful or thorough [default: careful up to 100,000 tets, then standard]
     #[arg(long, value_name = "NAME")]
     pub effort: Option<Effort>,

@@ -13,7 +13,7 @@ use tetmill::pipeline::target::Outcome;
 use tetmill::pipeline::{CoarseSettings, GenerateSettings, Generated, Model, Wanted, generate};
 use tetmill::progress::Progress;
 use tetmill::report::{MeshReport, PartitionReport, Report};
-use tetmill::size::{Closeness, SizeSettings};
+use tetmill::size::{Closeness, SizeSettings, file};
 use tetmill::{memory, picture, quality};
 
 /// `tetmill generate`
@@ -80,7 +80,8 @@ fn generate_on(comm: &dyn Communicator, options: &Generate, start: Instant) -> R
         .then(|| progress.stage("read", || read_sized_model(&options.input, &options.size, &progress)))
         .transpose();
     let model = agree(comm, model)?;
-    let settings = GenerateSettings { coarse: coarse_settings(&options.size), wanted: wanted(options) };
+    let coarse = agree(comm, coarse_settings(&options.size, first))?;
+    let settings = GenerateSettings { coarse, wanted: wanted(options) };
     let made = generate(comm, model.as_ref(), &settings, &progress)?;
     let target = options.output.clone().unwrap_or_else(|| {
         options.input.files[0].with_extension("").file_name().map_or_else(|| "mesh".into(), PathBuf::from)
@@ -120,12 +121,14 @@ fn read_sized_model(
     progress: &Progress,
 ) -> Result<Model, Failure> {
     let model = read_model(options, progress)?;
-    let SizeOptions { preset, maxh, minh, grading, closeness, effort, coarse } = size;
-    let sized = [maxh, minh, grading, closeness].iter().any(|length| length.is_some());
+    let SizeOptions { preset, maxh, minh, grading, closeness, effort, coarse, mesh_size_file } = size;
+    let sized =
+        [maxh, minh, grading, closeness].iter().any(|length| length.is_some()) || mesh_size_file.is_some();
     if matches!(model, Model::Given(_)) && (sized || preset.is_some() || effort.is_some() || coarse.is_some())
     {
         return Err(Failure::input(format!(
-            "{} is a mesh already and is taken as it is: leave out --preset, --maxh, --minh, --grading, --closeness, --effort and --coarse",
+            "{} is a mesh already and is taken as it is: leave out --preset, --maxh, --minh, --grading, \
+             --closeness, --mesh-size-file, --effort and --coarse",
             name_of(options)
         )));
     }
@@ -138,7 +141,8 @@ fn name_of(options: &InputOptions) -> String {
     names.join(", ")
 }
 
-fn coarse_settings(options: &SizeOptions) -> CoarseSettings {
+/// What the options say of the coarse mesh; the rank that makes it reads the mesh-size file.
+fn coarse_settings(options: &SizeOptions, reads: bool) -> Result<CoarseSettings, Failure> {
     let mut settings = SizeSettings::from(options.preset.unwrap_or_default());
     settings.maxh = options.maxh;
     settings.minh = options.minh.unwrap_or(settings.minh);
@@ -146,7 +150,10 @@ fn coarse_settings(options: &SizeOptions) -> CoarseSettings {
     if let Some(ratio) = options.closeness {
         settings.closeness = Closeness::of_ratio(ratio);
     }
-    CoarseSettings { size: settings, effort: options.effort }
+    if let Some(file) = options.mesh_size_file.as_ref().filter(|_| reads) {
+        settings.sources = file::read(file).map_err(Failure::input)?;
+    }
+    Ok(CoarseSettings { size: settings, effort: options.effort })
 }
 
 fn wanted(options: &Generate) -> Wanted {
@@ -247,6 +254,7 @@ fn summary(model: &Model, input: &str, made: &Generated, ranks: u32, shared: u64
         wanted: coarse.outcome,
         mesh: MeshReport::new(&made.check, made.checksum.to_string()),
         partition: PartitionReport::new(&coarse.partition, shared),
+        periodic: made.periodic,
         stages: Vec::new(),
         seconds: 0.0,
         peak_memory: None,
@@ -305,7 +313,7 @@ pub fn run_mesh(options: &MeshFile) -> Result<(), Failure> {
         Some(tets) => Wanted::Coarse { tets, levels: 0 },
         None => Wanted::Sizes { levels: 0 },
     };
-    let settings = GenerateSettings { coarse: coarse_settings(&options.size), wanted };
+    let settings = GenerateSettings { coarse: coarse_settings(&options.size, true)?, wanted };
     let made = generate(&comm, Some(&model), &settings, &progress)?;
     let written = progress.stage("write", || io::serial::write(&made.part, &made.names, &options.output))?;
     if let Some(file) = &options.picture {

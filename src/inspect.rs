@@ -3,7 +3,7 @@
 use crate::facets::FacetModel;
 use crate::mesh::VertexId;
 use crate::pipeline::{CsgModel, FacetSolid};
-use csg::{BodyId, Curve, PatchId};
+use csg::{BodyId, Curve, Features, PatchId, Singular};
 use serde::Serialize;
 use std::fmt;
 
@@ -20,6 +20,32 @@ pub struct Inspection {
     pub curves: Vec<CurveLine>,
     /// The corners.
     pub corners: Vec<[f64; 3]>,
+    /// Patches that are periodic images of others.
+    pub periodic: Vec<PeriodicLine>,
+    /// Patches, curves and corners that the file tags as singular.
+    pub singular: Vec<SingularLine>,
+}
+
+/// A patch that is the periodic image of another.
+#[derive(Clone, Debug, Serialize)]
+pub struct PeriodicLine {
+    /// The number of the identification, from 1.
+    pub identification: usize,
+    /// The boundary numbers of the patch and its image.
+    pub boundaries: [u32; 2],
+    /// The motion to the image as a matrix by rows: rotation and, in the last column, translation.
+    pub motion: [[f64; 4]; 3],
+}
+
+/// Something singular.
+#[derive(Clone, Debug, Serialize)]
+pub struct SingularLine {
+    /// `patch` (with its boundary number), `curve` or `corner` (with its index).
+    pub kind: &'static str,
+    /// The number or index.
+    pub number: usize,
+    /// How strongly.
+    pub factor: i32,
 }
 
 /// A body.
@@ -54,6 +80,8 @@ pub struct PatchLine {
     pub curves: Vec<usize>,
     /// Largest element size on it, where the file gives one.
     pub maxh: Option<f64>,
+    /// The solid whose boundary it is cut out by, if it is a top-level object of its own.
+    pub cutout: Option<String>,
 }
 
 /// A curve.
@@ -74,6 +102,7 @@ impl Inspection {
         let number = |body: Option<BodyId>| body.map_or(0, |b| geometry.bodies[b.index()].number);
         let patch = |patch: &csg::Patch| {
             let info = &geometry.surface_info[patch.surface.index()];
+            let cutout = patch.cutout.map(|i| &geometry.cutouts[i as usize]);
             PatchLine {
                 boundary: patch.bc,
                 name: patch.name.clone(),
@@ -82,7 +111,8 @@ impl Inspection {
                 line: Some(info.span.line),
                 bodies: [number(patch.inside), number(patch.outside)],
                 curves: patch.boundary.iter().map(|(curve, _)| curve.index()).collect(),
-                maxh: info.maxh,
+                maxh: cutout.and_then(|cutout| cutout.maxh).or(info.maxh),
+                cutout: cutout.map(|cutout| cutout.name.clone()),
             }
         };
         let boundary = |id: PatchId| features.patch(id).bc;
@@ -103,6 +133,8 @@ impl Inspection {
             patches: features.patches.iter().map(patch).collect(),
             curves: features.curves.iter().map(curve).collect(),
             corners: features.corners.iter().map(|c| c.point.into()).collect(),
+            periodic: periodic_lines(features),
+            singular: singular_lines(model),
         }
     }
 
@@ -121,6 +153,7 @@ impl Inspection {
                 bodies: [number(patch.inside), number(patch.outside)],
                 curves: (0..beside.len()).filter(|&curve| beside[curve].contains(&id)).collect(),
                 maxh: None,
+                cutout: None,
             }
         };
         let point = |v: u32| model.points[v as usize];
@@ -141,8 +174,32 @@ impl Inspection {
             patches: model.patches.iter().enumerate().map(patch).collect(),
             curves: model.curves.iter().enumerate().map(curve).collect(),
             corners: model.corners.iter().map(|&v| point(v).into()).collect(),
+            periodic: Vec::new(),
+            singular: Vec::new(),
         }
     }
+}
+
+fn periodic_lines(features: &Features) -> Vec<PeriodicLine> {
+    let lines = (1..).zip(&features.identified).flat_map(|(identification, identified)| {
+        let matrix = identified.motion.to_homogeneous();
+        let motion = [0, 1, 2].map(|i| [0, 1, 2, 3].map(|j| matrix[(i, j)]));
+        identified.patches.iter().map(move |patches| {
+            let boundaries = patches.map(|id| features.patch(id).bc);
+            PeriodicLine { identification, boundaries, motion }
+        })
+    });
+    lines.collect()
+}
+
+fn singular_lines(CsgModel { geometry, features, .. }: &CsgModel) -> Vec<SingularLine> {
+    let Singular { patches, curves, corners } = features.singular(geometry);
+    let line = |kind, number, factor| SingularLine { kind, number, factor };
+    let patches =
+        patches.into_iter().map(|(id, factor)| line("patch", features.patch(id).bc as usize, factor));
+    let curves = curves.into_iter().map(|(id, factor)| line("curve", id.index(), factor));
+    let corners = corners.into_iter().map(|(id, factor)| line("corner", id.index(), factor));
+    patches.chain(curves).chain(corners).collect()
 }
 
 /// The patches on either side of each curve, by curve.
@@ -201,9 +258,10 @@ impl fmt::Display for Inspection {
                 _ => patch.surface.to_owned(),
             };
             let maxh = patch.maxh.map_or(String::new(), |h| format!("  maxh {h}"));
+            let cutout = patch.cutout.as_ref().map_or(String::new(), |solid| format!("  cut out by {solid}"));
             writeln!(
                 f,
-                "  {:>4}  {:16} {surface:36} {behind} | {front}  {} curves{maxh}",
+                "  {:>4}  {:16} {surface:36} {behind} | {front}  {} curves{maxh}{cutout}",
                 patch.boundary,
                 patch.name,
                 patch.curves.len()
@@ -217,6 +275,26 @@ impl fmt::Display for Inspection {
         writeln!(f, "\n{} corners", self.corners.len())?;
         for (i, [x, y, z]) in self.corners.iter().enumerate() {
             writeln!(f, "  {i:>4}  ({x}, {y}, {z})")?;
+        }
+        if !self.periodic.is_empty() {
+            writeln!(
+                f,
+                "\n{} periodic patches (identification, boundary numbers, motion)",
+                self.periodic.len()
+            )?;
+        }
+        for line in &self.periodic {
+            let [of, image] = line.boundaries;
+            let [x, y, z] = line.motion.map(|row| row[3]);
+            let turns = [0, 1, 2].iter().any(|&i| line.motion[i][i] != 1.0);
+            let turned = if turns { "turned, then " } else { "" };
+            writeln!(f, "  {:>4}  {of} to {image}, {turned}moved by ({x}, {y}, {z})", line.identification)?;
+        }
+        if !self.singular.is_empty() {
+            writeln!(f, "\n{} singular patches, curves and corners (number, factor)", self.singular.len())?;
+        }
+        for SingularLine { kind, number, factor } in &self.singular {
+            writeln!(f, "  {kind} {number}, factor {factor}")?;
         }
         Ok(())
     }

@@ -14,6 +14,7 @@ pub mod kernel;
 pub mod memory;
 pub mod mesh;
 pub mod partition;
+pub mod periodic;
 pub mod picture;
 pub mod pipeline;
 pub mod progress;

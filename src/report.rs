@@ -3,6 +3,7 @@
 use crate::check::PartReport;
 use crate::io::Written;
 use crate::partition::Metrics;
+use crate::periodic::Checked;
 use crate::pipeline::target::Outcome;
 use crate::pipeline::{CoarseReport, Entities};
 use crate::progress::Stage;
@@ -32,6 +33,8 @@ pub struct Report {
     pub mesh: MeshReport,
     /// The partition.
     pub partition: PartitionReport,
+    /// What became of periodic faces; null if there are none.
+    pub periodic: Option<Checked>,
     /// The stages in order.
     pub stages: Vec<Stage>,
     /// Seconds from start to end.
@@ -218,6 +221,13 @@ impl fmt::Display for Report {
             write!(f, "; boundary vertices within {distance:.1e} of their patch")?;
         }
         writeln!(f)?;
+        if let Some(Checked { pairs, furthest, .. }) = self.periodic {
+            writeln!(
+                f,
+                "periodic   {} pairs of vertices, within {furthest:.1e} of their motions",
+                grouped(pairs)
+            )?;
+        }
         if self.ranks > 1 {
             let p = &self.partition;
             writeln!(

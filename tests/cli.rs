@@ -170,3 +170,42 @@ fn inspect_names_what_a_geometry_consists_of() {
     let json: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(json["bodies"].as_array().unwrap().len(), 4);
 }
+
+#[test]
+fn a_mesh_size_file_makes_the_mesh_finer_there_and_is_refused_with_its_line() {
+    let dir = tempfile::tempdir().unwrap();
+    let (sizes, report) = (dir.path().join("sizes.txt"), dir.path().join("report.json"));
+    let tets = |text: &str| {
+        std::fs::write(&sizes, text).unwrap();
+        let mut command = tetmill();
+        command.arg("generate").arg(own("sheared_cell")).args(["-f", "none", "-q", "--preset", "coarse"]);
+        command.arg("--mesh-size-file").arg(&sizes).arg("--report").arg(&report);
+        succeed(&mut command);
+        read_json(&report)["coarse"]["tets"].as_u64().unwrap()
+    };
+    assert!(tets("0\n1\n0.2 0 0  0.2 0 0.8  0.03\n") > 2 * tets("0\n"));
+    std::fs::write(&sizes, "1\n0 0 0 -1\n").unwrap();
+    let output = tetmill()
+        .arg("mesh")
+        .arg(own("sheared_cell"))
+        .arg("-o")
+        .arg(dir.path().join("m.vtu"))
+        .arg("--mesh-size-file")
+        .arg(&sizes)
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    assert!(said.contains("sizes.txt:2: the size -1 is not positive"), "{said}");
+}
+
+#[test]
+fn inspect_shows_what_is_periodic_cut_out_and_singular() {
+    let text =
+        |name: &str| String::from_utf8(succeed(tetmill().arg("inspect").arg(own(name))).stdout).unwrap();
+    assert!(text("rotor_sector").contains("1  1 to 2, turned, then moved by (0, 0, 0)"));
+    let plate = text("heated_plate");
+    for line in ["11  heater", "cut out by round", "curve 7, factor 2", "patch 11, factor 1"] {
+        assert!(plate.contains(line), "{line} in {plate}");
+    }
+}

@@ -3,9 +3,10 @@
 use crate::common::{geometries_in, judge, report_of, shared, succeed, tetmill};
 
 /// What this version meshes.
-const MESHED: [&str; 22] = [
+const MESHED: [&str; 24] = [
     "boundarycondition",
     "boxcyl",
+    "circle_on_cube",
     "cone",
     "cube",
     "cubeandspheres",
@@ -18,6 +19,7 @@ const MESHED: [&str; 22] = [
     "manyholes",
     "matrix",
     "ortho",
+    "period",
     "revolution",
     "sculpture",
     "shaft",

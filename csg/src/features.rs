@@ -11,7 +11,8 @@
 //!    An arc is part of a feature if it is more than a line on one smooth sheet.
 //! 6. `assemble`: arcs to curves and corners, sheets to patches; `extent`: their box; `number`: boundary
 //!    numbers and names.
-//! 7. `check`: whether it all fits together; `contact`: whether places where surfaces are tangent matter.
+//! 7. `periodic`: which of them are images of others.
+//! 8. `check`: whether it all fits together; `contact`: whether places where surfaces are tangent matter.
 //!
 //! Why trace all pairs and classify afterwards, and not follow edges from special points like NETGEN: no
 //! decision depends on a tolerance while a curve is followed; surfaces in special position (three through
@@ -44,13 +45,17 @@ mod error;
 mod extent;
 mod number;
 mod octree;
+mod periodic;
 mod seam;
 mod seed;
+mod singular;
 mod trace;
 
 pub use check::Inconsistency;
 pub use error::{FeatureError, Named, Place};
+pub use periodic::{CurveImage, Identified, Origin, Origins};
 pub use seam::find_seams;
+pub use singular::Singular;
 pub use trace::{curve_curvature, curve_tangent};
 
 /// A point where curves end, or a vertex of its own (`point`, the apex of a cone).
@@ -86,7 +91,7 @@ pub struct Curve {
     pub fins: Vec<Fin>,
 }
 
-/// The pieces of one surface that separate the same two regions.
+/// The pieces of one surface that separate the same two regions and belong to the same cutout, if to any.
 #[derive(Clone, Debug)]
 pub struct Patch {
     /// The surface.
@@ -98,6 +103,8 @@ pub struct Patch {
     pub inside: Option<BodyId>,
     /// The body in front of it, `None` for the exterior.
     pub outside: Option<BodyId>,
+    /// Which of [`Geometry::cutouts`] it is, by index, if it is one.
+    pub cutout: Option<u32>,
     /// Its boundary: curves, and whether each is run in its own direction with the patch on the left.
     /// Empty for a whole closed surface (sphere, torus, ellipsoid).
     pub boundary: Vec<(CurveId, bool)>,
@@ -120,6 +127,8 @@ pub struct Features {
     pub patches: Vec<Patch>,
     /// The box of the bodies, computed.
     pub bounds: Aabb,
+    /// Periodic faces, by identification of the geometry.
+    pub identified: Vec<Identified>,
 }
 
 impl Curve {
@@ -166,6 +175,7 @@ fn find_in(geometry: &Geometry, tree: &Octree, tolerances: &Tolerances) -> Resul
     contact::check(geometry, tree, tolerances)?;
     let mut features = assemble::entities(geometry, tree, &arcs, &nodes, tolerances)?;
     number::number(geometry, &mut features.patches);
+    features.identified = periodic::identify(geometry, &features, tolerances)?;
     features.check()?;
     Ok(features)
 }

@@ -117,6 +117,78 @@ pub struct Body {
     pub span: Span,
 }
 
+/// The part of a surface that bounds a solid, as a patch of its own: a top-level object with a surface (`tlo S F`).
+///
+/// It is no body and changes none: it cuts a patch out of those that lie on the surface, where the surface also
+/// bounds the solid.
+#[derive(Clone, Debug)]
+pub struct Cutout {
+    /// The name of the solid.
+    pub name: String,
+    /// The solid.
+    pub solid: Solid,
+    /// The surface.
+    pub surface: SurfaceId,
+    /// The number NETGEN gives it: 1 + position among all top-level objects of the file.
+    pub number: u32,
+    /// Upper bound of the mesh size on it (`-maxh`).
+    pub maxh: Option<f64>,
+    /// Boundary-condition number (`-bc`).
+    pub bc: Option<u32>,
+    /// Boundary name (`-bcname`).
+    pub bc_name: Option<String>,
+    /// Where it stands in the file.
+    pub span: Span,
+}
+
+/// Two surfaces whose patches are to be the same but for a motion (`identify periodic`).
+#[derive(Clone, Debug)]
+pub struct Identification {
+    /// The surface, and its image.
+    pub surfaces: [SurfaceId; 2],
+    /// The names of the solids whose first surfaces they are.
+    pub solids: [String; 2],
+    /// Where it stands in the file.
+    pub span: Span,
+}
+
+/// A tag for solvers that grade elements towards singularities (`singular`).
+#[derive(Clone, Debug)]
+pub struct Singularity {
+    /// Where.
+    pub place: SingularPlace,
+    /// How strongly (`-factor`).
+    pub factor: i32,
+    /// Upper bound of the mesh size there; edges only (`-maxh`).
+    pub maxh: Option<f64>,
+    /// Where it stands in the file.
+    pub span: Span,
+}
+
+/// Where a [`Singularity`] is, by the surfaces of the solids that it names.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum SingularPlace {
+    /// Where some surfaces bound a body.
+    Face {
+        /// The surfaces.
+        surfaces: Vec<SurfaceId>,
+        /// The body.
+        body: BodyId,
+    },
+    /// On curves between a surface of the first list and one of the second, beside a body if one is named.
+    Edge {
+        /// The two lists.
+        surfaces: [Vec<SurfaceId>; 2],
+        /// The body.
+        body: Option<BodyId>,
+    },
+    /// At corners on a surface of each list.
+    Point {
+        /// The three lists.
+        surfaces: [Vec<SurfaceId>; 3],
+    },
+}
+
 /// A point that is to be a mesh vertex (`point`).
 #[derive(Clone, Copy, Debug)]
 pub struct UserPoint {
@@ -176,6 +248,12 @@ pub struct Geometry {
     pub surface_info: Vec<SurfaceInfo>,
     /// The bodies in file order.
     pub bodies: Vec<Body>,
+    /// Parts of surfaces that are patches of their own, in file order. Where several have a place, the first counts.
+    pub cutouts: Vec<Cutout>,
+    /// Periodic faces.
+    pub identifications: Vec<Identification>,
+    /// Tags for solvers.
+    pub singularities: Vec<Singularity>,
     /// Points to be kept as mesh vertices.
     pub user_points: Vec<UserPoint>,
     /// Numbers and names for single boundaries of bodies, in file order.

@@ -17,10 +17,12 @@ pub mod project;
 pub mod solid;
 pub mod surface;
 
-pub use features::{Corner, Curve, FeatureError, Features, Fin, Patch};
+pub use features::{
+    Corner, Curve, FeatureError, Features, Fin, Identified, Origin, Origins, Patch, Singular,
+};
 pub use geometry::{
-    Aabb, Body, BodyId, BoundaryLabel, BoundaryOverride, CornerId, CurveId, Geometry, PatchId, Seam,
-    SurfaceId,
+    Aabb, Body, BodyId, BoundaryLabel, BoundaryOverride, CornerId, CurveId, Cutout, Geometry, Identification,
+    PatchId, Seam, SingularPlace, Singularity, SurfaceId,
 };
 pub use interval::Interval;
 pub use project::{ProjectionFailed, Projector};

@@ -4,7 +4,8 @@ use crate::primitive::{
     Cone, Cylinder, Ellipse, Ellipsoid, EllipticCone, EllipticCylinder, Nappe, Plane, Revolved, Section,
     Sphere, Sweep, Torus,
 };
-use crate::{CurveId, Features, Geometry, PatchId, Point, Surface, SurfaceId, Vector};
+use crate::{CurveId, Features, Geometry, Origin, PatchId, Point, Surface, SurfaceId, Vector};
+use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 
 /// A projection that did not converge.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
@@ -20,8 +21,49 @@ pub struct Projector {
     surfaces: Vec<Surface>,
     curves: Vec<[SurfaceId; 2]>,
     patches: Vec<SurfaceId>,
+    /// Curves that are images of others, ascending.
+    curve_images: Vec<Image>,
+    /// Patches that are images of others, ascending.
+    patch_images: Vec<Image>,
     /// How far a point may be from its surface, a length.
     tolerance: f64,
+}
+
+/// A periodic image: points are projected to it as their originals are to what it is an image of, and moved.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Image {
+    /// The index of the image, and that of its origin.
+    ids: [u32; 2],
+    /// From the origin to the image.
+    motion: Isometry3<f64>,
+}
+
+impl Image {
+    fn all(origins: &[Option<Origin>]) -> Vec<Self> {
+        let image = |(id, origin): (u32, &Option<Origin>)| {
+            origin.map(|origin| Self { ids: [id, origin.index as u32], motion: origin.motion })
+        };
+        (0..).zip(origins).filter_map(image).collect()
+    }
+
+    /// The image with this index.
+    #[inline]
+    fn find(images: &[Self], id: u32) -> Option<&Self> {
+        if images.is_empty() {
+            return None;
+        }
+        images.binary_search_by_key(&id, |image| image.ids[0]).ok().map(|at| &images[at])
+    }
+
+    /// Projects to the origin, and moves the result.
+    fn project(
+        &self,
+        point: &Point,
+        project: impl Fn(&Point) -> Result<Point, ProjectionFailed>,
+    ) -> Result<Point, ProjectionFailed> {
+        let original = project(&self.motion.inverse_transform_point(point));
+        original.map(|point| self.motion * point).map_err(|_| ProjectionFailed(*point))
+    }
 }
 
 /// A point is on a surface within this part of the diagonal of the box of the bodies, or within
@@ -37,7 +79,10 @@ impl Projector {
         let largest = bounds.min.coords.amax().max(bounds.max.coords.amax());
         let rounding = f64::max(ON_SURFACE * bounds.diagonal(), COORDINATE_ROUNDING * largest);
         let gap = GAP_ROOM * widest_gap(geometry, features);
+        let origins = features.origins();
         Self {
+            curve_images: Image::all(&origins.curves),
+            patch_images: Image::all(&origins.patches),
             surfaces: geometry.surfaces.clone(),
             curves: features.curves.iter().map(|c| c.surfaces).collect(),
             patches: features.patches.iter().map(|p| p.surface).collect(),
@@ -57,7 +102,10 @@ impl Projector {
     /// # Errors
     /// Where there is no nearest one, as in the centre of a sphere.
     pub fn project_patch(&self, patch: PatchId, point: &Point) -> Result<Point, ProjectionFailed> {
-        self.patch_surface(patch).project(point)
+        match Image::find(&self.patch_images, patch.0) {
+            Some(image) => image.project(point, |p| self.patch_surface(PatchId(image.ids[1])).project(p)),
+            None => self.patch_surface(patch).project(point),
+        }
     }
 
     /// The point of both surfaces of `curve` near to `point` to which steps across the curve lead.
@@ -67,8 +115,14 @@ impl Projector {
     /// # Errors
     /// If the steps end nowhere on both surfaces.
     pub fn project_curve(&self, curve: CurveId, point: &Point) -> Result<Point, ProjectionFailed> {
-        let [a, b] = self.curve_surfaces(curve);
-        project_to_both(a, b, point, self.tolerance)
+        let on = |curve: CurveId, point: &Point| {
+            let [a, b] = self.curve_surfaces(curve);
+            project_to_both(a, b, point, self.tolerance)
+        };
+        match Image::find(&self.curve_images, curve.0) {
+            Some(image) => image.project(point, |p| on(CurveId(image.ids[1]), p)),
+            None => on(curve, point),
+        }
     }
 
     /// The distance of `point` from the surface of `patch`, to first order.
@@ -95,7 +149,8 @@ impl Projector {
     /// Everything as plain numbers, to be sent to other ranks.
     ///
     /// First the tolerance and the numbers of surfaces, curves and patches; then each surface as its kind and the
-    /// vectors and then the numbers of its primitive; the two surfaces of each curve; the surface of each patch.
+    /// vectors and then the numbers of its primitive; the two surfaces of each curve; the surface of each patch; the numbers of curves and
+    /// patches that are images, each with its origin and the quaternion and translation between.
     pub fn encode(&self) -> Vec<f64> {
         let counts = [self.surfaces.len(), self.curves.len(), self.patches.len()];
         let mut out = vec![self.tolerance];
@@ -104,6 +159,11 @@ impl Projector {
             encode_surface(surface, &mut out);
         }
         out.extend(self.curves.iter().flatten().chain(&self.patches).map(|s| f64::from(s.0)));
+        out.extend([&self.curve_images, &self.patch_images].map(|images| images.len() as f64));
+        for Image { ids, motion } in self.curve_images.iter().chain(&self.patch_images) {
+            out.extend(ids.map(f64::from));
+            out.extend(motion.rotation.coords.iter().chain(motion.translation.vector.iter()));
+        }
         out
     }
 
@@ -115,9 +175,15 @@ impl Projector {
         let surfaces: Vec<_> = (0..surfaces).map(|_| reader.surface()).collect::<Option<_>>()?;
         let id = |reader: &mut Reader| reader.count().filter(|&i| i < surfaces.len()).map(SurfaceId::new);
         let curves =
-            (0..curves).map(|_| Some([id(&mut reader)?, id(&mut reader)?])).collect::<Option<_>>()?;
-        let patches = (0..patches).map(|_| id(&mut reader)).collect::<Option<_>>()?;
-        reader.0.is_empty().then_some(Self { surfaces, curves, patches, tolerance })
+            (0..curves).map(|_| Some([id(&mut reader)?, id(&mut reader)?])).collect::<Option<Vec<_>>>()?;
+        let patches = (0..patches).map(|_| id(&mut reader)).collect::<Option<Vec<_>>>()?;
+        let counts = [reader.count()?, reader.count()?];
+        let lengths = [curves.len(), patches.len()];
+        let mut images =
+            |i: usize| (0..counts[i]).map(|_| reader.image(lengths[i])).collect::<Option<Vec<_>>>();
+        let (curve_images, patch_images) = (images(0)?, images(1)?);
+        let projector = Self { surfaces, curves, patches, curve_images, patch_images, tolerance };
+        reader.0.is_empty().then_some(projector)
     }
 }
 
@@ -261,6 +327,15 @@ impl Reader<'_> {
         Some(Ellipse { center: pair()?, axis: pair()?, radii: pair()? })
     }
 
+    /// An image among `count` entities.
+    fn image(&mut self, count: usize) -> Option<Image> {
+        let ids = [self.count()?, self.count()?];
+        let quaternion = Quaternion::from([self.number()?, self.number()?, self.number()?, self.number()?]);
+        let rotation = UnitQuaternion::new_unchecked(quaternion);
+        let motion = Isometry3::from_parts(Translation3::from(self.vector()?), rotation);
+        ids.iter().all(|&id| id < count).then_some(Image { ids: ids.map(|id| id as u32), motion })
+    }
+
     fn surface(&mut self) -> Option<Surface> {
         Some(match self.count()? {
             0 => Surface::Plane(Plane { point: self.point()?, normal: self.vector()? }),
@@ -342,7 +417,7 @@ mod tests {
         let pair = |a, b| [SurfaceId(a), SurfaceId(b)];
         let curves = vec![pair(0, 1), pair(0, 2), pair(0, 3), pair(1, 2), pair(1, 3), pair(2, 3)];
         let patches = (0..4).map(SurfaceId).collect();
-        Projector { surfaces, curves, patches, tolerance: 2e-12 }
+        Projector { surfaces, curves, patches, tolerance: 2e-12, ..Projector::default() }
     }
 
     proptest! {
@@ -409,6 +484,9 @@ mod tests {
         let [axis, start, up] = [axes[2], axes[0], Vector::new(0.6, 0.0, 0.8)];
         let sweep = |section| Surface::Sweep(Sweep { center: o, axis, start, radius: 5.0, up, section });
         projector.surfaces.extend(sections.map(sweep));
+        let turn = Isometry3::new(Vector::new(1.0, 2.0, 3.0), Vector::new(0.1, 0.2, 0.3));
+        projector.curve_images = vec![Image { ids: [3, 1], motion: turn }];
+        projector.patch_images = vec![Image { ids: [2, 0], motion: turn.inverse() }];
         let numbers = projector.encode();
         assert_eq!(Projector::decode(&numbers), Some(projector));
         assert_eq!(Projector::decode(&numbers[..numbers.len() - 1]), None);

@@ -121,7 +121,7 @@ impl Surface {
             | Self::Ellipsoid(_)
             | Self::EllipticCylinder(_)
             | Self::EllipticCone(_) => true,
-            Self::Torus(_) => false,
+            Self::Torus(_) | Self::Nappe(_) | Self::Revolved(_) | Self::Sweep(_) => false,
         }
     }
 

@@ -362,7 +362,8 @@ mod tests {
             csg::primitive::Cone { point: Point::origin(), axis: Vector::z(), radius: 1.0, slope: -0.5 };
         let geometry = Geometry { surfaces: vec![Surface::Cone(cone)], ..Geometry::default() };
         let bounds = csg::Aabb { min: Point::origin(), max: Point::origin() };
-        let features = Features { corners: vec![], curves: vec![], patches: vec![], bounds };
+        let features =
+            Features { corners: vec![], curves: vec![], patches: vec![], bounds, identified: Vec::new() };
         let smoothness = GeometrySmoothness { geometry: &geometry, features: &features };
         assert_eq!(smoothness.surface_normal(&geometry.surfaces[0], &Point::new(0.0, 0.0, 2.0)), None);
     }

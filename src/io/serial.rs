@@ -6,7 +6,7 @@ use super::text::{FLOAT_CHARS, Line};
 use super::{WriteError, Written, geomview, vtu};
 use crate::comm::thread;
 use crate::mesh::Names;
-use crate::mesh::stream::{MeshStream, NO_TET, TetBlock};
+use crate::mesh::stream::{MeshStream, NO_TET, SingularTags, TetBlock};
 use std::ffi::OsStr;
 use std::path::Path;
 
@@ -92,7 +92,29 @@ fn gmsh(part: &dyn MeshStream, names: &Names, file: &mut Output) -> Result<(), W
         line.int(counts.boundary + tet.index + 1).bytes(b" 4 2 ").int(tet.number).blank();
         ids(line.int(u64::from(tet.body.0) + 1), tet.vertices);
     })?;
-    file.write(b"$EndElements\n")
+    file.write(b"$EndElements\n")?;
+    gmsh_periodic(part, file)
+}
+
+/// Gmsh's `$Periodic`: for each image its elementary tag and that of the patch it is the image of, the matrix of the motion, and
+/// the pairs of nodes, image first.
+fn gmsh_periodic(part: &dyn MeshStream, file: &mut Output) -> Result<(), WriteError> {
+    let links = part.links();
+    if links.is_empty() {
+        return Ok(());
+    }
+    let mut text = format!("$Periodic\n{}\n", links.len());
+    for (index, link) in links.iter().enumerate() {
+        text += &format!("2 {} {}\nAffine", link.image.0 + 1, link.of.0 + 1);
+        // By rows.
+        link.motion.to_homogeneous().transpose().iter().for_each(|x| text += &format!(" {x}"));
+        let pairs = part.images(index);
+        text += &format!("\n{}\n", pairs.len());
+        for (image, of) in pairs {
+            text += &format!("{} {}\n", image + 1, of + 1);
+        }
+    }
+    file.write((text + "$EndPeriodic\n").as_bytes())
 }
 
 /// Medit: the references are boundary and body numbers.
@@ -141,7 +163,7 @@ fn netgen(part: &dyn MeshStream, names: &Names, file: &mut Output) -> Result<(),
     })?;
     file.write(format!("edgesegmentsgi2\n0\npoints\n{}\n", counts.vertices).as_bytes())?;
     lines::vertices(part, file, |line, vertex| coordinates(line, vertex.point))?;
-    let mut end = String::new();
+    let mut end = netgen_identifications(part) + &netgen_singularities(part);
     for (title, list) in [("materials", &names.bodies), ("bcnames", &names.patches)] {
         let list = numbered(list);
         end += &format!("{title}\n{}\n", list.len());
@@ -151,6 +173,47 @@ fn netgen(part: &dyn MeshStream, names: &Names, file: &mut Output) -> Result<(),
         }
     }
     file.write((end + "endmesh\n").as_bytes())
+}
+
+/// NETGEN's pairs of vertices with the numbers of their identifications, all of them periodic. Empty if there are none.
+fn netgen_identifications(part: &dyn MeshStream) -> String {
+    /// NETGEN's number for periodic ones.
+    const PERIODIC: &str = " 2";
+    let links = part.links();
+    let of_link = |index: usize| {
+        let pair = move |(image, of): (u32, u64)| (links[index].identification, of + 1, u64::from(image) + 1);
+        part.images(index).into_iter().map(pair)
+    };
+    let mut pairs: Vec<(u32, u64, u64)> = (0..links.len()).flat_map(of_link).collect();
+    pairs.sort_unstable();
+    pairs.dedup();
+    let Some(count) = links.iter().map(|link| link.identification).max() else { return String::new() };
+    let mut text = format!("identifications\n{}\n", pairs.len());
+    for (number, of, image) in pairs {
+        text += &format!("{of} {image} {number}\n");
+    }
+    text + &format!("identificationtypes\n{count}\n{}\n", PERIODIC.repeat(count as usize).trim_start())
+}
+
+/// NETGEN's factors of singular points and of faces, on both sides of these. Edges have none, as the file has no segments.
+fn netgen_singularities(part: &dyn MeshStream) -> String {
+    let SingularTags { patches, vertices } = part.singular();
+    let points: Vec<_> = vertices.iter().map(|(v, factor)| (u64::from(*v) + 1, *factor)).collect();
+    let faces: Vec<_> = patches.iter().map(|(patch, factor)| (u64::from(patch.0) + 1, *factor)).collect();
+    let mut text = String::new();
+    for (title, list) in [
+        ("singular_points", points),
+        ("singular_face_inside", faces.clone()),
+        ("singular_face_outside", faces),
+    ] {
+        if !list.is_empty() {
+            text += &format!("{title}\n{}\n", list.len());
+        }
+        for (number, factor) in list {
+            text += &format!("{number} {factor}\n");
+        }
+    }
+    text
 }
 
 /// The body of each tet of a part, as runs of equal ones.

@@ -12,6 +12,7 @@
 //! ```
 
 use super::{GlobalId, Rank};
+use crate::periodic::Link;
 use csg::{BodyId, PatchId};
 use std::ops::Range;
 
@@ -68,6 +69,15 @@ pub struct BoundaryBlock {
 /// No fine tet on this side, in [`BoundaryBlock::parents`].
 pub const NO_TET: u64 = u64::MAX;
 
+/// Patches and vertices that are tagged as singular, with their factors.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct SingularTags {
+    /// Patches.
+    pub patches: Vec<(PatchId, i32)>,
+    /// Vertices by local index.
+    pub vertices: Vec<(u32, i32)>,
+}
+
 /// One rank's part of a mesh, as a stream of blocks. All functions are local.
 pub trait MeshStream: Sync {
     /// This rank.
@@ -100,6 +110,24 @@ pub trait MeshStream: Sync {
     fn boundary_blocks(&self) -> usize;
     /// Fills `block` with one boundary block, reusing its memory.
     fn boundary_block(&self, index: usize, block: &mut BoundaryBlock);
+    /// The patches that are periodic images of others, the same on all ranks.
+    fn links(&self) -> &[Link] {
+        &[]
+    }
+    /// The vertices of this part on the image of the link at `index`, by local index, ascending within vertices, edges and faces
+    /// of the coarse mesh, with the global ids of the vertices that they are images of.
+    fn images(&self, _index: usize) -> Vec<(u32, GlobalId)> {
+        Vec::new()
+    }
+    /// What solvers are to treat as singular; only writers of files for one part need it, and only rank 0 knows.
+    fn singular(&self) -> SingularTags {
+        SingularTags::default()
+    }
+    /// All vertices of this part that are images, each once, with the global ids of the first vertices of their chains, which
+    /// are no images.
+    fn origins(&self) -> Vec<(u32, GlobalId)> {
+        Vec::new()
+    }
 }
 
 /// The vertex block that has the vertex with this local index, by binary search.

@@ -5,6 +5,7 @@ use crate::Point;
 use crate::improve::{self, Effort, GeometrySmoothness, Smoothness};
 use crate::kernel::quality::QualitySummary;
 use crate::mesh::{Class, Mesh, Segment, VertexId};
+use crate::periodic::PeriodicSize;
 use crate::size::{GeometricSize, SizeField, SizeSettings, Source};
 use crate::surface::closeness::{ThinWalls, Walls, thin_walls};
 use crate::surface::curves::{CurveError, crowded, mesh_curves};
@@ -193,8 +194,10 @@ pub(super) fn corrected(
 
 fn attempt(model: &CsgModel, settings: &CoarseSettings, allowed: Allowed) -> Attempt {
     let CsgModel { geometry, features, projector } = model;
-    let size = GeometricSize::new(geometry, features, &settings.size);
-    let curves = match mesh_curves(features, projector, &size) {
+    let own = GeometricSize::new(geometry, features, &settings.size);
+    let periodic = PeriodicSize::new(&own, features, settings.size.grading);
+    let size: &dyn SizeField = if features.identified.is_empty() { &own } else { &periodic };
+    let curves = match mesh_curves(features, projector, size) {
         Ok(curves) => curves,
         Err(error) => return Attempt::Failed(error.into()),
     };
@@ -205,26 +208,25 @@ fn attempt(model: &CsgModel, settings: &CoarseSettings, allowed: Allowed) -> Att
     let ends = |s: &Segment| s.vertices.map(|v| curves.points[v.index()]);
     let segments: Vec<[Point; 2]> = curves.segments.iter().map(ends).collect();
     let regions = |id| [features.patch(id).inside, features.patch(id).outside];
-    let surface = surface::mesh_patches(geometry, features, curves, &size, &surface::Settings::default());
+    let surface = surface::mesh_patches(geometry, features, curves, size, &surface::Settings::default());
     let filled = match surface {
         Ok((surface, _)) => {
             let project = |patch, point: &Point| projector.project_patch(patch, point).unwrap_or(*point);
             let closeness = settings.size.scaled_closeness();
-            let walls =
-                Walls { mesh: &surface, regions: &regions, project: &project, size: &size, closeness };
+            let walls = Walls { mesh: &surface, regions: &regions, project: &project, size, closeness };
             let (sources, found) = if allowed.thin { thin_walls(&walls) } else { Default::default() };
             if found.places > 0 {
                 return Attempt::Thin(sources, found);
             }
             let smoothness = GeometrySmoothness { geometry, features };
-            fill(surface, regions, &size, Some(&smoothness), settings.effort)
+            fill(surface, regions, size, Some(&smoothness), settings.effort)
         }
         Err(error) => Err(error.into()),
     };
     match filled {
         Ok(made) => Attempt::Made(Box::new(made)),
         Err(error) => {
-            let lowered = if allowed.lower { error.remedy(&segments, &size) } else { Vec::new() };
+            let lowered = if allowed.lower { error.remedy(&segments, size) } else { Vec::new() };
             if lowered.is_empty() { Attempt::Failed(error) } else { Attempt::Lower(lowered) }
         }
     }

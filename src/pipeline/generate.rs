@@ -12,6 +12,7 @@ use crate::geometry::Projector;
 use crate::memory;
 use crate::mesh::{GlobalId, Mesh, Names, Rank};
 use crate::partition::{self, Metrics};
+use crate::periodic::{self, PeriodicMap};
 use crate::progress::Progress;
 use crate::refine::{self, RefineError, RefinedMesh};
 use crate::size::Source;
@@ -72,6 +73,8 @@ pub struct Generated {
     pub check: PartReport,
     /// What identifies the mesh, whatever the ranks: the same on all.
     pub checksum: Checksum,
+    /// What became of periodic faces, if there are any: the same on all.
+    pub periodic: Option<periodic::Checked>,
     /// On rank 0 alone.
     pub coarse: Option<CoarseResult>,
 }
@@ -117,9 +120,16 @@ pub fn generate(
             continue;
         }
         let part = agree(comm, refined.map_err(Failure::from))?;
+        let map = periodic_map(comm, model, coarse.as_ref().map(|(_, made)| &made.mesh))?;
+        let singular = match model {
+            Some(Model::Csg(model)) => model.features.singular(&model.geometry),
+            _ => csg::Singular::default(),
+        };
+        let part = part.with_periodic(map.clone()).with_singular(singular);
         let (check, checksum) = progress.stage("check", || verdict(comm, &part, &projector))?;
+        let periodic = periodic_verdict(comm, &part, &map, &projector)?;
         let coarse = coarse.take().map(|(_, made)| made);
-        return Ok(Generated { part, levels, names, check, checksum, coarse });
+        return Ok(Generated { part, levels, names, check, checksum, periodic, coarse });
     }
     unreachable!("the loop ends by itself")
 }
@@ -188,6 +198,46 @@ fn mesh_as_wanted(
             }
         }
     }
+}
+
+/// **Collective.** What is periodic in the coarse mesh that rank 0 has.
+fn periodic_map(
+    comm: &dyn Communicator,
+    model: Option<&Model>,
+    coarse: Option<&Mesh>,
+) -> Result<PeriodicMap, Failure> {
+    let map = match (model, coarse) {
+        (Some(Model::Csg(model)), Some(mesh)) => {
+            PeriodicMap::of(mesh, &model.features).map_err(|error| Failure::new(Status::NoValidMesh, error))
+        }
+        _ => Ok(PeriodicMap::default()),
+    };
+    let mut numbers = agree(comm, map)?.encode();
+    comm.broadcast(0, &mut numbers)?;
+    Ok(PeriodicMap::decode(&numbers))
+}
+
+/// **Collective.** Checks that all images are where they belong.
+fn periodic_verdict(
+    comm: &dyn Communicator,
+    part: &RefinedMesh,
+    map: &PeriodicMap,
+    projector: &Projector,
+) -> Result<Option<periodic::Checked>, Failure> {
+    if map.links.is_empty() {
+        return Ok(None);
+    }
+    /// Both points of a pair may be as far off as one from its surface, and moving one rounds.
+    const ROOM: f64 = 4.0;
+    let checked = periodic::check(comm, part, map)?;
+    if checked.lost > 0 || checked.furthest > ROOM * projector.tolerance() {
+        let message = format!(
+            "{} vertices of periodic faces have no partner, others are {:e} off; nothing was written",
+            checked.lost, checked.furthest
+        );
+        return Err(Failure::new(Status::NoValidMesh, message));
+    }
+    Ok(Some(checked))
 }
 
 /// **Collective.** The levels that rank 0 chose.

@@ -23,6 +23,7 @@ fn projector(surfaces: Vec<Surface>, curves: &[[u32; 2]], bounds: [P; 2]) -> Pro
         flipped: false,
         inside: Some(BodyId(0)),
         outside: None,
+        cutout: None,
         boundary: Vec::new(),
         seeds: Vec::new(),
         bc: surface as u32 + 1,
@@ -39,6 +40,7 @@ fn projector(surfaces: Vec<Surface>, curves: &[[u32; 2]], bounds: [P; 2]) -> Pro
         curves: curves.iter().map(curve).collect(),
         patches: (0..surfaces.len()).map(patch).collect(),
         bounds: Aabb { min: bounds[0], max: bounds[1] },
+        identified: Vec::new(),
     };
     csg::Projector::new(&Geometry { surfaces, ..Geometry::default() }, &features).into()
 }

@@ -5,8 +5,10 @@ use super::lattice::{OCTAHEDRON, UPRIGHT, UPSIDE_DOWN, corner_place, octahedron_
 use super::numbering::{Entity, Numbering, ascending};
 use super::snap::Coordinates;
 use crate::dist::{BoundaryFace, DistMesh};
-use crate::mesh::stream::{BoundaryBlock, Counts, MeshStream, NO_TET, TetBlock, VertexBlock};
+use crate::mesh::stream::{BoundaryBlock, Counts, MeshStream, NO_TET, SingularTags, TetBlock, VertexBlock};
 use crate::mesh::{Class, EdgeId, GlobalId, Rank, TET_EDGES, TET_FACES, TetId};
+use crate::periodic::{Link, PeriodicMap};
+use std::sync::Arc;
 
 /// One rank's part of a refined mesh: see [`refine`](super::refine()).
 ///
@@ -18,6 +20,8 @@ pub struct RefinedMesh {
     numbering: Numbering,
     points: Box<[Coordinates]>,
     diagonals: Diagonals,
+    periodic: Arc<PeriodicMap>,
+    singular: csg::Singular,
 }
 
 impl std::fmt::Debug for RefinedMesh {
@@ -40,7 +44,30 @@ impl RefinedMesh {
         diagonals: Diagonals,
     ) -> Self {
         assert_eq!(points.len(), numbering.vertices() as usize, "one point for each fine vertex");
-        Self { coarse, numbering, points, diagonals }
+        Self {
+            coarse,
+            numbering,
+            points,
+            diagonals,
+            periodic: Arc::default(),
+            singular: csg::Singular::default(),
+        }
+    }
+
+    /// The same with what is periodic in the whole coarse mesh.
+    pub fn with_periodic(mut self, map: PeriodicMap) -> Self {
+        self.periodic = Arc::new(map);
+        self
+    }
+
+    /// The same with what solvers are to treat as singular.
+    pub fn with_singular(self, singular: csg::Singular) -> Self {
+        Self { singular, ..self }
+    }
+
+    /// How its fine vertices are numbered.
+    pub fn numbering(&self) -> &Numbering {
+        &self.numbering
     }
 
     /// The coarse mesh.
@@ -255,6 +282,33 @@ impl MeshStream for RefinedMesh {
         block.parents.clear();
         block.parents.extend(behind.into_iter().zip(before).map(|(p, q)| [p, q]));
         block.patch = Some(face.patch);
+    }
+
+    fn links(&self) -> &[Link] {
+        &self.periodic.links
+    }
+
+    fn images(&self, index: usize) -> Vec<(u32, GlobalId)> {
+        self.periodic.pairs[index].fine(&self.coarse, &self.numbering)
+    }
+
+    fn singular(&self) -> SingularTags {
+        let factor = |class: &Class| match class {
+            Class::Corner(corner) => {
+                self.singular.corners.iter().find(|(id, _)| id == corner).map(|tag| tag.1)
+            }
+            _ => None,
+        };
+        let vertices =
+            (0..).zip(&self.coarse.vertex_classes).filter_map(|(v, class)| Some((v, factor(class)?)));
+        SingularTags {
+            patches: self.singular.patches.clone(),
+            vertices: if self.singular.corners.is_empty() { Vec::new() } else { vertices.collect() },
+        }
+    }
+
+    fn origins(&self) -> Vec<(u32, GlobalId)> {
+        self.periodic.origins.fine(&self.coarse, &self.numbering)
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::{Closeness, Preset, SizeField, Source, SourceTree};
 use crate::{Point, Vector};
-use csg::{BodyId, Curve, Features, Geometry, Interval, Solid, SurfaceId};
+use csg::{BodyId, Curve, CurveId, Cutout, Features, Geometry, Interval, Solid, SurfaceId};
 
 /// What the user asks of the size, beside what the geometry says.
 #[derive(Clone, Debug)]
@@ -84,8 +84,9 @@ impl<'a> GeometricSize<'a> {
             .collect();
         let sampler = Sampler { geometry, features, settings, maximum, body_bounds: &body_bounds };
         let mut sources = settings.sources.clone();
-        for curve in &features.curves {
-            sampler.sample_curve(curve, &mut sources);
+        for (i, curve) in features.curves.iter().enumerate() {
+            let bound = settings.scaled_bound(features.edge_bound(geometry, CurveId::new(i)));
+            sampler.sample_curve(curve, bound, &mut sources);
         }
         sampler.sample_patches(&mut sources);
         let tree = SourceTree::new(features.bounds, settings.grading, maximum, &sources);
@@ -145,16 +146,31 @@ impl Sampler<'_> {
         self.settings.scaled_bound(bound).min(self.size_of_curvature(curvature))
     }
 
-    /// Sources along a curve: its own curvature, its length, and the surfaces of the patches beside it.
-    fn sample_curve(&self, curve: &Curve, sources: &mut Vec<Source>) {
+    /// The size that a cutout asks for, infinity if it asks for none.
+    fn cutout_bound(&self, cutout: Option<u32>) -> f64 {
+        let bound = cutout.and_then(|i| self.geometry.cutouts[i as usize].maxh);
+        bound.map_or(f64::INFINITY, |bound| self.settings.scaled_bound(bound))
+    }
+
+    /// The least size that a cutout of a surface asks for, infinity if it has none.
+    fn least_cutout_bound(&self, surface: SurfaceId) -> f64 {
+        let cutouts = (0..).zip(&self.geometry.cutouts).filter(|(_, cutout)| cutout.surface == surface);
+        cutouts.map(|(i, _)| self.cutout_bound(Some(i))).fold(f64::INFINITY, f64::min)
+    }
+
+    /// Sources along a curve: its own curvature, its length, the bound that the file sets for it, and the surfaces of the
+    /// patches beside it.
+    fn sample_curve(&self, curve: &Curve, bound: f64, sources: &mut Vec<Source>) {
         let trace = &curve.trace;
         let length: f64 = trace.windows(2).map(|w| (w[1] - w[0]).norm()).sum();
-        let whole = (self.settings.scale * length / self.settings.segments_per_curve).max(self.settings.minh);
+        let whole = (self.settings.scale * length / self.settings.segments_per_curve)
+            .max(self.settings.minh)
+            .min(bound);
         let curvatures = trace_curvatures(trace, curve.ends.is_none());
         for (i, w) in trace.windows(2).enumerate() {
-            let beside = curve.fins.iter().map(|fin| self.features.patch(fin.patch).surface);
+            let beside = curve.fins.iter().map(|fin| self.features.patch(fin.patch));
             let size = beside
-                .map(|surface| self.size_on(surface, &w[0]))
+                .map(|patch| self.size_on(patch.surface, &w[0]).min(self.cutout_bound(patch.cutout)))
                 .fold(whole.min(self.size_of_curvature(curvatures[i].max(curvatures[i + 1]))), f64::min);
             if size >= self.maximum {
                 continue;
@@ -196,7 +212,8 @@ impl Sampler<'_> {
         if (point - center).norm() > edge {
             return;
         }
-        let own = self.size_on(surface, &point).min(self.least_body_bound());
+        let own =
+            self.size_on(surface, &point).min(self.least_body_bound()).min(self.least_cutout_bound(surface));
         let constant = self.constant_size(surface);
         if own >= self.maximum && constant {
             return;
@@ -242,8 +259,15 @@ impl Sampler<'_> {
         if sides[0] == sides[1] {
             return None;
         }
+        let is_here = |cutout: &Cutout| {
+            let [behind, before] =
+                [-step, step].map(|step| contains(self.geometry, &cutout.solid, &(point + step * normal)));
+            cutout.surface == surface && behind != before
+        };
+        let cutout = (0..).zip(&self.geometry.cutouts).find(|(_, cutout)| is_here(cutout)).map(|(i, _)| i);
         let bounds = self.body_bounds.iter().filter(|(body, _)| sides.contains(&Some(*body)));
-        let size = bounds.map(|(_, b)| *b).fold(self.size_on(surface, point), f64::min);
+        let on_surface = self.size_on(surface, point).min(self.cutout_bound(cutout));
+        let size = bounds.map(|(_, b)| *b).fold(on_surface, f64::min);
         (size < self.maximum).then_some(size)
     }
 }

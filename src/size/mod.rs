@@ -4,6 +4,7 @@
 //! ask for a size, from where it may grow by the **grading** per unit of distance. The field is therefore
 //! Lipschitz: `|size(p) − size(q)| ≤ grading·|p − q|`, except across a body's own bound.
 
+pub mod file;
 mod geometric;
 mod preset;
 mod source_tree;

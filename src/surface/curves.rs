@@ -27,7 +27,8 @@ pub struct CurveError {
     pub failed: ProjectionFailed,
 }
 
-/// Cuts all curves: vertices on corners (vertex i is corner i) and curves, segments in curve order.
+/// Cuts all curves: vertices on corners (vertex i is corner i) and curves, segments in curve order. Those that are
+/// periodic images are cut as their origins are.
 pub fn mesh_curves(
     features: &Features,
     projector: &Projector,
@@ -35,21 +36,49 @@ pub fn mesh_curves(
 ) -> Result<SurfaceMesh, CurveError> {
     let samplings: Vec<Sampling> = features.curves.iter().map(|c| Sampling::new(c, size)).collect();
     let mut counts: Vec<usize> = features.curves.iter().zip(&samplings).map(|(c, s)| s.segments(c)).collect();
-    part_curves_with_the_same_ends(features, &mut counts);
+    let origins = features.origins();
+    let origin = |i: usize| origins.curves[i].map_or(i, |origin| origin.index);
+    // Images are cut as their origins: what parts one, parts the other, and may make a third one the same edge.
+    loop {
+        for i in 0..counts.len() {
+            counts[i] = counts[origin(i)];
+        }
+        let same = curves_with_the_same_ends(features, &counts);
+        if same.is_empty() {
+            break;
+        }
+        same.into_iter().for_each(|i| counts[origin(i)] = 2);
+    }
 
     let mut mesh = SurfaceMesh::default();
     for (i, corner) in features.corners.iter().enumerate() {
-        mesh.points.push(corner.point);
+        mesh.points.push(match origins.corners[i] {
+            Some(origin) => origin.motion * features.corners[origin.index].point,
+            None => corner.point,
+        });
         mesh.classes.push(Class::Corner(CornerId::new(i)));
     }
-    for (i, (curve, sampling)) in features.curves.iter().zip(&samplings).enumerate() {
+    let placed = |i: usize| {
         let id = CurveId::new(i);
-        let inner = sampling
-            .inner_points(counts[i], curve.ends.is_none())
+        samplings[i]
+            .inner_points(counts[i], features.curves[i].ends.is_none())
             .map(|p| projector.project_curve(id, &p))
             .collect::<Result<Vec<Point>, _>>()
-            .map_err(|failed| CurveError { curve: id, failed })?;
-        add_curve(&mut mesh, id, curve, inner);
+            .map_err(|failed| CurveError { curve: id, failed })
+    };
+    for (i, curve) in features.curves.iter().enumerate() {
+        let inner = match origins.curves[i] {
+            Some(origin) => {
+                let mut points: Vec<Point> =
+                    placed(origin.index)?.into_iter().map(|p| origin.motion * p).collect();
+                if origin.reversed {
+                    points.reverse();
+                }
+                points
+            }
+            None => placed(i)?,
+        };
+        add_curve(&mut mesh, CurveId::new(i), curve, inner);
     }
     Ok(mesh)
 }
@@ -70,9 +99,9 @@ fn add_curve(mesh: &mut SurfaceMesh, id: CurveId, curve: &Curve, inner: Vec<Poin
     mesh.segments.extend(chain.windows(2).map(|w| Segment { vertices: [w[0], w[1]], curve: id }));
 }
 
-/// Gives a second segment to curves of one segment between the same corners, all but one of them: they
-/// would be the same edge.
-fn part_curves_with_the_same_ends(features: &Features, counts: &mut [usize]) {
+/// The curves of one segment between the same corners, all but one of them: they would be the same edge and need a second
+/// segment.
+fn curves_with_the_same_ends(features: &Features, counts: &[usize]) -> Vec<usize> {
     let mut single: Vec<([CornerId; 2], f64, usize)> = features
         .curves
         .iter()
@@ -84,11 +113,7 @@ fn part_curves_with_the_same_ends(features: &Features, counts: &mut [usize]) {
         })
         .collect();
     single.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.cmp(&b.2)));
-    for w in single.windows(2) {
-        if w[0].0 == w[1].0 {
-            counts[w[1].2] = 2;
-        }
-    }
+    single.windows(2).filter(|w| w[0].0 == w[1].0).map(|w| w[1].2).collect()
 }
 
 fn length(trace: &[Point]) -> f64 {
@@ -289,6 +314,7 @@ mod tests {
             curves,
             patches: vec![],
             bounds: csg::Aabb { min: Point::new(-1., -1., 0.), max: Point::new(1., 1., 0.) },
+            identified: vec![],
         };
         let cut = |h: f64| {
             let mut mesh = SurfaceMesh::default();

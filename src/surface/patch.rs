@@ -10,9 +10,12 @@ use super::sheet::{Kind, Node, Piece, Sheet, Stop};
 use super::topology::NONE;
 use super::{PatchReport, Report, Settings, SurfaceError, SurfaceMesh};
 use crate::mesh::{BoundaryTriangle, Class, VertexId};
+use crate::periodic::places::Places;
+use crate::periodic::same_place;
 use crate::size::SizeField;
 use crate::{Point, Vector};
 use csg::{CurveId, Features, Geometry, PatchId, Surface};
+use nalgebra::Isometry3;
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -28,7 +31,8 @@ struct Meshed {
 /// Fills all patches with triangles.
 ///
 /// `curves` has the vertices on corners and curves and the segments, and keeps them unchanged; the vertices on
-/// patches follow, patch by patch. Patches are meshed in parallel, with the same result for any number of threads.
+/// patches follow, patch by patch. Patches are meshed in parallel, with the same result for any number of threads; those that are
+/// periodic images get the triangles of their origins, moved.
 ///
 /// # Errors
 /// The first patch, by number, that could not be meshed, and where.
@@ -40,21 +44,31 @@ pub fn mesh_patches(
     settings: &Settings,
 ) -> Result<(SurfaceMesh, Report), SurfaceError> {
     let input = Input::new(geometry, features, &curves, size, settings);
-    let results: Vec<Result<Meshed, SurfaceError>> =
-        (0..features.patches.len()).into_par_iter().map(|p| input.mesh(PatchId::new(p))).collect();
-    let (mut meshed, mut errors) = (Vec::new(), Vec::new());
-    for result in results {
+    let origins = features.origins().patches;
+    let first = |p: usize| origins[p].is_none().then(|| input.mesh(PatchId::new(p)));
+    let firsts: Vec<Option<Result<Meshed, SurfaceError>>> =
+        (0..features.patches.len()).into_par_iter().map(first).collect();
+    let (mut meshed, mut errors): (Vec<Option<Meshed>>, Vec<SurfaceError>) = (Vec::new(), Vec::new());
+    for result in firsts {
         match result {
-            Ok(patch) => meshed.push(patch),
-            Err(error) => errors.push(error),
+            Some(Err(error)) => errors.push(error),
+            other => meshed.push(other.and_then(Result::ok)),
         }
     }
     if let Some(error) = joined(errors, &curves) {
         return Err(error);
     }
+    let images = origins.iter().enumerate().filter_map(|(p, origin)| Some((p, (*origin)?)));
+    let images: Vec<(usize, Meshed)> = images
+        .map(|(p, origin)| {
+            let of = meshed[origin.index].as_ref().expect("an origin is no image");
+            (p, input.moved(of, PatchId::new(p), &origin.motion))
+        })
+        .collect();
+    images.into_iter().for_each(|(p, image)| meshed[p] = Some(image));
     let mut out = curves;
     let mut report = Report::default();
-    for (p, meshed) in meshed.into_iter().enumerate() {
+    for (p, meshed) in meshed.into_iter().flatten().enumerate() {
         let Meshed { inputs, points, triangles, report: of_patch } = meshed;
         let patch = PatchId::new(p);
         let first = out.points.len();
@@ -152,6 +166,44 @@ impl<'a> Input<'a> {
         let direction =
             if !is_apex && line.norm() > TRANSVERSAL { line * line.dot(chord).signum() } else { *chord };
         direction.try_normalize(0.0).unwrap_or_default()
+    }
+
+    /// The mesh of a patch, moved to its image.
+    ///
+    /// # Panics
+    /// If its boundary vertices have no images.
+    fn moved(&self, of: &Meshed, id: PatchId, motion: &Isometry3<f64>) -> Meshed {
+        let patch = self.features.patch(id);
+        let surface = &self.geometry.surfaces[patch.surface.index()];
+        let on_curves = patch.boundary.iter().flat_map(|(curve, _)| self.ranges[curve.index()].clone());
+        let ends = on_curves.flat_map(|s| self.curves.segments[s].vertices).map(|v| v.0);
+        let mut vertices: Vec<u32> = ends.chain(self.lonely.iter().map(|lonely| lonely.0)).collect();
+        vertices.sort_unstable();
+        vertices.dedup();
+        let place = |v: u32| self.curves.points[v as usize];
+        let distance = same_place(&self.features.bounds);
+        let places = Places::new(vertices.into_iter().map(|v| (v, place(v))), distance);
+        let image = |&v: &u32| {
+            let found = places.find(&(motion * place(v)));
+            found.unwrap_or_else(|| panic!("vertex {v} has no image on patch {}", id.0))
+        };
+        let mut out = Meshed {
+            inputs: of.inputs.iter().map(image).collect(),
+            points: of.points.iter().map(|p| motion * p).collect(),
+            triangles: of.triangles.clone(),
+            report: PatchReport { patch: id, ..of.report.clone() },
+        };
+        let at = |v: u32| match out.inputs.get(v as usize) {
+            Some(&input) => place(input),
+            None => out.points[v as usize - out.inputs.len()],
+        };
+        if let Some([a, b, c]) = out.triangles.first().map(|t| t.map(at)) {
+            let normal = surface.normal(&a) * if patch.flipped { -1.0 } else { 1.0 };
+            if (b - a).cross(&(c - a)).dot(&normal) < 0.0 {
+                out.triangles.iter_mut().for_each(|t| t.swap(1, 2));
+            }
+        }
+        out
     }
 
     fn mesh(&self, id: PatchId) -> Result<Meshed, SurfaceError> {

@@ -89,14 +89,16 @@ fn is_boundary(
     Ok(false)
 }
 
-/// Unit directions from the apex along lines of both nappes, none of them special.
+/// Unit directions from the apex along lines of its nappes, none of them special.
 fn lines(cone: &Surface) -> Vec<Vector> {
     const COUNT: u32 = 16;
+    let round = |axis: &Vector, radius: f64, slope: f64| {
+        let (u, v) = tangents(axis);
+        ([u, v], [radius; 2], axis * (radius / slope))
+    };
     let (axes, radii, rise) = match cone {
-        Surface::Cone(c) => {
-            let (u, v) = tangents(&c.axis);
-            ([u, v], [c.radius; 2], c.axis * (c.radius / c.slope))
-        }
+        Surface::Cone(c) => round(&c.axis, c.radius, c.slope),
+        Surface::Nappe(c) => round(&c.axis, c.radius, c.slope),
         Surface::EllipticCone(c) => (c.axes, c.radii, c.axis / c.rate),
         _ => return Vec::new(),
     };
@@ -104,7 +106,8 @@ fn lines(cone: &Surface) -> Vec<Vector> {
     turns
         .flat_map(|turn| {
             let across = axes[0] * (radii[0] * turn.cos()) + axes[1] * (radii[1] * turn.sin());
-            [across + rise, across - rise].map(|line| line.normalize())
+            let nappes = if matches!(cone, Surface::Nappe(_)) { 1 } else { 2 };
+            [across + rise, across - rise].into_iter().take(nappes).map(|line| line.normalize())
         })
         .collect()
 }

@@ -70,6 +70,8 @@ pub(super) struct Sheet {
     pub outside: Option<BodyId>,
     /// Whether the normal is against the gradient.
     pub flipped: bool,
+    /// Which cutout it is part of, by index.
+    pub cutout: Option<u32>,
 }
 
 impl Sheet {
@@ -83,8 +85,20 @@ impl Sheet {
             (a, _) => a.is_none(),
         };
         let (inside, outside) = if flipped { (before, behind) } else { (behind, before) };
-        Some(Self { surface, inside, outside, flipped })
+        Some(Self { surface, inside, outside, flipped, cutout: None })
     }
+}
+
+/// The first cutout that a place on a surface belongs to: its solid is on one side of the surface only. `behind` and
+/// `before` tell the sides of surfaces for a point just behind the surface, and just before it.
+fn cutout_at(
+    geometry: &Geometry,
+    leaf: &Leaf,
+    surface: SurfaceId,
+    [behind, before]: [&dyn Fn(SurfaceId) -> bool; 2],
+) -> Option<u32> {
+    let mut here = leaf.cutouts.iter().filter(|(i, _)| geometry.cutouts[*i as usize].surface == surface);
+    here.find(|(_, solid)| solid.holds(behind) != solid.holds(before)).map(|(i, _)| *i)
 }
 
 /// The sheet of a surface at one of its points, `None` if it is no boundary there; `other_side` tells
@@ -97,9 +111,11 @@ pub(super) fn sheet_at(
     other_side: &dyn Fn(SurfaceId) -> bool,
 ) -> Result<Option<Sheet>, FeatureError> {
     let Some(leaf) = tree.leaf(at).filter(|leaf| leaf.surfaces.contains(&id)) else { return Ok(None) };
-    let side =
-        |positive: bool| region(geometry, leaf, at, &|s| if s == id { positive } else { other_side(s) });
-    Ok(Sheet::between(id, side(false)?, side(true)?))
+    let behind = |s| s != id && other_side(s);
+    let before = |s| s == id || other_side(s);
+    let sheet =
+        Sheet::between(id, region(geometry, leaf, at, &behind)?, region(geometry, leaf, at, &before)?);
+    Ok(sheet.map(|sheet| Sheet { cutout: cutout_at(geometry, leaf, id, [&behind, &before]), ..sheet }))
 }
 
 /// What is around a curve at one of its points.
@@ -179,18 +195,18 @@ pub(super) fn around(
     let outward = u * angle.cos() + v * angle.sin();
     let mut positive: Vec<bool> =
         surfaces.iter().map(|s| geometry.surfaces[s.index()].gradient(at).dot(&outward) > 0.0).collect();
-    let region_of = |positive: &[bool]| {
-        region(geometry, leaf, at, &|s| match surfaces.binary_search(&s) {
-            Ok(i) => positive[i],
-            Err(_) => geometry.surfaces[s.index()].value(at) > 0.0,
-        })
+    let side = |positive: &[bool], s: SurfaceId| match surfaces.binary_search(&s) {
+        Ok(i) => positive[i],
+        Err(_) => geometry.surfaces[s.index()].value(at) > 0.0,
     };
+    let region_of = |positive: &[bool]| region(geometry, leaf, at, &|s| side(positive, s));
     let mut sheets = Vec::new();
     let mut leaving: Vec<&Ray> = Vec::new();
     let mut before = region_of(&positive)?;
     for step in 1..=rays.len() {
         let ray = &rays[(widest + step) % rays.len()];
         let index = surfaces.binary_search(&ray.surface).expect("a ray of a surface through the curve");
+        let last = positive.clone();
         positive[index] = !positive[index];
         let after = region_of(&positive)?;
         let up = axis.cross(&ray.direction);
@@ -202,6 +218,9 @@ pub(super) fn around(
                 return Err(tangent_rays(geometry, [other, ray], at));
             }
             leaving.push(ray);
+            let cutout =
+                cutout_at(geometry, leaf, ray.surface, [&|s| side(&last, s), &|s| side(&positive, s)]);
+            let sheet = Sheet { cutout, ..sheet };
             // The sheet is to the left if its normal is `up`.
             sheets.push((sheet, along_gradient != sheet.flipped));
         }

@@ -128,8 +128,8 @@ pub(super) fn entities(
             corners.push(corner(geometry, tree, user.point, tolerances));
         }
     }
-    let mut features =
-        Features { corners, curves, patches, bounds: Aabb { min: Point::origin(), max: Point::origin() } };
+    let bounds = Aabb { min: Point::origin(), max: Point::origin() };
+    let mut features = Features { corners, curves, patches, bounds, identified: Vec::new() };
     features.bounds = super::extent::extent(geometry, tree, &features, tolerances)?;
     Ok(features)
 }
@@ -148,6 +148,7 @@ fn patch(sheet: &Sheet) -> Patch {
         flipped: sheet.flipped,
         inside: sheet.inside,
         outside: sheet.outside,
+        cutout: sheet.cutout,
         boundary: Vec::new(),
         seeds: Vec::new(),
         bc: 0,

@@ -106,6 +106,44 @@ pub enum FeatureError {
         /// Its line in the file.
         line: u32,
     },
+    /// A surface that is to be periodic bounds no body.
+    #[error("the first surface of {solid} bounds no body and cannot be periodic (line {line})")]
+    NoPeriodicFace {
+        /// The solid.
+        solid: Named,
+        /// The line of the statement.
+        line: u32,
+    },
+    /// Two surfaces that are to be periodic are not the same, moved.
+    #[error(
+        "the first surfaces of {first} and {second} are not the same, moved, and cannot be periodic (line {line}): \
+         name two planes, or two surfaces of the same shape"
+    )]
+    NoMotion {
+        /// One solid.
+        first: Named,
+        /// The other.
+        second: Named,
+        /// The line of the statement.
+        line: u32,
+    },
+    /// Two faces that are to be periodic do not match.
+    #[error(
+        "the faces on {first} and {second} do not match and cannot be periodic (line {line}): the {what} at {place} \
+         has no counterpart on the other face"
+    )]
+    NotPeriodic {
+        /// One solid.
+        first: Named,
+        /// The other.
+        second: Named,
+        /// The line of the statement.
+        line: u32,
+        /// What has none.
+        what: &'static str,
+        /// Where it is.
+        place: Place,
+    },
     /// What was found does not fit together.
     #[error("the corners, curves and patches found do not fit together: {0}")]
     Inconsistent(#[from] Inconsistency),

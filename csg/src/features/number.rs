@@ -6,8 +6,8 @@ use crate::{BoundaryLabel, Geometry};
 /// The name of a boundary that the file does not name.
 const DEFAULT_NAME: &str = "default";
 
-/// Gives each patch its number and name: those of its surface, else the next free number; then come the
-/// statements for single boundaries of bodies, in file order.
+/// Gives each patch its number and name: those of its cutout, else those of its surface, else the next free number; then come
+/// the statements for single boundaries of bodies, in file order.
 ///
 /// Free numbers start above all that the file gives. NETGEN's start above those of surfaces, so that one of them may be
 /// given again by a `boundarycondition`.
@@ -17,15 +17,18 @@ pub(super) fn number(geometry: &Geometry, patches: &mut [Patch]) {
         BoundaryLabel::Number(number) => Some(number),
         BoundaryLabel::Name(_) => None,
     });
-    let mut last = of_surfaces.chain(of_overrides).max().unwrap_or(0);
+    let of_cutouts = geometry.cutouts.iter().filter_map(|cutout| cutout.bc);
+    let mut last = of_surfaces.chain(of_overrides).chain(of_cutouts).max().unwrap_or(0);
     let mut next = || {
         last += 1;
         last
     };
     for patch in &mut *patches {
         let info = &geometry.surface_info[patch.surface.index()];
-        patch.bc = info.bc.unwrap_or_else(&mut next);
-        patch.name = info.bc_name.clone().unwrap_or_else(|| DEFAULT_NAME.to_owned());
+        let cutout = patch.cutout.map(|i| &geometry.cutouts[i as usize]);
+        patch.bc = cutout.and_then(|cutout| cutout.bc).or(info.bc).unwrap_or_else(&mut next);
+        let name = cutout.and_then(|cutout| cutout.bc_name.clone()).or_else(|| info.bc_name.clone());
+        patch.name = name.unwrap_or_else(|| DEFAULT_NAME.to_owned());
     }
     for over in &geometry.boundary_overrides {
         let sides = |patch: &Patch| [patch.inside, patch.outside].contains(&Some(over.body));

@@ -18,6 +18,8 @@ pub(super) struct Leaf {
     pub surfaces: Vec<SurfaceId>,
     /// What is left of the bodies in it; a body that fills it is `And([])`.
     pub bodies: Vec<(BodyId, Solid)>,
+    /// What is left of the solids of those cutouts whose surface matters in it, by index.
+    pub cutouts: Vec<(u32, Solid)>,
     /// The pairs of its surfaces that may meet in it, in a curve monotone along its middle's direction.
     pub pairs: Vec<[SurfaceId; 2]>,
 }
@@ -71,16 +73,17 @@ impl Octree {
     pub fn new(geometry: &Geometry, root: Cell, tolerances: &Tolerances) -> Result<Self, FeatureError> {
         let bodies = geometry.bodies.iter().enumerate();
         let bodies = bodies.map(|(i, body)| (BodyId::new(i), body.solid.clone())).collect();
+        let cutouts = (0..).zip(geometry.cutouts.iter().map(|cutout| cutout.solid.clone())).collect();
         let mut seams: BTreeMap<[SurfaceId; 2], Vec<[SurfaceId; 2]>> = BTreeMap::new();
         for seam in &geometry.seams {
             seams.entry(seam.carrier).or_default().push(seam.pair);
         }
         let nodes = vec![Node::Leaf(0)];
         let mut tree = Self { root, nodes, leaves: Vec::new(), contacts: Vec::new(), seams };
-        let mut open = vec![(0, root, bodies, 0)];
-        while let Some((node, cell, bodies, depth)) = open.pop() {
-            let bodies = prune(geometry, &cell, bodies);
-            let surfaces = surfaces_of(&bodies);
+        let mut open = vec![(0, root, (bodies, cutouts), 0)];
+        while let Some((node, cell, solids, depth)) = open.pop() {
+            let (bodies, cutouts) = prune_all(geometry, &cell, solids);
+            let surfaces = surfaces_of(&bodies, &cutouts);
             let pairs = Judge { geometry, cell: &cell, depth, tolerances }.all(&surfaces);
             let crowded = surfaces.len() > CROWD && depth < CROWD_DEPTH;
             if depth < MAX_DEPTH && (crowded || pairs.undecided.is_some()) {
@@ -92,14 +95,14 @@ impl Octree {
                 tree.nodes[node] = Node::Inner { middle: middle(&cell), first };
                 for (child, part) in split(&cell).into_iter().enumerate() {
                     tree.nodes.push(Node::Leaf(usize::MAX));
-                    open.push((first + child, part, bodies.clone(), depth + 1));
+                    open.push((first + child, part, (bodies.clone(), cutouts.clone()), depth + 1));
                 }
             } else {
                 tree.nodes[node] = Node::Leaf(tree.leaves.len());
                 tree.contacts.extend(pairs.contacts);
                 let at_the_end = pairs.undecided.map(|pair| Contact::at_middle(pair, &cell));
                 tree.contacts.extend(at_the_end);
-                tree.leaves.push(Leaf { cell, surfaces, bodies, pairs: pairs.regular });
+                tree.leaves.push(Leaf { cell, surfaces, bodies, cutouts, pairs: pairs.regular });
             }
         }
         Ok(tree)
@@ -159,8 +162,22 @@ impl Octree {
     }
 }
 
-/// What is left of the bodies in a cell.
-fn prune(geometry: &Geometry, cell: &Cell, bodies: Vec<(BodyId, Solid)>) -> Vec<(BodyId, Solid)> {
+/// The bodies that matter in a cell, and the solids of cutouts.
+type Solids = (Vec<(BodyId, Solid)>, Vec<(u32, Solid)>);
+
+/// What is left of the bodies in a cell, and of the cutouts of surfaces that matter to the bodies there.
+fn prune_all(geometry: &Geometry, cell: &Cell, (bodies, mut cutouts): Solids) -> Solids {
+    let bodies = prune(geometry, cell, bodies);
+    if !cutouts.is_empty() {
+        let surfaces = surfaces_of(&bodies, &[]);
+        cutouts.retain(|(i, _)| surfaces.binary_search(&geometry.cutouts[*i as usize].surface).is_ok());
+        cutouts = prune(geometry, cell, cutouts);
+    }
+    (bodies, cutouts)
+}
+
+/// What is left of solids in a cell.
+fn prune<I>(geometry: &Geometry, cell: &Cell, solids: Vec<(I, Solid)>) -> Vec<(I, Solid)> {
     let mut known: Vec<(SurfaceId, Interval)> = Vec::new();
     let mut range = |id: SurfaceId| {
         if let Some(range) = known.iter().find(|r| r.0 == id) {
@@ -170,16 +187,17 @@ fn prune(geometry: &Geometry, cell: &Cell, bodies: Vec<(BodyId, Solid)>) -> Vec<
         known.push((id, range));
         range
     };
-    let left = |(id, solid): (BodyId, Solid)| match solid.prune(&mut range) {
+    let left = |(id, solid): (I, Solid)| match solid.prune(&mut range) {
         Pruned::Empty => None,
         Pruned::Full => Some((id, Solid::And(Vec::new()))),
         Pruned::Part(part) => Some((id, part)),
     };
-    bodies.into_iter().filter_map(left).collect()
+    solids.into_iter().filter_map(left).collect()
 }
 
-fn surfaces_of(bodies: &[(BodyId, Solid)]) -> Vec<SurfaceId> {
+fn surfaces_of(bodies: &[(BodyId, Solid)], cutouts: &[(u32, Solid)]) -> Vec<SurfaceId> {
     let mut surfaces: Vec<_> = bodies.iter().flat_map(|(_, solid)| solid.surfaces()).collect();
+    surfaces.extend(cutouts.iter().flat_map(|(_, solid)| solid.surfaces()));
     surfaces.sort_unstable();
     surfaces.dedup();
     surfaces

@@ -7,7 +7,7 @@
 
 use super::parse::ReadError;
 use super::read::{ElmerMesh, Layout, layouts, read_layout};
-use super::{faults_faces, faults_nodes};
+use super::{faults_faces, faults_nodes, periodic};
 use std::collections::BTreeMap;
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -63,6 +63,8 @@ pub enum FaultKind {
     WrongParent,
     /// The normal of an outer boundary element points inward.
     Inward,
+    /// A node of a periodic face is not where its partner is moved to.
+    NotPeriodic,
 }
 
 impl fmt::Display for FaultKind {
@@ -92,6 +94,7 @@ impl fmt::Display for FaultKind {
             Self::NumbersDiffer => "different boundary numbers on the two sides",
             Self::WrongParent => "wrong or missing parent",
             Self::Inward => "boundary element with inward normal",
+            Self::NotPeriodic => "periodic nodes that do not match",
         })
     }
 }
@@ -169,7 +172,12 @@ impl fmt::Display for Faults {
 
 /// Reads each mesh in a folder (see [`layouts`]) and judges it.
 pub fn check_elmer(dir: &Path) -> Result<Vec<(Layout, Faults)>, ReadError> {
-    let judge = |layout: Layout| read_layout(&layout).map(|mesh| (layout, faults(&mesh)));
+    let judge = |layout: Layout| {
+        let mesh = read_layout(&layout)?;
+        let mut found = faults(&mesh);
+        periodic::check_pairs(&mesh, &mut found)?;
+        Ok((layout, found))
+    };
     layouts(dir)?.into_iter().map(judge).collect()
 }
 

@@ -7,6 +7,7 @@
 //!                        .elements  id body 504 v v v v
 //!                        .boundary  id bc parent parent 303 v v v
 //!                        .shared    vertex count part part …    the owner first
+//! DIR/partitioning.N/mesh.periodic  pairs of nodes of periodic faces, if there are any: not Elmer's
 //! DIR/mesh.{header,nodes,elements,boundary}                     where there is one part
 //! ```
 //! What Elmer reads and where it would stumble was found in its reader, `fem/src/MeshUtils.F90`.
@@ -16,6 +17,7 @@ mod faults_faces;
 mod faults_nodes;
 mod number;
 mod parse;
+mod periodic;
 mod read;
 #[cfg(test)]
 mod tests;

@@ -1,6 +1,7 @@
 //! Writing Elmer's files.
 
 use super::number::{Numbering, number};
+use super::periodic::{self, periodic_text};
 use super::{MAX_ID, MAX_LINE, TET, TRIANGLE};
 use crate::comm::Communicator;
 use crate::io::lines::{self, FLUSH_AT};
@@ -32,6 +33,7 @@ pub fn write(
     agree(comm, check_limits(part.totals(), part.counts(), part.rank()))?;
     let numbering = number(comm, part)?;
     agree(comm, check_shared_lines(part, &numbering))?;
+    let periodic = periodic_text(comm, part, &numbering)?;
 
     let needed = estimate(part, numbering.shared);
     let written = write_together(comm, dir, needed, is_part_file, |stage| {
@@ -41,6 +43,10 @@ pub fn write(
         let mut written = write_part(part, names, &numbering, &folder)?;
         if part.rank() == 0 {
             let bytes = write_text(&stage.join("mesh.names"), names_text(names).as_bytes())?;
+            written += Written { files: 1, bytes };
+        }
+        if let Some(text) = &periodic {
+            let bytes = write_text(&folder.join(periodic::NAME), text.as_bytes())?;
             written += Written { files: 1, bytes };
         }
         if part.ranks() == 1 {
@@ -53,6 +59,9 @@ pub fn write(
 
 /// The files of a replaced `partitioning.N` that may go.
 fn is_part_file(name: &str) -> bool {
+    if name == periodic::NAME {
+        return true;
+    }
     let Some((number, kind)) = name.strip_prefix("part.").and_then(|rest| rest.split_once('.')) else {
         return false;
     };

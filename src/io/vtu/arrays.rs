@@ -83,6 +83,8 @@ pub(super) struct Piece {
     pub arrays: Vec<Array>,
     /// The attributes of sections that have some: which array is the global id.
     pub attributes: Vec<(Section, &'static str)>,
+    /// Numbers by name that hold for the whole file: what bodies and boundaries are called.
+    pub fields: Vec<(String, Vec<u32>)>,
 }
 
 /// Each array begins with its length in bytes.
@@ -108,7 +110,8 @@ impl Piece {
     pub fn new(points: u64, cells: u64, per_cell: u64) -> Self {
         let fits = points.max(cells * per_cell) <= i32::MAX as u64;
         let id = if fits { Kind::I32 } else { Kind::I64 };
-        let mut piece = Self { points, cells, arrays: Vec::new(), attributes: Vec::new() };
+        let mut piece =
+            Self { points, cells, arrays: Vec::new(), attributes: Vec::new(), fields: Vec::new() };
         piece.add(Section::Points, "Points", Kind::F64, 3 * points);
         piece.add(Section::Cells, "connectivity", id, cells * per_cell);
         piece.add(Section::Cells, "offsets", id, cells);
@@ -132,6 +135,20 @@ impl Piece {
     /// All that comes before the arrays.
     fn head(&self) -> String {
         let mut text = file_tag("UnstructuredGrid") + " <UnstructuredGrid>\n";
+        if !self.fields.is_empty() {
+            text += "  <FieldData>\n";
+        }
+        for (name, numbers) in &self.fields {
+            let (name, count) = (escaped(name), numbers.len());
+            let values: Vec<String> = numbers.iter().map(u32::to_string).collect();
+            text += &format!(
+                "   <DataArray type=\"Int32\" Name=\"{name}\" NumberOfTuples=\"{count}\" format=\"ascii\">{}</DataArray>\n",
+                values.join(" ")
+            );
+        }
+        if !self.fields.is_empty() {
+            text += "  </FieldData>\n";
+        }
         text += &format!("  <Piece NumberOfPoints=\"{}\" NumberOfCells=\"{}\">\n", self.points, self.cells);
         let mut offset = 0;
         self.for_each_section(|section, attributes, arrays| {

@@ -6,8 +6,10 @@
 //! STEM.parts/part.K.vtu      …/boundary.K.vtu       K = 1 … N, rank K−1
 //!
 //! points   GlobalNodeId  vtkGhostType (several parts only: 1 on all copies but the owner's)
+//!          PeriodicId (periodic faces only: the global id of the vertex that this one is an image of, else its own)
 //! tets     GlobalElementId  BodyId  PartitionId
 //! triangles                 BoundaryId  PartitionId  vtkGhostType (1 on the second copy of an interface triangle)
+//! fields   one for each name, `Body NAME` or `Boundary NAME`: the numbers that have it
 //! ```
 //! The ids are the canonical ones, from 0, the same for every number of parts; `PartitionId` counts from 1, as
 //! Elmer's file names do. Tets and triangles stand in files of their own, so that a surface drawn from the tets
@@ -24,6 +26,7 @@ use super::{WriteError, Written, sum_written};
 use crate::comm::Communicator;
 use crate::mesh::Names;
 use crate::mesh::stream::MeshStream;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::io;
 use std::path::Path;
@@ -45,9 +48,11 @@ pub fn write(
     })?;
     let name = [".pvtu", ".vtu"].iter().find_map(|end| name.strip_suffix(end)).unwrap_or(name);
 
-    let tets = volume::piece(part);
+    let mut tets = volume::piece(part);
     let surface = boundary::Surface::of(part);
-    let triangles = surface.piece();
+    let mut triangles = surface.piece();
+    tets.fields = numbers_by_name("Body", &names.bodies);
+    triangles.fields = numbers_by_name("Boundary", &names.patches);
     let needed = tets.bytes() + triangles.bytes();
     let written = write_together(comm, &folder, needed, is_part_file, |stage| {
         let [tets_path, triangles_path] = if part.ranks() == 1 {
@@ -70,6 +75,18 @@ pub fn write(
         Ok(written)
     })?;
     sum_written(comm, written)
+}
+
+/// For each name the numbers that have it, both ascending.
+fn numbers_by_name(kind: &str, list: &[(u32, String)]) -> Vec<(String, Vec<u32>)> {
+    let mut by_name: BTreeMap<&str, BTreeSet<u32>> = BTreeMap::new();
+    for (number, name) in list {
+        by_name.entry(name).or_default().insert(*number);
+    }
+    by_name
+        .into_iter()
+        .map(|(name, numbers)| (format!("{kind} {name}"), numbers.into_iter().collect()))
+        .collect()
 }
 
 fn piece_path(name: &str, kind: &str, number: u32) -> String {

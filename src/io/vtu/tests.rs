@@ -28,7 +28,8 @@ fn arrays(path: &Path) -> BTreeMap<String, Vec<f64>> {
     let head = std::str::from_utf8(&bytes[..data]).unwrap();
     let mut arrays = BTreeMap::new();
     let mut end = 0;
-    for tag in head.split('<').filter(|tag| tag.starts_with("DataArray")) {
+    let is_raw = |tag: &&str| tag.starts_with("DataArray") && tag.contains("appended");
+    for tag in head.split('<').filter(is_raw) {
         let offset: usize = attribute(tag, "offset").parse().unwrap();
         assert_eq!(offset, end, "arrays stand behind each other: {tag}");
         let len = u64::from_le_bytes(bytes[data + offset..][..8].try_into().unwrap()) as usize;
@@ -59,7 +60,10 @@ fn two_tets_are_written_to_the_letter() {
     let bytes = fs::read(dir.path().join("m.vtu")).unwrap();
     let head = "<?xml version=\"1.0\"?>\n\
         <VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\">\n \
-        <UnstructuredGrid>\n  <Piece NumberOfPoints=\"5\" NumberOfCells=\"2\">\n   \
+        <UnstructuredGrid>\n  <FieldData>\n   \
+        <DataArray type=\"Int32\" Name=\"Body lower\" NumberOfTuples=\"1\" format=\"ascii\">1</DataArray>\n   \
+        <DataArray type=\"Int32\" Name=\"Body upper\" NumberOfTuples=\"1\" format=\"ascii\">2</DataArray>\n  \
+        </FieldData>\n  <Piece NumberOfPoints=\"5\" NumberOfCells=\"2\">\n   \
         <Points>\n    \
         <DataArray type=\"Float64\" Name=\"Points\" NumberOfComponents=\"3\" format=\"appended\" offset=\"0\"/>\n   \
         </Points>\n   <Cells>\n    \

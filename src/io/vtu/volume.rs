@@ -1,6 +1,6 @@
 //! The tets of a part.
 
-use super::arrays::{Kind, Piece, Section};
+use super::arrays::{Kind, Piece, PieceFile, Section};
 use crate::io::chunks::{items, split, write_chunks};
 use crate::io::{WriteError, body_number};
 use crate::mesh::Names;
@@ -19,6 +19,9 @@ pub(super) fn piece(part: &dyn MeshStream) -> Piece {
     piece.add(Section::PointData, "GlobalNodeId", Kind::I64, counts.vertices);
     if part.ranks() > 1 {
         piece.add(Section::PointData, "vtkGhostType", Kind::U8, counts.vertices);
+    }
+    if !part.links().is_empty() {
+        piece.add(Section::PointData, "PeriodicId", Kind::I64, counts.vertices);
     }
     piece.add(Section::CellData, "GlobalElementId", Kind::I64, counts.tets);
     piece.add(Section::CellData, "BodyId", Kind::I32, counts.tets);
@@ -67,6 +70,9 @@ pub(super) fn write(
         }
         Ok(())
     })?;
+    if !part.links().is_empty() {
+        write_periodic_ids(&file, part)?;
+    }
     if part.ranks() > 1 {
         write_chunks([&mut file.array("vtkGhostType")?.0], chunks, |chunk, [ghosts]| {
             for index in items(chunk, per_chunk, blocks) {
@@ -78,4 +84,14 @@ pub(super) fn write(
         })?;
     }
     file.finish()
+}
+
+/// For each vertex the id of the vertex that it is, at the end, the periodic image of; its own if it is none.
+fn write_periodic_ids(file: &PieceFile, part: &dyn MeshStream) -> Result<(), WriteError> {
+    let mut ids: Vec<u64> =
+        (0..part.vertex_blocks()).flat_map(|index| part.vertex_block(index).ids()).collect();
+    for (local, origin) in part.origins() {
+        ids[local as usize] = origin;
+    }
+    file.array("PeriodicId")?.0.write(bytemuck::cast_slice(&ids))
 }

@@ -27,7 +27,13 @@ impl Made {
         let bounds = Aabb { min: Point::new(-5., -5., -5.), max: Point::new(5., 5., 5.) };
         Self {
             geometry: Geometry { surfaces, ..Geometry::default() },
-            features: Features { corners: Vec::new(), curves: Vec::new(), patches: Vec::new(), bounds },
+            features: Features {
+                corners: Vec::new(),
+                curves: Vec::new(),
+                patches: Vec::new(),
+                bounds,
+                identified: Vec::new(),
+            },
             curves: SurfaceMesh::default(),
         }
     }
@@ -103,6 +109,7 @@ impl Made {
             flipped,
             inside: Some(BodyId(0)),
             outside: None,
+            cutout: None,
             boundary: boundary.to_vec(),
             seeds: seeds.to_vec(),
             bc: 1,

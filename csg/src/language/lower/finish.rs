@@ -3,10 +3,12 @@
 use std::collections::BTreeSet;
 
 use super::expand::{ExpandError, expand};
-use super::forest::NodeId;
+use super::forest::{ForestError, NodeId};
 use super::unify::Classes;
-use super::{Lowering, Override};
-use crate::geometry::{Body, BodyId, BoundaryOverride, Span};
+use super::{Lowering, Override, Tlo, TloKind};
+use crate::geometry::{
+    Body, BodyId, BoundaryOverride, Cutout, Identification, SingularPlace, Singularity, Span,
+};
 use crate::{Geometry, Solid, SurfaceId};
 
 impl Lowering<'_> {
@@ -22,13 +24,19 @@ impl Lowering<'_> {
         }
         let classes = Classes::find(&self.forest.surfaces, &used);
         self.warn_of_lost_numbers(&classes, &used);
-        let bodies = self.bodies(&classes);
+        let (bodies, cutouts) = self.top_level_objects(&classes);
+        self.warn_of_idle_cutouts(&bodies, &cutouts);
+        let identifications = self.identifications(&classes);
+        let singularities = self.singularities(&classes, &bodies);
         let boundary_overrides = self.boundary_overrides(&classes, &bodies);
         let (surfaces, surface_info) = classes.surfaces(&self.forest.surfaces, &used);
         Geometry {
             surfaces,
             surface_info,
             bodies,
+            cutouts,
+            identifications,
+            singularities,
             user_points: self.user_points,
             boundary_overrides,
             stated_box: self.stated_box,
@@ -36,16 +44,20 @@ impl Lowering<'_> {
         }
     }
 
-    /// The definition and the root of the tree of each top-level object that is a solid.
-    fn roots(&self) -> Vec<(usize, Option<NodeId>)> {
-        let bodies = self.tlos.iter().filter(|tlo| tlo.body.is_some());
-        bodies.map(|tlo| (tlo.definition, self.forest.definitions[tlo.definition].root)).collect()
+    /// The roots of the trees that top-level objects need.
+    fn roots(&self) -> Vec<Option<NodeId>> {
+        let root = |definition: usize| self.forest.definitions[definition].root;
+        let of_surface = |tlo: &Tlo| match tlo.kind {
+            TloKind::Body(_) => None,
+            TloKind::Cutout(_, of_surface) => Some(root(of_surface)),
+        };
+        self.tlos.iter().flat_map(|tlo| [Some(root(tlo.definition)), of_surface(tlo)]).flatten().collect()
     }
 
     /// The raw surfaces that bodies need; primitives among them that cannot be meshed are reported.
     fn used_surfaces(&mut self) -> BTreeSet<usize> {
         let mut primitives = BTreeSet::new();
-        for (_, root) in self.roots() {
+        for root in self.roots() {
             // Without a root, or with an error under it, there is an error in the report.
             let found = root.and_then(|root| self.forest.primitives_of(root).ok());
             primitives.extend(found.unwrap_or_default());
@@ -64,22 +76,96 @@ impl Lowering<'_> {
         used
     }
 
-    fn bodies(&mut self, classes: &Classes) -> Vec<Body> {
-        let mut bodies = Vec::new();
-        for tlo in &mut self.tlos {
-            let Some(mut body) = tlo.body.take() else { continue };
+    /// The bodies and the cutouts with their trees.
+    fn top_level_objects(&mut self, classes: &Classes) -> (Vec<Body>, Vec<Cutout>) {
+        let (mut bodies, mut cutouts) = (Vec::new(), Vec::new());
+        for tlo in std::mem::take(&mut self.tlos) {
             let definition = &self.forest.definitions[tlo.definition];
-            let root = definition.root.ok_or(ExpandError::Graph(super::forest::ForestError::Broken));
-            match root.and_then(|root| expand(&self.forest, classes, root)) {
-                Ok(solid) => body.solid = solid,
-                Err(error) => {
-                    self.report.meaning(tlo.span, format!("`{}` {error}", body.name), "simplify the solid");
+            let root = definition.root.ok_or(ExpandError::Graph(ForestError::Broken));
+            let tree = root.and_then(|root| expand(&self.forest, classes, root)).unwrap_or_else(|error| {
+                let message = format!("`{}` {error}", definition.name);
+                self.report.meaning(tlo.span, message, "simplify the solid");
+                Solid::Or(Vec::new())
+            });
+            match tlo.kind {
+                TloKind::Body(body) => {
+                    let maxh = body.maxh.or(definition.maxh);
+                    bodies.push(Body { solid: tree, maxh, ..body });
+                }
+                TloKind::Cutout(cutout, of_surface) => match self.first_surface(classes, of_surface) {
+                    Some(surface) => cutouts.push(Cutout { solid: tree, surface, ..cutout }),
+                    None => {
+                        let message = "the solid of this surface has no surface";
+                        self.report.meaning(tlo.span, message, "name a solid with at least one primitive");
+                    }
+                },
+            }
+        }
+        (bodies, cutouts)
+    }
+
+    /// Cutouts of surfaces that bound no body.
+    fn warn_of_idle_cutouts(&mut self, bodies: &[Body], cutouts: &[Cutout]) {
+        let mut of_bodies = BTreeSet::new();
+        bodies.iter().for_each(|body| surfaces_of(&body.solid, &mut of_bodies));
+        for cutout in cutouts.iter().filter(|cutout| !of_bodies.contains(&cutout.surface)) {
+            let message = "this surface bounds no body: the top-level object has no effect";
+            self.report.warn(cutout.span, message, "a surface of a body is cut, none is added");
+        }
+    }
+
+    /// The surfaces that are identified.
+    fn identifications(&mut self, classes: &Classes) -> Vec<Identification> {
+        let mut identifications = Vec::new();
+        for (definitions, solids, span) in std::mem::take(&mut self.identifications) {
+            let [first, second] = definitions.map(|definition| self.first_surface(classes, definition));
+            match (first, second) {
+                (Some(first), Some(second)) if first != second => {
+                    identifications.push(Identification { surfaces: [first, second], solids, span });
+                }
+                (Some(_), Some(_)) => {
+                    let message =
+                        format!("the first surfaces of `{}` and `{}` are the same", solids[0], solids[1]);
+                    self.report.meaning(span, message, "a periodic face needs another one as its image");
+                }
+                (first, _) => {
+                    let name = &solids[usize::from(first.is_some())];
+                    let message = format!("the first surface of `{name}` bounds no body");
+                    self.report.meaning(span, message, "name solids whose surfaces are boundaries of bodies");
                 }
             }
-            body.maxh = body.maxh.or(definition.maxh);
-            bodies.push(body);
         }
-        bodies
+        identifications
+    }
+
+    /// The first surface of a definition, in the order of the text.
+    fn first_surface(&self, classes: &Classes, definition: usize) -> Option<SurfaceId> {
+        let root = self.forest.definitions[definition].root?;
+        let surfaces = self.forest.surfaces_of(root).ok()?;
+        classes.id(*surfaces.first()?)
+    }
+
+    /// The tags over unified surfaces.
+    fn singularities(&mut self, classes: &Classes, bodies: &[Body]) -> Vec<Singularity> {
+        let of_bodies = |raw: Vec<usize>| raw.into_iter().filter_map(|i| classes.id(i)).collect::<Vec<_>>();
+        let mut singularities = Vec::new();
+        for tag in std::mem::take(&mut self.singularities) {
+            let body_of = |tlo: usize| bodies.iter().position(|body| body.number == tlo as u32 + 1);
+            let body = tag.tlo.and_then(body_of).map(BodyId::new);
+            let mut lists = tag.surfaces.into_iter().map(of_bodies);
+            let place = match (lists.next(), lists.next(), lists.next(), body) {
+                (Some(first), Some(second), Some(third), _) => {
+                    SingularPlace::Point { surfaces: [first, second, third] }
+                }
+                (Some(first), Some(second), None, body) => {
+                    SingularPlace::Edge { surfaces: [first, second], body }
+                }
+                (Some(surfaces), None, None, Some(body)) => SingularPlace::Face { surfaces, body },
+                _ => continue,
+            };
+            singularities.push(Singularity { place, factor: tag.factor, maxh: tag.maxh, span: tag.span });
+        }
+        singularities
     }
 
     /// The overrides over unified surfaces; those that reach nothing are warned of.

@@ -91,6 +91,11 @@ impl<'a> Flags<'a> {
         self.number("factor", "-factor=1", report).is_some_and(|factor| factor != 0.0)
     }
 
+    /// `-factor=k`
+    pub fn factor(&self, report: &mut Report) -> Option<i32> {
+        self.number("factor", "-factor=1", report).map(|factor| factor as i32)
+    }
+
     /// `-name=word`
     pub fn word(&self, name: &str, report: &mut Report) -> Option<&'a str> {
         let example = format!("-{name}=air, a word of letters, digits and _");
@@ -149,6 +154,14 @@ impl<T> PerSurface<T> {
         match self {
             PerSurface::All(value) => Some(value),
             PerSurface::Each(values) => values.get(index),
+        }
+    }
+
+    /// The value, if it is not a list.
+    pub fn single(self) -> Option<T> {
+        match self {
+            PerSurface::All(value) => Some(value),
+            PerSurface::Each(_) => None,
         }
     }
 

@@ -26,7 +26,7 @@ use super::ast::{Name, Statement};
 use super::diagnostic::{Report, Reported};
 use super::suggest::did_you_mean;
 use crate::Geometry;
-use crate::geometry::{Aabb, Body, BoundaryLabel, Span, UserPoint};
+use crate::geometry::{Aabb, Body, BoundaryLabel, Cutout, Span, UserPoint};
 use forest::Forest;
 
 /// The geometry that the statements describe; without errors in `report` it is complete.
@@ -39,6 +39,8 @@ pub(super) fn lower(statements: &[Statement], report: &mut Report) -> Geometry {
         tlos: Vec::new(),
         user_points: Vec::new(),
         overrides: Vec::new(),
+        identifications: Vec::new(),
+        singularities: Vec::new(),
         stated_box: None,
         losses_known: false,
         is_redefined: false,
@@ -61,6 +63,9 @@ struct Lowering<'r> {
     tlos: Vec<Tlo>,
     user_points: Vec<UserPoint>,
     overrides: Vec<Override>,
+    /// The definitions whose first surfaces are identified, their names and where it says so.
+    identifications: Vec<([usize; 2], [String; 2], Span)>,
+    singularities: Vec<Singularity>,
     stated_box: Option<Aabb>,
     /// Whether it has been said that copies lose flags.
     losses_known: bool,
@@ -72,8 +77,25 @@ struct Lowering<'r> {
 struct Tlo {
     /// Its solid among the definitions.
     definition: usize,
-    /// All but its tree; `None` for a surface.
-    body: Option<Body>,
+    kind: TloKind,
+    span: Span,
+}
+
+/// What a top-level object is; without its tree.
+enum TloKind {
+    Body(Body),
+    /// A surface, and the definition whose first surface it is.
+    Cutout(Cutout, usize),
+}
+
+/// A `singular`, its surfaces not yet unified.
+struct Singularity {
+    /// The surfaces of each solid that it names.
+    surfaces: Vec<Vec<usize>>,
+    /// Among the top-level objects.
+    tlo: Option<usize>,
+    factor: i32,
+    maxh: Option<f64>,
     span: Span,
 }
 
@@ -99,14 +121,17 @@ impl Lowering<'_> {
         Err(self.report.meaning(name.span, format!("there is no solid `{}`", name.text), &help))
     }
 
-    /// The top-level object of the solid with this name.
+    /// The body, a top-level object, of the solid with this name.
     fn tlo_named(&mut self, name: &Name) -> Result<usize, Reported> {
-        let name_of = |tlo: &Tlo| self.forest.definitions[tlo.definition].name.clone();
-        let names: Vec<String> = self.tlos.iter().map(name_of).collect();
-        if let Some(index) = names.iter().position(|known| *known == name.text) {
+        let name_of = |tlo: &Tlo| match tlo.kind {
+            TloKind::Body(_) => Some(self.forest.definitions[tlo.definition].name.clone()),
+            TloKind::Cutout(..) => None,
+        };
+        let names: Vec<Option<String>> = self.tlos.iter().map(name_of).collect();
+        if let Some(index) = names.iter().position(|known| known.as_ref() == Some(&name.text)) {
             return Ok(index);
         }
-        let mut help = did_you_mean(&name.text, names.iter().map(String::as_str));
+        let mut help = did_you_mean(&name.text, names.iter().flatten().map(String::as_str));
         if help.is_empty() {
             help = format!("write `tlo {};` before this line", name.text);
         }

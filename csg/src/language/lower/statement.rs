@@ -2,8 +2,8 @@
 
 use super::flags::Flags;
 use super::primitive::LARGEST_LENGTH;
-use super::{Lowering, Tlo};
-use crate::geometry::{Aabb, Body, Span, UserPoint};
+use super::{Lowering, Singularity, Tlo, TloKind};
+use crate::geometry::{Aabb, Body, Cutout, Span, SurfaceId, UserPoint};
 use crate::language::ast::{Flag, Name, Statement};
 use crate::language::diagnostic::Reported;
 use crate::{Point, Solid};
@@ -25,8 +25,11 @@ impl Lowering<'_> {
             Statement::BoundingBox { min, max, span } => self.bounding_box(min, max, *span),
             Statement::UserPoint { point, flags, span } => self.user_point(point, flags, *span),
             Statement::IdentifyPeriodic { solids, span } => {
-                self.known_with_surfaces(solids)?;
-                Err(self.not_meshed("identify periodic", *span))
+                let [first, second] = solids;
+                let definitions = [self.solid_named(first)?, self.solid_named(second)?];
+                let names = [first.text.clone(), second.text.clone()];
+                self.identifications.push((definitions, names, *span));
+                Ok(())
             }
             Statement::IdentifyCloseSurfaces { solids, flags, span } => {
                 self.known_with_surfaces(solids)?;
@@ -38,18 +41,11 @@ impl Lowering<'_> {
                 Err(self.not_meshed("identify closesurfaces", *span))
             }
             Statement::SingularFace { tlo, solid, flags, span } => {
-                self.tlo_named(tlo)?;
-                self.known_with_surfaces(std::slice::from_ref(solid))?;
-                self.singular(flags, *span)
+                let tlo = self.tlo_named(tlo)?;
+                self.singular(std::slice::from_ref(solid), Some(tlo), flags, *span)
             }
-            Statement::SingularEdge { solids, flags, span } => {
-                self.known_with_surfaces(solids)?;
-                self.singular(flags, *span)
-            }
-            Statement::SingularPoint { solids, flags, span } => {
-                self.known_with_surfaces(solids)?;
-                self.singular(flags, *span)
-            }
+            Statement::SingularEdge { solids, flags, span } => self.singular(solids, None, flags, *span),
+            Statement::SingularPoint { solids, flags, span } => self.singular(solids, None, flags, *span),
             Statement::Boundary { solid, tlo, number } => self.boundary_number(solid, tlo, *number),
             Statement::BoundaryName { solid, tlo, word } => self.boundary_name(solid, tlo, word),
             Statement::Constant { name } => {
@@ -80,7 +76,7 @@ impl Lowering<'_> {
         let known = ["col", "transparent", "material", "layer", "maxh"];
         let flags = Flags::new(flags, &known, &[("bc", ON_SOLID), ("bcname", ON_SOLID)], self.report);
         let definition = self.solid_named(name)?;
-        let same = |tlo: &&Tlo| tlo.definition == definition && tlo.body.is_some();
+        let same = |tlo: &&Tlo| tlo.definition == definition && matches!(tlo.kind, TloKind::Body(_));
         if let Some(first) = self.tlos.iter().find(same) {
             let message =
                 format!("`{}` is a top-level object already, in line {}", name.text, first.span.line);
@@ -97,13 +93,17 @@ impl Lowering<'_> {
             layer: flags.layer(self.report).unwrap_or(1),
             span: name.span,
         };
-        if let Some(other) = self.tlos.iter().filter_map(|tlo| tlo.body.as_ref()).next()
-            && other.layer != body.layer
+        let body_of = |tlo: &'_ Tlo| match &tlo.kind {
+            TloKind::Body(body) => Some((body.name.clone(), body.layer)),
+            TloKind::Cutout(..) => None,
+        };
+        if let Some((other, layer)) = self.tlos.iter().find_map(body_of)
+            && layer != body.layer
         {
-            let message = format!("`{}` and `{}` are in different layers", other.name, body.name);
+            let message = format!("`{other}` and `{}` are in different layers", body.name);
             self.report.warn(name.span, message, "they are meshed together, conformingly, all the same");
         }
-        self.tlos.push(Tlo { definition, body: Some(body), span: name.span });
+        self.tlos.push(Tlo { definition, kind: TloKind::Body(body), span: name.span });
         Ok(())
     }
 
@@ -111,13 +111,26 @@ impl Lowering<'_> {
     fn top_level_surface(&mut self, name: &Name, surface: &Name, flags: &[Flag]) -> Result<(), Reported> {
         let known = ["col", "transparent", "maxh", "layer", "bc", "bcname"];
         let idle = [("material", "a surface has none")];
-        Flags::new(flags, &known, &idle, self.report);
+        let flags = Flags::new(flags, &known, &idle, self.report);
         let definition = self.solid_named(name)?;
-        self.solid_named(surface)?;
-        // It takes a number like the others.
-        self.tlos.push(Tlo { definition, body: None, span: name.span });
-        let message = "a `tlo` of one surface is understood, but cannot be meshed yet";
-        Err(self.report.unsupported(surface.span, message, "without this statement the rest can be meshed"))
+        let of_surface = self.solid_named(surface)?;
+        let one_value = "a surface has one -bc and one -bcname, not a list";
+        let cutout = Cutout {
+            name: name.text.clone(),
+            solid: Solid::Or(Vec::new()),
+            surface: SurfaceId(0),
+            number: self.tlos.len() as u32 + 1,
+            maxh: flags.maxh(self.report),
+            bc: flags.boundary_numbers(self.report).and_then(|number| {
+                number.single().ok_or_else(|| self.report.meaning(name.span, one_value, "")).ok()
+            }),
+            bc_name: flags.boundary_names(self.report).and_then(|word| {
+                word.single().ok_or_else(|| self.report.meaning(name.span, one_value, "")).ok()
+            }),
+            span: name.span,
+        };
+        self.tlos.push(Tlo { definition, kind: TloKind::Cutout(cutout, of_surface), span: surface.span });
+        Ok(())
     }
 
     fn bounding_box(&mut self, min: &Point, max: &Point, span: Span) -> Result<(), Reported> {
@@ -145,17 +158,35 @@ impl Lowering<'_> {
         Ok(())
     }
 
-    fn singular(&mut self, flags: &[Flag], span: Span) -> Result<(), Reported> {
-        let flags = Flags::new(flags, &["factor", "maxh", "tlo"], &[], self.report);
-        if let (Some(tlo), Some(span)) = (flags.word("tlo", self.report), flags.span("tlo")) {
-            self.tlo_named(&Name { text: tlo.to_owned(), span })?;
+    /// `singular face`, `singular edge` or `singular point`, told apart by the number of solids.
+    fn singular(
+        &mut self,
+        solids: &[Name],
+        tlo: Option<usize>,
+        flags: &[Flag],
+        span: Span,
+    ) -> Result<(), Reported> {
+        let is_edge = solids.len() == 2;
+        let known: &[&str] = if is_edge { &["factor", "maxh", "tlo"] } else { &["factor"] };
+        let idle =
+            [("maxh", "it bounds the size along singular edges"), ("tlo", "it selects singular edges")];
+        let flags = Flags::new(flags, known, if is_edge { &[] } else { &idle }, self.report);
+        let mut surfaces = Vec::new();
+        for solid in solids {
+            let definition = self.solid_named(solid)?;
+            let root = self.forest.definitions[definition].root.ok_or(Reported)?;
+            surfaces.push(self.forest.surfaces_of(root).map_err(|_| Reported)?);
         }
-        flags.has_factor(self.report);
-        self.report.warn(span, "`singular` has no effect on the mesh", ONLY_HP);
-        if let (Some(_), Some(span)) = (flags.maxh(self.report), flags.span("maxh")) {
-            let help = "give -maxh to a solid whose surfaces meet there";
-            self.report.warn(span, "the mesh size along singular edges is not set", help);
+        let tlo = match (flags.word("tlo", self.report), flags.span("tlo")) {
+            (Some(tlo), Some(span)) if is_edge => Some(self.tlo_named(&Name { text: tlo.to_owned(), span })?),
+            _ => tlo,
+        };
+        let factor = flags.factor(self.report).unwrap_or(1);
+        let maxh = if is_edge { flags.maxh(self.report) } else { None };
+        if maxh.is_none() {
+            self.report.warn(span, "`singular` has no effect on the mesh", ONLY_HP);
         }
+        self.singularities.push(Singularity { surfaces, tlo, factor, maxh, span });
         Ok(())
     }
 }

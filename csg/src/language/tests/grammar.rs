@@ -1,6 +1,7 @@
 //! The corners of the grammar.
 
 use super::*;
+use crate::{BodyId, SingularPlace, SurfaceId};
 
 #[test]
 fn layout_and_comments_mean_nothing() {
@@ -67,9 +68,19 @@ fn singularities_are_read_and_have_no_effect() {
 }
 
 #[test]
-fn the_mesh_size_of_a_singular_edge_is_not_lost_silently() {
-    let text = "solid a = sphere (0,0,0; 1); tlo a; singular edge a a -maxh=0.1;";
-    assert!(parsed(text).warnings[1].message.contains("mesh size along singular edges is not set"));
+fn singularities_keep_their_surfaces_factors_and_sizes() {
+    let text = "solid a = sphere (0,0,0; 1); solid b = plane (0,0,0; 0,0,1); solid c = a and b; tlo c;
+                singular edge a b -factor=2 -tlo=c -maxh=0.1; singular face c a; singular point a b c -tlo=c;";
+    let Parsed { geometry, warnings } = parsed(text);
+    let [edge, face, point] = &geometry.singularities[..] else { panic!("{:?}", geometry.singularities) };
+    assert_eq!((edge.factor, edge.maxh, face.factor), (2, Some(0.1), 1));
+    let (ball, plane) = (vec![SurfaceId(0)], vec![SurfaceId(1)]);
+    let body = BodyId(0);
+    assert_eq!(edge.place, SingularPlace::Edge { surfaces: [ball.clone(), plane.clone()], body: Some(body) });
+    assert_eq!(face.place, SingularPlace::Face { surfaces: ball.clone(), body });
+    let both = [ball.clone(), plane.clone()].concat();
+    assert_eq!(point.place, SingularPlace::Point { surfaces: [ball, plane, both] });
+    assert!(warnings.iter().any(|w| w.message == "the flag -tlo has no effect here"));
 }
 
 const CURVES: &str = "curve2d ring = (4; 1,1; 1,2; 2,2; 2,1; 4; 2,1,2; 2,2,3; 2,3,4; 2,4,1);
@@ -87,21 +98,48 @@ fn what_cannot_be_swept_is_refused_only_where_it_is_used() {
 }
 
 #[test]
-fn identifications_and_surface_objects_are_refused_as_unsupported() {
+fn close_surfaces_are_refused_by_name_and_place() {
     let solids = "solid a = plane (0,0,0; 0,0,-1); solid b = orthobrick (0,0,0; 1,1,1); tlo b;";
-    for (text, construct) in [
-        ("identify periodic a b;", "identify periodic"),
-        ("identify closesurfaces a b -tlo=b -slices=[0.2,0.5] -direction=[0,0,1];", "identify closesurfaces"),
-        ("tlo b a -col=[1,0,0] -bc=5 -bcname=lid;", "a `tlo` of one surface"),
+    let errors =
+        errors(&format!("{solids} identify closesurfaces a b -tlo=b -slices=[0.2,0.5] -direction=[0,0,1];"));
+    assert!(errors.is_unsupported(), "{errors}");
+    assert!(errors.to_string().contains("`identify closesurfaces` is understood"), "{errors}");
+}
+
+#[test]
+fn surface_objects_and_identifications_name_first_surfaces() {
+    let Parsed { geometry, warnings } = parsed(
+        "solid low = plane (0,0,0; 0,0,-1); solid high = plane (0,0,1; 0,0,1) -bc=4;
+         solid b = orthobrick (0,0,0; 1,1,1) and low and high; solid disk = cylinder (0.5,0.5,0; 0.5,0.5,1; 0.2) and high;
+         tlo b; tlo disk high -col=[1,0,0] -bc=5 -bcname=lid -maxh=0.1; identify periodic low high; tlo disk disk;",
+    );
+    let [cutout, idle] = &geometry.cutouts[..] else { panic!("{:?}", geometry.cutouts) };
+    let [low, high] = geometry.identifications[0].surfaces;
+    assert_eq!((cutout.surface, cutout.number, cutout.bc, cutout.maxh), (high, 2, Some(5), Some(0.1)));
+    assert_eq!(cutout.bc_name.as_deref(), Some("lid"));
+    assert_eq!([low, high].map(|s| geometry.surface_info[s.index()].bc), [None, Some(4)]);
+    assert_eq!(idle.number, 3);
+    assert!(warnings.iter().any(|w| w.message.contains("bounds no body")));
+}
+
+#[test]
+fn surface_objects_and_identifications_of_nothing_are_errors() {
+    let solids = "solid a = plane (0,0,0; 0,0,-1); solid far = plane (9,0,0; 1,0,0);
+                  solid b = orthobrick (0,0,0; 1,1,1); tlo b;";
+    for (text, said) in [
+        ("identify periodic a far;", "the first surface of `far` bounds no body"),
+        ("identify periodic a b;", "the first surfaces of `a` and `b` are the same"),
+        ("tlo b a -bc=[1,2];", "a surface has one -bc and one -bcname, not a list"),
+        ("tlo b a; boundarycondition a nix 2;", "there is no top-level object `nix`"),
     ] {
         let errors = errors(&format!("{solids} {text}"));
-        assert!(errors.is_unsupported() && errors.to_string().contains(construct), "{errors}");
+        assert!(errors.to_string().contains(said), "{text}: {errors}");
     }
 }
 
 #[test]
 fn other_errors_beside_unsupported_ones_are_errors() {
-    let errors = errors("solid a = sphere (0,0,0; 1); tlo a; identify periodic a a; tlo b;");
+    let errors = errors("solid a = sphere (0,0,0; 1); tlo a; identify closesurfaces a a; tlo b;");
     assert_eq!(errors.errors().count(), 2);
     assert!(!errors.is_unsupported());
 }

@@ -1,0 +1,151 @@
+//! `mesh.periodic`: pairs of nodes on periodic faces. Elmer itself has no such file, it finds partners anew by projection (`Periodic
+//! BC`); this one spares other programs the search.
+//!
+//! ```text
+//! # node, the node that it is the image of, identification
+//! # motion 1 1 0 0 1 0 1 0 0 0 0 1 0        identification, three rows of the matrix
+//! 87 3 1
+//! ```
+
+use super::faults::{FaultKind, Faults};
+use super::number::Numbering;
+use super::parse::ReadError;
+use super::read::ElmerMesh;
+use crate::Point;
+use crate::comm::Communicator;
+use crate::io::WriteError;
+use crate::mesh::stream::MeshStream;
+use nalgebra::Matrix3x4;
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// The file's name, in the folder of the parts: their numbers are those that it uses.
+pub(super) const NAME: &str = "mesh.periodic";
+/// How a line with a motion begins.
+const MOTION: &str = "# motion ";
+
+/// **Collective.** The text of the file, on rank 0, if faces are periodic.
+///
+/// Owners tell the rank that an id names the number of each boundary vertex; images ask there, once each; what they learn goes to rank 0.
+pub(super) fn periodic_text(
+    comm: &dyn Communicator,
+    part: &dyn MeshStream,
+    numbering: &Numbering,
+) -> Result<Option<String>, WriteError> {
+    if part.links().is_empty() {
+        return Ok(None);
+    }
+    let (rank, ranks) = (part.rank(), u64::from(comm.size()));
+    let mut told: Vec<Vec<[u64; 2]>> = vec![Vec::new(); comm.size() as usize];
+    let mut is_owner = vec![false; part.points().len()];
+    for index in 0..part.vertex_blocks() {
+        let block = part.vertex_block(index);
+        if !block.on_boundary {
+            continue;
+        }
+        for (local, id) in
+            block.local.clone().zip(block.ids()).filter(|(_, id)| block.owner(*id, rank) == rank)
+        {
+            is_owner[local as usize] = true;
+            told[(id % ranks) as usize].push([id, numbering.vertices[local as usize].into()]);
+        }
+    }
+    let mut asked: Vec<Vec<[u64; 3]>> = vec![Vec::new(); comm.size() as usize];
+    for (index, link) in part.links().iter().enumerate() {
+        for (local, of) in part.images(index).into_iter().filter(|(local, _)| is_owner[*local as usize]) {
+            let number = numbering.vertices[local as usize];
+            asked[(of % ranks) as usize].push([of, number.into(), link.identification.into()]);
+        }
+    }
+    let mut told = comm.all_to_all(told)?.concat();
+    told.sort_unstable();
+    let mut pairs: Vec<[u64; 3]> = comm.all_to_all(asked)?.concat();
+    for pair in &mut pairs {
+        let [of, number, identification] = *pair;
+        let place = told.binary_search_by_key(&of, |known| known[0]);
+        let place =
+            place.unwrap_or_else(|_| panic!("vertex {of}, of which {number} is an image, is on no boundary"));
+        *pair = [number, told[place][1], identification];
+    }
+    let mut pairs = comm.gather(0, &pairs)?.concat();
+    if rank != 0 {
+        return Ok(None);
+    }
+    pairs.sort_unstable();
+    pairs.dedup();
+    let mut text = String::from("# node, the node that it is the image of, identification\n");
+    let mut last = 0;
+    for link in part.links() {
+        // The patches of one identification stand together and have one motion.
+        if std::mem::replace(&mut last, link.identification) != link.identification {
+            text += &format!("{MOTION}{}", link.identification);
+            let matrix = link.motion.to_homogeneous();
+            (0..3).for_each(|row| matrix.row(row).iter().for_each(|x| text += &format!(" {x}")));
+            text += "\n";
+        }
+    }
+    for [image, of, identification] in pairs {
+        text += &format!("{image} {of} {identification}\n");
+    }
+    Ok(Some(text))
+}
+
+/// Judges the pairs of a mesh, if it has any: both nodes must be there, and where the motion says.
+///
+/// # Errors
+/// A file that cannot be read, or a line that is none of it.
+pub(super) fn check_pairs(mesh: &ElmerMesh, faults: &mut Faults) -> Result<(), ReadError> {
+    /// Images are where the motions put them within this part of the diagonal.
+    const SAME_PLACE: f64 = 4e-12;
+    /// Far from the origin: within this part of the largest coordinate, 16 units in the last place.
+    const ROUNDING: f64 = 16.0 * f64::EPSILON;
+    let path = mesh.layout.folder().join(NAME);
+    if !path.exists() {
+        return Ok(());
+    }
+    let text = std::fs::read_to_string(&path).map_err(ReadError::io(&path))?;
+    let points: BTreeMap<u32, Point> =
+        mesh.parts.iter().flat_map(|part| part.nodes.iter().map(|node| (node.id, node.point))).collect();
+    let low = points.values().fold(Point::from([f64::INFINITY; 3]), |low, p| low.inf(p));
+    let high = points.values().fold(Point::from([f64::NEG_INFINITY; 3]), |high, p| high.sup(p));
+    let largest = low.coords.amax().max(high.coords.amax());
+    let tolerance = f64::max(SAME_PLACE * (high - low).norm(), ROUNDING * largest);
+    let mut motions: BTreeMap<u32, Matrix3x4<f64>> = BTreeMap::new();
+    for (index, line) in text.lines().enumerate() {
+        if let Some(rest) = line.strip_prefix(MOTION) {
+            let (number, matrix) = rest.split_once(' ').unwrap_or((rest, ""));
+            let entries: Vec<f64> = numbers(&path, index, matrix)?;
+            let [number] = numbers(&path, index, number)?[..] else { return Err(broken(&path, index)) };
+            if entries.len() != 12 {
+                return Err(broken(&path, index));
+            }
+            motions.insert(number, Matrix3x4::from_row_slice(&entries));
+        } else if !line.starts_with('#') {
+            let [image, of, number] = numbers(&path, index, line)?[..] else {
+                return Err(broken(&path, index));
+            };
+            let motion = motions.get(&number).ok_or_else(|| broken(&path, index))?;
+            let (Some(there), Some(here)) = (points.get(&image), points.get(&of)) else {
+                let what = || format!("of the pair of nodes {image} and {of} one is not in the mesh");
+                faults.add(FaultKind::NoSuchNode, path.clone(), index + 1, what);
+                continue;
+            };
+            let off = (motion * here.to_homogeneous() - there.coords).norm();
+            if off.is_nan() || off > tolerance {
+                let what = || format!("node {image} is {off:e} off the image of node {of}");
+                faults.add(FaultKind::NotPeriodic, path.clone(), index + 1, what);
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The numbers of a line.
+fn numbers<T: std::str::FromStr>(path: &Path, index: usize, line: &str) -> Result<Vec<T>, ReadError> {
+    line.split_whitespace().map(|word| word.parse().map_err(|_| broken(path, index))).collect()
+}
+
+fn broken(path: &Path, index: usize) -> ReadError {
+    let message = "neither two nodes and an identification nor the motion of one".into();
+    ReadError::Line { path: path.to_path_buf(), line: index as u64 + 1, message }
+}

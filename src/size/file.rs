@@ -1,0 +1,168 @@
+//! NETGEN's mesh-size files: sizes at points and along lines.
+//!
+//! ```text
+//! 2                      how many points
+//! 0 0 0  0.1             x y z and the size there
+//! 1 0 0  0.05
+//! 1                      how many lines
+//! 0 0 0  1 1 1  0.02     both ends and the size between
+//! ```
+//! The lines may be left out. Numbers stand in any number of lines; `#` begins a comment, which NETGEN does not know.
+
+use super::Source;
+use crate::Point;
+use std::path::{Path, PathBuf};
+
+/// Why a mesh-size file cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum SizeFileError {
+    /// The system cannot read it.
+    #[error("cannot read {}: {source}", .path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// It does not say what it should.
+    #[error("{}:{line}: {reason}", .path.display())]
+    Line {
+        /// The file.
+        path: PathBuf,
+        /// The line, from 1.
+        line: usize,
+        /// What is wrong.
+        reason: String,
+    },
+}
+
+/// Sources that a file may ask for at most, those along its lines included: 50 times what any mesh of one computer needs.
+const MOST_SOURCES: usize = 20_000_000;
+
+/// Reads the sources of a mesh-size file; lines become sources a size apart.
+///
+/// # Errors
+/// What is wrong, with the line.
+pub fn read(path: &Path) -> Result<Vec<Source>, SizeFileError> {
+    let text =
+        std::fs::read(path).map_err(|source| SizeFileError::Io { path: path.to_path_buf(), source })?;
+    parse(&String::from_utf8_lossy(&text)).map_err(|(line, reason)| SizeFileError::Line {
+        path: path.to_path_buf(),
+        line,
+        reason,
+    })
+}
+
+fn parse(text: &str) -> Result<Vec<Source>, (usize, String)> {
+    let mut words = Words::new(text);
+    let mut sources = Vec::new();
+    for _ in 0..words.count("the number of points")? {
+        let point = words.point("a point")?;
+        sources.push(Source { point, size: words.size()? });
+    }
+    if words.is_at_end() {
+        return Ok(sources);
+    }
+    for _ in 0..words.count("the number of lines")? {
+        let [from, to] = [words.point("the first end of a line")?, words.point("the second end of a line")?];
+        let size = words.size()?;
+        let pieces = ((to - from).norm() / size).ceil().max(1.0);
+        if pieces + sources.len() as f64 > MOST_SOURCES as f64 {
+            return Err((words.line, format!("the size {size} is too small for a line from {from} to {to}")));
+        }
+        let at = |piece: usize| from + (to - from) * (piece as f64 / pieces);
+        sources.extend((0..=pieces as usize).map(|piece| Source { point: at(piece), size }));
+    }
+    match words.next() {
+        None => Ok(sources),
+        Some(word) => Err((words.line, format!("`{word}` stands behind the last line"))),
+    }
+}
+
+/// The words of a text, and the line of the last one.
+struct Words<'a> {
+    rest: Vec<(usize, &'a str)>,
+    line: usize,
+}
+
+impl<'a> Words<'a> {
+    fn new(text: &'a str) -> Self {
+        let words = text.lines().enumerate().flat_map(|(i, line)| {
+            let content = line.split('#').next().unwrap_or_default();
+            content.split_whitespace().map(move |word| (i + 1, word))
+        });
+        let mut rest: Vec<_> = words.collect();
+        rest.reverse();
+        Self { rest, line: 1 }
+    }
+
+    fn is_at_end(&self) -> bool {
+        self.rest.is_empty()
+    }
+
+    fn next(&mut self) -> Option<&'a str> {
+        let (line, word) = self.rest.pop()?;
+        self.line = line;
+        Some(word)
+    }
+
+    fn number(&mut self, what: &str) -> Result<f64, (usize, String)> {
+        let Some(word) = self.next() else {
+            return Err((self.line, format!("the file ends where {what} should stand")));
+        };
+        let number = word.parse().ok().filter(|number: &f64| number.is_finite());
+        number.ok_or_else(|| (self.line, format!("`{word}` stands where {what} should stand")))
+    }
+
+    fn count(&mut self, what: &str) -> Result<usize, (usize, String)> {
+        let number = self.number(what)?;
+        if number.fract() != 0.0 || !(0.0..=MOST_SOURCES as f64).contains(&number) {
+            return Err((self.line, format!("{number} is not {what}")));
+        }
+        Ok(number as usize)
+    }
+
+    fn point(&mut self, what: &str) -> Result<Point, (usize, String)> {
+        Ok(Point::new(self.number(what)?, self.number(what)?, self.number(what)?))
+    }
+
+    fn size(&mut self) -> Result<f64, (usize, String)> {
+        let size = self.number("a size")?;
+        if size <= 0.0 {
+            return Err((self.line, format!("the size {size} is not positive")));
+        }
+        Ok(size)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn points_and_lines_become_sources() {
+        let sources = parse("2 # points\n0 0 0 0.1\n1 0\n0 0.5\n1\n0 0 0  0 3 0  1\n").unwrap();
+        assert_eq!(sources.len(), 2 + 4);
+        assert_eq!(sources[1], Source { point: Point::new(1.0, 0.0, 0.0), size: 0.5 });
+        assert_eq!(sources[4], Source { point: Point::new(0.0, 2.0, 0.0), size: 1.0 });
+        assert_eq!(parse("1\n0 0 0 1").unwrap().len(), 1);
+    }
+
+    #[test]
+    fn what_is_wrong_is_told_with_its_line() {
+        let cases = [
+            ("", 1, "ends where the number of points"),
+            ("2.5", 1, "2.5 is not the number of points"),
+            ("1\n0 0 x 1", 2, "`x` stands where a point"),
+            ("1\n0 0 0\n0", 3, "0 is not positive"),
+            ("1\n0 0 0 inf", 2, "`inf` stands where a size"),
+            ("2\n0 0 0 1\n0 0", 3, "ends where a point"),
+            ("0\n1\n0 0 0 1 0 0 1e-300", 3, "too small"),
+            ("0\n0\n\n7", 4, "`7` stands behind"),
+        ];
+        for (text, line, reason) in cases {
+            let (found, said) = parse(text).unwrap_err();
+            assert!(found == line && said.contains(reason), "{text:?}: line {found}, {said}");
+        }
+    }
+}
