@@ -72,7 +72,7 @@ fn parts() -> Vec<(&'static str, f64, [u64; 3])> {
         ("pipe_bend", 0.09 * PI * (3.0 + PI), [0, 8, 8]),
         ("square_ring", 80.0 * PI, [0, 4, 4]),
         ("i_beam", 10.0 * beam, [32, 48, 14]),
-        ("spindle", turned(&spindle), [0, 8, 9]),
+        ("spindle", turned(&spindle), [0, 10, 11]),
         ("vase", turned(&vase), [0, 6, 7]),
         ("swept_copies", 2.0 * turned(&ring) + 0.24 * 1.5 * PI, [8, 20, 14]),
         ("twisted_bar", bar, [8, 12, 6]),
@@ -89,8 +89,10 @@ fn swept_parts_have_their_features_and_volumes() {
             assert_eq!(found, entities, "{name}");
             (report["mesh"]["volume"].as_f64().unwrap() - exact).abs()
         };
-        let [once, twice] = [error("1"), error("2")];
-        assert!(twice <= 0.01 * exact, "{name}: {twice} of {exact}");
-        assert!(twice <= 0.35 * once + 1e-9 * exact, "{name}: {once}, then {twice}");
+        let [once, thrice] = [error("1"), error("3")];
+        // Two halvings divide what the chords cut off by sixteen, in the long run: that of a pipe's inside and outside have
+        // different signs.
+        assert!(thrice <= 0.002 * exact, "{name}: {thrice} of {exact}");
+        assert!(thrice <= 0.15 * once + 1e-9 * exact, "{name}: {once}, then {thrice}");
     }
 }

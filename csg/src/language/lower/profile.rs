@@ -381,14 +381,13 @@ impl Builder<'_> {
         if away.norm() < SAME {
             away = Vector::new(end.y, -end.x, 0.0);
         }
-        let side = Vector::new(-away.y, away.x, 0.0);
         let corner = |k: &usize| self.edges[edges[*k]].ends[0];
         let farthest = (1..edges.len()).map(|k| away.dot(&corner(&k))).fold(f64::NEG_INFINITY, f64::max);
-        // Of several as far the one at the end of their line: at the others is no angle.
+        // Of several as far one with an angle: those between on their line have none.
+        let turn = |k: &usize| direction(edges[k - 1]).cross(&direction(edges[*k])).z;
         let candidates = (1..edges.len()).filter(|k| away.dot(&corner(k)) >= farthest - self.tolerance);
-        let cut =
-            candidates.max_by(|i, j| side.dot(&corner(i)).total_cmp(&side.dot(&corner(j)))).unwrap_or(1);
-        let is_convex = direction(edges[cut - 1]).cross(&direction(edges[cut])).z > 0.0;
+        let cut = candidates.max_by(|i, j| turn(i).abs().total_cmp(&turn(j).abs())).unwrap_or(1);
+        let is_convex = turn(&cut) > 0.0;
         join(is_convex, self.chain(&edges[..cut], leaves), self.chain(&edges[cut..], leaves))
     }
 }

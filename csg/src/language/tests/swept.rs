@@ -216,3 +216,24 @@ fn a_list_of_numbers_has_one_for_each_segment_of_the_profile() {
     assert_eq!(bar.surfaces.len(), 6);
     assert_eq!(bar.surface_info.iter().filter(|info| info.bc.is_none()).count(), 2);
 }
+
+#[test]
+fn points_on_a_straight_side_of_a_profile_change_nothing() {
+    let points = [
+        [-2., 0.],
+        [-2., 1.],
+        [-1.8, 1.2],
+        [-1., 1.2],
+        [-1., 2.],
+        [-0.5, 2.],
+        [0., 2.],
+        [0., 1.5],
+        [1., 1.5],
+        [1.5, 1.],
+        [2., 1.],
+        [2.3, 0.7],
+        [2.3, 0.],
+    ];
+    let geometry = swept(&polygon(&points, false), "revolution (0, 0, 0; 2, 0, 0; p)");
+    assert_is(&geometry, |p| is_in(&points, [p.x, p.y.hypot(p.z)]));
+}
