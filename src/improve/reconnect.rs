@@ -44,6 +44,9 @@ pub(super) struct Reconnector {
     patience: usize,
 }
 
+/// A face, and the vertices that it can be joined to with the scores of the tets.
+type Choice = ([u8; 3], Vec<(u8, f64)>);
+
 /// Scores of tets between the vertices of a hole, computed once each.
 #[derive(Default)]
 struct Scores {
@@ -243,8 +246,8 @@ impl Reconnector {
     }
 
     /// The face of the front with the fewest vertices that it can be joined to, and these with their scores.
-    fn apexes_of_narrowest(&mut self, complex: &Complex, objective: &Objective) -> ([u8; 3], Vec<(u8, f64)>) {
-        let mut best: Option<([u8; 3], Vec<(u8, f64)>)> = None;
+    fn apexes_of_narrowest(&mut self, complex: &Complex, objective: &Objective) -> Choice {
+        let mut best: Option<Choice> = None;
         let mut apexes = Vec::with_capacity(MOST_VERTICES);
         for &[a, b, c] in &self.front {
             apexes.clear();
