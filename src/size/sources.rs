@@ -40,7 +40,7 @@ const LEAF: usize = 6;
 
 /// What could undercut the best so far by less than this part is not looked at: from the middle of a ball all sources on it
 /// are alike.
-const NO_LESS: f64 = 0.02;
+const NO_LESS: f64 = 0.01;
 
 impl Sources {
     /// The hierarchy of the sources that ask for less than `maximum`.
@@ -72,7 +72,7 @@ impl Sources {
         }
     }
 
-    /// The least size anywhere in a box, which may be a point, or up to a fiftieth more.
+    /// The least size anywhere in a box, which may be a point, or up to a hundredth more.
     ///
     /// `near` is the index of a source that may be the one that asks for least, which saves time; the index of that one is
     /// returned.

@@ -1,0 +1,34 @@
+//! A fixed few of the random scenes; `cargo bench --bench scenes` runs a thousand.
+
+use crate::scenes::run::{Outcome, run};
+use crate::scenes::scene::Style;
+
+/// In general position: a lens on a cone between two curves that are 10⁻³ of its length apart. Its surface mesh is refused.
+const NOT_MESHED: [u64; 1] = [32];
+
+#[test]
+fn random_scenes_in_general_position_are_meshed_as_their_text_means() {
+    let dir = tempfile::tempdir().unwrap();
+    for seed in 1..=40 {
+        match run(seed, Style::General, dir.path()) {
+            Outcome::Meshed { .. } | Outcome::Empty => {}
+            Outcome::Failed(reason) if NOT_MESHED.contains(&seed) && reason.contains("status Some(3)") => {}
+            other => panic!("scene {seed}: {other:?}"),
+        }
+    }
+}
+
+#[test]
+fn random_scenes_on_a_grid_are_meshed_as_their_text_means_or_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut meshed = 0;
+    for seed in 10..=25 {
+        match run(seed, Style::Grid, dir.path()) {
+            Outcome::Meshed { .. } | Outcome::Empty => meshed += 1,
+            // Surfaces that touch in a point or along a line are frequent there, and refused.
+            Outcome::Refused(reason) => assert!(reason.contains("touch"), "scene {seed}: {reason}"),
+            other => panic!("scene {seed}: {other:?}"),
+        }
+    }
+    assert!(meshed >= 10, "{meshed}");
+}
