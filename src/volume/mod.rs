@@ -24,8 +24,8 @@
 //! 2. `recover`: edges, then facets, by `flips`; where none is left, by Steiner points for a while (`steiner`), where their cavity has most
 //!    room (`clearance`); `flat` flips away tets that rounding alone makes positive.
 //! 3. `carve`: a flood from the triangles gives each tet its body and removes the outside.
-//! 4. `relocate`: Steiner points leave the surface: none or one stays inside on either side. `inside` deletes those that are not needed,
-//!    by a search for tets that fill the hole (`small`).
+//! 4. `relocate`: Steiner points leave the surface: none or one stays inside on either side, found by search where no place sees
+//!    all it must (`stuck`). `inside` deletes those that are not needed, by a search for tets that fill the hole (`small`).
 //! 5. `keep`: points that the caller wants.
 //! 6. `points`: the inside by the size field: lattices where it is level (`lattice`), frontal Delaunay elsewhere, after flips that make
 //!    the mesh Delaunay again (`legalize`); sizes grow by a limited gradient whatever the field (`sizes`).
@@ -61,6 +61,7 @@ mod sectors;
 mod sizes;
 mod small;
 mod steiner;
+mod stuck;
 mod surface_faults;
 mod tetrahedra;
 mod ties;
