@@ -277,16 +277,16 @@ impl Sector {
         seen.map(|&[a, b, c]| [apex, a, b, c]).collect()
     }
 
-    /// Takes in the tets behind those walls that a point does not see; false where there are none to take.
-    pub fn grow(&mut self, mesh: &Tetrahedra, point: &Point) -> bool {
-        let unseen = |wall: &u32| {
-            let [a, b, c] = mesh.face(*wall).map(|v| mesh.point(v));
-            orient3d(point, a, b, c) != Sign::Positive
+    /// Takes in the tets behind those walls that a point does not see, or behind all; false where there are none to take.
+    pub fn grow(&mut self, mesh: &Tetrahedra, point: Option<&Point>) -> bool {
+        let unseen = |wall: u32| {
+            let [a, b, c] = mesh.face(wall).map(|v| mesh.point(v));
+            point.is_none_or(|point| orient3d(point, a, b, c) != Sign::Positive)
         };
         let before = self.tets.len();
         for wall in self.walls.clone() {
             let behind = mesh.across(wall);
-            if unseen(&wall) && behind != NONE && !mesh.is_locked(wall) && !self.tets.contains(&(behind >> 2))
+            if unseen(wall) && behind != NONE && !mesh.is_locked(wall) && !self.tets.contains(&(behind >> 2))
             {
                 self.tets.push(behind >> 2);
             }
@@ -327,7 +327,7 @@ fn grow_and_find(mesh: &Tetrahedra, sector: &mut Sector, p: u32) -> Option<Apex>
     for off in OFF {
         sector.clone_from(&start);
         for _ in 0..GROWTHS {
-            let grown = sector.grow(mesh, &(mesh.point(p) + inward * off));
+            let grown = sector.grow(mesh, Some(&(mesh.point(p) + inward * off)));
             if !grown || !sector.keeps_vertices(mesh, p) {
                 break;
             }

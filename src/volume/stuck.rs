@@ -14,7 +14,8 @@ use crate::{Point, Vector};
 /// How many tets may be put in search of one filling. Those that are found mostly need less than a hundred.
 const TRIES: usize = 1000;
 
-/// How often the cavity grows: each time it takes in the tets behind walls that a place near the point does not see.
+/// How often the cavity grows: each time it takes in the tets behind walls that a place near the point does not see, or if
+/// these must stay, behind all.
 const GROWTHS: usize = 3;
 
 /// Cavities with more vertices are left alone: a search that looks at all their tets costs more than another attempt.
@@ -29,7 +30,9 @@ pub(super) fn fill(mesh: &mut Tetrahedra, sector: &mut Sector, p: u32) -> Option
     let start = sector.clone();
     let (inward, reach) = directions(mesh, sector, p);
     for growth in 0..=GROWTHS {
-        let grown = growth == 0 || sector.grow(mesh, &(mesh.point(p) + inward * OFF[0]));
+        // Walls that are seen stand in the way too where those that are not must stay.
+        let near = mesh.point(p) + inward * OFF[0];
+        let grown = growth == 0 || sector.grow(mesh, Some(&near)) || sector.grow(mesh, None);
         if !grown || !sector.keeps_vertices(mesh, p) {
             break;
         }
