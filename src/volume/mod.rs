@@ -51,6 +51,7 @@ mod intersect;
 mod keep;
 mod lattice;
 mod legalize;
+mod near;
 mod points;
 mod polygon;
 mod recover;
@@ -69,6 +70,7 @@ mod ties;
 pub use closed_surface::ClosedSurface;
 pub(crate) use intersect::{intersections, middles_of_sides};
 pub use keep::KeptPointFault;
+pub use near::NearPair;
 pub use surface_faults::{SurfaceFault, SurfaceFaults};
 
 use crate::Point;
@@ -125,12 +127,17 @@ pub struct Report {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum VolumeError {
     /// Some triangles could not be made faces of the mesh.
-    #[error("{} triangles could not be recovered: {}", triangles.len(), list_places(triangles, places))]
+    #[error(
+        "{} triangles could not be recovered: {}{}",
+        triangles.len(), list_places(triangles, places), nearest.map(|pair| format!("; {pair}")).unwrap_or_default()
+    )]
     NotRecovered {
         /// The triangles.
         triangles: Vec<u32>,
         /// A corner of each.
         places: Vec<Point>,
+        /// Those of the surface that come nearest to each other there, if any have no common vertex.
+        nearest: Option<NearPair>,
     },
     /// Two triangles name different regions for one and the same.
     #[error(
