@@ -17,16 +17,28 @@ pub(super) fn bound(
     points: &[Point],
     report: &mut Report,
 ) -> Result<Tetrahedra, VolumeError> {
-    let mut attempt = 0;
-    loop {
+    let mut fewest: Option<Vec<u32>> = None;
+    for attempt in 0..ATTEMPTS {
+        report.restarts = attempt as usize;
         match attempt_to_bound(surface, points, attempt, report) {
-            Err(VolumeError::NotRecovered { .. }) if attempt + 1 < ATTEMPTS => {
-                attempt += 1;
-                report.restarts += 1;
+            Ok(tets) => return Ok(tets),
+            Err(Stop::Inconsistent(error)) => return Err(error),
+            Err(Stop::Left(left)) => {
+                if fewest.as_ref().is_none_or(|other| left.len() < other.len()) {
+                    fewest = Some(left);
+                }
             }
-            result => return result,
         }
     }
+    Err(finish::not_recovered(surface, fewest.expect("an attempt was made")))
+}
+
+/// Why an attempt ended.
+enum Stop {
+    /// These triangles could not be recovered, or not without Steiner points on them: another attempt may.
+    Left(Vec<u32>),
+    /// The surface is wrong.
+    Inconsistent(VolumeError),
 }
 
 fn attempt_to_bound(
@@ -34,7 +46,7 @@ fn attempt_to_bound(
     points: &[Point],
     attempt: u32,
     report: &mut Report,
-) -> Result<Tetrahedra, VolumeError> {
+) -> Result<Tetrahedra, Stop> {
     let mut tets = delaunay::delaunay(points, &surface.triangles);
     let mut constraints = Constraints::new(&surface.triangles);
     let mut recovery = Recovery::new(&mut tets, &mut constraints, attempt);
@@ -44,16 +56,16 @@ fn attempt_to_bound(
     report.missing_edges = counts.missing_edges;
     report.missing_faces = counts.missing_faces;
     report.steiner_on_surface = steiner.len();
-    recovered.map_err(|left| finish::not_recovered(surface, &constraints, &left))?;
+    recovered.map_err(|left| Stop::Left(finish::triangles_of(&constraints, &left)))?;
     lock_facets(&mut tets, &constraints);
     carve::carve(&mut tets, &constraints, &surface.regions, points.len() as u32).map_err(|d| {
         let place = surface.points[surface.triangles[d.triangle as usize][0] as usize];
-        VolumeError::Inconsistent { triangle: d.triangle, place, regions: d.regions }
+        Stop::Inconsistent(VolumeError::Inconsistent { triangle: d.triangle, place, regions: d.regions })
     })?;
     let (inside, stayed) = relocate::relocate(&mut tets, &mut constraints, &surface.triangles, &steiner);
     if !stayed.is_empty() {
         let left: Vec<u32> = stayed.iter().flat_map(|&p| constraints.facets_at(p)).collect();
-        return Err(finish::not_recovered(surface, &constraints, &left));
+        return Err(Stop::Left(finish::triangles_of(&constraints, &left)));
     }
     let helping = helping.into_iter().filter(|&v| tets.at_vertex[v as usize] != NONE);
     let inside = inside.into_iter().chain(helping.collect::<Vec<_>>()).collect();

@@ -1,6 +1,7 @@
 //! Into the units of the mesher and back, and what its results look like outside.
 
 use super::constraints::Constraints;
+use super::near::nearest_pair;
 use super::tetrahedra::{NONE, Tetrahedra};
 use super::{ClosedSurface, VolumeError, VolumeMesh};
 use crate::Point;
@@ -54,12 +55,18 @@ fn along(vertices: &[u32], slots: &[[u32; 4]]) -> Vec<u32> {
     order
 }
 
-/// The error for facets that a recovery left undone, by the surface's triangles.
-pub(super) fn not_recovered(surface: &ClosedSurface, constraints: &Constraints, left: &[u32]) -> VolumeError {
-    let mut triangles: Vec<u32> = left.iter().map(|&f| constraints.facets[f as usize].triangle).collect();
+/// The triangles of the surface that some facets are pieces of.
+pub(super) fn triangles_of(constraints: &Constraints, facets: &[u32]) -> Vec<u32> {
+    let mut triangles: Vec<u32> = facets.iter().map(|&f| constraints.facets[f as usize].triangle).collect();
     triangles.sort_unstable();
     triangles.dedup();
+    triangles
+}
+
+/// The error for triangles that a recovery left undone.
+pub(super) fn not_recovered(surface: &ClosedSurface, triangles: Vec<u32>) -> VolumeError {
     let places =
         triangles.iter().map(|&t| surface.points[surface.triangles[t as usize][0] as usize]).collect();
-    VolumeError::NotRecovered { triangles, places }
+    let nearest = nearest_pair(&surface.points, &surface.triangles, &triangles);
+    VolumeError::NotRecovered { triangles, places, nearest }
 }

@@ -2,7 +2,7 @@
 
 use super::constraints::Constraints;
 use super::relocate::{GOOD_ENOUGH, Sector, find_place, worst};
-use super::small;
+use super::small::{self, Effort};
 use super::tetrahedra::{NONE, Tetrahedra};
 use crate::kernel::quality::mean_ratio;
 
@@ -11,6 +11,9 @@ const ROUNDS: usize = 2;
 
 /// How many tets may be put in search of a ball's filling, all its cavities together.
 const TRIES: usize = 500;
+
+/// Cavities with more vertices are left alone: the search would end without an answer nearly always.
+const MOST_VERTICES: usize = 24;
 
 /// Balls of more tets are tried as they are only: those that can be filled mostly can be so without more tets, and the larger ones take
 /// the time.
@@ -71,7 +74,7 @@ fn delete_one(mesh: &mut Tetrahedra, constraints: &Constraints, q: u32) -> bool 
         choices.extend(behind.iter().map(|&t| with(&[t])));
         choices.push(with(&behind));
     }
-    let mut tries = TRIES;
+    let mut effort = Effort { vertices: MOST_VERTICES, tries: TRIES };
     let filled = choices.into_iter().find_map(|tets| {
         let old = cavity(mesh, tets);
         let least = old.tets.iter().map(|&t| {
@@ -79,8 +82,9 @@ fn delete_one(mesh: &mut Tetrahedra, constraints: &Constraints, q: u32) -> bool 
             mean_ratio(a, b, c, d).max(0.0)
         });
         let least = least.fold(GOOD_ENOUGH, f64::min);
-        let new =
-            old.keeps_vertices(mesh, q).then(|| small::fill(&mesh.points, &old.skin, least, &mut tries))?;
+        let new = old
+            .keeps_vertices(mesh, q)
+            .then(|| small::fill(&mesh.points, &old.skin, &[], least, &mut effort))?;
         Some((old, new?))
     });
     let done = filled.is_some_and(|(old, new)| refill(mesh, constraints, &old, &new));

@@ -24,8 +24,8 @@
 //! 2. `recover`: edges, then facets, by `flips`; where none is left, by Steiner points for a while (`steiner`), where their cavity has most
 //!    room (`clearance`); `flat` flips away tets that rounding alone makes positive.
 //! 3. `carve`: a flood from the triangles gives each tet its body and removes the outside.
-//! 4. `relocate`: Steiner points leave the surface: none or one stays inside on either side. `inside` deletes those that are not needed,
-//!    by a search for tets that fill the hole (`small`).
+//! 4. `relocate`: Steiner points leave the surface: none or one stays inside on either side, found by search where no place sees
+//!    all it must (`stuck`). `inside` deletes those that are not needed, by a search for tets that fill the hole (`small`).
 //! 5. `keep`: points that the caller wants.
 //! 6. `points`: the inside by the size field: lattices where it is level (`lattice`), frontal Delaunay elsewhere, after flips that make
 //!    the mesh Delaunay again (`legalize`); sizes grow by a limited gradient whatever the field (`sizes`).
@@ -51,6 +51,7 @@ mod intersect;
 mod keep;
 mod lattice;
 mod legalize;
+mod near;
 mod points;
 mod polygon;
 mod recover;
@@ -61,6 +62,7 @@ mod sectors;
 mod sizes;
 mod small;
 mod steiner;
+mod stuck;
 mod surface_faults;
 mod tetrahedra;
 mod ties;
@@ -68,6 +70,7 @@ mod ties;
 pub use closed_surface::ClosedSurface;
 pub(crate) use intersect::{intersections, middles_of_sides};
 pub use keep::KeptPointFault;
+pub use near::NearPair;
 pub use surface_faults::{SurfaceFault, SurfaceFaults};
 
 use crate::Point;
@@ -124,12 +127,17 @@ pub struct Report {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum VolumeError {
     /// Some triangles could not be made faces of the mesh.
-    #[error("{} triangles could not be recovered: {}", triangles.len(), list_places(triangles, places))]
+    #[error(
+        "{} triangles could not be recovered: {}{}",
+        triangles.len(), list_places(triangles, places), nearest.map(|pair| format!("; {pair}")).unwrap_or_default()
+    )]
     NotRecovered {
         /// The triangles.
         triangles: Vec<u32>,
         /// A corner of each.
         places: Vec<Point>,
+        /// Those of the surface that come nearest to each other there, if any have no common vertex.
+        nearest: Option<NearPair>,
     },
     /// Two triangles name different regions for one and the same.
     #[error(

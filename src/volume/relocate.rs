@@ -18,6 +18,7 @@ use super::clearance::{Plane, most_inside};
 use super::constraints::Constraints;
 use super::inside;
 use super::polygon::{Shadow, triangulate};
+use super::stuck;
 use super::tetrahedra::{NONE, Tetrahedra, sorted};
 use crate::kernel::predicates::{Sign, orient3d};
 use crate::kernel::quality::mean_ratio;
@@ -64,26 +65,27 @@ pub(super) fn relocate(
 ) -> (Vec<u32>, Vec<u32>) {
     let mut inside = Vec::new();
     let mut left: Vec<u32> = steiner.iter().rev().copied().collect();
-    let mut stuck = 0;
-    while !left.is_empty() && stuck < STUCK {
+    let mut in_vain = 0;
+    while !left.is_empty() && in_vain < STUCK {
         let before = left.len();
-        left.retain(|&p| !take_off(mesh, constraints, triangles, p, &mut inside));
+        left.retain(|&p| !take_off(mesh, constraints, triangles, p, in_vain > 0, &mut inside));
         if left.len() < before {
-            stuck = 0;
+            in_vain = 0;
         } else {
-            stuck += 1;
+            in_vain += 1;
             inside::make_room(mesh, constraints, &left, &mut inside);
         }
     }
     (inside, left)
 }
 
-/// Takes one point off the surface if all its sectors can be filled without it.
+/// Takes one point off the surface if all its sectors can be filled without it; by `search` where no place sees the whole of one.
 fn take_off(
     mesh: &mut Tetrahedra,
     constraints: &mut Constraints,
     triangles: &[[u32; 3]],
     p: u32,
+    search: bool,
     inside: &mut Vec<u32>,
 ) -> bool {
     let old = constraints.facets_at(p);
@@ -102,25 +104,26 @@ fn take_off(
         };
     }
     let mut sectors = sectors(mesh, constraints, triangles, p, &patches);
-    let Some(apexes) = sectors.iter_mut().map(|s| grow_and_find(mesh, s, p)).collect::<Option<Vec<_>>>()
-    else {
-        return false;
-    };
+    let points = mesh.points.len();
+    let mut new = Vec::new();
+    for sector in &mut sectors {
+        let tets = match grow_and_find(mesh, sector, p) {
+            Some(apex) => Some(sector.star(mesh, apex)),
+            None if search => stuck::fill(mesh, sector, p),
+            None => None,
+        };
+        let Some(tets) = tets else {
+            mesh.forget_points(points);
+            return false;
+        };
+        new.extend(tets.into_iter().map(|tet| (tet, sector.body)));
+    }
     let mut ball: Vec<u32> = sectors.iter().flat_map(|s| s.tets.iter().copied()).collect();
     ball.sort_unstable();
     if ball.windows(2).any(|pair| pair[0] == pair[1]) {
         // Two sectors took in the same tet.
+        mesh.forget_points(points);
         return false;
-    }
-    let points = mesh.points.len();
-    let mut new = Vec::new();
-    for (sector, apex) in sectors.iter().zip(apexes) {
-        let apex = match apex {
-            Apex::Own(v) => v,
-            Apex::New(point) => mesh.add_point(point),
-        };
-        let seen = sector.skin.iter().filter(|face| !face.contains(&apex));
-        new.extend(seen.map(|&[a, b, c]| ([apex, a, b, c], sector.body)));
     }
     let fresh: Vec<[u32; 3]> = patches.values().flatten().map(|&face| sorted(face)).collect();
     let is_facet = |face| fresh.contains(&sorted(face)) || constraints.facet(face).is_some();
@@ -264,16 +267,26 @@ impl Sector {
         }
     }
 
-    /// Takes in the tets behind those walls that a point does not see; false where there are none to take.
-    fn grow(&mut self, mesh: &Tetrahedra, point: &Point) -> bool {
-        let unseen = |wall: &u32| {
-            let [a, b, c] = mesh.face(*wall).map(|v| mesh.point(v));
-            orient3d(point, a, b, c) != Sign::Positive
+    /// Its tets, all from one apex.
+    fn star(&self, mesh: &mut Tetrahedra, apex: Apex) -> Vec<[u32; 4]> {
+        let apex = match apex {
+            Apex::Own(v) => v,
+            Apex::New(point) => mesh.add_point(point),
+        };
+        let seen = self.skin.iter().filter(|face| !face.contains(&apex));
+        seen.map(|&[a, b, c]| [apex, a, b, c]).collect()
+    }
+
+    /// Takes in the tets behind those walls that a point does not see, or behind all; false where there are none to take.
+    pub fn grow(&mut self, mesh: &Tetrahedra, point: Option<&Point>) -> bool {
+        let unseen = |wall: u32| {
+            let [a, b, c] = mesh.face(wall).map(|v| mesh.point(v));
+            point.is_none_or(|point| orient3d(point, a, b, c) != Sign::Positive)
         };
         let before = self.tets.len();
         for wall in self.walls.clone() {
             let behind = mesh.across(wall);
-            if unseen(&wall) && behind != NONE && !mesh.is_locked(wall) && !self.tets.contains(&(behind >> 2))
+            if unseen(wall) && behind != NONE && !mesh.is_locked(wall) && !self.tets.contains(&(behind >> 2))
             {
                 self.tets.push(behind >> 2);
             }
@@ -314,7 +327,7 @@ fn grow_and_find(mesh: &Tetrahedra, sector: &mut Sector, p: u32) -> Option<Apex>
     for off in OFF {
         sector.clone_from(&start);
         for _ in 0..GROWTHS {
-            let grown = sector.grow(mesh, &(mesh.point(p) + inward * off));
+            let grown = sector.grow(mesh, Some(&(mesh.point(p) + inward * off)));
             if !grown || !sector.keeps_vertices(mesh, p) {
                 break;
             }
@@ -323,6 +336,7 @@ fn grow_and_find(mesh: &Tetrahedra, sector: &mut Sector, p: u32) -> Option<Apex>
             }
         }
     }
+    *sector = start;
     None
 }
 
@@ -370,7 +384,7 @@ pub(super) fn find_place(mesh: &Tetrahedra, sector: &Sector, p: u32) -> Option<(
 ///
 /// The facets lie in one plane or in two, however many pieces of each there are: half-way between two inward
 /// normals is inside of both planes, whatever the angle.
-fn directions(mesh: &Tetrahedra, sector: &Sector, p: u32) -> (Vector, f64) {
+pub(super) fn directions(mesh: &Tetrahedra, sector: &Sector, p: u32) -> (Vector, f64) {
     let reach = sector.reach(mesh, p);
     let inward = sector.sides.iter().fold(Vector::zeros(), |sum, face| {
         let [a, b, c] = face.map(|v| mesh.point(v));

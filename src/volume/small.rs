@@ -14,25 +14,32 @@ use crate::kernel::quality::mean_ratio;
 use crate::kernel::simplex::volume6;
 use std::collections::HashMap;
 
-/// Polyhedra with more vertices are left alone: the search would end without an answer nearly always.
-const MOST_VERTICES: usize = 24;
+/// How long to search.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Effort {
+    /// Polyhedra with more vertices are left alone.
+    pub vertices: usize,
+    /// How many tets may be put before the search ends without an answer, and how many are left of that after it.
+    pub tries: usize,
+}
 
 /// What of the volume the tets on the way may be too large by, for rounding.
 const VOLUME_SLACK: f64 = 1e-9;
 
-/// Tets that fill a closed surface, each of mean ratio `least` or more, with its vertices only; `None` where none are found. The
-/// faces of `skin` look out. `tries` is how many tets may be put before the search ends without an answer, and how many are left of that
-/// after it: most polyhedra that can be filled are so after a few more than they have faces.
+/// Tets that fill a closed surface, each of mean ratio `least` or more, with its vertices and as many of the `free` ones as fit; `None`
+/// where none are found. The faces of `skin` look out. Most polyhedra that can be filled are so after a few more tries than they
+/// have faces.
 pub(super) fn fill(
     points: &[Point],
     skin: &[[u32; 3]],
+    free: &[u32],
     least: f64,
-    tries: &mut usize,
+    effort: &mut Effort,
 ) -> Option<Vec<[u32; 4]>> {
-    let mut vertices: Vec<u32> = skin.iter().flatten().copied().collect();
+    let mut vertices: Vec<u32> = skin.iter().flatten().chain(free).copied().collect();
     vertices.sort_unstable();
     vertices.dedup();
-    if vertices.len() > MOST_VERTICES {
+    if vertices.len() > effort.vertices {
         return None;
     }
     let corners: Vec<&Point> = vertices.iter().map(|&v| &points[v as usize]).collect();
@@ -51,7 +58,7 @@ pub(super) fn fill(
         open: skin.clone(),
         tets: Vec::new(),
         room,
-        tries,
+        tries: &mut effort.tries,
     };
     search.run().then(|| search.tets.iter().map(|tet| tet.map(|i| vertices[i as usize])).collect())
 }
@@ -209,6 +216,10 @@ mod tests {
         (points, skin)
     }
 
+    fn effort(tries: usize) -> Effort {
+        Effort { vertices: 24, tries }
+    }
+
     fn volume(points: &[Point], tets: &[[u32; 4]]) -> f64 {
         let six = |t: &[u32; 4]| {
             let [a, b, c, d] = t.map(|v| &points[v as usize]);
@@ -220,10 +231,22 @@ mod tests {
     #[test]
     fn a_prism_bent_out_is_filled_with_three_tets_and_one_bent_in_with_none() {
         let (points, skin) = prism(0.3);
-        let tets = fill(&points, &skin, 0.0, &mut 1000).unwrap();
+        let tets = fill(&points, &skin, &[], 0.0, &mut effort(1000)).unwrap();
         assert!(tets.len() == 3 || tets.len() == 4, "{tets:?}");
         let (points, skin) = prism(-0.3);
-        assert_eq!(fill(&points, &skin, 0.0, &mut 1000), None);
+        assert_eq!(fill(&points, &skin, &[], 0.0, &mut effort(1000)), None);
+    }
+
+    #[test]
+    fn a_prism_bent_in_is_filled_from_a_free_point_and_one_bent_out_too() {
+        for (turn, least) in [(-0.3, 1), (0.3, 0)] {
+            let (mut points, skin) = prism(turn);
+            points.push(Point::new(0.0, 0.0, 0.5));
+            let tets = fill(&points, &skin, &[6], 0.0, &mut effort(1000)).unwrap();
+            assert!(tets.iter().filter(|tet| tet.contains(&6)).count() >= least, "{tets:?}");
+            let whole: f64 = skin.iter().map(|&[a, b, c]| volume(&points, &[[6, a, b, c]])).sum();
+            assert!((volume(&points, &tets) - whole).abs() < 1e-12 * whole);
+        }
     }
 
     #[test]
@@ -246,7 +269,7 @@ mod tests {
             }
         }
         assert_eq!(skin.len(), 20);
-        let tets = fill(&points, &skin, 0.01, &mut 1000).unwrap();
+        let tets = fill(&points, &skin, &[], 0.01, &mut effort(1000)).unwrap();
         let whole: f64 = skin
             .iter()
             .map(|&[a, b, c]| {
@@ -255,6 +278,6 @@ mod tests {
             })
             .sum();
         assert!((volume(&points, &tets) - whole).abs() < 1e-12 * whole);
-        assert_eq!(fill(&points, &skin, 0.01, &mut 5), None);
+        assert_eq!(fill(&points, &skin, &[], 0.01, &mut effort(5)), None);
     }
 }
