@@ -11,7 +11,8 @@ fn random_scenes_in_general_position_are_meshed_as_their_text_means() {
     let dir = tempfile::tempdir().unwrap();
     for seed in 1..=40 {
         match run(seed, Style::General, dir.path()) {
-            Outcome::Meshed { .. } | Outcome::Empty => {}
+            Outcome::Meshed { tets } => assert!(tets > 0, "scene {seed}"),
+            Outcome::Empty => {}
             Outcome::Failed(reason) if NOT_MESHED.contains(&seed) && reason.contains("status Some(3)") => {}
             other => panic!("scene {seed}: {other:?}"),
         }
