@@ -12,7 +12,8 @@
 //! 6. `assemble`: arcs to curves and corners, sheets to patches; `extent`: their box; `number`: boundary
 //!    numbers and names.
 //! 7. `periodic`: which of them are images of others.
-//! 8. `check`: whether it all fits together; `contact`: whether places where surfaces are tangent matter.
+//! 8. `check`: whether it all fits together; `contact`: whether places where surfaces are tangent matter; `touch`:
+//!    whether a corner or an edge touches the inside of a patch.
 //!
 //! Why trace all pairs and classify afterwards, and not follow edges from special points like NETGEN: no
 //! decision depends on a tolerance while a curve is followed; surfaces in special position (three through
@@ -24,8 +25,8 @@
 //! until a trace covers them or no curve can be there.
 //!
 //! What is refused, with its place: surfaces that are tangent where both are boundaries with a wedge of no angle between
-//! them, along a line (two rods side by side) or in a point (a ball on a plate, a torus cut where a plane touches it); bodies that
-//! overlap or are not bounded.
+//! them, along a line (two rods side by side) or in a point (a ball on a plate, a torus cut where a plane touches it); a corner or
+//! an edge that touches a face; bodies that overlap or are not bounded.
 //!
 //! Three or more surfaces that touch in one point to a high order are refused, but not always with that reason.
 
@@ -49,6 +50,7 @@ mod periodic;
 mod seam;
 mod seed;
 mod singular;
+mod touch;
 mod trace;
 
 pub use check::Inconsistency;
@@ -171,8 +173,9 @@ impl Features {
 fn find_in(geometry: &Geometry, tree: &Octree, tolerances: &Tolerances) -> Result<Features, FeatureError> {
     let traces = seed::trace_all(geometry, tree, tolerances);
     let (arcs, nodes) = arcs::feature_arcs(geometry, tree, &traces, tolerances)?;
-    let arcs = assemble::join(geometry, arcs, &nodes, tolerances)?;
     contact::check(geometry, tree, tolerances)?;
+    touch::check(geometry, tree, &arcs, &nodes, tolerances)?;
+    let arcs = assemble::join(geometry, arcs, &nodes, tolerances)?;
     let mut features = assemble::entities(geometry, tree, &arcs, &nodes, tolerances)?;
     number::number(geometry, &mut features.patches);
     features.identified = periodic::identify(geometry, &features, tolerances)?;

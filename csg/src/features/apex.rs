@@ -9,7 +9,7 @@ use super::octree::{Octree, is_flat};
 use super::{Corner, FeatureError};
 use crate::interval::Cell;
 use crate::primitive::quadric::tangents;
-use crate::{Geometry, Interval, Surface, SurfaceId, Vector};
+use crate::{Geometry, Interval, Point, Surface, SurfaceId, Vector};
 
 /// Cells that hold an apex are split so often at least: beside them there are cells in which the curves are found that end
 /// at the apex.
@@ -50,12 +50,7 @@ pub(super) fn add_corners(
     corners: &mut Vec<Corner>,
     tolerances: &Tolerances,
 ) -> Result<(), FeatureError> {
-    for (i, cone) in geometry.surfaces.iter().enumerate() {
-        let id = SurfaceId::new(i);
-        let Some(point) = cone.apex() else { continue };
-        if !is_boundary(geometry, tree, id, tolerances)? {
-            continue;
-        }
+    for (id, point) in boundaries(geometry, tree, tolerances)? {
         match corners.iter_mut().find(|c| (c.point - point).norm() <= tolerances.merge) {
             Some(corner) if corner.surfaces.contains(&id) => {}
             Some(corner) => {
@@ -66,6 +61,23 @@ pub(super) fn add_corners(
         }
     }
     Ok(())
+}
+
+/// The cones that are boundaries beside their apices, and the apices.
+pub(super) fn boundaries(
+    geometry: &Geometry,
+    tree: &Octree,
+    tolerances: &Tolerances,
+) -> Result<Vec<(SurfaceId, Point)>, FeatureError> {
+    let mut found = Vec::new();
+    for (i, cone) in geometry.surfaces.iter().enumerate() {
+        let id = SurfaceId::new(i);
+        let Some(point) = cone.apex() else { continue };
+        if is_boundary(geometry, tree, id, tolerances)? {
+            found.push((id, point));
+        }
+    }
+    Ok(found)
 }
 
 /// Whether a cone is a boundary beside its apex.

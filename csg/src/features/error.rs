@@ -78,6 +78,18 @@ pub enum FeatureError {
         /// Where they touch.
         place: Place,
     },
+    /// A corner, the tip of a cone or an edge touches the inside of a face: the bodies are not manifolds there.
+    #[error(
+        "a corner or an edge of {first} touches a face of {second} at {place}: move one of them or let them overlap"
+    )]
+    Touch {
+        /// What touches.
+        first: Named,
+        /// What is touched.
+        second: Named,
+        /// Where.
+        place: Place,
+    },
     /// A curve ends where nothing ends it.
     #[error("the intersection of surfaces of {first} and {second} could not be followed past {place}")]
     LooseCurve {

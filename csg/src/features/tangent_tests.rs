@@ -66,8 +66,8 @@ fn the_tip_of_a_cone_is_a_corner() {
     for (rest, expected) in cases {
         assert_eq!(counts(&find(&format!("{cone} {rest}"))), expected, "{rest}");
     }
-    let pit = "solid pit = cone (0,0,1; 1; 0,0,0.5; 0.5) and plane (0,0,-0.5; 0,0,-1);
-        solid s = orthobrick (-2,-2,0; 2,2,1) and not pit; tlo s;";
+    let pit = "solid pit = cone (0,0,1; 1; 0,0,0.5; 0.5) and plane (0,0,0; 0,0,-1);
+        solid s = orthobrick (-2,-2,-1; 2,2,1) and not pit; tlo s;";
     assert_eq!(counts(&find(pit)), [9, 12, 1, 7]);
 }
 
@@ -116,4 +116,37 @@ fn wedges_of_no_angle_are_refused_with_both_names_and_the_place() {
         let said = refused(source);
         assert!(said.starts_with(message), "{said} does not start with {message}");
     }
+}
+
+#[test]
+fn corners_tips_and_edges_that_touch_the_inside_of_a_face_are_refused() {
+    let tip = |z: f64| format!("cone (0,0,{z}; 0.5; 0,0,{}; 0) and plane (0,0,{z}; 0,0,1)", z - 1.0);
+    let block = "solid block = orthobrick (-1,-1,-1; 1,1,0);";
+    let cases = [
+        // The tip of a cone on a plate, the corner of a brick on it, the rim of a disk on a ball.
+        (format!("{block}\nsolid top = {} and plane (0,0,0; 0,0,-1); solid s = block or top; tlo s;", tip(1.0)), "(0.000000, 0.000000, 0.000000)"),
+        (
+            format!("{block}\nsolid top = polyhedron (0.25,0,0; 0,0,1; 0.5,0,1; 0,0.5,1; ; 1,3,2; 1,2,4; 1,4,3; 2,3,4); solid s = block or top; tlo s;"),
+            "(0.250000, 0.000000, 0.000000)",
+        ),
+        (
+            "solid ball = sphere (0,0,0; 0.5);\nsolid disk = cylinder (0,1,0; 0.3,1,0; 0.5) and plane (0,1,0; -1,0,0) and plane (0.3,1,0; 1,0,0);
+                solid s = ball or disk and plane (0.1,0,0; 1,0,0); tlo s;"
+                .to_owned(),
+            "(0.000000, 0.500000, 0.000000)",
+        ),
+    ];
+    for (source, place) in cases {
+        let said = refused(&source);
+        assert!(said.contains("touch") && said.contains(place), "{said} does not name {place}: {source}");
+    }
+    // In the plate, or away from it, the tip is one as any other.
+    let sunk = format!(
+        "{block} solid top = {}; solid s = block or top and plane (0,0,-0.1; 0,0,-1); tlo s;",
+        tip(0.9)
+    );
+    assert_eq!(counts(&find(&sunk))[0], 8, "the tip is buried");
+    let away =
+        format!("{block} solid top = {} and plane (0,0,0; 0,0,-1); solid s = block or top; tlo s;", tip(1.1));
+    assert_eq!(counts(&find(&away))[0], 9, "the tip is a corner");
 }

@@ -1,0 +1,80 @@
+//! Where a corner, the tip of a cone or an edge touches the inside of a patch.
+//!
+//! The solid is not a manifold there: the patch goes through a vertex that none of its curves has.
+
+use super::arcs::{Arc, Nodes};
+use super::around::{Tolerances, sheet_at};
+use super::octree::Octree;
+use super::{FeatureError, Named, Place, apex, assemble};
+use crate::primitive::quadric::tangents;
+use crate::{Geometry, Point, SurfaceId};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Refuses the first such place.
+///
+/// A surface through the end of an arc from which no arc leaves on it is a boundary either all around that point or nowhere
+/// near it; the same holds at an apex.
+///
+/// # Errors
+/// Names the surface that touches and the one that is touched.
+pub(super) fn check(
+    geometry: &Geometry,
+    tree: &Octree,
+    arcs: &[Arc],
+    nodes: &Nodes,
+    tolerances: &Tolerances,
+) -> Result<(), FeatureError> {
+    let mut leaving: BTreeMap<usize, BTreeSet<SurfaceId>> = BTreeMap::new();
+    for arc in arcs {
+        for node in arc.ends.into_iter().flatten().flatten() {
+            leaving.entry(node).or_default().extend(arc.around.sheets.iter().map(|(sheet, _)| sheet.surface));
+        }
+    }
+    let mut places: Vec<(Point, BTreeSet<SurfaceId>)> =
+        leaving.into_iter().map(|(node, surfaces)| (nodes.point(node), surfaces)).collect();
+    for (cone, point) in apex::boundaries(geometry, tree, tolerances)? {
+        match places.iter_mut().find(|(known, _)| (known - point).norm() <= tolerances.merge) {
+            Some((_, surfaces)) => drop(surfaces.insert(cone)),
+            None => places.push((point, BTreeSet::from([cone]))),
+        }
+    }
+    for (point, surfaces) in places {
+        for touched in assemble::corner(geometry, tree, point, tolerances).surfaces {
+            if !surfaces.contains(&touched) && goes_on_around(geometry, tree, touched, &point, tolerances)? {
+                let touching = *surfaces.first().expect("something ends at the place");
+                let [first, second] = [touching, touched].map(|s| Named::surface(geometry, s));
+                return Err(FeatureError::Touch { first, second, place: Place(point) });
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Whether a surface is a boundary on all sides of one of its points.
+fn goes_on_around(
+    geometry: &Geometry,
+    tree: &Octree,
+    id: SurfaceId,
+    point: &Point,
+    tolerances: &Tolerances,
+) -> Result<bool, FeatureError> {
+    /// How far from the point is looked, in lengths of merging: so near that no other surface comes between.
+    const BESIDE: f64 = 100.0;
+    /// In how many directions.
+    const DIRECTIONS: u32 = 16;
+    let surface = &geometry.surfaces[id.index()];
+    if surface.has_apex_at(point, tolerances.merge) {
+        return Ok(false);
+    }
+    let (u, v) = tangents(&surface.normal(point));
+    for k in 0..DIRECTIONS {
+        let angle = std::f64::consts::TAU * (f64::from(k) + 0.137) / f64::from(DIRECTIONS);
+        let beside = point + (u * angle.cos() + v * angle.sin()) * (BESIDE * tolerances.merge);
+        let Ok(beside) = surface.project(&beside) else { return Ok(false) };
+        let other_side = |s: SurfaceId| geometry.surfaces[s.index()].value(&beside) > 0.0;
+        if sheet_at(geometry, tree, id, &beside, &other_side)?.is_none() {
+            return Ok(false);
+        }
+    }
+    Ok(true)
+}
