@@ -51,7 +51,10 @@ pub fn find_seams(geometry: &mut Geometry) {
             seams.push(Seam { pair, carrier, is_alone: found.is_alone });
         }
     }
-    seams.sort_unstable_by_key(|seam| seam.pair);
+    // Those that the file tells, but for what was found here.
+    seams.append(&mut geometry.seams);
+    seams.sort_by_key(|seam| seam.pair);
+    seams.dedup_by_key(|seam| seam.pair);
     geometry.seams = seams;
 }
 
