@@ -76,6 +76,8 @@ fn parts() -> Vec<(&'static str, f64, [u64; 3])> {
         ("vase", turned(&vase), [0, 6, 7]),
         ("swept_copies", 2.0 * turned(&ring) + 0.24 * 1.5 * PI, [8, 20, 14]),
         ("twisted_bar", bar, [8, 12, 6]),
+        // Two straight parts as long as two sides of the arc's triangle.
+        ("winding_bar", bar + 8.0 * 125.0_f64.sqrt(), [16, 28, 14]),
     ]
 }
 

@@ -277,7 +277,11 @@ fn sorted_rays(
             start + rays[start..].iter().take_while(|r| r.angle - rays[start].angle <= SAME_ANGLE).count();
         rays[start..end].sort_by(|x, y| x.bend.total_cmp(&y.bend));
         for two in rays[start..end].windows(2) {
-            if two[1].bend - two[0].bend <= SAME_BEND * (two[1].bend.abs() + two[0].bend.abs()) {
+            let [first, second] = [two[0].surface, two[1].surface];
+            // Of two that go on in each other only one is a boundary here.
+            let is_seam = geometry.seam([first.min(second), first.max(second)]).is_some();
+            let apart = SAME_BEND * (two[1].bend.abs() + two[0].bend.abs());
+            if !is_seam && two[1].bend - two[0].bend <= apart {
                 return Err(tangent_rays(geometry, [&two[0], &two[1]], at));
             }
         }

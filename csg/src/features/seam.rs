@@ -16,7 +16,7 @@
 
 use crate::geometry::SurfaceInfo;
 use crate::primitive::{
-    Cylinder, Ellipsoid, EllipticCone, EllipticCylinder, Plane, Torus, quadric::tangents,
+    Cylinder, Ellipse, Ellipsoid, EllipticCone, EllipticCylinder, Plane, Torus, quadric::tangents,
 };
 use crate::{Geometry, Point, Seam, Surface, SurfaceId, Vector};
 
@@ -51,7 +51,10 @@ pub fn find_seams(geometry: &mut Geometry) {
             seams.push(Seam { pair, carrier, is_alone: found.is_alone });
         }
     }
-    seams.sort_unstable_by_key(|seam| seam.pair);
+    // Those that the file tells, but for what was found here.
+    seams.append(&mut geometry.seams);
+    seams.sort_by_key(|seam| seam.pair);
+    seams.dedup_by_key(|seam| seam.pair);
     geometry.seams = seams;
 }
 
@@ -125,6 +128,18 @@ fn line([a, b]: [&Surface; 2], tolerance: f64) -> Option<Found> {
         }
         (Surface::EllipticCylinder(c), Surface::Plane(p)) => (1, plane_on_cylinder(c, p, tolerance)?),
         (Surface::Cone(c), Surface::Plane(p)) => {
+            let (u, v) = tangents(&c.axis);
+            let (point, radii, rate) = (c.point, [c.radius; 2], c.slope / c.radius);
+            (
+                1,
+                plane_on_cone(
+                    &EllipticCone { point, axes: [u, v], radii, axis: c.axis, rate },
+                    p,
+                    tolerance,
+                )?,
+            )
+        }
+        (Surface::Nappe(c), Surface::Plane(p)) => {
             let (u, v) = tangents(&c.axis);
             let (point, radii, rate) = (c.point, [c.radius; 2], c.slope / c.radius);
             (
@@ -261,8 +276,16 @@ fn hull(e: &Ellipsoid, along: usize) -> Surface {
 /// The curve that makes a surface when it turns about an axis, in the half-plane of (radius, height).
 #[derive(Clone, Copy)]
 enum Meridian {
-    Line { point: [f64; 2], direction: [f64; 2] },
-    Circle { center: [f64; 2], radius: f64 },
+    Line {
+        point: [f64; 2],
+        direction: [f64; 2],
+    },
+    Circle {
+        center: [f64; 2],
+        radius: f64,
+    },
+    /// Not a circle.
+    Ellipse(Ellipse),
 }
 
 /// Tangent along a circle about a common axis.
@@ -271,11 +294,18 @@ fn around_axis([a, b]: [&Surface; 2], tolerance: f64) -> Option<Found> {
         Surface::Torus(t) => (t.center, t.axis),
         Surface::Cylinder(c) => (c.point, c.axis),
         Surface::Cone(c) => (c.point, c.axis),
+        Surface::Nappe(c) => (c.point, c.axis),
+        Surface::Revolved(r) => (r.point, r.axis),
         _ => return None,
     };
     let meridians = [meridian(a, &origin, &axis, tolerance)?, meridian(b, &origin, &axis, tolerance)?];
     let ([radius, height], slope) = touching_point(meridians, tolerance)?;
-    if radius.abs() <= PARALLEL.sqrt() * tolerance / TANGENT_GAP {
+    // Of a torus and a pair of nappes the meridian counts on both sides of the axis, of others on one.
+    let is_beyond = matches!(
+        (a, b),
+        (Surface::Nappe(_) | Surface::Revolved(_), _) | (_, Surface::Nappe(_) | Surface::Revolved(_))
+    ) && radius < 0.0;
+    if is_beyond || radius.abs() <= PARALLEL.sqrt() * tolerance / TANGENT_GAP {
         return None;
     }
     /// The sine at which the plane across the axis still cuts well; else a cylinder around it does.
@@ -288,14 +318,20 @@ fn around_axis([a, b]: [&Surface; 2], tolerance: f64) -> Option<Found> {
     // The one of which the auxiliary surface cuts the fewest circles.
     let rank = |s: &Surface| match s {
         Surface::Plane(_) => 0,
-        Surface::Cylinder(_) | Surface::Cone(_) => 1,
+        Surface::Cylinder(_) | Surface::Cone(_) | Surface::Nappe(_) => 1,
         Surface::Sphere(_) => 2,
         _ => 3,
     };
     let carrier = usize::from(rank(b) < rank(a));
     // The line of a cone goes on beyond its apex, where it may cut a circle once more.
-    let is_alone =
-        !matches!((a, b), (Surface::Cone(_), Surface::Torus(_)) | (Surface::Torus(_), Surface::Cone(_)));
+    let crosses_again = |a: &Surface, b: &Surface| {
+        matches!(
+            (a, b),
+            (Surface::Cone(_), Surface::Torus(_) | Surface::Revolved(_))
+                | (Surface::Revolved(_), Surface::Revolved(_))
+        )
+    };
+    let is_alone = !crosses_again(a, b) && !crosses_again(b, a);
     Some(Found { carrier, auxiliary, is_alone })
 }
 
@@ -321,6 +357,26 @@ fn meridian(surface: &Surface, origin: &Point, axis: &Vector, tolerance: f64) ->
                 direction: [slope / length, 1.0 / length],
             })
         }
+        Surface::Nappe(c) if on_axis(&c.point) && is_parallel(&c.axis, axis) => {
+            let slope = c.slope * c.axis.dot(axis).signum();
+            let length = slope.hypot(1.0);
+            Some(Meridian::Line {
+                point: [c.radius, height(&c.point)],
+                direction: [slope / length, 1.0 / length],
+            })
+        }
+        Surface::Revolved(r) if on_axis(&r.point) && is_parallel(&r.axis, axis) => {
+            let Ellipse { center: [out, up], axis: [c, s], radii } = r.profile;
+            let sign = r.axis.dot(axis).signum();
+            let center = [out, height(&r.point) + sign * up];
+            Some(if radii[0] == radii[1] {
+                Meridian::Circle { center, radius: radii[0] }
+            } else if sign > 0.0 {
+                Meridian::Ellipse(Ellipse { center, ..r.profile })
+            } else {
+                Meridian::Ellipse(Ellipse { center, axis: [c, -s], radii })
+            })
+        }
         Surface::Torus(t) if on_axis(&t.center) && is_parallel(&t.axis, axis) => {
             Some(Meridian::Circle { center: [t.major, height(&t.center)], radius: t.minor })
         }
@@ -331,6 +387,9 @@ fn meridian(surface: &Surface, origin: &Point, axis: &Vector, tolerance: f64) ->
 /// Where two meridians are tangent, and their direction there.
 fn touching_point(meridians: [Meridian; 2], tolerance: f64) -> Option<([f64; 2], [f64; 2])> {
     match meridians {
+        [Meridian::Ellipse(e), other] | [other, Meridian::Ellipse(e)] => {
+            touching_ellipse(&e, other, tolerance)
+        }
         [Meridian::Line { point, direction }, Meridian::Circle { center, radius }]
         | [Meridian::Circle { center, radius }, Meridian::Line { point, direction }] => {
             let arm = [center[0] - point[0], center[1] - point[1]];
@@ -353,4 +412,45 @@ fn touching_point(meridians: [Meridian; 2], tolerance: f64) -> Option<([f64; 2],
         }
         _ => None,
     }
+}
+
+/// Where an ellipse touches a line or a curve of its kind.
+fn touching_ellipse(e: &Ellipse, other: Meridian, tolerance: f64) -> Option<([f64; 2], [f64; 2])> {
+    let other = match other {
+        Meridian::Line { point, direction: [x, y] } => {
+            let normal = [y, -x];
+            let gap = |p: &[f64; 2]| ((p[0] - point[0]) * normal[0] + (p[1] - point[1]) * normal[1]).abs();
+            let foot =
+                [normal, normal.map(|n| -n)].map(|n| e.support(n)).into_iter().find(|p| gap(p) <= tolerance);
+            return foot.map(|p| (p, [x, y]));
+        }
+        Meridian::Circle { center, radius } => Ellipse { center, axis: [1.0, 0.0], radii: [radius; 2] },
+        Meridian::Ellipse(other) => other,
+    };
+    // Along the ellipse the function of the other has an extremum where both are tangent.
+    const PARTS: u32 = 64;
+    /// They halve a part to rounding.
+    const HALVINGS: usize = 50;
+    let step = std::f64::consts::TAU / f64::from(PARTS);
+    let direction = |angle: f64| {
+        let (sin, cos) = angle.sin_cos();
+        let ([c, s], [a, b]) = (e.axis, e.radii);
+        [-c * a * sin - s * b * cos, -s * a * sin + c * b * cos]
+    };
+    let slope = |angle: f64| {
+        let ([gx, gy], [x, y]) = (other.gradient(e.point(angle)), direction(angle));
+        gx * x + gy * y
+    };
+    (0..PARTS).find_map(|i| {
+        let [mut low, mut high] = [f64::from(i), f64::from(i + 1)].map(|k| k * step);
+        let negative = slope(low) < 0.0;
+        (negative != (slope(high) < 0.0)).then_some(())?;
+        for _ in 0..HALVINGS {
+            let middle = 0.5 * (low + high);
+            *(if (slope(middle) < 0.0) == negative { &mut low } else { &mut high }) = middle;
+        }
+        let (point, [x, y]) = (e.point(low), direction(low));
+        let ([gx, gy], length) = (other.gradient(point), x.hypot(y));
+        (other.value(point).abs() <= tolerance * gx.hypot(gy)).then_some((point, [x / length, y / length]))
+    })
 }

@@ -150,3 +150,34 @@ fn corners_tips_and_edges_that_touch_the_inside_of_a_face_are_refused() {
         format!("{block} solid top = {} and plane (0,0,0; 0,0,-1); solid s = block or top; tlo s;", tip(1.1));
     assert_eq!(counts(&find(&away))[0], 9, "the tip is a corner");
 }
+
+#[test]
+fn swept_profiles_with_smooth_joints_have_a_curve_at_each() {
+    let revolved = |points: &str, segments: &str| {
+        format!("curve2d p = ({points} {segments}); solid s = revolution (0,0,0; 0,0,1; p); tlo s;")
+    };
+    let cases = [
+        // A line that runs smoothly into an arc of a circle, and into one of an ellipse.
+        (revolved("5; 0,1; 2,2; 2.4,2.2; 2.2,1.8; 1,1;", "4; 2,1,2; 3,2,3,4; 2,4,5; 2,5,1"), [0, 0, 4, 4]),
+        (revolved("5; 0,1; 2,2; 3,2.5; 3,2; 3,1;", "4; 2,1,2; 3,2,3,4; 2,4,5; 2,5,1"), [0, 0, 4, 4]),
+        // A half circle, and ellipses that go on in one another.
+        (revolved("5; 0,1; 1,2; 2,3; 4,5; 5,1;", "3; 3,1,2,3; 3,3,4,5; 2,5,1"), [0, 0, 3, 3]),
+        // A tip at the end of a straight side.
+        (revolved("3; 0,0; 1,1; 1,0;", "2; 2,1,2; 2,2,3"), [1, 0, 1, 2]),
+        (revolved("4; 0,0; 1,1; 2,1; 4,0;", "3; 2,1,2; 2,2,3; 2,3,4"), [2, 0, 2, 3]),
+    ];
+    for (source, expected) in cases {
+        assert_eq!(counts(&find(&source)), expected, "{source}");
+    }
+}
+
+#[test]
+fn what_turns_with_its_path_goes_on_in_what_turns_otherwise() {
+    let square = "curve2d p = (4; 1,1; 1,-1; -1,-1; -1,1; 4; 2,1,2; 2,2,3; 2,3,4; 2,4,1);";
+    let line = "curve3d q = (4; -10,0,-5; 0,0,0; 10,0,5; 10,10,10; 2; 2,1,2; 3,2,3,4);";
+    let arc = "curve3d q = (5; 0,0,0; 10,0,5; 10,10,10; 10,20,15; 0,20,20; 2; 3,1,2,3; 3,3,4,5);";
+    for path in [line, arc] {
+        let source = format!("{path} {square} solid s = extrusion (q; p; 0,0,1); tlo s;");
+        assert_eq!(counts(&find(&source)), [12, 20, 0, 10], "{path}");
+    }
+}

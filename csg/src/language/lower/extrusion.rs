@@ -9,7 +9,7 @@
 use super::conic::{Arc, Piece, SpaceEllipse};
 use super::primitive::Shape;
 use super::profile::{Bound, Profile, formula};
-use super::swept::{Assembly, NO_FACE, SweepError, Turn};
+use super::swept::{Assembly, NO_FACE, SweepError, Swept, Turn, complement};
 use crate::primitive::{Cylinder, Ellipse, EllipticCylinder, Section, Sweep, Torus};
 use crate::{Point, Solid, Surface, Vector};
 
@@ -25,28 +25,48 @@ pub(super) fn shape(path: &[Piece], profile: &[Piece], up: Vector) -> Result<Sha
     check_path(path)?;
     let profile = formula(profile, false)?;
     let up = up.normalize();
-    refuse_turning_joints(path, up)?;
     let mut assembly = Assembly::default();
+    let swept = path.iter().enumerate().map(|(index, piece)| match *piece {
+        Piece::Line(ends) => along_line(&mut assembly, ends, &profile, up),
+        Piece::Arc(arc) => along_arc(&mut assembly, [index, path.len()], &arc, &profile, up),
+    });
+    let swept = swept.collect::<Result<Vec<_>, _>>()?;
+    let ends: Vec<Solid> =
+        path.iter().map(|piece| assembly.behind(piece.ends()[1], piece.tangents()[1], NO_FACE)).collect();
+    let last = path.len() - 1;
+    let is_closed = goes_on(&path[last], &path[0]) && meets(&path[last], &path[0]);
     let mut members = Vec::new();
     for (index, piece) in path.iter().enumerate() {
-        let mut member = match *piece {
-            Piece::Line(ends) => along_line(&mut assembly, ends, &profile, up)?,
-            Piece::Arc(arc) => along_arc(&mut assembly, index, &arc, &profile, up)?,
+        let before = if index > 0 { Some(index - 1) } else { is_closed.then_some(last) };
+        let start = match before {
+            Some(before) => {
+                assembly.join([before, index].map(|i| &swept[i].sides[..]), &ends[before]);
+                complement(ends[before].clone())
+            }
+            None => assembly.behind(piece.ends()[0], -piece.tangents()[0], NO_FACE),
         };
-        let ([start, end], [first, last]) = (piece.ends(), piece.tangents());
-        member.push(assembly.behind(start, -first, NO_FACE));
-        member.push(assembly.behind(end, last, NO_FACE));
-        members.push(Solid::And(member));
+        members.push(Solid::And(vec![swept[index].inside.clone(), start, ends[index].clone()]));
     }
     let inside = if members.len() == 1 { members.swap_remove(0) } else { Solid::Or(members) };
     Ok(assembly.shape(inside))
 }
 
+/// Whether a piece has the direction at its start that another has at its end.
+fn goes_on(before: &Piece, after: &Piece) -> bool {
+    let (before, after) = (before.tangents()[1], after.tangents()[0]);
+    let sine = before.cross(&after).norm() / (before.norm() * after.norm());
+    sine <= SMOOTH && before.dot(&after) > 0.0
+}
+
+/// Whether a piece starts where another ends.
+fn meets(before: &Piece, after: &Piece) -> bool {
+    let [start, end] = before.ends();
+    (after.ends()[0] - end).norm() <= SMOOTH * (end - start).norm()
+}
+
 fn check_path(path: &[Piece]) -> Result<(), SweepError> {
     for (index, two) in path.windows(2).enumerate() {
-        let (before, after) = (two[0].tangents()[1], two[1].tangents()[0]);
-        let sine = before.cross(&after).norm() / (before.norm() * after.norm());
-        if sine > SMOOTH || before.dot(&after) < 0.0 {
+        if !goes_on(&two[0], &two[1]) {
             let message =
                 format!("the path has a corner between its segments {} and {}", index + 1, index + 2);
             return Err(SweepError::Unsupported(
@@ -59,26 +79,6 @@ fn check_path(path: &[Piece]) -> Result<(), SweepError> {
         return Err(SweepError::Wrong(message, "its points are distinct"));
     }
     Ok(())
-}
-
-/// Where an arc that turns the profile goes on in another piece, the surfaces of both touch along the whole joint, some to
-/// third order: such joints are not told apart.
-fn refuse_turning_joints(path: &[Piece], up: Vector) -> Result<(), SweepError> {
-    let turns = |piece: &Piece| match piece {
-        Piece::Line(_) => false,
-        Piece::Arc(arc) => {
-            let [p, q, r] = arc.points;
-            is_turning((q - p).cross(&(r - q)).normalize(), up)
-        }
-    };
-    match path.iter().position(turns).filter(|_| path.len() > 1) {
-        Some(index) => Err(SweepError::Unsupported(format!(
-            "segment {} of the path turns the profile, which cannot be meshed yet in a path of several segments: its plane \
-             is neither across the direction of the profile's y nor along it",
-            index + 1
-        ))),
-        None => Ok(()),
-    }
 }
 
 /// Whether a profile with its y along `up` turns about the path on an arc around this axis.
@@ -104,11 +104,11 @@ fn along_line(
     ends: [Vector; 2],
     profile: &Profile,
     up: Vector,
-) -> Result<Vec<Solid>, SweepError> {
+) -> Result<Swept, SweepError> {
     let tangent = (ends[1] - ends[0]).normalize();
     let [x, y] = frame(tangent, up)?;
     let place = |p: [f64; 2]| ends[0] + x * p[0] + y * p[1];
-    let inside = into.sweep(profile, |into, bound, face| {
+    into.sweep(profile, |into, bound, face| {
         Ok(match bound {
             Bound::Left(from, to) => {
                 let [p, q] = [*from, *to].map(place);
@@ -127,18 +127,17 @@ fn along_line(
                 into.side(surface, false, face)
             }
         })
-    })?;
-    Ok(vec![inside])
+    })
 }
 
 /// What a profile sweeps that turns with an arc of the path.
 fn along_arc(
     into: &mut Assembly,
-    index: usize,
+    [index, count]: [usize; 2],
     arc: &Arc,
     profile: &Profile,
     up: Vector,
-) -> Result<Vec<Solid>, SweepError> {
+) -> Result<Swept, SweepError> {
     let ellipse = SpaceEllipse::of(arc);
     let points = arc.points;
     let Some(radius) = ellipse.radius() else {
@@ -161,7 +160,7 @@ fn along_arc(
             up,
             section: Section::Line { normal: [1.0, 0.0], offset: 0.0 },
         };
-        return turning(into, index, profile, circle);
+        return turning(into, [index, count], profile, circle);
     }
     // Where the direction lies in the plane of the arc, y' changes sides where the path runs along it.
     let end = (points[2] - points[1]).normalize();
@@ -192,7 +191,7 @@ fn along_arc(
         return Err(SweepError::Wrong(message, "a path bends less than its profile is wide"));
     }
     let mirrored = x.dot(&axis) * y.dot(&outward) - x.dot(&outward) * y.dot(&axis) < 0.0;
-    let inside = into.sweep(profile, |into, bound, face| {
+    into.sweep(profile, |into, bound, face| {
         let moved = match bound {
             Bound::Left(from, to) if mirrored => Bound::Left(place(*to), place(*from)),
             Bound::Left(from, to) => Bound::Left(place(*from), place(*to)),
@@ -203,24 +202,23 @@ fn along_arc(
             }
         };
         Ok(turn.turned(into, &moved, face))
-    })?;
-    Ok(vec![inside])
+    })
 }
 
 /// What a profile sweeps that turns about the path on its way.
 fn turning(
     into: &mut Assembly,
-    index: usize,
+    [index, count]: [usize; 2],
     profile: &Profile,
     circle: Sweep,
-) -> Result<Vec<Solid>, SweepError> {
+) -> Result<Swept, SweepError> {
     let reach = profile.reach;
     if reach >= 0.9 * circle.radius {
         let message =
             format!("the profile is too wide for segment {} of the path, which turns it", index + 1);
         return Err(SweepError::Unsupported(message + ": it reaches too near to the centre of that arc"));
     }
-    let inside = into.sweep(profile, |into, bound, face| {
+    let swept = into.sweep(profile, |into, bound, face| {
         let section = match *bound {
             Bound::Left([a, b], [c, d]) => {
                 let length = (c - a).hypot(d - b);
@@ -231,8 +229,11 @@ fn turning(
         };
         Ok(into.side(Surface::Sweep(Sweep { section, ..circle }), false, face))
     })?;
-    // All is inside this torus. Near the axis, where the section's sides come from all directions, nothing is.
-    let minor = f64::min(1.25 * reach, 0.5 * (reach + circle.radius));
+    // All is inside this torus. Near the axis, where the section's sides come from all directions, nothing is. Pieces that
+    // follow one another get tori that do not touch.
+    let part = if index + 1 == count { 0.7 } else { [0.3, 0.5][index % 2] };
+    let minor = reach + part * f64::min(0.5 * reach, circle.radius - reach);
     let around = Torus { center: circle.center, axis: circle.axis, major: circle.radius, minor };
-    Ok(vec![into.side(Surface::Torus(around), false, NO_FACE), inside])
+    let around = into.side(Surface::Torus(around), false, NO_FACE);
+    Ok(Swept { inside: Solid::And(vec![around, swept.inside]), ..swept })
 }

@@ -1,15 +1,16 @@
 //! The end of the file: equal surfaces become one, bodies get their trees.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::expand::{ExpandError, expand};
-use super::forest::{ForestError, NodeId};
+use super::forest::{ForestError, NodeId, Primitive};
+use super::swept::Joint;
 use super::unify::Classes;
 use super::{Lowering, Override, Tlo, TloKind};
 use crate::geometry::{
     Body, BodyId, BoundaryOverride, Cutout, Identification, SingularPlace, Singularity, Span,
 };
-use crate::{Geometry, Solid, SurfaceId};
+use crate::{Geometry, Seam, Solid, SurfaceId};
 
 impl Lowering<'_> {
     /// The geometry; where something is wrong it is in the report, and the geometry is of no use.
@@ -29,6 +30,7 @@ impl Lowering<'_> {
         let identifications = self.identifications(&classes);
         let singularities = self.singularities(&classes, &bodies);
         let boundary_overrides = self.boundary_overrides(&classes, &bodies);
+        let seams = self.joints(&classes);
         let (surfaces, surface_info) = classes.surfaces(&self.forest.surfaces, &used);
         Geometry {
             surfaces,
@@ -40,7 +42,7 @@ impl Lowering<'_> {
             user_points: self.user_points,
             boundary_overrides,
             stated_box: self.stated_box,
-            seams: Vec::new(),
+            seams,
         }
     }
 
@@ -102,6 +104,23 @@ impl Lowering<'_> {
             }
         }
         (bodies, cutouts)
+    }
+
+    /// Where the paths of extrusions go on: what is swept before and after touches there, and only there do both matter.
+    fn joints(&self, classes: &Classes) -> Vec<Seam> {
+        let mut seams = BTreeMap::new();
+        for Primitive { surfaces, joints, .. } in &self.forest.primitives {
+            for Joint { sides, plane } in &**joints {
+                let id = |index: usize| classes.id(surfaces.start + index);
+                if let ([Some(a), Some(b)], Some(plane)) = (sides.map(id), id(*plane))
+                    && a != b
+                {
+                    let (pair, carrier) = ([a.min(b), a.max(b)], [a.min(plane), a.max(plane)]);
+                    seams.entry(pair).or_insert(Seam { pair, carrier, is_alone: true });
+                }
+            }
+        }
+        seams.into_values().collect()
     }
 
     /// Cutouts of surfaces that bound no body.

@@ -8,6 +8,7 @@ use std::collections::HashMap;
 use std::ops::Range;
 use std::rc::Rc;
 
+use super::swept::Joint;
 use crate::geometry::{Span, SurfaceInfo};
 use crate::{Solid, Surface, SurfaceId};
 use nalgebra::Isometry3;
@@ -46,6 +47,8 @@ pub(super) struct Primitive {
     pub unsupported: Option<String>,
     /// For a swept solid the number of segments of its profile.
     pub segments: Option<usize>,
+    /// Where a swept solid's path goes on.
+    pub joints: Rc<Vec<Joint>>,
     pub span: Span,
 }
 

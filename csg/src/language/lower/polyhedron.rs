@@ -80,7 +80,7 @@ pub(super) fn shape(
         let help = "its faces may meet at common edges and points only";
         return Err(report.meaning(faces[face_of_surface[bad]].span, message, help));
     }
-    Ok(Shape { surfaces, inside, faces: face_of_surface })
+    Ok(Shape { surfaces, inside, faces: face_of_surface, joints: Vec::new() })
 }
 
 /// The triangles of a face: one, or two for four points; repeated points are dropped.

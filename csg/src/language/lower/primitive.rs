@@ -2,6 +2,7 @@
 
 use super::forest::inside_of;
 use super::polyhedron;
+use super::swept::Joint;
 use crate::geometry::Span;
 use crate::language::ast::Primitive;
 use crate::language::diagnostic::{Report, Reported};
@@ -30,12 +31,14 @@ pub(super) struct Shape {
     pub inside: Solid,
     /// For each surface the face of the text it belongs to.
     pub faces: Vec<usize>,
+    /// Where a swept solid's path goes on.
+    pub joints: Vec<Joint>,
 }
 
 impl Shape {
     /// The inside of one surface.
     fn of(surface: Surface) -> Self {
-        Self { surfaces: vec![surface], inside: inside_of(0), faces: vec![0] }
+        Self { surfaces: vec![surface], inside: inside_of(0), faces: vec![0], joints: Vec::new() }
     }
 }
 
@@ -259,7 +262,8 @@ impl Check<'_> {
         let plane = |point, normal| Surface::Plane(Plane { point, normal });
         let pair = |axis: Vector| [plane(min, -axis), plane(max, axis)];
         let surfaces = [Vector::z(), Vector::y(), Vector::x()].map(pair).concat();
-        Ok(Shape { surfaces, inside: Solid::And((0..6).map(inside_of).collect()), faces: (0..6).collect() })
+        let inside = Solid::And((0..6).map(inside_of).collect());
+        Ok(Shape { surfaces, inside, faces: (0..6).collect(), joints: Vec::new() })
     }
 
     fn torus(&mut self, center: &Point, axis: &Vector, major: f64, minor: f64) -> Result<Shape, Reported> {

@@ -24,8 +24,8 @@ pub(super) fn shape(point: Vector, axis: Vector, pieces: &[Piece]) -> Result<Sha
     let profile = formula(&above, true)?;
     let turn = Turn { point, axis, tolerance };
     let mut assembly = Assembly::default();
-    let inside = assembly.sweep(&profile, |into, bound, face| Ok(turn.turned(into, bound, face)))?;
-    Ok(assembly.shape(inside))
+    let swept = assembly.sweep(&profile, |into, bound, face| Ok(turn.turned(into, bound, face)))?;
+    Ok(assembly.shape(swept.inside))
 }
 
 /// A line that begins beyond the axis begins on it.

@@ -212,21 +212,21 @@ impl Lowering<'_> {
             Some((swept, segments)) => (swept, Some(segments)),
             None => (Ok(primitive::shape(primitive, span, self.report)?), None),
         };
-        let (inside, unsupported) = match shape {
-            Ok(Shape { surfaces, inside, faces }) => {
+        let (inside, joints, unsupported) = match shape {
+            Ok(Shape { surfaces, inside, faces, joints }) => {
                 let raw = |(surface, face)| RawSurface { surface: Some(surface), info: info.clone(), face };
                 self.forest.surfaces.extend(surfaces.into_iter().zip(faces).map(raw));
-                (inside, None)
+                (inside, joints, None)
             }
             Err(message) => {
                 let raw = |face| RawSurface { surface: None, info: info.clone(), face };
                 self.forest.surfaces.extend((0..segments.unwrap_or(0)).map(raw));
-                (Solid::And(Vec::new()), Some(message))
+                (Solid::And(Vec::new()), Vec::new(), Some(message))
             }
         };
         let surfaces = Range { start: first, end: self.forest.surfaces.len() };
-        let inside = Rc::new(inside);
-        self.forest.primitives.push(Primitive { surfaces, inside, unsupported, segments, span });
+        let (inside, joints) = (Rc::new(inside), Rc::new(joints));
+        self.forest.primitives.push(Primitive { surfaces, inside, unsupported, segments, joints, span });
         self.add(Node::Primitive(self.forest.primitives.len() - 1), span)
     }
 

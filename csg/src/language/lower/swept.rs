@@ -44,11 +44,29 @@ impl From<ProfileError> for SweepError {
 /// The surface number (see [`RawSurface::face`](super::forest::RawSurface)) of those that belong to no segment.
 pub(super) const NO_FACE: usize = usize::MAX;
 
+/// Where a path goes on: the surfaces that one side of the profile sweeps before and after, and the plane across the path in which
+/// they meet. Indices of the surfaces of a primitive.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Joint {
+    /// Before and after.
+    pub sides: [usize; 2],
+    /// The plane.
+    pub plane: usize,
+}
+
 /// The surfaces of a swept solid, while it is put together.
 #[derive(Default)]
 pub(super) struct Assembly {
     surfaces: Vec<Surface>,
     faces: Vec<usize>,
+    joints: Vec<Joint>,
+}
+
+/// What a profile sweeps.
+pub(super) struct Swept {
+    pub inside: Solid,
+    /// For each literal of the profile what it sweeps.
+    pub sides: Vec<Solid>,
 }
 
 impl Assembly {
@@ -71,7 +89,14 @@ impl Assembly {
 
     /// The solid with this inside.
     pub fn shape(self, inside: Solid) -> Shape {
-        Shape { surfaces: self.surfaces, inside, faces: self.faces }
+        Shape { surfaces: self.surfaces, inside, faces: self.faces, joints: self.joints }
+    }
+
+    /// Notes that what the same literals sweep before and after a plane meets there.
+    pub fn join(&mut self, [before, after]: [&[Solid]; 2], plane: &Solid) {
+        let Some(plane) = surface_of(plane) else { return };
+        let sides = before.iter().zip(after).filter_map(|(p, q)| Some([surface_of(p)?, surface_of(q)?]));
+        self.joints.extend(sides.filter(|[p, q]| p != q).map(|sides| Joint { sides, plane }));
     }
 
     /// A profile with each literal replaced by what `swept` makes of it.
@@ -79,9 +104,18 @@ impl Assembly {
         &mut self,
         profile: &Profile,
         mut swept: impl FnMut(&mut Self, &Bound, usize) -> Result<Solid, SweepError>,
-    ) -> Result<Solid, SweepError> {
-        let leaves = profile.literals.iter().map(|literal| swept(self, &literal.bound, literal.segment));
-        Ok(substituted(&profile.inside, &leaves.collect::<Result<Vec<_>, _>>()?))
+    ) -> Result<Swept, SweepError> {
+        let sides = profile.literals.iter().map(|literal| swept(self, &literal.bound, literal.segment));
+        let sides = sides.collect::<Result<Vec<_>, _>>()?;
+        Ok(Swept { inside: substituted(&profile.inside, &sides), sides })
+    }
+}
+
+/// The surface of a half-space.
+fn surface_of(solid: &Solid) -> Option<usize> {
+    match solid {
+        Solid::Half { surface, .. } => Some(surface.index()),
+        _ => None,
     }
 }
 
@@ -93,7 +127,7 @@ pub(super) fn nothing() -> Solid {
     Solid::Or(Vec::new())
 }
 
-fn complement(solid: Solid) -> Solid {
+pub(super) fn complement(solid: Solid) -> Solid {
     match solid {
         Solid::Half { surface, positive } => Solid::Half { surface, positive: !positive },
         Solid::And(members) if members.is_empty() => nothing(),
