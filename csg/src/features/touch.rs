@@ -1,11 +1,11 @@
-//! Where a corner, the tip of a cone or an edge touches the inside of a patch.
+//! Where a corner or an edge touches the inside of a patch. The lone tip of a cone may: it is a corner of its own.
 //!
 //! The solid is not a manifold there: the patch goes through a vertex that none of its curves has.
 
 use super::arcs::{Arc, Nodes};
 use super::around::{Tolerances, sheet_at};
 use super::octree::Octree;
-use super::{FeatureError, Named, Place, apex, assemble};
+use super::{FeatureError, Named, Place, assemble};
 use crate::primitive::quadric::tangents;
 use crate::{Geometry, Point, SurfaceId};
 use std::collections::{BTreeMap, BTreeSet};
@@ -13,7 +13,7 @@ use std::collections::{BTreeMap, BTreeSet};
 /// Refuses the first such place.
 ///
 /// A surface through the end of an arc from which no arc leaves on it is a boundary either all around that point or nowhere
-/// near it; the same holds at an apex.
+/// near it.
 ///
 /// # Errors
 /// Names the surface that touches and the one that is touched.
@@ -30,15 +30,8 @@ pub(super) fn check(
             leaving.entry(node).or_default().extend(arc.around.sheets.iter().map(|(sheet, _)| sheet.surface));
         }
     }
-    let mut places: Vec<(Point, BTreeSet<SurfaceId>)> =
-        leaving.into_iter().map(|(node, surfaces)| (nodes.point(node), surfaces)).collect();
-    for (cone, point) in apex::boundaries(geometry, tree, tolerances)? {
-        match places.iter_mut().find(|(known, _)| (known - point).norm() <= tolerances.merge) {
-            Some((_, surfaces)) => drop(surfaces.insert(cone)),
-            None => places.push((point, BTreeSet::from([cone]))),
-        }
-    }
-    for (point, surfaces) in places {
+    for (node, surfaces) in leaving {
+        let point = nodes.point(node);
         for touched in assemble::corner(geometry, tree, point, tolerances).surfaces {
             if !surfaces.contains(&touched) && goes_on_around(geometry, tree, touched, &point, tolerances)? {
                 let touching = *surfaces.first().expect("something ends at the place");
