@@ -3,7 +3,7 @@
 use crate::common::{geometries_in, judge, report_of, shared, succeed, tetmill};
 
 /// What this version meshes.
-const MESHED: [&str; 24] = [
+const MESHED: [&str; 25] = [
     "boundarycondition",
     "boxcyl",
     "circle_on_cube",
@@ -15,6 +15,7 @@ const MESHED: [&str; 24] = [
     "cylinder",
     "ellipsoid",
     "ellipticcyl",
+    "extrusion",
     "fichera",
     "manyholes",
     "matrix",
