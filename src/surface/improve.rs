@@ -235,7 +235,7 @@ pub(super) fn split(sheet: &mut Sheet, t: u32, i: usize, allowed: f64) -> Result
     // The nearest point to the middle of the chord; where that is beyond the triangles, the middle of the chart's edge.
     let places = [Some(nalgebra::center(&na.point, &nb.point)), sheet.chart.middle(&na.site, &nb.site)];
     for place in places.into_iter().flatten() {
-        let mut node = sheet.project(&place)?;
+        let Some(mut node) = sheet.try_project(&place)? else { continue };
         node.size = node.size.min(size * (1.0 + sheet.settings.growth));
         if fan_price(sheet, [p, a, d, b], &node).is_some_and(|worst| worst <= before.max(allowed)) {
             let v = sheet.nodes.len() as u32;
@@ -295,7 +295,7 @@ fn split_inside(sheet: &mut Sheet, t: u32) -> Result<bool, Stop> {
     let corners = sheet.corners(t);
     let middle = Point::from(corners.iter().map(|n| n.point.coords).sum::<Vector>() / 3.0);
     let size = corners.iter().map(|n| n.size).fold(f64::INFINITY, f64::min);
-    let mut node = sheet.project(&middle)?;
+    let Some(mut node) = sheet.try_project(&middle)? else { return Ok(false) };
     node.size = node.size.min(size);
     let [a, b, c] = sheet.corners(t);
     let fits = [(a, b), (b, c), (c, a)]

@@ -162,6 +162,14 @@ impl<'a> Sheet<'a> {
         Ok(self.node(point, self.wanted_size(&point)?, Kind::Free))
     }
 
+    /// The same; `None` where many points are equally near, as from the axis of a cone.
+    pub fn try_project(&self, point: &Point) -> Result<Option<Node>, Stop> {
+        match self.project(point) {
+            Err(Stop::Projection(_)) => Ok(None),
+            found => found.map(Some),
+        }
+    }
+
     /// The vertices of a triangle.
     #[inline]
     pub fn corners(&self, t: u32) -> [&Node; 3] {

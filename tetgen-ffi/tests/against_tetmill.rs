@@ -41,10 +41,14 @@ const NAMES: [&str; 13] = [
     "tee",
 ];
 
-/// Coarse meshes of walls so thin that corners of tets would fold as they are refined and snapped. Ours give up shape to keep
+/// Coarse meshes so coarse against curved walls that corners of tets would fold as they are refined and snapped. Ours give up shape to keep
 /// them from it; TetGen knows no such rule. There our tets without the rule are compared.
-const FOLDING: [(&str, Preset); 3] =
-    [("tee", Preset::VeryCoarse), ("tee", Preset::Coarse), ("dome", Preset::VeryCoarse)];
+const FOLDING: [(&str, Preset); 4] = [
+    ("tee", Preset::VeryCoarse),
+    ("tee", Preset::Coarse),
+    ("dome", Preset::VeryCoarse),
+    ("ring_segment", Preset::VeryCoarse),
+];
 
 /// tetmill's coarse mesh of one of our own geometries.
 fn coarse(name: &str, preset: Preset) -> Mesh {
