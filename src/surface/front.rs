@@ -187,12 +187,14 @@ impl Front<'_, '_> {
             node.size = node.size.min(base + self.sheet.settings.growth * distance);
             node
         };
-        let first = grown(self.sheet.project(&(middle + inward * height(base)))?);
+        let found = self.sheet.try_project(&(middle + inward * height(base)))?;
+        let Some(first) = found.map(grown) else { return Ok(None) };
         let size = 0.5 * (base + first.size);
         if (height(size) - height(base)).abs() <= 0.05 * height(base) {
             return Ok(Some(first));
         }
-        Ok(Some(grown(self.sheet.project(&(middle + inward * height(size)))?)))
+        let second = self.sheet.try_project(&(middle + inward * height(size)))?;
+        Ok(Some(second.map_or(first, grown)))
     }
 
     /// Inserts a vertex, or moves a helper that is in its way there, unless it is too near to something.
@@ -291,7 +293,7 @@ impl Front<'_, '_> {
             let [a, b, _] = self.sheet.corners(t);
             let along = (b.point - a.point).normalize();
             let (size, target) = (a.size, a.point + along * a.size);
-            let node = self.sheet.project(&target)?;
+            let Some(node) = self.sheet.try_project(&target)? else { continue };
             if let Some(place) = self.sheet.walk(t, &node.site, STEPS) {
                 let node = Node { size: node.size.min(size * (1.0 + self.sheet.settings.growth)), ..node };
                 if self.put(&node, place) {
