@@ -27,6 +27,16 @@ enum Cell {
     Leaf([f32; 8]),
 }
 
+impl Cell {
+    /// The same cell of a tree whose cells have all been moved on by `shift` places.
+    fn shifted(&self, shift: u32) -> Cell {
+        match self {
+            Cell::Split(first) => Cell::Split(first + shift),
+            Cell::Leaf(corners) => Cell::Leaf(*corners),
+        }
+    }
+}
+
 /// A cell whose edge is below this multiple of the least size in it is not split: a source in its middle is then overlooked by
 /// half a diagonal, `√3/2·grading` of that multiple of its size, at most.
 const SMALL: f64 = 0.7;
@@ -118,12 +128,8 @@ fn grow(sources: &Sources, root: Draft) -> Vec<Cell> {
     for ((at, _), part) in open.iter().zip(&parts) {
         // The first of a part takes its place, the others follow all that are there.
         let shift = cells.len() as u32 - 1;
-        let shifted = |cell: &Cell| match cell {
-            Cell::Split(first) => Cell::Split(first + shift),
-            Cell::Leaf(corners) => Cell::Leaf(*corners),
-        };
-        cells[*at] = shifted(&part[0]);
-        cells.extend(part[1..].iter().map(shifted));
+        cells[*at] = part[0].shifted(shift);
+        cells.extend(part[1..].iter().map(|cell| cell.shifted(shift)));
     }
     cells
 }
