@@ -1,7 +1,7 @@
 //! The smallest size over many graded sources, found fast.
 
 use super::Source;
-use super::sources::Sources;
+use super::sources::{Sources, Start};
 use crate::{Point, Vector};
 use csg::Aabb;
 use rayon::prelude::*;
@@ -57,8 +57,8 @@ struct Draft {
     min: Point,
     edge: f64,
     corners: [f64; 8],
-    /// A source that asks for least nearby.
-    near: Option<u32>,
+    /// Where searches in it begin.
+    start: Start,
 }
 
 /// The field at corners where it is known, by the bits of their coordinates: cells share corners.
@@ -76,10 +76,10 @@ impl SourceTree {
         let sources = Sources::new(grading, maximum, sources);
         let corner = |c: usize| {
             let point = cube.min + octant(c, side);
-            sources.least_in(&point, &point, None).0
+            sources.least_in(&point, &point, &sources.whole()).0
         };
         let corners = [0, 1, 2, 3, 4, 5, 6, 7].map(corner);
-        let root = Draft { min: cube.min, edge: side, corners, near: None };
+        let root = Draft { min: cube.min, edge: side, corners, start: sources.whole() };
         Self { bounds: cube, grading, maximum, cells: grow(&sources, root) }
     }
 
@@ -157,25 +157,38 @@ fn settle(
 
 /// The eight parts of a cell in which interpolation is not good enough.
 fn split(sources: &Sources, draft: &Draft, known: &mut Known) -> Option<[Draft; 8]> {
-    let Draft { min, edge, corners, near } = *draft;
-    let (least, nearest) = sources.least_in(&min, &(min + Vector::repeat(edge)), near);
-    if nearest.is_none() || edge < SMALL * least {
+    let Draft { min, edge, corners, start } = *draft;
+    let far = min + Vector::repeat(edge);
+    let least_corner = corners.iter().copied().fold(f64::INFINITY, f64::min);
+    // No point is further than half a diagonal from all corners, nor than √5/4 of an edge from all of these and the middle.
+    let reach = edge * sources.grading();
+    if edge < SMALL * (least_corner - 0.5 * 3.0_f64.sqrt() * reach) {
         return None;
     }
-    let at = |point: Point| sources.least_in(&point, &point, nearest);
-    let (middle, near) = at(min + Vector::repeat(0.5 * edge));
-    let mean = corners.iter().sum::<f64>() / 8.0;
-    if edge < LARGE * least && (mean - middle).abs() < BENT * middle {
+    let mut start = sources.start_in(&min, &far, least_corner + 3.0_f64.sqrt() * reach, &start);
+    let at = |point: Point, start: &Start| sources.least_in(&point, &point, start);
+    let (middle, near) = at(min + Vector::repeat(0.5 * edge), &start);
+    let least_known = least_corner.min(middle);
+    if edge < SMALL * (least_known - 0.25 * 5.0_f64.sqrt() * reach) {
         return None;
     }
-    let lattice = lattice(draft, middle, &|point| at(point).0, known);
+    start.near = near.or(start.near);
+    if edge < LARGE * least_known || near.is_none() {
+        let (least, nearest) = sources.least_in(&min, &far, &start);
+        let mean = corners.iter().sum::<f64>() / 8.0;
+        let flat = edge < LARGE * least && (mean - middle).abs() < BENT * middle;
+        if nearest.is_none() || edge < SMALL * least || flat {
+            return None;
+        }
+    }
+    let lattice = lattice(draft, middle, &|point| at(point, &start).0, known);
     let part = |i: usize| {
         let corner = |c: usize| {
             let along = |axis: usize| (i >> axis & 1) + (c >> axis & 1);
             lattice[along(0) + 3 * along(1) + 9 * along(2)]
         };
         let corners = [0, 1, 2, 3, 4, 5, 6, 7].map(corner);
-        Draft { min: min + octant(i, 0.5 * edge), edge: 0.5 * edge, corners, near: near.or(nearest) }
+        Draft { min: min + octant(i, 0.5 * edge), edge: 0.5 * edge, corners, start }
     };
     Some([0, 1, 2, 3, 4, 5, 6, 7].map(part))
 }

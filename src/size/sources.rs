@@ -42,7 +42,15 @@ const LEAF: usize = 6;
 /// are alike.
 const NO_LESS: f64 = 0.01;
 
+/// Nodes that a search begins at, at most: more save little, and are copied for each cell.
+const START: usize = 8;
+
 impl Sources {
+    /// Growth of the size per unit of distance.
+    pub fn grading(&self) -> f64 {
+        self.grading
+    }
+
     /// The hierarchy of the sources that ask for less than `maximum`.
     pub fn new(grading: f64, maximum: f64, sources: &[Source]) -> Self {
         let sources = sources.iter().copied().filter(|s| s.size < maximum).collect();
@@ -72,50 +80,103 @@ impl Sources {
         }
     }
 
-    /// The least size anywhere in a box, which may be a point, or up to a hundredth more.
-    ///
-    /// `near` is the index of a source that may be the one that asks for least, which saves time; the index of that one is
-    /// returned.
-    pub fn least_in(&self, min: &Point, max: &Point, near: Option<u32>) -> (f64, Option<u32>) {
-        let reach = |low: &Point, high: &Point| {
-            let gap = |i: usize| f64::max(low[i] - max[i], min[i] - high[i]).max(0.0);
-            (gap(0) * gap(0) + gap(1) * gap(1) + gap(2) * gap(2)).sqrt() * self.grading
-        };
-        let asked = |s: &Source| s.size + reach(&s.point, &s.point);
-        let mut best = (self.maximum, None);
-        let consider = |index: u32, best: &mut (f64, Option<u32>)| {
-            let size = asked(&self.sources[index as usize]);
-            if size < best.0 {
-                *best = (size, Some(index));
-            }
-        };
-        if let Some(near) = near {
-            consider(near, &mut best);
-        }
-        let bound = |node: usize| {
-            self.nodes[node].least + reach(&self.nodes[node].bounds.min, &self.nodes[node].bounds.max)
-        };
-        // Never more than the depth of the hierarchy wait.
-        let mut open = [(0_u32, 0.0_f64); 64];
-        let mut count = usize::from(!self.nodes.is_empty());
+    /// Where searches begin that know nothing of their place.
+    pub fn whole(&self) -> Start {
+        Start { nodes: [0; START], count: usize::from(!self.nodes.is_empty()), near: None }
+    }
+
+    /// Where searches in a box begin whose field is nowhere above `most`: `from` without what asks for more everywhere there, and
+    /// as far down as there is room.
+    pub fn start_in(&self, min: &Point, max: &Point, most: f64, from: &Start) -> Start {
+        let mut start = Start { count: 0, ..*from };
+        let mut open = [0; START];
+        let mut count = from.count;
+        open[..count].copy_from_slice(&from.nodes[..count]);
         while count > 0 {
             count -= 1;
-            let (node, at_least) = open[count];
-            if at_least >= (1.0 - NO_LESS) * best.0 {
+            let index = open[count];
+            let node = &self.nodes[index as usize];
+            if self.asks_less(node.least, &node.bounds.min, &node.bounds.max, (min, max), most).is_none() {
                 continue;
             }
-            let Node { range, second, .. } = self.nodes[node as usize];
-            if second == 0 {
+            if node.second == 0 || start.count + count + 2 > START {
+                start.nodes[start.count] = index;
+                start.count += 1;
+            } else {
+                (open[count], open[count + 1]) = (node.second, index + 1);
+                count += 2;
+            }
+        }
+        start
+    }
+
+    /// What sources in the box from `low` to `high` of `size` or more may ask for in another box, as the square of the distance, if that may
+    /// be less than `most`.
+    fn asks_less(
+        &self,
+        size: f64,
+        low: &Point,
+        high: &Point,
+        (min, max): (&Point, &Point),
+        most: f64,
+    ) -> Option<f64> {
+        let room = most - size;
+        let gap = |i: usize| f64::max(low[i] - max[i], min[i] - high[i]).max(0.0);
+        let square = gap(0) * gap(0) + gap(1) * gap(1) + gap(2) * gap(2);
+        (room > 0.0 && self.grading * self.grading * square < room * room).then_some(square)
+    }
+
+    /// The least size anywhere in a box, which may be a point, or up to a hundredth more; and the index of the source that asks for it.
+    pub fn least_in(&self, min: &Point, max: &Point, start: &Start) -> (f64, Option<u32>) {
+        let mut best = (self.maximum, None);
+        let consider = |index: u32, best: &mut (f64, Option<u32>)| {
+            let Source { point, size } = &self.sources[index as usize];
+            if let Some(square) = self.asks_less(*size, point, point, (min, max), best.0) {
+                *best = (size + self.grading * square.sqrt(), Some(index));
+            }
+        };
+        if let Some(near) = start.near {
+            consider(near, &mut best);
+        }
+        // Never more than the depth of the hierarchy wait below each node of the start.
+        let mut open = [0_u32; START + 64];
+        let mut count = start.count;
+        open[..count].copy_from_slice(&start.nodes[..count]);
+        while count > 0 {
+            count -= 1;
+            let index = open[count];
+            let Node { range, second, least, bounds } = &self.nodes[index as usize];
+            if self
+                .asks_less(*least, &bounds.min, &bounds.max, (min, max), (1.0 - NO_LESS) * best.0)
+                .is_none()
+            {
+                continue;
+            }
+            if *second == 0 {
                 (range[0]..range[1]).for_each(|index| consider(index, &mut best));
                 continue;
             }
-            let children = [node + 1, second].map(|child| (child, bound(child as usize)));
-            let nearer = usize::from(children[1].1 < children[0].1);
-            (open[count], open[count + 1]) = (children[1 - nearer], children[nearer]);
+            // The nearer child is looked into first.
+            let middle = |child: u32| {
+                let bounds = &self.nodes[child as usize].bounds;
+                (0..3).map(|i| (bounds.min[i] + bounds.max[i] - min[i] - max[i]).powi(2)).sum::<f64>()
+            };
+            let (first, second) = (index + 1, *second);
+            let swap = middle(first) < middle(second);
+            (open[count], open[count + 1]) = if swap { (second, first) } else { (first, second) };
             count += 2;
         }
         best
     }
+}
+
+/// Where a search begins: nodes that may hold the source that asks for least, and one that may be it, which saves time.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Start {
+    nodes: [u32; START],
+    count: usize,
+    /// Index of a source.
+    pub near: Option<u32>,
 }
 
 /// Of sources in one cell of a grid that is as wide as they are large, or half so, the smallest: facets may be far smaller than
