@@ -48,10 +48,11 @@ impl Preset {
     ];
 
     /// Elements per radius of curvature: the size there is `1 / (safety · curvature)`.
+    ///
+    /// Below 1.75 a ball loses more than 15 % of its volume. (NETGEN takes 1 and 1.5 for the first two, and loses 38 % and 16 %.)
     pub fn curvature_safety(self) -> f64 {
         match self {
-            Self::VeryCoarse => 1.0,
-            Self::Coarse => 1.5,
+            Self::VeryCoarse | Self::Coarse => 1.75,
             Self::Moderate => 2.0,
             Self::Fine => 3.0,
             Self::VeryFine => 5.0,
