@@ -201,7 +201,7 @@ fn attempt(model: &CsgModel, settings: &CoarseSettings, allowed: Allowed) -> Att
         Ok(curves) => curves,
         Err(error) => return Attempt::Failed(error.into()),
     };
-    let crowded = crowded(&curves, features);
+    let crowded = crowded(&curves, features, size);
     if allowed.lower && !crowded.is_empty() {
         return Attempt::Lower(crowded);
     }

@@ -47,7 +47,7 @@ const LARGE: f64 = 1.0;
 
 /// Above this grading both are less, so that the field is as true as there: at a grading of 0.7 sizes were 40 % too large on a
 /// ball.
-const STEEP: f64 = 0.3;
+const STEEP: f64 = 0.45;
 
 /// Between the two, a cell is split if its middle tells that interpolation is wrong by more than this part.
 const BENT: f64 = 0.03;

@@ -191,11 +191,12 @@ fn turn(trace: &[Point], closed: bool) -> f64 {
     turns.iter().sum::<f64>() + ends
 }
 
-/// Where a chord strays too far from its curve to keep clear of another segment: sources that halve it.
+/// Where a chord strays too far from its curve to keep clear of another segment: sources that shorten it, each below the size
+/// that was used, since with steep gradings a chord is longer than the size in its middle asks for.
 ///
 /// Two segments without a common vertex must be further apart than the sum of their sagittas (the
 /// largest distance of chord and curve), else patches that are apart would overlap in the mesh.
-pub fn crowded(mesh: &SurfaceMesh, features: &Features) -> Vec<Source> {
+pub fn crowded(mesh: &SurfaceMesh, features: &Features, size: &dyn SizeField) -> Vec<Source> {
     let sagittas = sagittas(mesh, features);
     let ends = |i: usize| mesh.segments[i].vertices.map(|v| mesh.points[v.index()]);
     // Along x, each chord in the interval that it and its clearance take.
@@ -218,7 +219,8 @@ pub fn crowded(mesh: &SurfaceMesh, features: &Features) -> Vec<Source> {
             let (distance, at) = segment_distance(ends(i), ends(j));
             if distance < CLEARANCE * (sagittas[i] + sagittas[j]) {
                 let [a, b] = ends(if sagittas[i] >= sagittas[j] { i } else { j });
-                sources.push(Source { point: at, size: SHORTENED * (b - a).norm() });
+                let used = size.size_at(&at).min((b - a).norm());
+                sources.push(Source { point: at, size: SHORTENED * used });
             }
         }
     }
@@ -325,8 +327,9 @@ mod tests {
             }
             mesh
         };
-        assert!(!crowded(&cut(1.0), &features).is_empty());
-        assert!(crowded(&cut(0.2), &features).is_empty());
+        let long = crowded(&cut(1.0), &features, &UniformSize(0.5));
+        assert!(!long.is_empty() && long.iter().all(|source| source.size <= 0.3));
+        assert!(crowded(&cut(0.2), &features, &UniformSize(0.2)).is_empty());
     }
 
     #[test]
