@@ -50,6 +50,7 @@ mod periodic;
 mod seam;
 mod seed;
 mod singular;
+mod swept;
 mod touch;
 mod trace;
 

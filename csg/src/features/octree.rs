@@ -3,10 +3,11 @@
 use super::around::Tolerances;
 use super::bounds::split;
 use super::contact::{self, Contact};
+use super::swept::Swept;
 use super::{FeatureError, Named, Place, apex};
 use crate::interval::{Cell, dot, middle, offset};
 use crate::solid::Pruned;
-use crate::{BodyId, Geometry, Interval, Point, Solid, Surface, SurfaceId, Vector};
+use crate::{BodyId, Geometry, Interval, Point, Seam, Solid, Surface, SurfaceId, Vector};
 use std::collections::BTreeMap;
 
 /// A cell in which any two surfaces are told apart.
@@ -84,7 +85,9 @@ impl Octree {
         while let Some((node, cell, solids, depth)) = open.pop() {
             let (bodies, cutouts) = prune_all(geometry, &cell, solids);
             let surfaces = surfaces_of(&bodies, &cutouts);
-            let pairs = Judge { geometry, cell: &cell, depth, tolerances }.all(&surfaces);
+            let solids = (bodies, cutouts);
+            let pairs = Judge { geometry, cell: &cell, solids: &solids, depth, tolerances }.all(&surfaces);
+            let (bodies, cutouts) = solids;
             let crowded = surfaces.len() > CROWD && depth < CROWD_DEPTH;
             if depth < MAX_DEPTH && (crowded || pairs.undecided.is_some()) {
                 if let (Some(pair), true) = (pairs.undecided, tree.nodes.len() > MAX_NODES) {
@@ -215,6 +218,7 @@ struct Pairs {
 struct Judge<'a> {
     geometry: &'a Geometry,
     cell: &'a Cell,
+    solids: &'a Solids,
     depth: u32,
     tolerances: &'a Tolerances,
 }
@@ -246,15 +250,38 @@ impl Judge<'_> {
             Some(seam) if seam.is_alone => self.crossing(seam.carrier, pairs),
             Some(seam) => {
                 self.crossing(seam.carrier, pairs)
-                    && (contact::on_seam(self.geometry, seam, self.cell, &mut pairs.contacts)
+                    && (self.is_divided(seam)
+                        || contact::on_seam(self.geometry, seam, self.cell, &mut pairs.contacts)
                         || self.crossing(pair, pairs))
             }
         }
     }
 
+    /// Whether solids keep the two apart but on the seam: on each side of the surface across it only one of the two matters.
+    fn is_divided(&self, seam: &Seam) -> bool {
+        let (bodies, cutouts) = self.solids;
+        let solids = || bodies.iter().map(|b| &b.1).chain(cutouts.iter().map(|c| &c.1));
+        let sides = [
+            Interval::new(f64::NEG_INFINITY, -f64::MIN_POSITIVE),
+            Interval::new(f64::MIN_POSITIVE, f64::INFINITY),
+        ];
+        sides.into_iter().all(|side| {
+            let unknown = Interval::new(f64::NEG_INFINITY, f64::INFINITY);
+            let is_across = |id| seam.carrier.contains(&id) && !seam.pair.contains(&id);
+            let left = solids().filter_map(|solid| {
+                match solid.prune(&mut |id| if is_across(id) { side } else { unknown }) {
+                    Pruned::Part(part) => Some(part.surfaces()),
+                    Pruned::Empty | Pruned::Full => None,
+                }
+            });
+            let left: Vec<SurfaceId> = left.flatten().collect();
+            !seam.pair.iter().all(|s| left.contains(s))
+        })
+    }
+
     /// Whether what two surfaces have in common in the cell is known: nothing, a monotone curve, a point of contact, or an apex.
     fn crossing(&self, pair: [SurfaceId; 2], pairs: &mut Pairs) -> bool {
-        let Self { geometry, cell, depth, tolerances } = *self;
+        let Self { geometry, cell, depth, tolerances, .. } = *self;
         let [a, b] = pair.map(|s| &geometry.surfaces[s.index()]);
         if !can_meet(a, b, cell) {
             return true;
@@ -279,6 +306,9 @@ impl Judge<'_> {
 /// Beside the ranges of both functions, the range of that combination of them is asked whose gradient is
 /// least in the middle: it tells nearly parallel sheets apart.
 pub(super) fn can_meet(a: &Surface, b: &Surface, cell: &Cell) -> bool {
+    if let Some(swept) = Swept::new(a, b, cell) {
+        return swept.can_meet();
+    }
     let center = middle(cell);
     let (ga, gb) = (a.gradient(&center), b.gradient(&center));
     let factor = ga.dot(&gb) / gb.norm_squared();
@@ -332,6 +362,12 @@ fn quadratic_difference(a: &Surface, b: &Surface, factor: f64, cell: &Cell) -> I
 /// a regular Jacobian for any choice of gradients, row by row, in their ranges (Neumaier 1990, Interval methods for
 /// systems of equations, section 5.1).
 pub(super) fn is_monotone(a: &Surface, b: &Surface, cell: &Cell, direction: &Vector) -> bool {
+    let in_plane = Swept::new(a, b, cell).and_then(|swept| swept.is_monotone(direction));
+    in_plane.unwrap_or_else(|| is_monotone_in_space(a, b, cell, direction))
+}
+
+/// The same from the ranges of the gradients.
+pub(super) fn is_monotone_in_space(a: &Surface, b: &Surface, cell: &Cell, direction: &Vector) -> bool {
     let (u, v) = (a.gradient_range(cell), b.gradient_range(cell));
     let cross = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
     dot(direction, &cross).lo > 0.0
