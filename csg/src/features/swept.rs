@@ -79,10 +79,10 @@ impl Swept {
 
     /// Those points that a line and an ellipse have in common which may be in the cell; `None` where they are not known.
     fn common_points(&self) -> Option<[Option<[f64; 2]>; 2]> {
-        /// Rounding of the points, as a part of the size of the ellipse and its distance from the origin. They are left alone where
-        /// the line is so near to tangent that they are not known as well.
-        const ROUNDING: f64 = 1e-11;
-        const TANGENT: f64 = 1e-6;
+        /// Rounding of the points, as a part of the size of the ellipse and its distance from the origin: that of the cosine, 10⁻¹⁵, is as much
+        /// larger in the angle as the sine is small. They are left alone where the line is so near to tangent that they are not known as well.
+        const ROUNDING: f64 = 1e-10;
+        const TANGENT: f64 = 1e-10;
         let (normal, offset, e) = match self.curves {
             [Section::Line { normal, offset }, Section::Ellipse(e)]
             | [Section::Ellipse(e), Section::Line { normal, offset }] => (normal, offset, e),

@@ -200,6 +200,26 @@ fn a_path_with_corners_is_mitred() {
 }
 
 #[test]
+fn arcs_of_a_profile_that_turns_about_its_path_are_followed_over_a_joint() {
+    // Beside the joint the arc before it and the chord of the one behind it cross where neither matters.
+    let path = "curve3d q = (5; 0,0,0; 4,0,2; 4,4,4; 4,8,6; 0,8,8; 2; 3,1,2,3; 3,3,4,5);";
+    let profile = "curve2d p = (4; -1,0; -0.7,0.7; 0,1; 0.5,-0.8; 3; 3,1,2,3; 2,3,4; 2,4,1);";
+    let features =
+        crate::Features::find(&swept(&format!("{path} {profile}"), "extrusion (q; p; 0,0,1)")).unwrap();
+    assert_eq!([features.corners.len(), features.curves.len(), features.patches.len()], [9, 15, 8]);
+}
+
+#[test]
+fn arcs_may_be_shallow() {
+    let path = "curve3d q = (3; 0,0,0; 10,0,2; 10,10,4; 1; 3,1,2,3);";
+    let profile = "curve2d p = (5; 0,1; 0,2; 1.5,2.002; 3,2; 3,1; 4; 2,1,2; 3,2,3,4; 2,4,5; 2,5,1);";
+    for solid in ["extrusion (q; p; 0,0,1)", "revolution (0,0,0; 1,0,0; p)"] {
+        let features = crate::Features::find(&swept(&format!("{path} {profile}"), solid)).unwrap();
+        assert!(features.patches.len() >= 4, "{solid}");
+    }
+}
+
+#[test]
 fn paths_that_run_back_or_are_too_short_for_their_corners_are_refused() {
     let bar = polygon(&[[-0.1, -0.1], [0.1, -0.1], [0.1, 0.1], [-0.1, 0.1]], true);
     for path in [
