@@ -3,8 +3,8 @@
 algebraic3d
 
 solid stem = cylinder (0, 0, 0; 0, 0, 1; 0.8) and plane (0, 0, 0; 0, 0, -1) and plane (0, 0, 2; 0, 0, 1);
-solid point_ = cone (0, 0, 0; 0.8; 0, 0, -0.8; 0.4) and plane (0, 0, 0; 0, 0, 1) and plane (0, 0, -1.6; 0, 0, -1);
-solid needle = stem or point_;
+solid tip = cone (0, 0, 0; 0.8; 0, 0, -0.8; 0.4) and plane (0, 0, 0; 0, 0, 1) and plane (0, 0, -1.6; 0, 0, -1);
+solid needle = stem or tip;
 solid seat = orthobrick (-1.5, -1.5, -1.2; 1.5, 1.5, 1) and not needle and not cylinder (0, 0, 0; 0, 0, 1; 0.4);
 tlo needle -material=steel;
 tlo seat -material=bronze;

@@ -1,6 +1,6 @@
 algebraic3d
 # A frame with mitred corners: the path is closed and has no arcs. The profile is an L.
-# Volume: by legs of the section, 2 (0.6 0.2) (4 + 3) + ... see the tests.
+# Each point of the section goes around a rectangle that is the larger the farther out it is (x): volume 14 0.18 - 8 0.009 = 2.448.
 
 curve3d path = (5;  0, 0, 0;  4, 0, 0;  4, 3, 0;  0, 3, 0;  0, 0, 0;  4;  2, 1, 2;  2, 2, 3;  2, 3, 4;  2, 4, 5);
 curve2d section = (6;

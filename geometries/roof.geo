@@ -1,5 +1,4 @@
-# A pyramid on a cube with a hole through both: four planes meet in one point. Volume 8 + 4 - 0.16 pi 3 + what the hole lacks at the tip
-# would be missing, so the hole is horizontal: volume 12 - 0.32 pi.
+# A pyramid on a cube with a horizontal hole: four planes meet in one point. Volume 12 - 0.32 pi.
 algebraic3d
 
 solid cube = orthobrick (-1, -1, 0; 1, 1, 2);
