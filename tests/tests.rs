@@ -7,6 +7,7 @@ mod inputs;
 mod kept;
 mod mpirun;
 mod mpirun_comm;
+mod parts;
 mod quality;
 mod random_scenes;
 mod ranks;

@@ -20,6 +20,8 @@
 //! one curve, four through one point, a plane through a seam between tangent surfaces) need no case of their own; and
 //! what was missed shows as an open end.
 //!
+//! Surfaces that one motion sweeps are compared in the moving plane (`swept`), and what planes of the file keep apart is not compared at all.
+//!
 //! Tangent surfaces are a case of their own (`seam`): a line or a circle along which two are tangent is found from
 //! their parameters. The apex of a cone is a corner (`apex`). Curves get their seeds by exclusion (`seed`): parts of cells are split
 //! until a trace covers them or no curve can be there.
@@ -50,6 +52,7 @@ mod periodic;
 mod seam;
 mod seed;
 mod singular;
+mod swept;
 mod touch;
 mod trace;
 

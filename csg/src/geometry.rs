@@ -228,7 +228,7 @@ pub enum BoundaryLabel {
 /// A curve along which two surfaces are tangent: a fillet and its plane, a pipe and the ball that ends it.
 ///
 /// The intersection of the two says little of such a curve: rounding moves it by the square root of itself. So it is
-/// carried by one of them and an **auxiliary** surface across it that bounds nothing.
+/// carried by one of them and an **auxiliary** surface across it, which need not bound anything.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Seam {
     /// The two surfaces, ascending.

@@ -3,10 +3,12 @@
 use super::around::Tolerances;
 use super::bounds::split;
 use super::contact::{self, Contact};
+use super::swept::Swept;
 use super::{FeatureError, Named, Place, apex};
 use crate::interval::{Cell, dot, middle, offset};
 use crate::solid::Pruned;
 use crate::{BodyId, Geometry, Interval, Point, Solid, Surface, SurfaceId, Vector};
+use std::cell::OnceCell;
 use std::collections::BTreeMap;
 
 /// A cell in which any two surfaces are told apart.
@@ -84,7 +86,19 @@ impl Octree {
         while let Some((node, cell, solids, depth)) = open.pop() {
             let (bodies, cutouts) = prune_all(geometry, &cell, solids);
             let surfaces = surfaces_of(&bodies, &cutouts);
-            let pairs = Judge { geometry, cell: &cell, depth, tolerances }.all(&surfaces);
+            let solids = (bodies, cutouts);
+            let dividers = OnceCell::new();
+            let judge = Judge {
+                geometry,
+                cell: &cell,
+                solids: &solids,
+                surfaces: &surfaces,
+                dividers,
+                depth,
+                tolerances,
+            };
+            let pairs = judge.all();
+            let (bodies, cutouts) = solids;
             let crowded = surfaces.len() > CROWD && depth < CROWD_DEPTH;
             if depth < MAX_DEPTH && (crowded || pairs.undecided.is_some()) {
                 if let (Some(pair), true) = (pairs.undecided, tree.nodes.len() > MAX_NODES) {
@@ -215,16 +229,20 @@ struct Pairs {
 struct Judge<'a> {
     geometry: &'a Geometry,
     cell: &'a Cell,
+    solids: &'a Solids,
+    surfaces: &'a [SurfaceId],
+    /// See [`Judge::sides_of_planes`].
+    dividers: OnceCell<Vec<(SurfaceId, [Vec<SurfaceId>; 2])>>,
     depth: u32,
     tolerances: &'a Tolerances,
 }
 
 impl Judge<'_> {
     /// Judges all pairs, up to the first that is not told apart.
-    fn all(&self, surfaces: &[SurfaceId]) -> Pairs {
+    fn all(&self) -> Pairs {
         let mut pairs = Pairs::default();
-        for (i, &first) in surfaces.iter().enumerate() {
-            for &second in &surfaces[i + 1..] {
+        for (i, &first) in self.surfaces.iter().enumerate() {
+            for &second in &self.surfaces[i + 1..] {
                 if !self.pair([first, second], &mut pairs) {
                     pairs.undecided = Some([first, second]);
                     if self.depth < MAX_DEPTH {
@@ -246,17 +264,63 @@ impl Judge<'_> {
             Some(seam) if seam.is_alone => self.crossing(seam.carrier, pairs),
             Some(seam) => {
                 self.crossing(seam.carrier, pairs)
-                    && (contact::on_seam(self.geometry, seam, self.cell, &mut pairs.contacts)
+                    && (self.is_divided(pair)
+                        || contact::on_seam(self.geometry, seam, self.cell, &mut pairs.contacts)
                         || self.crossing(pair, pairs))
             }
         }
     }
 
+    /// Whether solids keep two surfaces apart: on each side of a plane that both cross cleanly, or miss, only one of them matters.
+    ///
+    /// What the two have in common on the plane itself is seen where each of them meets it.
+    fn is_divided(&self, pair: [SurfaceId; 2]) -> bool {
+        let has_both = |side: &Vec<SurfaceId>| pair.iter().all(|s| side.contains(s));
+        let is_clear = |s: SurfaceId, plane: SurfaceId| {
+            let [a, b] = [s, plane].map(|s| &self.geometry.surfaces[s.index()]);
+            let center = middle(self.cell);
+            let direction = a.gradient(&center).cross(&b.gradient(&center));
+            !can_meet(a, b, self.cell) || is_monotone(a, b, self.cell, &direction)
+        };
+        let dividers = self.dividers.get_or_init(|| self.sides_of_planes());
+        pair.iter().all(|s| self.surfaces.binary_search(s).is_ok())
+            && dividers.iter().any(|(plane, sides)| {
+                !pair.contains(plane)
+                    && !sides.iter().any(has_both)
+                    && pair.iter().all(|&s| is_clear(s, *plane))
+            })
+    }
+
+    /// The planes of the cell, and the surfaces that matter on both sides of each.
+    fn sides_of_planes(&self) -> Vec<(SurfaceId, [Vec<SurfaceId>; 2])> {
+        /// In a cell with more surfaces the search for dividers would take longer than splitting it.
+        const MOST_SURFACES: usize = 24;
+        if self.surfaces.len() > MOST_SURFACES {
+            return Vec::new();
+        }
+        let sides = [(f64::NEG_INFINITY, -f64::MIN_POSITIVE), (f64::MIN_POSITIVE, f64::INFINITY)];
+        let sides = sides.map(|(lo, hi)| Interval::new(lo, hi));
+        let anything = Interval::new(f64::NEG_INFINITY, f64::INFINITY);
+        let (bodies, cutouts) = self.solids;
+        let mattering = |plane: SurfaceId, side: Interval| {
+            let solids = bodies.iter().map(|b| &b.1).chain(cutouts.iter().map(|c| &c.1));
+            let mut range = |id| if id == plane { side } else { anything };
+            let left = solids.filter_map(|solid| match solid.prune(&mut range) {
+                Pruned::Part(part) => Some(part.surfaces()),
+                Pruned::Empty | Pruned::Full => None,
+            });
+            left.flatten().collect()
+        };
+        let is_plane = |s: &SurfaceId| matches!(self.geometry.surfaces[s.index()], Surface::Plane(_));
+        let planes = self.surfaces.iter().copied().filter(is_plane);
+        planes.map(|plane| (plane, sides.map(|side| mattering(plane, side)))).collect()
+    }
+
     /// Whether what two surfaces have in common in the cell is known: nothing, a monotone curve, a point of contact, or an apex.
     fn crossing(&self, pair: [SurfaceId; 2], pairs: &mut Pairs) -> bool {
-        let Self { geometry, cell, depth, tolerances } = *self;
+        let Self { geometry, cell, depth, tolerances, .. } = *self;
         let [a, b] = pair.map(|s| &geometry.surfaces[s.index()]);
-        if !can_meet(a, b, cell) {
+        if !can_meet(a, b, cell) || self.is_divided(pair) {
             return true;
         }
         let center = middle(cell);
@@ -279,6 +343,9 @@ impl Judge<'_> {
 /// Beside the ranges of both functions, the range of that combination of them is asked whose gradient is
 /// least in the middle: it tells nearly parallel sheets apart.
 pub(super) fn can_meet(a: &Surface, b: &Surface, cell: &Cell) -> bool {
+    if let Some(swept) = Swept::new(a, b, cell) {
+        return swept.can_meet();
+    }
     let center = middle(cell);
     let (ga, gb) = (a.gradient(&center), b.gradient(&center));
     let factor = ga.dot(&gb) / gb.norm_squared();
@@ -332,6 +399,12 @@ fn quadratic_difference(a: &Surface, b: &Surface, factor: f64, cell: &Cell) -> I
 /// a regular Jacobian for any choice of gradients, row by row, in their ranges (Neumaier 1990, Interval methods for
 /// systems of equations, section 5.1).
 pub(super) fn is_monotone(a: &Surface, b: &Surface, cell: &Cell, direction: &Vector) -> bool {
+    let in_plane = Swept::new(a, b, cell).and_then(|swept| swept.is_monotone(direction));
+    in_plane.unwrap_or_else(|| is_monotone_in_space(a, b, cell, direction))
+}
+
+/// The same from the ranges of the gradients.
+pub(super) fn is_monotone_in_space(a: &Surface, b: &Surface, cell: &Cell, direction: &Vector) -> bool {
     let (u, v) = (a.gradient_range(cell), b.gradient_range(cell));
     let cross = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
     dot(direction, &cross).lo > 0.0

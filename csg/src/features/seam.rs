@@ -45,9 +45,12 @@ pub fn find_seams(geometry: &mut Geometry) {
     for (k, &i) in curved.iter().enumerate() {
         for &j in flat.iter().chain(&curved[k + 1..]) {
             let Some(found) = seam([i, j].map(|s| &geometry.surfaces[s]), tolerance) else { continue };
-            let auxiliary = auxiliary_id(geometry, count, found.auxiliary, tolerance);
+            // Where they meet elsewhere too, it may be a plane of the file that keeps them apart there.
+            let first = if found.is_alone { count } else { 0 };
+            let auxiliary = auxiliary_id(geometry, first, found.auxiliary, tolerance);
             let pair = [i.min(j), i.max(j)].map(SurfaceId::new);
-            let carrier = [SurfaceId::new([i, j][found.carrier]), auxiliary];
+            let carrier = SurfaceId::new([i, j][found.carrier]);
+            let carrier = [carrier.min(auxiliary), carrier.max(auxiliary)];
             seams.push(Seam { pair, carrier, is_alone: found.is_alone });
         }
     }
@@ -58,14 +61,14 @@ pub fn find_seams(geometry: &mut Geometry) {
     geometry.seams = seams;
 }
 
-/// The id of an auxiliary surface, new or that of an equal one; `count` are surfaces of the file.
-fn auxiliary_id(geometry: &mut Geometry, count: usize, surface: Surface, tolerance: f64) -> SurfaceId {
-    let known = geometry.surfaces[count..].iter().position(|s| s.same_as(&surface, tolerance).is_some());
+/// The id of an auxiliary surface, new or that of an equal one from `first` on.
+fn auxiliary_id(geometry: &mut Geometry, first: usize, surface: Surface, tolerance: f64) -> SurfaceId {
+    let known = geometry.surfaces[first..].iter().position(|s| s.same_as(&surface, tolerance).is_some());
     if known.is_none() {
         geometry.surfaces.push(surface);
         geometry.surface_info.push(SurfaceInfo::default());
     }
-    SurfaceId::new(known.map_or(geometry.surfaces.len() - 1, |i| count + i))
+    SurfaceId::new(known.map_or(geometry.surfaces.len() - 1, |i| first + i))
 }
 
 /// The extent of the points and radii that define the surfaces.

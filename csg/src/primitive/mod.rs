@@ -20,6 +20,7 @@ mod sweep;
 mod torus;
 
 pub use ellipse::Ellipse;
+pub(crate) use revolved::turned_ranges;
 
 /// What each primitive answers; [`Surface`](crate::Surface) documents the meaning.
 pub(crate) trait Primitive: Sized {

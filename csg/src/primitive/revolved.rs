@@ -13,6 +13,14 @@ use nalgebra::{Isometry3, Matrix3};
 /// This part of the larger semi-axis from the axis is on it: the direction from there is rounding.
 const ON_AXIS: f64 = 1e-12;
 
+/// The ranges over a box of (ρ, h), and of the directions of ∇ρ × ∇h, `None` if the axis passes through the box.
+pub(crate) fn turned_ranges(origin: &Point, axis: &Vector, cell: &Cell) -> ([Interval; 2], Option<Cell>) {
+    let arm = offset(cell, origin);
+    let ([x, y, z], distance) = direction_range(&reject_range(&arm, axis));
+    let forward = || [y * axis.z - z * axis.y, z * axis.x - x * axis.z, x * axis.y - y * axis.x];
+    ([distance, dot(axis, &arm)], (distance.lo > 0.0).then(forward))
+}
+
 impl Revolved {
     /// The vector from the axis, and the distance from it and the height.
     #[inline]

@@ -19,21 +19,22 @@ impl Section {
         }
     }
 
-    fn gradient(&self, at: [f64; 2]) -> [f64; 2] {
+    pub(crate) fn gradient(&self, at: [f64; 2]) -> [f64; 2] {
         match self {
             Self::Line { normal, .. } => *normal,
             Self::Ellipse(e) => e.gradient(at),
         }
     }
 
-    fn hessian(&self) -> [f64; 3] {
+    /// The second derivatives xx, xy, yy.
+    pub(crate) fn hessian(&self) -> [f64; 3] {
         match self {
             Self::Line { .. } => [0.0; 3],
             Self::Ellipse(e) => e.hessian(),
         }
     }
 
-    fn value_range(&self, [x, y]: [Interval; 2]) -> Interval {
+    pub(crate) fn value_range(&self, [x, y]: [Interval; 2]) -> Interval {
         match self {
             Self::Line { normal, offset } => x * normal[0] + y * normal[1] - Interval::point(*offset),
             Self::Ellipse(e) => e.value_range([x, y]),
@@ -124,7 +125,25 @@ impl Sweep {
         let [cos, sin] = [n, d].map(|v| (v / square.sqrt()).intersect(unit));
         let [q, z] = [distance - Interval::point(self.radius), dot(&self.axis, &arm)];
         let at = [q * cos - z * sin, q * sin + z * cos];
-        Ranges { outward, distance, along, cos, sin, turn: t * n / square, at }
+        Ranges { outward, distance, along, cos, sin, turn: t * n / square, across: [q, z], at }
+    }
+
+    /// Whether another section moves with this one.
+    pub(crate) fn is_along(&self, other: &Self) -> bool {
+        self.center == other.center
+            && self.axis == other.axis
+            && self.radius == other.radius
+            && self.up == other.up
+    }
+
+    /// The ranges over a box of (X, Y), and of directions of ∇X × ∇Y, which are against those in which points of the section
+    /// move; `None` if the axis passes through the box.
+    pub(crate) fn plane_ranges(&self, cell: &Cell) -> ([Interval; 2], Option<Cell>) {
+        let r = self.ranges(cell);
+        let [q, z] = r.across;
+        // With θ a point moves along the circle, and around the path as its plane turns.
+        let moved = |i: usize| r.along[i] * r.distance + (r.outward[i] * z - q * self.axis[i]) * r.turn;
+        (r.at, (r.distance.lo > 0.0).then(|| [0, 1, 2].map(|i| -moved(i))))
     }
 }
 
@@ -135,6 +154,8 @@ struct Ranges {
     cos: Interval,
     sin: Interval,
     turn: Interval,
+    /// The distance from the axis less the radius, and the height.
+    across: [Interval; 2],
     at: [Interval; 2],
 }
 

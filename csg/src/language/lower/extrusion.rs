@@ -22,8 +22,9 @@ const RIGID: f64 = 1e-9;
 
 /// The solid of a profile along a path; `up` is the direction of the profile's y.
 pub(super) fn shape(path: &[Piece], profile: &[Piece], up: Vector) -> Result<Shape, SweepError> {
-    check_path(path)?;
+    check_directions(path)?;
     let profile = formula(profile, false)?;
+    check_corners(path, profile.reach)?;
     let up = up.normalize();
     let mut assembly = Assembly::default();
     let swept = path.iter().enumerate().map(|(index, piece)| match *piece {
@@ -31,16 +32,22 @@ pub(super) fn shape(path: &[Piece], profile: &[Piece], up: Vector) -> Result<Sha
         Piece::Arc(arc) => along_arc(&mut assembly, [index, path.len()], &arc, &profile, up),
     });
     let swept = swept.collect::<Result<Vec<_>, _>>()?;
-    let ends: Vec<Solid> =
-        path.iter().map(|piece| assembly.behind(piece.ends()[1], piece.tangents()[1], NO_FACE)).collect();
     let last = path.len() - 1;
-    let is_closed = goes_on(&path[last], &path[0]) && meets(&path[last], &path[0]);
+    let is_closed = last > 0 && meets(&path[last], &path[0]);
+    let next = |index: usize| if index < last { Some(index + 1) } else { is_closed.then_some(0) };
+    let ends = path.iter().enumerate().map(|(index, piece)| {
+        let normal = next(index).map_or(piece.tangents()[1], |next| mitre(piece, &path[next]));
+        assembly.behind(piece.ends()[1], normal, NO_FACE)
+    });
+    let ends: Vec<Solid> = ends.collect();
     let mut members = Vec::new();
     for (index, piece) in path.iter().enumerate() {
         let before = if index > 0 { Some(index - 1) } else { is_closed.then_some(last) };
         let start = match before {
             Some(before) => {
-                assembly.join([before, index].map(|i| &swept[i].sides[..]), &ends[before]);
+                if goes_on(&path[before], &path[index]) {
+                    assembly.join([before, index].map(|i| &swept[i].sides[..]), &ends[before]);
+                }
                 complement(ends[before].clone())
             }
             None => assembly.behind(piece.ends()[0], -piece.tangents()[0], NO_FACE),
@@ -64,19 +71,55 @@ fn meets(before: &Piece, after: &Piece) -> bool {
     (after.ends()[0] - end).norm() <= SMOOTH * (end - start).norm()
 }
 
-fn check_path(path: &[Piece]) -> Result<(), SweepError> {
-    for (index, two) in path.windows(2).enumerate() {
-        if !goes_on(&two[0], &two[1]) {
-            let message =
-                format!("the path has a corner between its segments {} and {}", index + 1, index + 2);
-            return Err(SweepError::Unsupported(
-                message + ", which cannot be meshed yet: round it with a segment of kind 3",
-            ));
-        }
-    }
+/// The normal of the plane in which a piece of the path ends and the next one begins: across the path, or half-way between
+/// their directions where it has a corner.
+fn mitre(before: &Piece, after: &Piece) -> Vector {
+    let end = before.tangents()[1];
+    if goes_on(before, after) { end } else { end.normalize() + after.tangents()[0].normalize() }
+}
+
+fn check_directions(path: &[Piece]) -> Result<(), SweepError> {
     if let Some(index) = path.iter().position(|piece| piece.tangents().iter().any(|t| t.norm() == 0.0)) {
         let message = format!("segment {} of the path has no direction at an end", index + 1);
         return Err(SweepError::Wrong(message, "its points are distinct"));
+    }
+    Ok(())
+}
+
+/// At a corner the sides of a profile that reaches this far go on beyond the path's point, or end before it, by its
+/// reach times the tangent of half the angle that the path turns by. Both corners of a piece must leave room for each other.
+fn check_corners(path: &[Piece], reach: f64) -> Result<(), SweepError> {
+    let last = path.len() - 1;
+    let lack = |index: usize, next: usize| {
+        let [p, q] = [path[index].tangents()[1], path[next].tangents()[0]].map(|t| t.normalize());
+        // The tangent of half an angle is sin / (1 + cos); where the path runs back, it is as good as infinite.
+        if p.dot(&q) < -1.0 + SMOOTH {
+            f64::INFINITY
+        } else if goes_on(&path[index], &path[next]) {
+            0.0
+        } else {
+            reach * p.cross(&q).norm() / (1.0 + p.dot(&q))
+        }
+    };
+    let is_closed = last > 0 && meets(&path[last], &path[0]);
+    let mut taken = vec![0.0; path.len()];
+    for index in 0..path.len() {
+        let next = if index < last { index + 1 } else { 0 };
+        if index < last || is_closed {
+            let lack = lack(index, next);
+            taken[index] += lack;
+            taken[next] += lack;
+        }
+    }
+    for (index, (piece, taken)) in path.iter().zip(taken).enumerate() {
+        let [p, q] = piece.ends();
+        if taken >= (q - p).norm() {
+            let message = format!(
+                "segment {} of the path is too short for its corners, over which the sides of the profile go on",
+                index + 1
+            );
+            return Err(SweepError::Unsupported(message + ": make it longer, or the profile smaller"));
+        }
     }
     Ok(())
 }

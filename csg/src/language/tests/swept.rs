@@ -175,17 +175,62 @@ fn a_pipe_bend_is_cylinders_and_a_torus() {
 }
 
 #[test]
-fn profiles_that_cross_and_paths_with_corners_are_named() {
+fn profiles_that_cross_are_named() {
     let solid = "solid s = revolution (0,0,0; 1,0,0; p); tlo s;";
     let crossing = error(&format!("{} {solid}", polygon(&[[0., 1.], [2., 2.], [2., 1.], [0., 3.]], true)));
     assert!(crossing.contains("cross"), "{crossing}");
     let below = error(&format!("{} {solid}", polygon(&[[0., 1.], [2., -1.], [2., 2.]], true)));
     assert!(below.contains("beyond the axis"), "{below}");
-    let path = "curve3d q = (3; 0,0,0; 1,0,0; 1,1,0; 2; 2,1,2; 2,2,3);";
-    let corner =
-        error(&format!("{path} {} solid s = extrusion (q; p; 0,0,1); tlo s;", ring(0.0, 0.0, 0.1, 0.1)));
-    assert!(corner.contains("corner between its segments 1 and 2"), "{corner}");
 }
+
+#[test]
+fn a_path_with_corners_is_mitred() {
+    // Legs of 2.5 and 2; the profile is a square of side 1, whose y is along z.
+    let path = "curve3d q = (3; 0,0,0; 2.5,0,0; 2.5,2,0; 2; 2,1,2; 2,2,3);";
+    let bar = polygon(&[[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]], true);
+    let geometry = swept(&format!("{path} {bar}"), "extrusion (q; p; 0,0,1)");
+    let is_bar = |p: &Point| {
+        let first = p.y.abs() < 0.5 && p.x > 0.0 && p.x < 3.0;
+        let second = (p.x - 2.5).abs() < 0.5 && p.y > -0.5 && p.y < 2.0;
+        p.z.abs() < 0.5 && (first || second)
+    };
+    assert_is(&geometry, is_bar);
+    let features = crate::Features::find(&geometry).unwrap();
+    assert_eq!([features.corners.len(), features.curves.len(), features.patches.len()], [12, 18, 8]);
+}
+
+#[test]
+fn arcs_of_a_profile_that_turns_about_its_path_are_followed_over_a_joint() {
+    // Beside the joint the arc before it and the chord of the one behind it cross where neither matters.
+    let path = "curve3d q = (5; 0,0,0; 4,0,2; 4,4,4; 4,8,6; 0,8,8; 2; 3,1,2,3; 3,3,4,5);";
+    let profile = "curve2d p = (4; -1,0; -0.7,0.7; 0,1; 0.5,-0.8; 3; 3,1,2,3; 2,3,4; 2,4,1);";
+    let features =
+        crate::Features::find(&swept(&format!("{path} {profile}"), "extrusion (q; p; 0,0,1)")).unwrap();
+    assert_eq!([features.corners.len(), features.curves.len(), features.patches.len()], [9, 15, 8]);
+}
+
+#[test]
+fn arcs_may_be_shallow() {
+    let path = "curve3d q = (3; 0,0,0; 10,0,2; 10,10,4; 1; 3,1,2,3);";
+    let profile = "curve2d p = (5; 0,1; 0,2; 1.5,2.002; 3,2; 3,1; 4; 2,1,2; 3,2,3,4; 2,4,5; 2,5,1);";
+    for solid in ["extrusion (q; p; 0,0,1)", "revolution (0,0,0; 1,0,0; p)"] {
+        let features = crate::Features::find(&swept(&format!("{path} {profile}"), solid)).unwrap();
+        assert!(features.patches.len() >= 4, "{solid}");
+    }
+}
+
+#[test]
+fn paths_that_run_back_or_are_too_short_for_their_corners_are_refused() {
+    let bar = polygon(&[[-0.1, -0.1], [0.1, -0.1], [0.1, 0.1], [-0.1, 0.1]], true);
+    for path in [
+        "curve3d q = (3; 0,0,0; 2,0,0; 1,0,0; 2; 2,1,2; 2,2,3);",
+        "curve3d q = (4; 0,0,0; 2,0,0; 2,0.1,0; 4,0.1,0; 3; 2,1,2; 2,2,3; 2,3,4);",
+    ] {
+        let message = error(&format!("{path} {bar} solid s = extrusion (q; p; 0,0,1); tlo s;"));
+        assert!(message.contains("too short for its corners"), "{message}");
+    }
+}
+
 #[test]
 fn thin_shells_between_arcs_have_their_arcs_halved() {
     // Two arcs of different ellipses between the same points: the chords coincide.
