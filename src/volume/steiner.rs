@@ -18,6 +18,11 @@ use crate::{Point, Vector};
 /// on. Not a round number, so that they do not lie on the other side of a plate.
 const STAND_OFF: f64 = 0.37;
 
+/// Steiner points keep this far from the ends of their edge or the sides of their facet, as a fraction of its length. What is 10⁻¹⁷ from a
+/// vertex of the surface, as happens where an edge passes by others as closely, lies by rounding in front of the facets there or behind
+/// them; sheets that are 10⁻⁹ of the diagonal apart have crossings at least as far from the vertices.
+const OFF_ENDS: f64 = 1e-10;
+
 /// The edge or facet that a Steiner point is to split.
 struct Room {
     place: Place,
@@ -25,6 +30,13 @@ struct Room {
     axes: Vec<Vector>,
     /// How far.
     ends: Vec<Plane>,
+}
+
+impl Room {
+    fn is_off_ends(&self, point: &Point) -> bool {
+        let least = OFF_ENDS * self.axes.iter().map(Vector::norm).fold(0.0, f64::max);
+        self.ends.iter().all(|end| end.depth(point) >= least)
+    }
 }
 
 impl Recovery<'_> {
@@ -148,8 +160,8 @@ impl Recovery<'_> {
                 .collect();
             // The crossing lies in the plane of what is crossed: flips could make flat tets of these later.
             let best = most_inside(&point, &room.axes, &planes).0;
-            if let Some(seen) = [best, point].into_iter().find(|p| self.is_star_shaped(&tets, p, room.place))
-            {
+            let fits = |p: &Point| room.is_off_ends(p) && self.is_star_shaped(&tets, p, room.place);
+            if let Some(seen) = [best, point].into_iter().find(fits) {
                 break seen;
             }
             let grown = self.behind_unseen(&tets, &point, room.place)?;
