@@ -20,7 +20,7 @@ pub(super) fn bound(
     surface: &ClosedSurface,
     points: &[Point],
     report: &mut Report,
-) -> Result<Tetrahedra, VolumeError> {
+) -> Result<(Tetrahedra, Constraints), VolumeError> {
     let mut fewest: Option<Vec<u32>> = None;
     let mut help = 0;
     for attempt in 0..ATTEMPTS {
@@ -55,7 +55,7 @@ fn attempt_to_bound(
     attempt: u32,
     help: &mut u64,
     report: &mut Report,
-) -> Result<Tetrahedra, Stop> {
+) -> Result<(Tetrahedra, Constraints), Stop> {
     let mut tets = delaunay::delaunay(points, &surface.triangles);
     let mut constraints = Constraints::new(&surface.triangles);
     let mut recovery = Recovery::new(&mut tets, &mut constraints, attempt);
@@ -80,5 +80,5 @@ fn attempt_to_bound(
     let helping = helping.into_iter().filter(|&v| tets.at_vertex[v as usize] != NONE);
     let inside = inside.into_iter().chain(helping.collect::<Vec<_>>()).collect();
     report.steiner_inside = inside::delete(&mut tets, &constraints, inside);
-    Ok(tets)
+    Ok((tets, constraints))
 }

@@ -271,7 +271,7 @@ impl<'a> Recovery<'a> {
     }
 
     /// Sees to it that at least so many edges and facets can be helped.
-    fn give_help(&mut self, edges: usize) {
+    pub(super) fn give_help(&mut self, edges: usize) {
         let more = (u64::from(HELP) * edges as u64).saturating_sub(self.help_left);
         self.help_left += more;
         self.given += more;
@@ -290,7 +290,7 @@ impl<'a> Recovery<'a> {
     }
 
     /// Makes a, b an edge of the mesh by flips alone.
-    fn recover_edge(&mut self, a: u32, b: u32, depth: u32) -> bool {
+    pub(super) fn recover_edge(&mut self, a: u32, b: u32, depth: u32) -> bool {
         self.take_help();
         let mut found = std::mem::take(&mut self.found);
         let mut stuck = 0;

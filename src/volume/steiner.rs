@@ -24,7 +24,7 @@ const STAND_OFF: f64 = 0.37;
 const OFF_ENDS: f64 = 1e-10;
 
 /// The edge or facet that a Steiner point is to split.
-struct Room {
+pub(super) struct Room {
     place: Place,
     /// The directions in which the point may move.
     axes: Vec<Vector>,
@@ -91,7 +91,7 @@ impl Recovery<'_> {
 
     /// Puts a Steiner point on a missing edge inside a tet that it goes through, the longest way first. Where the edge
     /// passes close by other edges its crossings let no point be put on them: shorter pieces are easier.
-    fn split_between(&mut self, a: u32, b: u32, found: &[Crossing], room: &Room) -> Option<u32> {
+    pub(super) fn split_between(&mut self, a: u32, b: u32, found: &[Crossing], room: &Room) -> Option<u32> {
         let first = match *found.first()? {
             Crossing::Face(first) => first,
             // The way to an edge lies in the face between: a little beside the crossing there is more room.
@@ -124,8 +124,12 @@ impl Recovery<'_> {
     }
 
     fn room_on_edge(&self, a: u32, b: u32, triangle: u32) -> Room {
-        let [p, q] = [a, b].map(|v| self.mesh.point(v));
         let place = self.constraints.edge_of(a, b).map_or(Place::Triangle(triangle), Place::Edge);
+        self.room_on_line(a, b, place)
+    }
+
+    pub(super) fn room_on_line(&self, a: u32, b: u32, place: Place) -> Room {
+        let [p, q] = [a, b].map(|v| self.mesh.point(v));
         let ends = [Plane::across(&(p - q), p), Plane::across(&(q - p), q)];
         Room { place, axes: vec![q - p], ends: ends.into_iter().flatten().collect() }
     }
@@ -142,7 +146,7 @@ impl Recovery<'_> {
 
     /// Stars tets from a new point near `point`, where it has most room. Tets behind faces that do not see it are taken in first:
     /// near slivers the point may be, by rounding, on the wrong side of some.
-    fn add_steiner(&mut self, tets: &[u32], point: Point, room: &Room) -> Option<u32> {
+    pub(super) fn add_steiner(&mut self, tets: &[u32], point: Point, room: &Room) -> Option<u32> {
         /// More than a split of an edge with its usual ring needs, by far.
         const MOST_TETS: usize = 64;
         let mut tets = tets.to_vec();
@@ -174,7 +178,8 @@ impl Recovery<'_> {
             return None;
         }
         let p = self.mesh.add_point(point);
-        self.cavity.fill(self.mesh, p, NO_BODY);
+        let body = self.mesh.bodies[tets[0] as usize];
+        self.cavity.fill(self.mesh, p, body);
         self.constraints.set_place(p, room.place);
         self.steiner.push(p);
         self.counts.steiner += 1;
