@@ -11,7 +11,7 @@
 use crate::Point;
 use crate::improve::complex::{Complex, NONE};
 use crate::kernel::hilbert::hilbert_key;
-use crate::mesh::{Class, Mesh, VertexId};
+use crate::mesh::{Class, Mesh, VertexId, are_sides, sorted_edge};
 use csg::BodyId;
 use rayon::prelude::*;
 
@@ -69,19 +69,11 @@ impl Triangles {
 
 /// The segments of a mesh that are no side of a triangle, sorted, the lower vertex first.
 fn loose_segments(mesh: &Mesh) -> Vec<[u32; 2]> {
-    let key = |[a, b]: [VertexId; 2]| [a.0.min(b.0), a.0.max(b.0)];
-    let mut segments: Vec<[u32; 2]> = mesh.segments.iter().map(|s| key(s.vertices)).collect();
-    segments.sort_unstable();
-    segments.dedup();
-    let mut is_side = vec![false; segments.len()];
-    for [a, b, c] in mesh.triangles.iter().map(|t| t.vertices) {
-        for side in [[a, b], [b, c], [c, a]] {
-            if let Ok(i) = segments.binary_search(&key(side)) {
-                is_side[i] = true;
-            }
-        }
-    }
-    segments.into_iter().zip(is_side).filter(|(_, is_side)| !is_side).map(|(segment, _)| segment).collect()
+    let is_side = are_sides(&mesh.segments, &mesh.triangles);
+    let loose = mesh.segments.iter().zip(is_side).filter(|(_, is_side)| !is_side);
+    let mut edges: Vec<[u32; 2]> = loose.map(|(s, _)| sorted_edge(s.vertices).map(|v| v.0)).collect();
+    edges.sort_unstable();
+    edges
 }
 
 /// The tets of a mesh that take part in a round, block after block.
