@@ -25,7 +25,7 @@ use crate::{Point, Vector};
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
-/// How many points an edge may get for a while. Long edges across a bent Schönhardt polyhedron need one or two.
+/// How many points an edge may get for a while, so that there is an end. Not tuned.
 const MOST_ON_EDGE: usize = 64;
 
 /// How many edges may be tried to help for each kept one.
