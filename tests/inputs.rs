@@ -191,3 +191,37 @@ fn holes_and_regions_of_a_poly_file_say_what_is_solid() {
     let numbers: Vec<_> = seen["bodies"].as_array().unwrap().iter().map(|b| b["number"].clone()).collect();
     assert_eq!(numbers, [7, 3]);
 }
+
+#[test]
+fn loose_edges_of_a_poly_file_become_edges_of_the_mesh() {
+    // A cube, an edge from its corner at the origin to a point inside, and one from there on.
+    let dir = tempfile::tempdir().unwrap();
+    let file = dir.path().join("edges.poly");
+    let sides = ["0 1 3 2", "4 6 7 5", "0 4 5 1", "2 3 7 6", "0 2 6 4", "1 5 7 3"];
+    let mut text = "10 3\n".to_owned();
+    for i in 0..8 {
+        text += &format!("{i} {} {} {}\n", i >> 2, i >> 1 & 1, i & 1);
+    }
+    text += "8 0.4 0.5 0.45\n9 0.7 0.2 0.6\n8 0\n";
+    sides.iter().for_each(|side| text += &format!("1\n4 {side}\n"));
+    text += "1\n2 0 8\n1\n2 8 9\n0\n0\n";
+    std::fs::write(&file, text).unwrap();
+    let out = dir.path().join("edges.mesh");
+    let mut command = tetmill();
+    succeed(command.arg("mesh").arg(&file).args(["--keep-surface", "--maxh", "0.2", "-q", "-o"]).arg(&out));
+    let written = std::fs::read_to_string(&out).unwrap();
+    let mut words = written.split_ascii_whitespace();
+    let mut section = |name: &str, width: usize| -> Vec<Vec<f64>> {
+        words.by_ref().find(|word| *word == name).unwrap();
+        let count: usize = words.next().unwrap().parse().unwrap();
+        let mut row = || (0..width).map(|_| words.next().unwrap().parse().unwrap()).collect();
+        (0..count).map(|_| row()).collect()
+    };
+    let vertices = section("Vertices", 4);
+    let tets = section("Tetrahedra", 5);
+    let at = |place: [f64; 3]| 1.0 + vertices.iter().position(|row| row[..3] == place).unwrap() as f64;
+    let ends = [[0.0; 3], [0.4, 0.5, 0.45], [0.7, 0.2, 0.6]].map(at);
+    for edge in ends.windows(2) {
+        assert!(tets.iter().any(|tet| edge.iter().all(|v| tet[..4].contains(v))), "{edge:?}");
+    }
+}

@@ -11,7 +11,7 @@
 use crate::Point;
 use crate::improve::complex::{Complex, NONE};
 use crate::kernel::hilbert::hilbert_key;
-use crate::mesh::{Class, Mesh, VertexId};
+use crate::mesh::{Class, Mesh, VertexId, are_sides, sorted_edge};
 use csg::BodyId;
 use rayon::prelude::*;
 
@@ -23,6 +23,8 @@ pub(super) struct Triangles {
     others: Vec<([u32; 2], u32)>,
     /// Whether the vertex is on a triangle.
     on_triangle: Vec<bool>,
+    /// The segments that are no side of a triangle, sorted, the lower vertex first: edges inside bodies that must stay.
+    loose: Vec<[u32; 2]>,
 }
 
 impl Triangles {
@@ -50,7 +52,7 @@ impl Triangles {
             others[next[low as usize] as usize] = ([middle, high], t as u32);
             next[low as usize] += 1;
         }
-        Self { starts, others, on_triangle }
+        Self { starts, others, on_triangle, loose: loose_segments(mesh) }
     }
 
     /// The triangle with these vertices; none has a vertex that was added since.
@@ -63,6 +65,15 @@ impl Triangles {
         let here = &self.others[self.starts[low as usize] as usize..self.starts[low as usize + 1] as usize];
         here.iter().find(|(others, _)| *others == [middle, high]).map(|(_, t)| *t)
     }
+}
+
+/// The segments of a mesh that are no side of a triangle, sorted, the lower vertex first.
+fn loose_segments(mesh: &Mesh) -> Vec<[u32; 2]> {
+    let is_side = are_sides(&mesh.segments, &mesh.triangles);
+    let loose = mesh.segments.iter().zip(is_side).filter(|(_, is_side)| !is_side);
+    let mut edges: Vec<[u32; 2]> = loose.map(|(s, _)| sorted_edge(s.vertices).map(|v| v.0)).collect();
+    edges.sort_unstable();
+    edges
 }
 
 /// The tets of a mesh that take part in a round, block after block.
@@ -215,17 +226,23 @@ impl Block {
             }));
             bodies.push(mesh.bodies[t as usize]);
         }
+        let here = |edge: &[u32; 2]| edge.map(|v| to_block[v as usize]);
+        let kept = triangles.loose.iter().map(here).filter(|edge| !edge.contains(&NONE));
+        let mut kept_edges: Vec<[u32; 2]> = kept.map(|[a, b]| [a.min(b), a.max(b)]).collect();
+        kept_edges.sort_unstable();
         vertices.iter().for_each(|&v| to_block[v as usize] = NONE);
         let points = vertices.iter().map(|&v| mesh.points[v as usize]).collect();
         let is_free =
             |&v: &u32| !cut.on_seam[v as usize] && matches!(mesh.classes[v as usize], Class::Body(_));
-        let free = vertices.iter().map(is_free).collect();
+        let mut free: Vec<bool> = vertices.iter().map(is_free).collect();
+        kept_edges.iter().flatten().for_each(|&v| free[v as usize] = false);
         let mut met = Vec::new();
-        let complex = Complex::new(points, free, tets, bodies, |face| {
+        let mut complex = Complex::new(points, free, tets, bodies, |face| {
             let triangle = triangles.find(face.map(|v| vertices[v as usize]));
             met.extend(triangle);
             triangle.is_some()
         });
+        complex.kept_edges = kept_edges;
         let was_free = complex.free.clone();
         Self { complex, vertices, was_free, triangles: met }
     }

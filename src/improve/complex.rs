@@ -3,7 +3,7 @@
 use crate::Point;
 use crate::improve::objective::{self, Objective};
 use crate::kernel::predicates::{Sign, orient3d, volume6_and_error};
-use crate::mesh::{TET_FACES, VertexId};
+use crate::mesh::{TET_EDGES, TET_FACES, VertexId};
 use csg::BodyId;
 
 /// No tet, no vertex.
@@ -27,6 +27,8 @@ pub(super) struct Complex {
     pub scores: Vec<f64>,
     /// The body of each tet.
     pub bodies: Vec<BodyId>,
+    /// Edges that must stay although they need not be on a locked face: sorted, the lower vertex first.
+    pub kept_edges: Vec<[u32; 2]>,
     /// The pass in which a vertex last saw a change among its tets.
     pub touched: Vec<u32>,
     /// The present pass.
@@ -105,6 +107,7 @@ impl Complex {
             free,
             scores: vec![0.0; tets.len()],
             bodies,
+            kept_edges: Vec::new(),
             touched: vec![0; count],
             pass: 0,
             across: vec![[NONE; 4]; tets.len()],
@@ -308,6 +311,26 @@ impl Complex {
         self.touched.pop();
     }
 
+    /// Whether tets may be replaced by others that fill their hole: no edge that must stay is lost, and no face that must stay has both its
+    /// sides in the hole, as one inside a body can at its rim: its sides could not be told from each other.
+    pub fn may_replace(&self, old: &[u32], new: &[([u32; 4], f64)]) -> bool {
+        let has_both_sides = |t: u32| {
+            let across = self.across[t as usize];
+            (0..4).any(|k| self.is_locked(t, k) && across[k] != NONE && old.contains(&(across[k] / 4)))
+        };
+        if old.iter().any(|&t| self.locked[t as usize] != 0 && has_both_sides(t)) {
+            return false;
+        }
+        let is_kept = |[a, b]: [u32; 2]| self.kept_edges.binary_search(&[a.min(b), a.max(b)]).is_ok();
+        self.kept_edges.is_empty()
+            || old.iter().map(|&t| self.tets[t as usize]).all(|tet| {
+                let edges = TET_EDGES.map(|edge| edge.map(|i| tet[i]));
+                // Those on the surface of the hole are in new tets too.
+                let mut kept = edges.into_iter().filter(|&edge| is_kept(edge));
+                kept.all(|edge| new.iter().any(|(tet, _)| edge.iter().all(|v| tet.contains(v))))
+            })
+    }
+
     /// Takes the tets `old` out and fills their hole with `new` ones and their scores.
     ///
     /// # Panics
@@ -444,7 +467,6 @@ mod tests {
     use super::*;
     use crate::improve::blocks::whole;
     use crate::improve::samples::{cube, two_boxes};
-    use crate::mesh::TET_EDGES;
 
     #[test]
     fn the_tets_of_a_ring_follow_its_vertices() {

@@ -272,13 +272,13 @@ impl Sandwich<'_> {
     }
 }
 
-/// Fills a hole anew if all its new tets are exactly positive, else leaves all as it is.
+/// Fills a hole anew if all its new tets are exactly positive and nothing is lost that must stay, else leaves all as it is.
 pub(super) fn commit(complex: &mut Complex, old: &[u32], new: &[([u32; 4], f64)]) -> bool {
-    let positive = new.iter().all(|&(tet, _)| complex.is_positive(tet));
-    if positive {
+    let allowed = new.iter().all(|&(tet, _)| complex.is_positive(tet)) && complex.may_replace(old, new);
+    if allowed {
         complex.replace(old, new);
     }
-    positive
+    allowed
 }
 
 #[cfg(test)]

@@ -8,7 +8,7 @@ use super::samples::{
 use super::{Effort, Measure, Report, Settings, Smoothness, improve, make_refinable};
 use crate::kernel::quality::QualitySummary;
 use crate::kernel::simplex::volume;
-use crate::mesh::{Class, Mesh, VertexId};
+use crate::mesh::{BoundaryTriangle, Class, Mesh, Segment, VertexId};
 use crate::size::UniformSize;
 use csg::BodyId;
 use proptest::prelude::*;
@@ -246,4 +246,45 @@ proptest! {
         check(&before, &mesh, &report);
         prop_assert!(report.after.worst_mean_ratio >= report.before.worst_mean_ratio);
     }
+}
+
+#[test]
+fn segments_inside_bodies_stay() {
+    let mut before = cube(6, 2);
+    let inside = |v: &VertexId| matches!(before.classes[v.index()], Class::Body(_));
+    let edges = before.tets.iter().step_by(9).map(|tet| [tet[0], tet[3]]);
+    let kept: Vec<[VertexId; 2]> = edges.filter(|edge| edge.iter().all(inside)).collect();
+    assert!(kept.len() > 20);
+    before.segments.extend(kept.iter().map(|&vertices| Segment { vertices, curve: csg::CurveId(7) }));
+    let mut mesh = before.clone();
+    let report = improve(&mut mesh, &UniformSize(0.4), &Settings::default());
+    check(&before, &mesh, &report);
+    assert!(report.after.worst_mean_ratio > report.before.worst_mean_ratio);
+    for segment in &mesh.segments {
+        let is_there = |tet: &[VertexId; 4]| segment.vertices.iter().all(|v| tet.contains(v));
+        assert!(mesh.tets.iter().any(is_there), "{segment:?}");
+    }
+}
+
+#[test]
+fn a_hole_may_not_have_both_sides_of_a_face_that_stays() {
+    let mut mesh = cube(4, 1);
+    // Faces between inner vertices become cracks: one body on both sides.
+    let inside = |v: &VertexId| matches!(mesh.classes[v.index()], Class::Body(_));
+    let faces = mesh.tets.iter().step_by(11).map(|tet| [tet[1], tet[2], tet[3]]);
+    let cracks: Vec<[VertexId; 3]> = faces.filter(|face| face.iter().all(inside)).collect();
+    assert!(!cracks.is_empty());
+    let patch = csg::PatchId(6);
+    mesh.triangles.extend(cracks.iter().map(|&vertices| BoundaryTriangle { vertices, patch }));
+    let complex = whole(&mesh);
+    for face in &cracks {
+        let at = |t: &u32| face.iter().all(|v| complex.tets[*t as usize].contains(&v.0));
+        let sides: Vec<u32> = complex.living().filter(at).collect();
+        let same: Vec<([u32; 4], f64)> = sides.iter().map(|&t| (complex.tets[t as usize], 0.0)).collect();
+        assert!(!complex.may_replace(&sides, &same));
+        assert!(complex.may_replace(&sides[..1], &same[..1]));
+    }
+    let before = mesh.clone();
+    let report = improve(&mut mesh, &UniformSize(0.4), &Settings::default());
+    check(&before, &mesh, &report);
 }

@@ -48,6 +48,28 @@ pub struct Segment {
     pub curve: CurveId,
 }
 
+/// The ends of an edge, the lower first.
+pub(crate) fn sorted_edge([a, b]: [VertexId; 2]) -> [VertexId; 2] {
+    [a.min(b), a.max(b)]
+}
+
+/// Which segments are sides of triangles; the others are edges inside bodies.
+pub(crate) fn are_sides(segments: &[Segment], triangles: &[BoundaryTriangle]) -> Vec<bool> {
+    let mut order: Vec<([VertexId; 2], usize)> =
+        segments.iter().map(|s| sorted_edge(s.vertices)).zip(0..).collect();
+    order.sort_unstable();
+    let mut are = vec![false; segments.len()];
+    for [a, b, c] in triangles.iter().map(|t| t.vertices) {
+        for side in [[a, b], [b, c], [c, a]].map(sorted_edge) {
+            let first = order.partition_point(|(edge, _)| *edge < side);
+            for (_, i) in order[first..].iter().take_while(|(edge, _)| *edge == side) {
+                are[*i] = true;
+            }
+        }
+    }
+    are
+}
+
 /// A classified tetrahedral mesh on one rank.
 ///
 /// An edge is on a curve only if it is one of `segments`; else on a patch only if it is an edge of a

@@ -4,7 +4,7 @@ use super::model::CsgModel;
 use crate::Point;
 use crate::improve::{self, Effort, GeometrySmoothness, Smoothness};
 use crate::kernel::quality::QualitySummary;
-use crate::mesh::{Class, Mesh, Segment, VertexId};
+use crate::mesh::{Class, Mesh, Segment, VertexId, are_sides};
 use crate::periodic::PeriodicSize;
 use crate::size::{GeometricSize, SizeField, SizeSettings, Source};
 use crate::surface::closeness::{ThinWalls, Walls, thin_walls};
@@ -288,6 +288,11 @@ fn fill_bodies(
     triangles.iter_mut().for_each(|t| t.vertices = t.vertices.map(renumbered));
     let mut segments = surface.segments;
     segments.iter_mut().for_each(|s| s.vertices = s.vertices.map(renumbered));
+    let is_side = are_sides(&segments, &triangles);
+    let loose: Vec<Segment> =
+        segments.iter().zip(&is_side).filter(|(_, side)| !**side).map(|(s, _)| *s).collect();
+    let mut is_side = is_side.into_iter();
+    segments.retain(|_| is_side.next() == Some(true));
 
     let corners: Vec<[u32; 3]> = triangles.iter().map(|t| t.vertices.map(|v| v.0)).collect();
     let beside = triangles.iter().map(|t| regions(t.patch)).collect();
@@ -296,7 +301,8 @@ fn fill_bodies(
             let crossing = volume::middles_of_sides(&points, &corners, faults.crossings());
             CoarseError::NotClosed { faults, crossing }
         })?
-        .with_kept_points(points[on_surface..].to_vec());
+        .with_kept_points(points[on_surface..].to_vec())
+        .with_kept_edges(loose.iter().map(|s| s.vertices.map(|v| v.0)).collect());
     let (filled, report) = volume::mesh(&closed, size, &volume::Settings::default())?;
 
     classes.resize(filled.points.len(), Class::Corner(csg::CornerId(u32::MAX)));
@@ -304,6 +310,13 @@ fn fill_bodies(
         for v in tet.iter().filter(|&&v| v as usize >= order.len()) {
             classes[*v as usize] = Class::Body(*body);
         }
+    }
+    for (edge, i) in filled.kept_edges {
+        let curve = loose[i as usize].curve;
+        for v in edge.into_iter().filter(|&v| v as usize >= order.len()) {
+            classes[v as usize] = Class::Curve(curve);
+        }
+        segments.push(Segment { vertices: edge.map(VertexId), curve });
     }
     let mesh = Mesh {
         points: filled.points,

@@ -10,11 +10,12 @@ use crate::facets::{
 use crate::geometry::Projector;
 use crate::improve::Smoothness;
 use crate::io::surface::{self, Surface};
-use crate::mesh::{Class, Names};
+use crate::mesh::{Class, Names, Segment, VertexId};
 use crate::size::{Closeness, Source};
 use crate::surface::SurfaceMesh;
 use crate::surface::closeness::{ThinWalls, Walls, thin_walls};
-use csg::{BodyId, CornerId, PatchId};
+use csg::{BodyId, CornerId, CurveId, PatchId};
+use std::collections::BTreeMap;
 use std::path::Path;
 
 /// Solids bounded by facets, with what their files name.
@@ -26,6 +27,8 @@ pub struct FacetSolid {
     pub names: Names,
     /// Points inside that are to be vertices.
     pub kept_points: Vec<Point>,
+    /// Edges inside that are to be edges of the mesh; with `keep_surface` only, for else their ends need not be vertices.
+    pub kept_edges: Vec<[Point; 2]>,
     /// Whether the facets themselves are the surface mesh.
     pub keep_surface: bool,
 }
@@ -50,8 +53,11 @@ impl FacetSolid {
                     "{name}: the largest volumes of its regions are left out; sizes come from the options"
                 ));
             }
-            if !surface.loose_edges.is_empty() {
-                note(&format!("{name}: {} edges on no facet are left out", surface.loose_edges.len()));
+            if !surface.loose_edges.is_empty() && !settings.keep_surface {
+                let count = surface.loose_edges.len();
+                note(&format!(
+                    "{name}: {count} edges on no facet are left out: they are kept with the surface only"
+                ));
             }
             surfaces.push(surface);
         }
@@ -65,8 +71,10 @@ impl FacetSolid {
             .map(|p| p.as_ref().file_stem().unwrap_or_default().to_string_lossy().into())
             .collect();
         let names = names(&model, &surfaces, &stems);
+        let edges = surfaces.iter().filter(|_| settings.keep_surface).flat_map(|s| &s.loose_edges);
+        let kept_edges = edges.copied().collect();
         let kept_points = surfaces.into_iter().flat_map(|surface| surface.loose_points).collect();
-        Ok(Self { model, names, kept_points, keep_surface: settings.keep_surface })
+        Ok(Self { model, names, kept_points, kept_edges, keep_surface: settings.keep_surface })
     }
 
     /// Projection to patches and curves. Facets that are kept need none: what lies between points of a facet lies on it.
@@ -94,6 +102,7 @@ impl FacetSolid {
             remesh(&self.model, &size, &RemeshSettings::default()).0
         };
         self.add_kept_points(&mut surface);
+        self.add_kept_edges(&mut surface);
         let smoothness = FacetSmoothness(&self.model.projector);
         let smoothness: Option<&dyn Smoothness> = if self.keep_surface { None } else { Some(&smoothness) };
         match coarse::fill(surface, regions, &size, smoothness, settings.effort) {
@@ -128,6 +137,29 @@ impl FacetSolid {
         for (index, point) in self.kept_points.iter().enumerate() {
             surface.points.push(*point);
             surface.classes.push(Class::Corner(CornerId::new(self.model.corners.len() + index)));
+        }
+    }
+
+    /// Edges on no triangle are kept as segments inside, each of a curve of its own.
+    fn add_kept_edges(&self, surface: &mut SurfaceMesh) {
+        // Zero and its negative are one place.
+        let key = |p: &Point| p.coords.add_scalar(0.0).data.0[0].map(f64::to_bits);
+        let mut at: BTreeMap<[u64; 3], VertexId> = if self.kept_edges.is_empty() {
+            BTreeMap::new()
+        } else {
+            surface.points.iter().map(key).zip((0..).map(VertexId)).collect()
+        };
+        for (index, ends) in self.kept_edges.iter().enumerate() {
+            let vertices = ends.map(|end| {
+                *at.entry(key(&end)).or_insert_with(|| {
+                    surface.points.push(end);
+                    surface
+                        .classes
+                        .push(Class::Corner(CornerId::new(self.model.corners.len() + surface.points.len())));
+                    VertexId::new(surface.points.len() - 1)
+                })
+            });
+            surface.segments.push(Segment { vertices, curve: CurveId::new(self.model.curves.len() + index) });
         }
     }
 }

@@ -11,16 +11,24 @@ use crate::Point;
 /// recovered. An attempt that fails ends soon: see `recover`.
 const ATTEMPTS: u32 = 40;
 
+/// No attempt is begun after so many helping flips were tried: some tens of seconds. The second is mostly the last where thousands of
+/// edges are missing and do not come back, as where sheets come nearer and nearer to each other; forty would take an hour.
+const MOST_HELP: u64 = 3_000_000;
+
 /// The bodies in as few tets as the surface needs: its facets locked, nothing outside of them.
 pub(super) fn bound(
     surface: &ClosedSurface,
     points: &[Point],
     report: &mut Report,
-) -> Result<Tetrahedra, VolumeError> {
+) -> Result<(Tetrahedra, Constraints), VolumeError> {
     let mut fewest: Option<Vec<u32>> = None;
+    let mut help = 0;
     for attempt in 0..ATTEMPTS {
+        if help > MOST_HELP {
+            break;
+        }
         report.restarts = attempt as usize;
-        match attempt_to_bound(surface, points, attempt, report) {
+        match attempt_to_bound(surface, points, attempt, &mut help, report) {
             Ok(tets) => return Ok(tets),
             Err(Stop::Inconsistent(error)) => return Err(error),
             Err(Stop::Left(left)) => {
@@ -45,13 +53,15 @@ fn attempt_to_bound(
     surface: &ClosedSurface,
     points: &[Point],
     attempt: u32,
+    help: &mut u64,
     report: &mut Report,
-) -> Result<Tetrahedra, Stop> {
+) -> Result<(Tetrahedra, Constraints), Stop> {
     let mut tets = delaunay::delaunay(points, &surface.triangles);
     let mut constraints = Constraints::new(&surface.triangles);
     let mut recovery = Recovery::new(&mut tets, &mut constraints, attempt);
     let recovered = recovery.run();
     let counts = recovery.counts;
+    *help += recovery.help_spent();
     let (steiner, helping) = (std::mem::take(&mut recovery.steiner), std::mem::take(&mut recovery.helping));
     report.missing_edges = counts.missing_edges;
     report.missing_faces = counts.missing_faces;
@@ -70,5 +80,5 @@ fn attempt_to_bound(
     let helping = helping.into_iter().filter(|&v| tets.at_vertex[v as usize] != NONE);
     let inside = inside.into_iter().chain(helping.collect::<Vec<_>>()).collect();
     report.steiner_inside = inside::delete(&mut tets, &constraints, inside);
-    Ok(tets)
+    Ok((tets, constraints))
 }

@@ -6,6 +6,7 @@
 //! with the point meets both circumspheres beside it in one circle, so both tets are taken or none is.
 //! Elsewhere [`Cavity::make_star_shaped`] gives tets back until every face sees the point, exactly.
 
+use super::crossing::edges_of_tet;
 use super::tetrahedra::{NONE, Tetrahedra};
 use crate::Point;
 use crate::kernel::predicates::{Sign, orient3d};
@@ -137,7 +138,7 @@ impl Cavity {
                 }
             }
             if all_see {
-                return self.is_simple();
+                return self.is_simple() && self.keeps_edges(mesh);
             }
             self.tets.retain(|&t| mesh.is_marked(t));
             self.look_again(mesh);
@@ -173,6 +174,16 @@ impl Cavity {
     /// w / 2 + 2 vertices, and there are no others.
     fn is_simple(&self) -> bool {
         self.walls.len() + 4 == 2 * self.vertices.len()
+    }
+
+    /// Whether no edge that must stay is inside.
+    fn keeps_edges(&self, mesh: &Tetrahedra) -> bool {
+        if !mesh.has_kept_edges() {
+            return true;
+        }
+        let on_surface = |a, b| self.walls.iter().any(|&w| [a, b].iter().all(|v| mesh.face(w).contains(v)));
+        let mut edges = self.tets.iter().flat_map(|&t| edges_of_tet(mesh.tets[t as usize]));
+        edges.all(|[a, b]| !mesh.is_kept(a, b) || on_surface(a, b))
     }
 
     /// Stars the cavity from a vertex: new tets (vertex, wall), in `filled`.

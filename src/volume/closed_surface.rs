@@ -22,6 +22,7 @@ pub struct ClosedSurface {
     pub(crate) triangles: Vec<[u32; 3]>,
     pub(crate) regions: Vec<[Option<BodyId>; 2]>,
     pub(crate) kept_points: Vec<Point>,
+    pub(crate) kept_edges: Vec<[u32; 2]>,
 }
 
 impl ClosedSurface {
@@ -37,7 +38,7 @@ impl ClosedSurface {
         triangles: Vec<[u32; 3]>,
         regions: Vec<[Option<BodyId>; 2]>,
     ) -> Result<Self, SurfaceFaults> {
-        let surface = Self { points, triangles, regions, kept_points: Vec::new() };
+        let surface = Self { points, triangles, regions, kept_points: Vec::new(), kept_edges: Vec::new() };
         for find in [Self::index_faults, Self::form_faults] {
             let faults = find(&surface);
             if !faults.is_empty() {
@@ -51,6 +52,17 @@ impl ClosedSurface {
     #[must_use]
     pub fn with_kept_points(mut self, points: Vec<Point>) -> Self {
         self.kept_points = points;
+        self
+    }
+
+    /// Also asks for edges between these points, which must lie inside bodies: the points of the surface come first in the count, then
+    /// those of [`ClosedSurface::with_kept_points`]. Edges may have one or both ends on the surface and may have common ends, but
+    /// must not meet the surface or each other elsewhere.
+    ///
+    /// They are not cut to the wanted size. Where no other way is found one is, which [`Report`](super::Report) tells.
+    #[must_use]
+    pub fn with_kept_edges(mut self, edges: Vec<[u32; 2]>) -> Self {
+        self.kept_edges = edges;
         self
     }
 
@@ -72,6 +84,11 @@ impl ClosedSurface {
     /// Points inside bodies that are to be vertices.
     pub fn kept_points(&self) -> &[Point] {
         &self.kept_points
+    }
+
+    /// Edges inside bodies that are to be edges of the mesh.
+    pub fn kept_edges(&self) -> &[[u32; 2]] {
+        &self.kept_edges
     }
 
     fn first_corner(&self, triangle: usize) -> Point {

@@ -1,7 +1,7 @@
 //! Which edges and faces of the mesh must stay: the surface's, and pieces of those that had to be split.
 
 use super::tetrahedra::sorted;
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::hash::{BuildHasherDefault, Hasher};
 
 /// A piece of a triangle of the surface: the whole, unless Steiner points split it.
@@ -37,6 +37,8 @@ pub(super) struct Constraints {
     in_triangle: BTreeMap<u32, u32>,
     /// The vertices of the surface are those below.
     surface_vertices: u32,
+    /// Edges that must stay although no facet needs them, the lower vertex first.
+    kept: BTreeSet<[u32; 2]>,
 }
 
 impl Constraints {
@@ -67,13 +69,10 @@ impl Constraints {
     pub fn remove(&mut self, facet: u32) {
         let f = &mut self.facets[facet as usize];
         f.gone = true;
-        self.by_vertices.remove(&sorted(f.vertices));
-        for edge in edges(f.vertices) {
-            let uses = self.edge_uses.get_mut(&edge).expect("an edge of a facet");
-            *uses -= 1;
-            if *uses == 0 {
-                self.edge_uses.remove(&edge);
-            }
+        let vertices = f.vertices;
+        self.by_vertices.remove(&sorted(vertices));
+        for edge in edges(vertices) {
+            self.release(edge);
         }
     }
 
@@ -87,6 +86,47 @@ impl Constraints {
     #[inline]
     pub fn has_edge(&self, a: u32, b: u32) -> bool {
         self.edge_uses.contains_key(&[a.min(b), a.max(b)])
+    }
+
+    /// From now on the edge is one that must stay, whether a facet uses it or not.
+    pub fn keep_edge(&mut self, a: u32, b: u32) {
+        let edge = [a.min(b), a.max(b)];
+        if self.kept.insert(edge) {
+            *self.edge_uses.entry(edge).or_insert(0) += 1;
+        }
+    }
+
+    /// Undoes [`Constraints::keep_edge`].
+    pub fn forget_edge(&mut self, a: u32, b: u32) {
+        let edge = [a.min(b), a.max(b)];
+        if self.kept.remove(&edge) {
+            self.release(edge);
+        }
+    }
+
+    /// The edges that must stay although no facet needs them, sorted.
+    pub fn kept_edges(&self) -> Vec<[u32; 2]> {
+        self.kept.iter().copied().collect()
+    }
+
+    /// The other ends of the kept edges at a vertex, ascending.
+    pub fn kept_neighbours(&self, vertex: u32) -> Vec<u32> {
+        let at = self.kept.iter().filter(|edge| edge.contains(&vertex));
+        at.map(|&[a, b]| if a == vertex { b } else { a }).collect()
+    }
+
+    /// The whole edge that a piece of a kept one is part of.
+    pub fn line_of(&self, a: u32, b: u32) -> [u32; 2] {
+        let split = [a, b].iter().find_map(|v| self.on_edge.get(v).copied());
+        split.unwrap_or([a.min(b), a.max(b)])
+    }
+
+    fn release(&mut self, edge: [u32; 2]) {
+        let uses = self.edge_uses.get_mut(&edge).expect("an edge in use");
+        *uses -= 1;
+        if *uses == 0 {
+            self.edge_uses.remove(&edge);
+        }
     }
 
     /// The edge of the surface that an edge of facets is part of, if of any.

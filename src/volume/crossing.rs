@@ -1,6 +1,6 @@
 //! What stands in the way of a missing edge or face: the faces and edges of the mesh that it crosses.
 
-use super::tetrahedra::{Ring, Tetrahedra};
+use super::tetrahedra::{NONE, Ring, Tetrahedra};
 use crate::kernel::predicates::{Sign, orient2d};
 
 /// What a missing edge meets.
@@ -24,21 +24,43 @@ pub(super) fn crossings(
     star: &mut Vec<u32>,
     found: &mut Vec<Crossing>,
 ) {
+    assert!(trace(mesh, a, b, star, found), "no tet at vertex {a} faces vertex {b}");
+}
+
+/// As [`crossings`], also up to the outside of the mesh; false where the way from a to b is outside from the start.
+pub(super) fn trace(
+    mesh: &mut Tetrahedra,
+    a: u32,
+    b: u32,
+    star: &mut Vec<u32>,
+    found: &mut Vec<Crossing>,
+) -> bool {
     found.clear();
     mesh.star(a, star);
-    if star.iter().any(|&t| mesh.tets[t as usize].contains(&b)) {
-        return;
+    let faces = |star: &[u32]| star.iter().find_map(|&t| leaves_star(mesh, t, a, b));
+    let ends = |star: &[u32]| star.iter().any(|&t| mesh.tets[t as usize].contains(&b));
+    let mut first = faces(star);
+    if first.is_none() && !ends(star) {
+        // Where the outside parts the tets at a vertex a walk through faces misses some.
+        star.clear();
+        star.extend(mesh.alive().filter(|&t| mesh.tets[t as usize].contains(&a)));
+        first = faces(star);
     }
-    let Some(first) = star.iter().find_map(|&t| leaves_star(mesh, t, a, b)) else {
-        panic!("no tet at vertex {a} faces vertex {b}");
-    };
+    if ends(star) {
+        return true;
+    }
+    let Some(first) = first else { return false };
     found.push(first);
     while let Some(&Crossing::Face(half_face)) = found.last() {
+        if mesh.across(half_face) == NONE {
+            break;
+        }
         match leaves_tet(mesh, half_face, a, b) {
             Some(next) => found.push(next),
             None => break,
         }
     }
+    true
 }
 
 /// Where the edge from a to b leaves the tet t at a, if it goes through t.

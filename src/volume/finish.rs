@@ -17,17 +17,26 @@ pub(super) fn scale_of(points: &[Point]) -> f64 {
     2f64.powi(-(largest.log2().ceil() as i32).clamp(-LARGEST, LARGEST))
 }
 
-/// The mesh without unused slots and vertices: the surface's points as given, then the others along the Hilbert curve, and the
+/// The mesh without unused slots and vertices: the surface's points as given, then those kept, then the others along the Hilbert curve, and the
 /// tets so too: the improvement, which comes next, takes a fifth less time than in the order of insertion. Frees what is not
 /// needed any more first: this is where memory is scarce.
-pub(super) fn finish(surface: &ClosedSurface, mesh: Tetrahedra, scale: f64) -> VolumeMesh {
+pub(super) fn finish(
+    surface: &ClosedSurface,
+    mesh: Tetrahedra,
+    kept: &[u32],
+    mut kept_edges: Vec<([u32; 2], u32)>,
+    scale: f64,
+) -> VolumeMesh {
     let Tetrahedra { points: places, tets: slots, bodies: body_of, at_vertex, .. } = mesh;
     let order = hilbert_order(&places);
     let given = surface.points.len();
     let mut points = surface.points.clone();
     points.reserve_exact(places.len() - given);
     let mut new_vertex: Vec<u32> = (0..places.len() as u32).collect();
-    for &v in order.iter().filter(|&&v| v as usize >= given && at_vertex[v as usize] != NONE) {
+    let mut is_kept = vec![false; places.len()];
+    kept.iter().for_each(|&v| is_kept[v as usize] = true);
+    let added = |v: &&u32| **v as usize >= given && at_vertex[**v as usize] != NONE && !is_kept[**v as usize];
+    for &v in kept.iter().chain(order.iter().filter(added)) {
         new_vertex[v as usize] = points.len() as u32;
         points.push(places[v as usize] / scale);
     }
@@ -35,7 +44,10 @@ pub(super) fn finish(surface: &ClosedSurface, mesh: Tetrahedra, scale: f64) -> V
     let tets = order.iter().map(|&t| slots[t as usize].map(|v| new_vertex[v as usize])).collect();
     drop(slots);
     let bodies = order.iter().map(|&t| BodyId(body_of[t as usize])).collect();
-    VolumeMesh { points, tets, bodies }
+    for (edge, _) in &mut kept_edges {
+        *edge = edge.map(|v| new_vertex[v as usize]);
+    }
+    VolumeMesh { points, tets, bodies, kept_edges }
 }
 
 /// The slots with a tet in the order of their first vertices, by counting.

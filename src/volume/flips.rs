@@ -4,7 +4,7 @@
 //! flipped away (see [`Constraints`]).
 
 use super::constraints::Constraints;
-use super::tetrahedra::{NO_BODY, NONE, Ring, Tetrahedra};
+use super::tetrahedra::{NONE, Ring, Tetrahedra};
 use crate::kernel::predicates::{Sign, orient3d};
 use crate::kernel::quality::mean_ratio;
 
@@ -83,7 +83,8 @@ impl Flips {
         }
         self.made.clear();
         self.count += 1;
-        mesh.replace(&[half_face >> 2, other >> 2], &new, NO_BODY, &mut self.made);
+        let body = mesh.bodies[(half_face >> 2) as usize];
+        mesh.replace(&[half_face >> 2, other >> 2], &new, body, &mut self.made);
         Ok(())
     }
 
@@ -123,7 +124,8 @@ impl Flips {
         }
         self.made.clear();
         self.count += 1;
-        mesh.replace(&self.ring.tets, &self.new, NO_BODY, &mut self.made);
+        let body = mesh.bodies[tet as usize];
+        mesh.replace(&self.ring.tets, &self.new, body, &mut self.made);
         Ok(())
     }
 

@@ -55,7 +55,11 @@ fn flip(mesh: &mut Tetrahedra, half_face: u32, ring: &mut Ring, slots: &mut Vec<
         }
         (Some(([u, v, w], sign)), None) => {
             let tets = if sign == Sign::Negative { 3 } else { 4 };
-            if !mesh.ring(tet, u, v, ring) || ring.tets.len() != tets || has_locked_face(mesh, ring, [u, v]) {
+            if !mesh.ring(tet, u, v, ring)
+                || ring.tets.len() != tets
+                || has_locked_face(mesh, ring, [u, v])
+                || mesh.is_kept(u, v)
+            {
                 return false;
             }
             // What stands beside p and q around the edge: w, and in a ring of four another one.

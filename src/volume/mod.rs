@@ -26,7 +26,7 @@
 //! 3. `carve`: a flood from the triangles gives each tet its body and removes the outside.
 //! 4. `relocate`: Steiner points leave the surface: none or one stays inside on either side, found by search where no place sees
 //!    all it must (`stuck`). `inside` deletes those that are not needed, by a search for tets that fill the hole (`small`).
-//! 5. `keep`: points that the caller wants.
+//! 5. `keep`, `kept_edges`: points and edges that the caller wants.
 //! 6. `points`: the inside by the size field: lattices where it is level (`lattice`), frontal Delaunay elsewhere, after flips that make
 //!    the mesh Delaunay again (`legalize`); sizes grow by a limited gradient whatever the field (`sizes`).
 //!
@@ -49,6 +49,7 @@ mod flips;
 mod inside;
 mod intersect;
 mod keep;
+mod kept_edges;
 mod lattice;
 mod legalize;
 mod near;
@@ -70,6 +71,7 @@ mod ties;
 pub use closed_surface::ClosedSurface;
 pub(crate) use intersect::{intersections, middles_of_sides};
 pub use keep::KeptPointFault;
+pub use kept_edges::KeptEdgeFault;
 pub use near::NearPair;
 pub use surface_faults::{SurfaceFault, SurfaceFaults};
 
@@ -80,12 +82,15 @@ use csg::BodyId;
 /// Tets that fill the bodies of a [`ClosedSurface`].
 #[derive(Clone, Debug, Default)]
 pub struct VolumeMesh {
-    /// The points of the surface, unchanged and in order, then those inside.
+    /// The points of the surface, unchanged and in order, then those kept, in order, then the others inside.
     pub points: Vec<Point>,
     /// The tets, positively oriented; their faces on the boundary are the surface's triangles, exactly.
     pub tets: Vec<[u32; 4]>,
     /// The body of each tet.
     pub bodies: Vec<BodyId>,
+    /// The edges of the tets that the kept ones consist of, and the place of each of those in the list: one each, more where one had to
+    /// be cut.
+    pub kept_edges: Vec<([u32; 2], u32)>,
 }
 
 /// Choices of the volume mesher.
@@ -117,6 +122,8 @@ pub struct Report {
     pub steiner_on_surface: usize,
     /// Points left inside the bodies to replace them.
     pub steiner_inside: usize,
+    /// Points that had to stay on kept edges: each cuts one in two.
+    pub on_kept_edges: usize,
     /// How often the recovery was begun anew in another order.
     pub restarts: usize,
     /// Points added inside by the size field.
@@ -161,6 +168,17 @@ pub enum VolumeError {
         place: Point,
         /// Why not.
         fault: KeptPointFault,
+    },
+    /// An edge that was to be kept cannot be an edge inside a body.
+    #[error("edge {index}, from ({}, {}, {}) to ({}, {}, {}), was to be kept but {fault}",
+        ends[0].x, ends[0].y, ends[0].z, ends[1].x, ends[1].y, ends[1].z)]
+    KeptEdge {
+        /// Its index among the kept edges.
+        index: usize,
+        /// Its ends; the origin for those that do not exist.
+        ends: [Point; 2],
+        /// Why not.
+        fault: KeptEdgeFault,
     },
     /// The size field gives something that is no length.
     #[error("the size wanted at ({}, {}, {}) is {size}, not a positive length", place.x, place.y, place.z)]
@@ -208,15 +226,14 @@ pub fn mesh(
     let scale = finish::scale_of(&surface.points);
     let points: Vec<Point> = surface.points.iter().map(|p| p * scale).collect();
     let mut report = Report::default();
-    let mut tets = bound::bound(surface, &points, &mut report)?;
+    let (mut tets, mut constraints) = bound::bound(surface, &points, &mut report)?;
     let mut cavity = cavity::Cavity::default();
+    let mut kept = Vec::with_capacity(surface.kept_points.len());
     for (index, &place) in surface.kept_points.iter().enumerate() {
-        keep::keep(&mut tets, &mut cavity, place * scale).map_err(|fault| VolumeError::KeptPoint {
-            index,
-            place,
-            fault,
-        })?;
+        let vertex = keep::keep(&mut tets, &mut cavity, place * scale);
+        kept.push(vertex.map_err(|fault| VolumeError::KeptPoint { index, place, fault })?);
     }
+    let kept_edges = kept_edges::keep(surface, &mut tets, &mut constraints, &kept, scale, &mut report)?;
     if settings.fill {
         let limit = settings.max_tets.min(tetrahedra::MAX_TETS);
         report.points_inside =
@@ -226,7 +243,7 @@ pub fn mesh(
                     points::Stopped::TooManyTets => VolumeError::TooManyTets { limit },
                 })?;
     }
-    Ok((finish::finish(surface, tets, scale), report))
+    Ok((finish::finish(surface, tets, &kept, kept_edges, scale), report))
 }
 
 #[cfg(test)]

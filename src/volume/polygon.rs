@@ -21,6 +21,11 @@ impl Shadow {
         self.0.map(|k| p[k])
     }
 
+    /// Whether a triangle's shadow goes round counter-clockwise.
+    pub fn is_left(self, [a, b, c]: [&Point; 3]) -> bool {
+        self.turn(a, b, c) == Sign::Positive
+    }
+
     fn turn(self, a: &Point, b: &Point, c: &Point) -> Sign {
         orient2d(self.cast(a), self.cast(b), self.cast(c))
     }

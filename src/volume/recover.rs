@@ -7,9 +7,10 @@
 //! section 4). These points lie on the surface for the time being; `relocate` takes them off it again.
 
 use super::cavity::Cavity;
-use super::constraints::{Constraints, edges};
+use super::constraints::{Constraints, Facet, edges};
 use super::crossing::{Crossing, Piercing, crossings, piercing};
 use super::flips::Flips;
+use super::polygon::Shadow;
 use super::tetrahedra::Tetrahedra;
 use crate::kernel::random::mix;
 
@@ -37,8 +38,15 @@ const LEAST_EIGHTHS: usize = 4;
 /// The share of what was missing at first, in eighths; likewise. Attempts that end well have needed 1 to 5.
 const LEAST_FIRST_EIGHTHS: usize = 4;
 
+/// How many points an edge may get in one generation: attempts that end well need up to 11. Where sheets come so near to each other
+/// that rounding decides what an edge crosses it takes any number in vain.
+const MOST_ON_EDGE: usize = 16;
+
 /// How many generations an attempt may have, those with helping points counted: three or four is usual.
 const MOST_GENERATIONS: usize = 20;
+
+/// Of more missing edges and facets only an eighth counts: where so many are missing most come back by themselves, or none does.
+const MANY: usize = 2000;
 
 /// How often helping points are tried where a recovery is stuck.
 const HELPS: u32 = 3;
@@ -67,6 +75,8 @@ pub(super) struct Recovery<'a> {
     pub(super) most_steiner: usize,
     /// How many edges may still be tried to help in all: where nothing goes on, the time must end.
     help_left: u64,
+    /// How many there were to be tried in all.
+    given: u64,
     attempt: u32,
 }
 
@@ -86,6 +96,7 @@ impl<'a> Recovery<'a> {
             found: Vec::new(),
             most_steiner: 0,
             help_left: 0,
+            given: 0,
             attempt,
         }
     }
@@ -109,6 +120,9 @@ impl<'a> Recovery<'a> {
         for round in 0..MOST_GENERATIONS {
             let before = self.steiner.len();
             self.most_steiner = before + LEAST_STEINER + generation * self.patience(LEAST_EIGHTHS) / 8;
+            if round > 0 {
+                self.give_help(missing.len().min(MANY) / 2);
+            }
             self.recover_edges(&missing, round == 0);
             if self.steiner.len() < self.most_steiner {
                 self.recover_facets(&missing);
@@ -185,24 +199,87 @@ impl<'a> Recovery<'a> {
             self.counts.missing_edges = wanted.len();
             // Each Steiner point brings an end nearer, but rounding may spoil that.
             let missing = wanted.len() + self.counts.missing_faces;
-            self.help_left = u64::from(HELP) * (20 + missing as u64 / 2);
+            let missing = missing.min(MANY) + missing.saturating_sub(MANY) / 8;
+            self.give_help(20 + missing / 2);
             self.most_steiner = LEAST_STEINER + missing * self.patience(LEAST_FIRST_EIGHTHS) / 8;
         }
         wanted.retain(|&[a, b]| !self.recover_edge(a, b, 0));
         for depth in 1..=DEEPEST {
             wanted.retain(|&[a, b]| !self.recover_edge(a, b, depth));
         }
-        while let Some([a, b]) = wanted.pop() {
+        for edge in wanted.into_iter().rev() {
             if self.steiner.len() >= self.most_steiner {
                 return;
             }
-            if self.recover_edge(a, b, DEEPEST) {
+            self.split_until_there(edge);
+        }
+    }
+
+    /// Puts Steiner points on a missing edge until its pieces are there.
+    fn split_until_there(&mut self, edge: [u32; 2]) {
+        let most = self.most_steiner.min(self.steiner.len() + MOST_ON_EDGE);
+        let mut pieces = vec![edge];
+        while let Some([a, b]) = pieces.pop() {
+            let is_there = !self.constraints.has_edge(a, b) || self.recover_edge(a, b, DEEPEST);
+            if is_there || self.turn_edge(a, b, true) {
                 continue;
             }
-            if let Some(p) = self.split_edge(a, b) {
-                wanted.extend([[a, p], [p, b]]);
+            if self.steiner.len() >= most {
+                return;
+            }
+            match self.split_edge(a, b) {
+                Some(p) => pieces.extend([[a, p], [p, b]]),
+                None => drop(self.turn_edge(a, b, false)),
             }
         }
+    }
+
+    /// Replaces an edge between two facets of one triangle by the other diagonal of the two, one that is there if so asked. Which diagonals
+    /// facets of one triangle have is free, and where the edge cannot be had or split the other one may.
+    fn turn_edge(&mut self, a: u32, b: u32, must_be_there: bool) -> bool {
+        let mut at = self.constraints.facets_at(a);
+        at.retain(|&f| self.constraints.facets[f as usize].vertices.contains(&b));
+        let [one, other] = at[..] else { return false };
+        let [one, other] = [one, other].map(|f| self.constraints.facets[f as usize]);
+        if one.triangle != other.triangle {
+            return false;
+        }
+        let apex = |f: Facet| f.vertices.into_iter().find(|v| ![a, b].contains(v)).expect("a third corner");
+        let (c, d) = (apex(one), apex(other));
+        if must_be_there && self.mesh.tet_at_edge(c, d, &mut self.star).is_none() {
+            return false;
+        }
+        // In the first facet `b` becomes `d`, in the other one `a` becomes `c`.
+        let turned = [(one, b, d), (other, a, c)]
+            .map(|(f, from, to)| f.vertices.map(|v| if v == from { to } else { v }));
+        // The first facets are the triangles of the surface.
+        let triangle = self.constraints.facets[one.triangle as usize].vertices;
+        let shadow = Shadow::of(triangle.map(|v| self.mesh.point(v)));
+        let is_turned_over = |face: &[u32; 3]| {
+            self.constraints.on_one_edge(*face) || !shadow.is_left(face.map(|v| self.mesh.point(v)))
+        };
+        if turned.iter().any(is_turned_over) {
+            return false;
+        }
+        for f in at {
+            self.constraints.remove(f);
+        }
+        for vertices in turned {
+            self.constraints.add(vertices, one.triangle);
+        }
+        true
+    }
+
+    /// Sees to it that at least so many edges and facets can be helped.
+    pub(super) fn give_help(&mut self, edges: usize) {
+        let more = (u64::from(HELP) * edges as u64).saturating_sub(self.help_left);
+        self.help_left += more;
+        self.given += more;
+    }
+
+    /// How many edges were tried to help.
+    pub fn help_spent(&self) -> u64 {
+        self.given - self.help_left - u64::from(self.flips.budget)
     }
 
     /// Gives the flips their share of the help that is left, and takes back what was not used of the last.
@@ -213,7 +290,7 @@ impl<'a> Recovery<'a> {
     }
 
     /// Makes a, b an edge of the mesh by flips alone.
-    fn recover_edge(&mut self, a: u32, b: u32, depth: u32) -> bool {
+    pub(super) fn recover_edge(&mut self, a: u32, b: u32, depth: u32) -> bool {
         self.take_help();
         let mut found = std::mem::take(&mut self.found);
         let mut stuck = 0;

@@ -18,13 +18,25 @@ use crate::{Point, Vector};
 /// on. Not a round number, so that they do not lie on the other side of a plate.
 const STAND_OFF: f64 = 0.37;
 
+/// Steiner points keep this far from the ends of their edge or the sides of their facet, as a fraction of its length. What is 10⁻¹⁷ from a
+/// vertex of the surface, as happens where an edge passes by others as closely, lies by rounding in front of the facets there or behind
+/// them; sheets that are 10⁻⁹ of the diagonal apart have crossings at least as far from the vertices.
+const OFF_ENDS: f64 = 1e-10;
+
 /// The edge or facet that a Steiner point is to split.
-struct Room {
+pub(super) struct Room {
     place: Place,
     /// The directions in which the point may move.
     axes: Vec<Vector>,
     /// How far.
     ends: Vec<Plane>,
+}
+
+impl Room {
+    fn is_off_ends(&self, point: &Point) -> bool {
+        let least = OFF_ENDS * self.axes.iter().map(Vector::norm).fold(0.0, f64::max);
+        self.ends.iter().all(|end| end.depth(point) >= least)
+    }
 }
 
 impl Recovery<'_> {
@@ -79,7 +91,7 @@ impl Recovery<'_> {
 
     /// Puts a Steiner point on a missing edge inside a tet that it goes through, the longest way first. Where the edge
     /// passes close by other edges its crossings let no point be put on them: shorter pieces are easier.
-    fn split_between(&mut self, a: u32, b: u32, found: &[Crossing], room: &Room) -> Option<u32> {
+    pub(super) fn split_between(&mut self, a: u32, b: u32, found: &[Crossing], room: &Room) -> Option<u32> {
         let first = match *found.first()? {
             Crossing::Face(first) => first,
             // The way to an edge lies in the face between: a little beside the crossing there is more room.
@@ -112,8 +124,12 @@ impl Recovery<'_> {
     }
 
     fn room_on_edge(&self, a: u32, b: u32, triangle: u32) -> Room {
-        let [p, q] = [a, b].map(|v| self.mesh.point(v));
         let place = self.constraints.edge_of(a, b).map_or(Place::Triangle(triangle), Place::Edge);
+        self.room_on_line(a, b, place)
+    }
+
+    pub(super) fn room_on_line(&self, a: u32, b: u32, place: Place) -> Room {
+        let [p, q] = [a, b].map(|v| self.mesh.point(v));
         let ends = [Plane::across(&(p - q), p), Plane::across(&(q - p), q)];
         Room { place, axes: vec![q - p], ends: ends.into_iter().flatten().collect() }
     }
@@ -130,7 +146,7 @@ impl Recovery<'_> {
 
     /// Stars tets from a new point near `point`, where it has most room. Tets behind faces that do not see it are taken in first:
     /// near slivers the point may be, by rounding, on the wrong side of some.
-    fn add_steiner(&mut self, tets: &[u32], point: Point, room: &Room) -> Option<u32> {
+    pub(super) fn add_steiner(&mut self, tets: &[u32], point: Point, room: &Room) -> Option<u32> {
         /// More than a split of an edge with its usual ring needs, by far.
         const MOST_TETS: usize = 64;
         let mut tets = tets.to_vec();
@@ -148,8 +164,8 @@ impl Recovery<'_> {
                 .collect();
             // The crossing lies in the plane of what is crossed: flips could make flat tets of these later.
             let best = most_inside(&point, &room.axes, &planes).0;
-            if let Some(seen) = [best, point].into_iter().find(|p| self.is_star_shaped(&tets, p, room.place))
-            {
+            let fits = |p: &Point| room.is_off_ends(p) && self.is_star_shaped(&tets, p, room.place);
+            if let Some(seen) = [best, point].into_iter().find(fits) {
                 break seen;
             }
             let grown = self.behind_unseen(&tets, &point, room.place)?;
@@ -162,7 +178,8 @@ impl Recovery<'_> {
             return None;
         }
         let p = self.mesh.add_point(point);
-        self.cavity.fill(self.mesh, p, NO_BODY);
+        let body = self.mesh.bodies[tets[0] as usize];
+        self.cavity.fill(self.mesh, p, body);
         self.constraints.set_place(p, room.place);
         self.steiner.push(p);
         self.counts.steiner += 1;

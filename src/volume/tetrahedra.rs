@@ -55,6 +55,8 @@ pub(super) struct Tetrahedra {
     pub ranks: Vec<u32>,
     /// The vertex that asks.
     pub newcomer: u32,
+    /// Edges that stay although no locked face has them, sorted, the lower vertex first.
+    kept: Vec<[u32; 2]>,
     free: Vec<u32>,
     /// The circumsphere of each tet, found when it is asked for first: points with tets must not move.
     spheres: Vec<Circumsphere>,
@@ -140,6 +142,21 @@ impl Tetrahedra {
     #[inline]
     pub fn is_locked(&self, half_face: u32) -> bool {
         self.locked[(half_face >> 2) as usize] >> (half_face & 3) & 1 == 1
+    }
+
+    /// Makes these the edges that stay although no locked face has them: sorted, the lower vertex first.
+    pub fn keep_edges(&mut self, edges: Vec<[u32; 2]>) {
+        self.kept = edges;
+    }
+
+    /// Whether an edge is one of those.
+    pub fn is_kept(&self, a: u32, b: u32) -> bool {
+        !self.kept.is_empty() && self.kept.binary_search(&[a.min(b), a.max(b)]).is_ok()
+    }
+
+    /// Whether there are any.
+    pub fn has_kept_edges(&self) -> bool {
+        !self.kept.is_empty()
     }
 
     /// Locks a face on both sides.

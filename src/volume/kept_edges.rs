@@ -1,0 +1,461 @@
+//! Edges that the caller wants inside bodies.
+//!
+//! Recovered like those of the surface, in the mesh that is bounded already: by flips, else by points put on them for a while. Such a
+//! point p between its neighbours u and w leaves again: three new points stand around it, across the edge, so that three tets at u, w
+//! fill the middle of its ball; a search (`small`) fills the rest.
+//!
+//! ```text
+//!        u                u           Seen from the side; x are two of the three points.
+//!      ╱ │ ╲            ╱ │ ╲
+//!     v──p──v'   ─►    v─x│x─v'
+//!      ╲ │ ╱            ╲ │ ╱
+//!        w                w
+//! ```
+//!
+//! Where the search finds nothing the point stays: the edge is then a chain of edges of the mesh.
+
+use super::constraints::{Constraints, Place};
+use super::crossing::{Crossing, tets_around, trace};
+use super::recover::{DEEPEST, Recovery};
+use super::small::{self, Effort};
+use super::tetrahedra::{NONE, Tetrahedra};
+use super::{ClosedSurface, Report, VolumeError};
+use crate::kernel::predicates::{Sign, orient3d};
+use crate::{Point, Vector};
+use std::collections::BTreeMap;
+use std::f64::consts::TAU;
+
+/// How many points an edge may get for a while, so that there is an end. Not tuned.
+const MOST_ON_EDGE: usize = 64;
+
+/// How many edges may be tried to help for each kept one.
+const HELP: usize = 4;
+
+/// How many tets may be put in search of the filling around an edge.
+const TRIES: usize = 300;
+
+/// Balls with more vertices are left alone.
+const MOST_VERTICES: usize = 40;
+
+/// How far from the edge the three points stand, as fractions of the distance of what is around.
+const OFF: [f64; 3] = [0.5, 0.2, 0.02];
+
+/// How they may be turned around the edge, as fractions of the angle between them.
+const TURNS: usize = 4;
+
+/// Why an edge cannot be kept.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum KeptEdgeFault {
+    /// It names a point that does not exist, or one point twice.
+    NoEdge,
+    /// It leaves the bodies at one of its ends.
+    Outside,
+    /// It meets the surface or another kept edge there.
+    Meets(Point),
+    /// Neither flips nor points on it made it an edge of the mesh.
+    NotRecovered,
+}
+
+impl std::fmt::Display for KeptEdgeFault {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::NoEdge => f.write_str("does not have two different points"),
+            Self::Outside => f.write_str("leaves the bodies at one of its ends"),
+            Self::Meets(p) => {
+                write!(f, "meets the surface or another kept edge at ({}, {}, {})", p.x, p.y, p.z)
+            }
+            Self::NotRecovered => f.write_str("could not be recovered"),
+        }
+    }
+}
+
+/// Makes the edges that are wanted of a surface edges of the mesh; `kept` are the vertices of its kept points.
+/// Returns the edges of the mesh that they consist of, each with the place in the list of the one that it is part of.
+pub(super) fn keep(
+    surface: &ClosedSurface,
+    mesh: &mut Tetrahedra,
+    constraints: &mut Constraints,
+    kept: &[u32],
+    scale: f64,
+    report: &mut Report,
+) -> Result<Vec<([u32; 2], u32)>, VolumeError> {
+    let on_surface = surface.points.len();
+    let vertex =
+        |i: u32| if (i as usize) < on_surface { Some(i) } else { kept.get(i as usize - on_surface).copied() };
+    let refused = |mesh: &Tetrahedra, index: usize, fault: KeptEdgeFault| {
+        let ends =
+            surface.kept_edges[index].map(|i| vertex(i).map_or(Point::origin(), |v| mesh.point(v) / scale));
+        let fault =
+            if let KeptEdgeFault::Meets(place) = fault { KeptEdgeFault::Meets(place / scale) } else { fault };
+        VolumeError::KeptEdge { index, ends, fault }
+    };
+    let mut wanted = Vec::with_capacity(surface.kept_edges.len());
+    for (index, edge) in surface.kept_edges.iter().enumerate() {
+        match edge.map(vertex) {
+            [Some(a), Some(b)] if a != b => wanted.push([a, b]),
+            _ => return Err(refused(mesh, index, KeptEdgeFault::NoEdge)),
+        }
+    }
+    keep_edges(mesh, constraints, &wanted, report).map_err(|(index, fault)| refused(mesh, index, fault))?;
+    let number: BTreeMap<[u32; 2], u32> =
+        wanted.iter().map(|&[a, b]| [a.min(b), a.max(b)]).zip(0..).collect();
+    let pieces = constraints.kept_edges().into_iter();
+    Ok(pieces.map(|[a, b]| ([a, b], number[&constraints.line_of(a, b)])).collect())
+}
+
+/// Makes edges between vertices of the mesh edges of it. The mesh must be carved and its facets locked. An edge that is refused is
+/// told by its place in the list.
+fn keep_edges(
+    mesh: &mut Tetrahedra,
+    constraints: &mut Constraints,
+    wanted: &[[u32; 2]],
+    report: &mut Report,
+) -> Result<(), (usize, KeptEdgeFault)> {
+    for &[a, b] in wanted {
+        constraints.keep_edge(a, b);
+    }
+    let mut recovery = Recovery::new(mesh, constraints, 0);
+    let mut split = Vec::new();
+    for (i, &[a, b]) in wanted.iter().enumerate() {
+        recovery.give_help(HELP);
+        recovery.most_steiner = recovery.steiner.len() + MOST_ON_EDGE;
+        split.extend(recovery.keep_edge(a, b).map_err(|fault| (i, fault))?);
+    }
+    let mut left = split;
+    for depth in 0..=DEEPEST {
+        recovery.give_help(HELP * left.len());
+        left.retain(|&p| !recovery.leave(p, depth));
+    }
+    report.steiner_inside += recovery.helping.len();
+    report.on_kept_edges = left.len();
+    mesh.keep_edges(constraints.kept_edges());
+    Ok(())
+}
+
+impl Recovery<'_> {
+    /// Makes a, b an edge of the mesh, by points on it if need be, which are returned.
+    fn keep_edge(&mut self, a: u32, b: u32) -> Result<Vec<u32>, KeptEdgeFault> {
+        let mut pieces = vec![[a, b]];
+        let mut points = Vec::new();
+        while let Some([u, v]) = pieces.pop() {
+            let found = self.what_is_met(u, v)?;
+            if found.is_empty() || (0..=DEEPEST).any(|depth| self.recover_edge(u, v, depth)) {
+                continue;
+            }
+            let p = self.split_kept_edge(u, v).ok_or(KeptEdgeFault::NotRecovered)?;
+            self.constraints.forget_edge(u, v);
+            for end in [u, v] {
+                self.constraints.keep_edge(end, p);
+                pieces.push([end, p]);
+            }
+            points.push(p);
+        }
+        Ok(points)
+    }
+
+    /// What an edge crosses; a fault where that must stay.
+    fn what_is_met(&mut self, a: u32, b: u32) -> Result<Vec<Crossing>, KeptEdgeFault> {
+        let mut found = Vec::new();
+        if !trace(self.mesh, a, b, &mut self.star, &mut found) {
+            return Err(KeptEdgeFault::Outside);
+        }
+        for &crossing in &found {
+            let stays = match crossing {
+                Crossing::Face(half_face) => self.mesh.is_locked(half_face),
+                Crossing::Edge(_, [u, v]) => self.constraints.has_edge(u, v),
+                Crossing::Vertex(_) => true,
+            };
+            if stays {
+                return Err(KeptEdgeFault::Meets(self.crossing_point(a, b, crossing)));
+            }
+        }
+        Ok(found)
+    }
+
+    /// Puts a point on a missing edge where it crosses the mesh, near its middle first.
+    fn split_kept_edge(&mut self, a: u32, b: u32) -> Option<u32> {
+        let found = self.what_is_met(a, b).ok()?;
+        let edge = self.constraints.line_of(a, b);
+        let room = self.room_on_line(a, b, Place::Edge(edge));
+        let mut order: Vec<usize> = (0..found.len()).collect();
+        order.sort_by_key(|&i| (2 * i + 1).abs_diff(found.len()));
+        let added = order.into_iter().find_map(|i| {
+            let point = self.crossing_point(a, b, found[i]);
+            let tets = tets_around(self.mesh, found[i]);
+            self.add_steiner(&tets, point, &room)
+        });
+        added.or_else(|| self.split_between(a, b, &found, &room))
+    }
+
+    /// Takes a point off the kept edge that it splits, if that can be.
+    fn leave(&mut self, p: u32, depth: u32) -> bool {
+        let [u, w] = self.constraints.kept_neighbours(p)[..] else { return false };
+        self.thin_out(p, depth);
+        let points = self.mesh.points.len();
+        self.mesh.star(p, &mut self.star);
+        let skin: Vec<[u32; 3]> = self.star.iter().map(|&t| opposite(self.mesh, t, p)).collect();
+        let Some(tets) = around(self.mesh, &skin, [u, w]).or_else(|| surround(self.mesh, &skin, [u, p, w]))
+        else {
+            return false;
+        };
+        let body = self.mesh.bodies[self.star[0] as usize];
+        self.mesh.replace(&self.star, &tets, body, &mut self.flips.made);
+        self.mesh.at_vertex[p as usize] = NONE;
+        self.helping.extend(points as u32..self.mesh.points.len() as u32);
+        for end in [u, w] {
+            self.constraints.forget_edge(end, p);
+        }
+        self.constraints.keep_edge(u, w);
+        true
+    }
+
+    /// Removes what edges it can at a point but for those to be kept: the fewer there are the easier it leaves.
+    fn thin_out(&mut self, p: u32, depth: u32) {
+        self.mesh.star(p, &mut self.star);
+        let mut ends: Vec<u32> = self.star.iter().flat_map(|&t| self.mesh.tets[t as usize]).collect();
+        ends.sort_unstable();
+        ends.dedup();
+        for v in ends {
+            self.take_help();
+            if v != p
+                && let Some(tet) = self.mesh.tet_at_edge(p, v, &mut self.star)
+            {
+                self.remove_edge(tet, [p, v], [NONE; 2], depth);
+            }
+        }
+    }
+}
+
+/// The face of a tet opposite to a vertex, outward.
+fn opposite(mesh: &Tetrahedra, tet: u32, vertex: u32) -> [u32; 3] {
+    mesh.face(4 * tet + mesh.index_of(tet, vertex).expect("a vertex of the tet") as u32)
+}
+
+/// The tets around the edge u, w where only a ring of vertices is around it.
+fn around(mesh: &Tetrahedra, skin: &[[u32; 3]], [u, w]: [u32; 2]) -> Option<Vec<[u32; 4]>> {
+    let [above, below] = [u, w].map(|v| skin.iter().filter(|face| face.contains(&v)).count());
+    if above + below != skin.len() || above != below {
+        return None;
+    }
+    let tets: Vec<[u32; 4]> =
+        skin.iter().filter(|face| face.contains(&u)).map(|&[a, b, c]| [w, a, b, c]).collect();
+    tets.iter().all(|&tet| is_positive(mesh, tet)).then_some(tets)
+}
+
+fn is_positive(mesh: &Tetrahedra, tet: [u32; 4]) -> bool {
+    let [a, b, c, d] = tet.map(|v| mesh.point(v));
+    orient3d(a, b, c, d) == Sign::Positive
+}
+
+/// Tets that fill the ball of p with the edge u, w and three new points around it.
+fn surround(mesh: &mut Tetrahedra, skin: &[[u32; 3]], [u, p, w]: [u32; 3]) -> Option<Vec<[u32; 4]>> {
+    let [from, middle, to] = [u, p, w].map(|v| *mesh.point(v));
+    let along = (to - from).normalize();
+    let first = along.cross(&Vector::ith(along.iamin(), 1.0)).normalize();
+    let second = along.cross(&first);
+    // How near the skin comes, but for the faces at the ends.
+    let away = |face: &[u32; 3]| {
+        let [a, b, c] = face.map(|v| mesh.point(v));
+        crate::kernel::simplex::squared_distance(&middle, [a, b, c]).sqrt()
+    };
+    let reach =
+        skin.iter().filter(|f| !f.contains(&u) && !f.contains(&w)).map(away).fold(f64::INFINITY, f64::min);
+    let reach = if reach.is_finite() { reach } else { (middle - from).norm().min((to - middle).norm()) };
+    let points = mesh.points.len();
+    for off in OFF {
+        for turn in 0..TURNS {
+            let ring = [0, 1, 2].map(|k| {
+                let angle = TAU / 3.0 * (f64::from(k) + turn as f64 / TURNS as f64);
+                let place = middle + (first * angle.cos() + second * angle.sin()) * (off * reach);
+                mesh.add_point(place)
+            });
+            if let Some(tets) = fill_around(mesh, skin, [u, w], ring) {
+                return Some(tets);
+            }
+            mesh.forget_points(points);
+        }
+    }
+    None
+}
+
+/// Three tets around an edge, and what a search finds for the rest.
+fn fill_around(
+    mesh: &Tetrahedra,
+    skin: &[[u32; 3]],
+    [u, w]: [u32; 2],
+    ring: [u32; 3],
+) -> Option<Vec<[u32; 4]>> {
+    let mut tets: Vec<[u32; 4]> = (0..3).map(|k| [u, w, ring[k], ring[(k + 1) % 3]]).collect();
+    if !tets.iter().all(|&tet| is_positive(mesh, tet)) {
+        return None;
+    }
+    // The rest sees the three tets from outside.
+    let mut rest = skin.to_vec();
+    for &[u, w, x, y] in &tets {
+        rest.extend([[u, x, y], [w, y, x]]);
+    }
+    let mut effort = Effort { vertices: MOST_VERTICES, tries: TRIES };
+    tets.extend(small::fill(&mesh.points, &rest, &[], 0.0, &mut effort)?);
+    Some(tets)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::crossing::edges_of_tet;
+    use super::super::samples::check_fills;
+    use super::super::samples::{INSIDE, Soup};
+    use super::super::samples::{twist_limit, twisted_prisms};
+    use super::super::{Settings, VolumeMesh, mesh};
+    use super::*;
+    use crate::kernel::random::Random;
+    use crate::size::UniformSize;
+    use proptest::prelude::*;
+    use std::collections::BTreeSet;
+
+    const EMPTY: Settings = Settings { fill: false, growth: 0.3, max_tets: 1 << 20 };
+
+    fn cube(n: usize) -> ClosedSurface {
+        let mut soup = Soup::default();
+        soup.brick([0.; 3], [1.; 3], n, INSIDE);
+        soup.surface().unwrap()
+    }
+
+    fn edges_of(mesh: &VolumeMesh) -> BTreeSet<[u32; 2]> {
+        mesh.tets.iter().flat_map(|&tet| edges_of_tet(tet)).map(|[a, b]| [a.min(b), a.max(b)]).collect()
+    }
+
+    /// Meshes with and without points inside; all edges must be there between the points that they name, at most `cut` cut in two.
+    fn check_kept(surface: &ClosedSurface, size: f64, cut: usize) {
+        for settings in [EMPTY, Settings::default()] {
+            let (mesh, report) = mesh(surface, &UniformSize(size), &settings).unwrap();
+            check_fills(surface, &mesh);
+            assert!(report.on_kept_edges <= cut, "{report:?}");
+            let given = surface.points().iter().chain(surface.kept_points());
+            assert!(given.eq(mesh.points.iter().take(surface.points().len() + surface.kept_points().len())));
+            let edges = edges_of(&mesh);
+            let mut length = vec![0.0; surface.kept_edges().len()];
+            for &([a, b], edge) in &mesh.kept_edges {
+                assert!(edges.contains(&[a.min(b), a.max(b)]), "edge {a} {b}");
+                length[edge as usize] += (mesh.points[a as usize] - mesh.points[b as usize]).norm();
+            }
+            let (mut whole, mut wanted) = (0, BTreeSet::new());
+            for (i, &[a, b]) in surface.kept_edges().iter().enumerate().rev() {
+                if wanted.insert([a.min(b), a.max(b)]) {
+                    whole += usize::from(edges.contains(&[a.min(b), a.max(b)]));
+                    let expected = (mesh.points[a as usize] - mesh.points[b as usize]).norm();
+                    assert!((length[i] - expected).abs() < 1e-12, "edge {i}");
+                }
+            }
+            assert!(whole + report.on_kept_edges >= wanted.len());
+        }
+    }
+
+    fn random_point(random: &mut Random) -> Point {
+        Point::from([0; 3].map(|_| 0.05 + 0.9 * random.unit()))
+    }
+
+    #[test]
+    fn a_star_of_edges_to_the_surface_and_to_points_inside_is_kept() {
+        let surface = cube(3);
+        let on_surface = surface.points().len() as u32;
+        let mut random = Random::new(3);
+        let mut points = vec![Point::new(0.43, 0.52, 0.48)];
+        points.extend((0..12).map(|_| random_point(&mut random)));
+        let ends = (0..on_surface).step_by(3).chain(on_surface + 1..on_surface + 13);
+        let edges = ends.map(|end| [on_surface, end]).collect();
+        check_kept(&surface.with_kept_points(points).with_kept_edges(edges), 0.2, 1);
+    }
+
+    #[test]
+    fn a_chain_from_wall_to_wall_and_edges_as_close_as_needles_are_kept() {
+        let surface = cube(2);
+        let n = surface.points().len() as u32;
+        let near = |p: &Point| surface.points().iter().position(|q| (p - q).norm() < 1e-9).unwrap() as u32;
+        let [from, to] = [Point::new(0.0, 0.5, 0.5), Point::new(1.0, 1.0, 1.0)].map(|p| near(&p));
+        let chain = [[0.2, 0.6, 0.3], [0.5, 0.3, 0.7], [0.8, 0.9, 0.6]].map(Point::from);
+        let mut points = chain.to_vec();
+        let mut edges = vec![[from, n], [n, n + 1], [n + 1, n + 2], [n + 2, to]];
+        for i in 0..6 {
+            let beside = 1e-5 * f64::from(i * i);
+            points.extend([
+                Point::new(0.11, 0.1 + beside, 0.13),
+                Point::new(0.9, 0.12 + beside, 0.18 + beside),
+            ]);
+            edges.push([n + 3 + 2 * i as u32, n + 4 + 2 * i as u32]);
+        }
+        check_kept(&surface.with_kept_points(points).with_kept_edges(edges), 0.3, 1);
+    }
+
+    #[test]
+    fn long_edges_in_bent_prisms_are_kept() {
+        for sides in [3, 7] {
+            let surface = twisted_prisms(sides, -0.9 * twist_limit(sides), 3.0, 1).surface().unwrap();
+            let n = surface.points().len() as u32;
+            let points = [[0.02, 0.01, 0.1], [0.01, 0.03, 2.9]].map(Point::from).to_vec();
+            let edges = vec![[n, n + 1], [0, n], [n + 1, n - 1]];
+            check_kept(&surface.with_kept_points(points).with_kept_edges(edges), 0.5, 1);
+        }
+    }
+
+    #[test]
+    fn edges_that_meet_something_or_are_none_are_refused_with_their_place() {
+        let surface = cube(1);
+        let n = surface.points().len() as u32;
+        let corner = |p: [f64; 3]| surface.points().iter().position(|q| *q == Point::from(p)).unwrap() as u32;
+        let (o, x, top) = (corner([0.; 3]), corner([1., 0., 0.]), corner([1.; 3]));
+        let points = [[0.25; 3], [0.75; 3], [0.25, 0.25, 0.75], [0.75, 0.75, 0.25]].map(Point::from).to_vec();
+        let middle = KeptEdgeFault::Meets(Point::new(0.5, 0.5, 0.5));
+        for (edges, fault) in [
+            (vec![[o, x], [n, n]], Some(KeptEdgeFault::NoEdge)),
+            (vec![[o, x], [n, n + 4]], Some(KeptEdgeFault::NoEdge)),
+            (vec![[n, n + 1], [n + 2, n + 3]], Some(middle)),
+            (vec![[n, n + 1], [o, top]], Some(KeptEdgeFault::Meets(Point::new(0.25, 0.25, 0.25)))),
+            // The same edge again, an edge of the surface, a common end.
+            (vec![[n, n + 1], [n + 1, n], [o, x], [n + 1, top]], None),
+        ] {
+            let wanted = surface.clone().with_kept_points(points.clone()).with_kept_edges(edges);
+            match (mesh(&wanted, &UniformSize(1.0), &EMPTY), fault) {
+                (Err(VolumeError::KeptEdge { index: 1, fault, .. }), Some(expected)) => {
+                    assert_eq!(fault, expected)
+                }
+                (Ok(_), None) => {}
+                (other, _) => panic!("{fault:?}: {:?}", other.map(|m| m.1)),
+            }
+        }
+    }
+
+    #[test]
+    fn edges_through_what_is_not_inside_are_refused() {
+        // A cube with a hollow: from wall to wall through it, and away from both.
+        let mut soup = Soup::default();
+        soup.brick([0.; 3], [3.; 3], 1, INSIDE);
+        soup.brick([1.; 3], [2.; 3], 1, [None, INSIDE[0]]);
+        let surface = soup.surface().unwrap();
+        let corner = |p: [f64; 3]| surface.points().iter().position(|q| *q == Point::from(p)).unwrap() as u32;
+        let n = surface.points().len() as u32;
+        let points = [[0.5, 1.4, 1.3], [2.6, 1.6, 1.7]].map(Point::from).to_vec();
+        for (edge, outside) in [([corner([1.; 3]), corner([2.; 3])], true), ([n, n + 1], false)] {
+            let wanted = surface.clone().with_kept_points(points.clone()).with_kept_edges(vec![edge]);
+            let Err(VolumeError::KeptEdge { index: 0, fault, .. }) = mesh(&wanted, &UniformSize(1.0), &EMPTY)
+            else {
+                panic!("{edge:?} was kept")
+            };
+            assert_eq!(fault == KeptEdgeFault::Outside, outside, "{fault:?}");
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig { cases: 12, rng_seed: proptest::test_runner::RngSeed::Fixed(11), ..ProptestConfig::default() })]
+        #[test]
+        fn edges_between_points_anywhere_are_kept(seed in any::<u64>(), points in 2..12u32, edges in 1..12u32) {
+            let surface = cube(2);
+            let n = surface.points().len() as u32;
+            let mut random = Random::new(seed);
+            let inside = (0..points).map(|_| random_point(&mut random)).collect();
+            // One end inside: then no edge lies in a side of the cube.
+            let ends = (0..edges).map(|_| [n + (random.bits() % u64::from(points)) as u32, (random.bits() % u64::from(n + points)) as u32]);
+            let ends = ends.filter(|[a, b]| a != b).collect();
+            check_kept(&surface.with_kept_points(inside).with_kept_edges(ends), 0.4, 8);
+        }
+    }
+}
