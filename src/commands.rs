@@ -157,10 +157,11 @@ fn coarse_settings(options: &SizeOptions, reads: bool) -> Result<CoarseSettings,
 }
 
 fn wanted(options: &Generate) -> Wanted {
+    let pieces = options.pieces.unwrap_or(1 << options.levels);
     match (options.elements, options.size.coarse) {
         (Some(count), _) => Wanted::Elements(count),
-        (None, Some(tets)) => Wanted::Coarse { tets, levels: options.levels },
-        (None, None) => Wanted::Sizes { levels: options.levels },
+        (None, Some(tets)) => Wanted::Coarse { tets, pieces },
+        (None, None) => Wanted::Sizes { pieces },
     }
 }
 
@@ -249,7 +250,8 @@ fn summary(model: &Model, input: &str, made: &Generated, ranks: u32, shared: u64
         entities: model.entities(),
         ranks,
         threads: rayon::current_num_threads(),
-        levels: made.levels,
+        levels: made.pieces.ilog2(),
+        pieces: made.pieces,
         coarse: coarse.report.clone(),
         wanted: coarse.outcome,
         mesh: MeshReport::new(&made.check, made.checksum.to_string()),
@@ -310,8 +312,8 @@ pub fn run_mesh(options: &MeshFile) -> Result<(), Failure> {
     let progress = Progress::new(options.quiet, STAGES);
     let model = progress.stage("read", || read_sized_model(&options.input, &options.size, &progress))?;
     let wanted = match options.size.coarse {
-        Some(tets) => Wanted::Coarse { tets, levels: 0 },
-        None => Wanted::Sizes { levels: 0 },
+        Some(tets) => Wanted::Coarse { tets, pieces: 1 },
+        None => Wanted::Sizes { pieces: 1 },
     };
     let settings = GenerateSettings { coarse: coarse_settings(&options.size, true)?, wanted };
     let made = generate(&comm, Some(&model), &settings, &progress)?;

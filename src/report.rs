@@ -23,8 +23,10 @@ pub struct Report {
     pub ranks: u32,
     /// Threads in each process.
     pub threads: usize,
-    /// Levels of uniform refinement.
+    /// Levels of uniform refinement: the whole part of the logarithm of `pieces` to the base 2.
     pub levels: u32,
+    /// Pieces that each coarse edge was cut into.
+    pub pieces: u32,
     /// The coarse mesh.
     pub coarse: CoarseReport,
     /// Whether the wanted number of coarse tets was reached: `reached`, `least` or `jumped`; null if none was wanted.
@@ -166,6 +168,15 @@ fn grouped(count: u64) -> String {
     groups.join(" ")
 }
 
+/// How finely coarse edges were cut.
+fn cut_into(pieces: u32) -> String {
+    if pieces.is_power_of_two() {
+        format!("{} levels", pieces.ilog2())
+    } else {
+        format!("{pieces} pieces an edge")
+    }
+}
+
 /// Bytes in the unit that suits.
 fn sized(bytes: u64) -> String {
     let units = ["B", "kB", "MB", "GB", "TB"];
@@ -201,11 +212,11 @@ impl fmt::Display for Report {
         let mesh = &self.mesh;
         writeln!(
             f,
-            "mesh       {} tets, {} vertices, {} boundary triangles, {} levels",
+            "mesh       {} tets, {} vertices, {} boundary triangles, {}",
             grouped(mesh.tets),
             grouped(mesh.vertices),
             grouped(mesh.boundary),
-            self.levels
+            cut_into(self.pieces)
         )?;
         writeln!(
             f,

@@ -1,9 +1,10 @@
 //! Method 2 on all ranks: a coarse mesh, partitioned, distributed, refined, checked.
 
 use super::coarse::{CoarseMesh, CoarseReport, CoarseSettings};
-use super::mend::{self, MendError};
+use super::mend;
 use super::model::Model;
-use super::target::{Outcome, mesh_to_target};
+use super::target::Outcome;
+use super::wanted::{Wanted, mesh_as_wanted};
 use crate::check::{self, Checksum, PartReport};
 use crate::comm::Communicator;
 use crate::dist::{self, DistMesh};
@@ -16,25 +17,6 @@ use crate::periodic::{self, PeriodicMap};
 use crate::progress::Progress;
 use crate::refine::{self, RefineError, RefinedMesh};
 use crate::size::Source;
-
-/// How many tets are wanted.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Wanted {
-    /// What the sizes give, with this many levels of refinement.
-    Sizes {
-        /// Levels.
-        levels: u32,
-    },
-    /// A coarse mesh with this many, and this many levels of refinement.
-    Coarse {
-        /// Tets of the coarse mesh.
-        tets: u64,
-        /// Levels.
-        levels: u32,
-    },
-    /// This many in all: levels are chosen.
-    Elements(u64),
-}
 
 /// What is to be made.
 #[derive(Clone, Debug)]
@@ -65,8 +47,8 @@ pub struct CoarseResult {
 pub struct Generated {
     /// This rank's part.
     pub part: RefinedMesh,
-    /// Levels of refinement.
-    pub levels: u32,
+    /// Pieces that each coarse edge was cut into.
+    pub pieces: u32,
     /// Numbers and names of bodies and boundaries.
     pub names: Names,
     /// The check of the whole mesh, the same on all ranks.
@@ -78,12 +60,6 @@ pub struct Generated {
     /// On rank 0 alone.
     pub coarse: Option<CoarseResult>,
 }
-
-/// Levels of refinement at most: with more, even one tet would pass 2³² vertices.
-pub const MOST_LEVELS: u32 = 10;
-
-/// Below this many coarse tets a mesh that is to have many is not refined, but made finer.
-const LEAST_COARSE: u64 = 5_000;
 
 /// Rounds in which the coarse mesh is made finer because refined tets turned out inverted only now.
 const MOST_ROUNDS: usize = 4;
@@ -103,15 +79,13 @@ pub fn generate(
     for round in 0.. {
         let made = model.map(|model| coarse_mesh(comm.size(), model, settings, &sources, progress));
         let mut coarse = agree(comm, made.transpose())?;
-        let levels = broadcast_levels(comm, coarse.as_ref().map(|(levels, _)| *levels))?;
+        let pieces = broadcast_pieces(comm, coarse.as_ref().map(|(pieces, _)| *pieces))?;
         let (names, projector) = broadcast_geometry(comm, model)?;
         let given = coarse.as_ref().map(|(_, made)| (made.mesh.clone(), made.parts.clone()));
         let dist = progress.stage("distribute", || dist::distribute(comm, given))?;
-        let pieces = 1 << levels;
         refuse_without_memory(comm, &dist, pieces)?;
-        let refined = progress.stage("refine", || {
-            refine::refine(dist, &projector, pieces as u32, &refine::Settings::default())
-        });
+        let refined = progress
+            .stage("refine", || refine::refine(dist, &projector, pieces, &refine::Settings::default()));
         let bad = inverted_anywhere(comm, &refined)?;
         if !bad.is_empty() && round < MOST_ROUNDS {
             if let Some((_, made)) = &coarse {
@@ -129,12 +103,12 @@ pub fn generate(
         let (check, checksum) = progress.stage("check", || verdict(comm, &part, &projector))?;
         let periodic = periodic_verdict(comm, &part, &map, &projector)?;
         let coarse = coarse.take().map(|(_, made)| made);
-        return Ok(Generated { part, levels, names, check, checksum, periodic, coarse });
+        return Ok(Generated { part, pieces, names, check, checksum, periodic, coarse });
     }
     unreachable!("the loop ends by itself")
 }
 
-/// The coarse mesh, partitioned, and the levels of its refinement.
+/// The coarse mesh, partitioned, and the pieces of its edges.
 fn coarse_mesh(
     parts: u32,
     model: &Model,
@@ -142,62 +116,12 @@ fn coarse_mesh(
     sources: &[Source],
     progress: &Progress,
 ) -> Result<(u32, CoarseResult), Failure> {
-    let (levels, made, outcome) =
-        progress.stage("mesh", || mesh_as_wanted(parts, model, settings, sources))?;
+    let (pieces, made, outcome) = progress
+        .stage("mesh", || mesh_as_wanted(parts, model, &settings.coarse, settings.wanted, sources))?;
     let (assigned, metrics) = progress
         .stage("partition", || partition::partition(&made.mesh, parts, &partition::Settings::default()))?;
     let CoarseMesh { mesh, report } = made;
-    Ok((levels, CoarseResult { mesh, parts: assigned, report, outcome, partition: metrics }))
-}
-
-fn mesh_as_wanted(
-    parts: u32,
-    model: &Model,
-    settings: &GenerateSettings,
-    sources: &[Source],
-) -> Result<(u32, CoarseMesh, Option<Outcome>), Failure> {
-    let with = |more: &[Source]| {
-        let mut coarse = settings.coarse.clone();
-        coarse.size.sources.extend(sources.iter().chain(more));
-        coarse
-    };
-    let to_target = |tets: u64, levels: u32| {
-        let mut outcome = Outcome::Reached;
-        let made = mend::refinable(model, 1 << levels, |more| {
-            let (made, how) = mesh_to_target(model, &mut with(more), tets)?;
-            outcome = how;
-            Ok(made)
-        });
-        made.map(|made| (made, outcome))
-    };
-    match settings.wanted {
-        Wanted::Elements(count) if let Model::Given(given) = model => {
-            let tets = given.mesh.tets.len() as u64;
-            let levels = (0..MOST_LEVELS).find(|levels| tets << (3 * levels) >= count).unwrap_or(MOST_LEVELS);
-            Ok((levels, model.coarse_mesh(&mut settings.coarse.clone()).map_err(MendError::from)?, None))
-        }
-        Wanted::Sizes { levels } => {
-            let made = mend::refinable(model, 1 << levels, |more| model.coarse_mesh(&mut with(more)))?;
-            Ok((levels, made, None))
-        }
-        Wanted::Coarse { tets, levels } => {
-            let (made, outcome) = to_target(tets, levels)?;
-            Ok((levels, made, Some(outcome)))
-        }
-        Wanted::Elements(count) => {
-            let enough = LEAST_COARSE.max(100 * u64::from(parts));
-            let fits = |levels: &u32| count >> (3 * levels) >= enough;
-            let mut levels = (0..=MOST_LEVELS).rev().find(fits).unwrap_or(0);
-            loop {
-                let (made, outcome) = to_target(count.div_ceil(1 << (3 * levels)), levels)?;
-                // Too fine a coarse mesh for so many levels: fewer levels reach the number.
-                if outcome == Outcome::Reached || levels == 0 {
-                    return Ok((levels, made, Some(outcome)));
-                }
-                levels -= 1;
-            }
-        }
-    }
+    Ok((pieces, CoarseResult { mesh, parts: assigned, report, outcome, partition: metrics }))
 }
 
 /// **Collective.** What is periodic in the coarse mesh that rank 0 has.
@@ -240,11 +164,11 @@ fn periodic_verdict(
     Ok(Some(checked))
 }
 
-/// **Collective.** The levels that rank 0 chose.
-fn broadcast_levels(comm: &dyn Communicator, levels: Option<u32>) -> Result<u32, Failure> {
-    let mut levels = vec![levels.unwrap_or(0)];
-    comm.broadcast(0, &mut levels)?;
-    Ok(levels[0])
+/// **Collective.** The pieces that rank 0 chose.
+fn broadcast_pieces(comm: &dyn Communicator, pieces: Option<u32>) -> Result<u32, Failure> {
+    let mut pieces = vec![pieces.unwrap_or(1)];
+    comm.broadcast(0, &mut pieces)?;
+    Ok(pieces[0])
 }
 
 /// **Collective.** The names and the surfaces that rank 0 has read.
@@ -263,8 +187,8 @@ fn broadcast_geometry(comm: &dyn Communicator, model: Option<&Model>) -> Result<
 const VERTEX_BYTES: f64 = 24.0;
 
 /// **Collective.** Refuses what the memory of a machine cannot hold, before anything is refined.
-fn refuse_without_memory(comm: &dyn Communicator, part: &DistMesh, pieces: u64) -> Result<(), Failure> {
-    let n = pieces as f64;
+fn refuse_without_memory(comm: &dyn Communicator, part: &DistMesh, pieces: u32) -> Result<(), Failure> {
+    let n = f64::from(pieces);
     let on_edge = n - 1.0;
     let on_face = on_edge * (n - 2.0) / 2.0;
     let in_tet = on_face * (n - 3.0) / 3.0;

@@ -9,9 +9,11 @@ pub mod mend;
 pub mod model;
 pub mod names;
 pub mod target;
+pub mod wanted;
 
 pub use coarse::{CoarseError, CoarseMesh, CoarseReport, CoarseSettings};
 pub use facet_model::FacetSolid;
-pub use generate::{GenerateSettings, Generated, Wanted, generate};
+pub use generate::{GenerateSettings, Generated, generate};
 pub use model::{CsgModel, Entities, GivenMesh, Model};
 pub use names::names;
+pub use wanted::Wanted;
