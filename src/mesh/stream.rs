@@ -53,6 +53,16 @@ pub struct TetBlock {
     pub body: Option<BodyId>,
 }
 
+/// A tet block as a little mesh of its own: what is wanted of each vertex (coordinates, ids, hashes) is gathered once for
+/// all the tets around it.
+#[derive(Clone, Debug, Default)]
+pub struct LocalBlock {
+    /// Local indices of the vertices of the block.
+    pub vertices: Vec<u32>,
+    /// The tet block, but with vertices by their positions in `vertices`.
+    pub tets: TetBlock,
+}
+
 /// The children of one boundary triangle.
 #[derive(Clone, Debug, Default)]
 pub struct BoundaryBlock {
@@ -106,6 +116,21 @@ pub trait MeshStream: Sync {
     fn tet_blocks(&self) -> usize;
     /// Fills `block` with one tet block, reusing its memory.
     fn tet_block(&self, index: usize, block: &mut TetBlock);
+    /// Fills `block` with one tet block and its vertices, reusing its memory.
+    fn local_block(&self, index: usize, block: &mut LocalBlock) {
+        self.tet_block(index, &mut block.tets);
+        block.vertices.clear();
+        for tet in &mut block.tets.tets {
+            let first = block.vertices.len() as u32;
+            block.vertices.extend(*tet);
+            *tet = [first, first + 1, first + 2, first + 3];
+        }
+    }
+    /// Replaces `ids` by the global ids of the vertices of a block of this stream.
+    fn block_ids(&self, block: &LocalBlock, ids: &mut Vec<GlobalId>) {
+        ids.clear();
+        ids.extend(block.vertices.iter().map(|&vertex| self.vertex_id(vertex)));
+    }
     /// The number of boundary blocks.
     fn boundary_blocks(&self) -> usize;
     /// Fills `block` with one boundary block, reusing its memory.
@@ -149,6 +174,13 @@ pub fn vertex_block_of<S: MeshStream + ?Sized>(stream: &S, local: u32) -> usize 
         }
     }
     panic!("no vertex {local} in this part");
+}
+
+impl LocalBlock {
+    /// The vertices of a tet by local index.
+    pub fn tet(&self, index: usize) -> Option<[u32; 4]> {
+        self.tets.tets.get(index).map(|tet| tet.map(|k| self.vertices[k as usize]))
+    }
 }
 
 impl VertexBlock<'_> {

@@ -1,7 +1,7 @@
 //! The refined part with its tets stored, for consumers that need them again and again.
 
 use super::{RefineError, RefinedMesh};
-use crate::mesh::stream::{BoundaryBlock, Counts, MeshStream, TetBlock, VertexBlock};
+use crate::mesh::stream::{BoundaryBlock, Counts, LocalBlock, MeshStream, TetBlock, VertexBlock};
 use crate::mesh::{GlobalId, Rank};
 use rayon::prelude::*;
 
@@ -80,6 +80,12 @@ impl MeshStream for StoredMesh {
         block.first_local = (index * children) as u64;
         block.first_id = coarse.tet_ids[index] * children as u64;
         block.body = Some(coarse.tet_bodies[index]);
+    }
+    fn local_block(&self, index: usize, block: &mut LocalBlock) {
+        self.refined.local_block(index, block);
+    }
+    fn block_ids(&self, block: &LocalBlock, ids: &mut Vec<GlobalId>) {
+        self.refined.block_ids(block, ids);
     }
     fn boundary_blocks(&self) -> usize {
         self.refined.boundary_blocks()

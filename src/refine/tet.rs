@@ -15,6 +15,7 @@ use crate::check::Fault;
 use crate::dist::DistMesh;
 use crate::geometry::Projector;
 use crate::kernel::predicates::{Sign, orient3d, volume6_and_error};
+use crate::kernel::vector::{Wide, wide};
 use crate::mesh::{GlobalId, TetId};
 use rayon::iter::Either;
 use rayon::prelude::*;
@@ -43,14 +44,10 @@ pub fn fill(
         let corners = mesh.tets[tet.index()].map(|v| before[v.index()]);
         let flat = is_flat(mesh, projector, &settings.bends, tet);
         block.fill_odd_part(&plan, &corners, flat);
-        block.fill_inside(&plan);
-        block.scatter(lattice, inside);
         block.bad.clear();
-        if flat {
-            block.cut_evenly(&plan, diagonal::best_of_tet(&corners), bytes);
-        } else {
-            block.cut_each_best(&plan, bytes);
-        }
+        let cut = if flat { Cut::Evenly(diagonal::best_of_tet(&corners)) } else { Cut::EachBest };
+        wide(FillAndCut { block, plan: &plan, cut, bytes });
+        block.scatter(lattice, inside);
         block.verdict(mesh.tet_ids[tet.index()], lattice, settings.described)
     };
     let bad: Vec<BadTet> = insides
@@ -124,6 +121,36 @@ const PARENTS: [&[[i32; 3]]; 8] = [
     &[[1, -1, -1], [-1, 1, 1], [-1, 1, -1], [1, -1, 1], [-1, -1, 1], [1, 1, -1]],
 ];
 
+/// How octahedra are cut.
+enum Cut {
+    /// All along this diagonal.
+    Evenly(u8),
+    /// Each along its own best.
+    EachBest,
+}
+
+/// Fills the inside of a block and cuts its octahedra, in wide registers.
+struct FillAndCut<'a> {
+    block: &'a mut Block,
+    plan: &'a Plan,
+    cut: Cut,
+    bytes: &'a mut [u8],
+}
+
+impl Wide for FillAndCut<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Self { block, plan, cut, bytes } = self;
+        block.fill_inside(plan);
+        match cut {
+            Cut::Evenly(diagonal) => block.cut_evenly(plan, diagonal, bytes),
+            Cut::EachBest => block.cut_each_best(plan, bytes),
+        }
+    }
+}
+
 /// The lattice of one coarse tet: local ids and coordinates of its points, and scratch space.
 struct Block {
     ids: Vec<u32>,
@@ -192,6 +219,7 @@ impl Block {
     }
 
     /// The dyadic rule inside the tet.
+    #[inline(always)]
     fn fill_inside(&mut self, plan: &Plan) {
         let n = plan.lattice.n();
         let mut step = split(n).1 / 2;
@@ -208,6 +236,7 @@ impl Block {
     }
 
     /// Fills every second point of a row, from `b` on.
+    #[inline(always)]
     fn fill_row(&mut self, plan: &Plan, step: u32, [b, c, d]: [u32; 3]) {
         let odd = |x: u32| (x / step % 2) as usize;
         let parents = PARENTS[odd(b) | odd(c) << 1 | odd(d) << 2];
@@ -247,6 +276,7 @@ impl Block {
     }
 
     /// Cuts all octahedra along one diagonal and checks the children.
+    #[inline(always)]
     fn cut_evenly(&mut self, plan: &Plan, diagonal: u8, bytes: &mut [u8]) {
         // Four octahedra to a byte; bits beyond the last octahedron are never read.
         bytes.fill(diagonal * 0b0101_0101);
@@ -261,6 +291,7 @@ impl Block {
     }
 
     /// Cuts each octahedron along its own best diagonal and checks the children.
+    #[inline(always)]
     fn cut_each_best(&mut self, plan: &Plan, bytes: &mut [u8]) {
         for (c, d, cells) in plan.lattice.rows() {
             let rows = plan.around(c, d);
@@ -283,6 +314,7 @@ impl Block {
     }
 
     /// Checks the children of a row of cells that lie in no octahedron.
+    #[inline(always)]
     fn check_others(&mut self, plan: &Plan, rows: [usize; 4], [c, d, cells]: [u32; 3]) {
         let first = plan.lattice.child_row(c, d);
         self.check_run(rows, UPRIGHT, cells, first, 1);
@@ -292,6 +324,7 @@ impl Block {
 
     /// Checks the children with these corners in the first `count` cells of a row; their indices begin at
     /// `first` and are `stride` apart.
+    #[inline(always)]
     fn check_run(&mut self, rows: [usize; 4], corners: [u8; 4], count: u32, first: u32, stride: u32) {
         if count == 0 || self.run(rows, corners, count as usize).all_positive() {
             return;
@@ -302,6 +335,7 @@ impl Block {
     }
 
     /// The verdict on one child by exact sign.
+    #[cold]
     fn check_one(&mut self, rows: [usize; 4], corners: [u8; 4], cell: usize, child: u32) {
         let at = corners.map(|code| {
             let (row, shift) = corner_place(code);
@@ -318,7 +352,7 @@ impl Block {
     }
 
     /// The corners of the children with these corner codes in the first `count` cells of a row.
-    #[inline]
+    #[inline(always)]
     fn run(&self, rows: [usize; 4], corners: [u8; 4], count: usize) -> Run<'_> {
         let starts = corners.map(|code| {
             let (row, shift) = corner_place(code);
@@ -328,6 +362,7 @@ impl Block {
     }
 
     /// The worst shape and the least certain sign of the children of each octahedron, for each diagonal.
+    #[inline(always)]
     fn measure_octahedra(&mut self, rows: [usize; 4], count: usize) {
         if count == 0 {
             return;
@@ -393,7 +428,7 @@ impl Run<'_> {
     }
 
     /// Whether all are positive beyond doubt.
-    #[inline]
+    #[inline(always)]
     fn all_positive(&self) -> bool {
         let run = self.trimmed();
         let mut certain = true;
@@ -405,7 +440,7 @@ impl Run<'_> {
     }
 
     /// Lowers `shapes` to those of these tets where they are worse, and `certain` to 0 where a sign is not.
-    #[inline]
+    #[inline(always)]
     fn measure(&self, shapes: &mut [f64], certain: &mut [f64]) {
         let run = self.trimmed();
         let (shapes, certain) = (&mut shapes[..self.count], &mut certain[..self.count]);
