@@ -115,6 +115,10 @@ pub struct Generate {
     /// Pieces of each coarse edge: makes N³ tets of one; a number beside 1, 2, 4, 8, … of levels
     #[arg(long, value_name = "N", conflicts_with = "levels", value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_PIECES)))]
     pub pieces: Option<u32>,
+    /// Memory for fine vertices on each machine (bytes, 8e9 is understood) [default: what it has left]: where all do not
+    /// fit, those inside coarse tets are computed anew wherever they are needed
+    #[arg(long, value_name = "BYTES", value_parser = count)]
+    pub memory: Option<u64>,
     /// Sizes of the coarse mesh
     #[command(flatten)]
     pub size: SizeOptions,

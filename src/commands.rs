@@ -10,9 +10,9 @@ use tetmill::io::{self, Written, elmer};
 use tetmill::mesh::stream::MeshStream;
 use tetmill::pipeline::input::{self, InputSettings};
 use tetmill::pipeline::target::Outcome;
-use tetmill::pipeline::{CoarseSettings, GenerateSettings, Generated, Model, Wanted, generate};
+use tetmill::pipeline::{CoarseSettings, Disk, GenerateSettings, Generated, Model, Wanted, generate};
 use tetmill::progress::Progress;
-use tetmill::report::{MeshReport, PartitionReport, Report};
+use tetmill::report::{LevelReport, MeshReport, PartitionReport, Report};
 use tetmill::size::{Closeness, SizeSettings, file};
 use tetmill::{memory, picture, quality};
 
@@ -81,18 +81,23 @@ fn generate_on(comm: &dyn Communicator, options: &Generate, start: Instant) -> R
         .transpose();
     let model = agree(comm, model)?;
     let coarse = agree(comm, coarse_settings(&options.size, first))?;
-    let settings = GenerateSettings { coarse, wanted: wanted(options) };
-    let made = generate(comm, model.as_ref(), &settings, &progress)?;
     let target = options.output.clone().unwrap_or_else(|| {
         options.input.files[0].with_extension("").file_name().map_or_else(|| "mesh".into(), PathBuf::from)
     });
+    let disk = Some(disk_for(&options.format, &target));
+    let settings = GenerateSettings { coarse, wanted: wanted(options), memory: options.memory, disk };
+    let made = generate(comm, model.as_ref(), &settings, &progress)?;
     let written = progress.stage("write", || write_all(comm, options, &made, &target))?;
     if options.check && options.format.contains(&Format::Elmer) {
         let checked = if first { progress.stage("read back", || check_written(&target)) } else { Ok(()) };
         agree(comm, checked)?;
     }
-    if let Some(file) = &options.picture {
-        draw(comm, &made.part, options.cut, file)?;
+    match &options.picture {
+        Some(_) if !made.part.keeps_all() => {
+            progress.note("note: no picture is drawn of a mesh whose coordinates do not fit the memory")
+        }
+        Some(file) => draw(comm, &made.part, options.cut, file)?,
+        None => {}
     }
     let shared = shared_vertices(comm, &made.part)?;
     let memory = total_memory(comm)?;
@@ -167,6 +172,23 @@ fn wanted(options: &Generate) -> Wanted {
 
 fn wanted_count(options: &Generate) -> Option<u64> {
     options.elements.or(options.size.coarse)
+}
+
+/// What the formats will take on the disk: for each vertex, tet and boundary triangle about what short lines, or the arrays, have.
+fn disk_for(formats: &[Format], folder: &Path) -> Disk {
+    let bytes = |format: &Format| match format {
+        Format::Elmer => [60, 40, 40],
+        Format::Vtu => [32, 40, 20],
+        Format::Geomview => [0, 0, 30],
+        Format::None => [0; 3],
+    };
+    let sum = |sum: [u64; 3], more: [u64; 3]| [0, 1, 2].map(|k| sum[k] + more[k]);
+    Disk {
+        folder: std::path::absolute(folder).unwrap_or_else(|_| folder.to_path_buf()),
+        bytes: formats.iter().map(bytes).fold([0; 3], sum),
+        // Elmer's ids are 32-bit integers.
+        most: formats.contains(&Format::Elmer).then_some(i32::MAX as u64),
+    }
 }
 
 /// **Collective.** Writes each format.
@@ -255,6 +277,7 @@ fn summary(model: &Model, input: &str, made: &Generated, ranks: u32, shared: u64
         coarse: coarse.report.clone(),
         wanted: coarse.outcome,
         mesh: MeshReport::new(&made.check, made.checksum.to_string()),
+        quality_by_level: made.levels.iter().map(LevelReport::new).collect(),
         partition: PartitionReport::new(&coarse.partition, shared),
         periodic: made.periodic,
         stages: Vec::new(),
@@ -315,7 +338,8 @@ pub fn run_mesh(options: &MeshFile) -> Result<(), Failure> {
         Some(tets) => Wanted::Coarse { tets, pieces: 1 },
         None => Wanted::Sizes { pieces: 1 },
     };
-    let settings = GenerateSettings { coarse: coarse_settings(&options.size, true)?, wanted };
+    let settings =
+        GenerateSettings { coarse: coarse_settings(&options.size, true)?, wanted, memory: None, disk: None };
     let made = generate(&comm, Some(&model), &settings, &progress)?;
     let written = progress.stage("write", || io::serial::write(&made.part, &made.names, &options.output))?;
     if let Some(file) = &options.picture {

@@ -4,6 +4,7 @@ use crate::check::PartReport;
 use crate::io::Written;
 use crate::partition::Metrics;
 use crate::periodic::Checked;
+use crate::pipeline::generate::Level;
 use crate::pipeline::target::Outcome;
 use crate::pipeline::{CoarseReport, Entities};
 use crate::progress::Stage;
@@ -33,6 +34,8 @@ pub struct Report {
     pub wanted: Option<Outcome>,
     /// The fine mesh.
     pub mesh: MeshReport,
+    /// The shapes of all tets at each level of refinement, from the coarse mesh to the fine one.
+    pub quality_by_level: Vec<LevelReport>,
     /// The partition.
     pub partition: PartitionReport,
     /// What became of periodic faces; null if there are none.
@@ -94,6 +97,47 @@ impl MeshReport {
             largest_dihedral: shape.map_or(0.0, |s| s.largest_angle.value),
             furthest_off_surface: check.furthest.map(|f| f.distance),
             checksum,
+        }
+    }
+}
+
+/// The shapes of the tets of one level of refinement, all of them measured.
+#[derive(Clone, Debug, Serialize)]
+pub struct LevelReport {
+    /// Pieces of each coarse edge.
+    pub pieces: u32,
+    /// Tets.
+    pub tets: u64,
+    /// The least mean ratio.
+    pub worst_mean_ratio: f64,
+    /// The 1st percentile of the mean ratios.
+    pub first_percentile_mean_ratio: f64,
+    /// The mean of the mean ratios.
+    pub mean_mean_ratio: f64,
+    /// The smallest dihedral angle, degrees.
+    pub smallest_dihedral: f64,
+    /// The 1st percentile of each tet's smallest dihedral angle, degrees.
+    pub first_percentile_dihedral: f64,
+    /// The largest dihedral angle, degrees.
+    pub largest_dihedral: f64,
+    /// The 99th percentile of each tet's largest dihedral angle, degrees.
+    pub last_percentile_dihedral: f64,
+}
+
+impl LevelReport {
+    /// Of a level.
+    pub fn new(level: &Level) -> Self {
+        let shape = &level.shape;
+        Self {
+            pieces: level.pieces,
+            tets: level.tets,
+            worst_mean_ratio: shape.worst_ratio.value,
+            first_percentile_mean_ratio: shape.ratio_percentile(0.01),
+            mean_mean_ratio: shape.mean_ratio(),
+            smallest_dihedral: shape.smallest_angle.value,
+            first_percentile_dihedral: shape.smallest_angle_percentile(0.01),
+            largest_dihedral: shape.largest_angle.value,
+            last_percentile_dihedral: shape.largest_angle_percentile(0.99),
         }
     }
 }
@@ -227,6 +271,14 @@ impl fmt::Display for Report {
             mesh.largest_dihedral,
             mesh.first_percentile_dihedral
         )?;
+        if self.quality_by_level.len() > 1 {
+            let worst: Vec<String> = self
+                .quality_by_level
+                .iter()
+                .map(|l| format!("{:.1}° {:.1}°", l.smallest_dihedral, l.first_percentile_dihedral))
+                .collect();
+            writeln!(f, "by level   smallest dihedral angle and 1st percentile: {}", worst.join(", "))?;
+        }
         write!(f, "checked    every tet positive; volume {}", mesh.volume)?;
         if let Some(distance) = mesh.furthest_off_surface {
             write!(f, "; boundary vertices within {distance:.1e} of their patch")?;

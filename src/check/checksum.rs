@@ -80,9 +80,9 @@ pub fn checksum(stream: &dyn MeshStream) -> Checksum {
 fn of_vertices(stream: &dyn MeshStream, index: usize) -> Checksum {
     let block = stream.vertex_block(index);
     let mut sum = 0_u64;
-    for (local, id) in block.local.clone().zip(block.ids()) {
+    for (point, id) in stream.vertex_points(index).iter().zip(block.ids()) {
         if block.owner(id, stream.rank()) == stream.rank() {
-            let [x, y, z] = stream.points()[local as usize].map(f64::to_bits);
+            let [x, y, z] = point.map(f64::to_bits);
             sum = sum.wrapping_add(hash([id, x, y, z]));
         }
     }

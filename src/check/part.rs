@@ -88,7 +88,7 @@ fn check_vertices(stream: &dyn MeshStream, settings: &Settings) -> PartReport {
             let block = stream.vertex_block(index);
             let next = match index + 1 {
                 next if next < blocks => stream.vertex_block(next).local.start,
-                _ => stream.points().len() as u32,
+                _ => stream.counts().vertices as u32,
             };
             if block.local.end != next || index == 0 && block.local.start != 0 {
                 let at = u64::from(block.local.end);
@@ -156,7 +156,7 @@ fn check_chunk(
 ) -> (Range<u64>, PartReport) {
     let mut report = PartReport::default();
     let mut covered: Option<Range<u64>> = None;
-    let all_points = stream.points();
+    let vertices = stream.counts().vertices as u32;
     let mut body = None;
     for index in blocks {
         let Scratch { block, points, boundary, batch, shapes } = &mut *scratch;
@@ -171,10 +171,8 @@ fn check_chunk(
             flush(batch, shapes, body, settings, &mut report);
             body = tets.body;
         }
-        points.clear();
-        let missing = |vertex: u32| vertex as usize >= all_points.len();
-        let point = |&vertex: &u32| all_points.get(vertex as usize).copied().unwrap_or([f64::NAN; 3]);
-        points.extend(block.vertices.iter().map(point));
+        stream.block_points(block, points);
+        let missing = |vertex: u32| vertex >= vertices;
         let all_there = !block.vertices.iter().any(|&vertex| missing(vertex));
         for (id, tet) in (tets.first_id..).zip(&tets.tets) {
             if let Some(vertex) =

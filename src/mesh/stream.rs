@@ -14,6 +14,7 @@
 use super::{GlobalId, Rank};
 use crate::periodic::Link;
 use csg::{BodyId, PatchId};
+use std::borrow::Cow;
 use std::ops::Range;
 
 /// Counts of one part or of the whole mesh.
@@ -98,7 +99,8 @@ pub trait MeshStream: Sync {
     fn counts(&self) -> Counts;
     /// Counts of the whole mesh (each vertex once; `boundary` as the sum over patches, each triangle once).
     fn totals(&self) -> Counts;
-    /// Coordinates by local vertex index.
+    /// Coordinates by local vertex index. A part too large to keep all has those of its first vertices here, all on
+    /// boundaries and interfaces among them: [`vertex_points`](Self::vertex_points) and [`block_points`](Self::block_points) give the others.
     fn points(&self) -> &[[f64; 3]];
     /// The number of vertex blocks; together they cover each local vertex once, in ascending order.
     fn vertex_blocks(&self) -> usize;
@@ -130,6 +132,18 @@ pub trait MeshStream: Sync {
     fn block_ids(&self, block: &LocalBlock, ids: &mut Vec<GlobalId>) {
         ids.clear();
         ids.extend(block.vertices.iter().map(|&vertex| self.vertex_id(vertex)));
+    }
+    /// Replaces `points` by the coordinates of the vertices of a block of this stream; of a vertex that does not exist they are no numbers.
+    fn block_points(&self, block: &LocalBlock, points: &mut Vec<[f64; 3]>) {
+        let all = self.points();
+        let point = |&vertex: &u32| all.get(vertex as usize).copied().unwrap_or([f64::NAN; 3]);
+        points.clear();
+        points.extend(block.vertices.iter().map(point));
+    }
+    /// The coordinates of the vertices of one vertex block.
+    fn vertex_points(&self, index: usize) -> Cow<'_, [[f64; 3]]> {
+        let local = self.vertex_block(index).local;
+        Cow::Borrowed(&self.points()[local.start as usize..local.end as usize])
     }
     /// The number of boundary blocks.
     fn boundary_blocks(&self) -> usize;

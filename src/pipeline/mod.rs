@@ -8,6 +8,7 @@ pub mod input;
 pub mod mend;
 pub mod model;
 pub mod names;
+pub mod room;
 pub mod target;
 pub mod wanted;
 
@@ -16,4 +17,5 @@ pub use facet_model::FacetSolid;
 pub use generate::{GenerateSettings, Generated, generate};
 pub use model::{CsgModel, Entities, GivenMesh, Model};
 pub use names::names;
+pub use room::Disk;
 pub use wanted::Wanted;

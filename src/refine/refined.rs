@@ -1,15 +1,15 @@
 //! The refined part: coordinates kept, everything else computed as it is asked for.
 
-use super::diagonal::Diagonals;
 use super::lattice::{OCTAHEDRON, UPRIGHT, UPSIDE_DOWN, corner_place, octahedron_child_on_face};
 use super::numbering::{Entity, Numbering, ascending};
-use super::snap::Coordinates;
+use super::tet::{Inside, Lattices};
 use crate::dist::{BoundaryFace, DistMesh};
 use crate::mesh::stream::{
     BoundaryBlock, Counts, LocalBlock, MeshStream, NO_TET, SingularTags, TetBlock, VertexBlock,
 };
 use crate::mesh::{Class, EdgeId, GlobalId, Rank, TET_EDGES, TET_FACES, TetId};
 use crate::periodic::{Link, PeriodicMap};
+use std::borrow::Cow;
 use std::sync::Arc;
 
 /// One rank's part of a refined mesh: see [`refine`](super::refine()).
@@ -20,8 +20,7 @@ use std::sync::Arc;
 pub struct RefinedMesh {
     coarse: DistMesh,
     numbering: Numbering,
-    points: Box<[Coordinates]>,
-    diagonals: Diagonals,
+    inside: Inside,
     periodic: Arc<PeriodicMap>,
     singular: csg::Singular,
 }
@@ -39,21 +38,8 @@ impl std::fmt::Debug for RefinedMesh {
 }
 
 impl RefinedMesh {
-    pub(super) fn new(
-        coarse: DistMesh,
-        numbering: Numbering,
-        points: Box<[Coordinates]>,
-        diagonals: Diagonals,
-    ) -> Self {
-        assert_eq!(points.len(), numbering.vertices() as usize, "one point for each fine vertex");
-        Self {
-            coarse,
-            numbering,
-            points,
-            diagonals,
-            periodic: Arc::default(),
-            singular: csg::Singular::default(),
-        }
+    pub(super) fn new(coarse: DistMesh, numbering: Numbering, inside: Inside) -> Self {
+        Self { coarse, numbering, inside, periodic: Arc::default(), singular: csg::Singular::default() }
     }
 
     /// The same with what is periodic in the whole coarse mesh.
@@ -84,8 +70,8 @@ impl RefinedMesh {
 
     /// Bytes kept beside the coarse mesh.
     pub fn bytes(&self) -> u64 {
-        let coordinates = size_of_val(&*self.points) as u64;
-        coordinates + (self.coarse.tets.len() * self.diagonals.bytes_per_tet()) as u64
+        let coordinates = size_of_val(&*self.inside.points) as u64;
+        coordinates + (self.coarse.tets.len() * self.inside.diagonals.bytes_per_tet()) as u64
     }
 
     /// The number of fine tets of this part.
@@ -98,7 +84,7 @@ impl RefinedMesh {
         let lattice = self.numbering.lattice();
         let vertices = self.coarse.tets[tet.index()];
         let corners = ascending(TET_FACES[face], |corner| vertices[corner].0);
-        let diagonals = self.diagonals.of_tet(tet.0);
+        let diagonals = self.inside.diagonals.of_tet(tet.0);
         let first = u64::from(tet.0) * u64::from(lattice.children());
         for_each_face_child(lattice.n(), |j, k, upright| {
             let child = if upright {
@@ -201,7 +187,7 @@ impl MeshStream for RefinedMesh {
     }
 
     fn points(&self) -> &[[f64; 3]] {
-        &self.points
+        &self.inside.points
     }
 
     fn vertex_blocks(&self) -> usize {
@@ -258,6 +244,25 @@ impl MeshStream for RefinedMesh {
         };
         ids.clear();
         ids.extend(block.vertices.iter().map(id));
+    }
+
+    fn block_points(&self, block: &LocalBlock, points: &mut Vec<[f64; 3]>) {
+        if !self.keeps_all() {
+            let tet = block.tets.first_local / u64::from(self.numbering.lattice().children());
+            self.lattices().all(TetId(tet as u32), self.inside.flat[tet as usize], points);
+            return;
+        }
+        points.clear();
+        points.extend(block.vertices.iter().map(|&vertex| self.inside.points[vertex as usize]));
+    }
+
+    fn vertex_points(&self, index: usize) -> Cow<'_, [[f64; 3]]> {
+        let entity = self.numbering.block(index);
+        if entity.dimension == 3 && !self.keeps_all() {
+            return self.lattices().inside(TetId(entity.id), self.inside.flat[entity.id as usize]).into();
+        }
+        let local = self.numbering.inside(entity);
+        Cow::Borrowed(&self.inside.points[local.start as usize..local.end as usize])
     }
 
     fn boundary_blocks(&self) -> usize {
@@ -322,11 +327,20 @@ impl MeshStream for RefinedMesh {
 }
 
 impl RefinedMesh {
+    /// Whether all coordinates are kept, see [`Keep`](super::Keep).
+    pub fn keeps_all(&self) -> bool {
+        self.inside.points.len() == self.numbering.vertices() as usize
+    }
+
+    fn lattices(&self) -> Lattices<'_> {
+        Lattices { mesh: &self.coarse, numbering: &self.numbering, points: &self.inside.points }
+    }
+
     /// The children of a coarse tet by the points of its lattice.
     fn children(&self, tet: usize, block: &mut TetBlock) {
         let lattice = self.numbering.lattice();
         let children = lattice.children();
-        let diagonals = self.diagonals.of_tet(tet as u32);
+        let diagonals = self.inside.diagonals.of_tet(tet as u32);
         block.tets.clear();
         block.tets.reserve(children as usize);
         for (c, d, cells) in lattice.rows() {

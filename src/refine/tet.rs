@@ -20,21 +20,36 @@ use crate::mesh::{GlobalId, TetId};
 use rayon::iter::Either;
 use rayon::prelude::*;
 
-/// Fills the points inside the tets, chooses the diagonals, and checks every child. Also returns the coarse tets with
-/// children that are not positive.
+/// What refinement makes of the inside of the coarse tets.
+#[derive(Clone)]
+pub struct Inside {
+    /// The fine vertices that are kept.
+    pub points: Box<[Coordinates]>,
+    /// The diagonals of the octahedra.
+    pub diagonals: Diagonals,
+    /// Whether a coarse tet's lattice is an affine one.
+    pub flat: Vec<bool>,
+}
+
+/// Fills the points inside the tets, as far as they are kept, chooses the diagonals, and checks every child. Also returns the coarse
+/// tets with children that are not positive.
 pub fn fill(
     mesh: &DistMesh,
     projector: &Projector,
     numbering: &Numbering,
     mut points: Box<[Coordinates]>,
     settings: &Settings,
-) -> (Box<[Coordinates]>, Diagonals, Vec<BadTet>) {
+) -> (Inside, Vec<BadTet>) {
     let lattice = numbering.lattice();
     let mut diagonals = Diagonals::new(mesh.tets.len(), lattice.octahedra());
     let bytes_per_tet = diagonals.bytes_per_tet();
     let (before, inside) = points.split_at_mut(numbering.bases()[2]);
+    let flat: Vec<bool> =
+        (0..mesh.tets.len()).map(|tet| is_flat(mesh, projector, &settings.bends, TetId::new(tet))).collect();
     let insides = match lattice.tet_points() as usize {
-        0 => Either::Left((0..mesh.tets.len()).into_par_iter().map(|_| &mut [] as &mut [Coordinates])),
+        _ if inside.is_empty() => {
+            Either::Left((0..mesh.tets.len()).into_par_iter().map(|_| &mut [] as &mut [Coordinates]))
+        }
         size => Either::Right(inside.par_chunks_mut(size)),
     };
     let plan = Plan::new(lattice);
@@ -42,12 +57,13 @@ pub fn fill(
         let tet = TetId::new(tet);
         block.gather(mesh, numbering, tet, before);
         let corners = mesh.tets[tet.index()].map(|v| before[v.index()]);
-        let flat = is_flat(mesh, projector, &settings.bends, tet);
+        let flat = flat[tet.index()];
         block.fill_odd_part(&plan, &corners, flat);
         block.bad.clear();
         let cut = if flat { Cut::Evenly(diagonal::best_of_tet(&corners)) } else { Cut::EachBest };
         wide(FillAndCut { block, plan: &plan, cut, bytes });
-        block.scatter(lattice, inside);
+        let kept = inside.iter_mut();
+        kept.zip(block.inside(lattice)).for_each(|(kept, point)| *kept = point);
         block.verdict(mesh.tet_ids[tet.index()], lattice, settings.described)
     };
     let bad: Vec<BadTet> = insides
@@ -56,7 +72,41 @@ pub fn fill(
         .map_init(|| Block::new(lattice), fill_one)
         .flatten_iter()
         .collect();
-    (points, diagonals, bad)
+    (Inside { points, diagonals, flat }, bad)
+}
+
+/// The lattice points of a coarse tet, from those on its boundary, the same bits as [`fill`] made.
+pub struct Lattices<'a> {
+    /// The part.
+    pub mesh: &'a DistMesh,
+    /// Its numbering.
+    pub numbering: &'a Numbering,
+    /// The fine vertices, at least those in coarse vertices, edges and faces.
+    pub points: &'a [Coordinates],
+}
+
+impl Lattices<'_> {
+    fn block(&self, tet: TetId, flat: bool) -> Block {
+        let lattice = self.numbering.lattice();
+        let (mut block, plan) = (Block::new(lattice), Plan::new(lattice));
+        block.gather(self.mesh, self.numbering, tet, self.points);
+        let corners = self.mesh.tets[tet.index()].map(|v| self.points[v.index()]);
+        block.fill_odd_part(&plan, &corners, flat);
+        wide(Fill { block: &mut block, plan: &plan });
+        block
+    }
+
+    /// Replaces `points` by all points of the lattice, in its order.
+    pub fn all(&self, tet: TetId, flat: bool, points: &mut Vec<Coordinates>) {
+        let block = self.block(tet, flat);
+        points.clear();
+        points.extend((0..block.ids.len()).map(|i| block.coordinates(i)));
+    }
+
+    /// The points inside the tet, in the order of their ids.
+    pub fn inside(&self, tet: TetId, flat: bool) -> Vec<Coordinates> {
+        self.block(tet, flat).inside(self.numbering.lattice()).collect()
+    }
 }
 
 /// A coarse tet with children that are not positive.
@@ -127,6 +177,21 @@ enum Cut {
     Evenly(u8),
     /// Each along its own best.
     EachBest,
+}
+
+/// Fills the inside of a block, in wide registers.
+struct Fill<'a> {
+    block: &'a mut Block,
+    plan: &'a Plan,
+}
+
+impl Wide for Fill<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        self.block.fill_inside(self.plan);
+    }
 }
 
 /// Fills the inside of a block and cuts its octahedra, in wide registers.
@@ -264,15 +329,15 @@ impl Block {
         }
     }
 
-    /// Writes the points inside the tet.
-    fn scatter(&self, lattice: Lattice, inside: &mut [Coordinates]) {
-        let [x, y, z] = &self.axes;
-        let mut out = inside.iter_mut();
-        for (first, count) in lattice.interior_rows() {
-            for i in first as usize..(first + count) as usize {
-                *out.next().expect("as many points as interior rows have") = [x[i], y[i], z[i]];
-            }
-        }
+    /// The points inside the tet, in the order of their ids.
+    fn inside(&self, lattice: Lattice) -> impl Iterator<Item = Coordinates> {
+        let row = |(first, count)| (first as usize..(first + count) as usize).map(|i| self.coordinates(i));
+        lattice.interior_rows().flat_map(row)
+    }
+
+    #[inline]
+    fn coordinates(&self, i: usize) -> Coordinates {
+        [self.axes[0][i], self.axes[1][i], self.axes[2][i]]
     }
 
     /// Cuts all octahedra along one diagonal and checks the children.
@@ -348,7 +413,7 @@ impl Block {
     }
 
     fn point(&self, i: usize) -> Point {
-        Point::new(self.axes[0][i], self.axes[1][i], self.axes[2][i])
+        Point::from(self.coordinates(i))
     }
 
     /// The corners of the children with these corner codes in the first `count` cells of a row.
