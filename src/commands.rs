@@ -12,6 +12,7 @@ use tetmill::pipeline::input::{self, InputSettings};
 use tetmill::pipeline::target::Outcome;
 use tetmill::pipeline::{CoarseSettings, Disk, GenerateSettings, Generated, Model, Wanted, generate};
 use tetmill::progress::Progress;
+use tetmill::refine::census;
 use tetmill::report::{LevelReport, MeshReport, PartitionReport, Report};
 use tetmill::size::{Closeness, SizeSettings, file};
 use tetmill::{memory, picture, quality};
@@ -69,8 +70,8 @@ fn set_threads(threads: Option<u32>) -> Result<(), Failure> {
         .map_err(|error| Failure::new(Status::Resources, format!("cannot start {threads} threads: {error}")))
 }
 
-/// Stages that a progress bar counts: read, mesh, partition, distribute, refine, check, write.
-const STAGES: u64 = 7;
+/// Stages that a progress bar counts: read, mesh, partition, distribute, levels, refine, check, write.
+const STAGES: u64 = 8;
 
 /// **Collective.**
 fn generate_on(comm: &dyn Communicator, options: &Generate, start: Instant) -> Result<(), Failure> {
@@ -99,7 +100,7 @@ fn generate_on(comm: &dyn Communicator, options: &Generate, start: Instant) -> R
         Some(file) => draw(comm, &made.part, options.cut, file)?,
         None => {}
     }
-    let shared = shared_vertices(comm, &made.part)?;
+    let shared = (shared_vertices(comm, &made.part)?, owner_imbalance(comm, &made)?);
     let memory = total_memory(comm)?;
     let Some(model) = model else { return Ok(()) };
     let mut report = summary(&model, &name_of(&options.input), &made, comm.size(), shared);
@@ -254,6 +255,14 @@ fn shared_vertices(comm: &dyn Communicator, part: &dyn MeshStream) -> Result<u64
     Ok(comm.all_reduce_sum_u64([mine])?[0])
 }
 
+/// **Collective.** The largest share of its vertices that a part owns, over the mean.
+fn owner_imbalance(comm: &dyn Communicator, made: &Generated) -> Result<f64, Failure> {
+    let share = census(made.part.coarse(), made.pieces).owned_share();
+    let all = comm.all_gather_one(share)?;
+    let mean = all.iter().sum::<f64>() / all.len() as f64;
+    Ok(all.into_iter().fold(0.0, f64::max) / mean)
+}
+
 /// **Collective.** Peak memory: of this process for in-process ranks, of all processes under MPI.
 fn total_memory(comm: &dyn Communicator) -> Result<Option<u64>, Failure> {
     let mine = memory::peak_bytes();
@@ -264,7 +273,13 @@ fn total_memory(comm: &dyn Communicator) -> Result<Option<u64>, Failure> {
     Ok((sum > 0).then_some(sum))
 }
 
-fn summary(model: &Model, input: &str, made: &Generated, ranks: u32, shared: u64) -> Report {
+fn summary(
+    model: &Model,
+    input: &str,
+    made: &Generated,
+    ranks: u32,
+    (shared, owner_imbalance): (u64, f64),
+) -> Report {
     let coarse = made.coarse.as_ref().expect("rank 0 made the coarse mesh");
     Report {
         version: env!("CARGO_PKG_VERSION").into(),
@@ -278,7 +293,7 @@ fn summary(model: &Model, input: &str, made: &Generated, ranks: u32, shared: u64
         wanted: coarse.outcome,
         mesh: MeshReport::new(&made.check, made.checksum.to_string()),
         quality_by_level: made.levels.iter().map(LevelReport::new).collect(),
-        partition: PartitionReport::new(&coarse.partition, shared),
+        partition: PartitionReport::new(&coarse.partition, shared, owner_imbalance),
         periodic: made.periodic,
         stages: Vec::new(),
         seconds: 0.0,
@@ -345,7 +360,7 @@ pub fn run_mesh(options: &MeshFile) -> Result<(), Failure> {
     if let Some(file) = &options.picture {
         draw(&comm, &made.part, options.cut, file)?;
     }
-    let mut report = summary(&model, &name_of(&options.input), &made, 1, 0);
+    let mut report = summary(&model, &name_of(&options.input), &made, 1, (0, 1.0));
     report.stages = progress.finish();
     report.seconds = start.elapsed().as_secs_f64();
     report.peak_memory = memory::peak_bytes();

@@ -157,11 +157,13 @@ pub struct PartitionReport {
     pub pieces: u64,
     /// Fine vertices in more than one part, each once.
     pub shared_vertices: u64,
+    /// The largest share of its fine vertices that a part owns over the mean of all parts.
+    pub owner_imbalance: f64,
 }
 
 impl PartitionReport {
     /// From the metrics of a partition.
-    pub fn new(metrics: &Metrics, shared_vertices: u64) -> Self {
+    pub fn new(metrics: &Metrics, shared_vertices: u64, owner_imbalance: f64) -> Self {
         Self {
             method: metrics.method.to_string(),
             parts: metrics.parts,
@@ -169,6 +171,7 @@ impl PartitionReport {
             edge_cut: metrics.edge_cut as u64,
             pieces: metrics.pieces as u64,
             shared_vertices,
+            owner_imbalance,
         }
     }
 }

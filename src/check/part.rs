@@ -53,12 +53,14 @@ pub fn check(
     settings: &Settings,
 ) -> Result<PartReport, CommError> {
     let mine = check_part(stream, projector, settings);
-    let bytes = serde_json::to_vec(&mine).expect("plain data with text keys");
-    let all = comm.all_gather_bytes(&bytes)?;
-    // Its own report too goes through text, so that all ranks merge the same numbers.
-    let all = all.iter().map(|bytes| serde_json::from_slice(bytes).expect("what this program wrote"));
-    let merged = all.reduce(|a: PartReport, b| a.merged(b, settings.described));
-    let mut report = merged.unwrap_or_default();
+    let text = |report: &PartReport| serde_json::to_vec(report).expect("plain data with text keys");
+    let read = |bytes: &Vec<u8>| serde_json::from_slice(bytes).expect("what this program wrote");
+    // To one rank and back: a thousand ranks that got a thousand reports each would be gigabytes.
+    let all = comm.gather_bytes(0, &text(&mine))?;
+    let merged = all.iter().map(read).reduce(|a: PartReport, b| a.merged(b, settings.described));
+    let mut bytes = merged.as_ref().map(text).unwrap_or_default();
+    comm.broadcast_bytes(0, &mut bytes)?;
+    let mut report: PartReport = read(&bytes);
     let totals = stream.totals();
     let found = [report.vertices, report.tets, report.boundary];
     let stated = [totals.vertices, totals.tets, totals.boundary];

@@ -109,3 +109,27 @@ pub(super) fn what_fits(
     ));
     Ok(Keep::Boundary)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::refine::fixtures::{cube, whole};
+
+    #[test]
+    fn what_the_disk_cannot_hold_is_refused_with_the_numbers() {
+        let part = whole(&cube(1, false).mesh);
+        let refusal = |bytes, most| {
+            let disk = Disk { folder: std::env::temp_dir().join("not/there/yet"), bytes, most };
+            refuse_without_disk(0, &part, 2, Some(&disk)).err()
+        };
+        assert!(refusal([1, 1, 1], None).is_none());
+        let refused = refusal([0, 1 << 50, 0], None).expect("6·8 tets of 2⁵⁰ bytes are 54 PB");
+        assert_eq!(refused.status, Status::Resources);
+        assert!(refused.to_string().contains("take 54043195.5 GB or more"), "{refused}");
+        assert!(refusal([0; 3], Some(48)).is_none());
+        assert!(
+            refusal([0; 3], Some(47))
+                .is_some_and(|refused| refused.to_string().contains("48 tets with 27 vertices"))
+        );
+    }
+}
