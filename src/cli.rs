@@ -4,7 +4,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
 use tetmill::improve::Effort;
 use tetmill::picture::Cut;
-use tetmill::pipeline::generate::MOST_LEVELS;
+use tetmill::refine::lattice::MAX_PIECES;
 use tetmill::size::Preset;
 
 /// From solid geometry to partitioned tetrahedral meshes, in parallel.
@@ -106,12 +106,19 @@ pub struct Generate {
     /// Number of threads in all [default: the cores]
     #[arg(short, long, value_name = "THREADS", value_parser = clap::value_parser!(u32).range(1..))]
     pub threads: Option<u32>,
-    /// Number of tets wanted in all (1e9 is understood): chooses --coarse and --levels
-    #[arg(short, long, value_name = "COUNT", value_parser = count, conflicts_with_all = ["coarse", "levels"])]
+    /// Number of tets wanted in all (1e9 is understood): COUNT to 1.3 COUNT; chooses --coarse and --pieces
+    #[arg(short, long, value_name = "COUNT", value_parser = count, conflicts_with_all = ["coarse", "levels", "pieces"])]
     pub elements: Option<u64>,
     /// Levels of uniform refinement: each makes eight tets of one
-    #[arg(long, value_name = "L", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=i64::from(MOST_LEVELS)))]
+    #[arg(long, value_name = "L", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=i64::from(MAX_PIECES.ilog2())))]
     pub levels: u32,
+    /// Pieces of each coarse edge: makes N³ tets of one; a number beside 1, 2, 4, 8, … of levels
+    #[arg(long, value_name = "N", conflicts_with = "levels", value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_PIECES)))]
+    pub pieces: Option<u32>,
+    /// Memory for fine vertices on each machine (bytes, 8e9 is understood) [default: what it has left]: where all do not
+    /// fit, those inside coarse tets are computed anew wherever they are needed
+    #[arg(long, value_name = "BYTES", value_parser = count)]
+    pub memory: Option<u64>,
     /// Sizes of the coarse mesh
     #[command(flatten)]
     pub size: SizeOptions,

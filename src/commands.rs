@@ -10,9 +10,10 @@ use tetmill::io::{self, Written, elmer};
 use tetmill::mesh::stream::MeshStream;
 use tetmill::pipeline::input::{self, InputSettings};
 use tetmill::pipeline::target::Outcome;
-use tetmill::pipeline::{CoarseSettings, GenerateSettings, Generated, Model, Wanted, generate};
+use tetmill::pipeline::{CoarseSettings, Disk, GenerateSettings, Generated, Model, Wanted, generate};
 use tetmill::progress::Progress;
-use tetmill::report::{MeshReport, PartitionReport, Report};
+use tetmill::refine::census;
+use tetmill::report::{LevelReport, MeshReport, PartitionReport, Report};
 use tetmill::size::{Closeness, SizeSettings, file};
 use tetmill::{memory, picture, quality};
 
@@ -69,8 +70,8 @@ fn set_threads(threads: Option<u32>) -> Result<(), Failure> {
         .map_err(|error| Failure::new(Status::Resources, format!("cannot start {threads} threads: {error}")))
 }
 
-/// Stages that a progress bar counts: read, mesh, partition, distribute, refine, check, write.
-const STAGES: u64 = 7;
+/// Stages that a progress bar counts: read, mesh, partition, distribute, levels, refine, check, write.
+const STAGES: u64 = 8;
 
 /// **Collective.**
 fn generate_on(comm: &dyn Communicator, options: &Generate, start: Instant) -> Result<(), Failure> {
@@ -81,20 +82,25 @@ fn generate_on(comm: &dyn Communicator, options: &Generate, start: Instant) -> R
         .transpose();
     let model = agree(comm, model)?;
     let coarse = agree(comm, coarse_settings(&options.size, first))?;
-    let settings = GenerateSettings { coarse, wanted: wanted(options) };
-    let made = generate(comm, model.as_ref(), &settings, &progress)?;
     let target = options.output.clone().unwrap_or_else(|| {
         options.input.files[0].with_extension("").file_name().map_or_else(|| "mesh".into(), PathBuf::from)
     });
+    let disk = Some(disk_for(&options.format, &target));
+    let settings = GenerateSettings { coarse, wanted: wanted(options), memory: options.memory, disk };
+    let made = generate(comm, model.as_ref(), &settings, &progress)?;
     let written = progress.stage("write", || write_all(comm, options, &made, &target))?;
     if options.check && options.format.contains(&Format::Elmer) {
         let checked = if first { progress.stage("read back", || check_written(&target)) } else { Ok(()) };
         agree(comm, checked)?;
     }
-    if let Some(file) = &options.picture {
-        draw(comm, &made.part, options.cut, file)?;
+    match &options.picture {
+        Some(_) if !made.part.keeps_all() => {
+            progress.note("note: no picture is drawn of a mesh whose coordinates do not fit the memory")
+        }
+        Some(file) => draw(comm, &made.part, options.cut, file)?,
+        None => {}
     }
-    let shared = shared_vertices(comm, &made.part)?;
+    let shared = (shared_vertices(comm, &made.part)?, owner_imbalance(comm, &made)?);
     let memory = total_memory(comm)?;
     let Some(model) = model else { return Ok(()) };
     let mut report = summary(&model, &name_of(&options.input), &made, comm.size(), shared);
@@ -157,15 +163,33 @@ fn coarse_settings(options: &SizeOptions, reads: bool) -> Result<CoarseSettings,
 }
 
 fn wanted(options: &Generate) -> Wanted {
+    let pieces = options.pieces.unwrap_or(1 << options.levels);
     match (options.elements, options.size.coarse) {
         (Some(count), _) => Wanted::Elements(count),
-        (None, Some(tets)) => Wanted::Coarse { tets, levels: options.levels },
-        (None, None) => Wanted::Sizes { levels: options.levels },
+        (None, Some(tets)) => Wanted::Coarse { tets, pieces },
+        (None, None) => Wanted::Sizes { pieces },
     }
 }
 
 fn wanted_count(options: &Generate) -> Option<u64> {
     options.elements.or(options.size.coarse)
+}
+
+/// What the formats will take on the disk: for each vertex, tet and boundary triangle about what short lines, or the arrays, have.
+fn disk_for(formats: &[Format], folder: &Path) -> Disk {
+    let bytes = |format: &Format| match format {
+        Format::Elmer => [60, 40, 40],
+        Format::Vtu => [32, 40, 20],
+        Format::Geomview => [0, 0, 30],
+        Format::None => [0; 3],
+    };
+    let sum = |sum: [u64; 3], more: [u64; 3]| [0, 1, 2].map(|k| sum[k] + more[k]);
+    Disk {
+        folder: std::path::absolute(folder).unwrap_or_else(|_| folder.to_path_buf()),
+        bytes: formats.iter().map(bytes).fold([0; 3], sum),
+        // Elmer's ids are 32-bit integers.
+        most: formats.contains(&Format::Elmer).then_some(i32::MAX as u64),
+    }
 }
 
 /// **Collective.** Writes each format.
@@ -231,6 +255,14 @@ fn shared_vertices(comm: &dyn Communicator, part: &dyn MeshStream) -> Result<u64
     Ok(comm.all_reduce_sum_u64([mine])?[0])
 }
 
+/// **Collective.** The largest share of its vertices that a part owns, over the mean.
+fn owner_imbalance(comm: &dyn Communicator, made: &Generated) -> Result<f64, Failure> {
+    let share = census(made.part.coarse(), made.pieces).owned_share();
+    let all = comm.all_gather_one(share)?;
+    let mean = all.iter().sum::<f64>() / all.len() as f64;
+    Ok(all.into_iter().fold(0.0, f64::max) / mean)
+}
+
 /// **Collective.** Peak memory: of this process for in-process ranks, of all processes under MPI.
 fn total_memory(comm: &dyn Communicator) -> Result<Option<u64>, Failure> {
     let mine = memory::peak_bytes();
@@ -241,7 +273,13 @@ fn total_memory(comm: &dyn Communicator) -> Result<Option<u64>, Failure> {
     Ok((sum > 0).then_some(sum))
 }
 
-fn summary(model: &Model, input: &str, made: &Generated, ranks: u32, shared: u64) -> Report {
+fn summary(
+    model: &Model,
+    input: &str,
+    made: &Generated,
+    ranks: u32,
+    (shared, owner_imbalance): (u64, f64),
+) -> Report {
     let coarse = made.coarse.as_ref().expect("rank 0 made the coarse mesh");
     Report {
         version: env!("CARGO_PKG_VERSION").into(),
@@ -249,11 +287,13 @@ fn summary(model: &Model, input: &str, made: &Generated, ranks: u32, shared: u64
         entities: model.entities(),
         ranks,
         threads: rayon::current_num_threads(),
-        levels: made.levels,
+        levels: made.pieces.ilog2(),
+        pieces: made.pieces,
         coarse: coarse.report.clone(),
         wanted: coarse.outcome,
         mesh: MeshReport::new(&made.check, made.checksum.to_string()),
-        partition: PartitionReport::new(&coarse.partition, shared),
+        quality_by_level: made.levels.iter().map(LevelReport::new).collect(),
+        partition: PartitionReport::new(&coarse.partition, shared, owner_imbalance),
         periodic: made.periodic,
         stages: Vec::new(),
         seconds: 0.0,
@@ -310,16 +350,17 @@ pub fn run_mesh(options: &MeshFile) -> Result<(), Failure> {
     let progress = Progress::new(options.quiet, STAGES);
     let model = progress.stage("read", || read_sized_model(&options.input, &options.size, &progress))?;
     let wanted = match options.size.coarse {
-        Some(tets) => Wanted::Coarse { tets, levels: 0 },
-        None => Wanted::Sizes { levels: 0 },
+        Some(tets) => Wanted::Coarse { tets, pieces: 1 },
+        None => Wanted::Sizes { pieces: 1 },
     };
-    let settings = GenerateSettings { coarse: coarse_settings(&options.size, true)?, wanted };
+    let settings =
+        GenerateSettings { coarse: coarse_settings(&options.size, true)?, wanted, memory: None, disk: None };
     let made = generate(&comm, Some(&model), &settings, &progress)?;
     let written = progress.stage("write", || io::serial::write(&made.part, &made.names, &options.output))?;
     if let Some(file) = &options.picture {
         draw(&comm, &made.part, options.cut, file)?;
     }
-    let mut report = summary(&model, &name_of(&options.input), &made, 1, 0);
+    let mut report = summary(&model, &name_of(&options.input), &made, 1, (0, 1.0));
     report.stages = progress.finish();
     report.seconds = start.elapsed().as_secs_f64();
     report.peak_memory = memory::peak_bytes();

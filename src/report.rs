@@ -4,6 +4,7 @@ use crate::check::PartReport;
 use crate::io::Written;
 use crate::partition::Metrics;
 use crate::periodic::Checked;
+use crate::pipeline::generate::Level;
 use crate::pipeline::target::Outcome;
 use crate::pipeline::{CoarseReport, Entities};
 use crate::progress::Stage;
@@ -23,14 +24,18 @@ pub struct Report {
     pub ranks: u32,
     /// Threads in each process.
     pub threads: usize,
-    /// Levels of uniform refinement.
+    /// Levels of uniform refinement: the whole part of the logarithm of `pieces` to the base 2.
     pub levels: u32,
+    /// Pieces that each coarse edge was cut into.
+    pub pieces: u32,
     /// The coarse mesh.
     pub coarse: CoarseReport,
     /// Whether the wanted number of coarse tets was reached: `reached`, `least` or `jumped`; null if none was wanted.
     pub wanted: Option<Outcome>,
     /// The fine mesh.
     pub mesh: MeshReport,
+    /// The shapes of all tets at each level of refinement, from the coarse mesh to the fine one.
+    pub quality_by_level: Vec<LevelReport>,
     /// The partition.
     pub partition: PartitionReport,
     /// What became of periodic faces; null if there are none.
@@ -96,6 +101,47 @@ impl MeshReport {
     }
 }
 
+/// The shapes of the tets of one level of refinement, all of them measured.
+#[derive(Clone, Debug, Serialize)]
+pub struct LevelReport {
+    /// Pieces of each coarse edge.
+    pub pieces: u32,
+    /// Tets.
+    pub tets: u64,
+    /// The least mean ratio.
+    pub worst_mean_ratio: f64,
+    /// The 1st percentile of the mean ratios.
+    pub first_percentile_mean_ratio: f64,
+    /// The mean of the mean ratios.
+    pub mean_mean_ratio: f64,
+    /// The smallest dihedral angle, degrees.
+    pub smallest_dihedral: f64,
+    /// The 1st percentile of each tet's smallest dihedral angle, degrees.
+    pub first_percentile_dihedral: f64,
+    /// The largest dihedral angle, degrees.
+    pub largest_dihedral: f64,
+    /// The 99th percentile of each tet's largest dihedral angle, degrees.
+    pub last_percentile_dihedral: f64,
+}
+
+impl LevelReport {
+    /// Of a level.
+    pub fn new(level: &Level) -> Self {
+        let shape = &level.shape;
+        Self {
+            pieces: level.pieces,
+            tets: level.tets,
+            worst_mean_ratio: shape.worst_ratio.value,
+            first_percentile_mean_ratio: shape.ratio_percentile(0.01),
+            mean_mean_ratio: shape.mean_ratio(),
+            smallest_dihedral: shape.smallest_angle.value,
+            first_percentile_dihedral: shape.smallest_angle_percentile(0.01),
+            largest_dihedral: shape.largest_angle.value,
+            last_percentile_dihedral: shape.largest_angle_percentile(0.99),
+        }
+    }
+}
+
 /// The partition of the mesh.
 #[derive(Clone, Debug, Serialize)]
 pub struct PartitionReport {
@@ -111,11 +157,13 @@ pub struct PartitionReport {
     pub pieces: u64,
     /// Fine vertices in more than one part, each once.
     pub shared_vertices: u64,
+    /// The largest share of its fine vertices that a part owns over the mean of all parts.
+    pub owner_imbalance: f64,
 }
 
 impl PartitionReport {
     /// From the metrics of a partition.
-    pub fn new(metrics: &Metrics, shared_vertices: u64) -> Self {
+    pub fn new(metrics: &Metrics, shared_vertices: u64, owner_imbalance: f64) -> Self {
         Self {
             method: metrics.method.to_string(),
             parts: metrics.parts,
@@ -123,6 +171,7 @@ impl PartitionReport {
             edge_cut: metrics.edge_cut as u64,
             pieces: metrics.pieces as u64,
             shared_vertices,
+            owner_imbalance,
         }
     }
 }
@@ -166,6 +215,15 @@ fn grouped(count: u64) -> String {
     groups.join(" ")
 }
 
+/// How finely coarse edges were cut.
+fn cut_into(pieces: u32) -> String {
+    if pieces.is_power_of_two() {
+        format!("{} levels", pieces.ilog2())
+    } else {
+        format!("{pieces} pieces an edge")
+    }
+}
+
 /// Bytes in the unit that suits.
 fn sized(bytes: u64) -> String {
     let units = ["B", "kB", "MB", "GB", "TB"];
@@ -201,11 +259,11 @@ impl fmt::Display for Report {
         let mesh = &self.mesh;
         writeln!(
             f,
-            "mesh       {} tets, {} vertices, {} boundary triangles, {} levels",
+            "mesh       {} tets, {} vertices, {} boundary triangles, {}",
             grouped(mesh.tets),
             grouped(mesh.vertices),
             grouped(mesh.boundary),
-            self.levels
+            cut_into(self.pieces)
         )?;
         writeln!(
             f,
@@ -216,6 +274,14 @@ impl fmt::Display for Report {
             mesh.largest_dihedral,
             mesh.first_percentile_dihedral
         )?;
+        if self.quality_by_level.len() > 1 {
+            let worst: Vec<String> = self
+                .quality_by_level
+                .iter()
+                .map(|l| format!("{:.1}° {:.1}°", l.smallest_dihedral, l.first_percentile_dihedral))
+                .collect();
+            writeln!(f, "by level   smallest dihedral angle and 1st percentile: {}", worst.join(", "))?;
+        }
         write!(f, "checked    every tet positive; volume {}", mesh.volume)?;
         if let Some(distance) = mesh.furthest_off_surface {
             write!(f, "; boundary vertices within {distance:.1e} of their patch")?;

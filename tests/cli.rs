@@ -71,10 +71,52 @@ fn more_parts_than_tets_are_refused_with_both_numbers() {
 
 #[test]
 fn a_mesh_beyond_the_memory_is_refused_before_it_is_made() {
-    // 163 tets, 512 pieces an edge: 89 GB of coordinates, or 4 GB at 9 levels of one part's 32-bit ids.
-    let (output, said) = generate_text(BALL, &["--preset", "moderate", "--levels", "9", "-f", "none"]);
+    // 163 tets, 512 pieces an edge: 89 GB of coordinates, 1 GB of them on boundaries and interfaces of coarse tets.
+    let arguments = ["--preset", "moderate", "--levels", "9", "-f", "none", "--memory", "1e8"];
+    let (output, said) = generate_text(BALL, &arguments);
     assert_eq!(output.status.code(), Some(4), "{said}");
-    assert!(said.contains(" GB") || said.contains("more parts"), "{said}");
+    assert!(said.contains("this machine has 0.1 GB left"), "{said}");
+}
+
+#[test]
+fn more_tets_than_elmer_numbers_are_refused_before_they_are_made() {
+    let (output, said) = generate_text(BALL, &["--preset", "moderate", "--levels", "9", "-f", "elmer"]);
+    assert_eq!(output.status.code(), Some(4), "{said}");
+    assert!(said.contains("2147483647"), "{said}");
+}
+
+#[test]
+fn a_mesh_with_little_memory_is_the_same() {
+    let checksum = |memory: &str| {
+        let report = crate::common::report_of(
+            &own("dome"),
+            &["--levels", "4", "--preset", "very-coarse", "--memory", memory],
+        );
+        report["mesh"]["checksum"].as_str().unwrap().to_string()
+    };
+    assert_eq!(checksum("3e6"), checksum("1e10"));
+}
+
+#[test]
+fn a_wanted_number_in_all_is_reached_within_three_tenths_more() {
+    for (name, wanted) in [("nozzle", 6_000), ("bracket", 50_000), ("dome", 170_000), ("dome", 1_500_000)] {
+        let report = crate::common::report_of(&own(name), &["-e", &wanted.to_string(), "-n", "2"]);
+        let tets = report["mesh"]["tets"].as_u64().unwrap();
+        assert!((wanted..=wanted + 3 * wanted / 10).contains(&tets), "{name}: {wanted} wanted, {tets} made");
+        assert_eq!(report["wanted"], "reached");
+    }
+}
+
+#[test]
+fn the_quality_of_a_level_is_that_of_a_mesh_with_so_many_levels() {
+    let at = |pieces: &str| crate::common::report_of(&own("nozzle"), &["--pieces", pieces]);
+    let (six, twelve) = (at("6"), at("12"));
+    assert_eq!(six["coarse"]["tets"], twelve["coarse"]["tets"]);
+    let levels = twelve["quality_by_level"].as_array().unwrap();
+    let pieces: Vec<u64> = levels.iter().map(|level| level["pieces"].as_u64().unwrap()).collect();
+    assert_eq!(pieces, [1, 3, 6, 12]);
+    assert_eq!(levels[2], six["quality_by_level"][2]);
+    assert_eq!(levels[3]["smallest_dihedral"], twelve["mesh"]["smallest_dihedral"]);
 }
 
 #[test]

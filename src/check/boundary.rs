@@ -4,7 +4,7 @@ use super::{Fault, OffSurface, PartReport, Settings};
 use crate::Point;
 use crate::geometry::Projector;
 use crate::mesh::TET_FACES;
-use crate::mesh::stream::{BoundaryBlock, MeshStream, NO_TET, TetBlock};
+use crate::mesh::stream::{BoundaryBlock, LocalBlock, MeshStream, NO_TET, TetBlock};
 
 /// A side of a boundary block that has tets: the first of them, the block, and whether they are behind it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -77,7 +77,7 @@ pub(super) fn sides_of<'a>(sides: &'a [Side], tets: &TetBlock) -> &'a [Side] {
 pub(super) fn check_parents(
     stream: &dyn MeshStream,
     side: Side,
-    tets: &TetBlock,
+    tets: &LocalBlock,
     block: &mut BoundaryBlock,
     settings: &Settings,
     report: &mut PartReport,
@@ -85,10 +85,10 @@ pub(super) fn check_parents(
     stream.boundary_block(side.block as usize, block);
     for (triangle, parents) in block.triangles.iter().zip(&block.parents) {
         let parent = parents[usize::from(!side.behind)];
-        let tet = parent.checked_sub(tets.first_local).and_then(|i| tets.tets.get(usize::try_from(i).ok()?));
+        let tet = parent.checked_sub(tets.tets.first_local).and_then(|i| tets.tet(usize::try_from(i).ok()?));
         let [p, q, r] = *triangle;
         let outward = if side.behind { [p, q, r] } else { [p, r, q] };
-        if !tet.is_some_and(|tet| has_face(tet, outward)) {
+        if !tet.is_some_and(|tet| has_face(&tet, outward)) {
             report.add_fault(wrong_parent(stream, *triangle), settings.described);
         }
     }

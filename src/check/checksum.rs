@@ -4,14 +4,16 @@
 //! each tet (global id, vertices, body) and each side of a boundary triangle (patch, vertices, which side). They
 //! add across ranks. (The idea: p4est's and Omega_h's checksums that are independent of the partition.)
 //!
-//! [`Checksum::open`] is a sum with signs. Each face of each tet adds the hash of its vertices, negative if it is seen
-//! the other way round; each side of a boundary triangle takes one away again. So two tets that share a face cancel, and the
+//! [`Checksum::open`] is a sum with signs. A hash gives each vertex a random place p in the space of 64-bit integers modulo 2⁶⁴.
+//! Each tet adds its volume there, det(q−p, r−p, s−p), which is the sum of det(p, q, r) over its faces as seen from outside; each side of a
+//! boundary triangle takes its own det(p, q, r) away again. So two tets that share a face cancel there, and the
 //! sum over all ranks is 0 for a conforming mesh whose boundary is exactly its boundary triangles;
-//! for any other mesh it is 0 with probability 2⁻⁶⁴. This is the identity "the boundary of the chain of all tets
-//! is the chain of all boundary triangles", tested on a random cochain: no table of faces is needed.
+//! for any other mesh it is a polynomial of the random places that is not zero, and 0 with a probability near 2⁻⁶⁴. This is the identity "the
+//! boundary of the chain of all tets is the chain of all boundary triangles", tested on a random cochain: no table of faces is needed.
 
 use crate::comm::{CommError, Communicator};
-use crate::mesh::stream::{BoundaryBlock, MeshStream, NO_TET, TetBlock};
+use crate::mesh::GlobalId;
+use crate::mesh::stream::{BoundaryBlock, LocalBlock, MeshStream, NO_TET};
 use rayon::prelude::*;
 
 /// See the [module](self).
@@ -68,7 +70,7 @@ pub fn checksum(stream: &dyn MeshStream) -> Checksum {
     let vertices = (0..stream.vertex_blocks()).into_par_iter().map(|index| of_vertices(stream, index));
     let tets = (0..stream.tet_blocks())
         .into_par_iter()
-        .map_init(TetBlock::default, |block, index| of_tets(stream, index, block));
+        .map_init(Scratch::default, |scratch, index| of_tets(stream, index, scratch));
     let boundary = (0..stream.boundary_blocks())
         .into_par_iter()
         .map_init(BoundaryBlock::default, |block, index| of_boundary(stream, index, block));
@@ -78,23 +80,37 @@ pub fn checksum(stream: &dyn MeshStream) -> Checksum {
 fn of_vertices(stream: &dyn MeshStream, index: usize) -> Checksum {
     let block = stream.vertex_block(index);
     let mut sum = 0_u64;
-    for (local, id) in block.local.clone().zip(block.ids()) {
+    for (point, id) in stream.vertex_points(index).iter().zip(block.ids()) {
         if block.owner(id, stream.rank()) == stream.rank() {
-            let [x, y, z] = stream.points()[local as usize].map(f64::to_bits);
+            let [x, y, z] = point.map(f64::to_bits);
             sum = sum.wrapping_add(hash([id, x, y, z]));
         }
     }
     Checksum { vertices: sum, ..Checksum::default() }
 }
 
-fn of_tets(stream: &dyn MeshStream, index: usize, block: &mut TetBlock) -> Checksum {
-    stream.tet_block(index, block);
-    let body = block.body.map_or(u64::MAX, |body| u64::from(body.0));
+/// Scratch space of one thread.
+#[derive(Default)]
+struct Scratch {
+    block: LocalBlock,
+    ids: Vec<GlobalId>,
+    places: Vec<Place>,
+}
+
+fn of_tets(stream: &dyn MeshStream, index: usize, scratch: &mut Scratch) -> Checksum {
+    let Scratch { block, ids, places } = scratch;
+    stream.local_block(index, block);
+    stream.block_ids(block, ids);
+    places.clear();
+    places.extend(ids.iter().map(|&id| place(id)));
+    let body = block.tets.body.map_or(u64::MAX, |body| u64::from(body.0)) ^ KEYS[5];
     let mut sum = Checksum::default();
-    for (id, tet) in (block.first_id..).zip(&block.tets) {
-        let [p, q, r, s] = tet.map(|vertex| stream.vertex_id(vertex));
-        sum.tets = sum.tets.wrapping_add(hash([id, p, q, r, s, body]));
-        sum.open = sum.open.wrapping_add(boundary_of([p, q, r, s]));
+    for (id, tet) in (block.tets.first_id..).zip(&block.tets.tets) {
+        let [p, q, r, s] = tet.map(|k| places[k as usize]);
+        let first = fold(p[0] ^ KEYS[0], q[0] ^ KEYS[1]);
+        let second = fold(r[0] ^ KEYS[2], s[0] ^ KEYS[3]);
+        sum.tets = sum.tets.wrapping_add(fold(first ^ id.wrapping_mul(KEYS[4] | 1), second ^ body));
+        sum.open = sum.open.wrapping_add(determinant(minus(q, p), minus(r, p), minus(s, p)));
     }
     sum
 }
@@ -118,36 +134,32 @@ fn of_boundary(stream: &dyn MeshStream, index: usize, block: &mut BoundaryBlock)
     sum
 }
 
-/// The sum of a tet's faces, seen from outside.
-fn boundary_of(tet: [u64; 4]) -> u64 {
-    let (sorted, odd) = sort(tet);
-    let [p, q, r, s] = sorted;
-    // ∂[pqrs] = [qrs] − [prs] + [pqs] − [pqr]
-    let sum = hash([q, r, s])
-        .wrapping_sub(hash([p, r, s]))
-        .wrapping_add(hash([p, q, s]))
-        .wrapping_sub(hash([p, q, r]));
-    if odd { sum.wrapping_neg() } else { sum }
-}
+/// A place in the space of 64-bit integers.
+type Place = [u64; 3];
 
-/// The hash of a face, negative if its vertices are an odd permutation of ascending order.
-fn oriented(face: [u64; 3]) -> u64 {
-    let (sorted, odd) = sort(face);
-    if odd { hash(sorted).wrapping_neg() } else { hash(sorted) }
-}
-
-/// Sorts, and tells whether by an odd number of exchanges.
+/// The random place of a vertex.
 #[inline]
-fn sort<const N: usize>(mut ids: [u64; N]) -> ([u64; N], bool) {
-    let mut odd = false;
-    for end in (1..N).rev() {
-        for k in 0..end {
-            let exchange = ids[k] > ids[k + 1];
-            odd ^= exchange;
-            (ids[k], ids[k + 1]) = if exchange { (ids[k + 1], ids[k]) } else { (ids[k], ids[k + 1]) };
-        }
-    }
-    (ids, odd)
+fn place(id: GlobalId) -> Place {
+    [hash([id, 0]), hash([id, 1]), hash([id, 2])]
+}
+
+/// The value of the cochain on a face, seen from outside.
+fn oriented(face: [GlobalId; 3]) -> u64 {
+    let [p, q, r] = face.map(place);
+    determinant(p, q, r)
+}
+
+#[inline]
+fn minus(p: Place, q: Place) -> Place {
+    [p[0].wrapping_sub(q[0]), p[1].wrapping_sub(q[1]), p[2].wrapping_sub(q[2])]
+}
+
+/// The determinant modulo 2⁶⁴.
+#[inline]
+fn determinant(u: Place, v: Place, w: Place) -> u64 {
+    let minor = |i: usize, j: usize| v[i].wrapping_mul(w[j]).wrapping_sub(v[j].wrapping_mul(w[i]));
+    let term = |i: usize, j: usize, k: usize| u[i].wrapping_mul(minor(j, k));
+    term(0, 1, 2).wrapping_add(term(1, 2, 0)).wrapping_add(term(2, 0, 1))
 }
 
 /// Digits of π: no structure that ids could have.
@@ -165,11 +177,16 @@ const KEYS: [u64; 6] = [
 fn hash<const N: usize>(numbers: [u64; N]) -> u64 {
     let mut state = KEYS[5] ^ N as u64;
     for (number, key) in numbers.into_iter().zip(KEYS) {
-        let product = u128::from(number ^ key) * u128::from(state | 1);
-        state = state.rotate_left(32) ^ product as u64 ^ (product >> 64) as u64;
+        state = state.rotate_left(32) ^ fold(number ^ key, state | 1);
     }
     // The last number too is spread over all bits.
-    let product = u128::from(state ^ KEYS[0]) * u128::from(KEYS[3]);
+    fold(state ^ KEYS[0], KEYS[3])
+}
+
+/// A product of 128 bits, its halves folded together.
+#[inline]
+fn fold(a: u64, b: u64) -> u64 {
+    let product = u128::from(a) * u128::from(b);
     product as u64 ^ (product >> 64) as u64
 }
 
@@ -197,7 +214,11 @@ mod tests {
 
     #[test]
     fn faces_of_two_tets_that_share_one_cancel() {
-        let sum = boundary_of([0, 1, 2, 3]).wrapping_add(boundary_of([1, 2, 3, 4]));
+        let volume = |tet: [u64; 4]| {
+            let [p, q, r, s] = tet.map(place);
+            determinant(minus(q, p), minus(r, p), minus(s, p))
+        };
+        let sum = volume([0, 1, 2, 3]).wrapping_add(volume([1, 2, 3, 4]));
         let left = [[0, 1, 2], [0, 3, 1], [0, 2, 3]].map(|[p, q, r]| oriented([p, r, q]));
         let right = [[1, 2, 4], [2, 3, 4], [3, 1, 4]].map(oriented);
         let outside = left.into_iter().chain(right).fold(0_u64, u64::wrapping_add);

@@ -2,11 +2,11 @@
 
 use super::boundary::{Side, check_block, check_parents, check_range, sides_of};
 use super::report::{Extreme, PartReport, RATIO_BINS, ShapeReport};
-use super::shape::{Batch, Shapes};
+use super::shape::{Batch, Extremes, Shapes};
 use super::{Fault, angles};
 use crate::comm::{CommError, Communicator};
 use crate::geometry::Projector;
-use crate::mesh::stream::{BoundaryBlock, MeshStream, TetBlock};
+use crate::mesh::stream::{BoundaryBlock, LocalBlock, MeshStream};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -53,12 +53,14 @@ pub fn check(
     settings: &Settings,
 ) -> Result<PartReport, CommError> {
     let mine = check_part(stream, projector, settings);
-    let bytes = serde_json::to_vec(&mine).expect("plain data with text keys");
-    let all = comm.all_gather_bytes(&bytes)?;
-    // Its own report too goes through text, so that all ranks merge the same numbers.
-    let all = all.iter().map(|bytes| serde_json::from_slice(bytes).expect("what this program wrote"));
-    let merged = all.reduce(|a: PartReport, b| a.merged(b, settings.described));
-    let mut report = merged.unwrap_or_default();
+    let text = |report: &PartReport| serde_json::to_vec(report).expect("plain data with text keys");
+    let read = |bytes: &Vec<u8>| serde_json::from_slice(bytes).expect("what this program wrote");
+    // To one rank and back: a thousand ranks that got a thousand reports each would be gigabytes.
+    let all = comm.gather_bytes(0, &text(&mine))?;
+    let merged = all.iter().map(read).reduce(|a: PartReport, b| a.merged(b, settings.described));
+    let mut bytes = merged.as_ref().map(text).unwrap_or_default();
+    comm.broadcast_bytes(0, &mut bytes)?;
+    let mut report: PartReport = read(&bytes);
     let totals = stream.totals();
     let found = [report.vertices, report.tets, report.boundary];
     let stated = [totals.vertices, totals.tets, totals.boundary];
@@ -88,7 +90,7 @@ fn check_vertices(stream: &dyn MeshStream, settings: &Settings) -> PartReport {
             let block = stream.vertex_block(index);
             let next = match index + 1 {
                 next if next < blocks => stream.vertex_block(next).local.start,
-                _ => stream.points().len() as u32,
+                _ => stream.counts().vertices as u32,
             };
             if block.local.end != next || index == 0 && block.local.start != 0 {
                 let at = u64::from(block.local.end);
@@ -124,7 +126,8 @@ fn check_boundary(
 /// Scratch space of one thread.
 #[derive(Default)]
 struct Scratch {
-    tets: TetBlock,
+    block: LocalBlock,
+    points: Vec<[f64; 3]>,
     boundary: BoundaryBlock,
     batch: Batch,
     shapes: Shapes,
@@ -155,11 +158,12 @@ fn check_chunk(
 ) -> (Range<u64>, PartReport) {
     let mut report = PartReport::default();
     let mut covered: Option<Range<u64>> = None;
-    let points = stream.points();
+    let vertices = stream.counts().vertices as u32;
     let mut body = None;
     for index in blocks {
-        let Scratch { tets, boundary, batch, shapes } = &mut *scratch;
-        stream.tet_block(index, tets);
+        let Scratch { block, points, boundary, batch, shapes } = &mut *scratch;
+        stream.local_block(index, block);
+        let tets = &block.tets;
         let range = tets.first_local..tets.first_local + tets.tets.len() as u64;
         if let Some(before) = covered.as_ref().filter(|before| before.end != range.start) {
             report.add_fault(Fault::Gap { rank: stream.rank(), at: before.end }, settings.described);
@@ -169,8 +173,13 @@ fn check_chunk(
             flush(batch, shapes, body, settings, &mut report);
             body = tets.body;
         }
+        stream.block_points(block, points);
+        let missing = |vertex: u32| vertex >= vertices;
+        let all_there = !block.vertices.iter().any(|&vertex| missing(vertex));
         for (id, tet) in (tets.first_id..).zip(&tets.tets) {
-            if let Some(&vertex) = tet.iter().find(|v| **v as usize >= points.len()) {
+            if let Some(vertex) =
+                tet.iter().map(|&k| block.vertices[k as usize]).find(|&v| !all_there && missing(v))
+            {
                 report.add_fault(Fault::NoSuchVertex { rank: stream.rank(), vertex }, settings.described);
                 continue;
             }
@@ -181,7 +190,7 @@ fn check_chunk(
             }
         }
         for side in sides_of(sides, tets) {
-            check_parents(stream, *side, tets, boundary, settings, &mut report);
+            check_parents(stream, *side, block, boundary, settings, &mut report);
         }
     }
     flush(&mut scratch.batch, &mut scratch.shapes, body, settings, &mut report);
@@ -217,28 +226,31 @@ fn flush(
         report.body_volumes[body.index()] += volume6 / 6.0;
     }
     if settings.shapes {
-        batch.shapes(shapes);
-        add_shapes(batch, shapes, &mut report.shape);
+        let extremes = batch.shapes(shapes);
+        add_shapes(batch, shapes, extremes, &mut report.shape);
     }
     batch.clear();
 }
 
-fn add_shapes(batch: &Batch, shapes: &Shapes, report: &mut Option<ShapeReport>) {
+fn add_shapes(batch: &Batch, shapes: &Shapes, found: Extremes, report: &mut Option<ShapeReport>) {
+    let lane_of = |values: &[f64], value: f64| values.iter().position(|v| *v == value).unwrap_or(0);
     let extreme = |value, lane| Extreme { value, tet: batch.id(lane), place: batch.centroid(lane) };
     let degrees = |cosine: f64| cosine.clamp(-1.0, 1.0).acos().to_degrees();
-    // Cosines fall with the angle: the smallest angle has the largest. Only extremes become angles.
-    let (mut worst, mut smallest, mut largest) = (0, 0, 0);
-    for lane in 1..batch.len() {
-        let less = |values: &[f64], than: usize| if values[lane] < values[than] { lane } else { than };
-        worst = less(&shapes.mean_ratio, worst);
-        largest = less(&shapes.largest, largest);
-        smallest = if shapes.smallest[lane] > shapes.smallest[smallest] { lane } else { smallest };
+    // Cosines fall with the angle: the smallest angle has the largest. Only records become angles with places.
+    let beaten = report.as_ref().is_none_or(|report| {
+        found.mean_ratio <= report.worst_ratio.value
+            || degrees(found.smallest) <= report.smallest_angle.value
+            || degrees(found.largest) >= report.largest_angle.value
+    });
+    if beaten {
+        let worst = extreme(found.mean_ratio, lane_of(&shapes.mean_ratio, found.mean_ratio));
+        let smallest = extreme(degrees(found.smallest), lane_of(&shapes.smallest, found.smallest));
+        let largest = extreme(degrees(found.largest), lane_of(&shapes.largest, found.largest));
+        report
+            .get_or_insert_with(|| ShapeReport::of(worst, smallest, largest))
+            .take_extremes(worst, smallest, largest);
     }
-    let worst = extreme(shapes.mean_ratio[worst], worst);
-    let smallest = extreme(degrees(shapes.smallest[smallest]), smallest);
-    let largest = extreme(degrees(shapes.largest[largest]), largest);
-    let report = report.get_or_insert_with(|| ShapeReport::of(worst, smallest, largest));
-    report.take_extremes(worst, smallest, largest);
+    let Some(report) = report else { return };
     for lane in 0..batch.len() {
         let ratio = shapes.mean_ratio[lane];
         report.sum_of_ratios += ratio;

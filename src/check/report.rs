@@ -50,7 +50,7 @@ impl Extreme {
 }
 
 /// Bins of the mean ratio from 0 to 1.
-pub const RATIO_BINS: usize = 20;
+pub const RATIO_BINS: usize = 200;
 
 /// The shapes of tets.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -64,7 +64,7 @@ pub struct ShapeReport {
     pub smallest_angle: Extreme,
     /// The largest dihedral angle, degrees.
     pub largest_angle: Extreme,
-    /// Tets by mean ratio: 0 to 0.05 (and below), 0.05 to 0.1, ….
+    /// Tets by mean ratio: 0 to 0.005 (and below), 0.005 to 0.01, ….
     pub ratios: Vec<u64>,
     /// Tets by the whole degrees of their smallest dihedral angle.
     pub smallest_angles: Vec<u64>,
@@ -88,15 +88,22 @@ impl ShapeReport {
 
     /// The degrees below which a fraction of the tets has its smallest dihedral angle, linear within a bin of one degree.
     pub fn smallest_angle_percentile(&self, fraction: f64) -> f64 {
-        let wanted = fraction * self.smallest_angles.iter().sum::<u64>() as f64;
-        let mut below = 0.0;
-        for (degrees, &count) in self.smallest_angles.iter().enumerate() {
-            if count > 0 && below + count as f64 >= wanted {
-                return degrees as f64 + (wanted - below) / count as f64;
-            }
-            below += count as f64;
-        }
-        DEGREES as f64
+        percentile(&self.smallest_angles, fraction)
+    }
+
+    /// The degrees below which a fraction of the tets has its largest dihedral angle, likewise.
+    pub fn largest_angle_percentile(&self, fraction: f64) -> f64 {
+        percentile(&self.largest_angles, fraction)
+    }
+
+    /// The mean ratio below which a fraction of the tets is, linear within a bin of 0.005.
+    pub fn ratio_percentile(&self, fraction: f64) -> f64 {
+        percentile(&self.ratios, fraction) / RATIO_BINS as f64
+    }
+
+    /// The mean of the mean ratios.
+    pub fn mean_ratio(&self) -> f64 {
+        self.sum_of_ratios / self.ratios.iter().sum::<u64>() as f64
     }
 
     /// Keeps the more extreme ones.
@@ -118,6 +125,19 @@ impl ShapeReport {
             mine.iter_mut().zip(others).for_each(|(m, o)| *m += o);
         }
     }
+}
+
+/// The place, in bins, below which a fraction of what is counted lies.
+fn percentile(bins: &[u64], fraction: f64) -> f64 {
+    let wanted = fraction * bins.iter().sum::<u64>() as f64;
+    let mut below = 0.0;
+    for (bin, &count) in bins.iter().enumerate() {
+        if count > 0 && below + count as f64 >= wanted {
+            return bin as f64 + (wanted - below) / count as f64;
+        }
+        below += count as f64;
+    }
+    bins.len() as f64
 }
 
 /// The boundary vertex furthest from its patch.

@@ -5,6 +5,7 @@
 
 use crate::Point;
 use crate::kernel::predicates::{Sign, orient3d, volume6_and_error};
+use crate::kernel::vector::{Wide, wide};
 
 /// Tets in a batch: enough to fill vector registers, few enough to stay in the first cache.
 pub const BATCH: usize = 64;
@@ -31,6 +32,17 @@ pub struct Shapes {
     pub smallest: [f64; BATCH],
     /// Cosine of the largest dihedral angle.
     pub largest: [f64; BATCH],
+}
+
+/// The least mean ratio of a batch, and the cosines of its smallest and largest dihedral angles.
+#[derive(Clone, Copy, Debug)]
+pub struct Extremes {
+    /// Of the mean ratios.
+    pub mean_ratio: f64,
+    /// The largest cosine.
+    pub smallest: f64,
+    /// The smallest cosine.
+    pub largest: f64,
 }
 
 impl Default for Shapes {
@@ -108,10 +120,7 @@ impl Batch {
 
     /// Volumes and their error bounds.
     pub fn volumes(&self, shapes: &mut Shapes) {
-        for lane in 0..BATCH {
-            let edges = [self.edge(0, 1, lane), self.edge(0, 2, lane), self.edge(0, 3, lane)];
-            (shapes.volume6[lane], shapes.error[lane]) = volume6_and_error(edges);
-        }
+        wide(Volumes(self, shapes));
     }
 
     /// Whether a tet is positively oriented, exactly; after [`volumes`](Self::volumes).
@@ -124,8 +133,13 @@ impl Batch {
         orient3d(&p, &q, &r, &s) == Sign::Positive
     }
 
-    /// Mean ratios and dihedral angles; after [`volumes`](Self::volumes).
-    pub fn shapes(&self, shapes: &mut Shapes) {
+    /// Mean ratios and dihedral angles, and the most extreme of them; after [`volumes`](Self::volumes).
+    pub fn shapes(&self, shapes: &mut Shapes) -> Extremes {
+        wide(Measures(self, shapes))
+    }
+
+    #[inline(always)]
+    fn measure(&self, shapes: &mut Shapes) {
         for lane in 0..BATCH {
             let length = |p, q| square(self.edge(p, q, lane));
             let squares =
@@ -161,6 +175,57 @@ impl Batch {
     }
 }
 
+struct Volumes<'a>(&'a Batch, &'a mut Shapes);
+
+impl Wide for Volumes<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Self(batch, shapes) = self;
+        for lane in 0..BATCH {
+            let edges = [batch.edge(0, 1, lane), batch.edge(0, 2, lane), batch.edge(0, 3, lane)];
+            (shapes.volume6[lane], shapes.error[lane]) = volume6_and_error(edges);
+        }
+    }
+}
+
+struct Measures<'a>(&'a Batch, &'a mut Shapes);
+
+impl Wide for Measures<'_> {
+    type Output = Extremes;
+
+    #[inline(always)]
+    fn run(self) -> Extremes {
+        let Self(batch, shapes) = self;
+        batch.measure(shapes);
+        // Beyond the last tet there may be anything: a copy of the first changes nothing.
+        for lane in batch.count..BATCH {
+            shapes.mean_ratio[lane] = shapes.mean_ratio[0];
+            shapes.smallest[lane] = shapes.smallest[0];
+            shapes.largest[lane] = shapes.largest[0];
+        }
+        Extremes {
+            mean_ratio: least(&shapes.mean_ratio, 1.0),
+            smallest: -least(&shapes.smallest, -1.0),
+            largest: least(&shapes.largest, 1.0),
+        }
+    }
+}
+
+/// The least of some numbers, each times a sign.
+#[inline(always)]
+fn least(numbers: &[f64; BATCH], sign: f64) -> f64 {
+    let mut least = [f64::INFINITY; 8];
+    for chunk in numbers.as_chunks::<8>().0 {
+        for lane in 0..8 {
+            let number = sign * chunk[lane];
+            least[lane] = if number < least[lane] { number } else { least[lane] };
+        }
+    }
+    least.into_iter().fold(f64::INFINITY, f64::min)
+}
+
 #[inline(always)]
 fn dot(p: [f64; 3], q: [f64; 3]) -> f64 {
     p[0] * q[0] + p[1] * q[1] + p[2] * q[2]
@@ -178,16 +243,22 @@ fn cross(p: [f64; 3], q: [f64; 3]) -> [f64; 3] {
 
 /// The cube root of a number that is not negative, to within 10⁻¹⁵ relative (below 10⁻²⁹⁰: zero).
 ///
-/// A third of the exponent, from the bits, is within 5 %; each step of Halley's method cubes the error.
+/// Without divisions, by way of the inverse root y: a third of the exponent, from the bits, is within 5 %, and (1 − r)^(−1/3) with r = 1 − xy³
+/// up to its third power makes of an error e one of e⁴. A step of Newton's method for the root itself takes the last roundings away.
 #[inline(always)]
 fn cube_root(x: f64) -> f64 {
-    /// Two thirds of the exponent's bias, less what halves the worst error.
-    const BIAS: u64 = 0x2A9F_7893_782D_A1CE;
-    let mut root = f64::from_bits(x.to_bits() / 3 + BIAS);
-    for _ in 0..3 {
-        let cube = root * root * root;
-        root *= (cube + 2.0 * x) / (2.0 * cube + x);
+    /// Four thirds of the exponent's bias, less what halves the worst error.
+    const BIAS: u64 = 0x553E_F0FF_289D_D796;
+    /// 2³²/3: the lower half of the bits is of no use to a first guess.
+    const THIRD: u64 = 0x5555_5556;
+    let mut inverse = f64::from_bits(BIAS.wrapping_sub((x.to_bits() >> 32).wrapping_mul(THIRD)));
+    for _ in 0..2 {
+        let r = 1.0 - x * (inverse * inverse * inverse);
+        inverse += inverse * r * (1.0 / 3.0 + r * (2.0 / 9.0 + r * (14.0 / 81.0)));
     }
+    let slope = inverse * inverse;
+    let root = x * slope;
+    let root = root - (root * root * root - x) * (1.0 / 3.0) * slope;
     if x > 1e-290 { root } else { 0.0 }
 }
 

@@ -53,13 +53,16 @@ pub fn vertices(
     file: &mut Output,
     format: impl Fn(&mut Line, VertexLine) + Sync,
 ) -> Result<(), WriteError> {
-    let points = part.points();
-    let (chunks, per_chunk) = split(points.len(), points.len() as u64, PER_CHUNK);
+    let blocks = part.vertex_blocks();
+    let (chunks, per_chunk) = split(blocks, part.counts().vertices, PER_CHUNK);
     write_chunks([file], chunks, |chunk, [text]| {
         let mut line = Line::default();
-        for index in items(chunk, per_chunk, points.len()) {
-            format(&mut line, VertexLine { index, point: &points[index] });
-            line.end(text);
+        for block in items(chunk, per_chunk, blocks) {
+            let first = part.vertex_block(block).local.start as usize;
+            for (index, point) in (first..).zip(part.vertex_points(block).iter()) {
+                format(&mut line, VertexLine { index, point });
+                line.end(text);
+            }
         }
         Ok(())
     })

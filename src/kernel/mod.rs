@@ -9,3 +9,4 @@ pub mod random;
 pub mod simplex;
 pub mod sphere;
 pub(crate) mod tree;
+pub(crate) mod vector;

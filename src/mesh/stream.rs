@@ -14,6 +14,7 @@
 use super::{GlobalId, Rank};
 use crate::periodic::Link;
 use csg::{BodyId, PatchId};
+use std::borrow::Cow;
 use std::ops::Range;
 
 /// Counts of one part or of the whole mesh.
@@ -53,6 +54,16 @@ pub struct TetBlock {
     pub body: Option<BodyId>,
 }
 
+/// A tet block as a little mesh of its own: what is wanted of each vertex (coordinates, ids, hashes) is gathered once for
+/// all the tets around it.
+#[derive(Clone, Debug, Default)]
+pub struct LocalBlock {
+    /// Local indices of the vertices of the block.
+    pub vertices: Vec<u32>,
+    /// The tet block, but with vertices by their positions in `vertices`.
+    pub tets: TetBlock,
+}
+
 /// The children of one boundary triangle.
 #[derive(Clone, Debug, Default)]
 pub struct BoundaryBlock {
@@ -88,7 +99,8 @@ pub trait MeshStream: Sync {
     fn counts(&self) -> Counts;
     /// Counts of the whole mesh (each vertex once; `boundary` as the sum over patches, each triangle once).
     fn totals(&self) -> Counts;
-    /// Coordinates by local vertex index.
+    /// Coordinates by local vertex index. A part too large to keep all has those of its first vertices here, all on
+    /// boundaries and interfaces among them: [`vertex_points`](Self::vertex_points) and [`block_points`](Self::block_points) give the others.
     fn points(&self) -> &[[f64; 3]];
     /// The number of vertex blocks; together they cover each local vertex once, in ascending order.
     fn vertex_blocks(&self) -> usize;
@@ -106,6 +118,33 @@ pub trait MeshStream: Sync {
     fn tet_blocks(&self) -> usize;
     /// Fills `block` with one tet block, reusing its memory.
     fn tet_block(&self, index: usize, block: &mut TetBlock);
+    /// Fills `block` with one tet block and its vertices, reusing its memory.
+    fn local_block(&self, index: usize, block: &mut LocalBlock) {
+        self.tet_block(index, &mut block.tets);
+        block.vertices.clear();
+        for tet in &mut block.tets.tets {
+            let first = block.vertices.len() as u32;
+            block.vertices.extend(*tet);
+            *tet = [first, first + 1, first + 2, first + 3];
+        }
+    }
+    /// Replaces `ids` by the global ids of the vertices of a block of this stream.
+    fn block_ids(&self, block: &LocalBlock, ids: &mut Vec<GlobalId>) {
+        ids.clear();
+        ids.extend(block.vertices.iter().map(|&vertex| self.vertex_id(vertex)));
+    }
+    /// Replaces `points` by the coordinates of the vertices of a block of this stream; of a vertex that does not exist they are no numbers.
+    fn block_points(&self, block: &LocalBlock, points: &mut Vec<[f64; 3]>) {
+        let all = self.points();
+        let point = |&vertex: &u32| all.get(vertex as usize).copied().unwrap_or([f64::NAN; 3]);
+        points.clear();
+        points.extend(block.vertices.iter().map(point));
+    }
+    /// The coordinates of the vertices of one vertex block.
+    fn vertex_points(&self, index: usize) -> Cow<'_, [[f64; 3]]> {
+        let local = self.vertex_block(index).local;
+        Cow::Borrowed(&self.points()[local.start as usize..local.end as usize])
+    }
     /// The number of boundary blocks.
     fn boundary_blocks(&self) -> usize;
     /// Fills `block` with one boundary block, reusing its memory.
@@ -149,6 +188,13 @@ pub fn vertex_block_of<S: MeshStream + ?Sized>(stream: &S, local: u32) -> usize 
         }
     }
     panic!("no vertex {local} in this part");
+}
+
+impl LocalBlock {
+    /// The vertices of a tet by local index.
+    pub fn tet(&self, index: usize) -> Option<[u32; 4]> {
+        self.tets.tets.get(index).map(|tet| tet.map(|k| self.vertices[k as usize]))
+    }
 }
 
 impl VertexBlock<'_> {

@@ -22,7 +22,12 @@ fn model_of(source: &str) -> Model {
 
 fn settings(levels: u32, sources: &[Source]) -> GenerateSettings {
     let size = SizeSettings { sources: sources.to_vec(), ..Preset::VeryCoarse.into() };
-    GenerateSettings { coarse: CoarseSettings::from(size), wanted: Wanted::Sizes { levels } }
+    GenerateSettings {
+        coarse: CoarseSettings::from(size),
+        wanted: Wanted::Sizes { pieces: 1 << levels },
+        memory: None,
+        disk: None,
+    }
 }
 
 fn made(model: &Model, ranks: u32, levels: u32) -> Vec<Generated> {

@@ -1,40 +1,22 @@
 //! Method 2 on all ranks: a coarse mesh, partitioned, distributed, refined, checked.
 
 use super::coarse::{CoarseMesh, CoarseReport, CoarseSettings};
-use super::mend::{self, MendError};
+use super::mend;
 use super::model::Model;
-use super::target::{Outcome, mesh_to_target};
-use crate::check::{self, Checksum, PartReport};
+use super::room::{self, Disk};
+use super::target::Outcome;
+use super::wanted::{Wanted, mesh_as_wanted};
+use crate::check::{self, Checksum, PartReport, ShapeReport};
 use crate::comm::Communicator;
 use crate::dist::{self, DistMesh};
 use crate::error::{Failure, Status, agree};
 use crate::geometry::Projector;
-use crate::memory;
 use crate::mesh::{GlobalId, Mesh, Names, Rank};
 use crate::partition::{self, Metrics};
 use crate::periodic::{self, PeriodicMap};
 use crate::progress::Progress;
 use crate::refine::{self, RefineError, RefinedMesh};
 use crate::size::Source;
-
-/// How many tets are wanted.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Wanted {
-    /// What the sizes give, with this many levels of refinement.
-    Sizes {
-        /// Levels.
-        levels: u32,
-    },
-    /// A coarse mesh with this many, and this many levels of refinement.
-    Coarse {
-        /// Tets of the coarse mesh.
-        tets: u64,
-        /// Levels.
-        levels: u32,
-    },
-    /// This many in all: levels are chosen.
-    Elements(u64),
-}
 
 /// What is to be made.
 #[derive(Clone, Debug)]
@@ -43,6 +25,10 @@ pub struct GenerateSettings {
     pub coarse: CoarseSettings,
     /// How many tets.
     pub wanted: Wanted,
+    /// The memory to use for fine vertices on each machine, bytes; without it, what the machine has left.
+    pub memory: Option<u64>,
+    /// What is to be written, to refuse what does not fit before anything is refined.
+    pub disk: Option<Disk>,
 }
 
 /// What rank 0 found out on the way.
@@ -65,8 +51,10 @@ pub struct CoarseResult {
 pub struct Generated {
     /// This rank's part.
     pub part: RefinedMesh,
-    /// Levels of refinement.
-    pub levels: u32,
+    /// Pieces that each coarse edge was cut into.
+    pub pieces: u32,
+    /// The shapes of the tets of each level of refinement, from the coarse mesh to the last: the same on all ranks.
+    pub levels: Vec<Level>,
     /// Numbers and names of bodies and boundaries.
     pub names: Names,
     /// The check of the whole mesh, the same on all ranks.
@@ -79,11 +67,16 @@ pub struct Generated {
     pub coarse: Option<CoarseResult>,
 }
 
-/// Levels of refinement at most: with more, even one tet would pass 2³² vertices.
-pub const MOST_LEVELS: u32 = 10;
-
-/// Below this many coarse tets a mesh that is to have many is not refined, but made finer.
-const LEAST_COARSE: u64 = 5_000;
+/// The tets of one level of refinement.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Level {
+    /// Pieces of each coarse edge.
+    pub pieces: u32,
+    /// The number of tets.
+    pub tets: u64,
+    /// Their shapes.
+    pub shape: ShapeReport,
+}
 
 /// Rounds in which the coarse mesh is made finer because refined tets turned out inverted only now.
 const MOST_ROUNDS: usize = 4;
@@ -103,20 +96,26 @@ pub fn generate(
     for round in 0.. {
         let made = model.map(|model| coarse_mesh(comm.size(), model, settings, &sources, progress));
         let mut coarse = agree(comm, made.transpose())?;
-        let levels = broadcast_levels(comm, coarse.as_ref().map(|(levels, _)| *levels))?;
+        let pieces = broadcast_pieces(comm, coarse.as_ref().map(|(pieces, _)| *pieces))?;
         let (names, projector) = broadcast_geometry(comm, model)?;
         let given = coarse.as_ref().map(|(_, made)| (made.mesh.clone(), made.parts.clone()));
         let dist = progress.stage("distribute", || dist::distribute(comm, given))?;
-        let pieces = 1 << levels;
-        refuse_without_memory(comm, &dist, pieces)?;
-        let refined = progress.stage("refine", || {
-            refine::refine(dist, &projector, pieces as u32, &refine::Settings::default())
-        });
+        agree(comm, room::refuse_without_disk(comm.rank(), &dist, pieces, settings.disk.as_ref()))?;
+        let keep = room::what_fits(comm, &dist, pieces, settings.memory, progress)?;
+        let survey = progress.stage("levels", || survey(comm, &dist, &projector, pieces))?;
+        let mut levels = match survey {
+            Surveyed::Sound(levels) => levels,
+            Surveyed::Inverted(bad, _) if round < MOST_ROUNDS => {
+                lower(&mut sources, coarse.as_ref(), &bad);
+                continue;
+            }
+            Surveyed::Inverted(_, error) => return Err(error),
+        };
+        let how = refine::Settings { keep, ..refine::Settings::default() };
+        let refined = progress.stage("refine", || refine::refine(dist, &projector, pieces, &how));
         let bad = inverted_anywhere(comm, &refined)?;
         if !bad.is_empty() && round < MOST_ROUNDS {
-            if let Some((_, made)) = &coarse {
-                sources.extend(mend::lowered(&made.mesh, &bad));
-            }
+            lower(&mut sources, coarse.as_ref(), &bad);
             continue;
         }
         let part = agree(comm, refined.map_err(Failure::from))?;
@@ -128,13 +127,56 @@ pub fn generate(
         let part = part.with_periodic(map.clone()).with_singular(singular);
         let (check, checksum) = progress.stage("check", || verdict(comm, &part, &projector))?;
         let periodic = periodic_verdict(comm, &part, &map, &projector)?;
-        let coarse = coarse.take().map(|(_, made)| made);
-        return Ok(Generated { part, levels, names, check, checksum, periodic, coarse });
+        levels.extend(check.shape.clone().map(|shape| Level { pieces, tets: check.tets, shape }));
+        let coarse = coarse.take().map(|(_, mut made)| {
+            made.report.size_corrections += round as u64;
+            made
+        });
+        return Ok(Generated { part, pieces, levels, names, check, checksum, periodic, coarse });
     }
     unreachable!("the loop ends by itself")
 }
 
-/// The coarse mesh, partitioned, and the levels of its refinement.
+/// Asks for smaller sizes around coarse tets with inverted children, on the rank that has them.
+fn lower(sources: &mut Vec<Source>, coarse: Option<&(u32, CoarseResult)>, bad: &[GlobalId]) {
+    if let Some((_, made)) = coarse {
+        sources.extend(mend::lowered(&made.mesh, bad));
+    }
+}
+
+/// What the levels before the last are like.
+enum Surveyed {
+    /// All children are positive.
+    Sound(Vec<Level>),
+    /// These coarse tets have inverted children.
+    Inverted(Vec<GlobalId>, Failure),
+}
+
+/// **Collective.** Refines to each level before the last in turn, from none on, and measures all tets: a seventh of the work on the last,
+/// and what would be inverted there mostly is so earlier.
+fn survey(
+    comm: &dyn Communicator,
+    dist: &DistMesh,
+    projector: &Projector,
+    pieces: u32,
+) -> Result<Surveyed, Failure> {
+    let odd = pieces >> pieces.trailing_zeros();
+    let doubled = (0..pieces.trailing_zeros()).map(|k| odd << k);
+    let mut levels = Vec::new();
+    for n in (odd > 1).then_some(1).into_iter().chain(doubled) {
+        let refined = refine::refine(dist.clone(), projector, n, &refine::Settings::default());
+        let bad = inverted_anywhere(comm, &refined)?;
+        let part = match agree(comm, refined.map_err(Failure::from)) {
+            Err(error) if !bad.is_empty() => return Ok(Surveyed::Inverted(bad, error)),
+            other => other?,
+        };
+        let check = check::check(comm, &part, None, &check::Settings::default())?;
+        levels.extend(check.shape.map(|shape| Level { pieces: n, tets: check.tets, shape }));
+    }
+    Ok(Surveyed::Sound(levels))
+}
+
+/// The coarse mesh, partitioned, and the pieces of its edges.
 fn coarse_mesh(
     parts: u32,
     model: &Model,
@@ -142,62 +184,12 @@ fn coarse_mesh(
     sources: &[Source],
     progress: &Progress,
 ) -> Result<(u32, CoarseResult), Failure> {
-    let (levels, made, outcome) =
-        progress.stage("mesh", || mesh_as_wanted(parts, model, settings, sources))?;
+    let (pieces, made, outcome) = progress
+        .stage("mesh", || mesh_as_wanted(parts, model, &settings.coarse, settings.wanted, sources))?;
     let (assigned, metrics) = progress
         .stage("partition", || partition::partition(&made.mesh, parts, &partition::Settings::default()))?;
     let CoarseMesh { mesh, report } = made;
-    Ok((levels, CoarseResult { mesh, parts: assigned, report, outcome, partition: metrics }))
-}
-
-fn mesh_as_wanted(
-    parts: u32,
-    model: &Model,
-    settings: &GenerateSettings,
-    sources: &[Source],
-) -> Result<(u32, CoarseMesh, Option<Outcome>), Failure> {
-    let with = |more: &[Source]| {
-        let mut coarse = settings.coarse.clone();
-        coarse.size.sources.extend(sources.iter().chain(more));
-        coarse
-    };
-    let to_target = |tets: u64, levels: u32| {
-        let mut outcome = Outcome::Reached;
-        let made = mend::refinable(model, 1 << levels, |more| {
-            let (made, how) = mesh_to_target(model, &mut with(more), tets)?;
-            outcome = how;
-            Ok(made)
-        });
-        made.map(|made| (made, outcome))
-    };
-    match settings.wanted {
-        Wanted::Elements(count) if let Model::Given(given) = model => {
-            let tets = given.mesh.tets.len() as u64;
-            let levels = (0..MOST_LEVELS).find(|levels| tets << (3 * levels) >= count).unwrap_or(MOST_LEVELS);
-            Ok((levels, model.coarse_mesh(&mut settings.coarse.clone()).map_err(MendError::from)?, None))
-        }
-        Wanted::Sizes { levels } => {
-            let made = mend::refinable(model, 1 << levels, |more| model.coarse_mesh(&mut with(more)))?;
-            Ok((levels, made, None))
-        }
-        Wanted::Coarse { tets, levels } => {
-            let (made, outcome) = to_target(tets, levels)?;
-            Ok((levels, made, Some(outcome)))
-        }
-        Wanted::Elements(count) => {
-            let enough = LEAST_COARSE.max(100 * u64::from(parts));
-            let fits = |levels: &u32| count >> (3 * levels) >= enough;
-            let mut levels = (0..=MOST_LEVELS).rev().find(fits).unwrap_or(0);
-            loop {
-                let (made, outcome) = to_target(count.div_ceil(1 << (3 * levels)), levels)?;
-                // Too fine a coarse mesh for so many levels: fewer levels reach the number.
-                if outcome == Outcome::Reached || levels == 0 {
-                    return Ok((levels, made, Some(outcome)));
-                }
-                levels -= 1;
-            }
-        }
-    }
+    Ok((pieces, CoarseResult { mesh, parts: assigned, report, outcome, partition: metrics }))
 }
 
 /// **Collective.** What is periodic in the coarse mesh that rank 0 has.
@@ -240,11 +232,11 @@ fn periodic_verdict(
     Ok(Some(checked))
 }
 
-/// **Collective.** The levels that rank 0 chose.
-fn broadcast_levels(comm: &dyn Communicator, levels: Option<u32>) -> Result<u32, Failure> {
-    let mut levels = vec![levels.unwrap_or(0)];
-    comm.broadcast(0, &mut levels)?;
-    Ok(levels[0])
+/// **Collective.** The pieces that rank 0 chose.
+fn broadcast_pieces(comm: &dyn Communicator, pieces: Option<u32>) -> Result<u32, Failure> {
+    let mut pieces = vec![pieces.unwrap_or(1)];
+    comm.broadcast(0, &mut pieces)?;
+    Ok(pieces[0])
 }
 
 /// **Collective.** The names and the surfaces that rank 0 has read.
@@ -257,40 +249,6 @@ fn broadcast_geometry(comm: &dyn Communicator, model: Option<&Model>) -> Result<
     let (bodies, patches) = serde_json::from_slice(&text).expect("what rank 0 wrote");
     let projector = Projector::decode(&bytes).expect("what rank 0 encoded");
     Ok((Names { bodies, patches }, projector))
-}
-
-/// Bytes of a fine vertex: three coordinates.
-const VERTEX_BYTES: f64 = 24.0;
-
-/// **Collective.** Refuses what the memory of a machine cannot hold, before anything is refined.
-fn refuse_without_memory(comm: &dyn Communicator, part: &DistMesh, pieces: u64) -> Result<(), Failure> {
-    let n = pieces as f64;
-    let on_edge = n - 1.0;
-    let on_face = on_edge * (n - 2.0) / 2.0;
-    let in_tet = on_face * (n - 3.0) / 3.0;
-    let count = |items: usize| items as f64;
-    let vertices = count(part.points.len())
-        + count(part.edges.len()) * on_edge
-        + count(part.faces.len()) * on_face
-        + count(part.tets.len()) * in_tet;
-    let machine = memory::machine();
-    let machines = comm.all_gather_bytes(machine.as_bytes())?;
-    let needs = comm.all_gather_one(VERTEX_BYTES * vertices)?;
-    let here = machines.iter().zip(&needs).filter(|(name, _)| **name == machine.as_bytes());
-    let needed: f64 = here.map(|(_, need)| need).sum();
-    let refused = match memory::available_bytes() {
-        Some(available) if needed > available as f64 => Err(Failure::new(
-            Status::Resources,
-            format!(
-                "the fine vertices take {:.1} GB and this machine has {:.1} GB left: take fewer levels or tets, \
-                 or more machines",
-                needed / 1e9,
-                available as f64 / 1e9
-            ),
-        )),
-        _ => Ok(()),
-    };
-    agree(comm, refused)
 }
 
 /// **Collective.** The coarse tets with inverted children on any rank.

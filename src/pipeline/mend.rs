@@ -5,7 +5,7 @@ use super::model::Model;
 use crate::dist::{self, DistError};
 use crate::geometry::Projector;
 use crate::mesh::{GlobalId, Mesh, TET_EDGES};
-use crate::refine::{self, RefineError};
+use crate::refine::{self, RefineError, Trial};
 use crate::size::Source;
 
 /// Why no coarse mesh was found that can be refined.
@@ -25,15 +25,24 @@ pub enum MendError {
 /// Rounds of lowering sizes before the mender gives up.
 const MOST_ROUNDS: u64 = 20;
 
-/// Lattices are tried with as many pieces an edge at most: what inverts, does so by then, but for rare
-/// cases that the check of all children finds.
-const TRIED_PIECES: u32 = 4;
+/// Rounds in which sizes are lowered also where children would only be poor.
+const POOR_ROUNDS: u64 = 3;
+
+/// Lattices are tried with as many pieces an edge at most. With 4 the 4 levels of NETGEN's `matrix` at `very-coarse` had 712
+/// inverted tets that no trial had shown; with 16 the directions at vertices are near their limits.
+const TRIED_PIECES: u32 = 16;
+
+/// The worst child may lose this much of the worst mean ratio that the coarse mesh has without snapping.
+const KEPT: f64 = 0.6;
+
+/// Coarse meshes better than this may lose more: curvature alone costs that much where there are few elements to a radius.
+const GOOD: f64 = 0.35;
 
 /// Tets around an inverted child are asked to be smaller by this.
 const LOWERED: f64 = 0.6;
 
 /// Makes coarse meshes with `make`, which is given the places where sizes must be lowered, until the lattice
-/// of `pieces` an edge has no inverted child.
+/// of `pieces` an edge has no inverted child, and few poor ones.
 ///
 /// # Errors
 /// What failed in the end.
@@ -45,37 +54,30 @@ pub fn refinable(
     let mut sources = Vec::new();
     for round in 0.. {
         let mut coarse = make(&sources)?;
-        match inverted(model, &coarse.mesh, pieces.min(TRIED_PIECES))? {
-            None => {
-                coarse.report.size_corrections += round;
-                return Ok(coarse);
-            }
-            Some((_, error)) if round == MOST_ROUNDS => return Err(error.into()),
-            Some((tets, _)) => sources.extend(lowered(&coarse.mesh, &tets)),
+        let tried = try_out(model, &coarse, pieces.min(TRIED_PIECES))?;
+        let poor: &[GlobalId] = if round < POOR_ROUNDS { &tried.poor } else { &[] };
+        if tried.inverted.is_empty() && poor.is_empty() {
+            coarse.report.size_corrections += round;
+            return Ok(coarse);
         }
+        match tried.error {
+            Some(error) if round == MOST_ROUNDS => return Err(error.into()),
+            _ => [&tried.inverted, poor].map(|tets| sources.extend(lowered(&coarse.mesh, tets))),
+        };
     }
     unreachable!("the loop ends by itself")
 }
 
-/// The coarse tets with inverted children, and the error that says so.
-fn inverted(
-    model: &Model,
-    mesh: &Mesh,
-    pieces: u32,
-) -> Result<Option<(Vec<GlobalId>, RefineError)>, MendError> {
+/// What refinement would make of a coarse mesh.
+fn try_out(model: &Model, coarse: &CoarseMesh, pieces: u32) -> Result<Trial, MendError> {
     // What is not snapped cannot invert.
     let projector = model.projector();
     if pieces == 1 || projector == Projector::Flat {
-        return Ok(None);
+        return Ok(Trial::default());
     }
-    let part = dist::from_serial(mesh.clone())?;
-    match refine::refine(part, &projector, pieces, &refine::Settings::default()) {
-        Ok(_) => Ok(None),
-        Err(RefineError::Inverted { coarse, children, faults }) => {
-            Ok(Some((coarse.clone(), RefineError::Inverted { coarse, children, faults })))
-        }
-        Err(other) => Err(other.into()),
-    }
+    let part = dist::from_serial(coarse.mesh.clone())?;
+    let least = KEPT * coarse.report.quality.worst_refined.min(GOOD);
+    Ok(refine::trial(&part, &projector, pieces, least)?)
 }
 
 /// Sources that ask for smaller tets where these are: at their corners and the middles of their edges, as

@@ -8,10 +8,14 @@ pub mod input;
 pub mod mend;
 pub mod model;
 pub mod names;
+pub mod room;
 pub mod target;
+pub mod wanted;
 
 pub use coarse::{CoarseError, CoarseMesh, CoarseReport, CoarseSettings};
 pub use facet_model::FacetSolid;
-pub use generate::{GenerateSettings, Generated, Wanted, generate};
+pub use generate::{GenerateSettings, Generated, generate};
 pub use model::{CsgModel, Entities, GivenMesh, Model};
 pub use names::names;
+pub use room::Disk;
+pub use wanted::Wanted;

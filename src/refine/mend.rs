@@ -16,11 +16,10 @@
 use super::bend::Bends;
 use super::snap::{self, Coordinates};
 use super::tet::BadTet;
+use super::trial::{CHUNK, curved, worst_child};
 use super::{RefineError, RefinedMesh, Settings as RefineSettings, refine_unchecked};
-use crate::check::shape::{BATCH, Batch, Shapes};
 use crate::dist::DistMesh;
 use crate::geometry::Projector;
-use crate::mesh::stream::{MeshStream, TetBlock};
 use crate::mesh::{EdgeId, GlobalId, TetId};
 use std::collections::BTreeSet;
 
@@ -62,9 +61,6 @@ const FINEST: u32 = 16;
 /// With fewer pieces than these the children say little of the directions at vertices.
 const COARSEST: u32 = 5;
 
-/// Tets tried at a time: bounds the memory of the trial.
-const CHUNK: usize = 8192;
-
 /// First and last step of the search, in lengths of the edge. A bend of a quarter turns the edge by 45° at its ends; below
 /// a hundredth the children change less than by what counts as enough.
 const STEPS: [f64; 2] = [0.12, 0.01];
@@ -76,8 +72,7 @@ const STEPS: [f64; 2] = [0.12, 0.01];
 /// Vertices that cannot be snapped, and memory, as [`refine()`](super::refine()).
 pub fn mend(mesh: &DistMesh, projector: &Projector, settings: &Settings) -> Result<Mended, RefineError> {
     let mut trial = Trial { mesh, projector, settings, pieces: settings.pieces, bends: Bends::default() };
-    let is_curved = |tet: &u32| !snap::is_flat(mesh, projector, &Bends::default(), TetId(*tet));
-    let mut tried: BTreeSet<u32> = (0..mesh.tets.len() as u32).filter(is_curved).collect();
+    let mut tried: BTreeSet<u32> = curved(mesh, projector).into_iter().collect();
     let mut before: Option<Vec<GlobalId>> = None;
     let mut left = Vec::new();
     for pieces in ladder(settings.pieces) {
@@ -161,7 +156,8 @@ impl Trial<'_> {
     }
 
     fn refine(&self, part: DistMesh) -> Result<(RefinedMesh, Vec<BadTet>), RefineError> {
-        let settings = RefineSettings { described: 0, bends: self.bends.clone() };
+        let settings =
+            RefineSettings { described: 0, bends: self.bends.clone(), ..RefineSettings::default() };
         refine_unchecked(part, self.projector, self.pieces, &settings)
     }
 
@@ -223,24 +219,8 @@ impl Trial<'_> {
     }
 }
 
-/// The worst mean ratio of the children of a coarse tet.
-fn worst_child(refined: &RefinedMesh, tet: usize) -> f64 {
-    let (mut block, mut batch, mut shapes) = (TetBlock::default(), Batch::default(), Shapes::default());
-    refined.tet_block(tet, &mut block);
-    let points = refined.points();
-    let mut worst = 1.0_f64;
-    for tets in block.tets.chunks(BATCH) {
-        batch.clear();
-        tets.iter().for_each(|tet| batch.push(0, tet.map(|v| points[v as usize])));
-        batch.volumes(&mut shapes);
-        batch.shapes(&mut shapes);
-        worst = shapes.mean_ratio[..tets.len()].iter().copied().fold(worst, f64::min);
-    }
-    worst
-}
-
 /// Some tets of a mesh, ascending, as a part of their own without boundary and neighbours.
-fn extract(mesh: &DistMesh, tets: &[u32]) -> DistMesh {
+pub(super) fn extract(mesh: &DistMesh, tets: &[u32]) -> DistMesh {
     let vertices = used(tets, |tet| mesh.tets[tet].map(|v| v.0));
     let edges = used(tets, |tet| mesh.tet_edges[tet].map(|e| e.0));
     let faces = used(tets, |tet| mesh.tet_faces[tet].map(|f| f.0));

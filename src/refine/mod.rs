@@ -17,6 +17,7 @@
 
 pub mod bend;
 pub mod blend;
+pub mod census;
 pub mod diagonal;
 pub mod lattice;
 pub mod mend;
@@ -25,14 +26,19 @@ pub mod refined;
 pub mod snap;
 pub mod stored;
 mod tet;
+pub mod trial;
 
 pub use bend::Bends;
+pub use census::{Census, census};
 pub use mend::{Mended, mend};
 pub use refined::RefinedMesh;
 pub use stored::StoredMesh;
+pub use trial::{Trial, trial};
 
 #[cfg(test)]
 pub(crate) mod fixtures;
+#[cfg(test)]
+mod scale_tests;
 #[cfg(test)]
 mod tests;
 
@@ -49,11 +55,24 @@ pub struct Settings {
     pub described: usize,
     /// Coarse edges to be bent, the same on all ranks.
     pub bends: Bends,
+    /// Which coordinates are kept.
+    pub keep: Keep,
+}
+
+/// Which coordinates a refined mesh keeps: they are nearly all of its memory.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Keep {
+    /// All: 4 bytes a tet.
+    #[default]
+    All,
+    /// Those in coarse vertices, edges and faces. Those inside a coarse tet, nearly all of a very large mesh, are computed anew, the same bits,
+    /// whenever its children are asked for.
+    Boundary,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { described: 8, bends: Bends::default() }
+        Self { described: 8, bends: Bends::default(), keep: Keep::All }
     }
 }
 
@@ -136,9 +155,9 @@ fn refine_unchecked(
     settings: &Settings,
 ) -> Result<(RefinedMesh, Vec<tet::BadTet>), RefineError> {
     let numbering = numbering::Numbering::new(&mesh, n)?;
-    let points = snap::boundary_first(&mesh, projector, &numbering, &settings.bends)?;
-    let (points, diagonals, bad) = tet::fill(&mesh, projector, &numbering, points, settings);
-    Ok((RefinedMesh::new(mesh, numbering, points, diagonals), bad))
+    let points = snap::boundary_first(&mesh, projector, &numbering, settings)?;
+    let (inside, bad) = tet::fill(&mesh, projector, &numbering, points, settings);
+    Ok((RefinedMesh::new(mesh, numbering, inside), bad))
 }
 
 /// The least number of pieces to an edge with which `coarse` tets become at least `wanted`.

@@ -1,13 +1,15 @@
 //! The refined part: coordinates kept, everything else computed as it is asked for.
 
-use super::diagonal::Diagonals;
 use super::lattice::{OCTAHEDRON, UPRIGHT, UPSIDE_DOWN, corner_place, octahedron_child_on_face};
 use super::numbering::{Entity, Numbering, ascending};
-use super::snap::Coordinates;
+use super::tet::{Inside, Lattices};
 use crate::dist::{BoundaryFace, DistMesh};
-use crate::mesh::stream::{BoundaryBlock, Counts, MeshStream, NO_TET, SingularTags, TetBlock, VertexBlock};
+use crate::mesh::stream::{
+    BoundaryBlock, Counts, LocalBlock, MeshStream, NO_TET, SingularTags, TetBlock, VertexBlock,
+};
 use crate::mesh::{Class, EdgeId, GlobalId, Rank, TET_EDGES, TET_FACES, TetId};
 use crate::periodic::{Link, PeriodicMap};
+use std::borrow::Cow;
 use std::sync::Arc;
 
 /// One rank's part of a refined mesh: see [`refine`](super::refine()).
@@ -18,8 +20,7 @@ use std::sync::Arc;
 pub struct RefinedMesh {
     coarse: DistMesh,
     numbering: Numbering,
-    points: Box<[Coordinates]>,
-    diagonals: Diagonals,
+    inside: Inside,
     periodic: Arc<PeriodicMap>,
     singular: csg::Singular,
 }
@@ -37,21 +38,8 @@ impl std::fmt::Debug for RefinedMesh {
 }
 
 impl RefinedMesh {
-    pub(super) fn new(
-        coarse: DistMesh,
-        numbering: Numbering,
-        points: Box<[Coordinates]>,
-        diagonals: Diagonals,
-    ) -> Self {
-        assert_eq!(points.len(), numbering.vertices() as usize, "one point for each fine vertex");
-        Self {
-            coarse,
-            numbering,
-            points,
-            diagonals,
-            periodic: Arc::default(),
-            singular: csg::Singular::default(),
-        }
+    pub(super) fn new(coarse: DistMesh, numbering: Numbering, inside: Inside) -> Self {
+        Self { coarse, numbering, inside, periodic: Arc::default(), singular: csg::Singular::default() }
     }
 
     /// The same with what is periodic in the whole coarse mesh.
@@ -82,8 +70,8 @@ impl RefinedMesh {
 
     /// Bytes kept beside the coarse mesh.
     pub fn bytes(&self) -> u64 {
-        let coordinates = size_of_val(&*self.points) as u64;
-        coordinates + (self.coarse.tets.len() * self.diagonals.bytes_per_tet()) as u64
+        let coordinates = size_of_val(&*self.inside.points) as u64;
+        coordinates + (self.coarse.tets.len() * self.inside.diagonals.bytes_per_tet()) as u64
     }
 
     /// The number of fine tets of this part.
@@ -96,7 +84,7 @@ impl RefinedMesh {
         let lattice = self.numbering.lattice();
         let vertices = self.coarse.tets[tet.index()];
         let corners = ascending(TET_FACES[face], |corner| vertices[corner].0);
-        let diagonals = self.diagonals.of_tet(tet.0);
+        let diagonals = self.inside.diagonals.of_tet(tet.0);
         let first = u64::from(tet.0) * u64::from(lattice.children());
         for_each_face_child(lattice.n(), |j, k, upright| {
             let child = if upright {
@@ -199,7 +187,7 @@ impl MeshStream for RefinedMesh {
     }
 
     fn points(&self) -> &[[f64; 3]] {
-        &self.points
+        &self.inside.points
     }
 
     fn vertex_blocks(&self) -> usize {
@@ -233,22 +221,48 @@ impl MeshStream for RefinedMesh {
     }
 
     fn tet_block(&self, index: usize, block: &mut TetBlock) {
-        let lattice = self.numbering.lattice();
-        let children = lattice.children();
-        let tet = TetId::new(index);
         let mut ids = Vec::new();
-        self.numbering.lattice_ids(&self.coarse, tet, &mut ids);
-        let diagonals = self.diagonals.of_tet(tet.0);
-        block.tets.clear();
-        block.tets.reserve(children as usize);
-        for (c, d, cells) in lattice.rows() {
-            push_row(&ids, rows_around(lattice, c, d), cells as usize, &mut block.tets, |octahedron| {
-                diagonals.get(lattice.octahedron_row(c, d) + octahedron)
-            });
+        self.numbering.lattice_ids(&self.coarse, TetId::new(index), &mut ids);
+        self.children(index, block);
+        block.tets.iter_mut().flatten().for_each(|corner| *corner = ids[*corner as usize]);
+    }
+
+    fn local_block(&self, index: usize, block: &mut LocalBlock) {
+        self.numbering.lattice_ids(&self.coarse, TetId::new(index), &mut block.vertices);
+        self.children(index, &mut block.tets);
+    }
+
+    fn block_ids(&self, block: &LocalBlock, ids: &mut Vec<GlobalId>) {
+        let children = u64::from(self.numbering.lattice().children());
+        let tet = (block.tets.first_local / children) as u32;
+        let inside = self.numbering.inside(Entity { dimension: 3, id: tet });
+        let first = self.numbering.first_id(3, self.coarse.tet_ids[tet as usize]);
+        // Nearly all are inside the tet; where an id lies elsewhere takes divisions to tell.
+        let id = |&vertex: &u32| match vertex.checked_sub(inside.start) {
+            Some(within) => first + u64::from(within),
+            None => self.vertex_id(vertex),
+        };
+        ids.clear();
+        ids.extend(block.vertices.iter().map(id));
+    }
+
+    fn block_points(&self, block: &LocalBlock, points: &mut Vec<[f64; 3]>) {
+        if !self.keeps_all() {
+            let tet = block.tets.first_local / u64::from(self.numbering.lattice().children());
+            self.lattices().all(TetId(tet as u32), self.inside.flat[tet as usize], points);
+            return;
         }
-        block.first_id = self.coarse.tet_ids[index] * u64::from(children);
-        block.first_local = index as u64 * u64::from(children);
-        block.body = Some(self.coarse.tet_bodies[index]);
+        points.clear();
+        points.extend(block.vertices.iter().map(|&vertex| self.inside.points[vertex as usize]));
+    }
+
+    fn vertex_points(&self, index: usize) -> Cow<'_, [[f64; 3]]> {
+        let entity = self.numbering.block(index);
+        if entity.dimension == 3 && !self.keeps_all() {
+            return self.lattices().inside(TetId(entity.id), self.inside.flat[entity.id as usize]).into();
+        }
+        let local = self.numbering.inside(entity);
+        Cow::Borrowed(&self.inside.points[local.start as usize..local.end as usize])
     }
 
     fn boundary_blocks(&self) -> usize {
@@ -313,6 +327,33 @@ impl MeshStream for RefinedMesh {
 }
 
 impl RefinedMesh {
+    /// Whether all coordinates are kept, see [`Keep`](super::Keep).
+    pub fn keeps_all(&self) -> bool {
+        self.inside.points.len() == self.numbering.vertices() as usize
+    }
+
+    fn lattices(&self) -> Lattices<'_> {
+        Lattices { mesh: &self.coarse, numbering: &self.numbering, points: &self.inside.points }
+    }
+
+    /// The children of a coarse tet by the points of its lattice.
+    fn children(&self, tet: usize, block: &mut TetBlock) {
+        let lattice = self.numbering.lattice();
+        let children = lattice.children();
+        let diagonals = self.inside.diagonals.of_tet(tet as u32);
+        block.tets.clear();
+        block.tets.reserve(children as usize);
+        for (c, d, cells) in lattice.rows() {
+            let first = lattice.octahedron_row(c, d);
+            push_row(rows_around(lattice, c, d), cells, &mut block.tets, |octahedron| {
+                diagonals.get(first + octahedron)
+            });
+        }
+        block.first_id = self.coarse.tet_ids[tet] * u64::from(children);
+        block.first_local = tet as u64 * u64::from(children);
+        block.body = Some(self.coarse.tet_bodies[tet]);
+    }
+
     /// The global id of a coarse entity.
     fn coarse_id(&self, Entity { dimension, id }: Entity) -> GlobalId {
         let ids = match dimension {
@@ -326,38 +367,28 @@ impl RefinedMesh {
 }
 
 /// Where the four rows of points around a row of cells begin, as [`corner_place`] numbers them.
-fn rows_around(lattice: super::lattice::Lattice, c: u32, d: u32) -> [usize; 4] {
+fn rows_around(lattice: super::lattice::Lattice, c: u32, d: u32) -> [u32; 4] {
     let inside = c + d + 2 <= lattice.n();
-    let row = |c, d| lattice.row(c, d) as usize;
+    let row = |c, d| lattice.row(c, d);
     [row(c, d), row(c + 1, d), row(c, d + 1), if inside { row(c + 1, d + 1) } else { 0 }]
 }
 
-/// Appends the children of a row of cells.
-fn push_row(
-    ids: &[u32],
-    rows: [usize; 4],
-    cells: usize,
-    tets: &mut Vec<[u32; 4]>,
-    diagonal: impl Fn(u32) -> u8,
-) {
+/// Appends the children of a row of cells, by the points of the lattice.
+fn push_row(rows: [u32; 4], cells: u32, tets: &mut Vec<[u32; 4]>, diagonal: impl Fn(u32) -> u8) {
     // The last row of a layer has no fourth row of points beside it; none of its children asks for one.
-    let rows = rows.map(|start| &ids[start..]);
-    let at = |code: u8, cell: usize| {
+    let corner = |code: u8| {
         let (row, shift) = corner_place(code);
-        rows[row][cell + shift]
+        rows[row] + shift as u32
     };
-    let [p, q, r, s] = UPRIGHT;
-    tets.extend((0..cells).map(|cell| [at(p, cell), at(q, cell), at(r, cell), at(s, cell)]));
+    let along = |corners: [u32; 4], cell: u32| corners.map(|corner| corner + cell);
+    let upright = UPRIGHT.map(corner);
+    tets.extend((0..cells).map(|cell| along(upright, cell)));
+    let octahedron = OCTAHEDRON.map(|children| children.map(|child| child.map(corner)));
     for cell in 0..cells - 1 {
-        // By corner code; an octahedron has neither the first nor the last corner of its cell.
-        let corners = [0, at(1, cell), at(2, cell), at(3, cell), at(4, cell), at(5, cell), at(6, cell), 0];
-        for [p, q, r, s] in OCTAHEDRON[usize::from(diagonal(cell as u32))] {
-            let at = |code: u8| corners[usize::from(code & 7)];
-            tets.push([at(p), at(q), at(r), at(s)]);
-        }
+        // A diagonal is below 3.
+        let children = octahedron[usize::from(diagonal(cell) % 3)];
+        tets.extend(children.map(|corners| along(corners, cell)));
     }
-    let [p, q, r, s] = UPSIDE_DOWN;
-    tets.extend(
-        (0..cells.saturating_sub(2)).map(|cell| [at(p, cell), at(q, cell), at(r, cell), at(s, cell)]),
-    );
+    let upside_down = UPSIDE_DOWN.map(corner);
+    tets.extend((0..cells.saturating_sub(2)).map(|cell| along(upside_down, cell)));
 }

@@ -12,11 +12,11 @@
 //! case and below one in practice, far inside 10⁻¹² of the box unless the geometry lies some
 //! thousand box diagonals away from the origin.
 
-use super::RefineError;
 use super::bend::Bends;
 use super::blend::{Blend, barycentric, split};
 use super::lattice::Lattice;
 use super::numbering::Numbering;
+use super::{Keep, RefineError, Settings};
 use crate::Point;
 use crate::dist::DistMesh;
 use crate::geometry::Projector;
@@ -72,24 +72,27 @@ pub fn may_bend(class: Class, projector: &Projector) -> bool {
     matches!(class, Class::Body(_)) || matches!(Place::of(class, projector), Place::Patch(_))
 }
 
-/// The fine vertices, with the coordinates of those in coarse vertices, edges and faces.
+/// The fine vertices that are kept, with the coordinates of those in coarse vertices, edges and faces.
 pub fn boundary_first(
     mesh: &DistMesh,
     projector: &Projector,
     numbering: &Numbering,
-    bends: &Bends,
+    settings: &Settings,
 ) -> Result<Box<[Coordinates]>, RefineError> {
-    let count = numbering.vertices() as usize;
+    let [edge_base, face_base, tet_base] = numbering.bases();
+    let count = match settings.keep {
+        Keep::All => numbering.vertices() as usize,
+        Keep::Boundary => tet_base,
+    };
     let mut points: Box<[Coordinates]> = bytemuck::allocation::try_zeroed_slice_box(count).map_err(|()| {
         RefineError::OutOfMemory { rank: mesh.rank, bytes: (count * size_of::<Coordinates>()) as u64 }
     })?;
-    let [edge_base, face_base, tet_base] = numbering.bases();
     let (vertices, rest) = points.split_at_mut(edge_base);
     for (coordinates, point) in vertices.iter_mut().zip(&mesh.points) {
         *coordinates = (*point).into();
     }
     let (edges, rest) = rest.split_at_mut(face_base - edge_base);
-    let mut failed = fill_edges(mesh, projector, bends, vertices, edges);
+    let mut failed = fill_edges(mesh, projector, &settings.bends, vertices, edges);
     if failed.is_empty() {
         let faces = &mut rest[..tet_base - face_base];
         failed = fill_faces(mesh, projector, numbering, &*vertices, &*edges, faces);

@@ -1,9 +1,13 @@
 //! The refined part with its tets stored, for consumers that need them again and again.
 
 use super::{RefineError, RefinedMesh};
-use crate::mesh::stream::{BoundaryBlock, Counts, MeshStream, TetBlock, VertexBlock};
+use crate::mesh::stream::{
+    BoundaryBlock, Counts, LocalBlock, MeshStream, SingularTags, TetBlock, VertexBlock,
+};
 use crate::mesh::{GlobalId, Rank};
+use crate::periodic::Link;
 use rayon::prelude::*;
+use std::borrow::Cow;
 
 /// A [`RefinedMesh`] and its tets: 16 bytes for each beside the 4 to 5 of the coordinates.
 #[derive(Clone)]
@@ -81,10 +85,34 @@ impl MeshStream for StoredMesh {
         block.first_id = coarse.tet_ids[index] * children as u64;
         block.body = Some(coarse.tet_bodies[index]);
     }
+    fn local_block(&self, index: usize, block: &mut LocalBlock) {
+        self.refined.local_block(index, block);
+    }
+    fn block_ids(&self, block: &LocalBlock, ids: &mut Vec<GlobalId>) {
+        self.refined.block_ids(block, ids);
+    }
+    fn block_points(&self, block: &LocalBlock, points: &mut Vec<[f64; 3]>) {
+        self.refined.block_points(block, points);
+    }
+    fn vertex_points(&self, index: usize) -> Cow<'_, [[f64; 3]]> {
+        self.refined.vertex_points(index)
+    }
     fn boundary_blocks(&self) -> usize {
         self.refined.boundary_blocks()
     }
     fn boundary_block(&self, index: usize, block: &mut BoundaryBlock) {
         self.refined.boundary_block(index, block);
+    }
+    fn links(&self) -> &[Link] {
+        self.refined.links()
+    }
+    fn images(&self, index: usize) -> Vec<(u32, GlobalId)> {
+        self.refined.images(index)
+    }
+    fn singular(&self) -> SingularTags {
+        self.refined.singular()
+    }
+    fn origins(&self) -> Vec<(u32, GlobalId)> {
+        self.refined.origins()
     }
 }

@@ -15,25 +15,41 @@ use crate::check::Fault;
 use crate::dist::DistMesh;
 use crate::geometry::Projector;
 use crate::kernel::predicates::{Sign, orient3d, volume6_and_error};
+use crate::kernel::vector::{Wide, wide};
 use crate::mesh::{GlobalId, TetId};
 use rayon::iter::Either;
 use rayon::prelude::*;
 
-/// Fills the points inside the tets, chooses the diagonals, and checks every child. Also returns the coarse tets with
-/// children that are not positive.
+/// What refinement makes of the inside of the coarse tets.
+#[derive(Clone)]
+pub struct Inside {
+    /// The fine vertices that are kept.
+    pub points: Box<[Coordinates]>,
+    /// The diagonals of the octahedra.
+    pub diagonals: Diagonals,
+    /// Whether a coarse tet's lattice is an affine one.
+    pub flat: Vec<bool>,
+}
+
+/// Fills the points inside the tets, as far as they are kept, chooses the diagonals, and checks every child. Also returns the coarse
+/// tets with children that are not positive.
 pub fn fill(
     mesh: &DistMesh,
     projector: &Projector,
     numbering: &Numbering,
     mut points: Box<[Coordinates]>,
     settings: &Settings,
-) -> (Box<[Coordinates]>, Diagonals, Vec<BadTet>) {
+) -> (Inside, Vec<BadTet>) {
     let lattice = numbering.lattice();
     let mut diagonals = Diagonals::new(mesh.tets.len(), lattice.octahedra());
     let bytes_per_tet = diagonals.bytes_per_tet();
     let (before, inside) = points.split_at_mut(numbering.bases()[2]);
+    let flat: Vec<bool> =
+        (0..mesh.tets.len()).map(|tet| is_flat(mesh, projector, &settings.bends, TetId::new(tet))).collect();
     let insides = match lattice.tet_points() as usize {
-        0 => Either::Left((0..mesh.tets.len()).into_par_iter().map(|_| &mut [] as &mut [Coordinates])),
+        _ if inside.is_empty() => {
+            Either::Left((0..mesh.tets.len()).into_par_iter().map(|_| &mut [] as &mut [Coordinates]))
+        }
         size => Either::Right(inside.par_chunks_mut(size)),
     };
     let plan = Plan::new(lattice);
@@ -41,16 +57,13 @@ pub fn fill(
         let tet = TetId::new(tet);
         block.gather(mesh, numbering, tet, before);
         let corners = mesh.tets[tet.index()].map(|v| before[v.index()]);
-        let flat = is_flat(mesh, projector, &settings.bends, tet);
+        let flat = flat[tet.index()];
         block.fill_odd_part(&plan, &corners, flat);
-        block.fill_inside(&plan);
-        block.scatter(lattice, inside);
         block.bad.clear();
-        if flat {
-            block.cut_evenly(&plan, diagonal::best_of_tet(&corners), bytes);
-        } else {
-            block.cut_each_best(&plan, bytes);
-        }
+        let cut = if flat { Cut::Evenly(diagonal::best_of_tet(&corners)) } else { Cut::EachBest };
+        wide(FillAndCut { block, plan: &plan, cut, bytes });
+        let kept = inside.iter_mut();
+        kept.zip(block.inside(lattice)).for_each(|(kept, point)| *kept = point);
         block.verdict(mesh.tet_ids[tet.index()], lattice, settings.described)
     };
     let bad: Vec<BadTet> = insides
@@ -59,7 +72,41 @@ pub fn fill(
         .map_init(|| Block::new(lattice), fill_one)
         .flatten_iter()
         .collect();
-    (points, diagonals, bad)
+    (Inside { points, diagonals, flat }, bad)
+}
+
+/// The lattice points of a coarse tet, from those on its boundary, the same bits as [`fill`] made.
+pub struct Lattices<'a> {
+    /// The part.
+    pub mesh: &'a DistMesh,
+    /// Its numbering.
+    pub numbering: &'a Numbering,
+    /// The fine vertices, at least those in coarse vertices, edges and faces.
+    pub points: &'a [Coordinates],
+}
+
+impl Lattices<'_> {
+    fn block(&self, tet: TetId, flat: bool) -> Block {
+        let lattice = self.numbering.lattice();
+        let (mut block, plan) = (Block::new(lattice), Plan::new(lattice));
+        block.gather(self.mesh, self.numbering, tet, self.points);
+        let corners = self.mesh.tets[tet.index()].map(|v| self.points[v.index()]);
+        block.fill_odd_part(&plan, &corners, flat);
+        wide(Fill { block: &mut block, plan: &plan });
+        block
+    }
+
+    /// Replaces `points` by all points of the lattice, in its order.
+    pub fn all(&self, tet: TetId, flat: bool, points: &mut Vec<Coordinates>) {
+        let block = self.block(tet, flat);
+        points.clear();
+        points.extend((0..block.ids.len()).map(|i| block.coordinates(i)));
+    }
+
+    /// The points inside the tet, in the order of their ids.
+    pub fn inside(&self, tet: TetId, flat: bool) -> Vec<Coordinates> {
+        self.block(tet, flat).inside(self.numbering.lattice()).collect()
+    }
 }
 
 /// A coarse tet with children that are not positive.
@@ -123,6 +170,51 @@ const PARENTS: [&[[i32; 3]]; 8] = [
     &[[0, -1, 1], [0, 1, -1]],
     &[[1, -1, -1], [-1, 1, 1], [-1, 1, -1], [1, -1, 1], [-1, -1, 1], [1, 1, -1]],
 ];
+
+/// How octahedra are cut.
+enum Cut {
+    /// All along this diagonal.
+    Evenly(u8),
+    /// Each along its own best.
+    EachBest,
+}
+
+/// Fills the inside of a block, in wide registers.
+struct Fill<'a> {
+    block: &'a mut Block,
+    plan: &'a Plan,
+}
+
+impl Wide for Fill<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        self.block.fill_inside(self.plan);
+    }
+}
+
+/// Fills the inside of a block and cuts its octahedra, in wide registers.
+struct FillAndCut<'a> {
+    block: &'a mut Block,
+    plan: &'a Plan,
+    cut: Cut,
+    bytes: &'a mut [u8],
+}
+
+impl Wide for FillAndCut<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Self { block, plan, cut, bytes } = self;
+        block.fill_inside(plan);
+        match cut {
+            Cut::Evenly(diagonal) => block.cut_evenly(plan, diagonal, bytes),
+            Cut::EachBest => block.cut_each_best(plan, bytes),
+        }
+    }
+}
 
 /// The lattice of one coarse tet: local ids and coordinates of its points, and scratch space.
 struct Block {
@@ -192,6 +284,7 @@ impl Block {
     }
 
     /// The dyadic rule inside the tet.
+    #[inline(always)]
     fn fill_inside(&mut self, plan: &Plan) {
         let n = plan.lattice.n();
         let mut step = split(n).1 / 2;
@@ -208,6 +301,7 @@ impl Block {
     }
 
     /// Fills every second point of a row, from `b` on.
+    #[inline(always)]
     fn fill_row(&mut self, plan: &Plan, step: u32, [b, c, d]: [u32; 3]) {
         let odd = |x: u32| (x / step % 2) as usize;
         let parents = PARENTS[odd(b) | odd(c) << 1 | odd(d) << 2];
@@ -235,18 +329,19 @@ impl Block {
         }
     }
 
-    /// Writes the points inside the tet.
-    fn scatter(&self, lattice: Lattice, inside: &mut [Coordinates]) {
-        let [x, y, z] = &self.axes;
-        let mut out = inside.iter_mut();
-        for (first, count) in lattice.interior_rows() {
-            for i in first as usize..(first + count) as usize {
-                *out.next().expect("as many points as interior rows have") = [x[i], y[i], z[i]];
-            }
-        }
+    /// The points inside the tet, in the order of their ids.
+    fn inside(&self, lattice: Lattice) -> impl Iterator<Item = Coordinates> {
+        let row = |(first, count)| (first as usize..(first + count) as usize).map(|i| self.coordinates(i));
+        lattice.interior_rows().flat_map(row)
+    }
+
+    #[inline]
+    fn coordinates(&self, i: usize) -> Coordinates {
+        [self.axes[0][i], self.axes[1][i], self.axes[2][i]]
     }
 
     /// Cuts all octahedra along one diagonal and checks the children.
+    #[inline(always)]
     fn cut_evenly(&mut self, plan: &Plan, diagonal: u8, bytes: &mut [u8]) {
         // Four octahedra to a byte; bits beyond the last octahedron are never read.
         bytes.fill(diagonal * 0b0101_0101);
@@ -261,6 +356,7 @@ impl Block {
     }
 
     /// Cuts each octahedron along its own best diagonal and checks the children.
+    #[inline(always)]
     fn cut_each_best(&mut self, plan: &Plan, bytes: &mut [u8]) {
         for (c, d, cells) in plan.lattice.rows() {
             let rows = plan.around(c, d);
@@ -283,6 +379,7 @@ impl Block {
     }
 
     /// Checks the children of a row of cells that lie in no octahedron.
+    #[inline(always)]
     fn check_others(&mut self, plan: &Plan, rows: [usize; 4], [c, d, cells]: [u32; 3]) {
         let first = plan.lattice.child_row(c, d);
         self.check_run(rows, UPRIGHT, cells, first, 1);
@@ -292,6 +389,7 @@ impl Block {
 
     /// Checks the children with these corners in the first `count` cells of a row; their indices begin at
     /// `first` and are `stride` apart.
+    #[inline(always)]
     fn check_run(&mut self, rows: [usize; 4], corners: [u8; 4], count: u32, first: u32, stride: u32) {
         if count == 0 || self.run(rows, corners, count as usize).all_positive() {
             return;
@@ -302,6 +400,7 @@ impl Block {
     }
 
     /// The verdict on one child by exact sign.
+    #[cold]
     fn check_one(&mut self, rows: [usize; 4], corners: [u8; 4], cell: usize, child: u32) {
         let at = corners.map(|code| {
             let (row, shift) = corner_place(code);
@@ -314,11 +413,11 @@ impl Block {
     }
 
     fn point(&self, i: usize) -> Point {
-        Point::new(self.axes[0][i], self.axes[1][i], self.axes[2][i])
+        Point::from(self.coordinates(i))
     }
 
     /// The corners of the children with these corner codes in the first `count` cells of a row.
-    #[inline]
+    #[inline(always)]
     fn run(&self, rows: [usize; 4], corners: [u8; 4], count: usize) -> Run<'_> {
         let starts = corners.map(|code| {
             let (row, shift) = corner_place(code);
@@ -328,6 +427,7 @@ impl Block {
     }
 
     /// The worst shape and the least certain sign of the children of each octahedron, for each diagonal.
+    #[inline(always)]
     fn measure_octahedra(&mut self, rows: [usize; 4], count: usize) {
         if count == 0 {
             return;
@@ -393,7 +493,7 @@ impl Run<'_> {
     }
 
     /// Whether all are positive beyond doubt.
-    #[inline]
+    #[inline(always)]
     fn all_positive(&self) -> bool {
         let run = self.trimmed();
         let mut certain = true;
@@ -405,7 +505,7 @@ impl Run<'_> {
     }
 
     /// Lowers `shapes` to those of these tets where they are worse, and `certain` to 0 where a sign is not.
-    #[inline]
+    #[inline(always)]
     fn measure(&self, shapes: &mut [f64], certain: &mut [f64]) {
         let run = self.trimmed();
         let (shapes, certain) = (&mut shapes[..self.count], &mut certain[..self.count]);

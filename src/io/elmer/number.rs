@@ -23,7 +23,7 @@ pub(super) struct Numbering {
 /// Callers have made sure that the totals fit 32 bits.
 pub(super) fn number(comm: &dyn Communicator, part: &dyn MeshStream) -> Result<Numbering, WriteError> {
     let rank = part.rank();
-    let mut vertices = vec![0; part.points().len()];
+    let mut vertices = vec![0; part.counts().vertices as usize];
     let mut owned = 0;
     let mut shared = 0;
     for_each_vertex(part, |local, id, block| {

@@ -37,7 +37,7 @@ pub(super) fn periodic_text(
     }
     let (rank, ranks) = (part.rank(), u64::from(comm.size()));
     let mut told: Vec<Vec<[u64; 2]>> = vec![Vec::new(); comm.size() as usize];
-    let mut is_owner = vec![false; part.points().len()];
+    let mut is_owner = vec![false; part.counts().vertices as usize];
     for index in 0..part.vertex_blocks() {
         let block = part.vertex_block(index);
         if !block.on_boundary {

@@ -62,7 +62,8 @@ impl Surface {
         names: &Names,
         path: &Path,
     ) -> Result<u64, WriteError> {
-        let used = |v: &u32| self.to_surface[*v as usize] != UNUSED;
+        // A part that does not keep all points has none of the boundary beyond those it keeps.
+        let used = |v: &u32| self.to_surface.get(*v as usize).is_some_and(|place| *place != UNUSED);
         let file = piece.create(path)?;
         let points: Vec<[f64; 3]> =
             (0..part.points().len() as u32).filter(used).map(|v| part.points()[v as usize]).collect();

@@ -41,7 +41,14 @@ pub(super) fn write(
     path: &Path,
 ) -> Result<u64, WriteError> {
     let file = piece.create(path)?;
-    file.array("Points")?.0.write(bytemuck::cast_slice(part.points()))?;
+    let blocks = part.vertex_blocks();
+    let (vertex_chunks, vertices_per_chunk) = split(blocks, part.counts().vertices, PER_CHUNK);
+    write_chunks([&mut file.array("Points")?.0], vertex_chunks, |chunk, [points]| {
+        for index in items(chunk, vertices_per_chunk, blocks) {
+            points.extend_from_slice(bytemuck::cast_slice(&part.vertex_points(index)));
+        }
+        Ok(())
+    })?;
 
     let (mut connectivity, id) = file.array("connectivity")?;
     let files = [&mut connectivity, &mut file.array("GlobalElementId")?.0, &mut file.array("BodyId")?.0];
@@ -62,8 +69,7 @@ pub(super) fn write(
     file.fill_cells(4, VTK_TETRA)?;
     file.fill("PartitionId", |_| u64::from(part.rank()) + 1)?;
 
-    let blocks = part.vertex_blocks();
-    let (chunks, per_chunk) = split(blocks, part.counts().vertices, PER_CHUNK);
+    let (chunks, per_chunk) = (vertex_chunks, vertices_per_chunk);
     write_chunks([&mut file.array("GlobalNodeId")?.0], chunks, |chunk, [ids]| {
         for index in items(chunk, per_chunk, blocks) {
             part.vertex_block(index).ids().for_each(|global| Kind::I64.push(global, ids));

@@ -1,0 +1,228 @@
+//! What each of many ranks does, holds and sends: the tables of `docs/scaling.md`.
+//!
+//! `cargo bench --bench scaling [-- GEOMETRY COARSE N]`: a geometry file, the number of its coarse tets, the pieces of an edge. Ranks run in this
+//! process for what they send, counted by a communicator around theirs; for times the parts are refined and checked one after the other
+//! on one thread each, as ranks with a core of their own would.
+#![forbid(unsafe_code)]
+#![allow(missing_docs)]
+
+use std::cell::Cell;
+use std::time::Instant;
+use tetmill::comm::{CommError, Communicator, thread};
+use tetmill::dist::{self, DistMesh};
+use tetmill::mesh::{Mesh, Rank};
+use tetmill::pipeline::input::{self, InputSettings};
+use tetmill::pipeline::{CoarseSettings, Model};
+use tetmill::refine::{self, Census, census};
+use tetmill::{check, partition};
+
+const RANKS: [u32; 6] = [1, 4, 16, 64, 256, 1024];
+
+/// A communicator that counts what passes through it.
+struct Counting<'a> {
+    inner: &'a dyn Communicator,
+    calls: Cell<u64>,
+    sent: Cell<u64>,
+    received: Cell<u64>,
+}
+
+impl<'a> Counting<'a> {
+    fn new(inner: &'a dyn Communicator) -> Self {
+        Self { inner, calls: Cell::new(0), sent: Cell::new(0), received: Cell::new(0) }
+    }
+
+    fn count(&self, sent: usize, received: usize) {
+        self.calls.set(self.calls.get() + 1);
+        self.sent.set(self.sent.get() + sent as u64);
+        self.received.set(self.received.get() + received as u64);
+    }
+
+    fn taken(&self) -> [u64; 3] {
+        [&self.calls, &self.sent, &self.received].map(|cell| cell.replace(0))
+    }
+}
+
+fn total(messages: &[Vec<u8>]) -> usize {
+    messages.iter().map(Vec::len).sum()
+}
+
+impl Communicator for Counting<'_> {
+    fn rank(&self) -> Rank {
+        self.inner.rank()
+    }
+    fn size(&self) -> u32 {
+        self.inner.size()
+    }
+    fn barrier(&self) -> Result<(), CommError> {
+        self.count(0, 0);
+        self.inner.barrier()
+    }
+    fn broadcast_bytes(&self, root: Rank, bytes: &mut Vec<u8>) -> Result<(), CommError> {
+        self.inner.broadcast_bytes(root, bytes)?;
+        let mine = self.rank() == root;
+        self.count(if mine { bytes.len() } else { 0 }, if mine { 0 } else { bytes.len() });
+        Ok(())
+    }
+    fn gather_bytes(&self, root: Rank, bytes: &[u8]) -> Result<Vec<Vec<u8>>, CommError> {
+        let all = self.inner.gather_bytes(root, bytes)?;
+        self.count(bytes.len(), total(&all));
+        Ok(all)
+    }
+    fn all_gather_bytes(&self, bytes: &[u8]) -> Result<Vec<Vec<u8>>, CommError> {
+        let all = self.inner.all_gather_bytes(bytes)?;
+        self.count(bytes.len(), total(&all));
+        Ok(all)
+    }
+    fn all_gather_equal_bytes(&self, bytes: &[u8]) -> Result<Vec<u8>, CommError> {
+        let all = self.inner.all_gather_equal_bytes(bytes)?;
+        self.count(bytes.len(), all.len());
+        Ok(all)
+    }
+    fn scatter_bytes(&self, root: Rank, messages: Option<Vec<Vec<u8>>>) -> Result<Vec<u8>, CommError> {
+        let sent = messages.as_deref().map_or(0, total);
+        let own = self.inner.scatter_bytes(root, messages)?;
+        self.count(sent, own.len());
+        Ok(own)
+    }
+    fn exchange_bytes(&self, messages: Vec<(Rank, Vec<u8>)>) -> Result<Vec<(Rank, Vec<u8>)>, CommError> {
+        let bytes = |messages: &[(Rank, Vec<u8>)]| messages.iter().map(|m| m.1.len()).sum();
+        let sent = bytes(&messages);
+        let got = self.inner.exchange_bytes(messages)?;
+        self.count(sent, bytes(&got));
+        Ok(got)
+    }
+}
+
+fn main() {
+    let args: Vec<String> = std::env::args().skip(1).filter(|a| a != "--bench").collect();
+    let default = concat!(env!("CARGO_MANIFEST_DIR"), "/geometries/crankshaft.geo").to_string();
+    let geometry = args.first().unwrap_or(&default);
+    let number = |k: usize, other: u32| args.get(k).map_or(other, |text| text.parse().expect("a number"));
+    let (coarse, n) = (number(1, 100_000), number(2, 8));
+
+    let model = input::read(&[std::path::PathBuf::from(geometry)], &InputSettings::default(), &mut |_| ())
+        .expect("a geometry");
+    let start = Instant::now();
+    let mesh = coarse_mesh(&model, coarse.into());
+    let tets = mesh.tets.len();
+    println!(
+        "{geometry}: {tets} coarse tets in {:.2} s, {n} pieces an edge: {} tets",
+        start.elapsed().as_secs_f64(),
+        tets as u64 * u64::from(n).pow(3)
+    );
+
+    println!(
+        "\n| ranks | partition s | cut faces | imbalance | distribute s | rank 0 sends MB | largest piece kB | refine s, mean and most | M tets/s a core | check s, mean and most | each sends B | each gets kB |"
+    );
+    println!("|---|---|---|---|---|---|---|---|---|---|---|---|");
+    let counted: Vec<(u32, Vec<DistMesh>)> = RANKS
+        .into_iter()
+        .filter(|&ranks| tets >= ranks as usize)
+        .map(|ranks| (ranks, row(&model, &mesh, ranks, n)))
+        .collect();
+
+    for wanted in [tets as u64 * u64::from(n).pow(3), 100_000_000_000, 1_000_000_000_000] {
+        let n = refine::pieces_for(tets as u64, wanted);
+        println!("\n{n} pieces an edge, {:.3e} tets:\n", tets as f64 * f64::from(n).powi(3));
+        println!(
+            "| ranks | tets of a rank, mean and most | GB of coordinates, most | GB of those on boundaries and interfaces | shared %, mean and most | owned share, most over mean | neighbours, mean and most |"
+        );
+        println!("|---|---|---|---|---|---|---|");
+        counted.iter().for_each(|(ranks, parts)| census_row(*ranks, parts, n));
+    }
+}
+
+fn coarse_mesh(model: &Model, tets: u64) -> Mesh {
+    let mut settings = CoarseSettings::default();
+    let fits = |made| made >= tets && made <= tets + tets / 2;
+    let (made, _) =
+        tetmill::pipeline::target::mesh_to_target(model, &mut settings, tets, &fits).expect("a mesh");
+    made.mesh
+}
+
+/// Distributes, refines and checks; prints what that took.
+fn row(model: &Model, mesh: &Mesh, ranks: u32, n: u32) -> Vec<DistMesh> {
+    let start = Instant::now();
+    let (rank_of, metrics) =
+        partition::partition(mesh, ranks, &partition::Settings::default()).expect("a partition");
+    let partition_seconds = start.elapsed().as_secs_f64();
+    let projector = model.projector();
+
+    let start = Instant::now();
+    let sent = thread::run(ranks, |comm| {
+        let counting = Counting::new(comm);
+        let given = (comm.rank() == 0).then(|| (mesh.clone(), rank_of.clone()));
+        let part = dist::distribute(&counting, given).expect("a classified mesh");
+        (part, counting.taken())
+    });
+    let distribute_seconds = start.elapsed().as_secs_f64();
+    let (parts, sent): (Vec<DistMesh>, Vec<[u64; 3]>) = sent.expect("no rank fails").into_iter().unzip();
+
+    let alone = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
+    let (mut refining, mut checking) = (Vec::new(), Vec::new());
+    for part in &parts {
+        alone.install(|| {
+            let start = Instant::now();
+            let part =
+                refine::refine(part.clone(), &projector, n, &refine::Settings::default()).expect("refinable");
+            refining.push(start.elapsed().as_secs_f64());
+            let start = Instant::now();
+            let report = check::check_part(&part, Some(&projector), &check::Settings::default());
+            let _ = check::checksum(&part);
+            checking.push(start.elapsed().as_secs_f64());
+            assert_eq!(report.faults, 0);
+        });
+    }
+    // What the check of all ranks sends, with two pieces an edge: it does not grow with them.
+    let messages = thread::run(ranks, |comm| {
+        let counting = Counting::new(comm);
+        let part = parts[comm.rank() as usize].clone();
+        let part = refine::refine(part, &projector, 2, &refine::Settings::default()).expect("refinable");
+        check::check(&counting, &part, Some(&projector), &check::Settings::default()).expect("all ranks");
+        check::checksum_of_all(&counting, &part).expect("all ranks");
+        counting.taken()
+    });
+    let messages = messages.expect("no rank fails");
+
+    let largest =
+        |numbers: &[[u64; 3]], which: usize| numbers.iter().map(|m| m[which]).max().unwrap_or(0) as f64;
+    let mean = |seconds: &[f64]| seconds.iter().sum::<f64>() / seconds.len() as f64;
+    let most = |seconds: &[f64]| seconds.iter().copied().fold(0.0, f64::max);
+    let tets = mesh.tets.len() as f64 * f64::from(n).powi(3);
+    println!(
+        "| {ranks} | {partition_seconds:.2} | {} | {:.3} | {distribute_seconds:.2} | {:.1} | {:.0} | {:.3} {:.3} | {:.0} | {:.3} {:.3} | {:.0} | {:.1} |",
+        metrics.edge_cut,
+        metrics.imbalance,
+        largest(&sent, 1) / 1e6,
+        largest(&sent, 2) / 1e3,
+        mean(&refining),
+        most(&refining),
+        tets / refining.iter().sum::<f64>() / 1e6,
+        mean(&checking),
+        most(&checking),
+        largest(&messages, 1),
+        largest(&messages, 2) / 1e3,
+    );
+    parts
+}
+
+/// What the parts would hold and share with `n` pieces an edge, told without refining them.
+fn census_row(ranks: u32, parts: &[DistMesh], n: u32) {
+    let all: Vec<Census> = parts.iter().map(|part| census(part, n)).collect();
+    let mean = |of: &dyn Fn(&Census) -> f64| all.iter().map(of).sum::<f64>() / all.len() as f64;
+    let most = |of: &dyn Fn(&Census) -> f64| all.iter().map(of).fold(0.0, f64::max);
+    let shared = |c: &Census| 100.0 * c.shared as f64 / c.held as f64;
+    let neighbours = |c: &Census| c.neighbours.len() as f64;
+    println!(
+        "| {ranks} | {:.3e} {:.3e} | {:.2} | {:.3} | {:.2} {:.2} | {:.3} | {:.1} {:.0} |",
+        mean(&|c| c.tets as f64),
+        most(&|c| c.tets as f64),
+        most(&|c| c.bytes[0] as f64) / 1e9,
+        most(&|c| c.bytes[1] as f64) / 1e9,
+        mean(&shared),
+        most(&shared),
+        most(&Census::owned_share) / mean(&Census::owned_share),
+        mean(&neighbours),
+        most(&neighbours),
+    );
+}

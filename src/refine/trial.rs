@@ -1,0 +1,69 @@
+//! What snapping would make of a coarse mesh: its curved tets, refined for a trial, a few at a time.
+
+use super::mend::extract;
+use super::snap;
+use super::tet::inverted;
+use super::{Bends, RefineError, RefinedMesh, Settings, refine_unchecked};
+use crate::check::shape::{BATCH, Batch, Shapes};
+use crate::dist::DistMesh;
+use crate::geometry::Projector;
+use crate::mesh::stream::{MeshStream, TetBlock};
+use crate::mesh::{GlobalId, TetId};
+use rayon::prelude::*;
+
+/// Tets tried at a time: bounds the memory of a trial.
+pub(super) const CHUNK: usize = 8192;
+
+/// What a trial found.
+#[derive(Clone, Debug, Default)]
+pub struct Trial {
+    /// Coarse tets whose worst child is positive, but worse than asked for, ascending.
+    pub poor: Vec<GlobalId>,
+    /// Coarse tets with children that are not positive, ascending.
+    pub inverted: Vec<GlobalId>,
+    /// The error that says so of the first of them.
+    pub error: Option<RefineError>,
+}
+
+/// *Local, on the whole mesh.* Refines the coarse tets that snapping bends, to `pieces` an edge, and finds those with a child whose mean
+/// ratio is below `least`.
+///
+/// # Errors
+/// Vertices that cannot be snapped, and memory, as [`refine()`](super::refine()).
+pub fn trial(mesh: &DistMesh, projector: &Projector, pieces: u32, least: f64) -> Result<Trial, RefineError> {
+    let mut found = Trial::default();
+    let settings = Settings::default();
+    for chunk in curved(mesh, projector).chunks(CHUNK) {
+        let (refined, bad) = refine_unchecked(extract(mesh, chunk), projector, pieces, &settings)?;
+        let id = |at: usize| mesh.tet_ids[chunk[at] as usize];
+        found.inverted.extend(bad.iter().map(|bad| bad.tet));
+        let worst: Vec<f64> = (0..chunk.len()).into_par_iter().map(|at| worst_child(&refined, at)).collect();
+        let is_poor = |at: &usize| worst[*at] < least && found.inverted.binary_search(&id(*at)).is_err();
+        found.poor.extend((0..chunk.len()).filter(is_poor).map(id));
+        if found.error.is_none() && !bad.is_empty() {
+            found.error = Some(inverted(&bad, settings.described));
+        }
+    }
+    Ok(found)
+}
+
+/// The tets whose lattices are not affine, ascending.
+pub(super) fn curved(mesh: &DistMesh, projector: &Projector) -> Vec<u32> {
+    let is_curved = |tet: &u32| !snap::is_flat(mesh, projector, &Bends::default(), TetId(*tet));
+    (0..mesh.tets.len() as u32).filter(is_curved).collect()
+}
+
+/// The worst mean ratio of the children of a coarse tet.
+pub(super) fn worst_child(refined: &RefinedMesh, tet: usize) -> f64 {
+    let (mut block, mut batch, mut shapes) = (TetBlock::default(), Batch::default(), Shapes::default());
+    refined.tet_block(tet, &mut block);
+    let points = refined.points();
+    let mut worst = 1.0_f64;
+    for tets in block.tets.chunks(BATCH) {
+        batch.clear();
+        tets.iter().for_each(|tet| batch.push(0, tet.map(|v| points[v as usize])));
+        batch.volumes(&mut shapes);
+        worst = worst.min(batch.shapes(&mut shapes).mean_ratio);
+    }
+    worst
+}
