@@ -21,9 +21,24 @@ pub fn machine() -> String {
     std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default()
 }
 
+/// Bytes in the unit that suits.
+pub fn sized(bytes: u64) -> String {
+    let units = ["B", "kB", "MB", "GB", "TB"];
+    let power = (bytes.max(1).ilog10() / 3).min(4);
+    let value = bytes as f64 / 1000f64.powi(power as i32);
+    let decimals = if power == 0 { 0 } else { 1 };
+    format!("{value:.decimals$} {}", units[power as usize])
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn bytes_are_shown_in_the_unit_that_suits() {
+        assert_eq!(sized(999), "999 B");
+        assert_eq!(sized(1_500_000), "1.5 MB");
+    }
 
     #[test]
     fn the_peak_grows_with_what_is_touched() {

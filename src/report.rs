@@ -2,6 +2,7 @@
 
 use crate::check::PartReport;
 use crate::io::Written;
+use crate::memory::sized;
 use crate::partition::Metrics;
 use crate::periodic::Checked;
 use crate::pipeline::generate::Level;
@@ -224,15 +225,6 @@ fn cut_into(pieces: u32) -> String {
     }
 }
 
-/// Bytes in the unit that suits.
-fn sized(bytes: u64) -> String {
-    let units = ["B", "kB", "MB", "GB", "TB"];
-    let power = (bytes.max(1).ilog10() / 3).min(4);
-    let value = bytes as f64 / 1000f64.powi(power as i32);
-    let decimals = if power == 0 { 0 } else { 1 };
-    format!("{value:.decimals$} {}", units[power as usize])
-}
-
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Entities { bodies, corners, curves, patches } = self.entities;
@@ -328,7 +320,5 @@ mod tests {
         assert_eq!(grouped(1_234_567), "1 234 567");
         assert_eq!(grouped(12), "12");
         assert_eq!(grouped(123_456), "123 456");
-        assert_eq!(sized(999), "999 B");
-        assert_eq!(sized(1_500_000), "1.5 MB");
     }
 }

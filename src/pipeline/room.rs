@@ -3,7 +3,7 @@
 use crate::comm::Communicator;
 use crate::dist::DistMesh;
 use crate::error::{Failure, Status, agree};
-use crate::memory;
+use crate::memory::{self, sized};
 use crate::mesh::Rank;
 use crate::progress::Progress;
 use crate::refine::lattice::Lattice;
@@ -19,10 +19,6 @@ pub struct Disk {
     pub bytes: [u64; 3],
     /// The most vertices or tets that all formats can number.
     pub most: Option<u64>,
-}
-
-fn gigabytes(bytes: u64) -> f64 {
-    bytes as f64 / 1e9
 }
 
 /// *Local.* Refuses, on rank 0, what the disk cannot hold or a format cannot number.
@@ -56,10 +52,10 @@ pub(super) fn refuse_without_disk(
         Ok(available) if needed > available => Err(Failure::new(
             Status::Resources,
             format!(
-                "the files take {:.1} GB or more and {} has {:.1} GB free: write elsewhere, take another format, or ask for fewer tets",
-                gigabytes(needed),
+                "the files take {} or more and {} has {} free: write elsewhere, take another format, or ask for fewer tets",
+                sized(needed),
                 there.display(),
-                gigabytes(available)
+                sized(available)
             ),
         )),
         _ => Ok(()),
@@ -89,11 +85,11 @@ pub(super) fn what_fits(
     let Some(available) = memory.or_else(memory::available_bytes) else { return Ok(Keep::All) };
     let refused = (least > available).then(|| {
         let message = format!(
-            "the fine vertices take {:.1} GB, those on boundaries and interfaces alone {:.1} GB, and this machine has {:.1} GB \
+            "the fine vertices take {}, those on boundaries and interfaces alone {}, and this machine has {} \
              left: take fewer levels or tets, or more machines",
-            gigabytes(all),
-            gigabytes(least),
-            gigabytes(available)
+            sized(all),
+            sized(least),
+            sized(available)
         );
         Failure::new(Status::Resources, message)
     });
@@ -102,10 +98,10 @@ pub(super) fn what_fits(
         return Ok(Keep::All);
     }
     progress.note(&format!(
-        "note: the fine vertices take {:.1} GB, above the {:.1} GB there are: those inside coarse tets are computed anew wherever they \
+        "note: the fine vertices take {}, above the {} there are: those inside coarse tets are computed anew wherever they \
          are needed",
-        gigabytes(all),
-        gigabytes(available)
+        sized(all),
+        sized(available)
     ));
     Ok(Keep::Boundary)
 }
@@ -125,7 +121,7 @@ mod tests {
         assert!(refusal([1, 1, 1], None).is_none());
         let refused = refusal([0, 1 << 50, 0], None).expect("6·8 tets of 2⁵⁰ bytes are 54 PB");
         assert_eq!(refused.status, Status::Resources);
-        assert!(refused.to_string().contains("take 54043195.5 GB or more"), "{refused}");
+        assert!(refused.to_string().contains("take 54043.2 TB or more"), "{refused}");
         assert!(refusal([0; 3], Some(48)).is_none());
         assert!(
             refusal([0; 3], Some(47))
