@@ -8,35 +8,43 @@ pub const DEGREES: usize = 180;
 /// Cells of the table that narrows the search down: except near 0° and 180° a cell has one bound between degrees at most.
 const CELLS: usize = 4096;
 
-struct Table {
-    /// The cosines of 0°, 1°, …, 180°.
-    cosines: Vec<f64>,
+/// Degrees by their cosines; look it up once for many.
+pub struct Table {
+    /// The cosines of 0°, 1°, …, 179°, then what no cosine is below.
+    cosines: [f64; 257],
     /// For each cell of [−1, 1], the places nearest to a multiple of its width, the bin of its upper end.
-    first: Vec<u8>,
+    first: [u8; 2 * CELLS],
 }
 
 static TABLE: LazyLock<Table> = LazyLock::new(|| {
-    let cosines: Vec<f64> = (0..=DEGREES).map(|k| (k as f64).to_radians().cos()).collect();
-    let first = (0..=CELLS).map(|cell| {
+    let cosine = |k: usize| if k < DEGREES { (k as f64).to_radians().cos() } else { f64::NEG_INFINITY };
+    let cosines: [f64; 257] = std::array::from_fn(cosine);
+    let first = |cell: usize| {
         // A little more than half a width, for what rounding adds.
         let upper = 2.0 * (cell as f64 + 0.51) / CELLS as f64 - 1.0;
         (1..DEGREES).take_while(|&k| cosines[k] >= upper).count() as u8
-    });
-    let first = first.collect();
-    Table { cosines, first }
+    };
+    Table { cosines, first: std::array::from_fn(first) }
 });
 
-/// The whole degrees of the angle with this cosine: 0 to 179. A cosine beyond ±1 by rounding counts as ±1.
-#[inline]
-pub fn whole_degrees(cosine: f64) -> usize {
-    let table = &*TABLE;
-    let mut degrees = usize::from(table.first[cell(cosine)]);
-    // Nearly always one step or none: the first without a branch.
-    degrees += usize::from(cosine <= table.cosines[degrees + 1] && degrees < DEGREES - 1);
-    while degrees < DEGREES - 1 && cosine <= table.cosines[degrees + 1] {
-        degrees += 1;
+impl Table {
+    /// The table.
+    pub fn get() -> &'static Self {
+        &TABLE
     }
-    degrees
+
+    /// The whole degrees of the angle with this cosine: 0 to 179. A cosine beyond ±1 by rounding counts as ±1.
+    #[inline(always)]
+    pub fn whole_degrees(&self, cosine: f64) -> usize {
+        // The lengths of the tables leave no index out.
+        let mut degrees = self.first[cell(cosine) % (2 * CELLS)];
+        // Nearly always one step or none: the first without a branch.
+        degrees += u8::from(cosine <= self.cosines[usize::from(degrees) + 1]);
+        while cosine <= self.cosines[usize::from(degrees) + 1] {
+            degrees += 1;
+        }
+        usize::from(degrees)
+    }
 }
 
 /// The cell of a cosine. A whole number appears in the last bits of a float that is large enough: a conversion that vector registers
@@ -56,10 +64,11 @@ mod tests {
 
     #[test]
     fn whole_degrees_are_those_of_the_inverse_cosine() {
+        let table = Table::get();
         for k in 0..=20_000 {
             let angle = (f64::from(k) + 0.5) * 180.0 / 20_001.0;
-            assert_eq!(whole_degrees(angle.to_radians().cos()), angle as usize, "{angle}");
+            assert_eq!(table.whole_degrees(angle.to_radians().cos()), angle as usize, "{angle}");
         }
-        assert_eq!([1.1, 1.0, -1.0, -1.1].map(whole_degrees), [0, 0, 179, 179]);
+        assert_eq!([1.1, 1.0, -1.0, -1.1].map(|cosine| table.whole_degrees(cosine)), [0, 0, 179, 179]);
     }
 }

@@ -106,7 +106,8 @@ fn of_tets(stream: &dyn MeshStream, index: usize, scratch: &mut Scratch) -> Chec
     let body = block.tets.body.map_or(u64::MAX, |body| u64::from(body.0)) ^ KEYS[5];
     let mut sum = Checksum::default();
     for (id, tet) in (block.tets.first_id..).zip(&block.tets.tets) {
-        let [p, q, r, s] = tet.map(|k| places[k as usize]);
+        let at = |corner: usize| places[tet[corner] as usize];
+        let (p, q, r, s) = (at(0), at(1), at(2), at(3));
         let first = fold(p[0] ^ KEYS[0], q[0] ^ KEYS[1]);
         let second = fold(r[0] ^ KEYS[2], s[0] ^ KEYS[3]);
         sum.tets = sum.tets.wrapping_add(fold(first ^ id.wrapping_mul(KEYS[4] | 1), second ^ body));

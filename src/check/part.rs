@@ -251,11 +251,12 @@ fn add_shapes(batch: &Batch, shapes: &Shapes, found: Extremes, report: &mut Opti
             .take_extremes(worst, smallest, largest);
     }
     let Some(report) = report else { return };
+    let degrees_of = angles::Table::get();
     for lane in 0..batch.len() {
         let ratio = shapes.mean_ratio[lane];
         report.sum_of_ratios += ratio;
         report.ratios[((ratio * RATIO_BINS as f64) as usize).min(RATIO_BINS - 1)] += 1;
-        report.smallest_angles[angles::whole_degrees(shapes.smallest[lane])] += 1;
-        report.largest_angles[angles::whole_degrees(shapes.largest[lane])] += 1;
+        report.smallest_angles[degrees_of.whole_degrees(shapes.smallest[lane])] += 1;
+        report.largest_angles[degrees_of.whole_degrees(shapes.largest[lane])] += 1;
     }
 }

@@ -380,14 +380,15 @@ fn push_row(rows: [u32; 4], cells: u32, tets: &mut Vec<[u32; 4]>, diagonal: impl
         let (row, shift) = corner_place(code);
         rows[row] + shift as u32
     };
-    let along = |corners: [u32; 4], cell: u32| corners.map(|corner| corner + cell);
+    // Written out: closures in `map` are not always inlined, and these are made by the billion.
+    let along = |[p, q, r, s]: [u32; 4], cell: u32| [p + cell, q + cell, r + cell, s + cell];
     let upright = UPRIGHT.map(corner);
     tets.extend((0..cells).map(|cell| along(upright, cell)));
     let octahedron = OCTAHEDRON.map(|children| children.map(|child| child.map(corner)));
     for cell in 0..cells - 1 {
         // A diagonal is below 3.
-        let children = octahedron[usize::from(diagonal(cell) % 3)];
-        tets.extend(children.map(|corners| along(corners, cell)));
+        let [p, q, r, s] = octahedron[usize::from(diagonal(cell) % 3)];
+        tets.extend_from_slice(&[along(p, cell), along(q, cell), along(r, cell), along(s, cell)]);
     }
     let upside_down = UPSIDE_DOWN.map(corner);
     tets.extend((0..cells.saturating_sub(2)).map(|cell| along(upside_down, cell)));
