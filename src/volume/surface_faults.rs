@@ -125,12 +125,13 @@ impl SurfaceFault {
 pub struct SurfaceFaults(pub Vec<SurfaceFault>);
 
 impl SurfaceFaults {
-    /// The pairs of triangles that intersect or overlap: what a finer triangulation of the same geometry may mend.
+    /// The pairs of triangles that intersect, overlap or are the same (two sides of a thin lens): what a finer triangulation of the same
+    /// geometry may mend.
     pub fn crossings(&self) -> impl Iterator<Item = [u32; 2]> + '_ {
         self.0.iter().filter_map(|fault| match fault {
-            SurfaceFault::Intersect { triangles, .. } | SurfaceFault::Overlap { triangles, .. } => {
-                Some(*triangles)
-            }
+            SurfaceFault::Intersect { triangles, .. }
+            | SurfaceFault::Overlap { triangles, .. }
+            | SurfaceFault::Twice { triangles, .. } => Some(*triangles),
             _ => None,
         })
     }
