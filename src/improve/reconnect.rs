@@ -12,6 +12,7 @@
 use crate::improve::complex::Complex;
 use crate::improve::objective::{INVERTED, Objective};
 use crate::improve::swap::{commit, least_after};
+use crate::kernel::simplex::from_lowest;
 use crate::mesh::TET_FACES;
 
 /// The sizes of the holes that are tried, in tets.
@@ -52,17 +53,6 @@ type Choice = ([u8; 3], Vec<(u8, f64)>);
 struct Scores {
     /// For each quadruple in ascending order its score, and whether that order is the positive one; no number where not yet known.
     known: Vec<(f64, bool)>,
-}
-
-/// A face from its lowest vertex on.
-fn face([a, b, c]: [u8; 3]) -> [u8; 3] {
-    if a < b && a < c {
-        [a, b, c]
-    } else if b < c {
-        [b, c, a]
-    } else {
-        [c, a, b]
-    }
 }
 
 fn other_side([a, b, c]: [u8; 3]) -> [u8; 3] {
@@ -184,7 +174,7 @@ impl Reconnector {
             for (k, corners) in TET_FACES.iter().enumerate() {
                 let is_inside = complex.neighbour(t, k).is_some_and(|(next, _)| self.hole.contains(&next));
                 if !is_inside {
-                    self.front.push(face(corners.map(|i| local[i])));
+                    self.front.push(from_lowest(corners.map(|i| local[i])));
                 }
             }
         }
@@ -227,7 +217,7 @@ impl Reconnector {
             let before = self.front.clone();
             self.filling.push((tet, score));
             for corners in TET_FACES {
-                self.meet(face(corners.map(|k| tet[k])));
+                self.meet(from_lowest(corners.map(|k| tet[k])));
             }
             self.fill(complex, objective, worst.min(score));
             self.filling.pop();
@@ -259,7 +249,7 @@ impl Reconnector {
                 let score = self.scores.of(complex, objective, &self.vertices, [apex, a, b, c]);
                 // Its other faces must not be in the front the other way round: something is there already.
                 let sides = [[a, b, apex], [b, c, apex], [c, a, apex]];
-                if score > self.least && !sides.iter().any(|&s| self.front.contains(&face(s))) {
+                if score > self.least && !sides.iter().any(|&s| self.front.contains(&from_lowest(s))) {
                     apexes.push((apex, score));
                     if apexes.len() >= fewest {
                         break;

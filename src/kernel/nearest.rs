@@ -67,10 +67,10 @@ fn in_sides(p: &Point, corners: [&Point; 3]) -> [f64; 3] {
 /// Where on a segment, from 0 to 1, its nearest point to `p` is, and its squared distance.
 #[inline]
 pub(crate) fn in_segment(p: &Point, a: &Point, b: &Point) -> (f64, f64) {
-    let along = b - a;
+    let (along, to) = (b - a, p - a);
     let length = along.norm_squared();
-    let t = if length > 0.0 { (along.dot(&(p - a)) / length).clamp(0.0, 1.0) } else { 0.0 };
-    (t, (p - (a + along * t)).norm_squared())
+    let t = if length > 0.0 { (along.dot(&to) / length).clamp(0.0, 1.0) } else { 0.0 };
+    (t, (to - along * t).norm_squared())
 }
 
 /// The point with these weights. Exactly a corner where it is one.

@@ -1,5 +1,6 @@
 //! Volumes, areas and angles of simplices.
 
+use super::nearest::in_segment;
 use crate::{Point, Vector};
 
 /// Six times the signed volume of the tet a, b, c, d: (b−a)×(c−a)·(d−a). Not an exact sign.
@@ -52,6 +53,17 @@ pub fn dihedral_cosines(p: &[Point; 4]) -> [f64; 6] {
     ]
 }
 
+/// The corners of a triangle from the lowest on, in the same sense: its name among those that are looked for.
+pub fn from_lowest<T: Ord>([a, b, c]: [T; 3]) -> [T; 3] {
+    if a < b && a < c {
+        [a, b, c]
+    } else if b < c {
+        [b, c, a]
+    } else {
+        [c, a, b]
+    }
+}
+
 /// The squared distance of a point from a triangle.
 pub fn squared_distance(point: &Point, corners: [&Point; 3]) -> f64 {
     let [a, b, c] = corners;
@@ -60,11 +72,7 @@ pub fn squared_distance(point: &Point, corners: [&Point; 3]) -> f64 {
     if edges.iter().all(|[u, v]| normal.cross(&(*v - *u)).dot(&(point - *u)) >= 0.0) {
         return (point - a).dot(&normal).powi(2) / normal.norm_squared();
     }
-    let to_edge = |[u, v]: [&Point; 2]| {
-        let (along, to) = (v - u, point - u);
-        (to - along * (to.dot(&along) / along.norm_squared()).clamp(0.0, 1.0)).norm_squared()
-    };
-    edges.map(to_edge).into_iter().fold(f64::INFINITY, f64::min)
+    edges.map(|[u, v]| in_segment(point, u, v).1).into_iter().fold(f64::INFINITY, f64::min)
 }
 
 #[cfg(test)]

@@ -289,10 +289,9 @@ fn fill_bodies(
     let mut segments = surface.segments;
     segments.iter_mut().for_each(|s| s.vertices = s.vertices.map(renumbered));
     let is_side = are_sides(&segments, &triangles);
-    let loose: Vec<Segment> =
-        segments.iter().zip(&is_side).filter(|(_, side)| !**side).map(|(s, _)| *s).collect();
-    let mut is_side = is_side.into_iter();
-    segments.retain(|_| is_side.next() == Some(true));
+    let (sides, loose): (Vec<_>, Vec<_>) = segments.into_iter().zip(is_side).partition(|(_, side)| *side);
+    let [mut segments, loose] =
+        [sides, loose].map(|part| part.into_iter().map(|(s, _)| s).collect::<Vec<_>>());
 
     let corners: Vec<[u32; 3]> = triangles.iter().map(|t| t.vertices.map(|v| v.0)).collect();
     let beside = triangles.iter().map(|t| regions(t.patch)).collect();

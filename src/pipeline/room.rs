@@ -5,8 +5,10 @@ use crate::dist::DistMesh;
 use crate::error::{Failure, Status, agree};
 use crate::memory::{self, sized};
 use crate::mesh::Rank;
+use crate::mesh::stream::Counts;
 use crate::progress::Progress;
 use crate::refine::lattice::Lattice;
+use crate::refine::numbering::fine_totals;
 use crate::refine::{Keep, census};
 use std::path::{Path, PathBuf};
 
@@ -32,13 +34,7 @@ pub(super) fn refuse_without_disk(
     disk: Option<&Disk>,
 ) -> Result<(), Failure> {
     let Some(Disk { folder, bytes, most }) = disk.filter(|_| rank == 0) else { return Ok(()) };
-    let lattice = Lattice::new(pieces);
-    let totals = &part.totals;
-    let inside = [1, lattice.edge_points(), lattice.face_points(), lattice.tet_points()].map(u64::from);
-    let coarse = [totals.vertices, totals.edges, totals.faces, totals.tets];
-    let vertices: u64 = coarse.iter().zip(inside).map(|(count, size)| count * size).sum();
-    let tets = totals.tets * u64::from(lattice.children());
-    let boundary = totals.boundary * u64::from(lattice.face_children());
+    let Counts { vertices, tets, boundary } = fine_totals(&part.totals, Lattice::new(pieces));
     if let Some(most) = most.filter(|most| tets > *most || vertices > *most) {
         let message = format!(
             "{tets} tets with {vertices} vertices are more than {most}, the most that a format numbers: take another format, or fewer"

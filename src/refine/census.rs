@@ -31,7 +31,7 @@ impl Census {
 /// *Local.* Counts what this rank's part would have with `n` pieces an edge.
 pub fn census(mesh: &DistMesh, n: u32) -> Census {
     let lattice = Lattice::new(n);
-    let sizes = [1, lattice.edge_points(), lattice.face_points()].map(u64::from);
+    let [on_boundary @ .., inside_tet] = lattice.points_inside().map(u64::from);
     let totals = [mesh.totals.vertices, mesh.totals.edges, mesh.totals.faces];
     let kinds: [(&[GlobalId], &Shared); 3] = [
         (&mesh.vertex_ids, &mesh.shared_vertices),
@@ -41,7 +41,7 @@ pub fn census(mesh: &DistMesh, n: u32) -> Census {
     let mut census =
         Census { tets: mesh.tets.len() as u64 * u64::from(lattice.children()), ..Census::default() };
     let mut first = 0;
-    for ((ids, shared), (size, total)) in kinds.into_iter().zip(sizes.into_iter().zip(totals)) {
+    for ((ids, shared), (size, total)) in kinds.into_iter().zip(on_boundary.into_iter().zip(totals)) {
         census.held += ids.len() as u64 * size;
         census.shared += shared.len() as u64 * size;
         census.owned += (ids.len() - shared.len()) as u64 * size;
@@ -52,7 +52,7 @@ pub fn census(mesh: &DistMesh, n: u32) -> Census {
         }
         first += total * size;
     }
-    let inside = mesh.tets.len() as u64 * u64::from(lattice.tet_points());
+    let inside = mesh.tets.len() as u64 * inside_tet;
     census.bytes = [census.held + inside, census.held].map(|vertices| 24 * vertices);
     census.held += inside;
     census.owned += inside;

@@ -81,6 +81,11 @@ impl Lattice {
         choose3(self.n + 3)
     }
 
+    /// Points inside a coarse vertex, edge, face and tet.
+    pub fn points_inside(self) -> [u32; 4] {
+        [1, self.edge_points(), self.face_points(), self.tet_points()]
+    }
+
     /// Points inside an edge.
     pub fn edge_points(self) -> u32 {
         self.n - 1

@@ -9,7 +9,7 @@
 
 use super::RefineError;
 use super::lattice::{Lattice, MAX_PIECES};
-use crate::dist::DistMesh;
+use crate::dist::{DistMesh, Totals};
 use crate::mesh::stream::Counts;
 use crate::mesh::{GlobalId, TET_EDGES, TET_FACES, TetId};
 use std::ops::Range;
@@ -48,6 +48,20 @@ pub struct Entity {
     pub id: u32,
 }
 
+/// Counts of the whole fine mesh of a coarse one.
+pub fn fine_totals(coarse: &Totals, lattice: Lattice) -> Counts {
+    let counts = [coarse.vertices, coarse.edges, coarse.faces, coarse.tets];
+    Counts {
+        vertices: counts
+            .into_iter()
+            .zip(lattice.points_inside())
+            .map(|(count, size)| count * u64::from(size))
+            .sum(),
+        tets: coarse.tets * u64::from(lattice.children()),
+        boundary: coarse.boundary * u64::from(lattice.face_children()),
+    }
+}
+
 impl Numbering {
     /// Numbers the vertices of the lattices with `n` pieces.
     pub fn new(mesh: &DistMesh, n: u32) -> Result<Self, RefineError> {
@@ -55,7 +69,7 @@ impl Numbering {
             return Err(RefineError::Pieces { n });
         }
         let lattice = Lattice::new(n);
-        let sizes = [1, lattice.edge_points(), lattice.face_points(), lattice.tet_points()];
+        let sizes = lattice.points_inside();
         let counts = [mesh.points.len(), mesh.edges.len(), mesh.faces.len(), mesh.tets.len()];
         let all = [mesh.totals.vertices, mesh.totals.edges, mesh.totals.faces, mesh.totals.tets];
         let needed: u128 = counts.iter().zip(sizes).map(|(&c, s)| c as u128 * u128::from(s)).sum();
@@ -69,12 +83,7 @@ impl Numbering {
             global += all[dimension] * u64::from(kind.size);
             kind
         });
-        let totals = Counts {
-            vertices: global,
-            tets: mesh.totals.tets * u64::from(lattice.children()),
-            boundary: mesh.totals.boundary * u64::from(lattice.face_children()),
-        };
-        Ok(Self { lattice, kinds, vertices: local, totals })
+        Ok(Self { lattice, kinds, vertices: local, totals: fine_totals(&mesh.totals, lattice) })
     }
 
     /// The lattice.

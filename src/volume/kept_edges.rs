@@ -15,7 +15,7 @@
 //! Where the search finds nothing the point stays: the edge is then a chain of edges of the mesh.
 
 use super::constraints::{Constraints, Place};
-use super::crossing::{Crossing, tets_around, trace};
+use super::crossing::{Crossing, trace};
 use super::recover::{DEEPEST, Recovery};
 use super::small::{self, Effort};
 use super::tetrahedra::{NONE, Tetrahedra};
@@ -172,19 +172,12 @@ impl Recovery<'_> {
         Ok(found)
     }
 
-    /// Puts a point on a missing edge where it crosses the mesh, near its middle first.
+    /// Puts a point on a missing edge where it crosses the mesh.
     fn split_kept_edge(&mut self, a: u32, b: u32) -> Option<u32> {
         let found = self.what_is_met(a, b).ok()?;
         let edge = self.constraints.line_of(a, b);
         let room = self.room_on_line(a, b, Place::Edge(edge));
-        let mut order: Vec<usize> = (0..found.len()).collect();
-        order.sort_by_key(|&i| (2 * i + 1).abs_diff(found.len()));
-        let added = order.into_iter().find_map(|i| {
-            let point = self.crossing_point(a, b, found[i]);
-            let tets = tets_around(self.mesh, found[i]);
-            self.add_steiner(&tets, point, &room)
-        });
-        added.or_else(|| self.split_between(a, b, &found, &room))
+        self.split_at(a, b, &found, &room)
     }
 
     /// Takes a point off the kept edge that it splits, if that can be.

@@ -11,7 +11,7 @@
 use crate::Point;
 use crate::kernel::predicates::{Sign, orient3d};
 use crate::kernel::quality::mean_ratio;
-use crate::kernel::simplex::volume6;
+use crate::kernel::simplex::{from_lowest, volume6};
 use std::collections::HashMap;
 
 /// How long to search.
@@ -44,7 +44,7 @@ pub(super) fn fill(
     }
     let corners: Vec<&Point> = vertices.iter().map(|&v| &points[v as usize]).collect();
     let number = |v: u32| vertices.binary_search(&v).expect("a vertex of the skin") as u8;
-    let skin: Vec<Face> = skin.iter().map(|f| turned(f.map(number))).collect();
+    let skin: Vec<Face> = skin.iter().map(|f| from_lowest(f.map(number))).collect();
     let volume = |&f: &Face| {
         let [a, b, c] = f.map(|i| corners[i as usize]);
         volume6(corners[0], a, b, c)
@@ -65,17 +65,6 @@ pub(super) fn fill(
 
 /// Numbers of corners; the lowest first.
 type Face = [u8; 3];
-
-/// A face with its lowest vertex first, in the same sense.
-fn turned([a, b, c]: Face) -> Face {
-    if a < b && a < c {
-        [a, b, c]
-    } else if b < c {
-        [b, c, a]
-    } else {
-        [c, a, b]
-    }
-}
 
 /// Whether the segment between two corners goes through a face of the skin: then it is no edge.
 fn is_outside(corners: &[&Point], skin: &[Face], [u, v]: [u8; 2]) -> bool {
@@ -143,7 +132,7 @@ impl Search<'_> {
                 let v = choice.apex;
                 // A face that is open already cannot be open twice.
                 let doubled =
-                    [[a, b, v], [b, c, v], [c, a, v]].iter().any(|&f| self.open.contains(&turned(f)));
+                    [[a, b, v], [b, c, v], [c, a, v]].iter().any(|&f| self.open.contains(&from_lowest(f)));
                 choice.volume <= self.room && !doubled
             };
             let choices: Vec<Choice> = self.known[&face].iter().filter(fits).copied().collect();
@@ -188,9 +177,9 @@ impl Search<'_> {
         self.open.retain(|&f| f != face);
         // What is left sees the tet's other faces from behind; one that was open is closed.
         for [u, v] in [[a, b], [b, c], [c, a]] {
-            match self.open.iter().position(|&f| f == turned([v, u, apex])) {
+            match self.open.iter().position(|&f| f == from_lowest([v, u, apex])) {
                 Some(i) => drop(self.open.swap_remove(i)),
-                None => self.open.push(turned([u, v, apex])),
+                None => self.open.push(from_lowest([u, v, apex])),
             }
         }
     }

@@ -60,7 +60,7 @@ impl Recovery<'_> {
         p + (q - p) * fraction.clamp(0.0, 1.0)
     }
 
-    /// Puts a Steiner point on a missing edge where it crosses the mesh, the crossing in the middle first.
+    /// Puts a Steiner point on a missing edge where it crosses the mesh.
     pub(super) fn split_edge(&mut self, a: u32, b: u32) -> Option<u32> {
         let mut found = std::mem::take(&mut self.found);
         crossings(self.mesh, a, b, &mut self.star, &mut found);
@@ -68,14 +68,7 @@ impl Recovery<'_> {
         split.retain(|&f| self.constraints.facets[f as usize].vertices.contains(&b));
         let triangle = self.constraints.facets[*split.first()? as usize].triangle;
         let room = self.room_on_edge(a, b, triangle);
-        let mut order: Vec<usize> = (0..found.len()).collect();
-        order.sort_by_key(|&i| (2 * i + 1).abs_diff(found.len()));
-        let added = order.into_iter().find_map(|i| {
-            let point = self.crossing_point(a, b, found[i]);
-            let tets = tets_around(self.mesh, found[i]);
-            self.add_steiner(&tets, point, &room)
-        });
-        let added = added.or_else(|| self.split_between(a, b, &found, &room));
+        let added = self.split_at(a, b, &found, &room);
         self.found = found;
         let p = added?;
         for f in split {
@@ -89,9 +82,21 @@ impl Recovery<'_> {
         Some(p)
     }
 
+    /// Puts a Steiner point on a missing edge at one of its crossings, that in the middle first, else between two.
+    pub(super) fn split_at(&mut self, a: u32, b: u32, found: &[Crossing], room: &Room) -> Option<u32> {
+        let mut order: Vec<usize> = (0..found.len()).collect();
+        order.sort_by_key(|&i| (2 * i + 1).abs_diff(found.len()));
+        let added = order.into_iter().find_map(|i| {
+            let point = self.crossing_point(a, b, found[i]);
+            let tets = tets_around(self.mesh, found[i]);
+            self.add_steiner(&tets, point, room)
+        });
+        added.or_else(|| self.split_between(a, b, found, room))
+    }
+
     /// Puts a Steiner point on a missing edge inside a tet that it goes through, the longest way first. Where the edge
     /// passes close by other edges its crossings let no point be put on them: shorter pieces are easier.
-    pub(super) fn split_between(&mut self, a: u32, b: u32, found: &[Crossing], room: &Room) -> Option<u32> {
+    fn split_between(&mut self, a: u32, b: u32, found: &[Crossing], room: &Room) -> Option<u32> {
         let first = match *found.first()? {
             Crossing::Face(first) => first,
             // The way to an edge lies in the face between: a little beside the crossing there is more room.

@@ -131,33 +131,21 @@ fn line([a, b]: [&Surface; 2], tolerance: f64) -> Option<Found> {
         }
         (Surface::EllipticCylinder(c), Surface::Plane(p)) => (1, plane_on_cylinder(c, p, tolerance)?),
         (Surface::Cone(c), Surface::Plane(p)) => {
-            let (u, v) = tangents(&c.axis);
-            let (point, radii, rate) = (c.point, [c.radius; 2], c.slope / c.radius);
-            (
-                1,
-                plane_on_cone(
-                    &EllipticCone { point, axes: [u, v], radii, axis: c.axis, rate },
-                    p,
-                    tolerance,
-                )?,
-            )
+            (1, plane_on_cone(&as_elliptic(c.point, c.axis, c.radius, c.slope), p, tolerance)?)
         }
         (Surface::Nappe(c), Surface::Plane(p)) => {
-            let (u, v) = tangents(&c.axis);
-            let (point, radii, rate) = (c.point, [c.radius; 2], c.slope / c.radius);
-            (
-                1,
-                plane_on_cone(
-                    &EllipticCone { point, axes: [u, v], radii, axis: c.axis, rate },
-                    p,
-                    tolerance,
-                )?,
-            )
+            (1, plane_on_cone(&as_elliptic(c.point, c.axis, c.radius, c.slope), p, tolerance)?)
         }
         (Surface::EllipticCone(c), Surface::Plane(p)) => (1, plane_on_cone(c, p, tolerance)?),
         _ => return None,
     };
     Some(Found { carrier, auxiliary, is_alone: true })
+}
+
+/// A circular cone as an elliptic one: `radius` at `point`, growing by `slope` per unit along `axis`.
+fn as_elliptic(point: Point, axis: Vector, radius: f64, slope: f64) -> EllipticCone {
+    let (u, v) = tangents(&axis);
+    EllipticCone { point, axes: [u, v], radii: [radius; 2], axis, rate: slope / radius }
 }
 
 /// The part of a vector across a unit vector.
