@@ -120,6 +120,15 @@ fn the_quality_of_a_level_is_that_of_a_mesh_with_so_many_levels() {
 }
 
 #[test]
+fn four_levels_keep_six_tenths_of_the_smallest_angle() {
+    for name in ["dome", "capsule", "lens", "ice_cream"] {
+        let report = crate::common::report_of(&own(name), &["--preset", "coarse", "--levels", "4"]);
+        let angle = |level: usize| report["quality_by_level"][level]["smallest_dihedral"].as_f64().unwrap();
+        assert!(angle(4) >= 0.6 * angle(0), "{name}: {}° of {}°", angle(4), angle(0));
+    }
+}
+
+#[test]
 fn a_wanted_number_of_tets_is_reached_within_half_more() {
     for (name, wanted) in [("nozzle", 4000), ("bracket", 8000), ("dome", 3000)] {
         let report = crate::common::report_of(&own(name), &["--coarse", &wanted.to_string()]);

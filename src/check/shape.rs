@@ -45,6 +45,20 @@ pub struct Extremes {
     pub largest: f64,
 }
 
+impl Extremes {
+    /// What no tet is worse than.
+    pub const NONE: Self = Self { mean_ratio: 1.0, smallest: -1.0, largest: 1.0 };
+
+    /// Those of two sets of tets together.
+    pub fn with(self, other: Self) -> Self {
+        Self {
+            mean_ratio: self.mean_ratio.min(other.mean_ratio),
+            smallest: self.smallest.max(other.smallest),
+            largest: self.largest.min(other.largest),
+        }
+    }
+}
+
 impl Default for Shapes {
     fn default() -> Self {
         let zero = [0.0; BATCH];

@@ -5,7 +5,7 @@ use super::model::Model;
 use crate::dist::{self, DistError};
 use crate::geometry::Projector;
 use crate::mesh::{GlobalId, Mesh, TET_EDGES};
-use crate::refine::{self, RefineError, Trial};
+use crate::refine::{self, Least, RefineError, Trial};
 use crate::size::Source;
 
 /// Why no coarse mesh was found that can be refined.
@@ -26,44 +26,57 @@ pub enum MendError {
 const MOST_ROUNDS: u64 = 20;
 
 /// Rounds in which sizes are lowered also where children would only be poor.
-const POOR_ROUNDS: u64 = 3;
+const POOR_ROUNDS: u64 = 5;
 
 /// Lattices are tried with as many pieces an edge at most. With 4 the 4 levels of NETGEN's `matrix` at `very-coarse` had 712
 /// inverted tets that no trial had shown; with 16 the directions at vertices are near their limits.
 const TRIED_PIECES: u32 = 16;
 
-/// The worst child may lose this much of the worst mean ratio that the coarse mesh has without snapping.
+/// What the worst child must keep of the coarse mesh's smallest dihedral angle, and of its worst mean ratio without snapping.
 const KEPT: f64 = 0.6;
 
-/// Coarse meshes better than this may lose more: curvature alone costs that much where there are few elements to a radius.
+/// Mean ratios better than this may lose more: curvature alone costs that much where there are few elements to a radius.
 const GOOD: f64 = 0.35;
 
 /// Tets around an inverted child are asked to be smaller by this.
 const LOWERED: f64 = 0.6;
 
 /// Makes coarse meshes with `make`, which is given the places where sizes must be lowered, until the lattice
-/// of `pieces` an edge has no inverted child, and few poor ones.
+/// of `pieces` an edge has no inverted child, and no poor one. Where poor ones stay, the best of the meshes is taken. What `make`
+/// says of its mesh is passed on.
 ///
 /// # Errors
 /// What failed in the end.
-pub fn refinable(
+pub fn refinable<T>(
     model: &Model,
     pieces: u32,
-    mut make: impl FnMut(&[Source]) -> Result<CoarseMesh, CoarseError>,
-) -> Result<CoarseMesh, MendError> {
+    mut make: impl FnMut(&[Source]) -> Result<(CoarseMesh, T), CoarseError>,
+) -> Result<(CoarseMesh, T), MendError> {
     let mut sources = Vec::new();
+    let mut best: Option<(f64, (CoarseMesh, T))> = None;
     for round in 0.. {
-        let mut coarse = make(&sources)?;
-        let tried = try_out(model, &coarse, pieces.min(TRIED_PIECES))?;
-        let poor: &[GlobalId] = if round < POOR_ROUNDS { &tried.poor } else { &[] };
-        if tried.inverted.is_empty() && poor.is_empty() {
-            coarse.report.size_corrections += round;
-            return Ok(coarse);
+        let mut made = make(&sources)?;
+        made.0.report.size_corrections += round;
+        let tried = try_out(model, &made.0, pieces.min(TRIED_PIECES))?;
+        for tets in [&tried.inverted, &tried.poor] {
+            sources.extend(lowered(&made.0.mesh, tets));
         }
-        match tried.error {
-            Some(error) if round == MOST_ROUNDS => return Err(error.into()),
-            _ => [&tried.inverted, poor].map(|tets| sources.extend(lowered(&coarse.mesh, tets))),
-        };
+        if tried.inverted.is_empty() {
+            if tried.poor.is_empty() {
+                return Ok(made);
+            }
+            if best.as_ref().is_none_or(|(angle, _)| tried.smallest_dihedral > *angle) {
+                best = Some((tried.smallest_dihedral, made));
+            }
+        }
+        if round >= POOR_ROUNDS
+            && let Some((_, made)) = best
+        {
+            return Ok(made);
+        }
+        if let Some(error) = tried.error.filter(|_| round == MOST_ROUNDS) {
+            return Err(error.into());
+        }
     }
     unreachable!("the loop ends by itself")
 }
@@ -76,7 +89,11 @@ fn try_out(model: &Model, coarse: &CoarseMesh, pieces: u32) -> Result<Trial, Men
         return Ok(Trial::default());
     }
     let part = dist::from_serial(coarse.mesh.clone())?;
-    let least = KEPT * coarse.report.quality.worst_refined.min(GOOD);
+    let quality = &coarse.report.quality;
+    let least = Least {
+        mean_ratio: KEPT * quality.worst_refined.min(GOOD),
+        dihedral: KEPT * quality.smallest_dihedral,
+    };
     Ok(refine::trial(&part, &projector, pieces, least)?)
 }
 

@@ -82,13 +82,7 @@ pub(super) fn mesh_as_wanted(
         coarse
     };
     let to_target = |tets: u64, pieces: u32, fits: &dyn Fn(u64) -> bool| {
-        let mut outcome = Outcome::Reached;
-        let made = mend::refinable(model, pieces, |more| {
-            let (made, how) = mesh_to_target(model, &mut with(more), tets, fits)?;
-            outcome = how;
-            Ok(made)
-        });
-        made.map(|made| (made, outcome))
+        mend::refinable(model, pieces, |more| mesh_to_target(model, &mut with(more), tets, fits))
     };
     match wanted {
         Wanted::Elements(count) if let Model::Given(given) = model => {
@@ -96,8 +90,9 @@ pub(super) fn mesh_as_wanted(
             Ok((pieces, model.coarse_mesh(&mut settings.clone())?, None))
         }
         Wanted::Sizes { pieces } => {
-            let made = mend::refinable(model, pieces, |more| model.coarse_mesh(&mut with(more)))?;
-            Ok((pieces, made, None))
+            let make = |more: &[Source]| Ok((model.coarse_mesh(&mut with(more))?, None));
+            let (made, outcome) = mend::refinable(model, pieces, make)?;
+            Ok((pieces, made, outcome))
         }
         Wanted::Coarse { tets, pieces } => {
             let (made, outcome) = to_target(tets, pieces, &|made| made >= tets && made <= tets + tets / 2)?;

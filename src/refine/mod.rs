@@ -33,7 +33,7 @@ pub use census::{Census, census};
 pub use mend::{Mended, mend};
 pub use refined::RefinedMesh;
 pub use stored::StoredMesh;
-pub use trial::{Trial, trial};
+pub use trial::{Least, Trial, trial};
 
 #[cfg(test)]
 pub(crate) mod fixtures;

@@ -4,7 +4,7 @@ use super::mend::extract;
 use super::snap;
 use super::tet::inverted;
 use super::{Bends, RefineError, RefinedMesh, Settings, refine_unchecked};
-use crate::check::shape::{BATCH, Batch, Shapes};
+use crate::check::shape::{BATCH, Batch, Extremes, Shapes};
 use crate::dist::DistMesh;
 use crate::geometry::Projector;
 use crate::mesh::stream::{MeshStream, TetBlock};
@@ -14,35 +14,60 @@ use rayon::prelude::*;
 /// Tets tried at a time: bounds the memory of a trial.
 pub(super) const CHUNK: usize = 8192;
 
+/// What is asked of children.
+#[derive(Clone, Copy, Debug)]
+pub struct Least {
+    /// The least mean ratio.
+    pub mean_ratio: f64,
+    /// The least dihedral angle, degrees.
+    pub dihedral: f64,
+}
+
 /// What a trial found.
 #[derive(Clone, Debug, Default)]
 pub struct Trial {
-    /// Coarse tets whose worst child is positive, but worse than asked for, ascending.
+    /// Coarse tets whose children are positive, but one worse than asked for, ascending.
     pub poor: Vec<GlobalId>,
+    /// The smallest dihedral angle of the children of poor tets, degrees; 0 if there are none.
+    pub smallest_dihedral: f64,
     /// Coarse tets with children that are not positive, ascending.
     pub inverted: Vec<GlobalId>,
     /// The error that says so of the first of them.
     pub error: Option<RefineError>,
 }
 
-/// *Local, on the whole mesh.* Refines the coarse tets that snapping bends, to `pieces` an edge, and finds those with a child whose mean
-/// ratio is below `least`.
+/// *Local, on the whole mesh.* Refines the coarse tets that snapping bends, to `pieces` an edge, and finds those with a child below
+/// `least`.
 ///
 /// # Errors
 /// Vertices that cannot be snapped, and memory, as [`refine()`](super::refine()).
-pub fn trial(mesh: &DistMesh, projector: &Projector, pieces: u32, least: f64) -> Result<Trial, RefineError> {
+pub fn trial(
+    mesh: &DistMesh,
+    projector: &Projector,
+    pieces: u32,
+    least: Least,
+) -> Result<Trial, RefineError> {
     let mut found = Trial::default();
     let settings = Settings::default();
+    let mut worst_of_poor = Extremes::NONE;
+    let cosine = least.dihedral.to_radians().cos();
     for chunk in curved(mesh, projector).chunks(CHUNK) {
         let (refined, bad) = refine_unchecked(extract(mesh, chunk), projector, pieces, &settings)?;
         let id = |at: usize| mesh.tet_ids[chunk[at] as usize];
         found.inverted.extend(bad.iter().map(|bad| bad.tet));
-        let worst: Vec<f64> = (0..chunk.len()).into_par_iter().map(|at| worst_child(&refined, at)).collect();
-        let is_poor = |at: &usize| worst[*at] < least && found.inverted.binary_search(&id(*at)).is_err();
-        found.poor.extend((0..chunk.len()).filter(is_poor).map(id));
+        let worst: Vec<Extremes> =
+            (0..chunk.len()).into_par_iter().map(|at| worst_children(&refined, at)).collect();
+        let is_below = |worst: &Extremes| worst.mean_ratio < least.mean_ratio || worst.smallest > cosine;
+        let is_poor = |at: &usize| is_below(&worst[*at]) && found.inverted.binary_search(&id(*at)).is_err();
+        let poor: Vec<usize> = (0..chunk.len()).filter(is_poor).collect();
+        worst_of_poor = poor.iter().fold(worst_of_poor, |all, &at| all.with(worst[at]));
+        found.poor.extend(poor.into_iter().map(id));
         if found.error.is_none() && !bad.is_empty() {
             found.error = Some(inverted(&bad, settings.described));
         }
+    }
+    if !found.poor.is_empty() {
+        found.smallest_dihedral = worst_of_poor.smallest.acos().to_degrees();
     }
     Ok(found)
 }
@@ -55,15 +80,20 @@ pub(super) fn curved(mesh: &DistMesh, projector: &Projector) -> Vec<u32> {
 
 /// The worst mean ratio of the children of a coarse tet.
 pub(super) fn worst_child(refined: &RefinedMesh, tet: usize) -> f64 {
+    worst_children(refined, tet).mean_ratio
+}
+
+/// The worst mean ratio and the most extreme angles of the children of a coarse tet.
+fn worst_children(refined: &RefinedMesh, tet: usize) -> Extremes {
     let (mut block, mut batch, mut shapes) = (TetBlock::default(), Batch::default(), Shapes::default());
     refined.tet_block(tet, &mut block);
     let points = refined.points();
-    let mut worst = 1.0_f64;
+    let mut worst = Extremes::NONE;
     for tets in block.tets.chunks(BATCH) {
         batch.clear();
         tets.iter().for_each(|tet| batch.push(0, tet.map(|v| points[v as usize])));
         batch.volumes(&mut shapes);
-        worst = worst.min(batch.shapes(&mut shapes).mean_ratio);
+        worst = worst.with(batch.shapes(&mut shapes));
     }
     worst
 }
