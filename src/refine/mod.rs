@@ -23,6 +23,7 @@ pub mod lattice;
 pub mod mend;
 pub mod numbering;
 pub mod refined;
+mod run;
 pub mod snap;
 pub mod stored;
 mod tet;
