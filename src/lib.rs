@@ -13,6 +13,7 @@ pub mod io;
 pub mod kernel;
 pub mod memory;
 pub mod mesh;
+pub mod migrate;
 pub mod partition;
 pub mod periodic;
 pub mod picture;

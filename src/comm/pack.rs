@@ -5,6 +5,9 @@
 //! ```
 //! The receiver takes them in the order in which the sender put them. Nothing says their types:
 //! the two functions of a pair stand beside each other.
+//!
+//! Small numbers, such as the differences of ascending ids, may travel as **varints**: seven bits a byte, the lowest first,
+//! the eighth bit where more follow (LEB128).
 
 use bytemuck::{Pod, cast_slice, cast_slice_mut};
 
@@ -38,6 +41,54 @@ pub fn take<T: Pod>(message: &mut &[u8]) -> Vec<T> {
     numbers(values)
 }
 
+/// Appends a number as a varint: one byte below 128, two below 16384, ten at most.
+#[inline]
+pub fn put_varint(message: &mut Vec<u8>, mut value: u64) {
+    while value >= 0x80 {
+        message.push(value as u8 | 0x80);
+        value >>= 7;
+    }
+    message.push(value as u8);
+}
+
+/// Takes the next varint from the front of the message.
+///
+/// # Panics
+/// If the message ends within it: sender and receiver do not agree on what is sent.
+#[inline]
+pub fn take_varint(message: &mut &[u8]) -> u64 {
+    let mut value = 0;
+    for (place, byte) in message.iter().enumerate() {
+        value |= u64::from(byte & 0x7f) << (7 * place);
+        if *byte < 0x80 {
+            *message = &message[place + 1..];
+            return value;
+        }
+    }
+    panic!("a message ends within a number");
+}
+
+/// Appends numbers that ascend (equal ones allowed) as varints of their differences; the first is that to 0.
+pub fn put_ascending(message: &mut Vec<u8>, values: impl IntoIterator<Item = u64>) {
+    let mut previous = 0;
+    for value in values {
+        put_varint(message, value - previous);
+        previous = value;
+    }
+}
+
+/// Takes `count` numbers that [`put_ascending`] put.
+///
+/// # Panics
+/// As [`take_varint`].
+pub fn take_ascending(message: &mut &[u8], count: usize) -> impl Iterator<Item = u64> {
+    let mut previous = 0;
+    (0..count).map(move |_| {
+        previous += take_varint(message);
+        previous
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -55,6 +106,19 @@ mod tests {
         assert_eq!((floats[0], floats[1].to_bits()), (1.5, (-0.0f64).to_bits()));
         assert!(take::<u32>(&mut rest).is_empty());
         assert_eq!(take::<[u64; 2]>(&mut rest), [[1, 2], [3, u64::MAX]]);
+        assert!(rest.is_empty());
+    }
+
+    #[test]
+    fn varints_come_out_as_they_went_in_and_small_ones_are_short() {
+        let mut message = Vec::new();
+        let values = [0, 1, 127, 128, 16_383, 16_384, u64::MAX];
+        values.into_iter().for_each(|value| put_varint(&mut message, value));
+        assert_eq!(message.len(), 1 + 1 + 1 + 2 + 2 + 3 + 10);
+        put_ascending(&mut message, [5, 5, 9]);
+        let mut rest = &message[..];
+        assert!(values.into_iter().all(|value| take_varint(&mut rest) == value));
+        assert_eq!(take_ascending(&mut rest, 3).collect::<Vec<_>>(), [5, 5, 9]);
         assert!(rest.is_empty());
     }
 }

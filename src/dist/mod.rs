@@ -10,16 +10,21 @@
 //!          |__\            the same global id and the same class.
 //! ```
 //!
-//! [`distribute()`] makes it from a mesh on rank 0; [`DistMesh::check`] says whether the ranks agree.
+//! [`distribute()`] makes it from a mesh on rank 0; [`DistMesh::check`] says whether the ranks agree. Of a part that came from
+//! elsewhere only tets and vertices are known, a [`BareMesh`]: [`settle()`] finds its edges and faces.
 
+mod bare;
 mod check;
 mod classify;
 mod distribute;
 mod piece;
+mod settle;
 mod shared;
 
+pub use bare::{BareMesh, LaidEdge, Side};
 pub use check::Faults;
 pub use distribute::{DistError, distribute, from_serial};
+pub use settle::{SettleError, settle};
 pub use shared::owner;
 
 use crate::Point;
@@ -70,7 +75,7 @@ pub struct Totals {
 /// Edges and faces list their vertices by ascending global id.
 ///
 /// Not kept here: ghost tets.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct DistMesh {
     /// This rank.
     pub rank: Rank,

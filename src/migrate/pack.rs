@@ -1,0 +1,295 @@
+//! What travels with the tets that leave for one rank: all of it by places in the message's own list of vertices.
+//!
+//! ```text
+//!   counts | vertices: ids, classes, coordinates | tets: ids, bodies, corners | sides | edges
+//! ```
+//! Ids ascend and travel as differences, one byte each where they follow one another; bodies as runs; corners in as many bytes as
+//! the number of vertices needs. A clump of tets takes some 20 bytes a tet, of which coordinates are 5.
+
+use crate::comm::pack::{put_ascending, put_varint, take_ascending, take_varint};
+use crate::dist::{BareMesh, LaidEdge, Side};
+use crate::mesh::{Class, GlobalId, Rank, TET_EDGES, TetId, VertexId};
+use csg::{BodyId, CornerId, CurveId, PatchId};
+
+/// What a vertex is to the tets that stay, and to those that leave.
+const STAYS: u8 = 1;
+const LEAVES: u8 = 2;
+/// It is an end of an edge on a curve or patch that a leaving tet has.
+const AT_LEAVING_EDGE: u8 = 4;
+
+/// The kind of letter that a load is.
+const LOAD: u8 = 0;
+
+/// What of a part stays.
+pub(super) struct Kept {
+    /// The tets, ascending.
+    pub tets: Vec<u32>,
+    /// By vertex, whether a tet that stays has it.
+    pub vertices: Vec<bool>,
+    /// By edge on a curve or patch, the same.
+    pub edges: Vec<bool>,
+    /// The sides of the tets that stay, by tet in the old part.
+    pub sides: Vec<Side>,
+}
+
+/// What leaves a part, and what stays.
+pub(super) struct Leaving {
+    /// One load for each rank that gets tets, by ascending rank.
+    pub letters: Vec<(Rank, Vec<u8>)>,
+    /// The vertices in each load, ascending.
+    pub vertices: Vec<(Rank, Vec<u32>)>,
+    pub kept: Kept,
+    leaving_tets: u64,
+}
+
+impl Leaving {
+    /// The number of tets that leave.
+    pub fn tets(&self) -> u64 {
+        self.leaving_tets
+    }
+}
+
+/// Packs the tets that leave.
+pub(super) fn pack(mesh: &BareMesh, destination: &[Rank]) -> Leaving {
+    let mut counts = vec![0usize; mesh.ranks as usize];
+    destination.iter().for_each(|&to| counts[to as usize] += 1);
+    let mut tets_to: Vec<Vec<u32>> = counts.iter().map(|&count| Vec::with_capacity(count)).collect();
+    (0..).zip(destination).for_each(|(tet, &to)| tets_to[to as usize].push(tet));
+    let mut sides_to = vec![Vec::new(); mesh.ranks as usize];
+    mesh.sides.iter().for_each(|side| sides_to[destination[side.tet.index()] as usize].push(*side));
+
+    let mut flags = vec![0u8; mesh.points.len()];
+    let mut place = vec![u32::MAX; mesh.points.len()];
+    let (mut letters, mut vertices) = (Vec::new(), Vec::new());
+    let mut leaving_edges = Vec::new();
+    let mut leaving_tets = 0;
+    for to in (0..mesh.ranks).filter(|&to| to != mesh.rank && counts[to as usize] > 0) {
+        let tets = std::mem::take(&mut tets_to[to as usize]);
+        leaving_tets += tets.len() as u64;
+        let used = used_vertices(mesh, &tets, &mut place);
+        let edges = laid_edges(mesh, &tets);
+        let load = load(mesh, &tets, &used, &place, &sides_to[to as usize], &edges);
+        for &v in &used {
+            place[v as usize] = u32::MAX;
+            flags[v as usize] |= LEAVES;
+        }
+        leaving_edges.extend(edges);
+        letters.push((to, load));
+        vertices.push((to, used));
+    }
+    leaving_edges.sort_unstable();
+    leaving_edges.dedup();
+    for &edge in &leaving_edges {
+        mesh.edges[edge as usize].vertices.iter().for_each(|v| flags[v.index()] |= AT_LEAVING_EDGE);
+    }
+    let tets = std::mem::take(&mut tets_to[mesh.rank as usize]);
+    let edges = kept_edges(mesh, &tets, &mut flags, &leaving_edges);
+    let kept = Kept {
+        tets,
+        vertices: flags.iter().map(|flags| flags & STAYS != 0).collect(),
+        edges,
+        sides: std::mem::take(&mut sides_to[mesh.rank as usize]),
+    };
+    Leaving { letters, vertices, kept, leaving_tets }
+}
+
+/// The vertices of some tets, ascending; `place` gets where each stands among them.
+fn used_vertices(mesh: &BareMesh, tets: &[u32], place: &mut [u32]) -> Vec<u32> {
+    let mut used = Vec::with_capacity(tets.len() / 2 + 4);
+    for &tet in tets {
+        for v in mesh.tets[tet as usize] {
+            if place[v.index()] == u32::MAX {
+                place[v.index()] = 0;
+                used.push(v.0);
+            }
+        }
+    }
+    used.sort_unstable();
+    (0..).zip(&used).for_each(|(at, &v)| place[v as usize] = at);
+    used
+}
+
+/// The ends of the edges of a tet, ascending, that may lie on a curve or patch: both ends do, as `may` says.
+fn edges_between(tet: &[VertexId; 4], may: impl Fn(VertexId) -> bool) -> impl Iterator<Item = [VertexId; 2]> {
+    let may = tet.map(may);
+    TET_EDGES.into_iter().filter(move |[i, j]| may[*i] && may[*j]).map(|[i, j]| {
+        let (a, b) = (tet[i], tet[j]);
+        [a.min(b), a.max(b)]
+    })
+}
+
+fn find_edge(mesh: &BareMesh, ends: &[VertexId; 2]) -> Option<u32> {
+    mesh.edges.binary_search_by(|edge| edge.vertices.cmp(ends)).ok().map(|index| index as u32)
+}
+
+/// The edges of some tets that lie on curves and patches, ascending.
+fn laid_edges(mesh: &BareMesh, tets: &[u32]) -> Vec<u32> {
+    let on_boundary = |v: VertexId| !matches!(mesh.vertex_classes[v.index()], Class::Body(_));
+    let ends = tets.iter().flat_map(|&tet| edges_between(&mesh.tets[tet as usize], on_boundary));
+    let mut edges: Vec<u32> = ends.filter_map(|ends| find_edge(mesh, &ends)).collect();
+    edges.sort_unstable();
+    edges.dedup();
+    edges
+}
+
+/// Marks the vertices of the tets that stay, and tells for each edge on a curve or patch whether one of them has it. Only those that a
+/// leaving tet has must be looked for.
+fn kept_edges(mesh: &BareMesh, tets: &[u32], flags: &mut [u8], leaving: &[u32]) -> Vec<bool> {
+    let mut kept = vec![true; mesh.edges.len()];
+    leaving.iter().for_each(|&edge| kept[edge as usize] = false);
+    for &t in tets {
+        let tet = &mesh.tets[t as usize];
+        let mut at_leaving = 0;
+        for v in tet {
+            let flags = &mut flags[v.index()];
+            *flags |= STAYS;
+            at_leaving += *flags & AT_LEAVING_EDGE;
+        }
+        if at_leaving >= 2 * AT_LEAVING_EDGE {
+            let may = |v: VertexId| flags[v.index()] & AT_LEAVING_EDGE != 0;
+            for edge in edges_between(tet, may).filter_map(|ends| find_edge(mesh, &ends)) {
+                kept[edge as usize] = true;
+            }
+        }
+    }
+    kept
+}
+
+/// A class as one number.
+fn code(class: Class) -> u64 {
+    let (kind, id) = match class {
+        Class::Corner(id) => (0, id.0),
+        Class::Curve(id) => (1, id.0),
+        Class::Patch(id) => (2, id.0),
+        Class::Body(id) => (3, id.0),
+    };
+    u64::from(id) << 2 | kind
+}
+
+/// The inverse of [`code`].
+fn class(code: u64) -> Class {
+    let id = (code >> 2) as u32;
+    match code & 3 {
+        0 => Class::Corner(CornerId(id)),
+        1 => Class::Curve(CurveId(id)),
+        2 => Class::Patch(PatchId(id)),
+        _ => Class::Body(BodyId(id)),
+    }
+}
+
+/// How many bytes a place among `vertices` takes.
+fn width(vertices: usize) -> usize {
+    match vertices {
+        0..=0x100 => 1,
+        0x101..=0x1_0000 => 2,
+        0x1_0001..=0x100_0000 => 3,
+        _ => 4,
+    }
+}
+
+/// One load.
+fn load(
+    mesh: &BareMesh,
+    tets: &[u32],
+    vertices: &[u32],
+    place: &[u32],
+    sides: &[Side],
+    edges: &[u32],
+) -> Vec<u8> {
+    let width = width(vertices.len());
+    let mut m = Vec::with_capacity(64 + vertices.len() * 28 + tets.len() * (2 + 4 * width) + sides.len() * 6);
+    m.push(LOAD);
+    for count in [vertices.len(), tets.len(), sides.len(), edges.len()] {
+        put_varint(&mut m, count as u64);
+    }
+    put_ascending(&mut m, vertices.iter().map(|&v| mesh.vertex_ids[v as usize]));
+    vertices.iter().for_each(|&v| put_varint(&mut m, code(mesh.vertex_classes[v as usize])));
+    vertices.iter().for_each(|&v| m.extend_from_slice(bytemuck::bytes_of(&mesh.points[v as usize])));
+    put_ascending(&mut m, tets.iter().map(|&t| mesh.tet_ids[t as usize]));
+    let body = |t: &u32| mesh.tet_bodies[*t as usize];
+    for run in tets.chunk_by(|a, b| body(a) == body(b)) {
+        put_varint(&mut m, u64::from(body(&run[0]).0));
+        put_varint(&mut m, run.len() as u64);
+    }
+    for &t in tets {
+        for v in mesh.tets[t as usize] {
+            m.extend_from_slice(&place[v.index()].to_le_bytes()[..width]);
+        }
+    }
+    let mut at = 0;
+    let mut keys = Vec::with_capacity(sides.len());
+    for side in sides {
+        at += tets[at..].partition_point(|&t| t < side.tet.0);
+        keys.push(((at as u64) << 2 | u64::from(side.face)) << 1 | u64::from(side.behind));
+    }
+    put_ascending(&mut m, keys);
+    sides.iter().for_each(|side| put_varint(&mut m, u64::from(side.patch.0)));
+    let edge = |&edge: &u32| mesh.edges[edge as usize];
+    put_ascending(&mut m, edges.iter().map(|e| u64::from(place[edge(e).vertices[0].index()])));
+    for LaidEdge { vertices, class } in edges.iter().map(edge) {
+        put_varint(&mut m, u64::from(place[vertices[1].index()]));
+        put_varint(&mut m, code(class));
+    }
+    m
+}
+
+/// A load that arrived: a little mesh, its tets, sides and edges by places in its own lists.
+#[derive(Debug, Default, PartialEq)]
+pub(super) struct Load {
+    pub vertex_ids: Vec<GlobalId>,
+    pub vertex_classes: Vec<Class>,
+    pub points: Vec<[f64; 3]>,
+    pub tet_ids: Vec<GlobalId>,
+    pub tet_bodies: Vec<BodyId>,
+    pub tets: Vec<[u32; 4]>,
+    pub sides: Vec<Side>,
+    pub edges: Vec<LaidEdge>,
+}
+
+/// Reads a load.
+pub(super) fn unpack(mut message: &[u8]) -> Load {
+    let m = &mut message;
+    let [vertices, tets, sides, edges] = [(); 4].map(|()| take_varint(m) as usize);
+    let vertex_ids = take_ascending(m, vertices).collect();
+    let vertex_classes = (0..vertices).map(|_| class(take_varint(m))).collect();
+    let (coordinates, rest) = m.split_at(vertices * size_of::<[f64; 3]>());
+    *m = rest;
+    let tet_ids = take_ascending(m, tets).collect();
+    let mut tet_bodies = Vec::with_capacity(tets);
+    while tet_bodies.len() < tets {
+        let body = BodyId(take_varint(m) as u32);
+        let end = tet_bodies.len() + take_varint(m) as usize;
+        tet_bodies.resize(end, body);
+    }
+    let width = width(vertices);
+    let (corners, rest) = m.split_at(4 * width * tets);
+    *m = rest;
+    let corner = |bytes: &[u8], k: usize| {
+        let mut number = [0; 4];
+        number[..width].copy_from_slice(&bytes[k * width..(k + 1) * width]);
+        u32::from_le_bytes(number)
+    };
+    let keys: Vec<u64> = take_ascending(m, sides).collect();
+    let sides = keys.into_iter().map(|key| Side {
+        tet: TetId((key >> 3) as u32),
+        face: (key >> 1 & 3) as u8,
+        behind: key & 1 == 1,
+        patch: PatchId(take_varint(m) as u32),
+    });
+    let sides = sides.collect();
+    let first_ends: Vec<u64> = take_ascending(m, edges).collect();
+    let edges = first_ends.into_iter().map(|first| LaidEdge {
+        vertices: [VertexId(first as u32), VertexId(take_varint(m) as u32)],
+        class: class(take_varint(m)),
+    });
+    Load {
+        vertex_ids,
+        vertex_classes,
+        points: crate::comm::pack::numbers(coordinates),
+        tet_ids,
+        tet_bodies,
+        tets: corners.chunks_exact(4 * width).map(|c| [0, 1, 2, 3].map(|k| corner(c, k))).collect(),
+        sides,
+        edges: edges.collect(),
+    }
+}
