@@ -211,7 +211,7 @@ pub struct Quality {
 pub enum Method {
     /// Coarse mesh, partitioned, refined uniformly with boundary vertices on the geometry
     Refine,
-    /// Refine the skins of the parts, mesh each inside (not yet)
+    /// Coarse mesh, partitioned; the skins of the parts refined, and each meshed inside by the sizes
     Surface,
     /// Cut the geometry into parts, mesh each (not yet)
     Decompose,

@@ -10,7 +10,7 @@ use tetmill::io::{self, Written, elmer};
 use tetmill::mesh::stream::MeshStream;
 use tetmill::pipeline::input::{self, InputSettings};
 use tetmill::pipeline::target::Outcome;
-use tetmill::pipeline::{CoarseSettings, Disk, GenerateSettings, Generated, Model, Wanted, generate};
+use tetmill::pipeline::{self, CoarseSettings, Disk, GenerateSettings, Generated, Model, Wanted, generate};
 use tetmill::progress::Progress;
 use tetmill::refine::census;
 use tetmill::report::{LevelReport, MeshReport, PartitionReport, Report};
@@ -55,9 +55,9 @@ fn tell_once(comm: &dyn Communicator, failure: Failure) -> Failure {
 
 fn refuse_unfinished(options: &Generate) -> Result<(), Failure> {
     match options.method {
-        Method::Refine => Ok(()),
-        Method::Surface | Method::Decompose => {
-            Err(Failure::input("this version knows the method `refine` only: leave out -m"))
+        Method::Refine | Method::Surface => Ok(()),
+        Method::Decompose => {
+            Err(Failure::input("this version knows the methods `refine` and `surface` only"))
         }
     }
 }
@@ -86,7 +86,11 @@ fn generate_on(comm: &dyn Communicator, options: &Generate, start: Instant) -> R
         options.input.files[0].with_extension("").file_name().map_or_else(|| "mesh".into(), PathBuf::from)
     });
     let disk = Some(disk_for(&options.format, &target));
-    let settings = GenerateSettings { coarse, wanted: wanted(options), memory: options.memory, disk };
+    let method = match options.method {
+        Method::Surface => pipeline::Method::Surface,
+        _ => pipeline::Method::Refine,
+    };
+    let settings = GenerateSettings { method, coarse, wanted: wanted(options), memory: options.memory, disk };
     let made = generate(comm, model.as_ref(), &settings, &progress)?;
     let written = progress.stage("write", || write_all(comm, options, &made, &target))?;
     if options.check && options.format.contains(&Format::Elmer) {
@@ -257,7 +261,7 @@ fn shared_vertices(comm: &dyn Communicator, part: &dyn MeshStream) -> Result<u64
 
 /// **Collective.** The largest share of its vertices that a part owns, over the mean.
 fn owner_imbalance(comm: &dyn Communicator, made: &Generated) -> Result<f64, Failure> {
-    let share = census(made.part.coarse(), made.pieces).owned_share();
+    let share = census(made.part.coarse(), made.part.pieces()).owned_share();
     let all = comm.all_gather_one(share)?;
     let mean = all.iter().sum::<f64>() / all.len() as f64;
     Ok(all.into_iter().fold(0.0, f64::max) / mean)
@@ -353,8 +357,13 @@ pub fn run_mesh(options: &MeshFile) -> Result<(), Failure> {
         Some(tets) => Wanted::Coarse { tets, pieces: 1 },
         None => Wanted::Sizes { pieces: 1 },
     };
-    let settings =
-        GenerateSettings { coarse: coarse_settings(&options.size, true)?, wanted, memory: None, disk: None };
+    let settings = GenerateSettings {
+        method: pipeline::Method::default(),
+        coarse: coarse_settings(&options.size, true)?,
+        wanted,
+        memory: None,
+        disk: None,
+    };
     let made = generate(&comm, Some(&model), &settings, &progress)?;
     let written = progress.stage("write", || io::serial::write(&made.part, &made.names, &options.output))?;
     if let Some(file) = &options.picture {

@@ -23,6 +23,7 @@ pub mod quality;
 pub mod refine;
 pub mod report;
 pub mod size;
+pub mod skin;
 pub mod surface;
 pub mod volume;
 

@@ -4,7 +4,7 @@ use super::{PeriodicMap, PeriodicSize};
 use crate::comm::thread;
 use crate::io::serial;
 use crate::mesh::stream::MeshStream;
-use crate::pipeline::{CoarseSettings, GenerateSettings, Generated, Model, Wanted, generate};
+use crate::pipeline::{CoarseSettings, GenerateSettings, Generated, Method, Model, Wanted, generate};
 use crate::progress::Progress;
 use crate::size::{Preset, SizeField, SizeSettings, Source};
 use crate::{Point, Vector};
@@ -23,6 +23,7 @@ fn model_of(source: &str) -> Model {
 fn settings(levels: u32, sources: &[Source]) -> GenerateSettings {
     let size = SizeSettings { sources: sources.to_vec(), ..Preset::VeryCoarse.into() };
     GenerateSettings {
+        method: Method::Refine,
         coarse: CoarseSettings::from(size),
         wanted: Wanted::Sizes { pieces: 1 << levels },
         memory: None,

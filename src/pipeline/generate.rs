@@ -1,9 +1,10 @@
-//! Method 2 on all ranks: a coarse mesh, partitioned, distributed, refined, checked.
+//! Methods 2 and 3 on all ranks: a coarse mesh, partitioned, distributed, refined or meshed anew inside its refined skins, checked.
 
 use super::coarse::{CoarseMesh, CoarseReport, CoarseSettings};
 use super::mend;
 use super::model::Model;
 use super::room::{self, Disk};
+use super::skins::{self, Refused};
 use super::target::Outcome;
 use super::wanted::{Wanted, mesh_as_wanted};
 use crate::check::{self, Checksum, PartReport, ShapeReport};
@@ -11,6 +12,7 @@ use crate::comm::Communicator;
 use crate::dist::{self, DistMesh};
 use crate::error::{Failure, Status, agree};
 use crate::geometry::Projector;
+use crate::improve::Effort;
 use crate::mesh::{GlobalId, Mesh, Names, Rank};
 use crate::partition::{self, Metrics};
 use crate::periodic::{self, PeriodicMap};
@@ -18,9 +20,21 @@ use crate::progress::Progress;
 use crate::refine::{self, RefineError, RefinedMesh};
 use crate::size::Source;
 
+/// What becomes of the parts of a coarse mesh.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Method {
+    /// They are refined uniformly (the thesis' second method).
+    #[default]
+    Refine,
+    /// Their skins are, and each is meshed inside (the third).
+    Surface,
+}
+
 /// What is to be made.
 #[derive(Clone, Debug)]
 pub struct GenerateSettings {
+    /// What becomes of the coarse mesh.
+    pub method: Method,
     /// How the coarse mesh is made.
     pub coarse: CoarseSettings,
     /// How many tets.
@@ -63,6 +77,8 @@ pub struct Generated {
     pub checksum: Checksum,
     /// What became of periodic faces, if there are any: the same on all.
     pub periodic: Option<periodic::Checked>,
+    /// Skins that the mesher refused: the same on all.
+    pub refused: Refused,
     /// On rank 0 alone.
     pub coarse: Option<CoarseResult>,
 }
@@ -101,6 +117,10 @@ pub fn generate(
         let given = coarse.as_ref().map(|(_, made)| (made.mesh.clone(), made.parts.clone()));
         let dist = progress.stage("distribute", || dist::distribute(comm, given))?;
         agree(comm, room::refuse_without_disk(comm.rank(), &dist, pieces, settings.disk.as_ref()))?;
+        if settings.method == Method::Surface {
+            let coarse = coarse.take().map(|(_, made)| made);
+            return fill(comm, Parts { model, coarse, dist, projector, names, pieces }, settings, progress);
+        }
         let keep = room::what_fits(comm, &dist, pieces, settings.memory, progress)?;
         let survey = progress.stage("levels", || survey(comm, &dist, &projector, pieces))?;
         let mut levels = match survey {
@@ -132,9 +152,41 @@ pub fn generate(
             made.report.size_corrections += round as u64;
             made
         });
-        return Ok(Generated { part, pieces, levels, names, check, checksum, periodic, coarse });
+        let refused = Refused::default();
+        return Ok(Generated { part, pieces, levels, names, check, checksum, periodic, refused, coarse });
     }
     unreachable!("the loop ends by itself")
+}
+
+/// A coarse mesh on all ranks, and what rank 0 knows of it.
+struct Parts<'a> {
+    model: Option<&'a Model>,
+    coarse: Option<CoarseResult>,
+    dist: DistMesh,
+    projector: Projector,
+    names: Names,
+    pieces: u32,
+}
+
+/// **Collective.** Meshes the parts inside their refined skins.
+fn fill(
+    comm: &dyn Communicator,
+    parts: Parts,
+    settings: &GenerateSettings,
+    progress: &Progress,
+) -> Result<Generated, Failure> {
+    let Parts { model, coarse, dist, projector, names, pieces } = parts;
+    agree(comm, skins::refuse_periodic(model))?;
+    let sizes = model
+        .zip(coarse.as_ref())
+        .map(|(model, coarse)| skins::wanted_sizes(model, coarse, settings, pieces));
+    let effort = settings.coarse.effort.unwrap_or(Effort::Standard);
+    let (part, refused) =
+        skins::mesh_skins(comm, &dist, &projector, pieces, sizes.as_deref(), effort, progress)?;
+    let (check, checksum) = progress.stage("check", || verdict(comm, &part, &projector))?;
+    let level = check.shape.clone().map(|shape| Level { pieces, tets: check.tets, shape });
+    let levels = level.into_iter().collect();
+    Ok(Generated { part, pieces, levels, names, check, checksum, periodic: None, refused, coarse })
 }
 
 /// Asks for smaller sizes around coarse tets with inverted children, on the rank that has them.

@@ -9,13 +9,15 @@ pub mod mend;
 pub mod model;
 pub mod names;
 pub mod room;
+mod skins;
 pub mod target;
 pub mod wanted;
 
 pub use coarse::{CoarseError, CoarseMesh, CoarseReport, CoarseSettings};
 pub use facet_model::FacetSolid;
-pub use generate::{GenerateSettings, Generated, generate};
+pub use generate::{GenerateSettings, Generated, Method, generate};
 pub use model::{CsgModel, Entities, GivenMesh, Model};
 pub use names::names;
 pub use room::Disk;
+pub use skins::Refused;
 pub use wanted::Wanted;

@@ -214,6 +214,14 @@ pub fn corner_place(code: u8) -> (usize, usize) {
     (usize::from(code >> 1), usize::from(code & 1))
 }
 
+/// Calls `visit(j, k, upright)` for each child of a triangle, row by row: the upright ones, then those upside down.
+pub fn for_each_face_child(n: u32, mut visit: impl FnMut(u32, u32, bool)) {
+    for k in 0..n {
+        (0..n - k).for_each(|j| visit(j, k, true));
+        (0..n - k - 1).for_each(|j| visit(j, k, false));
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

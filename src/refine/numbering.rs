@@ -11,7 +11,7 @@ use super::RefineError;
 use super::lattice::{Lattice, MAX_PIECES};
 use crate::dist::{DistMesh, Totals};
 use crate::mesh::stream::Counts;
-use crate::mesh::{GlobalId, TET_EDGES, TET_FACES, TetId};
+use crate::mesh::{EdgeId, GlobalId, TET_EDGES, TET_FACES, TetId};
 use std::ops::Range;
 
 /// A kind of coarse entity, and how many fine vertices lie inside each.
@@ -180,6 +180,43 @@ impl Numbering {
             next += count;
         }
     }
+
+    /// Local ids of all lattice points of a face of a tet, by j + (n + 1)·k; `corners` are the face's places in the tet, by ascending vertex.
+    pub fn face_ids(&self, mesh: &DistMesh, tet: TetId, corners: [usize; 3]) -> Vec<u32> {
+        let n = self.lattice.n();
+        let vertices = mesh.tets[tet.index()];
+        let at = |j: u32, k: u32| (j + (n + 1) * k) as usize;
+        let mut ids = vec![u32::MAX; at(n, n) + 1];
+        for (corner, (j, k)) in corners.into_iter().zip([(0, 0), (n, 0), (0, n)]) {
+            ids[at(j, k)] = vertices[corner].0;
+        }
+        // Both corners of each pair ascend, so the edge runs as it is numbered.
+        for pair in [[0, 1], [0, 2], [1, 2]] {
+            let edge = edge_between(mesh, tet, pair.map(|p| corners[p]));
+            for (vertex, k) in self.inside(Entity { dimension: 1, id: edge.0 }).zip(1..) {
+                let place = match pair {
+                    [0, 1] => at(k, 0),
+                    [0, _] => at(0, k),
+                    _ => at(n - k, k),
+                };
+                ids[place] = vertex;
+            }
+        }
+        let opposite = 6 - corners.iter().sum::<usize>();
+        let face = mesh.tet_faces[tet.index()][opposite];
+        let inside = self.inside(Entity { dimension: 2, id: face.0 });
+        for (vertex, (j, k)) in inside.zip(self.lattice.face_interior()) {
+            ids[at(j, k)] = vertex;
+        }
+        ids
+    }
+}
+
+/// The edge of a tet between two of its corners.
+fn edge_between(mesh: &DistMesh, tet: TetId, mut corners: [usize; 2]) -> EdgeId {
+    corners.sort_unstable();
+    let edge = TET_EDGES.iter().position(|e| *e == corners).expect("two corners make an edge");
+    mesh.tet_edges[tet.index()][edge]
 }
 
 /// Corners of a tet by ascending key.

@@ -1,13 +1,15 @@
 //! The refined part: coordinates kept, everything else computed as it is asked for.
 
-use super::lattice::{OCTAHEDRON, UPRIGHT, UPSIDE_DOWN, corner_place, octahedron_child_on_face};
+use super::lattice::{
+    OCTAHEDRON, UPRIGHT, UPSIDE_DOWN, corner_place, for_each_face_child, octahedron_child_on_face,
+};
 use super::numbering::{Entity, Numbering, ascending};
 use super::tet::{Inside, Lattices};
 use crate::dist::{BoundaryFace, DistMesh};
 use crate::mesh::stream::{
     BoundaryBlock, Counts, LocalBlock, MeshStream, NO_TET, SingularTags, TetBlock, VertexBlock,
 };
-use crate::mesh::{Class, EdgeId, GlobalId, Rank, TET_EDGES, TET_FACES, TetId};
+use crate::mesh::{Class, GlobalId, Rank, TET_FACES, TetId};
 use crate::periodic::{Link, PeriodicMap};
 use std::borrow::Cow;
 use std::sync::Arc;
@@ -116,51 +118,6 @@ impl RefinedMesh {
         let [p, q, r] = TET_FACES[self.face_of(tet, boundary)].map(|corner| vertices[corner]);
         let even = [[p, q, r], [q, r, p], [r, p, q]].contains(&ascending);
         even == behind
-    }
-
-    /// Local ids of all lattice points of a face, by j + (n + 1)·k.
-    fn face_ids(&self, face: &BoundaryFace, ids: &mut Vec<u32>) {
-        let n = self.pieces();
-        let tet = face.parents[0].or(face.parents[1]).expect("a boundary face has a tet in this part");
-        let vertices = self.coarse.tets[tet.index()];
-        let corners = ascending(TET_FACES[self.face_of(tet, face)], |corner| vertices[corner].0);
-        let at = |j: u32, k: u32| (j + (n + 1) * k) as usize;
-        ids.clear();
-        ids.resize(at(n, n) + 1, u32::MAX);
-        for (corner, (j, k)) in corners.into_iter().zip([(0, 0), (n, 0), (0, n)]) {
-            ids[at(j, k)] = vertices[corner].0;
-        }
-        // Both corners of each pair ascend, so the edge runs as it is numbered.
-        for pair in [[0, 1], [0, 2], [1, 2]] {
-            let edge = self.edge_of(tet, pair.map(|p| corners[p]));
-            for (vertex, k) in self.numbering.inside(Entity { dimension: 1, id: edge.0 }).zip(1..) {
-                let place = match pair {
-                    [0, 1] => at(k, 0),
-                    [0, _] => at(0, k),
-                    _ => at(n - k, k),
-                };
-                ids[place] = vertex;
-            }
-        }
-        let inside = self.numbering.inside(Entity { dimension: 2, id: face.face.0 });
-        for (vertex, (j, k)) in inside.zip(self.numbering.lattice().face_interior()) {
-            ids[at(j, k)] = vertex;
-        }
-    }
-
-    /// The edge of `tet` between two of its corners.
-    fn edge_of(&self, tet: TetId, mut corners: [usize; 2]) -> EdgeId {
-        corners.sort_unstable();
-        let edge = TET_EDGES.iter().position(|e| *e == corners).expect("two corners make an edge");
-        self.coarse.tet_edges[tet.index()][edge]
-    }
-}
-
-/// Calls `visit(j, k, upright)` for each child of a triangle, row by row: the upright ones, then those upside down.
-fn for_each_face_child(n: u32, mut visit: impl FnMut(u32, u32, bool)) {
-    for k in 0..n {
-        (0..n - k).for_each(|j| visit(j, k, true));
-        (0..n - k - 1).for_each(|j| visit(j, k, false));
     }
 }
 
@@ -272,8 +229,10 @@ impl MeshStream for RefinedMesh {
     fn boundary_block(&self, index: usize, block: &mut BoundaryBlock) {
         let face = &self.coarse.boundary[index];
         let n = self.pieces();
-        let mut ids = Vec::new();
-        self.face_ids(face, &mut ids);
+        let tet = face.parents[0].or(face.parents[1]).expect("a boundary face has a tet in this part");
+        let vertices = self.coarse.tets[tet.index()];
+        let corners = ascending(TET_FACES[self.face_of(tet, face)], |corner| vertices[corner].0);
+        let ids = self.numbering.face_ids(&self.coarse, tet, corners);
         let outward = self.ascending_is_outward(face);
         block.triangles.clear();
         for_each_face_child(n, |j, k, upright| {

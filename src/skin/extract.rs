@@ -1,0 +1,198 @@
+//! The skin of a part: its faces that lie on a patch or have one tet of the part, with the lattice on them.
+
+use crate::Point;
+use crate::dist::DistMesh;
+use crate::geometry::Projector;
+use crate::mesh::{Class, EdgeId, FaceId, TET_FACES, TetId};
+use crate::refine::lattice::for_each_face_child;
+use crate::refine::numbering::{Entity, Numbering, ascending};
+use crate::refine::snap::boundary_first;
+use crate::refine::{Keep, RefineError, Settings};
+use csg::{BodyId, PatchId};
+use std::ops::Range;
+
+/// A triangle of a skin.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SkinTriangle {
+    /// Its vertices, by their place in the skin.
+    pub vertices: [u32; 3],
+    /// The bodies of this part behind and in front of it; `None` also where another part has the tet.
+    pub beside: [Option<BodyId>; 2],
+    /// The patch that it lies on, and whether its back is the patch's.
+    pub patch: Option<(PatchId, bool)>,
+}
+
+/// What bounds a part: closed, and the same triangle for triangle and bit for bit on both sides of an interface.
+///
+/// Vertices are those of triangles, then those inside that are to be kept (points and curves inside bodies); both in the order of the
+/// lattice.
+#[derive(Clone, Debug)]
+pub struct Skin {
+    /// How the lattice of the whole part is numbered.
+    pub numbering: Numbering,
+    /// The lattice vertex that each vertex is.
+    pub lattice: Vec<u32>,
+    /// Vertices of triangles; those from here on are inside.
+    pub on_triangles: usize,
+    /// Coordinates.
+    pub points: Vec<Point>,
+    /// What the vertices lie on.
+    pub classes: Vec<Class>,
+    /// The triangles.
+    pub triangles: Vec<SkinTriangle>,
+    /// Pieces of coarse edges that lie on curves and patches, and what they lie on.
+    pub edges: Vec<([u32; 2], Class)>,
+}
+
+/// No tet, no vertex.
+const NONE: u32 = u32::MAX;
+
+/// *Local.* The skin of a part, with `n` pieces to a coarse edge, on the geometry.
+///
+/// # Errors
+/// Vertices that cannot be snapped, and memory, as [`refine`](crate::refine::refine()).
+pub fn skin(mesh: &DistMesh, projector: &Projector, n: u32) -> Result<Skin, RefineError> {
+    let numbering = Numbering::new(mesh, n)?;
+    let settings = Settings { keep: Keep::Boundary, ..Settings::default() };
+    let coordinates = boundary_first(mesh, projector, &numbering, &settings)?;
+    let mut triangles = Vec::new();
+    sides(mesh).for_each(|side| push_triangles(mesh, &numbering, side, &mut triangles));
+    let mut edges = laid_edges(mesh, &numbering);
+
+    let mut place = vec![NONE; coordinates.len()];
+    triangles.iter().flat_map(|t| t.vertices).for_each(|v| place[v as usize] = 0);
+    let mut lattice: Vec<u32> = (0..place.len() as u32).filter(|&v| place[v as usize] == 0).collect();
+    let on_triangles = lattice.len();
+    let corners = (0..).zip(&mesh.vertex_classes).filter(|(_, class)| matches!(class, Class::Corner(_)));
+    let ends = edges.iter().flat_map(|(ends, _)| *ends);
+    let mut inside: Vec<u32> =
+        corners.map(|(v, _)| v).chain(ends).filter(|&v| place[v as usize] == NONE).collect();
+    inside.sort_unstable();
+    inside.dedup();
+    lattice.append(&mut inside);
+    (0..).zip(&lattice).for_each(|(new, &v)| place[v as usize] = new);
+
+    let renumbered = |v: u32| place[v as usize];
+    triangles.iter_mut().for_each(|t| t.vertices = t.vertices.map(renumbered));
+    edges.iter_mut().for_each(|(ends, _)| *ends = ends.map(renumbered));
+    Ok(Skin {
+        points: lattice.iter().map(|&v| coordinates[v as usize].into()).collect(),
+        classes: lattice.iter().map(|&v| class_of(mesh, numbering.locate(v).0)).collect(),
+        numbering,
+        lattice,
+        on_triangles,
+        triangles,
+        edges,
+    })
+}
+
+impl Skin {
+    /// The edges inside bodies, which no triangle has.
+    pub fn loose_edges(&self) -> Vec<[u32; 2]> {
+        let mut sides: Vec<[u32; 2]> = Vec::with_capacity(3 * self.triangles.len());
+        for [a, b, c] in self.triangles.iter().map(|t| t.vertices) {
+            sides.extend([[a, b], [b, c], [c, a]].map(sorted));
+        }
+        sides.sort_unstable();
+        let is_loose = |edge: &[u32; 2]| sides.binary_search(edge).is_err();
+        self.edges.iter().map(|(ends, _)| sorted(*ends)).filter(is_loose).collect()
+    }
+}
+
+fn sorted([a, b]: [u32; 2]) -> [u32; 2] {
+    [a.min(b), a.max(b)]
+}
+
+fn class_of(mesh: &DistMesh, Entity { dimension, id }: Entity) -> Class {
+    let classes = match dimension {
+        0 => &mesh.vertex_classes,
+        1 => &mesh.edge_classes,
+        _ => &mesh.face_classes,
+    };
+    classes[id as usize]
+}
+
+/// A coarse face of a skin, seen from a tet behind it.
+struct CoarseSide {
+    tet: TetId,
+    /// The face's place in the tet.
+    face: usize,
+    /// The tet of this part in front.
+    front: Option<TetId>,
+    /// Its patch, and whether the tet is behind that.
+    patch: Option<(PatchId, bool)>,
+}
+
+/// The coarse faces of a part's skin, by ascending face.
+fn sides(mesh: &DistMesh) -> impl Iterator<Item = CoarseSide> {
+    // Tets of each face: one, or two.
+    let mut tets = vec![[None; 2]; mesh.faces.len()];
+    for (tet, faces) in (0..).map(TetId).zip(&mesh.tet_faces) {
+        for face in faces {
+            let [first, second] = &mut tets[face.index()];
+            *(if first.is_none() { first } else { second }) = Some(tet);
+        }
+    }
+    let mut boundary = mesh.boundary.iter().peekable();
+    let side = move |(face, [first, second]): (FaceId, [Option<TetId>; 2])| {
+        let on_patch = boundary.next_if(|triangle| triangle.face == face);
+        let place = |tet: TetId| mesh.tet_faces[tet.index()].iter().position(|f| *f == face);
+        let of = |tet: TetId, front, patch| CoarseSide {
+            face: place(tet).expect("a tet has its faces"),
+            tet,
+            front,
+            patch,
+        };
+        match (on_patch.map(|t| (t.patch, t.parents)), first, second) {
+            (Some((patch, [Some(behind), front])), ..) => Some(of(behind, front, Some((patch, true)))),
+            (Some((patch, [None, Some(tet)])), ..) => Some(of(tet, None, Some((patch, false)))),
+            (_, Some(tet), None) => Some(of(tet, None, None)),
+            _ => None,
+        }
+    };
+    (0..).map(FaceId).zip(tets).filter_map(side)
+}
+
+/// The fine triangles of a coarse face, by lattice vertices.
+fn push_triangles(
+    mesh: &DistMesh,
+    numbering: &Numbering,
+    side: CoarseSide,
+    triangles: &mut Vec<SkinTriangle>,
+) {
+    let n = numbering.lattice().n();
+    let vertices = mesh.tets[side.tet.index()];
+    let corners = ascending(TET_FACES[side.face], |corner| vertices[corner].0);
+    let [p, q, r] = TET_FACES[side.face];
+    let is_outward = [[p, q, r], [q, r, p], [r, p, q]].contains(&corners);
+    let ids = numbering.face_ids(mesh, side.tet, corners);
+    let body = |tet: TetId| mesh.tet_bodies[tet.index()];
+    let beside = [Some(body(side.tet)), side.front.map(body)];
+    for_each_face_child(n, |j, k, upright| {
+        let at = |j: u32, k: u32| ids[(j + (n + 1) * k) as usize];
+        let [p, q, r] = if upright {
+            [at(j, k), at(j + 1, k), at(j, k + 1)]
+        } else {
+            [at(j + 1, k), at(j + 1, k + 1), at(j, k + 1)]
+        };
+        let vertices = if is_outward { [p, q, r] } else { [p, r, q] };
+        triangles.push(SkinTriangle { vertices, beside, patch: side.patch });
+    });
+}
+
+/// The pieces of the coarse edges on curves and patches, by lattice vertices.
+fn laid_edges(mesh: &DistMesh, numbering: &Numbering) -> Vec<([u32; 2], Class)> {
+    let mut edges = Vec::new();
+    for (edge, (ends, &class)) in (0..).map(EdgeId).zip(mesh.edges.iter().zip(&mesh.edge_classes)) {
+        if matches!(class, Class::Body(_)) {
+            continue;
+        }
+        let inside: Range<u32> = numbering.inside(Entity { dimension: 1, id: edge.0 });
+        let mut from = ends[0].0;
+        for to in inside.chain([ends[1].0]) {
+            edges.push(([from, to], class));
+            from = to;
+        }
+    }
+    edges
+}

@@ -1,0 +1,224 @@
+//! Global ids for parts that were meshed each on its own.
+//!
+//! A vertex of a skin has a name that all its holders know: its global id in the lattice of the whole mesh, of which the inside is now gone.
+//! Its owner numbers it anew, without gaps, and tells the other holders: one scan, one exchange.
+
+use super::{Filled, Skin};
+use crate::comm::pack::{put_ascending, put_varint, take_ascending, take_varint};
+use crate::comm::{CommError, Communicator};
+use crate::dist::{BareMesh, DistMesh, LaidEdge, Side, owner};
+use crate::mesh::stream::Counts;
+use crate::mesh::{Class, GlobalId, Rank, TET_FACES, TetId, VertexId};
+use crate::refine::numbering::{Entity, fine_totals};
+use std::collections::HashMap;
+
+/// **Collective.** The part of the whole mesh that the tets inside a skin are.
+///
+/// # Errors
+/// What the ranks cannot say.
+pub fn number(
+    comm: &dyn Communicator,
+    mesh: &DistMesh,
+    skin: Skin,
+    filled: Filled,
+) -> Result<BareMesh, CommError> {
+    let names = Names::of(mesh, &skin);
+    let vertices = (names.owned(mesh.rank) + filled.inside.len()) as u64;
+    let counts = [vertices, filled.tets.len() as u64];
+    let first = comm.exclusive_scan(counts)?;
+    let [vertices, tets] = comm.all_reduce_sum_u64(counts)?;
+    let totals = Counts { vertices, tets, ..fine_totals(&mesh.totals, skin.numbering.lattice()) };
+
+    let (mut ids, next) = names.number(mesh.rank, first[0]);
+    let heard = comm.exchange_bytes(names.letters(mesh.rank, &ids))?;
+    names.hear(&heard, &mut ids);
+    ids.extend((next..).take(filled.inside.len()));
+    Ok(assemble(mesh, skin, &names, filled, ids, first[1], totals))
+}
+
+/// The vertices of a skin as all their holders know them.
+struct Names<'a> {
+    /// Global ids in the lattice.
+    names: Vec<GlobalId>,
+    /// The holders where there are several, else none.
+    holders: Vec<&'a [Rank]>,
+}
+
+impl<'a> Names<'a> {
+    fn of(mesh: &'a DistMesh, skin: &Skin) -> Self {
+        let name = |&v: &u32| {
+            let (Entity { dimension, id }, within) = skin.numbering.locate(v);
+            let id = id as usize;
+            let ids = [&mesh.vertex_ids, &mesh.edge_ids, &mesh.face_ids][dimension];
+            skin.numbering.first_id(dimension, ids[id]) + u64::from(within)
+        };
+        let holders = |&v: &u32| {
+            let Entity { dimension, id } = skin.numbering.locate(v).0;
+            let shared = [&mesh.shared_vertices, &mesh.shared_edges, &mesh.shared_faces][dimension];
+            shared.holders_of(id).unwrap_or_default()
+        };
+        Self {
+            names: skin.lattice.iter().map(name).collect(),
+            holders: skin.lattice.iter().map(holders).collect(),
+        }
+    }
+
+    fn owner(&self, vertex: usize, rank: Rank) -> Rank {
+        match self.holders[vertex] {
+            [] => rank,
+            holders => owner(holders, self.names[vertex]),
+        }
+    }
+
+    fn owned(&self, rank: Rank) -> usize {
+        (0..self.names.len()).filter(|&v| self.owner(v, rank) == rank).count()
+    }
+
+    /// Numbers the vertices that this rank owns from `first` on; the others have none yet. Also the first number that is left.
+    fn number(&self, rank: Rank, mut first: GlobalId) -> (Vec<GlobalId>, GlobalId) {
+        let mut number = |v| {
+            if self.owner(v, rank) != rank {
+                return GlobalId::MAX;
+            }
+            first += 1;
+            first - 1
+        };
+        ((0..self.names.len()).map(&mut number).collect(), first)
+    }
+
+    /// To each other holder of owned vertices: how many, their names, their numbers, both ascending.
+    fn letters(&self, rank: Rank, ids: &[GlobalId]) -> Vec<(Rank, Vec<u8>)> {
+        let mut told: Vec<(Rank, GlobalId, GlobalId)> = Vec::new();
+        for (v, holders) in self.holders.iter().enumerate() {
+            if !holders.is_empty() && self.owner(v, rank) == rank {
+                let others = holders.iter().filter(|&&holder| holder != rank);
+                told.extend(others.map(|&holder| (holder, self.names[v], ids[v])));
+            }
+        }
+        told.sort_unstable();
+        let letter = |told: &[(Rank, GlobalId, GlobalId)]| {
+            let mut letter = Vec::new();
+            put_varint(&mut letter, told.len() as u64);
+            put_ascending(&mut letter, told.iter().map(|t| t.1));
+            told.iter().for_each(|t| put_varint(&mut letter, t.2));
+            (told[0].0, letter)
+        };
+        told.chunk_by(|a, b| a.0 == b.0).map(letter).collect()
+    }
+
+    /// Takes the numbers that owners tell.
+    fn hear(&self, letters: &[(Rank, Vec<u8>)], ids: &mut [GlobalId]) {
+        let mut by_name: Vec<(GlobalId, usize)> = self.names.iter().copied().zip(0..).collect();
+        by_name.sort_unstable();
+        for (_, letter) in letters {
+            let mut letter = &letter[..];
+            let count = take_varint(&mut letter) as usize;
+            let names: Vec<GlobalId> = take_ascending(&mut letter, count).collect();
+            for name in names {
+                let at = by_name.binary_search_by_key(&name, |n| n.0).expect("a holder has the vertex");
+                ids[by_name[at].1] = take_varint(&mut letter);
+            }
+        }
+    }
+}
+
+/// The part with its vertices in the order of their ids.
+fn assemble(
+    mesh: &DistMesh,
+    skin: Skin,
+    names: &Names,
+    filled: Filled,
+    ids: Vec<GlobalId>,
+    first_tet: GlobalId,
+    totals: Counts,
+) -> BareMesh {
+    let mut order: Vec<usize> = (0..ids.len()).collect();
+    order.sort_unstable_by_key(|&v| ids[v]);
+    let mut place = vec![VertexId(0); ids.len()];
+    (0..).zip(&order).for_each(|(new, &old)| place[old] = VertexId(new));
+    let bodies = bodies_inside(&skin, &filled);
+
+    let mut part = BareMesh { rank: mesh.rank, ranks: mesh.ranks, totals, ..BareMesh::default() };
+    let on_skin = skin.points.len();
+    for &old in &order {
+        part.vertex_ids.push(ids[old]);
+        if old < on_skin {
+            let p = skin.points[old];
+            part.points.push([p.x, p.y, p.z]);
+            part.vertex_classes.push(skin.classes[old]);
+            if !names.holders[old].is_empty() {
+                part.shared.push(place[old].0, names.holders[old].iter().copied());
+            }
+        } else {
+            part.points.push(filled.inside[old - on_skin]);
+            part.vertex_classes.push(bodies[old - on_skin]);
+        }
+    }
+    part.tets = filled.tets.iter().map(|tet| tet.map(|v| place[v as usize])).collect();
+    part.tet_ids = (first_tet..).take(filled.tets.len()).collect();
+    part.sides = sides(&skin, &filled);
+    part.edges = laid_edges(&skin, &place);
+    part.tet_bodies = filled.bodies;
+    part
+}
+
+/// The class of each vertex inside.
+fn bodies_inside(skin: &Skin, filled: &Filled) -> Vec<Class> {
+    let mut classes = vec![Class::Body(csg::BodyId(0)); filled.inside.len()];
+    for (tet, body) in filled.tets.iter().zip(&filled.bodies) {
+        for v in tet {
+            if let Some(v) = (*v as usize).checked_sub(skin.points.len()) {
+                classes[v] = Class::Body(*body);
+            }
+        }
+    }
+    classes
+}
+
+fn sorted([a, b, c]: [u32; 3]) -> [u32; 3] {
+    let mut key = [a, b, c];
+    key.sort_unstable();
+    key
+}
+
+/// The faces of tets on patches, ascending.
+fn sides(skin: &Skin, filled: &Filled) -> Vec<Side> {
+    let patched = skin.triangles.iter().filter(|t| t.patch.is_some());
+    let triangles: HashMap<[u32; 3], usize> =
+        patched.clone().zip(0..).map(|(t, k)| (sorted(t.vertices), k)).collect();
+    let patched: Vec<_> = patched.collect();
+    let mut sides = Vec::with_capacity(patched.len());
+    for (tet, corners) in (0..).map(TetId).zip(&filled.tets) {
+        // No tet inside has three vertices on triangles; most have none.
+        let on_triangles = corners.iter().filter(|&&v| (v as usize) < skin.on_triangles).count();
+        if on_triangles < 3 {
+            continue;
+        }
+        for (face, outward) in (0..).zip(TET_FACES.map(|face| face.map(|k| corners[k]))) {
+            let Some(&k) = triangles.get(&sorted(outward)) else { continue };
+            let [a, b, c] = patched[k].vertices;
+            let is_behind = [[a, b, c], [b, c, a], [c, a, b]].contains(&outward);
+            let (patch, back) = patched[k].patch.expect("they were filtered");
+            sides.push(Side { tet, face, patch, behind: is_behind == back });
+        }
+    }
+    sides
+}
+
+/// The edges on curves and patches, ascending.
+fn laid_edges(skin: &Skin, place: &[VertexId]) -> Vec<LaidEdge> {
+    let laid = |ends: [u32; 2], class| {
+        let [a, b] = ends.map(|v| place[v as usize]);
+        LaidEdge { vertices: [a.min(b), a.max(b)], class }
+    };
+    let mut edges: Vec<LaidEdge> = skin.edges.iter().map(|&(ends, class)| laid(ends, class)).collect();
+    for triangle in &skin.triangles {
+        let Some((patch, _)) = triangle.patch else { continue };
+        let [a, b, c] = triangle.vertices;
+        edges.extend([[a, b], [b, c], [c, a]].map(|ends| laid(ends, Class::Patch(patch))));
+    }
+    // Of an edge that is there several times the class that comes first holds: that of the curve, if it is on one.
+    edges.sort_unstable();
+    edges.dedup_by_key(|edge| edge.vertices);
+    edges
+}
