@@ -104,10 +104,13 @@ fn generate_on(comm: &dyn Communicator, options: &Generate, start: Instant) -> R
         Some(file) => draw(comm, &made.part, options.cut, file)?,
         None => {}
     }
-    let shared = (shared_vertices(comm, &made.part)?, owner_imbalance(comm, &made)?);
+    let partition = (
+        shared_vertices(comm, &made.part)?,
+        [tet_imbalance(comm, &made.part)?, owner_imbalance(comm, &made)?],
+    );
     let memory = total_memory(comm)?;
     let Some(model) = model else { return Ok(()) };
-    let mut report = summary(&model, &name_of(&options.input), &made, comm.size(), shared);
+    let mut report = summary(&model, &name_of(&options.input), &made, comm.size(), partition);
     report.stages = progress.finish();
     report.seconds = start.elapsed().as_secs_f64();
     report.peak_memory = memory;
@@ -263,8 +266,18 @@ fn shared_vertices(comm: &dyn Communicator, part: &dyn MeshStream) -> Result<u64
 fn owner_imbalance(comm: &dyn Communicator, made: &Generated) -> Result<f64, Failure> {
     let share = census(made.part.coarse(), made.part.pieces()).owned_share();
     let all = comm.all_gather_one(share)?;
+    Ok(imbalance(&all))
+}
+
+/// **Collective.** Tets of the largest part over the mean.
+fn tet_imbalance(comm: &dyn Communicator, part: &dyn MeshStream) -> Result<f64, Failure> {
+    Ok(imbalance(&comm.all_gather_one(part.counts().tets as f64)?))
+}
+
+/// The largest over the mean.
+fn imbalance(all: &[f64]) -> f64 {
     let mean = all.iter().sum::<f64>() / all.len() as f64;
-    Ok(all.into_iter().fold(0.0, f64::max) / mean)
+    all.iter().copied().fold(0.0, f64::max) / mean
 }
 
 /// **Collective.** Peak memory: of this process for in-process ranks, of all processes under MPI.
@@ -282,7 +295,7 @@ fn summary(
     input: &str,
     made: &Generated,
     ranks: u32,
-    (shared, owner_imbalance): (u64, f64),
+    (shared, imbalances): (u64, [f64; 2]),
 ) -> Report {
     let coarse = made.coarse.as_ref().expect("rank 0 made the coarse mesh");
     Report {
@@ -297,8 +310,9 @@ fn summary(
         wanted: coarse.outcome,
         mesh: MeshReport::new(&made.check, made.checksum.to_string()),
         quality_by_level: made.levels.iter().map(LevelReport::new).collect(),
-        partition: PartitionReport::new(&coarse.partition, shared, owner_imbalance),
+        partition: PartitionReport::new(&coarse.partition, shared, imbalances),
         periodic: made.periodic,
+        skins: made.refused.clone(),
         stages: Vec::new(),
         seconds: 0.0,
         peak_memory: None,

@@ -7,7 +7,7 @@ use crate::partition::Metrics;
 use crate::periodic::Checked;
 use crate::pipeline::generate::Level;
 use crate::pipeline::target::Outcome;
-use crate::pipeline::{CoarseReport, Entities};
+use crate::pipeline::{CoarseReport, Entities, Refused};
 use crate::progress::Stage;
 use serde::Serialize;
 use std::fmt;
@@ -41,6 +41,8 @@ pub struct Report {
     pub partition: PartitionReport,
     /// What became of periodic faces; null if there are none.
     pub periodic: Option<Checked>,
+    /// What became of the skins of the parts, if they were meshed inside; null if the parts were refined.
+    pub skins: Option<Refused>,
     /// The stages in order.
     pub stages: Vec<Stage>,
     /// Seconds from start to end.
@@ -163,12 +165,12 @@ pub struct PartitionReport {
 }
 
 impl PartitionReport {
-    /// From the metrics of a partition.
-    pub fn new(metrics: &Metrics, shared_vertices: u64, owner_imbalance: f64) -> Self {
+    /// From the metrics of the coarse partition, and the imbalances of fine tets and of owned vertices.
+    pub fn new(metrics: &Metrics, shared_vertices: u64, [imbalance, owner_imbalance]: [f64; 2]) -> Self {
         Self {
             method: metrics.method.to_string(),
             parts: metrics.parts,
-            imbalance: metrics.imbalance,
+            imbalance,
             edge_cut: metrics.edge_cut as u64,
             pieces: metrics.pieces as u64,
             shared_vertices,
@@ -296,6 +298,12 @@ impl fmt::Display for Report {
                 p.imbalance,
                 grouped(p.edge_cut),
                 grouped(p.shared_vertices)
+            )?;
+        }
+        if let Some(Refused { skins, first: Some((rank, reason)) }) = &self.skins {
+            writeln!(
+                f,
+                "skins      {skins} refused by the mesher and filled by the lattice; that of rank {rank}: {reason}"
             )?;
         }
         let stages: Vec<String> =

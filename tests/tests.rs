@@ -14,6 +14,8 @@ mod ranks;
 mod readers;
 mod samples;
 mod scenes;
+mod skins;
+mod skins;
 mod swept;
 mod tutorials;
 mod writers;

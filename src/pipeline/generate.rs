@@ -77,8 +77,8 @@ pub struct Generated {
     pub checksum: Checksum,
     /// What became of periodic faces, if there are any: the same on all.
     pub periodic: Option<periodic::Checked>,
-    /// Skins that the mesher refused: the same on all.
-    pub refused: Refused,
+    /// Skins that the mesher refused, if parts were meshed inside theirs: the same on all.
+    pub refused: Option<Refused>,
     /// On rank 0 alone.
     pub coarse: Option<CoarseResult>,
 }
@@ -152,7 +152,7 @@ pub fn generate(
             made.report.size_corrections += round as u64;
             made
         });
-        let refused = Refused::default();
+        let refused = None;
         return Ok(Generated { part, pieces, levels, names, check, checksum, periodic, refused, coarse });
     }
     unreachable!("the loop ends by itself")
@@ -186,7 +186,8 @@ fn fill(
     let (check, checksum) = progress.stage("check", || verdict(comm, &part, &projector))?;
     let level = check.shape.clone().map(|shape| Level { pieces, tets: check.tets, shape });
     let levels = level.into_iter().collect();
-    Ok(Generated { part, pieces, levels, names, check, checksum, periodic: None, refused, coarse })
+    let (periodic, refused) = (None, Some(refused));
+    Ok(Generated { part, pieces, levels, names, check, checksum, periodic, refused, coarse })
 }
 
 /// Asks for smaller sizes around coarse tets with inverted children, on the rank that has them.

@@ -51,9 +51,9 @@ pub(super) fn refuse_periodic(model: Option<&Model>) -> Result<(), Failure> {
 }
 
 /// Skins that the mesher refused, which the lattice filled instead.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct Refused {
-    /// How many.
+    /// How many of all skins.
     pub skins: u64,
     /// What it said of the first of them, and on which rank.
     pub first: Option<(u32, String)>,

@@ -18,6 +18,9 @@ mod fill;
 mod number;
 mod sizes;
 
+#[cfg(test)]
+mod tests;
+
 pub use extract::{Skin, SkinTriangle, skin};
 pub use fill::{Filled, fill};
 pub use number::number;

@@ -1,0 +1,57 @@
+//! `generate -m surface`: parts meshed inside their refined skins.
+
+use crate::common::{judge, own, read_json, succeed, tetmill};
+
+/// Made with so many ranks, and judged by both checkers: the smallest dihedral angle and the volume.
+fn made(name: &str, ranks: u32, pieces: u32) -> [f64; 2] {
+    let dir = tempfile::tempdir().unwrap();
+    let (out, report) = (dir.path().join("out"), dir.path().join("report.json"));
+    let mut command = tetmill();
+    command
+        .arg("generate")
+        .arg(own(name))
+        .args(["-m", "surface", "-q", "--preset", "coarse", "-o"])
+        .arg(&out);
+    command.args(["-n", &ranks.to_string(), "--pieces", &pieces.to_string(), "--report"]).arg(&report);
+    succeed(&mut command);
+    judge(&out, ranks);
+    let report = read_json(&report);
+    assert_eq!(report["skins"]["skins"], 0, "{name}: {}", report["skins"]);
+    ["smallest_dihedral", "volume"].map(|key| report["mesh"][key].as_f64().unwrap())
+}
+
+#[test]
+fn parts_of_own_geometries_are_meshed_inside_their_skins() {
+    let names = [
+        "nozzle",
+        "fibres",
+        "tee",
+        "boss_fillet",
+        "ice_cream",
+        "gear",
+        "probe_tank",
+        "layers",
+        "vase",
+        "dome",
+    ];
+    for (name, ranks) in names.into_iter().zip([2, 3, 4, 8, 16, 32].into_iter().cycle()) {
+        let [angle, volume] = made(name, ranks, 2);
+        assert!(angle > 8.0, "{name} on {ranks} ranks: {angle}°");
+        let refined = crate::common::report_of(&own(name), &["--preset", "coarse", "--pieces", "2"]);
+        let expected = refined["mesh"]["volume"].as_f64().unwrap();
+        assert!((volume / expected - 1.0).abs() < 1e-12, "{name}: {volume}, refined {expected}");
+    }
+}
+
+#[test]
+fn many_pieces_on_few_and_on_many_ranks_fill_the_same_volume() {
+    let [few, many] = [1, 24].map(|ranks| made("nozzle", ranks, 5)[1]);
+    assert!((few / many - 1.0).abs() < 1e-12);
+}
+
+#[test]
+fn periodic_faces_are_refused_by_name() {
+    let output = tetmill().arg("generate").arg(own("unit_cell")).args(["-m", "surface"]).output().unwrap();
+    assert_eq!(output.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&output.stderr).contains("identify periodic"));
+}
