@@ -15,7 +15,6 @@ mod readers;
 mod samples;
 mod scenes;
 mod skins;
-mod skins;
 mod swept;
 mod tutorials;
 mod writers;
