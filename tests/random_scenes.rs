@@ -10,7 +10,7 @@ fn random_scenes_in_general_position_are_meshed_as_their_text_means() {
         match run(seed, Style::General, dir.path()) {
             Outcome::Meshed { tets } => assert!(tets > 0, "scene {seed}"),
             Outcome::Empty => {}
-            other => panic!("scene {seed}: {other:?}"),
+            Outcome::Refused(reason) | Outcome::Failed(reason) => panic!("scene {seed}: {reason}"),
         }
     }
 }
