@@ -2,6 +2,7 @@
 
 use super::{Closeness, Preset, SizeField, Source, SourceTree};
 use crate::{Point, Vector};
+use csg::solid::Pruned;
 use csg::{BodyId, Curve, CurveId, Cutout, Features, Geometry, Interval, Solid, SurfaceId};
 
 /// What the user asks of the size, beside what the geometry says.
@@ -197,51 +198,108 @@ impl Sampler<'_> {
         let bounds = &self.features.bounds;
         // Room around it, so that no patch lies on the rim of the outermost cell.
         let edge = 1.02 * (bounds.max - bounds.min).max();
-        let min = bounds.center() - Vector::repeat(0.5 * edge);
-        for surface in surfaces {
-            self.sample_cell(surface, min, edge, sources);
+        let bodies = self.geometry.bodies.iter().enumerate();
+        let bodies = bodies.map(|(i, body)| (BodyId::new(i), body.solid.clone())).collect();
+        let mut samples = Vec::new();
+        self.sample_cell(&surfaces, bodies, bounds.center(), edge, &mut samples);
+        // Surface by surface: neighbours in the tree are neighbours on a surface.
+        samples.sort_by_key(|sample| sample.0);
+        sources.extend(samples.into_iter().map(|sample| sample.1));
+    }
+
+    /// Sources for those of the `wanted` surfaces that bound what is left of the bodies in a cell.
+    ///
+    /// One descent for all surfaces, with bodies pruned as in the search for features: most of an infinite surface bounds nothing, and what is
+    /// at a sample is told from few surfaces, however many the bodies have.
+    fn sample_cell(
+        &self,
+        wanted: &[SurfaceId],
+        bodies: Vec<(BodyId, Solid)>,
+        center: Point,
+        edge: f64,
+        samples: &mut Vec<(SurfaceId, Source)>,
+    ) {
+        let bodies = self.pruned(bodies, &center, edge);
+        let mut here: Vec<SurfaceId> = bodies.iter().flat_map(|body| body.1.surfaces()).collect();
+        here.sort_unstable();
+        let open: Vec<SurfaceId> = wanted
+            .iter()
+            .copied()
+            .filter(|surface| here.binary_search(surface).is_ok())
+            .filter(|&surface| self.is_coarse(surface, &bodies, &center, edge, samples))
+            .collect();
+        // Where a surface is singular (apex of a cone) the size there is nearly zero: no cell is worth going on.
+        let least = 1e-3 * self.features.bounds.diagonal() * self.settings.scale.min(1.0);
+        if open.is_empty() || edge < least {
+            return;
+        }
+        for child in 0..8 {
+            let side = |axis: usize| if child >> axis & 1 == 1 { 0.25 * edge } else { -0.25 * edge };
+            let middle = center + Vector::new(side(0), side(1), side(2));
+            self.sample_cell(&open, bodies.clone(), middle, 0.5 * edge, samples);
         }
     }
 
-    fn sample_cell(&self, surface: SurfaceId, min: Point, edge: f64, sources: &mut Vec<Source>) {
-        let shape = &self.geometry.surfaces[surface.index()];
-        let cell = [0, 1, 2].map(|axis| Interval { lo: min[axis], hi: min[axis] + edge });
-        let range = shape.value_range(&cell);
-        if range.lo > 0.0 || range.hi < 0.0 {
-            return;
-        }
-        let center = min + Vector::repeat(0.5 * edge);
-        let Ok(point) = shape.project(&center) else {
-            return self.split_cell(surface, min, edge, sources);
+    /// What is left of bodies in a cell and around it, as far as its samples may be.
+    fn pruned(&self, bodies: Vec<(BodyId, Solid)>, center: &Point, edge: f64) -> Vec<(BodyId, Solid)> {
+        /// A sample is at most an edge from the middle; with rounding.
+        const REACH: f64 = 1.01;
+        let reach = REACH * edge + 2.0 * self.side_step();
+        let cell = [0, 1, 2].map(|i| Interval { lo: center[i] - reach, hi: center[i] + reach });
+        let mut known: Vec<(SurfaceId, Interval)> = Vec::new();
+        let mut range = |id: SurfaceId| match known.iter().find(|known| known.0 == id) {
+            Some(known) => known.1,
+            None => {
+                let range = self.geometry.surfaces[id.index()].value_range(&cell);
+                known.push((id, range));
+                range
+            }
         };
+        let left = |(id, solid): (BodyId, Solid)| match solid.prune(&mut range) {
+            Pruned::Empty => None,
+            Pruned::Full => Some((id, Solid::And(Vec::new()))),
+            Pruned::Part(part) => Some((id, part)),
+        };
+        bodies.into_iter().filter_map(left).collect()
+    }
+
+    /// Whether a cell is too large for the size of a surface there; if it is not and the surface is near, adds its source.
+    fn is_coarse(
+        &self,
+        surface: SurfaceId,
+        bodies: &[(BodyId, Solid)],
+        center: &Point,
+        edge: f64,
+        samples: &mut Vec<(SurfaceId, Source)>,
+    ) -> bool {
+        let shape = &self.geometry.surfaces[surface.index()];
+        let cell = [0, 1, 2].map(|i| Interval { lo: center[i] - 0.5 * edge, hi: center[i] + 0.5 * edge });
+        if !shape.value_range(&cell).contains_zero() {
+            return false;
+        }
+        let Ok(point) = shape.project(center) else { return true };
         if (point - center).norm() > edge {
-            return;
+            return false;
         }
         let own =
             self.size_on(surface, &point).min(self.least_body_bound()).min(self.least_cutout_bound(surface));
         let constant = self.constant_size(surface);
         if own >= self.maximum && constant {
-            return;
+            return false;
         }
         let coarsest =
             if constant { f64::INFINITY } else { COARSEST_SAMPLE * self.features.bounds.diagonal() };
         if edge > coarsest.min(self.spacing(own)) {
-            return self.split_cell(surface, min, edge, sources);
+            return true;
         }
-        if let Some(size) = self.size_of_sample(surface, &point) {
-            sources.push(Source { point, size });
-        }
+        let size = self.size_of_sample(surface, bodies, &point);
+        samples.extend(size.map(|size| (surface, Source { point, size })));
+        false
     }
 
-    fn split_cell(&self, surface: SurfaceId, min: Point, edge: f64, sources: &mut Vec<Source>) {
-        // Where a surface is singular (apex of a cone) the size there is nearly zero: no cell is worth going on.
-        if edge < 1e-3 * self.features.bounds.diagonal() * self.settings.scale.min(1.0) {
-            return;
-        }
-        for child in 0..8 {
-            let offset = Vector::from_fn(|axis, _| if child >> axis & 1 == 1 { 0.5 * edge } else { 0.0 });
-            self.sample_cell(surface, min + offset, 0.5 * edge, sources);
-        }
+    /// How far beside a surface a point is taken to tell the regions on both sides.
+    fn side_step(&self) -> f64 {
+        SIDE_STEP * self.features.bounds.diagonal()
     }
 
     fn least_body_bound(&self) -> f64 {
@@ -256,19 +314,19 @@ impl Sampler<'_> {
         )
     }
 
-    /// The size at a point of a surface, if a patch is there.
-    fn size_of_sample(&self, surface: SurfaceId, point: &Point) -> Option<f64> {
-        let step = SIDE_STEP * self.features.bounds.diagonal();
+    /// The size at a point of a surface, if a patch is there; `bodies` is what is left of them around it.
+    fn size_of_sample(&self, surface: SurfaceId, bodies: &[(BodyId, Solid)], point: &Point) -> Option<f64> {
+        let step = self.side_step();
         let normal = self.geometry.surfaces[surface.index()].normal(point);
-        let sides = [point - step * normal, point + step * normal].map(|p| body_at(self.geometry, &p));
+        let body_at = |p: Point| bodies.iter().find(|b| contains(self.geometry, &b.1, &p)).map(|b| b.0);
+        let sides = [point - step * normal, point + step * normal].map(body_at);
         if sides[0] == sides[1] {
             return None;
         }
-        let is_here = |cutout: &Cutout| {
-            let [behind, before] =
-                [-step, step].map(|step| contains(self.geometry, &cutout.solid, &(point + step * normal)));
-            cutout.surface == surface && behind != before
-        };
+        let is_in =
+            |cutout: &Cutout, step: f64| contains(self.geometry, &cutout.solid, &(point + step * normal));
+        let is_here =
+            |cutout: &Cutout| cutout.surface == surface && is_in(cutout, -step) != is_in(cutout, step);
         let cutout = (0..).zip(&self.geometry.cutouts).find(|(_, cutout)| is_here(cutout)).map(|(i, _)| i);
         let bounds = self.body_bounds.iter().filter(|(body, _)| sides.contains(&Some(*body)));
         let on_surface = self.size_on(surface, point).min(self.cutout_bound(cutout));
@@ -279,10 +337,6 @@ impl Sampler<'_> {
 
 fn contains(geometry: &Geometry, solid: &Solid, point: &Point) -> bool {
     solid.holds(&|surface| geometry.surfaces[surface.index()].value(point) > 0.0)
-}
-
-fn body_at(geometry: &Geometry, point: &Point) -> Option<BodyId> {
-    geometry.bodies.iter().position(|b| contains(geometry, &b.solid, point)).map(BodyId::new)
 }
 
 /// Curvature at each point of a trace: that of the circle through it and its neighbours.

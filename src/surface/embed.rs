@@ -50,7 +50,7 @@ pub(super) fn embed(sheet: &mut Sheet, uses: &[(u32, bool)], seeds: &[Site]) -> 
         sheet.nodes.truncate(fixed);
         let done =
             if sheet.chart.is_flat() { triangulate_flat(sheet) } else { triangulate_round(sheet, attempt) };
-        let done = done.and_then(|()| carve(sheet, uses, seeds));
+        let done = done.and_then(|()| check_order(sheet)).and_then(|()| carve(sheet, uses, seeds));
         if done != Err(Fault::StartInTheWay) {
             return done;
         }
@@ -247,6 +247,43 @@ fn crossed_edges(sheet: &Sheet, s: u32, a: u32, b: u32) -> Result<VecDeque<[u32;
         };
     }
     Err(Conflict::TooLong(s).into())
+}
+
+/// Whether pieces leave their vertices in the order of their curves.
+///
+/// Where two curves leave a corner at a small angle and one is cut into fewer pieces, its chord may lie on the other side of the other:
+/// nothing crosses, but what was between them is turned inside out.
+fn check_order(sheet: &Sheet) -> Result<(), Fault> {
+    /// Below this sine the order of two directions is rounding, or that of surfaces which are tangent.
+    const LEAST_SINE: f64 = 1e-6;
+    let mut ends: Vec<(u32, u32, usize)> = Vec::with_capacity(2 * sheet.pieces.len());
+    for (s, piece) in (0..).zip(&sheet.pieces) {
+        ends.extend((0..2).map(|k| (piece.ends[k], s, k)));
+    }
+    ends.sort_unstable();
+    // Where a curve has no direction of its own it was given that of its chord, which tells nothing.
+    let own_direction = |&(v, s, k): &(u32, u32, usize)| {
+        let piece = &sheet.pieces[s as usize];
+        let other = piece.ends[1 - k];
+        let chord = sheet.nodes[other as usize].point - sheet.nodes[v as usize].point;
+        let direction = piece.tangents[k];
+        (chord.try_normalize(0.0) != Some(direction)).then_some((s, other, direction))
+    };
+    let mut conflicts = Vec::new();
+    for at in ends.chunk_by(|x, y| x.0 == y.0) {
+        let v = at[0].0;
+        let here: Vec<_> = at.iter().filter_map(own_direction).collect();
+        for (i, &(s, p, to_p)) in here.iter().enumerate() {
+            for &(t, q, to_q) in &here[i + 1..] {
+                let sine = to_p.cross(&to_q).dot(&sheet.nodes[v as usize].normal);
+                let is_turned = if sine > 0.0 { sheet.fits(v, q, p) } else { sheet.fits(v, p, q) };
+                if p != q && to_p.dot(&to_q) > 0.0 && sine.abs() > LEAST_SINE && is_turned {
+                    conflicts.push(Conflict::Crossing(s, t));
+                }
+            }
+        }
+    }
+    if conflicts.is_empty() { Ok(()) } else { Err(Fault::Coarse(conflicts)) }
 }
 
 /// Keeps the triangles that are inside: to the left of a use of a piece or around a seed, and what is joined to them

@@ -1,7 +1,7 @@
 //! A triangulation of one connected sheet of a surface while it is being made.
 
 use super::Settings;
-use super::chart::{Chart, Site};
+use super::chart::{Chart, Site, nappe};
 use super::topology::{NONE, Topology, last, next};
 use crate::kernel::predicates::Sign;
 use crate::kernel::simplex::area_vector;
@@ -143,7 +143,11 @@ impl<'a> Sheet<'a> {
         if size.is_nan() || size <= 0.0 || size.is_infinite() {
             return Err(Stop::Size(*point, size));
         }
-        // At the apex of a cone the curvature is infinite or no number; there is no bound then.
+        // At the apex of a cone there is no bound: its curvature is infinite, no number, or (some ulp off) a huge one, which would
+        // ask for sizes of 10⁻¹⁰.
+        if nappe(self.surface, point) == 0.0 {
+            return Ok(size);
+        }
         let bound = self.settings.turn / self.surface.curvature(point);
         Ok(if bound > 0.0 { size.min(bound) } else { size })
     }

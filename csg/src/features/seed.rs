@@ -28,10 +28,23 @@ const LEAST_SINE: f64 = 1e-4;
 /// The room around a leaf, as a part of its sides, in which the curve may be monotone too.
 const ROOMS: [f64; 4] = [0.5, 0.2, 0.08, 0.03];
 
-/// A trace, and how far its curve is from the chord of each of its steps.
+/// Chords near a leaf are halved until they are nearer to their curve than this part of the leaf: what is farther inside than that is
+/// covered. With chords as the trace has them most leaves along the path of an extrusion were split into a hundred parts.
+const FINE: f64 = 0.01;
+
+/// A trace, and chords of its curve, each its step or a part of it.
 struct Known {
     trace: Trace,
-    sagittas: Vec<f64>,
+    chords: Vec<Chord>,
+}
+
+/// A chord of a curve.
+struct Chord {
+    ends: [Point; 2],
+    /// The point of the curve beside its middle, if it is found.
+    middle: Option<Point>,
+    /// How far the curve is from it, with room for where it is farther than in the middle.
+    sagitta: f64,
 }
 
 /// All pieces of intersection curves in the leaves of the tree where they matter.
@@ -64,7 +77,10 @@ fn search(
     let wider = ROOMS.into_iter().map(|room| widened(&leaf.cell, room));
     let cell = wider.into_iter().find(|wide| is_monotone(a, b, wide, &direction)).unwrap_or(leaf.cell);
     let mut covered = Vec::new();
-    of_pair.iter().for_each(|&t| cover(&all[t], &cell, &direction, &mut covered));
+    for &t in of_pair.iter() {
+        all[t].refine([a, b], &leaf.cell, tolerances);
+        cover(&all[t], &cell, &direction, &mut covered);
+    }
     let reachable = widened(&leaf.cell, 1.0 / 64.0);
     // On a seam of the pair, where Newton's method may end, no curve can be followed.
     let has_seam = geometry.seam(pair).is_some();
@@ -87,7 +103,9 @@ fn search(
             let trace = Tracer::new(geometry, tree, pair, tolerances).trace(&seed);
             // A seed at a point of contact, from where no step leads on, is no curve.
             if trace.points.len() > 1 {
-                let known = Known { sagittas: sagittas(a, b, &trace, tolerances), trace };
+                let chord = |ends: &[Point]| Chord::new([a, b], [ends[0], ends[1]], tolerances);
+                let mut known = Known { chords: trace.points.windows(2).map(chord).collect(), trace };
+                known.refine([a, b], &leaf.cell, tolerances);
                 cover(&known, &cell, &direction, &mut covered);
                 of_pair.push(all.len());
                 all.push(known);
@@ -99,16 +117,43 @@ fn search(
     }
 }
 
-/// How far the curve is from the middle of each chord of a trace, with room for where it is farther.
-fn sagittas(a: &Surface, b: &Surface, trace: &Trace, tolerances: &Tolerances) -> Vec<f64> {
-    /// A step turns little: nowhere is the curve twice as far from the chord as in the middle.
-    const ROOM: f64 = 2.0;
-    let sagitta = |ends: &[Point]| {
+impl Chord {
+    fn new([a, b]: [&Surface; 2], ends: [Point; 2], tolerances: &Tolerances) -> Self {
+        /// A step turns little: nowhere is the curve twice as far from the chord as in the middle.
+        const ROOM: f64 = 2.0;
         let middle = nalgebra::center(&ends[0], &ends[1]);
-        let on = project_to_both(a, b, &middle, tolerances.exact);
-        on.map_or((ends[1] - ends[0]).norm(), |on| ROOM * (on - middle).norm())
-    };
-    trace.points.windows(2).map(sagitta).collect()
+        let on = project_to_both(a, b, &middle, tolerances.exact).ok();
+        let sagitta = on.map_or((ends[1] - ends[0]).norm(), |on| ROOM * (on - middle).norm());
+        Self { ends, middle: on, sagitta }
+    }
+
+    /// Where to halve it for a cell, if it is near and not yet fine enough.
+    fn cut_for(&self, cell: &Cell) -> Option<Point> {
+        let fine = FINE * cell.iter().map(Interval::width).fold(f64::INFINITY, f64::min);
+        let is_coarse = self.sagitta > fine && (self.ends[1] - self.ends[0]).norm() > fine;
+        self.middle.filter(|_| is_coarse && chord_in(&self.ends, cell, -self.sagitta).is_some())
+    }
+}
+
+impl Known {
+    /// Halves the chords near a cell until they are fine there.
+    fn refine(&mut self, pair: [&Surface; 2], cell: &Cell, tolerances: &Tolerances) {
+        if !self.chords.iter().any(|chord| chord.cut_for(cell).is_some()) {
+            return;
+        }
+        let mut open = std::mem::take(&mut self.chords);
+        open.reverse();
+        while let Some(chord) = open.pop() {
+            match chord.cut_for(cell) {
+                Some(middle) => {
+                    let [from, to] = chord.ends;
+                    open.push(Chord::new(pair, [middle, to], tolerances));
+                    open.push(Chord::new(pair, [from, middle], tolerances));
+                }
+                None => self.chords.push(chord),
+            }
+        }
+    }
 }
 
 /// A cell with room around it, as a part of its sides.
@@ -123,8 +168,8 @@ fn slab(cell: &Cell, direction: &Vector) -> Interval {
 
 /// Adds the slabs along a direction that a trace covers in a cell; those that touch become one.
 fn cover(known: &Known, cell: &Cell, direction: &Vector, covered: &mut Vec<Interval>) {
-    for (ends, &sagitta) in known.trace.points.windows(2).zip(&known.sagittas) {
-        if let Some([from, to]) = chord_in(ends, cell, sagitta) {
+    for chord in &known.chords {
+        if let Some([from, to]) = chord_in(&chord.ends, cell, chord.sagitta) {
             let [x, y] = [from, to].map(|p| p.coords.dot(direction));
             covered.push(Interval::new(x.min(y), x.max(y)));
         }

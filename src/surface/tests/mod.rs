@@ -3,6 +3,7 @@
 mod by_hand;
 mod random;
 mod tutorials;
+mod written;
 
 use super::*;
 use crate::mesh::{BoundaryTriangle, VertexId};

@@ -1,0 +1,86 @@
+//! Surface meshes of geometries written in a few lines.
+
+use super::*;
+use crate::size::{GeometricSize, SizeSettings, UniformSize};
+use crate::surface::curves::mesh_curves;
+
+/// The surface mesh of a geometry at moderate sizes.
+fn meshed(text: &str) -> Result<(SurfaceMesh, Features), SurfaceError> {
+    let geometry = csg::language::parse_geometry(text, "test.geo").expect("a geometry").geometry;
+    let features = Features::find(&geometry).expect("features");
+    let projector = Projector::new(&geometry, &features);
+    let size = GeometricSize::new(&geometry, &features, &SizeSettings::default());
+    let curves = mesh_curves(&features, &projector, &size).expect("curves");
+    let (mesh, _) = mesh_patches(&geometry, &features, curves, &size, &Settings::default())?;
+    assert_eq!(mesh.check(&features, &projector), []);
+    Ok((mesh, features))
+}
+
+#[test]
+fn the_tip_of_a_skew_cone_has_no_tiny_triangles() {
+    // Its apex is computed some ulp beside the point in which the plane cuts it.
+    let (mesh, features) = meshed(
+        "algebraic3d
+solid c = cone (-0.4018, -0.3177, 0.2946; 0.5526; -0.3036, 0.0514, 1.6624; 0)
+    and plane (-0.4018, -0.3177, 0.2946; -0.0982, -0.3691, -1.3678)
+    and plane (-0.3036, 0.0514, 1.6624; 0.0982, 0.3691, 1.3678);
+tlo c;",
+    )
+    .unwrap();
+    assert_eq!([features.corners.len(), features.curves.len(), features.patches.len()], [1, 1, 2]);
+    let point = |v: VertexId| mesh.points[v.index()];
+    let sides = mesh.triangles.iter().flat_map(|t| {
+        let [a, b, c] = t.vertices.map(point);
+        [(b - a).norm(), (c - b).norm(), (a - c).norm()]
+    });
+    let shortest = sides.fold(f64::INFINITY, f64::min);
+    assert!(shortest > 1e-4, "{shortest}");
+}
+
+#[test]
+fn a_lens_between_arcs_that_leave_a_corner_at_a_small_angle_asks_for_shorter_segments_until_it_is_not_turned_inside_out()
+ {
+    // A hundredth of a circle's sagitta is between two arcs with the same ends, and only one of them is cut in two.
+    let radius = |middle: f64| (1.0 + middle * middle).sqrt();
+    let lens = |counts: [usize; 2]| {
+        let mut made = Made::new(vec![
+            Surface::Plane(Plane { point: Point::origin(), normal: Vector::z() }),
+            Surface::Cylinder(Cylinder {
+                point: Point::new(0.0, -1.0, 0.0),
+                axis: Vector::z(),
+                radius: radius(1.0),
+            }),
+            Surface::Cylinder(Cylinder {
+                point: Point::new(0.0, -1.01, 0.0),
+                axis: Vector::z(),
+                radius: radius(1.01),
+            }),
+        ]);
+        let ends = [-1.0, 1.0].map(|x| made.corner(Point::new(x, 0.0, 0.0), &[0, 1, 2]));
+        let arc = |middle: f64| {
+            let half = 1.0_f64.atan2(middle);
+            move |t: f64| {
+                let turn = half * (2.0 * t - 1.0);
+                Point::new(radius(middle) * turn.sin(), radius(middle) * turn.cos() - middle, 0.0)
+            }
+        };
+        let outer = made.arc([0, 1], ends, counts[0], arc(1.0));
+        let inner = made.arc([0, 2], ends, counts[1], arc(1.01));
+        made.patch(0, false, &[(outer, false), (inner, true)], &[]);
+        made
+    };
+    let coarse = lens([1, 2]);
+    let failed = mesh_patches(
+        &coarse.geometry,
+        &coarse.features,
+        coarse.curves,
+        &UniformSize(0.5),
+        &Settings::default(),
+    );
+    let failed = failed.unwrap_err();
+    assert!(
+        matches!(&failed, SurfaceError::TooCoarse { segments, .. } if !segments.is_empty()),
+        "{failed:?}"
+    );
+    lens([64, 64]).mesh(&UniformSize(0.5));
+}
