@@ -7,7 +7,7 @@ use super::{ClosedSurface, Report, VolumeError, carve, delaunay, finish, inside,
 use crate::Point;
 
 /// How often the recovery is begun anew, taking edges and facets in another order, where it fails. Of 360 prisms twisted nearly to their limit,
-/// blocks with crossing notches, skins, staircases, spikes and lenses two need one; prisms of 30 and more sides some (`MOST_HELP` mostly ends
+/// blocks with crossing notches, skins, staircases, spikes and lenses two need one; prisms of 50 sides some (`MOST_HELP` mostly ends
 /// these before).
 const ATTEMPTS: u32 = 40;
 

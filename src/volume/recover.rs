@@ -34,7 +34,7 @@ const LEAST_STEINER: usize = 10;
 /// The share of the generation before, in eighths.
 const EIGHTHS: usize = 4;
 
-/// The share of what is missing, in eighths. With none at all 200 missing facets of prisms of 40 sides that are twisted nearly to their limit
+/// The share of what is missing, in eighths. With none at all 200 missing facets of prisms of 86 sides that are twisted nearly to their limit
 /// wait for ten points a generation.
 const EIGHTHS_OF_MISSING: usize = 2;
 
