@@ -27,29 +27,50 @@ const HELP: u32 = 1000;
 
 /// Steiner points come in **generations**: those on the edges and facets missing at first, those on the edges from these points to
 /// the corners opposite, and so on. Where flips do their part each generation is much smaller than the one before (skins end after
-/// 50 and 0, say). Where it is not (240, 540, 727) the points make more work than they do, and the attempt ends: a generation may
-/// have this many points and a share of the one before, the first one a share of the edges and facets missing at first.
+/// 50 and 0, say). Where it is not the points make more work than they do: so a generation may only have this many points and a share of the
+/// one before or of what is missing, the first one a share of what was missing at first. What is left waits for the next.
 const LEAST_STEINER: usize = 10;
 
-/// The share of the generation before, in eighths; every fourth attempt has one more, for very few inputs (5 of 200 blocks with
-/// notches) have no order that ends so soon.
-const LEAST_EIGHTHS: usize = 4;
+/// The share of the generation before, in eighths.
+const EIGHTHS: usize = 4;
 
-/// The share of what was missing at first, in eighths; likewise. Attempts that end well have needed 1 to 5.
-const LEAST_FIRST_EIGHTHS: usize = 4;
+/// The share of what is missing, in eighths. With none at all 200 missing facets of prisms of 86 sides that are twisted nearly to their limit
+/// wait for ten points a generation.
+const EIGHTHS_OF_MISSING: usize = 2;
 
-/// How many points an edge may get in one generation: attempts that end well need up to 11. Where sheets come so near to each other
-/// that rounding decides what an edge crosses it takes any number in vain.
+/// The share of what was missing at first, in eighths: attempts that end well have needed 1 to 5.
+const FIRST_EIGHTHS: usize = 4;
+
+/// How many points an edge of the surface may get in one generation: attempts that end well need up to 11. Where sheets come so near to each
+/// other that rounding decides what an edge crosses it takes any number in vain.
 const MOST_ON_EDGE: usize = 16;
 
-/// How many generations an attempt may have, those with helping points counted: three or four is usual.
-const MOST_GENERATIONS: usize = 20;
+/// How many points an edge inside a triangle may get in one generation: with one more on it there is mostly another way to cut the triangle. With
+/// sixteen the generations of twisted prisms grow (450, 671, 890 where one gives 450, 130, 92).
+const MOST_INSIDE: usize = 1;
+
+/// How many generations may pass without fewer missing facets than ever before.
+const PATIENCE: usize = 5;
+
+/// What an edge must be shorter than the one it replaces by, so that rounding has no say.
+const LESS: f64 = 1.0 - 1e-6;
+
+/// How many generations an attempt may have, those with helping points counted: three or four is usual, twisted prisms need up to twenty.
+const MOST_GENERATIONS: usize = 40;
 
 /// Of more missing edges and facets only an eighth counts: where so many are missing most come back by themselves, or none does.
 const MANY: usize = 2000;
 
 /// How often helping points are tried where a recovery is stuck.
 const HELPS: u32 = 3;
+
+/// When an edge inside a triangle gives way to the other diagonal of the two facets beside it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Turn {
+    Anyway,
+    IfThere,
+    IfThereOrShorter,
+}
 
 /// Counts of what the recovery met and did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -117,13 +138,18 @@ impl<'a> Recovery<'a> {
             return Ok(());
         }
         let (mut helps, mut generation) = (0, 0);
+        let (mut fewest, mut in_vain) = (usize::MAX, 0);
         for round in 0..MOST_GENERATIONS {
             let before = self.steiner.len();
-            self.most_steiner = before + LEAST_STEINER + generation * self.patience(LEAST_EIGHTHS) / 8;
             if round > 0 {
+                let share = (generation * EIGHTHS).max(missing.len() * EIGHTHS_OF_MISSING) / 8;
+                self.most_steiner = before + LEAST_STEINER + share;
                 self.give_help(missing.len().min(MANY) / 2);
             }
             self.recover_edges(&missing, round == 0);
+            if self.turn_missing_edges() {
+                missing = self.missing_facets();
+            }
             if self.steiner.len() < self.most_steiner {
                 self.recover_facets(&missing);
             }
@@ -132,7 +158,9 @@ impl<'a> Recovery<'a> {
                 return Ok(());
             }
             generation = self.steiner.len() - before;
-            if self.steiner.len() >= self.most_steiner {
+            in_vain = if missing.len() < fewest { 0 } else { in_vain + 1 };
+            fewest = fewest.min(missing.len());
+            if in_vain == PATIENCE {
                 break;
             }
             if generation == 0 {
@@ -144,11 +172,6 @@ impl<'a> Recovery<'a> {
             }
         }
         Err(missing)
-    }
-
-    /// A share that grows with the attempts.
-    fn patience(&self, least: usize) -> usize {
-        least + self.attempt as usize / 4
     }
 
     /// Makes facets faces of the mesh, with Steiner points where flips fail.
@@ -201,7 +224,7 @@ impl<'a> Recovery<'a> {
             let missing = wanted.len() + self.counts.missing_faces;
             let missing = missing.min(MANY) + missing.saturating_sub(MANY) / 8;
             self.give_help(20 + missing / 2);
-            self.most_steiner = LEAST_STEINER + missing * self.patience(LEAST_FIRST_EIGHTHS) / 8;
+            self.most_steiner = LEAST_STEINER + missing * FIRST_EIGHTHS / 8;
         }
         wanted.retain(|&[a, b]| !self.recover_edge(a, b, 0));
         for depth in 1..=DEEPEST {
@@ -217,11 +240,13 @@ impl<'a> Recovery<'a> {
 
     /// Puts Steiner points on a missing edge until its pieces are there.
     fn split_until_there(&mut self, edge: [u32; 2]) {
-        let most = self.most_steiner.min(self.steiner.len() + MOST_ON_EDGE);
+        let inside = self.constraints.edge_of(edge[0], edge[1]).is_none();
+        let most = if inside { MOST_INSIDE } else { MOST_ON_EDGE };
+        let most = self.most_steiner.min(self.steiner.len() + most);
         let mut pieces = vec![edge];
         while let Some([a, b]) = pieces.pop() {
             let is_there = !self.constraints.has_edge(a, b) || self.recover_edge(a, b, DEEPEST);
-            if is_there || self.turn_edge(a, b, true) {
+            if is_there || self.turn_edge(a, b, Turn::IfThere).is_some() {
                 continue;
             }
             if self.steiner.len() >= most {
@@ -229,25 +254,29 @@ impl<'a> Recovery<'a> {
             }
             match self.split_edge(a, b) {
                 Some(p) => pieces.extend([[a, p], [p, b]]),
-                None => drop(self.turn_edge(a, b, false)),
+                None => drop(self.turn_edge(a, b, Turn::Anyway)),
             }
         }
     }
 
-    /// Replaces an edge between two facets of one triangle by the other diagonal of the two, one that is there if so asked. Which diagonals
+    /// Replaces an edge between two facets of one triangle by the other diagonal of the two, which is returned. Which diagonals
     /// facets of one triangle have is free, and where the edge cannot be had or split the other one may.
-    fn turn_edge(&mut self, a: u32, b: u32, must_be_there: bool) -> bool {
+    fn turn_edge(&mut self, a: u32, b: u32, turn: Turn) -> Option<[u32; 2]> {
         let mut at = self.constraints.facets_at(a);
         at.retain(|&f| self.constraints.facets[f as usize].vertices.contains(&b));
-        let [one, other] = at[..] else { return false };
+        let [one, other] = at[..] else { return None };
         let [one, other] = [one, other].map(|f| self.constraints.facets[f as usize]);
         if one.triangle != other.triangle {
-            return false;
+            return None;
         }
         let apex = |f: Facet| f.vertices.into_iter().find(|v| ![a, b].contains(v)).expect("a third corner");
         let (c, d) = (apex(one), apex(other));
-        if must_be_there && self.mesh.tet_at_edge(c, d, &mut self.star).is_none() {
-            return false;
+        let length = |a, b| (self.mesh.point(a) - self.mesh.point(b)).norm();
+        let is_wanted = turn == Turn::Anyway
+            || (turn == Turn::IfThereOrShorter && length(c, d) < LESS * length(a, b))
+            || self.mesh.tet_at_edge(c, d, &mut self.star).is_some();
+        if !is_wanted {
+            return None;
         }
         // In the first facet `b` becomes `d`, in the other one `a` becomes `c`.
         let turned = [(one, b, d), (other, a, c)]
@@ -259,7 +288,7 @@ impl<'a> Recovery<'a> {
             self.constraints.on_one_edge(*face) || !shadow.is_left(face.map(|v| self.mesh.point(v)))
         };
         if turned.iter().any(is_turned_over) {
-            return false;
+            return None;
         }
         for f in at {
             self.constraints.remove(f);
@@ -267,7 +296,39 @@ impl<'a> Recovery<'a> {
         for vertices in turned {
             self.constraints.add(vertices, one.triangle);
         }
-        true
+        Some([c, d])
+    }
+
+    /// Turns missing edges inside triangles whose other diagonal is there or is shorter: the fewer edges are missing the fewer points the next
+    /// generation needs. Whether any was turned.
+    fn turn_missing_edges(&mut self) -> bool {
+        let mut sides: Vec<(u32, [u32; 2])> = self
+            .constraints
+            .alive()
+            .map(|f| self.constraints.facets[f as usize])
+            .filter(|f| f.vertices != self.constraints.facets[f.triangle as usize].vertices)
+            .flat_map(|f| edges(f.vertices).map(|edge| (f.triangle, edge)))
+            .collect();
+        sides.sort_unstable();
+        let inside = sides.windows(2).filter(|pair| pair[0] == pair[1]).map(|pair| pair[0].1);
+        let mut inside: Vec<[u32; 2]> = inside.collect();
+        let mut any = false;
+        // Each turn leaves fewer missing edges or shorter ones.
+        loop {
+            let mut turned = false;
+            for edge in &mut inside {
+                if self.mesh.tet_at_edge(edge[0], edge[1], &mut self.star).is_none()
+                    && let Some(other) = self.turn_edge(edge[0], edge[1], Turn::IfThereOrShorter)
+                {
+                    *edge = other;
+                    turned = true;
+                }
+            }
+            if !turned {
+                return any;
+            }
+            any = true;
+        }
     }
 
     /// Sees to it that at least so many edges and facets can be helped.
