@@ -83,11 +83,8 @@ fn run_body(body: &str, comm: &dyn Communicator) {
             let start = tetmill::dist::distribute(comm, given).unwrap();
             let sum = |mesh: &DistMesh| checksum_of_all(comm, &BareStream::new(mesh.clone().into())).unwrap();
             // In stretches, all on the last rank, and back.
-            let plans: [fn(u64, u32) -> u32; 3] = [
-                |tet, ranks| tet as u32 * ranks / 40,
-                |_, ranks| ranks - 1,
-                |tet, ranks| tet as u32 % ranks,
-            ];
+            let plans: [fn(u64, u32) -> u32; 3] =
+                [|tet, ranks| tet as u32 * ranks / 40, |_, ranks| ranks - 1, |tet, ranks| tet as u32 % ranks];
             let mut mesh = start.clone();
             for plan in plans {
                 let to: Vec<u32> = mesh.tet_ids.iter().map(|&tet| plan(tet, ranks)).collect();

@@ -16,7 +16,7 @@
 //!
 //! | what | how it moves |
 //! |---|---|
-//! | tets, bodies, boundary faces, edges on curves and patches | with the tets ([`pack`]) |
+//! | tets, bodies, boundary faces, edges on curves and patches | with the tets |
 //! | edges and faces inside | not: they follow from the tets, their ids and holders by [`settle`] |
 //! | names, periodic maps, singular tags | not: all ranks have them, by ids that migration keeps |
 //!
