@@ -21,6 +21,7 @@ pub mod pipeline;
 pub mod progress;
 pub mod quality;
 pub mod refine;
+pub mod repartition;
 pub mod report;
 pub mod size;
 pub mod skin;

@@ -5,8 +5,11 @@
 use csg::{BodyId, PatchId};
 use std::process::{Command, Output};
 use tetmill::Point;
+use tetmill::check::checksum_of_all;
 use tetmill::comm::Communicator;
+use tetmill::dist::DistMesh;
 use tetmill::mesh::{BoundaryTriangle, Class, Mesh, VertexId};
+use tetmill::migrate::BareStream;
 
 /// Which of the bodies below a rank is to run.
 const BODY: &str = "TETMILL_TEST_BODY";
@@ -74,6 +77,24 @@ fn run_body(body: &str, comm: &dyn Communicator) {
             part.check(comm).unwrap();
             println!("rank {} has {} of {} tets", comm.rank(), part.tets.len(), part.totals.tets);
         }
+        "migrate" => {
+            let ranks = comm.size();
+            let given = (comm.rank() == 0).then(|| (fan(40), (0..40).map(|tet| tet % ranks).collect()));
+            let start = tetmill::dist::distribute(comm, given).unwrap();
+            let sum = |mesh: &DistMesh| checksum_of_all(comm, &BareStream::new(mesh.clone().into())).unwrap();
+            // In stretches, all on the last rank, and back.
+            let plans: [fn(u64, u32) -> u32; 3] =
+                [|tet, ranks| tet as u32 * ranks / 40, |_, ranks| ranks - 1, |tet, ranks| tet as u32 % ranks];
+            let mut mesh = start.clone();
+            for plan in plans {
+                let to: Vec<u32> = mesh.tet_ids.iter().map(|&tet| plan(tet, ranks)).collect();
+                mesh = tetmill::migrate::migrate(comm, mesh, &to).unwrap();
+                mesh.check(comm).unwrap();
+                assert_eq!(sum(&mesh), sum(&start));
+            }
+            assert!(mesh == start);
+            println!("rank {} has its tets back", comm.rank());
+        }
         "panic" => {
             assert_ne!(comm.rank(), 1, "this rank fails on purpose");
             comm.barrier().unwrap();
@@ -109,6 +130,16 @@ fn processes_get_their_parts_and_agree_on_them() {
     assert!(output.status.success(), "{text}");
     for rank in 0..4 {
         assert!(text.contains(&format!("rank {rank} has 10 of 40 tets")), "{text}");
+    }
+}
+
+#[test]
+fn processes_move_their_tets_and_get_them_back() {
+    let Some(output) = mpirun(4, "migrate") else { return };
+    let text = text(&output);
+    assert!(output.status.success(), "{text}");
+    for rank in 0..4 {
+        assert!(text.contains(&format!("rank {rank} has its tets back")), "{text}");
     }
 }
 

@@ -122,7 +122,8 @@ fn of_boundary(stream: &dyn MeshStream, index: usize, block: &mut BoundaryBlock)
     let mut sum = Checksum::default();
     for (triangle, parents) in block.triangles.iter().zip(&block.parents) {
         let ids = triangle.map(|vertex| stream.vertex_id(vertex));
-        let [p, q, r] = ids;
+        // Whoever lists a triangle may begin with any of its vertices.
+        let [p, q, r] = from_least(ids);
         let face = oriented(ids);
         // The tet behind sees the triangle as it is, the one in front the other way round.
         for (side, seen) in [(0, face), (1, face.wrapping_neg())] {
@@ -133,6 +134,17 @@ fn of_boundary(stream: &dyn MeshStream, index: usize, block: &mut BoundaryBlock)
         }
     }
     sum
+}
+
+/// The same triangle, turned so that it begins with its least vertex.
+fn from_least([p, q, r]: [GlobalId; 3]) -> [GlobalId; 3] {
+    if p < q && p < r {
+        [p, q, r]
+    } else if q < r {
+        [q, r, p]
+    } else {
+        [r, p, q]
+    }
 }
 
 /// A place in the space of 64-bit integers.
@@ -211,6 +223,13 @@ mod tests {
             }
         }
         assert!((total / 256).abs_diff(32) <= 1, "{total}");
+    }
+
+    #[test]
+    fn a_triangle_is_the_same_whichever_vertex_it_begins_with_but_not_turned_round() {
+        let turned = [[2, 7, 5], [7, 5, 2], [5, 2, 7]].map(from_least);
+        assert_eq!(turned, [[2, 7, 5]; 3]);
+        assert_eq!(from_least([7, 2, 5]), [2, 5, 7]);
     }
 
     #[test]

@@ -2,7 +2,7 @@
 //!
 //! Each rank says where each of its tets is to be. The tets travel in one sparse exchange, with the vertices that the receiver needs,
 //! the faces and edges that lie on something, and the bodies. Who holds a vertex afterwards is settled by **owner updates** (chapter 5 of the
-//! thesis "A parallel mesh generator based on sequential NETGEN"; Shephard and others 1995): holders tell the owner what changes, and the
+//! thesis "A parallel mesh generator based on sequential NETGEN", after SCOREC's parallel mesh database): holders tell the owner what changes, and the
 //! owner, which alone knows the whole list, tells the new holders.
 //!
 //! ```text
@@ -16,11 +16,11 @@
 //!
 //! | what | how it moves |
 //! |---|---|
-//! | tets, bodies, boundary faces, edges on curves and patches | with the tets ([`pack`]) |
+//! | tets, bodies, boundary faces, edges on curves and patches | with the tets |
 //! | edges and faces inside | not: they follow from the tets, their ids and holders by [`settle`] |
 //! | names, periodic maps, singular tags | not: all ranks have them, by ids that migration keeps |
 //!
-//! Not here: where tets should go, which is [`partition`](crate::partition)'s question.
+//! Not here: where tets should go, which is [`repartition`](crate::repartition)'s question.
 
 mod fine;
 mod owners;

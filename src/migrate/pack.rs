@@ -22,8 +22,8 @@ const LOAD: u8 = 0;
 
 /// What of a part stays.
 pub(super) struct Kept {
-    /// The tets, ascending.
-    pub tets: Vec<u32>,
+    /// By tet, whether it stays.
+    pub tets: Vec<bool>,
     /// By vertex, whether a tet that stays has it.
     pub vertices: Vec<bool>,
     /// By edge on a curve or patch, the same.
@@ -53,8 +53,11 @@ impl Leaving {
 pub(super) fn pack(mesh: &BareMesh, destination: &[Rank]) -> Leaving {
     let mut counts = vec![0usize; mesh.ranks as usize];
     destination.iter().for_each(|&to| counts[to as usize] += 1);
+    let stays: Vec<bool> = destination.iter().map(|&to| to == mesh.rank).collect();
+    counts[mesh.rank as usize] = 0;
     let mut tets_to: Vec<Vec<u32>> = counts.iter().map(|&count| Vec::with_capacity(count)).collect();
-    (0..).zip(destination).for_each(|(tet, &to)| tets_to[to as usize].push(tet));
+    let leave = (0..).zip(destination).filter(|(_, to)| **to != mesh.rank);
+    leave.for_each(|(tet, &to)| tets_to[to as usize].push(tet));
     let mut sides_to = vec![Vec::new(); mesh.ranks as usize];
     mesh.sides.iter().for_each(|side| sides_to[destination[side.tet.index()] as usize].push(*side));
 
@@ -63,7 +66,7 @@ pub(super) fn pack(mesh: &BareMesh, destination: &[Rank]) -> Leaving {
     let (mut letters, mut vertices) = (Vec::new(), Vec::new());
     let mut leaving_edges = Vec::new();
     let mut leaving_tets = 0;
-    for to in (0..mesh.ranks).filter(|&to| to != mesh.rank && counts[to as usize] > 0) {
+    for to in (0..mesh.ranks).filter(|&to| counts[to as usize] > 0) {
         let tets = std::mem::take(&mut tets_to[to as usize]);
         leaving_tets += tets.len() as u64;
         let used = used_vertices(mesh, &tets, &mut place);
@@ -82,10 +85,9 @@ pub(super) fn pack(mesh: &BareMesh, destination: &[Rank]) -> Leaving {
     for &edge in &leaving_edges {
         mesh.edges[edge as usize].vertices.iter().for_each(|v| flags[v.index()] |= AT_LEAVING_EDGE);
     }
-    let tets = std::mem::take(&mut tets_to[mesh.rank as usize]);
-    let edges = kept_edges(mesh, &tets, &mut flags, &leaving_edges);
+    let edges = kept_edges(mesh, &stays, &mut flags, &leaving_edges);
     let kept = Kept {
-        tets,
+        tets: stays,
         vertices: flags.iter().map(|flags| flags & STAYS != 0).collect(),
         edges,
         sides: std::mem::take(&mut sides_to[mesh.rank as usize]),
@@ -134,11 +136,10 @@ fn laid_edges(mesh: &BareMesh, tets: &[u32]) -> Vec<u32> {
 
 /// Marks the vertices of the tets that stay, and tells for each edge on a curve or patch whether one of them has it. Only those that a
 /// leaving tet has must be looked for.
-fn kept_edges(mesh: &BareMesh, tets: &[u32], flags: &mut [u8], leaving: &[u32]) -> Vec<bool> {
+fn kept_edges(mesh: &BareMesh, stays: &[bool], flags: &mut [u8], leaving: &[u32]) -> Vec<bool> {
     let mut kept = vec![true; mesh.edges.len()];
     leaving.iter().for_each(|&edge| kept[edge as usize] = false);
-    for &t in tets {
-        let tet = &mesh.tets[t as usize];
+    for (tet, _) in mesh.tets.iter().zip(stays).filter(|(_, stays)| **stays) {
         let mut at_leaving = 0;
         for v in tet {
             let flags = &mut flags[v.index()];

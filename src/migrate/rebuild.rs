@@ -1,13 +1,14 @@
 //! The new part: what stayed and what arrived, merged by global id.
 //!
-//! All lists ascend already, or are a few ascending runs, so that this is merging, not sorting; arrays of the old part are freed
-//! as soon as the new ones stand.
+//! All lists ascend already, or are a few ascending runs, so that this is merging, not sorting. Tets, nearly all of a part, are merged in
+//! place, from the last to the first: a second copy would be most of the memory and, as fresh pages, of the time.
 
 use super::owners::Holders;
 use super::pack::{Kept, Load};
 use super::{MigrateError, Settings};
 use crate::dist::{BareMesh, LaidEdge, Shared, Side};
 use crate::mesh::{GlobalId, Rank, TetId, VertexId};
+use csg::BodyId;
 
 /// Something that arrived: its global id, the load it is in, its place there.
 type Arrival = (GlobalId, u32, u32);
@@ -25,6 +26,19 @@ impl Room {
         let mut list = Vec::new();
         let refused = bytes > self.limit || list.try_reserve_exact(count).is_err();
         if refused { Err(MigrateError::OutOfMemory { rank: self.rank, bytes }) } else { Ok(list) }
+    }
+
+    /// Lengthens a list to `count` entries, and gives back what a much longer one took.
+    fn grow<T: Copy>(self, list: &mut Vec<T>, count: usize, fill: T) -> Result<(), MigrateError> {
+        let bytes = count as u64 * size_of::<T>() as u64;
+        if bytes > self.limit || list.try_reserve_exact(count - list.len()).is_err() {
+            return Err(MigrateError::OutOfMemory { rank: self.rank, bytes });
+        }
+        list.resize(count, fill);
+        if list.capacity() / 2 > count {
+            list.shrink_to_fit();
+        }
+        Ok(())
     }
 
     /// The number of things of a part, as far as local ids reach.
@@ -187,7 +201,7 @@ fn merge_edges(
     Ok(edges)
 }
 
-/// Replaces the tets, and their sides, by those that stay and those that arrived.
+/// Replaces the tets, and their sides, by those that stay and those that arrived: in place, since tets are nearly all of a part.
 fn merge_tets(
     mesh: &mut BareMesh,
     kept: &Kept,
@@ -196,40 +210,53 @@ fn merge_tets(
     room: Room,
 ) -> Result<(), MigrateError> {
     let arrivals = arrivals(arrived.iter().map(|load| &load.tet_ids[..]), room)?;
-    let count = room.count(kept.tets.len() + arrivals.len(), "tets")?;
-    let (mut ids, mut bodies) = (room.make::<GlobalId>(count)?, room.make(count)?);
-    let mut tets = room.make::<[VertexId; 4]>(count)?;
     let mut sides: Vec<Side> =
         room.make(kept.sides.len() + arrived.iter().map(|load| load.sides.len()).sum::<usize>())?;
-    let mut next = arrivals.iter().peekable();
-    let mut next_side = kept.sides.iter().peekable();
-    let take = |&(id, load, place): &Arrival, ids: &mut Vec<_>, bodies: &mut Vec<_>, tets: &mut Vec<_>| {
-        let (load, new) = (&arrived[load as usize], &renumbered.loads[load as usize]);
-        ids.push(id);
-        bodies.push(load.tet_bodies[place as usize]);
-        tets.push(load.tets[place as usize].map(|v| VertexId(new[v as usize])));
-    };
-    for &tet in &kept.tets {
-        let id = mesh.tet_ids[tet as usize];
-        while let Some(arrival) = next.next_if(|arrival| arrival.0 < id) {
-            take(arrival, &mut ids, &mut bodies, &mut tets);
+    let side_ids: Vec<GlobalId> = kept.sides.iter().map(|side| mesh.tet_ids[side.tet.index()]).collect();
+
+    keep(&mut mesh.tet_ids, &kept.tets);
+    keep(&mut mesh.tet_bodies, &kept.tets);
+    keep(&mut mesh.tets, &kept.tets);
+    let staying = mesh.tet_ids.len();
+    let count = room.count(staying + arrivals.len(), "tets")?;
+    room.grow(&mut mesh.tet_ids, count, 0)?;
+    room.grow(&mut mesh.tet_bodies, count, BodyId(0))?;
+    room.grow(&mut mesh.tets, count, [VertexId(0); 4])?;
+    let BareMesh { tet_ids: ids, tet_bodies: bodies, tets, .. } = mesh;
+    let renumber = |tet: [VertexId; 4], new: &[u32]| tet.map(|v| VertexId(new[v.index()]));
+    // From the last to the first: what stays moves up, over what has moved up before.
+    let mut from = staying;
+    for (before, &(id, load, place)) in arrivals.iter().enumerate().rev() {
+        while from > 0 && ids[from - 1] > id {
+            from -= 1;
+            let to = from + before + 1;
+            (ids[to], bodies[to]) = (ids[from], bodies[from]);
+            tets[to] = renumber(tets[from], &renumbered.old);
         }
-        while let Some(side) = next_side.next_if(|side| side.tet.0 == tet) {
-            sides.push(Side { tet: TetId(ids.len() as u32), ..*side });
-        }
-        ids.push(id);
-        bodies.push(mesh.tet_bodies[tet as usize]);
-        tets.push(mesh.tets[tet as usize].map(|v| VertexId(renumbered.old[v.index()])));
+        let (load, new, place) = (&arrived[load as usize], &renumbered.loads[load as usize], place as usize);
+        (ids[from + before], bodies[from + before]) = (id, load.tet_bodies[place]);
+        tets[from + before] = renumber(load.tets[place].map(VertexId), new);
     }
-    next.for_each(|arrival| take(arrival, &mut ids, &mut bodies, &mut tets));
-    for load in arrived {
+    tets[..from].iter_mut().for_each(|tet| *tet = renumber(*tet, &renumbered.old));
+
+    let mut put_sides = |of: &[Side], tet_id: &dyn Fn(usize) -> GlobalId| {
         let mut at = 0;
-        for side in &load.sides {
-            at += gallop(&ids[at..], load.tet_ids[side.tet.index()]);
+        for (index, side) in of.iter().enumerate() {
+            at += gallop(&ids[at..], tet_id(index));
             sides.push(Side { tet: TetId(at as u32), ..*side });
         }
+    };
+    put_sides(&kept.sides, &|index| side_ids[index]);
+    for load in arrived {
+        put_sides(&load.sides, &|index| load.tet_ids[load.sides[index].tet.index()]);
     }
     sides.sort();
-    (mesh.tet_ids, mesh.tet_bodies, mesh.tets, mesh.sides) = (ids, bodies, tets, sides);
+    mesh.sides = sides;
     Ok(())
+}
+
+/// Keeps the entries that stay, in their order.
+fn keep<T: Copy>(list: &mut Vec<T>, stays: &[bool]) {
+    let mut stays = stays.iter();
+    list.retain(|_| *stays.next().expect("one for each entry"));
 }

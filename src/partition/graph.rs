@@ -2,6 +2,7 @@
 
 use super::PartitionError;
 use super::dual::Dual;
+use super::weighted::Graph;
 use crate::mesh::Rank;
 use metis::option::Seed;
 use std::sync::{Mutex, PoisonError};
@@ -25,6 +26,23 @@ pub fn bisect(dual: &Dual, parts: u32, seed: i32) -> Result<Vec<Rank>, Partition
     let _one_call = ONE_CALL.lock().unwrap_or_else(PoisonError::into_inner);
     metis::Graph::new(1, nparts, offsets, neighbours)
         .map_err(|error| failed(error.to_string()))?
+        .set_option(Seed(seed))
+        .part_recursive(&mut part)
+        .map_err(|error| failed(error.to_string()))?;
+    Ok(part.into_iter().map(|p| Rank::try_from(p).expect("METIS numbers parts from 0")).collect())
+}
+
+/// Parts of a graph with weights. Some may be empty where parts are nearly as many as its vertices.
+pub fn bisect_weighted(graph: &Graph, parts: u32, seed: i32) -> Result<Vec<Rank>, PartitionError> {
+    let tets = graph.weights.len();
+    let failed = |reason: String| PartitionError::Metis { tets, parts, reason };
+    let nparts = i32::try_from(parts).map_err(|_| failed("too many parts".into()))?;
+    let mut part = vec![0; tets];
+    let _one_call = ONE_CALL.lock().unwrap_or_else(PoisonError::into_inner);
+    metis::Graph::new(1, nparts, &graph.offsets, &graph.neighbours)
+        .map_err(|error| failed(error.to_string()))?
+        .set_vwgt(&graph.weights)
+        .set_adjwgt(&graph.edge_weights)
         .set_option(Seed(seed))
         .part_recursive(&mut part)
         .map_err(|error| failed(error.to_string()))?;

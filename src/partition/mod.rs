@@ -19,6 +19,7 @@ mod graph;
 mod graph;
 pub mod metrics;
 mod rcb;
+pub mod weighted;
 
 pub use metrics::Metrics;
 

@@ -1,0 +1,108 @@
+use super::*;
+use crate::comm::thread;
+use crate::dist::{distribute, from_serial};
+use crate::mesh::Mesh;
+use crate::mesh::fixtures::{lattice_box, lattice_cube};
+use crate::migrate::migrate;
+use crate::partition::{self, Settings};
+
+const METHODS: &[Method] = if cfg!(feature = "metis") {
+    &[Method::Curve, Method::Clusters { per_part: 50 }]
+} else {
+    &[Method::Curve]
+};
+
+/// Distributes as `part` says, partitions anew, and returns the new part of each tet by global id, with its metrics.
+fn anew(mesh: &Mesh, part: &[Rank], ranks: u32, parts: u32, method: Method) -> (Vec<Rank>, Metrics) {
+    let results = thread::run(ranks, |comm| {
+        let given = (comm.rank() == 0).then(|| (mesh.clone(), part.to_vec()));
+        let mesh = distribute(comm, given).unwrap();
+        let part = repartition(comm, &mesh, parts, method).unwrap();
+        let metrics = measure(comm, &mesh, &part, parts).unwrap();
+        (mesh.tet_ids.iter().copied().zip(part).collect::<Vec<_>>(), metrics)
+    });
+    let (parts, metrics): (Vec<_>, Vec<Metrics>) = results.unwrap().into_iter().unzip();
+    assert!(metrics.iter().all(|other| other.edge_cut == metrics[0].edge_cut));
+    let mut all = parts.concat();
+    all.sort_unstable();
+    (all.into_iter().map(|(_, part)| part).collect(), metrics[0])
+}
+
+#[test]
+fn parts_do_not_depend_on_who_held_the_tets_before() {
+    let mesh = lattice_box([6, 4, 4], |_| 0);
+    let tets = mesh.tets.len() as u32;
+    for &method in METHODS {
+        let (alone, whole) = anew(&mesh, &vec![0; tets as usize], 1, 5, method);
+        for ranks in [2, 3, 8] {
+            let scattered: Vec<Rank> = (0..tets).map(|tet| tet * 7 % ranks).collect();
+            let (part, metrics) = anew(&mesh, &scattered, ranks, 5, method);
+            assert_eq!(part, alone, "{method}, {ranks} ranks");
+            assert_eq!(metrics.edge_cut, whole.edge_cut);
+        }
+        // All on the last of four ranks.
+        assert_eq!(anew(&mesh, &vec![3; tets as usize], 4, 5, method).0, alone);
+    }
+}
+
+#[test]
+fn stretches_of_the_curve_are_balanced_to_one_tet() {
+    let mesh = lattice_cube(5);
+    for parts in [1, 2, 7, 16, 749, 750] {
+        let (_, metrics) = anew(&mesh, &vec![0; 750], 3, parts, Method::Curve);
+        assert!(metrics.largest - metrics.smallest <= 1, "{metrics:?}");
+        assert!(metrics.smallest >= 1);
+    }
+}
+
+#[test]
+fn cuts_are_measured_as_the_serial_partitioner_measures_them() {
+    let mesh = lattice_cube(4);
+    let (part, serial) = partition::partition(&mesh, 3, &Settings::default()).unwrap();
+    let metrics = thread::run(3, |comm| {
+        let given = (comm.rank() == 0).then(|| (mesh.clone(), part.clone()));
+        let mesh = distribute(comm, given).unwrap();
+        measure(comm, &mesh, &vec![comm.rank(); mesh.tets.len()], 3).unwrap()
+    });
+    for metrics in metrics.unwrap() {
+        assert_eq!(metrics.edge_cut, serial.edge_cut as u64);
+        assert_eq!([metrics.smallest, metrics.largest], [serial.smallest as u64, serial.largest as u64]);
+        assert_eq!(metrics.moving, 0);
+    }
+}
+
+#[cfg(feature = "metis")]
+#[test]
+fn clusters_cut_less_than_the_curve_and_at_most_half_more_than_metis_on_all_tets() {
+    let mesh = lattice_box([16, 12, 12], |_| 0);
+    let cut = |method| anew(&mesh, &vec![0; mesh.tets.len()], 2, 8, method).1.edge_cut as f64;
+    let metis = partition::partition(&mesh, 8, &Settings::default()).unwrap().1.edge_cut as f64;
+    let (curve, clusters) = (cut(Method::Curve), cut(Method::Clusters { per_part: 400 }));
+    assert!(clusters < curve, "{clusters} {curve}");
+    assert!(clusters < 1.5 * metis && curve < 1.9 * metis, "{clusters} {curve} {metis}");
+}
+
+#[test]
+fn a_mesh_of_two_ranks_grows_to_seven_and_shrinks_to_one() {
+    let mesh = lattice_cube(4);
+    thread::run(7, |comm| {
+        let part = (0..384).map(|tet| tet % 2).collect();
+        let mut mesh = distribute(comm, (comm.rank() == 0).then(|| (mesh.clone(), part))).unwrap();
+        for parts in [7, 3, 1] {
+            let to = repartition(comm, &mesh, parts, Method::Curve).unwrap();
+            mesh = migrate(comm, mesh, &to).unwrap();
+            mesh.check(comm).unwrap();
+            let fair = 384_usize.div_ceil(parts as usize);
+            assert!(mesh.tets.len() <= fair && mesh.tets.is_empty() == (comm.rank() >= parts));
+        }
+    })
+    .unwrap();
+}
+
+#[test]
+fn no_parts_and_more_parts_than_tets_are_refused() {
+    let mesh = from_serial(lattice_cube(1)).unwrap();
+    let refused = |parts| repartition(&thread::alone(), &mesh, parts, Method::Curve).unwrap_err();
+    assert_eq!(refused(0), PartitionError::NoParts.into());
+    assert_eq!(refused(7), PartitionError::MoreParts { parts: 7, tets: 6 }.into());
+}
