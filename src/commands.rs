@@ -383,7 +383,7 @@ pub fn run_mesh(options: &MeshFile) -> Result<(), Failure> {
     if let Some(file) = &options.picture {
         draw(&comm, &made.part, options.cut, file)?;
     }
-    let mut report = summary(&model, &name_of(&options.input), &made, 1, (0, 1.0));
+    let mut report = summary(&model, &name_of(&options.input), &made, 1, (0, [1.0; 2]));
     report.stages = progress.finish();
     report.seconds = start.elapsed().as_secs_f64();
     report.peak_memory = memory::peak_bytes();

@@ -317,9 +317,12 @@ impl Filler<'_> {
 
     /// Inserts a point near tet `t` unless it is too near to something; the new tets are in `cavity.filled`.
     pub(super) fn insert(&mut self, t: u32, point: Point, size: f64) -> bool {
+        // The circumcentre of a flat tet may be nowhere: what the field says there is nothing.
+        if ![point.x, point.y, point.z].iter().all(|x| x.is_finite()) {
+            return false;
+        }
         self.note_size(&point, size);
-        let finite = point.x.is_finite() && point.y.is_finite() && point.z.is_finite();
-        if self.stopped.is_some() || !finite || self.is_corner_near(t, &point, size) {
+        if self.stopped.is_some() || self.is_corner_near(t, &point, size) {
             return false;
         }
         let Walk::Inside(seed) = walk(self.mesh, t, &point) else { return false };
