@@ -1,6 +1,7 @@
 //! What the commands do: from the options to a written mesh and a summary.
 
 use crate::cli::{Check, Format, Generate, InputOptions, Inspect, MeshFile, Method, Quality, SizeOptions};
+use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 use tetmill::comm::{Communicator, mpi, thread};
@@ -324,7 +325,7 @@ fn summary(
 /// Shows the summary and writes it where it was asked for.
 fn tell(report: &Report, file: Option<&Path>, quiet: bool, wanted: Option<u64>) -> Result<(), Failure> {
     if !quiet {
-        println!("{report}");
+        show(format_args!("{report}\n"))?;
     }
     if let (Some(wanted), Some(outcome)) = (wanted, report.wanted) {
         let got = report.coarse.tets;
@@ -342,6 +343,16 @@ fn tell(report: &Report, file: Option<&Path>, quiet: bool, wanted: Option<u64>) 
         write_whole(file, &(serde_json::to_string_pretty(report).expect("plain data") + "\n"))?;
     }
     Ok(())
+}
+
+/// Writes to the standard output. That nobody reads on, as behind `| head`, is no fault.
+fn show(text: std::fmt::Arguments) -> Result<(), Failure> {
+    match std::io::stdout().lock().write_fmt(text) {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => {
+            Err(Failure::new(Status::Resources, format!("cannot write to the standard output: {error}")))
+        }
+        _ => Ok(()),
+    }
 }
 
 /// Writes a text file; the one before it stays if that fails.
@@ -398,14 +409,14 @@ pub fn run_check(options: &Check) -> Result<(), Failure> {
     for (layout, faults) in &checked {
         let folder = layout.folder().display();
         if options.json {
-            println!(
-                "{}",
-                serde_json::json!({ "mesh": folder.to_string(), "ok": faults.is_empty(), "text": faults.to_string() })
-            );
+            let told = serde_json::json!({
+                "mesh": folder.to_string(), "ok": faults.is_empty(), "text": faults.to_string()
+            });
+            show(format_args!("{told}\n"))?;
         } else if faults.is_empty() {
-            println!("{folder}: no faults");
+            show(format_args!("{folder}: no faults\n"))?;
         } else {
-            println!("{folder}: {faults}");
+            show(format_args!("{folder}: {faults}\n"))?;
         }
         if !faults.is_empty() {
             faulty.push(folder.to_string());
@@ -434,9 +445,9 @@ pub fn run_quality(options: &Quality) -> Result<(), Failure> {
     }
     if options.json {
         let json = serde_json::json!({ "version": env!("CARGO_PKG_VERSION"), "meshes": meshes });
-        println!("{}", serde_json::to_string_pretty(&json).expect("plain data"));
+        show(format_args!("{}\n", serde_json::to_string_pretty(&json).expect("plain data")))?;
     } else if !meshes.is_empty() {
-        print!("{}", quality::table(&meshes));
+        show(format_args!("{}", quality::table(&meshes)))?;
     }
     if let Some(file) = &options.picture {
         write_whole(file, &quality::histograms(&meshes))?;
@@ -465,9 +476,9 @@ pub fn run_inspect(options: &Inspect) -> Result<(), Failure> {
         }
     };
     if options.json {
-        println!("{}", serde_json::to_string_pretty(&seen).expect("plain data"));
+        show(format_args!("{}\n", serde_json::to_string_pretty(&seen).expect("plain data")))?;
     } else {
-        print!("{seen}");
+        show(format_args!("{seen}"))?;
     }
     Ok(())
 }

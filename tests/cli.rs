@@ -260,3 +260,14 @@ fn inspect_shows_what_is_periodic_cut_out_and_singular() {
         assert!(plate.contains(line), "{line} in {plate}");
     }
 }
+
+#[test]
+fn a_reader_that_stops_reading_is_no_fault() {
+    let mut command = tetmill();
+    command.arg("inspect").arg(own("gear")).stdout(std::process::Stdio::piped());
+    let mut child = command.stderr(std::process::Stdio::piped()).spawn().unwrap();
+    drop(child.stdout.take());
+    let output = child.wait_with_output().unwrap();
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success() && said.is_empty(), "{said}");
+}

@@ -16,7 +16,7 @@ use crate::kernel::tree::{Tree, bounds};
 use crate::mesh::Class;
 use crate::size::{Closeness, SizeField, Source, thinned};
 use crate::{Point, Vector};
-use csg::{BodyId, PatchId};
+use csg::{Aabb, BodyId, PatchId};
 use rayon::prelude::*;
 
 /// Sizes this near to what they should be stay.
@@ -96,6 +96,9 @@ struct Prober<'a> {
     corners: Vec<[Point; 3]>,
     /// Unit normals; zero of triangles without area.
     normals: Vec<Vector>,
+    /// By patch, its triangles and a tree of them; and a tree of the patches. Near a sharp wedge there are very many triangles of patches that do
+    /// not count, which one tree of all would have to look at.
+    patches: Vec<(Vec<u32>, Tree)>,
     tree: Tree,
     /// By patch: those with a common curve or corner, ascending.
     adjacent: Vec<Vec<PatchId>>,
@@ -107,11 +110,30 @@ impl<'a> Prober<'a> {
         let corners: Vec<[Point; 3]> =
             mesh.triangles.iter().map(|t| t.vertices.map(|v| mesh.points[v.index()])).collect();
         let normal = |[a, b, c]: &[Point; 3]| area_vector(a, b, c).try_normalize(0.0);
+        let adjacent = adjacent_patches(mesh);
+        let mut of_patch = vec![Vec::new(); adjacent.len()];
+        (0..).zip(&mesh.triangles).for_each(|(t, triangle)| of_patch[triangle.patch.index()].push(t));
+        let boxes = |triangles: &[u32]| -> Vec<Aabb> {
+            triangles.iter().map(|&t| bounds(&corners[t as usize])).collect()
+        };
+        let around = |triangles: &Vec<u32>| {
+            let whole = |a: Aabb, b: Aabb| Aabb { min: a.min.inf(&b.min), max: a.max.sup(&b.max) };
+            let nowhere =
+                Aabb { min: Point::from([f64::INFINITY; 3]), max: Point::from([f64::NEG_INFINITY; 3]) };
+            boxes(triangles).into_iter().fold(nowhere, whole)
+        };
         Self {
             walls,
             normals: corners.iter().map(|p| normal(p).unwrap_or_else(Vector::zeros)).collect(),
-            tree: Tree::new(&corners.iter().map(bounds).collect::<Vec<_>>()),
-            adjacent: adjacent_patches(mesh),
+            tree: Tree::new(&of_patch.iter().map(around).collect::<Vec<_>>()),
+            patches: of_patch
+                .into_iter()
+                .map(|triangles| {
+                    let tree = Tree::new(&boxes(&triangles));
+                    (triangles, tree)
+                })
+                .collect(),
+            adjacent,
             corners,
         }
     }
@@ -154,28 +176,42 @@ impl<'a> Prober<'a> {
         }
     }
 
+    /// The nearest point, of what a triangle may have opposite, to the centre of a ball, if it is in the ball; and its triangle.
+    fn nearest(&self, t: u32, center: &Point, radius: f64) -> Option<(u32, Point)> {
+        let patch = self.walls.mesh.triangles[t as usize].patch;
+        let adjacent = &self.adjacent[patch.index()];
+        let normal = self.normals[t as usize];
+        let foot = |s: u32| at(&self.corners[s as usize], in_triangle(center, &self.corners[s as usize]));
+        let mut best: Option<(f64, u32)> = None;
+        self.tree.nearest_within(center, radius * radius, |other| {
+            let other = PatchId(other);
+            if adjacent.binary_search(&other).is_ok() {
+                return f64::INFINITY;
+            }
+            let (triangles, tree) = &self.patches[other.index()];
+            let squared = |k: u32| {
+                let s = triangles[k as usize];
+                let faces = other != patch || normal.dot(&self.normals[s as usize]) < OPPOSITE;
+                if faces { (foot(s) - center).norm_squared() } else { f64::INFINITY }
+            };
+            let limit = best.map_or(radius * radius, |(distance, _)| distance);
+            let Some((k, distance)) = tree.nearest_within(center, limit, squared) else {
+                return f64::INFINITY;
+            };
+            let found = (distance, triangles[k as usize]);
+            best = Some(best.map_or(found, |best| if found < best { found } else { best }));
+            distance
+        });
+        best.map(|(_, s)| (s, foot(s)))
+    }
+
     /// The distance from a point of a triangle to the wall opposite, if that is less than `limit`.
     fn thickness(&self, t: u32, from: &Point, into: Vector, limit: f64) -> Option<f64> {
         let patch = self.walls.mesh.triangles[t as usize].patch;
-        let normal = self.normals[t as usize];
-        let adjacent = &self.adjacent[patch.index()];
-        let faces = |s: u32| {
-            let other = self.walls.mesh.triangles[s as usize].patch;
-            if other == patch {
-                normal.dot(&self.normals[s as usize]) < OPPOSITE
-            } else {
-                adjacent.binary_search(&other).is_err()
-            }
-        };
         let mut radius = 0.5 * limit;
         let mut touched: Option<(u32, Point)> = None;
         for _ in 0..MOST_SHRINKS {
-            let center = from + into * radius;
-            let foot =
-                |s: u32| at(&self.corners[s as usize], in_triangle(&center, &self.corners[s as usize]));
-            let squared = |s: u32| if faces(s) { (foot(s) - center).norm_squared() } else { f64::INFINITY };
-            let Some((s, _)) = self.tree.nearest_within(&center, radius * radius, squared) else { break };
-            let point = foot(s);
+            let Some((s, point)) = self.nearest(t, &(from + into * radius), radius) else { break };
             let way = point - from;
             let smaller = way.norm_squared() / (2.0 * into.dot(&way));
             touched = Some((s, point));
