@@ -66,6 +66,30 @@ impl Tree {
         self.build(boxes, children + 1, from + half, to);
     }
 
+    /// An item of which `is_it` says so, the first that is met; none whose box holds the point is overlooked.
+    pub fn find(&self, point: &Point, mut is_it: impl FnMut(u32) -> bool) -> Option<u32> {
+        self.nodes.first()?;
+        let mut stack = [0u32; 64];
+        let mut height = 1;
+        while height > 0 {
+            height -= 1;
+            let node = &self.nodes[stack[height] as usize];
+            if squared_gap(node, point) > 0.0 {
+                continue;
+            }
+            if node.count > 0 {
+                let items = &self.items[node.first as usize..(node.first + node.count) as usize];
+                if let Some(&item) = items.iter().find(|item| is_it(**item)) {
+                    return Some(item);
+                }
+                continue;
+            }
+            [stack[height], stack[height + 1]] = [node.first + 1, node.first];
+            height += 2;
+        }
+        None
+    }
+
     /// The item nearest to a point by a squared distance that is nowhere less than that to its box; of equal ones the first.
     ///
     /// `None` only of an empty tree.
@@ -134,4 +158,36 @@ pub(crate) fn bounds<'a>(points: impl IntoIterator<Item = &'a Point>) -> Aabb {
         (min, max) = (min.inf(p), max.sup(p));
     }
     Aabb { min, max }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::kernel::random::Random;
+
+    #[test]
+    fn what_is_found_is_what_trying_all_finds() {
+        let mut random = Random::new(7);
+        let mut point = || Point::from([0, 1, 2].map(|_| random.unit()));
+        let boxes: Vec<Aabb> = (0..200)
+            .map(|_| {
+                let corner = point();
+                bounds(&[corner, corner + (point() - corner) * 0.3])
+            })
+            .collect();
+        let tree = Tree::new(&boxes);
+        for _ in 0..500 {
+            let p = point();
+            let holds = |i: u32| {
+                let b = &boxes[i as usize];
+                (0..3).all(|k| b.min[k] <= p[k] && p[k] <= b.max[k])
+            };
+            let held: Vec<u32> = (0..200).filter(|&i| holds(i)).collect();
+            assert_eq!(tree.find(&p, holds).is_some(), !held.is_empty());
+            for &i in &held {
+                assert_eq!(tree.find(&p, |item| item == i), Some(i));
+            }
+        }
+        assert_eq!(Tree::new(&[]).find(&Point::origin(), |_| true), None);
+    }
 }

@@ -1,12 +1,12 @@
 //! Sizes inside a part: those wanted at the vertices of its coarse tets, linear between them.
 
-use crate::Point;
 use crate::comm::{CommError, Communicator};
 use crate::dist::DistMesh;
-use crate::kernel::simplex::{squared_distance, volume6};
-use crate::kernel::tree::Tree;
+use crate::kernel::simplex::squared_distance;
+use crate::kernel::tree::{Tree, bounds};
 use crate::mesh::{Mesh, TET_EDGES, TET_FACES, VertexId};
 use crate::size::SizeField;
+use crate::{Point, Vector};
 use csg::Aabb;
 
 /// The sizes of a part, in the coarse mesh that it was.
@@ -14,53 +14,61 @@ pub struct PartSizes<'a> {
     mesh: &'a DistMesh,
     /// By vertex.
     sizes: Vec<f64>,
+    /// By tet.
+    weights: Vec<Weights>,
     tets: Tree,
+}
+
+/// The barycentric coordinates in a tet as functions of the point: those of the corners but the first grow from zero at the first by
+/// these vectors.
+#[derive(Clone, Copy)]
+struct Weights {
+    first: Point,
+    others: [Vector; 3],
+}
+
+impl Weights {
+    fn of(corners: &[Point; 4]) -> Self {
+        let [u, v, w] = [1, 2, 3].map(|k| corners[k] - corners[0]);
+        let volume = u.dot(&v.cross(&w));
+        Self { first: corners[0], others: [v.cross(&w), w.cross(&u), u.cross(&v)].map(|n| n / volume) }
+    }
+
+    fn at(&self, point: &Point) -> [f64; 4] {
+        let way = point - self.first;
+        let [b, c, d] = self.others.map(|n| n.dot(&way));
+        [1.0 - (b + c + d), b, c, d]
+    }
 }
 
 impl<'a> PartSizes<'a> {
     /// From the size wanted at each vertex of the part.
     pub fn new(mesh: &'a DistMesh, sizes: Vec<f64>) -> Self {
-        let bounds = |tet: &[VertexId; 4]| {
-            let [p, rest @ ..] = tet.map(|v| mesh.points[v.index()]);
-            let grow = |b: Aabb, p: Point| Aabb { min: b.min.inf(&p), max: b.max.sup(&p) };
-            rest.into_iter().fold(Aabb { min: p, max: p }, grow)
-        };
-        let boxes: Vec<Aabb> = mesh.tets.iter().map(bounds).collect();
-        Self { mesh, sizes, tets: Tree::new(&boxes) }
+        let corners = |tet: &[VertexId; 4]| tet.map(|v| mesh.points[v.index()]);
+        let boxes: Vec<Aabb> = mesh.tets.iter().map(|tet| bounds(&corners(tet))).collect();
+        let weights = mesh.tets.iter().map(|tet| Weights::of(&corners(tet))).collect();
+        Self { mesh, sizes, weights, tets: Tree::new(&boxes) }
     }
 
-    fn corners(&self, tet: usize) -> [Point; 4] {
-        self.mesh.tets[tet].map(|v| self.mesh.points[v.index()])
+    fn squared_distance(&self, point: &Point, tet: u32) -> f64 {
+        let corners = self.mesh.tets[tet as usize].map(|v| self.mesh.points[v.index()]);
+        let to_face = |face: [usize; 3]| squared_distance(point, face.map(|k| &corners[k]));
+        TET_FACES.map(to_face).into_iter().fold(f64::INFINITY, f64::min)
     }
 }
 
 impl SizeField for PartSizes<'_> {
     fn size_at(&self, point: &Point) -> f64 {
-        let distance = |tet: u32| squared_distance_to_tet(point, &self.corners(tet as usize));
+        let is_inside = |tet: u32| self.weights[tet as usize].at(point).iter().all(|&w| w >= 0.0);
+        // Beside a curved boundary the refined skin leaves the coarse tets.
+        let nearest = || Some(self.tets.nearest(point, |tet| self.squared_distance(point, tet))?.0);
         // A part without tets has no place to ask about.
-        let Some((tet, _)) = self.tets.nearest(point, distance) else { return f64::INFINITY };
-        let weights = weights(point, &self.corners(tet as usize)).map(|w| w.max(0.0));
+        let Some(tet) = self.tets.find(point, is_inside).or_else(nearest) else { return f64::INFINITY };
+        let weights = self.weights[tet as usize].at(point).map(|w| w.max(0.0));
         let sizes = self.mesh.tets[tet as usize].map(|v| self.sizes[v.index()]);
         let sum: f64 = weights.iter().sum();
         weights.iter().zip(sizes).map(|(w, s)| w * s).sum::<f64>() / sum
     }
-}
-
-/// Barycentric coordinates times six volumes.
-fn weights(point: &Point, corners: &[Point; 4]) -> [f64; 4] {
-    [0, 1, 2, 3].map(|k| {
-        let mut p = *corners;
-        p[k] = *point;
-        volume6(&p[0], &p[1], &p[2], &p[3])
-    })
-}
-
-fn squared_distance_to_tet(point: &Point, corners: &[Point; 4]) -> f64 {
-    if weights(point, corners).iter().all(|&w| w >= 0.0) {
-        return 0.0;
-    }
-    let to_face = |face: [usize; 3]| squared_distance(point, face.map(|k| &corners[k]));
-    TET_FACES.map(to_face).into_iter().fold(f64::INFINITY, f64::min)
 }
 
 /// The size to be wanted at each vertex of a coarse mesh that is to be meshed `pieces` times as finely: `field`, by one factor for all such that
