@@ -20,7 +20,7 @@ use tetmill::{memory, picture, quality};
 
 /// `tetmill generate`
 pub fn run_generate(options: &Generate) -> Result<(), Failure> {
-    refuse_unfinished(options)?;
+    method_of(options)?;
     set_threads(options.threads)?;
     let start = Instant::now();
     if mpi::launched() {
@@ -54,9 +54,10 @@ fn tell_once(comm: &dyn Communicator, failure: Failure) -> Failure {
     }
 }
 
-fn refuse_unfinished(options: &Generate) -> Result<(), Failure> {
+fn method_of(options: &Generate) -> Result<pipeline::Method, Failure> {
     match options.method {
-        Method::Refine | Method::Surface => Ok(()),
+        Method::Refine => Ok(pipeline::Method::Refine),
+        Method::Surface => Ok(pipeline::Method::Surface),
         Method::Decompose => {
             Err(Failure::input("this version knows the methods `refine` and `surface` only"))
         }
@@ -87,10 +88,7 @@ fn generate_on(comm: &dyn Communicator, options: &Generate, start: Instant) -> R
         options.input.files[0].with_extension("").file_name().map_or_else(|| "mesh".into(), PathBuf::from)
     });
     let disk = Some(disk_for(&options.format, &target));
-    let method = match options.method {
-        Method::Surface => pipeline::Method::Surface,
-        _ => pipeline::Method::Refine,
-    };
+    let method = method_of(options)?;
     let settings = GenerateSettings { method, coarse, wanted: wanted(options), memory: options.memory, disk };
     let made = generate(comm, model.as_ref(), &settings, &progress)?;
     let written = progress.stage("write", || write_all(comm, options, &made, &target))?;

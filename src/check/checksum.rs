@@ -12,6 +12,7 @@
 //! boundary of the chain of all tets is the chain of all boundary triangles", tested on a random cochain: no table of faces is needed.
 
 use crate::comm::{CommError, Communicator};
+use crate::kernel::simplex::from_lowest;
 use crate::mesh::GlobalId;
 use crate::mesh::stream::{BoundaryBlock, LocalBlock, MeshStream, NO_TET};
 use rayon::prelude::*;
@@ -123,7 +124,7 @@ fn of_boundary(stream: &dyn MeshStream, index: usize, block: &mut BoundaryBlock)
     for (triangle, parents) in block.triangles.iter().zip(&block.parents) {
         let ids = triangle.map(|vertex| stream.vertex_id(vertex));
         // Whoever lists a triangle may begin with any of its vertices.
-        let [p, q, r] = from_least(ids);
+        let [p, q, r] = from_lowest(ids);
         let face = oriented(ids);
         // The tet behind sees the triangle as it is, the one in front the other way round.
         for (side, seen) in [(0, face), (1, face.wrapping_neg())] {
@@ -134,17 +135,6 @@ fn of_boundary(stream: &dyn MeshStream, index: usize, block: &mut BoundaryBlock)
         }
     }
     sum
-}
-
-/// The same triangle, turned so that it begins with its least vertex.
-fn from_least([p, q, r]: [GlobalId; 3]) -> [GlobalId; 3] {
-    if p < q && p < r {
-        [p, q, r]
-    } else if q < r {
-        [q, r, p]
-    } else {
-        [r, p, q]
-    }
 }
 
 /// A place in the space of 64-bit integers.
@@ -227,9 +217,9 @@ mod tests {
 
     #[test]
     fn a_triangle_is_the_same_whichever_vertex_it_begins_with_but_not_turned_round() {
-        let turned = [[2, 7, 5], [7, 5, 2], [5, 2, 7]].map(from_least);
+        let turned = [[2, 7, 5], [7, 5, 2], [5, 2, 7]].map(from_lowest);
         assert_eq!(turned, [[2, 7, 5]; 3]);
-        assert_eq!(from_least([7, 2, 5]), [2, 5, 7]);
+        assert_eq!(from_lowest([7, 2, 5]), [2, 5, 7]);
     }
 
     #[test]

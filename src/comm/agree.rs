@@ -22,6 +22,17 @@ pub enum Agreed<E> {
     Comm(#[from] CommError),
 }
 
+impl<E> Agreed<E> {
+    /// This rank's own error if it met one, else what `elsewhere` makes of the other rank and its message.
+    pub fn into_error<F: From<E> + From<CommError>>(self, elsewhere: impl FnOnce(Rank, String) -> F) -> F {
+        match self {
+            Self::Failed { own: Some(error), .. } => error.into(),
+            Self::Failed { rank, message, own: None } => elsewhere(rank, message),
+            Self::Comm(error) => error.into(),
+        }
+    }
+}
+
 impl dyn Communicator + '_ {
     /// **Collective.** Gives back `result` if it is good on every rank. Else each rank gets the message
     /// of the lowest rank where it is not, and none goes on to wait for one that left.

@@ -27,6 +27,24 @@ pub struct LaidEdge {
     pub class: Class,
 }
 
+impl LaidEdge {
+    /// The edge between two vertices, in any order.
+    pub fn new([a, b]: [VertexId; 2], class: Class) -> Self {
+        Self { vertices: [a.min(b), a.max(b)], class }
+    }
+
+    /// The edges of a triangle on a patch.
+    pub fn round([a, b, c]: [VertexId; 3], patch: PatchId) -> [Self; 3] {
+        [[a, b], [b, c], [c, a]].map(|ends| Self::new(ends, Class::Patch(patch)))
+    }
+
+    /// Sorts edges, each once: of one that is there several times the class that comes first holds, that of the curve if it is on one.
+    pub fn sort(edges: &mut Vec<Self>) {
+        edges.sort_unstable();
+        edges.dedup_by_key(|edge| edge.vertices);
+    }
+}
+
 /// A part with its tets, its vertices and what cannot be told from these: a third of a [`DistMesh`] in memory.
 ///
 /// It has no edges and faces but those that lie on something: the others follow from the tets, and so do the ids and holders of

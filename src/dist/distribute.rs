@@ -108,11 +108,7 @@ pub enum DistError {
 
 impl From<Agreed<Self>> for DistError {
     fn from(agreed: Agreed<Self>) -> Self {
-        match agreed {
-            Agreed::Failed { own: Some(error), .. } => error,
-            Agreed::Failed { rank, message, own: None } => Self::Elsewhere { rank, message },
-            Agreed::Comm(error) => Self::Comm(error),
-        }
+        agreed.into_error(|rank, message| Self::Elsewhere { rank, message })
     }
 }
 

@@ -57,11 +57,7 @@ pub enum SettleError {
 
 impl From<Agreed<Self>> for SettleError {
     fn from(agreed: Agreed<Self>) -> Self {
-        match agreed {
-            Agreed::Failed { own: Some(error), .. } => error,
-            Agreed::Failed { rank, message, own: None } => Self::Elsewhere { rank, message },
-            Agreed::Comm(error) => Self::Comm(error),
-        }
+        agreed.into_error(|rank, message| Self::Elsewhere { rank, message })
     }
 }
 

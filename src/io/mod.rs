@@ -27,7 +27,7 @@ pub mod text;
 pub mod volume;
 pub mod vtu;
 
-use crate::comm::{Agreed, CommError, Communicator};
+use crate::comm::{CommError, Communicator};
 use crate::mesh::{Names, Rank};
 use csg::{BodyId, PatchId};
 use std::io;
@@ -169,9 +169,6 @@ pub(crate) fn sum_written(comm: &dyn Communicator, written: Written) -> Result<W
 /// **Collective.** Every rank's own result where all went well; else every rank gets an error, its own or that
 /// of the first rank that failed.
 pub(crate) fn agree<T>(comm: &dyn Communicator, result: Result<T, WriteError>) -> Result<T, WriteError> {
-    comm.agree(result).map_err(|agreed| match agreed {
-        Agreed::Failed { own: Some(error), .. } => error,
-        Agreed::Failed { rank, message, own: None } => WriteError::OtherRank { rank, message },
-        Agreed::Comm(error) => error.into(),
-    })
+    let elsewhere = |rank, message| WriteError::OtherRank { rank, message };
+    comm.agree(result).map_err(|agreed| agreed.into_error(elsewhere))
 }

@@ -1,11 +1,11 @@
 //! A refined part as one that can move and be refined again.
 
 use super::MigrateError;
+use super::rebuild::Room;
 use crate::dist::{BareMesh, LaidEdge, Side};
 use crate::mesh::stream::{BoundaryBlock, MeshStream, NO_TET, TetBlock};
-use crate::mesh::{Class, Rank, TetId, VertexId};
+use crate::mesh::{TetId, VertexId};
 use crate::refine::RefinedMesh;
-use crate::refine::numbering::Entity;
 
 /// *Local.* Stores a refined part: its tets, and what its vertices, edges and faces lie on.
 ///
@@ -19,18 +19,19 @@ pub fn bare(refined: &RefinedMesh) -> Result<BareMesh, MigrateError> {
     if counts.tets >= u64::from(u32::MAX) {
         return Err(MigrateError::TooMany { rank, what: "tets", needed: counts.tets });
     }
+    let room = Room { rank, limit: u64::MAX };
     let (vertices, tets) = (counts.vertices as usize, counts.tets as usize);
     let mut mesh = BareMesh {
         rank,
         ranks: refined.ranks(),
         totals: refined.totals(),
-        points: room(rank, vertices)?,
-        vertex_ids: room(rank, vertices)?,
-        vertex_classes: room(rank, vertices)?,
-        tets: room(rank, tets)?,
-        tet_ids: room(rank, tets)?,
-        tet_bodies: room(rank, tets)?,
-        sides: room(rank, counts.boundary as usize)?,
+        points: room.make(vertices)?,
+        vertex_ids: room.make(vertices)?,
+        vertex_classes: room.make(vertices)?,
+        tets: room.make(tets)?,
+        tet_ids: room.make(tets)?,
+        tet_bodies: room.make(tets)?,
+        sides: room.make(counts.boundary as usize)?,
         ..BareMesh::default()
     };
     put_vertices(refined, &mut mesh);
@@ -46,26 +47,11 @@ pub fn bare(refined: &RefinedMesh) -> Result<BareMesh, MigrateError> {
     Ok(mesh)
 }
 
-/// Room for `count` things.
-fn room<T>(rank: Rank, count: usize) -> Result<Vec<T>, MigrateError> {
-    let mut list = Vec::new();
-    let bytes = count as u64 * size_of::<T>() as u64;
-    list.try_reserve_exact(count).map_err(|_| MigrateError::OutOfMemory { rank, bytes })?;
-    Ok(list)
-}
-
 fn put_vertices(refined: &RefinedMesh, mesh: &mut BareMesh) {
     let coarse = refined.coarse();
     for index in 0..refined.vertex_blocks() {
         let block = refined.vertex_block(index);
-        let Entity { dimension, id } = refined.numbering().block(index);
-        let id = id as usize;
-        let class = match dimension {
-            0 => coarse.vertex_classes[id],
-            1 => coarse.edge_classes[id],
-            2 => coarse.face_classes[id],
-            _ => Class::Body(coarse.tet_bodies[id]),
-        };
+        let class = refined.numbering().block(index).class(coarse);
         mesh.points.extend_from_slice(&refined.vertex_points(index));
         mesh.vertex_ids.extend(block.ids());
         mesh.vertex_classes.resize(mesh.vertex_ids.len(), class);
@@ -77,24 +63,14 @@ fn put_vertices(refined: &RefinedMesh, mesh: &mut BareMesh) {
 
 /// The sides of tets on patches, and the edges on curves and patches.
 fn put_boundary(refined: &RefinedMesh, mesh: &mut BareMesh) {
-    let coarse = refined.coarse();
-    let laid = |a: u32, b: u32, class| LaidEdge { vertices: [VertexId(a.min(b)), VertexId(a.max(b))], class };
-    for (id, (ends, class)) in (0..).zip(coarse.edges.iter().zip(&coarse.edge_classes)) {
-        if matches!(class, Class::Body(_)) {
-            continue;
-        }
-        let mut from = ends[0].0;
-        for to in refined.numbering().inside(Entity { dimension: 1, id }).chain([ends[1].0]) {
-            mesh.edges.push(laid(from, to, *class));
-            from = to;
-        }
-    }
+    let pieces = refined.numbering().laid_edges(refined.coarse());
+    mesh.edges.extend(pieces.map(|(ends, class)| LaidEdge::new(ends.map(VertexId), class)));
     let mut block = BoundaryBlock::default();
     for index in 0..refined.boundary_blocks() {
         refined.boundary_block(index, &mut block);
         let patch = block.patch.expect("a boundary triangle lies on a patch");
         for (&[a, b, c], parents) in block.triangles.iter().zip(&block.parents) {
-            mesh.edges.extend([[a, b], [b, c], [c, a]].map(|[a, b]| laid(a, b, Class::Patch(patch))));
+            mesh.edges.extend(LaidEdge::round([a, b, c].map(VertexId), patch));
             for (&tet, behind) in parents.iter().zip([true, false]).filter(|(tet, _)| **tet != NO_TET) {
                 let corners = mesh.tets[tet as usize];
                 let face = corners.iter().position(|v| ![a, b, c].contains(&v.0));
@@ -104,7 +80,5 @@ fn put_boundary(refined: &RefinedMesh, mesh: &mut BareMesh) {
         }
     }
     mesh.sides.sort_unstable();
-    // Of an edge that is there several times the class that is said first holds: that of the curve, if it is on one.
-    mesh.edges.sort_unstable();
-    mesh.edges.dedup_by_key(|edge| edge.vertices);
+    LaidEdge::sort(&mut mesh.edges);
 }

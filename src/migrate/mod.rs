@@ -99,11 +99,7 @@ pub enum MigrateError {
 
 impl From<Agreed<Self>> for MigrateError {
     fn from(agreed: Agreed<Self>) -> Self {
-        match agreed {
-            Agreed::Failed { own: Some(error), .. } => error,
-            Agreed::Failed { rank, message, own: None } => Self::Elsewhere { rank, message },
-            Agreed::Comm(error) => Self::Comm(error),
-        }
+        agreed.into_error(|rank, message| Self::Elsewhere { rank, message })
     }
 }
 

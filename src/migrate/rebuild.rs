@@ -15,13 +15,14 @@ type Arrival = (GlobalId, u32, u32);
 
 /// Makes room in memory, or says that there is none.
 #[derive(Clone, Copy)]
-struct Room {
-    rank: Rank,
-    limit: u64,
+pub(super) struct Room {
+    pub(super) rank: Rank,
+    /// The most bytes that one list may take.
+    pub(super) limit: u64,
 }
 
 impl Room {
-    fn make<T>(self, count: usize) -> Result<Vec<T>, MigrateError> {
+    pub(super) fn make<T>(self, count: usize) -> Result<Vec<T>, MigrateError> {
         let bytes = count as u64 * size_of::<T>() as u64;
         let mut list = Vec::new();
         let refused = bytes > self.limit || list.try_reserve_exact(count).is_err();

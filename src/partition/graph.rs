@@ -15,36 +15,37 @@ static ONE_CALL: Mutex<()> = Mutex::new(());
 /// Not k-way: in METIS 5.2.1, which the crate builds, its cut is 5 to 10 % worse than that of
 /// bisection and its refinement seems to do nothing, while in 5.1.0 it was better.
 pub fn bisect(dual: &Dual, parts: u32, seed: i32) -> Result<Vec<Rank>, PartitionError> {
-    let tets = dual.len();
-    let failed = |reason: String| PartitionError::Metis { tets, parts, reason };
-    let nparts = i32::try_from(parts).map_err(|_| failed("too many parts".into()))?;
-    if i32::try_from(dual.neighbours.len()).is_err() {
-        return Err(failed("the graph has more than 2^31 entries".into()));
-    }
     let (offsets, neighbours) = (bytemuck::cast_slice(&dual.offsets), bytemuck::cast_slice(&dual.neighbours));
-    let mut part = vec![0; tets];
-    let _one_call = ONE_CALL.lock().unwrap_or_else(PoisonError::into_inner);
-    metis::Graph::new(1, nparts, offsets, neighbours)
-        .map_err(|error| failed(error.to_string()))?
-        .set_option(Seed(seed))
-        .part_recursive(&mut part)
-        .map_err(|error| failed(error.to_string()))?;
-    Ok(part.into_iter().map(|p| Rank::try_from(p).expect("METIS numbers parts from 0")).collect())
+    run(offsets, neighbours, None, parts, seed)
 }
 
 /// Parts of a graph with weights. Some may be empty where parts are nearly as many as its vertices.
 pub fn bisect_weighted(graph: &Graph, parts: u32, seed: i32) -> Result<Vec<Rank>, PartitionError> {
-    let tets = graph.weights.len();
+    let weights = Some([&graph.weights[..], &graph.edge_weights]);
+    run(&graph.offsets, &graph.neighbours, weights, parts, seed)
+}
+
+/// Recursive bisection; the weights are those of vertices and of edges.
+fn run(
+    offsets: &[i32],
+    neighbours: &[i32],
+    weights: Option<[&[i32]; 2]>,
+    parts: u32,
+    seed: i32,
+) -> Result<Vec<Rank>, PartitionError> {
+    let tets = offsets.len() - 1;
     let failed = |reason: String| PartitionError::Metis { tets, parts, reason };
+    let refused = |error: &dyn std::fmt::Display| failed(error.to_string());
     let nparts = i32::try_from(parts).map_err(|_| failed("too many parts".into()))?;
+    if i32::try_from(neighbours.len()).is_err() {
+        return Err(failed("the graph has more than 2^31 entries".into()));
+    }
     let mut part = vec![0; tets];
     let _one_call = ONE_CALL.lock().unwrap_or_else(PoisonError::into_inner);
-    metis::Graph::new(1, nparts, &graph.offsets, &graph.neighbours)
-        .map_err(|error| failed(error.to_string()))?
-        .set_vwgt(&graph.weights)
-        .set_adjwgt(&graph.edge_weights)
-        .set_option(Seed(seed))
-        .part_recursive(&mut part)
-        .map_err(|error| failed(error.to_string()))?;
+    let mut graph = metis::Graph::new(1, nparts, offsets, neighbours).map_err(|error| refused(&error))?;
+    if let Some([vertices, edges]) = weights {
+        graph = graph.set_vwgt(vertices).set_adjwgt(edges);
+    }
+    graph.set_option(Seed(seed)).part_recursive(&mut part).map_err(|error| refused(&error))?;
     Ok(part.into_iter().map(|p| Rank::try_from(p).expect("METIS numbers parts from 0")).collect())
 }

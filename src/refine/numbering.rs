@@ -8,10 +8,11 @@
 //! inside a tet in the order of its vertices. So all holders of an entity agree, without a message.
 
 use super::RefineError;
-use super::lattice::{Lattice, MAX_PIECES};
+use super::lattice::{Lattice, MAX_PIECES, for_each_face_child};
 use crate::dist::{DistMesh, Totals};
+use crate::kernel::simplex::from_lowest;
 use crate::mesh::stream::Counts;
-use crate::mesh::{EdgeId, GlobalId, TET_EDGES, TET_FACES, TetId};
+use crate::mesh::{Class, EdgeId, GlobalId, Rank, TET_EDGES, TET_FACES, TetId};
 use std::ops::Range;
 
 /// A kind of coarse entity, and how many fine vertices lie inside each.
@@ -46,6 +47,41 @@ pub struct Entity {
     pub dimension: usize,
     /// Local id.
     pub id: u32,
+}
+
+impl Entity {
+    /// What it lies on.
+    pub fn class(self, mesh: &DistMesh) -> Class {
+        let id = self.id as usize;
+        match self.dimension {
+            0 => mesh.vertex_classes[id],
+            1 => mesh.edge_classes[id],
+            2 => mesh.face_classes[id],
+            _ => Class::Body(mesh.tet_bodies[id]),
+        }
+    }
+
+    /// Its global id among those of its dimension.
+    pub fn global_id(self, mesh: &DistMesh) -> GlobalId {
+        let ids = match self.dimension {
+            0 => &mesh.vertex_ids,
+            1 => &mesh.edge_ids,
+            2 => &mesh.face_ids,
+            _ => &mesh.tet_ids,
+        };
+        ids[self.id as usize]
+    }
+
+    /// The ranks that hold it where there are several, else none.
+    pub fn holders(self, mesh: &DistMesh) -> &[Rank] {
+        let shared = match self.dimension {
+            0 => &mesh.shared_vertices,
+            1 => &mesh.shared_edges,
+            2 => &mesh.shared_faces,
+            _ => return &[],
+        };
+        shared.holders_of(self.id).unwrap_or_default()
+    }
 }
 
 /// Counts of the whole fine mesh of a coarse one.
@@ -135,6 +171,11 @@ impl Numbering {
         kind.global + id * u64::from(kind.size)
     }
 
+    /// Global id of the first vertex inside a coarse entity of this part.
+    pub fn first_id_in(&self, mesh: &DistMesh, entity: Entity) -> GlobalId {
+        self.first_id(entity.dimension, entity.global_id(mesh))
+    }
+
     /// The coarse entity that a fine vertex lies in, and its index among the vertices inside.
     #[inline]
     pub fn locate(&self, local: u32) -> (Entity, u32) {
@@ -209,6 +250,40 @@ impl Numbering {
             ids[at(j, k)] = vertex;
         }
         ids
+    }
+
+    /// The fine triangles of a face of a tet, opposite corner `face`, by local ids, seen from outside the tet.
+    pub fn for_each_triangle(
+        &self,
+        mesh: &DistMesh,
+        tet: TetId,
+        face: usize,
+        mut each: impl FnMut([u32; 3]),
+    ) {
+        let n = self.lattice.n();
+        let vertices = mesh.tets[tet.index()];
+        let corners = ascending(TET_FACES[face], |corner| vertices[corner].0);
+        let is_outward = from_lowest(corners) == from_lowest(TET_FACES[face]);
+        let ids = self.face_ids(mesh, tet, corners);
+        for_each_face_child(n, |j, k, upright| {
+            let at = |j: u32, k: u32| ids[(j + (n + 1) * k) as usize];
+            let [p, q, r] = if upright {
+                [at(j, k), at(j + 1, k), at(j, k + 1)]
+            } else {
+                [at(j + 1, k), at(j + 1, k + 1), at(j, k + 1)]
+            };
+            each(if is_outward { [p, q, r] } else { [p, r, q] });
+        });
+    }
+
+    /// The pieces of the coarse edges on curves and patches, by local ids, and what they lie on.
+    pub fn laid_edges<'a>(&'a self, mesh: &'a DistMesh) -> impl Iterator<Item = ([u32; 2], Class)> + 'a {
+        let laid = (0..).zip(&mesh.edges).zip(&mesh.edge_classes);
+        laid.filter(|(_, class)| !matches!(class, Class::Body(_))).flat_map(|((id, ends), class)| {
+            let inside = self.inside(Entity { dimension: 1, id });
+            let starts = std::iter::once(ends[0].0).chain(inside.clone());
+            starts.zip(inside.chain([ends[1].0])).map(|(from, to)| ([from, to], *class))
+        })
     }
 }
 

@@ -105,20 +105,6 @@ impl RefinedMesh {
         let faces = &self.coarse.tet_faces[tet.index()];
         faces.iter().position(|f| *f == boundary.face).expect("a boundary face is a face of its parents")
     }
-
-    /// Whether the normal of the patch is that of the face with its vertices in ascending order.
-    fn ascending_is_outward(&self, boundary: &BoundaryFace) -> bool {
-        let ascending = self.coarse.faces[boundary.face.index()];
-        let (tet, behind) = match boundary.parents {
-            [Some(tet), _] => (tet, true),
-            [None, Some(tet)] => (tet, false),
-            [None, None] => panic!("boundary face {:?} has no tet in this part", boundary.face),
-        };
-        let vertices = self.coarse.tets[tet.index()];
-        let [p, q, r] = TET_FACES[self.face_of(tet, boundary)].map(|corner| vertices[corner]);
-        let even = [[p, q, r], [q, r, p], [r, p, q]].contains(&ascending);
-        even == behind
-    }
 }
 
 impl MeshStream for RefinedMesh {
@@ -153,24 +139,17 @@ impl MeshStream for RefinedMesh {
 
     fn vertex_block(&self, index: usize) -> VertexBlock<'_> {
         let entity = self.numbering.block(index);
-        let id = entity.id as usize;
-        let (class, holders) = match entity.dimension {
-            0 => (self.coarse.vertex_classes[id], self.coarse.shared_vertices.holders_of(entity.id)),
-            1 => (self.coarse.edge_classes[id], self.coarse.shared_edges.holders_of(entity.id)),
-            2 => (self.coarse.face_classes[id], self.coarse.shared_faces.holders_of(entity.id)),
-            _ => (Class::Body(self.coarse.tet_bodies[id]), None),
-        };
         VertexBlock {
             local: self.numbering.inside(entity),
-            first_id: self.numbering.first_id(entity.dimension, self.coarse_id(entity)),
-            holders: holders.unwrap_or_default(),
-            on_boundary: !matches!(class, Class::Body(_)),
+            first_id: self.numbering.first_id_in(&self.coarse, entity),
+            holders: entity.holders(&self.coarse),
+            on_boundary: !matches!(entity.class(&self.coarse), Class::Body(_)),
         }
     }
 
     fn vertex_id(&self, local: u32) -> GlobalId {
         let (entity, within) = self.numbering.locate(local);
-        self.numbering.first_id(entity.dimension, self.coarse_id(entity)) + u64::from(within)
+        self.numbering.first_id_in(&self.coarse, entity) + u64::from(within)
     }
 
     fn tet_blocks(&self) -> usize {
@@ -228,21 +207,14 @@ impl MeshStream for RefinedMesh {
 
     fn boundary_block(&self, index: usize, block: &mut BoundaryBlock) {
         let face = &self.coarse.boundary[index];
-        let n = self.pieces();
-        let tet = face.parents[0].or(face.parents[1]).expect("a boundary face has a tet in this part");
-        let vertices = self.coarse.tets[tet.index()];
-        let corners = ascending(TET_FACES[self.face_of(tet, face)], |corner| vertices[corner].0);
-        let ids = self.numbering.face_ids(&self.coarse, tet, corners);
-        let outward = self.ascending_is_outward(face);
+        let (tet, behind) = match face.parents {
+            [Some(tet), _] => (tet, true),
+            [None, Some(tet)] => (tet, false),
+            [None, None] => panic!("boundary face {:?} has no tet in this part", face.face),
+        };
         block.triangles.clear();
-        for_each_face_child(n, |j, k, upright| {
-            let at = |j: u32, k: u32| ids[(j + (n + 1) * k) as usize];
-            let [p, q, r] = if upright {
-                [at(j, k), at(j + 1, k), at(j, k + 1)]
-            } else {
-                [at(j + 1, k), at(j + 1, k + 1), at(j, k + 1)]
-            };
-            block.triangles.push(if outward { [p, q, r] } else { [p, r, q] });
+        self.numbering.for_each_triangle(&self.coarse, tet, self.face_of(tet, face), |[p, q, r]| {
+            block.triangles.push(if behind { [p, q, r] } else { [p, r, q] });
         });
         let mut parents = [Vec::new(), Vec::new()];
         for (parent, indices) in face.parents.iter().zip(&mut parents) {
@@ -311,17 +283,6 @@ impl RefinedMesh {
         block.first_id = self.coarse.tet_ids[tet] * u64::from(children);
         block.first_local = tet as u64 * u64::from(children);
         block.body = Some(self.coarse.tet_bodies[tet]);
-    }
-
-    /// The global id of a coarse entity.
-    fn coarse_id(&self, Entity { dimension, id }: Entity) -> GlobalId {
-        let ids = match dimension {
-            0 => &self.coarse.vertex_ids,
-            1 => &self.coarse.edge_ids,
-            2 => &self.coarse.face_ids,
-            _ => &self.coarse.tet_ids,
-        };
-        ids[id as usize]
     }
 }
 

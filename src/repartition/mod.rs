@@ -74,11 +74,7 @@ pub enum RepartitionError {
 
 impl From<Agreed<PartitionError>> for RepartitionError {
     fn from(agreed: Agreed<PartitionError>) -> Self {
-        match agreed {
-            Agreed::Failed { own: Some(error), .. } => Self::Partition(error),
-            Agreed::Failed { rank, message, own: None } => Self::Elsewhere { rank, message },
-            Agreed::Comm(error) => Self::Comm(error),
-        }
+        agreed.into_error(|rank, message| Self::Elsewhere { rank, message })
     }
 }
 

@@ -3,13 +3,11 @@
 use crate::Point;
 use crate::dist::DistMesh;
 use crate::geometry::Projector;
-use crate::mesh::{Class, EdgeId, FaceId, TET_FACES, TetId};
-use crate::refine::lattice::for_each_face_child;
-use crate::refine::numbering::{Entity, Numbering, ascending};
+use crate::mesh::{Class, FaceId, TetId};
+use crate::refine::numbering::Numbering;
 use crate::refine::snap::boundary_first;
 use crate::refine::{Keep, RefineError, Settings};
 use csg::{BodyId, PatchId};
-use std::ops::Range;
 
 /// A triangle of a skin.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -57,7 +55,7 @@ pub fn skin(mesh: &DistMesh, projector: &Projector, n: u32) -> Result<Skin, Refi
     let coordinates = boundary_first(mesh, projector, &numbering, &settings)?;
     let mut triangles = Vec::new();
     sides(mesh).for_each(|side| push_triangles(mesh, &numbering, side, &mut triangles));
-    let mut edges = laid_edges(mesh, &numbering);
+    let mut edges = numbering.laid_edges(mesh).collect::<Vec<_>>();
 
     let mut place = vec![NONE; coordinates.len()];
     triangles.iter().flat_map(|t| t.vertices).for_each(|v| place[v as usize] = 0);
@@ -77,7 +75,7 @@ pub fn skin(mesh: &DistMesh, projector: &Projector, n: u32) -> Result<Skin, Refi
     edges.iter_mut().for_each(|(ends, _)| *ends = ends.map(renumbered));
     Ok(Skin {
         points: lattice.iter().map(|&v| coordinates[v as usize].into()).collect(),
-        classes: lattice.iter().map(|&v| class_of(mesh, numbering.locate(v).0)).collect(),
+        classes: lattice.iter().map(|&v| numbering.locate(v).0.class(mesh)).collect(),
         numbering,
         lattice,
         on_triangles,
@@ -101,15 +99,6 @@ impl Skin {
 
 fn sorted([a, b]: [u32; 2]) -> [u32; 2] {
     [a.min(b), a.max(b)]
-}
-
-fn class_of(mesh: &DistMesh, Entity { dimension, id }: Entity) -> Class {
-    let classes = match dimension {
-        0 => &mesh.vertex_classes,
-        1 => &mesh.edge_classes,
-        _ => &mesh.face_classes,
-    };
-    classes[id as usize]
 }
 
 /// A coarse face of a skin, seen from a tet behind it.
@@ -160,39 +149,9 @@ fn push_triangles(
     side: CoarseSide,
     triangles: &mut Vec<SkinTriangle>,
 ) {
-    let n = numbering.lattice().n();
-    let vertices = mesh.tets[side.tet.index()];
-    let corners = ascending(TET_FACES[side.face], |corner| vertices[corner].0);
-    let [p, q, r] = TET_FACES[side.face];
-    let is_outward = [[p, q, r], [q, r, p], [r, p, q]].contains(&corners);
-    let ids = numbering.face_ids(mesh, side.tet, corners);
     let body = |tet: TetId| mesh.tet_bodies[tet.index()];
     let beside = [Some(body(side.tet)), side.front.map(body)];
-    for_each_face_child(n, |j, k, upright| {
-        let at = |j: u32, k: u32| ids[(j + (n + 1) * k) as usize];
-        let [p, q, r] = if upright {
-            [at(j, k), at(j + 1, k), at(j, k + 1)]
-        } else {
-            [at(j + 1, k), at(j + 1, k + 1), at(j, k + 1)]
-        };
-        let vertices = if is_outward { [p, q, r] } else { [p, r, q] };
+    numbering.for_each_triangle(mesh, side.tet, side.face, |vertices| {
         triangles.push(SkinTriangle { vertices, beside, patch: side.patch });
     });
-}
-
-/// The pieces of the coarse edges on curves and patches, by lattice vertices.
-fn laid_edges(mesh: &DistMesh, numbering: &Numbering) -> Vec<([u32; 2], Class)> {
-    let mut edges = Vec::new();
-    for (edge, (ends, &class)) in (0..).map(EdgeId).zip(mesh.edges.iter().zip(&mesh.edge_classes)) {
-        if matches!(class, Class::Body(_)) {
-            continue;
-        }
-        let inside: Range<u32> = numbering.inside(Entity { dimension: 1, id: edge.0 });
-        let mut from = ends[0].0;
-        for to in inside.chain([ends[1].0]) {
-            edges.push(([from, to], class));
-            from = to;
-        }
-    }
-    edges
 }

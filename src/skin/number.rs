@@ -7,9 +7,10 @@ use super::{Filled, Skin};
 use crate::comm::pack::{put_ascending, put_varint, take_ascending, take_varint};
 use crate::comm::{CommError, Communicator};
 use crate::dist::{BareMesh, DistMesh, LaidEdge, Side, owner};
+use crate::kernel::simplex::from_lowest;
 use crate::mesh::stream::Counts;
 use crate::mesh::{Class, GlobalId, Rank, TET_FACES, TetId, VertexId};
-use crate::refine::numbering::{Entity, fine_totals};
+use crate::refine::numbering::fine_totals;
 use std::collections::HashMap;
 
 /// **Collective.** The part of the whole mesh that the tets inside a skin are.
@@ -23,13 +24,13 @@ pub fn number(
     filled: Filled,
 ) -> Result<BareMesh, CommError> {
     let names = Names::of(mesh, &skin);
-    let vertices = (names.owned(mesh.rank) + filled.inside.len()) as u64;
+    let vertices = (names.owned.iter().filter(|owned| **owned).count() + filled.inside.len()) as u64;
     let counts = [vertices, filled.tets.len() as u64];
     let first = comm.exclusive_scan(counts)?;
     let [vertices, tets] = comm.all_reduce_sum_u64(counts)?;
     let totals = Counts { vertices, tets, ..fine_totals(&mesh.totals, skin.numbering.lattice()) };
 
-    let (mut ids, next) = names.number(mesh.rank, first[0]);
+    let (mut ids, next) = names.number(first[0]);
     let heard = comm.exchange_bytes(names.letters(mesh.rank, &ids))?;
     names.hear(&heard, &mut ids);
     ids.extend((next..).take(filled.inside.len()));
@@ -42,55 +43,42 @@ struct Names<'a> {
     names: Vec<GlobalId>,
     /// The holders where there are several, else none.
     holders: Vec<&'a [Rank]>,
+    /// Whether this rank owns them.
+    owned: Vec<bool>,
 }
 
 impl<'a> Names<'a> {
     fn of(mesh: &'a DistMesh, skin: &Skin) -> Self {
         let name = |&v: &u32| {
-            let (Entity { dimension, id }, within) = skin.numbering.locate(v);
-            let id = id as usize;
-            let ids = [&mesh.vertex_ids, &mesh.edge_ids, &mesh.face_ids][dimension];
-            skin.numbering.first_id(dimension, ids[id]) + u64::from(within)
+            let (entity, within) = skin.numbering.locate(v);
+            skin.numbering.first_id_in(mesh, entity) + u64::from(within)
         };
-        let holders = |&v: &u32| {
-            let Entity { dimension, id } = skin.numbering.locate(v).0;
-            let shared = [&mesh.shared_vertices, &mesh.shared_edges, &mesh.shared_faces][dimension];
-            shared.holders_of(id).unwrap_or_default()
-        };
-        Self {
-            names: skin.lattice.iter().map(name).collect(),
-            holders: skin.lattice.iter().map(holders).collect(),
-        }
-    }
-
-    fn owner(&self, vertex: usize, rank: Rank) -> Rank {
-        match self.holders[vertex] {
-            [] => rank,
-            holders => owner(holders, self.names[vertex]),
-        }
-    }
-
-    fn owned(&self, rank: Rank) -> usize {
-        (0..self.names.len()).filter(|&v| self.owner(v, rank) == rank).count()
+        let names: Vec<GlobalId> = skin.lattice.iter().map(name).collect();
+        let holders: Vec<&[Rank]> =
+            skin.lattice.iter().map(|&v| skin.numbering.locate(v).0.holders(mesh)).collect();
+        let is_owned =
+            |(holders, &name): (&&[Rank], _)| holders.is_empty() || owner(holders, name) == mesh.rank;
+        let owned = holders.iter().zip(&names).map(is_owned).collect();
+        Self { names, holders, owned }
     }
 
     /// Numbers the vertices that this rank owns from `first` on; the others have none yet. Also the first number that is left.
-    fn number(&self, rank: Rank, mut first: GlobalId) -> (Vec<GlobalId>, GlobalId) {
-        let mut number = |v| {
-            if self.owner(v, rank) != rank {
+    fn number(&self, mut first: GlobalId) -> (Vec<GlobalId>, GlobalId) {
+        let mut number = |&owned: &bool| {
+            if !owned {
                 return GlobalId::MAX;
             }
             first += 1;
             first - 1
         };
-        ((0..self.names.len()).map(&mut number).collect(), first)
+        (self.owned.iter().map(&mut number).collect(), first)
     }
 
     /// To each other holder of owned vertices: how many, their names, their numbers, both ascending.
     fn letters(&self, rank: Rank, ids: &[GlobalId]) -> Vec<(Rank, Vec<u8>)> {
         let mut told: Vec<(Rank, GlobalId, GlobalId)> = Vec::new();
         for (v, holders) in self.holders.iter().enumerate() {
-            if !holders.is_empty() && self.owner(v, rank) == rank {
+            if self.owned[v] {
                 let others = holders.iter().filter(|&&holder| holder != rank);
                 told.extend(others.map(|&holder| (holder, self.names[v], ids[v])));
             }
@@ -196,10 +184,9 @@ fn sides(skin: &Skin, filled: &Filled) -> Vec<Side> {
         }
         for (face, outward) in (0..).zip(TET_FACES.map(|face| face.map(|k| corners[k]))) {
             let Some(&k) = triangles.get(&sorted(outward)) else { continue };
-            let [a, b, c] = patched[k].vertices;
-            let is_behind = [[a, b, c], [b, c, a], [c, a, b]].contains(&outward);
+            let is_back = from_lowest(outward) == from_lowest(patched[k].vertices);
             let (patch, back) = patched[k].patch.expect("they were filtered");
-            sides.push(Side { tet, face, patch, behind: is_behind == back });
+            sides.push(Side { tet, face, patch, behind: is_back == back });
         }
     }
     sides
@@ -207,18 +194,14 @@ fn sides(skin: &Skin, filled: &Filled) -> Vec<Side> {
 
 /// The edges on curves and patches, ascending.
 fn laid_edges(skin: &Skin, place: &[VertexId]) -> Vec<LaidEdge> {
-    let laid = |ends: [u32; 2], class| {
-        let [a, b] = ends.map(|v| place[v as usize]);
-        LaidEdge { vertices: [a.min(b), a.max(b)], class }
-    };
-    let mut edges: Vec<LaidEdge> = skin.edges.iter().map(|&(ends, class)| laid(ends, class)).collect();
+    let placed = |v: u32| place[v as usize];
+    let pieces = skin.edges.iter().map(|&(ends, class)| LaidEdge::new(ends.map(placed), class));
+    let mut edges: Vec<LaidEdge> = pieces.collect();
     for triangle in &skin.triangles {
-        let Some((patch, _)) = triangle.patch else { continue };
-        let [a, b, c] = triangle.vertices;
-        edges.extend([[a, b], [b, c], [c, a]].map(|ends| laid(ends, Class::Patch(patch))));
+        if let Some((patch, _)) = triangle.patch {
+            edges.extend(LaidEdge::round(triangle.vertices.map(placed), patch));
+        }
     }
-    // Of an edge that is there several times the class that comes first holds: that of the curve, if it is on one.
-    edges.sort_unstable();
-    edges.dedup_by_key(|edge| edge.vertices);
+    LaidEdge::sort(&mut edges);
     edges
 }
