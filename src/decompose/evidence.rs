@@ -1,6 +1,6 @@
 //! What is known of a geometry before it is cut, from a coarse mesh of it.
 
-use super::plan::CutPlane;
+use super::plan::{CORNER, CutPlane, meeting_point};
 use crate::mesh::{Mesh, TET_EDGES};
 use crate::{Point, Vector};
 use csg::Features;
@@ -109,6 +109,12 @@ fn grid(corners: &[Point; 4], k: usize) -> impl Iterator<Item = Point> + '_ {
     (0..k).flat_map(move |a| (0..k - a).flat_map(move |b| (0..k - a - b).map(move |c| at(a, b, c))))
 }
 
+/// Whether points lie on both sides of a plane.
+fn straddles(points: &[Point; 3], plane: &CutPlane) -> bool {
+    let [a, b, c] = points.map(|point| plane.value(&point) < 0.0);
+    a != b || b != c
+}
+
 /// What a plane through a piece of space may meet.
 pub(super) struct Crossed<'a> {
     faces: Vec<&'a Face>,
@@ -136,6 +142,32 @@ impl Crossed<'_> {
             shallow(plane.normal.dot(&way).abs() / way.norm()) * way.norm() / piece.size
         });
         let corners = self.corners.iter().filter(|(point, size)| near(&[*point], *size)).count();
-        faces.sum::<f64>() + curves.sum::<f64>() + corners as f64
+        faces.sum::<f64>() + curves.sum::<f64>() + CORNER * corners as f64
+    }
+
+    /// Points of the boundary where planes that bound a piece meet curves, or others, and how far from them there is no room.
+    pub(super) fn meeting_points(&self, before: &[CutPlane], beside: &[CutPlane]) -> Vec<(Point, f64)> {
+        let mut points = Vec::new();
+        for (k, wall) in before.iter().enumerate() {
+            for piece in &self.curves {
+                let [a, b] = piece.ends.map(|end| wall.value(&end));
+                if (a < 0.0) != (b < 0.0) {
+                    let point = piece.ends[0] + (piece.ends[1] - piece.ends[0]) * (a / (a - b));
+                    points.push((point, CLEAR * piece.size));
+                }
+            }
+            let across = self.faces.iter().filter(|face| straddles(&face.corners, wall));
+            for face in across {
+                let plane = CutPlane { point: face.corners[0], normal: face.normal };
+                let others = before[k + 1..].iter().chain(beside);
+                let met = others.filter(|other| straddles(&face.corners, other));
+                let met = met.filter_map(|other| meeting_point([wall, other, &plane]));
+                let middle = Point::from(face.corners.iter().map(|c| c.coords).sum::<Vector>() / 3.0);
+                let reach = face.corners.iter().map(|c| (c - middle).norm()).fold(0.0, f64::max);
+                let on_face = met.filter(|point| (point - middle).norm() <= reach);
+                points.extend(on_face.map(|point| (point, CLEAR * face.size)));
+            }
+        }
+        points
     }
 }

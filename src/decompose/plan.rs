@@ -123,7 +123,16 @@ pub struct TooManyParts {
 const PLACES: i32 = 9;
 
 /// What a cell that is cut badly costs, in cells that are cut well.
-const BAD: f64 = 12.0;
+const BAD: f64 = 100.0;
+
+/// A plane that cuts other pieces already may be so many times further off the wanted shares.
+const AGAIN: f64 = 2.5;
+
+/// What a point where others meet costs that a plane passes too near, in cells that are cut badly.
+pub(super) const CORNER: f64 = 10.0;
+
+/// Nearer than this, in units of the room that is wanted, planes pass through one point.
+const SAME: f64 = 1e-9;
 
 /// Planes that meet at a smaller angle than this make slices: its sine.
 const SHALLOW: f64 = 0.6;
@@ -163,6 +172,8 @@ pub fn plan(evidence: &Evidence, parts: u32, settings: &Settings) -> Result<Cuts
 struct Others {
     before: Vec<CutPlane>,
     beside: Vec<CutPlane>,
+    /// Where these meet, or the boundary, and how far from there there is no room.
+    meeting_points: Vec<(Point, f64)>,
 }
 
 /// A piece of space that is to become some parts.
@@ -194,8 +205,11 @@ impl<'a> Piece<'a> {
         let is_before = |plane: usize| self.halves.iter().any(|half| half.plane == plane);
         let (before, beside): (Vec<usize>, Vec<usize>) =
             (0..cuts.planes.len()).partition(|&plane| is_before(plane));
-        let [before, beside] = [before, beside].map(|list| list.into_iter().map(|p| cuts.planes[p]).collect());
-        let others = Others { before, beside };
+        let [before, beside]: [Vec<CutPlane>; 2] =
+            [before, beside].map(|list| list.into_iter().map(|p| cuts.planes[p]).collect());
+        let mut meeting_points = self.meeting_points(cuts, &before, &beside);
+        meeting_points.extend(crossed.meeting_points(&before, &beside));
+        let others = Others { meeting_points, before, beside };
         // One that cuts other pieces already leaves no narrow strips beside them.
         let again = others.beside.iter().filter(|plane| self.shares(plane, settings));
         let planes = again.copied().chain(planes);
@@ -208,7 +222,32 @@ impl<'a> Piece<'a> {
         let count = self.samples.len() as f64;
         let negative = self.samples.iter().filter(|sample| plane.value(&sample.point) <= 0.0).count() as f64;
         let share = f64::from(self.parts / 2) / f64::from(self.parts);
-        (negative / count - share).abs() <= settings.allowance * share
+        (negative / count - share).abs() <= AGAIN * settings.allowance * share
+    }
+
+    /// Points on this piece where a plane that bounds it and two others meet, and how far from them there is no room.
+    fn meeting_points(&self, cuts: &Cuts, before: &[CutPlane], beside: &[CutPlane]) -> Vec<(Point, f64)> {
+        let planes: Vec<&CutPlane> = before.iter().chain(beside).collect();
+        let near = self.samples.iter().map(|sample| sample.near).sum::<f64>() / self.samples.len() as f64;
+        let bounds = crate::kernel::tree::bounds(
+            &self.samples.iter().map(|sample| sample.point).collect::<Vec<_>>(),
+        );
+        let touches = |point: &Point| {
+            let sign = |half: &Half| if half.positive { 1.0 } else { -1.0 };
+            let beside = |half: &Half| sign(half) * cuts.planes[half.plane].value(point) > -near;
+            let inside = (0..3).all(|k| point[k] > bounds.min[k] - near && point[k] < bounds.max[k] + near);
+            inside && self.halves.iter().all(beside)
+        };
+        let mut points = Vec::new();
+        for a in 0..before.len() {
+            for b in a + 1..planes.len() {
+                for c in b + 1..planes.len() {
+                    let point = meeting_point([planes[a], planes[b], planes[c]]);
+                    points.extend(point.filter(&touches).map(|point| (point, near)));
+                }
+            }
+        }
+        points
     }
 
     fn holds(&self, cuts: &Cuts, point: &Point) -> bool {
@@ -290,8 +329,21 @@ impl<'a> Piece<'a> {
                 bad += if both > 0 { shallow(sine) * both as f64 } else { 0.0 };
             }
         }
+        let too_near = |(point, near): &&(Point, f64)| {
+            let value = plane.value(point).abs();
+            value < *near && value > SAME * near
+        };
+        bad += CORNER * others.meeting_points.iter().filter(too_near).count() as f64;
         cut.len() as f64 + BAD * bad
     }
+}
+
+/// Where three planes meet, unless nearly at no point.
+pub(super) fn meeting_point(planes: [&CutPlane; 3]) -> Option<Point> {
+    let rows = planes.map(|plane| plane.normal.transpose());
+    let offsets = planes.map(|plane| plane.normal.dot(&plane.point.coords));
+    let inverse = Matrix3::from_rows(&rows).try_inverse()?;
+    Some(Point::from(inverse * Vector::from(offsets)))
 }
 
 /// How bad an angle is by its sine: from 1 for none to 0 for one that is large enough.
