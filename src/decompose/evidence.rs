@@ -141,8 +141,14 @@ impl Crossed<'_> {
             let way = piece.ends[1] - piece.ends[0];
             shallow(plane.normal.dot(&way).abs() / way.norm()) * way.norm() / piece.size
         });
-        let corners = self.corners.iter().filter(|(point, size)| near(&[*point], *size)).count();
+        let corners =
+            self.corners.iter().filter(|(point, size)| plane.passes_by(point, CLEAR * size)).count();
         faces.sum::<f64>() + curves.sum::<f64>() + CORNER * corners as f64
+    }
+
+    /// The corners.
+    pub(super) fn corners(&self) -> impl Iterator<Item = Point> + '_ {
+        self.corners.iter().map(|corner| corner.0)
     }
 
     /// Points of the boundary where planes that bound a piece meet curves, or others, and how far from them there is no room.

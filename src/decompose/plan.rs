@@ -13,6 +13,7 @@ use super::evidence::{Crossed, Sample};
 use crate::kernel::random::Random;
 use crate::{Point, Vector};
 use nalgebra::{Matrix3, SymmetricEigen};
+use rayon::prelude::*;
 
 /// A plane that cuts, oriented.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,6 +28,12 @@ impl CutPlane {
     /// The signed distance of a point.
     pub fn value(&self, point: &Point) -> f64 {
         self.normal.dot(&(point - self.point))
+    }
+
+    /// Whether it comes nearer than this to a point, but not right through it.
+    pub(super) fn passes_by(&self, point: &Point, near: f64) -> bool {
+        let distance = self.value(point).abs();
+        distance < near && distance > SAME * near
     }
 }
 
@@ -98,7 +105,8 @@ pub enum Candidates {
 pub struct Settings {
     /// Which planes are considered.
     pub candidates: Candidates,
-    /// How far the share of tets on one side of a plane may be off, as a part of the smaller share wanted.
+    /// How far the share of tets on one side of a plane may be off, as a part of the smaller share wanted; four times as far where
+    /// nothing can be cut well.
     pub allowance: f64,
     /// Random directions that are tried for each plane.
     pub tries: usize,
@@ -124,6 +132,9 @@ const PLACES: i32 = 9;
 
 /// What a cell that is cut badly costs, in cells that are cut well.
 const BAD: f64 = 100.0;
+
+/// Where nothing can be cut well, shares may be so many times further off.
+const AT_WORST: f64 = 4.0;
 
 /// A plane that cuts other pieces already may be so many times further off the wanted shares.
 const AGAIN: f64 = 2.5;
@@ -168,12 +179,39 @@ pub fn plan(evidence: &Evidence, parts: u32, settings: &Settings) -> Result<Cuts
     Ok(cuts)
 }
 
+/// What a plane cuts, in cells.
+#[derive(Clone, Copy, Debug)]
+struct Cost {
+    cut: f64,
+    /// Those that it cuts badly.
+    bad: f64,
+}
+
+impl Cost {
+    fn total(self) -> f64 {
+        self.cut + BAD * self.bad
+    }
+}
+
 /// Planes that were chosen already: those that bound a piece, and the others.
 struct Others {
     before: Vec<CutPlane>,
     beside: Vec<CutPlane>,
     /// Where these meet, or the boundary, and how far from there there is no room.
     meeting_points: Vec<(Point, f64)>,
+}
+
+impl Others {
+    fn of(piece: &Piece, cuts: &Cuts, crossed: &Crossed) -> Self {
+        let is_before = |plane: usize| piece.halves.iter().any(|half| half.plane == plane);
+        let (before, beside): (Vec<usize>, Vec<usize>) =
+            (0..cuts.planes.len()).partition(|&plane| is_before(plane));
+        let [before, beside]: [Vec<CutPlane>; 2] =
+            [before, beside].map(|list| list.into_iter().map(|p| cuts.planes[p]).collect());
+        let mut meeting_points = piece.meeting_points(cuts, &before, &beside);
+        meeting_points.extend(crossed.meeting_points(&before, &beside));
+        Self { before, beside, meeting_points }
+    }
 }
 
 /// A piece of space that is to become some parts.
@@ -197,41 +235,46 @@ impl<'a> Piece<'a> {
 
     fn best_plane(&self, cuts: &Cuts, evidence: &Evidence, settings: &Settings) -> CutPlane {
         let directions = self.directions(settings, cuts.planes.len() as u64);
-        let planes: Vec<CutPlane> = directions.iter().flat_map(|n| self.places(n, settings)).collect();
-        if let [only] = planes[..] {
-            return only;
+        if settings.candidates == Candidates::Median {
+            return self.places(&directions[0], 0.0)[0];
         }
         let crossed = evidence.within(|point| self.holds(cuts, point));
-        let is_before = |plane: usize| self.halves.iter().any(|half| half.plane == plane);
-        let (before, beside): (Vec<usize>, Vec<usize>) =
-            (0..cuts.planes.len()).partition(|&plane| is_before(plane));
-        let [before, beside]: [Vec<CutPlane>; 2] =
-            [before, beside].map(|list| list.into_iter().map(|p| cuts.planes[p]).collect());
-        let mut meeting_points = self.meeting_points(cuts, &before, &beside);
-        meeting_points.extend(crossed.meeting_points(&before, &beside));
-        let others = Others { meeting_points, before, beside };
-        // One that cuts other pieces already leaves no narrow strips beside them.
-        let again = others.beside.iter().filter(|plane| self.shares(plane, settings));
-        let planes = again.copied().chain(planes);
-        let costs = planes.map(|plane| (self.cost(&plane, &crossed, &others), plane));
-        costs.min_by(|a, b| a.0.total_cmp(&b.0)).expect("there are directions").1
+        let others = Others::of(self, cuts, &crossed);
+        // A plane that cuts other pieces already leaves no narrow strips beside them, and one right through a corner none beside that.
+        let corners = crossed.corners().chain(others.meeting_points.iter().map(|meeting| meeting.0));
+        let through =
+            corners.flat_map(|point| directions.iter().map(move |&normal| CutPlane { point, normal }));
+        let special: Vec<CutPlane> = others.beside.iter().copied().chain(through).collect();
+        let mut best: Option<(Cost, CutPlane)> = None;
+        for allowance in [1.0, AT_WORST].map(|factor| factor * settings.allowance) {
+            let planes = directions.iter().flat_map(|normal| self.places(normal, allowance));
+            let special = special.par_iter().filter(|plane| self.shares(plane, AGAIN * allowance));
+            let planes: Vec<CutPlane> = planes.chain(special.copied().collect::<Vec<_>>()).collect();
+            let costs: Vec<Cost> =
+                planes.par_iter().map(|plane| self.cost(plane, &crossed, &others)).collect();
+            let costs = costs.into_iter().zip(planes);
+            best = best.into_iter().chain(costs).min_by(|a, b| a.0.total().total_cmp(&b.0.total()));
+            if best.as_ref().is_some_and(|(cost, _)| cost.bad < 1.0) {
+                break;
+            }
+        }
+        best.expect("there are directions").1
     }
 
     /// Whether a plane leaves about the wanted shares on both sides.
-    fn shares(&self, plane: &CutPlane, settings: &Settings) -> bool {
+    fn shares(&self, plane: &CutPlane, allowance: f64) -> bool {
         let count = self.samples.len() as f64;
         let negative = self.samples.iter().filter(|sample| plane.value(&sample.point) <= 0.0).count() as f64;
         let share = f64::from(self.parts / 2) / f64::from(self.parts);
-        (negative / count - share).abs() <= AGAIN * settings.allowance * share
+        (negative / count - share).abs() <= allowance * share
     }
 
     /// Points on this piece where a plane that bounds it and two others meet, and how far from them there is no room.
     fn meeting_points(&self, cuts: &Cuts, before: &[CutPlane], beside: &[CutPlane]) -> Vec<(Point, f64)> {
         let planes: Vec<&CutPlane> = before.iter().chain(beside).collect();
         let near = self.samples.iter().map(|sample| sample.near).sum::<f64>() / self.samples.len() as f64;
-        let bounds = crate::kernel::tree::bounds(
-            &self.samples.iter().map(|sample| sample.point).collect::<Vec<_>>(),
-        );
+        let bounds =
+            crate::kernel::tree::bounds(&self.samples.iter().map(|sample| sample.point).collect::<Vec<_>>());
         let touches = |point: &Point| {
             let sign = |half: &Half| if half.positive { 1.0 } else { -1.0 };
             let beside = |half: &Half| sign(half) * cuts.planes[half.plane].value(point) > -near;
@@ -293,27 +336,24 @@ impl<'a> Piece<'a> {
     }
 
     /// Planes across a direction that leave the wanted shares on both sides, the best share first.
-    fn places(&self, normal: &Vector, settings: &Settings) -> Vec<CutPlane> {
+    fn places(&self, normal: &Vector, allowance: f64) -> Vec<CutPlane> {
         let mut along: Vec<f64> = self.samples.iter().map(|sample| sample.point.coords.dot(normal)).collect();
         along.sort_unstable_by(f64::total_cmp);
         let share = f64::from(self.parts / 2) / f64::from(self.parts);
-        let steps: Vec<i32> = match settings.candidates {
-            Candidates::Median => vec![0],
-            // 0, 1, -1, 2, -2, …
-            _ => (0..PLACES).map(|k| if k % 2 == 0 { -k / 2 } else { (k + 1) / 2 }).collect(),
-        };
+        // 0, 1, -1, 2, -2, …
+        let steps = (0..PLACES).map(|k| if k % 2 == 0 { -k / 2 } else { (k + 1) / 2 });
         let place = |step: i32| {
-            let off = f64::from(step) / f64::from(PLACES / 2) * settings.allowance * share;
+            let off = f64::from(step) / f64::from(PLACES / 2) * allowance * share;
             let at = ((share + off) * along.len() as f64).round() as usize;
             let at = at.clamp(1, along.len() - 1);
             let offset = 0.5 * (along[at - 1] + along[at]);
             CutPlane { point: Point::from(normal * offset), normal: *normal }
         };
-        steps.into_iter().map(place).collect()
+        steps.map(place).collect()
     }
 
     /// Cells that a plane cuts, those that it cuts badly many times over.
-    fn cost(&self, plane: &CutPlane, crossed: &Crossed, others: &Others) -> f64 {
+    fn cost(&self, plane: &CutPlane, crossed: &Crossed, others: &Others) -> Cost {
         let on_plane = |sample: &&&Sample| plane.value(&sample.point).abs() < 0.5 * sample.width;
         let cut: Vec<&Sample> = self.samples.iter().filter(on_plane).copied().collect();
         let near = |sample: &Sample, other: &CutPlane| other.value(&sample.point).abs() < sample.near;
@@ -329,12 +369,9 @@ impl<'a> Piece<'a> {
                 bad += if both > 0 { shallow(sine) * both as f64 } else { 0.0 };
             }
         }
-        let too_near = |(point, near): &&(Point, f64)| {
-            let value = plane.value(point).abs();
-            value < *near && value > SAME * near
-        };
-        bad += CORNER * others.meeting_points.iter().filter(too_near).count() as f64;
-        cut.len() as f64 + BAD * bad
+        let too_near = others.meeting_points.iter().filter(|(point, near)| plane.passes_by(point, *near));
+        bad += CORNER * too_near.count() as f64;
+        Cost { cut: cut.len() as f64, bad }
     }
 }
 
