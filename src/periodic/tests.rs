@@ -3,7 +3,6 @@
 use super::{PeriodicMap, PeriodicSize};
 use crate::comm::thread;
 use crate::io::serial;
-use crate::mesh::stream::MeshStream;
 use crate::pipeline::{CoarseSettings, GenerateSettings, Generated, Method, Model, Wanted, generate};
 use crate::progress::Progress;
 use crate::size::{Preset, SizeField, SizeSettings, Source};
