@@ -1,6 +1,6 @@
 //! What is known of a geometry before it is cut, from a coarse mesh of it.
 
-use super::plan::{CORNER, CutPlane, meeting_point};
+use super::plan::{CutPlane, Spot, meeting_point};
 use crate::comm::thread;
 use crate::dist::distribute;
 use crate::error::Failure;
@@ -137,7 +137,7 @@ pub(super) struct Crossed<'a> {
 const CLEAR: f64 = 1.5;
 
 impl Crossed<'_> {
-    /// Fine triangles, edges and vertices that a plane cuts at a small angle or comes too near to, weighted by how bad the sine of
+    /// Fine triangles and edges that a plane cuts at a small angle or comes too near to, weighted by how bad the sine of
     /// the angle is.
     pub(super) fn badly_cut(&self, plane: &CutPlane, shallow: impl Fn(f64) -> f64) -> f64 {
         let near = |points: &[Point], size: f64| {
@@ -152,25 +152,23 @@ impl Crossed<'_> {
             let way = piece.ends[1] - piece.ends[0];
             shallow(plane.normal.dot(&way).abs() / way.norm()) * way.norm() / piece.size
         });
-        let corners =
-            self.corners.iter().filter(|(point, size)| plane.passes_by(point, CLEAR * size)).count();
-        faces.sum::<f64>() + curves.sum::<f64>() + CORNER * corners as f64
+        faces.sum::<f64>() + curves.sum::<f64>()
     }
 
     /// The corners.
-    pub(super) fn corners(&self) -> impl Iterator<Item = Point> + '_ {
-        self.corners.iter().map(|corner| corner.0)
+    pub(super) fn corners(&self) -> impl Iterator<Item = Spot> + '_ {
+        self.corners.iter().map(|&&(point, size)| Spot { point, near: CLEAR * size, is_exact: true })
     }
 
     /// Points of the boundary where planes that bound a piece meet curves, or others, and how far from them there is no room.
-    pub(super) fn meeting_points(&self, before: &[CutPlane], beside: &[CutPlane]) -> Vec<(Point, f64)> {
+    pub(super) fn meeting_points(&self, before: &[CutPlane], beside: &[CutPlane]) -> Vec<Spot> {
         let mut points = Vec::new();
         for (k, wall) in before.iter().enumerate() {
             for piece in &self.curves {
                 let [a, b] = piece.ends.map(|end| wall.value(&end));
                 if (a < 0.0) != (b < 0.0) {
                     let point = piece.ends[0] + (piece.ends[1] - piece.ends[0]) * (a / (a - b));
-                    points.push((point, CLEAR * piece.size));
+                    points.push(Spot { point, near: CLEAR * piece.size, is_exact: false });
                 }
             }
             let across = self.faces.iter().filter(|face| straddles(&face.corners, wall));
@@ -182,7 +180,8 @@ impl Crossed<'_> {
                 let middle = Point::from(face.corners.iter().map(|c| c.coords).sum::<Vector>() / 3.0);
                 let reach = face.corners.iter().map(|c| (c - middle).norm()).fold(0.0, f64::max);
                 let on_face = met.filter(|point| (point - middle).norm() <= reach);
-                points.extend(on_face.map(|point| (point, CLEAR * face.size)));
+                let near = CLEAR * face.size;
+                points.extend(on_face.map(|point| Spot { point, near, is_exact: false }));
             }
         }
         points

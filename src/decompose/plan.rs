@@ -30,11 +30,24 @@ impl CutPlane {
         self.normal.dot(&(point - self.point))
     }
 
-    /// Whether it comes nearer than this to a point, but not right through it.
-    pub(super) fn passes_by(&self, point: &Point, near: f64) -> bool {
-        let distance = self.value(point).abs();
-        distance < near && distance > SAME * near
+    /// How bad it is to pass a spot as near as it does: nothing where it keeps away, or goes right through.
+    fn crowds(&self, spot: &Spot) -> f64 {
+        let distance = self.value(&spot.point).abs() / spot.near;
+        if distance > 1.0 || spot.is_exact && distance < SAME {
+            return 0.0;
+        }
+        CORNER * (1.0 - distance) / (ROOM + distance)
     }
+}
+
+/// A point that planes keep away from.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Spot {
+    pub point: Point,
+    /// Nearer than this there is no room for good tets.
+    pub near: f64,
+    /// Whether it is known so well that a plane may go right through it.
+    pub is_exact: bool,
 }
 
 /// One side of a plane.
@@ -139,8 +152,11 @@ const AT_WORST: f64 = 4.0;
 /// A plane that cuts other pieces already may be so many times further off the wanted shares.
 const AGAIN: f64 = 2.5;
 
-/// What a point where others meet costs that a plane passes too near, in cells that are cut badly.
-pub(super) const CORNER: f64 = 10.0;
+/// What a spot costs that a plane passes near, in cells that are cut badly.
+const CORNER: f64 = 3.0;
+
+/// Nearer than this part of the room that is wanted, it does not get much worse.
+const ROOM: f64 = 0.1;
 
 /// Nearer than this, in units of the room that is wanted, planes pass through one point.
 const SAME: f64 = 1e-9;
@@ -197,8 +213,8 @@ impl Cost {
 struct Others {
     before: Vec<CutPlane>,
     beside: Vec<CutPlane>,
-    /// Where these meet, or the boundary, and how far from there there is no room.
-    meeting_points: Vec<(Point, f64)>,
+    /// Corners, and where these planes meet each other or the boundary.
+    spots: Vec<Spot>,
 }
 
 impl Others {
@@ -208,9 +224,10 @@ impl Others {
             (0..cuts.planes.len()).partition(|&plane| is_before(plane));
         let [before, beside]: [Vec<CutPlane>; 2] =
             [before, beside].map(|list| list.into_iter().map(|p| cuts.planes[p]).collect());
-        let mut meeting_points = piece.meeting_points(cuts, &before, &beside);
-        meeting_points.extend(crossed.meeting_points(&before, &beside));
-        Self { before, beside, meeting_points }
+        let mut spots = piece.meeting_points(cuts, &before, &beside);
+        spots.extend(crossed.meeting_points(&before, &beside));
+        spots.extend(crossed.corners());
+        Self { before, beside, spots }
     }
 }
 
@@ -241,9 +258,9 @@ impl<'a> Piece<'a> {
         let crossed = evidence.within(|point| self.holds(cuts, point));
         let others = Others::of(self, cuts, &crossed);
         // A plane that cuts other pieces already leaves no narrow strips beside them, and one right through a corner none beside that.
-        let corners = crossed.corners().chain(others.meeting_points.iter().map(|meeting| meeting.0));
+        let spots = others.spots.iter().filter(|spot| spot.is_exact).map(|spot| spot.point);
         let through =
-            corners.flat_map(|point| directions.iter().map(move |&normal| CutPlane { point, normal }));
+            spots.flat_map(|point| directions.iter().map(move |&normal| CutPlane { point, normal }));
         let special: Vec<CutPlane> = others.beside.iter().copied().chain(through).collect();
         let mut best: Option<(Cost, CutPlane)> = None;
         for allowance in [1.0, AT_WORST].map(|factor| factor * settings.allowance) {
@@ -270,7 +287,7 @@ impl<'a> Piece<'a> {
     }
 
     /// Points on this piece where a plane that bounds it and two others meet, and how far from them there is no room.
-    fn meeting_points(&self, cuts: &Cuts, before: &[CutPlane], beside: &[CutPlane]) -> Vec<(Point, f64)> {
+    fn meeting_points(&self, cuts: &Cuts, before: &[CutPlane], beside: &[CutPlane]) -> Vec<Spot> {
         let planes: Vec<&CutPlane> = before.iter().chain(beside).collect();
         let near = self.samples.iter().map(|sample| sample.near).sum::<f64>() / self.samples.len() as f64;
         let bounds =
@@ -286,7 +303,7 @@ impl<'a> Piece<'a> {
             for b in a + 1..planes.len() {
                 for c in b + 1..planes.len() {
                     let point = meeting_point([planes[a], planes[b], planes[c]]);
-                    points.extend(point.filter(&touches).map(|point| (point, near)));
+                    points.extend(point.filter(&touches).map(|point| Spot { point, near, is_exact: true }));
                 }
             }
         }
@@ -369,8 +386,7 @@ impl<'a> Piece<'a> {
                 bad += if both > 0 { shallow(sine) * both as f64 } else { 0.0 };
             }
         }
-        let too_near = others.meeting_points.iter().filter(|(point, near)| plane.passes_by(point, *near));
-        bad += CORNER * too_near.count() as f64;
+        bad += others.spots.iter().map(|spot| plane.crowds(spot)).sum::<f64>();
         Cost { cut: cut.len() as f64, bad }
     }
 }
