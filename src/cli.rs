@@ -25,6 +25,12 @@ pub enum Command {
     /// Make the coarse mesh alone, in one part and one file
     #[command(after_help = STATUS)]
     Mesh(MeshFile),
+    /// Read a partitioned Elmer mesh, give its tets to another number of parts, check and write it
+    ///
+    /// Ours or ElmerGrid's, of tets without halo. Each rank reads some of the parts; none sees the whole mesh. Such files tell nothing of the
+    /// curves and surfaces of a geometry, so that refining the mesh again would not round it.
+    #[command(after_help = STATUS)]
+    Repartition(Repartition),
     /// Show the bodies, corners, curves, patches, boundary numbers and names of a geometry
     Inspect(Inspect),
     /// Check a written Elmer mesh: every fault, with ids and places
@@ -140,6 +146,46 @@ pub struct Generate {
     /// Say nothing but errors
     #[arg(short, long)]
     pub quiet: bool,
+}
+
+/// `tetmill repartition`
+#[derive(Args, Debug)]
+pub struct Repartition {
+    /// Folder with the mesh: one partitioning.M in it, or that folder itself, with mesh.names beside; or mesh.*
+    pub directory: PathBuf,
+    /// Number of parts wanted, each on an in-process rank [under mpirun: the ranks are MPI's, and so many parts]
+    #[arg(short = 'n', long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    pub parts: Option<u32>,
+    /// Folder to write to
+    #[arg(short, long, value_name = "DIR")]
+    pub output: PathBuf,
+    /// How tets are given to parts [default: graph, in a build with METIS]
+    #[arg(short, long, value_enum)]
+    pub method: Option<PartitionMethod>,
+    /// Number of threads in all [default: the cores]
+    #[arg(short, long, value_name = "THREADS", value_parser = clap::value_parser!(u32).range(1..))]
+    pub threads: Option<u32>,
+    /// What to write, with commas between, or none
+    #[arg(short, long, value_enum, value_delimiter = ',', default_value = "elmer")]
+    pub format: Vec<Format>,
+    /// Read the written Elmer mesh again and check it
+    #[arg(long)]
+    pub check: bool,
+    /// Write the summary as JSON
+    #[arg(long, value_name = "FILE.json")]
+    pub report: Option<PathBuf>,
+    /// Say nothing but errors
+    #[arg(short, long)]
+    pub quiet: bool,
+}
+
+/// How tets are given to parts.
+#[derive(ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PartitionMethod {
+    /// Equal stretches of a Hilbert curve: balanced to one tet, fast
+    Curve,
+    /// METIS on clusters of tets: fewer faces between parts
+    Graph,
 }
 
 /// `tetmill mesh`

@@ -1,5 +1,9 @@
 //! What the commands do: from the options to a written mesh and a summary.
 
+mod repartition;
+
+pub use repartition::run_repartition;
+
 use crate::cli::{Check, Format, Generate, InputOptions, Inspect, MeshFile, Method, Quality, SizeOptions};
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
@@ -8,6 +12,7 @@ use tetmill::comm::{Communicator, mpi, thread};
 use tetmill::error::{Failure, Status, agree};
 use tetmill::inspect::Inspection;
 use tetmill::io::{self, Written, elmer};
+use tetmill::mesh::Names;
 use tetmill::mesh::stream::MeshStream;
 use tetmill::pipeline::input::{self, InputSettings};
 use tetmill::pipeline::target::Outcome;
@@ -23,22 +28,28 @@ pub fn run_generate(options: &Generate) -> Result<(), Failure> {
     method_of(options)?;
     set_threads(options.threads)?;
     let start = Instant::now();
+    on_ranks(options.parts.or(options.ranks), |comm| generate_on(comm, options, start))
+}
+
+/// Runs a command on the ranks that were asked for (one, if none were), or on those that `mpirun` started, which must be as many.
+fn on_ranks(
+    asked: Option<u32>,
+    command: impl Fn(&dyn Communicator) -> Result<(), Failure> + Sync,
+) -> Result<(), Failure> {
     if mpi::launched() {
-        let ranks_given = options.ranks.or(options.parts);
         let done = mpi::run(|comm| {
-            let done = match ranks_given {
+            let done = match asked {
                 Some(ranks) if ranks != comm.size() => Err(Failure::input(format!(
                     "{ranks} ranks are asked for, but mpirun started {}: leave out -n and --parts",
                     comm.size()
                 ))),
-                _ => generate_on(comm, options, start),
+                _ => command(comm),
             };
             done.map_err(|failure| tell_once(comm, failure))
         });
         return done.map_err(Failure::input)?;
     }
-    let ranks = options.parts.or(options.ranks).unwrap_or(1);
-    let results = thread::run(ranks, |comm| generate_on(comm, options, start))?;
+    let results = thread::run(asked.unwrap_or(1), command)?;
     results.into_iter().collect()
 }
 
@@ -91,7 +102,9 @@ fn generate_on(comm: &dyn Communicator, options: &Generate, start: Instant) -> R
     let method = method_of(options)?;
     let settings = GenerateSettings { method, coarse, wanted: wanted(options), memory: options.memory, disk };
     let made = generate(comm, model.as_ref(), &settings, &progress)?;
-    let written = progress.stage("write", || write_all(comm, options, &made, &target))?;
+    let stem = target.join(options.input.files[0].file_stem().unwrap_or("mesh".as_ref()));
+    let written = progress
+        .stage("write", || write_formats(comm, &made.part, &made.names, &options.format, &target, &stem))?;
     if options.check && options.format.contains(&Format::Elmer) {
         let checked = if first { progress.stage("read back", || check_written(&target)) } else { Ok(()) };
         agree(comm, checked)?;
@@ -198,22 +211,21 @@ fn disk_for(formats: &[Format], folder: &Path) -> Disk {
     }
 }
 
-/// **Collective.** Writes each format.
-fn write_all(
+/// **Collective.** Writes each format into a folder; files of those that do not fill one are called `stem`.
+fn write_formats(
     comm: &dyn Communicator,
-    options: &Generate,
-    made: &Generated,
+    part: &dyn MeshStream,
+    names: &Names,
+    formats: &[Format],
     dir: &Path,
+    stem: &Path,
 ) -> Result<Written, Failure> {
     let mut written = Written::default();
-    let stem = dir.join(options.input.files[0].file_stem().unwrap_or("mesh".as_ref()));
-    for format in &options.format {
+    for format in formats {
         written += match format {
-            Format::Elmer => elmer::write(comm, &made.part, &made.names, dir)?,
-            Format::Vtu => io::vtu::write(comm, &made.part, &made.names, &stem)?,
-            Format::Geomview => {
-                io::geomview::write(comm, &made.part, &io::geomview::Settings::default(), &stem)?
-            }
+            Format::Elmer => elmer::write(comm, part, names, dir)?,
+            Format::Vtu => io::vtu::write(comm, part, names, stem)?,
+            Format::Geomview => io::geomview::write(comm, part, &io::geomview::Settings::default(), stem)?,
             Format::None => Written::default(),
         };
     }

@@ -11,6 +11,7 @@ fn main() -> ExitCode {
     let done = match Cli::parse().command {
         Command::Generate(options) => commands::run_generate(&options),
         Command::Mesh(options) => commands::run_mesh(&options),
+        Command::Repartition(options) => commands::run_repartition(&options),
         Command::Inspect(options) => commands::run_inspect(&options),
         Command::Check(options) => commands::run_check(&options),
         Command::Quality(options) => commands::run_quality(&options),

@@ -38,9 +38,16 @@ pub enum Method {
     },
 }
 
+impl Method {
+    /// By a graph, as fine as it pays.
+    pub fn graph() -> Self {
+        Self::Clusters { per_part: 1000 }
+    }
+}
+
 impl Default for Method {
     fn default() -> Self {
-        if cfg!(feature = "metis") { Self::Clusters { per_part: 1000 } } else { Self::Curve }
+        if cfg!(feature = "metis") { Self::graph() } else { Self::Curve }
     }
 }
 
