@@ -184,7 +184,9 @@ pub struct Repartition {
 pub enum PartitionMethod {
     /// Equal stretches of a Hilbert curve: balanced to one tet, fast
     Curve,
-    /// METIS on clusters of tets: fewer faces between parts
+    /// The same with fewer faces between parts, balanced to one percent
+    SmoothedCurve,
+    /// METIS on clusters of tets, then fewer faces between parts: the best, balanced to one percent
     Graph,
 }
 

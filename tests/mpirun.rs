@@ -2,7 +2,7 @@
 
 #[cfg(feature = "mpi")]
 mod with_mpi {
-    use crate::common::{judge, own, read_json, report_of, succeed};
+    use crate::common::{judge, own, read_json, report_of, succeed, tetmill};
     use std::process::Command;
 
     /// `mpirun -n RANKS tetmill`, or nothing, said aloud, where there is no `mpirun`.
@@ -60,6 +60,34 @@ mod with_mpi {
         assert_eq!(output.status.code(), Some(2));
         let said = String::from_utf8_lossy(&output.stderr);
         assert_eq!(said.matches("cannot read no/such/file.geo").count(), 1, "{said}");
+    }
+
+    #[test]
+    fn partitions_are_repartitioned_by_mpi_ranks_as_by_threads() {
+        let dir = tempfile::tempdir().unwrap();
+        let [start, grown, back] = ["start", "grown", "back"].map(|name| dir.path().join(name));
+        let mut command = tetmill();
+        command.arg("generate").arg(own("tee")).args(["--preset", "very-coarse", "-n", "7", "-q", "-o"]);
+        succeed(command.arg(&start));
+        let Some(mut command) = mpirun(4) else { return };
+        succeed(command.arg("repartition").arg(&start).args(["-q", "--check", "-o"]).arg(&grown));
+        judge(&grown, 4);
+        let same = dir.path().join("same");
+        succeed(tetmill().arg("repartition").arg(&start).args(["-n", "4", "-q", "-o"]).arg(&same));
+        for part in 1..=4 {
+            for kind in ["header", "nodes", "elements", "boundary", "shared"] {
+                let file = format!("partitioning.4/part.{part}.{kind}");
+                let text = |folder: &std::path::Path| std::fs::read(folder.join(&file)).unwrap();
+                assert!(text(&grown) == text(&same), "{file}");
+            }
+        }
+        let Some(mut command) = mpirun(3) else { return };
+        std::fs::write(start.join("partitioning.7/part.6.shared"), "1 2 6\n").unwrap();
+        let output = command.arg("repartition").arg(&start).args(["-q", "-o"]).arg(&back).output().unwrap();
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{said}");
+        assert_eq!(said.matches("part.6.shared:1").count(), 1, "{said}");
+        assert!(!back.exists());
     }
 
     #[test]

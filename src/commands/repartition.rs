@@ -31,6 +31,7 @@ fn repartition_on(comm: &dyn Communicator, options: &Repartition, start: Instant
     let method = match options.method {
         None => Method::default(),
         Some(PartitionMethod::Curve) => Method::Curve,
+        Some(PartitionMethod::SmoothedCurve) => Method::SmoothedCurve,
         Some(PartitionMethod::Graph) => Method::graph(),
     };
     let done = pipeline::repartition(comm, &options.directory, method, &progress)?;

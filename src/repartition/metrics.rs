@@ -45,8 +45,7 @@ pub fn measure(
     assert_eq!(part.len(), mesh.tets.len(), "rank {}: one part for each tet", mesh.rank);
     let mut sizes = vec![0u64; parts as usize];
     part.iter().for_each(|&p| sizes[p as usize] += 1);
-    let all = comm.all_gather(&sizes)?;
-    let sizes: Vec<u64> = (0..parts as usize).map(|p| all.iter().map(|sizes| sizes[p]).sum()).collect();
+    let sizes = sum_by_part(comm, &sizes)?;
     let mut cut = 0;
     across_faces(comm, mesh, part, |a, b| cut += u64::from(a != b))?;
     let moving = part.iter().filter(|&&p| p != mesh.rank).count() as u64;
@@ -69,6 +68,27 @@ pub fn measure(
         mean_neighbours: 2.0 * pairs.len() as f64 / f64::from(parts.max(1)),
         moving,
     })
+}
+
+/// **Collective.** The sums over the ranks of what each has of each part: most ranks have something of few parts only.
+pub(super) fn sum_by_part(comm: &dyn Communicator, mine: &[u64]) -> Result<Vec<u64>, CommError> {
+    let (parts, ranks) = (mine.len(), comm.size() as usize);
+    // Parts are at home at ranks in blocks.
+    let block = parts.div_ceil(ranks);
+    let mut letters: Vec<(Rank, Vec<[u64; 2]>)> = Vec::new();
+    for (part, &count) in mine.iter().enumerate().filter(|(_, count)| **count > 0) {
+        let home = (part / block) as Rank;
+        if letters.last().is_none_or(|(to, _)| *to != home) {
+            letters.push((home, Vec::new()));
+        }
+        letters.last_mut().expect("there is one now").1.push([part as u64, count]);
+    }
+    let first = (comm.rank() as usize * block).min(parts);
+    let mut sums = vec![0u64; block.min(parts - first)];
+    for [part, count] in comm.exchange(letters)?.into_iter().flat_map(|(_, list)| list) {
+        sums[part as usize - first] += count;
+    }
+    Ok(comm.all_gather(&sums)?.concat())
 }
 
 /// **Collective.** How many vertices at home on this rank are in several parts, and the distinct pairs of parts that meet there.

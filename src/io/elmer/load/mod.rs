@@ -46,9 +46,14 @@ pub struct Loaded {
 /// Why a partition cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum LoadError {
-    /// A file of this rank is not what it should be.
-    #[error(transparent)]
-    Read(#[from] ReadError),
+    /// A file is not what it should be.
+    #[error("{message}")]
+    Refused {
+        /// The lowest rank that found it.
+        rank: Rank,
+        /// Which, where and why.
+        message: String,
+    },
     /// The tets are no mesh.
     #[error("{}: {error}", folder.display())]
     Settle {
@@ -57,14 +62,6 @@ pub enum LoadError {
         /// Why.
         error: SettleError,
     },
-    /// Another rank met an error.
-    #[error("{message}")]
-    Elsewhere {
-        /// Which.
-        rank: Rank,
-        /// What it says.
-        message: String,
-    },
     /// The ranks cannot talk.
     #[error(transparent)]
     Comm(#[from] CommError),
@@ -72,7 +69,11 @@ pub enum LoadError {
 
 impl From<Agreed<ReadError>> for LoadError {
     fn from(agreed: Agreed<ReadError>) -> Self {
-        agreed.into_error(|rank, message| Self::Elsewhere { rank, message })
+        match agreed {
+            // The same words on all ranks, also on others that met an error.
+            Agreed::Failed { rank, message, .. } => Self::Refused { rank, message },
+            Agreed::Comm(error) => Self::Comm(error),
+        }
     }
 }
 
