@@ -106,7 +106,7 @@ pub struct Generate {
     /// Number of in-process ranks [default: 1; under mpirun the ranks are MPI's]
     #[arg(short = 'n', long, value_name = "RANKS", value_parser = clap::value_parser!(u32).range(1..))]
     pub ranks: Option<u32>,
-    /// Number of parts to write [default: the ranks]
+    /// Number of parts to write [default: the ranks]; under mpirun more or fewer than these are dealt out to them
     #[arg(long, value_name = "P", value_parser = clap::value_parser!(u32).range(1..))]
     pub parts: Option<u32>,
     /// Number of threads in all [default: the cores]
@@ -153,7 +153,7 @@ pub struct Generate {
 pub struct Repartition {
     /// Folder with the mesh: one partitioning.M in it, or that folder itself, with mesh.names beside; or mesh.*
     pub directory: PathBuf,
-    /// Number of parts wanted, each on an in-process rank [under mpirun: the ranks are MPI's, and so many parts]
+    /// Number of parts wanted, each on an in-process rank [default under mpirun: MPI's ranks; other numbers are dealt out to them]
     #[arg(short = 'n', long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub parts: Option<u32>,
     /// Folder to write to

@@ -8,10 +8,11 @@ use crate::cli::{Check, Format, Generate, InputOptions, Inspect, MeshFile, Metho
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
-use tetmill::comm::{Communicator, mpi, thread};
+use tetmill::comm::{Communicator, grouped, mpi, thread};
 use tetmill::error::{Failure, Status, agree};
 use tetmill::inspect::Inspection;
 use tetmill::io::{self, Written, elmer};
+use tetmill::kernel::random::mix;
 use tetmill::mesh::Names;
 use tetmill::mesh::stream::MeshStream;
 use tetmill::pipeline::input::{self, InputSettings};
@@ -28,28 +29,34 @@ pub fn run_generate(options: &Generate) -> Result<(), Failure> {
     method_of(options)?;
     set_threads(options.threads)?;
     let start = Instant::now();
-    on_ranks(options.parts.or(options.ranks), |comm| generate_on(comm, options, start))
+    on_ranks(options.ranks, options.parts, |comm| generate_on(comm, options, start))
 }
 
-/// Runs a command on the ranks that were asked for (one, if none were), or on those that `mpirun` started, which must be as many.
+/// Runs a command on a rank for each part. Parts are as many as were asked for, else as ranks (one, if none were asked for); under `mpirun`
+/// ranks are processes, and where parts are more or fewer, some processes have several of them or none.
 fn on_ranks(
-    asked: Option<u32>,
+    ranks: Option<u32>,
+    parts: Option<u32>,
     command: impl Fn(&dyn Communicator) -> Result<(), Failure> + Sync,
 ) -> Result<(), Failure> {
     if mpi::launched() {
         let done = mpi::run(|comm| {
-            let done = match asked {
-                Some(ranks) if ranks != comm.size() => Err(Failure::input(format!(
-                    "{ranks} ranks are asked for, but mpirun started {}: leave out -n and --parts",
+            let done = match (ranks, parts) {
+                (Some(ranks), _) if ranks != comm.size() => Err(Failure::input(format!(
+                    "{ranks} ranks are asked for, but mpirun started {}: leave out -n",
                     comm.size()
                 ))),
+                (_, Some(parts)) if parts != comm.size() => {
+                    let ran = grouped::run(comm, parts, &command).map_err(Failure::from);
+                    agree(comm, ran.and_then(|results| results.into_iter().collect()))
+                }
                 _ => command(comm),
             };
             done.map_err(|failure| tell_once(comm, failure))
         });
         return done.map_err(Failure::input)?;
     }
-    let results = thread::run(asked.unwrap_or(1), command)?;
+    let results = thread::run(parts.or(ranks).unwrap_or(1), command)?;
     results.into_iter().collect()
 }
 
@@ -291,13 +298,14 @@ fn imbalance(all: &[f64]) -> f64 {
     all.iter().copied().fold(0.0, f64::max) / mean
 }
 
-/// **Collective.** Peak memory: of this process for in-process ranks, of all processes under MPI.
+/// **Collective.** Peak memory of all processes that ranks run in, each once.
 fn total_memory(comm: &dyn Communicator) -> Result<Option<u64>, Failure> {
-    let mine = memory::peak_bytes();
-    if !mpi::launched() {
-        return Ok(mine);
-    }
-    let [sum] = comm.all_reduce_sum_u64([mine.unwrap_or(0)])?;
+    let machine = memory::machine().bytes().fold(0, |hash, byte| mix(hash ^ u64::from(byte)));
+    let bytes = memory::peak_bytes().unwrap_or(0);
+    let mut all = comm.all_gather_one([machine, u64::from(std::process::id()), bytes])?;
+    all.sort_unstable();
+    all.dedup_by_key(|[machine, process, _]| [*machine, *process]);
+    let sum: u64 = all.iter().map(|[.., bytes]| bytes).sum();
     Ok((sum > 0).then_some(sum))
 }
 

@@ -21,7 +21,7 @@ pub fn run_repartition(options: &Repartition) -> Result<(), Failure> {
     }
     set_threads(options.threads)?;
     let start = Instant::now();
-    on_ranks(options.parts, |comm| repartition_on(comm, options, start))
+    on_ranks(None, options.parts, |comm| repartition_on(comm, options, start))
 }
 
 /// **Collective.**
