@@ -16,10 +16,10 @@ use tetmill::kernel::random::mix;
 use tetmill::mesh::Names;
 use tetmill::mesh::stream::MeshStream;
 use tetmill::pipeline::input::{self, InputSettings};
+use tetmill::pipeline::part::{Balance, balance};
 use tetmill::pipeline::target::Outcome;
 use tetmill::pipeline::{self, CoarseSettings, Disk, GenerateSettings, Generated, Model, Wanted, generate};
 use tetmill::progress::Progress;
-use tetmill::refine::census;
 use tetmill::report::{LevelReport, MeshReport, PartitionReport, Report};
 use tetmill::size::{Closeness, SizeSettings, file};
 use tetmill::{memory, picture, quality};
@@ -76,9 +76,7 @@ fn method_of(options: &Generate) -> Result<pipeline::Method, Failure> {
     match options.method {
         Method::Refine => Ok(pipeline::Method::Refine),
         Method::Surface => Ok(pipeline::Method::Surface),
-        Method::Decompose => {
-            Err(Failure::input("this version knows the methods `refine` and `surface` only"))
-        }
+        Method::Decompose => Ok(pipeline::Method::Decompose),
     }
 }
 
@@ -107,11 +105,14 @@ fn generate_on(comm: &dyn Communicator, options: &Generate, start: Instant) -> R
     });
     let disk = Some(disk_for(&options.format, &target));
     let method = method_of(options)?;
-    let settings = GenerateSettings { method, coarse, wanted: wanted(options), memory: options.memory, disk };
+    let cuts = pipeline::CutSettings::default();
+    let settings =
+        GenerateSettings { method, cuts, coarse, wanted: wanted(options), memory: options.memory, disk };
     let made = generate(comm, model.as_ref(), &settings, &progress)?;
     let stem = target.join(options.input.files[0].file_stem().unwrap_or("mesh".as_ref()));
-    let written = progress
-        .stage("write", || write_formats(comm, &made.part, &made.names, &options.format, &target, &stem))?;
+    let written = progress.stage("write", || {
+        write_formats(comm, made.part.stream(), &made.names, &options.format, &target, &stem)
+    })?;
     if options.check && options.format.contains(&Format::Elmer) {
         let checked = if first { progress.stage("read back", || check_written(&target)) } else { Ok(()) };
         agree(comm, checked)?;
@@ -120,16 +121,13 @@ fn generate_on(comm: &dyn Communicator, options: &Generate, start: Instant) -> R
         Some(_) if !made.part.keeps_all() => {
             progress.note("note: no picture is drawn of a mesh whose coordinates do not fit the memory")
         }
-        Some(file) => draw(comm, &made.part, options.cut, file)?,
+        Some(file) => draw(comm, made.part.stream(), options.cut, file)?,
         None => {}
     }
-    let partition = (
-        shared_vertices(comm, &made.part)?,
-        [tet_imbalance(comm, &made.part)?, owner_imbalance(comm, &made)?],
-    );
+    let balanced = balance(comm, made.part.stream())?;
     let memory = total_memory(comm)?;
     let Some(model) = model else { return Ok(()) };
-    let mut report = summary(&model, &name_of(&options.input), &made, comm.size(), partition);
+    let mut report = summary(&model, &name_of(&options.input), &made, comm.size(), balanced);
     report.stages = progress.finish();
     report.seconds = start.elapsed().as_secs_f64();
     report.peak_memory = memory;
@@ -267,37 +265,6 @@ fn draw(
     agree(comm, drawn.map_err(Failure::from))
 }
 
-/// **Collective.** Fine vertices in more than one part, each counted by its owner.
-fn shared_vertices(comm: &dyn Communicator, part: &dyn MeshStream) -> Result<u64, Failure> {
-    let mut mine = 0;
-    for index in 0..part.vertex_blocks() {
-        let block = part.vertex_block(index);
-        let owned = |k: u64| tetmill::dist::owner(block.holders, block.first_id + k) == part.rank();
-        if !block.holders.is_empty() {
-            mine += (0..block.local.len() as u64).filter(|&k| owned(k)).count() as u64;
-        }
-    }
-    Ok(comm.all_reduce_sum_u64([mine])?[0])
-}
-
-/// **Collective.** The largest share of its vertices that a part owns, over the mean.
-fn owner_imbalance(comm: &dyn Communicator, made: &Generated) -> Result<f64, Failure> {
-    let share = census(made.part.coarse(), made.part.pieces()).owned_share();
-    let all = comm.all_gather_one(share)?;
-    Ok(imbalance(&all))
-}
-
-/// **Collective.** Tets of the largest part over the mean.
-fn tet_imbalance(comm: &dyn Communicator, part: &dyn MeshStream) -> Result<f64, Failure> {
-    Ok(imbalance(&comm.all_gather_one(part.counts().tets as f64)?))
-}
-
-/// The largest over the mean.
-fn imbalance(all: &[f64]) -> f64 {
-    let mean = all.iter().sum::<f64>() / all.len() as f64;
-    all.iter().copied().fold(0.0, f64::max) / mean
-}
-
 /// **Collective.** Peak memory of all processes that ranks run in, each once.
 fn total_memory(comm: &dyn Communicator) -> Result<Option<u64>, Failure> {
     let machine = memory::machine().bytes().fold(0, |hash, byte| mix(hash ^ u64::from(byte)));
@@ -309,13 +276,7 @@ fn total_memory(comm: &dyn Communicator) -> Result<Option<u64>, Failure> {
     Ok((sum > 0).then_some(sum))
 }
 
-fn summary(
-    model: &Model,
-    input: &str,
-    made: &Generated,
-    ranks: u32,
-    (shared, imbalances): (u64, [f64; 2]),
-) -> Report {
+fn summary(model: &Model, input: &str, made: &Generated, ranks: u32, balance: Balance) -> Report {
     let coarse = made.coarse.as_ref().expect("rank 0 made the coarse mesh");
     Report {
         version: env!("CARGO_PKG_VERSION").into(),
@@ -329,7 +290,7 @@ fn summary(
         wanted: coarse.outcome,
         mesh: MeshReport::new(&made.check, made.checksum.to_string()),
         quality_by_level: made.levels.iter().map(LevelReport::new).collect(),
-        partition: PartitionReport::new(&coarse.partition, shared, imbalances),
+        partition: PartitionReport::new(&coarse.partition, balance),
         periodic: made.periodic,
         skins: made.refused.clone(),
         stages: Vec::new(),
@@ -402,17 +363,19 @@ pub fn run_mesh(options: &MeshFile) -> Result<(), Failure> {
     };
     let settings = GenerateSettings {
         method: pipeline::Method::default(),
+        cuts: pipeline::CutSettings::default(),
         coarse: coarse_settings(&options.size, true)?,
         wanted,
         memory: None,
         disk: None,
     };
     let made = generate(&comm, Some(&model), &settings, &progress)?;
-    let written = progress.stage("write", || io::serial::write(&made.part, &made.names, &options.output))?;
+    let written =
+        progress.stage("write", || io::serial::write(made.part.stream(), &made.names, &options.output))?;
     if let Some(file) = &options.picture {
-        draw(&comm, &made.part, options.cut, file)?;
+        draw(&comm, made.part.stream(), options.cut, file)?;
     }
-    let mut report = summary(&model, &name_of(&options.input), &made, 1, (0, [1.0; 2]));
+    let mut report = summary(&model, &name_of(&options.input), &made, 1, balance(&comm, made.part.stream())?);
     report.stages = progress.finish();
     report.seconds = start.elapsed().as_secs_f64();
     report.peak_memory = memory::peak_bytes();

@@ -3,6 +3,7 @@
 
 pub mod check;
 pub mod comm;
+pub mod decompose;
 pub mod dist;
 pub mod error;
 pub mod facets;

@@ -8,6 +8,7 @@ use crate::memory::sized;
 use crate::partition::Metrics;
 use crate::periodic::Checked;
 use crate::pipeline::generate::Level;
+use crate::pipeline::part::Balance;
 use crate::pipeline::target::Outcome;
 use crate::pipeline::{CoarseReport, Entities, Refused};
 use crate::progress::Stage;
@@ -167,16 +168,16 @@ pub struct PartitionReport {
 }
 
 impl PartitionReport {
-    /// From the metrics of the coarse partition, and the imbalances of fine tets and of owned vertices.
-    pub fn new(metrics: &Metrics, shared_vertices: u64, [imbalance, owner_imbalance]: [f64; 2]) -> Self {
+    /// From the metrics of the coarse partition, and how the fine mesh lies on the ranks.
+    pub fn new(metrics: &Metrics, balance: Balance) -> Self {
         Self {
-            method: metrics.method.to_string(),
+            method: metrics.method.map_or("planes through the geometry".into(), |method| method.to_string()),
             parts: metrics.parts,
-            imbalance,
+            imbalance: balance.tets,
             edge_cut: metrics.edge_cut as u64,
             pieces: metrics.pieces as u64,
-            shared_vertices,
-            owner_imbalance,
+            shared_vertices: balance.shared_vertices,
+            owner_imbalance: balance.owned,
         }
     }
 }

@@ -316,7 +316,7 @@ fn description(
     holders: &[Rank],
     about: impl Iterator<Item = u64>,
 ) -> Vec<u64> {
-    let [class_kind, class_id] = super::piece::code(class);
+    let [class_kind, class_id] = class.code();
     let mut words = vec![kind, id, u64::from(class_kind), u64::from(class_id)];
     words.extend(about);
     words.extend(holders.iter().map(|&rank| u64::from(rank)));

@@ -10,7 +10,7 @@ use crate::Point;
 use crate::comm::pack::{put, take};
 use crate::mesh::topology::{self, Edges, Faces};
 use crate::mesh::{Class, FaceId, GlobalId, Rank, TetId, VertexId};
-use csg::{BodyId, CornerId, CurveId, PatchId};
+use csg::{BodyId, PatchId};
 
 /// Entities of one kind: global ids ascending, classes, and holders of the shared ones by local id.
 #[derive(Default)]
@@ -36,31 +36,10 @@ pub(super) struct Piece {
     pub triangles: Vec<Triangle>,
 }
 
-/// A class as two numbers: its kind and its id.
-pub(super) fn code(class: Class) -> [u32; 2] {
-    match class {
-        Class::Corner(id) => [0, id.0],
-        Class::Curve(id) => [1, id.0],
-        Class::Patch(id) => [2, id.0],
-        Class::Body(id) => [3, id.0],
-    }
-}
-
-/// The inverse of [`code`].
-fn class([kind, id]: [u32; 2]) -> Class {
-    match kind {
-        0 => Class::Corner(CornerId(id)),
-        1 => Class::Curve(CurveId(id)),
-        2 => Class::Patch(PatchId(id)),
-        3 => Class::Body(BodyId(id)),
-        _ => panic!("{kind} is no kind of geometric entity"),
-    }
-}
-
 impl Entities {
     fn put(&self, message: &mut Vec<u8>) {
         put(message, &self.ids);
-        put(message, &self.classes.iter().map(|&class| code(class)).collect::<Vec<_>>());
+        put(message, &self.classes.iter().map(|&class| class.code()).collect::<Vec<_>>());
         put(message, &self.shared.ids);
         put(message, &self.shared.offsets);
         put(message, &self.shared.holders);
@@ -69,7 +48,7 @@ impl Entities {
     fn take(message: &mut &[u8]) -> Self {
         Self {
             ids: take(message),
-            classes: take(message).into_iter().map(class).collect(),
+            classes: take(message).into_iter().map(Class::decode).collect(),
             shared: Shared { ids: take(message), offsets: take(message), holders: take(message) },
         }
     }

@@ -30,6 +30,29 @@ pub enum Class {
     Body(BodyId),
 }
 
+impl Class {
+    /// As two numbers for messages: its kind and its id.
+    pub(crate) fn code(self) -> [u32; 2] {
+        match self {
+            Self::Corner(id) => [0, id.0],
+            Self::Curve(id) => [1, id.0],
+            Self::Patch(id) => [2, id.0],
+            Self::Body(id) => [3, id.0],
+        }
+    }
+
+    /// The inverse of [`code`](Self::code).
+    pub(crate) fn decode([kind, id]: [u32; 2]) -> Self {
+        match kind {
+            0 => Self::Corner(CornerId(id)),
+            1 => Self::Curve(CurveId(id)),
+            2 => Self::Patch(PatchId(id)),
+            3 => Self::Body(BodyId(id)),
+            _ => panic!("{kind} is no kind of geometric entity"),
+        }
+    }
+}
+
 /// A triangle of the mesh that lies on a patch.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct BoundaryTriangle {

@@ -9,7 +9,7 @@
 use crate::comm::pack::{put_ascending, put_varint, take_ascending, take_varint};
 use crate::dist::{BareMesh, LaidEdge, Side};
 use crate::mesh::{Class, GlobalId, Rank, TET_EDGES, TetId, VertexId};
-use csg::{BodyId, CornerId, CurveId, PatchId};
+use csg::{BodyId, PatchId};
 
 /// What a vertex is to the tets that stay, and to those that leave.
 const STAYS: u8 = 1;
@@ -158,24 +158,13 @@ fn kept_edges(mesh: &BareMesh, stays: &[bool], flags: &mut [u8], leaving: &[u32]
 
 /// A class as one number.
 fn code(class: Class) -> u64 {
-    let (kind, id) = match class {
-        Class::Corner(id) => (0, id.0),
-        Class::Curve(id) => (1, id.0),
-        Class::Patch(id) => (2, id.0),
-        Class::Body(id) => (3, id.0),
-    };
-    u64::from(id) << 2 | kind
+    let [kind, id] = class.code();
+    u64::from(id) << 2 | u64::from(kind)
 }
 
 /// The inverse of [`code`].
 fn class(code: u64) -> Class {
-    let id = (code >> 2) as u32;
-    match code & 3 {
-        0 => Class::Corner(CornerId(id)),
-        1 => Class::Curve(CurveId(id)),
-        2 => Class::Patch(PatchId(id)),
-        _ => Class::Body(BodyId(id)),
-    }
+    Class::decode([(code & 3) as u32, (code >> 2) as u32])
 }
 
 /// How many bytes a place among `vertices` takes.

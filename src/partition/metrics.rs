@@ -9,8 +9,8 @@ use std::collections::BinaryHeap;
 /// How good a partition is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Metrics {
-    /// How it was made.
-    pub method: Method,
+    /// How it was made, if by a partitioner.
+    pub method: Option<Method>,
     /// The number of parts.
     pub parts: u32,
     /// Tets in the smallest part.
@@ -28,7 +28,7 @@ pub struct Metrics {
 }
 
 /// Measures a partition.
-pub fn measure(dual: &Dual, part: &[Rank], parts: u32, method: Method, repaired: usize) -> Metrics {
+pub fn measure(dual: &Dual, part: &[Rank], parts: u32, method: Option<Method>, repaired: usize) -> Metrics {
     let sizes = sizes(part, parts);
     let cut = |tet: usize| dual.of(tet).iter().filter(|&&other| part[other as usize] != part[tet]).count();
     let largest = sizes.iter().copied().max().unwrap_or(0);

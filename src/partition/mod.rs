@@ -129,8 +129,16 @@ pub fn partition(
         Method::Coordinates => rcb::bisect(mesh, parts),
     };
     let repaired = metrics::fill_empty_parts(&dual, &mut part, parts);
-    let metrics = metrics::measure(&dual, &part, parts, settings.method, repaired);
+    let metrics = metrics::measure(&dual, &part, parts, Some(settings.method), repaired);
     Ok((part, metrics))
+}
+
+/// Measures a partition that was made otherwise.
+///
+/// # Errors
+/// A mesh with a face of three tets.
+pub fn assess(mesh: &Mesh, part: &[Rank], parts: u32) -> Result<Metrics, PartitionError> {
+    Ok(metrics::measure(&dual_of(mesh)?, part, parts, None, 0))
 }
 
 /// The dual graph of a mesh.

@@ -49,10 +49,10 @@ fn images_are_where_the_motions_put_them_at_every_level_and_on_every_rank() {
         let mut ids_of_pairs = Vec::new();
         for (ranks, levels) in [(1, 0), (1, 2), (3, 2)] {
             let parts = made(&model, ranks, levels);
-            assert_eq!(parts[0].part.links().len(), links, "{name}");
+            assert_eq!(parts[0].part.stream().links().len(), links, "{name}");
             let mut pairs = Vec::new();
             for Generated { part, periodic, .. } in &parts {
-                let checked = periodic.expect("faces are periodic");
+                let (part, checked) = (part.stream(), periodic.expect("faces are periodic"));
                 assert!(checked.lost == 0 && checked.furthest < 1e-14, "{name}: {checked:?}");
                 for index in 0..links {
                     let ids =
@@ -72,7 +72,7 @@ fn images_are_where_the_motions_put_them_at_every_level_and_on_every_rank() {
 #[test]
 fn all_corners_of_a_cell_are_one_vertex_in_the_end() {
     let parts = made(&model("unit_cell"), 1, 1);
-    let part = &parts[0].part;
+    let part = parts[0].part.stream();
     let origins = part.origins();
     let corner = |p: &[f64; 3]| p.iter().all(|&x| x == 0.0 || x == 1.0);
     let mut first: Vec<u64> =
@@ -109,7 +109,7 @@ fn a_mesh_that_is_fine_at_one_face_is_fine_at_its_image() {
     let progress = Progress::new(true, 5);
     let on_first = |sources: &[Source]| {
         let made = generate(&alone, Some(&model_of(source)), &settings(0, sources), &progress).unwrap();
-        made.part.points().iter().filter(|p| p[0] == 0.0).count()
+        made.part.stream().points().iter().filter(|p| p[0] == 0.0).count()
     };
     assert!(on_first(&fine) > 5 * on_first(&[]));
 }
@@ -141,12 +141,12 @@ fn gmsh_and_netgen_files_hold_the_pairs() {
     let dir = tempfile::tempdir().unwrap();
     let read = |name: &str| {
         let path = dir.path().join(name);
-        serial::write(&generated.part, &generated.names, &path).unwrap();
+        serial::write(generated.part.stream(), &generated.names, &path).unwrap();
         std::fs::read_to_string(path).unwrap()
     };
-    let points = generated.part.points();
+    let points = generated.part.stream().points();
     let point = |number: f64| Point::from(points[number as usize - 1]);
-    let motion = generated.part.links()[0].motion;
+    let motion = generated.part.stream().links()[0].motion;
     let gmsh = block(&read("m.msh"), "$Periodic", "$EndPeriodic");
     // One link: its tags, the matrix, the number of pairs, the pairs.
     assert_eq!((gmsh[0][0], gmsh[1][0], gmsh[2].len()), (1.0, 2.0, 16));
@@ -172,9 +172,9 @@ fn elmers_companion_file_pairs_its_own_numbers() {
     let run = |comm: &dyn crate::comm::Communicator| {
         let given = (comm.rank() == 0).then_some(&model);
         let made = generate(comm, given, &settings(1, &[]), &Progress::new(true, 5)).unwrap();
-        crate::io::elmer::write(comm, &made.part, &made.names, dir.path()).unwrap();
+        crate::io::elmer::write(comm, made.part.stream(), &made.names, dir.path()).unwrap();
         let motions: Vec<_> =
-            made.part.links().iter().map(|link| (link.identification, link.motion)).collect();
+            made.part.stream().links().iter().map(|link| (link.identification, link.motion)).collect();
         motions
     };
     let motions = thread::run(3, run).unwrap().remove(0);
@@ -223,12 +223,12 @@ fn netgen_files_hold_singular_points_and_faces() {
     let generated = made(&model_of(source), 1, 1).remove(0);
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("m.vol");
-    serial::write(&generated.part, &generated.names, &path).unwrap();
+    serial::write(generated.part.stream(), &generated.names, &path).unwrap();
     let text = std::fs::read_to_string(&path).unwrap();
     let points = block(&text, "singular_points\n", "singular_face_inside");
     let [count, point] = &points[..] else { panic!("{points:?}") };
     assert_eq!((count[0], point[1]), (1.0, 2.0));
-    assert_eq!(generated.part.points()[point[0] as usize - 1], [1.0, 0.0, 1.0]);
+    assert_eq!(generated.part.stream().points()[point[0] as usize - 1], [1.0, 0.0, 1.0]);
     assert!(block(&text, "singular_face_outside\n", "materials")[1][1] == 3.0);
 }
 

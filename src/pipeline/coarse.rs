@@ -131,7 +131,7 @@ pub struct CoarseMesh {
 
 /// Times the sizes are lowered where curves or surfaces come too near each other, before the mesher
 /// gives up: each divides them by 1.7 or so, so that gaps of a thousandth of the size are still met.
-const MOST_CORRECTIONS: u64 = 14;
+pub(super) const MOST_CORRECTIONS: u64 = 14;
 
 /// A place that failed asks for this fraction of the size there.
 const LOWERED: f64 = 0.6;

@@ -1,8 +1,10 @@
 //! Methods 2 and 3 on all ranks: a coarse mesh, partitioned, distributed, refined or meshed anew inside its refined skins, checked.
 
 use super::coarse::{CoarseMesh, CoarseReport, CoarseSettings};
+use super::decompose::{self, CutSettings};
 use super::mend;
 use super::model::Model;
+use super::part::Part;
 use super::room::{self, Disk};
 use super::skins::{self, Refused};
 use super::target::Outcome;
@@ -13,7 +15,9 @@ use crate::dist::{self, DistMesh};
 use crate::error::{Failure, Status, agree};
 use crate::geometry::Projector;
 use crate::improve::Effort;
+use crate::mesh::stream::MeshStream;
 use crate::mesh::{GlobalId, Mesh, Names, Rank};
+use crate::migrate::BareStream;
 use crate::partition::{self, Metrics};
 use crate::periodic::{self, PeriodicMap};
 use crate::progress::Progress;
@@ -28,6 +32,8 @@ pub enum Method {
     Refine,
     /// Their skins are, and each is meshed inside (the third).
     Surface,
+    /// The geometry itself is cut, and each piece is meshed (the first).
+    Decompose,
 }
 
 /// What is to be made.
@@ -35,6 +41,8 @@ pub enum Method {
 pub struct GenerateSettings {
     /// What becomes of the coarse mesh.
     pub method: Method,
+    /// How the geometry is cut, by [`Method::Decompose`].
+    pub cuts: CutSettings,
     /// How the coarse mesh is made.
     pub coarse: CoarseSettings,
     /// How many tets.
@@ -64,7 +72,7 @@ pub struct CoarseResult {
 #[derive(Debug)]
 pub struct Generated {
     /// This rank's part.
-    pub part: RefinedMesh,
+    pub part: Part,
     /// Pieces that each coarse edge was cut into.
     pub pieces: u32,
     /// The shapes of the tets of each level of refinement, from the coarse mesh to the last: the same on all ranks.
@@ -108,6 +116,9 @@ pub fn generate(
     settings: &GenerateSettings,
     progress: &Progress,
 ) -> Result<Generated, Failure> {
+    if settings.method == Method::Decompose {
+        return decomposed(comm, model, settings, progress);
+    }
     let mut sources: Vec<Source> = Vec::new();
     for round in 0.. {
         let made = model.map(|model| coarse_mesh(comm.size(), model, settings, &sources, progress));
@@ -153,6 +164,7 @@ pub fn generate(
             made
         });
         let refused = None;
+        let part = Part::Refined(Box::new(part));
         return Ok(Generated { part, pieces, levels, names, check, checksum, periodic, refused, coarse });
     }
     unreachable!("the loop ends by itself")
@@ -183,11 +195,42 @@ fn fill(
     let effort = settings.coarse.effort.unwrap_or(Effort::Standard);
     let (part, refused) =
         skins::mesh_skins(comm, &dist, &projector, pieces, sizes.as_deref(), effort, progress)?;
+    stored(comm, part, Whole { names, projector, pieces, coarse, refused: Some(refused) }, progress)
+}
+
+/// **Collective.** Meshes the pieces that the geometry is cut into.
+fn decomposed(
+    comm: &dyn Communicator,
+    model: Option<&Model>,
+    settings: &GenerateSettings,
+    progress: &Progress,
+) -> Result<Generated, Failure> {
+    let (names, projector) = broadcast_geometry(comm, model)?;
+    let (part, pieces, coarse) = decompose::mesh_pieces(comm, model, settings, progress)?;
+    stored(comm, part, Whole { names, projector, pieces, coarse, refused: None }, progress)
+}
+
+/// What goes with parts that were meshed each on its own.
+struct Whole {
+    names: Names,
+    projector: Projector,
+    pieces: u32,
+    coarse: Option<CoarseResult>,
+    refused: Option<Refused>,
+}
+
+/// **Collective.** Checks parts that were meshed each on its own.
+fn stored(
+    comm: &dyn Communicator,
+    part: BareStream,
+    whole: Whole,
+    progress: &Progress,
+) -> Result<Generated, Failure> {
+    let Whole { names, projector, pieces, coarse, refused } = whole;
     let (check, checksum) = progress.stage("check", || verdict(comm, &part, &projector))?;
     let level = check.shape.clone().map(|shape| Level { pieces, tets: check.tets, shape });
-    let levels = level.into_iter().collect();
-    let (periodic, refused) = (None, Some(refused));
-    Ok(Generated { part, pieces, levels, names, check, checksum, periodic, refused, coarse })
+    let (levels, part) = (level.into_iter().collect(), Part::Stored(Box::new(part)));
+    Ok(Generated { part, pieces, levels, names, check, checksum, periodic: None, refused, coarse })
 }
 
 /// Asks for smaller sizes around coarse tets with inverted children, on the rank that has them.
@@ -319,7 +362,7 @@ fn inverted_anywhere(
 /// **Collective.** Checks every child, every boundary vertex and every face between tets.
 fn verdict(
     comm: &dyn Communicator,
-    part: &RefinedMesh,
+    part: &dyn MeshStream,
     projector: &Projector,
 ) -> Result<(PartReport, Checksum), Failure> {
     let report = check::check(comm, part, Some(projector), &check::Settings::default())?;

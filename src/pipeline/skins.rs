@@ -3,12 +3,13 @@
 use super::generate::{CoarseResult, GenerateSettings};
 use super::model::Model;
 use crate::comm::Communicator;
-use crate::dist::{DistMesh, settle};
-use crate::error::{Failure, Status, agree};
+use crate::dist::DistMesh;
+use crate::error::{Failure, agree};
 use crate::geometry::Projector;
 use crate::improve::{self, Effort};
+use crate::migrate::BareStream;
 use crate::progress::Progress;
-use crate::refine::{self, RefinedMesh, refine};
+use crate::refine;
 use crate::skin::{self, Filled, PartSizes};
 
 /// Fills the skins of all parts; coarse edges are cut into `pieces`, and tets inside are as much smaller than the coarse sizes.
@@ -23,21 +24,18 @@ pub(super) fn mesh_skins(
     sizes: Option<&[f64]>,
     effort: Effort,
     progress: &Progress,
-) -> Result<(RefinedMesh, Refused), Failure> {
-    let sizes = PartSizes::new(dist, skin::scatter(comm, dist, sizes)?);
+) -> Result<(BareStream, Refused), Failure> {
+    let sizes = PartSizes::new(dist.points.clone(), dist.tets.clone(), skin::scatter(comm, dist, sizes)?);
     let made = progress.stage("fill", || {
         let skin = skin::skin(dist, projector, pieces)?;
-        let filled = skin::fill(dist, projector, &skin, &sizes, &improve::Settings::of(effort))?;
+        let filled = skin::fill_or_refine(dist, projector, &skin, &sizes, &improve::Settings::of(effort))?;
         Ok((skin, filled))
     });
     let (skin, filled) = agree(comm, made.map_err(|error: refine::RefineError| Failure::from(error)))?;
     let refused = Refused::gather(comm, &filled)?;
-    let settled = progress.stage("number", || {
-        let bare = skin::number(comm, dist, skin, filled)?;
-        settle(comm, bare).map_err(|error| Failure::new(Status::NoValidMesh, error))
-    })?;
-    let whole = refine(settled, projector, 1, &refine::Settings::default());
-    Ok((agree(comm, whole.map_err(Failure::from))?, refused))
+    let boundary = skin.numbering.totals().boundary;
+    let bare = progress.stage("number", || skin::number(comm, skin.skin, filled, boundary))?;
+    Ok((BareStream::new(bare), refused))
 }
 
 /// Refuses geometries with periodic faces, on the rank that has one.

@@ -1,9 +1,9 @@
 //! The skin of a part: its faces that lie on a patch or have one tet of the part, with the lattice on them.
 
 use crate::Point;
-use crate::dist::DistMesh;
+use crate::dist::{DistMesh, Shared};
 use crate::geometry::Projector;
-use crate::mesh::{Class, FaceId, TetId};
+use crate::mesh::{Class, FaceId, GlobalId, TetId};
 use crate::refine::numbering::Numbering;
 use crate::refine::snap::boundary_first;
 use crate::refine::{Keep, RefineError, Settings};
@@ -22,14 +22,13 @@ pub struct SkinTriangle {
 
 /// What bounds a part: closed, and the same triangle for triangle and bit for bit on both sides of an interface.
 ///
-/// Vertices are those of triangles, then those inside that are to be kept (points and curves inside bodies); both in the order of the
-/// lattice.
-#[derive(Clone, Debug)]
+/// Vertices are those of triangles, then those inside that are to be kept (points and curves inside bodies).
+#[derive(Clone, Debug, Default)]
 pub struct Skin {
-    /// How the lattice of the whole part is numbered.
-    pub numbering: Numbering,
-    /// The lattice vertex that each vertex is.
-    pub lattice: Vec<u32>,
+    /// The name of each vertex that all its holders know.
+    pub names: Vec<GlobalId>,
+    /// Vertices that several ranks hold.
+    pub shared: Shared,
     /// Vertices of triangles; those from here on are inside.
     pub on_triangles: usize,
     /// Coordinates.
@@ -38,8 +37,19 @@ pub struct Skin {
     pub classes: Vec<Class>,
     /// The triangles.
     pub triangles: Vec<SkinTriangle>,
-    /// Pieces of coarse edges that lie on curves and patches, and what they lie on.
+    /// Edges that lie on curves and patches, and what they lie on; those of triangles on patches may be missing.
     pub edges: Vec<([u32; 2], Class)>,
+}
+
+/// The skin of a part of a coarse mesh, and the lattice that it is part of; vertices of triangles, and those inside, ascend in the lattice.
+#[derive(Clone, Debug)]
+pub struct LatticeSkin {
+    /// The skin.
+    pub skin: Skin,
+    /// How the lattice of the whole part is numbered.
+    pub numbering: Numbering,
+    /// The lattice vertex that each vertex of the skin is.
+    pub lattice: Vec<u32>,
 }
 
 /// No tet, no vertex.
@@ -49,7 +59,7 @@ const NONE: u32 = u32::MAX;
 ///
 /// # Errors
 /// Vertices that cannot be snapped, and memory, as [`refine`](crate::refine::refine()).
-pub fn skin(mesh: &DistMesh, projector: &Projector, n: u32) -> Result<Skin, RefineError> {
+pub fn skin(mesh: &DistMesh, projector: &Projector, n: u32) -> Result<LatticeSkin, RefineError> {
     let numbering = Numbering::new(mesh, n)?;
     let settings = Settings { keep: Keep::Boundary, ..Settings::default() };
     let coordinates = boundary_first(mesh, projector, &numbering, &settings)?;
@@ -73,15 +83,18 @@ pub fn skin(mesh: &DistMesh, projector: &Projector, n: u32) -> Result<Skin, Refi
     let renumbered = |v: u32| place[v as usize];
     triangles.iter_mut().for_each(|t| t.vertices = t.vertices.map(renumbered));
     edges.iter_mut().for_each(|(ends, _)| *ends = ends.map(renumbered));
-    Ok(Skin {
-        points: lattice.iter().map(|&v| coordinates[v as usize].into()).collect(),
-        classes: lattice.iter().map(|&v| numbering.locate(v).0.class(mesh)).collect(),
-        numbering,
-        lattice,
-        on_triangles,
-        triangles,
-        edges,
-    })
+    let mut skin = Skin { on_triangles, triangles, edges, ..Skin::default() };
+    for (new, &v) in (0..).zip(&lattice) {
+        let (entity, within) = numbering.locate(v);
+        skin.names.push(numbering.first_id_in(mesh, entity) + u64::from(within));
+        skin.points.push(coordinates[v as usize].into());
+        skin.classes.push(entity.class(mesh));
+        let holders = entity.holders(mesh);
+        if !holders.is_empty() {
+            skin.shared.push(new, holders.iter().copied());
+        }
+    }
+    Ok(LatticeSkin { skin, numbering, lattice })
 }
 
 impl Skin {

@@ -1,7 +1,6 @@
 //! Tets inside a skin.
 
-use super::Skin;
-use super::extract::SkinTriangle;
+use super::{LatticeSkin, Skin, SkinTriangle};
 use crate::dist::DistMesh;
 use crate::geometry::Projector;
 use crate::improve::{self, improve};
@@ -25,22 +24,18 @@ pub struct Filled {
     pub refused: Option<String>,
 }
 
-/// *Local.* Meshes the inside of a skin by a size field, and improves it. A skin that the volume mesher refuses is filled by the tets of
-/// the lattice.
+/// *Local.* [`fill`], or where the volume mesher refuses a skin, the tets of the lattice.
 ///
 /// # Errors
 /// Only where the lattice is not valid either.
-pub fn fill(
+pub fn fill_or_refine(
     mesh: &DistMesh,
     projector: &Projector,
-    skin: &Skin,
+    skin: &LatticeSkin,
     size: &dyn SizeField,
     settings: &improve::Settings,
 ) -> Result<Filled, RefineError> {
-    if skin.triangles.is_empty() {
-        return Ok(Filled::default());
-    }
-    match fill_freely(skin, size, settings) {
+    match fill(&skin.skin, size, settings) {
         Ok(filled) => Ok(filled),
         Err(refused) => {
             let filled = fill_by_lattice(mesh, projector, skin)?;
@@ -49,7 +44,14 @@ pub fn fill(
     }
 }
 
-fn fill_freely(skin: &Skin, size: &dyn SizeField, settings: &improve::Settings) -> Result<Filled, String> {
+/// *Local.* Meshes the inside of a skin by a size field, and improves it.
+///
+/// # Errors
+/// What the volume mesher refuses, in words.
+pub fn fill(skin: &Skin, size: &dyn SizeField, settings: &improve::Settings) -> Result<Filled, String> {
+    if skin.triangles.is_empty() {
+        return Ok(Filled::default());
+    }
     let (on_triangles, inside) = skin.points.split_at(skin.on_triangles);
     let corners = skin.triangles.iter().map(|t| t.vertices).collect();
     let beside = skin.triangles.iter().map(|t| t.beside).collect();
@@ -89,12 +91,16 @@ fn fill_freely(skin: &Skin, size: &dyn SizeField, settings: &improve::Settings) 
 }
 
 /// The tets of the lattice.
-fn fill_by_lattice(mesh: &DistMesh, projector: &Projector, skin: &Skin) -> Result<Filled, RefineError> {
+fn fill_by_lattice(
+    mesh: &DistMesh,
+    projector: &Projector,
+    skin: &LatticeSkin,
+) -> Result<Filled, RefineError> {
     const NONE: u32 = u32::MAX;
-    let pieces = skin.numbering.lattice().n();
-    let refined = refine(mesh.clone(), projector, pieces, &refine::Settings::default())?;
-    let mut place = vec![NONE; skin.numbering.vertices() as usize];
-    (0..).zip(&skin.lattice).for_each(|(new, &v)| place[v as usize] = new);
+    let LatticeSkin { skin, numbering, lattice } = skin;
+    let refined = refine(mesh.clone(), projector, numbering.lattice().n(), &refine::Settings::default())?;
+    let mut place = vec![NONE; numbering.vertices() as usize];
+    (0..).zip(lattice).for_each(|(new, &v)| place[v as usize] = new);
     let mut filled = Filled::default();
     for (v, new) in place.iter_mut().enumerate().filter(|(_, new)| **new == NONE) {
         *new = (skin.points.len() + filled.inside.len()) as u32;

@@ -21,7 +21,7 @@ mod sizes;
 #[cfg(test)]
 mod tests;
 
-pub use extract::{Skin, SkinTriangle, skin};
-pub use fill::{Filled, fill};
+pub use extract::{LatticeSkin, Skin, SkinTriangle, skin};
+pub use fill::{Filled, fill, fill_or_refine};
 pub use number::number;
 pub use sizes::{PartSizes, at_vertices, scatter};

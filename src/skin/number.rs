@@ -1,65 +1,62 @@
 //! Global ids for parts that were meshed each on its own.
 //!
-//! A vertex of a skin has a name that all its holders know: its global id in the lattice of the whole mesh, of which the inside is now gone.
+//! A vertex of a skin has a name that all its holders know: in Method 3 its global id in the lattice of the whole mesh, of which the inside is
+//! now gone, in Method 1 its place in the surface mesh.
 //! Its owner numbers it anew, without gaps, and tells the other holders: one scan, one exchange.
 
 use super::{Filled, Skin};
 use crate::comm::pack::{put_ascending, put_varint, take_ascending, take_varint};
 use crate::comm::{CommError, Communicator};
-use crate::dist::{BareMesh, DistMesh, LaidEdge, Side, owner};
+use crate::dist::{BareMesh, LaidEdge, Side, owner};
 use crate::kernel::simplex::from_lowest;
 use crate::mesh::stream::Counts;
 use crate::mesh::{Class, GlobalId, Rank, TET_FACES, TetId, VertexId};
-use crate::refine::numbering::fine_totals;
 use std::collections::HashMap;
 
-/// **Collective.** The part of the whole mesh that the tets inside a skin are.
+/// **Collective.** The part of the whole mesh that the tets inside a skin are; `boundary` is the number of triangles on patches of all.
 ///
 /// # Errors
 /// What the ranks cannot say.
 pub fn number(
     comm: &dyn Communicator,
-    mesh: &DistMesh,
     skin: Skin,
     filled: Filled,
+    boundary: u64,
 ) -> Result<BareMesh, CommError> {
-    let names = Names::of(mesh, &skin);
+    let names = Names::of(&skin, comm.rank());
     let vertices = (names.owned.iter().filter(|owned| **owned).count() + filled.inside.len()) as u64;
     let counts = [vertices, filled.tets.len() as u64];
     let first = comm.exclusive_scan(counts)?;
     let [vertices, tets] = comm.all_reduce_sum_u64(counts)?;
-    let totals = Counts { vertices, tets, ..fine_totals(&mesh.totals, skin.numbering.lattice()) };
 
     let (mut ids, next) = names.number(first[0]);
-    let heard = comm.exchange_bytes(names.letters(mesh.rank, &ids))?;
+    let heard = comm.exchange_bytes(names.letters(comm.rank(), &ids))?;
     names.hear(&heard, &mut ids);
     ids.extend((next..).take(filled.inside.len()));
-    Ok(assemble(mesh, skin, &names, filled, ids, first[1], totals))
+    let part = BareMesh {
+        rank: comm.rank(),
+        ranks: comm.size(),
+        totals: Counts { vertices, tets, boundary },
+        tet_ids: (first[1]..).take(filled.tets.len()).collect(),
+        ..BareMesh::default()
+    };
+    Ok(assemble(part, &skin, filled, ids))
 }
 
 /// The vertices of a skin as all their holders know them.
 struct Names<'a> {
-    /// Global ids in the lattice.
-    names: Vec<GlobalId>,
-    /// The holders where there are several, else none.
-    holders: Vec<&'a [Rank]>,
+    skin: &'a Skin,
     /// Whether this rank owns them.
     owned: Vec<bool>,
 }
 
 impl<'a> Names<'a> {
-    fn of(mesh: &'a DistMesh, skin: &Skin) -> Self {
-        let name = |&v: &u32| {
-            let (entity, within) = skin.numbering.locate(v);
-            skin.numbering.first_id_in(mesh, entity) + u64::from(within)
-        };
-        let names: Vec<GlobalId> = skin.lattice.iter().map(name).collect();
-        let holders: Vec<&[Rank]> =
-            skin.lattice.iter().map(|&v| skin.numbering.locate(v).0.holders(mesh)).collect();
-        let is_owned =
-            |(holders, &name): (&&[Rank], _)| holders.is_empty() || owner(holders, name) == mesh.rank;
-        let owned = holders.iter().zip(&names).map(is_owned).collect();
-        Self { names, holders, owned }
+    fn of(skin: &'a Skin, rank: Rank) -> Self {
+        let mut owned = vec![true; skin.names.len()];
+        for (v, holders) in skin.shared.iter() {
+            owned[v as usize] = owner(holders, skin.names[v as usize]) == rank;
+        }
+        Self { skin, owned }
     }
 
     /// Numbers the vertices that this rank owns from `first` on; the others have none yet. Also the first number that is left.
@@ -77,10 +74,10 @@ impl<'a> Names<'a> {
     /// To each other holder of owned vertices: how many, their names, their numbers, both ascending.
     fn letters(&self, rank: Rank, ids: &[GlobalId]) -> Vec<(Rank, Vec<u8>)> {
         let mut told: Vec<(Rank, GlobalId, GlobalId)> = Vec::new();
-        for (v, holders) in self.holders.iter().enumerate() {
+        for (v, holders) in self.skin.shared.iter().map(|(v, holders)| (v as usize, holders)) {
             if self.owned[v] {
                 let others = holders.iter().filter(|&&holder| holder != rank);
-                told.extend(others.map(|&holder| (holder, self.names[v], ids[v])));
+                told.extend(others.map(|&holder| (holder, self.skin.names[v], ids[v])));
             }
         }
         told.sort_unstable();
@@ -96,7 +93,7 @@ impl<'a> Names<'a> {
 
     /// Takes the numbers that owners tell.
     fn hear(&self, letters: &[(Rank, Vec<u8>)], ids: &mut [GlobalId]) {
-        let mut by_name: Vec<(GlobalId, usize)> = self.names.iter().copied().zip(0..).collect();
+        let mut by_name: Vec<(GlobalId, usize)> = self.skin.names.iter().copied().zip(0..).collect();
         by_name.sort_unstable();
         for (_, letter) in letters {
             let mut letter = &letter[..];
@@ -111,22 +108,13 @@ impl<'a> Names<'a> {
 }
 
 /// The part with its vertices in the order of their ids.
-fn assemble(
-    mesh: &DistMesh,
-    skin: Skin,
-    names: &Names,
-    filled: Filled,
-    ids: Vec<GlobalId>,
-    first_tet: GlobalId,
-    totals: Counts,
-) -> BareMesh {
+fn assemble(mut part: BareMesh, skin: &Skin, filled: Filled, ids: Vec<GlobalId>) -> BareMesh {
     let mut order: Vec<usize> = (0..ids.len()).collect();
     order.sort_unstable_by_key(|&v| ids[v]);
     let mut place = vec![VertexId(0); ids.len()];
     (0..).zip(&order).for_each(|(new, &old)| place[old] = VertexId(new));
-    let bodies = bodies_inside(&skin, &filled);
+    let bodies = bodies_inside(skin, &filled);
 
-    let mut part = BareMesh { rank: mesh.rank, ranks: mesh.ranks, totals, ..BareMesh::default() };
     let on_skin = skin.points.len();
     for &old in &order {
         part.vertex_ids.push(ids[old]);
@@ -134,8 +122,8 @@ fn assemble(
             let p = skin.points[old];
             part.points.push([p.x, p.y, p.z]);
             part.vertex_classes.push(skin.classes[old]);
-            if !names.holders[old].is_empty() {
-                part.shared.push(place[old].0, names.holders[old].iter().copied());
+            if let Some(holders) = skin.shared.holders_of(old as u32) {
+                part.shared.push(place[old].0, holders.iter().copied());
             }
         } else {
             part.points.push(filled.inside[old - on_skin]);
@@ -143,9 +131,8 @@ fn assemble(
         }
     }
     part.tets = filled.tets.iter().map(|tet| tet.map(|v| place[v as usize])).collect();
-    part.tet_ids = (first_tet..).take(filled.tets.len()).collect();
-    part.sides = sides(&skin, &filled);
-    part.edges = laid_edges(&skin, &place);
+    part.sides = sides(skin, &filled);
+    part.edges = laid_edges(skin, &place);
     part.tet_bodies = filled.bodies;
     part
 }

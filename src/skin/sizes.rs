@@ -10,8 +10,9 @@ use crate::{Point, Vector};
 use csg::Aabb;
 
 /// The sizes of a part, in the coarse mesh that it was.
-pub struct PartSizes<'a> {
-    mesh: &'a DistMesh,
+pub struct PartSizes {
+    points: Vec<Point>,
+    coarse: Vec<[VertexId; 4]>,
     /// By vertex.
     sizes: Vec<f64>,
     /// By tet.
@@ -41,23 +42,23 @@ impl Weights {
     }
 }
 
-impl<'a> PartSizes<'a> {
-    /// From the size wanted at each vertex of the part.
-    pub fn new(mesh: &'a DistMesh, sizes: Vec<f64>) -> Self {
-        let corners = |tet: &[VertexId; 4]| tet.map(|v| mesh.points[v.index()]);
-        let boxes: Vec<Aabb> = mesh.tets.iter().map(|tet| bounds(&corners(tet))).collect();
-        let weights = mesh.tets.iter().map(|tet| Weights::of(&corners(tet))).collect();
-        Self { mesh, sizes, weights, tets: Tree::new(&boxes) }
+impl PartSizes {
+    /// From the coarse tets, and the size wanted at each of their vertices.
+    pub fn new(points: Vec<Point>, coarse: Vec<[VertexId; 4]>, sizes: Vec<f64>) -> Self {
+        let corners = |tet: &[VertexId; 4]| tet.map(|v| points[v.index()]);
+        let boxes: Vec<Aabb> = coarse.iter().map(|tet| bounds(&corners(tet))).collect();
+        let weights = coarse.iter().map(|tet| Weights::of(&corners(tet))).collect();
+        Self { weights, tets: Tree::new(&boxes), points, coarse, sizes }
     }
 
     fn squared_distance(&self, point: &Point, tet: u32) -> f64 {
-        let corners = self.mesh.tets[tet as usize].map(|v| self.mesh.points[v.index()]);
+        let corners = self.coarse[tet as usize].map(|v| self.points[v.index()]);
         let to_face = |face: [usize; 3]| squared_distance(point, face.map(|k| &corners[k]));
         TET_FACES.map(to_face).into_iter().fold(f64::INFINITY, f64::min)
     }
 }
 
-impl SizeField for PartSizes<'_> {
+impl SizeField for PartSizes {
     fn size_at(&self, point: &Point) -> f64 {
         let is_inside = |tet: u32| self.weights[tet as usize].at(point).iter().all(|&w| w >= 0.0);
         // Beside a curved boundary the refined skin leaves the coarse tets.
@@ -65,7 +66,7 @@ impl SizeField for PartSizes<'_> {
         // A part without tets has no place to ask about.
         let Some(tet) = self.tets.find(point, is_inside).or_else(nearest) else { return f64::INFINITY };
         let weights = self.weights[tet as usize].at(point).map(|w| w.max(0.0));
-        let sizes = self.mesh.tets[tet as usize].map(|v| self.sizes[v.index()]);
+        let sizes = self.coarse[tet as usize].map(|v| self.sizes[v.index()]);
         let sum: f64 = weights.iter().sum();
         weights.iter().zip(sizes).map(|(w, s)| w * s).sum::<f64>() / sum
     }

@@ -36,9 +36,11 @@ fn filled(
         let mesh = (comm.rank() == 0).then(|| (fixture.mesh.clone(), rank_of.clone()));
         let part = distribute(comm, mesh).expect("a classified mesh");
         let skin = skin(&part, &fixture.projector, n).expect("a skin");
-        let filled = fill(&part, &fixture.projector, &skin, size, &Settings::default()).expect("tets");
+        let filled =
+            fill_or_refine(&part, &fixture.projector, &skin, size, &Settings::default()).expect("tets");
         let refused = usize::from(filled.refused.is_some());
-        let bare = number(comm, &part, skin, filled).expect("all ranks");
+        let boundary = skin.numbering.totals().boundary;
+        let bare = number(comm, skin.skin, filled, boundary).expect("all ranks");
         let whole = settle(comm, bare).expect("a mesh");
         whole.check(comm).expect("a distributed mesh");
         let mesh = refine(whole, &fixture.projector, 1, &refine::Settings::default()).expect("positive tets");
@@ -71,7 +73,7 @@ fn both_sides_of_an_interface_have_the_same_triangles() {
     let bits = |p: &Point| [p.x, p.y, p.z].map(f64::to_bits);
     let mut seen = BTreeMap::new();
     for part in parts(&fixture, 3) {
-        let skin = skin(&part, &fixture.projector, 4).expect("a skin");
+        let skin = skin(&part, &fixture.projector, 4).expect("a skin").skin;
         for triangle in &skin.triangles {
             let mut corners = triangle.vertices.map(|v| bits(&skin.points[v as usize]));
             corners.sort_unstable();
@@ -110,12 +112,10 @@ fn vertices_inside_that_are_corners_are_kept() {
         .expect("a vertex inside");
     fixture.mesh.classes[centre] = Class::Corner(csg::CornerId(99));
     let part = &parts(&fixture, 1)[0];
-    let skin = skin(part, &fixture.projector, 2).expect("a skin");
+    let skin = skin(part, &fixture.projector, 2).expect("a skin").skin;
     assert_eq!(skin.points.len(), skin.on_triangles + 1);
     assert_eq!(skin.points[skin.on_triangles], fixture.mesh.points[centre]);
-    let filled =
-        fill(part, &fixture.projector, &skin, &UniformSize(0.2), &Settings::default()).expect("tets");
-    assert_eq!(filled.refused, None);
+    let filled = fill(&skin, &UniformSize(0.2), &Settings::default()).expect("tets");
     assert!(filled.tets.iter().flatten().any(|&v| v as usize == skin.on_triangles));
 }
 
@@ -124,7 +124,7 @@ fn sizes_are_linear_between_the_vertices_and_fit_the_mesh_in_the_mean() {
     let fixture = cube(2, false);
     let part = &parts(&fixture, 1)[0];
     let at = |p: &Point| 1.0 + p.x + 2.0 * p.y - 0.5 * p.z;
-    let sizes = PartSizes::new(part, part.points.iter().map(at).collect());
+    let sizes = PartSizes::new(part.points.clone(), part.tets.clone(), part.points.iter().map(at).collect());
     for p in [Point::new(0.3, 0.2, 0.9), Point::new(0.51, 0.77, 0.13), part.points[3]] {
         assert!((sizes.size_at(&p) - at(&p)).abs() < 1e-12, "{p}");
     }

@@ -1,0 +1,179 @@
+//! What is known of a geometry before it is cut, from a coarse mesh of it.
+
+use super::plan::{CORNER, CutPlane, meeting_point};
+use crate::mesh::{Mesh, TET_EDGES};
+use crate::{Point, Vector};
+use csg::Features;
+
+/// A point that stands for a share of the fine tets, the same for all.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sample {
+    /// Where.
+    pub point: Point,
+    /// How wide the piece of space is that it stands for.
+    pub width: f64,
+    /// What is nearer than this leaves no room for good tets.
+    pub near: f64,
+}
+
+/// A boundary triangle of the coarse mesh.
+#[derive(Clone, Copy, Debug)]
+struct Face {
+    corners: [Point; 3],
+    normal: Vector,
+    /// Fine triangles on it.
+    cells: f64,
+    /// Length of their edges.
+    size: f64,
+}
+
+/// A piece of a curve.
+#[derive(Clone, Copy, Debug)]
+struct Piece {
+    ends: [Point; 2],
+    size: f64,
+}
+
+/// What planes are chosen by.
+#[derive(Clone, Debug, Default)]
+pub struct Evidence {
+    /// Where the tets will be.
+    pub samples: Vec<Sample>,
+    faces: Vec<Face>,
+    curves: Vec<Piece>,
+    corners: Vec<(Point, f64)>,
+}
+
+/// Samples for each part, about.
+const SAMPLES: usize = 1500;
+
+impl Evidence {
+    /// Of a coarse mesh whose edges will be cut into so many `pieces`, for so many `parts`.
+    pub fn of(mesh: &Mesh, features: &Features, pieces: u32, parts: u32) -> Self {
+        let mut evidence = Self::default();
+        let in_tet = (SAMPLES * parts as usize).div_ceil(mesh.tets.len().max(1));
+        // C(k + 2, 3) points in a tet with k to an edge.
+        let k = (1_usize..).find(|k| k * (k + 1) * (k + 2) / 6 >= in_tet).unwrap_or(1);
+        let mut shortest = vec![f64::INFINITY; mesh.points.len()];
+        for tet in &mesh.tets {
+            let corners = tet.map(|v| mesh.points[v.index()]);
+            let lengths = TET_EDGES.map(|[a, b]| (corners[b] - corners[a]).norm());
+            for ([a, b], length) in TET_EDGES.into_iter().zip(lengths) {
+                for v in [tet[a], tet[b]] {
+                    shortest[v.index()] = shortest[v.index()].min(length / f64::from(pieces));
+                }
+            }
+            let edge = lengths.iter().sum::<f64>() / 6.0;
+            let width = edge / k as f64;
+            let near = width.max(CLEAR * edge / f64::from(pieces));
+            evidence.samples.extend(grid(&corners, k).map(|point| Sample { point, width, near }));
+        }
+        for triangle in &mesh.triangles {
+            let corners = triangle.vertices.map(|v| mesh.points[v.index()]);
+            let normal = (corners[1] - corners[0]).cross(&(corners[2] - corners[0]));
+            let size = triangle.vertices.map(|v| shortest[v.index()]).iter().sum::<f64>() / 3.0;
+            let (area, normal) = (0.5 * normal.norm(), normal.normalize());
+            evidence.faces.push(Face { corners, normal, cells: area / (size * size), size });
+        }
+        let size_near = |point: &Point| {
+            let near = |face: &Face| face.corners.iter().map(|c| (c - point).norm()).fold(f64::MAX, f64::min);
+            let nearest = evidence.faces.iter().min_by(|a, b| near(a).total_cmp(&near(b)));
+            nearest.map_or(0.0, |face| face.size)
+        };
+        evidence.corners = features.corners.iter().map(|c| (c.point, size_near(&c.point))).collect();
+        for segment in &mesh.segments {
+            let ends = segment.vertices.map(|v| mesh.points[v.index()]);
+            let size = segment.vertices.map(|v| shortest[v.index()]).iter().sum::<f64>() / 2.0;
+            evidence.curves.push(Piece { ends, size });
+        }
+        evidence
+    }
+
+    /// That which reaches into a piece of space.
+    pub(super) fn within(&self, holds: impl Fn(&Point) -> bool) -> Crossed<'_> {
+        Crossed {
+            faces: self.faces.iter().filter(|face| face.corners.iter().any(&holds)).collect(),
+            curves: self.curves.iter().filter(|piece| piece.ends.iter().any(&holds)).collect(),
+            corners: self.corners.iter().filter(|corner| holds(&corner.0)).collect(),
+        }
+    }
+}
+
+/// Points in a tet, spread evenly, k to an edge.
+fn grid(corners: &[Point; 4], k: usize) -> impl Iterator<Item = Point> + '_ {
+    let at = move |a: usize, b: usize, c: usize| {
+        let weight = |i: usize| (i as f64 + 0.25) / k as f64;
+        let [u, v, w] = [1, 2, 3].map(|i| corners[i] - corners[0]);
+        corners[0] + u * weight(a) + v * weight(b) + w * weight(c)
+    };
+    (0..k).flat_map(move |a| (0..k - a).flat_map(move |b| (0..k - a - b).map(move |c| at(a, b, c))))
+}
+
+/// Whether points lie on both sides of a plane.
+fn straddles(points: &[Point; 3], plane: &CutPlane) -> bool {
+    let [a, b, c] = points.map(|point| plane.value(&point) < 0.0);
+    a != b || b != c
+}
+
+/// What a plane through a piece of space may meet.
+pub(super) struct Crossed<'a> {
+    faces: Vec<&'a Face>,
+    curves: Vec<&'a Piece>,
+    corners: Vec<&'a (Point, f64)>,
+}
+
+/// So many fine edges a plane keeps away from what it does not cross well.
+const CLEAR: f64 = 1.5;
+
+impl Crossed<'_> {
+    /// Fine triangles, edges and vertices that a plane cuts at a small angle or comes too near to, weighted by how bad the sine of
+    /// the angle is.
+    pub(super) fn badly_cut(&self, plane: &CutPlane, shallow: impl Fn(f64) -> f64) -> f64 {
+        let near = |points: &[Point], size: f64| {
+            let values = points.iter().map(|p| plane.value(p));
+            let [low, high] =
+                values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(v), high.max(v)]);
+            low < CLEAR * size && high > -CLEAR * size
+        };
+        let faces = self.faces.iter().filter(|face| near(&face.corners, face.size));
+        let faces = faces.map(|face| shallow(plane.normal.cross(&face.normal).norm()) * face.cells);
+        let curves = self.curves.iter().filter(|piece| near(&piece.ends, piece.size)).map(|piece| {
+            let way = piece.ends[1] - piece.ends[0];
+            shallow(plane.normal.dot(&way).abs() / way.norm()) * way.norm() / piece.size
+        });
+        let corners =
+            self.corners.iter().filter(|(point, size)| plane.passes_by(point, CLEAR * size)).count();
+        faces.sum::<f64>() + curves.sum::<f64>() + CORNER * corners as f64
+    }
+
+    /// The corners.
+    pub(super) fn corners(&self) -> impl Iterator<Item = Point> + '_ {
+        self.corners.iter().map(|corner| corner.0)
+    }
+
+    /// Points of the boundary where planes that bound a piece meet curves, or others, and how far from them there is no room.
+    pub(super) fn meeting_points(&self, before: &[CutPlane], beside: &[CutPlane]) -> Vec<(Point, f64)> {
+        let mut points = Vec::new();
+        for (k, wall) in before.iter().enumerate() {
+            for piece in &self.curves {
+                let [a, b] = piece.ends.map(|end| wall.value(&end));
+                if (a < 0.0) != (b < 0.0) {
+                    let point = piece.ends[0] + (piece.ends[1] - piece.ends[0]) * (a / (a - b));
+                    points.push((point, CLEAR * piece.size));
+                }
+            }
+            let across = self.faces.iter().filter(|face| straddles(&face.corners, wall));
+            for face in across {
+                let plane = CutPlane { point: face.corners[0], normal: face.normal };
+                let others = before[k + 1..].iter().chain(beside);
+                let met = others.filter(|other| straddles(&face.corners, other));
+                let met = met.filter_map(|other| meeting_point([wall, other, &plane]));
+                let middle = Point::from(face.corners.iter().map(|c| c.coords).sum::<Vector>() / 3.0);
+                let reach = face.corners.iter().map(|c| (c - middle).norm()).fold(0.0, f64::max);
+                let on_face = met.filter(|point| (point - middle).norm() <= reach);
+                points.extend(on_face.map(|point| (point, CLEAR * face.size)));
+            }
+        }
+        points
+    }
+}

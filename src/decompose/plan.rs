@@ -1,0 +1,400 @@
+//! Where a geometry is cut: planes, chosen one after the other by a coarse mesh.
+//!
+//! A part that is to become p parts is cut by one plane into two that become ⌊p/2⌋ and ⌈p/2⌉, with shares of the tets as these. Candidates
+//! are planes across the axes (a k-d tree), across the principal axes of the part, and in random directions (thesis 4.1.1), each at
+//! nine places within the allowance. The one is taken that crosses least: tets, and above all
+//!
+//! - boundary triangles at a small angle, or parallel to them and near: the tets there would be slices as thin,
+//! - curves that run along the plane, and corners beside it: short edges,
+//! - other planes at a small angle, and lines that others leave on the planes before it: narrow strips. A plane may cut several pieces.
+
+use super::Evidence;
+use super::evidence::{Crossed, Sample};
+use crate::kernel::random::Random;
+use crate::{Point, Vector};
+use nalgebra::{Matrix3, SymmetricEigen};
+use rayon::prelude::*;
+
+/// A plane that cuts, oriented.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CutPlane {
+    /// A point on it.
+    pub point: Point,
+    /// Its unit normal.
+    pub normal: Vector,
+}
+
+impl CutPlane {
+    /// The signed distance of a point.
+    pub fn value(&self, point: &Point) -> f64 {
+        self.normal.dot(&(point - self.point))
+    }
+
+    /// Whether it comes nearer than this to a point, but not right through it.
+    pub(super) fn passes_by(&self, point: &Point, near: f64) -> bool {
+        let distance = self.value(point).abs();
+        distance < near && distance > SAME * near
+    }
+}
+
+/// One side of a plane.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Half {
+    /// The plane, by its place in [`Cuts::planes`].
+    pub plane: usize,
+    /// Whether it is the side that the normal points to.
+    pub positive: bool,
+}
+
+/// Convex pieces of space, one for each part.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Cuts {
+    /// The planes.
+    pub planes: Vec<CutPlane>,
+    /// The pieces: intersections of sides of planes.
+    pub leaves: Vec<Vec<Half>>,
+}
+
+impl Cuts {
+    /// The piece that a point lies in; of several, where it lies on a plane, the first.
+    pub fn leaf_of(&self, point: &Point) -> usize {
+        let holds = |half: &Half| (self.planes[half.plane].value(point) > 0.0) == half.positive;
+        let found = self.leaves.iter().position(|leaf| leaf.iter().all(holds));
+        found.expect("the pieces fill space")
+    }
+
+    /// The pieces that planes make one after the other: each cuts all pieces that have evidence on both sides of it.
+    pub fn by_planes(planes: &[CutPlane], evidence: &Evidence) -> Self {
+        let mut leaves = vec![(Vec::new(), evidence.samples.iter().collect::<Vec<&Sample>>())];
+        for (plane, cut) in planes.iter().enumerate() {
+            leaves = leaves
+                .into_iter()
+                .flat_map(|(halves, samples)| {
+                    let (positive, negative): (Vec<&Sample>, Vec<&Sample>) =
+                        samples.into_iter().partition(|sample| cut.value(&sample.point) > 0.0);
+                    if positive.is_empty() || negative.is_empty() {
+                        return vec![(halves, [positive, negative].concat())];
+                    }
+                    let with = |positive| [halves.as_slice(), &[Half { plane, positive }]].concat();
+                    vec![(with(false), negative), (with(true), positive)]
+                })
+                .collect();
+        }
+        Self { planes: planes.to_vec(), leaves: leaves.into_iter().map(|leaf| leaf.0).collect() }
+    }
+}
+
+/// Which planes are considered.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Candidates {
+    /// All of the following but the last.
+    #[default]
+    All,
+    /// Across the axes: a k-d tree.
+    Axes,
+    /// Across the principal axes of each part.
+    Principal,
+    /// In random directions.
+    Random,
+    /// Across the longest side of each part's box, in the middle of its tets, whatever is there.
+    Median,
+}
+
+/// How planes are chosen.
+#[derive(Clone, Copy, Debug)]
+pub struct Settings {
+    /// Which planes are considered.
+    pub candidates: Candidates,
+    /// How far the share of tets on one side of a plane may be off, as a part of the smaller share wanted; four times as far where
+    /// nothing can be cut well.
+    pub allowance: f64,
+    /// Random directions that are tried for each plane.
+    pub tries: usize,
+}
+
+impl Default for Settings {
+    /// Two percent, as the thesis has it.
+    fn default() -> Self {
+        Self { candidates: Candidates::All, allowance: 0.02, tries: 12 }
+    }
+}
+
+/// Too many parts for what there is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{parts} parts are more than this geometry can be cut into; ask for fewer, or smaller sizes")]
+pub struct TooManyParts {
+    /// The parts wanted.
+    pub parts: u32,
+}
+
+/// Places that are tried for a plane in one direction.
+const PLACES: i32 = 9;
+
+/// What a cell that is cut badly costs, in cells that are cut well.
+const BAD: f64 = 100.0;
+
+/// Where nothing can be cut well, shares may be so many times further off.
+const AT_WORST: f64 = 4.0;
+
+/// A plane that cuts other pieces already may be so many times further off the wanted shares.
+const AGAIN: f64 = 2.5;
+
+/// What a point where others meet costs that a plane passes too near, in cells that are cut badly.
+pub(super) const CORNER: f64 = 10.0;
+
+/// Nearer than this, in units of the room that is wanted, planes pass through one point.
+const SAME: f64 = 1e-9;
+
+/// Planes that meet at a smaller angle than this make slices: its sine.
+const SHALLOW: f64 = 0.6;
+
+/// Cuts space into so many pieces with equal shares of the samples.
+///
+/// # Errors
+/// If there are too few samples to tell parts from one another.
+pub fn plan(evidence: &Evidence, parts: u32, settings: &Settings) -> Result<Cuts, TooManyParts> {
+    let mut cuts = Cuts::default();
+    let all = Piece { halves: Vec::new(), samples: evidence.samples.iter().collect(), parts };
+    let mut waiting = vec![all];
+    while let Some(piece) = waiting.pop() {
+        if piece.parts == 1 {
+            cuts.leaves.push(piece.halves);
+            continue;
+        }
+        if piece.samples.len() < 2 * piece.parts as usize {
+            return Err(TooManyParts { parts });
+        }
+        let plane = piece.best_plane(&cuts, evidence, settings);
+        let index = cuts.planes.iter().position(|known| *known == plane).unwrap_or(cuts.planes.len());
+        let children = piece.cut(&plane, index);
+        if children.iter().any(|child| child.samples.is_empty()) {
+            return Err(TooManyParts { parts });
+        }
+        if index == cuts.planes.len() {
+            cuts.planes.push(plane);
+        }
+        // The last in is the first out: pieces come in the order of the tree.
+        waiting.extend(children.into_iter().rev());
+    }
+    Ok(cuts)
+}
+
+/// What a plane cuts, in cells.
+#[derive(Clone, Copy, Debug)]
+struct Cost {
+    cut: f64,
+    /// Those that it cuts badly.
+    bad: f64,
+}
+
+impl Cost {
+    fn total(self) -> f64 {
+        self.cut + BAD * self.bad
+    }
+}
+
+/// Planes that were chosen already: those that bound a piece, and the others.
+struct Others {
+    before: Vec<CutPlane>,
+    beside: Vec<CutPlane>,
+    /// Where these meet, or the boundary, and how far from there there is no room.
+    meeting_points: Vec<(Point, f64)>,
+}
+
+impl Others {
+    fn of(piece: &Piece, cuts: &Cuts, crossed: &Crossed) -> Self {
+        let is_before = |plane: usize| piece.halves.iter().any(|half| half.plane == plane);
+        let (before, beside): (Vec<usize>, Vec<usize>) =
+            (0..cuts.planes.len()).partition(|&plane| is_before(plane));
+        let [before, beside]: [Vec<CutPlane>; 2] =
+            [before, beside].map(|list| list.into_iter().map(|p| cuts.planes[p]).collect());
+        let mut meeting_points = piece.meeting_points(cuts, &before, &beside);
+        meeting_points.extend(crossed.meeting_points(&before, &beside));
+        Self { before, beside, meeting_points }
+    }
+}
+
+/// A piece of space that is to become some parts.
+struct Piece<'a> {
+    halves: Vec<Half>,
+    samples: Vec<&'a Sample>,
+    parts: u32,
+}
+
+impl<'a> Piece<'a> {
+    fn cut(&self, plane: &CutPlane, index: usize) -> [Self; 2] {
+        let (positive, negative): (Vec<&Sample>, Vec<&Sample>) =
+            self.samples.iter().partition(|sample| plane.value(&sample.point) > 0.0);
+        let child = |samples, positive, parts| {
+            let halves = [self.halves.as_slice(), &[Half { plane: index, positive }]].concat();
+            Piece { halves, samples, parts }
+        };
+        let less = self.parts / 2;
+        [child(negative, false, less), child(positive, true, self.parts - less)]
+    }
+
+    fn best_plane(&self, cuts: &Cuts, evidence: &Evidence, settings: &Settings) -> CutPlane {
+        let directions = self.directions(settings, cuts.planes.len() as u64);
+        if settings.candidates == Candidates::Median {
+            return self.places(&directions[0], 0.0)[0];
+        }
+        let crossed = evidence.within(|point| self.holds(cuts, point));
+        let others = Others::of(self, cuts, &crossed);
+        // A plane that cuts other pieces already leaves no narrow strips beside them, and one right through a corner none beside that.
+        let corners = crossed.corners().chain(others.meeting_points.iter().map(|meeting| meeting.0));
+        let through =
+            corners.flat_map(|point| directions.iter().map(move |&normal| CutPlane { point, normal }));
+        let special: Vec<CutPlane> = others.beside.iter().copied().chain(through).collect();
+        let mut best: Option<(Cost, CutPlane)> = None;
+        for allowance in [1.0, AT_WORST].map(|factor| factor * settings.allowance) {
+            let planes = directions.iter().flat_map(|normal| self.places(normal, allowance));
+            let special = special.par_iter().filter(|plane| self.shares(plane, AGAIN * allowance));
+            let planes: Vec<CutPlane> = planes.chain(special.copied().collect::<Vec<_>>()).collect();
+            let costs: Vec<Cost> =
+                planes.par_iter().map(|plane| self.cost(plane, &crossed, &others)).collect();
+            let costs = costs.into_iter().zip(planes);
+            best = best.into_iter().chain(costs).min_by(|a, b| a.0.total().total_cmp(&b.0.total()));
+            if best.as_ref().is_some_and(|(cost, _)| cost.bad < 1.0) {
+                break;
+            }
+        }
+        best.expect("there are directions").1
+    }
+
+    /// Whether a plane leaves about the wanted shares on both sides.
+    fn shares(&self, plane: &CutPlane, allowance: f64) -> bool {
+        let count = self.samples.len() as f64;
+        let negative = self.samples.iter().filter(|sample| plane.value(&sample.point) <= 0.0).count() as f64;
+        let share = f64::from(self.parts / 2) / f64::from(self.parts);
+        (negative / count - share).abs() <= allowance * share
+    }
+
+    /// Points on this piece where a plane that bounds it and two others meet, and how far from them there is no room.
+    fn meeting_points(&self, cuts: &Cuts, before: &[CutPlane], beside: &[CutPlane]) -> Vec<(Point, f64)> {
+        let planes: Vec<&CutPlane> = before.iter().chain(beside).collect();
+        let near = self.samples.iter().map(|sample| sample.near).sum::<f64>() / self.samples.len() as f64;
+        let bounds =
+            crate::kernel::tree::bounds(&self.samples.iter().map(|sample| sample.point).collect::<Vec<_>>());
+        let touches = |point: &Point| {
+            let sign = |half: &Half| if half.positive { 1.0 } else { -1.0 };
+            let beside = |half: &Half| sign(half) * cuts.planes[half.plane].value(point) > -near;
+            let inside = (0..3).all(|k| point[k] > bounds.min[k] - near && point[k] < bounds.max[k] + near);
+            inside && self.halves.iter().all(beside)
+        };
+        let mut points = Vec::new();
+        for a in 0..before.len() {
+            for b in a + 1..planes.len() {
+                for c in b + 1..planes.len() {
+                    let point = meeting_point([planes[a], planes[b], planes[c]]);
+                    points.extend(point.filter(&touches).map(|point| (point, near)));
+                }
+            }
+        }
+        points
+    }
+
+    fn holds(&self, cuts: &Cuts, point: &Point) -> bool {
+        self.halves.iter().all(|half| (cuts.planes[half.plane].value(point) > 0.0) == half.positive)
+    }
+
+    /// Unit normals of the planes to try.
+    fn directions(&self, settings: &Settings, seed: u64) -> Vec<Vector> {
+        let axes = || vec![Vector::x(), Vector::y(), Vector::z()];
+        match settings.candidates {
+            Candidates::Axes => axes(),
+            Candidates::Principal => self.principal_axes(),
+            Candidates::Random => random_directions(settings.tries, seed),
+            Candidates::All => {
+                [axes(), self.principal_axes(), random_directions(settings.tries, seed)].concat()
+            }
+            Candidates::Median => {
+                let extent = |axis: &Vector| {
+                    let along = self.samples.iter().map(|sample| sample.point.coords.dot(axis));
+                    let [low, high] = along
+                        .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)]);
+                    high - low
+                };
+                axes().into_iter().max_by(|a, b| extent(a).total_cmp(&extent(b))).into_iter().collect()
+            }
+        }
+    }
+
+    /// The axes of inertia of the samples.
+    fn principal_axes(&self) -> Vec<Vector> {
+        let count = self.samples.len() as f64;
+        let mean = self.samples.iter().map(|sample| sample.point.coords).sum::<Vector>() / count;
+        let spread: Matrix3<f64> = self
+            .samples
+            .iter()
+            .map(|sample| {
+                let away = sample.point.coords - mean;
+                away * away.transpose()
+            })
+            .sum();
+        let axes = SymmetricEigen::new(spread).eigenvectors;
+        axes.column_iter().filter_map(|axis| Vector::from(axis).try_normalize(0.0)).collect()
+    }
+
+    /// Planes across a direction that leave the wanted shares on both sides, the best share first.
+    fn places(&self, normal: &Vector, allowance: f64) -> Vec<CutPlane> {
+        let mut along: Vec<f64> = self.samples.iter().map(|sample| sample.point.coords.dot(normal)).collect();
+        along.sort_unstable_by(f64::total_cmp);
+        let share = f64::from(self.parts / 2) / f64::from(self.parts);
+        // 0, 1, -1, 2, -2, …
+        let steps = (0..PLACES).map(|k| if k % 2 == 0 { -k / 2 } else { (k + 1) / 2 });
+        let place = |step: i32| {
+            let off = f64::from(step) / f64::from(PLACES / 2) * allowance * share;
+            let at = ((share + off) * along.len() as f64).round() as usize;
+            let at = at.clamp(1, along.len() - 1);
+            let offset = 0.5 * (along[at - 1] + along[at]);
+            CutPlane { point: Point::from(normal * offset), normal: *normal }
+        };
+        steps.map(place).collect()
+    }
+
+    /// Cells that a plane cuts, those that it cuts badly many times over.
+    fn cost(&self, plane: &CutPlane, crossed: &Crossed, others: &Others) -> Cost {
+        let on_plane = |sample: &&&Sample| plane.value(&sample.point).abs() < 0.5 * sample.width;
+        let cut: Vec<&Sample> = self.samples.iter().filter(on_plane).copied().collect();
+        let near = |sample: &Sample, other: &CutPlane| other.value(&sample.point).abs() < sample.near;
+        let mut bad = crossed.badly_cut(plane, shallow);
+        for wall in &others.before {
+            let on_wall: Vec<&Sample> = cut.iter().filter(|sample| near(sample, wall)).copied().collect();
+            let line = plane.normal.cross(&wall.normal);
+            bad += shallow(line.norm()) * on_wall.len() as f64;
+            // What cuts the other side of the wall leaves a line on it too.
+            for other in others.beside.iter().filter(|other| *other != plane) {
+                let sine = line.normalize().cross(&other.normal.cross(&wall.normal).normalize()).norm();
+                let both = on_wall.iter().filter(|sample| near(sample, other)).count();
+                bad += if both > 0 { shallow(sine) * both as f64 } else { 0.0 };
+            }
+        }
+        let too_near = others.meeting_points.iter().filter(|(point, near)| plane.passes_by(point, *near));
+        bad += CORNER * too_near.count() as f64;
+        Cost { cut: cut.len() as f64, bad }
+    }
+}
+
+/// Where three planes meet, unless nearly at no point.
+pub(super) fn meeting_point(planes: [&CutPlane; 3]) -> Option<Point> {
+    let rows = planes.map(|plane| plane.normal.transpose());
+    let offsets = planes.map(|plane| plane.normal.dot(&plane.point.coords));
+    let inverse = Matrix3::from_rows(&rows).try_inverse()?;
+    Some(Point::from(inverse * Vector::from(offsets)))
+}
+
+/// How bad an angle is by its sine: from 1 for none to 0 for one that is large enough.
+fn shallow(sine: f64) -> f64 {
+    (1.0 - sine / SHALLOW).max(0.0)
+}
+
+/// Directions spread over the sphere at random, the same for the same seed.
+fn random_directions(count: usize, seed: u64) -> Vec<Vector> {
+    let mut random = Random::new(seed);
+    let mut number = || 2.0 * random.unit() - 1.0;
+    std::iter::from_fn(|| Some(Vector::new(number(), number(), number())))
+        .filter(|v| v.norm_squared() <= 1.0)
+        .filter_map(|v| v.try_normalize(1e-3))
+        .take(count)
+        .collect()
+}

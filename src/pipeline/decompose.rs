@@ -1,0 +1,233 @@
+//! Method 1 on all ranks: a geometry cut into pieces, each meshed on its rank.
+
+use super::coarse::{CoarseError, CoarseMesh, MOST_CORRECTIONS};
+use super::generate::{CoarseResult, GenerateSettings};
+use super::model::{CsgModel, Model};
+use super::skins::refuse_periodic;
+use super::wanted::mesh_as_wanted;
+use crate::Point;
+use crate::comm::Communicator;
+use crate::comm::pack::{put, take};
+use crate::decompose::{self, CutModel, CutPlane, Cuts, Evidence};
+use crate::error::{Failure, Status, agree};
+use crate::improve::{self, Effort};
+use crate::mesh::{Mesh, Rank, VertexId};
+use crate::migrate::BareStream;
+use crate::partition;
+use crate::progress::Progress;
+use crate::size::{GeometricSize, SizeField, Source, SourceTree};
+use crate::skin::{self, PartSizes, Skin};
+use crate::surface::curves::{crowded, mesh_curves};
+use crate::surface::{self, SurfaceMesh};
+use csg::{Aabb, BodyId};
+use std::collections::BTreeSet;
+
+/// How a geometry is cut.
+#[derive(Clone, Debug, Default)]
+pub struct CutSettings {
+    /// How planes are chosen, where the user gives none.
+    pub plan: decompose::Settings,
+    /// The user's planes: each cuts all pieces that it meets.
+    pub planes: Vec<CutPlane>,
+}
+
+/// What rank 0 makes of a geometry.
+struct Cut {
+    pieces: u32,
+    coarse: CoarseResult,
+    /// For each rank, its skin and the sizes in it.
+    messages: Vec<Vec<u8>>,
+    boundary: u64,
+}
+
+/// **Collective.** Cuts the geometry, meshes the surface of the pieces on rank 0, and the pieces each on its rank.
+///
+/// # Errors
+/// The same on all ranks: a geometry that cannot be cut so, pieces that cannot be meshed.
+pub(super) fn mesh_pieces(
+    comm: &dyn Communicator,
+    model: Option<&Model>,
+    settings: &GenerateSettings,
+    progress: &Progress,
+) -> Result<(BareStream, u32, Option<CoarseResult>), Failure> {
+    let cut = agree(comm, model.map(|model| cut(comm.size(), model, settings, progress)).transpose())?;
+    let mut numbers = cut.as_ref().map_or(vec![0, 0], |cut| vec![u64::from(cut.pieces), cut.boundary]);
+    comm.broadcast(0, &mut numbers)?;
+    let [pieces, boundary] = numbers[..] else { panic!("rank 0 sent two numbers") };
+    let (coarse, messages) = cut.map(|cut| (cut.coarse, cut.messages)).unzip();
+    let message = progress.stage("distribute", || comm.scatter_bytes(0, messages))?;
+    let effort = settings.coarse.effort.unwrap_or(Effort::Standard);
+    let filled = progress.stage("fill", || {
+        let (skin, sizes) = unpack(&message);
+        let filled = skin::fill(&skin, &sizes, &improve::Settings::of(effort));
+        filled.map(|filled| (skin, filled)).map_err(|error| Failure::new(Status::NoValidMesh, error))
+    });
+    let (skin, filled) = agree(comm, filled)?;
+    let bare = progress.stage("number", || skin::number(comm, skin, filled, boundary))?;
+    Ok((BareStream::new(bare), pieces as u32, coarse))
+}
+
+/// The skins of the pieces, for all ranks.
+fn cut(parts: u32, model: &Model, settings: &GenerateSettings, progress: &Progress) -> Result<Cut, Failure> {
+    refuse_periodic(Some(model))?;
+    let Model::Csg(whole) = model else {
+        return Err(Failure::input(
+            "the method `decompose` cuts geometries (.geo); for triangles and meshes take `refine` or `surface`",
+        ));
+    };
+    let (pieces, made, outcome) =
+        progress.stage("mesh", || mesh_as_wanted(parts, model, &settings.coarse, settings.wanted, &[]))?;
+    let CoarseMesh { mesh, report } = made;
+    let no_mesh = |error: &dyn std::fmt::Display| Failure::new(Status::NoValidMesh, error.to_string());
+    let (cuts, model) = progress.stage("cut", || {
+        let cuts = plan(whole, &mesh, pieces, parts, &settings.cuts)?;
+        let candidates = candidates(&mesh, &cuts);
+        let model = CutModel::new(whole, &cuts, candidates).map_err(|error| no_mesh(&error))?;
+        Ok::<_, Failure>((cuts, model))
+    })?;
+    let field = GeometricSize::new(&whole.geometry, &whole.features, &settings.coarse.size);
+    let vertex_sizes = skin::at_vertices(&mesh, Some(&field), pieces);
+    let sizes = PartSizes::new(mesh.points.clone(), mesh.tets.clone(), vertex_sizes.clone());
+    let surface =
+        progress.stage("surface", || fine_surface(&model.model, &sizes)).map_err(|error| no_mesh(&error))?;
+    let skins = decompose::skins(&model, &surface, parts as usize).map_err(|error| no_mesh(&error))?;
+    let message = |skin: &Skin| {
+        let mut message = decompose::pack(skin);
+        pack_sizes(&mut message, skin, &mesh, &vertex_sizes);
+        message
+    };
+    let messages = skins.iter().map(message).collect();
+    let boundary = surface.triangles.iter().filter(|t| model.is_old(t.patch)).count() as u64;
+    let assigned: Vec<Rank> = mesh.tets.iter().map(|tet| cuts.leaf_of(&centre(&mesh, tet)) as Rank).collect();
+    let partition = partition::assess(&mesh, &assigned, parts).map_err(|error| no_mesh(&error))?;
+    let coarse = CoarseResult { mesh, parts: assigned, report, outcome, partition };
+    Ok(Cut { pieces, coarse, messages, boundary })
+}
+
+fn centre(mesh: &Mesh, tet: &[VertexId; 4]) -> Point {
+    Point::from(tet.iter().map(|v| mesh.points[v.index()].coords).sum::<crate::Vector>() / 4.0)
+}
+
+/// The planes: the user's, or those that suit the coarse mesh.
+fn plan(
+    whole: &CsgModel,
+    mesh: &Mesh,
+    pieces: u32,
+    parts: u32,
+    settings: &CutSettings,
+) -> Result<Cuts, Failure> {
+    let evidence = Evidence::of(mesh, &whole.features, pieces, parts);
+    if settings.planes.is_empty() {
+        return decompose::plan(&evidence, parts, &settings.plan).map_err(Failure::input);
+    }
+    let cuts = Cuts::by_planes(&settings.planes, &evidence);
+    if cuts.leaves.len() != parts as usize {
+        return Err(Failure::input(format!(
+            "the planes cut the geometry into {} pieces, for {parts} parts; each plane cuts every piece that it meets",
+            cuts.leaves.len()
+        )));
+    }
+    Ok(cuts)
+}
+
+/// How far a body may reach out of the coarse tets at its boundary, in units of their edges.
+const BULGE: f64 = 0.5;
+
+/// The parts that each body may reach into.
+fn candidates(mesh: &Mesh, cuts: &Cuts) -> Vec<(usize, BodyId)> {
+    let mut found = BTreeSet::new();
+    for (tet, &body) in mesh.tets.iter().zip(&mesh.bodies) {
+        let corners = tet.map(|v| mesh.points[v.index()]);
+        let room = BULGE * corners.iter().map(|c| (c - corners[0]).norm()).fold(0.0, f64::max);
+        let reaches = |half: &decompose::Half| {
+            let sign = if half.positive { 1.0 } else { -1.0 };
+            corners.iter().any(|c| sign * cuts.planes[half.plane].value(c) > -room)
+        };
+        let reached = (0..cuts.leaves.len()).filter(|&leaf| cuts.leaves[leaf].iter().all(reaches));
+        found.extend(reached.map(|leaf| (leaf, body)));
+    }
+    found.into_iter().collect()
+}
+
+/// Sizes, lowered by sources.
+struct Lowered<'a> {
+    base: &'a dyn SizeField,
+    sources: SourceTree,
+}
+
+impl SizeField for Lowered<'_> {
+    fn size_at(&self, point: &Point) -> f64 {
+        self.base.size_at(point).min(self.sources.size_at(point))
+    }
+}
+
+/// How fast sizes grow away from where they had to be lowered.
+const GRADING: f64 = 0.3;
+
+/// The surface mesh of all pieces. Where it fails for want of room, the sizes are lowered there and it is tried again.
+fn fine_surface(model: &CsgModel, base: &dyn SizeField) -> Result<SurfaceMesh, CoarseError> {
+    let CsgModel { geometry, features, projector } = model;
+    let mut sources: Vec<Source> = Vec::new();
+    let mut corrections = 0;
+    loop {
+        let diagonal = features.bounds.diagonal();
+        let size = Lowered { base, sources: SourceTree::new(features.bounds, GRADING, diagonal, &sources) };
+        let curves = mesh_curves(features, projector, &size)?;
+        let mut lower = crowded(&curves, features, &size);
+        if lower.is_empty() || corrections == MOST_CORRECTIONS {
+            let ends = |s: &crate::mesh::Segment| s.vertices.map(|v| curves.points[v.index()]);
+            let segments: Vec<[Point; 2]> = curves.segments.iter().map(ends).collect();
+            let made =
+                surface::mesh_patches(geometry, features, curves, &size, &surface::Settings::default());
+            let error = match made {
+                Ok((surface, _)) => return Ok(surface),
+                Err(error) => CoarseError::from(error),
+            };
+            lower = error.remedy(&segments, &size);
+            if lower.is_empty() || corrections == MOST_CORRECTIONS {
+                return Err(error);
+            }
+        }
+        corrections += 1;
+        sources.extend(lower);
+    }
+}
+
+/// Adds the coarse tets near a skin, and the sizes at their vertices.
+fn pack_sizes(message: &mut Vec<u8>, skin: &Skin, mesh: &Mesh, sizes: &[f64]) {
+    let bounds = crate::kernel::tree::bounds(&skin.points);
+    let near = |tet: &&[VertexId; 4]| {
+        meet(&bounds, &crate::kernel::tree::bounds(&tet.map(|v| mesh.points[v.index()])))
+    };
+    let tets: Vec<&[VertexId; 4]> = mesh.tets.iter().filter(near).collect();
+    let mut used: Vec<VertexId> = tets.iter().flat_map(|tet| **tet).collect();
+    used.sort_unstable();
+    used.dedup();
+    let place = |v: &VertexId| used.binary_search(v).expect("it is used") as u32;
+    let point = |v: &VertexId| {
+        let p = mesh.points[v.index()];
+        [p.x, p.y, p.z, sizes[v.index()]]
+    };
+    put(message, &used.iter().map(point).collect::<Vec<_>>());
+    put(
+        message,
+        &tets
+            .iter()
+            .map(|tet| [place(&tet[0]), place(&tet[1]), place(&tet[2]), place(&tet[3])])
+            .collect::<Vec<_>>(),
+    );
+}
+
+fn meet(a: &Aabb, b: &Aabb) -> bool {
+    (0..3).all(|k| a.min[k] <= b.max[k] && b.min[k] <= a.max[k])
+}
+
+/// A rank's skin, and the sizes in it.
+fn unpack(message: &[u8]) -> (Skin, PartSizes) {
+    let message = &mut &*message;
+    let skin = decompose::unpack(message);
+    let vertices = take::<[f64; 4]>(message);
+    let tets = take::<[u32; 4]>(message).into_iter().map(|tet| tet.map(VertexId)).collect();
+    let points = vertices.iter().map(|&[x, y, z, _]| Point::new(x, y, z)).collect();
+    (skin, PartSizes::new(points, tets, vertices.iter().map(|v| v[3]).collect()))
+}

@@ -1,0 +1,75 @@
+//! A rank's part of what was made, as it is kept.
+
+use crate::comm::Communicator;
+use crate::dist::owner;
+use crate::error::Failure;
+use crate::mesh::stream::MeshStream;
+use crate::migrate::BareStream;
+use crate::refine::RefinedMesh;
+
+/// The part of the mesh that a rank has.
+#[derive(Debug)]
+pub enum Part {
+    /// A lattice in each coarse tet: tets are computed as they are asked for.
+    Refined(Box<RefinedMesh>),
+    /// Tets that were meshed, and are kept.
+    Stored(Box<BareStream>),
+}
+
+impl Part {
+    /// For the checker, the writers and all else that reads a mesh.
+    pub fn stream(&self) -> &dyn MeshStream {
+        match self {
+            Self::Refined(part) => &**part,
+            Self::Stored(part) => &**part,
+        }
+    }
+
+    /// Whether all coordinates are kept, see [`Keep`](crate::refine::Keep).
+    pub fn keeps_all(&self) -> bool {
+        match self {
+            Self::Refined(part) => part.keeps_all(),
+            Self::Stored(_) => true,
+        }
+    }
+}
+
+/// How evenly a mesh lies on the ranks: the same on all.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Balance {
+    /// Vertices in more than one part, each counted once.
+    pub shared_vertices: u64,
+    /// Tets of the largest part over the mean.
+    pub tets: f64,
+    /// The largest share of its vertices that a part owns, over the mean.
+    pub owned: f64,
+}
+
+/// **Collective.** Counts what the parts have.
+///
+/// # Errors
+/// What the ranks cannot say.
+pub fn balance(comm: &dyn Communicator, part: &dyn MeshStream) -> Result<Balance, Failure> {
+    let counts = part.counts();
+    let (mut held_by_others, mut mine) = (0, 0);
+    for index in 0..part.vertex_blocks() {
+        let block = part.vertex_block(index);
+        if !block.holders.is_empty() {
+            let ids = block.ids();
+            held_by_others += ids.end - ids.start;
+            mine += ids.filter(|&id| owner(block.holders, id) == part.rank()).count() as u64;
+        }
+    }
+    let share = (counts.vertices - held_by_others + mine) as f64 / counts.vertices.max(1) as f64;
+    Ok(Balance {
+        shared_vertices: comm.all_reduce_sum_u64([mine])?[0],
+        tets: imbalance(&comm.all_gather_one(counts.tets as f64)?),
+        owned: imbalance(&comm.all_gather_one(share)?),
+    })
+}
+
+/// The largest over the mean.
+fn imbalance(all: &[f64]) -> f64 {
+    let mean = all.iter().sum::<f64>() / all.len() as f64;
+    all.iter().copied().fold(0.0, f64::max) / mean
+}
