@@ -91,6 +91,44 @@ mod with_mpi {
     }
 
     #[test]
+    fn more_and_fewer_parts_than_mpi_ranks_are_those_that_as_many_ranks_make() {
+        let arguments = ["--preset", "very-coarse", "--levels", "1", "-q"];
+        for (ranks, parts) in [(2, "5"), (3, "2")] {
+            let Some(mut command) = mpirun(ranks) else { return };
+            let dir = tempfile::tempdir().unwrap();
+            let [dealt, threads, moved] = ["dealt", "threads", "moved"].map(|name| dir.path().join(name));
+            succeed(
+                command
+                    .arg("generate")
+                    .arg(own("lens"))
+                    .args(arguments)
+                    .args(["--parts", parts, "-o"])
+                    .arg(&dealt),
+            );
+            succeed(
+                tetmill()
+                    .arg("generate")
+                    .arg(own("lens"))
+                    .args(arguments)
+                    .args(["-n", parts, "-o"])
+                    .arg(&threads),
+            );
+            let file = format!("partitioning.{parts}/part.{parts}.elements");
+            let text = |folder: &std::path::Path| std::fs::read(folder.join(&file)).unwrap();
+            assert!(text(&dealt) == text(&threads), "{parts} parts on {ranks} ranks");
+            judge(&dealt, parts.parse().unwrap());
+            let Some(mut command) = mpirun(ranks) else { return };
+            succeed(command.arg("repartition").arg(&dealt).args(["-n", "4", "-q", "-o"]).arg(&moved));
+            judge(&moved, 4);
+        }
+        let Some(mut command) = mpirun(2) else { return };
+        let output = command.args(["generate", "no/such/file.geo", "--parts", "5"]).output().unwrap();
+        assert_eq!(output.status.code(), Some(2));
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(said.matches("cannot read no/such/file.geo").count(), 1, "{said}");
+    }
+
+    #[test]
     fn a_number_of_ranks_that_contradicts_mpirun_is_refused() {
         let Some(mut command) = mpirun(2) else { return };
         let output =

@@ -19,6 +19,7 @@ mod own;
 use super::faults::FaultKind;
 use super::names::{NamesByNumber, names_of};
 use super::parse::ReadError;
+use super::periodic;
 use super::read::{Layout, only_layout};
 use crate::comm::{Agreed, CommError, Communicator};
 use crate::dist::{DistMesh, SettleError, settle};
@@ -106,6 +107,10 @@ pub fn load(comm: &dyn Communicator, dir: &Path) -> Result<Loaded, LoadError> {
     }
     if found.bare_faces > 0 {
         notes.push(format!("{} outer faces have no boundary element, and get none", found.bare_faces));
+    }
+    let has_pairs = u64::from(comm.rank() == 0 && folder.join(periodic::NAME).exists());
+    if comm.all_reduce_max_u64([has_pairs])? == [1] {
+        notes.push(format!("{} is left out: pairs of periodic nodes are not read", periodic::NAME));
     }
     let mut names = names_of(&folder);
     broadcast_names(comm, &mut names)?;
