@@ -93,7 +93,7 @@ fn empty_parts_are_filled_from_the_largest() {
     let mut part = vec![1; 48];
     part[TetId(0).index()] = 3;
     assert_eq!(metrics::fill_empty_parts(&dual, &mut part, 5), 3);
-    let measured = metrics::measure(&dual, &part, 5, Method::Coordinates, 3);
+    let measured = metrics::measure(&dual, &part, 5, Some(Method::Coordinates), 3);
     assert_eq!((measured.smallest, measured.largest, measured.repaired), (1, 44, 3));
 }
 

@@ -3,7 +3,6 @@
 use super::{PeriodicMap, PeriodicSize};
 use crate::comm::thread;
 use crate::io::serial;
-use crate::mesh::stream::MeshStream;
 use crate::pipeline::{CoarseSettings, GenerateSettings, Generated, Method, Model, Wanted, generate};
 use crate::progress::Progress;
 use crate::size::{Preset, SizeField, SizeSettings, Source};
@@ -24,6 +23,7 @@ fn settings(levels: u32, sources: &[Source]) -> GenerateSettings {
     let size = SizeSettings { sources: sources.to_vec(), ..Preset::VeryCoarse.into() };
     GenerateSettings {
         method: Method::Refine,
+        cuts: crate::pipeline::CutSettings::default(),
         coarse: CoarseSettings::from(size),
         wanted: Wanted::Sizes { pieces: 1 << levels },
         memory: None,

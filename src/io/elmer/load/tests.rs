@@ -293,8 +293,8 @@ fn malformed_parts_are_refused_with_file_and_line_on_all_ranks() {
     expect_refused("part.1.shared", set(0, "1 2 1 2"), "part.1.shared:1: wrong holders");
     expect_refused(
         "part.1.boundary",
-        set(0, "1 1 1 0 303 2 3 4"),
-        "part.1.boundary:1: wrong or missing parent",
+        set(0, "1 1 1 0 303 1 3 3"),
+        "part.1.boundary:1: boundary element that is no face",
     );
     expect_refused(
         "part.1.boundary",
