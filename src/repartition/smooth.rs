@@ -315,8 +315,9 @@ impl Band {
             while !rest.is_empty() {
                 let ghost = ghosts.nth(take_varint(rest) as usize).expect("a face of both");
                 let mut field = [(Rank::MAX, 0); KEPT];
-                for entry in 0..take_varint(rest) as usize {
-                    field[entry] = (take_varint(rest) as Rank, take_varint(rest) as u32);
+                let count = take_varint(rest) as usize;
+                for entry in &mut field[..count] {
+                    *entry = (take_varint(rest) as Rank, take_varint(rest) as u32);
                 }
                 self.slot[links.tets() + *ghost as usize] = self.ghosts.len() as u32;
                 self.ghosts.push(Field(field));

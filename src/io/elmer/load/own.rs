@@ -163,12 +163,10 @@ impl OwnParts {
         }
         nodes.par_sort_unstable();
         let mut local: Vec<Vec<VertexId>> = ids.iter().map(|ids| vec![VertexId(0); ids.len()]).collect();
-        let mut count = 0;
-        for copies in nodes.chunk_by(|a, b| a.0 == b.0) {
+        for (count, copies) in nodes.chunk_by(|a, b| a.0 == b.0).enumerate() {
             for (_, TetPlace { part, place }) in copies {
                 local[*part as usize][*place as usize] = VertexId::new(count);
             }
-            count += 1;
         }
         nodes.dedup_by_key(|(id, _)| *id);
         (local, nodes)
