@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 use tetmill::comm::{Communicator, mpi};
 use tetmill::error::{Failure, agree};
+use tetmill::io::elmer;
 use tetmill::pipeline;
 use tetmill::progress::Progress;
 use tetmill::repartition::Method;
@@ -16,8 +17,13 @@ const STAGES: u64 = 5;
 
 /// `tetmill repartition`
 pub fn run_repartition(options: &Repartition) -> Result<(), Failure> {
-    if options.parts.is_none() && !mpi::launched() {
-        return Err(Failure::input("how many parts? say so with -n"));
+    if !mpi::launched() {
+        let parts = options.parts.ok_or_else(|| Failure::input("how many parts? say so with -n"))?;
+        // Before a thread is started for each.
+        let tets = elmer::stated_elements(&options.directory).map_err(Failure::input)?;
+        if u64::from(parts) > tets {
+            return Err(Failure::input(format!("{parts} parts, but only {tets} tets")));
+        }
     }
     set_threads(options.threads)?;
     let start = Instant::now();

@@ -30,7 +30,7 @@ pub use load::{LoadError, Loaded, load};
 pub(crate) use names::names_of;
 pub use parse::ReadError;
 pub use read::{BoundaryElement, Element, ElmerMesh, ElmerPart, Header, Layout, Node, SharedNode};
-pub use read::{layouts, read, read_layout};
+pub use read::{layouts, read, read_layout, stated_elements};
 pub use write::write;
 
 /// Elmer's code of a tet with four vertices.

@@ -208,6 +208,22 @@ pub fn read_layout(layout: &Layout) -> Result<ElmerMesh, ReadError> {
     Ok(ElmerMesh { layout: layout.clone(), parts })
 }
 
+/// How many elements the headers of the mesh in a folder state: of its only partition, else of `mesh.*`.
+///
+/// # Errors
+/// As [`read`].
+pub fn stated_elements(dir: &Path) -> Result<u64, ReadError> {
+    let stated = |stem: PathBuf, partitioned| {
+        read_header(&file(&stem, "header"), partitioned).map(|header| u64::from(header.elements))
+    };
+    match only_layout(dir)? {
+        Layout::Serial(folder) => stated(folder.join("mesh"), false),
+        Layout::Partitioned { folder, parts } => {
+            (1..=parts).map(|part| stated(folder.join(format!("part.{part}")), true)).sum()
+        }
+    }
+}
+
 pub(super) fn read_part(stem: PathBuf, partitioned: bool) -> Result<ElmerPart, ReadError> {
     Ok(ElmerPart {
         header: read_header(&file(&stem, "header"), partitioned)?,
