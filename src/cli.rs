@@ -31,6 +31,9 @@ pub enum Command {
     /// curves and surfaces of a geometry, so that refining the mesh again would not round it.
     #[command(after_help = STATUS)]
     Repartition(Repartition),
+    /// Cut a geometry by planes into parts with equal shares of the tets, as a geometry
+    #[command(after_help = STATUS)]
+    Decompose(Decompose),
     /// Show the bodies, corners, curves, patches, boundary numbers and names of a geometry
     Inspect(Inspect),
     /// Check a written Elmer mesh: every fault, with ids and places
@@ -121,6 +124,9 @@ pub struct Generate {
     /// Pieces of each coarse edge: makes N³ tets of one; a number beside 1, 2, 4, 8, … of levels
     #[arg(long, value_name = "N", conflicts_with = "levels", value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_PIECES)))]
     pub pieces: Option<u32>,
+    /// How planes are chosen (method decompose)
+    #[command(flatten)]
+    pub planes: PlaneOptions,
     /// Memory for fine vertices on each machine (bytes, 8e9 is understood) [default: what it has left]: where all do not
     /// fit, those inside coarse tets are computed anew wherever they are needed
     #[arg(long, value_name = "BYTES", value_parser = count)]
@@ -219,6 +225,58 @@ pub struct MeshFile {
     pub quiet: bool,
 }
 
+/// `tetmill decompose`
+#[derive(Args, Debug)]
+pub struct Decompose {
+    /// What is cut
+    #[command(flatten)]
+    pub input: InputOptions,
+    /// File to write (.geo)
+    #[arg(short, long, value_name = "FILE.geo")]
+    pub output: PathBuf,
+    /// Number of parts
+    #[arg(short = 'n', long, value_name = "P", value_parser = clap::value_parser!(u32).range(1..))]
+    pub parts: u32,
+    /// How planes are chosen
+    #[command(flatten)]
+    pub planes: PlaneOptions,
+    /// Pieces that each edge of the coarse mesh stands for: planes keep clear of what is nearer than the fine edges
+    #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_PIECES)))]
+    pub pieces: u32,
+    /// Sizes of the coarse mesh that the planes are chosen by
+    #[command(flatten)]
+    pub size: SizeOptions,
+    /// Say nothing but errors
+    #[arg(short, long)]
+    pub quiet: bool,
+}
+
+/// How the planes are chosen that cut a geometry.
+#[derive(Args, Debug, Clone)]
+pub struct PlaneOptions {
+    /// Planes that are considered where the geometry is cut
+    #[arg(long, value_enum, default_value_t = Planes::Best)]
+    pub planes: Planes,
+    /// Cut by the planes of this file instead: a line each, a point and a normal; each cuts all pieces that it meets
+    #[arg(long, value_name = "FILE")]
+    pub planes_from: Option<PathBuf>,
+}
+
+/// Which planes are considered.
+#[derive(ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Planes {
+    /// All of the following, but the last
+    Best,
+    /// Across the axes
+    Axes,
+    /// Across the principal axes of each piece
+    Principal,
+    /// In random directions
+    Random,
+    /// Through the middle, across the longest side, whatever is there
+    Median,
+}
+
 /// `tetmill inspect`
 #[derive(Args, Debug)]
 pub struct Inspect {
@@ -261,7 +319,7 @@ pub enum Method {
     Refine,
     /// Coarse mesh, partitioned; the skins of the parts refined, and each meshed inside by the sizes
     Surface,
-    /// Cut the geometry into parts, mesh each (not yet)
+    /// Geometry cut by planes, each piece meshed
     Decompose,
 }
 

@@ -1,7 +1,10 @@
 //! What the commands do: from the options to a written mesh and a summary.
 
+mod decompose;
 mod repartition;
 
+use decompose::cut_settings;
+pub use decompose::run_decompose;
 pub use repartition::run_repartition;
 
 use crate::cli::{Check, Format, Generate, InputOptions, Inspect, MeshFile, Method, Quality, SizeOptions};
@@ -26,7 +29,6 @@ use tetmill::{memory, picture, quality};
 
 /// `tetmill generate`
 pub fn run_generate(options: &Generate) -> Result<(), Failure> {
-    method_of(options)?;
     set_threads(options.threads)?;
     let start = Instant::now();
     on_ranks(options.ranks, options.parts, |comm| generate_on(comm, options, start))
@@ -76,7 +78,7 @@ fn method_of(options: &Generate) -> Result<pipeline::Method, Failure> {
     match options.method {
         Method::Refine => Ok(pipeline::Method::Refine),
         Method::Surface => Ok(pipeline::Method::Surface),
-        Method::Decompose => Ok(pipeline::Method::Decompose),
+        Method::Decompose => cut_settings(&options.planes).map(pipeline::Method::Decompose),
     }
 }
 
@@ -104,10 +106,8 @@ fn generate_on(comm: &dyn Communicator, options: &Generate, start: Instant) -> R
         options.input.files[0].with_extension("").file_name().map_or_else(|| "mesh".into(), PathBuf::from)
     });
     let disk = Some(disk_for(&options.format, &target));
-    let method = method_of(options)?;
-    let cuts = pipeline::CutSettings::default();
-    let settings =
-        GenerateSettings { method, cuts, coarse, wanted: wanted(options), memory: options.memory, disk };
+    let method = agree(comm, method_of(options))?;
+    let settings = GenerateSettings { method, coarse, wanted: wanted(options), memory: options.memory, disk };
     let made = generate(comm, model.as_ref(), &settings, &progress)?;
     let stem = target.join(options.input.files[0].file_stem().unwrap_or("mesh".as_ref()));
     let written = progress.stage("write", || {
@@ -363,7 +363,6 @@ pub fn run_mesh(options: &MeshFile) -> Result<(), Failure> {
     };
     let settings = GenerateSettings {
         method: pipeline::Method::default(),
-        cuts: pipeline::CutSettings::default(),
         coarse: coarse_settings(&options.size, true)?,
         wanted,
         memory: None,

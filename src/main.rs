@@ -9,6 +9,7 @@ use std::process::ExitCode;
 
 fn main() -> ExitCode {
     let done = match Cli::parse().command {
+        Command::Decompose(options) => commands::run_decompose(&options),
         Command::Generate(options) => commands::run_generate(&options),
         Command::Mesh(options) => commands::run_mesh(&options),
         Command::Repartition(options) => commands::run_repartition(&options),

@@ -2,6 +2,7 @@
 
 mod cli;
 mod common;
+mod decompose;
 mod geometries;
 mod inputs;
 mod kept;

@@ -1,9 +1,12 @@
 //! What is known of a geometry before it is cut, from a coarse mesh of it.
 
 use super::plan::{CORNER, CutPlane, meeting_point};
-use crate::mesh::{Mesh, TET_EDGES};
-use crate::{Point, Vector};
-use csg::Features;
+use crate::comm::thread;
+use crate::dist::distribute;
+use crate::error::Failure;
+use crate::mesh::{Class, Mesh, TET_EDGES};
+use crate::pipeline::CsgModel;
+use crate::{Point, Vector, skin};
 
 /// A point that stands for a share of the fine tets, the same for all.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,49 +47,57 @@ pub struct Evidence {
     corners: Vec<(Point, f64)>,
 }
 
+/// The boundary is refined into so many pieces at most.
+const MOST_PIECES: u32 = 4;
+
 /// Samples for each part, about.
 const SAMPLES: usize = 1500;
 
 impl Evidence {
-    /// Of a coarse mesh whose edges will be cut into so many `pieces`, for so many `parts`.
-    pub fn of(mesh: &Mesh, features: &Features, pieces: u32, parts: u32) -> Self {
+    /// Of a coarse mesh whose edges will be cut into so many `pieces`, for so many `parts`. The boundary is refined, since coarse
+    /// triangles tell too little of where planes will meet on it.
+    ///
+    /// # Errors
+    /// A mesh that cannot be refined.
+    pub fn of(mesh: &Mesh, whole: &CsgModel, pieces: u32, parts: u32) -> Result<Self, Failure> {
         let mut evidence = Self::default();
         let in_tet = (SAMPLES * parts as usize).div_ceil(mesh.tets.len().max(1));
         // C(k + 2, 3) points in a tet with k to an edge.
         let k = (1_usize..).find(|k| k * (k + 1) * (k + 2) / 6 >= in_tet).unwrap_or(1);
-        let mut shortest = vec![f64::INFINITY; mesh.points.len()];
         for tet in &mesh.tets {
             let corners = tet.map(|v| mesh.points[v.index()]);
-            let lengths = TET_EDGES.map(|[a, b]| (corners[b] - corners[a]).norm());
-            for ([a, b], length) in TET_EDGES.into_iter().zip(lengths) {
-                for v in [tet[a], tet[b]] {
-                    shortest[v.index()] = shortest[v.index()].min(length / f64::from(pieces));
-                }
-            }
-            let edge = lengths.iter().sum::<f64>() / 6.0;
+            let edge = TET_EDGES.map(|[a, b]| (corners[b] - corners[a]).norm()).iter().sum::<f64>() / 6.0;
             let width = edge / k as f64;
             let near = width.max(CLEAR * edge / f64::from(pieces));
             evidence.samples.extend(grid(&corners, k).map(|point| Sample { point, width, near }));
         }
-        for triangle in &mesh.triangles {
-            let corners = triangle.vertices.map(|v| mesh.points[v.index()]);
+        let comm = thread::alone();
+        let given = (mesh.clone(), vec![0; mesh.tets.len()]);
+        let coarse = distribute(&comm, Some(given))?;
+        let n = pieces.min(MOST_PIECES);
+        let skin = skin::skin(&coarse, &whole.projector.clone().into(), n)?.skin;
+        // Edges of the fine mesh beside those of this one.
+        let finer = f64::from(n) / f64::from(pieces);
+        let edge = |a: u32, b: u32| (skin.points[b as usize] - skin.points[a as usize]).norm();
+        for [a, b, c] in skin.triangles.iter().map(|t| t.vertices) {
+            let corners = [a, b, c].map(|v| skin.points[v as usize]);
             let normal = (corners[1] - corners[0]).cross(&(corners[2] - corners[0]));
-            let size = triangle.vertices.map(|v| shortest[v.index()]).iter().sum::<f64>() / 3.0;
+            let size = finer * (edge(a, b) + edge(b, c) + edge(c, a)) / 3.0;
             let (area, normal) = (0.5 * normal.norm(), normal.normalize());
             evidence.faces.push(Face { corners, normal, cells: area / (size * size), size });
         }
+        for ([a, b], _) in skin.edges.iter().filter(|(_, class)| matches!(class, Class::Curve(_))) {
+            let ends = [*a, *b].map(|v| skin.points[v as usize]);
+            evidence.curves.push(Piece { ends, size: finer * edge(*a, *b) });
+        }
         let size_near = |point: &Point| {
-            let near = |face: &Face| face.corners.iter().map(|c| (c - point).norm()).fold(f64::MAX, f64::min);
-            let nearest = evidence.faces.iter().min_by(|a, b| near(a).total_cmp(&near(b)));
+            let to = |face: &Face| (face.corners[0] - point).norm_squared();
+            let nearest = evidence.faces.iter().min_by(|a, b| to(a).total_cmp(&to(b)));
             nearest.map_or(0.0, |face| face.size)
         };
-        evidence.corners = features.corners.iter().map(|c| (c.point, size_near(&c.point))).collect();
-        for segment in &mesh.segments {
-            let ends = segment.vertices.map(|v| mesh.points[v.index()]);
-            let size = segment.vertices.map(|v| shortest[v.index()]).iter().sum::<f64>() / 2.0;
-            evidence.curves.push(Piece { ends, size });
-        }
-        evidence
+        let corners = whole.features.corners.iter();
+        evidence.corners = corners.map(|corner| (corner.point, size_near(&corner.point))).collect();
+        Ok(evidence)
     }
 
     /// That which reaches into a piece of space.

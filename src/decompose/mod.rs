@@ -13,6 +13,7 @@ pub mod cut;
 mod evidence;
 mod plan;
 mod skins;
+mod text;
 
 #[cfg(test)]
 mod tests;
@@ -21,3 +22,4 @@ pub use cut::{CutError, CutModel};
 pub use evidence::{Evidence, Sample};
 pub use plan::{Candidates, CutPlane, Cuts, Half, Settings, TooManyParts, plan};
 pub use skins::{LooseEdge, pack, skins, unpack};
+pub use text::geo_text;

@@ -101,7 +101,7 @@ pub enum Candidates {
 }
 
 /// How planes are chosen.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
     /// Which planes are considered.
     pub candidates: Candidates,

@@ -1,1 +1,209 @@
+//! Boxes, a ball and two bodies in pieces.
 
+use super::*;
+use crate::comm::thread;
+use crate::pipeline::{
+    CoarseSettings, CsgModel, CutSettings, GenerateSettings, Method, Model, Wanted, generate,
+};
+use crate::progress::Progress;
+use crate::skin::Skin;
+use crate::{Point, Vector};
+use csg::BodyId;
+
+const BAR: &str = "algebraic3d
+solid bar = orthobrick (0, 0, 0; 4, 1, 1) -maxh=0.5;
+tlo bar;";
+
+/// A ball in a box, with a boundary of its own name.
+const PEARL: &str = "algebraic3d
+solid pearl = sphere (0, 0, 0; 1) -bcname=skin;
+solid box = orthobrick (-2, -2, -2; 2, 2, 2) and not pearl;
+tlo pearl -material=lime; tlo box -transparent;";
+
+fn model(source: &str) -> CsgModel {
+    CsgModel::new(csg::language::parse_geometry(source, "test.geo").expect("a geometry").geometry)
+        .expect("features")
+}
+
+fn evidence(model: &CsgModel, parts: u32) -> Evidence {
+    let whole = Model::Csg(Box::new(model.clone()));
+    let made = whole.coarse_mesh(&mut CoarseSettings::default()).expect("a mesh");
+    Evidence::of(&made.mesh, model, 2, parts).expect("a mesh that can be refined")
+}
+
+fn plane(point: [f64; 3], normal: [f64; 3]) -> CutPlane {
+    CutPlane { point: point.into(), normal: Vector::from(normal) }
+}
+
+/// The shares of the samples in each piece, times the pieces.
+fn shares(cuts: &Cuts, evidence: &Evidence) -> Vec<f64> {
+    let mut shares = vec![0.0; cuts.leaves.len()];
+    let one = cuts.leaves.len() as f64 / evidence.samples.len() as f64;
+    evidence.samples.iter().for_each(|sample| shares[cuts.leaf_of(&sample.point)] += one);
+    shares
+}
+
+#[test]
+fn a_bar_is_cut_across_into_equal_parts_of_any_number() {
+    let bar = model(BAR);
+    for parts in [1, 2, 3, 4] {
+        let evidence = evidence(&bar, parts);
+        let cuts = plan(&evidence, parts, &Settings::default()).expect("enough tets");
+        assert_eq!((cuts.leaves.len(), cuts.planes.len()), (parts as usize, parts as usize - 1));
+        for plane in &cuts.planes {
+            assert!(plane.normal.x.abs() > 0.999, "{parts} parts: {plane:?}");
+        }
+        let shares = shares(&cuts, &evidence);
+        assert!(shares.iter().all(|share| (share - 1.0).abs() < 0.05), "{parts} parts: {shares:?}");
+        assert_eq!(plan(&evidence, parts, &Settings::default()).expect("the same"), cuts);
+    }
+}
+
+#[test]
+fn more_parts_than_can_be_told_apart_are_refused() {
+    let bar = model(BAR);
+    let few = evidence(&bar, 1);
+    let parts = few.samples.len() as u32;
+    assert_eq!(plan(&few, parts, &Settings::default()), Err(TooManyParts { parts }));
+}
+
+#[test]
+fn planes_of_the_user_cut_what_they_meet() {
+    let evidence = evidence(&model(BAR), 4);
+    let across = plane([1.0, 0.0, 0.0], [1.0, 0.0, 0.0]);
+    let outside = plane([9.0, 0.0, 0.0], [1.0, 0.0, 0.0]);
+    let along = plane([0.0, 0.5, 0.0], [0.0, 1.0, 0.0]);
+    let cuts = Cuts::by_planes(&[across, outside, along], &evidence);
+    assert_eq!(cuts.leaves.len(), 4);
+    let leaves =
+        [[0.5, 0.2], [0.5, 0.8], [2.0, 0.2], [2.0, 0.8]].map(|[x, y]| cuts.leaf_of(&Point::new(x, y, 0.5)));
+    assert_eq!(leaves, [0, 1, 2, 3]);
+}
+
+#[test]
+fn what_lies_on_the_geometry_keeps_its_patch_and_cuts_lie_in_their_body() {
+    let whole = model(PEARL);
+    let cuts = Cuts::by_planes(&[plane([0.0, 0.0, 0.1], [0.0, 0.6, 0.8])], &evidence(&whole, 2));
+    let all: Vec<(usize, BodyId)> =
+        [0, 1].into_iter().flat_map(|part| [0, 1].map(|b| (part, BodyId(b)))).collect();
+    let cut = CutModel::new(&whole, &cuts, all).expect("pieces");
+    let mut inside = [0, 0];
+    let mut seen = vec![0; whole.features.patches.len()];
+    for (patch, face) in cut.model.features.patches.iter().zip(&cut.faces) {
+        match *face {
+            cut::Face::Old(id, _) => {
+                seen[id.index()] += 1;
+                assert_eq!(whole.features.patch(id).surface, patch.surface);
+            }
+            cut::Face::Cut(body) => inside[body.index()] += 1,
+        }
+    }
+    assert_eq!(inside, [1, 1], "a disc in the ball, and what is round it");
+    assert!(
+        seen.iter().all(|&count| count == 1 || count == 2),
+        "each patch is there, whole or in two: {seen:?}"
+    );
+    assert_eq!(seen.iter().filter(|&&count| count == 2).count(), 5, "the sphere and four sides");
+}
+
+#[test]
+fn a_piece_that_was_forgotten_is_found_out() {
+    let whole = model(PEARL);
+    let cuts = Cuts::by_planes(&[plane([0.0, 0.0, 0.1], [0.0, 0.6, 0.8])], &evidence(&whole, 2));
+    let pieces = vec![(0, BodyId(0)), (0, BodyId(1)), (1, BodyId(1))];
+    assert!(matches!(CutModel::new(&whole, &cuts, pieces), Err(CutError::NewFace { .. })));
+}
+
+#[test]
+fn the_text_of_the_pieces_is_a_geometry_of_the_same_volume_and_names() {
+    let whole = model(PEARL);
+    let cuts = Cuts::by_planes(&[plane([0.0, 0.0, 0.1], [0.0, 0.6, 0.8])], &evidence(&whole, 2));
+    let pieces: Vec<(usize, BodyId)> =
+        [0, 1].into_iter().flat_map(|part| [0, 1].map(|b| (part, BodyId(b)))).collect();
+    let text = geo_text(PEARL, &whole.geometry, &cuts, &pieces);
+    let parsed = csg::language::parse_geometry(&text, "cut.geo").expect("a geometry");
+    assert!(parsed.warnings.is_empty(), "{:?}", parsed.warnings);
+    let materials: Vec<_> = parsed.geometry.bodies.iter().filter_map(|body| body.material.clone()).collect();
+    assert_eq!(materials, ["lime", "box", "lime", "box"]);
+    let cut = CsgModel::new(parsed.geometry).expect("features");
+    let sphere = cut.features.patches.iter().filter(|patch| patch.name == "skin").count();
+    assert_eq!(sphere, 2);
+}
+
+#[test]
+fn a_skin_is_the_same_after_a_message() {
+    let skin = |sources: &[u32]| -> Skin {
+        let mut skin = Skin { names: vec![3, 9], on_triangles: 1, ..Skin::default() };
+        skin.points = vec![Point::new(1.0, 2.0, 3.0), Point::new(-0.0, 5e-324, 1e300)];
+        skin.classes = vec![crate::mesh::Class::Curve(csg::CurveId(4)), crate::mesh::Class::Body(BodyId(1))];
+        skin.triangles = vec![crate::skin::SkinTriangle {
+            vertices: [0, 1, 0],
+            beside: [Some(BodyId(1)), None],
+            patch: Some((csg::PatchId(2), false)),
+        }];
+        skin.edges = vec![([0, 1], crate::mesh::Class::Patch(csg::PatchId(7)))];
+        skin.shared.push(1, sources.iter().copied());
+        skin
+    };
+    let sent = skin(&[0, 2]);
+    let message = pack(&sent);
+    let mut rest = &message[..];
+    assert_eq!(format!("{:?}", unpack(&mut rest)), format!("{sent:?}"));
+    assert!(rest.is_empty());
+}
+
+#[test]
+fn pieces_meshed_each_on_its_rank_are_one_mesh() {
+    let whole = Model::Csg(Box::new(model(PEARL)));
+    let settings = |planes| GenerateSettings {
+        method: Method::Decompose(CutSettings { planes, ..CutSettings::default() }),
+        coarse: CoarseSettings::default(),
+        wanted: Wanted::Sizes { pieces: 1 },
+        memory: None,
+        disk: None,
+    };
+    for (ranks, planes) in [(1, vec![]), (5, vec![]), (2, vec![plane([0.0, 0.0, 0.1], [0.0, 0.6, 0.8])])] {
+        let settings = settings(planes);
+        let made = thread::run(ranks, |comm| {
+            let model = (comm.rank() == 0).then_some(&whole);
+            let made = generate(comm, model, &settings, &Progress::new(true, 9))
+                .map_err(|error| error.to_string())?;
+            Ok::<_, String>((
+                made.check.faults,
+                made.checksum.open,
+                made.check.volume,
+                made.part.stream().counts().tets,
+            ))
+        });
+        for made in made.expect("no rank fails") {
+            let (faults, open, volume, tets) = made.expect("a mesh");
+            assert_eq!((faults, open), (0, 0));
+            assert!((volume - 64.0).abs() < 1e-11, "{ranks} ranks: {volume}");
+            assert!(tets > 0);
+        }
+    }
+}
+
+#[test]
+fn what_is_no_geometry_is_not_cut() {
+    let settings = GenerateSettings {
+        method: Method::Decompose(CutSettings {
+            planes: vec![plane([9.0; 3], [0.0, 0.0, 1.0])],
+            ..CutSettings::default()
+        }),
+        coarse: CoarseSettings::default(),
+        wanted: Wanted::Sizes { pieces: 1 },
+        memory: None,
+        disk: None,
+    };
+    let whole = Model::Csg(Box::new(model(BAR)));
+    let refused = thread::run(2, |comm| {
+        let model = (comm.rank() == 0).then_some(&whole);
+        generate(comm, model, &settings, &Progress::new(true, 9))
+            .map(|_| ())
+            .map_err(|error| error.to_string())
+    });
+    for refused in refused.expect("no rank panics") {
+        assert!(refused.expect_err("one piece for two parts").contains("1 pieces, for 2 parts"));
+    }
+}

@@ -23,7 +23,6 @@ fn settings(levels: u32, sources: &[Source]) -> GenerateSettings {
     let size = SizeSettings { sources: sources.to_vec(), ..Preset::VeryCoarse.into() };
     GenerateSettings {
         method: Method::Refine,
-        cuts: crate::pipeline::CutSettings::default(),
         coarse: CoarseSettings::from(size),
         wanted: Wanted::Sizes { pieces: 1 << levels },
         memory: None,

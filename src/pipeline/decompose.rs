@@ -4,6 +4,7 @@ use super::coarse::{CoarseError, CoarseMesh, MOST_CORRECTIONS};
 use super::generate::{CoarseResult, GenerateSettings};
 use super::model::{CsgModel, Model};
 use super::skins::refuse_periodic;
+use super::target::Outcome;
 use super::wanted::mesh_as_wanted;
 use crate::Point;
 use crate::comm::Communicator;
@@ -15,7 +16,7 @@ use crate::mesh::{Mesh, Rank, VertexId};
 use crate::migrate::BareStream;
 use crate::partition;
 use crate::progress::Progress;
-use crate::size::{GeometricSize, SizeField, Source, SourceTree};
+use crate::size::{SizeField, Source, SourceTree};
 use crate::skin::{self, PartSizes, Skin};
 use crate::surface::curves::{crowded, mesh_curves};
 use crate::surface::{self, SurfaceMesh};
@@ -23,7 +24,7 @@ use csg::{Aabb, BodyId};
 use std::collections::BTreeSet;
 
 /// How a geometry is cut.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct CutSettings {
     /// How planes are chosen, where the user gives none.
     pub plan: decompose::Settings,
@@ -47,10 +48,11 @@ struct Cut {
 pub(super) fn mesh_pieces(
     comm: &dyn Communicator,
     model: Option<&Model>,
+    cuts: &CutSettings,
     settings: &GenerateSettings,
     progress: &Progress,
 ) -> Result<(BareStream, u32, Option<CoarseResult>), Failure> {
-    let cut = agree(comm, model.map(|model| cut(comm.size(), model, settings, progress)).transpose())?;
+    let cut = agree(comm, model.map(|model| cut(comm.size(), model, cuts, settings, progress)).transpose())?;
     let mut numbers = cut.as_ref().map_or(vec![0, 0], |cut| vec![u64::from(cut.pieces), cut.boundary]);
     comm.broadcast(0, &mut numbers)?;
     let [pieces, boundary] = numbers[..] else { panic!("rank 0 sent two numbers") };
@@ -67,39 +69,73 @@ pub(super) fn mesh_pieces(
     Ok((BareStream::new(bare), pieces as u32, coarse))
 }
 
-/// The skins of the pieces, for all ranks.
-fn cut(parts: u32, model: &Model, settings: &GenerateSettings, progress: &Progress) -> Result<Cut, Failure> {
+/// A geometry that is cut, and the coarse mesh that the planes were chosen by.
+pub struct Planned {
+    /// The planes.
+    pub cuts: Cuts,
+    /// The pieces.
+    pub model: CutModel,
+    coarse: CoarseMesh,
+    /// Pieces of each coarse edge.
+    pieces: u32,
+    outcome: Option<Outcome>,
+}
+
+/// Cuts a geometry into so many parts.
+///
+/// # Errors
+/// What is no geometry, what has periodic faces, no coarse mesh, planes that do not fit, pieces that cannot be meshed.
+pub fn planned(
+    parts: u32,
+    model: &Model,
+    cuts: &CutSettings,
+    settings: &GenerateSettings,
+    progress: &Progress,
+) -> Result<Planned, Failure> {
     refuse_periodic(Some(model))?;
     let Model::Csg(whole) = model else {
         return Err(Failure::input(
-            "the method `decompose` cuts geometries (.geo); for triangles and meshes take `refine` or `surface`",
+            "only geometries (.geo) can be cut; for triangles and meshes take the methods `refine` or `surface`",
         ));
     };
-    let (pieces, made, outcome) =
+    let (pieces, coarse, outcome) =
         progress.stage("mesh", || mesh_as_wanted(parts, model, &settings.coarse, settings.wanted, &[]))?;
-    let CoarseMesh { mesh, report } = made;
-    let no_mesh = |error: &dyn std::fmt::Display| Failure::new(Status::NoValidMesh, error.to_string());
-    let (cuts, model) = progress.stage("cut", || {
-        let cuts = plan(whole, &mesh, pieces, parts, &settings.cuts)?;
-        let candidates = candidates(&mesh, &cuts);
-        let model = CutModel::new(whole, &cuts, candidates).map_err(|error| no_mesh(&error))?;
-        Ok::<_, Failure>((cuts, model))
-    })?;
-    let field = GeometricSize::new(&whole.geometry, &whole.features, &settings.coarse.size);
-    let vertex_sizes = skin::at_vertices(&mesh, Some(&field), pieces);
+    progress.stage("cut", || {
+        let cuts = plan(whole, &coarse.mesh, pieces, parts, cuts)?;
+        let candidates = candidates(&coarse.mesh, &cuts);
+        let model = CutModel::new(whole, &cuts, candidates).map_err(no_mesh)?;
+        Ok(Planned { cuts, model, coarse, pieces, outcome })
+    })
+}
+
+fn no_mesh(error: impl std::fmt::Display) -> Failure {
+    Failure::new(Status::NoValidMesh, error.to_string())
+}
+
+/// The skins of the pieces, for all ranks.
+fn cut(
+    parts: u32,
+    model: &Model,
+    cuts: &CutSettings,
+    settings: &GenerateSettings,
+    progress: &Progress,
+) -> Result<Cut, Failure> {
+    let planned = planned(parts, model, cuts, settings, progress)?;
+    let Planned { cuts, model: pieces_of, coarse: CoarseMesh { mesh, report }, pieces, outcome } = planned;
+    let field = model.size_field(&settings.coarse.size);
+    let vertex_sizes = skin::at_vertices(&mesh, field.as_deref(), pieces);
     let sizes = PartSizes::new(mesh.points.clone(), mesh.tets.clone(), vertex_sizes.clone());
-    let surface =
-        progress.stage("surface", || fine_surface(&model.model, &sizes)).map_err(|error| no_mesh(&error))?;
-    let skins = decompose::skins(&model, &surface, parts as usize).map_err(|error| no_mesh(&error))?;
+    let surface = progress.stage("surface", || fine_surface(&pieces_of.model, &sizes)).map_err(no_mesh)?;
+    let skins = decompose::skins(&pieces_of, &surface, parts as usize).map_err(no_mesh)?;
     let message = |skin: &Skin| {
         let mut message = decompose::pack(skin);
         pack_sizes(&mut message, skin, &mesh, &vertex_sizes);
         message
     };
     let messages = skins.iter().map(message).collect();
-    let boundary = surface.triangles.iter().filter(|t| model.is_old(t.patch)).count() as u64;
+    let boundary = surface.triangles.iter().filter(|t| pieces_of.is_old(t.patch)).count() as u64;
     let assigned: Vec<Rank> = mesh.tets.iter().map(|tet| cuts.leaf_of(&centre(&mesh, tet)) as Rank).collect();
-    let partition = partition::assess(&mesh, &assigned, parts).map_err(|error| no_mesh(&error))?;
+    let partition = partition::assess(&mesh, &assigned, parts).map_err(no_mesh)?;
     let coarse = CoarseResult { mesh, parts: assigned, report, outcome, partition };
     Ok(Cut { pieces, coarse, messages, boundary })
 }
@@ -116,7 +152,7 @@ fn plan(
     parts: u32,
     settings: &CutSettings,
 ) -> Result<Cuts, Failure> {
-    let evidence = Evidence::of(mesh, &whole.features, pieces, parts);
+    let evidence = Evidence::of(mesh, whole, pieces, parts)?;
     if settings.planes.is_empty() {
         return decompose::plan(&evidence, parts, &settings.plan).map_err(Failure::input);
     }

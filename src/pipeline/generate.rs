@@ -25,7 +25,7 @@ use crate::refine::{self, RefineError, RefinedMesh};
 use crate::size::Source;
 
 /// What becomes of the parts of a coarse mesh.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub enum Method {
     /// They are refined uniformly (the thesis' second method).
     #[default]
@@ -33,7 +33,7 @@ pub enum Method {
     /// Their skins are, and each is meshed inside (the third).
     Surface,
     /// The geometry itself is cut, and each piece is meshed (the first).
-    Decompose,
+    Decompose(CutSettings),
 }
 
 /// What is to be made.
@@ -41,8 +41,6 @@ pub enum Method {
 pub struct GenerateSettings {
     /// What becomes of the coarse mesh.
     pub method: Method,
-    /// How the geometry is cut, by [`Method::Decompose`].
-    pub cuts: CutSettings,
     /// How the coarse mesh is made.
     pub coarse: CoarseSettings,
     /// How many tets.
@@ -116,8 +114,8 @@ pub fn generate(
     settings: &GenerateSettings,
     progress: &Progress,
 ) -> Result<Generated, Failure> {
-    if settings.method == Method::Decompose {
-        return decomposed(comm, model, settings, progress);
+    if let Method::Decompose(cuts) = &settings.method {
+        return decomposed(comm, model, cuts, settings, progress);
     }
     let mut sources: Vec<Source> = Vec::new();
     for round in 0.. {
@@ -202,11 +200,12 @@ fn fill(
 fn decomposed(
     comm: &dyn Communicator,
     model: Option<&Model>,
+    cuts: &CutSettings,
     settings: &GenerateSettings,
     progress: &Progress,
 ) -> Result<Generated, Failure> {
     let (names, projector) = broadcast_geometry(comm, model)?;
-    let (part, pieces, coarse) = decompose::mesh_pieces(comm, model, settings, progress)?;
+    let (part, pieces, coarse) = decompose::mesh_pieces(comm, model, cuts, settings, progress)?;
     stored(comm, part, Whole { names, projector, pieces, coarse, refused: None }, progress)
 }
 
