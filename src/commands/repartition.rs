@@ -17,6 +17,8 @@ const STAGES: u64 = 5;
 
 /// `tetmill repartition`
 pub fn run_repartition(options: &Repartition) -> Result<(), Failure> {
+    // First: reading already uses the threads.
+    set_threads(options.threads)?;
     if !mpi::launched() {
         let parts = options.parts.ok_or_else(|| Failure::input("how many parts? say so with -n"))?;
         // Before a thread is started for each.
@@ -25,7 +27,6 @@ pub fn run_repartition(options: &Repartition) -> Result<(), Failure> {
             return Err(Failure::input(format!("{parts} parts, but only {tets} tets")));
         }
     }
-    set_threads(options.threads)?;
     let start = Instant::now();
     on_ranks(None, options.parts, |comm| repartition_on(comm, options, start))
 }
