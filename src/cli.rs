@@ -25,6 +25,12 @@ pub enum Command {
     /// Make the coarse mesh alone, in one part and one file
     #[command(after_help = STATUS)]
     Mesh(MeshFile),
+    /// Read a partitioned Elmer mesh, give its tets to another number of parts, check and write it
+    ///
+    /// Ours or ElmerGrid's, of tets without halo. Each rank reads some of the parts; none sees the whole mesh. Such files tell nothing of the
+    /// curves and surfaces of a geometry, so that refining the mesh again would not round it.
+    #[command(after_help = STATUS)]
+    Repartition(Repartition),
     /// Cut a geometry by planes into parts with equal shares of the tets, as a geometry
     #[command(after_help = STATUS)]
     Decompose(Decompose),
@@ -103,7 +109,7 @@ pub struct Generate {
     /// Number of in-process ranks [default: 1; under mpirun the ranks are MPI's]
     #[arg(short = 'n', long, value_name = "RANKS", value_parser = clap::value_parser!(u32).range(1..))]
     pub ranks: Option<u32>,
-    /// Number of parts to write [default: the ranks]
+    /// Number of parts to write [default: the ranks]; under mpirun more or fewer than these are dealt out to them
     #[arg(long, value_name = "P", value_parser = clap::value_parser!(u32).range(1..))]
     pub parts: Option<u32>,
     /// Number of threads in all [default: the cores]
@@ -146,6 +152,48 @@ pub struct Generate {
     /// Say nothing but errors
     #[arg(short, long)]
     pub quiet: bool,
+}
+
+/// `tetmill repartition`
+#[derive(Args, Debug)]
+pub struct Repartition {
+    /// Folder with the mesh: one partitioning.M in it, or that folder itself, with mesh.names beside; or mesh.*
+    pub directory: PathBuf,
+    /// Number of parts wanted, each on an in-process rank [default under mpirun: MPI's ranks; other numbers are dealt out to them]
+    #[arg(short = 'n', long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    pub parts: Option<u32>,
+    /// Folder to write to
+    #[arg(short, long, value_name = "DIR")]
+    pub output: PathBuf,
+    /// How tets are given to parts [default: graph, in a build with METIS]
+    #[arg(short, long, value_enum)]
+    pub method: Option<PartitionMethod>,
+    /// Number of threads in all [default: the cores]
+    #[arg(short, long, value_name = "THREADS", value_parser = clap::value_parser!(u32).range(1..))]
+    pub threads: Option<u32>,
+    /// What to write, with commas between, or none
+    #[arg(short, long, value_enum, value_delimiter = ',', default_value = "elmer")]
+    pub format: Vec<Format>,
+    /// Read the written Elmer mesh again and check it
+    #[arg(long)]
+    pub check: bool,
+    /// Write the summary as JSON
+    #[arg(long, value_name = "FILE.json")]
+    pub report: Option<PathBuf>,
+    /// Say nothing but errors
+    #[arg(short, long)]
+    pub quiet: bool,
+}
+
+/// How tets are given to parts.
+#[derive(ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PartitionMethod {
+    /// Equal stretches of a Hilbert curve: balanced to one tet, fast
+    Curve,
+    /// The same with fewer faces between parts, balanced to one percent
+    SmoothedCurve,
+    /// METIS on clusters of tets, then fewer faces between parts: the best, balanced to one percent
+    Graph,
 }
 
 /// `tetmill mesh`

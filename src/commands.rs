@@ -1,18 +1,22 @@
 //! What the commands do: from the options to a written mesh and a summary.
 
 mod decompose;
+mod repartition;
 
 use decompose::cut_settings;
 pub use decompose::run_decompose;
+pub use repartition::run_repartition;
 
 use crate::cli::{Check, Format, Generate, InputOptions, Inspect, MeshFile, Method, Quality, SizeOptions};
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
-use tetmill::comm::{Communicator, mpi, thread};
+use tetmill::comm::{Communicator, grouped, mpi, thread};
 use tetmill::error::{Failure, Status, agree};
 use tetmill::inspect::Inspection;
 use tetmill::io::{self, Written, elmer};
+use tetmill::kernel::random::mix;
+use tetmill::mesh::Names;
 use tetmill::mesh::stream::MeshStream;
 use tetmill::pipeline::input::{self, InputSettings};
 use tetmill::pipeline::part::{Balance, balance};
@@ -27,22 +31,34 @@ use tetmill::{memory, picture, quality};
 pub fn run_generate(options: &Generate) -> Result<(), Failure> {
     set_threads(options.threads)?;
     let start = Instant::now();
+    on_ranks(options.ranks, options.parts, |comm| generate_on(comm, options, start))
+}
+
+/// Runs a command on a rank for each part. Parts are as many as were asked for, else as ranks (one, if none were asked for); under `mpirun`
+/// ranks are processes, and where parts are more or fewer, some processes have several of them or none.
+fn on_ranks(
+    ranks: Option<u32>,
+    parts: Option<u32>,
+    command: impl Fn(&dyn Communicator) -> Result<(), Failure> + Sync,
+) -> Result<(), Failure> {
     if mpi::launched() {
-        let ranks_given = options.ranks.or(options.parts);
         let done = mpi::run(|comm| {
-            let done = match ranks_given {
-                Some(ranks) if ranks != comm.size() => Err(Failure::input(format!(
-                    "{ranks} ranks are asked for, but mpirun started {}: leave out -n and --parts",
+            let done = match (ranks, parts) {
+                (Some(ranks), _) if ranks != comm.size() => Err(Failure::input(format!(
+                    "{ranks} ranks are asked for, but mpirun started {}: leave out -n",
                     comm.size()
                 ))),
-                _ => generate_on(comm, options, start),
+                (_, Some(parts)) if parts != comm.size() => {
+                    let ran = grouped::run(comm, parts, &command).map_err(Failure::from);
+                    agree(comm, ran.and_then(|results| results.into_iter().collect()))
+                }
+                _ => command(comm),
             };
             done.map_err(|failure| tell_once(comm, failure))
         });
         return done.map_err(Failure::input)?;
     }
-    let ranks = options.parts.or(options.ranks).unwrap_or(1);
-    let results = thread::run(ranks, |comm| generate_on(comm, options, start))?;
+    let results = thread::run(parts.or(ranks).unwrap_or(1), command)?;
     results.into_iter().collect()
 }
 
@@ -93,7 +109,10 @@ fn generate_on(comm: &dyn Communicator, options: &Generate, start: Instant) -> R
     let method = agree(comm, method_of(options))?;
     let settings = GenerateSettings { method, coarse, wanted: wanted(options), memory: options.memory, disk };
     let made = generate(comm, model.as_ref(), &settings, &progress)?;
-    let written = progress.stage("write", || write_all(comm, options, &made, &target))?;
+    let stem = target.join(options.input.files[0].file_stem().unwrap_or("mesh".as_ref()));
+    let written = progress.stage("write", || {
+        write_formats(comm, made.part.stream(), &made.names, &options.format, &target, &stem)
+    })?;
     if options.check && options.format.contains(&Format::Elmer) {
         let checked = if first { progress.stage("read back", || check_written(&target)) } else { Ok(()) };
         agree(comm, checked)?;
@@ -197,22 +216,21 @@ fn disk_for(formats: &[Format], folder: &Path) -> Disk {
     }
 }
 
-/// **Collective.** Writes each format.
-fn write_all(
+/// **Collective.** Writes each format into a folder; files of those that do not fill one are called `stem`.
+fn write_formats(
     comm: &dyn Communicator,
-    options: &Generate,
-    made: &Generated,
+    part: &dyn MeshStream,
+    names: &Names,
+    formats: &[Format],
     dir: &Path,
+    stem: &Path,
 ) -> Result<Written, Failure> {
     let mut written = Written::default();
-    let stem = dir.join(options.input.files[0].file_stem().unwrap_or("mesh".as_ref()));
-    for format in &options.format {
+    for format in formats {
         written += match format {
-            Format::Elmer => elmer::write(comm, made.part.stream(), &made.names, dir)?,
-            Format::Vtu => io::vtu::write(comm, made.part.stream(), &made.names, &stem)?,
-            Format::Geomview => {
-                io::geomview::write(comm, made.part.stream(), &io::geomview::Settings::default(), &stem)?
-            }
+            Format::Elmer => elmer::write(comm, part, names, dir)?,
+            Format::Vtu => io::vtu::write(comm, part, names, stem)?,
+            Format::Geomview => io::geomview::write(comm, part, &io::geomview::Settings::default(), stem)?,
             Format::None => Written::default(),
         };
     }
@@ -247,13 +265,14 @@ fn draw(
     agree(comm, drawn.map_err(Failure::from))
 }
 
-/// **Collective.** Peak memory: of this process for in-process ranks, of all processes under MPI.
+/// **Collective.** Peak memory of all processes that ranks run in, each once.
 fn total_memory(comm: &dyn Communicator) -> Result<Option<u64>, Failure> {
-    let mine = memory::peak_bytes();
-    if !mpi::launched() {
-        return Ok(mine);
-    }
-    let [sum] = comm.all_reduce_sum_u64([mine.unwrap_or(0)])?;
+    let machine = memory::machine().bytes().fold(0, |hash, byte| mix(hash ^ u64::from(byte)));
+    let bytes = memory::peak_bytes().unwrap_or(0);
+    let mut all = comm.all_gather_one([machine, u64::from(std::process::id()), bytes])?;
+    all.sort_unstable();
+    all.dedup_by_key(|[machine, process, _]| [*machine, *process]);
+    let sum: u64 = all.iter().map(|[.., bytes]| bytes).sum();
     Ok((sum > 0).then_some(sum))
 }
 

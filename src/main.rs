@@ -12,6 +12,7 @@ fn main() -> ExitCode {
         Command::Decompose(options) => commands::run_decompose(&options),
         Command::Generate(options) => commands::run_generate(&options),
         Command::Mesh(options) => commands::run_mesh(&options),
+        Command::Repartition(options) => commands::run_repartition(&options),
         Command::Inspect(options) => commands::run_inspect(&options),
         Command::Check(options) => commands::run_check(&options),
         Command::Quality(options) => commands::run_quality(&options),

@@ -1,5 +1,7 @@
 //! The summary of a run, for people and as JSON. The JSON keys are stable: they are only added to.
 
+pub mod moved;
+
 use crate::check::PartReport;
 use crate::io::Written;
 use crate::memory::sized;

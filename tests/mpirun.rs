@@ -2,7 +2,7 @@
 
 #[cfg(feature = "mpi")]
 mod with_mpi {
-    use crate::common::{judge, own, read_json, report_of, succeed};
+    use crate::common::{judge, own, read_json, report_of, succeed, tetmill};
     use std::process::Command;
 
     /// `mpirun -n RANKS tetmill`, or nothing, said aloud, where there is no `mpirun`.
@@ -57,6 +57,72 @@ mod with_mpi {
     fn bad_input_ends_all_ranks_with_its_status_and_one_message() {
         let Some(mut command) = mpirun(3) else { return };
         let output = command.args(["generate", "no/such/file.geo"]).output().unwrap();
+        assert_eq!(output.status.code(), Some(2));
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(said.matches("cannot read no/such/file.geo").count(), 1, "{said}");
+    }
+
+    #[test]
+    fn partitions_are_repartitioned_by_mpi_ranks_as_by_threads() {
+        let dir = tempfile::tempdir().unwrap();
+        let [start, grown, back] = ["start", "grown", "back"].map(|name| dir.path().join(name));
+        let mut command = tetmill();
+        command.arg("generate").arg(own("tee")).args(["--preset", "very-coarse", "-n", "7", "-q", "-o"]);
+        succeed(command.arg(&start));
+        let Some(mut command) = mpirun(4) else { return };
+        succeed(command.arg("repartition").arg(&start).args(["-q", "--check", "-o"]).arg(&grown));
+        judge(&grown, 4);
+        let same = dir.path().join("same");
+        succeed(tetmill().arg("repartition").arg(&start).args(["-n", "4", "-q", "-o"]).arg(&same));
+        for part in 1..=4 {
+            for kind in ["header", "nodes", "elements", "boundary", "shared"] {
+                let file = format!("partitioning.4/part.{part}.{kind}");
+                let text = |folder: &std::path::Path| std::fs::read(folder.join(&file)).unwrap();
+                assert!(text(&grown) == text(&same), "{file}");
+            }
+        }
+        let Some(mut command) = mpirun(3) else { return };
+        std::fs::write(start.join("partitioning.7/part.6.shared"), "1 2 6\n").unwrap();
+        let output = command.arg("repartition").arg(&start).args(["-q", "-o"]).arg(&back).output().unwrap();
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{said}");
+        assert_eq!(said.matches("part.6.shared:1").count(), 1, "{said}");
+        assert!(!back.exists());
+    }
+
+    #[test]
+    fn more_and_fewer_parts_than_mpi_ranks_are_those_that_as_many_ranks_make() {
+        let arguments = ["--preset", "very-coarse", "--levels", "1", "-q"];
+        for (ranks, parts) in [(2, "5"), (3, "2")] {
+            let Some(mut command) = mpirun(ranks) else { return };
+            let dir = tempfile::tempdir().unwrap();
+            let [dealt, threads, moved] = ["dealt", "threads", "moved"].map(|name| dir.path().join(name));
+            succeed(
+                command
+                    .arg("generate")
+                    .arg(own("lens"))
+                    .args(arguments)
+                    .args(["--parts", parts, "-o"])
+                    .arg(&dealt),
+            );
+            succeed(
+                tetmill()
+                    .arg("generate")
+                    .arg(own("lens"))
+                    .args(arguments)
+                    .args(["-n", parts, "-o"])
+                    .arg(&threads),
+            );
+            let file = format!("partitioning.{parts}/part.{parts}.elements");
+            let text = |folder: &std::path::Path| std::fs::read(folder.join(&file)).unwrap();
+            assert!(text(&dealt) == text(&threads), "{parts} parts on {ranks} ranks");
+            judge(&dealt, parts.parse().unwrap());
+            let Some(mut command) = mpirun(ranks) else { return };
+            succeed(command.arg("repartition").arg(&dealt).args(["-n", "4", "-q", "-o"]).arg(&moved));
+            judge(&moved, 4);
+        }
+        let Some(mut command) = mpirun(2) else { return };
+        let output = command.args(["generate", "no/such/file.geo", "--parts", "5"]).output().unwrap();
         assert_eq!(output.status.code(), Some(2));
         let said = String::from_utf8_lossy(&output.stderr);
         assert_eq!(said.matches("cannot read no/such/file.geo").count(), 1, "{said}");

@@ -13,6 +13,7 @@ mod quality;
 mod random_scenes;
 mod ranks;
 mod readers;
+mod repartition;
 mod samples;
 mod scenes;
 mod skins;

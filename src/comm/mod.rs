@@ -18,6 +18,7 @@
 //! |---|---|---|
 //! | [`thread`] | threads of this process | the others get [`CommError::RankFailed`] |
 //! | [`mpi`] (feature `mpi`) | processes that `mpirun` started | the job ends with a message |
+//! | [`grouped`] | threads of the ranks of another communicator, as many as wanted | what that one does |
 //!
 //! Messages are slices of plain numbers; how the bytes of several slices share one message: [`pack`].
 //! Both backends pass one suite, [`conformance`].
@@ -28,6 +29,7 @@
 pub mod agree;
 #[doc(hidden)]
 pub mod conformance;
+pub mod grouped;
 pub mod launch;
 #[cfg(feature = "mpi")]
 pub mod mpi;

@@ -18,6 +18,9 @@ use std::thread;
 /// Stack of a rank's thread in bytes. Only reserved, not used up: 1024 ranks fit into 4 GiB of addresses.
 const STACK: usize = 4 << 20;
 
+/// Twice as many threads and their guard pages pass what Linux gives a process, which ends it.
+const MOST_RANKS: u32 = 8192;
+
 /// Messages with the rank they go to, or come from.
 type Messages = Vec<(Rank, Vec<u8>)>;
 
@@ -149,6 +152,9 @@ pub fn run<R: Send>(ranks: u32, body: impl Fn(&dyn Communicator) -> R + Sync) ->
     let not_started = |reason: String| CommError::NotStarted { ranks, reason };
     if ranks == 0 {
         return Err(not_started("there must be at least one".into()));
+    }
+    if ranks > MOST_RANKS {
+        return Err(not_started(format!("ranks are threads here, at most {MOST_RANKS}: take MPI's")));
     }
     let world = Arc::new(World::new(ranks));
     let run_rank = |rank| {

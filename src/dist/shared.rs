@@ -1,7 +1,10 @@
 //! Who holds what, and who owns it.
 
 use super::{DistMesh, Shared};
+use crate::comm::{CommError, Communicator};
 use crate::mesh::{EdgeId, FaceId, GlobalId, Rank, VertexId};
+use bytemuck::Pod;
+use std::collections::BTreeMap;
 
 /// The **owner** of an entity, chosen from its holders: `holders[id_sum mod holders.len()]` (the rule
 /// of the thesis "A parallel mesh generator based on sequential NETGEN", chapter 5).
@@ -40,6 +43,38 @@ impl Shared {
     /// All shared entities: local id and holders, by ascending id.
     pub fn iter(&self) -> impl Iterator<Item = (u32, &[Rank])> {
         self.ids.iter().enumerate().map(|(index, &id)| (id, self.holders_at(index)))
+    }
+
+    /// **Collective.** Tells the other holders of each entity what `say` says of it by its local id. What they say comes back as local
+    /// id, holder, word; by ascending holder.
+    ///
+    /// Ids ascend on all ranks alike, so that words go without them.
+    ///
+    /// # Errors
+    /// If another rank fails.
+    ///
+    /// # Panics
+    /// If the ranks do not share what they say they share.
+    pub fn exchange<T: Pod>(
+        &self,
+        comm: &dyn Communicator,
+        say: impl Fn(u32) -> T,
+    ) -> Result<Vec<(u32, Rank, T)>, CommError> {
+        let rank = comm.rank();
+        let mut with: BTreeMap<Rank, Vec<u32>> = BTreeMap::new();
+        for (id, holders) in self.iter() {
+            for &other in holders.iter().filter(|&&holder| holder != rank) {
+                with.entry(other).or_default().push(id);
+            }
+        }
+        let words = with.iter().map(|(other, ids)| (*other, ids.iter().map(|&id| say(id)).collect()));
+        let mut heard = Vec::with_capacity(self.holders.len() - self.ids.len());
+        for (from, words) in comm.exchange::<T>(words.collect())? {
+            let ids = with.get(&from).map_or(&[][..], |ids| ids);
+            assert_eq!(ids.len(), words.len(), "entities that ranks {rank} and {from} share");
+            heard.extend(ids.iter().zip(words).map(|(&id, word)| (id, from, word)));
+        }
+        Ok(heard)
     }
 
     /// Appends an entity: local ids ascend.

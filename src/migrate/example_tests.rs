@@ -65,7 +65,8 @@ fn the_thesis_example_gives_the_lists_and_messages_of_the_thesis() {
     let results = thread::run(4, |comm| {
         let given = (comm.rank() == 0).then(|| (mesh.clone(), parts.clone()));
         let part: BareMesh = distribute(comm, given).unwrap().into();
-        let leaving = pack::pack(&part, &destinations(&part));
+        let room = rebuild::Room { rank: part.rank, limit: u64::MAX };
+        let leaving = pack::pack(&part, &destinations(&part), room).unwrap();
         let told = owners::updates(&part, &leaving);
         let (mut heard, mut news_heard) = (Vec::new(), Vec::new());
         for (_, letter) in comm.exchange_bytes(owners::letters(&told)).unwrap() {

@@ -53,6 +53,14 @@ pub enum MigrateError {
         /// The destinations given.
         destinations: usize,
     },
+    /// The mesh belongs to another group of ranks.
+    #[error("the mesh is one of {expected} ranks, and there are {ranks}")]
+    Ranks {
+        /// The ranks of the mesh.
+        expected: u32,
+        /// Those there are.
+        ranks: u32,
+    },
     /// A tet is meant for a rank that does not exist.
     #[error("tet {tet} is meant for rank {destination} of {ranks}")]
     NoSuchRank {
@@ -73,8 +81,8 @@ pub enum MigrateError {
         /// How many.
         needed: u64,
     },
-    /// The new part does not fit.
-    #[error("rank {rank} has no memory for {bytes} bytes of its new part")]
+    /// What is to be sent, or the new part, does not fit.
+    #[error("rank {rank} has no memory for {bytes} bytes of the tets that leave it or of its new part")]
     OutOfMemory {
         /// The rank.
         rank: Rank,
@@ -106,7 +114,7 @@ impl From<Agreed<Self>> for MigrateError {
 /// Choices for [`migrate_bare`].
 #[derive(Clone, Copy, Debug)]
 pub struct Settings {
-    /// The most bytes that one array of a rank's new part may take; beyond, it is refused as if memory were short.
+    /// The most bytes that one array of a rank's new part, or of what leaves it, may take; beyond, it is refused as if memory were short.
     pub array_limit: u64,
 }
 
@@ -150,8 +158,9 @@ pub fn migrate_bare(
     destination: &[Rank],
     settings: &Settings,
 ) -> Result<(BareMesh, Moved), MigrateError> {
-    comm.agree(expect_destinations(&mesh, destination))?;
-    let leaving = pack::pack(&mesh, destination);
+    comm.agree(expect_ranks(&mesh, comm.size()).and_then(|()| expect_destinations(&mesh, destination)))?;
+    let room = rebuild::Room { rank: mesh.rank, limit: settings.array_limit };
+    let leaving = comm.agree(pack::pack(&mesh, destination, room))?;
     let mut moved = Moved { tets: leaving.tets(), bytes: 0 };
 
     let updates = owners::updates(&mesh, &leaving);
@@ -179,6 +188,11 @@ pub fn migrate_bare(
 
     let rebuilt = rebuild::rebuild(mesh, &leaving.kept, arrived, heard, settings);
     Ok((comm.agree(rebuilt)?, moved))
+}
+
+fn expect_ranks(mesh: &BareMesh, ranks: u32) -> Result<(), MigrateError> {
+    let expected = mesh.ranks;
+    if expected == ranks { Ok(()) } else { Err(MigrateError::Ranks { expected, ranks }) }
 }
 
 fn expect_destinations(mesh: &BareMesh, destination: &[Rank]) -> Result<(), MigrateError> {

@@ -6,6 +6,8 @@
 //! Ids ascend and travel as differences, one byte each where they follow one another; bodies as runs; corners in as many bytes as
 //! the number of vertices needs. A clump of tets takes some 20 bytes a tet, of which coordinates are 5.
 
+use super::MigrateError;
+use super::rebuild::Room;
 use crate::comm::pack::{put_ascending, put_varint, take_ascending, take_varint};
 use crate::dist::{BareMesh, LaidEdge, Side};
 use crate::mesh::{Class, GlobalId, Rank, TET_EDGES, TetId, VertexId};
@@ -50,7 +52,10 @@ impl Leaving {
 }
 
 /// Packs the tets that leave.
-pub(super) fn pack(mesh: &BareMesh, destination: &[Rank]) -> Leaving {
+///
+/// # Errors
+/// No memory for what is to be sent.
+pub(super) fn pack(mesh: &BareMesh, destination: &[Rank], room: Room) -> Result<Leaving, MigrateError> {
     let mut counts = vec![0usize; mesh.ranks as usize];
     destination.iter().for_each(|&to| counts[to as usize] += 1);
     let stays: Vec<bool> = destination.iter().map(|&to| to == mesh.rank).collect();
@@ -71,7 +76,7 @@ pub(super) fn pack(mesh: &BareMesh, destination: &[Rank]) -> Leaving {
         leaving_tets += tets.len() as u64;
         let used = used_vertices(mesh, &tets, &mut place);
         let edges = laid_edges(mesh, &tets);
-        let load = load(mesh, &tets, &used, &place, &sides_to[to as usize], &edges);
+        let load = load(mesh, &tets, &used, &place, &sides_to[to as usize], &edges, room)?;
         for &v in &used {
             place[v as usize] = u32::MAX;
             flags[v as usize] |= LEAVES;
@@ -92,7 +97,7 @@ pub(super) fn pack(mesh: &BareMesh, destination: &[Rank]) -> Leaving {
         edges,
         sides: std::mem::take(&mut sides_to[mesh.rank as usize]),
     };
-    Leaving { letters, vertices, kept, leaving_tets }
+    Ok(Leaving { letters, vertices, kept, leaving_tets })
 }
 
 /// The vertices of some tets, ascending; `place` gets where each stands among them.
@@ -185,9 +190,11 @@ fn load(
     place: &[u32],
     sides: &[Side],
     edges: &[u32],
-) -> Vec<u8> {
+    room: Room,
+) -> Result<Vec<u8>, MigrateError> {
     let width = width(vertices.len());
-    let mut m = Vec::with_capacity(64 + vertices.len() * 28 + tets.len() * (2 + 4 * width) + sides.len() * 6);
+    let mut m: Vec<u8> =
+        room.make(64 + vertices.len() * 28 + tets.len() * (2 + 4 * width) + sides.len() * 6)?;
     m.push(LOAD);
     for count in [vertices.len(), tets.len(), sides.len(), edges.len()] {
         put_varint(&mut m, count as u64);
@@ -220,7 +227,7 @@ fn load(
         put_varint(&mut m, u64::from(place[vertices[1].index()]));
         put_varint(&mut m, code(class));
     }
-    m
+    Ok(m)
 }
 
 /// A load that arrived: a little mesh, its tets, sides and edges by places in its own lists.

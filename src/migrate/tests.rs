@@ -157,12 +157,28 @@ fn a_rank_without_memory_for_its_new_part_stops_all_with_one_message() {
     let mesh = lattice_cube(2);
     let errors = thread::run(2, |comm| {
         let part = distribute(comm, given(comm, &mesh, &[0; 48])).unwrap();
-        let settings = Settings { array_limit: if comm.rank() == 1 { 300 } else { u64::MAX } };
+        // What rank 1 gets, and what rank 0 sends.
         let to = vec![1; part.tets.len()];
-        migrate_bare(comm, part.into(), &to, &settings).unwrap_err()
+        [1, 0].map(|poor| {
+            let settings = Settings { array_limit: if comm.rank() == poor { 300 } else { u64::MAX } };
+            migrate_bare(comm, part.clone().into(), &to, &settings).unwrap_err()
+        })
     })
     .unwrap();
-    let MigrateError::OutOfMemory { rank: 1, bytes } = errors[1] else { panic!("{}", errors[1]) };
-    assert!(bytes > 300);
-    assert_eq!(errors[0], MigrateError::Elsewhere { rank: 1, message: errors[1].to_string() });
+    for (case, [poor, other]) in [[1, 0], [0, 1]].into_iter().enumerate() {
+        let [own, others] = [&errors[poor][case], &errors[other][case]];
+        let MigrateError::OutOfMemory { rank, bytes } = *own else { panic!("{own}") };
+        assert!(bytes > 300 && rank == poor as Rank);
+        assert_eq!(*others, MigrateError::Elsewhere { rank, message: own.to_string() });
+    }
+}
+
+#[test]
+fn a_mesh_of_other_ranks_is_refused() {
+    let mesh = from_serial(lattice_cube(1)).unwrap();
+    let errors = thread::run(2, |comm| {
+        let part = BareMesh { rank: comm.rank(), ..mesh.clone().into() };
+        migrate_bare(comm, part, &[0; 6], &Settings::default()).unwrap_err()
+    });
+    assert!(errors.unwrap().iter().all(|error| *error == MigrateError::Ranks { expected: 1, ranks: 2 }));
 }

@@ -3,8 +3,8 @@
 //! The graph is as large as the parts, not as the mesh, so that rank 0 can hold it. Stretches of the curve are compact; what they
 //! lack in smoothness is the price for a graph that needs no rounds of matching between ranks.
 
-use super::RepartitionError;
 use super::metrics::across_faces;
+use super::{MOST_CLUSTERS, RepartitionError};
 use crate::comm::Communicator;
 use crate::dist::DistMesh;
 use crate::mesh::Rank;
@@ -19,7 +19,8 @@ pub(super) fn partition(
     per_part: u32,
 ) -> Result<Vec<Rank>, RepartitionError> {
     let tets = mesh.totals.tets;
-    let clusters = u64::from(parts).saturating_mul(u64::from(per_part.max(1))).min(tets).min(1 << 30);
+    let clusters = u64::from(parts).saturating_mul(u64::from(per_part.max(1))).min(tets);
+    let clusters = clusters.min(MOST_CLUSTERS.max(parts.into()));
     let cluster = |place: u64| (u128::from(place) * u128::from(clusters) / u128::from(tets)) as u32;
     let of_tet: Vec<u32> = places.iter().map(|&place| cluster(place)).collect();
 

@@ -1,12 +1,13 @@
 //! How good a partition of a distributed mesh is.
 
 use crate::comm::{CommError, Communicator};
-use crate::dist::{DistMesh, Shared};
-use crate::mesh::Rank;
+use crate::dist::{DistMesh, owner};
 use crate::mesh::topology::face_tets;
+use crate::mesh::{Rank, VertexId};
+use std::collections::BTreeMap;
 
 /// How good a partition is, the same on all ranks.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Metrics {
     /// The number of parts.
     pub parts: u32,
@@ -18,6 +19,12 @@ pub struct Metrics {
     pub imbalance: f64,
     /// Faces between parts.
     pub edge_cut: u64,
+    /// Vertices in more than one part, each once.
+    pub shared_vertices: u64,
+    /// The most parts that one part shares vertices with.
+    pub most_neighbours: u32,
+    /// The mean number of parts that a part shares vertices with.
+    pub mean_neighbours: f64,
     /// Tets that are to go to another rank than holds them.
     pub moving: u64,
 }
@@ -38,12 +45,17 @@ pub fn measure(
     assert_eq!(part.len(), mesh.tets.len(), "rank {}: one part for each tet", mesh.rank);
     let mut sizes = vec![0u64; parts as usize];
     part.iter().for_each(|&p| sizes[p as usize] += 1);
-    let all = comm.all_gather(&sizes)?;
-    let sizes: Vec<u64> = (0..parts as usize).map(|p| all.iter().map(|sizes| sizes[p]).sum()).collect();
+    let sizes = sum_by_part(comm, &sizes)?;
     let mut cut = 0;
     across_faces(comm, mesh, part, |a, b| cut += u64::from(a != b))?;
     let moving = part.iter().filter(|&&p| p != mesh.rank).count() as u64;
-    let [edge_cut, moving] = comm.all_reduce_sum_u64([cut, moving])?;
+    let (shared, mut pairs) = pairs_at_vertices(comm, mesh, part)?;
+    let [edge_cut, moving, shared_vertices] = comm.all_reduce_sum_u64([cut, moving, shared])?;
+    pairs = comm.all_gather(&pairs)?.concat();
+    pairs.sort_unstable();
+    pairs.dedup();
+    let mut neighbours = vec![0u32; parts as usize];
+    pairs.iter().flatten().for_each(|&p| neighbours[p as usize] += 1);
     let largest = sizes.iter().copied().max().unwrap_or(0);
     Ok(Metrics {
         parts,
@@ -51,8 +63,91 @@ pub fn measure(
         largest,
         imbalance: largest as f64 * f64::from(parts) / mesh.totals.tets.max(1) as f64,
         edge_cut,
+        shared_vertices,
+        most_neighbours: neighbours.iter().copied().max().unwrap_or(0),
+        mean_neighbours: 2.0 * pairs.len() as f64 / f64::from(parts.max(1)),
         moving,
     })
+}
+
+/// **Collective.** The sums over the ranks of what each has of each part: most ranks have something of few parts only.
+pub(super) fn sum_by_part(comm: &dyn Communicator, mine: &[u64]) -> Result<Vec<u64>, CommError> {
+    let (parts, ranks) = (mine.len(), comm.size() as usize);
+    // Parts are at home at ranks in blocks.
+    let block = parts.div_ceil(ranks);
+    let mut letters: Vec<(Rank, Vec<[u64; 2]>)> = Vec::new();
+    for (part, &count) in mine.iter().enumerate().filter(|(_, count)| **count > 0) {
+        let home = (part / block) as Rank;
+        if letters.last().is_none_or(|(to, _)| *to != home) {
+            letters.push((home, Vec::new()));
+        }
+        letters.last_mut().expect("there is one now").1.push([part as u64, count]);
+    }
+    let first = (comm.rank() as usize * block).min(parts);
+    let mut sums = vec![0u64; block.min(parts - first)];
+    for [part, count] in comm.exchange(letters)?.into_iter().flat_map(|(_, list)| list) {
+        sums[part as usize - first] += count;
+    }
+    Ok(comm.all_gather(&sums)?.concat())
+}
+
+/// **Collective.** How many vertices at home on this rank are in several parts, and the distinct pairs of parts that meet there.
+fn pairs_at_vertices(
+    comm: &dyn Communicator,
+    mesh: &DistMesh,
+    part: &[Rank],
+) -> Result<(u64, Vec<[Rank; 2]>), CommError> {
+    // All parts at the vertices that may be in several: those with two parts here, and those on several ranks.
+    let mut first = vec![Rank::MAX; mesh.points.len()];
+    let mut wanted = vec![false; mesh.points.len()];
+    mesh.shared_vertices.ids.iter().for_each(|&v| wanted[v as usize] = true);
+    let uses = || mesh.tets.iter().zip(part).flat_map(|(tet, &p)| tet.iter().map(move |&v| (v, p)));
+    for (VertexId(v), p) in uses() {
+        let known = &mut first[v as usize];
+        if *known == Rank::MAX {
+            *known = p;
+        }
+        wanted[v as usize] |= *known != p;
+    }
+    let mut at: Vec<(u32, Rank)> =
+        uses().map(|(v, p)| (v.0, p)).filter(|(v, _)| wanted[*v as usize]).collect();
+    at.sort_unstable();
+    at.dedup();
+
+    // Owners hear the parts on all ranks.
+    let mut letters: BTreeMap<Rank, Vec<[u64; 2]>> = BTreeMap::new();
+    let mut known: Vec<[u64; 2]> = Vec::new();
+    let mut shared = mesh.shared_vertices.ids.iter().copied().zip(0..).peekable();
+    for (v, p) in at {
+        let id = mesh.vertex_ids[v as usize];
+        while shared.next_if(|(shared, _)| *shared < v).is_some() {}
+        let to = match shared.peek() {
+            Some(&(of, place)) if of == v => owner(mesh.shared_vertices.holders_at(place), id),
+            _ => mesh.rank,
+        };
+        let list = if to == mesh.rank { &mut known } else { letters.entry(to).or_default() };
+        list.push([id, p.into()]);
+    }
+    let heard = comm.exchange(letters.into_iter().collect())?;
+    known.extend(heard.into_iter().flat_map(|(_, list)| list));
+    known.sort_unstable();
+    known.dedup();
+    let (mut count, mut pairs, mut room) = (0, Vec::new(), 1 << 16);
+    for of_vertex in known.chunk_by(|a, b| a[0] == b[0]).filter(|parts| parts.len() > 1) {
+        count += 1;
+        for (k, [_, p]) in of_vertex.iter().enumerate() {
+            pairs.extend(of_vertex[k + 1..].iter().map(|[_, q]| [*p as Rank, *q as Rank]));
+        }
+        // Nearly all pairs are there already.
+        if pairs.len() > room {
+            pairs.sort_unstable();
+            pairs.dedup();
+            room = room.max(2 * pairs.len());
+        }
+    }
+    pairs.sort_unstable();
+    pairs.dedup();
+    Ok((count, pairs))
 }
 
 /// **Collective.** Calls `visit` with what `of_tet` says of the two tets at each face between two; a face between ranks is visited on the lower one.
@@ -69,27 +164,11 @@ pub(super) fn across_faces(
             visit(of_tet[*first as usize], of_tet[*second as usize]);
         }
     }
-    // Faces ascend by global id on both ranks: what both say of their tets stands in the same order.
-    let letters =
-        by_other_holder(&mesh.shared_faces, mesh.rank, |face| of_tet[sides[face as usize][0] as usize]);
-    let mine = letters.clone();
-    for (from, theirs) in comm.exchange(letters)? {
-        let (_, mine) = mine.iter().find(|(to, _)| *to == from).expect("both hold the faces between them");
-        assert_eq!(mine.len(), theirs.len(), "ranks {} and {from} share faces", mesh.rank);
+    let beside = |face: u32| of_tet[sides[face as usize][0] as usize];
+    for (face, from, theirs) in mesh.shared_faces.exchange(comm, beside)? {
         if mesh.rank < from {
-            mine.iter().zip(&theirs).for_each(|(&a, &b)| visit(a, b));
+            visit(beside(face), theirs);
         }
     }
     Ok(())
-}
-
-/// What is said of each shared entity, for its other holders, by ascending rank.
-fn by_other_holder(shared: &Shared, rank: Rank, say: impl Fn(u32) -> u32) -> Vec<(Rank, Vec<u32>)> {
-    let mut letters = std::collections::BTreeMap::<Rank, Vec<u32>>::new();
-    for (id, holders) in shared.iter() {
-        for &other in holders.iter().filter(|&&holder| holder != rank) {
-            letters.entry(other).or_default().push(say(id));
-        }
-    }
-    letters.into_iter().collect()
 }

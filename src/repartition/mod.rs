@@ -7,14 +7,16 @@
 //! | method | how | cut |
 //! |---|---|---|
 //! | [`Method::Curve`] | stretches of a Hilbert curve through the centres of the tets, of equal weight | largest |
-//! | [`Method::Clusters`] | METIS on a coarse graph of clusters of tets, gathered on rank 0 (feature `metis`) | smaller |
+//! | [`Method::SmoothedCurve`] | the same, and fewer faces by [`smooth`] | smaller |
+//! | [`Method::Clusters`] | METIS on a coarse graph of clusters of tets, gathered on rank 0 (feature `metis`), and fewer faces by [`smooth`] | smallest |
 //!
-//! Both depend on the mesh and the number of parts alone, not on who holds what before. Parts are more, fewer or as many as ranks: a
+//! All depend on the mesh and the number of parts alone, not on who holds what before. Parts are more, fewer or as many as ranks: a
 //! part beyond the ranks needs ranks to hold it ([`migrate`](crate::migrate::migrate) refuses such destinations).
 
 mod clusters;
 pub mod curve;
 pub mod metrics;
+pub mod smooth;
 #[cfg(test)]
 mod tests;
 
@@ -30,17 +32,25 @@ use crate::partition::PartitionError;
 pub enum Method {
     /// Equal stretches of a Hilbert curve, balanced to one tet.
     Curve,
+    /// The same with fewer faces between parts, balanced to one percent.
+    SmoothedCurve,
     /// Multilevel bisection by METIS (Karypis and Kumar 1998) of a graph of clusters, each a stretch of that curve.
     Clusters {
-        /// Clusters for each part: parts are balanced to within one in so many, the graph on rank 0 is as large as
-        /// the parts times this.
+        /// Clusters for each part, [`MOST_CLUSTERS`] in all: the graph on rank 0 is as large as the parts times this.
         per_part: u32,
     },
 }
 
+impl Method {
+    /// By a graph, as fine as it pays.
+    pub fn graph() -> Self {
+        Self::Clusters { per_part: 16_000 }
+    }
+}
+
 impl Default for Method {
     fn default() -> Self {
-        if cfg!(feature = "metis") { Self::Clusters { per_part: 1000 } } else { Self::Curve }
+        if cfg!(feature = "metis") { Self::graph() } else { Self::Curve }
     }
 }
 
@@ -48,10 +58,14 @@ impl std::fmt::Display for Method {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::Curve => f.write_str("stretches of a Hilbert curve"),
-            Self::Clusters { per_part } => write!(f, "METIS on {per_part} clusters a part"),
+            Self::SmoothedCurve => f.write_str("stretches of a Hilbert curve, smoothed"),
+            Self::Clusters { .. } => f.write_str("METIS on clusters, smoothed"),
         }
     }
 }
+
+/// The most clusters on rank 0: their graph then takes some 300 MB, and METIS some ten seconds.
+pub const MOST_CLUSTERS: u64 = 1 << 21;
 
 /// Why a distributed mesh cannot be partitioned anew.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -97,8 +111,13 @@ pub fn repartition(
     }
     let centers = mesh.tets.iter().map(|tet| curve::center(tet.map(|v| &mesh.points[v.index()].coords)));
     let places = curve::places(comm, centers, &mesh.tet_ids)?;
-    match method {
-        Method::Curve => Ok(curve::stretches(&places, mesh.totals.tets, parts)),
-        Method::Clusters { per_part } => clusters::partition(comm, mesh, &places, parts, per_part),
+    let mut part = match method {
+        Method::Curve => return Ok(curve::stretches(&places, mesh.totals.tets, parts)),
+        Method::SmoothedCurve => curve::stretches(&places, mesh.totals.tets, parts),
+        Method::Clusters { per_part } => clusters::partition(comm, mesh, &places, parts, per_part)?,
+    };
+    if parts > 1 {
+        smooth::smooth(comm, mesh, &mut part, parts, &smooth::Settings::default())?;
     }
+    Ok(part)
 }

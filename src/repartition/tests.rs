@@ -7,9 +7,9 @@ use crate::migrate::migrate;
 use crate::partition::{self, Settings};
 
 const METHODS: &[Method] = if cfg!(feature = "metis") {
-    &[Method::Curve, Method::Clusters { per_part: 50 }]
+    &[Method::Curve, Method::SmoothedCurve, Method::Clusters { per_part: 50 }]
 } else {
-    &[Method::Curve]
+    &[Method::Curve, Method::SmoothedCurve]
 };
 
 /// Distributes as `part` says, partitions anew, and returns the new part of each tet by global id, with its metrics.
@@ -71,15 +71,51 @@ fn cuts_are_measured_as_the_serial_partitioner_measures_them() {
     }
 }
 
+#[test]
+fn smoothing_makes_the_cut_smaller_and_keeps_the_balance() {
+    let mesh = lattice_box([16, 12, 12], |_| 0);
+    let tets = mesh.tets.len() as u32;
+    let (_, curve) = anew(&mesh, &vec![0; tets as usize], 2, 8, Method::Curve);
+    let slabs: Vec<Rank> = (0..tets).map(|tet| tet * 3 / tets).collect();
+    let (part, smoothed) = anew(&mesh, &slabs, 3, 8, Method::SmoothedCurve);
+    assert!(smoothed.edge_cut < curve.edge_cut, "{smoothed:?} {curve:?}");
+    assert!(smoothed.imbalance <= 1.01, "{smoothed:?}");
+    let noise: Vec<Rank> = (0..tets).map(|tet| crate::kernel::random::mix(tet.into()) as u32 % 2).collect();
+    assert!(
+        anew(&mesh, &noise, 2, 8, Method::SmoothedCurve).0 == part,
+        "it matters who held the tets before"
+    );
+}
+
 #[cfg(feature = "metis")]
 #[test]
-fn clusters_cut_less_than_the_curve_and_at_most_half_more_than_metis_on_all_tets() {
+fn clusters_cut_less_than_the_curve_and_a_tenth_more_than_metis_on_all_tets_at_most() {
     let mesh = lattice_box([16, 12, 12], |_| 0);
     let cut = |method| anew(&mesh, &vec![0; mesh.tets.len()], 2, 8, method).1.edge_cut as f64;
     let metis = partition::partition(&mesh, 8, &Settings::default()).unwrap().1.edge_cut as f64;
-    let (curve, clusters) = (cut(Method::Curve), cut(Method::Clusters { per_part: 400 }));
-    assert!(clusters < curve, "{clusters} {curve}");
-    assert!(clusters < 1.5 * metis && curve < 1.9 * metis, "{clusters} {curve} {metis}");
+    let [curve, smoothed, clusters] =
+        [Method::Curve, Method::SmoothedCurve, Method::Clusters { per_part: 400 }].map(cut);
+    let told = format!("{clusters} {smoothed} {curve} {metis}");
+    assert!(clusters <= smoothed && smoothed < curve, "{told}");
+    assert!(clusters < 1.1 * metis && smoothed < 1.5 * metis && curve < 1.9 * metis, "{told}");
+}
+
+#[test]
+fn neighbours_and_shared_vertices_are_counted_whatever_the_ranks() {
+    // Eight cubes in a row of which each is a part: each but the ends has two neighbours and shares 4 vertices with each.
+    let mesh = lattice_box([8, 1, 1], |_| 0);
+    for ranks in [1, 2, 3, 8] {
+        let held: Vec<Rank> = (0..48).map(|tet| tet * 5 % ranks).collect();
+        let results = thread::run(ranks, |comm| {
+            let mesh = distribute(comm, (comm.rank() == 0).then(|| (mesh.clone(), held.clone()))).unwrap();
+            let part: Vec<Rank> = mesh.tet_ids.iter().map(|id| (id / 6) as Rank).collect();
+            measure(comm, &mesh, &part, 8).unwrap()
+        });
+        for metrics in results.unwrap() {
+            assert_eq!((metrics.shared_vertices, metrics.edge_cut), (28, 14));
+            assert_eq!((metrics.most_neighbours, metrics.mean_neighbours), (2, 14.0 / 8.0));
+        }
+    }
 }
 
 #[test]

@@ -6,7 +6,7 @@
 //! it is the boundary of a set of tets.
 
 use super::parse::ReadError;
-use super::read::{ElmerMesh, Layout, layouts, read_layout};
+use super::read::{ElmerMesh, ElmerPart, Layout, layouts, read_layout};
 use super::{faults_faces, faults_nodes, periodic};
 use std::collections::BTreeMap;
 use std::fmt;
@@ -198,31 +198,34 @@ fn check_counts(mesh: &ElmerMesh, faults: &mut Faults) {
             faults.add(FaultKind::PartCount, folder.clone(), 0, || format!("holds {parts} parts"));
         }
     }
-    for part in &mesh.parts {
-        let header = &part.header;
-        let mut types = vec![(super::TRIANGLE, part.boundary.len()), (super::TET, part.elements.len())];
-        types.retain(|(_, count)| *count > 0);
-        let mut stated: Vec<_> = header.types.iter().map(|&(code, n)| (code, n as usize)).collect();
-        stated.retain(|(_, count)| *count > 0);
-        stated.sort_unstable();
-        let mut count = |line: usize, what: &str, said: u32, found: usize| {
-            if said as usize != found {
-                let text = || format!("says {said} {what}, the file has {found}");
-                faults.add(FaultKind::Count, part.file("header"), line, text);
-            }
-        };
-        count(1, "nodes", header.nodes, part.nodes.len());
-        count(1, "elements", header.elements, part.elements.len());
-        count(1, "boundary elements", header.boundary, part.boundary.len());
-        if let Some(shared) = header.shared {
-            count(3 + header.types.len(), "shared nodes", shared, part.shared.len());
+    mesh.parts.iter().for_each(|part| check_header(part, faults));
+}
+
+/// Compares the counts of a part with its files.
+pub(super) fn check_header(part: &ElmerPart, faults: &mut Faults) {
+    let header = &part.header;
+    let mut types = vec![(super::TRIANGLE, part.boundary.len()), (super::TET, part.elements.len())];
+    types.retain(|(_, count)| *count > 0);
+    let mut stated: Vec<_> = header.types.iter().map(|&(code, n)| (code, n as usize)).collect();
+    stated.retain(|(_, count)| *count > 0);
+    stated.sort_unstable();
+    let mut count = |line: usize, what: &str, said: u32, found: usize| {
+        if said as usize != found {
+            let text = || format!("says {said} {what}, the file has {found}");
+            faults.add(FaultKind::Count, part.file("header"), line, text);
         }
-        if stated != types {
-            let text = || format!("says {stated:?} of the types, the files have {types:?}");
-            faults.add(FaultKind::Count, part.file("header"), 2, text);
-        }
-        if part.elements.is_empty() {
-            faults.add(FaultKind::EmptyPart, part.file("elements"), 0, || "no elements".into());
-        }
+    };
+    count(1, "nodes", header.nodes, part.nodes.len());
+    count(1, "elements", header.elements, part.elements.len());
+    count(1, "boundary elements", header.boundary, part.boundary.len());
+    if let Some(shared) = header.shared {
+        count(3 + header.types.len(), "shared nodes", shared, part.shared.len());
+    }
+    if stated != types {
+        let text = || format!("says {stated:?} of the types, the files have {types:?}");
+        faults.add(FaultKind::Count, part.file("header"), 2, text);
+    }
+    if part.elements.is_empty() {
+        faults.add(FaultKind::EmptyPart, part.file("elements"), 0, || "no elements".into());
     }
 }

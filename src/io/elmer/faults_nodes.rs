@@ -16,6 +16,11 @@ impl NodeTable {
         Self { sorted }
     }
 
+    /// Ids, ascending, and where each stands in `.nodes`.
+    pub fn sorted(&self) -> &[(u32, u32)] {
+        &self.sorted
+    }
+
     /// Where the node stands in `.nodes`.
     pub fn find(&self, id: u32) -> Option<usize> {
         let first = self.sorted.first()?.0;
@@ -28,21 +33,24 @@ impl NodeTable {
 
 /// Checks each part's `.nodes`, and that elements and boundary elements find theirs.
 pub(super) fn check_nodes(mesh: &ElmerMesh, faults: &mut Faults) -> Vec<NodeTable> {
-    let tables: Vec<NodeTable> = mesh.parts.iter().map(NodeTable::new).collect();
-    for (part, table) in mesh.parts.iter().zip(&tables) {
-        for pair in table.sorted.windows(2).filter(|pair| pair[0].0 == pair[1].0) {
-            let what = || format!("node {} stands here and on line {}", pair[1].0, pair[0].1 + 1);
-            faults.add(FaultKind::NodeTwice, part.file("nodes"), pair[1].1 as usize + 1, what);
-        }
-        for (k, node) in part.nodes.iter().enumerate() {
-            if !node.point.iter().all(|x| x.is_finite()) {
-                let what = || format!("node {} is at {}", node.id, node.point);
-                faults.add(FaultKind::NotFinite, part.file("nodes"), k + 1, what);
-            }
-        }
-        check_uses(part, table, faults);
+    mesh.parts.iter().map(|part| check_nodes_of(part, faults)).collect()
+}
+
+/// The same for one part.
+pub(super) fn check_nodes_of(part: &ElmerPart, faults: &mut Faults) -> NodeTable {
+    let table = NodeTable::new(part);
+    for pair in table.sorted.windows(2).filter(|pair| pair[0].0 == pair[1].0) {
+        let what = || format!("node {} stands here and on line {}", pair[1].0, pair[0].1 + 1);
+        faults.add(FaultKind::NodeTwice, part.file("nodes"), pair[1].1 as usize + 1, what);
     }
-    tables
+    for (k, node) in part.nodes.iter().enumerate() {
+        if !node.point.iter().all(|x| x.is_finite()) {
+            let what = || format!("node {} is at {}", node.id, node.point);
+            faults.add(FaultKind::NotFinite, part.file("nodes"), k + 1, what);
+        }
+    }
+    check_uses(part, &table, faults);
+    table
 }
 
 fn check_uses(part: &ElmerPart, table: &NodeTable, faults: &mut Faults) {

@@ -15,6 +15,8 @@
 mod faults;
 mod faults_faces;
 mod faults_nodes;
+mod load;
+mod names;
 mod number;
 mod parse;
 mod periodic;
@@ -24,9 +26,11 @@ mod tests;
 mod write;
 
 pub use faults::{Fault, FaultKind, Faults, check_elmer, faults};
+pub use load::{LoadError, Loaded, load};
+pub(crate) use names::names_of;
 pub use parse::ReadError;
 pub use read::{BoundaryElement, Element, ElmerMesh, ElmerPart, Header, Layout, Node, SharedNode};
-pub use read::{layouts, read, read_layout};
+pub use read::{layouts, read, read_layout, stated_elements};
 pub use write::write;
 
 /// Elmer's code of a tet with four vertices.

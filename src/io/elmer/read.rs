@@ -178,11 +178,16 @@ fn partitioned(folder: PathBuf) -> Result<Layout, ReadError> {
 /// Where the folder holds several partitions, or a file is missing or has a line that is no part of a mesh of
 /// tets. Faults of a mesh that can be read are found by [`faults`](super::faults).
 pub fn read(dir: &Path) -> Result<ElmerMesh, ReadError> {
-    let found = layouts(dir)?;
+    read_layout(&only_layout(dir)?)
+}
+
+/// The mesh of a folder: its only partition, else `mesh.*`.
+pub(super) fn only_layout(dir: &Path) -> Result<Layout, ReadError> {
+    let mut found = layouts(dir)?;
     let partitions: Vec<&Layout> = found.iter().filter(|l| matches!(l, Layout::Partitioned { .. })).collect();
     match partitions[..] {
-        [] => read_layout(&found[0]),
-        [one] => read_layout(one),
+        [] => Ok(found.remove(0)),
+        [one] => Ok(one.clone()),
         _ => {
             let found = partitions.iter().map(|l| l.folder().to_path_buf()).collect();
             Err(ReadError::Several { dir: dir.to_path_buf(), found })
@@ -203,7 +208,23 @@ pub fn read_layout(layout: &Layout) -> Result<ElmerMesh, ReadError> {
     Ok(ElmerMesh { layout: layout.clone(), parts })
 }
 
-fn read_part(stem: PathBuf, partitioned: bool) -> Result<ElmerPart, ReadError> {
+/// How many elements the headers of the mesh in a folder state: of its only partition, else of `mesh.*`.
+///
+/// # Errors
+/// As [`read`].
+pub fn stated_elements(dir: &Path) -> Result<u64, ReadError> {
+    let stated = |stem: PathBuf, partitioned| {
+        read_header(&file(&stem, "header"), partitioned).map(|header| u64::from(header.elements))
+    };
+    match only_layout(dir)? {
+        Layout::Serial(folder) => stated(folder.join("mesh"), false),
+        Layout::Partitioned { folder, parts } => {
+            (1..=parts).map(|part| stated(folder.join(format!("part.{part}")), true)).sum()
+        }
+    }
+}
+
+pub(super) fn read_part(stem: PathBuf, partitioned: bool) -> Result<ElmerPart, ReadError> {
     Ok(ElmerPart {
         header: read_header(&file(&stem, "header"), partitioned)?,
         nodes: read_lines(&file(&stem, "nodes"), node)?,

@@ -3,9 +3,9 @@
 use super::assemble::assemble;
 use super::raw::{Label, Raw, Shape};
 use super::{VolumeMesh, gmsh::Ids};
-use crate::io::elmer::{ElmerMesh, read as read_elmer};
+use crate::io::elmer::{ElmerMesh, names_of, read as read_elmer};
 use crate::io::input::{Fault, ReadError};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::path::Path;
 
 /// Reads the mesh of a folder; names from `mesh.names` there, or in the folder above a partition.
@@ -13,11 +13,7 @@ pub(super) fn read(folder: &Path) -> Result<VolumeMesh, ReadError> {
     let mesh = read_elmer(folder)?;
     let at = mesh.layout.folder().to_path_buf();
     let mut raw = joined(&mesh).map_err(|fault| fault.in_file(&at, b""))?;
-    let above = at.parent().map(|parent| parent.join("mesh.names"));
-    let names = [Some(at.join("mesh.names")), above].into_iter().flatten();
-    if let Some(text) = names.filter_map(|path| std::fs::read_to_string(path).ok()).next() {
-        read_names(&text, &mut raw);
-    }
+    [raw.body_names, raw.patch_names] = names_of(&at);
     assemble(raw).map_err(|fault| fault.in_file(&at, b""))
 }
 
@@ -62,21 +58,4 @@ fn joined(mesh: &ElmerMesh) -> Result<Raw, Fault> {
         raw.add(Shape::Triangle, &corners, Label::number(triangle.boundary.into())).map_err(Fault::file)?;
     }
     Ok(raw)
-}
-
-/// Lines `$ name = number …`, below a comment that says of what.
-fn read_names(text: &str, raw: &mut Raw) {
-    let mut of_bodies = true;
-    for line in text.lines() {
-        if let Some(comment) = line.trim().strip_prefix('!') {
-            of_bodies = !comment.contains("boundaries");
-        }
-        let entry = line.trim().strip_prefix('$').and_then(|entry| entry.split_once('='));
-        let Some((name, number)) = entry else { continue };
-        let names: &mut BTreeMap<i64, String> =
-            if of_bodies { &mut raw.body_names } else { &mut raw.patch_names };
-        for number in number.split_whitespace().filter_map(|number| number.parse().ok()) {
-            names.insert(number, name.trim().to_string());
-        }
-    }
 }

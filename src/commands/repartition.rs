@@ -1,0 +1,77 @@
+//! `tetmill repartition`
+
+use super::{check_written, on_ranks, set_threads, show, total_memory, write_formats, write_whole};
+use crate::cli::{Format, PartitionMethod, Repartition};
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+use tetmill::comm::{Communicator, mpi};
+use tetmill::error::{Failure, agree};
+use tetmill::io::elmer;
+use tetmill::pipeline;
+use tetmill::progress::Progress;
+use tetmill::repartition::Method;
+use tetmill::report::moved::MoveReport;
+
+/// Stages that a progress bar counts: read, partition, move, check, write.
+const STAGES: u64 = 5;
+
+/// `tetmill repartition`
+pub fn run_repartition(options: &Repartition) -> Result<(), Failure> {
+    // First: reading already uses the threads.
+    set_threads(options.threads)?;
+    if !mpi::launched() {
+        let parts = options.parts.ok_or_else(|| Failure::input("how many parts? say so with -n"))?;
+        // Before a thread is started for each.
+        let tets = elmer::stated_elements(&options.directory).map_err(Failure::input)?;
+        if u64::from(parts) > tets {
+            return Err(Failure::input(format!("{parts} parts, but only {tets} tets")));
+        }
+    }
+    let start = Instant::now();
+    on_ranks(None, options.parts, |comm| repartition_on(comm, options, start))
+}
+
+/// **Collective.**
+fn repartition_on(comm: &dyn Communicator, options: &Repartition, start: Instant) -> Result<(), Failure> {
+    let first = comm.rank() == 0;
+    let progress = Progress::new(options.quiet || !first, STAGES);
+    let method = match options.method {
+        None => Method::default(),
+        Some(PartitionMethod::Curve) => Method::Curve,
+        Some(PartitionMethod::SmoothedCurve) => Method::SmoothedCurve,
+        Some(PartitionMethod::Graph) => Method::graph(),
+    };
+    let done = pipeline::repartition(comm, &options.directory, method, &progress)?;
+    let target = &options.output;
+    let stem = target.join(stem_of(&done.folder));
+    let written = progress
+        .stage("write", || write_formats(comm, &done.part, &done.names, &options.format, target, &stem))?;
+    if options.check && options.format.contains(&Format::Elmer) {
+        let checked = if first { progress.stage("read back", || check_written(target)) } else { Ok(()) };
+        agree(comm, checked)?;
+    }
+    let memory = total_memory(comm)?;
+    if !first {
+        return Ok(());
+    }
+    let mut report = MoveReport::new(&done, method.to_string(), comm.size());
+    report.stages = progress.finish();
+    report.seconds = start.elapsed().as_secs_f64();
+    report.peak_memory = memory;
+    report.add_written(written);
+    if !options.quiet {
+        show(format_args!("{report}\n"))?;
+    }
+    match &options.report {
+        Some(file) => write_whole(file, &(serde_json::to_string_pretty(&report).expect("plain data") + "\n")),
+        None => Ok(()),
+    }
+}
+
+/// What files of one format are called: as the folder that the mesh was read from, which for a `partitioning.N` is the one above.
+fn stem_of(folder: &Path) -> PathBuf {
+    let whole = std::path::absolute(folder).unwrap_or_else(|_| folder.to_path_buf());
+    let is_partition = |name: &std::ffi::OsStr| name.to_string_lossy().starts_with("partitioning.");
+    let named = whole.ancestors().find_map(|above| above.file_name().filter(|name| !is_partition(name)));
+    named.map_or_else(|| "mesh".into(), PathBuf::from)
+}

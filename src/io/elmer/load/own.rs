@@ -1,0 +1,254 @@
+//! The parts that this rank reads, and what can be said of them without the others.
+
+use super::super::faults::{FaultKind, Faults, check_header};
+use super::super::faults_nodes::{NodeTable, check_nodes_of};
+use super::super::parse::ReadError;
+use super::super::read::{ElmerPart, Layout, read_part};
+use super::fault;
+use super::ids::SettledIds;
+use crate::Point;
+use crate::comm::Communicator;
+use crate::dist::{BareMesh, Shared};
+use crate::kernel::predicates::{Sign, orient3d};
+use crate::mesh::stream::Counts;
+use crate::mesh::{Class, GlobalId, Rank, VertexId};
+use csg::BodyId;
+use rayon::prelude::*;
+
+/// A part as it was read, with its tables in the order of ids.
+pub(super) struct OwnPart {
+    pub files: ElmerPart,
+    pub nodes: NodeTable,
+    /// For each node in the order of ids its line in `.shared`, counted from 0.
+    pub shared: Vec<Option<u32>>,
+    /// Places of elements by ascending id.
+    pub elements: Vec<u32>,
+}
+
+/// The parts of this rank, one after the other.
+pub(super) struct OwnParts {
+    /// The first, from 0.
+    first: Rank,
+    pub list: Vec<OwnPart>,
+    /// The number of parts of the mesh.
+    pub parts: u32,
+}
+
+/// A tet by the file that it stands in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct TetPlace {
+    /// The part, among those of this rank.
+    pub part: u32,
+    /// Its place in `.elements`.
+    pub place: u32,
+}
+
+/// The parts of a rank as one.
+pub(super) struct Assembled {
+    /// Without anything on patches.
+    pub bare: BareMesh,
+    /// Where each tet comes from.
+    pub of_tet: Vec<TetPlace>,
+    /// The vertex of each node, by part and place in its `.nodes`.
+    pub local: Vec<Vec<VertexId>>,
+    /// How many tets were turned round.
+    pub turned: u64,
+}
+
+/// The rank that reads a part.
+pub(super) fn reader(part: u32, parts: u32, ranks: u32) -> Rank {
+    (u64::from(part) * u64::from(ranks) / u64::from(parts)) as Rank
+}
+
+impl OwnParts {
+    /// *Local.* Reads and checks the parts that are this rank's.
+    pub fn read(comm: &dyn Communicator, layout: &Layout) -> Result<Self, ReadError> {
+        let parts = match layout {
+            Layout::Serial(_) => 1,
+            Layout::Partitioned { parts, .. } => *parts,
+        };
+        let mine: Vec<u32> =
+            (0..parts).filter(|&part| reader(part, parts, comm.size()) == comm.rank()).collect();
+        let read = |&part: &u32| {
+            let files = match layout {
+                Layout::Serial(folder) => read_part(folder.join("mesh"), false)?,
+                Layout::Partitioned { folder, .. } => {
+                    read_part(folder.join(format!("part.{}", part + 1)), true)?
+                }
+            };
+            OwnPart::new(files, part + 1)
+        };
+        let list: Vec<Result<OwnPart, ReadError>> = mine.par_iter().map(read).collect();
+        let list = list.into_iter().collect::<Result<_, _>>()?;
+        Ok(Self { first: mine.first().copied().unwrap_or(0), list, parts })
+    }
+
+    /// The files of the parts.
+    pub fn files(&self) -> impl Iterator<Item = &ElmerPart> {
+        self.list.iter().map(|part| &part.files)
+    }
+
+    /// The number of a part of this rank, from 0.
+    pub fn number(&self, part: u32) -> Rank {
+        self.first + part
+    }
+
+    /// *Local.* The parts as one, in the order of ids.
+    pub fn assemble(
+        &self,
+        comm: &dyn Communicator,
+        ids: SettledIds,
+        bodies: &[u32],
+    ) -> Result<Assembled, ReadError> {
+        let (local, vertices) = self.number_vertices(&ids.nodes);
+        let mut of_tet: Vec<(GlobalId, TetPlace)> = Vec::new();
+        for (part, ids) in (0..).zip(&ids.elements) {
+            of_tet.extend((0..).zip(ids).map(|(place, &id)| (id, TetPlace { part, place })));
+        }
+        of_tet.par_sort_unstable();
+        let point = |&(_, TetPlace { part, place }): &(GlobalId, TetPlace)| {
+            self.list[part as usize].files.nodes[place as usize].point
+        };
+        let points: Vec<Point> = vertices.iter().map(point).collect();
+        let tet = |&(_, at): &(GlobalId, TetPlace)| self.positive(at, &local, &points);
+        let tets: Vec<Result<([VertexId; 4], bool), ReadError>> = of_tet.par_iter().map(tet).collect();
+        let mut turned = 0;
+        let mut positive = Vec::with_capacity(tets.len());
+        for tet in tets {
+            let (tet, was_turned) = tet?;
+            turned += u64::from(was_turned);
+            positive.push(tet);
+        }
+        let mut shared = Shared::default();
+        for (id, holders) in ids.holders {
+            let v = vertices.binary_search_by_key(&id, |(id, _)| *id).expect("a node of this rank");
+            shared.push(v as u32, holders);
+        }
+        let body = |&(_, at): &(GlobalId, TetPlace)| {
+            let body = bodies.binary_search(&self.element(at).body).expect("all bodies are listed");
+            BodyId(body as u32)
+        };
+        let [all_vertices, all_tets] = ids.totals;
+        let bare = BareMesh {
+            rank: comm.rank(),
+            ranks: comm.size(),
+            totals: Counts { vertices: all_vertices, tets: all_tets, boundary: 0 },
+            points: points.into_iter().map(|p| p.into()).collect(),
+            vertex_ids: vertices.iter().map(|(id, _)| *id).collect(),
+            vertex_classes: vec![Class::Body(BodyId(0)); vertices.len()],
+            shared,
+            tets: positive,
+            tet_ids: of_tet.iter().map(|(id, _)| *id).collect(),
+            tet_bodies: of_tet.iter().map(body).collect(),
+            ..BareMesh::default()
+        };
+        Ok(Assembled { bare, of_tet: of_tet.into_iter().map(|(_, at)| at).collect(), local, turned })
+    }
+
+    /// An element by where it stands.
+    pub fn element(&self, at: TetPlace) -> &super::super::Element {
+        &self.list[at.part as usize].files.elements[at.place as usize]
+    }
+
+    /// A fault of an element.
+    pub fn element_fault(&self, kind: FaultKind, at: TetPlace, what: String) -> ReadError {
+        fault(kind, self.list[at.part as usize].files.file("elements"), at.place as usize, what)
+    }
+
+    /// The vertex of each node, by part and place; and of each vertex, by id, a node that it is.
+    fn number_vertices(&self, ids: &[Vec<GlobalId>]) -> (Vec<Vec<VertexId>>, Vec<(GlobalId, TetPlace)>) {
+        let mut nodes: Vec<(GlobalId, TetPlace)> = Vec::new();
+        for (part, ids) in (0..).zip(ids) {
+            nodes.extend((0..).zip(ids).map(|(place, &id)| (id, TetPlace { part, place })));
+        }
+        nodes.par_sort_unstable();
+        let mut local: Vec<Vec<VertexId>> = ids.iter().map(|ids| vec![VertexId(0); ids.len()]).collect();
+        for (count, copies) in nodes.chunk_by(|a, b| a.0 == b.0).enumerate() {
+            for (_, TetPlace { part, place }) in copies {
+                local[*part as usize][*place as usize] = VertexId::new(count);
+            }
+        }
+        nodes.dedup_by_key(|(id, _)| *id);
+        (local, nodes)
+    }
+
+    /// The vertices of an element, positively oriented, and whether it was turned round for that.
+    fn positive(
+        &self,
+        at: TetPlace,
+        local: &[Vec<VertexId>],
+        points: &[Point],
+    ) -> Result<([VertexId; 4], bool), ReadError> {
+        let element = self.element(at);
+        let part = at.part as usize;
+        let vertex = |id: u32| local[part][self.list[part].nodes.find(id).expect("checked before")];
+        let [a, b, c, d] = element.nodes.map(vertex);
+        let [p, q, r, s] = [a, b, c, d].map(|v| &points[v.index()]);
+        match orient3d(p, q, r, s) {
+            Sign::Positive => Ok(([a, b, c, d], false)),
+            Sign::Negative => Ok(([a, b, d, c], true)),
+            Sign::Zero => {
+                let what = format!("element {} is flat", element.id);
+                Err(self.element_fault(FaultKind::Inverted, at, what))
+            }
+        }
+    }
+}
+
+impl OwnPart {
+    /// Checks the files of the part of this number, from 1.
+    fn new(files: ElmerPart, number: u32) -> Result<Self, ReadError> {
+        let mut faults = Faults::default();
+        check_header(&files, &mut faults);
+        let nodes = check_nodes_of(&files, &mut faults);
+        // A part may be empty here: the ranks of another program may not all have had work.
+        faults.first.retain(|fault| fault.kind != FaultKind::EmptyPart);
+        if let Some(first) = faults.first.into_iter().next() {
+            let line = first.line.max(1);
+            let message = format!("{}: {}", first.kind, first.what);
+            return Err(ReadError::Line { path: first.file, line, message });
+        }
+        let elements = sorted_elements(&files)?;
+        let shared = shared_lines(&files, &nodes, number)?;
+        Ok(Self { files, nodes, shared, elements })
+    }
+
+    /// Whether an element with this id is in the part.
+    pub fn has_element(&self, id: u32) -> bool {
+        let elements = &self.files.elements;
+        self.elements.binary_search_by_key(&id, |&place| elements[place as usize].id).is_ok()
+    }
+}
+
+/// The places of elements by ascending id.
+fn sorted_elements(files: &ElmerPart) -> Result<Vec<u32>, ReadError> {
+    let id = |place: &u32| files.elements[*place as usize].id;
+    let mut places: Vec<u32> = (0..files.elements.len() as u32).collect();
+    places.sort_by_key(id);
+    match places.windows(2).find(|pair| id(&pair[0]) == id(&pair[1])) {
+        None => Ok(places),
+        Some(pair) => {
+            let what = format!("element {} stands on line {} too", id(&pair[1]), pair[0] + 1);
+            Err(fault(FaultKind::ElementTwice, files.file("elements"), pair[1] as usize, what))
+        }
+    }
+}
+
+/// For each node by ascending id its line in `.shared`; each line must be of a node of the part, and name the part.
+fn shared_lines(files: &ElmerPart, nodes: &NodeTable, number: u32) -> Result<Vec<Option<u32>>, ReadError> {
+    let wrong =
+        |line: usize, what: String| Err(fault(FaultKind::WrongHolders, files.file("shared"), line, what));
+    let mut by_place = vec![None; files.nodes.len()];
+    for (line, shared) in files.shared.iter().enumerate() {
+        let Some(place) = nodes.find(shared.id) else {
+            return wrong(line, format!("node {} is not in this part", shared.id));
+        };
+        if let Some(before) = by_place[place].replace(line as u32) {
+            return wrong(line, format!("node {} is on line {} too", shared.id, before + 1));
+        }
+        if !shared.parts.contains(&number) {
+            return wrong(line, format!("node {} is said to be in {:?}", shared.id, shared.parts));
+        }
+    }
+    Ok(nodes.sorted().iter().map(|(_, place)| by_place[*place as usize]).collect())
+}

@@ -1,0 +1,102 @@
+//! `tetmill repartition`: partitions on the disk become others, and stay the same mesh.
+
+use crate::common::{judge, own, read_json, succeed, tetmill};
+use std::path::Path;
+use std::process::Output;
+
+/// Writes a bodied geometry in so many parts.
+fn generate(dir: &Path, parts: &str) {
+    let mut command = tetmill();
+    command.arg("generate").arg(own("tee")).args([
+        "--preset",
+        "very-coarse",
+        "--levels",
+        "0",
+        "-q",
+        "-n",
+        parts,
+    ]);
+    succeed(command.arg("-o").arg(dir));
+}
+
+/// `tetmill repartition FROM -n PARTS -o TO ARGUMENTS`
+fn repartition(from: &Path, parts: &str, to: &Path, arguments: &[&str]) -> Output {
+    tetmill().arg("repartition").arg(from).args(["-n", parts, "-o"]).arg(to).args(arguments).output().unwrap()
+}
+
+/// All lines of one kind of file in a partition, without the ids, which are others in each partition: sorted. Of elements what is left
+/// is the body, of boundary elements the number, of nodes the place.
+fn content(dir: &Path, parts: u32, kind: &str) -> Vec<String> {
+    let mut lines: Vec<String> = (1..=parts)
+        .flat_map(|part| {
+            let file = dir.join(format!("partitioning.{parts}/part.{part}.{kind}"));
+            let text = std::fs::read_to_string(file).unwrap();
+            let kept = |line: &str| match kind {
+                "nodes" => line.split_once(' ').unwrap().1.to_string(),
+                _ => line.split(' ').nth(1).unwrap().to_string(),
+            };
+            text.lines().map(kept).collect::<Vec<_>>()
+        })
+        .collect();
+    lines.sort();
+    if kind == "nodes" {
+        lines.dedup();
+    }
+    lines
+}
+
+#[test]
+fn partitions_become_others_and_both_checkers_accept_them() {
+    let dir = tempfile::tempdir().unwrap();
+    let [start, grown, shrunk, report] = ["start", "grown", "shrunk", "r.json"].map(|n| dir.path().join(n));
+    generate(&start, "3");
+    let arguments = ["-q", "--check", "--report", report.to_str().unwrap()];
+    assert!(repartition(&start, "8", &grown, &arguments).status.success());
+    judge(&grown, 8);
+    let said = read_json(&report);
+    assert_eq!([&said["before"]["parts"], &said["after"]["parts"]], [3, 8]);
+    assert!(said["after"]["imbalance"].as_f64().unwrap() < 1.05, "{said}");
+    assert!(said["after"]["shared_vertices"].as_u64() > said["before"]["shared_vertices"].as_u64());
+    assert!(
+        repartition(&grown, "2", &shrunk, &["-q", "--check", "-m", "curve", "-f", "elmer,vtu"])
+            .status
+            .success()
+    );
+    judge(&shrunk, 2);
+    assert!(shrunk.join("grown.pvtu").exists());
+    let before = content(&start, 3, "nodes");
+    for (folder, parts) in [(&grown, 8), (&shrunk, 2)] {
+        assert_eq!(content(folder, parts, "nodes"), before);
+        assert_eq!(content(folder, parts, "elements"), content(&start, 3, "elements"));
+        let names = |folder: &Path| std::fs::read_to_string(folder.join("mesh.names")).unwrap();
+        assert_eq!(names(folder), names(&start));
+    }
+}
+
+#[test]
+fn what_cannot_be_read_or_parted_is_refused_and_nothing_is_written() {
+    let dir = tempfile::tempdir().unwrap();
+    let [start, out] = ["start", "out"].map(|name| dir.path().join(name));
+    generate(&start, "3");
+    let refused = |parts: &str, expected: &str| {
+        let output = repartition(&start, parts, &out, &["-q"]);
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{said}");
+        assert_eq!(said.matches(expected).count(), 1, "{said}");
+        assert!(!said.contains("panicked") && !out.exists(), "{said}");
+    };
+    refused("100000", "100000 parts");
+    let file = |kind: &str| start.join(format!("partitioning.3/part.3.{kind}"));
+    let text = std::fs::read_to_string(file("elements")).unwrap();
+    std::fs::write(file("elements"), text.replacen(" 504 ", " 508 ", 1)).unwrap();
+    refused("4", "part.3.elements:1: ");
+    std::fs::write(file("elements"), text).unwrap();
+    std::fs::remove_file(file("nodes")).unwrap();
+    refused("2", "part.3.nodes");
+    std::fs::remove_file(file("header")).unwrap();
+    refused("2", "part.3.header");
+    std::fs::remove_dir_all(&start).unwrap();
+    refused("2", "start");
+    let output = tetmill().arg("repartition").arg(&start).arg("-o").arg(&out).output().unwrap();
+    assert_eq!(output.status.code(), Some(2));
+}
