@@ -1,6 +1,7 @@
 //! Where a third surface crosses the intersection of two others.
 
 use super::around::Tolerances;
+use super::contact::{Contact, Kind};
 use super::octree::Octree;
 use super::trace::{Trace, along, step_box};
 use crate::project::project_to_both;
@@ -18,6 +19,9 @@ pub(super) struct Crossing {
     /// The volume spanned by the three unit normals: how well the point is determined.
     pub volume: f64,
 }
+
+/// Crossings nearer to each other than this many lengths of merging may be one: a thousandth of the diagonal.
+const NEAR: f64 = 1e5;
 
 /// The crossings of a trace with all other surfaces that matter there, in order.
 pub(super) fn crossings(
@@ -75,8 +79,35 @@ pub(super) fn crossings(
         }
         found.extend(distinct(&geometry.surfaces[id.index()], crossings, tolerances));
     }
+    for crossing in &mut found {
+        crossing.point = settled(geometry, tree, trace, crossing, tolerances);
+    }
     found.sort_by(|x, y| x.position.total_cmp(&y.position));
     found
+}
+
+/// The point where a crossing is: that where two surfaces through it are tangent, if rounding does not tell both apart.
+///
+/// A line in the plane that touches a torus at its throat, along a branch of what the two have in common, leaves the torus with the third
+/// power: where it crosses the torus is known to the third root of rounding only, and the point of contact much better.
+fn settled(
+    geometry: &Geometry,
+    tree: &Octree,
+    trace: &Trace,
+    crossing: &Crossing,
+    tolerances: &Tolerances,
+) -> Point {
+    let at = crossing.point;
+    let is_on = |s: &SurfaceId, p: &Point| geometry.surfaces[s.index()].distance(p) <= tolerances.on_surface;
+    let is_same = |contact: &&Contact| {
+        let middle = nalgebra::center(&at, &contact.point);
+        (contact.point - at).norm() <= NEAR * tolerances.merge
+            && contact.kind == Kind::Tangent
+            && contact.pair.iter().all(|s| is_on(s, &at) && is_on(s, &middle))
+            && trace.pair.iter().all(|s| is_on(s, &contact.point) && is_on(s, &middle))
+            && geometry.seam(contact.pair).is_none()
+    };
+    tree.contacts.iter().find(is_same).map_or(at, |contact| contact.point)
 }
 
 /// The surface that cuts the seam of a third surface and one of a pair, if that seam is all the two have in common.
@@ -94,8 +125,6 @@ fn auxiliary(geometry: &Geometry, pair: [SurfaceId; 2], third: SurfaceId) -> Opt
 /// Rounding makes of a touching point two crossings nearby, or one and an extremum beside it. The extremum is
 /// kept, else the one that is nearest to the surface.
 fn distinct(third: &Surface, mut crossings: Vec<Crossing>, tolerances: &Tolerances) -> Vec<Crossing> {
-    /// Crossings nearer to each other than this many lengths of merging may be one: a thousandth of the diagonal.
-    const NEAR: f64 = 1e5;
     /// The volume at an extremum found by bisection is rounding.
     const EXTREMUM: f64 = 1e-10;
     crossings.sort_by(|x, y| x.position.total_cmp(&y.position));
