@@ -194,14 +194,3 @@ fn a_face_may_end_in_a_cusp_between_curves_that_bend_differently() {
     let reason = refused(rod);
     assert!(reason.contains("cusp") && reason.contains("(0.250000, 0.750000, 0.000000)"), "{reason}");
 }
-
-#[test]
-fn a_curve_that_a_plane_leaves_slowly_is_followed_to_its_end() {
-    // The rod and the cone's rim touch in one point of the plane of the rim, which parts from their common curve with the fourth power.
-    let reason = refused(
-        "solid rod = cylinder (0,-1,0.5; 0,1,0.5; 0.5) and plane (0,-1,0; 0,-1,0) and plane (0,1,0; 0,1,0);
-        solid stump = cone (-0.5,0.75,0; 0.5; -0.5,0.75,-0.5; 0.25) and plane (0,0,0; 0,0,1) and plane (0,0,-0.5; 0,0,-1);
-        solid s = rod or stump; tlo s;",
-    );
-    assert!(reason.contains("touch"), "{reason}");
-}
