@@ -4,6 +4,7 @@ use super::around::Tolerances;
 use super::contact::{Contact, Kind};
 use super::octree::Octree;
 use super::trace::{Trace, along, step_box};
+use crate::interval::Cell;
 use crate::project::project_to_both;
 use crate::{Geometry, Interval, Point, Surface, SurfaceId, Vector};
 use nalgebra::Matrix3;
@@ -42,7 +43,8 @@ pub(super) fn crossings(
                 continue;
             }
             let third = &geometry.surfaces[id.index()];
-            let mut finder = Finder { a, b, third, tolerances, found: Vec::new() };
+            let matters = |cell: &Cell| tree.surfaces_in(cell).binary_search(&id).is_ok();
+            let mut finder = Finder { a, b, third, matters: &matters, tolerances, found: Vec::new() };
             if !finder.contains_curve(ends) {
                 // Where it is tangent to one of the pair, what crosses their seam says where well.
                 if let Some(auxiliary) = auxiliary(geometry, trace.pair, id) {
@@ -162,6 +164,8 @@ struct Finder<'a> {
     a: &'a Surface,
     b: &'a Surface,
     third: &'a Surface,
+    /// Whether the third surface, or that for which it stands, matters in a box.
+    matters: &'a dyn Fn(&Cell) -> bool,
     tolerances: &'a Tolerances,
     found: Vec<Point>,
 }
@@ -184,6 +188,9 @@ impl Finder<'_> {
         const DEPTH: u32 = 30;
         /// On a part of 1/32 of a step a derivative with different signs at its ends has one root.
         const SHORT: u32 = 5;
+        /// So many times it is halved before it is asked whether the third surface matters on the part: far from where it does, it may have
+        /// places where it is not smooth, and a long step may run along them.
+        const LOCAL: u32 = 6;
         if depth == 0 {
             // An end of the step on the surface may be lost to rounding on both sides of it.
             let ends: Vec<Point> = [p, q].into_iter().filter(|x| self.is_on(x)).copied().collect();
@@ -191,6 +198,9 @@ impl Finder<'_> {
         }
         let cell = step_box(p, q);
         if !self.third.value_range(&cell).contains_zero() {
+            return;
+        }
+        if depth == LOCAL && !(self.matters)(&cell) {
             return;
         }
         let (u, v) = (self.a.gradient_range(&cell), self.b.gradient_range(&cell));

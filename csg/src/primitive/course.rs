@@ -53,31 +53,47 @@ fn unit([x, y]: [f64; 2]) -> [f64; 2] {
 
 /// Ranges over a disk around a point: of the normal, and of the distance from the centre of curvature (all that are not negative where
 /// that is not known).
+///
+/// Off the segment of its longer axis whose points have two nearest ones the normal turns smoothly. It turns by less than an angle if within that
+/// angle the radius of curvature is large enough that it could not have turned so far.
 pub(super) fn ranges(radii: [f64; 2], at: [f64; 2], reach: f64) -> ([Interval; 2], Interval) {
-    /// The first bound of the turn takes the least radius of curvature, the next ones that in the range found before.
-    const ROUNDS: usize = 3;
+    /// Angles that are tried, in those by which the normal turns where the radius of curvature is that at the middle.
+    const TRIALS: [f64; 3] = [1.2, 2.0, 5.0];
     let [a, b] = radii;
-    let Beside { normal: [c, s], distance, bend: _ } = beside(radii, at);
+    let seen = beside(radii, at);
     // Rounding of the nearest point, and of the normal there.
-    let slack = 64.0 * f64::EPSILON * (a.max(b) + at[0].hypot(at[1]));
+    let slack = 16.0 * f64::EPSILON * (a.max(b) + at[0].hypot(at[1]));
     let blur = slack / least_bend(radii);
-    let whole = [Interval::new(-1.0, 1.0); 2];
-    let mut known = (whole, Interval::new(0.0, f64::INFINITY));
-    let mut bend = Interval::new(least_bend(radii), a.max(b).powi(2) / a.min(b));
-    for _ in 0..ROUNDS {
-        let arm = bend + Interval::new(distance - reach - slack, distance + reach + slack);
-        let turn = reach / arm.lo + blur;
-        if !(arm.lo > 0.0 && turn < std::f64::consts::FRAC_PI_2) {
+    let (along, across) = if a > b { (at[0], at[1]) } else { (at[1], at[0]) };
+    let room = reach + slack;
+    let has_two = across.abs() <= room && along.abs() - room <= (a * a - b * b).abs() / a.max(b);
+    let middle = seen.bend[0] + seen.distance;
+    for trial in TRIALS.map(|trial| trial * reach / middle + 2.0 * blur) {
+        if has_two || !(trial > 0.0 && trial < std::f64::consts::FRAC_PI_2) {
             break;
         }
-        let (cos, sin) = (Interval::new(turn.cos() - f64::EPSILON, 1.0), turn.sin());
-        let sin = Interval::new(-sin, sin);
-        let normal = [cos * c - sin * s, cos * s + sin * c].map(|x| x.intersect(whole[0]));
-        let least = a.min(b).powi(2);
-        let square = (normal[0] * a).square() + (normal[1] * b).square();
-        let square = Interval::new(square.lo.max(least), square.hi.max(least));
-        bend = (Interval::point((a * b).powi(2)) / (square * square.sqrt())).intersect(bend);
-        known = (normal, arm);
+        let far = |turn: f64| bend_range(radii, turned(seen.normal, turn));
+        let arm = |bend: Interval| bend + Interval::new(seen.distance - room, seen.distance + room);
+        let least = arm(far(trial)).lo;
+        let turn = reach / least + blur;
+        if least > 0.0 && turn <= trial {
+            return (turned(seen.normal, turn), arm(far(turn)));
+        }
     }
-    known
+    ([Interval::new(-1.0, 1.0); 2], Interval::new(0.0, f64::INFINITY))
+}
+
+/// The range of a unit vector that turns by an angle at most, less than a right one.
+fn turned([c, s]: [f64; 2], turn: f64) -> [Interval; 2] {
+    let cos = Interval::new(turn.cos() - f64::EPSILON, 1.0);
+    let sin = Interval::new(-turn.sin(), turn.sin());
+    [cos * c - sin * s, cos * s + sin * c].map(|x| x.intersect(Interval::new(-1.0, 1.0)))
+}
+
+/// The range of the radius of curvature where the normal is in a range.
+fn bend_range([a, b]: [f64; 2], normal: [Interval; 2]) -> Interval {
+    let (least, most) = (a.min(b).powi(2), a.max(b).powi(2));
+    let square = (normal[0] * a).square() + (normal[1] * b).square();
+    let square = Interval::new(square.lo.max(least), square.hi.min(most).max(least));
+    Interval::point((a * b).powi(2)) / (square * square.sqrt())
 }

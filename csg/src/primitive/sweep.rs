@@ -181,7 +181,7 @@ impl Sweep {
         let ([c, s], distance) = course::ranges(self.radii, at, reach);
         let outward = [0, 1, 2].map(|i| c * self.start[i] + s * side[i]);
         // The distance from the path has the normal for its gradient.
-        let rounding = 64.0 * f64::EPSILON * (self.reach() + arm.norm() + reach);
+        let rounding = 16.0 * f64::EPSILON * (self.reach() + arm.norm() + reach);
         let seen = course::beside(self.radii, at).distance;
         let seen = Interval::new(seen - rounding, seen + rounding);
         let way = offset(cell, &center);
