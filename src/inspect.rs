@@ -232,7 +232,8 @@ fn kind(surface: &csg::Surface) -> &'static str {
         csg::Surface::EllipticCone(_) => "elliptic cone",
         csg::Surface::Nappe(_) => "nappe of a cone",
         csg::Surface::Revolved(_) => "turned ellipse",
-        csg::Surface::Sweep(_) => "section moved along a circle",
+        csg::Surface::Sweep(s) if s.is_round() => "section moved along a circle",
+        csg::Surface::Sweep(_) => "section moved along an ellipse",
     }
 }
 

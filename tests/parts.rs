@@ -168,6 +168,7 @@ fn others() -> Vec<Part> {
     let start = (ball * ball - pipe * pipe).sqrt();
     let eccentricity = 0.75_f64.sqrt();
     let slot = 94.0 - 0.5 * PI;
+    let oval = 2.5 + 0.25 * ellipse_length(2.0, 1.0);
     vec![
         ("micro_beam", [8, 14, 7], (100.0 - PI) * 1e-18, 250e-12),
         (
@@ -180,6 +181,7 @@ fn others() -> Vec<Part> {
         ("thin_plate", [16, 26, 11], 0.1 * slot, 2.0 * slot + 0.1 * (44.0 + 2.0 * PI)),
         ("roof", [9, 18, 10], 12.0 - 0.32 * PI, 20.0 - 0.32 * PI + 1.6 * PI + 4.0 * 10.0_f64.sqrt()),
         ("elliptic_bend", [0, 2, 3], 0.24 * PI * PI, ellipse_length(0.6, 0.4) * PI + 0.48 * PI),
+        ("oval_bend", [16, 28, 15], (0.16 + 0.04 * PI) * oval, (1.6 + 0.4 * PI) * oval + 0.32 + 0.08 * PI),
         ("picture_frame", [24, 36, 15], 2.448, 27.52),
         ("handle", [0, 4, 4], 2.5 * PI, 10.5 * PI),
         ("house", [10, 15, 7], 15.0, 28.0 + 6.0 * SQRT_2),

@@ -67,6 +67,8 @@ fn parts() -> Vec<(&'static str, f64, [u64; 3])> {
     // An arc of a circle with a chord of √300 between tangents of length √125.
     let cosine = 300.0_f64.sqrt() / (2.0 * 125.0_f64.sqrt());
     let half = cosine.acos();
+    let quarter: Vec<[f64; 2]> = profile(&[&[[0., 0.]], &[[2., 0.], [2., 1.]]]);
+    let oval: f64 = quarter.windows(2).map(|w| (w[1][0] - w[0][0]).hypot(w[1][1] - w[0][1])).sum();
     let bar = 4.0 * (2.0 * half * 125.0_f64.sqrt() / half.tan());
     vec![
         ("pipe_bend", 0.09 * PI * (3.0 + PI), [0, 8, 8]),
@@ -76,6 +78,7 @@ fn parts() -> Vec<(&'static str, f64, [u64; 3])> {
         ("vase", turned(&vase), [0, 6, 7]),
         ("swept_copies", 2.0 * turned(&ring) + 0.24 * 1.5 * PI, [8, 20, 14]),
         ("twisted_bar", bar, [8, 12, 6]),
+        ("oval_twist", 0.16 * (2.5 + oval), [16, 28, 14]),
         // Two straight parts as long as two sides of the arc's triangle.
         ("winding_bar", bar + 8.0 * 125.0_f64.sqrt(), [16, 28, 14]),
     ]

@@ -13,7 +13,7 @@
 //!    numbers and names.
 //! 7. `periodic`: which of them are images of others.
 //! 8. `check`: whether it all fits together; `contact`: whether places where surfaces are tangent matter; `touch`:
-//!    whether a corner or an edge touches the inside of a patch.
+//!    whether a corner or an edge touches the inside of a patch; `cusp`: whether one ends in too sharp a cusp.
 //!
 //! Why trace all pairs and classify afterwards, and not follow edges from special points like NETGEN: no
 //! decision depends on a tolerance while a curve is followed; surfaces in special position (three through
@@ -28,7 +28,7 @@
 //!
 //! What is refused, with its place: surfaces that are tangent where both are boundaries with a wedge of no angle between
 //! them, along a line (two rods side by side) or in a point (a ball on a plate, a torus cut where a plane touches it); a corner or
-//! an edge that touches a face; bodies that overlap or are not bounded.
+//! an edge that touches a face; a face that ends in a cusp whose curves bend alike; bodies that overlap or are not bounded.
 //!
 //! Three or more surfaces that touch in one point to a high order are refused, but not always with that reason.
 
@@ -44,6 +44,7 @@ mod bounds;
 mod check;
 mod contact;
 mod cross;
+mod cusp;
 mod error;
 mod extent;
 mod number;
@@ -183,6 +184,7 @@ fn find_in(geometry: &Geometry, tree: &Octree, tolerances: &Tolerances) -> Resul
     number::number(geometry, &mut features.patches);
     features.identified = periodic::identify(geometry, &features, tolerances)?;
     features.check()?;
+    cusp::check(geometry, &features)?;
     Ok(features)
 }
 

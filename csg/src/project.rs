@@ -284,10 +284,12 @@ fn encode_surface(surface: &Surface, out: &mut Vec<f64>) {
         Surface::Sweep(s) => {
             let vectors = [s.center.coords, s.axis, s.start, s.up];
             match s.section {
-                Section::Line { normal: [x, y], offset } => put(10, &vectors, &[s.radius, x, y, offset]),
+                Section::Line { normal: [x, y], offset } => {
+                    put(10, &vectors, &[s.radii[0], s.radii[1], x, y, offset])
+                }
                 Section::Ellipse(e) => {
                     let [a, b, c, d, e, f] = ellipse_numbers(&e);
-                    put(11, &vectors, &[s.radius, a, b, c, d, e, f]);
+                    put(11, &vectors, &[s.radii[0], s.radii[1], a, b, c, d, e, f]);
                 }
             }
         }
@@ -388,13 +390,13 @@ impl Reader<'_> {
             kind @ (10 | 11) => {
                 let center = self.point()?;
                 let [axis, start, up] = [self.vector()?, self.vector()?, self.vector()?];
-                let radius = self.number()?;
+                let radii = [self.number()?, self.number()?];
                 let section = if kind == 10 {
                     Section::Line { normal: [self.number()?, self.number()?], offset: self.number()? }
                 } else {
                     Section::Ellipse(self.ellipse()?)
                 };
-                Surface::Sweep(Sweep { center, axis, start, radius, up, section })
+                Surface::Sweep(Sweep { center, axis, start, radii, up, section })
             }
             _ => return None,
         })
@@ -482,7 +484,8 @@ mod tests {
             Section::Ellipse(Ellipse { center: [0.1, 0.2], axis: [0.6, 0.8], radii: [1.0, 2.0] }),
         ];
         let [axis, start, up] = [axes[2], axes[0], Vector::new(0.6, 0.0, 0.8)];
-        let sweep = |section| Surface::Sweep(Sweep { center: o, axis, start, radius: 5.0, up, section });
+        let sweep =
+            |section| Surface::Sweep(Sweep { center: o, axis, start, radii: [5.0, 4.0], up, section });
         projector.surfaces.extend(sections.map(sweep));
         let turn = Isometry3::new(Vector::new(1.0, 2.0, 3.0), Vector::new(0.1, 0.2, 0.3));
         projector.curve_images = vec![Image { ids: [3, 1], motion: turn }];

@@ -1,5 +1,6 @@
 //! Boolean trees over half-spaces.
 
+use crate::interval::Cell;
 use crate::{Interval, Point, Surface, SurfaceId};
 
 /// A set of points of space.
@@ -109,6 +110,27 @@ impl Solid {
             Self::Or(members) => prune_members(members, range, Pruned::Full, Pruned::Empty, Self::Or),
         }
     }
+}
+
+/// What is left of solids in a box; one that fills it is `And([])`, one that is not there is left out.
+///
+/// The range of each surface is asked once, however many solids it bounds.
+pub fn prune_in<I>(surfaces: &[Surface], cell: &Cell, solids: Vec<(I, Solid)>) -> Vec<(I, Solid)> {
+    let mut known: Vec<(SurfaceId, Interval)> = Vec::new();
+    let mut range = |id: SurfaceId| {
+        if let Some(range) = known.iter().find(|r| r.0 == id) {
+            return range.1;
+        }
+        let range = surfaces[id.index()].value_range(cell);
+        known.push((id, range));
+        range
+    };
+    let left = |(id, solid): (I, Solid)| match solid.prune(&mut range) {
+        Pruned::Empty => None,
+        Pruned::Full => Some((id, Solid::And(Vec::new()))),
+        Pruned::Part(part) => Some((id, part)),
+    };
+    solids.into_iter().filter_map(left).collect()
 }
 
 /// Prunes each member; one that is `decisive` decides, those that are `neutral` are left out.

@@ -32,7 +32,7 @@ pub enum Surface {
     Nappe(Nappe),
     /// An ellipse turned about an axis in its plane.
     Revolved(Revolved),
-    /// A line or an ellipse moved along a circle and turned on the way.
+    /// A line or an ellipse moved along an ellipse and turned on the way.
     Sweep(Sweep),
 }
 

@@ -2,7 +2,7 @@
 
 use super::{Closeness, Preset, SizeField, Source, SourceTree};
 use crate::{Point, Vector};
-use csg::solid::Pruned;
+use csg::solid::prune_in;
 use csg::{BodyId, Curve, CurveId, Cutout, Features, Geometry, Interval, Solid, SurfaceId};
 
 /// What the user asks of the size, beside what the geometry says.
@@ -246,21 +246,7 @@ impl Sampler<'_> {
         const REACH: f64 = 1.01;
         let reach = REACH * edge + 2.0 * self.side_step();
         let cell = [0, 1, 2].map(|i| Interval { lo: center[i] - reach, hi: center[i] + reach });
-        let mut known: Vec<(SurfaceId, Interval)> = Vec::new();
-        let mut range = |id: SurfaceId| match known.iter().find(|known| known.0 == id) {
-            Some(known) => known.1,
-            None => {
-                let range = self.geometry.surfaces[id.index()].value_range(&cell);
-                known.push((id, range));
-                range
-            }
-        };
-        let left = |(id, solid): (BodyId, Solid)| match solid.prune(&mut range) {
-            Pruned::Empty => None,
-            Pruned::Full => Some((id, Solid::And(Vec::new()))),
-            Pruned::Part(part) => Some((id, part)),
-        };
-        bodies.into_iter().filter_map(left).collect()
+        prune_in(&self.geometry.surfaces, &cell, bodies)
     }
 
     /// Whether a cell is too large for the size of a surface there; if it is not and the surface is near, adds its source.

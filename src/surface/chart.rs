@@ -67,9 +67,9 @@ enum Shape {
         middle: f64,
         half: f64,
     },
-    /// A line moved along a circle.
+    /// A line moved along an ellipse.
     Strip(Sweep),
-    /// An ellipse moved along a circle.
+    /// An ellipse moved along an ellipse.
     Hose(Sweep),
 }
 
@@ -223,11 +223,11 @@ impl Chart {
             Shape::Strip(sweep) => {
                 let (angle, [x, y]) = sweep.coordinates(point);
                 let normal = line_normal(&sweep);
-                [angle * sweep.radius, normal[0] * y - normal[1] * x, 0.0]
+                [angle * mean_radius(&sweep), normal[0] * y - normal[1] * x, 0.0]
             }
             Shape::Hose(sweep) => {
                 let (angle, at) = sweep.coordinates(point);
-                [on_grid(section_ellipse(&sweep).angle(at)), -angle * sweep.radius, 0.0]
+                [on_grid(section_ellipse(&sweep).angle(at)), -angle * mean_radius(&sweep), 0.0]
             }
         }
     }
@@ -346,12 +346,12 @@ impl Chart {
                 let (normal, t) = (line_normal(&sweep), site[1]);
                 let Section::Line { offset, .. } = sweep.section else { return None };
                 let at = [offset * normal[0] - t * normal[1], offset * normal[1] + t * normal[0]];
-                return Some(sweep.place(site[0] / sweep.radius, at));
+                return Some(sweep.place(site[0] / mean_radius(&sweep), at));
             }
             _ if site[2] != 0.0 => return None,
             Shape::Hose(sweep) => {
                 let at = section_ellipse(&sweep).point(TAU * site[0]);
-                return Some(sweep.place(-site[1] / sweep.radius, at));
+                return Some(sweep.place(-site[1] / mean_radius(&sweep), at));
             }
             Shape::Straight => {
                 let [x, y] = round(1.0);
@@ -389,6 +389,11 @@ impl Chart {
             Shape::Straight | Shape::Conic { .. } | Shape::Hose(_) => [half(0), 0.5 * (a[1] + b[1]), 0.0],
         })
     }
+}
+
+/// By which the parameter of a path is multiplied to be about as long as the path.
+fn mean_radius(sweep: &Sweep) -> f64 {
+    0.5 * (sweep.radii[0] + sweep.radii[1])
 }
 
 /// The normal of the line that a strip's section is.

@@ -301,8 +301,9 @@ fn classify(
     ends: Option<[Option<usize>; 2]>,
     tolerances: &Tolerances,
 ) -> Result<Option<Arc>, FeatureError> {
-    /// Where else than in the middle an arc is looked at: all must agree.
-    const OTHER_PARTS: [f64; 2] = [0.27, 0.81];
+    /// Where else than in the middle an arc is looked at: all must agree. Towards an end where a surface leaves the curve with a high power of the
+    /// distance it is taken to be on it for a while: there the next part counts that is free of it.
+    const OTHER_PARTS: [[f64; 3]; 2] = [[0.27, 0.37, 0.46], [0.81, 0.69, 0.58]];
     let look = |part: f64| {
         let (at, forward) = sample(geometry, pair, &points, part, tolerances);
         around(geometry, tree, pair, &at, &forward, tolerances).map(|found| (at, found))
@@ -313,11 +314,18 @@ fn classify(
     let mut surfaces = found.surfaces.clone();
     // Beyond where a trace was left nothing is known: only its middle counts.
     let whole = ends.is_none_or(|ends| ends.iter().all(Option::is_some));
-    for part in if whole { &OTHER_PARTS[..] } else { &[] } {
-        let (at, Some(other)) = look(*part)? else { return Ok(None) };
-        if sheets(&other) != sheets(&found) {
-            return Err(loose(geometry, pair, &at));
-        }
+    for parts in if whole { &OTHER_PARTS[..] } else { &[] } {
+        let mut parts = parts.iter();
+        let other = loop {
+            let part = parts.next().expect("the last of the parts is taken as it is");
+            let (at, Some(other)) = look(*part)? else { return Ok(None) };
+            if sheets(&other) == sheets(&found) {
+                break other;
+            }
+            if parts.as_slice().is_empty() || other.surfaces == found.surfaces {
+                return Err(loose(geometry, pair, &at));
+            }
+        };
         surfaces.extend(other.surfaces);
     }
     if !found.is_feature() {

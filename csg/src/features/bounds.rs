@@ -131,7 +131,7 @@ fn huge_cube(geometry: &Geometry) -> Cell {
             Surface::EllipticCone(e) => (e.point, e.radii[0].max(e.radii[1]).max(1.0 / e.rate.abs())),
             Surface::Nappe(c) => (c.point, c.radius.max((c.radius / c.slope).abs())),
             Surface::Revolved(r) => (r.point, r.reach()),
-            Surface::Sweep(s) => (s.center, s.radius),
+            Surface::Sweep(s) => (s.center, s.reach()),
         })
         .collect();
     let mut hull = Aabb { min: Point::from([f64::INFINITY; 3]), max: Point::from([f64::NEG_INFINITY; 3]) };

@@ -1,8 +1,10 @@
 //! Where a third surface crosses the intersection of two others.
 
 use super::around::Tolerances;
+use super::contact::{Contact, Kind};
 use super::octree::Octree;
 use super::trace::{Trace, along, step_box};
+use crate::interval::Cell;
 use crate::project::project_to_both;
 use crate::{Geometry, Interval, Point, Surface, SurfaceId, Vector};
 use nalgebra::Matrix3;
@@ -18,6 +20,9 @@ pub(super) struct Crossing {
     /// The volume spanned by the three unit normals: how well the point is determined.
     pub volume: f64,
 }
+
+/// Crossings nearer to each other than this many lengths of merging may be one: a thousandth of the diagonal.
+const NEAR: f64 = 1e5;
 
 /// The crossings of a trace with all other surfaces that matter there, in order.
 pub(super) fn crossings(
@@ -38,7 +43,8 @@ pub(super) fn crossings(
                 continue;
             }
             let third = &geometry.surfaces[id.index()];
-            let mut finder = Finder { a, b, third, tolerances, found: Vec::new() };
+            let matters = |cell: &Cell| tree.surfaces_in(cell).binary_search(&id).is_ok();
+            let mut finder = Finder { a, b, third, matters: &matters, tolerances, found: Vec::new() };
             if !finder.contains_curve(ends) {
                 // Where it is tangent to one of the pair, what crosses their seam says where well.
                 if let Some(auxiliary) = auxiliary(geometry, trace.pair, id) {
@@ -75,8 +81,35 @@ pub(super) fn crossings(
         }
         found.extend(distinct(&geometry.surfaces[id.index()], crossings, tolerances));
     }
+    for crossing in &mut found {
+        crossing.point = settled(geometry, tree, trace, crossing, tolerances);
+    }
     found.sort_by(|x, y| x.position.total_cmp(&y.position));
     found
+}
+
+/// The point where a crossing is: that where two surfaces through it are tangent, if rounding does not tell both apart.
+///
+/// A line in the plane that touches a torus at its throat, along a branch of what the two have in common, leaves the torus with the third
+/// power: where it crosses the torus is known to the third root of rounding only, and the point of contact much better.
+fn settled(
+    geometry: &Geometry,
+    tree: &Octree,
+    trace: &Trace,
+    crossing: &Crossing,
+    tolerances: &Tolerances,
+) -> Point {
+    let at = crossing.point;
+    let is_on = |s: &SurfaceId, p: &Point| geometry.surfaces[s.index()].distance(p) <= tolerances.on_surface;
+    let is_same = |contact: &&Contact| {
+        let middle = nalgebra::center(&at, &contact.point);
+        (contact.point - at).norm() <= NEAR * tolerances.merge
+            && contact.kind == Kind::Tangent
+            && contact.pair.iter().all(|s| is_on(s, &at) && is_on(s, &middle))
+            && trace.pair.iter().all(|s| is_on(s, &contact.point) && is_on(s, &middle))
+            && geometry.seam(contact.pair).is_none()
+    };
+    tree.contacts.iter().find(is_same).map_or(at, |contact| contact.point)
 }
 
 /// The surface that cuts the seam of a third surface and one of a pair, if that seam is all the two have in common.
@@ -94,8 +127,6 @@ fn auxiliary(geometry: &Geometry, pair: [SurfaceId; 2], third: SurfaceId) -> Opt
 /// Rounding makes of a touching point two crossings nearby, or one and an extremum beside it. The extremum is
 /// kept, else the one that is nearest to the surface.
 fn distinct(third: &Surface, mut crossings: Vec<Crossing>, tolerances: &Tolerances) -> Vec<Crossing> {
-    /// Crossings nearer to each other than this many lengths of merging may be one: a thousandth of the diagonal.
-    const NEAR: f64 = 1e5;
     /// The volume at an extremum found by bisection is rounding.
     const EXTREMUM: f64 = 1e-10;
     crossings.sort_by(|x, y| x.position.total_cmp(&y.position));
@@ -133,6 +164,8 @@ struct Finder<'a> {
     a: &'a Surface,
     b: &'a Surface,
     third: &'a Surface,
+    /// Whether the third surface, or that for which it stands, matters in a box.
+    matters: &'a dyn Fn(&Cell) -> bool,
     tolerances: &'a Tolerances,
     found: Vec<Point>,
 }
@@ -155,6 +188,9 @@ impl Finder<'_> {
         const DEPTH: u32 = 30;
         /// On a part of 1/32 of a step a derivative with different signs at its ends has one root.
         const SHORT: u32 = 5;
+        /// So many times it is halved before it is asked whether the third surface matters on the part: far from where it does, it may have
+        /// places where it is not smooth, and a long step may run along them.
+        const LOCAL: u32 = 6;
         if depth == 0 {
             // An end of the step on the surface may be lost to rounding on both sides of it.
             let ends: Vec<Point> = [p, q].into_iter().filter(|x| self.is_on(x)).copied().collect();
@@ -162,6 +198,9 @@ impl Finder<'_> {
         }
         let cell = step_box(p, q);
         if !self.third.value_range(&cell).contains_zero() {
+            return;
+        }
+        if depth == LOCAL && !(self.matters)(&cell) {
             return;
         }
         let (u, v) = (self.a.gradient_range(&cell), self.b.gradient_range(&cell));

@@ -39,7 +39,8 @@ pub struct Place(pub Point);
 
 impl fmt::Display for Place {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        let shown = |x: f64| if x == 0.0 { 0.0 } else { x };
+        // Without the sign of what is shown as zero.
+        let shown = |x: f64| if x.abs() < 0.5e-6 { 0.0 } else { x };
         write!(f, "({:.6}, {:.6}, {:.6})", shown(self.0.x), shown(self.0.y), shown(self.0.z))
     }
 }
@@ -88,6 +89,19 @@ pub enum FeatureError {
         /// What is touched.
         second: Named,
         /// Where.
+        place: Place,
+    },
+    /// A face ends in a cusp that is too sharp for triangles.
+    #[error(
+        "a face between surfaces of {first} and {second} ends at {place} in a cusp too sharp for triangles: move one of \
+         them or let them overlap"
+    )]
+    Cusp {
+        /// A surface beside one of the curves of the cusp.
+        first: Named,
+        /// One beside the other.
+        second: Named,
+        /// The tip.
         place: Place,
     },
     /// A curve ends where nothing ends it.

@@ -6,7 +6,7 @@ use super::contact::{self, Contact};
 use super::swept::Swept;
 use super::{FeatureError, Named, Place, apex};
 use crate::interval::{Cell, dot, middle, offset};
-use crate::solid::Pruned;
+use crate::solid::{Pruned, prune_in};
 use crate::{BodyId, Geometry, Interval, Point, Solid, Surface, SurfaceId, Vector};
 use std::cell::OnceCell;
 use std::collections::BTreeMap;
@@ -181,32 +181,13 @@ type Solids = (Vec<(BodyId, Solid)>, Vec<(u32, Solid)>);
 
 /// What is left of the bodies in a cell, and of the cutouts of surfaces that matter to the bodies there.
 fn prune_all(geometry: &Geometry, cell: &Cell, (bodies, mut cutouts): Solids) -> Solids {
-    let bodies = prune(geometry, cell, bodies);
+    let bodies = prune_in(&geometry.surfaces, cell, bodies);
     if !cutouts.is_empty() {
         let surfaces = surfaces_of(&bodies, &[]);
         cutouts.retain(|(i, _)| surfaces.binary_search(&geometry.cutouts[*i as usize].surface).is_ok());
-        cutouts = prune(geometry, cell, cutouts);
+        cutouts = prune_in(&geometry.surfaces, cell, cutouts);
     }
     (bodies, cutouts)
-}
-
-/// What is left of solids in a cell.
-fn prune<I>(geometry: &Geometry, cell: &Cell, solids: Vec<(I, Solid)>) -> Vec<(I, Solid)> {
-    let mut known: Vec<(SurfaceId, Interval)> = Vec::new();
-    let mut range = |id: SurfaceId| {
-        if let Some(range) = known.iter().find(|r| r.0 == id) {
-            return range.1;
-        }
-        let range = geometry.surfaces[id.index()].value_range(cell);
-        known.push((id, range));
-        range
-    };
-    let left = |(id, solid): (I, Solid)| match solid.prune(&mut range) {
-        Pruned::Empty => None,
-        Pruned::Full => Some((id, Solid::And(Vec::new()))),
-        Pruned::Part(part) => Some((id, part)),
-    };
-    solids.into_iter().filter_map(left).collect()
 }
 
 fn surfaces_of(bodies: &[(BodyId, Solid)], cutouts: &[(u32, Solid)]) -> Vec<SurfaceId> {

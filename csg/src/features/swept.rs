@@ -26,7 +26,9 @@ impl Swept {
                 let second = match other {
                     Surface::Sweep(t) if s.is_along(t) => t.section,
                     // The torus around the path.
-                    Surface::Torus(t) if t.center == s.center && t.axis == s.axis && t.major == s.radius => {
+                    Surface::Torus(t)
+                        if t.center == s.center && t.axis == s.axis && s.radii == [t.major; 2] =>
+                    {
                         Section::Ellipse(circle([0.0, 0.0], t.minor))
                     }
                     _ => return None,

@@ -180,3 +180,17 @@ fn what_turns_with_its_path_goes_on_in_what_turns_otherwise() {
         assert_eq!(counts(&find(&source)), [12, 20, 0, 10], "{path}");
     }
 }
+
+#[test]
+fn a_face_may_end_in_a_cusp_between_curves_that_bend_differently() {
+    // On the step between the two blocks the ball's circle touches the edge of the lower one.
+    let step = "solid high = orthobrick (0,-1,-1; 1,1,0.6) and not sphere (0,0,0.5; 0.5);
+        solid low = orthobrick (-1,-1,-1; 0,1,0); solid s = high or low; tlo s;";
+    assert_eq!(counts(&find(step)), [15, 23, 0, 9]);
+    // The rim of the rod touches the circle along which the torus touches the rod's end: the torus leaves it with the fourth power.
+    let rod = "solid ring = torus (0,0,0; 1,0,0; 0.75; 0.25);
+        solid rod = cylinder (-1,0.25,0; 1,0.25,0; 0.5) and plane (-1,0,0; -1,0,0) and plane (0.25,0,0; 1,0,0);
+        solid s = ring or rod; tlo s;";
+    let reason = refused(rod);
+    assert!(reason.contains("cusp") && reason.contains("(0.250000, 0.750000, 0.000000)"), "{reason}");
+}

@@ -5,6 +5,7 @@ use crate::{Point, ProjectionFailed, Vector};
 use nalgebra::{Isometry3, Matrix3};
 
 mod cone;
+mod course;
 mod cylinder;
 mod ellipse;
 mod ellipsoid;
@@ -194,21 +195,21 @@ pub enum Section {
     Ellipse(Ellipse),
 }
 
-/// What a section sweeps that moves along a circle in the plane across it, and turns there so that its y points along a
+/// What a section sweeps that moves along an ellipse or a circle in the plane across it, and turns there so that its y points along a
 /// fixed direction as far as that plane allows.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sweep {
-    /// The centre of the circle.
+    /// The centre of the ellipse.
     pub center: Point,
-    /// Unit direction of its axis; the section moves counter-clockwise around it.
+    /// Unit direction across its plane; the section moves counter-clockwise around it.
     pub axis: Vector,
-    /// Unit direction from the centre to where angles are zero.
+    /// Unit direction from the centre to where parameters are zero: one of its axes.
     pub start: Vector,
-    /// The radius of the circle.
-    pub radius: f64,
-    /// Unit direction of the section's y, neither in the plane of the circle nor across it.
+    /// Its semi-axes, along `start` and across it.
+    pub radii: [f64; 2],
+    /// Unit direction of the section's y, not in the plane of the ellipse.
     pub up: Vector,
-    /// The section; its x is along (the circle's direction) × y.
+    /// The section; its x is along (the path's direction) × y.
     pub section: Section,
 }
 

@@ -122,9 +122,19 @@ fn same_sweep(a: &Sweep, b: &Sweep, tolerance: f64) -> bool {
     };
     sections
         && (a.center - b.center).norm() <= tolerance
-        && (a.radius - b.radius).abs() <= tolerance
+        && same_path(a, b, tolerance)
         && (a.axis - b.axis).norm() <= SAME_DIRECTION
         && (a.up - b.up).norm() <= SAME_DIRECTION
+}
+
+/// Whether the ellipses about one centre in one plane are the same, whichever of their axes they start from.
+fn same_path(a: &Sweep, b: &Sweep, tolerance: f64) -> bool {
+    let side = b.axis.cross(&b.start);
+    let [p, q] = b.radii;
+    [(b.start, [p, q]), (side, [q, p])].into_iter().any(|(start, radii)| {
+        (0..2).all(|i| (a.radii[i] - radii[i]).abs() <= tolerance)
+            && (a.is_round() || a.start.cross(&start).norm() <= SAME_DIRECTION)
+    })
 }
 
 fn same_revolved(a: &Revolved, b: &Revolved, tolerance: f64) -> bool {

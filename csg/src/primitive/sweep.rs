@@ -1,13 +1,14 @@
-//! What a line or an ellipse sweeps that moves along a circle in the plane across it, and turns there.
+//! What a line or an ellipse sweeps that moves along an ellipse or a circle in the plane across it, and turns there.
 //!
-//! At an angle θ of the circle the plane across has the directions outward e and along the axis n. The section's y points
+//! Where the path's normal is at an angle θ the plane across has the directions outward e and along the axis n. The section's y points
 //! along the part of a fixed vector `up` in that plane: (cos ψ, sin ψ) in the directions n and e with
-//! tan ψ = up·e / up·n. So (X, Y) = (q cos ψ - z sin ψ, q sin ψ + z cos ψ) with q the distance from the axis less the
-//! radius of the circle and z the height; the function is the section's, g(X, Y). Not smooth on the axis.
+//! tan ψ = up·e / up·n. So (X, Y) = (q cos ψ - z sin ψ, q sin ψ + z cos ψ) with q the distance from the path in its plane (see
+//! [`course`]) and z the height; the function is the section's, g(X, Y). Not smooth where points have
+//! several nearest ones on the path.
 
 use super::quadric::{largest_curvature, reject};
-use super::{Primitive, Section, Sweep, direction_range, reject_range};
-use crate::interval::{Cell, Interval, dot, offset};
+use super::{Ellipse, Primitive, Section, Sweep, course, direction_range, reject_range};
+use crate::interval::{Cell, Interval, dot, middle, offset};
 use crate::{Point, ProjectionFailed, Vector};
 use nalgebra::{Isometry3, Matrix3, Matrix4, Vector4};
 
@@ -59,12 +60,14 @@ impl Section {
     }
 }
 
-/// The plane across the circle through a point, and where the point is in it.
+/// The plane across the path through a point, and where the point is in it.
 struct Across {
-    /// Outward and along the circle.
+    /// Outward and along the path.
     outward: Vector,
     along: Vector,
+    /// From the path's centre of curvature, and the derivative of its radius of curvature by θ.
     distance: f64,
+    growth: f64,
     /// cos ψ, sin ψ and the first two derivatives of ψ by θ.
     cos: f64,
     sin: f64,
@@ -74,14 +77,38 @@ struct Across {
 }
 
 impl Sweep {
+    /// Whether the path is a circle.
+    pub fn is_round(&self) -> bool {
+        self.radii[0] == self.radii[1]
+    }
+
+    /// The largest distance of the path from its centre.
+    pub fn reach(&self) -> f64 {
+        self.radii[0].max(self.radii[1])
+    }
+
+    /// The path's least radius of curvature.
+    pub fn least_bend(&self) -> f64 {
+        course::least_bend(self.radii)
+    }
+
     fn across(&self, point: &Point) -> Across {
         let arm = point - self.center;
-        let across = reject(&arm, &self.axis);
-        let distance = across.norm();
-        let outward = across.try_normalize(0.0).unwrap_or_default();
-        let [q, z] = [distance - self.radius, arm.dot(&self.axis)];
+        let (outward, q, distance, growth);
+        if self.is_round() {
+            let across = reject(&arm, &self.axis);
+            (distance, growth) = (across.norm(), 0.0);
+            (outward, q) = (across.try_normalize(0.0).unwrap_or_default(), distance - self.radii[0]);
+        } else {
+            let side = self.axis.cross(&self.start);
+            let seen = course::beside(self.radii, [arm.dot(&self.start), arm.dot(&side)]);
+            let [radius, change] = seen.bend;
+            outward = self.start * seen.normal[0] + side * seen.normal[1];
+            (q, distance, growth) = (seen.distance, radius + seen.distance, change);
+        }
+        let z = arm.dot(&self.axis);
         let mut found = self.frame(outward);
-        found.distance = distance;
+        (found.distance, found.growth) = (distance, growth);
         found.at = [found.cos * q - found.sin * z, found.sin * q + found.cos * z];
         found
     }
@@ -92,29 +119,45 @@ impl Sweep {
         let square = d * d + n * n;
         let length = square.sqrt();
         let turns = [t * n / square, -n * d * (square + 2.0 * t * t) / (square * square)];
-        Across { outward, along, distance: 0.0, cos: n / length, sin: d / length, turns, at: [0.0; 2] }
+        Across {
+            outward,
+            along,
+            distance: 0.0,
+            growth: 0.0,
+            cos: n / length,
+            sin: d / length,
+            turns,
+            at: [0.0; 2],
+        }
     }
 
-    /// The angle of a point around the circle from `start`, -π to π, and its place in the section.
+    /// The parameter of the path beside a point, from `start`, -π to π, and its place in the section.
     pub fn coordinates(&self, point: &Point) -> (f64, [f64; 2]) {
         let found = self.across(point);
-        let side = self.axis.cross(&self.start);
-        (found.outward.dot(&side).atan2(found.outward.dot(&self.start)), found.at)
+        let normal = [self.start, self.axis.cross(&self.start)].map(|v| found.outward.dot(&v));
+        (course::angle_of(self.radii, normal), found.at)
     }
 
     /// The point with these coordinates.
     pub fn place(&self, angle: f64, [x, y]: [f64; 2]) -> Point {
+        let side = self.axis.cross(&self.start);
+        let along = |[p, q]: [f64; 2]| self.start * p + side * q;
+        let outward = along(course::normal_at(self.radii, angle));
         let (sin, cos) = angle.sin_cos();
-        let outward = self.start * cos + self.axis.cross(&self.start) * sin;
         let frame = self.frame(outward);
         let [q, z] = [frame.cos * x + frame.sin * y, frame.cos * y - frame.sin * x];
-        self.center + outward * (self.radius + q) + self.axis * z
+        self.center + along([self.radii[0] * cos, self.radii[1] * sin]) + outward * q + self.axis * z
     }
 
-    /// The ranges over a box of: outward, the distance from the axis, along, cos ψ, sin ψ, ψ', and (X, Y).
+    /// The ranges over a box of: outward, the distance from the centre of curvature, along, cos ψ, sin ψ, ψ', and (X, Y).
     fn ranges(&self, cell: &Cell) -> Ranges {
         let arm = offset(cell, &self.center);
-        let (outward, distance) = direction_range(&reject_range(&arm, &self.axis));
+        let (outward, distance, q) = if self.is_round() {
+            let (outward, distance) = direction_range(&reject_range(&arm, &self.axis));
+            (outward, distance, distance - Interval::point(self.radii[0]))
+        } else {
+            self.ranges_beside(cell)
+        };
         let [a, b, c] = [self.axis.x, self.axis.y, self.axis.z];
         let [x, y, z] = outward;
         let along = [z * b - y * c, x * c - z * a, y * a - x * b];
@@ -123,16 +166,35 @@ impl Sweep {
         let square = d.square() + n.square();
         let unit = Interval::new(-1.0, 1.0);
         let [cos, sin] = [n, d].map(|v| (v / square.sqrt()).intersect(unit));
-        let [q, z] = [distance - Interval::point(self.radius), dot(&self.axis, &arm)];
+        let z = dot(&self.axis, &arm);
         let at = [q * cos - z * sin, q * sin + z * cos];
         Ranges { outward, distance, along, cos, sin, turn: t * n / square, across: [q, z], at }
+    }
+
+    /// The ranges of outward, the distance from the centre of curvature, and that from the path, which is not a circle.
+    fn ranges_beside(&self, cell: &Cell) -> (Cell, Interval, Interval) {
+        let side = self.axis.cross(&self.start);
+        let center = middle(cell);
+        let arm = center - self.center;
+        let at = [arm.dot(&self.start), arm.dot(&side)];
+        let reach = 0.5 * cell.iter().map(|side| side.width().powi(2)).sum::<f64>().sqrt();
+        let ([c, s], distance) = course::ranges(self.radii, at, reach);
+        let outward = [0, 1, 2].map(|i| c * self.start[i] + s * side[i]);
+        // The distance from the path has the normal for its gradient.
+        let rounding = 16.0 * f64::EPSILON * (self.reach() + arm.norm() + reach);
+        let seen = course::beside(self.radii, at).distance;
+        let seen = Interval::new(seen - rounding, seen + rounding);
+        let way = offset(cell, &center);
+        let q = seen + c * dot(&self.start, &way) + s * dot(&side, &way);
+        (outward, distance, q.intersect(seen + Interval::new(-reach, reach)))
     }
 
     /// Whether another section moves with this one.
     pub(crate) fn is_along(&self, other: &Self) -> bool {
         self.center == other.center
             && self.axis == other.axis
-            && self.radius == other.radius
+            && self.radii == other.radii
+            && (self.is_round() || self.start == other.start)
             && self.up == other.up
     }
 
@@ -141,7 +203,7 @@ impl Sweep {
     pub(crate) fn plane_ranges(&self, cell: &Cell) -> ([Interval; 2], Option<Cell>) {
         let r = self.ranges(cell);
         let [q, z] = r.across;
-        // With θ a point moves along the circle, and around the path as its plane turns.
+        // With θ a point moves along the path, and around the path as its plane turns.
         let moved = |i: usize| r.along[i] * r.distance + (r.outward[i] * z - q * self.axis[i]) * r.turn;
         (r.at, (r.distance.lo > 0.0).then(|| [0, 1, 2].map(|i| -moved(i))))
     }
@@ -154,7 +216,7 @@ struct Ranges {
     cos: Interval,
     sin: Interval,
     turn: Interval,
-    /// The distance from the axis less the radius, and the height.
+    /// The distance from the path in its plane, and the height.
     across: [Interval; 2],
     at: [Interval; 2],
 }
@@ -172,9 +234,9 @@ impl Primitive for Sweep {
         a.outward * (gx * a.cos + gy * a.sin) + self.axis * (gy * a.cos - gx * a.sin) + a.along * round
     }
 
-    /// By the chain rule in cylinder coordinates.
+    /// By the chain rule in coordinates along the path.
     fn hessian(&self, point: &Point) -> Matrix3<f64> {
-        let Across { outward, along, distance, cos, sin, turns: [turn, bend], at: [x, y] } =
+        let Across { outward, along, distance, growth, cos, sin, turns: [turn, bend], at: [x, y] } =
             self.across(point);
         if distance == 0.0 {
             return Matrix3::zeros();
@@ -190,7 +252,7 @@ impl Primitive for Sweep {
         let tt = form(by_t, by_t) + bend * slope([-y, x]) - turn * turn * slope([x, y]);
         let (q, t) = (slope(by_q), slope(by_t));
         let [rt, nt] = [qt / distance - t / (distance * distance), zt / distance];
-        let round = tt / (distance * distance) + q / distance;
+        let round = tt / (distance * distance) + q / distance - t * growth / distance.powi(3);
         let frame = Matrix3::from_columns(&[outward, along, self.axis]);
         frame * Matrix3::new(qq, rt, qz, rt, round, nt, qz, nt, zz) * frame.transpose()
     }
@@ -199,9 +261,9 @@ impl Primitive for Sweep {
         largest_curvature(&self.gradient(point), &self.hessian(point))
     }
 
-    /// The nearest point if the point is near to the surface; else the nearest one in the plane across the circle will do.
+    /// The nearest point if the point is near to the surface; else the nearest one in the plane across the path will do.
     ///
-    /// From the nearest point in the plane across the circle by Newton's method for the point and the multiplier λ in
+    /// From the nearest point in the plane across the path by Newton's method for the point and the multiplier λ in
     /// x + λ ∇f(x) = p, f(x) = 0.
     fn project(&self, point: &Point) -> Result<Point, ProjectionFailed> {
         const STEPS: usize = 20;
@@ -230,12 +292,18 @@ impl Primitive for Sweep {
             foot += step.xyz();
             factor += step.w;
         }
-        let is_better = (point - foot).norm() <= (point - across).norm() && best <= SOLVED * self.radius;
+        let is_better = (point - foot).norm() <= (point - across).norm() && best <= SOLVED * self.reach();
         Ok(if is_better { foot } else { across })
     }
 
     fn natural_range(&self, cell: &Cell) -> Interval {
-        self.section.value_range(self.ranges(cell).at)
+        let r = self.ranges(cell);
+        // A circle about the path does not change as it turns, though where it turns fast little is known of (X, Y).
+        let is_tube = |e: &Ellipse| e.center == [0.0; 2] && e.radii[0] == e.radii[1];
+        match &self.section {
+            Section::Ellipse(e) if is_tube(e) => e.value_range(r.across),
+            section => section.value_range(r.at),
+        }
     }
 
     fn gradient_range(&self, cell: &Cell) -> Cell {

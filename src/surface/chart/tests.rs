@@ -21,7 +21,7 @@ fn surfaces() -> Vec<Surface> {
 
 fn sweep(section: Section) -> Surface {
     let (axis, start, up) = (Vector::z(), Vector::x(), Vector::new(0.48, 0.36, 0.8));
-    Surface::Sweep(Sweep { center: Point::new(0.3, 0.1, 0.2), axis, start, radius: 1.2, up, section })
+    Surface::Sweep(Sweep { center: Point::new(0.3, 0.1, 0.2), axis, start, radii: [1.2; 2], up, section })
 }
 
 fn revolved(distance: f64) -> Surface {

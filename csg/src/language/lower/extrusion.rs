@@ -2,7 +2,7 @@
 //!
 //! In the plane across the path the profile's y points along the part of the given direction in that plane (y'), its x
 //! along tangent × y'. Piece by piece of the path, the solid is what the profile sweeps between two planes across the path:
-//! prisms along lines, parts of bodies of revolution along circles. NETGEN has no faces at the
+//! prisms along lines, parts of bodies of revolution along circles, what a section sweeps along ellipses and where it turns. NETGEN has no faces at the
 //! ends of an open path, and asks for planes that cut it; here the planes across its ends close it, and if one that
 //! the file cuts with is nearer, nothing is left of them.
 
@@ -10,7 +10,7 @@ use super::conic::{Arc, Piece, SpaceEllipse};
 use super::primitive::Shape;
 use super::profile::{Bound, Profile, formula};
 use super::swept::{Assembly, NO_FACE, SweepError, Swept, Turn, complement};
-use crate::primitive::{Cylinder, Ellipse, EllipticCylinder, Section, Sweep, Torus};
+use crate::primitive::{Cylinder, Ellipse, EllipticCylinder, Plane, Section, Sweep, Torus};
 use crate::{Point, Solid, Surface, Vector};
 
 /// The sine of the angle up to which the tangents of two pieces of a path are the same: decimals typed with six digits.
@@ -184,11 +184,7 @@ fn along_arc(
     let ellipse = SpaceEllipse::of(arc);
     let points = arc.points;
     let Some(radius) = ellipse.radius() else {
-        let message =
-            format!("segment {} of the path is an arc of an ellipse, which cannot be meshed yet", index + 1);
-        return Err(SweepError::Unsupported(
-            message + ": with tangents of equal length it is one of a circle",
-        ));
+        return along_ellipse(into, [index, count], arc, &ellipse, profile, up);
     };
     let outward = (points[0] - ellipse.center) / radius;
     let tangent = (points[1] - points[0]).normalize();
@@ -199,23 +195,13 @@ fn along_arc(
             center: Point::from(ellipse.center),
             axis,
             start: outward,
-            radius,
+            radii: [radius; 2],
             up,
             section: Section::Line { normal: [1.0, 0.0], offset: 0.0 },
         };
-        return turning(into, [index, count], profile, circle);
+        return turning(into, [index, count], profile, circle, &|p| p);
     }
-    // Where the direction lies in the plane of the arc, y' changes sides where the path runs along it.
-    let end = (points[2] - points[1]).normalize();
-    let end_outward = end.cross(&axis);
-    let [_, at_end] = frame(end, up)?;
-    let same =
-        |v: Vector, w: Vector, before: Vector, after: Vector| (v.dot(&before) - w.dot(&after)).abs() <= 1e-3;
-    if !same(y, at_end, axis, axis) || !same(y, at_end, outward, end_outward) {
-        let message =
-            format!("segment {} of the path turns into the direction of the profile's y", index + 1);
-        return Err(SweepError::Wrong(message, "the third argument is a direction across the path"));
-    }
+    check_side(arc, index, axis, up)?;
     let place = |p: [f64; 2]| {
         let v = x * p[0] + y * p[1];
         [v.dot(&axis), radius + v.dot(&outward)]
@@ -248,35 +234,110 @@ fn along_arc(
     })
 }
 
-/// What a profile sweeps that turns about the path on its way.
+/// Refuses an arc along which y' changes sides: the direction lies in its plane, and the path runs along it somewhere.
+fn check_side(arc: &Arc, index: usize, axis: Vector, up: Vector) -> Result<(), SweepError> {
+    let [p, q, r] = arc.points;
+    let [start, end] = [(q - p).normalize(), (r - q).normalize()];
+    let [y, at_end] = [frame(start, up)?[1], frame(end, up)?[1]];
+    let same = |before: Vector, after: Vector| (y.dot(&before) - at_end.dot(&after)).abs() <= 1e-3;
+    if !same(axis, axis) || !same(start.cross(&axis), end.cross(&axis)) {
+        let message =
+            format!("segment {} of the path turns into the direction of the profile's y", index + 1);
+        return Err(SweepError::Wrong(message, "the third argument is a direction across the path"));
+    }
+    Ok(())
+}
+
+/// What a profile sweeps along an arc of an ellipse.
+fn along_ellipse(
+    into: &mut Assembly,
+    place: [usize; 2],
+    arc: &Arc,
+    ellipse: &SpaceEllipse,
+    profile: &Profile,
+    up: Vector,
+) -> Result<Swept, SweepError> {
+    let [p, q, _] = arc.points;
+    let tangent = (q - p).normalize();
+    let axis = (p - ellipse.center).cross(&tangent).normalize();
+    // The axis nearest to the middle of the arc: parameters along it stay clear of half a turn from there.
+    let middle = arc.middle() - ellipse.center;
+    let share = |arm: &Vector| middle.dot(arm) / arm.norm_squared();
+    let [a, b] = ellipse.arms;
+    let (first, second) = if share(&a).abs() >= share(&b).abs() { (a, b) } else { (b, a) };
+    let mut path = Sweep {
+        center: Point::from(ellipse.center),
+        axis,
+        start: first.normalize() * share(&first).signum(),
+        radii: [first.norm(), second.norm()],
+        up,
+        section: Section::Line { normal: [1.0, 0.0], offset: 0.0 },
+    };
+    if is_turning(axis, up) {
+        return turning(into, place, profile, path, &|p| p);
+    }
+    check_side(arc, place[0], axis, up)?;
+    // Nothing turns: sections are the same in the directions outward and along the axis.
+    let [x, y] = frame(tangent, up)?;
+    let outward = tangent.cross(&axis);
+    path.up = axis;
+    turning(into, place, profile, path, &|p| {
+        let v = x * p[0] + y * p[1];
+        [v.dot(&outward), v.dot(&axis)]
+    })
+}
+
+/// What a profile sweeps along the path of a section, on which it may turn; `moved` brings a place of the profile to the section's plane, which
+/// may be a rotation there.
 fn turning(
     into: &mut Assembly,
     [index, count]: [usize; 2],
     profile: &Profile,
-    circle: Sweep,
+    path: Sweep,
+    moved: &dyn Fn([f64; 2]) -> [f64; 2],
 ) -> Result<Swept, SweepError> {
-    let reach = profile.reach;
-    if reach >= 0.9 * circle.radius {
-        let message =
-            format!("the profile is too wide for segment {} of the path, which turns it", index + 1);
-        return Err(SweepError::Unsupported(message + ": it reaches too near to the centre of that arc"));
+    let (reach, bend) = (profile.reach, path.least_bend());
+    if reach >= 0.9 * bend {
+        let what = if path.is_round() { "which turns it" } else { "an arc of an ellipse" };
+        let message = format!("the profile is too wide for segment {} of the path, {what}", index + 1);
+        return Err(SweepError::Unsupported(message + ": it reaches too near to where that arc bends about"));
     }
     let swept = into.sweep(profile, |into, bound, face| {
         let section = match *bound {
-            Bound::Left([a, b], [c, d]) => {
+            Bound::Left(from, to) => {
+                let ([a, b], [c, d]) = (moved(from), moved(to));
                 let length = (c - a).hypot(d - b);
                 let normal = [(d - b) / length, (a - c) / length];
                 Section::Line { normal, offset: 0.5 * (normal[0] * (a + c) + normal[1] * (b + d)) }
             }
-            Bound::Inside(ellipse) => Section::Ellipse(ellipse),
+            Bound::Inside(ellipse) => {
+                let ([x, y], [u, v]) = (moved([0.0, 0.0]), moved(ellipse.axis));
+                Section::Ellipse(Ellipse { center: moved(ellipse.center), axis: [u - x, v - y], ..ellipse })
+            }
         };
-        Ok(into.side(Surface::Sweep(Sweep { section, ..circle }), false, face))
+        Ok(into.side(swept_by(section, &path), false, face))
     })?;
-    // All is inside this torus. Near the axis, where the section's sides come from all directions, nothing is. Pieces that
-    // follow one another get tori that do not touch.
+    // All is inside this tube. Near the centres of curvature, where the section's sides come from all directions, nothing is. Pieces
+    // that follow one another get tubes that do not touch.
     let part = if index + 1 == count { 0.7 } else { [0.3, 0.5][index % 2] };
-    let minor = reach + part * f64::min(0.5 * reach, circle.radius - reach);
-    let around = Torus { center: circle.center, axis: circle.axis, major: circle.radius, minor };
-    let around = into.side(Surface::Torus(around), false, NO_FACE);
+    let minor = reach + part * f64::min(0.5 * reach, bend - reach);
+    let around = if path.is_round() {
+        Surface::Torus(Torus { center: path.center, axis: path.axis, major: path.radii[0], minor })
+    } else {
+        let section = Section::Ellipse(Ellipse { center: [0.0; 2], axis: [1.0, 0.0], radii: [minor; 2] });
+        Surface::Sweep(Sweep { section, ..path })
+    };
+    let around = into.side(around, false, NO_FACE);
     Ok(Swept { inside: Solid::And(vec![around, swept.inside]), ..swept })
+}
+
+/// What a section sweeps: a plane if it is a line along the plane of the path and does not turn.
+fn swept_by(section: Section, path: &Sweep) -> Surface {
+    match section {
+        Section::Line { normal: [x, y], offset } if path.up == path.axis && x.abs() <= RIGID => {
+            let normal = path.axis * y.signum();
+            Surface::Plane(Plane { point: path.center + normal * offset, normal })
+        }
+        _ => Surface::Sweep(Sweep { section, ..*path }),
+    }
 }

@@ -178,6 +178,6 @@ fn anchor(surface: &Surface) -> (Point, f64) {
         Surface::EllipticCone(c) => (c.point, c.radii[0].max(c.radii[1])),
         Surface::Nappe(cone) => (cone.point, cone.radius),
         Surface::Revolved(r) => (r.point, r.reach()),
-        Surface::Sweep(s) => (s.center, s.radius),
+        Surface::Sweep(s) => (s.center, s.reach()),
     }
 }
