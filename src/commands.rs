@@ -293,6 +293,7 @@ fn summary(model: &Model, input: &str, made: &Generated, ranks: u32, balance: Ba
         partition: PartitionReport::new(&coarse.partition, balance),
         periodic: made.periodic,
         skins: made.refused.clone(),
+        evened: made.evened,
         stages: Vec::new(),
         seconds: 0.0,
         peak_memory: None,

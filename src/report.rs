@@ -8,7 +8,7 @@ use crate::memory::sized;
 use crate::partition::Metrics;
 use crate::periodic::Checked;
 use crate::pipeline::generate::Level;
-use crate::pipeline::part::Balance;
+use crate::pipeline::part::{Balance, Evened};
 use crate::pipeline::target::Outcome;
 use crate::pipeline::{CoarseReport, Entities, Refused};
 use crate::progress::Stage;
@@ -46,6 +46,8 @@ pub struct Report {
     pub periodic: Option<Checked>,
     /// What became of the skins of the parts, if they were meshed inside; null if the parts were refined.
     pub skins: Option<Refused>,
+    /// What was done to make parts even; null where nothing was.
+    pub evened: Option<Evened>,
     /// The stages in order.
     pub stages: Vec<Stage>,
     /// Seconds from start to end.
@@ -302,6 +304,10 @@ impl fmt::Display for Report {
                 grouped(p.edge_cut),
                 grouped(p.shared_vertices)
             )?;
+        }
+        if let Some(Evened { imbalance, moved }) = self.evened {
+            let moved = grouped(moved);
+            writeln!(f, "evened     {moved} tets went to other parts; the imbalance was {imbalance:.3}")?;
         }
         if let Some(Refused { skins, first: Some((rank, reason)) }) = &self.skins {
             writeln!(

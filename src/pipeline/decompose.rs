@@ -10,10 +10,10 @@ use crate::Point;
 use crate::comm::Communicator;
 use crate::comm::pack::{put, take};
 use crate::decompose::{self, CutModel, CutPlane, Cuts, Evidence};
+use crate::dist::BareMesh;
 use crate::error::{Failure, Status, agree};
 use crate::improve::{self, Effort};
 use crate::mesh::{Mesh, Rank, VertexId};
-use crate::migrate::BareStream;
 use crate::partition;
 use crate::progress::Progress;
 use crate::size::{SizeField, Source, SourceTree};
@@ -51,7 +51,7 @@ pub(super) fn mesh_pieces(
     cuts: &CutSettings,
     settings: &GenerateSettings,
     progress: &Progress,
-) -> Result<(BareStream, u32, Option<CoarseResult>), Failure> {
+) -> Result<(BareMesh, u32, Option<CoarseResult>), Failure> {
     let cut = agree(comm, model.map(|model| cut(comm.size(), model, cuts, settings, progress)).transpose())?;
     let mut numbers = cut.as_ref().map_or(vec![0, 0], |cut| vec![u64::from(cut.pieces), cut.boundary]);
     comm.broadcast(0, &mut numbers)?;
@@ -66,7 +66,7 @@ pub(super) fn mesh_pieces(
     });
     let (skin, filled) = agree(comm, filled)?;
     let bare = progress.stage("number", || skin::number(comm, skin, filled, boundary))?;
-    Ok((BareStream::new(bare), pieces as u32, coarse))
+    Ok((bare, pieces as u32, coarse))
 }
 
 /// A geometry that is cut, and the coarse mesh that the planes were chosen by.

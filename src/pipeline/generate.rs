@@ -4,14 +4,14 @@ use super::coarse::{CoarseMesh, CoarseReport, CoarseSettings};
 use super::decompose::{self, CutSettings};
 use super::mend;
 use super::model::Model;
-use super::part::Part;
+use super::part::{Evened, Part, even_out};
 use super::room::{self, Disk};
 use super::skins::{self, Refused};
 use super::target::Outcome;
 use super::wanted::{Wanted, mesh_as_wanted};
 use crate::check::{self, Checksum, PartReport, ShapeReport};
 use crate::comm::Communicator;
-use crate::dist::{self, DistMesh};
+use crate::dist::{self, BareMesh, DistMesh};
 use crate::error::{Failure, Status, agree};
 use crate::geometry::Projector;
 use crate::improve::Effort;
@@ -85,6 +85,8 @@ pub struct Generated {
     pub periodic: Option<periodic::Checked>,
     /// Skins that the mesher refused, if parts were meshed inside theirs: the same on all.
     pub refused: Option<Refused>,
+    /// What was done to make parts even that were meshed each on its own: the same on all.
+    pub evened: Option<Evened>,
     /// On rank 0 alone.
     pub coarse: Option<CoarseResult>,
 }
@@ -161,9 +163,20 @@ pub fn generate(
             made.report.size_corrections += round as u64;
             made
         });
-        let refused = None;
         let part = Part::Refined(Box::new(part));
-        return Ok(Generated { part, pieces, levels, names, check, checksum, periodic, refused, coarse });
+        let (refused, evened) = (None, None);
+        return Ok(Generated {
+            part,
+            pieces,
+            levels,
+            names,
+            check,
+            checksum,
+            periodic,
+            refused,
+            evened,
+            coarse,
+        });
     }
     unreachable!("the loop ends by itself")
 }
@@ -218,18 +231,21 @@ struct Whole {
     refused: Option<Refused>,
 }
 
-/// **Collective.** Checks parts that were meshed each on its own.
+/// **Collective.** Makes parts even that were meshed each on its own, and checks them.
 fn stored(
     comm: &dyn Communicator,
-    part: BareStream,
+    part: BareMesh,
     whole: Whole,
     progress: &Progress,
 ) -> Result<Generated, Failure> {
     let Whole { names, projector, pieces, coarse, refused } = whole;
+    let (part, evened) = even_out(comm, part, progress)?;
+    let part = BareStream::new(part);
     let (check, checksum) = progress.stage("check", || verdict(comm, &part, &projector))?;
     let level = check.shape.clone().map(|shape| Level { pieces, tets: check.tets, shape });
     let (levels, part) = (level.into_iter().collect(), Part::Stored(Box::new(part)));
-    Ok(Generated { part, pieces, levels, names, check, checksum, periodic: None, refused, coarse })
+    let periodic = None;
+    Ok(Generated { part, pieces, levels, names, check, checksum, periodic, refused, evened, coarse })
 }
 
 /// Asks for smaller sizes around coarse tets with inverted children, on the rank that has them.

@@ -1,11 +1,13 @@
 //! A rank's part of what was made, as it is kept.
 
 use crate::comm::Communicator;
-use crate::dist::owner;
-use crate::error::Failure;
+use crate::dist::{BareMesh, owner, settle};
+use crate::error::{Failure, Status};
 use crate::mesh::stream::MeshStream;
-use crate::migrate::BareStream;
+use crate::migrate::{self, BareStream};
+use crate::progress::Progress;
 use crate::refine::RefinedMesh;
+use crate::repartition::{self, Method};
 
 /// The part of the mesh that a rank has.
 #[derive(Debug)]
@@ -65,6 +67,40 @@ pub fn balance(comm: &dyn Communicator, part: &dyn MeshStream) -> Result<Balance
         shared_vertices: comm.all_reduce_sum_u64([mine])?[0],
         tets: imbalance(&comm.all_gather_one(counts.tets as f64)?),
         owned: imbalance(&comm.all_gather_one(share)?),
+    })
+}
+
+/// Parts that were meshed each on its own are made even where the largest is larger than the mean by more than this factor.
+const UNEVEN: f64 = 1.05;
+
+/// What was done to make parts even: the same on all ranks.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct Evened {
+    /// Tets of the largest part over the mean, before.
+    pub imbalance: f64,
+    /// Tets that went to other ranks.
+    pub moved: u64,
+}
+
+/// **Collective.** Deals the tets out anew if the parts are too uneven.
+///
+/// # Errors
+/// The same on all ranks: no mesh, fewer tets than parts, memory.
+pub(super) fn even_out(
+    comm: &dyn Communicator,
+    part: BareMesh,
+    progress: &Progress,
+) -> Result<(BareMesh, Option<Evened>), Failure> {
+    let imbalance = imbalance(&comm.all_gather_one(part.tets.len() as f64)?);
+    if imbalance <= UNEVEN || part.totals.tets < u64::from(comm.size()) {
+        return Ok((part, None));
+    }
+    progress.stage("even out", || {
+        let mesh = settle(comm, part).map_err(|error| Failure::new(Status::NoValidMesh, error))?;
+        let to = repartition::repartition(comm, &mesh, comm.size(), Method::default())?;
+        let (part, mine) = migrate::migrate_bare(comm, mesh.into(), &to, &migrate::Settings::default())?;
+        let [moved] = comm.all_reduce_sum_u64([mine.tets])?;
+        Ok((part, Some(Evened { imbalance, moved })))
     })
 }
 

@@ -3,11 +3,10 @@
 use super::generate::{CoarseResult, GenerateSettings};
 use super::model::Model;
 use crate::comm::Communicator;
-use crate::dist::DistMesh;
+use crate::dist::{BareMesh, DistMesh};
 use crate::error::{Failure, agree};
 use crate::geometry::Projector;
 use crate::improve::{self, Effort};
-use crate::migrate::BareStream;
 use crate::progress::Progress;
 use crate::refine;
 use crate::skin::{self, Filled, PartSizes};
@@ -24,7 +23,7 @@ pub(super) fn mesh_skins(
     sizes: Option<&[f64]>,
     effort: Effort,
     progress: &Progress,
-) -> Result<(BareStream, Refused), Failure> {
+) -> Result<(BareMesh, Refused), Failure> {
     let sizes = PartSizes::new(dist.points.clone(), dist.tets.clone(), skin::scatter(comm, dist, sizes)?);
     let made = progress.stage("fill", || {
         let skin = skin::skin(dist, projector, pieces)?;
@@ -35,7 +34,7 @@ pub(super) fn mesh_skins(
     let refused = Refused::gather(comm, &filled)?;
     let boundary = skin.numbering.totals().boundary;
     let bare = progress.stage("number", || skin::number(comm, skin.skin, filled, boundary))?;
-    Ok((BareStream::new(bare), refused))
+    Ok((bare, refused))
 }
 
 /// Refuses geometries with periodic faces, on the rank that has one.
