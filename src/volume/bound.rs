@@ -6,13 +6,12 @@ use super::tetrahedra::{NONE, Tetrahedra};
 use super::{ClosedSurface, Report, VolumeError, carve, delaunay, finish, inside, relocate};
 use crate::Point;
 
-/// How often the recovery is begun anew, taking edges and facets in another order, where it fails. Of 360 prisms twisted nearly to their limit,
-/// blocks with crossing notches, skins, staircases, spikes and lenses two need one; prisms of 50 sides some (`MOST_HELP` mostly ends
-/// these before).
-const ATTEMPTS: u32 = 40;
+/// How often the recovery is begun anew where it fails: by flips, by points alone (`conform`), and so both again in another order. Of 360 prisms
+/// twisted nearly to their limit, blocks with crossing notches, skins, staircases, spikes and lenses two need a second.
+const ATTEMPTS: u32 = 6;
 
-/// No attempt is begun after so many helping flips were tried: some tens of seconds. The second is mostly the last where thousands of
-/// edges are missing and do not come back, as where sheets come nearer and nearer to each other; forty would take an hour.
+/// No third attempt and none later is begun after so many helping flips were tried: some tens of seconds. The second is mostly the last where
+/// thousands of edges are missing and do not come back, as where sheets come nearer and nearer to each other; more would take an hour.
 const MOST_HELP: u64 = 3_000_000;
 
 /// The bodies in as few tets as the surface needs: its facets locked, nothing outside of them.
@@ -24,7 +23,7 @@ pub(super) fn bound(
     let mut fewest: Option<Vec<u32>> = None;
     let mut help = 0;
     for attempt in 0..ATTEMPTS {
-        if help > MOST_HELP {
+        if attempt >= 2 && help > MOST_HELP {
             break;
         }
         report.restarts = attempt as usize;
@@ -59,7 +58,8 @@ fn attempt_to_bound(
     let mut tets = delaunay::delaunay(points, &surface.triangles);
     let mut constraints = Constraints::new(&surface.triangles);
     let mut recovery = Recovery::new(&mut tets, &mut constraints, attempt);
-    let recovered = recovery.run();
+    // By flips with a few points and by points alone in turn: the one makes fewer, the other ends where many edges pass by each other.
+    let recovered = if attempt % 2 == 0 { recovery.run() } else { recovery.conform() };
     let counts = recovery.counts;
     *help += recovery.help_spent();
     let (steiner, helping) = (std::mem::take(&mut recovery.steiner), std::mem::take(&mut recovery.helping));
@@ -81,4 +81,29 @@ fn attempt_to_bound(
     let inside = inside.into_iter().chain(helping.collect::<Vec<_>>()).collect();
     report.steiner_inside = inside::delete(&mut tets, &constraints, inside);
     Ok((tets, constraints))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::samples::{Soup, check_fills, notched_block, twist_limit, twisted_prisms};
+    use super::*;
+
+    #[test]
+    fn points_alone_recover_a_surface_and_leave_it_again() {
+        let prism = |sides: u32, layers: u32| twisted_prisms(sides, -0.98 * twist_limit(sides), 1.0, layers);
+        let soups: [Soup; 4] = [prism(3, 1), prism(9, 2), notched_block(2, 0.01), notched_block(3, 0.3)];
+        for (i, soup) in soups.into_iter().enumerate() {
+            let surface = soup.surface().unwrap();
+            let scale = finish::scale_of(&surface.points);
+            let points: Vec<Point> = surface.points.iter().map(|p| p * scale).collect();
+            let (mut help, mut report) = (0, Report::default());
+            // Odd attempts are those without flips that help.
+            let Ok((tets, _)) = attempt_to_bound(&surface, &points, 1, &mut help, &mut report) else {
+                panic!("surface {i} was not recovered")
+            };
+            assert!(report.steiner_on_surface > 0, "surface {i} needs points");
+            assert_eq!(tets.check(), Vec::<String>::new());
+            check_fills(&surface, &finish::finish(&surface, tets, &[], Vec::new(), scale));
+        }
+    }
 }

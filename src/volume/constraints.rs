@@ -31,10 +31,10 @@ pub(super) struct Constraints {
     by_vertices: HashMap<[u32; 3], u32, BuildHasherDefault<VertexHasher>>,
     /// How many facets use each edge.
     edge_uses: HashMap<[u32; 2], u32, BuildHasherDefault<VertexHasher>>,
-    /// The edge of the surface that a Steiner point lies on, if it lies on one.
-    on_edge: BTreeMap<u32, [u32; 2]>,
-    /// The triangle of the surface that a Steiner point lies in, if on no edge.
-    in_triangle: BTreeMap<u32, u32>,
+    /// Where each vertex after those of the surface lies on it, if it does.
+    places: Vec<Option<Place>>,
+    /// The facets at each Steiner point, some of them gone.
+    at_steiner: BTreeMap<u32, Vec<u32>>,
     /// The vertices of the surface are those below.
     surface_vertices: u32,
     /// Edges that must stay although no facet needs them, the lower vertex first.
@@ -61,6 +61,9 @@ impl Constraints {
         self.by_vertices.insert(sorted(vertices), facet);
         for edge in edges(vertices) {
             *self.edge_uses.entry(edge).or_insert(0) += 1;
+        }
+        for v in vertices.into_iter().filter(|&v| v >= self.surface_vertices) {
+            self.at_steiner.entry(v).or_default().push(facet);
         }
         facet
     }
@@ -117,7 +120,7 @@ impl Constraints {
 
     /// The whole edge that a piece of a kept one is part of.
     pub fn line_of(&self, a: u32, b: u32) -> [u32; 2] {
-        let split = [a, b].iter().find_map(|v| self.on_edge.get(v).copied());
+        let split = [a, b].iter().find_map(|&v| self.edge_at(v));
         split.unwrap_or([a.min(b), a.max(b)])
     }
 
@@ -131,7 +134,7 @@ impl Constraints {
 
     /// The edge of the surface that an edge of facets is part of, if of any.
     pub fn edge_of(&self, a: u32, b: u32) -> Option<[u32; 2]> {
-        match [a, b].map(|v| self.on_edge.get(&v).copied()) {
+        match [a, b].map(|v| self.edge_at(v)) {
             _ if a.max(b) < self.surface_vertices => Some([a.min(b), a.max(b)]),
             [Some(edge), None] if edge.contains(&b) => Some(edge),
             [None, Some(edge)] if edge.contains(&a) => Some(edge),
@@ -142,10 +145,27 @@ impl Constraints {
 
     /// Notes where on the surface a Steiner point lies.
     pub fn set_place(&mut self, p: u32, place: Place) {
-        match place {
-            Place::Edge(edge) => drop(self.on_edge.insert(p, edge)),
-            Place::Triangle(triangle) => drop(self.in_triangle.insert(p, triangle)),
+        let i = (p - self.surface_vertices) as usize;
+        self.places.resize(self.places.len().max(i + 1), None);
+        self.places[i] = Some(place);
+    }
+
+    fn place(&self, v: u32) -> Option<Place> {
+        let i = v.checked_sub(self.surface_vertices)?;
+        self.places.get(i as usize).copied().flatten()
+    }
+
+    /// The edge of the surface that a Steiner point lies on, if it lies on one.
+    fn edge_at(&self, v: u32) -> Option<[u32; 2]> {
+        match self.place(v)? {
+            Place::Edge(edge) => Some(edge),
+            Place::Triangle(_) => None,
         }
+    }
+
+    /// A Steiner point lies on no triangle any more.
+    pub fn forget_place(&mut self, p: u32) {
+        self.places[(p - self.surface_vertices) as usize] = None;
     }
 
     /// Whether vertices of a tet, or of a wall and a point at the given place, lie in one plane or three of them on one line but for
@@ -155,10 +175,7 @@ impl Constraints {
         // The vertices of the surface that span each, its own number for any other.
         let mut spans = [[0u32; 3]; 4];
         let mut lengths = [0; 4];
-        let places = vertices.iter().map(|&v| {
-            let edge = self.on_edge.get(&v).map(|&e| Place::Edge(e));
-            (v, edge.or_else(|| self.in_triangle.get(&v).map(|&t| Place::Triangle(t))))
-        });
+        let places = vertices.iter().map(|&v| (v, self.place(v)));
         for (i, (v, place)) in places.chain(place.map(|p| (0, Some(p)))).enumerate() {
             lengths[i] = match place {
                 None => {
@@ -194,8 +211,8 @@ impl Constraints {
 
     /// Whether vertices lie on one edge of the surface.
     pub fn on_one_edge(&self, vertices: [u32; 3]) -> bool {
-        let Some(edge) = vertices.iter().find_map(|v| self.on_edge.get(v)) else { return false };
-        vertices.iter().all(|v| edge.contains(v) || self.on_edge.get(v) == Some(edge))
+        let Some(edge) = vertices.iter().find_map(|&v| self.edge_at(v)) else { return false };
+        vertices.iter().all(|&v| edge.contains(&v) || self.edge_at(v) == Some(edge))
     }
 
     /// The facets in use, in ascending order.
@@ -203,9 +220,19 @@ impl Constraints {
         (0..self.facets.len() as u32).filter(|&f| !self.facets[f as usize].gone)
     }
 
-    /// The facets at a vertex, in ascending order. Looks at all: for the few vertices that were added.
+    /// The facets at a Steiner point, in ascending order.
     pub fn facets_at(&self, vertex: u32) -> Vec<u32> {
-        self.alive().filter(|&f| self.facets[f as usize].vertices.contains(&vertex)).collect()
+        let at = self.at_steiner.get(&vertex).into_iter().flatten().copied();
+        at.filter(|&f| !self.facets[f as usize].gone).collect()
+    }
+
+    /// The facets at an edge, in ascending order. Looks at all where both ends are vertices of the surface.
+    pub fn facets_at_edge(&self, a: u32, b: u32) -> Vec<u32> {
+        let has_both = |f: &u32| [a, b].iter().all(|v| self.facets[*f as usize].vertices.contains(v));
+        match a.max(b) {
+            v if v >= self.surface_vertices => self.facets_at(v).into_iter().filter(has_both).collect(),
+            _ => self.alive().filter(has_both).collect(),
+        }
     }
 }
 

@@ -19,8 +19,14 @@ const MOST_VERTICES: usize = 24;
 /// the time.
 const MOST_TO_GROW: usize = 14;
 
-/// Gives the points inside at the balls of others better places.
-pub(super) fn make_room(mesh: &mut Tetrahedra, constraints: &Constraints, of: &[u32], inside: &mut [u32]) {
+/// Gives the points inside at the balls of others better places; appends the new tets to `made`.
+pub(super) fn make_room(
+    mesh: &mut Tetrahedra,
+    constraints: &Constraints,
+    of: &[u32],
+    inside: &mut [u32],
+    made: &mut Vec<u32>,
+) {
     for q in inside {
         let mut ball = Vec::new();
         mesh.star(*q, &mut ball);
@@ -33,7 +39,7 @@ pub(super) fn make_room(mesh: &mut Tetrahedra, constraints: &Constraints, of: &[
         let points = mesh.points.len();
         let new = mesh.add_point(place);
         let tets: Vec<[u32; 4]> = sector.skin.iter().map(|&[a, b, c]| [new, a, b, c]).collect();
-        if refill(mesh, constraints, &sector, &tets) {
+        if refill(mesh, constraints, &sector, &tets, made) {
             mesh.at_vertex[*q as usize] = NONE;
             *q = new;
         } else {
@@ -87,7 +93,7 @@ fn delete_one(mesh: &mut Tetrahedra, constraints: &Constraints, q: u32) -> bool 
             .then(|| small::fill(&mesh.points, &old.skin, &[], least, &mut effort))?;
         Some((old, new?))
     });
-    let done = filled.is_some_and(|(old, new)| refill(mesh, constraints, &old, &new));
+    let done = filled.is_some_and(|(old, new)| refill(mesh, constraints, &old, &new, &mut Vec::new()));
     if done {
         mesh.at_vertex[q as usize] = NONE;
     }
@@ -102,7 +108,13 @@ fn cavity(mesh: &Tetrahedra, tets: Vec<u32>) -> Sector {
     Sector::inside(mesh, mesh.bodies[tets[0] as usize], tets, walls)
 }
 
-fn refill(mesh: &mut Tetrahedra, constraints: &Constraints, sector: &Sector, tets: &[[u32; 4]]) -> bool {
+fn refill(
+    mesh: &mut Tetrahedra,
+    constraints: &Constraints,
+    sector: &Sector,
+    tets: &[[u32; 4]],
+    made: &mut Vec<u32>,
+) -> bool {
     let tets: Vec<([u32; 4], u32)> = tets.iter().map(|&tet| (tet, sector.body)).collect();
-    mesh.rebuild(&sector.tets, &tets, &|face| constraints.facet(face).is_some())
+    mesh.rebuild(&sector.tets, &tets, &|face| constraints.facet(face).is_some(), made)
 }

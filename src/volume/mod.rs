@@ -22,7 +22,8 @@
 //! 1. `delaunay`: the boundary points, by exact cavities (`cavity`), in random rounds along the Hilbert curve; `ties` make it have the diagonals
 //!    of grids.
 //! 2. `recover`: edges, then facets, by `flips`; where none is left, by Steiner points for a while (`steiner`), where their cavity has most
-//!    room (`clearance`); `flat` flips away tets that rounding alone makes positive.
+//!    room (`clearance`); `flat` flips away tets that rounding alone makes positive. Where that comes to no end the mesh is cut along the
+//!    surface (`conform`).
 //! 3. `carve`: a flood from the triangles gives each tet its body and removes the outside.
 //! 4. `relocate`: Steiner points leave the surface: none or one stays inside on either side, found by search where no place sees
 //!    all it must (`stuck`). `inside` deletes those that are not needed, by a search for tets that fill the hole (`small`).
@@ -40,6 +41,7 @@ mod carve;
 mod cavity;
 mod clearance;
 pub mod closed_surface;
+mod conform;
 mod constraints;
 mod crossing;
 mod delaunay;
@@ -124,7 +126,7 @@ pub struct Report {
     pub steiner_inside: usize,
     /// Points that had to stay on kept edges: each cuts one in two.
     pub on_kept_edges: usize,
-    /// How often the recovery was begun anew in another order.
+    /// How often the recovery was begun anew: by points alone, or in another order.
     pub restarts: usize,
     /// Points added inside by the size field.
     pub points_inside: usize,

@@ -190,7 +190,7 @@ impl<'a> Recovery<'a> {
     }
 
     /// The facets that are no faces of the mesh, by one pass over it.
-    fn missing_facets(&self) -> Vec<u32> {
+    pub(super) fn missing_facets(&self) -> Vec<u32> {
         let mut present = vec![false; self.constraints.facets.len()];
         for t in self.mesh.alive() {
             for half_face in 4 * t..4 * t + 4 {
@@ -262,8 +262,7 @@ impl<'a> Recovery<'a> {
     /// Replaces an edge between two facets of one triangle by the other diagonal of the two, which is returned. Which diagonals
     /// facets of one triangle have is free, and where the edge cannot be had or split the other one may.
     fn turn_edge(&mut self, a: u32, b: u32, turn: Turn) -> Option<[u32; 2]> {
-        let mut at = self.constraints.facets_at(a);
-        at.retain(|&f| self.constraints.facets[f as usize].vertices.contains(&b));
+        let at = self.constraints.facets_at_edge(a, b);
         let [one, other] = at[..] else { return None };
         let [one, other] = [one, other].map(|f| self.constraints.facets[f as usize]);
         if one.triangle != other.triangle {

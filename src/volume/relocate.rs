@@ -24,7 +24,8 @@ use crate::kernel::predicates::{Sign, orient3d};
 use crate::kernel::quality::mean_ratio;
 use crate::kernel::simplex::area_vector;
 use crate::{Point, Vector};
-use std::collections::BTreeMap;
+use std::cmp::Reverse;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// A sector is filled from one of its own vertices, without a new point, if the worst mean ratio is at least
 /// this; else from where it is better. A sliver of 0.001 is worse to mend than one vertex more.
@@ -55,7 +56,7 @@ enum Apex {
     New(Point),
 }
 
-/// Takes all Steiner points off the surface, the last first. Returns the new points inside, and the
+/// Takes all Steiner points off the surface. Returns the new points inside, and the
 /// points that stayed.
 pub(super) fn relocate(
     mesh: &mut Tetrahedra,
@@ -64,16 +65,31 @@ pub(super) fn relocate(
     steiner: &[u32],
 ) -> (Vec<u32>, Vec<u32>) {
     let mut inside = Vec::new();
-    let mut left: Vec<u32> = steiner.iter().rev().copied().collect();
+    let mut left: Vec<u32> = steiner.to_vec();
+    let mut balls = Balls::of(mesh, steiner);
     let mut in_vain = 0;
     while !left.is_empty() && in_vain < STUCK {
         let before = left.len();
-        left.retain(|&p| !take_off(mesh, constraints, triangles, p, in_vain > 0, &mut inside));
+        // The smallest ball first, of equal ones that of the last point: so they stay small.
+        let mut queue: BTreeSet<(usize, Reverse<u32>)> =
+            left.iter().map(|&p| (balls.size(mesh, p), Reverse(p))).collect();
+        let mut stuck = Vec::new();
+        while let Some((size, Reverse(p))) = queue.pop_first() {
+            let now = balls.size(mesh, p);
+            if now > size {
+                queue.insert((now, Reverse(p)));
+            } else if !take_off(mesh, constraints, triangles, p, in_vain > 0, &mut inside, &mut balls) {
+                stuck.push(p);
+            }
+        }
+        left = stuck;
         if left.len() < before {
             in_vain = 0;
         } else {
             in_vain += 1;
-            inside::make_room(mesh, constraints, &left, &mut inside);
+            let mut made = Vec::new();
+            inside::make_room(mesh, constraints, &left, &mut inside, &mut made);
+            balls.add(mesh, &made);
         }
     }
     (inside, left)
@@ -87,6 +103,7 @@ fn take_off(
     p: u32,
     search: bool,
     inside: &mut Vec<u32>,
+    balls: &mut Balls,
 ) -> bool {
     let old = constraints.facets_at(p);
     let mut fans: BTreeMap<u32, Vec<[u32; 3]>> = BTreeMap::new();
@@ -103,7 +120,7 @@ fn take_off(
             None => return false,
         };
     }
-    let mut sectors = sectors(mesh, constraints, triangles, p, &patches);
+    let mut sectors = sectors(mesh, constraints, triangles, p, &balls.ball(mesh, p), &patches);
     let points = mesh.points.len();
     let mut new = Vec::new();
     for sector in &mut sectors {
@@ -127,10 +144,12 @@ fn take_off(
     }
     let fresh: Vec<[u32; 3]> = patches.values().flatten().map(|&face| sorted(face)).collect();
     let is_facet = |face| fresh.contains(&sorted(face)) || constraints.facet(face).is_some();
-    if !mesh.rebuild(&ball, &new, &is_facet) {
+    let mut made = Vec::new();
+    if !mesh.rebuild(&ball, &new, &is_facet, &mut made) {
         mesh.forget_points(points);
         return false;
     }
+    balls.add(mesh, &made);
     inside.extend(points as u32..mesh.points.len() as u32);
     mesh.at_vertex[p as usize] = NONE;
     for f in old {
@@ -176,12 +195,12 @@ fn sectors(
     constraints: &Constraints,
     triangles: &[[u32; 3]],
     p: u32,
+    ball: &[u32],
     patches: &BTreeMap<u32, Vec<[u32; 3]>>,
 ) -> Vec<Sector> {
-    let ball = ball(mesh, p);
     let mut sector_of: BTreeMap<u32, usize> = BTreeMap::new();
     let mut sectors: Vec<Sector> = Vec::new();
-    for &first in &ball {
+    for &first in ball {
         if sector_of.contains_key(&first) {
             continue;
         }
@@ -218,10 +237,43 @@ fn sectors(
     sectors
 }
 
-/// All tets at a vertex, also where locked faces and the outside part them.
-fn ball(mesh: &Tetrahedra, p: u32) -> Vec<u32> {
-    // A walk through faces might miss tets behind the outside: points on the skin are few, look at all.
-    mesh.alive().filter(|&t| mesh.tets[t as usize].contains(&p)).collect()
+/// The tets at each Steiner point. A walk through faces would miss some where the outside parts them.
+struct Balls {
+    /// Some may have gone, or come twice.
+    tets: BTreeMap<u32, Vec<u32>>,
+}
+
+impl Balls {
+    fn of(mesh: &Tetrahedra, points: &[u32]) -> Self {
+        let mut balls = Self { tets: points.iter().map(|&p| (p, Vec::new())).collect() };
+        if !points.is_empty() {
+            balls.add(mesh, &mesh.alive().collect::<Vec<_>>());
+        }
+        balls
+    }
+
+    /// Takes in new tets.
+    fn add(&mut self, mesh: &Tetrahedra, tets: &[u32]) {
+        for &t in tets {
+            for v in mesh.tets[t as usize] {
+                if let Some(ball) = self.tets.get_mut(&v) {
+                    ball.push(t);
+                }
+            }
+        }
+    }
+
+    fn size(&mut self, mesh: &Tetrahedra, p: u32) -> usize {
+        self.ball(mesh, p).len()
+    }
+
+    fn ball(&mut self, mesh: &Tetrahedra, p: u32) -> Vec<u32> {
+        let ball = self.tets.get_mut(&p).expect("a Steiner point");
+        ball.retain(|&t| mesh.is_alive(t) && mesh.tets[t as usize].contains(&p));
+        ball.sort_unstable();
+        ball.dedup();
+        ball.clone()
+    }
 }
 
 /// The worst mean ratio of a sector filled from a point; negative if some tet were not positive.

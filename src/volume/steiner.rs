@@ -64,8 +64,7 @@ impl Recovery<'_> {
     pub(super) fn split_edge(&mut self, a: u32, b: u32) -> Option<u32> {
         let mut found = std::mem::take(&mut self.found);
         crossings(self.mesh, a, b, &mut self.star, &mut found);
-        let mut split = self.constraints.facets_at(a);
-        split.retain(|&f| self.constraints.facets[f as usize].vertices.contains(&b));
+        let split = self.constraints.facets_at_edge(a, b);
         let triangle = self.constraints.facets[*split.first()? as usize].triangle;
         let room = self.room_on_edge(a, b, triangle);
         let added = self.split_at(a, b, &found, &room);
@@ -139,7 +138,7 @@ impl Recovery<'_> {
         Room { place, axes: vec![q - p], ends: ends.into_iter().flatten().collect() }
     }
 
-    fn room_in_facet(&self, facet: Facet) -> Room {
+    pub(super) fn room_in_facet(&self, facet: Facet) -> Room {
         let [a, b, c] = facet.vertices.map(|v| self.mesh.point(v));
         let normal = area_vector(a, b, c);
         let beside = |[p, q]: [&Point; 2]| Plane::across(&(q - p).cross(&normal), p);

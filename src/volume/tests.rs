@@ -515,7 +515,8 @@ fn steiner_points_leave_the_surface_at_the_first_attempt() {
             restarts += bare(soup).restarts;
         }
     }
-    assert!(restarts <= 2, "{restarts}");
+    // Every attempt that fails counts, the one by points alone too, which comes before that in another order: 3 when this was written.
+    assert!(restarts <= 3, "{restarts}");
 }
 
 #[test]

@@ -411,12 +411,13 @@ impl Tetrahedra {
     /// Replaces tets by others, each with its body, where the outside and the facets among them change too.
     ///
     /// Faces of facets are locked; a new face that is alone must be one, and borders the outside then. Where the
-    /// new tets do not fit so, nothing is changed and the answer is false.
+    /// new tets do not fit so, nothing is changed and the answer is false. The slots of the new tets are appended to `slots`.
     pub fn rebuild(
         &mut self,
         old: &[u32],
         new: &[([u32; 4], u32)],
         is_facet: &dyn Fn([u32; 3]) -> bool,
+        slots: &mut Vec<u32>,
     ) -> bool {
         let mut faces = Vec::new();
         self.clear_marks();
@@ -444,6 +445,7 @@ impl Tetrahedra {
         }
         for (i, &(tet, body)) in new.iter().enumerate() {
             let t = self.add_tet(tet, body);
+            slots.push(t);
             for k in 0..4 {
                 faces[outer + 4 * i + k].1 = Some(4 * t + k as u32);
             }
