@@ -132,17 +132,21 @@ impl CutModel {
     }
 
     fn find_curves(&self, whole: &CsgModel) -> Vec<Class> {
-        let old_surfaces = whole.geometry.surfaces.len();
+        let tolerance = whole.projector.tolerance().max(self.model.projector.tolerance());
         let of_curve = |curve: &csg::Curve| {
-            if curve.surfaces.iter().all(|s| s.index() < old_surfaces) {
-                let middle = &curve.trace[curve.trace.len() / 2];
-                if let Some(id) = nearest_curve(&whole.features, middle) {
-                    return Class::Curve(id);
-                }
+            let mut faces: Vec<Class> = curve.fins.iter().map(|fin| self.face_class(fin.patch)).collect();
+            faces.sort_unstable();
+            faces.dedup();
+            let on_patches = faces.iter().filter(|class| matches!(class, Class::Patch(_))).count();
+            let middle = &curve.trace[curve.trace.len() / 2];
+            let old = nearest_curve(&whole.features, middle);
+            let is_on =
+                |id: &CurveId| on_patches > 1 || whole.projector.curve_distance(*id, middle) <= tolerance;
+            match old.filter(is_on) {
+                Some(id) if on_patches > 0 => Class::Curve(id),
+                // Of those beside it, a patch says more than the inside of a body.
+                _ => faces[0],
             }
-            let faces = curve.fins.iter().map(|fin| self.face_class(fin.patch));
-            // Of those beside it, a patch says more than the inside of a body.
-            faces.min().expect("a curve has patches beside it")
         };
         self.model.features.curves.iter().map(of_curve).collect()
     }

@@ -123,12 +123,16 @@ pub struct Settings {
     pub allowance: f64,
     /// Random directions that are tried for each plane.
     pub tries: usize,
+    /// Which random directions.
+    pub seed: u64,
+    /// Whether planes may go right through corners.
+    pub through_corners: bool,
 }
 
 impl Default for Settings {
     /// Two percent, as the thesis has it.
     fn default() -> Self {
-        Self { candidates: Candidates::All, allowance: 0.02, tries: 12 }
+        Self { candidates: Candidates::All, allowance: 0.02, tries: 12, seed: 0, through_corners: true }
     }
 }
 
@@ -251,14 +255,15 @@ impl<'a> Piece<'a> {
     }
 
     fn best_plane(&self, cuts: &Cuts, evidence: &Evidence, settings: &Settings) -> CutPlane {
-        let directions = self.directions(settings, cuts.planes.len() as u64);
+        let directions = self.directions(settings, settings.seed << 32 | cuts.planes.len() as u64);
         if settings.candidates == Candidates::Median {
             return self.places(&directions[0], 0.0)[0];
         }
         let crossed = evidence.within(|point| self.holds(cuts, point));
         let others = Others::of(self, cuts, &crossed);
         // A plane that cuts other pieces already leaves no narrow strips beside them, and one right through a corner none beside that.
-        let spots = others.spots.iter().filter(|spot| spot.is_exact).map(|spot| spot.point);
+        let exact = others.spots.iter().filter(|spot| settings.through_corners && spot.is_exact);
+        let spots = exact.map(|spot| spot.point);
         let through =
             spots.flat_map(|point| directions.iter().map(move |&normal| CutPlane { point, normal }));
         let special: Vec<CutPlane> = others.beside.iter().copied().chain(through).collect();

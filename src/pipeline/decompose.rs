@@ -101,12 +101,23 @@ pub fn planned(
     let (pieces, coarse, outcome) =
         progress.stage("mesh", || mesh_as_wanted(parts, model, &settings.coarse, settings.wanted, &[]))?;
     progress.stage("cut", || {
-        let cuts = plan(whole, &coarse.mesh, pieces, parts, cuts)?;
-        let candidates = candidates(&coarse.mesh, &cuts);
-        let model = CutModel::new(whole, &cuts, candidates).map_err(no_mesh)?;
-        Ok(Planned { cuts, model, coarse, pieces, outcome })
+        let mut settings = cuts.clone();
+        for seed in 0..MOST_PLANS {
+            settings.plan = decompose::Settings { seed, through_corners: seed == 0, ..settings.plan };
+            let cuts = plan(whole, &coarse.mesh, pieces, parts, &settings)?;
+            match CutModel::new(whole, &cuts, candidates(&coarse.mesh, &cuts)) {
+                Ok(model) => return Ok(Planned { cuts, model, coarse, pieces, outcome }),
+                // Other planes may do.
+                Err(_) if settings.planes.is_empty() && seed + 1 < MOST_PLANS => {}
+                Err(error) => return Err(no_mesh(error)),
+            }
+        }
+        unreachable!("the last plan returns")
     })
 }
+
+/// Plans that are tried where the pieces of one cannot be told: a plane through an edge, or that touches a face.
+const MOST_PLANS: u64 = 4;
 
 fn no_mesh(error: impl std::fmt::Display) -> Failure {
     Failure::new(Status::NoValidMesh, error.to_string())

@@ -7,7 +7,7 @@ use crate::mesh::stream::MeshStream;
 use crate::migrate::{self, BareStream};
 use crate::progress::Progress;
 use crate::refine::RefinedMesh;
-use crate::repartition::{self, Method};
+use crate::repartition::{self, Method, diffuse};
 
 /// The part of the mesh that a rank has.
 #[derive(Debug)]
@@ -82,25 +82,39 @@ pub struct Evened {
     pub moved: u64,
 }
 
-/// **Collective.** Deals the tets out anew if the parts are too uneven.
+/// Moves to neighbours at most, before tets are dealt out from nothing: what has to go far goes a part further each time.
+const MOST_MOVES: usize = 4;
+
+/// **Collective.** Moves tets where the parts are too uneven: to neighbours, and if that is not enough, by a partition from nothing.
 ///
 /// # Errors
-/// The same on all ranks: no mesh, fewer tets than parts, memory.
+/// The same on all ranks: no mesh, memory.
 pub(super) fn even_out(
     comm: &dyn Communicator,
-    part: BareMesh,
+    mut part: BareMesh,
     progress: &Progress,
 ) -> Result<(BareMesh, Option<Evened>), Failure> {
-    let imbalance = imbalance(&comm.all_gather_one(part.tets.len() as f64)?);
-    if imbalance <= UNEVEN || part.totals.tets < u64::from(comm.size()) {
+    let uneven = |part: &BareMesh| Ok::<_, Failure>(imbalance(&comm.all_gather_one(part.tets.len() as f64)?));
+    let before = uneven(&part)?;
+    if before <= UNEVEN || part.totals.tets < u64::from(comm.size()) {
         return Ok((part, None));
     }
     progress.stage("even out", || {
-        let mesh = settle(comm, part).map_err(|error| Failure::new(Status::NoValidMesh, error))?;
-        let to = repartition::repartition(comm, &mesh, comm.size(), Method::default())?;
-        let (part, mine) = migrate::migrate_bare(comm, mesh.into(), &to, &migrate::Settings::default())?;
-        let [moved] = comm.all_reduce_sum_u64([mine.tets])?;
-        Ok((part, Some(Evened { imbalance, moved })))
+        let mut moved = 0;
+        for step in 0..=MOST_MOVES {
+            let mesh = settle(comm, part).map_err(|error| Failure::new(Status::NoValidMesh, error))?;
+            let to = match step {
+                MOST_MOVES => repartition::repartition(comm, &mesh, comm.size(), Method::default())?,
+                _ => diffuse(comm, &mesh)?,
+            };
+            let (next, mine) = migrate::migrate_bare(comm, mesh.into(), &to, &migrate::Settings::default())?;
+            moved += comm.all_reduce_sum_u64([mine.tets])?[0];
+            part = next;
+            if uneven(&part)? <= UNEVEN {
+                break;
+            }
+        }
+        Ok((part, Some(Evened { imbalance: before, moved })))
     })
 }
 

@@ -10,16 +10,20 @@
 //! | [`Method::SmoothedCurve`] | the same, and fewer faces by [`smooth`] | smaller |
 //! | [`Method::Clusters`] | METIS on a coarse graph of clusters of tets, gathered on rank 0 (feature `metis`), and fewer faces by [`smooth`] | smallest |
 //!
-//! All depend on the mesh and the number of parts alone, not on who holds what before. Parts are more, fewer or as many as ranks: a
+//! And [`diffuse`] makes parts even that are not, by little movement.
+//!
+//! All methods depend on the mesh and the number of parts alone, not on who holds what before. Parts are more, fewer or as many as ranks: a
 //! part beyond the ranks needs ranks to hold it ([`migrate`](crate::migrate::migrate) refuses such destinations).
 
 mod clusters;
 pub mod curve;
+pub mod diffuse;
 pub mod metrics;
 pub mod smooth;
 #[cfg(test)]
 mod tests;
 
+pub use diffuse::diffuse;
 pub use metrics::{Metrics, measure};
 
 use crate::comm::{Agreed, CommError, Communicator};

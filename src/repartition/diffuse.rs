@@ -1,0 +1,138 @@
+//! Even parts with little movement: what a part has too much of goes to its neighbours.
+//!
+//! How many tets go from which part to which is the flow of least cost on the graph of parts that leaves all equal (Hu and Blake 1999):
+//! x solves the graph's Laplace equation with the loads on the right side, and between neighbours i and j flows w (x_i − x_j). The weights
+//! w are the faces that two parts share, so that wide borders move as far as narrow ones. Each rank then gives away its tets next to the
+//! border, layer by layer. Messages are as few as parts have neighbours; compare [`repartition`](super::repartition()), which begins from nothing.
+
+use crate::comm::{CommError, Communicator};
+use crate::dist::DistMesh;
+use crate::mesh::Rank;
+use crate::mesh::topology::face_tets;
+use std::collections::BTreeMap;
+
+/// No tet behind a face.
+const NONE: u32 = u32::MAX;
+
+/// A rank keeps this part of its tets at least: what only passes through goes on the next time.
+const KEPT: f64 = 0.2;
+
+/// The equation is solved to this part of its right side.
+const SOLVED: f64 = 1e-6;
+
+/// **Collective.** A rank for each tet of this part, so that parts are as even as one move to neighbours can make them.
+///
+/// Parts that hang together with no others stay as they are.
+///
+/// # Errors
+/// If another rank fails.
+pub fn diffuse(comm: &dyn Communicator, mesh: &DistMesh) -> Result<Vec<Rank>, CommError> {
+    let tets = face_tets(mesh.faces.len(), &mesh.tet_faces)
+        .unwrap_or_else(|face| panic!("face {face:?} on rank {} has three tets", mesh.rank));
+    let mut borders: BTreeMap<Rank, Vec<u32>> = BTreeMap::new();
+    for (face, holders) in mesh.shared_faces.iter() {
+        let other = holders.iter().find(|&&holder| holder != mesh.rank).expect("another holder");
+        borders.entry(*other).or_default().push(tets[face as usize][0]);
+    }
+    let mine: Vec<[u64; 2]> = borders.iter().map(|(&rank, list)| [rank.into(), list.len() as u64]).collect();
+    let graph = Graph { neighbours: comm.all_gather(&mine)? };
+    let loads = comm.all_gather_one(mesh.tets.len() as f64)?;
+    let potential = graph.potential(&loads);
+    let me = mesh.rank as usize;
+    let flow = |[rank, faces]: &[u64; 2]| *faces as f64 * (potential[me] - potential[*rank as usize]);
+    let wanted: f64 = mine.iter().map(flow).filter(|flow| *flow > 0.0).sum();
+    let scale = f64::min(1.0, (1.0 - KEPT) * loads[me] / wanted.max(1.0));
+    let quotas: Vec<usize> = mine.iter().map(|link| (scale * flow(link)).max(0.0).round() as usize).collect();
+    Ok(give_away(mesh, &tets, borders, quotas))
+}
+
+/// Which parts share how many faces with which others.
+struct Graph {
+    /// By part: others, ascending, and faces.
+    neighbours: Vec<Vec<[u64; 2]>>,
+}
+
+impl Graph {
+    /// The Laplacian of the graph times a vector.
+    fn apply(&self, x: &[f64]) -> Vec<f64> {
+        let row = |(i, links): (usize, &Vec<[u64; 2]>)| {
+            links.iter().map(|&[j, faces]| faces as f64 * (x[i] - x[j as usize])).sum()
+        };
+        self.neighbours.iter().enumerate().map(row).collect()
+    }
+
+    /// For each part the first of those that hang together with it.
+    fn components(&self) -> Vec<usize> {
+        let mut first = vec![usize::MAX; self.neighbours.len()];
+        for start in 0..first.len() {
+            let mut waiting = vec![start];
+            while let Some(part) = waiting.pop() {
+                if first[part] == usize::MAX {
+                    first[part] = start;
+                    waiting.extend(self.neighbours[part].iter().map(|link| link[0] as usize));
+                }
+            }
+        }
+        first
+    }
+
+    /// The potential whose flow makes the loads equal, within parts that hang together: by conjugate gradients, the same on all ranks.
+    fn potential(&self, loads: &[f64]) -> Vec<f64> {
+        let component = self.components();
+        let mut sums = vec![(0.0, 0.0); loads.len()];
+        for (part, load) in loads.iter().enumerate() {
+            let sum = &mut sums[component[part]];
+            *sum = (sum.0 + load, sum.1 + 1.0);
+        }
+        let excess = |(part, load): (usize, &f64)| load - sums[component[part]].0 / sums[component[part]].1;
+        let mut residual: Vec<f64> = loads.iter().enumerate().map(excess).collect();
+        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let mut x = vec![0.0; loads.len()];
+        let mut way = residual.clone();
+        let mut norm = dot(&residual, &residual);
+        let goal = SOLVED * SOLVED * norm;
+        for _ in 0..4 * loads.len() {
+            if norm <= goal {
+                break;
+            }
+            let image = self.apply(&way);
+            let step = norm / dot(&way, &image);
+            x.iter_mut().zip(&way).for_each(|(x, way)| *x += step * way);
+            residual.iter_mut().zip(&image).for_each(|(r, image)| *r -= step * image);
+            let next = dot(&residual, &residual);
+            way.iter_mut().zip(&residual).for_each(|(way, r)| *way = r + next / norm * *way);
+            norm = next;
+        }
+        x
+    }
+}
+
+/// A destination for each tet: so many for each neighbour, from the border inward, a layer for each neighbour in turn.
+fn give_away(
+    mesh: &DistMesh,
+    tets_of_faces: &[[u32; 2]],
+    borders: BTreeMap<Rank, Vec<u32>>,
+    mut quotas: Vec<usize>,
+) -> Vec<Rank> {
+    let mut to = vec![mesh.rank; mesh.tets.len()];
+    let (ranks, mut layers): (Vec<Rank>, Vec<Vec<u32>>) = borders.into_iter().unzip();
+    while quotas.iter().zip(&layers).any(|(quota, layer)| *quota > 0 && !layer.is_empty()) {
+        for ((&rank, quota), layer) in ranks.iter().zip(&mut quotas).zip(&mut layers) {
+            let mut next = Vec::new();
+            for tet in std::mem::take(layer) {
+                if *quota == 0 {
+                    break;
+                }
+                if to[tet as usize] != mesh.rank {
+                    continue;
+                }
+                to[tet as usize] = rank;
+                *quota -= 1;
+                let beside = mesh.tet_faces[tet as usize].iter().flat_map(|face| tets_of_faces[face.index()]);
+                next.extend(beside.filter(|&other| other != NONE && to[other as usize] == mesh.rank));
+            }
+            *layer = next;
+        }
+    }
+    to
+}
