@@ -54,21 +54,38 @@ pub struct CutModel {
     pub corners: Vec<Class>,
 }
 
-/// The geometry that planes make of another: bodies are the pieces, part by part.
+/// The geometry that planes make of another: bodies are the pieces, part by part. Planes nearer than `tolerance` to one of the geometry
+/// are that.
 ///
 /// Statements that name bodies (`boundarycondition`, `singular`) are left out: numbers and names are those of the whole.
-pub fn cut_geometry(geometry: &Geometry, cuts: &Cuts, pieces: &[(usize, BodyId)]) -> Geometry {
-    let first = geometry.surfaces.len();
+pub fn cut_geometry(
+    geometry: &Geometry,
+    cuts: &Cuts,
+    pieces: &[(usize, BodyId)],
+    tolerance: f64,
+) -> Geometry {
     let mut cut = geometry.clone();
+    // Of a plane that is one of the geometry's already, its surface, and whether the normal is the same.
+    let mut surfaces: Vec<(SurfaceId, bool)> = Vec::with_capacity(cuts.planes.len());
     for plane in &cuts.planes {
         let (point, normal) = (plane.point, plane.normal);
-        cut.surfaces.push(Surface::Plane(csg::primitive::Plane { point, normal }));
-        cut.surface_info.push(Default::default());
+        let plane = Surface::Plane(csg::primitive::Plane { point, normal });
+        let known = geometry.surfaces.iter().map(|known| known.same_as(&plane, tolerance));
+        surfaces.push(match (0..).zip(known).find_map(|(k, same)| Some((SurfaceId(k), same?))) {
+            Some(known) => known,
+            None => {
+                cut.surfaces.push(plane);
+                cut.surface_info.push(Default::default());
+                (SurfaceId::new(cut.surfaces.len() - 1), true)
+            }
+        });
     }
     cut.boundary_overrides.clear();
     cut.singularities.clear();
-    let half =
-        |half: &Half| Solid::Half { surface: SurfaceId::new(first + half.plane), positive: half.positive };
+    let half = |half: &Half| {
+        let (surface, same) = surfaces[half.plane];
+        Solid::Half { surface, positive: half.positive == same }
+    };
     let piece = |&(part, body): &(usize, BodyId)| {
         let body = &geometry.bodies[body.index()];
         let halves = cuts.leaves[part].iter().map(half);
@@ -90,7 +107,7 @@ impl CutModel {
     /// Pieces that cannot be meshed, with the place.
     pub fn new(whole: &CsgModel, cuts: &Cuts, mut pieces: Vec<(usize, BodyId)>) -> Result<Self, CutError> {
         let model = loop {
-            match CsgModel::new(cut_geometry(&whole.geometry, cuts, &pieces)) {
+            match CsgModel::new(cut_geometry(&whole.geometry, cuts, &pieces, whole.projector.tolerance())) {
                 Err(FeatureError::Empty(named)) => pieces.retain(|(part, body)| {
                     named.solid != format!("{} in part {part}", whole.geometry.bodies[body.index()].name)
                 }),
@@ -133,12 +150,12 @@ impl CutModel {
 
     fn find_curves(&self, whole: &CsgModel) -> Vec<Class> {
         let tolerance = whole.projector.tolerance().max(self.model.projector.tolerance());
-        let of_curve = |curve: &csg::Curve| {
+        let of_curve = |(id, curve): (u32, &csg::Curve)| {
             let mut faces: Vec<Class> = curve.fins.iter().map(|fin| self.face_class(fin.patch)).collect();
             faces.sort_unstable();
             faces.dedup();
             let on_patches = faces.iter().filter(|class| matches!(class, Class::Patch(_))).count();
-            let middle = &curve.trace[curve.trace.len() / 2];
+            let middle = &self.middle(CurveId(id), curve);
             let old = nearest_curve(&whole.features, middle);
             let is_on =
                 |id: &CurveId| on_patches > 1 || whole.projector.curve_distance(*id, middle) <= tolerance;
@@ -148,7 +165,14 @@ impl CutModel {
                 _ => faces[0],
             }
         };
-        self.model.features.curves.iter().map(of_curve).collect()
+        (0..).zip(&self.model.features.curves).map(of_curve).collect()
+    }
+
+    /// A point inside a curve.
+    fn middle(&self, id: CurveId, curve: &csg::Curve) -> Point {
+        let half = curve.trace.len() / 2;
+        let between = nalgebra::center(&curve.trace[half - 1], &curve.trace[half]);
+        self.model.projector.project_curve(id, &between).unwrap_or(between)
     }
 
     /// What a vertex inside a patch of the pieces lies on.

@@ -133,6 +133,12 @@ pub(super) struct Crossed<'a> {
     corners: Vec<&'a (Point, f64)>,
 }
 
+/// A curve that is nearer to a plane than this part of a fine edge along all of a piece, but not in it, crosses it nowhere in particular.
+const NEARLY_IN: f64 = 0.01;
+
+/// Rounding of coordinates: what is nearer is in the plane.
+const ROUNDING: f64 = 1e-15;
+
 /// So many fine edges a plane keeps away from what it does not cross well.
 const CLEAR: f64 = 1.5;
 
@@ -150,6 +156,11 @@ impl Crossed<'_> {
         let faces = faces.map(|face| shallow(plane.normal.cross(&face.normal).norm()) * face.cells);
         let curves = self.curves.iter().filter(|piece| near(&piece.ends, piece.size)).map(|piece| {
             let way = piece.ends[1] - piece.ends[0];
+            let off = piece.ends.iter().map(|end| plane.value(end).abs()).fold(0.0, f64::max);
+            let largest = piece.ends[0].coords.amax().max(piece.ends[1].coords.amax());
+            if off < NEARLY_IN * piece.size && off > ROUNDING * largest {
+                return f64::INFINITY;
+            }
             shallow(plane.normal.dot(&way).abs() / way.norm()) * way.norm() / piece.size
         });
         faces.sum::<f64>() + curves.sum::<f64>()

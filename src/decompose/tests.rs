@@ -35,6 +35,17 @@ fn plane(point: [f64; 3], normal: [f64; 3]) -> CutPlane {
     CutPlane { point: point.into(), normal: Vector::from(normal) }
 }
 
+/// Method 1 with these planes, or with those that it chooses.
+fn settings(planes: Vec<CutPlane>) -> GenerateSettings {
+    GenerateSettings {
+        method: Method::Decompose(CutSettings { planes, ..CutSettings::default() }),
+        coarse: CoarseSettings::default(),
+        wanted: Wanted::Sizes { pieces: 1 },
+        memory: None,
+        disk: None,
+    }
+}
+
 /// The shares of the samples in each piece, times the pieces.
 fn shares(cuts: &Cuts, evidence: &Evidence) -> Vec<f64> {
     let mut shares = vec![0.0; cuts.leaves.len()];
@@ -114,6 +125,32 @@ fn a_piece_that_was_forgotten_is_found_out() {
     assert!(matches!(CutModel::new(&whole, &cuts, pieces), Err(CutError::NewFace { .. })));
 }
 
+/// A cube without one of its eighths: planes through its inner corner are planes of the file.
+const FICHERA: &str = "algebraic3d
+solid fichera = orthobrick (-1, -1, -1; 1, 1, 1) and not orthobrick (0, 0, 0; 2, 2, 2) -maxh=0.5;
+tlo fichera;";
+
+#[test]
+fn a_cut_in_a_plane_of_the_file_is_no_boundary_where_a_body_goes_on() {
+    let whole = model(FICHERA);
+    let along = plane([0.0; 3], [0.0, -1.0, 0.0]);
+    let cuts = Cuts::by_planes(&[along], &evidence(&whole, 2));
+    let cut = CutModel::new(&whole, &cuts, vec![(0, BodyId(0)), (1, BodyId(0))]).expect("pieces");
+    assert_eq!(cut.faces.iter().filter(|face| matches!(face, cut::Face::Cut(_))).count(), 1);
+    let on_patches = cut.curves.iter().filter(|class| matches!(class, crate::mesh::Class::Patch(_))).count();
+    assert_eq!(on_patches, 4, "the cut ends on four sides of the cube, and at two edges of the hole");
+    let whole = Model::Csg(Box::new(whole));
+    let made = thread::run(2, |comm| {
+        let model = (comm.rank() == 0).then_some(&whole);
+        let made = generate(comm, model, &settings(vec![along]), &Progress::new(true, 9));
+        made.map(|made| (made.check.faults, made.check.volume)).map_err(|error| error.to_string())
+    });
+    for made in made.expect("no rank fails") {
+        let (faults, volume) = made.expect("a mesh");
+        assert!(faults == 0 && (volume - 7.0).abs() < 1e-12, "{faults} faults, volume {volume}");
+    }
+}
+
 #[test]
 fn the_text_of_the_pieces_is_a_geometry_of_the_same_volume_and_names() {
     let whole = model(PEARL);
@@ -155,13 +192,6 @@ fn a_skin_is_the_same_after_a_message() {
 #[test]
 fn pieces_meshed_each_on_its_rank_are_one_mesh() {
     let whole = Model::Csg(Box::new(model(PEARL)));
-    let settings = |planes| GenerateSettings {
-        method: Method::Decompose(CutSettings { planes, ..CutSettings::default() }),
-        coarse: CoarseSettings::default(),
-        wanted: Wanted::Sizes { pieces: 1 },
-        memory: None,
-        disk: None,
-    };
     for (ranks, planes) in [(1, vec![]), (5, vec![]), (2, vec![plane([0.0, 0.0, 0.1], [0.0, 0.6, 0.8])])] {
         let settings = settings(planes);
         let made = thread::run(ranks, |comm| {
@@ -185,17 +215,8 @@ fn pieces_meshed_each_on_its_rank_are_one_mesh() {
 }
 
 #[test]
-fn what_is_no_geometry_is_not_cut() {
-    let settings = GenerateSettings {
-        method: Method::Decompose(CutSettings {
-            planes: vec![plane([9.0; 3], [0.0, 0.0, 1.0])],
-            ..CutSettings::default()
-        }),
-        coarse: CoarseSettings::default(),
-        wanted: Wanted::Sizes { pieces: 1 },
-        memory: None,
-        disk: None,
-    };
+fn planes_that_miss_the_geometry_are_refused() {
+    let settings = settings(vec![plane([9.0; 3], [0.0, 0.0, 1.0])]);
     let whole = Model::Csg(Box::new(model(BAR)));
     let refused = thread::run(2, |comm| {
         let model = (comm.rank() == 0).then_some(&whole);

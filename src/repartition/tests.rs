@@ -142,3 +142,50 @@ fn no_parts_and_more_parts_than_tets_are_refused() {
     assert_eq!(refused(0), PartitionError::NoParts.into());
     assert_eq!(refused(7), PartitionError::MoreParts { parts: 7, tets: 6 }.into());
 }
+
+/// Tets of each part after so many moves to neighbours.
+fn diffused(mesh: &Mesh, part: &[Rank], ranks: u32, moves: usize) -> Vec<usize> {
+    let sizes = thread::run(ranks, |comm| {
+        let given = (comm.rank() == 0).then(|| (mesh.clone(), part.to_vec()));
+        let mut mesh = distribute(comm, given).unwrap();
+        for _ in 0..moves {
+            let to = diffuse(comm, &mesh).unwrap();
+            mesh = migrate(comm, mesh, &to).unwrap();
+            mesh.check(comm).unwrap();
+        }
+        mesh.tets.len()
+    });
+    sizes.unwrap()
+}
+
+#[test]
+fn parts_in_a_row_become_even_by_moves_to_neighbours() {
+    // A bar whose first half is one part and whose last quarter are two.
+    let mesh = lattice_box([16, 3, 3], |_| 0);
+    let tets = mesh.tets.len();
+    let part: Vec<Rank> = (0..tets).map(|tet| [0, 0, 0, 0, 1, 1, 2, 3][tet * 8 / tets]).collect();
+    assert_eq!(diffused(&mesh, &part, 4, 0), [432, 216, 108, 108]);
+    for size in diffused(&mesh, &part, 4, 2) {
+        assert!((212..=220).contains(&size), "{size} of 864 in four parts");
+    }
+}
+
+#[test]
+fn even_parts_and_parts_alone_stay_as_they_are() {
+    let mesh = lattice_box([4, 2, 2], |_| 0);
+    let even: Vec<Rank> = (0..96).map(|tet| tet / 48).collect();
+    assert_eq!(diffused(&mesh, &even, 2, 1), [48, 48]);
+    assert_eq!(diffused(&mesh, &[0; 96], 1, 1), [96]);
+    // The third rank has no neighbour to get tets from.
+    assert_eq!(diffused(&mesh, &even, 3, 1), [48, 48, 0]);
+}
+
+#[test]
+fn tets_pass_through_parts_that_have_few() {
+    let mesh = lattice_box([12, 2, 2], |_| 0);
+    // All but the last tets of the bar on the first of five ranks.
+    let part: Vec<Rank> = (0..288).map(|tet: u32| tet.saturating_sub(283)).collect();
+    let sizes = diffused(&mesh, &part, 5, 8);
+    assert_eq!(sizes.iter().sum::<usize>(), 288);
+    assert!(sizes.iter().all(|&size| (48..=68).contains(&size)), "{sizes:?}");
+}
