@@ -157,10 +157,12 @@ impl CutModel {
             let on_patches = faces.iter().filter(|class| matches!(class, Class::Patch(_))).count();
             let middle = &self.middle(CurveId(id), curve);
             let old = nearest_curve(&whole.features, middle);
-            let is_on =
-                |id: &CurveId| on_patches > 1 || whole.projector.curve_distance(*id, middle) <= tolerance;
+            // Another piece of the intersection of the same surfaces may be the nearest curve.
+            let is_on = |&(id, away): &(CurveId, f64)| {
+                on_patches > 1 || away < BESIDE && whole.projector.curve_distance(id, middle) <= tolerance
+            };
             match old.filter(is_on) {
-                Some(id) if on_patches > 0 => Class::Curve(id),
+                Some((id, _)) if on_patches > 0 => Class::Curve(id),
                 // Of those beside it, a patch says more than the inside of a body.
                 _ => faces[0],
             }
@@ -224,12 +226,17 @@ impl CutModel {
     }
 }
 
-/// The curve that a point lies on, or nearly.
-fn nearest_curve(features: &Features, point: &Point) -> Option<CurveId> {
-    let distance = |curve: &csg::Curve| {
-        let to = |ends: &[Point]| in_segment(point, &ends[0], &ends[1]).1;
-        curve.trace.windows(2).map(to).fold(f64::INFINITY, f64::min)
+/// A curve is no further from the chords of its trace than this, in units of their length: it turns by a quarter radian at most.
+const BESIDE: f64 = 0.05;
+
+/// The curve that is nearest to a point, and how far the point is from a chord of its trace, in units of the chord's length.
+fn nearest_curve(features: &Features, point: &Point) -> Option<(CurveId, f64)> {
+    let chords = |(id, curve): (u32, &csg::Curve)| {
+        let to =
+            move |ends: &[Point]| (in_segment(point, &ends[0], &ends[1]).1, (ends[1] - ends[0]).norm(), id);
+        curve.trace.windows(2).map(to).collect::<Vec<_>>()
     };
-    let distances = features.curves.iter().map(distance).zip(0..);
-    distances.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, id)| CurveId(id))
+    let all = (0..).zip(&features.curves).flat_map(chords);
+    let nearest = all.min_by(|a, b| a.0.total_cmp(&b.0));
+    nearest.map(|(squared, length, id)| (CurveId(id), squared.sqrt() / length))
 }
