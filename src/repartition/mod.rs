@@ -10,7 +10,7 @@
 //! | [`Method::SmoothedCurve`] | the same, and fewer faces by [`smooth`] | smaller |
 //! | [`Method::Clusters`] | METIS on a coarse graph of clusters of tets, gathered on rank 0 (feature `metis`), and fewer faces by [`smooth`] | smallest |
 //!
-//! And [`diffuse`] makes parts even that are not, by little movement.
+//! And [`diffuse()`] makes parts even that are not, by little movement.
 //!
 //! All methods depend on the mesh and the number of parts alone, not on who holds what before. Parts are more, fewer or as many as ranks: a
 //! part beyond the ranks needs ranks to hold it ([`migrate`](crate::migrate::migrate) refuses such destinations).

@@ -59,7 +59,7 @@ fn attempt_to_bound(
     let mut constraints = Constraints::new(&surface.triangles);
     let mut recovery = Recovery::new(&mut tets, &mut constraints, attempt);
     // By flips with a few points and by points alone in turn: the one makes fewer, the other ends where many edges pass by each other.
-    let recovered = if attempt % 2 == 0 { recovery.run() } else { recovery.conform() };
+    let recovered = if attempt.is_multiple_of(2) { recovery.run() } else { recovery.conform() };
     let counts = recovery.counts;
     *help += recovery.help_spent();
     let (steiner, helping) = (std::mem::take(&mut recovery.steiner), std::mem::take(&mut recovery.helping));
