@@ -32,3 +32,10 @@ fn bodies_with_interfaces_are_the_same_for_all_ranks_and_threads() {
 fn another_mesh_has_another_checksum() {
     assert_ne!(checksum("nozzle", 1, 1), checksum("lens", 1, 1));
 }
+
+#[test]
+fn three_hundred_ranks_do_not_fill_the_stacks_of_the_threads_they_share() {
+    let report = report_of(&own("dome"), &["-n", "300", "--coarse", "4000", "--pieces", "2"]);
+    assert_eq!(report["ranks"], 300);
+    assert!(report["mesh"]["tets"].as_u64().unwrap() > 32_000);
+}
