@@ -41,7 +41,7 @@ pub(super) fn mesh_skins(
 pub(super) fn refuse_periodic(model: Option<&Model>) -> Result<(), Failure> {
     match model {
         Some(Model::Csg(model)) if !model.features.identified.is_empty() => Err(Failure::input(
-            "`identify periodic` is kept by the method `refine` only: leave out `-m surface`, or the identification",
+            "`identify periodic` is kept by the method `refine` only: leave out `-m`, or the identification",
         )),
         _ => Ok(()),
     }
