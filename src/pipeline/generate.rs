@@ -143,8 +143,11 @@ pub fn generate(
             Surveyed::Inverted(_, error) => return Err(error),
         };
         let how = refine::Settings { keep, ..refine::Settings::default() };
-        let refined = progress.stage("refine", || refine::refine(dist, &projector, pieces, &how));
-        let bad = inverted_anywhere(comm, &refined)?;
+        // Until the last rank is done.
+        let (refined, bad) = progress.stage("refine", || {
+            let refined = refine::refine(dist, &projector, pieces, &how);
+            inverted_anywhere(comm, &refined).map(|bad| (refined, bad))
+        })?;
         if !bad.is_empty() && round < MOST_ROUNDS {
             lower(&mut sources, coarse.as_ref(), &bad);
             continue;
