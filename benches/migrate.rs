@@ -6,6 +6,9 @@
 #![forbid(unsafe_code)]
 #![allow(missing_docs)]
 
+mod common;
+
+use common::cpu_seconds;
 use csg::{BodyId, PatchId};
 use std::sync::Mutex;
 use tetmill::comm::thread;
@@ -93,18 +96,6 @@ fn other_rank(part: &BareMesh, random: &mut Random) -> Rank {
     other + Rank::from(other >= part.rank)
 }
 
-/// Processor seconds of this process so far.
-fn processor_seconds() -> f64 {
-    let stat = std::fs::read_to_string("/proc/self/stat").expect("Linux");
-    // Fields 14 and 15, after the name in parentheses: ticks of 10 ms.
-    let ticks: f64 = stat
-        .rsplit(") ")
-        .next()
-        .map(|rest| rest.split(' ').skip(11).take(2).filter_map(|t| t.parse::<f64>().ok()).sum())
-        .expect("numbers");
-    ticks / 100.0
-}
-
 fn main() {
     let args: Vec<usize> = std::env::args().skip(1).filter_map(|arg| arg.parse().ok()).collect();
     let number = |k: usize, other: usize| args.get(k).copied().unwrap_or(other);
@@ -141,7 +132,7 @@ fn main() {
         // Not every kernel allows it; then the column tells too much.
         let _ = std::fs::write("/proc/self/clear_refs", "5");
         let resident = peak_bytes().unwrap_or(0);
-        let (start, wall) = (processor_seconds(), std::time::Instant::now());
+        let (start, wall) = (cpu_seconds(), std::time::Instant::now());
         let moved = thread::run(ranks, |comm| {
             let slot = &parts[comm.rank() as usize];
             let mesh = slot.lock().unwrap().take().expect("a part");
@@ -151,7 +142,7 @@ fn main() {
             *slot.lock().unwrap() = Some(mesh);
             moved
         });
-        let (seconds, wall) = (processor_seconds() - start, wall.elapsed().as_secs_f64());
+        let (seconds, wall) = (cpu_seconds() - start, wall.elapsed().as_secs_f64());
         let peak = peak_bytes().unwrap_or(0).saturating_sub(resident);
         let moved: Vec<Moved> = moved.expect("no rank fails");
         let tets: u64 = moved.iter().map(|m| m.tets).sum();
@@ -164,14 +155,14 @@ fn main() {
             peak as f64 / 1e6
         );
     }
-    let (start, wall) = (processor_seconds(), std::time::Instant::now());
+    let (start, wall) = (cpu_seconds(), std::time::Instant::now());
     let settled = thread::run(ranks, |comm| {
         let mesh = parts[comm.rank() as usize].lock().unwrap().take().expect("a part");
         let settled = dist::settle(comm, mesh).expect("a mesh");
         settled.edges.len() as u64
     });
     let edges: u64 = settled.expect("no rank fails").iter().sum();
-    let (seconds, wall) = (processor_seconds() - start, wall.elapsed().as_secs_f64());
+    let (seconds, wall) = (cpu_seconds() - start, wall.elapsed().as_secs_f64());
     println!(
         "\nedges and faces settled: {edges} edges in {wall:.2} s, {seconds:.2} processor s, {:.2} M tets/s a core",
         all as f64 / seconds / 1e6

@@ -10,7 +10,7 @@
 #![allow(missing_docs)]
 
 use std::time::Instant;
-use tetmill::{Point, check, dist, geometry, mesh, refine};
+use tetmill::{Point, check, dist, geometry, memory, mesh, refine};
 
 #[path = "../src/refine/fixtures.rs"]
 #[allow(dead_code)]
@@ -173,9 +173,7 @@ fn forget_peak() {
     let _ = std::fs::write("/proc/self/clear_refs", "5");
 }
 
-/// Peak resident memory of the process.
+/// Peak resident memory of the process; 0 where the system does not tell.
 fn peak_bytes() -> u64 {
-    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
-    line.and_then(|l| l.split_whitespace().next()?.parse::<u64>().ok()).unwrap_or(0) * 1024
+    memory::peak_bytes().unwrap_or(0)
 }

@@ -5,22 +5,13 @@
 #![forbid(unsafe_code)]
 #![allow(missing_docs)]
 
+mod common;
+
+use common::cpu_seconds;
 use std::path::PathBuf;
 use tetmill::comm::thread;
 use tetmill::io::elmer;
 use tetmill::repartition::{self, Method};
-
-/// Processor seconds of this process so far.
-fn processor_seconds() -> f64 {
-    let stat = std::fs::read_to_string("/proc/self/stat").expect("Linux");
-    // Fields 14 and 15, after the name in parentheses: ticks of 10 ms.
-    let ticks: f64 = stat
-        .rsplit(") ")
-        .next()
-        .map(|rest| rest.split(' ').skip(11).take(2).filter_map(|t| t.parse::<f64>().ok()).sum())
-        .expect("numbers");
-    ticks / 100.0
-}
 
 fn main() {
     // Cargo adds --bench.
@@ -46,10 +37,10 @@ fn main() {
             let results = thread::run(ranks, |comm| {
                 let loaded = elmer::load(comm, &dir).expect("a mesh");
                 comm.barrier().expect("no rank fails");
-                let start = processor_seconds();
+                let start = cpu_seconds();
                 let part = repartition::repartition(comm, &loaded.mesh, parts, method).expect("a partition");
                 comm.barrier().expect("no rank fails");
-                let seconds = processor_seconds() - start;
+                let seconds = cpu_seconds() - start;
                 (repartition::measure(comm, &loaded.mesh, &part, parts).expect("no rank fails"), seconds)
             });
             let (metrics, seconds) = results.expect("no rank fails")[0];

@@ -9,6 +9,9 @@
 //! cargo bench --bench volume -- one cube_100k size=1.3 threads=2 target=0.7 passes=3
 //! ```
 
+mod common;
+
+use common::cpu_seconds;
 use csg::{BodyId, PatchId};
 use std::path::PathBuf;
 use std::process::Command;
@@ -240,20 +243,7 @@ fn read_ply(path: &std::path::Path) -> (Vec<Point>, Vec<[u32; 3]>) {
     )
 }
 
-/// Seconds that all threads have worked so far; 0 where the system does not tell.
-fn cpu_seconds() -> f64 {
-    /// Ticks of `/proc` in a second.
-    const TICKS: f64 = 100.0;
-    let stat = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
-    // The name of the program, in brackets, may hold blanks; user and system time are the 12th and 13th words after it.
-    let after = stat.rsplit(')').next().unwrap_or_default();
-    let ticks = after.split_whitespace().skip(11).take(2).filter_map(|w| w.parse::<f64>().ok());
-    ticks.sum::<f64>() / TICKS
-}
-
 /// The most memory that this process had so far; 0 where the system does not tell.
 fn peak_megabytes() -> f64 {
-    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:")).unwrap_or_default();
-    line.split_whitespace().next().and_then(|w| w.parse::<f64>().ok()).unwrap_or(0.0) * 1024.0 / 1e6
+    tetmill::memory::peak_bytes().unwrap_or(0) as f64 / 1e6
 }

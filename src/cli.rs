@@ -94,6 +94,26 @@ pub struct InputOptions {
     pub feature_angle: Option<f64>,
 }
 
+/// How a command runs that writes a partitioned mesh.
+#[derive(Args, Debug)]
+pub struct RunOptions {
+    /// Number of threads in all [default: the cores]
+    #[arg(short, long, value_name = "THREADS", value_parser = clap::value_parser!(u32).range(1..))]
+    pub threads: Option<u32>,
+    /// What to write, with commas between, or none
+    #[arg(short, long, value_enum, value_delimiter = ',', default_value = "elmer")]
+    pub format: Vec<Format>,
+    /// Read the written Elmer mesh again and check it
+    #[arg(long)]
+    pub check: bool,
+    /// Write the summary as JSON
+    #[arg(long, value_name = "FILE.json")]
+    pub report: Option<PathBuf>,
+    /// Say nothing but errors
+    #[arg(short, long)]
+    pub quiet: bool,
+}
+
 /// `tetmill generate`
 #[derive(Args, Debug)]
 pub struct Generate {
@@ -112,9 +132,6 @@ pub struct Generate {
     /// Number of parts to write [default: the ranks]; under mpirun more or fewer than these are dealt out to them
     #[arg(long, value_name = "P", value_parser = clap::value_parser!(u32).range(1..))]
     pub parts: Option<u32>,
-    /// Number of threads in all [default: the cores]
-    #[arg(short, long, value_name = "THREADS", value_parser = clap::value_parser!(u32).range(1..))]
-    pub threads: Option<u32>,
     /// Number of tets wanted in all (1e9 is understood): COUNT to 1.3 COUNT; chooses --coarse and --pieces
     #[arg(short, long, value_name = "COUNT", value_parser = count, conflicts_with_all = ["coarse", "levels", "pieces"])]
     pub elements: Option<u64>,
@@ -134,24 +151,15 @@ pub struct Generate {
     /// Sizes of the coarse mesh
     #[command(flatten)]
     pub size: SizeOptions,
-    /// What to write, with commas between, or none
-    #[arg(short, long, value_enum, value_delimiter = ',', default_value = "elmer")]
-    pub format: Vec<Format>,
-    /// Read the written Elmer mesh again and check it
-    #[arg(long)]
-    pub check: bool,
-    /// Write the summary as JSON
-    #[arg(long, value_name = "FILE.json")]
-    pub report: Option<PathBuf>,
     /// Draw the mesh: its parts in colours, or its patches if there is one
     #[arg(long, value_name = "FILE.png")]
     pub picture: Option<PathBuf>,
     /// Draw only the tets behind a plane, given by a point on it and its normal
     #[arg(long, value_name = "X,Y,Z,NX,NY,NZ", value_parser = cut, allow_hyphen_values = true, requires = "picture")]
     pub cut: Option<Cut>,
-    /// Say nothing but errors
-    #[arg(short, long)]
-    pub quiet: bool,
+    /// What is written, and what is told of it
+    #[command(flatten)]
+    pub run: RunOptions,
 }
 
 /// `tetmill repartition`
@@ -168,21 +176,9 @@ pub struct Repartition {
     /// How tets are given to parts [default: graph, in a build with METIS]
     #[arg(short, long, value_enum)]
     pub method: Option<PartitionMethod>,
-    /// Number of threads in all [default: the cores]
-    #[arg(short, long, value_name = "THREADS", value_parser = clap::value_parser!(u32).range(1..))]
-    pub threads: Option<u32>,
-    /// What to write, with commas between, or none
-    #[arg(short, long, value_enum, value_delimiter = ',', default_value = "elmer")]
-    pub format: Vec<Format>,
-    /// Read the written Elmer mesh again and check it
-    #[arg(long)]
-    pub check: bool,
-    /// Write the summary as JSON
-    #[arg(long, value_name = "FILE.json")]
-    pub report: Option<PathBuf>,
-    /// Say nothing but errors
-    #[arg(short, long)]
-    pub quiet: bool,
+    /// What is written, and what is told of it
+    #[command(flatten)]
+    pub run: RunOptions,
 }
 
 /// How tets are given to parts.

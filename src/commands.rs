@@ -7,7 +7,9 @@ use decompose::cut_settings;
 pub use decompose::run_decompose;
 pub use repartition::run_repartition;
 
-use crate::cli::{Check, Format, Generate, InputOptions, Inspect, MeshFile, Method, Quality, SizeOptions};
+use crate::cli::{
+    Check, Format, Generate, InputOptions, Inspect, MeshFile, Method, Quality, RunOptions, SizeOptions,
+};
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -29,7 +31,7 @@ use tetmill::{memory, picture, quality};
 
 /// `tetmill generate`
 pub fn run_generate(options: &Generate) -> Result<(), Failure> {
-    set_threads(options.threads)?;
+    set_threads(options.run.threads)?;
     let start = Instant::now();
     on_ranks(options.ranks, options.parts, |comm| generate_on(comm, options, start))
 }
@@ -101,7 +103,7 @@ const STAGES: u64 = 8;
 /// **Collective.**
 fn generate_on(comm: &dyn Communicator, options: &Generate, start: Instant) -> Result<(), Failure> {
     let first = comm.rank() == 0;
-    let progress = Progress::new(options.quiet || !first, STAGES);
+    let progress = Progress::new(options.run.quiet || !first, STAGES);
     let model = first
         .then(|| progress.stage("read", || read_sized_model(&options.input, &options.size, &progress)))
         .transpose();
@@ -110,18 +112,15 @@ fn generate_on(comm: &dyn Communicator, options: &Generate, start: Instant) -> R
     let target = options.output.clone().unwrap_or_else(|| {
         options.input.files[0].with_extension("").file_name().map_or_else(|| "mesh".into(), PathBuf::from)
     });
-    let disk = Some(disk_for(&options.format, &target));
+    let disk = Some(disk_for(&options.run.format, &target));
     let method = agree(comm, method_of(options))?;
     let settings = GenerateSettings { method, coarse, wanted: wanted(options), memory: options.memory, disk };
     let made = generate(comm, model.as_ref(), &settings, &progress)?;
     let stem = target.join(options.input.files[0].file_stem().unwrap_or("mesh".as_ref()));
     let written = progress.stage("write", || {
-        write_formats(comm, made.part.stream(), &made.names, &options.format, &target, &stem)
+        write_formats(comm, made.part.stream(), &made.names, &options.run.format, &target, &stem)
     })?;
-    if options.check && options.format.contains(&Format::Elmer) {
-        let checked = if first { progress.stage("read back", || check_written(&target)) } else { Ok(()) };
-        agree(comm, checked)?;
-    }
+    read_back(comm, &options.run, &target, &progress)?;
     match &options.picture {
         Some(_) if !made.part.keeps_all() => {
             progress.note("note: no picture is drawn of a mesh whose coordinates do not fit the memory")
@@ -137,7 +136,7 @@ fn generate_on(comm: &dyn Communicator, options: &Generate, start: Instant) -> R
     report.seconds = start.elapsed().as_secs_f64();
     report.peak_memory = memory;
     report.add_written(written);
-    tell(&report, options.report.as_deref(), options.quiet, wanted_count(options))
+    tell(&report, options.run.report.as_deref(), options.run.quiet, wanted_count(options))
 }
 
 /// Reads what is to be meshed; what the user should know is shown.
@@ -192,11 +191,16 @@ fn coarse_settings(options: &SizeOptions, reads: bool) -> Result<CoarseSettings,
 }
 
 fn wanted(options: &Generate) -> Wanted {
-    let pieces = options.pieces.unwrap_or(1 << options.levels);
-    match (options.elements, options.size.coarse) {
-        (Some(count), _) => Wanted::Elements(count),
-        (None, Some(tets)) => Wanted::Coarse { tets, pieces },
-        (None, None) => Wanted::Sizes { pieces },
+    match options.elements {
+        Some(count) => Wanted::Elements(count),
+        None => wanted_coarse(&options.size, options.pieces.unwrap_or(1 << options.levels)),
+    }
+}
+
+fn wanted_coarse(size: &SizeOptions, pieces: u32) -> Wanted {
+    match size.coarse {
+        Some(tets) => Wanted::Coarse { tets, pieces },
+        None => Wanted::Sizes { pieces },
     }
 }
 
@@ -242,7 +246,21 @@ fn write_formats(
     Ok(written)
 }
 
-/// Reads the written Elmer mesh again.
+/// **Collective.** Reads the written Elmer mesh again, if that is asked for.
+fn read_back(
+    comm: &dyn Communicator,
+    options: &RunOptions,
+    dir: &Path,
+    progress: &Progress,
+) -> Result<(), Failure> {
+    if !options.check || !options.format.contains(&Format::Elmer) {
+        return Ok(());
+    }
+    let checked = if comm.rank() == 0 { progress.stage("read back", || check_written(dir)) } else { Ok(()) };
+    agree(comm, checked)
+}
+
+/// Reads a written Elmer mesh again.
 fn check_written(dir: &Path) -> Result<(), Failure> {
     let checked = elmer::check_elmer(dir).map_err(|error| Failure::new(Status::Faults, error))?;
     match checked.iter().find(|(_, faults)| !faults.is_empty()) {
@@ -324,10 +342,15 @@ fn tell(report: &Report, file: Option<&Path>, quiet: bool, wanted: Option<u64>) 
             ),
         }
     }
-    if let Some(file) = file {
-        write_whole(file, &(serde_json::to_string_pretty(report).expect("plain data") + "\n"))?;
+    write_report(file, report)
+}
+
+/// Writes a report where it was asked for.
+fn write_report(file: Option<&Path>, report: &impl serde::Serialize) -> Result<(), Failure> {
+    match file {
+        Some(file) => write_whole(file, &(serde_json::to_string_pretty(report).expect("plain data") + "\n")),
+        None => Ok(()),
     }
-    Ok(())
 }
 
 /// Writes to the standard output. That nobody reads on, as behind `| head`, is no fault.
@@ -363,14 +386,10 @@ pub fn run_mesh(options: &MeshFile) -> Result<(), Failure> {
     let comm = thread::alone();
     let progress = Progress::new(options.quiet, STAGES);
     let model = progress.stage("read", || read_sized_model(&options.input, &options.size, &progress))?;
-    let wanted = match options.size.coarse {
-        Some(tets) => Wanted::Coarse { tets, pieces: 1 },
-        None => Wanted::Sizes { pieces: 1 },
-    };
     let settings = GenerateSettings {
         method: pipeline::Method::default(),
         coarse: coarse_settings(&options.size, true)?,
-        wanted,
+        wanted: wanted_coarse(&options.size, 1),
         memory: None,
         disk: None,
     };

@@ -82,3 +82,15 @@ pub fn report_of(geometry: &Path, arguments: &[&str]) -> serde_json::Value {
 pub fn read_json(file: &Path) -> serde_json::Value {
     serde_json::from_slice(&std::fs::read(file).expect("the report is there")).expect("JSON")
 }
+
+/// Made by a method on so many ranks, at `coarse`, and judged by both checkers: the report.
+pub fn judged_report(method: &str, name: &str, ranks: u32, more: &[&str]) -> serde_json::Value {
+    let dir = tempfile::tempdir().unwrap();
+    let (out, report) = (dir.path().join("out"), dir.path().join("report.json"));
+    let mut command = tetmill();
+    command.arg("generate").arg(own(name)).args(["-m", method, "-q", "--preset", "coarse"]);
+    command.args(["-n", &ranks.to_string(), "-o"]).arg(&out).arg("--report").arg(&report).args(more);
+    succeed(&mut command);
+    judge(&out, ranks);
+    read_json(&report)
+}

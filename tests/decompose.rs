@@ -1,21 +1,10 @@
 //! `generate -m decompose` and `tetmill decompose`: geometries cut by planes.
 
-use crate::common::{judge, own, read_json, report_of, succeed, tetmill};
+use crate::common::{judged_report, own, report_of, succeed, tetmill};
 
 /// Made with so many ranks, and judged by both checkers: tets, the smallest dihedral angle and the volume.
 fn made(name: &str, ranks: u32, more: &[&str]) -> [f64; 3] {
-    let dir = tempfile::tempdir().unwrap();
-    let (out, report) = (dir.path().join("out"), dir.path().join("report.json"));
-    let mut command = tetmill();
-    command
-        .arg("generate")
-        .arg(own(name))
-        .args(["-m", "decompose", "-q", "--preset", "coarse", "-o"])
-        .arg(&out);
-    command.args(["-n", &ranks.to_string(), "--report"]).arg(&report).args(more);
-    succeed(&mut command);
-    judge(&out, ranks);
-    let report = read_json(&report);
+    let report = judged_report("decompose", name, ranks, more);
     ["tets", "smallest_dihedral", "volume"].map(|key| report["mesh"][key].as_f64().unwrap())
 }
 

@@ -1,21 +1,10 @@
 //! `generate -m surface`: parts meshed inside their refined skins.
 
-use crate::common::{judge, own, read_json, succeed, tetmill};
+use crate::common::{judged_report, own, tetmill};
 
 /// Made with so many ranks, and judged by both checkers: the smallest dihedral angle and the volume.
 fn made(name: &str, ranks: u32, pieces: u32) -> [f64; 2] {
-    let dir = tempfile::tempdir().unwrap();
-    let (out, report) = (dir.path().join("out"), dir.path().join("report.json"));
-    let mut command = tetmill();
-    command
-        .arg("generate")
-        .arg(own(name))
-        .args(["-m", "surface", "-q", "--preset", "coarse", "-o"])
-        .arg(&out);
-    command.args(["-n", &ranks.to_string(), "--pieces", &pieces.to_string(), "--report"]).arg(&report);
-    succeed(&mut command);
-    judge(&out, ranks);
-    let report = read_json(&report);
+    let report = judged_report("surface", name, ranks, &["--pieces", &pieces.to_string()]);
     assert_eq!(report["skins"]["skins"], 0, "{name}: {}", report["skins"]);
     ["smallest_dihedral", "volume"].map(|key| report["mesh"][key].as_f64().unwrap())
 }

@@ -1,12 +1,12 @@
 //! `tetmill decompose`, and how planes are chosen.
 
-use super::{STAGES, coarse_settings, read_sized_model};
+use super::{STAGES, coarse_settings, read_sized_model, show, wanted_coarse, write_whole};
 use crate::cli::{Decompose, PlaneOptions, Planes};
 use std::path::Path;
 use tetmill::decompose::{Candidates, CutPlane, Settings, geo_text};
-use tetmill::error::{Failure, Status};
+use tetmill::error::Failure;
 use tetmill::pipeline::decompose::{CutSettings, planned};
-use tetmill::pipeline::{self, GenerateSettings, Model, Wanted};
+use tetmill::pipeline::{Model, input};
 use tetmill::progress::Progress;
 use tetmill::{Point, Vector};
 
@@ -14,18 +14,10 @@ use tetmill::{Point, Vector};
 pub fn run_decompose(options: &Decompose) -> Result<(), Failure> {
     let progress = Progress::new(options.quiet, STAGES);
     let model = progress.stage("read", || read_sized_model(&options.input, &options.size, &progress))?;
-    let wanted = match options.size.coarse {
-        Some(tets) => Wanted::Coarse { tets, pieces: options.pieces },
-        None => Wanted::Sizes { pieces: options.pieces },
-    };
-    let settings = GenerateSettings {
-        method: pipeline::Method::default(),
-        coarse: coarse_settings(&options.size, true)?,
-        wanted,
-        memory: None,
-        disk: None,
-    };
-    let planned = planned(options.parts, &model, &cut_settings(&options.planes)?, &settings, &progress)?;
+    let cuts = cut_settings(&options.planes)?;
+    let coarse = coarse_settings(&options.size, true)?;
+    let wanted = wanted_coarse(&options.size, options.pieces);
+    let planned = planned(options.parts, &model, &cuts, &coarse, wanted, &progress)?;
     let Model::Csg(whole) = &model else { unreachable!("only geometries are cut") };
     if !whole.geometry.boundary_overrides.is_empty() || !whole.geometry.singularities.is_empty() {
         return Err(Failure::input(
@@ -35,13 +27,12 @@ pub fn run_decompose(options: &Decompose) -> Result<(), Failure> {
     }
     let source = read_text(&options.input.files[0])?;
     let text = geo_text(&source, &whole.geometry, &planned.cuts, &planned.model.pieces);
-    std::fs::write(&options.output, text).map_err(|error| {
-        Failure::new(Status::Resources, format!("cannot write {}: {error}", options.output.display()))
-    })?;
+    write_whole(&options.output, &text)?;
     progress.finish();
     if !options.quiet {
         let (planes, pieces) = (planned.cuts.planes.len(), planned.model.pieces.len());
-        println!("{}: {} parts by {planes} planes, {pieces} bodies", options.output.display(), options.parts);
+        let (file, parts) = (options.output.display(), options.parts);
+        show(format_args!("{file}: {parts} parts by {planes} planes, {pieces} bodies\n"))?;
     }
     Ok(())
 }
@@ -60,9 +51,7 @@ pub(super) fn cut_settings(options: &PlaneOptions) -> Result<CutSettings, Failur
 }
 
 fn read_text(path: &Path) -> Result<String, Failure> {
-    let bytes = std::fs::read(path)
-        .map_err(|error| Failure::input(format!("cannot read {}: {error}", path.display())))?;
-    Ok(String::from_utf8_lossy(&bytes).into_owned())
+    Ok(String::from_utf8_lossy(&input::read_bytes(path)?).into_owned())
 }
 
 /// Planes, a line each: three coordinates of a point and three of a normal, with blanks or commas between. `#` begins a comment.

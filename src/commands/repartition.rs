@@ -1,11 +1,11 @@
 //! `tetmill repartition`
 
-use super::{check_written, on_ranks, set_threads, show, total_memory, write_formats, write_whole};
-use crate::cli::{Format, PartitionMethod, Repartition};
+use super::{on_ranks, read_back, set_threads, show, total_memory, write_formats, write_report};
+use crate::cli::{PartitionMethod, Repartition};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 use tetmill::comm::{Communicator, mpi};
-use tetmill::error::{Failure, agree};
+use tetmill::error::Failure;
 use tetmill::io::elmer;
 use tetmill::pipeline;
 use tetmill::progress::Progress;
@@ -18,7 +18,7 @@ const STAGES: u64 = 5;
 /// `tetmill repartition`
 pub fn run_repartition(options: &Repartition) -> Result<(), Failure> {
     // First: reading already uses the threads.
-    set_threads(options.threads)?;
+    set_threads(options.run.threads)?;
     if !mpi::launched() {
         let parts = options.parts.ok_or_else(|| Failure::input("how many parts? say so with -n"))?;
         // Before a thread is started for each.
@@ -34,7 +34,7 @@ pub fn run_repartition(options: &Repartition) -> Result<(), Failure> {
 /// **Collective.**
 fn repartition_on(comm: &dyn Communicator, options: &Repartition, start: Instant) -> Result<(), Failure> {
     let first = comm.rank() == 0;
-    let progress = Progress::new(options.quiet || !first, STAGES);
+    let progress = Progress::new(options.run.quiet || !first, STAGES);
     let method = match options.method {
         None => Method::default(),
         Some(PartitionMethod::Curve) => Method::Curve,
@@ -44,12 +44,10 @@ fn repartition_on(comm: &dyn Communicator, options: &Repartition, start: Instant
     let done = pipeline::repartition(comm, &options.directory, method, &progress)?;
     let target = &options.output;
     let stem = target.join(stem_of(&done.folder));
-    let written = progress
-        .stage("write", || write_formats(comm, &done.part, &done.names, &options.format, target, &stem))?;
-    if options.check && options.format.contains(&Format::Elmer) {
-        let checked = if first { progress.stage("read back", || check_written(target)) } else { Ok(()) };
-        agree(comm, checked)?;
-    }
+    let written = progress.stage("write", || {
+        write_formats(comm, &done.part, &done.names, &options.run.format, target, &stem)
+    })?;
+    read_back(comm, &options.run, target, &progress)?;
     let memory = total_memory(comm)?;
     if !first {
         return Ok(());
@@ -59,13 +57,10 @@ fn repartition_on(comm: &dyn Communicator, options: &Repartition, start: Instant
     report.seconds = start.elapsed().as_secs_f64();
     report.peak_memory = memory;
     report.add_written(written);
-    if !options.quiet {
+    if !options.run.quiet {
         show(format_args!("{report}\n"))?;
     }
-    match &options.report {
-        Some(file) => write_whole(file, &(serde_json::to_string_pretty(&report).expect("plain data") + "\n")),
-        None => Ok(()),
-    }
+    write_report(options.run.report.as_deref(), &report)
 }
 
 /// What files of one format are called: as the folder that the mesh was read from, which for a `partitioning.N` is the one above.

@@ -19,7 +19,7 @@ pub enum CutError {
     Features(#[from] FeatureError),
     /// A face of a piece is none of the geometry.
     #[error(
-        "a cut would make a face of part {part} at ({}, {}, {}) that the geometry does not have; other planes may do (`--cut FILE`)",
+        "a cut would make a face of part {part} at ({}, {}, {}) that the geometry does not have; other planes may do (`--planes-from FILE`)",
         point.x, point.y, point.z
     )]
     NewFace {
@@ -90,13 +90,17 @@ pub fn cut_geometry(
         let body = &geometry.bodies[body.index()];
         let halves = cuts.leaves[part].iter().map(half);
         Body {
-            name: format!("{} in part {part}", body.name),
+            name: piece_name(body, part),
             solid: Solid::And(std::iter::once(body.solid.clone()).chain(halves).collect()),
             ..body.clone()
         }
     };
     cut.bodies = pieces.iter().map(piece).collect();
     cut
+}
+
+fn piece_name(body: &Body, part: usize) -> String {
+    format!("{} in part {part}", body.name)
 }
 
 impl CutModel {
@@ -108,8 +112,8 @@ impl CutModel {
     pub fn new(whole: &CsgModel, cuts: &Cuts, mut pieces: Vec<(usize, BodyId)>) -> Result<Self, CutError> {
         let model = loop {
             match CsgModel::new(cut_geometry(&whole.geometry, cuts, &pieces, whole.projector.tolerance())) {
-                Err(FeatureError::Empty(named)) => pieces.retain(|(part, body)| {
-                    named.solid != format!("{} in part {part}", whole.geometry.bodies[body.index()].name)
+                Err(FeatureError::Empty(named)) => pieces.retain(|&(part, body)| {
+                    named.solid != piece_name(&whole.geometry.bodies[body.index()], part)
                 }),
                 made => break made?,
             }
@@ -148,8 +152,13 @@ impl CutModel {
         self.model.features.patches.iter().map(face).collect()
     }
 
+    /// What is no further apart than this is one, in the whole and in the pieces.
+    fn tolerance(&self, whole: &CsgModel) -> f64 {
+        whole.projector.tolerance().max(self.model.projector.tolerance())
+    }
+
     fn find_curves(&self, whole: &CsgModel) -> Vec<Class> {
-        let tolerance = whole.projector.tolerance().max(self.model.projector.tolerance());
+        let tolerance = self.tolerance(whole);
         let of_curve = |(id, curve): (u32, &csg::Curve)| {
             let mut faces: Vec<Class> = curve.fins.iter().map(|fin| self.face_class(fin.patch)).collect();
             faces.sort_unstable();
@@ -186,7 +195,7 @@ impl CutModel {
     }
 
     fn find_corners(&self, whole: &CsgModel) -> Vec<Class> {
-        let tolerance = whole.projector.tolerance().max(self.model.projector.tolerance());
+        let tolerance = self.tolerance(whole);
         let mut classes: Vec<Option<Class>> = vec![None; self.model.features.corners.len()];
         for (curve, class) in self.model.features.curves.iter().zip(&self.curves) {
             for end in curve.ends.into_iter().flatten() {

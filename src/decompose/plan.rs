@@ -11,7 +11,9 @@
 use super::Evidence;
 use super::evidence::{Crossed, Sample};
 use crate::kernel::random::Random;
+use crate::kernel::tree;
 use crate::{Point, Vector};
+use csg::Aabb;
 use nalgebra::{Matrix3, SymmetricEigen};
 use rayon::prelude::*;
 
@@ -28,6 +30,17 @@ impl CutPlane {
     /// The signed distance of a point.
     pub fn value(&self, point: &Point) -> f64 {
         self.normal.dot(&(point - self.point))
+    }
+
+    /// Whether a point is on the side that the normal points to.
+    fn is_positive(&self, point: &Point) -> bool {
+        self.value(point) > 0.0
+    }
+
+    /// The samples behind it and in front of it.
+    fn split<'a>(&self, samples: &[&'a Sample]) -> [Vec<&'a Sample>; 2] {
+        let (positive, negative) = samples.iter().partition(|sample| self.is_positive(&sample.point));
+        [negative, positive]
     }
 
     /// How bad it is to pass a spot as near as it does: nothing where it keeps away, or goes right through.
@@ -68,12 +81,30 @@ pub struct Cuts {
     pub leaves: Vec<Vec<Half>>,
 }
 
+impl Half {
+    /// How far inside a point is.
+    fn depth(self, planes: &[CutPlane], point: &Point) -> f64 {
+        let value = planes[self.plane].value(point);
+        if self.positive { value } else { -value }
+    }
+
+    /// Whether a point belongs to it; those on the plane do to the side that the normal points away from.
+    fn holds(self, planes: &[CutPlane], point: &Point) -> bool {
+        planes[self.plane].is_positive(point) == self.positive
+    }
+}
+
 impl Cuts {
     /// The piece that a point lies in; of several, where it lies on a plane, the first.
     pub fn leaf_of(&self, point: &Point) -> usize {
-        let holds = |half: &Half| (self.planes[half.plane].value(point) > 0.0) == half.positive;
-        let found = self.leaves.iter().position(|leaf| leaf.iter().all(holds));
-        found.expect("the pieces fill space")
+        let holds = |leaf: &Vec<Half>| leaf.iter().all(|half| half.holds(&self.planes, point));
+        self.leaves.iter().position(holds).expect("the pieces fill space")
+    }
+
+    /// The pieces that one of some points is in, or is no further from than `room`.
+    pub fn leaves_near(&self, points: &[Point], room: f64) -> impl Iterator<Item = usize> {
+        let reaches = move |half: &Half| points.iter().any(|point| half.depth(&self.planes, point) > -room);
+        (0..self.leaves.len()).filter(move |&leaf| self.leaves[leaf].iter().all(reaches))
     }
 
     /// The pieces that planes make one after the other: each cuts all pieces that have evidence on both sides of it.
@@ -83,13 +114,14 @@ impl Cuts {
             leaves = leaves
                 .into_iter()
                 .flat_map(|(halves, samples)| {
-                    let (positive, negative): (Vec<&Sample>, Vec<&Sample>) =
-                        samples.into_iter().partition(|sample| cut.value(&sample.point) > 0.0);
+                    let [negative, positive] = cut.split(&samples);
                     if positive.is_empty() || negative.is_empty() {
-                        return vec![(halves, [positive, negative].concat())];
+                        return vec![(halves, samples)];
                     }
-                    let with = |positive| [halves.as_slice(), &[Half { plane, positive }]].concat();
-                    vec![(with(false), negative), (with(true), positive)]
+                    vec![
+                        (with_half(&halves, plane, false), negative),
+                        (with_half(&halves, plane, true), positive),
+                    ]
                 })
                 .collect();
         }
@@ -244,14 +276,18 @@ struct Piece<'a> {
 
 impl<'a> Piece<'a> {
     fn cut(&self, plane: &CutPlane, index: usize) -> [Self; 2] {
-        let (positive, negative): (Vec<&Sample>, Vec<&Sample>) =
-            self.samples.iter().partition(|sample| plane.value(&sample.point) > 0.0);
+        let [negative, positive] = plane.split(&self.samples);
         let child = |samples, positive, parts| {
-            let halves = [self.halves.as_slice(), &[Half { plane: index, positive }]].concat();
+            let halves = with_half(&self.halves, index, positive);
             Piece { halves, samples, parts }
         };
         let less = self.parts / 2;
         [child(negative, false, less), child(positive, true, self.parts - less)]
+    }
+
+    /// The share of the samples that is to be behind the next plane.
+    fn share(&self) -> f64 {
+        f64::from(self.parts / 2) / f64::from(self.parts)
     }
 
     fn best_plane(&self, cuts: &Cuts, evidence: &Evidence, settings: &Settings) -> CutPlane {
@@ -286,8 +322,8 @@ impl<'a> Piece<'a> {
     /// Whether a plane leaves about the wanted shares on both sides.
     fn shares(&self, plane: &CutPlane, allowance: f64) -> bool {
         let count = self.samples.len() as f64;
-        let negative = self.samples.iter().filter(|sample| plane.value(&sample.point) <= 0.0).count() as f64;
-        let share = f64::from(self.parts / 2) / f64::from(self.parts);
+        let negative = self.samples.iter().filter(|sample| !plane.is_positive(&sample.point)).count() as f64;
+        let share = self.share();
         (negative / count - share).abs() <= allowance * share
     }
 
@@ -295,11 +331,9 @@ impl<'a> Piece<'a> {
     fn meeting_points(&self, cuts: &Cuts, before: &[CutPlane], beside: &[CutPlane]) -> Vec<Spot> {
         let planes: Vec<&CutPlane> = before.iter().chain(beside).collect();
         let near = self.samples.iter().map(|sample| sample.near).sum::<f64>() / self.samples.len() as f64;
-        let bounds =
-            crate::kernel::tree::bounds(&self.samples.iter().map(|sample| sample.point).collect::<Vec<_>>());
+        let bounds = self.bounds();
         let touches = |point: &Point| {
-            let sign = |half: &Half| if half.positive { 1.0 } else { -1.0 };
-            let beside = |half: &Half| sign(half) * cuts.planes[half.plane].value(point) > -near;
+            let beside = |half: &Half| half.depth(&cuts.planes, point) > -near;
             let inside = (0..3).all(|k| point[k] > bounds.min[k] - near && point[k] < bounds.max[k] + near);
             inside && self.halves.iter().all(beside)
         };
@@ -316,7 +350,7 @@ impl<'a> Piece<'a> {
     }
 
     fn holds(&self, cuts: &Cuts, point: &Point) -> bool {
-        self.halves.iter().all(|half| (cuts.planes[half.plane].value(point) > 0.0) == half.positive)
+        self.halves.iter().all(|half| half.holds(&cuts.planes, point))
     }
 
     /// Unit normals of the planes to try.
@@ -330,15 +364,14 @@ impl<'a> Piece<'a> {
                 [axes(), self.principal_axes(), random_directions(settings.tries, seed)].concat()
             }
             Candidates::Median => {
-                let extent = |axis: &Vector| {
-                    let along = self.samples.iter().map(|sample| sample.point.coords.dot(axis));
-                    let [low, high] = along
-                        .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)]);
-                    high - low
-                };
-                axes().into_iter().max_by(|a, b| extent(a).total_cmp(&extent(b))).into_iter().collect()
+                let bounds = self.bounds();
+                vec![axes()[(bounds.max - bounds.min).imax()]]
             }
         }
+    }
+
+    fn bounds(&self) -> Aabb {
+        tree::bounds(&self.samples.iter().map(|sample| sample.point).collect::<Vec<_>>())
     }
 
     /// The axes of inertia of the samples.
@@ -361,7 +394,7 @@ impl<'a> Piece<'a> {
     fn places(&self, normal: &Vector, allowance: f64) -> Vec<CutPlane> {
         let mut along: Vec<f64> = self.samples.iter().map(|sample| sample.point.coords.dot(normal)).collect();
         along.sort_unstable_by(f64::total_cmp);
-        let share = f64::from(self.parts / 2) / f64::from(self.parts);
+        let share = self.share();
         // 0, 1, -1, 2, -2, …
         let steps = (0..PLACES).map(|k| if k % 2 == 0 { -k / 2 } else { (k + 1) / 2 });
         let place = |step: i32| {
@@ -394,6 +427,11 @@ impl<'a> Piece<'a> {
         bad += others.spots.iter().map(|spot| plane.crowds(spot)).sum::<f64>();
         Cost { cut: cut.len() as f64, bad }
     }
+}
+
+/// A piece with one half more.
+fn with_half(halves: &[Half], plane: usize, positive: bool) -> Vec<Half> {
+    [halves, &[Half { plane, positive }]].concat()
 }
 
 /// Where three planes meet, unless nearly at no point.

@@ -4,7 +4,8 @@ use super::cut::{CutModel, Face};
 use crate::comm::pack::{put, take};
 use crate::dist::Shared;
 use crate::mesh::{Class, Rank};
-use crate::skin::{Skin, SkinTriangle};
+
+use crate::skin::{Skin, SkinTriangle, sorted_ends};
 use crate::surface::SurfaceMesh;
 use csg::{BodyId, PatchId};
 
@@ -32,7 +33,7 @@ pub fn skins(cut: &CutModel, surface: &SurfaceMesh, parts: usize) -> Result<Vec<
     let mut segments: Vec<([u32; 2], Class)> = surface
         .segments
         .iter()
-        .map(|s| (sorted(s.vertices.map(|v| v.0)), cut.curves[s.curve.index()]))
+        .map(|s| (sorted_ends(s.vertices.map(|v| v.0)), cut.curves[s.curve.index()]))
         .filter(|(_, class)| !matches!(class, Class::Body(_)))
         .collect();
     segments.sort_unstable();
@@ -46,13 +47,10 @@ pub fn skins(cut: &CutModel, surface: &SurfaceMesh, parts: usize) -> Result<Vec<
         used.dedup();
         skin.on_triangles = used.len();
         used.extend(inside.iter().filter(|(_, of)| *of == part).map(|(v, _)| *v));
-        let mut sides: Vec<[u32; 2]> = skin.triangles.iter().flat_map(|t| sides_of(t.vertices)).collect();
-        sides.sort_unstable();
-        sides.dedup();
-        for (k, segment) in segments.iter().enumerate() {
-            if sides.binary_search(&segment.0).is_ok() {
+        for side in skin.sides() {
+            if let Ok(k) = segments.binary_search_by_key(&side, |segment| segment.0) {
                 seen[k] = true;
-                skin.edges.push(*segment);
+                skin.edges.push(segments[k]);
             }
         }
         for (new, &v) in (0..).zip(&used) {
@@ -70,14 +68,6 @@ pub fn skins(cut: &CutModel, surface: &SurfaceMesh, parts: usize) -> Result<Vec<
         skins.push(skin);
     }
     if seen.iter().all(|&seen| seen) { Ok(skins) } else { Err(LooseEdge) }
-}
-
-fn sorted([a, b]: [u32; 2]) -> [u32; 2] {
-    [a.min(b), a.max(b)]
-}
-
-fn sides_of([a, b, c]: [u32; 3]) -> [[u32; 2]; 3] {
-    [[a, b], [b, c], [c, a]].map(sorted)
 }
 
 /// Adds a triangle to the part behind it, and the other way round to the part in front of it, if that is another one.

@@ -2,6 +2,7 @@
 
 use crate::improve::Smoothness;
 use crate::kernel::quality::mean_ratio;
+use crate::kernel::random::Random;
 use crate::mesh::{BoundaryTriangle, Class, Mesh, Segment, TET_FACES, VertexId};
 use crate::{Point, Vector};
 use csg::{BodyId, CurveId, PatchId};
@@ -37,15 +38,6 @@ fn lattice(n: usize) -> Mesh {
         }
     }
     mesh
-}
-
-/// Numbers in [−1, 1) that look random: splitmix64.
-pub(super) fn noise(state: &mut u64) -> f64 {
-    *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    let mut z = *state;
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
 }
 
 /// The faces with one tet, or between two bodies with the lower body's side, and the bodies on both sides.
@@ -87,9 +79,9 @@ pub(super) fn shake(mesh: &mut Mesh, cell: f64, amount: f64, seed: u64) {
             tets_of[v.index()].push(t);
         }
     }
-    let mut state = seed;
+    let mut random = Random::new(seed);
     for (v, tets) in tets_of.iter().enumerate() {
-        let by = Vector::from_fn(|_, _| noise(&mut state)) * (amount * cell);
+        let by = Vector::from_fn(|_, _| 2.0 * random.unit() - 1.0) * (amount * cell);
         if !matches!(mesh.classes[v], Class::Body(_)) {
             continue;
         }

@@ -192,43 +192,73 @@ pub(super) fn corrected(
     }
 }
 
+/// Why there is no surface mesh, or none that can be filled.
+pub(super) enum Unmeshed {
+    /// It takes smaller sizes.
+    Lower(Vec<Source>),
+    Failed(CoarseError),
+}
+
+impl Unmeshed {
+    /// What to do about an error, if sizes may be lowered; `segments` are the ends of those on curves.
+    fn of(error: CoarseError, segments: &[[Point; 2]], size: &dyn SizeField, may_lower: bool) -> Self {
+        let lower = if may_lower { error.remedy(segments, size) } else { Vec::new() };
+        if lower.is_empty() { Self::Failed(error) } else { Self::Lower(lower) }
+    }
+}
+
+impl From<Unmeshed> for Attempt {
+    fn from(unmeshed: Unmeshed) -> Self {
+        match unmeshed {
+            Unmeshed::Lower(sources) => Self::Lower(sources),
+            Unmeshed::Failed(error) => Self::Failed(error),
+        }
+    }
+}
+
+/// Meshes the surface of a geometry; also the ends of the segments on its curves.
+pub(super) fn mesh_surface(
+    model: &CsgModel,
+    size: &dyn SizeField,
+    may_lower: bool,
+) -> Result<(SurfaceMesh, Vec<[Point; 2]>), Unmeshed> {
+    let CsgModel { geometry, features, projector } = model;
+    let curves = mesh_curves(features, projector, size).map_err(|error| Unmeshed::Failed(error.into()))?;
+    let crowded = crowded(&curves, features, size);
+    if may_lower && !crowded.is_empty() {
+        return Err(Unmeshed::Lower(crowded));
+    }
+    let ends = |s: &Segment| s.vertices.map(|v| curves.points[v.index()]);
+    let segments: Vec<[Point; 2]> = curves.segments.iter().map(ends).collect();
+    match surface::mesh_patches(geometry, features, curves, size, &surface::Settings::default()) {
+        Ok((surface, _)) => Ok((surface, segments)),
+        Err(error) => Err(Unmeshed::of(error.into(), &segments, size, may_lower)),
+    }
+}
+
 fn attempt(model: &CsgModel, settings: &CoarseSettings, allowed: Allowed) -> Attempt {
     let CsgModel { geometry, features, projector } = model;
     let own = GeometricSize::new(geometry, features, &settings.size);
     let periodic = PeriodicSize::new(&own, features, settings.size.grading);
     let size: &dyn SizeField = if features.identified.is_empty() { &own } else { &periodic };
-    let curves = match mesh_curves(features, projector, size) {
-        Ok(curves) => curves,
-        Err(error) => return Attempt::Failed(error.into()),
+    let (surface, segments) = match mesh_surface(model, size, allowed.lower) {
+        Ok(made) => made,
+        Err(unmeshed) => return unmeshed.into(),
     };
-    let crowded = crowded(&curves, features, size);
-    if allowed.lower && !crowded.is_empty() {
-        return Attempt::Lower(crowded);
-    }
-    let ends = |s: &Segment| s.vertices.map(|v| curves.points[v.index()]);
-    let segments: Vec<[Point; 2]> = curves.segments.iter().map(ends).collect();
     let regions = |id| [features.patch(id).inside, features.patch(id).outside];
-    let surface = surface::mesh_patches(geometry, features, curves, size, &surface::Settings::default());
-    let filled = match surface {
-        Ok((surface, _)) => {
-            let project = |patch, point: &Point| projector.project_patch(patch, point).unwrap_or(*point);
-            let closeness = settings.size.scaled_closeness();
-            let walls = Walls { mesh: &surface, regions: &regions, project: &project, size, closeness };
-            let (sources, found) = if allowed.thin { thin_walls(&walls) } else { Default::default() };
-            if found.places > 0 {
-                return Attempt::Thin(sources, found);
-            }
-            let smoothness = GeometrySmoothness { geometry, features };
-            fill(surface, regions, size, Some(&smoothness), settings.effort)
+    if allowed.thin {
+        let project = |patch, point: &Point| projector.project_patch(patch, point).unwrap_or(*point);
+        let closeness = settings.size.scaled_closeness();
+        let walls = Walls { mesh: &surface, regions: &regions, project: &project, size, closeness };
+        let (sources, found) = thin_walls(&walls);
+        if found.places > 0 {
+            return Attempt::Thin(sources, found);
         }
-        Err(error) => Err(error.into()),
-    };
-    match filled {
+    }
+    let smoothness = GeometrySmoothness { geometry, features };
+    match fill(surface, regions, size, Some(&smoothness), settings.effort) {
         Ok(made) => Attempt::Made(Box::new(made)),
-        Err(error) => {
-            let lowered = if allowed.lower { error.remedy(&segments, size) } else { Vec::new() };
-            if lowered.is_empty() { Attempt::Failed(error) } else { Attempt::Lower(lowered) }
-        }
+        Err(error) => Unmeshed::of(error, &segments, size, allowed.lower).into(),
     }
 }
 

@@ -1,11 +1,11 @@
 //! Method 1 on all ranks: a geometry cut into pieces, each meshed on its rank.
 
-use super::coarse::{CoarseError, CoarseMesh, MOST_CORRECTIONS};
+use super::coarse::{CoarseError, CoarseMesh, CoarseSettings, MOST_CORRECTIONS, Unmeshed, mesh_surface};
 use super::generate::{CoarseResult, GenerateSettings};
 use super::model::{CsgModel, Model};
 use super::skins::refuse_periodic;
 use super::target::Outcome;
-use super::wanted::mesh_as_wanted;
+use super::wanted::{Wanted, mesh_as_wanted};
 use crate::Point;
 use crate::comm::Communicator;
 use crate::comm::pack::{put, take};
@@ -13,13 +13,13 @@ use crate::decompose::{self, CutModel, CutPlane, Cuts, Evidence};
 use crate::dist::BareMesh;
 use crate::error::{Failure, Status, agree};
 use crate::improve::{self, Effort};
+use crate::kernel::tree::bounds;
 use crate::mesh::{Mesh, Rank, VertexId};
 use crate::partition;
 use crate::progress::Progress;
 use crate::size::{SizeField, Source, SourceTree};
 use crate::skin::{self, PartSizes, Skin};
-use crate::surface::curves::{crowded, mesh_curves};
-use crate::surface::{self, SurfaceMesh};
+use crate::surface::SurfaceMesh;
 use csg::{Aabb, BodyId};
 use std::collections::BTreeSet;
 
@@ -89,7 +89,8 @@ pub fn planned(
     parts: u32,
     model: &Model,
     cuts: &CutSettings,
-    settings: &GenerateSettings,
+    settings: &CoarseSettings,
+    wanted: Wanted,
     progress: &Progress,
 ) -> Result<Planned, Failure> {
     refuse_periodic(Some(model))?;
@@ -99,12 +100,13 @@ pub fn planned(
         ));
     };
     let (pieces, coarse, outcome) =
-        progress.stage("mesh", || mesh_as_wanted(parts, model, &settings.coarse, settings.wanted, &[]))?;
+        progress.stage("mesh", || mesh_as_wanted(parts, model, settings, wanted, &[]))?;
     progress.stage("cut", || {
+        let evidence = Evidence::of(&coarse.mesh, whole, pieces, parts)?;
         let mut settings = cuts.clone();
         for seed in 0..MOST_PLANS {
             settings.plan = decompose::Settings { seed, through_corners: seed == 0, ..settings.plan };
-            let cuts = plan(whole, &coarse.mesh, pieces, parts, &settings)?;
+            let cuts = plan(&evidence, parts, &settings)?;
             match CutModel::new(whole, &cuts, candidates(&coarse.mesh, &cuts)) {
                 Ok(model) => return Ok(Planned { cuts, model, coarse, pieces, outcome }),
                 // Other planes may do.
@@ -131,7 +133,7 @@ fn cut(
     settings: &GenerateSettings,
     progress: &Progress,
 ) -> Result<Cut, Failure> {
-    let planned = planned(parts, model, cuts, settings, progress)?;
+    let planned = planned(parts, model, cuts, &settings.coarse, settings.wanted, progress)?;
     let Planned { cuts, model: pieces_of, coarse: CoarseMesh { mesh, report }, pieces, outcome } = planned;
     let field = model.size_field(&settings.coarse.size);
     let vertex_sizes = skin::at_vertices(&mesh, field.as_deref(), pieces);
@@ -156,18 +158,11 @@ fn centre(mesh: &Mesh, tet: &[VertexId; 4]) -> Point {
 }
 
 /// The planes: the user's, or those that suit the coarse mesh.
-fn plan(
-    whole: &CsgModel,
-    mesh: &Mesh,
-    pieces: u32,
-    parts: u32,
-    settings: &CutSettings,
-) -> Result<Cuts, Failure> {
-    let evidence = Evidence::of(mesh, whole, pieces, parts)?;
+fn plan(evidence: &Evidence, parts: u32, settings: &CutSettings) -> Result<Cuts, Failure> {
     if settings.planes.is_empty() {
-        return decompose::plan(&evidence, parts, &settings.plan).map_err(Failure::input);
+        return decompose::plan(evidence, parts, &settings.plan).map_err(Failure::input);
     }
-    let cuts = Cuts::by_planes(&settings.planes, &evidence);
+    let cuts = Cuts::by_planes(&settings.planes, evidence);
     if cuts.leaves.len() != parts as usize {
         return Err(Failure::input(format!(
             "the planes cut the geometry into {} pieces, for {parts} parts; each plane cuts every piece that it meets",
@@ -186,12 +181,7 @@ fn candidates(mesh: &Mesh, cuts: &Cuts) -> Vec<(usize, BodyId)> {
     for (tet, &body) in mesh.tets.iter().zip(&mesh.bodies) {
         let corners = tet.map(|v| mesh.points[v.index()]);
         let room = BULGE * corners.iter().map(|c| (c - corners[0]).norm()).fold(0.0, f64::max);
-        let reaches = |half: &decompose::Half| {
-            let sign = if half.positive { 1.0 } else { -1.0 };
-            corners.iter().any(|c| sign * cuts.planes[half.plane].value(c) > -room)
-        };
-        let reached = (0..cuts.leaves.len()).filter(|&leaf| cuts.leaves[leaf].iter().all(reaches));
-        found.extend(reached.map(|leaf| (leaf, body)));
+        found.extend(cuts.leaves_near(&corners, room).map(|leaf| (leaf, body)));
     }
     found.into_iter().collect()
 }
@@ -213,39 +203,24 @@ const GRADING: f64 = 0.3;
 
 /// The surface mesh of all pieces. Where it fails for want of room, the sizes are lowered there and it is tried again.
 fn fine_surface(model: &CsgModel, base: &dyn SizeField) -> Result<SurfaceMesh, CoarseError> {
-    let CsgModel { geometry, features, projector } = model;
+    let bounds = model.features.bounds;
     let mut sources: Vec<Source> = Vec::new();
     let mut corrections = 0;
     loop {
-        let diagonal = features.bounds.diagonal();
-        let size = Lowered { base, sources: SourceTree::new(features.bounds, GRADING, diagonal, &sources) };
-        let curves = mesh_curves(features, projector, &size)?;
-        let mut lower = crowded(&curves, features, &size);
-        if lower.is_empty() || corrections == MOST_CORRECTIONS {
-            let ends = |s: &crate::mesh::Segment| s.vertices.map(|v| curves.points[v.index()]);
-            let segments: Vec<[Point; 2]> = curves.segments.iter().map(ends).collect();
-            let made =
-                surface::mesh_patches(geometry, features, curves, &size, &surface::Settings::default());
-            let error = match made {
-                Ok((surface, _)) => return Ok(surface),
-                Err(error) => CoarseError::from(error),
-            };
-            lower = error.remedy(&segments, &size);
-            if lower.is_empty() || corrections == MOST_CORRECTIONS {
-                return Err(error);
-            }
+        let size = Lowered { base, sources: SourceTree::new(bounds, GRADING, bounds.diagonal(), &sources) };
+        match mesh_surface(model, &size, corrections < MOST_CORRECTIONS) {
+            Ok((surface, _)) => return Ok(surface),
+            Err(Unmeshed::Lower(lower)) => sources.extend(lower),
+            Err(Unmeshed::Failed(error)) => return Err(error),
         }
         corrections += 1;
-        sources.extend(lower);
     }
 }
 
 /// Adds the coarse tets near a skin, and the sizes at their vertices.
 fn pack_sizes(message: &mut Vec<u8>, skin: &Skin, mesh: &Mesh, sizes: &[f64]) {
-    let bounds = crate::kernel::tree::bounds(&skin.points);
-    let near = |tet: &&[VertexId; 4]| {
-        meet(&bounds, &crate::kernel::tree::bounds(&tet.map(|v| mesh.points[v.index()])))
-    };
+    let skin_bounds = bounds(&skin.points);
+    let near = |tet: &&[VertexId; 4]| meet(&skin_bounds, &bounds(&tet.map(|v| mesh.points[v.index()])));
     let tets: Vec<&[VertexId; 4]> = mesh.tets.iter().filter(near).collect();
     let mut used: Vec<VertexId> = tets.iter().flat_map(|tet| **tet).collect();
     used.sort_unstable();
@@ -255,14 +230,9 @@ fn pack_sizes(message: &mut Vec<u8>, skin: &Skin, mesh: &Mesh, sizes: &[f64]) {
         let p = mesh.points[v.index()];
         [p.x, p.y, p.z, sizes[v.index()]]
     };
+    let corners: Vec<[u32; 4]> = tets.iter().map(|tet| tet.each_ref().map(place)).collect();
     put(message, &used.iter().map(point).collect::<Vec<_>>());
-    put(
-        message,
-        &tets
-            .iter()
-            .map(|tet| [place(&tet[0]), place(&tet[1]), place(&tet[2]), place(&tet[3])])
-            .collect::<Vec<_>>(),
-    );
+    put(message, &corners);
 }
 
 fn meet(a: &Aabb, b: &Aabb) -> bool {

@@ -61,9 +61,16 @@ pub fn read(
     }
 }
 
+/// A file, whole.
+///
+/// # Errors
+/// With the path: what cannot be read.
+pub fn read_bytes(path: &Path) -> Result<Vec<u8>, Failure> {
+    std::fs::read(path).map_err(|error| Failure::input(format!("cannot read {}: {error}", path.display())))
+}
+
 fn read_csg(path: &Path, note: &mut dyn FnMut(&str)) -> Result<Model, Failure> {
-    let bytes = std::fs::read(path)
-        .map_err(|error| Failure::input(format!("cannot read {}: {error}", path.display())))?;
+    let bytes = read_bytes(path)?;
     let parsed = csg::language::parse_geometry_bytes(&bytes, &path.display().to_string())?;
     parsed.warnings.iter().for_each(|warning| note(&warning.to_string()));
     Model::from_csg(parsed.geometry).map_err(|error| Failure::input(format!("{}: {error}", path.display())))

@@ -98,19 +98,27 @@ pub fn skin(mesh: &DistMesh, projector: &Projector, n: u32) -> Result<LatticeSki
 }
 
 impl Skin {
+    /// The edges of its triangles, ascending.
+    pub fn sides(&self) -> Vec<[u32; 2]> {
+        let of = |t: &SkinTriangle| {
+            let [a, b, c] = t.vertices;
+            [[a, b], [b, c], [c, a]].map(sorted_ends)
+        };
+        let mut sides: Vec<[u32; 2]> = self.triangles.iter().flat_map(of).collect();
+        sides.sort_unstable();
+        sides.dedup();
+        sides
+    }
+
     /// The edges inside bodies, which no triangle has.
     pub fn loose_edges(&self) -> Vec<[u32; 2]> {
-        let mut sides: Vec<[u32; 2]> = Vec::with_capacity(3 * self.triangles.len());
-        for [a, b, c] in self.triangles.iter().map(|t| t.vertices) {
-            sides.extend([[a, b], [b, c], [c, a]].map(sorted));
-        }
-        sides.sort_unstable();
+        let sides = self.sides();
         let is_loose = |edge: &[u32; 2]| sides.binary_search(edge).is_err();
-        self.edges.iter().map(|(ends, _)| sorted(*ends)).filter(is_loose).collect()
+        self.edges.iter().map(|(ends, _)| sorted_ends(*ends)).filter(is_loose).collect()
     }
 }
 
-fn sorted([a, b]: [u32; 2]) -> [u32; 2] {
+pub(crate) fn sorted_ends([a, b]: [u32; 2]) -> [u32; 2] {
     [a.min(b), a.max(b)]
 }
 

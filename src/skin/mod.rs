@@ -21,6 +21,7 @@ mod sizes;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use extract::sorted_ends;
 pub use extract::{LatticeSkin, Skin, SkinTriangle, skin};
 pub use fill::{Filled, fill, fill_or_refine};
 pub use number::number;
