@@ -16,6 +16,9 @@ use tetmill::{Point, check, dist, geometry, memory, mesh, refine};
 #[allow(dead_code)]
 mod fixtures;
 
+mod common;
+
+use common::living_cpu_seconds;
 use fixtures::Fixture;
 use mesh::stream::{MeshStream, TetBlock};
 use rayon::prelude::*;
@@ -79,7 +82,7 @@ fn run(case: &str, coarse: u32, n: u32, bandwidth: f64) {
     let coarse_tets = dist.tets.len();
     let tets = coarse_tets as u64 * u64::from(n).pow(3);
     let row = |stage: &str, start: Start, bytes: u64| {
-        let (wall, cpu) = (start.wall.elapsed().as_secs_f64(), cpu_seconds() - start.cpu);
+        let (wall, cpu) = (start.wall.elapsed().as_secs_f64(), living_cpu_seconds() - start.cpu);
         let peak = peak_bytes();
         println!(
             "| {case} | {coarse_tets} | {n} | {tets} | {stage} | {wall:.2} | {cpu:.2} | {:.1} | {:.0} | {:.1} | {:.0} |",
@@ -154,18 +157,8 @@ struct Start {
 
 impl Start {
     fn now() -> Self {
-        Self { wall: Instant::now(), cpu: cpu_seconds() }
+        Self { wall: Instant::now(), cpu: living_cpu_seconds() }
     }
-}
-
-/// Processor time of all threads so far.
-fn cpu_seconds() -> f64 {
-    let tasks = std::fs::read_dir("/proc/self/task").into_iter().flatten().flatten();
-    let nanoseconds = tasks.filter_map(|task| {
-        let text = std::fs::read_to_string(task.path().join("schedstat")).ok()?;
-        text.split_whitespace().next()?.parse::<f64>().ok()
-    });
-    nanoseconds.sum::<f64>() / 1e9
 }
 
 /// Lets the peak begin anew, where the system can: it would be that of the triad, or of the case before.

@@ -1,11 +1,14 @@
 //! What each of many ranks does, holds and sends: the tables of `docs/scaling.md`.
 //!
 //! `cargo bench --bench scaling [-- GEOMETRY COARSE N]`: a geometry file, the number of its coarse tets, the pieces of an edge. Ranks run in this
-//! process for what they send, counted by a communicator around theirs; for times the parts are refined and checked one after the other
-//! on one thread each, as ranks with a core of their own would.
+//! process for what they send, counted by a communicator around theirs; for times, those of the processor, the parts are refined and checked one
+//! after the other on one thread each, as ranks with a core of their own would.
 #![forbid(unsafe_code)]
 #![allow(missing_docs)]
 
+mod common;
+
+use common::living_cpu_seconds;
 use std::cell::Cell;
 use std::time::Instant;
 use tetmill::comm::{CommError, Communicator, thread};
@@ -162,14 +165,14 @@ fn row(model: &Model, mesh: &Mesh, ranks: u32, n: u32) -> Vec<DistMesh> {
     let (mut refining, mut checking) = (Vec::new(), Vec::new());
     for part in &parts {
         alone.install(|| {
-            let start = Instant::now();
+            let start = living_cpu_seconds();
             let part =
                 refine::refine(part.clone(), &projector, n, &refine::Settings::default()).expect("refinable");
-            refining.push(start.elapsed().as_secs_f64());
-            let start = Instant::now();
+            refining.push(living_cpu_seconds() - start);
+            let start = living_cpu_seconds();
             let report = check::check_part(&part, Some(&projector), &check::Settings::default());
             let _ = check::checksum(&part);
-            checking.push(start.elapsed().as_secs_f64());
+            checking.push(living_cpu_seconds() - start);
             assert_eq!(report.faults, 0);
         });
     }

@@ -254,6 +254,9 @@ impl fmt::Display for Report {
                 coarse.illegal_repaired, coarse.illegal_left
             )?;
         }
+        if coarse.bent_edges > 0 {
+            writeln!(f, "           {} edges bent for better refined tets", grouped(coarse.bent_edges))?;
+        }
         write_thin_walls(f, coarse)?;
         let mesh = &self.mesh;
         writeln!(

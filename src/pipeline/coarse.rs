@@ -6,6 +6,7 @@ use crate::improve::{self, Effort, GeometrySmoothness, Smoothness};
 use crate::kernel::quality::QualitySummary;
 use crate::mesh::{Class, Mesh, Segment, VertexId, are_sides};
 use crate::periodic::PeriodicSize;
+use crate::refine::Bends;
 use crate::size::{GeometricSize, SizeField, SizeSettings, Source};
 use crate::surface::closeness::{ThinWalls, Walls, thin_walls};
 use crate::surface::curves::{CurveError, crowded, mesh_curves};
@@ -94,6 +95,8 @@ pub struct CoarseReport {
     /// Times the mesh was made anew with smaller sizes where surfaces came too near each other, or where
     /// refined tets would have been inverted.
     pub size_corrections: u64,
+    /// Edges that refinement bends, so that refined tets are not inverted, or better.
+    pub bent_edges: u64,
     /// Walls in which the sizes were lowered since they are thin.
     pub thin_walls: ThinWalls,
 }
@@ -125,6 +128,8 @@ fn effort_for(tets: usize) -> Effort {
 pub struct CoarseMesh {
     /// The mesh.
     pub mesh: Mesh,
+    /// What refinement has to bend, by the ids that distribution gives edges.
+    pub bends: Bends,
     /// Its numbers.
     pub report: CoarseReport,
 }
@@ -288,7 +293,7 @@ pub(super) fn fill(
         steiner_points: volume.steiner_inside as u64,
         ..CoarseReport::default()
     };
-    Ok(CoarseMesh { mesh, report })
+    Ok(CoarseMesh { mesh, report, bends: Bends::default() })
 }
 
 /// Fills the bodies inside a surface mesh.

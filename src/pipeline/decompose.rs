@@ -17,6 +17,7 @@ use crate::kernel::tree::bounds;
 use crate::mesh::{Mesh, Rank, VertexId};
 use crate::partition;
 use crate::progress::Progress;
+use crate::refine::Bends;
 use crate::size::{SizeField, Source, SourceTree};
 use crate::skin::{self, PartSizes, Skin};
 use crate::surface::SurfaceMesh;
@@ -134,7 +135,8 @@ fn cut(
     progress: &Progress,
 ) -> Result<Cut, Failure> {
     let planned = planned(parts, model, cuts, &settings.coarse, settings.wanted, progress)?;
-    let Planned { cuts, model: pieces_of, coarse: CoarseMesh { mesh, report }, pieces, outcome } = planned;
+    let Planned { cuts, model: pieces_of, coarse: CoarseMesh { mesh, report, .. }, pieces, outcome } =
+        planned;
     let field = model.size_field(&settings.coarse.size);
     let vertex_sizes = skin::at_vertices(&mesh, field.as_deref(), pieces);
     let sizes = PartSizes::new(mesh.points.clone(), mesh.tets.clone(), vertex_sizes.clone());
@@ -149,7 +151,7 @@ fn cut(
     let boundary = surface.triangles.iter().filter(|t| pieces_of.is_old(t.patch)).count() as u64;
     let assigned: Vec<Rank> = mesh.tets.iter().map(|tet| cuts.leaf_of(&centre(&mesh, tet)) as Rank).collect();
     let partition = partition::assess(&mesh, &assigned, parts).map_err(no_mesh)?;
-    let coarse = CoarseResult { mesh, parts: assigned, report, outcome, partition };
+    let coarse = CoarseResult { mesh, bends: Bends::default(), parts: assigned, report, outcome, partition };
     Ok(Cut { pieces, coarse, messages, boundary })
 }
 

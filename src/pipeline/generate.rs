@@ -21,7 +21,7 @@ use crate::migrate::BareStream;
 use crate::partition::{self, Metrics};
 use crate::periodic::{self, PeriodicMap};
 use crate::progress::Progress;
-use crate::refine::{self, RefineError, RefinedMesh};
+use crate::refine::{self, Bends, RefineError, RefinedMesh};
 use crate::size::Source;
 
 /// What becomes of the parts of a coarse mesh.
@@ -56,6 +56,8 @@ pub struct GenerateSettings {
 pub struct CoarseResult {
     /// The coarse mesh, and the part of each of its tets.
     pub mesh: Mesh,
+    /// The edges that refinement bends.
+    pub bends: Bends,
     /// The part of each tet.
     pub parts: Vec<Rank>,
     /// Its numbers.
@@ -133,7 +135,9 @@ pub fn generate(
             return fill(comm, Parts { model, coarse, dist, projector, names, pieces }, settings, progress);
         }
         let keep = room::what_fits(comm, &dist, pieces, settings.memory, progress)?;
-        let survey = progress.stage("levels", || survey(comm, &dist, &projector, pieces))?;
+        let bends = broadcast_bends(comm, coarse.as_ref().map(|(_, made)| &made.bends))?;
+        let how = refine::Settings { bends, ..refine::Settings::default() };
+        let survey = progress.stage("levels", || survey(comm, &dist, &projector, pieces, &how))?;
         let mut levels = match survey {
             Surveyed::Sound(levels) => levels,
             Surveyed::Inverted(bad, _) if round < MOST_ROUNDS => {
@@ -142,7 +146,7 @@ pub fn generate(
             }
             Surveyed::Inverted(_, error) => return Err(error),
         };
-        let how = refine::Settings { keep, ..refine::Settings::default() };
+        let how = refine::Settings { keep, ..how };
         // Until the last rank is done.
         let (refined, bad) = progress.stage("refine", || {
             let refined = refine::refine(dist, &projector, pieces, &how);
@@ -273,12 +277,13 @@ fn survey(
     dist: &DistMesh,
     projector: &Projector,
     pieces: u32,
+    how: &refine::Settings,
 ) -> Result<Surveyed, Failure> {
     let odd = pieces >> pieces.trailing_zeros();
     let doubled = (0..pieces.trailing_zeros()).map(|k| odd << k);
     let mut levels = Vec::new();
     for n in (odd > 1).then_some(1).into_iter().chain(doubled) {
-        let refined = refine::refine(dist.clone(), projector, n, &refine::Settings::default());
+        let refined = refine::refine(dist.clone(), projector, n, how);
         let bad = inverted_anywhere(comm, &refined)?;
         let part = match agree(comm, refined.map_err(Failure::from)) {
             Err(error) if !bad.is_empty() => return Ok(Surveyed::Inverted(bad, error)),
@@ -302,8 +307,8 @@ fn coarse_mesh(
         .stage("mesh", || mesh_as_wanted(parts, model, &settings.coarse, settings.wanted, sources))?;
     let (assigned, metrics) = progress
         .stage("partition", || partition::partition(&made.mesh, parts, &partition::Settings::default()))?;
-    let CoarseMesh { mesh, report } = made;
-    Ok((pieces, CoarseResult { mesh, parts: assigned, report, outcome, partition: metrics }))
+    let CoarseMesh { mesh, bends, report } = made;
+    Ok((pieces, CoarseResult { mesh, bends, parts: assigned, report, outcome, partition: metrics }))
 }
 
 /// **Collective.** What is periodic in the coarse mesh that rank 0 has.
@@ -351,6 +356,15 @@ fn broadcast_pieces(comm: &dyn Communicator, pieces: Option<u32>) -> Result<u32,
     let mut pieces = vec![pieces.unwrap_or(1)];
     comm.broadcast(0, &mut pieces)?;
     Ok(pieces[0])
+}
+
+/// **Collective.** The bent edges that rank 0 knows.
+fn broadcast_bends(comm: &dyn Communicator, bends: Option<&Bends>) -> Result<Bends, Failure> {
+    let (mut ids, mut middles): (Vec<GlobalId>, Vec<[f64; 3]>) =
+        bends.map(|bends| bends.edges().iter().copied().unzip()).unwrap_or_default();
+    comm.broadcast(0, &mut ids)?;
+    comm.broadcast(0, &mut middles)?;
+    Ok(ids.into_iter().zip(middles).collect())
 }
 
 /// **Collective.** The names and the surfaces that rank 0 has read.

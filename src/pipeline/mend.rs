@@ -1,11 +1,12 @@
-//! Coarse meshes whose snapped lattices are valid: where a child would be inverted, the sizes are lowered.
+//! Coarse meshes whose snapped lattices are valid: where a child would be inverted or poor, the sizes are lowered; what then remains is mended by
+//! bending edges.
 
 use super::coarse::{CoarseError, CoarseMesh};
 use super::model::Model;
 use crate::dist::{self, DistError};
 use crate::geometry::Projector;
 use crate::mesh::{GlobalId, Mesh, TET_EDGES};
-use crate::refine::{self, Least, RefineError, Trial};
+use crate::refine::{self, Bends, Least, RefineError, Trial};
 use crate::size::Source;
 
 /// Why no coarse mesh was found that can be refined.
@@ -41,9 +42,16 @@ const GOOD: f64 = 0.35;
 /// Tets around an inverted child are asked to be smaller by this.
 const LOWERED: f64 = 0.6;
 
+/// What worst children must have more than what is asked for not to be worked on again, and what is enough, when edges are bent: in
+/// mean ratio, and in units of the regular tet's angle.
+const BENT: [f64; 2] = [0.01, 0.03];
+
+/// So many tets at most are worth bending edges around: each takes a tenth of a second.
+const MOST_BENT: usize = 100;
+
 /// Makes coarse meshes with `make`, which is given the places where sizes must be lowered, until the lattice
-/// of `pieces` an edge has no inverted child, and no poor one. Where poor ones stay, the best of the meshes is taken. What `make`
-/// says of its mesh is passed on.
+/// of `pieces` an edge has no inverted child, and no poor one. Where some stay, the best of the meshes is taken and edges are bent.
+/// What `make` says of its mesh is passed on.
 ///
 /// # Errors
 /// What failed in the end.
@@ -53,7 +61,7 @@ pub fn refinable<T>(
     mut make: impl FnMut(&[Source]) -> Result<(CoarseMesh, T), CoarseError>,
 ) -> Result<(CoarseMesh, T), MendError> {
     let mut sources = Vec::new();
-    let mut best: Option<(f64, (CoarseMesh, T))> = None;
+    let mut best: Option<(Trial, (CoarseMesh, T))> = None;
     for round in 0.. {
         let mut made = make(&sources)?;
         made.0.report.size_corrections += round;
@@ -65,20 +73,31 @@ pub fn refinable<T>(
             if tried.poor.is_empty() {
                 return Ok(made);
             }
-            if best.as_ref().is_none_or(|(angle, _)| tried.smallest_dihedral > *angle) {
-                best = Some((tried.smallest_dihedral, made));
+            if best.as_ref().is_none_or(|(before, _)| tried.smallest_dihedral > before.smallest_dihedral) {
+                best = Some((tried, made));
             }
+        } else if round == MOST_ROUNDS {
+            let mut coarse = made.0;
+            bend(model, &mut coarse, &tried, pieces.min(TRIED_PIECES))?;
+            return match tried.error {
+                Some(error) if coarse.bends.is_empty() => Err(error.into()),
+                _ => Ok((coarse, made.1)),
+            };
         }
         if round >= POOR_ROUNDS
-            && let Some((_, made)) = best
+            && let Some((tried, mut made)) = best
         {
+            bend(model, &mut made.0, &tried, pieces.min(TRIED_PIECES))?;
             return Ok(made);
-        }
-        if let Some(error) = tried.error.filter(|_| round == MOST_ROUNDS) {
-            return Err(error.into());
         }
     }
     unreachable!("the loop ends by itself")
+}
+
+/// What is wanted of the children of a coarse mesh.
+fn least(coarse: &CoarseMesh) -> Least {
+    let quality = &coarse.report.quality;
+    Least { mean_ratio: KEPT * quality.worst_refined.min(GOOD), dihedral: KEPT * quality.smallest_dihedral }
 }
 
 /// What refinement would make of a coarse mesh.
@@ -89,12 +108,26 @@ fn try_out(model: &Model, coarse: &CoarseMesh, pieces: u32) -> Result<Trial, Men
         return Ok(Trial::default());
     }
     let part = dist::from_serial(coarse.mesh.clone())?;
-    let quality = &coarse.report.quality;
-    let least = Least {
-        mean_ratio: KEPT * quality.worst_refined.min(GOOD),
-        dihedral: KEPT * quality.smallest_dihedral,
-    };
-    Ok(refine::trial(&part, &projector, pieces, least)?)
+    Ok(refine::trial(&part, &projector, pieces, &coarse.bends, least(coarse))?)
+}
+
+/// Bends edges of a coarse mesh for which a trial found bad children, if that makes the worst of them better.
+fn bend(model: &Model, coarse: &mut CoarseMesh, before: &Trial, pieces: u32) -> Result<(), MendError> {
+    if before.poor.len() + before.inverted.len() > MOST_BENT {
+        return Ok(());
+    }
+    let part = dist::from_serial(coarse.mesh.clone())?;
+    let [margin, enough] = BENT;
+    let settings =
+        refine::mend::Settings { pieces, least: least(coarse), margin, enough, ..Default::default() };
+    coarse.bends = refine::mend(&part, &model.projector(), &settings)?.bends;
+    let after = try_out(model, coarse, pieces)?;
+    let is_better = after.poor.is_empty() || after.smallest_dihedral > before.smallest_dihedral;
+    if !after.inverted.is_empty() || !is_better {
+        coarse.bends = Bends::default();
+    }
+    coarse.report.bent_edges = coarse.bends.edges().len() as u64;
+    Ok(())
 }
 
 /// Sources that ask for smaller tets where these are: at their corners and the middles of their edges, as

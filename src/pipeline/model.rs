@@ -154,6 +154,6 @@ impl GivenMesh {
             quality: QualitySummary::of(&mesh),
             ..CoarseReport::default()
         };
-        CoarseMesh { mesh, report }
+        CoarseMesh { mesh, report, ..CoarseMesh::default() }
     }
 }

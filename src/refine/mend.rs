@@ -16,11 +16,12 @@
 use super::bend::Bends;
 use super::snap::{self, Coordinates};
 use super::tet::BadTet;
-use super::trial::{CHUNK, curved, worst_child};
+use super::trial::{CHUNK, Least, curved, worst_children};
 use super::{RefineError, RefinedMesh, Settings as RefineSettings, refine_unchecked};
 use crate::dist::DistMesh;
 use crate::geometry::Projector;
 use crate::mesh::{EdgeId, GlobalId, TetId};
+use rayon::prelude::*;
 use std::collections::BTreeSet;
 
 /// How to mend.
@@ -31,15 +32,19 @@ pub struct Settings {
     pub pieces: u32,
     /// Rounds over the bad tets.
     pub rounds: u32,
-    /// Mean ratio below which the worst child of a tet is worked on again in the next round.
+    /// What children must be better than. With zeros: positive.
+    pub least: Least,
+    /// A tet whose worst child is not better by so much is worked on again in the next round. In mean ratio, or in angle: in units of the
+    /// regular tet's.
     pub margin: f64,
-    /// Mean ratio of the worst child from which on a bend need not become better.
+    /// A bend need not make the worst child better by more than this, likewise.
     pub enough: f64,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { pieces: 8, rounds: 8, margin: 0.05, enough: 0.2 }
+        let least = Least { mean_ratio: 0.0, dihedral: 0.0 };
+        Self { pieces: 8, rounds: 8, least, margin: 0.05, enough: 0.2 }
     }
 }
 
@@ -48,7 +53,7 @@ impl Default for Settings {
 pub struct Mended {
     /// The edges to be bent, for [`Settings::bends`](super::Settings::bends) on all ranks.
     pub bends: Bends,
-    /// Coarse tets with children that were not positive in the first, coarser trial, ascending.
+    /// Coarse tets with children that were not good enough in the first, coarser trial, ascending.
     pub before: Vec<GlobalId>,
     /// Those that have some in the last trial, ascending.
     pub left: Vec<GlobalId>,
@@ -65,14 +70,13 @@ const COARSEST: u32 = 5;
 /// a hundredth the children change less than by what counts as enough.
 const STEPS: [f64; 2] = [0.12, 0.01];
 
-/// *Local, on the whole mesh.* Finds bends of interior edges with which the children of all tets are positive, or of as
-/// many as it can.
+/// *Local, on the whole mesh.* Finds bends of edges with which the children of all tets are good enough, or of as many as it can.
 ///
 /// # Errors
 /// Vertices that cannot be snapped, and memory, as [`refine()`](super::refine()).
 pub fn mend(mesh: &DistMesh, projector: &Projector, settings: &Settings) -> Result<Mended, RefineError> {
     let mut trial = Trial { mesh, projector, settings, pieces: settings.pieces, bends: Bends::default() };
-    let mut tried: BTreeSet<u32> = curved(mesh, projector).into_iter().collect();
+    let mut tried: BTreeSet<u32> = curved(mesh, projector, &Bends::default()).into_iter().collect();
     let mut before: Option<Vec<GlobalId>> = None;
     let mut left = Vec::new();
     for pieces in ladder(settings.pieces) {
@@ -111,16 +115,24 @@ impl Trial<'_> {
         tets.iter().map(|&tet| self.mesh.tet_ids[tet as usize]).collect()
     }
 
-    /// Those of some tets, ascending, that have children which are not positive.
+    /// Those of some tets, ascending, that have children which are not good enough.
     fn bad(&self, tets: &BTreeSet<u32>) -> Result<Vec<u32>, RefineError> {
         let mut bad = Vec::new();
         for chunk in Vec::from_iter(tets.iter().copied()).chunks(CHUNK) {
-            let part = extract(self.mesh, chunk);
-            let (_, found) = self.refine(part)?;
-            let local = |tet| self.mesh.tet_ids.binary_search(&tet).expect("a tet of the mesh") as u32;
-            bad.extend(found.iter().map(|b| local(b.tet)));
+            let (refined, inverted) = self.refine(extract(self.mesh, chunk))?;
+            let is_inverted = |id| inverted.binary_search_by_key(&id, |bad| bad.tet).is_ok();
+            let is_bad = |at: &usize| {
+                is_inverted(self.mesh.tet_ids[chunk[*at] as usize]) || self.excess(&refined, *at) <= 0.0
+            };
+            let found: Vec<usize> = (0..chunk.len()).into_par_iter().filter(is_bad).collect();
+            bad.extend(found.into_iter().map(|at| chunk[at]));
         }
         Ok(bad)
+    }
+
+    /// By how much the worst child of a tet is better than it must be.
+    fn excess(&self, refined: &RefinedMesh, tet: usize) -> f64 {
+        self.settings.least.excess(&worst_children(refined, tet))
     }
 
     /// Bends the edges of bad tets, round by round; returns all tets whose shape that changes.
@@ -148,10 +160,10 @@ impl Trial<'_> {
         Ok(touched)
     }
 
-    /// Those of some tets, ascending, whose worst child is not clearly positive.
+    /// Those of some tets, ascending, whose worst child is not clearly good enough.
     fn poor(&self, tets: &[u32]) -> Result<Vec<u32>, RefineError> {
         let (refined, _) = self.refine(extract(self.mesh, tets))?;
-        let is_poor = |at: &usize| worst_child(&refined, *at) < self.settings.margin;
+        let is_poor = |at: &usize| self.excess(&refined, *at) < self.settings.margin;
         Ok((0..tets.len()).filter(is_poor).map(|at| tets[at]).collect())
     }
 
@@ -175,13 +187,13 @@ impl Trial<'_> {
     }
 
     /// How bad the children of the tets of a part are: for each tet the square by which its worst child falls short of
-    /// good enough, and one more if that is not even positive.
+    /// what is enough, and one more if that is not good enough at all.
     fn badness(&self, part: &DistMesh) -> Result<f64, RefineError> {
         let (refined, _) = self.refine(part.clone())?;
         let of_tet = |tet| {
-            let worst = worst_child(&refined, tet);
-            let short = f64::max(self.settings.enough - worst, 0.0);
-            if worst > 0.0 { short * short } else { 1.0 + short * short }
+            let excess = self.excess(&refined, tet);
+            let short = f64::max(self.settings.enough - excess, 0.0);
+            if excess > 0.0 { short * short } else { 1.0 + short * short }
         };
         Ok((0..part.tets.len()).map(of_tet).sum())
     }

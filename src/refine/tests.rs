@@ -343,6 +343,26 @@ fn bent_edges_make_room_beside_a_hollow_sphere() {
 }
 
 #[test]
+fn bent_edges_make_angles_larger_that_are_too_small() {
+    let fixture = shell(1.0, 2.6);
+    let coarse = whole(&fixture.mesh);
+    let tried = |bends: &Bends, dihedral: f64| {
+        let least = Least { mean_ratio: 0.0, dihedral };
+        trial(&coarse, &fixture.projector, 8, bends, least).expect("projects")
+    };
+    let before = tried(&Bends::default(), 90.0);
+    assert!(before.inverted.is_empty());
+    let wanted = before.smallest_dihedral + 1.0;
+    let least = Least { mean_ratio: 0.0, dihedral: wanted };
+    let settings = mend::Settings { pieces: 8, least, margin: 0.01, enough: 0.03, ..Default::default() };
+    let mended = mend(&coarse, &fixture.projector, &settings).expect("projects");
+    assert!(!mended.before.is_empty());
+    assert!(mended.left.is_empty(), "{:?}", mended.left);
+    let after = tried(&mended.bends, wanted);
+    assert!(after.inverted.is_empty() && after.poor.is_empty(), "{:?}", after.poor);
+}
+
+#[test]
 fn a_sound_mesh_needs_no_mending() {
     let fixture = cylinder(2);
     let mended = mend(&whole(&fixture.mesh), &fixture.projector, &mend::Settings::default());

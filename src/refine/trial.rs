@@ -23,6 +23,18 @@ pub struct Least {
     pub dihedral: f64,
 }
 
+/// The dihedral angles of the regular tet, degrees.
+const REGULAR: f64 = 70.528_779_365_509_31;
+
+impl Least {
+    /// By how much the worst children are better than this: the lesser of what they have more in mean ratio, and in dihedral angle in
+    /// units of the regular tet's.
+    pub(super) fn excess(&self, worst: &Extremes) -> f64 {
+        let dihedral = worst.smallest.clamp(-1.0, 1.0).acos().to_degrees();
+        f64::min(worst.mean_ratio - self.mean_ratio, (dihedral - self.dihedral) / REGULAR)
+    }
+}
+
 /// What a trial found.
 #[derive(Clone, Debug, Default)]
 pub struct Trial {
@@ -36,8 +48,8 @@ pub struct Trial {
     pub error: Option<RefineError>,
 }
 
-/// *Local, on the whole mesh.* Refines the coarse tets that snapping bends, to `pieces` an edge, and finds those with a child below
-/// `least`.
+/// *Local, on the whole mesh.* Refines the coarse tets that snapping or `bends` bend, to `pieces` an edge, and finds those with a child
+/// below `least`.
 ///
 /// # Errors
 /// Vertices that cannot be snapped, and memory, as [`refine()`](super::refine()).
@@ -45,20 +57,20 @@ pub fn trial(
     mesh: &DistMesh,
     projector: &Projector,
     pieces: u32,
+    bends: &Bends,
     least: Least,
 ) -> Result<Trial, RefineError> {
     let mut found = Trial::default();
-    let settings = Settings::default();
+    let settings = Settings { bends: bends.clone(), ..Settings::default() };
     let mut worst_of_poor = Extremes::NONE;
-    let cosine = least.dihedral.to_radians().cos();
-    for chunk in curved(mesh, projector).chunks(CHUNK) {
+    for chunk in curved(mesh, projector, bends).chunks(CHUNK) {
         let (refined, bad) = refine_unchecked(extract(mesh, chunk), projector, pieces, &settings)?;
         let id = |at: usize| mesh.tet_ids[chunk[at] as usize];
         found.inverted.extend(bad.iter().map(|bad| bad.tet));
         let worst: Vec<Extremes> =
             (0..chunk.len()).into_par_iter().map(|at| worst_children(&refined, at)).collect();
-        let is_below = |worst: &Extremes| worst.mean_ratio < least.mean_ratio || worst.smallest > cosine;
-        let is_poor = |at: &usize| is_below(&worst[*at]) && found.inverted.binary_search(&id(*at)).is_err();
+        let is_poor =
+            |at: &usize| least.excess(&worst[*at]) < 0.0 && found.inverted.binary_search(&id(*at)).is_err();
         let poor: Vec<usize> = (0..chunk.len()).filter(is_poor).collect();
         worst_of_poor = poor.iter().fold(worst_of_poor, |all, &at| all.with(worst[at]));
         found.poor.extend(poor.into_iter().map(id));
@@ -73,18 +85,13 @@ pub fn trial(
 }
 
 /// The tets whose lattices are not affine, ascending.
-pub(super) fn curved(mesh: &DistMesh, projector: &Projector) -> Vec<u32> {
-    let is_curved = |tet: &u32| !snap::is_flat(mesh, projector, &Bends::default(), TetId(*tet));
+pub(super) fn curved(mesh: &DistMesh, projector: &Projector, bends: &Bends) -> Vec<u32> {
+    let is_curved = |tet: &u32| !snap::is_flat(mesh, projector, bends, TetId(*tet));
     (0..mesh.tets.len() as u32).filter(is_curved).collect()
 }
 
-/// The worst mean ratio of the children of a coarse tet.
-pub(super) fn worst_child(refined: &RefinedMesh, tet: usize) -> f64 {
-    worst_children(refined, tet).mean_ratio
-}
-
 /// The worst mean ratio and the most extreme angles of the children of a coarse tet.
-fn worst_children(refined: &RefinedMesh, tet: usize) -> Extremes {
+pub(super) fn worst_children(refined: &RefinedMesh, tet: usize) -> Extremes {
     let (mut block, mut batch, mut shapes) = (TetBlock::default(), Batch::default(), Shapes::default());
     refined.tet_block(tet, &mut block);
     let points = refined.points();
