@@ -17,7 +17,6 @@ use tetmill::comm::{Communicator, grouped, mpi, thread};
 use tetmill::error::{Failure, Status, agree};
 use tetmill::inspect::Inspection;
 use tetmill::io::{self, Written, elmer};
-use tetmill::kernel::random::mix;
 use tetmill::mesh::Names;
 use tetmill::mesh::stream::MeshStream;
 use tetmill::pipeline::input::{self, InputSettings};
@@ -25,9 +24,9 @@ use tetmill::pipeline::part::{Balance, balance};
 use tetmill::pipeline::target::Outcome;
 use tetmill::pipeline::{self, CoarseSettings, Disk, GenerateSettings, Generated, Model, Wanted, generate};
 use tetmill::progress::Progress;
-use tetmill::report::{LevelReport, MeshReport, PartitionReport, Report};
+use tetmill::report::{LevelReport, MeshReport, PartitionReport, Processes, Report, processes};
 use tetmill::size::{Closeness, SizeSettings, file};
-use tetmill::{memory, picture, quality};
+use tetmill::{picture, quality};
 
 /// `tetmill generate`
 pub fn run_generate(options: &Generate) -> Result<(), Failure> {
@@ -129,12 +128,11 @@ fn generate_on(comm: &dyn Communicator, options: &Generate, start: Instant) -> R
         None => {}
     }
     let balanced = balance(comm, made.part.stream())?;
-    let memory = total_memory(comm)?;
+    let took = processes(comm)?;
     let Some(model) = model else { return Ok(()) };
-    let mut report = summary(&model, &name_of(&options.input), &made, comm.size(), balanced);
+    let mut report = summary(&model, &name_of(&options.input), &made, took, comm.size(), balanced);
     report.stages = progress.finish();
     report.seconds = start.elapsed().as_secs_f64();
-    report.peak_memory = memory;
     report.add_written(written);
     tell(&report, options.run.report.as_deref(), options.run.quiet, wanted_count(options))
 }
@@ -288,18 +286,14 @@ fn draw(
     agree(comm, drawn.map_err(Failure::from))
 }
 
-/// **Collective.** Peak memory of all processes that ranks run in, each once.
-fn total_memory(comm: &dyn Communicator) -> Result<Option<u64>, Failure> {
-    let machine = memory::machine().bytes().fold(0, |hash, byte| mix(hash ^ u64::from(byte)));
-    let bytes = memory::peak_bytes().unwrap_or(0);
-    let mut all = comm.all_gather_one([machine, u64::from(std::process::id()), bytes])?;
-    all.sort_unstable();
-    all.dedup_by_key(|[machine, process, _]| [*machine, *process]);
-    let sum: u64 = all.iter().map(|[.., bytes]| bytes).sum();
-    Ok((sum > 0).then_some(sum))
-}
-
-fn summary(model: &Model, input: &str, made: &Generated, ranks: u32, balance: Balance) -> Report {
+fn summary(
+    model: &Model,
+    input: &str,
+    made: &Generated,
+    took: Processes,
+    ranks: u32,
+    balance: Balance,
+) -> Report {
     let coarse = made.coarse.as_ref().expect("rank 0 made the coarse mesh");
     Report {
         version: env!("CARGO_PKG_VERSION").into(),
@@ -319,7 +313,8 @@ fn summary(model: &Model, input: &str, made: &Generated, ranks: u32, balance: Ba
         evened: made.evened,
         stages: Vec::new(),
         seconds: 0.0,
-        peak_memory: None,
+        peak_memory: took.memory(),
+        processes: took,
         files: 0,
         bytes: 0,
     }
@@ -399,10 +394,10 @@ pub fn run_mesh(options: &MeshFile) -> Result<(), Failure> {
     if let Some(file) = &options.picture {
         draw(&comm, made.part.stream(), options.cut, file)?;
     }
-    let mut report = summary(&model, &name_of(&options.input), &made, 1, balance(&comm, made.part.stream())?);
+    let balanced = balance(&comm, made.part.stream())?;
+    let mut report = summary(&model, &name_of(&options.input), &made, processes(&comm)?, 1, balanced);
     report.stages = progress.finish();
     report.seconds = start.elapsed().as_secs_f64();
-    report.peak_memory = memory::peak_bytes();
     report.add_written(written);
     tell(&report, options.report.as_deref(), options.quiet, options.size.coarse)
 }

@@ -1,4 +1,4 @@
-//! How much memory this process has used, and how much the machine has left.
+//! How much memory and time this process has used, and how much memory the machine has left.
 
 /// The largest resident set of this process so far in bytes; `None` where the system does not say.
 pub fn peak_bytes() -> Option<u64> {
@@ -6,6 +6,17 @@ pub fn peak_bytes() -> Option<u64> {
     let line = status.lines().find(|line| line.starts_with("VmHWM:"))?;
     let kib: u64 = line.split_whitespace().nth(1)?.parse().ok()?;
     Some(kib * 1024)
+}
+
+/// Processor seconds of all threads of this process so far, of those too that have ended; `None` where the system does not say.
+pub fn cpu_seconds() -> Option<f64> {
+    /// Ticks of `/proc` in a second.
+    const TICKS: f64 = 100.0;
+    let stat = std::fs::read_to_string("/proc/self/stat").ok()?;
+    // The name of the program, in brackets, may hold blanks; user and system time are the 12th and 13th words after it.
+    let words: Vec<&str> = stat.rsplit(')').next()?.split_whitespace().collect();
+    let ticks = |k: usize| words.get(k)?.parse::<f64>().ok();
+    Some((ticks(11)? + ticks(12)?) / TICKS)
 }
 
 /// The memory that this machine can still give, bytes; `None` where the system does not say.
@@ -38,6 +49,18 @@ mod tests {
     fn bytes_are_shown_in_the_unit_that_suits() {
         assert_eq!(sized(999), "999 B");
         assert_eq!(sized(1_500_000), "1.5 MB");
+    }
+
+    #[test]
+    fn processor_time_passes_with_work() {
+        let Some(before) = cpu_seconds() else {
+            eprintln!("skipped: this system has no /proc/self/stat");
+            return;
+        };
+        let start = std::time::Instant::now();
+        while cpu_seconds().unwrap() < before + 0.02 {
+            assert!(start.elapsed().as_secs() < 60, "no processor time in a minute of work");
+        }
     }
 
     #[test]

@@ -1,6 +1,9 @@
 //! The summary of a run, for people and as JSON. The JSON keys are stable: they are only added to.
 
 pub mod moved;
+pub mod processes;
+
+pub use processes::{Processes, processes};
 
 use crate::check::PartReport;
 use crate::io::Written;
@@ -54,6 +57,8 @@ pub struct Report {
     pub seconds: f64,
     /// Peak resident memory of all processes together, bytes; null where the system does not tell.
     pub peak_memory: Option<u64>,
+    /// What each process took.
+    pub processes: Processes,
     /// Files written.
     pub files: u64,
     /// Bytes written.
@@ -321,9 +326,7 @@ impl fmt::Display for Report {
         let stages: Vec<String> =
             self.stages.iter().map(|s| format!("{} {:.2}", s.name, s.seconds)).collect();
         writeln!(f, "seconds    {} in all: {}", format_args!("{:.2}", self.seconds), stages.join(", "))?;
-        if let Some(bytes) = self.peak_memory {
-            writeln!(f, "memory     {} at the peak", sized(bytes))?;
-        }
+        write!(f, "{}", self.processes)?;
         if self.files > 0 {
             writeln!(f, "written    {} files, {}", self.files, sized(self.bytes))?;
         }

@@ -1,15 +1,9 @@
 //! What benchmarks share.
 #![allow(dead_code)]
 
-/// Processor seconds of this process so far, of threads that have ended too.
+/// Processor seconds of this process so far, of threads that have ended too; 0 where the system does not tell.
 pub fn cpu_seconds() -> f64 {
-    /// Ticks of `/proc` in a second.
-    const TICKS: f64 = 100.0;
-    let stat = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
-    // The name of the program, in brackets, may hold blanks; user and system time are the 12th and 13th words after it.
-    let after = stat.rsplit(')').next().unwrap_or_default();
-    let ticks = after.split_whitespace().skip(11).take(2).filter_map(|w| w.parse::<f64>().ok());
-    ticks.sum::<f64>() / TICKS
+    tetmill::memory::cpu_seconds().unwrap_or(0.0)
 }
 
 /// Processor seconds of the threads that live now, to the nanosecond.

@@ -1,6 +1,6 @@
 //! `tetmill repartition`
 
-use super::{on_ranks, read_back, set_threads, show, total_memory, write_formats, write_report};
+use super::{on_ranks, read_back, set_threads, show, write_formats, write_report};
 use crate::cli::{PartitionMethod, Repartition};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -11,6 +11,7 @@ use tetmill::pipeline;
 use tetmill::progress::Progress;
 use tetmill::repartition::Method;
 use tetmill::report::moved::MoveReport;
+use tetmill::report::processes;
 
 /// Stages that a progress bar counts: read, partition, move, check, write.
 const STAGES: u64 = 5;
@@ -48,14 +49,13 @@ fn repartition_on(comm: &dyn Communicator, options: &Repartition, start: Instant
         write_formats(comm, &done.part, &done.names, &options.run.format, target, &stem)
     })?;
     read_back(comm, &options.run, target, &progress)?;
-    let memory = total_memory(comm)?;
+    let took = processes(comm)?;
     if !first {
         return Ok(());
     }
-    let mut report = MoveReport::new(&done, method.to_string(), comm.size());
+    let mut report = MoveReport::new(&done, method.to_string(), comm.size(), took);
     report.stages = progress.finish();
     report.seconds = start.elapsed().as_secs_f64();
-    report.peak_memory = memory;
     report.add_written(written);
     if !options.run.quiet {
         show(format_args!("{report}\n"))?;

@@ -1,6 +1,6 @@
 //! The summary of a repartition.
 
-use super::{MeshReport, grouped};
+use super::{MeshReport, Processes, grouped};
 use crate::io::Written;
 use crate::memory::sized;
 use crate::pipeline::Repartitioned;
@@ -38,6 +38,8 @@ pub struct MoveReport {
     pub seconds: f64,
     /// Peak resident memory of all processes together, bytes; null where the system does not tell.
     pub peak_memory: Option<u64>,
+    /// What each process took.
+    pub processes: Processes,
     /// Files written.
     pub files: u64,
     /// Bytes written.
@@ -46,7 +48,7 @@ pub struct MoveReport {
 
 impl MoveReport {
     /// Of a repartition on so many ranks; what comes after it (writing, times) is left empty.
-    pub fn new(done: &Repartitioned, method: String, ranks: u32) -> Self {
+    pub fn new(done: &Repartitioned, method: String, ranks: u32, processes: Processes) -> Self {
         Self {
             version: env!("CARGO_PKG_VERSION").into(),
             input: done.folder.display().to_string(),
@@ -60,7 +62,8 @@ impl MoveReport {
             notes: done.notes.clone(),
             stages: Vec::new(),
             seconds: 0.0,
-            peak_memory: None,
+            peak_memory: processes.memory(),
+            processes,
             files: 0,
             bytes: 0,
         }
@@ -118,9 +121,7 @@ impl fmt::Display for MoveReport {
         let stages: Vec<String> =
             self.stages.iter().map(|s| format!("{} {:.2}", s.name, s.seconds)).collect();
         writeln!(f, "seconds    {:.2} in all: {}", self.seconds, stages.join(", "))?;
-        if let Some(bytes) = self.peak_memory {
-            writeln!(f, "memory     {} at the peak", sized(bytes))?;
-        }
+        write!(f, "{}", self.processes)?;
         write!(f, "written    {} files, {}", self.files, sized(self.bytes))
     }
 }

@@ -1,0 +1,106 @@
+//! What the processes of a run took, rank 0's beside the others.
+
+use crate::comm::{CommError, Communicator};
+use crate::kernel::random::mix;
+use crate::memory::{self, sized};
+use serde::Serialize;
+use std::fmt;
+
+/// One number of each process.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Spread {
+    /// Of rank 0's process.
+    pub first: f64,
+    /// In the mean.
+    pub mean: f64,
+    /// At most.
+    pub most: f64,
+}
+
+impl Spread {
+    fn of(numbers: &[u64], unit: f64) -> Self {
+        let mean = numbers.iter().sum::<u64>() as f64 / numbers.len() as f64;
+        let most = numbers.iter().copied().max().unwrap_or(0);
+        Self { first: numbers[0] as f64 * unit, mean: mean * unit, most: most as f64 * unit }
+    }
+}
+
+/// What the processes took that ranks run in.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Processes {
+    /// How many there are: one for all in-process ranks.
+    pub count: u64,
+    /// Processor seconds of all threads.
+    pub cpu_seconds: Spread,
+    /// Peak resident memory, bytes.
+    pub peak_memory: Spread,
+}
+
+impl Processes {
+    /// Peak resident memory of all together, bytes; `None` where the system does not tell.
+    pub fn memory(&self) -> Option<u64> {
+        let sum = (self.peak_memory.mean * self.count as f64).round() as u64;
+        (sum > 0).then_some(sum)
+    }
+}
+
+/// **Collective.** What all processes took so far, each counted once; zeros where the system does not tell. The same on all ranks.
+///
+/// # Errors
+/// If another rank fails.
+pub fn processes(comm: &dyn Communicator) -> Result<Processes, CommError> {
+    /// Seconds travel as whole numbers of these.
+    const TICK: f64 = 1e-3;
+    let machine = memory::machine().bytes().fold(0, |hash, byte| mix(hash ^ u64::from(byte)));
+    let ticks = (memory::cpu_seconds().unwrap_or(0.0) / TICK).round() as u64;
+    let mine = [machine, u64::from(std::process::id()), ticks, memory::peak_bytes().unwrap_or(0)];
+    let all = comm.all_gather_one(mine)?;
+    let mut seen = std::collections::BTreeSet::new();
+    let each: Vec<[u64; 4]> =
+        all.into_iter().filter(|[machine, process, ..]| seen.insert([*machine, *process])).collect();
+    let column = |k: usize| each.iter().map(|of| of[k]).collect::<Vec<u64>>();
+    Ok(Processes {
+        count: each.len() as u64,
+        cpu_seconds: Spread::of(&column(2), TICK),
+        peak_memory: Spread::of(&column(3), 1.0),
+    })
+}
+
+impl fmt::Display for Processes {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some(bytes) = self.memory() {
+            write!(f, "memory     {} at the peak\n", sized(bytes))?;
+        }
+        if self.count > 1 {
+            let (cpu, memory) = (self.cpu_seconds, self.peak_memory);
+            let [first, mean, most] =
+                [memory.first, memory.mean, memory.most].map(|bytes| sized(bytes as u64));
+            write!(
+                f,
+                "processes  {}: rank 0 {:.1} processor s and {first}, in the mean {:.1} s and {mean}, at most {:.1} s and {most}\n",
+                self.count, cpu.first, cpu.mean, cpu.most
+            )?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::comm::thread;
+
+    #[test]
+    fn ranks_of_one_process_count_once() {
+        let told = thread::run(3, |comm| processes(comm).unwrap()).unwrap();
+        // Processor time goes on between ranks.
+        assert!(told.iter().all(|of| of.count == 1));
+        assert_eq!(told[0].memory().is_some(), memory::peak_bytes().is_some());
+    }
+
+    #[test]
+    fn rank_0_stands_beside_the_mean_and_the_most() {
+        let spread = Spread::of(&[4000, 1000, 1000], 1e-3);
+        assert_eq!(spread, Spread { first: 4.0, mean: 2.0, most: 4.0 });
+    }
+}
