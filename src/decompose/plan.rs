@@ -197,6 +197,14 @@ const ROOM: f64 = 0.1;
 /// Nearer than this, in units of the room that is wanted, planes pass through one point.
 const SAME: f64 = 1e-9;
 
+/// Planes that are not across an axis cost so many times what they cut: those across the axes meet each other, and mostly the faces of
+/// the geometry, at right angles, which leaves more room than the cost of each plane alone tells. Without it the smallest angles of NETGEN's tutorials in 16
+/// and 32 parts are between 2° and 27°, with it but one are above 16°; with 4 some are at 2° again, as shallow cuts across an axis are preferred.
+const OBLIQUE: f64 = 2.0;
+
+/// A plane is across an axis if that component of its normal is at least this.
+const ALONG: f64 = 1.0 - 1e-9;
+
 /// Planes that meet at a smaller angle than this make slices: its sine.
 const SHALLOW: f64 = 0.6;
 
@@ -425,7 +433,8 @@ impl<'a> Piece<'a> {
             }
         }
         bad += others.spots.iter().map(|spot| plane.crowds(spot)).sum::<f64>();
-        Cost { cut: cut.len() as f64, bad }
+        let factor = if plane.normal.amax() < ALONG { OBLIQUE } else { 1.0 };
+        Cost { cut: factor * cut.len() as f64, bad: factor * bad }
     }
 }
 
