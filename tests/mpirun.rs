@@ -54,6 +54,28 @@ mod with_mpi {
     }
 
     #[test]
+    fn parts_meshed_by_mpi_ranks_are_those_that_threads_mesh() {
+        for method in ["surface", "decompose"] {
+            let arguments = ["-m", method, "--preset", "coarse", "--pieces", "2", "-q"];
+            for (ranks, parts) in [(4, 4), (2, 5)] {
+                let Some(mut command) = mpirun(ranks) else { return };
+                let dir = tempfile::tempdir().unwrap();
+                let (out, file) = (dir.path().join("out"), dir.path().join("report.json"));
+                command.arg("generate").arg(own("tee")).args(arguments).args(["--parts", &parts.to_string()]);
+                succeed(command.arg("-o").arg(&out).arg("--report").arg(&file));
+                judge(&out, parts);
+                let report = read_json(&file);
+                assert_eq!(report["processes"]["count"], ranks);
+                let threads = report_of(&own("tee"), &[&arguments[..], &["-n", &parts.to_string()]].concat());
+                assert_eq!(
+                    report["mesh"]["checksum"], threads["mesh"]["checksum"],
+                    "{method}, {parts} parts"
+                );
+            }
+        }
+    }
+
+    #[test]
     fn bad_input_ends_all_ranks_with_its_status_and_one_message() {
         let Some(mut command) = mpirun(3) else { return };
         let output = command.args(["generate", "no/such/file.geo"]).output().unwrap();

@@ -1,6 +1,6 @@
 //! `generate -m surface`: parts meshed inside their refined skins.
 
-use crate::common::{judged_report, own, tetmill};
+use crate::common::{judged_report, own, report_of, tetmill};
 
 /// Made with so many ranks, and judged by both checkers: the smallest dihedral angle and the volume.
 fn made(name: &str, ranks: u32, pieces: u32) -> [f64; 2] {
@@ -26,7 +26,7 @@ fn parts_of_own_geometries_are_meshed_inside_their_skins() {
     for (name, ranks) in names.into_iter().zip([2, 3, 4, 8, 16, 32].into_iter().cycle()) {
         let [angle, volume] = made(name, ranks, 2);
         assert!(angle > 8.0, "{name} on {ranks} ranks: {angle}°");
-        let refined = crate::common::report_of(&own(name), &["--preset", "coarse", "--pieces", "2"]);
+        let refined = report_of(&own(name), &["--preset", "coarse", "--pieces", "2"]);
         let expected = refined["mesh"]["volume"].as_f64().unwrap();
         assert!((volume / expected - 1.0).abs() < 1e-12, "{name}: {volume}, refined {expected}");
     }
@@ -36,6 +36,19 @@ fn parts_of_own_geometries_are_meshed_inside_their_skins() {
 fn many_pieces_on_few_and_on_many_ranks_fill_the_same_volume() {
     let [few, many] = [1, 24].map(|ranks| made("nozzle", ranks, 5)[1]);
     assert!((few / many - 1.0).abs() < 1e-12);
+}
+
+#[test]
+fn triangles_of_others_are_meshed_in_parts() {
+    let Some(file) = crate::common::shared("netgen-tutorials/part1.stl") else { return };
+    let report = |arguments: &[&str]| {
+        report_of(&file, &[&["--preset", "coarse", "--pieces", "2"], arguments].concat())
+    };
+    let [refined, filled] = [report(&[]), report(&["-m", "surface", "-n", "4"])];
+    assert_eq!(filled["skins"]["skins"], 0);
+    let volume = |report: &serde_json::Value| report["mesh"]["volume"].as_f64().unwrap();
+    assert!((volume(&filled) / volume(&refined) - 1.0).abs() < 1e-12);
+    assert!(filled["mesh"]["smallest_dihedral"].as_f64().unwrap() > 10.0);
 }
 
 #[test]

@@ -19,7 +19,7 @@ use crate::partition;
 use crate::progress::Progress;
 use crate::refine::Bends;
 use crate::size::{SizeField, Source, SourceTree};
-use crate::skin::{self, PartSizes, Skin};
+use crate::skin::{self, Filled, PartSizes, Skin};
 use crate::surface::SurfaceMesh;
 use csg::{Aabb, BodyId};
 use std::collections::BTreeSet;
@@ -60,14 +60,18 @@ pub(super) fn mesh_pieces(
     let (coarse, messages) = cut.map(|cut| (cut.coarse, cut.messages)).unzip();
     let message = progress.stage("distribute", || comm.scatter_bytes(0, messages))?;
     let effort = settings.coarse.effort.unwrap_or(Effort::Standard);
-    let filled = progress.stage("fill", || {
-        let (skin, sizes) = unpack(&message);
-        let filled = skin::fill(&skin, &sizes, &improve::Settings::of(effort));
-        filled.map(|filled| (skin, filled)).map_err(|error| Failure::new(Status::NoValidMesh, error))
-    });
+    let filled = progress.stage("fill", || fill(comm.rank(), &message, effort));
     let (skin, filled) = agree(comm, filled)?;
     let bare = progress.stage("number", || skin::number(comm, skin, filled, boundary))?;
     Ok((bare, pieces as u32, coarse))
+}
+
+/// Fills the skin of a part that came in a message.
+fn fill(part: Rank, message: &[u8], effort: Effort) -> Result<(Skin, Filled), Failure> {
+    let (skin, sizes) = unpack(message);
+    let filled = skin::fill(&skin, &sizes, &improve::Settings::of(effort));
+    let refused = |error| no_mesh(format!("part {part} (from 0) cannot be meshed: {error}"));
+    filled.map(|filled| (skin, filled)).map_err(refused)
 }
 
 /// A geometry that is cut, and the coarse mesh that the planes were chosen by.
@@ -249,4 +253,58 @@ fn unpack(message: &[u8]) -> (Skin, PartSizes) {
     let tets = take::<[u32; 4]>(message).into_iter().map(|tet| tet.map(VertexId)).collect();
     let points = vertices.iter().map(|&[x, y, z, _]| Point::new(x, y, z)).collect();
     (skin, PartSizes::new(points, tets, vertices.iter().map(|v| v[3]).collect()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::comm::thread;
+    use crate::mesh::Class;
+    use crate::skin::SkinTriangle;
+    use csg::PatchId;
+
+    /// The message of a part that is one tet.
+    fn message(triangles: &[[u32; 3]]) -> Vec<u8> {
+        let points = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        let triangle = |&vertices: &[u32; 3]| SkinTriangle {
+            vertices,
+            beside: [Some(BodyId(0)), None],
+            patch: Some((PatchId(0), true)),
+        };
+        let skin = Skin {
+            names: vec![0, 1, 2, 3],
+            on_triangles: 4,
+            points: points.map(Point::from).to_vec(),
+            classes: vec![Class::Patch(PatchId(0)); 4],
+            triangles: triangles.iter().map(triangle).collect(),
+            ..Skin::default()
+        };
+        let mesh = Mesh {
+            points: skin.points.clone(),
+            tets: vec![[0, 1, 2, 3].map(VertexId)],
+            bodies: vec![BodyId(0)],
+            ..Mesh::default()
+        };
+        let mut message = decompose::pack(&skin);
+        pack_sizes(&mut message, &skin, &mesh, &[1.0; 4]);
+        message
+    }
+
+    #[test]
+    fn a_piece_that_one_rank_cannot_fill_ends_all_ranks_with_one_message() {
+        let closed = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]];
+        let failures = thread::run(3, |comm| {
+            // One triangle is missing.
+            let triangles = if comm.rank() == 1 { &closed[..3] } else { &closed };
+            let filled = agree(comm, fill(comm.rank(), &message(triangles), Effort::Quick));
+            filled.map(|_| ()).unwrap_err()
+        });
+        let failures = failures.unwrap();
+        assert!(
+            failures
+                .iter()
+                .all(|f| f.status == Status::NoValidMesh && f.to_string() == failures[0].to_string())
+        );
+        assert!(failures[0].to_string().contains("part 1 (from 0)"), "{}", failures[0]);
+    }
 }
