@@ -11,7 +11,7 @@ use common::cpu_seconds;
 use std::path::PathBuf;
 use tetmill::comm::thread;
 use tetmill::io::elmer;
-use tetmill::repartition::{self, Method};
+use tetmill::repartition::{self, Geometric, Method};
 
 fn main() {
     // Cargo adds --bench.
@@ -24,8 +24,10 @@ fn main() {
     let parts: Vec<u32> = parts.iter().map(|parts| parts.parse().expect("a number of parts")).collect();
     let whole = ("METIS on all tets", Method::Clusters { per_part: u32::MAX });
     let methods = [
-        ("curve", Method::Curve),
-        ("curve, smoothed", Method::SmoothedCurve),
+        ("curve", Method::Geometric(Geometric::Curve)),
+        ("bisection", Method::Geometric(Geometric::Bisection)),
+        ("curve, smoothed", Method::Smoothed(Geometric::Curve)),
+        ("bisection, smoothed", Method::Smoothed(Geometric::Bisection)),
         ("1000 clusters a part, smoothed", Method::Clusters { per_part: 1000 }),
         ("4000 clusters a part, smoothed", Method::Clusters { per_part: 4000 }),
         ("16000 clusters a part, smoothed (default)", Method::graph()),

@@ -188,6 +188,10 @@ pub enum PartitionMethod {
     Curve,
     /// The same with fewer faces between parts, balanced to one percent
     SmoothedCurve,
+    /// Parts cut in two across their longest side, again and again: balanced to one tet
+    Bisection,
+    /// The same with fewer faces between parts, balanced to one percent
+    SmoothedBisection,
     /// METIS on clusters of tets, then fewer faces between parts: the best, balanced to one percent
     Graph,
 }

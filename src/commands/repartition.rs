@@ -9,7 +9,7 @@ use tetmill::error::Failure;
 use tetmill::io::elmer;
 use tetmill::pipeline;
 use tetmill::progress::Progress;
-use tetmill::repartition::Method;
+use tetmill::repartition::{Geometric, Method};
 use tetmill::report::moved::MoveReport;
 use tetmill::report::processes;
 
@@ -38,8 +38,10 @@ fn repartition_on(comm: &dyn Communicator, options: &Repartition, start: Instant
     let progress = Progress::new(options.run.quiet || !first, STAGES);
     let method = match options.method {
         None => Method::default(),
-        Some(PartitionMethod::Curve) => Method::Curve,
-        Some(PartitionMethod::SmoothedCurve) => Method::SmoothedCurve,
+        Some(PartitionMethod::Curve) => Method::Geometric(Geometric::Curve),
+        Some(PartitionMethod::SmoothedCurve) => Method::Smoothed(Geometric::Curve),
+        Some(PartitionMethod::Bisection) => Method::Geometric(Geometric::Bisection),
+        Some(PartitionMethod::SmoothedBisection) => Method::Smoothed(Geometric::Bisection),
         Some(PartitionMethod::Graph) => Method::graph(),
     };
     let done = pipeline::repartition(comm, &options.directory, method, &progress)?;

@@ -1,7 +1,7 @@
 //! Where each tet stands along a Hilbert curve through the centres of all: a parallel sort by samples.
 //!
-//! Each rank sends its tets' keys to the ranks that sort stretches of the curve (their limits are chosen from samples: Shi and Schaeffer
-//! 1992), which answer with places. 16 bytes a tet go and 8 come, whatever the number of ranks.
+//! Each rank sends its tets' keys and weights to the ranks that sort stretches of the curve (their limits are chosen from samples: Shi and
+//! Schaeffer 1992), which answer with places. 24 bytes a tet go and 8 come, whatever the number of ranks.
 
 use crate::Vector;
 use crate::comm::{CommError, Communicator};
@@ -24,7 +24,7 @@ pub fn center(corners: [&Vector; 4]) -> [f64; 3] {
 /// A place on the curve: the key of its cell, then the id of the tet, by which no two are equal.
 type Key = [u64; 2];
 
-/// **Collective.** The places, from 0, of this rank's tets in the order of all tets along the curve.
+/// **Collective.** The weight of all tets before each of this rank's along the curve: with weights of 1, its place, from 0.
 ///
 /// # Errors
 /// If another rank fails.
@@ -32,6 +32,7 @@ pub fn places(
     comm: &dyn Communicator,
     centers: impl Iterator<Item = [f64; 3]> + Clone,
     ids: &[GlobalId],
+    weight: impl Fn(usize) -> u64,
 ) -> Result<Vec<u64>, CommError> {
     let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
     for center in centers.clone() {
@@ -48,9 +49,10 @@ pub fn places(
 
     let limits = limits(comm, &keys)?;
     let sorter = |key: &Key| limits.partition_point(|limit| limit <= key) as Rank;
-    let mut letters: Vec<(Rank, Vec<Key>)> = Vec::new();
+    let mut letters: Vec<(Rank, Vec<[u64; 3]>)> = Vec::new();
     for run in keys.chunk_by(|a, b| sorter(&a.0) == sorter(&b.0)) {
-        letters.push((sorter(&run[0].0), run.iter().map(|(key, _)| *key).collect()));
+        let weighted = run.iter().map(|&([key, id], local)| [key, id, weight(local as usize)]);
+        letters.push((sorter(&run[0].0), weighted.collect()));
     }
     let answers = comm.exchange(sorted(comm, &comm.exchange(letters)?)?)?;
     // Ranks that sort later stretches answer later: in the order in which the keys were sent.
@@ -82,11 +84,15 @@ fn limits(comm: &dyn Communicator, keys: &[(Key, u32)]) -> Result<Vec<Key>, Comm
     Ok(limits)
 }
 
-/// Sorts the keys that came, and answers each sender with their places in its order.
-fn sorted(comm: &dyn Communicator, came: &[(Rank, Vec<Key>)]) -> Result<Vec<(Rank, Vec<u64>)>, CommError> {
+/// Sorts the keys that came with their weights, and answers each sender with the weights before them, in its order.
+fn sorted(
+    comm: &dyn Communicator,
+    came: &[(Rank, Vec<[u64; 3]>)],
+) -> Result<Vec<(Rank, Vec<u64>)>, CommError> {
     let count: usize = came.iter().map(|(_, keys)| keys.len()).sum();
-    let [first] = comm.exclusive_scan([count as u64])?;
-    let mut all: Vec<(Key, u32)> = Vec::with_capacity(count);
+    let weight: u64 = came.iter().flat_map(|(_, keys)| keys).map(|key| key[2]).sum();
+    let [mut before] = comm.exclusive_scan([weight])?;
+    let mut all: Vec<([u64; 3], u32)> = Vec::with_capacity(count);
     for (sender, (_, keys)) in (0..).zip(came) {
         all.extend(keys.iter().map(|&key| (key, sender)));
     }
@@ -94,14 +100,15 @@ fn sorted(comm: &dyn Communicator, came: &[(Rank, Vec<Key>)]) -> Result<Vec<(Ran
     all.sort();
     let mut answers: Vec<(Rank, Vec<u64>)> =
         came.iter().map(|(from, keys)| (*from, Vec::with_capacity(keys.len()))).collect();
-    for (place, (_, sender)) in (first..).zip(&all) {
-        answers[*sender as usize].1.push(place);
+    for ([.., weight], sender) in &all {
+        answers[*sender as usize].1.push(before);
+        before += weight;
     }
     Ok(answers)
 }
 
-/// Equal stretches of the curve: parts whose sizes differ by one tet at most.
-pub fn stretches(places: &[u64], tets: u64, parts: u32) -> Vec<Rank> {
-    let part = |place: u64| (u128::from(place) * u128::from(parts) / u128::from(tets)) as Rank;
-    places.iter().map(|&place| part(place)).collect()
+/// The part of each place of a curve of that length, cut into equal stretches.
+pub fn stretches(places: impl Iterator<Item = u64>, length: u64, parts: u32) -> Vec<Rank> {
+    let part = |place: u64| (u128::from(place) * u128::from(parts) / u128::from(length.max(1))) as Rank;
+    places.map(|place| part(place).min(parts - 1)).collect()
 }

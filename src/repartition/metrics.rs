@@ -70,25 +70,46 @@ pub fn measure(
     })
 }
 
-/// **Collective.** The sums over the ranks of what each has of each part: most ranks have something of few parts only.
+/// **Collective.** The sums over the ranks of what each has of each part.
 pub(super) fn sum_by_part(comm: &dyn Communicator, mine: &[u64]) -> Result<Vec<u64>, CommError> {
+    let mine: Vec<[u64; 1]> = mine.iter().map(|&count| [count]).collect();
+    let sums = reduce_by_part(comm, &mine, [0], |sum, more| sum[0] += more[0])?;
+    Ok(sums.into_iter().map(|[sum]| sum).collect())
+}
+
+/// **Collective.** What all ranks together have of each part, by `fold`, for which `nothing` changes nothing: most ranks have something of few
+/// parts only.
+pub(super) fn reduce_by_part<const N: usize>(
+    comm: &dyn Communicator,
+    mine: &[[u64; N]],
+    nothing: [u64; N],
+    fold: impl Fn(&mut [u64; N], [u64; N]),
+) -> Result<Vec<[u64; N]>, CommError> {
     let (parts, ranks) = (mine.len(), comm.size() as usize);
     // Parts are at home at ranks in blocks.
     let block = parts.div_ceil(ranks);
-    let mut letters: Vec<(Rank, Vec<[u64; 2]>)> = Vec::new();
-    for (part, &count) in mine.iter().enumerate().filter(|(_, count)| **count > 0) {
+    // Numbers of parts, each before its words.
+    let mut letters: Vec<(Rank, Vec<u64>)> = Vec::new();
+    for (part, words) in mine.iter().enumerate().filter(|(_, words)| **words != nothing) {
         let home = (part / block) as Rank;
         if letters.last().is_none_or(|(to, _)| *to != home) {
             letters.push((home, Vec::new()));
         }
-        letters.last_mut().expect("there is one now").1.push([part as u64, count]);
+        let letter = &mut letters.last_mut().expect("there is one now").1;
+        letter.push(part as u64);
+        letter.extend(words);
     }
     let first = (comm.rank() as usize * block).min(parts);
-    let mut sums = vec![0u64; block.min(parts - first)];
-    for [part, count] in comm.exchange(letters)?.into_iter().flat_map(|(_, list)| list) {
-        sums[part as usize - first] += count;
+    let mut all = vec![nothing; block.min(parts - first)];
+    for (_, letter) in comm.exchange(letters)? {
+        for entry in letter.chunks_exact(1 + N) {
+            let words = std::array::from_fn(|k| entry[1 + k]);
+            fold(&mut all[entry[0] as usize - first], words);
+        }
     }
-    Ok(comm.all_gather(&sums)?.concat())
+    let words: Vec<u64> = all.concat();
+    let all = comm.all_gather(&words)?.concat();
+    Ok(all.chunks_exact(N).map(|words| std::array::from_fn(|k| words[k])).collect())
 }
 
 /// **Collective.** How many vertices at home on this rank are in several parts, and the distinct pairs of parts that meet there.

@@ -6,8 +6,9 @@
 //!
 //! | method | how | cut |
 //! |---|---|---|
-//! | [`Method::Curve`] | stretches of a Hilbert curve through the centres of the tets, of equal weight | largest |
-//! | [`Method::SmoothedCurve`] | the same, and fewer faces by [`smooth`] | smaller |
+//! | [`Geometric::Curve`] | stretches of a Hilbert curve through the centres of the tets, of equal weight | largest |
+//! | [`Geometric::Bisection`] | recursive bisection across the longest side | smaller |
+//! | [`Method::Smoothed`] | one of these, and fewer faces by [`smooth`] | smaller still |
 //! | [`Method::Clusters`] | METIS on a coarse graph of clusters of tets, gathered on rank 0 (feature `metis`), and fewer faces by [`smooth`] | smallest |
 //!
 //! And [`diffuse()`] makes parts even that are not, by little movement.
@@ -15,6 +16,7 @@
 //! All methods depend on the mesh and the number of parts alone, not on who holds what before. Parts are more, fewer or as many as ranks: a
 //! part beyond the ranks needs ranks to hold it ([`migrate`](crate::migrate::migrate) refuses such destinations).
 
+pub mod bisection;
 mod clusters;
 pub mod curve;
 pub mod diffuse;
@@ -31,13 +33,22 @@ use crate::dist::DistMesh;
 use crate::mesh::Rank;
 use crate::partition::PartitionError;
 
+/// How to partition by where tets are: balanced to one tet.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Geometric {
+    /// Equal stretches of a Hilbert curve.
+    Curve,
+    /// Recursive coordinate bisection (Berger and Bokhari 1987).
+    Bisection,
+}
+
 /// How to partition anew.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Method {
-    /// Equal stretches of a Hilbert curve, balanced to one tet.
-    Curve,
+    /// By where tets are.
+    Geometric(Geometric),
     /// The same with fewer faces between parts, balanced to one percent.
-    SmoothedCurve,
+    Smoothed(Geometric),
     /// Multilevel bisection by METIS (Karypis and Kumar 1998) of a graph of clusters, each a stretch of that curve.
     Clusters {
         /// Clusters for each part, [`MOST_CLUSTERS`] in all: the graph on rank 0 is as large as the parts times this.
@@ -54,15 +65,24 @@ impl Method {
 
 impl Default for Method {
     fn default() -> Self {
-        if cfg!(feature = "metis") { Self::graph() } else { Self::Curve }
+        if cfg!(feature = "metis") { Self::graph() } else { Self::Smoothed(Geometric::Bisection) }
+    }
+}
+
+impl std::fmt::Display for Geometric {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Curve => "stretches of a Hilbert curve",
+            Self::Bisection => "recursive coordinate bisection",
+        })
     }
 }
 
 impl std::fmt::Display for Method {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
-            Self::Curve => f.write_str("stretches of a Hilbert curve"),
-            Self::SmoothedCurve => f.write_str("stretches of a Hilbert curve, smoothed"),
+            Self::Geometric(how) => how.fmt(f),
+            Self::Smoothed(how) => write!(f, "{how}, smoothed"),
             Self::Clusters { .. } => f.write_str("METIS on clusters, smoothed"),
         }
     }
@@ -106,22 +126,75 @@ pub fn repartition(
     parts: u32,
     method: Method,
 ) -> Result<Vec<Rank>, RepartitionError> {
-    let tets = mesh.totals.tets as usize;
-    if parts == 0 {
-        return Err(PartitionError::NoParts.into());
-    }
-    if tets < parts as usize {
-        return Err(PartitionError::MoreParts { parts, tets }.into());
-    }
-    let centers = mesh.tets.iter().map(|tet| curve::center(tet.map(|v| &mesh.points[v.index()].coords)));
-    let places = curve::places(comm, centers, &mesh.tet_ids)?;
+    refuse_too_many(mesh, parts)?;
     let mut part = match method {
-        Method::Curve => return Ok(curve::stretches(&places, mesh.totals.tets, parts)),
-        Method::SmoothedCurve => curve::stretches(&places, mesh.totals.tets, parts),
-        Method::Clusters { per_part } => clusters::partition(comm, mesh, &places, parts, per_part)?,
+        Method::Geometric(how) | Method::Smoothed(how) => by_place(comm, mesh, None, parts, how)?,
+        Method::Clusters { per_part } => {
+            let places = curve::places(comm, centers(mesh), &mesh.tet_ids, |_| 1)?;
+            clusters::partition(comm, mesh, &places, parts, per_part)?
+        }
     };
-    if parts > 1 {
+    if parts > 1 && !matches!(method, Method::Geometric(_)) {
         smooth::smooth(comm, mesh, &mut part, parts, &smooth::Settings::default())?;
     }
     Ok(part)
+}
+
+/// **Collective.** The same for tets of unequal weight: a part below `parts` for each, so that the parts' weights are equal to within the heaviest
+/// tets. Where weights are very unequal a part may have no tet.
+///
+/// # Errors
+/// More parts than tets, or none. The same rank's on all ranks.
+///
+/// # Panics
+/// If there is not one weight for each tet.
+pub fn repartition_weighted(
+    comm: &dyn Communicator,
+    mesh: &DistMesh,
+    weights: &[u32],
+    parts: u32,
+    method: Geometric,
+) -> Result<Vec<Rank>, RepartitionError> {
+    assert_eq!(weights.len(), mesh.tets.len(), "rank {}: one weight for each tet", mesh.rank);
+    refuse_too_many(mesh, parts)?;
+    Ok(by_place(comm, mesh, Some(weights), parts, method)?)
+}
+
+fn refuse_too_many(mesh: &DistMesh, parts: u32) -> Result<(), PartitionError> {
+    let tets = mesh.totals.tets as usize;
+    match parts {
+        0 => Err(PartitionError::NoParts),
+        _ if tets < parts as usize => Err(PartitionError::MoreParts { parts, tets }),
+        _ => Ok(()),
+    }
+}
+
+/// The centres of tets, times four.
+fn centers(mesh: &DistMesh) -> impl Iterator<Item = [f64; 3]> + Clone + '_ {
+    mesh.tets.iter().map(|tet| curve::center(tet.map(|v| &mesh.points[v.index()].coords)))
+}
+
+/// **Collective.** Parts by where tets are, of equal weight; without weights, of equal number.
+fn by_place(
+    comm: &dyn Communicator,
+    mesh: &DistMesh,
+    weights: Option<&[u32]>,
+    parts: u32,
+    method: Geometric,
+) -> Result<Vec<Rank>, CommError> {
+    let weight = |tet: usize| weights.map_or(1, |weights| u64::from(weights[tet]));
+    match method {
+        Geometric::Curve => {
+            let before = curve::places(comm, centers(mesh), &mesh.tet_ids, weight)?;
+            let [total] = comm.all_reduce_sum_u64([(0..mesh.tets.len()).map(weight).sum()])?;
+            let middle = |(tet, before): (usize, u64)| 2 * before + weight(tet);
+            let middles = before.into_iter().enumerate().map(middle);
+            Ok(curve::stretches(middles, 2 * total, parts))
+        }
+        Geometric::Bisection => {
+            let centers: Vec<[f64; 3]> = centers(mesh).collect();
+            let weights: Vec<u64> = (0..mesh.tets.len()).map(weight).collect();
+            bisection::bisect(comm, &centers, &mesh.tet_ids, &weights, parts)
+        }
+    }
 }

@@ -7,10 +7,12 @@ use crate::migrate::migrate;
 use crate::partition::{self, Settings};
 
 const METHODS: &[Method] = if cfg!(feature = "metis") {
-    &[Method::Curve, Method::SmoothedCurve, Method::Clusters { per_part: 50 }]
+    &[BY_PLACE[0], BY_PLACE[1], Method::Smoothed(Geometric::Curve), Method::Clusters { per_part: 50 }]
 } else {
-    &[Method::Curve, Method::SmoothedCurve]
+    &[BY_PLACE[0], BY_PLACE[1], Method::Smoothed(Geometric::Curve)]
 };
+
+const BY_PLACE: [Method; 2] = [Method::Geometric(Geometric::Curve), Method::Geometric(Geometric::Bisection)];
 
 /// Distributes as `part` says, partitions anew, and returns the new part of each tet by global id, with its metrics.
 fn anew(mesh: &Mesh, part: &[Rank], ranks: u32, parts: u32, method: Method) -> (Vec<Rank>, Metrics) {
@@ -46,12 +48,43 @@ fn parts_do_not_depend_on_who_held_the_tets_before() {
 }
 
 #[test]
-fn stretches_of_the_curve_are_balanced_to_one_tet() {
+fn parts_by_place_are_balanced_to_one_tet() {
     let mesh = lattice_cube(5);
-    for parts in [1, 2, 7, 16, 749, 750] {
-        let (_, metrics) = anew(&mesh, &vec![0; 750], 3, parts, Method::Curve);
-        assert!(metrics.largest - metrics.smallest <= 1, "{metrics:?}");
+    for (method, parts) in BY_PLACE.into_iter().flat_map(|m| [1, 2, 7, 16, 749, 750].map(|parts| (m, parts)))
+    {
+        let (_, metrics) = anew(&mesh, &vec![0; 750], 3, parts, method);
+        assert!(metrics.largest - metrics.smallest <= 1, "{method}: {metrics:?}");
         assert!(metrics.smallest >= 1);
+    }
+}
+
+#[test]
+fn parts_by_place_have_equal_weights() {
+    let mesh = lattice_box([6, 4, 4], |_| 0);
+    let tets = mesh.tets.len() as u32;
+    let weight = |id: u64| 1 + (id % 7) as u32 * (id % 2) as u32;
+    let heaviest = 7;
+    for how in [Geometric::Curve, Geometric::Bisection] {
+        let weighed = |ranks: u32| {
+            let held: Vec<Rank> = (0..tets).map(|tet| tet * 5 % ranks).collect();
+            let parts = thread::run(ranks, |comm| {
+                let mesh =
+                    distribute(comm, (comm.rank() == 0).then(|| (mesh.clone(), held.clone()))).unwrap();
+                let weights: Vec<u32> = mesh.tet_ids.iter().map(|&id| weight(id)).collect();
+                let part = repartition_weighted(comm, &mesh, &weights, 5, how).unwrap();
+                mesh.tet_ids.iter().copied().zip(part).collect::<Vec<_>>()
+            });
+            let mut all = parts.unwrap().concat();
+            all.sort_unstable();
+            all
+        };
+        let alone = weighed(1);
+        assert_eq!(weighed(3), alone, "{how}");
+        let mut sums = [0; 5];
+        alone.iter().for_each(|&(id, part)| sums[part as usize] += weight(id));
+        let fair = sums.iter().sum::<u32>() / 5;
+        // Each level of bisection may be off by the heaviest tet.
+        assert!(sums.iter().all(|sum| sum.abs_diff(fair) <= 3 * heaviest), "{how}: {sums:?}");
     }
 }
 
@@ -75,14 +108,14 @@ fn cuts_are_measured_as_the_serial_partitioner_measures_them() {
 fn smoothing_makes_the_cut_smaller_and_keeps_the_balance() {
     let mesh = lattice_box([16, 12, 12], |_| 0);
     let tets = mesh.tets.len() as u32;
-    let (_, curve) = anew(&mesh, &vec![0; tets as usize], 2, 8, Method::Curve);
+    let (_, curve) = anew(&mesh, &vec![0; tets as usize], 2, 8, Method::Geometric(Geometric::Curve));
     let slabs: Vec<Rank> = (0..tets).map(|tet| tet * 3 / tets).collect();
-    let (part, smoothed) = anew(&mesh, &slabs, 3, 8, Method::SmoothedCurve);
+    let (part, smoothed) = anew(&mesh, &slabs, 3, 8, Method::Smoothed(Geometric::Curve));
     assert!(smoothed.edge_cut < curve.edge_cut, "{smoothed:?} {curve:?}");
     assert!(smoothed.imbalance <= 1.01, "{smoothed:?}");
     let noise: Vec<Rank> = (0..tets).map(|tet| crate::kernel::random::mix(tet.into()) as u32 % 2).collect();
     assert!(
-        anew(&mesh, &noise, 2, 8, Method::SmoothedCurve).0 == part,
+        anew(&mesh, &noise, 2, 8, Method::Smoothed(Geometric::Curve)).0 == part,
         "it matters who held the tets before"
     );
 }
@@ -93,8 +126,12 @@ fn clusters_cut_less_than_the_curve_and_a_tenth_more_than_metis_on_all_tets_at_m
     let mesh = lattice_box([16, 12, 12], |_| 0);
     let cut = |method| anew(&mesh, &vec![0; mesh.tets.len()], 2, 8, method).1.edge_cut as f64;
     let metis = partition::partition(&mesh, 8, &Settings::default()).unwrap().1.edge_cut as f64;
-    let [curve, smoothed, clusters] =
-        [Method::Curve, Method::SmoothedCurve, Method::Clusters { per_part: 400 }].map(cut);
+    let [curve, smoothed, clusters] = [
+        Method::Geometric(Geometric::Curve),
+        Method::Smoothed(Geometric::Curve),
+        Method::Clusters { per_part: 400 },
+    ]
+    .map(cut);
     let told = format!("{clusters} {smoothed} {curve} {metis}");
     assert!(clusters <= smoothed && smoothed < curve, "{told}");
     assert!(clusters < 1.1 * metis && smoothed < 1.5 * metis && curve < 1.9 * metis, "{told}");
@@ -125,7 +162,7 @@ fn a_mesh_of_two_ranks_grows_to_seven_and_shrinks_to_one() {
         let part = (0..384).map(|tet| tet % 2).collect();
         let mut mesh = distribute(comm, (comm.rank() == 0).then(|| (mesh.clone(), part))).unwrap();
         for parts in [7, 3, 1] {
-            let to = repartition(comm, &mesh, parts, Method::Curve).unwrap();
+            let to = repartition(comm, &mesh, parts, Method::Geometric(Geometric::Curve)).unwrap();
             mesh = migrate(comm, mesh, &to).unwrap();
             mesh.check(comm).unwrap();
             let fair = 384_usize.div_ceil(parts as usize);
@@ -138,7 +175,8 @@ fn a_mesh_of_two_ranks_grows_to_seven_and_shrinks_to_one() {
 #[test]
 fn no_parts_and_more_parts_than_tets_are_refused() {
     let mesh = from_serial(lattice_cube(1)).unwrap();
-    let refused = |parts| repartition(&thread::alone(), &mesh, parts, Method::Curve).unwrap_err();
+    let refused =
+        |parts| repartition(&thread::alone(), &mesh, parts, Method::Geometric(Geometric::Curve)).unwrap_err();
     assert_eq!(refused(0), PartitionError::NoParts.into());
     assert_eq!(refused(7), PartitionError::MoreParts { parts: 7, tets: 6 }.into());
 }
