@@ -19,6 +19,7 @@ pub mod check;
 pub mod closeness;
 mod condition;
 pub mod curves;
+mod cusp;
 mod embed;
 mod error;
 mod front;

@@ -6,7 +6,7 @@
 //! rounding before it is as wide as a triangle is long.
 
 use super::{Curve, FeatureError, Features, Named, Place, curve_curvature};
-use crate::project::project_to_both;
+use crate::project::{at_distance, project_to_both};
 use crate::{CornerId, CurveId, Geometry, Point};
 use std::collections::BTreeMap;
 
@@ -72,25 +72,13 @@ fn angles(geometry: &Geometry, ends: [(&Curve, usize); 2]) -> Option<[f64; 2]> {
         reach = reach.min(curve.length()).min(1.0 / curve_curvature(geometry, curve, &middle));
     }
     let angle = |distance: f64| {
-        let [p, q] = [0, 1].map(|i| at_distance(geometry, ends[i].0, &traces[i], distance));
+        let [p, q] = [0, 1].map(|i| {
+            let [a, b] = ends[i].0.surfaces.map(|s| &geometry.surfaces[s.index()]);
+            let project = |at: &Point| project_to_both(a, b, at, f64::EPSILON * distance);
+            at_distance(&traces[i], distance, project)
+        });
         Some((p? - q?).norm() / distance)
     };
     let far = REACH * reach;
     Some([angle(0.5 * far)?, angle(far)?])
-}
-
-/// The first point of a curve at a distance from where its trace begins.
-fn at_distance(geometry: &Geometry, curve: &Curve, trace: &[Point], distance: f64) -> Option<Point> {
-    /// Each leaves the square of what the direction is off.
-    const STEPS: usize = 4;
-    let [a, b] = curve.surfaces.map(|s| &geometry.surfaces[s.index()]);
-    let corner = trace[0];
-    let after = trace.iter().position(|p| (p - corner).norm() >= distance)?;
-    let (low, high) = ((trace[after - 1] - corner).norm(), (trace[after] - corner).norm());
-    let mut at = trace[after - 1] + (trace[after] - trace[after - 1]) * ((distance - low) / (high - low));
-    for _ in 0..STEPS {
-        let ahead = corner + (at - corner).normalize() * distance;
-        at = project_to_both(a, b, &ahead, f64::EPSILON * distance).ok()?;
-    }
-    Some(at)
 }
