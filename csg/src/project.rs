@@ -209,16 +209,23 @@ pub fn at_distance(
     distance: f64,
     project: impl Fn(&Point) -> Result<Point, ProjectionFailed>,
 ) -> Option<Point> {
-    /// Each leaves the square of what the direction is off.
-    const STEPS: usize = 4;
+    /// Each leaves less than a tenth, as the chords of a trace turn little.
+    const STEPS: usize = 20;
     let corner = trace[0];
     let after = trace.iter().position(|p| (p - corner).norm() >= distance)?;
-    let (low, high) = ((trace[after - 1] - corner).norm(), (trace[after] - corner).norm());
-    let mut at = trace[after - 1] + (trace[after] - trace[after - 1]) * ((distance - low) / (high - low));
+    let (from, chord) = (trace[after - 1], trace[after] - trace[after - 1]);
+    let (low, high) = ((from - corner).norm(), (trace[after] - corner).norm());
+    let mut at = from + chord * ((distance - low) / (high - low));
     for _ in 0..STEPS {
-        let ahead = corner + (at - corner).normalize() * distance;
-        at = project(&ahead).ok()?;
+        at = project(&at).ok()?;
+        let arm = at - corner;
+        let lack = distance - arm.norm();
+        if lack.abs() <= f64::EPSILON * distance {
+            break;
+        }
+        at += chord * (lack * arm.norm() / arm.dot(&chord));
     }
+    at = project(&at).ok()?;
     Some(at)
 }
 

@@ -30,7 +30,8 @@ pub(super) fn tangent_line([a, b]: [&Surface; 2], tolerance: f64, extent: f64) -
         let at = point + along * extent;
         let off = b.project(&at).map_or(f64::INFINITY, |p| (p - at).norm());
         let is_tangent = a.normal(&at).cross(&b.normal(&at)).norm() <= PARALLEL;
-        (b.distance(&point) <= tolerance && off <= PARALLEL * extent + tolerance && is_tangent).then_some([point.coords, along])
+        (b.distance(&point) <= tolerance && off <= PARALLEL * extent + tolerance && is_tangent)
+            .then_some([point.coords, along])
     })?;
     let at = Point::from(point) + along * extent;
     let normal = a.normal(&at);
@@ -41,16 +42,12 @@ pub(super) fn tangent_line([a, b]: [&Surface; 2], tolerance: f64, extent: f64) -
 /// The quadric of which a surface of lines is a part.
 fn whole(surface: &Surface) -> Option<Surface> {
     match surface {
-        Surface::Nappe(c) => Some(Surface::Cone(Cone {
-            point: c.point,
-            axis: c.axis,
-            radius: c.radius,
-            slope: c.slope,
-        })),
-        Surface::Cone(_)
-        | Surface::EllipticCone(_)
-        | Surface::Cylinder(_)
-        | Surface::EllipticCylinder(_) => Some(surface.clone()),
+        Surface::Nappe(c) => {
+            Some(Surface::Cone(Cone { point: c.point, axis: c.axis, radius: c.radius, slope: c.slope }))
+        }
+        Surface::Cone(_) | Surface::EllipticCone(_) | Surface::Cylinder(_) | Surface::EllipticCylinder(_) => {
+            Some(surface.clone())
+        }
         _ => None,
     }
 }
