@@ -9,6 +9,7 @@ use crate::periodic::PeriodicSize;
 use crate::size::{GeometricSize, SizeField, SizeSettings, Source};
 use crate::surface::closeness::{ThinWalls, Walls, thin_walls};
 use crate::surface::curves::{CurveError, crowded, mesh_curves};
+use crate::surface::narrow::narrow;
 use crate::surface::{self, SurfaceError, SurfaceMesh};
 use crate::volume::{self, ClosedSurface, SurfaceFaults, VolumeError};
 use csg::{BodyId, PatchId};
@@ -201,7 +202,8 @@ fn attempt(model: &CsgModel, settings: &CoarseSettings, allowed: Allowed) -> Att
         Ok(curves) => curves,
         Err(error) => return Attempt::Failed(error.into()),
     };
-    let crowded = crowded(&curves, features, size);
+    let mut crowded = crowded(&curves, features, size);
+    crowded.extend(narrow(&curves, features, projector));
     if allowed.lower && !crowded.is_empty() {
         return Attempt::Lower(crowded);
     }

@@ -24,6 +24,7 @@ mod embed;
 mod error;
 mod front;
 mod improve;
+pub mod narrow;
 mod patch;
 pub(crate) mod plane;
 mod report;
