@@ -10,10 +10,10 @@ use crate::size::Source;
 use crate::{Point, Vector};
 use csg::{Features, PatchId, Projector};
 
-/// A segment this many times as long as its band is wide makes an angle of 21.8°.
-const LONG: f64 = 2.5;
+/// A segment this many times as long as its band is wide makes an angle of 23.5°.
+const LONG: f64 = 2.3;
 /// What such a segment is shortened to, in widths of the band, but at least by [`SHORTENED`].
-const SHORT: f64 = 2.0;
+const SHORT: f64 = 1.8;
 /// The part of its length that a segment keeps at most: so that rounded numbers of segments come to an end.
 const SHORTENED: f64 = 0.7;
 /// Bands narrower than this part of their segments' length are left as they are: the thin sides of plates would get more triangles than all
