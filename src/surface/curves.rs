@@ -254,7 +254,7 @@ fn sagittas(mesh: &SurfaceMesh, features: &Features) -> Vec<f64> {
 }
 
 /// The least distance of two segments, and the middle of the shortest connection.
-pub(super) fn segment_distance(s: [Point; 2], t: [Point; 2]) -> (f64, Point) {
+fn segment_distance(s: [Point; 2], t: [Point; 2]) -> (f64, Point) {
     let (d1, d2, r) = (s[1] - s[0], t[1] - t[0], s[0] - t[0]);
     let (a, e, b) = (d1.norm_squared(), d2.norm_squared(), d1.dot(&d2));
     let (c, f) = (d1.dot(&r), d2.dot(&r));

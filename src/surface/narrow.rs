@@ -4,7 +4,6 @@
 //! end of the other's as a corner, and if that is right above an end of the segment, an angle of atan(width / length).
 
 use super::SurfaceMesh;
-use super::curves::segment_distance;
 use crate::mesh::Segment;
 use crate::size::Source;
 use crate::{Point, Vector};
@@ -39,7 +38,7 @@ pub fn narrow(mesh: &SurfaceMesh, features: &Features, projector: &Projector) ->
             for b in sides[k + 1..].iter().take_while(|b| b.low.x <= a.high.x) {
                 if (1..3).all(|i| a.low[i] <= b.high[i] && b.low[i] <= a.high[i]) && may_face(features, a, b)
                 {
-                    sources.extend(a.shortened_beside(b));
+                    sources.extend(a.beside(b).chain(b.beside(a)));
                 }
             }
         }
@@ -84,16 +83,21 @@ impl<'a> Side<'a> {
         Self { segment, ends, length, inward, low, high }
     }
 
-    /// The source that makes this segment and another one shorter, if they face each other across a narrow band.
-    fn shortened_beside(&self, other: &Self) -> Option<Source> {
-        let (width, middle) = segment_distance(self.ends, other.ends);
-        let length = self.length.max(other.length);
-        let is_inside = [self, other].into_iter().all(|side| {
-            let way = middle - nalgebra::center(&side.ends[0], &side.ends[1]);
-            way.dot(&side.inward) > 0.0
-        });
-        let is_narrow = LONG * width < length && width > NARROWEST * length;
-        let size = (SHORT * width).min(SHORTENED * length);
-        (is_inside && is_narrow).then_some(Source { point: middle, size })
+    /// Sources along this segment where another one faces it across a narrow band.
+    fn beside<'b>(&'b self, other: &'b Self) -> impl Iterator<Item = Source> + 'b {
+        /// Parts of the segment, between which the band hardly gets much narrower.
+        const PARTS: u32 = 4;
+        let [from, to] = other.ends;
+        let along = to - from;
+        (0..=PARTS).filter_map(move |part| {
+            let point = self.ends[0] + (self.ends[1] - self.ends[0]) * (f64::from(part) / f64::from(PARTS));
+            let foot = ((point - from).dot(&along) / along.norm_squared()).clamp(0.0, 1.0);
+            let way = from + along * foot - point;
+            let width = way.norm();
+            let is_inside = way.dot(&self.inward) > 0.0 && way.dot(&other.inward) < 0.0;
+            let is_narrow = LONG * width < self.length && width > NARROWEST * self.length;
+            let size = (SHORT * width).min(SHORTENED * self.length);
+            (is_inside && is_narrow).then_some(Source { point, size })
+        })
     }
 }
