@@ -13,8 +13,8 @@ use csg::{Features, PatchId, Projector};
 const LONG: f64 = 2.3;
 /// What such a segment is shortened to, in widths of the band, but at least by [`SHORTENED`].
 const SHORT: f64 = 1.8;
-/// The part of its length that a segment keeps at most: so that rounded numbers of segments come to an end.
-const SHORTENED: f64 = 0.7;
+/// The part of its length that a segment keeps at most: sizes that grow by 0.7 allow segments of 1.45 times the size at one end.
+const SHORTENED: f64 = 0.5;
 /// Bands narrower than this part of their segments' length are left as they are: the thin sides of plates would get more triangles than all
 /// else, unasked.
 const NARROWEST: f64 = 1.0 / 12.0;
