@@ -203,7 +203,7 @@ fn attempt(model: &CsgModel, settings: &CoarseSettings, allowed: Allowed) -> Att
         Err(error) => return Attempt::Failed(error.into()),
     };
     let mut crowded = crowded(&curves, features, size);
-    crowded.extend(narrow(&curves, features, projector));
+    crowded.extend(narrow(&curves, features, projector, size));
     if allowed.lower && !crowded.is_empty() {
         return Attempt::Lower(crowded);
     }

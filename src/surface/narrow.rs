@@ -5,16 +5,17 @@
 
 use super::SurfaceMesh;
 use crate::mesh::Segment;
-use crate::size::Source;
+use crate::size::{SizeField, Source};
 use crate::{Point, Vector};
 use csg::{Features, PatchId, Projector};
 
 /// A segment this many times as long as its band is wide makes an angle of 23.5°.
 const LONG: f64 = 2.3;
-/// What such a segment is shortened to, in widths of the band, but at least by [`SHORTENED`].
+/// What such a segment is shortened to, in widths of the band.
 const SHORT: f64 = 1.8;
-/// The part of its length that a segment keeps at most: sizes that grow by 0.7 allow segments of 1.45 times the size at one end.
-const SHORTENED: f64 = 0.5;
+/// The part of its length, and of the size that was used, that it keeps at most: with steep gradings and rounded numbers of segments it is longer
+/// than the size at its ends.
+const SHORTENED: f64 = 0.7;
 /// Bands narrower than this part of their segments' length are left as they are: the thin sides of plates would get more triangles than all
 /// else, unasked.
 const NARROWEST: f64 = 1.0 / 12.0;
@@ -22,7 +23,12 @@ const NARROWEST: f64 = 1.0 / 12.0;
 /// Sources that shorten the segments beside narrow bands of patches.
 ///
 /// Curves with a common corner are left out: near the corner of two curves at an angle a band is narrow whatever the size.
-pub fn narrow(mesh: &SurfaceMesh, features: &Features, projector: &Projector) -> Vec<Source> {
+pub fn narrow(
+    mesh: &SurfaceMesh,
+    features: &Features,
+    projector: &Projector,
+    size: &dyn SizeField,
+) -> Vec<Source> {
     let mut sources = Vec::new();
     for (i, patch) in features.patches.iter().enumerate() {
         let id = PatchId::new(i);
@@ -38,7 +44,7 @@ pub fn narrow(mesh: &SurfaceMesh, features: &Features, projector: &Projector) ->
             for b in sides[k + 1..].iter().take_while(|b| b.low.x <= a.high.x) {
                 if (1..3).all(|i| a.low[i] <= b.high[i] && b.low[i] <= a.high[i]) && may_face(features, a, b)
                 {
-                    sources.extend(a.beside(b).chain(b.beside(a)));
+                    sources.extend(a.beside(b, size).chain(b.beside(a, size)));
                 }
             }
         }
@@ -84,7 +90,7 @@ impl<'a> Side<'a> {
     }
 
     /// Sources along this segment where another one faces it across a narrow band.
-    fn beside<'b>(&'b self, other: &'b Self) -> impl Iterator<Item = Source> + 'b {
+    fn beside<'b>(&'b self, other: &'b Self, used: &'b dyn SizeField) -> impl Iterator<Item = Source> + 'b {
         /// Parts of the segment, between which the band hardly gets much narrower.
         const PARTS: u32 = 4;
         let [from, to] = other.ends;
@@ -96,8 +102,8 @@ impl<'a> Side<'a> {
             let width = way.norm();
             let is_inside = way.dot(&self.inward) > 0.0 && way.dot(&other.inward) < 0.0;
             let is_narrow = LONG * width < self.length && width > NARROWEST * self.length;
-            let size = (SHORT * width).min(SHORTENED * self.length);
-            (is_inside && is_narrow).then_some(Source { point, size })
+            let size = || (SHORT * width).min(SHORTENED * self.length.min(used.size_at(&point)));
+            (is_inside && is_narrow).then(|| Source { point, size: size() })
         })
     }
 }
