@@ -40,8 +40,48 @@ fn ellipse_length(a: f64, b: f64) -> f64 {
     around(|t| (a * t.sin()).hypot(b * t.cos()))
 }
 
+/// A circular cone up to an ellipse across the plane of its axis: its volume, its side and the area of the ellipse. `lines` are the lengths from the
+/// tip to both ends of the ellipse, `tilt` the sine and the cosine of half the angle between them.
+fn cut_cone(lines: [f64; 2], tilt: [f64; 2]) -> [f64; 3] {
+    let ([p, q], [sin, cos]) = (lines, tilt);
+    let root = (p * q).sqrt();
+    let chord = (p * p + q * q - 2.0 * p * q * (cos * cos - sin * sin)).sqrt();
+    [
+        PI / 3.0 * root.powi(3) * sin * sin * cos,
+        PI / 2.0 * root * (p + q) * sin,
+        PI / 2.0 * chord * root * sin,
+    ]
+}
+
+/// A cone that is the boundary of a rod up to where both bend alike.
+fn spout() -> [f64; 2] {
+    let tilt = [0.28, 0.96];
+    let [sine, cosine] = [0.5376, 0.8432];
+    let shared = [24.0 / 7.0, 2.0 / sine];
+    let [low, high] = [cut_cone([5.0, 5.0 / cosine], tilt), cut_cone(shared, tilt)];
+    let rod = 3.0 - (5.0 - 0.5 * (shared[0] + shared[1] * cosine));
+    [low[0] - high[0] + PI * rod, low[1] - high[1] + low[2] + 2.0 * PI * rod + PI]
+}
+
+/// Two cones that are tangent along a line, up to the ellipse where they change places.
+fn leaning_cones() -> [f64; 2] {
+    let (wide, slim) = ([5.0 / 13.0, 12.0 / 13.0], [0.28, 0.96]);
+    let double = |[sin, cos]: [f64; 2]| [2.0 * sin * cos, cos * cos - sin * sin];
+    let ([of_wide, wide_cosine], [of_slim, slim_cosine]) = (double(wide), double(slim));
+    // Where the lines opposite the common one meet.
+    let slopes = [of_wide / wide_cosine, of_slim / slim_cosine];
+    let height = (3.0 * slopes[0] - 4.0 * slopes[1]) / (slopes[0] - slopes[1]);
+    let low =
+        [[3.0, 3.0 / wide_cosine], [7.0 / 3.0, (3.0 - height) / wide_cosine]].map(|l| cut_cone(l, wide));
+    let high =
+        [[10.0 / 3.0, (4.0 - height) / slim_cosine], [2.0, 2.0 / slim_cosine]].map(|l| cut_cone(l, slim));
+    let between = |i: usize| low[0][i] - low[1][i] + high[0][i] - high[1][i];
+    [between(0), between(1) + low[0][2] + high[1][2]]
+}
+
 /// Tangent surfaces, tips and other degenerate places.
 fn degenerate() -> Vec<Part> {
+    let (spout, cones) = (spout(), leaning_cones());
     let fillet = PI / 8.0 * (1.5 - 2.0 / (3.0 * PI)) * PI;
     let ice = 0.515_388_203;
     let cap = ice - 0.125;
@@ -73,6 +113,9 @@ fn degenerate() -> Vec<Part> {
             PI * (4.0 + 2.8 + 2.89) + 0.3 * PI * PI * (1.7 + 0.6 / PI),
         ),
         ("capsule", [0, 2, 3], 10.0 / 3.0 * PI, 8.0 * PI),
+        ("spout", [0, 3, 4], spout[0], spout[1]),
+        ("leaning_cones", [0, 3, 4], cones[0], cones[1]),
+        ("eccentric", [1, 4, 5], 1.25 * PI, 5.0 * PI),
         ("teardrop", [6, 9, 5], cam[0], 2.0 * cam[0] + cam[1]),
         ("bends", [0, 4, 5], 0.09 * PI * (PI + 1.0) + 0.018 * PI, 0.6 * PI * (PI + 1.0) + 0.27 * PI),
         (

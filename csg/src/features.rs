@@ -50,6 +50,7 @@ mod extent;
 mod number;
 mod octree;
 mod periodic;
+mod ruled;
 mod seam;
 mod seed;
 mod singular;

@@ -235,7 +235,9 @@ pub struct Seam {
     pub pair: [SurfaceId; 2],
     /// One of them and the auxiliary surface, ascending. Their intersection may have other pieces, where the two are apart.
     pub carrier: [SurfaceId; 2],
-    /// Whether the two have no other points in common.
+    /// What else the two have in common where they cross, carried likewise: cones tangent along a line have a conic in common, too.
+    pub rest: Option<[SurfaceId; 2]>,
+    /// Whether the two have no other points in common than what is carried.
     pub is_alone: bool,
 }
 

@@ -203,6 +203,32 @@ fn widest_gap(geometry: &Geometry, features: &Features) -> f64 {
     features.curves.iter().map(gap).fold(0.0, f64::max)
 }
 
+/// The first point of a curve at a distance from where its trace begins, `None` if it is nowhere so far away; `project` leads to the curve.
+pub fn at_distance(
+    trace: &[Point],
+    distance: f64,
+    project: impl Fn(&Point) -> Result<Point, ProjectionFailed>,
+) -> Option<Point> {
+    /// Each leaves less than a tenth, as the chords of a trace turn little.
+    const STEPS: usize = 20;
+    let corner = trace[0];
+    let after = trace.iter().position(|p| (p - corner).norm() >= distance)?;
+    let (from, chord) = (trace[after - 1], trace[after] - trace[after - 1]);
+    let (low, high) = ((from - corner).norm(), (trace[after] - corner).norm());
+    let mut at = from + chord * ((distance - low) / (high - low));
+    for _ in 0..STEPS {
+        at = project(&at).ok()?;
+        let arm = at - corner;
+        let lack = distance - arm.norm();
+        if lack.abs() <= f64::EPSILON * distance {
+            break;
+        }
+        at += chord * (lack * arm.norm() / arm.dot(&chord));
+    }
+    at = project(&at).ok()?;
+    Some(at)
+}
+
 /// The point of both surfaces to which Newton's method leads from `point`, each step the shortest one that
 /// solves both linearised equations (it lies in the plane of the two gradients).
 ///

@@ -10,6 +10,7 @@ use crate::refine::Bends;
 use crate::size::{GeometricSize, SizeField, SizeSettings, Source};
 use crate::surface::closeness::{ThinWalls, Walls, thin_walls};
 use crate::surface::curves::{CurveError, crowded, mesh_curves};
+use crate::surface::narrow::narrow;
 use crate::surface::{self, SurfaceError, SurfaceMesh};
 use crate::volume::{self, ClosedSurface, SurfaceFaults, VolumeError};
 use csg::{BodyId, PatchId};
@@ -229,7 +230,8 @@ pub(super) fn mesh_surface(
 ) -> Result<(SurfaceMesh, Vec<[Point; 2]>), Unmeshed> {
     let CsgModel { geometry, features, projector } = model;
     let curves = mesh_curves(features, projector, size).map_err(|error| Unmeshed::Failed(error.into()))?;
-    let crowded = crowded(&curves, features, size);
+    let mut crowded = crowded(&curves, features, size);
+    crowded.extend(narrow(&curves, features, projector, size));
     if may_lower && !crowded.is_empty() {
         return Err(Unmeshed::Lower(crowded));
     }

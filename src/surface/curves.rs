@@ -4,7 +4,7 @@
 //! section 3), but never so few that a segment turns by more than 60°, that two curves share
 //! an edge, or that its chord comes near another curve.
 
-use super::SurfaceMesh;
+use super::{SurfaceMesh, cusp};
 use crate::mesh::{Class, Segment, VertexId};
 use crate::size::{SizeField, Source};
 use crate::{Point, Vector};
@@ -66,17 +66,20 @@ pub fn mesh_curves(
             .collect::<Result<Vec<Point>, _>>()
             .map_err(|failed| CurveError { curve: id, failed })
     };
+    let is_origin = |i: usize| origins.curves[i].is_none();
+    let of_origin = |i: usize| if is_origin(i) { placed(i) } else { Ok(Vec::new()) };
+    let mut inner = (0..counts.len()).map(of_origin).collect::<Result<Vec<_>, _>>()?;
+    cusp::align(features, projector, &is_origin, &mut inner);
     for (i, curve) in features.curves.iter().enumerate() {
         let inner = match origins.curves[i] {
             Some(origin) => {
-                let mut points: Vec<Point> =
-                    placed(origin.index)?.into_iter().map(|p| origin.motion * p).collect();
+                let mut points: Vec<Point> = inner[origin.index].iter().map(|p| origin.motion * p).collect();
                 if origin.reversed {
                     points.reverse();
                 }
                 points
             }
-            None => placed(i)?,
+            None => inner[i].clone(),
         };
         add_curve(&mut mesh, CurveId::new(i), curve, inner);
     }
@@ -217,7 +220,8 @@ pub fn crowded(mesh: &SurfaceMesh, features: &Features, size: &dyn SizeField) ->
                 continue;
             }
             let (distance, at) = segment_distance(ends(i), ends(j));
-            if distance < CLEARANCE * (sagittas[i] + sagittas[j]) {
+            let is_near = distance < CLEARANCE * (sagittas[i] + sagittas[j]);
+            if is_near && !cusp::are_aligned(mesh, features, [s, t]) {
                 let [a, b] = ends(if sagittas[i] >= sagittas[j] { i } else { j });
                 let used = size.size_at(&at).min((b - a).norm());
                 sources.push(Source { point: at, size: SHORTENED * used });

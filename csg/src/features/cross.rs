@@ -9,6 +9,7 @@ use crate::project::project_to_both;
 use crate::{Geometry, Interval, Point, Surface, SurfaceId, Vector};
 use nalgebra::Matrix3;
 use std::collections::BTreeMap;
+use std::iter;
 
 /// A point where another surface crosses or touches a trace.
 #[derive(Clone, Copy, Debug)]
@@ -44,29 +45,38 @@ pub(super) fn crossings(
             }
             let third = &geometry.surfaces[id.index()];
             let matters = |cell: &Cell| tree.surfaces_in(cell).binary_search(&id).is_ok();
+            // Where it is tangent to one of the pair, what crosses their seam says where well.
+            let instead = auxiliaries(geometry, trace.pair, id);
+            let asked = if instead.is_empty() { vec![third] } else { instead };
             let mut finder = Finder { a, b, third, matters: &matters, tolerances, found: Vec::new() };
-            if !finder.contains_curve(ends) {
-                // Where it is tangent to one of the pair, what crosses their seam says where well.
-                if let Some(auxiliary) = auxiliary(geometry, trace.pair, id) {
-                    finder.third = auxiliary;
-                    if !finder.contains_curve(ends) {
-                        finder.find(&ends[0], &ends[1], 0);
-                    }
-                    finder.found.retain(|p| third.distance(p) <= tolerances.merge);
-                } else {
+            if finder.contains_curve(ends) {
+                continue;
+            }
+            for surface in asked {
+                finder.third = surface;
+                if !finder.contains_curve(ends) {
                     finder.find(&ends[0], &ends[1], 0);
                 }
+                finder.found.retain(|p| third.distance(p) <= tolerances.merge);
+                by_surface.entry(id).or_default().extend(finder.crossings(index, ends));
             }
-            let third = finder.third;
-            by_surface.entry(id).or_default().extend(finder.found.iter().map(|&point| {
-                let position = index as f64 + along(ends, &point).unwrap_or_else(|| nearer_end(ends, &point));
-                Crossing { position, point, volume: volume(&[a, b, third], &point) }
-            }));
         }
-        for user in &geometry.user_points {
-            let on_both = a.distance(&user.point).max(b.distance(&user.point)) <= tolerances.on_surface;
-            if let (true, Some(part)) = (on_both, along(ends, &user.point)) {
-                found.push(Crossing { position: index as f64 + part, point: user.point, volume: 0.0 });
+        // Where what two tangent surfaces have in common parts.
+        for id in companions(geometry, tree, trace.pair) {
+            let third = &geometry.surfaces[id.index()];
+            let mut finder = Finder { a, b, third, matters: &|_| true, tolerances, found: Vec::new() };
+            if !finder.contains_curve(ends) {
+                finder.find(&ends[0], &ends[1], 0);
+                by_surface.entry(id).or_default().extend(finder.crossings(index, ends));
+            }
+        }
+        let sewn = tree.sewn_pairs(trace.pair).iter().flatten();
+        let apices = sewn.filter_map(|s| geometry.surfaces[s.index()].apex());
+        let given = geometry.user_points.iter().map(|user| user.point);
+        for point in given.chain(apices) {
+            let on_both = a.distance(&point).max(b.distance(&point)) <= tolerances.on_surface;
+            if let (true, Some(part)) = (on_both, along(ends, &point)) {
+                found.push(Crossing { position: index as f64 + part, point, volume: 0.0 });
             }
         }
     }
@@ -112,13 +122,23 @@ fn settled(
     tree.contacts.iter().find(is_same).map_or(at, |contact| contact.point)
 }
 
-/// The surface that cuts the seam of a third surface and one of a pair, if that seam is all the two have in common.
-fn auxiliary(geometry: &Geometry, pair: [SurfaceId; 2], third: SurfaceId) -> Option<&Surface> {
-    pair.into_iter().find_map(|s| {
-        let seam = geometry.seam([s.min(third), s.max(third)]).filter(|seam| seam.is_alone)?;
-        let id = seam.carrier.into_iter().find(|c| !seam.pair.contains(c))?;
-        Some(&geometry.surfaces[id.index()])
-    })
+/// The surfaces that cut one of a pair in all that it has in common with a third surface, if the two are tangent along a seam and these
+/// are known.
+fn auxiliaries(geometry: &Geometry, pair: [SurfaceId; 2], third: SurfaceId) -> Vec<&Surface> {
+    let seam_with = |s: SurfaceId| geometry.seam([s.min(third), s.max(third)]).filter(|seam| seam.is_alone);
+    let Some(seam) = pair.into_iter().find_map(seam_with) else { return Vec::new() };
+    let carriers = iter::once(seam.carrier).chain(seam.rest).flatten();
+    carriers.filter(|c| !seam.pair.contains(c)).map(|c| &geometry.surfaces[c.index()]).collect()
+}
+
+/// The surfaces that cut what else two surfaces have in common that are tangent along the intersection of a pair.
+fn companions(geometry: &Geometry, tree: &Octree, pair: [SurfaceId; 2]) -> Vec<SurfaceId> {
+    let seams = tree.sewn_pairs(pair).iter().filter_map(|&sewn| geometry.seam(sewn));
+    let carriers = seams.filter_map(|seam| Some([seam.carrier, seam.rest?])).flatten().flatten();
+    let mut found: Vec<SurfaceId> = carriers.filter(|c| !pair.contains(c)).collect();
+    found.sort_unstable();
+    found.dedup();
+    found
 }
 
 /// The crossings of one surface without repetitions: where the trace is on the surface all the way between two of them,
@@ -171,6 +191,15 @@ struct Finder<'a> {
 }
 
 impl Finder<'_> {
+    /// The crossings at the points found on the step with this index.
+    fn crossings(&mut self, index: usize, ends: &[Point]) -> Vec<Crossing> {
+        let crossing = |point: Point| {
+            let position = index as f64 + along(ends, &point).unwrap_or_else(|| nearer_end(ends, &point));
+            Crossing { position, point, volume: volume(&[self.a, self.b, self.third], &point) }
+        };
+        self.found.drain(..).map(crossing).collect()
+    }
+
     /// Whether the step lies in the third surface.
     fn contains_curve(&self, ends: &[Point]) -> bool {
         let near = |p: &Point| self.third.distance(p) <= self.tolerances.on_surface;

@@ -10,6 +10,7 @@ use crate::solid::{Pruned, prune_in};
 use crate::{BodyId, Geometry, Interval, Point, Solid, Surface, SurfaceId, Vector};
 use std::cell::OnceCell;
 use std::collections::BTreeMap;
+use std::iter;
 
 /// A cell in which any two surfaces are told apart.
 #[derive(Debug)]
@@ -43,7 +44,7 @@ pub(super) struct Octree {
     pub leaves: Vec<Leaf>,
     /// Places where surfaces of a cell touch or cross too flatly for curves to be monotone.
     pub contacts: Vec<Contact>,
-    /// By the surfaces that carry seams: the pairs of which they are seams.
+    /// By the surfaces that carry seams, or the rest of what their surfaces have in common: the pairs that they stand for.
     seams: BTreeMap<[SurfaceId; 2], Vec<[SurfaceId; 2]>>,
 }
 
@@ -78,7 +79,9 @@ impl Octree {
         let cutouts = (0..).zip(geometry.cutouts.iter().map(|cutout| cutout.solid.clone())).collect();
         let mut seams: BTreeMap<[SurfaceId; 2], Vec<[SurfaceId; 2]>> = BTreeMap::new();
         for seam in &geometry.seams {
-            seams.entry(seam.carrier).or_default().push(seam.pair);
+            for carrier in iter::once(seam.carrier).chain(seam.rest) {
+                seams.entry(carrier).or_default().push(seam.pair);
+            }
         }
         let nodes = vec![Node::Leaf(0)];
         let mut tree = Self { root, nodes, leaves: Vec::new(), contacts: Vec::new(), seams };
@@ -146,13 +149,17 @@ impl Octree {
 
     /// Whether a surface is one of those whose seam a pair carries.
     pub fn is_seam(&self, pair: [SurfaceId; 2], surface: SurfaceId) -> bool {
-        self.seams.get(&pair).into_iter().flatten().flatten().any(|&s| s == surface)
+        self.sewn_pairs(pair).iter().flatten().any(|&s| s == surface)
     }
 
     /// The surfaces that matter in a leaf and are tangent along the intersection of a pair that carries their seams.
     pub fn sewn<'a>(&'a self, leaf: &'a Leaf, pair: [SurfaceId; 2]) -> impl Iterator<Item = SurfaceId> + 'a {
-        let pairs = self.seams.get(&pair).into_iter().flatten().copied();
-        pairs.filter(|&sewn| leaf.has_both(sewn)).flatten()
+        self.sewn_pairs(pair).iter().copied().filter(|&sewn| leaf.has_both(sewn)).flatten()
+    }
+
+    /// The pairs of surfaces that are tangent along the intersection of a pair that carries their seams.
+    pub fn sewn_pairs(&self, pair: [SurfaceId; 2]) -> &[[SurfaceId; 2]] {
+        self.seams.get(&pair).map_or(&[], Vec::as_slice)
     }
 
     /// The surfaces that matter anywhere in a box, ascending.
@@ -242,7 +249,9 @@ impl Judge<'_> {
         match self.geometry.seam(pair) {
             None => self.crossing(pair, pairs),
             // Where the seam is all they have in common, its carrier stands for them.
-            Some(seam) if seam.is_alone => self.crossing(seam.carrier, pairs),
+            Some(seam) if seam.is_alone => {
+                iter::once(seam.carrier).chain(seam.rest).all(|carrier| self.crossing(carrier, pairs))
+            }
             Some(seam) => {
                 self.crossing(seam.carrier, pairs)
                     && (self.is_divided(pair)

@@ -12,8 +12,11 @@
 //!
 //! A fourth is that of ellipsoids with the girth of a cylinder or of each other.
 //!
-//! Left to the cells: cones and cylinders tangent along a common line, and ellipsoids tangent elsewhere.
+//! A fifth is that of cones and cylinders with a line in common (`ruled`), which may have a conic in common, too.
+//!
+//! Left to the cells: ellipsoids tangent elsewhere.
 
+use super::ruled::{Contact, tangent_line};
 use crate::geometry::SurfaceInfo;
 use crate::primitive::{
     Cylinder, Ellipse, Ellipsoid, EllipticCone, EllipticCylinder, Plane, Torus, quadric::tangents,
@@ -25,14 +28,23 @@ use crate::{Geometry, Point, Seam, Surface, SurfaceId, Vector};
 const TANGENT_GAP: f64 = 1e-8;
 /// The largest sine of an angle that is none. Directions typed with nine digits are off by 10⁻⁹; over the
 /// length of a part 10⁻⁷ makes a gap ten times as wide as [`TANGENT_GAP`], which no shorter seam notices.
-const PARALLEL: f64 = 1e-7;
+pub(super) const PARALLEL: f64 = 1e-7;
 
 /// A seam before it has ids.
 struct Found {
     /// Which of the two surfaces carries it.
     carrier: usize,
     auxiliary: Surface,
+    /// The surface that cuts the carrier in all else that the two have in common, if there is more.
+    rest: Option<Surface>,
     is_alone: bool,
+}
+
+impl Found {
+    /// A seam that is all that its surfaces have in common.
+    fn alone(carrier: usize, auxiliary: Surface) -> Self {
+        Self { carrier, auxiliary, rest: None, is_alone: true }
+    }
 }
 
 /// Finds the seams of all pairs of surfaces and adds their auxiliary surfaces to the geometry.
@@ -50,8 +62,9 @@ pub fn find_seams(geometry: &mut Geometry) {
             let auxiliary = auxiliary_id(geometry, first, found.auxiliary, tolerance);
             let pair = [i.min(j), i.max(j)].map(SurfaceId::new);
             let carrier = SurfaceId::new([i, j][found.carrier]);
-            let carrier = [carrier.min(auxiliary), carrier.max(auxiliary)];
-            seams.push(Seam { pair, carrier, is_alone: found.is_alone });
+            let carried_with = |other: SurfaceId| [carrier.min(other), carrier.max(other)];
+            let rest = found.rest.map(|rest| carried_with(auxiliary_id(geometry, count, rest, tolerance)));
+            seams.push(Seam { pair, carrier: carried_with(auxiliary), rest, is_alone: found.is_alone });
         }
     }
     // Those that the file tells, but for what was found here.
@@ -107,7 +120,8 @@ fn is_parallel(a: &Vector, b: &Vector) -> bool {
     a.cross(b).norm() <= PARALLEL
 }
 
-fn plane(point: Point, normal: Vector) -> Option<Surface> {
+/// The plane through a point across a direction.
+pub(super) fn plane(point: Point, normal: Vector) -> Option<Surface> {
     Some(Surface::Plane(Plane { point, normal: normal.try_normalize(PARALLEL)? }))
 }
 
@@ -137,9 +151,15 @@ fn line([a, b]: [&Surface; 2], tolerance: f64) -> Option<Found> {
             (1, plane_on_cone(&as_elliptic(c.point, c.axis, c.radius, c.slope), p, tolerance)?)
         }
         (Surface::EllipticCone(c), Surface::Plane(p)) => (1, plane_on_cone(c, p, tolerance)?),
-        _ => return None,
+        _ => {
+            // A cylinder carries it better than a cone: it has no apex.
+            let carrier = usize::from(b.apex().is_none());
+            let ordered = if carrier == 0 { [a, b] } else { [b, a] };
+            let Contact { across, rest } = tangent_line(ordered, tolerance, tolerance / TANGENT_GAP)?;
+            return Some(Found { rest, ..Found::alone(carrier, across) });
+        }
     };
-    Some(Found { carrier, auxiliary, is_alone: true })
+    Some(Found::alone(carrier, auxiliary))
 }
 
 /// A circular cone as an elliptic one: `radius` at `point`, growing by `slope` per unit along `axis`.
@@ -149,7 +169,7 @@ fn as_elliptic(point: Point, axis: Vector, radius: f64, slope: f64) -> EllipticC
 }
 
 /// The part of a vector across a unit vector.
-fn across(vector: &Vector, axis: &Vector) -> Vector {
+pub(super) fn across(vector: &Vector, axis: &Vector) -> Vector {
     vector - axis * vector.dot(axis)
 }
 
@@ -198,7 +218,7 @@ fn tube([a, b]: [&Surface; 2], tolerance: f64) -> Option<Found> {
             let radial = across(&arm, &t.axis);
             (same(radial.norm(), t.major) && same(arm.dot(&t.axis), 0.0)).then_some(())?;
             let auxiliary = plane(s.center, t.axis.cross(&radial) / t.major)?;
-            Some(Found { carrier: 1, auxiliary, is_alone: true })
+            Some(Found::alone(1, auxiliary))
         }
         Surface::Cylinder(c) if same(c.radius, t.minor) => {
             let arm = across(&(c.point - t.center), &c.axis);
@@ -206,11 +226,11 @@ fn tube([a, b]: [&Surface; 2], tolerance: f64) -> Option<Found> {
                 && same(arm.dot(&t.axis), 0.0)
                 && same(arm.norm(), t.major);
             let auxiliary = plane(t.center + arm, c.axis)?;
-            fits.then_some(Found { carrier: 1, auxiliary, is_alone: false })
+            fits.then_some(Found { is_alone: false, ..Found::alone(1, auxiliary) })
         }
         Surface::Torus(s) if same(s.minor, t.minor) => {
             let (point, direction) = where_circles_are_tangent(t, s, tolerance)?;
-            Some(Found { carrier: 0, auxiliary: plane(point, direction)?, is_alone: false })
+            Some(Found { is_alone: false, ..Found::alone(0, plane(point, direction)?) })
         }
         _ => None,
     }
@@ -250,7 +270,7 @@ fn girth([a, b]: [&Surface; 2], tolerance: f64) -> Option<Found> {
             _ => false,
         };
         let auxiliary = plane(e.center, e.axes[k])?;
-        fits.then_some(Found { carrier: 1, auxiliary, is_alone: true })
+        fits.then_some(Found::alone(1, auxiliary))
     })
 }
 
@@ -323,7 +343,7 @@ fn around_axis([a, b]: [&Surface; 2], tolerance: f64) -> Option<Found> {
         )
     };
     let is_alone = !crosses_again(a, b) && !crosses_again(b, a);
-    Some(Found { carrier, auxiliary, is_alone })
+    Some(Found { is_alone, ..Found::alone(carrier, auxiliary) })
 }
 
 /// The meridian of a surface of revolution about an axis, `None` for others.

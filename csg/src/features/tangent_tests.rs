@@ -118,6 +118,44 @@ fn wedges_of_no_angle_are_refused_with_both_names_and_the_place() {
     }
 }
 
+/// Two cones and a slab: tips on the line x = y = 0, tangent along it, the second one's axis to the side `side`.
+fn cones_on_a_line(tips: [f64; 2], side: f64, solid: &str) -> String {
+    let cone = |tip: f64, [x, z, r]: [f64; 3]| format!("cone (0,0,{tip}; 0; {x},0,{}; {r})", tip - z);
+    let [a, b] = [cone(tips[0], [-0.6, 1.44, 0.65]), cone(tips[1], [-1.344 * side, 4.608, 1.4])];
+    format!(
+        "solid a = {a};\nsolid b = {b};\nsolid slab = plane (0,0,0; 0,0,-1) and plane (0,0,2; 0,0,1);
+        solid c = ({solid}) and slab; solid s = translate (3,-1,2; rotate (0.3,0,0; 0.4,0.7,1.1; c)); tlo s;"
+    )
+}
+
+#[test]
+fn cones_tangent_along_a_line_meet_in_an_ellipse_too() {
+    // The wider one below the ellipse, the other above it; with one tip there is no ellipse; from outside both do not meet at all.
+    assert_eq!(counts(&find(&cones_on_a_line([3.0, 4.0], 1.0, "a or b"))), [0, 0, 3, 4]);
+    assert_eq!(counts(&find(&cones_on_a_line([3.0, 4.0], 1.0, "a and b"))), [0, 0, 3, 4]);
+    assert_eq!(counts(&find(&cones_on_a_line([3.0, 3.0], 1.0, "a or b"))), [0, 0, 2, 3]);
+    assert_eq!(counts(&find(&cones_on_a_line([3.0, 4.0], -1.0, "a and not b"))), [0, 0, 2, 3]);
+    for (side, solid) in [(1.0, "a and not b"), (-1.0, "a or b")] {
+        let said = refused(&cones_on_a_line([3.0, 4.0], side, solid));
+        let names = said.contains("(line 2)") && said.contains("(line 3)");
+        assert!(names && said.contains("without crossing"), "{said}");
+    }
+}
+
+#[test]
+fn a_cone_tangent_to_a_rod_takes_turns_with_it() {
+    let parts = "solid rod = cylinder (0,0,0; 0,0,1; 1);\nsolid horn = cone (1,0,5; 0; -0.344,0,0.392; 1.4);
+        solid slab = plane (0,0,0; 0,0,-1) and plane (0,0,3; 0,0,1);";
+    for solid in ["rod or horn", "rod and horn"] {
+        assert_eq!(counts(&find(&format!("{parts} solid s = ({solid}) and slab; tlo s;"))), [0, 0, 3, 4]);
+    }
+    // What is cut off leaves no wedge; one that is left is refused.
+    let cut = format!("{parts} solid s = rod and slab and not horn and plane (0.5,0,0; 1,0,0); tlo s;");
+    assert!(counts(&find(&cut))[3] > 3);
+    let said = refused(&format!("{parts} solid s = rod and slab and not horn; tlo s;"));
+    assert!(said.contains("touch at (1.000000, 0.000000"), "{said}");
+}
+
 #[test]
 fn corners_and_edges_that_touch_the_inside_of_a_face_are_refused() {
     let tip = |z: f64| format!("cone (0,0,{z}; 0.5; 0,0,{}; 0) and plane (0,0,{z}; 0,0,1)", z - 1.0);
@@ -187,6 +225,20 @@ fn a_face_may_end_in_a_cusp_between_curves_that_bend_differently() {
     let step = "solid high = orthobrick (0,-1,-1; 1,1,0.6) and not sphere (0,0,0.5; 0.5);
         solid low = orthobrick (-1,-1,-1; 0,1,0); solid s = high or low; tlo s;";
     assert_eq!(counts(&find(step)), [15, 23, 0, 9]);
+    // Flush with the rod below, a thinner one leaves a crescent with two cusps; one that is hardly thinner leaves none worth the name.
+    let flush = |r: f64| {
+        format!(
+            "solid low = cylinder (0,0,0; 0,0,1; 1) and plane (0,0,0; 0,0,-1) and plane (0,0,1; 0,0,1);
+            solid high = cylinder ({x},0,0; {x},0,1; {r}) and plane (0,0,1; 0,0,-1) and plane (0,0,2; 0,0,1);
+            solid s = low or high; tlo s;",
+            x = 1.0 - r
+        )
+    };
+    for r in [0.25, 0.8, 0.98] {
+        assert_eq!(counts(&find(&flush(r))), [1, 2, 2, 5], "radius {r}");
+    }
+    let reason = refused(&flush(0.999));
+    assert!(reason.contains("cusp") && reason.contains("(1.000000, 0.000000, 1.000000)"), "{reason}");
     // The rim of the rod touches the circle along which the torus touches the rod's end: the torus leaves it with the fourth power.
     let rod = "solid ring = torus (0,0,0; 1,0,0; 0.75; 0.25);
         solid rod = cylinder (-1,0.25,0; 1,0.25,0; 0.5) and plane (-1,0,0; -1,0,0) and plane (0.25,0,0; 1,0,0);

@@ -2,13 +2,20 @@
 
 use super::*;
 use crate::size::{GeometricSize, SizeSettings, UniformSize};
-use crate::surface::curves::mesh_curves;
+use crate::surface::curves::{crowded, mesh_curves};
+use crate::surface::narrow::narrow;
 
-/// The surface mesh of a geometry at moderate sizes.
-fn meshed(text: &str) -> Result<(SurfaceMesh, Features), SurfaceError> {
+/// A geometry with its features.
+fn read(text: &str) -> (Geometry, Features, Projector) {
     let geometry = csg::language::parse_geometry(text, "test.geo").expect("a geometry").geometry;
     let features = Features::find(&geometry).expect("features");
     let projector = Projector::new(&geometry, &features);
+    (geometry, features, projector)
+}
+
+/// The surface mesh of a geometry at moderate sizes.
+fn meshed(text: &str) -> Result<(SurfaceMesh, Features), SurfaceError> {
+    let (geometry, features, projector) = read(text);
     let size = GeometricSize::new(&geometry, &features, &SizeSettings::default());
     let curves = mesh_curves(&features, &projector, &size).expect("curves");
     let (mesh, _) = mesh_patches(&geometry, &features, curves, &size, &Settings::default())?;
@@ -83,4 +90,61 @@ fn a_lens_between_arcs_that_leave_a_corner_at_a_small_angle_asks_for_shorter_seg
         "{failed:?}"
     );
     lens([64, 64]).mesh(&UniformSize(0.5));
+}
+
+#[test]
+fn circles_that_touch_from_inside_are_cut_at_the_same_distances_from_where_they_touch() {
+    let (_, features, projector) = read(
+        "algebraic3d
+solid shaft = cylinder (0, 0, 0; 0, 0, 1; 1) and plane (0, 0, 0; 0, 0, -1) and plane (0, 0, 1; 0, 0, 1);
+solid pin = cylinder (0.2, 0, 0; 0.2, 0, 1; 0.8) and plane (0, 0, 1; 0, 0, -1) and plane (0, 0, 2; 0, 0, 1);
+solid eccentric = shaft or pin;
+tlo eccentric;",
+    );
+    let size = UniformSize(0.25);
+    let curves = mesh_curves(&features, &projector, &size).expect("curves");
+    let cusp = features.corners[0].point;
+    // By curve, how far its vertices are from the cusp, those within half a radius.
+    let ending = (0..).zip(&features.curves).filter(|(_, curve)| curve.ends.is_some());
+    let distances = ending.map(|(id, _)| {
+        let of_curve = curves.segments.iter().filter(|s| s.curve == CurveId(id));
+        let mut near: Vec<f64> = of_curve
+            .map(|s| (curves.points[s.vertices[1].index()] - cusp).norm())
+            .filter(|d| *d < 0.6)
+            .collect();
+        near.sort_by(f64::total_cmp);
+        near
+    });
+    let [outer, inner] =
+        <[Vec<f64>; 2]>::try_from(distances.collect::<Vec<_>>()).expect("two curves end there");
+    assert!(outer.len() > 4 && outer.len() == inner.len());
+    assert!(outer.iter().zip(&inner).all(|(p, q)| (p - q).abs() < 1e-12), "{outer:?} {inner:?}");
+    // Near the cusp the chords are nearer to each other than to their curves, and in order nevertheless.
+    let near = |source: &crate::size::Source| (source.point - cusp).norm() < 0.6;
+    assert!(!crowded(&curves, &features, &size).iter().any(|source| near(source)));
+}
+
+#[test]
+fn segments_beside_a_narrow_band_are_asked_to_be_shorter_and_those_across_a_gap_are_not() {
+    // A disk whose rim is a band, and two blocks whose tops are one patch with a gap between them.
+    let disk = "algebraic3d
+solid disk = cylinder (0, 0, 0; 0, 0, 1; 1) and plane (0, 0, 0; 0, 0, -1) and plane (0, 0, 0.1; 0, 0, 1);
+tlo disk;";
+    let blocks = "algebraic3d
+solid low = orthobrick (0, 0, 0; 2, 1, 1);
+solid high = orthobrick (2.1, 0, 0; 4.1, 1, 1);
+solid blocks = low or high;
+tlo blocks;";
+    let found = |text: &str| {
+        let (_, features, projector) = read(text);
+        let size = UniformSize(0.5);
+        let curves = mesh_curves(&features, &projector, &size).expect("curves");
+        narrow(&curves, &features, &projector, &size)
+    };
+    let sources = found(disk);
+    assert!(
+        !sources.is_empty() && sources.iter().all(|source| (0.1..0.25).contains(&source.size)),
+        "{sources:?}"
+    );
+    assert_eq!(found(blocks), []);
 }

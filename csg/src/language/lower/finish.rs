@@ -116,7 +116,7 @@ impl Lowering<'_> {
                     && a != b
                 {
                     let (pair, carrier) = ([a.min(b), a.max(b)], [a.min(plane), a.max(plane)]);
-                    seams.entry(pair).or_insert(Seam { pair, carrier, is_alone: true });
+                    seams.entry(pair).or_insert(Seam { pair, carrier, rest: None, is_alone: true });
                 }
             }
         }
