@@ -9,10 +9,11 @@
 //!
 //! The points are many: `relocate` takes them off as any others.
 
-use super::constraints::{Facet, Place, edges};
-use super::crossing::{Crossing, crossings, edges_of_tet, tets_around};
+use super::constraints::{Facet, edges};
+use super::crossing::{crossings, edges_of_tet};
 use super::recover::{DEEPEST, Recovery};
 use super::tetrahedra::{NONE, Ring, sorted};
+use crate::kernel::fixed::Fixed;
 use crate::kernel::predicates::Sign;
 use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet};
@@ -23,6 +24,9 @@ const MOST_POINTS: usize = 15_000;
 
 /// How often what was left is tried again.
 const ROUNDS: u32 = 10;
+
+/// How often points are taken off the edges: each round may let others go, hardly any after the second.
+const THINNINGS: usize = 4;
 
 /// How often the edges through a triangle may be flipped away before they are split: flips may bring others.
 const FLIPS: usize = 10;
@@ -51,6 +55,9 @@ impl Recovery<'_> {
     pub fn conform(&mut self) -> Result<(), Vec<u32>> {
         let missing = self.missing_facets();
         self.counts.missing_faces = missing.len();
+        if !missing.is_empty() && self.mesh.points.iter().any(|p| Fixed::of(p).is_none()) {
+            return Err(missing);
+        }
         self.most_steiner = MOST_POINTS;
         self.give_help(HELPED);
         self.flips.never_flat = true;
@@ -69,8 +76,10 @@ impl Recovery<'_> {
         let mut cut = Cut::default();
         cut.missing.extend(wanted.into_iter().map(|edge| (edge, edge)));
         for depth in 0..=DEEPEST {
-            self.cut_edges(depth, &mut cut);
+            cut.missing.retain(|&(_, [a, b])| !self.recover_edge(a, b, depth));
         }
+        self.cut_edges(DEEPEST, &mut cut);
+        self.thin_edges(&mut cut);
         let left = self.cut_triangles(missing, &mut cut);
         self.flips.never_flat = false;
         for [a, b] in self.constraints.kept_edges() {
@@ -95,15 +104,86 @@ impl Recovery<'_> {
                     None => cut.missing.push((edge, [a, b])),
                 }
             }
+            if cut.missing.last().is_none_or(|last| last.0 != edge) {
+                self.thin_edge(edge, cut);
+            }
         }
+    }
+
+    /// The points on an edge of the surface, from its first end on.
+    fn points_on(&self, [from, to]: [u32; 2], cut: &Cut) -> Vec<u32> {
+        let along = self.mesh.point(to) - self.mesh.point(from);
+        let axis = along.iamax();
+        let mut points = cut.on_edge.get(&[from.min(to), from.max(to)]).cloned().unwrap_or_default();
+        points.sort_by_cached_key(|&v| self.mesh.place(v).key(axis));
+        if along[axis] < 0.0 {
+            points.reverse();
+        }
+        points
+    }
+
+    /// Takes points off the edges of the surface as long as that goes on.
+    fn thin_edges(&mut self, cut: &mut Cut) {
+        let whole = |edge: &[u32; 2]| cut.missing.iter().all(|(missing, _)| missing != edge);
+        let edges: Vec<[u32; 2]> = cut.on_edge.keys().copied().filter(whole).collect();
+        for _ in 0..THINNINGS {
+            if edges.iter().map(|&edge| self.thin_edge(edge, cut)).sum::<usize>() == 0 {
+                break;
+            }
+        }
+    }
+
+    /// Takes points off an edge of the surface that are not needed any more, as the mesh has changed since.
+    fn thin_edge(&mut self, edge: [u32; 2], cut: &mut Cut) -> usize {
+        let points = self.points_on(edge, cut);
+        let mut left = vec![edge[0]];
+        for (i, &p) in points.iter().enumerate() {
+            let u = *left.last().expect("an end");
+            let w = points.get(i + 1).copied().unwrap_or(edge[1]);
+            if !self.merge_pieces(u, p, w) {
+                left.push(p);
+            }
+        }
+        left.remove(0);
+        let gone = points.len() - left.len();
+        cut.on_edge.insert(edge, left);
+        gone
+    }
+
+    /// Makes one edge of two pieces of an edge of the surface if one of their ends sees all of the ball of the point between.
+    fn merge_pieces(&mut self, u: u32, p: u32, w: u32) -> bool {
+        self.mesh.star(p, &mut self.star);
+        let skin: Vec<[u32; 3]> = self
+            .star
+            .iter()
+            .map(|&t| self.mesh.face(4 * t + self.mesh.index_of(t, p).expect("a tet at p") as u32))
+            .collect();
+        let sees = |v: &u32| {
+            skin.iter().filter(|f| !f.contains(v)).all(|&f| self.mesh.side(f, *v) == Sign::Negative)
+        };
+        let Some(apex) = [u, w].into_iter().find(sees) else { return false };
+        let tets: Vec<[u32; 4]> =
+            skin.iter().filter(|f| !f.contains(&apex)).map(|&[a, b, c]| [apex, a, b, c]).collect();
+        let star = std::mem::take(&mut self.star);
+        let body = self.mesh.bodies[star[0] as usize];
+        self.mesh.replace(&star, &tets, body, &mut self.flips.made);
+        self.star = star;
+        self.mesh.at_vertex[p as usize] = NONE;
+        self.constraints.forget_edge(u, p);
+        self.constraints.forget_edge(p, w);
+        self.constraints.keep_edge(u, w);
+        self.constraints.forget_place(p);
+        self.steiner.retain(|&q| q != p);
+        true
     }
 
     /// Splits a piece of an edge of the surface where it crosses the mesh.
     fn cut_edge(&mut self, edge: [u32; 2], [a, b]: [u32; 2]) -> Option<u32> {
         let mut found = std::mem::take(&mut self.found);
         crossings(self.mesh, a, b, &mut self.star, &mut found);
-        let room = self.room_on_line(a, b, Place::Edge(edge));
-        let added = self.split_at(a, b, &found, &room);
+        let mut order: Vec<usize> = (0..found.len()).collect();
+        order.sort_by_key(|&i| (2 * i + 1).abs_diff(found.len()));
+        let added = order.into_iter().find_map(|i| self.split_exactly(edge, [a, b], found[i]));
         self.found = found;
         let p = added?;
         self.constraints.forget_edge(a, b);
@@ -135,7 +215,7 @@ impl Recovery<'_> {
         let Some(outline) = self.outline(vertices, cut) else { return false };
         let mut on: BTreeSet<u32> = outline.iter().map(|side| side.0[0]).collect();
         on.extend(cut.inside.get(&t).into_iter().flatten());
-        let room = self.room_in_facet(Facet { vertices, triangle: t, gone: false });
+        let facet = Facet { vertices, triangle: t, gone: false };
         let (mut fewest, mut in_vain) = (usize::MAX, 0);
         let faces = loop {
             let Some(trace) = self.trace_triangle(vertices, &outline, &on) else { return false };
@@ -161,10 +241,8 @@ impl Recovery<'_> {
             }
             for &(_, [u, v]) in &trace.through {
                 let Some(tet) = self.mesh.tet_at_edge(u, v, &mut self.star) else { continue };
-                let point = self.piercing_point(vertices, [u, v]);
-                let tets = tets_around(self.mesh, Crossing::Edge(tet, [u, v]));
                 if !self.constraints.has_edge(u, v)
-                    && let Some(p) = self.add_steiner(&tets, point, &room)
+                    && let Some(p) = self.pierce_exactly(facet, tet, [u, v])
                 {
                     on.insert(p);
                     cut.inside.entry(t).or_default().push(p);
@@ -176,14 +254,6 @@ impl Recovery<'_> {
                 return false;
             }
         };
-        for &p in cut.inside.get(&t).into_iter().flatten() {
-            if !faces.values().any(|face| face.contains(&p)) {
-                // Rounding put it beside the triangle.
-                self.constraints.forget_place(p);
-                self.steiner.retain(|&q| q != p);
-                self.helping.push(p);
-            }
-        }
         for face in faces.into_values() {
             self.constraints.add(face, t);
         }
@@ -194,10 +264,7 @@ impl Recovery<'_> {
     fn outline(&mut self, [a, b, c]: [u32; 3], cut: &Cut) -> Option<Vec<([u32; 2], u32)>> {
         let mut outline = Vec::new();
         for [from, to, opposite] in [[a, b, c], [b, c, a], [c, a, b]] {
-            let [p, q] = [from, to].map(|v| *self.mesh.point(v));
-            let far = |v: &u32| (self.mesh.point(*v) - p).dot(&(q - p));
-            let mut points = cut.on_edge.get(&[from.min(to), from.max(to)]).cloned().unwrap_or_default();
-            points.sort_by(|u, v| far(u).total_cmp(&far(v)));
+            let mut points = self.points_on([from, to], cut);
             points.insert(0, from);
             points.push(to);
             outline.extend(points.windows(2).map(|piece| ([piece[0], piece[1]], opposite)));

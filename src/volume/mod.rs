@@ -45,6 +45,7 @@ mod conform;
 mod constraints;
 mod crossing;
 mod delaunay;
+mod exact;
 mod finish;
 mod flat;
 mod flips;
@@ -59,6 +60,7 @@ mod points;
 mod polygon;
 mod recover;
 mod relocate;
+mod round;
 #[cfg(test)]
 mod samples;
 mod sectors;

@@ -96,8 +96,6 @@ pub(super) struct Recovery<'a> {
     pub(super) most_steiner: usize,
     /// How many edges may still be tried to help in all: where nothing goes on, the time must end.
     help_left: u64,
-    /// How many there were to be tried in all.
-    given: u64,
     attempt: u32,
 }
 
@@ -117,7 +115,6 @@ impl<'a> Recovery<'a> {
             found: Vec::new(),
             most_steiner: 0,
             help_left: 0,
-            given: 0,
             attempt,
         }
     }
@@ -334,12 +331,6 @@ impl<'a> Recovery<'a> {
     pub(super) fn give_help(&mut self, edges: usize) {
         let more = (u64::from(HELP) * edges as u64).saturating_sub(self.help_left);
         self.help_left += more;
-        self.given += more;
-    }
-
-    /// How many edges were tried to help.
-    pub fn help_spent(&self) -> u64 {
-        self.given - self.help_left - u64::from(self.flips.budget)
     }
 
     /// Gives the flips their share of the help that is left, and takes back what was not used of the last.
@@ -369,7 +360,7 @@ impl<'a> Recovery<'a> {
             }
         }
         self.found = found;
-        done
+        done || self.mesh.tet_at_edge(a, b, &mut self.star).is_some()
     }
 
     /// Flips something of what the edge from `a` to `b` crosses.

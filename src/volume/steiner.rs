@@ -25,11 +25,11 @@ const OFF_ENDS: f64 = 1e-10;
 
 /// The edge or facet that a Steiner point is to split.
 pub(super) struct Room {
-    place: Place,
+    pub place: Place,
     /// The directions in which the point may move.
-    axes: Vec<Vector>,
+    pub axes: Vec<Vector>,
     /// How far.
-    ends: Vec<Plane>,
+    pub ends: Vec<Plane>,
 }
 
 impl Room {
