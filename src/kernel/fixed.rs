@@ -198,3 +198,84 @@ pub fn bits_of(number: f64, bits: usize) -> Vec<bool> {
         })
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::kernel::predicates::orient3d;
+    use crate::kernel::random::Random;
+
+    fn random_point(random: &mut Random) -> Point {
+        Point::from([0; 3].map(|_| 2.0 * random.unit() - 1.0))
+    }
+
+    #[test]
+    fn doubles_are_held_as_they_are() {
+        for x in [0.0, -0.0, 1.0, -1.0, 0.1, -1e-9, 1e-56, 1023.9] {
+            let p = Point::new(x, -x, 0.3);
+            assert_eq!(Fixed::of(&p).map(|f| f.rounded()), Some(p), "{x}");
+        }
+        for x in [1e-60, 5e-324, 1024.0, f64::INFINITY, f64::NAN] {
+            assert_eq!(Fixed::of(&Point::new(0.0, x, 0.0)), None, "{x}");
+        }
+    }
+
+    #[test]
+    fn points_of_edges_and_triangles_lie_exactly_there() {
+        let mut random = Random::new(7);
+        for _ in 0..200 {
+            let [a, b, c, d] = [0; 4].map(|_| Fixed::of(&random_point(&mut random)).unwrap());
+            let bits =
+                |random: &mut Random| -> Vec<bool> { (0..60).map(|_| random.bits() % 2 == 0).collect() };
+            let (s, t) = (bits(&mut random), bits(&mut random));
+            let on_edge = a.along([b.minus(&a)], [&s]).unwrap();
+            assert_eq!(orient3d_fixed([&a, &b, &on_edge, &d]), Sign::Zero);
+            assert_eq!(orient2d_fixed([0, 1], [&a, &b, &on_edge]), Sign::Zero);
+            let inside = a.along([b.minus(&a), c.minus(&a)], [&s, &t]).unwrap();
+            assert_eq!(orient3d_fixed([&a, &b, &c, &inside]), Sign::Zero);
+            // The rounded point is beside, nearly always, and the filter knows that it does not know.
+            assert_eq!(orient3d_rounded([&a, &b, &c, &inside].map(|p| p.rounded()).each_ref()), None);
+        }
+        let unit = Fixed::of(&Point::new(2f64.powi(-240), 0.0, 0.0)).unwrap();
+        assert_eq!(unit.halved(), None);
+    }
+
+    #[test]
+    fn what_the_filter_says_is_so_whatever_the_points_were_rounded_from() {
+        let mut random = Random::new(8);
+        let mut certain = 0;
+        for case in 0..2000 {
+            let near = 2f64.powi(-(case % 50));
+            let origin = random_point(&mut random) * 0.9;
+            let places = [0; 4].map(|_| {
+                let p = Fixed::of(&(origin + random_point(&mut random).coords * (0.05 * near))).unwrap();
+                let q = Fixed::of(&random_point(&mut random)).unwrap();
+                // A little away, by less than doubles tell.
+                p.along([q.minus(&p)], [&[false; 55]]).unwrap()
+            });
+            let exact = orient3d_fixed(places.each_ref());
+            let found = orient3d_rounded(places.map(|p| p.rounded()).each_ref());
+            assert!(found.is_none_or(|sign| sign == exact), "case {case}");
+            certain += usize::from(found.is_some());
+            let doubles = places.map(|p| p.rounded());
+            let [a, b, c, d] = doubles.each_ref();
+            assert_eq!(
+                orient3d_fixed(doubles.map(|p| Fixed::of(&p).unwrap()).each_ref()),
+                orient3d(a, b, c, d)
+            );
+        }
+        assert!(certain > 500, "{certain}");
+    }
+
+    #[test]
+    fn bits_of_shares_are_those_of_the_quotient() {
+        let [o, x, y, z] = [[0., 0., 0.], [1., 0., 0.], [0., 1., 0.], [0., 0., 1.]].map(Point::from);
+        let volume_to = |top: f64| volume([o, x, y, z * top].map(|p| Fixed::of(&p).unwrap()).each_ref());
+        let (one, other) = (volume_to(0.75), volume_to(-2.0));
+        let value =
+            |bits: Vec<bool>| bits.iter().rev().fold(0.0, |sum, &bit| 0.5 * (sum + f64::from(u8::from(bit))));
+        assert!((value(share(one, [one, other], 50)) - 0.75 / 2.75).abs() < 1e-14);
+        assert_eq!(bits_of(0.625, 4), [true, false, true, false]);
+        assert_eq!(share(one, [one], 3), [true; 3]);
+    }
+}

@@ -10,14 +10,18 @@ use super::constraints::{Facet, Place};
 use super::crossing::{Crossing, tets_around};
 use super::recover::Recovery;
 use super::steiner::Room;
-use super::tetrahedra::Tetrahedra;
+use super::tetrahedra::{NONE, Tetrahedra};
 use crate::kernel::fixed::{Fixed, Volume, bits_of, share, volume};
 use crate::kernel::predicates::Sign;
 use crate::kernel::simplex::area_vector;
 use crate::{Point, Vector};
+use std::collections::BTreeSet;
 
 /// How many bits are tried where there is no room to be seen in floating point: more each time, up to what [`Fixed`] holds.
 const BITS: usize = 8;
+
+/// A point takes in no more tets.
+const MOST_TETS: usize = 64;
 
 /// No number has more.
 const MOST_BITS: usize = 240;
@@ -29,8 +33,10 @@ impl Recovery<'_> {
         edge: [u32; 2],
         [a, b]: [u32; 2],
         crossing: Crossing,
+        others: &[Crossing],
     ) -> Option<u32> {
         let tets = tets_around(self.mesh, crossing);
+        let more: BTreeSet<u32> = others.iter().flat_map(|&c| tets_around(self.mesh, c)).collect();
         let plane = self.plane_of(edge, crossing, &tets)?;
         let point = self.crossing_point(a, b, crossing);
         let place = Place::Edge(edge);
@@ -42,7 +48,7 @@ impl Recovery<'_> {
             let [p, q] = edge.map(|v| volume_between(mesh, plane, v));
             [share(p, [p, q], MOST_BITS)]
         };
-        self.star_exactly(&tets, edge, (&point, &room), part, exact)
+        self.star_exactly((&tets, &more), edge, (&point, &room), part, exact)
     }
 
     /// Three vertices whose plane an edge passes through where it meets the mesh.
@@ -59,7 +65,13 @@ impl Recovery<'_> {
     }
 
     /// Puts a Steiner point in a triangle of the surface where an edge of the mesh goes through it.
-    pub(super) fn pierce_exactly(&mut self, facet: Facet, tet: u32, [u, v]: [u32; 2]) -> Option<u32> {
+    pub(super) fn pierce_exactly(
+        &mut self,
+        facet: Facet,
+        tet: u32,
+        [u, v]: [u32; 2],
+        more: &BTreeSet<u32>,
+    ) -> Option<u32> {
         let tets = tets_around(self.mesh, Crossing::Edge(tet, [u, v]));
         let triangle = facet.vertices;
         let point = self.piercing_point(triangle, [u, v]);
@@ -75,14 +87,14 @@ impl Recovery<'_> {
             let [p, q, r] = [[b, c], [c, a], [a, b]].map(|[x, y]| volume_between(mesh, [u, v, x], y));
             [q, r].map(|side| share(side, [p, q, r], MOST_BITS))
         };
-        self.star_exactly(&tets, triangle, (&point, &room), part, exact)
+        self.star_exactly((&tets, more), triangle, (&point, &room), part, exact)
     }
 
     /// Stars tets from a point of the edge or triangle between `corners`: near a place where it has most room, else near enough to where
     /// that is crossed. `part` gives the weights of all corners but the first at a place, `exact` those where it is crossed.
     fn star_exactly<const N: usize, const K: usize>(
         &mut self,
-        tets: &[u32],
+        (tets, more): (&[u32], &BTreeSet<u32>),
         corners: [u32; N],
         (near, room): (&Point, &Room),
         part: impl Fn(&Point) -> [f64; K],
@@ -104,19 +116,19 @@ impl Recovery<'_> {
                 ((reach / radius).log2().ceil() + 2.0).clamp(1.0, f64::from(f64::MANTISSA_DIGITS)) as usize;
             let weights = part(&best).map(|t| bits_of(t.clamp(0.0, 1.0), bits));
             let place = corners[0].along(ways, weights.each_ref().map(|bits| &bits[..]));
-            if let Some(p) = place.and_then(|place| self.star_from(tets, &place, room.place)) {
+            if let Some(p) = place.and_then(|place| self.star_from(tets, more, &place, room.place)) {
                 return Some(p);
             }
         }
         let weights = exact(self.mesh);
         (BITS..=MOST_BITS).step_by(BITS).find_map(|bits| {
             let place = corners[0].along(ways, weights.each_ref().map(|all| &all[..bits]))?;
-            self.star_from(tets, &place, room.place)
+            self.star_from(tets, more, &place, room.place)
         })
     }
 
     /// Stars the tets of the cavity from a place if all its walls see that.
-    fn star_from(&mut self, tets: &[u32], at: &Fixed, place: Place) -> Option<u32> {
+    fn star_from(&mut self, tets: &[u32], more: &BTreeSet<u32>, at: &Fixed, place: Place) -> Option<u32> {
         let points = self.mesh.points.len();
         let p = self.mesh.add_exact_point(at);
         let sees = |&wall: &u32| self.mesh.side(self.mesh.face(wall), p) == Sign::Negative;
@@ -124,14 +136,42 @@ impl Recovery<'_> {
             self.mesh.forget_points(points);
             return None;
         }
-        // There is one vertex more than when the cavity was looked at.
-        self.cavity.take(self.mesh, tets);
+        self.take_more(tets, more, p);
         let body = self.mesh.bodies[tets[0] as usize];
         self.cavity.fill(self.mesh, p, body);
         self.constraints.set_place(p, place);
         self.steiner.push(p);
         self.counts.steiner += 1;
         Some(p)
+    }
+}
+
+impl Recovery<'_> {
+    /// Takes tets and `more` beside them as long as all walls see a point and what must stay does so.
+    fn take_more(&mut self, tets: &[u32], more: &BTreeSet<u32>, p: u32) {
+        let mut tets = tets.to_vec();
+        self.cavity.take(self.mesh, &tets);
+        let mut open = self.cavity.walls.clone();
+        while let Some(wall) = open.pop() {
+            let behind = self.mesh.across(wall);
+            let t = behind >> 2;
+            if behind == NONE || tets.len() == MOST_TETS || !more.contains(&t) || tets.contains(&t) {
+                continue;
+            }
+            let outer = |h: &u32| !tets.contains(&(self.mesh.across(*h) >> 2));
+            let walls: Vec<u32> = (4 * t..4 * t + 4).filter(|h| *h != behind).filter(outer).collect();
+            if walls.iter().any(|&h| self.mesh.side(self.mesh.face(h), p) != Sign::Negative) {
+                continue;
+            }
+            tets.push(t);
+            self.cavity.take(self.mesh, &tets);
+            if self.cavity.is_simple() && self.keeps_edges(&tets) {
+                open.extend(walls);
+            } else {
+                tets.pop();
+            }
+        }
+        self.cavity.take(self.mesh, &tets);
     }
 }
 

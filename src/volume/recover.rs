@@ -50,7 +50,11 @@ const MOST_ON_EDGE: usize = 16;
 const MOST_INSIDE: usize = 1;
 
 /// How many generations may pass without fewer missing facets than ever before.
-const PATIENCE: usize = 5;
+const PATIENCE: usize = 3;
+
+/// How many points there may be for each edge that was missing at first. Attempts that end well need up to 2; those with more take tens of seconds,
+/// where exact points take some (`conform`).
+const MOST_FOR_EDGE: usize = 2;
 
 /// What an edge must be shorter than the one it replaces by, so that rounding has no say.
 const LESS: f64 = 1.0 - 1e-6;
@@ -157,7 +161,9 @@ impl<'a> Recovery<'a> {
             generation = self.steiner.len() - before;
             in_vain = if missing.len() < fewest { 0 } else { in_vain + 1 };
             fewest = fewest.min(missing.len());
-            if in_vain == PATIENCE {
+            if in_vain == PATIENCE
+                || self.steiner.len() > LEAST_STEINER + MOST_FOR_EDGE * self.counts.missing_edges
+            {
                 break;
             }
             if generation == 0 {

@@ -224,7 +224,7 @@ impl Recovery<'_> {
     }
 
     /// Whether the facets and their edges among some tets are all on the surface of the cavity they make.
-    fn keeps_edges(&self, tets: &[u32]) -> bool {
+    pub(super) fn keeps_edges(&self, tets: &[u32]) -> bool {
         let outer = |h: &u32| {
             let other = self.mesh.across(*h);
             other == NONE || !tets.contains(&(other >> 2))
