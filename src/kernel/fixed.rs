@@ -225,8 +225,9 @@ mod tests {
         let mut random = Random::new(7);
         for _ in 0..200 {
             let [a, b, c, d] = [0; 4].map(|_| Fixed::of(&random_point(&mut random)).unwrap());
-            let bits =
-                |random: &mut Random| -> Vec<bool> { (0..60).map(|_| random.bits() % 2 == 0).collect() };
+            let bits = |random: &mut Random| -> Vec<bool> {
+                (0..60).map(|_| random.bits().is_multiple_of(2)).collect()
+            };
             let (s, t) = (bits(&mut random), bits(&mut random));
             let on_edge = a.along([b.minus(&a)], [&s]).unwrap();
             assert_eq!(orient3d_fixed([&a, &b, &on_edge, &d]), Sign::Zero);
