@@ -129,7 +129,7 @@ pub struct Report {
     pub steiner_inside: usize,
     /// Points that had to stay on kept edges: each cuts one in two.
     pub on_kept_edges: usize,
-    /// How often the recovery was begun anew: by points alone, or in another order.
+    /// How often the recovery was begun anew: by exact points on the surface, then by such in another order.
     pub restarts: usize,
     /// Points added inside by the size field.
     pub points_inside: usize,
