@@ -19,7 +19,7 @@ const NARROW: u32 = 62;
 const WIDE: u32 = 125;
 
 /// An integer in two's complement, lowest word first.
-type Words<const N: usize> = [u64; N];
+pub(super) type Words<const N: usize> = [u64; N];
 
 /// The sign of (b−a)×(c−a)·(d−a); none where the coordinates do not fit.
 pub(super) fn orient3d(a: &Point, b: &Point, c: &Point, d: &Point) -> Option<Sign> {
@@ -68,15 +68,15 @@ fn differences<const N: usize>(points: [&Point; N], origin: &Point) -> Option<[[
     fit.then_some(differences)
 }
 
-/// A number as mantissa·2^exponent, with an odd mantissa.
+/// A number as mantissa·2^(exponent − 1075), with an odd mantissa.
 #[derive(Clone, Copy)]
-struct Parts {
-    mantissa: i64,
-    exponent: i32,
+pub(super) struct Parts {
+    pub mantissa: i64,
+    pub exponent: i32,
 }
 
 #[inline(always)]
-fn parts(point: &Point) -> [Parts; 3] {
+pub(super) fn parts(point: &Point) -> [Parts; 3] {
     /// Stored bits of the mantissa of a double.
     const STORED: u32 = f64::MANTISSA_DIGITS - 1;
     /// What no number has: it makes the unit of zeros no smaller, and that of infinities too large to fit.
@@ -110,7 +110,9 @@ fn words(x: i128) -> Words<2> {
 
 /// u·v×w of a difference's words D, a product's P = 2·D, a volume's T = D + P.
 #[inline(always)]
-fn volume6<const D: usize, const P: usize, const T: usize>([u, v, w]: &[[Words<D>; 3]; 3]) -> Words<T> {
+pub(super) fn volume6<const D: usize, const P: usize, const T: usize>(
+    [u, v, w]: &[[Words<D>; 3]; 3],
+) -> Words<T> {
     let minor = |i: usize, j: usize| sub(mul::<D, D, P>(v[i], w[j]), mul::<D, D, P>(v[j], w[i]));
     let [x, y, z] = [minor(1, 2), minor(2, 0), minor(0, 1)];
     add(add(mul::<D, P, T>(u[0], x), mul::<D, P, T>(u[1], y)), mul::<D, P, T>(u[2], z))
@@ -138,7 +140,7 @@ fn in_sphere_determinant<const D: usize, const P: usize, const T: usize, const F
     add(sub(lifted(a, bcd), lifted(b, cda)), sub(lifted(c, dab), lifted(d, abc)))
 }
 
-fn sign<const N: usize>(number: Words<N>) -> Sign {
+pub(super) fn sign<const N: usize>(number: Words<N>) -> Sign {
     if is_negative(&number) {
         Sign::Negative
     } else if number == [0; N] {
@@ -149,12 +151,12 @@ fn sign<const N: usize>(number: Words<N>) -> Sign {
 }
 
 #[inline(always)]
-fn is_negative<const N: usize>(number: &Words<N>) -> bool {
+pub(super) fn is_negative<const N: usize>(number: &Words<N>) -> bool {
     number[N - 1] >> 63 == 1
 }
 
 #[inline(always)]
-fn add<const N: usize>(a: Words<N>, b: Words<N>) -> Words<N> {
+pub(super) fn add<const N: usize>(a: Words<N>, b: Words<N>) -> Words<N> {
     let mut sum = a;
     let mut carry = false;
     for (s, b) in sum.iter_mut().zip(b) {
@@ -166,7 +168,7 @@ fn add<const N: usize>(a: Words<N>, b: Words<N>) -> Words<N> {
 }
 
 #[inline(always)]
-fn sub<const N: usize>(mut a: Words<N>, b: Words<N>) -> Words<N> {
+pub(super) fn sub<const N: usize>(mut a: Words<N>, b: Words<N>) -> Words<N> {
     take_away(&mut a, &b);
     a
 }
@@ -184,7 +186,7 @@ fn take_away(from: &mut [u64], b: &[u64]) {
 
 /// The product, of exactly A + B words.
 #[inline(always)]
-fn mul<const A: usize, const B: usize, const N: usize>(a: Words<A>, b: Words<B>) -> Words<N> {
+pub(super) fn mul<const A: usize, const B: usize, const N: usize>(a: Words<A>, b: Words<B>) -> Words<N> {
     const { assert!(N == A + B) };
     let mut product = [0; N];
     for i in 0..A {

@@ -1,5 +1,6 @@
 //! Geometry that every stage rests on: exact signs, simplices, shape measures, search, order.
 
+pub(crate) mod fixed;
 pub mod hilbert;
 mod integers;
 pub(crate) mod nearest;

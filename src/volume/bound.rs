@@ -3,16 +3,12 @@
 use super::constraints::Constraints;
 use super::recover::{Recovery, lock_facets};
 use super::tetrahedra::{NONE, Tetrahedra};
-use super::{ClosedSurface, Report, VolumeError, carve, delaunay, finish, inside, relocate};
+use super::{ClosedSurface, Report, VolumeError, carve, delaunay, finish, inside, relocate, round};
 use crate::Point;
+use std::collections::BTreeSet;
 
-/// How often the recovery is begun anew where it fails: by flips, by points alone (`conform`), and so both again in another order. Of 360 prisms
-/// twisted nearly to their limit, blocks with crossing notches, skins, staircases, spikes and lenses two need a second.
-const ATTEMPTS: u32 = 6;
-
-/// No third attempt and none later is begun after so many helping flips were tried: some tens of seconds. The second is mostly the last where
-/// thousands of edges are missing and do not come back, as where sheets come nearer and nearer to each other; more would take an hour.
-const MOST_HELP: u64 = 3_000_000;
+/// How often a surface is tried: by flips, which leave fewest points, then by exact points on it (`conform`), in one order of edges and in another.
+const ATTEMPTS: u32 = 3;
 
 /// The bodies in as few tets as the surface needs: its facets locked, nothing outside of them.
 pub(super) fn bound(
@@ -21,13 +17,9 @@ pub(super) fn bound(
     report: &mut Report,
 ) -> Result<(Tetrahedra, Constraints), VolumeError> {
     let mut fewest: Option<Vec<u32>> = None;
-    let mut help = 0;
     for attempt in 0..ATTEMPTS {
-        if attempt >= 2 && help > MOST_HELP {
-            break;
-        }
         report.restarts = attempt as usize;
-        match attempt_to_bound(surface, points, attempt, &mut help, report) {
+        match attempt_to_bound(surface, points, attempt, report) {
             Ok(tets) => return Ok(tets),
             Err(Stop::Inconsistent(error)) => return Err(error),
             Err(Stop::Left(left)) => {
@@ -52,16 +44,13 @@ fn attempt_to_bound(
     surface: &ClosedSurface,
     points: &[Point],
     attempt: u32,
-    help: &mut u64,
     report: &mut Report,
 ) -> Result<(Tetrahedra, Constraints), Stop> {
     let mut tets = delaunay::delaunay(points, &surface.triangles);
     let mut constraints = Constraints::new(&surface.triangles);
     let mut recovery = Recovery::new(&mut tets, &mut constraints, attempt);
-    // By flips with a few points and by points alone in turn: the one makes fewer, the other ends where many edges pass by each other.
-    let recovered = if attempt.is_multiple_of(2) { recovery.run() } else { recovery.conform() };
+    let recovered = if attempt == 0 { recovery.run() } else { recovery.conform() };
     let counts = recovery.counts;
-    *help += recovery.help_spent();
     let (steiner, helping) = (std::mem::take(&mut recovery.steiner), std::mem::take(&mut recovery.helping));
     report.missing_edges = counts.missing_edges;
     report.missing_faces = counts.missing_faces;
@@ -72,15 +61,32 @@ fn attempt_to_bound(
         let place = surface.points[surface.triangles[d.triangle as usize][0] as usize];
         Stop::Inconsistent(VolumeError::Inconsistent { triangle: d.triangle, place, regions: d.regions })
     })?;
-    let (inside, stayed) = relocate::relocate(&mut tets, &mut constraints, &surface.triangles, &steiner);
+    let (mut inside, stayed) = relocate::relocate(&mut tets, &mut constraints, &surface.triangles, &steiner);
     if !stayed.is_empty() {
         let left: Vec<u32> = stayed.iter().flat_map(|&p| constraints.facets_at(p)).collect();
         return Err(Stop::Left(finish::triangles_of(&constraints, &left)));
     }
-    let helping = helping.into_iter().filter(|&v| tets.at_vertex[v as usize] != NONE);
-    let inside = inside.into_iter().chain(helping.collect::<Vec<_>>()).collect();
-    report.steiner_inside = inside::delete(&mut tets, &constraints, inside);
+    inside.extend(helping.into_iter().filter(|&v| tets.at_vertex[v as usize] != NONE));
+    inside::delete(&mut tets, &constraints, &mut inside);
+    let rough = round::round(&mut tets, &constraints, &mut inside);
+    if !rough.is_empty() {
+        return Err(Stop::Left(triangles_near(&mut tets, &surface.triangles, &rough)));
+    }
+    tets.forget_exact();
+    report.steiner_inside = inside.len();
     Ok((tets, constraints))
+}
+
+/// The triangles with corners beside vertices inside.
+fn triangles_near(tets: &mut Tetrahedra, triangles: &[[u32; 3]], inside: &[u32]) -> Vec<u32> {
+    let mut star = Vec::new();
+    let mut beside = BTreeSet::new();
+    for &q in inside {
+        tets.star(q, &mut star);
+        beside.extend(star.iter().flat_map(|&t| tets.tets[t as usize]));
+    }
+    let has_any = |t: &u32| triangles[*t as usize].iter().any(|v| beside.contains(v));
+    (0..triangles.len() as u32).filter(has_any).collect()
 }
 
 #[cfg(test)]
@@ -96,9 +102,8 @@ mod tests {
             let surface = soup.surface().unwrap();
             let scale = finish::scale_of(&surface.points);
             let points: Vec<Point> = surface.points.iter().map(|p| p * scale).collect();
-            let (mut help, mut report) = (0, Report::default());
-            // Odd attempts are those without flips that help.
-            let Ok((tets, _)) = attempt_to_bound(&surface, &points, 1, &mut help, &mut report) else {
+            let mut report = Report::default();
+            let Ok((tets, _)) = attempt_to_bound(&surface, &points, 1, &mut report) else {
                 panic!("surface {i} was not recovered")
             };
             assert!(report.steiner_on_surface > 0, "surface {i} needs points");

@@ -172,7 +172,7 @@ impl Cavity {
 
     /// Whether the cavity is a ball without a vertex inside. Star-shaped, it is a ball; so its surface of w triangles has
     /// w / 2 + 2 vertices, and there are no others.
-    fn is_simple(&self) -> bool {
+    pub fn is_simple(&self) -> bool {
         self.walls.len() + 4 == 2 * self.vertices.len()
     }
 

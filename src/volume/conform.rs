@@ -1,34 +1,44 @@
-//! Recovery by points alone: the mesh is cut along the surface.
+//! Recovery by exact points: the mesh is cut along the surface.
 //!
 //! Where flips go round in circles (many edges that pass close by one another), the way that must end is taken. A missing edge is split
-//! wherever it crosses the mesh; a split takes one crossing away and brings it no new one, and edges that are there stay. When all edges
-//! are there, every edge of the mesh that goes through a missing triangle is split in the triangle: its pieces and the edges from the new
-//! point to the ring around lie on one side, so what goes through becomes less by one. When nothing does, the triangle consists of faces
-//! of the mesh, whichever these are (the first half of George, Borouchaki, Saltel 2003, with no demand on how the triangles are cut). That it
-//! ends is certain in exact arithmetic; what rounding spoils is left until what is beside it has changed.
+//! where it crosses the mesh, by points exactly on it (`exact`); a split takes one crossing away and brings it no new one, and edges that are there stay. When all
+//! edges are there, edges of the mesh that go through a missing triangle are flipped away, and where that comes to a standstill split in the triangle: their pieces
+//! and the edges from the new point to the ring around lie on one side, so what goes through becomes less by one. When nothing does, the triangle consists of faces
+//! of the mesh, whichever these are (the first half of George, Borouchaki, Saltel 2003, with no demand on how the triangles are cut). As all signs are
+//! exact it ends, if not for lack of points: what is bounded is their number.
 //!
-//! The points are many: `relocate` takes them off as any others.
+//! Each point takes in all tets that it sees of those that the edge or triangle crosses, and points of an edge whose ball one of their neighbours sees go again: the
+//! fewer there are the fewer the next edge crosses. The others leave as any do (`relocate`).
 
-use super::constraints::{Facet, Place, edges};
+use super::constraints::{Facet, edges};
 use super::crossing::{Crossing, crossings, edges_of_tet, tets_around};
 use super::recover::{DEEPEST, Recovery};
 use super::tetrahedra::{NONE, Ring, sorted};
+use crate::kernel::fixed::Fixed;
 use crate::kernel::predicates::Sign;
 use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// The most points for a surface, which bounds the time of a refusal. Blocks with twenty crossing notches that are recovered take 3000, prisms of
-/// 50 sides 1500.
+/// The most points for a surface, which bounds the time of a refusal. Blocks with twenty crossing notches take 600, a prism of 94 sides and two layers 7200.
 const MOST_POINTS: usize = 15_000;
 
 /// How often what was left is tried again.
 const ROUNDS: u32 = 10;
 
+/// How often points are taken off the edges: each round may let others go, hardly any after the second.
+const THINNINGS: usize = 4;
+
 /// How often the edges through a triangle may be flipped away before they are split: flips may bring others.
 const FLIPS: usize = 10;
 
-/// How many edges through triangles may be tried to be flipped in all: some seconds. Blocks with twenty crossing notches take less.
-const MOST_TRIES: usize = 300_000;
+/// How often flips and splits may take turns in one triangle before it is split to the end.
+const STANDSTILLS: usize = 10;
+
+/// How many edges through a triangle may be tried to be flipped until one is split, for each that there is at first.
+const MOST_TRIES: usize = 30;
+
+/// The same, beside those.
+const LEAST_TRIES: usize = 100;
 
 /// For how many edges and facets' worth other flips may help.
 const HELPED: usize = 1000;
@@ -51,6 +61,9 @@ impl Recovery<'_> {
     pub fn conform(&mut self) -> Result<(), Vec<u32>> {
         let missing = self.missing_facets();
         self.counts.missing_faces = missing.len();
+        if !missing.is_empty() && self.mesh.points.iter().any(|p| Fixed::of(p).is_none()) {
+            return Err(missing);
+        }
         self.most_steiner = MOST_POINTS;
         self.give_help(HELPED);
         self.flips.never_flat = true;
@@ -69,8 +82,10 @@ impl Recovery<'_> {
         let mut cut = Cut::default();
         cut.missing.extend(wanted.into_iter().map(|edge| (edge, edge)));
         for depth in 0..=DEEPEST {
-            self.cut_edges(depth, &mut cut);
+            cut.missing.retain(|&(_, [a, b])| !self.recover_edge(a, b, depth));
         }
+        self.cut_edges(DEEPEST, &mut cut);
+        self.thin_edges(&mut cut);
         let left = self.cut_triangles(missing, &mut cut);
         self.flips.never_flat = false;
         for [a, b] in self.constraints.kept_edges() {
@@ -95,15 +110,86 @@ impl Recovery<'_> {
                     None => cut.missing.push((edge, [a, b])),
                 }
             }
+            if cut.missing.last().is_none_or(|last| last.0 != edge) {
+                self.thin_edge(edge, cut);
+            }
         }
+    }
+
+    /// The points on an edge of the surface, from its first end on.
+    fn points_on(&self, [from, to]: [u32; 2], cut: &Cut) -> Vec<u32> {
+        let along = self.mesh.point(to) - self.mesh.point(from);
+        let axis = along.iamax();
+        let mut points = cut.on_edge.get(&[from.min(to), from.max(to)]).cloned().unwrap_or_default();
+        points.sort_by_cached_key(|&v| self.mesh.place(v).key(axis));
+        if along[axis] < 0.0 {
+            points.reverse();
+        }
+        points
+    }
+
+    /// Takes points off the edges of the surface as long as that goes on.
+    fn thin_edges(&mut self, cut: &mut Cut) {
+        let whole = |edge: &[u32; 2]| cut.missing.iter().all(|(missing, _)| missing != edge);
+        let edges: Vec<[u32; 2]> = cut.on_edge.keys().copied().filter(whole).collect();
+        for _ in 0..THINNINGS {
+            if edges.iter().map(|&edge| self.thin_edge(edge, cut)).sum::<usize>() == 0 {
+                break;
+            }
+        }
+    }
+
+    /// Takes points off an edge of the surface that are not needed any more, as the mesh has changed since.
+    fn thin_edge(&mut self, edge: [u32; 2], cut: &mut Cut) -> usize {
+        let points = self.points_on(edge, cut);
+        let mut left = vec![edge[0]];
+        for (i, &p) in points.iter().enumerate() {
+            let u = *left.last().expect("an end");
+            let w = points.get(i + 1).copied().unwrap_or(edge[1]);
+            if !self.merge_pieces(u, p, w) {
+                left.push(p);
+            }
+        }
+        left.remove(0);
+        let gone = points.len() - left.len();
+        cut.on_edge.insert(edge, left);
+        gone
+    }
+
+    /// Makes one edge of two pieces of an edge of the surface if one of their ends sees all of the ball of the point between.
+    fn merge_pieces(&mut self, u: u32, p: u32, w: u32) -> bool {
+        self.mesh.star(p, &mut self.star);
+        let skin: Vec<[u32; 3]> = self
+            .star
+            .iter()
+            .map(|&t| self.mesh.face(4 * t + self.mesh.index_of(t, p).expect("a tet at p") as u32))
+            .collect();
+        let sees = |v: &u32| {
+            skin.iter().filter(|f| !f.contains(v)).all(|&f| self.mesh.side(f, *v) == Sign::Negative)
+        };
+        let Some(apex) = [u, w].into_iter().find(sees) else { return false };
+        let tets: Vec<[u32; 4]> =
+            skin.iter().filter(|f| !f.contains(&apex)).map(|&[a, b, c]| [apex, a, b, c]).collect();
+        let star = std::mem::take(&mut self.star);
+        let body = self.mesh.bodies[star[0] as usize];
+        self.mesh.replace(&star, &tets, body, &mut self.flips.made);
+        self.star = star;
+        self.mesh.at_vertex[p as usize] = NONE;
+        self.constraints.forget_edge(u, p);
+        self.constraints.forget_edge(p, w);
+        self.constraints.keep_edge(u, w);
+        self.constraints.forget_place(p);
+        self.steiner.retain(|&q| q != p);
+        true
     }
 
     /// Splits a piece of an edge of the surface where it crosses the mesh.
     fn cut_edge(&mut self, edge: [u32; 2], [a, b]: [u32; 2]) -> Option<u32> {
         let mut found = std::mem::take(&mut self.found);
         crossings(self.mesh, a, b, &mut self.star, &mut found);
-        let room = self.room_on_line(a, b, Place::Edge(edge));
-        let added = self.split_at(a, b, &found, &room);
+        let mut order: Vec<usize> = (0..found.len()).collect();
+        order.sort_by_key(|&i| (2 * i + 1).abs_diff(found.len()));
+        let added = order.into_iter().find_map(|i| self.split_exactly(edge, [a, b], found[i], &found));
         self.found = found;
         let p = added?;
         self.constraints.forget_edge(a, b);
@@ -118,86 +204,96 @@ impl Recovery<'_> {
         for round in 0..ROUNDS {
             let before = left.len();
             self.cut_edges(DEEPEST, cut);
-            let depth = (round <= DEEPEST).then_some(round);
-            left.retain(|&t| !self.cut_triangle(t, depth, cut));
-            if left.is_empty()
-                || (depth.is_none() && left.len() == before && self.steiner.len() >= self.most_steiner)
-            {
+            let split = round > DEEPEST;
+            left.retain(|&t| !self.cut_triangle(t, round.min(DEEPEST), split, cut));
+            if left.is_empty() || (split && left.len() == before && self.steiner.len() >= self.most_steiner) {
                 break;
             }
         }
         left
     }
 
-    /// Makes a triangle consist of faces, by flips of this depth or by points; false where it does not.
-    fn cut_triangle(&mut self, t: u32, flips: Option<u32>, cut: &mut Cut) -> bool {
+    /// Makes a triangle consist of faces, by flips of this depth, and by points where these come to a standstill; false where it does not.
+    fn cut_triangle(&mut self, t: u32, depth: u32, split: bool, cut: &mut Cut) -> bool {
         let vertices = self.constraints.facets[t as usize].vertices;
         let Some(outline) = self.outline(vertices, cut) else { return false };
         let mut on: BTreeSet<u32> = outline.iter().map(|side| side.0[0]).collect();
         on.extend(cut.inside.get(&t).into_iter().flatten());
-        let room = self.room_in_facet(Facet { vertices, triangle: t, gone: false });
-        let (mut fewest, mut in_vain) = (usize::MAX, 0);
+        let facet = Facet { vertices, triangle: t, gone: false };
+        let (mut fewest, mut in_vain, mut standstills, mut most) = (usize::MAX, 0, 0, 0);
         let faces = loop {
             let Some(trace) = self.trace_triangle(vertices, &outline, &on) else { return false };
             if trace.through.is_empty() {
                 break trace.faces;
             }
+            if fewest == usize::MAX {
+                most = cut.tries + LEAST_TRIES + MOST_TRIES * trace.through.len();
+            }
             in_vain = if trace.through.len() < fewest { 0 } else { in_vain + 1 };
             fewest = fewest.min(trace.through.len());
-            let mut any = false;
-            if let Some(depth) = flips {
-                if in_vain == FLIPS || cut.tries > MOST_TRIES {
-                    return false;
-                }
-                cut.tries += trace.through.len();
-                for &(tet, edge) in &trace.through {
-                    self.take_help();
-                    any |= self.remove_edge(tet, edge, [NONE; 2], depth);
-                }
-                if !any {
-                    return false;
-                }
+            let flips = in_vain < FLIPS && standstills <= STANDSTILLS && cut.tries < most;
+            if flips && self.flip_through(&trace, depth, cut) {
                 continue;
             }
-            for &(_, [u, v]) in &trace.through {
-                let Some(tet) = self.mesh.tet_at_edge(u, v, &mut self.star) else { continue };
-                let point = self.piercing_point(vertices, [u, v]);
-                let tets = tets_around(self.mesh, Crossing::Edge(tet, [u, v]));
-                if !self.constraints.has_edge(u, v)
-                    && let Some(p) = self.add_steiner(&tets, point, &room)
-                {
-                    on.insert(p);
-                    cut.inside.entry(t).or_default().push(p);
-                    any = true;
-                }
-            }
-            (fewest, in_vain) = (usize::MAX, 0);
-            if !any {
+            if !split || !self.split_through(&trace, facet, &mut on, cut, standstills < STANDSTILLS) {
                 return false;
             }
+            standstills += 1;
+            (fewest, in_vain) = (usize::MAX, 0);
         };
-        for &p in cut.inside.get(&t).into_iter().flatten() {
-            if !faces.values().any(|face| face.contains(&p)) {
-                // Rounding put it beside the triangle.
-                self.constraints.forget_place(p);
-                self.steiner.retain(|&q| q != p);
-                self.helping.push(p);
-            }
-        }
         for face in faces.into_values() {
             self.constraints.add(face, t);
         }
         true
     }
 
+    /// Flips away what edges it can that go through a triangle; whether any.
+    fn flip_through(&mut self, trace: &Trace, depth: u32, cut: &mut Cut) -> bool {
+        cut.tries += trace.through.len();
+        let mut any = false;
+        for &(tet, edge) in &trace.through {
+            self.take_help();
+            any |= self.remove_edge(tet, edge, [NONE; 2], depth);
+        }
+        any
+    }
+
+    /// Splits the edges that go through a triangle there; whether any.
+    fn split_through(
+        &mut self,
+        trace: &Trace,
+        facet: Facet,
+        on: &mut BTreeSet<u32>,
+        cut: &mut Cut,
+        one: bool,
+    ) -> bool {
+        let mut any = false;
+        // Flips in vain may have changed the tets since.
+        let mut more = BTreeSet::new();
+        for &(_, [u, v]) in &trace.through {
+            if let Some(tet) = self.mesh.tet_at_edge(u, v, &mut self.star) {
+                more.extend(tets_around(self.mesh, Crossing::Edge(tet, [u, v])));
+            }
+        }
+        for &(_, [u, v]) in &trace.through {
+            let Some(tet) = self.mesh.tet_at_edge(u, v, &mut self.star) else { continue };
+            if let Some(p) = self.pierce_exactly(facet, tet, [u, v], &more) {
+                on.insert(p);
+                cut.inside.entry(facet.triangle).or_default().push(p);
+                any = true;
+                if one {
+                    break;
+                }
+            }
+        }
+        any
+    }
+
     /// The pieces of a triangle's edges, in its sense, each with the corner opposite; `None` where one is missing.
     fn outline(&mut self, [a, b, c]: [u32; 3], cut: &Cut) -> Option<Vec<([u32; 2], u32)>> {
         let mut outline = Vec::new();
         for [from, to, opposite] in [[a, b, c], [b, c, a], [c, a, b]] {
-            let [p, q] = [from, to].map(|v| *self.mesh.point(v));
-            let far = |v: &u32| (self.mesh.point(*v) - p).dot(&(q - p));
-            let mut points = cut.on_edge.get(&[from.min(to), from.max(to)]).cloned().unwrap_or_default();
-            points.sort_by(|u, v| far(u).total_cmp(&far(v)));
+            let mut points = self.points_on([from, to], cut);
             points.insert(0, from);
             points.push(to);
             outline.extend(points.windows(2).map(|piece| ([piece[0], piece[1]], opposite)));

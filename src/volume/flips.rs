@@ -5,12 +5,16 @@
 
 use super::constraints::Constraints;
 use super::tetrahedra::{NONE, Ring, Tetrahedra};
-use crate::kernel::predicates::{Sign, orient3d};
+use crate::kernel::predicates::Sign;
 use crate::kernel::quality::mean_ratio;
 
 /// Rings with more tets are left alone: the search is cubic, and long rings belong to edges that
 /// are better removed after their neighbours. A usual ring has five or six tets.
 const LONGEST_RING: usize = 16;
+
+/// Where vertices of the surface lie in one plane up to rounding, tets of them have a mean ratio of 10⁻¹¹ or so; between sheets that are 10⁻⁹ of the
+/// diagonal apart some have 10⁻⁶.
+const FLAT: f64 = 1e-9;
 
 /// Why a flip was not made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -54,14 +58,15 @@ impl Flips {
     /// The mean ratio of a positive tet, by exact sign; 0 for one that rounding alone makes positive; below every quality for any
     /// that must not be made.
     fn quality(&self, mesh: &Tetrahedra, constraints: &Constraints, tet: [u32; 4]) -> f64 {
-        let [a, b, c, d] = tet.map(|v| mesh.point(v));
-        if orient3d(a, b, c, d) != Sign::Positive {
+        if mesh.side([tet[0], tet[1], tet[2]], tet[3]) != Sign::Positive {
             return f64::NEG_INFINITY;
         }
         if self.is_flat(constraints, tet) {
             return if self.never_flat { f64::NEG_INFINITY } else { 0.0 };
         }
-        mean_ratio(a, b, c, d).max(0.0)
+        let [a, b, c, d] = tet.map(|v| mesh.point(v));
+        let quality = mean_ratio(a, b, c, d).max(0.0);
+        if self.never_flat && quality < FLAT { f64::NEG_INFINITY } else { quality }
     }
 
     /// Replaces a face by the edge between the two vertices opposite to it (2-3).

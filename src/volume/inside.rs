@@ -31,15 +31,16 @@ pub(super) fn make_room(
         let mut ball = Vec::new();
         mesh.star(*q, &mut ball);
         let sector = cavity(mesh, ball);
-        let is_near = sector.skin.iter().flatten().any(|v| of.contains(v));
-        let Some((quality, place)) = find_place(mesh, &sector, *q).filter(|_| is_near) else { continue };
-        if quality <= worst(mesh, &sector.skin, mesh.point(*q), NONE, 0.0) {
+        if !sector.skin.iter().flatten().any(|v| of.contains(v)) {
+            continue;
+        }
+        let Some((quality, place)) = find_place(mesh, &sector, *q) else { continue };
+        if quality <= worst(mesh, &sector.skin, mesh.point(*q), *q, 0.0) {
             continue;
         }
         let points = mesh.points.len();
         let new = mesh.add_point(place);
-        let tets: Vec<[u32; 4]> = sector.skin.iter().map(|&[a, b, c]| [new, a, b, c]).collect();
-        if refill(mesh, constraints, &sector, &tets, made) {
+        if refill(mesh, constraints, &sector, &sector.star_of(new), made) {
             mesh.at_vertex[*q as usize] = NONE;
             *q = new;
         } else {
@@ -48,9 +49,8 @@ pub(super) fn make_room(
     }
 }
 
-/// Deletes those points inside whose ball can be filled without them, with no worse a tet unless it is good enough. Returns how
-/// many are left.
-pub(super) fn delete(mesh: &mut Tetrahedra, constraints: &Constraints, mut inside: Vec<u32>) -> usize {
+/// Deletes those points inside whose ball can be filled without them, with no worse a tet unless it is good enough.
+pub(super) fn delete(mesh: &mut Tetrahedra, constraints: &Constraints, inside: &mut Vec<u32>) {
     for _ in 0..ROUNDS {
         let before = inside.len();
         inside.retain(|&q| !delete_one(mesh, constraints, q));
@@ -58,12 +58,11 @@ pub(super) fn delete(mesh: &mut Tetrahedra, constraints: &Constraints, mut insid
             break;
         }
     }
-    inside.len()
 }
 
 /// Fills the ball of a point without it, or the ball with one tet or all tets beside it: what stands around a point that is needed there
 /// is often not needed itself (a cavity that grows, as in Marot, Verhetsel, Remacle 2020).
-fn delete_one(mesh: &mut Tetrahedra, constraints: &Constraints, q: u32) -> bool {
+pub(super) fn delete_one(mesh: &mut Tetrahedra, constraints: &Constraints, q: u32) -> bool {
     let mut ball = Vec::new();
     mesh.star(q, &mut ball);
     let mut behind: Vec<u32> = cavity(mesh, ball.clone())
@@ -89,8 +88,8 @@ fn delete_one(mesh: &mut Tetrahedra, constraints: &Constraints, q: u32) -> bool 
         });
         let least = least.fold(GOOD_ENOUGH, f64::min);
         let new = old
-            .keeps_vertices(mesh, q)
-            .then(|| small::fill(&mesh.points, &old.skin, &[], least, &mut effort))?;
+            .keeps_vertices(mesh, |v| v == q)
+            .then(|| small::fill(mesh, &old.skin, &[], least, &mut effort))?;
         Some((old, new?))
     });
     let done = filled.is_some_and(|(old, new)| refill(mesh, constraints, &old, &new, &mut Vec::new()));
@@ -101,14 +100,14 @@ fn delete_one(mesh: &mut Tetrahedra, constraints: &Constraints, q: u32) -> bool 
 }
 
 /// Some tets of one body and what is around them.
-fn cavity(mesh: &Tetrahedra, tets: Vec<u32>) -> Sector {
+pub(super) fn cavity(mesh: &Tetrahedra, tets: Vec<u32>) -> Sector {
     let outer =
         |h: &u32| mesh.is_locked(*h) || mesh.across(*h) == NONE || !tets.contains(&(mesh.across(*h) >> 2));
     let walls = tets.iter().flat_map(|&t| 4 * t..4 * t + 4).filter(outer).collect();
     Sector::inside(mesh, mesh.bodies[tets[0] as usize], tets, walls)
 }
 
-fn refill(
+pub(super) fn refill(
     mesh: &mut Tetrahedra,
     constraints: &Constraints,
     sector: &Sector,

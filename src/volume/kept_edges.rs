@@ -288,7 +288,7 @@ fn fill_around(
         rest.extend([[u, x, y], [w, y, x]]);
     }
     let mut effort = Effort { vertices: MOST_VERTICES, tries: TRIES };
-    tets.extend(small::fill(&mesh.points, &rest, &[], 0.0, &mut effort)?);
+    tets.extend(small::fill(mesh, &rest, &[], 0.0, &mut effort)?);
     Some(tets)
 }
 

@@ -23,10 +23,11 @@
 //!    of grids.
 //! 2. `recover`: edges, then facets, by `flips`; where none is left, by Steiner points for a while (`steiner`), where their cavity has most
 //!    room (`clearance`); `flat` flips away tets that rounding alone makes positive. Where that comes to no end the mesh is cut along the
-//!    surface (`conform`).
+//!    surface (`conform`), by points exactly on it (`exact`).
 //! 3. `carve`: a flood from the triangles gives each tet its body and removes the outside.
 //! 4. `relocate`: Steiner points leave the surface: none or one stays inside on either side, found by search where no place sees
-//!    all it must (`stuck`). `inside` deletes those that are not needed, by a search for tets that fill the hole (`small`).
+//!    all it must (`stuck`). `inside` deletes those that are not needed, by a search for tets that fill the hole (`small`); `round` gives the others
+//!    places with doubles.
 //! 5. `keep`, `kept_edges`: points and edges that the caller wants.
 //! 6. `points`: the inside by the size field: lattices where it is level (`lattice`), frontal Delaunay elsewhere, after flips that make
 //!    the mesh Delaunay again (`legalize`); sizes grow by a limited gradient whatever the field (`sizes`).
@@ -45,6 +46,7 @@ mod conform;
 mod constraints;
 mod crossing;
 mod delaunay;
+mod exact;
 mod finish;
 mod flat;
 mod flips;
@@ -59,6 +61,7 @@ mod points;
 mod polygon;
 mod recover;
 mod relocate;
+mod round;
 #[cfg(test)]
 mod samples;
 mod sectors;
@@ -126,7 +129,7 @@ pub struct Report {
     pub steiner_inside: usize,
     /// Points that had to stay on kept edges: each cuts one in two.
     pub on_kept_edges: usize,
-    /// How often the recovery was begun anew: by points alone, or in another order.
+    /// How often the recovery was begun anew: by exact points on the surface, then by such in another order.
     pub restarts: usize,
     /// Points added inside by the size field.
     pub points_inside: usize,

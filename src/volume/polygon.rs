@@ -1,5 +1,6 @@
 //! A polygon in the plane of a triangle, into triangles.
 
+use super::tetrahedra::Tetrahedra;
 use crate::Point;
 use crate::kernel::predicates::{Sign, orient2d};
 use crate::kernel::simplex::area_vector;
@@ -35,7 +36,7 @@ impl Shadow {
 ///
 /// `on_line` tells of vertices on one line, up to rounding only: they are no ear.
 pub(super) fn triangulate(
-    points: &[Point],
+    mesh: &Tetrahedra,
     shadow: Shadow,
     polygon: &[u32],
     on_line: impl Fn([u32; 3]) -> bool,
@@ -44,11 +45,11 @@ pub(super) fn triangulate(
     let mut triangles = Vec::with_capacity(left.len().saturating_sub(2));
     while left.len() >= 3 {
         let n = left.len();
-        let (mut best, mut best_shape) = (None, 0.0);
+        let (mut best, mut best_shape) = (None, f64::NEG_INFINITY);
         for i in 0..n {
             let ear = [left[(i + n - 1) % n], left[i], left[(i + 1) % n]];
-            let shape = shape(points, ear);
-            if shape > best_shape && !on_line(ear) && is_ear(points, shadow, &left, ear) {
+            let shape = shape(mesh, ear);
+            if shape > best_shape && !on_line(ear) && is_ear(mesh, shadow, &left, ear) {
                 (best, best_shape) = (Some((i, ear)), shape);
             }
         }
@@ -60,18 +61,17 @@ pub(super) fn triangulate(
 }
 
 /// Area over the square of the longest edge: larger is better.
-fn shape(points: &[Point], triangle: [u32; 3]) -> f64 {
-    let [a, b, c] = triangle.map(|v| &points[v as usize]);
+fn shape(mesh: &Tetrahedra, triangle: [u32; 3]) -> f64 {
+    let [a, b, c] = triangle.map(|v| mesh.point(v));
     let longest = (b - a).norm_squared().max((c - b).norm_squared()).max((a - c).norm_squared());
     area_vector(a, b, c).norm() / longest
 }
 
-fn is_ear(points: &[Point], shadow: Shadow, polygon: &[u32], ear: [u32; 3]) -> bool {
-    let [a, b, c] = ear.map(|v| &points[v as usize]);
-    shadow.turn(a, b, c) == Sign::Positive
+fn is_ear(mesh: &Tetrahedra, shadow: Shadow, polygon: &[u32], ear: [u32; 3]) -> bool {
+    let [a, b, c] = ear;
+    mesh.turn(shadow.0, ear) == Sign::Positive
         && polygon.iter().filter(|v| !ear.contains(v)).all(|&v| {
-            let p = &points[v as usize];
-            [[a, b], [b, c], [c, a]].iter().any(|&[s, t]| shadow.turn(s, t, p) == Sign::Negative)
+            [[a, b], [b, c], [c, a]].iter().any(|&[s, t]| mesh.turn(shadow.0, [s, t, v]) == Sign::Negative)
         })
 }
 
@@ -85,12 +85,13 @@ mod tests {
             .map(|[x, y]| Point::new(1.0, x, y))
             .to_vec();
         let shadow = Shadow::of([&points[0], &points[2], &points[3]]);
-        let triangles = triangulate(&points, shadow, &[0, 1, 2, 3, 4, 5], |_| false).unwrap();
+        let mesh = Tetrahedra::new(points.clone());
+        let triangles = triangulate(&mesh, shadow, &[0, 1, 2, 3, 4, 5], |_| false).unwrap();
         assert_eq!(triangles.len(), 4);
         for t in triangles {
             let [a, b, c] = t.map(|v| &points[v as usize]);
             assert_eq!(shadow.turn(a, b, c), Sign::Positive);
         }
-        assert_eq!(triangulate(&points, shadow, &[0, 1, 2], |_| false), None);
+        assert_eq!(triangulate(&mesh, shadow, &[0, 1, 2], |_| false), None);
     }
 }

@@ -50,7 +50,11 @@ const MOST_ON_EDGE: usize = 16;
 const MOST_INSIDE: usize = 1;
 
 /// How many generations may pass without fewer missing facets than ever before.
-const PATIENCE: usize = 5;
+const PATIENCE: usize = 3;
+
+/// How many points there may be for each edge that was missing at first. Attempts that end well need up to 2; those with more take tens of seconds,
+/// where exact points take some (`conform`).
+const MOST_FOR_EDGE: usize = 2;
 
 /// What an edge must be shorter than the one it replaces by, so that rounding has no say.
 const LESS: f64 = 1.0 - 1e-6;
@@ -96,8 +100,6 @@ pub(super) struct Recovery<'a> {
     pub(super) most_steiner: usize,
     /// How many edges may still be tried to help in all: where nothing goes on, the time must end.
     help_left: u64,
-    /// How many there were to be tried in all.
-    given: u64,
     attempt: u32,
 }
 
@@ -117,7 +119,6 @@ impl<'a> Recovery<'a> {
             found: Vec::new(),
             most_steiner: 0,
             help_left: 0,
-            given: 0,
             attempt,
         }
     }
@@ -160,7 +161,9 @@ impl<'a> Recovery<'a> {
             generation = self.steiner.len() - before;
             in_vain = if missing.len() < fewest { 0 } else { in_vain + 1 };
             fewest = fewest.min(missing.len());
-            if in_vain == PATIENCE {
+            if in_vain == PATIENCE
+                || self.steiner.len() > LEAST_STEINER + MOST_FOR_EDGE * self.counts.missing_edges
+            {
                 break;
             }
             if generation == 0 {
@@ -334,12 +337,6 @@ impl<'a> Recovery<'a> {
     pub(super) fn give_help(&mut self, edges: usize) {
         let more = (u64::from(HELP) * edges as u64).saturating_sub(self.help_left);
         self.help_left += more;
-        self.given += more;
-    }
-
-    /// How many edges were tried to help.
-    pub fn help_spent(&self) -> u64 {
-        self.given - self.help_left - u64::from(self.flips.budget)
     }
 
     /// Gives the flips their share of the help that is left, and takes back what was not used of the last.
@@ -369,7 +366,7 @@ impl<'a> Recovery<'a> {
             }
         }
         self.found = found;
-        done
+        done || self.mesh.tet_at_edge(a, b, &mut self.star).is_some()
     }
 
     /// Flips something of what the edge from `a` to `b` crosses.

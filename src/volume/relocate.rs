@@ -20,7 +20,8 @@ use super::inside;
 use super::polygon::{Shadow, triangulate};
 use super::stuck;
 use super::tetrahedra::{NONE, Tetrahedra, sorted};
-use crate::kernel::predicates::{Sign, orient3d};
+use crate::kernel::fixed::Fixed;
+use crate::kernel::predicates::Sign;
 use crate::kernel::quality::mean_ratio;
 use crate::kernel::simplex::area_vector;
 use crate::{Point, Vector};
@@ -54,6 +55,7 @@ pub(super) struct Sector {
 enum Apex {
     Own(u32),
     New(Point),
+    NewExact(Fixed),
 }
 
 /// Takes all Steiner points off the surface. Returns the new points inside, and the
@@ -115,7 +117,7 @@ fn take_off(
     for (&triangle, fan) in &fans {
         let shadow = Shadow::of(triangles[triangle as usize].map(|v| mesh.point(v)));
         let on_line = |ear| constraints.on_one_edge(ear);
-        match triangulate(&mesh.points, shadow, &outline(fan, p), on_line) {
+        match triangulate(mesh, shadow, &outline(fan, p), on_line) {
             Some(patch) => patches.insert(triangle, patch),
             None => return false,
         };
@@ -276,14 +278,15 @@ impl Balls {
     }
 }
 
-/// The worst mean ratio of a sector filled from a point; negative if some tet were not positive.
+/// The worst mean ratio of a sector filled from a point, that of the vertex `own` if it is one; negative if some tet were not positive.
 pub(super) fn worst(mesh: &Tetrahedra, skin: &[[u32; 3]], apex: &Point, own: u32, floor: f64) -> f64 {
     let mut worst = f64::INFINITY;
     for face in skin.iter().filter(|face| !face.contains(&own)) {
-        let [a, b, c] = face.map(|v| mesh.point(v));
-        if orient3d(apex, a, b, c) != Sign::Positive {
+        let side = if own == NONE { mesh.side_of(*face, apex) } else { mesh.side(*face, own) };
+        if side != Sign::Negative {
             return f64::NEG_INFINITY;
         }
+        let [a, b, c] = face.map(|v| mesh.point(v));
         worst = worst.min(mean_ratio(apex, a, b, c).max(0.0));
         if worst < floor {
             return worst;
@@ -300,9 +303,9 @@ impl Sector {
         sector
     }
 
-    /// How far it reaches from p.
-    fn reach(&self, mesh: &Tetrahedra, p: u32) -> f64 {
-        let distance = |&v: &u32| (mesh.point(v) - mesh.point(p)).norm();
+    /// How far it reaches from a place.
+    pub fn reach(&self, mesh: &Tetrahedra, from: &Point) -> f64 {
+        let distance = |&v: &u32| (mesh.point(v) - from).norm();
         self.skin.iter().flatten().map(distance).fold(0.0, f64::max)
     }
 
@@ -321,20 +324,23 @@ impl Sector {
 
     /// Its tets, all from one apex.
     fn star(&self, mesh: &mut Tetrahedra, apex: Apex) -> Vec<[u32; 4]> {
-        let apex = match apex {
+        self.star_of(match apex {
             Apex::Own(v) => v,
             Apex::New(point) => mesh.add_point(point),
-        };
+            Apex::NewExact(place) => mesh.add_exact_point(&place),
+        })
+    }
+
+    /// Its tets, all from one vertex.
+    pub fn star_of(&self, apex: u32) -> Vec<[u32; 4]> {
         let seen = self.skin.iter().filter(|face| !face.contains(&apex));
         seen.map(|&[a, b, c]| [apex, a, b, c]).collect()
     }
 
     /// Takes in the tets behind those walls that a point does not see, or behind all; false where there are none to take.
     pub fn grow(&mut self, mesh: &Tetrahedra, point: Option<&Point>) -> bool {
-        let unseen = |wall: u32| {
-            let [a, b, c] = mesh.face(wall).map(|v| mesh.point(v));
-            point.is_none_or(|point| orient3d(point, a, b, c) != Sign::Positive)
-        };
+        let unseen =
+            |wall: u32| point.is_none_or(|point| mesh.side_of(mesh.face(wall), point) != Sign::Negative);
         let before = self.tets.len();
         for wall in self.walls.clone() {
             let behind = mesh.across(wall);
@@ -354,18 +360,18 @@ impl Sector {
         self.tets.len() > before
     }
 
-    /// Whether every vertex of its tets but p is on its surface.
-    pub fn keeps_vertices(&self, mesh: &Tetrahedra, p: u32) -> bool {
+    /// Whether every vertex of its tets but those that may go is on its surface.
+    pub fn keeps_vertices(&self, mesh: &Tetrahedra, may_go: impl Fn(u32) -> bool) -> bool {
         let on_surface = |v: u32| {
             self.walls.iter().any(|&w| mesh.face(w).contains(&v)) || self.fresh.iter().any(|f| f.contains(&v))
         };
-        self.tets.iter().flat_map(|&t| mesh.tets[t as usize]).all(|v| v == p || on_surface(v))
+        self.tets.iter().flat_map(|&t| mesh.tets[t as usize]).all(|v| may_go(v) || on_surface(v))
     }
 }
 
 /// From where to fill a sector. As long as no place sees it all it takes in tets behind walls: where points lie on one line or
 /// in one plane up to rounding, slivers of no thickness stand between p and what it should see.
-fn grow_and_find(mesh: &Tetrahedra, sector: &mut Sector, p: u32) -> Option<Apex> {
+fn grow_and_find(mesh: &mut Tetrahedra, sector: &mut Sector, p: u32) -> Option<Apex> {
     /// Each time the walls around move one tet away; what lies that far is no matter of rounding.
     const GROWTHS: usize = 8;
     /// Where to look from: these fractions of the sector's size off the surface. The first sees over what rounding
@@ -374,13 +380,13 @@ fn grow_and_find(mesh: &Tetrahedra, sector: &mut Sector, p: u32) -> Option<Apex>
     if let Some(apex) = find_apex(mesh, sector, p) {
         return Some(apex);
     }
-    let (inward, _) = directions(mesh, sector, p);
+    let inward = directions(mesh, sector, p);
     let start = sector.clone();
     for off in OFF {
         sector.clone_from(&start);
         for _ in 0..GROWTHS {
             let grown = sector.grow(mesh, Some(&(mesh.point(p) + inward * off)));
-            if !grown || !sector.keeps_vertices(mesh, p) {
+            if !grown || !sector.keeps_vertices(mesh, |v| v == p) {
                 break;
             }
             if let Some(apex) = find_apex(mesh, sector, p) {
@@ -392,21 +398,28 @@ fn grow_and_find(mesh: &Tetrahedra, sector: &mut Sector, p: u32) -> Option<Apex>
     None
 }
 
-/// From where to fill a sector as it is.
-fn find_apex(mesh: &Tetrahedra, sector: &Sector, p: u32) -> Option<Apex> {
-    if sector.skin.is_empty() {
-        return Some(Apex::Own(p));
-    }
+/// The vertex of a sector from which it is filled best, and the worst mean ratio so; the latter negative where none sees it all.
+pub(super) fn best_own(mesh: &Tetrahedra, sector: &Sector) -> (f64, u32) {
     let mut own: Vec<u32> = sector.skin.iter().flatten().copied().collect();
     own.sort_unstable();
     own.dedup();
-    let mut best = (f64::NEG_INFINITY, None);
+    let mut best = (f64::NEG_INFINITY, NONE);
     for &v in &own {
         let quality = worst(mesh, &sector.skin, mesh.point(v), v, best.0);
         if quality > best.0 {
-            best = (quality, Some(Apex::Own(v)));
+            best = (quality, v);
         }
     }
+    best
+}
+
+/// From where to fill a sector as it is.
+fn find_apex(mesh: &mut Tetrahedra, sector: &Sector, p: u32) -> Option<Apex> {
+    if sector.skin.is_empty() {
+        return Some(Apex::Own(p));
+    }
+    let (quality, own) = best_own(mesh, sector);
+    let mut best = (quality, (own != NONE).then_some(Apex::Own(own)));
     if best.0 >= GOOD_ENOUGH {
         return best.1;
     }
@@ -415,13 +428,32 @@ fn find_apex(mesh: &Tetrahedra, sector: &Sector, p: u32) -> Option<Apex> {
     {
         best = (quality, Some(Apex::New(point)));
     }
-    best.1
+    best.1.or_else(|| mesh.has_rounded().then(|| beside(mesh, sector, p)).flatten())
+}
+
+/// A place beside p, so near that it sees all walls of its sector: those that p sees, and the facets in whose planes p lies. In exact
+/// arithmetic there is one, unless both sides of one facet are in the sector.
+fn beside(mesh: &mut Tetrahedra, sector: &Sector, p: u32) -> Option<Apex> {
+    let inward = directions(mesh, sector, p);
+    let place = mesh.place(p);
+    let points = mesh.points.len();
+    let mut way = Fixed::of(&Point::from(inward))?;
+    loop {
+        way = way.nearly_halved()?;
+        let near = place.plus(&way);
+        let v = mesh.add_exact_point(&near);
+        let sees = sector.skin.iter().all(|&face| mesh.side(face, v) == Sign::Negative);
+        mesh.forget_points(points);
+        if sees {
+            return Some(Apex::NewExact(near));
+        }
+    }
 }
 
 /// A place inside a sector that sees all of its skin, and the worst mean ratio from there.
 pub(super) fn find_place(mesh: &Tetrahedra, sector: &Sector, p: u32) -> Option<(f64, Point)> {
     let start = *mesh.point(p);
-    let reach = sector.reach(mesh, p);
+    let reach = sector.reach(mesh, &start);
     let planes: Vec<Plane> = sector.skin.iter().filter_map(|f| Plane::of(f.map(|v| mesh.point(v)))).collect();
     let axes = [Vector::x() * reach, Vector::y() * reach, Vector::z() * reach];
     let (place, _) = most_inside(&start, &axes, &planes);
@@ -429,20 +461,21 @@ pub(super) fn find_place(mesh: &Tetrahedra, sector: &Sector, p: u32) -> Option<(
     if quality < 0.0 {
         return None;
     }
-    Some(climb(mesh, sector, (quality, place), reach))
+    let (quality, place) = climb(mesh, sector, (quality, place), reach);
+    Fixed::of(&place).map(|_| (quality, place))
 }
 
-/// Away from the facets at p, as long as the sector reaches; and how far that is.
+/// Away from the facets at p, as long as the sector reaches.
 ///
 /// The facets lie in one plane or in two, however many pieces of each there are: half-way between two inward
 /// normals is inside of both planes, whatever the angle.
-pub(super) fn directions(mesh: &Tetrahedra, sector: &Sector, p: u32) -> (Vector, f64) {
-    let reach = sector.reach(mesh, p);
+pub(super) fn directions(mesh: &Tetrahedra, sector: &Sector, p: u32) -> Vector {
+    let reach = sector.reach(mesh, mesh.point(p));
     let inward = sector.sides.iter().fold(Vector::zeros(), |sum, face| {
         let [a, b, c] = face.map(|v| mesh.point(v));
         sum - area_vector(a, b, c).normalize()
     });
-    (inward.try_normalize(0.0).unwrap_or_else(Vector::zeros) * reach, reach)
+    inward.try_normalize(0.0).unwrap_or_else(Vector::zeros) * reach
 }
 
 /// Moves a place along the axes as long as the worst mean ratio grows.

@@ -8,8 +8,9 @@
 //! passed, and all tets are positive by exact sign, each place inside lies in one tet and each place outside in none, for the windings of
 //! the tets add up to that of the skin.
 
+use super::tetrahedra::Tetrahedra;
 use crate::Point;
-use crate::kernel::predicates::{Sign, orient3d};
+use crate::kernel::predicates::Sign;
 use crate::kernel::quality::mean_ratio;
 use crate::kernel::simplex::{from_lowest, volume6};
 use std::collections::HashMap;
@@ -30,7 +31,7 @@ const VOLUME_SLACK: f64 = 1e-9;
 /// where none are found. The faces of `skin` look out. Most polyhedra that can be filled are so after a few more tries than they
 /// have faces.
 pub(super) fn fill(
-    points: &[Point],
+    mesh: &Tetrahedra,
     skin: &[[u32; 3]],
     free: &[u32],
     least: f64,
@@ -42,16 +43,16 @@ pub(super) fn fill(
     if vertices.len() > effort.vertices {
         return None;
     }
-    let corners: Vec<&Point> = vertices.iter().map(|&v| &points[v as usize]).collect();
+    let corners = Corners { mesh, vertices: &vertices };
     let number = |v: u32| vertices.binary_search(&v).expect("a vertex of the skin") as u8;
     let skin: Vec<Face> = skin.iter().map(|f| from_lowest(f.map(number))).collect();
     let volume = |&f: &Face| {
-        let [a, b, c] = f.map(|i| corners[i as usize]);
-        volume6(corners[0], a, b, c)
+        let [a, b, c] = f.map(|i| corners.point(i));
+        volume6(corners.point(0), a, b, c)
     };
     let room = skin.iter().map(volume).sum::<f64>() * (1.0 + VOLUME_SLACK);
     let mut search = Search {
-        corners: &corners,
+        corners,
         skin: &skin,
         least,
         known: HashMap::new(),
@@ -67,13 +68,11 @@ pub(super) fn fill(
 type Face = [u8; 3];
 
 /// Whether the segment between two corners goes through a face of the skin: then it is no edge.
-fn is_outside(corners: &[&Point], skin: &[Face], [u, v]: [u8; 2]) -> bool {
-    let [p, q] = [u, v].map(|i| corners[i as usize]);
-    skin.iter().filter(|f| !f.contains(&u) && !f.contains(&v)).any(|face| {
-        let [a, b, c] = face.map(|i| corners[i as usize]);
-        let (one, other) = (orient3d(a, b, c, p), orient3d(a, b, c, q));
+fn is_outside(corners: Corners, skin: &[Face], [u, v]: [u8; 2]) -> bool {
+    skin.iter().filter(|f| !f.contains(&u) && !f.contains(&v)).any(|&[a, b, c]| {
+        let (one, other) = (corners.side([a, b, c, u]), corners.side([a, b, c, v]));
         one != Sign::Zero && one == other.flipped() && {
-            let turns = [orient3d(p, q, a, b), orient3d(p, q, b, c), orient3d(p, q, c, a)];
+            let turns = [corners.side([u, v, a, b]), corners.side([u, v, b, c]), corners.side([u, v, c, a])];
             turns[0] != Sign::Zero && turns.iter().all(|&t| t == turns[0])
         }
     })
@@ -87,8 +86,26 @@ struct Choice {
     volume: f64,
 }
 
+/// The vertices at hand, by number.
+#[derive(Clone, Copy)]
+struct Corners<'a> {
+    mesh: &'a Tetrahedra,
+    vertices: &'a [u32],
+}
+
+impl<'a> Corners<'a> {
+    fn point(self, i: u8) -> &'a Point {
+        self.mesh.point(self.vertices[i as usize])
+    }
+
+    fn side(self, tet: [u8; 4]) -> Sign {
+        let [a, b, c, d] = tet.map(|i| self.vertices[i as usize]);
+        self.mesh.side([a, b, c], d)
+    }
+}
+
 struct Search<'a> {
-    corners: &'a [&'a Point],
+    corners: Corners<'a>,
     skin: &'a [Face],
     least: f64,
     /// What may be put on each face that was open, whatever else there is. Looked up only.
@@ -154,11 +171,11 @@ impl Search<'_> {
         }
         let [a, b, c] = face;
         let mut choices = Vec::new();
-        for v in (0..self.corners.len() as u8).filter(|v| !face.contains(v)) {
-            let [p, x, y, z] = [v, a, b, c].map(|i| self.corners[i as usize]);
-            if orient3d(p, x, y, z) != Sign::Positive {
+        for v in (0..self.corners.vertices.len() as u8).filter(|v| !face.contains(v)) {
+            if self.corners.side([v, a, b, c]) != Sign::Positive {
                 continue;
             }
+            let [p, x, y, z] = [v, a, b, c].map(|i| self.corners.point(i));
             let quality = mean_ratio(p, x, y, z).max(0.0);
             let leaves = || face.iter().any(|&i| is_outside(self.corners, self.skin, [i, v]));
             if quality >= self.least && !leaves() {
@@ -220,10 +237,10 @@ mod tests {
     #[test]
     fn a_prism_bent_out_is_filled_with_three_tets_and_one_bent_in_with_none() {
         let (points, skin) = prism(0.3);
-        let tets = fill(&points, &skin, &[], 0.0, &mut effort(1000)).unwrap();
+        let tets = fill(&Tetrahedra::new(points.clone()), &skin, &[], 0.0, &mut effort(1000)).unwrap();
         assert!(tets.len() == 3 || tets.len() == 4, "{tets:?}");
         let (points, skin) = prism(-0.3);
-        assert_eq!(fill(&points, &skin, &[], 0.0, &mut effort(1000)), None);
+        assert_eq!(fill(&Tetrahedra::new(points.clone()), &skin, &[], 0.0, &mut effort(1000)), None);
     }
 
     #[test]
@@ -231,7 +248,7 @@ mod tests {
         for (turn, least) in [(-0.3, 1), (0.3, 0)] {
             let (mut points, skin) = prism(turn);
             points.push(Point::new(0.0, 0.0, 0.5));
-            let tets = fill(&points, &skin, &[6], 0.0, &mut effort(1000)).unwrap();
+            let tets = fill(&Tetrahedra::new(points.clone()), &skin, &[6], 0.0, &mut effort(1000)).unwrap();
             assert!(tets.iter().filter(|tet| tet.contains(&6)).count() >= least, "{tets:?}");
             let whole: f64 = skin.iter().map(|&[a, b, c]| volume(&points, &[[6, a, b, c]])).sum();
             assert!((volume(&points, &tets) - whole).abs() < 1e-12 * whole);
@@ -258,7 +275,7 @@ mod tests {
             }
         }
         assert_eq!(skin.len(), 20);
-        let tets = fill(&points, &skin, &[], 0.01, &mut effort(1000)).unwrap();
+        let tets = fill(&Tetrahedra::new(points.clone()), &skin, &[], 0.01, &mut effort(1000)).unwrap();
         let whole: f64 = skin
             .iter()
             .map(|&[a, b, c]| {
@@ -267,6 +284,6 @@ mod tests {
             })
             .sum();
         assert!((volume(&points, &tets) - whole).abs() < 1e-12 * whole);
-        assert_eq!(fill(&points, &skin, &[], 0.01, &mut effort(5)), None);
+        assert_eq!(fill(&Tetrahedra::new(points.clone()), &skin, &[], 0.01, &mut effort(5)), None);
     }
 }

@@ -25,11 +25,11 @@ const OFF_ENDS: f64 = 1e-10;
 
 /// The edge or facet that a Steiner point is to split.
 pub(super) struct Room {
-    place: Place,
+    pub place: Place,
     /// The directions in which the point may move.
-    axes: Vec<Vector>,
+    pub axes: Vec<Vector>,
     /// How far.
-    ends: Vec<Plane>,
+    pub ends: Vec<Plane>,
 }
 
 impl Room {
@@ -224,7 +224,7 @@ impl Recovery<'_> {
     }
 
     /// Whether the facets and their edges among some tets are all on the surface of the cavity they make.
-    fn keeps_edges(&self, tets: &[u32]) -> bool {
+    pub(super) fn keeps_edges(&self, tets: &[u32]) -> bool {
         let outer = |h: &u32| {
             let other = self.mesh.across(*h);
             other == NONE || !tets.contains(&(other >> 2))

@@ -8,7 +8,7 @@ use super::clearance::{Plane, most_inside};
 use super::relocate::{Sector, directions};
 use super::small::{self, Effort};
 use super::tetrahedra::Tetrahedra;
-use crate::kernel::predicates::{Sign, orient3d};
+use crate::kernel::predicates::Sign;
 use crate::{Point, Vector};
 
 /// How many tets may be put in search of one filling. Those that are found mostly need less than a hundred.
@@ -28,12 +28,12 @@ const OFF: [f64; 4] = [1e-6, 1e-3, 0.02, 0.1];
 /// it and the mesh are as before.
 pub(super) fn fill(mesh: &mut Tetrahedra, sector: &mut Sector, p: u32) -> Option<Vec<[u32; 4]>> {
     let start = sector.clone();
-    let (inward, reach) = directions(mesh, sector, p);
+    let inward = directions(mesh, sector, p);
     for growth in 0..=GROWTHS {
         // Walls that are seen stand in the way too where those that are not must stay.
         let near = mesh.point(p) + inward * OFF[0];
         let grown = growth == 0 || sector.grow(mesh, Some(&near)) || sector.grow(mesh, None);
-        if !grown || !sector.keeps_vertices(mesh, p) {
+        if !grown || !sector.keeps_vertices(mesh, |v| v == p) {
             break;
         }
         if let Some(tets) = search(mesh, sector, &[]) {
@@ -41,7 +41,7 @@ pub(super) fn fill(mesh: &mut Tetrahedra, sector: &mut Sector, p: u32) -> Option
         }
         for off in OFF {
             let near = mesh.point(p) + inward * off;
-            let Some(place) = where_most_is_seen(mesh, sector, &near, reach) else { continue };
+            let Some(place) = where_most_is_seen(mesh, sector, &near) else { continue };
             let points = mesh.points.len();
             let new = mesh.add_point(place);
             match search(mesh, sector, &[new]) {
@@ -61,15 +61,13 @@ pub(super) fn fill(mesh: &mut Tetrahedra, sector: &mut Sector, p: u32) -> Option
 
 fn search(mesh: &Tetrahedra, sector: &Sector, free: &[u32]) -> Option<Vec<[u32; 4]>> {
     let mut effort = Effort { vertices: MOST_VERTICES, tries: TRIES };
-    small::fill(&mesh.points, &sector.skin, free, 0.0, &mut effort)
+    small::fill(mesh, &sector.skin, free, 0.0, &mut effort)
 }
 
 /// The place that is farthest inside of all that a place near the surface sees; `None` if it does not see all that.
-fn where_most_is_seen(mesh: &Tetrahedra, sector: &Sector, near: &Point, reach: f64) -> Option<Point> {
-    let sees = |from: &Point, face: &[u32; 3]| {
-        let [a, b, c] = face.map(|v| mesh.point(v));
-        orient3d(from, a, b, c) == Sign::Positive
-    };
+pub(super) fn where_most_is_seen(mesh: &Tetrahedra, sector: &Sector, near: &Point) -> Option<Point> {
+    let reach = sector.reach(mesh, near);
+    let sees = |from: &Point, face: &[u32; 3]| mesh.side_of(*face, from) == Sign::Negative;
     let seen: Vec<[u32; 3]> = sector.skin.iter().filter(|face| sees(near, face)).copied().collect();
     let planes: Vec<Plane> = seen.iter().filter_map(|f| Plane::of(f.map(|v| mesh.point(v)))).collect();
     let axes = [Vector::x(), Vector::y(), Vector::z()].map(|axis| axis * reach);
