@@ -12,6 +12,10 @@ const ROUNDS: usize = 2;
 /// How many tets may be put in search of a ball's filling, all its cavities together.
 const TRIES: usize = 500;
 
+/// How many points are tried at most, which bounds the time to some ten seconds: thousands stay inside only where a hundred edges nearly meet, and a
+/// mesh with some points too many is valid.
+const MOST_TRIED: usize = 2000;
+
 /// Cavities with more vertices are left alone: the search would end without an answer nearly always.
 const MOST_VERTICES: usize = 24;
 
@@ -51,9 +55,13 @@ pub(super) fn make_room(
 
 /// Deletes those points inside whose ball can be filled without them, with no worse a tet unless it is good enough.
 pub(super) fn delete(mesh: &mut Tetrahedra, constraints: &Constraints, inside: &mut Vec<u32>) {
+    let mut tried = 0;
     for _ in 0..ROUNDS {
         let before = inside.len();
-        inside.retain(|&q| !delete_one(mesh, constraints, q));
+        inside.retain(|&q| {
+            tried += 1;
+            tried > MOST_TRIED || !delete_one(mesh, constraints, q)
+        });
         if inside.len() == before {
             break;
         }
