@@ -18,11 +18,6 @@ const LEAST_ANGLE: f64 = 2e-3;
 /// Half as far away it is the same for curves that leave at an angle, a half where they part with the square of the distance, a quarter and less
 /// where with higher powers.
 const FALLING: f64 = 0.35;
-/// Curves that part with the square of the distance may be seen under less, but not under this: radii of 0.98 and 1 leave 10⁻³ and
-/// triangles of 0.3°, radii of 0.999 and 1 leave 5·10⁻⁵ and no triangle worth the name.
-const LEAST_OF_ANY: f64 = 2e-4;
-/// Half as far away curves of a cusp are seen under less than this part of the angle.
-const CUSP: f64 = 0.75;
 
 /// Refuses the first cusp that is too sharp.
 ///
@@ -42,10 +37,7 @@ pub(super) fn check(geometry: &Geometry, features: &Features) -> Result<(), Feat
                 let is_beside = |curve: &Curve, patch| curve.fins.iter().any(|fin| fin.patch == patch);
                 let Some(fin) = c.fins.iter().find(|fin| is_beside(d, fin.patch)) else { continue };
                 let angles = angles(geometry, [(c, first.1), (d, second.1)]);
-                let is_too_sharp = |[near, far]: [f64; 2]| {
-                    (far < LEAST_ANGLE && near < FALLING * far) || (far < LEAST_OF_ANY && near < CUSP * far)
-                };
-                if !angles.is_some_and(is_too_sharp) {
+                if !angles.is_some_and(|[near, far]| far < LEAST_ANGLE && near < FALLING * far) {
                     continue;
                 }
                 let of_patch = features.patch(fin.patch).surface;

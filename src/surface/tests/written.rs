@@ -121,7 +121,7 @@ tlo eccentric;",
     assert!(outer.iter().zip(&inner).all(|(p, q)| (p - q).abs() < 1e-12), "{outer:?} {inner:?}");
     // Near the cusp the chords are nearer to each other than to their curves, and in order nevertheless.
     let near = |source: &crate::size::Source| (source.point - cusp).norm() < 0.6;
-    assert!(!crowded(&curves, &features, &size).iter().any(|source| near(source)));
+    assert!(!crowded(&curves, &features, &size).iter().any(near));
 }
 
 #[test]
