@@ -143,7 +143,7 @@ tlo blocks;";
     };
     let sources = found(disk);
     assert!(
-        !sources.is_empty() && sources.iter().all(|source| (0.1..0.25).contains(&source.size)),
+        !sources.is_empty() && sources.iter().all(|source| (0.17..0.35).contains(&source.size)),
         "{sources:?}"
     );
     assert_eq!(found(blocks), []);
