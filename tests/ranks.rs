@@ -39,13 +39,3 @@ fn three_hundred_ranks_do_not_fill_the_stacks_of_the_threads_they_share() {
     assert_eq!(report["ranks"], 300);
     assert!(report["mesh"]["tets"].as_u64().unwrap() > 32_000);
 }
-
-#[test]
-fn edges_bent_for_better_angles_are_bent_alike_on_all_ranks() {
-    let report = |ranks| report_of(&own("tee"), &["--levels", "3", "--preset", "coarse", "-n", ranks]);
-    let [alone, three] = ["1", "3"].map(report);
-    assert!(alone["coarse"]["bent_edges"].as_u64().unwrap() > 0);
-    assert_eq!(alone["mesh"]["checksum"], three["mesh"]["checksum"]);
-    let angles = [0, 3].map(|k: usize| alone["quality_by_level"][k]["smallest_dihedral"].as_f64().unwrap());
-    assert!(angles[1] > 0.6 * angles[0], "{angles:?}");
-}

@@ -410,3 +410,17 @@ fn verdict(
     }
     Ok((report, checksum))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::comm::thread;
+
+    #[test]
+    fn edges_that_rank_0_bends_are_bent_alike_on_all_ranks() {
+        let bends: Bends = [(7, [0.5, 0.0, -1.25]), (1 << 40, [0.1, 0.2, 0.3])].into_iter().collect();
+        let heard =
+            thread::run(3, |comm| broadcast_bends(comm, (comm.rank() == 0).then_some(&bends)).unwrap());
+        assert_eq!(heard.unwrap(), vec![bends; 3]);
+    }
+}
