@@ -56,13 +56,13 @@ mod with_mpi {
     #[test]
     fn parts_meshed_by_mpi_ranks_are_those_that_threads_mesh() {
         for method in ["surface", "decompose"] {
-            let arguments = ["-m", method, "--preset", "coarse", "--pieces", "2", "-q"];
+            let arguments = ["-m", method, "--preset", "coarse", "--pieces", "2"];
             for (ranks, parts) in [(4, 4), (2, 5)] {
                 let Some(mut command) = mpirun(ranks) else { return };
                 let dir = tempfile::tempdir().unwrap();
                 let (out, file) = (dir.path().join("out"), dir.path().join("report.json"));
                 command.arg("generate").arg(own("tee")).args(arguments).args(["--parts", &parts.to_string()]);
-                succeed(command.arg("-o").arg(&out).arg("--report").arg(&file));
+                succeed(command.arg("-q").arg("-o").arg(&out).arg("--report").arg(&file));
                 judge(&out, parts);
                 let report = read_json(&file);
                 assert_eq!(report["processes"]["count"], ranks);

@@ -9,7 +9,7 @@ use super::{FacetError, normals, regions};
 use crate::Point;
 use crate::kernel::tree;
 use crate::mesh::{BoundaryTriangle, VertexId};
-use crate::volume::{intersections, middles_of_sides};
+use crate::surface::crossings;
 use csg::{Aabb, BodyId, CornerId, PatchId};
 
 /// A triangulated surface as a file gives it: closed, its triangles in any order.
@@ -250,11 +250,4 @@ fn assemble(joined: Joined, regions: &Regions, found: Found, bounds: Aabb, round
 fn bodies_of(regions: &Regions) -> Vec<FacetBody> {
     let Regions { files, numbers, .. } = regions;
     files.iter().zip(numbers).map(|(&file, &number)| FacetBody { file, number }).collect()
-}
-
-/// The middles of the sides of triangles that meet others elsewhere than in a common corner or edge.
-pub(super) fn crossings(points: &[Point], triangles: &[BoundaryTriangle]) -> Vec<Point> {
-    let corners: Vec<[u32; 3]> = triangles.iter().map(|t| t.vertices.map(|v| v.0)).collect();
-    let pairs = intersections(points, &corners);
-    middles_of_sides(points, &corners, pairs.into_iter().map(|(pair, _)| pair))
 }

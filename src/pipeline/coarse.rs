@@ -70,7 +70,8 @@ impl CoarseError {
     }
 }
 
-fn smaller_at(point: Point, size: &dyn SizeField) -> Source {
+/// A source for where there is too little room.
+pub(super) fn smaller_at(point: Point, size: &dyn SizeField) -> Source {
     Source { point, size: LOWERED * size.size_at(&point) }
 }
 

@@ -1,6 +1,8 @@
 //! Method 1 on all ranks: a geometry cut into pieces, each meshed on its rank.
 
-use super::coarse::{CoarseError, CoarseMesh, CoarseSettings, MOST_CORRECTIONS, Unmeshed, mesh_surface};
+use super::coarse::{
+    CoarseError, CoarseMesh, CoarseSettings, MOST_CORRECTIONS, Unmeshed, mesh_surface, smaller_at,
+};
 use super::generate::{CoarseResult, GenerateSettings};
 use super::model::{CsgModel, Model};
 use super::skins::refuse_periodic;
@@ -20,7 +22,7 @@ use crate::progress::Progress;
 use crate::refine::Bends;
 use crate::size::{SizeField, Source, SourceTree};
 use crate::skin::{self, Filled, PartSizes, Skin};
-use crate::surface::SurfaceMesh;
+use crate::surface::{self, SurfaceMesh};
 use csg::{Aabb, BodyId};
 use std::collections::BTreeSet;
 
@@ -215,7 +217,14 @@ fn fine_surface(model: &CsgModel, base: &dyn SizeField) -> Result<SurfaceMesh, C
     loop {
         let size = Lowered { base, sources: SourceTree::new(bounds, GRADING, bounds.diagonal(), &sources) };
         match mesh_surface(model, &size, corrections < MOST_CORRECTIONS) {
-            Ok((surface, _)) => return Ok(surface),
+            Ok((surface, _)) => {
+                // The ranks could not fill it, and would say so too late.
+                let crossing = surface::crossings(&surface.points, &surface.triangles);
+                if crossing.is_empty() || corrections == MOST_CORRECTIONS {
+                    return Ok(surface);
+                }
+                sources.extend(crossing.into_iter().map(|point| smaller_at(point, &size)));
+            }
             Err(Unmeshed::Lower(lower)) => sources.extend(lower),
             Err(Unmeshed::Failed(error)) => return Err(error),
         }

@@ -40,6 +40,7 @@ pub use report::{PatchReport, Report};
 
 use crate::Point;
 use crate::mesh::{BoundaryTriangle, Class, Segment};
+use crate::volume::{intersections, middles_of_sides};
 
 /// A classified triangulation of all patches: vertices on corners, curves and patches, segments on curves.
 ///
@@ -54,6 +55,14 @@ pub struct SurfaceMesh {
     pub segments: Vec<Segment>,
     /// The triangles, with normals from the patch's `inside` to its `outside`.
     pub triangles: Vec<BoundaryTriangle>,
+}
+
+/// The middles of the sides of triangles that meet others elsewhere than in a common corner or edge, by exact signs: where smaller sizes part
+/// them.
+pub(crate) fn crossings(points: &[Point], triangles: &[BoundaryTriangle]) -> Vec<Point> {
+    let corners: Vec<[u32; 3]> = triangles.iter().map(|t| t.vertices.map(|v| v.0)).collect();
+    let pairs = intersections(points, &corners);
+    middles_of_sides(points, &corners, pairs.into_iter().map(|(pair, _)| pair))
 }
 
 /// How patches are meshed.

@@ -20,11 +20,10 @@ mod split;
 pub use deviation::deviation;
 pub use report::RemeshReport;
 
-use super::model::crossings;
 use super::{FacetModel, FacetSize};
 use crate::Point;
 use crate::size::{SizeField, Source, SourceTree};
-use crate::surface::SurfaceMesh;
+use crate::surface::{SurfaceMesh, crossings};
 use sheet::Sheet;
 
 /// How facets are remeshed.
