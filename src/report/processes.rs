@@ -69,15 +69,15 @@ pub fn processes(comm: &dyn Communicator) -> Result<Processes, CommError> {
 impl fmt::Display for Processes {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if let Some(bytes) = self.memory() {
-            write!(f, "memory     {} at the peak\n", sized(bytes))?;
+            writeln!(f, "memory     {} at the peak", sized(bytes))?;
         }
         if self.count > 1 {
             let (cpu, memory) = (self.cpu_seconds, self.peak_memory);
             let [first, mean, most] =
                 [memory.first, memory.mean, memory.most].map(|bytes| sized(bytes as u64));
-            write!(
+            writeln!(
                 f,
-                "processes  {}: rank 0 {:.1} processor s and {first}, in the mean {:.1} s and {mean}, at most {:.1} s and {most}\n",
+                "processes  {}: rank 0 {:.1} processor s and {first}, in the mean {:.1} s and {mean}, at most {:.1} s and {most}",
                 self.count, cpu.first, cpu.mean, cpu.most
             )?;
         }
