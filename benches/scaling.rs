@@ -97,6 +97,8 @@ impl Communicator for Counting<'_> {
 }
 
 fn main() {
+    let pool = rayon::ThreadPoolBuilder::new().stack_size(thread::POOL_STACK);
+    pool.build_global().expect("the first pool");
     let args: Vec<String> = std::env::args().skip(1).filter(|a| a != "--bench").collect();
     let default = concat!(env!("CARGO_MANIFEST_DIR"), "/geometries/crankshaft.geo").to_string();
     let geometry = args.first().unwrap_or(&default);

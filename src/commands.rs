@@ -83,15 +83,11 @@ fn method_of(options: &Generate) -> Result<pipeline::Method, Failure> {
     }
 }
 
-/// The stack of each thread of the pool, of which only what is used takes memory. A thread that waits for part of one rank's work takes up
-/// that of another rank meanwhile, and so on: with 64 ranks the usual 2 MiB have overflowed.
-const THREAD_STACK: usize = 256 << 20;
-
 fn set_threads(threads: Option<u32>) -> Result<(), Failure> {
     let threads = threads.unwrap_or(0) as usize;
     rayon::ThreadPoolBuilder::new()
         .num_threads(threads)
-        .stack_size(THREAD_STACK)
+        .stack_size(thread::POOL_STACK)
         .build_global()
         .map_err(|error| Failure::new(Status::Resources, format!("cannot start {threads} threads: {error}")))
 }

@@ -141,6 +141,11 @@ pub fn alone() -> ThreadComm {
     ThreadComm { rank: 0, world: Arc::new(World::new(1)), _one_thread: PhantomData }
 }
 
+/// The stack that each thread of rayon's pool should have where many ranks share it, of which only what is used takes memory. A thread that waits
+/// for part of one rank's work takes up that of another rank meanwhile, and so on: with 64 ranks the usual 2 MiB have overflowed. The program
+/// `tetmill` sets it; who runs ranks from a program of their own has to (`rayon::ThreadPoolBuilder::stack_size`).
+pub const POOL_STACK: usize = 256 << 20;
+
 /// Runs `body` on each of `ranks` threads and returns their results by rank.
 ///
 /// With one rank `body` runs on the calling thread.
