@@ -231,10 +231,12 @@ pub(super) fn mesh_surface(
 ) -> Result<(SurfaceMesh, Vec<[Point; 2]>), Unmeshed> {
     let CsgModel { geometry, features, projector } = model;
     let curves = mesh_curves(features, projector, size).map_err(|error| Unmeshed::Failed(error.into()))?;
-    let mut crowded = crowded(&curves, features, size);
-    crowded.extend(narrow(&curves, features, projector, size));
-    if may_lower && !crowded.is_empty() {
-        return Err(Unmeshed::Lower(crowded));
+    if may_lower {
+        let mut lower = crowded(&curves, features, size);
+        lower.extend(narrow(&curves, features, projector, size));
+        if !lower.is_empty() {
+            return Err(Unmeshed::Lower(lower));
+        }
     }
     let ends = |s: &Segment| s.vertices.map(|v| curves.points[v.index()]);
     let segments: Vec<[Point; 2]> = curves.segments.iter().map(ends).collect();

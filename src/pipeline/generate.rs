@@ -168,6 +168,7 @@ pub fn generate(
         levels.extend(check.shape.clone().map(|shape| Level { pieces, tets: check.tets, shape }));
         let coarse = coarse.take().map(|(_, mut made)| {
             made.report.size_corrections += round as u64;
+            made.report.bent_edges = made.bends.edges().len() as u64;
             made
         });
         let part = Part::Refined(Box::new(part));

@@ -108,7 +108,7 @@ fn try_out(model: &Model, coarse: &CoarseMesh, pieces: u32) -> Result<Trial, Men
         return Ok(Trial::default());
     }
     let part = dist::from_serial(coarse.mesh.clone())?;
-    Ok(refine::trial(&part, &projector, pieces, &coarse.bends, least(coarse))?)
+    Ok(refine::trial(&part, &projector, pieces, &Bends::default(), least(coarse))?)
 }
 
 /// Bends edges of a coarse mesh for which a trial found bad children, if that makes the worst of them better.
@@ -116,17 +116,16 @@ fn bend(model: &Model, coarse: &mut CoarseMesh, before: &Trial, pieces: u32) -> 
     if before.poor.len() + before.inverted.len() > MOST_BENT {
         return Ok(());
     }
-    let part = dist::from_serial(coarse.mesh.clone())?;
+    let (part, projector, least) =
+        (dist::from_serial(coarse.mesh.clone())?, model.projector(), least(coarse));
     let [margin, enough] = BENT;
-    let settings =
-        refine::mend::Settings { pieces, least: least(coarse), margin, enough, ..Default::default() };
-    coarse.bends = refine::mend(&part, &model.projector(), &settings)?.bends;
-    let after = try_out(model, coarse, pieces)?;
+    let settings = refine::mend::Settings { pieces, least, margin, enough, ..Default::default() };
+    let bends = refine::mend(&part, &projector, &settings)?.bends;
+    let after = refine::trial(&part, &projector, pieces, &bends, least)?;
     let is_better = after.poor.is_empty() || after.smallest_dihedral > before.smallest_dihedral;
-    if !after.inverted.is_empty() || !is_better {
-        coarse.bends = Bends::default();
+    if after.inverted.is_empty() && is_better {
+        coarse.bends = bends;
     }
-    coarse.report.bent_edges = coarse.bends.edges().len() as u64;
     Ok(())
 }
 

@@ -5,10 +5,10 @@
 //! w are the faces that two parts share, so that wide borders move as far as narrow ones. Each rank then gives away its tets next to the
 //! border, layer by layer. Messages are as few as parts have neighbours; compare [`repartition`](super::repartition()), which begins from nothing.
 
+use super::tets_at_faces;
 use crate::comm::{CommError, Communicator};
 use crate::dist::DistMesh;
 use crate::mesh::Rank;
-use crate::mesh::topology::face_tets;
 use std::collections::BTreeMap;
 
 /// No tet behind a face.
@@ -27,8 +27,7 @@ const SOLVED: f64 = 1e-6;
 /// # Errors
 /// If another rank fails.
 pub fn diffuse(comm: &dyn Communicator, mesh: &DistMesh) -> Result<Vec<Rank>, CommError> {
-    let tets = face_tets(mesh.faces.len(), &mesh.tet_faces)
-        .unwrap_or_else(|face| panic!("face {face:?} on rank {} has three tets", mesh.rank));
+    let tets = tets_at_faces(mesh);
     let mut borders: BTreeMap<Rank, Vec<u32>> = BTreeMap::new();
     for (face, holders) in mesh.shared_faces.iter() {
         let other = holders.iter().find(|&&holder| holder != mesh.rank).expect("another holder");

@@ -31,6 +31,7 @@ pub use metrics::{Metrics, measure};
 use crate::comm::{Agreed, CommError, Communicator};
 use crate::dist::DistMesh;
 use crate::mesh::Rank;
+use crate::mesh::topology::face_tets;
 use crate::partition::PartitionError;
 
 /// How to partition by where tets are: balanced to one tet.
@@ -158,6 +159,12 @@ pub fn repartition_weighted(
     assert_eq!(weights.len(), mesh.tets.len(), "rank {}: one weight for each tet", mesh.rank);
     refuse_too_many(mesh, parts)?;
     Ok(by_place(comm, mesh, Some(weights), parts, method)?)
+}
+
+/// The tets at each face.
+fn tets_at_faces(mesh: &DistMesh) -> Vec<[u32; 2]> {
+    face_tets(mesh.faces.len(), &mesh.tet_faces)
+        .unwrap_or_else(|face| panic!("face {face:?} on rank {} has three tets", mesh.rank))
 }
 
 fn refuse_too_many(mesh: &DistMesh, parts: u32) -> Result<(), PartitionError> {

@@ -15,11 +15,11 @@
 //! who holds which tet. Only tets near cuts are touched, and messages are as large as the cut where it crosses ranks.
 
 use super::metrics::sum_by_part;
+use super::tets_at_faces;
 use crate::comm::pack::{put_varint, take_varint};
 use crate::comm::{CommError, Communicator};
 use crate::dist::DistMesh;
 use crate::kernel::random::mix;
-use crate::mesh::topology::face_tets;
 use crate::mesh::{GlobalId, Rank};
 use rayon::prelude::*;
 
@@ -118,8 +118,7 @@ struct Links {
 
 impl Links {
     fn new(mesh: &DistMesh) -> Self {
-        let sides = face_tets(mesh.faces.len(), &mesh.tet_faces)
-            .unwrap_or_else(|face| panic!("face {face:?} on rank {} has three tets", mesh.rank));
+        let sides = tets_at_faces(mesh);
         let mut ghost = vec![NONE; mesh.faces.len()];
         let mut own = Vec::with_capacity(mesh.shared_faces.len());
         let mut with: Vec<(Rank, Vec<u32>)> = (0..mesh.ranks).map(|rank| (rank, Vec::new())).collect();

@@ -142,9 +142,8 @@ pub(super) fn are_aligned(mesh: &SurfaceMesh, features: &Features, pair: [&Segme
         let corner = features.corner(corner).point;
         let away = |v: VertexId| (place(v) - corner).norm();
         let has_at = |curve: CurveId, distance: f64| {
-            let from = mesh.segments.partition_point(|s| s.curve < curve);
-            let of_curve = mesh.segments[from..].iter().take_while(|s| s.curve == curve);
-            of_curve.flat_map(|s| s.vertices).any(|v| (away(v) - distance).abs() <= SAME * distance)
+            let mut vertices = mesh.segments_of(curve).flat_map(|s| s.vertices);
+            vertices.any(|v| (away(v) - distance).abs() <= SAME * distance)
         };
         let [s, t] = pair.map(|s| s.vertices.map(away).into_iter().fold(0.0, f64::max));
         pair[0].curve != pair[1].curve && has_at(pair[1].curve, s) && has_at(pair[0].curve, t)

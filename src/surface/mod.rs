@@ -41,6 +41,7 @@ pub use report::{PatchReport, Report};
 use crate::Point;
 use crate::mesh::{BoundaryTriangle, Class, Segment};
 use crate::volume::{intersections, middles_of_sides};
+use csg::CurveId;
 
 /// A classified triangulation of all patches: vertices on corners, curves and patches, segments on curves.
 ///
@@ -55,6 +56,14 @@ pub struct SurfaceMesh {
     pub segments: Vec<Segment>,
     /// The triangles, with normals from the patch's `inside` to its `outside`.
     pub triangles: Vec<BoundaryTriangle>,
+}
+
+impl SurfaceMesh {
+    /// The edges on a curve, in its order and direction.
+    pub(crate) fn segments_of(&self, curve: CurveId) -> impl Iterator<Item = &Segment> {
+        let from = self.segments.partition_point(|s| s.curve < curve);
+        self.segments[from..].iter().take_while(move |s| s.curve == curve)
+    }
 }
 
 /// The middles of the sides of triangles that meet others elsewhere than in a common corner or edge, by exact signs: where smaller sizes part

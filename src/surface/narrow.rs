@@ -34,10 +34,9 @@ pub fn narrow(
         let id = PatchId::new(i);
         let mut sides: Vec<Side> = Vec::new();
         for &(curve, forward) in &patch.boundary {
-            let from = mesh.segments.partition_point(|s| s.curve < curve);
-            let of_curve = mesh.segments[from..].iter().take_while(|s| s.curve == curve);
             let sign = if forward != patch.flipped { 1.0 } else { -1.0 };
-            sides.extend(of_curve.map(|segment| Side::new(mesh, projector, id, segment, sign)));
+            sides
+                .extend(mesh.segments_of(curve).map(|segment| Side::new(mesh, projector, id, segment, sign)));
         }
         sides.sort_by(|a, b| a.low.x.total_cmp(&b.low.x));
         for (k, a) in sides.iter().enumerate() {

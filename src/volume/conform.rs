@@ -13,6 +13,7 @@
 use super::constraints::{Facet, edges};
 use super::crossing::{Crossing, crossings, edges_of_tet, tets_around};
 use super::recover::{DEEPEST, Recovery};
+use super::steiner::middle_first;
 use super::tetrahedra::{NONE, Ring, sorted};
 use crate::kernel::fixed::Fixed;
 use crate::kernel::predicates::Sign;
@@ -187,9 +188,8 @@ impl Recovery<'_> {
     fn cut_edge(&mut self, edge: [u32; 2], [a, b]: [u32; 2]) -> Option<u32> {
         let mut found = std::mem::take(&mut self.found);
         crossings(self.mesh, a, b, &mut self.star, &mut found);
-        let mut order: Vec<usize> = (0..found.len()).collect();
-        order.sort_by_key(|&i| (2 * i + 1).abs_diff(found.len()));
-        let added = order.into_iter().find_map(|i| self.split_exactly(edge, [a, b], found[i], &found));
+        let added =
+            middle_first(&found).find_map(|crossing| self.split_exactly(edge, [a, b], crossing, &found));
         self.found = found;
         let p = added?;
         self.constraints.forget_edge(a, b);

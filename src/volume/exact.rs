@@ -144,9 +144,7 @@ impl Recovery<'_> {
         self.counts.steiner += 1;
         Some(p)
     }
-}
 
-impl Recovery<'_> {
     /// Takes tets and `more` beside them as long as all walls see a point and what must stay does so.
     fn take_more(&mut self, tets: &[u32], more: &BTreeSet<u32>, p: u32) {
         let mut tets = tets.to_vec();

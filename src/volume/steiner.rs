@@ -39,6 +39,13 @@ impl Room {
     }
 }
 
+/// Crossings along an edge, that in the middle first.
+pub(super) fn middle_first(found: &[Crossing]) -> impl Iterator<Item = Crossing> + use<> {
+    let mut order: Vec<(usize, Crossing)> = found.iter().copied().enumerate().collect();
+    order.sort_by_key(|(i, _)| (2 * i + 1).abs_diff(found.len()));
+    order.into_iter().map(|(_, crossing)| crossing)
+}
+
 impl Recovery<'_> {
     /// The point of the edge a, b at a crossing, rounded.
     pub(super) fn crossing_point(&self, a: u32, b: u32, crossing: Crossing) -> Point {
@@ -83,11 +90,9 @@ impl Recovery<'_> {
 
     /// Puts a Steiner point on a missing edge at one of its crossings, that in the middle first, else between two.
     pub(super) fn split_at(&mut self, a: u32, b: u32, found: &[Crossing], room: &Room) -> Option<u32> {
-        let mut order: Vec<usize> = (0..found.len()).collect();
-        order.sort_by_key(|&i| (2 * i + 1).abs_diff(found.len()));
-        let added = order.into_iter().find_map(|i| {
-            let point = self.crossing_point(a, b, found[i]);
-            let tets = tets_around(self.mesh, found[i]);
+        let added = middle_first(found).find_map(|crossing| {
+            let point = self.crossing_point(a, b, crossing);
+            let tets = tets_around(self.mesh, crossing);
             self.add_steiner(&tets, point, room)
         });
         added.or_else(|| self.split_between(a, b, found, room))
