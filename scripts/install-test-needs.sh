@@ -5,7 +5,8 @@ set -euo pipefail
 
 missing=()
 command -v mpicc >/dev/null && command -v mpirun >/dev/null || missing+=(libopenmpi-dev openmpi-bin)
-compgen -G '/usr/lib/llvm-*/lib/libclang*.so*' >/dev/null || compgen -G '/usr/lib/*/libclang*.so*' >/dev/null \
+# libclang-cpp, which other packages bring along, is another library.
+compgen -G '/usr/lib/llvm-*/lib/libclang[.-][s0-9]*' >/dev/null || compgen -G '/usr/lib/*/libclang[.-][s0-9]*' >/dev/null \
     || missing+=(libclang-dev)
 [ -e /usr/include/tetgen.h ] || missing+=(libtet1.5-dev)
 command -v cc >/dev/null && command -v c++ >/dev/null || missing+=(build-essential)
