@@ -59,24 +59,48 @@ impl<'a> Fields<'a> {
     }
 
     /// The next word; only blanks separate words.
+    #[inline]
     fn word(&mut self, what: &str) -> Result<&'a [u8], String> {
-        let start =
-            self.0.iter().position(|&b| b != b' ').ok_or(format!("the line ends before its {what}"))?;
-        let rest = &self.0[start..];
+        let start = self.0.iter().position(|&b| b != b' ');
+        // Texts are made where something is wrong, not before: there are hundreds of millions of words.
+        let rest = &self.0[start.ok_or_else(|| format!("the line ends before its {what}"))?..];
         let end = rest.iter().position(|&b| b == b' ').unwrap_or(rest.len());
         self.0 = &rest[end..];
         Ok(&rest[..end])
     }
 
     /// The next word as a whole number that Elmer can hold.
+    #[inline]
     pub fn int(&mut self, what: &str) -> Result<u32, String> {
-        let word = self.word(what)?;
-        let wrong = || format!("the {what} is no whole number from 0 to {MAX_ID}: '{}'", shown(word));
-        if !word.iter().all(u8::is_ascii_digit) {
-            return Err(wrong());
+        let mut rest = self.0;
+        while let [b' ', after @ ..] = rest {
+            rest = after;
         }
-        let number = word.iter().fold(0_u64, |n, b| n.saturating_mul(10).saturating_add(u64::from(b - b'0')));
-        if number <= MAX_ID { Ok(number as u32) } else { Err(wrong()) }
+        // In one go where it is a number of at most nine digits; all else is looked at more closely.
+        let (mut number, mut digits) = (0_u32, 0);
+        while let [digit @ b'0'..=b'9', after @ ..] = rest
+            && digits < 9
+        {
+            number = 10 * number + u32::from(digit - b'0');
+            digits += 1;
+            rest = after;
+        }
+        if digits > 0 && matches!(rest, [] | [b' ', ..]) {
+            self.0 = rest;
+            return Ok(number);
+        }
+        whole(self.word(what)?, what)
+    }
+
+    /// The next word as a whole number, and behind a slash, where there is one, another from 1.
+    pub fn int_and_part(&mut self, what: &str) -> Result<(u32, Option<u32>), String> {
+        let word = self.word(what)?;
+        let Some(slash) = word.iter().position(|&b| b == b'/') else { return Ok((whole(word, what)?, None)) };
+        let part = whole(&word[slash + 1..], "part behind the slash")?;
+        if part == 0 {
+            return Err(format!("the {what} is of part 0: '{}'", shown(word)));
+        }
+        Ok((whole(&word[..slash], what)?, Some(part)))
     }
 
     /// The next word as a number; Fortran's `1.5D-3` too.
@@ -87,13 +111,14 @@ impl<'a> Fields<'a> {
         number.map_err(|_| format!("the {what} is no number: '{}'", shown(word)))
     }
 
-    /// The next word, which must be this.
-    pub fn expect(&mut self, what: &str, expected: &str) -> Result<(), String> {
-        let word = self.word(what)?;
-        if word == expected.as_bytes() {
+    /// The next number, which must be this.
+    #[inline]
+    pub fn expect(&mut self, what: &str, expected: u32) -> Result<(), String> {
+        let found = self.int(what)?;
+        if found == expected {
             return Ok(());
         }
-        Err(format!("the {what} is '{}'; only {expected} is read here", shown(word)))
+        Err(format!("the {what} is '{found}'; only {expected} is read here"))
     }
 
     /// Whether nothing is left.
@@ -105,6 +130,20 @@ impl<'a> Fields<'a> {
     pub fn end(&self) -> Result<(), String> {
         if self.is_empty() { Ok(()) } else { Err(format!("too much: '{}'", shown(self.0.trim_ascii()))) }
     }
+}
+
+/// A word as a whole number that Elmer can hold.
+fn whole(word: &[u8], what: &str) -> Result<u32, String> {
+    let wrong = || format!("the {what} is no whole number from 0 to {MAX_ID}: '{}'", shown(word));
+    let mut number = 0_u64;
+    for &digit in word {
+        let digit = digit.wrapping_sub(b'0');
+        if digit > 9 || number > MAX_ID {
+            return Err(wrong());
+        }
+        number = 10 * number + u64::from(digit);
+    }
+    if number <= MAX_ID && !word.is_empty() { Ok(number as u32) } else { Err(wrong()) }
 }
 
 /// A few words of a file for a message.
@@ -130,24 +169,33 @@ pub(super) fn read_lines<T: Send>(
     path: &Path,
     parse: impl Fn(&[u8]) -> Result<T, String> + Sync,
 ) -> Result<Vec<T>, ReadError> {
+    let pieces = read_pieces(path, parse)?;
+    let mut values = Vec::with_capacity(pieces.iter().map(Vec::len).sum());
+    pieces.into_iter().for_each(|piece| values.extend(piece));
+    Ok(values)
+}
+
+/// The same, in pieces that follow one another.
+pub(super) fn read_pieces<T: Send>(
+    path: &Path,
+    parse: impl Fn(&[u8]) -> Result<T, String> + Sync,
+) -> Result<Vec<Vec<T>>, ReadError> {
     const PIECE: usize = 1 << 20;
     let text = fs::read(path).map_err(ReadError::io(path))?;
     let pieces = pieces(&text, PIECE);
     let parsed: Vec<Result<Vec<T>, (usize, String)>> =
         pieces.par_iter().map(|piece| parse_piece(piece, &parse)).collect();
-    let mut values = Vec::with_capacity(parsed.iter().flatten().map(Vec::len).sum());
-    let mut lines = 0;
-    for (piece, parsed) in pieces.iter().zip(parsed) {
-        match parsed {
-            Ok(parsed) => values.extend(parsed),
-            Err((line, message)) => {
-                let line = lines + line as u64 + 1;
-                return Err(ReadError::Line { path: path.to_path_buf(), line, message });
-            }
-        }
-        lines += piece.iter().filter(|&&b| b == b'\n').count() as u64;
-    }
-    Ok(values)
+    let failed = parsed.iter().position(Result::is_err).unwrap_or(0);
+    let lines_before = || -> usize { pieces[..failed].iter().map(|piece| count_lines(piece)).sum() };
+    let located = |(line, message)| {
+        let line = (lines_before() + line) as u64 + 1;
+        ReadError::Line { path: path.to_path_buf(), line, message }
+    };
+    parsed.into_iter().map(|piece| piece.map_err(located)).collect()
+}
+
+fn count_lines(piece: &[u8]) -> usize {
+    piece.iter().filter(|&&b| b == b'\n').count()
 }
 
 /// Splits a text into pieces of about `size` bytes that end with a line.
