@@ -35,7 +35,7 @@ fn faces(tet: &Told) -> impl Iterator<Item = [u64; 3]> + '_ {
 }
 
 /// What the ghosts of a rank must be, from all tets of the mesh.
-fn expected<'a>(all: &'a [Told], rank: Rank, by: By) -> Vec<&'a Told> {
+fn expected(all: &[Told], rank: Rank, by: By) -> Vec<&Told> {
     let mine = |tet: &&Told| tet[0] == u64::from(rank);
     let vertices: BTreeSet<u64> = all.iter().filter(mine).flat_map(|tet| tet[4..].to_vec()).collect();
     let own_faces: BTreeSet<[u64; 3]> = all.iter().filter(mine).flat_map(faces).collect();

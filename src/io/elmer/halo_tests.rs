@@ -126,20 +126,35 @@ fn halo_elements_that_are_not_their_owners_are_found() {
 }
 
 #[test]
-fn owners_must_hold_what_they_own_and_list_who_watches() {
-    use FaultKind::*;
-    // Vertex 0 is the corner of the lower slab, its node 1; some of the part's nodes are watched by the other.
+fn owners_must_hold_what_they_own() {
     let dir = tempfile::tempdir().unwrap();
     let mesh = cube(2);
     write_parts(&mesh, &slabs(&mesh, 2), 2, Some(By::Faces), dir.path());
-    let shared = text(&dir.path().join("partitioning.2/part.1.shared"));
-    let held = text(&dir.path().join("partitioning.2/part.1.nodes")).lines().count();
-    assert!(shared.lines().count() > 9 && held > 18);
-    let [watched] = [shared.lines().position(|line| line.ends_with(" 2 1 2")).unwrap() + 1];
-    let swap = |line: &str| line.replace(" 2 1 2", " 2 2 1");
-    let (kinds, said) = broken("part.1.shared", watched, swap);
-    assert!(kinds.contains(&OwnersDiffer), "{kinds:?}");
-    assert!(said.contains("owner"), "{said}");
+    let file = |part: u32| dir.path().join(format!("partitioning.2/part.{part}.shared"));
+    // The first node that both have and only part 1 holds: part 2 is said to own it, by both.
+    let held = text(&dir.path().join("partitioning.2/part.1.elements"));
+    let mine: BTreeSet<&str> =
+        held.lines().filter(|line| !line.contains('/')).flat_map(|line| line.split(' ').skip(3)).collect();
+    let halo = text(&dir.path().join("partitioning.2/part.2.elements"));
+    let theirs: BTreeSet<&str> =
+        halo.lines().filter(|line| !line.contains('/')).flat_map(|line| line.split(' ').skip(3)).collect();
+    let shared = text(&file(1));
+    let mut nodes = shared.lines().map(|line| line.split(' ').next().unwrap());
+    let node = nodes.find(|node| mine.contains(node) && !theirs.contains(node)).unwrap();
+    for part in [1, 2] {
+        let (before, after) = (format!("{node} 2 1 2"), format!("{node} 2 2 1"));
+        let swap = |line: &str| if line == before { after.clone() } else { line.to_string() } + "\n";
+        let swapped: String = text(&file(part)).lines().map(swap).collect();
+        assert_ne!(swapped, text(&file(part)));
+        fs::write(file(part), swapped).unwrap();
+    }
+    let (_, faults) = check_elmer(dir.path()).unwrap().remove(0);
+    assert_eq!(faults.counts.into_iter().collect::<Vec<_>>(), [(FaultKind::OwnerWatches, 1)]);
+    for ranks in [1, 2, 3] {
+        let said = together(ranks, |comm| load(comm, dir.path()).unwrap_err().to_string());
+        assert!(said[0].contains("owner that has the node in halo elements only"), "{}", said[0]);
+        assert!(said.iter().all(|text| *text == said[0]));
+    }
 }
 
 /// A partition as ElmerGrid writes it (its `SaveElmerInputPartitioned`): numbers of the whole mesh, blanks at the ends of lines, 12 digits,
