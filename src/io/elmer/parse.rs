@@ -2,8 +2,8 @@
 
 use super::{MAX_ID, MAX_LINE};
 use rayon::prelude::*;
-use std::fs;
-use std::io;
+use std::fs::{self, File};
+use std::io::{self, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
 /// Why a mesh could not be read.
@@ -164,62 +164,119 @@ pub(super) fn refuse_what_elmer_cuts(line: &[u8]) -> Result<(), String> {
     Ok(())
 }
 
-/// Reads a file of one value per line, with many threads.
+/// Bytes of a file that one thread reads and parses at a time.
+const PIECE: u64 = 1 << 20;
+
+/// Reads a file of one value per line, with many threads; `expected` values, as a header says.
 pub(super) fn read_lines<T: Send>(
     path: &Path,
+    expected: u32,
     parse: impl Fn(&[u8]) -> Result<T, String> + Sync,
 ) -> Result<Vec<T>, ReadError> {
-    let pieces = read_pieces(path, parse)?;
-    let mut values = Vec::with_capacity(pieces.iter().map(Vec::len).sum());
-    pieces.into_iter().for_each(|piece| values.extend(piece));
-    Ok(values)
+    let mut all = Vec::with_capacity(room(path, expected));
+    for_each_line(path, parse, |values| all.append(values))?;
+    Ok(all)
 }
 
-/// The same, in pieces that follow one another.
-pub(super) fn read_pieces<T: Send>(
+/// How many values room is made for: what a header says, unless the file cannot have so many.
+pub(super) fn room(path: &Path, expected: u32) -> usize {
+    let bytes = fs::metadata(path).map_or(0, |file| file.len());
+    (bytes / 2).min(expected.into()) as usize
+}
+
+/// Reads a file of one value per line, with many threads, and gives the values to `take` in their order, many at a time.
+///
+/// Pieces are read, parsed and taken in the same few buffers: what is touched once only has to be cleared by the system first, which takes
+/// longer than parsing.
+pub(super) fn for_each_line<T: Send>(
     path: &Path,
     parse: impl Fn(&[u8]) -> Result<T, String> + Sync,
-) -> Result<Vec<Vec<T>>, ReadError> {
-    const PIECE: usize = 1 << 20;
-    let text = fs::read(path).map_err(ReadError::io(path))?;
-    let pieces = pieces(&text, PIECE);
-    let parsed: Vec<Result<Vec<T>, (usize, String)>> =
-        pieces.par_iter().map(|piece| parse_piece(piece, &parse)).collect();
-    let failed = parsed.iter().position(Result::is_err).unwrap_or(0);
-    let lines_before = || -> usize { pieces[..failed].iter().map(|piece| count_lines(piece)).sum() };
-    let located = |(line, message)| {
-        let line = (lines_before() + line) as u64 + 1;
-        ReadError::Line { path: path.to_path_buf(), line, message }
-    };
-    parsed.into_iter().map(|piece| piece.map_err(located)).collect()
-}
-
-fn count_lines(piece: &[u8]) -> usize {
-    piece.iter().filter(|&&b| b == b'\n').count()
-}
-
-/// Splits a text into pieces of about `size` bytes that end with a line.
-fn pieces(mut text: &[u8], size: usize) -> Vec<&[u8]> {
-    let mut pieces = Vec::new();
-    while !text.is_empty() {
-        let end = text.iter().skip(size).position(|&b| b == b'\n').map_or(text.len(), |k| size + k + 1);
-        let (piece, rest) = text.split_at(end);
-        pieces.push(piece);
-        text = rest;
+    mut take: impl FnMut(&mut Vec<T>),
+) -> Result<(), ReadError> {
+    let length = fs::metadata(path).map_err(ReadError::io(path))?.len();
+    let pieces = length.div_ceil(PIECE);
+    let at_once = pieces.min(4 * rayon::current_num_threads() as u64).max(1);
+    let mut buffers: Vec<Buffer<T>> = (0..at_once).map(|_| Buffer::default()).collect();
+    let mut line = 0;
+    for first in (0..pieces).step_by(at_once as usize) {
+        let filled = &mut buffers[..at_once.min(pieces - first) as usize];
+        let found: Vec<Result<Option<String>, ReadError>> = filled
+            .par_iter_mut()
+            .enumerate()
+            .map(|(k, buffer)| {
+                buffer.read(path, (first + k as u64) * PIECE).map_err(ReadError::io(path))?;
+                Ok(buffer.parse(&parse).err())
+            })
+            .collect();
+        for (buffer, found) in filled.iter_mut().zip(found) {
+            line += buffer.values.len() as u64;
+            if let Some(message) = found? {
+                return Err(ReadError::Line { path: path.to_path_buf(), line: line + 1, message });
+            }
+            take(&mut buffer.values);
+            buffer.values.clear();
+        }
     }
-    pieces
+    Ok(())
 }
 
-/// The values of a piece, or the index of the first bad line and what is wrong with it.
-fn parse_piece<T>(
-    piece: &[u8],
-    parse: impl Fn(&[u8]) -> Result<T, String>,
-) -> Result<Vec<T>, (usize, String)> {
-    let text = piece.strip_suffix(b"\n").unwrap_or(piece);
-    text.split(|&b| b == b'\n')
-        .enumerate()
-        .map(|(k, line)| parse(line.strip_suffix(b"\r").unwrap_or(line)).map_err(|message| (k, message)))
-        .collect()
+/// The lines that begin in one piece of a file.
+struct Buffer<T> {
+    text: Vec<u8>,
+    values: Vec<T>,
+}
+
+impl<T> Default for Buffer<T> {
+    fn default() -> Self {
+        Self { text: Vec::new(), values: Vec::new() }
+    }
+}
+
+impl<T> Buffer<T> {
+    /// Reads the lines that begin in the piece from `start` on.
+    fn read(&mut self, path: &Path, start: u64) -> io::Result<()> {
+        const MORE: u64 = 1024;
+        let mut file = File::open(path)?;
+        // From the byte before: the piece may begin with a line.
+        let before = u64::from(start > 0);
+        file.seek(SeekFrom::Start(start - before))?;
+        self.text.clear();
+        (&mut file).take(before + PIECE).read_to_end(&mut self.text)?;
+        let begun = match before {
+            0 => 0,
+            _ => self.text.iter().position(|&b| b == b'\n').map_or(self.text.len(), |at| at + 1),
+        };
+        if begun == self.text.len() && self.text.last() != Some(&b'\n') {
+            // All of it belongs to a line that begins before.
+            self.text.clear();
+            return Ok(());
+        }
+        // The last line may end in a later piece.
+        while self.text.last() != Some(&b'\n') {
+            let end = self.text.len();
+            if (&mut file).take(MORE).read_to_end(&mut self.text)? == 0 {
+                break;
+            }
+            if let Some(at) = self.text[end..].iter().position(|&b| b == b'\n') {
+                self.text.truncate(end + at + 1);
+            }
+        }
+        self.text.drain(..begun);
+        Ok(())
+    }
+
+    /// Parses the lines; those before the first bad one are in `values` in the end.
+    fn parse(&mut self, parse: impl Fn(&[u8]) -> Result<T, String>) -> Result<(), String> {
+        self.values.clear();
+        if self.text.is_empty() {
+            return Ok(());
+        }
+        let text = self.text.strip_suffix(b"\n").unwrap_or(&self.text);
+        for line in text.split(|&b| b == b'\n') {
+            self.values.push(parse(line.strip_suffix(b"\r").unwrap_or(line))?);
+        }
+        Ok(())
+    }
 }
 
 #[cfg(test)]
@@ -233,11 +290,40 @@ mod tests {
         let mut text: String = (0..300_000).map(|k| format!("{k}\n")).collect();
         fs::write(&path, &text).unwrap();
         let parse = |line: &[u8]| Fields::new(line).int("number");
-        assert_eq!(read_lines(&path, parse).unwrap(), (0..300_000).collect::<Vec<_>>());
+        assert_eq!(read_lines(&path, 7, parse).unwrap(), (0..300_000).collect::<Vec<_>>());
         text += "12x\n";
         fs::write(&path, &text).unwrap();
-        let error = read_lines(&path, parse).unwrap_err().to_string();
+        let error = read_lines(&path, 300_000, parse).unwrap_err().to_string();
         assert!(error.contains("f:300001: the number is no whole number"), "{error}");
+    }
+
+    #[test]
+    fn lines_are_read_whole_wherever_pieces_end() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("f");
+        let piece = PIECE as usize;
+        let parse = |line: &[u8]| Ok(line.len());
+        // A line that ends with the piece, just before or behind its end, spans several, or ends with the file.
+        for lengths in [
+            vec![],
+            vec![0],
+            vec![piece - 2, 0, 5, 1],
+            vec![piece - 1, 0, 5],
+            vec![piece, 3, 0],
+            vec![piece + 1, 3],
+            vec![10, 3 * piece, 7, 2 * piece - 20, 1, 0, 4],
+            vec![3; 1_000_000],
+        ] {
+            for end in ["\n", ""] {
+                let text: String = lengths.iter().map(|&n| "x".repeat(n) + "\n").collect();
+                let text = text.strip_suffix('\n').map(|text| text.to_string() + end).unwrap_or_default();
+                let last_is_empty = end.is_empty() && lengths.last() == Some(&0);
+                fs::write(&path, text).unwrap();
+                let found = read_lines(&path, 0, parse).unwrap();
+                let expected = if last_is_empty { &lengths[..lengths.len() - 1] } else { &lengths[..] };
+                assert!(found == expected, "{:?}, end {end:?}", &lengths[..lengths.len().min(9)]);
+            }
+        }
     }
 
     #[test]

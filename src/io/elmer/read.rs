@@ -1,6 +1,6 @@
 //! Reading Elmer's files: all of a mesh, with nothing set right.
 
-use super::parse::{Fields, ReadError, read_lines, read_pieces, refuse_what_elmer_cuts};
+use super::parse::{Fields, ReadError, for_each_line, read_lines, refuse_what_elmer_cuts, room};
 use super::{MAX_LINE, TET, TRIANGLE};
 use crate::Point;
 use rayon::prelude::*;
@@ -94,7 +94,7 @@ pub struct ElmerPart {
     /// The part's own elements in `.elements`
     pub elements: Rows<Element>,
     /// The halo elements there: those of other parts, with the owner's number, from 1.
-    pub halo: Rows<(Element, u32)>,
+    pub halo: Halo,
     /// The triangles in `.boundary` beside the part's own elements.
     pub boundary: Rows<BoundaryElement>,
     /// How many lines of `.boundary` are not read, by type: points and edges, and triangles of halo elements.
@@ -273,33 +273,44 @@ pub fn stated_elements(dir: &Path) -> Result<u64, ReadError> {
 
 pub(super) fn read_part(stem: PathBuf, partitioned: bool) -> Result<ElmerPart, ReadError> {
     let header = read_header(&file(&stem, "header"), partitioned)?;
-    let nodes = read_lines(&file(&stem, "nodes"), node)?;
-    let (elements, halo) = own_and_halo(read_pieces(&file(&stem, "elements"), element)?);
-    let lines = read_lines(&file(&stem, "boundary"), boundary_line)?;
+    let nodes = read_lines(&file(&stem, "nodes"), header.nodes, node)?;
+    let (elements, halo) = read_elements(&file(&stem, "elements"), header.elements)?;
+    let lines = read_lines(&file(&stem, "boundary"), header.boundary, boundary_line)?;
     let (boundary, left_out) = own_boundary(lines, &elements, &halo);
-    let shared = if partitioned { read_lines(&file(&stem, "shared"), shared_node)? } else { Vec::new() };
+    let shared = match header.shared {
+        Some(count) => read_lines(&file(&stem, "shared"), count, shared_node)?,
+        None => Vec::new(),
+    };
     Ok(ElmerPart { stem, header, nodes, elements, halo, boundary, left_out, shared })
 }
 
-/// Parts elements from halo elements; part 0 stands for this one.
-fn own_and_halo(pieces: Vec<Vec<(Element, u32)>>) -> (Rows<Element>, Rows<(Element, u32)>) {
+/// The halo elements of a part, with the numbers of their owners.
+pub type Halo = Rows<(Element, u32)>;
+
+/// Reads the part's own elements, and halo elements.
+fn read_elements(path: &Path, expected: u32) -> Result<(Rows<Element>, Halo), ReadError> {
     let (mut own, mut halo) = (Rows::default(), Rows::default());
-    let is_own = |(_, owner): &&(Element, u32)| *owner == 0;
-    let count: usize = pieces.iter().map(|piece| piece.iter().filter(is_own).count()).sum();
-    let has_halo = count < pieces.iter().map(Vec::len).sum();
-    own.values.reserve_exact(count);
-    for ((element, owner), line) in pieces.into_iter().flatten().zip(1..) {
-        if owner > 0 {
-            halo.values.push((element, owner));
-            halo.lines.push(line);
-        } else {
-            own.values.push(element);
-            if has_halo {
-                own.lines.push(line);
+    own.values.reserve_exact(room(path, expected));
+    let mut line = 0;
+    for_each_line(path, element, |elements| {
+        for (element, owner) in elements.drain(..) {
+            line += 1;
+            if owner > 0 {
+                if halo.values.is_empty() {
+                    // Until here each stands on the line of its index.
+                    own.lines.extend(1..line);
+                }
+                halo.values.push((element, owner));
+                halo.lines.push(line);
+            } else {
+                own.values.push(element);
+                if !halo.values.is_empty() {
+                    own.lines.push(line);
+                }
             }
         }
-    }
-    (own, halo)
+    })?;
+    Ok((own, halo))
 }
 
 /// The triangles beside elements of the part, and how many lines are left out, by type.
@@ -308,7 +319,7 @@ fn own_and_halo(pieces: Vec<Vec<(Element, u32)>>) -> (Rows<Element>, Rows<(Eleme
 fn own_boundary(
     all: Vec<BoundaryLine>,
     elements: &Rows<Element>,
-    halo: &Rows<(Element, u32)>,
+    halo: &Halo,
 ) -> (Rows<BoundaryElement>, BTreeMap<u32, u32>) {
     let mut own: Vec<u32> = Vec::new();
     if !halo.is_empty() {
@@ -337,7 +348,7 @@ fn own_boundary(
 }
 
 fn read_header(path: &Path, partitioned: bool) -> Result<Header, ReadError> {
-    let lines = read_lines(path, |line| {
+    let lines = read_lines(path, 0, |line| {
         let mut fields = Fields::new(line);
         let mut numbers = Vec::new();
         while !fields.is_empty() {

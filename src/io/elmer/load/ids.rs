@@ -197,7 +197,10 @@ impl Judged {
             let rest = &mut &message[..];
             let part = take_varint(rest) as u32 + 1;
             let mut id = 0;
-            for _ in 0..take_varint(rest) {
+            let count = take_varint(rest);
+            copies.reserve(count as usize);
+            let nodes = Vec::with_capacity(count as usize);
+            for _ in 0..count {
                 let code = take_varint(rest);
                 id += code >> 2;
                 let (watched, is_said) = (code & 2 == 2, code & 1 == 1);
@@ -208,7 +211,7 @@ impl Judged {
             }
             let count = take_varint(rest) as usize;
             elements.extend(take_ascending(rest, count).map(|id| (id, letter)));
-            let (nodes, elements) = (Vec::new(), Vec::new());
+            let elements = Vec::with_capacity(count);
             letters.push(Letter { from: *from, part, complaint: None, nodes, elements });
         }
         // Stable, and letters come by ascending part: so do the copies of a node.

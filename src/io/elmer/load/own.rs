@@ -111,14 +111,14 @@ impl OwnParts {
         };
         let points: Vec<Point> = vertices.iter().map(point).collect();
         let tet = |&(_, at): &(GlobalId, TetPlace)| self.positive(at, &local, &points);
-        let tets: Vec<Result<([VertexId; 4], bool), ReadError>> = of_tet.par_iter().map(tet).collect();
-        let mut turned = 0;
-        let mut positive = Vec::with_capacity(tets.len());
-        for tet in tets {
-            let (tet, was_turned) = tet?;
-            turned += u64::from(was_turned);
-            positive.push(tet);
+        let (mut positive, mut signs) = (Vec::new(), Vec::new());
+        of_tet.par_iter().map(tet).unzip_into_vecs(&mut positive, &mut signs);
+        if let Some(flat) = signs.par_iter().position_first(|sign| *sign == Sign::Zero) {
+            let at = of_tet[flat].1;
+            let what = format!("element {} is flat", self.element(at).id);
+            return Err(self.element_fault(FaultKind::Inverted, at, what));
         }
+        let turned = signs.iter().filter(|sign| **sign == Sign::Negative).count() as u64;
         let mut shared = Shared::default();
         for (id, holders) in ids.holders {
             let v = vertices.binary_search_by_key(&id, |(id, _)| *id).expect("a node of this rank");
@@ -175,25 +175,16 @@ impl OwnParts {
         (local, nodes)
     }
 
-    /// The vertices of an element, positively oriented, and whether it was turned round for that.
-    fn positive(
-        &self,
-        at: TetPlace,
-        local: &[Vec<VertexId>],
-        points: &[Point],
-    ) -> Result<([VertexId; 4], bool), ReadError> {
+    /// The vertices of an element, positively oriented, and its orientation in the file.
+    fn positive(&self, at: TetPlace, local: &[Vec<VertexId>], points: &[Point]) -> ([VertexId; 4], Sign) {
         let element = self.element(at);
         let part = at.part as usize;
         let vertex = |id: u32| local[part][self.list[part].nodes.find(id).expect("checked before")];
         let [a, b, c, d] = element.nodes.map(vertex);
         let [p, q, r, s] = [a, b, c, d].map(|v| &points[v.index()]);
         match orient3d(p, q, r, s) {
-            Sign::Positive => Ok(([a, b, c, d], false)),
-            Sign::Negative => Ok(([a, b, d, c], true)),
-            Sign::Zero => {
-                let what = format!("element {} is flat", element.id);
-                Err(self.element_fault(FaultKind::Inverted, at, what))
-            }
+            Sign::Negative => ([a, b, d, c], Sign::Negative),
+            sign => ([a, b, c, d], sign),
         }
     }
 }
