@@ -27,7 +27,7 @@ pub enum Command {
     Mesh(MeshFile),
     /// Read a partitioned Elmer mesh, give its tets to another number of parts, check and write it
     ///
-    /// Ours or ElmerGrid's, of tets without halo. Each rank reads some of the parts; none sees the whole mesh. Such files tell nothing of the
+    /// Ours or ElmerGrid's, of tets; halo elements are left out. Each rank reads some of the parts; none sees the whole mesh. Such files tell nothing of the
     /// curves and surfaces of a geometry, so that refining the mesh again would not round it.
     #[command(after_help = STATUS)]
     Repartition(Repartition),
@@ -103,6 +103,9 @@ pub struct RunOptions {
     /// What to write, with commas between, or none
     #[arg(short, long, value_enum, value_delimiter = ',', default_value = "elmer")]
     pub format: Vec<Format>,
+    /// Write with each part one layer of tets of the parts beside it: as Elmer's halo elements, or VTU's ghosts
+    #[arg(long, value_enum, value_name = "BY")]
+    pub halo: Option<Halo>,
     /// Read the written Elmer mesh again and check it
     #[arg(long)]
     pub check: bool,
@@ -321,6 +324,15 @@ pub enum Method {
     Surface,
     /// Geometry cut by planes, each piece meshed
     Decompose,
+}
+
+/// Which tets of other parts are written with a part.
+#[derive(ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Halo {
+    /// Those with a face in common with the part
+    Faces,
+    /// Those with a vertex in common with the part
+    Vertices,
 }
 
 /// What is written.

@@ -2,22 +2,21 @@
 
 mod decompose;
 mod repartition;
+mod write;
 
 use decompose::cut_settings;
 pub use decompose::run_decompose;
 pub use repartition::run_repartition;
+use write::{read_back, refuse_halo, write_formats};
 
-use crate::cli::{
-    Check, Format, Generate, InputOptions, Inspect, MeshFile, Method, Quality, RunOptions, SizeOptions,
-};
+use crate::cli::{Check, Format, Generate, InputOptions, Inspect, MeshFile, Method, Quality, SizeOptions};
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 use tetmill::comm::{Communicator, grouped, mpi, thread};
 use tetmill::error::{Failure, Status, agree};
 use tetmill::inspect::Inspection;
-use tetmill::io::{self, Written, elmer};
-use tetmill::mesh::Names;
+use tetmill::io::{self, elmer};
 use tetmill::mesh::stream::MeshStream;
 use tetmill::pipeline::input::{self, InputSettings};
 use tetmill::pipeline::part::{Balance, balance};
@@ -31,6 +30,7 @@ use tetmill::{picture, quality};
 /// `tetmill generate`
 pub fn run_generate(options: &Generate) -> Result<(), Failure> {
     set_threads(options.run.threads)?;
+    refuse_halo(&options.run)?;
     let start = Instant::now();
     on_ranks(options.ranks, options.parts, |comm| generate_on(comm, options, start))
 }
@@ -112,8 +112,8 @@ fn generate_on(comm: &dyn Communicator, options: &Generate, start: Instant) -> R
     let settings = GenerateSettings { method, coarse, wanted: wanted(options), memory: options.memory, disk };
     let made = generate(comm, model.as_ref(), &settings, &progress)?;
     let stem = target.join(options.input.files[0].file_stem().unwrap_or("mesh".as_ref()));
-    let written = progress.stage("write", || {
-        write_formats(comm, made.part.stream(), &made.names, &options.run.format, &target, &stem)
+    let (written, halo) = progress.stage("write", || {
+        write_formats(comm, made.part.stream(), &made.names, &options.run, &target, &stem)
     })?;
     read_back(comm, &options.run, &target, &progress)?;
     match &options.picture {
@@ -127,6 +127,7 @@ fn generate_on(comm: &dyn Communicator, options: &Generate, start: Instant) -> R
     let took = processes(comm)?;
     let Some(model) = model else { return Ok(()) };
     let mut report = summary(&model, &name_of(&options.input), &made, took, comm.size(), balanced);
+    report.halo = halo;
     report.stages = progress.finish();
     report.seconds = start.elapsed().as_secs_f64();
     report.add_written(written);
@@ -219,52 +220,6 @@ fn disk_for(formats: &[Format], folder: &Path) -> Disk {
     }
 }
 
-/// **Collective.** Writes each format into a folder; files of those that do not fill one are called `stem`.
-fn write_formats(
-    comm: &dyn Communicator,
-    part: &dyn MeshStream,
-    names: &Names,
-    formats: &[Format],
-    dir: &Path,
-    stem: &Path,
-) -> Result<Written, Failure> {
-    let mut written = Written::default();
-    for format in formats {
-        written += match format {
-            Format::Elmer => elmer::write(comm, part, names, dir)?,
-            Format::Vtu => io::vtu::write(comm, part, names, stem)?,
-            Format::Geomview => io::geomview::write(comm, part, &io::geomview::Settings::default(), stem)?,
-            Format::None => Written::default(),
-        };
-    }
-    Ok(written)
-}
-
-/// **Collective.** Reads the written Elmer mesh again, if that is asked for.
-fn read_back(
-    comm: &dyn Communicator,
-    options: &RunOptions,
-    dir: &Path,
-    progress: &Progress,
-) -> Result<(), Failure> {
-    if !options.check || !options.format.contains(&Format::Elmer) {
-        return Ok(());
-    }
-    let checked = if comm.rank() == 0 { progress.stage("read back", || check_written(dir)) } else { Ok(()) };
-    agree(comm, checked)
-}
-
-/// Reads a written Elmer mesh again.
-fn check_written(dir: &Path) -> Result<(), Failure> {
-    let checked = elmer::check_elmer(dir).map_err(|error| Failure::new(Status::Faults, error))?;
-    match checked.iter().find(|(_, faults)| !faults.is_empty()) {
-        None => Ok(()),
-        Some((layout, faults)) => {
-            Err(Failure::new(Status::Faults, format!("{}: {faults}", layout.folder().display())))
-        }
-    }
-}
-
 /// **Collective.** A picture of the skin, or of what a plane leaves of the mesh: parts in colours, patches if
 /// there is one part.
 fn draw(
@@ -307,6 +262,7 @@ fn summary(
         periodic: made.periodic,
         skins: made.refused.clone(),
         evened: made.evened,
+        halo: None,
         stages: Vec::new(),
         seconds: 0.0,
         peak_memory: took.memory(),

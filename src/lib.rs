@@ -8,6 +8,7 @@ pub mod dist;
 pub mod error;
 pub mod facets;
 pub mod geometry;
+pub mod halo;
 pub mod improve;
 pub mod inspect;
 pub mod io;

@@ -1,8 +1,10 @@
 //! The summary of a run, for people and as JSON. The JSON keys are stable: they are only added to.
 
+pub mod halo;
 pub mod moved;
 pub mod processes;
 
+pub use halo::HaloReport;
 pub use processes::{Processes, processes};
 
 use crate::check::PartReport;
@@ -51,6 +53,8 @@ pub struct Report {
     pub skins: Option<Refused>,
     /// What was done to make parts even; null where nothing was.
     pub evened: Option<Evened>,
+    /// The ghosts that were written; null where none were asked for.
+    pub halo: Option<HaloReport>,
     /// The stages in order.
     pub stages: Vec<Stage>,
     /// Seconds from start to end.
@@ -322,6 +326,9 @@ impl fmt::Display for Report {
                 f,
                 "skins      {skins} refused by the mesher and filled by the lattice; that of rank {rank}: {reason}"
             )?;
+        }
+        if let Some(halo) = &self.halo {
+            write!(f, "{halo}")?;
         }
         let stages: Vec<String> =
             self.stages.iter().map(|s| format!("{} {:.2}", s.name, s.seconds)).collect();

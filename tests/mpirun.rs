@@ -113,6 +113,27 @@ mod with_mpi {
     }
 
     #[test]
+    fn halos_of_mpi_ranks_are_those_of_threads() {
+        let dir = tempfile::tempdir().unwrap();
+        let [start, processes, threads] = ["start", "processes", "threads"].map(|name| dir.path().join(name));
+        let Some(mut command) = mpirun(4) else { return };
+        command.arg("generate").arg(own("tee")).args(["--preset", "very-coarse", "-q", "--check"]);
+        succeed(command.args(["--halo", "vertices", "-o"]).arg(&start));
+        succeed(tetmill().arg("check").arg(&start));
+        let Some(mut command) = mpirun(4) else { return };
+        let arguments = ["-q", "--check", "--halo", "faces", "-n", "5", "-o"];
+        succeed(command.arg("repartition").arg(&start).args(arguments).arg(&processes));
+        succeed(tetmill().arg("repartition").arg(&start).args(arguments).arg(&threads));
+        for part in 1..=5 {
+            for kind in ["header", "nodes", "elements", "boundary", "shared"] {
+                let file = format!("partitioning.5/part.{part}.{kind}");
+                let text = |folder: &std::path::Path| std::fs::read(folder.join(&file)).unwrap();
+                assert!(text(&processes) == text(&threads), "{file}");
+            }
+        }
+    }
+
+    #[test]
     fn more_and_fewer_parts_than_mpi_ranks_are_those_that_as_many_ranks_make() {
         let arguments = ["--preset", "very-coarse", "--levels", "1", "-q"];
         for (ranks, parts) in [(2, "5"), (3, "2")] {

@@ -100,3 +100,57 @@ fn what_cannot_be_read_or_parted_is_refused_and_nothing_is_written() {
     let output = tetmill().arg("repartition").arg(&start).arg("-o").arg(&out).output().unwrap();
     assert_eq!(output.status.code(), Some(2));
 }
+
+/// How many tets `tetmill quality` finds in a mesh.
+fn tets(mesh: &Path) -> u64 {
+    let output = succeed(tetmill().arg("quality").arg(mesh).arg("--json"));
+    let told: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    told["meshes"][0]["tets"].as_u64().unwrap()
+}
+
+#[test]
+fn halos_are_written_and_checked_and_left_out_when_they_are_read() {
+    let dir = tempfile::tempdir().unwrap();
+    let [plain, start, moved, back, report] =
+        ["plain", "start", "moved", "back", "r.json"].map(|name| dir.path().join(name));
+    let arguments = ["--preset", "very-coarse", "--levels", "1", "-q", "-n", "3", "-o"];
+    let generate = |to: &Path, more: &[&str]| {
+        succeed(tetmill().arg("generate").arg(own("lens")).args(arguments).arg(to).args(more));
+    };
+    generate(&plain, &[]);
+    generate(&start, &["--halo", "vertices", "--check", "-f", "elmer,vtu"]);
+    succeed(tetmill().arg("check").arg(&start));
+    assert_eq!(tets(&start), tets(&plain));
+    let pieces: u64 = (1..=3).map(|part| tets(&start.join(format!("lens.parts/part.{part}.vtu")))).sum();
+    assert_eq!(pieces, tets(&plain), "ghosts of pieces are no tets of theirs");
+    let list = std::fs::read_to_string(start.join("lens.pvtu")).unwrap();
+    assert!(list.contains("GhostLevel=\"1\"") && list.matches("vtkGhostType").count() == 2, "{list}");
+
+    let report = ["--report", report.to_str().unwrap(), "-q", "--check", "--halo", "faces"];
+    assert!(repartition(&start, "5", &moved, &report).status.success());
+    let said = read_json(Path::new(report[1]));
+    assert_eq!(said["halo"]["by"], "faces");
+    // By faces each face on a cut makes two ghosts, but where a tet has several there.
+    let (ghosts, cut) = (said["halo"]["tets"].as_u64().unwrap(), said["after"]["edge_cut"].as_u64().unwrap());
+    assert!(ghosts > cut && ghosts <= 2 * cut, "{ghosts} ghosts at {cut} faces");
+    assert!(said["notes"][0].as_str().unwrap().ends_with("halo elements left out"), "{said}");
+    assert!(repartition(&moved, "2", &back, &["-q"]).status.success());
+    judge(&back, 2);
+    assert_eq!(content(&back, 2, "nodes"), content(&plain, 3, "nodes"));
+    assert_eq!(content(&back, 2, "elements"), content(&plain, 3, "elements"));
+}
+
+#[test]
+fn a_format_without_halo_refuses_one_by_name_before_any_work() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().join("out");
+    for command in ["generate", "repartition"] {
+        let mut run = tetmill();
+        run.args([command, "no/such/input", "-n", "2", "--halo", "faces", "-f", "elmer,geomview", "-o"]);
+        let output = run.arg(&out).output().unwrap();
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{said}");
+        assert!(said.contains("geomview has no halo elements"), "{said}");
+        assert!(!out.exists());
+    }
+}

@@ -1,6 +1,7 @@
 //! `tetmill repartition`
 
-use super::{on_ranks, read_back, set_threads, show, write_formats, write_report};
+use super::write::{read_back, refuse_halo, write_formats};
+use super::{on_ranks, set_threads, show, write_report};
 use crate::cli::{PartitionMethod, Repartition};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -20,6 +21,7 @@ const STAGES: u64 = 5;
 pub fn run_repartition(options: &Repartition) -> Result<(), Failure> {
     // First: reading already uses the threads.
     set_threads(options.run.threads)?;
+    refuse_halo(&options.run)?;
     if !mpi::launched() {
         let parts = options.parts.ok_or_else(|| Failure::input("how many parts? say so with -n"))?;
         // Before a thread is started for each.
@@ -47,15 +49,15 @@ fn repartition_on(comm: &dyn Communicator, options: &Repartition, start: Instant
     let done = pipeline::repartition(comm, &options.directory, method, &progress)?;
     let target = &options.output;
     let stem = target.join(stem_of(&done.folder));
-    let written = progress.stage("write", || {
-        write_formats(comm, &done.part, &done.names, &options.run.format, target, &stem)
-    })?;
+    let (written, halo) = progress
+        .stage("write", || write_formats(comm, &done.part, &done.names, &options.run, target, &stem))?;
     read_back(comm, &options.run, target, &progress)?;
     let took = processes(comm)?;
     if !first {
         return Ok(());
     }
     let mut report = MoveReport::new(&done, method.to_string(), comm.size(), took);
+    report.halo = halo;
     report.stages = progress.finish();
     report.seconds = start.elapsed().as_secs_f64();
     report.add_written(written);

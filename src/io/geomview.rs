@@ -34,13 +34,16 @@ impl Default for Settings {
 /// `.off` or `.list`. Each rank gets the sums over all ranks.
 ///
 /// # Errors
-/// A full disk, what the system says: on all ranks alike, and the old files stay.
+/// A part with ghosts, a full disk, what the system says: on all ranks alike, and the old files stay.
 pub fn write(
     comm: &dyn Communicator,
     part: &dyn MeshStream,
     settings: &Settings,
     stem: &Path,
 ) -> Result<Written, WriteError> {
+    if part.ghosts().is_some() {
+        return Err(WriteError::NoHalo("Geomview's OFF"));
+    }
     let (folder, name) = folder_and_name(stem)?;
     let name = name.to_string_lossy();
     let name = [".off", ".list"].iter().find_map(|end| name.strip_suffix(end)).unwrap_or(&name);

@@ -121,6 +121,9 @@ pub enum WriteError {
         /// How many parts there are.
         parts: u32,
     },
+    /// A format that cannot tell ghosts from a part's own tets.
+    #[error("{0} has no halo elements; write Elmer or VTU, or leave out the halo")]
+    NoHalo(&'static str),
     /// The ranks could not agree.
     #[error(transparent)]
     Comm(#[from] CommError),

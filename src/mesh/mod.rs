@@ -2,6 +2,7 @@
 
 #[cfg(test)]
 pub(crate) mod fixtures;
+pub mod ghosts;
 pub mod ids;
 pub mod stream;
 pub mod topology;

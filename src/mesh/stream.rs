@@ -11,6 +11,7 @@
 //! boundary block= the children of one boundary triangle, with the fine tets beside them
 //! ```
 
+use super::ghosts::Ghosts;
 use super::{GlobalId, Rank};
 use crate::periodic::Link;
 use csg::{BodyId, PatchId};
@@ -166,6 +167,11 @@ pub trait MeshStream: Sync {
     /// are no images.
     fn origins(&self) -> Vec<(u32, GlobalId)> {
         Vec::new()
+    }
+    /// What is known of the tets of other parts, if anything is: they are the last tets of the stream, and their vertices the last
+    /// vertices, whose holders are other ranks alone.
+    fn ghosts(&self) -> Option<&Ghosts> {
+        None
     }
 }
 

@@ -5,7 +5,7 @@
 
 use super::metrics::across_faces;
 use super::{MOST_CLUSTERS, RepartitionError};
-use crate::comm::Communicator;
+use crate::comm::{CommError, Communicator};
 use crate::dist::DistMesh;
 use crate::mesh::Rank;
 use crate::partition::weighted::{self, Graph};
@@ -15,6 +15,7 @@ pub(super) fn partition(
     comm: &dyn Communicator,
     mesh: &DistMesh,
     places: &[u64],
+    weights: Option<&[u32]>,
     parts: u32,
     per_part: u32,
 ) -> Result<Vec<Rank>, RepartitionError> {
@@ -36,10 +37,14 @@ pub(super) fn partition(
     drop(pairs);
 
     let gathered = comm.gather(0, &counted)?;
+    let heavy = match weights {
+        Some(weights) => Some(gathered_weights(comm, &of_tet, weights, clusters)?),
+        None => None,
+    };
     let part_of_cluster = if comm.rank() == 0 {
-        let sizes =
-            (0..clusters).map(|c| first_place(c + 1, clusters, tets) - first_place(c, clusters, tets));
-        let graph = Graph::new(sizes.map(|size| size as i32).collect(), gathered.concat());
+        let size = |c: u64| (first_place(c + 1, clusters, tets) - first_place(c, clusters, tets)) as i32;
+        let sizes = heavy.unwrap_or_else(|| (0..clusters).map(size).collect());
+        let graph = Graph::new(sizes, gathered.concat());
         weighted::bisect(&graph, parts)
     } else {
         Ok(Vec::new())
@@ -47,6 +52,27 @@ pub(super) fn partition(
     let mut part_of_cluster = comm.agree(part_of_cluster)?;
     comm.broadcast(0, &mut part_of_cluster)?;
     Ok(of_tet.into_iter().map(|cluster| part_of_cluster[cluster as usize]).collect())
+}
+
+/// **Collective.** The weights of clusters on rank 0, in units so large that METIS' 32-bit integers hold their sum.
+fn gathered_weights(
+    comm: &dyn Communicator,
+    of_tet: &[u32],
+    weights: &[u32],
+    clusters: u64,
+) -> Result<Vec<i32>, CommError> {
+    let mut mine: Vec<[u64; 2]> = of_tet.iter().zip(weights).map(|(&c, &w)| [c.into(), w.into()]).collect();
+    mine.sort_unstable();
+    let sum = |run: &[[u64; 2]]| [run[0][0], run.iter().map(|[_, weight]| weight).sum()];
+    let mine: Vec<[u64; 2]> = mine.chunk_by(|a, b| a[0] == b[0]).map(sum).collect();
+    let gathered = comm.gather(0, &mine)?.concat();
+    if comm.rank() != 0 {
+        return Ok(Vec::new());
+    }
+    let mut sums = vec![0; clusters as usize];
+    gathered.into_iter().for_each(|[cluster, weight]| sums[cluster as usize] += weight);
+    let unit = sums.iter().sum::<u64>() / (i32::MAX / 2) as u64 + 1;
+    Ok(sums.into_iter().map(|sum| sum.div_ceil(unit) as i32).collect())
 }
 
 /// The least place of cluster `cluster`: of those with `place · clusters / tets ≥ cluster`.

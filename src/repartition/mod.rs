@@ -127,22 +127,11 @@ pub fn repartition(
     parts: u32,
     method: Method,
 ) -> Result<Vec<Rank>, RepartitionError> {
-    refuse_too_many(mesh, parts)?;
-    let mut part = match method {
-        Method::Geometric(how) | Method::Smoothed(how) => by_place(comm, mesh, None, parts, how)?,
-        Method::Clusters { per_part } => {
-            let places = curve::places(comm, centers(mesh), &mesh.tet_ids, |_| 1)?;
-            clusters::partition(comm, mesh, &places, parts, per_part)?
-        }
-    };
-    if parts > 1 && !matches!(method, Method::Geometric(_)) {
-        smooth::smooth(comm, mesh, &mut part, parts, &smooth::Settings::default())?;
-    }
-    Ok(part)
+    by_method(comm, mesh, None, parts, method)
 }
 
 /// **Collective.** The same for tets of unequal weight: a part below `parts` for each, so that the parts' weights are equal to within the heaviest
-/// tets. Where weights are very unequal a part may have no tet.
+/// tets (by place) or one percent beside these (smoothed, by a graph). Where weights are very unequal a part may have no tet.
 ///
 /// # Errors
 /// More parts than tets, or none. The same rank's on all ranks.
@@ -154,11 +143,32 @@ pub fn repartition_weighted(
     mesh: &DistMesh,
     weights: &[u32],
     parts: u32,
-    method: Geometric,
+    method: Method,
 ) -> Result<Vec<Rank>, RepartitionError> {
     assert_eq!(weights.len(), mesh.tets.len(), "rank {}: one weight for each tet", mesh.rank);
+    by_method(comm, mesh, Some(weights), parts, method)
+}
+
+/// **Collective.** Parts of equal weight; without weights, of equal number.
+fn by_method(
+    comm: &dyn Communicator,
+    mesh: &DistMesh,
+    weights: Option<&[u32]>,
+    parts: u32,
+    method: Method,
+) -> Result<Vec<Rank>, RepartitionError> {
     refuse_too_many(mesh, parts)?;
-    Ok(by_place(comm, mesh, Some(weights), parts, method)?)
+    let mut part = match method {
+        Method::Geometric(how) | Method::Smoothed(how) => by_place(comm, mesh, weights, parts, how)?,
+        Method::Clusters { per_part } => {
+            let places = curve::places(comm, centers(mesh), &mesh.tet_ids, |_| 1)?;
+            clusters::partition(comm, mesh, &places, weights, parts, per_part)?
+        }
+    };
+    if parts > 1 && !matches!(method, Method::Geometric(_)) {
+        smooth::smooth(comm, mesh, weights, &mut part, parts, &smooth::Settings::default())?;
+    }
+    Ok(part)
 }
 
 /// The tets at each face.

@@ -32,7 +32,7 @@ pub struct Settings {
     pub rounds: usize,
     /// The most rounds in which single tets move.
     pub single_moves: usize,
-    /// The most tets that a part may have in the end over the mean, unless it begins with more.
+    /// The most tets, or weight, that a part may have in the end over the mean, unless it begins with more.
     pub imbalance: f64,
 }
 
@@ -55,19 +55,21 @@ const CORRECTIONS: usize = 12;
 /// Rounds end when fewer tets near cuts than one in so many moved.
 const STILL_MOVING: u64 = 500;
 
-/// **Collective.** Changes the parts of tets near cuts so that fewer faces lie between parts; never makes the cut larger.
+/// **Collective.** Changes the parts of tets near cuts so that fewer faces lie between parts; never makes the cut larger. Parts are balanced by
+/// the weights of their tets, or by their numbers where there are no weights.
 ///
 /// # Errors
 /// If another rank fails.
 pub fn smooth(
     comm: &dyn Communicator,
     mesh: &DistMesh,
+    weights: Option<&[u32]>,
     part: &mut Vec<Rank>,
     parts: u32,
     settings: &Settings,
 ) -> Result<(), CommError> {
     let links = Links::new(mesh);
-    let mut state = State { label: links.with_ghosts(comm, part)?, parts };
+    let mut state = State { label: links.with_ghosts(comm, part)?, parts, weights };
     let mut best = state.judge(comm, &links)?;
     let allowed = settings.imbalance.max(best.imbalance);
     let mut bonus = vec![0.0; parts as usize];
@@ -341,17 +343,28 @@ impl Band {
 }
 
 /// The parts of tets and ghosts.
-struct State {
+struct State<'a> {
     label: Vec<Rank>,
     parts: u32,
+    /// Of this rank's tets; 1 each where there are none.
+    weights: Option<&'a [u32]>,
 }
 
-impl State {
-    /// How many of these tets are in each part.
-    fn count(&self, labels: impl Iterator<Item = Rank>) -> Vec<u64> {
-        let mut counts = vec![0; self.parts as usize];
-        labels.for_each(|part| counts[part as usize] += 1);
-        counts
+impl State<'_> {
+    fn weight(&self, tet: usize) -> u64 {
+        self.weights.map_or(1, |weights| weights[tet].into())
+    }
+
+    /// The weight of all tets of this rank in each part.
+    fn sizes(&self, tets: usize) -> Vec<u64> {
+        self.weigh(self.label[..tets].iter().copied().enumerate())
+    }
+
+    /// The weight of tets, given with the parts that they are in, in each part.
+    fn weigh(&self, tets: impl Iterator<Item = (usize, Rank)>) -> Vec<u64> {
+        let mut sizes = vec![0; self.parts as usize];
+        tets.for_each(|(tet, part)| sizes[part as usize] += self.weight(tet));
+        sizes
     }
 
     /// **Collective.** The partition as it is.
@@ -363,7 +376,7 @@ impl State {
         };
         let twice: u64 = (0..tets).into_par_iter().map(cut).sum();
         let [twice] = comm.all_reduce_sum_u64([twice])?;
-        let sizes = sum_by_part(comm, &self.count(self.label[..tets].iter().copied()))?;
+        let sizes = sum_by_part(comm, &self.sizes(tets))?;
         let largest = sizes.iter().copied().max().unwrap_or(0) as f64;
         let mean = sizes.iter().sum::<u64>() as f64 / f64::from(self.parts);
         Ok(Judged { part: self.label[..tets].to_vec(), cut: twice / 2, imbalance: largest / mean })
@@ -379,13 +392,16 @@ impl State {
     ) -> Result<bool, CommError> {
         let band = Band::spread(comm, links, &self.label, steps)?;
         let tets = links.tets();
-        let mut outside = self.count(self.label[..tets].iter().copied());
-        band.tets.iter().for_each(|&tet| outside[self.label[tet as usize] as usize] -= 1);
+        let mut outside = self.sizes(tets);
+        for &tet in &band.tets {
+            outside[self.label[tet as usize] as usize] -= self.weight(tet as usize);
+        }
         let outside = sum_by_part(comm, &outside)?;
         let mut chosen = Vec::new();
         for _ in 0..CORRECTIONS {
             chosen = band.choose(&self.label, bonus);
-            let inside = sum_by_part(comm, &self.count(chosen.iter().copied()))?;
+            let in_band = band.tets.iter().map(|&tet| tet as usize).zip(chosen.iter().copied());
+            let inside = sum_by_part(comm, &self.weigh(in_band))?;
             let sizes: Vec<u64> = inside.iter().zip(&outside).map(|(a, b)| a + b).collect();
             let mean = sizes.iter().sum::<u64>() as f64 / f64::from(self.parts);
             if sizes.iter().all(|&size| (size as f64 - mean).abs() <= BALANCED * mean) {
@@ -415,9 +431,10 @@ impl State {
         allowed: f64,
     ) -> Result<bool, CommError> {
         let tets = links.tets();
-        let sizes = sum_by_part(comm, &self.count(self.label[..tets].iter().copied()))?;
+        let sizes = sum_by_part(comm, &self.sizes(tets))?;
         let most = allowed * sizes.iter().sum::<u64>() as f64 / f64::from(self.parts);
-        let wish = |tet: usize| self.wish(links, tet, |part| (sizes[part as usize] as f64) < most - 1.0);
+        let has_room = |tet: usize, part: Rank| ((sizes[part as usize] + self.weight(tet)) as f64) < most;
+        let wish = |tet: usize| self.wish(links, tet, |part| has_room(tet, part));
         let wishes: Vec<(u64, Rank)> = (0..tets)
             .into_par_iter()
             .map(|tet| match wish(tet) {

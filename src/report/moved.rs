@@ -1,6 +1,6 @@
 //! The summary of a repartition.
 
-use super::{MeshReport, Processes, grouped};
+use super::{HaloReport, MeshReport, Processes, grouped};
 use crate::io::Written;
 use crate::memory::sized;
 use crate::pipeline::Repartitioned;
@@ -30,6 +30,8 @@ pub struct MoveReport {
     pub moved_bytes: u64,
     /// The mesh.
     pub mesh: MeshReport,
+    /// The ghosts that were written; null where none were asked for.
+    pub halo: Option<HaloReport>,
     /// What users should know of the files.
     pub notes: Vec<String>,
     /// The stages in order.
@@ -59,6 +61,7 @@ impl MoveReport {
             moved_tets: done.moved.tets,
             moved_bytes: done.moved.bytes,
             mesh: MeshReport::new(&done.check, done.checksum.to_string()),
+            halo: None,
             notes: done.notes.clone(),
             stages: Vec::new(),
             seconds: 0.0,
@@ -115,6 +118,9 @@ impl fmt::Display for MoveReport {
             "checked    every tet positive; volume {}; the mesh is the same after the move",
             mesh.volume
         )?;
+        if let Some(halo) = &self.halo {
+            write!(f, "{halo}")?;
+        }
         for note in &self.notes {
             writeln!(f, "note       {note}")?;
         }

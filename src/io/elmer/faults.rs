@@ -2,12 +2,13 @@
 //!
 //! Judged is what Elmer and its users rely on, from the files alone: tables of ids that fit each other, shared
 //! nodes known to all their holders, positive tets that fill the body without gap or overlap, and a boundary that
-//! covers each outer face once with the parent beside it. That the outer surface is closed need not be looked at:
+//! covers each outer face once with the parent beside it. Halo elements must be those of their owners; which ones there should be is not
+//! judged, as there are many kinds of halos. That the outer surface is closed need not be looked at:
 //! it is the boundary of a set of tets.
 
 use super::parse::ReadError;
 use super::read::{ElmerMesh, ElmerPart, Layout, layouts, read_layout};
-use super::{faults_faces, faults_nodes, periodic};
+use super::{faults_faces, faults_halo, faults_nodes, periodic};
 use std::collections::BTreeMap;
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -41,8 +42,12 @@ pub enum FaultKind {
     OwnersDiffer,
     /// A node in `.shared` is in no other part.
     NeedlesslyShared,
+    /// The first part listed for a node has it in halo elements only.
+    OwnerWatches,
     /// An element id stands twice in the mesh.
     ElementTwice,
+    /// A halo element is not, or not so, among the elements of the part that it names.
+    WrongHalo,
     /// Two elements have the same nodes.
     SameElement,
     /// An element is not positively oriented.
@@ -83,7 +88,9 @@ impl fmt::Display for FaultKind {
             Self::WrongHolders => "wrong holders in .shared",
             Self::OwnersDiffer => "node with different owners in different parts",
             Self::NeedlesslyShared => "node in .shared that is in one part only",
+            Self::OwnerWatches => "owner that has the node in halo elements only",
             Self::ElementTwice => "element id twice",
+            Self::WrongHalo => "halo element that its owner does not have so",
             Self::SameElement => "two elements with the same nodes",
             Self::Inverted => "element inverted or flat",
             Self::CrowdedFace => "face of more than two elements",
@@ -186,7 +193,8 @@ pub fn faults(mesh: &ElmerMesh) -> Faults {
     let mut faults = Faults::default();
     check_counts(mesh, &mut faults);
     let tables = faults_nodes::check_nodes(mesh, &mut faults);
-    faults_nodes::check_shared(mesh, &mut faults);
+    faults_nodes::check_shared(mesh, &tables, &mut faults);
+    faults_halo::check_halo(mesh, &mut faults);
     faults_faces::check_elements_and_boundary(mesh, &tables, &mut faults);
     faults
 }
@@ -204,8 +212,13 @@ fn check_counts(mesh: &ElmerMesh, faults: &mut Faults) {
 /// Compares the counts of a part with its files.
 pub(super) fn check_header(part: &ElmerPart, faults: &mut Faults) {
     let header = &part.header;
-    let mut types = vec![(super::TRIANGLE, part.boundary.len()), (super::TET, part.elements.len())];
-    types.retain(|(_, count)| *count > 0);
+    let elements = part.elements.len() + part.halo.len();
+    let mut types: BTreeMap<u32, usize> =
+        part.left_out.iter().map(|(&code, &count)| (code, count as usize)).collect();
+    *types.entry(super::TRIANGLE).or_default() += part.boundary.len();
+    let boundary = types.values().sum();
+    types.insert(super::TET, elements);
+    let types: Vec<_> = types.into_iter().filter(|(_, count)| *count > 0).collect();
     let mut stated: Vec<_> = header.types.iter().map(|&(code, n)| (code, n as usize)).collect();
     stated.retain(|(_, count)| *count > 0);
     stated.sort_unstable();
@@ -216,8 +229,8 @@ pub(super) fn check_header(part: &ElmerPart, faults: &mut Faults) {
         }
     };
     count(1, "nodes", header.nodes, part.nodes.len());
-    count(1, "elements", header.elements, part.elements.len());
-    count(1, "boundary elements", header.boundary, part.boundary.len());
+    count(1, "elements", header.elements, elements);
+    count(1, "boundary elements", header.boundary, boundary);
     if let Some(shared) = header.shared {
         count(3 + header.types.len(), "shared nodes", shared, part.shared.len());
     }

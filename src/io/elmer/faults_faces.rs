@@ -43,11 +43,11 @@ fn check_element_ids(mesh: &ElmerMesh, faults: &mut Faults) {
     ids.par_sort_unstable();
     for pair in ids.windows(2).filter(|pair| pair[0].0 == pair[1].0) {
         let (before, here) = (pair[0].1, pair[1].1);
-        let part = &mesh.parts[here.part as usize];
-        let what = || {
-            format!("element {} stands in part {}, line {} too", pair[1].0, before.part + 1, before.index + 1)
-        };
-        faults.add(FaultKind::ElementTwice, part.file("elements"), here.index as usize + 1, what);
+        let line = |at: Place| mesh.parts[at.part as usize].elements.line(at.index as usize);
+        let what =
+            || format!("element {} stands in part {}, line {} too", pair[1].0, before.part + 1, line(before));
+        let file = mesh.parts[here.part as usize].file("elements");
+        faults.add(FaultKind::ElementTwice, file, line(here), what);
     }
 }
 
@@ -64,7 +64,7 @@ fn check_orientation(mesh: &ElmerMesh, tables: &[NodeTable], faults: &mut Faults
             let Some(sign @ (Sign::Negative | Sign::Zero)) = sign else { continue };
             let state = if *sign == Sign::Zero { "flat" } else { "inverted" };
             let what = || format!("element {} is {state}", part.elements[k].id);
-            faults.add(FaultKind::Inverted, part.file("elements"), k + 1, what);
+            faults.add(FaultKind::Inverted, part.file("elements"), part.elements.line(k), what);
         }
         signs.push(of_part.into_iter().map(|sign| sign.unwrap_or(Sign::Zero)).collect());
     }
@@ -142,7 +142,9 @@ impl Judge<'_> {
         what: impl FnOnce() -> String,
     ) {
         let part = &self.mesh.parts[at.place.part as usize];
-        faults.add(kind, part.file(file), at.place.index as usize + 1, what);
+        let index = at.place.index as usize;
+        let line = if file == "boundary" { part.boundary.line(index) } else { part.elements.line(index) };
+        faults.add(kind, part.file(file), line, what);
     }
 
     /// What lies on both sides of each face of the elements.

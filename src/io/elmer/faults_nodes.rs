@@ -1,19 +1,39 @@
 //! Faults of nodes: tables, copies, owners.
 
 use super::faults::{FaultKind, Faults};
-use super::read::{ElmerMesh, ElmerPart, SharedNode};
+use super::read::{Element, ElmerMesh, ElmerPart, SharedNode};
+
+/// A table by id has at most this many entries for a node: Elmer's own tables have one for each id between the least and the largest.
+const MOST_PER_NODE: usize = 32;
 
 /// Finds a node of a part by its id.
 pub(super) struct NodeTable {
     /// Ids, ascending, and where each stands in `.nodes`.
     sorted: Vec<(u32, u32)>,
+    /// The places of ids from the first on, `u32::MAX` where there is none; empty where the ids of the part are spread too far.
+    by_id: Vec<u32>,
+    /// By place in `.nodes`: whether an element of the part itself has it, not only halo elements.
+    held: Vec<bool>,
 }
 
 impl NodeTable {
     fn new(part: &ElmerPart) -> Self {
         let mut sorted: Vec<(u32, u32)> = part.nodes.iter().map(|node| node.id).zip(0..).collect();
         sorted.sort_unstable();
-        Self { sorted }
+        let mut by_id = Vec::new();
+        if let (Some(&(first, _)), Some(&(last, _))) = (sorted.first(), sorted.last())
+            && ((last - first) as usize) < MOST_PER_NODE * sorted.len()
+        {
+            by_id.resize((last - first) as usize + 1, u32::MAX);
+            // Of a node that stands twice the first counts.
+            sorted.iter().rev().for_each(|(id, place)| by_id[(id - first) as usize] = *place);
+        }
+        Self { sorted, by_id, held: vec![false; part.nodes.len()] }
+    }
+
+    /// Whether an element of the part itself has the node at this place in `.nodes`.
+    pub fn holds(&self, place: usize) -> bool {
+        self.held[place]
     }
 
     /// Ids, ascending, and where each stands in `.nodes`.
@@ -22,12 +42,15 @@ impl NodeTable {
     }
 
     /// Where the node stands in `.nodes`.
+    #[inline]
     pub fn find(&self, id: u32) -> Option<usize> {
         let first = self.sorted.first()?.0;
-        // Where ids have no gap before it, the place is known.
-        let guess = self.sorted.get(id.checked_sub(first)? as usize).filter(|(known, _)| *known == id);
-        let by_search = || self.sorted.binary_search_by_key(&id, |(known, _)| *known).ok();
-        guess.or_else(|| by_search().map(|place| &self.sorted[place])).map(|(_, index)| *index as usize)
+        if !self.by_id.is_empty() {
+            let place = *self.by_id.get(id.checked_sub(first)? as usize)?;
+            return (place != u32::MAX).then_some(place as usize);
+        }
+        let place = self.sorted.binary_search_by_key(&id, |(known, _)| *known).ok()?;
+        Some(self.sorted[place].1 as usize)
     }
 }
 
@@ -38,7 +61,7 @@ pub(super) fn check_nodes(mesh: &ElmerMesh, faults: &mut Faults) -> Vec<NodeTabl
 
 /// The same for one part.
 pub(super) fn check_nodes_of(part: &ElmerPart, faults: &mut Faults) -> NodeTable {
-    let table = NodeTable::new(part);
+    let mut table = NodeTable::new(part);
     for pair in table.sorted.windows(2).filter(|pair| pair[0].0 == pair[1].0) {
         let what = || format!("node {} stands here and on line {}", pair[1].0, pair[0].1 + 1);
         faults.add(FaultKind::NodeTwice, part.file("nodes"), pair[1].1 as usize + 1, what);
@@ -49,40 +72,59 @@ pub(super) fn check_nodes_of(part: &ElmerPart, faults: &mut Faults) -> NodeTable
             faults.add(FaultKind::NotFinite, part.file("nodes"), k + 1, what);
         }
     }
-    check_uses(part, &table, faults);
+    table.held = check_uses(part, &table, faults);
     table
 }
 
-fn check_uses(part: &ElmerPart, table: &NodeTable, faults: &mut Faults) {
-    let mut used = vec![false; part.nodes.len()];
+/// The nodes that elements of the part itself have.
+fn check_uses(part: &ElmerPart, table: &NodeTable, faults: &mut Faults) -> Vec<bool> {
+    let mut held = vec![false; part.nodes.len()];
     for (k, element) in part.elements.iter().enumerate() {
-        if element.body == 0 {
-            let what = || format!("element {} is in body 0", element.id);
-            faults.add(FaultKind::ZeroNumber, part.file("elements"), k + 1, what);
-        }
-        for &id in &element.nodes {
-            match table.find(id) {
-                Some(index) => used[index] = true,
-                None => {
-                    let what = || format!("element {} uses node {id}", element.id);
-                    faults.add(FaultKind::NoSuchNode, part.file("elements"), k + 1, what);
-                }
-            }
-        }
+        check_element(part, table, element, || part.elements.line(k), &mut held, faults);
     }
+    let mut used = if part.halo.is_empty() { Vec::new() } else { held.clone() };
+    for (k, (element, _)) in part.halo.iter().enumerate() {
+        check_element(part, table, element, || part.halo.line(k), &mut used, faults);
+    }
+    let used = if part.halo.is_empty() { &held } else { &used };
     for (k, element) in part.boundary.iter().enumerate() {
         if element.boundary == 0 {
             let what = || format!("boundary element {} has number 0", element.id);
-            faults.add(FaultKind::ZeroNumber, part.file("boundary"), k + 1, what);
+            faults.add(FaultKind::ZeroNumber, part.file("boundary"), part.boundary.line(k), what);
         }
         for &id in element.nodes.iter().filter(|&&id| table.find(id).is_none()) {
             let what = || format!("boundary element {} uses node {id}", element.id);
-            faults.add(FaultKind::NoSuchNode, part.file("boundary"), k + 1, what);
+            faults.add(FaultKind::NoSuchNode, part.file("boundary"), part.boundary.line(k), what);
         }
     }
     for (k, node) in part.nodes.iter().enumerate().filter(|(k, _)| !used[*k]) {
         let what = || format!("node {} belongs to no element of this part", node.id);
         faults.add(FaultKind::UnusedNode, part.file("nodes"), k + 1, what);
+    }
+    held
+}
+
+/// Checks the body and the nodes of an element, and marks these.
+fn check_element(
+    part: &ElmerPart,
+    table: &NodeTable,
+    element: &Element,
+    line: impl Fn() -> usize,
+    used: &mut [bool],
+    faults: &mut Faults,
+) {
+    if element.body == 0 {
+        let what = || format!("element {} is in body 0", element.id);
+        faults.add(FaultKind::ZeroNumber, part.file("elements"), line(), what);
+    }
+    for &id in &element.nodes {
+        match table.find(id) {
+            Some(index) => used[index] = true,
+            None => {
+                let what = || format!("element {} uses node {id}", element.id);
+                faults.add(FaultKind::NoSuchNode, part.file("elements"), line(), what);
+            }
+        }
     }
 }
 
@@ -108,7 +150,7 @@ impl<'a> SharedTable<'a> {
 }
 
 /// Checks copies of nodes and what `.shared` says of them, against the parts that really hold them.
-pub(super) fn check_shared(mesh: &ElmerMesh, faults: &mut Faults) {
+pub(super) fn check_shared(mesh: &ElmerMesh, nodes: &[NodeTable], faults: &mut Faults) {
     let mut copies: Vec<(u32, u32, u32)> = Vec::new();
     for (p, part) in (0..).zip(&mesh.parts) {
         copies.extend(part.nodes.iter().zip(0..).map(|(node, k)| (node.id, p, k)));
@@ -119,6 +161,7 @@ pub(super) fn check_shared(mesh: &ElmerMesh, faults: &mut Faults) {
     let tables: Vec<SharedTable> = mesh.parts.iter().map(|part| SharedTable::new(&part.shared)).collect();
     for copies in copies.chunk_by(|a, b| a.0 == b.0).filter(|copies| copies.len() > 1) {
         check_copies(mesh, &tables, copies, faults);
+        check_owner(mesh, &tables, nodes, copies, faults);
     }
     for (p, part) in (0..).zip(&mesh.parts) {
         for (k, line) in part.shared.iter().enumerate() {
@@ -166,6 +209,22 @@ fn check_copies(mesh: &ElmerMesh, tables: &[SharedTable], copies: &[(u32, u32, u
         if lines == 0 {
             let what = || format!("node {id} is in parts {holders:?}");
             faults.add(FaultKind::NotShared, part.file("shared"), 0, what);
+        }
+    }
+}
+
+/// The first part listed must be one that has an element of its own at the node.
+fn check_owner(
+    mesh: &ElmerMesh,
+    tables: &[SharedTable],
+    nodes: &[NodeTable],
+    copies: &[(u32, u32, u32)],
+    faults: &mut Faults,
+) {
+    for &(id, part, place) in copies.iter().filter(|copy| !nodes[copy.1 as usize].holds(copy.2 as usize)) {
+        for (k, line) in tables[part as usize].find(id).filter(|(_, line)| line.parts[0] == part + 1) {
+            let what = || format!("node {id} (line {} of .nodes), owner {}", place + 1, line.parts[0]);
+            faults.add(FaultKind::OwnerWatches, mesh.parts[part as usize].file("shared"), k + 1, what);
         }
     }
 }

@@ -4,7 +4,7 @@
 //! DIR/mesh.names                    names of bodies and boundaries
 //! DIR/partitioning.N/part.K.header  counts                      K = 1 … N, rank K−1
 //!                        .nodes     id -1 x y z                 of every vertex the part uses
-//!                        .elements  id body 504 v v v v
+//!                        .elements  id body 504 v v v v         id/OWNER of a halo element
 //!                        .boundary  id bc parent parent 303 v v v
 //!                        .shared    vertex count part part …    the owner first
 //! DIR/partitioning.N/mesh.periodic  pairs of nodes of periodic faces, if there are any: not Elmer's
@@ -14,7 +14,10 @@
 
 mod faults;
 mod faults_faces;
+mod faults_halo;
 mod faults_nodes;
+#[cfg(test)]
+mod halo_tests;
 mod load;
 mod names;
 mod number;
@@ -29,7 +32,7 @@ pub use faults::{Fault, FaultKind, Faults, check_elmer, faults};
 pub use load::{LoadError, Loaded, load};
 pub(crate) use names::names_of;
 pub use parse::ReadError;
-pub use read::{BoundaryElement, Element, ElmerMesh, ElmerPart, Header, Layout, Node, SharedNode};
+pub use read::{BoundaryElement, Element, ElmerMesh, ElmerPart, Header, Layout, Node, Rows, SharedNode};
 pub use read::{layouts, read, read_layout, stated_elements};
 pub use write::write;
 

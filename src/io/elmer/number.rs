@@ -2,24 +2,38 @@
 
 use crate::comm::Communicator;
 use crate::io::WriteError;
-use crate::mesh::GlobalId;
+use crate::mesh::ghosts::GhostTet;
 use crate::mesh::stream::{MeshStream, VertexBlock};
+use crate::mesh::{GlobalId, Rank};
 
-/// The numbers of one part's entities, all from 1.
+/// The numbers of one part's entities, all from 1; of its ghosts those that they have in their own part.
 #[derive(Debug)]
 pub(super) struct Numbering {
     /// By local vertex index.
     pub vertices: Vec<u32>,
     /// The number of the part's first tet; the others follow in local order.
-    pub first_tet: u64,
-    /// How many vertices of this part others hold too.
+    first_tet: u64,
+    /// Where ghost tets begin, and their numbers.
+    ghosts: (u64, Vec<u64>),
+    /// How many vertices of this part, or of its ghosts, others have too.
     pub shared: u64,
+}
+
+impl Numbering {
+    /// The number of a tet by its index within the part.
+    pub fn tet(&self, index: u64) -> u64 {
+        let (first_ghost, numbers) = &self.ghosts;
+        match index.checked_sub(*first_ghost) {
+            None => self.first_tet + index,
+            Some(ghost) => numbers[ghost as usize],
+        }
+    }
 }
 
 /// **Collective.** Numbers the vertices so that those that a part owns are neighbours, and the tets so that those
 /// of a part are neighbours; parts in the order of their ranks, entities in local order.
 ///
-/// One gather of counts and one message to each neighbour: 16 bytes for each copy of a vertex.
+/// Two gathers of counts and one message to each neighbour: 16 bytes for each copy of a vertex.
 /// Callers have made sure that the totals fit 32 bits.
 pub(super) fn number(comm: &dyn Communicator, part: &dyn MeshStream) -> Result<Numbering, WriteError> {
     let rank = part.rank();
@@ -27,19 +41,33 @@ pub(super) fn number(comm: &dyn Communicator, part: &dyn MeshStream) -> Result<N
     let mut owned = 0;
     let mut shared = 0;
     for_each_vertex(part, |local, id, block| {
-        shared += u64::from(!block.holders.is_empty());
+        shared += u64::from(!block.holders.is_empty() || !watchers(part, local).is_empty());
         if block.owner(id, rank) == rank {
             owned += 1;
             vertices[local as usize] = owned;
         }
     });
 
-    let [vertices_before, tets_before] = comm.exclusive_scan([u64::from(owned), part.counts().tets])?;
+    let own_tets = part.ghosts().map_or(part.counts().tets, |ghosts| ghosts.first_tet);
+    let [vertices_before] = comm.exclusive_scan([u64::from(owned)])?;
     for number in vertices.iter_mut().filter(|number| **number > 0) {
         *number += vertices_before as u32;
     }
     learn_from_owners(comm, part, &mut vertices)?;
-    Ok(Numbering { vertices, first_tet: 1 + tets_before, shared })
+    let mut next = 1;
+    let first_tets = comm.all_gather_one(own_tets)?.into_iter().map(|tets| {
+        next += tets;
+        next - tets
+    });
+    let first_tets: Vec<u64> = first_tets.collect();
+    let of_ghost = |tet: &GhostTet| first_tets[tet.owner as usize] + tet.index;
+    let numbers = part.ghosts().map(|ghosts| ghosts.tets.iter().map(of_ghost).collect()).unwrap_or_default();
+    Ok(Numbering { vertices, first_tet: first_tets[rank as usize], ghosts: (own_tets, numbers), shared })
+}
+
+/// The ranks that have a vertex in ghost tets only.
+pub(super) fn watchers(part: &dyn MeshStream, local: u32) -> &[Rank] {
+    part.ghosts().map_or(&[], |ghosts| ghosts.watchers_of(local))
 }
 
 /// Calls `f(local index, global id, its block)` for each vertex in local order.
@@ -52,7 +80,7 @@ fn for_each_vertex(part: &dyn MeshStream, mut f: impl FnMut(u32, GlobalId, &Vert
     }
 }
 
-/// **Collective.** Owners tell the other holders the numbers of shared vertices.
+/// **Collective.** Owners tell the other holders, and those who have a vertex in their ghosts, the numbers of shared vertices.
 fn learn_from_owners(
     comm: &dyn Communicator,
     part: &dyn MeshStream,
@@ -63,8 +91,9 @@ fn learn_from_owners(
     let mut to_learn: Vec<(GlobalId, u32)> = Vec::new();
     for_each_vertex(part, |local, id, block| {
         if block.owner(id, rank) == rank {
-            for &holder in block.holders.iter().filter(|&&holder| holder != rank) {
-                to_each[holder as usize].extend([id, u64::from(vertices[local as usize])]);
+            let others = block.holders.iter().filter(|&&holder| holder != rank);
+            for &other in others.chain(watchers(part, local)) {
+                to_each[other as usize].extend([id, u64::from(vertices[local as usize])]);
             }
         } else {
             to_learn.push((id, local));

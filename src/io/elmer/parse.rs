@@ -2,8 +2,8 @@
 
 use super::{MAX_ID, MAX_LINE};
 use rayon::prelude::*;
-use std::fs;
-use std::io;
+use std::fs::{self, File};
+use std::io::{self, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
 /// Why a mesh could not be read.
@@ -59,24 +59,48 @@ impl<'a> Fields<'a> {
     }
 
     /// The next word; only blanks separate words.
+    #[inline]
     fn word(&mut self, what: &str) -> Result<&'a [u8], String> {
-        let start =
-            self.0.iter().position(|&b| b != b' ').ok_or(format!("the line ends before its {what}"))?;
-        let rest = &self.0[start..];
+        let start = self.0.iter().position(|&b| b != b' ');
+        // Texts are made where something is wrong, not before: there are hundreds of millions of words.
+        let rest = &self.0[start.ok_or_else(|| format!("the line ends before its {what}"))?..];
         let end = rest.iter().position(|&b| b == b' ').unwrap_or(rest.len());
         self.0 = &rest[end..];
         Ok(&rest[..end])
     }
 
     /// The next word as a whole number that Elmer can hold.
+    #[inline]
     pub fn int(&mut self, what: &str) -> Result<u32, String> {
-        let word = self.word(what)?;
-        let wrong = || format!("the {what} is no whole number from 0 to {MAX_ID}: '{}'", shown(word));
-        if !word.iter().all(u8::is_ascii_digit) {
-            return Err(wrong());
+        let mut rest = self.0;
+        while let [b' ', after @ ..] = rest {
+            rest = after;
         }
-        let number = word.iter().fold(0_u64, |n, b| n.saturating_mul(10).saturating_add(u64::from(b - b'0')));
-        if number <= MAX_ID { Ok(number as u32) } else { Err(wrong()) }
+        // In one go where it is a number of at most nine digits; all else is looked at more closely.
+        let (mut number, mut digits) = (0_u32, 0);
+        while let [digit @ b'0'..=b'9', after @ ..] = rest
+            && digits < 9
+        {
+            number = 10 * number + u32::from(digit - b'0');
+            digits += 1;
+            rest = after;
+        }
+        if digits > 0 && matches!(rest, [] | [b' ', ..]) {
+            self.0 = rest;
+            return Ok(number);
+        }
+        whole(self.word(what)?, what)
+    }
+
+    /// The next word as a whole number, and behind a slash, where there is one, another from 1.
+    pub fn int_and_part(&mut self, what: &str) -> Result<(u32, Option<u32>), String> {
+        let word = self.word(what)?;
+        let Some(slash) = word.iter().position(|&b| b == b'/') else { return Ok((whole(word, what)?, None)) };
+        let part = whole(&word[slash + 1..], "part behind the slash")?;
+        if part == 0 {
+            return Err(format!("the {what} is of part 0: '{}'", shown(word)));
+        }
+        Ok((whole(&word[..slash], what)?, Some(part)))
     }
 
     /// The next word as a number; Fortran's `1.5D-3` too.
@@ -87,13 +111,14 @@ impl<'a> Fields<'a> {
         number.map_err(|_| format!("the {what} is no number: '{}'", shown(word)))
     }
 
-    /// The next word, which must be this.
-    pub fn expect(&mut self, what: &str, expected: &str) -> Result<(), String> {
-        let word = self.word(what)?;
-        if word == expected.as_bytes() {
+    /// The next number, which must be this.
+    #[inline]
+    pub fn expect(&mut self, what: &str, expected: u32) -> Result<(), String> {
+        let found = self.int(what)?;
+        if found == expected {
             return Ok(());
         }
-        Err(format!("the {what} is '{}'; only {expected} is read here", shown(word)))
+        Err(format!("the {what} is '{found}'; only {expected} is read here"))
     }
 
     /// Whether nothing is left.
@@ -105,6 +130,20 @@ impl<'a> Fields<'a> {
     pub fn end(&self) -> Result<(), String> {
         if self.is_empty() { Ok(()) } else { Err(format!("too much: '{}'", shown(self.0.trim_ascii()))) }
     }
+}
+
+/// A word as a whole number that Elmer can hold.
+fn whole(word: &[u8], what: &str) -> Result<u32, String> {
+    let wrong = || format!("the {what} is no whole number from 0 to {MAX_ID}: '{}'", shown(word));
+    let mut number = 0_u64;
+    for &digit in word {
+        let digit = digit.wrapping_sub(b'0');
+        if digit > 9 || number > MAX_ID {
+            return Err(wrong());
+        }
+        number = 10 * number + u64::from(digit);
+    }
+    if number <= MAX_ID && !word.is_empty() { Ok(number as u32) } else { Err(wrong()) }
 }
 
 /// A few words of a file for a message.
@@ -125,53 +164,119 @@ pub(super) fn refuse_what_elmer_cuts(line: &[u8]) -> Result<(), String> {
     Ok(())
 }
 
-/// Reads a file of one value per line, with many threads.
+/// Bytes of a file that one thread reads and parses at a time.
+const PIECE: u64 = 1 << 20;
+
+/// Reads a file of one value per line, with many threads; `expected` values, as a header says.
 pub(super) fn read_lines<T: Send>(
     path: &Path,
+    expected: u32,
     parse: impl Fn(&[u8]) -> Result<T, String> + Sync,
 ) -> Result<Vec<T>, ReadError> {
-    const PIECE: usize = 1 << 20;
-    let text = fs::read(path).map_err(ReadError::io(path))?;
-    let pieces = pieces(&text, PIECE);
-    let parsed: Vec<Result<Vec<T>, (usize, String)>> =
-        pieces.par_iter().map(|piece| parse_piece(piece, &parse)).collect();
-    let mut values = Vec::with_capacity(parsed.iter().flatten().map(Vec::len).sum());
-    let mut lines = 0;
-    for (piece, parsed) in pieces.iter().zip(parsed) {
-        match parsed {
-            Ok(parsed) => values.extend(parsed),
-            Err((line, message)) => {
-                let line = lines + line as u64 + 1;
-                return Err(ReadError::Line { path: path.to_path_buf(), line, message });
+    let mut all = Vec::with_capacity(room(path, expected));
+    for_each_line(path, parse, |values| all.append(values))?;
+    Ok(all)
+}
+
+/// How many values room is made for: what a header says, unless the file cannot have so many.
+pub(super) fn room(path: &Path, expected: u32) -> usize {
+    let bytes = fs::metadata(path).map_or(0, |file| file.len());
+    (bytes / 2).min(expected.into()) as usize
+}
+
+/// Reads a file of one value per line, with many threads, and gives the values to `take` in their order, many at a time.
+///
+/// Pieces are read, parsed and taken in the same few buffers: what is touched once only has to be cleared by the system first, which takes
+/// longer than parsing.
+pub(super) fn for_each_line<T: Send>(
+    path: &Path,
+    parse: impl Fn(&[u8]) -> Result<T, String> + Sync,
+    mut take: impl FnMut(&mut Vec<T>),
+) -> Result<(), ReadError> {
+    let length = fs::metadata(path).map_err(ReadError::io(path))?.len();
+    let pieces = length.div_ceil(PIECE);
+    let at_once = pieces.min(4 * rayon::current_num_threads() as u64).max(1);
+    let mut buffers: Vec<Buffer<T>> = (0..at_once).map(|_| Buffer::default()).collect();
+    let mut line = 0;
+    for first in (0..pieces).step_by(at_once as usize) {
+        let filled = &mut buffers[..at_once.min(pieces - first) as usize];
+        let found: Vec<Result<Option<String>, ReadError>> = filled
+            .par_iter_mut()
+            .enumerate()
+            .map(|(k, buffer)| {
+                buffer.read(path, (first + k as u64) * PIECE).map_err(ReadError::io(path))?;
+                Ok(buffer.parse(&parse).err())
+            })
+            .collect();
+        for (buffer, found) in filled.iter_mut().zip(found) {
+            line += buffer.values.len() as u64;
+            if let Some(message) = found? {
+                return Err(ReadError::Line { path: path.to_path_buf(), line: line + 1, message });
+            }
+            take(&mut buffer.values);
+            buffer.values.clear();
+        }
+    }
+    Ok(())
+}
+
+/// The lines that begin in one piece of a file.
+struct Buffer<T> {
+    text: Vec<u8>,
+    values: Vec<T>,
+}
+
+impl<T> Default for Buffer<T> {
+    fn default() -> Self {
+        Self { text: Vec::new(), values: Vec::new() }
+    }
+}
+
+impl<T> Buffer<T> {
+    /// Reads the lines that begin in the piece from `start` on.
+    fn read(&mut self, path: &Path, start: u64) -> io::Result<()> {
+        const MORE: u64 = 1024;
+        let mut file = File::open(path)?;
+        // From the byte before: the piece may begin with a line.
+        let before = u64::from(start > 0);
+        file.seek(SeekFrom::Start(start - before))?;
+        self.text.clear();
+        (&mut file).take(before + PIECE).read_to_end(&mut self.text)?;
+        let begun = match before {
+            0 => 0,
+            _ => self.text.iter().position(|&b| b == b'\n').map_or(self.text.len(), |at| at + 1),
+        };
+        if begun == self.text.len() && self.text.last() != Some(&b'\n') {
+            // All of it belongs to a line that begins before.
+            self.text.clear();
+            return Ok(());
+        }
+        // The last line may end in a later piece.
+        while self.text.last() != Some(&b'\n') {
+            let end = self.text.len();
+            if (&mut file).take(MORE).read_to_end(&mut self.text)? == 0 {
+                break;
+            }
+            if let Some(at) = self.text[end..].iter().position(|&b| b == b'\n') {
+                self.text.truncate(end + at + 1);
             }
         }
-        lines += piece.iter().filter(|&&b| b == b'\n').count() as u64;
+        self.text.drain(..begun);
+        Ok(())
     }
-    Ok(values)
-}
 
-/// Splits a text into pieces of about `size` bytes that end with a line.
-fn pieces(mut text: &[u8], size: usize) -> Vec<&[u8]> {
-    let mut pieces = Vec::new();
-    while !text.is_empty() {
-        let end = text.iter().skip(size).position(|&b| b == b'\n').map_or(text.len(), |k| size + k + 1);
-        let (piece, rest) = text.split_at(end);
-        pieces.push(piece);
-        text = rest;
+    /// Parses the lines; those before the first bad one are in `values` in the end.
+    fn parse(&mut self, parse: impl Fn(&[u8]) -> Result<T, String>) -> Result<(), String> {
+        self.values.clear();
+        if self.text.is_empty() {
+            return Ok(());
+        }
+        let text = self.text.strip_suffix(b"\n").unwrap_or(&self.text);
+        for line in text.split(|&b| b == b'\n') {
+            self.values.push(parse(line.strip_suffix(b"\r").unwrap_or(line))?);
+        }
+        Ok(())
     }
-    pieces
-}
-
-/// The values of a piece, or the index of the first bad line and what is wrong with it.
-fn parse_piece<T>(
-    piece: &[u8],
-    parse: impl Fn(&[u8]) -> Result<T, String>,
-) -> Result<Vec<T>, (usize, String)> {
-    let text = piece.strip_suffix(b"\n").unwrap_or(piece);
-    text.split(|&b| b == b'\n')
-        .enumerate()
-        .map(|(k, line)| parse(line.strip_suffix(b"\r").unwrap_or(line)).map_err(|message| (k, message)))
-        .collect()
 }
 
 #[cfg(test)]
@@ -185,11 +290,40 @@ mod tests {
         let mut text: String = (0..300_000).map(|k| format!("{k}\n")).collect();
         fs::write(&path, &text).unwrap();
         let parse = |line: &[u8]| Fields::new(line).int("number");
-        assert_eq!(read_lines(&path, parse).unwrap(), (0..300_000).collect::<Vec<_>>());
+        assert_eq!(read_lines(&path, 7, parse).unwrap(), (0..300_000).collect::<Vec<_>>());
         text += "12x\n";
         fs::write(&path, &text).unwrap();
-        let error = read_lines(&path, parse).unwrap_err().to_string();
+        let error = read_lines(&path, 300_000, parse).unwrap_err().to_string();
         assert!(error.contains("f:300001: the number is no whole number"), "{error}");
+    }
+
+    #[test]
+    fn lines_are_read_whole_wherever_pieces_end() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("f");
+        let piece = PIECE as usize;
+        let parse = |line: &[u8]| Ok(line.len());
+        // A line that ends with the piece, just before or behind its end, spans several, or ends with the file.
+        for lengths in [
+            vec![],
+            vec![0],
+            vec![piece - 2, 0, 5, 1],
+            vec![piece - 1, 0, 5],
+            vec![piece, 3, 0],
+            vec![piece + 1, 3],
+            vec![10, 3 * piece, 7, 2 * piece - 20, 1, 0, 4],
+            vec![3; 1_000_000],
+        ] {
+            for end in ["\n", ""] {
+                let text: String = lengths.iter().map(|&n| "x".repeat(n) + "\n").collect();
+                let text = text.strip_suffix('\n').map(|text| text.to_string() + end).unwrap_or_default();
+                let last_is_empty = end.is_empty() && lengths.last() == Some(&0);
+                fs::write(&path, text).unwrap();
+                let found = read_lines(&path, 0, parse).unwrap();
+                let expected = if last_is_empty { &lengths[..lengths.len() - 1] } else { &lengths[..] };
+                assert!(found == expected, "{:?}, end {end:?}", &lengths[..lengths.len().min(9)]);
+            }
+        }
     }
 
     #[test]

@@ -1,11 +1,16 @@
 //! Reading Elmer's files: all of a mesh, with nothing set right.
 
-use super::parse::{Fields, ReadError, read_lines, refuse_what_elmer_cuts};
+use super::parse::{Fields, ReadError, for_each_line, read_lines, refuse_what_elmer_cuts, room};
 use super::{MAX_LINE, TET, TRIANGLE};
 use crate::Point;
 use rayon::prelude::*;
+use std::collections::BTreeMap;
 use std::fs;
+use std::ops::Deref;
 use std::path::{Path, PathBuf};
+
+/// Points, and edges with two nodes, which ElmerGrid keeps among boundary elements: they bound no tet.
+const POINTS_AND_EDGES: [u32; 3] = [101, 102, 202];
 
 /// Where a mesh stands.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -39,7 +44,45 @@ pub struct ElmerMesh {
     pub parts: Vec<ElmerPart>,
 }
 
-/// The files of one part. The value with index k stands on line k + 1 of its file.
+/// Values of a file, and the lines that they stand on: some lines may be others' business.
+#[derive(Clone, Debug)]
+pub struct Rows<T> {
+    values: Vec<T>,
+    /// Counted from 1; empty where each value stands on the line of its index.
+    lines: Vec<u32>,
+}
+
+impl<T> Default for Rows<T> {
+    fn default() -> Self {
+        Self { values: Vec::new(), lines: Vec::new() }
+    }
+}
+
+impl<T> Rows<T> {
+    /// The line of the value at `index`, from 1.
+    pub fn line(&self, index: usize) -> usize {
+        self.lines.get(index).map_or(index + 1, |&line| line as usize)
+    }
+}
+
+impl<T> Deref for Rows<T> {
+    type Target = [T];
+
+    fn deref(&self) -> &[T] {
+        &self.values
+    }
+}
+
+impl<'a, T> IntoIterator for &'a Rows<T> {
+    type Item = &'a T;
+    type IntoIter = std::slice::Iter<'a, T>;
+
+    fn into_iter(self) -> Self::IntoIter {
+        self.values.iter()
+    }
+}
+
+/// The files of one part. The value with index k stands on line k + 1 of its file, if its [`Rows`] don't say another.
 #[derive(Clone, Debug)]
 pub struct ElmerPart {
     /// The files' common beginning: `DIR/mesh` or `DIR/partitioning.N/part.K`.
@@ -48,10 +91,14 @@ pub struct ElmerPart {
     pub header: Header,
     /// `.nodes`
     pub nodes: Vec<Node>,
-    /// `.elements`
-    pub elements: Vec<Element>,
-    /// `.boundary`
-    pub boundary: Vec<BoundaryElement>,
+    /// The part's own elements in `.elements`
+    pub elements: Rows<Element>,
+    /// The halo elements there: those of other parts, with the owner's number, from 1.
+    pub halo: Halo,
+    /// The triangles in `.boundary` beside the part's own elements.
+    pub boundary: Rows<BoundaryElement>,
+    /// How many lines of `.boundary` are not read, by type: points and edges, and triangles of halo elements.
+    pub left_out: BTreeMap<u32, u32>,
     /// `.shared`; empty for a serial mesh.
     pub shared: Vec<SharedNode>,
 }
@@ -225,18 +272,83 @@ pub fn stated_elements(dir: &Path) -> Result<u64, ReadError> {
 }
 
 pub(super) fn read_part(stem: PathBuf, partitioned: bool) -> Result<ElmerPart, ReadError> {
-    Ok(ElmerPart {
-        header: read_header(&file(&stem, "header"), partitioned)?,
-        nodes: read_lines(&file(&stem, "nodes"), node)?,
-        elements: read_lines(&file(&stem, "elements"), element)?,
-        boundary: read_lines(&file(&stem, "boundary"), boundary_element)?,
-        shared: if partitioned { read_lines(&file(&stem, "shared"), shared_node)? } else { Vec::new() },
-        stem,
-    })
+    let header = read_header(&file(&stem, "header"), partitioned)?;
+    let nodes = read_lines(&file(&stem, "nodes"), header.nodes, node)?;
+    let (elements, halo) = read_elements(&file(&stem, "elements"), header.elements)?;
+    let lines = read_lines(&file(&stem, "boundary"), header.boundary, boundary_line)?;
+    let (boundary, left_out) = own_boundary(lines, &elements, &halo);
+    let shared = match header.shared {
+        Some(count) => read_lines(&file(&stem, "shared"), count, shared_node)?,
+        None => Vec::new(),
+    };
+    Ok(ElmerPart { stem, header, nodes, elements, halo, boundary, left_out, shared })
+}
+
+/// The halo elements of a part, with the numbers of their owners.
+pub type Halo = Rows<(Element, u32)>;
+
+/// Reads the part's own elements, and halo elements.
+fn read_elements(path: &Path, expected: u32) -> Result<(Rows<Element>, Halo), ReadError> {
+    let (mut own, mut halo) = (Rows::default(), Rows::default());
+    own.values.reserve_exact(room(path, expected));
+    let mut line = 0;
+    for_each_line(path, element, |elements| {
+        for (element, owner) in elements.drain(..) {
+            line += 1;
+            if owner > 0 {
+                if halo.values.is_empty() {
+                    // Until here each stands on the line of its index.
+                    own.lines.extend(1..line);
+                }
+                halo.values.push((element, owner));
+                halo.lines.push(line);
+            } else {
+                own.values.push(element);
+                if !halo.values.is_empty() {
+                    own.lines.push(line);
+                }
+            }
+        }
+    })?;
+    Ok((own, halo))
+}
+
+/// The triangles beside elements of the part, and how many lines are left out, by type.
+///
+/// Some of ElmerGrid's halos have the boundary elements of halo elements too, with these as parents.
+fn own_boundary(
+    all: Vec<BoundaryLine>,
+    elements: &Rows<Element>,
+    halo: &Halo,
+) -> (Rows<BoundaryElement>, BTreeMap<u32, u32>) {
+    let mut own: Vec<u32> = Vec::new();
+    if !halo.is_empty() {
+        own.extend(elements.iter().map(|element| element.id));
+        own.sort_unstable();
+    }
+    let is_foreign = |parent: &u32| own.binary_search(parent).is_err();
+    let mut left_out = BTreeMap::new();
+    let mut boundary = Rows::default();
+    for (element, line) in all.into_iter().zip(1..) {
+        match element {
+            BoundaryLine::Own(element) => {
+                let parents = element.parents.iter().filter(|parent| **parent != 0);
+                let of_halo = !own.is_empty() && parents.clone().count() > 0 && { parents }.all(is_foreign);
+                if of_halo {
+                    *left_out.entry(TRIANGLE).or_default() += 1;
+                } else {
+                    boundary.values.push(element);
+                    boundary.lines.push(line);
+                }
+            }
+            BoundaryLine::LeftOut(kind) => *left_out.entry(kind).or_default() += 1,
+        }
+    }
+    (boundary, left_out)
 }
 
 fn read_header(path: &Path, partitioned: bool) -> Result<Header, ReadError> {
-    let lines = read_lines(path, |line| {
+    let lines = read_lines(path, 0, |line| {
         let mut fields = Fields::new(line);
         let mut numbers = Vec::new();
         while !fields.is_empty() {
@@ -295,27 +407,42 @@ fn ids<const N: usize>(fields: &mut Fields, what: &str) -> Result<[u32; N], Stri
     Ok(ids)
 }
 
-fn element(line: &[u8]) -> Result<Element, String> {
+/// An element, and the part whose halo element it is, or 0.
+fn element(line: &[u8]) -> Result<(Element, u32), String> {
     refuse_what_elmer_cuts(line)?;
     let mut fields = Fields::new(line);
-    let id = fields.int("element (halo elements, ID/PART, are not read)")?;
+    let (id, owner) = fields.int_and_part("element")?;
     let body = fields.int("body")?;
-    fields.expect("element type", &TET.to_string())?;
+    fields.expect("element type", TET)?;
     let nodes = ids(&mut fields, "node")?;
     fields.end()?;
-    Ok(Element { id, body, nodes })
+    Ok((Element { id, body, nodes }, owner.unwrap_or(0)))
 }
 
-fn boundary_element(line: &[u8]) -> Result<BoundaryElement, String> {
+/// A line of `.boundary`.
+enum BoundaryLine {
+    Own(BoundaryElement),
+    /// Of this type: a point or edge, or a triangle of a halo element.
+    LeftOut(u32),
+}
+
+fn boundary_line(line: &[u8]) -> Result<BoundaryLine, String> {
     refuse_what_elmer_cuts(line)?;
     let mut fields = Fields::new(line);
-    let id = fields.int("boundary element")?;
+    let (id, owner) = fields.int_and_part("boundary element")?;
     let boundary = fields.int("boundary number")?;
     let parents = ids(&mut fields, "parent")?;
-    fields.expect("element type", &TRIANGLE.to_string())?;
+    let kind = fields.int("element type")?;
+    if POINTS_AND_EDGES.contains(&kind) {
+        return Ok(BoundaryLine::LeftOut(kind));
+    }
+    if kind != TRIANGLE {
+        return Err(format!("the element type is '{kind}'; only {TRIANGLE} is read here"));
+    }
     let nodes = ids(&mut fields, "node")?;
     fields.end()?;
-    Ok(BoundaryElement { id, boundary, parents, nodes })
+    let element = BoundaryElement { id, boundary, parents, nodes };
+    Ok(if owner.is_some() { BoundaryLine::LeftOut(kind) } else { BoundaryLine::Own(element) })
 }
 
 fn shared_node(line: &[u8]) -> Result<SharedNode, String> {

@@ -345,7 +345,11 @@ fn a_line_that_is_no_part_of_a_mesh_is_an_error_with_its_place() {
             word(2, "808"),
             "part.1.elements:2: the element type is '808'; only 504 is read here",
         ),
-        ("part.1.elements", word(0, "2/1"), "part.1.elements:2: the element (halo elements"),
+        (
+            "part.1.elements",
+            word(0, "2/x"),
+            "part.1.elements:2: the part behind the slash is no whole number",
+        ),
     ] {
         let found = message(file, &change);
         assert!(found.contains(expected), "{found}");

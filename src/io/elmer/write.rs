@@ -1,6 +1,6 @@
 //! Writing Elmer's files.
 
-use super::number::{Numbering, number};
+use super::number::{Numbering, number, watchers};
 use super::periodic::{self, periodic_text};
 use super::{MAX_ID, MAX_LINE, TET, TRIANGLE};
 use crate::comm::Communicator;
@@ -8,8 +8,10 @@ use crate::io::lines::{self, FLUSH_AT};
 use crate::io::output::{Output, write_text, write_together};
 use crate::io::text::{Line, digits};
 use crate::io::{WriteError, Written, agree, sum_written};
-use crate::mesh::stream::{Counts, MeshStream, NO_TET};
-use crate::mesh::{Names, Rank};
+use crate::mesh::ghosts::Ghosts;
+use crate::mesh::stream::{Counts, MeshStream, NO_TET, vertex_block_of};
+use crate::mesh::{Names, Rank, TET_FACES};
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
@@ -20,6 +22,9 @@ const MEAN_FLOAT: u64 = 19;
 /// (hard links, where the disk has them). Each rank gets the sums over all ranks.
 ///
 /// Ids in the files are Elmer's own: from 1, those that a part owns without a gap. The canonical ids are in VTU.
+///
+/// Ghosts are written as ElmerGrid writes its halos: elements `ID/OWNER`, their nodes, and these in `.shared` with all parts that have
+/// them, those that have a node in halo elements only behind the others. Boundary elements are those of a part's own elements.
 ///
 /// # Errors
 /// Before anything is written: more ids than 2³¹−1, a `.shared` line that Elmer would cut, a part without tets,
@@ -88,14 +93,30 @@ fn check_shared_lines(part: &dyn MeshStream, numbering: &Numbering) -> Result<()
     for index in 0..part.vertex_blocks() {
         let block = part.vertex_block(index);
         let Some(last) = block.local.end.checked_sub(1).filter(|_| !block.local.is_empty()) else { continue };
-        let parts: usize = block.holders.iter().map(|&rank| 1 + digits(u64::from(rank) + 1)).sum();
-        let count = block.holders.len();
         let longest = block.local.map(|v| numbering.vertices[v as usize]).max().unwrap_or(0);
-        let characters = digits(longest.into()) + 1 + digits(count as u64) + parts;
-        if characters > MAX_LINE.0 || 2 + count > MAX_LINE.1 {
-            let vertex = numbering.vertices[last as usize].into();
-            return Err(WriteError::SharedLine { vertex, parts: count, characters });
-        }
+        check_shared_line(block.holders, &[], longest, numbering.vertices[last as usize])?;
+    }
+    let Some(ghosts) = part.ghosts() else { return Ok(()) };
+    for (k, &local) in ghosts.watched.iter().enumerate() {
+        let block = part.vertex_block(vertex_block_of(part, local));
+        let number = numbering.vertices[local as usize];
+        check_shared_line(block.holders, ghosts.watchers.get(k), number, number)?;
+    }
+    Ok(())
+}
+
+/// Refuses a line with these ranks that would be too long; `longest` is the largest number that it may begin with.
+fn check_shared_line(
+    holders: &[Rank],
+    watchers: &[Rank],
+    longest: u32,
+    vertex: u32,
+) -> Result<(), WriteError> {
+    let count = holders.len() + watchers.len();
+    let parts: usize = holders.iter().chain(watchers).map(|&rank| 1 + digits(u64::from(rank) + 1)).sum();
+    let characters = digits(longest.into()) + 1 + digits(count as u64) + parts;
+    if characters > MAX_LINE.0 || 2 + count > MAX_LINE.1 {
+        return Err(WriteError::SharedLine { vertex: vertex.into(), parts: count, characters });
     }
     Ok(())
 }
@@ -160,7 +181,11 @@ fn write_elements(
 ) -> Result<u64, WriteError> {
     let mut file = Output::create(path)?;
     lines::tets(part, names, &mut file, |line, tet| {
-        line.int(numbering.first_tet + tet.index).blank().int(tet.number).blank().int(TET.into());
+        line.int(numbering.tet(tet.index));
+        if let Some(ghost) = part.ghosts().and_then(|ghosts| ghosts.tet(tet.index)) {
+            line.bytes(b"/").int(u64::from(ghost.owner) + 1);
+        }
+        line.blank().int(tet.number).blank().int(TET.into());
         ids(line, numbering, tet.vertices);
     })?;
     file.finish()
@@ -173,14 +198,34 @@ fn write_boundary(
     path: &Path,
 ) -> Result<u64, WriteError> {
     let mut file = Output::create(path)?;
+    let behind_cuts = part.ghosts().map(ghost_faces).unwrap_or_default();
     lines::triangles(part, names, &mut file, |line, triangle| {
         line.int(triangle.index + 1).blank().int(triangle.number);
-        // A parent that is here goes first: solvers look there for the body of the boundary.
-        let here = triangle.parents.iter().filter(|&&tet| tet != NO_TET).map(|tet| numbering.first_tet + tet);
-        here.chain([0, 0]).take(2).for_each(|parent| _ = line.blank().int(parent));
+        // A parent that is here goes first: solvers look there for the body of the boundary. A ghost beside it comes second.
+        let here = triangle.parents.iter().filter(|&&tet| tet != NO_TET).map(|&tet| numbering.tet(tet));
+        let ghost = behind_cuts.get(&ascending(*triangle.vertices)).map(|&tet| numbering.tet(tet));
+        here.chain(ghost).chain([0, 0]).take(2).for_each(|parent| _ = line.blank().int(parent));
         ids(line.blank().int(TRIANGLE.into()), numbering, triangle.vertices);
     })?;
     file.finish()
+}
+
+fn ascending(mut face: [u32; 3]) -> [u32; 3] {
+    face.sort_unstable();
+    face
+}
+
+/// The faces of ghost tets whose vertices are all shared with the part, ascending, and the tets that have them.
+fn ghost_faces(ghosts: &Ghosts) -> BTreeMap<[u32; 3], u64> {
+    let mut faces = BTreeMap::new();
+    for (tet, index) in ghosts.tets.iter().zip(ghosts.first_tet..) {
+        for face in TET_FACES.map(|face| face.map(|k| tet.vertices[k])) {
+            if face.iter().all(|&vertex| vertex < ghosts.first_vertex) {
+                faces.insert(ascending(face), index);
+            }
+        }
+    }
+    faces
 }
 
 /// Appends the numbers of vertices.
@@ -194,12 +239,22 @@ fn write_shared(part: &dyn MeshStream, numbering: &Numbering, path: &Path) -> Re
     let mut text = Vec::new();
     for index in 0..part.vertex_blocks() {
         let block = part.vertex_block(index);
-        for (local, id) in block.local.clone().zip(block.first_id..).filter(|_| !block.holders.is_empty()) {
+        if block.holders.is_empty() && part.ghosts().is_none() {
+            continue;
+        }
+        for (local, id) in block.local.clone().zip(block.ids()) {
+            let watchers = watchers(part, local);
+            let others = block.holders.len() + watchers.len();
+            if others == 0 {
+                continue;
+            }
             let owner = block.owner(id, part.rank());
-            line.int(numbering.vertices[local as usize].into()).blank().int(block.holders.len() as u64);
+            // Of a vertex that others only watch no holders are listed: there is this one.
+            let count = others + usize::from(block.holders.is_empty());
+            line.int(numbering.vertices[local as usize].into()).blank().int(count as u64);
             line.blank().int(u64::from(owner) + 1);
-            for &holder in block.holders.iter().filter(|&&holder| holder != owner) {
-                line.blank().int(u64::from(holder) + 1);
+            for &other in block.holders.iter().filter(|&&holder| holder != owner).chain(watchers) {
+                line.blank().int(u64::from(other) + 1);
             }
             line.end(&mut text);
         }

@@ -1,7 +1,7 @@
 //! VTK's XML files of unstructured grids with one piece: tets, and triangles on their boundary.
 //!
 //! Arrays may be text, base64 (inline or appended) or raw, and compressed by zlib. Bodies and boundaries are told by
-//! the first known array of cells, see [`LABELS`]. Our own files keep the boundary in a second one, `STEM.boundary.vtu`,
+//! the first known array of cells, see [`LABELS`]. Cells that `vtkGhostType` calls copies are left out. Our own files keep the boundary in a second one, `STEM.boundary.vtu`,
 //! which is read with the first.
 
 use super::raw::{Label, Raw, Shape};
@@ -56,6 +56,10 @@ fn parse(content: &[u8]) -> Result<Grid, Fault> {
     if labels.as_ref().is_some_and(|labels| labels.len() != types.len()) {
         return Err(Fault::file("the numbers of bodies are not as many as the cells"));
     }
+    let copies =
+        document.array(Section::CellData, Some("vtkGhostType")).map(|array| array.ints()).transpose()?;
+    let is_copy =
+        |cell: usize| copies.as_ref().and_then(|copies| copies.get(cell)).is_some_and(|c| c & 1 == 1);
     let mut raw =
         Raw { points: points.iter().map(|p| p.map(|x| x + 0.0).into()).collect(), ..Raw::default() };
     let mut nodes = Vec::new();
@@ -64,6 +68,10 @@ fn parse(content: &[u8]) -> Result<Grid, Fault> {
         let vertices = usize::try_from(end).ok().and_then(|end| connectivity.get(begin..end));
         let vertices =
             vertices.ok_or_else(|| Fault::file(format!("the offset {end} of cell {cell} is wrong")))?;
+        begin = end as usize;
+        if is_copy(cell) {
+            continue;
+        }
         nodes.clear();
         for &vertex in vertices {
             let index = u32::try_from(vertex).ok().filter(|&v| (v as usize) < points.len());
@@ -77,7 +85,6 @@ fn parse(content: &[u8]) -> Result<Grid, Fault> {
         let label = Label::number(labels.as_ref().map_or(0, |labels| labels[cell]));
         raw.add(shape(kind), &nodes, label)
             .map_err(|message| Fault::file(format!("cell {cell} is {message}")))?;
-        begin = end as usize;
     }
     let ids = document.array(Section::PointData, Some("GlobalNodeId"));
     let vertex_ids = ids.map(|array| array.ints()).transpose()?.unwrap_or_default();

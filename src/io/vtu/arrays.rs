@@ -194,18 +194,35 @@ pub(super) struct PieceFile<'a> {
 }
 
 impl PieceFile<'_> {
-    /// The array of this name, ready to be written from its beginning.
+    /// The array of this name, ready to be written from its beginning. Where points and cells have one each, that of the points.
     pub fn array(&self, name: &str) -> Result<(Output, Kind), WriteError> {
+        self.array_where(|array| array.name == name)
+    }
+
+    /// The array of cells of this name, ready to be written from its beginning.
+    pub fn cell_array(&self, name: &str) -> Result<(Output, Kind), WriteError> {
+        self.array_where(|array| array.section == Section::CellData && array.name == name)
+    }
+
+    fn array_where(&self, wanted: impl Fn(&Array) -> bool) -> Result<(Output, Kind), WriteError> {
         let arrays = &self.piece.arrays;
-        let place = arrays.iter().position(|array| array.name == name).expect("an array of the piece");
+        let place = arrays.iter().position(wanted).expect("an array of the piece");
         let before: u64 = arrays[..place].iter().map(|array| LENGTH + array.bytes()).sum();
         Ok((Output::at(&self.path, self.head + before + LENGTH)?, arrays[place].kind))
     }
 
     /// Fills an array with one number per cell.
     pub fn fill(&self, name: &str, number: impl Fn(u64) -> u64 + Sync) -> Result<(), WriteError> {
+        self.fill_array(self.array(name)?, number)
+    }
+
+    /// Fills an array with one number per cell.
+    pub fn fill_array(
+        &self,
+        (mut file, kind): (Output, Kind),
+        number: impl Fn(u64) -> u64 + Sync,
+    ) -> Result<(), WriteError> {
         const PER_CHUNK: u64 = 1 << 16;
-        let (mut file, kind) = self.array(name)?;
         let cells = self.piece.cells as usize;
         let (chunks, per_chunk) = split(cells, cells as u64, PER_CHUNK);
         write_chunks([&mut file], chunks, |chunk, [bytes]| {

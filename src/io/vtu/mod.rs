@@ -7,7 +7,7 @@
 //!
 //! points   GlobalNodeId  vtkGhostType (several parts only: 1 on all copies but the owner's)
 //!          PeriodicId (periodic faces only: the global id of the vertex that this one is an image of, else its own)
-//! tets     GlobalElementId  BodyId  PartitionId
+//! tets     GlobalElementId  BodyId  PartitionId  vtkGhostType (with a halo only: 1 on ghosts, whose PartitionId is their owner's)
 //! triangles                 BoundaryId  PartitionId  vtkGhostType (1 on the second copy of an interface triangle)
 //! fields   one for each name, `Body NAME` or `Boundary NAME`: the numbers that have it
 //! ```
@@ -66,8 +66,11 @@ pub fn write(
         written.bytes += volume::write(&tets, part, names, &stage.join(tets_path))?;
         written.bytes += surface.write(&triangles, part, names, &stage.join(triangles_path))?;
         if part.ranks() > 1 && part.rank() == 0 {
-            for (piece, end, kind) in [(&tets, "", "part"), (&triangles, ".boundary", "boundary")] {
-                let text = list_of_pieces(piece, part.ranks(), name, kind);
+            let layers = u32::from(part.ghosts().is_some());
+            for (piece, end, kind, layers) in
+                [(&tets, "", "part", layers), (&triangles, ".boundary", "boundary", 0)]
+            {
+                let text = list_of_pieces(piece, part.ranks(), name, kind, layers);
                 let bytes = write_text(&stage.join(format!("{name}{end}.pvtu")), text.as_bytes())?;
                 written += Written { files: 1, bytes };
             }
@@ -99,9 +102,10 @@ fn is_part_file(name: &str) -> bool {
     number.is_some_and(|number| number.bytes().all(|b| b.is_ascii_digit()))
 }
 
-/// The `.pvtu`: the arrays of each piece, without data, and where the pieces are.
-fn list_of_pieces(piece: &Piece, parts: u32, name: &str, kind: &str) -> String {
-    let mut text = arrays::file_tag("PUnstructuredGrid") + " <PUnstructuredGrid GhostLevel=\"0\">\n";
+/// The `.pvtu`: the arrays of each piece, without data, how many layers of ghosts they have, and where the pieces are.
+fn list_of_pieces(piece: &Piece, parts: u32, name: &str, kind: &str, layers: u32) -> String {
+    let head = format!(" <PUnstructuredGrid GhostLevel=\"{layers}\">\n");
+    let mut text = arrays::file_tag("PUnstructuredGrid") + &head;
     piece.for_each_section(|section, attributes, arrays| {
         // What the cells are made of is each piece's own affair.
         if section != "Cells" {

@@ -42,7 +42,10 @@ fn arrays(path: &Path) -> BTreeMap<String, Vec<f64>> {
             "Float64" => values.as_chunks().0.iter().map(|&b| f64::from_le_bytes(b)).collect(),
             other => panic!("{other}"),
         };
-        arrays.insert(attribute(tag, "Name").to_string(), numbers);
+        let name = attribute(tag, "Name").to_string();
+        // Points and cells may both have one of this name.
+        let name = if arrays.contains_key(&name) { format!("{name} of cells") } else { name };
+        arrays.insert(name, numbers);
     }
     assert_eq!(&bytes[data + end..], b"\n </AppendedData>\n</VTKFile>\n");
     let piece = head.split('<').find(|tag| tag.starts_with("Piece")).unwrap();
@@ -135,4 +138,40 @@ fn the_pieces_of_a_cube_make_the_cube() {
         assert!(list.contains(&format!("<Piece Source=\"a&amp;b.parts/part.{ranks}.vtu\"/>")), "{list}");
         assert!(list.contains("<PDataArray type=\"UInt8\" Name=\"vtkGhostType\"/>"), "{list}");
     }
+}
+
+#[test]
+fn ghosts_are_told_from_the_tets_of_a_part_and_name_their_owner() {
+    let dir = tempfile::tempdir().unwrap();
+    let mesh = two_tets();
+    together(2, |comm| {
+        let part = PlainPart::part(&mesh, &[0, 1], 2, comm.rank());
+        let ghosts = crate::halo::halo(comm, &part, crate::halo::By::Faces).unwrap();
+        write(comm, &crate::halo::WithHalo::new(&part, &ghosts), &names(), &dir.path().join("m")).unwrap();
+    });
+    // Vertices 1 and 3 are rank 1's, 2 is rank 0's.
+    for (part, ids, copies) in
+        [(1, [0., 1., 2., 3., 4.], [0., 1., 0., 1., 1.]), (2, [1., 2., 3., 4., 0.], [0., 1., 0., 0., 1.])]
+    {
+        let tets = arrays(&dir.path().join(format!("m.parts/part.{part}.vtu")));
+        assert_eq!(tets["GlobalNodeId"], ids);
+        assert_eq!(tets["vtkGhostType"], copies);
+        assert_eq!(tets["vtkGhostType of cells"], [0., 1.]);
+        let (own, other) = (f64::from(part), f64::from(3 - part));
+        assert_eq!(tets["PartitionId"], [own, other]);
+        assert_eq!(tets["GlobalElementId"], [own - 1., other - 1.]);
+        let by_id = |tet: usize| {
+            let mut corners = tets["connectivity"][4 * tet..][..4].to_vec();
+            corners.iter_mut().for_each(|v| *v = ids[*v as usize]);
+            corners
+        };
+        for tet in [0, 1] {
+            let expected = mesh.tets[tets["GlobalElementId"][tet] as usize].map(|v| f64::from(v.0));
+            assert_eq!(by_id(tet), expected);
+        }
+        let triangles = arrays(&dir.path().join(format!("m.parts/boundary.{part}.vtu")));
+        assert_eq!(triangles["PartitionId"], [own; 3]);
+    }
+    let list = fs::read_to_string(dir.path().join("m.pvtu")).unwrap();
+    assert!(list.contains("GhostLevel=\"1\""), "{list}");
 }

@@ -9,6 +9,8 @@ use std::path::Path;
 
 /// VTK's number for a tet.
 const VTK_TETRA: u64 = 10;
+/// VTK's name for what tells copies (1) from originals (0), of points as of cells.
+const GHOST_TYPE: &str = "vtkGhostType";
 /// Tets or vertices that one thread turns to bytes at a time.
 const PER_CHUNK: u64 = 1 << 14;
 
@@ -18,7 +20,7 @@ pub(super) fn piece(part: &dyn MeshStream) -> Piece {
     let mut piece = Piece::new(counts.vertices, counts.tets, 4);
     piece.add(Section::PointData, "GlobalNodeId", Kind::I64, counts.vertices);
     if part.ranks() > 1 {
-        piece.add(Section::PointData, "vtkGhostType", Kind::U8, counts.vertices);
+        piece.add(Section::PointData, GHOST_TYPE, Kind::U8, counts.vertices);
     }
     if !part.links().is_empty() {
         piece.add(Section::PointData, "PeriodicId", Kind::I64, counts.vertices);
@@ -26,6 +28,9 @@ pub(super) fn piece(part: &dyn MeshStream) -> Piece {
     piece.add(Section::CellData, "GlobalElementId", Kind::I64, counts.tets);
     piece.add(Section::CellData, "BodyId", Kind::I32, counts.tets);
     piece.add(Section::CellData, "PartitionId", Kind::I32, counts.tets);
+    if part.ghosts().is_some() {
+        piece.add(Section::CellData, GHOST_TYPE, Kind::U8, counts.tets);
+    }
     piece.attributes = vec![
         (Section::PointData, " GlobalIds=\"GlobalNodeId\""),
         (Section::CellData, " GlobalIds=\"GlobalElementId\""),
@@ -67,7 +72,12 @@ pub(super) fn write(
         Ok(())
     })?;
     file.fill_cells(4, VTK_TETRA)?;
-    file.fill("PartitionId", |_| u64::from(part.rank()) + 1)?;
+    let ghost = |tet: u64| part.ghosts().and_then(|ghosts| ghosts.tet(tet));
+    let owner = |tet: u64| ghost(tet).map_or(part.rank(), |ghost| ghost.owner);
+    file.fill("PartitionId", |tet| u64::from(owner(tet)) + 1)?;
+    if part.ghosts().is_some() {
+        file.fill_array(file.cell_array(GHOST_TYPE)?, |tet| u64::from(ghost(tet).is_some()))?;
+    }
 
     let (chunks, per_chunk) = (vertex_chunks, vertices_per_chunk);
     write_chunks([&mut file.array("GlobalNodeId")?.0], chunks, |chunk, [ids]| {
@@ -80,7 +90,7 @@ pub(super) fn write(
         write_periodic_ids(&file, part)?;
     }
     if part.ranks() > 1 {
-        write_chunks([&mut file.array("vtkGhostType")?.0], chunks, |chunk, [ghosts]| {
+        write_chunks([&mut file.array(GHOST_TYPE)?.0], chunks, |chunk, [ghosts]| {
             for index in items(chunk, per_chunk, blocks) {
                 let block = part.vertex_block(index);
                 let copy = |global| block.owner(global, part.rank()) != part.rank();

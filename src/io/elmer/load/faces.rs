@@ -87,7 +87,8 @@ pub(super) fn find_boundary(
     let mut patches: Vec<(FaceId, Patch, [Option<TetId>; 2])> = Vec::new();
     let mut bare_faces = 0;
     for (face, (tets, own_said)) in (0..).zip(beside.iter().zip(&said)) {
-        let other = others.get(&face);
+        // Only a face with one tet here may have one elsewhere; nearly all have two.
+        let other = if tets[1] == NONE { others.get(&face) } else { None };
         if own_said.number > 0 || other.is_some_and(|word| word[5] > 0) {
             let (patch, parents) = sides(mesh, *tets, *own_said, other);
             patches.push((FaceId(face), patch, parents));
@@ -161,11 +162,13 @@ fn tets_beside(own: &OwnParts, of_tet: &[TetPlace], mesh: &DistMesh) -> Result<V
         let what = format!("elements {:?} have a face in common", ids(&tets));
         own.element_fault(FaultKind::CrowdedFace, of_tet[tets[2] as usize], what)
     })?;
-    for (face, tets) in (0..).zip(&beside).filter(|(_, tets)| tets[1] != NONE) {
-        if mesh.shared_faces.holders_of(face).is_some() {
+    for tets in mesh.shared_faces.ids.iter().map(|&face| &beside[face as usize]) {
+        if tets[1] != NONE {
             let what = format!("elements {:?} and one of another part have a face in common", ids(tets));
             return Err(own.element_fault(FaultKind::CrowdedFace, of_tet[tets[1] as usize], what));
         }
+    }
+    for (face, tets) in (0..).zip(&beside).filter(|(_, tets)| tets[1] != NONE) {
         if turned(mesh, tets[0], face) == turned(mesh, tets[1], face) {
             let what = format!("elements {:?}", ids(tets));
             return Err(own.element_fault(FaultKind::Overlap, of_tet[tets[1] as usize], what));
@@ -201,7 +204,8 @@ fn lay(
     let mut given: Vec<Given> = Vec::new();
     for (part, of_part) in (0u32..).zip(&own.list) {
         for (place, element) in (0..).zip(&of_part.files.boundary) {
-            let error = |kind, what| Err(fault(kind, of_part.files.file("boundary"), place as usize, what));
+            let line = || of_part.files.boundary.line(place as usize);
+            let error = |kind, what| Err(fault(kind, of_part.files.file("boundary"), line(), what));
             let vertices =
                 element.nodes.map(|id| local[part as usize][of_part.nodes.find(id).expect("checked before")]);
             let mut key = vertices;
@@ -230,13 +234,14 @@ fn lay(
     for of_face in given.chunk_by(|a, b| a.face == b.face) {
         for pair in of_face.windows(2) {
             let (before, here) = (element(&pair[0]), element(&pair[1]));
-            let file = own.list[pair[1].part as usize].files.file("boundary");
+            let files = &own.list[pair[1].part as usize].files;
+            let (file, line) = (files.file("boundary"), files.boundary.line(pair[1].place as usize));
             let what = format!("boundary elements {} and {}", before.id, here.id);
             if pair[0].part == pair[1].part {
-                return Err(fault(FaultKind::BoundaryTwice, file, pair[1].place as usize, what));
+                return Err(fault(FaultKind::BoundaryTwice, file, line, what));
             }
             if before.boundary != here.boundary {
-                return Err(fault(FaultKind::NumbersDiffer, file, pair[1].place as usize, what));
+                return Err(fault(FaultKind::NumbersDiffer, file, line, what));
             }
         }
         let face = of_face[0].face;

@@ -64,11 +64,19 @@ enum Complaint {
     CopiesDiffer,
     /// An element is in another part too.
     ElementTwice,
+    /// The first listed, or the only part with the node, has it in halo elements only.
+    OwnerWatches,
 }
 
 impl Complaint {
-    const ALL: [Self; 5] =
-        [Self::NotShared, Self::WrongHolders, Self::OwnersDiffer, Self::CopiesDiffer, Self::ElementTwice];
+    const ALL: [Self; 6] = [
+        Self::NotShared,
+        Self::WrongHolders,
+        Self::OwnersDiffer,
+        Self::CopiesDiffer,
+        Self::ElementTwice,
+        Self::OwnerWatches,
+    ];
 }
 
 /// **Collective.** New ids and holders.
@@ -107,7 +115,9 @@ fn question(part: &OwnPart, number: u32, home: Rank, homes: [Homes; 2]) -> Optio
     let mut previous = 0;
     for (&(_, place), line) in nodes.iter().zip(shared) {
         let node = &part.files.nodes[place as usize];
-        put_varint(&mut message, u64::from(node.id - previous) << 1 | u64::from(line.is_some()));
+        let watched = !part.nodes.holds(place as usize);
+        let bits = u64::from(watched) << 1 | u64::from(line.is_some());
+        put_varint(&mut message, u64::from(node.id - previous) << 2 | bits);
         previous = node.id;
         if let &Some(line) = line {
             message.extend_from_slice(bytemuck::cast_slice(node.point.coords.as_slice()));
@@ -148,6 +158,8 @@ struct Copy {
     id: u64,
     /// Which letter.
     letter: usize,
+    /// Whether halo elements alone have it there.
+    watched: bool,
     /// Where it stands among what is told of shared nodes.
     said: Option<usize>,
 }
@@ -185,18 +197,21 @@ impl Judged {
             let rest = &mut &message[..];
             let part = take_varint(rest) as u32 + 1;
             let mut id = 0;
-            for _ in 0..take_varint(rest) {
+            let count = take_varint(rest);
+            copies.reserve(count as usize);
+            let nodes = Vec::with_capacity(count as usize);
+            for _ in 0..count {
                 let code = take_varint(rest);
-                id += code >> 1;
-                let is_said = code & 1 == 1;
-                copies.push(Copy { id, letter, said: is_said.then_some(said.len()) });
+                id += code >> 2;
+                let (watched, is_said) = (code & 2 == 2, code & 1 == 1);
+                copies.push(Copy { id, letter, watched, said: is_said.then_some(said.len()) });
                 if is_said {
                     said.push(Said::take(rest));
                 }
             }
             let count = take_varint(rest) as usize;
             elements.extend(take_ascending(rest, count).map(|id| (id, letter)));
-            let (nodes, elements) = (Vec::new(), Vec::new());
+            let elements = Vec::with_capacity(count);
             letters.push(Letter { from: *from, part, complaint: None, nodes, elements });
         }
         // Stable, and letters come by ascending part: so do the copies of a node.
@@ -222,13 +237,23 @@ impl Judged {
     }
 
     fn judge_node(&mut self, copies: &[Copy], said: &[Said], parts: u32, ranks: u32) {
-        let holders: Vec<u32> = copies.iter().map(|copy| self.letters[copy.letter].part).collect();
+        // Nearly all nodes.
+        if let [Copy { letter, watched: false, said: None, .. }] = copies {
+            self.letters[*letter].nodes.push((self.counts[0], Vec::new()));
+            self.counts[0] += 1;
+            return;
+        }
+        let part = |copy: &Copy| self.letters[copy.letter].part;
+        let holders: Vec<u32> = copies.iter().map(part).collect();
+        let held: Vec<u32> = copies.iter().filter(|copy| !copy.watched).map(part).collect();
         let first = copies[0].said.map(|k| &said[k]);
         for (copy, &part) in copies.iter().zip(&holders) {
             let other = holders.iter().copied().find(|&holder| holder != part).unwrap_or(part);
             let Some(own) = copy.said.map(|k| &said[k]) else {
                 if copies.len() > 1 {
                     self.complain(copy.letter, Complaint::NotShared, copy.id, other);
+                } else if copy.watched {
+                    self.complain(copy.letter, Complaint::OwnerWatches, copy.id, part);
                 }
                 continue;
             };
@@ -236,6 +261,9 @@ impl Judged {
             listed.sort_unstable();
             if listed != holders {
                 self.complain(copy.letter, Complaint::WrongHolders, copy.id, other);
+            }
+            if !held.contains(&own.parts[0]) {
+                self.complain(copy.letter, Complaint::OwnerWatches, copy.id, own.parts[0]);
             }
             let Some(first) = first else { continue };
             if own.parts[0] != first.parts[0] {
@@ -245,7 +273,7 @@ impl Judged {
                 self.complain(copy.letter, Complaint::CopiesDiffer, copy.id, holders[0]);
             }
         }
-        let mut on: Vec<Rank> = holders.iter().map(|part| reader(part - 1, parts, ranks)).collect();
+        let mut on: Vec<Rank> = held.iter().map(|part| reader(part - 1, parts, ranks)).collect();
         on.dedup();
         if on.len() == 1 {
             on.clear();
@@ -319,8 +347,8 @@ fn hear(
                 node += take_varint(rest);
                 settled.nodes[number as usize][place as usize] = node;
                 let count = take_varint(rest) as usize;
-                if count > 0 {
-                    let holders = take_ascending(rest, count).map(|rank| rank as Rank).collect();
+                let holders: Vec<Rank> = take_ascending(rest, count).map(|rank| rank as Rank).collect();
+                if part.nodes.holds(place as usize) && count > 0 {
                     settled.holders.push((node, holders));
                 }
             }
@@ -361,9 +389,14 @@ fn located(part: &OwnPart, complaint: Complaint, id: u32, other: u64) -> ReadErr
         }
         Complaint::ElementTwice => {
             let place = files.elements.iter().position(|element| element.id == id).unwrap_or(0);
+            let line = files.elements.line(place);
             let what = format!("element {id} is in part {other} too");
-            (FaultKind::ElementTwice, "elements", place, what)
+            (FaultKind::ElementTwice, "elements", line - 1, what)
+        }
+        Complaint::OwnerWatches => {
+            let what = format!("node {id}, part {other}");
+            (FaultKind::OwnerWatches, "nodes", node(), what)
         }
     };
-    fault(kind, files.file(file), place, what)
+    fault(kind, files.file(file), place + 1, what)
 }

@@ -8,7 +8,8 @@
 //!     faces           what lies beside each face; boundary numbers to patches
 //! ```
 //! No rank sees the whole mesh. What is read is judged as strictly as by [`check_elmer`](super::check_elmer), but for faces without
-//! boundary element, which other programs leave out and which are kept as they are; the first fault ends the reading on all ranks, with file and line.
+//! boundary element, which other programs leave out and which are kept as they are, and for halo elements, which are left out with the
+//! nodes that only they have; the first fault ends the reading on all ranks, with file and line.
 //!
 //! There are no curves, and a patch is what has one boundary number between the same bodies: to refine such a mesh is to refine it flat.
 
@@ -78,9 +79,9 @@ impl From<Agreed<ReadError>> for LoadError {
     }
 }
 
-/// A fault as an error: it ends the reading.
-fn fault(kind: FaultKind, path: PathBuf, place: usize, what: String) -> ReadError {
-    ReadError::Line { path, line: place as u64 + 1, message: format!("{kind}: {what}") }
+/// A fault as an error, with the line from 1: it ends the reading.
+fn fault(kind: FaultKind, path: PathBuf, line: usize, what: String) -> ReadError {
+    ReadError::Line { path, line: line as u64, message: format!("{kind}: {what}") }
 }
 
 /// **Collective.** Reads the only partition in `dir` (or `dir` itself, if it is a `partitioning.M`), else `mesh.*` there: on as many ranks as
@@ -107,6 +108,18 @@ pub fn load(comm: &dyn Communicator, dir: &Path) -> Result<Loaded, LoadError> {
     }
     if found.bare_faces > 0 {
         notes.push(format!("{} outer faces have no boundary element, and get none", found.bare_faces));
+    }
+    let left_out = |kind: fn(u32) -> bool| -> u64 {
+        let lines = own.files().flat_map(|files| &files.left_out);
+        lines.filter(|(code, _)| kind(**code)).map(|(_, &count)| u64::from(count)).sum()
+    };
+    let halo: u64 = own.files().map(|files| files.halo.len() as u64).sum();
+    let [halo, lesser] = comm.all_reduce_sum_u64([halo, left_out(|code| code != super::TRIANGLE)])?;
+    if halo > 0 {
+        notes.push(format!("{halo} halo elements left out"));
+    }
+    if lesser > 0 {
+        notes.push(format!("{lesser} boundary elements that are points or edges left out"));
     }
     let has_pairs = u64::from(comm.rank() == 0 && folder.join(periodic::NAME).exists());
     if comm.all_reduce_max_u64([has_pairs])? == [1] {

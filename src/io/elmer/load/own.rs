@@ -111,14 +111,14 @@ impl OwnParts {
         };
         let points: Vec<Point> = vertices.iter().map(point).collect();
         let tet = |&(_, at): &(GlobalId, TetPlace)| self.positive(at, &local, &points);
-        let tets: Vec<Result<([VertexId; 4], bool), ReadError>> = of_tet.par_iter().map(tet).collect();
-        let mut turned = 0;
-        let mut positive = Vec::with_capacity(tets.len());
-        for tet in tets {
-            let (tet, was_turned) = tet?;
-            turned += u64::from(was_turned);
-            positive.push(tet);
+        let (mut positive, mut signs) = (Vec::new(), Vec::new());
+        of_tet.par_iter().map(tet).unzip_into_vecs(&mut positive, &mut signs);
+        if let Some(flat) = signs.par_iter().position_first(|sign| *sign == Sign::Zero) {
+            let at = of_tet[flat].1;
+            let what = format!("element {} is flat", self.element(at).id);
+            return Err(self.element_fault(FaultKind::Inverted, at, what));
         }
+        let turned = signs.iter().filter(|sign| **sign == Sign::Negative).count() as u64;
         let mut shared = Shared::default();
         for (id, holders) in ids.holders {
             let v = vertices.binary_search_by_key(&id, |(id, _)| *id).expect("a node of this rank");
@@ -152,14 +152,17 @@ impl OwnParts {
 
     /// A fault of an element.
     pub fn element_fault(&self, kind: FaultKind, at: TetPlace, what: String) -> ReadError {
-        fault(kind, self.list[at.part as usize].files.file("elements"), at.place as usize, what)
+        let files = &self.list[at.part as usize].files;
+        fault(kind, files.file("elements"), files.elements.line(at.place as usize), what)
     }
 
-    /// The vertex of each node, by part and place; and of each vertex, by id, a node that it is.
+    /// The vertex of each node, by part and place; and of each vertex, by id, a node that it is. Nodes of halo elements alone have none.
     fn number_vertices(&self, ids: &[Vec<GlobalId>]) -> (Vec<Vec<VertexId>>, Vec<(GlobalId, TetPlace)>) {
         let mut nodes: Vec<(GlobalId, TetPlace)> = Vec::new();
         for (part, ids) in (0..).zip(ids) {
-            nodes.extend((0..).zip(ids).map(|(place, &id)| (id, TetPlace { part, place })));
+            let held = |place: &u32| self.list[part as usize].nodes.holds(*place as usize);
+            let places = (0..).zip(ids).filter(|(place, _)| held(place));
+            nodes.extend(places.map(|(place, &id)| (id, TetPlace { part, place })));
         }
         nodes.par_sort_unstable();
         let mut local: Vec<Vec<VertexId>> = ids.iter().map(|ids| vec![VertexId(0); ids.len()]).collect();
@@ -172,25 +175,16 @@ impl OwnParts {
         (local, nodes)
     }
 
-    /// The vertices of an element, positively oriented, and whether it was turned round for that.
-    fn positive(
-        &self,
-        at: TetPlace,
-        local: &[Vec<VertexId>],
-        points: &[Point],
-    ) -> Result<([VertexId; 4], bool), ReadError> {
+    /// The vertices of an element, positively oriented, and its orientation in the file.
+    fn positive(&self, at: TetPlace, local: &[Vec<VertexId>], points: &[Point]) -> ([VertexId; 4], Sign) {
         let element = self.element(at);
         let part = at.part as usize;
         let vertex = |id: u32| local[part][self.list[part].nodes.find(id).expect("checked before")];
         let [a, b, c, d] = element.nodes.map(vertex);
         let [p, q, r, s] = [a, b, c, d].map(|v| &points[v.index()]);
         match orient3d(p, q, r, s) {
-            Sign::Positive => Ok(([a, b, c, d], false)),
-            Sign::Negative => Ok(([a, b, d, c], true)),
-            Sign::Zero => {
-                let what = format!("element {} is flat", element.id);
-                Err(self.element_fault(FaultKind::Inverted, at, what))
-            }
+            Sign::Negative => ([a, b, d, c], Sign::Negative),
+            sign => ([a, b, c, d], sign),
         }
     }
 }
@@ -228,8 +222,9 @@ fn sorted_elements(files: &ElmerPart) -> Result<Vec<u32>, ReadError> {
     match places.windows(2).find(|pair| id(&pair[0]) == id(&pair[1])) {
         None => Ok(places),
         Some(pair) => {
-            let what = format!("element {} stands on line {} too", id(&pair[1]), pair[0] + 1);
-            Err(fault(FaultKind::ElementTwice, files.file("elements"), pair[1] as usize, what))
+            let [before, line] = [pair[0], pair[1]].map(|place| files.elements.line(place as usize));
+            let what = format!("element {} stands on line {before} too", id(&pair[1]));
+            Err(fault(FaultKind::ElementTwice, files.file("elements"), line, what))
         }
     }
 }
@@ -237,7 +232,7 @@ fn sorted_elements(files: &ElmerPart) -> Result<Vec<u32>, ReadError> {
 /// For each node by ascending id its line in `.shared`; each line must be of a node of the part, and name the part.
 fn shared_lines(files: &ElmerPart, nodes: &NodeTable, number: u32) -> Result<Vec<Option<u32>>, ReadError> {
     let wrong =
-        |line: usize, what: String| Err(fault(FaultKind::WrongHolders, files.file("shared"), line, what));
+        |line: usize, what: String| Err(fault(FaultKind::WrongHolders, files.file("shared"), line + 1, what));
     let mut by_place = vec![None; files.nodes.len()];
     for (line, shared) in files.shared.iter().enumerate() {
         let Some(place) = nodes.find(shared.id) else {

@@ -1,0 +1,86 @@
+//! Writing a partitioned mesh, and reading it again.
+
+use crate::cli::{Format, Halo, RunOptions};
+use std::path::Path;
+use tetmill::comm::Communicator;
+use tetmill::error::{Failure, Status, agree};
+use tetmill::halo::{self, By, WithHalo};
+use tetmill::io::{self, Written, elmer};
+use tetmill::mesh::Names;
+use tetmill::mesh::stream::MeshStream;
+use tetmill::progress::Progress;
+use tetmill::report::HaloReport;
+
+/// Formats that have no halo refuse before any work is done.
+pub(super) fn refuse_halo(options: &RunOptions) -> Result<(), Failure> {
+    if options.halo.is_some() && options.format.contains(&Format::Geomview) {
+        return Err(Failure::input("--halo: the format geomview has no halo elements; write elmer or vtu"));
+    }
+    Ok(())
+}
+
+/// **Collective.** Writes each format into a folder, with a halo if one is asked for; files of those that do not fill one are called `stem`.
+pub(super) fn write_formats(
+    comm: &dyn Communicator,
+    part: &dyn MeshStream,
+    names: &Names,
+    options: &RunOptions,
+    dir: &Path,
+    stem: &Path,
+) -> Result<(Written, Option<HaloReport>), Failure> {
+    let Some(by) = options.halo else { return Ok((write_all(comm, part, names, options, dir, stem)?, None)) };
+    let by = match by {
+        Halo::Faces => By::Faces,
+        Halo::Vertices => By::Vertices,
+    };
+    let ghosts = halo::halo(comm, part, by)?;
+    let told = HaloReport::new(comm, by, &ghosts)?;
+    let written = write_all(comm, &WithHalo::new(part, &ghosts), names, options, dir, stem)?;
+    Ok((written, Some(told)))
+}
+
+/// **Collective.** Writes a stream in each format.
+fn write_all(
+    comm: &dyn Communicator,
+    part: &dyn MeshStream,
+    names: &Names,
+    options: &RunOptions,
+    dir: &Path,
+    stem: &Path,
+) -> Result<Written, Failure> {
+    let mut written = Written::default();
+    for format in &options.format {
+        written += match format {
+            Format::Elmer => elmer::write(comm, part, names, dir)?,
+            Format::Vtu => io::vtu::write(comm, part, names, stem)?,
+            Format::Geomview => io::geomview::write(comm, part, &io::geomview::Settings::default(), stem)?,
+            Format::None => Written::default(),
+        };
+    }
+    Ok(written)
+}
+
+/// **Collective.** Reads the written Elmer mesh again, if that is asked for.
+pub(super) fn read_back(
+    comm: &dyn Communicator,
+    options: &RunOptions,
+    dir: &Path,
+    progress: &Progress,
+) -> Result<(), Failure> {
+    if !options.check || !options.format.contains(&Format::Elmer) {
+        return Ok(());
+    }
+    let checked = if comm.rank() == 0 { progress.stage("read back", || check_written(dir)) } else { Ok(()) };
+    agree(comm, checked)
+}
+
+/// Reads a written Elmer mesh again.
+fn check_written(dir: &Path) -> Result<(), Failure> {
+    let checked = elmer::check_elmer(dir).map_err(|error| Failure::new(Status::Faults, error))?;
+    match checked.iter().find(|(_, faults)| !faults.is_empty()) {
+        None => Ok(()),
+        Some((layout, faults)) => {
+            Err(Failure::new(Status::Faults, format!("{}: {faults}", layout.folder().display())))
+        }
+    }
+}

@@ -1,0 +1,41 @@
+//! The halo of a partitioned mesh, in numbers.
+
+use super::grouped;
+use crate::comm::{CommError, Communicator};
+use crate::mesh::ghosts::{By, Ghosts};
+use serde::Serialize;
+use std::fmt;
+
+/// The ghosts of all parts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct HaloReport {
+    /// `faces` or `vertices`: what ghosts have in common with tets of the part.
+    pub by: &'static str,
+    /// Ghost tets, summed over the parts.
+    pub tets: u64,
+    /// Vertices that a part has in ghost tets only, summed over the parts.
+    pub vertices: u64,
+}
+
+impl HaloReport {
+    /// **Collective.** Counts the ghosts of all ranks.
+    ///
+    /// # Errors
+    /// If another rank fails.
+    pub fn new(comm: &dyn Communicator, by: By, ghosts: &Ghosts) -> Result<Self, CommError> {
+        let [tets, vertices] =
+            comm.all_reduce_sum_u64([ghosts.tets.len() as u64, ghosts.vertices.len() as u64])?;
+        let by = match by {
+            By::Faces => "faces",
+            By::Vertices => "vertices",
+        };
+        Ok(Self { by, tets, vertices })
+    }
+}
+
+impl fmt::Display for HaloReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (tets, vertices) = (grouped(self.tets), grouped(self.vertices));
+        writeln!(f, "halo       by {}: {tets} ghost tets, {vertices} ghost vertices", self.by)
+    }
+}
