@@ -306,6 +306,7 @@ fn summary(
         partition: PartitionReport::new(&coarse.partition, balance),
         periodic: made.periodic,
         skins: made.refused.clone(),
+        across: made.across,
         evened: made.evened,
         stages: Vec::new(),
         seconds: 0.0,

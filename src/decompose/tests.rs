@@ -228,3 +228,24 @@ fn planes_that_miss_the_geometry_are_refused() {
         assert!(refused.expect_err("one piece for two parts").contains("1 pieces, for 2 parts"));
     }
 }
+
+#[test]
+fn tets_between_cuts_that_nearly_touch_are_improved_across_them() {
+    let whole = Model::Csg(Box::new(model(BAR)));
+    // A slab a tenth as thick as the edges of the mesh.
+    let planes = [1.9, 1.95].map(|x| plane([x, 0.0, 0.0], [1.0, 0.0, 0.0]));
+    let made = thread::run(3, |comm| {
+        let model = (comm.rank() == 0).then_some(&whole);
+        let made = generate(comm, model, &settings(planes.to_vec()), &Progress::new(true, 9));
+        let made = made.map_err(|error| error.to_string())?;
+        Ok::<_, String>((made.check.faults, made.checksum.open, made.check.volume, made.across))
+    });
+    for made in made.expect("no rank fails") {
+        let (faults, open, volume, across) = made.expect("a mesh");
+        assert_eq!((faults, open), (0, 0));
+        assert!((volume - 4.0).abs() < 1e-12, "{volume}");
+        let across = across.expect("the slab has bad tets");
+        assert!(across.smallest_before < 18.0 && across.smallest_after > 24.0, "{across:?}");
+        assert!(across.merged > 0, "the slab leaves a narrow strip on the sides: {across:?}");
+    }
+}
