@@ -9,11 +9,11 @@
 //!             (labels over interfaces)    (migrate_bare)     (no message)  (a scan, a list)
 //! ```
 //!
-//! The boundary of the geometry and the surface of each region stay as they are ([`improve`](crate::improve)), so all still fits. Regions of a round
+//! The boundary of the geometry and the surface of each region stay as they are ([`improve`]), so all still fits. Regions of a round
 //! may meet, and the interface is elsewhere afterwards; so there are several rounds, with other regions in each. Where three or more parts meet is
 //! inside of a region like any other place. What costs time grows with the bad tets, not with the mesh.
 //!
-//! Compared: migrating whole layers beside all interfaces (as ParMETIS-based remeshers do: Cirrottola, Froehly 2021) moves most of small parts, good
+//! Compared: migrating whole layers beside all interfaces (as ParMmg does: Cirrottola, Froehly 2019) moves most of small parts, good
 //! or bad; operations that only touch one rank leave the narrow triangles, which are the reason.
 
 mod merge;
