@@ -9,8 +9,8 @@
 //!             (labels over interfaces)    (migrate_bare)     (no message)  (a scan, a list)
 //! ```
 //!
-//! The boundary of the geometry and the surface of each region stay as they are ([`improve`]), so all still fits. Regions of a round
-//! may meet, and the interface is elsewhere afterwards; so there are several rounds, with other regions in each. Where three or more parts meet is
+//! The surface of each region stays as it is ([`improve`]), so all still fits; and so does the boundary of the geometry, but for vertices that only
+//! a cut needed ([`Settings::merge`]). Regions of a round may meet, and the interface is elsewhere afterwards; so there are several rounds, with other regions in each. Where three or more parts meet is
 //! inside of a region like any other place. What costs time grows with the bad tets, not with the mesh.
 //!
 //! Compared: migrating whole layers beside all interfaces (as ParMmg does: Cirrottola, Froehly 2019) moves most of small parts, good
