@@ -261,6 +261,7 @@ fn summary(
         partition: PartitionReport::new(&coarse.partition, balance),
         periodic: made.periodic,
         skins: made.refused.clone(),
+        across: made.across,
         evened: made.evened,
         halo: None,
         stages: Vec::new(),

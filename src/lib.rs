@@ -1,6 +1,7 @@
 //! tetmill: from solid geometry to very large, partitioned tetrahedral meshes, in parallel.
 #![forbid(unsafe_code)]
 
+pub mod across;
 pub mod check;
 pub mod comm;
 pub mod decompose;

@@ -7,6 +7,7 @@ pub mod processes;
 pub use halo::HaloReport;
 pub use processes::{Processes, processes};
 
+use crate::across;
 use crate::check::PartReport;
 use crate::io::Written;
 use crate::memory::sized;
@@ -51,6 +52,8 @@ pub struct Report {
     pub periodic: Option<Checked>,
     /// What became of the skins of the parts, if they were meshed inside; null if the parts were refined.
     pub skins: Option<Refused>,
+    /// What was done for tets across interfaces; null where nothing was.
+    pub across: Option<across::Report>,
     /// What was done to make parts even; null where nothing was.
     pub evened: Option<Evened>,
     /// The ghosts that were written; null where none were asked for.
@@ -315,6 +318,20 @@ impl fmt::Display for Report {
                 p.imbalance,
                 grouped(p.edge_cut),
                 grouped(p.shared_vertices)
+            )?;
+        }
+        if let Some(across) = &self.across {
+            writeln!(
+                f,
+                "interfaces {} tets beside them improved in {} rounds, {} sent to other parts for it; smallest angle {:.1}°, was {:.1}°; {} tets below {}°, were {}",
+                grouped(across.tets),
+                across.rounds,
+                grouped(across.moved),
+                across.smallest_after,
+                across.smallest_before,
+                grouped(across.bad_after),
+                across.angle,
+                grouped(across.bad_before)
             )?;
         }
         if let Some(Evened { imbalance, moved }) = self.evened {

@@ -112,8 +112,9 @@ impl CutModel {
     pub fn new(whole: &CsgModel, cuts: &Cuts, mut pieces: Vec<(usize, BodyId)>) -> Result<Self, CutError> {
         let model = loop {
             match CsgModel::new(cut_geometry(&whole.geometry, cuts, &pieces, whole.projector.tolerance())) {
-                Err(FeatureError::Empty(named)) => pieces.retain(|&(part, body)| {
-                    named.solid != piece_name(&whole.geometry.bodies[body.index()], part)
+                Err(FeatureError::Empty(empty)) => pieces.retain(|&(part, body)| {
+                    let name = piece_name(&whole.geometry.bodies[body.index()], part);
+                    empty.iter().all(|named| named.solid != name)
                 }),
                 made => break made?,
             }

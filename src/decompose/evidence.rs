@@ -51,7 +51,7 @@ pub struct Evidence {
 const MOST_PIECES: u32 = 4;
 
 /// Samples for each part, about.
-const SAMPLES: usize = 1500;
+const SAMPLES: usize = 600;
 
 impl Evidence {
     /// Of a coarse mesh whose edges will be cut into so many `pieces`, for so many `parts`. The boundary is refined, since coarse

@@ -12,6 +12,7 @@
 pub mod cut;
 mod evidence;
 mod plan;
+mod scan;
 mod skins;
 mod text;
 

@@ -10,6 +10,7 @@
 
 use super::Evidence;
 use super::evidence::{Crossed, Sample};
+use super::scan::{Scan, is_met};
 use crate::kernel::random::Random;
 use crate::kernel::tree;
 use crate::{Point, Vector};
@@ -41,6 +42,13 @@ impl CutPlane {
     fn split<'a>(&self, samples: &[&'a Sample]) -> [Vec<&'a Sample>; 2] {
         let (positive, negative) = samples.iter().partition(|sample| self.is_positive(&sample.point));
         [negative, positive]
+    }
+
+    /// Whether it is no further than `room` from some point of a box.
+    fn comes_near(&self, bounds: &Aabb, room: f64) -> bool {
+        let half = 0.5 * (bounds.max - bounds.min);
+        let reach = half.dot(&self.normal.abs());
+        self.value(&nalgebra::center(&bounds.min, &bounds.max)).abs() <= reach + room
     }
 
     /// How bad it is to pass a spot as near as it does: nothing where it keeps away, or goes right through.
@@ -176,8 +184,8 @@ pub struct TooManyParts {
     pub parts: u32,
 }
 
-/// Places that are tried for a plane in one direction.
-const PLACES: i32 = 9;
+/// A plane that cuts less than this badly, in cells, is as clear as any: no further directions are tried.
+const CLEAR_CUT: f64 = 0.1;
 
 /// What a cell that is cut badly costs, in cells that are cut well.
 const BAD: f64 = 100.0;
@@ -264,8 +272,11 @@ struct Others {
 impl Others {
     fn of(piece: &Piece, cuts: &Cuts, crossed: &Crossed) -> Self {
         let is_before = |plane: usize| piece.halves.iter().any(|half| half.plane == plane);
+        let bounds = piece.bounds();
+        let room = piece.samples.iter().map(|sample| sample.near).fold(0.0, f64::max);
+        let comes_near = |plane: &usize| is_before(*plane) || cuts.planes[*plane].comes_near(&bounds, room);
         let (before, beside): (Vec<usize>, Vec<usize>) =
-            (0..cuts.planes.len()).partition(|&plane| is_before(plane));
+            (0..cuts.planes.len()).filter(comes_near).partition(|&plane| is_before(plane));
         let [before, beside]: [Vec<CutPlane>; 2] =
             [before, beside].map(|list| list.into_iter().map(|p| cuts.planes[p]).collect());
         let mut spots = piece.meeting_points(cuts, &before, &beside);
@@ -301,30 +312,59 @@ impl<'a> Piece<'a> {
     fn best_plane(&self, cuts: &Cuts, evidence: &Evidence, settings: &Settings) -> CutPlane {
         let directions = self.directions(settings, settings.seed << 32 | cuts.planes.len() as u64);
         if settings.candidates == Candidates::Median {
-            return self.places(&directions[0], 0.0)[0];
+            return Scan::new(&self.samples, directions[0][0]).places(self.share(), 0.0)[0];
         }
         let crossed = evidence.within(|point| self.holds(cuts, point));
         let others = Others::of(self, cuts, &crossed);
-        // A plane that cuts other pieces already leaves no narrow strips beside them, and one right through a corner none beside that.
-        let exact = others.spots.iter().filter(|spot| settings.through_corners && spot.is_exact);
-        let spots = exact.map(|spot| spot.point);
-        let through =
-            spots.flat_map(|point| directions.iter().map(move |&normal| CutPlane { point, normal }));
-        let special: Vec<CutPlane> = others.beside.iter().copied().chain(through).collect();
+        let mut scans: Vec<Vec<Scan>> = Vec::new();
         let mut best: Option<(Cost, CutPlane)> = None;
         for allowance in [1.0, AT_WORST].map(|factor| factor * settings.allowance) {
-            let planes = directions.iter().flat_map(|normal| self.places(normal, allowance));
-            let special = special.par_iter().filter(|plane| self.shares(plane, AGAIN * allowance));
-            let planes: Vec<CutPlane> = planes.chain(special.copied().collect::<Vec<_>>()).collect();
-            let costs: Vec<Cost> =
-                planes.par_iter().map(|plane| self.cost(plane, &crossed, &others)).collect();
-            let costs = costs.into_iter().zip(planes);
-            best = best.into_iter().chain(costs).min_by(|a, b| a.0.total().total_cmp(&b.0.total()));
+            for (group, directions) in directions.iter().enumerate() {
+                if scans.len() == group {
+                    let scan = |normal: &Vector| Scan::new(&self.samples, *normal);
+                    scans.push(directions.par_iter().map(scan).collect());
+                }
+                let candidates = self.candidates(&scans[group], group == 0, &others, allowance, settings);
+                let cost = |(plane, met): (CutPlane, Vec<&Sample>)| {
+                    (self.cost(&plane, &met, &crossed, &others), plane)
+                };
+                let costs: Vec<(Cost, CutPlane)> = candidates.into_par_iter().map(cost).collect();
+                best = best.into_iter().chain(costs).min_by(|a, b| a.0.total().total_cmp(&b.0.total()));
+                if best.as_ref().is_some_and(|(cost, _)| cost.bad < CLEAR_CUT) {
+                    break;
+                }
+            }
             if best.as_ref().is_some_and(|(cost, _)| cost.bad < 1.0) {
                 break;
             }
         }
         best.expect("there are directions").1
+    }
+
+    /// Planes to try, and the samples that they meet: at places along some directions, and through corners; if asked for, those that cut other pieces
+    /// already. A plane that is one of these leaves no narrow strips beside them, and one right through a corner none beside that.
+    fn candidates(
+        &self,
+        scans: &[Scan<'a>],
+        with_others: bool,
+        others: &Others,
+        allowance: f64,
+        settings: &Settings,
+    ) -> Vec<(CutPlane, Vec<&'a Sample>)> {
+        let (share, again) = (self.share(), AGAIN * allowance);
+        let exact = others.spots.iter().filter(|spot| settings.through_corners && spot.is_exact);
+        let exact: Vec<&Spot> = exact.collect();
+        let across = |scan: &Scan<'a>| {
+            let planes = [scan.places(share, allowance), scan.through(&exact, share, again)].concat();
+            planes.into_iter().map(|plane| (plane, scan.met_by(&plane))).collect::<Vec<_>>()
+        };
+        let mut found: Vec<_> = scans.par_iter().flat_map(across).collect();
+        if with_others {
+            let fits = |plane: &&CutPlane| self.shares(plane, again);
+            let known = others.beside.par_iter().filter(fits).map(|plane| (*plane, self.met_by(plane)));
+            found.extend(known.collect::<Vec<_>>());
+        }
+        found
     }
 
     /// Whether a plane leaves about the wanted shares on both sides.
@@ -333,6 +373,11 @@ impl<'a> Piece<'a> {
         let negative = self.samples.iter().filter(|sample| !plane.is_positive(&sample.point)).count() as f64;
         let share = self.share();
         (negative / count - share).abs() <= allowance * share
+    }
+
+    /// The samples that a plane meets.
+    fn met_by(&self, plane: &CutPlane) -> Vec<&'a Sample> {
+        self.samples.iter().filter(|sample| is_met(plane, sample)).copied().collect()
     }
 
     /// Points on this piece where a plane that bounds it and two others meet, and how far from them there is no room.
@@ -361,19 +406,20 @@ impl<'a> Piece<'a> {
         self.halves.iter().all(|half| half.holds(&cuts.planes, point))
     }
 
-    /// Unit normals of the planes to try.
-    fn directions(&self, settings: &Settings, seed: u64) -> Vec<Vector> {
+    /// Unit normals of the planes to try, those to be tried first in a list of their own: others only where no plane of these is clear.
+    fn directions(&self, settings: &Settings, seed: u64) -> Vec<Vec<Vector>> {
         let axes = || vec![Vector::x(), Vector::y(), Vector::z()];
         match settings.candidates {
-            Candidates::Axes => axes(),
-            Candidates::Principal => self.principal_axes(),
-            Candidates::Random => random_directions(settings.tries, seed),
+            Candidates::Axes => vec![axes()],
+            Candidates::Principal => vec![self.principal_axes()],
+            Candidates::Random => vec![random_directions(settings.tries, seed)],
             Candidates::All => {
-                [axes(), self.principal_axes(), random_directions(settings.tries, seed)].concat()
+                let others = [self.principal_axes(), random_directions(settings.tries, seed)].concat();
+                vec![axes(), others]
             }
             Candidates::Median => {
                 let bounds = self.bounds();
-                vec![axes()[(bounds.max - bounds.min).imax()]]
+                vec![vec![axes()[(bounds.max - bounds.min).imax()]]]
             }
         }
     }
@@ -398,27 +444,8 @@ impl<'a> Piece<'a> {
         axes.column_iter().filter_map(|axis| Vector::from(axis).try_normalize(0.0)).collect()
     }
 
-    /// Planes across a direction that leave the wanted shares on both sides, the best share first.
-    fn places(&self, normal: &Vector, allowance: f64) -> Vec<CutPlane> {
-        let mut along: Vec<f64> = self.samples.iter().map(|sample| sample.point.coords.dot(normal)).collect();
-        along.sort_unstable_by(f64::total_cmp);
-        let share = self.share();
-        // 0, 1, -1, 2, -2, …
-        let steps = (0..PLACES).map(|k| if k % 2 == 0 { -k / 2 } else { (k + 1) / 2 });
-        let place = |step: i32| {
-            let off = f64::from(step) / f64::from(PLACES / 2) * allowance * share;
-            let at = ((share + off) * along.len() as f64).round() as usize;
-            let at = at.clamp(1, along.len() - 1);
-            let offset = 0.5 * (along[at - 1] + along[at]);
-            CutPlane { point: Point::from(normal * offset), normal: *normal }
-        };
-        steps.map(place).collect()
-    }
-
     /// Cells that a plane cuts, those that it cuts badly many times over.
-    fn cost(&self, plane: &CutPlane, crossed: &Crossed, others: &Others) -> Cost {
-        let on_plane = |sample: &&&Sample| plane.value(&sample.point).abs() < 0.5 * sample.width;
-        let cut: Vec<&Sample> = self.samples.iter().filter(on_plane).copied().collect();
+    fn cost(&self, plane: &CutPlane, cut: &[&Sample], crossed: &Crossed, others: &Others) -> Cost {
         let near = |sample: &Sample, other: &CutPlane| other.value(&sample.point).abs() < sample.near;
         let mut bad = crossed.badly_cut(plane, shallow);
         for wall in &others.before {
@@ -428,8 +455,10 @@ impl<'a> Piece<'a> {
             // What cuts the other side of the wall leaves a line on it too.
             for other in others.beside.iter().filter(|other| *other != plane) {
                 let sine = line.normalize().cross(&other.normal.cross(&wall.normal).normalize()).norm();
-                let both = on_wall.iter().filter(|sample| near(sample, other)).count();
-                bad += if both > 0 { shallow(sine) * both as f64 } else { 0.0 };
+                let weight = shallow(sine);
+                if weight > 0.0 {
+                    bad += weight * on_wall.iter().filter(|sample| near(sample, other)).count() as f64;
+                }
             }
         }
         bad += others.spots.iter().map(|spot| plane.crowds(spot)).sum::<f64>();

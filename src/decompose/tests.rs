@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::comm::thread;
+use crate::mesh::stream::{BoundaryBlock, MeshStream, NO_TET};
 use crate::pipeline::{
     CoarseSettings, CsgModel, CutSettings, GenerateSettings, Method, Model, Wanted, generate,
 };
@@ -226,5 +227,67 @@ fn planes_that_miss_the_geometry_are_refused() {
     });
     for refused in refused.expect("no rank panics") {
         assert!(refused.expect_err("one piece for two parts").contains("1 pieces, for 2 parts"));
+    }
+}
+
+#[test]
+fn tets_between_cuts_that_nearly_touch_are_improved_across_them() {
+    let whole = Model::Csg(Box::new(model(BAR)));
+    // A slab a tenth as thick as the edges of the mesh.
+    let planes = [1.9, 1.95].map(|x| plane([x, 0.0, 0.0], [1.0, 0.0, 0.0]));
+    let made = thread::run(3, |comm| {
+        let model = (comm.rank() == 0).then_some(&whole);
+        let made = generate(comm, model, &settings(planes.to_vec()), &Progress::new(true, 9));
+        let made = made.map_err(|error| error.to_string())?;
+        Ok::<_, String>((made.check.faults, made.checksum.open, made.check.volume, made.across))
+    });
+    for made in made.expect("no rank fails") {
+        let (faults, open, volume, across) = made.expect("a mesh");
+        assert_eq!((faults, open), (0, 0));
+        assert!((volume - 4.0).abs() < 1e-12, "{volume}");
+        let across = across.expect("the slab has bad tets");
+        assert!(across.smallest_before < 18.0 && across.smallest_after > 24.0, "{across:?}");
+        assert!(across.merged > 0, "the slab leaves a narrow strip on the sides: {across:?}");
+    }
+}
+
+/// Of a part: the volume that the faces of its tets on patches enclose; and for a ball of radius 1 by how much chords may make that too small.
+fn enclosed(part: &dyn MeshStream) -> [f64; 2] {
+    let mut block = BoundaryBlock::default();
+    let (mut sixfold, mut between) = (0.0, 0.0);
+    for index in 0..part.boundary_blocks() {
+        part.boundary_block(index, &mut block);
+        for (triangle, parents) in block.triangles.iter().zip(&block.parents) {
+            let [a, b, c] = triangle.map(|v| Vector::from(part.points()[v as usize]));
+            let sides = parents.map(|tet| f64::from(u8::from(tet != NO_TET)));
+            sixfold += (sides[0] - sides[1]) * a.cross(&b).dot(&c);
+            let normal = (b - a).cross(&(c - a));
+            let from_centre = a.dot(&normal) / normal.norm();
+            between += sides[0] * 0.5 * normal.norm() * (1.0 - from_centre);
+        }
+    }
+    [sixfold / 6.0, between]
+}
+
+#[test]
+fn parts_fill_what_their_surface_encloses_which_is_a_ball_but_for_the_chords() {
+    let ball = "algebraic3d\nsolid ball = sphere (0, 0, 0; 1);\ntlo ball;";
+    let whole = Model::Csg(Box::new(model(ball)));
+    let exact = 4.0 / 3.0 * std::f64::consts::PI;
+    for method in [Method::Surface, Method::Decompose(CutSettings::default())] {
+        let settings = GenerateSettings { method, wanted: Wanted::Sizes { pieces: 2 }, ..settings(vec![]) };
+        let made = thread::run(5, |comm| {
+            let model = (comm.rank() == 0).then_some(&whole);
+            let made = generate(comm, model, &settings, &Progress::new(true, 9));
+            made.map(|made| (made.check.volume, enclosed(made.part.stream())))
+                .map_err(|error| error.to_string())
+        });
+        let made: Result<Vec<_>, String> = made.expect("no rank fails").into_iter().collect();
+        let made = made.expect("a mesh");
+        let volume = made[0].0;
+        let [enclosed, between] = [0, 1].map(|k| made.iter().map(|part| part.1[k]).sum::<f64>());
+        assert!((volume / enclosed - 1.0).abs() < 1e-12, "{volume} {enclosed}");
+        // A cap holds no more than its base at the surface times its height.
+        assert!(volume < exact && exact - volume < 1.1 * between, "{volume} of {exact}, chords {between}");
     }
 }

@@ -9,6 +9,7 @@ use super::room::{self, Disk};
 use super::skins::{self, Refused};
 use super::target::Outcome;
 use super::wanted::{Wanted, mesh_as_wanted};
+use crate::across;
 use crate::check::{self, Checksum, PartReport, ShapeReport};
 use crate::comm::Communicator;
 use crate::dist::{self, BareMesh, DistMesh};
@@ -87,6 +88,8 @@ pub struct Generated {
     pub periodic: Option<periodic::Checked>,
     /// Skins that the mesher refused, if parts were meshed inside theirs: the same on all.
     pub refused: Option<Refused>,
+    /// What was done for tets across interfaces, if parts were meshed each on its own and some were bad: the same on all ranks.
+    pub across: Option<across::Report>,
     /// What was done to make parts even that were meshed each on its own: the same on all.
     pub evened: Option<Evened>,
     /// On rank 0 alone.
@@ -172,7 +175,7 @@ pub fn generate(
             made
         });
         let part = Part::Refined(Box::new(part));
-        let (refused, evened) = (None, None);
+        let (refused, across, evened) = (None, None, None);
         return Ok(Generated {
             part,
             pieces,
@@ -182,6 +185,7 @@ pub fn generate(
             checksum,
             periodic,
             refused,
+            across,
             evened,
             coarse,
         });
@@ -214,7 +218,10 @@ fn fill(
     let effort = settings.coarse.effort.unwrap_or(Effort::Standard);
     let (part, refused) =
         skins::mesh_skins(comm, &dist, &projector, pieces, sizes.as_deref(), effort, progress)?;
-    stored(comm, part, Whole { names, projector, pieces, coarse, refused: Some(refused) }, progress)
+    // The boundary is that of the method `refine`, with no lines of cuts.
+    let across = across::Settings { merge: false, ..across::Settings::default() };
+    let whole = Whole { names, projector, pieces, coarse, refused: Some(refused) };
+    stored(comm, part, whole, &across, progress)
 }
 
 /// **Collective.** Meshes the pieces that the geometry is cut into.
@@ -227,7 +234,8 @@ fn decomposed(
 ) -> Result<Generated, Failure> {
     let (names, projector) = broadcast_geometry(comm, model)?;
     let (part, pieces, coarse) = decompose::mesh_pieces(comm, model, cuts, settings, progress)?;
-    stored(comm, part, Whole { names, projector, pieces, coarse, refused: None }, progress)
+    let whole = Whole { names, projector, pieces, coarse, refused: None };
+    stored(comm, part, whole, &across::Settings::default(), progress)
 }
 
 /// What goes with parts that were meshed each on its own.
@@ -239,21 +247,23 @@ struct Whole {
     refused: Option<Refused>,
 }
 
-/// **Collective.** Makes parts even that were meshed each on its own, and checks them.
+/// **Collective.** Improves parts that were meshed each on its own across their interfaces, makes them even, and checks them.
 fn stored(
     comm: &dyn Communicator,
     part: BareMesh,
     whole: Whole,
+    across: &across::Settings,
     progress: &Progress,
 ) -> Result<Generated, Failure> {
     let Whole { names, projector, pieces, coarse, refused } = whole;
+    let (part, across) = progress.stage("interfaces", || across::improve_across(comm, part, across))?;
     let (part, evened) = even_out(comm, part, progress)?;
     let part = BareStream::new(part);
     let (check, checksum) = progress.stage("check", || verdict(comm, &part, &projector))?;
     let level = check.shape.clone().map(|shape| Level { pieces, tets: check.tets, shape });
     let (levels, part) = (level.into_iter().collect(), Part::Stored(Box::new(part)));
     let periodic = None;
-    Ok(Generated { part, pieces, levels, names, check, checksum, periodic, refused, evened, coarse })
+    Ok(Generated { part, pieces, levels, names, check, checksum, periodic, refused, across, evened, coarse })
 }
 
 /// Asks for smaller sizes around coarse tets with inverted children, on the rank that has them.

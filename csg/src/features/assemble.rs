@@ -110,11 +110,11 @@ pub(super) fn entities(
     }
     let patches: Vec<Patch> = patches.into_values().collect();
     // What the rough cells around the bodies did not show: a body of no volume has no boundary.
-    for i in 0..geometry.bodies.len() {
-        let id = BodyId::new(i);
-        if !patches.iter().any(|p| p.inside == Some(id) || p.outside == Some(id)) {
-            return Err(FeatureError::Empty(Named::body(geometry, id)));
-        }
+    let is_bounded = |id: &BodyId| patches.iter().any(|p| p.inside == Some(*id) || p.outside == Some(*id));
+    let unbounded = (0..geometry.bodies.len()).map(BodyId::new).filter(|id| !is_bounded(id));
+    let empty: Vec<Named> = unbounded.map(|id| Named::body(geometry, id)).collect();
+    if !empty.is_empty() {
+        return Err(FeatureError::Empty(empty));
     }
     for (i, patch) in patches.iter().enumerate() {
         for &(curve, forward) in &patch.boundary {

@@ -37,15 +37,17 @@ pub(super) fn bounding_cell(geometry: &Geometry) -> Result<Cell, FeatureError> {
     let all = bodies.map(|(i, body)| (BodyId::new(i), Some(body.solid.clone()))).collect();
     let mut parts: Vec<Part> = prune(geometry, Part { cell: cube, bodies: all }).into_iter().collect();
     loop {
-        for id in (0..geometry.bodies.len()).map(BodyId::new) {
-            if !parts.iter().any(|part| part.bodies.iter().any(|b| b.0 == id)) {
-                return Err(FeatureError::Empty(Named::body(geometry, id)));
-            }
+        let mut is_somewhere = vec![false; geometry.bodies.len()];
+        parts.iter().flat_map(|part| &part.bodies).for_each(|body| is_somewhere[body.0.index()] = true);
+        let nowhere = (0..geometry.bodies.len()).filter(|&body| !is_somewhere[body]);
+        let empty: Vec<Named> = nowhere.map(|body| Named::body(geometry, BodyId::new(body))).collect();
+        if !empty.is_empty() {
+            return Err(FeatureError::Empty(empty));
         }
         let hull = hull(&parts);
         let longest = hull.iter().map(Interval::width).fold(0.0, f64::max);
         if longest < NOTHING * cube[0].width() {
-            return Err(FeatureError::Empty(Named::body(geometry, parts[0].bodies[0].0)));
+            return Err(FeatureError::Empty(vec![Named::body(geometry, parts[0].bodies[0].0)]));
         }
         let is_rough = |part: &Part| {
             let touches = (0..3).any(|i| part.cell[i].lo == hull[i].lo || part.cell[i].hi == hull[i].hi);

@@ -51,9 +51,9 @@ pub enum FeatureError {
     /// Nothing is to be meshed.
     #[error("the geometry has no top-level object that is a solid")]
     NoBody,
-    /// A body has no inside.
-    #[error("{0} contains nothing: its parts do not meet")]
-    Empty(Named),
+    /// Bodies have no inside: those that are known, one at least.
+    #[error("{} contains nothing: its parts do not meet", .0[0])]
+    Empty(Vec<Named>),
     /// A body goes on without end.
     #[error("{0} is not bounded: cut it with planes or other solids")]
     Unbounded(Named),

@@ -1,0 +1,325 @@
+//! The regions that a rank has got, improved.
+
+use super::Settings;
+use super::merge::{Merger, largest_cosine};
+use crate::dist::{BareMesh, LaidEdge, Side};
+use crate::improve::improve;
+use crate::kernel::simplex::from_lowest;
+use crate::mesh::{BoundaryTriangle, Class, GlobalId, Mesh, Segment, TET_EDGES, TET_FACES, TetId, VertexId};
+use crate::skin::{self, PartSizes};
+use csg::{BodyId, CurveId, PatchId};
+use rayon::prelude::*;
+use std::collections::{BTreeMap, HashMap};
+
+/// What becomes of the tets of a rank's regions.
+#[derive(Default)]
+pub(super) struct Reworked {
+    /// The tets of the part that were taken out, ascending.
+    pub taken: Vec<u32>,
+    /// The tets that they are now, by vertex of the part; vertices that were added have the numbers after it.
+    pub tets: Vec<[VertexId; 4]>,
+    /// Their bodies.
+    pub bodies: Vec<BodyId>,
+    /// Their faces on patches; tets by their place here.
+    pub sides: Vec<Side>,
+    /// Vertices of the part, where they are now and in what.
+    pub moved: Vec<(u32, [f64; 3], Class)>,
+    /// Vertices of the part without tets, ascending.
+    pub gone: Vec<u32>,
+    /// New vertices.
+    pub added: Vec<([f64; 3], Class)>,
+    /// Edges on curves and patches in place of those of vertices that are gone.
+    pub edges: Vec<LaidEdge>,
+    /// Triangles on patches that vanished.
+    pub lost_triangles: u64,
+    /// Vertices of the boundary that were merged into others.
+    pub merged: u64,
+}
+
+/// Merging and improving again, so often.
+const TURNS: usize = 3;
+
+/// *Local.* Improves the tets with these ids, inside of what bounds them. What hangs together is a region, which stays as it is if its smallest angle
+/// would be less.
+///
+/// # Panics
+/// If this rank does not have them.
+pub(super) fn rework(part: &BareMesh, ids: &[GlobalId], settings: &Settings) -> Reworked {
+    let place = |id: &GlobalId| part.tet_ids.binary_search(id).expect("the tets have arrived") as u32;
+    let taken: Vec<u32> = ids.iter().map(place).collect();
+    let mut regions = regions(part, &taken);
+    let is_better: Vec<bool> = regions.par_iter_mut().map(|region| region.rework(settings)).collect();
+    let mut reworked = Reworked::default();
+    let better = regions.into_iter().zip(is_better).filter(|(_, is_better)| *is_better);
+    better.for_each(|(region, _)| region.finish(part.points.len(), &mut reworked));
+    reworked.taken.sort_unstable();
+    reworked.gone.sort_unstable();
+    reworked
+}
+
+/// Tets that hang together as a mesh of their own. Its vertices are first those of its surface and of the boundary, then those inside, which may move.
+#[derive(Default)]
+struct Region {
+    /// The tets in the part.
+    taken: Vec<u32>,
+    mesh: Mesh,
+    /// The first of its vertices in the part.
+    outer: Vec<u32>,
+    /// Of these, whether the vertex may be merged into another: it lies in a patch or curve, and has all its tets here.
+    loose: Vec<bool>,
+    /// Of these, whether other ranks have it too.
+    shared: Vec<bool>,
+    /// Edges on curves and patches.
+    edges: BTreeMap<[u32; 2], Class>,
+    /// Vertices inside, in the part, before.
+    inside: Vec<u32>,
+    /// Vertices of the part that were merged into others.
+    gone: Vec<u32>,
+    /// Triangles on patches that vanished thereby.
+    lost_triangles: u64,
+}
+
+/// All that matters of a class is whether the vertex may move.
+const FIXED: Class = Class::Corner(csg::CornerId(0));
+
+/// No vertex, no region.
+const NONE: u32 = u32::MAX;
+
+/// The region of each vertex of some tets that hang together by vertices, and how many regions there are.
+fn components(part: &BareMesh, taken: &[u32]) -> (Vec<u32>, usize) {
+    let mut parent = vec![NONE; part.points.len()];
+    let root = |parent: &mut [u32], mut v: u32| {
+        while parent[v as usize] != v {
+            parent[v as usize] = parent[parent[v as usize] as usize];
+            v = parent[v as usize];
+        }
+        v
+    };
+    for &tet in taken {
+        let corners = part.tets[tet as usize].map(|v| v.0);
+        for v in corners {
+            if parent[v as usize] == NONE {
+                parent[v as usize] = v;
+            }
+            let [a, b] = [corners[0], v].map(|v| root(&mut parent, v));
+            parent[a.max(b) as usize] = a.min(b);
+        }
+    }
+    let (mut region, mut count) = (vec![NONE; parent.len()], 0);
+    for v in (0..parent.len() as u32).filter(|&v| parent[v as usize] != NONE).collect::<Vec<_>>() {
+        let first = root(&mut parent, v);
+        // The least vertex of a region is its root, and comes first.
+        if first == v {
+            region[v as usize] = count;
+            count += 1;
+        } else {
+            region[v as usize] = region[first as usize];
+        }
+    }
+    (region, count as usize)
+}
+
+/// Takes tets out of a part.
+fn regions(part: &BareMesh, taken: &[u32]) -> Vec<Region> {
+    let (region_of, count) = components(part, taken);
+    let mut is_taken = vec![false; part.tets.len()];
+    taken.iter().for_each(|&tet| is_taken[tet as usize] = true);
+    let mut is_shared = vec![false; part.points.len()];
+    part.shared.ids.iter().for_each(|&v| is_shared[v as usize] = true);
+    let mut is_free: Vec<bool> = is_shared.iter().map(|shared| !shared).collect();
+    let rest = part.tets.iter().zip(&is_taken).filter(|(_, taken)| !**taken);
+    rest.flat_map(|(tet, _)| tet).for_each(|v| is_free[v.index()] = false);
+
+    let mut regions: Vec<Region> = std::iter::repeat_with(Region::default).take(count).collect();
+    let mut place = vec![VertexId(NONE); part.points.len()];
+    let is_inside = |v: usize| is_free[v] && matches!(part.vertex_classes[v], Class::Body(_));
+    let of_regions = || (0..part.points.len()).filter(|&v| region_of[v] != NONE);
+    for v in of_regions().filter(|&v| !is_inside(v)).chain(of_regions().filter(|&v| is_inside(v))) {
+        let region = &mut regions[region_of[v] as usize];
+        place[v] = VertexId::new(region.mesh.points.len());
+        region.mesh.points.push(part.points[v].into());
+        region.mesh.classes.push(if is_free[v] { part.vertex_classes[v] } else { FIXED });
+        if is_inside(v) {
+            region.inside.push(v as u32);
+        } else {
+            region.outer.push(v as u32);
+            region.loose.push(is_free[v]);
+            region.shared.push(is_shared[v]);
+        }
+    }
+    let region_at = |v: VertexId| region_of[v.index()] as usize;
+    let placed = |v: VertexId| place[v.index()];
+    for &tet in taken {
+        let corners = part.tets[tet as usize];
+        let region = &mut regions[region_at(corners[0])];
+        region.taken.push(tet);
+        region.mesh.tets.push(corners.map(placed));
+        region.mesh.bodies.push(part.tet_bodies[tet as usize]);
+    }
+    for side in part.sides.iter().filter(|side| is_taken[side.tet.index()]) {
+        let corners = TET_FACES[usize::from(side.face)].map(|k| part.tets[side.tet.index()][k]);
+        let [a, b, c] = corners.map(placed);
+        let vertices = if side.behind { [a, b, c] } else { [a, c, b] };
+        regions[region_at(corners[0])].mesh.triangles.push(BoundaryTriangle { vertices, patch: side.patch });
+    }
+    for edge in &part.edges {
+        let [first, second] = edge.vertices.map(|v| region_of[v.index()]);
+        if first != NONE && first == second {
+            let [a, b] = edge.vertices.map(|v| placed(v).0);
+            regions[first as usize].edges.insert([a.min(b), a.max(b)], edge.class);
+        }
+    }
+    for region in &mut regions {
+        // Those between two tets are there twice.
+        region.mesh.triangles.sort_unstable_by_key(|t| sorted(t.vertices));
+        region.mesh.triangles.dedup_by_key(|t| sorted(t.vertices));
+    }
+    regions
+}
+
+impl Region {
+    /// Improves it; whether it is no worse for that.
+    fn rework(&mut self, settings: &Settings) -> bool {
+        let smallest = |mesh: &Mesh| {
+            let angle = |tet: &[VertexId; 4]| largest_cosine(&tet.map(|v| mesh.points[v.index()]));
+            mesh.tets.iter().map(angle).fold(-1.0, f64::max)
+        };
+        let before = smallest(&self.mesh);
+        self.improve(settings);
+        for _ in 0..TURNS {
+            if !settings.merge || !self.merge(settings.angle) {
+                break;
+            }
+            self.improve(settings);
+        }
+        smallest(&self.mesh) <= before
+    }
+
+    fn improve(&mut self, settings: &Settings) {
+        let on_curves = self.edges.iter().filter(|(_, class)| matches!(class, Class::Curve(_)));
+        let segment =
+            |(ends, _): (&[u32; 2], &Class)| Segment { vertices: ends.map(VertexId), curve: CurveId(0) };
+        self.mesh.segments = on_curves.map(segment).collect();
+        let sizes =
+            PartSizes::new(self.mesh.points.clone(), self.mesh.tets.clone(), usual_lengths(&self.mesh));
+        improve(&mut self.mesh, &sizes, &settings.improve);
+    }
+
+    /// Merges vertices of the boundary; whether there were any.
+    fn merge(&mut self, angle: f64) -> bool {
+        let count = self.mesh.points.len();
+        let outer = |list: &[bool]| -> Vec<bool> {
+            list.iter().copied().chain(std::iter::repeat(false)).take(count).collect()
+        };
+        let (loose, shared) = (outer(&self.loose), outer(&self.shared));
+        let tets = self.mesh.tets.iter().map(|tet| tet.map(|v| v.0)).zip(self.mesh.bodies.iter().copied());
+        let triangles = self.mesh.triangles.iter().map(|t| (t.vertices.map(|v| v.0), t.patch)).collect();
+        let at = (&self.mesh.points[..], &self.mesh.classes[..]);
+        let mut merger =
+            Merger::new(at, &loose, &shared, tets.collect(), triangles, std::mem::take(&mut self.edges));
+        merger.run(angle);
+        let Merger { tets, triangles, edges, mut gone, .. } = merger;
+        gone.sort_unstable();
+        let mut next = 0;
+        let place: Vec<u32> = (0..count as u32)
+            .map(|v| {
+                let stays = gone.binary_search(&v).is_err();
+                next += u32::from(stays);
+                if stays { next - 1 } else { NONE }
+            })
+            .collect();
+        let keep = |v: usize| place[v] != NONE;
+        let placed = |v: u32| place[v as usize];
+        self.gone.extend(gone.iter().map(|&v| self.outer[v as usize]));
+        retain(&mut self.mesh.points, keep);
+        retain(&mut self.mesh.classes, keep);
+        retain(&mut self.outer, keep);
+        retain(&mut self.loose, keep);
+        retain(&mut self.shared, keep);
+        let alive = || tets.iter().flatten();
+        self.mesh.tets = alive().map(|(tet, _)| tet.map(|v| VertexId(placed(v)))).collect();
+        self.mesh.bodies = alive().map(|(_, body)| *body).collect();
+        let triangle = |&(vertices, patch): &([u32; 3], PatchId)| BoundaryTriangle {
+            vertices: vertices.map(|v| VertexId(placed(v))),
+            patch,
+        };
+        self.lost_triangles += triangles.iter().filter(|t| t.is_none()).count() as u64;
+        self.mesh.triangles = triangles.iter().flatten().map(triangle).collect();
+        // Places keep their order.
+        self.edges = edges.into_iter().map(|(ends, class)| (ends.map(placed), class)).collect();
+        !gone.is_empty()
+    }
+
+    /// Adds what became of it, in a part with so many vertices.
+    fn finish(self, vertices: usize, reworked: &mut Reworked) {
+        let on_surface = self.outer.len();
+        let mut names: Vec<VertexId> = self.outer.into_iter().map(VertexId).collect();
+        let mut before = self.inside.into_iter();
+        for (point, &class) in self.mesh.points[on_surface..].iter().zip(&self.mesh.classes[on_surface..]) {
+            let point = [point.x, point.y, point.z];
+            if let Some(v) = before.next() {
+                reworked.moved.push((v, point, class));
+                names.push(VertexId(v));
+            } else {
+                names.push(VertexId::new(vertices + reworked.added.len()));
+                reworked.added.push((point, class));
+            }
+        }
+        if !self.gone.is_empty() {
+            let named = |ends: &[u32; 2]| ends.map(|v| names[v as usize]);
+            reworked.edges.extend(self.edges.iter().map(|(ends, class)| LaidEdge::new(named(ends), *class)));
+        }
+        reworked.merged += self.gone.len() as u64;
+        reworked.gone.extend(self.gone);
+        reworked.gone.extend(before);
+        let first = reworked.tets.len() as u32;
+        let in_all = |side: Side| Side { tet: TetId(first + side.tet.0), ..side };
+        reworked.sides.extend(sides(&self.mesh, on_surface).into_iter().map(in_all));
+        reworked.lost_triangles += self.lost_triangles;
+        reworked.taken.extend(self.taken);
+        reworked.tets.extend(self.mesh.tets.iter().map(|tet| tet.map(|v| names[v.index()])));
+        reworked.bodies.extend(self.mesh.bodies);
+    }
+}
+
+fn retain<T>(list: &mut Vec<T>, keep: impl Fn(usize) -> bool) {
+    let mut at = 0..;
+    list.retain(|_| keep(at.next().expect("there is always another")));
+}
+
+fn sorted(mut corners: [VertexId; 3]) -> [VertexId; 3] {
+    corners.sort_unstable();
+    corners
+}
+
+/// The faces of tets on patches, ascending; the first `on_surface` vertices may have such.
+fn sides(mesh: &Mesh, on_surface: usize) -> Vec<Side> {
+    let known: HashMap<[VertexId; 3], &BoundaryTriangle> =
+        mesh.triangles.iter().map(|t| (sorted(t.vertices), t)).collect();
+    let mut sides = Vec::with_capacity(known.len());
+    for (tet, corners) in (0..).map(TetId).zip(&mesh.tets) {
+        if corners.iter().filter(|v| v.index() < on_surface).count() < 3 {
+            continue;
+        }
+        for (face, outward) in (0..).zip(TET_FACES.map(|face| face.map(|k| corners[k]))) {
+            let Some(triangle) = known.get(&sorted(outward)) else { continue };
+            let behind = from_lowest(outward) == from_lowest(triangle.vertices);
+            sides.push(Side { tet, face, patch: triangle.patch, behind });
+        }
+    }
+    sides
+}
+
+/// At each vertex the length that edges around it have: the largest mean of it and its neighbours, since beside an interface that is to be mended
+/// some are short.
+fn usual_lengths(mesh: &Mesh) -> Vec<f64> {
+    let means = skin::at_vertices(mesh, None, 1);
+    let mut lengths = means.clone();
+    for tet in &mesh.tets {
+        for [a, b] in TET_EDGES.map(|edge| edge.map(|k| tet[k].index())) {
+            lengths[a] = lengths[a].max(means[b]);
+            lengths[b] = lengths[b].max(means[a]);
+        }
+    }
+    lengths
+}

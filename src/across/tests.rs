@@ -1,0 +1,100 @@
+//! Parts of a cube, a ball and a cylinder that were meshed each on its own, and a slab between two cuts.
+
+use super::*;
+use crate::check::{self, PartReport, check, checksum_of_all};
+use crate::comm::thread;
+use crate::dist::{distribute, settle};
+use crate::improve::Settings as Improve;
+use crate::mesh::Rank;
+use crate::refine::fixtures::{Fixture, ball, cube, cylinder};
+use crate::refine::{self, refine};
+use crate::size::UniformSize;
+use crate::skin;
+
+/// The parts of a fixture, ragged, each meshed inside its skin.
+fn filled(comm: &dyn Communicator, fixture: &Fixture, h: f64) -> BareMesh {
+    let rank_of: Vec<Rank> = (0..fixture.mesh.tets.len() as u32).map(|t| t / 3 % comm.size()).collect();
+    let given = (comm.rank() == 0).then(|| (fixture.mesh.clone(), rank_of));
+    let part = distribute(comm, given).expect("a classified mesh");
+    let skin = skin::skin(&part, &fixture.projector, 2).expect("a skin");
+    let tets = skin::fill_or_refine(&part, &fixture.projector, &skin, &UniformSize(h), &Improve::default());
+    let boundary = skin.numbering.totals().boundary;
+    skin::number(comm, skin.skin, tets.expect("tets"), boundary).expect("all ranks")
+}
+
+/// What the check says of a mesh that is distributed.
+fn checked(comm: &dyn Communicator, fixture: &Fixture, mesh: BareMesh) -> PartReport {
+    let whole = settle(comm, mesh).expect("a mesh");
+    whole.check(comm).expect("a distributed mesh, with ids without gaps");
+    let mesh = refine(whole, &fixture.projector, 1, &refine::Settings::default()).expect("positive tets");
+    let report =
+        check(comm, &mesh, Some(&fixture.projector), &check::Settings::default()).expect("all ranks");
+    assert_eq!(report.faults, 0, "{:?}", report.described);
+    assert_eq!(checksum_of_all(comm, &mesh).expect("all ranks").open, 0, "each face is matched");
+    report
+}
+
+#[test]
+fn improved_parts_still_fit_and_fill_the_bodies() {
+    for (fixture, h) in [(ball(1.0), 0.4), (cylinder(2), 0.3)] {
+        for (ranks, merge) in [(2, false), (5, true), (16, false), (16, true)] {
+            let settings = Settings { angle: 35.0, merge, ..Settings::default() };
+            let made = thread::run(ranks, |comm| {
+                let before = filled(comm, &fixture, h);
+                let volume = checked(comm, &fixture, before.clone()).volume;
+                let (after, report) = improve_across(comm, before, &settings).expect("all ranks");
+                (volume, checked(comm, &fixture, after), report.expect("ragged parts have bad tets"))
+            });
+            let (volume, after, report) = made.expect("no rank fails").swap_remove(0);
+            assert!(report.merged == 0 || merge, "{ranks} ranks: {report:?}");
+            let off = if report.merged > 0 { 0.02 } else { 1e-13 };
+            assert!((after.volume / volume - 1.0).abs() < off, "{ranks} ranks: {} {volume}", after.volume);
+            assert!(report.bad_after < report.bad_before, "{ranks} ranks: {report:?}");
+            assert!(report.smallest_after >= report.smallest_before, "{ranks} ranks: {report:?}");
+        }
+    }
+}
+
+#[test]
+fn bodies_side_by_side_keep_the_face_between_them() {
+    let fixture = cube(4, true);
+    let settings = Settings { angle: 50.0, ..Settings::default() };
+    let made = thread::run(7, |comm| {
+        let before = filled(comm, &fixture, 0.2);
+        let volumes = checked(comm, &fixture, before.clone()).body_volumes;
+        let (after, report) = improve_across(comm, before, &settings).expect("all ranks");
+        (volumes, checked(comm, &fixture, after).body_volumes, report)
+    });
+    let (before, after, report) = made.expect("no rank fails").swap_remove(0);
+    assert!(report.is_some_and(|report| report.tets > 0));
+    assert_eq!(before.len(), 2);
+    assert!(before.iter().zip(after).all(|(before, after)| (after / before - 1.0).abs() < 1e-12));
+}
+
+#[test]
+fn parts_without_bad_tets_stay_as_they_are() {
+    let fixture = cube(3, false);
+    let settings = Settings { angle: 1.0, ..Settings::default() };
+    let same = thread::run(3, |comm| {
+        let before = filled(comm, &fixture, 0.3);
+        improve_across(comm, before.clone(), &settings).expect("all ranks") == (before, None)
+    });
+    assert_eq!(same.expect("no rank fails"), [true; 3]);
+}
+
+#[test]
+fn the_same_parts_become_the_same_with_any_number_of_threads() {
+    let fixture = cylinder(2);
+    let sum = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+        let sums = pool.install(|| {
+            thread::run(4, |comm| {
+                let mesh = filled(comm, &fixture, 0.3);
+                let (after, _) = improve_across(comm, mesh, &Settings::default()).expect("all ranks");
+                checksum_of_all(comm, &crate::migrate::BareStream::new(after)).expect("all ranks")
+            })
+        });
+        sums.expect("no rank fails").swap_remove(0)
+    };
+    assert_eq!(sum(1), sum(3));
+}
