@@ -52,11 +52,6 @@ impl Plane {
         Some(Self { normal: outward.try_normalize(0.0)?, foot: *foot })
     }
 
-    /// How far inside of it a point is.
-    pub fn depth(&self, point: &Point) -> f64 {
-        self.normal.dot(&(self.foot - point))
-    }
-
     /// The plane of an outward face; `None` if that is flat.
     pub fn of([a, b, c]: [&Point; 3]) -> Option<Self> {
         Self::across(&area_vector(a, b, c), a)

@@ -1,7 +1,7 @@
-//! Recovery by exact points: the mesh is cut along the surface.
+//! Boundary recovery: every triangle of the surface comes to consist of faces of the mesh.
 //!
-//! Where flips go round in circles (many edges that pass close by one another), the way that must end is taken. A missing edge is split
-//! where it crosses the mesh, by points exactly on it (`exact`); a split takes one crossing away and brings it no new one, and edges that are there stay. When all
+//! First by flips (`recover`), which do nearly all of it. Where they go no further the mesh is cut along the surface. A missing edge is split
+//! where it crosses the mesh, by points exactly on it (`steiner`); a split takes one crossing away and brings it no new one, and edges that are there stay. When all
 //! edges are there, edges of the mesh that go through a missing triangle are flipped away, and where that comes to a standstill split in the triangle: their pieces
 //! and the edges from the new point to the ring around lie on one side, so what goes through becomes less by one. When nothing does, the triangle consists of faces
 //! of the mesh, whichever these are (the first half of George, Borouchaki, Saltel 2003, with no demand on how the triangles are cut). As all signs are
@@ -12,10 +12,10 @@
 
 use super::constraints::{Facet, edges};
 use super::crossing::{Crossing, crossings, edges_of_tet, tets_around};
+use super::flips::FLAT;
 use super::recover::{DEEPEST, Recovery};
 use super::steiner::middle_first;
 use super::tetrahedra::{NONE, Ring, sorted};
-use crate::kernel::fixed::Fixed;
 use crate::kernel::predicates::Sign;
 use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet};
@@ -25,6 +25,9 @@ const MOST_POINTS: usize = 15_000;
 
 /// How often what was left is tried again.
 const ROUNDS: u32 = 10;
+
+/// The round in which flips may make flat tets, before triangles are split.
+const FLAT_ROUND: u32 = DEEPEST + 1;
 
 /// How often points are taken off the edges: each round may let others go, hardly any after the second.
 const THINNINGS: usize = 4;
@@ -58,20 +61,17 @@ struct Cut {
 }
 
 impl Recovery<'_> {
-    /// Recovers all facets, or returns those that it cannot; where there are points already they must not lie on the surface.
+    /// Recovers all facets, or returns those that it cannot.
     pub fn conform(&mut self) -> Result<(), Vec<u32>> {
         let missing = self.missing_facets();
         self.counts.missing_faces = missing.len();
-        if !missing.is_empty() && self.mesh.points.iter().any(|p| Fixed::of(p).is_none()) {
-            return Err(missing);
-        }
-        self.most_steiner = MOST_POINTS;
+        self.most_steiner = if self.mesh.fits_exact() { MOST_POINTS } else { 0 };
         self.give_help(HELPED);
-        self.flips.never_flat = true;
         let sides = |f: &u32| edges(self.constraints.facets[*f as usize].vertices);
         let mut wanted: Vec<[u32; 2]> = missing.iter().flat_map(sides).collect();
         wanted.sort_unstable();
         wanted.dedup();
+        self.shuffle(&mut wanted, |&[a, b]| u64::from(a) << 32 | u64::from(b));
         for &[a, b] in &wanted {
             self.constraints.keep_edge(a, b);
         }
@@ -82,13 +82,16 @@ impl Recovery<'_> {
         self.counts.missing_edges = wanted.len();
         let mut cut = Cut::default();
         cut.missing.extend(wanted.into_iter().map(|edge| (edge, edge)));
-        for depth in 0..=DEEPEST {
-            cut.missing.retain(|&(_, [a, b])| !self.recover_edge(a, b, depth));
+        for least in [FLAT, 0.0] {
+            self.flips.least = least;
+            for depth in 0..=DEEPEST {
+                cut.missing.retain(|&(_, [a, b])| !self.recover_edge(a, b, depth));
+            }
         }
+        self.flips.least = FLAT;
         self.cut_edges(DEEPEST, &mut cut);
         self.thin_edges(&mut cut);
         let left = self.cut_triangles(missing, &mut cut);
-        self.flips.never_flat = false;
         for [a, b] in self.constraints.kept_edges() {
             self.constraints.forget_edge(a, b);
         }
@@ -204,7 +207,8 @@ impl Recovery<'_> {
         for round in 0..ROUNDS {
             let before = left.len();
             self.cut_edges(DEEPEST, cut);
-            let split = round > DEEPEST;
+            self.flips.least = if round == FLAT_ROUND { 0.0 } else { FLAT };
+            let split = round > FLAT_ROUND;
             left.retain(|&t| !self.cut_triangle(t, round.min(DEEPEST), split, cut));
             if left.is_empty() || (split && left.len() == before && self.steiner.len() >= self.most_steiner) {
                 break;

@@ -132,15 +132,9 @@ impl Constraints {
         }
     }
 
-    /// The edge of the surface that an edge of facets is part of, if of any.
-    pub fn edge_of(&self, a: u32, b: u32) -> Option<[u32; 2]> {
-        match [a, b].map(|v| self.edge_at(v)) {
-            _ if a.max(b) < self.surface_vertices => Some([a.min(b), a.max(b)]),
-            [Some(edge), None] if edge.contains(&b) => Some(edge),
-            [None, Some(edge)] if edge.contains(&a) => Some(edge),
-            [Some(edge), Some(other)] if edge == other => Some(edge),
-            _ => None,
-        }
+    /// Whether a vertex was given with the surface.
+    pub fn is_of_surface(&self, v: u32) -> bool {
+        v < self.surface_vertices
     }
 
     /// Notes where on the surface a Steiner point lies.
@@ -168,53 +162,6 @@ impl Constraints {
         self.places[(p - self.surface_vertices) as usize] = None;
     }
 
-    /// Whether vertices of a tet, or of a wall and a point at the given place, lie in one plane or three of them on one line but for
-    /// rounding: they lie on the same edge or triangle of the surface, or on what three of its vertices span. Such a tet may be
-    /// positive, yet nothing can be done with it.
-    pub fn is_flat(&self, vertices: &[u32], place: Option<Place>) -> bool {
-        // The vertices of the surface that span each, its own number for any other.
-        let mut spans = [[0u32; 3]; 4];
-        let mut lengths = [0; 4];
-        let places = vertices.iter().map(|&v| (v, self.place(v)));
-        for (i, (v, place)) in places.chain(place.map(|p| (0, Some(p)))).enumerate() {
-            lengths[i] = match place {
-                None => {
-                    spans[i][0] = v;
-                    1
-                }
-                Some(Place::Edge(edge)) => {
-                    spans[i][..2].copy_from_slice(&edge);
-                    2
-                }
-                Some(Place::Triangle(t)) => {
-                    spans[i] = self.facets[t as usize].vertices;
-                    3
-                }
-            };
-        }
-        let spanned = |which: &[usize]| {
-            let mut all = [0u32; 12];
-            let mut n = 0;
-            for &i in which {
-                for &v in &spans[i][..lengths[i]] {
-                    if !all[..n].contains(&v) {
-                        all[n] = v;
-                        n += 1;
-                    }
-                }
-            }
-            n
-        };
-        spanned(&[0, 1, 2, 3]) < 4
-            || [[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]].iter().any(|three| spanned(three) < 3)
-    }
-
-    /// Whether vertices lie on one edge of the surface.
-    pub fn on_one_edge(&self, vertices: [u32; 3]) -> bool {
-        let Some(edge) = vertices.iter().find_map(|&v| self.edge_at(v)) else { return false };
-        vertices.iter().all(|&v| edge.contains(&v) || self.edge_at(v) == Some(edge))
-    }
-
     /// The facets in use, in ascending order.
     pub fn alive(&self) -> impl Iterator<Item = u32> + '_ {
         (0..self.facets.len() as u32).filter(|&f| !self.facets[f as usize].gone)
@@ -224,15 +171,6 @@ impl Constraints {
     pub fn facets_at(&self, vertex: u32) -> Vec<u32> {
         let at = self.at_steiner.get(&vertex).into_iter().flatten().copied();
         at.filter(|&f| !self.facets[f as usize].gone).collect()
-    }
-
-    /// The facets at an edge, in ascending order. Looks at all where both ends are vertices of the surface.
-    pub fn facets_at_edge(&self, a: u32, b: u32) -> Vec<u32> {
-        let has_both = |f: &u32| [a, b].iter().all(|v| self.facets[*f as usize].vertices.contains(v));
-        match a.max(b) {
-            v if v >= self.surface_vertices => self.facets_at(v).into_iter().filter(has_both).collect(),
-            _ => self.alive().filter(has_both).collect(),
-        }
     }
 }
 
@@ -260,42 +198,5 @@ impl Hasher for VertexHasher {
 
     fn write_usize(&mut self, _: usize) {
         // Array lengths: always the same.
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn vertices_on_one_edge_or_triangle_make_flat_tets() {
-        // Two triangles at the edge 0, 1; points 4 and 5 on it, 6 inside the first triangle, 7 on the edge 1, 2, 8 on no surface.
-        let mut constraints = Constraints::new(&[[0, 1, 2], [1, 0, 3]]);
-        for (p, place) in [
-            (4, Place::Edge([0, 1])),
-            (5, Place::Edge([0, 1])),
-            (6, Place::Triangle(0)),
-            (7, Place::Edge([1, 2])),
-        ] {
-            constraints.set_place(p, place);
-        }
-        for (tet, flat) in [
-            ([0, 1, 2, 3], false),
-            ([0, 4, 2, 3], false),
-            // Three on one line.
-            ([0, 4, 5, 8], true),
-            ([4, 5, 2, 8], false),
-            // Four in one plane.
-            ([0, 4, 2, 7], true),
-            ([0, 1, 2, 6], true),
-            ([4, 5, 7, 6], true),
-            ([4, 5, 7, 3], false),
-            ([0, 7, 6, 8], false),
-        ] {
-            assert_eq!(constraints.is_flat(&tet, None), flat, "{tet:?}");
-        }
-        assert!(constraints.is_flat(&[0, 4, 8], Some(Place::Edge([0, 1]))));
-        assert!(constraints.is_flat(&[4, 2, 7], Some(Place::Triangle(0))));
-        assert!(!constraints.is_flat(&[4, 2, 7], Some(Place::Triangle(1))));
     }
 }

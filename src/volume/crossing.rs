@@ -1,7 +1,7 @@
 //! What stands in the way of a missing edge or face: the faces and edges of the mesh that it crosses.
 
 use super::tetrahedra::{NONE, Ring, Tetrahedra};
-use crate::kernel::predicates::{Sign, orient2d};
+use crate::kernel::predicates::Sign;
 
 /// What a missing edge meets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -109,72 +109,6 @@ fn leaves_tet(mesh: &Tetrahedra, half_face: u32, a: u32, b: u32) -> Option<Cross
         [i] => Some(Crossing::Edge(t, [apex, [x, y, z][i]])),
         _ => Some(Crossing::Vertex(apex)),
     }
-}
-
-/// What a missing face meets.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) enum Piercing {
-    /// Edges of the mesh, each with a tet, that go through its interior.
-    Edges(Vec<(u32, [u32; 2])>),
-    /// A vertex in its plane lies on it.
-    Vertex,
-}
-
-/// The edges of the mesh that pierce a missing face whose own edges are all in the mesh.
-///
-/// From the tet at edge a, b into which the face runs, through all tets that it cuts: as its outline consists of
-/// mesh edges, a tet that it cuts is cut right through.
-pub(super) fn piercing(mesh: &mut Tetrahedra, [a, b, c]: [u32; 3], star: &mut Vec<u32>) -> Piercing {
-    let at_edge = mesh.tet_at_edge(a, b, star).expect("the face's edges are in the mesh");
-    let mut ring = Ring::default();
-    assert!(mesh.ring(at_edge, a, b, &mut ring), "edge {a} {b} lies outside");
-    let n = ring.tets.len();
-    let mut first = None;
-    for i in 0..n {
-        let (r, s) = (ring.vertices[i], ring.vertices[(i + 1) % n]);
-        match (mesh.side([a, b, r], c), mesh.side([a, b, s], c)) {
-            (Sign::Positive, Sign::Negative) => first = Some((ring.tets[i], [r, s])),
-            (Sign::Zero, _) if same_side(mesh, a, b, r, c) => return Piercing::Vertex,
-            _ => {}
-        }
-    }
-    // A facet whose corners lie on one line, by the rounding of a Steiner point, leads nowhere.
-    let Some(first) = first else { return Piercing::Edges(Vec::new()) };
-    let mut edges = vec![first];
-    let mut next = 0;
-    while let Some(&(tet, [r, s])) = edges.get(next) {
-        next += 1;
-        if !mesh.ring(tet, r, s, &mut ring) {
-            continue;
-        }
-        for &t in &ring.tets {
-            let signs = mesh.tets[t as usize]
-                .map(|v| if [a, b, c].contains(&v) { Sign::Zero } else { mesh.side([a, b, c], v) });
-            for i in 0..4 {
-                for j in i + 1..4 {
-                    let (u, v) = (mesh.tets[t as usize][i], mesh.tets[t as usize][j]);
-                    let cut = signs[i] != Sign::Zero && signs[i] == signs[j].flipped();
-                    if cut && !edges.iter().any(|&(_, e)| e == [u, v] || e == [v, u]) {
-                        edges.push((t, [u, v]));
-                    }
-                }
-                let v = mesh.tets[t as usize][i];
-                if signs[i] == Sign::Zero && ![a, b, c].contains(&v) {
-                    return Piercing::Vertex;
-                }
-            }
-        }
-    }
-    Piercing::Edges(edges)
-}
-
-/// Whether c and d, in one plane with the line through a and b, lie on the same side of it.
-fn same_side(mesh: &Tetrahedra, a: u32, b: u32, c: u32, d: u32) -> bool {
-    let [a, b, c, d] = [a, b, c, d].map(|v| mesh.point(v));
-    [[0, 1], [1, 2], [2, 0]].iter().any(|&[i, j]| {
-        let side = |p: &crate::Point| orient2d([a[i], a[j]], [b[i], b[j]], [p[i], p[j]]);
-        side(c) != Sign::Zero && side(c) == side(d)
-    })
 }
 
 /// The edges of a tet.

@@ -1,178 +1,98 @@
-//! Steiner points exactly on the surface.
-//!
-//! A point of an edge a, b is a + t(b − a), one of a triangle a, b, c is a + s(b − a) + t(c − a). With dyadic t and s such points are integers
-//! in a small enough unit ([`Fixed`]), so all signs stay exact and nothing has to be told apart from rounding (with implicit points:
-//! Diazzi, Panozzo, Vaxman, Attene 2023, section 4). A point that is starred into the tets around what is crossed need not lie where it is crossed: near enough
-//! it sees all walls, so a number with enough bits always does. Where there is most room few bits are enough, and that is tried first.
+//! Vertices at places that are no doubles, and signs with them.
 
-use super::clearance::{Plane, most_inside};
-use super::constraints::{Facet, Place};
-use super::crossing::{Crossing, tets_around};
-use super::recover::Recovery;
-use super::steiner::Room;
-use super::tetrahedra::{NONE, Tetrahedra};
-use crate::kernel::fixed::{Fixed, Volume, bits_of, share, volume};
-use crate::kernel::predicates::Sign;
-use crate::kernel::simplex::area_vector;
-use crate::{Point, Vector};
-use std::collections::BTreeSet;
+use super::tetrahedra::Tetrahedra;
+use crate::Point;
+use crate::kernel::fixed::{Fixed, orient2d_fixed, orient3d_fixed, orient3d_rounded};
+use crate::kernel::predicates::{Sign, orient2d, orient3d};
 
-/// How many bits are tried where there is no room to be seen in floating point: more each time, up to what [`Fixed`] holds.
-const BITS: usize = 8;
-
-/// A point takes in no more tets.
-const MOST_TETS: usize = 64;
-
-/// No number has more.
-const MOST_BITS: usize = 240;
-
-impl Recovery<'_> {
-    /// Puts a Steiner point on an edge of the surface, or a kept one, where a piece of it meets the mesh.
-    pub(super) fn split_exactly(
-        &mut self,
-        edge: [u32; 2],
-        [a, b]: [u32; 2],
-        crossing: Crossing,
-        others: &[Crossing],
-    ) -> Option<u32> {
-        let tets = tets_around(self.mesh, crossing);
-        let more: BTreeSet<u32> = others.iter().flat_map(|&c| tets_around(self.mesh, c)).collect();
-        let plane = self.plane_of(edge, crossing, &tets)?;
-        let point = self.crossing_point(a, b, crossing);
-        let place = Place::Edge(edge);
-        let room = self.room_on_line(a, b, place);
-        let [from, to] = edge.map(|v| *self.mesh.point(v));
-        let along = to - from;
-        let part = |p: &Point| [(p - from).dot(&along) / along.norm_squared()];
-        let exact = |mesh: &Tetrahedra| {
-            let [p, q] = edge.map(|v| volume_between(mesh, plane, v));
-            [share(p, [p, q], MOST_BITS)]
-        };
-        self.star_exactly((&tets, &more), edge, (&point, &room), part, exact)
+impl Tetrahedra {
+    /// Adds a vertex without tets at an exact place.
+    pub fn add_exact_point(&mut self, place: &Fixed) -> u32 {
+        let rounded = place.rounded();
+        let v = self.add_point(rounded);
+        if Fixed::of(&rounded) != Some(*place) {
+            self.exact.resize(self.points.len(), None);
+            self.exact[v as usize] = Some(Box::new(*place));
+        }
+        v
     }
 
-    /// Three vertices whose plane an edge passes through where it meets the mesh.
-    fn plane_of(&self, [a, _]: [u32; 2], crossing: Crossing, tets: &[u32]) -> Option<[u32; 3]> {
-        match crossing {
-            Crossing::Face(half_face) => Some(self.mesh.face(half_face)),
-            Crossing::Edge(_, [u, v]) => {
-                let around = tets.iter().flat_map(|&t| self.mesh.tets[t as usize]);
-                let beside = |w: &u32| ![u, v].contains(w) && self.mesh.side([u, v, a], *w) != Sign::Zero;
-                around.into_iter().find(beside).map(|w| [u, v, w])
-            }
-            Crossing::Vertex(_) => None,
+    /// The exact place of a vertex, if that differs from its rounded one.
+    fn exact(&self, vertex: u32) -> Option<&Fixed> {
+        self.exact.get(vertex as usize)?.as_deref()
+    }
+
+    /// Whether the coordinates of all vertices are such that exact places on their edges and triangles can be told.
+    pub fn fits_exact(&self) -> bool {
+        self.points.iter().all(|p| Fixed::of(p).is_some())
+    }
+
+    /// Whether a vertex is only near the point it has.
+    pub fn is_rounded(&self, vertex: u32) -> bool {
+        self.exact(vertex).is_some()
+    }
+
+    /// From now on all vertices are where their points are.
+    pub fn forget_exact(&mut self) {
+        self.exact.clear();
+    }
+
+    /// Puts a vertex at its rounded place if all tets at it stay positive so; uses the marks.
+    pub fn round_in_place(&mut self, vertex: u32) -> bool {
+        let Some(place) = self.exact.get_mut(vertex as usize).and_then(Option::take) else { return true };
+        let mut star = Vec::new();
+        self.star(vertex, &mut star);
+        let is_positive = |&t: &u32| {
+            let [a, b, c, d] = self.tets[t as usize];
+            self.side([a, b, c], d) == Sign::Positive
+        };
+        let stays = star.iter().all(is_positive);
+        if !stays {
+            self.exact[vertex as usize] = Some(place);
+        }
+        stays
+    }
+
+    /// The exact place of a vertex.
+    ///
+    /// # Panics
+    /// Where its coordinates are too large or too small for [`Fixed`].
+    pub fn place(&self, vertex: u32) -> Fixed {
+        match self.exact(vertex) {
+            Some(place) => *place,
+            None => Fixed::of(self.point(vertex)).expect("coordinates that fit"),
         }
     }
 
-    /// Puts a Steiner point in a triangle of the surface where an edge of the mesh goes through it.
-    pub(super) fn pierce_exactly(
-        &mut self,
-        facet: Facet,
-        tet: u32,
-        [u, v]: [u32; 2],
-        more: &BTreeSet<u32>,
-    ) -> Option<u32> {
-        let tets = tets_around(self.mesh, Crossing::Edge(tet, [u, v]));
-        let triangle = facet.vertices;
-        let point = self.piercing_point(triangle, [u, v]);
-        let room = self.room_in_facet(facet);
-        let corners = triangle.map(|v| *self.mesh.point(v));
-        let part = |p: &Point| {
-            let [a, b, c] = &corners;
-            let normal = area_vector(a, b, c);
-            [area_vector(a, p, c), area_vector(a, b, p)].map(|n| n.dot(&normal) / normal.norm_squared())
-        };
-        let exact = |mesh: &Tetrahedra| {
-            let [a, b, c] = triangle;
-            let [p, q, r] = [[b, c], [c, a], [a, b]].map(|[x, y]| volume_between(mesh, [u, v, x], y));
-            [q, r].map(|side| share(side, [p, q, r], MOST_BITS))
-        };
-        self.star_exactly((&tets, more), triangle, (&point, &room), part, exact)
+    /// The sign of the volume of four vertices.
+    pub(super) fn exact_side(&self, tet: [u32; 4]) -> Sign {
+        let [a, b, c, d] = tet.map(|v| self.point(v));
+        if tet.iter().all(|&v| !self.is_rounded(v)) {
+            return orient3d(a, b, c, d);
+        }
+        orient3d_rounded([a, b, c, d])
+            .unwrap_or_else(|| orient3d_fixed(tet.map(|v| self.place(v)).each_ref()))
     }
 
-    /// Stars tets from a point of the edge or triangle between `corners`: near a place where it has most room, else near enough to where
-    /// that is crossed. `part` gives the weights of all corners but the first at a place, `exact` those where it is crossed.
-    fn star_exactly<const N: usize, const K: usize>(
-        &mut self,
-        (tets, more): (&[u32], &BTreeSet<u32>),
-        corners: [u32; N],
-        (near, room): (&Point, &Room),
-        part: impl Fn(&Point) -> [f64; K],
-        exact: impl Fn(&Tetrahedra) -> [Vec<bool>; K],
-    ) -> Option<u32> {
-        if tets.is_empty() || self.steiner.len() >= self.most_steiner {
-            return None;
+    /// The sign of the volume between a face and a point; zero where that is not known, as its coordinates do not fit [`Fixed`].
+    pub fn side_of(&self, face: [u32; 3], point: &Point) -> Sign {
+        let [a, b, c] = face.map(|v| self.point(v));
+        if face.iter().all(|&v| !self.is_rounded(v)) {
+            return orient3d(a, b, c, point);
         }
-        self.cavity.take(self.mesh, tets);
-        let corners = corners.map(|v| self.mesh.place(v));
-        let ways: [Fixed; K] = std::array::from_fn(|k| corners[k + 1].minus(&corners[0]));
-        let walls = self.cavity.walls.iter().filter_map(|&wall| Plane::of(self.mesh.face_points(wall)));
-        let planes: Vec<Plane> = walls.chain(room.ends.iter().copied()).collect();
-        let (best, radius) = most_inside(near, &room.axes, &planes);
-        let reach = room.axes.iter().map(Vector::norm).fold(0.0, f64::max);
-        if radius > 0.0 {
-            // The place may be off by a quarter of the radius.
-            let bits =
-                ((reach / radius).log2().ceil() + 2.0).clamp(1.0, f64::from(f64::MANTISSA_DIGITS)) as usize;
-            let weights = part(&best).map(|t| bits_of(t.clamp(0.0, 1.0), bits));
-            let place = corners[0].along(ways, weights.each_ref().map(|bits| &bits[..]));
-            if let Some(p) = place.and_then(|place| self.star_from(tets, more, &place, room.place)) {
-                return Some(p);
-            }
-        }
-        let weights = exact(self.mesh);
-        (BITS..=MOST_BITS).step_by(BITS).find_map(|bits| {
-            let place = corners[0].along(ways, weights.each_ref().map(|all| &all[..bits]))?;
-            self.star_from(tets, more, &place, room.place)
+        orient3d_rounded([a, b, c, point]).unwrap_or_else(|| {
+            let [a, b, c] = face.map(|v| self.place(v));
+            Fixed::of(point).map_or(Sign::Zero, |point| orient3d_fixed([&a, &b, &c, &point]))
         })
     }
 
-    /// Stars the tets of the cavity from a place if all its walls see that.
-    fn star_from(&mut self, tets: &[u32], more: &BTreeSet<u32>, at: &Fixed, place: Place) -> Option<u32> {
-        let points = self.mesh.points.len();
-        let p = self.mesh.add_exact_point(at);
-        let sees = |&wall: &u32| self.mesh.side(self.mesh.face(wall), p) == Sign::Negative;
-        if !self.cavity.walls.iter().all(sees) {
-            self.mesh.forget_points(points);
-            return None;
+    /// The sign of the area of three vertices' shadow on a coordinate plane.
+    pub fn turn(&self, [i, j]: [usize; 2], triangle: [u32; 3]) -> Sign {
+        if triangle.iter().any(|&v| self.is_rounded(v)) {
+            orient2d_fixed([i, j], triangle.map(|v| self.place(v)).each_ref())
+        } else {
+            let [a, b, c] = triangle.map(|v| self.point(v)).map(|p| [p[i], p[j]]);
+            orient2d(a, b, c)
         }
-        self.take_more(tets, more, p);
-        let body = self.mesh.bodies[tets[0] as usize];
-        self.cavity.fill(self.mesh, p, body);
-        self.constraints.set_place(p, place);
-        self.steiner.push(p);
-        self.counts.steiner += 1;
-        Some(p)
     }
-
-    /// Takes tets and `more` beside them as long as all walls see a point and what must stay does so.
-    fn take_more(&mut self, tets: &[u32], more: &BTreeSet<u32>, p: u32) {
-        let mut tets = tets.to_vec();
-        self.cavity.take(self.mesh, &tets);
-        let mut open = self.cavity.walls.clone();
-        while let Some(wall) = open.pop() {
-            let behind = self.mesh.across(wall);
-            let t = behind >> 2;
-            if behind == NONE || tets.len() == MOST_TETS || !more.contains(&t) || tets.contains(&t) {
-                continue;
-            }
-            let outer = |h: &u32| !tets.contains(&(self.mesh.across(*h) >> 2));
-            let walls: Vec<u32> = (4 * t..4 * t + 4).filter(|h| *h != behind).filter(outer).collect();
-            if walls.iter().any(|&h| self.mesh.side(self.mesh.face(h), p) != Sign::Negative) {
-                continue;
-            }
-            tets.push(t);
-            self.cavity.take(self.mesh, &tets);
-            if self.cavity.is_simple() && self.keeps_edges(&tets) {
-                open.extend(walls);
-            } else {
-                tets.pop();
-            }
-        }
-        self.cavity.take(self.mesh, &tets);
-    }
-}
-
-fn volume_between(mesh: &Tetrahedra, [a, b, c]: [u32; 3], d: u32) -> Volume {
-    volume([a, b, c, d].map(|v| mesh.place(v)).each_ref())
 }

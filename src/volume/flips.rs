@@ -13,8 +13,9 @@ use crate::kernel::quality::mean_ratio;
 const LONGEST_RING: usize = 16;
 
 /// Where vertices of the surface lie in one plane up to rounding, tets of them have a mean ratio of 10⁻¹¹ or so; between sheets that are 10⁻⁹ of the
-/// diagonal apart some have 10⁻⁶.
-const FLAT: f64 = 1e-9;
+/// diagonal apart some have 10⁻⁶. Flatter tets are made where nothing else helps: among needles
+/// all are.
+pub(super) const FLAT: f64 = 1e-9;
 
 /// Why a flip was not made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,39 +35,22 @@ pub(super) struct Flips {
     pub count: u64,
     /// How many more edges may be tried in order to help: see [`Flips::remove_edge_with_help`].
     pub budget: u32,
-    /// Whether tets that rounding alone makes positive must not be made. They stand between Steiner points and where these are to go
-    /// (`relocate`), but as steps on the way they help: without them few blocks with notches are recovered in the first attempt.
-    pub never_flat: bool,
-    /// The vertices from here on are Steiner points.
-    first_steiner: u32,
+    /// No tet of a smaller mean ratio is made.
+    pub least: f64,
     ring: Ring,
     new: Vec<[u32; 4]>,
     best: Vec<(f64, u32)>,
 }
 
 impl Flips {
-    /// For a mesh whose vertices from `first_steiner` on are Steiner points.
-    pub fn new(first_steiner: u32) -> Self {
-        Self { first_steiner, ..Self::default() }
-    }
-
-    /// Whether rounding alone makes a tet at a Steiner point positive.
-    pub fn is_flat(&self, constraints: &Constraints, tet: [u32; 4]) -> bool {
-        tet.iter().any(|&v| v >= self.first_steiner) && constraints.is_flat(&tet, None)
-    }
-
-    /// The mean ratio of a positive tet, by exact sign; 0 for one that rounding alone makes positive; below every quality for any
-    /// that must not be made.
-    fn quality(&self, mesh: &Tetrahedra, constraints: &Constraints, tet: [u32; 4]) -> f64 {
+    /// The mean ratio of a tet that is positive by exact sign; below every quality for any that must not be made.
+    fn quality(&self, mesh: &Tetrahedra, tet: [u32; 4]) -> f64 {
         if mesh.side([tet[0], tet[1], tet[2]], tet[3]) != Sign::Positive {
             return f64::NEG_INFINITY;
         }
-        if self.is_flat(constraints, tet) {
-            return if self.never_flat { f64::NEG_INFINITY } else { 0.0 };
-        }
         let [a, b, c, d] = tet.map(|v| mesh.point(v));
         let quality = mean_ratio(a, b, c, d).max(0.0);
-        if self.never_flat && quality < FLAT { f64::NEG_INFINITY } else { quality }
+        if quality < self.least { f64::NEG_INFINITY } else { quality }
     }
 
     /// Replaces a face by the edge between the two vertices opposite to it (2-3).
@@ -83,7 +67,7 @@ impl Flips {
         }
         let (d, e) = (mesh.apex(half_face), mesh.apex(other));
         let new = [[d, e, a, b], [d, e, b, c], [d, e, c, a]];
-        if new.iter().any(|&tet| self.quality(mesh, constraints, tet) < 0.0) {
+        if new.iter().any(|&tet| self.quality(mesh, tet) < 0.0) {
             return Err(Refused::Inverted);
         }
         self.made.clear();
@@ -116,14 +100,13 @@ impl Flips {
         let through_chord = match chord {
             [Some(i), Some(j)] if i.abs_diff(j) > 1 && i.abs_diff(j) < n - 1 => {
                 let (i, j) = (i.min(j), i.max(j));
-                self.fill_polygon(mesh, constraints, [a, b], i, j)
-                    && self.fill_polygon(mesh, constraints, [a, b], j, i + n)
+                self.fill_polygon(mesh, [a, b], i, j) && self.fill_polygon(mesh, [a, b], j, i + n)
             }
             _ => false,
         };
         if !through_chord {
             self.new.clear();
-            if !self.fill_polygon(mesh, constraints, [a, b], 0, n - 1) {
+            if !self.fill_polygon(mesh, [a, b], 0, n - 1) {
                 return Err(Refused::Inverted);
             }
         }
@@ -177,14 +160,7 @@ impl Flips {
 
     /// Triangulates the ring's vertices from `first` to `last` (counted on round the ring) and appends the tets
     /// on both sides to `new`; false where some tet would not be positive.
-    fn fill_polygon(
-        &mut self,
-        mesh: &Tetrahedra,
-        constraints: &Constraints,
-        edge: [u32; 2],
-        first: usize,
-        last: usize,
-    ) -> bool {
+    fn fill_polygon(&mut self, mesh: &Tetrahedra, edge: [u32; 2], first: usize, last: usize) -> bool {
         let n = last - first + 1;
         if n < 3 {
             return true;
@@ -207,9 +183,7 @@ impl Flips {
                     if sides <= best.0 {
                         continue;
                     }
-                    let worst = tets(i, k, j)
-                        .iter()
-                        .fold(sides, |q, &tet| q.min(self.quality(mesh, constraints, tet)));
+                    let worst = tets(i, k, j).iter().fold(sides, |q, &tet| q.min(self.quality(mesh, tet)));
                     if worst > best.0 {
                         best = (worst, k as u32);
                     }

@@ -1,7 +1,7 @@
 //! Points that the recovery left inside: moved where they are in the way, deleted where they are not needed.
 
 use super::constraints::Constraints;
-use super::relocate::{GOOD_ENOUGH, Sector, find_place, worst};
+use super::sector::{GOOD_ENOUGH, Sector, find_place, worst};
 use super::small::{self, Effort};
 use super::tetrahedra::{NONE, Tetrahedra};
 use crate::kernel::quality::mean_ratio;
@@ -23,14 +23,8 @@ const MOST_VERTICES: usize = 24;
 /// the time.
 const MOST_TO_GROW: usize = 14;
 
-/// Gives the points inside at the balls of others better places; appends the new tets to `made`.
-pub(super) fn make_room(
-    mesh: &mut Tetrahedra,
-    constraints: &Constraints,
-    of: &[u32],
-    inside: &mut [u32],
-    made: &mut Vec<u32>,
-) {
+/// Gives the points inside at the balls of others better places.
+pub(super) fn make_room(mesh: &mut Tetrahedra, constraints: &Constraints, of: &[u32], inside: &mut [u32]) {
     for q in inside {
         let mut ball = Vec::new();
         mesh.star(*q, &mut ball);
@@ -44,7 +38,7 @@ pub(super) fn make_room(
         }
         let points = mesh.points.len();
         let new = mesh.add_point(place);
-        if refill(mesh, constraints, &sector, &sector.star_of(new), made) {
+        if refill(mesh, constraints, &sector, &sector.star_of(new)) {
             mesh.at_vertex[*q as usize] = NONE;
             *q = new;
         } else {
@@ -100,7 +94,7 @@ pub(super) fn delete_one(mesh: &mut Tetrahedra, constraints: &Constraints, q: u3
             .then(|| small::fill(mesh, &old.skin, &[], least, &mut effort))?;
         Some((old, new?))
     });
-    let done = filled.is_some_and(|(old, new)| refill(mesh, constraints, &old, &new, &mut Vec::new()));
+    let done = filled.is_some_and(|(old, new)| refill(mesh, constraints, &old, &new));
     if done {
         mesh.at_vertex[q as usize] = NONE;
     }
@@ -115,13 +109,13 @@ pub(super) fn cavity(mesh: &Tetrahedra, tets: Vec<u32>) -> Sector {
     Sector::inside(mesh, mesh.bodies[tets[0] as usize], tets, walls)
 }
 
+/// Puts other tets into a cavity; false where they do not fit.
 pub(super) fn refill(
     mesh: &mut Tetrahedra,
     constraints: &Constraints,
     sector: &Sector,
     tets: &[[u32; 4]],
-    made: &mut Vec<u32>,
 ) -> bool {
     let tets: Vec<([u32; 4], u32)> = tets.iter().map(|&tet| (tet, sector.body)).collect();
-    mesh.rebuild(&sector.tets, &tets, &|face| constraints.facet(face).is_some(), made)
+    mesh.rebuild(&sector.tets, &tets, &|face| constraints.facet(face).is_some(), &mut Vec::new())
 }

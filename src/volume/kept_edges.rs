@@ -14,13 +14,14 @@
 //!
 //! Where the search finds nothing the point stays: the edge is then a chain of edges of the mesh.
 
-use super::constraints::{Constraints, Place};
+use super::constraints::Constraints;
 use super::crossing::{Crossing, trace};
 use super::recover::{DEEPEST, Recovery};
 use super::small::{self, Effort};
+use super::steiner::middle_first;
 use super::tetrahedra::{NONE, Tetrahedra};
 use super::{ClosedSurface, Report, VolumeError};
-use crate::kernel::predicates::{Sign, orient3d};
+use crate::kernel::predicates::Sign;
 use crate::{Point, Vector};
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
@@ -116,18 +117,30 @@ fn keep_edges(
     }
     let mut recovery = Recovery::new(mesh, constraints, 0);
     let mut split = Vec::new();
+    let most = if recovery.mesh.fits_exact() { MOST_ON_EDGE } else { 0 };
     for (i, &[a, b]) in wanted.iter().enumerate() {
         recovery.give_help(HELP);
-        recovery.most_steiner = recovery.steiner.len() + MOST_ON_EDGE;
+        recovery.most_steiner = recovery.steiner.len() + most;
         split.extend(recovery.keep_edge(a, b).map_err(|fault| (i, fault))?);
     }
     let mut left = split;
     for depth in 0..=DEEPEST {
         recovery.give_help(HELP * left.len());
-        left.retain(|&p| !recovery.leave(p, depth));
+        left.retain(|p| match recovery.leave(*p, depth) {
+            Some(added) => {
+                report.steiner_inside += added;
+                false
+            }
+            None => true,
+        });
     }
-    report.steiner_inside += recovery.helping.len();
     report.on_kept_edges = left.len();
+    if let Some(p) = left.into_iter().find(|&p| !mesh.round_in_place(p)) {
+        let line = constraints.line_of(p, p);
+        let index = wanted.iter().position(|&[a, b]| line == [a.min(b), a.max(b)]).expect("a kept edge");
+        return Err((index, KeptEdgeFault::NotRecovered));
+    }
+    mesh.forget_exact();
     mesh.keep_edges(constraints.kept_edges());
     Ok(())
 }
@@ -176,30 +189,25 @@ impl Recovery<'_> {
     fn split_kept_edge(&mut self, a: u32, b: u32) -> Option<u32> {
         let found = self.what_is_met(a, b).ok()?;
         let edge = self.constraints.line_of(a, b);
-        let room = self.room_on_line(a, b, Place::Edge(edge));
-        self.split_at(a, b, &found, &room)
+        middle_first(&found).find_map(|crossing| self.split_exactly(edge, [a, b], crossing, &found))
     }
 
-    /// Takes a point off the kept edge that it splits, if that can be.
-    fn leave(&mut self, p: u32, depth: u32) -> bool {
-        let [u, w] = self.constraints.kept_neighbours(p)[..] else { return false };
+    /// Takes a point off the kept edge that it splits, if that can be; how many points stand around it then.
+    fn leave(&mut self, p: u32, depth: u32) -> Option<usize> {
+        let [u, w] = self.constraints.kept_neighbours(p)[..] else { return None };
         self.thin_out(p, depth);
         let points = self.mesh.points.len();
         self.mesh.star(p, &mut self.star);
         let skin: Vec<[u32; 3]> = self.star.iter().map(|&t| opposite(self.mesh, t, p)).collect();
-        let Some(tets) = around(self.mesh, &skin, [u, w]).or_else(|| surround(self.mesh, &skin, [u, p, w]))
-        else {
-            return false;
-        };
+        let tets = around(self.mesh, &skin, [u, w]).or_else(|| surround(self.mesh, &skin, [u, p, w]))?;
         let body = self.mesh.bodies[self.star[0] as usize];
         self.mesh.replace(&self.star, &tets, body, &mut self.flips.made);
         self.mesh.at_vertex[p as usize] = NONE;
-        self.helping.extend(points as u32..self.mesh.points.len() as u32);
         for end in [u, w] {
             self.constraints.forget_edge(end, p);
         }
         self.constraints.keep_edge(u, w);
-        true
+        Some(self.mesh.points.len() - points)
     }
 
     /// Removes what edges it can at a point but for those to be kept: the fewer there are the easier it leaves.
@@ -236,8 +244,8 @@ fn around(mesh: &Tetrahedra, skin: &[[u32; 3]], [u, w]: [u32; 2]) -> Option<Vec<
 }
 
 fn is_positive(mesh: &Tetrahedra, tet: [u32; 4]) -> bool {
-    let [a, b, c, d] = tet.map(|v| mesh.point(v));
-    orient3d(a, b, c, d) == Sign::Positive
+    let [a, b, c, d] = tet;
+    mesh.side([a, b, c], d) == Sign::Positive
 }
 
 /// Tets that fill the ball of p with the edge u, w and three new points around it.

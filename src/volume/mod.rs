@@ -21,13 +21,11 @@
 //! A surface that meets itself is refused when it is made (`intersect`, over the tree of `boxes`). The steps, one file each:
 //! 1. `delaunay`: the boundary points, by exact cavities (`cavity`), in random rounds along the Hilbert curve; `ties` make it have the diagonals
 //!    of grids.
-//! 2. `recover`: edges, then facets, by `flips`; where none is left, by Steiner points for a while (`steiner`), where their cavity has most
-//!    room (`clearance`); `flat` flips away tets that rounding alone makes positive. Where that comes to no end the mesh is cut along the
-//!    surface (`conform`), by points exactly on it (`exact`).
+//! 2. `conform`: edges, then triangles: by `flips` (`recover`); where none is left, the mesh is cut along the surface, by Steiner points for a
+//!    while that lie exactly on it (`steiner`), where their cavity has most room (`clearance`).
 //! 3. `carve`: a flood from the triangles gives each tet its body and removes the outside.
-//! 4. `relocate`: Steiner points leave the surface: none or one stays inside on either side, found by search where no place sees
-//!    all it must (`stuck`). `inside` deletes those that are not needed, by a search for tets that fill the hole (`small`); `round` gives the others
-//!    places with doubles.
+//! 4. `relocate`: Steiner points leave the surface: none or one stays inside on either side of it (`sector`). `inside` deletes those that are not
+//!    needed, by a search for tets that fill the hole (`small`); `round` gives the others places with doubles.
 //! 5. `keep`, `kept_edges`: points and edges that the caller wants.
 //! 6. `points`: the inside by the size field: lattices where it is level (`lattice`), frontal Delaunay elsewhere, after flips that make
 //!    the mesh Delaunay again (`legalize`); sizes grow by a limited gradient whatever the field (`sizes`).
@@ -48,7 +46,6 @@ mod crossing;
 mod delaunay;
 mod exact;
 mod finish;
-mod flat;
 mod flips;
 mod inside;
 mod intersect;
@@ -64,11 +61,11 @@ mod relocate;
 mod round;
 #[cfg(test)]
 mod samples;
+mod sector;
 mod sectors;
 mod sizes;
 mod small;
 mod steiner;
-mod stuck;
 mod surface_faults;
 mod tetrahedra;
 mod ties;
@@ -129,7 +126,7 @@ pub struct Report {
     pub steiner_inside: usize,
     /// Points that had to stay on kept edges: each cuts one in two.
     pub on_kept_edges: usize,
-    /// How often the recovery was begun anew: by exact points on the surface, then by such in another order.
+    /// How often the recovery was begun anew, in another order.
     pub restarts: usize,
     /// Points added inside by the size field.
     pub points_inside: usize,
@@ -251,5 +248,7 @@ pub fn mesh(
     Ok((finish::finish(surface, tets, &kept, kept_edges, scale), report))
 }
 
+#[cfg(test)]
+mod hard_tests;
 #[cfg(test)]
 mod tests;

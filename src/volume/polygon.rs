@@ -2,7 +2,7 @@
 
 use super::tetrahedra::Tetrahedra;
 use crate::Point;
-use crate::kernel::predicates::{Sign, orient2d};
+use crate::kernel::predicates::Sign;
 use crate::kernel::simplex::area_vector;
 
 /// A coordinate plane on which a triangle has a counter-clockwise shadow.
@@ -17,30 +17,10 @@ impl Shadow {
         let (i, j) = ((axis + 1) % 3, (axis + 2) % 3);
         Self(if normal[axis] > 0.0 { [i, j] } else { [j, i] })
     }
-
-    fn cast(self, p: &Point) -> [f64; 2] {
-        self.0.map(|k| p[k])
-    }
-
-    /// Whether a triangle's shadow goes round counter-clockwise.
-    pub fn is_left(self, [a, b, c]: [&Point; 3]) -> bool {
-        self.turn(a, b, c) == Sign::Positive
-    }
-
-    fn turn(self, a: &Point, b: &Point, c: &Point) -> Sign {
-        orient2d(self.cast(a), self.cast(b), self.cast(c))
-    }
 }
 
 /// The triangles of a counter-clockwise polygon, by cutting its best ear first; `None` if there is no ear.
-///
-/// `on_line` tells of vertices on one line, up to rounding only: they are no ear.
-pub(super) fn triangulate(
-    mesh: &Tetrahedra,
-    shadow: Shadow,
-    polygon: &[u32],
-    on_line: impl Fn([u32; 3]) -> bool,
-) -> Option<Vec<[u32; 3]>> {
+pub(super) fn triangulate(mesh: &Tetrahedra, shadow: Shadow, polygon: &[u32]) -> Option<Vec<[u32; 3]>> {
     let mut left = polygon.to_vec();
     let mut triangles = Vec::with_capacity(left.len().saturating_sub(2));
     while left.len() >= 3 {
@@ -49,7 +29,7 @@ pub(super) fn triangulate(
         for i in 0..n {
             let ear = [left[(i + n - 1) % n], left[i], left[(i + 1) % n]];
             let shape = shape(mesh, ear);
-            if shape > best_shape && !on_line(ear) && is_ear(mesh, shadow, &left, ear) {
+            if shape > best_shape && is_ear(mesh, shadow, &left, ear) {
                 (best, best_shape) = (Some((i, ear)), shape);
             }
         }
@@ -85,13 +65,12 @@ mod tests {
             .map(|[x, y]| Point::new(1.0, x, y))
             .to_vec();
         let shadow = Shadow::of([&points[0], &points[2], &points[3]]);
-        let mesh = Tetrahedra::new(points.clone());
-        let triangles = triangulate(&mesh, shadow, &[0, 1, 2, 3, 4, 5], |_| false).unwrap();
+        let mesh = Tetrahedra::new(points);
+        let triangles = triangulate(&mesh, shadow, &[0, 1, 2, 3, 4, 5]).unwrap();
         assert_eq!(triangles.len(), 4);
         for t in triangles {
-            let [a, b, c] = t.map(|v| &points[v as usize]);
-            assert_eq!(shadow.turn(a, b, c), Sign::Positive);
+            assert_eq!(mesh.turn(shadow.0, t), Sign::Positive);
         }
-        assert_eq!(triangulate(&mesh, shadow, &[0, 1, 2], |_| false), None);
+        assert_eq!(triangulate(&mesh, shadow, &[0, 1, 2]), None);
     }
 }

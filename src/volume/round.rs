@@ -8,15 +8,16 @@
 
 use super::clearance::{Plane, most_inside};
 use super::constraints::Constraints;
+use super::flips::Flips;
 use super::inside::{cavity, delete_one, make_room, refill};
-use super::relocate::{Sector, best_own, find_place, worst};
-use super::stuck;
+use super::sector::{Sector, best_own, find_place, worst};
 use super::tetrahedra::{NONE, Tetrahedra};
+use crate::kernel::predicates::Sign;
 use crate::{Point, Vector};
 use std::collections::BTreeSet;
 
 /// How often all are tried in vain: as points beside them move they get room. Only then fillings are searched for, which takes long.
-const IN_VAIN: usize = 2;
+const IN_VAIN: usize = 4;
 
 /// How often a ball takes in what is behind its walls for one place.
 const GROWTHS: usize = 8;
@@ -34,20 +35,38 @@ pub(super) fn round(mesh: &mut Tetrahedra, constraints: &Constraints, inside: &m
             // Another point may have taken it in.
             if mesh.at_vertex[q as usize] != NONE {
                 let points = mesh.points.len() as u32;
-                round_one(mesh, constraints, q, inside, in_vain > 0);
+                if in_vain > 0 {
+                    thin_out(mesh, constraints, q);
+                }
+                round_one(mesh, constraints, q, in_vain > 0);
                 inside.extend(points..mesh.points.len() as u32);
             }
         }
         inside.retain(|&q| mesh.at_vertex[q as usize] != NONE);
         left = inside.iter().copied().filter(|&q| mesh.is_rounded(q)).collect();
         in_vain = if left.len() < before { 0 } else { in_vain + 1 };
-        make_room(mesh, constraints, &left, inside, &mut Vec::new());
+        make_room(mesh, constraints, &left, inside);
     }
     left
 }
 
+/// Flips away what edges it can at a point: the smaller its ball is the more room there is.
+fn thin_out(mesh: &mut Tetrahedra, constraints: &Constraints, q: u32) {
+    let (mut star, mut flips) = (Vec::new(), Flips::default());
+    mesh.star(q, &mut star);
+    let mut ends: Vec<u32> = star.iter().flat_map(|&t| mesh.tets[t as usize]).filter(|&v| v != q).collect();
+    ends.sort_unstable();
+    ends.dedup();
+    for v in ends {
+        if let Some(tet) = mesh.tet_at_edge(q, v, &mut star) {
+            // What cannot go stays.
+            let _ = flips.remove_edge(mesh, constraints, tet, [q, v], [NONE; 2]);
+        }
+    }
+}
+
 /// Moves a point to a place with doubles that sees all of its ball, or fills that without it, if need be after a `search`.
-fn round_one(mesh: &mut Tetrahedra, constraints: &Constraints, q: u32, inside: &[u32], search: bool) -> bool {
+fn round_one(mesh: &mut Tetrahedra, constraints: &Constraints, q: u32, search: bool) -> bool {
     let mut ball = Vec::new();
     mesh.star(q, &mut ball);
     let sector = cavity(mesh, ball);
@@ -58,7 +77,7 @@ fn round_one(mesh: &mut Tetrahedra, constraints: &Constraints, q: u32, inside: &
     let mut wider = sector.clone();
     let place = match find_place(mesh, &sector, q) {
         Some((_, place)) => Some(place),
-        None => take_in(mesh, &mut wider, q, inside),
+        None => take_in(mesh, constraints, &mut wider, q),
     };
     let points = mesh.points.len();
     if let Some(place) = place {
@@ -74,7 +93,7 @@ fn round_one(mesh: &mut Tetrahedra, constraints: &Constraints, q: u32, inside: &
 /// Fills a sector with other tets; false where they do not fit. Vertices that have none any more are told so.
 fn put(mesh: &mut Tetrahedra, constraints: &Constraints, sector: &Sector, tets: &[[u32; 4]]) -> bool {
     let old: BTreeSet<u32> = sector.tets.iter().flat_map(|&t| mesh.tets[t as usize]).collect();
-    let fits = refill(mesh, constraints, sector, tets, &mut Vec::new());
+    let fits = refill(mesh, constraints, sector, tets);
     if fits {
         for v in old {
             if !sector.skin.iter().any(|face| face.contains(&v)) {
@@ -86,7 +105,7 @@ fn put(mesh: &mut Tetrahedra, constraints: &Constraints, sector: &Sector, tets: 
 }
 
 /// A place with doubles that sees all of a ball and of the tets that this takes in.
-fn take_in(mesh: &Tetrahedra, ball: &mut Sector, q: u32, inside: &[u32]) -> Option<Point> {
+fn take_in(mesh: &Tetrahedra, constraints: &Constraints, ball: &mut Sector, q: u32) -> Option<Point> {
     let start = ball.clone();
     for place in places(mesh, ball, q) {
         for _ in 0..GROWTHS {
@@ -94,7 +113,7 @@ fn take_in(mesh: &Tetrahedra, ball: &mut Sector, q: u32, inside: &[u32]) -> Opti
                 return Some(place);
             }
             let grown = ball.grow(mesh, Some(&place));
-            if !grown || !ball.keeps_vertices(mesh, |v| v == q || inside.contains(&v)) {
+            if !grown || !ball.keeps_vertices(mesh, |v| !constraints.is_of_surface(v)) {
                 break;
             }
         }
@@ -111,7 +130,7 @@ fn places(mesh: &Tetrahedra, ball: &Sector, q: u32) -> Vec<Point> {
     let reach = ball.reach(mesh, &near);
     let axes = |size: f64| [Vector::x(), Vector::y(), Vector::z()].map(|axis| axis * size);
     let mut places = vec![near];
-    places.extend(stuck::where_most_is_seen(mesh, ball, &near));
+    places.extend(where_most_is_seen(mesh, ball, &near));
     places.extend(AWAY.map(|share| most_inside(&near, &axes(share * reach), &fixed).0));
     for share in AWAY {
         for way in axes(share * reach) {
@@ -119,4 +138,15 @@ fn places(mesh: &Tetrahedra, ball: &Sector, q: u32) -> Vec<Point> {
         }
     }
     places
+}
+
+/// The place that is farthest inside of all that a place near the surface sees; `None` if it does not see all that.
+fn where_most_is_seen(mesh: &Tetrahedra, sector: &Sector, near: &Point) -> Option<Point> {
+    let reach = sector.reach(mesh, near);
+    let sees = |from: &Point, face: &[u32; 3]| mesh.side_of(*face, from) == Sign::Negative;
+    let seen: Vec<[u32; 3]> = sector.skin.iter().filter(|face| sees(near, face)).copied().collect();
+    let planes: Vec<Plane> = seen.iter().filter_map(|f| Plane::of(f.map(|v| mesh.point(v)))).collect();
+    let axes = [Vector::x(), Vector::y(), Vector::z()].map(|axis| axis * reach);
+    let (place, _) = most_inside(near, &axes, &planes);
+    seen.iter().all(|face| sees(&place, face)).then_some(place)
 }

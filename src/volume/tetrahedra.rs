@@ -5,8 +5,8 @@
 //! face also says where one arrives. A **locked** face belongs to the boundary and stays for ever.
 
 use crate::Point;
-use crate::kernel::fixed::{Fixed, orient2d_fixed, orient3d_fixed, orient3d_rounded};
-use crate::kernel::predicates::{Sign, insphere, orient2d, orient3d};
+use crate::kernel::fixed::Fixed;
+use crate::kernel::predicates::{Sign, insphere, orient3d};
 use crate::kernel::sphere::Circumsphere;
 use crate::mesh::TET_FACES;
 
@@ -43,7 +43,7 @@ pub(super) struct Tetrahedra {
     /// The places of the vertices; rounded for those that have an exact place beside it.
     pub points: Vec<Point>,
     /// The exact places of vertices whose coordinates are no doubles. Empty where there are none.
-    exact: Vec<Option<Box<Fixed>>>,
+    pub(super) exact: Vec<Option<Box<Fixed>>>,
     /// Vertices, positively oriented; a freed slot has `NONE` first.
     pub tets: Vec<[u32; 4]>,
     /// The half-face across each face, or `NONE`.
@@ -101,48 +101,6 @@ impl Tetrahedra {
         self.points.push(point);
         self.at_vertex.push(NONE);
         (self.points.len() - 1) as u32
-    }
-
-    /// Adds a vertex without tets at an exact place.
-    pub fn add_exact_point(&mut self, place: &Fixed) -> u32 {
-        let rounded = place.rounded();
-        let v = self.add_point(rounded);
-        if Fixed::of(&rounded) != Some(*place) {
-            self.exact.resize(self.points.len(), None);
-            self.exact[v as usize] = Some(Box::new(*place));
-        }
-        v
-    }
-
-    /// The exact place of a vertex, if that differs from its rounded one.
-    fn exact(&self, vertex: u32) -> Option<&Fixed> {
-        self.exact.get(vertex as usize)?.as_deref()
-    }
-
-    /// Whether a vertex is only near the point it has.
-    pub fn is_rounded(&self, vertex: u32) -> bool {
-        self.exact(vertex).is_some()
-    }
-
-    /// Whether there are vertices that are only near their points.
-    pub fn has_rounded(&self) -> bool {
-        !self.exact.is_empty()
-    }
-
-    /// From now on all vertices are where their points are.
-    pub fn forget_exact(&mut self) {
-        self.exact.clear();
-    }
-
-    /// The exact place of a vertex.
-    ///
-    /// # Panics
-    /// Where its coordinates are too large or too small for [`Fixed`].
-    pub fn place(&self, vertex: u32) -> Fixed {
-        match self.exact(vertex) {
-            Some(place) => *place,
-            None => Fixed::of(self.point(vertex)).expect("coordinates that fit"),
-        }
     }
 
     /// Takes the last points away again, down to `count` of them; none may have tets.
@@ -222,37 +180,6 @@ impl Tetrahedra {
             orient3d(self.point(a), self.point(b), self.point(c), self.point(d))
         } else {
             self.exact_side([a, b, c, d])
-        }
-    }
-
-    fn exact_side(&self, tet: [u32; 4]) -> Sign {
-        let [a, b, c, d] = tet.map(|v| self.point(v));
-        if tet.iter().all(|&v| !self.is_rounded(v)) {
-            return orient3d(a, b, c, d);
-        }
-        orient3d_rounded([a, b, c, d])
-            .unwrap_or_else(|| orient3d_fixed(tet.map(|v| self.place(v)).each_ref()))
-    }
-
-    /// The sign of the volume between a face and a point; zero where that is not known, as its coordinates do not fit [`Fixed`].
-    pub fn side_of(&self, face: [u32; 3], point: &Point) -> Sign {
-        let [a, b, c] = face.map(|v| self.point(v));
-        if face.iter().all(|&v| !self.is_rounded(v)) {
-            return orient3d(a, b, c, point);
-        }
-        orient3d_rounded([a, b, c, point]).unwrap_or_else(|| {
-            let [a, b, c] = face.map(|v| self.place(v));
-            Fixed::of(point).map_or(Sign::Zero, |point| orient3d_fixed([&a, &b, &c, &point]))
-        })
-    }
-
-    /// The sign of the area of three vertices' shadow on a coordinate plane.
-    pub fn turn(&self, [i, j]: [usize; 2], triangle: [u32; 3]) -> Sign {
-        if triangle.iter().any(|&v| self.is_rounded(v)) {
-            orient2d_fixed([i, j], triangle.map(|v| self.place(v)).each_ref())
-        } else {
-            let [a, b, c] = triangle.map(|v| self.point(v)).map(|p| [p[i], p[j]]);
-            orient2d(a, b, c)
         }
     }
 
@@ -401,17 +328,6 @@ impl Tetrahedra {
     pub fn tet_at_edge(&mut self, a: u32, b: u32, tets: &mut Vec<u32>) -> Option<u32> {
         self.star(a, tets);
         tets.iter().copied().find(|&t| self.tets[t as usize].contains(&b))
-    }
-
-    /// Some half-face with these vertices, if they are a face of the mesh. Uses the marks and `tets`.
-    pub fn find_face(&mut self, [a, b, c]: [u32; 3], tets: &mut Vec<u32>) -> Option<u32> {
-        self.star(a, tets);
-        let t = tets.iter().copied().find(|&t| {
-            let tet = &self.tets[t as usize];
-            tet.contains(&b) && tet.contains(&c)
-        })?;
-        let opposite = (0..4).find(|&i| ![a, b, c].contains(&self.tets[t as usize][i]))?;
-        Some(4 * t + opposite as u32)
     }
 
     /// The ring around the edge a→b of `tet`; false where it is open, that is on the outside.
