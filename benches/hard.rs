@@ -127,7 +127,7 @@ fn fill(family: &str, seed: u64) -> String {
     let mut random = Random::new(seed);
     let mut soup = make(family, &mut random);
     let turn = Rotation3::from_euler_angles(7.0 * random.unit(), 7.0 * random.unit(), 7.0 * random.unit());
-    if seed % 3 > 0 {
+    if !seed.is_multiple_of(3) {
         soup.map(|p| turn * p);
     }
     if seed % 3 == 2 {
