@@ -8,7 +8,7 @@
 use crate::Point;
 use crate::kernel::nearest::in_segment;
 use crate::kernel::predicates::{Sign, orient3d};
-use crate::kernel::simplex::{area_vector, dihedral_cosines, squared_distance};
+use crate::kernel::simplex::{area_vector, largest_cosine, squared_distance};
 use crate::mesh::Class;
 use csg::{BodyId, PatchId};
 use std::collections::BTreeMap;
@@ -44,11 +44,6 @@ pub(super) struct Merger<'a> {
 
 /// A vertex, that into which it is merged, and the largest cosine of an angle of the tets there then.
 type Merge = (u32, u32, f64);
-
-/// The largest cosine of a dihedral angle.
-pub(super) fn largest_cosine(p: &[Point; 4]) -> f64 {
-    dihedral_cosines(p).into_iter().fold(-1.0, f64::max)
-}
 
 fn ends(a: u32, b: u32) -> [u32; 2] {
     [a.min(b), a.max(b)]

@@ -1,10 +1,10 @@
 //! Which tets are improved together, and on which rank.
 
-use super::merge::largest_cosine;
 use crate::Point;
 use crate::comm::{CommError, Communicator};
 use crate::dist::BareMesh;
 use crate::kernel::random::mix;
+use crate::kernel::simplex::largest_cosine;
 use crate::mesh::{GlobalId, Rank, VertexId};
 
 /// A bad tet counts if it is within so many layers of tets from an interface: what is further inside has been improved before.

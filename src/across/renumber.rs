@@ -90,8 +90,8 @@ impl Gaps {
     }
 }
 
-/// New places after some were taken out, ascending.
-fn places_without(count: usize, gone: &[u32]) -> Vec<u32> {
+/// New places after some were taken out, ascending; `u32::MAX` for those.
+pub(super) fn places_without(count: usize, gone: &[u32]) -> Vec<u32> {
     let mut next = 0;
     let mut gone = gone.iter().peekable();
     let place = |old: u32| {
@@ -105,7 +105,7 @@ fn places_without(count: usize, gone: &[u32]) -> Vec<u32> {
 }
 
 /// Keeps what has a new place.
-fn keep<T>(list: &mut Vec<T>, places: &[u32]) {
+pub(super) fn keep<T>(list: &mut Vec<T>, places: &[u32]) {
     let mut places = places.iter();
     list.retain(|_| places.next().is_some_and(|place| *place != u32::MAX));
 }

@@ -1,10 +1,11 @@
 //! The regions that a rank has got, improved.
 
 use super::Settings;
-use super::merge::{Merger, largest_cosine};
+use super::merge::Merger;
+use super::renumber::{keep, places_without};
 use crate::dist::{BareMesh, LaidEdge, Side};
 use crate::improve::improve;
-use crate::kernel::simplex::from_lowest;
+use crate::kernel::simplex::{from_lowest, largest_cosine};
 use crate::mesh::{BoundaryTriangle, Class, GlobalId, Mesh, Segment, TET_EDGES, TET_FACES, TetId, VertexId};
 use crate::skin::{self, PartSizes};
 use csg::{BodyId, CurveId, PatchId};
@@ -220,22 +221,14 @@ impl Region {
         merger.run(angle);
         let Merger { tets, triangles, edges, mut gone, .. } = merger;
         gone.sort_unstable();
-        let mut next = 0;
-        let place: Vec<u32> = (0..count as u32)
-            .map(|v| {
-                let stays = gone.binary_search(&v).is_err();
-                next += u32::from(stays);
-                if stays { next - 1 } else { NONE }
-            })
-            .collect();
-        let keep = |v: usize| place[v] != NONE;
-        let placed = |v: u32| place[v as usize];
+        let places = places_without(count, &gone);
+        let placed = |v: u32| places[v as usize];
         self.gone.extend(gone.iter().map(|&v| self.outer[v as usize]));
-        retain(&mut self.mesh.points, keep);
-        retain(&mut self.mesh.classes, keep);
-        retain(&mut self.outer, keep);
-        retain(&mut self.loose, keep);
-        retain(&mut self.shared, keep);
+        keep(&mut self.mesh.points, &places);
+        keep(&mut self.mesh.classes, &places);
+        keep(&mut self.outer, &places);
+        keep(&mut self.loose, &places);
+        keep(&mut self.shared, &places);
         let alive = || tets.iter().flatten();
         self.mesh.tets = alive().map(|(tet, _)| tet.map(|v| VertexId(placed(v)))).collect();
         self.mesh.bodies = alive().map(|(_, body)| *body).collect();
@@ -280,11 +273,6 @@ impl Region {
         reworked.tets.extend(self.mesh.tets.iter().map(|tet| tet.map(|v| names[v.index()])));
         reworked.bodies.extend(self.mesh.bodies);
     }
-}
-
-fn retain<T>(list: &mut Vec<T>, keep: impl Fn(usize) -> bool) {
-    let mut at = 0..;
-    list.retain(|_| keep(at.next().expect("there is always another")));
 }
 
 fn sorted(mut corners: [VertexId; 3]) -> [VertexId; 3] {

@@ -28,26 +28,14 @@ pub(super) fn write_formats(
     dir: &Path,
     stem: &Path,
 ) -> Result<(Written, Option<HaloReport>), Failure> {
-    let Some(by) = options.halo else { return Ok((write_all(comm, part, names, options, dir, stem)?, None)) };
-    let by = match by {
+    let by = options.halo.map(|by| match by {
         Halo::Faces => By::Faces,
         Halo::Vertices => By::Vertices,
-    };
-    let ghosts = halo::halo(comm, part, by)?;
-    let told = HaloReport::new(comm, by, &ghosts)?;
-    let written = write_all(comm, &WithHalo::new(part, &ghosts), names, options, dir, stem)?;
-    Ok((written, Some(told)))
-}
-
-/// **Collective.** Writes a stream in each format.
-fn write_all(
-    comm: &dyn Communicator,
-    part: &dyn MeshStream,
-    names: &Names,
-    options: &RunOptions,
-    dir: &Path,
-    stem: &Path,
-) -> Result<Written, Failure> {
+    });
+    let ghosts = by.map(|by| halo::halo(comm, part, by).map(|ghosts| (by, ghosts))).transpose()?;
+    let told = ghosts.as_ref().map(|(by, ghosts)| HaloReport::new(comm, *by, ghosts)).transpose()?;
+    let with_halo = ghosts.as_ref().map(|(_, ghosts)| WithHalo::new(part, ghosts));
+    let part: &dyn MeshStream = with_halo.as_ref().map_or(part, |with_halo| with_halo);
     let mut written = Written::default();
     for format in &options.format {
         written += match format {
@@ -57,7 +45,7 @@ fn write_all(
             Format::None => Written::default(),
         };
     }
-    Ok(written)
+    Ok((written, told))
 }
 
 /// **Collective.** Reads the written Elmer mesh again, if that is asked for.

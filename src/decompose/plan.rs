@@ -202,8 +202,8 @@ const CORNER: f64 = 3.0;
 /// Nearer than this part of the room that is wanted, it does not get much worse.
 const ROOM: f64 = 0.1;
 
-/// Nearer than this, in units of the room that is wanted, planes pass through one point.
-const SAME: f64 = 1e-9;
+/// Nearer than this, in units of the room that is wanted, planes pass through one point, and parallel ones are one.
+pub(super) const SAME: f64 = 1e-9;
 
 /// Planes that are not across an axis cost so many times what they cut: those across the axes meet each other, and mostly the faces of
 /// the geometry, at right angles, which leaves more room than the cost of each plane alone tells. Without it the smallest angles of NETGEN's tutorials in 16

@@ -1,14 +1,11 @@
 //! The samples of a piece in their order along a direction: what a plane across it leaves behind it, and meets, without asking all of them.
 
 use super::evidence::Sample;
-use super::plan::{CutPlane, Spot};
+use super::plan::{CutPlane, SAME, Spot};
 use crate::{Point, Vector};
 
 /// Places that are tried for a plane in one direction.
 const PLACES: i32 = 9;
-
-/// Planes nearer to each other than this, in units of the room round the point that they go through, are one.
-const SAME: f64 = 1e-9;
 
 /// Samples, sorted along a direction.
 pub(super) struct Scan<'a> {

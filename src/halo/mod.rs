@@ -32,42 +32,20 @@ use interface::Interface;
 use letter::Letter;
 use std::collections::BTreeMap;
 
-/// Why there are no ghosts.
+/// Why there are no ghosts: local ids are 32-bit.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum HaloError {
-    /// Local ids are 32-bit.
-    #[error(
-        "rank {rank} would have {needed} vertices with its halo, above the {} of one part: take more parts",
-        u32::MAX
-    )]
-    TooMany {
-        /// The rank.
-        rank: Rank,
-        /// How many.
-        needed: u64,
-    },
-    /// Another rank met an error.
-    #[error("rank {rank}: {message}")]
-    Elsewhere {
-        /// Which.
-        rank: Rank,
-        /// What it says.
-        message: String,
-    },
-    /// The ranks cannot talk.
-    #[error(transparent)]
-    Comm(#[from] CommError),
+#[error(
+    "a part would have {needed} vertices with its halo, above the {} of one part: take more parts",
+    u32::MAX
+)]
+pub struct TooManyVertices {
+    /// How many.
+    pub needed: u64,
 }
 
-impl From<Agreed<Self>> for HaloError {
-    fn from(agreed: Agreed<Self>) -> Self {
-        agreed.into_error(|rank, message| Self::Elsewhere { rank, message })
-    }
-}
-
-impl From<HaloError> for Failure {
-    fn from(error: HaloError) -> Self {
-        let status = if matches!(error, HaloError::Comm(_)) { Status::Rank } else { Status::Resources };
+impl From<Agreed<TooManyVertices>> for Failure {
+    fn from(error: Agreed<TooManyVertices>) -> Self {
+        let status = if matches!(error, Agreed::Comm(_)) { Status::Rank } else { Status::Resources };
         Self::new(status, error)
     }
 }
@@ -76,7 +54,11 @@ impl From<HaloError> for Failure {
 ///
 /// # Errors
 /// On all ranks alike, where vertices of a part and its ghosts pass `u32`.
-pub fn halo(comm: &dyn Communicator, part: &dyn MeshStream, by: By) -> Result<Ghosts, HaloError> {
+pub fn halo(
+    comm: &dyn Communicator,
+    part: &dyn MeshStream,
+    by: By,
+) -> Result<Ghosts, Agreed<TooManyVertices>> {
     let interface = Interface::new(part);
     let to = leaving::leaving(comm, &interface, by)?;
     let origins: BTreeMap<u32, GlobalId> = part.origins().into_iter().collect();
@@ -97,7 +79,7 @@ pub fn halo(comm: &dyn Communicator, part: &dyn MeshStream, by: By) -> Result<Gh
 }
 
 /// Ghosts in the order of their ids, without their watchers.
-fn settled(interface: &Interface, letters: Vec<Letter>) -> Result<Ghosts, HaloError> {
+fn settled(interface: &Interface, letters: Vec<Letter>) -> Result<Ghosts, TooManyVertices> {
     let counts = interface.part.counts();
     let mut vertices: Vec<(GhostVertex, Vec<Rank>)> = Vec::new();
     let mut named = Vec::new();
@@ -111,7 +93,7 @@ fn settled(interface: &Interface, letters: Vec<Letter>) -> Result<Ghosts, HaloEr
     named.sort_by_key(|named| named.tet.id);
     let needed = counts.vertices + vertices.len() as u64;
     if needed > u64::from(u32::MAX) {
-        return Err(HaloError::TooMany { rank: interface.part.rank(), needed });
+        return Err(TooManyVertices { needed });
     }
     let first_vertex = counts.vertices as u32;
     let find = |id: GlobalId| match vertices.binary_search_by_key(&id, |(vertex, _)| vertex.id) {

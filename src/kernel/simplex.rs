@@ -53,6 +53,11 @@ pub fn dihedral_cosines(p: &[Point; 4]) -> [f64; 6] {
     ]
 }
 
+/// The largest of the [`dihedral_cosines`]: that of the smallest angle.
+pub fn largest_cosine(p: &[Point; 4]) -> f64 {
+    dihedral_cosines(p).into_iter().fold(-1.0, f64::max)
+}
+
 /// The corners of a triangle from the lowest on, in the same sense: its name among those that are looked for.
 pub fn from_lowest<T: Ord>([a, b, c]: [T; 3]) -> [T; 3] {
     if a < b && a < c {

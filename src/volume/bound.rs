@@ -81,8 +81,7 @@ fn triangles_near(tets: &mut Tetrahedra, triangles: &[[u32; 3]], inside: &[u32])
     let mut star = Vec::new();
     let mut beside = BTreeSet::new();
     for &q in inside {
-        tets.star(q, &mut star);
-        beside.extend(star.iter().flat_map(|&t| tets.tets[t as usize]));
+        beside.extend(tets.neighbours(q, &mut star));
     }
     let has_any = |t: &u32| triangles[*t as usize].iter().any(|v| beside.contains(v));
     (0..triangles.len() as u32).filter(has_any).collect()

@@ -42,11 +42,7 @@ impl Tetrahedra {
         let Some(place) = self.exact.get_mut(vertex as usize).and_then(Option::take) else { return true };
         let mut star = Vec::new();
         self.star(vertex, &mut star);
-        let is_positive = |&t: &u32| {
-            let [a, b, c, d] = self.tets[t as usize];
-            self.side([a, b, c], d) == Sign::Positive
-        };
-        let stays = star.iter().all(is_positive);
+        let stays = star.iter().all(|&t| self.is_positive(self.tets[t as usize]));
         if !stays {
             self.exact[vertex as usize] = Some(place);
         }

@@ -5,7 +5,6 @@
 
 use super::constraints::Constraints;
 use super::tetrahedra::{NONE, Ring, Tetrahedra};
-use crate::kernel::predicates::Sign;
 use crate::kernel::quality::mean_ratio;
 
 /// Rings with more tets are left alone: the search is cubic, and long rings belong to edges that
@@ -45,7 +44,7 @@ pub(super) struct Flips {
 impl Flips {
     /// The mean ratio of a tet that is positive by exact sign; below every quality for any that must not be made.
     fn quality(&self, mesh: &Tetrahedra, tet: [u32; 4]) -> f64 {
-        if mesh.side([tet[0], tet[1], tet[2]], tet[3]) != Sign::Positive {
+        if !mesh.is_positive(tet) {
             return f64::NEG_INFINITY;
         }
         let [a, b, c, d] = tet.map(|v| mesh.point(v));

@@ -21,7 +21,6 @@ use super::small::{self, Effort};
 use super::steiner::middle_first;
 use super::tetrahedra::{NONE, Tetrahedra};
 use super::{ClosedSurface, Report, VolumeError};
-use crate::kernel::predicates::Sign;
 use crate::{Point, Vector};
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
@@ -212,15 +211,9 @@ impl Recovery<'_> {
 
     /// Removes what edges it can at a point but for those to be kept: the fewer there are the easier it leaves.
     fn thin_out(&mut self, p: u32, depth: u32) {
-        self.mesh.star(p, &mut self.star);
-        let mut ends: Vec<u32> = self.star.iter().flat_map(|&t| self.mesh.tets[t as usize]).collect();
-        ends.sort_unstable();
-        ends.dedup();
-        for v in ends {
+        for v in self.mesh.neighbours(p, &mut self.star) {
             self.take_help();
-            if v != p
-                && let Some(tet) = self.mesh.tet_at_edge(p, v, &mut self.star)
-            {
+            if let Some(tet) = self.mesh.tet_at_edge(p, v, &mut self.star) {
                 self.remove_edge(tet, [p, v], [NONE; 2], depth);
             }
         }
@@ -240,12 +233,7 @@ fn around(mesh: &Tetrahedra, skin: &[[u32; 3]], [u, w]: [u32; 2]) -> Option<Vec<
     }
     let tets: Vec<[u32; 4]> =
         skin.iter().filter(|face| face.contains(&u)).map(|&[a, b, c]| [w, a, b, c]).collect();
-    tets.iter().all(|&tet| is_positive(mesh, tet)).then_some(tets)
-}
-
-fn is_positive(mesh: &Tetrahedra, tet: [u32; 4]) -> bool {
-    let [a, b, c, d] = tet;
-    mesh.side([a, b, c], d) == Sign::Positive
+    tets.iter().all(|&tet| mesh.is_positive(tet)).then_some(tets)
 }
 
 /// Tets that fill the ball of p with the edge u, w and three new points around it.
@@ -287,7 +275,7 @@ fn fill_around(
     ring: [u32; 3],
 ) -> Option<Vec<[u32; 4]>> {
     let mut tets: Vec<[u32; 4]> = (0..3).map(|k| [u, w, ring[k], ring[(k + 1) % 3]]).collect();
-    if !tets.iter().all(|&tet| is_positive(mesh, tet)) {
+    if !tets.iter().all(|&tet| mesh.is_positive(tet)) {
         return None;
     }
     // The rest sees the three tets from outside.

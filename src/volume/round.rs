@@ -53,11 +53,7 @@ pub(super) fn round(mesh: &mut Tetrahedra, constraints: &Constraints, inside: &m
 /// Flips away what edges it can at a point: the smaller its ball is the more room there is.
 fn thin_out(mesh: &mut Tetrahedra, constraints: &Constraints, q: u32) {
     let (mut star, mut flips) = (Vec::new(), Flips::default());
-    mesh.star(q, &mut star);
-    let mut ends: Vec<u32> = star.iter().flat_map(|&t| mesh.tets[t as usize]).filter(|&v| v != q).collect();
-    ends.sort_unstable();
-    ends.dedup();
-    for v in ends {
+    for v in mesh.neighbours(q, &mut star) {
         if let Some(tet) = mesh.tet_at_edge(q, v, &mut star) {
             // What cannot go stays.
             let _ = flips.remove_edge(mesh, constraints, tet, [q, v], [NONE; 2]);

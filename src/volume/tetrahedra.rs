@@ -173,6 +173,12 @@ impl Tetrahedra {
         }
     }
 
+    /// Whether four vertices make a positive tet.
+    #[inline]
+    pub fn is_positive(&self, [a, b, c, d]: [u32; 4]) -> bool {
+        self.side([a, b, c], d) == Sign::Positive
+    }
+
     /// The sign of the volume between a face and a vertex.
     #[inline]
     pub fn side(&self, [a, b, c]: [u32; 3], d: u32) -> Sign {
@@ -322,6 +328,16 @@ impl Tetrahedra {
                 }
             }
         }
+    }
+
+    /// The vertices that share a tet with this one, ascending. Uses the marks and `tets`.
+    pub fn neighbours(&mut self, vertex: u32, tets: &mut Vec<u32>) -> Vec<u32> {
+        self.star(vertex, tets);
+        let mut beside: Vec<u32> = tets.iter().flat_map(|&t| self.tets[t as usize]).collect();
+        beside.sort_unstable();
+        beside.dedup();
+        beside.retain(|&v| v != vertex);
+        beside
     }
 
     /// Some tet with the edge a, b, if it is an edge of the mesh. Uses the marks and `tets`.
