@@ -110,9 +110,19 @@ fn shifted(p: Parts) -> Option<Words<4>> {
 }
 
 fn to_double(x: Words<4>) -> f64 {
-    let size = if is_negative(&x) { sub([0; 4], x) } else { x };
+    in_units(x, FRACTION)
+}
+
+/// A volume as a double, to some units in its last place.
+pub fn rounded_volume(volume: Volume) -> f64 {
+    in_units(volume, 3 * FRACTION)
+}
+
+/// The double near a number of units of 2 to minus `fraction`.
+fn in_units<const N: usize>(x: Words<N>, fraction: i32) -> f64 {
+    let size = if is_negative(&x) { sub([0; N], x) } else { x };
     // The lowest first, so that only what is lost beside the highest is lost.
-    let sum = (0..).zip(size).fold(0.0, |sum, (k, word)| sum + word as f64 * 2f64.powi(64 * k - FRACTION));
+    let sum = (0..).zip(size).fold(0.0, |sum, (k, word)| sum + word as f64 * 2f64.powi(64 * k - fraction));
     if is_negative(&x) { -sum } else { sum }
 }
 

@@ -32,6 +32,19 @@ impl Tetrahedra {
         self.exact(vertex).is_some()
     }
 
+    /// Puts a vertex elsewhere.
+    pub fn put_at(&mut self, vertex: u32, place: &Fixed) {
+        let rounded = place.rounded();
+        self.points[vertex as usize] = rounded;
+        let is_rounded = Fixed::of(&rounded) != Some(*place);
+        if is_rounded && self.exact.len() <= vertex as usize {
+            self.exact.resize(self.points.len(), None);
+        }
+        if let Some(exact) = self.exact.get_mut(vertex as usize) {
+            *exact = is_rounded.then(|| Box::new(*place));
+        }
+    }
+
     /// From now on all vertices are where their points are.
     pub fn forget_exact(&mut self) {
         self.exact.clear();

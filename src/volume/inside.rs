@@ -1,7 +1,7 @@
-//! Points that the recovery left inside: moved where they are in the way, deleted where they are not needed.
+//! Points that the recovery left inside, deleted where they are not needed.
 
 use super::constraints::Constraints;
-use super::sector::{GOOD_ENOUGH, Sector, find_place, worst};
+use super::sector::{GOOD_ENOUGH, Sector};
 use super::small::{self, Effort};
 use super::tetrahedra::{NONE, Tetrahedra};
 use crate::kernel::quality::mean_ratio;
@@ -22,30 +22,6 @@ const MOST_VERTICES: usize = 24;
 /// Balls of more tets are tried as they are only: those that can be filled mostly can be so without more tets, and the larger ones take
 /// the time.
 const MOST_TO_GROW: usize = 14;
-
-/// Gives the points inside at the balls of others better places.
-pub(super) fn make_room(mesh: &mut Tetrahedra, constraints: &Constraints, of: &[u32], inside: &mut [u32]) {
-    for q in inside {
-        let mut ball = Vec::new();
-        mesh.star(*q, &mut ball);
-        let sector = cavity(mesh, ball);
-        if !sector.skin.iter().flatten().any(|v| of.contains(v)) {
-            continue;
-        }
-        let Some((quality, place)) = find_place(mesh, &sector, *q) else { continue };
-        if quality <= worst(mesh, &sector.skin, mesh.point(*q), *q, 0.0) {
-            continue;
-        }
-        let points = mesh.points.len();
-        let new = mesh.add_point(place);
-        if refill(mesh, constraints, &sector, &sector.star_of(new)) {
-            mesh.at_vertex[*q as usize] = NONE;
-            *q = new;
-        } else {
-            mesh.forget_points(points);
-        }
-    }
-}
 
 /// Deletes those points inside whose ball can be filled without them, with no worse a tet unless it is good enough.
 pub(super) fn delete(mesh: &mut Tetrahedra, constraints: &Constraints, inside: &mut Vec<u32>) {

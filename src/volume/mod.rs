@@ -57,6 +57,7 @@ mod near;
 mod points;
 mod polygon;
 mod recover;
+mod relax;
 mod relocate;
 mod round;
 #[cfg(test)]

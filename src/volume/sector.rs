@@ -78,16 +78,14 @@ impl Sector {
         seen.map(|&[a, b, c]| [apex, a, b, c]).collect()
     }
 
-    /// Takes in the tets behind those walls that a point does not see, or behind all; false where there are none to take.
-    pub fn grow(&mut self, mesh: &Tetrahedra, point: Option<&Point>) -> bool {
-        let unseen =
-            |wall: u32| point.is_none_or(|point| mesh.side_of(mesh.face(wall), point) != Sign::Negative);
+    /// Takes in the tets behind some of its walls; false where there are none to take.
+    pub fn grow(&mut self, mesh: &Tetrahedra, behind: impl Fn(u32) -> bool) -> bool {
         let before = self.tets.len();
         for wall in self.walls.clone() {
-            let behind = mesh.across(wall);
-            if unseen(wall) && behind != NONE && !mesh.is_locked(wall) && !self.tets.contains(&(behind >> 2))
+            let beyond = mesh.across(wall);
+            if behind(wall) && beyond != NONE && !mesh.is_locked(wall) && !self.tets.contains(&(beyond >> 2))
             {
-                self.tets.push(behind >> 2);
+                self.tets.push(beyond >> 2);
             }
         }
         let half_faces = self.tets[before..].iter().flat_map(|&t| 4 * t..4 * t + 4);
