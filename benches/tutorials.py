@@ -2,10 +2,12 @@
 """NETGEN's tutorial geometries at all presets, beside what NETGEN makes of them: a table in Markdown.
 
   tutorials.py target/release/tetmill ../shared/netgen-tutorials [--spec ../shared/spec/netgen-meshing.md] [--only NAME,NAME]
+  tutorials.py … --netgen ENVIRONMENT/bin/python --presets moderate        # pip install netgen-mesher in an environment of its own
 
 The folder holds the .geo files and reference.json (NETGEN's counts, angles and seconds, taken on another day on such a machine); the
 specification's section 11 has NETGEN's total badness at three presets. Each geometry is meshed by one thread, from the file to the
 checked mesh in a file; a run is ended after 600 seconds. Manyholes and shell are left out at the two finest presets.
+With --netgen its seconds are taken in the same run, right after ours: from the file to the mesh, without start and output.
 """
 import argparse, json, pathlib, re, subprocess, tempfile, time
 
@@ -45,6 +47,27 @@ def measure(binary, geometry, preset, folder):
     return [quality[key] for key in keys] + [seconds]
 
 
+NETGEN = """
+import sys, time
+from netgen.csg import CSGeometry
+from netgen.meshing import meshsize
+began = time.perf_counter()
+mesh = CSGeometry(sys.argv[1]).GenerateMesh(getattr(meshsize, sys.argv[2]))
+print("seconds", time.perf_counter() - began)
+"""
+
+
+def seconds_of_netgen(python, geometry, preset):
+    """None where it fails or does not end."""
+    try:
+        made = subprocess.run([python, "-c", NETGEN, geometry, preset.replace("-", "_")],
+                              capture_output=True, text=True, timeout=600)
+    except subprocess.TimeoutExpired:
+        return None
+    found = re.search(r"seconds (\S+)$", made.stdout, re.M)
+    return float(found[1]) if found else None
+
+
 def shown(values):
     """The five columns as text."""
     digits = [0, 1, 1, 2, 2]
@@ -57,6 +80,8 @@ def main():
     options.add_argument("tutorials", type=pathlib.Path)
     options.add_argument("--spec", type=pathlib.Path)
     options.add_argument("--only", default="")
+    options.add_argument("--presets", default=",".join(PRESETS))
+    options.add_argument("--netgen", help="a Python that has NETGEN")
     given = options.parse_args()
     reference = json.loads((given.tutorials / "reference.json").read_text())
     badness = badness_of_netgen(given.spec)
@@ -69,7 +94,7 @@ def main():
             name = geometry.stem
             if only and name not in only:
                 continue
-            for preset in PRESETS:
+            for preset in given.presets.split(","):
                 if name in LARGE and preset in PRESETS[3:]:
                     continue
                 found = measure(given.binary, geometry, preset, pathlib.Path(folder))
@@ -78,14 +103,17 @@ def main():
                     continue
                 netgen = reference.get(name, {}).get(preset.replace("-", "_"), {})
                 other = [netgen.get(key) for key in ["tets", "min_dihedral", "p1_min_dihedral"]]
-                other += [badness.get((name, preset)), netgen.get("seconds")]
+                seconds = netgen.get("seconds")
+                if given.netgen:
+                    seconds = seconds_of_netgen(given.netgen, geometry, preset)
+                other += [badness.get((name, preset)), seconds]
                 if other[-1] is not None:
                     ours[preset] += found[-1]
                     theirs[preset] += other[-1]
                 cells = [cell for pair in zip(shown(found), shown(other)) for cell in pair]
                 print(f"| {name} | {preset} | " + " | ".join(cells) + " |", flush=True)
     print("\nSeconds in sum where both have them: " +
-          "; ".join(f"{preset} {ours[preset]:.1f}, NETGEN {theirs[preset]:.1f}" for preset in PRESETS) + ".")
+          "; ".join(f"{preset} {ours[preset]:.1f}, NETGEN {theirs[preset]:.1f}" for preset in given.presets.split(",")) + ".")
 
 
 if __name__ == "__main__":
