@@ -17,6 +17,7 @@ mod repartition;
 mod samples;
 mod scenes;
 mod skins;
+mod surfaces;
 mod swept;
 mod tutorials;
 mod writers;
