@@ -219,15 +219,18 @@ impl Sampler<'_> {
         edge: f64,
         samples: &mut Vec<(SurfaceId, Source)>,
     ) {
+        let mut open = wanted.to_vec();
+        let cell = [0, 1, 2].map(|i| Interval { lo: center[i] - 0.5 * edge, hi: center[i] + 0.5 * edge });
+        open.retain(|surface| self.geometry.surfaces[surface.index()].value_range(&cell).contains_zero());
+        // Most cells end here, before what costs more.
+        if open.is_empty() {
+            return;
+        }
         let bodies = self.pruned(bodies, &center, edge);
         let mut here: Vec<SurfaceId> = bodies.iter().flat_map(|body| body.1.surfaces()).collect();
         here.sort_unstable();
-        let open: Vec<SurfaceId> = wanted
-            .iter()
-            .copied()
-            .filter(|surface| here.binary_search(surface).is_ok())
-            .filter(|&surface| self.is_coarse(surface, &bodies, &center, edge, samples))
-            .collect();
+        open.retain(|surface| here.binary_search(surface).is_ok());
+        open.retain(|&surface| self.is_coarse(surface, &bodies, &center, edge, samples));
         // Where a surface is singular (apex of a cone) the size there is nearly zero: no cell is worth going on.
         let least = 1e-3 * self.features.bounds.diagonal() * self.settings.scale.min(1.0);
         if open.is_empty() || edge < least {
@@ -249,7 +252,7 @@ impl Sampler<'_> {
         prune_in(&self.geometry.surfaces, &cell, bodies)
     }
 
-    /// Whether a cell is too large for the size of a surface there; if it is not and the surface is near, adds its source.
+    /// Whether a cell is too large for the size of a surface that may pass through it; if it is not and the surface is near, adds its source.
     fn is_coarse(
         &self,
         surface: SurfaceId,
@@ -259,10 +262,6 @@ impl Sampler<'_> {
         samples: &mut Vec<(SurfaceId, Source)>,
     ) -> bool {
         let shape = &self.geometry.surfaces[surface.index()];
-        let cell = [0, 1, 2].map(|i| Interval { lo: center[i] - 0.5 * edge, hi: center[i] + 0.5 * edge });
-        if !shape.value_range(&cell).contains_zero() {
-            return false;
-        }
         let Ok(point) = shape.project(center) else { return true };
         if (point - center).norm() > edge {
             return false;
