@@ -16,7 +16,10 @@ use crate::Point;
 use std::collections::BTreeSet;
 
 /// How often all are tried in vain, each time with one ring of points more that move. Only then fillings are searched for, which takes long.
-const IN_VAIN: usize = 4;
+const IN_VAIN: usize = 6;
+
+/// Walls are taken for those that leave a place no room up to so many times farther away, each second time that all were tried in vain.
+const TIGHT: f64 = 8.0;
 
 /// A ball takes in no more tets.
 const MOST_TETS: usize = 200;
@@ -38,7 +41,7 @@ pub(super) fn round(mesh: &mut Tetrahedra, constraints: &Constraints, inside: &m
                 if in_vain > 0 {
                     thin_out(mesh, constraints, q);
                 }
-                round_one(mesh, constraints, q, in_vain > 0);
+                round_one(mesh, constraints, q, in_vain);
                 inside.extend(points..mesh.points.len() as u32);
             }
         }
@@ -60,8 +63,8 @@ fn thin_out(mesh: &mut Tetrahedra, constraints: &Constraints, q: u32) {
     }
 }
 
-/// Moves a point to a place with doubles that sees all of its ball, or fills that without it, if need be after a `search`.
-fn round_one(mesh: &mut Tetrahedra, constraints: &Constraints, q: u32, search: bool) -> bool {
+/// Moves a point to a place with doubles that sees all of its ball, or fills that without it: after a search if all has been tried `in_vain` so often.
+fn round_one(mesh: &mut Tetrahedra, constraints: &Constraints, q: u32, in_vain: usize) -> bool {
     let mut ball = Vec::new();
     mesh.star(q, &mut ball);
     let sector = cavity(mesh, ball);
@@ -72,7 +75,7 @@ fn round_one(mesh: &mut Tetrahedra, constraints: &Constraints, q: u32, search: b
     let mut wider = sector.clone();
     let place = match find_place(mesh, &sector, q) {
         Some((_, place)) => Some(place),
-        None => take_in(mesh, constraints, &mut wider, q),
+        None => take_in(mesh, constraints, &mut wider, q, TIGHT.powi(in_vain as i32 / 2)),
     };
     let points = mesh.points.len();
     if let Some(place) = place {
@@ -82,7 +85,7 @@ fn round_one(mesh: &mut Tetrahedra, constraints: &Constraints, q: u32, search: b
         }
         mesh.forget_points(points);
     }
-    search && delete_one(mesh, constraints, q)
+    in_vain > 0 && delete_one(mesh, constraints, q)
 }
 
 /// Fills a sector with other tets; false where they do not fit. Vertices that have none any more are told so.
@@ -99,9 +102,15 @@ fn put(mesh: &mut Tetrahedra, constraints: &Constraints, sector: &Sector, tets: 
     fits
 }
 
-/// A place with doubles that sees all of a ball and of the tets that this takes in: those behind the walls that are nearest to where there is
-/// most room, or that are not seen from there.
-fn take_in(mesh: &Tetrahedra, constraints: &Constraints, ball: &mut Sector, q: u32) -> Option<Point> {
+/// A place with doubles that sees all of a ball and of the tets that this takes in: those behind the walls that are not seen from where there is
+/// most room, or are within so many times that room.
+fn take_in(
+    mesh: &Tetrahedra,
+    constraints: &Constraints,
+    ball: &mut Sector,
+    q: u32,
+    times: f64,
+) -> Option<Point> {
     let mut place = mesh.place(q);
     while ball.tets.len() <= MOST_TETS {
         let reach = ball.reach(mesh, mesh.point(q));
@@ -113,7 +122,7 @@ fn take_in(mesh: &Tetrahedra, constraints: &Constraints, ball: &mut Sector, q: u
         if room > 0.0 && worst(mesh, &ball.skin, &rounded, NONE, 0.0) >= 0.0 {
             return Some(rounded);
         }
-        let tight = |wall| distance(mesh, mesh.face(wall), &place) <= room + room.abs();
+        let tight = |wall| distance(mesh, mesh.face(wall), &place) <= room + times * room.abs();
         let grown = ball.grow(mesh, tight);
         let keeps = ball.keeps_vertices(mesh, |v| !constraints.is_of_surface(v));
         if !grown || !keeps {
