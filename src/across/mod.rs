@@ -45,7 +45,7 @@ pub struct Settings {
 
 impl Default for Settings {
     /// First the few percent of the tets that the 1st percentile depends on, then the worst. With 38° nearly all tets near interfaces go through it, and no
-    /// percentile is better by more than 0.1°; with 30° alone those of balls and cubes are 2° below the ones on one rank.
+    /// percentile is better by more than 0.2°; with 30° alone those of cubes in 64 parts are 2° below the one on one rank.
     ///
     /// Vertices of an interface are merged and added where tets are worse than 0.75, as there may be too many: at 0.6, usual inside of parts, the thin wall
     /// of a pipe tee in 64 parts has a 1st percentile of 26°, then 29.5°.
