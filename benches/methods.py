@@ -8,7 +8,7 @@
     --mpi 4                                            the same ranks under mpirun (a binary with the feature mpi); checksums must agree
 
 Sizes are those of the preset `coarse` (where that is less than 640 tets, `--coarse 640`) with so many pieces an edge that one rank makes some 64,000 tets or more, in-process ranks.
-"Volume" is the difference from the mesh on one rank, relative; "tets" the number over that on one rank. A row ends with what is wrong with it: an
+"Pieces" are connected by faces, of all parts together: as many as ranks where each part is in one piece. "Volume" is the difference from the mesh on one rank, relative; "tets" the number over that on one rank. A row ends with what is wrong with it: an
 angle below 10° where one rank has more, a 1st percentile more than 2° below that of one rank, more than 30 % more or fewer tets, a fault.
 """
 import argparse, json, math, os, pathlib, subprocess, sys, tempfile
@@ -60,8 +60,8 @@ def judged(given, folder, ranks):
 
 def matrix(given, geometries, folder):
     """Each geometry on one rank, and with each method on many."""
-    print("| geometry | method | ranks | tets | over serial | min dih | serial | p1 | serial | volume | s | interfaces: tets, angle before | |")
-    print("|---|---|" + "--:|" * 10 + "---|")
+    print("| geometry | method | ranks | tets | over serial | min dih | serial | p1 | serial | volume | pieces | imbalance | s | interfaces: s, tets, angle before | |")
+    print("|---|---|" + "--:|" * 11 + "---|---|")
     rows = wrong = 0
     for geometry in geometries:
         size = sizes(given.binary, geometry, folder, given.tets)
@@ -74,7 +74,7 @@ def matrix(given, geometries, folder):
                 report = run(given.binary, [geometry, *size, "-m", method, "-n", ranks, *out], folder)
                 if isinstance(report, str) or isinstance(serial, str):
                     wrong += 1
-                    print(name, f" | | | | | | | | | {report if isinstance(report, str) else serial} |", flush=True)
+                    print(name, f" | | | | | | | | | | | {report if isinstance(report, str) else serial} |", flush=True)
                     continue
                 mesh, one, across = report["mesh"], serial["mesh"], report["across"]
                 bad = list(faults(mesh, one))
@@ -82,10 +82,12 @@ def matrix(given, geometries, folder):
                 if ranks == given.mpi:
                     bad += against_mpi(given, [geometry, *size, "-m", method, "-f", "none"], mesh, folder)
                 wrong += bool(bad)
-                before = f"{across['tets']}, {across['smallest_before']:.1f}" if across else ""
+                seconds = {stage["name"]: stage["seconds"] for stage in report["stages"]}
+                before = f"{seconds['interfaces']:.1f}, {across['tets']}, {across['smallest_before']:.1f}" if across else ""
+                part = report["partition"]
                 print(name, f"{mesh['tets']} | {mesh['tets'] / one['tets']:.2f} | {mesh['smallest_dihedral']:.1f} | "
                       f"{one['smallest_dihedral']:.1f} | {mesh['first_percentile_dihedral']:.1f} | {one['first_percentile_dihedral']:.1f} | "
-                      f"{mesh['volume'] / one['volume'] - 1:.0e} | {report['seconds']:.1f} | {before} | {', '.join(bad)} |", flush=True)
+                      f"{mesh['volume'] / one['volume'] - 1:.0e} | {part['pieces']} | {part['imbalance']:.2f} | {report['seconds']:.1f} | {before} | {', '.join(bad)} |", flush=True)
     print(f"\n{rows} rows, {wrong} with something wrong.")
 
 

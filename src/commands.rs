@@ -123,7 +123,7 @@ fn generate_on(comm: &dyn Communicator, options: &Generate, start: Instant) -> R
         Some(file) => draw(comm, made.part.stream(), options.cut, file)?,
         None => {}
     }
-    let balanced = balance(comm, made.part.stream())?;
+    let balanced = balance(comm, &made.part)?;
     let took = processes(comm)?;
     let Some(model) = model else { return Ok(()) };
     let mut report = summary(&model, &name_of(&options.input), &made, took, comm.size(), balanced);
@@ -347,7 +347,7 @@ pub fn run_mesh(options: &MeshFile) -> Result<(), Failure> {
     if let Some(file) = &options.picture {
         draw(&comm, made.part.stream(), options.cut, file)?;
     }
-    let balanced = balance(&comm, made.part.stream())?;
+    let balanced = balance(&comm, &made.part)?;
     let mut report = summary(&model, &name_of(&options.input), &made, processes(&comm)?, 1, balanced);
     report.stages = progress.finish();
     report.seconds = start.elapsed().as_secs_f64();

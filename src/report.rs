@@ -189,7 +189,7 @@ impl PartitionReport {
             parts: metrics.parts,
             imbalance: balance.tets,
             edge_cut: metrics.edge_cut as u64,
-            pieces: metrics.pieces as u64,
+            pieces: balance.pieces.unwrap_or(metrics.pieces as u64),
             shared_vertices: balance.shared_vertices,
             owner_imbalance: balance.owned,
         }

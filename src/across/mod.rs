@@ -5,16 +5,18 @@
 //! but faces inside a body:
 //!
 //! ```text
-//!   bad tets ──► regions round them ──► each to one rank ──► improved ──► ids without gaps
-//!             (labels over interfaces)    (migrate_bare)     (no message)  (a scan, a list)
+//!   bad tets ──► regions round them ──► each to one rank ──► improved ──► ids without gaps ──► back to the ranks they came from
+//!             (labels over interfaces)    (migrate_bare)     (no message)  (a scan, a list)     (migrate_bare)
 //! ```
 //!
 //! The surface of each region stays as it is ([`improve`]), so all still fits; and so does the boundary of the geometry, but for vertices that only
-//! a cut needed ([`Settings::merge`]). Regions of a round may meet, and the interface is elsewhere afterwards; so there are several rounds, with other regions in each. Where three or more parts meet is
-//! inside of a region like any other place. What costs time grows with the bad tets, not with the mesh.
+//! a cut needed ([`Settings::merge_angle`]). No angle in a region gets smaller than its smallest. Then each tet goes to the rank that had its place before: parts stay where
+//! they were, as even and as connected, and what is still bad is beside an interface as before. Regions of a round may meet; so there are several rounds, with other regions in
+//! each. Where three or more parts meet is inside of a region like any other place. What costs time grows with the bad tets, not with the mesh.
 //!
 //! Compared: migrating whole layers beside all interfaces (as ParMmg does: Cirrottola, Froehly 2019) moves most of small parts, good
-//! or bad; operations that only touch one rank leave the narrow triangles, which are the reason.
+//! or bad; operations that only touch one rank leave the narrow triangles, which are the reason. Regions that stay where they were improved (as here at first) make parts
+//! ragged, with islands, and take what is still bad away from the interfaces, by which it is found.
 
 mod merge;
 mod regions;
@@ -32,19 +34,28 @@ use crate::migrate::{self, MigrateError};
 /// How much is done.
 #[derive(Clone, Debug)]
 pub struct Settings {
-    /// Tets near interfaces with a smaller dihedral angle than this are bad, degrees.
-    pub angle: f64,
-    /// Rounds at most.
-    pub rounds: u32,
-    /// Whether vertices of the geometry's boundary may be merged into neighbours, where cuts have left them too near.
-    pub merge: bool,
+    /// For each round: tets near interfaces with a smaller dihedral angle than this are bad, degrees.
+    pub angles: Vec<f64>,
+    /// At tets with a smaller angle than this, degrees, vertices of the geometry's boundary may be merged into neighbours: where cuts have left them too
+    /// near.
+    pub merge_angle: Option<f64>,
     /// How regions are improved.
     pub improve: improve::Settings,
 }
 
 impl Default for Settings {
+    /// First the few percent of the tets that the 1st percentile depends on, then the worst. With 38° nearly all tets near interfaces go through it, and no
+    /// percentile is better by more than 0.2°; with 30° alone those of cubes in 64 parts are 2° below the one on one rank.
+    ///
+    /// Vertices of an interface are merged and added where tets are worse than 0.75, as there may be too many: at 0.6, usual inside of parts, the thin wall
+    /// of a pipe tee in 64 parts has a 1st percentile of 26°, then 29.5°.
     fn default() -> Self {
-        Self { angle: 30.0, rounds: 4, merge: true, improve: improve::Settings::of(improve::Effort::Careful) }
+        let improve = improve::Settings {
+            passes: 4,
+            change_below: 0.75,
+            ..improve::Settings::of(improve::Effort::Careful)
+        };
+        Self { angles: vec![34.0, 34.0, 30.0, 30.0], merge_angle: Some(30.0), improve }
     }
 }
 
@@ -82,10 +93,11 @@ pub fn improve_across(
     mut mesh: BareMesh,
     settings: &Settings,
 ) -> Result<(BareMesh, Option<Report>), MigrateError> {
-    let mut report = Report { angle: settings.angle, ..Report::default() };
-    (report.smallest_before, report.bad_before) = angles(comm, &mesh, settings.angle)?;
-    for round in 0..settings.rounds {
-        let bad = regions::bad_tets(&mesh, settings.angle);
+    let angle = settings.angles.iter().copied().fold(0.0, f64::max);
+    let mut report = Report { angle, ..Report::default() };
+    (report.smallest_before, report.bad_before) = angles(comm, &mesh, angle)?;
+    for (round, &angle) in (0..).zip(&settings.angles) {
+        let bad = regions::bad_tets(&mesh, angle);
         if comm.all_reduce_sum_u64([bad.len() as u64])? == [0] {
             break;
         }
@@ -94,7 +106,8 @@ pub fn improve_across(
         let (moved, sent) = migrate::migrate_bare(comm, mesh, &regions.to, &migrate::Settings::default())?;
         let reworked = rework::rework(&moved, &mine, settings);
         let counts = [mine.len() as u64, sent.tets, reworked.merged];
-        mesh = renumber::put_back(comm, moved, reworked)?;
+        let (improved, home) = renumber::put_back(comm, moved, reworked)?;
+        (mesh, _) = migrate::migrate_bare(comm, improved, &home, &migrate::Settings::default())?;
         let [tets, moved, merged] = comm.all_reduce_sum_u64(counts)?;
         report.rounds += 1;
         report.tets += tets;
@@ -104,7 +117,7 @@ pub fn improve_across(
     if report.rounds == 0 {
         return Ok((mesh, None));
     }
-    (report.smallest_after, report.bad_after) = angles(comm, &mesh, settings.angle)?;
+    (report.smallest_after, report.bad_after) = angles(comm, &mesh, angle)?;
     Ok((mesh, Some(report)))
 }
 

@@ -117,13 +117,19 @@ fn share(comm: &dyn Communicator, mesh: &BareMesh, labels: &mut [Label]) -> Resu
 }
 
 impl Regions {
-    /// **Collective.** The ids of the tets of regions that go to this rank, or stay here; ascending.
-    pub fn tets_to(&self, comm: &dyn Communicator, mesh: &BareMesh) -> Result<Vec<GlobalId>, CommError> {
+    /// **Collective.** The ids of the tets of regions that go to this rank, or stay here, and where they are now; ascending.
+    pub fn tets_to(
+        &self,
+        comm: &dyn Communicator,
+        mesh: &BareMesh,
+    ) -> Result<Vec<(GlobalId, Rank)>, CommError> {
         let mut lists = vec![Vec::new(); mesh.ranks as usize];
         for (tet, &to) in self.to.iter().enumerate().filter(|(tet, _)| self.inside[*tet]) {
             lists[to as usize].push(mesh.tet_ids[tet]);
         }
-        let mut mine = comm.all_to_all(lists)?.concat();
+        let lists = (0..).zip(comm.all_to_all(lists)?);
+        let mut mine: Vec<(GlobalId, Rank)> =
+            lists.flat_map(|(from, ids)| ids.into_iter().map(move |id| (id, from))).collect();
         mine.sort_unstable();
         Ok(mine)
     }

@@ -4,10 +4,11 @@ use super::rework::Reworked;
 use crate::comm::{CommError, Communicator};
 use crate::dist::{BareMesh, LaidEdge, Shared, Side};
 use crate::mesh::stream::Counts;
-use crate::mesh::{GlobalId, TetId, VertexId};
+use crate::mesh::{GlobalId, Rank, TetId, VertexId};
 
 /// **Collective.** The part with reworked tets. Ids of tets and vertices that were taken out are used again on their rank; then what is too much gets
 /// the highest, and where some are left over all others move up: so they keep their order, and only ids that are left over have to be told to all.
+/// Also the rank that each tet goes to.
 ///
 /// # Errors
 /// What the ranks cannot say.
@@ -15,8 +16,9 @@ pub(super) fn put_back(
     comm: &dyn Communicator,
     mut part: BareMesh,
     reworked: Reworked,
-) -> Result<BareMesh, CommError> {
-    let Reworked { tets, bodies, sides, taken, moved, gone, added, edges, lost_triangles, .. } = reworked;
+) -> Result<(BareMesh, Vec<Rank>), CommError> {
+    let Reworked { tets, bodies, to: ranks, sides, taken, moved, gone, added, edges, lost_triangles, .. } =
+        reworked;
     for (v, point, class) in moved {
         (part.points[v as usize], part.vertex_classes[v as usize]) = (point, class);
     }
@@ -38,6 +40,8 @@ pub(super) fn put_back(
     part.sides.retain(|side| !is_taken[side.tet.index()]);
     part.sides.extend(sides.into_iter().map(|side| Side { tet: TetId(places[side.tet.index()]), ..side }));
     part.sides.sort_unstable();
+    let mut to = vec![part.rank; part.tets.len() + more];
+    places.iter().zip(ranks).for_each(|(&place, rank)| to[place as usize] = rank);
     for (&place, (tet, body)) in places.iter().zip(tets.into_iter().zip(bodies)) {
         if (place as usize) < part.tets.len() {
             (part.tets[place as usize], part.tet_bodies[place as usize]) = (tet, body);
@@ -47,7 +51,7 @@ pub(super) fn put_back(
         }
     }
     part.tet_ids.extend((part.totals.tets + before[1]..).take(more));
-    drop_tets(&mut part, left_over);
+    drop_tets(&mut part, &mut to, left_over);
 
     part.vertex_ids.extend((part.totals.vertices + before[0]..).take(added.len()));
     for (point, class) in added {
@@ -64,7 +68,7 @@ pub(super) fn put_back(
         tets: part.totals.tets + more_tets - gaps[1].0.len() as u64,
         boundary: part.totals.boundary - lost_triangles,
     };
-    Ok(part)
+    Ok((part, to))
 }
 
 /// Ids that are left over, of all ranks; ascending.
@@ -110,7 +114,7 @@ pub(super) fn keep<T>(list: &mut Vec<T>, places: &[u32]) {
     list.retain(|_| places.next().is_some_and(|place| *place != u32::MAX));
 }
 
-fn drop_tets(part: &mut BareMesh, gone: &[u32]) {
+fn drop_tets(part: &mut BareMesh, to: &mut Vec<Rank>, gone: &[u32]) {
     if gone.is_empty() {
         return;
     }
@@ -118,6 +122,7 @@ fn drop_tets(part: &mut BareMesh, gone: &[u32]) {
     keep(&mut part.tets, &places);
     keep(&mut part.tet_bodies, &places);
     keep(&mut part.tet_ids, &places);
+    keep(to, &places);
     part.sides.iter_mut().for_each(|side| side.tet = TetId(places[side.tet.index()]));
 }
 

@@ -98,7 +98,7 @@ mod tests {
     use crate::improve::samples::cube;
     use crate::size::UniformSize;
 
-    const SHAPES: Objective = Objective { measure: Measure::MeanRatio, legality: None };
+    const SHAPES: Objective = Objective { measure: Measure::MeanRatio, legality: None, sharpest: 1.0 };
 
     fn collapse_all(size: f64) -> (usize, usize) {
         let mut complex = whole(&cube(5, 3));

@@ -161,7 +161,7 @@ mod tests {
     use crate::improve::objective::Measure;
     use crate::improve::samples::{cube, icosahedron};
 
-    const SHAPES: Objective = Objective { measure: Measure::MeanRatio, legality: None };
+    const SHAPES: Objective = Objective { measure: Measure::MeanRatio, legality: None, sharpest: 1.0 };
 
     fn middle(complex: &Complex, tet: u32) -> Point {
         let sum: crate::Vector = complex.corners(complex.tets[tet as usize]).iter().map(|p| p.coords).sum();

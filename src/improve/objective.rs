@@ -5,7 +5,7 @@ use crate::improve::complex::NONE;
 use crate::improve::legality::Legality;
 use crate::improve::limits::TetLimits;
 use crate::kernel::quality::{Diagonal, squared_lengths, worst_child_of};
-use crate::kernel::simplex::{area_vector, volume6};
+use crate::kernel::simplex::{area_vector, largest_cosine, volume6};
 use crate::{Vector, mesh::TET_FACES};
 
 /// How the shape of a tet is measured: 1 at most, more than 0 for every positively oriented tet.
@@ -58,6 +58,8 @@ pub(super) struct Objective<'a> {
     pub measure: Measure,
     /// Which tets are illegal, if that matters.
     pub legality: Option<&'a Legality>,
+    /// Tets with a dihedral angle whose cosine is larger count as inverted; 1 or more where all may be.
+    pub sharpest: f64,
 }
 
 impl Objective<'_> {
@@ -137,6 +139,9 @@ impl Objective<'_> {
         if v6.is_nan() || v6 <= 0.0 {
             return 0.0;
         }
+        if self.sharpest < 1.0 && largest_cosine(p) > self.sharpest {
+            return 0.0;
+        }
         let (sum, scale, _) = self.denominator(&squared_lengths(p));
         scale * v6 / (sum * sum.sqrt())
     }
@@ -200,7 +205,7 @@ mod tests {
         #[test]
         fn the_gradient_is_the_difference_quotient(p in any_tet(), x in -1.0..1.0f64, y in -1.0..1.0f64) {
             for measure in [Measure::MeanRatio, Measure::Refined] {
-                let objective = Objective { measure, legality: None };
+                let objective = Objective { measure, legality: None, sharpest: 1.0 };
                 let shape = objective.shape(&p);
                 prop_assume!(shape > 0.05);
                 let (same, gradient) = objective.shape_and_gradient(&p);
@@ -216,8 +221,16 @@ mod tests {
         }
 
         #[test]
+        fn what_is_sharper_than_allowed_counts_as_inverted(p in any_tet(), sharpest in 0.5..1.0f64) {
+            let objective = Objective { measure: Measure::Refined, legality: None, sharpest };
+            let free = Objective { sharpest: 1.0, ..objective };
+            let scores = [objective, free].map(|objective| objective.score(&p, [0, 1, 2, 3]));
+            prop_assert_eq!(scores[0], if largest_cosine(&p) > sharpest { INVERTED } else { scores[1] });
+        }
+
+        #[test]
         fn the_refined_measure_is_the_refined_quality(p in any_tet()) {
-            let objective = Objective { measure: Measure::Refined, legality: None };
+            let objective = Objective { measure: Measure::Refined, legality: None, sharpest: 1.0 };
             let quality = refined_quality(&p).0;
             prop_assume!(quality > 0.0);
             prop_assert!((objective.shape(&p) - score_of_ratio(quality * 7.0 / 6.0)).abs() < 1e-12);

@@ -275,7 +275,7 @@ mod tests {
     use crate::improve::samples::{cube, fan};
     use crate::improve::swap::Swapper;
 
-    const SHAPES: Objective = Objective { measure: Measure::MeanRatio, legality: None };
+    const SHAPES: Objective = Objective { measure: Measure::MeanRatio, legality: None, sharpest: 1.0 };
 
     #[test]
     fn reconnection_goes_on_where_swaps_end() {

@@ -31,6 +31,8 @@ pub struct Settings {
     pub shortest_edge: f64,
     /// Partial fillings at most that are looked at for reconnections, in each pass over a block.
     pub reconnection_steps: usize,
+    /// If no tet has a smaller dihedral angle than this, degrees, none gets one. The worst measure rises anyway, but the smallest angle may fall for it.
+    pub least_angle: f64,
     /// Tets that are improved together, apart from others, as a unit of parallel work: see [`improve`].
     pub block: usize,
 }
@@ -95,6 +97,7 @@ impl Settings {
             change_below: 0.6,
             shortest_edge: 0.6,
             reconnection_steps,
+            least_angle: 0.0,
             block: 1 << 15,
         }
     }
@@ -210,7 +213,9 @@ fn run(mesh: &mut Mesh, size: &dyn SizeField, legality: Option<&Legality>, setti
             .map_init(worker, |(to_block, tools), block| {
                 let mut block = Block::new(mesh, &triangles, &cut, block, to_block);
                 let legality = legality.map(|l| l.of_block(&block.vertices, to_block));
-                let objective = Objective { measure: settings.measure, legality: legality.as_ref() };
+                let sharpest = settings.least_angle.to_radians().cos();
+                let objective =
+                    Objective { measure: settings.measure, legality: legality.as_ref(), sharpest };
                 let counts = tools.improve(&mut block.complex, &objective, size, settings);
                 let met = std::mem::take(&mut block.triangles);
                 (block.finish(&cut, |score| score < score_of_ratio(settings.target)), counts, met)

@@ -159,6 +159,10 @@ impl Smoother {
             self.active.clear();
             let band = self.values.iter().zip(&self.gradients).filter(|(v, _)| **v <= worst + ACTIVE_BAND);
             self.active.extend(band.map(|(_, g)| *g));
+            // None is near the worst that counts as inverted for its angles alone.
+            if self.active.is_empty() {
+                break;
+            }
             let direction = shortest_in_hull(&self.active, &mut self.weights);
             let slope = direction.norm_squared();
             if slope.sqrt() * reach < SMALL_STEP_GAIN {

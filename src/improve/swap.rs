@@ -288,7 +288,7 @@ mod tests {
     use crate::improve::objective::Measure;
     use crate::improve::samples::{cube, fan};
 
-    const SHAPES: Objective = Objective { measure: Measure::MeanRatio, legality: None };
+    const SHAPES: Objective = Objective { measure: Measure::MeanRatio, legality: None, sharpest: 1.0 };
 
     /// Swaps wherever it helps; after each swap the worst of the swapped tets must be better.
     fn swap_all(complex: &mut Complex) -> usize {

@@ -8,7 +8,6 @@ use super::model::{CsgModel, Model};
 use super::skins::refuse_periodic;
 use super::target::Outcome;
 use super::wanted::{Wanted, mesh_as_wanted};
-use crate::Point;
 use crate::comm::Communicator;
 use crate::comm::pack::{put, take};
 use crate::decompose::{self, CutModel, CutPlane, Cuts, Evidence};
@@ -16,14 +15,16 @@ use crate::dist::BareMesh;
 use crate::error::{Failure, Status, agree};
 use crate::improve::{self, Effort};
 use crate::kernel::tree::bounds;
-use crate::mesh::{Mesh, Rank, VertexId};
+use crate::mesh::{BoundaryTriangle, Mesh, Rank, VertexId};
 use crate::partition;
 use crate::progress::Progress;
 use crate::refine::Bends;
 use crate::size::{SizeField, Source, SourceTree};
 use crate::skin::{self, Filled, PartSizes, Skin};
 use crate::surface::{self, SurfaceMesh};
+use crate::{Point, Vector};
 use csg::{Aabb, BodyId};
+use rayon::prelude::*;
 use std::collections::BTreeSet;
 
 /// How a geometry is cut.
@@ -162,7 +163,7 @@ fn cut(
 }
 
 fn centre(mesh: &Mesh, tet: &[VertexId; 4]) -> Point {
-    Point::from(tet.iter().map(|v| mesh.points[v.index()].coords).sum::<crate::Vector>() / 4.0)
+    Point::from(tet.iter().map(|v| mesh.points[v.index()].coords).sum::<Vector>() / 4.0)
 }
 
 /// The planes: the user's, or those that suit the coarse mesh.
@@ -219,17 +220,32 @@ fn fine_surface(model: &CsgModel, base: &dyn SizeField) -> Result<SurfaceMesh, C
         match mesh_surface(model, &size, corrections < MOST_CORRECTIONS) {
             Ok((surface, _)) => {
                 // The ranks could not fill it, and would say so too late.
-                let crossing = surface::crossings(&surface.points, &surface.triangles);
-                if crossing.is_empty() || corrections == MOST_CORRECTIONS {
+                let mut unfit = surface::crossings(&surface.points, &surface.triangles);
+                unfit.extend(coincident(&surface));
+                if unfit.is_empty() || corrections == MOST_CORRECTIONS {
                     return Ok(surface);
                 }
-                sources.extend(crossing.into_iter().map(|point| smaller_at(point, &size)));
+                sources.extend(unfit.into_iter().map(|point| smaller_at(point, &size)));
             }
             Err(Unmeshed::Lower(lower)) => sources.extend(lower),
             Err(Unmeshed::Failed(error)) => return Err(error),
         }
         corrections += 1;
     }
+}
+
+/// The centres of triangles with the same corners: where a piece is a lens or a slice so thin that no vertex lies inside both of its sides.
+fn coincident(surface: &SurfaceMesh) -> Vec<Point> {
+    let corners = |t: &BoundaryTriangle| {
+        let mut corners = t.vertices;
+        corners.sort_unstable();
+        corners
+    };
+    let mut all: Vec<[VertexId; 3]> = surface.triangles.iter().map(corners).collect();
+    all.par_sort_unstable();
+    let same = all.windows(2).filter(|two| two[0] == two[1]).map(|two| two[0]);
+    let centre = |v: [VertexId; 3]| v.iter().map(|v| surface.points[v.index()].coords).sum::<Vector>() / 3.0;
+    same.map(|corners| centre(corners).into()).collect()
 }
 
 /// Adds the coarse tets near a skin, and the sizes at their vertices.
@@ -297,6 +313,20 @@ mod tests {
         let mut message = decompose::pack(&skin);
         pack_sizes(&mut message, &skin, &mesh, &[1.0; 4]);
         message
+    }
+
+    #[test]
+    fn both_sides_of_a_lens_without_vertices_inside_are_found() {
+        let triangle = |vertices: [u32; 3], patch: u32| BoundaryTriangle {
+            vertices: vertices.map(VertexId),
+            patch: PatchId(patch),
+        };
+        let surface = SurfaceMesh {
+            points: [[0.0; 3], [3.0, 0.0, 0.0], [0.0, 3.0, 0.0], [0.0, 0.0, 3.0]].map(Point::from).to_vec(),
+            triangles: vec![triangle([0, 1, 2], 0), triangle([1, 2, 3], 0), triangle([0, 2, 1], 1)],
+            ..SurfaceMesh::default()
+        };
+        assert_eq!(coincident(&surface), [Point::new(1.0, 1.0, 0.0)]);
     }
 
     #[test]

@@ -219,7 +219,7 @@ fn fill(
     let (part, refused) =
         skins::mesh_skins(comm, &dist, &projector, pieces, sizes.as_deref(), effort, progress)?;
     // The boundary is that of the method `refine`, with no lines of cuts.
-    let across = across::Settings { merge: false, ..across::Settings::default() };
+    let across = across::Settings { merge_angle: None, ..across::Settings::default() };
     let whole = Whole { names, projector, pieces, coarse, refused: Some(refused) };
     stored(comm, part, whole, &across, progress)
 }

@@ -11,7 +11,7 @@
 //! | [`Method::Smoothed`] | one of these, and fewer faces by [`smooth`] | smaller still |
 //! | [`Method::Clusters`] | METIS on a coarse graph of clusters of tets, gathered on rank 0 (feature `metis`), and fewer faces by [`smooth`] | smallest |
 //!
-//! And [`diffuse()`] makes parts even that are not, by little movement.
+//! And [`diffuse()`] makes parts even that are not, by little movement; [`islands()`] brings small pieces of parts to those around them.
 //!
 //! All methods depend on the mesh and the number of parts alone, not on who holds what before. Parts are more, fewer or as many as ranks: a
 //! part beyond the ranks needs ranks to hold it ([`migrate`](crate::migrate::migrate) refuses such destinations).
@@ -20,12 +20,14 @@ pub mod bisection;
 mod clusters;
 pub mod curve;
 pub mod diffuse;
+pub mod islands;
 pub mod metrics;
 pub mod smooth;
 #[cfg(test)]
 mod tests;
 
 pub use diffuse::diffuse;
+pub use islands::islands;
 pub use metrics::{Metrics, measure};
 
 use crate::comm::{Agreed, CommError, Communicator};

@@ -1,9 +1,9 @@
 use super::*;
 use crate::comm::thread;
-use crate::dist::{distribute, from_serial};
+use crate::dist::{BareMesh, distribute, from_serial};
 use crate::mesh::Mesh;
 use crate::mesh::fixtures::{lattice_box, lattice_cube};
-use crate::migrate::migrate;
+use crate::migrate::{self, migrate, migrate_bare};
 use crate::partition::{self, Settings};
 
 const METHODS: &[Method] = if cfg!(feature = "metis") {
@@ -235,4 +235,42 @@ fn tets_pass_through_parts_that_have_few() {
     let sizes = diffused(&mesh, &part, 5, 8);
     assert_eq!(sizes.iter().sum::<usize>(), 288);
     assert!(sizes.iter().all(|&size| (48..=68).contains(&size)), "{sizes:?}");
+}
+
+/// The parts after islands have gone once, and how many pieces there are then.
+fn joined(mesh: &Mesh, part: &[Rank], ranks: u32) -> (Vec<Rank>, u64) {
+    let results = thread::run(ranks, |comm| {
+        let given = (comm.rank() == 0).then(|| (mesh.clone(), part.to_vec()));
+        let mesh = BareMesh::from(distribute(comm, given).unwrap());
+        let to = islands(&mesh);
+        let (mesh, _) = migrate_bare(comm, mesh, &to, &migrate::Settings::default()).unwrap();
+        let pieces = islands::pieces(comm, &mesh).unwrap();
+        (mesh.tet_ids.iter().map(|&id| (id, comm.rank())).collect::<Vec<_>>(), pieces)
+    });
+    let (parts, pieces): (Vec<_>, Vec<u64>) = results.unwrap().into_iter().unzip();
+    let mut all = parts.concat();
+    all.sort_unstable();
+    (all.into_iter().map(|(_, part)| part).collect(), pieces[0])
+}
+
+#[test]
+fn islands_go_to_the_part_around_them() {
+    let mesh = lattice_box([12, 4, 4], |_| 0);
+    let tets = mesh.tets.len();
+    let halves: Vec<Rank> = (0..tets).map(|tet| (tet % 72 / 36) as Rank).collect();
+    assert_eq!(joined(&mesh, &halves, 2), (halves.clone(), 2));
+    let mut part = halves.clone();
+    // A tet of the second half in the first, and two the other way round; of three parts one has these only.
+    (part[0], part[66], part[67]) = (1, 0, 0);
+    assert_eq!(joined(&mesh, &part, 2), (halves.clone(), 2));
+    (part[0], part[66], part[67]) = (2, 1, 1);
+    assert_eq!(joined(&mesh, &part, 3), (part, 3), "the only piece of a part stays");
+}
+
+#[test]
+fn large_pieces_stay_where_they_are() {
+    // Stripes: the first of two parts has both ends of a bar.
+    let mesh = lattice_box([12, 2, 2], |_| 0);
+    let part: Vec<Rank> = (0..288).map(|tet| u32::from((24..48).contains(&(tet % 72)))).collect();
+    assert_eq!(joined(&mesh, &part, 2), (part, 3));
 }

@@ -51,6 +51,13 @@ impl PartSizes {
         Self { weights, tets: Tree::new(&boxes), points, coarse, sizes }
     }
 
+    /// The coarse tet that a point lies in, or the nearest: beside a curved boundary the refined skin leaves the coarse tets. `None` of no tets.
+    pub fn tet_at(&self, point: &Point) -> Option<u32> {
+        let is_inside = |tet: u32| self.weights[tet as usize].at(point).iter().all(|&w| w >= 0.0);
+        let nearest = || Some(self.tets.nearest(point, |tet| self.squared_distance(point, tet))?.0);
+        self.tets.find(point, is_inside).or_else(nearest)
+    }
+
     fn squared_distance(&self, point: &Point, tet: u32) -> f64 {
         let corners = self.coarse[tet as usize].map(|v| self.points[v.index()]);
         let to_face = |face: [usize; 3]| squared_distance(point, face.map(|k| &corners[k]));
@@ -60,11 +67,8 @@ impl PartSizes {
 
 impl SizeField for PartSizes {
     fn size_at(&self, point: &Point) -> f64 {
-        let is_inside = |tet: u32| self.weights[tet as usize].at(point).iter().all(|&w| w >= 0.0);
-        // Beside a curved boundary the refined skin leaves the coarse tets.
-        let nearest = || Some(self.tets.nearest(point, |tet| self.squared_distance(point, tet))?.0);
         // A part without tets has no place to ask about.
-        let Some(tet) = self.tets.find(point, is_inside).or_else(nearest) else { return f64::INFINITY };
+        let Some(tet) = self.tet_at(point) else { return f64::INFINITY };
         let weights = self.weights[tet as usize].at(point).map(|w| w.max(0.0));
         let sizes = self.coarse[tet as usize].map(|v| self.sizes[v.index()]);
         let sum: f64 = weights.iter().sum();
