@@ -196,7 +196,7 @@ fn simple_solids_are_remeshed_well() {
     ];
     for solid in solids {
         let found = model(&[solid]);
-        for scale in [2.0, 1.0, 0.5] {
+        for scale in [2.0, 1.4, 1.0, 0.7, 0.5] {
             assert_good(&run(&found, scale), 20.0, 11.0);
         }
     }

@@ -1,4 +1,4 @@
-//! What the rounds left: bad triangles one by one, and those that would flatten in refinement.
+//! What the rounds left: triangles too far from their facets, bad ones one by one, and those that would flatten in refinement.
 
 use super::report::{RemeshReport, least_angle};
 use super::sheet::{Kind, NONE, Sheet};
@@ -12,8 +12,19 @@ const WANTED_ANGLE: f64 = 30.0;
 /// Rounds over the bad triangles.
 const ROUNDS: usize = 6;
 
-/// Works on triangles with small angles, then on those with two sides on one smooth curve.
+/// Works on triangles that do not follow their facets, then on those with small angles, then on those with two sides on one smooth
+/// curve.
 pub(super) fn repair(sheet: &mut Sheet, report: &mut RemeshReport) {
+    for _ in 0..ROUNDS {
+        let off: Vec<(u32, [u32; 3])> =
+            sheet.living().filter(|&t| !sheet.fits_at(t)).map(|t| (t, sheet.at(t).v)).collect();
+        let splits = off.iter().filter(|(t, v)| sheet.at(*t).v == *v && split_off(sheet, *t)).count();
+        if splits == 0 {
+            break;
+        }
+        report.splits += splits;
+        report.flips += flip::flip_all(sheet);
+    }
     for _ in 0..ROUNDS {
         let bad: Vec<(u32, [u32; 3])> = sheet
             .living()
@@ -41,6 +52,8 @@ pub(super) fn repair(sheet: &mut Sheet, report: &mut RemeshReport) {
 
 /// Longest edge that mending a bad triangle may leave, in units of the wanted size.
 const LONG: f64 = 1.7;
+/// The worst triangle at the middle of a split side of one that is too far from its facets is so good at least, in units of the worst before.
+const WORSE: f64 = 0.4;
 /// Sides of bad triangles are collapsed up to this length, in units of the wanted size.
 const COLLAPSIBLE: f64 = 1.1;
 
@@ -70,7 +83,7 @@ fn mend(sheet: &mut Sheet, t: u32, report: &mut RemeshReport) {
     }
     let (a, b) = ends(sides[2]);
     if sheet.length(a, b) > 1.0 && sheet.at(t).curve[sides[2]] == NONE {
-        report.splits += usize::from(split_if_better(sheet, a, b));
+        report.splits += usize::from(split_if(sheet, a, b, |before, after| after > before));
     }
 }
 
@@ -88,8 +101,18 @@ fn probe(sheet: &mut Sheet, v: u32) -> bool {
     [across, up, -across, -up].iter().any(|d| try_place(sheet, v, patch, here + d * step))
 }
 
-/// Splits an edge inside a patch if the worst triangle there gets better.
-fn split_if_better(sheet: &mut Sheet, a: u32, b: u32) -> bool {
+/// Splits the longest side of a triangle that is too far from its facets, unless it lies on a curve; whether it did.
+fn split_off(sheet: &mut Sheet, t: u32) -> bool {
+    let triangle = *sheet.at(t);
+    let p = sheet.corners(triangle.v);
+    let length = |k: usize| (p[(k + 2) % 3] - p[(k + 1) % 3]).norm();
+    let k = (0..3).fold(0, |best, k| if length(k) > length(best) { k } else { best });
+    let (a, b) = (triangle.v[(k + 1) % 3], triangle.v[(k + 2) % 3]);
+    triangle.curve[k] == NONE && split_if(sheet, a, b, |before, after| after > WORSE * before)
+}
+
+/// Splits an edge inside a patch if the new triangles follow their facets and the worst of those before and after pass.
+fn split_if(sheet: &mut Sheet, a: u32, b: u32, passes: impl Fn(f64, f64) -> bool) -> bool {
     let Some(pair) = sheet.pair(a, b) else { return false };
     let before = pair.iter().map(|&t| sheet.value_at(t)).fold(1.0, f64::min);
     let (point, kind) = split::middle(sheet, a, b);
@@ -106,7 +129,7 @@ fn split_if_better(sheet: &mut Sheet, a: u32, b: u32) -> bool {
             }
         }
     }
-    if after <= before {
+    if !passes(before, after) {
         return false;
     }
     let v = split::split(sheet, a, b, point, kind);

@@ -52,8 +52,7 @@ impl RemeshReport {
             self.min_angle = self.min_angle.min(angle);
             self.below_20 += usize::from(angle < 20.0);
             self.flattening_left += usize::from(sheet.flattens(triangle.curve));
-            let fits = sheet.fits(triangle.patch, &p, sheet.mean_size(triangle.v));
-            self.misfits += usize::from(!fits);
+            self.misfits += usize::from(!sheet.fits_at(t));
         }
         self.mean_quality = sum / self.triangles.max(1) as f64;
         self.vertices = sheet.around.iter().filter(|a| !a.is_empty()).count();

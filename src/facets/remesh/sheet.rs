@@ -174,6 +174,12 @@ impl<'a> Sheet<'a> {
             && (middle - foot.point).norm() <= FITTING_DISTANCE * longest.min(size)
     }
 
+    /// The same of one of its triangles.
+    pub fn fits_at(&self, t: u32) -> bool {
+        let triangle = self.at(t);
+        self.fits(triangle.patch, &self.corners(triangle.v), self.mean_size(triangle.v))
+    }
+
     /// The mean of the sizes wanted at some vertices.
     pub fn mean_size(&self, v: [u32; 3]) -> f64 {
         v.iter().map(|&v| self.sizes[v as usize]).sum::<f64>() / 3.0

@@ -102,10 +102,7 @@ pub(super) fn energy(sheet: &Sheet, v: u32) -> f64 {
 }
 
 pub(super) fn around_fits(sheet: &Sheet, v: u32) -> bool {
-    sheet.around[v as usize].iter().all(|&t| {
-        let triangle = sheet.at(t);
-        sheet.fits(triangle.patch, &sheet.corners(triangle.v), sheet.mean_size(triangle.v))
-    })
+    sheet.around[v as usize].iter().all(|&t| sheet.fits_at(t))
 }
 
 /// The mean of the places in which the vertex would make each triangle around it isosceles, with sides of the wanted size as far
