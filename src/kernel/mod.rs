@@ -1,6 +1,7 @@
 //! Geometry that every stage rests on: exact signs, simplices, shape measures, search, order.
 
 pub(crate) mod fixed;
+pub(crate) mod hash;
 pub mod hilbert;
 mod integers;
 pub(crate) mod nearest;

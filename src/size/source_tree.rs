@@ -1,7 +1,8 @@
 //! The smallest size over many graded sources, found fast.
 
 use super::Source;
-use super::sources::{Sources, Start};
+use super::sources::{NO_LESS, Sources, Start};
+use crate::kernel::hash::WordHash;
 use crate::{Point, Vector};
 use csg::Aabb;
 use rayon::prelude::*;
@@ -45,12 +46,16 @@ const SMALL: f64 = 0.7;
 /// of the field is then less than `√3·grading` of it.
 const LARGE: f64 = 1.0;
 
-/// Above this grading both are less, so that the field is as true as there: at a grading of 0.7 sizes were 40 % too large on a
-/// ball.
+/// That multiple is so much more where the middle and the corners do show the least size.
+const SHOWN: f64 = 2.0;
+
+/// Above this grading the multiples are less, so that the field is as true as there: at a grading of 0.7 sizes were 40 % too large on
+/// a ball.
 const STEEP: f64 = 0.45;
 
-/// Between the two, a cell is split if its middle tells that interpolation is wrong by more than this part.
-const BENT: f64 = 0.03;
+/// Between them, a cell is split if its middle tells that interpolation is wrong by more than this part, and the least size is
+/// shown if it is not below what is known by more than that.
+const BENT: f64 = 0.04;
 
 /// The uppermost levels are built in parallel below this depth: 64 pieces.
 const PARALLEL_DEPTH: u32 = 2;
@@ -61,12 +66,14 @@ struct Draft {
     min: Point,
     edge: f64,
     corners: [f64; 8],
+    /// The field is nowhere less in it.
+    least: f64,
     /// Where searches in it begin.
     start: Start,
 }
 
 /// The field at corners where it is known, by the bits of their coordinates: cells share corners.
-type Known = HashMap<[u64; 3], f64>;
+type Known = HashMap<[u64; 3], f64, WordHash>;
 
 impl SourceTree {
     /// Builds the tree over `bounds` (outside it, the value of the nearest point of the box is graded on).
@@ -83,7 +90,7 @@ impl SourceTree {
             sources.least_in(&point, &point, &sources.whole()).0
         };
         let corners = [0, 1, 2, 3, 4, 5, 6, 7].map(corner);
-        let root = Draft { min: cube.min, edge: side, corners, start: sources.whole() };
+        let root = Draft { min: cube.min, edge: side, corners, least: 0.0, start: sources.whole() };
         Self { bounds: cube, grading, maximum, cells: grow(&sources, root) }
     }
 
@@ -115,14 +122,14 @@ impl SourceTree {
 fn grow(sources: &Sources, root: Draft) -> Vec<Cell> {
     let mut cells = vec![Cell::Split(0)];
     let mut open = vec![(0, root)];
-    let mut known = Known::new();
+    let mut known = Known::default();
     for _ in 0..PARALLEL_DEPTH {
         open = open.iter().flat_map(|draft| settle(sources, &mut cells, draft, &mut known)).collect();
     }
     let below = |(_, draft): &(usize, Draft)| {
         let mut cells = vec![Cell::Split(0)];
         let mut open = vec![(0, *draft)];
-        let mut known = Known::new();
+        let mut known = Known::default();
         while let Some(next) = open.pop() {
             open.extend(settle(sources, &mut cells, &next, &mut known));
         }
@@ -161,13 +168,13 @@ fn settle(
 
 /// The eight parts of a cell in which interpolation is not good enough.
 fn split(sources: &Sources, draft: &Draft, known: &mut Known) -> Option<[Draft; 8]> {
-    let Draft { min, edge, corners, start } = *draft;
+    let Draft { min, edge, corners, least, start } = *draft;
     let far = min + Vector::repeat(edge);
     let least_corner = corners.iter().copied().fold(f64::INFINITY, f64::min);
     // No point is further than half a diagonal from all corners, nor than √5/4 of an edge from all of these and the middle.
     let reach = edge * sources.grading();
     let (small, large) = limits(sources.grading());
-    if edge < small * (least_corner - 0.5 * 3.0_f64.sqrt() * reach) {
+    if edge < small * least.max(least_corner - 0.5 * 3.0_f64.sqrt() * reach) {
         return None;
     }
     let mut start = sources.start_in(&min, &far, least_corner + 3.0_f64.sqrt() * reach, &start);
@@ -178,13 +185,12 @@ fn split(sources: &Sources, draft: &Draft, known: &mut Known) -> Option<[Draft; 
         return None;
     }
     start.near = near.or(start.near);
-    if edge < large * least_known || near.is_none() {
-        let (least, nearest) = sources.least_in(&min, &far, &start);
-        let mean = corners.iter().sum::<f64>() / 8.0;
-        let flat = edge < large * least && (mean - middle).abs() < BENT * middle;
-        if nearest.is_none() || edge < small * least || flat {
-            return None;
-        }
+    let (least, nearest) = sources.least_in(&min, &far, &start);
+    let mean = corners.iter().sum::<f64>() / 8.0;
+    let large = if least > (1.0 - BENT) * least_known { SHOWN * large } else { large };
+    let flat = edge < large * least && (mean - middle).abs() < BENT * middle;
+    if nearest.is_none() || edge < small * least || flat {
+        return None;
     }
     let lattice = lattice(draft, middle, &|point| at(point, &start).0, known);
     let part = |i: usize| {
@@ -193,7 +199,13 @@ fn split(sources: &Sources, draft: &Draft, known: &mut Known) -> Option<[Draft; 
             lattice[along(0) + 3 * along(1) + 9 * along(2)]
         };
         let corners = [0, 1, 2, 3, 4, 5, 6, 7].map(corner);
-        Draft { min: min + octant(i, 0.5 * edge), edge: 0.5 * edge, corners, start }
+        Draft {
+            min: min + octant(i, 0.5 * edge),
+            edge: 0.5 * edge,
+            corners,
+            least: (1.0 - NO_LESS) * least,
+            start,
+        }
     };
     Some([0, 1, 2, 3, 4, 5, 6, 7].map(part))
 }

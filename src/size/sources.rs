@@ -33,6 +33,9 @@ struct Node {
     range: [u32; 2],
     /// The second child, 0 for a leaf.
     second: u32,
+    /// The coordinate along `axis` at which its sources are parted.
+    axis: u32,
+    cut: f64,
 }
 
 /// Sources of a leaf.
@@ -40,7 +43,7 @@ const LEAF: usize = 6;
 
 /// What could undercut the best so far by less than this part is not looked at: from the middle of a ball all sources on it
 /// are alike.
-const NO_LESS: f64 = 0.01;
+pub(super) const NO_LESS: f64 = 0.01;
 
 /// Nodes that a search begins at, at most: more save little, and are copied for each cell.
 const START: usize = 8;
@@ -69,11 +72,20 @@ impl Sources {
         };
         let least = part.iter().map(|s| s.size).fold(f64::INFINITY, f64::min);
         let node = self.nodes.len();
-        self.nodes.push(Node { bounds, least, range: [begin as u32, end as u32], second: 0 });
+        self.nodes.push(Node {
+            bounds,
+            least,
+            range: [begin as u32, end as u32],
+            second: 0,
+            axis: 0,
+            cut: 0.0,
+        });
         if end - begin > LEAF {
             let axis = (bounds.max - bounds.min).imax();
             let half = part.len() / 2;
             part.select_nth_unstable_by(half, |a, b| a.point[axis].total_cmp(&b.point[axis]));
+            let cut = part[half].point[axis];
+            (self.nodes[node].axis, self.nodes[node].cut) = (axis as u32, cut);
             self.build(begin, begin + half);
             self.nodes[node].second = self.nodes.len() as u32;
             self.build(begin + half, end);
@@ -145,7 +157,7 @@ impl Sources {
         while count > 0 {
             count -= 1;
             let index = open[count];
-            let Node { range, second, least, bounds } = &self.nodes[index as usize];
+            let Node { range, second, axis, cut, least, bounds } = &self.nodes[index as usize];
             if self
                 .asks_less(*least, &bounds.min, &bounds.max, (min, max), (1.0 - NO_LESS) * best.0)
                 .is_none()
@@ -157,12 +169,9 @@ impl Sources {
                 continue;
             }
             // The nearer child is looked into first.
-            let middle = |child: u32| {
-                let bounds = &self.nodes[child as usize].bounds;
-                (0..3).map(|i| (bounds.min[i] + bounds.max[i] - min[i] - max[i]).powi(2)).sum::<f64>()
-            };
+            let axis = *axis as usize;
+            let swap = 0.5 * (min[axis] + max[axis]) < *cut;
             let (first, second) = (index + 1, *second);
-            let swap = middle(first) < middle(second);
             (open[count], open[count + 1]) = if swap { (second, first) } else { (first, second) };
             count += 2;
         }

@@ -1,8 +1,8 @@
 //! Which edges and faces of the mesh must stay: the surface's, and pieces of those that had to be split.
 
 use super::tetrahedra::sorted;
+use crate::kernel::hash::WordHash;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
-use std::hash::{BuildHasherDefault, Hasher};
 
 /// A piece of a triangle of the surface: the whole, unless Steiner points split it.
 #[derive(Clone, Copy, Debug)]
@@ -28,9 +28,9 @@ pub(super) enum Place {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Constraints {
     pub facets: Vec<Facet>,
-    by_vertices: HashMap<[u32; 3], u32, BuildHasherDefault<VertexHasher>>,
+    by_vertices: HashMap<[u32; 3], u32, WordHash>,
     /// How many facets use each edge.
-    edge_uses: HashMap<[u32; 2], u32, BuildHasherDefault<VertexHasher>>,
+    edge_uses: HashMap<[u32; 2], u32, WordHash>,
     /// Where each vertex after those of the surface lies on it, if it does.
     places: Vec<Option<Place>>,
     /// The facets at each Steiner point, some of them gone.
@@ -177,26 +177,4 @@ impl Constraints {
 /// The edges of a face, each with its lower vertex first.
 pub(super) fn edges([a, b, c]: [u32; 3]) -> [[u32; 2]; 3] {
     [[a, b], [b, c], [c, a]].map(|[p, q]| [p.min(q), p.max(q)])
-}
-
-/// Mixes a few vertex numbers: much faster than the standard hash, and the numbers are our own.
-#[derive(Clone, Copy, Debug, Default)]
-struct VertexHasher(u64);
-
-impl Hasher for VertexHasher {
-    fn finish(&self) -> u64 {
-        self.0 ^ (self.0 >> 29)
-    }
-
-    fn write(&mut self, bytes: &[u8]) {
-        for chunk in bytes.chunks(8) {
-            let mut word = [0; 8];
-            word[..chunk.len()].copy_from_slice(chunk);
-            self.0 = (self.0.rotate_left(23) ^ u64::from_le_bytes(word)).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-        }
-    }
-
-    fn write_usize(&mut self, _: usize) {
-        // Array lengths: always the same.
-    }
 }
