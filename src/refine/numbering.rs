@@ -199,6 +199,9 @@ impl Numbering {
         for (corner, at) in [[0, 0, 0], [n, 0, 0], [0, n, 0], [0, 0, n]].into_iter().enumerate() {
             ids[lattice.index(at) as usize] = corners[corner].0;
         }
+        if n == 1 {
+            return;
+        }
         for (edge, id) in TET_EDGES.into_iter().zip(mesh.tet_edges[tet.index()]) {
             let edge = ascending(edge, |corner| corners[corner].0);
             let inside = self.inside(Entity { dimension: 1, id: id.0 });
@@ -230,6 +233,9 @@ impl Numbering {
         let mut ids = vec![u32::MAX; at(n, n) + 1];
         for (corner, (j, k)) in corners.into_iter().zip([(0, 0), (n, 0), (0, n)]) {
             ids[at(j, k)] = vertices[corner].0;
+        }
+        if n == 1 {
+            return ids;
         }
         // Both corners of each pair ascend, so the edge runs as it is numbered.
         for pair in [[0, 1], [0, 2], [1, 2]] {
