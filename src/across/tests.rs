@@ -34,11 +34,16 @@ fn checked(comm: &dyn Communicator, fixture: &Fixture, mesh: BareMesh) -> PartRe
     report
 }
 
+/// Rounds with these angles, however many tets are bad.
+fn with_angles(angles: &[f64]) -> Settings {
+    Settings { angles: angles.to_vec(), angles_if_many: angles.to_vec(), ..Settings::default() }
+}
+
 #[test]
 fn improved_parts_still_fit_and_fill_the_bodies() {
     for (fixture, h) in [(ball(1.0), 0.4), (cylinder(2), 0.3)] {
         for (ranks, merge_angle) in [(2, None), (5, Some(35.0)), (16, None), (16, Some(35.0))] {
-            let settings = Settings { angles: vec![35.0; 4], merge_angle, ..Settings::default() };
+            let settings = Settings { merge_angle, ..with_angles(&[35.0; 4]) };
             let made = thread::run(ranks, |comm| {
                 let before = filled(comm, &fixture, h);
                 let volume = checked(comm, &fixture, before.clone()).volume;
@@ -63,7 +68,7 @@ fn improved_parts_still_fit_and_fill_the_bodies() {
 #[test]
 fn bodies_side_by_side_keep_the_face_between_them() {
     let fixture = cube(4, true);
-    let settings = Settings { angles: vec![50.0; 4], ..Settings::default() };
+    let settings = with_angles(&[50.0; 4]);
     let made = thread::run(7, |comm| {
         let before = filled(comm, &fixture, 0.2);
         let volumes = checked(comm, &fixture, before.clone()).body_volumes;
@@ -79,7 +84,7 @@ fn bodies_side_by_side_keep_the_face_between_them() {
 #[test]
 fn parts_without_bad_tets_stay_as_they_are() {
     let fixture = cube(3, false);
-    let settings = Settings { angles: vec![1.0], ..Settings::default() };
+    let settings = with_angles(&[1.0]);
     let same = thread::run(3, |comm| {
         let before = filled(comm, &fixture, 0.3);
         improve_across(comm, before.clone(), &settings).expect("all ranks") == (before, None)
