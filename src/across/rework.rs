@@ -9,7 +9,7 @@ use crate::improve;
 use crate::kernel::simplex::{from_lowest, largest_cosine};
 use crate::mesh::topology::{self, Faces};
 use crate::mesh::{BoundaryTriangle, Class, GlobalId, Mesh, Rank, Segment};
-use crate::mesh::{TET_EDGES, TET_FACES, TetId, VertexId};
+use crate::mesh::{TET_EDGES, TET_FACES, TetId, VertexId, sorted_face};
 use crate::skin::{self, PartSizes};
 use csg::{BodyId, CurveId, PatchId};
 use rayon::prelude::*;
@@ -189,8 +189,8 @@ fn regions(part: &BareMesh, taken: &[(u32, Rank)]) -> Vec<Region> {
     }
     for region in &mut regions {
         // Those between two tets are there twice.
-        region.mesh.triangles.sort_unstable_by_key(|t| sorted(t.vertices));
-        region.mesh.triangles.dedup_by_key(|t| sorted(t.vertices));
+        region.mesh.triangles.sort_unstable_by_key(|t| sorted_face(t.vertices));
+        region.mesh.triangles.dedup_by_key(|t| sorted_face(t.vertices));
     }
     regions
 }
@@ -320,22 +320,17 @@ fn homes(mesh: &Mesh, before: &PartSizes, ranks: &[Rank]) -> Vec<Rank> {
     homes
 }
 
-fn sorted(mut corners: [VertexId; 3]) -> [VertexId; 3] {
-    corners.sort_unstable();
-    corners
-}
-
 /// The faces of tets on patches, ascending; the first `on_surface` vertices may have such.
 fn sides(mesh: &Mesh, on_surface: usize) -> Vec<Side> {
     let known: HashMap<[VertexId; 3], &BoundaryTriangle> =
-        mesh.triangles.iter().map(|t| (sorted(t.vertices), t)).collect();
+        mesh.triangles.iter().map(|t| (sorted_face(t.vertices), t)).collect();
     let mut sides = Vec::with_capacity(known.len());
     for (tet, corners) in (0..).map(TetId).zip(&mesh.tets) {
         if corners.iter().filter(|v| v.index() < on_surface).count() < 3 {
             continue;
         }
         for (face, outward) in (0..).zip(TET_FACES.map(|face| face.map(|k| corners[k]))) {
-            let Some(triangle) = known.get(&sorted(outward)) else { continue };
+            let Some(triangle) = known.get(&sorted_face(outward)) else { continue };
             let behind = from_lowest(outward) == from_lowest(triangle.vertices);
             sides.push(Side { tet, face, patch: triangle.patch, behind });
         }

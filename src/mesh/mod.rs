@@ -77,6 +77,12 @@ pub(crate) fn sorted_edge([a, b]: [VertexId; 2]) -> [VertexId; 2] {
     [a.min(b), a.max(b)]
 }
 
+/// The corners of a face, ascending.
+pub(crate) fn sorted_face(mut corners: [VertexId; 3]) -> [VertexId; 3] {
+    corners.sort_unstable();
+    corners
+}
+
 /// Which segments are sides of triangles; the others are edges inside bodies.
 pub(crate) fn are_sides(segments: &[Segment], triangles: &[BoundaryTriangle]) -> Vec<bool> {
     let mut order: Vec<([VertexId; 2], usize)> =

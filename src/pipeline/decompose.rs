@@ -15,7 +15,7 @@ use crate::dist::BareMesh;
 use crate::error::{Failure, Status, agree};
 use crate::improve::{self, Effort};
 use crate::kernel::tree::bounds;
-use crate::mesh::{BoundaryTriangle, Mesh, Rank, VertexId};
+use crate::mesh::{Mesh, Rank, VertexId, sorted_face};
 use crate::partition;
 use crate::progress::Progress;
 use crate::refine::Bends;
@@ -236,12 +236,7 @@ fn fine_surface(model: &CsgModel, base: &dyn SizeField) -> Result<SurfaceMesh, C
 
 /// The centres of triangles with the same corners: where a piece is a lens or a slice so thin that no vertex lies inside both of its sides.
 fn coincident(surface: &SurfaceMesh) -> Vec<Point> {
-    let corners = |t: &BoundaryTriangle| {
-        let mut corners = t.vertices;
-        corners.sort_unstable();
-        corners
-    };
-    let mut all: Vec<[VertexId; 3]> = surface.triangles.iter().map(corners).collect();
+    let mut all: Vec<[VertexId; 3]> = surface.triangles.iter().map(|t| sorted_face(t.vertices)).collect();
     all.par_sort_unstable();
     let same = all.windows(2).filter(|two| two[0] == two[1]).map(|two| two[0]);
     let centre = |v: [VertexId; 3]| v.iter().map(|v| surface.points[v.index()].coords).sum::<Vector>() / 3.0;
@@ -284,7 +279,7 @@ fn unpack(message: &[u8]) -> (Skin, PartSizes) {
 mod tests {
     use super::*;
     use crate::comm::thread;
-    use crate::mesh::Class;
+    use crate::mesh::{BoundaryTriangle, Class};
     use crate::skin::SkinTriangle;
     use csg::PatchId;
 
