@@ -1,8 +1,8 @@
 use super::*;
 use crate::comm::thread;
 use crate::dist::{BareMesh, distribute, from_serial};
-use crate::mesh::Mesh;
 use crate::mesh::fixtures::{lattice_box, lattice_cube};
+use crate::mesh::{GlobalId, Mesh};
 use crate::migrate::{self, migrate, migrate_bare};
 use crate::partition::{self, Settings};
 
@@ -14,20 +14,33 @@ const METHODS: &[Method] = if cfg!(feature = "metis") {
 
 const BY_PLACE: [Method; 2] = [Method::Geometric(Geometric::Curve), Method::Geometric(Geometric::Bisection)];
 
-/// Distributes as `part` says, partitions anew, and returns the new part of each tet by global id, with its metrics.
-fn anew(mesh: &Mesh, part: &[Rank], ranks: u32, parts: u32, method: Method) -> (Vec<Rank>, Metrics) {
+/// Distributes as `part` says and does something on all ranks: the ranks that it gives tets by their global ids, in the order of these, and what else
+/// it says on each rank.
+fn on_parts<T: Send>(
+    mesh: &Mesh,
+    part: &[Rank],
+    ranks: u32,
+    work: impl Fn(&dyn Communicator, DistMesh) -> (Vec<(GlobalId, Rank)>, T) + Sync,
+) -> (Vec<Rank>, Vec<T>) {
     let results = thread::run(ranks, |comm| {
         let given = (comm.rank() == 0).then(|| (mesh.clone(), part.to_vec()));
-        let mesh = distribute(comm, given).unwrap();
-        let part = repartition(comm, &mesh, parts, method).unwrap();
-        let metrics = measure(comm, &mesh, &part, parts).unwrap();
-        (mesh.tet_ids.iter().copied().zip(part).collect::<Vec<_>>(), metrics)
+        work(comm, distribute(comm, given).unwrap())
     });
-    let (parts, metrics): (Vec<_>, Vec<Metrics>) = results.unwrap().into_iter().unzip();
-    assert!(metrics.iter().all(|other| other.edge_cut == metrics[0].edge_cut));
+    let (parts, said): (Vec<_>, Vec<T>) = results.unwrap().into_iter().unzip();
     let mut all = parts.concat();
     all.sort_unstable();
-    (all.into_iter().map(|(_, part)| part).collect(), metrics[0])
+    (all.into_iter().map(|(_, part)| part).collect(), said)
+}
+
+/// Distributes as `part` says, partitions anew, and returns the new part of each tet by global id, with its metrics.
+fn anew(mesh: &Mesh, part: &[Rank], ranks: u32, parts: u32, method: Method) -> (Vec<Rank>, Metrics) {
+    let (part, metrics) = on_parts(mesh, part, ranks, |comm, mesh| {
+        let part = repartition(comm, &mesh, parts, method).unwrap();
+        let metrics = measure(comm, &mesh, &part, parts).unwrap();
+        (mesh.tet_ids.iter().copied().zip(part).collect(), metrics)
+    });
+    assert!(metrics.iter().all(|other| other.edge_cut == metrics[0].edge_cut));
+    (part, metrics[0])
 }
 
 #[test]
@@ -239,18 +252,14 @@ fn tets_pass_through_parts_that_have_few() {
 
 /// The parts after islands have gone once, and how many pieces there are then.
 fn joined(mesh: &Mesh, part: &[Rank], ranks: u32) -> (Vec<Rank>, u64) {
-    let results = thread::run(ranks, |comm| {
-        let given = (comm.rank() == 0).then(|| (mesh.clone(), part.to_vec()));
-        let mesh = BareMesh::from(distribute(comm, given).unwrap());
+    let (part, pieces) = on_parts(mesh, part, ranks, |comm, mesh| {
+        let mesh = BareMesh::from(mesh);
         let to = islands(&mesh);
         let (mesh, _) = migrate_bare(comm, mesh, &to, &migrate::Settings::default()).unwrap();
         let pieces = islands::pieces(comm, &mesh).unwrap();
-        (mesh.tet_ids.iter().map(|&id| (id, comm.rank())).collect::<Vec<_>>(), pieces)
+        (mesh.tet_ids.iter().map(|&id| (id, comm.rank())).collect(), pieces)
     });
-    let (parts, pieces): (Vec<_>, Vec<u64>) = results.unwrap().into_iter().unzip();
-    let mut all = parts.concat();
-    all.sort_unstable();
-    (all.into_iter().map(|(_, part)| part).collect(), pieces[0])
+    (part, pieces[0])
 }
 
 #[test]
