@@ -101,11 +101,16 @@ pub fn improve_across(
     mut mesh: BareMesh,
     settings: &Settings,
 ) -> Result<(BareMesh, Option<Report>), MigrateError> {
-    let angles = angles_of_rounds(comm, &mesh, settings)?;
-    let angle = angles.iter().copied().fold(0.0, f64::max);
-    let mut report = Report { angle, ..Report::default() };
-    (report.smallest_before, report.bad_before) = smallest_and_bad(comm, &mesh, angle)?;
-    for (round, &angle) in (0..).zip(&angles) {
+    let largest = |angles: &[f64]| angles.iter().copied().fold(0.0, f64::max);
+    let choices = [&settings.angles, &settings.angles_if_many];
+    let first = settings.angles.first().copied().unwrap_or(0.0);
+    let (smallest, [worse, few, many]) =
+        smallest_and_bad(comm, &mesh, [first, largest(choices[0]), largest(choices[1])])?;
+    let [tets] = comm.all_reduce_sum_u64([mesh.tets.len() as u64])?;
+    let (angles, bad) = if worse > tets / 100 { (choices[1], many) } else { (choices[0], few) };
+    let angle = largest(angles);
+    let mut report = Report { angle, smallest_before: smallest, bad_before: bad, ..Report::default() };
+    for (round, &angle) in (0..).zip(angles) {
         let bad = regions::bad_tets(&mesh, angle);
         if comm.all_reduce_sum_u64([bad.len() as u64])? == [0] {
             break;
@@ -126,29 +131,21 @@ pub fn improve_across(
     if report.rounds == 0 {
         return Ok((mesh, None));
     }
-    (report.smallest_after, report.bad_after) = smallest_and_bad(comm, &mesh, angle)?;
+    (report.smallest_after, [report.bad_after]) = smallest_and_bad(comm, &mesh, [angle])?;
     Ok((mesh, Some(report)))
 }
 
-/// **Collective.** The angle of each round for this mesh, degrees.
-fn angles_of_rounds(
+/// **Collective.** The smallest dihedral angle of the mesh, degrees, and how many tets have a smaller one than each of some angles.
+fn smallest_and_bad<const N: usize>(
     comm: &dyn Communicator,
     mesh: &BareMesh,
-    settings: &Settings,
-) -> Result<Vec<f64>, CommError> {
-    let Some(&first) = settings.angles.first() else { return Ok(Vec::new()) };
-    let (_, bad) = smallest_and_bad(comm, mesh, first)?;
-    let [tets] = comm.all_reduce_sum_u64([mesh.tets.len() as u64])?;
-    Ok(if bad > tets / 100 { settings.angles_if_many.clone() } else { settings.angles.clone() })
-}
-
-/// **Collective.** The smallest dihedral angle of the mesh, degrees, and how many tets have a smaller one than `angle`.
-fn smallest_and_bad(comm: &dyn Communicator, mesh: &BareMesh, angle: f64) -> Result<(f64, u64), CommError> {
-    let (mut smallest, mut bad) = (f64::INFINITY, 0);
+    angles: [f64; N],
+) -> Result<(f64, [u64; N]), CommError> {
+    let (mut smallest, mut bad) = (f64::INFINITY, [0; N]);
     for tet in 0..mesh.tets.len() {
         let here = regions::smallest_angle(mesh, tet);
         smallest = smallest.min(here);
-        bad += u64::from(here < angle);
+        bad.iter_mut().zip(angles).for_each(|(bad, angle)| *bad += u64::from(here < angle));
     }
-    Ok((comm.all_reduce_min_f64([smallest])?[0], comm.all_reduce_sum_u64([bad])?[0]))
+    Ok((comm.all_reduce_min_f64([smallest])?[0], comm.all_reduce_sum_u64(bad)?))
 }
