@@ -3,7 +3,7 @@
 use super::{Closeness, Preset, SizeField, Source, SourceTree};
 use crate::{Point, Vector};
 use csg::solid::prune_in;
-use csg::{BodyId, Curve, CurveId, Cutout, Features, Geometry, Interval, Solid, SurfaceId};
+use csg::{Body, BodyId, Curve, CurveId, Cutout, Features, Geometry, Interval, Solid, SurfaceId};
 
 /// What the user asks of the size, beside what the geometry says.
 #[derive(Clone, Debug)]
@@ -74,13 +74,17 @@ impl<'a> GeometricSize<'a> {
     /// Samples curves and patches for the sources of the field.
     pub fn new(geometry: &'a Geometry, features: &Features, settings: &SizeSettings) -> Self {
         let diagonal = features.bounds.diagonal();
-        let maximum =
-            settings.scaled_bound(settings.maxh.unwrap_or(f64::INFINITY)).min(diagonal * settings.scale);
+        // Where all bodies have bounds, no size above the largest is ever wanted, and none has to be graded down to it.
+        let of_body = |body: &Body| settings.scaled_bound(body.maxh.unwrap_or(f64::INFINITY));
+        let maximum = settings
+            .scaled_bound(settings.maxh.unwrap_or(f64::INFINITY))
+            .min(diagonal * settings.scale)
+            .min(geometry.bodies.iter().map(of_body).reduce(f64::max).unwrap_or(f64::INFINITY));
         let body_bounds: Vec<(BodyId, f64)> = geometry
             .bodies
             .iter()
             .enumerate()
-            .filter_map(|(i, body)| Some((BodyId::new(i), settings.scaled_bound(body.maxh?))))
+            .map(|(i, body)| (BodyId::new(i), of_body(body)))
             .filter(|(_, bound)| *bound < maximum)
             .collect();
         let sampler = Sampler { geometry, features, settings, maximum, body_bounds: &body_bounds };
