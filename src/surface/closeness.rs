@@ -25,6 +25,9 @@ const WORTH: f64 = 0.85;
 /// Distance of neighbouring sources at most, in units of their size.
 const SPACING: f64 = 1.5;
 
+/// The surface may be so much nearer than the triangles that stand for it.
+const SAG: f64 = 1.25;
+
 /// A triangle is halved at most so often in each direction.
 const MOST_HALVINGS: u32 = 24;
 
@@ -157,9 +160,7 @@ impl<'a> Prober<'a> {
         let size = self.walls.size.size_at(&middle);
         let length = |k: usize| (part[(k + 2) % 3] - part[(k + 1) % 3]).norm();
         let longest = (0..3).fold(0, |best, k| if length(k) > length(best) { k } else { best });
-        // Over the triangle, the thickness may differ by as much as the triangle is long.
-        let enough = size / ratio;
-        let Some(thickness) = self.thickness(t, &middle, into, enough + 0.5 * length(longest)) else {
+        let Some(thickness) = self.thickness(t, &middle, into, self.limit(size, length(longest))) else {
             return;
         };
         let wanted = ratio * thickness;
@@ -174,6 +175,16 @@ impl<'a> Prober<'a> {
             let source = (lowered < WORTH * size).then_some(Source { point: middle, size: lowered });
             places.push(Place { source, thickness, limited: wanted < lowered });
         }
+    }
+
+    /// The thickness from which on a wall asks for nothing at a part of a triangle, nor for smaller parts.
+    fn limit(&self, size: f64, longest: f64) -> f64 {
+        let ratio = self.walls.closeness.ratio;
+        if longest > SPACING * WORTH * size {
+            // Over the triangle, the thickness may differ by as much as the triangle is long.
+            return size / ratio + 0.5 * longest;
+        }
+        SAG * WORTH * size / ratio
     }
 
     /// The nearest point, of what a triangle may have opposite, to the centre of a ball, if it is in the ball; and its triangle.
