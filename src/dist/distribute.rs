@@ -4,7 +4,8 @@ use super::classify::{Classified, Triangle, classify};
 use super::piece::{Entities, Piece};
 use super::{DistMesh, Shared, Totals};
 use crate::comm::{Agreed, CommError, Communicator};
-use crate::mesh::{Class, EdgeId, FaceId, GlobalId, Mesh, Rank, VertexId, topology};
+use crate::mesh::topology::{self, Edges, Faces};
+use crate::mesh::{Class, EdgeId, FaceId, GlobalId, Mesh, Rank, VertexId};
 use rayon::prelude::*;
 
 /// Why a mesh cannot be distributed.
@@ -121,15 +122,18 @@ impl From<Agreed<Self>> for DistError {
 /// # Errors
 /// A mesh that is not one, or is not classified, with the place; the same on all ranks.
 pub fn distribute(comm: &dyn Communicator, mesh: Option<(Mesh, Vec<Rank>)>) -> Result<DistMesh, DistError> {
-    let plan = match mesh {
-        Some((mesh, part)) if comm.rank() == 0 => plan(mesh, &part, comm.size()).map(Some),
+    let listed = match mesh {
+        Some((mesh, part)) if comm.rank() == 0 => {
+            Listed::new(mesh, &part, comm.size()).map(|listed| Some((listed, part)))
+        }
         None if comm.rank() == 0 => Err(DistError::NoMesh),
         _ => Ok(None),
     };
-    let plan = comm.agree(plan)?;
-    if let (Some(plan), 1) = (&plan, comm.size()) {
-        return Ok(plan.piece(0, &mut Vec::new()).assemble(0, 1));
-    }
+    let listed = match (comm.agree(listed)?, comm.size()) {
+        (Some((listed, _)), 1) => return Ok(listed.as_only_part()),
+        (listed, _) => listed,
+    };
+    let plan = listed.map(|(listed, part)| Plan::new(listed, &part, comm.size()));
     let messages = plan.map(|plan| {
         let message = |scratch: &mut Vec<u32>, rank| plan.piece(rank, scratch).to_message();
         (0..comm.size()).into_par_iter().map_init(Vec::new, message).collect()
@@ -145,6 +149,72 @@ pub fn distribute(comm: &dyn Communicator, mesh: Option<(Mesh, Vec<Rank>)>) -> R
 pub fn from_serial(mesh: Mesh) -> Result<DistMesh, DistError> {
     let part = vec![0; mesh.tets.len()];
     distribute(&crate::comm::thread::alone(), Some((mesh, part)))
+}
+
+/// A mesh with its edges and faces, and what they lie on.
+struct Listed {
+    mesh: Mesh,
+    edges: Edges,
+    faces: Faces,
+    classified: Classified,
+}
+
+impl Listed {
+    /// Lists and classifies the edges and faces of a mesh that can be distributed.
+    fn new(mesh: Mesh, part: &[Rank], ranks: u32) -> Result<Self, DistError> {
+        let tets = mesh.tets.len();
+        if part.len() != tets {
+            return Err(DistError::PartsMismatch { tets, parts: part.len() });
+        }
+        if tets > topology::MAX_TETS {
+            return Err(DistError::TooManyTets { tets });
+        }
+        if let Some(tet) = part.iter().position(|&rank| rank >= ranks) {
+            return Err(DistError::NoSuchRank { tet, part: part[tet], ranks });
+        }
+        let mut used = vec![false; mesh.points.len()];
+        mesh.tets.iter().flatten().for_each(|v| used[v.index()] = true);
+        if let Some(vertex) = used.iter().position(|used| !used) {
+            return Err(DistError::UnusedVertex { vertex });
+        }
+        let edges = topology::edges(mesh.points.len(), &mesh.tets);
+        let faces = topology::faces(mesh.points.len(), &mesh.tets);
+        let classified = classify(&mesh, &edges, &faces)?;
+        Ok(Self { mesh, edges, faces, classified })
+    }
+
+    fn totals(&self) -> Totals {
+        Totals {
+            vertices: self.mesh.points.len() as u64,
+            edges: self.edges.edges.len() as u64,
+            faces: self.faces.faces.len() as u64,
+            tets: self.mesh.tets.len() as u64,
+            boundary: self.classified.triangles.len() as u64,
+        }
+    }
+
+    /// The whole mesh on the only rank.
+    fn as_only_part(self) -> DistMesh {
+        let totals = self.totals();
+        let Self { mesh, edges, faces, classified } = self;
+        let entities = |classes: Vec<Class>| Entities {
+            ids: (0..classes.len() as GlobalId).collect(),
+            classes,
+            shared: Shared::default(),
+        };
+        let piece = Piece {
+            totals,
+            points: mesh.points,
+            vertices: entities(mesh.classes),
+            edges: entities(classified.edge_classes),
+            faces: entities(classified.face_classes),
+            tet_ids: (0..mesh.tets.len() as GlobalId).collect(),
+            tets: mesh.tets,
+            bodies: mesh.bodies,
+            triangles: classified.triangles,
+        };
+        piece.assemble_from(edges, faces, 0, 1)
+    }
 }
 
 /// Lists of numbers, in compressed rows.
@@ -234,6 +304,7 @@ impl Held {
 
 /// All that rank 0 knows when it cuts the mesh into pieces.
 struct Plan {
+    totals: Totals,
     mesh: Mesh,
     edge_classes: Vec<Class>,
     face_classes: Vec<Class>,
@@ -246,57 +317,35 @@ struct Plan {
     faces: Held,
 }
 
-/// Lists, classifies and finds the holders.
-fn plan(mesh: Mesh, part: &[Rank], ranks: u32) -> Result<Plan, DistError> {
-    let tets = mesh.tets.len();
-    if part.len() != tets {
-        return Err(DistError::PartsMismatch { tets, parts: part.len() });
-    }
-    if tets > topology::MAX_TETS {
-        return Err(DistError::TooManyTets { tets });
-    }
-    if let Some(tet) = part.iter().position(|&rank| rank >= ranks) {
-        return Err(DistError::NoSuchRank { tet, part: part[tet], ranks });
-    }
-    let tets_by_rank =
-        Rows::collect(ranks as usize, |pair| (0..).zip(part).for_each(|(tet, &r)| pair(r, tet)));
-    let vertices = held(mesh.points.len(), &tets_by_rank, |t| mesh.tets[t as usize].map(|v| v.0));
-    if let Some(vertex) = (0..mesh.points.len()).find(|&v| vertices.holders.row(v).is_empty()) {
-        return Err(DistError::UnusedVertex { vertex });
-    }
-    let listed_edges = topology::edges(mesh.points.len(), &mesh.tets);
-    let listed_faces = topology::faces(mesh.points.len(), &mesh.tets);
-    let Classified { edge_classes, face_classes, triangles } = classify(&mesh, &listed_edges, &listed_faces)?;
-    let edge_ids = |t: u32| listed_edges.tet_edges[t as usize].map(|EdgeId(id)| id);
-    let face_ids = |t: u32| listed_faces.tet_faces[t as usize].map(|FaceId(id)| id);
-    let edges = held(edge_classes.len(), &tets_by_rank, edge_ids);
-    let faces = held(face_classes.len(), &tets_by_rank, face_ids);
-    let triangles_by_rank = Rows::collect(ranks as usize, |pair| {
-        for (index, triangle) in (0..).zip(&triangles) {
-            faces.holders.row(triangle.face.index()).iter().for_each(|&rank| pair(rank, index));
-        }
-    });
-    Ok(Plan {
-        mesh,
-        edge_classes,
-        face_classes,
-        triangles,
-        triangles_by_rank,
-        tets_by_rank,
-        vertices,
-        edges,
-        faces,
-    })
-}
-
 impl Plan {
-    fn totals(&self) -> Totals {
-        Totals {
-            vertices: self.mesh.points.len() as u64,
-            edges: self.edge_classes.len() as u64,
-            faces: self.face_classes.len() as u64,
-            tets: self.mesh.tets.len() as u64,
-            boundary: self.triangles.len() as u64,
+    /// Finds the holders.
+    fn new(listed: Listed, part: &[Rank], ranks: u32) -> Self {
+        let totals = listed.totals();
+        let Listed { mesh, edges, faces, classified } = listed;
+        let Classified { edge_classes, face_classes, triangles } = classified;
+        let tets_by_rank =
+            Rows::collect(ranks as usize, |pair| (0..).zip(part).for_each(|(tet, &r)| pair(r, tet)));
+        let vertices = held(mesh.points.len(), &tets_by_rank, |t| mesh.tets[t as usize].map(|v| v.0));
+        let edge_ids = |t: u32| edges.tet_edges[t as usize].map(|EdgeId(id)| id);
+        let face_ids = |t: u32| faces.tet_faces[t as usize].map(|FaceId(id)| id);
+        let edges = held(edge_classes.len(), &tets_by_rank, edge_ids);
+        let faces = held(face_classes.len(), &tets_by_rank, face_ids);
+        let triangles_by_rank = Rows::collect(ranks as usize, |pair| {
+            for (index, triangle) in (0..).zip(&triangles) {
+                faces.holders.row(triangle.face.index()).iter().for_each(|&rank| pair(rank, index));
+            }
+        });
+        Self {
+            totals,
+            mesh,
+            edge_classes,
+            face_classes,
+            triangles,
+            triangles_by_rank,
+            tets_by_rank,
+            vertices,
+            edges,
+            faces,
         }
     }
 
@@ -314,7 +363,7 @@ impl Plan {
             Triangle { face: FaceId(local[triangle.face.index()]), ..triangle }
         });
         Piece {
-            totals: self.totals(),
+            totals: self.totals,
             points: vertices.iter().map(|&v| self.mesh.points[v as usize]).collect(),
             vertices: self.vertices.entities(rank, &self.mesh.classes),
             edges: self.edges.entities(rank, &self.edge_classes),

@@ -94,8 +94,14 @@ impl Piece {
 
     /// Makes the part of `rank`.
     pub fn assemble(self, rank: Rank, ranks: u32) -> DistMesh {
-        let Edges { edges, tet_edges } = topology::edges(self.points.len(), &self.tets);
-        let Faces { faces, tet_faces } = topology::faces(self.points.len(), &self.tets);
+        let edges = topology::edges(self.points.len(), &self.tets);
+        let faces = topology::faces(self.points.len(), &self.tets);
+        self.assemble_from(edges, faces, rank, ranks)
+    }
+
+    /// The same where the edges and faces of the tets are listed already.
+    pub fn assemble_from(self, edges: Edges, faces: Faces, rank: Rank, ranks: u32) -> DistMesh {
+        let (Edges { edges, tet_edges }, Faces { faces, tet_faces }) = (edges, faces);
         assert_eq!(
             edges.len(),
             self.edges.ids.len(),
