@@ -304,6 +304,9 @@ fn push_row(rows: [u32; 4], cells: u32, tets: &mut Vec<[u32; 4]>, diagonal: impl
     let along = |[p, q, r, s]: [u32; 4], cell: u32| [p + cell, q + cell, r + cell, s + cell];
     let upright = UPRIGHT.map(corner);
     tets.extend((0..cells).map(|cell| along(upright, cell)));
+    if cells == 1 {
+        return;
+    }
     let octahedron = OCTAHEDRON.map(|children| children.map(|child| child.map(corner)));
     for cell in 0..cells - 1 {
         // A diagonal is below 3.

@@ -54,6 +54,7 @@ pub fn fill(
         size => Either::Right(inside.par_chunks_mut(size)),
     };
     let plan = Plan::new(lattice);
+    let is_cut = lattice.octahedra() > 0;
     let fill_one = |block: &mut Block, ((tet, inside), bytes): ((usize, &mut [Coordinates]), &mut [u8])| {
         let tet = TetId::new(tet);
         block.gather(mesh, numbering, tet, before);
@@ -61,7 +62,7 @@ pub fn fill(
         let flat = flat[tet.index()];
         block.fill_odd_part(&plan, &corners, flat);
         block.bad.clear();
-        let cut = if flat { Cut::Evenly(diagonal::best_of_tet(&corners)) } else { Cut::EachBest };
+        let cut = if flat && is_cut { Cut::Evenly(diagonal::best_of_tet(&corners)) } else { Cut::EachBest };
         wide(FillAndCut { block, plan: &plan, cut, bytes });
         let kept = inside.iter_mut();
         kept.zip(block.inside(lattice)).for_each(|(kept, point)| *kept = point);
