@@ -85,7 +85,7 @@ impl Settings {
     pub fn of(effort: Effort) -> Self {
         let (passes, target, reconnection_steps) = match effort {
             Effort::Quick => (1, 0.7, 0),
-            Effort::Standard => (3, 0.8, 0),
+            Effort::Standard => (3, 0.8, 4_000),
             Effort::Careful => (8, 0.85, 4_000),
             Effort::Thorough => (8, 0.9, 40_000),
         };
