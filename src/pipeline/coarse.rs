@@ -7,7 +7,7 @@ use crate::kernel::quality::QualitySummary;
 use crate::mesh::{Class, Mesh, Segment, VertexId, are_sides};
 use crate::periodic::PeriodicSize;
 use crate::refine::Bends;
-use crate::size::{GeometricSize, SizeField, SizeSettings, Source};
+use crate::size::{GeometricSamples, GeometricSize, SizeField, SizeSettings, Source};
 use crate::surface::closeness::{ThinWalls, Walls, thin_walls};
 use crate::surface::curves::{CurveError, crowded, mesh_curves};
 use crate::surface::narrow::narrow;
@@ -149,7 +149,8 @@ const LOWERED: f64 = 0.6;
 /// # Errors
 /// What failed in the end, with its place.
 pub fn mesh(model: &CsgModel, settings: &mut CoarseSettings) -> Result<CoarseMesh, CoarseError> {
-    corrected(settings, |settings, allowed| attempt(model, settings, allowed))
+    let samples = GeometricSamples::new(&model.geometry, &model.features, &settings.size);
+    corrected(settings, |settings, allowed| attempt(model, &samples, settings, allowed))
 }
 
 /// How one attempt at a coarse mesh ended.
@@ -246,9 +247,14 @@ pub(super) fn mesh_surface(
     }
 }
 
-fn attempt(model: &CsgModel, settings: &CoarseSettings, allowed: Allowed) -> Attempt {
+fn attempt(
+    model: &CsgModel,
+    samples: &GeometricSamples,
+    settings: &CoarseSettings,
+    allowed: Allowed,
+) -> Attempt {
     let CsgModel { geometry, features, projector } = model;
-    let own = GeometricSize::new(geometry, features, &settings.size);
+    let own = GeometricSize::of_samples(geometry, features, &settings.size, samples);
     let periodic = PeriodicSize::new(&own, features, settings.size.grading);
     let size: &dyn SizeField = if features.identified.is_empty() { &own } else { &periodic };
     let (surface, segments) = match mesh_surface(model, size, allowed.lower) {

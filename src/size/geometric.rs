@@ -61,18 +61,19 @@ impl SizeSettings {
     }
 }
 
-/// Sizes from the bounds in the file, curvature, short curves and the user's settings.
+/// What a geometry asks of the size under some settings, but for their own sources: sampled once, it serves fields with any.
 #[derive(Clone, Debug)]
-pub struct GeometricSize<'a> {
-    geometry: &'a Geometry,
-    tree: SourceTree,
+pub struct GeometricSamples {
+    /// The size where nothing asks for less.
+    maximum: f64,
     /// Bodies with a bound of their own.
     body_bounds: Vec<(BodyId, f64)>,
+    sources: Vec<Source>,
 }
 
-impl<'a> GeometricSize<'a> {
-    /// Samples curves and patches for the sources of the field.
-    pub fn new(geometry: &'a Geometry, features: &Features, settings: &SizeSettings) -> Self {
+impl GeometricSamples {
+    /// Samples curves and patches.
+    pub fn new(geometry: &Geometry, features: &Features, settings: &SizeSettings) -> Self {
         let diagonal = features.bounds.diagonal();
         // Where all bodies have bounds, no size above the largest is ever wanted, and none has to be graded down to it.
         let of_body = |body: &Body| settings.scaled_bound(body.maxh.unwrap_or(f64::INFINITY));
@@ -88,14 +89,41 @@ impl<'a> GeometricSize<'a> {
             .filter(|(_, bound)| *bound < maximum)
             .collect();
         let sampler = Sampler { geometry, features, settings, maximum, body_bounds: &body_bounds };
-        let mut sources = settings.sources.clone();
+        let mut sources = Vec::new();
         for (i, curve) in features.curves.iter().enumerate() {
             let bound = settings.scaled_bound(features.edge_bound(geometry, CurveId::new(i)));
             sampler.sample_curve(curve, bound, &mut sources);
         }
         sampler.sample_patches(&mut sources);
-        let tree = SourceTree::new(features.bounds, settings.grading, maximum, &sources);
-        Self { geometry, tree, body_bounds }
+        Self { maximum, body_bounds, sources }
+    }
+}
+
+/// Sizes from the bounds in the file, curvature, short curves and the user's settings.
+#[derive(Clone, Debug)]
+pub struct GeometricSize<'a> {
+    geometry: &'a Geometry,
+    tree: SourceTree,
+    /// Bodies with a bound of their own.
+    body_bounds: Vec<(BodyId, f64)>,
+}
+
+impl<'a> GeometricSize<'a> {
+    /// Samples curves and patches for the sources of the field.
+    pub fn new(geometry: &'a Geometry, features: &Features, settings: &SizeSettings) -> Self {
+        Self::of_samples(geometry, features, settings, &GeometricSamples::new(geometry, features, settings))
+    }
+
+    /// The field of samples that were taken under the same settings but for their sources.
+    pub fn of_samples(
+        geometry: &'a Geometry,
+        features: &Features,
+        settings: &SizeSettings,
+        samples: &GeometricSamples,
+    ) -> Self {
+        let sources = [&*settings.sources, &*samples.sources].concat();
+        let tree = SourceTree::new(features.bounds, settings.grading, samples.maximum, &sources);
+        Self { geometry, tree, body_bounds: samples.body_bounds.clone() }
     }
 }
 

@@ -10,7 +10,7 @@ mod preset;
 mod source_tree;
 mod sources;
 
-pub use geometric::{GeometricSize, SizeSettings};
+pub use geometric::{GeometricSamples, GeometricSize, SizeSettings};
 pub use preset::{Closeness, Preset};
 pub use source_tree::SourceTree;
 pub use sources::Source;
