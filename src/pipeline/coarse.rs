@@ -13,6 +13,7 @@ use crate::surface::curves::{CurveError, crowded, mesh_curves};
 use crate::surface::narrow::narrow;
 use crate::surface::{self, SurfaceError, SurfaceMesh};
 use crate::volume::{self, ClosedSurface, SurfaceFaults, VolumeError};
+use csg::features::{Named, Place};
 use csg::{BodyId, PatchId};
 
 /// Why there is no coarse mesh.
@@ -24,8 +25,23 @@ pub enum CoarseError {
     /// A patch could not be meshed.
     #[error(transparent)]
     Surface(#[from] SurfaceError),
+    /// Curves that stay too near others, however short their segments.
+    #[error(
+        "an edge between surfaces of {first} and {second} comes too near another at {place} for any segments that were tried: surfaces \
+         touch there to a high order, or leave too narrow a face; move one of them or let them overlap"
+    )]
+    TooNear {
+        /// One surface.
+        first: Named,
+        /// The other.
+        second: Named,
+        /// Where.
+        place: Place,
+    },
     /// The surface mesh does not bound the bodies.
-    #[error("the surface mesh does not bound the bodies: {faults}")]
+    #[error(
+        "the surface mesh does not bound the bodies: {faults}; surfaces may touch there, or leave too thin a wall: move one of them"
+    )]
     NotClosed {
         /// What is wrong.
         faults: SurfaceFaults,
@@ -243,6 +259,10 @@ pub(super) fn mesh_surface(
     let segments: Vec<[Point; 2]> = curves.segments.iter().map(ends).collect();
     match surface::mesh_patches(geometry, features, curves, size, &surface::Settings::default()) {
         Ok((surface, _)) => Ok((surface, segments)),
+        Err(SurfaceError::TooCoarse { curve, at, .. }) if !may_lower => {
+            let [first, second] = features.curve(curve).surfaces.map(|s| Named::surface(geometry, s));
+            Err(Unmeshed::Failed(CoarseError::TooNear { first, second, place: Place(at) }))
+        }
         Err(error) => Err(Unmeshed::of(error.into(), &segments, size, may_lower)),
     }
 }
@@ -372,4 +392,27 @@ fn fill_bodies(
         segments,
     };
     Ok((mesh, report))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::size::UniformSize;
+
+    #[test]
+    fn curves_that_may_not_be_cut_finer_are_told_by_their_solids() {
+        let ring = "algebraic3d\n\
+            solid rod = cylinder (0, 0, 0; 0, 0, 1; 1);\n\
+            solid hole = orthobrick (-0.7, -0.7, -1; 0.7, 0.7, 2);\n\
+            solid ring = rod and not hole and plane (0, 0, 0; 0, 0, -1) and plane (0, 0, 1; 0, 0, 1);\n\
+            tlo ring;\n";
+        let geometry = csg::language::parse_geometry(ring, "ring.geo").unwrap().geometry;
+        let model = CsgModel::new(geometry).unwrap();
+        let Err(Unmeshed::Failed(error)) = mesh_surface(&model, &UniformSize(1.0), false) else {
+            panic!("segments as long as the radius cross")
+        };
+        let CoarseError::TooNear { place: Place(at), .. } = &error else { panic!("{error}") };
+        assert!((0.8..1.0).contains(&at.coords.xy().norm()), "{at}");
+        assert!(error.to_string().contains("solid `rod` (line 2)"), "{error}");
+    }
 }

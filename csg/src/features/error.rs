@@ -21,7 +21,7 @@ impl fmt::Display for Named {
 
 impl Named {
     /// The solid in which a surface first occurs.
-    pub(super) fn surface(geometry: &Geometry, id: SurfaceId) -> Self {
+    pub fn surface(geometry: &Geometry, id: SurfaceId) -> Self {
         let info = &geometry.surface_info[id.index()];
         Self { solid: info.solid.clone(), line: info.span.line }
     }
