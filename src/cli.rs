@@ -71,7 +71,7 @@ pub struct SizeOptions {
     /// NETGEN's mesh-size file: a count and lines `x y z h`, then a count and lines `x1 y1 z1 x2 y2 z2 h`
     #[arg(long, value_name = "FILE")]
     pub mesh_size_file: Option<PathBuf>,
-    /// How much is done for better shapes: quick, standard, careful or thorough [default: careful up to 150,000 tets, then standard]
+    /// How much is done for better shapes: quick, standard, careful or thorough [default: careful up to 100,000 tets, then standard]
     #[arg(long, value_name = "NAME")]
     pub effort: Option<Effort>,
     /// Number of tets of the coarse mesh: COUNT to 1.5 COUNT, or the least that the geometry allows

@@ -135,7 +135,7 @@ impl From<SizeSettings> for CoarseSettings {
 }
 
 /// Up to so many tets patience costs less than a second, and each may become many.
-const FEW_TETS: usize = 150_000;
+const FEW_TETS: usize = 100_000;
 
 fn effort_for(tets: usize) -> Effort {
     if tets <= FEW_TETS { Effort::Careful } else { Effort::Standard }
