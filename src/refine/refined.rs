@@ -304,6 +304,7 @@ fn push_row(rows: [u32; 4], cells: u32, tets: &mut Vec<[u32; 4]>, diagonal: impl
     let along = |[p, q, r, s]: [u32; 4], cell: u32| [p + cell, q + cell, r + cell, s + cell];
     let upright = UPRIGHT.map(corner);
     tets.extend((0..cells).map(|cell| along(upright, cell)));
+    // One cell alone, as where nothing is refined, has no octahedron beside it.
     if cells == 1 {
         return;
     }
