@@ -130,7 +130,7 @@ pub fn distribute(comm: &dyn Communicator, mesh: Option<(Mesh, Vec<Rank>)>) -> R
         _ => Ok(None),
     };
     let listed = match (comm.agree(listed)?, comm.size()) {
-        (Some((listed, _)), 1) => return Ok(listed.as_only_part()),
+        (Some((listed, _)), 1) => return Ok(listed.into_only_part()),
         (listed, _) => listed,
     };
     let plan = listed.map(|(listed, part)| Plan::new(listed, &part, comm.size()));
@@ -194,7 +194,7 @@ impl Listed {
     }
 
     /// The whole mesh on the only rank.
-    fn as_only_part(self) -> DistMesh {
+    fn into_only_part(self) -> DistMesh {
         let totals = self.totals();
         let Self { mesh, edges, faces, classified } = self;
         let entities = |classes: Vec<Class>| Entities {
