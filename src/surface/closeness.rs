@@ -25,7 +25,7 @@ const WORTH: f64 = 0.85;
 /// Distance of neighbouring sources at most, in units of their size.
 const SPACING: f64 = 1.5;
 
-/// The surface may be so much nearer than the triangles that stand for it.
+/// Surfaces may be nearer to each other than the triangles that stand for them by this factor at most.
 const SAG: f64 = 1.25;
 
 /// A triangle is halved at most so often in each direction.
