@@ -1,7 +1,7 @@
 //! What a geometry consists of, for people and as JSON.
 
 use crate::facets::FacetModel;
-use crate::mesh::VertexId;
+use crate::mesh::{Label, VertexId};
 use crate::pipeline::{CsgModel, FacetSolid};
 use csg::{BodyId, Curve, Features, PatchId, Singular};
 use serde::Serialize;
@@ -66,8 +66,8 @@ pub struct BodyLine {
 pub struct PatchLine {
     /// Its boundary number.
     pub boundary: u32,
-    /// Its boundary name.
-    pub name: String,
+    /// Its boundary name; null if it has none.
+    pub name: Option<String>,
     /// The kind of its surface.
     pub surface: &'static str,
     /// The solid of the file where its surface stands; null for surfaces.
@@ -141,12 +141,12 @@ impl Inspection {
     /// Looks at solids of triangles.
     pub fn of_facets(FacetSolid { model, names, .. }: &FacetSolid) -> Self {
         let beside = patches_beside(model);
-        let number = |body: Option<BodyId>| body.map_or(0, |b| names.bodies[b.index()].0);
+        let number = |body: Option<BodyId>| body.map_or(0, |b| names.bodies[b.index()].number);
         let patch = |(index, patch): (usize, &crate::facets::FacetPatch)| {
             let id = PatchId::new(index);
             PatchLine {
-                boundary: names.patches[index].0,
-                name: names.patches[index].1.clone(),
+                boundary: names.patches[index].number,
+                name: names.patches[index].name().map(str::to_owned),
                 surface: if model.projector.is_flat_patch(id) { "plane" } else { "facets" },
                 solid: None,
                 line: None,
@@ -160,11 +160,11 @@ impl Inspection {
         let curve = |(index, curve): (usize, &crate::facets::FacetCurve)| CurveLine {
             length: curve.vertices.windows(2).map(|w| (point(w[1]) - point(w[0])).norm()).sum(),
             corners: curve.ends.map(|ends| ends.map(|c| c.index())),
-            boundaries: beside[index].iter().map(|patch| names.patches[patch.index()].0).collect(),
+            boundaries: beside[index].iter().map(|patch| names.patches[patch.index()].number).collect(),
         };
-        let body = |(number, name): &(u32, String)| BodyLine {
-            number: *number,
-            name: name.clone(),
+        let body = |label: &Label| BodyLine {
+            number: label.number,
+            name: label.name().unwrap_or_default().to_owned(),
             maxh: None,
             line: None,
         };
@@ -264,7 +264,7 @@ impl fmt::Display for Inspection {
                 f,
                 "  {:>4}  {:16} {surface:36} {behind} | {front}  {} curves{maxh}{cutout}",
                 patch.boundary,
-                patch.name,
+                patch.name.as_deref().unwrap_or("-"),
                 patch.curves.len()
             )?;
         }

@@ -5,6 +5,7 @@ use std::path::Path;
 use std::process::Command;
 use tetmill::io::{surface, volume};
 use tetmill::kernel::simplex::volume as tet_volume;
+use tetmill::mesh::Label;
 
 /// Edges that do not have exactly two triangles in opposite directions.
 fn loose_edges(triangles: &[[u32; 3]]) -> usize {
@@ -82,7 +83,7 @@ fn tetgens_own_files_are_read() {
     };
     assert!(output.status.success(), "{output:?}");
     let found = volume::read(&dir.path().join("box.1.ele")).unwrap();
-    let mut numbers: Vec<u32> = found.names.bodies.iter().map(|(number, _)| *number).collect();
+    let mut numbers: Vec<u32> = found.names.bodies.iter().map(|label| label.number).collect();
     numbers.sort_unstable();
     assert_eq!(numbers, [3, 4]);
     let mut volumes = [0.0; 2];
@@ -90,10 +91,11 @@ fn tetgens_own_files_are_read() {
         let [a, b, c, d] = tet.map(|v| found.mesh.points[v.index()]);
         volumes[body.index()] += tet_volume(&a, &b, &c, &d);
     }
-    let of = |number: u32| volumes[found.names.bodies.iter().position(|(n, _)| *n == number).unwrap()];
+    let of =
+        |number: u32| volumes[found.names.bodies.iter().position(|label| label.number == number).unwrap()];
     assert!((of(3) - 56.0).abs() < 1e-10 && (of(4) - 8.0).abs() < 1e-10, "{volumes:?}");
     assert!(found.inverted.is_empty());
-    let patch_numbers: Vec<u32> = found.names.patches.iter().map(|(number, _)| *number).collect();
+    let patch_numbers: Vec<u32> = found.names.patches.iter().map(|label| label.number).collect();
     assert_eq!(patch_numbers, [10, 20]);
     eprintln!("tetgen: {} tets, {:?}", found.mesh.tets.len(), found.notes);
 }
@@ -160,8 +162,8 @@ gmsh.write('second.msh')
         assert!(found.inverted.is_empty(), "{name}");
         assert_eq!(found.names.bodies.len(), 2, "{name}: {:?}", found.names);
         if name != "m.mesh" {
-            assert_eq!(found.names.bodies[0], (11, "body 0".to_string()), "{name}");
-            assert!(found.names.patches.iter().all(|p| *p == (5, "all sides".to_string())), "{name}");
+            assert_eq!(found.names.bodies[0], Label::new(11, "body 0"), "{name}");
+            assert!(found.names.patches.iter().all(|p| *p == Label::new(5, "all sides")), "{name}");
         }
         tets.push(found.mesh.tets.len());
     }
@@ -186,7 +188,7 @@ mesh.write('text.vtu', binary=False)
     for name in ["zlib.vtu", "plain.vtu", "text.vtu"] {
         let found = volume::read(&dir.path().join(name)).unwrap();
         assert_eq!((found.mesh.points.len(), found.mesh.tets.len()), (5, 2), "{name}");
-        assert_eq!(found.names.bodies.iter().map(|b| b.0).collect::<Vec<_>>(), [7, 8], "{name}");
-        assert!(found.names.patches.iter().any(|p| p.0 == 5), "{name}");
+        assert_eq!(found.names.bodies.iter().map(|b| b.number).collect::<Vec<_>>(), [7, 8], "{name}");
+        assert!(found.names.patches.iter().any(|p| p.number == 5), "{name}");
     }
 }

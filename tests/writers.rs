@@ -5,7 +5,7 @@ use tetmill::Point;
 use tetmill::comm::thread;
 use tetmill::io::plain::PlainPart;
 use tetmill::io::{elmer, geomview, serial, vtu};
-use tetmill::mesh::{BoundaryTriangle, Class, Mesh, Names, VertexId};
+use tetmill::mesh::{BoundaryTriangle, Class, Label, Mesh, Names, VertexId};
 use tetmill::picture;
 
 /// The cube 0 … 1 around its centre: two tets on each side, a patch each, the upper half a part of its own.
@@ -26,9 +26,9 @@ fn cube() -> (Mesh, Names, Vec<u32>) {
             mesh.bodies.push(csg::BodyId(0));
         }
     }
-    let patches = (1..=6).map(|k| (k, format!("side {k}"))).collect();
+    let patches = (1..=6).map(|k| Label::new(k, format!("side {k}"))).collect();
     let tet_to_rank = (0..12).map(|t| u32::from(t >= 10)).collect();
-    (mesh, Names { bodies: vec![(1, "cube".into())], patches }, tet_to_rank)
+    (mesh, Names { bodies: vec![Label::new(1, "cube")], patches }, tet_to_rank)
 }
 
 #[test]

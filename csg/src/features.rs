@@ -119,8 +119,8 @@ pub struct Patch {
     pub seeds: Vec<Point>,
     /// Boundary-condition number, from 1; unique per patch unless the file gives one to several.
     pub bc: u32,
-    /// Boundary name.
-    pub name: String,
+    /// Boundary name; none if the file gives none.
+    pub name: Option<String>,
 }
 
 /// The geometric entities of a geometry.

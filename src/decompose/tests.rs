@@ -164,7 +164,7 @@ fn the_text_of_the_pieces_is_a_geometry_of_the_same_volume_and_names() {
     let materials: Vec<_> = parsed.geometry.bodies.iter().filter_map(|body| body.material.clone()).collect();
     assert_eq!(materials, ["lime", "box", "lime", "box"]);
     let cut = CsgModel::new(parsed.geometry).expect("features");
-    let sphere = cut.features.patches.iter().filter(|patch| patch.name == "skin").count();
+    let sphere = cut.features.patches.iter().filter(|patch| patch.name.as_deref() == Some("skin")).count();
     assert_eq!(sphere, 2);
 }
 

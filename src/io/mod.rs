@@ -28,7 +28,7 @@ pub mod volume;
 pub mod vtu;
 
 use crate::comm::{CommError, Communicator};
-use crate::mesh::{Names, Rank};
+use crate::mesh::{Label, Names, Rank};
 use csg::{BodyId, PatchId};
 use std::io;
 use std::path::{Path, PathBuf};
@@ -159,8 +159,8 @@ pub(crate) fn patch_number(patch: Option<PatchId>, names: &Names) -> Result<u64,
     number_of(&names.patches, patch.index()).ok_or(WriteError::UnknownPatch(patch))
 }
 
-fn number_of(list: &[(u32, String)], index: usize) -> Option<u64> {
-    list.get(index).map(|(number, _)| *number).filter(|n| (1..=MAX_NUMBER).contains(n)).map(u64::from)
+fn number_of(list: &[Label], index: usize) -> Option<u64> {
+    list.get(index).map(|label| label.number).filter(|n| (1..=MAX_NUMBER).contains(n)).map(u64::from)
 }
 
 /// **Collective.** What all ranks have written.

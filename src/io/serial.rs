@@ -5,8 +5,8 @@ use super::output::{Output, write_file};
 use super::text::{FLOAT_CHARS, Line};
 use super::{WriteError, Written, geomview, vtu};
 use crate::comm::thread;
-use crate::mesh::Names;
 use crate::mesh::stream::{MeshStream, NO_TET, SingularTags, TetBlock};
+use crate::mesh::{Label, Names};
 use std::ffi::OsStr;
 use std::path::Path;
 
@@ -60,8 +60,9 @@ fn coordinates(line: &mut Line, point: &[f64; 3]) {
 }
 
 /// Each number once, with the first name it has.
-fn numbered(list: &[(u32, String)]) -> Vec<&(u32, String)> {
-    let mut numbered: Vec<&(u32, String)> = list.iter().collect();
+fn numbered(list: &[Label]) -> Vec<(u32, &str)> {
+    let named = list.iter().filter_map(|label| Some((label.number, label.name()?)));
+    let mut numbered: Vec<(u32, &str)> = named.collect();
     numbered.sort_by_key(|(number, _)| *number);
     numbered.dedup_by_key(|(number, _)| *number);
     numbered
@@ -145,7 +146,7 @@ fn netgen(part: &dyn MeshStream, names: &Names, file: &mut Output) -> Result<(),
     let counts = part.counts();
     let bodies = BodyRuns::of(part);
     let domain = |tet: u64| match bodies.find(tet) {
-        Some(body) => names.bodies.get(body).map_or(0, |(number, _)| u64::from(*number)),
+        Some(body) => names.bodies.get(body).map_or(0, |label| u64::from(label.number)),
         None => 0,
     };
     file.write(

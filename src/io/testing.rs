@@ -2,7 +2,7 @@
 
 use crate::Point;
 use crate::comm::{Communicator, thread};
-use crate::mesh::{BoundaryTriangle, Class, Mesh, Names, Rank, TET_FACES, VertexId};
+use crate::mesh::{BoundaryTriangle, Class, Label, Mesh, Names, Rank, TET_FACES, VertexId};
 use csg::{BodyId, CornerId, PatchId};
 
 /// Runs `f` on each rank; the results by rank.
@@ -42,7 +42,7 @@ pub fn two_tets() -> Mesh {
 
 /// Names for [`two_tets`] and [`cube`].
 pub fn names() -> Names {
-    let named = |k: u32, name: &str| (k, name.to_string());
+    let named = |k: u32, name: &str| Label::new(k, name);
     Names {
         bodies: vec![named(1, "lower"), named(2, "upper")],
         patches: vec![named(1, "skin"), named(2, "lid"), named(3, "between")],

@@ -4,10 +4,12 @@
 pub(crate) mod fixtures;
 pub mod ghosts;
 pub mod ids;
+mod names;
 pub mod stream;
 pub mod topology;
 
 pub use ids::{EdgeId, FaceId, GlobalId, Rank, TetId, VertexId};
+pub use names::{Label, Names};
 
 use crate::Point;
 use csg::{BodyId, CornerId, CurveId, PatchId};
@@ -118,13 +120,4 @@ pub struct Mesh {
     pub triangles: Vec<BoundaryTriangle>,
     /// The edges on curves, each once.
     pub segments: Vec<Segment>,
-}
-
-/// Numbers and names of bodies and boundaries, as the formats write them.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Names {
-    /// By [`BodyId`]: the body's number and its name (material, else the name of its solid).
-    pub bodies: Vec<(u32, String)>,
-    /// By [`PatchId`]: boundary number and name.
-    pub patches: Vec<(u32, String)>,
 }

@@ -10,7 +10,7 @@ use crate::facets::{
 use crate::geometry::Projector;
 use crate::improve::Smoothness;
 use crate::io::surface::{self, Surface};
-use crate::mesh::{Class, Names, Segment, VertexId};
+use crate::mesh::{Class, Label, Names, Segment, VertexId};
 use crate::size::{Closeness, Source};
 use crate::surface::SurfaceMesh;
 use crate::surface::closeness::{ThinWalls, Walls, thin_walls};
@@ -183,14 +183,14 @@ fn marks_of(surface: &Surface) -> Marks {
 /// each patch is one.
 fn names(model: &FacetModel, surfaces: &[Surface], stems: &[String]) -> Names {
     let all_numbered = surfaces.len() == 1 && model.bodies.iter().all(|b| b.number.is_some_and(|n| n > 0));
-    let mut bodies: Vec<(u32, String)> = Vec::new();
+    let mut bodies: Vec<Label> = Vec::new();
     for body in &model.bodies {
         let stem = &stems[body.file as usize];
-        let taken = |name: &String| bodies.iter().any(|(_, other)| other == name);
+        let taken = |name: &String| bodies.iter().any(|body| body.name() == Some(name));
         let numbered = (2..).map(|k| format!("{stem}_{k}"));
         let name = std::iter::once(stem.clone()).chain(numbered).find(|name| !taken(name)).expect("endless");
         let number = body.number.filter(|_| all_numbered).and_then(|number| u32::try_from(number).ok());
-        bodies.push((number.unwrap_or(bodies.len() as u32 + 1), name));
+        bodies.push(Label::new(number.unwrap_or(bodies.len() as u32 + 1), name));
     }
     let groups: Vec<(usize, usize)> = surfaces
         .iter()
@@ -202,8 +202,8 @@ fn names(model: &FacetModel, surfaces: &[Surface], stems: &[String]) -> Names {
         let (file, group) = patch.labels.first().map_or((0, 0), |&(f, g)| (f as usize, g as usize));
         let at = groups.binary_search(&(file, group)).ok().filter(|_| has_groups);
         match at {
-            Some(at) => (group_number(surfaces, &groups, at), surfaces[file].groups[group].clone()),
-            None => (index as u32 + 1, format!("patch{}", index + 1)),
+            Some(at) => Label::new(group_number(surfaces, &groups, at), surfaces[file].groups[group].clone()),
+            None => Label::new(index as u32 + 1, format!("patch{}", index + 1)),
         }
     };
     Names { bodies, patches: model.patches.iter().enumerate().map(patch).collect() }

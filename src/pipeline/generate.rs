@@ -383,11 +383,11 @@ fn broadcast_geometry(comm: &dyn Communicator, model: Option<&Model>) -> Result<
     let mut bytes = model.map(|m| m.projector().encode()).unwrap_or_default();
     comm.broadcast_bytes(0, &mut bytes)?;
     let names = model.map(Model::names).unwrap_or_default();
-    let mut text = serde_json::to_vec(&(&names.bodies, &names.patches)).expect("plain data");
+    let mut text = serde_json::to_vec(&names).expect("plain data");
     comm.broadcast_bytes(0, &mut text)?;
-    let (bodies, patches) = serde_json::from_slice(&text).expect("what rank 0 wrote");
+    let names = serde_json::from_slice(&text).expect("what rank 0 wrote");
     let projector = Projector::decode(&bytes).expect("what rank 0 encoded");
-    Ok((Names { bodies, patches }, projector))
+    Ok((names, projector))
 }
 
 /// **Collective.** The coarse tets with inverted children on any rank.

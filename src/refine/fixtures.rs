@@ -27,7 +27,7 @@ fn projector(surfaces: Vec<Surface>, curves: &[[u32; 2]], bounds: [P; 2]) -> Pro
         boundary: Vec::new(),
         seeds: Vec::new(),
         bc: surface as u32 + 1,
-        name: String::new(),
+        name: None,
     };
     let curve = |surfaces: &[u32; 2]| Curve {
         surfaces: surfaces.map(SurfaceId),

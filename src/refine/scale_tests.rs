@@ -9,8 +9,8 @@ use crate::comm::thread;
 use crate::dist::{self, distribute};
 use crate::io;
 use crate::kernel::random::Random;
-use crate::mesh::Names;
 use crate::mesh::stream::MeshStream;
+use crate::mesh::{Label, Names};
 use crate::partition::{self, partition};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -103,7 +103,7 @@ fn parts_own_like_shares_of_what_they_hold() {
 }
 
 fn names(fixture: &Fixture) -> Names {
-    let named = |k: u32| (k, format!("number {k}"));
+    let named = |k: u32| Label::new(k, format!("number {k}"));
     let bodies = fixture.mesh.bodies.iter().map(|b| b.0 + 1).max().unwrap_or(0);
     let patches = fixture.mesh.triangles.iter().map(|t| t.patch.0 + 1).max().unwrap_or(0);
     Names { bodies: (1..=bodies).map(named).collect(), patches: (1..=patches).map(named).collect() }

@@ -152,7 +152,7 @@ fn patch(sheet: &Sheet) -> Patch {
         boundary: Vec::new(),
         seeds: Vec::new(),
         bc: 0,
-        name: String::new(),
+        name: None,
     }
 }
 

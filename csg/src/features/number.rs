@@ -3,9 +3,6 @@
 use super::Patch;
 use crate::{BoundaryLabel, Geometry};
 
-/// The name of a boundary that the file does not name.
-const DEFAULT_NAME: &str = "default";
-
 /// Gives each patch its number and name: those of its cutout, else those of its surface, else the next free number; then come
 /// the statements for single boundaries of bodies, in file order.
 ///
@@ -27,8 +24,7 @@ pub(super) fn number(geometry: &Geometry, patches: &mut [Patch]) {
         let info = &geometry.surface_info[patch.surface.index()];
         let cutout = patch.cutout.map(|i| &geometry.cutouts[i as usize]);
         patch.bc = cutout.and_then(|cutout| cutout.bc).or(info.bc).unwrap_or_else(&mut next);
-        let name = cutout.and_then(|cutout| cutout.bc_name.clone()).or_else(|| info.bc_name.clone());
-        patch.name = name.unwrap_or_else(|| DEFAULT_NAME.to_owned());
+        patch.name = cutout.and_then(|cutout| cutout.bc_name.clone()).or_else(|| info.bc_name.clone());
     }
     for over in &geometry.boundary_overrides {
         let sides = |patch: &Patch| [patch.inside, patch.outside].contains(&Some(over.body));
@@ -36,7 +32,7 @@ pub(super) fn number(geometry: &Geometry, patches: &mut [Patch]) {
             match &over.label {
                 BoundaryLabel::Number(number) => patch.bc = *number,
                 BoundaryLabel::Name(name) => {
-                    patch.name.clone_from(name);
+                    patch.name = Some(name.clone());
                     // The number may be that of other patches, which keep their name.
                     if geometry.surface_info[patch.surface.index()].bc == Some(patch.bc) {
                         patch.bc = next();
@@ -51,7 +47,7 @@ pub(super) fn number(geometry: &Geometry, patches: &mut [Patch]) {
 mod tests {
     use crate::{Features, language};
 
-    fn labels(statements: &str) -> Vec<(u32, String)> {
+    fn labels(statements: &str) -> Vec<(u32, Option<String>)> {
         let source = format!(
             "algebraic3d
             solid right = plane (0.5, 0, 0; -1, 0, 0);
@@ -70,7 +66,7 @@ mod tests {
         // Five sides of the low brick and the interface; of the high brick its top, while its sides are
         // in the planes of the low one.
         assert_eq!(labels.iter().filter(|l| l.0 == 2).count(), 10);
-        assert_eq!(labels.iter().filter(|l| **l == (3, "high".to_owned())).count(), 1);
+        assert_eq!(labels.iter().filter(|l| **l == (3, Some("high".to_owned()))).count(), 1);
     }
 
     #[test]
@@ -79,8 +75,9 @@ mod tests {
         // The sides of the high brick and the interface get 7; then all patches of the low one a name; those
         // that still had the number of the surface, the five outer ones, a number of their own. (8 is the top of the high one.)
         assert_eq!(labels.iter().filter(|l| l.0 == 7).count(), 5);
-        assert_eq!(labels.iter().filter(|l| l.1 == "bottom").count(), 6);
-        let mut own: Vec<u32> = labels.iter().filter(|l| l.1 == "bottom" && l.0 != 7).map(|l| l.0).collect();
+        assert_eq!(labels.iter().filter(|l| l.1.as_deref() == Some("bottom")).count(), 6);
+        let mut own: Vec<u32> =
+            labels.iter().filter(|l| l.1.as_deref() == Some("bottom") && l.0 != 7).map(|l| l.0).collect();
         own.sort_unstable();
         assert_eq!(own, [9, 10, 11, 12, 13]);
     }

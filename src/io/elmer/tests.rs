@@ -7,7 +7,7 @@ use crate::io::plain::PlainPart;
 use crate::io::testing::{cube, names, scattered, slabs, together, two_tets};
 use crate::io::{WriteError, Written};
 use crate::mesh::stream::Counts;
-use crate::mesh::{Mesh, Names, Rank};
+use crate::mesh::{Label, Mesh, Names, Rank};
 use crate::refine::fixtures::{self, Fixture, ball};
 use crate::refine::refine;
 use std::fs;
@@ -95,7 +95,7 @@ fn cubes_in_one_to_seven_parts_have_no_faults() {
 
 /// Refines each part of a mesh on its rank and writes it.
 fn write_refined(fixture: &Fixture, n: u32, ranks: u32, dir: &Path) -> Written {
-    let named = |k: u32| (k, format!("number {k}"));
+    let named = |k: u32| Label::new(k, format!("number {k}"));
     let names = Names { bodies: (1..3).map(named).collect(), patches: (1..8).map(named).collect() };
     let write_part = |comm: &dyn Communicator| {
         let mesh = (comm.rank() == 0).then(|| (fixture.mesh.clone(), slabs(&fixture.mesh, ranks)));
@@ -218,14 +218,14 @@ fn what_elmer_cannot_read_is_refused_before_anything_is_written() {
 
 #[test]
 fn names_that_elmer_would_confuse_are_kept_apart() {
-    let named = |k: u32, name: &str| (k, name.to_string());
+    let named = |k: u32, name: &str| Label::new(k, name);
     let names = crate::mesh::Names {
         bodies: vec![named(1, "Iron"), named(2, "")],
         patches: vec![named(1, "iron"), named(3, "a=b"), named(2, "A=B")],
     };
-    let text = super::write::names_text(&names);
+    let text = super::names::names_text(&names);
     let lines: Vec<&str> = text.lines().filter(|line| line.starts_with('$')).collect();
-    assert_eq!(lines, ["$ Iron = 1", "$ body2 = 2", "$ iron_boundary = 1", "$ a_b = 2 3"]);
+    assert_eq!(lines, ["$ Iron = 1", "$ iron_boundary = 1", "$ a_b = 2 3"]);
 }
 
 /// Writes a cube in two slabs (the interface patch is where they meet), changes a line of a file, and judges.

@@ -1,5 +1,6 @@
 //! Writing Elmer's files.
 
+use super::names::names_text;
 use super::number::{Numbering, number, watchers};
 use super::periodic::{self, periodic_text};
 use super::{MAX_ID, MAX_LINE, TET, TRIANGLE};
@@ -276,48 +277,4 @@ fn link_serial_files(part: &dyn MeshStream, stage: &Path, folder: &Path) -> Resu
         written.files += 1;
     }
     Ok(written)
-}
-
-/// `mesh.names`: each name once with all its numbers.
-///
-/// Elmer folds the case of names, ends them at `=`, and finds bodies and boundaries in one list: a boundary that
-/// is named as a body gets `_boundary` behind its name.
-pub(super) fn names_text(names: &Names) -> String {
-    let bodies = by_name(&names.bodies, "body");
-    let mut boundaries = by_name(&names.patches, "boundary");
-    for (name, _) in &mut boundaries {
-        while bodies.iter().any(|(body, _)| body.eq_ignore_ascii_case(name)) {
-            name.push_str("_boundary");
-        }
-    }
-    let mut text = String::new();
-    for (title, list) in [("bodies", bodies), ("boundaries", boundaries)] {
-        text += &format!("! ----- names for {title} -----\n");
-        for (name, numbers) in list {
-            let numbers: Vec<String> = numbers.iter().map(u32::to_string).collect();
-            text += &format!("$ {name} = {}\n", numbers.join(" "));
-        }
-    }
-    text
-}
-
-/// Names that Elmer can read, in their first order, each with its numbers, ascending.
-fn by_name(list: &[(u32, String)], kind: &str) -> Vec<(String, Vec<u32>)> {
-    let mut named: Vec<(String, Vec<u32>)> = Vec::new();
-    for (number, name) in list {
-        let readable = |c: char| if c.is_control() || "=$!".contains(c) { '_' } else { c };
-        let mut name: String = name.trim().chars().map(readable).collect();
-        if name.is_empty() {
-            name = format!("{kind}{number}");
-        }
-        match named.iter_mut().find(|(known, _)| known.eq_ignore_ascii_case(&name)) {
-            Some((_, numbers)) => {
-                if let Err(place) = numbers.binary_search(number) {
-                    numbers.insert(place, *number);
-                }
-            }
-            None => named.push((name, vec![*number])),
-        }
-    }
-    named
 }

@@ -4,7 +4,7 @@ use super::raw::{Label, Raw};
 use super::{VolumeMesh, boundary, classify, orient};
 use crate::io::input::{Fault, counted};
 use crate::mesh::topology::{self, Faces};
-use crate::mesh::{BoundaryTriangle, Mesh, TetId, VertexId};
+use crate::mesh::{self, BoundaryTriangle, Mesh, TetId, VertexId};
 use csg::{BodyId, PatchId};
 use std::collections::BTreeMap;
 
@@ -165,10 +165,10 @@ const MOST: i64 = i32::MAX as i64;
 /// A number from 1 and a name for each label. Labels without such a number get those behind the largest one.
 fn names_of(
     labels: &[Label],
-    given: &BTreeMap<i64, String>,
+    given: &BTreeMap<i64, Vec<String>>,
     kind: &str,
     notes: &mut Vec<String>,
-) -> Vec<(u32, String)> {
+) -> Vec<mesh::Label> {
     let valid = |number: i64| (1..=MOST).contains(&number);
     let mut next = labels.iter().map(|l| l.number).filter(|&n| valid(n)).max().unwrap_or(0) + 1;
     let mut replaced: BTreeMap<i64, i64> = BTreeMap::new();
@@ -186,9 +186,10 @@ fn names_of(
                 number
             })
         };
-        let name = given.get(&label.number).filter(|name| !name.is_empty()).cloned();
+        let mut own = given.get(&label.number).cloned().unwrap_or_default();
+        own.retain(|name| !name.is_empty());
         // More labels than numbers left are not in reach of memory.
-        names.push((number.min(MOST) as u32, name.unwrap_or_else(|| format!("{kind} {number}"))));
+        names.push(mesh::Label { number: number.min(MOST) as u32, names: own });
     }
     names
 }

@@ -186,8 +186,8 @@ fn physical_names(words: &mut Words, raw: &mut Raw) -> Result<(), Fault> {
         let name = String::from_utf8_lossy(words.rest_of_line()).into_owned();
         let name = name.trim_matches('"').to_string();
         match dimension {
-            2 => raw.patch_names.insert(tag, name),
-            3 => raw.body_names.insert(tag, name),
+            2 => raw.patch_names.insert(tag, vec![name]),
+            3 => raw.body_names.insert(tag, vec![name]),
             _ => None,
         };
     }

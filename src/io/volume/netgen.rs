@@ -116,12 +116,12 @@ fn segments(
     Ok(())
 }
 
-fn names(words: &mut Words, names: &mut std::collections::BTreeMap<i64, String>) -> Result<(), Fault> {
+fn names(words: &mut Words, names: &mut std::collections::BTreeMap<i64, Vec<String>>) -> Result<(), Fault> {
     let count = words.count("names", 1)?;
     for _ in 0..count {
         let number = words.int("the number of a name")?;
         let name = String::from_utf8_lossy(words.rest_of_line()).into_owned();
-        names.insert(number, name);
+        names.insert(number, vec![name]);
     }
     Ok(())
 }

@@ -45,9 +45,9 @@ pub(super) struct Raw {
     pub edges: Vec<[u32; 2]>,
     pub edge_labels: Vec<i64>,
     /// Names of bodies by number.
-    pub body_names: BTreeMap<i64, String>,
+    pub body_names: BTreeMap<i64, Vec<String>>,
     /// Names of boundaries by number.
-    pub patch_names: BTreeMap<i64, String>,
+    pub patch_names: BTreeMap<i64, Vec<String>>,
     /// Elements of higher order, whose corners alone are kept.
     pub higher_order: usize,
     pub notes: Vec<String>,

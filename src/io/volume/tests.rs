@@ -7,7 +7,7 @@ use crate::io::testing::{names, scattered, two_tets};
 use crate::io::{elmer, serial};
 use crate::kernel::predicates::{Sign, orient3d};
 use crate::mesh::fixtures::{lattice_box, lattice_cube};
-use crate::mesh::{Class, VertexId};
+use crate::mesh::{Class, Label, VertexId};
 use proptest::prelude::*;
 use std::fs;
 
@@ -41,8 +41,8 @@ fn reads_two_tets(name: &str, content: impl AsRef<[u8]>) -> VolumeMesh {
     assert_eq!(found.mesh.points, two_tets().points);
     assert_eq!(found.mesh.tets, two_tets().tets);
     assert_eq!(found.mesh.triangles.len(), 6);
-    assert_eq!(found.names.bodies.iter().map(|(n, _)| *n).collect::<Vec<_>>(), [7]);
-    assert_eq!(found.names.patches.iter().map(|(n, _)| *n).collect::<Vec<_>>(), [5]);
+    assert_eq!(found.names.bodies.iter().map(|label| label.number).collect::<Vec<_>>(), [7]);
+    assert_eq!(found.names.patches.iter().map(|label| label.number).collect::<Vec<_>>(), [5]);
     assert!(found.inverted.is_empty());
     found
 }
@@ -51,8 +51,8 @@ fn reads_two_tets(name: &str, content: impl AsRef<[u8]>) -> VolumeMesh {
 fn two_bodies() -> (Mesh, Names) {
     let mesh = lattice_box([2, 2, 2], |cell| u32::from(cell[0] > 0));
     let patches = mesh.triangles.iter().map(|t| t.patch.0).max().unwrap() + 1;
-    let patches = (1..=patches).map(|k| (k, format!("side {k}").replace(' ', "_"))).collect();
-    (mesh, Names { bodies: vec![(1, "left".into()), (2, "right".into())], patches })
+    let patches = (1..=patches).map(|k| Label::new(k, format!("side_{k}"))).collect();
+    (mesh, Names { bodies: vec![Label::new(1, "left"), Label::new(2, "right")], patches })
 }
 
 /// Vertices, tets, bodies, triangles and their order as they were.
@@ -139,8 +139,10 @@ fn an_elmer_mesh_reads_back_whole_and_in_parts() {
 #[test]
 fn classes_are_found_where_patches_meet() {
     let cube = lattice_cube(3);
-    let names =
-        Names { bodies: vec![(1, "b".into())], patches: (1..=6).map(|k| (k, format!("s{k}"))).collect() };
+    let names = Names {
+        bodies: vec![Label::new(1, "b")],
+        patches: (1..=6).map(|k| Label::new(k, format!("s{k}"))).collect(),
+    };
     let found = written(&cube, &names, "m.msh").mesh;
     let count = |wanted: fn(&Class) -> bool| found.classes.iter().filter(|class| wanted(class)).count();
     assert_eq!(count(|c| matches!(c, Class::Corner(_))), 8);
@@ -154,8 +156,8 @@ fn classes_are_found_where_patches_meet() {
 #[test]
 fn gmsh_2_is_read_as_text_with_any_ids() {
     let found = reads_two_tets("m.msh", MSH22);
-    assert_eq!(found.names.bodies[0].1, "body a");
-    assert_eq!(found.names.patches[0].1, "skin");
+    assert_eq!(found.names.bodies[0].name().unwrap(), "body a");
+    assert_eq!(found.names.patches[0].name().unwrap(), "skin");
     // The edge between the first two vertices is a curve of the file's.
     assert_eq!(found.mesh.segments.len(), 1);
     assert_eq!(found.notes, Vec::<String>::new());
@@ -195,7 +197,7 @@ fn gmsh_2_is_read_in_both_orders_of_bytes() {
 #[test]
 fn gmsh_4_is_read_as_text() {
     let found = reads_two_tets("m.msh", MSH41);
-    assert_eq!(found.names.bodies[0].1, "body");
+    assert_eq!(found.names.bodies[0].name().unwrap(), "body");
 }
 
 #[test]
@@ -212,7 +214,7 @@ fn triangles_between_partitions_of_gmsh_are_left_out() {
         $Nodes\n1 5 1 5\n3 5 0 5\n1\n2\n3\n4\n5\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 1 1\n$EndNodes\n\
         $Elements\n3 3 1 3\n2 9 2 1\n1 2 3 4\n3 5 4 1\n2 1 2 3 4\n3 6 4 1\n3 2 3 4 5\n$EndElements\n";
     let found = read_as("m.msh", text).unwrap();
-    assert_eq!(found.names.bodies, [(7, "body 7".to_string())]);
+    assert_eq!(found.names.bodies, [Label::unnamed(7)]);
     assert_eq!(found.mesh.triangles.len(), 6);
     assert_eq!(found.notes[0], "1 triangles between partitions left out");
 }
@@ -221,8 +223,8 @@ fn triangles_between_partitions_of_gmsh_are_left_out() {
 fn netgen_meshes_are_turned_round_and_told_so() {
     let found = reads_two_tets("m.vol", VOL);
     assert_eq!(found.notes, ["all 2 tets stored in negative orientation turned round"]);
-    assert_eq!(found.names.bodies[0].1, "points");
-    assert_eq!(found.names.patches[0].1, "skin of it");
+    assert_eq!(found.names.bodies[0].name().unwrap(), "points");
+    assert_eq!(found.names.patches[0].name().unwrap(), "skin of it");
     assert_eq!(found.mesh.segments.len(), 1);
 }
 
@@ -256,12 +258,12 @@ fn tetgen_files_are_read_together() {
         let found = read_all(&files).unwrap();
         assert_same(&found.mesh, &Mesh { triangles: found.mesh.triangles.clone(), ..two_tets() });
         assert_eq!(found.mesh.triangles.len(), 6);
-        assert_eq!(found.names.patches, [(5, "boundary 5".to_string())]);
-        assert_eq!(found.names.bodies, [(7, "body 7".to_string())]);
+        assert_eq!(found.names.patches, [Label::unnamed(5)]);
+        assert_eq!(found.names.bodies, [Label::unnamed(7)]);
     }
     let found = read_all(&files[..2]).unwrap();
     assert!(found.notes[0].ends_with("m.1.face: no boundary numbers"), "{:?}", found.notes);
-    assert_eq!(found.names.patches, [(1, "boundary 1".to_string())]);
+    assert_eq!(found.names.patches, [Label::unnamed(1)]);
     assert!(read_all(&files[..1]).unwrap_err().contains("m.1.node"));
     let error =
         read_all(&[("m.ele", b"2 4 0\n1 0 1 2 3\n2 1 2 3 5\n"), ("m.node", NODE.as_bytes())]).unwrap_err();
@@ -393,9 +395,9 @@ fn what_the_file_leaves_open_is_filled_in_and_told() {
         Edges 1\n1 2 3\nTriangles 3\n3 4 5 4\n2 3 4 6\n2 3 6 6\nTetrahedra 2\n2 3 4 5 3\n3 4 5 6 0\nEnd\n";
     let found = read_as("m.mesh", text).unwrap();
     assert_eq!(found.mesh.points.len(), 5);
-    assert_eq!(found.names.bodies, [(4, "body 4".to_string()), (3, "body 3".to_string())]);
+    assert_eq!(found.names.bodies, [Label::unnamed(4), Label::unnamed(3)]);
     let numbers: Vec<u32> =
-        found.mesh.triangles.iter().map(|t| found.names.patches[t.patch.index()].0).collect();
+        found.mesh.triangles.iter().map(|t| found.names.patches[t.patch.index()].number).collect();
     assert_eq!(numbers, [4, 6, 7, 7, 7, 7, 7]);
     assert_eq!(
         found.notes,
@@ -473,6 +475,6 @@ proptest! {
 #[test]
 fn names_of_two_tets_survive_gmsh() {
     let found = written(&two_tets(), &names(), "m.msh");
-    assert_eq!(found.names.bodies, [(1, "lower".to_string())]);
-    assert_eq!(found.names.patches, [(1, "skin".to_string()), (2, "lid".to_string())]);
+    assert_eq!(found.names.bodies, [Label::new(1, "lower")]);
+    assert_eq!(found.names.patches, [Label::new(1, "skin"), Label::new(2, "lid")]);
 }

@@ -24,8 +24,8 @@ use arrays::{Piece, escaped};
 use super::output::{folder_and_name, write_text, write_together};
 use super::{WriteError, Written, sum_written};
 use crate::comm::Communicator;
-use crate::mesh::Names;
 use crate::mesh::stream::MeshStream;
+use crate::mesh::{Label, Names};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::io;
@@ -81,10 +81,12 @@ pub fn write(
 }
 
 /// For each name the numbers that have it, both ascending.
-fn numbers_by_name(kind: &str, list: &[(u32, String)]) -> Vec<(String, Vec<u32>)> {
+fn numbers_by_name(kind: &str, list: &[Label]) -> Vec<(String, Vec<u32>)> {
     let mut by_name: BTreeMap<&str, BTreeSet<u32>> = BTreeMap::new();
-    for (number, name) in list {
-        by_name.entry(name).or_default().insert(*number);
+    for label in list {
+        for name in &label.names {
+            by_name.entry(name).or_default().insert(label.number);
+        }
     }
     by_name
         .into_iter()

@@ -114,7 +114,7 @@ impl Made {
             boundary: boundary.to_vec(),
             seeds: seeds.to_vec(),
             bc: 1,
-            name: String::new(),
+            name: None,
         });
     }
 

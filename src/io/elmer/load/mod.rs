@@ -24,8 +24,9 @@ use super::periodic;
 use super::read::{Layout, only_layout};
 use crate::comm::{Agreed, CommError, Communicator};
 use crate::dist::{DistMesh, SettleError, settle};
-use crate::mesh::{Names, Rank};
+use crate::mesh::{Label, Names, Rank};
 use own::OwnParts;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// A mesh that was read in parts.
@@ -127,10 +128,7 @@ pub fn load(comm: &dyn Communicator, dir: &Path) -> Result<Loaded, LoadError> {
     }
     let mut names = names_of(&folder);
     broadcast_names(comm, &mut names)?;
-    let names = Names {
-        bodies: named(&bodies, &names[0], "body"),
-        patches: named(&found.numbers, &names[1], "boundary"),
-    };
+    let names = Names { bodies: named(&bodies, &names[0]), patches: named(&found.numbers, &names[1]) };
     let part = of_tet.iter().map(|tet| own.number(tet.part)).collect();
     Ok(Loaded { mesh, part, parts: own.parts, folder, names, notes })
 }
@@ -193,10 +191,9 @@ fn broadcast_names(comm: &dyn Communicator, names: &mut NamesByNumber) -> Result
 }
 
 /// Numbers with their names.
-fn named(numbers: &[u32], names: &std::collections::BTreeMap<i64, String>, kind: &str) -> Vec<(u32, String)> {
-    let name = |number: u32| names.get(&number.into()).filter(|name| !name.is_empty()).cloned();
-    let named = |&number: &u32| (number, name(number).unwrap_or_else(|| format!("{kind}{number}")));
-    numbers.iter().map(named).collect()
+fn named(numbers: &[u32], names: &BTreeMap<i64, Vec<String>>) -> Vec<Label> {
+    let names = |number: u32| names.get(&number.into()).cloned().unwrap_or_default();
+    numbers.iter().map(|&number| Label { number, names: names(number) }).collect()
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@ use crate::check::checksum_of_all;
 use crate::io::elmer::write;
 use crate::io::plain::PlainPart;
 use crate::io::testing::{cube, names, scattered, slabs, together, two_tets};
-use crate::mesh::{Mesh, VertexId};
+use crate::mesh::{Label, Mesh, VertexId};
 use crate::migrate::BareStream;
 use proptest::collection::vec;
 use proptest::prelude::*;
@@ -41,10 +41,10 @@ impl Content {
     fn of_mesh(mesh: &Mesh) -> Self {
         let at = |v: VertexId| place(&mesh.points[v.index()]);
         let tet = |(tet, body): (&[VertexId; 4], &csg::BodyId)| {
-            (sorted(tet.map(at)), names().bodies[body.index()].0)
+            (sorted(tet.map(at)), names().bodies[body.index()].number)
         };
         let triangle = |t: &crate::mesh::BoundaryTriangle| {
-            (from_least(t.vertices.map(at)), names().patches[t.patch.index()].0)
+            (from_least(t.vertices.map(at)), names().patches[t.patch.index()].number)
         };
         Self {
             tets: mesh.tets.iter().zip(&mesh.bodies).map(tet).collect(),
@@ -57,12 +57,12 @@ impl Content {
         let mesh = &loaded.mesh;
         let at = |v: VertexId| place(&mesh.points[v.index()]);
         let tet = |(tet, body): (&[VertexId; 4], &csg::BodyId)| {
-            (sorted(tet.map(at)), loaded.names.bodies[body.index()].0)
+            (sorted(tet.map(at)), loaded.names.bodies[body.index()].number)
         };
         let mine = |t: &&crate::dist::BoundaryFace| mesh.face_holders(t.face)[0] == mesh.rank;
         let triangle = |t: &crate::dist::BoundaryFace| {
             let vertices = mesh.boundary_vertices(t).map(at);
-            (from_least(vertices), loaded.names.patches[t.patch.index()].0)
+            (from_least(vertices), loaded.names.patches[t.patch.index()].number)
         };
         Self {
             tets: mesh.tets.iter().zip(&mesh.tet_bodies).map(tet).collect(),
@@ -132,13 +132,13 @@ fn names_and_numbers_are_those_of_the_files_and_patches_end_where_bodies_do() {
     let dir = tempfile::tempdir().unwrap();
     write_parts(&two_tets(), &[0, 1], 2, dir.path());
     let loaded = together(2, |comm| load(comm, dir.path()).unwrap());
-    assert_eq!(loaded[0].names.bodies, [(1, "lower".to_string())]);
-    assert_eq!(loaded[0].names.patches, [(1, "skin".to_string()), (2, "lid".to_string())]);
+    assert_eq!(loaded[0].names.bodies, [Label::new(1, "lower")]);
+    assert_eq!(loaded[0].names.patches, [Label::new(1, "skin"), Label::new(2, "lid")]);
     // The folder of the parts itself, too; and without names.
     fs::remove_file(dir.path().join("mesh.names")).unwrap();
     let folder = dir.path().join("partitioning.2");
     let loaded = together(1, |comm| load(comm, &folder).unwrap());
-    assert_eq!(loaded[0].names.patches[1], (2, "boundary2".to_string()));
+    assert_eq!(loaded[0].names.patches[1], Label::unnamed(2));
 }
 
 proptest! {
