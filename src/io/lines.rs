@@ -1,6 +1,7 @@
 //! The entities of a part as lines of a text file: what all text formats have in common.
 
 use super::chunks::{items, split, write_chunks};
+use super::once::LeftOut;
 use super::output::Output;
 use super::text::Line;
 use super::{WriteError, body_number, patch_number};
@@ -35,7 +36,7 @@ pub struct TetLine<'a> {
 
 /// A boundary triangle.
 pub struct TriangleLine<'a> {
-    /// Its index within the part.
+    /// Its place among the triangles that the part writes.
     pub index: u64,
     /// Its patch.
     pub patch: PatchId,
@@ -92,22 +93,27 @@ pub fn tets(
     })
 }
 
-/// Appends a line for each boundary triangle. By one thread: they are few beside the tets, and count on.
-pub fn triangles(
+/// Appends a line for each boundary triangle but those that another part writes. By one thread: they are few beside the tets, and count on.
+pub(crate) fn triangles(
     part: &dyn MeshStream,
     names: &Names,
+    left_out: &LeftOut,
     file: &mut Output,
     mut format: impl FnMut(&mut Line, TriangleLine),
 ) -> Result<(), WriteError> {
     let mut block = BoundaryBlock::default();
     let mut line = Line::default();
     let mut text = Vec::new();
-    let mut index = 0;
+    let (mut place, mut index) = (0, 0);
     for of_block in 0..part.boundary_blocks() {
         part.boundary_block(of_block, &mut block);
         let patch = block.patch.expect("a boundary block has a patch");
         let number = patch_number(block.patch, names)?;
         for (vertices, parents) in block.triangles.iter().zip(&block.parents) {
+            place += 1;
+            if left_out.contains(place - 1) {
+                continue;
+            }
             format(&mut line, TriangleLine { index, patch, number, vertices, parents });
             line.end(&mut text);
             index += 1;

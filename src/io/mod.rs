@@ -16,6 +16,7 @@ pub mod elmer;
 pub mod geomview;
 pub mod input;
 pub mod lines;
+pub(crate) mod once;
 pub mod output;
 pub mod plain;
 pub mod serial;

@@ -21,8 +21,11 @@ pub struct PlainPart {
     tet_runs: Vec<TetRun>,
     triangles: Vec<[u32; 3]>,
     parents: Vec<[u64; 2]>,
-    triangle_runs: Vec<(Range<usize>, PatchId)>,
+    triangle_runs: Vec<(Range<usize>, (PatchId, Bodies))>,
 }
+
+/// The bodies of a part's own tets behind and in front of a triangle.
+type Bodies = [Option<BodyId>; 2];
 
 /// Vertices with neighbouring ids that the same ranks hold.
 struct VertexRun {
@@ -74,7 +77,8 @@ impl PlainPart {
             if here != [NO_TET; 2] {
                 triangles.push(triangle.vertices.map(local));
                 parents.push(here);
-                patches.push(triangle.patch);
+                let body = |k: usize| (here[k] != NO_TET).then(|| mesh.bodies[sides[k] as usize]);
+                patches.push((triangle.patch, [body(0), body(1)]));
             }
         }
         Self {
@@ -222,11 +226,12 @@ impl MeshStream for PlainPart {
     }
 
     fn boundary_block(&self, index: usize, block: &mut BoundaryBlock) {
-        let (range, patch) = &self.triangle_runs[index];
+        let (range, (patch, bodies)) = &self.triangle_runs[index];
         block.triangles.clear();
         block.triangles.extend_from_slice(&self.triangles[range.clone()]);
         block.parents.clear();
         block.parents.extend_from_slice(&self.parents[range.clone()]);
+        block.bodies = *bodies;
         block.patch = Some(*patch);
     }
 }

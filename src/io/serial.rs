@@ -1,6 +1,7 @@
 //! One part in one file: the format by the file's name.
 
 use super::lines::{self, TetLine, TriangleLine, VertexLine};
+use super::once::LeftOut;
 use super::output::{Output, write_file};
 use super::text::{FLOAT_CHARS, Line};
 use super::{WriteError, Written, geomview, vtu};
@@ -85,7 +86,7 @@ fn gmsh(part: &dyn MeshStream, names: &Names, file: &mut Output) -> Result<(), W
         coordinates(line.int(index as u64 + 1).blank(), point);
     })?;
     file.write(format!("$EndNodes\n$Elements\n{}\n", counts.boundary + counts.tets).as_bytes())?;
-    lines::triangles(part, names, file, |line, triangle: TriangleLine| {
+    lines::triangles(part, names, &LeftOut::default(), file, |line, triangle: TriangleLine| {
         line.int(triangle.index + 1).bytes(b" 2 2 ").int(triangle.number).blank();
         ids(line.int(u64::from(triangle.patch.0) + 1), triangle.vertices);
     })?;
@@ -129,7 +130,7 @@ fn medit(part: &dyn MeshStream, names: &Names, file: &mut Output) -> Result<(), 
     })?;
     // Each line begins with a blank, which Medit skips.
     file.write(format!("Triangles\n{}\n", counts.boundary).as_bytes())?;
-    lines::triangles(part, names, file, |line, triangle| {
+    lines::triangles(part, names, &LeftOut::default(), file, |line, triangle| {
         ids(line, triangle.vertices);
         line.blank().int(triangle.number);
     })?;
@@ -152,7 +153,7 @@ fn netgen(part: &dyn MeshStream, names: &Names, file: &mut Output) -> Result<(),
     file.write(
         format!("mesh3d\ndimension\n3\ngeomtype\n0\nsurfaceelements\n{}\n", counts.boundary).as_bytes(),
     )?;
-    lines::triangles(part, names, file, |line, triangle| {
+    lines::triangles(part, names, &LeftOut::default(), file, |line, triangle| {
         line.int(u64::from(triangle.patch.0) + 1).blank().int(triangle.number);
         triangle.parents.iter().for_each(|&parent| _ = line.blank().int(domain(parent)));
         ids(line.bytes(b" 3"), triangle.vertices);

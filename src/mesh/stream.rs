@@ -74,6 +74,8 @@ pub struct BoundaryBlock {
     /// (`first_local` + position); [`NO_TET`] where there is none. On each side either all triangles of a block
     /// have a tet or none, and these tets lie in one tet block.
     pub parents: Vec<[u64; 2]>,
+    /// The bodies of these tets; none on a side where there are none.
+    pub bodies: [Option<BodyId>; 2],
     /// The patch of all.
     pub patch: Option<PatchId>,
 }

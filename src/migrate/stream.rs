@@ -172,6 +172,7 @@ impl MeshStream for BareStream {
         block.triangles.push(triangle.vertices.map(|v| v.0));
         block.parents.clear();
         block.parents.push(triangle.parents.map(|tet| tet.map_or(NO_TET, |tet| u64::from(tet.0))));
+        block.bodies = triangle.parents.map(|tet| Some(self.mesh.tet_bodies[tet?.index()]));
         block.patch = Some(triangle.patch);
     }
 }

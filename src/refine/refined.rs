@@ -226,6 +226,7 @@ impl MeshStream for RefinedMesh {
         let [behind, before] = parents;
         block.parents.clear();
         block.parents.extend(behind.into_iter().zip(before).map(|(p, q)| [p, q]));
+        block.bodies = face.parents.map(|parent| Some(self.coarse.tet_bodies[parent?.index()]));
         block.patch = Some(face.patch);
     }
 

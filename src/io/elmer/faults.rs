@@ -56,12 +56,17 @@ pub enum FaultKind {
     CrowdedFace,
     /// Two elements lie on the same side of their common face.
     Overlap,
-    /// An outer face, or an interface face on one of its two sides, has no boundary element.
+    /// An outer face has no boundary element, or a face between parts that both know both elements (by halos) has none in one of them.
     NoBoundary,
     /// A boundary element is no face of an element of its part.
     NoFace,
     /// A boundary element stands twice in its part.
     BoundaryTwice,
+    /// A boundary element between two parts without halo is in both: loads on it count twice.
+    BoundaryInTwoParts,
+    /// A boundary element between two parts without halo is in that of the body with the lower number: its normal is turned against those of the
+    /// boundary elements whose elements are both in one part.
+    NormalTurned,
     /// Two parts give an interface face different boundary numbers.
     NumbersDiffer,
     /// A parent is missing, or is not beside the boundary element.
@@ -98,6 +103,10 @@ impl fmt::Display for FaultKind {
             Self::NoBoundary => "face without its boundary element",
             Self::NoFace => "boundary element that is no face",
             Self::BoundaryTwice => "boundary element twice",
+            Self::BoundaryInTwoParts => "boundary element in two parts, so that loads count twice",
+            Self::NormalTurned => {
+                "boundary element only in the part of the lower body, so that its normal is turned"
+            }
             Self::NumbersDiffer => "different boundary numbers on the two sides",
             Self::WrongParent => "wrong or missing parent",
             Self::Inward => "boundary element with inward normal",

@@ -2,7 +2,7 @@
 
 use super::faults::{FaultKind, Faults};
 use super::faults_nodes::NodeTable;
-use super::read::{BoundaryElement, Element, ElmerMesh};
+use super::read::{BoundaryElement, Element, ElmerMesh, ElmerPart};
 use crate::kernel::predicates::{Sign, orient3d};
 use crate::mesh::TET_FACES;
 use rayon::prelude::*;
@@ -30,7 +30,8 @@ struct Side {
 pub(super) fn check_elements_and_boundary(mesh: &ElmerMesh, tables: &[NodeTable], faults: &mut Faults) {
     check_element_ids(mesh, faults);
     let signs = check_orientation(mesh, tables, faults);
-    let judge = Judge { mesh, sides: element_sides(mesh, &signs), boundary: boundary_sides(mesh) };
+    let halo = halo_ids(mesh);
+    let judge = Judge { mesh, sides: element_sides(mesh, &signs), boundary: boundary_sides(mesh), halo };
     judge.check_faces(faults);
     judge.check_boundary(faults);
 }
@@ -110,6 +111,16 @@ fn boundary_sides(mesh: &ElmerMesh) -> Vec<Side> {
     sides
 }
 
+/// The ids of each part's halo elements, sorted.
+fn halo_ids(mesh: &ElmerMesh) -> Vec<Vec<u32>> {
+    let of_part = |part: &ElmerPart| {
+        let mut ids: Vec<u32> = part.halo.iter().map(|(element, _)| element.id).collect();
+        ids.sort_unstable();
+        ids
+    };
+    mesh.parts.iter().map(of_part).collect()
+}
+
 /// The sides of one face among all.
 fn of_face(sides: &[Side], key: Key) -> &[Side] {
     let start = sides.partition_point(|side| side.key < key);
@@ -122,6 +133,7 @@ struct Judge<'a> {
     mesh: &'a ElmerMesh,
     sides: Vec<Side>,
     boundary: Vec<Side>,
+    halo: Vec<Vec<u32>>,
 }
 
 impl Judge<'_> {
@@ -157,10 +169,8 @@ impl Judge<'_> {
                     if a.even == b.even {
                         self.check_overlap(a, b, faults);
                     }
-                    let bounded = of_face(&self.boundary, key);
-                    if !bounded.is_empty() && a.place.part != b.place.part {
-                        self.check_bounded(a, faults);
-                        self.check_bounded(b, faults);
+                    if a.place.part != b.place.part {
+                        self.check_between_parts(a, b, faults);
                     }
                 }
                 [.., last] => {
@@ -169,6 +179,51 @@ impl Judge<'_> {
                     self.add_at(faults, FaultKind::CrowdedFace, "elements", last, what);
                 }
                 [] => {}
+            }
+        }
+    }
+
+    /// What bounds a face between two parts: with halos both parts have the boundary element, and Elmer halves what it adds; else one of them
+    /// has it, that of the body with the higher number.
+    fn check_between_parts(&self, a: &Side, b: &Side, faults: &mut Faults) {
+        let bounded = of_face(&self.boundary, a.key);
+        let knows = |part: &Side, other: &Side| {
+            self.halo[part.place.part as usize].binary_search(&self.element(other).id).is_ok()
+        };
+        match bounded {
+            [] => {}
+            _ if knows(a, b) || knows(b, a) => {
+                self.check_bounded(a, faults);
+                self.check_bounded(b, faults);
+            }
+            [one] => {
+                let (there, other) = if one.place.part == a.place.part { (a, b) } else { (b, a) };
+                let bodies = [there, other].map(|side| self.element(side).body);
+                if one.place.part == there.place.part && bodies[0] < bodies[1] {
+                    let what = || {
+                        format!(
+                            "face {:?} of body {} belongs to part {}, which has body {}",
+                            one.key,
+                            bodies[0],
+                            other.place.part + 1,
+                            bodies[1]
+                        )
+                    };
+                    self.add_at(faults, FaultKind::NormalTurned, "boundary", one, what);
+                }
+            }
+            [first, second, ..] => {
+                let what = || {
+                    let before = self.boundary_element(first).id;
+                    format!(
+                        "face {:?} is boundary element {before} of part {} too",
+                        first.key,
+                        first.place.part + 1
+                    )
+                };
+                if first.place.part != second.place.part {
+                    self.add_at(faults, FaultKind::BoundaryInTwoParts, "boundary", second, what);
+                }
             }
         }
     }

@@ -66,11 +66,13 @@ fn meshes_with_halos_have_no_faults_and_are_read_as_without() {
             let (with, without) = (read(dir.path()).unwrap(), read(plain.path()).unwrap());
             for (with, without) in with.parts.iter().zip(&without.parts) {
                 assert!(with.elements[..] == without.elements[..] && with.halo.is_empty() == (ranks == 1));
-                // But for the parents across the cuts.
+                // But for the parents across the cuts, and what lies between parts, which both have now.
                 let content = |part: &ElmerPart| {
-                    part.boundary.iter().map(|b| (b.boundary, b.parents[0], b.nodes)).collect::<Vec<_>>()
+                    part.boundary.iter().map(|b| (b.boundary, b.parents[0], b.nodes)).collect::<BTreeSet<_>>()
                 };
-                assert_eq!(content(with), content(without));
+                assert!(content(with).is_superset(&content(without)));
+                let twice: Vec<_> = content(with).difference(&content(without)).copied().collect();
+                assert!(twice.iter().all(|(number, ..)| *number == 3), "between the bodies alone: {twice:?}");
             }
             for readers in [1, 2, 3, 7] {
                 let of = |dir: &Path| together(readers, |comm| load(comm, dir).unwrap());
@@ -93,7 +95,8 @@ fn broken(file: &str, line: usize, change: impl Fn(&str) -> String) -> (Vec<Faul
     let path = dir.path().join("partitioning.2").join(file);
     let mut lines: Vec<String> = text(&path).lines().map(String::from).collect();
     lines[line - 1] = change(&lines[line - 1]);
-    fs::write(&path, lines.iter().map(|line| format!("{line}\n")).collect::<String>()).unwrap();
+    let kept = lines.iter().filter(|line| !line.is_empty());
+    fs::write(&path, kept.map(|line| format!("{line}\n")).collect::<String>()).unwrap();
     let said = |ranks| {
         together(ranks, |comm| load(comm, dir.path()).err().map(|e| e.to_string()).unwrap_or_default())
     };
@@ -117,6 +120,8 @@ fn halo_elements_that_are_not_their_owners_are_found() {
     assert_eq!(judged(elements, 25, &with(" 2 504", " 1 504")), [WrongHalo]);
     assert_eq!(judged(elements, 25, &|line| format!("9{line}")), [WrongHalo]);
     assert_eq!(judged(elements, 25, &|line| format!("{line}\n{line}")), [Count, WrongHalo]);
+    // Line 3 is the first one on the interface, which both parts have.
+    assert_eq!(judged("part.1.boundary", 3, &|_| String::new()), [Count, NoBoundary]);
     let (kinds, said) = broken(elements, 25, with("/2 ", "/0 "));
     assert!(kinds.is_empty() && said.contains("part.1.elements:25: the element is of part 0"), "{said}");
     // A halo element that the part takes for its own.
@@ -252,7 +257,10 @@ impl ElmerGrid<'_> {
                 (0..tets.len()).filter(|&t| vertices.iter().all(|v| tets[t].contains(v))).collect();
             let here = parents.iter().any(|&t| self.part[t] == part);
             let greedy = matches!(self.halo, 2 | 4) && vertices.iter().any(|v| held[*v].contains(&part));
-            if !here && !greedy {
+            // ElmerGrid keeps both parents of what lies inside in one part; where these partitions do not, one part has the triangle.
+            let body = |t: &usize| self.mesh.bodies[*t];
+            let theirs = parents.iter().max_by_key(|t| body(t)).is_some_and(|&t| self.part[t] != part);
+            if !here && !greedy || self.halo == 0 && theirs {
                 continue;
             }
             if self.halo == 0 {

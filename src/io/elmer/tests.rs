@@ -306,9 +306,6 @@ fn each_way_to_break_the_files_is_found() {
     finds(boundary, 2, word(3, "24"), &[WrongParent]);
     finds(boundary, 2, swapped(5, 6), &[Inward]);
     finds(boundary, 2, word(5, "99"), &[NoSuchNode, NoBoundary, NoFace]);
-    // Line 3 is the first one on the interface.
-    finds(boundary, 3, gone, &[Count, NoBoundary]);
-    finds(boundary, 3, word(1, "7"), &[NumbersDiffer]);
 }
 
 #[test]
@@ -378,4 +375,62 @@ fn a_folder_without_a_mesh_and_one_with_several_are_refused() {
     fs::remove_file(dir.path().join("partitioning.2/part.1.header")).unwrap();
     let error = check_elmer(dir.path()).unwrap_err().to_string();
     assert!(error.contains("part.1.header"), "{error}");
+}
+
+#[test]
+fn what_lies_between_parts_is_written_once_by_the_higher_body() {
+    let mesh = cube(4);
+    for (ranks, tet_to_rank) in
+        [(1, slabs(&mesh, 1)), (2, slabs(&mesh, 2)), (4, slabs(&mesh, 4)), (7, scattered(&mesh, 7))]
+    {
+        let dir = tempfile::tempdir().unwrap();
+        write_parts(&mesh, &tet_to_rank, ranks, dir.path()).unwrap();
+        let read = read(dir.path()).unwrap();
+        let between = read.parts.iter().flat_map(|part| {
+            let body = |id: u32| part.elements.iter().find(|e| e.id == id).map(|e| e.body);
+            part.boundary.iter().filter(|b| b.boundary == 3).map(move |b| b.parents.map(body))
+        });
+        let bodies: Vec<_> = between.collect();
+        assert_eq!(bodies.len(), 2 * 4 * 4, "{ranks} parts");
+        // Beside the body of number 1 alone, which is behind the patch, Elmer's normal would be turned.
+        assert!(bodies.iter().all(|parents| parents.contains(&Some(2))), "{bodies:?}");
+        assert!(check_elmer(dir.path()).unwrap().iter().all(|(_, faults)| faults.is_empty()));
+    }
+}
+
+#[test]
+fn second_copies_and_turned_normals_between_parts_are_faults() {
+    let mesh = cube(2);
+    let dir = tempfile::tempdir().unwrap();
+    write_parts(&mesh, &slabs(&mesh, 2), 2, dir.path()).unwrap();
+    let folder = dir.path().join("partitioning.2");
+    let read = read(dir.path()).unwrap();
+    let (line, between) = text(&folder.join("part.2.boundary"))
+        .lines()
+        .zip(&read.parts[1].boundary)
+        .find(|(_, b)| b.boundary == 3)
+        .map(|(line, b)| (line.to_string(), *b))
+        .unwrap();
+    let mut face = between.nodes;
+    face.sort_unstable();
+    let has_face = |nodes: &[u32; 4]| face.iter().all(|node| nodes.contains(node));
+    let parent = read.parts[0].elements.iter().find(|e| has_face(&e.nodes)).unwrap().id;
+    let judged = |keep: bool, number: u32| {
+        let [first, second] = [1, 2].map(|k| folder.join(format!("part.{k}.boundary")));
+        let copy = line.replacen(&format!(" {} ", between.parents[0]), &format!(" {parent} "), 1);
+        let copy = copy.replacen(" 3 ", &format!(" {number} "), 1);
+        let (before, there) = (text(&first), text(&second));
+        fs::write(&first, format!("{before}{copy}\n")).unwrap();
+        if !keep {
+            fs::write(&second, there.replace(&format!("{line}\n"), "")).unwrap();
+        }
+        let found = check_elmer(dir.path()).unwrap().remove(0).1;
+        fs::write(&first, before).unwrap();
+        fs::write(&second, there).unwrap();
+        use FaultKind::*;
+        [BoundaryInTwoParts, NormalTurned, NumbersDiffer].map(|kind| found.count(kind))
+    };
+    assert_eq!(judged(true, 3), [1, 0, 0]);
+    assert_eq!(judged(false, 3), [0, 1, 0]);
+    assert_eq!(judged(true, 7), [1, 0, 1]);
 }

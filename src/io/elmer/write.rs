@@ -6,6 +6,7 @@ use super::periodic::{self, periodic_text};
 use super::{MAX_ID, MAX_LINE, TET, TRIANGLE};
 use crate::comm::Communicator;
 use crate::io::lines::{self, FLUSH_AT};
+use crate::io::once::{LeftOut, left_out};
 use crate::io::output::{Output, write_text, write_together};
 use crate::io::text::{Line, digits};
 use crate::io::{WriteError, Written, agree, sum_written};
@@ -25,7 +26,10 @@ const MEAN_FLOAT: u64 = 19;
 /// Ids in the files are Elmer's own: from 1, those that a part owns without a gap. The canonical ids are in VTU.
 ///
 /// Ghosts are written as ElmerGrid writes its halos: elements `ID/OWNER`, their nodes, and these in `.shared` with all parts that have
-/// them, those that have a node in halo elements only behind the others. Boundary elements are those of a part's own elements.
+/// them, those that have a node in halo elements only behind the others.
+///
+/// Boundary elements are those of a part's own elements. One between two parts is written once, by the part of the body with the higher
+/// number, so that no load counts twice; with ghosts by both, as Elmer then knows the other part's element and halves what it adds.
 ///
 /// # Errors
 /// Before anything is written: more ids than 2³¹−1, a `.shared` line that Elmer would cut, a part without tets,
@@ -40,13 +44,15 @@ pub fn write(
     let numbering = number(comm, part)?;
     agree(comm, check_shared_lines(part, &numbering))?;
     let periodic = periodic_text(comm, part, &numbering)?;
+    let left_out = if part.ghosts().is_some() { LeftOut::default() } else { left_out(comm, part, names)? };
+    let content = Content { part, names, numbering, left_out };
 
-    let needed = estimate(part, numbering.shared);
+    let needed = content.estimate();
     let written = write_together(comm, dir, needed, is_part_file, |stage| {
         let folder = stage.join(format!("partitioning.{}", part.ranks()));
         // Each rank makes it: another machine may see rank 0's only later.
         fs::create_dir_all(&folder).map_err(WriteError::io(&folder))?;
-        let mut written = write_part(part, names, &numbering, &folder)?;
+        let mut written = content.write_part(&folder)?;
         if part.rank() == 0 {
             let bytes = write_text(&stage.join("mesh.names"), names_text(names).as_bytes())?;
             written += Written { files: 1, bytes };
@@ -56,7 +62,7 @@ pub fn write(
             written += Written { files: 1, bytes };
         }
         if part.ranks() == 1 {
-            written += link_serial_files(part, stage, &folder)?;
+            written += content.link_serial_files(stage, &folder)?;
         }
         Ok(written)
     })?;
@@ -122,93 +128,147 @@ fn check_shared_line(
     Ok(())
 }
 
-/// About how many bytes a part takes.
-fn estimate(part: &dyn MeshStream, shared: u64) -> u64 {
-    let (counts, totals) = (part.counts(), part.totals());
-    let vertex = digits(totals.vertices) as u64 + 1;
-    let tet = digits(totals.tets) as u64 + 1;
-    counts.vertices * (vertex + 3 + 3 * MEAN_FLOAT)
-        + counts.tets * (tet + 6 + 4 * vertex)
-        + counts.boundary * (tet + 17 + 3 * vertex)
-        + shared * (vertex + 8)
+/// What a part's files are made of.
+struct Content<'a> {
+    part: &'a dyn MeshStream,
+    names: &'a Names,
+    numbering: Numbering,
+    /// Boundary elements that other parts write.
+    left_out: LeftOut,
 }
 
-/// Writes the five files of a part.
-fn write_part(
-    part: &dyn MeshStream,
-    names: &Names,
-    numbering: &Numbering,
-    folder: &Path,
-) -> Result<Written, WriteError> {
-    let path = |kind: &str| folder.join(format!("part.{}.{kind}", part.rank() + 1));
-    let bytes = write_text(&path("header"), header_text(part, Some(numbering.shared)).as_bytes())?
-        + write_nodes(part, numbering, &path("nodes"))?
-        + write_elements(part, names, numbering, &path("elements"))?
-        + write_boundary(part, names, numbering, &path("boundary"))?
-        + write_shared(part, numbering, &path("shared"))?;
-    Ok(Written { files: 5, bytes })
-}
-
-/// The counts; without `shared` as a serial mesh has them.
-fn header_text(part: &dyn MeshStream, shared: Option<u64>) -> String {
-    let counts = part.counts();
-    let mut text = format!("{} {} {}\n", counts.vertices, counts.tets, counts.boundary);
-    if counts.boundary > 0 {
-        text += &format!("2\n{TRIANGLE} {}\n", counts.boundary);
-    } else {
-        text += "1\n";
+impl Content<'_> {
+    /// How many boundary elements are written.
+    fn boundary(&self) -> u64 {
+        self.part.counts().boundary - self.left_out.len()
     }
-    text += &format!("{TET} {}\n", counts.tets);
-    if let Some(shared) = shared {
-        text += &format!("{shared} 0\n");
+
+    /// About how many bytes a part takes.
+    fn estimate(&self) -> u64 {
+        let (counts, totals) = (self.part.counts(), self.part.totals());
+        let vertex = digits(totals.vertices) as u64 + 1;
+        let tet = digits(totals.tets) as u64 + 1;
+        counts.vertices * (vertex + 3 + 3 * MEAN_FLOAT)
+            + counts.tets * (tet + 6 + 4 * vertex)
+            + counts.boundary * (tet + 17 + 3 * vertex)
+            + self.numbering.shared * (vertex + 8)
     }
-    text
-}
 
-fn write_nodes(part: &dyn MeshStream, numbering: &Numbering, path: &Path) -> Result<u64, WriteError> {
-    let mut file = Output::create(path)?;
-    lines::vertices(part, &mut file, |line, vertex| {
-        line.int(numbering.vertices[vertex.index].into()).bytes(b" -1");
-        vertex.point.iter().for_each(|&x| _ = line.blank().float(x));
-    })?;
-    file.finish()
-}
+    /// Writes the five files of a part.
+    fn write_part(&self, folder: &Path) -> Result<Written, WriteError> {
+        let path = |kind: &str| folder.join(format!("part.{}.{kind}", self.part.rank() + 1));
+        let header = self.header_text(Some(self.numbering.shared));
+        let bytes = write_text(&path("header"), header.as_bytes())?
+            + self.write_nodes(&path("nodes"))?
+            + self.write_elements(&path("elements"))?
+            + self.write_boundary(&path("boundary"))?
+            + self.write_shared(&path("shared"))?;
+        Ok(Written { files: 5, bytes })
+    }
 
-fn write_elements(
-    part: &dyn MeshStream,
-    names: &Names,
-    numbering: &Numbering,
-    path: &Path,
-) -> Result<u64, WriteError> {
-    let mut file = Output::create(path)?;
-    lines::tets(part, names, &mut file, |line, tet| {
-        line.int(numbering.tet(tet.index));
-        if let Some(ghost) = part.ghosts().and_then(|ghosts| ghosts.tet(tet.index)) {
-            line.bytes(b"/").int(u64::from(ghost.owner) + 1);
+    /// The counts; without `shared` as a serial mesh has them.
+    fn header_text(&self, shared: Option<u64>) -> String {
+        let (counts, boundary) = (self.part.counts(), self.boundary());
+        let mut text = format!("{} {} {boundary}\n", counts.vertices, counts.tets);
+        if boundary > 0 {
+            text += &format!("2\n{TRIANGLE} {boundary}\n");
+        } else {
+            text += "1\n";
         }
-        line.blank().int(tet.number).blank().int(TET.into());
-        ids(line, numbering, tet.vertices);
-    })?;
-    file.finish()
-}
+        text += &format!("{TET} {}\n", counts.tets);
+        if let Some(shared) = shared {
+            text += &format!("{shared} 0\n");
+        }
+        text
+    }
 
-fn write_boundary(
-    part: &dyn MeshStream,
-    names: &Names,
-    numbering: &Numbering,
-    path: &Path,
-) -> Result<u64, WriteError> {
-    let mut file = Output::create(path)?;
-    let behind_cuts = part.ghosts().map(ghost_faces).unwrap_or_default();
-    lines::triangles(part, names, &mut file, |line, triangle| {
-        line.int(triangle.index + 1).blank().int(triangle.number);
-        // A parent that is here goes first: solvers look there for the body of the boundary. A ghost beside it comes second.
-        let here = triangle.parents.iter().filter(|&&tet| tet != NO_TET).map(|&tet| numbering.tet(tet));
-        let ghost = behind_cuts.get(&ascending(*triangle.vertices)).map(|&tet| numbering.tet(tet));
-        here.chain(ghost).chain([0, 0]).take(2).for_each(|parent| _ = line.blank().int(parent));
-        ids(line.blank().int(TRIANGLE.into()), numbering, triangle.vertices);
-    })?;
-    file.finish()
+    fn write_nodes(&self, path: &Path) -> Result<u64, WriteError> {
+        let mut file = Output::create(path)?;
+        lines::vertices(self.part, &mut file, |line, vertex| {
+            line.int(self.numbering.vertices[vertex.index].into()).bytes(b" -1");
+            vertex.point.iter().for_each(|&x| _ = line.blank().float(x));
+        })?;
+        file.finish()
+    }
+
+    fn write_elements(&self, path: &Path) -> Result<u64, WriteError> {
+        let mut file = Output::create(path)?;
+        lines::tets(self.part, self.names, &mut file, |line, tet| {
+            line.int(self.numbering.tet(tet.index));
+            if let Some(ghost) = self.part.ghosts().and_then(|ghosts| ghosts.tet(tet.index)) {
+                line.bytes(b"/").int(u64::from(ghost.owner) + 1);
+            }
+            line.blank().int(tet.number).blank().int(TET.into());
+            self.ids(line, tet.vertices);
+        })?;
+        file.finish()
+    }
+
+    fn write_boundary(&self, path: &Path) -> Result<u64, WriteError> {
+        let mut file = Output::create(path)?;
+        let behind_cuts = self.part.ghosts().map(ghost_faces).unwrap_or_default();
+        lines::triangles(self.part, self.names, &self.left_out, &mut file, |line, triangle| {
+            line.int(triangle.index + 1).blank().int(triangle.number);
+            // A parent that is here goes first: solvers look there for the body of the boundary. A ghost beside it comes second.
+            let here = triangle.parents.iter().filter(|&&tet| tet != NO_TET);
+            let ghost = behind_cuts.get(&ascending(*triangle.vertices));
+            let parents = here.chain(ghost).map(|&tet| self.numbering.tet(tet));
+            parents.chain([0, 0]).take(2).for_each(|parent| _ = line.blank().int(parent));
+            self.ids(line.blank().int(TRIANGLE.into()), triangle.vertices);
+        })?;
+        file.finish()
+    }
+
+    /// Appends the numbers of vertices.
+    fn ids(&self, line: &mut Line, vertices: &[u32]) {
+        vertices.iter().for_each(|&v| _ = line.blank().int(self.numbering.vertices[v as usize].into()));
+    }
+
+    fn write_shared(&self, path: &Path) -> Result<u64, WriteError> {
+        let part = self.part;
+        let mut file = Output::create(path)?;
+        let mut line = Line::default();
+        let mut text = Vec::new();
+        for index in 0..part.vertex_blocks() {
+            let block = part.vertex_block(index);
+            if block.holders.is_empty() && part.ghosts().is_none() {
+                continue;
+            }
+            for (local, id) in block.local.clone().zip(block.ids()) {
+                let watchers = watchers(part, local);
+                let others = block.holders.len() + watchers.len();
+                if others == 0 {
+                    continue;
+                }
+                let owner = block.owner(id, part.rank());
+                // Of a vertex that others only watch no holders are listed: there is this one.
+                let count = others + usize::from(block.holders.is_empty());
+                line.int(self.numbering.vertices[local as usize].into()).blank().int(count as u64);
+                line.blank().int(u64::from(owner) + 1);
+                for &other in block.holders.iter().filter(|&&holder| holder != owner).chain(watchers) {
+                    line.blank().int(u64::from(other) + 1);
+                }
+                line.end(&mut text);
+            }
+            file.flush_past(FLUSH_AT, &mut text)?;
+        }
+        file.flush_past(0, &mut text)?;
+        file.finish()
+    }
+
+    /// `DIR/mesh.*` beside `partitioning.1`: the same files under a second name, but for the header.
+    fn link_serial_files(&self, stage: &Path, folder: &Path) -> Result<Written, WriteError> {
+        let bytes = write_text(&stage.join("mesh.header"), self.header_text(None).as_bytes())?;
+        let mut written = Written { files: 1, bytes };
+        for kind in ["nodes", "elements", "boundary"] {
+            let (from, to) = (folder.join(format!("part.1.{kind}")), stage.join(format!("mesh.{kind}")));
+            if fs::hard_link(&from, &to).is_err() {
+                written.bytes += fs::copy(&from, &to).map_err(WriteError::io(&to))?;
+            }
+            written.files += 1;
+        }
+        Ok(written)
+    }
 }
 
 fn ascending(mut face: [u32; 3]) -> [u32; 3] {
@@ -227,54 +287,4 @@ fn ghost_faces(ghosts: &Ghosts) -> BTreeMap<[u32; 3], u64> {
         }
     }
     faces
-}
-
-/// Appends the numbers of vertices.
-fn ids(line: &mut Line, numbering: &Numbering, vertices: &[u32]) {
-    vertices.iter().for_each(|&v| _ = line.blank().int(numbering.vertices[v as usize].into()));
-}
-
-fn write_shared(part: &dyn MeshStream, numbering: &Numbering, path: &Path) -> Result<u64, WriteError> {
-    let mut file = Output::create(path)?;
-    let mut line = Line::default();
-    let mut text = Vec::new();
-    for index in 0..part.vertex_blocks() {
-        let block = part.vertex_block(index);
-        if block.holders.is_empty() && part.ghosts().is_none() {
-            continue;
-        }
-        for (local, id) in block.local.clone().zip(block.ids()) {
-            let watchers = watchers(part, local);
-            let others = block.holders.len() + watchers.len();
-            if others == 0 {
-                continue;
-            }
-            let owner = block.owner(id, part.rank());
-            // Of a vertex that others only watch no holders are listed: there is this one.
-            let count = others + usize::from(block.holders.is_empty());
-            line.int(numbering.vertices[local as usize].into()).blank().int(count as u64);
-            line.blank().int(u64::from(owner) + 1);
-            for &other in block.holders.iter().filter(|&&holder| holder != owner).chain(watchers) {
-                line.blank().int(u64::from(other) + 1);
-            }
-            line.end(&mut text);
-        }
-        file.flush_past(FLUSH_AT, &mut text)?;
-    }
-    file.flush_past(0, &mut text)?;
-    file.finish()
-}
-
-/// `DIR/mesh.*` beside `partitioning.1`: the same files under a second name, but for the header.
-fn link_serial_files(part: &dyn MeshStream, stage: &Path, folder: &Path) -> Result<Written, WriteError> {
-    let bytes = write_text(&stage.join("mesh.header"), header_text(part, None).as_bytes())?;
-    let mut written = Written { files: 1, bytes };
-    for kind in ["nodes", "elements", "boundary"] {
-        let (from, to) = (folder.join(format!("part.1.{kind}")), stage.join(format!("mesh.{kind}")));
-        if fs::hard_link(&from, &to).is_err() {
-            written.bytes += fs::copy(&from, &to).map_err(WriteError::io(&to))?;
-        }
-        written.files += 1;
-    }
-    Ok(written)
 }
