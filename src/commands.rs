@@ -344,6 +344,9 @@ pub fn run_mesh(options: &MeshFile) -> Result<(), Failure> {
     let made = generate(&comm, Some(&model), &settings, &progress)?;
     let written =
         progress.stage("write", || io::serial::write(made.part.stream(), &made.names, &options.output))?;
+    for loss in io::serial::losses(&made.names, &options.output) {
+        progress.note(&format!("note: {}: {loss}", options.output.display()));
+    }
     if let Some(file) = &options.picture {
         draw(&comm, made.part.stream(), options.cut, file)?;
     }

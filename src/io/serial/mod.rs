@@ -1,0 +1,218 @@
+//! One part in one file: the format by the file's name.
+
+mod gmsh;
+mod groups;
+mod netgen;
+mod runs;
+
+use super::lines;
+use super::once::LeftOut;
+use super::output::{Output, write_file};
+use super::text::{FLOAT_CHARS, Line};
+use super::{WriteError, Written, geomview, vtu};
+use crate::comm::thread;
+use crate::mesh::Names;
+use crate::mesh::stream::MeshStream;
+use std::ffi::OsStr;
+use std::path::Path;
+
+/// The ends of names that [`write()`] knows.
+pub const KNOWN: &str =
+    ".vtu, .msh (Gmsh), .mesh (Medit), .vol (NETGEN), .off (Geomview: the boundary alone)";
+
+/// Writes a mesh of one part in the format that the end of `path` tells; see [`KNOWN`]. With `.vtu` the triangles
+/// on patches are in a second file, `STEM.boundary.vtu`.
+///
+/// # Errors
+/// An unknown format, several parts, a body or patch without a number, a full disk, what the system says; the
+/// file before it stays.
+pub fn write(part: &dyn MeshStream, names: &Names, path: &Path) -> Result<Written, WriteError> {
+    if part.ranks() != 1 {
+        return Err(WriteError::SeveralParts { path: path.to_path_buf(), parts: part.ranks() });
+    }
+    let format: fn(&dyn MeshStream, &Names, &mut Output) -> Result<(), WriteError> = match path
+        .extension()
+        .and_then(OsStr::to_str)
+    {
+        Some("vtu") => return vtu::write(&thread::alone(), part, names, path),
+        Some("off") => return geomview::write(&thread::alone(), part, &geomview::Settings::default(), path),
+        Some("msh") => gmsh::write,
+        Some("mesh") => medit,
+        Some("vol") => netgen::write,
+        _ => return Err(WriteError::UnknownFormat(path.to_path_buf())),
+    };
+    let bytes = write_file(path, estimate(part), |path| {
+        let mut file = Output::create(path)?;
+        format(part, names, &mut file)?;
+        file.finish()
+    })?;
+    Ok(Written { files: 1, bytes })
+}
+
+/// What a file of this name cannot hold of the names and numbers of a mesh, a sentence each: a solver that looks for them there must know.
+pub fn losses(names: &Names, path: &Path) -> Vec<String> {
+    match path.extension().and_then(OsStr::to_str) {
+        Some("msh") => gmsh::losses(names),
+        Some("vol") => netgen::losses(names),
+        Some("mesh") if names.bodies.iter().chain(&names.patches).any(|label| !label.names.is_empty()) => {
+            vec!["Medit has no names: bodies and boundaries are known by their numbers alone".into()]
+        }
+        _ => Vec::new(),
+    }
+}
+
+/// About how many bytes a text format takes.
+fn estimate(part: &dyn MeshStream) -> u64 {
+    const PER_ENTITY: u64 = 45;
+    let counts = part.counts();
+    counts.vertices * (3 * FLOAT_CHARS as u64) + (counts.tets + counts.boundary) * PER_ENTITY
+}
+
+/// Appends ids from 1.
+fn ids(line: &mut Line, vertices: &[u32]) {
+    vertices.iter().for_each(|&v| _ = line.blank().int(u64::from(v) + 1));
+}
+
+fn coordinates(line: &mut Line, point: &[f64; 3]) {
+    line.float(point[0]).blank().float(point[1]).blank().float(point[2]);
+}
+
+/// Medit: the references are boundary and body numbers.
+fn medit(part: &dyn MeshStream, names: &Names, file: &mut Output) -> Result<(), WriteError> {
+    let counts = part.counts();
+    let head = format!("MeshVersionFormatted 2\nDimension 3\nVertices\n{}\n", counts.vertices);
+    file.write(head.as_bytes())?;
+    lines::vertices(part, file, |line, vertex| {
+        coordinates(line, vertex.point);
+        line.bytes(b" 0");
+    })?;
+    // Each line begins with a blank, which Medit skips.
+    file.write(format!("Triangles\n{}\n", counts.boundary).as_bytes())?;
+    lines::triangles(part, names, &LeftOut::default(), file, |line, triangle| {
+        ids(line, triangle.vertices);
+        line.blank().int(triangle.number);
+    })?;
+    file.write(format!("Tetrahedra\n{}\n", counts.tets).as_bytes())?;
+    lines::tets(part, names, file, |line, tet| {
+        ids(line, tet.vertices);
+        line.blank().int(tet.number);
+    })?;
+    file.write(b"End\n")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::io::plain::PlainPart;
+    use crate::io::testing::{cube, names, two_tets};
+    use crate::mesh::{Label, Mesh};
+    use std::fs;
+
+    fn written(mesh: &Mesh, name: &str) -> String {
+        written_with(mesh, &names(), name)
+    }
+
+    fn written_with(mesh: &Mesh, names: &Names, name: &str) -> String {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join(name);
+        let written = write(&PlainPart::whole(mesh), names, &path).unwrap();
+        let text = fs::read_to_string(&path).unwrap();
+        assert_eq!(written, Written { files: 1, bytes: text.len() as u64 });
+        text
+    }
+
+    #[test]
+    fn two_tets_are_written_to_the_letter_for_gmsh() {
+        let expected = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n5\n\
+            2 1 \"skin\"\n2 2 \"lid\"\n2 3 \"between\"\n3 1 \"lower\"\n3 2 \"upper\"\n$EndPhysicalNames\n\
+            $Nodes\n5\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n5 1 1 1\n$EndNodes\n$Elements\n8\n\
+            1 2 2 1 1 1 3 2\n2 2 2 1 1 1 2 4\n3 2 2 1 1 1 4 3\n4 2 2 2 2 2 3 5\n5 2 2 2 2 2 5 4\n\
+            6 2 2 2 2 3 4 5\n7 4 2 1 1 1 2 3 4\n8 4 2 1 1 2 3 4 5\n$EndElements\n";
+        assert_eq!(written(&two_tets(), "m.msh"), expected);
+    }
+
+    #[test]
+    fn boundaries_in_several_groups_make_a_gmsh_file_of_version_4() {
+        let all = |number: u32, more: &[&str]| Label {
+            number,
+            names: [&["all"], more].concat().into_iter().map(String::from).collect(),
+        };
+        let names = Names { bodies: vec![Label::unnamed(4)], patches: vec![all(1, &[]), all(2, &["clamp"])] };
+        let expected = "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$PhysicalNames\n2\n2 1 \"all\"\n2 2 \"clamp\"\n$EndPhysicalNames\n\
+            $Entities\n0 0 2 1\n1 0 0 0 1 1 1 1 1 0\n2 0 0 0 1 1 1 2 1 2 0\n1 0 0 0 1 1 1 1 4 0\n$EndEntities\n\
+            $Nodes\n1 5 1 5\n3 1 0 5\n1\n2\n3\n4\n5\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 1 1\n$EndNodes\n\
+            $Elements\n3 8 1 8\n2 1 2 3\n1 1 3 2\n2 1 2 4\n3 1 4 3\n2 2 2 3\n4 2 3 5\n5 2 5 4\n6 3 4 5\n\
+            3 1 4 2\n7 1 2 3 4\n8 2 3 4 5\n$EndElements\n";
+        assert_eq!(written_with(&two_tets(), &names, "m.msh"), expected);
+        assert!(losses(&names, Path::new("m.msh")).is_empty());
+        let said = losses(&names, Path::new("m.vol"));
+        assert_eq!(said, ["NETGEN has one name for a boundary: of number 2 it is `all`, without `clamp`"]);
+        assert_eq!(losses(&names, Path::new("m.mesh")).len(), 1);
+    }
+
+    #[test]
+    fn boundaries_of_one_name_are_one_physical_group() {
+        let names = Names {
+            bodies: vec![Label::new(1, "lower")],
+            patches: vec![Label::new(6, "skin"), Label::new(3, "skin")],
+        };
+        let text = written_with(&two_tets(), &names, "m.msh");
+        assert!(text.contains("$PhysicalNames\n2\n2 3 \"skin\"\n3 1 \"lower\"\n"), "{text}");
+        assert!(text.contains("\n1 2 2 3 1 1 3 2\n") && text.contains("\n6 2 2 3 2 3 4 5\n"), "{text}");
+        let said = losses(&names, Path::new("m.msh"));
+        assert_eq!(said, ["Gmsh has one number a name: boundaries 3, 6 are the physical group 3 (`skin`)"]);
+    }
+
+    #[test]
+    fn unused_and_unnamed_numbers_have_names_for_netgen() {
+        let names = Names {
+            bodies: vec![Label::unnamed(2)],
+            patches: vec![Label::new(4, "skin"), Label::unnamed(2)],
+        };
+        let text = written_with(&two_tets(), &names, "m.vol");
+        let end = "materials\n2\n1 default\n2 default\nbcnames\n4\n1 default\n2 default\n3 default\n4 skin\nendmesh\n";
+        assert!(text.ends_with(end), "{text}");
+    }
+
+    #[test]
+    fn two_tets_are_written_to_the_letter_for_medit() {
+        let expected = "MeshVersionFormatted 2\nDimension 3\nVertices\n5\n\
+            0 0 0 0\n1 0 0 0\n0 1 0 0\n0 0 1 0\n1 1 1 0\nTriangles\n6\n \
+            1 3 2 1\n 1 2 4 1\n 1 4 3 1\n 2 3 5 2\n 2 5 4 2\n 3 4 5 2\nTetrahedra\n2\n 1 2 3 4 1\n 2 3 4 5 1\nEnd\n";
+        assert_eq!(written(&two_tets(), "m.mesh"), expected);
+    }
+
+    #[test]
+    fn two_tets_are_written_to_the_letter_for_netgen() {
+        let expected = "mesh3d\ndimension\n3\ngeomtype\n0\nsurfaceelements\n6\n\
+            1 1 1 0 3 1 3 2\n1 1 1 0 3 1 2 4\n1 1 1 0 3 1 4 3\n2 2 1 0 3 2 3 5\n2 2 1 0 3 2 5 4\n2 2 1 0 3 3 4 5\n\
+            volumeelements\n2\n1 4 2 1 3 4\n1 4 3 2 4 5\nedgesegmentsgi2\n0\npoints\n5\n\
+            0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 1 1\nmaterials\n2\n1 lower\n2 upper\n\
+            bcnames\n3\n1 skin\n2 lid\n3 between\nendmesh\n";
+        assert_eq!(written(&two_tets(), "m.vol"), expected);
+    }
+
+    #[test]
+    fn an_interface_lies_between_two_domains_for_netgen() {
+        let text = written(&cube(4), "m.vol");
+        let surface = text.lines().skip_while(|line| *line != "surfaceelements").skip(2).take(192 + 32);
+        let (interface, outer): (Vec<&str>, Vec<&str>) = surface.partition(|line| line.starts_with("3 3 "));
+        assert_eq!((interface.len(), outer.len()), (32, 192));
+        assert!(interface.iter().all(|line| line.starts_with("3 3 1 2 3 ")));
+        assert!(outer.iter().all(|line| line.starts_with("1 1 1 0 3 ") || line.starts_with("2 2 2 0 3 ")));
+    }
+
+    #[test]
+    fn other_formats_and_several_parts_are_refused() {
+        let dir = tempfile::tempdir().unwrap();
+        let mesh = two_tets();
+        let refuse = |part: &PlainPart, name: &str| {
+            write(part, &names(), &dir.path().join(name)).unwrap_err().to_string()
+        };
+        let unknown = refuse(&PlainPart::whole(&mesh), "m.stl");
+        assert!(unknown.contains("m.stl") && unknown.contains(".msh"), "{unknown}");
+        let parts = refuse(&PlainPart::part(&mesh, &[0, 1], 2, 0), "m.msh");
+        assert!(parts.contains("2 parts"), "{parts}");
+        assert!(fs::read_dir(dir.path()).unwrap().next().is_none());
+    }
+}

@@ -1,0 +1,227 @@
+//! NETGEN's `.vol`.
+//!
+//! NETGEN keeps names in a list by number, which it takes to be as long as there are names in the file: a number beyond that was written
+//! behind its memory by older versions and is ignored by newer ones, which then call all boundaries `default`. So each
+//! number from 1 to the largest gets a name here.
+
+use super::runs::Runs;
+use super::{coordinates, ids};
+use crate::io::once::LeftOut;
+use crate::io::output::Output;
+use crate::io::{WriteError, lines};
+use crate::mesh::stream::{MeshStream, NO_TET, SingularTags};
+use crate::mesh::{Label, Names};
+use std::collections::BTreeMap;
+
+/// What NETGEN calls a body or boundary without a name.
+const UNNAMED: &str = "default";
+
+/// Numbers up to this one are kept whatever their gaps; NGSolve takes 0.02 s for as many regions, and 3 s for a million.
+const LARGEST_KEPT: u32 = 10_000;
+
+/// Writes the mesh. Its tets are negatively oriented: two vertices change places. Without edge segments.
+pub(super) fn write(part: &dyn MeshStream, names: &Names, file: &mut Output) -> Result<(), WriteError> {
+    let counts = part.counts();
+    let runs = Runs::of_bodies(part);
+    let [bodies, patches] = [&names.bodies, &names.patches].map(|list| Numbered::of(list));
+    let domain = |tet: u64| match (tet != NO_TET).then(|| runs.find(tet).of) {
+        Some(body) => bodies.of.get(body as usize).copied().unwrap_or(0),
+        None => 0,
+    };
+    file.write(
+        format!("mesh3d\ndimension\n3\ngeomtype\n0\nsurfaceelements\n{}\n", counts.boundary).as_bytes(),
+    )?;
+    lines::triangles(part, names, &LeftOut::default(), file, |line, triangle| {
+        line.int(u64::from(triangle.patch.0) + 1).blank().int(patches.of[triangle.patch.index()].into());
+        triangle.parents.iter().for_each(|&parent| _ = line.blank().int(domain(parent).into()));
+        ids(line.bytes(b" 3"), triangle.vertices);
+    })?;
+    file.write(format!("volumeelements\n{}\n", counts.tets).as_bytes())?;
+    lines::tets(part, names, file, |line, tet| {
+        let [a, b, c, d] = *tet.vertices;
+        ids(line.int(bodies.of[tet.body.index()].into()).bytes(b" 4"), &[b, a, c, d]);
+    })?;
+    file.write(format!("edgesegmentsgi2\n0\npoints\n{}\n", counts.vertices).as_bytes())?;
+    lines::vertices(part, file, |line, vertex| coordinates(line, vertex.point))?;
+    let mut end = identifications(part) + &singularities(part);
+    for (title, list) in [("materials", bodies), ("bcnames", patches)] {
+        end += &format!("{title}\n{}\n", list.names.len());
+        for (number, name) in (1..).zip(list.names) {
+            end += &format!("{number} {name}\n");
+        }
+    }
+    file.write((end + "endmesh\n").as_bytes())
+}
+
+/// What the file cannot hold of these names, a sentence each.
+pub(super) fn losses(names: &Names) -> Vec<String> {
+    let mut losses = Vec::new();
+    for (kind, labels) in [("body", &names.bodies), ("boundary", &names.patches)] {
+        for label in labels.iter().filter(|label| label.names.len() > 1) {
+            losses.push(format!(
+                "NETGEN has one name for a {kind}: of number {} it is `{}`, without {}",
+                label.number,
+                word(&label.names[0]),
+                quoted(&label.names[1..])
+            ));
+        }
+        let changed = labels.iter().flat_map(|label| label.name()).filter(|name| word(name) != **name);
+        for name in changed.collect::<std::collections::BTreeSet<_>>() {
+            losses.push(format!("NETGEN reads words: the {kind} `{name}` is `{}`", word(name)));
+        }
+        let numbered = Numbered::of(labels);
+        let moved: BTreeMap<(u32, u32), &Label> = (labels.iter().zip(&numbered.of))
+            .filter(|(label, number)| label.number != **number)
+            .map(|(label, number)| ((label.number, *number), label))
+            .collect();
+        const SHOWN: usize = 5;
+        let of_one = |((old, new), label): (&(u32, u32), &&Label)| match label.name() {
+            Some(name) => format!("{old} (`{name}`) is {new}"),
+            None => format!("{old} is {new}"),
+        };
+        if !moved.is_empty() {
+            let more = if moved.len() > SHOWN { ", …" } else { "" };
+            let list = moved.iter().take(SHOWN).map(of_one).collect::<Vec<_>>().join(", ");
+            losses.push(format!("NETGEN counts from 1, with one name a number: {kind} {list}{more}"));
+        }
+    }
+    losses.dedup();
+    losses
+}
+
+fn quoted(names: &[String]) -> String {
+    names.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
+}
+
+/// A name as the older readers take it: one word.
+fn word(name: &str) -> String {
+    name.split_whitespace().collect::<Vec<_>>().join("_")
+}
+
+/// The numbers that bodies or boundaries have in the file.
+#[derive(Debug, PartialEq, Eq)]
+struct Numbered {
+    /// By label.
+    of: Vec<u32>,
+    /// The names of 1 to the largest number.
+    names: Vec<String>,
+}
+
+impl Numbered {
+    /// Numbers stay, unless the largest is beyond [`LARGEST_KEPT`] and most below it are unused: then they are counted anew in their order.
+    /// If labels of one number have different names, the names behind the first get numbers behind the largest.
+    fn of(labels: &[Label]) -> Self {
+        let mut kinds: Vec<(u32, String)> =
+            labels.iter().map(|label| (label.number, label.name().map_or(UNNAMED.into(), word))).collect();
+        let of_label = kinds.clone();
+        // In the order of labels within a number.
+        kinds.sort_by_key(|(number, _)| *number);
+        let mut seen = std::collections::BTreeSet::new();
+        kinds.retain(|kind| seen.insert(kind.clone()));
+        let largest = kinds.last().map_or(0, |(number, _)| *number);
+        let count_anew = largest > LARGEST_KEPT && u64::from(largest) > 2 * kinds.len() as u64;
+        let mut next = if count_anew { 1 } else { largest + 1 };
+        let mut last = None;
+        let mut numbers: BTreeMap<&(u32, String), u32> = BTreeMap::new();
+        for kind in &kinds {
+            let repeated = last.replace(kind.0) == Some(kind.0);
+            let number = if count_anew || repeated { next } else { kind.0 };
+            next += u32::from(count_anew || repeated);
+            numbers.insert(kind, number);
+        }
+        let mut names = vec![UNNAMED.to_string(); numbers.values().copied().max().unwrap_or(0) as usize];
+        for ((_, name), number) in &numbers {
+            if let Some(place) = number.checked_sub(1) {
+                names[place as usize].clone_from(name);
+            }
+        }
+        Self { of: of_label.iter().map(|kind| numbers[kind]).collect(), names }
+    }
+}
+
+/// NETGEN's pairs of vertices with the numbers of their identifications, all of them periodic. Empty if there are none.
+fn identifications(part: &dyn MeshStream) -> String {
+    /// NETGEN's number for periodic ones.
+    const PERIODIC: &str = " 2";
+    let links = part.links();
+    let of_link = |index: usize| {
+        let pair = move |(image, of): (u32, u64)| (links[index].identification, of + 1, u64::from(image) + 1);
+        part.images(index).into_iter().map(pair)
+    };
+    let mut pairs: Vec<(u32, u64, u64)> = (0..links.len()).flat_map(of_link).collect();
+    pairs.sort_unstable();
+    pairs.dedup();
+    let Some(count) = links.iter().map(|link| link.identification).max() else { return String::new() };
+    let mut text = format!("identifications\n{}\n", pairs.len());
+    for (number, of, image) in pairs {
+        text += &format!("{of} {image} {number}\n");
+    }
+    text + &format!("identificationtypes\n{count}\n{}\n", PERIODIC.repeat(count as usize).trim_start())
+}
+
+/// NETGEN's factors of singular points and of faces, on both sides of these. Edges have none, as the file has no segments.
+fn singularities(part: &dyn MeshStream) -> String {
+    let SingularTags { patches, vertices } = part.singular();
+    let points: Vec<_> = vertices.iter().map(|(v, factor)| (u64::from(*v) + 1, *factor)).collect();
+    let faces: Vec<_> = patches.iter().map(|(patch, factor)| (u64::from(patch.0) + 1, *factor)).collect();
+    let mut text = String::new();
+    for (title, list) in [
+        ("singular_points", points),
+        ("singular_face_inside", faces.clone()),
+        ("singular_face_outside", faces),
+    ] {
+        if !list.is_empty() {
+            text += &format!("{title}\n{}\n", list.len());
+        }
+        for (number, factor) in list {
+            text += &format!("{number} {factor}\n");
+        }
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn numbered(labels: &[Label]) -> (Vec<u32>, Vec<String>) {
+        let Numbered { of, names } = Numbered::of(labels);
+        (of, names)
+    }
+
+    #[test]
+    fn every_number_up_to_the_largest_has_a_name() {
+        let labels =
+            [Label::new(5, "skin"), Label::unnamed(2), Label::new(3, "a lid"), Label::new(5, "skin")];
+        let names = ["default", "default", "a_lid", "default", "skin"].map(String::from).to_vec();
+        assert_eq!(numbered(&labels), (vec![5, 2, 3, 5], names));
+        assert_eq!(
+            losses(&Names { patches: labels.to_vec(), ..Names::default() }),
+            ["NETGEN reads words: the boundary `a lid` is `a_lid`"]
+        );
+    }
+
+    #[test]
+    fn large_sparse_numbers_are_counted_anew_and_large_dense_ones_stay() {
+        let sparse = [Label::new(1_000_000, "skin"), Label::unnamed(7), Label::new(2_000_000_000, "lid")];
+        let (of, names) = numbered(&sparse);
+        assert_eq!((of, names), (vec![2, 1, 3], ["default", "skin", "lid"].map(String::from).to_vec()));
+        let told = losses(&Names { patches: sparse.to_vec(), ..Names::default() });
+        assert_eq!(
+            told,
+            [
+                "NETGEN counts from 1, with one name a number: boundary 7 is 1, 1000000 (`skin`) is 2, 2000000000 (`lid`) is 3"
+            ]
+        );
+        let dense: Vec<Label> = (1..=20_000).map(Label::unnamed).collect();
+        assert_eq!(numbered(&dense).0[19_999], 20_000);
+        assert!(losses(&Names { patches: dense, ..Names::default() }).is_empty());
+    }
+
+    #[test]
+    fn one_number_with_two_names_becomes_two() {
+        let labels = [Label::new(1, "a"), Label::new(1, "b"), Label::unnamed(1), Label::new(2, "c")];
+        assert_eq!(numbered(&labels).0, [1, 3, 4, 2]);
+        assert_eq!(losses(&Names { bodies: labels.to_vec(), ..Names::default() }).len(), 1);
+    }
+}

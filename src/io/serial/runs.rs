@@ -1,0 +1,58 @@
+//! Consecutive tets or boundary triangles of one body or patch.
+
+use crate::mesh::stream::{BoundaryBlock, MeshStream, TetBlock};
+
+/// Elements of one body or patch that follow each other.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Run {
+    /// The index of the first within the part.
+    pub first: u64,
+    /// The body or patch.
+    pub of: u32,
+    /// How many.
+    pub count: u64,
+}
+
+/// The runs of a part, in order.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Runs(pub Vec<Run>);
+
+impl Runs {
+    pub fn of_bodies(part: &dyn MeshStream) -> Self {
+        let mut runs = Self::default();
+        let mut block = TetBlock::default();
+        for index in 0..part.tet_blocks() {
+            part.tet_block(index, &mut block);
+            runs.add(block.body.expect("a tet block has a body").0, block.tets.len());
+        }
+        runs
+    }
+
+    pub fn of_patches(part: &dyn MeshStream) -> Self {
+        let mut runs = Self::default();
+        let mut block = BoundaryBlock::default();
+        for index in 0..part.boundary_blocks() {
+            part.boundary_block(index, &mut block);
+            runs.add(block.patch.expect("a boundary block has a patch").0, block.triangles.len());
+        }
+        runs
+    }
+
+    fn add(&mut self, of: u32, count: usize) {
+        match self.0.last_mut() {
+            Some(last) if last.of == of => last.count += count as u64,
+            last => {
+                let first = last.map_or(0, |last| last.first + last.count);
+                self.0.push(Run { first, of, count: count as u64 });
+            }
+        }
+    }
+
+    /// The run that has the element at this index within the part.
+    ///
+    /// # Panics
+    /// If there is no such element.
+    pub fn find(&self, element: u64) -> &Run {
+        &self.0[self.0.partition_point(|run| run.first <= element) - 1]
+    }
+}
