@@ -5,7 +5,7 @@ use super::{Link, Pair, Pairs};
 use crate::Point;
 use crate::mesh::topology;
 use crate::mesh::{Mesh, VertexId};
-use csg::{Aabb, Features, PatchId};
+use csg::{Aabb, PatchId};
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 use std::collections::BTreeMap;
 
@@ -18,6 +18,8 @@ pub struct PeriodicMap {
     pub pairs: Vec<Pairs>,
     /// All images, with the first entity of the chain that leads to them, which is none.
     pub origins: Pairs,
+    /// How far an image may be from where the motion puts it: that is how its partner is found.
+    pub distance: f64,
 }
 
 /// A mesh whose faces are not periodic although its geometry is.
@@ -56,26 +58,23 @@ pub fn same_place(bounds: &Aabb) -> f64 {
 }
 
 impl PeriodicMap {
-    /// The pairs of a coarse mesh. Edges and faces are numbered as parts number them, see [`crate::dist::distribute`].
+    /// The pairs of a coarse mesh; `bounds` are those of the geometry. Edges and faces are numbered as parts number them, see
+    /// [`crate::dist::distribute`].
     ///
     /// # Errors
     /// A vertex or triangle without partner.
-    pub fn of(mesh: &Mesh, features: &Features) -> Result<Self, MapError> {
-        let mut map = Self::default();
-        if features.identified.is_empty() {
+    pub fn of(mesh: &Mesh, links: Vec<Link>, bounds: &Aabb) -> Result<Self, MapError> {
+        let mut map = Self { distance: same_place(bounds), ..Self::default() };
+        if links.is_empty() {
             return Ok(map);
         }
         let lists = Lists {
             edges: topology::edges(mesh.points.len(), &mesh.tets).edges,
             faces: topology::faces(mesh.points.len(), &mesh.tets).faces,
         };
-        let distance = same_place(&features.bounds);
-        for (number, identified) in (1..).zip(&features.identified) {
-            for &[of, image] in &identified.patches {
-                let link = Link { identification: number, of, image, motion: identified.motion };
-                map.pairs.push(lists.pairs(mesh, &link, distance)?);
-                map.links.push(link);
-            }
+        for link in links {
+            map.pairs.push(lists.pairs(mesh, &link, map.distance)?);
+            map.links.push(link);
         }
         map.origins =
             Pairs([0, 1, 2].map(|dimension| {
@@ -84,10 +83,10 @@ impl PeriodicMap {
         Ok(map)
     }
 
-    /// Everything as numbers, to be sent to other ranks: links, then for each and for the origins the pairs of vertices,
+    /// Everything as numbers, to be sent to other ranks: the distance, links, then for each and for the origins the pairs of vertices,
     /// edges and faces.
     pub fn encode(&self) -> Vec<u64> {
-        let mut out = vec![self.links.len() as u64];
+        let mut out = vec![self.distance.to_bits(), self.links.len() as u64];
         for Link { identification, of, image, motion } in &self.links {
             out.extend([identification, &of.0, &image.0].map(|&number| u64::from(number)));
             let numbers = motion.rotation.coords.iter().chain(motion.translation.vector.iter());
@@ -112,6 +111,7 @@ impl PeriodicMap {
     pub fn decode(numbers: &[u64]) -> Self {
         let mut numbers = numbers.iter().copied();
         let mut next = || numbers.next().expect("an encoded map");
+        let distance = f64::from_bits(next());
         let links = (0..next())
             .map(|_| {
                 let [identification, of, image] = [next(), next(), next()].map(|number| number as u32);
@@ -133,7 +133,7 @@ impl PeriodicMap {
             }))
         };
         let of_links = links.iter().map(|_| pairs()).collect();
-        Self { pairs: of_links, origins: pairs(), links }
+        Self { pairs: of_links, origins: pairs(), links, distance }
     }
 }
 

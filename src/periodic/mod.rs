@@ -23,7 +23,7 @@ pub use map::{MapError, PeriodicMap, same_place};
 pub use pairs::{Pair, Pairs};
 pub use size::PeriodicSize;
 
-use csg::PatchId;
+use csg::{Features, PatchId};
 use nalgebra::Isometry3;
 
 /// A patch that is the image of another.
@@ -37,4 +37,15 @@ pub struct Link {
     pub image: PatchId,
     /// The motion to the image.
     pub motion: Isometry3<f64>,
+}
+
+/// The links of a geometry.
+pub fn links(features: &Features) -> Vec<Link> {
+    let mut links = Vec::new();
+    for (identification, identified) in (1..).zip(&features.identified) {
+        let link =
+            |&[of, image]: &[PatchId; 2]| Link { identification, of, image, motion: identified.motion };
+        links.extend(identified.patches.iter().map(link));
+    }
+    links
 }

@@ -119,11 +119,12 @@ fn a_map_survives_its_encoding_and_a_mesh_that_is_not_periodic_has_none() {
     let mut settings = CoarseSettings::from(SizeSettings::from(Preset::VeryCoarse));
     let mut mesh = model.coarse_mesh(&mut settings).unwrap().mesh;
     let Model::Csg(csg) = &model else { panic!("a geometry") };
-    let map = PeriodicMap::of(&mesh, &csg.features).unwrap();
+    let map = PeriodicMap::of(&mesh, super::links(&csg.features), &csg.features.bounds).unwrap();
     assert_eq!(PeriodicMap::decode(&map.encode()), map);
     let image = map.pairs[0].0[0][0].image as usize;
     mesh.points[image] += Vector::new(1e-6, 0.0, 0.0);
-    let error = PeriodicMap::of(&mesh, &csg.features).unwrap_err().to_string();
+    let error =
+        PeriodicMap::of(&mesh, super::links(&csg.features), &csg.features.bounds).unwrap_err().to_string();
     assert!(error.contains("has no image on patch"), "{error}");
 }
 
@@ -245,5 +246,38 @@ fn cells_far_from_the_origin_and_of_any_size_are_periodic() {
         );
         let checked = made(&model_of(&source), 2, 1)[0].periodic.unwrap();
         assert!(checked.lost == 0 && checked.pairs > 30, "{source}: {checked:?}");
+    }
+}
+
+#[test]
+fn periodic_meshes_of_files_are_refined_as_such_and_written_again() {
+    let dir = tempfile::tempdir().unwrap();
+    for (name, links) in GEOMETRIES {
+        let first = made(&model(name), 1, 0).remove(0);
+        for ending in ["msh", "vol"] {
+            let path = dir.path().join(format!("{name}.{ending}"));
+            serial::write(first.part.stream(), &first.names, &path).unwrap();
+            let mut notes = Vec::new();
+            let read = |path: &Path, notes: &mut Vec<String>| {
+                let add = &mut |note: &str| notes.push(note.to_owned());
+                crate::pipeline::input::read(&[path], &Default::default(), add).unwrap()
+            };
+            let given = read(&path, &mut notes);
+            assert!(!notes.iter().any(|note| note.contains("periodic")), "{name}.{ending}: {notes:?}");
+            let checked = first.periodic.unwrap();
+            let again = made(&given, 1, 0).remove(0);
+            assert_eq!(again.part.stream().links().len(), links, "{name}.{ending}");
+            assert_eq!(again.periodic.unwrap().pairs, checked.pairs, "{name}.{ending}");
+            // Refined in parts, written and read once more.
+            let fine = made(&given, 3, 1).remove(0).periodic.unwrap();
+            assert!(fine.lost == 0 && fine.pairs > 2 * checked.pairs && fine.furthest < 1e-12, "{fine:?}");
+            serial::write(again.part.stream(), &again.names, &path).unwrap();
+            let once_more = made(&read(&path, &mut notes), 1, 0).remove(0);
+            let motions = |made: &Generated| -> Vec<_> {
+                let links = made.part.stream().links().iter();
+                links.map(|l| (l.identification, l.of, l.image, l.motion)).collect()
+            };
+            assert_eq!(motions(&once_more), motions(&again), "{name}.{ending}");
+        }
     }
 }

@@ -16,6 +16,7 @@ use crate::dist::{self, BareMesh, DistMesh};
 use crate::error::{Failure, Status, agree};
 use crate::geometry::Projector;
 use crate::improve::Effort;
+use crate::kernel::tree;
 use crate::mesh::stream::MeshStream;
 use crate::mesh::{GlobalId, Mesh, Names, Rank};
 use crate::migrate::BareStream;
@@ -212,6 +213,10 @@ fn fill(
 ) -> Result<Generated, Failure> {
     let Parts { model, coarse, dist, projector, names, pieces } = parts;
     agree(comm, skins::refuse_periodic(model))?;
+    if matches!(model, Some(Model::Given(given)) if !given.links.is_empty()) {
+        progress
+            .note("note: the method `surface` keeps no periodic faces: those of the mesh are like others");
+    }
     let sizes = model
         .zip(coarse.as_ref())
         .map(|(model, coarse)| skins::wanted_sizes(model, coarse, settings, pieces));
@@ -330,10 +335,15 @@ fn periodic_map(
 ) -> Result<PeriodicMap, Failure> {
     let map = match (model, coarse) {
         (Some(Model::Csg(model)), Some(mesh)) => {
-            PeriodicMap::of(mesh, &model.features).map_err(|error| Failure::new(Status::NoValidMesh, error))
+            let bounds = &model.features.bounds;
+            PeriodicMap::of(mesh, periodic::links(&model.features), bounds)
+        }
+        (Some(Model::Given(given)), Some(mesh)) => {
+            PeriodicMap::of(mesh, given.links.clone(), &tree::bounds(&mesh.points))
         }
         _ => Ok(PeriodicMap::default()),
     };
+    let map = map.map_err(|error| Failure::new(Status::NoValidMesh, error));
     let mut numbers = agree(comm, map)?.encode();
     comm.broadcast(0, &mut numbers)?;
     Ok(PeriodicMap::decode(&numbers))
@@ -352,7 +362,9 @@ fn periodic_verdict(
     /// Both points of a pair may be as far off as one from its surface, and moving one rounds.
     const ROOM: f64 = 4.0;
     let checked = periodic::check(comm, part, map)?;
-    if checked.lost > 0 || checked.furthest > ROOM * projector.tolerance() {
+    // Points of a mesh without geometry are not projected: they are as far off as the coarse ones may be.
+    let tolerance = if matches!(projector, Projector::Flat) { map.distance } else { projector.tolerance() };
+    if checked.lost > 0 || checked.furthest > ROOM * tolerance {
         let message = format!(
             "{} vertices of periodic faces have no partner, others are {:e} off; nothing was written",
             checked.lost, checked.furthest

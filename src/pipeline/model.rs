@@ -6,6 +6,7 @@ use crate::facets::FacetSize;
 use crate::geometry::Projector;
 use crate::kernel::quality::QualitySummary;
 use crate::mesh::{Mesh, Names};
+use crate::periodic::Link;
 use crate::size::{GeometricSize, SizeField, SizeSettings};
 use csg::{Features, Geometry};
 
@@ -50,6 +51,8 @@ pub struct GivenMesh {
     pub mesh: Mesh,
     /// Numbers and names of its bodies and boundaries.
     pub names: Names,
+    /// Its patches that are periodic images of others.
+    pub links: Vec<Link>,
 }
 
 /// How many entities a geometry has.

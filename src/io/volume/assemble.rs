@@ -1,7 +1,7 @@
 //! From the content of a file to a mesh: vertices that are used, orientation, bodies, boundary, classes.
 
 use super::raw::{Label, Raw};
-use super::{VolumeMesh, boundary, classify, orient};
+use super::{VolumeMesh, boundary, classify, orient, periodic};
 use crate::io::input::{Fault, counted};
 use crate::mesh::topology::{self, Faces};
 use crate::mesh::{self, BoundaryTriangle, Mesh, TetId, VertexId};
@@ -60,7 +60,8 @@ pub(super) fn assemble(mut raw: Raw) -> Result<VolumeMesh, Fault> {
     let mut mesh = Mesh { points: raw.points, tets, bodies, triangles, ..Mesh::default() };
     classify::classify(&mut mesh, &raw.edges, &raw.edge_labels, &mut notes);
     let inverted = orient::not_positive(&mesh.points, &mesh.tets).into_iter().map(TetId).collect();
-    Ok(VolumeMesh { mesh, names, turned, inverted, notes })
+    let links = periodic::links(&mesh, &raw.periodic, &mut notes);
+    Ok(VolumeMesh { mesh, names, turned, inverted, links, notes })
 }
 
 /// Every corner must be a vertex, and the corners of a tet four different ones.
@@ -89,6 +90,7 @@ fn check_corners(raw: &Raw) -> Result<(), Fault> {
     check("tetrahedron", &raw.tets, count)?;
     check("triangle", &raw.triangles, count)?;
     check("edge", &raw.edges, count)?;
+    raw.periodic.iter().try_for_each(|periodic| check("periodic pair", &periodic.pairs, count))?;
     let twice = |t: &[u32; 4]| (0..4).any(|i| t[..i].contains(&t[i]));
     match raw.tets.iter().position(twice) {
         Some(k) => {
@@ -116,6 +118,10 @@ fn drop_unused(raw: &mut Raw) {
     let before = raw.triangles.len() + raw.edges.len();
     drop_hanging(&mut raw.triangles, &mut raw.triangle_labels, &to_kept, UNUSED);
     drop_hanging(&mut raw.edges, &mut raw.edge_labels, &to_kept, UNUSED);
+    for periodic in &mut raw.periodic {
+        periodic.pairs.iter_mut().flatten().for_each(|v| *v = to_kept[*v as usize]);
+        periodic.pairs.retain(|pair| !pair.contains(&UNUSED));
+    }
     let hanging = before - raw.triangles.len() - raw.edges.len();
     let mut note = format!("{} that no tet uses left out", counted(unused, "vertex"));
     if hanging > 0 {
@@ -162,7 +168,7 @@ pub(super) fn numbered<K: Ord + Copy>(keys: &[K]) -> (Vec<K>, Vec<u32>) {
 /// The largest number that the writers can write.
 const MOST: i64 = i32::MAX as i64;
 
-/// A number from 1 and a name for each label. Labels without such a number get those behind the largest one.
+/// A number from 1 and names for each label. Labels without such a number get those behind the largest one, each entity its own.
 fn names_of(
     labels: &[Label],
     given: &BTreeMap<i64, Vec<String>>,
@@ -171,13 +177,14 @@ fn names_of(
 ) -> Vec<mesh::Label> {
     let valid = |number: i64| (1..=MOST).contains(&number);
     let mut next = labels.iter().map(|l| l.number).filter(|&n| valid(n)).max().unwrap_or(0) + 1;
-    let mut replaced: BTreeMap<i64, i64> = BTreeMap::new();
+    let mut replaced: BTreeMap<[i64; 2], i64> = BTreeMap::new();
     let mut names = Vec::with_capacity(labels.len());
     for label in labels {
         let number = if valid(label.number) {
             label.number
         } else {
-            *replaced.entry(label.number).or_insert_with(|| {
+            let entity = if label.number == 0 { label.entity } else { 0 };
+            *replaced.entry([label.number, entity]).or_insert_with(|| {
                 let number = next;
                 next += 1;
                 if label.number != 0 && given.get(&label.number).is_none() {
@@ -190,6 +197,14 @@ fn names_of(
         own.retain(|name| !name.is_empty());
         // More labels than numbers left are not in reach of memory.
         names.push(mesh::Label { number: number.min(MOST) as u32, names: own });
+    }
+    let in_no_group: Vec<i64> = (replaced.iter())
+        .filter(|([number, entity], _)| *number == 0 && *entity != 0)
+        .map(|(_, number)| *number)
+        .collect();
+    if let (Some(first), Some(last)) = (in_no_group.iter().min(), in_no_group.iter().max()) {
+        let range = if first == last { format!("{first}") } else { format!("{first} to {last}") };
+        notes.push(format!("{kind} without number in the file: {range} here"));
     }
     names
 }

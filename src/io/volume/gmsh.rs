@@ -5,11 +5,13 @@
 //! $PhysicalNames   dimension  tag  "name"
 //! $Nodes           2.x: id x y z              4.1: blocks, see `gmsh4`
 //! $Elements        2.x: id type tags… nodes…
+//! $Periodic       see `gmsh_periodic`
 //! ```
-//! Physical tags are numbers of bodies and boundaries, elementary tags their entities. Other sections are skipped.
+//! Physical tags are groups of bodies and boundaries (see `groups`), elementary tags their entities. Other sections are skipped.
 
-use super::gmsh4;
+use super::groups::Groups;
 use super::raw::{Label, Raw, Shape};
+use super::{gmsh_periodic, gmsh4, groups};
 use crate::io::input::{Bytes, Fault, Words, shown};
 
 /// How numbers are stored.
@@ -98,16 +100,21 @@ pub(super) fn parse(content: &[u8]) -> Result<Raw, Fault> {
     while let Some(section) = words.next() {
         words.rest_of_line();
         match (section, version, storage) {
-            (b"$PhysicalNames", ..) => physical_names(&mut words, &mut raw)?,
+            (b"$PhysicalNames", ..) => physical_names(&mut words, &mut file.groups)?,
             (b"$Nodes", Version::Two, Storage::Text) => file.ids = Some(nodes_text(&mut words, &mut raw)?),
             (b"$Nodes", Version::Two, Storage::Binary { big_endian }) => {
                 file.ids = Some(nodes_binary(&mut words, content, big_endian, &mut raw)?);
             }
-            (b"$Elements", Version::Two, Storage::Text) => elements_text(&mut words, &file.ids, &mut raw)?,
+            (b"$Elements", Version::Two, Storage::Text) => elements_text(&mut words, &mut file, &mut raw)?,
             (b"$Elements", Version::Two, Storage::Binary { big_endian }) => {
-                elements_binary(&mut words, content, big_endian, &file.ids, &mut raw)?;
+                elements_binary(&mut words, content, big_endian, &mut file, &mut raw)?;
             }
-            (b"$Entities" | b"$PartitionedEntities" | b"$Nodes" | b"$Elements", Version::Four, _) => {
+            (b"$Periodic", Version::Two, _) => gmsh_periodic::version_2(&mut words, &file.ids, &mut raw)?,
+            (
+                b"$Entities" | b"$PartitionedEntities" | b"$Nodes" | b"$Elements" | b"$Periodic",
+                Version::Four,
+                _,
+            ) => {
                 gmsh4::section(section, &mut words, content, storage, &mut file, &mut raw)?;
             }
             (name, ..) if name.starts_with(b"$") => {
@@ -125,6 +132,8 @@ pub(super) fn parse(content: &[u8]) -> Result<Raw, Fault> {
     if file.ids.is_none() {
         return Err(Fault::file("the file has no section $Nodes"));
     }
+    let [_, _, of_triangles, of_tets] = &mut file.groups;
+    groups::finish([of_triangles, of_tets], &mut raw);
     Ok(raw)
 }
 
@@ -178,18 +187,17 @@ fn header(words: &mut Words, content: &[u8]) -> Result<(Version, Storage), Fault
     Ok((version, storage))
 }
 
-fn physical_names(words: &mut Words, raw: &mut Raw) -> Result<(), Fault> {
+fn physical_names(words: &mut Words, groups: &mut [Groups; 4]) -> Result<(), Fault> {
     let count = words.count("physical names", 3)?;
     for _ in 0..count {
         let dimension = words.int("a dimension")?;
         let tag = words.int("a physical tag")?;
         let name = String::from_utf8_lossy(words.rest_of_line()).into_owned();
         let name = name.trim_matches('"').to_string();
-        match dimension {
-            2 => raw.patch_names.insert(tag, vec![name]),
-            3 => raw.body_names.insert(tag, vec![name]),
-            _ => None,
-        };
+        if let Some(groups) = usize::try_from(dimension).ok().and_then(|dimension| groups.get_mut(dimension))
+        {
+            groups.names.insert(tag, name);
+        }
     }
     Ok(())
 }
@@ -242,10 +250,18 @@ fn nodes_binary(words: &mut Words, content: &[u8], big_endian: bool, raw: &mut R
     Ids::new(&ids)
 }
 
-const NO_NODES: &str = "elements stand before nodes";
+pub(super) const NO_NODES: &str = "elements stand before nodes";
 
-fn elements_text(words: &mut Words, ids: &Option<Ids>, raw: &mut Raw) -> Result<(), Fault> {
-    let ids = ids.as_ref().ok_or_else(|| words.fault(NO_NODES))?;
+/// The label of an element of version 2, by its first two tags.
+fn label(shape: Shape, [physical, entity]: [i64; 2], groups: &mut [Groups; 4]) -> Label {
+    // The sign is the orientation; 0 is none.
+    let physical = physical.saturating_abs();
+    let tags: &[i64] = if physical == 0 { &[] } else { &[physical] };
+    Label { entity, number: groups[shape.dimension()].set(tags) }
+}
+
+fn elements_text(words: &mut Words, file: &mut gmsh4::Parts, raw: &mut Raw) -> Result<(), Fault> {
+    let ids = file.ids.as_ref().ok_or_else(|| words.fault(NO_NODES))?;
     let count = words.count("elements", 4)?;
     let mut nodes = Vec::new();
     for _ in 0..count {
@@ -253,15 +269,14 @@ fn elements_text(words: &mut Words, ids: &Option<Ids>, raw: &mut Raw) -> Result<
         let code = words.int("the type of an element")?;
         let (shape, size) = known_type(code).map_err(|message| words.fault(message))?;
         let tags = words.count("tags", 1)?;
-        let mut label = Label::default();
+        let mut first_tags = [0; 2];
         for k in 0..tags {
             let tag = words.int("a tag")?;
-            match k {
-                0 => label.number = tag,
-                1 => label.entity = tag,
-                _ => {}
+            if let Some(place) = first_tags.get_mut(k) {
+                *place = tag;
             }
         }
+        let label = label(shape, first_tags, &mut file.groups);
         nodes.clear();
         for _ in 0..size {
             let id = id(words)?;
@@ -276,10 +291,10 @@ fn elements_binary(
     words: &mut Words,
     content: &[u8],
     big_endian: bool,
-    ids: &Option<Ids>,
+    file: &mut gmsh4::Parts,
     raw: &mut Raw,
 ) -> Result<(), Fault> {
-    let ids = ids.as_ref().ok_or_else(|| words.fault(NO_NODES))?;
+    let ids = file.ids.as_ref().ok_or_else(|| words.fault(NO_NODES))?;
     let total = words.count("elements", 1)?;
     words.rest_of_line();
     let mut bytes = Bytes::new(content, words.offset(), big_endian);
@@ -298,15 +313,14 @@ fn elements_binary(
         }
         for _ in 0..count {
             bytes.i32("the id of an element")?;
-            let mut label = Label::default();
+            let mut first_tags = [0; 2];
             for k in 0..tags {
-                let tag = bytes.i32("a tag")?.into();
-                match k {
-                    0 => label.number = tag,
-                    1 => label.entity = tag,
-                    _ => {}
+                let tag = bytes.i32("a tag")?;
+                if let Some(place) = first_tags.get_mut(k) {
+                    *place = tag.into();
                 }
             }
+            let label = label(shape, first_tags, &mut file.groups);
             nodes.clear();
             for _ in 0..size {
                 let id = bytes.i32("the id of a node")?;

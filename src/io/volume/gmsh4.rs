@@ -1,6 +1,8 @@
 //! The sections of Gmsh's MSH 4.1 that its version 2 has not: entities, and nodes and elements in blocks.
 
-use super::gmsh::{Ids, Storage, known_type};
+use super::gmsh::{Ids, NO_NODES, Storage, known_type};
+use super::gmsh_periodic;
+use super::groups::Groups;
 use super::raw::{Label, Raw, Shape};
 use crate::Point;
 use crate::io::input::{Bytes, Fault, Words};
@@ -13,27 +15,28 @@ pub(super) struct Parts {
     pub ids: Option<Ids>,
     /// By dimension and tag.
     entities: BTreeMap<(i64, i64), Entity>,
-    has_physicals: bool,
+    /// Physical groups by dimension.
+    pub groups: [Groups; 4],
 }
 
 /// What is said of a geometric entity.
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Default)]
 struct Entity {
-    /// The first physical tag.
-    physical: Option<i64>,
+    /// Its physical groups.
+    physical: Vec<i64>,
     /// The entity that it is a part of, by dimension and tag.
     parent: Option<(i64, i64)>,
 }
 
 /// Numbers as text or binary.
-enum Source<'a, 'w> {
+pub(super) enum Source<'a, 'w> {
     Text(&'w mut Words<'a>),
     Binary { words: &'w mut Words<'a>, bytes: Bytes<'a> },
 }
 
 impl Source<'_, '_> {
     /// A number that takes four bytes.
-    fn int(&mut self, what: &str) -> Result<i64, Fault> {
+    pub fn int(&mut self, what: &str) -> Result<i64, Fault> {
         match self {
             Self::Text(words) => words.int(what),
             Self::Binary { bytes, .. } => bytes.i32(what).map(i64::from),
@@ -41,7 +44,7 @@ impl Source<'_, '_> {
     }
 
     /// A number that takes eight bytes.
-    fn size(&mut self, what: &str) -> Result<u64, Fault> {
+    pub fn size(&mut self, what: &str) -> Result<u64, Fault> {
         match self {
             Self::Text(words) => {
                 let number = words.int(what)?;
@@ -58,8 +61,15 @@ impl Source<'_, '_> {
         }
     }
 
+    pub fn float(&mut self, what: &str) -> Result<f64, Fault> {
+        match self {
+            Self::Text(words) => words.float(what),
+            Self::Binary { bytes, .. } => bytes.f64(what),
+        }
+    }
+
     /// A number of things that follow, each of at least so many numbers and bytes.
-    fn count(&mut self, what: &str, numbers: usize, bytes_each: usize) -> Result<usize, Fault> {
+    pub fn count(&mut self, what: &str, numbers: usize, bytes_each: usize) -> Result<usize, Fault> {
         match self {
             Self::Text(words) => words.count(what, numbers),
             Self::Binary { bytes, .. } => {
@@ -69,7 +79,7 @@ impl Source<'_, '_> {
         }
     }
 
-    fn fault(&self, message: impl Into<String>) -> Fault {
+    pub fn fault(&self, message: impl Into<String>) -> Fault {
         match self {
             Self::Text(words) => words.fault(message),
             Self::Binary { bytes, .. } => bytes.fault(message),
@@ -111,6 +121,7 @@ pub(super) fn section<'a>(
             }
             entities(&mut source, true, parts)?;
         }
+        b"$Periodic" => gmsh_periodic::version_4(&mut source, &parts.ids, raw)?,
         b"$Nodes" => parts.ids = Some(nodes(&mut source, raw)?),
         _ => elements(&mut source, parts, raw)?,
     }
@@ -137,13 +148,9 @@ fn entities(source: &mut Source, partitioned: bool, parts: &mut Parts) -> Result
             if dimension > 0 {
                 source.point()?;
             }
-            for k in 0..source.count("physical tags", 1, 4)? {
-                let physical = source.int("a physical tag")?;
-                if k == 0 {
-                    // The sign is the orientation.
-                    entity.physical = Some(physical.saturating_abs());
-                    parts.has_physicals |= dimension >= 2;
-                }
+            for _ in 0..source.count("physical tags", 1, 4)? {
+                // The sign is the orientation.
+                entity.physical.push(source.int("a physical tag")?.saturating_abs());
             }
             if dimension > 0 {
                 for _ in 0..source.count("bounding entities", 1, 4)? {
@@ -174,18 +181,16 @@ fn nodes(source: &mut Source, raw: &mut Raw) -> Result<Ids, Fault> {
             raw.points.push(source.point()?);
             // Parameters on the entity: as many numbers as it has dimensions.
             for _ in 0..if parametric == 1 { dimension.clamp(0, 3) } else { 0 } {
-                match source {
-                    Source::Text(words) => _ = words.float("a parameter")?,
-                    Source::Binary { bytes, .. } => _ = bytes.f64("a parameter")?,
-                }
+                source.float("a parameter")?;
             }
         }
     }
     Ids::new(&ids)
 }
 
-fn elements(source: &mut Source, parts: &Parts, raw: &mut Raw) -> Result<(), Fault> {
-    let ids = parts.ids.as_ref().ok_or_else(|| source.fault("elements stand before nodes"))?;
+fn elements(source: &mut Source, parts: &mut Parts, raw: &mut Raw) -> Result<(), Fault> {
+    let Parts { ids, entities, groups } = parts;
+    let ids = ids.as_ref().ok_or_else(|| source.fault(NO_NODES))?;
     let blocks = source.size("the number of blocks")?;
     for what in ["the number of elements", "the least id", "the largest id"] {
         source.size(what)?;
@@ -198,7 +203,7 @@ fn elements(source: &mut Source, parts: &Parts, raw: &mut Raw) -> Result<(), Fau
         let code = source.int("the type of elements")?;
         let (shape, size) = known_type(code).map_err(|message| source.fault(message))?;
         let count = source.count("elements", 1 + size, 8 * (1 + size))?;
-        let label = label(parts, dimension, tag);
+        let label = label(entities, &mut groups[shape.dimension()], dimension, tag);
         for _ in 0..count {
             source.size("the id of an element")?;
             nodes.clear();
@@ -220,14 +225,18 @@ fn elements(source: &mut Source, parts: &Parts, raw: &mut Raw) -> Result<(), Fau
 }
 
 /// The label of the elements of an entity; `None` for what only separates partitions.
-fn label(parts: &Parts, dimension: i64, tag: i64) -> Option<Label> {
-    let entity = parts.entities.get(&(dimension, tag)).copied().unwrap_or_default();
+fn label(
+    entities: &BTreeMap<(i64, i64), Entity>,
+    groups: &mut Groups,
+    dimension: i64,
+    tag: i64,
+) -> Option<Label> {
+    let nothing = Entity::default();
+    let entity = entities.get(&(dimension, tag)).unwrap_or(&nothing);
     let (whole_dimension, whole) = entity.parent.unwrap_or((dimension, tag));
     if whole_dimension > dimension {
         return None;
     }
-    let of_whole = parts.entities.get(&(dimension, whole)).and_then(|entity| entity.physical);
-    let physical = entity.physical.or(of_whole);
-    let number = physical.unwrap_or(if parts.has_physicals { 0 } else { whole });
-    Some(Label { entity: whole, number })
+    let own = if entity.physical.is_empty() { entities.get(&(dimension, whole)) } else { Some(entity) };
+    Some(Label { entity: whole, number: groups.set(own.map_or(&[], |own| &own.physical)) })
 }

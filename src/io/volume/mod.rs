@@ -18,10 +18,15 @@ mod classify;
 mod elmer;
 mod gmsh;
 mod gmsh4;
+mod gmsh_periodic;
+#[cfg(test)]
+mod group_tests;
+mod groups;
 mod medit;
 mod medit_binary;
 mod netgen;
 mod orient;
+mod periodic;
 mod raw;
 #[cfg(test)]
 mod samples;
@@ -35,6 +40,7 @@ pub use super::input::{Place, ReadError};
 
 use super::input::{Fault, ending, load};
 use crate::mesh::{Mesh, Names, TetId};
+use crate::periodic::Link;
 use raw::Raw;
 use std::io::Read;
 use std::path::Path;
@@ -54,6 +60,8 @@ pub struct VolumeMesh {
     pub turned: usize,
     /// Tets that are not positively oriented: inverted or flat.
     pub inverted: Vec<TetId>,
+    /// Patches that are periodic images of others.
+    pub links: Vec<Link>,
     /// What was mended, added or left out, a sentence each.
     pub notes: Vec<String>,
 }

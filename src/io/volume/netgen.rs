@@ -1,13 +1,15 @@
 //! NETGEN's `.vol`: keywords, counts and lists, in any order. Tets are stored negatively.
 
-use super::raw::{Label, Raw, Shape};
-use crate::io::input::{Fault, Words};
+use super::raw::{Label, PeriodicPairs, Raw, Shape};
+use crate::io::input::{Fault, Words, counted};
+use std::collections::BTreeMap;
 
 pub(super) fn parse(content: &[u8]) -> Result<Raw, Fault> {
     let mut words = Words::with_comments(content);
     words.expect("mesh3d")?;
     let mut raw = Raw::default();
     let mut has_points = false;
+    let mut types = Vec::new();
     while let Some(word) = words.next() {
         match word {
             b"dimension" => {
@@ -32,6 +34,8 @@ pub(super) fn parse(content: &[u8]) -> Result<Raw, Fault> {
             }
             b"materials" => names(&mut words, &mut raw.body_names)?,
             b"bcnames" => names(&mut words, &mut raw.patch_names)?,
+            b"identifications" => identifications(&mut words, &mut raw)?,
+            b"identificationtypes" => types = identification_types(&mut words)?,
             // Lists whose words could be taken for keywords.
             b"cd2names" | b"cd3names" => names(&mut words, &mut Default::default())?,
             b"endmesh" => break,
@@ -41,6 +45,7 @@ pub(super) fn parse(content: &[u8]) -> Result<Raw, Fault> {
     if !has_points {
         return Err(Fault::file("the file has no `points`: it is cut off, or no mesh of NETGEN"));
     }
+    keep_periodic(&types, &mut raw);
     Ok(raw)
 }
 
@@ -116,12 +121,46 @@ fn segments(
     Ok(())
 }
 
-fn names(words: &mut Words, names: &mut std::collections::BTreeMap<i64, Vec<String>>) -> Result<(), Fault> {
+fn names(words: &mut Words, names: &mut BTreeMap<i64, Vec<String>>) -> Result<(), Fault> {
     let count = words.count("names", 1)?;
     for _ in 0..count {
         let number = words.int("the number of a name")?;
         let name = String::from_utf8_lossy(words.rest_of_line()).into_owned();
-        names.insert(number, vec![name]);
+        // What NETGEN calls what has no name.
+        if name != "default" {
+            names.insert(number, vec![name]);
+        }
     }
     Ok(())
+}
+
+/// `vertex image identification`
+fn identifications(words: &mut Words, raw: &mut Raw) -> Result<(), Fault> {
+    let count = words.count("pairs of vertices", 3)?;
+    let mut by_number: BTreeMap<i64, Vec<[u32; 2]>> = BTreeMap::new();
+    for _ in 0..count {
+        let [of, image] = [words.vertex_to_come(1)?, words.vertex_to_come(1)?];
+        by_number.entry(words.int("the number of an identification")?).or_default().push([image, of]);
+    }
+    let pairs = by_number.into_iter().map(|(identification, pairs)| PeriodicPairs { identification, pairs });
+    raw.periodic.extend(pairs);
+    Ok(())
+}
+
+/// The types of identifications 1, 2, ….
+fn identification_types(words: &mut Words) -> Result<Vec<i64>, Fault> {
+    let count = words.count("types of identifications", 1)?;
+    (0..count).map(|_| words.int("the type of an identification")).collect()
+}
+
+/// Drops identifications of other types: close surfaces and edges.
+fn keep_periodic(types: &[i64], raw: &mut Raw) {
+    const PERIODIC: i64 = 2;
+    let type_of = |number: i64| usize::try_from(number - 1).ok().and_then(|place| types.get(place));
+    let before = raw.periodic.len();
+    raw.periodic.retain(|pairs| type_of(pairs.identification) == Some(&PERIODIC));
+    if raw.periodic.len() < before {
+        let left_out = counted(before - raw.periodic.len(), "identification");
+        raw.notes.push(format!("{left_out} that are not periodic left out"));
+    }
 }

@@ -34,6 +34,27 @@ pub(super) enum Shape {
     Other(&'static str),
 }
 
+impl Shape {
+    /// 0 to 3.
+    pub fn dimension(self) -> usize {
+        match self {
+            Self::Point => 0,
+            Self::Edge => 1,
+            Self::Triangle => 2,
+            Self::Tet | Self::Other(_) => 3,
+        }
+    }
+}
+
+/// Vertices that a file calls periodic images of others.
+#[derive(Clone, Debug, Default)]
+pub(super) struct PeriodicPairs {
+    /// The number of their identification, if the format has such; else 0.
+    pub identification: i64,
+    /// The image, and what it is the image of.
+    pub pairs: Vec<[u32; 2]>,
+}
+
 /// The content of a file.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Raw {
@@ -50,6 +71,8 @@ pub(super) struct Raw {
     pub patch_names: BTreeMap<i64, Vec<String>>,
     /// Elements of higher order, whose corners alone are kept.
     pub higher_order: usize,
+    /// What is periodic.
+    pub periodic: Vec<PeriodicPairs>,
     pub notes: Vec<String>,
 }
 

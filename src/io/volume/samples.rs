@@ -4,7 +4,7 @@ use crate::io::testing::two_tets;
 
 /// `two_tets` for Gmsh 2.2, with ids that have a gap.
 pub(super) const MSH22: &str = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n2\n2 5 \"skin\"\n3 7 \"body a\"\n$EndPhysicalNames\n\
-    $Nodes\n5\n10 0 0 0\n20 1 0 0\n30 0 1 0\n40 0 0 1\n41 1 1 1\n$EndNodes\n$Periodic\nanything\n$EndPeriodic\n\
+    $Nodes\n5\n10 0 0 0\n20 1 0 0\n30 0 1 0\n40 0 0 1\n41 1 1 1\n$EndNodes\n$Comments\nanything\n$EndComments\n\
     $Elements\n10\n1 15 2 0 1 10\n2 1 2 0 1 10 20\n3 2 2 5 1 10 30 20\n4 2 2 5 1 10 20 40\n5 2 2 5 1 10 40 30\n\
     6 2 2 5 1 20 30 41\n7 2 2 5 1 20 41 40\n8 2 2 5 1 30 40 41\n9 4 2 7 1 10 20 30 40\n10 4 4 7 1 1 1 20 30 40 41\n$EndElements\n";
 

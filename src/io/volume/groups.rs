@@ -1,0 +1,141 @@
+//! Physical groups of a Gmsh file: an element may be in several, and a mesh here has one number for each body and boundary.
+
+use super::raw::{Label, Raw};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// The physical groups of the elements of one dimension. While a file is read, the number of a label is that of a set of groups, from 1;
+/// 0 is the empty set.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Groups {
+    /// Names by tag.
+    pub names: BTreeMap<i64, String>,
+    sets: Vec<Vec<i64>>,
+    places: BTreeMap<Vec<i64>, i64>,
+}
+
+impl Groups {
+    /// The number of a set, its tags in the order of the file.
+    pub fn set(&mut self, tags: &[i64]) -> i64 {
+        if tags.is_empty() {
+            return 0;
+        }
+        if let Some(place) = self.places.get(tags) {
+            return *place;
+        }
+        self.sets.push(tags.to_vec());
+        let place = self.sets.len() as i64;
+        self.places.insert(tags.to_vec(), place);
+        place
+    }
+
+    fn tags(&self, set: i64) -> &[i64] {
+        usize::try_from(set - 1).map_or(&[], |place| &self.sets[place])
+    }
+
+    /// Joins the copies of an element that version 2 has for each of its groups.
+    fn join_copies<const N: usize>(&mut self, elements: &mut Vec<[u32; N]>, labels: &mut Vec<Label>) {
+        let mut first_set: BTreeMap<i64, i64> = BTreeMap::new();
+        let mut with_several: BTreeSet<i64> = BTreeSet::new();
+        for label in labels.iter() {
+            if *first_set.entry(label.entity).or_insert(label.number) != label.number {
+                with_several.insert(label.entity);
+            }
+        }
+        if with_several.is_empty() {
+            return;
+        }
+        let key = |k: usize| {
+            let mut corners = elements[k];
+            corners.sort_unstable();
+            (labels[k].entity, corners)
+        };
+        let mut order: Vec<_> = (0..elements.len())
+            .filter(|&k| with_several.contains(&labels[k].entity))
+            .map(|k| (key(k), k))
+            .collect();
+        order.sort_unstable();
+        let mut is_copy = vec![false; elements.len()];
+        for copies in order.chunk_by(|a, b| a.0 == b.0).filter(|copies| copies.len() > 1) {
+            let first = copies[0].1;
+            let mut tags = self.tags(labels[first].number).to_vec();
+            for &(_, k) in &copies[1..] {
+                // An element that is there twice in the same group is no copy of this kind.
+                let more = self.tags(labels[k].number);
+                if more.iter().any(|tag| !tags.contains(tag)) {
+                    tags.extend(more);
+                    is_copy[k] = true;
+                }
+            }
+            labels[first].number = self.set(&tags);
+        }
+        let mut kept = is_copy.iter().map(|is_copy| !is_copy);
+        elements.retain(|_| kept.next() == Some(true));
+        let mut kept = is_copy.iter().map(|is_copy| !is_copy);
+        labels.retain(|_| kept.next() == Some(true));
+    }
+
+    /// Gives a label the number of its body or boundary, and each number its names.
+    ///
+    /// A group alone gives its tag. Of several groups it is the tag of one that no other set has, else a number behind all tags, so that
+    /// different sets have different numbers. Elements in no group have the number 0, but that of their entity if no element is in a group.
+    fn number(
+        &mut self,
+        labels: &mut [Label],
+        kind: &str,
+        notes: &mut Vec<String>,
+    ) -> BTreeMap<i64, Vec<String>> {
+        let used: BTreeSet<i64> = labels.iter().map(|label| label.number).collect();
+        let used: Vec<i64> = used.into_iter().filter(|set| *set != 0).collect();
+        if used.is_empty() {
+            labels.iter_mut().for_each(|label| label.number = label.entity);
+            return BTreeMap::new();
+        }
+        self.name_shared(&used, kind, notes);
+        let mut sets_with: BTreeMap<i64, usize> = BTreeMap::new();
+        used.iter().flat_map(|set| self.tags(*set)).for_each(|tag| *sets_with.entry(*tag).or_default() += 1);
+        let mut next =
+            sets_with.keys().chain(self.names.keys()).copied().max().unwrap_or(0).saturating_add(1);
+        let mut numbers: BTreeMap<i64, i64> = BTreeMap::new();
+        let mut names = BTreeMap::new();
+        for set in used {
+            let tags = self.tags(set);
+            let number = match tags {
+                [tag] => *tag,
+                tags => tags.iter().copied().find(|tag| sets_with[tag] == 1).unwrap_or_else(|| {
+                    next += 1;
+                    next - 1
+                }),
+            };
+            numbers.insert(set, number);
+            names.insert(number, tags.iter().filter_map(|tag| self.names.get(tag).cloned()).collect());
+        }
+        labels
+            .iter_mut()
+            .filter(|label| label.number != 0)
+            .for_each(|label| label.number = numbers[&label.number]);
+        names
+    }
+
+    /// Names groups that have no name but share elements with others: their tag alone could not say both.
+    fn name_shared(&mut self, used: &[i64], kind: &str, notes: &mut Vec<String>) {
+        let shared: BTreeSet<i64> =
+            used.iter().map(|set| self.tags(*set)).filter(|tags| tags.len() > 1).flatten().copied().collect();
+        for tag in shared {
+            if self.names.get(&tag).is_none_or(String::is_empty) {
+                let name = format!("group_{tag}");
+                notes.push(format!(
+                    "the physical group {tag} of {kind} has no name and is not alone on all of them: it is `{name}` here"
+                ));
+                self.names.insert(tag, name);
+            }
+        }
+    }
+}
+
+/// Ends the reading of a file: `groups` are those of triangles and of tets.
+pub(super) fn finish([of_triangles, of_tets]: [&mut Groups; 2], raw: &mut Raw) {
+    of_triangles.join_copies(&mut raw.triangles, &mut raw.triangle_labels);
+    of_tets.join_copies(&mut raw.tets, &mut raw.tet_labels);
+    raw.patch_names = of_triangles.number(&mut raw.triangle_labels, "boundaries", &mut raw.notes);
+    raw.body_names = of_tets.number(&mut raw.tet_labels, "bodies", &mut raw.notes);
+}

@@ -1,0 +1,146 @@
+//! Periodic patches of a file: which patch is the image of which, and by what motion.
+//!
+//! Files pair vertices. A patch is the image of another if the pairs take each of its triangles to one of the other, and the other has as many. The motion
+//! is the rigid one that fits the pairs best. What does not fit is left out, with a note: links of a mesh are
+//! kept by refinement and checked, so none may be taken that is not exact.
+
+use super::raw::PeriodicPairs;
+use crate::Point;
+use crate::io::input::counted;
+use crate::kernel::tree;
+use crate::mesh::{Mesh, VertexId, sorted_face};
+use crate::periodic::{Link, same_place};
+use csg::PatchId;
+use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+
+/// Rotations nearer to none than this angle are none: what fitting leaves of a translation.
+const NO_ROTATION: f64 = 1e-12;
+
+/// The links of a mesh.
+pub(super) fn links(mesh: &Mesh, given: &[PeriodicPairs], notes: &mut Vec<String>) -> Vec<Link> {
+    if given.is_empty() {
+        return Vec::new();
+    }
+    let bounds = tree::bounds(&mesh.points);
+    let distance = same_place(&bounds);
+    let patch_of: HashMap<[VertexId; 3], PatchId> =
+        mesh.triangles.iter().map(|t| (sorted_face(t.vertices), t.patch)).collect();
+    let mut sizes: BTreeMap<PatchId, usize> = BTreeMap::new();
+    mesh.triangles.iter().for_each(|t| *sizes.entry(t.patch).or_default() += 1);
+    let mut links: Vec<(i64, Link)> = Vec::new();
+    let mut left_out = 0;
+    for PeriodicPairs { identification, pairs } in given {
+        let Some(originals) = originals(pairs) else {
+            notes.push("periodic vertices that are images of several at once left out".into());
+            continue;
+        };
+        let patch_pairs = patch_pairs(mesh, &originals, &patch_of);
+        left_out += usize::from(patch_pairs.is_empty());
+        for (image, of) in patch_pairs {
+            let Some(of) = of.filter(|of| sizes[of] == sizes[&image] && *of != image) else {
+                left_out += 1;
+                continue;
+            };
+            let on_image: BTreeSet<VertexId> =
+                mesh.triangles.iter().filter(|t| t.patch == image).flat_map(|t| t.vertices).collect();
+            let pairs: Vec<[Point; 2]> =
+                on_image.iter().map(|v| [*v, originals[v]].map(|v| mesh.points[v.index()])).collect();
+            let motion = fitted(&pairs);
+            let off = pairs.iter().map(|[image, of]| (motion * of - image).norm()).fold(0.0, f64::max);
+            if off > distance {
+                notes.push(format!(
+                    "the periodic boundary around ({}, {}, {}) is no rigid motion of another, by {off:e}: it is not periodic here",
+                    pairs[0][0].x, pairs[0][0].y, pairs[0][0].z
+                ));
+                continue;
+            }
+            links.push((*identification, Link { identification: 0, of, image, motion }));
+        }
+    }
+    if left_out > 0 {
+        notes.push(format!(
+            "{} whose triangles are not those of another: not periodic here",
+            counted(left_out, "periodic surface")
+        ));
+    }
+    numbered(links, distance)
+}
+
+/// By image what it is the image of; `None` if a vertex is the image of two.
+fn originals(pairs: &[[u32; 2]]) -> Option<BTreeMap<VertexId, VertexId>> {
+    let mut originals = BTreeMap::new();
+    for [image, of] in pairs.iter().map(|pair| pair.map(VertexId)) {
+        if originals.insert(image, of).is_some_and(|before| before != of) {
+            return None;
+        }
+    }
+    Some(originals)
+}
+
+/// The patches that have triangles whose vertices are images of those of another triangle, with the patch that all its triangles come from, if
+/// that is one.
+fn patch_pairs(
+    mesh: &Mesh,
+    originals: &BTreeMap<VertexId, VertexId>,
+    patch_of: &HashMap<[VertexId; 3], PatchId>,
+) -> BTreeMap<PatchId, Option<PatchId>> {
+    let mut found: BTreeMap<PatchId, BTreeSet<Option<PatchId>>> = BTreeMap::new();
+    for triangle in &mesh.triangles {
+        let [a, b, c] = triangle.vertices.map(|v| originals.get(&v).copied());
+        let of = match (a, b, c) {
+            (Some(a), Some(b), Some(c)) => patch_of.get(&sorted_face([a, b, c])).copied(),
+            _ => None,
+        };
+        found.entry(triangle.patch).or_default().insert(of);
+    }
+    // Patches that only touch an image have no triangle that is one.
+    let is_image = |of: &BTreeSet<Option<PatchId>>| of.iter().any(Option::is_some);
+    let one =
+        |of: BTreeSet<Option<PatchId>>| if of.len() == 1 { of.into_iter().flatten().next() } else { None };
+    found.into_iter().filter(|(_, of)| is_image(of)).map(|(image, of)| (image, one(of))).collect()
+}
+
+/// The rigid motion that takes the second of each pair nearest to the first (Kabsch 1976).
+fn fitted(pairs: &[[Point; 2]]) -> Isometry3<f64> {
+    let count = pairs.len() as f64;
+    let middle =
+        |k: usize| pairs.iter().fold(nalgebra::Vector3::zeros(), |sum, pair| sum + pair[k].coords / count);
+    let (to, from) = (middle(0), middle(1));
+    let mut covariance = Matrix3::zeros();
+    for [image, of] in pairs {
+        covariance += (image.coords - to) * (of.coords - from).transpose();
+    }
+    let svd = covariance.svd(true, true);
+    let (Some(u), Some(v)) = (svd.u, svd.v_t) else { return Isometry3::identity() };
+    // The vertices of a plane patch leave the last direction open: it is chosen so that nothing is mirrored.
+    let mut turn = Matrix3::identity();
+    turn[(2, 2)] = (u * v).determinant().signum();
+    let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(u * turn * v));
+    let rotation = if rotation.angle() < NO_ROTATION { UnitQuaternion::identity() } else { rotation };
+    Isometry3::from_parts(Translation3::from(to - rotation * from), rotation)
+}
+
+/// Numbers identifications from 1 in their order: links that the file puts together, or leaves without a number, are one if their motions are.
+fn numbered(links: Vec<(i64, Link)>, distance: f64) -> Vec<Link> {
+    let mut kinds: Vec<(i64, Isometry3<f64>)> = Vec::new();
+    let same = |a: &Isometry3<f64>, b: &Isometry3<f64>| {
+        (a.translation.vector - b.translation.vector).norm() <= distance
+            && a.rotation.angle_to(&b.rotation) < 1e-8
+    };
+    let mut numbered: Vec<Link> = Vec::new();
+    for (given, mut link) in links {
+        let kind = kinds.iter().position(|(number, motion)| *number == given && same(motion, &link.motion));
+        let kind = kind.unwrap_or_else(|| {
+            kinds.push((given, link.motion));
+            kinds.len() - 1
+        });
+        // One motion for all of them, as their vertices may be the same.
+        link.motion = kinds[kind].1;
+        link.identification = kind as u32 + 1;
+        numbered.push(link);
+    }
+    numbered.sort_by_key(|link| (link.identification, link.of, link.image));
+    numbered.dedup();
+    numbered
+}
