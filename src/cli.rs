@@ -83,7 +83,7 @@ pub struct SizeOptions {
 #[derive(Args, Debug, Clone)]
 pub struct InputOptions {
     /// A geometry (.geo, NETGEN CSG), surfaces (.stl, .off, .obj, .ply, .poly, .smesh: several become
-    /// several bodies), or a mesh (.msh, .vol, .mesh, .meshb, .vtu, .ele, an Elmer folder), which is taken as it is
+    /// several bodies), or a mesh (.msh, .vol, .mesh, .meshb, .vtu, .pvtu, .ele, an Elmer folder), which is taken as it is
     #[arg(required = true, value_name = "INPUT")]
     pub files: Vec<PathBuf>,
     /// Keep the triangles of surfaces as they are; else they are made anew by the sizes
@@ -103,6 +103,9 @@ pub struct RunOptions {
     /// What to write, with commas between, or none
     #[arg(short, long, value_enum, value_delimiter = ',', default_value = "elmer")]
     pub format: Vec<Format>,
+    /// Where VTU has the triangles on boundaries [default: beside]
+    #[arg(long, value_enum, value_name = "WHERE")]
+    pub boundary: Option<Boundary>,
     /// Write with each part one layer of tets of the parts beside it: as Elmer's halo elements, or VTU's ghosts
     #[arg(long, value_enum, value_name = "BY")]
     pub halo: Option<Halo>,
@@ -208,6 +211,9 @@ pub struct MeshFile {
     /// File to write; its ending names the format: .vtu, .msh (Gmsh 2.2), .mesh (Medit), .vol (NETGEN), .off
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
+    /// Where a .vtu has the triangles on boundaries [default: beside]
+    #[arg(long, value_enum, value_name = "WHERE")]
+    pub boundary: Option<Boundary>,
     /// Sizes of the mesh
     #[command(flatten)]
     pub size: SizeOptions,
@@ -304,7 +310,7 @@ pub struct Check {
 /// `tetmill quality`
 #[derive(Args, Debug)]
 pub struct Quality {
-    /// Meshes: .vtu, .msh (Gmsh), .vol (NETGEN), .mesh or .meshb (Medit), .ele (TetGen), or the folder of an Elmer mesh
+    /// Meshes: .vtu, .pvtu, .msh (Gmsh), .vol (NETGEN), .mesh or .meshb (Medit), .ele (TetGen), or the folder of an Elmer mesh
     #[arg(required = true)]
     pub meshes: Vec<PathBuf>,
     /// As JSON
@@ -333,6 +339,15 @@ pub enum Halo {
     Faces,
     /// Those with a vertex in common with the part
     Vertices,
+}
+
+/// Where VTU files have the triangles on boundaries.
+#[derive(ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Boundary {
+    /// Behind the tets in the same file, with BoundaryId: for meshio and scikit-fem
+    In,
+    /// In files of their own, NAME.boundary.vtu or .pvtu: for ParaView and MFEM
+    Beside,
 }
 
 /// What is written.

@@ -7,7 +7,7 @@ mod write;
 use decompose::cut_settings;
 pub use decompose::run_decompose;
 pub use repartition::run_repartition;
-use write::{read_back, refuse_halo, write_formats};
+use write::{place_of, read_back, refuse_unknown, write_formats};
 
 use crate::cli::{Check, Format, Generate, InputOptions, Inspect, MeshFile, Method, Quality, SizeOptions};
 use std::io::{ErrorKind, Write};
@@ -30,7 +30,7 @@ use tetmill::{picture, quality};
 /// `tetmill generate`
 pub fn run_generate(options: &Generate) -> Result<(), Failure> {
     set_threads(options.run.threads)?;
-    refuse_halo(&options.run)?;
+    refuse_unknown(&options.run)?;
     let start = Instant::now();
     on_ranks(options.ranks, options.parts, |comm| generate_on(comm, options, start))
 }
@@ -330,6 +330,10 @@ pub fn run_mesh(options: &MeshFile) -> Result<(), Failure> {
             io::serial::KNOWN
         )));
     }
+    let is_vtu = options.output.extension().is_some_and(|ending| ending == "vtu");
+    if options.boundary.is_some() && !is_vtu {
+        return Err(Failure::input("--boundary: only VTU has a choice; write a .vtu"));
+    }
     set_threads(options.threads)?;
     let comm = thread::alone();
     let progress = Progress::new(options.quiet, STAGES);
@@ -342,10 +346,13 @@ pub fn run_mesh(options: &MeshFile) -> Result<(), Failure> {
         disk: None,
     };
     let made = generate(&comm, Some(&model), &settings, &progress)?;
-    let written =
-        progress.stage("write", || io::serial::write(made.part.stream(), &made.names, &options.output))?;
-    for loss in io::serial::losses(&made.names, &options.output) {
-        progress.note(&format!("note: {}: {loss}", options.output.display()));
+    let (part, file) = (made.part.stream(), &options.output);
+    let written = progress.stage("write", || match place_of(options.boundary) {
+        place if is_vtu => io::vtu::write_with(&comm, part, &made.names, file, place),
+        _ => io::serial::write(part, &made.names, file),
+    })?;
+    for loss in io::serial::losses(&made.names, file) {
+        progress.note(&format!("note: {}: {loss}", file.display()));
     }
     if let Some(file) = &options.picture {
         draw(&comm, made.part.stream(), options.cut, file)?;

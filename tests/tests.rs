@@ -20,4 +20,5 @@ mod skins;
 mod surfaces;
 mod swept;
 mod tutorials;
+mod vtu_clients;
 mod writers;

@@ -1,6 +1,6 @@
 //! `tetmill repartition`
 
-use super::write::{read_back, refuse_halo, write_formats};
+use super::write::{read_back, refuse_unknown, write_formats};
 use super::{on_ranks, set_threads, show, write_report};
 use crate::cli::{PartitionMethod, Repartition};
 use std::path::{Path, PathBuf};
@@ -21,7 +21,7 @@ const STAGES: u64 = 5;
 pub fn run_repartition(options: &Repartition) -> Result<(), Failure> {
     // First: reading already uses the threads.
     set_threads(options.run.threads)?;
-    refuse_halo(&options.run)?;
+    refuse_unknown(&options.run)?;
     if !mpi::launched() {
         let parts = options.parts.ok_or_else(|| Failure::input("how many parts? say so with -n"))?;
         // Before a thread is started for each.

@@ -1,22 +1,33 @@
 //! Writing a partitioned mesh, and reading it again.
 
-use crate::cli::{Format, Halo, RunOptions};
+use crate::cli::{Boundary, Format, Halo, RunOptions};
 use std::path::Path;
 use tetmill::comm::Communicator;
 use tetmill::error::{Failure, Status, agree};
 use tetmill::halo::{self, By, WithHalo};
-use tetmill::io::{self, Written, elmer};
+use tetmill::io::{self, Written, elmer, vtu};
 use tetmill::mesh::Names;
 use tetmill::mesh::stream::MeshStream;
 use tetmill::progress::Progress;
 use tetmill::report::HaloReport;
 
-/// Formats that have no halo refuse before any work is done.
-pub(super) fn refuse_halo(options: &RunOptions) -> Result<(), Failure> {
+/// Options that no wanted format knows are refused before any work is done.
+pub(super) fn refuse_unknown(options: &RunOptions) -> Result<(), Failure> {
+    if options.boundary.is_some() && !options.format.contains(&Format::Vtu) {
+        return Err(Failure::input("--boundary: only VTU has a choice; add it to --format"));
+    }
     if options.halo.is_some() && options.format.contains(&Format::Geomview) {
         return Err(Failure::input("--halo: the format geomview has no halo elements; write elmer or vtu"));
     }
     Ok(())
+}
+
+/// Where VTU files have the boundary.
+pub(super) fn place_of(boundary: Option<Boundary>) -> vtu::Boundary {
+    match boundary {
+        Some(Boundary::In) => vtu::Boundary::In,
+        Some(Boundary::Beside) | None => vtu::Boundary::Beside,
+    }
 }
 
 /// **Collective.** Writes each format into a folder, with a halo if one is asked for; files of those that do not fill one are called `stem`.
@@ -40,7 +51,7 @@ pub(super) fn write_formats(
     for format in &options.format {
         written += match format {
             Format::Elmer => elmer::write(comm, part, names, dir)?,
-            Format::Vtu => io::vtu::write(comm, part, names, stem)?,
+            Format::Vtu => vtu::write_with(comm, part, names, stem, place_of(options.boundary))?,
             Format::Geomview => io::geomview::write(comm, part, &io::geomview::Settings::default(), stem)?,
             Format::None => Written::default(),
         };

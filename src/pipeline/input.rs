@@ -31,7 +31,7 @@ fn kind(path: &Path) -> Result<Kind, Failure> {
         _ if path.is_dir() => Ok(Kind::Mesh),
         "geo" => Ok(Kind::Csg),
         "stl" | "off" | "obj" | "ply" | "poly" | "smesh" => Ok(Kind::Surface),
-        "vtu" | "msh" | "vol" | "gz" | "mesh" | "meshb" | "ele" | "node" | "face" => Ok(Kind::Mesh),
+        "vtu" | "pvtu" | "msh" | "vol" | "gz" | "mesh" | "meshb" | "ele" | "node" | "face" => Ok(Kind::Mesh),
         _ => Err(Failure::input(format!(
             "cannot tell by its name what {} holds; known are geometries (.geo), surfaces ({}) and meshes ({})",
             path.display(),

@@ -27,6 +27,7 @@ mod medit_binary;
 mod netgen;
 mod orient;
 mod periodic;
+mod pvtu;
 mod raw;
 #[cfg(test)]
 mod samples;
@@ -35,6 +36,8 @@ mod tests;
 mod tetgen;
 mod vtu;
 mod vtu_arrays;
+#[cfg(test)]
+mod vtu_tests;
 
 pub use super::input::{Place, ReadError};
 
@@ -46,7 +49,7 @@ use std::io::Read;
 use std::path::Path;
 
 /// What [`read`] knows.
-pub const KNOWN: &str = ".vtu, .msh (Gmsh), .vol and .vol.gz (NETGEN), .mesh and .meshb (Medit), \
+pub const KNOWN: &str = ".vtu, .pvtu, .msh (Gmsh), .vol and .vol.gz (NETGEN), .mesh and .meshb (Medit), \
     .ele, .node and .face (TetGen), and the folder of an Elmer mesh";
 
 /// A tetrahedral mesh of others.
@@ -77,6 +80,7 @@ pub fn read(path: &Path) -> Result<VolumeMesh, ReadError> {
     }
     let parse: fn(&[u8]) -> Result<Raw, Fault> = match ending(path).as_str() {
         "vtu" => return vtu::read(path),
+        "pvtu" => return pvtu::read(path),
         "ele" | "node" | "face" => return tetgen::read(path),
         "gz" if ending(Path::new(path.file_stem().unwrap_or_default())) == "vol" => {
             let content = load(path)?;

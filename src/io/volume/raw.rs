@@ -55,6 +55,9 @@ pub(super) struct PeriodicPairs {
     pub pairs: Vec<[u32; 2]>,
 }
 
+/// Names of bodies or boundaries by number.
+pub(super) type NamesByNumber = BTreeMap<i64, Vec<String>>;
+
 /// The content of a file.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Raw {
@@ -66,9 +69,9 @@ pub(super) struct Raw {
     pub edges: Vec<[u32; 2]>,
     pub edge_labels: Vec<i64>,
     /// Names of bodies by number.
-    pub body_names: BTreeMap<i64, Vec<String>>,
+    pub body_names: NamesByNumber,
     /// Names of boundaries by number.
-    pub patch_names: BTreeMap<i64, Vec<String>>,
+    pub patch_names: NamesByNumber,
     /// Elements of higher order, whose corners alone are kept.
     pub higher_order: usize,
     /// What is periodic.
@@ -104,6 +107,20 @@ impl Raw {
         };
         self.higher_order += usize::from(nodes.len() > corners);
         Ok(())
+    }
+
+    /// Adds names that are not there yet.
+    pub fn add_names(&mut self, [bodies, patches]: [NamesByNumber; 2]) {
+        for (names, more) in [(&mut self.body_names, bodies), (&mut self.patch_names, patches)] {
+            for (number, more) in more {
+                let names: &mut Vec<String> = names.entry(number).or_default();
+                for name in more {
+                    if !names.contains(&name) {
+                        names.push(name);
+                    }
+                }
+            }
+        }
     }
 }
 

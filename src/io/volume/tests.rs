@@ -95,6 +95,7 @@ fn what_our_writers_write_reads_back_the_same() {
     }
     let found = written(&mesh, &names, "m.vtu");
     assert_same(&found.mesh, &mesh);
+    assert_eq!(found.names, names);
     assert!(found.notes.is_empty(), "{:?}", found.notes);
 }
 

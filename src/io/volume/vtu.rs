@@ -1,8 +1,9 @@
 //! VTK's XML files of unstructured grids with one piece: tets, and triangles on their boundary.
 //!
 //! Arrays may be text, base64 (inline or appended) or raw, and compressed by zlib. Bodies and boundaries are told by
-//! the first known array of cells, see [`LABELS`]. Cells that `vtkGhostType` calls copies are left out. Our own files keep the boundary in a second one, `STEM.boundary.vtu`,
-//! which is read with the first.
+//! the first known array of cells, see [`LABELS`]; boundaries by `BoundaryId` if there is one. Cells that `vtkGhostType` calls copies are left out.
+//! Our own files name bodies and boundaries in `FieldData`, and keep the boundary in a second file, `STEM.boundary.vtu`, unless asked otherwise;
+//! it is read with the first.
 
 use super::raw::{Label, Raw, Shape};
 use super::vtu_arrays::{Document, Section};
@@ -29,13 +30,25 @@ pub(super) fn read(path: &Path) -> Result<VolumeMesh, ReadError> {
     finish(Ok(raw.raw), path, &content)
 }
 
-/// A file's mesh, and the ids of its vertices in the whole mesh, if it has such.
-struct Grid {
-    raw: Raw,
-    vertex_ids: Vec<i64>,
+/// A file's mesh, and the ids of its vertices and tets in the whole mesh, if it has such.
+#[derive(Default)]
+pub(super) struct Grid {
+    pub raw: Raw,
+    pub vertex_ids: Vec<i64>,
+    pub tet_ids: Vec<i64>,
 }
 
-fn parse(content: &[u8]) -> Result<Grid, Fault> {
+/// The numbers of cells in the first of these arrays that there is.
+fn labels(document: &Document, names: &[&str], cells: usize) -> Result<Option<Vec<i64>>, Fault> {
+    let array = names.iter().find_map(|name| document.array(Section::CellData, Some(name)));
+    let labels = array.map(|array| array.ints()).transpose()?;
+    if labels.as_ref().is_some_and(|labels| labels.len() != cells) {
+        return Err(Fault::file("the numbers of bodies are not as many as the cells"));
+    }
+    Ok(labels)
+}
+
+pub(super) fn parse(content: &[u8]) -> Result<Grid, Fault> {
     let document = Document::read(content)?;
     let coordinates = document.required(Section::Points, None)?.floats()?;
     let (points, rest) = coordinates.as_chunks::<3>();
@@ -51,11 +64,11 @@ fn parse(content: &[u8]) -> Result<Grid, Fault> {
     if offsets.len() != types.len() {
         return Err(Fault::file(format!("{} offsets and {} types of cells", offsets.len(), types.len())));
     }
-    let label = LABELS.iter().find_map(|name| document.array(Section::CellData, Some(name)));
-    let labels = label.map(|array| array.ints()).transpose()?;
-    if labels.as_ref().is_some_and(|labels| labels.len() != types.len()) {
-        return Err(Fault::file("the numbers of bodies are not as many as the cells"));
-    }
+    let of_tets = labels(&document, &LABELS, types.len())?;
+    let of_triangles = labels(&document, &["BoundaryId"], types.len())?;
+    let of_triangles = of_triangles.as_ref().or(of_tets.as_ref());
+    let ids = document.ids(Section::CellData, "GlobalElementId")?;
+    let mut tet_ids = Vec::new();
     let copies =
         document.array(Section::CellData, Some("vtkGhostType")).map(|array| array.ints()).transpose()?;
     let is_copy =
@@ -82,13 +95,19 @@ fn parse(content: &[u8]) -> Result<Grid, Fault> {
                 ))
             })?);
         }
-        let label = Label::number(labels.as_ref().map_or(0, |labels| labels[cell]));
+        let labels = if shape(kind) == Shape::Triangle { of_triangles } else { of_tets.as_ref() };
+        let label = Label::number(labels.map_or(0, |labels| labels[cell]));
         raw.add(shape(kind), &nodes, label)
             .map_err(|message| Fault::file(format!("cell {cell} is {message}")))?;
+        tet_ids.extend(ids.get(cell).filter(|_| shape(kind) == Shape::Tet));
     }
-    let ids = document.array(Section::PointData, Some("GlobalNodeId"));
-    let vertex_ids = ids.map(|array| array.ints()).transpose()?.unwrap_or_default();
-    Ok(Grid { raw, vertex_ids })
+    raw.add_names(document.names()?);
+    if document.array(Section::PointData, Some("PeriodicId")).is_some() {
+        raw.notes.push(
+            "the pairs of periodic vertices (PeriodicId) are left out: the mesh is not periodic here".into(),
+        );
+    }
+    Ok(Grid { raw, vertex_ids: document.ids(Section::PointData, "GlobalNodeId")?, tet_ids })
 }
 
 /// By VTK's numbers of cell types.
@@ -107,7 +126,7 @@ fn shape(kind: i64) -> Shape {
 }
 
 /// Adds the triangles of a file of their own, whose vertices are told by their ids.
-fn add_boundary(grid: &mut Grid, boundary: Grid) -> Result<(), Fault> {
+pub(super) fn add_boundary(grid: &mut Grid, boundary: Grid) -> Result<(), Fault> {
     let places: BTreeMap<i64, u32> = grid.vertex_ids.iter().copied().zip(0..).collect();
     let to_place = |&v: &u32| {
         let id = boundary.vertex_ids.get(v as usize);
@@ -123,5 +142,6 @@ fn add_boundary(grid: &mut Grid, boundary: Grid) -> Result<(), Fault> {
         grid.raw.triangles.push(vertices);
         grid.raw.triangle_labels.push(*label);
     }
+    grid.raw.add_names([boundary.raw.body_names, boundary.raw.patch_names]);
     Ok(())
 }

@@ -2,6 +2,7 @@
 //!
 //! The tags are read by hand: a file with raw appended data is no well-formed XML.
 
+use super::raw::NamesByNumber;
 use crate::io::input::{Bytes, Fault, Words, shown};
 use std::io::Read;
 
@@ -12,7 +13,13 @@ pub(super) enum Section {
     Cells,
     PointData,
     CellData,
+    FieldData,
 }
+
+/// How a comment begins that holds fields: MFEM's reader accepts them nowhere else (see `io::vtu`).
+const HIDDEN_FIELDS: &[u8] = b"<!-- <FieldData>";
+/// What the names of our fields begin with, those of bodies and those of boundaries.
+const NAMES: [&str; 2] = ["Body ", "Boundary "];
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Format {
@@ -47,18 +54,27 @@ struct Frame<'a> {
 }
 
 /// A file's arrays.
-pub(super) struct Document<'a>(Vec<Array<'a>>);
+pub(super) struct Document<'a> {
+    arrays: Vec<Array<'a>>,
+    /// The names of arrays that are the global ids of points and of cells, as the sections say.
+    global_ids: Vec<(Section, String)>,
+}
 
 /// A tag: name and attributes, and where its text ends.
-struct Tag<'a> {
-    name: &'a str,
+pub(super) struct Tag<'a> {
+    pub name: &'a str,
     attributes: &'a str,
-    begin: usize,
-    end: usize,
+    pub begin: usize,
+    pub end: usize,
 }
 
 impl Tag<'_> {
-    fn attribute(&self, name: &str) -> Option<&str> {
+    /// The text of an attribute.
+    pub fn text(&self, name: &str) -> Option<String> {
+        self.attribute(name).map(unescaped)
+    }
+
+    pub fn attribute(&self, name: &str) -> Option<&str> {
         let mut rest = self.attributes;
         while let Some((before, after)) = rest.split_once('=') {
             let quote = after.trim_start().chars().next().filter(|c| *c == '"' || *c == '\'')?;
@@ -72,10 +88,51 @@ impl Tag<'_> {
     }
 }
 
-/// The next tag from an offset on; declarations and comments are skipped.
-fn next_tag(content: &[u8], mut at: usize) -> Option<Tag<'_>> {
+/// The characters that a text of XML stands for. What is no reference stays.
+fn unescaped(text: &str) -> String {
+    let mut plain = String::with_capacity(text.len());
+    let mut rest = text;
+    while let Some((before, after)) = rest.split_once('&') {
+        plain.push_str(before);
+        let reference = after.split_once(';').and_then(|(name, behind)| Some((character(name)?, behind)));
+        match reference {
+            Some((c, behind)) => {
+                plain.push(c);
+                rest = behind;
+            }
+            None => {
+                plain.push('&');
+                rest = after;
+            }
+        }
+    }
+    plain + rest
+}
+
+/// What `&name;` stands for.
+fn character(name: &str) -> Option<char> {
+    let code = |digits: &str, radix| u32::from_str_radix(digits, radix).ok().and_then(char::from_u32);
+    match name {
+        "amp" => Some('&'),
+        "lt" => Some('<'),
+        "gt" => Some('>'),
+        "quot" => Some('"'),
+        "apos" => Some('\''),
+        _ => match name.strip_prefix('#')? {
+            digits if digits.starts_with(['x', 'X']) => code(&digits[1..], 16),
+            digits => code(digits, 10),
+        },
+    }
+}
+
+/// The next tag from an offset on; declarations and comments are skipped, but for fields in a comment.
+pub(super) fn next_tag(content: &[u8], mut at: usize) -> Option<Tag<'_>> {
     loop {
         let begin = at + content[at..].iter().position(|&b| b == b'<')?;
+        if content[begin..].starts_with(HIDDEN_FIELDS) {
+            at = begin + 1;
+            continue;
+        }
         if content[begin..].starts_with(b"<!--") {
             at = begin + content[begin..].windows(3).position(|w| w == b"-->")? + 3;
             continue;
@@ -97,6 +154,7 @@ impl<'a> Document<'a> {
         let mut frame = Frame { content, ..Frame::default() };
         let mut arrays: Vec<Array> = Vec::new();
         let mut section = None;
+        let mut global_ids = Vec::new();
         let (mut at, mut pieces, mut is_vtk) = (0, 0, false);
         while let Some(tag) = next_tag(content, at) {
             at = tag.end;
@@ -113,11 +171,19 @@ impl<'a> Document<'a> {
                 }
                 "Points" => section = Some(Section::Points),
                 "Cells" => section = Some(Section::Cells),
-                "PointData" => section = Some(Section::PointData),
-                "CellData" => section = Some(Section::CellData),
-                "/Points" | "/Cells" | "/PointData" | "/CellData" => section = None,
+                "PointData" | "CellData" => {
+                    let of = if tag.name == "CellData" { Section::CellData } else { Section::PointData };
+                    global_ids.extend(tag.text("GlobalIds").map(|name| (of, name)));
+                    section = Some(of);
+                }
+                "FieldData" => section = Some(Section::FieldData),
+                "/Points" | "/Cells" | "/PointData" | "/CellData" | "/FieldData" => section = None,
                 "DataArray" => {
                     let Some(section) = section else { continue };
+                    let is_ours = |name: &str| NAMES.iter().any(|kind| name.starts_with(kind));
+                    if section == Section::FieldData && !tag.attribute("Name").is_some_and(is_ours) {
+                        continue;
+                    }
                     let inline = &content[tag.end..];
                     let inline = &inline[..inline.iter().position(|&b| b == b'<').unwrap_or(inline.len())];
                     arrays.push(Array::of(&tag, section, inline, frame)?);
@@ -139,12 +205,34 @@ impl<'a> Document<'a> {
             ));
         }
         arrays.iter_mut().for_each(|array| array.frame.appended = frame.appended);
-        Ok(Self(arrays))
+        Ok(Self { arrays, global_ids })
+    }
+
+    /// The global ids of points or cells: the array that the section calls so, or one of this name.
+    pub fn ids(&self, section: Section, name: &str) -> Result<Vec<i64>, Fault> {
+        let told = self.global_ids.iter().find(|(of, _)| *of == section).map(|(_, name)| name.as_str());
+        let array = told.and_then(|name| self.array(section, Some(name)));
+        let array = array.or_else(|| self.array(section, Some(name)));
+        array.map_or(Ok(Vec::new()), Array::ints)
+    }
+
+    /// The names of bodies and boundaries that our fields tell.
+    pub fn names(&self) -> Result<[NamesByNumber; 2], Fault> {
+        let mut names = [NamesByNumber::new(), NamesByNumber::new()];
+        for array in self.arrays.iter().filter(|array| array.section == Section::FieldData) {
+            for (prefix, names) in NAMES.iter().zip(&mut names) {
+                let Some(name) = array.name.strip_prefix(prefix) else { continue };
+                for number in array.ints()? {
+                    names.entry(number).or_default().push(name.to_string());
+                }
+            }
+        }
+        Ok(names)
     }
 
     /// The array of this name, or the first one of its section.
     pub fn array(&self, section: Section, name: Option<&str>) -> Option<&Array<'a>> {
-        self.0.iter().find(|a| a.section == section && name.is_none_or(|name| a.name == name))
+        self.arrays.iter().find(|a| a.section == section && name.is_none_or(|name| a.name == name))
     }
 
     /// The same, which must be there.
@@ -155,10 +243,16 @@ impl<'a> Document<'a> {
     }
 }
 
-fn header<'a>(tag: &Tag, frame: Frame<'a>) -> Result<Frame<'a>, Fault> {
-    if let Some(kind) = tag.attribute("type").filter(|kind| *kind != "UnstructuredGrid") {
-        return Err(Fault::text(tag.begin, format!("a VTK file of type {kind}; UnstructuredGrid is needed")));
+/// Refuses a file of another type.
+pub(super) fn check_type(tag: &Tag, wanted: &str) -> Result<(), Fault> {
+    match tag.attribute("type").filter(|kind| *kind != wanted) {
+        Some(kind) => Err(Fault::text(tag.begin, format!("a VTK file of type {kind}; {wanted} is needed"))),
+        None => Ok(()),
     }
+}
+
+fn header<'a>(tag: &Tag, frame: Frame<'a>) -> Result<Frame<'a>, Fault> {
+    check_type(tag, "UnstructuredGrid")?;
     let compressed = match tag.attribute("compressor") {
         None | Some("") => false,
         Some("vtkZLibDataCompressor") => true,
@@ -188,7 +282,7 @@ impl<'a> Array<'a> {
                 return Err(wrong(format!("the format `{}` of an array is not known", other.unwrap_or(""))));
             }
         };
-        let name = tag.attribute("Name").unwrap_or_default().to_string();
+        let name = tag.text("Name").unwrap_or_default();
         let kind = tag.attribute("type").unwrap_or_default().to_string();
         Ok(Self { section, name, kind, format, inline, frame })
     }

@@ -85,8 +85,15 @@ pub(super) struct Piece {
     pub attributes: Vec<(Section, &'static str)>,
     /// Numbers by name that hold for the whole file: what bodies and boundaries are called.
     pub fields: Vec<(String, Vec<u32>)>,
+    /// Whether the fields are in a comment. MFEM's reader accepts nothing beside the piece, before it or behind it; VTK and meshio
+    /// accept fields nowhere else.
+    pub hides_fields: bool,
 }
 
+/// VTK's number for a tet.
+const VTK_TETRA: u64 = 10;
+/// VTK's number for a triangle.
+const VTK_TRIANGLE: u64 = 5;
 /// Each array begins with its length in bytes.
 const LENGTH: u64 = 8;
 const END: &str = "\n </AppendedData>\n</VTKFile>\n";
@@ -100,20 +107,27 @@ pub(super) fn file_tag(kind: &str) -> String {
     )
 }
 
-/// A text as the value of an attribute.
+/// A text as the value of an attribute. Control characters have no place in XML.
 pub(super) fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('"', "&quot;")
+    let text = text.replace(char::is_control, "_").replace('&', "&amp;").replace('"', "&quot;");
+    text.replace('<', "&lt;").replace('>', "&gt;")
 }
 
 impl Piece {
-    /// The points and cells that each piece has: `per_cell` vertices a cell, in numbers of 32 bits where they fit.
-    pub fn new(points: u64, cells: u64, per_cell: u64) -> Self {
-        let fits = points.max(cells * per_cell) <= i32::MAX as u64;
-        let id = if fits { Kind::I32 } else { Kind::I64 };
-        let mut piece =
-            Self { points, cells, arrays: Vec::new(), attributes: Vec::new(), fields: Vec::new() };
+    /// The points and cells that each piece has: tets, and triangles behind them. Their vertices are numbers of 32 bits where they fit.
+    pub fn new(points: u64, tets: u64, triangles: u64) -> Self {
+        let (cells, corners) = (tets + triangles, 4 * tets + 3 * triangles);
+        let id = if points.max(corners) <= i32::MAX as u64 { Kind::I32 } else { Kind::I64 };
+        let mut piece = Self {
+            points,
+            cells,
+            arrays: Vec::new(),
+            attributes: Vec::new(),
+            fields: Vec::new(),
+            hides_fields: false,
+        };
         piece.add(Section::Points, "Points", Kind::F64, 3 * points);
-        piece.add(Section::Cells, "connectivity", id, cells * per_cell);
+        piece.add(Section::Cells, "connectivity", id, corners);
         piece.add(Section::Cells, "offsets", id, cells);
         piece.add(Section::Cells, "types", Kind::U8, cells);
         piece
@@ -132,12 +146,12 @@ impl Piece {
         }
     }
 
-    /// All that comes before the arrays.
-    fn head(&self) -> String {
-        let mut text = file_tag("UnstructuredGrid") + " <UnstructuredGrid>\n";
-        if !self.fields.is_empty() {
-            text += "  <FieldData>\n";
+    /// The fields as text.
+    fn field_data(&self) -> String {
+        if self.fields.is_empty() {
+            return String::new();
         }
+        let mut text = String::new();
         for (name, numbers) in &self.fields {
             let (name, count) = (escaped(name), numbers.len());
             let values: Vec<String> = numbers.iter().map(u32::to_string).collect();
@@ -146,9 +160,17 @@ impl Piece {
                 values.join(" ")
             );
         }
-        if !self.fields.is_empty() {
-            text += "  </FieldData>\n";
+        let text = format!("<FieldData>\n{text}  </FieldData>");
+        if self.hides_fields {
+            // Two hyphens would end the comment.
+            return format!("  <!-- {} -->\n", text.replace("--", "-&#45;"));
         }
+        format!("  {text}\n")
+    }
+
+    /// All that comes before the arrays.
+    fn head(&self) -> String {
+        let mut text = file_tag("UnstructuredGrid") + " <UnstructuredGrid>\n" + &self.field_data();
         text += &format!("  <Piece NumberOfPoints=\"{}\" NumberOfCells=\"{}\">\n", self.points, self.cells);
         let mut offset = 0;
         self.for_each_section(|section, attributes, arrays| {
@@ -196,19 +218,28 @@ pub(super) struct PieceFile<'a> {
 impl PieceFile<'_> {
     /// The array of this name, ready to be written from its beginning. Where points and cells have one each, that of the points.
     pub fn array(&self, name: &str) -> Result<(Output, Kind), WriteError> {
-        self.array_where(|array| array.name == name)
+        self.array_from(name, 0)
     }
 
-    /// The array of cells of this name, ready to be written from its beginning.
-    pub fn cell_array(&self, name: &str) -> Result<(Output, Kind), WriteError> {
-        self.array_where(|array| array.section == Section::CellData && array.name == name)
+    /// The same, ready to be written behind its first numbers.
+    pub fn array_from(&self, name: &str, numbers: u64) -> Result<(Output, Kind), WriteError> {
+        let place = self.piece.arrays.iter().position(|array| array.name == name);
+        self.array_at(place.expect("an array of the piece"), numbers)
     }
 
-    fn array_where(&self, wanted: impl Fn(&Array) -> bool) -> Result<(Output, Kind), WriteError> {
+    /// The array of cells of this name, ready to be written from its beginning, if there is one.
+    pub fn cell_array(&self, name: &str) -> Result<Option<(Output, Kind)>, WriteError> {
+        let is_it = |array: &Array| array.section == Section::CellData && array.name == name;
+        let place = self.piece.arrays.iter().position(is_it);
+        place.map(|place| self.array_at(place, 0)).transpose()
+    }
+
+    fn array_at(&self, place: usize, numbers: u64) -> Result<(Output, Kind), WriteError> {
         let arrays = &self.piece.arrays;
-        let place = arrays.iter().position(wanted).expect("an array of the piece");
         let before: u64 = arrays[..place].iter().map(|array| LENGTH + array.bytes()).sum();
-        Ok((Output::at(&self.path, self.head + before + LENGTH)?, arrays[place].kind))
+        let kind = arrays[place].kind;
+        let offset = self.head + before + LENGTH + numbers * kind.bytes();
+        Ok((Output::at(&self.path, offset)?, kind))
     }
 
     /// Fills an array with one number per cell.
@@ -231,10 +262,11 @@ impl PieceFile<'_> {
         })
     }
 
-    /// Fills what cells of one type with so many vertices have in common.
-    pub fn fill_cells(&self, per_cell: u64, vtk_type: u64) -> Result<(), WriteError> {
-        self.fill("offsets", |cell| (cell + 1) * per_cell)?;
-        self.fill("types", |_| vtk_type)
+    /// Fills where each cell ends and what it is: so many tets, then triangles.
+    pub fn fill_cells(&self, tets: u64) -> Result<(), WriteError> {
+        let end = |count: u64| 4 * count.min(tets) + 3 * count.saturating_sub(tets);
+        self.fill("offsets", |cell| end(cell + 1))?;
+        self.fill("types", |cell| if cell < tets { VTK_TETRA } else { VTK_TRIANGLE })
     }
 
     /// Waits until all is on the disk; returns the length.

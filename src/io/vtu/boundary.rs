@@ -6,8 +6,6 @@ use crate::mesh::Names;
 use crate::mesh::stream::{BoundaryBlock, MeshStream, NO_TET};
 use std::path::Path;
 
-/// VTK's number for a triangle.
-const VTK_TRIANGLE: u64 = 5;
 /// A vertex that no triangle uses.
 const UNUSED: u32 = u32::MAX;
 
@@ -43,7 +41,7 @@ impl Surface {
 
     /// The arrays of the triangles.
     pub fn piece(&self) -> Piece {
-        let mut piece = Piece::new(self.vertices, self.triangles, 3);
+        let mut piece = Piece::new(self.vertices, 0, self.triangles);
         piece.add(Section::PointData, "GlobalNodeId", Kind::I64, self.vertices);
         piece.add(Section::CellData, "BoundaryId", Kind::I32, self.triangles);
         piece.add(Section::CellData, "PartitionId", Kind::I32, self.triangles);
@@ -78,25 +76,48 @@ impl Surface {
         file.array("GlobalNodeId")?.0.write(&ids)?;
 
         let (mut connectivity, id) = file.array("connectivity")?;
-        let (mut triangles, mut numbers, mut ghosts) = (Vec::new(), Vec::new(), Vec::new());
+        let triangles = Triangles::of(part, names, id, |v| self.to_surface[v as usize].into())?;
+        connectivity.write(&triangles.connectivity)?;
+        file.fill("BoundaryId", |cell| triangles.numbers[cell as usize].into())?;
+        if self.several_parts {
+            file.array("vtkGhostType")?.0.write(&triangles.copies)?;
+        }
+        file.fill("PartitionId", |_| u64::from(part.rank()) + 1)?;
+        file.fill_cells(0)?;
+        file.finish()
+    }
+}
+
+/// The triangles on patches, as a file has them.
+pub(super) struct Triangles {
+    /// Their vertices in binary.
+    pub connectivity: Vec<u8>,
+    /// Their boundary numbers.
+    pub numbers: Vec<u32>,
+    /// 1 for those that another part has too, and counts.
+    pub copies: Vec<u8>,
+}
+
+impl Triangles {
+    /// Of a part; `vertex` numbers the vertices from their local indices.
+    pub fn of(
+        part: &dyn MeshStream,
+        names: &Names,
+        kind: Kind,
+        vertex: impl Fn(u32) -> u64,
+    ) -> Result<Self, WriteError> {
+        let mut triangles = Self { connectivity: Vec::new(), numbers: Vec::new(), copies: Vec::new() };
         let mut block = BoundaryBlock::default();
         for index in 0..part.boundary_blocks() {
             part.boundary_block(index, &mut block);
-            let number = patch_number(block.patch, names)?;
-            for (triangle, parents) in block.triangles.iter().zip(&block.parents) {
-                triangle.iter().for_each(|&v| id.push(self.to_surface[v as usize].into(), &mut triangles));
-                Kind::I32.push(number, &mut numbers);
+            let number = patch_number(block.patch, names)? as u32;
+            for (corners, parents) in block.triangles.iter().zip(&block.parents) {
+                corners.iter().for_each(|&v| kind.push(vertex(v), &mut triangles.connectivity));
+                triangles.numbers.push(number);
                 // An outer patch has its body behind it: with nothing behind, the other part has this triangle too.
-                ghosts.push(u8::from(parents[0] == NO_TET));
+                triangles.copies.push(u8::from(parents[0] == NO_TET));
             }
         }
-        connectivity.write(&triangles)?;
-        file.array("BoundaryId")?.0.write(&numbers)?;
-        if self.several_parts {
-            file.array("vtkGhostType")?.0.write(&ghosts)?;
-        }
-        file.fill("PartitionId", |_| u64::from(part.rank()) + 1)?;
-        file.fill_cells(3, VTK_TRIANGLE)?;
-        file.finish()
+        Ok(triangles)
     }
 }

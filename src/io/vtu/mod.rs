@@ -11,8 +11,12 @@
 //! triangles                 BoundaryId  PartitionId  vtkGhostType (1 on the second copy of an interface triangle)
 //! fields   one for each name, `Body NAME` or `Boundary NAME`: the numbers that have it
 //! ```
+//! With [`Boundary::In`] the triangles are behind the tets, in the same files: `BodyId`, `BoundaryId` and `PartitionId` of all cells, 0
+//! where a number does not apply, and -1 for the `GlobalElementId` of triangles. MFEM reads `STEM.vtu` of one part without triangles: for its reader
+//! there is a copy `material` of `BodyId`, and the fields of this file are in a comment (those of `STEM.boundary.vtu` are not).
+//!
 //! The ids are the canonical ones, from 0, the same for every number of parts; `PartitionId` counts from 1, as
-//! Elmer's file names do. Tets and triangles stand in files of their own, so that a surface drawn from the tets
+//! Elmer's file names do. Tets and triangles are in files of their own unless asked otherwise, so that a surface drawn from the tets
 //! does not hide the triangles.
 
 mod arrays;
@@ -31,6 +35,16 @@ use std::fs;
 use std::io;
 use std::path::Path;
 
+/// Where the triangles on patches are.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Boundary {
+    /// In files of their own, beside those of the tets.
+    #[default]
+    Beside,
+    /// In the files of the tets, behind these.
+    In,
+}
+
 /// **Collective.** Writes the part of each rank and, with several, the files that list them. `stem` may end in
 /// `.vtu` or `.pvtu`. Each rank gets the sums over all ranks.
 ///
@@ -42,18 +56,34 @@ pub fn write(
     names: &Names,
     stem: &Path,
 ) -> Result<Written, WriteError> {
+    write_with(comm, part, names, stem, Boundary::Beside)
+}
+
+/// **Collective.** The same, with the triangles where they are wanted.
+///
+/// # Errors
+/// Those of [`write()`].
+pub fn write_with(
+    comm: &dyn Communicator,
+    part: &dyn MeshStream,
+    names: &Names,
+    stem: &Path,
+    boundary: Boundary,
+) -> Result<Written, WriteError> {
     let (folder, name) = folder_and_name(stem)?;
     let name = name.to_str().ok_or_else(|| {
         WriteError::io(stem)(io::Error::new(io::ErrorKind::InvalidInput, "the name is not in Unicode"))
     })?;
     let name = [".pvtu", ".vtu"].iter().find_map(|end| name.strip_suffix(end)).unwrap_or(name);
 
-    let mut tets = volume::piece(part);
-    let surface = boundary::Surface::of(part);
-    let mut triangles = surface.piece();
-    tets.fields = numbers_by_name("Body", &names.bodies);
-    triangles.fields = numbers_by_name("Boundary", &names.patches);
-    let needed = tets.bytes() + triangles.bytes();
+    let mut tets = volume::piece(part, boundary);
+    let surface = (boundary == Boundary::Beside).then(|| boundary::Surface::of(part));
+    let mut triangles = surface.as_ref().map(boundary::Surface::piece);
+    let (of_bodies, of_boundaries) =
+        (numbers_by_name("Body", &names.bodies), numbers_by_name("Boundary", &names.patches));
+    tets.fields.clone_from(&of_bodies);
+    triangles.as_mut().unwrap_or(&mut tets).fields = [of_bodies, of_boundaries].concat();
+    let needed = tets.bytes() + triangles.as_ref().map_or(0, Piece::bytes);
     let written = write_together(comm, &folder, needed, is_part_file, |stage| {
         let [tets_path, triangles_path] = if part.ranks() == 1 {
             [format!("{name}.vtu"), format!("{name}.boundary.vtu")]
@@ -62,14 +92,17 @@ pub fn write(
             fs::create_dir_all(&folder).map_err(WriteError::io(&folder))?;
             ["part", "boundary"].map(|kind| piece_path(name, kind, part.rank() + 1))
         };
-        let mut written = Written { files: 2, bytes: 0 };
-        written.bytes += volume::write(&tets, part, names, &stage.join(tets_path))?;
-        written.bytes += surface.write(&triangles, part, names, &stage.join(triangles_path))?;
+        let mut written =
+            Written { files: 1, bytes: volume::write(&tets, part, names, &stage.join(tets_path))? };
+        if let (Some(surface), Some(triangles)) = (&surface, &triangles) {
+            let bytes = surface.write(triangles, part, names, &stage.join(triangles_path))?;
+            written += Written { files: 1, bytes };
+        }
         if part.ranks() > 1 && part.rank() == 0 {
             let layers = u32::from(part.ghosts().is_some());
-            for (piece, end, kind, layers) in
-                [(&tets, "", "part", layers), (&triangles, ".boundary", "boundary", 0)]
-            {
+            let of_tets = Some((&tets, "", "part", layers));
+            let of_triangles = triangles.as_ref().map(|piece| (piece, ".boundary", "boundary", 0));
+            for (piece, end, kind, layers) in of_tets.into_iter().chain(of_triangles) {
                 let text = list_of_pieces(piece, part.ranks(), name, kind, layers);
                 let bytes = write_text(&stage.join(format!("{name}{end}.pvtu")), text.as_bytes())?;
                 written += Written { files: 1, bytes };
@@ -80,18 +113,29 @@ pub fn write(
     sum_written(comm, written)
 }
 
-/// For each name the numbers that have it, both ascending.
+/// For each name the numbers that have it, ascending. The names of a number are in the order of its label, as far as labels agree: its main
+/// name comes back as the main one.
 fn numbers_by_name(kind: &str, list: &[Label]) -> Vec<(String, Vec<u32>)> {
     let mut by_name: BTreeMap<&str, BTreeSet<u32>> = BTreeMap::new();
+    // Which names come before a name in some label.
+    let mut before: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
     for label in list {
-        for name in &label.names {
+        for (k, name) in label.names.iter().enumerate() {
             by_name.entry(name).or_default().insert(label.number);
+            before.entry(name).or_default().extend(label.names[..k].iter().map(String::as_str));
         }
     }
-    by_name
-        .into_iter()
-        .map(|(name, numbers)| (format!("{kind} {name}"), numbers.into_iter().collect()))
-        .collect()
+    let mut fields = Vec::with_capacity(by_name.len());
+    while !before.is_empty() {
+        let is_first =
+            |name: &&str| before[*name].iter().all(|other| other == name || !before.contains_key(other));
+        // Labels that contradict each other have no first name: any will do.
+        let next = before.keys().copied().find(|name| is_first(name)).or(before.keys().copied().next());
+        let next = next.expect("a name is left");
+        before.remove(next);
+        fields.push((format!("{kind} {next}"), by_name[next].iter().copied().collect()));
+    }
+    fields
 }
 
 fn piece_path(name: &str, kind: &str, number: u32) -> String {

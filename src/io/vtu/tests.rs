@@ -63,10 +63,10 @@ fn two_tets_are_written_to_the_letter() {
     let bytes = fs::read(dir.path().join("m.vtu")).unwrap();
     let head = "<?xml version=\"1.0\"?>\n\
         <VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\">\n \
-        <UnstructuredGrid>\n  <FieldData>\n   \
+        <UnstructuredGrid>\n  <!-- <FieldData>\n   \
         <DataArray type=\"Int32\" Name=\"Body lower\" NumberOfTuples=\"1\" format=\"ascii\">1</DataArray>\n   \
         <DataArray type=\"Int32\" Name=\"Body upper\" NumberOfTuples=\"1\" format=\"ascii\">2</DataArray>\n  \
-        </FieldData>\n  <Piece NumberOfPoints=\"5\" NumberOfCells=\"2\">\n   \
+        </FieldData> -->\n  <Piece NumberOfPoints=\"5\" NumberOfCells=\"2\">\n   \
         <Points>\n    \
         <DataArray type=\"Float64\" Name=\"Points\" NumberOfComponents=\"3\" format=\"appended\" offset=\"0\"/>\n   \
         </Points>\n   <Cells>\n    \
@@ -75,13 +75,14 @@ fn two_tets_are_written_to_the_letter() {
         <DataArray type=\"UInt8\" Name=\"types\" format=\"appended\" offset=\"184\"/>\n   \
         </Cells>\n   <PointData GlobalIds=\"GlobalNodeId\">\n    \
         <DataArray type=\"Int64\" Name=\"GlobalNodeId\" format=\"appended\" offset=\"194\"/>\n   \
-        </PointData>\n   <CellData GlobalIds=\"GlobalElementId\">\n    \
-        <DataArray type=\"Int64\" Name=\"GlobalElementId\" format=\"appended\" offset=\"242\"/>\n    \
-        <DataArray type=\"Int32\" Name=\"BodyId\" format=\"appended\" offset=\"266\"/>\n    \
-        <DataArray type=\"Int32\" Name=\"PartitionId\" format=\"appended\" offset=\"282\"/>\n   \
+        </PointData>\n   <CellData Scalars=\"material\" GlobalIds=\"GlobalElementId\">\n    \
+        <DataArray type=\"Int32\" Name=\"material\" format=\"appended\" offset=\"242\"/>\n    \
+        <DataArray type=\"Int64\" Name=\"GlobalElementId\" format=\"appended\" offset=\"258\"/>\n    \
+        <DataArray type=\"Int32\" Name=\"BodyId\" format=\"appended\" offset=\"282\"/>\n    \
+        <DataArray type=\"Int32\" Name=\"PartitionId\" format=\"appended\" offset=\"298\"/>\n   \
         </CellData>\n  </Piece>\n </UnstructuredGrid>\n <AppendedData encoding=\"raw\">\n_";
     assert_eq!(String::from_utf8_lossy(&bytes[..head.len()]), head);
-    assert_eq!(bytes.len(), head.len() + 282 + 16 + "\n </AppendedData>\n</VTKFile>\n".len());
+    assert_eq!(bytes.len(), head.len() + 298 + 16 + "\n </AppendedData>\n</VTKFile>\n".len());
     let tets = arrays(&dir.path().join("m.vtu"));
     assert_eq!(tets["Points"][3..9], [1., 0., 0., 0., 1., 0.]);
     assert_eq!(tets["connectivity"], [0., 1., 2., 3., 1., 2., 3., 4.]);
@@ -89,7 +90,7 @@ fn two_tets_are_written_to_the_letter() {
     assert_eq!(tets["types"], [10., 10.]);
     assert_eq!(tets["GlobalNodeId"], [0., 1., 2., 3., 4.]);
     assert_eq!(tets["GlobalElementId"], [0., 1.]);
-    assert_eq!((&tets["BodyId"], &tets["PartitionId"]), (&vec![1., 1.], &vec![1., 1.]));
+    assert_eq!([&tets["BodyId"], &tets["material"], &tets["PartitionId"]], [&vec![1., 1.]; 3]);
     let triangles = arrays(&dir.path().join("m.boundary.vtu"));
     assert_eq!(triangles["connectivity"][..6], [0., 2., 1., 0., 1., 3.]);
     assert_eq!(triangles["offsets"], [3., 6., 9., 12., 15., 18.]);
@@ -174,4 +175,71 @@ fn ghosts_are_told_from_the_tets_of_a_part_and_name_their_owner() {
     }
     let list = fs::read_to_string(dir.path().join("m.pvtu")).unwrap();
     assert!(list.contains("GhostLevel=\"1\""), "{list}");
+}
+
+#[test]
+#[cfg(target_endian = "little")]
+fn triangles_stand_behind_the_tets_of_the_same_file_if_wanted() {
+    let dir = tempfile::tempdir().unwrap();
+    let mesh = two_tets();
+    write_with(
+        &crate::comm::thread::alone(),
+        &PlainPart::whole(&mesh),
+        &names(),
+        &dir.path().join("m.vtu"),
+        Boundary::In,
+    )
+    .unwrap();
+    let cells = arrays(&dir.path().join("m.vtu"));
+    assert_eq!(cells["connectivity"][..14], [0., 1., 2., 3., 1., 2., 3., 4., 0., 2., 1., 0., 1., 3.]);
+    assert_eq!(cells["offsets"], [4., 8., 11., 14., 17., 20., 23., 26.]);
+    assert_eq!(cells["types"], [10., 10., 5., 5., 5., 5., 5., 5.]);
+    assert_eq!(cells["BodyId"], [1., 1., 0., 0., 0., 0., 0., 0.]);
+    assert_eq!(cells["BoundaryId"], [0., 0., 1., 1., 1., 2., 2., 2.]);
+    assert_eq!(cells["PartitionId"], [1.; 8]);
+    assert_eq!(cells["GlobalElementId"], [0., 1., -1., -1., -1., -1., -1., -1.]);
+    assert!(!dir.path().join("m.boundary.vtu").exists());
+    let text = fs::read(dir.path().join("m.vtu")).unwrap();
+    let text = String::from_utf8_lossy(&text);
+    assert!(
+        text.contains("\n  <FieldData>\n") && text.contains("Name=\"Boundary lid\""),
+        "fields are no comment"
+    );
+}
+
+#[test]
+#[cfg(target_endian = "little")]
+fn copies_of_triangles_in_mixed_files_are_marked() {
+    let dir = tempfile::tempdir().unwrap();
+    let mesh = cube(4);
+    together(3, |comm| {
+        let part = PlainPart::part(&mesh, &scattered(&mesh, 3), 3, comm.rank());
+        write_with(comm, &part, &names(), &dir.path().join("m"), Boundary::In).unwrap();
+    });
+    let mut counts = [0; 4];
+    for part in 1..=3 {
+        let cells = arrays(&dir.path().join(format!("m.parts/part.{part}.vtu")));
+        for (number, copy) in cells["BoundaryId"].iter().zip(&cells["vtkGhostType of cells"]) {
+            counts[*number as usize] += usize::from(*copy == 0.0);
+        }
+        assert!(
+            cells["BodyId"].iter().zip(&cells["types"]).all(|(body, kind)| (*body > 0.0) == (*kind == 10.0))
+        );
+    }
+    assert_eq!(counts, [384, 96, 96, 32]);
+    assert!(!dir.path().join("m.boundary.pvtu").exists());
+}
+
+#[test]
+fn the_main_name_of_each_number_comes_first() {
+    let label =
+        |number, names: &[&str]| Label { number, names: names.iter().map(|n| n.to_string()).collect() };
+    let list =
+        [label(1, &["wall"]), label(2, &["inlet", "wall"]), label(3, &["a", "inlet", "all"]), label(2, &[])];
+    let fields = numbers_by_name("Boundary", &list);
+    let names: Vec<&str> = fields.iter().map(|(name, _)| name.as_str()).collect();
+    assert_eq!(names, ["Boundary a", "Boundary inlet", "Boundary all", "Boundary wall"]);
+    assert_eq!(fields[3].1, [1, 2]);
+    let contrary = [label(1, &["a", "b"]), label(2, &["b", "a"])];
+    assert_eq!(numbers_by_name("Body", &contrary).len(), 2);
 }

@@ -1,40 +1,62 @@
-//! The tets of a part.
+//! The tets of a part, and behind them its triangles if they are wanted in the same file.
 
+use super::Boundary;
 use super::arrays::{Kind, Piece, PieceFile, Section};
+use super::boundary::Triangles;
 use crate::io::chunks::{items, split, write_chunks};
 use crate::io::{WriteError, body_number};
 use crate::mesh::Names;
 use crate::mesh::stream::{MeshStream, TetBlock};
 use std::path::Path;
 
-/// VTK's number for a tet.
-const VTK_TETRA: u64 = 10;
 /// VTK's name for what tells copies (1) from originals (0), of points as of cells.
 const GHOST_TYPE: &str = "vtkGhostType";
+/// MFEM's name for the numbers of bodies.
+const MATERIAL: &str = "material";
+/// What triangles have for an id: -1.
+const NO_ID: u64 = u64::MAX;
 /// Tets or vertices that one thread turns to bytes at a time.
 const PER_CHUNK: u64 = 1 << 14;
 
-/// The arrays of a part's tets.
-pub(super) fn piece(part: &dyn MeshStream) -> Piece {
+/// The arrays of a part's tets, and of its triangles with [`Boundary::In`].
+///
+/// MFEM takes the first array of cells for the attributes of elements, if `Scalars` says that it is called `material`.
+pub(super) fn piece(part: &dyn MeshStream, boundary: Boundary) -> Piece {
     let counts = part.counts();
-    let mut piece = Piece::new(counts.vertices, counts.tets, 4);
+    let (mixed, several) = (boundary == Boundary::In, part.ranks() > 1);
+    let mut piece = Piece::new(counts.vertices, counts.tets, if mixed { counts.boundary } else { 0 });
+    piece.attributes = vec![(Section::PointData, " GlobalIds=\"GlobalNodeId\"")];
     piece.add(Section::PointData, "GlobalNodeId", Kind::I64, counts.vertices);
-    if part.ranks() > 1 {
+    if several {
         piece.add(Section::PointData, GHOST_TYPE, Kind::U8, counts.vertices);
     }
     if !part.links().is_empty() {
         piece.add(Section::PointData, "PeriodicId", Kind::I64, counts.vertices);
     }
-    piece.add(Section::CellData, "GlobalElementId", Kind::I64, counts.tets);
-    piece.add(Section::CellData, "BodyId", Kind::I32, counts.tets);
-    piece.add(Section::CellData, "PartitionId", Kind::I32, counts.tets);
-    if part.ghosts().is_some() {
-        piece.add(Section::CellData, GHOST_TYPE, Kind::U8, counts.tets);
+    // MFEM reads files of one part with tets alone.
+    let for_mfem = !mixed && !several;
+    piece.hides_fields = for_mfem;
+    // Triangles have no ids, so that those in a mixed file are none of all cells.
+    let attributes = match (for_mfem, mixed) {
+        (true, _) => " Scalars=\"material\" GlobalIds=\"GlobalElementId\"",
+        (false, false) => " GlobalIds=\"GlobalElementId\"",
+        (false, true) => "",
+    };
+    piece.attributes.push((Section::CellData, attributes));
+    let cells = piece.cells;
+    let mut add = |name, kind| piece.add(Section::CellData, name, kind, cells);
+    if for_mfem {
+        add(MATERIAL, Kind::I32);
     }
-    piece.attributes = vec![
-        (Section::PointData, " GlobalIds=\"GlobalNodeId\""),
-        (Section::CellData, " GlobalIds=\"GlobalElementId\""),
-    ];
+    add("GlobalElementId", Kind::I64);
+    add("BodyId", Kind::I32);
+    if mixed {
+        add("BoundaryId", Kind::I32);
+    }
+    add("PartitionId", Kind::I32);
+    if part.ghosts().is_some() || (mixed && several) {
+        add(GHOST_TYPE, Kind::U8);
+    }
     piece
 }
 
@@ -55,29 +77,7 @@ pub(super) fn write(
         Ok(())
     })?;
 
-    let (mut connectivity, id) = file.array("connectivity")?;
-    let files = [&mut connectivity, &mut file.array("GlobalElementId")?.0, &mut file.array("BodyId")?.0];
-    let (chunks, per_chunk) = split(part.tet_blocks(), part.counts().tets, PER_CHUNK);
-    write_chunks(files, chunks, |chunk, [connectivity, ids, bodies]| {
-        let mut block = TetBlock::default();
-        for index in items(chunk, per_chunk, part.tet_blocks()) {
-            part.tet_block(index, &mut block);
-            let body = body_number(block.body, names)?;
-            for (tet, global) in block.tets.iter().zip(block.first_id..) {
-                tet.iter().for_each(|&v| id.push(v.into(), connectivity));
-                Kind::I64.push(global, ids);
-                Kind::I32.push(body, bodies);
-            }
-        }
-        Ok(())
-    })?;
-    file.fill_cells(4, VTK_TETRA)?;
-    let ghost = |tet: u64| part.ghosts().and_then(|ghosts| ghosts.tet(tet));
-    let owner = |tet: u64| ghost(tet).map_or(part.rank(), |ghost| ghost.owner);
-    file.fill("PartitionId", |tet| u64::from(owner(tet)) + 1)?;
-    if part.ghosts().is_some() {
-        file.fill_array(file.cell_array(GHOST_TYPE)?, |tet| u64::from(ghost(tet).is_some()))?;
-    }
+    write_cells(&file, part, names)?;
 
     let (chunks, per_chunk) = (vertex_chunks, vertices_per_chunk);
     write_chunks([&mut file.array("GlobalNodeId")?.0], chunks, |chunk, [ids]| {
@@ -100,6 +100,80 @@ pub(super) fn write(
         })?;
     }
     file.finish()
+}
+
+/// Writes all arrays of cells: of tets while they are streamed, of triangles from memory, where there is room for them.
+fn write_cells(file: &PieceFile, part: &dyn MeshStream, names: &Names) -> Result<(), WriteError> {
+    let tets = part.counts().tets;
+    write_tets(file, part, names)?;
+    file.fill_cells(tets)?;
+    // Triangles are none.
+    let ghost = |cell: u64| part.ghosts().filter(|_| cell < tets)?.tet(cell);
+    let owner = |cell: u64| ghost(cell).map_or(part.rank(), |ghost| ghost.owner);
+    file.fill("PartitionId", |cell| u64::from(owner(cell)) + 1)?;
+
+    let mixed = file.cell_array("BoundaryId")?.is_some();
+    let copies = if mixed { write_triangles(file, part, names)? } else { Vec::new() };
+    if let Some(array) = file.cell_array(GHOST_TYPE)? {
+        let copy = |triangle: u64| copies[triangle as usize].into();
+        file.fill_array(array, |cell| cell.checked_sub(tets).map_or(ghost(cell).is_some().into(), copy))?;
+    }
+    Ok(())
+}
+
+/// Writes the vertices of tets, their ids and their bodies.
+fn write_tets(file: &PieceFile, part: &dyn MeshStream, names: &Names) -> Result<(), WriteError> {
+    let (mut connectivity, id) = file.array("connectivity")?;
+    let (mut ids, mut bodies) = (file.array("GlobalElementId")?.0, file.array("BodyId")?.0);
+    let (chunks, per_chunk) = split(part.tet_blocks(), part.counts().tets, PER_CHUNK);
+    let format = |chunk: usize, connectivity: &mut Vec<u8>, ids: &mut Vec<u8>, bodies: &mut Vec<u8>| {
+        let mut block = TetBlock::default();
+        for index in items(chunk, per_chunk, part.tet_blocks()) {
+            part.tet_block(index, &mut block);
+            let body = body_number(block.body, names)?;
+            for (tet, global) in block.tets.iter().zip(block.first_id..) {
+                tet.iter().for_each(|&v| id.push(v.into(), connectivity));
+                Kind::I64.push(global, ids);
+                Kind::I32.push(body, bodies);
+            }
+        }
+        Ok(())
+    };
+    match file.cell_array(MATERIAL)? {
+        Some((mut materials, _)) => {
+            let files = [&mut connectivity, &mut ids, &mut bodies, &mut materials];
+            write_chunks(files, chunks, |chunk, [connectivity, ids, bodies, materials]| {
+                format(chunk, connectivity, ids, bodies)?;
+                materials.extend_from_slice(bodies);
+                Ok(())
+            })
+        }
+        None => {
+            let files = [&mut connectivity, &mut ids, &mut bodies];
+            write_chunks(files, chunks, |chunk, [connectivity, ids, bodies]| {
+                format(chunk, connectivity, ids, bodies)
+            })
+        }
+    }
+}
+
+/// Writes what triangles behind the tets have of their own; returns which of them are copies.
+fn write_triangles(file: &PieceFile, part: &dyn MeshStream, names: &Names) -> Result<Vec<u8>, WriteError> {
+    let counts = part.counts();
+    let (mut connectivity, id) = file.array_from("connectivity", 4 * counts.tets)?;
+    let triangles = Triangles::of(part, names, id, u64::from)?;
+    connectivity.write(&triangles.connectivity)?;
+    let (mut bodies, kind) = file.array_from("BodyId", counts.tets)?;
+    let mut none = Vec::new();
+    (0..counts.boundary).for_each(|_| kind.push(0, &mut none));
+    bodies.write(&none)?;
+    let (mut ids, kind) = file.array_from("GlobalElementId", counts.tets)?;
+    none.clear();
+    (0..counts.boundary).for_each(|_| kind.push(NO_ID, &mut none));
+    ids.write(&none)?;
+    let number = |triangle: u64| triangles.numbers[triangle as usize].into();
+    file.fill("BoundaryId", |cell| cell.checked_sub(counts.tets).map_or(0, number))?;
+    Ok(triangles.copies)
 }
 
 /// For each vertex the id of the vertex that it is, at the end, the periodic image of; its own if it is none.

@@ -1,0 +1,172 @@
+//! VTU files in the programs that read them: MFEM, meshio, scikit-fem. Without their Python modules a test is skipped, aloud.
+
+use crate::common::{own, succeed, tetmill};
+use std::path::Path;
+use std::process::Command;
+
+/// Runs a Python program in a folder; false if a module is missing.
+fn python(modules: &[&str], program: &str, folder: &Path) -> bool {
+    for module in modules {
+        let found = Command::new("python3").args(["-c", &format!("import {module}")]).output();
+        if !found.is_ok_and(|output| output.status.success()) {
+            eprintln!("SKIPPED: there is no Python module {module}");
+            return false;
+        }
+    }
+    succeed(Command::new("python3").args(["-c", program]).current_dir(folder));
+    true
+}
+
+/// Bodies substrate (1), film (2) and cover (3), with interfaces: volumes 16, 3.2 and 16.
+fn layers(folder: &Path, file: &str, more: &[&str]) {
+    succeed(tetmill().arg("mesh").arg(own("layers")).arg("-o").arg(folder.join(file)).args(more).arg("-q"));
+}
+
+/// Volumes and areas of meshio's cells by number.
+const MEASURES: &str = "
+import meshio
+import numpy as np
+def volumes(mesh, numbers):
+    cells = mesh.cells_dict['tetra']
+    a, b, c, d = (mesh.points[cells[:, k]] for k in range(4))
+    each = np.einsum('ij,ij->i', np.cross(b - a, c - a), d - a) / 6
+    return {int(n): each[numbers == n].sum() for n in np.unique(numbers)}
+def areas(mesh, numbers):
+    cells = mesh.cells_dict['triangle']
+    a, b, c = (mesh.points[cells[:, k]] for k in range(3))
+    each = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
+    return {int(n): each[numbers == n].sum() for n in np.unique(numbers)}
+def same(found, expected):
+    assert found.keys() == expected.keys(), (found, expected)
+    assert all(abs(found[n] - expected[n]) < 1e-9 for n in found), (found, expected)
+";
+
+#[test]
+fn mfem_reads_bodies_as_attributes() {
+    let dir = tempfile::tempdir().unwrap();
+    layers(dir.path(), "m.vtu", &[]);
+    let program = "
+import mfem.ser as mfem
+mesh = mfem.Mesh('m.vtu')
+assert mesh.attributes.ToList() == [1, 2, 3], mesh.attributes.ToList()
+volumes = {n: 0 for n in (1, 2, 3)}
+for k in range(mesh.GetNE()):
+    volumes[mesh.GetAttribute(k)] += mesh.GetElementVolume(k)
+assert abs(volumes[1] - 16) < 1e-9 and abs(volumes[2] - 3.2) < 1e-9, volumes
+assert mesh.GetNBE() > 0 and mesh.CheckElementOrientation(False) == 0
+";
+    python(&["mfem.ser"], program, dir.path());
+}
+
+#[test]
+fn meshio_reads_the_boundary_in_the_file_and_beside_it() {
+    let dir = tempfile::tempdir().unwrap();
+    layers(dir.path(), "beside.vtu", &[]);
+    layers(dir.path(), "in.vtu", &["--boundary", "in"]);
+    assert!(dir.path().join("beside.boundary.vtu").exists() && !dir.path().join("in.boundary.vtu").exists());
+    let program = MEASURES.to_string()
+        + "
+beside, skin, both = (meshio.read(name) for name in ('beside.vtu', 'beside.boundary.vtu', 'in.vtu'))
+data = both.cell_data_dict
+same(volumes(both, data['BodyId']['tetra']), {1: 16, 2: 3.2, 3: 16})
+same(volumes(beside, beside.cell_data_dict['BodyId']['tetra']), {1: 16, 2: 3.2, 3: 16})
+expected = areas(skin, skin.cell_data_dict['BoundaryId']['triangle'])
+# Outside 2 (16 + 16 * 2.2) - 2 * 16 and two interfaces of 16.
+assert abs(sum(expected.values()) - (32 + 16 * 2.2 + 32)) < 1e-9, expected
+same(areas(both, data['BoundaryId']['triangle']), expected)
+assert not data['BodyId']['triangle'].any() and not data['BoundaryId']['tetra'].any()
+assert (data['PartitionId']['triangle'] == 1).all() and (data['PartitionId']['tetra'] == 1).all()
+for mesh in (skin, both):
+    assert list(mesh.field_data['Body film']) == [2], mesh.field_data
+";
+    python(&["meshio"], &program, dir.path());
+}
+
+#[test]
+fn scikit_fem_loads_the_file_with_its_boundaries() {
+    let dir = tempfile::tempdir().unwrap();
+    layers(dir.path(), "in.vtu", &["--boundary", "in"]);
+    let program = "
+import meshio, skfem
+from skfem.io.meshio import from_meshio
+mesh = skfem.MeshTet.load('in.vtu')
+assert mesh.is_valid() and abs(skfem.Basis(mesh, skfem.ElementTetP1()).dx.sum() - 35.2) < 1e-9
+read = meshio.read('in.vtu')
+read.cell_data_to_sets('BoundaryId')
+read.cell_data_to_sets('BodyId')
+mesh = from_meshio(read)
+film = mesh.subdomains['set-BodyId-2']
+assert abs(skfem.Basis(mesh, skfem.ElementTetP1(), elements=film).dx.sum() - 3.2) < 1e-9
+sides = [facets for name, facets in mesh.boundaries.items() if name.startswith('set-BoundaryId-')]
+area = sum(skfem.FacetBasis(mesh, skfem.ElementTetP1(), facets=facets).dx.sum() for facets in sides)
+assert len(sides) > 3 and abs(area - 99.2) < 1e-9, area
+";
+    python(&["meshio", "skfem"], program, dir.path());
+}
+
+#[test]
+fn parts_come_back_as_the_mesh_that_they_were() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().join("out");
+    let generate = |more: &[&str]| {
+        succeed(
+            tetmill()
+                .arg("generate")
+                .arg(own("layers"))
+                .args(["-n", "3", "-f", "vtu", "-q", "-o"])
+                .arg(&out)
+                .args(more),
+        );
+    };
+    let quality = |file: &str| {
+        let output = succeed(tetmill().args(["quality", "--json"]).arg(out.join(file)));
+        let mut told: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        told["meshes"][0].take()
+    };
+    generate(&[]);
+    let beside = quality("layers.pvtu");
+    generate(&["--boundary", "in", "--halo", "faces"]);
+    std::fs::remove_file(out.join("layers.boundary.pvtu")).unwrap();
+    let both = quality("layers.pvtu");
+    assert_eq!(beside["tets"], both["tets"]);
+    // Taken as an input, the parts are the mesh again: names, and each triangle once.
+    let again = dir.path().join("again.vtu");
+    let output = succeed(tetmill().arg("mesh").arg(out.join("layers.pvtu")).arg("-o").arg(&again));
+    assert!(
+        !String::from_utf8_lossy(&output.stderr).contains("left out"),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    let text = std::fs::read(&again).unwrap();
+    let text = String::from_utf8_lossy(&text);
+    for name in ["substrate", "film", "cover"] {
+        assert!(text.contains(&format!("Name=\"Body {name}\"")), "{name}");
+    }
+    layers(dir.path(), "whole.vtu", &[]);
+    let measured = MEASURES.to_string()
+        + "
+again, whole = (meshio.read(name + '.boundary.vtu') for name in ('again', 'whole'))
+number = lambda mesh: mesh.cell_data_dict['BoundaryId']['triangle']
+same(areas(again, number(again)), areas(whole, number(whole)))
+";
+    python(&["meshio"], &measured, dir.path());
+}
+
+#[test]
+fn the_place_of_the_boundary_is_refused_for_other_formats() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().join("m.msh");
+    let refused = |command: &mut Command| {
+        let output = command.output().unwrap();
+        assert_eq!(output.status.code(), Some(2));
+        assert!(String::from_utf8_lossy(&output.stderr).contains("--boundary: only VTU"));
+    };
+    refused(tetmill().arg("mesh").arg(own("layers")).args(["--boundary", "in", "-o"]).arg(&out));
+    refused(
+        tetmill()
+            .arg("generate")
+            .arg(own("layers"))
+            .args(["--boundary", "in", "-f", "elmer", "-o"])
+            .arg(&out),
+    );
+}
