@@ -357,6 +357,12 @@ pub enum Format {
     Elmer,
     /// VTK: one .vtu for each part and a .pvtu
     Vtu,
+    /// Gmsh 2.2, DIR/NAME.msh: all parts in one file
+    Msh,
+    /// Medit, DIR/NAME.mesh: all parts in one file
+    Medit,
+    /// NETGEN, DIR/NAME.vol: all parts in one file
+    Vol,
     /// Geomview OFF: the boundary, one colour for each part
     Geomview,
     /// Nothing

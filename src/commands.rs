@@ -208,15 +208,20 @@ fn disk_for(formats: &[Format], folder: &Path) -> Disk {
     let bytes = |format: &Format| match format {
         Format::Elmer => [60, 40, 40],
         Format::Vtu => [32, 40, 20],
+        Format::Msh => [65, 60, 50],
+        Format::Medit => [60, 40, 30],
+        Format::Vol => [58, 40, 42],
         Format::Geomview => [0, 0, 30],
         Format::None => [0; 3],
     };
+    let has_short_ids =
+        |format: &Format| matches!(format, Format::Elmer | Format::Msh | Format::Medit | Format::Vol);
     let sum = |sum: [u64; 3], more: [u64; 3]| [0, 1, 2].map(|k| sum[k] + more[k]);
     Disk {
         folder: std::path::absolute(folder).unwrap_or_else(|_| folder.to_path_buf()),
         bytes: formats.iter().map(bytes).fold([0; 3], sum),
-        // Elmer's ids are 32-bit integers.
-        most: formats.contains(&Format::Elmer).then_some(i32::MAX as u64),
+        // The ids of all but VTU are 32-bit integers.
+        most: formats.iter().any(has_short_ids).then_some(i32::MAX as u64),
     }
 }
 

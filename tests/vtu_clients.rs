@@ -1,4 +1,5 @@
-//! VTU files in the programs that read them: MFEM, meshio, scikit-fem. Without their Python modules a test is skipped, aloud.
+//! VTU files, and files of all parts, in the programs that read them: MFEM, meshio, scikit-fem, Gmsh, NGSolve. Without their Python modules a
+//! test is skipped, aloud.
 
 use crate::common::{own, succeed, tetmill};
 use std::path::Path;
@@ -169,4 +170,81 @@ fn the_place_of_the_boundary_is_refused_for_other_formats() {
             .args(["--boundary", "in", "-f", "elmer", "-o"])
             .arg(&out),
     );
+}
+
+#[test]
+fn files_of_seven_ranks_are_the_mesh_that_one_rank_writes() {
+    let dir = tempfile::tempdir().unwrap();
+    for ranks in ["1", "7"] {
+        let mut command = tetmill();
+        command.arg("generate").arg(own("layers")).args([
+            "-n",
+            ranks,
+            "--levels",
+            "1",
+            "-f",
+            "msh,medit,vol",
+            "-q",
+            "-o",
+        ]);
+        succeed(command.arg(dir.path().join(ranks)));
+        for file in ["layers.msh", "layers.mesh", "layers.vol"] {
+            assert!(dir.path().join(ranks).join(file).exists(), "{file}");
+        }
+    }
+    let meshio = MEASURES.to_string()
+        + "
+for file, key in (('layers.msh', 'gmsh:physical'), ('layers.mesh', 'medit:ref')):
+    one, seven = (meshio.read(ranks + '/' + file) for ranks in '17')
+    assert len(one.points) == len(seven.points)
+    for mesh in (one, seven):
+        same(volumes(mesh, mesh.cell_data_dict[key]['tetra']), {1: 16, 2: 3.2, 3: 16})
+    same(*(areas(mesh, mesh.cell_data_dict[key]['triangle']) for mesh in (one, seven)))
+    counts = [{kind: len(cells) for kind, cells in mesh.cells_dict.items()} for mesh in (one, seven)]
+    assert counts[0] == counts[1], counts
+    names = [sorted(mesh.field_data) for mesh in (one, seven)]
+    assert names[0] == names[1] and (file.endswith('.mesh') or 'film' in names[0]), names
+";
+    python(&["meshio"], &meshio, dir.path());
+    let gmsh = "
+import gmsh
+import numpy as np
+gmsh.initialize()
+gmsh.option.setNumber('General.Terminal', 0)
+def measured(file):
+    gmsh.open(file)
+    tags, points, _ = gmsh.model.mesh.getNodes()
+    place = dict(zip(tags, points.reshape(-1, 3)))
+    found = {'nodes': len(tags)}
+    for dimension, tag in gmsh.model.getPhysicalGroups():
+        name = gmsh.model.getPhysicalName(dimension, tag)
+        total = 0
+        for entity in gmsh.model.getEntitiesForPhysicalGroup(dimension, tag):
+            for nodes in gmsh.model.mesh.getElements(dimension, entity)[2]:
+                for corners in nodes.reshape(-1, dimension + 1):
+                    a, *others = (place[v] for v in corners)
+                    edges = [b - a for b in others]
+                    total += np.linalg.det(edges) / 6 if dimension == 3 else np.linalg.norm(np.cross(*edges)) / 2
+        found[dimension, tag, name] = total
+    return found
+one, seven = measured('1/layers.msh'), measured('7/layers.msh')
+assert one.keys() == seven.keys() and len(one) > 6, (one, seven)
+assert all(abs(one[key] - seven[key]) < 1e-9 for key in one), (one, seven)
+assert any(key[0] == 3 and key[2] == 'film' and abs(one[key] - 3.2) < 1e-9 for key in one if key != 'nodes'), one
+";
+    python(&["gmsh"], gmsh, dir.path());
+    let ngsolve = "
+from ngsolve import CF, BND, Integrate, Mesh
+def measured(file):
+    mesh = Mesh(file)
+    volumes = {name: Integrate(CF(1), mesh.Materials(name)) for name in mesh.GetMaterials()}
+    areas = {name: Integrate(CF(1), mesh.Boundaries(name)) for name in mesh.GetBoundaries()}
+    return mesh.nv, mesh.ne, mesh.GetNE(BND), volumes, areas
+one, seven = measured('1/layers.vol'), measured('7/layers.vol')
+assert one[:3] == seven[:3], (one, seven)
+for a, b in zip(one[3:], seven[3:]):
+    assert a.keys() == b.keys() and all(abs(a[key] - b[key]) < 1e-9 for key in a), (a, b)
+assert abs(seven[3]['film'] - 3.2) < 1e-9, seven
+";
+    python(&["ngsolve"], ngsolve, dir.path());
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 use tetmill::comm::Communicator;
 use tetmill::error::{Failure, Status, agree};
 use tetmill::halo::{self, By, WithHalo};
-use tetmill::io::{self, Written, elmer, vtu};
+use tetmill::io::{self, Written, elmer, serial, vtu};
 use tetmill::mesh::Names;
 use tetmill::mesh::stream::MeshStream;
 use tetmill::progress::Progress;
@@ -16,10 +16,15 @@ pub(super) fn refuse_unknown(options: &RunOptions) -> Result<(), Failure> {
     if options.boundary.is_some() && !options.format.contains(&Format::Vtu) {
         return Err(Failure::input("--boundary: only VTU has a choice; add it to --format"));
     }
-    if options.halo.is_some() && options.format.contains(&Format::Geomview) {
-        return Err(Failure::input("--halo: the format geomview has no halo elements; write elmer or vtu"));
+    let has_halo = |format: &&Format| matches!(format, Format::Elmer | Format::Vtu | Format::None);
+    let without = options.format.iter().find(|format| !has_halo(format));
+    match without.filter(|_| options.halo.is_some()) {
+        Some(format) => Err(Failure::input(format!(
+            "--halo: the format {} has no halo elements; write elmer or vtu",
+            format!("{format:?}").to_lowercase()
+        ))),
+        None => Ok(()),
     }
-    Ok(())
 }
 
 /// Where VTU files have the boundary.
@@ -47,11 +52,20 @@ pub(super) fn write_formats(
     let told = ghosts.as_ref().map(|(by, ghosts)| HaloReport::new(comm, *by, ghosts)).transpose()?;
     let with_halo = ghosts.as_ref().map(|(_, ghosts)| WithHalo::new(part, ghosts));
     let part: &dyn MeshStream = with_halo.as_ref().map_or(part, |with_halo| with_halo);
+    let joined = |ending: &str| {
+        // Names may have points in them.
+        let mut file = stem.as_os_str().to_os_string();
+        file.push(ending);
+        serial::write_joined(comm, part, names, Path::new(&file))
+    };
     let mut written = Written::default();
     for format in &options.format {
         written += match format {
             Format::Elmer => elmer::write(comm, part, names, dir)?,
             Format::Vtu => vtu::write_with(comm, part, names, stem, place_of(options.boundary))?,
+            Format::Msh => joined(".msh")?,
+            Format::Medit => joined(".mesh")?,
+            Format::Vol => joined(".vol")?,
             Format::Geomview => io::geomview::write(comm, part, &io::geomview::Settings::default(), stem)?,
             Format::None => Written::default(),
         };

@@ -38,6 +38,8 @@ pub struct TetLine<'a> {
 pub struct TriangleLine<'a> {
     /// Its place among the triangles that the part writes.
     pub index: u64,
+    /// The bodies of the part's tets behind it and in front of it.
+    pub bodies: [Option<BodyId>; 2],
     /// Its patch.
     pub patch: PatchId,
     /// The boundary number of the patch.
@@ -48,10 +50,11 @@ pub struct TriangleLine<'a> {
     pub parents: &'a [u64; 2],
 }
 
-/// Appends a line for each vertex.
+/// Appends a line for each vertex whose local index `keep` accepts.
 pub fn vertices(
     part: &dyn MeshStream,
     file: &mut Output,
+    keep: impl Fn(usize) -> bool + Sync,
     format: impl Fn(&mut Line, VertexLine) + Sync,
 ) -> Result<(), WriteError> {
     let blocks = part.vertex_blocks();
@@ -60,7 +63,7 @@ pub fn vertices(
         let mut line = Line::default();
         for block in items(chunk, per_chunk, blocks) {
             let first = part.vertex_block(block).local.start as usize;
-            for (index, point) in (first..).zip(part.vertex_points(block).iter()) {
+            for (index, point) in (first..).zip(part.vertex_points(block).iter()).filter(|v| keep(v.0)) {
                 format(&mut line, VertexLine { index, point });
                 line.end(text);
             }
@@ -114,7 +117,8 @@ pub(crate) fn triangles(
             if left_out.contains(place - 1) {
                 continue;
             }
-            format(&mut line, TriangleLine { index, patch, number, vertices, parents });
+            let bodies = block.bodies;
+            format(&mut line, TriangleLine { index, bodies, patch, number, vertices, parents });
             line.end(&mut text);
             index += 1;
         }

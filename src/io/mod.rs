@@ -5,19 +5,26 @@
 //! elmer     DIR/partitioning.N/part.K.*, DIR/mesh.*       every rank writes its part; read back and judged
 //! vtu       STEM.vtu, or STEM.pvtu with a file per part   raw binary, for ParaView and meshio
 //! geomview  STEM.off, or STEM.list with a file per part   the skin, a colour per part
-//! serial    FILE.{vtu,msh,mesh,vol,off}                   one part: Gmsh, Medit and NETGEN too
+//! serial    FILE.{msh,mesh,vol}                           Gmsh, Medit, NETGEN: all parts in one file
+//!           FILE.{vtu,off}                                one part, by the name of the file
 //! ```
 //! All writers go through [`output`]: what is written stands in a temporary folder beside the target until every
 //! rank is done, and only then takes the place of what was there. A writer that fails leaves the old files as
 //! they were. Numbers in text read back to the same bits.
 
 pub mod chunks;
+mod domains;
 pub mod elmer;
 pub mod geomview;
 pub mod input;
+mod joined;
+#[cfg(test)]
+mod joined_tests;
 pub mod lines;
+mod number;
 pub(crate) mod once;
 pub mod output;
+mod pairs;
 pub mod plain;
 pub mod serial;
 pub mod skin;

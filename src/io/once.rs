@@ -22,7 +22,7 @@ impl LeftOut {
         self.0.len() as u64
     }
 
-    /// Whether the triangle at this place is left out.
+    /// Whether the triangle at this place, among all of the part, is left out.
     pub fn contains(&self, place: u64) -> bool {
         self.0.binary_search(&place).is_ok()
     }

@@ -68,32 +68,57 @@ pub fn folder_and_name(path: &Path) -> Result<(PathBuf, PathBuf), WriteError> {
     Ok((folder.to_path_buf(), name.into()))
 }
 
-/// A file that is being written, with its path for errors.
+/// A file that is being written, with its path for errors; or none, where bytes are only counted.
 pub struct Output {
-    file: File,
+    file: Option<File>,
     path: PathBuf,
+    written: u64,
 }
 
 impl Output {
     /// Creates the file, or empties it.
     pub fn create(path: &Path) -> Result<Self, WriteError> {
-        let file = File::create(path).map_err(WriteError::io(path))?;
-        Ok(Self { file, path: path.to_path_buf() })
+        Self::open(path, File::options().write(true).create(true).truncate(true))
+    }
+
+    /// Opens a file that several ranks write, each at its own places: the first one creates it.
+    pub fn shared(path: &Path) -> Result<Self, WriteError> {
+        Self::open(path, File::options().write(true).create(true).truncate(false))
     }
 
     /// Opens an existing file once more, to write from `offset` on (past the end too: zeros fill the gap).
     pub fn at(path: &Path, offset: u64) -> Result<Self, WriteError> {
-        let open = || {
-            let mut file = File::options().write(true).open(path)?;
-            file.seek(io::SeekFrom::Start(offset))?;
-            Ok(file)
-        };
-        Ok(Self { file: open().map_err(WriteError::io(path))?, path: path.to_path_buf() })
+        let mut output = Self::open(path, File::options().write(true))?;
+        output.go_to(offset)?;
+        Ok(output)
+    }
+
+    /// No file: counts what would be written.
+    pub fn counter() -> Self {
+        Self { file: None, path: PathBuf::new(), written: 0 }
+    }
+
+    fn open(path: &Path, options: &fs::OpenOptions) -> Result<Self, WriteError> {
+        let file = options.open(path).map_err(WriteError::io(path))?;
+        Ok(Self { file: Some(file), path: path.to_path_buf(), written: 0 })
+    }
+
+    /// Goes on at this offset.
+    pub fn go_to(&mut self, offset: u64) -> Result<(), WriteError> {
+        let Some(file) = &mut self.file else { return Ok(()) };
+        file.seek(io::SeekFrom::Start(offset)).map(drop).map_err(WriteError::io(&self.path))
     }
 
     /// Appends bytes, unbuffered: give it much at a time.
     pub fn write(&mut self, bytes: &[u8]) -> Result<(), WriteError> {
-        self.file.write_all(bytes).map_err(WriteError::io(&self.path))
+        self.written += bytes.len() as u64;
+        let Some(file) = &mut self.file else { return Ok(()) };
+        file.write_all(bytes).map_err(WriteError::io(&self.path))
+    }
+
+    /// How many bytes were written here.
+    pub fn written(&self) -> u64 {
+        self.written
     }
 
     /// Writes and empties `text` if it is longer than `limit`.
@@ -107,7 +132,8 @@ impl Output {
 
     /// Waits until the file is on the disk, and returns its length.
     pub fn finish(self) -> Result<u64, WriteError> {
-        let length = self.file.sync_all().and_then(|()| self.file.metadata()).map(|m| m.len());
+        let Some(file) = self.file else { return Ok(self.written) };
+        let length = file.sync_all().and_then(|()| file.metadata()).map(|m| m.len());
         length.map_err(WriteError::io(&self.path))
     }
 }

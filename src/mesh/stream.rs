@@ -161,7 +161,7 @@ pub trait MeshStream: Sync {
     fn images(&self, _index: usize) -> Vec<(u32, GlobalId)> {
         Vec::new()
     }
-    /// What solvers are to treat as singular; only writers of files for one part need it, and only rank 0 knows.
+    /// What solvers are to treat as singular: all patches, and the vertices of this part.
     fn singular(&self) -> SingularTags {
         SingularTags::default()
     }

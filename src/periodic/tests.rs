@@ -166,6 +166,51 @@ fn gmsh_and_netgen_files_hold_the_pairs() {
 }
 
 #[test]
+fn pairs_are_those_of_the_whole_mesh_whatever_the_number_of_ranks() {
+    let dir = tempfile::tempdir().unwrap();
+    let model = model("unit_cell");
+    let counts = [1, 3].map(|ranks| {
+        let run = |comm: &dyn crate::comm::Communicator| {
+            let given = (comm.rank() == 0).then_some(&model);
+            let made = generate(comm, given, &settings(1, &[]), &Progress::new(true, 5)).unwrap();
+            for name in ["m.msh", "m.vol"] {
+                serial::write_joined(comm, made.part.stream(), &made.names, &dir.path().join(name)).unwrap();
+            }
+            made.part.stream().links().to_vec()
+        };
+        let links = thread::run(ranks, run).unwrap().remove(0);
+        let read = |name: &str| std::fs::read_to_string(dir.path().join(name)).unwrap();
+        let (gmsh, netgen) = (read("m.msh"), read("m.vol"));
+        let nodes = block(&gmsh, "$Nodes", "$EndNodes");
+        let place = |number: f64| {
+            Point::new(nodes[number as usize][1], nodes[number as usize][2], nodes[number as usize][3])
+        };
+        let lines = block(&gmsh, "$Periodic", "$EndPeriodic");
+        let mut rest = &lines[1..];
+        let mut pairs = Vec::new();
+        for link in &links {
+            assert_eq!(rest[0], [2.0, f64::from(link.image.0) + 1.0, f64::from(link.of.0) + 1.0]);
+            let count = rest[2][0] as usize;
+            for pair in &rest[3..3 + count] {
+                assert!((link.motion * place(pair[1]) - place(pair[0])).norm() < 1e-14);
+            }
+            pairs.push(count);
+            rest = &rest[3 + count..];
+        }
+        assert!(rest.is_empty());
+        let identified = block(&netgen, "identifications\n", "identificationtypes");
+        assert_eq!(identified[0][0] as usize, identified.len() - 1);
+        for line in &identified[1..] {
+            let link = links.iter().find(|link| f64::from(link.identification) == line[2]).unwrap();
+            assert!((link.motion * place(line[0]) - place(line[1])).norm() < 1e-14);
+        }
+        (pairs, identified.len())
+    });
+    assert_eq!(counts[0], counts[1]);
+    assert!(counts[0].1 > 100);
+}
+
+#[test]
 fn elmers_companion_file_pairs_its_own_numbers() {
     let dir = tempfile::tempdir().unwrap();
     let model = model("unit_cell");
@@ -220,16 +265,24 @@ fn netgen_files_hold_singular_points_and_faces() {
     let source = "algebraic3d solid top = plane (0,0,1; 0,0,1); solid right = plane (1,0,0; 1,0,0); solid front = plane (0,0,0; 0,-1,0);
         solid box = orthobrick (0,0,0; 1,1,1) and top and right and front; tlo box;
         singular face box top -factor=3; singular point top right front -factor=2;";
-    let generated = made(&model_of(source), 1, 1).remove(0);
+    let model = model_of(source);
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("m.vol");
-    serial::write(generated.part.stream(), &generated.names, &path).unwrap();
-    let text = std::fs::read_to_string(&path).unwrap();
-    let points = block(&text, "singular_points\n", "singular_face_inside");
-    let [count, point] = &points[..] else { panic!("{points:?}") };
-    assert_eq!((count[0], point[1]), (1.0, 2.0));
-    assert_eq!(generated.part.stream().points()[point[0] as usize - 1], [1.0, 0.0, 1.0]);
-    assert!(block(&text, "singular_face_outside\n", "materials")[1][1] == 3.0);
+    // The corner is on some rank, not always on rank 0.
+    for ranks in [1, 4] {
+        let run = |comm: &dyn crate::comm::Communicator| {
+            let given = (comm.rank() == 0).then_some(&model);
+            let made = generate(comm, given, &settings(1, &[]), &Progress::new(true, 5)).unwrap();
+            serial::write_joined(comm, made.part.stream(), &made.names, &path).unwrap();
+        };
+        thread::run(ranks, run).unwrap();
+        let text = std::fs::read_to_string(&path).unwrap();
+        let points = block(&text, "singular_points\n", "singular_face_inside");
+        let [count, point] = &points[..] else { panic!("{points:?}") };
+        assert_eq!((count[0], point[1]), (1.0, 2.0));
+        assert_eq!(block(&text, "\npoints\n", "singular_points")[point[0] as usize], [1.0, 0.0, 1.0]);
+        assert!(block(&text, "singular_face_outside\n", "materials")[1][1] == 3.0);
+    }
 }
 
 #[test]

@@ -162,11 +162,7 @@ pub fn generate(
         }
         let part = agree(comm, refined.map_err(Failure::from))?;
         let map = periodic_map(comm, model, coarse.as_ref().map(|(_, made)| &made.mesh))?;
-        let singular = match model {
-            Some(Model::Csg(model)) => model.features.singular(&model.geometry),
-            _ => csg::Singular::default(),
-        };
-        let part = part.with_periodic(map.clone()).with_singular(singular);
+        let part = part.with_periodic(map.clone()).with_singular(broadcast_singular(comm, model)?);
         let (check, checksum) = progress.stage("check", || verdict(comm, &part, &projector))?;
         let periodic = periodic_verdict(comm, &part, &map, &projector)?;
         levels.extend(check.shape.clone().map(|shape| Level { pieces, tets: check.tets, shape }));
@@ -388,6 +384,32 @@ fn broadcast_bends(comm: &dyn Communicator, bends: Option<&Bends>) -> Result<Ben
     comm.broadcast(0, &mut ids)?;
     comm.broadcast(0, &mut middles)?;
     Ok(ids.into_iter().zip(middles).collect())
+}
+
+/// **Collective.** What rank 0's geometry tags as singular.
+fn broadcast_singular(comm: &dyn Communicator, model: Option<&Model>) -> Result<csg::Singular, Failure> {
+    let csg::Singular { mut patches, mut curves, mut corners } = match model {
+        Some(Model::Csg(model)) => model.features.singular(&model.geometry),
+        _ => csg::Singular::default(),
+    };
+    broadcast_factors(comm, &mut patches, |id| id.0, csg::PatchId)?;
+    broadcast_factors(comm, &mut curves, |id| id.0, csg::CurveId)?;
+    broadcast_factors(comm, &mut corners, |id| id.0, csg::CornerId)?;
+    Ok(csg::Singular { patches, curves, corners })
+}
+
+/// **Collective.** Replaces the factors of entities by those of rank 0.
+fn broadcast_factors<Id>(
+    comm: &dyn Communicator,
+    factors: &mut Vec<(Id, i32)>,
+    number: impl Fn(&Id) -> u32,
+    id: impl Fn(u32) -> Id,
+) -> Result<(), Failure> {
+    let mut numbers: Vec<[i64; 2]> =
+        factors.iter().map(|(id, factor)| [number(id).into(), (*factor).into()]).collect();
+    comm.broadcast(0, &mut numbers)?;
+    *factors = numbers.iter().map(|&[number, factor]| (id(number as u32), factor as i32)).collect();
+    Ok(())
 }
 
 /// **Collective.** The names and the surfaces that rank 0 has read.

@@ -20,7 +20,6 @@ mod faults_nodes;
 mod halo_tests;
 mod load;
 mod names;
-mod number;
 mod parse;
 mod periodic;
 mod read;

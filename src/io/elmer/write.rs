@@ -1,11 +1,11 @@
 //! Writing Elmer's files.
 
 use super::names::names_text;
-use super::number::{Numbering, number, watchers};
 use super::periodic::{self, periodic_text};
 use super::{MAX_ID, MAX_LINE, TET, TRIANGLE};
 use crate::comm::Communicator;
 use crate::io::lines::{self, FLUSH_AT};
+use crate::io::number::{Numbering, number, watchers};
 use crate::io::once::{LeftOut, left_out};
 use crate::io::output::{Output, write_text, write_together};
 use crate::io::text::{Line, digits};
@@ -184,10 +184,15 @@ impl Content<'_> {
 
     fn write_nodes(&self, path: &Path) -> Result<u64, WriteError> {
         let mut file = Output::create(path)?;
-        lines::vertices(self.part, &mut file, |line, vertex| {
-            line.int(self.numbering.vertices[vertex.index].into()).bytes(b" -1");
-            vertex.point.iter().for_each(|&x| _ = line.blank().float(x));
-        })?;
+        lines::vertices(
+            self.part,
+            &mut file,
+            |_| true,
+            |line, vertex| {
+                line.int(self.numbering.vertices[vertex.index].into()).bytes(b" -1");
+                vertex.point.iter().for_each(|&x| _ = line.blank().float(x));
+            },
+        )?;
         file.finish()
     }
 

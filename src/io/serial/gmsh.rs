@@ -4,24 +4,25 @@
 //! place and refuses. So where a boundary or body is in several groups the file is of version 4.1, in which an entity has any number of groups, and
 //! which Gmsh, meshio and MFEM read.
 
+use super::coordinates;
 use super::groups::Groups;
 use super::runs::Runs;
-use super::{coordinates, ids};
+use crate::comm::Communicator;
 use crate::io::WriteError;
-use crate::io::lines::{self, TetLine, TriangleLine, VertexLine};
-use crate::io::once::LeftOut;
-use crate::io::output::Output;
+use crate::io::joined::{Section, Whole};
 use crate::io::text::Line;
-use crate::mesh::stream::MeshStream;
 use crate::mesh::{Label, Names};
 
-/// Writes the mesh.
-pub(super) fn write(part: &dyn MeshStream, names: &Names, file: &mut Output) -> Result<(), WriteError> {
-    let [patches, bodies] = [&names.patches, &names.bodies].map(|labels| Groups::of(labels));
+/// **Collective.** The file.
+pub(super) fn sections<'a>(
+    comm: &dyn Communicator,
+    whole: &'a Whole<'a>,
+) -> Result<Vec<Section<'a>>, WriteError> {
+    let [patches, bodies] = [&whole.names.patches, &whole.names.bodies].map(|labels| Groups::of(labels));
     if patches.are_apart() && bodies.are_apart() {
-        write_2(part, names, &patches, &bodies, file)
+        Ok(sections_2(whole, patches, bodies))
     } else {
-        write_4(part, names, &patches, &bodies, file)
+        sections_4(comm, whole, &patches, &bodies)
     }
 }
 
@@ -39,63 +40,58 @@ fn head(version: &str, patches: &Groups, bodies: &Groups) -> String {
     format!("$MeshFormat\n{version} 0 8\n$EndMeshFormat\n$PhysicalNames\n{count}\n{list}$EndPhysicalNames\n")
 }
 
-fn write_2(
-    part: &dyn MeshStream,
-    names: &Names,
-    patches: &Groups,
-    bodies: &Groups,
-    file: &mut Output,
-) -> Result<(), WriteError> {
-    let counts = part.counts();
-    file.write((head("2.2", patches, bodies) + &format!("$Nodes\n{}\n", counts.vertices)).as_bytes())?;
-    lines::vertices(part, file, |line, VertexLine { index, point }| {
-        coordinates(line.int(index as u64 + 1).blank(), point);
-    })?;
-    file.write(format!("$EndNodes\n$Elements\n{}\n", counts.boundary + counts.tets).as_bytes())?;
+fn sections_2<'a>(whole: &'a Whole<'a>, patches: Groups, bodies: Groups) -> Vec<Section<'a>> {
+    let counts = whole.totals;
+    let head = head("2.2", &patches, &bodies) + &format!("$Nodes\n{}\n", counts.vertices);
     let group = |groups: &Groups, of: usize| u64::from(groups.of[of][0]);
-    lines::triangles(part, names, &LeftOut::default(), file, |line, triangle: TriangleLine| {
-        line.int(triangle.index + 1).bytes(b" 2 2 ").int(group(patches, triangle.patch.index())).blank();
-        ids(line.int(u64::from(triangle.patch.0) + 1), triangle.vertices);
-    })?;
-    lines::tets(part, names, file, |line, tet: TetLine| {
-        line.int(counts.boundary + tet.index + 1)
-            .bytes(b" 4 2 ")
-            .int(group(bodies, tet.body.index()))
-            .blank();
-        ids(line.int(u64::from(tet.body.0) + 1), tet.vertices);
-    })?;
-    file.write(b"$EndElements\n")?;
-    periodic(part, "Affine", file)
+    vec![
+        Section::Text(head),
+        Section::Vertices(Box::new(|line, number, point| coordinates(line.int(number).blank(), point))),
+        Section::Text(format!("$EndNodes\n$Elements\n{}\n", counts.boundary + counts.tets)),
+        Section::Triangles(Box::new(move |line, triangle| {
+            let group = group(&patches, triangle.patch.index());
+            line.int(whole.triangle(triangle)).bytes(b" 2 2 ").int(group).blank();
+            whole.ids(line.int(u64::from(triangle.patch.0) + 1), triangle.vertices);
+        })),
+        Section::Tets(Box::new(move |line, tet| {
+            let group = group(&bodies, tet.body.index());
+            line.int(counts.boundary + whole.tet(tet)).bytes(b" 4 2 ").int(group).blank();
+            whole.ids(line.int(u64::from(tet.body.0) + 1), tet.vertices);
+        })),
+        Section::Text(String::from("$EndElements\n") + &periodic(whole, "Affine")),
+    ]
 }
 
 /// Nodes stand in one block: Gmsh finds those of a surface by its elements.
-fn write_4(
-    part: &dyn MeshStream,
-    names: &Names,
+fn sections_4<'a>(
+    comm: &dyn Communicator,
+    whole: &'a Whole<'a>,
     patches: &Groups,
     bodies: &Groups,
-    file: &mut Output,
-) -> Result<(), WriteError> {
-    let counts = part.counts();
-    let [of_patches, of_bodies] = [Runs::of_patches(part), Runs::of_bodies(part)];
+) -> Result<Vec<Section<'a>>, WriteError> {
+    let counts = whole.totals;
+    let [of_patches, of_bodies] = [Runs::of_patches(whole), Runs::of_bodies(whole.part)];
+    let [blocks] = comm.all_reduce_sum_u64([(of_patches.0.len() + of_bodies.0.len()) as u64])?;
     let first_body = of_bodies.0.first().map_or(1, |run| run.of + 1);
-    let n = counts.vertices;
-    file.write((head("4.1", patches, bodies) + &entities(part, names, patches, bodies)).as_bytes())?;
-    file.write(format!("$Nodes\n1 {n} 1 {n}\n3 {first_body} 0 {n}\n").as_bytes())?;
-    lines::vertices(part, file, |line, VertexLine { index, .. }| _ = line.int(index as u64 + 1))?;
-    lines::vertices(part, file, |line, VertexLine { point, .. }| coordinates(line, point))?;
-    let (blocks, elements) = (of_patches.0.len() + of_bodies.0.len(), counts.boundary + counts.tets);
-    file.write(format!("$EndNodes\n$Elements\n{blocks} {elements} 1 {elements}\n").as_bytes())?;
-    lines::triangles(part, names, &LeftOut::default(), file, |line, triangle: TriangleLine| {
-        begin_block(line, &of_patches, triangle.index, b"2 ", b" 2 ");
-        ids(line.int(triangle.index + 1), triangle.vertices);
-    })?;
-    lines::tets(part, names, file, |line, tet: TetLine| {
-        begin_block(line, &of_bodies, tet.index, b"3 ", b" 4 ");
-        ids(line.int(counts.boundary + tet.index + 1), tet.vertices);
-    })?;
-    file.write(b"$EndElements\n")?;
-    periodic(part, "16", file)
+    let (n, elements) = (counts.vertices, counts.boundary + counts.tets);
+    let head = head("4.1", patches, bodies)
+        + &entities(whole.names, &bounds(comm, whole)?, patches, bodies)
+        + &format!("$Nodes\n1 {n} 1 {n}\n3 {first_body} 0 {n}\n");
+    Ok(vec![
+        Section::Text(head),
+        Section::Vertices(Box::new(|line, number, _| _ = line.int(number))),
+        Section::Vertices(Box::new(|line, _, point| coordinates(line, point))),
+        Section::Text(format!("$EndNodes\n$Elements\n{blocks} {elements} 1 {elements}\n")),
+        Section::Triangles(Box::new(move |line, triangle| {
+            begin_block(line, &of_patches, triangle.index, b"2 ", b" 2 ");
+            whole.ids(line.int(whole.triangle(triangle)), triangle.vertices);
+        })),
+        Section::Tets(Box::new(move |line, tet| {
+            begin_block(line, &of_bodies, tet.index, b"3 ", b" 4 ");
+            whole.ids(line.int(counts.boundary + whole.tet(tet)), tet.vertices);
+        })),
+        Section::Text(String::from("$EndElements\n") + &periodic(whole, "16")),
+    ])
 }
 
 /// The line before the first element of a run: dimension, entity, type, count.
@@ -106,18 +102,23 @@ fn begin_block(line: &mut Line, runs: &Runs, element: u64, dimension: &[u8], kin
     }
 }
 
-/// The section of patches and bodies with their groups. All have the box of the mesh, as Gmsh itself computes those of entities that have only a mesh.
-fn entities(part: &dyn MeshStream, names: &Names, patches: &Groups, bodies: &Groups) -> String {
-    let mut bounds = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
-    for index in 0..part.vertex_blocks() {
-        for point in part.vertex_points(index).iter() {
+/// **Collective.** The box of the mesh.
+fn bounds(comm: &dyn Communicator, whole: &Whole) -> Result<String, WriteError> {
+    let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+    for index in 0..whole.part.vertex_blocks() {
+        for point in whole.part.vertex_points(index).iter() {
             for axis in 0..3 {
-                bounds[0][axis] = bounds[0][axis].min(point[axis]);
-                bounds[1][axis] = bounds[1][axis].max(point[axis]);
+                low[axis] = low[axis].min(point[axis]);
+                high[axis] = high[axis].max(point[axis]);
             }
         }
     }
-    let bounds: String = bounds.iter().flatten().map(|x| format!(" {x}")).collect();
+    let (low, high) = (comm.all_reduce_min_f64(low)?, comm.all_reduce_max_f64(high)?);
+    Ok(low.iter().chain(&high).map(|x| format!(" {x}")).collect())
+}
+
+/// The section of patches and bodies with their groups. All have the box of the mesh, as Gmsh itself computes those of entities that have only a mesh.
+fn entities(names: &Names, bounds: &str, patches: &Groups, bodies: &Groups) -> String {
     let mut text = format!("$Entities\n0 0 {} {}\n", names.patches.len(), names.bodies.len());
     for groups in [patches, bodies] {
         for (entity, tags) in (1..).zip(&groups.of) {
@@ -130,23 +131,25 @@ fn entities(part: &dyn MeshStream, names: &Names, patches: &Groups, bodies: &Gro
 }
 
 /// The section of periodic patches: for each image its elementary tag and that of the patch it is the image of, the matrix of the motion by
-/// rows behind the word that begins it, and the pairs of nodes, image first.
-fn periodic(part: &dyn MeshStream, begin: &str, file: &mut Output) -> Result<(), WriteError> {
-    let links = part.links();
+/// rows behind the word that begins it, and the pairs of nodes, image first. Empty if there are none.
+fn periodic(whole: &Whole, begin: &str) -> String {
+    let links = whole.part.links();
     if links.is_empty() {
-        return Ok(());
+        return String::new();
+    }
+    let mut pairs: Vec<String> = vec![String::new(); links.len()];
+    let mut counts = vec![0_u64; links.len()];
+    for &[image, of, link] in &whole.pairs {
+        pairs[link as usize] += &format!("{image} {of}\n");
+        counts[link as usize] += 1;
     }
     let mut text = format!("$Periodic\n{}\n", links.len());
-    for (index, link) in links.iter().enumerate() {
+    for ((link, pairs), count) in links.iter().zip(pairs).zip(counts) {
         text += &format!("2 {} {}\n{begin}", link.image.0 + 1, link.of.0 + 1);
         link.motion.to_homogeneous().transpose().iter().for_each(|x| text += &format!(" {x}"));
-        let pairs = part.images(index);
-        text += &format!("\n{}\n", pairs.len());
-        for (image, of) in pairs {
-            text += &format!("{} {}\n", image + 1, of + 1);
-        }
+        text += &format!("\n{count}\n{pairs}");
     }
-    file.write((text + "$EndPeriodic\n").as_bytes())
+    text + "$EndPeriodic\n"
 }
 
 /// What the file cannot hold of these names, a sentence each: the numbers of boundaries and bodies that share a name.

@@ -1,16 +1,14 @@
-//! One part in one file: the format by the file's name.
+//! One file: the format by the file's name. Gmsh's, Medit's and NETGEN's hold the mesh of all ranks.
 
 mod gmsh;
 mod groups;
 mod netgen;
 mod runs;
 
-use super::lines;
-use super::once::LeftOut;
-use super::output::{Output, write_file};
-use super::text::{FLOAT_CHARS, Line};
+use super::joined::{self, Format, Section, Whole};
+use super::text::Line;
 use super::{WriteError, Written, geomview, vtu};
-use crate::comm::thread;
+use crate::comm::{Communicator, thread};
 use crate::mesh::Names;
 use crate::mesh::stream::MeshStream;
 use std::ffi::OsStr;
@@ -30,23 +28,32 @@ pub fn write(part: &dyn MeshStream, names: &Names, path: &Path) -> Result<Writte
     if part.ranks() != 1 {
         return Err(WriteError::SeveralParts { path: path.to_path_buf(), parts: part.ranks() });
     }
-    let format: fn(&dyn MeshStream, &Names, &mut Output) -> Result<(), WriteError> = match path
-        .extension()
-        .and_then(OsStr::to_str)
-    {
-        Some("vtu") => return vtu::write(&thread::alone(), part, names, path),
-        Some("off") => return geomview::write(&thread::alone(), part, &geomview::Settings::default(), path),
-        Some("msh") => gmsh::write,
-        Some("mesh") => medit,
-        Some("vol") => netgen::write,
+    match path.extension().and_then(OsStr::to_str) {
+        Some("vtu") => vtu::write(&thread::alone(), part, names, path),
+        Some("off") => geomview::write(&thread::alone(), part, &geomview::Settings::default(), path),
+        _ => write_joined(&thread::alone(), part, names, path),
+    }
+}
+
+/// **Collective.** Writes the mesh of all ranks to one file of Gmsh, Medit or NETGEN, as the end of `path` tells. Each vertex and tet is there once,
+/// and so is a triangle between two parts. Each rank gets the sums over all ranks.
+///
+/// # Errors
+/// An unknown format, more vertices or elements than 32 bits number, a part with ghosts, a body or patch without a number, a full disk, what the
+/// system says: on all ranks alike, and the file before it stays.
+pub fn write_joined(
+    comm: &dyn Communicator,
+    part: &dyn MeshStream,
+    names: &Names,
+    path: &Path,
+) -> Result<Written, WriteError> {
+    let format = match path.extension().and_then(OsStr::to_str) {
+        Some("msh") => Format { name: "Gmsh", sections: gmsh::sections },
+        Some("mesh") => Format { name: "Medit", sections: medit_sections },
+        Some("vol") => Format { name: "NETGEN", sections: netgen::sections },
         _ => return Err(WriteError::UnknownFormat(path.to_path_buf())),
     };
-    let bytes = write_file(path, estimate(part), |path| {
-        let mut file = Output::create(path)?;
-        format(part, names, &mut file)?;
-        file.finish()
-    })?;
-    Ok(Written { files: 1, bytes })
+    joined::write(comm, part, names, path, &format)
 }
 
 /// What a file of this name cannot hold of the names and numbers of a mesh, a sentence each: a solver that looks for them there must know.
@@ -61,43 +68,31 @@ pub fn losses(names: &Names, path: &Path) -> Vec<String> {
     }
 }
 
-/// About how many bytes a text format takes.
-fn estimate(part: &dyn MeshStream) -> u64 {
-    const PER_ENTITY: u64 = 45;
-    let counts = part.counts();
-    counts.vertices * (3 * FLOAT_CHARS as u64) + (counts.tets + counts.boundary) * PER_ENTITY
-}
-
-/// Appends ids from 1.
-fn ids(line: &mut Line, vertices: &[u32]) {
-    vertices.iter().for_each(|&v| _ = line.blank().int(u64::from(v) + 1));
-}
-
 fn coordinates(line: &mut Line, point: &[f64; 3]) {
     line.float(point[0]).blank().float(point[1]).blank().float(point[2]);
 }
 
-/// Medit: the references are boundary and body numbers.
-fn medit(part: &dyn MeshStream, names: &Names, file: &mut Output) -> Result<(), WriteError> {
-    let counts = part.counts();
-    let head = format!("MeshVersionFormatted 2\nDimension 3\nVertices\n{}\n", counts.vertices);
-    file.write(head.as_bytes())?;
-    lines::vertices(part, file, |line, vertex| {
-        coordinates(line, vertex.point);
-        line.bytes(b" 0");
-    })?;
-    // Each line begins with a blank, which Medit skips.
-    file.write(format!("Triangles\n{}\n", counts.boundary).as_bytes())?;
-    lines::triangles(part, names, &LeftOut::default(), file, |line, triangle| {
-        ids(line, triangle.vertices);
-        line.blank().int(triangle.number);
-    })?;
-    file.write(format!("Tetrahedra\n{}\n", counts.tets).as_bytes())?;
-    lines::tets(part, names, file, |line, tet| {
-        ids(line, tet.vertices);
-        line.blank().int(tet.number);
-    })?;
-    file.write(b"End\n")
+/// Medit: the references are boundary and body numbers. Lines that begin with a blank are read as others.
+fn medit_sections<'a>(_: &dyn Communicator, whole: &'a Whole<'a>) -> Result<Vec<Section<'a>>, WriteError> {
+    let counts = whole.totals;
+    Ok(vec![
+        Section::Text(format!("MeshVersionFormatted 2\nDimension 3\nVertices\n{}\n", counts.vertices)),
+        Section::Vertices(Box::new(|line, _, point| {
+            coordinates(line, point);
+            line.bytes(b" 0");
+        })),
+        Section::Text(format!("Triangles\n{}\n", counts.boundary)),
+        Section::Triangles(Box::new(|line, triangle| {
+            whole.ids(line, triangle.vertices);
+            line.blank().int(triangle.number);
+        })),
+        Section::Text(format!("Tetrahedra\n{}\n", counts.tets)),
+        Section::Tets(Box::new(|line, tet| {
+            whole.ids(line, tet.vertices);
+            line.blank().int(tet.number);
+        })),
+        Section::Text("End\n".into()),
+    ])
 }
 
 #[cfg(test)]

@@ -4,12 +4,11 @@
 //! behind its memory by older versions and is ignored by newer ones, which then call all boundaries `default`. So each
 //! number from 1 to the largest gets a name here.
 
-use super::runs::Runs;
-use super::{coordinates, ids};
-use crate::io::once::LeftOut;
-use crate::io::output::Output;
-use crate::io::{WriteError, lines};
-use crate::mesh::stream::{MeshStream, NO_TET, SingularTags};
+use super::coordinates;
+use crate::comm::Communicator;
+use crate::io::WriteError;
+use crate::io::domains;
+use crate::io::joined::{Section, Whole};
 use crate::mesh::{Label, Names};
 use std::collections::BTreeMap;
 
@@ -19,38 +18,42 @@ const UNNAMED: &str = "default";
 /// Numbers up to this one are kept whatever their gaps; NGSolve takes 0.02 s for as many regions, and 3 s for a million.
 const LARGEST_KEPT: u32 = 10_000;
 
-/// Writes the mesh. Its tets are negatively oriented: two vertices change places. Without edge segments.
-pub(super) fn write(part: &dyn MeshStream, names: &Names, file: &mut Output) -> Result<(), WriteError> {
-    let counts = part.counts();
-    let runs = Runs::of_bodies(part);
-    let [bodies, patches] = [&names.bodies, &names.patches].map(|list| Numbered::of(list));
-    let domain = |tet: u64| match (tet != NO_TET).then(|| runs.find(tet).of) {
-        Some(body) => bodies.of.get(body as usize).copied().unwrap_or(0),
-        None => 0,
-    };
-    file.write(
-        format!("mesh3d\ndimension\n3\ngeomtype\n0\nsurfaceelements\n{}\n", counts.boundary).as_bytes(),
-    )?;
-    lines::triangles(part, names, &LeftOut::default(), file, |line, triangle| {
-        line.int(u64::from(triangle.patch.0) + 1).blank().int(patches.of[triangle.patch.index()].into());
-        triangle.parents.iter().for_each(|&parent| _ = line.blank().int(domain(parent).into()));
-        ids(line.bytes(b" 3"), triangle.vertices);
-    })?;
-    file.write(format!("volumeelements\n{}\n", counts.tets).as_bytes())?;
-    lines::tets(part, names, file, |line, tet| {
-        let [a, b, c, d] = *tet.vertices;
-        ids(line.int(bodies.of[tet.body.index()].into()).bytes(b" 4"), &[b, a, c, d]);
-    })?;
-    file.write(format!("edgesegmentsgi2\n0\npoints\n{}\n", counts.vertices).as_bytes())?;
-    lines::vertices(part, file, |line, vertex| coordinates(line, vertex.point))?;
-    let mut end = identifications(part) + &singularities(part);
-    for (title, list) in [("materials", bodies), ("bcnames", patches)] {
+/// **Collective.** The file. Its tets are negatively oriented: two vertices change places. Without edge segments.
+pub(super) fn sections<'a>(
+    comm: &dyn Communicator,
+    whole: &'a Whole<'a>,
+) -> Result<Vec<Section<'a>>, WriteError> {
+    let counts = whole.totals;
+    let [bodies, patches] = [&whole.names.bodies, &whole.names.patches].map(|list| Numbered::of(list));
+    let domains = domains::find(comm, whole)?;
+    let mut end = identifications(whole) + &singularities(whole);
+    for (title, list) in [("materials", &bodies), ("bcnames", &patches)] {
         end += &format!("{title}\n{}\n", list.names.len());
-        for (number, name) in (1..).zip(list.names) {
+        for (number, name) in (1..).zip(&list.names) {
             end += &format!("{number} {name}\n");
         }
     }
-    file.write((end + "endmesh\n").as_bytes())
+    let (of_bodies, of_domains) = (bodies.of.clone(), bodies.of);
+    Ok(vec![
+        Section::Text(format!("mesh3d\ndimension\n3\ngeomtype\n0\nsurfaceelements\n{}\n", counts.boundary)),
+        Section::Triangles(Box::new(move |line, triangle| {
+            let number = patches.of[triangle.patch.index()];
+            line.int(u64::from(triangle.patch.0) + 1).blank().int(number.into());
+            for body in domains.of(triangle) {
+                let domain = body.and_then(|body| of_domains.get(body.index())).copied().unwrap_or(0);
+                line.blank().int(domain.into());
+            }
+            whole.ids(line.bytes(b" 3"), triangle.vertices);
+        })),
+        Section::Text(format!("volumeelements\n{}\n", counts.tets)),
+        Section::Tets(Box::new(move |line, tet| {
+            let [a, b, c, d] = *tet.vertices;
+            whole.ids(line.int(of_bodies[tet.body.index()].into()).bytes(b" 4"), &[b, a, c, d]);
+        })),
+        Section::Text(format!("edgesegmentsgi2\n0\npoints\n{}\n", counts.vertices)),
+        Section::Vertices(Box::new(|line, _, point| coordinates(line, point))),
+        Section::Text(end + "endmesh\n"),
+    ])
 }
 
 /// What the file cannot hold of these names, a sentence each.
@@ -140,18 +143,15 @@ impl Numbered {
 }
 
 /// NETGEN's pairs of vertices with the numbers of their identifications, all of them periodic. Empty if there are none.
-fn identifications(part: &dyn MeshStream) -> String {
+fn identifications(whole: &Whole) -> String {
     /// NETGEN's number for periodic ones.
     const PERIODIC: &str = " 2";
-    let links = part.links();
-    let of_link = |index: usize| {
-        let pair = move |(image, of): (u32, u64)| (links[index].identification, of + 1, u64::from(image) + 1);
-        part.images(index).into_iter().map(pair)
-    };
-    let mut pairs: Vec<(u32, u64, u64)> = (0..links.len()).flat_map(of_link).collect();
+    let links = whole.part.links();
+    let Some(count) = links.iter().map(|link| link.identification).max() else { return String::new() };
+    let pair = |&[image, of, link]: &[u64; 3]| (links[link as usize].identification, of, image);
+    let mut pairs: Vec<(u32, u64, u64)> = whole.pairs.iter().map(pair).collect();
     pairs.sort_unstable();
     pairs.dedup();
-    let Some(count) = links.iter().map(|link| link.identification).max() else { return String::new() };
     let mut text = format!("identifications\n{}\n", pairs.len());
     for (number, of, image) in pairs {
         text += &format!("{of} {image} {number}\n");
@@ -160,15 +160,14 @@ fn identifications(part: &dyn MeshStream) -> String {
 }
 
 /// NETGEN's factors of singular points and of faces, on both sides of these. Edges have none, as the file has no segments.
-fn singularities(part: &dyn MeshStream) -> String {
-    let SingularTags { patches, vertices } = part.singular();
-    let points: Vec<_> = vertices.iter().map(|(v, factor)| (u64::from(*v) + 1, *factor)).collect();
-    let faces: Vec<_> = patches.iter().map(|(patch, factor)| (u64::from(patch.0) + 1, *factor)).collect();
+fn singularities(whole: &Whole) -> String {
+    let faces = whole.part.singular().patches;
+    let faces: Vec<_> = faces.iter().map(|(patch, factor)| (u64::from(patch.0) + 1, *factor)).collect();
     let mut text = String::new();
     for (title, list) in [
-        ("singular_points", points),
-        ("singular_face_inside", faces.clone()),
-        ("singular_face_outside", faces),
+        ("singular_points", &whole.singular_vertices),
+        ("singular_face_inside", &faces),
+        ("singular_face_outside", &faces),
     ] {
         if !list.is_empty() {
             text += &format!("{title}\n{}\n", list.len());

@@ -1,5 +1,6 @@
 //! Consecutive tets or boundary triangles of one body or patch.
 
+use crate::io::joined::Whole;
 use crate::mesh::stream::{BoundaryBlock, MeshStream, TetBlock};
 
 /// Elements of one body or patch that follow each other.
@@ -28,17 +29,25 @@ impl Runs {
         runs
     }
 
-    pub fn of_patches(part: &dyn MeshStream) -> Self {
+    /// Of the triangles that the part writes.
+    pub fn of_patches(whole: &Whole) -> Self {
         let mut runs = Self::default();
         let mut block = BoundaryBlock::default();
-        for index in 0..part.boundary_blocks() {
-            part.boundary_block(index, &mut block);
-            runs.add(block.patch.expect("a boundary block has a patch").0, block.triangles.len());
+        let mut place = 0;
+        for index in 0..whole.part.boundary_blocks() {
+            whole.part.boundary_block(index, &mut block);
+            let next = place + block.triangles.len() as u64;
+            let written = (place..next).filter(|&place| !whole.left_out.contains(place)).count();
+            runs.add(block.patch.expect("a boundary block has a patch").0, written);
+            place = next;
         }
         runs
     }
 
     fn add(&mut self, of: u32, count: usize) {
+        if count == 0 {
+            return;
+        }
         match self.0.last_mut() {
             Some(last) if last.of == of => last.count += count as u64,
             last => {

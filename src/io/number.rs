@@ -1,16 +1,20 @@
-//! The numbers that Elmer's files bear: compact per part, since Elmer sizes its tables by the range of ids in a part.
+//! The numbers that text files bear: from 1 without a gap, and compact per part, since Elmer sizes its tables by the range of ids in a part,
+//! and formats that number vertices by their order in the file need all of a part behind each other.
 
 use crate::comm::Communicator;
 use crate::io::WriteError;
 use crate::mesh::ghosts::GhostTet;
 use crate::mesh::stream::{MeshStream, VertexBlock};
 use crate::mesh::{GlobalId, Rank};
+use std::ops::Range;
 
 /// The numbers of one part's entities, all from 1; of its ghosts those that they have in their own part.
 #[derive(Debug)]
 pub(super) struct Numbering {
     /// By local vertex index.
     pub vertices: Vec<u32>,
+    /// The numbers of the vertices that this part owns.
+    owned: Range<u64>,
     /// The number of the part's first tet; the others follow in local order.
     first_tet: u64,
     /// Where ghost tets begin, and their numbers.
@@ -20,6 +24,11 @@ pub(super) struct Numbering {
 }
 
 impl Numbering {
+    /// Whether this part owns the vertex with this local index.
+    pub fn owns(&self, local: usize) -> bool {
+        self.owned.contains(&self.vertices[local].into())
+    }
+
     /// The number of a tet by its index within the part.
     pub fn tet(&self, index: u64) -> u64 {
         let (first_ghost, numbers) = &self.ghosts;
@@ -62,7 +71,14 @@ pub(super) fn number(comm: &dyn Communicator, part: &dyn MeshStream) -> Result<N
     let first_tets: Vec<u64> = first_tets.collect();
     let of_ghost = |tet: &GhostTet| first_tets[tet.owner as usize] + tet.index;
     let numbers = part.ghosts().map(|ghosts| ghosts.tets.iter().map(of_ghost).collect()).unwrap_or_default();
-    Ok(Numbering { vertices, first_tet: first_tets[rank as usize], ghosts: (own_tets, numbers), shared })
+    let owned = vertices_before + 1..vertices_before + 1 + u64::from(owned);
+    Ok(Numbering {
+        vertices,
+        owned,
+        first_tet: first_tets[rank as usize],
+        ghosts: (own_tets, numbers),
+        shared,
+    })
 }
 
 /// The ranks that have a vertex in ghost tets only.
