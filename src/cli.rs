@@ -357,7 +357,7 @@ pub enum Format {
     Elmer,
     /// VTK: one .vtu for each part and a .pvtu
     Vtu,
-    /// Gmsh 2.2, DIR/NAME.msh: all parts in one file
+    /// Gmsh, DIR/NAME.msh: all parts in one file
     Msh,
     /// Medit, DIR/NAME.mesh: all parts in one file
     Medit,

@@ -7,7 +7,7 @@ mod write;
 use decompose::cut_settings;
 pub use decompose::run_decompose;
 pub use repartition::run_repartition;
-use write::{place_of, read_back, refuse_unknown, write_formats};
+use write::{note_losses, place_of, read_back, refuse_unknown, write_formats};
 
 use crate::cli::{Check, Format, Generate, InputOptions, Inspect, MeshFile, Method, Quality, SizeOptions};
 use std::io::{ErrorKind, Write};
@@ -113,7 +113,7 @@ fn generate_on(comm: &dyn Communicator, options: &Generate, start: Instant) -> R
     let made = generate(comm, model.as_ref(), &settings, &progress)?;
     let stem = target.join(options.input.files[0].file_stem().unwrap_or("mesh".as_ref()));
     let (written, halo) = progress.stage("write", || {
-        write_formats(comm, made.part.stream(), &made.names, &options.run, &target, &stem)
+        write_formats(comm, made.part.stream(), &made.names, &options.run, [&target, &stem], &progress)
     })?;
     read_back(comm, &options.run, &target, &progress)?;
     match &options.picture {
@@ -356,9 +356,7 @@ pub fn run_mesh(options: &MeshFile) -> Result<(), Failure> {
         place if is_vtu => io::vtu::write_with(&comm, part, &made.names, file, place),
         _ => io::serial::write(part, &made.names, file),
     })?;
-    for loss in io::serial::losses(&made.names, file) {
-        progress.note(&format!("note: {}: {loss}", file.display()));
-    }
+    note_losses(&made.names, file, &progress);
     if let Some(file) = &options.picture {
         draw(&comm, made.part.stream(), options.cut, file)?;
     }

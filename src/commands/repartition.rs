@@ -49,8 +49,9 @@ fn repartition_on(comm: &dyn Communicator, options: &Repartition, start: Instant
     let done = pipeline::repartition(comm, &options.directory, method, &progress)?;
     let target = &options.output;
     let stem = target.join(stem_of(&done.folder));
-    let (written, halo) = progress
-        .stage("write", || write_formats(comm, &done.part, &done.names, &options.run, target, &stem))?;
+    let (written, halo) = progress.stage("write", || {
+        write_formats(comm, &done.part, &done.names, &options.run, [target, &stem], &progress)
+    })?;
     read_back(comm, &options.run, target, &progress)?;
     let took = processes(comm)?;
     if !first {

@@ -36,13 +36,14 @@ pub(super) fn place_of(boundary: Option<Boundary>) -> vtu::Boundary {
 }
 
 /// **Collective.** Writes each format into a folder, with a halo if one is asked for; files of those that do not fill one are called `stem`.
+/// Notes tell which names and numbers a format cannot hold.
 pub(super) fn write_formats(
     comm: &dyn Communicator,
     part: &dyn MeshStream,
     names: &Names,
     options: &RunOptions,
-    dir: &Path,
-    stem: &Path,
+    [dir, stem]: [&Path; 2],
+    progress: &Progress,
 ) -> Result<(Written, Option<HaloReport>), Failure> {
     let by = options.halo.map(|by| match by {
         Halo::Faces => By::Faces,
@@ -56,7 +57,9 @@ pub(super) fn write_formats(
         // Names may have points in them.
         let mut file = stem.as_os_str().to_os_string();
         file.push(ending);
-        serial::write_joined(comm, part, names, Path::new(&file))
+        let file = Path::new(&file);
+        note_losses(names, file, progress);
+        serial::write_joined(comm, part, names, file)
     };
     let mut written = Written::default();
     for format in &options.format {
@@ -71,6 +74,13 @@ pub(super) fn write_formats(
         };
     }
     Ok((written, told))
+}
+
+/// Tells what a file cannot hold of names and numbers.
+pub(super) fn note_losses(names: &Names, file: &Path, progress: &Progress) {
+    for loss in serial::losses(names, file) {
+        progress.note(&format!("note: {}: {loss}", file.display()));
+    }
 }
 
 /// **Collective.** Reads the written Elmer mesh again, if that is asked for.

@@ -1,9 +1,9 @@
 //! One text file for the mesh of all ranks, written by all of them.
 //!
 //! A file is a list of sections. Rank 0 has the text of some; of others each rank has its lines, in the order of ranks:
-//! vertices by their owners, tets, and boundary triangles (one between two parts by one of them, see [`once`](super::once)). Text has no length that is known before it is made,
-//! so with several ranks each formats its lines twice: first it counts bytes, which gives every rank its places in the
-//! file, then it writes there. That takes no memory and no second file; formatting is shared by all ranks.
+//! vertices by their owners, tets, and boundary triangles (one between two parts by one of them, see [`once`](super::once)).
+//! The length of text is not known before it is made. So with several ranks each formats its lines twice: first it counts
+//! bytes, which gives every rank its places in the file, then it writes there. That takes no memory and no second file.
 //!
 //! ```text
 //! rank 0  head  vertices 0              tets 0                end
@@ -34,16 +34,23 @@ pub(super) struct Format {
     pub sections: for<'a> fn(&dyn Communicator, &'a Whole<'a>) -> Result<Vec<Section<'a>>, WriteError>,
 }
 
+/// Appends what a line says of a vertex, by its number and place.
+type FormatVertex<'a> = Box<dyn Fn(&mut Line, u64, &[f64; 3]) + Sync + 'a>;
+/// Appends what a line says of a triangle on a patch.
+type FormatTriangle<'a> = Box<dyn Fn(&mut Line, &TriangleLine) + Sync + 'a>;
+/// Appends what a line says of a tet.
+type FormatTet<'a> = Box<dyn Fn(&mut Line, &TetLine) + Sync + 'a>;
+
 /// A part of a file.
 pub(super) enum Section<'a> {
     /// This, from rank 0.
     Text(String),
-    /// A line for each vertex, by its number and place.
-    Vertices(Box<dyn Fn(&mut Line, u64, &[f64; 3]) + Sync + 'a>),
+    /// A line for each vertex.
+    Vertices(FormatVertex<'a>),
     /// A line for each triangle on a patch.
-    Triangles(Box<dyn Fn(&mut Line, &TriangleLine) + Sync + 'a>),
+    Triangles(FormatTriangle<'a>),
     /// A line for each tet.
-    Tets(Box<dyn Fn(&mut Line, &TetLine) + Sync + 'a>),
+    Tets(FormatTet<'a>),
 }
 
 /// A rank's part of the mesh, and what a file says of the whole.
@@ -70,13 +77,15 @@ impl<'a> Whole<'a> {
         names: &'a Names,
         format: &'static str,
     ) -> Result<Self, WriteError> {
-        let totals = part.totals();
-        let checked = check(part, totals, format);
+        let checked = check(part, part.totals(), format);
         agree(comm, checked)?;
         let numbering = number(comm, part)?;
         let pairs = pairs(comm, part, &numbering, |index, _| index as u64)?;
         let left_out = left_out(comm, part, names)?;
-        let [triangles_before] = comm.exclusive_scan([part.counts().boundary - left_out.len()])?;
+        let own_triangles = part.counts().boundary - left_out.len();
+        let [triangles_before] = comm.exclusive_scan([own_triangles])?;
+        let [boundary] = comm.all_reduce_sum_u64([own_triangles])?;
+        let totals = Counts { boundary, ..part.totals() };
         let own_singular = part.singular().vertices;
         let own_singular = own_singular.iter().filter(|(local, _)| numbering.owns(*local as usize));
         let own_singular: Vec<[i64; 2]> = own_singular
