@@ -207,7 +207,7 @@ fn wanted_count(options: &Generate) -> Option<u64> {
 fn disk_for(formats: &[Format], folder: &Path) -> Disk {
     let bytes = |format: &Format| match format {
         Format::Elmer => [60, 40, 40],
-        Format::Vtu => [32, 40, 20],
+        Format::Vtu => [32, 44, 30],
         Format::Msh => [65, 60, 50],
         Format::Medit => [60, 40, 30],
         Format::Vol => [58, 40, 42],
