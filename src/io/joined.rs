@@ -14,7 +14,7 @@
 use super::lines::{self, TetLine, TriangleLine};
 use super::number::{Numbering, number};
 use super::once::{LeftOut, left_out};
-use super::output::{Output, folder_and_name, write_together};
+use super::output::{Output, folder_and_name, write_file, write_together};
 use super::pairs::pairs;
 use super::text::{FLOAT_CHARS, Line};
 use super::{WriteError, Written, agree, sum_written};
@@ -27,7 +27,7 @@ use std::path::Path;
 const MOST: u64 = i32::MAX as u64;
 
 /// A format of one file.
-pub(super) struct Format {
+pub(super) struct TextFormat {
     /// What it is called.
     pub name: &'static str,
     /// **Collective.** What is behind each other in the file.
@@ -166,25 +166,19 @@ pub(super) fn write(
     part: &dyn MeshStream,
     names: &Names,
     path: &Path,
-    format: &Format,
+    format: &TextFormat,
 ) -> Result<Written, WriteError> {
     let whole = Whole::of(comm, part, names, format.name)?;
     let sections = (format.sections)(comm, &whole)?;
-    let (folder, name) = folder_and_name(path)?;
     if comm.size() == 1 {
-        let bytes = write_together(
-            comm,
-            &folder,
-            estimate(part),
-            |_| false,
-            |stage| {
-                let mut file = Output::create(&stage.join(name))?;
-                sections.iter().try_for_each(|section| whole.write(section, &mut file))?;
-                file.finish()
-            },
-        )?;
+        let bytes = write_file(path, estimate(part), |path| {
+            let mut file = Output::create(path)?;
+            sections.iter().try_for_each(|section| whole.write(section, &mut file))?;
+            file.finish()
+        })?;
         return Ok(Written { files: 1, bytes });
     }
+    let (folder, name) = folder_and_name(path)?;
     let lengths = agree(comm, whole.lengths(&sections))?;
     let places = places(comm, &lengths)?;
     let bytes = lengths.iter().sum();

@@ -5,7 +5,7 @@ mod groups;
 mod netgen;
 mod runs;
 
-use super::joined::{self, Format, Section, Whole};
+use super::joined::{self, Section, TextFormat, Whole};
 use super::text::Line;
 use super::{WriteError, Written, geomview, vtu};
 use crate::comm::{Communicator, thread};
@@ -48,9 +48,9 @@ pub fn write_joined(
     path: &Path,
 ) -> Result<Written, WriteError> {
     let format = match path.extension().and_then(OsStr::to_str) {
-        Some("msh") => Format { name: "Gmsh", sections: gmsh::sections },
-        Some("mesh") => Format { name: "Medit", sections: medit_sections },
-        Some("vol") => Format { name: "NETGEN", sections: netgen::sections },
+        Some("msh") => TextFormat { name: "Gmsh", sections: gmsh::sections },
+        Some("mesh") => TextFormat { name: "Medit", sections: medit_sections },
+        Some("vol") => TextFormat { name: "NETGEN", sections: netgen::sections },
         _ => return Err(WriteError::UnknownFormat(path.to_path_buf())),
     };
     joined::write(comm, part, names, path, &format)
