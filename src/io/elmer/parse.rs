@@ -111,16 +111,6 @@ impl<'a> Fields<'a> {
         number.map_err(|_| format!("the {what} is no number: '{}'", shown(word)))
     }
 
-    /// The next number, which must be this.
-    #[inline]
-    pub fn expect(&mut self, what: &str, expected: u32) -> Result<(), String> {
-        let found = self.int(what)?;
-        if found == expected {
-            return Ok(());
-        }
-        Err(format!("the {what} is '{found}'; only {expected} is read here"))
-    }
-
     /// Whether nothing is left.
     pub fn is_empty(&self) -> bool {
         self.0.iter().all(|&b| b == b' ')

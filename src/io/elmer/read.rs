@@ -10,7 +10,36 @@ use std::ops::Deref;
 use std::path::{Path, PathBuf};
 
 /// Points, and edges with two nodes, which ElmerGrid keeps among boundary elements: they bound no tet.
-const POINTS_AND_EDGES: [u32; 3] = [101, 102, 202];
+const POINTS_AND_EDGES: [u32; 4] = [101, 102, 202, 203];
+
+/// A shape of elements: its types of first and second order, and how many nodes the second has beside its corners.
+struct Kind {
+    first: u32,
+    second: u32,
+    middles: usize,
+}
+
+const TETS: Kind = Kind { first: TET, second: 510, middles: 6 };
+const TRIANGLES: Kind = Kind { first: TRIANGLE, second: 306, middles: 3 };
+
+/// Which elements are read.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Order {
+    First,
+    /// Of elements of second order the corners, which come first.
+    Corners,
+}
+
+impl Kind {
+    /// The nodes behind the corners of an element of this type.
+    fn middles(&self, code: u32, order: Order) -> Result<usize, String> {
+        match code {
+            _ if code == self.first => Ok(0),
+            _ if code == self.second && order == Order::Corners => Ok(self.middles),
+            _ => Err(format!("the element type is '{code}'; only {} is read here", self.first)),
+        }
+    }
+}
 
 /// Where a mesh stands.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -228,6 +257,18 @@ pub fn read(dir: &Path) -> Result<ElmerMesh, ReadError> {
     read_layout(&only_layout(dir)?)
 }
 
+/// The same for meshes of second order too: of these the corners, and how many elements that were.
+///
+/// # Errors
+/// As [`read`].
+pub(crate) fn read_corners(dir: &Path) -> Result<(ElmerMesh, usize), ReadError> {
+    let mesh = read_ordered(&only_layout(dir)?, Order::Corners)?;
+    let types = mesh.parts.iter().flat_map(|part| &part.header.types);
+    let of_second = types.filter(|(code, _)| [TETS.second, TRIANGLES.second].contains(code));
+    let count = of_second.map(|(_, count)| *count as usize).sum();
+    Ok((mesh, count))
+}
+
 /// The mesh of a folder: its only partition, else `mesh.*`.
 pub(super) fn only_layout(dir: &Path) -> Result<Layout, ReadError> {
     let mut found = layouts(dir)?;
@@ -244,10 +285,14 @@ pub(super) fn only_layout(dir: &Path) -> Result<Layout, ReadError> {
 
 /// Reads one mesh; several threads read its parts.
 pub fn read_layout(layout: &Layout) -> Result<ElmerMesh, ReadError> {
+    read_ordered(layout, Order::First)
+}
+
+fn read_ordered(layout: &Layout, order: Order) -> Result<ElmerMesh, ReadError> {
     let parts = match layout {
-        Layout::Serial(folder) => vec![read_part(folder.join("mesh"), false)?],
+        Layout::Serial(folder) => vec![read_files(folder.join("mesh"), false, order)?],
         Layout::Partitioned { folder, parts } => {
-            let read = |k: u32| read_part(folder.join(format!("part.{k}")), true);
+            let read = |k: u32| read_files(folder.join(format!("part.{k}")), true, order);
             let parts: Vec<_> = (1..=*parts).into_par_iter().map(read).collect();
             parts.into_iter().collect::<Result<_, _>>()?
         }
@@ -272,10 +317,14 @@ pub fn stated_elements(dir: &Path) -> Result<u64, ReadError> {
 }
 
 pub(super) fn read_part(stem: PathBuf, partitioned: bool) -> Result<ElmerPart, ReadError> {
+    read_files(stem, partitioned, Order::First)
+}
+
+fn read_files(stem: PathBuf, partitioned: bool, order: Order) -> Result<ElmerPart, ReadError> {
     let header = read_header(&file(&stem, "header"), partitioned)?;
     let nodes = read_lines(&file(&stem, "nodes"), header.nodes, node)?;
-    let (elements, halo) = read_elements(&file(&stem, "elements"), header.elements)?;
-    let lines = read_lines(&file(&stem, "boundary"), header.boundary, boundary_line)?;
+    let (elements, halo) = read_elements(&file(&stem, "elements"), header.elements, order)?;
+    let lines = read_lines(&file(&stem, "boundary"), header.boundary, |line| boundary_line(line, order))?;
     let (boundary, left_out) = own_boundary(lines, &elements, &halo);
     let shared = match header.shared {
         Some(count) => read_lines(&file(&stem, "shared"), count, shared_node)?,
@@ -288,28 +337,32 @@ pub(super) fn read_part(stem: PathBuf, partitioned: bool) -> Result<ElmerPart, R
 pub type Halo = Rows<(Element, u32)>;
 
 /// Reads the part's own elements, and halo elements.
-fn read_elements(path: &Path, expected: u32) -> Result<(Rows<Element>, Halo), ReadError> {
+fn read_elements(path: &Path, expected: u32, order: Order) -> Result<(Rows<Element>, Halo), ReadError> {
     let (mut own, mut halo) = (Rows::default(), Rows::default());
     own.values.reserve_exact(room(path, expected));
     let mut line = 0;
-    for_each_line(path, element, |elements| {
-        for (element, owner) in elements.drain(..) {
-            line += 1;
-            if owner > 0 {
-                if halo.values.is_empty() {
-                    // Until here each stands on the line of its index.
-                    own.lines.extend(1..line);
-                }
-                halo.values.push((element, owner));
-                halo.lines.push(line);
-            } else {
-                own.values.push(element);
-                if !halo.values.is_empty() {
-                    own.lines.push(line);
+    for_each_line(
+        path,
+        |line| element(line, order),
+        |elements| {
+            for (element, owner) in elements.drain(..) {
+                line += 1;
+                if owner > 0 {
+                    if halo.values.is_empty() {
+                        // Until here each stands on the line of its index.
+                        own.lines.extend(1..line);
+                    }
+                    halo.values.push((element, owner));
+                    halo.lines.push(line);
+                } else {
+                    own.values.push(element);
+                    if !halo.values.is_empty() {
+                        own.lines.push(line);
+                    }
                 }
             }
-        }
-    })?;
+        },
+    )?;
     Ok((own, halo))
 }
 
@@ -407,14 +460,19 @@ fn ids<const N: usize>(fields: &mut Fields, what: &str) -> Result<[u32; N], Stri
     Ok(ids)
 }
 
+fn skip(fields: &mut Fields, nodes: usize) -> Result<(), String> {
+    (0..nodes).try_for_each(|_| fields.int("node").map(drop))
+}
+
 /// An element, and the part whose halo element it is, or 0.
-fn element(line: &[u8]) -> Result<(Element, u32), String> {
+fn element(line: &[u8], order: Order) -> Result<(Element, u32), String> {
     refuse_what_elmer_cuts(line)?;
     let mut fields = Fields::new(line);
     let (id, owner) = fields.int_and_part("element")?;
     let body = fields.int("body")?;
-    fields.expect("element type", TET)?;
+    let middles = TETS.middles(fields.int("element type")?, order)?;
     let nodes = ids(&mut fields, "node")?;
+    skip(&mut fields, middles)?;
     fields.end()?;
     Ok((Element { id, body, nodes }, owner.unwrap_or(0)))
 }
@@ -426,7 +484,7 @@ enum BoundaryLine {
     LeftOut(u32),
 }
 
-fn boundary_line(line: &[u8]) -> Result<BoundaryLine, String> {
+fn boundary_line(line: &[u8], order: Order) -> Result<BoundaryLine, String> {
     refuse_what_elmer_cuts(line)?;
     let mut fields = Fields::new(line);
     let (id, owner) = fields.int_and_part("boundary element")?;
@@ -436,10 +494,9 @@ fn boundary_line(line: &[u8]) -> Result<BoundaryLine, String> {
     if POINTS_AND_EDGES.contains(&kind) {
         return Ok(BoundaryLine::LeftOut(kind));
     }
-    if kind != TRIANGLE {
-        return Err(format!("the element type is '{kind}'; only {TRIANGLE} is read here"));
-    }
+    let middles = TRIANGLES.middles(kind, order)?;
     let nodes = ids(&mut fields, "node")?;
+    skip(&mut fields, middles)?;
     fields.end()?;
     let element = BoundaryElement { id, boundary, parents, nodes };
     Ok(if owner.is_some() { BoundaryLine::LeftOut(kind) } else { BoundaryLine::Own(element) })

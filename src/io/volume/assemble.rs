@@ -44,7 +44,7 @@ pub(super) fn assemble(mut raw: Raw) -> Result<VolumeMesh, Fault> {
         .collect();
     if raw.higher_order > 0 {
         notes.push(format!(
-            "{} of higher order keep their corners alone",
+            "the mesh is of higher order: of {} the corners are taken and the other nodes left out, so curved edges are straight",
             counted(raw.higher_order, "element")
         ));
     }

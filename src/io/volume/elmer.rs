@@ -3,16 +3,17 @@
 use super::assemble::assemble;
 use super::raw::{Label, Raw, Shape};
 use super::{VolumeMesh, gmsh::Ids};
-use crate::io::elmer::{ElmerMesh, names_of, read as read_elmer};
+use crate::io::elmer::{ElmerMesh, names_of, read_corners};
 use crate::io::input::{Fault, ReadError};
 use std::collections::BTreeSet;
 use std::path::Path;
 
 /// Reads the mesh of a folder; names from `mesh.names` there, or in the folder above a partition.
 pub(super) fn read(folder: &Path) -> Result<VolumeMesh, ReadError> {
-    let mesh = read_elmer(folder)?;
+    let (mesh, of_second_order) = read_corners(folder)?;
     let at = mesh.layout.folder().to_path_buf();
     let mut raw = joined(&mesh).map_err(|fault| fault.in_file(&at, b""))?;
+    raw.higher_order = of_second_order;
     [raw.body_names, raw.patch_names] = names_of(&at);
     assemble(raw).map_err(|fault| fault.in_file(&at, b""))
 }

@@ -3,18 +3,37 @@
 use super::raw::{Label, Raw, Shape};
 use crate::io::input::{Fault, Words, shown};
 
-/// What a block of elements holds: the shape and its corners.
+/// What a block of elements holds: the shape and its nodes, corners first.
 pub(super) fn block(keyword: &str) -> Option<(Shape, usize)> {
     Some(match keyword {
         "Edges" => (Shape::Edge, 2),
         "Triangles" => (Shape::Triangle, 3),
         "Tetrahedra" => (Shape::Tet, 4),
+        "EdgesP2" => (Shape::Edge, 3),
+        "TrianglesP2" => (Shape::Triangle, 6),
+        "TetrahedraP2" => (Shape::Tet, 10),
+        "QuadrilateralsQ2" => (Shape::Other("quadrangle"), 9),
+        "HexahedraQ2" => (Shape::Other("hexahedron"), 27),
+        "PrismsP2" => (Shape::Other("prism"), 18),
+        "PyramidsP2" => (Shape::Other("pyramid"), 14),
         "Quadrilaterals" => (Shape::Other("quadrangle"), 4),
         "Hexahedra" | "Hexaedra" => (Shape::Other("hexahedron"), 8),
         "Prisms" => (Shape::Other("prism"), 6),
         "Pyramids" => (Shape::Other("pyramid"), 5),
         _ => return None,
     })
+}
+
+/// Whether a block would change what is read if it were skipped: elements of higher orders than the second, and orders of nodes in which corners need
+/// not be the first.
+fn is_unread(keyword: &str) -> bool {
+    let is_order = |end: &str| matches!(end, "P3" | "P4" | "Q3" | "Q4");
+    keyword.ends_with("Ordering") || keyword.get(keyword.len().saturating_sub(2)..).is_some_and(is_order)
+}
+
+/// Why such a block is refused.
+pub(super) fn unread(keyword: &str) -> String {
+    format!("`{keyword}` is not read: save the mesh in first order")
 }
 
 pub(super) fn parse(content: &[u8]) -> Result<Raw, Fault> {
@@ -60,6 +79,7 @@ pub(super) fn parse(content: &[u8]) -> Result<Raw, Fault> {
                     raw.add(shape, &nodes, label).map_err(|message| words.fault(message))?;
                 }
             }
+            (keyword, _) if is_unread(keyword) => return Err(words.fault(unread(keyword))),
             ("End", _) => return done(raw, has_vertices),
             _ if word[0].is_ascii_alphabetic() => skip_block(&mut words),
             _ => return Err(words.fault(format!("expected a keyword, found `{}`", shown(word)))),

@@ -6,13 +6,16 @@
 //!                     coordinates: 4 bytes in version 1, else 8     last keyword 54, position 0
 //! ```
 
-use super::medit::block;
+use super::medit::{block, unread};
 use super::raw::{Label, Raw, Shape};
 use crate::io::input::{Bytes, Fault};
 
 const DIMENSION: i32 = 3;
 const VERTICES: i32 = 4;
 const END: i32 = 54;
+/// Orders of nodes of second order, in which corners need not be the first.
+const ORDERINGS: [(i32, &str); 3] =
+    [(127, "EdgesP2Ordering"), (129, "TrianglesP2Ordering"), (133, "TetrahedraP2Ordering")];
 
 /// The blocks of elements, by the names that they have in text.
 fn elements(code: i32) -> Option<(Shape, usize)> {
@@ -23,6 +26,11 @@ fn elements(code: i32) -> Option<(Shape, usize)> {
         8 => "Tetrahedra",
         9 => "Prisms",
         10 => "Hexahedra",
+        24 => "TrianglesP2",
+        25 => "EdgesP2",
+        27 => "QuadrilateralsQ2",
+        30 => "TetrahedraP2",
+        33 => "HexahedraQ2",
         49 => "Pyramids",
         _ => return None,
     })
@@ -76,6 +84,9 @@ pub(super) fn parse(content: &[u8]) -> Result<Raw, Fault> {
         let keyword = reader.bytes.i32("a keyword")?;
         if keyword == END {
             break;
+        }
+        if let Some((_, name)) = ORDERINGS.iter().find(|(code, _)| *code == keyword) {
+            return Err(reader.bytes.fault(unread(name)));
         }
         let at = reader.bytes.offset();
         let next = reader.position()?;

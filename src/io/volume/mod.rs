@@ -25,6 +25,8 @@ mod groups;
 mod medit;
 mod medit_binary;
 mod netgen;
+#[cfg(test)]
+mod order_tests;
 mod orient;
 mod periodic;
 mod pvtu;

@@ -417,16 +417,6 @@ fn what_the_file_leaves_open_is_filled_in_and_told() {
     }
 }
 
-#[test]
-fn elements_of_second_order_keep_their_corners() {
-    let text = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n10\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n5 .5 0 0\n6 .5 .5 0\n\
-        7 0 .5 0\n8 0 0 .5\n9 0 .5 .5\n10 .5 0 .5\n$EndNodes\n$Elements\n1\n1 11 2 1 1 1 2 3 4 5 6 7 8 9 10\n$EndElements\n";
-    let found = read_as("m.msh", text).unwrap();
-    assert_eq!((found.mesh.points.len(), found.mesh.tets.len(), found.mesh.triangles.len()), (4, 1, 4));
-    assert!(found.notes.contains(&"6 vertices that no tet uses left out".to_string()), "{:?}", found.notes);
-    assert!(found.notes.contains(&"1 element of higher order keep their corners alone".to_string()));
-}
-
 proptest! {
     #![proptest_config(ProptestConfig {
         rng_seed: proptest::test_runner::RngSeed::Fixed(1),

@@ -13,19 +13,19 @@ pub(super) fn read(path: &Path) -> Result<VolumeMesh, ReadError> {
     let nodes = tetgen_nodes::read(&mut Words::with_comments(&content))
         .map_err(|fault| fault.in_file(&node, &content))?;
     let mut raw = Raw { points: nodes.points, ..Raw::default() };
+    let content = load(&ele)?;
+    let corners = tets(&content, nodes.base, &mut raw).map_err(|fault| fault.in_file(&ele, &content))?;
     if face.exists() {
         let content = load(&face)?;
-        faces(&content, nodes.base, &mut raw).map_err(|fault| fault.in_file(&face, &content))?;
+        faces(&content, nodes.base, corners > 4, &mut raw).map_err(|fault| fault.in_file(&face, &content))?;
     } else {
         raw.notes.push(format!("there is no {}: no boundary numbers", face.display()));
     }
-    let content = load(&ele)?;
-    tets(&content, nodes.base, &mut raw).map_err(|fault| fault.in_file(&ele, &content))?;
     finish(Ok(raw), &ele, &content)
 }
 
-/// `count corners attributes`, then `id vertex… region`.
-fn tets(content: &[u8], base: i64, raw: &mut Raw) -> Result<(), Fault> {
+/// `count nodes attributes`, then `id vertex… region`; returns the number of nodes of each.
+fn tets(content: &[u8], base: i64, raw: &mut Raw) -> Result<usize, Fault> {
     let mut words = Words::with_comments(content);
     let count = words.count("tetrahedra", 5)?;
     let corners = words.int("the number of corners, 4 or 10")?;
@@ -42,7 +42,7 @@ fn tets(content: &[u8], base: i64, raw: &mut Raw) -> Result<(), Fault> {
         words.rest_of_line();
         raw.add(Shape::Tet, &nodes, label).map_err(|message| words.fault(message))?;
     }
-    Ok(())
+    Ok(corners as usize)
 }
 
 /// An attribute, which may be written as `1.0`. Others than whole ones tell regions apart by their entity alone.
@@ -56,21 +56,32 @@ fn region(words: &mut Words) -> Result<Label, Fault> {
     Ok(Label { entity: value.to_bits() as i64, number: 0 })
 }
 
-/// `count marker`, then `id vertex vertex vertex marker`.
-fn faces(content: &[u8], base: i64, raw: &mut Raw) -> Result<(), Fault> {
+/// `count marker`, then `id vertex… marker`, and with `-nn` the tets on both sides.
+///
+/// Beside tets of second order (`-o2`) faces have six nodes too, which the header does not say: the columns tell, as
+/// three nodes with all that may follow them are fewer.
+fn faces(content: &[u8], base: i64, second_order: bool, raw: &mut Raw) -> Result<(), Fault> {
     let mut words = Words::with_comments(content);
     let count = words.count("faces", 4)?;
     let has_marker = words.next_in_line().is_some_and(|word| word != b"0");
     words.rest_of_line();
+    let has_six = second_order && columns(&words) >= 1 + 6 + usize::from(has_marker);
     let mut nodes = Vec::new();
     for _ in 0..count {
         words.int("the number of a face")?;
-        read_nodes(&mut words, 3, base, raw.points.len(), &mut nodes)?;
+        read_nodes(&mut words, if has_six { 6 } else { 3 }, base, raw.points.len(), &mut nodes)?;
         let marker = if has_marker { words.int("a marker")? } else { 0 };
         words.rest_of_line();
         raw.add(Shape::Triangle, &nodes, Label::number(marker)).map_err(|message| words.fault(message))?;
     }
     Ok(())
+}
+
+/// The words of the next line that has any.
+fn columns(words: &Words) -> usize {
+    let mut ahead = words.clone();
+    let first = usize::from(ahead.next().is_some());
+    first + std::iter::from_fn(|| ahead.next_in_line()).count()
 }
 
 fn read_nodes(
