@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Installs what the tests need beside Rust: MPI, libclang (for its bindings), TetGen, Python with numpy.
+# Installs what the tests need beside Rust: MPI, libclang (for its bindings), TetGen, Python with numpy, and the programs that read our
+# files, as modules of Python: Gmsh, NGSolve with NETGEN, meshio.
 # Debian and Ubuntu by apt; elsewhere it says what is missing. Does nothing where all is there.
 set -euo pipefail
 
@@ -12,6 +13,17 @@ compgen -G '/usr/lib/llvm-*/lib/libclang[.-][s0-9]*' >/dev/null || compgen -G '/
 command -v cc >/dev/null && command -v c++ >/dev/null || missing+=(build-essential)
 command -v pkg-config >/dev/null || missing+=(pkg-config)
 command -v python3 >/dev/null || missing+=(python3 python3-numpy)
+# Without these tests are skipped, aloud: they are no reason to give up where there is no apt.
+if command -v apt-get >/dev/null; then
+    command -v tetgen >/dev/null || missing+=(tetgen)
+    python3 -m pip --version >/dev/null 2>&1 || missing+=(python3-pip)
+    # What the wheels of Gmsh and NETGEN need of the system.
+    libraries=$(PATH=$PATH:/sbin:/usr/sbin ldconfig -p)
+    for library in GL.so.1:libgl1 GLU.so.1:libglu1-mesa Xrender.so.1:libxrender1 Xcursor.so.1:libxcursor1 Xft.so.2:libxft2 \
+        Xinerama.so.1:libxinerama1 Xfixes.so.3:libxfixes3 fontconfig.so.1:libfontconfig1 gomp.so.1:libgomp1; do
+        [[ $libraries == *"lib${library%%:*}"* ]] || missing+=("${library##*:}")
+    done
+fi
 
 if [ ${#missing[@]} -gt 0 ]; then
     if ! command -v apt-get >/dev/null; then
@@ -25,7 +37,11 @@ if [ ${#missing[@]} -gt 0 ]; then
     "${sudo[@]}" apt-get install -y -qq --no-install-recommends "${missing[@]}"
 fi
 
-if ! python3 -c 'import numpy' 2>/dev/null; then
-    python3 -m pip install --quiet numpy 2>/dev/null \
-        || python3 -m pip install --quiet --break-system-packages numpy
-fi
+# The module and the package that has it.
+for module in numpy:numpy gmsh:gmsh ngsolve:ngsolve netgen.csg:netgen-mesher meshio:meshio; do
+    python3 -c "import ${module%%:*}" 2>/dev/null && continue
+    package=${module##*:}
+    python3 -m pip install --quiet "$package" 2>/dev/null \
+        || python3 -m pip install --quiet --break-system-packages "$package" \
+        || echo "no $package: tests that need it are skipped" >&2
+done

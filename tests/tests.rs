@@ -1,6 +1,7 @@
 //! tetmill as its users run it: geometries, ranks, the command line, MPI.
 
 mod cli;
+mod clients;
 mod common;
 mod decompose;
 mod geometries;

@@ -1,0 +1,296 @@
+//! What other programs find in files of ours, and we in theirs: names, numbers of elements and areas by name. The programs are Gmsh, NGSolve
+//! and meshio, as modules of Python; without one its test is skipped, aloud.
+
+use csg::{BodyId, PatchId};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use tetmill::Point;
+use tetmill::io::plain::PlainPart;
+use tetmill::io::{serial, volume};
+use tetmill::kernel::simplex;
+use tetmill::mesh::{BoundaryTriangle, Class, Label, Mesh, Names, TET_FACES, VertexId};
+
+/// By name the number of elements and their area or volume.
+type Sizes = BTreeMap<String, (u64, f64)>;
+
+/// What a program finds: boundaries and bodies.
+type Found = [Sizes; 2];
+
+/// A Python program that reads or writes meshes.
+struct Client(&'static str);
+
+const GMSH: Client = Client("gmsh_groups.py");
+const MESHIO: Client = Client("meshio_groups.py");
+const NGSOLVE: Client = Client("ngsolve_regions.py");
+
+impl Client {
+    /// Runs the script on a file or folder; its output, unless the module is missing.
+    fn run(&self, path: &Path) -> Option<String> {
+        let script = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/clients").join(self.0);
+        let output = Command::new("python3").arg(script).arg(path).output().unwrap();
+        let said = String::from_utf8_lossy(&output.stdout).into_owned();
+        let complaint = String::from_utf8_lossy(&output.stderr);
+        // The module, or a library of the system that it needs, is not there.
+        if ["ModuleNotFoundError", "ImportError", "OSError: lib"]
+            .iter()
+            .any(|error| complaint.contains(error))
+        {
+            eprintln!("SKIPPED: {}", complaint.lines().last().unwrap_or_default());
+            return None;
+        }
+        assert!(output.status.success(), "{}: {said}{complaint}", self.0);
+        Some(said)
+    }
+
+    /// What the program finds in a mesh.
+    fn find(&self, path: &Path) -> Option<Found> {
+        let said = self.run(path)?;
+        let last = said.lines().last().unwrap();
+        let found: BTreeMap<String, Sizes> = serde_json::from_str(last).unwrap();
+        Some(["boundaries", "bodies"].map(|kind| found[kind].clone()))
+    }
+}
+
+/// Cells of the box along each axis: 288 squares on its faces and in the middle.
+const CELLS: [u32; 3] = [8, 8, 4];
+
+/// A box of cubes of six tets each, two bodies side by side or one; each square of a cell on the boundary is a patch of its own.
+fn squares(bodies: u32) -> Mesh {
+    const ORDERS: [[usize; 3]; 6] = [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 2, 1], [2, 1, 0], [1, 0, 2]];
+    let [nx, ny, nz] = CELLS.map(|n| n + 1);
+    let id = |[x, y, z]: [u32; 3]| VertexId((z * ny + y) * nx + x);
+    let mut mesh = Mesh::default();
+    for k in 0..nx * ny * nz {
+        let place = [k % nx, k / nx % ny, k / nx / ny];
+        mesh.points.push(Point::from(place.map(f64::from)));
+        // Patches meet in all of their vertices.
+        mesh.classes.push(Class::Corner(csg::CornerId(k)));
+    }
+    let body_of = |cell: [u32; 3]| u32::from(bodies == 2 && cell[0] >= CELLS[0] / 2);
+    let mut patches: BTreeMap<[[u32; 3]; 2], u32> = BTreeMap::new();
+    for cell in 0..CELLS.iter().product() {
+        let cell = [cell % CELLS[0], cell / CELLS[0] % CELLS[1], cell / CELLS[0] / CELLS[1]];
+        for (k, order) in ORDERS.iter().enumerate() {
+            let mut path = [cell; 4];
+            for step in 0..3 {
+                path[step + 1] = path[step];
+                path[step + 1][order[step]] += 1;
+            }
+            if k >= 3 {
+                path.swap(0, 3);
+            }
+            mesh.tets.push(path.map(id));
+            mesh.bodies.push(BodyId(body_of(cell)));
+            for face in TET_FACES.map(|face| face.map(|v| path[v])) {
+                let flat = |axis: usize, at: u32| face.iter().all(|p| p[axis] == at);
+                let is_outer = (0..3).any(|axis| flat(axis, 0) || flat(axis, CELLS[axis]));
+                let is_between = bodies == 2 && body_of(cell) == 0 && flat(0, CELLS[0] / 2);
+                if is_outer || is_between {
+                    let corner = |pick: fn(u32, u32) -> u32| {
+                        [0, 1, 2].map(|axis| face.iter().map(|p| p[axis]).reduce(pick).unwrap())
+                    };
+                    let next = patches.len() as u32;
+                    let patch = *patches.entry([corner(u32::min), corner(u32::max)]).or_insert(next);
+                    mesh.triangles.push(BoundaryTriangle { vertices: face.map(id), patch: PatchId(patch) });
+                }
+            }
+        }
+    }
+    mesh
+}
+
+fn patch_count(mesh: &Mesh) -> u32 {
+    mesh.triangles.iter().map(|t| t.patch.0 + 1).max().unwrap()
+}
+
+/// What a mesh has under the keys of its labels.
+fn sizes(mesh: &Mesh, names: &Names, keys: impl Fn(&Label) -> Vec<String>) -> Found {
+    let mut found = Found::default();
+    let mut add = |kind: usize, label: &Label, size: f64| {
+        for key in keys(label) {
+            let entry = found[kind].entry(key).or_insert((0, 0.0));
+            entry.0 += 1;
+            entry.1 += size;
+        }
+    };
+    for t in &mesh.triangles {
+        let [a, b, c] = t.vertices.map(|v| mesh.points[v.index()]);
+        add(0, &names.patches[t.patch.index()], 0.5 * (b - a).cross(&(c - a)).norm());
+    }
+    for (t, body) in mesh.tets.iter().zip(&mesh.bodies) {
+        let [a, b, c, d] = t.map(|v| mesh.points[v.index()]);
+        add(1, &names.bodies[body.index()], simplex::volume(&a, &b, &c, &d));
+    }
+    found
+}
+
+#[track_caller]
+fn assert_alike(found: &Found, expected: &Found, what: &str) {
+    for (found, expected) in found.iter().zip(expected) {
+        let keys = |sizes: &Sizes| sizes.keys().cloned().collect::<Vec<_>>();
+        assert_eq!(keys(found), keys(expected), "{what}");
+        for (name, (count, size)) in expected {
+            let (found_count, found_size) = found[name];
+            assert_eq!(found_count, *count, "{what}: elements of {name}");
+            assert!((found_size - size).abs() < 1e-9 * size, "{what}: {name} has {found_size}, not {size}");
+        }
+    }
+}
+
+fn several(number: u32, names: &[&str]) -> Label {
+    Label { number, names: names.iter().map(ToString::to_string).collect() }
+}
+
+/// Labels of patches by their index, as real files have them.
+type Labels = fn(u32) -> Label;
+
+/// Named, unnamed, repeated and sparse numbers; several numbers of one name.
+fn mixed(patch: u32) -> Label {
+    match patch % 6 {
+        0 => Label::new(7, "skin"),
+        1 => Label::new(12, "skin"),
+        2 => Label::unnamed(3),
+        3 => Label::new(900, "clamp"),
+        4 => Label::unnamed(41),
+        _ => Label::new(12, "skin"),
+    }
+}
+
+/// A number for each patch, most of them named.
+fn hundreds(patch: u32) -> Label {
+    if patch.is_multiple_of(7) {
+        Label::unnamed(patch + 1)
+    } else {
+        Label::new(patch + 1, format!("wall_{patch}"))
+    }
+}
+
+/// Numbers up to two thousand million.
+fn sparse(patch: u32) -> Label {
+    let number = 1 + patch % 20 * 100_000_000;
+    if patch % 20 == 3 { Label::unnamed(number) } else { Label::new(number, format!("far_{}", patch % 20)) }
+}
+
+/// Each in one to three groups.
+fn groups(patch: u32) -> Label {
+    match patch % 4 {
+        0 => several(1, &["all"]),
+        1 => several(2, &["all", "clamp"]),
+        2 => several(3, &["all", "clamp", "hot"]),
+        _ => several(9, &["all", "hot"]),
+    }
+}
+
+const CASES: [(&str, Labels); 4] =
+    [("mixed", mixed), ("hundreds", hundreds), ("sparse", sparse), ("groups", groups)];
+
+/// Each case with one and two bodies, written with this ending.
+fn for_each_case(ending: &str, mut check: impl FnMut(&Path, &Mesh, &Names, &str)) {
+    let dir = tempfile::tempdir().unwrap();
+    for bodies in [1, 2] {
+        let mesh = squares(bodies);
+        for (case, label) in CASES {
+            let patches = (0..patch_count(&mesh)).map(label).collect();
+            let bodies_of = match case {
+                "groups" => vec![several(4, &["solid", "copper"]), several(5, &["solid"])],
+                "sparse" => vec![Label::new(3_000_000, "copper"), Label::unnamed(17)],
+                _ => vec![Label::new(2, "copper"), Label::unnamed(6)],
+            };
+            let names = Names { bodies: bodies_of[..bodies as usize].to_vec(), patches };
+            let path = dir.path().join(format!("{case}.{ending}"));
+            serial::write(&PlainPart::whole(&mesh), &names, &path).unwrap();
+            check(&path, &mesh, &names, &format!("{case}, {bodies} bodies"));
+        }
+    }
+}
+
+/// Under Gmsh's names a label is in a group for each of its names, else in one of its number.
+fn by_group(label: &Label) -> Vec<String> {
+    if label.names.is_empty() { vec![format!("#{}", label.number)] } else { label.names.clone() }
+}
+
+#[test]
+fn ngsolve_finds_all_names_and_areas() {
+    for_each_case("vol", |path, mesh, names, case| {
+        let Some(found) = NGSOLVE.find(path) else { return };
+        let expected = sizes(mesh, names, |label| vec![label.name().unwrap_or("default").to_string()]);
+        assert_alike(&found, &expected, case);
+    });
+}
+
+#[test]
+fn gmsh_finds_all_names_and_areas() {
+    for_each_case("msh", |path, mesh, names, case| {
+        let Some(found) = GMSH.find(path) else { return };
+        assert_alike(&found, &sizes(mesh, names, by_group), case);
+    });
+}
+
+#[test]
+fn meshio_finds_all_names_and_areas() {
+    for_each_case("msh", |path, mesh, names, case| {
+        let Some(found) = MESHIO.find(path) else { return };
+        assert_alike(&found, &sizes(mesh, names, by_group), case);
+    });
+}
+
+#[test]
+fn our_own_reader_finds_all_names_and_areas() {
+    for_each_case("msh", |path, mesh, names, case| {
+        let found = volume::read(path).unwrap();
+        assert_alike(&sizes(&found.mesh, &found.names, by_group), &sizes(mesh, names, by_group), case);
+    });
+    let main = |label: &Label| vec![label.name().unwrap_or("default").to_string()];
+    for_each_case("vol", |path, mesh, names, case| {
+        let found = volume::read(path).unwrap();
+        assert_alike(&sizes(&found.mesh, &found.names, main), &sizes(mesh, names, main), case);
+    });
+}
+
+#[test]
+fn groups_and_periods_of_gmshs_files_are_read() {
+    let dir = tempfile::tempdir().unwrap();
+    let client = Client("gmsh_write.py");
+    if client.run(dir.path()).is_none() {
+        return;
+    }
+    for version in ["2.2", "4.1"] {
+        for (binary, order) in [(0, 1), (1, 1), (0, 2), (1, 2)] {
+            let name = format!("{version}-{binary}-{order}.msh");
+            let found = volume::read(&dir.path().join(&name)).unwrap();
+            let [boundaries, bodies] = sizes(&found.mesh, &found.names, |label| label.names.clone());
+            let areas: Vec<(&str, f64)> = boundaries.iter().map(|(name, size)| (&**name, size.1)).collect();
+            let [("clamp", clamp), ("ends", ends), ("outer", outer)] = areas[..] else { panic!("{areas:?}") };
+            let off =
+                [(clamp, 1.0), (ends, 2.0), (outer, 10.0), (bodies["all"].1, 2.0), (bodies["first"].1, 1.0)];
+            assert!(off.iter().all(|(found, expected)| (found - expected).abs() < 1e-9), "{name}: {off:?}");
+            let [link] = &found.links[..] else { panic!("{name}: {:?}", found.links) };
+            let by_two = Point::new(2.0, 0.0, 0.0).coords;
+            assert!((link.motion.translation.vector - by_two).norm() < 1e-12, "{name}");
+            let says_order = found.notes.iter().any(|note| note.starts_with("the mesh is of higher order"));
+            assert_eq!(says_order, order == 2, "{name}: {:?}", found.notes);
+        }
+    }
+}
+
+#[test]
+fn periodic_meshes_of_netgen_are_read() {
+    let dir = tempfile::tempdir().unwrap();
+    let client = Client("netgen_write.py");
+    if client.run(dir.path()).is_none() {
+        return;
+    }
+    for order in [1, 2] {
+        let found = volume::read(&dir.path().join(format!("{order}.vol"))).unwrap();
+        let [boundaries, bodies] = sizes(&found.mesh, &found.names, |label| label.names.clone());
+        let areas: Vec<(&str, f64)> =
+            boundaries.iter().map(|(name, size)| (&**name, size.1.round())).collect();
+        assert_eq!(areas, [("left", 1.0), ("right", 1.0), ("side", 4.0)]);
+        assert!((bodies["block"].1 - 1.0).abs() < 1e-9);
+        let [link] = &found.links[..] else { panic!("{:?}", found.links) };
+        assert!((link.motion.translation.vector - Point::new(1.0, 0.0, 0.0).coords).norm() < 1e-12);
+        let says_order = found.notes.iter().any(|note| note.starts_with("the mesh is of higher order"));
+        assert_eq!(says_order, order == 2, "{:?}", found.notes);
+    }
+}
