@@ -92,5 +92,5 @@ fn read_mesh(path: &Path, note: &mut dyn FnMut(&str)) -> Result<Model, Failure> 
             corner.z
         )));
     }
-    Ok(Model::Given(GivenMesh { mesh: read.mesh, names: read.names, links: read.links }))
+    Ok(Model::Given(Box::new(GivenMesh { mesh: read.mesh, names: read.names, links: read.links })))
 }

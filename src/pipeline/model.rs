@@ -18,7 +18,7 @@ pub enum Model {
     /// Solids of triangles.
     Facets(Box<FacetSolid>),
     /// A mesh that came without its geometry.
-    Given(GivenMesh),
+    Given(Box<GivenMesh>),
 }
 
 /// A geometry with everything that was found out about it.

@@ -4,14 +4,14 @@
 //! place and refuses. So where a boundary or body is in several groups the file is of version 4.1, in which an entity has any number of groups, and
 //! which Gmsh, meshio and MFEM read.
 
-use super::coordinates;
 use super::groups::Groups;
 use super::runs::Runs;
+use super::{coordinates, listed};
 use crate::comm::Communicator;
 use crate::io::WriteError;
 use crate::io::joined::{Section, Whole};
 use crate::io::text::Line;
-use crate::mesh::{Label, Names};
+use crate::mesh::Names;
 
 /// **Collective.** The file.
 pub(super) fn sections<'a>(
@@ -152,29 +152,26 @@ fn periodic(whole: &Whole, begin: &str) -> String {
     text + "$EndPeriodic\n"
 }
 
-/// What the file cannot hold of these names, a sentence each: the numbers of boundaries and bodies that share a name.
+/// What the file cannot hold of these names, a sentence each: numbers of boundaries and bodies that have another one's name.
 pub(super) fn losses(names: &Names) -> Vec<String> {
     let mut losses = Vec::new();
     for (kind, labels) in [("bodies", &names.bodies), ("boundaries", &names.patches)] {
         let groups = Groups::of(labels);
-        for group in &groups.list {
-            let mut numbers: Vec<u32> = numbers_in(labels, &groups, group.tag).collect();
-            numbers.sort_unstable();
-            numbers.dedup();
-            let numbers: Vec<String> = numbers.into_iter().map(|number| number.to_string()).collect();
-            if groups.are_apart() && numbers != [group.tag.to_string()] {
-                losses.push(format!(
-                    "Gmsh has one number a name: {kind} {} are the physical group {} (`{}`)",
-                    numbers.join(", "),
-                    group.tag,
-                    group.name
-                ));
-            }
+        let mut lost: Vec<(u32, &[u32], &[String])> = (labels.iter().zip(&groups.of))
+            .filter(|(label, tags)| !tags.contains(&label.number))
+            .map(|(label, tags)| (label.number, tags.as_slice(), label.names.as_slice()))
+            .collect();
+        lost.sort_unstable();
+        lost.dedup();
+        let one = |(number, tags, names): &(u32, &[u32], &[String])| {
+            let groups: Vec<String> =
+                tags.iter().zip(*names).map(|(tag, name)| format!("{tag} (`{name}`)")).collect();
+            format!("{number} in {}", groups.join(" and "))
+        };
+        if !lost.is_empty() {
+            let list = listed(lost.iter().map(one));
+            losses.push(format!("Gmsh has one number a name: of {kind}, {list}"));
         }
     }
     losses
-}
-
-fn numbers_in(labels: &[Label], groups: &Groups, tag: u32) -> impl Iterator<Item = u32> {
-    labels.iter().zip(&groups.of).filter(move |(_, tags)| tags.contains(&tag)).map(|(label, _)| label.number)
 }

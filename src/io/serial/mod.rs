@@ -68,6 +68,14 @@ pub fn losses(names: &Names, path: &Path) -> Vec<String> {
     }
 }
 
+/// The first of some texts, and how many more there are.
+fn listed(texts: impl Iterator<Item = String>) -> String {
+    const SHOWN: usize = 10;
+    let texts: Vec<String> = texts.collect();
+    let list = texts[..texts.len().min(SHOWN)].join(", ");
+    if texts.len() > SHOWN { format!("{list} and {} more", texts.len() - SHOWN) } else { list }
+}
+
 fn coordinates(line: &mut Line, point: &[f64; 3]) {
     line.float(point[0]).blank().float(point[1]).blank().float(point[2]);
 }
@@ -141,7 +149,7 @@ mod tests {
         assert_eq!(written_with(&two_tets(), &names, "m.msh"), expected);
         assert!(losses(&names, Path::new("m.msh")).is_empty());
         let said = losses(&names, Path::new("m.vol"));
-        assert_eq!(said, ["NETGEN has one name for a boundary: of number 2 it is `all`, without `clamp`"]);
+        assert_eq!(said, ["NETGEN has one name for a number: of boundaries, 2 is `all` without `clamp`"]);
         assert_eq!(losses(&names, Path::new("m.mesh")).len(), 1);
     }
 
@@ -155,7 +163,7 @@ mod tests {
         assert!(text.contains("$PhysicalNames\n2\n2 3 \"skin\"\n3 1 \"lower\"\n"), "{text}");
         assert!(text.contains("\n1 2 2 3 1 1 3 2\n") && text.contains("\n6 2 2 3 2 3 4 5\n"), "{text}");
         let said = losses(&names, Path::new("m.msh"));
-        assert_eq!(said, ["Gmsh has one number a name: boundaries 3, 6 are the physical group 3 (`skin`)"]);
+        assert_eq!(said, ["Gmsh has one number a name: of boundaries, 6 in 3 (`skin`)"]);
     }
 
     #[test]

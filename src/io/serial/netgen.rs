@@ -4,13 +4,13 @@
 //! behind its memory by older versions and is ignored by newer ones, which then call all boundaries `default`. So each
 //! number from 1 to the largest gets a name here.
 
-use super::coordinates;
+use super::{coordinates, listed};
 use crate::comm::Communicator;
 use crate::io::WriteError;
 use crate::io::domains;
 use crate::io::joined::{Section, Whole};
 use crate::mesh::{Label, Names};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// What NETGEN calls a body or boundary without a name.
 const UNNAMED: &str = "default";
@@ -59,41 +59,32 @@ pub(super) fn sections<'a>(
 /// What the file cannot hold of these names, a sentence each.
 pub(super) fn losses(names: &Names) -> Vec<String> {
     let mut losses = Vec::new();
-    for (kind, labels) in [("body", &names.bodies), ("boundary", &names.patches)] {
-        for label in labels.iter().filter(|label| label.names.len() > 1) {
-            losses.push(format!(
-                "NETGEN has one name for a {kind}: of number {} it is `{}`, without {}",
-                label.number,
-                word(&label.names[0]),
-                quoted(&label.names[1..])
-            ));
-        }
-        let changed = labels.iter().flat_map(|label| label.name()).filter(|name| word(name) != **name);
-        for name in changed.collect::<std::collections::BTreeSet<_>>() {
-            losses.push(format!("NETGEN reads words: the {kind} `{name}` is `{}`", word(name)));
-        }
-        let numbered = Numbered::of(labels);
-        let moved: BTreeMap<(u32, u32), &Label> = (labels.iter().zip(&numbered.of))
-            .filter(|(label, number)| label.number != **number)
-            .map(|(label, number)| ((label.number, *number), label))
-            .collect();
-        const SHOWN: usize = 5;
-        let of_one = |((old, new), label): (&(u32, u32), &&Label)| match label.name() {
-            Some(name) => format!("{old} (`{name}`) is {new}"),
-            None => format!("{old} is {new}"),
+    for (kind, labels) in [("bodies", &names.bodies), ("boundaries", &names.patches)] {
+        let mut tell = |of: BTreeSet<(u32, String)>, what: &str| {
+            if !of.is_empty() {
+                losses.push(format!("{what}: of {kind}, {}", listed(of.into_iter().map(|(_, text)| text))));
+            }
         };
-        if !moved.is_empty() {
-            let more = if moved.len() > SHOWN { ", …" } else { "" };
-            let list = moved.iter().take(SHOWN).map(of_one).collect::<Vec<_>>().join(", ");
-            losses.push(format!("NETGEN counts from 1, with one name a number: {kind} {list}{more}"));
-        }
+        let further = labels.iter().filter(|label| label.names.len() > 1).map(|label| {
+            let names: Vec<String> = label.names.iter().map(|name| format!("`{name}`")).collect();
+            (label.number, format!("{} is {} without {}", label.number, names[0], names[1..].join(", ")))
+        });
+        tell(further.collect(), "NETGEN has one name for a number");
+        let changed = labels.iter().filter_map(|label| Some((label.number, label.name()?)));
+        let changed = changed.filter(|(_, name)| word(name) != **name);
+        tell(
+            changed.map(|(_, name)| (0, format!("`{name}` is `{}`", word(name)))).collect(),
+            "NETGEN reads words",
+        );
+        let moved =
+            labels.iter().zip(Numbered::of(labels).of).filter(|(label, number)| label.number != *number);
+        let moved = moved.map(|(label, number)| {
+            let name = label.name().map_or(String::new(), |name| format!(" (`{name}`)"));
+            (label.number, format!("{}{name} is {number}", label.number))
+        });
+        tell(moved.collect(), "NETGEN counts from 1, and has one name for a number");
     }
-    losses.dedup();
     losses
-}
-
-fn quoted(names: &[String]) -> String {
-    names.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
 }
 
 /// A name as the older readers take it: one word.
@@ -119,7 +110,7 @@ impl Numbered {
         let of_label = kinds.clone();
         // In the order of labels within a number.
         kinds.sort_by_key(|(number, _)| *number);
-        let mut seen = std::collections::BTreeSet::new();
+        let mut seen = BTreeSet::new();
         kinds.retain(|kind| seen.insert(kind.clone()));
         let largest = kinds.last().map_or(0, |(number, _)| *number);
         let count_anew = largest > LARGEST_KEPT && u64::from(largest) > 2 * kinds.len() as u64;
@@ -196,7 +187,7 @@ mod tests {
         assert_eq!(numbered(&labels), (vec![5, 2, 3, 5], names));
         assert_eq!(
             losses(&Names { patches: labels.to_vec(), ..Names::default() }),
-            ["NETGEN reads words: the boundary `a lid` is `a_lid`"]
+            ["NETGEN reads words: of boundaries, `a lid` is `a_lid`"]
         );
     }
 
@@ -209,7 +200,7 @@ mod tests {
         assert_eq!(
             told,
             [
-                "NETGEN counts from 1, with one name a number: boundary 7 is 1, 1000000 (`skin`) is 2, 2000000000 (`lid`) is 3"
+                "NETGEN counts from 1, and has one name for a number: of boundaries, 7 is 1, 1000000 (`skin`) is 2, 2000000000 (`lid`) is 3"
             ]
         );
         let dense: Vec<Label> = (1..=20_000).map(Label::unnamed).collect();

@@ -158,6 +158,9 @@ fn column(periodic: impl Fn(&[[u32; 2]]) -> String, stretch: f64) -> String {
     text + "$EndElements\n" + &periodic(&pairs)
 }
 
+/// The text of a section for pairs.
+type Section = fn(&[[u32; 2]]) -> String;
+
 fn section(pairs: &[[u32; 2]]) -> String {
     let lines: String = pairs.iter().map(|[image, of]| format!("{image} {of}\n")).collect();
     format!(
@@ -192,10 +195,10 @@ fn pairs_that_are_no_motion_or_no_whole_patch_are_left_out_aloud() {
     };
     let part = |pairs: &[[u32; 2]]| section(&pairs[..3]);
     let twice = |pairs: &[[u32; 2]]| section(&[pairs[0], [pairs[0][0], pairs[1][1]]]);
-    let said: [(&dyn Fn(&[[u32; 2]]) -> String, &str); 3] = [
-        (&crossed, "1 periodic surface whose triangles are not those of another"),
-        (&part, "1 periodic surface whose triangles are not those of another"),
-        (&twice, "images of several"),
+    let said: [(Section, &str); 3] = [
+        (crossed, "1 periodic surface whose triangles are not those of another"),
+        (part, "1 periodic surface whose triangles are not those of another"),
+        (twice, "not paired one to one"),
     ];
     for (pairs, note) in said {
         let found = read_as("m.msh", &column(pairs, 0.0));

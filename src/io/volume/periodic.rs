@@ -17,6 +17,9 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 /// Rotations nearer to none than this angle are none: what fitting leaves of a translation.
 const NO_ROTATION: f64 = 1e-12;
 
+/// Iterations of a singular value decomposition of three by three numbers, which takes a few.
+const MOST_SWEEPS: usize = 100;
+
 /// The links of a mesh.
 pub(super) fn links(mesh: &Mesh, given: &[PeriodicPairs], notes: &mut Vec<String>) -> Vec<Link> {
     if given.is_empty() {
@@ -28,11 +31,13 @@ pub(super) fn links(mesh: &Mesh, given: &[PeriodicPairs], notes: &mut Vec<String
         mesh.triangles.iter().map(|t| (sorted_face(t.vertices), t.patch)).collect();
     let mut sizes: BTreeMap<PatchId, usize> = BTreeMap::new();
     mesh.triangles.iter().for_each(|t| *sizes.entry(t.patch).or_default() += 1);
-    let mut links: Vec<(i64, Link)> = Vec::new();
+    // The number in the file and the motion of each identification.
+    let mut kinds: Vec<(i64, Isometry3<f64>)> = Vec::new();
+    let mut links: Vec<Link> = Vec::new();
     let mut left_out = 0;
     for PeriodicPairs { identification, pairs } in given {
         let Some(originals) = originals(pairs) else {
-            notes.push("periodic vertices that are images of several at once left out".into());
+            notes.push("periodic vertices that are not paired one to one left out".into());
             continue;
         };
         let patch_pairs = patch_pairs(mesh, &originals, &patch_of);
@@ -42,20 +47,23 @@ pub(super) fn links(mesh: &Mesh, given: &[PeriodicPairs], notes: &mut Vec<String
                 left_out += 1;
                 continue;
             };
-            let on_image: BTreeSet<VertexId> =
-                mesh.triangles.iter().filter(|t| t.patch == image).flat_map(|t| t.vertices).collect();
-            let pairs: Vec<[Point; 2]> =
-                on_image.iter().map(|v| [*v, originals[v]].map(|v| mesh.points[v.index()])).collect();
-            let motion = fitted(&pairs);
-            let off = pairs.iter().map(|[image, of]| (motion * of - image).norm()).fold(0.0, f64::max);
-            if off > distance {
+            let pairs = vertex_pairs(mesh, image, &originals);
+            // One motion for all patches that it fits, as they may have vertices in common.
+            let fits = |motion: &Isometry3<f64>| largest_gap(&pairs, motion) <= distance;
+            let known = kinds.iter().position(|(number, motion)| number == identification && fits(motion));
+            let motion = known.map_or_else(|| fitted(&pairs), |kind| kinds[kind].1);
+            if !fits(&motion) {
                 notes.push(format!(
-                    "the periodic boundary around ({}, {}, {}) is no rigid motion of another, by {off:e}: it is not periodic here",
-                    pairs[0][0].x, pairs[0][0].y, pairs[0][0].z
+                    "the periodic boundary around ({}, {}, {}) is no rigid motion of another, by {:e}: it is not periodic here",
+                    pairs[0][0].x, pairs[0][0].y, pairs[0][0].z, largest_gap(&pairs, &motion)
                 ));
                 continue;
             }
-            links.push((*identification, Link { identification: 0, of, image, motion }));
+            let kind = known.unwrap_or_else(|| {
+                kinds.push((*identification, motion));
+                kinds.len() - 1
+            });
+            links.push(Link { identification: kind as u32 + 1, of, image, motion });
         }
     }
     if left_out > 0 {
@@ -64,14 +72,17 @@ pub(super) fn links(mesh: &Mesh, given: &[PeriodicPairs], notes: &mut Vec<String
             counted(left_out, "periodic surface")
         ));
     }
-    numbered(links, distance)
+    links.sort_by_key(|link| (link.identification, link.of, link.image));
+    links.dedup();
+    links
 }
 
-/// By image what it is the image of; `None` if a vertex is the image of two.
+/// By image what it is the image of; `None` if a vertex is the image of two or has two.
 fn originals(pairs: &[[u32; 2]]) -> Option<BTreeMap<VertexId, VertexId>> {
-    let mut originals = BTreeMap::new();
+    let (mut originals, mut images) = (BTreeMap::new(), BTreeMap::new());
     for [image, of] in pairs.iter().map(|pair| pair.map(VertexId)) {
-        if originals.insert(image, of).is_some_and(|before| before != of) {
+        let is_other = |before: Option<VertexId>, now| before.is_some_and(|before| before != now);
+        if is_other(originals.insert(image, of), of) || is_other(images.insert(of, image), image) {
             return None;
         }
     }
@@ -101,6 +112,19 @@ fn patch_pairs(
     found.into_iter().filter(|(_, of)| is_image(of)).map(|(image, of)| (image, one(of))).collect()
 }
 
+/// The vertices of a patch, and those that they are images of.
+fn vertex_pairs(mesh: &Mesh, image: PatchId, originals: &BTreeMap<VertexId, VertexId>) -> Vec<[Point; 2]> {
+    let on_image: BTreeSet<VertexId> =
+        mesh.triangles.iter().filter(|t| t.patch == image).flat_map(|t| t.vertices).collect();
+    on_image.iter().map(|v| [*v, originals[v]].map(|v| mesh.points[v.index()])).collect()
+}
+
+/// How far the first of a pair is from the second moved, at most; what is no number counts as far.
+fn largest_gap(pairs: &[[Point; 2]], motion: &Isometry3<f64>) -> f64 {
+    let gap = |[image, of]: &[Point; 2]| (motion * of - image).norm();
+    pairs.iter().map(gap).max_by(f64::total_cmp).unwrap_or(f64::INFINITY)
+}
+
 /// The rigid motion that takes the second of each pair nearest to the first (Kabsch 1976).
 fn fitted(pairs: &[[Point; 2]]) -> Isometry3<f64> {
     let count = pairs.len() as f64;
@@ -111,36 +135,13 @@ fn fitted(pairs: &[[Point; 2]]) -> Isometry3<f64> {
     for [image, of] in pairs {
         covariance += (image.coords - to) * (of.coords - from).transpose();
     }
-    let svd = covariance.svd(true, true);
-    let (Some(u), Some(v)) = (svd.u, svd.v_t) else { return Isometry3::identity() };
+    // Coordinates whose squares overflow have none, and then nothing fits.
+    let svd = covariance.try_svd(true, true, f64::EPSILON, MOST_SWEEPS);
+    let Some((u, v)) = svd.and_then(|svd| svd.u.zip(svd.v_t)) else { return Isometry3::identity() };
     // The vertices of a plane patch leave the last direction open: it is chosen so that nothing is mirrored.
     let mut turn = Matrix3::identity();
     turn[(2, 2)] = (u * v).determinant().signum();
     let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(u * turn * v));
     let rotation = if rotation.angle() < NO_ROTATION { UnitQuaternion::identity() } else { rotation };
     Isometry3::from_parts(Translation3::from(to - rotation * from), rotation)
-}
-
-/// Numbers identifications from 1 in their order: links that the file puts together, or leaves without a number, are one if their motions are.
-fn numbered(links: Vec<(i64, Link)>, distance: f64) -> Vec<Link> {
-    let mut kinds: Vec<(i64, Isometry3<f64>)> = Vec::new();
-    let same = |a: &Isometry3<f64>, b: &Isometry3<f64>| {
-        (a.translation.vector - b.translation.vector).norm() <= distance
-            && a.rotation.angle_to(&b.rotation) < 1e-8
-    };
-    let mut numbered: Vec<Link> = Vec::new();
-    for (given, mut link) in links {
-        let kind = kinds.iter().position(|(number, motion)| *number == given && same(motion, &link.motion));
-        let kind = kind.unwrap_or_else(|| {
-            kinds.push((given, link.motion));
-            kinds.len() - 1
-        });
-        // One motion for all of them, as their vertices may be the same.
-        link.motion = kinds[kind].1;
-        link.identification = kind as u32 + 1;
-        numbered.push(link);
-    }
-    numbered.sort_by_key(|link| (link.identification, link.of, link.image));
-    numbered.dedup();
-    numbered
 }

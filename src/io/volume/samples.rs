@@ -290,6 +290,10 @@ pub(super) fn samples() -> Vec<(&'static str, Vec<u8>)> {
         ("m.meshb", meshb(2, false)),
         ("m.meshb", meshb(4, true)),
     ];
+    let periodic = "$Periodic\n1\n2 1 1\nAffine 1 0 0\n2\n10 20\n30 40\n$EndPeriodic\n";
+    samples.push(("m.msh", (MSH22.to_owned() + periodic).into()));
+    let identified = "identifications\n2\n1 2 1\n3 4 1\nidentificationtypes\n1\n2\nendmesh";
+    samples.push(("m.vol", VOL.replace("endmesh", identified).into()));
     samples.extend(ALL_STORED.map(|stored| ("m.vtu", vtu(stored))));
     samples
 }

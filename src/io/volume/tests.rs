@@ -427,7 +427,7 @@ proptest! {
 
     #[test]
     fn damaged_files_never_panic(
-        sample in 0..13_usize,
+        sample in 0..15_usize,
         cut in 0.0..1.0,
         changes in prop::collection::vec((0.0..1.0, any::<u8>()), 0..6),
         digits in any::<bool>(),
