@@ -43,8 +43,8 @@ fn an_element_that_gmsh_repeats_for_its_groups_is_one_in_all_of_them() {
         "2 2 2 2 3 5",
         "2 1 2 2 5 4",
         "2 2 2 2 5 4",
-        "2 1 2 3 4 5",
         "2 2 2 3 4 5",
+        "2 1 2 3 4 5",
         "4 7 1 1 2 3 4",
         "4 8 1 1 2 3 4",
         "4 7 2 2 3 4 5",
@@ -88,6 +88,14 @@ fn a_group_without_name_that_shares_faces_gets_one_aloud() {
         "{:?}",
         found.notes
     );
+}
+
+#[test]
+fn groups_of_one_name_are_one() {
+    let names = "$PhysicalNames\n2\n2 1 \"skin\"\n2 2 \"skin\"\n$EndPhysicalNames\n";
+    let elements = ["2 1 1 1 3 2", "2 2 1 1 3 2", "2 1 2 1 2 4", "4 7 1 1 2 3 4"];
+    let found = read_as("m.msh", &gmsh_2(names, &elements));
+    assert_eq!(found.names.patches[..2], [Label::new(2, "skin"), Label::new(1, "skin")]);
 }
 
 #[test]

@@ -10,22 +10,29 @@ pub(super) struct Groups {
     /// Names by tag.
     pub names: BTreeMap<i64, String>,
     sets: Vec<Vec<i64>>,
+    /// By sorted tags.
     places: BTreeMap<Vec<i64>, i64>,
 }
 
 impl Groups {
-    /// The number of a set, its tags in the order of the file.
+    /// The number of a set. Its tags keep the order in which the file has them first.
     pub fn set(&mut self, tags: &[i64]) -> i64 {
         if tags.is_empty() {
             return 0;
         }
-        if let Some(place) = self.places.get(tags) {
-            return *place;
-        }
-        self.sets.push(tags.to_vec());
-        let place = self.sets.len() as i64;
-        self.places.insert(tags.to_vec(), place);
-        place
+        let mut sorted = tags.to_vec();
+        sorted.sort_unstable();
+        sorted.dedup();
+        *self.places.entry(sorted).or_insert_with(|| {
+            let mut own: Vec<i64> = Vec::new();
+            tags.iter().for_each(|tag| {
+                if !own.contains(tag) {
+                    own.push(*tag)
+                }
+            });
+            self.sets.push(own);
+            self.sets.len() as i64
+        })
     }
 
     fn tags(&self, set: i64) -> &[i64] {
@@ -102,12 +109,19 @@ impl Groups {
             let number = match tags {
                 [tag] => *tag,
                 tags => tags.iter().copied().find(|tag| sets_with[tag] == 1).unwrap_or_else(|| {
-                    next += 1;
+                    next = next.saturating_add(1);
                     next - 1
                 }),
             };
             numbers.insert(set, number);
-            names.insert(number, tags.iter().filter_map(|tag| self.names.get(tag).cloned()).collect());
+            let mut of_set: Vec<String> = Vec::new();
+            for name in tags.iter().filter_map(|tag| self.names.get(tag)) {
+                // Groups of one name are one.
+                if !of_set.contains(name) {
+                    of_set.push(name.clone());
+                }
+            }
+            names.insert(number, of_set);
         }
         labels
             .iter_mut()

@@ -156,7 +156,8 @@ fn identification_types(words: &mut Words) -> Result<Vec<i64>, Fault> {
 /// Drops identifications of other types: close surfaces and edges.
 fn keep_periodic(types: &[i64], raw: &mut Raw) {
     const PERIODIC: i64 = 2;
-    let type_of = |number: i64| usize::try_from(number - 1).ok().and_then(|place| types.get(place));
+    let type_of =
+        |number: i64| number.checked_sub(1).and_then(|place| types.get(usize::try_from(place).ok()?));
     let before = raw.periodic.len();
     raw.periodic.retain(|pairs| type_of(pairs.identification) == Some(&PERIODIC));
     if raw.periodic.len() < before {
