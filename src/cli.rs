@@ -109,6 +109,9 @@ pub struct RunOptions {
     /// Write with each part one layer of tets of the parts beside it: as Elmer's halo elements, or VTU's ghosts
     #[arg(long, value_enum, value_name = "BY")]
     pub halo: Option<Halo>,
+    /// Write an Elmer mesh even if periodic faces and their images are in different parts, where Elmer's `Periodic BC` is wrong
+    #[arg(long)]
+    pub allow_split_periodic: bool,
     /// Read the written Elmer mesh again and check it
     #[arg(long)]
     pub check: bool,

@@ -109,7 +109,14 @@ fn generate_on(comm: &dyn Communicator, options: &Generate, start: Instant) -> R
     });
     let disk = Some(disk_for(&options.run.format, &target));
     let method = agree(comm, method_of(options))?;
-    let settings = GenerateSettings { method, coarse, wanted: wanted(options), memory: options.memory, disk };
+    let settings = GenerateSettings {
+        method,
+        coarse,
+        wanted: wanted(options),
+        memory: options.memory,
+        disk,
+        periodic_together: options.run.format.contains(&Format::Elmer) && !options.run.allow_split_periodic,
+    };
     let made = generate(comm, model.as_ref(), &settings, &progress)?;
     let stem = target.join(options.input.files[0].file_stem().unwrap_or("mesh".as_ref()));
     let (written, halo) = progress.stage("write", || {
@@ -349,6 +356,7 @@ pub fn run_mesh(options: &MeshFile) -> Result<(), Failure> {
         wanted: wanted_coarse(&options.size, 1),
         memory: None,
         disk: None,
+        periodic_together: false,
     };
     let made = generate(&comm, Some(&model), &settings, &progress)?;
     let (part, file) = (made.part.stream(), &options.output);

@@ -173,6 +173,10 @@ pub struct PartitionReport {
     pub imbalance: f64,
     /// Coarse faces between parts.
     pub edge_cut: u64,
+    /// Triangles between bodies whose coarse tets are in different parts; of parts that were meshed each on its own not counted.
+    pub cut_interfaces: u64,
+    /// Coarse tets at periodic faces that are in another part than Elmer needs.
+    pub split_periodic: u64,
     /// Connected pieces of all parts.
     pub pieces: u64,
     /// Fine vertices in more than one part, each once.
@@ -189,6 +193,8 @@ impl PartitionReport {
             parts: metrics.parts,
             imbalance: balance.tets,
             edge_cut: metrics.edge_cut as u64,
+            cut_interfaces: metrics.cut_interfaces as u64,
+            split_periodic: metrics.lost_ties as u64,
             pieces: balance.pieces.unwrap_or(metrics.pieces as u64),
             shared_vertices: balance.shared_vertices,
             owner_imbalance: balance.owned,
@@ -302,9 +308,16 @@ impl fmt::Display for Report {
         }
         writeln!(f)?;
         if let Some(Checked { pairs, furthest, .. }) = self.periodic {
+            let parts = match self.partition.split_periodic {
+                _ if self.ranks == 1 => String::new(),
+                0 => "; each face in one part with its image".into(),
+                lost => format!(
+                    "; {lost} coarse tets NOT in one part with their images: no `Periodic BC` of Elmer"
+                ),
+            };
             writeln!(
                 f,
-                "periodic   {} pairs of vertices, within {furthest:.1e} of their motions",
+                "periodic   {} pairs of vertices, within {furthest:.1e} of their motions{parts}",
                 grouped(pairs)
             )?;
         }

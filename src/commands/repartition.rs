@@ -2,7 +2,7 @@
 
 use super::write::{read_back, refuse_unknown, write_formats};
 use super::{on_ranks, set_threads, show, write_report};
-use crate::cli::{PartitionMethod, Repartition};
+use crate::cli::{Format, PartitionMethod, Repartition};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 use tetmill::comm::{Communicator, mpi};
@@ -46,7 +46,8 @@ fn repartition_on(comm: &dyn Communicator, options: &Repartition, start: Instant
         Some(PartitionMethod::SmoothedBisection) => Method::Smoothed(Geometric::Bisection),
         Some(PartitionMethod::Graph) => Method::graph(),
     };
-    let done = pipeline::repartition(comm, &options.directory, method, &progress)?;
+    let together = options.run.format.contains(&Format::Elmer) && !options.run.allow_split_periodic;
+    let done = pipeline::repartition(comm, &options.directory, method, together, &progress)?;
     let target = &options.output;
     let stem = target.join(stem_of(&done.folder));
     let (written, halo) = progress.stage("write", || {

@@ -44,6 +44,7 @@ fn settings(planes: Vec<CutPlane>) -> GenerateSettings {
         wanted: Wanted::Sizes { pieces: 1 },
         memory: None,
         disk: None,
+        periodic_together: false,
     }
 }
 

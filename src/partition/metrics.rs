@@ -23,6 +23,10 @@ pub struct Metrics {
     pub edge_cut: usize,
     /// Connected pieces (by faces) of all parts together: as many as parts where each is connected.
     pub pieces: usize,
+    /// Triangles between bodies whose tets are in different parts.
+    pub cut_interfaces: usize,
+    /// Tets that are not where their [`Ties`](super::ties::Ties) ask them to be.
+    pub lost_ties: usize,
     /// Parts that the method left empty, and that were given a tet.
     pub repaired: usize,
 }
@@ -40,6 +44,8 @@ pub fn measure(dual: &Dual, part: &[Rank], parts: u32, method: Option<Method>, r
         imbalance: largest as f64 * f64::from(parts) / part.len().max(1) as f64,
         edge_cut: (0..part.len()).map(cut).sum::<usize>() / 2,
         pieces: pieces(dual, part),
+        cut_interfaces: 0,
+        lost_ties: 0,
         repaired,
     }
 }

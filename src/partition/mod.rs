@@ -19,12 +19,15 @@ mod graph;
 mod graph;
 pub mod metrics;
 mod rcb;
+pub mod ties;
 pub mod weighted;
 
 pub use metrics::Metrics;
 
-use crate::mesh::{FaceId, Mesh, Rank, topology};
+use crate::mesh::topology::Faces;
+use crate::mesh::{FaceId, Mesh, Rank, sorted_face, topology};
 use dual::Dual;
+use ties::{Clusters, Ties};
 
 /// How to partition.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -103,13 +106,26 @@ pub enum PartitionError {
     },
 }
 
-/// Assigns each tet of `mesh` a part below `parts`.
+/// Assigns each tet of `mesh` a part below `parts`. The tets on both sides of an interface between bodies are in one part as far as balance allows.
 ///
 /// # Errors
 /// More parts than tets, or none; a mesh with a face of three tets; what METIS says.
 pub fn partition(
     mesh: &Mesh,
     parts: u32,
+    settings: &Settings,
+) -> Result<(Vec<Rank>, Metrics), PartitionError> {
+    partition_tied(mesh, parts, &Ties::default(), settings)
+}
+
+/// The same, and tied tets are in one part. [`Metrics::lost_ties`] tells whether that was possible: it is not where parts are about as many as tets.
+///
+/// # Errors
+/// As [`partition`].
+pub fn partition_tied(
+    mesh: &Mesh,
+    parts: u32,
+    ties: &Ties,
     settings: &Settings,
 ) -> Result<(Vec<Rank>, Metrics), PartitionError> {
     let tets = mesh.tets.len();
@@ -122,15 +138,39 @@ pub fn partition(
     if tets > topology::MAX_TETS {
         return Err(PartitionError::TooManyTets { tets });
     }
-    let dual = dual_of(mesh)?;
-    let mut part = match settings.method {
+    let listed = topology::faces(mesh.points.len(), &mesh.tets);
+    let dual = dual_of(&listed)?;
+    let interfaces = interfaces(mesh, &listed);
+    let clusters = Clusters::new(tets, ties, &interfaces, parts).filter(|_| parts > 1);
+    let mut part = match (settings.method, &clusters) {
         _ if parts == 1 => vec![0; tets],
-        Method::Metis => graph::bisect(&dual, parts, settings.seed)?,
-        Method::Coordinates => rcb::bisect(mesh, parts),
+        (Method::Metis, None) => graph::bisect(&dual, parts, settings.seed)?,
+        (Method::Metis, Some(clusters)) => {
+            let of_cluster = graph::bisect_weighted(&clusters.graph(&dual), parts, settings.seed)?;
+            clusters.of.iter().map(|&cluster| of_cluster[cluster as usize]).collect()
+        }
+        (Method::Coordinates, _) => rcb::bisect(mesh, parts),
     };
+    if let Some(clusters) = &clusters {
+        clusters.gather(&mut part);
+        ties::settle_around(&dual, clusters, ties, parts, &mut part);
+    }
     let repaired = metrics::fill_empty_parts(&dual, &mut part, parts);
-    let metrics = metrics::measure(&dual, &part, parts, Some(settings.method), repaired);
+    let mut metrics = metrics::measure(&dual, &part, parts, Some(settings.method), repaired);
+    metrics.cut_interfaces =
+        interfaces.iter().filter(|[a, b]| part[*a as usize] != part[*b as usize]).count();
+    metrics.lost_ties = ties::lost(ties, &part);
     Ok((part, metrics))
+}
+
+/// The tets on both sides of boundary triangles inside the mesh.
+fn interfaces(mesh: &Mesh, listed: &Faces) -> Vec<[u32; 2]> {
+    let Ok(face_tets) = topology::face_tets(listed.faces.len(), &listed.tet_faces) else { return Vec::new() };
+    let sides = mesh.triangles.iter().filter_map(|triangle| {
+        let face = listed.faces.binary_search(&sorted_face(triangle.vertices)).ok()?;
+        Some(face_tets[face]).filter(|tets| tets[1] != u32::MAX)
+    });
+    sides.collect()
 }
 
 /// Measures a partition that was made otherwise.
@@ -138,13 +178,13 @@ pub fn partition(
 /// # Errors
 /// A mesh with a face of three tets.
 pub fn assess(mesh: &Mesh, part: &[Rank], parts: u32) -> Result<Metrics, PartitionError> {
-    Ok(metrics::measure(&dual_of(mesh)?, part, parts, None, 0))
+    let listed = topology::faces(mesh.points.len(), &mesh.tets);
+    Ok(metrics::measure(&dual_of(&listed)?, part, parts, None, 0))
 }
 
-/// The dual graph of a mesh.
-fn dual_of(mesh: &Mesh) -> Result<Dual, PartitionError> {
-    let listed = topology::faces(mesh.points.len(), &mesh.tets);
-    dual::dual(&listed).map_err(|face: FaceId| PartitionError::NotAMesh {
+/// The dual graph of the tets whose faces are listed.
+fn dual_of(listed: &Faces) -> Result<Dual, PartitionError> {
+    dual::dual(listed).map_err(|face: FaceId| PartitionError::NotAMesh {
         vertices: listed.faces[face.index()].map(|v| v.0),
     })
 }

@@ -89,7 +89,7 @@ fn a_face_of_three_tets_is_refused() {
 #[test]
 fn empty_parts_are_filled_from_the_largest() {
     let mesh = lattice_cube(2);
-    let dual = dual_of(&mesh).unwrap();
+    let dual = dual_of(&topology::faces(mesh.points.len(), &mesh.tets)).unwrap();
     let mut part = vec![1; 48];
     part[TetId(0).index()] = 3;
     assert_eq!(metrics::fill_empty_parts(&dual, &mut part, 5), 3);
@@ -104,4 +104,30 @@ fn parts_of_two_bodies_that_do_not_touch_are_counted_as_pieces() {
     mesh.tets.drain(6..12);
     mesh.bodies.drain(6..12);
     assert_eq!(partition(&mesh, 1, &Settings::default()).unwrap().1.pieces, 2);
+}
+
+#[test]
+fn both_tets_of_an_interface_are_in_one_part() {
+    let mesh = lattice_box([6, 6, 6], |[x, y, _]| u32::from(x + y > 5));
+    for &method in METHODS {
+        for parts in [2, 4, 7] {
+            let (part, metrics) = partition(&mesh, parts, &with(method)).unwrap();
+            assert_eq!(metrics.cut_interfaces, 0, "{method} in {parts}");
+            assert!(metrics.imbalance < 1.1, "{method} in {parts}: {}", metrics.imbalance);
+            let faces = topology::faces(mesh.points.len(), &mesh.tets);
+            let sides = topology::face_tets(faces.faces.len(), &faces.tet_faces).unwrap();
+            let between = sides
+                .iter()
+                .filter(|[a, b]| *b != u32::MAX && mesh.bodies[*a as usize] != mesh.bodies[*b as usize]);
+            assert!(between.clone().count() > 50);
+            assert!(between.into_iter().all(|[a, b]| part[*a as usize] == part[*b as usize]));
+        }
+    }
+}
+
+#[test]
+fn bodies_one_tet_thick_do_not_become_one_part() {
+    let mesh = lattice_box([12, 12, 3], |[_, _, z]| z as u32);
+    let (_, metrics) = partition(&mesh, 8, &Settings::default()).unwrap();
+    assert!(metrics.imbalance < 1.15, "{}", metrics.imbalance);
 }

@@ -17,11 +17,13 @@ pub mod places;
 mod size;
 #[cfg(test)]
 mod tests;
+mod ties;
 
 pub use check::{Checked, check};
 pub use map::{MapError, PeriodicMap, same_place};
 pub use pairs::{Pair, Pairs};
 pub use size::PeriodicSize;
+pub use ties::ties;
 
 use csg::{Features, PatchId};
 use nalgebra::Isometry3;

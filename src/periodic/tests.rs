@@ -2,7 +2,7 @@
 
 use super::{PeriodicMap, PeriodicSize};
 use crate::comm::thread;
-use crate::io::serial;
+use crate::io::{elmer, serial};
 use crate::pipeline::{CoarseSettings, GenerateSettings, Generated, Method, Model, Wanted, generate};
 use crate::progress::Progress;
 use crate::size::{Preset, SizeField, SizeSettings, Source};
@@ -27,6 +27,7 @@ fn settings(levels: u32, sources: &[Source]) -> GenerateSettings {
         wanted: Wanted::Sizes { pieces: 1 << levels },
         memory: None,
         disk: None,
+        periodic_together: false,
     }
 }
 
@@ -331,6 +332,30 @@ fn periodic_meshes_of_files_are_refined_as_such_and_written_again() {
                 links.map(|l| (l.identification, l.of, l.image, l.motion)).collect()
             };
             assert_eq!(motions(&once_more), motions(&again), "{name}.{ending}");
+        }
+    }
+}
+
+#[test]
+fn parts_have_periodic_faces_together_with_their_images() {
+    for name in ["unit_cell", "rotor_sector"] {
+        for ranks in [2, 5, 9] {
+            let dir = tempfile::tempdir().unwrap();
+            let model = model(name);
+            let written = thread::run(ranks, |comm| {
+                let model = (comm.rank() == 0).then_some(&model);
+                let progress = Progress::new(true, 5);
+                let coarse = CoarseSettings::from(SizeSettings::from(Preset::Moderate));
+                let settings = GenerateSettings { coarse, periodic_together: true, ..settings(1, &[]) };
+                let made = generate(comm, model, &settings, &progress).unwrap();
+                elmer::write(comm, made.part.stream(), &made.names, dir.path()).unwrap();
+                made.coarse.map(|coarse| (coarse.partition.lost_ties, coarse.partition.imbalance))
+            });
+            let (lost, imbalance) = written.unwrap()[0].unwrap();
+            assert_eq!(lost, 0, "{name} in {ranks} parts");
+            assert!(imbalance < 1.4, "{name} in {ranks} parts: {imbalance}");
+            let (_, faults) = elmer::check_elmer(dir.path()).unwrap().remove(0);
+            assert!(faults.is_empty(), "{name} in {ranks} parts: {faults}");
         }
     }
 }

@@ -17,6 +17,7 @@ use crate::improve::{self, Effort};
 use crate::kernel::tree::bounds;
 use crate::mesh::{Mesh, Rank, VertexId, sorted_face};
 use crate::partition;
+use crate::periodic::PeriodicMap;
 use crate::progress::Progress;
 use crate::refine::Bends;
 use crate::size::{SizeField, Source, SourceTree};
@@ -158,7 +159,8 @@ fn cut(
     let boundary = surface.triangles.iter().filter(|t| pieces_of.is_old(t.patch)).count() as u64;
     let assigned: Vec<Rank> = mesh.tets.iter().map(|tet| cuts.leaf_of(&centre(&mesh, tet)) as Rank).collect();
     let partition = partition::assess(&mesh, &assigned, parts).map_err(no_mesh)?;
-    let coarse = CoarseResult { mesh, bends: Bends::default(), parts: assigned, report, outcome, partition };
+    let (bends, periodic) = (Bends::default(), PeriodicMap::default());
+    let coarse = CoarseResult { mesh, bends, parts: assigned, report, outcome, partition, periodic };
     Ok(Cut { pieces, coarse, messages, boundary })
 }
 

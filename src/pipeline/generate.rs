@@ -20,6 +20,7 @@ use crate::kernel::tree;
 use crate::mesh::stream::MeshStream;
 use crate::mesh::{GlobalId, Mesh, Names, Rank};
 use crate::migrate::BareStream;
+use crate::partition::ties::Ties;
 use crate::partition::{self, Metrics};
 use crate::periodic::{self, PeriodicMap};
 use crate::progress::Progress;
@@ -51,6 +52,8 @@ pub struct GenerateSettings {
     pub memory: Option<u64>,
     /// What is to be written, to refuse what does not fit before anything is refined.
     pub disk: Option<Disk>,
+    /// Whether to refuse a partition that has periodic faces and their images in different parts.
+    pub periodic_together: bool,
 }
 
 /// What rank 0 found out on the way.
@@ -68,6 +71,8 @@ pub struct CoarseResult {
     pub outcome: Option<Outcome>,
     /// How good the partition is.
     pub partition: Metrics,
+    /// What is periodic in the mesh.
+    pub periodic: PeriodicMap,
 }
 
 /// A refined, checked mesh on each rank.
@@ -161,7 +166,7 @@ pub fn generate(
             continue;
         }
         let part = agree(comm, refined.map_err(Failure::from))?;
-        let map = periodic_map(comm, model, coarse.as_ref().map(|(_, made)| &made.mesh))?;
+        let map = broadcast_periodic(comm, coarse.as_ref().map(|(_, made)| &made.periodic))?;
         let part = part.with_periodic(map.clone()).with_singular(broadcast_singular(comm, model)?);
         let (check, checksum) = progress.stage("check", || verdict(comm, &part, &projector))?;
         let periodic = periodic_verdict(comm, &part, &map, &projector)?;
@@ -317,30 +322,41 @@ fn coarse_mesh(
 ) -> Result<(u32, CoarseResult), Failure> {
     let (pieces, made, outcome) = progress
         .stage("mesh", || mesh_as_wanted(parts, model, &settings.coarse, settings.wanted, sources))?;
-    let (assigned, metrics) = progress
-        .stage("partition", || partition::partition(&made.mesh, parts, &partition::Settings::default()))?;
+    let map = periodic_map(model, &made.mesh)?;
+    let (assigned, metrics) = progress.stage("partition", || {
+        let ties = if parts > 1 { periodic::ties(&made.mesh, &map) } else { Ties::default() };
+        partition::partition_tied(&made.mesh, parts, &ties, &partition::Settings::default())
+    })?;
+    if settings.periodic_together && metrics.lost_ties > 0 {
+        return Err(Failure::input(format!(
+            "{} of the {} coarse tets beside periodic faces cannot be in one part with those at their images, which Elmer needs: use \
+             fewer parts or a finer coarse mesh, or insist with --allow-split-periodic",
+            metrics.lost_ties,
+            made.mesh.tets.len()
+        )));
+    }
     let CoarseMesh { mesh, bends, report } = made;
-    Ok((pieces, CoarseResult { mesh, bends, parts: assigned, report, outcome, partition: metrics }))
+    Ok((
+        pieces,
+        CoarseResult { mesh, bends, parts: assigned, report, outcome, partition: metrics, periodic: map },
+    ))
 }
 
-/// **Collective.** What is periodic in the coarse mesh that rank 0 has.
-fn periodic_map(
-    comm: &dyn Communicator,
-    model: Option<&Model>,
-    coarse: Option<&Mesh>,
-) -> Result<PeriodicMap, Failure> {
-    let map = match (model, coarse) {
-        (Some(Model::Csg(model)), Some(mesh)) => {
-            let bounds = &model.features.bounds;
-            PeriodicMap::of(mesh, periodic::links(&model.features), bounds)
+/// What is periodic in a coarse mesh.
+fn periodic_map(model: &Model, mesh: &Mesh) -> Result<PeriodicMap, Failure> {
+    let map = match model {
+        Model::Csg(model) => {
+            PeriodicMap::of(mesh, periodic::links(&model.features), &model.features.bounds)
         }
-        (Some(Model::Given(given)), Some(mesh)) => {
-            PeriodicMap::of(mesh, given.links.clone(), &tree::bounds(&mesh.points))
-        }
-        _ => Ok(PeriodicMap::default()),
+        Model::Given(given) => PeriodicMap::of(mesh, given.links.clone(), &tree::bounds(&mesh.points)),
+        Model::Facets(_) => Ok(PeriodicMap::default()),
     };
-    let map = map.map_err(|error| Failure::new(Status::NoValidMesh, error));
-    let mut numbers = agree(comm, map)?.encode();
+    map.map_err(|error| Failure::new(Status::NoValidMesh, error))
+}
+
+/// **Collective.** What is periodic in the coarse mesh, which rank 0 knows.
+fn broadcast_periodic(comm: &dyn Communicator, map: Option<&PeriodicMap>) -> Result<PeriodicMap, Failure> {
+    let mut numbers = map.map(PeriodicMap::encode).unwrap_or_default();
     comm.broadcast(0, &mut numbers)?;
     Ok(PeriodicMap::decode(&numbers))
 }

@@ -35,17 +35,26 @@ pub struct Repartitioned {
     pub checksum: Checksum,
 }
 
-/// **Collective.** Reads the partition in `dir`, and gives each rank one of as many parts as there are ranks.
+/// **Collective.** Reads the partition in `dir`, and gives each rank one of as many parts as there are ranks. With `periodic_together` a mesh
+/// with periodic faces is refused unless there is one part: pairs are not read, so that faces and their images would come to be in different parts.
 ///
 /// # Errors
-/// The same on all ranks: files that cannot be read or hold no valid mesh; more parts than tets; memory.
+/// The same on all ranks: files that cannot be read or hold no valid mesh; more parts than tets; periodic faces; memory.
 pub fn repartition(
     comm: &dyn Communicator,
     dir: &Path,
     method: Method,
+    periodic_together: bool,
     progress: &Progress,
 ) -> Result<Repartitioned, Failure> {
     let loaded = progress.stage("read", || elmer::load(comm, dir))?;
+    if periodic_together && loaded.is_periodic && comm.size() > 1 {
+        return Err(Failure::input(format!(
+            "{} has periodic faces, and parts are chosen without regard to them, so that Elmer's `Periodic BC` would be wrong: make the \
+             parts with `tetmill generate`, or insist with --allow-split-periodic",
+            loaded.folder.display()
+        )));
+    }
     let (mesh, parts) = (loaded.mesh, comm.size());
     let (to, before, after) = progress.stage("partition", || {
         let to = repartition::repartition(comm, &mesh, parts, method)?;

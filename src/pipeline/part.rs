@@ -133,6 +133,7 @@ pub(super) fn even_out(
                 break;
             }
         }
+        part = join_interfaces(comm, part, &mut moved)?;
         Ok((part, (moved > 0).then_some(Evened { imbalance: before, moved })))
     })
 }
@@ -154,6 +155,20 @@ fn join(comm: &dyn Communicator, mut part: BareMesh, moved: &mut u64) -> Result<
         part = go(comm, part, &to, moved)?;
     }
     Ok(part)
+}
+
+/// **Collective.** Brings the tets on both sides of interfaces between bodies together, if parts stay even.
+fn join_interfaces(comm: &dyn Communicator, part: BareMesh, moved: &mut u64) -> Result<BareMesh, Failure> {
+    let several = u64::from(part.tet_bodies.windows(2).any(|pair| pair[0] != pair[1]));
+    let bodies = [several, part.tet_bodies.first().map_or(0, |body| u64::from(body.0))];
+    let [several, last] = comm.all_reduce_max_u64(bodies)?;
+    if several == 0 && last == 0 {
+        return Ok(part);
+    }
+    let mesh = settle(comm, part).map_err(|error| Failure::new(Status::NoValidMesh, error))?;
+    let mut to = vec![mesh.rank; mesh.tets.len()];
+    repartition::join_interfaces(comm, &mesh, &mut to, comm.size(), UNEVEN)?;
+    go(comm, mesh.into(), &to, moved)
 }
 
 /// The largest over the mean.

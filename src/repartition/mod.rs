@@ -20,6 +20,7 @@ pub mod bisection;
 mod clusters;
 pub mod curve;
 pub mod diffuse;
+mod interfaces;
 pub mod islands;
 pub mod metrics;
 pub mod smooth;
@@ -27,6 +28,7 @@ pub mod smooth;
 mod tests;
 
 pub use diffuse::diffuse;
+pub use interfaces::join_interfaces;
 pub use islands::islands;
 pub use metrics::{Metrics, measure};
 
@@ -50,9 +52,9 @@ pub enum Geometric {
 pub enum Method {
     /// By where tets are.
     Geometric(Geometric),
-    /// The same with fewer faces between parts, balanced to one percent.
+    /// The same with fewer faces between parts and interfaces in one part each, balanced to two percent.
     Smoothed(Geometric),
-    /// Multilevel bisection by METIS (Karypis and Kumar 1998) of a graph of clusters, each a stretch of that curve.
+    /// Multilevel bisection by METIS (Karypis and Kumar 1998) of a graph of clusters, each a stretch of that curve; smoothed likewise.
     Clusters {
         /// Clusters for each part, [`MOST_CLUSTERS`] in all: the graph on rank 0 is as large as the parts times this.
         per_part: u32,
@@ -169,9 +171,15 @@ fn by_method(
     };
     if parts > 1 && !matches!(method, Method::Geometric(_)) {
         smooth::smooth(comm, mesh, weights, &mut part, parts, &smooth::Settings::default())?;
+        if weights.is_none() {
+            join_interfaces(comm, mesh, &mut part, parts, JOINED)?;
+        }
     }
     Ok(part)
 }
+
+/// Parts may be larger than the mean by this factor for the sake of interfaces between bodies that lie in one part each.
+const JOINED: f64 = 1.02;
 
 /// The tets at each face.
 fn tets_at_faces(mesh: &DistMesh) -> Vec<[u32; 2]> {

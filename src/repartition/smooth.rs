@@ -43,7 +43,7 @@ impl Default for Settings {
 }
 
 /// No tet behind a face.
-const NONE: u32 = u32::MAX;
+pub(super) const NONE: u32 = u32::MAX;
 /// In [`Band::slot`]: all of a tet is in its own part.
 const PURE: u32 = u32::MAX;
 /// A tet keeps what came of so many parts: more meet within a few faces only where parts are tiny.
@@ -109,9 +109,9 @@ impl Judged {
 }
 
 /// Which tets are beside which, over the borders of ranks: there stand **ghosts**, numbered behind the tets of this rank.
-struct Links {
+pub(super) struct Links {
     /// Across each face of each tet.
-    beside: Vec<[u32; 4]>,
+    pub beside: Vec<[u32; 4]>,
     /// For each ghost the tet of this rank beside it.
     own: Vec<u32>,
     /// The ghosts by the rank that has them, in the order of faces, which is the same there.
@@ -119,7 +119,7 @@ struct Links {
 }
 
 impl Links {
-    fn new(mesh: &DistMesh) -> Self {
+    pub fn new(mesh: &DistMesh) -> Self {
         let sides = tets_at_faces(mesh);
         let mut ghost = vec![NONE; mesh.faces.len()];
         let mut own = Vec::with_capacity(mesh.shared_faces.len());
@@ -151,7 +151,7 @@ impl Links {
     }
 
     /// **Collective.** Words on this rank's tets, followed by those on the ghosts.
-    fn with_ghosts<T: bytemuck::Pod>(
+    pub fn with_ghosts<T: bytemuck::Pod>(
         &self,
         comm: &dyn Communicator,
         words: &[T],

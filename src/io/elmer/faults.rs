@@ -75,6 +75,8 @@ pub enum FaultKind {
     Inward,
     /// A node of a periodic face is not where its partner is moved to.
     NotPeriodic,
+    /// A part has a node of a periodic face, but no face there together with its image: Elmer's `Periodic BC` is wrong there.
+    PeriodicSplit,
 }
 
 impl fmt::Display for FaultKind {
@@ -111,6 +113,7 @@ impl fmt::Display for FaultKind {
             Self::WrongParent => "wrong or missing parent",
             Self::Inward => "boundary element with inward normal",
             Self::NotPeriodic => "periodic nodes that do not match",
+            Self::PeriodicSplit => "node of a periodic face in a part without a face and its image there",
         })
     }
 }

@@ -17,7 +17,7 @@ use crate::io::number::Numbering;
 use crate::io::pairs::pairs;
 use crate::mesh::stream::MeshStream;
 use nalgebra::Matrix3x4;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 /// The file's name, in the folder of the parts: their numbers are those that it uses.
@@ -76,6 +76,7 @@ pub(super) fn check_pairs(mesh: &ElmerMesh, faults: &mut Faults) -> Result<(), R
     let largest = low.coords.amax().max(high.coords.amax());
     let tolerance = f64::max(SAME_PLACE * (high - low).norm(), ROUNDING * largest);
     let mut motions: BTreeMap<u32, Matrix3x4<f64>> = BTreeMap::new();
+    let mut pairs: BTreeMap<u32, Vec<[u32; 2]>> = BTreeMap::new();
     for (index, line) in text.lines().enumerate() {
         if let Some(rest) = line.strip_prefix(MOTION) {
             let (number, matrix) = rest.split_once(' ').unwrap_or((rest, ""));
@@ -90,6 +91,7 @@ pub(super) fn check_pairs(mesh: &ElmerMesh, faults: &mut Faults) -> Result<(), R
                 return Err(broken(&path, index));
             };
             let motion = motions.get(&number).ok_or_else(|| broken(&path, index))?;
+            pairs.entry(number).or_default().push([image, of]);
             let (Some(there), Some(here)) = (points.get(&image), points.get(&of)) else {
                 let what = || format!("of the pair of nodes {image} and {of} one is not in the mesh");
                 faults.add(FaultKind::NoSuchNode, path.clone(), index + 1, what);
@@ -102,7 +104,40 @@ pub(super) fn check_pairs(mesh: &ElmerMesh, faults: &mut Faults) -> Result<(), R
             }
         }
     }
+    if mesh.parts.len() > 1 {
+        pairs.values().for_each(|pairs| check_together(mesh, pairs, faults));
+    }
     Ok(())
+}
+
+/// Elmer eliminates the nodes of an image part by part, with the boundary elements that the part has. So a part that has a node of a periodic face in
+/// one of its elements needs a face there, and the image of that face.
+fn check_together(mesh: &ElmerMesh, pairs: &[[u32; 2]], faults: &mut Faults) {
+    let image_of: BTreeMap<u32, u32> = pairs.iter().map(|&[image, of]| (of, image)).collect();
+    let paired: BTreeSet<u32> = pairs.iter().flatten().copied().collect();
+    for part in &mesh.parts {
+        let sorted = |mut face: [u32; 3]| {
+            face.sort_unstable();
+            face
+        };
+        let faces: BTreeSet<[u32; 3]> = part.boundary.iter().map(|element| sorted(element.nodes)).collect();
+        let mut bounded: BTreeSet<u32> = BTreeSet::new();
+        for face in &faces {
+            let [Some(&a), Some(&b), Some(&c)] = face.map(|node| image_of.get(&node)) else { continue };
+            if faces.contains(&sorted([a, b, c])) {
+                bounded.extend(face.iter().chain(&[a, b, c]));
+            }
+        }
+        let mut seen: BTreeSet<u32> = BTreeSet::new();
+        for (k, element) in part.elements.iter().enumerate() {
+            for node in element.nodes.into_iter().filter(|node| paired.contains(node)) {
+                if !bounded.contains(&node) && seen.insert(node) {
+                    let what = || format!("node {node} of element {}", element.id);
+                    faults.add(FaultKind::PeriodicSplit, part.file("elements"), part.elements.line(k), what);
+                }
+            }
+        }
+    }
 }
 
 /// The numbers of a line.

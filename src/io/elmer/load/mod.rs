@@ -42,6 +42,8 @@ pub struct Loaded {
     pub folder: PathBuf,
     /// Numbers and names, the same on all ranks. A patch and its continuation between other bodies have the same number.
     pub names: Names,
+    /// Whether the mesh has periodic faces; their pairs are not read.
+    pub is_periodic: bool,
     /// What was mended, or is missing: a sentence each, the same on all ranks.
     pub notes: Vec<String>,
 }
@@ -123,14 +125,15 @@ pub fn load(comm: &dyn Communicator, dir: &Path) -> Result<Loaded, LoadError> {
         notes.push(format!("{lesser} boundary elements that are points or edges left out"));
     }
     let has_pairs = u64::from(comm.rank() == 0 && folder.join(periodic::NAME).exists());
-    if comm.all_reduce_max_u64([has_pairs])? == [1] {
+    let is_periodic = comm.all_reduce_max_u64([has_pairs])? == [1];
+    if is_periodic {
         notes.push(format!("{} is left out: pairs of periodic nodes are not read", periodic::NAME));
     }
     let mut names = names_of(&folder);
     broadcast_names(comm, &mut names)?;
     let names = Names { bodies: named(&bodies, &names[0]), patches: named(&found.numbers, &names[1]) };
     let part = of_tet.iter().map(|tet| own.number(tet.part)).collect();
-    Ok(Loaded { mesh, part, parts: own.parts, folder, names, notes })
+    Ok(Loaded { mesh, part, parts: own.parts, folder, names, is_periodic, notes })
 }
 
 /// **Collective.** Rank 0 looks which mesh there is.
