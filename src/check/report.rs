@@ -49,6 +49,9 @@ impl Extreme {
     }
 }
 
+/// The dihedral angle of the regular tet, acos(1/3) in degrees: every tet has an angle up to it, and one from it on.
+const REGULAR_ANGLE: f64 = 70.528_779_365_509_31;
+
 /// Bins of the mean ratio from 0 to 1.
 pub const RATIO_BINS: usize = 200;
 
@@ -87,18 +90,19 @@ impl ShapeReport {
     }
 
     /// The degrees below which a fraction of the tets has its smallest dihedral angle, linear within a bin of one degree.
+    /// Never below the smallest angle of all.
     pub fn smallest_angle_percentile(&self, fraction: f64) -> f64 {
-        percentile(&self.smallest_angles, fraction)
+        percentile(&self.smallest_angles, 1.0, [self.smallest_angle.value, REGULAR_ANGLE], fraction)
     }
 
-    /// The degrees below which a fraction of the tets has its largest dihedral angle, likewise.
+    /// The degrees below which a fraction of the tets has its largest dihedral angle, likewise. Never above the largest of all.
     pub fn largest_angle_percentile(&self, fraction: f64) -> f64 {
-        percentile(&self.largest_angles, fraction)
+        percentile(&self.largest_angles, 1.0, [REGULAR_ANGLE, self.largest_angle.value], fraction)
     }
 
-    /// The mean ratio below which a fraction of the tets is, linear within a bin of 0.005.
+    /// The mean ratio below which a fraction of the tets is, linear within a bin of 0.005. Never below the worst of all.
     pub fn ratio_percentile(&self, fraction: f64) -> f64 {
-        percentile(&self.ratios, fraction) / RATIO_BINS as f64
+        percentile(&self.ratios, 1.0 / RATIO_BINS as f64, [self.worst_ratio.value, 1.0], fraction)
     }
 
     /// The mean of the mean ratios.
@@ -127,17 +131,20 @@ impl ShapeReport {
     }
 }
 
-/// The place, in bins, below which a fraction of what is counted lies.
-fn percentile(bins: &[u64], fraction: f64) -> f64 {
+/// The value below which a fraction of what is counted in bins of a width lies. Values are known to be in a range, which cuts
+/// the bins at its ends: a bin's lower bound alone may lie below all that is counted in it.
+fn percentile(bins: &[u64], width: f64, [least, greatest]: [f64; 2], fraction: f64) -> f64 {
     let wanted = fraction * bins.iter().sum::<u64>() as f64;
     let mut below = 0.0;
     for (bin, &count) in bins.iter().enumerate() {
         if count > 0 && below + count as f64 >= wanted {
-            return bin as f64 + (wanted - below) / count as f64;
+            let lower = (bin as f64 * width).max(least);
+            let upper = ((bin + 1) as f64 * width).min(greatest).max(lower);
+            return lower + (upper - lower) * ((wanted - below) / count as f64);
         }
         below += count as f64;
     }
-    bins.len() as f64
+    greatest
 }
 
 /// The boundary vertex furthest from its patch.
@@ -229,5 +236,49 @@ impl PartReport {
     /// The mean of the mean ratios.
     pub fn mean_ratio(&self) -> Option<f64> {
         self.shape.as_ref().map(|shape| shape.sum_of_ratios / self.tets as f64)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn extreme(value: f64) -> Extreme {
+        Extreme { value, tet: 0, place: [0.0; 3] }
+    }
+
+    /// So many tets of one shape.
+    fn alike(count: u64, ratio: f64, smallest: f64, largest: f64) -> ShapeReport {
+        let mut shape = ShapeReport::of(extreme(ratio), extreme(smallest), extreme(largest));
+        shape.ratios[((ratio * RATIO_BINS as f64) as usize).min(RATIO_BINS - 1)] = count;
+        shape.smallest_angles[smallest as usize] = count;
+        shape.largest_angles[largest as usize] = count;
+        shape
+    }
+
+    #[test]
+    fn percentiles_stay_between_the_extremes() {
+        // In their bins these values are near the upper, then near the lower bound; the last is the regular tet.
+        for (ratio, smallest, largest) in
+            [(0.1049, 23.9, 130.9), (0.1001, 23.1, 130.1), (1.0, REGULAR_ANGLE, REGULAR_ANGLE)]
+        {
+            let shape = alike(1000, ratio, smallest, largest);
+            for fraction in [0.0, 0.01, 0.5, 0.99, 1.0] {
+                let found = shape.smallest_angle_percentile(fraction);
+                assert!((smallest..=REGULAR_ANGLE).contains(&found), "{fraction} of {smallest}: {found}");
+                let found = shape.largest_angle_percentile(fraction);
+                assert!((REGULAR_ANGLE..=largest).contains(&found), "{fraction} of {largest}: {found}");
+                let found = shape.ratio_percentile(fraction);
+                assert!((ratio..=1.0).contains(&found), "{fraction} of {ratio}: {found}");
+            }
+        }
+    }
+
+    #[test]
+    fn percentiles_are_linear_within_the_part_of_a_bin_that_is_in_use() {
+        let mut shape = alike(50, 0.5, 20.5, 100.0);
+        shape.smallest_angles[30] = 50;
+        assert_eq!(shape.smallest_angle_percentile(0.25), 20.75);
+        assert_eq!(shape.smallest_angle_percentile(0.75), 30.5);
     }
 }

@@ -102,7 +102,7 @@ fn a_good_mesh_has_no_fault_and_the_shapes_that_its_tets_have() {
             assert_eq!(bins.iter().sum::<u64>(), report.tets);
         }
         let percentile = shape.smallest_angle_percentile(0.01);
-        assert!(percentile >= shape.smallest_angle.value.floor() && percentile < 70.6, "{percentile}");
+        assert!(percentile >= shape.smallest_angle.value && percentile < 70.6, "{percentile}");
         assert!(report.furthest.is_some_and(|f| f.distance <= fixture.projector.tolerance()));
         assert_eq!(checksum(&mesh).open, 0);
     }
