@@ -114,12 +114,47 @@ fn sizes_for_a_mesh_and_mixed_inputs_are_refused() {
     };
     refused(&[mesh.as_os_str(), "--maxh".as_ref(), "0.1".as_ref()], "--maxh");
     refused(&[mesh.as_os_str(), brick.as_os_str()], "surfaces");
-    refused(&["part.step".as_ref()], ".stl");
+    let step = dir.path().join("part.step");
+    std::fs::write(&step, "").unwrap();
+    refused(&[step.as_os_str()], ".stl");
     let open = dir.path().join("open.stl");
     let text = std::fs::read_to_string(&brick).unwrap();
     let facets: Vec<&str> = text.split_inclusive("endfacet\n").collect();
     std::fs::write(&open, facets[1..].concat().replacen("facet", "solid open\nfacet", 1)).unwrap();
     refused(&[open.as_os_str()], "not closed");
+}
+
+#[test]
+fn what_is_missing_is_told_to_be_missing() {
+    let dir = tempfile::tempdir().unwrap();
+    std::fs::copy(own("lens"), dir.path().join("part.geo")).unwrap();
+    for name in ["m.ele", "m.poly"] {
+        std::fs::write(dir.path().join(name), "0 3 0 0\n").unwrap();
+    }
+    let cases = [
+        ("generate gone.stl", "gone.stl"),
+        ("generate gone.xyz", "gone.xyz"),
+        ("generate gone", "gone"),
+        ("mesh gone.geo -o o.vtu", "gone.geo"),
+        ("mesh gone.xyz -o o.xyz", "gone.xyz"),
+        ("mesh m.ele -o o.vtu", "m.node"),
+        ("mesh m.poly -o o.vtu", "m.node"),
+        ("inspect gone.msh", "gone.msh"),
+        ("decompose gone.geo -n 2 -o o.geo", "gone.geo"),
+        ("quality gone.vtu", "gone.vtu"),
+        ("quality gone.xyz", "gone.xyz"),
+        ("quality gone", "gone"),
+        ("check gone", "gone"),
+        ("repartition gone -n 2 -o o", "gone"),
+        ("generate part.geo --mesh-size-file gone.txt", "gone.txt"),
+        ("generate part.geo -m decompose --planes-from gone.txt", "gone.txt"),
+    ];
+    for (arguments, missing) in cases {
+        let output = tetmill().current_dir(dir.path()).args(arguments.split(' ')).output().unwrap();
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{arguments}: {said}");
+        assert!(said.contains(&format!("cannot read {missing}: it does not exist")), "{arguments}: {said}");
+    }
 }
 
 #[test]

@@ -50,6 +50,7 @@ pub fn read(
     settings: &InputSettings,
     note: &mut dyn FnMut(&str),
 ) -> Result<Model, Failure> {
+    refuse_missing(paths)?;
     let kinds = paths.iter().map(|path| kind(path.as_ref())).collect::<Result<Vec<_>, _>>()?;
     match (kinds.as_slice(), paths) {
         ([Kind::Csg], [path]) => read_csg(path.as_ref(), note),
@@ -61,12 +62,22 @@ pub fn read(
     }
 }
 
+/// Refuses the first file or folder that is not there.
+///
+/// # Errors
+/// With its path.
+pub fn refuse_missing(paths: &[impl AsRef<Path>]) -> Result<(), Failure> {
+    paths.iter().try_for_each(|path| io::input::refuse_missing(path.as_ref())).map_err(Failure::input)
+}
+
 /// A file, whole.
 ///
 /// # Errors
 /// With the path: what cannot be read.
 pub fn read_bytes(path: &Path) -> Result<Vec<u8>, Failure> {
-    std::fs::read(path).map_err(|error| Failure::input(format!("cannot read {}: {error}", path.display())))
+    std::fs::read(path).map_err(|error| {
+        Failure::input(format!("cannot read {}: {}", path.display(), io::input::reason(&error)))
+    })
 }
 
 fn read_csg(path: &Path, note: &mut dyn FnMut(&str)) -> Result<Model, Failure> {

@@ -11,13 +11,14 @@
 
 use super::Source;
 use crate::Point;
+use crate::io::input::reason;
 use std::path::{Path, PathBuf};
 
 /// Why a mesh-size file cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum SizeFileError {
     /// The system cannot read it.
-    #[error("cannot read {}: {source}", .path.display())]
+    #[error("cannot read {}: {}", .path.display(), reason(source))]
     Io {
         /// The file.
         path: PathBuf,

@@ -1,6 +1,7 @@
 //! Lines of numbers to values, with the file and line of what is wrong.
 
 use super::{MAX_ID, MAX_LINE};
+use crate::io::input::reason;
 use rayon::prelude::*;
 use std::fs::{self, File};
 use std::io::{self, Read, Seek, SeekFrom};
@@ -10,7 +11,7 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, thiserror::Error)]
 pub enum ReadError {
     /// The operating system refused.
-    #[error("cannot read {}: {source}", path.display())]
+    #[error("cannot read {}: {}", path.display(), reason(source))]
     Io {
         /// The file or folder.
         path: PathBuf,

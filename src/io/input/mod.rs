@@ -22,7 +22,7 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, thiserror::Error)]
 pub enum ReadError {
     /// The operating system refused.
-    #[error("cannot read {}: {source}", path.display())]
+    #[error("cannot read {}: {}", path.display(), reason(source))]
     Io {
         /// The file or folder.
         path: PathBuf,
@@ -124,6 +124,24 @@ impl ReadError {
     }
 }
 
+/// Why the system could not read a file or folder: its own words, but that a file is missing is told in the same ones on all
+/// systems.
+pub(crate) fn reason(error: &io::Error) -> String {
+    match error.kind() {
+        io::ErrorKind::NotFound => "it does not exist".into(),
+        _ => error.to_string(),
+    }
+}
+
+/// Refuses a file or folder that is not there, whatever its name ends in.
+pub(crate) fn refuse_missing(path: &Path) -> Result<(), ReadError> {
+    match path.try_exists() {
+        Ok(false) => Err(ReadError::io(path)(io::ErrorKind::NotFound.into())),
+        // What cannot even be looked for is left to those who open it.
+        _ => Ok(()),
+    }
+}
+
 /// The content of a file.
 pub(crate) fn load(path: &Path) -> Result<Vec<u8>, ReadError> {
     let content = fs::read(path).map_err(ReadError::io(path))?;
@@ -169,7 +187,7 @@ mod tests {
     fn an_empty_and_a_missing_file_are_refused() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("f");
-        assert!(load(&path).unwrap_err().to_string().starts_with("cannot read "));
+        assert!(load(&path).unwrap_err().to_string().ends_with("f: it does not exist"));
         fs::write(&path, "").unwrap();
         assert!(load(&path).unwrap_err().to_string().ends_with("f: the file is empty"));
     }

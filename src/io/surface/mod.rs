@@ -24,7 +24,7 @@ mod tests;
 
 pub use super::input::{Place, ReadError};
 
-use super::input::{Fault, ending, load};
+use super::input::{Fault, ending, load, refuse_missing};
 use crate::Point;
 use std::path::Path;
 
@@ -74,6 +74,7 @@ pub struct Region {
 /// # Errors
 /// A format that is not known; content that is not of the format, or cut off, with line or byte; what the system says.
 pub fn read(path: &Path) -> Result<Surface, ReadError> {
+    refuse_missing(path)?;
     let parse: fn(&[u8]) -> Result<Surface, Fault> = match ending(path).as_str() {
         "stl" => stl::parse,
         "off" => off::parse,

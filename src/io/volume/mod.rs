@@ -43,7 +43,7 @@ mod vtu_tests;
 
 pub use super::input::{Place, ReadError};
 
-use super::input::{Fault, ending, load};
+use super::input::{Fault, ending, load, refuse_missing};
 use crate::mesh::{Mesh, Names, TetId};
 use crate::periodic::Link;
 use raw::Raw;
@@ -77,6 +77,7 @@ pub struct VolumeMesh {
 /// A format that is not known; content that is not of the format, or cut off, with line or byte; elements
 /// other than tets and what bounds them; faces of more than two tets; what the system says.
 pub fn read(path: &Path) -> Result<VolumeMesh, ReadError> {
+    refuse_missing(path)?;
     if path.is_dir() {
         return elmer::read(path);
     }
