@@ -115,7 +115,7 @@ pub struct RunOptions {
     /// Read the written Elmer mesh again and check it
     #[arg(long)]
     pub check: bool,
-    /// Write the summary as JSON
+    /// Write the summary as JSON; - is the standard output (the readable summary then goes to the standard error)
     #[arg(long, value_name = "FILE.json")]
     pub report: Option<PathBuf>,
     /// Say nothing but errors
@@ -160,7 +160,7 @@ pub struct Generate {
     /// Sizes of the coarse mesh
     #[command(flatten)]
     pub size: SizeOptions,
-    /// Draw the mesh: its parts in colours, or its patches if there is one
+    /// Draw the mesh: its parts in colours, or its patches if there is one; - is the standard output
     #[arg(long, value_name = "FILE.png")]
     pub picture: Option<PathBuf>,
     /// Draw only the tets behind a plane, given by a point on it and its normal
@@ -211,22 +211,25 @@ pub struct MeshFile {
     /// What is meshed
     #[command(flatten)]
     pub input: InputOptions,
-    /// File to write; its ending names the format: .vtu, .msh (Gmsh 2.2), .mesh (Medit), .vol (NETGEN), .off
+    /// File to write; its ending names the format: .vtu, .msh (Gmsh), .mesh (Medit), .vol (NETGEN), .off; - is the standard output
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
     /// Where a .vtu has the triangles on boundaries [default: beside]
     #[arg(long, value_enum, value_name = "WHERE")]
     pub boundary: Option<Boundary>,
+    /// Format of the file, whatever its ending; needed with - and pipes
+    #[arg(short, long, value_enum)]
+    pub format: Option<FileFormat>,
     /// Sizes of the mesh
     #[command(flatten)]
     pub size: SizeOptions,
     /// Number of threads [default: the cores]
     #[arg(short, long, value_name = "THREADS", value_parser = clap::value_parser!(u32).range(1..))]
     pub threads: Option<u32>,
-    /// Write the summary as JSON
+    /// Write the summary as JSON; - is the standard output (the readable summary then goes to the standard error)
     #[arg(long, value_name = "FILE.json")]
     pub report: Option<PathBuf>,
-    /// Draw the mesh
+    /// Draw the mesh; - is the standard output
     #[arg(long, value_name = "FILE.png")]
     pub picture: Option<PathBuf>,
     /// Draw only the tets behind a plane, given by a point on it and its normal
@@ -243,7 +246,7 @@ pub struct Decompose {
     /// What is cut
     #[command(flatten)]
     pub input: InputOptions,
-    /// File to write (.geo)
+    /// File to write (.geo); - is the standard output
     #[arg(short, long, value_name = "FILE.geo")]
     pub output: PathBuf,
     /// Number of parts
@@ -319,7 +322,7 @@ pub struct Quality {
     /// As JSON
     #[arg(long)]
     pub json: bool,
-    /// Draw histograms of the angles and of NETGEN's badness
+    /// Draw histograms of the angles and of NETGEN's badness; - is the standard output
     #[arg(long, value_name = "FILE.svg")]
     pub picture: Option<PathBuf>,
 }
@@ -370,6 +373,21 @@ pub enum Format {
     Geomview,
     /// Nothing
     None,
+}
+
+/// A format of one file.
+#[derive(ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FileFormat {
+    /// VTK: FILE.vtu, and the boundary in FILE.boundary.vtu
+    Vtu,
+    /// Gmsh
+    Msh,
+    /// Medit
+    Mesh,
+    /// NETGEN
+    Vol,
+    /// Geomview OFF: the boundary alone
+    Off,
 }
 
 /// A positive finite length.

@@ -1,22 +1,26 @@
 //! What the commands do: from the options to a written mesh and a summary.
 
 mod decompose;
+mod outputs;
 mod repartition;
 mod write;
 
 use decompose::cut_settings;
 pub use decompose::run_decompose;
+use outputs::Outputs;
 pub use repartition::run_repartition;
 use write::{note_losses, place_of, read_back, refuse_unknown, write_formats};
 
-use crate::cli::{Check, Format, Generate, InputOptions, Inspect, MeshFile, Method, Quality, SizeOptions};
-use std::io::{ErrorKind, Write};
+use crate::cli::{
+    Check, FileFormat, Format, Generate, InputOptions, Inspect, MeshFile, Method, Quality, SizeOptions,
+};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 use tetmill::comm::{Communicator, grouped, mpi, thread};
 use tetmill::error::{Failure, Status, agree};
 use tetmill::inspect::Inspection;
-use tetmill::io::{self, elmer};
+use tetmill::io::output::Destination;
+use tetmill::io::{self, elmer, serial};
 use tetmill::mesh::stream::MeshStream;
 use tetmill::pipeline::input::{self, InputSettings};
 use tetmill::pipeline::part::{Balance, balance};
@@ -98,15 +102,17 @@ const STAGES: u64 = 8;
 /// **Collective.**
 fn generate_on(comm: &dyn Communicator, options: &Generate, start: Instant) -> Result<(), Failure> {
     let first = comm.rank() == 0;
+    let target = options.output.clone().unwrap_or_else(|| {
+        options.input.files[0].with_extension("").file_name().map_or_else(|| "mesh".into(), PathBuf::from)
+    });
+    let stem = target.join(options.input.files[0].file_stem().unwrap_or("mesh".as_ref()));
+    let outputs = agree(comm, prepared(comm, || outputs_of(options, &target, &stem, comm.size())))?;
     let progress = Progress::new(options.run.quiet || !first, STAGES);
     let model = first
         .then(|| progress.stage("read", || read_sized_model(&options.input, &options.size, &progress)))
         .transpose();
     let model = agree(comm, model)?;
     let coarse = agree(comm, coarse_settings(&options.size, first))?;
-    let target = options.output.clone().unwrap_or_else(|| {
-        options.input.files[0].with_extension("").file_name().map_or_else(|| "mesh".into(), PathBuf::from)
-    });
     let disk = Some(disk_for(&options.run.format, &target));
     let method = agree(comm, method_of(options))?;
     let settings = GenerateSettings {
@@ -118,7 +124,6 @@ fn generate_on(comm: &dyn Communicator, options: &Generate, start: Instant) -> R
         periodic_together: options.run.format.contains(&Format::Elmer) && !options.run.allow_split_periodic,
     };
     let made = generate(comm, model.as_ref(), &settings, &progress)?;
-    let stem = target.join(options.input.files[0].file_stem().unwrap_or("mesh".as_ref()));
     let (written, halo) = progress.stage("write", || {
         write_formats(comm, made.part.stream(), &made.names, &options.run, [&target, &stem], &progress)
     })?;
@@ -138,7 +143,31 @@ fn generate_on(comm: &dyn Communicator, options: &Generate, start: Instant) -> R
     report.stages = progress.finish();
     report.seconds = start.elapsed().as_secs_f64();
     report.add_written(written);
-    tell(&report, options.run.report.as_deref(), options.run.quiet, wanted_count(options))
+    tell(&report, options.run.report.as_deref(), &outputs, options.run.quiet, wanted_count(options))
+}
+
+/// Where `generate` reads and writes.
+fn outputs_of(options: &Generate, target: &Path, stem: &Path, parts: u32) -> Outputs {
+    reading(&options.input, &options.size)
+        .and_reading(options.planes.planes_from.as_ref())
+        .folder(target, stem, &options.run, parts)
+        .file("--report", options.run.report.as_ref())
+        .file("--picture", options.picture.as_ref())
+}
+
+/// On rank 0, which writes the files of the whole, the outputs once they are prepared; elsewhere none.
+fn prepared(comm: &dyn Communicator, outputs: impl FnOnce() -> Outputs) -> Result<Outputs, Failure> {
+    if comm.rank() != 0 {
+        return Ok(Outputs::default());
+    }
+    let outputs = outputs();
+    outputs.prepare()?;
+    Ok(outputs)
+}
+
+/// The files that a mesher reads.
+fn reading(input: &InputOptions, size: &SizeOptions) -> Outputs {
+    Outputs::reading(&input.files).and_reading(size.mesh_size_file.as_ref())
 }
 
 /// Reads what is to be meshed; what the user should know is shown.
@@ -286,9 +315,15 @@ fn summary(
 }
 
 /// Shows the summary and writes it where it was asked for.
-fn tell(report: &Report, file: Option<&Path>, quiet: bool, wanted: Option<u64>) -> Result<(), Failure> {
+fn tell(
+    report: &Report,
+    file: Option<&Path>,
+    outputs: &Outputs,
+    quiet: bool,
+    wanted: Option<u64>,
+) -> Result<(), Failure> {
     if !quiet {
-        show(format_args!("{report}\n"))?;
+        outputs.show(format_args!("{report}\n"))?;
     }
     if let (Some(wanted), Some(outcome)) = (wanted, report.wanted) {
         let got = report.coarse.tets;
@@ -313,39 +348,47 @@ fn write_report(file: Option<&Path>, report: &impl serde::Serialize) -> Result<(
     }
 }
 
-/// Writes to the standard output. That nobody reads on, as behind `| head`, is no fault.
+/// Writes to the standard output.
 fn show(text: std::fmt::Arguments) -> Result<(), Failure> {
-    match std::io::stdout().lock().write_fmt(text) {
-        Err(error) if error.kind() != ErrorKind::BrokenPipe => {
-            Err(Failure::new(Status::Resources, format!("cannot write to the standard output: {error}")))
-        }
-        _ => Ok(()),
-    }
+    Outputs::default().show(text)
 }
 
 /// Writes a text file; the one before it stays if that fails.
 fn write_whole(file: &Path, text: &str) -> Result<(), Failure> {
-    io::output::write_file(file, text.len() as u64, |temporary| {
-        io::output::write_text(temporary, text.as_bytes())
-    })?;
+    io::output::write_file(file, text.len() as u64, |output| output.write(text.as_bytes()))?;
     Ok(())
+}
+
+/// The format of a file by the option, else by its name; refused if the file cannot take it.
+fn format_of(options: &MeshFile) -> Result<serial::Format, Failure> {
+    let format = match options.format {
+        Some(FileFormat::Vtu) => serial::Format::Vtu,
+        Some(FileFormat::Msh) => serial::Format::Gmsh,
+        Some(FileFormat::Mesh) => serial::Format::Medit,
+        Some(FileFormat::Vol) => serial::Format::Netgen,
+        Some(FileFormat::Off) => serial::Format::Off,
+        None => serial::Format::of(&options.output)?,
+    };
+    format.fits(&options.output)?;
+    Ok(format)
 }
 
 /// `tetmill mesh`
 pub fn run_mesh(options: &MeshFile) -> Result<(), Failure> {
     let start = Instant::now();
-    let known = ["vtu", "msh", "mesh", "vol", "off"];
-    if !options.output.extension().is_some_and(|ending| known.iter().any(|k| ending == *k)) {
-        return Err(Failure::input(format!(
-            "the end of {} names no format; known are {}",
-            options.output.display(),
-            io::serial::KNOWN
-        )));
-    }
-    let is_vtu = options.output.extension().is_some_and(|ending| ending == "vtu");
-    if options.boundary.is_some() && !is_vtu {
+    input::refuse_missing(&options.input.files)?;
+    let format = format_of(options)?;
+    if options.boundary.is_some() && format != serial::Format::Vtu {
         return Err(Failure::input("--boundary: only VTU has a choice; write a .vtu"));
     }
+    let place = place_of(options.boundary);
+    let second = format.second(&options.output).filter(|_| place == io::vtu::Boundary::Beside);
+    let outputs = reading(&options.input, &options.size)
+        .file("-o", Some(&options.output))
+        .file("-o", second.as_ref())
+        .file("--report", options.report.as_ref())
+        .file("--picture", options.picture.as_ref());
+    outputs.prepare()?;
     set_threads(options.threads)?;
     let comm = thread::alone();
     let progress = Progress::new(options.quiet, STAGES);
@@ -360,11 +403,11 @@ pub fn run_mesh(options: &MeshFile) -> Result<(), Failure> {
     };
     let made = generate(&comm, Some(&model), &settings, &progress)?;
     let (part, file) = (made.part.stream(), &options.output);
-    let written = progress.stage("write", || match place_of(options.boundary) {
-        place if is_vtu => io::vtu::write_with(&comm, part, &made.names, file, place),
-        _ => io::serial::write(part, &made.names, file),
+    let written = progress.stage("write", || match format {
+        serial::Format::Vtu => io::vtu::write_with(&comm, part, &made.names, file, place),
+        _ => serial::write_as(part, &made.names, format, file),
     })?;
-    note_losses(&made.names, file, &progress);
+    note_losses(&made.names, format, file, &progress);
     if let Some(file) = &options.picture {
         draw(&comm, made.part.stream(), options.cut, file)?;
     }
@@ -373,7 +416,7 @@ pub fn run_mesh(options: &MeshFile) -> Result<(), Failure> {
     report.stages = progress.finish();
     report.seconds = start.elapsed().as_secs_f64();
     report.add_written(written);
-    tell(&report, options.report.as_deref(), options.quiet, options.size.coarse)
+    tell(&report, options.report.as_deref(), &outputs, options.quiet, options.size.coarse)
 }
 
 /// `tetmill check`
@@ -405,9 +448,13 @@ pub fn run_check(options: &Check) -> Result<(), Failure> {
 
 /// `tetmill quality`
 pub fn run_quality(options: &Quality) -> Result<(), Failure> {
-    if let Some(file) = options.picture.as_deref().filter(|file| file.extension().is_none_or(|e| e != "svg"))
-    {
-        return Err(Failure::input(format!("histograms are drawn as .svg, not {}", file.display())));
+    let outputs = Outputs::reading(&options.meshes).file("--picture", options.picture.as_ref());
+    outputs.prepare()?;
+    if let Some(file) = &options.picture {
+        refuse_other_pictures(file)?;
+    }
+    if options.json && outputs.take_stdout() {
+        return Err(Failure::input("--json and --picture both go to the standard output; name a file"));
     }
     let (mut meshes, mut unreadable) = (Vec::new(), Vec::new());
     // One after the other: each is measured by all threads, and the largest one alone must fit the memory.
@@ -421,7 +468,7 @@ pub fn run_quality(options: &Quality) -> Result<(), Failure> {
         let json = serde_json::json!({ "version": env!("CARGO_PKG_VERSION"), "meshes": meshes });
         show(format_args!("{}\n", serde_json::to_string_pretty(&json).expect("plain data")))?;
     } else if !meshes.is_empty() {
-        show(format_args!("{}", quality::table(&meshes)))?;
+        outputs.show(format_args!("{}", quality::table(&meshes)))?;
     }
     if let Some(file) = &options.picture {
         write_whole(file, &quality::histograms(&meshes))?;
@@ -435,6 +482,15 @@ pub fn run_quality(options: &Quality) -> Result<(), Failure> {
         .map(|mesh| format!("{} inverted tets in {}", mesh.inverted, mesh.mesh))
         .collect();
     if faulty.is_empty() { Ok(()) } else { Err(Failure::new(Status::Faults, faulty.join(", "))) }
+}
+
+/// Histograms are SVG; only the names of regular files say so.
+fn refuse_other_pictures(file: &Path) -> Result<(), Failure> {
+    let is_file = matches!(Destination::of(file), Ok(Destination::File(_)));
+    if is_file && file.extension().is_none_or(|ending| ending != "svg") {
+        return Err(Failure::input(format!("histograms are drawn as .svg, not {}", file.display())));
+    }
+    Ok(())
 }
 
 /// `tetmill inspect`

@@ -9,6 +9,7 @@ mod inputs;
 mod kept;
 mod mpirun;
 mod mpirun_comm;
+mod outputs;
 mod parts;
 mod quality;
 mod random_scenes;

@@ -1,6 +1,6 @@
 //! `tetmill decompose`, and how planes are chosen.
 
-use super::{STAGES, coarse_settings, read_sized_model, show, wanted_coarse, write_whole};
+use super::{STAGES, coarse_settings, read_sized_model, reading, wanted_coarse, write_whole};
 use crate::cli::{Decompose, PlaneOptions, Planes};
 use std::path::Path;
 use tetmill::decompose::{Candidates, CutPlane, Settings, geo_text};
@@ -12,6 +12,10 @@ use tetmill::{Point, Vector};
 
 /// `tetmill decompose`
 pub fn run_decompose(options: &Decompose) -> Result<(), Failure> {
+    let outputs = reading(&options.input, &options.size)
+        .and_reading(options.planes.planes_from.as_ref())
+        .file("-o", Some(&options.output));
+    outputs.prepare()?;
     let progress = Progress::new(options.quiet, STAGES);
     let model = progress.stage("read", || read_sized_model(&options.input, &options.size, &progress))?;
     let cuts = cut_settings(&options.planes)?;
@@ -32,7 +36,7 @@ pub fn run_decompose(options: &Decompose) -> Result<(), Failure> {
     if !options.quiet {
         let (planes, pieces) = (planned.cuts.planes.len(), planned.model.pieces.len());
         let (file, parts) = (options.output.display(), options.parts);
-        show(format_args!("{file}: {parts} parts by {planes} planes, {pieces} bodies\n"))?;
+        outputs.show(format_args!("{file}: {parts} parts by {planes} planes, {pieces} bodies\n"))?;
     }
     Ok(())
 }

@@ -1,12 +1,13 @@
 //! `tetmill repartition`
 
+use super::outputs::Outputs;
 use super::write::{read_back, refuse_unknown, write_formats};
-use super::{on_ranks, set_threads, show, write_report};
+use super::{on_ranks, prepared, set_threads, write_report};
 use crate::cli::{Format, PartitionMethod, Repartition};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 use tetmill::comm::{Communicator, mpi};
-use tetmill::error::Failure;
+use tetmill::error::{Failure, agree};
 use tetmill::io::elmer;
 use tetmill::pipeline;
 use tetmill::progress::Progress;
@@ -37,6 +38,7 @@ pub fn run_repartition(options: &Repartition) -> Result<(), Failure> {
 /// **Collective.**
 fn repartition_on(comm: &dyn Communicator, options: &Repartition, start: Instant) -> Result<(), Failure> {
     let first = comm.rank() == 0;
+    let outputs = agree(comm, prepared(comm, || outputs_of(options, comm.size())))?;
     let progress = Progress::new(options.run.quiet || !first, STAGES);
     let method = match options.method {
         None => Method::default(),
@@ -64,9 +66,18 @@ fn repartition_on(comm: &dyn Communicator, options: &Repartition, start: Instant
     report.seconds = start.elapsed().as_secs_f64();
     report.add_written(written);
     if !options.run.quiet {
-        show(format_args!("{report}\n"))?;
+        outputs.show(format_args!("{report}\n"))?;
     }
     write_report(options.run.report.as_deref(), &report)
+}
+
+/// The files of the one mesh that is read, and those that are written.
+fn outputs_of(options: &Repartition, parts: u32) -> Outputs {
+    let layout = elmer::only_layout(&options.directory).ok();
+    let read = layout.as_ref().map_or(options.directory.as_path(), elmer::Layout::folder);
+    Outputs::reading([&options.directory])
+        .folder(&options.output, &options.output.join(stem_of(read)), &options.run, parts)
+        .file("--report", options.run.report.as_ref())
 }
 
 /// What files of one format are called: as the folder that the mesh was read from, which for a `partitioning.N` is the one above.

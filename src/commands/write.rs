@@ -53,22 +53,22 @@ pub(super) fn write_formats(
     let told = ghosts.as_ref().map(|(by, ghosts)| HaloReport::new(comm, *by, ghosts)).transpose()?;
     let with_halo = ghosts.as_ref().map(|(_, ghosts)| WithHalo::new(part, ghosts));
     let part: &dyn MeshStream = with_halo.as_ref().map_or(part, |with_halo| with_halo);
-    let joined = |ending: &str| {
+    let joined = |ending: &str, format: serial::Format| {
         // Names may have points in them.
         let mut file = stem.as_os_str().to_os_string();
         file.push(ending);
         let file = Path::new(&file);
-        note_losses(names, file, progress);
-        serial::write_joined(comm, part, names, file)
+        note_losses(names, format, file, progress);
+        serial::write_joined(comm, part, names, format, file)
     };
     let mut written = Written::default();
     for format in &options.format {
         written += match format {
             Format::Elmer => elmer::write(comm, part, names, dir)?,
             Format::Vtu => vtu::write_with(comm, part, names, stem, place_of(options.boundary))?,
-            Format::Msh => joined(".msh")?,
-            Format::Medit => joined(".mesh")?,
-            Format::Vol => joined(".vol")?,
+            Format::Msh => joined(".msh", serial::Format::Gmsh)?,
+            Format::Medit => joined(".mesh", serial::Format::Medit)?,
+            Format::Vol => joined(".vol", serial::Format::Netgen)?,
             Format::Geomview => io::geomview::write(comm, part, &io::geomview::Settings::default(), stem)?,
             Format::None => Written::default(),
         };
@@ -77,8 +77,8 @@ pub(super) fn write_formats(
 }
 
 /// Tells what a file cannot hold of names and numbers.
-pub(super) fn note_losses(names: &Names, file: &Path, progress: &Progress) {
-    for loss in serial::losses(names, file) {
+pub(super) fn note_losses(names: &Names, format: serial::Format, file: &Path, progress: &Progress) {
+    for loss in serial::losses(names, format) {
         progress.note(&format!("note: {}: {loss}", file.display()));
     }
 }

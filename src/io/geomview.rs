@@ -7,7 +7,7 @@
 //! ```
 
 use super::lines::FLUSH_AT;
-use super::output::{Output, folder_and_name, write_text, write_together};
+use super::output::{Output, folder_and_name, write_file, write_text, write_together};
 use super::skin::{SkinFace, skin};
 use super::text::{FLOAT_CHARS, Line};
 use super::{WriteError, Written, sum_written};
@@ -41,16 +41,13 @@ pub fn write(
     settings: &Settings,
     stem: &Path,
 ) -> Result<Written, WriteError> {
-    if part.ghosts().is_some() {
-        return Err(WriteError::NoHalo("Geomview's OFF"));
-    }
+    refuse_ghosts(part)?;
     let (folder, name) = folder_and_name(stem)?;
     let name = name.to_string_lossy();
     let name = [".off", ".list"].iter().find_map(|end| name.strip_suffix(end)).unwrap_or(&name);
 
     let faces = skin(part, |_| true);
-    // A closed triangulated surface has half as many vertices as triangles.
-    let needed = faces.len() as u64 * (3 * FLOAT_CHARS as u64 / 2 + 40);
+    let needed = estimate(&faces);
     let written = write_together(comm, &folder, needed, is_part_file, |stage| {
         let mut written = Written { files: 1, bytes: 0 };
         let file = if part.ranks() == 1 {
@@ -60,7 +57,9 @@ pub fn write(
             fs::create_dir_all(&folder).map_err(WriteError::io(&folder))?;
             format!("{name}.parts/part.{}.off", part.rank() + 1)
         };
-        written.bytes += write_off(part, &faces, settings, &stage.join(file))?;
+        let mut file = Output::create(&stage.join(file))?;
+        write_off(part, &faces, settings, &mut file)?;
+        written.bytes += file.finish()?;
         if part.ranks() > 1 && part.rank() == 0 {
             let bytes = write_text(&stage.join(format!("{name}.list")), list(name, part.ranks()).as_bytes())?;
             written += Written { files: 1, bytes };
@@ -68,6 +67,24 @@ pub fn write(
         Ok(written)
     })?;
     sum_written(comm, written)
+}
+
+/// Writes the boundary of the only part into one file or stream.
+pub(super) fn write_whole(part: &dyn MeshStream, path: &Path) -> Result<Written, WriteError> {
+    refuse_ghosts(part)?;
+    let faces = skin(part, |_| true);
+    let bytes =
+        write_file(path, estimate(&faces), |file| write_off(part, &faces, &Settings::default(), file))?;
+    Ok(Written { files: 1, bytes })
+}
+
+fn refuse_ghosts(part: &dyn MeshStream) -> Result<(), WriteError> {
+    if part.ghosts().is_some() { Err(WriteError::NoHalo("Geomview's OFF")) } else { Ok(()) }
+}
+
+/// About how many bytes the faces of a part take: a closed triangulated surface has half as many vertices as triangles.
+fn estimate(faces: &[SkinFace]) -> u64 {
+    faces.len() as u64 * (3 * FLOAT_CHARS as u64 / 2 + 40)
 }
 
 /// The files of a replaced `STEM.parts` that may go.
@@ -89,8 +106,8 @@ fn write_off(
     part: &dyn MeshStream,
     faces: &[SkinFace],
     settings: &Settings,
-    path: &Path,
-) -> Result<u64, WriteError> {
+    file: &mut Output,
+) -> Result<(), WriteError> {
     let mut used: Vec<u32> = faces.iter().flat_map(|face| face.vertices).collect();
     used.sort_unstable();
     used.dedup();
@@ -99,7 +116,6 @@ fn write_off(
     let centre: [f64; 3] =
         std::array::from_fn(|k| points().map(|p| p[k]).sum::<f64>() / used.len().max(1) as f64);
 
-    let mut file = Output::create(path)?;
     let mut text = format!("OFF\n{} {} 0\n", used.len(), faces.len()).into_bytes();
     let mut line = Line::default();
     for point in points() {
@@ -118,8 +134,7 @@ fn write_off(
         line.bytes(color.as_bytes()).end(&mut text);
         file.flush_past(FLUSH_AT, &mut text)?;
     }
-    file.flush_past(0, &mut text)?;
-    file.finish()
+    file.flush_past(0, &mut text)
 }
 
 /// Floats, with a point: Geomview takes `1 0 0` for integers up to 255.

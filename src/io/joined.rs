@@ -171,10 +171,8 @@ pub(super) fn write(
     let whole = Whole::of(comm, part, names, format.name)?;
     let sections = (format.sections)(comm, &whole)?;
     if comm.size() == 1 {
-        let bytes = write_file(path, estimate(part), |path| {
-            let mut file = Output::create(path)?;
-            sections.iter().try_for_each(|section| whole.write(section, &mut file))?;
-            file.finish()
+        let bytes = write_file(path, estimate(part), |file| {
+            sections.iter().try_for_each(|section| whole.write(section, file))
         })?;
         return Ok(Written { files: 1, bytes });
     }

@@ -2,7 +2,7 @@
 
 use super::Written;
 use super::plain::PlainPart;
-use super::serial::write_joined;
+use super::serial::{Format, write_joined};
 use super::testing::{cube, names, scattered, slabs, together, two_tets};
 use super::volume;
 use crate::mesh::{Mesh, Names, Rank};
@@ -15,7 +15,7 @@ const FILES: [&str; 3] = ["m.msh", "m.mesh", "m.vol"];
 fn written(mesh: &Mesh, tet_to_rank: &[Rank], ranks: u32, path: &Path) -> String {
     let written = together(ranks, |comm| {
         let part = PlainPart::part(mesh, tet_to_rank, ranks, comm.rank());
-        write_joined(comm, &part, &names(), path).unwrap()
+        write_joined(comm, &part, &names(), Format::of(path).unwrap(), path).unwrap()
     });
     let text = fs::read_to_string(path).unwrap();
     assert!(written.iter().all(|w| *w == Written { files: 1, bytes: text.len() as u64 }), "{written:?}");
@@ -113,11 +113,14 @@ fn halos_and_numbers_that_are_missing_are_refused_on_all_ranks() {
         for name in FILES {
             let path = dir.path().join(name);
             let with_halo = crate::halo::WithHalo::new(&part, &ghosts);
-            let error = write_joined(comm, &with_halo, &names(), &path).unwrap_err().to_string();
+            let error = write_joined(comm, &with_halo, &names(), Format::of(&path).unwrap(), &path)
+                .unwrap_err()
+                .to_string();
             assert!(error.contains("no halo elements"), "{error}");
             // The lid is on rank 1 alone.
             let few = Names { patches: names().patches[..1].to_vec(), ..names() };
-            let error = write_joined(comm, &part, &few, &path).unwrap_err().to_string();
+            let error =
+                write_joined(comm, &part, &few, Format::of(&path).unwrap(), &path).unwrap_err().to_string();
             assert!(error.contains("patch 1 has no boundary number"), "{error}");
         }
     });

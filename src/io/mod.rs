@@ -10,7 +10,7 @@
 //! ```
 //! All writers go through [`output`]: what is written stands in a temporary folder beside the target until every
 //! rank is done, and only then takes the place of what was there. A writer that fails leaves the old files as
-//! they were. Numbers in text read back to the same bits.
+//! they were. A format of one stream can also go to a pipe, a device or the standard output. Numbers in text read back to the same bits.
 
 pub mod chunks;
 mod domains;
@@ -118,8 +118,17 @@ pub enum WriteError {
     /// Something else stands where the output belongs.
     #[error("{} is in the way: a folder where a file belongs, or a file where a folder belongs", .0.display())]
     InTheWay(PathBuf),
+    /// A device, a pipe or a socket where only a file or folder can be replaced.
+    #[error("{} is a device, a pipe or a socket, where a regular file or a folder is needed", .0.display())]
+    NoRegularFile(PathBuf),
+    /// A format of two files, and a path that names one.
+    #[error(
+        "VTU takes two files, FILE.vtu and FILE.boundary.vtu, and {} is no such name: end it in .vtu, or write another format",
+        .0.display()
+    )]
+    TwoFiles(PathBuf),
     /// A format that is not known by the end of the file's name.
-    #[error("cannot tell the format of {} by its name; known are {}", .0.display(), serial::KNOWN)]
+    #[error("cannot tell the format of {} by its name; known are {}; or name it with --format", .0.display(), serial::KNOWN)]
     UnknownFormat(PathBuf),
     /// A format that holds one part.
     #[error("{} can hold one part, and there are {parts} parts", path.display())]

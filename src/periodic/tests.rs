@@ -175,7 +175,9 @@ fn pairs_are_those_of_the_whole_mesh_whatever_the_number_of_ranks() {
             let given = (comm.rank() == 0).then_some(&model);
             let made = generate(comm, given, &settings(1, &[]), &Progress::new(true, 5)).unwrap();
             for name in ["m.msh", "m.vol"] {
-                serial::write_joined(comm, made.part.stream(), &made.names, &dir.path().join(name)).unwrap();
+                let path = dir.path().join(name);
+                let format = serial::Format::of(&path).unwrap();
+                serial::write_joined(comm, made.part.stream(), &made.names, format, &path).unwrap();
             }
             made.part.stream().links().to_vec()
         };
@@ -274,7 +276,8 @@ fn netgen_files_hold_singular_points_and_faces() {
         let run = |comm: &dyn crate::comm::Communicator| {
             let given = (comm.rank() == 0).then_some(&model);
             let made = generate(comm, given, &settings(1, &[]), &Progress::new(true, 5)).unwrap();
-            serial::write_joined(comm, made.part.stream(), &made.names, &path).unwrap();
+            let format = serial::Format::of(&path).unwrap();
+            serial::write_joined(comm, made.part.stream(), &made.names, format, &path).unwrap();
         };
         thread::run(ranks, run).unwrap();
         let text = std::fs::read_to_string(&path).unwrap();

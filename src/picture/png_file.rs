@@ -2,14 +2,14 @@
 
 use super::raster::Image;
 use crate::io::WriteError;
-use crate::io::output::{write_file, write_text};
+use crate::io::output::write_file;
 use std::io;
 use std::path::Path;
 
-/// Writes an image; the file before it stays if that fails.
+/// Writes an image; the file before it stays if that fails. See [`write_file`] for paths that are no regular files.
 pub fn write_png(image: &Image, path: &Path) -> Result<(), WriteError> {
     let bytes = encode(image).map_err(|error| WriteError::io(path)(io::Error::other(error)))?;
-    write_file(path, bytes.len() as u64, |path| write_text(path, &bytes))?;
+    write_file(path, bytes.len() as u64, |output| output.write(&bytes))?;
     Ok(())
 }
 

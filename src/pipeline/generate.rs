@@ -345,9 +345,7 @@ fn coarse_mesh(
 /// What is periodic in a coarse mesh.
 fn periodic_map(model: &Model, mesh: &Mesh) -> Result<PeriodicMap, Failure> {
     let map = match model {
-        Model::Csg(model) => {
-            PeriodicMap::of(mesh, periodic::links(&model.features), &model.features.bounds)
-        }
+        Model::Csg(model) => PeriodicMap::of(mesh, periodic::links(&model.features), &model.features.bounds),
         Model::Given(given) => PeriodicMap::of(mesh, given.links.clone(), &tree::bounds(&mesh.points)),
         Model::Facets(_) => Ok(PeriodicMap::default()),
     };

@@ -33,7 +33,7 @@ pub(crate) use names::names_of;
 pub use parse::ReadError;
 pub(crate) use read::read_corners;
 pub use read::{BoundaryElement, Element, ElmerMesh, ElmerPart, Header, Layout, Node, Rows, SharedNode};
-pub use read::{layouts, read, read_layout, stated_elements};
+pub use read::{layouts, only_layout, read, read_layout, stated_elements};
 pub use write::write;
 
 /// Elmer's code of a tet with four vertices.

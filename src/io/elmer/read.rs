@@ -270,7 +270,10 @@ pub(crate) fn read_corners(dir: &Path) -> Result<(ElmerMesh, usize), ReadError> 
 }
 
 /// The mesh of a folder: its only partition, else `mesh.*`.
-pub(super) fn only_layout(dir: &Path) -> Result<Layout, ReadError> {
+///
+/// # Errors
+/// No mesh, or several partitions.
+pub fn only_layout(dir: &Path) -> Result<Layout, ReadError> {
     let mut found = layouts(dir)?;
     let partitions: Vec<&Layout> = found.iter().filter(|l| matches!(l, Layout::Partitioned { .. })).collect();
     match partitions[..] {

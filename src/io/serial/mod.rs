@@ -6,62 +6,135 @@ mod netgen;
 mod runs;
 
 use super::joined::{self, Section, TextFormat, Whole};
+use super::output::Destination;
 use super::text::Line;
 use super::{WriteError, Written, geomview, vtu};
 use crate::comm::{Communicator, thread};
 use crate::mesh::Names;
 use crate::mesh::stream::MeshStream;
 use std::ffi::OsStr;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-/// The ends of names that [`write()`] knows.
+/// The ends of names that [`Format::of`] knows.
 pub const KNOWN: &str =
     ".vtu, .msh (Gmsh), .mesh (Medit), .vol (NETGEN), .off (Geomview: the boundary alone)";
 
-/// Writes a mesh of one part in the format that the end of `path` tells; see [`KNOWN`]. With `.vtu` the triangles
-/// on patches are in a second file, `STEM.boundary.vtu`.
-///
-/// # Errors
-/// An unknown format, several parts, a body or patch without a number, a full disk, what the system says; the
-/// file before it stays.
-pub fn write(part: &dyn MeshStream, names: &Names, path: &Path) -> Result<Written, WriteError> {
-    if part.ranks() != 1 {
-        return Err(WriteError::SeveralParts { path: path.to_path_buf(), parts: part.ranks() });
+/// A format of one file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Format {
+    /// VTK's XML, binary. The triangles on patches are in a second file, `STEM.boundary.vtu`.
+    Vtu,
+    /// Gmsh 2.2, or 4.1 if something is in several groups; text.
+    Gmsh,
+    /// Medit, text.
+    Medit,
+    /// NETGEN's `.vol`.
+    Netgen,
+    /// Geomview's OFF: the boundary alone.
+    Off,
+}
+
+impl Format {
+    /// The format that the end of a file's name tells; see [`KNOWN`].
+    ///
+    /// # Errors
+    /// Another end, or none.
+    pub fn of(path: &Path) -> Result<Self, WriteError> {
+        match path.extension().and_then(OsStr::to_str) {
+            Some("vtu") => Ok(Self::Vtu),
+            Some("msh") => Ok(Self::Gmsh),
+            Some("mesh") => Ok(Self::Medit),
+            Some("vol") => Ok(Self::Netgen),
+            Some("off") => Ok(Self::Off),
+            _ => Err(WriteError::UnknownFormat(path.to_path_buf())),
+        }
     }
-    match path.extension().and_then(OsStr::to_str) {
-        Some("vtu") => vtu::write(&thread::alone(), part, names, path),
-        Some("off") => geomview::write(&thread::alone(), part, &geomview::Settings::default(), path),
-        _ => write_joined(&thread::alone(), part, names, path),
+
+    /// Refuses a path that cannot take this format: VTU has two files, which no stream holds.
+    ///
+    /// # Errors
+    /// That the path is no regular file whose name ends in `.vtu`, or the second file is something else.
+    pub fn fits(self, path: &Path) -> Result<(), WriteError> {
+        let is_file = |path: &Path| matches!(Destination::of(path), Ok(Destination::File(_)));
+        let Some(second) = self.second(path) else { return Ok(()) };
+        if path.extension() != Some(OsStr::new("vtu")) || !is_file(path) {
+            return Err(WriteError::TwoFiles(path.to_path_buf()));
+        }
+        if is_file(&second) { Ok(()) } else { Err(WriteError::NoRegularFile(second)) }
+    }
+
+    /// The file that is written beside `path`.
+    pub fn second(self, path: &Path) -> Option<PathBuf> {
+        (self == Self::Vtu).then(|| path.with_extension("boundary.vtu"))
+    }
+
+    /// The text format, if it is one that holds the mesh of all ranks.
+    fn text(self) -> Option<TextFormat> {
+        match self {
+            Self::Gmsh => Some(TextFormat { name: "Gmsh", sections: gmsh::sections }),
+            Self::Medit => Some(TextFormat { name: "Medit", sections: medit_sections }),
+            Self::Netgen => Some(TextFormat { name: "NETGEN", sections: netgen::sections }),
+            Self::Vtu | Self::Off => None,
+        }
     }
 }
 
-/// **Collective.** Writes the mesh of all ranks to one file of Gmsh, Medit or NETGEN, as the end of `path` tells. Each vertex and tet is there once,
+/// Writes a mesh of one part in the format that the end of `path` tells; see [`KNOWN`] and [`write_as`].
+///
+/// # Errors
+/// An unknown format, and those of [`write_as`].
+pub fn write(part: &dyn MeshStream, names: &Names, path: &Path) -> Result<Written, WriteError> {
+    write_as(part, names, Format::of(path)?, path)
+}
+
+/// Writes a mesh of one part in a format, whatever the end of `path`. What is no regular file is written through, and `-` is the
+/// standard output; see [`super::output::Destination`].
+///
+/// # Errors
+/// Several parts, a body or patch without a number, VTU into a stream, a full disk, what the system says; the file before it
+/// stays.
+pub fn write_as(
+    part: &dyn MeshStream,
+    names: &Names,
+    format: Format,
+    path: &Path,
+) -> Result<Written, WriteError> {
+    if part.ranks() != 1 {
+        return Err(WriteError::SeveralParts { path: path.to_path_buf(), parts: part.ranks() });
+    }
+    format.fits(path)?;
+    match format.text() {
+        Some(text) => joined::write(&thread::alone(), part, names, path, &text),
+        None if format == Format::Off => geomview::write_whole(part, path),
+        None => vtu::write(&thread::alone(), part, names, path),
+    }
+}
+
+/// **Collective.** Writes the mesh of all ranks to one file of Gmsh, Medit or NETGEN. Each vertex and tet is there once,
 /// and so is a triangle between two parts. Each rank gets the sums over all ranks.
 ///
 /// # Errors
-/// An unknown format, more vertices or elements than 32 bits number, a part with ghosts, a body or patch without a number, a full disk, what the
-/// system says: on all ranks alike, and the file before it stays.
+/// A format that holds one part, more vertices or elements than 32 bits number, a part with ghosts, a body or patch without a number, a full disk,
+/// what the system says: on all ranks alike, and the file before it stays.
 pub fn write_joined(
     comm: &dyn Communicator,
     part: &dyn MeshStream,
     names: &Names,
+    format: Format,
     path: &Path,
 ) -> Result<Written, WriteError> {
-    let format = match path.extension().and_then(OsStr::to_str) {
-        Some("msh") => TextFormat { name: "Gmsh", sections: gmsh::sections },
-        Some("mesh") => TextFormat { name: "Medit", sections: medit_sections },
-        Some("vol") => TextFormat { name: "NETGEN", sections: netgen::sections },
-        _ => return Err(WriteError::UnknownFormat(path.to_path_buf())),
-    };
-    joined::write(comm, part, names, path, &format)
+    match format.text() {
+        Some(text) => joined::write(comm, part, names, path, &text),
+        None => Err(WriteError::SeveralParts { path: path.to_path_buf(), parts: part.ranks() }),
+    }
 }
 
-/// What a file of this name cannot hold of the names and numbers of a mesh, a sentence each: a solver that looks for them there must know.
-pub fn losses(names: &Names, path: &Path) -> Vec<String> {
-    match path.extension().and_then(OsStr::to_str) {
-        Some("msh") => gmsh::losses(names),
-        Some("vol") => netgen::losses(names),
-        Some("mesh") if names.bodies.iter().chain(&names.patches).any(|label| !label.names.is_empty()) => {
+/// What a file of this format cannot hold of the names and numbers of a mesh, a sentence each: a solver that looks for them there must know.
+pub fn losses(names: &Names, format: Format) -> Vec<String> {
+    match format {
+        Format::Gmsh => gmsh::losses(names),
+        Format::Netgen => netgen::losses(names),
+        Format::Medit if names.bodies.iter().chain(&names.patches).any(|label| !label.names.is_empty()) => {
             vec!["Medit has no names: bodies and boundaries are known by their numbers alone".into()]
         }
         _ => Vec::new(),
@@ -147,10 +220,10 @@ mod tests {
             $Elements\n3 8 1 8\n2 1 2 3\n1 1 3 2\n2 1 2 4\n3 1 4 3\n2 2 2 3\n4 2 3 5\n5 2 5 4\n6 3 4 5\n\
             3 1 4 2\n7 1 2 3 4\n8 2 3 4 5\n$EndElements\n";
         assert_eq!(written_with(&two_tets(), &names, "m.msh"), expected);
-        assert!(losses(&names, Path::new("m.msh")).is_empty());
-        let said = losses(&names, Path::new("m.vol"));
+        assert!(losses(&names, Format::Gmsh).is_empty());
+        let said = losses(&names, Format::Netgen);
         assert_eq!(said, ["NETGEN has one name for a number: of boundaries, 2 is `all` without `clamp`"]);
-        assert_eq!(losses(&names, Path::new("m.mesh")).len(), 1);
+        assert_eq!(losses(&names, Format::Medit).len(), 1);
     }
 
     #[test]
@@ -162,7 +235,7 @@ mod tests {
         let text = written_with(&two_tets(), &names, "m.msh");
         assert!(text.contains("$PhysicalNames\n2\n2 3 \"skin\"\n3 1 \"lower\"\n"), "{text}");
         assert!(text.contains("\n1 2 2 3 1 1 3 2\n") && text.contains("\n6 2 2 3 2 3 4 5\n"), "{text}");
-        let said = losses(&names, Path::new("m.msh"));
+        let said = losses(&names, Format::Gmsh);
         assert_eq!(said, ["Gmsh has one number a name: of boundaries, 6 in 3 (`skin`)"]);
     }
 
