@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use tetmill::Point;
+use tetmill::comm::{Communicator, thread};
 use tetmill::io::plain::PlainPart;
 use tetmill::io::{serial, volume};
 use tetmill::kernel::simplex;
@@ -185,7 +186,7 @@ fn groups(patch: u32) -> Label {
 const CASES: [(&str, Labels); 4] =
     [("mixed", mixed), ("hundreds", hundreds), ("sparse", sparse), ("groups", groups)];
 
-/// Each case with one and two bodies, written with this ending.
+/// Each case with one and two bodies, in one part and in seven, written with this ending.
 fn for_each_case(ending: &str, mut check: impl FnMut(&Path, &Mesh, &Names, &str)) {
     let dir = tempfile::tempdir().unwrap();
     for bodies in [1, 2] {
@@ -201,6 +202,14 @@ fn for_each_case(ending: &str, mut check: impl FnMut(&Path, &Mesh, &Names, &str)
             let path = dir.path().join(format!("{case}.{ending}"));
             serial::write(&PlainPart::whole(&mesh), &names, &path).unwrap();
             check(&path, &mesh, &names, &format!("{case}, {bodies} bodies"));
+            let rank_of: Vec<u32> = (0..mesh.tets.len()).map(|tet| (tet / 100 % 7) as u32).collect();
+            let write = |comm: &dyn Communicator| {
+                let part = PlainPart::part(&mesh, &rank_of, 7, comm.rank());
+                let format = serial::Format::of(&path).unwrap();
+                serial::write_joined(comm, &part, &names, format, &path).unwrap();
+            };
+            thread::run(7, write).unwrap();
+            check(&path, &mesh, &names, &format!("{case}, {bodies} bodies in seven parts"));
         }
     }
 }

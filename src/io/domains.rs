@@ -7,7 +7,7 @@ use super::WriteError;
 use super::joined::Whole;
 use super::lines::TriangleLine;
 use crate::comm::Communicator;
-use crate::mesh::stream::{BoundaryBlock, MeshStream};
+use crate::mesh::stream::MeshStream;
 use csg::BodyId;
 
 /// Bodies beside triangles.
@@ -34,29 +34,27 @@ pub(super) fn find(comm: &dyn Communicator, whole: &Whole) -> Result<Domains, Wr
     let mut told: Vec<Vec<[u64; 4]>> = vec![Vec::new(); ranks];
     let mut asked: Vec<Vec<[u64; 3]>> = vec![Vec::new(); ranks];
     let mut askers: Vec<Vec<u64>> = vec![Vec::new(); ranks];
-    let (mut place, mut index) = (0, 0);
-    let mut block = BoundaryBlock::default();
-    for of_block in 0..whole.part.boundary_blocks() {
-        whole.part.boundary_block(of_block, &mut block);
+    let mut index = 0;
+    whole.by_patch.visit(whole.part, |block, first| {
         let [behind, in_front] = block.bodies;
-        for triangle in &block.triangles {
+        for (place, triangle) in (first..).zip(&block.triangles) {
             let mut key = triangle.map(|v| u64::from(whole.numbering.vertices[v as usize]));
             key.sort_unstable();
             let directory = (key[0] % ranks as u64) as usize;
             if whole.left_out.contains(place) {
                 let body = behind.or(in_front).expect("a triangle has a tet here");
                 told[directory].push([key[0], key[1], key[2], body.0.into()]);
-            } else {
-                let is_alone = behind.is_none() || in_front.is_none();
-                if is_alone && triangle.iter().all(|&v| is_shared[v as usize]) {
-                    asked[directory].push(key);
-                    askers[directory].push(index);
-                }
-                index += 1;
+                continue;
             }
-            place += 1;
+            let is_alone = behind.is_none() || in_front.is_none();
+            if is_alone && triangle.iter().all(|&v| is_shared[v as usize]) {
+                asked[directory].push(key);
+                askers[directory].push(index);
+            }
+            index += 1;
         }
-    }
+        Ok(())
+    })?;
     let mut told = comm.all_to_all(told)?.concat();
     told.sort_unstable();
     // One more than the body, 0 for none.

@@ -11,7 +11,7 @@
 //! ```
 //! Numbers of vertices and elements follow the parts, so the order of lines depends on the number of ranks; the mesh does not.
 
-use super::lines::{self, TetLine, TriangleLine};
+use super::lines::{self, ByPatch, TetLine, TriangleLine};
 use super::number::{Numbering, number};
 use super::once::{LeftOut, left_out};
 use super::output::{Output, folder_and_name, write_file, write_together};
@@ -60,6 +60,7 @@ pub(super) struct Whole<'a> {
     /// Of the whole mesh.
     pub totals: Counts,
     pub numbering: Numbering,
+    pub by_patch: ByPatch,
     /// Triangles of this part that another one writes.
     pub left_out: LeftOut,
     triangles_before: u64,
@@ -94,7 +95,18 @@ impl<'a> Whole<'a> {
         let mut singular: Vec<[i64; 2]> = comm.gather(0, &own_singular)?.concat();
         singular.sort_unstable();
         let singular_vertices = singular.iter().map(|&[number, k]| (number as u64, k as i32)).collect();
-        Ok(Self { part, names, totals, numbering, left_out, triangles_before, pairs, singular_vertices })
+        let by_patch = ByPatch::of(part);
+        Ok(Self {
+            part,
+            names,
+            totals,
+            numbering,
+            by_patch,
+            left_out,
+            triangles_before,
+            pairs,
+            singular_vertices,
+        })
     }
 
     /// Appends the numbers of vertices, each behind a blank.
@@ -123,11 +135,14 @@ impl<'a> Whole<'a> {
                     format(line, self.numbering.vertices[vertex.index].into(), vertex.point);
                 })
             }
-            Section::Triangles(format) => {
-                lines::triangles(self.part, self.names, &self.left_out, file, |line, triangle| {
-                    format(line, &triangle)
-                })
-            }
+            Section::Triangles(format) => lines::triangles(
+                self.part,
+                self.names,
+                &self.by_patch,
+                &self.left_out,
+                file,
+                |line, triangle| format(line, &triangle),
+            ),
             Section::Tets(format) => lines::tets(self.part, self.names, file, |line, tet| format(line, &tet)),
         }
     }

@@ -96,33 +96,63 @@ pub fn tets(
     })
 }
 
+/// The boundary blocks of a part by patch, each with the place of its first triangle: readers want the triangles of a patch in one piece.
+#[derive(Clone, Debug)]
+pub(crate) struct ByPatch(Vec<(u32, u64)>);
+
+impl ByPatch {
+    /// Of a part.
+    pub fn of(part: &dyn MeshStream) -> Self {
+        let mut block = BoundaryBlock::default();
+        let mut first = 0;
+        let mut order: Vec<(Option<PatchId>, u32, u64)> = Vec::with_capacity(part.boundary_blocks());
+        for index in 0..part.boundary_blocks() {
+            part.boundary_block(index, &mut block);
+            order.push((block.patch, index as u32, first));
+            first += block.triangles.len() as u64;
+        }
+        order.sort_unstable();
+        Self(order.into_iter().map(|(_, index, first)| (index, first)).collect())
+    }
+
+    /// Calls `visit` for each block with the place of its first triangle.
+    pub fn visit(
+        &self,
+        part: &dyn MeshStream,
+        mut visit: impl FnMut(&BoundaryBlock, u64) -> Result<(), WriteError>,
+    ) -> Result<(), WriteError> {
+        let mut block = BoundaryBlock::default();
+        self.0.iter().try_for_each(|&(index, first)| {
+            part.boundary_block(index as usize, &mut block);
+            visit(&block, first)
+        })
+    }
+}
+
 /// Appends a line for each boundary triangle but those that another part writes. By one thread: they are few beside the tets, and count on.
 pub(crate) fn triangles(
     part: &dyn MeshStream,
     names: &Names,
+    order: &ByPatch,
     left_out: &LeftOut,
     file: &mut Output,
     mut format: impl FnMut(&mut Line, TriangleLine),
 ) -> Result<(), WriteError> {
-    let mut block = BoundaryBlock::default();
     let mut line = Line::default();
     let mut text = Vec::new();
-    let (mut place, mut index) = (0, 0);
-    for of_block in 0..part.boundary_blocks() {
-        part.boundary_block(of_block, &mut block);
+    let mut index = 0;
+    order.visit(part, |block, first| {
         let patch = block.patch.expect("a boundary block has a patch");
         let number = patch_number(block.patch, names)?;
-        for (vertices, parents) in block.triangles.iter().zip(&block.parents) {
-            place += 1;
-            if left_out.contains(place - 1) {
-                continue;
+        for (place, (vertices, parents)) in (first..).zip(block.triangles.iter().zip(&block.parents)) {
+            if !left_out.contains(place) {
+                let bodies = block.bodies;
+                format(&mut line, TriangleLine { index, bodies, patch, number, vertices, parents });
+                line.end(&mut text);
+                index += 1;
             }
-            let bodies = block.bodies;
-            format(&mut line, TriangleLine { index, bodies, patch, number, vertices, parents });
-            line.end(&mut text);
-            index += 1;
         }
-        file.flush_past(FLUSH_AT, &mut text)?;
-    }
+        file.flush_past(FLUSH_AT, &mut text)
+    })?;
     file.flush_past(0, &mut text)
 }

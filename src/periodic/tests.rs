@@ -150,8 +150,8 @@ fn gmsh_and_netgen_files_hold_the_pairs() {
     let motion = generated.part.stream().links()[0].motion;
     let gmsh = block(&read("m.msh"), "$Periodic", "$EndPeriodic");
     // One link: its tags, the matrix, the number of pairs, the pairs.
-    assert_eq!((gmsh[0][0], gmsh[1][0], gmsh[2].len()), (1.0, 2.0, 16));
-    assert_eq!((gmsh[2][3], gmsh[2][15]), (motion.translation.x, 1.0));
+    assert_eq!((gmsh[0][0], gmsh[1][0], gmsh[2].len()), (1.0, 2.0, 17));
+    assert_eq!((gmsh[2][4], gmsh[2][16]), (motion.translation.x, 1.0));
     assert_eq!(gmsh[3][0] as usize, gmsh.len() - 4);
     for pair in &gmsh[4..] {
         assert!((motion * point(pair[1]) - point(pair[0])).norm() < 1e-14);

@@ -4,7 +4,7 @@ use super::names::names_text;
 use super::periodic::{self, periodic_text};
 use super::{MAX_ID, MAX_LINE, TET, TRIANGLE};
 use crate::comm::Communicator;
-use crate::io::lines::{self, FLUSH_AT};
+use crate::io::lines::{self, ByPatch, FLUSH_AT};
 use crate::io::number::{Numbering, number, watchers};
 use crate::io::once::{LeftOut, left_out};
 use crate::io::output::{Output, write_text, write_together};
@@ -211,8 +211,9 @@ impl Content<'_> {
 
     fn write_boundary(&self, path: &Path) -> Result<u64, WriteError> {
         let mut file = Output::create(path)?;
+        let by_patch = ByPatch::of(self.part);
         let behind_cuts = self.part.ghosts().map(ghost_faces).unwrap_or_default();
-        lines::triangles(self.part, self.names, &self.left_out, &mut file, |line, triangle| {
+        lines::triangles(self.part, self.names, &by_patch, &self.left_out, &mut file, |line, triangle| {
             line.int(triangle.index + 1).blank().int(triangle.number);
             // A parent that is here goes first: solvers look there for the body of the boundary. A ghost beside it comes second.
             let here = triangle.parents.iter().filter(|&&tet| tet != NO_TET);

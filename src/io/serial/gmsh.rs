@@ -1,8 +1,8 @@
 //! Gmsh's `.msh`, text: a physical group for each name, elementary entities for patches and bodies (from 1).
 //!
 //! Version 2.2 can say only one group of an element; Gmsh then repeats the element, which MFEM takes for a second one at the same
-//! place and refuses. So where a boundary or body is in several groups the file is of version 4.1, in which an entity has any number of groups, and
-//! which Gmsh, meshio and MFEM read.
+//! place and refuses; and Gmsh ignores periodic pairs in files of version 2.2. So if a boundary or body is in several groups, or faces are periodic, the
+//! file is of version 4.1, in which an entity has any number of groups, and which Gmsh, meshio and MFEM read.
 
 use super::groups::Groups;
 use super::runs::Runs;
@@ -19,7 +19,7 @@ pub(super) fn sections<'a>(
     whole: &'a Whole<'a>,
 ) -> Result<Vec<Section<'a>>, WriteError> {
     let [patches, bodies] = [&whole.names.patches, &whole.names.bodies].map(|labels| Groups::of(labels));
-    if patches.are_apart() && bodies.are_apart() {
+    if patches.are_apart() && bodies.are_apart() && whole.part.links().is_empty() {
         Ok(sections_2(whole, patches, bodies))
     } else {
         sections_4(comm, whole, &patches, &bodies)
@@ -58,7 +58,7 @@ fn sections_2<'a>(whole: &'a Whole<'a>, patches: Groups, bodies: Groups) -> Vec<
             line.int(counts.boundary + whole.tet(tet)).bytes(b" 4 2 ").int(group).blank();
             whole.ids(line.int(u64::from(tet.body.0) + 1), tet.vertices);
         })),
-        Section::Text(String::from("$EndElements\n") + &periodic(whole, "Affine")),
+        Section::Text("$EndElements\n".into()),
     ]
 }
 
@@ -70,7 +70,7 @@ fn sections_4<'a>(
     bodies: &Groups,
 ) -> Result<Vec<Section<'a>>, WriteError> {
     let counts = whole.totals;
-    let [of_patches, of_bodies] = [Runs::of_patches(whole), Runs::of_bodies(whole.part)];
+    let (of_patches, of_bodies) = (Runs::of_patches(whole)?, Runs::of_bodies(whole.part));
     let [blocks] = comm.all_reduce_sum_u64([(of_patches.0.len() + of_bodies.0.len()) as u64])?;
     let first_body = of_bodies.0.first().map_or(1, |run| run.of + 1);
     let (n, elements) = (counts.vertices, counts.boundary + counts.tets);
@@ -90,7 +90,7 @@ fn sections_4<'a>(
             begin_block(line, &of_bodies, tet.index, b"3 ", b" 4 ");
             whole.ids(line.int(counts.boundary + whole.tet(tet)), tet.vertices);
         })),
-        Section::Text(String::from("$EndElements\n") + &periodic(whole, "16")),
+        Section::Text(String::from("$EndElements\n") + &periodic(whole)),
     ])
 }
 
@@ -131,8 +131,8 @@ fn entities(names: &Names, bounds: &str, patches: &Groups, bodies: &Groups) -> S
 }
 
 /// The section of periodic patches: for each image its elementary tag and that of the patch it is the image of, the matrix of the motion by
-/// rows behind the word that begins it, and the pairs of nodes, image first. Empty if there are none.
-fn periodic(whole: &Whole, begin: &str) -> String {
+/// rows behind its length, and the pairs of nodes, image first. Empty if there are none.
+fn periodic(whole: &Whole) -> String {
     let links = whole.part.links();
     if links.is_empty() {
         return String::new();
@@ -145,7 +145,7 @@ fn periodic(whole: &Whole, begin: &str) -> String {
     }
     let mut text = format!("$Periodic\n{}\n", links.len());
     for ((link, pairs), count) in links.iter().zip(pairs).zip(counts) {
-        text += &format!("2 {} {}\n{begin}", link.image.0 + 1, link.of.0 + 1);
+        text += &format!("2 {} {}\n16", link.image.0 + 1, link.of.0 + 1);
         link.motion.to_homogeneous().transpose().iter().for_each(|x| text += &format!(" {x}"));
         text += &format!("\n{count}\n{pairs}");
     }

@@ -1,7 +1,8 @@
 //! Consecutive tets or boundary triangles of one body or patch.
 
+use crate::io::WriteError;
 use crate::io::joined::Whole;
-use crate::mesh::stream::{BoundaryBlock, MeshStream, TetBlock};
+use crate::mesh::stream::{MeshStream, TetBlock};
 
 /// Elements of one body or patch that follow each other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -30,18 +31,15 @@ impl Runs {
     }
 
     /// Of the triangles that the part writes.
-    pub fn of_patches(whole: &Whole) -> Self {
+    pub fn of_patches(whole: &Whole) -> Result<Self, WriteError> {
         let mut runs = Self::default();
-        let mut block = BoundaryBlock::default();
-        let mut place = 0;
-        for index in 0..whole.part.boundary_blocks() {
-            whole.part.boundary_block(index, &mut block);
-            let next = place + block.triangles.len() as u64;
-            let written = (place..next).filter(|&place| !whole.left_out.contains(place)).count();
+        whole.by_patch.visit(whole.part, |block, first| {
+            let places = first..first + block.triangles.len() as u64;
+            let written = places.filter(|&place| !whole.left_out.contains(place)).count();
             runs.add(block.patch.expect("a boundary block has a patch").0, written);
-            place = next;
-        }
-        runs
+            Ok(())
+        })?;
+        Ok(runs)
     }
 
     fn add(&mut self, of: u32, count: usize) {
