@@ -185,9 +185,9 @@ fn pairs_are_those_of_the_whole_mesh_whatever_the_number_of_ranks() {
         let read = |name: &str| std::fs::read_to_string(dir.path().join(name)).unwrap();
         let (gmsh, netgen) = (read("m.msh"), read("m.vol"));
         let nodes = block(&gmsh, "$Nodes", "$EndNodes");
-        let place = |number: f64| {
-            Point::new(nodes[number as usize][1], nodes[number as usize][2], nodes[number as usize][3])
-        };
+        // Behind two lines of counts all numbers, which ascend from 1, then all places.
+        let places = &nodes[2 + nodes[0][1] as usize..];
+        let place = |number: f64| Point::from_slice(&places[number as usize - 1]);
         let lines = block(&gmsh, "$Periodic", "$EndPeriodic");
         let mut rest = &lines[1..];
         let mut pairs = Vec::new();

@@ -283,3 +283,36 @@ fn large_pieces_stay_where_they_are() {
     let part: Vec<Rank> = (0..288).map(|tet| u32::from((24..48).contains(&(tet % 72)))).collect();
     assert_eq!(joined(&mesh, &part, 2), (part, 3));
 }
+
+#[test]
+fn interfaces_are_joined_whoever_holds_the_tets() {
+    let mesh = lattice_box([10, 10, 10], |[x, y, _]| u32::from(x > y));
+    let tets = mesh.tets.len();
+    let cut_interfaces = |part: &[Rank]| {
+        let faces = crate::mesh::topology::faces(mesh.points.len(), &mesh.tets);
+        let sides = face_tets(faces.faces.len(), &faces.tet_faces).unwrap();
+        let [one, other] = [0, 1].map(|side| move |pair: &[u32; 2]| pair[side] as usize);
+        let between = sides.iter().filter(|pair| pair[1] != u32::MAX);
+        let between = between.filter(|pair| mesh.bodies[one(pair)] != mesh.bodies[other(pair)]);
+        between.filter(|pair| part[one(pair)] != part[other(pair)]).count()
+    };
+    // Equal stretches, cut anywhere.
+    let part: Vec<Rank> = (0..tets).map(|tet| (tet * 4 / tets) as Rank).collect();
+    assert!(cut_interfaces(&part) > 0);
+    let join = |ranks: u32, most: f64| {
+        let held: Vec<Rank> = (0..tets as u32).map(|tet| tet * 7 % ranks).collect();
+        let (joined, _) = on_parts(&mesh, &held, ranks, |comm, mesh| {
+            let mut to: Vec<Rank> = mesh.tet_ids.iter().map(|&id| part[id as usize]).collect();
+            join_interfaces(comm, &mesh, &mut to, 4, most).unwrap();
+            (mesh.tet_ids.iter().copied().zip(to).collect(), ())
+        });
+        joined
+    };
+    let alone = join(1, 1.1);
+    assert_eq!(cut_interfaces(&alone), 0);
+    assert_ne!(alone, part);
+    for ranks in [2, 5] {
+        assert_eq!(join(ranks, 1.1), alone);
+    }
+    assert_eq!(join(2, 1.0), part, "parts that would be too uneven stay as they are");
+}
