@@ -362,3 +362,26 @@ fn parts_have_periodic_faces_together_with_their_images() {
         }
     }
 }
+
+#[test]
+fn periodic_partitions_of_elmer_are_read_as_such() {
+    let model = model("rotor_sector");
+    let pairs = made(&model, 1, 0)[0].periodic.unwrap().pairs;
+    for ranks in [1, 3] {
+        let dir = tempfile::tempdir().unwrap();
+        let write = |comm: &dyn crate::comm::Communicator| {
+            let model = (comm.rank() == 0).then_some(&model);
+            let made = generate(comm, model, &settings(0, &[]), &Progress::new(true, 5)).unwrap();
+            elmer::write(comm, made.part.stream(), &made.names, dir.path()).unwrap();
+        };
+        thread::run(ranks, write).unwrap();
+        let mut notes = Vec::new();
+        let add = &mut |note: &str| notes.push(note.to_owned());
+        let given = crate::pipeline::input::read(&[dir.path()], &Default::default(), add).unwrap();
+        assert!(!notes.iter().any(|note| note.contains("periodic")), "{notes:?}");
+        let again = made(&given, 1, 0).remove(0);
+        assert_eq!(again.part.stream().links().len(), 1, "{ranks} parts");
+        assert_eq!(again.periodic.unwrap().pairs, pairs, "{ranks} parts");
+        assert_eq!(made(&given, 2, 0).remove(0).coarse.unwrap().partition.lost_ties, 0);
+    }
+}

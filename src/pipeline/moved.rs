@@ -50,8 +50,8 @@ pub fn repartition(
     let loaded = progress.stage("read", || elmer::load(comm, dir))?;
     if periodic_together && loaded.is_periodic && comm.size() > 1 {
         return Err(Failure::input(format!(
-            "{} has periodic faces, and parts are chosen without regard to them, so that Elmer's `Periodic BC` would be wrong: make the \
-             parts with `tetmill generate`, or insist with --allow-split-periodic",
+            "{} has periodic faces, and parts are chosen without regard to them, so that Elmer's `Periodic BC` would be wrong: make other \
+             parts of it with `tetmill generate`, which reads pairs, or insist with --allow-split-periodic",
             loaded.folder.display()
         )));
     }

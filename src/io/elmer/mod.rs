@@ -31,6 +31,7 @@ pub use faults::{Fault, FaultKind, Faults, check_elmer, faults};
 pub use load::{LoadError, Loaded, load};
 pub(crate) use names::names_of;
 pub use parse::ReadError;
+pub(crate) use periodic::{PairsOfNodes, pairs_of};
 pub(crate) use read::read_corners;
 pub use read::{BoundaryElement, Element, ElmerMesh, ElmerPart, Header, Layout, Node, Rows, SharedNode};
 pub use read::{layouts, only_layout, read, read_layout, stated_elements};

@@ -55,6 +55,25 @@ pub(super) fn periodic_text(
     Ok(Some(text))
 }
 
+/// Pairs of nodes, image first, by identification.
+pub(crate) type PairsOfNodes = BTreeMap<u32, Vec<[u32; 2]>>;
+
+/// The pairs of the mesh in `folder`, if it has any. Those of a serial mesh of ours are in the folder of its only part.
+///
+/// # Errors
+/// A file that cannot be read, or a line that is none of it.
+pub(crate) fn pairs_of(folder: &Path) -> Result<PairsOfNodes, ReadError> {
+    let mut pairs = PairsOfNodes::new();
+    let places = [folder.join(NAME), folder.join("partitioning.1").join(NAME)];
+    let Some(path) = places.into_iter().find(|path| path.exists()) else { return Ok(pairs) };
+    let text = std::fs::read_to_string(&path).map_err(ReadError::io(&path))?;
+    for (index, line) in text.lines().enumerate().filter(|(_, line)| !line.starts_with('#')) {
+        let [image, of, number] = numbers(&path, index, line)?[..] else { return Err(broken(&path, index)) };
+        pairs.entry(number).or_default().push([image, of]);
+    }
+    Ok(pairs)
+}
+
 /// Judges the pairs of a mesh, if it has any: both nodes must be there, and where the motion says.
 ///
 /// # Errors
@@ -76,7 +95,7 @@ pub(super) fn check_pairs(mesh: &ElmerMesh, faults: &mut Faults) -> Result<(), R
     let largest = low.coords.amax().max(high.coords.amax());
     let tolerance = f64::max(SAME_PLACE * (high - low).norm(), ROUNDING * largest);
     let mut motions: BTreeMap<u32, Matrix3x4<f64>> = BTreeMap::new();
-    let mut pairs: BTreeMap<u32, Vec<[u32; 2]>> = BTreeMap::new();
+    let mut pairs = PairsOfNodes::new();
     for (index, line) in text.lines().enumerate() {
         if let Some(rest) = line.strip_prefix(MOTION) {
             let (number, matrix) = rest.split_once(' ').unwrap_or((rest, ""));

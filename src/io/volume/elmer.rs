@@ -1,25 +1,25 @@
 //! An Elmer mesh, whole or in parts, by the reader that `check` uses.
 
 use super::assemble::assemble;
-use super::raw::{Label, Raw, Shape};
+use super::raw::{Label, PeriodicPairs, Raw, Shape};
 use super::{VolumeMesh, gmsh::Ids};
-use crate::io::elmer::{ElmerMesh, names_of, read_corners};
+use crate::io::elmer::{ElmerMesh, PairsOfNodes, names_of, pairs_of, read_corners};
 use crate::io::input::{Fault, ReadError};
 use std::collections::BTreeSet;
 use std::path::Path;
 
-/// Reads the mesh of a folder; names from `mesh.names` there, or in the folder above a partition.
+/// Reads the mesh of a folder, with its periodic pairs; names from `mesh.names` there, or in the folder above a partition.
 pub(super) fn read(folder: &Path) -> Result<VolumeMesh, ReadError> {
     let (mesh, of_second_order) = read_corners(folder)?;
     let at = mesh.layout.folder().to_path_buf();
-    let mut raw = joined(&mesh).map_err(|fault| fault.in_file(&at, b""))?;
+    let mut raw = joined(&mesh, pairs_of(&at)?).map_err(|fault| fault.in_file(&at, b""))?;
     raw.higher_order = of_second_order;
     [raw.body_names, raw.patch_names] = names_of(&at);
     assemble(raw).map_err(|fault| fault.in_file(&at, b""))
 }
 
 /// All parts in one: nodes in the order of their ids, elements in that of theirs.
-fn joined(mesh: &ElmerMesh) -> Result<Raw, Fault> {
+fn joined(mesh: &ElmerMesh, pairs: PairsOfNodes) -> Result<Raw, Fault> {
     let mut nodes: Vec<_> = mesh.parts.iter().flat_map(|part| &part.nodes).collect();
     nodes.sort_by_key(|node| node.id);
     nodes.dedup_by_key(|node| node.id);
@@ -33,6 +33,14 @@ fn joined(mesh: &ElmerMesh) -> Result<Raw, Fault> {
         ids.place(id.into())
             .ok_or_else(|| Fault::file(format!("{what} {of} names node {id}, which is not there")))
     };
+    for (identification, pairs) in pairs {
+        let places = |[image, of]: [u32; 2]| {
+            let node = |id: u32| place(id, "a pair of identification", identification);
+            Ok([node(image)?, node(of)?])
+        };
+        let pairs = pairs.into_iter().map(places).collect::<Result<_, Fault>>()?;
+        raw.periodic.push(PeriodicPairs { identification: identification.into(), pairs });
+    }
     let mut elements: Vec<_> = mesh.parts.iter().flat_map(|part| &part.elements).collect();
     elements.sort_by_key(|element| element.id);
     for element in elements {
