@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Installs what the tests need beside Rust: MPI, libclang (for its bindings), TetGen, Python with numpy, and the programs that read our
-# files, as modules of Python: Gmsh, NGSolve with NETGEN, meshio.
+# files, as modules of Python: Gmsh, NGSolve with NETGEN, meshio, scikit-fem, MFEM.
 # Debian and Ubuntu by apt; elsewhere it says what is missing. Does nothing where all is there.
 set -euo pipefail
 
@@ -38,7 +38,7 @@ if [ ${#missing[@]} -gt 0 ]; then
 fi
 
 # The module and the package that has it.
-for module in numpy:numpy gmsh:gmsh ngsolve:ngsolve netgen.csg:netgen-mesher meshio:meshio; do
+for module in numpy:numpy gmsh:gmsh ngsolve:ngsolve netgen.csg:netgen-mesher meshio:meshio skfem:scikit-fem mfem.ser:mfem; do
     python3 -c "import ${module%%:*}" 2>/dev/null && continue
     package=${module##*:}
     python3 -m pip install --quiet "$package" 2>/dev/null \
