@@ -1,7 +1,6 @@
 //! The dual graph: tets, and which of them share a face.
 
-use crate::mesh::FaceId;
-use crate::mesh::topology::{Faces, face_tets};
+use crate::mesh::topology::Faces;
 
 /// The tets beside each tet, in compressed rows.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -29,12 +28,8 @@ impl Dual {
     }
 }
 
-/// The dual graph of the tets whose faces are listed.
-///
-/// # Errors
-/// The first face that more than two tets have.
-pub fn dual(listed: &Faces) -> Result<Dual, FaceId> {
-    let face_tets = face_tets(listed.faces.len(), &listed.tet_faces)?;
+/// The dual graph of the tets whose faces are listed, with the tets at each face.
+pub fn dual(listed: &Faces, face_tets: &[[u32; 2]]) -> Dual {
     let mut dual = Dual { offsets: Vec::with_capacity(listed.tet_faces.len() + 1), neighbours: Vec::new() };
     dual.offsets.push(0);
     for (tet, faces) in (0..).zip(&listed.tet_faces) {
@@ -45,5 +40,5 @@ pub fn dual(listed: &Faces) -> Result<Dual, FaceId> {
         dual.neighbours.extend(beside.filter(|&other| other != u32::MAX));
         dual.offsets.push(dual.neighbours.len() as u32);
     }
-    Ok(dual)
+    dual
 }

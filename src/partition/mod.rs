@@ -26,7 +26,6 @@ pub use metrics::Metrics;
 
 use crate::mesh::topology::Faces;
 use crate::mesh::{FaceId, Mesh, Rank, sorted_face, topology};
-use dual::Dual;
 use ties::{Clusters, Ties};
 
 /// How to partition.
@@ -139,9 +138,10 @@ pub fn partition_tied(
         return Err(PartitionError::TooManyTets { tets });
     }
     let listed = topology::faces(mesh.points.len(), &mesh.tets);
-    let dual = dual_of(&listed)?;
-    let interfaces = interfaces(mesh, &listed);
-    let clusters = Clusters::new(tets, ties, &interfaces, parts).filter(|_| parts > 1);
+    let face_tets = tets_at_faces(&listed)?;
+    let dual = dual::dual(&listed, &face_tets);
+    let interfaces = interfaces(mesh, &listed, &face_tets);
+    let clusters = if parts > 1 { Clusters::new(tets, ties, &interfaces, parts) } else { None };
     let mut part = match (settings.method, &clusters) {
         _ if parts == 1 => vec![0; tets],
         (Method::Metis, None) => graph::bisect(&dual, parts, settings.seed)?,
@@ -164,8 +164,7 @@ pub fn partition_tied(
 }
 
 /// The tets on both sides of boundary triangles inside the mesh.
-fn interfaces(mesh: &Mesh, listed: &Faces) -> Vec<[u32; 2]> {
-    let Ok(face_tets) = topology::face_tets(listed.faces.len(), &listed.tet_faces) else { return Vec::new() };
+fn interfaces(mesh: &Mesh, listed: &Faces, face_tets: &[[u32; 2]]) -> Vec<[u32; 2]> {
     let sides = mesh.triangles.iter().filter_map(|triangle| {
         let face = listed.faces.binary_search(&sorted_face(triangle.vertices)).ok()?;
         Some(face_tets[face]).filter(|tets| tets[1] != u32::MAX)
@@ -179,13 +178,14 @@ fn interfaces(mesh: &Mesh, listed: &Faces) -> Vec<[u32; 2]> {
 /// A mesh with a face of three tets.
 pub fn assess(mesh: &Mesh, part: &[Rank], parts: u32) -> Result<Metrics, PartitionError> {
     let listed = topology::faces(mesh.points.len(), &mesh.tets);
-    Ok(metrics::measure(&dual_of(&listed)?, part, parts, None, 0))
+    let dual = dual::dual(&listed, &tets_at_faces(&listed)?);
+    Ok(metrics::measure(&dual, part, parts, None, 0))
 }
 
-/// The dual graph of the tets whose faces are listed.
-fn dual_of(listed: &Faces) -> Result<Dual, PartitionError> {
-    dual::dual(listed).map_err(|face: FaceId| PartitionError::NotAMesh {
-        vertices: listed.faces[face.index()].map(|v| v.0),
+/// The tets at each of the listed faces.
+fn tets_at_faces(listed: &Faces) -> Result<Vec<[u32; 2]>, PartitionError> {
+    topology::face_tets(listed.faces.len(), &listed.tet_faces).map_err(|face: FaceId| {
+        PartitionError::NotAMesh { vertices: listed.faces[face.index()].map(|v| v.0) }
     })
 }
 

@@ -89,7 +89,8 @@ fn a_face_of_three_tets_is_refused() {
 #[test]
 fn empty_parts_are_filled_from_the_largest() {
     let mesh = lattice_cube(2);
-    let dual = dual_of(&topology::faces(mesh.points.len(), &mesh.tets)).unwrap();
+    let listed = topology::faces(mesh.points.len(), &mesh.tets);
+    let dual = dual::dual(&listed, &tets_at_faces(&listed).unwrap());
     let mut part = vec![1; 48];
     part[TetId(0).index()] = 3;
     assert_eq!(metrics::fill_empty_parts(&dual, &mut part, 5), 3);

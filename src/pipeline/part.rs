@@ -159,10 +159,9 @@ fn join(comm: &dyn Communicator, mut part: BareMesh, moved: &mut u64) -> Result<
 
 /// **Collective.** Brings the tets on both sides of interfaces between bodies together, if parts stay even.
 fn join_interfaces(comm: &dyn Communicator, part: BareMesh, moved: &mut u64) -> Result<BareMesh, Failure> {
-    let several = u64::from(part.tet_bodies.windows(2).any(|pair| pair[0] != pair[1]));
-    let bodies = [several, part.tet_bodies.first().map_or(0, |body| u64::from(body.0))];
-    let [several, last] = comm.all_reduce_max_u64(bodies)?;
-    if several == 0 && last == 0 {
+    let last = part.tet_bodies.iter().map(|body| u64::from(body.0)).max().unwrap_or(0);
+    // Bodies are counted from 0: this is the only one.
+    if comm.all_reduce_max_u64([last])? == [0] {
         return Ok(part);
     }
     let mesh = settle(comm, part).map_err(|error| Failure::new(Status::NoValidMesh, error))?;

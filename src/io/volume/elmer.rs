@@ -54,7 +54,7 @@ fn joined(mesh: &ElmerMesh, pairs: PairsOfNodes) -> Result<Raw, Fault> {
     triangles.sort_by_key(|triangle| triangle.id);
     let mut seen = BTreeSet::new();
     for triangle in triangles {
-        // A triangle between two parts is in both.
+        // A triangle between two parts may be in both.
         let mut key = triangle.nodes;
         key.sort_unstable();
         if !seen.insert(key) {
