@@ -1,9 +1,11 @@
-//! Compiles the C++ shim if TetGen's header is found, and links it into the worker alone: TetGen is AGPL and
-//! may crash, so neither the library crate nor any test that uses it is linked with it.
+//! Compiles the C++ shim if TetGen's header is found, and links it into the worker only.
+//!
+//! TetGen is AGPL and may crash, so neither the library crate nor any test is linked with it.
 
 use std::path::Path;
 
-/// Where packages put `tetgen.h`. If `TETGEN_INCLUDE` is set, only the folder that it names is searched.
+/// Folders where packages install `tetgen.h`. If `TETGEN_INCLUDE` is set, only that folder is
+/// searched.
 const INCLUDE_FOLDERS: [&str; 3] = ["/usr/include", "/usr/local/include", "/opt/homebrew/include"];
 
 fn main() {

@@ -1,44 +1,53 @@
-//! Corners, curves and patches of the bodies of a geometry.
+//! Finds the corners, curves and patches of a geometry.
 //!
-//! [`Features::find`] goes this way:
+//! A surface is **relevant** in a cell if membership in some body (or cutout) depends on it there.
+//! [`Features::find`] proceeds as follows:
 //!
-//! 1. `bounds`: a box around all bodies, by pruning a huge cube.
-//! 2. `octree`: cells, in each the part of each body that matters there; split until any two surfaces in a
-//!    cell either cannot meet in it or meet in a curve that is monotone there, which interval arithmetic proves.
-//! 3. `seed`, `trace`: from seeds in the cells, the intersection curves of all such pairs of surfaces.
-//! 4. `cross`: on them, the points where a third surface crosses or touches; `arcs`: cut there, into arcs.
-//! 5. `around`: at a point of each arc, the regions (bodies or the exterior) around it, sector by sector.
-//!    An arc is part of a feature if it is more than a line on one smooth sheet.
-//! 6. `assemble`: arcs to curves and corners, sheets to patches; `extent`: their box; `number`: boundary
-//!    numbers and names.
-//! 7. `periodic`: which of them are images of others.
-//! 8. `check`: whether it all fits together; `contact`: whether places where surfaces are tangent matter; `touch`:
-//!    whether a corner or an edge touches the inside of a patch; `cusp`: whether one ends in too sharp a cusp.
+//! 1. `bounds`: finds a box around all bodies by pruning a huge cube.
+//! 2. `octree`: splits the box into cells, each with the relevant part of each body. A cell is
+//!    split until interval arithmetic proves for any two of its surfaces that they do not meet in
+//!    the cell, or meet in a curve that is monotone there.
+//! 3. `seed`, `trace`: traces the intersection curves of all such pairs from seeds in the cells.
+//! 4. `cross`: finds the points on a curve where a third surface crosses or touches it; `arcs`:
+//!    cuts the curve there into arcs.
+//! 5. `neighborhood`: finds the regions (bodies or the exterior) around a point of each arc, sector
+//!    by sector. An arc belongs to a feature unless it lies inside one smooth sheet or off all
+//!    sheets.
+//! 6. `assemble`: joins arcs to curves and corners, and sheets to patches; `extent`: computes their
+//!    bounding box; `number`: assigns boundary numbers and names.
+//! 7. `periodic`: matches periodic copies.
+//! 8. `check`: verifies consistency; `contact`: decides whether points of tangency matter; `touch`:
+//!    rejects corners and edges that touch the interior of a patch; `cusp`: rejects patches that end
+//!    in too sharp a cusp.
 //!
-//! Why trace all pairs and classify afterwards, and not follow edges from special points like NETGEN: no
-//! decision depends on a tolerance while a curve is followed; surfaces in special position (three through
-//! one curve, four through one point, a plane through a seam between tangent surfaces) need no case of their own; and
-//! what was missed shows as an open end.
+//! NETGEN follows edges from special points. We trace all pairs and classify afterwards: no
+//! decision depends on a tolerance during tracing; special positions (three surfaces through one
+//! curve, four through one point, a plane through a seam between tangent surfaces) need no special
+//! case; and a missed curve leaves an open end, which is detected.
 //!
-//! Surfaces that one motion sweeps are compared in the moving plane (`swept`), and what planes of the file keep apart is not compared at all.
+//! Pairs of surfaces swept by the same motion are compared in the moving plane (`swept`). Pairs
+//! separated by a plane of the file are not compared.
 //!
-//! Tangent surfaces are a case of their own (`seam`): a line or a circle along which two are tangent is found from
-//! their parameters. The apex of a cone is a corner (`apex`). Curves get their seeds by exclusion (`seed`): parts of cells are split
-//! until a trace covers them or no curve can be there.
+//! Tangent pairs of surfaces are a special case (`seam`): a line or an ellipse of tangency is
+//! computed from the parameters of the surfaces. The apex of a cone is a corner (`apex`). Seeds of
+//! curves are found by exclusion (`seed`): parts of cells are split until each is covered by a
+//! trace or proved to contain no curve.
 //!
-//! What is refused, with its place: surfaces that are tangent where both are boundaries with a wedge of no angle between
-//! them, along a line (two rods side by side) or in a point (a ball on a plate, a torus cut where a plane touches it); a corner or
-//! an edge that touches a face; a face that ends in a cusp whose curves bend alike; bodies that overlap or are not bounded.
+//! The following are rejected with their coordinates: surfaces that are tangent where both are
+//! boundaries with a wedge of zero angle between them, along a line (two parallel rods in contact)
+//! or at a point (a ball on a plate, a torus cut by a tangent plane); a corner or an edge that
+//! touches the interior of a face; a face that ends in a cusp between curves of equal curvature;
+//! bodies that overlap or are unbounded.
 //!
-//! Three or more surfaces that touch in one point to a high order are refused, but not always with that reason.
+//! Three or more surfaces in contact of high order at one point are rejected too, but the error may
+//! name another reason.
 
 use crate::{Aabb, BodyId, CornerId, CurveId, Geometry, PatchId, Point, SurfaceId};
-use around::Tolerances;
+use neighborhood::Tolerances;
 use octree::Octree;
 
 mod apex;
 mod arcs;
-mod around;
 mod assemble;
 mod bounds;
 mod check;
@@ -47,6 +56,7 @@ mod cross;
 mod cusp;
 mod error;
 mod extent;
+mod neighborhood;
 mod number;
 mod octree;
 mod periodic;
@@ -60,66 +70,70 @@ mod trace;
 
 pub use check::Inconsistency;
 pub use error::{FeatureError, Named, Place};
-pub use periodic::{CurveImage, Identified, Origin, Origins};
-pub use seam::find_seams;
+pub use periodic::{CurveCopy, Identified, Origin, Origins};
+pub(crate) use seam::find_seams;
 pub use singular::Singular;
-pub use trace::{curve_curvature, curve_tangent};
+use trace::curve_curvature;
 
-/// A point where curves end, or a vertex of its own (`point`, the apex of a cone).
+/// A point where curves end, or an isolated vertex (`point`, the apex of a cone).
 #[derive(Clone, Debug)]
 pub struct Corner {
-    /// Where it is.
+    /// The coordinates.
     pub point: Point,
     /// The surfaces through it, ascending.
     pub surfaces: Vec<SurfaceId>,
 }
 
-/// A patch beside a curve: which one, and on which side.
+/// A **fin**: the use of a curve by the boundary of one adjacent patch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Fin {
     /// The patch.
     pub patch: PatchId,
-    /// Whether the patch lies to the left for one who walks along the curve in its direction with
-    /// the patch's normal up (see [`Patch::flipped`] for the normal). Its boundary then has the curve forward.
+    /// Whether the patch lies to the left of the curve, seen along the curve with the patch's
+    /// normal up (see [`Patch::flipped`]). Then the curve is traversed forward on the patch's
+    /// boundary.
     pub forward: bool,
 }
 
-/// A smooth piece of the intersection of two surfaces where patches meet.
+/// A smooth piece of the intersection of two surfaces at which patches meet.
 #[derive(Clone, Debug)]
 pub struct Curve {
     /// The two surfaces, ascending.
     pub surfaces: [SurfaceId; 2],
-    /// The corners at its start and end (they may be the same), `None` where it is closed and smooth.
+    /// The corners at its start and end (possibly the same); `None` for a smooth closed curve.
     pub ends: Option<[CornerId; 2]>,
-    /// Points on the curve from its start to its end, exact within rounding, so dense that the curve
-    /// turns by less than a quarter radian between two of them. A closed one repeats its first point at its end.
+    /// Points on the curve from start to end, accurate to rounding. The curve turns by less than a
+    /// quarter radian between consecutive points. A closed curve repeats its first point at the
+    /// end.
     pub trace: Vec<Point>,
-    /// The patches that have it on their boundary: at most one each of (patch, direction).
+    /// The adjacent patches: at most one fin per patch and direction.
     pub fins: Vec<Fin>,
 }
 
-/// The pieces of one surface that separate the same two regions and belong to the same cutout, if to any.
+/// The pieces of one surface that separate the same two regions and belong to the same cutout, if
+/// any.
 #[derive(Clone, Debug)]
 pub struct Patch {
     /// The surface.
     pub surface: SurfaceId,
-    /// False: its normal is the gradient of the surface; true: the opposite.
-    /// The normal points from `inside` to `outside`.
+    /// Whether the normal is opposite to the surface's gradient. The normal points from `inside` to
+    /// `outside`.
     pub flipped: bool,
-    /// The body behind its normal (never `None` on both sides; for an outer patch `inside` is the body).
+    /// The body behind the normal; for an outer patch, the body it bounds.
     pub inside: Option<BodyId>,
-    /// The body in front of it, `None` for the exterior.
+    /// The body in front of the normal, `None` for the exterior.
     pub outside: Option<BodyId>,
-    /// Which of [`Geometry::cutouts`] it is, by index, if it is one.
+    /// Index in [`Geometry::cutouts`] of the cutout it belongs to.
     pub cutout: Option<u32>,
-    /// Its boundary: curves, and whether each is run in its own direction with the patch on the left.
-    /// Empty for a whole closed surface (sphere, torus, ellipsoid).
+    /// The curves of its boundary, and whether each is traversed in its own direction with the
+    /// patch on the left. Empty for a whole closed surface (sphere, torus, ellipsoid).
     pub boundary: Vec<(CurveId, bool)>,
-    /// A point in the relative interior of each of its pieces that has no boundary curve, to begin a front from.
+    /// An interior point of each component without boundary curves, to start the advancing front.
     pub seeds: Vec<Point>,
-    /// Boundary-condition number, from 1; unique per patch unless the file gives one to several.
+    /// Boundary-condition number, from 1. Unique per patch unless the file assigns one number to
+    /// several.
     pub bc: u32,
-    /// Boundary name; none if the file gives none.
+    /// Boundary name, if the file gives one.
     pub name: Option<String>,
 }
 
@@ -132,14 +146,15 @@ pub struct Features {
     pub curves: Vec<Curve>,
     /// The patches.
     pub patches: Vec<Patch>,
-    /// The box of the bodies, computed.
+    /// The bounding box of the bodies.
     pub bounds: Aabb,
-    /// Periodic faces, by identification of the geometry.
+    /// Matched periodic entities, one item per identification of the geometry.
     pub identified: Vec<Identified>,
 }
 
 impl Curve {
-    /// Its length, to second order in the angle between the points of its trace.
+    /// The length of the polyline through the trace; its relative error is second order in the
+    /// angle between chords.
     pub fn length(&self) -> f64 {
         self.trace.windows(2).map(|ends| (ends[1] - ends[0]).norm()).sum()
     }
@@ -149,7 +164,7 @@ impl Features {
     /// Finds the features of a geometry.
     ///
     /// # Errors
-    /// What cannot be meshed is refused with its place, see [`FeatureError`].
+    /// [`FeatureError`], with coordinates, if the geometry cannot be meshed.
     pub fn find(geometry: &Geometry) -> Result<Self, FeatureError> {
         let root = bounds::bounding_cell(geometry)?;
         let diagonal = root.iter().map(|side| side.width().powi(2)).sum::<f64>().sqrt();
@@ -160,21 +175,21 @@ impl Features {
             .map_err(|error| contact::explain(geometry, &tree, error, &tolerances))
     }
 
-    /// The curve with this id.
+    /// The curve with index `id`.
     pub fn curve(&self, id: CurveId) -> &Curve {
         &self.curves[id.index()]
     }
-    /// The patch with this id.
+    /// The patch with index `id`.
     pub fn patch(&self, id: PatchId) -> &Patch {
         &self.patches[id.index()]
     }
-    /// The corner with this id.
+    /// The corner with index `id`.
     pub fn corner(&self, id: CornerId) -> &Corner {
         &self.corners[id.index()]
     }
 }
 
-/// The features in the cells of a tree.
+/// Finds the features with a given octree.
 fn find_in(geometry: &Geometry, tree: &Octree, tolerances: &Tolerances) -> Result<Features, FeatureError> {
     let traces = seed::trace_all(geometry, tree, tolerances);
     let (arcs, nodes) = arcs::feature_arcs(geometry, tree, &traces, tolerances)?;

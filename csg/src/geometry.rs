@@ -1,8 +1,8 @@
-//! The central type: what a `.geo` file says, with equal surfaces made one.
+//! The geometry described by a `.geo` file: surfaces, bodies and the options that apply to them.
 
 use crate::{Point, Solid, Surface};
 
-/// Declares the id of one kind of geometric entity: an index into the list of its kind.
+/// Declares the id of one kind of geometric entity: an index into the list of that kind.
 macro_rules! entity_id {
     ($(#[$doc:meta])* $name:ident) => {
         $(#[$doc])*
@@ -19,7 +19,7 @@ macro_rules! entity_id {
             /// The id of the entity at `index`.
             ///
             /// # Panics
-            /// Past `u32::MAX` entities.
+            /// If `index` does not fit in 32 bits.
             #[inline]
             pub fn new(index: usize) -> Self {
                 Self(u32::try_from(index).expect("more than 2^32 geometric entities"))
@@ -29,15 +29,16 @@ macro_rules! entity_id {
 }
 
 entity_id!(
-    /// A surface of a [`Geometry`]; equal surfaces of the file have one id.
+    /// A surface of a [`Geometry`]. Coincident surfaces of the file share one id.
     SurfaceId
 );
 entity_id!(
-    /// A corner: a point where curves end.
+    /// A corner: an end point of curves, or an isolated vertex.
     CornerId
 );
 entity_id!(
-    /// A curve: a piece of the intersection of two surfaces, between two corners or closed.
+    /// A curve: a connected piece of the intersection of two surfaces, closed or between two
+    /// corners.
     CurveId
 );
 entity_id!(
@@ -45,32 +46,33 @@ entity_id!(
     PatchId
 );
 entity_id!(
-    /// A body: a solid that is meshed. `BodyId(0)` is the first `tlo` of the file that is a solid.
+    /// A body: a solid that is meshed. `BodyId(0)` is the first `tlo` of the file that declares
+    /// a body and not a cutout.
     BodyId
 );
 
-/// An axis-parallel box.
+/// An axis-aligned box.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Aabb {
-    /// The corner with the least coordinates.
+    /// The corner with the smallest coordinates.
     pub min: Point,
     /// The corner with the largest coordinates.
     pub max: Point,
 }
 
 impl Aabb {
-    /// The length of the diagonal, the unit in which tolerances are given.
+    /// The length of the diagonal. Tolerances are given relative to it.
     pub fn diagonal(&self) -> f64 {
         (self.max - self.min).norm()
     }
 
-    /// The middle of the box.
+    /// The center of the box.
     pub fn center(&self) -> Point {
         nalgebra::center(&self.min, &self.max)
     }
 }
 
-/// A place in the source text, from 1.
+/// A position in the source text.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub struct Span {
     /// The line, from 1.
@@ -79,18 +81,18 @@ pub struct Span {
     pub column: u32,
 }
 
-/// What the file says of one surface beside its shape.
+/// Options of one surface, and its position in the file.
 #[derive(Clone, Debug, Default)]
 pub struct SurfaceInfo {
-    /// Upper bound of the mesh size on it, if given (`-maxh` of a solid that has it).
+    /// Upper bound of the mesh size on the surface (`-maxh` of a solid that contains it), if given.
     pub maxh: Option<f64>,
     /// Boundary-condition number (`-bc`).
     pub bc: Option<u32>,
     /// Boundary name (`-bcname`).
     pub bc_name: Option<String>,
-    /// The named solid in which the surface first occurs, for messages.
+    /// The named solid in which the surface first occurs, for error messages.
     pub solid: String,
-    /// Where its primitive stands in the file.
+    /// Position of its primitive in the file.
     pub span: Span,
 }
 
@@ -99,27 +101,27 @@ pub struct SurfaceInfo {
 pub struct Body {
     /// The name of its solid.
     pub name: String,
-    /// Its inside.
+    /// The set of points inside the body.
     pub solid: Solid,
-    /// The number NETGEN gives it: 1 + position among all top-level objects of the file.
+    /// The NETGEN domain number: 1 + position among all top-level objects of the file.
     pub number: u32,
     /// Upper bound of the mesh size inside (`-maxh` of the tlo, else of the solid).
     pub maxh: Option<f64>,
     /// Material name (`-material`).
     pub material: Option<String>,
-    /// Colour, 0 to 1 each (`-col`).
+    /// Color, 0 to 1 each (`-col`).
     pub color: Option<[f64; 3]>,
     /// `-transparent`
     pub transparent: bool,
     /// `-layer`
     pub layer: i32,
-    /// Where it stands in the file.
+    /// Position in the file.
     pub span: Span,
 }
 
-/// The part of a surface that bounds a solid, as a patch of its own: a top-level object with a surface (`tlo S F`).
+/// The part of a surface that bounds a solid, as a patch of its own (`tlo S F`).
 ///
-/// It is no body and changes none: it cuts a patch out of those that lie on the surface, where the surface also
+/// A cutout does not change the bodies. It splits the patches on its surface where the surface also
 /// bounds the solid.
 #[derive(Clone, Debug)]
 pub struct Cutout {
@@ -129,94 +131,97 @@ pub struct Cutout {
     pub solid: Solid,
     /// The surface.
     pub surface: SurfaceId,
-    /// The number NETGEN gives it: 1 + position among all top-level objects of the file.
+    /// The NETGEN number: 1 + position among all top-level objects of the file.
     pub number: u32,
-    /// Upper bound of the mesh size on it (`-maxh`).
+    /// Upper bound of the mesh size on the cutout (`-maxh`).
     pub maxh: Option<f64>,
     /// Boundary-condition number (`-bc`).
     pub bc: Option<u32>,
     /// Boundary name (`-bcname`).
     pub bc_name: Option<String>,
-    /// Where it stands in the file.
+    /// Position in the file.
     pub span: Span,
 }
 
-/// Two surfaces whose patches are to be the same but for a motion (`identify periodic`).
+/// Two surfaces with matching patches: a rigid motion maps those of the first to those of the
+/// second (`identify periodic`).
 #[derive(Clone, Debug)]
 pub struct Identification {
-    /// The surface, and its image.
+    /// The master surface and its periodic copy.
     pub surfaces: [SurfaceId; 2],
-    /// The names of the solids whose first surfaces they are.
+    /// The solids named in the statement; the first surface of each is meant.
     pub solids: [String; 2],
-    /// Where it stands in the file.
+    /// Position in the file.
     pub span: Span,
 }
 
-/// A tag for solvers that grade elements towards singularities (`singular`).
+/// A tag for solvers that grade elements toward singularities (`singular`).
 #[derive(Clone, Debug)]
 pub struct Singularity {
-    /// Where.
+    /// The tagged entities.
     pub place: SingularPlace,
-    /// How strongly (`-factor`).
+    /// Grading factor (`-factor`).
     pub factor: i32,
-    /// Upper bound of the mesh size there; edges only (`-maxh`).
+    /// Upper bound of the mesh size (`-maxh`); edges only.
     pub maxh: Option<f64>,
-    /// Where it stands in the file.
+    /// Position in the file.
     pub span: Span,
 }
 
-/// Where a [`Singularity`] is, by the surfaces of the solids that it names.
+/// The entities tagged by a [`Singularity`], given by the surfaces of the solids it names.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum SingularPlace {
-    /// Where some surfaces bound a body.
+    /// Patches of some surfaces that bound a body.
     Face {
         /// The surfaces.
         surfaces: Vec<SurfaceId>,
         /// The body.
         body: BodyId,
     },
-    /// On curves between a surface of the first list and one of the second, beside a body if one is named.
+    /// Curves between a surface of the first list and one of the second, restricted to one body if
+    /// given.
     Edge {
         /// The two lists.
         surfaces: [Vec<SurfaceId>; 2],
         /// The body.
         body: Option<BodyId>,
     },
-    /// At corners on a surface of each list.
+    /// Corners on one surface of each list.
     Point {
         /// The three lists.
         surfaces: [Vec<SurfaceId>; 3],
     },
 }
 
-/// A point that is to be a mesh vertex (`point`).
+/// A point that must become a mesh vertex (`point`).
 #[derive(Clone, Copy, Debug)]
 pub struct UserPoint {
-    /// Where the vertex is to be.
+    /// Coordinates of the vertex.
     pub point: Point,
-    /// Where it stands in the file.
+    /// Position in the file.
     pub span: Span,
 }
 
 /// A boundary-condition number or name for the part of some surfaces that bounds one body
 /// (`boundarycondition`, `boundaryconditionname`).
 ///
-/// Overrides apply in file order, after patches have their numbers from [`SurfaceInfo::bc`] or the counter. A
-/// number replaces the patch's number; a name goes to the patch alone: where the number came from
-/// [`SurfaceInfo::bc`], which other patches may have too, the patch first gets a fresh one.
+/// Overrides apply in file order, after every patch has its number from [`SurfaceInfo::bc`] or from
+/// the counter. A number replaces the number of the patch. A name applies to that patch alone: if
+/// its number comes from [`SurfaceInfo::bc`], which other patches may share, the patch first gets a
+/// new number.
 #[derive(Clone, Debug)]
 pub struct BoundaryOverride {
     /// The surfaces, ascending.
     pub surfaces: Vec<SurfaceId>,
-    /// The body, which may be on either side of them.
+    /// The body, on either side of the surfaces.
     pub body: BodyId,
-    /// The number or the name.
+    /// The number or name to assign.
     pub label: BoundaryLabel,
-    /// Where it stands in the file.
+    /// Position in the file.
     pub span: Span,
 }
 
-/// What a [`BoundaryOverride`] gives to its patches.
+/// The label that a [`BoundaryOverride`] assigns.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum BoundaryLabel {
     /// A boundary-condition number, from 1.
@@ -225,50 +230,56 @@ pub enum BoundaryLabel {
     Name(String),
 }
 
-/// A curve along which two surfaces are tangent: a fillet and its plane, a pipe and the ball that ends it.
+/// A curve along which two surfaces are tangent, for example where a fillet ends on a plane or a
+/// spherical cap on a pipe.
 ///
-/// The intersection of the two says little of such a curve: rounding moves it by the square root of itself. So it is
-/// carried by one of them and an **auxiliary** surface across it, which need not bound anything.
+/// The intersection of a tangent pair is ill-conditioned: a relative perturbation ε of the surfaces
+/// moves it by √ε. The seam is therefore computed as the intersection of one surface of the pair
+/// with an **auxiliary surface** that crosses it transversally. The auxiliary surface need not
+/// bound any solid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Seam {
-    /// The two surfaces, ascending.
+    /// The tangent pair, ascending.
     pub pair: [SurfaceId; 2],
-    /// One of them and the auxiliary surface, ascending. Their intersection may have other pieces, where the two are apart.
-    pub carrier: [SurfaceId; 2],
-    /// What else the two have in common where they cross, carried likewise: cones tangent along a line have a conic in common, too.
-    pub rest: Option<[SurfaceId; 2]>,
-    /// Whether the two have no other points in common than what is carried.
-    pub is_alone: bool,
+    /// The seam surfaces, ascending: one of the pair and the auxiliary surface. They may also
+    /// intersect where the pair is not tangent.
+    pub surfaces: [SurfaceId; 2],
+    /// The residual intersection of the pair, given by two surfaces in the same way. For example,
+    /// two cones tangent along a line may also share a conic.
+    pub residual: Option<[SurfaceId; 2]>,
+    /// Whether the seam and the residual intersection are all that the pair has in common.
+    pub is_complete: bool,
 }
 
-/// What a `.geo` file says.
+/// The geometry described by a `.geo` file.
 #[derive(Clone, Debug, Default)]
 pub struct Geometry {
-    /// The surfaces, equal ones made one; after those of the file the auxiliary ones of seams.
+    /// The surfaces without duplicates: those of the file, then the auxiliary surfaces of seams.
     pub surfaces: Vec<Surface>,
-    /// Beside each surface what the file says of it.
+    /// Options of each surface, in the same order.
     pub surface_info: Vec<SurfaceInfo>,
     /// The bodies in file order.
     pub bodies: Vec<Body>,
-    /// Parts of surfaces that are patches of their own, in file order. Where several have a place, the first counts.
+    /// Parts of surfaces that are patches of their own, in file order. If several contain a point,
+    /// the first applies.
     pub cutouts: Vec<Cutout>,
-    /// Periodic faces.
+    /// Pairs of periodic surfaces.
     pub identifications: Vec<Identification>,
-    /// Tags for solvers.
+    /// Singularity tags for solvers.
     pub singularities: Vec<Singularity>,
-    /// Points to be kept as mesh vertices.
+    /// Points that must become mesh vertices.
     pub user_points: Vec<UserPoint>,
-    /// Numbers and names for single boundaries of bodies, in file order.
+    /// Boundary numbers and names for parts of the boundary of one body, in file order.
     pub boundary_overrides: Vec<BoundaryOverride>,
-    /// The `boundingbox` statement: an override, never needed.
+    /// The box of the `boundingbox` statement. Optional: the bounds are computed.
     pub stated_box: Option<Aabb>,
-    /// Where surfaces are tangent along curves, by pair ([`find_seams`](crate::features::find_seams)).
+    /// The seams of tangent pairs of surfaces, sorted by pair.
     pub seams: Vec<Seam>,
 }
 
 impl Geometry {
-    /// The seam of two surfaces, ascending, if they have one.
-    pub fn seam(&self, pair: [SurfaceId; 2]) -> Option<&Seam> {
+    /// The seam of a pair of surfaces (ascending), if they are tangent along a curve.
+    pub(crate) fn seam(&self, pair: [SurfaceId; 2]) -> Option<&Seam> {
         self.seams.binary_search_by_key(&pair, |seam| seam.pair).ok().map(|i| &self.seams[i])
     }
 }

@@ -1,13 +1,13 @@
-//! Closed intervals of numbers, for ranges of functions over boxes.
+//! Interval arithmetic, to bound functions over boxes.
 //!
-//! Every operation takes the two ends with the rounding of the machine and then moves each end one
-//! number outward, so the exact result is always inside (Moore, Kearfott, Cloud: Introduction to Interval
-//! Analysis, 2009, chapter 2). Boxes are finite; ends that overflow become infinite and stay correct.
+//! Each operation rounds to nearest and then moves both ends outward by one floating-point number,
+//! so the result contains the exact one (Moore, Kearfott, Cloud: Introduction to Interval Analysis,
+//! 2009, chapter 2). Boxes are finite; ends that overflow become infinite and remain valid bounds.
 
 use crate::{Point, Vector};
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-/// A closed interval; every operation rounds outward far enough to contain the exact result.
+/// A closed interval. Operations round outward, so their results contain the exact ones.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Interval {
     /// Lower end.
@@ -22,14 +22,14 @@ pub type Cell = [Interval; 3];
 impl Interval {
     /// The numbers from `lo` to `hi`.
     #[inline]
-    pub fn new(lo: f64, hi: f64) -> Self {
+    pub(crate) fn new(lo: f64, hi: f64) -> Self {
         debug_assert!(lo <= hi, "an interval from {lo} to {hi}");
         Self { lo, hi }
     }
 
-    /// One number.
+    /// The interval that contains only `x`.
     #[inline]
-    pub fn point(x: f64) -> Self {
+    pub(crate) fn point(x: f64) -> Self {
         Self { lo: x, hi: x }
     }
 
@@ -38,13 +38,13 @@ impl Interval {
         Self { lo: lo.next_down(), hi: hi.next_up() }
     }
 
-    /// Whether `x` is in it.
+    /// Whether the interval contains `x`.
     #[inline]
-    pub fn contains(&self, x: f64) -> bool {
+    pub(crate) fn contains(&self, x: f64) -> bool {
         self.lo <= x && x <= self.hi
     }
 
-    /// Whether zero is in it.
+    /// Whether the interval contains zero.
     #[inline]
     pub fn contains_zero(&self) -> bool {
         self.contains(0.0)
@@ -52,48 +52,48 @@ impl Interval {
 
     /// The length.
     #[inline]
-    pub fn width(&self) -> f64 {
+    pub(crate) fn width(&self) -> f64 {
         self.hi - self.lo
     }
 
-    /// The middle, rounded.
+    /// The midpoint, rounded to nearest.
     #[inline]
-    pub fn middle(&self) -> f64 {
+    pub(crate) fn middle(&self) -> f64 {
         0.5 * self.lo + 0.5 * self.hi
     }
 
-    /// The largest absolute value in it.
+    /// The largest absolute value.
     #[inline]
-    pub fn magnitude(&self) -> f64 {
+    pub(crate) fn magnitude(&self) -> f64 {
         self.lo.abs().max(self.hi.abs())
     }
 
-    /// The least absolute value in it.
+    /// The smallest absolute value.
     #[inline]
-    pub fn mignitude(&self) -> f64 {
+    pub(crate) fn mignitude(&self) -> f64 {
         if self.contains_zero() { 0.0 } else { self.lo.abs().min(self.hi.abs()) }
     }
 
-    /// The squares of its numbers: tighter than the product with itself.
+    /// The range of x² over the interval; tighter than the product of the interval with itself.
     #[inline]
     #[must_use]
-    pub fn square(self) -> Self {
+    pub(crate) fn square(self) -> Self {
         let (near, far) = (self.mignitude(), self.magnitude());
         Self { lo: (near * near).next_down().max(0.0), hi: (far * far).next_up() }
     }
 
-    /// The square roots of its numbers that are not negative.
+    /// The range of √x over the nonnegative part of the interval.
     #[inline]
     #[must_use]
-    pub fn sqrt(self) -> Self {
+    pub(crate) fn sqrt(self) -> Self {
         let (lo, hi) = (self.lo.max(0.0).sqrt(), self.hi.max(0.0).sqrt());
         Self { lo: lo.next_down().max(0.0), hi: hi.next_up() }
     }
 
-    /// The numbers in both, when both are known to contain the same number.
+    /// The intersection of two intervals that are known to overlap.
     #[inline]
     #[must_use]
-    pub fn intersect(self, other: Self) -> Self {
+    pub(crate) fn intersect(self, other: Self) -> Self {
         Self { lo: self.lo.max(other.lo), hi: self.hi.min(other.hi) }
     }
 }
@@ -145,7 +145,7 @@ impl Mul<f64> for Interval {
 
 impl Div for Interval {
     type Output = Self;
-    /// The quotient; everything where the divisor contains zero.
+    /// The quotient; the whole real line if the divisor contains zero.
     #[inline]
     fn div(self, other: Self) -> Self {
         if other.contains_zero() {
@@ -159,21 +159,21 @@ impl Div for Interval {
     }
 }
 
-/// The differences between the points of a box and a point.
+/// The box minus a point.
 #[inline]
-pub fn offset(cell: &Cell, origin: &Point) -> Cell {
+pub(crate) fn offset(cell: &Cell, origin: &Point) -> Cell {
     [0, 1, 2].map(|i| cell[i] - Interval::point(origin[i]))
 }
 
-/// The inner products of a vector with the vectors of a box.
+/// The inner product of a vector with a box of vectors.
 #[inline]
-pub fn dot(direction: &Vector, cell: &Cell) -> Interval {
+pub(crate) fn dot(direction: &Vector, cell: &Cell) -> Interval {
     cell[0] * direction.x + cell[1] * direction.y + cell[2] * direction.z
 }
 
-/// The middle of a box.
+/// The center of a box.
 #[inline]
-pub fn middle(cell: &Cell) -> Point {
+pub(crate) fn middle(cell: &Cell) -> Point {
     Point::new(cell[0].middle(), cell[1].middle(), cell[2].middle())
 }
 

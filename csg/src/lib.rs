@@ -1,28 +1,31 @@
-//! Constructive solid geometry: from the text of a `.geo` file to corners, curves, patches and bodies.
+//! Constructive solid geometry: reads a `.geo` file and finds its corners, curves, patches and
+//! bodies.
 //!
-//! A **surface** is the zero set of a smooth function, negative inside. A **solid** is a Boolean
-//! tree over the half-spaces of surfaces. A **body** is a solid that is to be meshed (a top-level
-//! object). Where the boundaries of bodies meet surfaces, they leave the geometric entities that a
-//! mesh is classified on: **corners**, **curves** between them, **patches** bounded by curves.
+//! A **surface** is the zero set of a smooth function that is negative inside. A **solid** is a
+//! Boolean tree over the half-spaces of surfaces. A **body** is a solid that is meshed (a top-level
+//! object). The boundaries of the bodies consist of the geometric entities that a mesh is
+//! classified on: **patches** of surfaces, **curves** that bound the patches, and **corners** at
+//! the ends of curves.
 //!
-//! This crate knows no mesh and no ranks.
+//! The crate contains no mesh and no parallel code.
 #![forbid(unsafe_code)]
 
 pub mod features;
-pub mod geometry;
-pub mod interval;
+mod geometry;
+mod interval;
 pub mod language;
 pub mod primitive;
 pub mod project;
 pub mod solid;
-pub mod surface;
+mod surface;
 
 pub use features::{
-    Corner, Curve, FeatureError, Features, Fin, Identified, Origin, Origins, Patch, Singular,
+    Corner, Curve, CurveCopy, FeatureError, Features, Fin, Identified, Inconsistency, Origin, Origins, Patch,
+    Singular,
 };
 pub use geometry::{
     Aabb, Body, BodyId, BoundaryLabel, BoundaryOverride, CornerId, CurveId, Cutout, Geometry, Identification,
-    PatchId, Seam, SingularPlace, Singularity, SurfaceId,
+    PatchId, Seam, SingularPlace, Singularity, Span, SurfaceId, SurfaceInfo, UserPoint,
 };
 pub use interval::Interval;
 pub use project::{ProjectionFailed, Projector};
@@ -34,7 +37,7 @@ pub type Point = nalgebra::Point3<f64>;
 /// A vector in space.
 pub type Vector = nalgebra::Vector3<f64>;
 
-/// Property tests that try the same cases on every run.
+/// Configuration of property tests: a fixed seed, so every run tries the same cases.
 #[cfg(test)]
 fn seeded() -> proptest::test_runner::Config {
     proptest::test_runner::Config { rng_seed: proptest::test_runner::RngSeed::Fixed(1), ..Default::default() }

@@ -1,4 +1,5 @@
-//! Projection of points to patches and curves: all that refinement needs to know of a geometry.
+//! Projection of points to patches and curves: the only geometric information that refinement
+//! needs.
 
 use crate::primitive::{
     Cone, Cylinder, Ellipse, Ellipsoid, EllipticCone, EllipticCylinder, Nappe, Plane, Revolved, Section,
@@ -7,55 +8,56 @@ use crate::primitive::{
 use crate::{CurveId, Features, Geometry, Origin, PatchId, Point, Surface, SurfaceId, Vector};
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 
-/// A projection that did not converge.
+/// A projection to a surface or a curve that did not converge.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-#[error("the point ({}, {}, {}) has no nearest point there that Newton's method finds", .0.x, .0.y, .0.z)]
+#[error("projection of the point ({}, {}, {}) did not converge", .0.x, .0.y, .0.z)]
 pub struct ProjectionFailed(pub Point);
 
 /// The surfaces of patches and curves, and projection to them.
 ///
-/// Small, and made of plain numbers: every rank has one. Projection is a function of the point and the
-/// entity alone, bit for bit the same on all ranks and threads. It allocates nothing.
+/// A few plain numbers, so every rank stores a copy. A projection depends only on the point and the
+/// entity: results are bitwise equal on all ranks and threads. Projection does not allocate memory.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Projector {
     surfaces: Vec<Surface>,
     curves: Vec<[SurfaceId; 2]>,
     patches: Vec<SurfaceId>,
-    /// Curves that are images of others, ascending.
-    curve_images: Vec<Image>,
-    /// Patches that are images of others, ascending.
-    patch_images: Vec<Image>,
-    /// How far a point may be from its surface, a length.
+    /// Periodic copies among the curves, sorted by id.
+    curve_copies: Vec<PeriodicCopy>,
+    /// Periodic copies among the patches, sorted by id.
+    patch_copies: Vec<PeriodicCopy>,
+    /// Largest distance of a projected point from its surfaces, a length.
     tolerance: f64,
 }
 
-/// A periodic image: points are projected to it as their originals are to what it is an image of, and moved.
+/// A periodic copy of an entity. To project to the copy, move the point to the master, project, and
+/// move back.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Image {
-    /// The index of the image, and that of its origin.
+struct PeriodicCopy {
+    /// Index of the copy and index of its master.
     ids: [u32; 2],
-    /// From the origin to the image.
+    /// Maps the master to the copy.
     motion: Isometry3<f64>,
 }
 
-impl Image {
-    fn all(origins: &[Option<Origin>]) -> Vec<Self> {
-        let image = |(id, origin): (u32, &Option<Origin>)| {
-            origin.map(|origin| Self { ids: [id, origin.index as u32], motion: origin.motion })
+impl PeriodicCopy {
+    fn all(masters: &[Option<Origin>]) -> Vec<Self> {
+        let copy = |(id, master): (u32, &Option<Origin>)| {
+            master.map(|master| Self { ids: [id, master.index as u32], motion: master.motion })
         };
-        (0..).zip(origins).filter_map(image).collect()
+        (0..).zip(masters).filter_map(copy).collect()
     }
 
-    /// The image with this index.
+    /// The periodic copy with index `id`.
     #[inline]
-    fn find(images: &[Self], id: u32) -> Option<&Self> {
-        if images.is_empty() {
+    fn find(copies: &[Self], id: u32) -> Option<&Self> {
+        if copies.is_empty() {
             return None;
         }
-        images.binary_search_by_key(&id, |image| image.ids[0]).ok().map(|at| &images[at])
+        copies.binary_search_by_key(&id, |copy| copy.ids[0]).ok().map(|at| &copies[at])
     }
 
-    /// Projects to the origin, and moves the result.
+    /// Projects to the master and maps the result to the copy.
     fn project(
         &self,
         point: &Point,
@@ -66,23 +68,23 @@ impl Image {
     }
 }
 
-/// A point is on a surface within this part of the diagonal of the box of the bodies, or within
-/// [`COORDINATE_ROUNDING`] of its largest coordinate, whichever is larger.
+/// Tolerance of [`Projector`] as a fraction of the diagonal of the bodies' bounding box; see also
+/// [`COORDINATE_ROUNDING`].
 const ON_SURFACE: f64 = 1e-12;
-/// Four units in the last place.
+/// Tolerance of [`Projector`] relative to the largest coordinate: four units in the last place.
 const COORDINATE_ROUNDING: f64 = 4.0 * f64::EPSILON;
 
 impl Projector {
-    /// Takes what it needs of a geometry.
+    /// Extracts the surfaces and the periodic copies of a geometry.
     pub fn new(geometry: &Geometry, features: &Features) -> Self {
         let bounds = &features.bounds;
         let largest = bounds.min.coords.amax().max(bounds.max.coords.amax());
         let rounding = f64::max(ON_SURFACE * bounds.diagonal(), COORDINATE_ROUNDING * largest);
         let gap = GAP_ROOM * widest_gap(geometry, features);
-        let origins = features.origins();
+        let masters = features.origins();
         Self {
-            curve_images: Image::all(&origins.curves),
-            patch_images: Image::all(&origins.patches),
+            curve_copies: PeriodicCopy::all(&masters.curves),
+            patch_copies: PeriodicCopy::all(&masters.patches),
             surfaces: geometry.surfaces.clone(),
             curves: features.curves.iter().map(|c| c.surfaces).collect(),
             patches: features.patches.iter().map(|p| p.surface).collect(),
@@ -90,9 +92,11 @@ impl Projector {
         }
     }
 
-    /// How far a projected point may be from its surfaces, a length: the larger of 10⁻¹² of the diagonal of the box
-    /// of the bodies and 4 units in the last place of its largest coordinate; more where surfaces that are to meet in a curve
-    /// miss each other by more, as tangent ones do whose decimals are rounded.
+    /// Largest distance of a projected point from its surfaces, a length.
+    ///
+    /// It is the larger of 10⁻¹² of the diagonal of the bodies' bounding box and 4 units in the
+    /// last place of the largest coordinate. It is larger if surfaces that should meet in a curve
+    /// have a wider gap, as tangent surfaces with rounded decimals do.
     pub fn tolerance(&self) -> f64 {
         self.tolerance
     }
@@ -100,27 +104,27 @@ impl Projector {
     /// The point of the surface of `patch` nearest to `point`.
     ///
     /// # Errors
-    /// Where there is no nearest one, as in the centre of a sphere.
+    /// [`ProjectionFailed`] if the nearest point is not unique, as at the center of a sphere.
     pub fn project_patch(&self, patch: PatchId, point: &Point) -> Result<Point, ProjectionFailed> {
-        match Image::find(&self.patch_images, patch.0) {
-            Some(image) => image.project(point, |p| self.patch_surface(PatchId(image.ids[1])).project(p)),
+        match PeriodicCopy::find(&self.patch_copies, patch.0) {
+            Some(copy) => copy.project(point, |p| self.patch_surface(PatchId(copy.ids[1])).project(p)),
             None => self.patch_surface(patch).project(point),
         }
     }
 
-    /// The point of both surfaces of `curve` near to `point` to which steps across the curve lead.
+    /// The point of `curve` nearest to `point` to first order.
     ///
-    /// It is the nearest one to first order: each step is orthogonal to the curve's direction where it begins.
+    /// Newton's method: each step is orthogonal to the direction of the curve at its start.
     ///
     /// # Errors
-    /// If the steps end nowhere on both surfaces.
+    /// [`ProjectionFailed`] if the iteration does not converge to a point on both surfaces.
     pub fn project_curve(&self, curve: CurveId, point: &Point) -> Result<Point, ProjectionFailed> {
         let on = |curve: CurveId, point: &Point| {
             let [a, b] = self.curve_surfaces(curve);
             project_to_both(a, b, point, self.tolerance)
         };
-        match Image::find(&self.curve_images, curve.0) {
-            Some(image) => image.project(point, |p| on(CurveId(image.ids[1]), p)),
+        match PeriodicCopy::find(&self.curve_copies, curve.0) {
+            Some(copy) => copy.project(point, |p| on(CurveId(copy.ids[1]), p)),
             None => on(curve, point),
         }
     }
@@ -146,11 +150,12 @@ impl Projector {
         self.curves[curve.index()].map(|s| &self.surfaces[s.index()])
     }
 
-    /// Everything as plain numbers, to be sent to other ranks.
+    /// Serializes the projector to numbers, to send it to other ranks.
     ///
-    /// First the tolerance and the numbers of surfaces, curves and patches; then each surface as its kind and the
-    /// vectors and then the numbers of its primitive; the two surfaces of each curve; the surface of each patch; the numbers of curves and
-    /// patches that are images, each with its origin and the quaternion and translation between.
+    /// Order: the tolerance; the counts of surfaces, curves and patches; each surface as its kind,
+    /// then the vectors and the numbers of its primitive; the two surfaces of each curve; the
+    /// surface of each patch; the counts of periodic curves and patches, each copy with its master
+    /// and the quaternion and translation between them.
     pub fn encode(&self) -> Vec<f64> {
         let counts = [self.surfaces.len(), self.curves.len(), self.patches.len()];
         let mut out = vec![self.tolerance];
@@ -159,15 +164,15 @@ impl Projector {
             encode_surface(surface, &mut out);
         }
         out.extend(self.curves.iter().flatten().chain(&self.patches).map(|s| f64::from(s.0)));
-        out.extend([&self.curve_images, &self.patch_images].map(|images| images.len() as f64));
-        for Image { ids, motion } in self.curve_images.iter().chain(&self.patch_images) {
+        out.extend([&self.curve_copies, &self.patch_copies].map(|copies| copies.len() as f64));
+        for PeriodicCopy { ids, motion } in self.curve_copies.iter().chain(&self.patch_copies) {
             out.extend(ids.map(f64::from));
             out.extend(motion.rotation.coords.iter().chain(motion.translation.vector.iter()));
         }
         out
     }
 
-    /// The inverse of [`encode`](Self::encode); `None` for anything else.
+    /// Restores a projector from the result of [`encode`](Self::encode); `None` for invalid input.
     pub fn decode(numbers: &[f64]) -> Option<Self> {
         let mut reader = Reader(numbers);
         let tolerance = reader.number()?;
@@ -179,18 +184,18 @@ impl Projector {
         let patches = (0..patches).map(|_| id(&mut reader)).collect::<Option<Vec<_>>>()?;
         let counts = [reader.count()?, reader.count()?];
         let lengths = [curves.len(), patches.len()];
-        let mut images =
-            |i: usize| (0..counts[i]).map(|_| reader.image(lengths[i])).collect::<Option<Vec<_>>>();
-        let (curve_images, patch_images) = (images(0)?, images(1)?);
-        let projector = Self { surfaces, curves, patches, curve_images, patch_images, tolerance };
+        let mut copies =
+            |i: usize| (0..counts[i]).map(|_| reader.copy(lengths[i])).collect::<Option<Vec<_>>>();
+        let (curve_copies, patch_copies) = (copies(0)?, copies(1)?);
+        let projector = Self { surfaces, curves, patches, curve_copies, patch_copies, tolerance };
         reader.0.is_empty().then_some(projector)
     }
 }
 
-/// A gap between surfaces is at most so much wider between the points of a trace than at them.
+/// A gap between surfaces can be wider between the points of a trace than at them by this factor.
 const GAP_ROOM: f64 = 1.25;
 
-/// How far the surfaces of patches are from the curves on their boundaries.
+/// The largest distance between a curve and the surfaces of its adjacent patches.
 fn widest_gap(geometry: &Geometry, features: &Features) -> f64 {
     let gap = |curve: &crate::Curve| {
         let beside = curve.fins.iter().map(|fin| features.patch(fin.patch).surface);
@@ -203,13 +208,17 @@ fn widest_gap(geometry: &Geometry, features: &Features) -> f64 {
     features.curves.iter().map(gap).fold(0.0, f64::max)
 }
 
-/// The first point of a curve at a distance from where its trace begins, `None` if it is nowhere so far away; `project` leads to the curve.
+/// The first point of a curve at a given distance from the start of its trace; `None` if there is
+/// none.
+///
+/// `project` projects a point to the curve.
 pub fn at_distance(
     trace: &[Point],
     distance: f64,
     project: impl Fn(&Point) -> Result<Point, ProjectionFailed>,
 ) -> Option<Point> {
-    /// Each leaves less than a tenth, as the chords of a trace turn little.
+    /// Each step reduces the error to less than a tenth, because consecutive chords of a trace are
+    /// nearly parallel.
     const STEPS: usize = 20;
     let corner = trace[0];
     let after = trace.iter().position(|p| (p - corner).norm() >= distance)?;
@@ -229,20 +238,24 @@ pub fn at_distance(
     Some(at)
 }
 
-/// The point of both surfaces to which Newton's method leads from `point`, each step the shortest one that
-/// solves both linearised equations (it lies in the plane of the two gradients).
+/// Projects `point` to the intersection of two surfaces by Newton's method.
 ///
-/// The steps go on until they no longer halve the distance; the result is the nearest to both surfaces that was met, and
-/// an error if that is more than `tolerance` from one of them.
+/// Each step is the shortest solution of both linearized equations; it lies in the plane of the two
+/// gradients. Steps continue while they halve the distance to the surfaces, and the best iterate is
+/// returned.
+///
+/// # Errors
+/// [`ProjectionFailed`] if the best iterate is more than `tolerance` from one of the surfaces.
 pub(crate) fn project_to_both(
     a: &Surface,
     b: &Surface,
     point: &Point,
     tolerance: f64,
 ) -> Result<Point, ProjectionFailed> {
-    /// From afar the distance is halved each time, then squared: 50 steps cover all numbers.
+    /// Far away the distance halves in each step, near the solution it converges quadratically: 50
+    /// halvings cover the precision of a double.
     const STEPS: usize = 60;
-    /// The first steps may lead away from strongly curved surfaces before they converge.
+    /// In the first steps the distance may grow, near strongly curved surfaces.
     const FREE_STEPS: usize = 6;
     let mut at = *point;
     let mut best = (f64::INFINITY, at);
@@ -272,13 +285,14 @@ pub(crate) fn project_to_both(
     }
 }
 
-/// The shortest vector s with gradientᵢ·s = -valueᵢ; `None` where the gradients are parallel.
+/// The shortest vector s with gradientᵢ·s = -valueᵢ; `None` if the gradients are parallel.
 pub(crate) fn shortest_step(values: [f64; 2], gradients: [Vector; 2], squares: [f64; 2]) -> Option<Vector> {
-    /// The least square of the sine between the gradients: below it rounding of the values, 1e-16, would move
-    /// the point by more than 1e-9.
+    /// Smallest squared sine of the angle between the gradients. Below it, a rounding error of
+    /// 1e-16 in the values moves the point by more than 1e-9.
     const LEAST_SINE_SQUARED: f64 = 1e-14;
     let mixed = gradients[0].dot(&gradients[1]);
-    // As a cross product: squares[0] * squares[1] - mixed² loses half the digits where it is small.
+    // By the cross product: squares[0] * squares[1] - mixed² would lose half the digits if the
+    // gradients are nearly parallel.
     let determinant = gradients[0].cross(&gradients[1]).norm_squared();
     if determinant <= LEAST_SINE_SQUARED * squares[0] * squares[1] {
         return None;
@@ -326,7 +340,7 @@ fn ellipse_numbers(e: &Ellipse) -> [f64; 6] {
     [e.center[0], e.center[1], e.axis[0], e.axis[1], e.radii[0], e.radii[1]]
 }
 
-/// Takes numbers off the front of a slice.
+/// Reads numbers from the front of a slice.
 struct Reader<'a>(&'a [f64]);
 
 impl Reader<'_> {
@@ -336,7 +350,7 @@ impl Reader<'_> {
         Some(*first)
     }
 
-    /// A count or an index: a whole number that fits an id.
+    /// A count or an index: an integer that fits an id.
     fn count(&mut self) -> Option<usize> {
         let number = self.number()?;
         (number.fract() == 0.0 && (0.0..=f64::from(u32::MAX)).contains(&number)).then_some(number as usize)
@@ -355,13 +369,13 @@ impl Reader<'_> {
         Some(Ellipse { center: pair()?, axis: pair()?, radii: pair()? })
     }
 
-    /// An image among `count` entities.
-    fn image(&mut self, count: usize) -> Option<Image> {
+    /// A periodic copy; both ids must be less than `count`.
+    fn copy(&mut self, count: usize) -> Option<PeriodicCopy> {
         let ids = [self.count()?, self.count()?];
         let quaternion = Quaternion::from([self.number()?, self.number()?, self.number()?, self.number()?]);
         let rotation = UnitQuaternion::new_unchecked(quaternion);
         let motion = Isometry3::from_parts(Translation3::from(self.vector()?), rotation);
-        ids.iter().all(|&id| id < count).then_some(Image { ids: ids.map(|id| id as u32), motion })
+        ids.iter().all(|&id| id < count).then_some(PeriodicCopy { ids: ids.map(|id| id as u32), motion })
     }
 
     fn surface(&mut self) -> Option<Surface> {
@@ -434,7 +448,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// A plane, a sphere, a cylinder, and a cylinder across it; curves on each pair that meets.
+    /// A plane, a sphere and two crossing cylinders, with a curve for each pair that intersects.
     fn projector() -> Projector {
         let surfaces = vec![
             Surface::Plane(Plane { point: Point::new(0.0, 0.0, 0.2), normal: Vector::z() }),
@@ -462,7 +476,7 @@ mod tests {
             let near = on + Vector::from(shift);
             let back = projector.project_curve(CurveId(curve), &near).unwrap();
             prop_assert!(projector.curve_distance(CurveId(curve), &back) <= 4.0 * f64::EPSILON);
-            // Not exactly nearest, but no farther than the known point by more than the curvature explains.
+            // The projection is nearest to first order only; the factor allows for curvature.
             prop_assert!((near - back).norm() <= (near - on).norm() * 1.3);
             let again = projector.project_curve(CurveId(curve), &back).unwrap();
             prop_assert!((again - back).norm() <= 8.0 * f64::EPSILON);
@@ -478,7 +492,7 @@ mod tests {
     }
 
     #[test]
-    fn a_projector_survives_its_encoding_and_nothing_else_is_taken_for_one() {
+    fn encoding_round_trips_and_invalid_input_is_rejected() {
         let mut projector = projector();
         let o = Point::origin();
         let axes = [Vector::x(), Vector::y(), Vector::z()];
@@ -514,8 +528,8 @@ mod tests {
             |section| Surface::Sweep(Sweep { center: o, axis, start, radii: [5.0, 4.0], up, section });
         projector.surfaces.extend(sections.map(sweep));
         let turn = Isometry3::new(Vector::new(1.0, 2.0, 3.0), Vector::new(0.1, 0.2, 0.3));
-        projector.curve_images = vec![Image { ids: [3, 1], motion: turn }];
-        projector.patch_images = vec![Image { ids: [2, 0], motion: turn.inverse() }];
+        projector.curve_copies = vec![PeriodicCopy { ids: [3, 1], motion: turn }];
+        projector.patch_copies = vec![PeriodicCopy { ids: [2, 0], motion: turn.inverse() }];
         let numbers = projector.encode();
         assert_eq!(Projector::decode(&numbers), Some(projector));
         assert_eq!(Projector::decode(&numbers[..numbers.len() - 1]), None);

@@ -3,43 +3,43 @@
 use crate::interval::Cell;
 use crate::{Interval, Point, Surface, SurfaceId};
 
-/// A set of points of space.
+/// A set of points in space, as a Boolean tree.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Solid {
-    /// One side of a surface: where its function is negative, or where it is positive.
+    /// One side of a surface.
     Half {
         /// The surface that bounds it.
         surface: SurfaceId,
-        /// Whether the side is the one where the function is positive.
+        /// Whether it is the side where the function of the surface is positive.
         positive: bool,
     },
-    /// The intersection of its members (everything if there are none).
+    /// The intersection of its members (all of space if there are none).
     And(Vec<Solid>),
-    /// The union of its members (nothing if there are none).
+    /// The union of its members (the empty set if there are none).
     Or(Vec<Solid>),
     /// The complement.
     Not(Box<Solid>),
 }
 
-/// Where a point is with respect to a solid.
+/// Position of a point relative to a solid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Side {
     /// In its interior.
     Inside,
     /// In the interior of its complement.
     Outside,
-    /// On its boundary, or too near to tell.
+    /// On its boundary within the tolerance.
     On,
 }
 
-/// What a solid is inside a box.
+/// A solid restricted to a box.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Pruned {
-    /// Nothing.
+pub(crate) enum Pruned {
+    /// The box and the solid are disjoint.
     Empty,
-    /// The whole box.
+    /// The solid contains the box.
     Full,
-    /// This solid, made of the surfaces only that may pass through the box.
+    /// Undecided: an equivalent solid, reduced to the surfaces that may pass through the box.
     Part(Solid),
 }
 
@@ -60,7 +60,8 @@ impl Solid {
         surfaces
     }
 
-    /// Whether a point is inside of which `positive` tells on which side of each surface it is.
+    /// Whether the solid contains a point for which `positive` returns the sign of each surface's
+    /// function.
     pub fn holds(&self, positive: &dyn Fn(SurfaceId) -> bool) -> bool {
         match self {
             Self::Half { surface, positive: side } => positive(*surface) == *side,
@@ -70,7 +71,8 @@ impl Solid {
         }
     }
 
-    /// Where `point` is; `On` if it is within `tolerance` (a length) of a surface that matters there.
+    /// Classifies `point`: `On` if it is within `tolerance` (a length) of a surface that bounds the
+    /// solid there.
     pub fn side(&self, surfaces: &[Surface], point: &Point, tolerance: f64) -> Side {
         let answer = self.prune(&mut |id| {
             let surface = &surfaces[id.index()];
@@ -85,11 +87,11 @@ impl Solid {
         }
     }
 
-    /// What it is in a box over which each surface's function has the range that `range` gives.
+    /// Restricts the solid to a box over which `range` bounds the function of each surface.
     ///
-    /// Three-valued evaluation that keeps what is undecided (Duff 1992, Interval arithmetic and recursive
-    /// subdivision for implicit functions and constructive solid geometry).
-    pub fn prune(&self, range: &mut dyn FnMut(SurfaceId) -> Interval) -> Pruned {
+    /// Three-valued evaluation that keeps the undecided subtree (Duff 1992, Interval arithmetic and
+    /// recursive subdivision for implicit functions and constructive solid geometry).
+    pub(crate) fn prune(&self, range: &mut dyn FnMut(SurfaceId) -> Interval) -> Pruned {
         match self {
             Self::Half { surface, positive } => {
                 let Interval { lo, hi } = range(*surface);
@@ -112,9 +114,9 @@ impl Solid {
     }
 }
 
-/// What is left of solids in a box; one that fills it is `And([])`, one that is not there is left out.
+/// Restricts solids to a box: `And([])` if a solid contains the box; disjoint solids are removed.
 ///
-/// The range of each surface is asked once, however many solids it bounds.
+/// Each surface's range is computed only once, even if several solids share the surface.
 pub fn prune_in<I>(surfaces: &[Surface], cell: &Cell, solids: Vec<(I, Solid)>) -> Vec<(I, Solid)> {
     let mut known: Vec<(SurfaceId, Interval)> = Vec::new();
     let mut range = |id: SurfaceId| {
@@ -133,7 +135,8 @@ pub fn prune_in<I>(surfaces: &[Surface], cell: &Cell, solids: Vec<(I, Solid)>) -
     solids.into_iter().filter_map(left).collect()
 }
 
-/// Prunes each member; one that is `decisive` decides, those that are `neutral` are left out.
+/// Prunes the members of a node. One `decisive` member decides the node, `neutral` members are
+/// removed.
 fn prune_members(
     members: &[Solid],
     range: &mut dyn FnMut(SurfaceId) -> Interval,
@@ -185,7 +188,7 @@ mod tests {
     }
 
     #[test]
-    fn a_surface_that_is_buried_in_the_solid_does_not_count() {
+    fn a_surface_inside_the_solid_is_ignored() {
         let solid = Solid::Or(vec![half(0), half(1)]);
         assert_eq!(solid.side(&surfaces(), &Point::new(0.0, 0.1, 0.2), 1e-9), Side::Inside);
         assert_eq!(

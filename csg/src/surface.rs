@@ -1,4 +1,4 @@
-//! Surfaces: value, gradient, curvature, projection, ranges over boxes.
+//! Implicit surfaces: value, derivatives, projection, and ranges over boxes.
 
 use crate::interval::{Cell, middle, offset};
 use crate::primitive::quadric::polish;
@@ -30,14 +30,15 @@ pub enum Surface {
     EllipticCone(EllipticCone),
     /// One nappe of a circular cone.
     Nappe(Nappe),
-    /// An ellipse turned about an axis in its plane.
+    /// A surface of revolution whose profile is an ellipse, with the axis in the plane of the
+    /// ellipse.
     Revolved(Revolved),
-    /// A line or an ellipse moved along an ellipse and turned on the way.
+    /// A line or an ellipse swept along an elliptic path, turning with the path.
     Sweep(Sweep),
 }
 
-/// Asks the primitive inside the surface.
-macro_rules! ask {
+/// Dispatches to the primitive of a surface.
+macro_rules! dispatch {
     ($surface:expr, $primitive:ident => $answer:expr) => {
         match $surface {
             Surface::Plane($primitive) => $answer,
@@ -56,52 +57,61 @@ macro_rules! ask {
 }
 
 impl Surface {
-    /// The function at `point`: zero on the surface, negative inside, with a gradient of unit length on
-    /// the surface wherever the kind allows, so that `value / |gradient|` is the distance to first order.
+    /// The function at `point`: zero on the surface, negative inside.
+    ///
+    /// Its gradient has unit length on the surface for most kinds; `value / |gradient|` is the
+    /// distance to first order.
     pub fn value(&self, point: &Point) -> f64 {
-        ask!(self, p => p.value(point))
+        dispatch!(self, p => p.value(point))
     }
 
-    /// The gradient of the function at `point`: points outward.
+    /// The gradient of the function at `point`; it points outward.
     pub fn gradient(&self, point: &Point) -> Vector {
-        ask!(self, p => p.gradient(point))
+        dispatch!(self, p => p.gradient(point))
     }
 
-    /// The second derivatives of the function at `point`.
-    pub fn hessian(&self, point: &Point) -> Matrix3<f64> {
-        ask!(self, p => p.hessian(point))
+    /// The Hessian of the function at `point`.
+    pub(crate) fn hessian(&self, point: &Point) -> Matrix3<f64> {
+        dispatch!(self, p => p.hessian(point))
     }
 
-    /// The unit outward normal at a point on or near the surface; zero where the gradient vanishes (the axis of a
-    /// cylinder, the apex of a cone).
+    /// The unit outward normal at a point on or near the surface.
+    ///
+    /// Zero where the gradient vanishes (on the axis of a cylinder, at the apex of a cone).
     pub fn normal(&self, point: &Point) -> Vector {
         self.gradient(point).try_normalize(0.0).unwrap_or_default()
     }
 
     /// The largest absolute principal curvature at a point on or near the surface, 1/length.
     pub fn curvature(&self, point: &Point) -> f64 {
-        ask!(self, p => p.curvature(point))
+        dispatch!(self, p => p.curvature(point))
     }
 
-    /// The nearest point of the surface, on it within a few units in the last place of the largest coordinate.
+    /// The nearest point of the surface.
+    ///
+    /// The result is on the surface within a few units in the last place of the largest coordinate.
     ///
     /// # Errors
-    /// Where all points of a circle or a sphere are equally near (on the axis of a cylinder, in the centre of a sphere).
+    /// [`ProjectionFailed`] if the nearest point is not unique (on the axis of a cylinder, at the
+    /// center of a sphere).
     pub fn project(&self, point: &Point) -> Result<Point, ProjectionFailed> {
-        ask!(self, p => Ok(polish(p.project(point)?, |x| p.value(x), |x| p.gradient(x))))
+        dispatch!(self, p => Ok(polish(p.project(point)?, |x| p.value(x), |x| p.gradient(x))))
     }
 
-    /// The distance of `point` from the surface to first order; infinite where the gradient vanishes off it.
+    /// The distance of `point` from the surface to first order; infinite off the surface where the
+    /// gradient vanishes.
     pub fn distance(&self, point: &Point) -> f64 {
         let value = self.value(point).abs();
         let distance = if value == 0.0 { 0.0 } else { value / self.gradient(point).norm() };
-        // Beside the apex of a cone rounding leaves nothing of both.
+        // Close to the apex of a cone, value and gradient are both dominated by rounding.
         self.apex().map_or(distance, |apex| distance.min((point - apex).norm()))
     }
 
-    /// The point of a closed surface (sphere, torus, ellipsoid) farthest in a direction, a unit vector, one of
-    /// them if there are more; `None` for other surfaces.
-    pub fn support(&self, direction: &Vector) -> Option<Point> {
+    /// The support point of a closed surface (sphere, torus, ellipsoid, revolved ellipse) in a unit
+    /// direction.
+    ///
+    /// If several points are farthest, one of them; `None` for other surfaces.
+    pub(crate) fn support(&self, direction: &Vector) -> Option<Point> {
         match self {
             Self::Sphere(s) => Some(s.center + direction * s.radius),
             Self::Torus(t) => Some(t.support(direction)),
@@ -111,8 +121,8 @@ impl Surface {
         }
     }
 
-    /// Whether its function is quadratic, so that its second derivatives are the same everywhere.
-    pub fn is_quadric(&self) -> bool {
+    /// Whether the function is quadratic, so that its Hessian is constant.
+    pub(crate) fn is_quadric(&self) -> bool {
         match self {
             Self::Plane(_)
             | Self::Sphere(_)
@@ -135,35 +145,36 @@ impl Surface {
         }
     }
 
-    /// Whether its apex is within a length of a point: it has no normal there.
+    /// Whether the apex, where the surface has no normal, is within the distance `within` of a
+    /// point.
     pub fn has_apex_at(&self, point: &Point, within: f64) -> bool {
         self.apex().is_some_and(|apex| (point - apex).norm() <= within)
     }
 
     /// An interval that contains the function's values over a box.
     pub fn value_range(&self, cell: &Cell) -> Interval {
-        // The mean-value form closes in with the square of the size of the box, which the formula term
-        // for term does not in a skew frame; on large boxes the latter is better (Moore, Kearfott, Cloud
-        // 2009, section 6.4).
-        let natural = ask!(self, p => p.natural_range(cell));
+        // The error of the mean-value form decreases quadratically with the size of the box, which
+        // natural evaluation in a skew frame does not achieve. On large boxes natural evaluation is
+        // tighter (Moore, Kearfott, Cloud 2009, section 6.4).
+        let natural = dispatch!(self, p => p.natural_range(cell));
         if !natural.contains_zero() {
             return natural;
         }
         let center = middle(cell);
         let arm = offset(cell, &center);
         let slope = self.gradient_range(cell);
-        let at_center = ask!(self, p => p.natural_range(&[0, 1, 2].map(|i| Interval::point(center[i]))));
+        let at_center = dispatch!(self, p => p.natural_range(&[0, 1, 2].map(|i| Interval::point(center[i]))));
         natural.intersect(at_center + slope[0] * arm[0] + slope[1] * arm[1] + slope[2] * arm[2])
     }
 
     /// An interval for each component of the gradient over a box.
-    pub fn gradient_range(&self, cell: &Cell) -> Cell {
-        ask!(self, p => p.gradient_range(cell))
+    pub(crate) fn gradient_range(&self, cell: &Cell) -> Cell {
+        dispatch!(self, p => p.gradient_range(cell))
     }
 
-    /// The surface moved.
+    /// The surface after a rigid motion.
     #[must_use]
-    pub fn transformed(&self, motion: &Isometry3<f64>) -> Self {
+    pub(crate) fn transformed(&self, motion: &Isometry3<f64>) -> Self {
         match self {
             Self::Plane(p) => Self::Plane(p.transformed(motion)),
             Self::Sphere(p) => Self::Sphere(p.transformed(motion)),
@@ -179,8 +190,10 @@ impl Surface {
         }
     }
 
-    /// Whether both are the same set of points within `tolerance` (a length), and if so whether their insides
-    /// are the same side: `Some(true)` same side, `Some(false)` opposite sides, `None` different surfaces.
+    /// Compares two surfaces as point sets within `tolerance` (a length).
+    ///
+    /// `Some(true)`: same surface and same inside; `Some(false)`: same surface, opposite insides;
+    /// `None`: different surfaces.
     pub fn same_as(&self, other: &Self, tolerance: f64) -> Option<bool> {
         same::same(self, other, tolerance)
     }

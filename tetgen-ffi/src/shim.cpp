@@ -1,4 +1,4 @@
-// TetGen's tetrahedralize() behind a C interface: plain arrays in and out.
+// C interface of TetGen's tetrahedralize(), with plain arrays.
 
 #include <cstdio>
 #include <cstring>
@@ -21,7 +21,7 @@ struct ShimMesh {
   void *owner;
 };
 
-// 0 where a mesh was made; else what TetGen threw, or -1 for anything else that was thrown.
+// Returns 0 for a mesh, the code that TetGen threw, or -1 for any other exception.
 int shim_run(const char *switches, int points, const double *coordinates, int facets, const int *triangles,
              ShimMesh *mesh) {
   int status = 0;
@@ -49,7 +49,7 @@ int shim_run(const char *switches, int points, const double *coordinates, int fa
   } catch (...) {
     status = -1;
   }
-  // What TetGen says comes before what the worker writes to the same pipe.
+  // TetGen's output must precede the worker's answer in the same pipe.
   std::fflush(stdout);
   ShimMesh result = {out->numberofpoints, out->pointlist,
                      out->numberoftetrahedra, out->numberofcorners, out->tetrahedronlist,

@@ -1,17 +1,17 @@
-//! What goes through the pipes between a test and the worker, in little-endian bytes.
+//! Messages between a test and the worker, in little-endian bytes.
 //!
-//! Lists are their length as `u64` and their numbers. An answer begins with [`MARK`], since TetGen itself
-//! prints to the same pipe before.
+//! A list is its length as `u64` and its numbers. An answer starts with [`MARK`], because TetGen
+//! prints to the same pipe before it.
 
 use crate::TetgenMesh;
 
-/// Begins an answer.
+/// Start of an answer.
 pub const MARK: &[u8; 16] = b"\0tetgen answers\0";
 
-/// Status of a worker that was built without TetGen; TetGen's own are small numbers.
+/// Status of a worker built without TetGen. TetGen's own are small numbers.
 pub const NO_TETGEN: i32 = i32::MIN;
 
-/// A request: switches, coordinates, vertices of the facets.
+/// Encodes a request: switches, coordinates, vertices of the facets.
 pub fn request(points: &[[f64; 3]], facets: &[[u32; 3]], switches: &str) -> Vec<u8> {
     let mut bytes = Vec::new();
     put(&mut bytes, switches.len(), switches.bytes().map(|byte| [byte]));
@@ -20,7 +20,7 @@ pub fn request(points: &[[f64; 3]], facets: &[[u32; 3]], switches: &str) -> Vec<
     bytes
 }
 
-/// What [`request`] wrote: switches, coordinates, vertices; `None` if it is cut short.
+/// Decodes a request; `None` if it is truncated.
 pub fn read_request(mut bytes: &[u8]) -> Option<(Vec<u8>, Vec<f64>, Vec<i32>)> {
     let switches = take(&mut bytes, |[byte]: [u8; 1]| byte)?;
     let coordinates = take(&mut bytes, f64::from_le_bytes)?;
@@ -28,7 +28,7 @@ pub fn read_request(mut bytes: &[u8]) -> Option<(Vec<u8>, Vec<f64>, Vec<i32>)> {
     Some((switches, coordinates, vertices))
 }
 
-/// An answer: a mesh, or what TetGen threw.
+/// Encodes an answer: a mesh, or the code that TetGen threw.
 pub fn answer(result: &Result<TetgenMesh, i32>) -> Vec<u8> {
     let mut bytes = MARK.to_vec();
     match result {
@@ -43,20 +43,20 @@ pub fn answer(result: &Result<TetgenMesh, i32>) -> Vec<u8> {
     bytes
 }
 
-/// What TetGen said, and what [`answer`] wrote; `None` if no whole answer is there.
+/// Decodes TetGen's output and the answer; `None` if the answer is incomplete.
 pub fn read_answer(bytes: &[u8]) -> Option<(String, Result<TetgenMesh, i32>)> {
     let at = bytes.windows(MARK.len()).position(|window| window == MARK)?;
-    let said = String::from_utf8_lossy(&bytes[..at]).trim().to_string();
+    let printed = String::from_utf8_lossy(&bytes[..at]).trim().to_string();
     let (status, mut rest) = bytes[at + MARK.len()..].split_first_chunk()?;
     let status = i32::from_le_bytes(*status);
     if status != 0 {
-        return Some((said, Err(status)));
+        return Some((printed, Err(status)));
     }
     let points: Vec<f64> = take(&mut rest, f64::from_le_bytes)?;
     let tets: Vec<u32> = take(&mut rest, u32::from_le_bytes)?;
     let regions = take(&mut rest, i32::from_le_bytes)?;
     let (points, tets) = (points.as_chunks().0.to_vec(), tets.as_chunks().0.to_vec());
-    Some((said, Ok(TetgenMesh { points, tets, regions })))
+    Some((printed, Ok(TetgenMesh { points, tets, regions })))
 }
 
 fn put<const N: usize>(bytes: &mut Vec<u8>, length: usize, numbers: impl Iterator<Item = [u8; N]>) {

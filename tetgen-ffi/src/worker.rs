@@ -1,4 +1,4 @@
-//! The worker: one request on stdin, TetGen, one answer on stdout.
+//! The worker: reads one request from stdin, runs TetGen, writes one answer to stdout.
 
 use std::io::{Read, Write};
 use std::process::ExitCode;
@@ -8,14 +8,14 @@ use tetgen_ffi::wire;
 mod ffi;
 #[cfg(not(tetgen))]
 mod ffi {
-    //! The twin without TetGen.
+    //! Replacement for a build without TetGen.
 
     use tetgen_ffi::{TetgenMesh, wire};
 
     /// Whether TetGen is built in.
     pub const AVAILABLE: bool = false;
 
-    /// Refuses.
+    /// Returns the status of a worker without TetGen.
     pub fn run(_switches: Vec<u8>, _coordinates: &[f64], _vertices: &[i32]) -> Result<TetgenMesh, i32> {
         println!("the worker was built without tetgen.h (Debian: libtet1.5-dev)");
         Err(wire::NO_TETGEN)

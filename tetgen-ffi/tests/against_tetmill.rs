@@ -1,4 +1,5 @@
-//! tetmill's tets beside TetGen's inside the same surfaces: what must agree agrees, and ours are no worse.
+//! Compares tets of tetmill and TetGen inside the same surfaces: both are valid, and those of
+//! tetmill are not worse.
 
 mod comparison;
 mod samples;
@@ -12,17 +13,17 @@ use samples::hard::{
 use samples::{INSIDE, Soup};
 use tetgen_ffi::available;
 use tetmill::Point;
-use tetmill::improve::{Effort, Settings, improve};
-use tetmill::kernel::quality::QualitySummary;
-use tetmill::kernel::random::Random;
-use tetmill::mesh::{BoundaryTriangle, Class, Mesh, VertexId};
-use tetmill::pipeline::Model;
-use tetmill::size::{Preset, SizeSettings, UniformSize};
-use tetmill::volume::{self, ClosedSurface};
+use tetmill::internals::Model;
+use tetmill::internals::improve::{Settings, improve};
+use tetmill::internals::volume::ClosedSurface;
+use tetmill::internals::{Random, UniformSize, volume};
+use tetmill::mesh::{BoundaryTriangle, Class, Mesh, QualitySummary, VertexId};
+use tetmill::progress::Work;
+use tetmill::size::{Effort, Preset, SizeSettings};
 use thiserror as _;
 
-/// TetGen's own default of quality: a radius-edge ratio of 1.4 at most. It then has about as many tets as ours with sizes from the surface;
-/// asked for more it makes more.
+/// TetGen's default quality: a radius-edge ratio of at most 1.4. It then makes about as many tets
+/// as tetmill with sizes from the surface; stricter bounds give more.
 const SWITCHES: &str = "q1.4";
 
 const NAMES: [&str; 13] = [
@@ -41,8 +42,10 @@ const NAMES: [&str; 13] = [
     "tee",
 ];
 
-/// Coarse meshes so coarse against curved walls that corners of tets would fold as they are refined and snapped. Ours give up shape to keep
-/// them from it; TetGen knows no such rule. There our tets without the rule are compared.
+/// Geometries with meshes so coarse at curved walls that tets would fold when refined and snapped.
+///
+/// tetmill gives up quality to avoid this; TetGen has no such rule. They are compared without the
+/// rule.
 const FOLDING: [(&str, Preset); 4] = [
     ("tee", Preset::VeryCoarse),
     ("tee", Preset::Coarse),
@@ -50,15 +53,15 @@ const FOLDING: [(&str, Preset); 4] = [
     ("ring_segment", Preset::VeryCoarse),
 ];
 
-/// tetmill's coarse mesh of one of our own geometries.
+/// tetmill's coarse mesh of a geometry of this repository.
 fn coarse(name: &str, preset: Preset) -> Mesh {
     let path = format!("{}/../geometries/{name}.geo", env!("CARGO_MANIFEST_DIR"));
     let source = std::fs::read_to_string(&path).unwrap();
     let model = Model::from_csg(parse_geometry(&source, &path).unwrap().geometry).unwrap();
-    model.coarse_mesh(&mut SizeSettings::from(preset).into()).unwrap().mesh
+    model.coarse_mesh(&mut SizeSettings::from(preset).into(), Work::unwatched()).unwrap().mesh
 }
 
-/// The improved tets inside a surface of which nothing else is known; sizes come from its triangles.
+/// Improved tets inside a bare surface, with sizes from its triangles.
 fn inside(surface: &ClosedSurface) -> Mesh {
     let size = UniformSize(f64::INFINITY);
     let (filled, _) = volume::mesh(surface, &size, &volume::Settings::default()).unwrap();
@@ -86,18 +89,20 @@ fn row(what: &str, ours: &QualitySummary, theirs: &QualitySummary) -> String {
     format!("| {what} | {} | {} |", numbers(ours), numbers(theirs))
 }
 
-/// Smallest angle, worst and mean ratio.
+/// Smallest dihedral angle, worst and mean of the mean ratios.
 fn shape(q: &QualitySummary) -> [f64; 3] {
     [q.smallest_dihedral, q.worst_mean_ratio, q.average_mean_ratio]
 }
 
-/// Whether ours are no worse at the worst and in the mean, up to rounding.
+/// Whether tetmill's tets are not worse, at the minimum and in the mean, up to rounding.
 fn is_no_worse(ours: &QualitySummary, theirs: &QualitySummary) -> bool {
     shape(ours).iter().zip(shape(theirs)).all(|(a, b)| *a >= b * (1.0 - 1e-9))
 }
 
-/// Differences of the three numbers that are a tie on one of many surfaces: the smallest angle is then one of the surface
-/// itself, and the means are of meshes whose counts differ by a tenth. Who wins such a tie changes with the last bits of the sizes.
+/// Differences of the three numbers that count as a tie.
+///
+/// The smallest angle is then one of the surface itself, and the means are of meshes whose counts
+/// differ by a tenth. Ties depend on the last bits of the sizes.
 const TIES: [f64; 3] = [0.5, 0.005, 0.005];
 
 fn is_no_worse_or_tied(ours: &QualitySummary, theirs: &QualitySummary) -> bool {
@@ -153,7 +158,7 @@ fn inside_fine_surfaces_of_geometries_both_agree_and_ours_are_no_worse() {
     compare_geometries(&Preset::ALL[3..]);
 }
 
-/// Surfaces that are hard to recover, with several bodies, interfaces, voids and shells inside.
+/// Surfaces that are hard to recover, with several bodies, interfaces, voids and shells.
 fn hard_surfaces() -> Vec<(String, Soup)> {
     let random = &mut Random::new(31);
     let mut surfaces: Vec<(String, Soup)> = Vec::new();
@@ -191,9 +196,11 @@ fn hard_surfaces() -> Vec<(String, Soup)> {
     surfaces
 }
 
-/// Skins that leave hardly a good tet. Ours are improved by the mean ratio, worst first, and their worst mean ratio is the higher one here
-/// too. TetGen has the larger angle in the first two (0.4° and 0.3°, where ours have 0.2° and 0.1°), and the higher mean in the others, by
-/// 0.004 to 0.07.
+/// Surfaces that allow hardly a good tet.
+///
+/// tetmill improves the mean ratio, worst first, and its worst mean ratio is higher here too.
+/// TetGen has the larger angle in the first two (0.4° and 0.3° against 0.2° and 0.1°), and the
+/// higher mean in the others, by 0.004 to 0.07.
 const BEHIND: [&str; 5] = [
     "prism of 9 sides, 0.9 of the limit",
     "block of 2 notches",

@@ -14,7 +14,7 @@ const CORNERS: [[f64; 3]; 8] = [
     [0., 1., 1.],
 ];
 
-/// The cube's sides, each as two triangles.
+/// The sides of the cube, two triangles each.
 fn sides() -> Vec<[u32; 3]> {
     let sides = [[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]];
     sides.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect()
@@ -56,11 +56,11 @@ fn a_cube_has_volume_one_and_its_tets_are_positive() {
 }
 
 #[test]
-fn regions_are_told_apart_with_the_switch_for_it() {
+fn regions_are_numbered_with_the_switch_for_it() {
     if !has_tetgen() {
         return;
     }
-    // A wall across the cube, from corner to corner.
+    // A diagonal wall across the cube.
     let mut facets = sides();
     facets.extend([[0, 2, 6], [0, 6, 4]]);
     let mesh = tetrahedralize(&CORNERS, &facets, "pA").unwrap();
@@ -75,7 +75,7 @@ fn input_on_which_tetgen_fails_is_an_error_not_a_crash_of_the_test() {
     if !has_tetgen() {
         return;
     }
-    // Two triangles that pass through each other.
+    // Two intersecting triangles.
     let mut facets = sides();
     facets.extend([[0, 2, 6], [1, 3, 7]]);
     let error = tetrahedralize(&CORNERS, &facets, "p").unwrap_err();

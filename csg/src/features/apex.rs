@@ -1,21 +1,24 @@
-//! The apex of a cone, where it has no normal.
+//! The apex of a cone, where the surface has no normal.
 //!
-//! It is a corner where the cone is a boundary beside it. Curves of a cone and another surface through its apex end there: near it
-//! they are nearly straight, and no closed ones are between them.
+//! The apex is a corner if the cone is a boundary near it. Intersection curves of the cone with
+//! another surface through the apex end there: near the apex they are nearly straight and none is
+//! closed.
 
-use super::around::{Tolerances, sheet_at};
 use super::contact::{Contact, Kind, diagonal};
+use super::neighborhood::{Tolerances, sheet_at};
 use super::octree::{Octree, is_flat};
 use super::{Corner, FeatureError};
 use crate::interval::Cell;
 use crate::primitive::quadric::tangents;
 use crate::{Geometry, Interval, Point, Surface, SurfaceId, Vector};
 
-/// Cells that hold an apex are split so often at least: beside them there are cells in which the curves are found that end
-/// at the apex.
+/// Cells that contain an apex are split at least to this depth, so that neighboring cells contain
+/// the curves that end at the apex.
 const LEAST_DEPTH: u32 = 6;
 
-/// The apex of one of two surfaces in (or just beside) a cell, if the other passes through it and is flat there or has the same
+/// The contact at the apex of one of two surfaces in or close to a cell.
+///
+/// Found if the other surface passes through the apex, and is flat in the cell or has the same
 /// apex.
 pub(super) fn in_cell(
     geometry: &Geometry,
@@ -43,7 +46,7 @@ pub(super) fn in_cell(
     })
 }
 
-/// Adds a corner at each apex where its cone is a boundary and no curve ends.
+/// Adds a corner at each apex that is on the boundary but is not an end of a curve.
 pub(super) fn add_corners(
     geometry: &Geometry,
     tree: &Octree,
@@ -63,7 +66,7 @@ pub(super) fn add_corners(
     Ok(())
 }
 
-/// The cones that are boundaries beside their apices, and the apices.
+/// The cones that are boundaries near their apexes, with the apexes.
 pub(super) fn boundaries(
     geometry: &Geometry,
     tree: &Octree,
@@ -80,14 +83,15 @@ pub(super) fn boundaries(
     Ok(found)
 }
 
-/// Whether a cone is a boundary beside its apex.
+/// Whether a cone is a boundary near its apex.
 fn is_boundary(
     geometry: &Geometry,
     tree: &Octree,
     id: SurfaceId,
     tolerances: &Tolerances,
 ) -> Result<bool, FeatureError> {
-    /// How far from the apex, in lengths of merging: so near that no other surface comes between.
+    /// Distance of the sample points in units of the merge tolerance, small enough that no other
+    /// surface intervenes.
     const BESIDE: f64 = 100.0;
     let cone = &geometry.surfaces[id.index()];
     let Some(apex) = cone.apex() else { return Ok(false) };
@@ -101,7 +105,7 @@ fn is_boundary(
     Ok(false)
 }
 
-/// Unit directions from the apex along lines of its nappes, none of them special.
+/// Unit directions of lines on the nappes of a cone from the apex, in general position.
 fn lines(cone: &Surface) -> Vec<Vector> {
     const COUNT: u32 = 16;
     let round = |axis: &Vector, radius: f64, slope: f64| {

@@ -1,7 +1,7 @@
-//! Traces cut at crossings into arcs, classified by what is around them.
+//! Cuts traces at crossings into arcs and classifies the arcs.
 
-use super::around::{Around, Tolerances, around};
 use super::cross::{Crossing, crossings};
+use super::neighborhood::{Neighborhood, Tolerances, neighborhood};
 use super::octree::Octree;
 use super::trace::{Trace, along, tangent_along};
 use super::{FeatureError, Named, Place};
@@ -10,17 +10,18 @@ use crate::{Geometry, Interval, Point, Surface, SurfaceId, Vector};
 use nalgebra::Matrix3;
 use std::collections::HashMap;
 
-/// Points where traces are cut; those within the tolerance of merging are one.
+/// The end points of arcs. Points within the merge tolerance are one node.
 #[derive(Debug, Default)]
 pub(super) struct Nodes {
-    /// Where they are, and how well each is determined (the largest volume spanned by three normals there).
+    /// Coordinates, and the largest volume spanned by three normals there (how well the node is
+    /// determined).
     points: Vec<(Point, f64)>,
-    /// The nodes in each cell of a grid that is as wide as the tolerance.
+    /// The nodes in each cell of a grid with the merge tolerance as spacing.
     grid: HashMap<[i64; 3], Vec<usize>>,
 }
 
 impl Nodes {
-    /// The node at a point, new or old.
+    /// The node at a point; adds one if there is none.
     fn add(&mut self, point: &Point, volume: f64, tolerances: &Tolerances) -> usize {
         let size = tolerances.merge;
         let key = [0, 1, 2].map(|i| (point[i] / size).floor() as i64);
@@ -40,9 +41,8 @@ impl Nodes {
         self.points.len() - 1
     }
 
-    /// Moves nodes that are not on all surfaces through them: those that stand for points that are not quite the same,
-    /// and those where surfaces are tangent.
-    fn settle(&mut self, geometry: &Geometry, tree: &Octree, tolerances: &Tolerances) {
+    /// Moves nodes that are off some of their surfaces: merged nodes and nodes at tangencies.
+    fn relax(&mut self, geometry: &Geometry, tree: &Octree, tolerances: &Tolerances) {
         for (point, _) in &mut self.points {
             let near = |x: f64| Interval::new(x - tolerances.merge, x + tolerances.merge);
             let surfaces: Vec<&Surface> = tree
@@ -53,7 +53,7 @@ impl Nodes {
                 .collect();
             let distance = |p: &Point| surfaces.iter().map(|s| s.distance(p)).fold(0.0, f64::max);
             let mut best = distance(point);
-            for _ in 0..SETTLING_STEPS {
+            for _ in 0..RELAXATION_STEPS {
                 let Some(step) = common_step(&surfaces, point).filter(|_| best > tolerances.exact) else {
                     break;
                 };
@@ -67,18 +67,18 @@ impl Nodes {
         }
     }
 
-    /// Where a node is.
+    /// The coordinates of a node.
     pub fn point(&self, node: usize) -> Point {
         self.points[node].0
     }
 }
 
-/// Tangent surfaces make the steps halve the distance only: this many make 10⁻⁸ to rounding.
-const SETTLING_STEPS: usize = 30;
+/// At tangent surfaces a step only halves the distance: this many reduce 10⁻⁸ to rounding.
+const RELAXATION_STEPS: usize = 30;
 
-/// The shortest step that leads nearest to all surfaces, to first order.
+/// The shortest least-squares step to all surfaces, to first order.
 fn common_step(surfaces: &[&Surface], at: &Point) -> Option<Vector> {
-    /// Directions in which the surfaces hardly differ are left alone.
+    /// Directions in which the surfaces hardly differ are ignored.
     const LEAST_SINGULAR: f64 = 1e-6;
     let mut normal_matrix = Matrix3::zeros();
     let mut right = Vector::zeros();
@@ -94,27 +94,29 @@ fn common_step(surfaces: &[&Surface], at: &Point) -> Option<Vector> {
     Some(-(inverse * right))
 }
 
-/// A piece of a trace between crossings, or a closed one without.
+/// A piece of a trace between crossings, or a closed trace without crossings.
 #[derive(Clone, Debug)]
 pub(super) struct Arc {
-    /// The two surfaces that it is computed from.
+    /// The surfaces whose intersection it is.
     pub pair: [SurfaceId; 2],
-    /// Points on it.
+    /// Points on the arc.
     pub points: Vec<Point>,
-    /// The nodes at its ends, `None` where the trace was left; no ends at all where it is closed.
+    /// The nodes at its ends, `None` where the trace stopped; no ends at all if the arc is closed.
     pub ends: Option<[Option<usize>; 2]>,
-    /// What is around it.
-    pub around: Around,
-    /// A point inside it.
+    /// The surfaces and sheets around it.
+    pub neighborhood: Neighborhood,
+    /// A point in its interior.
     pub middle: Point,
-    /// The sine of the angle between the surfaces in the middle.
+    /// The sine of the angle between the two surfaces at `middle`.
     sine: f64,
 }
 
-/// The arcs that are parts of features, each once, and the nodes at their ends.
+/// Cuts all traces into arcs and returns the arcs of features without duplicates, and their end
+/// nodes.
 ///
 /// # Errors
-/// If something is not the same all along an arc, or an arc ends where nothing ends it.
+/// [`FeatureError::LooseCurve`] or [`FeatureError::Tangent`] if the neighborhood changes along an
+/// arc, or an arc ends without a node; errors of [`neighborhood`].
 pub(super) fn feature_arcs(
     geometry: &Geometry,
     tree: &Octree,
@@ -124,7 +126,7 @@ pub(super) fn feature_arcs(
     let mut nodes = Nodes::default();
     let mut cuts: Vec<_> =
         traces.iter().map(|trace| cuts(geometry, tree, trace, &mut nodes, tolerances)).collect();
-    nodes.settle(geometry, tree, tolerances);
+    nodes.relax(geometry, tree, tolerances);
     for (trace, cuts) in traces.iter().zip(&mut cuts) {
         cut_at_known_nodes(geometry, trace, &nodes, cuts, tolerances);
     }
@@ -136,10 +138,10 @@ pub(super) fn feature_arcs(
             }
         }
     }
-    Ok((each_once(geometry, arcs, tolerances)?, nodes))
+    Ok((without_duplicates(geometry, arcs, tolerances)?, nodes))
 }
 
-/// The positions on a trace where it is cut, ascending, and the nodes there.
+/// The positions on a trace at which it is cut, ascending, with their nodes.
 fn cuts(
     geometry: &Geometry,
     tree: &Octree,
@@ -167,7 +169,7 @@ fn cuts(
             cuts.push((crossing.position, node));
         }
     }
-    // On a closed trace the same crossing may stand at both ends.
+    // On a closed trace the same crossing may appear at both ends.
     if let (true, [first, .., end]) = (trace.closed, &cuts[..]) {
         let around = length(trace, end.0, last as f64) + length(trace, 0.0, first.0);
         if first.1 == end.1 && around <= 4.0 * tolerances.merge {
@@ -177,10 +179,10 @@ fn cuts(
     cuts
 }
 
-/// Cuts a trace also at the nodes on it that were found on other traces.
+/// Cuts a trace also at nodes found on other traces.
 ///
-/// Two traces may go over one piece of curve; a surface that matters nowhere near it may have been met by the
-/// longer steps of one and not of the other. Cut alike, they are known to be the same.
+/// Two traces may cover the same piece of a curve, and the longer steps of only one of them may
+/// have met an irrelevant surface. Cut at the same nodes, the pieces are recognized as equal.
 fn cut_at_known_nodes(
     geometry: &Geometry,
     trace: &Trace,
@@ -215,10 +217,10 @@ fn length(trace: &Trace, from: f64, to: f64) -> f64 {
     sum
 }
 
-/// The points and ends of an arc.
+/// The points and end nodes of an arc.
 type Piece = (Vec<Point>, Option<[Option<usize>; 2]>);
 
-/// Cuts a trace.
+/// Cuts a trace at the given positions.
 fn pieces(trace: &Trace, cuts: &[(f64, usize)], nodes: &Nodes, tolerances: &Tolerances) -> Vec<Piece> {
     let last = trace.points.len() - 1;
     if cuts.is_empty() {
@@ -249,7 +251,7 @@ fn pieces(trace: &Trace, cuts: &[(f64, usize)], nodes: &Nodes, tolerances: &Tole
     }
     for (points, ends) in &mut pieces {
         let [start, end] = ends.expect("a cut trace has no closed pieces").map(|e| e.map(|n| nodes.point(n)));
-        // A point of the trace beside a node would make a step of no length.
+        // A trace point close to a node would make a step of nearly zero length.
         let beside =
             |p: &Point| [start, end].iter().flatten().any(|n| (n - p).norm() <= 4.0 * tolerances.merge);
         points.retain(|p| !beside(p));
@@ -267,7 +269,8 @@ fn inner_points(trace: &Trace, from: f64, to: f64) -> Vec<Point> {
     trace.points[first.min(last)..last].to_vec()
 }
 
-/// The point at a part of the length of a polyline, on both surfaces, and the direction there.
+/// The point at a fraction of the length of a polyline, projected to both surfaces, and the
+/// direction there.
 fn sample(
     geometry: &Geometry,
     pair: [SurfaceId; 2],
@@ -292,7 +295,7 @@ fn sample(
     (project_to_both(a, b, &start, tolerances.exact).unwrap_or(start), chord)
 }
 
-/// The arc of these points if it is part of a feature.
+/// Makes an arc of the given points if it belongs to a feature, else `None`.
 fn classify(
     geometry: &Geometry,
     tree: &Octree,
@@ -301,29 +304,31 @@ fn classify(
     ends: Option<[Option<usize>; 2]>,
     tolerances: &Tolerances,
 ) -> Result<Option<Arc>, FeatureError> {
-    /// Where else than in the middle an arc is looked at: all must agree. Towards an end where a surface leaves the curve with a high power of the
-    /// distance it is taken to be on it for a while: there the next part counts that is free of it.
+    /// Other fractions of the length at which the neighborhood is compared with that in the middle.
+    /// If a surface separates from the curve with a high power of the distance from an end, it
+    /// counts as passing through the curve for some length: then the next fraction, further inside,
+    /// is used.
     const OTHER_PARTS: [[f64; 3]; 2] = [[0.27, 0.37, 0.46], [0.81, 0.69, 0.58]];
-    let look = |part: f64| {
+    let neighborhood_at = |part: f64| {
         let (at, forward) = sample(geometry, pair, &points, part, tolerances);
-        around(geometry, tree, pair, &at, &forward, tolerances).map(|found| (at, found))
+        neighborhood(geometry, tree, pair, &at, &forward, tolerances).map(|found| (at, found))
     };
-    // Where the pair does not matter, the feature, if there is one, is that of other surfaces through the same curve.
-    let (middle, Some(found)) = look(0.52)? else { return Ok(None) };
-    let sheets = |around: &Around| if around.is_feature() { around.sheets.clone() } else { Vec::new() };
+    // If the pair is not relevant, a feature here belongs to other surfaces through the curve.
+    let (middle, Some(found)) = neighborhood_at(0.52)? else { return Ok(None) };
+    let sheets = |at: &Neighborhood| if at.is_feature() { at.sheets.clone() } else { Vec::new() };
     let mut surfaces = found.surfaces.clone();
-    // Beyond where a trace was left nothing is known: only its middle counts.
+    // The curve is unknown beyond the point where the trace stopped: then only the middle counts.
     let whole = ends.is_none_or(|ends| ends.iter().all(Option::is_some));
     for parts in if whole { &OTHER_PARTS[..] } else { &[] } {
         let mut parts = parts.iter();
         let other = loop {
             let part = parts.next().expect("the last of the parts is taken as it is");
-            let (at, Some(other)) = look(*part)? else { return Ok(None) };
+            let (at, Some(other)) = neighborhood_at(*part)? else { return Ok(None) };
             if sheets(&other) == sheets(&found) {
                 break other;
             }
             if parts.as_slice().is_empty() || other.surfaces == found.surfaces {
-                return Err(loose(geometry, pair, &at));
+                return Err(loose_curve(geometry, pair, &at));
             }
         };
         surfaces.extend(other.surfaces);
@@ -335,13 +340,18 @@ fn classify(
     surfaces.dedup();
     let [a, b] = pair.map(|s| &geometry.surfaces[s.index()]);
     let sine = a.normal(&middle).cross(&b.normal(&middle)).norm();
-    let around = Around { surfaces, ..found };
-    Ok(Some(Arc { pair, points, ends, around, middle, sine }))
+    let neighborhood = Neighborhood { surfaces, ..found };
+    Ok(Some(Arc { pair, points, ends, neighborhood, middle, sine }))
 }
 
-/// Keeps one of arcs that are the same: those of several pairs of surfaces through one curve, and
-/// those that two traces went over. The one whose surfaces cross most steeply stays.
-fn each_once(geometry: &Geometry, arcs: Vec<Arc>, tolerances: &Tolerances) -> Result<Vec<Arc>, FeatureError> {
+/// Removes duplicate arcs, found from several pairs of surfaces through one curve or by two traces.
+///
+/// Of equal arcs, keeps the one whose surfaces cross at the largest angle.
+fn without_duplicates(
+    geometry: &Geometry,
+    arcs: Vec<Arc>,
+    tolerances: &Tolerances,
+) -> Result<Vec<Arc>, FeatureError> {
     let mut order: Vec<usize> = (0..arcs.len()).collect();
     order.sort_by(|&x, &y| arcs[y].sine.total_cmp(&arcs[x].sine).then(x.cmp(&y)));
     let key = |arc: &Arc| arc.ends.map(|[a, b]| (a.min(b), a.max(b)));
@@ -358,16 +368,16 @@ fn each_once(geometry: &Geometry, arcs: Vec<Arc>, tolerances: &Tolerances) -> Re
     }
     for i in open {
         if !kept.iter().any(|&k| arcs[k].passes(geometry, &arcs[i].middle, tolerances)) {
-            return Err(loose(geometry, arcs[i].pair, &arcs[i].middle));
+            return Err(loose_curve(geometry, arcs[i].pair, &arcs[i].middle));
         }
     }
     kept.sort_unstable();
     Ok(kept.into_iter().map(|i| arcs[i].clone()).collect())
 }
 
-/// The error for a curve that nothing ends: where its surfaces are nearly tangent, that is the reason.
-pub(super) fn loose(geometry: &Geometry, pair: [SurfaceId; 2], at: &Point) -> FeatureError {
-    /// The sine of an angle at which curves are followed without trouble.
+/// The error for a curve with a loose end: a tangency if its surfaces are nearly tangent there.
+pub(super) fn loose_curve(geometry: &Geometry, pair: [SurfaceId; 2], at: &Point) -> FeatureError {
+    /// From this sine of the angle on, tracing is reliable.
     const STEEP: f64 = 1e-2;
     let [a, b] = pair.map(|s| geometry.surfaces[s.index()].normal(at));
     let [first, second] = pair.map(|s| Named::surface(geometry, s));
@@ -380,28 +390,29 @@ pub(super) fn loose(geometry: &Geometry, pair: [SurfaceId; 2], at: &Point) -> Fe
 }
 
 impl Arc {
-    /// Whether a point lies on it.
+    /// Whether a point lies on the arc.
     pub fn passes(&self, geometry: &Geometry, point: &Point, tolerances: &Tolerances) -> bool {
         let on = |s: &SurfaceId| geometry.surfaces[s.index()].distance(point) <= tolerances.on_surface;
         self.pair.iter().all(on) && self.points.windows(2).any(|ends| along(ends, point).is_some())
     }
 
-    /// The same arc run the other way.
+    /// The same arc in the opposite direction.
     pub fn reversed(mut self) -> Self {
         self.points.reverse();
         self.ends = self.ends.map(|[a, b]| [b, a]);
-        for (_, left) in &mut self.around.sheets {
+        for (_, left) in &mut self.neighborhood.sheets {
             *left = !*left;
         }
-        self.around.sheets.sort_unstable();
+        self.neighborhood.sheets.sort_unstable();
         self
     }
 
-    /// Whether it may be one curve with the arc `next` that begins where it ends.
+    /// Whether the arc and `next`, which starts at its end, may be one curve.
     pub fn continues_in(&self, geometry: &Geometry, next: &Self) -> bool {
-        /// The cosine of the least angle that is a corner where both lie on the same surfaces: more than two steps turn by.
+        /// Arcs on the same surfaces form a corner if the cosine of their angle is at most this;
+        /// two trace steps turn less.
         const STRAIGHT: f64 = 0.9;
-        let same = self.pair == next.pair || self.around.surfaces == next.around.surfaces;
+        let same = self.pair == next.pair || self.neighborhood.surfaces == next.neighborhood.surfaces;
         let direction = |arc: &Self, at: &Point, chord: Vector| {
             let [a, b] = arc.pair.map(|s| &geometry.surfaces[s.index()]);
             tangent_along(a, b, at, &chord)
@@ -409,6 +420,6 @@ impl Arc {
         let n = self.points.len();
         let end = direction(self, &self.points[n - 1], self.points[n - 1] - self.points[n - 2]);
         let start = direction(next, &next.points[0], next.points[1] - next.points[0]);
-        same && self.around.sheets == next.around.sheets && end.dot(&start) > STRAIGHT
+        same && self.neighborhood.sheets == next.neighborhood.sheets && end.dot(&start) > STRAIGHT
     }
 }

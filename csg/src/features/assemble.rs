@@ -1,15 +1,19 @@
-//! Arcs to curves and corners, sheets to patches.
+//! Joins arcs to curves and corners, and sheets to patches.
 
-use super::arcs::{Arc, Nodes, loose};
-use super::around::{Sheet, Tolerances, sheet_at};
+use super::arcs::{Arc, Nodes, loose_curve};
+use super::neighborhood::{Sheet, Tolerances, sheet_at};
 use super::octree::Octree;
 use super::{Corner, Curve, FeatureError, Features, Fin, Named, Patch, Place};
 use crate::geometry::UserPoint;
 use crate::{Aabb, BodyId, CornerId, CurveId, Geometry, Interval, PatchId, Point, SurfaceId, Vector};
 use std::collections::{BTreeMap, HashMap};
 
-/// Joins arcs that continue each other at nodes where nothing else is, and returns them as chains:
-/// one arc each, whose ends are corners or which is closed.
+/// Joins arcs that continue each other at nodes without other arcs.
+///
+/// Each returned arc ends at corners or is closed.
+///
+/// # Errors
+/// [`FeatureError::LooseCurve`] or [`FeatureError::Tangent`] if only one arc ends at a node.
 pub(super) fn join(
     geometry: &Geometry,
     arcs: Vec<Arc>,
@@ -26,7 +30,7 @@ pub(super) fn join(
     for (&node, ends) in &ends {
         let point = nodes.point(node);
         if let [(arc, _)] = ends[..] {
-            return Err(loose(geometry, arcs[arc].pair, &point));
+            return Err(loose_curve(geometry, arcs[arc].pair, &point));
         }
         let is_user_point = geometry.user_points.iter().any(|u| (u.point - point).norm() <= tolerances.merge);
         if let ([first, second], false) = (&ends[..], is_user_point) {
@@ -40,11 +44,11 @@ pub(super) fn join(
     Ok(chains(arcs, &mates))
 }
 
-/// Follows the mates from arc to arc.
+/// Concatenates the arcs along the links of `mates`.
 fn chains(arcs: Vec<Arc>, mates: &HashMap<(usize, usize), (usize, usize)>) -> Vec<Arc> {
     let mut used = vec![false; arcs.len()];
     let mut chains = Vec::new();
-    // First those that begin at a corner, then what is left: closed ones.
+    // Open chains first, starting at corners; the rest are closed.
     let begins = |i: usize| [0, 1].into_iter().find(|&end| !mates.contains_key(&(i, end)));
     let starts = (0..arcs.len()).filter_map(|i| begins(i).map(|end| (i, end)));
     let starts: Vec<_> = starts.chain((0..arcs.len()).map(|i| (i, 0))).collect();
@@ -73,12 +77,12 @@ fn chains(arcs: Vec<Arc>, mates: &HashMap<(usize, usize), (usize, usize)>) -> Ve
     chains
 }
 
-/// The arc, run from the end with this index.
+/// The arc, traversed from the end with the given index.
 fn taken(arc: &Arc, end: usize) -> Arc {
     if end == 0 { arc.clone() } else { arc.clone().reversed() }
 }
 
-/// Makes the geometric entities of joined arcs and of the surfaces without arcs.
+/// Makes the geometric entities from joined arcs, and from closed surfaces without arcs.
 pub(super) fn entities(
     geometry: &Geometry,
     tree: &Octree,
@@ -101,7 +105,7 @@ pub(super) fn entities(
             })
         });
         curves.push(Curve { surfaces: arc.pair, ends, trace: arc.points.clone(), fins: Vec::new() });
-        for &(sheet, left) in &arc.around.sheets {
+        for &(sheet, left) in &arc.neighborhood.sheets {
             patches.entry(sheet).or_insert_with(|| patch(&sheet)).boundary.push((CurveId::new(i), left));
         }
     }
@@ -109,7 +113,8 @@ pub(super) fn entities(
         patches.entry(sheet).or_insert_with(|| patch(&sheet)).seeds.push(seed);
     }
     let patches: Vec<Patch> = patches.into_values().collect();
-    // What the rough cells around the bodies did not show: a body of no volume has no boundary.
+    // The coarse box cells do not detect all empty bodies, but a body of zero volume has no
+    // boundary.
     let is_bounded = |id: &BodyId| patches.iter().any(|p| p.inside == Some(*id) || p.outside == Some(*id));
     let unbounded = (0..geometry.bodies.len()).map(BodyId::new).filter(|id| !is_bounded(id));
     let empty: Vec<Named> = unbounded.map(|id| Named::body(geometry, id)).collect();
@@ -134,7 +139,7 @@ pub(super) fn entities(
     Ok(features)
 }
 
-/// A corner with the surfaces that matter there.
+/// A corner with the relevant surfaces through it.
 pub(super) fn corner(geometry: &Geometry, tree: &Octree, point: Point, tolerances: &Tolerances) -> Corner {
     let near = |x: f64| Interval::new(x - tolerances.merge, x + tolerances.merge);
     let mut surfaces = tree.surfaces_in(&[near(point.x), near(point.y), near(point.z)]);
@@ -156,9 +161,10 @@ fn patch(sheet: &Sheet) -> Patch {
     }
 }
 
-/// The closed surfaces (spheres, tori, ellipsoids) that are boundaries and carry no curve, with a point on each.
+/// The closed surfaces (spheres, tori, ellipsoids) that are boundaries without curves, with a point
+/// on each.
 ///
-/// The regions on both sides of a connected surface change at curves only, so one point tells.
+/// The regions on both sides of a connected surface change at curves only, so one point decides.
 fn closed_sheets(
     geometry: &Geometry,
     tree: &Octree,
@@ -186,7 +192,7 @@ fn closed_sheets(
     Ok(found)
 }
 
-/// Directions all around, none of them special.
+/// Directions spread over the sphere, in general position.
 fn scattered_directions() -> impl Iterator<Item = Vector> {
     const COUNT: u32 = 32;
     // A spiral from pole to pole that turns by the golden angle (Vogel 1979 for the disk).
@@ -199,7 +205,7 @@ fn scattered_directions() -> impl Iterator<Item = Vector> {
     })
 }
 
-/// Refuses a point that is in no body and on no boundary.
+/// Rejects a point of the user outside all bodies.
 fn check_inside(
     geometry: &Geometry,
     tree: &Octree,

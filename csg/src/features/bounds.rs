@@ -1,33 +1,36 @@
-//! A box around all bodies.
+//! A box that contains all bodies, found without their features.
 
 use super::{FeatureError, Named};
 use crate::interval::Cell;
 use crate::solid::Pruned;
 use crate::{Aabb, BodyId, Geometry, Interval, Point, Solid, Surface};
 
-/// A body that reaches this many times the extent of all primitives is taken for unbounded.
+/// A body that reaches this many times the extent of all primitives counts as unbounded.
 const HUGE: f64 = 1e4;
-/// A box is good when the cells at its faces are smaller than this part of its longest side.
+/// The box is accurate enough if undecided cells at its faces are smaller than this fraction of its
+/// longest side.
 const RESOLUTION: f64 = 1.0 / 16.0;
 
-/// What is smaller than this part of the huge cube, a ten-thousand-millionth of the extent of the primitives, is nothing:
-/// two balls that touch have a point in common.
+/// Bodies smaller than this fraction of the huge cube (10⁻¹⁰ of the extent of the primitives) count
+/// as empty, for example the common point of two touching balls.
 const NOTHING: f64 = 1e-14;
 
-/// Far out a sharp wedge that ends is told from one that goes on in small cells only: with so many parts a wedge of 10⁻³ is, and
-/// a slab, which goes on, is given up soon.
+/// Largest number of cells in the search for unbounded bodies. Far out, only small cells show
+/// whether a sharp wedge ends: this number suffices for an angle of 10⁻³, and an unbounded slab is
+/// detected quickly.
 const MOST_PARTS: usize = 20_000;
 
-/// Part of the huge cube, and what bodies may be in it (`None`: the whole cell is in the body).
+/// A cell of the huge cube and the bodies that may meet it (`None`: the cell is inside the body).
 struct Part {
     cell: Cell,
     bodies: Vec<(BodyId, Option<Solid>)>,
 }
 
-/// A box that contains all bodies with a little room around, by pruning a huge cube.
+/// A box that contains all bodies with a small margin, found by pruning a huge cube.
 ///
 /// # Errors
-/// If there is no body, one is empty, or one reaches the faces of the cube.
+/// [`FeatureError::NoBody`], [`FeatureError::Empty`], or [`FeatureError::Unbounded`] if a body
+/// reaches the faces of the cube.
 pub(super) fn bounding_cell(geometry: &Geometry) -> Result<Cell, FeatureError> {
     if geometry.bodies.is_empty() {
         return Err(FeatureError::NoBody);
@@ -56,7 +59,7 @@ pub(super) fn bounding_cell(geometry: &Geometry) -> Result<Cell, FeatureError> {
         };
         if !parts.iter().any(is_rough) {
             let Some(part) = parts.iter().find(|part| is_at_face(part, &cube)) else {
-                // Uneven room, so that planes of symmetry do not fall on the borders of cells.
+                // Uneven margins, so that planes of symmetry do not coincide with faces of cells.
                 let room = [0.0123, 0.0217, 0.0181].map(|part| part * longest);
                 return Ok([0, 1, 2].map(|i| Interval::new(hull[i].lo - room[i], hull[i].hi + 1.3 * room[i])));
             };
@@ -71,12 +74,12 @@ pub(super) fn bounding_cell(geometry: &Geometry) -> Result<Cell, FeatureError> {
     }
 }
 
-/// Whether a part reaches a face of the cube.
+/// Whether a part touches a face of the cube.
 fn is_at_face(part: &Part, cube: &Cell) -> bool {
     (0..3).any(|i| part.cell[i].lo == cube[i].lo || part.cell[i].hi == cube[i].hi)
 }
 
-/// The parts with some of them split.
+/// Splits the parts selected by `is_rough`.
 fn refined(geometry: &Geometry, parts: Vec<Part>, is_rough: &dyn Fn(&Part) -> bool) -> Vec<Part> {
     let (rough, mut parts): (Vec<_>, Vec<_>) = parts.into_iter().partition(is_rough);
     for part in rough {
@@ -86,7 +89,7 @@ fn refined(geometry: &Geometry, parts: Vec<Part>, is_rough: &dyn Fn(&Part) -> bo
     parts
 }
 
-/// What is left of the bodies in a part, `None` if nothing.
+/// Prunes the bodies to the cell of a part; `None` if all are disjoint from it.
 fn prune(geometry: &Geometry, part: Part) -> Option<Part> {
     let mut range = |id: crate::SurfaceId| geometry.surfaces[id.index()].value_range(&part.cell);
     let left = |(id, solid): (BodyId, Option<Solid>)| match solid.map(|s| s.prune(&mut range)) {
@@ -98,7 +101,7 @@ fn prune(geometry: &Geometry, part: Part) -> Option<Part> {
     (!bodies.is_empty()).then_some(Part { cell: part.cell, bodies })
 }
 
-/// The smallest box around all parts.
+/// The bounding box of all parts.
 fn hull(parts: &[Part]) -> Cell {
     let first = parts[0].cell;
     parts.iter().fold(first, |hull, part| {
@@ -106,7 +109,7 @@ fn hull(parts: &[Part]) -> Cell {
     })
 }
 
-/// The eight parts of a box, the x-halves alternating fastest.
+/// The eight octants of a box; x varies fastest.
 pub(super) fn split(cell: &Cell) -> [Cell; 8] {
     let halves = cell.map(|side| {
         let middle = side.middle();
@@ -116,7 +119,7 @@ pub(super) fn split(cell: &Cell) -> [Cell; 8] {
         .map(|child| [halves[0][child & 1], halves[1][child >> 1 & 1], halves[2][child >> 2]])
 }
 
-/// A cube around the points that define the primitives, far larger than they are apart.
+/// A cube around the points that define the primitives, much larger than their extent.
 fn huge_cube(geometry: &Geometry) -> Cell {
     let extents: Vec<(Point, f64)> = geometry
         .bodies
@@ -144,7 +147,7 @@ fn huge_cube(geometry: &Geometry) -> Cell {
     if extents.is_empty() {
         hull = Aabb { min: Point::origin(), max: Point::origin() };
     }
-    // Planes alone may all be given by one point: then its coordinates are the only length known.
+    // If all primitives are planes through one point, its coordinates are the only known length.
     let size = match hull.diagonal() {
         0.0 => hull.min.coords.amax().max(1.0),
         diagonal => diagonal,

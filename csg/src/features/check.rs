@@ -1,46 +1,47 @@
-//! Whether corners, curves and patches fit together.
+//! Consistency of corners, curves and patches.
 
 use super::{Features, Place};
 use crate::{CornerId, CurveId, PatchId};
 use std::collections::BTreeMap;
 
-/// A way in which features do not fit together.
+/// An inconsistency between features.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Inconsistency {
-    /// A curve belongs to fewer than two sides of patches.
-    #[error("curve {} at {place} has {fins} patches beside it", .curve.0)]
+    /// A curve has fewer than two adjacent patches.
+    #[error("curve {} at {place} has {fins} adjacent patches instead of at least 2", .curve.0)]
     Fins {
         /// The curve.
         curve: CurveId,
-        /// How many.
+        /// The number of fins.
         fins: usize,
-        /// Its first point.
+        /// The first point of the curve.
         place: Place,
     },
-    /// The boundary of a patch comes into a corner more often than it leaves it, or less often.
+    /// The boundary curves of a patch do not balance at a corner: incoming and outgoing counts
+    /// differ.
     #[error("the boundary of patch {} is not closed at {place}", .patch.0)]
     OpenBoundary {
         /// The patch.
         patch: PatchId,
-        /// Where.
+        /// The corner.
         place: Place,
     },
-    /// A patch with neither boundary nor seed, or with the same body on both sides.
-    #[error("patch {} is no boundary", .patch.0)]
+    /// A patch has neither boundary curves nor a seed, or the same body on both sides.
+    #[error("patch {} does not separate two regions, or has neither boundary nor seed", .patch.0)]
     NoBoundary {
         /// The patch.
         patch: PatchId,
     },
-    /// A curve and a patch do not agree on whether they are beside each other.
-    #[error("curve {} and patch {} do not agree on being beside each other", .curve.0, .patch.0)]
+    /// Only one of a curve and a patch lists the other as adjacent.
+    #[error("curve {} and patch {} do not agree on whether they are adjacent", .curve.0, .patch.0)]
     Disagreement {
         /// The curve.
         curve: CurveId,
         /// The patch.
         patch: PatchId,
     },
-    /// A trace with fewer than two points, or whose ends are not at its corners.
-    #[error("the trace of curve {} does not run between its ends", .curve.0)]
+    /// A trace has fewer than two points, or does not end at the corners of its curve.
+    #[error("the trace of curve {} does not connect its end corners", .curve.0)]
     Trace {
         /// The curve.
         curve: CurveId,
@@ -48,12 +49,12 @@ pub enum Inconsistency {
 }
 
 impl Features {
-    /// Checks that the boundary of each patch is closed, that each curve has patches beside it all of which know it, and
-    /// that traces run from corner to corner.
+    /// Checks that patch boundaries are closed, that curves and patches agree on adjacency, and
+    /// that traces connect corners.
     ///
     /// # Errors
-    /// The first thing that does not fit.
-    pub fn check(&self) -> Result<(), Inconsistency> {
+    /// The first [`Inconsistency`] found.
+    pub(crate) fn check(&self) -> Result<(), Inconsistency> {
         for (i, curve) in self.curves.iter().enumerate() {
             let id = CurveId::new(i);
             if curve.trace.len() < 2 {

@@ -1,6 +1,6 @@
-//! Places where two surfaces are tangent: whether they matter.
+//! Points where two surfaces are tangent, and whether they affect the features.
 
-use super::around::{Tolerances, region};
+use super::neighborhood::{Tolerances, region};
 use super::octree::{Leaf, Octree, is_flat};
 use super::{FeatureError, Inconsistency, Named, Place};
 use crate::interval::{Cell, middle};
@@ -9,20 +9,20 @@ use crate::project::project_to_both;
 use crate::{Geometry, Interval, Point, Seam, Surface, SurfaceId};
 use nalgebra::{Matrix2, Vector2};
 
-/// A place where two surfaces are tangent, or not told apart from it.
+/// A point where two surfaces are tangent or cannot be separated.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Contact {
     /// The surfaces, ascending.
     pub pair: [SurfaceId; 2],
-    /// Where.
+    /// The coordinates.
     pub point: Point,
-    /// The size of the cell in which it was found.
+    /// The diagonal of the cell in which it was found.
     pub reach: f64,
-    /// What it is.
+    /// Why the point is special.
     pub kind: Kind,
 }
 
-/// What kind of place a contact is.
+/// The kind of a contact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
     /// The surfaces are tangent.
@@ -31,11 +31,11 @@ pub(super) enum Kind {
     Apex,
 }
 
-/// Surfaces at an angle of less than this (its sine) where they meet are tangent there: a wedge so sharp has no mesh.
+/// Surfaces are tangent if the sine of their angle is below this: a sharper wedge cannot be meshed.
 const TANGENT: f64 = 1e-6;
 
 impl Contact {
-    /// Surfaces of a cell that could not be told apart.
+    /// A contact at the center of a cell in which two surfaces could not be separated.
     pub fn at_middle(pair: [SurfaceId; 2], cell: &Cell) -> Self {
         Self { pair, point: middle(cell), reach: diagonal(cell), kind: Kind::Tangent }
     }
@@ -46,16 +46,16 @@ pub(super) fn diagonal(cell: &Cell) -> f64 {
     cell.iter().map(|side| side.width().powi(2)).sum::<f64>().sqrt()
 }
 
-/// The point in (or just beside) a cell where both surfaces meet and are tangent, if there is one.
+/// The point in or close to a cell where both surfaces meet and are tangent, if there is one.
 ///
-/// Where they miss each other by less than what counts as nothing, they are taken to meet.
+/// Surfaces with a gap below the tolerance count as meeting.
 pub(super) fn find(
     geometry: &Geometry,
     pair: [SurfaceId; 2],
     cell: &Cell,
     tolerances: &Tolerances,
 ) -> Option<Contact> {
-    /// The steps converge with the square: more than this many lead elsewhere.
+    /// Convergence is quadratic; an iteration that needs more steps leads elsewhere.
     const STEPS: usize = 12;
     let [a, b] = pair.map(|s| &geometry.surfaces[s.index()]);
     let center = middle(cell);
@@ -80,14 +80,15 @@ pub(super) fn find(
     (meets && inside && sine <= TANGENT).then_some(Contact { pair, point: at, reach, kind: Kind::Tangent })
 }
 
-/// Whether a seam passes through a cell in which both of its surfaces are flat; the place is noted as a contact.
+/// Whether a seam passes through a cell in which both of its surfaces are flat; records it as a
+/// contact.
 ///
-/// Beside the seam the two may cross in other curves, which end on it.
+/// Other intersection curves of the pair may end on the seam.
 pub(super) fn on_seam(geometry: &Geometry, seam: &Seam, cell: &Cell, contacts: &mut Vec<Contact>) -> bool {
     if !seam.pair.iter().all(|s| is_flat(&geometry.surfaces[s.index()], cell)) {
         return false;
     }
-    let [a, b] = seam.carrier.map(|s| &geometry.surfaces[s.index()]);
+    let [a, b] = seam.surfaces.map(|s| &geometry.surfaces[s.index()]);
     let center = middle(cell);
     let reach = diagonal(cell);
     let Ok(point) = project_to_both(a, b, &center, f64::EPSILON * center.coords.amax().max(reach)) else {
@@ -101,8 +102,10 @@ pub(super) fn on_seam(geometry: &Geometry, seam: &Seam, cell: &Cell, contacts: &
     is_on && is_near
 }
 
-/// The shortest step that solves the two linearised equations and the one that the gradients be parallel in
-/// the least-squares sense.
+/// One Gauss-Newton step toward a point of tangency.
+///
+/// The shortest least-squares solution of the linearized equations: both values vanish and the
+/// gradients are parallel.
 fn least_squares_step(a: &Surface, b: &Surface, at: &Point) -> Option<crate::Vector> {
     let (ga, gb) = (a.gradient(at), b.gradient(at));
     let (ha, hb) = (a.hessian(at), b.hessian(at));
@@ -116,7 +119,7 @@ fn least_squares_step(a: &Surface, b: &Surface, at: &Point) -> Option<crate::Vec
     matrix.row_mut(1).copy_from(&(gb.transpose() / lb));
     values[0] = a.value(at) / la;
     values[1] = b.value(at) / lb;
-    // The sines have no unit; a curvature makes them a length as the others.
+    // Sines have no unit: divide by a curvature to get lengths, like the other equations.
     let bend = ha.amax() / la + hb.amax() / lb;
     if bend > 0.0 {
         let cross = ga.cross(&gb) / (la * lb * bend);
@@ -126,15 +129,16 @@ fn least_squares_step(a: &Surface, b: &Surface, at: &Point) -> Option<crate::Vec
         }
         values.fixed_rows_mut::<3>(2).copy_from(&cross);
     }
-    // Along a curve of contact one direction is free: small singular values are left out.
+    // Along a curve of contact one direction is free: drop small singular values.
     let svd = matrix.svd(true, true);
     svd.solve(&values, 1e-6).ok().map(|step| -step)
 }
 
-/// Whether the regions beside a contact are the same as if one of both surfaces were not there.
+/// Whether the regions beside a contact are the same as without one of the two surfaces.
 ///
-/// Where the sheets are tangent and one bends more, a wedge lies between them. Below, in the wedge and above
-/// there are up to three different regions; the contact matters if both sheets separate some.
+/// If the sheets are tangent with different curvatures, a wedge lies between them. Up to three
+/// different regions lie below, in and above the wedge. The contact matters if both sheets separate
+/// regions.
 fn is_harmless(
     geometry: &Geometry,
     tree: &Octree,
@@ -146,7 +150,7 @@ fn is_harmless(
         return Ok(true);
     }
     let wedges = possible_wedges(geometry, contact);
-    // A surface through the point is tried on both sides.
+    // For surfaces through the point, try both sides.
     let others: Vec<SurfaceId> = leaf
         .surfaces
         .iter()
@@ -166,7 +170,8 @@ fn is_harmless(
     Ok(true)
 }
 
-/// Whether the region depends on the side of one of the two surfaces only, over the possible pairs of sides.
+/// Whether the region depends on the side of only one of the two surfaces, over the given pairs of
+/// sides.
 fn depends_on_one(
     geometry: &Geometry,
     leaf: &Leaf,
@@ -193,7 +198,7 @@ fn depends_on_one(
 
 /// The pairs of sides (positive or not) of the two surfaces that occur near a contact.
 fn possible_wedges(geometry: &Geometry, contact: &Contact) -> Vec<[bool; 2]> {
-    /// A difference of curvatures below this part of their sum is none.
+    /// Curvatures count as equal if they differ by less than this fraction of their sum.
     const SAME_CURVATURE: f64 = 1e-6;
     let [a, b] = contact.pair.map(|s| &geometry.surfaces[s.index()]);
     let at = &contact.point;
@@ -201,7 +206,7 @@ fn possible_wedges(geometry: &Geometry, contact: &Contact) -> Vec<[bool; 2]> {
     let turned = na.dot(&nb) < 0.0;
     let sign = if turned { -1.0 } else { 1.0 };
     let (ha, hb) = (a.hessian(at) / a.gradient(at).norm(), b.hessian(at) / b.gradient(at).norm() * sign);
-    // The sheets' heights over the common tangent plane are minus half these forms.
+    // The heights of the sheets over the common tangent plane are minus one half of these forms.
     let (u, v) = tangents(&na);
     let form = |x: &Vector2<f64>| u * x.x + v * x.y;
     let (e, f) = (form(&Vector2::x()), form(&Vector2::y()));
@@ -233,28 +238,33 @@ fn possible_wedges(geometry: &Geometry, contact: &Contact) -> Vec<[bool; 2]> {
     sides
 }
 
-/// Refuses contacts with a wedge of no angle between the sheets.
+/// Rejects contacts with a wedge of zero angle between the sheets.
 ///
-/// Where other surfaces through the contact leave it open which regions are beside it, it is looked around.
+/// If other surfaces through the contact leave the regions ambiguous, the neighborhood is sampled.
+///
+/// # Errors
+/// [`FeatureError::Tangent`] at the first such contact.
 pub(super) fn check(geometry: &Geometry, tree: &Octree, tolerances: &Tolerances) -> Result<(), FeatureError> {
     for contact in &tree.contacts {
         if !is_harmless(geometry, tree, contact, tolerances)? && has_wedge(geometry, contact) {
-            return Err(refusal(geometry, contact));
+            return Err(tangent_error(geometry, contact));
         }
     }
     Ok(())
 }
 
-/// Whether somewhere around a contact there is a wedge of no angle: both sheets are boundaries, one above the other.
+/// Whether both sheets are boundaries, one above the other, somewhere around a contact.
 ///
-/// Looked for on a small circle, where other surfaces through the contact are where they are: the plane, the ball and the rods
-/// of a block with round edges all touch in one point, and each is a boundary in its own sector.
+/// Samples a small circle instead of the point itself because other surfaces may pass through the
+/// contact: in a block with rounded edges, a plane, a ball and two rods touch at one point, and
+/// each is a boundary in its own sector.
 fn has_wedge(geometry: &Geometry, contact: &Contact) -> bool {
-    /// The radius of the circle, in radii of curvature: the sheets are apart by half its square.
+    /// Radius of the circle relative to the radius of curvature: the gap between the sheets is half
+    /// its square.
     const CIRCLE: f64 = 1e-3;
-    /// In how many directions is looked.
+    /// Number of samples.
     const DIRECTIONS: u32 = 61;
-    /// Sheets nearer than this part of the square of the radius are one another's continuation.
+    /// Sheets closer than this fraction of the squared radius continue each other.
     const APART: f64 = 1e-3;
     let [a, b] = contact.pair.map(|s| &geometry.surfaces[s.index()]);
     let at = &contact.point;
@@ -281,9 +291,9 @@ fn has_wedge(geometry: &Geometry, contact: &Contact) -> bool {
     })
 }
 
-/// The point of a surface on a line across it.
+/// The intersection of a surface with a line that crosses it near `start`.
 fn on_line(surface: &Surface, start: &Point, direction: &crate::Vector) -> Option<Point> {
-    /// Newton's method begins within a millionth of the radius of curvature.
+    /// Newton's method starts within a millionth of the radius of curvature.
     const STEPS: usize = 5;
     let mut at = *start;
     for _ in 0..STEPS {
@@ -292,7 +302,7 @@ fn on_line(surface: &Surface, start: &Point, direction: &crate::Vector) -> Optio
     at.coords.iter().all(|x| x.is_finite()).then_some(at)
 }
 
-/// Names the contact of surfaces near the place of an error, if there is one that matters, as its reason.
+/// Replaces an error by the contact that caused it, if one that matters is near.
 pub(super) fn explain(
     geometry: &Geometry,
     tree: &Octree,
@@ -307,11 +317,11 @@ pub(super) fn explain(
     let is_near = |contact: &&Contact| (contact.point - place.0).norm() <= 2.0 * contact.reach;
     let matters = |contact: &&Contact| matches!(is_harmless(geometry, tree, contact, tolerances), Ok(false));
     let reason = tree.contacts.iter().filter(is_near).find(matters);
-    reason.map_or(error, |contact| refusal(geometry, contact))
+    reason.map_or(error, |contact| tangent_error(geometry, contact))
 }
 
 /// The error for a contact that matters.
-fn refusal(geometry: &Geometry, contact: &Contact) -> FeatureError {
+fn tangent_error(geometry: &Geometry, contact: &Contact) -> FeatureError {
     let [first, second] = contact.pair.map(|s| Named::surface(geometry, s));
     FeatureError::Tangent { first, second, place: Place(contact.point) }
 }

@@ -1,7 +1,7 @@
-//! Where a third surface crosses the intersection of two others.
+//! Crossings of a third surface with the intersection curve of two others.
 
-use super::around::Tolerances;
 use super::contact::{Contact, Kind};
+use super::neighborhood::Tolerances;
 use super::octree::Octree;
 use super::trace::{Trace, along, step_box};
 use crate::interval::Cell;
@@ -14,18 +14,18 @@ use std::iter;
 /// A point where another surface crosses or touches a trace.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Crossing {
-    /// Its position: the step in which it lies, plus the part of the step before it.
+    /// The parameter on the trace: index of the step plus the fraction of the step.
     pub position: f64,
-    /// Where.
+    /// The coordinates.
     pub point: Point,
-    /// The volume spanned by the three unit normals: how well the point is determined.
+    /// The volume spanned by the three unit normals, a measure of how well the point is determined.
     pub volume: f64,
 }
 
-/// Crossings nearer to each other than this many lengths of merging may be one: a thousandth of the diagonal.
+/// Crossings closer than this many merge tolerances (a thousandth of the diagonal) may be the same.
 const NEAR: f64 = 1e5;
 
-/// The crossings of a trace with all other surfaces that matter there, in order.
+/// All crossings of a trace with other relevant surfaces, sorted by position.
 pub(super) fn crossings(
     geometry: &Geometry,
     tree: &Octree,
@@ -40,19 +40,20 @@ pub(super) fn crossings(
             if trace.pair.contains(&id) {
                 continue;
             }
-            if tree.is_seam(trace.pair, id) {
+            if tree.is_tangent_along(trace.pair, id) {
                 continue;
             }
             let third = &geometry.surfaces[id.index()];
-            let matters = |cell: &Cell| tree.surfaces_in(cell).binary_search(&id).is_ok();
-            // Where it is tangent to one of the pair, what crosses their seam says where well.
-            let instead = auxiliaries(geometry, trace.pair, id);
-            let asked = if instead.is_empty() { vec![third] } else { instead };
-            let mut finder = Finder { a, b, third, matters: &matters, tolerances, found: Vec::new() };
+            let is_relevant = |cell: &Cell| tree.surfaces_in(cell).binary_search(&id).is_ok();
+            // If the third surface is tangent to one of the pair, the crossing is ill-conditioned:
+            // intersect with the seam's auxiliary surfaces instead.
+            let auxiliaries = auxiliaries(geometry, trace.pair, id);
+            let targets = if auxiliaries.is_empty() { vec![third] } else { auxiliaries };
+            let mut finder = Finder { a, b, third, is_relevant: &is_relevant, tolerances, found: Vec::new() };
             if finder.contains_curve(ends) {
                 continue;
             }
-            for surface in asked {
+            for surface in targets {
                 finder.third = surface;
                 if !finder.contains_curve(ends) {
                     finder.find(&ends[0], &ends[1], 0);
@@ -61,17 +62,17 @@ pub(super) fn crossings(
                 by_surface.entry(id).or_default().extend(finder.crossings(index, ends));
             }
         }
-        // Where what two tangent surfaces have in common parts.
-        for id in companions(geometry, tree, trace.pair) {
+        // Points where the seam and the residual intersection of a tangent pair cross.
+        for id in residual_surfaces(geometry, tree, trace.pair) {
             let third = &geometry.surfaces[id.index()];
-            let mut finder = Finder { a, b, third, matters: &|_| true, tolerances, found: Vec::new() };
+            let mut finder = Finder { a, b, third, is_relevant: &|_| true, tolerances, found: Vec::new() };
             if !finder.contains_curve(ends) {
                 finder.find(&ends[0], &ends[1], 0);
                 by_surface.entry(id).or_default().extend(finder.crossings(index, ends));
             }
         }
-        let sewn = tree.sewn_pairs(trace.pair).iter().flatten();
-        let apices = sewn.filter_map(|s| geometry.surfaces[s.index()].apex());
+        let tangent = tree.tangent_pairs(trace.pair).iter().flatten();
+        let apices = tangent.filter_map(|s| geometry.surfaces[s.index()].apex());
         let given = geometry.user_points.iter().map(|user| user.point);
         for point in given.chain(apices) {
             let on_both = a.distance(&point).max(b.distance(&point)) <= tolerances.on_surface;
@@ -81,7 +82,8 @@ pub(super) fn crossings(
         }
     }
     for (id, mut crossings) in by_surface {
-        // A surface through a branch point is tangent there too, and crossings beside it are rounding.
+        // A surface through a branch point is tangent there too; crossings close to it are rounding
+        // errors.
         let last = trace.points.len() - 1;
         for (position, _) in [0, last].into_iter().zip(trace.branches).filter(|end| end.1) {
             let point = trace.points[position];
@@ -92,17 +94,19 @@ pub(super) fn crossings(
         found.extend(distinct(&geometry.surfaces[id.index()], crossings, tolerances));
     }
     for crossing in &mut found {
-        crossing.point = settled(geometry, tree, trace, crossing, tolerances);
+        crossing.point = snapped(geometry, tree, trace, crossing, tolerances);
     }
     found.sort_by(|x, y| x.position.total_cmp(&y.position));
     found
 }
 
-/// The point where a crossing is: that where two surfaces through it are tangent, if rounding does not tell both apart.
+/// The point of a crossing, or the point of tangency of two surfaces if rounding cannot separate
+/// both.
 ///
-/// A line in the plane that touches a torus at its throat, along a branch of what the two have in common, leaves the torus with the third
-/// power: where it crosses the torus is known to the third root of rounding only, and the point of contact much better.
-fn settled(
+/// Example: a line in the tangent plane at the throat of a torus, along a branch of their
+/// intersection, leaves the torus with the third power of the distance. Its crossing with the torus
+/// is accurate only to the cube root of rounding; the point of contact is much more accurate.
+fn snapped(
     geometry: &Geometry,
     tree: &Octree,
     trace: &Trace,
@@ -122,32 +126,35 @@ fn settled(
     tree.contacts.iter().find(is_same).map_or(at, |contact| contact.point)
 }
 
-/// The surfaces that cut one of a pair in all that it has in common with a third surface, if the two are tangent along a seam and these
-/// are known.
+/// The auxiliary surfaces that replace `third` if it is tangent to one of a pair along a seam.
+///
+/// They cut both tangent surfaces in their whole intersection. Empty if there is no seam, or if the
+/// intersection is not completely known.
 fn auxiliaries(geometry: &Geometry, pair: [SurfaceId; 2], third: SurfaceId) -> Vec<&Surface> {
-    let seam_with = |s: SurfaceId| geometry.seam([s.min(third), s.max(third)]).filter(|seam| seam.is_alone);
+    let seam_with =
+        |s: SurfaceId| geometry.seam([s.min(third), s.max(third)]).filter(|seam| seam.is_complete);
     let Some(seam) = pair.into_iter().find_map(seam_with) else { return Vec::new() };
-    let carriers = iter::once(seam.carrier).chain(seam.rest).flatten();
-    carriers.filter(|c| !seam.pair.contains(c)).map(|c| &geometry.surfaces[c.index()]).collect()
+    let surfaces = iter::once(seam.surfaces).chain(seam.residual).flatten();
+    surfaces.filter(|c| !seam.pair.contains(c)).map(|c| &geometry.surfaces[c.index()]).collect()
 }
 
-/// The surfaces that cut what else two surfaces have in common that are tangent along the intersection of a pair.
-fn companions(geometry: &Geometry, tree: &Octree, pair: [SurfaceId; 2]) -> Vec<SurfaceId> {
-    let seams = tree.sewn_pairs(pair).iter().filter_map(|&sewn| geometry.seam(sewn));
-    let carriers = seams.filter_map(|seam| Some([seam.carrier, seam.rest?])).flatten().flatten();
-    let mut found: Vec<SurfaceId> = carriers.filter(|c| !pair.contains(c)).collect();
+/// The surfaces that cut the residual intersection of the pairs tangent along the curve of `pair`.
+fn residual_surfaces(geometry: &Geometry, tree: &Octree, pair: [SurfaceId; 2]) -> Vec<SurfaceId> {
+    let seams = tree.tangent_pairs(pair).iter().filter_map(|&tangent| geometry.seam(tangent));
+    let surfaces = seams.filter_map(|seam| Some([seam.surfaces, seam.residual?])).flatten().flatten();
+    let mut found: Vec<SurfaceId> = surfaces.filter(|c| !pair.contains(c)).collect();
     found.sort_unstable();
     found.dedup();
     found
 }
 
-/// The crossings of one surface without repetitions: where the trace is on the surface all the way between two of them,
-/// they are one.
+/// Removes repeated crossings with one surface: crossings are the same if the trace is on the
+/// surface between them.
 ///
-/// Rounding makes of a touching point two crossings nearby, or one and an extremum beside it. The extremum is
-/// kept, else the one that is nearest to the surface.
+/// Rounding splits a point of tangency into two crossings, or into a crossing and an extremum.
+/// Keeps the extremum, or else the crossing closest to the surface.
 fn distinct(third: &Surface, mut crossings: Vec<Crossing>, tolerances: &Tolerances) -> Vec<Crossing> {
-    /// The volume at an extremum found by bisection is rounding.
+    /// The volume at an extremum found by bisection is below this (rounding).
     const EXTREMUM: f64 = 1e-10;
     crossings.sort_by(|x, y| x.position.total_cmp(&y.position));
     let rank = |c: &Crossing| if c.volume <= EXTREMUM { -1.0 } else { third.distance(&c.point) };
@@ -179,19 +186,19 @@ fn volume(surfaces: &[&Surface; 3], at: &Point) -> f64 {
     u.cross(&v).dot(&w).abs()
 }
 
-/// Finds the points of one step of the intersection of `a` and `b` on the `third` surface.
+/// Finds the points on the `third` surface along one step of the intersection of `a` and `b`.
 struct Finder<'a> {
     a: &'a Surface,
     b: &'a Surface,
     third: &'a Surface,
-    /// Whether the third surface, or that for which it stands, matters in a box.
-    matters: &'a dyn Fn(&Cell) -> bool,
+    /// Whether the original third surface is relevant in a box.
+    is_relevant: &'a dyn Fn(&Cell) -> bool,
     tolerances: &'a Tolerances,
     found: Vec<Point>,
 }
 
 impl Finder<'_> {
-    /// The crossings at the points found on the step with this index.
+    /// Returns the crossings found on the step with this index.
     fn crossings(&mut self, index: usize, ends: &[Point]) -> Vec<Crossing> {
         let crossing = |point: Point| {
             let position = index as f64 + along(ends, &point).unwrap_or_else(|| nearer_end(ends, &point));
@@ -210,18 +217,18 @@ impl Finder<'_> {
         near(&ends[0]) && near(&ends[1]) && between(0.31) && between(0.64)
     }
 
-    /// Splits the step until on each part the third function excludes zero or is monotone along the curve, or has one
-    /// extremum.
+    /// Subdivides the step until the third function excludes zero, is monotone along the curve, or
+    /// has one extremum.
     fn find(&mut self, p: &Point, q: &Point, depth: u32) {
-        /// A part of 10⁻⁹ of a step that is not resolved holds at most one point.
+        /// A fraction 10⁻⁹ of a step that is still unresolved contains at most one point.
         const DEPTH: u32 = 30;
-        /// On a part of 1/32 of a step a derivative with different signs at its ends has one root.
+        /// On 1/32 of a step, a derivative whose sign changes has exactly one root.
         const SHORT: u32 = 5;
-        /// So many times it is halved before it is asked whether the third surface matters on the part: far from where it does, it may have
-        /// places where it is not smooth, and a long step may run along them.
+        /// Depth at which relevance of the third surface is tested. Elsewhere the surface may be
+        /// singular, and a long step may run along the singularity.
         const LOCAL: u32 = 6;
         if depth == 0 {
-            // An end of the step on the surface may be lost to rounding on both sides of it.
+            // If an end of the step is on the surface, rounding may lose it in both adjacent steps.
             let ends: Vec<Point> = [p, q].into_iter().filter(|x| self.is_on(x)).copied().collect();
             self.found.extend(ends);
         }
@@ -229,7 +236,7 @@ impl Finder<'_> {
         if !self.third.value_range(&cell).contains_zero() {
             return;
         }
-        if depth == LOCAL && !(self.matters)(&cell) {
+        if depth == LOCAL && !(self.is_relevant)(&cell) {
             return;
         }
         let (u, v) = (self.a.gradient_range(&cell), self.b.gradient_range(&cell));
@@ -251,7 +258,8 @@ impl Finder<'_> {
             return;
         }
         let middle = self.middle(p, q);
-        // A curve that touches the surface to a high order is on it for a while: one node stands for all of that.
+        // A curve with contact of high order stays on the surface for some length: one node
+        // represents it.
         if depth == DEPTH || [p, &middle, q].into_iter().all(|x| self.is_on(x)) {
             if self.is_on(&middle) {
                 self.found.push(middle);
@@ -279,9 +287,10 @@ impl Finder<'_> {
         project_to_both(self.a, self.b, &middle, self.tolerances.exact).unwrap_or(middle)
     }
 
-    /// The root of a function with values of opposite signs at two points of the curve, between them.
+    /// The root of a function with values of opposite signs at two points of the curve, between
+    /// them.
     fn bisect(&self, mut p: Point, mut q: Point, function: impl Fn(&Point) -> f64) -> Point {
-        /// They halve a step to less than its rounding.
+        /// Enough to bisect a step down to rounding.
         const STEPS: usize = 56;
         let negative = function(&p) < 0.0;
         for _ in 0..STEPS {
@@ -295,7 +304,7 @@ impl Finder<'_> {
         p
     }
 
-    /// The root between two points between which the third function is monotone, if the signs there differ.
+    /// Finds the root between two points if the third function, monotone there, changes sign.
     fn find_between(&mut self, p: &Point, q: &Point) {
         let (low, high) = (self.third.value(p), self.third.value(q));
         if (low < 0.0) == (high < 0.0) {

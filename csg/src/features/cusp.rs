@@ -1,28 +1,30 @@
 //! Faces that end in a cusp too sharp for triangles.
 //!
-//! Two curves of a patch may leave a corner in one direction: the patch has no angle there. Where they part with the square of the distance,
-//! as a line and a circle do, triangles of the usual size have an angle of some degrees at the tip. Where they bend alike and part
-//! with its third or fourth power (the end of a rod and the torus around which its own rim runs, in one point), the tip is as thin as
-//! rounding before it is as wide as a triangle is long.
+//! Two curves of a patch may leave a corner in the same direction, so that the patch has no angle
+//! there. If their distance grows quadratically, as between a line and a circle, triangles of the
+//! usual size have an angle of some degrees at the tip. If their curvatures are equal and the
+//! distance grows with the third or fourth power (as between the rim of a rod and the circle where
+//! a torus touches the rod's end), the tip is thinner than rounding over the length of a triangle.
 
 use super::{Curve, FeatureError, Features, Named, Place, curve_curvature};
 use crate::project::{at_distance, project_to_both};
 use crate::{CornerId, CurveId, Geometry, Point};
 use std::collections::BTreeMap;
 
-/// How far from the corner the curves are compared, in the least of their radii of curvature and lengths: a tenth to a half of what sizes ask for.
+/// Distance from the corner at which the curves are compared, relative to the smallest of their
+/// radii of curvature and lengths. Usual mesh sizes are two to ten times larger.
 const REACH: f64 = 0.1;
-/// The angle under which two curves of a cusp must be seen from the corner there. A line and a circle: 0.05; curves that part with
-/// the fourth power: 3·10⁻⁵.
+/// Smallest angle at the corner between the points of the two curves at that distance. A line and a
+/// circle have 0.05, curves that separate with the fourth power 3·10⁻⁵.
 const LEAST_ANGLE: f64 = 2e-3;
-/// Half as far away it is the same for curves that leave at an angle, a half where they part with the square of the distance, a quarter and less
-/// where with higher powers.
+/// Largest ratio of the angles at half and at full distance for a sharp cusp: the ratio is 1 for
+/// curves at an angle, 1/2 for quadratic and at most 1/4 for higher-order separation.
 const FALLING: f64 = 0.35;
 
-/// Refuses the first cusp that is too sharp.
+/// Rejects the first cusp that is too sharp.
 ///
 /// # Errors
-/// Names the surfaces beside the two curves, other than that of the patch.
+/// [`FeatureError::Cusp`] with the surfaces beside the two curves other than that of the patch.
 pub(super) fn check(geometry: &Geometry, features: &Features) -> Result<(), FeatureError> {
     let mut ends: BTreeMap<CornerId, Vec<(CurveId, usize)>> = BTreeMap::new();
     for (i, curve) in features.curves.iter().enumerate() {
@@ -56,8 +58,9 @@ pub(super) fn check(geometry: &Geometry, features: &Features) -> Result<(), Feat
     Ok(())
 }
 
-/// The angles under which two curves that end at a corner are seen from there, half as far away and as far away as they are
-/// compared; `None` where they cannot be followed.
+/// The angles at a corner between the points of two curves at half and at full distance.
+///
+/// `None` if a curve cannot be followed that far.
 fn angles(geometry: &Geometry, ends: [(&Curve, usize); 2]) -> Option<[f64; 2]> {
     let traces = ends.map(|(curve, end)| {
         let mut trace = curve.trace.clone();

@@ -1,10 +1,10 @@
-//! Why features could not be found.
+//! Errors of the feature search.
 
 use super::Inconsistency;
 use crate::{Geometry, Point, SurfaceId};
 use std::fmt;
 
-/// Something of the file: the name of a solid and the line where it, or its primitive, stands.
+/// A named object of the file: the name of a solid and the line of the solid or its primitive.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Named {
     /// The name of the solid.
@@ -33,41 +33,42 @@ impl Named {
     }
 }
 
-/// A point, for messages.
+/// Coordinates of a point, for messages.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Place(pub Point);
 
 impl fmt::Display for Place {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        // Without the sign of what is shown as zero.
+        // Avoid a minus sign on a value displayed as zero.
         let shown = |x: f64| if x.abs() < 0.5e-6 { 0.0 } else { x };
         write!(f, "({:.6}, {:.6}, {:.6})", shown(self.0.x), shown(self.0.y), shown(self.0.z))
     }
 }
 
-/// Why the features could not be found.
+/// Why the features of a geometry could not be found.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum FeatureError {
-    /// Nothing is to be meshed.
+    /// There is nothing to mesh.
     #[error("the geometry has no top-level object that is a solid")]
     NoBody,
-    /// Bodies have no inside: those that are known, one at least.
+    /// Bodies without interior: at least one, not necessarily all.
     #[error("{} contains nothing: its parts do not meet", .0[0])]
     Empty(Vec<Named>),
-    /// A body goes on without end.
+    /// A body is unbounded.
     #[error("{0} is not bounded: cut it with planes or other solids")]
     Unbounded(Named),
-    /// Two bodies share more than boundary.
+    /// The interiors of two bodies intersect.
     #[error("{first} and {second} overlap near {place}: subtract one from the other")]
     Overlap {
         /// One body.
         first: Named,
         /// The other.
         second: Named,
-        /// A place in or beside the overlap.
+        /// A point in or close to the overlap.
         place: Place,
     },
-    /// Two surfaces touch and both are boundaries there: the bodies have a wedge of no angle.
+    /// Two surfaces are tangent and both are boundaries there, with a wedge of zero angle between
+    /// them.
     #[error(
         "surfaces of {first} and {second} touch at {place} without crossing: move one of them or let them overlap"
     )]
@@ -79,16 +80,17 @@ pub enum FeatureError {
         /// Where they touch.
         place: Place,
     },
-    /// A corner, the tip of a cone or an edge touches the inside of a face: the bodies are not manifolds there.
+    /// A corner, the apex of a cone or an edge touches the interior of a face: the body is not a
+    /// manifold there.
     #[error(
         "a corner or an edge of {first} touches a face of {second} at {place}: move one of them or let them overlap"
     )]
     Touch {
-        /// What touches.
+        /// The solid whose corner or edge touches.
         first: Named,
-        /// What is touched.
+        /// The solid whose face is touched.
         second: Named,
-        /// Where.
+        /// Where they touch.
         place: Place,
     },
     /// A face ends in a cusp that is too sharp for triangles.
@@ -99,12 +101,12 @@ pub enum FeatureError {
     Cusp {
         /// A surface beside one of the curves of the cusp.
         first: Named,
-        /// One beside the other.
+        /// A surface beside the other curve.
         second: Named,
         /// The tip.
         place: Place,
     },
-    /// A curve ends where nothing ends it.
+    /// A feature curve has a loose end: tracing stopped, or no other curve continues it.
     #[error("the intersection of surfaces of {first} and {second} could not be followed past {place}")]
     LooseCurve {
         /// One surface.
@@ -114,25 +116,27 @@ pub enum FeatureError {
         /// The last point.
         place: Place,
     },
-    /// The cells that are needed to tell surfaces apart are too many.
-    #[error("the surfaces of {first} and {second} are too intricate near {place} to be told apart")]
+    /// Separating two surfaces needs too many cells.
+    #[error(
+        "surfaces of {first} and {second} could not be separated near {place}: they are too close or nearly tangent; move one of them"
+    )]
     TooIntricate {
         /// One surface.
         first: Named,
         /// The other.
         second: Named,
-        /// A place where they are not told apart.
+        /// The center of a cell in which they are not separated.
         place: Place,
     },
-    /// A point that is to be a mesh vertex is in no body.
+    /// A point that must become a mesh vertex is outside all bodies.
     #[error("the point {place} (line {line}) is outside all bodies")]
     PointOutside {
         /// The point.
         place: Place,
-        /// Its line in the file.
+        /// The line of the statement.
         line: u32,
     },
-    /// A surface that is to be periodic bounds no body.
+    /// A surface that is declared periodic bounds no body.
     #[error("the first surface of {solid} bounds no body and cannot be periodic (line {line})")]
     NoPeriodicFace {
         /// The solid.
@@ -140,10 +144,10 @@ pub enum FeatureError {
         /// The line of the statement.
         line: u32,
     },
-    /// Two surfaces that are to be periodic are not the same, moved.
+    /// No rigid motion maps the first of two periodic surfaces to the second.
     #[error(
-        "the first surfaces of {first} and {second} are not the same, moved, and cannot be periodic (line {line}): \
-         name two planes, or two surfaces of the same shape"
+        "no rigid motion maps the first surface of {first} to that of {second}, so they cannot be periodic \
+         (line {line}): name two planes, or two surfaces of the same shape"
     )]
     NoMotion {
         /// One solid.
@@ -153,7 +157,7 @@ pub enum FeatureError {
         /// The line of the statement.
         line: u32,
     },
-    /// Two faces that are to be periodic do not match.
+    /// The patches of two periodic surfaces do not match.
     #[error(
         "the faces on {first} and {second} do not match and cannot be periodic (line {line}): the {what} at {place} \
          has no counterpart on the other face"
@@ -165,12 +169,12 @@ pub enum FeatureError {
         second: Named,
         /// The line of the statement.
         line: u32,
-        /// What has none.
+        /// What has no counterpart.
         what: &'static str,
         /// Where it is.
         place: Place,
     },
-    /// What was found does not fit together.
-    #[error("the corners, curves and patches found do not fit together: {0}")]
+    /// The features found are inconsistent.
+    #[error("the corners, curves and patches found are inconsistent: {0}")]
     Inconsistent(#[from] Inconsistency),
 }

@@ -1,15 +1,16 @@
-//! The smallest box around all bodies.
+//! The bounding box of all bodies.
 
-use super::around::{Tolerances, sheet_at};
+use super::neighborhood::{Tolerances, sheet_at};
 use super::octree::Octree;
 use super::{FeatureError, Features};
 use crate::project::project_to_both;
 use crate::{Aabb, Geometry, Point, Surface, SurfaceId, Vector};
 
-/// The box of corners, curves and closed surfaces.
+/// The bounding box of corners, curves and closed surfaces.
 ///
-/// A coordinate is largest at a corner, inside a curve, or inside a patch where the normal points along the axis. On
-/// planes, cylinders and cones the latter happens along whole lines, which end on curves.
+/// A coordinate attains its maximum at a corner, inside a curve, or inside a patch at a point whose
+/// normal is parallel to the axis. On planes, cylinders and cones such points form whole lines,
+/// which end on curves.
 pub(super) fn extent(
     geometry: &Geometry,
     tree: &Octree,
@@ -24,7 +25,7 @@ pub(super) fn extent(
         let last = trace.len() - 1;
         let surfaces = curve.surfaces.map(|s| &geometry.surfaces[s.index()]);
         for i in 0..last {
-            // Of a closed trace the first point has the last but one before it.
+            // In a closed trace, the point before the first is the last but one.
             let before = match i {
                 0 if closed => trace[last - 1],
                 0 => continue,
@@ -56,7 +57,8 @@ pub(super) fn extent(
     Ok(bounds)
 }
 
-/// Whether a surface is a boundary at a point, for some choice of sides of other surfaces that touch it there.
+/// Whether a surface is a boundary at a point, for some choice of sides of the other surfaces
+/// through the point.
 fn may_be_boundary(
     geometry: &Geometry,
     tree: &Octree,
@@ -80,7 +82,8 @@ fn may_be_boundary(
     Ok(false)
 }
 
-/// The point between two points of a curve where a coordinate times `sign` is largest.
+/// The point between two points of a curve at which `sign` times a coordinate is largest (ternary
+/// search).
 fn turning_point(
     [a, b]: [&Surface; 2],
     [mut from, mut to]: [Point; 2],
@@ -88,7 +91,7 @@ fn turning_point(
     sign: f64,
     tolerances: &Tolerances,
 ) -> Point {
-    /// Each step leaves two thirds; past 10⁻⁸ of the step the coordinate no longer changes.
+    /// Each step keeps two thirds. Below 10⁻⁸ of the interval the coordinate no longer changes.
     const STEPS: usize = 45;
     let on = |p: Point| project_to_both(a, b, &p, tolerances.exact).unwrap_or(p);
     for _ in 0..STEPS {

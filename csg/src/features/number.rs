@@ -3,11 +3,12 @@
 use super::Patch;
 use crate::{BoundaryLabel, Geometry};
 
-/// Gives each patch its number and name: those of its cutout, else those of its surface, else the next free number; then come
-/// the statements for single boundaries of bodies, in file order.
+/// Assigns each patch its boundary number and name: those of its cutout, else those of its surface,
+/// else the next free number. Then applies the statements for single boundaries of bodies in file
+/// order.
 ///
-/// Free numbers start above all that the file gives. NETGEN's start above those of surfaces, so that one of them may be
-/// given again by a `boundarycondition`.
+/// Free numbers start above all numbers in the file. NETGEN's start above those of surfaces only,
+/// so a `boundarycondition` may assign one of them again.
 pub(super) fn number(geometry: &Geometry, patches: &mut [Patch]) {
     let of_surfaces = geometry.surface_info.iter().filter_map(|info| info.bc);
     let of_overrides = geometry.boundary_overrides.iter().filter_map(|over| match over.label {
@@ -33,7 +34,8 @@ pub(super) fn number(geometry: &Geometry, patches: &mut [Patch]) {
                 BoundaryLabel::Number(number) => patch.bc = *number,
                 BoundaryLabel::Name(name) => {
                     patch.name = Some(name.clone());
-                    // The number may be that of other patches, which keep their name.
+                    // Other patches with this number keep their name, so this patch needs its own
+                    // number.
                     if geometry.surface_info[patch.surface.index()].bc == Some(patch.bc) {
                         patch.bc = next();
                     }
@@ -61,10 +63,10 @@ mod tests {
     }
 
     #[test]
-    fn patches_take_the_numbers_of_their_surfaces_or_the_next_free_ones() {
+    fn patches_get_the_numbers_of_their_surfaces_or_the_next_free_ones() {
         let labels = labels("");
-        // Five sides of the low brick and the interface; of the high brick its top, while its sides are
-        // in the planes of the low one.
+        // Number 2: the interface and five sides of the low brick, and four sides of the high brick
+        // that lie in the planes of the low one. The top of the high brick has a name.
         assert_eq!(labels.iter().filter(|l| l.0 == 2).count(), 10);
         assert_eq!(labels.iter().filter(|l| **l == (3, Some("high".to_owned()))).count(), 1);
     }
@@ -72,8 +74,9 @@ mod tests {
     #[test]
     fn statements_for_one_body_change_its_patches_only() {
         let labels = labels("boundarycondition low high 7; boundaryconditionname low low bottom;");
-        // The sides of the high brick and the interface get 7; then all patches of the low one a name; those
-        // that still had the number of the surface, the five outer ones, a number of their own. (8 is the top of the high one.)
+        // Four sides of the high brick and the interface get 7. Then all patches of the low brick
+        // get a name, and its five outer patches, which still have the surface's number, get new
+        // numbers. (8 is the top of the high brick.)
         assert_eq!(labels.iter().filter(|l| l.0 == 7).count(), 5);
         assert_eq!(labels.iter().filter(|l| l.1.as_deref() == Some("bottom")).count(), 6);
         let mut own: Vec<u32> =

@@ -1,8 +1,8 @@
-//! Cells that separate surfaces: in each, what matters there.
+//! An octree whose leaves separate the surfaces of a geometry.
 
-use super::around::Tolerances;
 use super::bounds::split;
 use super::contact::{self, Contact};
+use super::neighborhood::Tolerances;
 use super::swept::Swept;
 use super::{FeatureError, Named, Place, apex};
 use crate::interval::{Cell, dot, middle, offset};
@@ -12,23 +12,25 @@ use std::cell::OnceCell;
 use std::collections::BTreeMap;
 use std::iter;
 
-/// A cell in which any two surfaces are told apart.
+/// A cell in which the intersection of any two surfaces is known.
 #[derive(Debug)]
 pub(super) struct Leaf {
-    /// Its box.
+    /// The box of the cell.
     pub cell: Cell,
-    /// The surfaces that matter in it, ascending.
+    /// The relevant surfaces, ascending.
     pub surfaces: Vec<SurfaceId>,
-    /// What is left of the bodies in it; a body that fills it is `And([])`.
+    /// The bodies pruned to the cell; `And([])` if a body contains the cell.
     pub bodies: Vec<(BodyId, Solid)>,
-    /// What is left of the solids of those cutouts whose surface matters in it, by index.
+    /// The solids of cutouts whose surface is relevant, pruned to the cell, with the index of the
+    /// cutout.
     pub cutouts: Vec<(u32, Solid)>,
-    /// The pairs of its surfaces that may meet in it, in a curve monotone along its middle's direction.
+    /// The pairs of surfaces that may meet in the cell, each in a curve that is monotone along the
+    /// curve direction at the center.
     pub pairs: Vec<[SurfaceId; 2]>,
 }
 
 impl Leaf {
-    /// Whether both surfaces matter in it.
+    /// Whether both surfaces are relevant in the cell.
     pub fn has_both(&self, pair: [SurfaceId; 2]) -> bool {
         pair.iter().all(|s| self.surfaces.binary_search(s).is_ok())
     }
@@ -37,15 +39,17 @@ impl Leaf {
 /// An octree of such cells.
 #[derive(Debug)]
 pub(super) struct Octree {
-    /// The box of all.
+    /// The box of the root.
     pub root: Cell,
     nodes: Vec<Node>,
-    /// Its leaves, in the order in which they were made.
+    /// The leaves, in order of creation.
     pub leaves: Vec<Leaf>,
-    /// Places where surfaces of a cell touch or cross too flatly for curves to be monotone.
+    /// Points in leaves where surfaces are tangent, or cross at too small an angle for monotone
+    /// curves.
     pub contacts: Vec<Contact>,
-    /// By the surfaces that carry seams, or the rest of what their surfaces have in common: the pairs that they stand for.
-    seams: BTreeMap<[SurfaceId; 2], Vec<[SurfaceId; 2]>>,
+    /// For each pair of seam surfaces (or surfaces of a residual intersection), the tangent pairs
+    /// it represents.
+    tangent_pairs: BTreeMap<[SurfaceId; 2], Vec<[SurfaceId; 2]>>,
 }
 
 #[derive(Debug)]
@@ -54,44 +58,45 @@ enum Node {
     Leaf(usize),
 }
 
-/// No cell is split deeper: it would be smaller than rounding.
+/// Largest depth of a cell; deeper cells would be smaller than rounding.
 const MAX_DEPTH: u32 = 44;
-/// More nodes than any real part needs (the densest example, a plate with 400 holes, needs some ten thousand).
+/// Largest number of nodes. The densest known example, a plate with 400 holes, needs some ten
+/// thousand.
 const MAX_NODES: usize = 4_000_000;
-/// Cells with more surfaces than this are split a few levels although their pairs are told apart: fewer pairs are followed
-/// where they do not matter.
+/// Cells with more surfaces than this are split further even if all pairs are separated: then fewer
+/// pairs are traced where they are irrelevant.
 const CROWD: usize = 6;
-/// How many levels.
+/// Largest depth of this additional splitting.
 const CROWD_DEPTH: u32 = 7;
-/// If gradients vary by less than this part over a cell and still are not told apart from parallel, the cell is
-/// searched for a point of contact. Larger: curves so short that they fit beside a contact in a cell are lost; smaller:
-/// more cells along a curve of contact (ten thousands at 10⁻³).
+/// If the gradients vary by less than this fraction over a cell and still may be parallel, the cell
+/// is searched for a point of contact. A larger value loses short curves next to a contact; a
+/// smaller one needs more cells along a curve of contact (tens of thousands at 10⁻³).
 const FLAT: f64 = 0.05;
 
 impl Octree {
-    /// The cells of the bodies in the box `root`.
+    /// Builds the octree of all bodies in the box `root`.
     ///
     /// # Errors
-    /// If more cells are needed than memory should hold.
+    /// [`FeatureError::TooIntricate`] if more than [`MAX_NODES`] nodes are needed.
     pub fn new(geometry: &Geometry, root: Cell, tolerances: &Tolerances) -> Result<Self, FeatureError> {
         let bodies = geometry.bodies.iter().enumerate();
         let bodies = bodies.map(|(i, body)| (BodyId::new(i), body.solid.clone())).collect();
         let cutouts = (0..).zip(geometry.cutouts.iter().map(|cutout| cutout.solid.clone())).collect();
-        let mut seams: BTreeMap<[SurfaceId; 2], Vec<[SurfaceId; 2]>> = BTreeMap::new();
+        let mut tangent_pairs: BTreeMap<[SurfaceId; 2], Vec<[SurfaceId; 2]>> = BTreeMap::new();
         for seam in &geometry.seams {
-            for carrier in iter::once(seam.carrier).chain(seam.rest) {
-                seams.entry(carrier).or_default().push(seam.pair);
+            for surfaces in iter::once(seam.surfaces).chain(seam.residual) {
+                tangent_pairs.entry(surfaces).or_default().push(seam.pair);
             }
         }
         let nodes = vec![Node::Leaf(0)];
-        let mut tree = Self { root, nodes, leaves: Vec::new(), contacts: Vec::new(), seams };
+        let mut tree = Self { root, nodes, leaves: Vec::new(), contacts: Vec::new(), tangent_pairs };
         let mut open = vec![(0, root, (bodies, cutouts), 0)];
         while let Some((node, cell, solids, depth)) = open.pop() {
             let (bodies, cutouts) = prune_all(geometry, &cell, solids);
             let surfaces = surfaces_of(&bodies, &cutouts);
             let solids = (bodies, cutouts);
             let dividers = OnceCell::new();
-            let judge = Judge {
+            let classifier = PairClassifier {
                 geometry,
                 cell: &cell,
                 solids: &solids,
@@ -100,7 +105,7 @@ impl Octree {
                 depth,
                 tolerances,
             };
-            let pairs = judge.all();
+            let pairs = classifier.classify_all();
             let (bodies, cutouts) = solids;
             let crowded = surfaces.len() > CROWD && depth < CROWD_DEPTH;
             if depth < MAX_DEPTH && (crowded || pairs.undecided.is_some()) {
@@ -125,7 +130,7 @@ impl Octree {
         Ok(tree)
     }
 
-    /// The leaf that contains `point`, `None` outside the root.
+    /// The leaf that contains `point`; `None` outside the root.
     pub fn leaf(&self, point: &Point) -> Option<&Leaf> {
         if !(0..3).all(|i| self.root[i].contains(point[i])) {
             return None;
@@ -142,27 +147,33 @@ impl Octree {
         }
     }
 
-    /// Whether the intersection of a pair of surfaces matters in a leaf: both do, or those do whose seam it carries.
-    pub fn matters(&self, leaf: &Leaf, pair: [SurfaceId; 2]) -> bool {
-        leaf.has_both(pair) || self.sewn(leaf, pair).next().is_some()
+    /// Whether the intersection of a pair is relevant in a leaf: both surfaces are, or both of a
+    /// tangent pair represented by it.
+    pub fn is_relevant(&self, leaf: &Leaf, pair: [SurfaceId; 2]) -> bool {
+        leaf.has_both(pair) || self.tangent_surfaces(leaf, pair).next().is_some()
     }
 
-    /// Whether a surface is one of those whose seam a pair carries.
-    pub fn is_seam(&self, pair: [SurfaceId; 2], surface: SurfaceId) -> bool {
-        self.sewn_pairs(pair).iter().flatten().any(|&s| s == surface)
+    /// Whether a surface is tangent to another along the intersection of a pair of seam surfaces.
+    pub fn is_tangent_along(&self, pair: [SurfaceId; 2], surface: SurfaceId) -> bool {
+        self.tangent_pairs(pair).iter().flatten().any(|&s| s == surface)
     }
 
-    /// The surfaces that matter in a leaf and are tangent along the intersection of a pair that carries their seams.
-    pub fn sewn<'a>(&'a self, leaf: &'a Leaf, pair: [SurfaceId; 2]) -> impl Iterator<Item = SurfaceId> + 'a {
-        self.sewn_pairs(pair).iter().copied().filter(|&sewn| leaf.has_both(sewn)).flatten()
+    /// The relevant surfaces of a leaf that are tangent along the intersection of a pair of seam
+    /// surfaces.
+    pub fn tangent_surfaces<'a>(
+        &'a self,
+        leaf: &'a Leaf,
+        pair: [SurfaceId; 2],
+    ) -> impl Iterator<Item = SurfaceId> + 'a {
+        self.tangent_pairs(pair).iter().copied().filter(|&tangent| leaf.has_both(tangent)).flatten()
     }
 
-    /// The pairs of surfaces that are tangent along the intersection of a pair that carries their seams.
-    pub fn sewn_pairs(&self, pair: [SurfaceId; 2]) -> &[[SurfaceId; 2]] {
-        self.seams.get(&pair).map_or(&[], Vec::as_slice)
+    /// The pairs of surfaces that are tangent along the intersection of a pair of seam surfaces.
+    pub fn tangent_pairs(&self, pair: [SurfaceId; 2]) -> &[[SurfaceId; 2]] {
+        self.tangent_pairs.get(&pair).map_or(&[], Vec::as_slice)
     }
 
-    /// The surfaces that matter anywhere in a box, ascending.
+    /// The surfaces that are relevant anywhere in a box, ascending.
     pub fn surfaces_in(&self, cell: &Cell) -> Vec<SurfaceId> {
         let mut found = Vec::new();
         let mut open = vec![0];
@@ -183,10 +194,10 @@ impl Octree {
     }
 }
 
-/// The bodies that matter in a cell, and the solids of cutouts.
+/// Bodies and cutout solids with their ids.
 type Solids = (Vec<(BodyId, Solid)>, Vec<(u32, Solid)>);
 
-/// What is left of the bodies in a cell, and of the cutouts of surfaces that matter to the bodies there.
+/// Prunes the bodies to a cell, and the cutouts whose surface is relevant to the bodies there.
 fn prune_all(geometry: &Geometry, cell: &Cell, (bodies, mut cutouts): Solids) -> Solids {
     let bodies = prune_in(&geometry.surfaces, cell, bodies);
     if !cutouts.is_empty() {
@@ -205,7 +216,7 @@ fn surfaces_of(bodies: &[(BodyId, Solid)], cutouts: &[(u32, Solid)]) -> Vec<Surf
     surfaces
 }
 
-/// What is known of the pairs of surfaces in a cell.
+/// Classification of the pairs of surfaces in a cell.
 #[derive(Default)]
 struct Pairs {
     regular: Vec<[SurfaceId; 2]>,
@@ -213,25 +224,25 @@ struct Pairs {
     undecided: Option<[SurfaceId; 2]>,
 }
 
-/// Judges the pairs of surfaces in a cell.
-struct Judge<'a> {
+/// Classifies the pairs of surfaces in a cell.
+struct PairClassifier<'a> {
     geometry: &'a Geometry,
     cell: &'a Cell,
     solids: &'a Solids,
     surfaces: &'a [SurfaceId],
-    /// See [`Judge::sides_of_planes`].
+    /// Computed on demand by [`sides_of_planes`](Self::sides_of_planes).
     dividers: OnceCell<Vec<(SurfaceId, [Vec<SurfaceId>; 2])>>,
     depth: u32,
     tolerances: &'a Tolerances,
 }
 
-impl Judge<'_> {
-    /// Judges all pairs, up to the first that is not told apart.
-    fn all(&self) -> Pairs {
+impl PairClassifier<'_> {
+    /// Classifies all pairs, up to the first undecided one.
+    fn classify_all(&self) -> Pairs {
         let mut pairs = Pairs::default();
         for (i, &first) in self.surfaces.iter().enumerate() {
             for &second in &self.surfaces[i + 1..] {
-                if !self.pair([first, second], &mut pairs) {
+                if !self.classify([first, second], &mut pairs) {
                     pairs.undecided = Some([first, second]);
                     if self.depth < MAX_DEPTH {
                         return pairs;
@@ -244,26 +255,28 @@ impl Judge<'_> {
         pairs
     }
 
-    /// Whether two surfaces of the cell are told apart in it.
-    fn pair(&self, pair: [SurfaceId; 2], pairs: &mut Pairs) -> bool {
+    /// Classifies a pair; false if its intersection in the cell is undecided.
+    fn classify(&self, pair: [SurfaceId; 2], pairs: &mut Pairs) -> bool {
         match self.geometry.seam(pair) {
-            None => self.crossing(pair, pairs),
-            // Where the seam is all they have in common, its carrier stands for them.
-            Some(seam) if seam.is_alone => {
-                iter::once(seam.carrier).chain(seam.rest).all(|carrier| self.crossing(carrier, pairs))
-            }
+            None => self.classify_crossing(pair, pairs),
+            // The seam surfaces replace the pair if the whole intersection is known.
+            Some(seam) if seam.is_complete => iter::once(seam.surfaces)
+                .chain(seam.residual)
+                .all(|surfaces| self.classify_crossing(surfaces, pairs)),
             Some(seam) => {
-                self.crossing(seam.carrier, pairs)
+                self.classify_crossing(seam.surfaces, pairs)
                     && (self.is_divided(pair)
                         || contact::on_seam(self.geometry, seam, self.cell, &mut pairs.contacts)
-                        || self.crossing(pair, pairs))
+                        || self.classify_crossing(pair, pairs))
             }
         }
     }
 
-    /// Whether solids keep two surfaces apart: on each side of a plane that both cross cleanly, or miss, only one of them matters.
+    /// Whether a plane separates two surfaces: on each side of the plane, at most one of them is
+    /// relevant.
     ///
-    /// What the two have in common on the plane itself is seen where each of them meets it.
+    /// Both surfaces must miss the plane or cross it in a monotone curve, so that their
+    /// intersection on the plane itself is found from their intersections with the plane.
     fn is_divided(&self, pair: [SurfaceId; 2]) -> bool {
         let has_both = |side: &Vec<SurfaceId>| pair.iter().all(|s| side.contains(s));
         let is_clear = |s: SurfaceId, plane: SurfaceId| {
@@ -281,9 +294,9 @@ impl Judge<'_> {
             })
     }
 
-    /// The planes of the cell, and the surfaces that matter on both sides of each.
+    /// The planes in the cell, each with the surfaces that are relevant on its two sides.
     fn sides_of_planes(&self) -> Vec<(SurfaceId, [Vec<SurfaceId>; 2])> {
-        /// In a cell with more surfaces the search for dividers would take longer than splitting it.
+        /// With more surfaces, this search takes longer than splitting the cell.
         const MOST_SURFACES: usize = 24;
         if self.surfaces.len() > MOST_SURFACES {
             return Vec::new();
@@ -292,7 +305,7 @@ impl Judge<'_> {
         let sides = sides.map(|(lo, hi)| Interval::new(lo, hi));
         let anything = Interval::new(f64::NEG_INFINITY, f64::INFINITY);
         let (bodies, cutouts) = self.solids;
-        let mattering = |plane: SurfaceId, side: Interval| {
+        let relevant = |plane: SurfaceId, side: Interval| {
             let solids = bodies.iter().map(|b| &b.1).chain(cutouts.iter().map(|c| &c.1));
             let mut range = |id| if id == plane { side } else { anything };
             let left = solids.filter_map(|solid| match solid.prune(&mut range) {
@@ -303,11 +316,12 @@ impl Judge<'_> {
         };
         let is_plane = |s: &SurfaceId| matches!(self.geometry.surfaces[s.index()], Surface::Plane(_));
         let planes = self.surfaces.iter().copied().filter(is_plane);
-        planes.map(|plane| (plane, sides.map(|side| mattering(plane, side)))).collect()
+        planes.map(|plane| (plane, sides.map(|side| relevant(plane, side)))).collect()
     }
 
-    /// Whether what two surfaces have in common in the cell is known: nothing, a monotone curve, a point of contact, or an apex.
-    fn crossing(&self, pair: [SurfaceId; 2], pairs: &mut Pairs) -> bool {
+    /// Classifies an intersection as empty, a monotone curve, a point of contact, or an apex; false
+    /// if undecided.
+    fn classify_crossing(&self, pair: [SurfaceId; 2], pairs: &mut Pairs) -> bool {
         let Self { geometry, cell, depth, tolerances, .. } = *self;
         let [a, b] = pair.map(|s| &geometry.surfaces[s.index()]);
         if !can_meet(a, b, cell) || self.is_divided(pair) {
@@ -330,8 +344,8 @@ impl Judge<'_> {
 
 /// Whether two surfaces that both pass through a box may meet in it.
 ///
-/// Beside the ranges of both functions, the range of that combination of them is asked whose gradient is
-/// least in the middle: it tells nearly parallel sheets apart.
+/// Evaluates the ranges of both functions, and of the linear combination whose gradient at the
+/// center is smallest: it separates nearly parallel sheets.
 pub(super) fn can_meet(a: &Surface, b: &Surface, cell: &Cell) -> bool {
     if let Some(swept) = Swept::new(a, b, cell) {
         return swept.can_meet();
@@ -349,7 +363,7 @@ pub(super) fn can_meet(a: &Surface, b: &Surface, cell: &Cell) -> bool {
         && b.value_range(cell).contains_zero()
 }
 
-/// A range of a - `factor` b over a box, by the mean-value form.
+/// A range of `a - factor * b` over a box, by the mean-value form.
 fn difference_by_mean_value(a: &Surface, b: &Surface, factor: f64, cell: &Cell) -> Interval {
     let center = middle(cell);
     let at = [0, 1, 2].map(|i| Interval::point(center[i]));
@@ -359,15 +373,17 @@ fn difference_by_mean_value(a: &Surface, b: &Surface, factor: f64, cell: &Cell) 
     a.value_range(&at) - b.value_range(&at) * factor + slope(0) + slope(1) + slope(2)
 }
 
-/// The same for two quadrics, whose second derivatives are constant: what is alike in both cancels, so that the walls of a thin
-/// pipe are told apart in cells much larger than the wall.
+/// A range of `a - factor * b` over a box for two quadrics.
+///
+/// Their Hessians are constant, so the common part cancels. The walls of a thin pipe are separated
+/// in cells much larger than the wall thickness.
 fn quadratic_difference(a: &Surface, b: &Surface, factor: f64, cell: &Cell) -> Interval {
     let center = middle(cell);
     let at = [0, 1, 2].map(|i| Interval::point(center[i]));
     let (ra, rb) = (a.gradient_range(&at), b.gradient_range(&at));
     let (ha, hb) = (a.hessian(&center), b.hessian(&center) * factor);
     let bend = ha - hb;
-    // Rounding of the entries, which are sums of few products.
+    // Rounding error of the entries, which are sums of few products.
     let slack = 16.0 * f64::EPSILON * (ha.amax() + hb.amax());
     let slack = Interval::new(-slack, slack);
     let arm = offset(cell, &center);
@@ -385,22 +401,22 @@ fn quadratic_difference(a: &Surface, b: &Surface, factor: f64, cell: &Cell) -> I
 
 /// Whether the intersection of two surfaces runs forward along `direction` everywhere in a box.
 ///
-/// It then has at most one point on each plane across `direction`: the two equations restricted to that plane have
-/// a regular Jacobian for any choice of gradients, row by row, in their ranges (Neumaier 1990, Interval methods for
-/// systems of equations, section 5.1).
+/// Then it has at most one point on each plane perpendicular to `direction`: the two equations
+/// restricted to the plane have a regular Jacobian for any choice of gradients, row by row, in
+/// their ranges (Neumaier 1990, Interval methods for systems of equations, section 5.1).
 pub(super) fn is_monotone(a: &Surface, b: &Surface, cell: &Cell, direction: &Vector) -> bool {
     let in_plane = Swept::new(a, b, cell).and_then(|swept| swept.is_monotone(direction));
     in_plane.unwrap_or_else(|| is_monotone_in_space(a, b, cell, direction))
 }
 
-/// The same from the ranges of the gradients.
-pub(super) fn is_monotone_in_space(a: &Surface, b: &Surface, cell: &Cell, direction: &Vector) -> bool {
+/// The same as [`is_monotone`], from the ranges of the gradients in space.
+fn is_monotone_in_space(a: &Surface, b: &Surface, cell: &Cell, direction: &Vector) -> bool {
     let (u, v) = (a.gradient_range(cell), b.gradient_range(cell));
     let cross = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
     dot(direction, &cross).lo > 0.0
 }
 
-/// Whether a gradient hardly varies over a box.
+/// Whether the gradient of a surface is nearly constant over a box.
 pub(super) fn is_flat(surface: &Surface, cell: &Cell) -> bool {
     let widest = surface.gradient_range(cell).iter().map(Interval::width).fold(0.0, f64::max);
     widest <= FLAT * surface.gradient(&middle(cell)).norm()

@@ -1,53 +1,57 @@
-//! Periodic faces: what on one surface is the image of what on another.
+//! Matches the features of periodic surfaces.
 //!
-//! An **identification** (`identify periodic S1 S2`) says that the patches on the first surface of S2, the **images**, are those
-//! on the first surface of S1 moved. The motion is found from the surfaces, as in NETGEN along the normal where both are
-//! parallel planes; also askew where only that matches, and, what NETGEN does not know, a rotation where the planes
-//! are not parallel. Then each corner, curve and patch must have its image. An entity may be an image of an image, and of several
-//! (the last corner of a cell with three periods): its **origin** is the first of all these, the only one that is meshed.
+//! An **identification** (`identify periodic S1 S2`) states that a rigid motion maps the patches on
+//! the first surface of S1, the **masters**, to those on the first surface of S2, their **copies**.
+//! The motion is computed from the surfaces: as in NETGEN, along the normal if both are parallel
+//! planes; oblique if only that matches; and, beyond NETGEN, a rotation if the planes are not
+//! parallel. Every corner, curve and patch must have a copy.
+//!
+//! A copy may be the master of another copy, and may have several masters (the last corner of a
+//! cell with three periods). Its **origin** is the entity at the start of all these chains, the
+//! only one that is meshed.
 
-use super::around::Tolerances;
+use super::neighborhood::Tolerances;
 use super::{CornerId, CurveId, FeatureError, Features, Geometry, Named, PatchId, Place, Point, SurfaceId};
 use crate::{Surface, Vector};
 use nalgebra::{Isometry3, Point3, Translation3, Unit, UnitQuaternion};
 use std::collections::BTreeMap;
 
-/// A curve that is the image of another.
+/// A curve and its periodic copy.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct CurveImage {
-    /// The curve.
-    pub of: CurveId,
-    /// Its image.
-    pub image: CurveId,
-    /// Whether the image runs the other way.
+pub struct CurveCopy {
+    /// The master curve.
+    pub master: CurveId,
+    /// Its copy.
+    pub copy: CurveId,
+    /// Whether the copy has the opposite direction.
     pub reversed: bool,
 }
 
-/// What one `identify periodic` statement identifies.
+/// The entities matched by one `identify periodic` statement.
 #[derive(Clone, Debug)]
 pub struct Identified {
-    /// How the first surface is moved to the second.
+    /// The motion that maps the first surface to the second.
     pub motion: Isometry3<f64>,
-    /// Corners and their images.
+    /// Corners and their copies.
     pub corners: Vec<[CornerId; 2]>,
-    /// Curves and their images.
-    pub curves: Vec<CurveImage>,
-    /// Patches and their images.
+    /// Curves and their copies.
+    pub curves: Vec<CurveCopy>,
+    /// Patches and their copies.
     pub patches: Vec<[PatchId; 2]>,
 }
 
-/// The entity that another is, directly or not, the image of.
+/// The entity of which another is, directly or indirectly, a periodic copy.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Origin {
-    /// Its index among its kind.
+    /// Its index among entities of its kind.
     pub index: usize,
-    /// The motion from it to its image.
+    /// The motion that maps the origin to the copy.
     pub motion: Isometry3<f64>,
-    /// For curves: whether the image runs the other way.
+    /// For curves: whether the copy has the opposite direction.
     pub reversed: bool,
 }
 
-/// By corner, curve and patch the origin of those that are images.
+/// The origin of each periodic copy; `None` for entities that are not copies.
 #[derive(Clone, Debug, Default)]
 pub struct Origins {
     /// By corner.
@@ -58,16 +62,16 @@ pub struct Origins {
     pub patches: Vec<Option<Origin>>,
 }
 
-/// One step from an entity to its image.
+/// A master, its copy, the motion between them, and whether a curve is reversed.
 type Link = (usize, usize, Isometry3<f64>, bool);
 
 impl Features {
-    /// The origins of all images.
+    /// The origins of all periodic copies.
     pub fn origins(&self) -> Origins {
         let mut links: [Vec<Link>; 3] = Default::default();
         for Identified { motion, corners, curves, patches } in &self.identified {
             links[0].extend(corners.iter().map(|[a, b]| (a.index(), b.index(), *motion, false)));
-            links[1].extend(curves.iter().map(|c| (c.of.index(), c.image.index(), *motion, c.reversed)));
+            links[1].extend(curves.iter().map(|c| (c.master.index(), c.copy.index(), *motion, c.reversed)));
             links[2].extend(patches.iter().map(|[a, b]| (a.index(), b.index(), *motion, false)));
         }
         Origins {
@@ -78,7 +82,8 @@ impl Features {
     }
 }
 
-/// Follows the links from entities that are no images; where all are (in a ring), from the first of them.
+/// Follows the links from entities that are not copies. In a ring all entities are copies; then the
+/// one with the smallest index is the origin.
 fn origins_along(count: usize, links: &[Link]) -> Vec<Option<Origin>> {
     let mut origins: Vec<Option<Origin>> = vec![None; count];
     let mut steps: BTreeMap<usize, Vec<Link>> = BTreeMap::new();
@@ -108,16 +113,18 @@ fn origins_along(count: usize, links: &[Link]) -> Vec<Option<Origin>> {
     origins
 }
 
-/// Something on one of two identified surfaces without counterpart on the other.
+/// An entity of one of two identified surfaces without a counterpart on the other.
 struct Unmatched {
     what: &'static str,
     place: Point,
 }
 
-/// Finds the images of all identifications.
+/// Matches the entities of all identifications.
 ///
 /// # Errors
-/// Surfaces that are no images of each other, and the first entity without image.
+/// [`FeatureError::NoPeriodicFace`] if a surface bounds no body, [`FeatureError::NoMotion`] if no
+/// motion maps one surface to the other, [`FeatureError::NotPeriodic`] with the first entity
+/// without a counterpart.
 pub(super) fn identify(
     geometry: &Geometry,
     features: &Features,
@@ -155,11 +162,11 @@ pub(super) fn identify(
         }
         debug_assert_eq!(all.len(), index + 1);
     }
-    refuse_contradictions(geometry, features, &all, tolerances)?;
+    check_consistency(geometry, features, &all, tolerances)?;
     Ok(all)
 }
 
-/// Corners, curves and patches on a surface.
+/// The corners, curves and patches on a surface.
 struct Side {
     surface: SurfaceId,
     corners: Vec<CornerId>,
@@ -177,7 +184,7 @@ impl Side {
         curves.dedup();
         let mut corners: Vec<CornerId> =
             curves.iter().filter_map(|&c| features.curve(c).ends).flatten().collect();
-        // Points of the user that are on no curve.
+        // Isolated corners: points of the user on no curve.
         let ends: Vec<CornerId> = features.curves.iter().filter_map(|c| c.ends).flatten().collect();
         let lonely = (0..features.corners.len()).map(CornerId::new).filter(|c| !ends.contains(c));
         corners.extend(lonely.filter(|&c| features.corner(c).surfaces.contains(&surface)));
@@ -186,7 +193,7 @@ impl Side {
         Self { surface, corners, curves, patches }
     }
 
-    /// The middle of its corners, or of its curves where they are closed.
+    /// The mean of its corners, or the centroid of its curves if all are closed.
     fn center(&self, features: &Features) -> Option<Point> {
         let mut points: Vec<(Point, f64)> =
             self.corners.iter().map(|&c| (features.corner(c).point, 1.0)).collect();
@@ -199,7 +206,7 @@ impl Side {
         (weight > 0.0).then(|| Point::from(sum / weight))
     }
 
-    /// The normal of a plane, away from the body.
+    /// The normal of a plane, pointing away from the body.
     fn outward(&self, geometry: &Geometry, features: &Features) -> Vector {
         let patch = features.patch(self.patches[0]);
         let normal = geometry.surfaces[self.surface.index()].normal(&Point::origin());
@@ -207,7 +214,7 @@ impl Side {
     }
 }
 
-/// The motions that may take one surface to the other, the likeliest first.
+/// The motions that may map one surface to the other, most likely first.
 fn motions(
     geometry: &Geometry,
     features: &Features,
@@ -215,11 +222,12 @@ fn motions(
     sides: &[Side; 2],
     tolerances: &Tolerances,
 ) -> Vec<Isometry3<f64>> {
-    /// Planes at a smaller angle (its sine) are parallel: the same bound as for equal planes.
+    /// Planes are parallel if the sine of their angle is at most this; the same bound as for equal
+    /// planes.
     const PARALLEL: f64 = 1e-8;
     let [from, to] = surfaces.map(|s| &geometry.surfaces[s.index()]);
     let shift = |v: Vector| {
-        // A component that is rounding would make images of round coordinates not round.
+        // Zero out rounding errors, so that copies of round coordinates stay round.
         let clean = v.map(|x| if x.abs() <= tolerances.exact { 0.0 } else { x });
         Isometry3::from_parts(Translation3::from(clean), UnitQuaternion::identity())
     };
@@ -242,9 +250,9 @@ fn motions(
     found
 }
 
-/// The rotation about the line that two planes share that turns the normal of the first to `target`.
+/// The rotation about the common line of two planes that maps the normal of the first to `target`.
 fn turn(points: [Point; 2], [m, n]: [Vector; 2], cross: Vector, target: Vector) -> Isometry3<f64> {
-    // The point of the line nearest to the first plane's point.
+    // The point of the line nearest to the given point of the first plane.
     let in_first = n - m * n.dot(&m);
     let at = points[0] + in_first * ((points[1] - points[0]).dot(&n) / in_first.norm_squared());
     let axis = Unit::new_normalize(cross);
@@ -253,7 +261,7 @@ fn turn(points: [Point; 2], [m, n]: [Vector; 2], cross: Vector, target: Vector) 
     Isometry3::rotation_wrt_point(rotation, Point3::from(at))
 }
 
-/// All images under a motion.
+/// Matches all corners, curves and patches under a motion.
 fn matched(
     geometry: &Geometry,
     features: &Features,
@@ -265,10 +273,10 @@ fn matched(
     let [from, to] = sides;
     for &of in &from.corners {
         let place = features.corner(of).point;
-        let is_image =
+        let is_copy =
             |c: &&CornerId| (features.corner(**c).point - motion * place).norm() <= tolerances.merge;
-        let image = to.corners.iter().find(is_image).ok_or(Unmatched { what: "corner", place })?;
-        identified.corners.push([of, *image]);
+        let copy = to.corners.iter().find(is_copy).ok_or(Unmatched { what: "corner", place })?;
+        identified.corners.push([of, *copy]);
     }
     let missed = |c: &&CornerId| !identified.corners.iter().any(|pair| pair[1] == **c);
     if let Some(&corner) = to.corners.iter().find(missed) {
@@ -276,22 +284,28 @@ fn matched(
     }
     for &of in &from.curves {
         let place = middle(features, of);
-        let images = to.curves.iter().filter_map(|&image| {
-            let reversed =
-                image_of(geometry, features, [of, image], &motion, &identified.corners, tolerances)?;
-            Some(CurveImage { of, image, reversed })
+        let copies = to.curves.iter().filter_map(|&copy| {
+            let reversed = orientation_of_copy(
+                geometry,
+                features,
+                [of, copy],
+                &motion,
+                &identified.corners,
+                tolerances,
+            )?;
+            Some(CurveCopy { master: of, copy, reversed })
         });
-        let image = images.into_iter().next().ok_or(Unmatched { what: "curve", place })?;
-        identified.curves.push(image);
+        let copy = copies.into_iter().next().ok_or(Unmatched { what: "curve", place })?;
+        identified.curves.push(copy);
     }
-    let missed = |c: &&CurveId| !identified.curves.iter().any(|pair| pair.image == **c);
+    let missed = |c: &&CurveId| !identified.curves.iter().any(|pair| pair.copy == **c);
     if let Some(&curve) = to.curves.iter().find(missed) {
         return Err(Unmatched { what: "curve", place: middle(features, curve) });
     }
     let boundary = |id: PatchId, moved: bool| {
-        let image =
-            |c: CurveId| identified.curves.iter().find(|pair| pair.of == c).map_or(c, |pair| pair.image);
-        let curves = features.patch(id).boundary.iter().map(|(c, _)| if moved { image(*c) } else { *c });
+        let copy =
+            |c: CurveId| identified.curves.iter().find(|pair| pair.master == c).map_or(c, |pair| pair.copy);
+        let curves = features.patch(id).boundary.iter().map(|(c, _)| if moved { copy(*c) } else { *c });
         let mut curves: Vec<CurveId> = curves.collect();
         curves.sort_unstable();
         curves.dedup();
@@ -302,14 +316,14 @@ fn matched(
         let curves = boundary(of, true);
         let place = features.patch(of).seeds.first().copied();
         let place = place.unwrap_or_else(|| middle(features, features.patch(of).boundary[0].0));
-        let image = to.patches.iter().find(|&&p| !curves.is_empty() && boundary(p, false) == curves);
-        patches.push([of, *image.ok_or(Unmatched { what: "boundary of the patch", place })?]);
+        let copy = to.patches.iter().find(|&&p| !curves.is_empty() && boundary(p, false) == curves);
+        patches.push([of, *copy.ok_or(Unmatched { what: "boundary of the patch", place })?]);
     }
     identified.patches = patches;
     Ok(identified)
 }
 
-/// A point in the midst of a curve.
+/// A point near the middle of a curve.
 fn middle(features: &Features, curve: CurveId) -> Point {
     let trace = &features.curve(curve).trace;
     match trace.len() {
@@ -318,34 +332,36 @@ fn middle(features: &Features, curve: CurveId) -> Point {
     }
 }
 
-/// Whether the second curve is the image of the first; if so, whether it runs the other way.
-fn image_of(
+/// Compares two curves: `Some(reversed)` if the second is the copy of the first, else `None`.
+fn orientation_of_copy(
     geometry: &Geometry,
     features: &Features,
-    [of, image]: [CurveId; 2],
+    [master, copy]: [CurveId; 2],
     motion: &Isometry3<f64>,
     corners: &[[CornerId; 2]],
     tolerances: &Tolerances,
 ) -> Option<bool> {
-    /// A trace turns by less than a quarter radian a step: its chords are nearer to the curve than this part of them.
+    /// Bound of the sagitta relative to the chord; a trace turns by less than a quarter radian per
+    /// step.
     const SAGITTA: f64 = 0.05;
-    let [a, b] = [of, image].map(|c| features.curve(c));
+    let [a, b] = [master, copy].map(|c| features.curve(c));
     let moved = |c: CornerId| corners.iter().find(|pair| pair[0] == c).map(|pair| pair[1]);
     let ends = match (a.ends, b.ends) {
         (None, None) => true,
-        (Some(of), Some(ends)) => {
-            let images = of.map(moved);
-            images == ends.map(Some) || images == [ends[1], ends[0]].map(Some)
+        (Some(from), Some(ends)) => {
+            let copies = from.map(moved);
+            copies == ends.map(Some) || copies == [ends[1], ends[0]].map(Some)
         }
         _ => false,
     };
     if !ends {
         return None;
     }
-    // Points all along the curve must be on both surfaces of its image, and near the chords of its trace.
+    // Points along the curve must map to both surfaces of the copy, close to the chords of its
+    // trace.
     let last = a.trace.len() - 1;
     let direction_at = |at: usize| {
-        let on_it = motion * if last == 1 { middle(features, of) } else { a.trace[at] };
+        let on_it = motion * if last == 1 { middle(features, master) } else { a.trace[at] };
         let surfaces = b.surfaces.map(|s| geometry.surfaces[s.index()].distance(&on_it));
         let near = b.trace.windows(2).find(|w| {
             let chord = w[1] - w[0];
@@ -360,8 +376,11 @@ fn image_of(
     places.iter().all(|&at| direction_at(at) == Some(reversed)).then_some(reversed)
 }
 
-/// Refuses motions that take one entity to different places on different ways.
-fn refuse_contradictions(
+/// Checks that different chains of identifications map each entity to the same place.
+///
+/// # Errors
+/// [`FeatureError::NotPeriodic`] at the first point with two different images.
+fn check_consistency(
     geometry: &Geometry,
     features: &Features,
     identified: &[Identified],
@@ -378,7 +397,7 @@ fn refuse_contradictions(
             (a, b, features.corners[a.0].point)
         });
         let curves = all.curves.iter().map(|pair| {
-            let [a, b] = [pair.of, pair.image].map(|c| to(&origins.curves, c.index()));
+            let [a, b] = [pair.master, pair.copy].map(|c| to(&origins.curves, c.index()));
             (a, b, middle(features, CurveId::new(a.0)))
         });
         for ((from, first), (other, second), place) in corners.chain(curves) {
@@ -390,7 +409,7 @@ fn refuse_contradictions(
                     first,
                     second,
                     line,
-                    what: "point that other identifications take elsewhere",
+                    what: "point that other identifications map elsewhere",
                     place: Place(there[0]),
                 });
             }

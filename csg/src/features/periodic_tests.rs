@@ -9,7 +9,7 @@ fn find(statements: &str) -> Result<Features, crate::FeatureError> {
     Features::find(&geometry)
 }
 
-/// A unit cube of named planes, and more of it.
+/// A unit cube of named planes, followed by other statements.
 fn cube(more: &str) -> String {
     format!(
         "solid l = plane (0,0,0; -1,0,0); solid r = plane (1,0,0; 1,0,0);
@@ -25,8 +25,8 @@ const ALL: &str = "identify periodic l r; identify periodic f b; identify period
 fn a_cube_with_three_periods_has_one_corner_three_curves_and_three_patches() {
     let features = find(&cube(&format!("tlo cell; {ALL}"))).unwrap();
     let origins = features.origins();
-    let images = |list: &[Option<super::Origin>]| list.iter().flatten().count();
-    assert_eq!([&origins.corners, &origins.curves, &origins.patches].map(|o| images(o)), [7, 9, 3]);
+    let copies = |list: &[Option<super::Origin>]| list.iter().flatten().count();
+    assert_eq!([&origins.corners, &origins.curves, &origins.patches].map(|o| copies(o)), [7, 9, 3]);
     for (i, origin) in origins.corners.iter().enumerate().filter_map(|(i, o)| Some((i, (*o)?))) {
         let first = features.corner(CornerId::new(origin.index)).point;
         assert_eq!(first, Point::origin());
@@ -35,14 +35,14 @@ fn a_cube_with_three_periods_has_one_corner_three_curves_and_three_patches() {
 }
 
 #[test]
-fn holes_through_periodic_faces_are_images_of_each_other() {
+fn holes_through_periodic_faces_are_periodic_copies() {
     let features =
         find(&cube(&format!("solid p = cell and not cylinder (0,0.5,0.5; 1,0.5,0.5; 0.2); tlo p; {ALL}")))
             .unwrap();
     let identified = &features.identified[0];
     assert_eq!((identified.corners.len(), identified.curves.len(), identified.patches.len()), (4, 5, 1));
     let circle = |id| features.curve(id).ends.is_none();
-    assert_eq!(identified.curves.iter().filter(|c| circle(c.of) && circle(c.image)).count(), 1);
+    assert_eq!(identified.curves.iter().filter(|c| circle(c.master) && circle(c.copy)).count(), 1);
 }
 
 #[test]
@@ -65,12 +65,12 @@ fn sheared_and_turned_faces_are_found() {
     .unwrap();
     let motion = turned.identified[0].motion;
     assert!((motion * Point::new(1.0, 0.0, 0.5) - Point::new(0.0, 1.0, 0.5)).norm() < 1e-15);
-    // The axis is its own image.
+    // The axis is its own copy.
     assert_eq!(turned.origins().curves.iter().flatten().count(), 3);
 }
 
 #[test]
-fn faces_that_do_not_match_are_refused_with_the_place() {
+fn faces_that_do_not_match_are_rejected_with_coordinates() {
     let hole = "cylinder (0.5,0.5,0.5; 1,0.5,0.5; 0.2) and plane (0.5,0,0; -1,0,0)";
     let cases = [
         (cube(&format!("solid p = cell and not ({hole}); tlo p; {ALL}")), "the curve at (1.000000"),
@@ -83,17 +83,17 @@ fn faces_that_do_not_match_are_refused_with_the_place() {
             cube(
                 "solid s = sphere (0.5,0.5,0.5; 0.2); tlo s; solid p = cell and not s; tlo p; identify periodic l s;",
             ),
-            "are not the same, moved",
+            "no rigid motion maps",
         ),
     ];
-    for (statements, said) in cases {
+    for (statements, message) in cases {
         let error = find(&statements).unwrap_err().to_string();
-        assert!(error.contains(said) && error.contains("line"), "{error}");
+        assert!(error.contains(message) && error.contains("line"), "{error}");
     }
 }
 
 #[test]
-fn a_point_on_one_face_only_is_refused() {
+fn a_point_on_one_face_only_is_rejected() {
     let error = find(&cube("tlo cell; point (0,0.5,0.5); identify periodic l r;")).unwrap_err().to_string();
     assert!(error.contains("the corner at (0.000000, 0.500000, 0.500000) has no counterpart"), "{error}");
 }

@@ -1,4 +1,4 @@
-//! Random solids: what sampling finds around random points must be what the features say.
+//! Random solids: features must agree with the regions sampled around random points.
 
 use super::*;
 use crate::geometry::{Body, SurfaceInfo};
@@ -88,12 +88,12 @@ fn body_at(geometry: &Geometry, at: &Point) -> Option<BodyId> {
     geometry.bodies.iter().position(|b| b.solid.holds(&positive)).map(BodyId::new)
 }
 
-/// Whether no surface but these passes near a point.
+/// Whether all surfaces except those in `but` are far from a point.
 fn is_clear(geometry: &Geometry, at: &Point, but: &[usize]) -> bool {
     (0..geometry.surfaces.len()).all(|i| but.contains(&i) || geometry.surfaces[i].distance(at) > 1e-3)
 }
 
-/// The regions in the four quadrants between two surfaces depend on both: a curve of the features must be here.
+/// If the regions in the four quadrants between two surfaces depend on both, there must be a curve.
 fn check_curve(
     geometry: &Geometry,
     features: &Features,
@@ -106,7 +106,7 @@ fn check_curve(
     if u.cross(&v).norm() < 0.02 || !is_clear(geometry, &at, &[i, j]) {
         return Ok(());
     }
-    // Moved along these, the point stays on one of the surfaces.
+    // Each shift is tangent to one of the two surfaces.
     let (p, q) = ((u - v * u.dot(&v)).normalize() * 1e-6, (v - u * u.dot(&v)).normalize() * 1e-6);
     let [pp, np, nn, pn] = [p + q, q - p, -p - q, p - q].map(|shift| body_at(geometry, &(at + shift)));
     if (pp == pn && np == nn) || (pp == np && nn == pn) {
@@ -125,7 +125,7 @@ fn check_curve(
     Ok(())
 }
 
-/// Where the regions on both sides of a surface differ, a patch must have just these sides.
+/// If the regions on both sides of a surface differ, there must be a patch with these regions.
 fn check_patch(
     geometry: &Geometry,
     features: &Features,

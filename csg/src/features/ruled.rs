@@ -1,32 +1,34 @@
-//! Cones and cylinders that are tangent along a line of both.
+//! Cones and cylinders that are tangent along a common line.
 //!
-//! Let z be the height over the common tangent plane and y the distance across the line in it. Both functions have
-//! no terms but y², yz, z² and z times a linear one, so that with the same coefficient of y² their difference is z times a linear function:
-//! what the two have in common is the line, counted twice, and a conic in a plane (Levin 1976 calls such a member of the pencil a pair of planes).
-//! Where that plane crosses the line, both surfaces bend alike and change places.
+//! Let z be the height over the common tangent plane and y the distance from the line within that
+//! plane. Both functions contain only the terms y², yz, z² and z times a linear function. Scaled to
+//! the same coefficient of y², their difference is z times a linear function. So the intersection
+//! is the line, counted twice, and a conic in a plane (Levin 1976 calls such a member of the pencil
+//! a pair of planes). Where that plane crosses the line, both surfaces have equal curvature and
+//! exchange sides.
 
-use super::seam::{PARALLEL, across, plane};
+use super::seam::{PARALLEL, perpendicular, plane};
 use crate::primitive::Cone;
 use crate::{Point, Surface, Vector};
 
-/// The plane of a conic farther away than this many extents of all surfaces cuts none of the bodies.
+/// The plane of a conic at more than this many extents of all surfaces cuts none of the bodies.
 const FAR: f64 = 1e6;
 
-/// Where two surfaces are tangent along a line.
-pub(super) struct Contact {
-    /// The plane that cuts the first of both in the line.
-    pub across: Surface,
-    /// The plane that cuts it in all else that the two have in common.
-    pub rest: Option<Surface>,
+/// A line along which two surfaces are tangent.
+pub(super) struct TangentLine {
+    /// A plane that cuts the first surface in the line.
+    pub auxiliary: Surface,
+    /// The plane that cuts the first surface in the residual intersection of both.
+    pub residual: Option<Surface>,
 }
 
 /// The line along which two cones, or a cone and a cylinder, are tangent.
 ///
-/// `tolerance` is how far things may be apart that are meant to be one, `extent` the size of all.
-pub(super) fn tangent_line([a, b]: [&Surface; 2], tolerance: f64, extent: f64) -> Option<Contact> {
-    let [a, b] = [whole(a)?, whole(b)?];
+/// `tolerance` is the largest gap between coincident objects, `extent` the size of the geometry.
+pub(super) fn tangent_line([a, b]: [&Surface; 2], tolerance: f64, extent: f64) -> Option<TangentLine> {
+    let [a, b] = [quadric(a)?, quadric(b)?];
     let [point, along] = candidates([&a, &b], tolerance).into_iter().find_map(|(point, along)| {
-        // Far enough from both apices for the directions to tell.
+        // Far enough from both apexes for the directions to be significant.
         let at = point + along * extent;
         let off = b.project(&at).map_or(f64::INFINITY, |p| (p - at).norm());
         let is_tangent = a.normal(&at).cross(&b.normal(&at)).norm() <= PARALLEL;
@@ -35,12 +37,12 @@ pub(super) fn tangent_line([a, b]: [&Surface; 2], tolerance: f64, extent: f64) -
     })?;
     let at = Point::from(point) + along * extent;
     let normal = a.normal(&at);
-    let across = plane(Point::from(point), along.cross(&normal))?;
-    Some(Contact { across, rest: rest([&a, &b], &at, &along, &normal, extent) })
+    let auxiliary = plane(Point::from(point), along.cross(&normal))?;
+    Some(TangentLine { auxiliary, residual: residual([&a, &b], &at, &along, &normal, extent) })
 }
 
-/// The quadric of which a surface of lines is a part.
-fn whole(surface: &Surface) -> Option<Surface> {
+/// The quadric that contains a ruled surface.
+fn quadric(surface: &Surface) -> Option<Surface> {
     match surface {
         Surface::Nappe(c) => {
             Some(Surface::Cone(Cone { point: c.point, axis: c.axis, radius: c.radius, slope: c.slope }))
@@ -52,9 +54,9 @@ fn whole(surface: &Surface) -> Option<Surface> {
     }
 }
 
-/// Lines of the first surface that may be lines of the second: a point of each and its direction.
+/// Lines of the first surface that may also lie on the second, each as a point and a direction.
 fn candidates([a, b]: [&Surface; 2], tolerance: f64) -> Vec<(Point, Vector)> {
-    // The line of a cone that passes near a point, which is not its apex.
+    // The line of a cone nearest to a point other than its apex.
     let line_to = |cone: &Surface, apex: Point, target: Point| {
         let on = cone.project(&target).ok()?;
         Some((apex, (on - apex).try_normalize(tolerance)?))
@@ -69,7 +71,7 @@ fn candidates([a, b]: [&Surface; 2], tolerance: f64) -> Vec<(Point, Vector)> {
     found.into_iter().collect()
 }
 
-/// The direction of the lines of a cylinder.
+/// The direction of the generators of a cylinder.
 fn direction(surface: &Surface) -> Option<Vector> {
     match surface {
         Surface::Cylinder(c) => Some(c.axis),
@@ -78,15 +80,22 @@ fn direction(surface: &Surface) -> Option<Vector> {
     }
 }
 
-/// The lines of a circular cone in the plane of its axis and that of another one with the same apex.
+/// The lines of a circular cone in the plane of its axis and the axis of another cone with the same
+/// apex.
 fn lines_between_axes(a: &Surface, b: &Surface, apex: Point) -> Vec<(Point, Vector)> {
     let (Surface::Cone(c), Surface::Cone(d)) = (a, b) else { return Vec::new() };
-    let Some(side) = across(&d.axis, &c.axis).try_normalize(PARALLEL) else { return Vec::new() };
+    let Some(side) = perpendicular(&d.axis, &c.axis).try_normalize(PARALLEL) else { return Vec::new() };
     [c.slope, -c.slope].map(|slope| (apex, (c.axis + side * slope).normalize())).into()
 }
 
-/// The plane of the conic that two quadrics have in common beside a line through `at` along which they are tangent.
-fn rest([a, b]: [&Surface; 2], at: &Point, along: &Vector, normal: &Vector, extent: f64) -> Option<Surface> {
+/// The plane of the residual conic of two quadrics that are tangent along a line through `at`.
+fn residual(
+    [a, b]: [&Surface; 2],
+    at: &Point,
+    along: &Vector,
+    normal: &Vector,
+    extent: f64,
+) -> Option<Surface> {
     let side = along.cross(normal);
     let [p, q] = [a, b].map(|s| {
         let hessian = s.hessian(at);

@@ -1,54 +1,60 @@
 //! Pairs of surfaces that are tangent along a curve.
 //!
-//! Such pairs are told from their parameters, for their intersection is ill-conditioned: decimals that miss each other
-//! by 10⁻¹⁰ make a gap, or two curves 10⁻⁵ apart. What is meant is one curve, the **seam**; it is a line or an ellipse, and
-//! is described by one of the two surfaces and an auxiliary surface that crosses it (a plane, or a cylinder around the axis).
+//! The intersection of a tangent pair is ill-conditioned: decimals rounded by 10⁻¹⁰ leave a gap, or
+//! split the curve into two that are 10⁻⁵ apart. The intended curve, the **seam**, is a line or an
+//! ellipse. It is detected from the parameters of the surfaces and stored as the intersection of
+//! one surface of the pair with an auxiliary surface (a plane, or a cylinder about the common
+//! axis).
 //!
-//! Three families hold nearly all cases of planes, spheres, circular cylinders, cones and tori:
+//! For planes, spheres, circular cylinders, cones and tori, three families cover almost all cases:
 //!
-//! * lines: a plane and a surface of straight lines, parallel cylinders;
-//! * surfaces of revolution about one axis whose meridians (lines and circles in a half-plane) are tangent;
-//! * a tube of one radius that goes on in another way: a torus and a ball, a cylinder or another torus.
+//! * lines: a plane and a ruled surface, or parallel cylinders;
+//! * surfaces of revolution about one axis whose meridians (lines and circles in a half-plane) are
+//!   tangent;
+//! * tubes of equal radius that continue each other: a torus and a sphere, a cylinder or another
+//!   torus.
 //!
-//! A fourth is that of ellipsoids with the girth of a cylinder or of each other.
+//! The fourth family is an ellipsoid tangent to a circumscribed cylinder, or to another ellipsoid
+//! with the same circumscribed cylinder. The fifth is cones and cylinders that are tangent along a
+//! common line (`ruled`); they may also share a conic.
 //!
-//! A fifth is that of cones and cylinders with a line in common (`ruled`), which may have a conic in common, too.
-//!
-//! Left to the cells: ellipsoids tangent elsewhere.
+//! Other tangencies of ellipsoids are not detected here; the octree cells handle them.
 
-use super::ruled::{Contact, tangent_line};
+use super::ruled::{TangentLine, tangent_line};
 use crate::geometry::SurfaceInfo;
 use crate::primitive::{
     Cylinder, Ellipse, Ellipsoid, EllipticCone, EllipticCylinder, Plane, Torus, quadric::tangents,
 };
 use crate::{Geometry, Point, Seam, Surface, SurfaceId, Vector};
 
-/// Surfaces that miss each other by less than this part of the size of all are tangent: as much as surfaces may lie apart
-/// that are taken for one.
+/// Surfaces with a gap below this fraction of the total size count as tangent. The same tolerance
+/// decides whether two surfaces are equal.
 const TANGENT_GAP: f64 = 1e-8;
-/// The largest sine of an angle that is none. Directions typed with nine digits are off by 10⁻⁹; over the
-/// length of a part 10⁻⁷ makes a gap ten times as wide as [`TANGENT_GAP`], which no shorter seam notices.
+/// Directions are parallel if the sine of their angle is at most this. Directions given with nine
+/// digits are off by 10⁻⁹. Over the length of the whole geometry, 10⁻⁷ opens a gap of ten times
+/// [`TANGENT_GAP`]; shorter seams are not affected.
 pub(super) const PARALLEL: f64 = 1e-7;
 
-/// A seam before it has ids.
+/// A seam without ids.
 struct Found {
-    /// Which of the two surfaces carries it.
-    carrier: usize,
+    /// Index of the surface in the pair that defines the seam together with the auxiliary surface.
+    base: usize,
     auxiliary: Surface,
-    /// The surface that cuts the carrier in all else that the two have in common, if there is more.
-    rest: Option<Surface>,
-    is_alone: bool,
+    /// The surface that cuts the base surface in the residual intersection, if there is one.
+    residual: Option<Surface>,
+    /// Whether seam and residual intersection are the whole intersection of the pair.
+    is_complete: bool,
 }
 
 impl Found {
-    /// A seam that is all that its surfaces have in common.
-    fn alone(carrier: usize, auxiliary: Surface) -> Self {
-        Self { carrier, auxiliary, rest: None, is_alone: true }
+    /// A seam that is the whole intersection of its pair.
+    fn complete(base: usize, auxiliary: Surface) -> Self {
+        Self { base, auxiliary, residual: None, is_complete: true }
     }
 }
 
-/// Finds the seams of all pairs of surfaces and adds their auxiliary surfaces to the geometry.
-pub fn find_seams(geometry: &mut Geometry) {
+/// Finds the seams of all pairs of surfaces and appends their auxiliary surfaces to the geometry.
+pub(crate) fn find_seams(geometry: &mut Geometry) {
     let count = geometry.surfaces.len();
     let tolerance = TANGENT_GAP * size(&geometry.surfaces);
     let (flat, curved): (Vec<usize>, Vec<usize>) =
@@ -57,24 +63,32 @@ pub fn find_seams(geometry: &mut Geometry) {
     for (k, &i) in curved.iter().enumerate() {
         for &j in flat.iter().chain(&curved[k + 1..]) {
             let Some(found) = seam([i, j].map(|s| &geometry.surfaces[s]), tolerance) else { continue };
-            // Where they meet elsewhere too, it may be a plane of the file that keeps them apart there.
-            let first = if found.is_alone { count } else { 0 };
+            // If the seam is not the whole intersection, a plane of the file may separate the pair
+            // elsewhere: reuse it as the auxiliary surface.
+            let first = if found.is_complete { count } else { 0 };
             let auxiliary = auxiliary_id(geometry, first, found.auxiliary, tolerance);
             let pair = [i.min(j), i.max(j)].map(SurfaceId::new);
-            let carrier = SurfaceId::new([i, j][found.carrier]);
-            let carried_with = |other: SurfaceId| [carrier.min(other), carrier.max(other)];
-            let rest = found.rest.map(|rest| carried_with(auxiliary_id(geometry, count, rest, tolerance)));
-            seams.push(Seam { pair, carrier: carried_with(auxiliary), rest, is_alone: found.is_alone });
+            let base = SurfaceId::new([i, j][found.base]);
+            let with_base = |other: SurfaceId| [base.min(other), base.max(other)];
+            let residual =
+                found.residual.map(|other| with_base(auxiliary_id(geometry, count, other, tolerance)));
+            seams.push(Seam {
+                pair,
+                surfaces: with_base(auxiliary),
+                residual,
+                is_complete: found.is_complete,
+            });
         }
     }
-    // Those that the file tells, but for what was found here.
+    // The geometry already has the seams at joints of extrusions; seams found here take precedence.
     seams.append(&mut geometry.seams);
     seams.sort_by_key(|seam| seam.pair);
     seams.dedup_by_key(|seam| seam.pair);
     geometry.seams = seams;
 }
 
-/// The id of an auxiliary surface, new or that of an equal one from `first` on.
+/// The id of an auxiliary surface: that of an equal surface with index `first` or higher, or a new
+/// one.
 fn auxiliary_id(geometry: &mut Geometry, first: usize, surface: Surface, tolerance: f64) -> SurfaceId {
     let known = geometry.surfaces[first..].iter().position(|s| s.same_as(&surface, tolerance).is_some());
     if known.is_none() {
@@ -84,7 +98,7 @@ fn auxiliary_id(geometry: &mut Geometry, first: usize, surface: Surface, toleran
     SurfaceId::new(known.map_or(geometry.surfaces.len() - 1, |i| first + i))
 }
 
-/// The extent of the points and radii that define the surfaces.
+/// The diagonal of a box around the points and radii that define the surfaces.
 fn size(surfaces: &[Surface]) -> f64 {
     let mut low = Vector::repeat(f64::INFINITY);
     let mut high = -low;
@@ -103,16 +117,16 @@ fn size(surfaces: &[Surface]) -> f64 {
     if low.x > high.x { 0.0 } else { (high - low).norm() }
 }
 
-/// The seam of two surfaces, if there is one.
+/// The seam of a pair of surfaces, if they are tangent along a known curve.
 fn seam(surfaces: [&Surface; 2], tolerance: f64) -> Option<Found> {
     let swapped = [surfaces[1], surfaces[0]];
     let ordered = |surfaces| {
         line(surfaces, tolerance)
             .or_else(|| tube(surfaces, tolerance))
             .or_else(|| around_axis(surfaces, tolerance))
-            .or_else(|| girth(surfaces, tolerance))
+            .or_else(|| equator(surfaces, tolerance))
     };
-    let turned = |found: Found| Found { carrier: 1 - found.carrier, ..found };
+    let turned = |found: Found| Found { base: 1 - found.base, ..found };
     ordered(surfaces).or_else(|| ordered(swapped).map(turned))
 }
 
@@ -120,16 +134,16 @@ fn is_parallel(a: &Vector, b: &Vector) -> bool {
     a.cross(b).norm() <= PARALLEL
 }
 
-/// The plane through a point across a direction.
+/// The plane through `point` with the direction `normal`; `None` if `normal` is nearly zero.
 pub(super) fn plane(point: Point, normal: Vector) -> Option<Surface> {
     Some(Surface::Plane(Plane { point, normal: normal.try_normalize(PARALLEL)? }))
 }
 
-/// Tangent along a straight line.
+/// The seam of surfaces that are tangent along a straight line.
 fn line([a, b]: [&Surface; 2], tolerance: f64) -> Option<Found> {
-    let (carrier, auxiliary) = match (a, b) {
+    let (base, auxiliary) = match (a, b) {
         (Surface::Cylinder(c), Surface::Cylinder(d)) => {
-            let between = across(&(d.point - c.point), &c.axis);
+            let between = perpendicular(&(d.point - c.point), &c.axis);
             let distance = between.norm();
             let gap =
                 (distance - (c.radius + d.radius)).abs().min((distance - (c.radius - d.radius).abs()).abs());
@@ -152,34 +166,36 @@ fn line([a, b]: [&Surface; 2], tolerance: f64) -> Option<Found> {
         }
         (Surface::EllipticCone(c), Surface::Plane(p)) => (1, plane_on_cone(c, p, tolerance)?),
         _ => {
-            // A cylinder carries it better than a cone: it has no apex.
-            let carrier = usize::from(b.apex().is_none());
-            let ordered = if carrier == 0 { [a, b] } else { [b, a] };
-            let Contact { across, rest } = tangent_line(ordered, tolerance, tolerance / TANGENT_GAP)?;
-            return Some(Found { rest, ..Found::alone(carrier, across) });
+            // A cylinder is the better base surface because it has no apex.
+            let base = usize::from(b.apex().is_none());
+            let ordered = if base == 0 { [a, b] } else { [b, a] };
+            let TangentLine { auxiliary, residual } =
+                tangent_line(ordered, tolerance, tolerance / TANGENT_GAP)?;
+            return Some(Found { residual, ..Found::complete(base, auxiliary) });
         }
     };
-    Some(Found::alone(carrier, auxiliary))
+    Some(Found::complete(base, auxiliary))
 }
 
-/// A circular cone as an elliptic one: `radius` at `point`, growing by `slope` per unit along `axis`.
+/// A circular cone as an elliptic one: `radius` at `point`, growing by `slope` per unit along
+/// `axis`.
 fn as_elliptic(point: Point, axis: Vector, radius: f64, slope: f64) -> EllipticCone {
     let (u, v) = tangents(&axis);
     EllipticCone { point, axes: [u, v], radii: [radius; 2], axis, rate: slope / radius }
 }
 
-/// The part of a vector across a unit vector.
-pub(super) fn across(vector: &Vector, axis: &Vector) -> Vector {
+/// The component of a vector perpendicular to a unit vector.
+pub(super) fn perpendicular(vector: &Vector, axis: &Vector) -> Vector {
     vector - axis * vector.dot(axis)
 }
 
-/// The plane through the line where a plane touches a cylinder, across the plane.
+/// The plane through the line where a plane touches a cylinder, perpendicular to that plane.
 fn plane_on_cylinder(c: &EllipticCylinder, p: &Plane, tolerance: f64) -> Option<Surface> {
     let axis = c.axis();
     if p.normal.dot(&axis).abs() > PARALLEL {
         return None;
     }
-    // The point of the ellipse farthest along the normal is as far as its support function says.
+    // The distance to the extreme point of the ellipse along the normal is its support function.
     let [x, y] = [0, 1].map(|i| c.radii[i] * p.normal.dot(&c.axes[i]));
     let reach = x.hypot(y);
     let height = (p.point - c.point).dot(&p.normal);
@@ -190,13 +206,14 @@ fn plane_on_cylinder(c: &EllipticCylinder, p: &Plane, tolerance: f64) -> Option<
     plane(c.point + arm, axis.cross(&p.normal))
 }
 
-/// The plane through the line where a plane touches a cone, across the plane.
+/// The plane through the line where a plane touches a cone, perpendicular to that plane.
 fn plane_on_cone(c: &EllipticCone, p: &Plane, tolerance: f64) -> Option<Surface> {
     let apex = c.apex();
     if (apex - p.point).dot(&p.normal).abs() > tolerance {
         return None;
     }
-    // Along the line from the apex to (x, y) of the base ellipse, one unit of 1/rate farther.
+    // The line of contact leads from the apex to the point (x, y) of the base ellipse and 1/rate
+    // along the axis.
     let [x, y] = [0, 1].map(|i| c.radii[i] * p.normal.dot(&c.axes[i]));
     let (reach, rise) = (x.hypot(y), p.normal.dot(&c.axis) / c.rate);
     let scale = c.radii[0].max(c.radii[1]).max(1.0 / c.rate.abs());
@@ -208,36 +225,36 @@ fn plane_on_cone(c: &EllipticCone, p: &Plane, tolerance: f64) -> Option<Surface>
     plane(apex, line.normalize().cross(&p.normal))
 }
 
-/// A tube of one radius that goes on in another way.
+/// The seam of a torus with a sphere, cylinder or torus of the same tube radius that continues it.
 fn tube([a, b]: [&Surface; 2], tolerance: f64) -> Option<Found> {
     let Surface::Torus(t) = a else { return None };
     let same = |x: f64, y: f64| (x - y).abs() <= tolerance;
     match b {
         Surface::Sphere(s) if same(s.radius, t.minor) => {
             let arm = s.center - t.center;
-            let radial = across(&arm, &t.axis);
+            let radial = perpendicular(&arm, &t.axis);
             (same(radial.norm(), t.major) && same(arm.dot(&t.axis), 0.0)).then_some(())?;
             let auxiliary = plane(s.center, t.axis.cross(&radial) / t.major)?;
-            Some(Found::alone(1, auxiliary))
+            Some(Found::complete(1, auxiliary))
         }
         Surface::Cylinder(c) if same(c.radius, t.minor) => {
-            let arm = across(&(c.point - t.center), &c.axis);
+            let arm = perpendicular(&(c.point - t.center), &c.axis);
             let fits = c.axis.dot(&t.axis).abs() <= PARALLEL
                 && same(arm.dot(&t.axis), 0.0)
                 && same(arm.norm(), t.major);
             let auxiliary = plane(t.center + arm, c.axis)?;
-            fits.then_some(Found { is_alone: false, ..Found::alone(1, auxiliary) })
+            fits.then_some(Found { is_complete: false, ..Found::complete(1, auxiliary) })
         }
         Surface::Torus(s) if same(s.minor, t.minor) => {
-            let (point, direction) = where_circles_are_tangent(t, s, tolerance)?;
-            Some(Found { is_alone: false, ..Found::alone(0, plane(point, direction)?) })
+            let (point, direction) = center_line_tangency(t, s, tolerance)?;
+            Some(Found { is_complete: false, ..Found::complete(0, plane(point, direction)?) })
         }
         _ => None,
     }
 }
 
-/// The point where the centre lines of two tori are tangent, and their direction there.
-fn where_circles_are_tangent(t: &Torus, s: &Torus, tolerance: f64) -> Option<(Point, Vector)> {
+/// The point where the center lines of two tori are tangent, and their direction there.
+fn center_line_tangency(t: &Torus, s: &Torus, tolerance: f64) -> Option<(Point, Vector)> {
     let direction = if is_parallel(&t.axis, &s.axis) {
         t.axis.cross(&(s.center - t.center))
     } else {
@@ -253,29 +270,33 @@ fn where_circles_are_tangent(t: &Torus, s: &Torus, tolerance: f64) -> Option<(Po
     Some((point, direction))
 }
 
-/// An ellipsoid that has an ellipse around its centre in common with a cylinder along one of its axes, or with another one or a
-/// sphere about the same centre.
-fn girth([a, b]: [&Surface; 2], tolerance: f64) -> Option<Found> {
+/// The seam of an ellipsoid along its equator in one of its axes.
+///
+/// The other surface is the cylinder circumscribed along that axis, or a concentric sphere or
+/// ellipsoid with the same circumscribed cylinder.
+fn equator([a, b]: [&Surface; 2], tolerance: f64) -> Option<Found> {
     let Surface::Ellipsoid(e) = a else { return None };
     let same_center = |center: &Point| (center - e.center).norm() <= tolerance;
     (0..3).find_map(|k| {
-        let hull = hull(e, k);
-        let is_same = |other: &Surface| hull.same_as(other, tolerance).is_some();
+        let cylinder = circumscribed_cylinder(e, k);
+        let is_same = |other: &Surface| cylinder.same_as(other, tolerance).is_some();
         let fits = match b {
             Surface::Cylinder(_) | Surface::EllipticCylinder(_) => is_same(b),
             Surface::Sphere(s) if same_center(&s.center) => {
                 is_same(&Surface::Cylinder(Cylinder { point: s.center, axis: e.axes[k], radius: s.radius }))
             }
-            Surface::Ellipsoid(f) if same_center(&f.center) => (0..3).any(|l| is_same(&self::hull(f, l))),
+            Surface::Ellipsoid(f) if same_center(&f.center) => {
+                (0..3).any(|l| is_same(&circumscribed_cylinder(f, l)))
+            }
             _ => false,
         };
         let auxiliary = plane(e.center, e.axes[k])?;
-        fits.then_some(Found::alone(1, auxiliary))
+        fits.then_some(Found::complete(1, auxiliary))
     })
 }
 
-/// The cylinder around an ellipsoid along one of its axes.
-fn hull(e: &Ellipsoid, along: usize) -> Surface {
+/// The cylinder circumscribed about an ellipsoid along one of its axes.
+fn circumscribed_cylinder(e: &Ellipsoid, along: usize) -> Surface {
     let [i, j] = [(along + 1) % 3, (along + 2) % 3];
     Surface::EllipticCylinder(EllipticCylinder {
         point: e.center,
@@ -284,7 +305,7 @@ fn hull(e: &Ellipsoid, along: usize) -> Surface {
     })
 }
 
-/// The curve that makes a surface when it turns about an axis, in the half-plane of (radius, height).
+/// The profile curve of a surface of revolution in the half-plane of (radius, height).
 #[derive(Clone, Copy)]
 enum Meridian {
     Line {
@@ -295,11 +316,11 @@ enum Meridian {
         center: [f64; 2],
         radius: f64,
     },
-    /// Not a circle.
+    /// An ellipse with different radii.
     Ellipse(Ellipse),
 }
 
-/// Tangent along a circle about a common axis.
+/// The seam of two surfaces of revolution about a common axis, a circle.
 fn around_axis([a, b]: [&Surface; 2], tolerance: f64) -> Option<Found> {
     let (origin, axis) = match a {
         Surface::Torus(t) => (t.center, t.axis),
@@ -310,8 +331,9 @@ fn around_axis([a, b]: [&Surface; 2], tolerance: f64) -> Option<Found> {
         _ => return None,
     };
     let meridians = [meridian(a, &origin, &axis, tolerance)?, meridian(b, &origin, &axis, tolerance)?];
-    let ([radius, height], slope) = touching_point(meridians, tolerance)?;
-    // Of a torus and a pair of nappes the meridian counts on both sides of the axis, of others on one.
+    let ([radius, height], slope) = tangent_point(meridians, tolerance)?;
+    // For a torus or a double cone the meridian counts on both sides of the axis, for the others
+    // only on one.
     let is_beyond = matches!(
         (a, b),
         (Surface::Nappe(_) | Surface::Revolved(_), _) | (_, Surface::Nappe(_) | Surface::Revolved(_))
@@ -319,22 +341,23 @@ fn around_axis([a, b]: [&Surface; 2], tolerance: f64) -> Option<Found> {
     if is_beyond || radius.abs() <= PARALLEL.sqrt() * tolerance / TANGENT_GAP {
         return None;
     }
-    /// The sine at which the plane across the axis still cuts well; else a cylinder around it does.
+    /// From this sine on, the plane perpendicular to the axis cuts the surfaces well enough;
+    /// otherwise a cylinder about the axis does.
     const STEEP: f64 = 0.5;
     let auxiliary = if slope[1].abs() >= STEEP {
         Surface::Plane(Plane { point: origin + axis * height, normal: axis })
     } else {
         Surface::Cylinder(Cylinder { point: origin, axis, radius: radius.abs() })
     };
-    // The one of which the auxiliary surface cuts the fewest circles.
+    // Prefer the base surface that the auxiliary surface cuts in the fewest circles.
     let rank = |s: &Surface| match s {
         Surface::Plane(_) => 0,
         Surface::Cylinder(_) | Surface::Cone(_) | Surface::Nappe(_) => 1,
         Surface::Sphere(_) => 2,
         _ => 3,
     };
-    let carrier = usize::from(rank(b) < rank(a));
-    // The line of a cone goes on beyond its apex, where it may cut a circle once more.
+    let base = usize::from(rank(b) < rank(a));
+    // The line of a double cone continues beyond the apex, where it may cut a circle again.
     let crosses_again = |a: &Surface, b: &Surface| {
         matches!(
             (a, b),
@@ -342,14 +365,14 @@ fn around_axis([a, b]: [&Surface; 2], tolerance: f64) -> Option<Found> {
                 | (Surface::Revolved(_), Surface::Revolved(_))
         )
     };
-    let is_alone = !crosses_again(a, b) && !crosses_again(b, a);
-    Some(Found { is_alone, ..Found::alone(carrier, auxiliary) })
+    let is_complete = !crosses_again(a, b) && !crosses_again(b, a);
+    Some(Found { is_complete, ..Found::complete(base, auxiliary) })
 }
 
-/// The meridian of a surface of revolution about an axis, `None` for others.
+/// The meridian of a surface of revolution about the given axis, `None` for other surfaces.
 fn meridian(surface: &Surface, origin: &Point, axis: &Vector, tolerance: f64) -> Option<Meridian> {
     let height = |p: &Point| (p - origin).dot(axis);
-    let on_axis = |p: &Point| across(&(p - origin), axis).norm() <= tolerance;
+    let on_axis = |p: &Point| perpendicular(&(p - origin), axis).norm() <= tolerance;
     match surface {
         Surface::Plane(p) if is_parallel(&p.normal, axis) => {
             Some(Meridian::Line { point: [0.0, height(&p.point)], direction: [1.0, 0.0] })
@@ -395,11 +418,11 @@ fn meridian(surface: &Surface, origin: &Point, axis: &Vector, tolerance: f64) ->
     }
 }
 
-/// Where two meridians are tangent, and their direction there.
-fn touching_point(meridians: [Meridian; 2], tolerance: f64) -> Option<([f64; 2], [f64; 2])> {
+/// The point where two meridians are tangent, and their common direction.
+fn tangent_point(meridians: [Meridian; 2], tolerance: f64) -> Option<([f64; 2], [f64; 2])> {
     match meridians {
         [Meridian::Ellipse(e), other] | [other, Meridian::Ellipse(e)] => {
-            touching_ellipse(&e, other, tolerance)
+            ellipse_tangent_point(&e, other, tolerance)
         }
         [Meridian::Line { point, direction }, Meridian::Circle { center, radius }]
         | [Meridian::Circle { center, radius }, Meridian::Line { point, direction }] => {
@@ -425,8 +448,8 @@ fn touching_point(meridians: [Meridian; 2], tolerance: f64) -> Option<([f64; 2],
     }
 }
 
-/// Where an ellipse touches a line or a curve of its kind.
-fn touching_ellipse(e: &Ellipse, other: Meridian, tolerance: f64) -> Option<([f64; 2], [f64; 2])> {
+/// The point where an ellipse is tangent to another meridian, and the direction there.
+fn ellipse_tangent_point(e: &Ellipse, other: Meridian, tolerance: f64) -> Option<([f64; 2], [f64; 2])> {
     let other = match other {
         Meridian::Line { point, direction: [x, y] } => {
             let normal = [y, -x];
@@ -438,9 +461,10 @@ fn touching_ellipse(e: &Ellipse, other: Meridian, tolerance: f64) -> Option<([f6
         Meridian::Circle { center, radius } => Ellipse { center, axis: [1.0, 0.0], radii: [radius; 2] },
         Meridian::Ellipse(other) => other,
     };
-    // Along the ellipse the function of the other has an extremum where both are tangent.
+    // On the ellipse, the other curve's function has an extremum at a point of tangency: bisect its
+    // derivative.
     const PARTS: u32 = 64;
-    /// They halve a part to rounding.
+    /// Enough to bisect a part down to rounding.
     const HALVINGS: usize = 50;
     let step = std::f64::consts::TAU / f64::from(PARTS);
     let direction = |angle: f64| {

@@ -1,12 +1,13 @@
-//! A seed on every piece of curve.
+//! Finds a seed on every piece of the intersection curves.
 //!
-//! In a leaf the curve of a pair is monotone: it has at most one point on each plane across a direction. So a trace through
-//! the leaf **covers** the slab between the planes through its ends, and there is no other curve of the pair in that slab.
-//! A leaf is split until each part is excluded, or covered by traces, or so small that Newton's method
-//! from its middle finds whatever is in it.
+//! In a leaf the curve of a pair is monotone: it has at most one point on each plane perpendicular
+//! to a direction. So a trace through the leaf **covers** the slab between the perpendicular planes
+//! through its ends: no other curve of the pair is in that slab. A leaf is split until each part is
+//! excluded, covered by traces, or so small that Newton's method from its center finds the curve if
+//! there is one.
 
-use super::around::Tolerances;
 use super::bounds::split;
+use super::neighborhood::Tolerances;
 use super::octree::{Leaf, Octree, can_meet, is_monotone};
 use super::trace::{Trace, Tracer};
 use crate::interval::{Cell, dot, middle};
@@ -14,26 +15,29 @@ use crate::project::project_to_both;
 use crate::{Geometry, Interval, Point, Surface, SurfaceId, Vector};
 use std::collections::{HashMap, VecDeque};
 
-/// A part of a leaf is split so often at most. A curve in a part of 1/256 of a cell in which it is monotone is nearly straight, and
-/// one step of Newton's method from the middle leads to it.
+/// Largest depth of parts of a leaf. In 1/256 of a cell in which it is monotone, a curve is nearly
+/// straight, and one step of Newton's method from the center leads to it.
 const DEPTH: u32 = 8;
-/// Where surfaces are nearly tangent all along a leaf, parts are not excluded. Largest first, so many are looked at: all of
-/// 1/8 of the cell.
+/// Largest number of parts per leaf, visited by decreasing size, for surfaces that are nearly
+/// tangent all along a leaf: then no part can be excluded. It suffices for all parts of 1/8 of the
+/// cell.
 const MOST_PARTS: usize = 600;
-/// So many for surfaces that are tangent along a curve beside the one that is looked for: a hundred cells along it have such a pair.
+/// The same limit for pairs with a seam, because about a hundred cells along a seam contain such a
+/// pair.
 const PARTS_BESIDE_SEAM: usize = 73;
-/// The sine between surfaces at which their intersection is taken to cross their seam, not to be the seam: Newton's method ends on the
-/// seam within 10⁻⁶ or so.
+/// Smallest sine of the angle between surfaces with a seam at which a point counts as a crossing
+/// and not as a point of the seam. Newton's method converges to the seam within about 10⁻⁶.
 const LEAST_SINE: f64 = 1e-4;
-/// The room around a leaf, as a part of its sides, in which the curve may be monotone too.
+/// Margins around a leaf, as fractions of its sides, within which the curve may be monotone too.
 const ROOMS: [f64; 4] = [0.5, 0.2, 0.08, 0.03];
 
-/// Chords near a leaf are halved until they are nearer to their curve than this part of the leaf: what is farther inside than that is
-/// covered. With chords as the trace has them most leaves along the path of an extrusion were split into a hundred parts.
+/// Chords near a leaf are bisected until their sagitta is below this fraction of the leaf: the
+/// trace covers only what is farther from the faces. With the coarser chords of the trace, most
+/// leaves along an extrusion path would be split into a hundred parts.
 const FINE: f64 = 0.01;
 
-/// A trace, and chords of its curve, each its step or a part of it.
-struct Known {
+/// A trace with its steps refined to shorter chords.
+struct RefinedTrace {
     trace: Trace,
     chords: Vec<Chord>,
 }
@@ -41,16 +45,16 @@ struct Known {
 /// A chord of a curve.
 struct Chord {
     ends: [Point; 2],
-    /// The point of the curve beside its middle, if it is found.
+    /// The point of the curve at the middle of the chord, if Newton's method finds one.
     middle: Option<Point>,
-    /// How far the curve is from it, with room for where it is farther than in the middle.
+    /// Upper bound of the distance between curve and chord.
     sagitta: f64,
 }
 
-/// All pieces of intersection curves in the leaves of the tree where they matter.
+/// Traces all pieces of intersection curves in the leaves where they are relevant.
 pub(super) fn trace_all(geometry: &Geometry, tree: &Octree, tolerances: &Tolerances) -> Vec<Trace> {
     let mut known: HashMap<[SurfaceId; 2], Vec<usize>> = HashMap::new();
-    let mut all: Vec<Known> = Vec::new();
+    let mut all: Vec<RefinedTrace> = Vec::new();
     for leaf in &tree.leaves {
         for &pair in &leaf.pairs {
             let of_pair = known.entry(pair).or_default();
@@ -60,20 +64,22 @@ pub(super) fn trace_all(geometry: &Geometry, tree: &Octree, tolerances: &Toleran
     all.into_iter().map(|known| known.trace).collect()
 }
 
-/// Traces the curves of a pair in a leaf that are not known yet; `of_pair` are the traces of the pair among `all`.
+/// Traces the curves of a pair in a leaf that are not yet known; `of_pair` indexes the pair's
+/// traces in `all`.
 fn search(
     geometry: &Geometry,
     tree: &Octree,
     leaf: &Leaf,
     pair: [SurfaceId; 2],
-    all: &mut Vec<Known>,
+    all: &mut Vec<RefinedTrace>,
     of_pair: &mut Vec<usize>,
     tolerances: &Tolerances,
 ) {
     let [a, b] = pair.map(|s| &geometry.surfaces[s.index()]);
     let center = middle(&leaf.cell);
     let direction = a.gradient(&center).cross(&b.gradient(&center));
-    // In a larger cell the slab of a trace reaches farther, beyond where it leaves the leaf.
+    // In a larger monotone cell, the slab of a trace extends beyond the point where it leaves the
+    // leaf.
     let wider = ROOMS.into_iter().map(|room| widened(&leaf.cell, room));
     let cell = wider.into_iter().find(|wide| is_monotone(a, b, wide, &direction)).unwrap_or(leaf.cell);
     let mut covered = Vec::new();
@@ -82,13 +88,13 @@ fn search(
         cover(&all[t], &cell, &direction, &mut covered);
     }
     let reachable = widened(&leaf.cell, 1.0 / 64.0);
-    // On a seam of the pair, where Newton's method may end, no curve can be followed.
+    // Newton's method may converge to a seam of the pair, where no curve can be traced.
     let has_seam = geometry.seam(pair).is_some();
     let crosses = |p: &Point| !has_seam || a.normal(p).cross(&b.normal(p)).norm() > LEAST_SINE;
     let is_here = |p: &Point| {
         (0..3).all(|i| reachable[i].contains(p[i]))
             && crosses(p)
-            && tree.leaf(p).is_some_and(|leaf| tree.matters(leaf, pair))
+            && tree.leaf(p).is_some_and(|leaf| tree.is_relevant(leaf, pair))
     };
     let mut open = VecDeque::from([(leaf.cell, 0)]);
     let most = if has_seam { PARTS_BESIDE_SEAM } else { MOST_PARTS };
@@ -101,10 +107,10 @@ fn search(
         let seed = project_to_both(a, b, &middle(&part), tolerances.exact).ok().filter(is_here);
         if let Some(seed) = seed.filter(|seed| !of_pair.iter().any(|&t| all[t].trace.passes(seed))) {
             let trace = Tracer::new(geometry, tree, pair, tolerances).trace(&seed);
-            // A seed at a point of contact, from where no step leads on, is no curve.
+            // A trace with one point is a contact from which no step continues.
             if trace.points.len() > 1 {
                 let chord = |ends: &[Point]| Chord::new([a, b], [ends[0], ends[1]], tolerances);
-                let mut known = Known { chords: trace.points.windows(2).map(chord).collect(), trace };
+                let mut known = RefinedTrace { chords: trace.points.windows(2).map(chord).collect(), trace };
                 known.refine([a, b], &leaf.cell, tolerances);
                 cover(&known, &cell, &direction, &mut covered);
                 of_pair.push(all.len());
@@ -119,7 +125,7 @@ fn search(
 
 impl Chord {
     fn new([a, b]: [&Surface; 2], ends: [Point; 2], tolerances: &Tolerances) -> Self {
-        /// A step turns little: nowhere is the curve twice as far from the chord as in the middle.
+        /// A step turns little: the deviation is nowhere twice that in the middle.
         const ROOM: f64 = 2.0;
         let middle = nalgebra::center(&ends[0], &ends[1]);
         let on = project_to_both(a, b, &middle, tolerances.exact).ok();
@@ -127,7 +133,8 @@ impl Chord {
         Self { ends, middle: on, sagitta }
     }
 
-    /// Where to halve it for a cell, if it is near and not yet fine enough.
+    /// The point at which to bisect the chord for a cell, if the chord is near and still too
+    /// coarse.
     fn cut_for(&self, cell: &Cell) -> Option<Point> {
         let fine = FINE * cell.iter().map(Interval::width).fold(f64::INFINITY, f64::min);
         let is_coarse = self.sagitta > fine && (self.ends[1] - self.ends[0]).norm() > fine;
@@ -135,8 +142,8 @@ impl Chord {
     }
 }
 
-impl Known {
-    /// Halves the chords near a cell until they are fine there.
+impl RefinedTrace {
+    /// Bisects the chords near a cell until they are fine enough.
     fn refine(&mut self, pair: [&Surface; 2], cell: &Cell, tolerances: &Tolerances) {
         if !self.chords.iter().any(|chord| chord.cut_for(cell).is_some()) {
             return;
@@ -156,7 +163,7 @@ impl Known {
     }
 }
 
-/// A cell with room around it, as a part of its sides.
+/// A cell enlarged by a fraction of its sides on each side.
 fn widened(cell: &Cell, part: f64) -> Cell {
     cell.map(|side| Interval::new(side.lo - part * side.width(), side.hi + part * side.width()))
 }
@@ -166,8 +173,8 @@ fn slab(cell: &Cell, direction: &Vector) -> Interval {
     dot(direction, cell)
 }
 
-/// Adds the slabs along a direction that a trace covers in a cell; those that touch become one.
-fn cover(known: &Known, cell: &Cell, direction: &Vector, covered: &mut Vec<Interval>) {
+/// Adds the slabs that a trace covers in a cell along a direction, and merges adjacent ones.
+fn cover(known: &RefinedTrace, cell: &Cell, direction: &Vector, covered: &mut Vec<Interval>) {
     for chord in &known.chords {
         if let Some([from, to]) = chord_in(&chord.ends, cell, chord.sagitta) {
             let [x, y] = [from, to].map(|p| p.coords.dot(direction));
@@ -175,7 +182,7 @@ fn cover(known: &Known, cell: &Cell, direction: &Vector, covered: &mut Vec<Inter
         }
     }
     covered.sort_by(|x, y| x.lo.total_cmp(&y.lo));
-    // Rounding of the ends of steps that follow each other.
+    // Rounding at the common end of consecutive chords.
     let slack = direction.norm() * f64::EPSILON * cell.iter().map(Interval::magnitude).fold(0.0, f64::max);
     covered.dedup_by(|next, last| {
         let touch = next.lo <= last.hi + 8.0 * slack;
@@ -186,7 +193,8 @@ fn cover(known: &Known, cell: &Cell, direction: &Vector, covered: &mut Vec<Inter
     });
 }
 
-/// The ends of the part of a chord that keeps a distance from the outside of a cell.
+/// The ends of the part of a chord whose distance from the outside of a cell is at least
+/// `distance`.
 fn chord_in(ends: &[Point], cell: &Cell, distance: f64) -> Option<[Point; 2]> {
     let chord = ends[1] - ends[0];
     let (mut from, mut to) = (0.0, 1.0);
@@ -205,7 +213,7 @@ fn chord_in(ends: &[Point], cell: &Cell, distance: f64) -> Option<[Point; 2]> {
     (from < to).then(|| [ends[0] + chord * from, ends[0] + chord * to])
 }
 
-/// Whether a slab lies in one that is covered.
+/// Whether a slab is inside a covered one.
 fn is_covered(slab: &Interval, covered: &[Interval]) -> bool {
     covered.iter().any(|c| c.lo <= slab.lo && slab.hi <= c.hi)
 }
@@ -221,11 +229,12 @@ mod tests {
     }
 
     #[test]
-    fn tiny_caps_and_holes_anywhere_in_a_large_body_are_found() {
+    fn small_caps_and_holes_anywhere_in_a_large_body_are_found() {
         for k in 0..40 {
             let (x, y) = (0.1 + 0.0201 * f64::from(k), 0.9 - 0.0173 * f64::from(k));
             let r = 10_f64.powf(-2.0 - 0.1 * f64::from(k));
-            // A ball that looks out of a face by a tenth of its radius, and a hole of the same radius.
+            // A ball that protrudes from a face by a tenth of its radius, and a hole of the same
+            // radius.
             let source = format!(
                 "solid s = orthobrick (0, 0, 0; 1, 1, 1) or sphere ({x}, {y}, {z}; {r}); tlo s;",
                 z = 1.0 - 0.9 * r

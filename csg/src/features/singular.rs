@@ -1,10 +1,12 @@
-//! What the file tags as singular: patches, curves and corners. Solvers grade their elements there; the mesh is the same, but for
-//! the size that a singular edge may bound.
+//! Patches, curves and corners tagged as singular.
+//!
+//! Solvers grade their elements there. The mesh does not depend on the tags, except for the mesh
+//! size that a singular edge may set.
 
 use super::Features;
 use crate::{CornerId, CurveId, Geometry, PatchId, SingularPlace, SurfaceId};
 
-/// The factors of singular patches, curves and corners, each entity once: of several the last counts.
+/// The factors of singular patches, curves and corners. Each entity occurs once, with its last tag.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Singular {
     /// Patches, ascending.
@@ -16,7 +18,7 @@ pub struct Singular {
 }
 
 impl Features {
-    /// What is singular.
+    /// The singular entities and their factors.
     pub fn singular(&self, geometry: &Geometry) -> Singular {
         let factor = |is_here: &dyn Fn(&SingularPlace) -> bool| {
             let mut here = geometry.singularities.iter().filter(|s| is_here(&s.place));
@@ -34,7 +36,7 @@ impl Features {
         }
     }
 
-    /// The least size that singular edges ask for along a curve, infinity if none does.
+    /// The smallest mesh size that singular edges set along a curve; infinity if none.
     pub fn edge_bound(&self, geometry: &Geometry, curve: CurveId) -> f64 {
         let here = geometry.singularities.iter().filter(|s| self.is_edge(curve, &s.place));
         here.filter_map(|singularity| singularity.maxh).fold(f64::INFINITY, f64::min)
@@ -68,7 +70,7 @@ impl Features {
     }
 }
 
-/// Whether there are different surfaces in `through`, one from each list.
+/// Whether `through` contains distinct surfaces, one from each list.
 fn are_different(through: &[SurfaceId], lists: &[&Vec<SurfaceId>]) -> bool {
     let Some((list, rest)) = lists.split_first() else { return true };
     let mut candidates = through.iter().filter(|surface| list.contains(surface));

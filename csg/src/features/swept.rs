@@ -1,31 +1,32 @@
-//! Pairs of surfaces that one motion of a plane sweeps: what they have in common is decided in that plane.
+//! Pairs of surfaces swept by the same motion of a plane, compared in that plane.
 //!
-//! The chord and the ellipse that bound an extrusion or a revolution beside an arc of its profile meet at a small angle, and in space
-//! the ranges of their gradients over a cell differ by more than that angle. In the plane, where both are of degree two at most,
-//! what is alike in them cancels exactly, and the cells along such a pair can be as large as where any two surfaces cross.
+//! The chord and the ellipse of an extrusion or revolution next to an arc of its profile meet at a
+//! small angle. In space, the ranges of their gradients over a cell vary by more than that angle.
+//! In the plane, both are of degree two at most, and their common part cancels exactly. So cells
+//! along such a pair can be as large as for any crossing pair.
 
 use crate::interval::{Cell, dot};
 use crate::primitive::quadric::reject;
 use crate::primitive::{Ellipse, Section};
 use crate::{Interval, Point, Surface, Vector};
 
-/// Two curves of a moving plane, where a cell is in that plane, and where the plane goes there.
+/// Two curves in a moving plane, with the ranges of plane coordinates over a cell.
 pub(super) struct Swept {
     curves: [Section; 2],
-    /// Where the points of the cell are in the plane.
+    /// The ranges of the plane coordinates over the cell.
     at: [Interval; 2],
-    /// The directions of ∇x × ∇y in the cell; `None` where the motion has its axis.
+    /// The range of ∇x × ∇y over the cell; `None` if the cell meets the axis of the motion.
     forward: Option<Cell>,
 }
 
 impl Swept {
-    /// Two surfaces in a cell, if one motion sweeps them and they are not told apart in space as well.
+    /// Two surfaces in a cell, if one motion sweeps both and comparison in space is less accurate.
     pub fn new(a: &Surface, b: &Surface, cell: &Cell) -> Option<Self> {
         match (a, b) {
             (Surface::Sweep(s), other) | (other, Surface::Sweep(s)) => {
                 let second = match other {
                     Surface::Sweep(t) if s.is_along(t) => t.section,
-                    // The torus around the path.
+                    // The torus about the path.
                     Surface::Torus(t)
                         if t.center == s.center && t.axis == s.axis && s.radii == [t.major; 2] =>
                     {
@@ -42,9 +43,10 @@ impl Swept {
         }
     }
 
-    /// Surfaces of revolution about one axis: coordinates are the distance from it and the height along it.
+    /// Surfaces of revolution about one axis. Plane coordinates: distance from the axis and height
+    /// along it.
     fn turned(a: &Surface, b: &Surface, cell: &Cell) -> Option<Self> {
-        /// The largest distance of axes that are one, as a part of the cell.
+        /// Axes closer than this fraction of the cell are the same.
         const SAME_AXIS: f64 = 1e-6;
         let is_turned =
             |s: &Surface| matches!(s, Surface::Torus(_) | Surface::Nappe(_) | Surface::Revolved(_));
@@ -59,13 +61,13 @@ impl Swept {
         if gap > SAME_AXIS * cell[0].width() {
             return None;
         }
-        let (at, forward) = crate::primitive::turned_ranges(&origin, &axis, cell);
+        let (at, forward) = crate::primitive::meridian_ranges(&origin, &axis, cell);
         let room = Interval::new(-gap, gap);
         let forward = forward.map(|range| range.map(|x| x + room * (2.0 / at[0].lo)));
         Some(Self { curves: [first, second], at: [at[0] + room, at[1]], forward })
     }
 
-    /// Whether the two may meet in the cell.
+    /// Whether the two surfaces may meet in the cell.
     pub fn can_meet(&self) -> bool {
         let center = self.at.map(|side| side.middle());
         let arm = [0, 1].map(|i| self.at[i] - Interval::point(center[i]));
@@ -79,10 +81,12 @@ impl Swept {
             && self.common_points().is_none_or(|points| points.iter().any(Option::is_some))
     }
 
-    /// Those points that a line and an ellipse have in common which may be in the cell; `None` where they are not known.
+    /// The intersection points of a line and an ellipse that may be in the cell; `None` for other
+    /// curves.
     fn common_points(&self) -> Option<[Option<[f64; 2]>; 2]> {
-        /// Rounding of the points, as a part of the size of the ellipse and its distance from the origin: that of the cosine, 10⁻¹⁵, is as much
-        /// larger in the angle as the sine is small. They are left alone where the line is so near to tangent that they are not known as well.
+        /// Error of the points relative to the size of the ellipse and its distance from the
+        /// origin. The angle has the error of the cosine, 10⁻¹⁵, divided by its sine. Lines too
+        /// close to tangent for this accuracy are not evaluated.
         const ROUNDING: f64 = 1e-10;
         const TANGENT: f64 = 1e-10;
         let (normal, offset, e) = match self.curves {
@@ -91,7 +95,8 @@ impl Swept {
             _ => return None,
         };
         let [c, s] = e.axis;
-        // The ellipse as a unit circle, in whose plane the line is at this distance from the centre.
+        // Map the ellipse to the unit circle; `cosine` is the distance of the mapped line from the
+        // center.
         let across =
             [e.radii[0] * (c * normal[0] + s * normal[1]), e.radii[1] * (c * normal[1] - s * normal[0])];
         let distance = offset - normal[0] * e.center[0] - normal[1] * e.center[1];
@@ -106,11 +111,13 @@ impl Swept {
         Some([middle - half, middle + half].map(|angle| Some(e.point(angle)).filter(is_near)))
     }
 
-    /// Whether what they have in common runs forward along `direction` in the whole cell; `None` if that is not known here.
+    /// Whether the intersection runs forward along `direction` in the whole cell; `None` if the
+    /// cell meets the axis.
     pub fn is_monotone(&self, direction: &Vector) -> Option<bool> {
         let along = dot(direction, &self.forward?);
         match self.common_points() {
-            // All that is in the cell is what this point sweeps, where both are known to cross.
+            // The whole intersection in the cell is swept by this point, where both curves are
+            // known to cross.
             Some([Some(point), None] | [None, Some(point)]) => {
                 let [[a, b], [c, d]] = self.curves.map(|curve| curve.gradient(point));
                 return Some((along * (a * d - b * c)).lo > 0.0);
@@ -125,7 +132,7 @@ impl Swept {
     }
 }
 
-/// A function of degree two about a point of the plane.
+/// A quadratic Taylor polynomial about a point of the plane.
 #[derive(Clone, Copy, Debug)]
 struct Taylor {
     value: Interval,
@@ -140,7 +147,7 @@ impl Default for Taylor {
     }
 }
 
-/// Rounding of the coefficients, which are sums of few products, as a part of the largest.
+/// Rounding error of the coefficients (sums of few products) relative to the largest one.
 const ROUNDING: f64 = 16.0 * f64::EPSILON;
 
 impl Taylor {
@@ -157,7 +164,7 @@ impl Taylor {
         [most(&self.gradient), most(&self.hessian)]
     }
 
-    /// The range of this less `factor` times another over a box around the point.
+    /// The range of `self - factor * other` over a box around the point.
     fn range(&self, other: &Self, factor: f64, [x, y]: [Interval; 2]) -> Interval {
         let ([g, h], [k, l]) = (self.largest(), other.largest());
         let around = |z: f64, slack: f64| Interval::new(z - ROUNDING * slack, z + ROUNDING * slack);
@@ -196,7 +203,7 @@ fn circle(center: [f64; 2], radius: f64) -> Ellipse {
     Ellipse { center, axis: [1.0, 0.0], radii: [radius; 2] }
 }
 
-/// A point of the axis of a surface of revolution, and its direction.
+/// A point on the axis of a surface of revolution, and the direction of the axis.
 fn axis_of(surface: &Surface) -> Option<(Point, Vector)> {
     match surface {
         Surface::Torus(t) => Some((t.center, t.axis)),
@@ -206,8 +213,10 @@ fn axis_of(surface: &Surface) -> Option<(Point, Vector)> {
     }
 }
 
-/// The curve that makes a surface when it turns about an axis, with its gradient on the same side, and how far the surface's own axis
-/// is from this one; `None` for other surfaces.
+/// The meridian of a surface of revolution with respect to a given axis, oriented like the surface,
+/// and the distance of its own axis from the given one.
+///
+/// `None` for other surfaces.
 fn meridian(surface: &Surface, origin: &Point, axis: &Vector) -> Option<(Section, f64)> {
     let sign = |own: &Vector| if own == axis { Some(1.0) } else { (-own == *axis).then_some(-1.0) };
     let height = |p: &Point| (p - origin).dot(axis);
@@ -254,7 +263,8 @@ mod tests {
     use crate::project::project_to_both;
     use proptest::prelude::*;
 
-    /// A vase-like ring and a bar that turns about its path: pairs of chords and arcs.
+    /// A ring with a profile of lines and arcs, and a bar along a curved path: pairs of chords and
+    /// arcs.
     const SOURCE: &str = "algebraic3d
 curve2d profile = (6; 0, 1; 1, 3; 3, 2; 3, 1; 2, 0.6; 1, 0.9; 4; 3, 1, 2, 3; 2, 3, 4; 3, 4, 5, 6; 2, 6, 1);
 curve3d path = (3; 10, 0, 0; 15, 0, 2; 15, 5, 4; 1; 3, 1, 2, 3);
@@ -267,7 +277,7 @@ tlo a; tlo b;";
         #![proptest_config(crate::seeded())]
 
         #[test]
-        fn what_is_excluded_in_the_plane_is_not_in_space(
+        fn pairs_excluded_in_the_plane_do_not_meet_in_space(
             pick in any::<[prop::sample::Index; 2]>(),
             at in [0.0..1.0_f64, 0.0..1.0_f64, 0.0..1.0_f64],
             inside in [0.0..1.0_f64, 0.0..1.0_f64, 0.0..1.0_f64],

@@ -1,10 +1,10 @@
-//! Features of surfaces that are tangent, and of cones with their tips.
+//! Features of tangent surfaces, and of cones with their apexes.
 
 use super::tests::{counts, find, refused};
 
 #[test]
-fn fillets_and_caps_are_curves_between_two_patches_also_with_rounded_decimals() {
-    // Sources, and numbers of corners, of curves between corners, of closed curves, of patches.
+fn fillets_and_caps_have_seams_even_with_rounded_decimals() {
+    // Sources, and numbers of corners, curves between corners, closed curves and patches.
     let cases = [
         ("solid s = cylinder (0,0,0; 0,0,1; 1) and plane (0,0,0; 0,0,-1) and plane (0,0,1; 0,0,1)
             and plane (1,0,0; 1,0,0) and plane (0,-1.000000001,0; 0,-1,0); tlo s;", [0, 0, 2, 3]),
@@ -38,7 +38,7 @@ fn fillets_and_caps_are_curves_between_two_patches_also_with_rounded_decimals() 
 }
 
 #[test]
-fn parts_with_seams_turned_any_way_have_the_same_features() {
+fn seams_are_found_in_any_orientation() {
     let rim = "solid disk = cylinder (0,0,0; 0,0,1; 2) and plane (0,0,0; 0,0,-1) and plane (0,0,1; 0,0,1);
         solid corner = cylinder (0,0,0; 0,0,1; 3) and not cylinder (0,0,0; 0,0,1; 1.7) and plane (0,0,0.7; 0,0,-1);
         solid rim = disk and not corner or torus (0,0,0.7; 0,0,1; 1.7; 0.3);";
@@ -52,7 +52,7 @@ fn parts_with_seams_turned_any_way_have_the_same_features() {
 }
 
 #[test]
-fn the_tip_of_a_cone_is_a_corner() {
+fn the_apex_of_a_cone_is_a_corner() {
     let cone = "solid c = cone (0,0,0; 1; 0,0,1; 0.5) and plane (0,0,0; 0,0,-1)";
     let cases = [
         ("and plane (0,0,2; 0,0,1); tlo c;", [1, 0, 1, 2]),
@@ -60,7 +60,7 @@ fn the_tip_of_a_cone_is_a_corner() {
         ("and plane (0,0,2; 0,0,1) and plane (0,0,0; 0,1,0); tlo c;", [3, 4, 0, 3]),
         ("and plane (0,0,2; 0,0,1) and plane (0,0,0; 0,1,0) and plane (0,0,0; 1,0,0); tlo c;", [4, 6, 0, 4]),
         ("and plane (0,0,2; 0,0,1); solid t = rotate (0.3,0.5,1.1; 0.4,0.7,1.1; c); tlo t;", [1, 0, 1, 2]),
-        // Buried in a ball it is nothing.
+        // Inside a ball it is not on the boundary.
         ("and plane (0,0,2.2; 0,0,1) or sphere (0,0,2; 0.5); tlo c;", [0, 0, 2, 3]),
     ];
     for (rest, expected) in cases {
@@ -72,8 +72,8 @@ fn the_tip_of_a_cone_is_a_corner() {
 }
 
 #[test]
-fn a_plane_two_rods_and_a_ball_that_touch_in_a_point_make_a_round_corner() {
-    // One corner of a block with round edges, cut off.
+fn a_plane_two_rods_and_a_ball_touching_at_a_point_form_a_rounded_corner() {
+    // One corner of a block with rounded edges.
     let corner = "solid s = (orthobrick (0,0,0; 1,1,1) and not orthobrick (0.7,0.7,-1; 2,2,2) and not orthobrick (0.7,-1,0.7; 2,2,2)
             and not orthobrick (-1,0.7,0.7; 2,2,2))
         or cylinder (0.7,0.7,0; 0.7,0.7,1; 0.3) and plane (0,0,0; 0,0,-1) and plane (0,0,0.7; 0,0,1)
@@ -84,7 +84,7 @@ fn a_plane_two_rods_and_a_ball_that_touch_in_a_point_make_a_round_corner() {
 }
 
 #[test]
-fn wedges_of_no_angle_are_refused_with_both_names_and_the_place() {
+fn wedges_of_zero_angle_are_rejected_with_both_names_and_coordinates() {
     let rod =
         |x: f64| format!("cylinder ({x},0,0; {x},0,1; 1) and plane (0,0,0; 0,0,-1) and plane (0,0,1; 0,0,1)");
     let rods = format!("solid a = {};\nsolid b = {}; tlo a; tlo b;", rod(0.0), rod(2.0));
@@ -106,19 +106,20 @@ fn wedges_of_no_angle_are_refused_with_both_names_and_the_place() {
             "solid a = torus (0,0,0.5; 0,0,1; 2; 0.5);\nsolid b = orthobrick (-3,-3,-1; 3,3,0); solid c = a or b; tlo c;",
             "surfaces of solid `a` (line 2) and solid `b` (line 3) touch at (",
         ),
-        // A plane that touches a torus from the hole cuts it into lobes that meet in a point.
+        // A plane tangent to a torus at its inner equator cuts it into lobes that meet at a point.
         (
             "solid a = torus (0,0,0; 0,0,1; 2; 0.5) and plane (1.5,0,0; 1,0,0); tlo a;",
             "surfaces of solid `a` (line 2) and solid `a` (line 2) touch at (1.500000, ",
         ),
     ];
     for (source, message) in cases {
-        let said = refused(source);
-        assert!(said.starts_with(message), "{said} does not start with {message}");
+        let error = refused(source);
+        assert!(error.starts_with(message), "{error} does not start with {message}");
     }
 }
 
-/// Two cones and a slab: tips on the line x = y = 0, tangent along it, the second one's axis to the side `side`.
+/// Two cones and a slab: apexes on the line x = y = 0, tangent along it; the second cone's axis is
+/// on the side `side`.
 fn cones_on_a_line(tips: [f64; 2], side: f64, solid: &str) -> String {
     let cone = |tip: f64, [x, z, r]: [f64; 3]| format!("cone (0,0,{tip}; 0; {x},0,{}; {r})", tip - z);
     let [a, b] = [cone(tips[0], [-0.6, 1.44, 0.65]), cone(tips[1], [-1.344 * side, 4.608, 1.4])];
@@ -129,39 +130,40 @@ fn cones_on_a_line(tips: [f64; 2], side: f64, solid: &str) -> String {
 }
 
 #[test]
-fn cones_tangent_along_a_line_meet_in_an_ellipse_too() {
-    // The wider one below the ellipse, the other above it; with one tip there is no ellipse; from outside both do not meet at all.
+fn cones_tangent_along_a_line_may_also_meet_in_an_ellipse() {
+    // The cones exchange sides at the ellipse. With a common apex there is no ellipse; tangent from
+    // outside, they do not cross.
     assert_eq!(counts(&find(&cones_on_a_line([3.0, 4.0], 1.0, "a or b"))), [0, 0, 3, 4]);
     assert_eq!(counts(&find(&cones_on_a_line([3.0, 4.0], 1.0, "a and b"))), [0, 0, 3, 4]);
     assert_eq!(counts(&find(&cones_on_a_line([3.0, 3.0], 1.0, "a or b"))), [0, 0, 2, 3]);
     assert_eq!(counts(&find(&cones_on_a_line([3.0, 4.0], -1.0, "a and not b"))), [0, 0, 2, 3]);
     for (side, solid) in [(1.0, "a and not b"), (-1.0, "a or b")] {
-        let said = refused(&cones_on_a_line([3.0, 4.0], side, solid));
-        let names = said.contains("(line 2)") && said.contains("(line 3)");
-        assert!(names && said.contains("without crossing"), "{said}");
+        let error = refused(&cones_on_a_line([3.0, 4.0], side, solid));
+        let names = error.contains("(line 2)") && error.contains("(line 3)");
+        assert!(names && error.contains("without crossing"), "{error}");
     }
 }
 
 #[test]
-fn a_cone_tangent_to_a_rod_takes_turns_with_it() {
+fn a_cone_tangent_to_a_rod_along_a_line_exchanges_sides_with_it() {
     let parts = "solid rod = cylinder (0,0,0; 0,0,1; 1);\nsolid horn = cone (1,0,5; 0; -0.344,0,0.392; 1.4);
         solid slab = plane (0,0,0; 0,0,-1) and plane (0,0,3; 0,0,1);";
     for solid in ["rod or horn", "rod and horn"] {
         assert_eq!(counts(&find(&format!("{parts} solid s = ({solid}) and slab; tlo s;"))), [0, 0, 3, 4]);
     }
-    // What is cut off leaves no wedge; one that is left is refused.
+    // Without the wedge the solid is valid; with the wedge it is rejected.
     let cut = format!("{parts} solid s = rod and slab and not horn and plane (0.5,0,0; 1,0,0); tlo s;");
     assert!(counts(&find(&cut))[3] > 3);
-    let said = refused(&format!("{parts} solid s = rod and slab and not horn; tlo s;"));
-    assert!(said.contains("touch at (1.000000, 0.000000"), "{said}");
+    let error = refused(&format!("{parts} solid s = rod and slab and not horn; tlo s;"));
+    assert!(error.contains("touch at (1.000000, 0.000000"), "{error}");
 }
 
 #[test]
-fn corners_and_edges_that_touch_the_inside_of_a_face_are_refused() {
+fn corners_and_edges_that_touch_the_interior_of_a_face_are_rejected() {
     let tip = |z: f64| format!("cone (0,0,{z}; 0.5; 0,0,{}; 0) and plane (0,0,{z}; 0,0,1)", z - 1.0);
     let block = "solid block = orthobrick (-1,-1,-1; 1,1,0);";
     let cases = [
-        // The corner of a tetrahedron on a plate, the rim of a disk on a ball.
+        // The corner of a tetrahedron on a plate; the rim of a disk on a ball.
         (
             format!("{block}\nsolid top = polyhedron (0.25,0,0; 0,0,1; 0.5,0,1; 0,0.5,1; ; 1,3,2; 1,2,4; 1,4,3; 2,3,4); solid s = block or top; tlo s;"),
             "(0.250000, 0.000000, 0.000000)",
@@ -174,10 +176,10 @@ fn corners_and_edges_that_touch_the_inside_of_a_face_are_refused() {
         ),
     ];
     for (source, place) in cases {
-        let said = refused(&source);
-        assert!(said.contains("touch") && said.contains(place), "{said} does not name {place}: {source}");
+        let error = refused(&source);
+        assert!(error.contains("touch") && error.contains(place), "{error} does not name {place}: {source}");
     }
-    // In the plate, or away from it, the tip is one as any other.
+    // Inside the plate, or away from it, the apex is allowed.
     let sunk = format!(
         "{block} solid top = {}; solid s = block or top and plane (0,0,-0.1; 0,0,-1); tlo s;",
         tip(0.9)
@@ -189,17 +191,17 @@ fn corners_and_edges_that_touch_the_inside_of_a_face_are_refused() {
 }
 
 #[test]
-fn swept_profiles_with_smooth_joints_have_a_curve_at_each() {
+fn smooth_joints_of_revolved_profiles_are_curves() {
     let revolved = |points: &str, segments: &str| {
         format!("curve2d p = ({points} {segments}); solid s = revolution (0,0,0; 0,0,1; p); tlo s;")
     };
     let cases = [
-        // A line that runs smoothly into an arc of a circle, and into one of an ellipse.
+        // A line that continues smoothly in an arc of a circle, and in one of an ellipse.
         (revolved("5; 0,1; 2,2; 2.4,2.2; 2.2,1.8; 1,1;", "4; 2,1,2; 3,2,3,4; 2,4,5; 2,5,1"), [0, 0, 4, 4]),
         (revolved("5; 0,1; 2,2; 3,2.5; 3,2; 3,1;", "4; 2,1,2; 3,2,3,4; 2,4,5; 2,5,1"), [0, 0, 4, 4]),
-        // A half circle, and ellipses that go on in one another.
+        // A half circle, and ellipses that continue each other.
         (revolved("5; 0,1; 1,2; 2,3; 4,5; 5,1;", "3; 3,1,2,3; 3,3,4,5; 2,5,1"), [0, 0, 3, 3]),
-        // A tip at the end of a straight side.
+        // A tip at the end of a straight segment.
         (revolved("3; 0,0; 1,1; 1,0;", "2; 2,1,2; 2,2,3"), [1, 0, 1, 2]),
         (revolved("4; 0,0; 1,1; 2,1; 4,0;", "3; 2,1,2; 2,2,3; 2,3,4"), [2, 0, 2, 3]),
     ];
@@ -209,7 +211,7 @@ fn swept_profiles_with_smooth_joints_have_a_curve_at_each() {
 }
 
 #[test]
-fn what_turns_with_its_path_goes_on_in_what_turns_otherwise() {
+fn extrusion_segments_with_different_frames_are_joined() {
     let square = "curve2d p = (4; 1,1; 1,-1; -1,-1; -1,1; 4; 2,1,2; 2,2,3; 2,3,4; 2,4,1);";
     let line = "curve3d q = (4; -10,0,-5; 0,0,0; 10,0,5; 10,10,10; 2; 2,1,2; 3,2,3,4);";
     let arc = "curve3d q = (5; 0,0,0; 10,0,5; 10,10,10; 10,20,15; 0,20,20; 2; 3,1,2,3; 3,3,4,5);";
@@ -221,11 +223,12 @@ fn what_turns_with_its_path_goes_on_in_what_turns_otherwise() {
 
 #[test]
 fn a_face_may_end_in_a_cusp_between_curves_that_bend_differently() {
-    // On the step between the two blocks the ball's circle touches the edge of the lower one.
+    // On the step between the two blocks, the circle of the ball is tangent to the edge of the
+    // lower block.
     let step = "solid high = orthobrick (0,-1,-1; 1,1,0.6) and not sphere (0,0,0.5; 0.5);
         solid low = orthobrick (-1,-1,-1; 0,1,0); solid s = high or low; tlo s;";
     assert_eq!(counts(&find(step)), [15, 23, 0, 9]);
-    // Flush with the rod below, a thinner one leaves a crescent with two cusps.
+    // A thinner rod flush with the rod below leaves a crescent with two cusps.
     let flush = |r: f64| {
         format!(
             "solid low = cylinder (0,0,0; 0,0,1; 1) and plane (0,0,0; 0,0,-1) and plane (0,0,1; 0,0,1);
@@ -237,7 +240,8 @@ fn a_face_may_end_in_a_cusp_between_curves_that_bend_differently() {
     for r in [0.25, 0.8, 0.98, 0.999] {
         assert_eq!(counts(&find(&flush(r))), [1, 2, 2, 5], "radius {r}");
     }
-    // The rim of the rod touches the circle along which the torus touches the rod's end: the torus leaves it with the fourth power.
+    // The rim of the rod is tangent to the circle of contact between the torus and the rod's end;
+    // the torus separates from it with the fourth power.
     let rod = "solid ring = torus (0,0,0; 1,0,0; 0.75; 0.25);
         solid rod = cylinder (-1,0.25,0; 1,0.25,0; 0.5) and plane (-1,0,0; -1,0,0) and plane (0.25,0,0; 1,0,0);
         solid s = ring or rod; tlo s;";

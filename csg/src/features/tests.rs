@@ -1,5 +1,6 @@
-//! Features of small geometries, with counts made by hand.
+//! Features of small geometries, with counts determined by hand.
 
+use super::trace::curve_tangent;
 use super::*;
 use crate::{Projector, Vector, language};
 
@@ -19,13 +20,13 @@ pub(super) fn refused(source: &str) -> String {
     Features::find(&geometry(source)).unwrap_err().to_string()
 }
 
-/// Numbers of corners, of curves between corners, of closed curves, of patches.
+/// Numbers of corners, curves between corners, closed curves and patches.
 pub(super) fn counts(features: &Features) -> [usize; 4] {
     let closed = features.curves.iter().filter(|c| c.ends.is_none()).count();
     [features.corners.len(), features.curves.len() - closed, closed, features.patches.len()]
 }
 
-/// Traces lie on both surfaces and turn by less than a quarter radian from point to point.
+/// Checks that traces lie on both surfaces and turn by less than a quarter radian per step.
 fn check_traces(geometry: &Geometry, features: &Features) {
     let tolerance = Projector::new(geometry, features).tolerance();
     for curve in &features.curves {
@@ -73,7 +74,8 @@ fn the_normal_of_an_outer_patch_leaves_the_body_and_its_boundary_runs_counterclo
             let curve = features.curve(curve);
             let along = curve_tangent(&geometry, curve, &at) * if forward { 1.0 } else { -1.0 };
             let normal = surface.normal(&at) * if patch.flipped { -1.0 } else { 1.0 };
-            // A little to the left, still on the surface, and a little below it: inside the body.
+            // To the left of the curve on the surface: just below that point is inside, just above
+            // outside.
             let left = surface.project(&(at + normal.cross(&along) * 1e-3)).unwrap();
             let solid = &geometry.bodies[0].solid;
             let side = |p: Point| solid.side(&geometry.surfaces, &p, 1e-9);
@@ -88,7 +90,7 @@ fn closed_surfaces_without_curves_get_a_seed() {
     let features = find("solid s = sphere (0, 0, 0; 2) and not torus (0, 0, 0; 1, 1, 0; 1; 0.5); tlo s;");
     assert_eq!(counts(&features), [0, 0, 0, 2]);
     assert!(features.patches.iter().all(|p| p.seeds.len() == 1 && p.boundary.is_empty()));
-    // The torus bounds the body from within: its gradient points into the body.
+    // The torus bounds the body from inside, so its gradient points into the body.
     assert_eq!(features.patches.iter().map(|p| p.flipped).collect::<Vec<_>>(), [false, true]);
     assert!((features.bounds.max - Point::new(2.0, 2.0, 2.0)).norm() < 1e-12);
 }
@@ -125,7 +127,8 @@ fn many_planes_through_one_point_or_one_line_make_one_corner_or_curve() {
         tlo a; tlo b; tlo c;";
     let features = find(fan);
     let fins = |n: usize| features.curves.iter().filter(|c| c.fins.len() == n).count();
-    // On the axis: the sides of a, and what divides b from c, and x = 0 below where a is not.
+    // On the axis: the two sides of a, the interface of b and c, and the part of x = 0 beside b and
+    // c.
     assert!(fins(4) == 1, "{}", fins(4));
 }
 
@@ -148,7 +151,7 @@ fn a_curve_on_three_surfaces_is_found_once() {
 }
 
 #[test]
-fn surfaces_that_join_smoothly_keep_the_curve_between_them() {
+fn smoothly_joined_surfaces_have_a_curve_between_them() {
     let capsule =
         "solid pipe = cylinder (0,0,0; 0,0,1; 1) and plane (0,0,0; 0,0,-1) and plane (0,0,2; 0,0,1);
         solid capsule = pipe or sphere (0,0,0; 1) or sphere (0,0,2; 1); tlo capsule;";
@@ -163,7 +166,7 @@ fn surfaces_that_join_smoothly_keep_the_curve_between_them() {
 }
 
 #[test]
-fn surfaces_that_only_touch_the_boundary_do_not_count() {
+fn surfaces_that_only_touch_the_boundary_add_no_features() {
     let inscribed = "solid s = orthobrick (-1,-1,0; 1,1,2) and cylinder (0,0,0; 0,0,1; 1);";
     assert_eq!(counts(&find(&format!("{inscribed} tlo s;"))), [0, 0, 2, 3]);
     let turned = format!("{inscribed} solid t = rotate (0.1,0.2,0.3; 0.4,0.7,1.1; s); tlo t;");
@@ -181,7 +184,7 @@ fn pipes_of_one_radius_branch_where_they_are_tangent() {
     let cross = find(&format!("{pipes} and plane (0,-3,0; 0,-1,0); solid s = a or b; tlo s;"));
     assert_eq!(counts(&cross), [2, 4, 4, 6]);
     let source = format!("{pipes} and plane (0,0,0; 0,-1,0); solid s = a or b;");
-    // In a skew position rounding decides nothing either.
+    // The result does not depend on rounding in a skew position.
     let turned = find(&format!("{source} solid t = rotate (0.1,0.2,0.3; 0.4,0.7,1.1; s); tlo t;"));
     assert_eq!(counts(&turned), [2, 2, 3, 5]);
     let tee = find(&format!("{source} tlo s;"));
@@ -202,7 +205,7 @@ fn a_circle_has_the_curvature_of_its_radius() {
 }
 
 #[test]
-fn points_of_the_file_are_corners_and_cut_curves() {
+fn points_of_the_file_are_corners_and_split_curves() {
     let points = "point (0,0,0); point (0.3,0,0); point (0.5,0.5,0); point (0.5,0.4,0.3);";
     let features = find(&format!("{CUBE} tlo cube; {points}"));
     assert_eq!(counts(&features), [11, 13, 0, 6]);
@@ -215,7 +218,7 @@ fn points_of_the_file_are_corners_and_cut_curves() {
 }
 
 #[test]
-fn size_and_distance_from_the_origin_do_not_matter() {
+fn features_do_not_depend_on_size_and_distance_from_the_origin() {
     let part = |size: f64, x: f64| {
         let at = |u: f64| x + u * size;
         format!(
@@ -245,8 +248,8 @@ fn thin_plates_and_sharp_wedges_are_bounded() {
 }
 
 #[test]
-fn what_cannot_be_meshed_is_refused_with_its_place() {
-    let refusals = [
+fn invalid_geometries_are_rejected_with_coordinates() {
+    let cases = [
         (
             "solid a = cylinder (0,0,0; 1,1,1; 0.5) and plane (0,0,0; 0,0,-1); tlo a;",
             "solid `a` (line 2) is not bounded",
@@ -270,7 +273,7 @@ fn what_cannot_be_meshed_is_refused_with_its_place() {
             "the point (2.000000, 0.000000, 0.000000) (line 3)",
         ),
     ];
-    for (source, message) in refusals {
+    for (source, message) in cases {
         assert!(refused(source).starts_with(message), "{} does not start with {message}", refused(source));
     }
     assert_eq!(Features::find(&Geometry::default()).unwrap_err(), FeatureError::NoBody);
@@ -306,7 +309,7 @@ fn the_tutorials_have_the_features_counted_by_hand() {
     for (name, hand) in expected {
         let file = format!("{folder}/netgen-tutorials/{name}.geo");
         let Ok(source) = std::fs::read_to_string(&file) else {
-            eprintln!("SKIPPED: {file} is not there (set TETMILL_SHARED)");
+            eprintln!("SKIPPED: {file} not found (set TETMILL_SHARED)");
             return;
         };
         let geometry = language::parse_geometry(&source, name).unwrap().geometry;

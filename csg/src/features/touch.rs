@@ -1,22 +1,23 @@
-//! Where a corner or an edge touches the inside of a patch. The lone tip of a cone may: it is a corner of its own.
+//! Corners and edges that touch the interior of a patch.
 //!
-//! The solid is not a manifold there: the patch goes through a vertex that none of its curves has.
+//! The solid is not a manifold there: the patch contains a vertex that is on none of its curves. An
+//! isolated apex of a cone is allowed, because it is a corner of its own.
 
 use super::arcs::{Arc, Nodes};
-use super::around::{Tolerances, sheet_at};
+use super::neighborhood::{Tolerances, sheet_at};
 use super::octree::Octree;
 use super::{FeatureError, Named, Place, assemble};
 use crate::primitive::quadric::tangents;
 use crate::{Geometry, Point, SurfaceId};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Refuses the first such place.
+/// Rejects the first corner or edge that touches the interior of a patch.
 ///
-/// A surface through the end of an arc from which no arc leaves on it is a boundary either all around that point or nowhere
-/// near it.
+/// If no arc on a surface leaves a point of that surface, the surface is a boundary either all
+/// around the point or nowhere near it.
 ///
 /// # Errors
-/// Names the surface that touches and the one that is touched.
+/// [`FeatureError::Touch`] with the touching and the touched surface.
 pub(super) fn check(
     geometry: &Geometry,
     tree: &Octree,
@@ -27,13 +28,18 @@ pub(super) fn check(
     let mut leaving: BTreeMap<usize, BTreeSet<SurfaceId>> = BTreeMap::new();
     for arc in arcs {
         for node in arc.ends.into_iter().flatten().flatten() {
-            leaving.entry(node).or_default().extend(arc.around.sheets.iter().map(|(sheet, _)| sheet.surface));
+            leaving
+                .entry(node)
+                .or_default()
+                .extend(arc.neighborhood.sheets.iter().map(|(sheet, _)| sheet.surface));
         }
     }
     for (node, surfaces) in leaving {
         let point = nodes.point(node);
         for touched in assemble::corner(geometry, tree, point, tolerances).surfaces {
-            if !surfaces.contains(&touched) && goes_on_around(geometry, tree, touched, &point, tolerances)? {
+            if !surfaces.contains(&touched)
+                && is_boundary_all_around(geometry, tree, touched, &point, tolerances)?
+            {
                 let touching = *surfaces.first().expect("something ends at the place");
                 let [first, second] = [touching, touched].map(|s| Named::surface(geometry, s));
                 return Err(FeatureError::Touch { first, second, place: Place(point) });
@@ -44,16 +50,17 @@ pub(super) fn check(
 }
 
 /// Whether a surface is a boundary on all sides of one of its points.
-fn goes_on_around(
+fn is_boundary_all_around(
     geometry: &Geometry,
     tree: &Octree,
     id: SurfaceId,
     point: &Point,
     tolerances: &Tolerances,
 ) -> Result<bool, FeatureError> {
-    /// How far from the point is looked, in lengths of merging: so near that no other surface comes between.
+    /// Distance of the sample points in units of the merge tolerance, small enough that no other
+    /// surface intervenes.
     const BESIDE: f64 = 100.0;
-    /// In how many directions.
+    /// Number of sample directions.
     const DIRECTIONS: u32 = 16;
     let surface = &geometry.surfaces[id.index()];
     if surface.has_apex_at(point, tolerances.merge) {

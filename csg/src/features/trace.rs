@@ -1,56 +1,59 @@
-//! Intersection curves of pairs of surfaces, followed from seeds.
+//! Traces intersection curves of pairs of surfaces from seeds.
 
-use super::around::Tolerances;
 use super::contact::{Contact, Kind};
+use super::neighborhood::Tolerances;
 use super::octree::{Octree, is_monotone};
 use crate::interval::Cell;
 use crate::project::{project_to_both, shortest_step};
 use crate::{Curve, Geometry, Interval, Point, Surface, SurfaceId, Vector};
 
-/// A piece of the intersection of two surfaces.
+/// A piece of the intersection curve of two surfaces.
 #[derive(Clone, Debug)]
 pub(super) struct Trace {
     /// The surfaces, ascending.
     pub pair: [SurfaceId; 2],
-    /// Points on it, along the cross product of the two gradients. A closed one repeats the first at the end.
+    /// Points on it, in the direction of the cross product of the two gradients. A closed trace
+    /// repeats the first point at the end.
     pub points: Vec<Point>,
     /// Whether it is a closed curve.
     pub closed: bool,
-    /// Whether it starts and ends at a point where the surfaces are tangent.
+    /// Whether its start and its end are branch points: tangencies of the surfaces, or an apex.
     pub branches: [bool; 2],
 }
 
-/// The largest angle, in radians, that a curve turns by from one point to the next: under the quarter that
-/// [`Curve::trace`] promises.
+/// Largest angle (radians) between consecutive points, below the quarter radian of
+/// [`Curve::trace`].
 const TURN: f64 = 0.2;
-/// By how much of a step the box around it is larger than the box of its ends: an arc that turns by [`TURN`] leaves
-/// its chord by less than a twentieth.
+/// Margin of the box around a step, as a fraction of the step. An arc that turns by [`TURN`]
+/// deviates from its chord by less than a twentieth.
 const ROOM: f64 = 0.1;
-/// A step below this part of the diagonal gets nowhere.
+/// Smallest step as a fraction of the diagonal.
 const LEAST_STEP: f64 = 1e-9;
-/// A curve with more points than this does not end.
+/// Largest number of points of a trace.
 const MOST_POINTS: usize = 1_000_000;
-/// Near a branch point within this part of the radius of curvature, a curve that heads for it is taken to reach it.
+/// A curve heading for a branch point within this fraction of the radius of curvature reaches it.
 const NEAR_BRANCH: f64 = 1e-2;
 
 impl Trace {
-    /// Whether a point of the intersection of its two surfaces lies on this piece.
+    /// Whether a point of the intersection of both surfaces lies on this trace.
     ///
-    /// In the box around a step the curve has one point on each plane across the step (see [`is_monotone`]).
+    /// In the box of a step, the curve has at most one point on each plane perpendicular to the
+    /// step (see [`is_monotone`]).
     pub fn passes(&self, point: &Point) -> bool {
         self.points.windows(2).any(|ends| along(ends, point).is_some())
     }
 
-    /// The point at a position: a step, plus the part of the step before it. On the chord of that step.
+    /// The point at a position (step index plus fraction), on the chord of the step.
     pub fn at(&self, position: f64) -> Point {
         let step = (position.max(0.0) as usize).min(self.points.len() - 2);
         self.points[step] + (self.points[step + 1] - self.points[step]) * (position - step as f64)
     }
 }
 
-/// The position of a point of the curve along a step, 0 to 1, if it is in the box of the step.
+/// The fraction (0 to 1) along a step of a point on the curve, if the point is in the box of the
+/// step.
 pub(super) fn along(ends: &[Point], point: &Point) -> Option<f64> {
-    /// Rounding of the position.
+    /// Tolerance for rounding of the fraction.
     const SLACK: f64 = 1e-9;
     let chord = ends[1] - ends[0];
     let position = (point - ends[0]).dot(&chord) / chord.norm_squared();
@@ -59,20 +62,20 @@ pub(super) fn along(ends: &[Point], point: &Point) -> Option<f64> {
         .then_some(position.clamp(0.0, 1.0))
 }
 
-/// The box around a step in which the curve stays between its ends.
+/// The box that contains the curve along a step.
 pub(super) fn step_box(p: &Point, q: &Point) -> Cell {
     let room = ROOM * (q - p).norm();
     [0, 1, 2].map(|i| Interval::new(p[i].min(q[i]) - room, p[i].max(q[i]) + room))
 }
 
-/// Follows one curve.
+/// Traces one intersection curve.
 pub(super) struct Tracer<'a> {
     tree: &'a Octree,
     pair: [SurfaceId; 2],
     surfaces: [&'a Surface; 2],
     tolerances: &'a Tolerances,
     diagonal: f64,
-    /// Where the two surfaces are tangent and the curve may branch, and where it ends at an apex.
+    /// Contacts of the pair: the curve may branch at tangencies and ends at an apex.
     branch_points: Vec<Contact>,
 }
 
@@ -89,14 +92,14 @@ impl<'a> Tracer<'a> {
         Self { tree, pair, surfaces, tolerances, diagonal, branch_points }
     }
 
-    /// The curve through a point of the intersection.
+    /// Traces the curve through a point of the intersection, both ways.
     pub fn trace(&self, seed: &Point) -> Trace {
         let closed = |points| Trace { pair: self.pair, points, closed: true, branches: [false; 2] };
         let (mut points, end) = self.follow(seed, seed, 1.0);
         if end == End::Closed {
             return closed(points);
         }
-        // Steps the other way may pass over the gap where this end was left.
+        // The steps of the other direction may pass over the gap at which this end stopped.
         let stop = if end == End::Left { points[points.len() - 1] } else { *seed };
         let (mut backward, start) = self.follow(seed, &stop, -1.0);
         backward.reverse();
@@ -109,7 +112,7 @@ impl<'a> Tracer<'a> {
         Trace { pair: self.pair, points: backward, closed: false, branches }
     }
 
-    /// The points from the seed on, along the tangent times `sign`, at most to `stop`.
+    /// The points from the seed along `sign` times the tangent, at most up to `stop`.
     fn follow(&self, seed: &Point, stop: &Point, sign: f64) -> (Vec<Point>, End) {
         let mut points = vec![*seed];
         let mut reach = f64::INFINITY;
@@ -130,22 +133,22 @@ impl<'a> Tracer<'a> {
                     None => step *= 0.5,
                 }
             };
-            // The first step begins at the stop if that is the seed.
+            // If the stop is the seed, the first step starts there.
             if (points.len() > 1 || stop != seed) && along(&[at, next], stop).is_some() {
                 points.push(*stop);
                 return (points, End::Closed);
             }
             points.push(next);
-            if !self.matters(&next) {
+            if !self.is_relevant(&next) {
                 return (points, End::Left);
             }
             reach = 2.0 * step;
         }
     }
 
-    /// Whether the intersection matters at a point.
-    fn matters(&self, point: &Point) -> bool {
-        self.tree.leaf(point).is_some_and(|leaf| self.tree.matters(leaf, self.pair))
+    /// Whether the intersection is relevant at a point.
+    fn is_relevant(&self, point: &Point) -> bool {
+        self.tree.leaf(point).is_some_and(|leaf| self.tree.is_relevant(leaf, self.pair))
     }
 
     fn direction(&self, at: &Point, sign: f64) -> (Vector, f64) {
@@ -153,7 +156,7 @@ impl<'a> Tracer<'a> {
         (tangent(a, b, at) * sign, curvature(a, b, at))
     }
 
-    /// A point one step on, if it is proved to be on the same piece and the curve turns little.
+    /// The next point, if it is proved to be on the same piece and the curve turns little.
     fn step(&self, at: &Point, tangent: &Vector, step: f64, sign: f64) -> Option<Point> {
         let [a, b] = self.surfaces;
         let next = project_to_both(a, b, &(at + tangent * step), self.tolerances.exact).ok()?;
@@ -170,7 +173,7 @@ impl<'a> Tracer<'a> {
         is_monotone(a, b, &step_box(at, &next), &(chord * sign)).then_some(next)
     }
 
-    /// The branch point that the curve is about to reach.
+    /// The branch point directly ahead, if the curve is close to one.
     fn branch_ahead(&self, at: &Point, tangent: &Vector) -> Option<Point> {
         let curvature = self.surfaces.iter().map(|s| s.curvature(at)).fold(0.0, f64::max);
         let is_ahead = |branch: &&Contact| {
@@ -186,28 +189,29 @@ impl<'a> Tracer<'a> {
     }
 }
 
-/// How a curve ends.
+/// Why tracing stopped.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum End {
-    /// Where it was to stop.
+    /// It reached the stop point.
     Closed,
-    /// Where one of its surfaces no longer matters.
+    /// One of the surfaces is no longer relevant.
     Left,
-    /// At a point where its surfaces are tangent.
+    /// It reached a tangency of the surfaces, or an apex.
     Branch,
-    /// Where steps became too small.
+    /// The steps became too small.
     Lost,
 }
 
-/// The unit tangent of the intersection of two surfaces, along the cross product of their gradients.
+/// The unit tangent of the intersection of two surfaces in the direction of the cross product of
+/// their gradients.
 pub(super) fn tangent(a: &Surface, b: &Surface, at: &Point) -> Vector {
     a.gradient(at).cross(&b.gradient(at)).try_normalize(0.0).unwrap_or_default()
 }
 
 /// The curvature of the intersection of two surfaces, 1/length; infinite where they are tangent.
 ///
-/// Along the curve by arc length, ∇f·c'' = -c'ᵀ(∇²f)c' for both functions, and c''·c' = 0
-/// (Goldman 2005, Curvature formulas for implicit curves and surfaces, section 5).
+/// In terms of arc length, ∇f·c'' = -c'ᵀ(∇²f)c' for both functions, and c''·c' = 0 (Goldman 2005,
+/// Curvature formulas for implicit curves and surfaces, section 5).
 fn curvature(a: &Surface, b: &Surface, at: &Point) -> f64 {
     let t = tangent(a, b, at);
     let gradients = [a.gradient(at), b.gradient(at)];
@@ -216,55 +220,59 @@ fn curvature(a: &Surface, b: &Surface, at: &Point) -> f64 {
     shortest_step(values, gradients, squares).map_or(f64::INFINITY, |bend| bend.norm())
 }
 
-/// The unit tangent of a curve at a point on it, in its direction.
+/// The unit tangent of a curve at one of its points, in the curve's direction.
 ///
-/// At an end where its surfaces are tangent, that of the trace there.
-pub fn curve_tangent(geometry: &Geometry, curve: &Curve, at: &Point) -> Vector {
+/// At an end where its surfaces are tangent, the direction of the adjacent trace step.
+#[cfg(test)]
+pub(super) fn curve_tangent(geometry: &Geometry, curve: &Curve, at: &Point) -> Vector {
     let [a, b] = curve.surfaces.map(|s| &geometry.surfaces[s.index()]);
     let step = nearest_step(curve, at);
     tangent_along(a, b, at, &(curve.trace[step + 1] - curve.trace[step]))
 }
 
-/// The unit tangent of the intersection of two surfaces in the direction of a chord nearby; the chord's own where the
-/// surfaces are tangent.
+/// The unit tangent of the intersection of two surfaces, oriented along a nearby chord.
+///
+/// Where the surfaces are tangent, the direction of the chord.
 pub(super) fn tangent_along(a: &Surface, b: &Surface, at: &Point, chord: &Vector) -> Vector {
     let along = tangent(a, b, at);
-    match (cross_well(a, b, at, chord), along.dot(chord) < 0.0) {
+    match (is_transversal(a, b, at, chord), along.dot(chord) < 0.0) {
         (false, _) => chord.normalize(),
         (true, true) => -along,
         (true, false) => along,
     }
 }
 
-/// The curvature of a curve at a point on it, 1/length.
+/// The curvature of a curve at one of its points, 1/length.
 ///
-/// At an end where its surfaces are tangent, that at the middle of the step of the trace there.
-pub fn curve_curvature(geometry: &Geometry, curve: &Curve, at: &Point) -> f64 {
+/// At an end where its surfaces are tangent, the curvature at the middle of the adjacent trace
+/// step.
+pub(super) fn curve_curvature(geometry: &Geometry, curve: &Curve, at: &Point) -> f64 {
     let [a, b] = curve.surfaces.map(|s| &geometry.surfaces[s.index()]);
     let chord = inward(curve, at);
-    if cross_well(a, b, at, &chord) { curvature(a, b, at) } else { curvature(a, b, &(at + chord * 0.5)) }
+    if is_transversal(a, b, at, &chord) { curvature(a, b, at) } else { curvature(a, b, &(at + chord * 0.5)) }
 }
 
-/// Whether two surfaces cross at an angle at which their gradients tell the tangent of the intersection; a chord gives the size
-/// of things.
-fn cross_well(a: &Surface, b: &Surface, at: &Point, chord: &Vector) -> bool {
-    /// The sine; the second derivatives of the intersection lose twice its digits.
+/// Whether two surfaces cross at an angle large enough to compute the tangent from their gradients.
+///
+/// `chord` sets the length scale.
+fn is_transversal(a: &Surface, b: &Surface, at: &Point, chord: &Vector) -> bool {
+    /// Smallest sine; second derivatives of the intersection lose twice its digits.
     const LEAST_SINE: f64 = 1e-4;
-    /// An apex is nearer than this part of the chord, or it is elsewhere.
+    /// An apex counts only within this fraction of the chord.
     const APEX: f64 = 1e-6;
     let within = APEX * chord.norm();
     let is_regular = ![a, b].iter().any(|s| s.has_apex_at(at, within));
     is_regular && a.normal(at).cross(&b.normal(at)).norm() > LEAST_SINE
 }
 
-/// The step of the trace that is nearest to a point.
+/// Index of the trace step nearest to a point.
 fn nearest_step(curve: &Curve, at: &Point) -> usize {
     let middle = |i: usize| nalgebra::center(&curve.trace[i], &curve.trace[i + 1]);
     let distance = |i: usize| (middle(i) - at).norm() - 0.5 * (curve.trace[i + 1] - curve.trace[i]).norm();
     (1..curve.trace.len() - 1).fold(0, |best, i| if distance(i) < distance(best) { i } else { best })
 }
 
-/// The way from a point at an end of a step of the trace to its other end.
+/// The vector from a point at one end of a trace step to the other end.
 fn inward(curve: &Curve, at: &Point) -> Vector {
     let i = nearest_step(curve, at);
     let ends = [curve.trace[i] - at, curve.trace[i + 1] - at];

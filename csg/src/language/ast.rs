@@ -1,23 +1,23 @@
-//! The statements of a file, names not yet looked up.
+//! The statements of a file, before names are resolved.
 
 use crate::geometry::Span;
 use crate::{Point, Vector};
 
-/// A name and its place.
+/// A name and its position.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Name {
     pub text: String,
     pub span: Span,
 }
 
-/// A whole number with its place; the file may give any number there.
+/// A number where the grammar expects an integer, with its position; checked later.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Num {
     pub value: f64,
     pub span: Span,
 }
 
-/// A set of points, as an expression.
+/// A Boolean expression of solids.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Expr {
     Primitive(Primitive, Span),
@@ -28,7 +28,7 @@ pub(super) enum Expr {
     Or(Vec<Expr>),
 }
 
-/// A primitive solid; the fields are its arguments in their order.
+/// A primitive solid; the fields are its arguments in order.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Primitive {
     Plane(Point, Vector),
@@ -52,7 +52,7 @@ pub(super) struct PolyFace {
     pub span: Span,
 }
 
-/// A motion, or several.
+/// A transform, or repeated copies by a transform.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Transform {
     Translate(Vector),
@@ -83,7 +83,7 @@ pub(super) struct Flag {
     pub span: Span,
 }
 
-/// What stands behind the `=` of a flag.
+/// The value of a flag after the `=`.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum FlagValue {
     Nothing,
@@ -101,7 +101,8 @@ pub(super) enum Statement {
         body: Expr,
         flags: Vec<Flag>,
     },
-    /// A solid or curve that could not be read: its name exists, so that uses of it give no further error.
+    /// A solid or curve with an error. Its name is defined, so that uses of it give no further
+    /// errors.
     Broken {
         name: Name,
     },

@@ -1,19 +1,19 @@
-//! Messages about a `.geo` file: where, what, and what to do.
+//! Diagnostics of a `.geo` file: position, message and help.
 
 use std::fmt;
 
 use crate::geometry::Span;
 
-/// What a message is about; all but [`Kind::Warning`] mean that there is no geometry.
+/// The kind of a diagnostic. All except [`Kind::Warning`] prevent a geometry.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// The text does not follow the grammar.
+    /// The text violates the grammar.
     Syntax,
-    /// The text follows the grammar, but means nothing: an unknown name, a sphere without a radius.
+    /// The text follows the grammar but is invalid: an unknown name, a sphere of radius zero.
     Meaning,
-    /// The text is right, but what it asks for cannot be meshed yet.
+    /// The text is valid, but describes something that cannot be meshed yet.
     Unsupported,
-    /// The geometry is made, perhaps not as the author thinks.
+    /// There is a geometry, but perhaps not the intended one.
     Warning,
 }
 
@@ -27,7 +27,7 @@ impl Kind {
     }
 }
 
-/// One message about one place of a file.
+/// One diagnostic at one position of a file.
 ///
 /// ```text
 /// ball.geo:3:14: error: `sphere` needs a positive radius, not 0.0
@@ -37,23 +37,23 @@ impl Kind {
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Diagnostic {
-    /// What it is about.
+    /// The kind.
     pub kind: Kind,
-    /// The file's name, as the caller gave it.
+    /// The name of the file, as passed by the caller.
     pub file: String,
-    /// The place.
+    /// The position.
     pub span: Span,
-    /// What is wrong: one sentence without a full stop.
+    /// What is wrong: one sentence without a period.
     pub message: String,
-    /// What to do about it.
+    /// How to correct it.
     pub help: Option<String>,
-    /// The line of the file that has the place.
+    /// The source line at the position.
     pub source_line: String,
 }
 
-/// Longest piece of a source line that is shown, in characters: a file may be a single line of megabytes.
+/// Longest excerpt of a source line in characters; a file may be a single line of megabytes.
 const SHOWN_CHARACTERS: usize = 100;
-/// How many of them stand before the place in a line that is too long.
+/// Number of characters before the position in the excerpt of a long line.
 const SHOWN_BEFORE: usize = 60;
 
 impl fmt::Display for Diagnostic {
@@ -70,8 +70,9 @@ impl fmt::Display for Diagnostic {
     }
 }
 
-/// The piece of `line` to show for `column`, and the blanks that bring a caret under it (tabs stay tabs, so
-/// that the caret is right whatever the width of a tab).
+/// The excerpt of `line` around `column`, and the blanks that place a caret under it.
+///
+/// Tabs are kept, so that the caret is right for any tab width.
 fn shown_piece(line: &str, column: u32) -> (String, String) {
     let at = column.max(1) as usize - 1;
     let long = line.chars().nth(SHOWN_CHARACTERS).is_some();
@@ -84,20 +85,15 @@ fn shown_piece(line: &str, column: u32) -> (String, String) {
     (shown, before)
 }
 
-/// Why a file gives no geometry: at least one message that is not a warning.
+/// The diagnostics of an invalid file; at least one is not a warning.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Diagnostics {
-    /// All messages, in file order.
+    /// All diagnostics, in file order.
     pub messages: Vec<Diagnostic>,
 }
 
 impl Diagnostics {
-    /// Whether nothing is wrong with the file but that it asks for what cannot be meshed yet.
-    pub fn is_unsupported(&self) -> bool {
-        self.errors().all(|message| message.kind == Kind::Unsupported)
-    }
-
-    /// The messages that are not warnings.
+    /// The diagnostics that are not warnings.
     pub fn errors(&self) -> impl Iterator<Item = &Diagnostic> {
         self.messages.iter().filter(|message| message.kind != Kind::Warning)
     }
@@ -115,12 +111,12 @@ impl fmt::Display for Diagnostics {
 
 impl std::error::Error for Diagnostics {}
 
-/// Most errors that are reported of one file; later ones mostly follow from earlier ones.
+/// Largest number of reported errors per file; later ones are mostly consequences.
 const MOST_ERRORS: usize = 20;
-/// Most warnings that are reported of one file.
+/// Largest number of reported warnings per file.
 const MOST_WARNINGS: usize = 100;
 
-/// Collects the messages of all stages.
+/// Collects the diagnostics of all stages.
 #[derive(Debug, Default)]
 pub(super) struct Report {
     notes: Vec<Note>,
@@ -136,12 +132,12 @@ struct Note {
     help: Option<String>,
 }
 
-/// A failure that [`Report`] knows already.
+/// Marks a failure that is already in the [`Report`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Reported;
 
 impl Report {
-    /// Adds a message; returned as an error so that callers may `return Err(report.error(..))`.
+    /// Adds a diagnostic; returns the error value for `return Err(report.add(..))`.
     pub fn add(&mut self, kind: Kind, span: Span, message: impl Into<String>, help: &str) -> Reported {
         let (count, most) = match kind {
             Kind::Warning => (&mut self.warnings, MOST_WARNINGS),
@@ -155,17 +151,17 @@ impl Report {
         Reported
     }
 
-    /// Adds an error of the grammar.
+    /// Adds a syntax error.
     pub fn syntax(&mut self, span: Span, message: impl Into<String>, help: &str) -> Reported {
         self.add(Kind::Syntax, span, message, help)
     }
 
-    /// Adds an error of what the text means.
+    /// Adds an error of meaning.
     pub fn meaning(&mut self, span: Span, message: impl Into<String>, help: &str) -> Reported {
         self.add(Kind::Meaning, span, message, help)
     }
 
-    /// Adds a refusal of something right.
+    /// Adds an error for something valid that cannot be meshed yet.
     pub fn unsupported(&mut self, span: Span, message: impl Into<String>, help: &str) -> Reported {
         self.add(Kind::Unsupported, span, message, help)
     }
@@ -175,17 +171,17 @@ impl Report {
         self.add(Kind::Warning, span, message, help);
     }
 
-    /// Whether anything but warnings was added.
+    /// Whether anything other than warnings was added.
     pub fn has_errors(&self) -> bool {
         self.errors > 0
     }
 
-    /// Whether more errors make no sense.
+    /// Whether the limit of errors is exceeded.
     pub fn is_full(&self) -> bool {
         self.errors > MOST_ERRORS
     }
 
-    /// The messages in file order, each with its line of `source`.
+    /// The diagnostics in file order, each with its line of `source`.
     pub fn finish(mut self, source: &str, file: &str) -> Vec<Diagnostic> {
         if self.errors > MOST_ERRORS
             && let Some(last) = self.notes.iter_mut().rfind(|note| note.kind != Kind::Warning)
@@ -216,7 +212,7 @@ mod tests {
             file: "a.geo".into(),
             span: Span { line: 7, column },
             message: "it is wrong".into(),
-            help: Some("mend it".into()),
+            help: Some("correct it".into()),
             source_line: source_line.into(),
         }
     }
@@ -224,7 +220,8 @@ mod tests {
     #[test]
     fn a_message_shows_place_line_caret_and_help() {
         let text = diagnostic(5, "tlo x;").to_string();
-        let expected = "a.geo:7:5: error: it is wrong\n    7 | tlo x;\n      |     ^\n      = help: mend it";
+        let expected =
+            "a.geo:7:5: error: it is wrong\n    7 | tlo x;\n      |     ^\n      = help: correct it";
         assert_eq!(text, expected);
     }
 
@@ -234,7 +231,7 @@ mod tests {
     }
 
     #[test]
-    fn of_a_very_long_line_the_piece_around_the_place_is_shown() {
+    fn a_very_long_line_is_shown_around_the_position() {
         let line = "x".repeat(5000) + "!" + &"y".repeat(5000);
         let text = diagnostic(5001, &line).to_string();
         let lines: Vec<&str> = text.lines().collect();

@@ -1,8 +1,9 @@
-//! The language of `.geo` files: from text to a [`Geometry`].
+//! The language of `.geo` files, from text to a [`Geometry`].
 //!
-//! A file begins with `algebraic3d`. A **solid** is named by `solid NAME = ...;`, where primitives (half-spaces,
-//! balls, infinite cylinders, ...) are combined by `and`, `or` and `not`. A **top-level object**, `tlo NAME;`, says
-//! that the solid is a body to be meshed. Flags as `-maxh=0.1` stand at the end of a statement.
+//! A file begins with `algebraic3d`. `solid NAME = ...;` defines a named **solid** from primitives
+//! (half-spaces, balls, infinite cylinders, ...) combined by `and`, `or` and `not`. `tlo NAME;`
+//! declares a **top-level object**: the solid is a body to be meshed. Flags such as `-maxh=0.1`
+//! follow at the end of a statement.
 //!
 //! ```
 //! let source = "algebraic3d
@@ -19,11 +20,11 @@
 //! assert!(errors.to_string().starts_with("can.geo:2:5: error: there is no solid `can`"));
 //! ```
 //!
-//! The language is NETGEN's. Where that program is silent about a mistake (unknown names, curves that do not
-//! join, a radius of zero, misspelt flags), this one says so; where it refuses to move a primitive, this one does.
-//! Numbers of bodies and boundaries are the same.
+//! The language is NETGEN's. Mistakes that NETGEN ignores (unknown names, curves that do not join,
+//! a radius of zero, misspelled flags) are reported, and every primitive can be transformed.
+//! Numbers of bodies and boundaries are the same as in NETGEN.
 //!
-//! Not done here: nothing tells whether bodies overlap or are unbounded; that needs [`Features`](crate::Features).
+//! This module does not detect overlapping or unbounded bodies; [`Features`](crate::Features) does.
 
 mod ast;
 mod diagnostic;
@@ -37,20 +38,20 @@ pub use diagnostic::{Diagnostic, Diagnostics, Kind};
 use crate::Geometry;
 use diagnostic::Report;
 
-/// What a file says, and what its author should know.
+/// The result of reading a file.
 #[derive(Clone, Debug)]
 pub struct Parsed {
-    /// What it says.
+    /// The geometry.
     pub geometry: Geometry,
     /// Warnings, in file order.
     pub warnings: Vec<Diagnostic>,
 }
 
-/// Reads a geometry; `file_name` is for messages only.
+/// Reads a geometry; `file_name` is used in messages only.
 ///
 /// # Errors
-/// All messages, warnings included, if one of them is an error, or if the file asks for something that
-/// cannot be meshed yet ([`Diagnostics::is_unsupported`]).
+/// All diagnostics, including warnings, if one of them is an error, or if the file contains
+/// something that cannot be meshed yet ([`Kind::Unsupported`]).
 pub fn parse_geometry(source: &str, file_name: &str) -> Result<Parsed, Diagnostics> {
     let mut report = Report::default();
     let statements = parse::parse(source, &mut report);
@@ -61,10 +62,10 @@ pub fn parse_geometry(source: &str, file_name: &str) -> Result<Parsed, Diagnosti
     if failed { Err(Diagnostics { messages }) } else { Ok(Parsed { geometry, warnings: messages }) }
 }
 
-/// Reads a geometry from the bytes of a file, which may have comments in any encoding.
+/// Reads a geometry from the bytes of a file; comments may have any encoding.
 ///
 /// # Errors
-/// As [`parse_geometry`]; bytes that are not UTF-8 outside comments are unknown characters.
+/// As for [`parse_geometry`]. Outside comments, bytes that are not UTF-8 are unknown characters.
 pub fn parse_geometry_bytes(source: &[u8], file_name: &str) -> Result<Parsed, Diagnostics> {
     parse_geometry(&String::from_utf8_lossy(source), file_name)
 }

@@ -1,6 +1,6 @@
-//! The words of the language, and which one a misspelt word may have meant.
+//! The keywords of the language, and suggestions for misspelled words.
 
-/// Words that begin a statement.
+/// Keywords that begin a statement.
 pub(super) const STATEMENTS: [&str; 11] = [
     "solid",
     "tlo",
@@ -15,7 +15,7 @@ pub(super) const STATEMENTS: [&str; 11] = [
     "define",
 ];
 
-/// Words that begin a solid and take arguments.
+/// Keywords of solids with arguments.
 pub(super) const PRIMITIVES: [&str; 16] = [
     "plane",
     "sphere",
@@ -35,7 +35,7 @@ pub(super) const PRIMITIVES: [&str; 16] = [
     "multirotate",
 ];
 
-/// The other words that are no names. `tube` and `gencyl` have never meant anything.
+/// The other keywords. NETGEN reserves `tube` and `gencyl` without a meaning.
 const OTHERS: [&str; 12] = [
     "algebraic3d",
     "or",
@@ -51,19 +51,20 @@ const OTHERS: [&str; 12] = [
     "gencyl",
 ];
 
-/// Whether `word` has a meaning of its own and so cannot be a name.
+/// Whether `word` is a keyword and cannot be a name.
 pub(super) fn is_reserved(word: &str) -> bool {
     STATEMENTS.contains(&word) || PRIMITIVES.contains(&word) || OTHERS.contains(&word)
 }
 
-/// Whether `word` begins a statement.
+/// Whether `word` is a keyword that begins a statement.
 pub(super) fn begins_statement(word: &str) -> bool {
     STATEMENTS.contains(&word)
 }
 
-/// A help line that names the nearest of `candidates`, or nothing if none is near.
+/// A help line with the nearest of `candidates`, or an empty string if none is near.
 pub(super) fn did_you_mean<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) -> String {
-    // A third of the letters may be wrong (at least one): `spere` means `sphere`, but `box` does not mean `cone`.
+    // Up to a third of the letters may differ (at least one): `spere` suggests `sphere`, but `box`
+    // does not suggest `cone`.
     let allowed = (word.chars().count() / 3).max(1);
     let distance = |candidate: &&str| edits(&word.to_lowercase(), &candidate.to_lowercase());
     let nearest = candidates.into_iter().map(|c| (distance(&c), c)).min();
@@ -73,8 +74,10 @@ pub(super) fn did_you_mean<'a>(word: &str, candidates: impl IntoIterator<Item = 
     }
 }
 
-/// The number of letters to insert, delete, replace or swap with the next to get `b` from `a` (Damerau and
-/// Levenshtein's distance, the restricted kind); at least the difference of lengths, at once, for very long words.
+/// The restricted Damerau-Levenshtein distance: insertions, deletions, replacements and swaps of
+/// neighboring letters.
+///
+/// Words longer than `LONGEST` are only compared for equality.
 fn edits(a: &str, b: &str) -> usize {
     const LONGEST: usize = 64;
     let (a, b): (Vec<char>, Vec<char>) = (a.chars().collect(), b.chars().collect());
@@ -110,7 +113,7 @@ mod tests {
     }
 
     #[test]
-    fn near_words_are_suggested_and_far_ones_are_not() {
+    fn only_similar_words_are_suggested() {
         assert_eq!(did_you_mean("Sphere", PRIMITIVES), "did you mean `sphere`?");
         assert_eq!(did_you_mean("cilinder", PRIMITIVES), "did you mean `cylinder`?");
         assert_eq!(did_you_mean("box", PRIMITIVES), "");

@@ -1,38 +1,38 @@
-//! Text to tokens.
+//! Splits text into tokens.
 
 use super::diagnostic::Report;
 use crate::geometry::Span;
 
-/// What a token is.
+/// The kind of a token.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum TokenKind<'a> {
     /// A keyword or a name.
     Word(&'a str),
-    /// A number: finite, never negative (the sign is a token of its own).
+    /// A number: finite and never negative (the sign is a separate token).
     Number(f64),
     /// One of `( ) [ ] - = , ;`.
     Mark(char),
-    /// Something that is no token; it has been reported.
+    /// An invalid token, already reported.
     Bad,
     /// The end of the file.
     End,
 }
 
-/// A token and its place.
+/// A token and its position.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Token<'a> {
     pub kind: TokenKind<'a>,
     pub span: Span,
 }
 
-/// The lines of a text, which end in LF, CR LF or a lone CR.
+/// The lines of a text, terminated by LF, CR LF or CR.
 pub(super) fn lines(source: &str) -> impl Iterator<Item = &str> {
     source.split('\n').flat_map(|line| line.strip_suffix('\r').unwrap_or(line).split('\r'))
 }
 
-/// The tokens of a text, the last of which is [`TokenKind::End`].
+/// The tokens of a text; the last one is [`TokenKind::End`].
 ///
-/// Comments run from `#` to the end of the line. A byte-order mark at the beginning is white space.
+/// Comments extend from `#` to the end of the line. A byte-order mark is white space.
 pub(super) fn tokenize<'a>(source: &'a str, report: &mut Report) -> Vec<Token<'a>> {
     let mut tokens = Vec::new();
     let mut end = Span { line: 1, column: 1 };
@@ -47,12 +47,12 @@ pub(super) fn tokenize<'a>(source: &'a str, report: &mut Report) -> Vec<Token<'a
     tokens
 }
 
-/// Scans one line: no token goes beyond it.
+/// Scans one line; no token extends across lines.
 struct Scanner<'a> {
     text: &'a str,
-    /// Bytes scanned.
+    /// Number of bytes scanned.
     at: usize,
-    /// The place of the next character.
+    /// Position of the next character.
     span: Span,
 }
 
@@ -61,7 +61,7 @@ impl<'a> Scanner<'a> {
         &self.text[self.at..]
     }
 
-    /// Takes the characters that `accept`s, at least none.
+    /// Takes all following characters that satisfy `accept`.
     fn take_while(&mut self, accept: impl Fn(char) -> bool) -> &'a str {
         let rest = self.rest();
         let taken = &rest[..rest.find(|c| !accept(c)).unwrap_or(rest.len())];
@@ -80,7 +80,7 @@ impl<'a> Scanner<'a> {
             }
             c if c.is_ascii_digit() || c == '.' => self.number(report),
             '"' => {
-                // The whole string, so that one mistake gives one message.
+                // Take the whole string, so that one mistake gives one message.
                 self.take_one();
                 self.take_while(|c| c != '"');
                 if self.rest().starts_with('"') {
@@ -95,7 +95,7 @@ impl<'a> Scanner<'a> {
                 if "()[]-=,;".contains(c) {
                     TokenKind::Mark(c)
                 } else {
-                    report.syntax(span, format!("the character {c:?} has no meaning here"), stray_help(c));
+                    report.syntax(span, format!("unexpected character {c:?}"), stray_help(c));
                     TokenKind::Bad
                 }
             }
@@ -103,7 +103,7 @@ impl<'a> Scanner<'a> {
         Some(Token { kind, span })
     }
 
-    /// Takes a number: digits, perhaps a point, perhaps an exponent.
+    /// Scans a number: digits, optional decimal point, optional exponent.
     fn number(&mut self, report: &mut Report) -> TokenKind<'a> {
         let span = self.span;
         let start = self.at;
@@ -147,7 +147,7 @@ impl<'a> Scanner<'a> {
     }
 }
 
-/// What C's `isspace` accepts within a line, and the byte-order mark.
+/// The characters that C's `isspace` accepts within a line, and the byte-order mark.
 fn is_blank(c: char) -> bool {
     matches!(c, ' ' | '\t' | '\u{b}' | '\u{c}' | '\u{feff}')
 }
@@ -160,8 +160,8 @@ fn stray_help(c: char) -> &'static str {
         '{' | '}' => "solids are grouped by ( )",
         '&' | '|' | '!' => "solids are combined by `and`, `or`, `not`",
         '_' => "names begin with a letter",
-        '\u{fffd}' => "the file is not UTF-8 text; other characters may stand in comments only",
-        c if !c.is_ascii() => "only comments may have characters beyond ASCII",
+        '\u{fffd}' => "the file is not UTF-8; other encodings are allowed in comments only",
+        c if !c.is_ascii() => "non-ASCII characters are allowed in comments only",
         _ => "",
     }
 }
@@ -182,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_have_the_forms_that_c_streams_read() {
+    fn numbers_have_the_forms_of_c_streams() {
         let expected: Vec<_> = [1., 1., 0.5, 1e-3, 2.5e4, 0.].into_iter().map(Number).chain([End]).collect();
         assert_eq!(kinds("1 1. .5 1e-3 2.5E+4 1e-999"), expected);
     }

@@ -1,6 +1,8 @@
-//! The circular double cone: (ρ² - R²)/(2 r √(1+s²)), ρ the distance from the axis, R the radius there.
+//! The circular double cone: (ρ² - R²)/(2 r √(1+s²)), with ρ the distance from the axis and R the
+//! radius there.
 //!
-//! The gradient has unit length on the circle through the point that defines the cone, and grows with R.
+//! The gradient has unit length on the circle through the point that defines the cone, and grows
+//! with R.
 
 use super::quadric::{largest_curvature, reject};
 use super::{Cone, Primitive, reject_range};
@@ -9,7 +11,7 @@ use crate::{Point, ProjectionFailed, Vector};
 use nalgebra::{Isometry3, Matrix3};
 
 impl Cone {
-    /// Its apex, where both nappes meet.
+    /// The apex, where both nappes meet.
     pub fn apex(&self) -> Point {
         self.point - self.axis * (self.radius / self.slope)
     }
@@ -18,7 +20,7 @@ impl Cone {
         1.0 / (self.radius * (1.0 + self.slope * self.slope).sqrt())
     }
 
-    /// The vector from the axis, and the (signed) radius at the height of the point.
+    /// The vector from the axis, and the signed radius at the height of the point.
     #[inline]
     fn split(&self, point: &Point) -> (Vector, f64) {
         let arm = point - self.point;
@@ -53,8 +55,8 @@ impl Primitive for Cone {
         if distance == 0.0 {
             return if radius == 0.0 { Ok(*point) } else { Err(ProjectionFailed(*point)) };
         }
-        // In the half-plane through the axis, the nearest line is that of the nappe on whose side the point
-        // is; the foot never falls behind the apex.
+        // In the half-plane through the axis, the nearest line is on the nappe on the point's side
+        // of the apex, and the foot is never beyond the apex.
         let slope = self.slope * radius.signum();
         let lack = (distance - radius.abs()) / (1.0 + slope * slope);
         Ok(point - arm * (lack / distance) + self.axis * (lack * slope))
@@ -64,7 +66,8 @@ impl Primitive for Cone {
         let arm = offset(cell, &self.point);
         let [x, y, z] = reject_range(&arm, &self.axis).map(Interval::square);
         let radius = Interval::point(self.radius) + dot(&self.axis, &arm) * self.slope;
-        // The scale is a rounded number like the other parameters: the range is that of the function so scaled.
+        // The scale is a rounded number like the other parameters, so this is the range of the
+        // scaled function.
         (x + y + z - radius.square()) * (0.5 * self.scale())
     }
 

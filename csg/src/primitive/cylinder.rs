@@ -1,4 +1,4 @@
-//! The circular cylinder: (ρ² - r²)/2r, ρ the distance from the axis.
+//! The circular cylinder: (ρ² - r²)/2r, with ρ the distance from the axis.
 
 use super::quadric::reject;
 use super::{Cylinder, Primitive, reject_range};

@@ -1,4 +1,5 @@
-//! An ellipse in a plane: (u²/a² + v²/b² - 1)·s/2 with u, v along its axes and s the shorter semi-axis.
+//! An ellipse in a plane: (u²/a² + v²/b² - 1)·s/2, with u, v along its axes and s the shorter
+//! semi-axis.
 
 use super::quadric::nearest_on_ellipsoid;
 use crate::Interval;
@@ -7,11 +8,11 @@ use std::f64::consts::PI;
 /// An ellipse in a plane with coordinates (x, y).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ellipse {
-    /// Its centre.
+    /// The center.
     pub center: [f64; 2],
-    /// Unit direction of its first axis; the second is a quarter turn counter-clockwise from it.
+    /// Unit direction of the first axis; the second is perpendicular, counterclockwise.
     pub axis: [f64; 2],
-    /// The semi-axes along both, positive.
+    /// The semi-axes in the directions of both axes, positive.
     pub radii: [f64; 2],
 }
 
@@ -20,7 +21,7 @@ impl Ellipse {
         self.radii[0].min(self.radii[1])
     }
 
-    /// The coordinates of a point along the axes, from the centre.
+    /// The coordinates of a point along the axes, relative to the center.
     fn local(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         let ([p, q], [c, s]) = ([x - self.center[0], y - self.center[1]], self.axis);
         [c * p + s * q, c * q - s * p]
@@ -42,7 +43,7 @@ impl Ellipse {
         [c * gu - s * gv, s * gu + c * gv]
     }
 
-    /// The second derivatives xx, xy, yy.
+    /// The second derivatives (xx, xy, yy).
     pub(crate) fn hessian(&self) -> [f64; 3] {
         let ([a, b], [c, s]) = (self.radii, self.axis);
         let [p, q] = [1.0 / (a * a), 1.0 / (b * b)].map(|h| h * self.scale());
@@ -62,7 +63,7 @@ impl Ellipse {
     }
 
     pub(crate) fn gradient_range(&self, [x, y]: [Interval; 2]) -> [Interval; 2] {
-        // The second derivatives are rounded numbers; the range is that of the function with these.
+        // The second derivatives are rounded numbers; this is the range for the rounded function.
         let [p, q] = [x - Interval::point(self.center[0]), y - Interval::point(self.center[1])];
         let [xx, xy, yy] = self.hessian();
         [p * xx + q * xy, p * xy + q * yy]
@@ -73,7 +74,7 @@ impl Ellipse {
         self.global(nearest_on_ellipsoid(self.local(at), self.radii))
     }
 
-    /// The point farthest in a direction.
+    /// The support point in a direction.
     pub(crate) fn support(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         let [c, s] = self.axis;
         let arms = [(c * x + s * y) * self.radii[0], (c * y - s * x) * self.radii[1]];
@@ -82,20 +83,22 @@ impl Ellipse {
         self.global([share[0] * self.radii[0], share[1] * self.radii[1]])
     }
 
-    /// The point at a parameter: an angle in the ellipse scaled to a circle, counter-clockwise from its first axis.
+    /// The point at a parameter: the angle in the ellipse scaled to a circle, counterclockwise from
+    /// the first axis.
     pub fn point(&self, angle: f64) -> [f64; 2] {
         let (sin, cos) = angle.sin_cos();
         self.global([cos * self.radii[0], sin * self.radii[1]])
     }
 
-    /// The parameter of a point, -π to π.
+    /// The parameter of a point, in [-π, π].
     pub fn angle(&self, at: [f64; 2]) -> f64 {
         let [u, v] = self.local(at);
         (v / self.radii[1]).atan2(u / self.radii[0])
     }
 
-    /// The part with x ≥ 0: the parameter of its middle, and by how much it reaches from there to both
-    /// sides; `None` if all of the ellipse has x > 0. (Reaches nowhere if none has.)
+    /// The part with x ≥ 0: the parameter of its middle and the half-width of its parameter range.
+    ///
+    /// `None` if the whole ellipse has x > 0; the half-width is 0 if no point has.
     pub fn right_part(&self) -> Option<(f64, f64)> {
         let [c, s] = self.axis;
         let (along, across) = (c * self.radii[0], -s * self.radii[1]);

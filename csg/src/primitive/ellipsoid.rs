@@ -1,4 +1,5 @@
-//! The ellipsoid: (Σ (dᵢ/rᵢ)² - 1)·r/2 with r the shortest semi-axis, so the gradient's length is at most 1 on it.
+//! The ellipsoid: (Σ (dᵢ/rᵢ)² - 1)·r/2, with r the shortest semi-axis, so the gradient has at most
+//! unit length on it.
 
 use super::quadric::{largest_curvature, nearest_on_ellipsoid};
 use super::{Ellipsoid, Primitive};
@@ -7,7 +8,7 @@ use crate::{Point, ProjectionFailed, Vector};
 use nalgebra::{Isometry3, Matrix3};
 
 impl Ellipsoid {
-    /// The point farthest in a direction.
+    /// The support point in a direction.
     pub(crate) fn support(&self, direction: &Vector) -> Point {
         let weights = [0, 1, 2].map(|i| self.radii[i] * direction.dot(&self.axes[i]));
         let length = weights.iter().map(|w| w * w).sum::<f64>().sqrt();
@@ -67,10 +68,12 @@ impl Primitive for Ellipsoid {
     }
 }
 
-/// The range of a gradient that is linear: the matrix of second derivatives times the distance from the
-/// centre. The entries are rounded sums; they are taken with a few units of the largest one to either side.
+/// The range of a linear gradient: the Hessian times the vector from the center.
+///
+/// The entries of the Hessian are rounded sums; each is widened by a few units in the last place of
+/// the largest one.
 pub(super) fn linear_range(hessian: &Matrix3<f64>, arm: &Cell) -> Cell {
-    /// Rounding of an entry: three products of three rounded numbers each, and their sum.
+    /// Rounding errors in an entry: a sum of three products of three rounded numbers.
     const ROUNDINGS: f64 = 16.0;
     let slack = ROUNDINGS * f64::EPSILON * hessian.amax();
     [0, 1, 2].map(|i| {

@@ -1,4 +1,5 @@
-//! The double cone over an ellipse: (Σ (dᵢ/rᵢ)² - (1 + q h)²)·r/2, h the height, r the shorter semi-axis.
+//! The double cone over an ellipse: (Σ (dᵢ/rᵢ)² - (1 + q h)²)·r/2, with h the height and r the
+//! shorter semi-axis.
 
 use super::ellipsoid::linear_range;
 use super::quadric::{largest_curvature, nearest_on_cone};
@@ -8,7 +9,7 @@ use crate::{Point, ProjectionFailed, Vector};
 use nalgebra::{Isometry3, Matrix3};
 
 impl EllipticCone {
-    /// Its apex, where both nappes meet.
+    /// The apex, where both nappes meet.
     pub fn apex(&self) -> Point {
         self.point - self.axis / self.rate
     }

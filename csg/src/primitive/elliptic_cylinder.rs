@@ -1,4 +1,4 @@
-//! The cylinder over an ellipse: (Σ (dᵢ/rᵢ)² - 1)·r/2 with r the shorter semi-axis.
+//! The cylinder over an ellipse: (Σ (dᵢ/rᵢ)² - 1)·r/2, with r the shorter semi-axis.
 
 use super::ellipsoid::linear_range;
 use super::quadric::{largest_curvature, nearest_on_ellipsoid};
@@ -12,7 +12,7 @@ impl EllipticCylinder {
         self.radii[0].min(self.radii[1])
     }
 
-    /// The unit direction in which it is infinite.
+    /// The unit direction of the axis.
     pub fn axis(&self) -> Vector {
         self.axes[0].cross(&self.axes[1]).normalize()
     }

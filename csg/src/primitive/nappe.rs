@@ -1,6 +1,8 @@
-//! One nappe of a circular cone: (ρ - R)/√(1+s²), ρ the distance from the axis, R the radius there.
+//! One nappe of a circular cone: (ρ - R)/√(1+s²), with ρ the distance from the axis and R the
+//! radius there.
 //!
-//! The gradient has unit length everywhere but on the axis, where only the apex belongs to the surface.
+//! The gradient has unit length everywhere except on the axis, where only the apex belongs to the
+//! surface.
 
 use super::quadric::reject;
 use super::{Nappe, Primitive, direction_range, reject_range};
@@ -9,7 +11,7 @@ use crate::{Point, ProjectionFailed, Vector};
 use nalgebra::{Isometry3, Matrix3};
 
 impl Nappe {
-    /// Where it ends.
+    /// The apex.
     pub fn apex(&self) -> Point {
         self.point - self.axis * (self.radius / self.slope)
     }
@@ -18,7 +20,8 @@ impl Nappe {
         1.0 / self.slope.hypot(1.0)
     }
 
-    /// The vector from the axis, its length, and the radius at the height of the point, negative beyond the apex.
+    /// The vector from the axis, its length, and the radius at the height of the point (negative
+    /// beyond the apex).
     #[inline]
     fn split(&self, point: &Point) -> (Vector, f64, f64) {
         let arm = point - self.point;
@@ -70,7 +73,8 @@ impl Primitive for Nappe {
         let arm = offset(cell, &self.point);
         let [x, y, z] = reject_range(&arm, &self.axis).map(Interval::square);
         let radius = Interval::point(self.radius) + dot(&self.axis, &arm) * self.slope;
-        // The scale is a rounded number like the other parameters: the range is that of the function so scaled.
+        // The scale is a rounded number like the other parameters, so this is the range of the
+        // scaled function.
         ((x + y + z).sqrt() - radius) * self.scale()
     }
 

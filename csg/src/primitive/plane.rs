@@ -1,4 +1,4 @@
-//! The plane: n·(x - p), a distance.
+//! The plane: the signed distance n·(x - p).
 
 use super::{Plane, Primitive};
 use crate::interval::{Cell, Interval, dot, offset};

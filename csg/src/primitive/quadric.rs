@@ -1,13 +1,15 @@
-//! What the curved primitives share: curvature from derivatives, and nearest points on conics in their axes.
+//! Helpers of the curved primitives: curvature from derivatives, and nearest points on quadrics in
+//! their principal axes.
 
 use crate::{Point, Vector};
 use nalgebra::Matrix3;
 
-/// The largest absolute principal curvature of the level set with this gradient and these second
-/// derivatives, 1/length; infinite where the gradient vanishes.
+/// The largest absolute principal curvature of the level set with the given gradient and Hessian,
+/// 1/length.
 ///
-/// The shape operator is the second derivative restricted to the tangent plane over the length of the
-/// gradient (Goldman 2005, Curvature formulas for implicit curves and surfaces, section 4).
+/// Infinite where the gradient vanishes. The shape operator is the Hessian restricted to the
+/// tangent plane, divided by the length of the gradient (Goldman 2005, Curvature formulas for
+/// implicit curves and surfaces, section 4).
 pub fn largest_curvature(gradient: &Vector, hessian: &Matrix3<f64>) -> f64 {
     let length = gradient.norm();
     if length == 0.0 {
@@ -20,7 +22,7 @@ pub fn largest_curvature(gradient: &Vector, hessian: &Matrix3<f64>) -> f64 {
     (mean.abs() + spread) / length
 }
 
-/// Two unit vectors that make a right-handed orthogonal frame (u, v, `normal`).
+/// Two unit vectors u, v that form a right-handed orthogonal frame (u, v, `normal`).
 pub fn tangents(normal: &Vector) -> (Vector, Vector) {
     let least = normal.iamin();
     let mut axis = Vector::zeros();
@@ -29,17 +31,19 @@ pub fn tangents(normal: &Vector) -> (Vector, Vector) {
     (u, normal.cross(&u))
 }
 
-/// The part of `vector` that is orthogonal to the unit vector `axis`.
+/// The component of `vector` orthogonal to the unit vector `axis`.
 #[inline]
 pub fn reject(vector: &Vector, axis: &Vector) -> Vector {
     vector - axis * vector.dot(axis)
 }
 
-/// Newton's steps along the gradient until the value no longer gets smaller: brings a point that is on
-/// the surface up to rounding of a closed form to within rounding of its coordinates.
+/// Refines a point by Newton steps along the gradient while the value decreases.
+///
+/// The point must be on the surface up to rounding of a closed formula; the result is accurate up
+/// to rounding of its coordinates.
 #[inline]
 pub fn polish(mut point: Point, value: impl Fn(&Point) -> f64, gradient: impl Fn(&Point) -> Vector) -> Point {
-    /// One step repairs the rounding of a closed form; the second sees that it did.
+    /// One step removes the rounding error of a closed formula; a second confirms it.
     const STEPS: usize = 3;
     let mut best = value(&point);
     for _ in 0..STEPS {
@@ -58,16 +62,17 @@ pub fn polish(mut point: Point, value: impl Fn(&Point) -> f64, gradient: impl Fn
     point
 }
 
-/// The steps that bracketed Newton iterations may take; they need about ten.
+/// Limit for bracketed Newton iterations, which need about ten steps.
 const ITERATIONS: usize = 100;
 
 /// The nearest point to `y` on Σ (xᵢ/rᵢ)² = 1.
 ///
-/// It is xᵢ = rᵢ²yᵢ/(t + rᵢ²), t the largest root of Σ (rᵢyᵢ/(t + rᵢ²))² = 1 (Eberly 2013, Distance from
-/// a point to an ellipse, an ellipsoid or a hyperellipsoid). The left side falls and is convex, so
-/// Newton's method from a point left of the root climbs to it. If y lies in the plane across the shortest
-/// axis and near the centre, there is no such root past -r²; two points are then equally near and
-/// the one with the positive coordinate is taken.
+/// It is xᵢ = rᵢ²yᵢ/(t + rᵢ²), with t the largest root of Σ (rᵢyᵢ/(t + rᵢ²))² = 1 (Eberly 2013,
+/// Distance from a point to an ellipse, an ellipsoid or a hyperellipsoid). The left side is
+/// decreasing and convex, so Newton's method started left of the root increases monotonically to
+/// it. If y lies in the plane perpendicular to the shortest axis and near the center, there is no
+/// such root greater than -r²; then two points are equally near, and the one with positive
+/// coordinate is returned.
 pub fn nearest_on_ellipsoid<const N: usize>(y: [f64; N], radii: [f64; N]) -> [f64; N] {
     let shortest = (0..N).fold(0, |best, i| if radii[i] < radii[best] { i } else { best });
     let pole = -radii[shortest] * radii[shortest];
@@ -113,10 +118,11 @@ pub fn nearest_on_ellipsoid<const N: usize>(y: [f64; N], radii: [f64; N]) -> [f6
 
 /// The nearest point to `y` on the cone (x₀/a)² + (x₁/b)² = (x₂/c)²; `radii` is `[a, b, c]`.
 ///
-/// It is xᵢ = rᵢ²yᵢ/(rᵢ² ± t) with + for the first two, t the root of (a y₀/(a²+t))² + (b y₁/(b²+t))² -
-/// (c y₂/(c²-t))² between -min(a, b)² and c², where the left side falls and the second-order condition of
-/// a least distance holds. Where an end of that range has no pole (a coordinate is zero), the root may be
-/// beyond it: t is then the end, and that coordinate follows from the equation of the cone, positive.
+/// It is xᵢ = rᵢ²yᵢ/(rᵢ² ± t) with + for the first two, where t is the root of (a y₀/(a²+t))² + (b
+/// y₁/(b²+t))² - (c y₂/(c²-t))² between -min(a, b)² and c². In this interval the left side is
+/// decreasing and the second-order condition for a minimum holds. If an end of the interval has no
+/// pole because a coordinate is zero, the root may be beyond it: then t is that end, and the
+/// coordinate follows from the equation of the cone, positive.
 pub fn nearest_on_cone(y: [f64; 3], radii: [f64; 3]) -> [f64; 3] {
     let [a2, b2, c2] = radii.map(|r| r * r);
     let shortest = if radii[0] <= radii[1] { 0 } else { 1 };

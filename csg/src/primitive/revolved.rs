@@ -1,8 +1,8 @@
-//! What an ellipse leaves behind that turns about an axis in its plane: the ellipse's function of (ρ, h), the
-//! distance from the axis and the height along it.
+//! The surface of revolution of an ellipse: the ellipse's function of (ρ, h), with ρ the distance
+//! from the axis and h the height along it.
 //!
-//! Of the ellipse the part with ρ ≥ 0 counts. Not smooth on the axis, but where it meets the axis at a right angle: there
-//! the surface is a cap.
+//! Only the part of the ellipse with ρ ≥ 0 is used. The surface is not smooth on the axis, unless
+//! the ellipse meets the axis at a right angle and forms a cap.
 
 use super::quadric::{largest_curvature, reject, tangents};
 use super::{Ellipse, Primitive, Revolved, direction_range, reject_range};
@@ -10,11 +10,13 @@ use crate::interval::{Cell, Interval, dot, offset};
 use crate::{Point, ProjectionFailed, Vector};
 use nalgebra::{Isometry3, Matrix3};
 
-/// This part of the larger semi-axis from the axis is on it: the direction from there is rounding.
+/// Distances from the axis below this fraction of the larger semi-axis count as zero, because the
+/// radial direction is rounding.
 const ON_AXIS: f64 = 1e-12;
 
-/// The ranges over a box of (ρ, h), and of the directions of ∇ρ × ∇h, `None` if the axis passes through the box.
-pub(crate) fn turned_ranges(origin: &Point, axis: &Vector, cell: &Cell) -> ([Interval; 2], Option<Cell>) {
+/// The ranges over a box of (ρ, h) and of ∇ρ × ∇h; the latter is `None` if the axis passes through
+/// the box.
+pub(crate) fn meridian_ranges(origin: &Point, axis: &Vector, cell: &Cell) -> ([Interval; 2], Option<Cell>) {
     let arm = offset(cell, origin);
     let ([x, y, z], distance) = direction_range(&reject_range(&arm, axis));
     let forward = || [y * axis.z - z * axis.y, z * axis.x - x * axis.z, x * axis.y - y * axis.x];
@@ -22,7 +24,7 @@ pub(crate) fn turned_ranges(origin: &Point, axis: &Vector, cell: &Cell) -> ([Int
 }
 
 impl Revolved {
-    /// The vector from the axis, and the distance from it and the height.
+    /// The vector from the axis, and the coordinates (ρ, h).
     #[inline]
     fn split(&self, point: &Point) -> (Vector, [f64; 2]) {
         let arm = point - self.point;
@@ -30,7 +32,7 @@ impl Revolved {
         (across, [across.norm(), arm.dot(&self.axis)])
     }
 
-    /// No point of it is farther than this from `point`.
+    /// An upper bound of the distance of the surface from `point`.
     pub(crate) fn reach(&self) -> f64 {
         let Ellipse { center, radii, .. } = &self.profile;
         center[0].hypot(center[1]) + radii[0].max(radii[1])
@@ -40,7 +42,7 @@ impl Revolved {
         distance <= ON_AXIS * self.profile.radii[0].max(self.profile.radii[1])
     }
 
-    /// The point farthest in a direction, a unit vector; `None` if it is on the part that does not count.
+    /// The support point in a unit direction; `None` if it is on the unused part of the ellipse.
     pub(crate) fn support(&self, direction: &Vector) -> Option<Point> {
         let across = reject(direction, &self.axis);
         let outward = across.try_normalize(1e-9).unwrap_or_else(|| tangents(&self.axis).0);
@@ -85,7 +87,7 @@ impl Primitive for Revolved {
         let (across, at) = self.split(point);
         let [distance, height] = self.profile.nearest(at);
         if distance <= 0.0 {
-            // The nearest point of the part that counts is where it ends, on the axis.
+            // The nearest point of the used part is one of its ends, on the axis.
             let Some((middle, half)) = self.profile.right_part() else {
                 return Err(ProjectionFailed(*point));
             };

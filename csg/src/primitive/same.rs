@@ -1,22 +1,22 @@
-//! Whether two surfaces are the same set of points.
+//! Comparison of surfaces as point sets.
 
 use super::quadric::tangents;
 use super::{Ellipsoid, EllipticCone, EllipticCylinder, Nappe, Plane, Revolved, Section, Sweep, Torus};
 use crate::{Surface, Vector};
 use nalgebra::Matrix3;
 
-/// The largest sine of an angle, and the largest relative difference of slopes, that count as none.
+/// Largest sine of an angle, and largest relative difference of slopes, between equal surfaces.
 ///
-/// Directions in files are typed with five or six digits: 1.5708 for a right angle is off by 3.7e-6 and
-/// means the same surface. Two surfaces that cross at less than this leave a wedge no mesh can resolve.
-/// (NETGEN takes 1.4e-4.)
+/// Directions in files have five or six digits: 1.5708 for a right angle is off by 3.7e-6 and means
+/// the same surface. Two surfaces that cross at a smaller angle leave a wedge that no mesh
+/// resolves. (NETGEN uses 1.4e-4.)
 const SAME_DIRECTION: f64 = 1e-5;
 
 fn parallel(a: &Vector, b: &Vector) -> bool {
     a.cross(b).norm() <= SAME_DIRECTION
 }
 
-/// Spheres as ellipsoids, circular cylinders and cones as elliptic ones.
+/// Converts spheres to ellipsoids, and circular cylinders and cones to elliptic ones.
 fn generalized(surface: &Surface) -> Surface {
     match surface {
         Surface::Sphere(s) => Surface::Ellipsoid(Ellipsoid {
@@ -42,7 +42,7 @@ fn generalized(surface: &Surface) -> Surface {
     }
 }
 
-/// See [`Surface::same_as`].
+/// Compares two surfaces, see [`Surface::same_as`].
 pub fn same(a: &Surface, b: &Surface, tolerance: f64) -> Option<bool> {
     match (generalized(a), generalized(b)) {
         (Surface::Plane(a), Surface::Plane(b)) => same_plane(&a, &b, tolerance),
@@ -74,7 +74,8 @@ fn same_torus(a: &Torus, b: &Torus, tolerance: f64) -> bool {
         && (a.minor - b.minor).abs() <= tolerance
 }
 
-/// The matrix with these eigenvectors and eigenvalues: does not depend on the order and choice of axes.
+/// The matrix with the given eigenvectors and eigenvalues; independent of the order and choice of
+/// axes.
 fn shape(axes: &[Vector], radii: &[f64]) -> Matrix3<f64> {
     axes.iter().zip(radii).map(|(axis, &radius)| axis * axis.transpose() * radius).sum()
 }
@@ -100,13 +101,14 @@ fn same_elliptic_cone(a: &EllipticCone, b: &EllipticCone, tolerance: f64) -> boo
 }
 
 fn same_nappe(a: &Nappe, b: &Nappe, tolerance: f64) -> bool {
-    // The direction along which the radius grows.
+    // Points in the direction in which the radius grows.
     let slopes = |c: &Nappe| c.axis * c.slope;
     (a.apex() - b.apex()).norm() <= tolerance
         && (slopes(a) - slopes(b)).norm() <= SAME_DIRECTION * slopes(a).norm()
 }
 
-/// Those that run the same way only; of others nobody would say that they are the same.
+/// Whether two sweeps are equal and have the same direction; sweeps with opposite direction count
+/// as different.
 fn same_sweep(a: &Sweep, b: &Sweep, tolerance: f64) -> bool {
     let near = |[p, q]: [f64; 2], [r, s]: [f64; 2], room: f64| (p - r).abs() <= room && (q - s).abs() <= room;
     let sections = match (&a.section, &b.section) {
@@ -127,7 +129,7 @@ fn same_sweep(a: &Sweep, b: &Sweep, tolerance: f64) -> bool {
         && (a.up - b.up).norm() <= SAME_DIRECTION
 }
 
-/// Whether the ellipses about one centre in one plane are the same, whichever of their axes they start from.
+/// Whether two concentric coplanar ellipses are equal, whichever axis is the first.
 fn same_path(a: &Sweep, b: &Sweep, tolerance: f64) -> bool {
     let side = b.axis.cross(&b.start);
     let [p, q] = b.radii;
@@ -138,7 +140,7 @@ fn same_path(a: &Sweep, b: &Sweep, tolerance: f64) -> bool {
 }
 
 fn same_revolved(a: &Revolved, b: &Revolved, tolerance: f64) -> bool {
-    // Both centres and shapes in the half-plane, upwards along the axis of `a`.
+    // Compare centers and shapes in the half-plane, with heights along the axis of `a`.
     let up = if a.axis.dot(&b.axis) < 0.0 { -1.0 } else { 1.0 };
     let center = |r: &Revolved, sign: f64| {
         let foot = r.point + r.axis * r.profile.center[1];

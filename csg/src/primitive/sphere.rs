@@ -1,4 +1,4 @@
-//! The sphere: (|x - c|² - r²)/2r.
+//! The sphere: (|x - c|² - r²)/2r, with center c.
 
 use super::{Primitive, Sphere};
 use crate::interval::{Cell, Interval, offset};
@@ -8,7 +8,7 @@ use nalgebra::{Isometry3, Matrix3};
 impl Primitive for Sphere {
     fn value(&self, point: &Point) -> f64 {
         let distance = (point - self.center).norm();
-        // The difference of squares as a product: no cancellation of large squares near the surface.
+        // The difference of squares as a product, to avoid cancellation near the surface.
         (distance - self.radius) * (distance + self.radius) / (2.0 * self.radius)
     }
 

@@ -1,13 +1,14 @@
-//! What a line or an ellipse sweeps that moves along an ellipse or a circle in the plane across it, and turns there.
+//! The surface swept by a line or an ellipse along an elliptic or circular path.
 //!
-//! Where the path's normal is at an angle θ the plane across has the directions outward e and along the axis n. The section's y points
-//! along the part of a fixed vector `up` in that plane: (cos ψ, sin ψ) in the directions n and e with
-//! tan ψ = up·e / up·n. So (X, Y) = (q cos ψ - z sin ψ, q sin ψ + z cos ψ) with q the distance from the path in its plane (see
-//! [`course`]) and z the height; the function is the section's, g(X, Y). Not smooth where points have
-//! several nearest ones on the path.
+//! At the angle θ of the path's normal, the perpendicular plane is spanned by the outward direction
+//! e and the axis n. The section's y axis is the projection of the fixed vector `up` to that plane:
+//! (cos ψ, sin ψ) in the directions n and e, with tan ψ = up·e / up·n. So (X, Y) = (q cos ψ - z sin
+//! ψ, q sin ψ + z cos ψ), with q the distance from the path in its plane (see [`elliptic_path`])
+//! and z the height. The implicit function is that of the section, g(X, Y). It is not smooth at
+//! points with several nearest points on the path.
 
 use super::quadric::{largest_curvature, reject};
-use super::{Ellipse, Primitive, Section, Sweep, course, direction_range, reject_range};
+use super::{Ellipse, Primitive, Section, Sweep, direction_range, elliptic_path, reject_range};
 use crate::interval::{Cell, Interval, dot, middle, offset};
 use crate::{Point, ProjectionFailed, Vector};
 use nalgebra::{Isometry3, Matrix3, Matrix4, Vector4};
@@ -27,7 +28,7 @@ impl Section {
         }
     }
 
-    /// The second derivatives xx, xy, yy.
+    /// The second derivatives (xx, xy, yy).
     pub(crate) fn hessian(&self) -> [f64; 3] {
         match self {
             Self::Line { .. } => [0.0; 3],
@@ -60,19 +61,20 @@ impl Section {
     }
 }
 
-/// The plane across the path through a point, and where the point is in it.
-struct Across {
-    /// Outward and along the path.
+/// The plane perpendicular to the path through a point, and the coordinates of the point.
+struct SectionFrame {
+    /// Unit directions outward from and along the path.
     outward: Vector,
     along: Vector,
-    /// From the path's centre of curvature, and the derivative of its radius of curvature by θ.
+    /// Distance from the path's center of curvature, and the derivative of the radius of curvature
+    /// with respect to θ.
     distance: f64,
     growth: f64,
-    /// cos ψ, sin ψ and the first two derivatives of ψ by θ.
+    /// cos ψ, sin ψ, and the first two derivatives of ψ with respect to θ.
     cos: f64,
     sin: f64,
     turns: [f64; 2],
-    /// The coordinates of the section.
+    /// The coordinates (X, Y) in the section.
     at: [f64; 2],
 }
 
@@ -82,17 +84,17 @@ impl Sweep {
         self.radii[0] == self.radii[1]
     }
 
-    /// The largest distance of the path from its centre.
-    pub fn reach(&self) -> f64 {
+    /// The largest distance of the path from its center.
+    pub(crate) fn reach(&self) -> f64 {
         self.radii[0].max(self.radii[1])
     }
 
     /// The path's least radius of curvature.
-    pub fn least_bend(&self) -> f64 {
-        course::least_bend(self.radii)
+    pub(crate) fn least_curvature_radius(&self) -> f64 {
+        elliptic_path::least_curvature_radius(self.radii)
     }
 
-    fn across(&self, point: &Point) -> Across {
+    fn section_frame(&self, point: &Point) -> SectionFrame {
         let arm = point - self.center;
         let (outward, q, distance, growth);
         if self.is_round() {
@@ -101,8 +103,8 @@ impl Sweep {
             (outward, q) = (across.try_normalize(0.0).unwrap_or_default(), distance - self.radii[0]);
         } else {
             let side = self.axis.cross(&self.start);
-            let seen = course::beside(self.radii, [arm.dot(&self.start), arm.dot(&side)]);
-            let [radius, change] = seen.bend;
+            let seen = elliptic_path::foot(self.radii, [arm.dot(&self.start), arm.dot(&side)]);
+            let [radius, change] = seen.curvature_radius;
             outward = self.start * seen.normal[0] + side * seen.normal[1];
             (q, distance, growth) = (seen.distance, radius + seen.distance, change);
         }
@@ -113,13 +115,13 @@ impl Sweep {
         found
     }
 
-    fn frame(&self, outward: Vector) -> Across {
+    fn frame(&self, outward: Vector) -> SectionFrame {
         let along = self.axis.cross(&outward);
         let [d, t, n] = [outward, along, self.axis].map(|v| self.up.dot(&v));
         let square = d * d + n * n;
         let length = square.sqrt();
         let turns = [t * n / square, -n * d * (square + 2.0 * t * t) / (square * square)];
-        Across {
+        SectionFrame {
             outward,
             along,
             distance: 0.0,
@@ -131,25 +133,26 @@ impl Sweep {
         }
     }
 
-    /// The parameter of the path beside a point, from `start`, -π to π, and its place in the section.
+    /// The path parameter of the nearest path point, in [-π, π] from `start`, and the coordinates
+    /// in the section.
     pub fn coordinates(&self, point: &Point) -> (f64, [f64; 2]) {
-        let found = self.across(point);
+        let found = self.section_frame(point);
         let normal = [self.start, self.axis.cross(&self.start)].map(|v| found.outward.dot(&v));
-        (course::angle_of(self.radii, normal), found.at)
+        (elliptic_path::angle_of(self.radii, normal), found.at)
     }
 
-    /// The point with these coordinates.
+    /// The point with the given path parameter and section coordinates.
     pub fn place(&self, angle: f64, [x, y]: [f64; 2]) -> Point {
         let side = self.axis.cross(&self.start);
         let along = |[p, q]: [f64; 2]| self.start * p + side * q;
-        let outward = along(course::normal_at(self.radii, angle));
+        let outward = along(elliptic_path::normal_at(self.radii, angle));
         let (sin, cos) = angle.sin_cos();
         let frame = self.frame(outward);
         let [q, z] = [frame.cos * x + frame.sin * y, frame.cos * y - frame.sin * x];
         self.center + along([self.radii[0] * cos, self.radii[1] * sin]) + outward * q + self.axis * z
     }
 
-    /// The ranges over a box of: outward, the distance from the centre of curvature, along, cos ψ, sin ψ, ψ', and (X, Y).
+    /// The ranges over a box of all quantities of a section frame, and of (q, z).
     fn ranges(&self, cell: &Cell) -> Ranges {
         let arm = offset(cell, &self.center);
         let (outward, distance, q) = if self.is_round() {
@@ -171,25 +174,26 @@ impl Sweep {
         Ranges { outward, distance, along, cos, sin, turn: t * n / square, across: [q, z], at }
     }
 
-    /// The ranges of outward, the distance from the centre of curvature, and that from the path, which is not a circle.
+    /// The ranges of the outward direction, the distance from the center of curvature, and q, for
+    /// an elliptic path.
     fn ranges_beside(&self, cell: &Cell) -> (Cell, Interval, Interval) {
         let side = self.axis.cross(&self.start);
         let center = middle(cell);
         let arm = center - self.center;
         let at = [arm.dot(&self.start), arm.dot(&side)];
         let reach = 0.5 * cell.iter().map(|side| side.width().powi(2)).sum::<f64>().sqrt();
-        let ([c, s], distance) = course::ranges(self.radii, at, reach);
+        let ([c, s], distance) = elliptic_path::ranges(self.radii, at, reach);
         let outward = [0, 1, 2].map(|i| c * self.start[i] + s * side[i]);
-        // The distance from the path has the normal for its gradient.
+        // The gradient of the distance from the path is the normal.
         let rounding = 16.0 * f64::EPSILON * (self.reach() + arm.norm() + reach);
-        let seen = course::beside(self.radii, at).distance;
+        let seen = elliptic_path::foot(self.radii, at).distance;
         let seen = Interval::new(seen - rounding, seen + rounding);
         let way = offset(cell, &center);
         let q = seen + c * dot(&self.start, &way) + s * dot(&side, &way);
         (outward, distance, q.intersect(seen + Interval::new(-reach, reach)))
     }
 
-    /// Whether another section moves with this one.
+    /// Whether another sweep has the same path and the same frame.
     pub(crate) fn is_along(&self, other: &Self) -> bool {
         self.center == other.center
             && self.axis == other.axis
@@ -198,17 +202,21 @@ impl Sweep {
             && self.up == other.up
     }
 
-    /// The ranges over a box of (X, Y), and of directions of ∇X × ∇Y, which are against those in which points of the section
-    /// move; `None` if the axis passes through the box.
+    /// The ranges over a box of (X, Y) and of ∇X × ∇Y; the latter is `None` if the box may contain
+    /// a center of curvature.
+    ///
+    /// ∇X × ∇Y is opposite to the direction in which points of the section move.
     pub(crate) fn plane_ranges(&self, cell: &Cell) -> ([Interval; 2], Option<Cell>) {
         let r = self.ranges(cell);
         let [q, z] = r.across;
-        // With θ a point moves along the path, and around the path as its plane turns.
+        // The derivative of a point of the section with respect to θ: along the path, plus the
+        // rotation of the section.
         let moved = |i: usize| r.along[i] * r.distance + (r.outward[i] * z - q * self.axis[i]) * r.turn;
         (r.at, (r.distance.lo > 0.0).then(|| [0, 1, 2].map(|i| -moved(i))))
     }
 }
 
+/// The ranges of the quantities of a [`SectionFrame`] over a box.
 struct Ranges {
     outward: Cell,
     distance: Interval,
@@ -216,34 +224,34 @@ struct Ranges {
     cos: Interval,
     sin: Interval,
     turn: Interval,
-    /// The distance from the path in its plane, and the height.
+    /// The distance q from the path in its plane, and the height z.
     across: [Interval; 2],
     at: [Interval; 2],
 }
 
 impl Primitive for Sweep {
     fn value(&self, point: &Point) -> f64 {
-        self.section.value(self.across(point).at)
+        self.section.value(self.section_frame(point).at)
     }
 
     fn gradient(&self, point: &Point) -> Vector {
-        let a = self.across(point);
+        let a = self.section_frame(point);
         let [gx, gy] = self.section.gradient(a.at);
         let round =
             if a.distance > 0.0 { a.turns[0] * (gy * a.at[0] - gx * a.at[1]) / a.distance } else { 0.0 };
         a.outward * (gx * a.cos + gy * a.sin) + self.axis * (gy * a.cos - gx * a.sin) + a.along * round
     }
 
-    /// By the chain rule in coordinates along the path.
+    /// The Hessian by the chain rule in coordinates along the path.
     fn hessian(&self, point: &Point) -> Matrix3<f64> {
-        let Across { outward, along, distance, growth, cos, sin, turns: [turn, bend], at: [x, y] } =
-            self.across(point);
+        let SectionFrame { outward, along, distance, growth, cos, sin, turns: [turn, bend], at: [x, y] } =
+            self.section_frame(point);
         if distance == 0.0 {
             return Matrix3::zeros();
         }
         let ([gx, gy], [xx, xy, yy]) = (self.section.gradient([x, y]), self.section.hessian());
         let form = |[a, b]: [f64; 2], [c, d]: [f64; 2]| xx * a * c + xy * (a * d + b * c) + yy * b * d;
-        // Derivatives of (X, Y) by q, z and θ.
+        // Derivatives of (X, Y) with respect to q, z and θ.
         let (by_q, by_z, by_t) = ([cos, sin], [-sin, cos], [-turn * y, turn * x]);
         let slope = |[a, b]: [f64; 2]| gx * a + gy * b;
         let (qq, qz, zz) = (form(by_q, by_q), form(by_q, by_z), form(by_z, by_z));
@@ -261,13 +269,14 @@ impl Primitive for Sweep {
         largest_curvature(&self.gradient(point), &self.hessian(point))
     }
 
-    /// The nearest point if the point is near to the surface; else the nearest one in the plane across the path will do.
+    /// The nearest point if `point` is near the surface; otherwise the nearest one in the
+    /// perpendicular plane.
     ///
-    /// From the nearest point in the plane across the path by Newton's method for the point and the multiplier λ in
-    /// x + λ ∇f(x) = p, f(x) = 0.
+    /// Starts at the nearest point in the plane perpendicular to the path, and applies Newton's
+    /// method to the point x and the multiplier λ in x + λ ∇f(x) = p, f(x) = 0.
     fn project(&self, point: &Point) -> Result<Point, ProjectionFailed> {
         const STEPS: usize = 20;
-        /// The rest of the equations, as a part of the radius, of what counts as a solution.
+        /// Largest residual of a solution, relative to the radius.
         const SOLVED: f64 = 1e-10;
         let (angle, at) = self.coordinates(point);
         let across = self.place(angle, self.section.nearest(at));
@@ -298,7 +307,8 @@ impl Primitive for Sweep {
 
     fn natural_range(&self, cell: &Cell) -> Interval {
         let r = self.ranges(cell);
-        // A circle about the path does not change as it turns, though where it turns fast little is known of (X, Y).
+        // A circle about the path is invariant under rotation of the section. Where the section
+        // rotates fast, the range of (X, Y) would be wide.
         let is_tube = |e: &Ellipse| e.center == [0.0; 2] && e.radii[0] == e.radii[1];
         match &self.section {
             Section::Ellipse(e) if is_tube(e) => e.value_range(r.across),

@@ -1,4 +1,4 @@
-//! What every primitive must answer, asked of one of each kind in a skew position.
+//! Properties of all primitives, tested on one of each kind in a skew position.
 
 use super::*;
 use crate::Surface;
@@ -12,7 +12,7 @@ fn skew() -> Isometry3<f64> {
     )
 }
 
-/// One of each kind, about as large as 1.
+/// One surface of each kind, of about unit size.
 fn straight() -> Vec<Surface> {
     let (x, y, z) = (Vector::x(), Vector::y(), Vector::z());
     let o = Point::origin();
@@ -39,7 +39,7 @@ fn ellipse(center: [f64; 2], radii: [f64; 2]) -> Ellipse {
     Ellipse { center, axis: [0.8, 0.6], radii }
 }
 
-/// Along an ellipse about the origin.
+/// A sweep along an ellipse about the origin.
 fn sweep(radii: [f64; 2], section: Section) -> Surface {
     let (axis, start, up) = (Vector::z(), Vector::x(), Vector::new(0.48, 0.36, 0.8));
     Surface::Sweep(Sweep { center: Point::origin(), axis, start, radii, up, section })
@@ -56,7 +56,8 @@ fn point() -> impl Strategy<Value = Point> {
     [-1.5..1.5f64, -1.5..1.5f64, -1.5..1.5f64].prop_map(Point::from)
 }
 
-/// Where derivatives are not defined: the axis of a torus and of what else turns about one.
+/// Whether a point is near the axis of a torus or another surface of revolution, where derivatives
+/// are undefined.
 fn on_torus_axis(surface: &Surface, point: &Point) -> bool {
     let (center, axis) = match surface {
         Surface::Torus(t) => (t.center, t.axis),
@@ -68,19 +69,20 @@ fn on_torus_axis(surface: &Surface, point: &Point) -> bool {
     (point - center).cross(&axis).norm() < 0.05
 }
 
-/// Whether a point is so far inside of the ellipse along which a section moves that its normals come together there.
-fn is_where_path_bends_about(surface: &Surface, point: &Point) -> bool {
+/// Whether a point is so far inside an elliptic sweep path that the normals of the path nearly
+/// meet.
+fn is_near_path_evolute(surface: &Surface, point: &Point) -> bool {
     let Surface::Sweep(s) = surface else { return false };
     let arm = point - s.center;
     let at = [arm.dot(&s.start), arm.dot(&s.axis.cross(&s.start))];
-    !s.is_round() && course::beside(s.radii, at).distance < -0.8 * s.least_bend()
+    !s.is_round() && elliptic_path::foot(s.radii, at).distance < -0.8 * s.least_curvature_radius()
 }
 
 proptest! {
     #![proptest_config(crate::seeded())]
 
     #[test]
-    fn gradient_and_hessian_are_those_of_finite_differences(s in surface(), p in point()) {
+    fn gradient_and_hessian_agree_with_finite_differences(s in surface(), p in point()) {
         prop_assume!(!on_torus_axis(&s, &p));
         let h = 1e-5;
         for i in 0..3 {
@@ -94,7 +96,7 @@ proptest! {
     }
 
     #[test]
-    fn projections_lie_on_the_surface_and_stay_where_they_are(s in surface(), p in point()) {
+    fn projection_lies_on_the_surface_and_is_idempotent(s in surface(), p in point()) {
         let q = s.project(&p).unwrap();
         prop_assert!(s.distance(&q) <= 8.0 * f64::EPSILON, "{} away", s.distance(&q));
         let again = s.project(&q).unwrap();
@@ -105,11 +107,11 @@ proptest! {
     fn no_other_point_of_the_surface_is_nearer_than_the_projection(
         s in surface(), p in point(), others in prop::collection::vec(point(), 40),
     ) {
-        // The swept ones find it from nearby only.
+        // Sweeps find the nearest point only from nearby.
         prop_assume!(!matches!(s, Surface::Sweep(_)) || (s.distance(&p) < 0.2 && !on_torus_axis(&s, &p)));
         let q = s.project(&p).unwrap();
         for other in others {
-            // Points near the foot are the dangerous ones, and far ones show a wrong branch.
+            // Points near the foot test local optimality, distant points detect a wrong branch.
             for candidate in [other, q + (other - q) * 0.01] {
                 let on = s.project(&candidate).unwrap();
                 prop_assert!((p - q).norm() <= (p - on).norm() + 1e-13);
@@ -124,7 +126,7 @@ proptest! {
         let cell = [0, 1, 2].map(|i| Interval::new(p[i], p[i] + size));
         let q = Point::from([0, 1, 2].map(|i| cell[i].lo + at[i] * cell[i].width()));
         prop_assume!(!on_torus_axis(&s, &q));
-        // The value at the point is itself rounded.
+        // The value at the point has rounding errors too.
         let slack = 1e-14;
         let range = s.value_range(&cell);
         prop_assert!(range.lo - slack <= s.value(&q) && s.value(&q) <= range.hi + slack);
@@ -135,10 +137,10 @@ proptest! {
     }
 
     #[test]
-    fn ranges_over_small_boxes_are_as_wide_as_the_slope_asks(s in surface(), p in point()) {
+    fn ranges_over_small_boxes_are_tight(s in surface(), p in point()) {
         let size = 1e-3;
         let q = s.project(&p).unwrap();
-        prop_assume!(!is_where_path_bends_about(&s, &q));
+        prop_assume!(!is_near_path_evolute(&s, &q));
         prop_assume!(s.gradient(&q).norm() > 0.1 && !on_torus_axis(&s, &q));
         let cell = [0, 1, 2].map(|i| Interval::new(q[i] - size, q[i] + size));
         let slope: f64 = s.gradient(&q).iter().map(|g| g.abs()).sum();
@@ -152,7 +154,7 @@ proptest! {
     }
 
     #[test]
-    fn curvature_is_how_fast_the_normal_turns(s in surface(), p in point()) {
+    fn curvature_is_the_rate_of_rotation_of_the_normal(s in surface(), p in point()) {
         let q = s.project(&p).unwrap();
         prop_assume!(s.curvature(&q) < 20.0);
         let normal = s.normal(&q);
@@ -179,14 +181,14 @@ fn gradients_are_unit_vectors_on_plane_sphere_cylinder_and_torus() {
 }
 
 #[test]
-fn the_centre_of_an_ellipsoid_goes_to_the_end_of_its_shortest_axis() {
+fn the_center_of_an_ellipsoid_projects_to_the_end_of_its_shortest_axis() {
     let [_, _, _, _, _, ellipsoid, cylinder, ..] = &straight()[..] else { unreachable!() };
     assert!((ellipsoid.project(&Point::origin()).unwrap() - Point::new(0.0, 0.5, 0.0)).norm() < 1e-15);
     assert!((cylinder.project(&Point::origin()).unwrap() - Point::new(0.4, 0.0, 0.0)).norm() < 1e-15);
 }
 
 #[test]
-fn the_centre_of_a_sphere_has_no_projection() {
+fn the_center_of_a_sphere_has_no_projection() {
     assert!(straight()[1].project(&Point::origin()).is_err());
 }
 
@@ -195,12 +197,12 @@ fn points_on_the_axes_of_an_elliptic_cone_are_projected() {
     let cone = &straight()[7];
     for p in [Point::new(0.0, 0.0, 0.4), Point::new(0.3, 0.0, -1.0 / 0.6), Point::new(0.0, 0.0, -1.0 / 0.6)] {
         let q = cone.project(&p).unwrap();
-        assert!(cone.value(&q).abs() < 1e-14, "{p} goes to {q}");
+        assert!(cone.value(&q).abs() < 1e-14, "{p} is projected to {q}");
     }
 }
 
 #[test]
-fn equal_surfaces_are_found_equal_however_they_are_written() {
+fn equal_surfaces_with_different_parameters_are_recognized() {
     let shifted = |s: &Surface, by: Vector| s.transformed(&Isometry3::translation(by.x, by.y, by.z));
     for (i, a) in straight().iter().enumerate() {
         for (j, b) in straight().iter().enumerate() {

@@ -1,6 +1,6 @@
-//! The torus: ((ρ - R)² + τ² - r²)/2r, ρ the distance from the axis, τ the height.
+//! The torus: ((ρ - R)² + τ² - r²)/2r, with ρ the distance from the axis and τ the height.
 //!
-//! Not smooth on the axis, which a ring torus keeps clear of.
+//! Not smooth on the axis, which a ring torus does not meet.
 
 use super::quadric::{reject, tangents};
 use super::{Primitive, Torus, reject_range};
@@ -9,7 +9,7 @@ use crate::{Point, ProjectionFailed, Vector};
 use nalgebra::{Isometry3, Matrix3};
 
 impl Torus {
-    /// The point farthest in a direction, a unit vector.
+    /// The support point in a unit direction.
     pub(crate) fn support(&self, direction: &Vector) -> Point {
         let across = reject(direction, &self.axis);
         let outward = across.try_normalize(1e-9).unwrap_or_else(|| tangents(&self.axis).0);

@@ -1,25 +1,24 @@
-//! A mesh of ours and one of TetGen's inside the same surface: what must agree, and how good both are.
+//! Checks meshes of tetmill and TetGen inside the same surface, and measures their quality.
 
 use crate::samples::volumes::{assert_same_volumes, volumes_by_surface, volumes_by_tets};
 use csg::BodyId;
 use std::collections::{BTreeMap, BTreeSet};
 use tetgen_ffi::{Error, TetgenMesh, tetrahedralize};
 use tetmill::Point;
-use tetmill::kernel::quality::QualitySummary;
-use tetmill::mesh::{Mesh, TET_FACES, VertexId};
-use tetmill::volume::ClosedSurface;
+use tetmill::internals::volume::ClosedSurface;
+use tetmill::mesh::{Mesh, QualitySummary, TET_FACES, VertexId};
 
-/// Of each face, by its sorted vertices, the bodies behind it and in front of it.
+/// The bodies behind and in front of each face, by its sorted vertices.
 type Sides<R> = BTreeMap<[u32; 3], [Option<R>; 2]>;
 
-/// The sorted vertices, and whether they go round the same way.
+/// The sorted vertices, and whether the permutation is even.
 fn sorted(mut face: [u32; 3]) -> ([u32; 3], bool) {
     let before = face;
     face.sort_unstable();
     (face, (0..3).any(|k| face == [before[k], before[(k + 1) % 3], before[(k + 2) % 3]]))
 }
 
-/// The faces of tets, and what has a tet on either side.
+/// The faces of tets with the bodies on both sides.
 fn sides<R: Copy>(tets: impl Iterator<Item = ([u32; 4], R)>) -> Sides<R> {
     let mut sides = Sides::new();
     for (tet, region) in tets {
@@ -32,7 +31,7 @@ fn sides<R: Copy>(tets: impl Iterator<Item = ([u32; 4], R)>) -> Sides<R> {
     sides
 }
 
-/// The surface between the bodies of a mesh and round them; its vertices come first in the mesh.
+/// The surface around and between the bodies of a mesh; its vertices come first in the mesh.
 pub fn surface_of(mesh: &Mesh) -> ClosedSurface {
     let tets = mesh.tets.iter().map(|t| t.map(|v| v.0)).zip(mesh.bodies.iter().copied());
     let (triangles, regions): (Vec<[u32; 3]>, Vec<_>) =
@@ -42,8 +41,10 @@ pub fn surface_of(mesh: &Mesh) -> ClosedSurface {
     ClosedSurface::new(mesh.points[..used.len()].to_vec(), triangles, regions).unwrap()
 }
 
-/// Asserts that tets fill a surface: the same points first, the same triangles between the same bodies and no others, and each
-/// body's volume, all exactly. Triangles within one body need only be there.
+/// Asserts that tets fill a surface exactly.
+///
+/// The points come first, the triangles separate the same bodies, no other faces do, and each body
+/// has its volume. A triangle inside one body only needs to be a face.
 fn check_fills(what: &str, surface: &ClosedSurface, points: &[Point], tets: &[([u32; 4], BodyId)]) {
     assert!(points[..surface.points().len()] == *surface.points(), "{what}: other points");
     let mut found = sides(tets.iter().copied());
@@ -59,20 +60,21 @@ fn check_fills(what: &str, surface: &ClosedSurface, points: &[Point], tets: &[([
     assert_same_volumes(what, &by_surface, &by_tets);
 }
 
-/// Asserts that tets of ours fill a surface, and says how good they are.
+/// Asserts that tetmill's tets fill a surface, and returns their quality.
 pub fn check_ours(what: &str, surface: &ClosedSurface, mesh: &Mesh) -> QualitySummary {
     let tets: Vec<_> = mesh.tets.iter().map(|t| t.map(|v| v.0)).zip(mesh.bodies.iter().copied()).collect();
     check_fills(what, surface, &mesh.points, &tets);
     QualitySummary::of(mesh)
 }
 
-/// TetGen's mesh of a surface that it is told to keep, by `switches`; asserts that it fills the surface as well, and says how good it is.
+/// The quality of TetGen's mesh of a surface, made with `switches`; asserts that it fills the
+/// surface.
 ///
-/// TetGen is not told where bodies are: it fills voids too and gives each space between facets a number (`A`). What the surface has
-/// on the sides of its triangles says which body a number stands for.
+/// TetGen does not know the bodies: it also fills voids and numbers each region between facets
+/// (`A`). The sides of the triangles identify the body of each region.
 ///
 /// # Errors
-/// TetGen's refusals and crashes.
+/// If TetGen rejects the input or crashes.
 pub fn check_theirs(what: &str, surface: &ClosedSurface, switches: &str) -> Result<QualitySummary, Error> {
     let points: Vec<[f64; 3]> = surface.points().iter().map(|&p| p.into()).collect();
     let made = tetrahedralize(&points, surface.triangles(), &format!("pYA{switches}"))?;

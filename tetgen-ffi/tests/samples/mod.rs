@@ -1,17 +1,17 @@
-//! The hard surfaces of tetmill's own tests, which name what they use through this module.
+//! The hard surfaces of tetmill's unit tests, which import through this module.
 
-#[path = "../../../src/volume/samples/hard.rs"]
+#[path = "../../../src/mesher/volume/samples/hard.rs"]
 #[allow(dead_code)]
 pub mod hard;
-#[path = "../../../src/volume/samples/soup.rs"]
+#[path = "../../../src/mesher/volume/samples/soup.rs"]
 #[allow(dead_code)]
 pub mod soup;
-#[path = "../../../src/volume/samples/volumes.rs"]
+#[path = "../../../src/mesher/volume/samples/volumes.rs"]
 pub mod volumes;
 
 use csg::BodyId;
 pub use soup::{INSIDE, Soup};
-use tetmill::kernel::random::Random;
+use tetmill::internals::Random;
+use tetmill::internals::volume::{ClosedSurface, SurfaceFaults};
 use tetmill::mesh::TET_FACES;
-use tetmill::volume::{ClosedSurface, SurfaceFaults};
 use tetmill::{Point, Vector};

@@ -1,4 +1,4 @@
-//! `boundarycondition` and `boundaryconditionname`.
+//! Lowers `boundarycondition` and `boundaryconditionname`.
 
 use super::{Lowering, Override};
 use crate::geometry::{BoundaryLabel, Span};
@@ -8,8 +8,12 @@ use crate::language::diagnostic::Reported;
 impl Lowering<'_> {
     pub(super) fn boundary_number(&mut self, solid: &Name, tlo: &Name, number: Num) -> Result<(), Reported> {
         if !(1.0..=f64::from(i32::MAX)).contains(&number.value) {
-            let message = format!("{} is no boundary-condition number", number.value);
-            return Err(self.report.meaning(number.span, message, "they are whole and begin with 1"));
+            let message = format!("{} is not a boundary-condition number", number.value);
+            return Err(self.report.meaning(
+                number.span,
+                message,
+                "boundary-condition numbers are integers from 1",
+            ));
         }
         self.override_boundary(solid, tlo, BoundaryLabel::Number(number.value as u32), solid.span)
     }

@@ -1,38 +1,40 @@
-//! Segments of curves: lines, and the rational quadratic ones, which are arcs of ellipses.
+//! Segments of curves: lines, and rational quadratic curves, which are arcs of ellipses.
 //!
-//! With control points p, q, r the middle weight (for the basis 2t(1 - t)) is w = |pr| / √(2(|pq|² + |qr|²)). It is
-//! less than 1 unless the three are on a line with q in the middle, so that there are no parabolas and hyperbolas.
+//! For the control points p, q, r, the weight of q (in the basis 2t(1 - t)) is
+//! w = |pr| / √(2(|pq|² + |qr|²)). It is less than 1 unless the points are collinear with q in the
+//! middle, so parabolas and hyperbolas do not occur.
 
 use crate::Vector;
 use crate::primitive::Ellipse;
 
-/// A segment; in the plane z is zero.
+/// A segment. In plane curves, z is zero.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Piece {
     Line([Vector; 2]),
     Arc(Arc),
 }
 
-/// An arc of an ellipse of less than half a turn.
+/// An arc of an ellipse, less than half a turn.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Arc {
-    /// Its ends, and the control point between them where the tangents at the ends meet.
+    /// The end points, and between them the control point, where the end tangents intersect.
     pub points: [Vector; 3],
     /// The weight of the control point.
     weight: f64,
 }
 
-/// The part of the longest side of the control triangle below which its height is none: the arc is a line.
+/// A control triangle whose height is below this fraction of its longest side is flat: the arc is a
+/// line.
 const FLAT: f64 = 1e-9;
 
 impl Piece {
-    /// From the points of the text.
+    /// The segment with the given control points.
     pub fn new(points: &[Vector]) -> Self {
         match *points {
             [p, q, r] => {
                 let longest = (r - p).norm().max((q - p).norm()).max((r - q).norm());
                 let is_flat = (q - p).cross(&(r - q)).norm() <= FLAT * longest * longest;
-                // A control point beyond an end on the line of both would make it run back.
+                // If the control point is beyond an end of the line, the curve would run back.
                 let is_between = (q - p).dot(&(r - q)) >= 0.0;
                 if is_flat && is_between { Self::Line([p, r]) } else { Self::Arc(Arc::new([p, q, r])) }
             }
@@ -54,7 +56,7 @@ impl Piece {
         }
     }
 
-    /// Its directions at its start and end, not of unit length.
+    /// The directions at the start and the end, not normalized.
     pub fn tangents(&self) -> [Vector; 2] {
         match *self {
             Self::Line([p, q]) => [q - p; 2],
@@ -62,7 +64,7 @@ impl Piece {
         }
     }
 
-    /// The points of its control polygon.
+    /// The control points.
     pub fn control(&self) -> Vec<Vector> {
         match *self {
             Self::Line(ends) => ends.to_vec(),
@@ -86,7 +88,7 @@ impl Arc {
         Self { points: [r, q, p], ..*self }
     }
 
-    /// The same arc in two, cut at t = 1/2 by De Casteljau's algorithm in homogeneous coordinates.
+    /// Splits the arc at t = 1/2 by De Casteljau's algorithm in homogeneous coordinates.
     pub fn halves(&self) -> [Self; 2] {
         let Self { points: [p, q, r], weight } = *self;
         let (a, b) = ((p + q * weight) / (1.0 + weight), (q * weight + r) / (1.0 + weight));
@@ -102,22 +104,22 @@ impl Arc {
     }
 }
 
-/// An ellipse in space: its centre and two vectors to it from there along its axes.
+/// An ellipse in space: its center and its two semi-axis vectors.
 pub(super) struct SpaceEllipse {
     pub center: Vector,
     pub arms: [Vector; 2],
 }
 
-/// How much the semi-axes of a circle may differ, relatively. Coordinates are typed with six digits or more.
+/// Largest relative difference of the semi-axes of a circle; coordinates have six digits or more.
 const ROUND: f64 = 1e-6;
 
 impl SpaceEllipse {
-    /// The ellipse of an arc; a circle where it is one but for the rounding of decimals.
+    /// The ellipse of an arc; an exact circle if the semi-axes agree up to rounded decimals.
     pub fn of(arc: &Arc) -> Self {
         let Arc { points: [p, q, r], weight } = *arc;
         let square = weight * weight;
         let center = (p + r - q * (2.0 * square)) / (2.0 * (1.0 - square));
-        // Conjugate half-diameters: to the shoulder of the arc, and along its chord.
+        // Conjugate semi-diameters: to the shoulder of the arc, and along its chord.
         let (u, v) = (arc.middle() - center, (r - p) * (0.5 / (1.0 - square).sqrt()));
         let (mixed, difference) = (2.0 * u.dot(&v), u.norm_squared() - v.norm_squared());
         if mixed.hypot(difference) <= ROUND * (u.norm_squared() + v.norm_squared()) {
@@ -130,13 +132,13 @@ impl SpaceEllipse {
         Self { center, arms: [u * cos + v * sin, v * cos - u * sin] }
     }
 
-    /// Its radius if it is a circle.
+    /// The radius if it is a circle.
     pub fn radius(&self) -> Option<f64> {
         let [a, b] = self.arms.map(|arm| arm.norm());
         ((a - b).abs() <= ROUND * a.max(b)).then_some(a)
     }
 
-    /// The same in the plane of x and y.
+    /// The same ellipse in the xy-plane.
     pub fn flat(&self) -> Ellipse {
         let [a, b] = self.arms;
         let length = a.norm();
@@ -179,14 +181,14 @@ mod tests {
             }
             let first = first.points;
             assert!(ellipse.value([first[2].x, first[2].y]).abs() < 1e-12);
-            // The tangents at the ends of the halves.
+            // Check the tangent at the point where the halves meet.
             let [gx, gy] = ellipse.gradient([first[2].x, first[2].y]);
             assert!(v(gx, gy).dot(&(first[1] - first[2])).abs() < 1e-12);
         }
     }
 
     #[test]
-    fn tangents_of_equal_length_make_a_circle() {
+    fn end_tangents_of_equal_length_give_a_circle() {
         let arc = SpaceEllipse::of(&Arc::new([
             Vector::zeros(),
             Vector::new(10., 0., 5.),

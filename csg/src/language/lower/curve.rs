@@ -1,4 +1,4 @@
-//! Curves, and the solids swept along or around them.
+//! Lowers curves, and the solids swept along or around them.
 
 use super::conic::Piece;
 use super::primitive::{LARGEST_LENGTH, Shape, direction};
@@ -10,25 +10,25 @@ use crate::language::ast::{CurveText, Name, Num, Primitive, Segment};
 use crate::language::diagnostic::Reported;
 use crate::language::suggest::did_you_mean;
 
-/// Index of the curves of the plane.
+/// Index of the plane curves.
 const IN_PLANE: usize = 0;
-/// Index of the curves of space.
+/// Index of the space curves.
 const IN_SPACE: usize = 1;
 
-/// How far the ends of a closed profile may lie apart, as in NETGEN.
+/// Largest distance between the ends of a closed profile, as in NETGEN.
 const CLOSED: f64 = 1e-7;
 
-/// Segments that follow one another, at least one.
+/// Consecutive segments; never empty.
 #[derive(Clone, Debug)]
 pub(super) struct Curve {
     pieces: Vec<Piece>,
 }
 
-/// A swept solid, or why it cannot be meshed; and the number of segments of its profile.
+/// A swept solid or the reason why it cannot be meshed, and the number of segments of its profile.
 type Swept = (Result<Shape, String>, usize);
 
 impl Curve {
-    /// Its first and its last point.
+    /// The first and the last point.
     fn ends(&self) -> [Vector; 2] {
         [self.pieces[0].ends()[0], self.pieces[self.pieces.len() - 1].ends()[1]]
     }
@@ -38,7 +38,7 @@ impl Curve {
         (first - last).amax() < CLOSED
     }
 
-    /// Whether both ends are on the axis of a revolution, or beyond.
+    /// Whether both ends are on the axis of a revolution or below it.
     fn is_on_axis(&self) -> bool {
         self.ends().iter().all(|end| end.y <= 0.0)
     }
@@ -69,18 +69,25 @@ impl Lowering<'_> {
                 && end != start
                 && text.points[end] != text.points[start]
             {
-                let message =
-                    format!("this segment begins at point {}, the one before ends at {}", start + 1, end + 1);
-                return Err(self.report.meaning(segment.kind.span, message, "segments follow one another"));
+                let message = format!(
+                    "this segment begins at point {}, but the one before ends at {}",
+                    start + 1,
+                    end + 1
+                );
+                return Err(self.report.meaning(
+                    segment.kind.span,
+                    message,
+                    "each segment begins where the previous one ends",
+                ));
             }
             end = indices.last().copied();
             let points: Vec<Vector> = indices.iter().map(place).collect();
             if points.windows(2).any(|two| two[0] == two[1]) {
-                let message = "two points of this segment that follow one another are the same";
+                let message = "two consecutive points of this segment coincide";
                 return Err(self.report.meaning(
                     segment.kind.span,
                     message,
-                    "a segment has a length and directions",
+                    "consecutive points of a segment must differ",
                 ));
             }
             if points.iter().any(|p| p.amax() > LARGEST_LENGTH) {
@@ -92,7 +99,7 @@ impl Lowering<'_> {
         Ok(Curve { pieces })
     }
 
-    /// The points of a segment, from 0.
+    /// The point indices of a segment, from 0.
     fn segment_points(&mut self, segment: &Segment, count: usize) -> Result<Vec<usize>, Reported> {
         let Num { value, span } = segment.kind;
         let help = "a segment is `2, i, j` (a line) or `3, i, j, k` (a conic with control point j)";
@@ -116,19 +123,23 @@ impl Lowering<'_> {
         Ok(indices)
     }
 
-    /// An extrusion or a revolution; `None` for other primitives.
+    /// Lowers an extrusion or a revolution; `None` for other primitives.
     pub(super) fn swept(&mut self, primitive: &Primitive, span: Span) -> Result<Option<Swept>, Reported> {
         let (profile, shape) = match primitive {
             Primitive::Extrusion { path, profile, up } => {
                 let path = self.curve_named(path, IN_SPACE)?;
                 let curve = self.curve_named(profile, IN_PLANE)?;
                 let Some(up) = direction(up) else {
-                    let help = "it is the direction in space of the profile's y";
+                    let help = "give the direction in space of the profile's y axis";
                     return Err(self.report.meaning(span, "the vector of `extrusion` is zero", help));
                 };
                 if !curve.is_closed() {
                     let message = "the profile of `extrusion` is open";
-                    return Err(self.report.meaning(profile.span, message, "it returns to its first point"));
+                    return Err(self.report.meaning(
+                        profile.span,
+                        message,
+                        "it must return to its first point",
+                    ));
                 }
                 let shape = extrusion::shape(&path.pieces, &curve.pieces, up);
                 (curve, shape)
@@ -137,12 +148,12 @@ impl Lowering<'_> {
                 let curve = self.curve_named(profile, IN_PLANE)?;
                 if !curve.is_closed() && !curve.is_on_axis() {
                     let message = "the profile of `revolution` is open, and not closed by the axis either";
-                    let help = "it returns to its first point, or begins and ends at y = 0";
+                    let help = "it must return to its first point, or begin and end at y = 0";
                     return Err(self.report.meaning(profile.span, message, help));
                 }
                 let Some(axis) = direction(&(to - from)) else {
                     let message = "the two points on the axis of `revolution` coincide";
-                    return Err(self.report.meaning(span, message, "they give the direction of the axis"));
+                    return Err(self.report.meaning(span, message, "two different points define the axis"));
                 };
                 let shape = revolution::shape(from.coords, axis, &curve.pieces);
                 (curve, shape)
@@ -164,7 +175,7 @@ impl Lowering<'_> {
         let other = self.curves[1 - dimension].contains_key(&name.text);
         let mut help = did_you_mean(&name.text, self.curves[dimension].keys().map(String::as_str));
         if other {
-            help = "an extrusion takes a curve of space first, then one of the plane".into();
+            help = "an extrusion takes a curve3d (the path) first, then a curve2d (the profile)".into();
         } else if help.is_empty() {
             help = "a curve must be defined before it is used".into();
         }

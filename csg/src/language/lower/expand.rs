@@ -1,4 +1,4 @@
-//! From the graph of solids to a tree over surfaces for each body.
+//! Expands the graph of solids to one Boolean tree per body.
 
 use std::collections::{HashMap, HashSet};
 
@@ -6,37 +6,39 @@ use super::forest::{Forest, ForestError, Node, NodeId};
 use super::unify::Classes;
 use crate::{Solid, SurfaceId};
 
-/// Most half-spaces of one body: a graph of a few lines can stand for a tree beyond all memory.
+/// Largest number of half-spaces per body: a graph of a few lines may expand to a tree that exceeds
+/// any memory.
 const MOST_HALF_SPACES: usize = 1_000_000;
-/// Deepest tree: those who walk it recurse. Chains of `and` or of `or`, however long, count once.
+/// Largest depth of a tree, because traversals recurse. A chain of `and` or of `or` of any length
+/// counts as one level.
 const DEEPEST_TREE: usize = 400;
 
-/// Why a body has no tree.
+/// Why a body cannot be expanded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum ExpandError {
-    /// Something under it is wrong, and has been reported.
+    /// A node below it has an error, which has been reported.
     Graph(ForestError),
-    /// More than [`MOST_HALF_SPACES`].
+    /// There are more than [`MOST_HALF_SPACES`] half-spaces.
     TooManyHalfSpaces,
-    /// More than [`DEEPEST_TREE`].
+    /// The tree is deeper than [`DEEPEST_TREE`].
     TooDeep,
 }
 
 impl std::fmt::Display for ExpandError {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
-            ExpandError::Graph(_) => write!(f, "is defined by something that is wrong"),
+            ExpandError::Graph(_) => write!(f, "depends on a solid with an error"),
             ExpandError::TooManyHalfSpaces => {
                 write!(f, "consists of more than {MOST_HALF_SPACES} half-spaces")
             }
             ExpandError::TooDeep => {
-                write!(f, "has `and`, `or` and `not` nested by turns more than {DEEPEST_TREE} deep")
+                write!(f, "nests alternating `and`, `or` and `not` more than {DEEPEST_TREE} deep")
             }
         }
     }
 }
 
-/// A tree with what its copies would cost.
+/// A tree with its size.
 #[derive(Clone)]
 struct Measured {
     solid: Solid,
@@ -44,7 +46,10 @@ struct Measured {
     depth: usize,
 }
 
-/// The tree of what is under `root`.
+/// The Boolean tree of the node `root`.
+///
+/// # Errors
+/// [`ExpandError`] if a node below has an error, or the tree exceeds a limit.
 pub(super) fn expand(forest: &Forest, classes: &Classes, root: NodeId) -> Result<Solid, ExpandError> {
     let mut order = forest.post_order(root).map_err(ExpandError::Graph)?;
     order.retain(|&id| !matches!(forest.node(id), Node::Named(_)));
@@ -96,8 +101,10 @@ pub(super) fn expand(forest: &Forest, classes: &Classes, root: NodeId) -> Result
     Ok(trees.remove(&root).expect("the root comes last").solid)
 }
 
-/// The nodes that have a single user, of the same kind: their members are its members. So a chain of
-/// thousands of unions, each of the one before and a little more, takes linear time.
+/// The nodes whose only user is of the same kind, so that their members become members of the user.
+///
+/// This makes a chain of thousands of unions, each of the previous one and another solid, take
+/// linear time.
 fn absorbed(
     forest: &Forest,
     order: &[NodeId],
@@ -118,7 +125,7 @@ fn absorbed(
     Ok(absorbed)
 }
 
-/// The members of a node and of all that it absorbs, from left to right.
+/// The members of a node and of all nodes absorbed into it, from left to right.
 fn members_of_chain(
     forest: &Forest,
     id: NodeId,
@@ -137,7 +144,7 @@ fn members_of_chain(
     Ok(members)
 }
 
-/// What a node stands for, if it is a name.
+/// The node that a name refers to.
 fn resolved(forest: &Forest, mut id: NodeId) -> Result<NodeId, ExpandError> {
     while let Node::Named(_) = forest.node(id) {
         id = forest.members(id).map_err(ExpandError::Graph)?[0];
@@ -145,7 +152,7 @@ fn resolved(forest: &Forest, mut id: NodeId) -> Result<NodeId, ExpandError> {
     Ok(id)
 }
 
-/// The members of a node, names replaced by what they stand for and repetitions left out.
+/// The members of a node, with names resolved and duplicates removed.
 fn distinct_members(forest: &Forest, id: NodeId) -> Result<Vec<NodeId>, ExpandError> {
     let mut distinct = Vec::new();
     let mut seen = HashSet::new();
@@ -176,7 +183,8 @@ fn measure(solid: Solid) -> Measured {
     Measured { solid, halves, depth }
 }
 
-/// The same tree over other half-spaces: `half_space` gives for a surface the one on its negative side.
+/// The tree over other half-spaces; `half_space` maps a surface to the half-space on its negative
+/// side.
 fn relabel(solid: &Solid, half_space: &impl Fn(SurfaceId) -> (SurfaceId, bool)) -> Solid {
     let all = |members: &[Solid]| members.iter().map(|member| relabel(member, half_space)).collect();
     match solid {
@@ -200,7 +208,8 @@ fn complement(Measured { solid, halves, depth }: Measured) -> Measured {
     }
 }
 
-/// The intersection or union; members of the same kind are taken in, half-spaces that come again left out.
+/// The intersection or union of trees. Nested nodes of the same kind are flattened, repeated
+/// half-spaces removed.
 fn combine(members: Vec<Measured>, is_and: bool) -> Measured {
     let mut flat = Vec::new();
     let mut seen = HashSet::new();

@@ -1,10 +1,14 @@
 //! `extrusion`: a profile moved along a path.
 //!
-//! In the plane across the path the profile's y points along the part of the given direction in that plane (y'), its x
-//! along tangent × y'. Piece by piece of the path, the solid is what the profile sweeps between two planes across the path:
-//! prisms along lines, parts of bodies of revolution along circles, what a section sweeps along ellipses and where it turns. NETGEN has no faces at the
-//! ends of an open path, and asks for planes that cut it; here the planes across its ends close it, and if one that
-//! the file cuts with is nearer, nothing is left of them.
+//! In the plane perpendicular to the path, the profile's y axis is the projection y' of the given
+//! direction to that plane, and its x axis is tangent × y'. For each segment of the path, the
+//! profile sweeps a solid between two planes across the path: a prism along a line, part of a body
+//! of revolution along a circle, or a sweep along an ellipse or where the profile rotates about the
+//! path.
+//!
+//! NETGEN has no faces at the ends of an open path and requires planes that cut it off. Here the
+//! perpendicular planes at the ends close the solid; if a plane of the file cuts it off earlier,
+//! they have no effect.
 
 use super::conic::{Arc, Piece, SpaceEllipse};
 use super::primitive::Shape;
@@ -13,14 +17,16 @@ use super::swept::{Assembly, NO_FACE, SweepError, Swept, Turn, complement};
 use crate::primitive::{Cylinder, Ellipse, EllipticCylinder, Plane, Section, Sweep, Torus};
 use crate::{Point, Solid, Surface, Vector};
 
-/// The sine of the angle up to which the tangents of two pieces of a path are the same: decimals typed with six digits.
+/// Tangents of two segments are the same if the sine of their angle is at most this: decimals have
+/// six digits.
 const SMOOTH: f64 = 1e-5;
-/// The sine of the angle between path and direction at least.
+/// Smallest sine of the angle between the path and the direction of the profile's y axis.
 const UPRIGHT: f64 = 1e-6;
-/// The sine of the angle up to which the direction lies in the plane of an arc or across it.
+/// Largest sine of the angle at which the direction counts as lying in the plane of an arc, or
+/// perpendicular to it.
 const RIGID: f64 = 1e-9;
 
-/// The solid of a profile along a path; `up` is the direction of the profile's y.
+/// The solid of a profile along a path; `up` is the direction of the profile's y axis.
 pub(super) fn shape(path: &[Piece], profile: &[Piece], up: Vector) -> Result<Shape, SweepError> {
     check_directions(path)?;
     let profile = formula(profile, false)?;
@@ -45,7 +51,7 @@ pub(super) fn shape(path: &[Piece], profile: &[Piece], up: Vector) -> Result<Sha
         let before = if index > 0 { Some(index - 1) } else { is_closed.then_some(last) };
         let start = match before {
             Some(before) => {
-                if goes_on(&path[before], &path[index]) {
+                if is_smooth_joint(&path[before], &path[index]) {
                     assembly.join([before, index].map(|i| &swept[i].sides[..]), &ends[before]);
                 }
                 complement(ends[before].clone())
@@ -58,44 +64,47 @@ pub(super) fn shape(path: &[Piece], profile: &[Piece], up: Vector) -> Result<Sha
     Ok(assembly.shape(inside))
 }
 
-/// Whether a piece has the direction at its start that another has at its end.
-fn goes_on(before: &Piece, after: &Piece) -> bool {
+/// Whether the end tangent of a segment and the start tangent of the next one agree.
+fn is_smooth_joint(before: &Piece, after: &Piece) -> bool {
     let (before, after) = (before.tangents()[1], after.tangents()[0]);
     let sine = before.cross(&after).norm() / (before.norm() * after.norm());
     sine <= SMOOTH && before.dot(&after) > 0.0
 }
 
-/// Whether a piece starts where another ends.
+/// Whether a segment starts where another ends.
 fn meets(before: &Piece, after: &Piece) -> bool {
     let [start, end] = before.ends();
     (after.ends()[0] - end).norm() <= SMOOTH * (end - start).norm()
 }
 
-/// The normal of the plane in which a piece of the path ends and the next one begins: across the path, or half-way between
-/// their directions where it has a corner.
+/// The normal of the plane between two segments: the tangent at a smooth joint, else the mean of
+/// both directions.
 fn mitre(before: &Piece, after: &Piece) -> Vector {
     let end = before.tangents()[1];
-    if goes_on(before, after) { end } else { end.normalize() + after.tangents()[0].normalize() }
+    if is_smooth_joint(before, after) { end } else { end.normalize() + after.tangents()[0].normalize() }
 }
 
 fn check_directions(path: &[Piece]) -> Result<(), SweepError> {
     if let Some(index) = path.iter().position(|piece| piece.tangents().iter().any(|t| t.norm() == 0.0)) {
         let message = format!("segment {} of the path has no direction at an end", index + 1);
-        return Err(SweepError::Wrong(message, "its points are distinct"));
+        return Err(SweepError::Wrong(message, "consecutive points of a segment must differ"));
     }
     Ok(())
 }
 
-/// At a corner the sides of a profile that reaches this far go on beyond the path's point, or end before it, by its
-/// reach times the tangent of half the angle that the path turns by. Both corners of a piece must leave room for each other.
+/// Checks that segments are long enough for the mitred corners at their ends.
+///
+/// At a corner, the sides of a profile extend beyond the corner of the path, or end before it, by
+/// the profile's reach times the tangent of half the turning angle. The extensions at both ends of
+/// a segment must not overlap.
 fn check_corners(path: &[Piece], reach: f64) -> Result<(), SweepError> {
     let last = path.len() - 1;
     let lack = |index: usize, next: usize| {
         let [p, q] = [path[index].tangents()[1], path[next].tangents()[0]].map(|t| t.normalize());
-        // The tangent of half an angle is sin / (1 + cos); where the path runs back, it is as good as infinite.
+        // tan(α/2) = sin α / (1 + cos α); practically infinite if the path runs back.
         if p.dot(&q) < -1.0 + SMOOTH {
             f64::INFINITY
-        } else if goes_on(&path[index], &path[next]) {
+        } else if is_smooth_joint(&path[index], &path[next]) {
             0.0
         } else {
             reach * p.cross(&q).norm() / (1.0 + p.dot(&q))
@@ -114,34 +123,31 @@ fn check_corners(path: &[Piece], reach: f64) -> Result<(), SweepError> {
     for (index, (piece, taken)) in path.iter().zip(taken).enumerate() {
         let [p, q] = piece.ends();
         if taken >= (q - p).norm() {
-            let message = format!(
-                "segment {} of the path is too short for its corners, over which the sides of the profile go on",
-                index + 1
-            );
-            return Err(SweepError::Unsupported(message + ": make it longer, or the profile smaller"));
+            let message = format!("segment {} of the path is too short for its mitred corners", index + 1);
+            return Err(SweepError::Unsupported(message + ": lengthen it, or make the profile smaller"));
         }
     }
     Ok(())
 }
 
-/// Whether a profile with its y along `up` turns about the path on an arc around this axis.
-fn is_turning(axis: Vector, up: Vector) -> bool {
+/// Whether a profile with y axis along `up` rotates about the path on an arc with the given axis.
+fn is_rotating(axis: Vector, up: Vector) -> bool {
     let height = up.dot(&axis).abs();
     height > RIGID && height < 1.0 - RIGID
 }
 
-/// The directions of the profile's x and y at a point of the path.
+/// The directions of the profile's x and y axes at a point of the path.
 fn frame(tangent: Vector, up: Vector) -> Result<[Vector; 2], SweepError> {
     let across = up - tangent * up.dot(&tangent);
     if across.norm() <= UPRIGHT {
-        let message = "the path of the extrusion runs along the direction of the profile's y".into();
-        return Err(SweepError::Wrong(message, "the third argument is a direction across the path"));
+        let message = "the path of the extrusion is parallel to the direction of the profile's y axis".into();
+        return Err(SweepError::Wrong(message, "the third argument must not be parallel to the path"));
     }
     let y = across.normalize();
     Ok([tangent.cross(&y), y])
 }
 
-/// The prism of a profile along a line.
+/// The solid of a profile along a line.
 fn along_line(
     into: &mut Assembly,
     ends: [Vector; 2],
@@ -155,7 +161,7 @@ fn along_line(
         Ok(match bound {
             Bound::Left(from, to) => {
                 let [p, q] = [*from, *to].map(place);
-                // Right of the line, where x × y is against the path.
+                // To the right of the line, because x × y points against the path.
                 into.behind(p, tangent.cross(&(q - p)), face)
             }
             Bound::Inside(ellipse) => {
@@ -173,7 +179,7 @@ fn along_line(
     })
 }
 
-/// What a profile sweeps that turns with an arc of the path.
+/// The solid of a profile along an arc of a circle or an ellipse.
 fn along_arc(
     into: &mut Assembly,
     [index, count]: [usize; 2],
@@ -190,7 +196,7 @@ fn along_arc(
     let tangent = (points[1] - points[0]).normalize();
     let axis = outward.cross(&tangent).normalize();
     let [x, y] = frame(tangent, up)?;
-    if is_turning(axis, up) {
+    if is_rotating(axis, up) {
         let circle = Sweep {
             center: Point::from(ellipse.center),
             axis,
@@ -199,7 +205,7 @@ fn along_arc(
             up,
             section: Section::Line { normal: [1.0, 0.0], offset: 0.0 },
         };
-        return turning(into, [index, count], profile, circle, &|p| p);
+        return sweep_section(into, [index, count], profile, circle, &|p| p);
     }
     check_side(arc, index, axis, up)?;
     let place = |p: [f64; 2]| {
@@ -216,8 +222,11 @@ fn along_arc(
         }
     };
     if profile.literals.iter().any(|literal| reaches_axis(&literal.bound)) {
-        let message = format!("the profile reaches the centre of segment {} of the path", index + 1);
-        return Err(SweepError::Wrong(message, "a path bends less than its profile is wide"));
+        let message = format!("the profile reaches the center of segment {} of the path", index + 1);
+        return Err(SweepError::Wrong(
+            message,
+            "the radius of an arc must be larger than the profile's reach",
+        ));
     }
     let mirrored = x.dot(&axis) * y.dot(&outward) - x.dot(&outward) * y.dot(&axis) < 0.0;
     into.sweep(profile, |into, bound, face| {
@@ -234,21 +243,24 @@ fn along_arc(
     })
 }
 
-/// Refuses an arc along which y' changes sides: the direction lies in its plane, and the path runs along it somewhere.
+/// Rejects an arc along which y' changes sign: the direction lies in its plane, and is tangent to
+/// the path somewhere.
 fn check_side(arc: &Arc, index: usize, axis: Vector, up: Vector) -> Result<(), SweepError> {
     let [p, q, r] = arc.points;
     let [start, end] = [(q - p).normalize(), (r - q).normalize()];
     let [y, at_end] = [frame(start, up)?[1], frame(end, up)?[1]];
     let same = |before: Vector, after: Vector| (y.dot(&before) - at_end.dot(&after)).abs() <= 1e-3;
     if !same(axis, axis) || !same(start.cross(&axis), end.cross(&axis)) {
-        let message =
-            format!("segment {} of the path turns into the direction of the profile's y", index + 1);
-        return Err(SweepError::Wrong(message, "the third argument is a direction across the path"));
+        let message = format!(
+            "segment {} of the path becomes parallel to the direction of the profile's y axis",
+            index + 1
+        );
+        return Err(SweepError::Wrong(message, "the third argument must not be parallel to the path"));
     }
     Ok(())
 }
 
-/// What a profile sweeps along an arc of an ellipse.
+/// The solid of a profile along an arc of an ellipse.
 fn along_ellipse(
     into: &mut Assembly,
     place: [usize; 2],
@@ -260,7 +272,8 @@ fn along_ellipse(
     let [p, q, _] = arc.points;
     let tangent = (q - p).normalize();
     let axis = (p - ellipse.center).cross(&tangent).normalize();
-    // The axis nearest to the middle of the arc: parameters along it stay clear of half a turn from there.
+    // The semi-axis nearest to the middle of the arc, so that parameters along the arc stay away
+    // from ±π.
     let middle = arc.middle() - ellipse.center;
     let share = |arm: &Vector| middle.dot(arm) / arm.norm_squared();
     let [a, b] = ellipse.arms;
@@ -273,34 +286,37 @@ fn along_ellipse(
         up,
         section: Section::Line { normal: [1.0, 0.0], offset: 0.0 },
     };
-    if is_turning(axis, up) {
-        return turning(into, place, profile, path, &|p| p);
+    if is_rotating(axis, up) {
+        return sweep_section(into, place, profile, path, &|p| p);
     }
     check_side(arc, place[0], axis, up)?;
-    // Nothing turns: sections are the same in the directions outward and along the axis.
+    // Without rotation, the section is constant in the coordinates (outward, axis).
     let [x, y] = frame(tangent, up)?;
     let outward = tangent.cross(&axis);
     path.up = axis;
-    turning(into, place, profile, path, &|p| {
+    sweep_section(into, place, profile, path, &|p| {
         let v = x * p[0] + y * p[1];
         [v.dot(&outward), v.dot(&axis)]
     })
 }
 
-/// What a profile sweeps along the path of a section, on which it may turn; `moved` brings a place of the profile to the section's plane, which
-/// may be a rotation there.
-fn turning(
+/// The solid of a profile swept along an elliptic path, possibly rotating about it.
+///
+/// `moved` maps profile coordinates to section coordinates, possibly by a rotation.
+fn sweep_section(
     into: &mut Assembly,
     [index, count]: [usize; 2],
     profile: &Profile,
     path: Sweep,
     moved: &dyn Fn([f64; 2]) -> [f64; 2],
 ) -> Result<Swept, SweepError> {
-    let (reach, bend) = (profile.reach, path.least_bend());
-    if reach >= 0.9 * bend {
-        let what = if path.is_round() { "which turns it" } else { "an arc of an ellipse" };
+    let (reach, radius) = (profile.reach, path.least_curvature_radius());
+    if reach >= 0.9 * radius {
+        let what = if path.is_round() { "along which it rotates" } else { "an elliptic arc" };
         let message = format!("the profile is too wide for segment {} of the path, {what}", index + 1);
-        return Err(SweepError::Unsupported(message + ": it reaches too near to where that arc bends about"));
+        return Err(SweepError::Unsupported(
+            message + ": it comes too close to the arc's centers of curvature",
+        ));
     }
     let swept = into.sweep(profile, |into, bound, face| {
         let section = match *bound {
@@ -315,12 +331,13 @@ fn turning(
                 Section::Ellipse(Ellipse { center: moved(ellipse.center), axis: [u - x, v - y], ..ellipse })
             }
         };
-        Ok(into.side(swept_by(section, &path), false, face))
+        Ok(into.side(swept_surface(section, &path), false, face))
     })?;
-    // All is inside this tube. Near the centres of curvature, where the section's sides come from all directions, nothing is. Pieces
-    // that follow one another get tubes that do not touch.
+    // Restrict the solid to a tube that contains it: near the centers of curvature the surfaces of
+    // the section continue, but the solid does not. Tubes of consecutive segments have different
+    // radii so that they do not touch.
     let part = if index + 1 == count { 0.7 } else { [0.3, 0.5][index % 2] };
-    let minor = reach + part * f64::min(0.5 * reach, bend - reach);
+    let minor = reach + part * f64::min(0.5 * reach, radius - reach);
     let around = if path.is_round() {
         Surface::Torus(Torus { center: path.center, axis: path.axis, major: path.radii[0], minor })
     } else {
@@ -331,8 +348,9 @@ fn turning(
     Ok(Swept { inside: Solid::And(vec![around, swept.inside]), ..swept })
 }
 
-/// What a section sweeps: a plane if it is a line along the plane of the path and does not turn.
-fn swept_by(section: Section, path: &Sweep) -> Surface {
+/// The surface swept by a section: a plane for a line parallel to the plane of a path without
+/// rotation.
+fn swept_surface(section: Section, path: &Sweep) -> Surface {
     match section {
         Section::Line { normal: [x, y], offset } if path.up == path.axis && x.abs() <= RIGID => {
             let normal = path.axis * y.signum();

@@ -1,4 +1,4 @@
-//! The end of the file: equal surfaces become one, bodies get their trees.
+//! Finishes the geometry: unifies equal surfaces and expands the trees of bodies.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -13,7 +13,7 @@ use crate::geometry::{
 use crate::{Geometry, Seam, Solid, SurfaceId};
 
 impl Lowering<'_> {
-    /// The geometry; where something is wrong it is in the report, and the geometry is of no use.
+    /// The geometry; meaningless if there are errors in the report.
     pub(super) fn finish(mut self) -> Geometry {
         if self.tlos.is_empty() && !self.report.has_errors() {
             let message = "there is no top-level object, hence nothing to mesh";
@@ -46,7 +46,7 @@ impl Lowering<'_> {
         }
     }
 
-    /// The roots of the trees that top-level objects need.
+    /// The root nodes of all top-level objects.
     fn roots(&self) -> Vec<Option<NodeId>> {
         let root = |definition: usize| self.forest.definitions[definition].root;
         let of_surface = |tlo: &Tlo| match tlo.kind {
@@ -56,11 +56,12 @@ impl Lowering<'_> {
         self.tlos.iter().flat_map(|tlo| [Some(root(tlo.definition)), of_surface(tlo)]).flatten().collect()
     }
 
-    /// The raw surfaces that bodies need; primitives among them that cannot be meshed are reported.
+    /// The raw surfaces used by top-level objects; reports primitives among them that cannot be
+    /// meshed.
     fn used_surfaces(&mut self) -> BTreeSet<usize> {
         let mut primitives = BTreeSet::new();
         for root in self.roots() {
-            // Without a root, or with an error under it, there is an error in the report.
+            // A missing root or an error below it has been reported.
             let found = root.and_then(|root| self.forest.primitives_of(root).ok());
             primitives.extend(found.unwrap_or_default());
         }
@@ -78,7 +79,7 @@ impl Lowering<'_> {
         used
     }
 
-    /// The bodies and the cutouts with their trees.
+    /// The bodies and the cutouts with their expanded trees.
     fn top_level_objects(&mut self, classes: &Classes) -> (Vec<Body>, Vec<Cutout>) {
         let (mut bodies, mut cutouts) = (Vec::new(), Vec::new());
         for tlo in std::mem::take(&mut self.tlos) {
@@ -97,7 +98,7 @@ impl Lowering<'_> {
                 TloKind::Cutout(cutout, of_surface) => match self.first_surface(classes, of_surface) {
                     Some(surface) => cutouts.push(Cutout { solid: tree, surface, ..cutout }),
                     None => {
-                        let message = "the solid of this surface has no surface";
+                        let message = "this solid has no surface";
                         self.report.meaning(tlo.span, message, "name a solid with at least one primitive");
                     }
                 },
@@ -106,7 +107,7 @@ impl Lowering<'_> {
         (bodies, cutouts)
     }
 
-    /// Where the paths of extrusions go on: what is swept before and after touches there, and only there do both matter.
+    /// Seams at smooth joints of extrusion paths: the surfaces before and after are tangent there.
     fn joints(&self, classes: &Classes) -> Vec<Seam> {
         let mut seams = BTreeMap::new();
         for Primitive { surfaces, joints, .. } in &self.forest.primitives {
@@ -115,25 +116,29 @@ impl Lowering<'_> {
                 if let ([Some(a), Some(b)], Some(plane)) = (sides.map(id), id(*plane))
                     && a != b
                 {
-                    let (pair, carrier) = ([a.min(b), a.max(b)], [a.min(plane), a.max(plane)]);
-                    seams.entry(pair).or_insert(Seam { pair, carrier, rest: None, is_alone: true });
+                    let (pair, surfaces) = ([a.min(b), a.max(b)], [a.min(plane), a.max(plane)]);
+                    seams.entry(pair).or_insert(Seam { pair, surfaces, residual: None, is_complete: true });
                 }
             }
         }
         seams.into_values().collect()
     }
 
-    /// Cutouts of surfaces that bound no body.
+    /// Warns of cutouts on surfaces that bound no body.
     fn warn_of_idle_cutouts(&mut self, bodies: &[Body], cutouts: &[Cutout]) {
         let mut of_bodies = BTreeSet::new();
         bodies.iter().for_each(|body| surfaces_of(&body.solid, &mut of_bodies));
         for cutout in cutouts.iter().filter(|cutout| !of_bodies.contains(&cutout.surface)) {
             let message = "this surface bounds no body: the top-level object has no effect";
-            self.report.warn(cutout.span, message, "a surface of a body is cut, none is added");
+            self.report.warn(
+                cutout.span,
+                message,
+                "`tlo SOLID SURFACE` splits a surface of a body, it does not add one",
+            );
         }
     }
 
-    /// The surfaces that are identified.
+    /// The identifications in terms of unified surfaces.
     fn identifications(&mut self, classes: &Classes) -> Vec<Identification> {
         let mut identifications = Vec::new();
         for (definitions, solids, span) in std::mem::take(&mut self.identifications) {
@@ -145,7 +150,7 @@ impl Lowering<'_> {
                 (Some(_), Some(_)) => {
                     let message =
                         format!("the first surfaces of `{}` and `{}` are the same", solids[0], solids[1]);
-                    self.report.meaning(span, message, "a periodic face needs another one as its image");
+                    self.report.meaning(span, message, "name two different surfaces");
                 }
                 (first, _) => {
                     let name = &solids[usize::from(first.is_some())];
@@ -157,14 +162,14 @@ impl Lowering<'_> {
         identifications
     }
 
-    /// The first surface of a definition, in the order of the text.
+    /// The first surface of a definition, in file order.
     fn first_surface(&self, classes: &Classes, definition: usize) -> Option<SurfaceId> {
         let root = self.forest.definitions[definition].root?;
         let surfaces = self.forest.surfaces_of(root).ok()?;
         classes.id(*surfaces.first()?)
     }
 
-    /// The tags over unified surfaces.
+    /// The singularities in terms of unified surfaces.
     fn singularities(&mut self, classes: &Classes, bodies: &[Body]) -> Vec<Singularity> {
         let of_bodies = |raw: Vec<usize>| raw.into_iter().filter_map(|i| classes.id(i)).collect::<Vec<_>>();
         let mut singularities = Vec::new();
@@ -187,7 +192,7 @@ impl Lowering<'_> {
         singularities
     }
 
-    /// The overrides over unified surfaces; those that reach nothing are warned of.
+    /// The overrides in terms of unified surfaces; warns of those without effect.
     fn boundary_overrides(&mut self, classes: &Classes, bodies: &[Body]) -> Vec<BoundaryOverride> {
         let mut overrides = Vec::new();
         for Override { surfaces, tlo, label, span } in std::mem::take(&mut self.overrides) {
@@ -206,20 +211,21 @@ impl Lowering<'_> {
         overrides
     }
 
-    /// Boundary numbers and names that have no effect, as the surface is that of an earlier primitive.
+    /// Warns of boundary numbers and names without effect, because the surface belongs to an
+    /// earlier primitive.
     fn warn_of_lost_numbers(&mut self, classes: &Classes, used: &BTreeSet<usize>) {
-        let mut told = BTreeSet::new();
+        let mut warned = BTreeSet::new();
         for &i in used {
             let [first, own] = [classes.first(i), i].map(|i| &self.forest.surfaces[i].info);
             let loses = (own.bc.is_some() && own.bc != first.bc)
                 || (own.bc_name.is_some() && own.bc_name != first.bc_name);
-            if loses && told.insert((first.solid.clone(), own.solid.clone())) {
+            if loses && warned.insert((first.solid.clone(), own.solid.clone())) {
                 let (line, span) = (first.span.line, own.span);
                 let message = format!(
-                    "a surface of `{}` is also one of `{}` (line {line}), whose -bc and -bcname count for both",
+                    "a surface of `{}` is also one of `{}` (line {line}), whose -bc and -bcname apply to both",
                     own.solid, first.solid
                 );
-                let help = "`boundarycondition` and `boundaryconditionname` give them body by body";
+                let help = "use `boundarycondition` and `boundaryconditionname` to set them per body";
                 self.report.warn(span, message, help);
             }
         }

@@ -5,16 +5,17 @@ use super::super::diagnostic::Report;
 use crate::geometry::Span;
 use crate::language::suggest::did_you_mean;
 
-/// The flags of a statement. Of a repeated flag the last counts.
+/// The flags of a statement. The last of repeated flags applies.
 pub(super) struct Flags<'a> {
     flags: &'a [Flag],
 }
 
-/// A flag that a statement takes but does not use, and what to do instead.
+/// A flag that is accepted without effect, and what to do instead.
 pub(super) type Idle = (&'static str, &'static str);
 
 impl<'a> Flags<'a> {
-    /// Checks the names: `known` are read later, `idle` mean something elsewhere, others nothing.
+    /// Checks names: `known` flags are read later, `idle` flags have no effect here, all others are
+    /// unknown.
     pub fn new(flags: &'a [Flag], known: &[&str], idle: &[Idle], report: &mut Report) -> Self {
         for flag in flags {
             let name = flag.name.as_str();
@@ -27,7 +28,7 @@ impl<'a> Flags<'a> {
             }
             let mut help = did_you_mean(name, known.iter().copied());
             if help.is_empty() && !known.is_empty() {
-                help = format!("flags here are -{}", known.join(", -"));
+                help = format!("known flags are -{}", known.join(", -"));
             }
             report.warn(flag.span, format!("the unknown flag -{name} is ignored"), &help);
         }
@@ -38,7 +39,7 @@ impl<'a> Flags<'a> {
         self.flags.iter().rfind(|flag| flag.name == name)
     }
 
-    /// Where the flag stands.
+    /// The position of a flag.
     pub fn span(&self, name: &str) -> Option<Span> {
         self.find(name).map(|flag| flag.span)
     }
@@ -75,7 +76,11 @@ impl<'a> Flags<'a> {
         let maxh = self.number("maxh", "-maxh=0.1", report)?;
         if maxh <= 0.0 {
             let span = self.span("maxh")?;
-            report.meaning(span, format!("-maxh={maxh} is no mesh size"), "a mesh size is a positive length");
+            report.meaning(
+                span,
+                format!("-maxh={maxh} is not a mesh size"),
+                "a mesh size is a positive length",
+            );
             return None;
         }
         Some(maxh)
@@ -86,7 +91,7 @@ impl<'a> Flags<'a> {
         self.number("layer", "-layer=1", report).map(|layer| layer as i32)
     }
 
-    /// `-factor=k`, whether there is one that is not zero.
+    /// Whether `-factor=k` is given with k ≠ 0.
     pub fn has_factor(&self, report: &mut Report) -> bool {
         self.number("factor", "-factor=1", report).is_some_and(|factor| factor != 0.0)
     }

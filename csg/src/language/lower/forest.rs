@@ -1,8 +1,8 @@
-//! The solids of a file as one directed acyclic graph.
+//! The solids of a file as a directed acyclic graph.
 //!
-//! A named solid is shared by all that use it: its surfaces are theirs, and where it is defined again its
-//! earlier uses change too. A transform copies everything under it. Walks use a stack of their own, since
-//! programs write chains of many thousands of definitions.
+//! A named solid is shared by all its users: they use the same surfaces, and a redefinition also
+//! changes earlier uses. A transform copies the whole subgraph. Traversals use an explicit stack,
+//! because generated files may have chains of many thousands of definitions.
 
 use std::collections::HashMap;
 use std::ops::Range;
@@ -13,18 +13,18 @@ use crate::geometry::{Span, SurfaceInfo};
 use crate::{Solid, Surface, SurfaceId};
 use nalgebra::Isometry3;
 
-/// Most surfaces that the primitives of a file may have, copies by transforms included: the nested
-/// `multitranslate` of a few short lines could otherwise ask for more than any memory holds. The 10⁴
-/// holes of a large perforated plate are well below.
+/// Largest number of surfaces of all primitives in a file, including copies by transforms. A few
+/// nested `multitranslate` could otherwise exceed any memory. A large perforated plate has 10⁴
+/// holes.
 pub(super) const MOST_SURFACES: usize = 1_000_000;
-/// Most nodes of the graph, for the same reason.
+/// Largest number of nodes of the graph, for the same reason.
 const MOST_NODES: usize = 4 * MOST_SURFACES;
 
 /// Index of a [`Node`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub(super) struct NodeId(usize);
 
-/// A set of points, made of others.
+/// A Boolean operation, a primitive or a name.
 #[derive(Debug)]
 pub(super) enum Node {
     /// Index of a [`Primitive`].
@@ -36,30 +36,30 @@ pub(super) enum Node {
     Or(Vec<NodeId>),
 }
 
-/// A primitive with its place among the surfaces.
+/// A primitive and its surfaces.
 #[derive(Clone, Debug)]
 pub(super) struct Primitive {
-    /// Its surfaces among [`Forest::surfaces`].
+    /// Its range in [`Forest::surfaces`].
     pub surfaces: Range<usize>,
-    /// Its inside; surface 0 is its first one.
+    /// Its inside, with surfaces numbered from 0 within the primitive.
     pub inside: Rc<Solid>,
-    /// Why it cannot be meshed, if so.
+    /// Why it cannot be meshed, if it cannot.
     pub unsupported: Option<String>,
-    /// For a swept solid the number of segments of its profile.
+    /// The number of segments of the profile of a swept solid.
     pub segments: Option<usize>,
-    /// Where a swept solid's path goes on.
+    /// The smooth joints of the path of an extrusion.
     pub joints: Rc<Vec<Joint>>,
     pub span: Span,
 }
 
-/// One surface of one primitive, equal ones still apart.
+/// One surface of one primitive, before equal surfaces are unified.
 #[derive(Clone, Debug)]
 pub(super) struct RawSurface {
     /// `None` for a primitive that cannot be meshed yet.
     pub surface: Option<Surface>,
     pub info: SurfaceInfo,
-    /// Which face of the text it belongs to: the halves of a polyhedron's quadrilateral have the same.
-    /// [`NO_FACE`](super::swept::NO_FACE) for none.
+    /// The face of the primitive in the text; both halves of a polyhedron's quadrilateral have the
+    /// same. [`NO_FACE`](super::swept::NO_FACE) if none.
     pub face: usize,
 }
 
@@ -68,11 +68,11 @@ pub(super) struct RawSurface {
 pub(super) struct Definition {
     pub name: String,
     pub span: Span,
-    /// `None` if its definition has an error.
+    /// `None` if the definition has an error.
     pub root: Option<NodeId>,
     /// `-maxh`
     pub maxh: Option<f64>,
-    /// Whether all its surfaces have a boundary number, and a boundary name.
+    /// Whether all its surfaces have a boundary number, and whether all have a boundary name.
     pub labelled: [bool; 2],
 }
 
@@ -84,14 +84,14 @@ pub(super) struct Forest {
     pub definitions: Vec<Definition>,
 }
 
-/// Why there is no order, or no copy.
+/// Why a traversal or a copy failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum ForestError {
-    /// A definition needs itself.
+    /// A definition depends on itself.
     Cycle,
     /// A definition with an error is used.
     Broken,
-    /// More than [`MOST_SURFACES`] surfaces.
+    /// There are more than [`MOST_SURFACES`] surfaces or [`MOST_NODES`] nodes.
     TooLarge,
 }
 
@@ -103,7 +103,7 @@ impl Forest {
     /// Adds a node.
     ///
     /// # Errors
-    /// [`ForestError::TooLarge`].
+    /// [`ForestError::TooLarge`] if a limit is reached.
     pub fn add(&mut self, node: Node) -> Result<NodeId, ForestError> {
         if self.nodes.len() >= MOST_NODES || self.surfaces.len() > MOST_SURFACES {
             return Err(ForestError::TooLarge);
@@ -112,7 +112,7 @@ impl Forest {
         Ok(NodeId(self.nodes.len() - 1))
     }
 
-    /// The members of a node; names count as what they stand for.
+    /// The members of a node; the member of a name is the root of its definition.
     pub fn members(&self, id: NodeId) -> Result<Vec<NodeId>, ForestError> {
         let members: &[NodeId] = match self.node(id) {
             Node::Primitive(_) => &[],
@@ -123,12 +123,12 @@ impl Forest {
         Ok(members.to_vec())
     }
 
-    /// All nodes under `root`, each once, members before what they make up, from left to right.
+    /// All nodes below `root`, each once, in post-order from left to right.
     pub fn post_order(&self, root: NodeId) -> Result<Vec<NodeId>, ForestError> {
         self.post_order_except(root, |_| false)
     }
 
-    /// The same without what is under the definitions that `skip` names.
+    /// The same as [`post_order`](Self::post_order) without the definitions selected by `skip`.
     fn post_order_except(
         &self,
         root: NodeId,
@@ -163,7 +163,7 @@ impl Forest {
         Ok(order)
     }
 
-    /// The primitives under `root`, each once, from left to right.
+    /// The primitives below `root`, each once, from left to right.
     pub fn primitives_of(&self, root: NodeId) -> Result<Vec<usize>, ForestError> {
         Ok(self.primitives_among(&self.post_order(root)?))
     }
@@ -176,12 +176,12 @@ impl Forest {
         nodes.iter().filter_map(primitive).collect()
     }
 
-    /// The surfaces under `root`, each once, from left to right.
+    /// The surfaces below `root`, each once, from left to right.
     pub fn surfaces_of(&self, root: NodeId) -> Result<Vec<usize>, ForestError> {
         self.surfaces_except(root, |_| false)
     }
 
-    /// The same without those of the definitions that `skip` names.
+    /// The same as [`surfaces_of`](Self::surfaces_of) without the definitions selected by `skip`.
     pub fn surfaces_except(
         &self,
         root: NodeId,
@@ -191,7 +191,8 @@ impl Forest {
         Ok(primitives.into_iter().flat_map(|p| self.primitives[p].surfaces.clone()).collect())
     }
 
-    /// Copies what is under `root`, moved. The copies of surfaces belong to `solid` and have no flags.
+    /// Copies the nodes below `root` with a motion. Copied surfaces belong to `solid` and have no
+    /// flags.
     pub fn copy(
         &mut self,
         root: NodeId,
@@ -233,7 +234,7 @@ impl Forest {
     }
 }
 
-/// The half-space behind the surface at `index` of a primitive.
+/// The negative half-space of the surface at `index` of a primitive.
 pub(super) fn inside_of(index: usize) -> Solid {
     Solid::Half { surface: SurfaceId::new(index), positive: false }
 }

@@ -1,7 +1,8 @@
-//! Statements to a [`Geometry`].
+//! Lowers statements to a [`Geometry`].
 //!
-//! Statements are taken in file order, as names are known from their definition on. Surfaces stay apart, one
-//! for each primitive that is written, until the end of the file; then equal ones become one and each body gets its tree.
+//! Statements are processed in file order, because a name is known only after its definition. Each
+//! primitive has its own surfaces until the end of the file; then equal surfaces are unified and
+//! each body gets its tree.
 
 mod boundary;
 mod conic;
@@ -29,7 +30,7 @@ use crate::Geometry;
 use crate::geometry::{Aabb, Body, BoundaryLabel, Cutout, Span, UserPoint};
 use forest::Forest;
 
-/// The geometry that the statements describe; without errors in `report` it is complete.
+/// Lowers statements; the geometry is complete if `report` has no errors.
 pub(super) fn lower(statements: &[Statement], report: &mut Report) -> Geometry {
     let mut lowering = Lowering {
         report,
@@ -42,74 +43,75 @@ pub(super) fn lower(statements: &[Statement], report: &mut Report) -> Geometry {
         identifications: Vec::new(),
         singularities: Vec::new(),
         stated_box: None,
-        losses_known: false,
+        has_warned_of_losses: false,
         is_redefined: false,
     };
     for statement in statements {
-        // What is wrong with it is in the report; the next statement may be wrong too.
+        // Errors are in the report; continue to find further ones.
         let _: Result<(), Reported> = lowering.statement(statement);
     }
     lowering.finish()
 }
 
-/// What the statements so far have said.
+/// State of the lowering after the statements so far.
 struct Lowering<'r> {
     report: &'r mut Report,
     forest: Forest,
-    /// Index of each named solid among the definitions.
+    /// The index of each named solid in the definitions.
     solids: BTreeMap<String, usize>,
-    /// The curves of the plane and those of space; `None` for one with an error.
+    /// Plane curves and space curves; `None` for one with an error.
     curves: [BTreeMap<String, Option<curve::Curve>>; 2],
     tlos: Vec<Tlo>,
     user_points: Vec<UserPoint>,
     overrides: Vec<Override>,
-    /// The definitions whose first surfaces are identified, their names and where it says so.
+    /// Definitions whose first surfaces are identified, their names, and the position of the
+    /// statement.
     identifications: Vec<([usize; 2], [String; 2], Span)>,
     singularities: Vec<Singularity>,
     stated_box: Option<Aabb>,
-    /// Whether it has been said that copies lose flags.
-    losses_known: bool,
-    /// Whether a solid was defined a second time.
+    /// Whether the warning that copies lose their flags has been given.
+    has_warned_of_losses: bool,
+    /// Whether a solid was redefined.
     is_redefined: bool,
 }
 
 /// A top-level object.
 struct Tlo {
-    /// Its solid among the definitions.
+    /// The index of its solid in the definitions.
     definition: usize,
     kind: TloKind,
     span: Span,
 }
 
-/// What a top-level object is; without its tree.
+/// A top-level object without its tree.
 enum TloKind {
     Body(Body),
-    /// A surface, and the definition whose first surface it is.
+    /// A cutout, and the definition whose first surface it is on.
     Cutout(Cutout, usize),
 }
 
-/// A `singular`, its surfaces not yet unified.
+/// A `singular` statement with raw surfaces.
 struct Singularity {
-    /// The surfaces of each solid that it names.
+    /// The surfaces of each named solid.
     surfaces: Vec<Vec<usize>>,
-    /// Among the top-level objects.
+    /// Index of a top-level object.
     tlo: Option<usize>,
     factor: i32,
     maxh: Option<f64>,
     span: Span,
 }
 
-/// A `boundarycondition` or `boundaryconditionname`, its surfaces not yet unified.
+/// A `boundarycondition` or `boundaryconditionname` statement with raw surfaces.
 struct Override {
     surfaces: Vec<usize>,
-    /// Among the top-level objects.
+    /// Index of a top-level object.
     tlo: usize,
     label: BoundaryLabel,
     span: Span,
 }
 
 impl Lowering<'_> {
-    /// The definition of the solid with this name.
+    /// The definition of a named solid; reports an unknown name.
     fn solid_named(&mut self, name: &Name) -> Result<usize, Reported> {
         if let Some(&index) = self.solids.get(&name.text) {
             return Ok(index);
@@ -121,7 +123,7 @@ impl Lowering<'_> {
         Err(self.report.meaning(name.span, format!("there is no solid `{}`", name.text), &help))
     }
 
-    /// The body, a top-level object, of the solid with this name.
+    /// The index of the top-level object whose body is the named solid; reports an unknown name.
     fn tlo_named(&mut self, name: &Name) -> Result<usize, Reported> {
         let name_of = |tlo: &Tlo| match tlo.kind {
             TloKind::Body(_) => Some(self.forest.definitions[tlo.definition].name.clone()),

@@ -1,9 +1,10 @@
 //! Polyhedra as Boolean trees over the planes of their faces.
 //!
-//! A binary space partition by the planes of the faces ends in cells that are all inside or all outside; the
-//! tree of the partition is a formula for the polyhedron (Thibault, Naylor 1987, section 4; Paterson, Yao 1990
-//! bound its size). No other planes come in. A plane that cuts faces also cuts the inside, but both
-//! sides of it are inside there, which is how any two solids that touch look.
+//! A binary space partition by the planes of the faces ends in cells that are entirely inside or
+//! outside. The tree of the partition is a formula for the polyhedron (Thibault, Naylor 1987,
+//! section 4; Paterson, Yao 1990 bound its size). It uses no other planes. A plane that cuts faces
+//! also cuts the interior, but both of its sides are inside there, as at the interface of any two
+//! solids in contact.
 
 use std::collections::BTreeMap;
 
@@ -14,18 +15,19 @@ use crate::language::diagnostic::{Report, Reported};
 use crate::primitive::Plane;
 use crate::{Point, Solid, Surface, SurfaceId, Vector};
 
-/// Most faces: the partition takes quadratic time, and so does whoever evaluates the tree at many points.
+/// Largest number of faces: the partition takes quadratic time, and so does evaluation at many
+/// points.
 const MOST_FACES: usize = 10_000;
-/// How far a point may be from a plane and still count as on it, as a fraction of the polyhedron's size.
-/// Coordinates typed with ten digits (a rotated cube) deviate by 10⁻¹⁰, edges are longer than 10⁻⁸.
+/// Largest distance of a point on a plane, as a fraction of the polyhedron's size. Coordinates with
+/// ten digits (of a rotated cube) are off by 10⁻¹⁰, edges are longer than 10⁻⁸.
 const ON_PLANE: f64 = 1e-9;
-/// Deepest nesting of cuts that have faces on both sides, and of unions within intersections; a comb of hundreds of
-/// teeth has a dozen.
+/// Largest nesting of cuts with faces on both sides, and of unions within intersections. A comb
+/// with hundreds of teeth needs a dozen.
 const DEEPEST_CUT: usize = 150;
-/// How many faces are tried for a cut.
+/// Number of faces tried for a cut.
 const CANDIDATES: usize = 24;
 
-/// A convex piece of a face, its plane and whether the outside is on the plane's negative side.
+/// A convex piece of a face, its plane, and whether the outside is on the plane's negative side.
 #[derive(Clone, Debug)]
 struct Piece {
     points: Vec<Point>,
@@ -33,7 +35,7 @@ struct Piece {
     flipped: bool,
 }
 
-/// The polyhedron with these faces, whose point numbers count from 1.
+/// The solid of a polyhedron; point numbers of the faces start at 1.
 pub(super) fn shape(
     points: &[Point],
     faces: &[PolyFace],
@@ -41,7 +43,7 @@ pub(super) fn shape(
     report: &mut Report,
 ) -> Result<Shape, Reported> {
     if faces.len() > MOST_FACES {
-        let message = format!("a `polyhedron` of {} faces; {MOST_FACES} can be meshed", faces.len());
+        let message = format!("this `polyhedron` has {} faces, the limit is {MOST_FACES}", faces.len());
         return Err(report.unsupported(span, message, ""));
     }
     let mut triangles = Vec::new();
@@ -68,22 +70,22 @@ pub(super) fn shape(
     every_face_has_area(faces, &face_of_surface, report)?;
     let volume: f64 = triangles.iter().map(|(t, _)| signed_volume(points, *t)).sum();
     if volume <= 0.0 {
-        let message = "the faces of `polyhedron` enclose no volume from outside";
-        let help = "list the points of each face counter-clockwise as seen from outside";
+        let message = "the faces of `polyhedron` enclose no volume, or are oriented inward";
+        let help = "list the points of each face counterclockwise as seen from outside";
         return Err(report.meaning(span, message, help));
     }
     let Some(inside) = builder.partition(pieces.clone(), 0) else {
-        return Err(report.unsupported(span, "a `polyhedron` with too many dents one in another", ""));
+        return Err(report.unsupported(span, "this `polyhedron` has too many nested concavities", ""));
     };
     if let Some(bad) = pieces.iter().position(|piece| !builder.separates(&inside, piece)) {
-        let message = "faces of `polyhedron` cross, or one is inside out";
-        let help = "its faces may meet at common edges and points only";
+        let message = "faces of `polyhedron` cross, or one has the wrong orientation";
+        let help = "faces may meet only at common edges and points";
         return Err(report.meaning(faces[face_of_surface[bad]].span, message, help));
     }
     Ok(Shape { surfaces, inside, faces: face_of_surface, joints: Vec::new() })
 }
 
-/// The triangles of a face: one, or two for four points; repeated points are dropped.
+/// The triangles of a face: one, or two for four points. Repeated points are dropped.
 fn face_triangles(face: &PolyFace, count: usize, report: &mut Report) -> Result<Vec<[u32; 3]>, Reported> {
     let mut distinct: Vec<u32> = Vec::new();
     for number in &face.points {
@@ -106,7 +108,7 @@ fn face_triangles(face: &PolyFace, count: usize, report: &mut Report) -> Result<
     }
 }
 
-/// Each edge is run as often in one direction as in the other.
+/// Checks that each edge is traversed equally often in both directions.
 fn closed(triangles: &[([u32; 3], usize)], faces: &[PolyFace], report: &mut Report) -> Result<(), Reported> {
     let mut balance: BTreeMap<[u32; 2], (i64, usize)> = BTreeMap::new();
     for &([a, b, c], face) in triangles {
@@ -121,11 +123,12 @@ fn closed(triangles: &[([u32; 3], usize)], faces: &[PolyFace], report: &mut Repo
     };
     let message =
         format!("the faces of `polyhedron` do not close at the edge from point {from} to point {to}");
-    let help = "each edge has two faces, which run along it in opposite directions";
+    let help = "each edge needs two faces that traverse it in opposite directions";
     Err(report.meaning(faces[face].span, message, help))
 }
 
-/// A quadrilateral may have three points on a line, then one of its halves has no area; a face must have some.
+/// Checks that each face has an area. One half of a quadrilateral with three collinear points may
+/// have none.
 fn every_face_has_area(
     faces: &[PolyFace],
     face_of_surface: &[usize],
@@ -137,7 +140,7 @@ fn every_face_has_area(
     }
     match has_area.iter().position(|has| !has) {
         Some(face) => {
-            Err(report.meaning(faces[face].span, "the points of this face of `polyhedron` are on a line", ""))
+            Err(report.meaning(faces[face].span, "the points of this face of `polyhedron` are collinear", ""))
         }
         None => Ok(()),
     }
@@ -148,7 +151,8 @@ fn signed_volume(points: &[Point], triangle: [u32; 3]) -> f64 {
     a.dot(&b.cross(&c)) / 6.0
 }
 
-/// The plane through three points, its normal where they run counter-clockwise; none if they are on a line.
+/// The plane through three points, with the normal on the side where they are counterclockwise;
+/// `None` if collinear.
 fn plane_of(corners: &[Point; 3], tolerance: f64) -> Option<Plane> {
     let [a, b, c] = *corners;
     let normal = (b - a).cross(&(c - a));
@@ -159,9 +163,9 @@ fn plane_of(corners: &[Point; 3], tolerance: f64) -> Option<Plane> {
     Some(Plane { point: a, normal: direction(&normal)? })
 }
 
-/// The planes of the faces, equal ones made one.
+/// The distinct planes of the faces.
 struct Builder {
-    /// Each with the surface that stands for it.
+    /// Each plane with the surface that represents it.
     planes: Vec<(Plane, usize)>,
     /// A length.
     tolerance: f64,
@@ -177,7 +181,7 @@ impl Builder {
         points.iter().all(|point| self.distance(plane, point).abs() <= self.tolerance)
     }
 
-    /// A face that belongs to the surface with index `surface`.
+    /// The piece of a face on the surface with index `surface`.
     fn piece(&mut self, corners: &[Point; 3], plane: Plane, surface: usize) -> Piece {
         let known = (0..self.planes.len()).find(|&known| self.contains(known, corners));
         let known = known.unwrap_or_else(|| {
@@ -188,16 +192,18 @@ impl Builder {
         Piece { points: corners.to_vec(), plane: known, flipped }
     }
 
-    /// The inner side of a piece's plane.
+    /// The half-space on the inner side of a piece.
     fn half(&self, piece: &Piece) -> Solid {
         let surface = SurfaceId::new(self.planes[piece.plane].1);
         Solid::Half { surface, positive: piece.flipped }
     }
 
-    /// The inside of the pieces, given that at least one bounds the cell they are in; `None` if it is too deep.
+    /// The Boolean tree of the inside within a cell, from the pieces in the cell (at least one).
+    ///
+    /// `None` if the nesting is too deep.
     fn partition(&self, mut pieces: Vec<Piece>, depth: usize) -> Option<Solid> {
-        // Cuts with faces on one side only, outermost first: whether all else is met with the half-space or
-        // joined to it.
+        // Cuts with faces on one side only, outermost first, and whether the rest is intersected
+        // with the half-space (or united with it).
         let mut shells: Vec<(bool, Solid)> = Vec::new();
         let mut solid = loop {
             let turns = shells.windows(2).filter(|pair| pair[0].0 != pair[1].0).count();
@@ -231,8 +237,8 @@ impl Builder {
         Some(solid)
     }
 
-    /// Among some of the pieces the first whose plane has all others on one side, or else one that cuts few and
-    /// balances.
+    /// The first sampled piece whose plane has all others on one side, else one that cuts few
+    /// pieces and is balanced.
     fn best_cut(&self, pieces: &[Piece]) -> Option<usize> {
         let stride = pieces.len().div_ceil(CANDIDATES).max(1);
         let mut best: Option<(usize, usize)> = None;
@@ -255,7 +261,7 @@ impl Builder {
         best.map(|(_, candidate)| candidate)
     }
 
-    /// Whether the piece has points behind the plane, and before it.
+    /// Whether the piece has points behind the plane, and in front of it.
     fn sides(&self, plane: usize, piece: &Piece) -> [bool; 2] {
         if piece.plane == plane {
             return [false, false];
@@ -264,7 +270,8 @@ impl Builder {
         [any(-1.0), any(1.0)]
     }
 
-    /// The pieces on the inner and on the outer side of one of them; those in its plane are done.
+    /// Splits the pieces into those on the inner and on the outer side of one; drops those in its
+    /// plane.
     fn split(&self, pieces: Vec<Piece>, cut: usize) -> (Vec<Piece>, Vec<Piece>) {
         let Piece { plane, flipped, .. } = pieces[cut];
         let (mut behind, mut before) = (Vec::new(), Vec::new());
@@ -282,7 +289,8 @@ impl Builder {
         if flipped { (before, behind) } else { (behind, before) }
     }
 
-    /// What of the piece is on the side of the plane with this sign (Sutherland, Hodgman 1974).
+    /// The part of a piece on one side of a plane (Sutherland, Hodgman 1974); `sign` selects the
+    /// side.
     fn clipped(&self, piece: &Piece, plane: usize, sign: f64) -> Piece {
         let mut points = Vec::new();
         for (i, p) in piece.points.iter().enumerate() {
@@ -299,7 +307,8 @@ impl Builder {
         Piece { points, ..*piece }
     }
 
-    /// Whether the tree is inside behind the piece and outside before it, at a point that is on no other plane.
+    /// Whether the tree is inside behind the piece and outside in front of it, at a point on no
+    /// other plane.
     fn separates(&self, solid: &Solid, piece: &Piece) -> bool {
         const WEIGHTS: [[f64; 3]; 4] =
             [[0.34, 0.35, 0.31], [0.21, 0.58, 0.21], [0.55, 0.17, 0.28], [0.13, 0.29, 0.58]];
@@ -311,7 +320,7 @@ impl Builder {
             let sum: Vector = piece.points.iter().zip(weights).map(|(p, w)| p.coords * *w).sum();
             Point::from(sum)
         };
-        // On other planes at all samples: nothing can be told.
+        // All samples are on other planes: undecided.
         let Some(point) = WEIGHTS.iter().map(sample).find(clear) else {
             return true;
         };
@@ -319,7 +328,7 @@ impl Builder {
         self.evaluate(solid, &point, piece.plane, inner) && !self.evaluate(solid, &point, piece.plane, !inner)
     }
 
-    /// The tree at a point, taken to be on the positive side of `plane` or on its negative side.
+    /// The value of the tree at a point, which counts as on the given side of `plane`.
     fn evaluate(&self, solid: &Solid, point: &Point, plane: usize, positive_side: bool) -> bool {
         match solid {
             Solid::Half { surface, positive } => {
@@ -341,7 +350,7 @@ fn complement_of_half(half: &Solid) -> Solid {
     }
 }
 
-/// The intersection (`meet`) or union of two, in one list where the second is of the same kind.
+/// The intersection (`meet`) or union of two trees, flattened if the second is of the same kind.
 fn join(meet: bool, first: Solid, second: Solid) -> Solid {
     let mut members = vec![first];
     match (second, meet) {

@@ -1,4 +1,4 @@
-//! Primitives to surfaces and half-spaces.
+//! Lowers primitives to surfaces and half-spaces.
 
 use super::forest::inside_of;
 use super::polyhedron;
@@ -9,40 +9,40 @@ use crate::language::diagnostic::{Report, Reported};
 use crate::primitive::{Cone, Cylinder, Ellipsoid, EllipticCone, EllipticCylinder, Plane, Sphere, Torus};
 use crate::{Point, Solid, Surface, Vector};
 
-/// Largest coordinate, radius or length of a vector: fourth powers of it still fit a double.
+/// Largest coordinate, radius or length of a vector; its fourth power still fits a double.
 pub(super) const LARGEST_LENGTH: f64 = 1e60;
 /// Smallest radius or length of a vector, for the same reason.
 const SMALLEST_LENGTH: f64 = 1e-60;
-/// The distance of two points, as a fraction of their coordinates, below which it is all rounding error.
+/// Points closer than this fraction of their coordinates coincide up to rounding.
 const ROUNDING: f64 = 1e-14;
-/// The relative difference of two radii below which they are equal: a cone so steep is a cylinder, an ellipse
-/// so round is a circle. Decimals typed to be equal are equal; this takes up the rounding of norms.
+/// Radii with a smaller relative difference are equal: such a cone is a cylinder, such an ellipse a
+/// circle. It allows for the rounding of norms only.
 const SAME_RADIUS: f64 = 1e-13;
-/// The cosine between two semi-axes up to which they are at right angles without a word: axes typed with six
-/// digits reach 10⁻⁶.
+/// Largest cosine between semi-axes that are perpendicular without a warning; axes with six digits
+/// reach 10⁻⁶.
 const RIGHT_ANGLE: f64 = 3e-6;
-/// The cosine up to which semi-axes are turned to right angles with a warning; axes typed with three digits
-/// reach 10⁻³. Beyond it they were not meant to be orthogonal.
+/// Largest cosine between semi-axes that are made perpendicular with a warning; axes with three
+/// digits reach 10⁻³. Beyond it, they were not meant to be orthogonal.
 const ALMOST_RIGHT_ANGLE: f64 = 3e-3;
 
-/// A primitive that can be meshed.
+/// A primitive that can be meshed: surfaces and a Boolean tree over them.
 pub(super) struct Shape {
     pub surfaces: Vec<Surface>,
     pub inside: Solid,
-    /// For each surface the face of the text it belongs to.
+    /// The face of the text for each surface.
     pub faces: Vec<usize>,
-    /// Where a swept solid's path goes on.
+    /// The smooth joints of the path of an extrusion.
     pub joints: Vec<Joint>,
 }
 
 impl Shape {
-    /// The inside of one surface.
+    /// The negative side of one surface.
     fn of(surface: Surface) -> Self {
         Self { surfaces: vec![surface], inside: inside_of(0), faces: vec![0], joints: Vec::new() }
     }
 }
 
-/// What a primitive is, for all but extrusions and revolutions.
+/// Lowers a primitive other than an extrusion or a revolution.
 pub(super) fn shape(primitive: &Primitive, span: Span, report: &mut Report) -> Result<Shape, Reported> {
     let mut check = Check { span, report };
     match primitive {
@@ -85,10 +85,10 @@ pub(super) fn shape(primitive: &Primitive, span: Span, report: &mut Report) -> R
     }
 }
 
-/// The direction of a vector that is neither zero nor beyond all measure.
+/// The direction of a vector; `None` if it is zero or its length is out of range.
 pub(super) fn direction(vector: &Vector) -> Option<Vector> {
     let largest = vector.amax();
-    // Scaled first, so that no square overflows or vanishes.
+    // Scale first, so that squares neither overflow nor underflow.
     (SMALLEST_LENGTH..=LARGEST_LENGTH).contains(&largest).then(|| (vector / largest).normalize())
 }
 
@@ -136,7 +136,7 @@ impl Check<'_> {
             let [x, y, z] = [vector.x, vector.y, vector.z];
             self.wrong(
                 format!("{what} ({x}, {y}, {z}) has no direction"),
-                "its length matters only if it is not zero",
+                "give a vector with a length from 1e-60 to 1e60",
             )
         })
     }
@@ -147,7 +147,7 @@ impl Check<'_> {
         let arm = b - a;
         if arm.amax() <= ROUNDING * a.coords.amax().max(b.coords.amax()) {
             let message = format!("the two points on the axis of `{what}` coincide");
-            return Err(self.wrong(message, "they give the direction of the axis"));
+            return Err(self.wrong(message, "two different points define the axis"));
         }
         let axis = self.direction(&format!("the axis of `{what}`"), &arm)?;
         Ok((axis, arm.dot(&axis)))
@@ -163,22 +163,22 @@ impl Check<'_> {
         let largest = radii[0].max(radii[1]);
         if radii[0].min(radii[1]) < 0.0 || largest <= 0.0 {
             let message = format!("`cone` cannot have the radii {} and {}", radii[0], radii[1]);
-            return Err(self.wrong(message, "one may be zero, the apex; the other is positive"));
+            return Err(self.wrong(message, "one radius may be zero (the apex), the other must be positive"));
         }
         self.radius("cone", largest)?;
         if same_radius(radii[0], radii[1]) {
             return Ok(Shape::of(Surface::Cylinder(Cylinder { point: *ends[0], axis, radius: largest })));
         }
-        // From the wider end, which is never the apex.
+        // Use the wider end, which is never the apex.
         let point = if radii[0] > radii[1] { *ends[0] } else { *ends[1] };
         let slope = (radii[1] - radii[0]) / length;
         if !(SMALLEST_LENGTH..=LARGEST_LENGTH).contains(&slope.abs()) {
-            return Err(self.wrong(format!("the slope {slope:e} of `cone` is beyond all measure"), ""));
+            return Err(self.wrong(format!("the slope {slope:e} of `cone` is out of range"), ""));
         }
         Ok(Shape::of(Surface::Cone(Cone { point, axis, radius: largest, slope })))
     }
 
-    /// The longer semi-axis goes first, as in NETGEN: the axis of the cone points along first × second.
+    /// An elliptic cone. As in NETGEN the axis is (longer semi-axis) × (shorter semi-axis).
     fn elliptic_cone(
         &mut self,
         base: &Point,
@@ -191,15 +191,16 @@ impl Check<'_> {
             axes.reverse();
             radii.reverse();
             let message = "the height of this `ellipticcone` is measured along second × first semi-axis";
-            let help = "as in NETGEN, since the second is the longer one; give the longer one first";
+            let help = "as in NETGEN, because the second semi-axis is longer; give the longer one first";
             self.report.warn(self.span, message, help);
         }
         let point = self.point(base)?;
         if !(SMALLEST_LENGTH..=LARGEST_LENGTH).contains(&height.abs()) {
             let message = format!("`ellipticcone` cannot have the height {height}");
-            return Err(
-                self.wrong(message, "the height is where the semi-axes are `ratio` times those of the base")
-            );
+            return Err(self.wrong(
+                message,
+                "the height is the distance at which the semi-axes are `ratio` times those of the base",
+            ));
         }
         if !(0.0..=LARGEST_LENGTH).contains(&ratio) {
             let help = "0 puts the apex at the height, 1 makes a cylinder";
@@ -218,7 +219,7 @@ impl Check<'_> {
         Ok(Shape::of(surface))
     }
 
-    /// Unit directions at right angles, and lengths.
+    /// The semi-axes as orthogonal unit vectors and lengths.
     fn semi_axes<const N: usize>(
         &mut self,
         what: &str,
@@ -255,10 +256,10 @@ impl Check<'_> {
             if min[i] >= max[i] {
                 let message =
                     format!("`orthobrick` has no extent along {name}: from {} to {}", min[i], max[i]);
-                return Err(self.wrong(message, "the corner with the least coordinates comes first"));
+                return Err(self.wrong(message, "give the corner with the smallest coordinates first"));
             }
         }
-        // The order of NETGEN, in which lists of boundary numbers are given: z, y, x, the lower first.
+        // NETGEN's order, used by lists of boundary numbers: z, y, x, the lower face first.
         let plane = |point, normal| Surface::Plane(Plane { point, normal });
         let pair = |axis: Vector| [plane(min, -axis), plane(max, axis)];
         let surfaces = [Vector::z(), Vector::y(), Vector::x()].map(pair).concat();
@@ -270,9 +271,9 @@ impl Check<'_> {
         let (center, axis) = (self.point(center)?, self.direction("the axis of `torus`", axis)?);
         let (major, minor) = (self.radius("torus", major)?, self.radius("torus", minor)?);
         if minor >= major {
-            let message = format!("the tube of `torus` has radius {minor}, its centre line only {major}");
+            let message = format!("the tube of `torus` has radius {minor}, its center line only {major}");
             return Err(
-                self.wrong(message, "a torus without a hole crosses itself; the larger radius comes first")
+                self.wrong(message, "a torus without a hole intersects itself; give the larger radius first")
             );
         }
         Ok(Shape::of(Surface::Torus(Torus { center, axis, major, minor })))

@@ -1,12 +1,16 @@
-//! A closed curve of lines and elliptic arcs in the plane as a Boolean formula of half-planes and ellipses.
+//! A closed plane curve of lines and elliptic arcs as a Boolean formula of half-planes and
+//! ellipses.
 //!
-//! The polygon of the chords has a formula in which each edge's half-plane occurs once (Dobkin, Guibas, Hershberger,
-//! Snoeyink 1988, "An efficient algorithm for finding the CSG representation of a simple polygon": a chain is cut at a
-//! vertex of its convex hull; the halves are met if it is convex there, joined if not). The edge of an arc that bulges
-//! outward stands for its half-plane or the ellipse, one that bulges inward for the half-plane without the ellipse;
-//! what of a cap other edges cut off is joined or taken away afterwards. So chords are seen at the
-//! ends of their arcs only. All holds if the control triangles of arcs and the edges meet in common ends only; arcs
-//! are halved until they do.
+//! The polygon of the chords has a formula in which the half-plane of each edge occurs once
+//! (Dobkin, Guibas, Hershberger, Snoeyink 1988, "An efficient algorithm for finding the CSG
+//! representation of a simple polygon": a chain is cut at a vertex of its convex hull; its halves
+//! are intersected if the vertex is convex, else united). For an arc that bulges outward, the edge
+//! is replaced by (half-plane or ellipse); for one that bulges inward, by (half-plane without
+//! ellipse). Parts of the caps that other edges cut off are added or removed at the end. So chords
+//! are visible only at the ends of their arcs.
+//!
+//! This requires that control triangles of arcs and edges meet in common ends only; arcs are
+//! bisected until they do.
 
 use super::conic::{Arc, Piece, SpaceEllipse};
 use crate::primitive::Ellipse;
@@ -16,17 +20,17 @@ use std::f64::consts::PI;
 /// One side of a line or an ellipse.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Literal {
-    /// What bounds it.
+    /// The line or ellipse.
     pub bound: Bound,
-    /// The segment of the profile it belongs to.
+    /// The segment of the profile it comes from.
     pub segment: usize,
 }
 
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Bound {
-    /// To the left of the line from one point to the other.
+    /// The half-plane to the left of the line through two points.
     Left([f64; 2], [f64; 2]),
-    /// Inside an ellipse.
+    /// The inside of an ellipse.
     Inside(Ellipse),
 }
 
@@ -35,38 +39,40 @@ pub(super) enum Bound {
 pub(super) struct Profile {
     pub literals: Vec<Literal>,
     pub inside: Solid,
-    /// How far from the origin it reaches at most.
+    /// An upper bound of the distance of the profile from the origin.
     pub reach: f64,
 }
 
-/// What is wrong with a profile.
+/// Why a profile is invalid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum ProfileError {
-    /// Two of its segments cross, touch, or run into each other without an angle: their numbers.
+    /// Two segments (by index) cross, touch, or continue each other backward.
     Crossing(usize, usize),
-    /// It encloses nothing.
+    /// The profile encloses no area.
     Empty,
-    /// An arc leaves the axis, not at a right angle.
+    /// An arc does not meet the axis at a right angle.
     Slanted(usize),
 }
 
-/// A side of the polygon: the chord of a line or an arc, counter-clockwise around the inside.
+/// An edge of the polygon: the chord of a line or an arc, counterclockwise around the inside.
 #[derive(Clone, Debug)]
 struct Edge {
     ends: [Vector; 2],
-    /// The convex hull of the segment and of its chord.
+    /// Points whose convex hull contains the segment and its chord.
     hull: Vec<Vector>,
     arc: Option<(Arc, Ellipse)>,
     segment: usize,
     depth: u32,
 }
 
-/// Two points nearer than this part of the size are one.
+/// Points closer than this fraction of the size coincide.
 const SAME: f64 = 1e-9;
-/// Arcs are halved so often at most.
+/// Largest number of bisections of an arc.
 const DEEPEST: u32 = 8;
 
-/// The formula of a profile; one that is not closed is closed by a line. With `by_axis` nothing below y = 0 counts.
+/// The formula of a profile; an open profile is closed by a line.
+///
+/// With `by_axis`, the part below y = 0 is ignored.
 pub(super) fn formula(pieces: &[Piece], by_axis: bool) -> Result<Profile, ProfileError> {
     let size = pieces.iter().flat_map(Piece::control).map(|p| p.amax()).fold(0.0, f64::max);
     let cutter = Cutter { by_axis, tolerance: SAME * size };
@@ -79,7 +85,7 @@ pub(super) fn formula(pieces: &[Piece], by_axis: bool) -> Result<Profile, Profil
     let mut edges = cutter.edges(pieces)?;
     while let Some([i, j]) = cutter.conflict(&edges) {
         let can_split = |k: &usize| edges[*k].arc.is_some() && edges[*k].depth < DEEPEST;
-        // The later first, so that the number of the other stays.
+        // Process the later edge first, so that the index of the other stays valid.
         let split: Vec<usize> = [i.max(j), i.min(j)].into_iter().filter(can_split).collect();
         if split.is_empty() {
             return Err(ProfileError::Crossing(edges[i].segment, edges[j].segment));
@@ -89,11 +95,11 @@ pub(super) fn formula(pieces: &[Piece], by_axis: bool) -> Result<Profile, Profil
             edges.splice(k..=k, parts);
         }
     }
-    cutter.settle_on_axis(&mut edges);
+    cutter.extend_along_axis(&mut edges);
     Ok(Builder { literals: Vec::new(), edges: &edges, tolerance: cutter.tolerance }.build())
 }
 
-/// About twice the area that segments enclose.
+/// About twice the area enclosed by segments.
 fn area(pieces: &[Piece]) -> f64 {
     let twice = |p: Vector, q: Vector| p.cross(&q).z;
     let each = pieces.iter().map(|piece| match *piece {
@@ -103,7 +109,7 @@ fn area(pieces: &[Piece]) -> f64 {
     each.sum()
 }
 
-/// Cuts pieces into edges.
+/// Cuts segments into edges.
 struct Cutter {
     by_axis: bool,
     /// A length.
@@ -111,9 +117,9 @@ struct Cutter {
 }
 
 impl Cutter {
-    /// The ellipse that a profile of arcs is, if it is one: all of it, or half of it closed by the axis.
+    /// The ellipse that a profile of arcs forms, completely or as a half closed by the axis.
     fn whole_ellipse(&self, pieces: &[Piece]) -> Option<Ellipse> {
-        /// Radians by which a turn may be off.
+        /// Tolerance of the total turning angle, radians.
         const ANGLE: f64 = 1e-3;
         let mut found: Option<(Ellipse, f64)> = None;
         let mut turn = 0.0;
@@ -139,7 +145,7 @@ impl Cutter {
         (whole || half).then_some(ellipse)
     }
 
-    /// The edges of the polygon, counter-clockwise; points on the axis exactly there.
+    /// The edges of the polygon, counterclockwise; points near the axis are moved onto it.
     fn edges(&self, pieces: &[Piece]) -> Result<Vec<Edge>, ProfileError> {
         let on_axis = |mut p: Vector| {
             if self.by_axis && p.y <= self.tolerance {
@@ -180,10 +186,11 @@ impl Cutter {
         Ok(edges)
     }
 
-    /// The edge of a piece; two if it is an arc from the axis to the axis.
+    /// The edge of a segment; two edges for an arc from the axis to the axis.
     ///
-    /// An arc that begins or ends on the axis gets a chord across the axis, from its other end; between its end and the
-    /// chord's lies the axis. So the chord is never a cone with its tip on the surface.
+    /// The chord of an arc with one end on the axis is perpendicular to the axis and starts at the
+    /// arc's other end; the axis closes the gap. So the chord never sweeps a cone with its apex on
+    /// the surface.
     fn edges_of(
         &self,
         mut ends: [Vector; 2],
@@ -191,7 +198,7 @@ impl Cutter {
         segment: usize,
         depth: u32,
     ) -> Result<Vec<Edge>, ProfileError> {
-        /// The cosine of the angle with the axis.
+        /// Largest cosine of the angle between the arc and the axis.
         const SLANTED: f64 = 1e-6;
         let Some((arc, ellipse)) = arc else {
             return Ok(vec![Edge { ends, hull: ends.to_vec(), arc: None, segment, depth }]);
@@ -228,7 +235,7 @@ impl Cutter {
         Ok([first?, second?].concat())
     }
 
-    /// Two edges whose hulls have more in common than the end of one that is the start of the other.
+    /// Two edges whose hulls share more than the common vertex of consecutive edges.
     fn conflict(&self, edges: &[Edge]) -> Option<[usize; 2]> {
         let count = edges.len();
         for i in 0..count {
@@ -245,8 +252,8 @@ impl Cutter {
         None
     }
 
-    /// Makes lines along the axis reach to where the chords beside them are; those without length are left out.
-    fn settle_on_axis(&self, edges: &mut Vec<Edge>) {
+    /// Extends lines along the axis to the adjacent chords; removes lines of zero length.
+    fn extend_along_axis(&self, edges: &mut Vec<Edge>) {
         let count = edges.len();
         for i in 0..count {
             let (before, after) = (edges[(i + count - 1) % count].ends[1], edges[(i + 1) % count].ends[0]);
@@ -262,16 +269,17 @@ impl Cutter {
     }
 }
 
-/// Whether an edge runs back on the one before it.
+/// Whether an edge runs back along the previous one.
 fn folds_back(edge: &Edge, next: &Edge) -> bool {
-    /// The sine of the angle.
+    /// Largest sine of a zero angle.
     const NO_ANGLE: f64 = 1e-6;
     let [a, b] = [edge.ends[1] - edge.ends[0], next.ends[1] - next.ends[0]];
-    // On the axis edges may run back: nothing is there.
+    // On the axis edges may run back, because they sweep nothing.
     edge.ends[1].y != 0.0 && a.dot(&b) < 0.0 && a.cross(&b).norm() <= NO_ANGLE * a.norm() * b.norm()
 }
 
-/// Whether a line lies between two convex hulls, with so much room (or overlap, if negative).
+/// Whether a line separates two convex hulls with a gap of at least `room` (an overlap if
+/// negative).
 fn separated(first: &[Vector], second: &[Vector], room: f64) -> bool {
     let directions = |hull: &[Vector]| {
         let mut all = Vec::new();
@@ -337,7 +345,7 @@ impl Builder<'_> {
             removed.insert(0, inside);
             inside = Solid::And(removed);
         }
-        // The hulls have the arcs in them.
+        // The hulls contain the arcs.
         let reach = self.edges.iter().flat_map(|e| &e.hull).map(|p| p.norm()).fold(0.0, f64::max);
         Profile { literals: self.literals, inside, reach }
     }
@@ -350,7 +358,8 @@ impl Builder<'_> {
         }))
     }
 
-    /// What stands for an edge in the polygon's formula; its cap to be joined or taken away.
+    /// The part of an edge in the polygon's formula; caps to add or remove are appended to the
+    /// lists.
     fn leaf(&mut self, index: usize, added: &mut Vec<Solid>, removed: &mut Vec<Solid>) -> Solid {
         let Edge { ends: [p, q], arc, segment, .. } = self.edges[index].clone();
         let line = self.literal(Bound::Left([p.x, p.y], [q.x, q.y]), segment);
@@ -365,7 +374,7 @@ impl Builder<'_> {
         }
     }
 
-    /// The formula of a chain of edges whose first and last go on for ever.
+    /// The formula of a chain of edges whose first and last edge extend to infinity.
     fn chain(&self, edges: &[usize], leaves: &[Solid]) -> Solid {
         let [.., last] = edges else { return Solid::And(Vec::new()) };
         if edges.len() == 1 {
@@ -376,14 +385,14 @@ impl Builder<'_> {
             (q - p).normalize()
         };
         let (first, end) = (direction(edges[0]), direction(*last));
-        // Away from both rays: there the hull has a vertex.
+        // The direction away from both end rays, in which the hull has a vertex.
         let mut away = first - end;
         if away.norm() < SAME {
             away = Vector::new(end.y, -end.x, 0.0);
         }
         let corner = |k: &usize| self.edges[edges[*k]].ends[0];
         let farthest = (1..edges.len()).map(|k| away.dot(&corner(&k))).fold(f64::NEG_INFINITY, f64::max);
-        // Of several as far one with an angle: those between on their line have none.
+        // Of several farthest points, take one with an angle; points between on a line have none.
         let turn = |k: &usize| direction(edges[k - 1]).cross(&direction(edges[*k])).z;
         let candidates = (1..edges.len()).filter(|k| away.dot(&corner(k)) >= farthest - self.tolerance);
         let cut = candidates.max_by(|i, j| turn(i).abs().total_cmp(&turn(j).abs())).unwrap_or(1);
@@ -392,7 +401,7 @@ impl Builder<'_> {
     }
 }
 
-/// The intersection (`meet`) or union of two, in one list with members of the same kind.
+/// The intersection (`meet`) or union of two trees, flattened with members of the same kind.
 fn join(meet: bool, first: Solid, second: Solid) -> Solid {
     let mut members = Vec::new();
     for part in [first, second] {

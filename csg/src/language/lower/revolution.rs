@@ -1,4 +1,4 @@
-//! `revolution`: a profile turned about an axis.
+//! `revolution`: a profile rotated about an axis.
 
 use super::conic::{Arc, Piece};
 use super::primitive::Shape;
@@ -6,10 +6,10 @@ use super::profile::formula;
 use super::swept::{Assembly, SweepError, Turn};
 use crate::Vector;
 
-/// Lengths below this part of the size of the profile are none.
+/// Lengths below this fraction of the size of the profile count as zero.
 const NOTHING: f64 = 1e-9;
 
-/// The solid of a profile in coordinates (height along the axis, distance from it).
+/// The solid of a profile in the coordinates (height along the axis, distance from the axis).
 pub(super) fn shape(point: Vector, axis: Vector, pieces: &[Piece]) -> Result<Shape, SweepError> {
     let size = pieces.iter().flat_map(Piece::control).map(|p| p.amax()).fold(0.0, f64::max);
     let tolerance = NOTHING * size;
@@ -19,7 +19,7 @@ pub(super) fn shape(point: Vector, axis: Vector, pieces: &[Piece]) -> Result<Sha
     above[last] = cut_by_axis(above[last].reversed()).reversed();
     if let Some(index) = above.iter().position(|piece| lowest(piece) < -tolerance) {
         let message = format!("segment {} of the profile is beyond the axis", index + 1);
-        return Err(SweepError::Wrong(message, "the distance from the axis, y, is not negative"));
+        return Err(SweepError::Wrong(message, "the distance y from the axis must not be negative"));
     }
     let profile = formula(&above, true)?;
     let turn = Turn { point, axis, tolerance };
@@ -28,7 +28,7 @@ pub(super) fn shape(point: Vector, axis: Vector, pieces: &[Piece]) -> Result<Sha
     Ok(assembly.shape(swept.inside))
 }
 
-/// A line that begins beyond the axis begins on it.
+/// Cuts off the start of a line that begins below the axis.
 fn cut_by_axis(piece: Piece) -> Piece {
     match piece {
         Piece::Line([p, q]) if p.y < 0.0 && q.y > 0.0 => {
@@ -40,9 +40,9 @@ fn cut_by_axis(piece: Piece) -> Piece {
     }
 }
 
-/// The least y of a piece, nearly.
+/// The least y of a segment, approximately.
 fn lowest(piece: &Piece) -> f64 {
-    /// Pieces of an arc of which the ends are taken: 32.
+    /// Recursion depth: an arc is evaluated at the ends of 32 pieces.
     const DEPTH: u32 = 5;
     fn least(arc: Arc, depth: u32) -> f64 {
         let [p, q, r] = arc.points.map(|p| p.y);

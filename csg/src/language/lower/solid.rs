@@ -1,4 +1,4 @@
-//! Definitions of solids and the expressions in them.
+//! Lowers definitions of solids and their expressions.
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion};
 use std::f64::consts::FRAC_PI_2;
@@ -15,9 +15,10 @@ use crate::language::ast::{self, Expr, Flag, Name, Num, Transform};
 use crate::language::diagnostic::Reported;
 use crate::{Point, Solid, Vector};
 
-/// How near to a multiple of a right angle (but zero) a rotation is that multiple, in radians. Four decimals
-/// are at most 1.5e-5 off for a full turn or less (6.2832); the matrix is then exact to rounding, and a brick that was
-/// turned has the same planes as its neighbour that was not. Nobody means 90.001 degrees (1.7e-5).
+/// Rotations this close (radians) to a nonzero multiple of a right angle are made exact. Four
+/// decimals are off by at most 1.5e-5 for up to a full turn (6.2832). The exact rotation gives a
+/// rotated brick the same planes as its neighbor. An angle of 90.001 degrees (1.7e-5) is not
+/// expected.
 const RIGHT_ANGLE_SNAP: f64 = 1.6e-5;
 
 impl Lowering<'_> {
@@ -31,18 +32,19 @@ impl Lowering<'_> {
         }
         self.forest.definitions[index].root = root.ok();
         let root = root?;
-        // Only what is defined again can come into itself: names are known from their definition on.
+        // Only a redefined solid can contain itself, because names are known only after their
+        // definition.
         if known.is_some()
             && let Err(ForestError::Cycle) = self.forest.post_order(root)
         {
             self.forest.definitions[index].root = None;
-            let message = format!("the solid `{}` is made of itself", name.text);
-            return Err(self.report.meaning(name.span, message, "give the new solid a name of its own"));
+            let message = format!("the solid `{}` contains itself", name.text);
+            return Err(self.report.meaning(name.span, message, "give the new solid another name"));
         }
         self.apply_flags(index, root, flags)
     }
 
-    /// A solid or curve that could not be read: using it gives no further error.
+    /// Declares a solid or curve with an error; using it gives no further error.
     pub(super) fn define_broken(&mut self, name: &Name) {
         for curves in &mut self.curves {
             curves.insert(name.text.clone(), None);
@@ -50,7 +52,7 @@ impl Lowering<'_> {
         self.declare(name);
     }
 
-    /// A new definition that has no tree yet.
+    /// Adds a definition without a tree.
     fn declare(&mut self, name: &Name) -> usize {
         let definition = Definition {
             name: name.text.clone(),
@@ -67,15 +69,16 @@ impl Lowering<'_> {
 
     fn redefined(&mut self, index: usize, name: &Name) {
         let definition = &mut self.forest.definitions[index];
-        let message = format!("`{}` was defined in line {} already", name.text, definition.span.line);
+        let message = format!("`{}` is already defined in line {}", name.text, definition.span.line);
         definition.span = name.span;
         definition.maxh = None;
         definition.labelled = [false; 2];
         self.is_redefined = true;
-        self.report.warn(name.span, message, "what was made of it before now changes too, as in NETGEN");
+        self.report.warn(name.span, message, "its earlier uses change too, as in NETGEN");
     }
 
-    /// The flags of a definition go to the surfaces under it; what a surface already has, it keeps.
+    /// Assigns the flags of a definition to the surfaces below it; existing numbers and names are
+    /// kept.
     fn apply_flags(&mut self, index: usize, root: NodeId, flags: &[Flag]) -> Result<(), Reported> {
         const ON_TLO: &str = "it belongs on the `tlo`";
         let idle = [("col", ON_TLO), ("transparent", ON_TLO), ("material", ON_TLO), ("layer", ON_TLO)];
@@ -93,8 +96,9 @@ impl Lowering<'_> {
             names.as_ref().is_some_and(|n| is_list(n.len())),
         ];
         let labels = [numbers.is_some(), names.is_some()];
-        // Definitions that have all that is given here keep it: a chain of definitions with flags takes linear
-        // time. Lists must be counted, and after a second definition nothing is sure.
+        // Skip definitions that already have all flags given here, so that a chain of definitions
+        // with flags takes linear time. Lists must be counted, and after a redefinition nothing can
+        // be skipped.
         let must_walk = self.is_redefined || lists.contains(&true);
         let has_all = |d: &Definition| {
             let fine = maxh.is_none_or(|maxh| d.maxh.is_some_and(|known| known <= maxh));
@@ -114,7 +118,7 @@ impl Lowering<'_> {
                 && length != count
             {
                 let message = format!("the list of -{flag} has {length} values for {count} surfaces");
-                self.report.warn(span, message, "one value for each surface, in the order of the text");
+                self.report.warn(span, message, "give one value per surface, in file order");
             }
         }
         for (surface, entry) in surfaces.into_iter().zip(entries) {
@@ -132,9 +136,11 @@ impl Lowering<'_> {
         Ok(())
     }
 
-    /// For each of the surfaces under `root` its place in a list of boundary numbers, none for a surface that belongs to no
-    /// segment, and how many places there are. A surface has a place of its own, except that those of a polyhedron alone
-    /// count by faces of the text and those of swept solids by segments of the profile.
+    /// For each surface below `root`, its index in a list of boundary numbers (`NO_FACE` if it
+    /// belongs to no segment), and the length of the list.
+    ///
+    /// Surfaces have one entry each, except that a single polyhedron counts by faces of the text,
+    /// and swept solids count by segments of the profile.
     fn list_entries(&self, root: NodeId) -> (Vec<usize>, usize) {
         let primitives = self.forest.primitives_of(root).unwrap_or_default();
         let (mut entries, mut count) = (Vec::new(), 0);
@@ -163,13 +169,13 @@ impl Lowering<'_> {
         result.map_err(|error| match error {
             ForestError::TooLarge => {
                 let message = format!("the primitives have more than {MOST_SURFACES} surfaces");
-                self.report.meaning(span, message, "transforms within transforms multiply")
+                self.report.meaning(span, message, "nested transforms multiply the number of copies")
             }
             ForestError::Broken | ForestError::Cycle => Reported,
         })
     }
 
-    /// Adds an expression in the definition of `solid`.
+    /// Adds an expression that occurs in the definition of `solid`.
     fn expression(&mut self, expr: &Expr, solid: &str) -> Result<NodeId, Reported> {
         match expr {
             Expr::Primitive(primitive, span) => self.primitive(primitive, *span, solid),
@@ -199,7 +205,7 @@ impl Lowering<'_> {
         }
     }
 
-    /// All of them, so that each reports its own error.
+    /// Adds all members before failing, so that each reports its own error.
     fn expressions(&mut self, members: &[Expr], solid: &str) -> Result<Vec<NodeId>, Reported> {
         let members: Vec<_> = members.iter().map(|member| self.expression(member, solid)).collect();
         members.into_iter().collect()
@@ -238,7 +244,7 @@ impl Lowering<'_> {
         solid: &str,
     ) -> Result<NodeId, Reported> {
         let moved = |motion: Isometry3<f64>| vec![motion];
-        // The copies to make, and whether the original stays.
+        // The motions of the copies, and whether the original is kept.
         let (motions, keeps_original) = match transform {
             Transform::Translate(shift) => (moved(self.translation(&shift, 1.0, span)?), false),
             Transform::Rotate(center, angles) => (moved(self.rotation(&center, &angles, span)?), false),
@@ -249,7 +255,7 @@ impl Lowering<'_> {
             }
             Transform::MultiRotate(center, angles, count) => {
                 let motion = self.rotation(&center, &angles, span)?;
-                // The first of the copies that NETGEN makes is not turned: it is the original again.
+                // NETGEN's first copy is not rotated: it coincides with the original.
                 let turns = self.copies(count)?.saturating_sub(1);
                 let next = |last: &Isometry3<f64>| Some(last * motion);
                 (std::iter::successors(Some(motion), next).take(turns).collect(), true)
@@ -273,7 +279,7 @@ impl Lowering<'_> {
         if (0.0..=MOST_SURFACES as f64).contains(&count.value) {
             return Ok(count.value as usize);
         }
-        let help = format!("a number from 0 to {MOST_SURFACES}");
+        let help = format!("give a number from 0 to {MOST_SURFACES}");
         Err(self.report.meaning(count.span, format!("there cannot be {} copies", count.value), &help))
     }
 
@@ -283,7 +289,8 @@ impl Lowering<'_> {
         Ok(Translation3::from(shift).into())
     }
 
-    /// x ↦ c + Rz(γ) Rx(β) Rz(α) (x - c), each turning clockwise as seen from the tip of its axis.
+    /// The rotation x ↦ c + Rz(γ) Rx(β) Rz(α) (x - c), each factor clockwise as seen from the tip
+    /// of its axis.
     fn rotation(&mut self, center: &Point, angles: &Vector, span: Span) -> Result<Isometry3<f64>, Reported> {
         self.within_reach(&center.coords, span)?;
         self.within_reach(angles, span)?;
@@ -302,19 +309,20 @@ impl Lowering<'_> {
         Err(self.report.meaning(span, message, "choose another unit of length"))
     }
 
-    /// Copies have none of the flags of their original; said once a file.
+    /// Warns, once per file, that copies do not have the flags of the original.
     fn warn_of_losses(&mut self, originals: &[usize], span: Span) {
         let infos = originals.iter().map(|&surface| &self.forest.surfaces[surface].info);
         let mut flagged = infos.filter(|i| i.maxh.is_some() || i.bc.is_some() || i.bc_name.is_some());
-        if let (false, Some(info)) = (self.losses_known, flagged.next()) {
-            let message = format!("moved copies do not have the -bc, -bcname and -maxh of `{}`", info.solid);
-            self.losses_known = true;
-            self.report.warn(span, message, "as in NETGEN; give flags to the solid that is defined here");
+        if let (false, Some(info)) = (self.has_warned_of_losses, flagged.next()) {
+            let message =
+                format!("transformed copies do not inherit -bc, -bcname and -maxh from `{}`", info.solid);
+            self.has_warned_of_losses = true;
+            self.report.warn(span, message, "as in NETGEN; give flags to the solid defined here");
         }
     }
 }
 
-/// The multiple of a right angle (but zero) that the angle stands for, or the angle.
+/// The nearby nonzero multiple of a right angle, or the angle itself.
 fn snapped_to_right_angle(angle: f64) -> f64 {
     let quarters = (angle / FRAC_PI_2).round();
     let exact = quarters * FRAC_PI_2;

@@ -1,4 +1,4 @@
-//! The other statements.
+//! Lowers the other statements.
 
 use super::flags::Flags;
 use super::primitive::LARGEST_LENGTH;
@@ -59,7 +59,7 @@ impl Lowering<'_> {
 
     fn not_meshed(&mut self, construct: &str, span: Span) -> Reported {
         let message = format!("`{construct}` is understood, but cannot be meshed yet");
-        self.report.unsupported(span, message, "without this statement the rest can be meshed")
+        self.report.unsupported(span, message, "remove this statement to mesh the rest")
     }
 
     fn known_with_surfaces(&mut self, solids: &[Name]) -> Result<(), Reported> {
@@ -79,8 +79,12 @@ impl Lowering<'_> {
         let same = |tlo: &&Tlo| tlo.definition == definition && matches!(tlo.kind, TloKind::Body(_));
         if let Some(first) = self.tlos.iter().find(same) {
             let message =
-                format!("`{}` is a top-level object already, in line {}", name.text, first.span.line);
-            return Err(self.report.meaning(name.span, message, "bodies must not overlap"));
+                format!("`{}` is already a top-level object, in line {}", name.text, first.span.line);
+            return Err(self.report.meaning(
+                name.span,
+                message,
+                "remove one of the two `tlo`: bodies must not overlap",
+            ));
         }
         let body = Body {
             name: name.text.clone(),
@@ -101,7 +105,7 @@ impl Lowering<'_> {
             && layer != body.layer
         {
             let message = format!("`{other}` and `{}` are in different layers", body.name);
-            self.report.warn(name.span, message, "they are meshed together, conformingly, all the same");
+            self.report.warn(name.span, message, "layers are ignored: all bodies are meshed conformingly");
         }
         self.tlos.push(Tlo { definition, kind: TloKind::Body(body), span: name.span });
         Ok(())
@@ -110,7 +114,7 @@ impl Lowering<'_> {
     /// `tlo solid surface flags;`
     fn top_level_surface(&mut self, name: &Name, surface: &Name, flags: &[Flag]) -> Result<(), Reported> {
         let known = ["col", "transparent", "maxh", "layer", "bc", "bcname"];
-        let idle = [("material", "a surface has none")];
+        let idle = [("material", "surfaces have no material")];
         let flags = Flags::new(flags, &known, &idle, self.report);
         let definition = self.solid_named(name)?;
         let of_surface = self.solid_named(surface)?;
@@ -135,11 +139,11 @@ impl Lowering<'_> {
 
     fn bounding_box(&mut self, min: &Point, max: &Point, span: Span) -> Result<(), Reported> {
         if (0..3).any(|i| min[i] >= max[i]) {
-            let help = "the corner with the least coordinates comes first";
+            let help = "give the corner with the smallest coordinates first";
             return Err(self.report.meaning(span, "the box of `boundingbox` is empty", help));
         }
         if self.stated_box.is_some() {
-            self.report.warn(span, "there was a `boundingbox` before; this one counts", "");
+            self.report.warn(span, "this `boundingbox` replaces an earlier one", "");
         }
         self.stated_box = Some(Aabb { min: *min, max: *max });
         Ok(())
@@ -158,7 +162,7 @@ impl Lowering<'_> {
         Ok(())
     }
 
-    /// `singular face`, `singular edge` or `singular point`, told apart by the number of solids.
+    /// `singular face`, `singular edge` or `singular point`, distinguished by the number of solids.
     fn singular(
         &mut self,
         solids: &[Name],
@@ -191,5 +195,5 @@ impl Lowering<'_> {
     }
 }
 
-/// What singularities are for.
-const ONLY_HP: &str = "it grades hp elements, and tetrahedra are written without grading";
+/// The purpose of singularities, for help lines.
+const ONLY_HP: &str = "it is for hp elements; the tetrahedral mesh is not graded";

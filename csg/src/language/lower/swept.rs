@@ -1,4 +1,4 @@
-//! What revolutions and extrusions have in common: profiles whose sides become surfaces in space.
+//! Common parts of revolutions and extrusions: profiles whose sides become surfaces in space.
 
 use super::forest::inside_of;
 use super::primitive::Shape;
@@ -6,11 +6,11 @@ use super::profile::{Bound, Profile, ProfileError};
 use crate::primitive::{Cylinder, Ellipse, Ellipsoid, Nappe, Plane, Revolved, Sphere, Torus};
 use crate::{Point, Solid, Surface, Vector};
 
-/// Why there is no swept solid.
+/// Why a swept solid cannot be made.
 pub(super) enum SweepError {
-    /// It makes no sense: what, and what to do.
+    /// The input is invalid: message and help.
     Wrong(String, &'static str),
-    /// It is right, but cannot be meshed.
+    /// The input is valid, but cannot be meshed.
     Unsupported(String),
 }
 
@@ -19,21 +19,21 @@ impl From<ProfileError> for SweepError {
         match error {
             ProfileError::Crossing(i, j) if i == j => Self::Wrong(
                 format!("segment {} of the profile crosses itself", i + 1),
-                "segments meet at their ends only",
+                "segments may meet at their ends only",
             ),
             ProfileError::Crossing(i, j) => Self::Wrong(
                 format!(
-                    "segments {} and {} of the profile cross, touch, or meet without an angle",
+                    "segments {} and {} of the profile cross, touch, or meet at a zero angle",
                     i + 1,
                     j + 1
                 ),
-                "segments meet at their ends only, and there at an angle",
+                "segments may meet only at their ends and at a nonzero angle",
             ),
             ProfileError::Empty => {
-                Self::Wrong("the profile encloses no area".into(), "its segments go around an area")
+                Self::Wrong("the profile encloses no area".into(), "its segments must enclose an area")
             }
             ProfileError::Slanted(i) => Self::Unsupported(format!(
-                "segment {} of the profile is curved and leaves the axis at an angle other than a right one, which cannot \
+                "segment {} of the profile is curved and does not meet the axis at a right angle, which cannot \
                  be meshed yet",
                 i + 1
             )),
@@ -41,20 +41,23 @@ impl From<ProfileError> for SweepError {
     }
 }
 
-/// The surface number (see [`RawSurface::face`](super::forest::RawSurface)) of those that belong to no segment.
+/// The face number (see [`RawSurface::face`](super::forest::RawSurface)) of surfaces that belong to
+/// no segment.
 pub(super) const NO_FACE: usize = usize::MAX;
 
-/// Where a path goes on: the surfaces that one side of the profile sweeps before and after, and the plane across the path in which
-/// they meet. Indices of the surfaces of a primitive.
+/// A smooth joint of a path, as indices of the surfaces of a primitive.
+///
+/// The surfaces that one side of the profile sweeps before and after the joint meet in the plane
+/// perpendicular to the path.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Joint {
-    /// Before and after.
+    /// The surfaces before and after.
     pub sides: [usize; 2],
-    /// The plane.
+    /// The plane of the joint.
     pub plane: usize,
 }
 
-/// The surfaces of a swept solid, while it is put together.
+/// Collects the surfaces of a swept solid.
 #[derive(Default)]
 pub(super) struct Assembly {
     surfaces: Vec<Surface>,
@@ -62,15 +65,15 @@ pub(super) struct Assembly {
     joints: Vec<Joint>,
 }
 
-/// What a profile sweeps.
+/// The solid swept by a profile.
 pub(super) struct Swept {
     pub inside: Solid,
-    /// For each literal of the profile what it sweeps.
+    /// The half-space swept by each literal of the profile.
     pub sides: Vec<Solid>,
 }
 
 impl Assembly {
-    /// The negative side of a surface, or the positive one.
+    /// The negative or the positive side of a surface.
     pub fn side(&mut self, surface: Surface, positive: bool, face: usize) -> Solid {
         let known = (0..self.surfaces.len()).find(|&i| self.faces[i] == face && self.surfaces[i] == surface);
         let index = known.unwrap_or_else(|| {
@@ -81,25 +84,25 @@ impl Assembly {
         if positive { complement(inside_of(index)) } else { inside_of(index) }
     }
 
-    /// Behind the plane through a point.
+    /// The half-space behind the plane through a point.
     pub fn behind(&mut self, point: Vector, normal: Vector, face: usize) -> Solid {
         let normal = normal.normalize();
         self.side(Surface::Plane(Plane { point: Point::from(point), normal }), false, face)
     }
 
-    /// The solid with this inside.
+    /// The primitive with the given Boolean tree.
     pub fn shape(self, inside: Solid) -> Shape {
         Shape { surfaces: self.surfaces, inside, faces: self.faces, joints: self.joints }
     }
 
-    /// Notes that what the same literals sweep before and after a plane meets there.
+    /// Records that the surfaces swept by the same literals before and after a plane meet there.
     pub fn join(&mut self, [before, after]: [&[Solid]; 2], plane: &Solid) {
         let Some(plane) = surface_of(plane) else { return };
         let sides = before.iter().zip(after).filter_map(|(p, q)| Some([surface_of(p)?, surface_of(q)?]));
         self.joints.extend(sides.filter(|[p, q]| p != q).map(|sides| Joint { sides, plane }));
     }
 
-    /// A profile with each literal replaced by what `swept` makes of it.
+    /// The tree of a profile with each literal replaced by the result of `swept`.
     pub fn sweep(
         &mut self,
         profile: &Profile,
@@ -111,7 +114,7 @@ impl Assembly {
     }
 }
 
-/// The surface of a half-space.
+/// The index of the surface of a half-space.
 fn surface_of(solid: &Solid) -> Option<usize> {
     match solid {
         Solid::Half { surface, .. } => Some(surface.index()),
@@ -137,7 +140,7 @@ pub(super) fn complement(solid: Solid) -> Solid {
     }
 }
 
-/// The tree with its half-spaces replaced; what is everything or nothing is left out.
+/// The tree with its half-spaces replaced and simplified for empty and full members.
 fn substituted(solid: &Solid, leaves: &[Solid]) -> Solid {
     let members = |members: &[Solid], neutral: Solid, decisive: Solid, join: fn(Vec<Solid>) -> Solid| {
         let parts: Vec<Solid> =
@@ -153,18 +156,18 @@ fn substituted(solid: &Solid, leaves: &[Solid]) -> Solid {
     }
 }
 
-/// An axis about which a half-plane turns.
+/// An axis of revolution.
 pub(super) struct Turn {
     /// A point on the axis.
     pub point: Vector,
-    /// Its unit direction.
+    /// Unit direction of the axis.
     pub axis: Vector,
-    /// Lengths below this are none.
+    /// Lengths below this count as zero.
     pub tolerance: f64,
 }
 
-/// The sine of an angle below which a line is parallel to the axis or across it. Decimals are typed with six digits or
-/// more where they matter; then the ends of a segment are brought to the same radius or height.
+/// A line whose angle has a smaller sine is parallel or perpendicular to the axis. Decimals have
+/// six digits or more where it matters; then the ends of a segment get the same radius or height.
 const PARALLEL: f64 = 1e-9;
 
 impl Turn {
@@ -172,7 +175,8 @@ impl Turn {
         Point::from(self.point + self.axis * height)
     }
 
-    /// What a side of the profile in coordinates (height along the axis, distance from it) becomes.
+    /// The half-space swept by a side of the profile, in coordinates (height along the axis,
+    /// distance from it).
     pub fn turned(&self, into: &mut Assembly, bound: &Bound, face: usize) -> Solid {
         match bound {
             Bound::Left(from, to) => self.turned_line(into, *from, *to, face),
@@ -180,13 +184,13 @@ impl Turn {
         }
     }
 
-    /// To the left of a line from one point to the other.
+    /// The half-space swept by the left side of a line.
     fn turned_line(&self, into: &mut Assembly, from: [f64; 2], to: [f64; 2], face: usize) -> Solid {
         let [x, y] = [0, 1].map(|i| to[i] - from[i]);
         let length = x.hypot(y);
         let axis = self.axis;
         if from[1].max(to[1]) <= self.tolerance {
-            // Along the axis: all is on one side.
+            // A line along the axis: everything is on one side.
             return if x > 0.0 { everything() } else { nothing() };
         }
         if x.abs() <= PARALLEL * length {
@@ -220,7 +224,8 @@ impl Turn {
             let (u, v) = crate::primitive::quadric::tangents(&axis);
             return Surface::Ellipsoid(Ellipsoid { center, axes: [u, v, axis], radii: [out, out, up] });
         }
-        // In (distance, height) the axis has its coordinates exchanged; the other is then the opposite, which is the same.
+        // In (distance, height), the coordinates of the axis are exchanged. The second axis becomes
+        // its opposite, which gives the same ellipse.
         let profile = Ellipse { center: [distance, 0.0], axis: [s, c], radii };
         Surface::Revolved(Revolved { point: center, axis, profile })
     }

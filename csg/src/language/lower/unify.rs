@@ -1,8 +1,8 @@
-//! Equal surfaces become one.
+//! Unifies equal surfaces.
 //!
-//! Two bodies meet conformingly where their boundaries have the same surface, so that two bricks side by side
-//! must find that they share a plane. As in NETGEN, a surface is replaced by the first of the file that
-//! equals it, and the flags of that one count.
+//! Two bodies meet conformingly if their boundaries have the same surface; for example, adjacent
+//! bricks must share a plane. As in NETGEN, a surface is replaced by the first equal surface of the
+//! file, whose flags apply.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
@@ -10,27 +10,28 @@ use super::forest::RawSurface;
 use crate::geometry::SurfaceInfo;
 use crate::{Point, Surface, SurfaceId, Vector};
 
-/// How far two surfaces may lie apart and still be one, as a fraction of the size of the geometry.
+/// Largest distance between equal surfaces, as a fraction of the size of the geometry.
 ///
-/// Above: the rounding of transforms (10⁻¹⁵) and of decimals typed with nine digits. Below: any gap meant as
-/// one (a coating of a micrometre on a part of ten metres is 10⁻⁷). NETGEN has the same factor, but takes the
-/// size from `boundingbox`, which is 1100 where the file says nothing.
+/// It exceeds the rounding of transforms (10⁻¹⁵) and of decimals with nine digits, and is less than
+/// any intended gap (a coating of one micrometer on a part of ten meters is 10⁻⁷). NETGEN uses the
+/// same factor, but with the size of `boundingbox`, which is 1100 by default.
 const EQUAL_SURFACES: f64 = 1e-8;
 
-/// Bound for the angle between two surfaces that [`Surface::same_as`] may call equal, with room to spare.
+/// Upper bound of the angle between surfaces that [`Surface::same_as`] considers equal, with a
+/// margin.
 const LARGEST_ANGLE: f64 = 1e-4;
 
-/// Which surfaces are one.
+/// The equivalence classes of raw surfaces.
 #[derive(Debug, Default)]
 pub(super) struct Classes {
-    /// For each raw surface the first that equals it, and whether its inside is the outside of that one.
+    /// For each raw surface, the first equal one and whether it has the opposite inside.
     first: Vec<(usize, bool)>,
-    /// The surfaces that count: the first ones of those in use, ascending.
+    /// The ids of the representatives that are used by bodies, ascending.
     ids: BTreeMap<usize, SurfaceId>,
 }
 
 impl Classes {
-    /// Finds the equal ones of `raw`; `used` are those that bodies need.
+    /// Finds equal surfaces in `raw`; `used` are the indices used by bodies.
     pub fn find(raw: &[RawSurface], used: &BTreeSet<usize>) -> Self {
         let place = Place::of(used.iter().filter_map(|&i| raw[i].surface.as_ref()));
         let mut cells: HashMap<Cell, Vec<usize>> = HashMap::new();
@@ -41,7 +42,7 @@ impl Classes {
                 continue;
             };
             let cell = place.cell(surface);
-            let near = cell.with_neighbours();
+            let near = cell.with_neighbors();
             let near = near.iter().filter_map(|cell| cells.get(cell)).flatten();
             let equal = |&j: &usize| {
                 let same_side = surface.same_as(raw[j].surface.as_ref()?, place.tolerance())?;
@@ -58,27 +59,29 @@ impl Classes {
         Self { first, ids }
     }
 
-    /// The surface that stands for the raw one at `index`, and whether the other side of it is meant.
+    /// The representative of the raw surface at `index`, and whether its orientation is opposite.
     ///
     /// # Panics
-    /// If no body uses it.
+    /// If no body uses the surface.
     pub fn half_space(&self, index: usize) -> (SurfaceId, bool) {
         let (first, flipped) = self.first[index];
         (self.ids[&first], flipped)
     }
 
-    /// The id of the raw surface at `index`, if bodies use it or one that equals it.
+    /// The id of the raw surface at `index`, if bodies use it or an equal one.
     pub fn id(&self, index: usize) -> Option<SurfaceId> {
         self.ids.get(&self.first[index].0).copied()
     }
 
-    /// The raw surface whose flags count for the one at `index`.
+    /// The raw surface whose flags apply to the one at `index`.
     pub fn first(&self, index: usize) -> usize {
         self.first[index].0
     }
 
-    /// The surfaces that bodies use with what the file says of them. The mesh size is the least of all that
-    /// are in use and equal; all else comes from the first.
+    /// The surfaces used by bodies, with their options.
+    ///
+    /// The mesh size is the smallest of all equal surfaces in use; the other options come from the
+    /// first one.
     pub fn surfaces(&self, raw: &[RawSurface], used: &BTreeSet<usize>) -> (Vec<Surface>, Vec<SurfaceInfo>) {
         let counts = |&i: &usize| raw[i].surface.clone().map(|surface| (surface, raw[i].info.clone()));
         let (surfaces, mut infos): (Vec<Surface>, Vec<SurfaceInfo>) =
@@ -96,7 +99,7 @@ impl Classes {
     }
 }
 
-/// Where the geometry is: the box of the points that define its surfaces.
+/// The bounding box of the points that define the surfaces.
 struct Place {
     center: Point,
     size: f64,
@@ -120,10 +123,10 @@ impl Place {
         EQUAL_SURFACES * self.size
     }
 
-    /// The cell of a surface; equal ones are in the same one or in neighbours.
+    /// The hash cell of a surface; equal surfaces are in the same or in adjacent cells.
     fn cell(&self, surface: &Surface) -> Cell {
-        // Equal surfaces have this point in common, nearly: those that turn a little against each other drift
-        // apart towards the centre.
+        // Equal surfaces nearly agree in this point. If they are rotated against each other, they
+        // separate toward the center.
         let foot_on_axis = |point: &Point, axis: &Vector| {
             let arm = self.center - point;
             point + axis * (arm.dot(axis) / axis.norm_squared())
@@ -142,14 +145,14 @@ impl Place {
             Surface::Sweep(s) => (7, s.center),
         };
         let width = (4.0 * (EQUAL_SURFACES + LARGEST_ANGLE) * self.size).max(f64::MIN_POSITIVE);
-        // Any directions will do; these seldom map points of a regular grid to one place.
+        // Arbitrary directions that rarely map points of a regular grid to the same value.
         let directions = [Vector::new(0.618, 0.414, 0.666), Vector::new(-0.532, 0.771, 0.351)];
         let place = directions.map(|d| ((point - self.center).dot(&d) / width).floor() as i64);
         Cell { kind, place }
     }
 }
 
-/// Surfaces of one kind at about the same place.
+/// Surfaces of one kind with about the same position.
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
 struct Cell {
     kind: u8,
@@ -157,7 +160,7 @@ struct Cell {
 }
 
 impl Cell {
-    fn with_neighbours(self) -> [Self; 9] {
+    fn with_neighbors(self) -> [Self; 9] {
         std::array::from_fn(|i| {
             let shift = [i as i64 / 3 - 1, i as i64 % 3 - 1];
             Self { place: [0, 1].map(|k| self.place[k].saturating_add(shift[k])), ..self }
@@ -165,7 +168,8 @@ impl Cell {
     }
 }
 
-/// A point that defines the surface and how far the surface is from it, where that tells of its size.
+/// A point that defines the surface, and the distance of the surface from it where it indicates the
+/// size.
 fn anchor(surface: &Surface) -> (Point, f64) {
     match surface {
         Surface::Plane(plane) => (plane.point, 0.0),

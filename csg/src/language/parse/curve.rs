@@ -1,4 +1,4 @@
-//! `curve2d` and `curve3d`.
+//! Parses `curve2d` and `curve3d`.
 
 use super::{Parsed, Parser};
 use crate::language::ast::{CurveText, Num, Segment, Statement};
@@ -23,7 +23,7 @@ impl Parser<'_, '_> {
         }
         let segment_count = self.count("segments")?;
         if self.peek_mark(',') {
-            let wanted = format!("`;` (the count promised {point_count} points, here comes another)");
+            let wanted = format!("`;` (the curve declares {point_count} points, but another follows)");
             return Err(self.expected(&wanted));
         }
         let mut segments = Vec::new();
@@ -36,7 +36,7 @@ impl Parser<'_, '_> {
         Ok(if in_space { Statement::Curve3d { name, text } } else { Statement::Curve2d { name, text } })
     }
 
-    /// The coordinates of a point and a `;`.
+    /// The coordinates of a point and the `;` after them.
     fn curve_point(&mut self, dimension: usize, done: u32, count: u32) -> Parsed<Vec<f64>> {
         let mut coordinates = vec![self.value()?];
         while coordinates.len() < dimension {

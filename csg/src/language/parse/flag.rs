@@ -1,4 +1,4 @@
-//! Flags: `-name`, `-name=word`, `-name=number`, `-name=[a, b]`.
+//! Parses flags: `-name`, `-name=word`, `-name=number`, `-name=[a, b]`.
 
 use super::{Parsed, Parser};
 use crate::language::ast::{Flag, FlagValue};
@@ -8,10 +8,10 @@ use crate::language::token::TokenKind;
 impl Parser<'_, '_> {
     pub(super) fn flags(&mut self) -> Parsed<Vec<Flag>> {
         let mut flags = Vec::new();
-        self.usage = "flags as -maxh=0.1, -bc=2, -material=air, -col=[1,0,0] or -transparent";
+        self.usage = "flags such as -maxh=0.1, -bc=2, -material=air, -col=[1,0,0] or -transparent";
         while self.peek_mark('-') {
             let span = self.next().span;
-            // Flags may have the names of keywords: `-tlo=air`.
+            // Flags may have names of keywords: `-tlo=air`.
             let TokenKind::Word(word) = self.peek().kind else {
                 return Err(self.expected("the name of a flag"));
             };
@@ -51,7 +51,7 @@ impl Parser<'_, '_> {
         match token.kind {
             TokenKind::Word(word) if is_reserved(word) => {
                 self.next();
-                let message = format!("`{word}` is a word of the language and cannot be the value of a flag");
+                let message = format!("`{word}` is a keyword and cannot be the value of a flag");
                 Err(self.report.syntax(token.span, message, "choose another word"))
             }
             TokenKind::Word(word) => {

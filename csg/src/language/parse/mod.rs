@@ -1,7 +1,7 @@
-//! Tokens to statements.
+//! Parses tokens into statements.
 //!
-//! A statement with an error is reported once; reading goes on at the next word that begins a statement.
-//! Those words are reserved, so that one error seldom causes another.
+//! A statement with an error is reported once; parsing resumes at the next keyword that begins a
+//! statement. These keywords are reserved, so one error rarely causes another.
 
 mod curve;
 mod flag;
@@ -17,7 +17,8 @@ use crate::{Point, Vector};
 
 type Parsed<T> = Result<T, Reported>;
 
-/// The statements of `source`, those with errors left out (or [`Statement::Broken`] if they define a solid).
+/// Parses `source`. Statements with errors are omitted, or [`Statement::Broken`] if they define a
+/// name.
 pub(super) fn parse(source: &str, report: &mut Report) -> Vec<Statement> {
     let tokens = tokenize(source, report);
     let mut parser = Parser { tokens: &tokens, at: 0, report, depth: 0, usage: "" };
@@ -43,9 +44,9 @@ struct Parser<'a, 'r> {
     tokens: &'a [Token<'a>],
     at: usize,
     report: &'r mut Report,
-    /// How deep the expression being read is nested.
+    /// Nesting depth of the expression being parsed.
     depth: usize,
-    /// How the construct being read is written, for the help line.
+    /// Syntax of the construct being parsed, for help lines.
     usage: &'static str,
 }
 
@@ -54,7 +55,7 @@ impl<'a> Parser<'a, '_> {
         self.tokens[self.at]
     }
 
-    /// Takes a token; the end of the file stays.
+    /// Takes the next token; the end of the file is never consumed.
     fn next(&mut self) -> Token<'a> {
         let token = self.peek();
         self.at = (self.at + 1).min(self.tokens.len() - 1);
@@ -69,7 +70,7 @@ impl<'a> Parser<'a, '_> {
         self.peek().kind == TokenKind::Word(word)
     }
 
-    /// Takes `mark` if it is next.
+    /// Takes `mark` if it is the next token; returns whether it was.
     fn take_mark(&mut self, mark: char) -> bool {
         let there = self.peek_mark(mark);
         if there {
@@ -96,7 +97,7 @@ impl<'a> Parser<'a, '_> {
         if self.peek_mark(mark) { Ok(self.next().span) } else { Err(self.expected(&format!("`{mark}`"))) }
     }
 
-    /// A number behind any count of minus signs.
+    /// A number with any number of minus signs before it.
     fn number(&mut self) -> Parsed<Num> {
         let span = self.peek().span;
         let mut negative = false;
@@ -131,13 +132,13 @@ impl<'a> Parser<'a, '_> {
         Ok(self.point()?.coords)
     }
 
-    /// A `;` and then a number.
+    /// `;` and a number.
     fn next_value(&mut self) -> Parsed<f64> {
         self.mark(';')?;
         self.value()
     }
 
-    /// A `;` and then a number, to be a whole one.
+    /// `;` and a number that must be an integer (checked later).
     fn next_number(&mut self) -> Parsed<Num> {
         self.mark(';')?;
         self.number()
@@ -153,17 +154,17 @@ impl<'a> Parser<'a, '_> {
         self.vector()
     }
 
-    /// The name of `what`.
+    /// A name; `what` is the kind of named object, for messages.
     fn name(&mut self, what: &str) -> Parsed<Name> {
         let token = self.peek();
         match token.kind {
             TokenKind::Word(word) if is_reserved(word) => {
                 self.next();
                 if !(self.peek_mark('=') || self.peek_mark(';')) {
-                    // It begins the next statement perhaps, where reading goes on.
+                    // It may begin the next statement, where parsing resumes.
                     self.at -= 1;
                 }
-                let message = format!("`{word}` is a word of the language and cannot name {what}");
+                let message = format!("`{word}` is a keyword and cannot name {what}");
                 Err(self.report.syntax(token.span, message, "choose another name"))
             }
             TokenKind::Word(word) => {
@@ -171,13 +172,13 @@ impl<'a> Parser<'a, '_> {
                 Ok(Name { text: word.to_owned(), span: token.span })
             }
             _ => {
-                let help = "names begin with a letter and go on with letters, digits and _";
+                let help = "names begin with a letter, followed by letters, digits and _";
                 Err(self.expected_with_help(&format!("the name of {what}"), help))
             }
         }
     }
 
-    /// `algebraic3d`, with which every file begins.
+    /// The keyword `algebraic3d` at the beginning of the file.
     fn header(&mut self) -> Parsed<()> {
         let token = self.peek();
         match token.kind {
@@ -187,7 +188,7 @@ impl<'a> Parser<'a, '_> {
             }
             TokenKind::Bad => Err(Reported),
             TokenKind::End => {
-                let help = "write `algebraic3d`, solids, and `tlo NAME;` for each that is to be meshed";
+                let help = "write `algebraic3d`, solids, and `tlo NAME;` for each body to be meshed";
                 Err(self.report.syntax(token.span, "the file is empty", help))
             }
             TokenKind::Word(word) if begins_statement(word) => {
@@ -196,15 +197,16 @@ impl<'a> Parser<'a, '_> {
                 Ok(())
             }
             _ => {
-                let help = "this is perhaps no solid geometry, but a file of another kind";
+                let help = "this may be a file of another kind";
                 let message = "a .geo file begins with the word `algebraic3d`";
                 Err(self.report.syntax(token.span, message, help))
             }
         }
     }
 
-    /// What a statement that could not be read (it began at token `start`) would have defined: its first word may
-    /// be the wrong one.
+    /// The definition that a statement with an error (starting at token `start`) would have made.
+    ///
+    /// The first word is not checked, because it may be misspelled.
     fn broken_definition(&self, start: usize) -> Option<Statement> {
         let [word, name, mark] = self.tokens.get(start..start + 3)? else { return None };
         match (word.kind, name.kind, mark.kind) {
@@ -215,7 +217,7 @@ impl<'a> Parser<'a, '_> {
         }
     }
 
-    /// Goes to the next word that begins a statement and is not the one at `start`.
+    /// Skips to the next keyword after `start` that begins a statement.
     fn skip_to_statement(&mut self, start: usize) {
         self.at = self.at.max(start + 1).min(self.tokens.len() - 1);
         loop {
@@ -232,14 +234,17 @@ impl<'a> Parser<'a, '_> {
         }
     }
 
-    /// Reports a token that begins no statement.
+    /// Reports a token that does not begin a statement.
     fn no_statement(&mut self) -> Reported {
         let help = match self.peek().kind {
             TokenKind::Word(word) => did_you_mean(word, STATEMENTS),
             _ => String::new(),
         };
-        let help =
-            if help.is_empty() { format!("statements begin with {}", STATEMENTS.join(", ")) } else { help };
+        let help = if help.is_empty() {
+            format!("statements begin with one of {}", STATEMENTS.join(", "))
+        } else {
+            help
+        };
         self.expected_with_help("a statement", &help)
     }
 }

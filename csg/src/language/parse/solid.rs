@@ -1,4 +1,4 @@
-//! Solids: expressions of primitives, transforms and names.
+//! Parses solids: expressions of primitives, transforms and names.
 
 use super::{Parsed, Parser};
 use crate::geometry::Span;
@@ -6,8 +6,9 @@ use crate::language::ast::{Expr, PolyFace, Primitive, Transform};
 use crate::language::suggest::{PRIMITIVES, did_you_mean};
 use crate::language::token::TokenKind;
 
-/// Deepest nesting of parentheses, `not` and transforms that is read. Every level costs some stack here and
-/// in all that walk the tree; people write a dozen, and programs that write more can name their parts.
+/// Largest nesting depth of parentheses, `not` and transforms. Each level uses stack space here and
+/// in every traversal of the tree. Written files need about a dozen levels; generated files can use
+/// named solids.
 const DEEPEST_NESTING: usize = 200;
 
 impl Parser<'_, '_> {
@@ -36,7 +37,7 @@ impl Parser<'_, '_> {
         self.depth += 1;
         let primary = if self.depth > DEEPEST_NESTING {
             let message = format!("the solid is nested more than {DEEPEST_NESTING} deep");
-            Err(self.report.syntax(span, message, "give its parts names by `solid` definitions"))
+            Err(self.report.syntax(span, message, "name its parts with `solid` definitions"))
         } else {
             self.primary_within_depth(span)
         };
@@ -62,39 +63,40 @@ impl Parser<'_, '_> {
                 self.with_arguments(word, span)
             }
             TokenKind::Word(word @ ("tube" | "gencyl")) => {
-                let help = "NETGEN reserves the word, but has never given it a meaning";
-                Err(self.report.unsupported(span, format!("`{word}` is no solid"), help))
+                let help = "NETGEN reserves this word without a meaning";
+                Err(self.report.unsupported(span, format!("`{word}` is not a primitive"), help))
             }
             TokenKind::Word(word) if self.tokens[self.at + 1].kind == TokenKind::Mark('(') => {
                 let help = did_you_mean(word, PRIMITIVES);
                 let help =
-                    if help.is_empty() { format!("there are {}", PRIMITIVES.join(", ")) } else { help };
+                    if help.is_empty() { format!("primitives are {}", PRIMITIVES.join(", ")) } else { help };
                 Err(self.report.syntax(span, format!("unknown primitive `{word}`"), &help))
             }
             TokenKind::Word(_) => Ok(Expr::Name(self.name("a solid")?)),
             TokenKind::Mark('-') => {
-                let help = "there is no difference: write `a and not b`; flags stand behind the whole solid";
+                let help =
+                    "there is no difference operator: write `a and not b`; flags follow the whole solid";
                 Err(self.expected_with_help("a solid", help))
             }
             _ => Err(self.expected_with_help("a solid", "a primitive, a name, `not`, or a solid in ( )")),
         }
     }
 
-    /// The `)` of the `(` at `open`.
+    /// The `)` that closes the `(` at `open`.
     fn close(&mut self, open: Span) -> Parsed<()> {
         if self.take_mark(')') {
             return Ok(());
         }
         let Span { line, column } = open;
         let help = match self.peek().kind {
-            TokenKind::Mark('-') => "flags stand once, behind the whole solid and its parentheses",
+            TokenKind::Mark('-') => "flags follow the whole solid, after its parentheses",
             _ => "only `and`, `or` and `not` combine solids",
         };
         let wanted = format!("`)` for the `(` of line {line}, column {column}");
         Err(self.expected_with_help(&wanted, help))
     }
 
-    /// A primitive or transform whose name `word` has been taken.
+    /// A primitive or transform; its keyword `word` has been consumed.
     fn with_arguments(&mut self, word: &str, span: Span) -> Parsed<Expr> {
         self.usage = usage(word);
         self.mark('(')?;
@@ -150,7 +152,7 @@ impl Parser<'_, '_> {
         Ok(Expr::Transform(motion, open, Box::new(solid)))
     }
 
-    /// Points, `;;`, faces.
+    /// The points, `;;`, and the faces.
     fn polyhedron(&mut self) -> Parsed<Primitive> {
         let mut points = Vec::new();
         while !self.peek_mark(';') {
@@ -179,10 +181,10 @@ impl Parser<'_, '_> {
     }
 }
 
-/// How a primitive or transform is written.
+/// The syntax of a primitive or transform.
 fn usage(word: &str) -> &'static str {
     match word {
-        "plane" => "plane (px, py, pz; nx, ny, nz), with the normal outward",
+        "plane" => "plane (px, py, pz; nx, ny, nz), with the normal pointing outward",
         "sphere" => "sphere (cx, cy, cz; r)",
         "cylinder" => "cylinder (ax, ay, az; bx, by, bz; r)",
         "cone" => "cone (ax, ay, az; ra; bx, by, bz; rb)",

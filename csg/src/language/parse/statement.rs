@@ -1,4 +1,4 @@
-//! Statements.
+//! Parses statements.
 
 use super::{Parsed, Parser};
 use crate::language::ast::Statement;
@@ -6,7 +6,7 @@ use crate::language::suggest::{did_you_mean, is_reserved};
 use crate::language::token::TokenKind;
 
 impl Parser<'_, '_> {
-    /// A statement with its `;`, or a lone `;`.
+    /// A statement with its `;`, or a single `;`.
     pub(super) fn statement(&mut self) -> Parsed<Option<Statement>> {
         self.usage = "";
         let TokenKind::Word(word) = self.peek().kind else {
@@ -35,9 +35,9 @@ impl Parser<'_, '_> {
         }
         let help = match self.peek().kind {
             TokenKind::Word("and" | "or" | "not") => {
-                "flags stand once, behind the whole solid: name this part by a `solid` of its own"
+                "flags follow the whole solid: define this part as a separate `solid`"
             }
-            _ => "every statement ends in `;`",
+            _ => "every statement ends with `;`",
         };
         Err(self.expected_with_help("`;` at the end of the statement", help))
     }
@@ -45,7 +45,7 @@ impl Parser<'_, '_> {
     fn solid_definition(&mut self) -> Parsed<Statement> {
         self.next();
         let name = self.name("a solid")?;
-        self.usage = "solid NAME = ...; (names have letters, digits and _ only)";
+        self.usage = "solid NAME = ...; (names have only letters, digits and _)";
         self.mark('=')?;
         let body = self.solid()?;
         let flags = self.flags()?;
@@ -56,7 +56,7 @@ impl Parser<'_, '_> {
         self.next();
         let solid = self.name("a solid")?;
         let surface = match self.peek().kind {
-            // A word of the language begins the next statement: the `;` is missing.
+            // A keyword begins the next statement, so the `;` is missing.
             TokenKind::Word(word) if !is_reserved(word) => Some(self.name("a solid")?),
             _ => None,
         };
@@ -131,7 +131,7 @@ impl Parser<'_, '_> {
         Ok(Statement::Boundary { solid, tlo, number: self.number()? })
     }
 
-    /// `define constant NAME = number`; what follows it may be a `;`.
+    /// `define constant NAME = number`; the `;` is optional.
     fn constant(&mut self) -> Parsed<Statement> {
         self.next();
         self.usage = "define constant NAME = NUMBER;";

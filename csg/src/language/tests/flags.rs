@@ -1,4 +1,4 @@
-//! Flags.
+//! Flags of statements.
 
 use super::*;
 
@@ -20,13 +20,13 @@ fn a_tlo_without_flags_has_none() {
 }
 
 #[test]
-fn of_a_repeated_flag_the_last_counts() {
+fn the_last_of_repeated_flags_applies() {
     let geometry = geometry("solid a = sphere (0,0,0; 1); tlo a -maxh=1 -maxh=2;");
     assert_eq!(geometry.bodies[0].maxh, Some(2.0));
 }
 
 #[test]
-fn misspelt_flags_are_warned_of() {
+fn misspelled_flags_give_a_warning() {
     let text = warning("solid a = sphere (0,0,0; 1) -mxah=0.1; tlo a;");
     assert!(
         text.contains("the unknown flag -mxah is ignored") && text.contains("did you mean `maxh`?"),
@@ -35,7 +35,7 @@ fn misspelt_flags_are_warned_of() {
 }
 
 #[test]
-fn flags_in_the_wrong_place_are_warned_of() {
+fn flags_in_the_wrong_place_give_a_warning() {
     assert!(warning("solid a = sphere (0,0,0; 1); tlo a -bc=2;").contains("it belongs on the `solid`"));
     assert!(warning("solid a = sphere (0,0,0; 1) -material=air; tlo a;").contains("it belongs on the `tlo`"));
 }
@@ -43,8 +43,8 @@ fn flags_in_the_wrong_place_are_warned_of() {
 #[test]
 fn wrong_values_are_errors() {
     for (flag, part) in [
-        ("-maxh=0", "-maxh=0 is no mesh size"),
-        ("-maxh=-1", "-maxh=-1 is no mesh size"),
+        ("-maxh=0", "-maxh=0 is not a mesh size"),
+        ("-maxh=-1", "-maxh=-1 is not a mesh size"),
         ("-maxh=fine", "-maxh has a wrong value"),
         ("-maxh", "-maxh has a wrong value"),
         ("-bc=0", "-bc has a wrong value"),
@@ -63,7 +63,7 @@ fn wrong_values_are_errors() {
 }
 
 #[test]
-fn different_layers_are_warned_of() {
+fn different_layers_give_a_warning() {
     let text = "solid a = sphere (0,0,0; 1); solid b = sphere (5,0,0; 1); tlo a; tlo b -layer=2;";
     assert!(warning(text).contains("`a` and `b` are in different layers"));
 }

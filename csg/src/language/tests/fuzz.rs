@@ -1,9 +1,9 @@
-//! Whatever the text, there is an answer, and every message has a place in the text.
+//! Any text gives a geometry or errors, and every message has a position in the text.
 
 use super::*;
 use proptest::prelude::*;
 
-/// Sources with every construct, to be spoilt.
+/// Sources with every construct, to be mutated.
 const SOURCES: [&str; 4] = [
     "algebraic3d
 solid c1 = plane (0, 0, 0; 0, 0, -1) and plane (1, 1, 1; 0, 0, 1)
@@ -30,7 +30,7 @@ solid x = extrusion (path; profile; 0,0,1) or revolution (0,0,0; 1,0,0; profile)
 define constant identprec = 1e-5; tlo x;",
 ];
 
-/// Words, marks and numbers that soups are made of.
+/// Words, marks and numbers for random token sequences.
 const TOKENS: [&str; 42] = [
     "solid",
     "tlo",
@@ -76,7 +76,7 @@ const TOKENS: [&str; 42] = [
     "\u{e4}",
 ];
 
-/// Reads, and checks that messages point into the text.
+/// Parses the source and checks that messages point into it.
 fn survives(source: &str) -> Result<(), TestCaseError> {
     let messages = match parse_geometry(source, "fuzz.geo") {
         Ok(parsed) => {
@@ -109,8 +109,8 @@ fn surfaces_exist(solid: &Solid, count: usize) -> bool {
     }
 }
 
-/// A change of a text: at a place, some characters replaced by a token.
-fn spoil(source: &str, changes: &[(prop::sample::Index, usize, &str)]) -> String {
+/// Mutates a text: at given positions, replaces some characters by a token.
+fn mutate(source: &str, changes: &[(prop::sample::Index, usize, &str)]) -> String {
     let mut characters: Vec<char> = source.chars().collect();
     for (place, removed, token) in changes {
         let at = place.index(characters.len() + 1);
@@ -128,30 +128,30 @@ proptest! {
     })]
 
     #[test]
-    fn spoilt_sources_get_an_answer(
+    fn mutated_sources_do_not_panic(
         source in prop::sample::select(&SOURCES[..]),
         changes in prop::collection::vec(
             (any::<prop::sample::Index>(), 0..6_usize, prop::sample::select(&TOKENS[..])),
             0..6,
         ),
     ) {
-        survives(&spoil(source, &changes))?;
+        survives(&mutate(source, &changes))?;
     }
 
     #[test]
-    fn token_soups_get_an_answer(tokens in prop::collection::vec(prop::sample::select(&TOKENS[..]), 0..80)) {
+    fn token_sequences_do_not_panic(tokens in prop::collection::vec(prop::sample::select(&TOKENS[..]), 0..80)) {
         survives(&format!("algebraic3d {}", tokens.join(" ")))?;
     }
 
     #[test]
-    fn any_text_gets_an_answer(text in any::<String>(), bytes in any::<Vec<u8>>()) {
+    fn arbitrary_text_does_not_panic(text in any::<String>(), bytes in any::<Vec<u8>>()) {
         survives(&text)?;
         survives(&format!("algebraic3d\nsolid {text}"))?;
         survives(&String::from_utf8_lossy(&bytes))?;
     }
 
     #[test]
-    fn any_numbers_get_an_answer(numbers in prop::collection::vec(extreme(), 13), place in 0..12_usize) {
+    fn extreme_numbers_do_not_panic(numbers in prop::collection::vec(extreme(), 13), place in 0..12_usize) {
         let n: Vec<String> = numbers.iter().map(|x| format!("{x:e}")).collect();
         let v = |i: usize| format!("{},{},{}", n[i], n[i + 1], n[i + 2]);
         let primitives = [
@@ -179,7 +179,7 @@ proptest! {
     }
 }
 
-/// Numbers of ordinary size and beyond.
+/// Numbers of ordinary size, and extreme ones.
 fn extreme() -> impl Strategy<Value = f64> {
     prop_oneof![
         4 => -3.0..3.0_f64,

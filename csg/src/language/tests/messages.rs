@@ -1,10 +1,11 @@
-//! What is said, where, and what help is given.
+//! Messages: text, position and help.
 
 use super::*;
 
-/// The message of the only error has its place in line 2 and these parts.
+/// Checks that the statements give a single error in line 2 at `column`, whose text contains
+/// `parts`.
 #[track_caller]
-fn says(statements: &str, column: u32, parts: &[&str]) {
+fn expect_error(statements: &str, column: u32, parts: &[&str]) {
     let text = error(statements);
     assert!(text.starts_with(&format!("t.geo:2:{column}: ")), "{text}");
     for part in parts {
@@ -13,7 +14,7 @@ fn says(statements: &str, column: u32, parts: &[&str]) {
 }
 
 #[test]
-fn a_message_is_shown_whole() {
+fn a_message_has_position_source_line_and_help() {
     let text = errors("solid ball = sphere (0, 0, 0, 1);").to_string();
     let expected = "t.geo:2:29: error: expected `;`, found `,`
     2 | solid ball = sphere (0, 0, 0, 1);
@@ -23,14 +24,22 @@ fn a_message_is_shown_whole() {
 }
 
 #[test]
-fn arguments_that_are_wrong_are_met_with_the_right_form() {
-    says("solid a = plane (0,0; 0,0,1);", 21, &["expected `,`, found `;`", "plane (px, py, pz; nx, ny, nz)"]);
-    says("solid a = cone (0,0,0; 1; 1,0,0);", 32, &["expected `;`, found `)`", "cone (ax, ay, az; ra;"]);
-    says("solid a = torus 0,0,0;", 17, &["expected `(`, found the number 0", "torus (cx, cy, cz;"]);
-    says("solid a = sphere (0,0,r; 1);", 23, &["expected a number, found `r`", "no variables"]);
-    says("solid a = cylinder (0,0,0; 1,0,0; 1;", 36, &["expected `)`, found `;`"]);
-    says("solid a = translate (1,0,0, b);", 27, &["expected `;`", "translate (dx, dy, dz; SOLID)"]);
-    says(
+fn wrong_arguments_are_answered_with_the_syntax() {
+    expect_error(
+        "solid a = plane (0,0; 0,0,1);",
+        21,
+        &["expected `,`, found `;`", "plane (px, py, pz; nx, ny, nz)"],
+    );
+    expect_error(
+        "solid a = cone (0,0,0; 1; 1,0,0);",
+        32,
+        &["expected `;`, found `)`", "cone (ax, ay, az; ra;"],
+    );
+    expect_error("solid a = torus 0,0,0;", 17, &["expected `(`, found the number 0", "torus (cx, cy, cz;"]);
+    expect_error("solid a = sphere (0,0,r; 1);", 23, &["expected a number, found `r`", "no variables"]);
+    expect_error("solid a = cylinder (0,0,0; 1,0,0; 1;", 36, &["expected `)`, found `;`"]);
+    expect_error("solid a = translate (1,0,0, b);", 27, &["expected `;`", "translate (dx, dy, dz; SOLID)"]);
+    expect_error(
         "solid a = rotate (0,0,0; 1,0,0; sphere (0,0,0; 1);",
         50,
         &["expected `)` for the `(` of line 2, column 11"],
@@ -38,61 +47,77 @@ fn arguments_that_are_wrong_are_met_with_the_right_form() {
 }
 
 #[test]
-fn misspelt_words_are_guessed() {
-    says(
+fn misspelled_words_get_a_suggestion() {
+    expect_error(
         "sold a = sphere (0,0,0; 1); tlo a;",
         1,
         &["expected a statement, found `sold`", "did you mean `solid`?"],
     );
-    says("solid a = spehre (0,0,0; 1);", 11, &["unknown primitive `spehre`", "did you mean `sphere`?"]);
-    says(
+    expect_error(
+        "solid a = spehre (0,0,0; 1);",
+        11,
+        &["unknown primitive `spehre`", "did you mean `sphere`?"],
+    );
+    expect_error(
         "solid ball = sphere (0,0,0; 1); tlo bal;",
         37,
         &["there is no solid `bal`", "did you mean `ball`?"],
     );
-    says("solid a = box;", 11, &["there is no solid `box`", "defined before it is used"]);
-    says("identify perodic a b;", 10, &["`closesurfaces` or `periodic`", "did you mean `periodic`?"]);
-    says("singular egde a b;", 10, &["expected `face` or `edge` or `point`", "did you mean `edge`?"]);
-    says("define konstant a = 1;", 8, &["expected `constant`", "did you mean `constant`?"]);
+    expect_error("solid a = box;", 11, &["there is no solid `box`", "defined before it is used"]);
+    expect_error("identify perodic a b;", 10, &["`closesurfaces` or `periodic`", "did you mean `periodic`?"]);
+    expect_error("singular egde a b;", 10, &["expected `face` or `edge` or `point`", "did you mean `edge`?"]);
+    expect_error("define konstant a = 1;", 8, &["expected `constant`", "did you mean `constant`?"]);
 }
 
 #[test]
-fn words_of_the_language_are_no_names() {
-    says(
-        "solid plane = sphere (0,0,0; 1);",
-        7,
-        &["`plane` is a word of the language and cannot name a solid"],
+fn keywords_cannot_be_names() {
+    expect_error("solid plane = sphere (0,0,0; 1);", 7, &["`plane` is a keyword and cannot name a solid"]);
+    expect_error("solid a = tube (0,0,0; 1);", 11, &["`tube` is not a primitive"]);
+    expect_error(
+        "solid my-box = sphere (0,0,0; 1);",
+        9,
+        &["expected `=`, found `-`", "letters, digits and _"],
     );
-    says("solid a = tube (0,0,0; 1);", 11, &["`tube` is no solid"]);
-    says("solid my-box = sphere (0,0,0; 1);", 9, &["expected `=`, found `-`", "letters, digits and _"]);
-    says("solid 2a = sphere (0,0,0; 1);", 7, &["expected the name of a solid", "begin with a letter"]);
-    says("solid a = sphere (0,0,0; 1) -material=solid;", 39, &["`solid` is a word of the language"]);
+    expect_error(
+        "solid 2a = sphere (0,0,0; 1);",
+        7,
+        &["expected the name of a solid", "begin with a letter"],
+    );
+    expect_error("solid a = sphere (0,0,0; 1) -material=solid;", 39, &["`solid` is a keyword"]);
 }
 
 #[test]
-fn a_missing_semicolon_is_found_at_the_next_word() {
-    says(
+fn a_missing_semicolon_is_reported_at_the_next_word() {
+    expect_error(
         "solid a = sphere (0,0,0; 1) tlo a;",
         29,
         &["expected `;` at the end of the statement, found `tlo`"],
     );
-    says("solid a = sphere (0,0,0; 1); tlo a", 35, &["expected `;`", "found the end of the file"]);
-    says("solid a = sphere (0,0,0; 1); tlo a solid b = a;", 36, &["expected `;`", "found `solid`"]);
+    expect_error("solid a = sphere (0,0,0; 1); tlo a", 35, &["expected `;`", "found the end of the file"]);
+    expect_error("solid a = sphere (0,0,0; 1); tlo a solid b = a;", 36, &["expected `;`", "found `solid`"]);
 }
 
 #[test]
 fn flags_within_a_solid_are_explained() {
-    says("solid a = sphere (0,0,0; 1) -bc=1 or plane (0,0,0; 0,0,1);", 35, &["flags stand once"]);
-    says("solid a = (sphere (0,0,0; 1) -bc=1);", 30, &["expected `)`", "flags stand once"]);
-    says("solid a = sphere (0,0,0; 1) -material=\"air\";", 39, &["there are no quoted strings"]);
-    says("solid a = sphere (0,0,0; 1) -maxh=;", 35, &["expected the value of the flag"]);
-    says("solid a = sphere (0,0,0; 1) - -maxh=1;", 31, &["expected the name of a flag"]);
-    says("solid a = sphere (0,0,0; 1) -bc=[1,2;", 37, &["expected `]`, found `;`"]);
-    says("solid a = -b;", 11, &["expected a solid, found `-`", "write `a and not b`"]);
+    expect_error(
+        "solid a = sphere (0,0,0; 1) -bc=1 or plane (0,0,0; 0,0,1);",
+        35,
+        &["flags follow the whole solid"],
+    );
+    expect_error(
+        "solid a = (sphere (0,0,0; 1) -bc=1);",
+        30,
+        &["expected `)`", "flags follow the whole solid"],
+    );
+    expect_error("solid a = sphere (0,0,0; 1) -material=\"air\";", 39, &["there are no quoted strings"]);
+    expect_error("solid a = sphere (0,0,0; 1) -maxh=;", 35, &["expected the value of the flag"]);
+    expect_error("solid a = sphere (0,0,0; 1) - -maxh=1;", 31, &["expected the name of a flag"]);
+    expect_error("solid a = sphere (0,0,0; 1) -bc=[1,2;", 37, &["expected `]`, found `;`"]);
+    expect_error("solid a = -b;", 11, &["expected a solid, found `-`", "write `a and not b`"]);
 }
 
 #[test]
-fn a_file_begins_with_its_word() {
+fn a_file_must_begin_with_its_keyword() {
     let whole = |source: &str| parse_geometry(source, "t.geo").unwrap_err().to_string();
     assert!(whole("").starts_with("t.geo:1:1: error: the file is empty"));
     assert!(whole("# nothing\n").contains("the file is empty"));
@@ -104,7 +129,7 @@ fn a_file_begins_with_its_word() {
 }
 
 #[test]
-fn several_errors_are_reported_and_none_follows_from_another() {
+fn independent_errors_are_reported_without_consequences() {
     let text = "solid a = sphere (0,0,0);\nsolid b = a and plane (0,0,0; 0,0,0);\nsolid c = a or b or ball;\ntlo c; tlo a;\nboundarycondition c d 1;";
     let errors = errors(text);
     let places: Vec<_> = errors.errors().map(|e| (e.span.line, e.span.column)).collect();
@@ -148,8 +173,8 @@ fn degenerate_primitives_are_located() {
 }
 
 #[test]
-fn degenerate_primitives_are_refused_inside_transforms_too() {
-    says("solid a = translate (1,0,0; sphere (0,0,0; 0)); tlo a;", 29, &["positive radius"]);
+fn degenerate_primitives_are_rejected_inside_transforms() {
+    expect_error("solid a = translate (1,0,0; sphere (0,0,0; 0)); tlo a;", 29, &["positive radius"]);
 }
 
 #[test]
@@ -164,7 +189,7 @@ fn wrong_polyhedra_are_located() {
     for (faces, message) in [
         ("1,3,2; 1,2,4; 2,3,4", "do not close at the edge from point 1 to point 3"),
         ("1,3,2; 1,2,4; 2,3,4; 1,3,4", "do not close at the edge from point 1 to point 3"),
-        ("1,2,3; 1,4,2; 2,4,3; 1,3,4", "enclose no volume from outside"),
+        ("1,2,3; 1,4,2; 2,4,3; 1,3,4", "enclose no volume, or are oriented inward"),
         ("1,3,2; 1,2,4; 2,3,5; 1,4,3", "there is no point 5 in this `polyhedron`"),
         ("1,3,2; 1,2,2; 2,3,4; 1,4,3", "needs three different points"),
         ("1,3,2; 1,2,1.5; 2,3,4; 1,4,3", "there is no point 1.5"),
@@ -172,12 +197,12 @@ fn wrong_polyhedra_are_located() {
         let text = error(&format!("solid a = polyhedron ({points} {faces}); tlo a;"));
         assert!(text.contains(message), "{faces}: {text}");
     }
-    says("solid a = polyhedron (0,0,0; 1,0,0; 1,2,3);", 42, &["x, y, z; ... ;; i, j, k"]);
+    expect_error("solid a = polyhedron (0,0,0; 1,0,0; 1,2,3);", 42, &["x, y, z; ... ;; i, j, k"]);
 }
 
 #[test]
-fn a_polyhedron_that_crosses_itself_is_refused() {
-    // A tetrahedron through another: closed and oriented, but no solid.
+fn a_self_intersecting_polyhedron_is_rejected() {
+    // A tetrahedron through another one: closed and oriented, but not a solid.
     let text = "solid a = polyhedron (0,0,0; 3,0,0; 0,3,0; 0,0,3; 0.5,0.5,0.5; 0.5,0.5,-2; 2.5,0.5,0.4; 0.6,2.5,0.6 ;;
         1,3,2; 1,2,4; 2,3,4; 1,4,3; 5,7,6; 5,6,8; 6,7,8; 5,8,7); tlo a;";
     let message = error(text);
@@ -194,10 +219,10 @@ fn wrong_curves_are_located() {
         ("curve2d c = (2; 0,0; 1,1; 1; 7,1,2);", "no segment of kind 7"),
         (
             "curve2d c = (4; 0,0; 1,1; 2,2; 3,3; 2; 2,1,2; 2,3,4);",
-            "begins at point 3, the one before ends at 2",
+            "begins at point 3, but the one before ends at 2",
         ),
         ("curve2d c = (3; 0,0; 1,1; 1; 2,1,2);", "another coordinate (2 of 3 points are complete)"),
-        ("curve2d c = (1; 0,0; 1,1; 1; 2,1,2);", "the count promised 1 points"),
+        ("curve2d c = (1; 0,0; 1,1; 1; 2,1,2);", "the curve declares 1 points"),
         ("curve2d c = (0; 1; 2,1,2);", "a curve cannot have 0 points"),
         ("curve3d c = (2; 0,0; 1,1,1; 1; 2,1,2);", "another coordinate"),
         ("curve3d c = (4e9; 0,0,0; 1,1,1; 1; 2,1,2);", "another coordinate"),
@@ -208,7 +233,7 @@ fn wrong_curves_are_located() {
     let open = "curve2d f = (2; 0,0; 1,1; 1; 2,1,2); solid a = revolution (0,0,0; 1,0,0; f); tlo a;";
     assert!(error(open).contains("is open, and not closed by the axis either"));
     let order = "curve2d f = (2; 0,0; 1,1; 1; 2,1,2); curve3d p = (2; 0,0,0; 1,1,1; 1; 2,1,2); solid a = extrusion (f; p; 0,0,1); tlo a;";
-    assert!(error(order).contains("takes a curve of space first"));
+    assert!(error(order).contains("takes a curve3d (the path) first"));
 }
 
 #[test]
@@ -235,26 +260,26 @@ fn unknown_names_everywhere_are_errors() {
 }
 
 #[test]
-fn solids_that_are_made_of_themselves_are_refused() {
+fn solids_that_contain_themselves_are_rejected() {
     assert!(
         error("solid a = sphere (0,0,0; 1); solid a = a and plane (0,0,0; 0,0,1); tlo a;")
-            .contains("`a` is made of itself")
+            .contains("`a` contains itself")
     );
     assert!(error("solid a = a; tlo a;").contains("there is no solid `a`"));
     let around = "solid a = sphere (0,0,0; 1); solid b = not a; solid a = b or plane (0,0,0; 0,0,1); tlo b;";
-    assert!(error(around).contains("`a` is made of itself"));
+    assert!(error(around).contains("`a` contains itself"));
 }
 
 #[test]
-fn twice_the_same_top_level_object_is_refused() {
+fn a_repeated_top_level_object_is_rejected() {
     assert!(
         error("solid a = sphere (0,0,0; 1); tlo a; tlo a;")
-            .contains("`a` is a top-level object already, in line 2")
+            .contains("`a` is already a top-level object, in line 2")
     );
 }
 
 #[test]
-fn an_empty_box_is_refused() {
+fn an_empty_box_is_rejected() {
     assert!(error("boundingbox (0,0,0; 1,-1,1);").contains("the box of `boundingbox` is empty"));
 }
 
@@ -262,12 +287,12 @@ fn an_empty_box_is_refused() {
 fn a_boundary_number_begins_with_one() {
     assert!(
         error("solid a = sphere (0,0,0; 1); tlo a; boundarycondition a a 0;")
-            .contains("0 is no boundary-condition number")
+            .contains("0 is not a boundary-condition number")
     );
 }
 
 #[test]
-fn very_many_errors_are_cut_off() {
+fn the_number_of_reported_errors_is_limited() {
     let errors = errors(&"solid = sphere (0,0,0; 1);\n".repeat(10_000));
     assert_eq!(errors.messages.len(), 20);
     assert!(errors.to_string().contains("more than 20 errors"));

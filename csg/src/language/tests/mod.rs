@@ -1,4 +1,4 @@
-//! What files mean, and what is said of files that mean nothing.
+//! Tests of the language: geometries of valid files, and messages of invalid ones.
 
 mod flags;
 mod fuzz;
@@ -13,7 +13,7 @@ mod unity;
 use super::*;
 use crate::{Point, Solid, Surface};
 
-/// What the statements say.
+/// The result of parsing the statements.
 fn parsed(statements: &str) -> Parsed {
     match parse_geometry(&format!("algebraic3d\n{statements}"), "t.geo") {
         Ok(parsed) => parsed,
@@ -21,21 +21,26 @@ fn parsed(statements: &str) -> Parsed {
     }
 }
 
-/// The geometry of the statements, which give no warning.
+/// The geometry of statements that give no warning.
 fn geometry(statements: &str) -> Geometry {
     let Parsed { geometry, warnings } = parsed(statements);
     assert!(warnings.is_empty(), "{}", warnings[0]);
     geometry
 }
 
-/// The geometry of one solid, `a`.
+/// The geometry of one solid named `a`.
 fn solid(text: &str) -> Geometry {
     geometry(&format!("solid a = {text}; tlo a;"))
 }
 
-/// The messages of the statements, which are in line 2 and following.
+/// The errors of the statements, which start in line 2.
 fn errors(statements: &str) -> Diagnostics {
     parse_geometry(&format!("algebraic3d\n{statements}"), "t.geo").expect_err(statements)
+}
+
+/// Whether all errors are of the kind [`Kind::Unsupported`].
+fn is_unsupported(errors: &Diagnostics) -> bool {
+    errors.errors().all(|message| message.kind == Kind::Unsupported)
 }
 
 /// The only error of the statements.
@@ -52,7 +57,7 @@ fn warning(statements: &str) -> String {
     warnings[0].to_string()
 }
 
-/// Whether a point is inside a solid of the geometry; it is on no surface.
+/// Whether a point, which must not be on a surface, is inside a solid.
 fn is_inside(geometry: &Geometry, solid: &Solid, point: &Point) -> bool {
     match solid {
         Solid::Half { surface, positive } => {
@@ -64,14 +69,15 @@ fn is_inside(geometry: &Geometry, solid: &Solid, point: &Point) -> bool {
     }
 }
 
-/// Points of the cube [-3, 3]³ that avoid round coordinates.
+/// Points in the cube [-3, 3]³ that avoid round coordinates.
 fn samples() -> impl Iterator<Item = Point> {
-    // The fractional parts of multiples of powers of the real root of x⁴ = x + 1 fill a cube evenly (Roberts 2018).
+    // Fractional parts of multiples of powers of the real root of x⁴ = x + 1 are uniformly
+    // distributed (Roberts 2018).
     let steps = [0.819_172_513, 0.671_043_607, 0.549_700_478];
     (1..4000).map(move |i| Point::from(steps.map(|step| (f64::from(i) * step).fract() * 6.0 - 3.0)))
 }
 
-/// Asserts that the first body is where `inside` says.
+/// Asserts that the first body agrees with `inside` at all samples.
 fn assert_is(geometry: &Geometry, inside: impl Fn(&Point) -> bool) {
     let mut counts = [0, 0];
     for point in samples() {
@@ -79,5 +85,5 @@ fn assert_is(geometry: &Geometry, inside: impl Fn(&Point) -> bool) {
         assert_eq!(is_inside(geometry, &geometry.bodies[0].solid, &point), expected, "at {point}");
         counts[usize::from(expected)] += 1;
     }
-    assert!(counts[1] > 10 && counts[0] > 10, "the samples tell nothing: {counts:?}");
+    assert!(counts[1] > 10 && counts[0] > 10, "too few samples inside or outside: {counts:?}");
 }

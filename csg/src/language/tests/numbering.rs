@@ -1,4 +1,4 @@
-//! Boundary numbers and names, body numbers, and where they come from.
+//! Boundary numbers and names, and body numbers.
 
 use super::*;
 use crate::geometry::{BoundaryLabel, SurfaceInfo};
@@ -9,14 +9,14 @@ fn numbers(geometry: &Geometry) -> Vec<Option<u32>> {
 }
 
 #[test]
-fn the_number_nearest_to_the_leaves_wins() {
+fn the_number_of_the_innermost_solid_applies() {
     let text = "solid a = plane (0,0,0; -1,0,0) and plane (1,0,0; 1,0,0) -bc=2;
                 solid c = a and plane (0,0,0; 0,1,0) -bc=1; tlo c;";
     assert_eq!(numbers(&geometry(text)), [Some(2), Some(2), Some(1)]);
 }
 
 #[test]
-fn a_number_is_for_the_whole_named_solid() {
+fn a_number_applies_to_the_whole_named_solid() {
     let geometry = geometry("solid a = sphere (0,0,0; 1) and plane (0,0,0; 0,0,1) -bc=7; tlo a;");
     assert_eq!(numbers(&geometry), [Some(7), Some(7)]);
 }
@@ -30,7 +30,7 @@ fn lists_follow_the_order_of_surfaces() {
 }
 
 #[test]
-fn lists_of_wrong_length_are_warned_of() {
+fn lists_of_wrong_length_give_a_warning() {
     let text = "solid a = orthobrick (0,0,0; 1,1,1) -bc=[1,2]; tlo a;";
     assert!(warning(text).contains("the list of -bc has 2 values for 6 surfaces"));
     assert_eq!(numbers(&parsed(text).geometry), [Some(1), Some(2), None, None, None, None]);
@@ -44,7 +44,7 @@ fn the_list_of_a_polyhedron_counts_its_faces() {
 }
 
 #[test]
-fn of_equal_surfaces_the_first_has_the_say() {
+fn the_flags_of_the_first_of_equal_surfaces_apply() {
     let text = "solid a = orthobrick (0,0,0; 1,1,1) -bc=1;\nsolid b = orthobrick (0,0,-1; 1,1,0) -bc=2; tlo a; tlo b;";
     assert!(warning(text).contains("`b` is also one of `a` (line 2)"));
     let numbers = numbers(&parsed(text).geometry);
@@ -64,7 +64,7 @@ fn the_mesh_size_of_a_surface_is_the_least_of_all() {
 }
 
 #[test]
-fn the_size_of_a_tlo_goes_before_that_of_its_solid() {
+fn the_size_of_a_tlo_overrides_that_of_its_solid() {
     let geometry = geometry("solid a = sphere (0,0,0; 1) -maxh=0.5; tlo a -maxh=0.2;");
     assert_eq!(geometry.bodies[0].maxh, Some(0.2));
     assert_eq!(geometry.surface_info[0].maxh, Some(0.5));
@@ -73,7 +73,7 @@ fn the_size_of_a_tlo_goes_before_that_of_its_solid() {
 #[test]
 fn moved_copies_have_no_flags_but_the_originals_keep_theirs() {
     let text = "solid b = sphere (0,0,0; 1) -bc=3; solid a = multitranslate (5,0,0; 1; b) -bc=4; tlo a;";
-    assert!(warning(text).contains("moved copies do not have the -bc"));
+    assert!(warning(text).contains("transformed copies do not inherit -bc"));
     assert_eq!(numbers(&parsed(text).geometry), [Some(3), Some(4)]);
 }
 
@@ -99,7 +99,7 @@ fn boundary_conditions_name_surfaces_and_a_body() {
 }
 
 #[test]
-fn a_boundary_condition_that_reaches_nothing_is_warned_of() {
+fn a_boundary_condition_without_effect_gives_a_warning() {
     let text =
         "solid p = plane (0.5,0,0; 1,0,0); solid a = sphere (0,0,0; 1); tlo a; boundarycondition p a 3;";
     assert!(warning(text).contains("no surface of this solid bounds `a`"));

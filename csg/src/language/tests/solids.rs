@@ -1,4 +1,4 @@
-//! Primitives, transforms and Boolean operations, compared with inside functions written by hand.
+//! Primitives, transforms and Boolean operations, compared with hand-written inside functions.
 
 use super::*;
 use crate::Vector;
@@ -67,7 +67,8 @@ fn an_elliptic_cone_shrinks_along_long_cross_short() {
     });
     let swapped = parsed("solid a = ellipticcone (0,0,0; 0,1,0; 2,0,0; 2; 0.5); tlo a;");
     assert!(swapped.warnings[0].message.contains("second × first"));
-    // (2,0,0) × (0,1,0) is +z: the height is measured upward although the text has them the other way.
+    // (2,0,0) × (0,1,0) is +z: the height is measured upward although the text gives the axes in
+    // the other order.
     assert_is(&swapped.geometry, at(2.0));
 }
 
@@ -102,7 +103,7 @@ fn a_convex_polyhedron_is_an_intersection() {
     assert_is(&geometry, |p| p.x.abs() < 0.5 && (0.0..1.0).contains(&p.y) && (0.0..1.0).contains(&p.z));
 }
 
-/// A prism over a polygon that runs counter-clockwise in the plane z = 0, up to z = `height`.
+/// A prism from z = 0 to z = `height` over a counterclockwise polygon.
 fn prism(polygon: &[[f64; 2]], height: f64) -> String {
     let n = polygon.len();
     let mut points = String::new();
@@ -113,7 +114,7 @@ fn prism(polygon: &[[f64; 2]], height: f64) -> String {
     }
     let mut faces: Vec<String> =
         (1..=n).map(|i| (i, i % n + 1)).map(|(i, j)| format!("{i},{j},{},{}", j + n, i + n)).collect();
-    // Lids as fans around a point in the middle of the polygon, which sees all of it.
+    // Lids are fans around a point from which the whole polygon is visible.
     points += &format!("0,0,0; 0,0,{height};");
     for (i, j) in (1..=n).map(|i| (i, i % n + 1)) {
         faces.push(format!("{j},{i},{}", 2 * n + 1));
@@ -123,7 +124,7 @@ fn prism(polygon: &[[f64; 2]], height: f64) -> String {
 }
 
 #[test]
-fn a_polyhedron_with_dents_is_where_its_faces_say() {
+fn a_nonconvex_polyhedron_has_the_inside_of_its_faces() {
     let star: Vec<[f64; 2]> = (0..10)
         .map(|i| (f64::from(i) * 0.1 * std::f64::consts::TAU, if i % 2 == 0 { 2.9 } else { 1.0 }))
         .map(|(angle, radius)| [radius * angle.cos(), radius * angle.sin()])
@@ -165,7 +166,7 @@ fn and_binds_tighter_than_or_and_not_tightest() {
 
 #[test]
 fn rotations_are_clockwise_and_in_radians() {
-    // +x goes to -y.
+    // +x is mapped to -y.
     let geometry = solid("rotate (0,0,0; 1.5708,0,0; plane (1,0,0; 1,0,0))");
     assert_is(&geometry, |p| p.y > -1.0);
     let Surface::Plane(plane) = &geometry.surfaces[0] else { panic!() };
@@ -173,7 +174,7 @@ fn rotations_are_clockwise_and_in_radians() {
 }
 
 #[test]
-fn euler_angles_are_z_x_z_about_the_given_centre() {
+fn euler_angles_are_z_x_z_about_the_given_center() {
     let (alpha, beta, gamma) = (0.3_f64, 0.5_f64, -0.7_f64);
     let geometry = solid("rotate (1,2,3; 0.3,0.5,-0.7; orthobrick (-1,-1.5,0; 1,1.5,2.5))");
     let center = Vector::new(1.0, 2.0, 3.0);
@@ -211,14 +212,14 @@ fn every_primitive_can_be_moved() {
 }
 
 #[test]
-fn multitranslate_makes_one_more_than_it_says() {
+fn multitranslate_makes_one_more_than_its_count() {
     let geometry = solid("multitranslate (1.5,0,0; 2; sphere (-1.5,0,0; 0.6))");
     assert_eq!(geometry.surfaces.len(), 3);
     assert_is(&geometry, |p| [-1.5, 0.0, 1.5].iter().any(|x| (p - Point::new(*x, 0., 0.)).norm() < 0.6));
 }
 
 #[test]
-fn multirotate_makes_as_many_as_it_says() {
+fn multirotate_makes_as_many_as_its_count() {
     let geometry = solid(&format!("multirotate (0,0,0; {FRAC_PI_2},0,0; 3; sphere (2,0,0; 0.9))"));
     assert_eq!(geometry.surfaces.len(), 3);
     let centers = [[2., 0.], [0., -2.], [-2., 0.]];
@@ -243,7 +244,7 @@ fn a_chain_of_thousands_of_definitions_is_one_union() {
 }
 
 #[test]
-fn a_copy_is_of_the_solid_as_it_is_then() {
+fn a_copy_uses_the_current_definition_of_its_solid() {
     let text = "solid b = sphere (0,0,0; 1); solid c = translate (1,0,0; b); solid b = sphere (0,0,0; 2);
                 solid a = b and c; tlo a;";
     let parsed = parsed(text);
@@ -251,9 +252,9 @@ fn a_copy_is_of_the_solid_as_it_is_then() {
 }
 
 #[test]
-fn a_second_definition_changes_what_was_made_of_the_first() {
+fn a_redefinition_changes_earlier_uses() {
     let text = "solid b = sphere (0,0,0; 1); solid a = b and plane (0,0,0; 1,0,0); solid b = sphere (0,0,0; 2); tlo a;";
     let parsed = parsed(text);
-    assert!(parsed.warnings[0].message.contains("`b` was defined in line 2 already"));
+    assert!(parsed.warnings[0].message.contains("`b` is already defined in line 2"));
     assert_is(&parsed.geometry, |p| p.coords.norm() < 2.0 && p.x < 0.0);
 }

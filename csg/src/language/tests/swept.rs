@@ -1,14 +1,14 @@
-//! Revolutions and extrusions, compared with inside functions written by hand.
+//! Revolutions and extrusions, compared with hand-written inside functions.
 
 use super::*;
 use proptest::prelude::*;
 
-/// The only body of a file with these curves and this solid.
+/// The geometry of a file with the given curves and one solid.
 fn swept(curves: &str, solid: &str) -> Geometry {
     geometry(&format!("{curves} solid s = {solid}; tlo s;"))
 }
 
-/// A `curve2d` through points, by lines.
+/// A `curve2d` of lines through points.
 fn polygon(points: &[[f64; 2]], closed: bool) -> String {
     let n = points.len();
     let places: String = points.iter().map(|[x, y]| format!("{x:?}, {y:?}; ")).collect();
@@ -17,7 +17,7 @@ fn polygon(points: &[[f64; 2]], closed: bool) -> String {
     format!("curve2d p = ({n}; {places}{}; {});", lines.len(), lines.join("; "))
 }
 
-/// Whether a point is in a polygon, by parity.
+/// Whether a point is in a polygon, by the even-odd rule.
 fn is_in(points: &[[f64; 2]], [x, y]: [f64; 2]) -> bool {
     let crosses = |i: usize| {
         let ([a, b], [c, d]) = (points[i], points[(i + 1) % points.len()]);
@@ -26,7 +26,7 @@ fn is_in(points: &[[f64; 2]], [x, y]: [f64; 2]) -> bool {
     (0..points.len()).filter(|&i| crosses(i)).count() % 2 == 1
 }
 
-/// A polygon without crossings, star-shaped about (0, 2): radii in order of the angle.
+/// A simple polygon, star-shaped about (0, 2), from radii in order of the angle.
 fn star() -> impl Strategy<Value = Vec<[f64; 2]>> {
     prop::collection::vec(0.6..1.8f64, 3..14).prop_map(|radii| {
         let n = radii.len() as f64;
@@ -39,7 +39,7 @@ proptest! {
     #![proptest_config(crate::seeded())]
 
     #[test]
-    fn a_revolution_of_any_polygon_is_what_turns(points in star(), clockwise: bool) {
+    fn a_revolution_of_any_polygon_has_the_right_inside(points in star(), clockwise: bool) {
         let mut given = points.clone();
         if clockwise { given.reverse(); }
         let geometry = swept(&polygon(&given, true), "revolution (0, 0, 0; 1, 0, 0; p)");
@@ -56,7 +56,7 @@ proptest! {
 }
 
 #[test]
-fn a_staircase_with_dents_is_where_it_should_be() {
+fn a_revolution_of_a_nonconvex_staircase_has_the_right_inside() {
     let points = [
         [-2., 0.5],
         [-2., 2.5],
@@ -88,7 +88,7 @@ fn a_profile_closed_by_the_axis_has_cones_planes_and_cylinders() {
     assert_eq!(kinds.collect::<String>(), "npcp");
 }
 
-/// Four quarter arcs about (x, y).
+/// Four quarter arcs of an ellipse about (x, y).
 fn ring(x: f64, y: f64, r: f64, s: f64) -> String {
     let p = |i: f64, j: f64| format!("{:?}, {:?}; ", x + i * r, y + j * s);
     let points = [[1., 0.], [1., 1.], [0., 1.], [-1., 1.], [-1., 0.], [-1., -1.], [0., -1.], [1., -1.]];
@@ -97,14 +97,14 @@ fn ring(x: f64, y: f64, r: f64, s: f64) -> String {
 }
 
 #[test]
-fn a_turned_circle_is_one_torus() {
+fn a_revolved_circle_is_one_torus() {
     let geometry = swept(&ring(0.5, 2.0, 0.5, 0.5), "revolution (0, 0, 0; 1, 0, 0; p)");
     assert!(matches!(&geometry.surfaces[..], [Surface::Torus(t)] if t.major == 2.0));
     assert_is(&geometry, |p| (p.x - 0.5).hypot(p.y.hypot(p.z) - 2.0) < 0.5);
 }
 
 #[test]
-fn a_moved_circle_is_one_cylinder_between_planes() {
+fn an_extruded_circle_is_one_cylinder_between_planes() {
     let path = "curve3d q = (2; 0, 0, 0; 0, 2, 0; 1; 2, 1, 2);";
     let geometry = swept(&(path.to_owned() + &ring(0.5, 0.0, 1.0, 1.0)), "extrusion (q; p; 0, 0, 1)");
     assert_eq!(geometry.surfaces.len(), 3);
@@ -112,7 +112,7 @@ fn a_moved_circle_is_one_cylinder_between_planes() {
     assert_is(&geometry, |p| p.y > 0.0 && p.y < 2.0 && (p.x - 0.5).hypot(p.z) < 1.0);
 }
 
-/// A point of a segment of kind 3.
+/// The point of a segment of kind 3 at the parameter `t`.
 fn at(points: [[f64; 2]; 3], t: f64) -> [f64; 2] {
     let [p, q, r] = points.map(|[x, y]| crate::Vector::new(x, y, 0.0));
     let w = (r - p).norm() / (0.5 * ((q - p).norm_squared() + (r - q).norm_squared())).sqrt();
@@ -122,12 +122,12 @@ fn at(points: [[f64; 2]; 3], t: f64) -> [f64; 2] {
 }
 
 #[test]
-fn arcs_bulge_out_of_polygons_and_into_them() {
-    // A stadium with a groove; the cap of the arc on the right reaches above the line at its top.
+fn arcs_may_bulge_outward_and_inward() {
+    // A stadium with a groove; the cap of the right arc extends above the line at its top.
     let text = "curve2d p = (9; -1,1; 1,1; 2.5,2.5; 1,3; 0.5,3; 0,2; -0.5,3; -1,3; -2,2;
         6; 2,1,2; 3,2,3,4; 2,4,5; 3,5,6,7; 2,7,8; 3,8,9,1);";
     let geometry = swept(text, "revolution (0, 0, 0; 1, 0, 0; p)");
-    // The same curve, cut into short lines.
+    // The same curve, approximated by short lines.
     let mut fine = vec![[-1., 1.]];
     for arc in [
         [[1., 1.], [2.5, 2.5], [1., 3.]],
@@ -148,7 +148,7 @@ fn a_half_circle_on_the_axis_is_a_ball() {
 }
 
 #[test]
-fn a_cap_on_the_axis_is_smooth_and_its_chord_stays_away() {
+fn a_spherical_cap_on_the_axis_has_the_right_inside() {
     let text = "curve2d p = (5; -1,0; -1,1; 0,1; 2,1; 2,0; 3; 3,1,2,3; 2,3,4; 2,4,5);";
     let geometry = swept(text, "revolution (0, 0, 0; 1, 0, 0; p)");
     assert_is(&geometry, |p| {
@@ -175,7 +175,7 @@ fn a_pipe_bend_is_cylinders_and_a_torus() {
 }
 
 #[test]
-fn profiles_that_cross_are_named() {
+fn invalid_profiles_are_reported() {
     let solid = "solid s = revolution (0,0,0; 1,0,0; p); tlo s;";
     let crossing = error(&format!("{} {solid}", polygon(&[[0., 1.], [2., 2.], [2., 1.], [0., 3.]], true)));
     assert!(crossing.contains("cross"), "{crossing}");
@@ -185,7 +185,7 @@ fn profiles_that_cross_are_named() {
 
 #[test]
 fn a_path_with_corners_is_mitred() {
-    // Legs of 2.5 and 2; the profile is a square of side 1, whose y is along z.
+    // Legs of length 2.5 and 2; the profile is a unit square with its y axis along z.
     let path = "curve3d q = (3; 0,0,0; 2.5,0,0; 2.5,2,0; 2; 2,1,2; 2,2,3);";
     let bar = polygon(&[[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]], true);
     let geometry = swept(&format!("{path} {bar}"), "extrusion (q; p; 0,0,1)");
@@ -200,8 +200,9 @@ fn a_path_with_corners_is_mitred() {
 }
 
 #[test]
-fn arcs_of_a_profile_that_turns_about_its_path_are_followed_over_a_joint() {
-    // Beside the joint the arc before it and the chord of the one behind it cross where neither matters.
+fn arcs_of_a_rotating_profile_continue_across_a_joint() {
+    // Near the joint, the arc before it and the chord of the one after it cross where neither is
+    // relevant.
     let path = "curve3d q = (5; 0,0,0; 4,0,2; 4,4,4; 4,8,6; 0,8,8; 2; 3,1,2,3; 3,3,4,5);";
     let profile = "curve2d p = (4; -1,0; -0.7,0.7; 0,1; 0.5,-0.8; 3; 3,1,2,3; 2,3,4; 2,4,1);";
     let features =
@@ -220,20 +221,20 @@ fn arcs_may_be_shallow() {
 }
 
 #[test]
-fn paths_that_run_back_or_are_too_short_for_their_corners_are_refused() {
+fn paths_that_run_back_or_are_too_short_for_their_corners_are_rejected() {
     let bar = polygon(&[[-0.1, -0.1], [0.1, -0.1], [0.1, 0.1], [-0.1, 0.1]], true);
     for path in [
         "curve3d q = (3; 0,0,0; 2,0,0; 1,0,0; 2; 2,1,2; 2,2,3);",
         "curve3d q = (4; 0,0,0; 2,0,0; 2,0.1,0; 4,0.1,0; 3; 2,1,2; 2,2,3; 2,3,4);",
     ] {
         let message = error(&format!("{path} {bar} solid s = extrusion (q; p; 0,0,1); tlo s;"));
-        assert!(message.contains("too short for its corners"), "{message}");
+        assert!(message.contains("too short for its mitred corners"), "{message}");
     }
 }
 
 #[test]
-fn thin_shells_between_arcs_have_their_arcs_halved() {
-    // Two arcs of different ellipses between the same points: the chords coincide.
+fn arcs_of_thin_shells_are_bisected() {
+    // Two arcs of different ellipses between the same points: their chords coincide.
     let text = "curve2d p = (4; -2,1; 1,4; 2,1; 0.8,2.8; 2; 3,1,2,3; 3,3,4,1);";
     let geometry = swept(text, "revolution (0, 0, 0; 1, 0, 0; p)");
     let mut fine = Vec::new();
@@ -255,7 +256,7 @@ fn a_list_of_numbers_has_one_for_each_segment_of_the_profile() {
     assert_eq!(number(&ring, |s| matches!(s, Surface::Cylinder(c) if c.radius == 1.0)), Some(1));
     assert_eq!(number(&ring, |s| matches!(s, Surface::Plane(p) if p.point.x == 1.0)), Some(2));
     assert_eq!(number(&ring, |s| matches!(s, Surface::Cylinder(c) if c.radius == 2.0)), Some(3));
-    // The planes across the ends of a path have none.
+    // The planes at the ends of a path have no number.
     let path = "curve3d q = (2; 0,0,0; 0,0,5; 1; 2,1,2);";
     let bar = geometry(&format!("{path} {square} solid s = extrusion (q; p; 0,1,0) -bc=[1,2,3,4]; tlo s;"));
     assert_eq!(bar.surfaces.len(), 6);
@@ -263,7 +264,7 @@ fn a_list_of_numbers_has_one_for_each_segment_of_the_profile() {
 }
 
 #[test]
-fn points_on_a_straight_side_of_a_profile_change_nothing() {
+fn points_on_a_straight_side_of_a_profile_have_no_effect() {
     let points = [
         [-2., 0.],
         [-2., 1.],

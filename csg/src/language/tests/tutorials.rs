@@ -1,9 +1,9 @@
-//! NETGEN's tutorials, where they are at hand.
+//! NETGEN's tutorials, if they are available.
 
 use super::*;
 use std::path::PathBuf;
 
-/// The folder of the tutorials: `TETMILL_SHARED`, or `shared` beside the project.
+/// The folder of the tutorials: in `TETMILL_SHARED`, or in `shared` next to the project.
 fn folder() -> Option<PathBuf> {
     let beside = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared");
     let shared = std::env::var_os("TETMILL_SHARED").map_or_else(|| PathBuf::from(beside), PathBuf::from);
@@ -20,7 +20,7 @@ fn read(name: &str) -> Option<Result<Parsed, Diagnostics>> {
     Some(parse_geometry_bytes(&source, name))
 }
 
-/// Surfaces and bodies of each tutorial, counted by hand.
+/// Numbers of surfaces and bodies of each tutorial, counted by hand.
 const COUNTS: [(&str, usize, usize); 25] = [
     ("boundarycondition", 8, 2),
     ("boxcyl", 10, 1),
@@ -32,7 +32,7 @@ const COUNTS: [(&str, usize, usize); 25] = [
     ("cylinder", 3, 1),
     ("ellipsoid", 1, 1),
     ("ellipticcyl", 3, 1),
-    // Four arcs with four sides and a torus each, five planes across; a brick; a ball.
+    // Four arcs with four sides and a torus each, five planes between them; a brick; a ball.
     ("extrusion", 32, 1),
     ("fichera", 12, 1),
     ("manyholes", 106, 1),
@@ -55,13 +55,13 @@ fn every_tutorial_is_read() {
     for (name, surfaces, bodies) in COUNTS {
         let Some(result) = read(&format!("{name}.geo")) else { return };
         let geometry = result.unwrap_or_else(|errors| panic!("{errors}")).geometry;
-        // Auxiliary surfaces of seams stand in no solid of the file.
+        // Auxiliary surfaces of seams belong to no solid of the file.
         let of_file = geometry.surface_info.iter().filter(|info| !info.solid.is_empty()).count();
         assert_eq!((of_file, geometry.bodies.len()), (surfaces, bodies), "{name}");
     }
 }
 
-/// Asserts that the first body of a tutorial is where `inside` says, at points of a box.
+/// Asserts that the first body of a tutorial agrees with `inside` at samples of a box.
 fn tutorial_is(name: &str, low: Point, high: Point, inside: impl Fn(&Point) -> bool) {
     let Some(result) = read(name) else { return };
     let geometry = result.unwrap_or_else(|errors| panic!("{errors}")).geometry;
@@ -73,12 +73,12 @@ fn tutorial_is(name: &str, low: Point, high: Point, inside: impl Fn(&Point) -> b
         count += usize::from(expected);
         assert_eq!(is_inside(&geometry, &geometry.bodies[0].solid, &point), expected, "{name} at {point}");
     }
-    assert!((100..3900).contains(&count), "the samples tell little: {count}");
+    assert!((100..3900).contains(&count), "too few samples inside or outside: {count}");
 }
 
 #[test]
-fn the_shaft_is_where_its_parts_are() {
-    // A web between `from` and `to`, its flanks converging towards the crank pin at y = 30·`side`.
+fn the_shaft_is_the_union_of_its_parts() {
+    // A web between `from` and `to`; its flanks converge toward the crank pin at y = 30·`side`.
     let web = |p: &Point, [from, to]: [f64; 2], side: f64| {
         let (y, flank) = (side * p.y, side * p.y - 3.0 * 28.0 + 3.0 * p.z.abs());
         let within = p.x > from && p.x < to;
@@ -102,7 +102,7 @@ fn the_shaft_is_where_its_parts_are() {
 }
 
 #[test]
-fn the_plate_with_holes_is_where_its_parts_are() {
+fn the_plate_has_its_holes() {
     tutorial_is("manyholes.geo", Point::new(-1., -1., -0.5), Point::new(11., 11., 1.5), |p| {
         let in_plate = (0.0..10.0).contains(&p.x) && (0.0..10.0).contains(&p.y) && (0.0..1.0).contains(&p.z);
         in_plate && (p.x.fract() - 0.5).hypot(p.y.fract() - 0.5) > 0.2
@@ -118,7 +118,7 @@ fn the_fichera_cube_has_its_numbers() {
 }
 
 #[test]
-fn the_two_bricks_share_planes_and_one_has_its_number_overridden() {
+fn two_bricks_share_planes_and_one_number_is_overridden() {
     let Some(result) = read("boundarycondition.geo") else { return };
     let Parsed { geometry, warnings } = result.unwrap_or_else(|errors| panic!("{errors}"));
     assert_eq!(geometry.boundary_overrides.len(), 1);

@@ -1,12 +1,12 @@
-//! Equal surfaces are one.
+//! Unification of equal surfaces.
 
 use super::*;
 
 #[test]
-fn neighbouring_bricks_share_a_plane_with_opposite_sides() {
+fn adjacent_bricks_share_a_plane_with_opposite_sides() {
     let geometry =
         geometry("solid a = orthobrick (0,0,0; 1,1,1); solid b = orthobrick (1,0,0; 2,1,1); tlo a; tlo b;");
-    // The wall between them, and the four walls that go through: twelve less five.
+    // The interface, and the four planes common to both bricks: twelve less five.
     assert_eq!(geometry.surfaces.len(), 7);
     let [in_a, in_b] = [0, 1].map(|body| {
         let at = |x| is_inside(&geometry, &geometry.bodies[body].solid, &Point::new(x, 0.5, 0.4));
@@ -16,7 +16,7 @@ fn neighbouring_bricks_share_a_plane_with_opposite_sides() {
 }
 
 #[test]
-fn a_plane_through_another_point_is_the_same() {
+fn planes_through_different_points_are_unified() {
     let geometry = solid("plane (0,0,1; 0,0,1) and plane (7,8,1; 0,0,3) and plane (-1,0,0; -1,0,0)");
     assert_eq!(geometry.surfaces.len(), 2);
     assert!(matches!(&geometry.bodies[0].solid, Solid::And(members) if members.len() == 2));
@@ -39,13 +39,14 @@ fn equal_surfaces_of_every_kind_are_one() {
 }
 
 #[test]
-fn transforms_do_not_part_equal_surfaces() {
+fn equal_surfaces_are_unified_after_transforms() {
     let text = "solid a = orthobrick (0,0,0; 1,1,1);
                 solid b = rotate (1,0,0; 1.5708,0,0; orthobrick (0,0,0; 1,1,1));
                 solid c = translate (0.1,0,0; translate (0.2,0,0; orthobrick (0.7,0,0; 1.7,1,1)));
                 tlo a; tlo b; tlo c;";
     let geometry = geometry(text);
-    // b is the unit cube turned about its edge x = 1, y = 0 by a right angle: [1,2]×[0,1]×[0,1], as is c.
+    // b is the unit cube rotated about its edge x = 1, y = 0 by a right angle: [1,2]×[0,1]×[0,1],
+    // the same as c.
     assert_eq!(geometry.surfaces.len(), 7);
 }
 
@@ -56,7 +57,7 @@ fn thin_layers_stay_apart() {
 }
 
 #[test]
-fn tolerance_follows_the_size_of_the_geometry_not_the_distance_from_the_origin() {
+fn tolerance_depends_on_the_size_of_the_geometry_but_not_on_its_position() {
     for (scale, shift) in [(1e-9, 0.0), (1e9, 0.0), (1.0, 1e5)] {
         let at = |x: f64| x * scale + shift;
         let brick = |x: f64| {

@@ -2,9 +2,9 @@
 //!
 //! ```text
 //!            \ B |
-//!             \  |  exterior         Three sheets through a curve that comes out of the page:
+//!             \  |  exterior         Three sheets through a curve that points out of the page:
 //!          A   \ |                   six rays, six sectors. A ray with different regions on its
-//!      -----------x-----------       sides is part of a patch; the others are no boundaries.
+//!      -----------x-----------       sides is part of a patch; the other rays are not boundaries.
 //!          A     | \      A
 //!             A  |  \
 //!                | A \
@@ -15,22 +15,22 @@ use super::trace::tangent;
 use super::{FeatureError, Named, Place};
 use crate::{BodyId, Geometry, Point, SurfaceId, Vector};
 
-/// The lengths below which things are the same.
+/// Absolute tolerances, all lengths.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Tolerances {
-    /// How near Newton's method must come to its surfaces.
+    /// Largest distance from the surfaces after Newton's method.
     pub exact: f64,
-    /// A point this near to a surface is on it.
+    /// A point within this distance of a surface is on the surface.
     pub on_surface: f64,
-    /// Corners this near to each other are one.
+    /// Corners within this distance are merged.
     pub merge: f64,
 }
 
 impl Tolerances {
-    /// For bodies in a box of this diagonal and largest coordinate.
+    /// Tolerances for bodies in a box with this diagonal and largest coordinate.
     ///
-    /// The decimals of a file make three surfaces that are meant to share a curve miss each other by
-    /// 10⁻¹⁶ to 10⁻¹² of the size if they are written in full; real features are larger than 10⁻⁷ of it.
+    /// Coordinates written with all decimals make surfaces that share a curve miss each other by
+    /// 10⁻¹⁶ to 10⁻¹² of the size. Real features are larger than 10⁻⁷ of the size.
     pub fn new(diagonal: f64, largest: f64) -> Self {
         let rounding = 16.0 * f64::EPSILON * largest;
         Self {
@@ -41,7 +41,11 @@ impl Tolerances {
     }
 }
 
-/// The body a place near `at` is in, or `None` for the exterior; `positive` tells its side of each surface.
+/// The body that contains a point near `at`, `None` for the exterior; `positive` is the sign of
+/// each surface there.
+///
+/// # Errors
+/// [`FeatureError::Overlap`] if two bodies contain the point.
 pub(super) fn region(
     geometry: &Geometry,
     leaf: &Leaf,
@@ -59,25 +63,26 @@ pub(super) fn region(
     }
 }
 
-/// One side of a surface beside a curve where the region changes: part of a patch.
+/// One side of a surface at a curve, separating two different regions: part of a patch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Sheet {
     /// The surface.
     pub surface: SurfaceId,
-    /// The body behind the patch's normal.
+    /// The body behind the normal of the patch.
     pub inside: Option<BodyId>,
-    /// The body in front of it.
+    /// The body in front of the normal.
     pub outside: Option<BodyId>,
-    /// Whether the normal is against the gradient.
+    /// Whether the normal is opposite to the gradient.
     pub flipped: bool,
-    /// Which cutout it is part of, by index.
+    /// Index of the cutout it belongs to.
     pub cutout: Option<u32>,
 }
 
 impl Sheet {
-    /// The sheet between the regions behind and before a surface's gradient, if they differ.
+    /// The sheet between the regions behind and in front of a surface (along its gradient), if they
+    /// differ.
     ///
-    /// The normal points to the exterior, or to the body that comes later.
+    /// The normal points to the exterior, or to the body with the larger id.
     pub fn between(surface: SurfaceId, behind: Option<BodyId>, before: Option<BodyId>) -> Option<Self> {
         let flipped = match (behind, before) {
             (a, b) if a == b => return None,
@@ -89,8 +94,11 @@ impl Sheet {
     }
 }
 
-/// The first cutout that a place on a surface belongs to: its solid is on one side of the surface only. `behind` and
-/// `before` tell the sides of surfaces for a point just behind the surface, and just before it.
+/// The first cutout that contains a point of a surface: its solid lies on one side of the surface
+/// only.
+///
+/// `behind` and `before` return the signs of all surfaces just behind the point and just in front
+/// of it.
 fn cutout_at(
     geometry: &Geometry,
     leaf: &Leaf,
@@ -101,8 +109,12 @@ fn cutout_at(
     here.find(|(_, solid)| solid.holds(behind) != solid.holds(before)).map(|(i, _)| *i)
 }
 
-/// The sheet of a surface at one of its points, `None` if it is no boundary there; `other_side` tells
-/// on which side of each other surface the point is (whether on the positive one).
+/// The sheet of a surface at one of its points; `None` if the surface is not a boundary there.
+///
+/// `other_side` returns whether the point is on the positive side of another surface.
+///
+/// # Errors
+/// [`FeatureError::Overlap`] if two bodies contain a point beside it.
 pub(super) fn sheet_at(
     geometry: &Geometry,
     tree: &Octree,
@@ -118,18 +130,18 @@ pub(super) fn sheet_at(
     Ok(sheet.map(|sheet| Sheet { cutout: cutout_at(geometry, leaf, id, [&behind, &before]), ..sheet }))
 }
 
-/// What is around a curve at one of its points.
+/// The surfaces and sheets around a point of a curve.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Around {
+pub(super) struct Neighborhood {
     /// The surfaces through the curve, ascending.
     pub surfaces: Vec<SurfaceId>,
-    /// The sheets that leave it, and whether each lies to the left for one who walks along the curve with the sheet's
-    /// normal up; ascending.
+    /// The sheets that start at the curve, sorted, each with whether it lies to the left of the
+    /// curve, seen along the curve with the sheet's normal up.
     pub sheets: Vec<(Sheet, bool)>,
 }
 
-impl Around {
-    /// Whether it is more than a line on one smooth sheet, or in no sheet at all.
+impl Neighborhood {
+    /// Whether the curve is a feature: neither inside one smooth sheet nor off all sheets.
     pub fn is_feature(&self) -> bool {
         match &self.sheets[..] {
             [] => false,
@@ -139,40 +151,46 @@ impl Around {
     }
 }
 
-/// Half of the intersection of a surface with the plane across the curve.
+/// Half of the intersection of a surface with the plane perpendicular to the curve.
 struct Ray {
     surface: SurfaceId,
-    /// Its unit direction.
+    /// Unit direction.
     direction: Vector,
-    /// The angle of its direction, radians.
+    /// Angle of the direction, radians.
     angle: f64,
-    /// How it bends from there, counterclockwise positive, 1/length.
-    bend: f64,
+    /// Curvature term at the start, positive counterclockwise, 1/length.
+    curvature: f64,
 }
 
-/// Directions within this angle, in radians, are one, and the bend decides which comes first.
+/// Rays within this angle (radians) have the same direction; their order is decided by curvature.
 const SAME_ANGLE: f64 = 1e-6;
 
-/// The regions around the point `at` on the intersection of a pair of surfaces, run along `forward`; `None` if the
-/// pair does not matter there.
+/// The neighborhood of the point `at` on the intersection of a pair of surfaces, seen along
+/// `forward`.
+///
+/// `None` if the pair is not relevant there.
 ///
 /// # Errors
-/// If bodies overlap there, or two sheets leave the curve alike.
-pub(super) fn around(
+/// [`FeatureError::Overlap`] if bodies overlap there; [`FeatureError::Tangent`] if two sheets leave
+/// the curve in the same direction.
+pub(super) fn neighborhood(
     geometry: &Geometry,
     tree: &Octree,
     pair: [SurfaceId; 2],
     at: &Point,
     forward: &Vector,
     tolerances: &Tolerances,
-) -> Result<Option<Around>, FeatureError> {
-    let Some(leaf) = tree.leaf(at).filter(|leaf| tree.matters(leaf, pair)) else { return Ok(None) };
-    /// In lengths of merging; seams are found within a part of the size of all primitives, which may be larger than the bodies.
-    const SEWN_GAP: f64 = 100.0;
-    let sewn: Vec<SurfaceId> = tree.sewn(leaf, pair).collect();
+) -> Result<Option<Neighborhood>, FeatureError> {
+    let Some(leaf) = tree.leaf(at).filter(|leaf| tree.is_relevant(leaf, pair)) else { return Ok(None) };
+    /// Largest gap at a seam in units of the merge tolerance. Seams are found with a tolerance
+    /// relative to all primitives, which may be larger than the bodies.
+    const SEAM_GAP: f64 = 100.0;
+    let tangent_surfaces: Vec<SurfaceId> = tree.tangent_surfaces(leaf, pair).collect();
     let is_through = |s: &SurfaceId| {
-        // Tangent surfaces miss each other by more than others may, but not where their carrier runs on without them.
-        let gap = if sewn.contains(s) { SEWN_GAP * tolerances.merge } else { tolerances.on_surface };
+        // The gap between tangent surfaces is wider than usual, but not where the seam surfaces
+        // intersect away from the tangent pair.
+        let gap =
+            if tangent_surfaces.contains(s) { SEAM_GAP * tolerances.merge } else { tolerances.on_surface };
         pair.contains(s) || geometry.surfaces[s.index()].distance(at) <= gap
     };
     let surfaces: Vec<SurfaceId> = leaf.surfaces.iter().copied().filter(is_through).collect();
@@ -183,7 +201,7 @@ pub(super) fn around(
     }
     let rays = sorted_rays(geometry, &surfaces, at, &axis)?;
 
-    // The side of each surface in the widest sector, which is safe to tell; then around, ray by ray.
+    // Start in the widest sector, where the side of each surface is certain, then cross ray by ray.
     let gap = |i: usize| {
         let next =
             rays[(i + 1) % rays.len()].angle + if i + 1 == rays.len() { std::f64::consts::TAU } else { 0.0 };
@@ -213,7 +231,7 @@ pub(super) fn around(
         let along_gradient = geometry.surfaces[ray.surface.index()].gradient(at).dot(&up) > 0.0;
         let (behind, front) = if along_gradient { (before, after) } else { (after, before) };
         if let Some(sheet) = Sheet::between(ray.surface, behind, front) {
-            // Two sheets that leave alike have a wedge of no angle between them.
+            // Two sheets in the same direction bound a wedge of zero angle.
             if let Some(other) = leaving.iter().find(|r| (r.direction - ray.direction).norm() <= SAME_ANGLE) {
                 return Err(tangent_rays(geometry, [other, ray], at));
             }
@@ -227,7 +245,7 @@ pub(super) fn around(
         before = after;
     }
     sheets.sort_unstable();
-    Ok(Some(Around { surfaces, sheets }))
+    Ok(Some(Neighborhood { surfaces, sheets }))
 }
 
 fn tangent_rays(geometry: &Geometry, rays: [&Ray; 2], at: &Point) -> FeatureError {
@@ -235,7 +253,7 @@ fn tangent_rays(geometry: &Geometry, rays: [&Ray; 2], at: &Point) -> FeatureErro
     FeatureError::Tangent { first, second, place: Place(*at) }
 }
 
-/// Two unit vectors across `axis`, so that turning the first to the second is counterclockwise.
+/// Two unit vectors perpendicular to `axis`; rotating the first to the second is counterclockwise.
 fn frame(axis: &Vector) -> (Vector, Vector) {
     crate::primitive::quadric::tangents(axis)
 }
@@ -247,8 +265,8 @@ fn sorted_rays(
     at: &Point,
     axis: &Vector,
 ) -> Result<Vec<Ray>, FeatureError> {
-    /// A relative difference of bends below this is none.
-    const SAME_BEND: f64 = 1e-6;
+    /// Curvatures with a smaller relative difference count as equal.
+    const SAME_CURVATURE: f64 = 1e-6;
     let (u, v) = frame(axis);
     let mut rays = Vec::with_capacity(2 * surfaces.len());
     for &id in surfaces {
@@ -258,12 +276,12 @@ fn sorted_rays(
         let Some(tangent) = axis.cross(&normal).try_normalize(0.0) else { continue };
         for direction in [tangent, -tangent] {
             let up = axis.cross(&direction);
-            let bend = -0.5 * direction.dot(&(surface.hessian(at) * direction)) / gradient.dot(&up);
+            let curvature = -0.5 * direction.dot(&(surface.hessian(at) * direction)) / gradient.dot(&up);
             let angle = direction.dot(&v).atan2(direction.dot(&u));
-            rays.push(Ray { surface: id, direction, angle, bend });
+            rays.push(Ray { surface: id, direction, angle, curvature });
         }
     }
-    // An angle just below π is the same direction as one just above -π.
+    // Angles just below π and just above -π are the same direction.
     let turn = std::f64::consts::TAU;
     for ray in &mut rays {
         if ray.angle > 0.5 * turn - SAME_ANGLE {
@@ -275,13 +293,13 @@ fn sorted_rays(
     while start < rays.len() {
         let end =
             start + rays[start..].iter().take_while(|r| r.angle - rays[start].angle <= SAME_ANGLE).count();
-        rays[start..end].sort_by(|x, y| x.bend.total_cmp(&y.bend));
+        rays[start..end].sort_by(|x, y| x.curvature.total_cmp(&y.curvature));
         for two in rays[start..end].windows(2) {
             let [first, second] = [two[0].surface, two[1].surface];
-            // Of two that go on in each other only one is a boundary here.
+            // At a seam only one of the two surfaces is a boundary.
             let is_seam = geometry.seam([first.min(second), first.max(second)]).is_some();
-            let apart = SAME_BEND * (two[1].bend.abs() + two[0].bend.abs());
-            if !is_seam && two[1].bend - two[0].bend <= apart {
+            let apart = SAME_CURVATURE * (two[1].curvature.abs() + two[0].curvature.abs());
+            if !is_seam && two[1].curvature - two[0].curvature <= apart {
                 return Err(tangent_rays(geometry, [&two[0], &two[1]], at));
             }
         }
