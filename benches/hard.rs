@@ -1,7 +1,8 @@
-//! Hard surfaces by the hundred: how many are filled, at which attempt, with how many points, in which time.
+//! Hundreds of hard surfaces: filled or not, attempts, points and time.
 //!
-//! Each surface is filled without points inside by the size field, in a process of its own with a time limit, and checked: surface unchanged,
-//! bodies right, all tets positive by exact sign, volumes exact. One in three is turned, one turned and moved away from the origin.
+//! Each surface is filled without points for the size field, in its own process with a time limit.
+//! The check: unchanged surface, correct bodies, positive tets by exact sign, exact volumes. One
+//! surface in three is rotated, one rotated and moved away from the origin.
 //!
 //! ```sh
 //! cargo bench --bench hard                          # all families
@@ -19,11 +20,10 @@ use samples::*;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 use tetmill::Vector;
-use tetmill::kernel::random::Random;
-use tetmill::size::UniformSize;
-use tetmill::volume::{Settings, mesh};
+use tetmill::internals::volume::{Settings, mesh};
+use tetmill::internals::{Random, UniformSize};
 
-/// Families, how many seeds of each, and what they are.
+/// Families: name, number of seeds, description.
 const FAMILIES: [(&str, u64, &str); 12] = [
     ("prisms", 120, "twisted prisms, 3 to 14 sides, 1 to 4 layers"),
     ("blocks", 60, "Chazelle's blocks, 1 to 6 notches"),
@@ -39,10 +39,10 @@ const FAMILIES: [(&str, u64, &str); 12] = [
     ("many-blocks", 24, "Chazelle's blocks, 7 to 40 notches"),
 ];
 
-/// No surface may take longer.
+/// Time limit of a surface.
 const LIMIT: Duration = Duration::from_secs(300);
 
-/// One surface in three is moved this many times its size away.
+/// One surface in three is moved away by this multiple of its size.
 const AWAY: f64 = 30.0;
 
 fn main() {
@@ -95,7 +95,7 @@ fn run_family(family: &str, what: &str, seeds: std::ops::Range<u64>) {
     );
 }
 
-/// Runs one surface in a process of its own; what it prints.
+/// Runs one surface in its own process and returns its output.
 fn run_apart(family: &str, seed: u64) -> String {
     let program = std::env::current_exe().expect("this program");
     let mut child = Command::new(program)
@@ -122,7 +122,10 @@ fn run_apart(family: &str, seed: u64) -> String {
     }
 }
 
-/// Fills one surface and checks it: what happened, triangles, missing edges and faces, restarts, points on the surface and inside, seconds.
+/// Fills one surface and checks it.
+///
+/// Returns the result, triangles, missing edges and faces, restarts, points on the surface and
+/// inside, seconds.
 fn fill(family: &str, seed: u64) -> String {
     let mut random = Random::new(seed);
     let mut soup = make(family, &mut random);
@@ -158,7 +161,7 @@ fn fill(family: &str, seed: u64) -> String {
     }
 }
 
-/// A surface of a family.
+/// Makes a surface of a family.
 fn make(family: &str, random: &mut Random) -> Soup {
     match family {
         "prisms" => prism([3, 14], [1, 4], random),
@@ -217,7 +220,7 @@ fn prism(sides: [u32; 2], layers: [u32; 2], random: &mut Random) -> Soup {
     twisted_prisms(sides, -twist * twist_limit(sides), power(random, -0.5, 0.5), layers)
 }
 
-/// Two or three balls in one another, flattened alike.
+/// Two or three nested balls, flattened alike.
 fn shells(random: &mut Random) -> Soup {
     let (levels, flat) = (whole(random, 1, 3), power(random, -4.0, 0.5));
     let mut soup = Soup::default();
@@ -225,7 +228,7 @@ fn shells(random: &mut Random) -> Soup {
     let count = whole(random, 2, 3);
     for i in 0..count {
         let inner = if i + 1 == count { None } else { Some(BodyId(i + 1)) };
-        // Outermost first: what is behind each is a body, or the hole in the last.
+        // Outermost first: behind each is a body, behind the last possibly a hole.
         let outer = if i == 0 { None } else { Some(BodyId(i)) };
         soup.sphere(tetmill::Point::origin(), radius, levels, [inner, outer]);
         radius *= 1.0 - power(random, -8.0, -0.3);
@@ -238,7 +241,7 @@ fn body(kind: u64) -> Option<BodyId> {
     [A, None, B, Some(BodyId(2))][kind as usize]
 }
 
-/// A whole number from `low` to `high`.
+/// An integer from `low` to `high`.
 fn whole(random: &mut Random, low: u32, high: u32) -> u32 {
     low + (random.bits() % u64::from(high - low + 1)) as u32
 }

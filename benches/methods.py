@@ -1,15 +1,16 @@
 #!/usr/bin/env python3
-"""Methods 1 and 3 on many geometries and numbers of ranks, beside one rank; or all three methods side by side. A table in Markdown.
+"""Methods 1 and 3 on many geometries and numbers of ranks, compared with one rank; or all three methods. A table in Markdown.
 
   methods.py target/release/tetmill ../shared/netgen-tutorials            each geometry with each method on 2 … 64 ranks
-  methods.py target/release/tetmill ../shared/netgen-tutorials --table    the thesis' table 6.1: cube, torus, sphere; 16, 32, 64 ranks
-    --ranks 2,4 --methods surface --only cube,tee      less of it
-    --judge ../shared/tools/check_partition.py         writes Elmer parts, and has them read by another checker
+  methods.py target/release/tetmill ../shared/netgen-tutorials --table    table 6.1 of the thesis: cube, torus, sphere; 16, 32, 64 ranks
+    --ranks 2,4 --methods surface --only cube,tee      a selection
+    --judge ../shared/tools/check_partition.py         writes Elmer parts and runs another checker on them
     --mpi 4                                            the same ranks under mpirun (a binary with the feature mpi); checksums must agree
 
-Sizes are those of the preset `coarse` (where that is less than 640 tets, `--coarse 640`) with so many pieces an edge that one rank makes some 64,000 tets or more, in-process ranks.
-"Pieces" are connected by faces, of all parts together: as many as ranks where each part is in one piece. "Volume" is the difference from the mesh on one rank, relative; "tets" the number over that on one rank. A row ends with what is wrong with it: an
-angle below 10° where one rank has more, a 1st percentile more than 2° below that of one rank, more than 30 % more or fewer tets, a fault.
+Sizes are those of the preset `coarse` (where that is less than 640 tets, `--coarse 640`) with enough subdivisions of an edge for about 64,000 tets or more on one rank. Ranks are in-process.
+"Pieces" counts the components of all parts connected by faces: the number of ranks if each part is connected. "Volume" is the relative
+difference from the mesh on one rank, "over serial" the ratio of the numbers of tets. A row ends with its faults: an angle below 10° if one rank has more,
+a 1st percentile more than 2° below that of one rank, more than 30 % more or fewer tets, or an invalid mesh.
 """
 import argparse, json, math, os, pathlib, subprocess, sys, tempfile
 
@@ -20,7 +21,7 @@ STAGES = ["mesh", "cut", "surface", "distribute", "fill", "number", "interfaces"
 
 
 def run(binary, arguments, folder, mpi=None):
-    """The report of a run, or the first line of what it says."""
+    """The report of a run, or the first line of its message."""
     report = folder / "report.json"
     report.unlink(missing_ok=True)
     start = ["mpirun", "-n", str(mpi)] if mpi else []
@@ -32,7 +33,7 @@ def run(binary, arguments, folder, mpi=None):
 
 
 def sizes(binary, geometry, folder, tets):
-    """Arguments by which one rank makes about so many tets, from a coarse mesh that 64 parts can have tets of."""
+    """Arguments for about this number of tets on one rank, with a coarse mesh large enough for 64 parts."""
     for given in ["--preset", "coarse"], ["--coarse", 640]:
         coarse = run(binary, [geometry, *given, "-f", "none"], folder)["mesh"]["tets"]
         if coarse >= 640:
@@ -41,7 +42,7 @@ def sizes(binary, geometry, folder, tets):
 
 
 def faults(mesh, serial):
-    """What is wrong with a mesh beside that of one rank."""
+    """Faults of a mesh compared with that of one rank."""
     angle, p1 = "smallest_dihedral", "first_percentile_dihedral"
     if mesh[angle] < min(10, serial[angle]):
         yield f"angle {mesh[angle]:.1f}"
@@ -52,10 +53,10 @@ def faults(mesh, serial):
 
 
 def judged(given, folder, ranks):
-    """What the other checker says against a written mesh."""
+    """Faults that the other checker finds in a written mesh."""
     parts = folder / "out" / f"partitioning.{ranks}"
-    said = subprocess.run([sys.executable, given.judge, parts], capture_output=True, text=True)
-    return [] if said.returncode == 0 else ["check_partition.py: " + said.stdout.splitlines()[-1]]
+    result = subprocess.run([sys.executable, given.judge, parts], capture_output=True, text=True)
+    return [] if result.returncode == 0 else ["check_partition.py: " + result.stdout.splitlines()[-1]]
 
 
 def matrix(given, geometries, folder):
@@ -88,11 +89,11 @@ def matrix(given, geometries, folder):
                 print(name, f"{mesh['tets']} | {mesh['tets'] / one['tets']:.2f} | {mesh['smallest_dihedral']:.1f} | "
                       f"{one['smallest_dihedral']:.1f} | {mesh['first_percentile_dihedral']:.1f} | {one['first_percentile_dihedral']:.1f} | "
                       f"{mesh['volume'] / one['volume'] - 1:.0e} | {part['pieces']} | {part['imbalance']:.2f} | {report['seconds']:.1f} | {before} | {', '.join(bad)} |", flush=True)
-    print(f"\n{rows} rows, {wrong} with something wrong.")
+    print(f"\n{rows} rows, {wrong} with faults.")
 
 
 def against_mpi(given, arguments, mesh, folder):
-    """What differs under mpirun."""
+    """Differences under mpirun."""
     report = run(given.binary, [*arguments, "--parts", given.mpi], folder, mpi=given.mpi)
     if isinstance(report, str):
         return [f"mpirun: {report}"]
@@ -100,7 +101,7 @@ def against_mpi(given, arguments, mesh, folder):
 
 
 def table(given, geometries, folder):
-    """The three methods side by side."""
+    """Compares the three methods."""
     print("| geometry | ranks | method | tets | " + " | ".join(STAGES) + " | all | tets/s a core | imbalance | min dih | p1 | peak MB |")
     print("|---|--:|---|" + "--:|" * (len(STAGES) + 7))
     cores = os.cpu_count()
@@ -129,8 +130,8 @@ def main():
     options.add_argument("tutorials", type=pathlib.Path)
     options.add_argument("--own", type=pathlib.Path, default=pathlib.Path(__file__).parent.parent / "geometries")
     options.add_argument("--table", action="store_true")
-    options.add_argument("--pieces", type=int, default=8, help="of an edge, in the table")
-    options.add_argument("--tets", type=float, default=64_000, help="on one rank, about; not in the table")
+    options.add_argument("--pieces", type=int, default=8, help="subdivisions of an edge, for --table")
+    options.add_argument("--tets", type=float, default=64_000, help="approximate tets on one rank, without --table")
     options.add_argument("--ranks", type=lambda text: [int(n) for n in text.split(",")])
     options.add_argument("--methods", type=lambda text: text.split(","), default=["decompose", "surface"])
     options.add_argument("--only", type=lambda text: text.split(","))

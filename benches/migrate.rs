@@ -1,8 +1,11 @@
-//! Moving tets between ranks: the thesis' tables 6.2 and 6.3, a tenth of each rank's tets to 10 and to 20 random ranks.
+//! Migration of tets: tables 6.2 and 6.3 of the thesis, a tenth of each rank's tets to 10 and to 20
+//! random ranks.
 //!
-//! `cargo bench --bench migrate [-- CELLS PIECES RANKS]`: a cube of so many cells an edge, six coarse tets each, each edge cut into so many
-//! pieces; ranks run in this process. Times are processor seconds of all threads, so that a busy machine does not matter much; for memory the
-//! process' high-water mark is set back before each move (Linux).
+//! `cargo bench --bench migrate [-- CELLS PIECES RANKS]`: a cube with CELLS cells an edge of six
+//! coarse tets each, PIECES subdivisions of each edge, and in-process ranks.
+//!
+//! Times are processor seconds of all threads, so that other load hardly matters. The peak memory
+//! of the process is reset before each move (Linux).
 #![forbid(unsafe_code)]
 #![allow(missing_docs)]
 
@@ -11,15 +14,15 @@ mod common;
 use common::cpu_seconds;
 use csg::{BodyId, PatchId};
 use std::sync::Mutex;
+use tetmill::Point;
+use tetmill::comm::Rank;
 use tetmill::comm::thread;
-use tetmill::dist::{self, BareMesh};
-use tetmill::geometry::Projector;
+use tetmill::internals::{Projector, distribution, migrate, partition, refine};
 use tetmill::memory::peak_bytes;
-use tetmill::mesh::{BoundaryTriangle, Class, Mesh, Rank, TET_FACES, VertexId};
-use tetmill::migrate::{self, Moved};
-use tetmill::{Point, partition, refine};
+use tetmill::mesh::{BareMesh, BoundaryTriangle, Class, Mesh, TET_FACES, VertexId};
+use tetmill::repartition::Moved;
 
-/// Kuhn cubes, all of the boundary one patch.
+/// A grid of Kuhn cubes whose boundary is one patch.
 fn cube(cells: usize) -> Mesh {
     let side = cells + 1;
     let at = |p: [usize; 3]| VertexId::new((p[2] * side + p[1]) * side + p[0]);
@@ -71,7 +74,7 @@ impl Random {
     }
 }
 
-/// A tenth of the tets in so many clumps of consecutive ones, each to a random other rank.
+/// A tenth of the tets in clumps of consecutive ones, each to a random other rank.
 fn clumps(part: &BareMesh, clumps: usize) -> Vec<Rank> {
     let mut random = Random(u64::from(part.rank));
     let mut to = vec![part.rank; part.tets.len()];
@@ -105,7 +108,7 @@ fn main() {
     let (part, _) = partition::partition(&mesh, ranks, &settings).expect("a partition");
     let parts = thread::run(ranks, |comm| {
         let given = (comm.rank() == 0).then(|| (mesh.clone(), part.clone()));
-        let coarse = dist::distribute(comm, given).expect("a classified mesh");
+        let coarse = distribution::distribute(comm, given).expect("a classified mesh");
         let refined = refine::refine(coarse, &Projector::Flat, pieces, &refine::Settings::default());
         migrate::bare(&refined.expect("refinable")).expect("memory")
     });
@@ -129,7 +132,7 @@ fn main() {
             parts.iter().map(|part| part.lock().unwrap().as_ref().map_or(0, BareMesh::bytes)).sum();
         let destinations: Vec<Vec<Rank>> =
             parts.iter().map(|part| choose(part.lock().unwrap().as_ref().expect("a part"))).collect();
-        // Not every kernel allows it; then the column tells too much.
+        // Not every kernel supports this; the column is then too large.
         let _ = std::fs::write("/proc/self/clear_refs", "5");
         let resident = peak_bytes().unwrap_or(0);
         let (start, wall) = (cpu_seconds(), std::time::Instant::now());
@@ -158,7 +161,7 @@ fn main() {
     let (start, wall) = (cpu_seconds(), std::time::Instant::now());
     let settled = thread::run(ranks, |comm| {
         let mesh = parts[comm.rank() as usize].lock().unwrap().take().expect("a part");
-        let settled = dist::settle(comm, mesh).expect("a mesh");
+        let settled = distribution::settle(comm, mesh).expect("a mesh");
         settled.edges.len() as u64
     });
     let edges: u64 = settled.expect("no rank fails").iter().sum();

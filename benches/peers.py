@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 """Gmsh's HXT and TetGen on the surfaces of benches/volume.rs, with the same columns.
 
-  pip install gmsh tetgen numpy      # in an environment of its own; both programs are GPL or AGPL and only run here
-  peers.py FOLDER [SURFACE...]       # FOLDER holds the PLY files; each case runs in a process of its own
+  pip install gmsh tetgen numpy      # in a separate environment; both programs are GPL or AGPL and only run here
+  peers.py FOLDER [SURFACE...]       # FOLDER has the PLY files; each case runs in its own process
 
-Times are of meshing and optimising alone, without reading. NumPy measures the angles, after the clock has stopped.
+Times are of meshing and optimisation without reading. NumPy measures the angles afterwards.
 """
 import os, pathlib, resource, subprocess, sys, time
 

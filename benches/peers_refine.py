@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 """MFEM's uniform refinement of the cube of `cargo bench --bench refine -- cube 12 8`, with the same columns.
 
-  pip install mfem                   # in an environment of its own
-  peers_refine.py [LEVELS]           # 82 944 tets, eight times as many at each level; three levels take 12 GB
+  pip install mfem                   # in a separate environment
+  peers_refine.py [LEVELS]           # 82 944 tets, times eight at each level; three levels take 12 GB
 
-Times are processor times of the last level alone. The meshes are stored, not snapped, and no tet is checked.
+Times are processor times of the last level only. The meshes are stored, not snapped, and no tet is checked.
 """
 import resource
 import sys

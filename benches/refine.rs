@@ -1,18 +1,43 @@
 //! Refinement, streamed check, checksum and storage: tets per second and peak memory.
 //!
-//! `cargo bench --bench refine [-- CASE COARSE N]`, CASE one of `cube`, `ball`, `cylinder`; COARSE the pieces of a first
-//! refinement that makes the coarse mesh. Threads by `RAYON_NUM_THREADS`. Rates are by processor time. Results are kept in `benches/results`.
+//! `cargo bench --bench refine [-- CASE COARSE N]`: CASE is `cube`, `ball` or `cylinder`, COARSE
+//! the subdivisions of an edge in a first refinement that makes the coarse mesh. Threads are set by
+//! `RAYON_NUM_THREADS`. Rates are by processor time.
 //!
-//! The memory bandwidth is measured first, by the triad a = b + s·c of STREAM (McCalpin 1995) with all threads on arrays far beyond the caches. The
-//! last column is the share of it that a stage takes by wall time, counting only what no stage could do without: coordinates written once, or
-//! read once, and tets written once where they are stored.
+//! The memory bandwidth is measured first by the triad a = b + s·c of STREAM (McCalpin 1995), with
+//! all threads on arrays far larger than the caches. The last column is the share of it that a
+//! stage uses by wall time. Only necessary traffic counts: coordinates written or read once, and
+//! tets written once if they are stored.
 #![forbid(unsafe_code)]
 #![allow(missing_docs)]
 
 use std::time::Instant;
-use tetmill::{Point, check, dist, geometry, memory, mesh, refine};
+use tetmill::internals::refine;
+use tetmill::mesh::{MeshStream, TetBlock};
+use tetmill::{Point, check, memory};
 
-#[path = "../src/refine/fixtures.rs"]
+/// The imports of the fixtures, which are the library's own.
+mod ground {
+    pub mod mesh {
+        pub use tetmill::mesh::*;
+        pub mod stream {
+            pub use tetmill::mesh::{BoundaryBlock, MeshStream, TetBlock};
+        }
+    }
+    pub mod projector {
+        pub use tetmill::internals::Projector;
+    }
+}
+mod parallel {
+    pub mod distribution {
+        pub use tetmill::internals::distribution::{DistMesh, from_serial};
+    }
+    pub mod refine {
+        pub use tetmill::mesh::RefinedMesh;
+    }
+}
+
+#[path = "../src/parallel/refine/fixtures.rs"]
 #[allow(dead_code)]
 mod fixtures;
 
@@ -20,10 +45,9 @@ mod common;
 
 use common::living_cpu_seconds;
 use fixtures::Fixture;
-use mesh::stream::{MeshStream, TetBlock};
 use rayon::prelude::*;
 
-/// Beyond these the stored tets are not measured: 16 bytes each.
+/// Above this number stored tets, of 16 bytes each, are not measured.
 const MOST_STORED: u64 = 200_000_000;
 
 fn main() {
@@ -45,7 +69,7 @@ fn main() {
     }
 }
 
-/// Bytes a second that the triad moves at best.
+/// Best rate of the triad, bytes per second.
 fn triad() -> f64 {
     const LENGTH: usize = 1 << 25;
     const REPEATS: usize = 7;
@@ -133,7 +157,7 @@ fn run(case: &str, coarse: u32, n: u32, bandwidth: f64) {
     );
 }
 
-/// The simplest consumer: what a solver's loop over elements costs.
+/// The simplest consumer: the cost of a solver's loop over elements.
 fn volume(mesh: &dyn MeshStream) -> f64 {
     let points = mesh.points();
     let of_block = |block: &mut TetBlock, index| {
@@ -149,7 +173,8 @@ fn volume6(corners: [[f64; 3]; 4]) -> f64 {
     (q - p).cross(&(r - p)).dot(&(s - p))
 }
 
-/// Wall and processor time when a stage began. On a machine that others use, only the latter means much.
+/// Wall and processor time at the start of a stage. On a shared machine only the latter is
+/// meaningful.
 struct Start {
     wall: Instant,
     cpu: f64,
@@ -161,12 +186,13 @@ impl Start {
     }
 }
 
-/// Lets the peak begin anew, where the system can: it would be that of the triad, or of the case before.
+/// Resets the peak memory if the system supports it, or else it includes the triad and previous
+/// cases.
 fn forget_peak() {
     let _ = std::fs::write("/proc/self/clear_refs", "5");
 }
 
-/// Peak resident memory of the process; 0 where the system does not tell.
+/// Peak resident memory of the process; 0 if the system does not report it.
 fn peak_bytes() -> u64 {
     memory::peak_bytes().unwrap_or(0)
 }

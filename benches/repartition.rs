@@ -1,7 +1,9 @@
-//! How good and how fast partitions of distributed meshes are, method by method, beside METIS on all tets.
+//! Quality and speed of the partition methods for distributed meshes, compared with METIS on all
+//! tets.
 //!
-//! `cargo bench --bench repartition -- DIR RANKS PARTS…`: an Elmer mesh, read on so many in-process ranks. Seconds are processor seconds of
-//! all threads, so that a busy machine does not matter much. METIS on all tets sees the dual graph of the whole mesh, on one rank.
+//! `cargo bench --bench repartition -- DIR RANKS PARTS…` reads an Elmer mesh on RANKS in-process
+//! ranks. Times are processor seconds of all threads, so that other load hardly matters. METIS on
+//! all tets partitions the dual graph of the whole mesh on one rank.
 #![forbid(unsafe_code)]
 #![allow(missing_docs)]
 
@@ -9,15 +11,17 @@ mod common;
 
 use common::cpu_seconds;
 use std::path::{Path, PathBuf};
+use tetmill::comm::Rank;
 use tetmill::comm::{Communicator, thread};
-use tetmill::dist::DistMesh;
-use tetmill::io::elmer;
-use tetmill::mesh::Rank;
-use tetmill::mesh::topology::face_tets;
-use tetmill::partition::weighted::{self, Graph};
-use tetmill::repartition::{self, Geometric, Method, Metrics};
+use tetmill::files::elmer;
+use tetmill::internals::partition::weighted;
+use tetmill::internals::partition::weighted::Graph;
+use tetmill::internals::topology::face_tets;
+use tetmill::mesh::DistMesh;
+use tetmill::repartition;
+use tetmill::repartition::{Geometric, Method, Metrics};
 
-/// METIS' recursive bisection of the dual graph of a mesh that one rank holds.
+/// METIS' recursive bisection of the dual graph of a mesh on one rank.
 fn metis(mesh: &DistMesh, parts: u32) -> Vec<Rank> {
     let sides = face_tets(mesh.faces.len(), &mesh.tet_faces).expect("a mesh");
     let inner = sides.into_iter().filter(|[_, second]| *second != u32::MAX);
@@ -25,7 +29,7 @@ fn metis(mesh: &DistMesh, parts: u32) -> Vec<Rank> {
     weighted::bisect(&graph, parts).expect("METIS is there")
 }
 
-/// Reads a mesh on so many ranks and partitions it: how good that is, and how many processor seconds it takes.
+/// Reads a mesh and partitions it; returns the metrics and the processor seconds.
 fn measured(
     dir: &Path,
     ranks: u32,

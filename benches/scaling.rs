@@ -1,8 +1,11 @@
-//! What each of many ranks does, holds and sends: the tables of `docs/scaling.md`.
+//! Work, memory and messages of each of many ranks: the tables of the guide
+//! (`docs/src/scaling.md`).
 //!
-//! `cargo bench --bench scaling [-- GEOMETRY COARSE N]`: a geometry file, the number of its coarse tets, the pieces of an edge. Ranks run in this
-//! process for what they send, counted by a communicator around theirs; for times, those of the processor, the parts are refined and checked one
-//! after the other on one thread each, as ranks with a core of their own would.
+//! `cargo bench --bench scaling [-- GEOMETRY COARSE N]`: a geometry file, the number of coarse
+//! tets, the subdivisions of an edge.
+//!
+//! Messages are counted by a wrapped communicator of in-process ranks. Processor times are of parts
+//! refined and checked one after the other on one thread each, as if each rank had its own core.
 #![forbid(unsafe_code)]
 #![allow(missing_docs)]
 
@@ -11,17 +14,18 @@ mod common;
 use common::living_cpu_seconds;
 use std::cell::Cell;
 use std::time::Instant;
+use tetmill::check;
+use tetmill::comm::Rank;
 use tetmill::comm::{CommError, Communicator, thread};
-use tetmill::dist::{self, DistMesh};
-use tetmill::mesh::{Mesh, Rank};
-use tetmill::pipeline::input::{self, InputSettings};
-use tetmill::pipeline::{CoarseSettings, Model};
-use tetmill::refine::{self, Census, census};
-use tetmill::{check, partition};
+use tetmill::internals::refine::{Census, census};
+use tetmill::internals::{Model, distribution, mesh_to_target, partition, refine};
+use tetmill::mesh::{DistMesh, Mesh};
+use tetmill::progress::Work;
+use tetmill::run::CoarseSettings;
 
 const RANKS: [u32; 6] = [1, 4, 16, 64, 256, 1024];
 
-/// A communicator that counts what passes through it.
+/// A communicator that counts its calls and bytes.
 struct Counting<'a> {
     inner: &'a dyn Communicator,
     calls: Cell<u64>,
@@ -105,8 +109,9 @@ fn main() {
     let number = |k: usize, other: u32| args.get(k).map_or(other, |text| text.parse().expect("a number"));
     let (coarse, n) = (number(1, 100_000), number(2, 8));
 
-    let model = input::read(&[std::path::PathBuf::from(geometry)], &InputSettings::default(), &mut |_| ())
-        .expect("a geometry");
+    let text = std::fs::read(geometry).expect("a file");
+    let parsed = tetmill::csg::language::parse_geometry_bytes(&text, geometry).expect("a geometry");
+    let model = Model::from_csg(parsed.geometry).expect("features");
     let start = Instant::now();
     let mesh = coarse_mesh(&model, coarse.into());
     let tets = mesh.tets.len();
@@ -140,12 +145,11 @@ fn main() {
 fn coarse_mesh(model: &Model, tets: u64) -> Mesh {
     let mut settings = CoarseSettings::default();
     let fits = |made| made >= tets && made <= tets + tets / 2;
-    let (made, _) =
-        tetmill::pipeline::target::mesh_to_target(model, &mut settings, tets, &fits).expect("a mesh");
+    let (made, _) = mesh_to_target(model, &mut settings, tets, &fits, Work::unwatched()).expect("a mesh");
     made.mesh
 }
 
-/// Distributes, refines and checks; prints what that took.
+/// Distributes, refines and checks; prints times and messages.
 fn row(model: &Model, mesh: &Mesh, ranks: u32, n: u32) -> Vec<DistMesh> {
     let start = Instant::now();
     let (rank_of, metrics) =
@@ -157,7 +161,7 @@ fn row(model: &Model, mesh: &Mesh, ranks: u32, n: u32) -> Vec<DistMesh> {
     let sent = thread::run(ranks, |comm| {
         let counting = Counting::new(comm);
         let given = (comm.rank() == 0).then(|| (mesh.clone(), rank_of.clone()));
-        let part = dist::distribute(&counting, given).expect("a classified mesh");
+        let part = distribution::distribute(&counting, given).expect("a classified mesh");
         (part, counting.taken())
     });
     let distribute_seconds = start.elapsed().as_secs_f64();
@@ -178,7 +182,7 @@ fn row(model: &Model, mesh: &Mesh, ranks: u32, n: u32) -> Vec<DistMesh> {
             assert_eq!(report.faults, 0);
         });
     }
-    // What the check of all ranks sends, with two pieces an edge: it does not grow with them.
+    // Messages of the check, with two subdivisions an edge; they do not grow with the subdivisions.
     let messages = thread::run(ranks, |comm| {
         let counting = Counting::new(comm);
         let part = parts[comm.rank() as usize].clone();
@@ -211,7 +215,7 @@ fn row(model: &Model, mesh: &Mesh, ranks: u32, n: u32) -> Vec<DistMesh> {
     parts
 }
 
-/// What the parts would hold and share with `n` pieces an edge, told without refining them.
+/// Size estimate of the parts with `n` subdivisions an edge, without refining them.
 fn census_row(ranks: u32, parts: &[DistMesh], n: u32) {
     let all: Vec<Census> = parts.iter().map(|part| census(part, n)).collect();
     let mean = |of: &dyn Fn(&Census) -> f64| all.iter().map(of).sum::<f64>() / all.len() as f64;

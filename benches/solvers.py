@@ -3,9 +3,9 @@
 
   benches/solvers.py TETMILL [--elmer ELMERSOLVER_MPI] [--levels 3]
 
-Each solver reads the boundary by its name or number from the file; a file without it would give another solution. Needs numpy and scipy,
-and what there is of: ngsolve, scikit-fem with meshio, PyMFEM (package mfem), and ElmerSolver_mpi (with ELMER_HOME set as it needs) under mpirun.
-Prints a table: one line for each solver, format and number of parts, with the errors from level to level and their last ratio (4 is right).
+Each solver reads the boundary by its name or number from the file; a wrong boundary would give another solution. Needs numpy and scipy.
+Runs those available of ngsolve, scikit-fem with meshio, PyMFEM (package mfem), and ElmerSolver_mpi (with its ELMER_HOME) under mpirun.
+Prints a table: one line for each solver, format and number of parts, with the errors of the levels and their last ratio (expected: 4).
 """
 import argparse
 import glob
@@ -182,7 +182,7 @@ def elmer(solver, tetmill, folder, level, parts, *more):
     for name, text in ("case.sif", SIF), ("ELMERSOLVER_STARTINFO", "case.sif\n1\n"):
         with open(os.path.join(run, name), "w") as file:
             file.write(text)
-    # On one rank ElmerSolver ends without MPI_Finalize, which mpirun takes for a failure: the files tell.
+    # On one rank ElmerSolver ends without MPI_Finalize, so mpirun reports a failure; the files show whether it worked.
     ran = subprocess.run(["mpirun", "-np", str(parts), solver], cwd=run, capture_output=True, text=True)
     files = sorted(glob.glob(run + "/res*.vtu") + glob.glob(out + "/res*.vtu"))
     if len(files) != parts:

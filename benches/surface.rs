@@ -1,18 +1,19 @@
-//! Geometries into surface meshes: seconds of each stage, triangles a second, angles.
+//! Surface meshing: seconds of each stage, triangles per second, angles.
 //!
 //! ```sh
 //! cargo bench --bench surface                          # own geometries and NETGEN's tutorials, preset moderate, one thread
-//! cargo bench --bench surface -- shaft torus           # those whose names contain one of the words
+//! cargo bench --bench surface -- shaft torus           # only names that contain one of the words
 //! cargo bench --bench surface -- shaft maxh=0.5        # with a bound on the size
 //! ```
 //!
-//! The tutorials are those in `$TETMILL_SHARED/netgen-tutorials`, or in `../shared` beside the project.
+//! The tutorials are in `$TETMILL_SHARED/netgen-tutorials`, or in `../shared` beside the
+//! repository.
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
-use tetmill::pipeline::CsgModel;
-use tetmill::size::{GeometricSize, SizeSettings};
-use tetmill::surface::{self, curves::mesh_curves};
+use tetmill::internals::surface::curves::mesh_curves;
+use tetmill::internals::{CsgModel, GeometricSize, surface};
+use tetmill::size::SizeSettings;
 
 fn main() {
     let words: Vec<String> = std::env::args().skip(1).filter(|w| w != "--bench").collect();
@@ -52,7 +53,7 @@ fn files() -> Vec<PathBuf> {
     files
 }
 
-/// One geometry, from text to triangles; without the corrections that the mesher of solids makes.
+/// Meshes the surface of one geometry, without the size corrections of the volume mesher.
 fn row(file: &Path, maxh: Option<f64>) -> Result<String, String> {
     let seconds = |began: Instant| began.elapsed().as_secs_f64();
     let text = std::fs::read_to_string(file).map_err(|e| e.to_string())?;

@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
-"""NETGEN's tutorial geometries at all presets, beside what NETGEN makes of them: a table in Markdown.
+"""NETGEN's tutorial geometries at all presets, compared with NETGEN's meshes: a table in Markdown.
 
   tutorials.py target/release/tetmill ../shared/netgen-tutorials [--spec ../shared/spec/netgen-meshing.md] [--only NAME,NAME]
-  tutorials.py … --netgen ENVIRONMENT/bin/python --presets moderate        # pip install netgen-mesher in an environment of its own
+  tutorials.py … --netgen ENVIRONMENT/bin/python --presets moderate        # pip install netgen-mesher in a separate environment
 
-The folder holds the .geo files and reference.json (NETGEN's counts, angles and seconds, taken on another day on such a machine); the
+The folder has the .geo files and reference.json (NETGEN's counts, angles and seconds, measured on another day on a similar machine); the
 specification's section 11 has NETGEN's total badness at three presets. Each geometry is meshed by one thread, from the file to the
-checked mesh in a file; a run is ended after 600 seconds. Manyholes and shell are left out at the two finest presets.
-With --netgen its seconds are taken in the same run, right after ours: from the file to the mesh, without start and output.
+checked mesh in a file, for at most 600 seconds. Manyholes and shell are omitted at the two finest presets.
+With --netgen, NETGEN's seconds are measured in the same run, from the file to the mesh, without start and output.
 """
 import argparse, json, pathlib, re, subprocess, tempfile, time
 
@@ -29,7 +29,7 @@ def badness_of_netgen(spec):
 
 
 def measure(binary, geometry, preset, folder):
-    """Our five columns, or the first line of the error."""
+    """The five columns of tetmill, or the first line of the error."""
     mesh = folder / "mesh.vol"
     began = time.perf_counter()
     try:
@@ -40,8 +40,8 @@ def measure(binary, geometry, preset, folder):
     seconds = time.perf_counter() - began
     if made.returncode:
         return made.stderr.splitlines()[0]
-    said = subprocess.run([binary, "quality", "--json", mesh], capture_output=True, text=True, check=True).stdout
-    quality = json.loads(said)["meshes"][0]
+    output = subprocess.run([binary, "quality", "--json", mesh], capture_output=True, text=True, check=True).stdout
+    quality = json.loads(output)["meshes"][0]
     assert quality["inverted"] == 0, geometry
     keys = ["tets", "smallest_dihedral", "first_percentile_dihedral", "mean_badness"]
     return [quality[key] for key in keys] + [seconds]
@@ -58,7 +58,7 @@ print("seconds", time.perf_counter() - began)
 
 
 def seconds_of_netgen(python, geometry, preset):
-    """None where it fails or does not end."""
+    """None if it fails or exceeds the time limit."""
     try:
         made = subprocess.run([python, "-c", NETGEN, geometry, preset.replace("-", "_")],
                               capture_output=True, text=True, timeout=600)
@@ -81,7 +81,7 @@ def main():
     options.add_argument("--spec", type=pathlib.Path)
     options.add_argument("--only", default="")
     options.add_argument("--presets", default=",".join(PRESETS))
-    options.add_argument("--netgen", help="a Python that has NETGEN")
+    options.add_argument("--netgen", help="a Python with NETGEN")
     given = options.parse_args()
     reference = json.loads((given.tutorials / "reference.json").read_text())
     badness = badness_of_netgen(given.spec)
@@ -112,7 +112,7 @@ def main():
                     theirs[preset] += other[-1]
                 cells = [cell for pair in zip(shown(found), shown(other)) for cell in pair]
                 print(f"| {name} | {preset} | " + " | ".join(cells) + " |", flush=True)
-    print("\nSeconds in sum where both have them: " +
+    print("\nTotal seconds where both have a time: " +
           "; ".join(f"{preset} {ours[preset]:.1f}, NETGEN {theirs[preset]:.1f}" for preset in given.presets.split(",")) + ".")
 
 

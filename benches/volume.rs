@@ -1,11 +1,12 @@
-//! Surfaces into improved meshes: seconds, angles and memory.
+//! Volume meshing and improvement: seconds, angles and memory.
 //!
-//! The surfaces are the PLY files in `$TETMILL_SHARED/surfaces`, or `../shared/surfaces` beside the project; without them this
-//! says so and ends. Each case runs in a process of its own, so that the peak of its memory is its own.
+//! The surfaces are PLY files in `$TETMILL_SHARED/surfaces`, or `../shared/surfaces` beside the
+//! repository; without them the benchmark is skipped with a message. Each case runs in its own
+//! process, which gives its peak memory.
 //!
 //! ```sh
 //! cargo bench --bench volume                        # all cases
-//! cargo bench --bench volume -- cube 1M             # those whose row begins with one of the words
+//! cargo bench --bench volume -- cube 1M             # only rows that contain one of the words
 //! cargo bench --bench volume -- one cube_100k size=1.3 threads=2 target=0.7 passes=3
 //! ```
 
@@ -17,18 +18,17 @@ use std::path::PathBuf;
 use std::process::Command;
 use std::time::Instant;
 use tetmill::Point;
-use tetmill::improve::{self, improve};
-use tetmill::kernel::quality::QualitySummary;
-use tetmill::mesh::{BoundaryTriangle, Class, Mesh, VertexId};
-use tetmill::size::UniformSize;
-use tetmill::volume::{self, ClosedSurface, VolumeMesh};
+use tetmill::internals::improve::improve;
+use tetmill::internals::volume::{ClosedSurface, VolumeMesh};
+use tetmill::internals::{UniformSize, improve, volume};
+use tetmill::mesh::{BoundaryTriangle, Class, Mesh, QualitySummary, VertexId};
 
-/// One run: a surface, its size in units of the mean edge, and what the improver is told.
+/// One run: a surface, its size in units of the mean edge, and the settings of the improvement.
 struct Case {
     surface: String,
     size: f64,
     threads: usize,
-    /// What the improver is told; no improvement without.
+    /// Settings of the improvement; `None` for no improvement.
     settings: Option<improve::Settings>,
 }
 
@@ -51,12 +51,12 @@ fn main() {
     }
 }
 
-/// The cases, each as the words of its own run.
+/// The cases, each as the arguments of its run.
 fn all_cases() -> Vec<String> {
     let mut cases = Vec::new();
     let mut add = |case: String| cases.push(case);
     for surface in ["cube_100k", "shaft_100k", "torus_100k", "cube_1M", "shaft_1M", "torus_1M"] {
-        // The first size comes near the numbers of tets that others make of the surface.
+        // The first size gives about as many tets as other programs make.
         for case in ["size=1.3 threads=1", "size=1.3 threads=2", "size=1 threads=1"] {
             add(format!("{surface} {case}"));
         }
@@ -72,7 +72,7 @@ fn all_cases() -> Vec<String> {
     cases
 }
 
-/// From no improvement to much: where angles and seconds balance is seen from these.
+/// From no improvement to much: the trade-off of angles and seconds.
 const BUDGETS: [&str; 8] = [
     "none",
     "target=0.4 passes=1",
@@ -107,7 +107,7 @@ fn header() -> String {
     )
 }
 
-/// Runs a case in a process of its own, which prints its row.
+/// Runs a case in its own process, which prints its row.
 fn run_apart(line: &str) {
     let program = std::env::current_exe().expect("this program has a path");
     let threads = line.split(' ').find_map(|w| w.strip_prefix("threads=")).unwrap_or("1");
@@ -192,7 +192,7 @@ impl Case {
     }
 }
 
-/// One body, its skin one patch.
+/// One body whose surface is one patch.
 fn classified(filled: VolumeMesh, triangles: &[[u32; 3]]) -> Mesh {
     let mut mesh = Mesh {
         classes: vec![Class::Body(BodyId(0)); filled.points.len()],
@@ -222,7 +222,7 @@ fn mean_edge(points: &[Point], triangles: &[[u32; 3]]) -> f64 {
     sum / (3 * triangles.len()) as f64
 }
 
-/// A binary little-endian PLY file of f64 coordinates and triangles of 32-bit indices, as the surfaces here are.
+/// Reads a binary little-endian PLY file with f64 coordinates and triangles of 32-bit indices.
 fn read_ply(path: &std::path::Path) -> (Vec<Point>, Vec<[u32; 3]>) {
     const END: &[u8] = b"end_header\n";
     let bytes = std::fs::read(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
@@ -243,7 +243,7 @@ fn read_ply(path: &std::path::Path) -> (Vec<Point>, Vec<[u32; 3]>) {
     )
 }
 
-/// The most memory that this process had so far; 0 where the system does not tell.
+/// Peak memory of this process so far; 0 if the system does not report it.
 fn peak_megabytes() -> f64 {
     tetmill::memory::peak_bytes().unwrap_or(0) as f64 / 1e6
 }

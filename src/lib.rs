@@ -1,34 +1,210 @@
-//! tetmill: from solid geometry to very large, partitioned tetrahedral meshes, in parallel.
+//! From solid geometry to very large, partitioned tetrahedral meshes, in parallel.
+//!
+//! A **geometry** ([`Geometry`]) is read from a file (`.geo`, STL, meshes of other programs), from text, or from arrays. It
+//! consists of **bodies**, which are meshed, the **patches** around and between them, the **curves** where patches meet,
+//! and **corners**. A [`Mesher`] makes the mesh, on one rank or on many:
+//!
+//! ```
+//! use tetmill::comm::{Communicator, thread};
+//! use tetmill::{Error, Geometry, Mesher};
+//!
+//! let part = Geometry::from_text(
+//!     "algebraic3d
+//!      solid base = plane (0, 0, 0; 0, 0, -1) -bcname=fixed;
+//!      solid dome = sphere (0, 0, 0; 1) and base;
+//!      tlo dome;",
+//! )?;
+//!
+//! // Three ranks, here threads of this process. Each gets its part of the same mesh.
+//! let owned = thread::run(3, |comm| -> Result<u64, Error> {
+//!     let mesh = Mesher::new().max_size(0.4).levels(2).generate_on(comm, Some(&part))?;
+//!
+//!     // The part as flat arrays: points, tets, bodies, boundary triangles and their patches.
+//!     let arrays = mesh.arrays();
+//!     let on_base = |index: &usize| {
+//!         let patch = arrays.triangle_patches[*index];
+//!         mesh.names.patches[patch.index()].name() == Some("fixed")
+//!     };
+//!     for triangle in (0..arrays.triangles.len()).filter(on_base) {
+//!         assert!(arrays.triangles[triangle].iter().all(|&v| arrays.points[v as usize][2].abs() < 1e-9));
+//!     }
+//!
+//!     // Vertices on interfaces are on several ranks, and owned by one of them.
+//!     let sharing = mesh.sharing();
+//!     Ok((0..arrays.points.len() as u32).filter(|&vertex| sharing.is_owned(vertex)).count() as u64)
+//! })?;
+//! let owned: u64 = owned.into_iter().collect::<Result<Vec<u64>, Error>>()?.iter().sum();
+//! assert_eq!(owned, Mesher::new().max_size(0.4).levels(2).generate(&part)?.stream().totals().vertices);
+//! # Ok::<(), Error>(())
+//! ```
+//!
+//! # How a mesh is made
+//!
+//! Rank 0 makes a **coarse mesh** and partitions it. Each rank then refines its part: a coarse edge is cut into n
+//! **pieces**, a coarse tet into n³ children, and new vertices on the boundary are moved onto the geometry. Fine ids are
+//! arithmetic on coarse ids, so refinement needs no message, and the mesh is the same, bit by bit, for any number of ranks
+//! and threads. Other [methods](Method) mesh the inside of the parts by the size field instead.
+//!
+//! A refined mesh is not stored. A part is a **stream** ([`mesh::MeshStream`]) that computes blocks of tets when they are
+//! read; [`Generated::arrays`] copies all of it, [`mesh::blocks`] reads it in pieces of bounded size, and the writers of
+//! [`files`] read it directly. So meshes of 10⁹ tets fit a laptop.
+//!
+//! # Where to go
+//!
+//! | you want | look at |
+//! |---|---|
+//! | sizes, refinement, methods | [`Mesher`], [`size`] |
+//! | elements assembled across ranks | [`mesh::Sharing`], [`Generated::with_edges_and_faces`] |
+//! | one layer of tets of other parts | [`Generated::ghosts`] |
+//! | multigrid | [`Generated::into_hierarchy`], [`Hierarchy`] |
+//! | tets moved to other ranks | [`repartition`] |
+//! | files | [`files`] |
+//! | MPI, in a program of your own | [`comm::mpi`] |
+//! | a progress bar, a cancel button | [`progress`] |
+//! | to match on what went wrong | [`error`], [`error::HasKind`] |
+//!
+//! Whole programs are in the folder `examples`: Poisson's equation across ranks, a multigrid cycle, sizes by a function.
+//!
+//! # What is guaranteed
+//!
+//! Every tet is positively oriented, by exact arithmetic, also after refinement; each boundary vertex is on its patch,
+//! curve or corner, within a tolerance that the report states; parts fit together. A mesh that does not pass the
+//! check is not returned but an error. *Not* guaranteed are lower bounds on angles: thin walls and sharp
+//! edges of the geometry leave sharp tets. The number of tets is met only as far as [`Mesher::tets`] says.
 #![forbid(unsafe_code)]
 
-pub mod across;
-pub mod check;
-pub mod comm;
-pub mod decompose;
-pub mod dist;
-pub mod error;
-pub mod facets;
-pub mod geometry;
-pub mod halo;
-pub mod improve;
-pub mod inspect;
-pub mod io;
-pub mod kernel;
-pub mod memory;
-pub mod mesh;
-pub mod migrate;
-pub mod partition;
-pub mod periodic;
-pub mod picture;
-pub mod pipeline;
-pub mod progress;
-pub mod quality;
-pub mod refine;
-pub mod repartition;
-pub mod report;
-pub mod size;
-pub mod skin;
-pub mod surface;
-pub mod volume;
+pub mod files;
+mod ground;
+mod mesher;
+mod parallel;
+mod pipeline;
 
-pub use csg::{Point, Vector};
+pub use csg::{self, Point, Vector};
+pub use files::arrays::{MeshArrays, SurfaceArrays};
+pub use pipeline::error::Error;
+pub use pipeline::{Generated, Geometry, Hierarchy, InputSettings, Mesher, Method};
+
+/// Ranks: threads of this process, or processes of an MPI job.
+pub mod comm {
+    pub use crate::ground::comm::{CommError, Communicator, Rank, grouped, mpi, thread};
+}
+
+/// Meshes: ids and entities, a part as arrays, as blocks or as a stream, shared vertices and ghosts.
+pub mod mesh {
+    pub use crate::ground::mesh::ghosts::{By, GhostTet, GhostVertex, Ghosts, RankLists};
+    pub use crate::ground::mesh::periodic::Link;
+    pub use crate::ground::mesh::stream::{
+        BoundaryBlock, Counts, LocalBlock, MeshStream, NO_TET, SingularTags, TetBlock, VertexBlock,
+    };
+    pub use crate::ground::mesh::{
+        Arrays, BoundaryTriangle, Class, EdgeId, FaceId, GlobalId, Label, Mesh, Names, Neighbour,
+        QualitySummary, Segment, Sharing, TET_EDGES, TET_FACES, TetId, VertexId, Watched, blocks,
+    };
+    pub use crate::parallel::distribution::{BareMesh, BoundaryFace, DistMesh, Shared, Totals};
+    pub use crate::parallel::halo::{WithHalo, halo};
+    pub use crate::parallel::migrate::BareStream;
+    pub use crate::parallel::refine::RefinedMesh;
+    pub use csg::{BodyId, CornerId, CurveId, PatchId};
+}
+
+/// How sizes are chosen, and how much is done for shapes.
+pub mod size {
+    pub use crate::ground::size::{Closeness, Preset, SizeFunction, SizeSettings, Source};
+    pub use crate::mesher::improve::Effort;
+}
+
+/// The memory and the processor time of this process and machine.
+pub mod memory {
+    pub use crate::ground::memory::{available_bytes, cpu_seconds, machine, peak_bytes, sized};
+}
+
+/// How far a run is, and how to cancel it.
+pub mod progress {
+    pub use crate::ground::progress::{Cancelled, Observer, Progress, Silent, Stage, StageTime, Work};
+}
+
+/// What can go wrong, by stage.
+pub mod error {
+    pub use crate::files::WriteError;
+    pub use crate::files::arrays::ArrayError;
+    pub use crate::files::elmer::LoadError;
+    pub use crate::files::input::ReadError;
+    pub use crate::ground::comm::CommError;
+    pub use crate::ground::comm::launch::LaunchError;
+    pub use crate::ground::error::{ErrorKind, HasKind};
+    pub use crate::ground::mesh::periodic::MapError;
+    pub use crate::ground::progress::Cancelled;
+    pub use crate::mesher::facets::FacetError;
+    pub use crate::mesher::surface::SurfaceError;
+    pub use crate::mesher::surface::curves::CurveError;
+    pub use crate::mesher::volume::{SurfaceFaults, VolumeError};
+    pub use crate::parallel::decompose::{CutError, LooseEdge, TooManyParts};
+    pub use crate::parallel::distribution::{DistError, SettleError};
+    pub use crate::parallel::halo::HaloError;
+    pub use crate::parallel::migrate::MigrateError;
+    pub use crate::parallel::partition::PartitionError;
+    pub use crate::parallel::refine::RefineError;
+    pub use crate::parallel::refine::parents::LevelError;
+    pub use crate::parallel::repartition::RepartitionError;
+    pub use crate::parallel::skin::FillError;
+    pub use crate::pipeline::CoarseError;
+    pub use crate::pipeline::error::{Error, InputError, InvalidMesh, RequestError, RoomError};
+    pub use csg::FeatureError;
+    pub use csg::language::Diagnostics;
+}
+
+/// The settings of [`Mesher`] and what was made, in full.
+pub mod run {
+    pub use crate::parallel::decompose::{Candidates, CutPlane, Settings as PlanSettings};
+    pub use crate::parallel::interfaces::Report as InterfaceReport;
+    pub use crate::parallel::partition::Metrics;
+    pub use crate::parallel::refine::PeriodicCheck;
+    pub use crate::parallel::refine::lattice::MAX_PIECES;
+    pub use crate::pipeline::decompose::{Planned, planned};
+    pub use crate::pipeline::inspect::Inspection;
+    pub use crate::pipeline::part::{Balance, Evened, Part, balance};
+    pub use crate::pipeline::target::Outcome;
+    pub use crate::pipeline::{
+        CoarseReport, CoarseResult, CoarseSettings, CutSettings, Disk, Entities, GenerateSettings, Level,
+        Refused, Wanted, generate,
+    };
+}
+
+/// Tets to other ranks: where they should go, and moving them.
+pub mod repartition {
+    pub use crate::parallel::migrate::{Moved, Settings as MoveSettings, bare, migrate, migrate_bare};
+    pub use crate::parallel::repartition::metrics::{Metrics, measure};
+    pub use crate::parallel::repartition::{Geometric, Method, repartition, repartition_weighted};
+    pub use crate::pipeline::{Repartitioned, repartition as repartition_files};
+}
+
+/// Checks of meshes, as streams.
+pub mod check {
+    pub use crate::parallel::check::{
+        Checksum, Extreme, Fault, OffSurface, PartReport, Settings, ShapeReport, check, check_part, checksum,
+        checksum_of_all,
+    };
+}
+
+/// The shapes of the tets of meshes, in the measures of several programs.
+pub mod quality {
+    pub use crate::pipeline::quality::{Quality, histograms, measure, table};
+}
+
+/// Stages on their own, for this project's benches and tests: not for others, and without any promise.
+#[doc(hidden)]
+pub mod internals {
+    pub use crate::files::plain::PlainPart;
+    pub use crate::ground::comm::conformance;
+    pub use crate::ground::kernel::predicates::{Sign, orient3d};
+    pub use crate::ground::kernel::random::Random;
+    pub use crate::ground::kernel::simplex;
+    pub use crate::ground::mesh::topology;
+    pub use crate::ground::projector::Projector;
+    pub use crate::ground::size::{GeometricSize, UniformSize};
+    pub use crate::mesher::model::CsgModel;
+    pub use crate::mesher::{improve, surface, volume};
+    pub use crate::parallel::{distribution, migrate, partition, refine, repartition};
+    pub use crate::pipeline::model::Model;
+    pub use crate::pipeline::target::mesh_to_target;
+}

@@ -1,5 +1,8 @@
-//! What other programs find in files of ours, and we in theirs: names, numbers of elements and areas by name. The programs are Gmsh, NGSolve
-//! and meshio, as modules of Python; without one its test is skipped, aloud.
+//! Exchange of meshes with other programs: names, numbers of elements, and areas by name, in both
+//! directions.
+//!
+//! The programs are the Python modules of Gmsh, NGSolve and meshio. A test is skipped with a
+//! message if its module is missing.
 
 use csg::{BodyId, PatchId};
 use std::collections::BTreeMap;
@@ -7,15 +10,14 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use tetmill::Point;
 use tetmill::comm::{Communicator, thread};
-use tetmill::io::plain::PlainPart;
-use tetmill::io::{serial, volume};
-use tetmill::kernel::simplex;
+use tetmill::files::{serial, volume};
+use tetmill::internals::{PlainPart, simplex};
 use tetmill::mesh::{BoundaryTriangle, Class, Label, Mesh, Names, TET_FACES, VertexId};
 
-/// By name the number of elements and their area or volume.
+/// Number of elements and total area or volume, by name.
 type Sizes = BTreeMap<String, (u64, f64)>;
 
-/// What a program finds: boundaries and bodies.
+/// What a program reads from a mesh: boundaries and bodies.
 type Found = [Sizes; 2];
 
 /// A Python program that reads or writes meshes.
@@ -26,13 +28,13 @@ const MESHIO: Client = Client("meshio_groups.py");
 const NGSOLVE: Client = Client("ngsolve_regions.py");
 
 impl Client {
-    /// Runs the script on a file or folder; its output, unless the module is missing.
+    /// Runs the script on a file or folder. Returns its output, or `None` if the module is missing.
     fn run(&self, path: &Path) -> Option<String> {
         let script = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/clients").join(self.0);
         let output = Command::new("python3").arg(script).arg(path).output().unwrap();
-        let said = String::from_utf8_lossy(&output.stdout).into_owned();
+        let printed = String::from_utf8_lossy(&output.stdout).into_owned();
         let complaint = String::from_utf8_lossy(&output.stderr);
-        // The module, or a library of the system that it needs, is not there.
+        // The module, or a system library that it needs, is missing.
         if ["ModuleNotFoundError", "ImportError", "OSError: lib"]
             .iter()
             .any(|error| complaint.contains(error))
@@ -40,14 +42,14 @@ impl Client {
             eprintln!("SKIPPED: {}", complaint.lines().last().unwrap_or_default());
             return None;
         }
-        assert!(output.status.success(), "{}: {said}{complaint}", self.0);
-        Some(said)
+        assert!(output.status.success(), "{}: {printed}{complaint}", self.0);
+        Some(printed)
     }
 
-    /// What the program finds in a mesh.
+    /// Reads a mesh with the program.
     fn find(&self, path: &Path) -> Option<Found> {
-        let said = self.run(path)?;
-        let last = said.lines().last().unwrap();
+        let printed = self.run(path)?;
+        let last = printed.lines().last().unwrap();
         let found: BTreeMap<String, Sizes> = serde_json::from_str(last).unwrap();
         Some(["boundaries", "bodies"].map(|kind| found[kind].clone()))
     }
@@ -56,7 +58,8 @@ impl Client {
 /// Cells of the box along each axis: 288 squares on its faces and in the middle.
 const CELLS: [u32; 3] = [8, 8, 4];
 
-/// A box of cubes of six tets each, two bodies side by side or one; each square of a cell on the boundary is a patch of its own.
+/// A box of cubes of six tets each, as one body or two adjacent ones. Each boundary square of a
+/// cell is its own patch.
 fn squares(bodies: u32) -> Mesh {
     const ORDERS: [[usize; 3]; 6] = [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 2, 1], [2, 1, 0], [1, 0, 2]];
     let [nx, ny, nz] = CELLS.map(|n| n + 1);
@@ -65,7 +68,7 @@ fn squares(bodies: u32) -> Mesh {
     for k in 0..nx * ny * nz {
         let place = [k % nx, k / nx % ny, k / nx / ny];
         mesh.points.push(Point::from(place.map(f64::from)));
-        // Patches meet in all of their vertices.
+        // Each vertex belongs to several patches.
         mesh.classes.push(Class::Corner(csg::CornerId(k)));
     }
     let body_of = |cell: [u32; 3]| u32::from(bodies == 2 && cell[0] >= CELLS[0] / 2);
@@ -105,7 +108,7 @@ fn patch_count(mesh: &Mesh) -> u32 {
     mesh.triangles.iter().map(|t| t.patch.0 + 1).max().unwrap()
 }
 
-/// What a mesh has under the keys of its labels.
+/// The expected contents of a mesh, by the keys of its labels.
 fn sizes(mesh: &Mesh, names: &Names, keys: impl Fn(&Label) -> Vec<String>) -> Found {
     let mut found = Found::default();
     let mut add = |kind: usize, label: &Label, size: f64| {
@@ -143,10 +146,10 @@ fn several(number: u32, names: &[&str]) -> Label {
     Label { number, names: names.iter().map(ToString::to_string).collect() }
 }
 
-/// Labels of patches by their index, as real files have them.
+/// Labels of patches by their index, as in real files.
 type Labels = fn(u32) -> Label;
 
-/// Named, unnamed, repeated and sparse numbers; several numbers of one name.
+/// Named, unnamed, repeated and sparse numbers; several numbers with one name.
 fn mixed(patch: u32) -> Label {
     match patch % 6 {
         0 => Label::new(7, "skin"),
@@ -167,7 +170,7 @@ fn hundreds(patch: u32) -> Label {
     }
 }
 
-/// Numbers up to two thousand million.
+/// Numbers up to 2·10⁹.
 fn sparse(patch: u32) -> Label {
     let number = 1 + patch % 20 * 100_000_000;
     if patch % 20 == 3 { Label::unnamed(number) } else { Label::new(number, format!("far_{}", patch % 20)) }
@@ -186,7 +189,8 @@ fn groups(patch: u32) -> Label {
 const CASES: [(&str, Labels); 4] =
     [("mixed", mixed), ("hundreds", hundreds), ("sparse", sparse), ("groups", groups)];
 
-/// Each case with one and two bodies, in one part and in seven, written with this ending.
+/// Calls `check` for each case with one and two bodies, in one and in seven parts, written with
+/// this extension.
 fn for_each_case(ending: &str, mut check: impl FnMut(&Path, &Mesh, &Names, &str)) {
     let dir = tempfile::tempdir().unwrap();
     for bodies in [1, 2] {
@@ -214,7 +218,7 @@ fn for_each_case(ending: &str, mut check: impl FnMut(&Path, &Mesh, &Names, &str)
     }
 }
 
-/// Under Gmsh's names a label is in a group for each of its names, else in one of its number.
+/// In Gmsh a label is in a group for each of its names, or else in one of its number.
 fn by_group(label: &Label) -> Vec<String> {
     if label.names.is_empty() { vec![format!("#{}", label.number)] } else { label.names.clone() }
 }

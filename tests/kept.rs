@@ -1,19 +1,20 @@
-//! Surfaces as they come from geometries, from partitions and from needle-loving exporters: all are filled, and kept exactly.
+//! Surfaces of geometries, of parts, and with needle triangles: all are filled, and kept exactly.
 
-use crate::common::own;
+use crate::folders::own;
 use crate::samples::{Soup, check_fills, graded_ball, needle_cone, needle_tube, skin_of};
 use csg::BodyId;
 use csg::language::parse_geometry;
 use std::time::Instant;
-use tetmill::dist::from_serial;
-use tetmill::mesh::Mesh;
-use tetmill::mesh::stream::{MeshStream, TetBlock};
-use tetmill::partition::partition;
-use tetmill::pipeline::Model;
-use tetmill::refine::{self, refine};
-use tetmill::size::{Preset, SizeSettings, UniformSize};
-use tetmill::volume::{self, ClosedSurface, Settings};
-use tetmill::{Point, partition as parts};
+use tetmill::Point;
+use tetmill::internals::Model;
+use tetmill::internals::distribution::from_serial;
+use tetmill::internals::partition::partition;
+use tetmill::internals::refine::refine;
+use tetmill::internals::volume::{ClosedSurface, Settings};
+use tetmill::internals::{UniformSize, partition as parts, refine, volume};
+use tetmill::mesh::{Mesh, MeshStream, TetBlock};
+use tetmill::progress::Work;
+use tetmill::size::{Preset, SizeSettings};
 
 fn model(name: &str) -> Model {
     let path = own(name);
@@ -22,11 +23,12 @@ fn model(name: &str) -> Model {
 }
 
 fn coarse(model: &Model, preset: Preset) -> Mesh {
-    model.coarse_mesh(&mut SizeSettings::from(preset).into()).unwrap().mesh
+    model.coarse_mesh(&mut SizeSettings::from(preset).into(), Work::unwatched()).unwrap().mesh
 }
 
-/// Meshes a surface with sizes from its triangles and checks what comes of it. Gives a row of a table: triangles, points that the boundary
-/// needed, tets, and seconds.
+/// Meshes a surface with sizes from its triangles and checks the result.
+///
+/// Returns a row of a table: triangles, Steiner points, tets, seconds.
 fn filled(what: &str, surface: &ClosedSurface) -> String {
     let start = Instant::now();
     let (mesh, report) = volume::mesh(surface, &UniformSize(f64::INFINITY), &Settings::default())
@@ -41,7 +43,7 @@ fn filled(what: &str, surface: &ClosedSurface) -> String {
     )
 }
 
-/// The surface between the bodies of some tets and round them.
+/// The surface around and between the bodies of some tets.
 fn surface_of(points: &[Point], tets: &[([u32; 4], Option<BodyId>)]) -> ClosedSurface {
     skin_of(points, tets, 1).surface().unwrap()
 }
@@ -94,7 +96,8 @@ fn surfaces_of_all_geometries_are_filled_at_all_presets() {
     }
 }
 
-/// The surfaces of the parts of a geometry's mesh whose edges are cut in `pieces`, new vertices on the geometry.
+/// The surfaces of the parts of a mesh with `pieces` subdivisions an edge, with new vertices on the
+/// geometry.
 fn surfaces_of_parts(name: &str, preset: Preset, ranks: u32, pieces: u32) -> Vec<ClosedSurface> {
     let model = model(name);
     let part = from_serial(coarse(&model, preset)).unwrap();
@@ -112,7 +115,7 @@ fn surfaces_of_parts(name: &str, preset: Preset, ranks: u32, pieces: u32) -> Vec
     tets.iter().map(|tets| surface_of(&points, tets)).collect()
 }
 
-/// Edges with more than two triangles.
+/// Number of edges with more than two triangles.
 fn edges_of_many(surface: &ClosedSurface) -> usize {
     let edge = |t: &[u32; 3], k: usize| [t[k].min(t[(k + 1) % 3]), t[k].max(t[(k + 1) % 3])];
     let mut edges: Vec<[u32; 2]> =
@@ -142,7 +145,7 @@ fn skins_of_refined_parts_are_filled_also_where_they_touch_themselves() {
 #[ignore = "a minute: its table is in benches/results/hard-inputs-2026-11-21.md"]
 fn skins_of_all_refined_parts_are_filled() {
     for name in NAMES {
-        // Refined, the coarse mesh of the tee would have inverted tets: `generate` makes it finer there.
+        // The coarse mesh of the tee would have inverted children; `generate` makes it finer there.
         let coarse = if name == "tee" { Preset::Moderate } else { Preset::Coarse };
         for (preset, ranks, pieces) in [(Preset::Moderate, 4, 2), (coarse, 16, 2), (coarse, 16, 4)] {
             for (rank, surface) in surfaces_of_parts(name, preset, ranks, pieces).iter().enumerate() {
@@ -152,7 +155,8 @@ fn skins_of_all_refined_parts_are_filled() {
     }
 }
 
-/// Needles of aspect 10⁴ side by side: walls of a tube, and a cone of which all meet in the apex.
+/// Needle triangles of aspect ratio 10⁴: the side of a tube, and a cone whose triangles all meet at
+/// the apex.
 fn needles() -> Vec<(String, Soup)> {
     let mut soups = Vec::new();
     for sides in [5, 24, 100] {
@@ -164,7 +168,8 @@ fn needles() -> Vec<(String, Soup)> {
     soups
 }
 
-/// A torus, inverted at a point near it: its triangles stay similar, their edges are as (farthest/nearest)².
+/// A torus inverted at a point near it. Triangles stay similar; edge lengths vary as
+/// (farthest/nearest)².
 fn inverted_torus(around: [usize; 2], near: f64) -> Soup {
     let mut soup = Soup::default();
     soup.torus([1.0, 0.4], around, crate::samples::INSIDE);
@@ -174,7 +179,7 @@ fn inverted_torus(around: [usize; 2], near: f64) -> Soup {
     soup
 }
 
-/// The longest edge over the shortest.
+/// Ratio of the longest edge to the shortest.
 fn spread(surface: &ClosedSurface) -> f64 {
     let (mut least, mut most) = (f64::INFINITY, 0.0_f64);
     for t in surface.triangles() {

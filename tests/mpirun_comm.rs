@@ -1,37 +1,36 @@
-//! The communicator's conformance suite under `mpirun`: this test program starts itself as the ranks.
+//! The conformance suite of the communicator under `mpirun`: this test program starts itself as the
+//! ranks.
 //!
-//! Skipped, aloud, in a build without the feature `mpi` and where there is no `mpirun`.
+//! Skipped with a message without the feature `mpi` or without `mpirun`.
 
 use csg::{BodyId, PatchId};
 use std::process::{Command, Output};
-use tetmill::Point;
 use tetmill::check::checksum_of_all;
 use tetmill::comm::Communicator;
-use tetmill::dist::DistMesh;
-use tetmill::mesh::{BoundaryTriangle, Class, Mesh, VertexId};
-use tetmill::migrate::BareStream;
+use tetmill::mesh::{BareStream, BoundaryTriangle, Class, DistMesh, Mesh, VertexId};
+use tetmill::{Geometry, Mesher, Point};
 
-/// Which of the bodies below a rank is to run.
+/// Environment variable that selects the body a rank runs.
 const BODY: &str = "TETMILL_TEST_BODY";
 
-/// Bytes in a chunk: so few that the suite's messages need many.
+/// Bytes of a chunk, few enough that the messages of the suite need many chunks.
 const SMALL_CHUNK: usize = 1000;
 
-/// Runs `body` of [`as_a_rank`] on `ranks` processes, or tells why it cannot.
+/// Runs `body` of [`as_a_rank`] on `ranks` processes, or prints why it cannot.
 fn mpirun(ranks: u32, body: &str) -> Option<Output> {
     if !cfg!(feature = "mpi") {
         eprintln!("skipped: built without the feature `mpi`");
         return None;
     }
     let program = std::env::current_exe().expect("a test program knows its path");
-    // The name that the harness gives to the test: the path of this module within its program.
+    // The name of the test in the harness: the path of this module within its program.
     let module = module_path!().split_once("::").map(|(_, path)| format!("{path}::")).unwrap_or_default();
     let result = Command::new("mpirun")
         .args(["-n", &ranks.to_string()])
         .arg(program)
         .args([&format!("{module}as_a_rank"), "--exact", "--ignored", "--nocapture", "--test-threads=1"])
         .env(BODY, body)
-        // Open MPI refuses to run as root and on fewer cores than ranks unless told otherwise.
+        // By default Open MPI refuses to run as root or with more ranks than cores.
         .envs([("OMPI_ALLOW_RUN_AS_ROOT", "1"), ("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1")])
         .env("OMPI_MCA_rmaps_base_oversubscribe", "1")
         .output();
@@ -56,6 +55,10 @@ fn as_a_rank() {
         return;
     };
     #[cfg(feature = "mpi")]
+    if body == "own" {
+        return on_a_communicator_of_its_own();
+    }
+    #[cfg(feature = "mpi")]
     tetmill::comm::mpi::run_with_chunks(SMALL_CHUNK, |comm| run_body(&body, comm)).unwrap();
     #[cfg(not(feature = "mpi"))]
     tetmill::comm::mpi::run(|comm| run_body(&body, comm)).unwrap();
@@ -65,7 +68,7 @@ fn run_body(body: &str, comm: &dyn Communicator) {
     assert!(tetmill::comm::mpi::launched() || comm.size() == 1);
     match body {
         "conformance" => {
-            tetmill::comm::conformance::conformance(comm);
+            tetmill::internals::conformance::conformance(comm);
             let ranks = comm.all_gather_one(comm.rank()).unwrap();
             if comm.rank() == 0 {
                 println!("{} ranks with chunks of {SMALL_CHUNK} bytes conform", ranks.len());
@@ -73,22 +76,22 @@ fn run_body(body: &str, comm: &dyn Communicator) {
         }
         "distribute" => {
             let given = (comm.rank() == 0).then(|| (fan(40), (0..40).map(|tet| tet % comm.size()).collect()));
-            let part = tetmill::dist::distribute(comm, given).unwrap();
+            let part = tetmill::internals::distribution::distribute(comm, given).unwrap();
             part.check(comm).unwrap();
             println!("rank {} has {} of {} tets", comm.rank(), part.tets.len(), part.totals.tets);
         }
         "migrate" => {
             let ranks = comm.size();
             let given = (comm.rank() == 0).then(|| (fan(40), (0..40).map(|tet| tet % ranks).collect()));
-            let start = tetmill::dist::distribute(comm, given).unwrap();
+            let start = tetmill::internals::distribution::distribute(comm, given).unwrap();
             let sum = |mesh: &DistMesh| checksum_of_all(comm, &BareStream::new(mesh.clone().into())).unwrap();
-            // In stretches, all on the last rank, and back.
+            // In consecutive blocks, all on the last rank, and back.
             let plans: [fn(u64, u32) -> u32; 3] =
                 [|tet, ranks| tet as u32 * ranks / 40, |_, ranks| ranks - 1, |tet, ranks| tet as u32 % ranks];
             let mut mesh = start.clone();
             for plan in plans {
                 let to: Vec<u32> = mesh.tet_ids.iter().map(|&tet| plan(tet, ranks)).collect();
-                mesh = tetmill::migrate::migrate(comm, mesh, &to).unwrap();
+                mesh = tetmill::repartition::migrate(comm, mesh, &to).unwrap();
                 mesh.check(comm).unwrap();
                 assert_eq!(sum(&mesh), sum(&start));
             }
@@ -104,7 +107,19 @@ fn run_body(body: &str, comm: &dyn Communicator) {
     }
 }
 
-/// Tets around one edge, half a turn, all on one patch.
+/// The program initialises MPI itself, and lends its communicator.
+#[cfg(feature = "mpi")]
+fn on_a_communicator_of_its_own() {
+    use tetmill::comm::mpi::{duplicate_of, rsmpi};
+    let (universe, _) =
+        rsmpi::initialize_with_threading(rsmpi::Threading::Funneled).expect("MPI can be initialised");
+    let comm = duplicate_of(&universe.world());
+    let ball = Geometry::from_text("algebraic3d solid b = sphere (0, 0, 0; 1); tlo b;").expect("a geometry");
+    let mesh = Mesher::new().levels(1).generate_on(&comm, Some(&ball)).expect("a mesh");
+    println!("rank {} of a program has {}", comm.rank(), mesh.checksum);
+}
+
+/// Tets around one edge, half a turn, with one patch.
 fn fan(tets: u32) -> Mesh {
     let rim = (0..=tets).map(|i| std::f64::consts::PI * f64::from(i) / f64::from(tets));
     let rim = rim.map(|angle| Point::new(angle.cos(), angle.sin(), 0.0));
@@ -161,4 +176,16 @@ fn a_rank_that_panics_ends_the_job_with_its_message() {
     assert!(text.contains("this rank fails on purpose"), "{text}");
     assert!(text.contains("rank 1 panicked: the job ends"), "{text}");
     assert!(!text.contains("the barrier was passed"), "{text}");
+}
+
+#[test]
+fn a_program_with_mpi_of_its_own_gets_the_same_mesh() {
+    let Some(output) = mpirun(3, "own") else { return };
+    let text = text(&output);
+    assert!(output.status.success(), "{text}");
+    let ball = Geometry::from_text("algebraic3d solid b = sphere (0, 0, 0; 1); tlo b;").expect("a geometry");
+    let alone = Mesher::new().levels(1).generate(&ball).expect("a mesh");
+    for rank in 0..3 {
+        assert!(text.contains(&format!("rank {rank} of a program has {}", alone.checksum)), "{text}");
+    }
 }

@@ -1,13 +1,13 @@
-//! Files of others, as a program that uses the library reads them.
+//! Files of other programs, read through the library.
 
-use crate::common::shared;
+use crate::folders::shared;
 use std::path::Path;
 use std::process::Command;
-use tetmill::io::{surface, volume};
-use tetmill::kernel::simplex::volume as tet_volume;
+use tetmill::files::{surface, volume};
+use tetmill::internals::simplex::volume as tet_volume;
 use tetmill::mesh::Label;
 
-/// Edges that do not have exactly two triangles in opposite directions.
+/// Number of edges that do not have exactly two triangles in opposite directions.
 fn loose_edges(triangles: &[[u32; 3]]) -> usize {
     let mut edges: Vec<[u32; 2]> = triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]).collect();
     edges.sort_unstable();
@@ -49,7 +49,7 @@ fn the_ply_surfaces_have_the_counts_of_their_headers() {
     }
 }
 
-/// A cube with a smaller one inside as a second region, in TetGen's words.
+/// A cube with a smaller one inside as a second region, in TetGen's format.
 fn nested_cubes() -> String {
     let mut text = String::from("16 3 0 0\n");
     for (k, (low, high)) in [(0, (0, 4)), (8, (1, 3))] {
@@ -100,7 +100,7 @@ fn tetgens_own_files_are_read() {
     eprintln!("tetgen: {} tets, {:?}", found.mesh.tets.len(), found.notes);
 }
 
-/// Runs a Python program; without the module that it needs the test is skipped, aloud.
+/// Runs a Python program; the test is skipped with a message if the module is missing.
 fn python(module: &str, program: &str, folder: &Path) -> bool {
     let has_module = Command::new("python3")
         .args(["-c", &format!("import {module}")])

@@ -1,20 +1,24 @@
-//! The surfaces of our own geometries' coarse meshes: closed, without crossings, and near what they stand for.
+//! The surfaces of coarse meshes: closed, without intersections, and close to the geometry.
 
-use crate::common::own_geometries;
+use crate::folders::own_geometries;
 use crate::samples::skin_of;
 use csg::language::parse_geometry;
 use std::path::Path;
+use tetmill::internals::{CsgModel, Model};
 use tetmill::mesh::{BoundaryTriangle, Mesh};
-use tetmill::pipeline::{CsgModel, Model};
+use tetmill::progress::Work;
 use tetmill::size::{Preset, SizeSettings};
 use tetmill::{Point, Vector};
 
-/// The chord error of a triangle is less than this part of its longest side, divided by the elements per radius of curvature c that the preset asks for:
-/// of an equilateral triangle of side h, whose middle is h/√3 from its corners, it is h²/6 times the curvature, and sides are less than
-/// 1.5 radii / c long.
+/// Bound of the chord error, relative to the longest side of the triangle over the preset's
+/// elements per radius of curvature c.
+///
+/// For an equilateral triangle of side h the centre is h/√3 from its corners, so the error is h²/6
+/// times the curvature; sides are less than 1.5 radii / c long.
 const CHORD: f64 = 0.25;
 
-/// How far the middles of a triangle and of its sides are from its patch, in units of its longest side.
+/// Largest distance of the midpoints of a triangle and its sides from the patch, relative to the
+/// longest side.
 fn chord_error(csg: &CsgModel, mesh: &Mesh, triangle: &BoundaryTriangle) -> f64 {
     let [a, b, c] = triangle.vertices.map(|v| mesh.points[v.0 as usize]);
     let middle = |of: &[Point]| Point::from(of.iter().map(|p| p.coords).sum::<Vector>() / of.len() as f64);
@@ -24,21 +28,24 @@ fn chord_error(csg: &CsgModel, mesh: &Mesh, triangle: &BoundaryTriangle) -> f64 
     middles.into_iter().map(off).fold(0.0, f64::max) / longest
 }
 
-/// Whether a corner of a triangle is the apex of its cone, where no size is small enough for the curvature, or within some sizes of it: that of
-/// a thousandth of the diagonal is the least that curvature asks for.
+/// Whether a corner of a triangle is at or near the apex of its cone.
+///
+/// At the apex no size is small enough for the curvature; near means within some sizes of it, where
+/// curvature requests a thousandth of the diagonal at least.
 fn is_at_apex(csg: &CsgModel, mesh: &Mesh, triangle: &BoundaryTriangle) -> bool {
     let near = 5e-3 * csg.features.bounds.diagonal();
     let surface = &csg.geometry.surfaces[csg.features.patches[triangle.patch.index()].surface.index()];
     triangle.vertices.iter().any(|v| surface.has_apex_at(&mesh.points[v.0 as usize], near))
 }
 
-/// Checks the surface of a coarse mesh: closed and without crossings by exact signs, chord errors as small as the preset asks.
+/// Checks the surface of a coarse mesh: closed, without intersections by exact signs, and with
+/// chord errors as the preset requires.
 fn check_surface(geometry: &Path, preset: Preset) {
     let what = format!("{} {preset:?}", geometry.display());
     let source = std::fs::read_to_string(geometry).unwrap();
     let parsed = parse_geometry(&source, &geometry.to_string_lossy()).unwrap();
     let model = Model::from_csg(parsed.geometry).unwrap();
-    let mesh = model.coarse_mesh(&mut SizeSettings::from(preset).into()).unwrap().mesh;
+    let mesh = model.coarse_mesh(&mut SizeSettings::from(preset).into(), Work::unwatched()).unwrap().mesh;
     let tets = mesh.tets.iter().zip(&mesh.bodies).map(|(t, body)| (t.map(|v| v.0), Some(*body)));
     let skin = skin_of(&mesh.points, &tets.collect::<Vec<_>>(), 1);
     skin.surface().unwrap_or_else(|faults| panic!("{what}: {faults}"));

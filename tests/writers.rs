@@ -1,14 +1,14 @@
-//! The writers as a program that uses the library sees them.
+//! The writers through the public interface of the library.
 
 use std::fs;
 use tetmill::Point;
 use tetmill::comm::thread;
-use tetmill::io::plain::PlainPart;
-use tetmill::io::{elmer, geomview, serial, vtu};
+use tetmill::files::{elmer, geomview, picture, serial, vtu};
+use tetmill::internals::PlainPart;
 use tetmill::mesh::{BoundaryTriangle, Class, Label, Mesh, Names, VertexId};
-use tetmill::picture;
 
-/// The cube 0 … 1 around its centre: two tets on each side, a patch each, the upper half a part of its own.
+/// The unit cube around its centre: two tets and one patch on each side; the upper half is its own
+/// part.
 fn cube() -> (Mesh, Names, Vec<u32>) {
     let mut mesh = Mesh::default();
     for k in 0..8_u32 {
@@ -32,7 +32,7 @@ fn cube() -> (Mesh, Names, Vec<u32>) {
 }
 
 #[test]
-fn every_format_of_a_cube_in_two_parts_stands_in_one_folder() {
+fn every_format_of_a_cube_in_two_parts_is_written_to_one_folder() {
     let (mesh, names, tet_to_rank) = cube();
     let dir = tempfile::tempdir().unwrap();
     thread::run(2, |comm| {

@@ -1,12 +1,13 @@
-//! What benchmarks share.
+//! Functions shared by the benchmarks.
 #![allow(dead_code)]
 
-/// Processor seconds of this process so far, of threads that have ended too; 0 where the system does not tell.
+/// Processor seconds of this process so far, including ended threads; 0 if the system does not
+/// report it.
 pub fn cpu_seconds() -> f64 {
     tetmill::memory::cpu_seconds().unwrap_or(0.0)
 }
 
-/// Processor seconds of the threads that live now, to the nanosecond.
+/// Processor seconds of the living threads, in nanosecond resolution.
 pub fn living_cpu_seconds() -> f64 {
     let tasks = std::fs::read_dir("/proc/self/task").into_iter().flatten().flatten();
     let nanoseconds = tasks.filter_map(|task| {

@@ -1,31 +1,33 @@
-//! From a geometry to one classified, refinable tetrahedral mesh, on one rank.
+//! Makes one classified, refinable tetrahedral mesh of a geometry, on one rank.
 
-use super::model::CsgModel;
 use crate::Point;
-use crate::improve::{self, Effort, GeometrySmoothness, Smoothness};
-use crate::kernel::quality::QualitySummary;
-use crate::mesh::{Class, Mesh, Segment, VertexId, are_sides};
-use crate::periodic::PeriodicSize;
-use crate::refine::Bends;
-use crate::size::{GeometricSamples, GeometricSize, SizeField, SizeSettings, Source};
-use crate::surface::closeness::{ThinWalls, Walls, thin_walls};
-use crate::surface::curves::{CurveError, crowded, mesh_curves};
-use crate::surface::narrow::narrow;
-use crate::surface::{self, SurfaceError, SurfaceMesh};
-use crate::volume::{self, ClosedSurface, SurfaceFaults, VolumeError};
+use crate::ground::error::{ErrorKind, HasKind};
+use crate::ground::mesh::QualitySummary;
+use crate::ground::mesh::{Class, Mesh, Segment, VertexId, are_sides};
+use crate::ground::progress::{Cancelled, Work};
+use crate::ground::size::{GeometricSamples, GeometricSize, SizeField, SizeSettings, Source};
+use crate::ground::size::{PeriodicSize, WatchedSize};
+use crate::mesher::improve::{self, Effort, GeometrySmoothness, Smoothness};
+use crate::mesher::model::CsgModel;
+use crate::mesher::surface::closeness::{ThinWalls, Walls, thin_walls};
+use crate::mesher::surface::curves::{CurveError, crowded, mesh_curves};
+use crate::mesher::surface::narrow::narrow;
+use crate::mesher::surface::{self, SurfaceError, SurfaceMesh};
+use crate::mesher::volume::{self, ClosedSurface, SurfaceFaults, VolumeError};
+use crate::parallel::refine::Bends;
 use csg::features::{Named, Place};
 use csg::{BodyId, PatchId};
 
 /// Why there is no coarse mesh.
 #[derive(Debug, thiserror::Error)]
 pub enum CoarseError {
-    /// A curve could not be cut.
+    /// A curve could not be divided into segments.
     #[error(transparent)]
     Curve(#[from] CurveError),
     /// A patch could not be meshed.
     #[error(transparent)]
     Surface(#[from] SurfaceError),
-    /// Curves that stay too near others, however short their segments.
+    /// Curves remain too close to each other, however short their segments.
     #[error(
         "an edge between surfaces of {first} and {second} comes too near another at {place} for any segments that were tried: surfaces \
          touch there to a high order, or leave too narrow a face; move one of them or let them overlap"
@@ -35,7 +37,7 @@ pub enum CoarseError {
         first: Named,
         /// The other.
         second: Named,
-        /// Where.
+        /// Where the curves are too close.
         place: Place,
     },
     /// The surface mesh does not bound the bodies.
@@ -43,31 +45,53 @@ pub enum CoarseError {
         "the surface mesh does not bound the bodies: {faults}; surfaces may touch there, or leave too thin a wall: move one of them"
     )]
     NotClosed {
-        /// What is wrong.
+        /// The faults.
         faults: SurfaceFaults,
-        /// The middles of the sides of triangles that cross others.
+        /// Edge midpoints of triangles that intersect others.
         crossing: Vec<Point>,
     },
-    /// The triangles that were given do not bound bodies.
+    /// The input triangles do not bound bodies.
     #[error(
         "the surface's own triangles intersect, or touch without being the same: {count} places, the first at ({}, {}, {}); where \
          surfaces touch, give both the same triangles there (join them in the program that made them), or keep them apart",
         first.x, first.y, first.z
     )]
     FacetsMeet {
-        /// Middles of sides of such triangles.
+        /// Number of intersecting places.
         count: usize,
-        /// The first of them.
+        /// The first of them: an edge midpoint of an intersecting triangle.
         first: Point,
     },
     /// A body could not be filled.
     #[error(transparent)]
-    Volume(#[from] VolumeError),
+    Volume(VolumeError),
+    /// The observer cancelled the run.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+}
+
+impl From<VolumeError> for CoarseError {
+    fn from(error: VolumeError) -> Self {
+        match error {
+            VolumeError::Cancelled(cancelled) => Self::Cancelled(cancelled),
+            error => Self::Volume(error),
+        }
+    }
+}
+
+impl HasKind for CoarseError {
+    fn kind(&self) -> ErrorKind {
+        match self {
+            Self::FacetsMeet { .. } => ErrorKind::Input,
+            Self::Cancelled(_) => ErrorKind::Cancelled,
+            _ => ErrorKind::NoMesh,
+        }
+    }
 }
 
 impl CoarseError {
-    /// Where a finer mesh may help: sources that ask for it. `segments` are the ends of the segments that
-    /// the mesh was begun with, `size` the size field that was used.
+    /// Sources that lower the sizes where a finer mesh may help. `segments` are the ends of the
+    /// initial segments, `size` is the size field that was used.
     pub(super) fn remedy(&self, segments: &[[Point; 2]], size: &dyn SizeField) -> Vec<Source> {
         match self {
             Self::Surface(SurfaceError::TooCoarse { segments: long, .. }) => {
@@ -86,12 +110,12 @@ impl CoarseError {
     }
 }
 
-/// A source for where there is too little room.
+/// A source that lowers the size at a place with too little room.
 pub(super) fn smaller_at(point: Point, size: &dyn SizeField) -> Source {
     Source { point, size: LOWERED * size.size_at(&point) }
 }
 
-/// What became of the coarse mesh.
+/// Statistics of a coarse mesh.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
 pub struct CoarseReport {
     /// Vertices.
@@ -102,29 +126,30 @@ pub struct CoarseReport {
     pub boundary: u64,
     /// Segments on curves.
     pub segments: u64,
-    /// Shapes of the tets.
+    /// Shape quality of the tets.
     pub quality: QualitySummary,
-    /// Tets that would have flattened when refined and snapped, and were repaired.
+    /// Number of tets that would have been inverted by refinement and snapping, and were repaired.
     pub illegal_repaired: u64,
-    /// Those that are left.
+    /// Number of such tets left.
     pub illegal_left: u64,
-    /// Points inside that the boundary could not do without.
+    /// Steiner points inside bodies that the boundary recovery needed.
     pub steiner_points: u64,
-    /// Times the mesh was made anew with smaller sizes where surfaces came too near each other, or where
+    /// Number of restarts with smaller sizes, where surfaces were too close to each other or
     /// refined tets would have been inverted.
     pub size_corrections: u64,
-    /// Edges that refinement bends, so that refined tets are not inverted, or better.
+    /// Number of edges that refinement curves to avoid inverted or poor tets.
     pub bent_edges: u64,
-    /// Walls in which the sizes were lowered since they are thin.
+    /// Thin regions in which the sizes were lowered.
     pub thin_walls: ThinWalls,
 }
 
 /// How a coarse mesh is made.
 #[derive(Clone, Debug, Default)]
 pub struct CoarseSettings {
-    /// The sizes.
+    /// The element sizes.
     pub size: SizeSettings,
-    /// How much is done for better shapes; without it, as much as takes a second at most, then the standard.
+    /// Effort for the shapes of tets; if `None`, the careful one up to a second of work, else the
+    /// standard one.
     pub effort: Option<Effort>,
 }
 
@@ -134,68 +159,72 @@ impl From<SizeSettings> for CoarseSettings {
     }
 }
 
-/// Up to so many tets patience costs less than a second, and each may become many.
+/// Up to this many tets the careful effort takes less than a second, and refinement multiplies its
+/// effect.
 const FEW_TETS: usize = 100_000;
 
 fn effort_for(tets: usize) -> Effort {
     if tets <= FEW_TETS { Effort::Careful } else { Effort::Standard }
 }
 
-/// A coarse mesh and what became of it.
+/// A coarse mesh with its statistics.
 #[derive(Clone, Debug, Default)]
 pub struct CoarseMesh {
     /// The mesh.
     pub mesh: Mesh,
-    /// What refinement has to bend, by the ids that distribution gives edges.
+    /// Edge displacements for refinement, by the edge ids that distribution assigns.
     pub bends: Bends,
-    /// Its numbers.
+    /// Its statistics.
     pub report: CoarseReport,
 }
 
-/// Times the sizes are lowered where curves or surfaces come too near each other, before the mesher
-/// gives up: each divides them by 1.7 or so, so that gaps of a thousandth of the size are still met.
+/// Maximum number of restarts with smaller sizes. Each lowers them by a factor of about 1.7, so
+/// that gaps of a thousandth of the initial size are resolved.
 pub(super) const MOST_CORRECTIONS: u64 = 14;
 
-/// A place that failed asks for this fraction of the size there.
+/// Factor applied to the size where an attempt failed.
 const LOWERED: f64 = 0.6;
 
-/// Makes a coarse mesh with the given sizes. Where it fails for want of room between curves or surfaces, the
-/// sizes are lowered there (`settings` keeps the new sources) and it is tried again.
+/// Makes a coarse mesh with the given sizes. Where it fails for lack of room between curves or
+/// surfaces, the sizes are lowered and the mesh is made again; `settings` keeps the new sources.
 ///
 /// # Errors
-/// What failed in the end, with its place.
-pub fn mesh(model: &CsgModel, settings: &mut CoarseSettings) -> Result<CoarseMesh, CoarseError> {
+/// The last failure, with its location.
+pub fn mesh(model: &CsgModel, settings: &mut CoarseSettings, work: &Work) -> Result<CoarseMesh, CoarseError> {
     let samples = GeometricSamples::new(&model.geometry, &model.features, &settings.size);
-    corrected(settings, |settings, allowed| attempt(model, &samples, settings, allowed))
+    corrected(settings, work, |settings, allowed| attempt(model, &samples, settings, allowed, work))
 }
 
-/// How one attempt at a coarse mesh ended.
+/// The result of one attempt at a coarse mesh.
 pub(super) enum Attempt {
     Made(Box<CoarseMesh>),
-    /// Walls were found to be thin: sources for those that can be resolved.
+    /// Thin regions were found: sources for those that can be resolved.
     Thin(Vec<Source>, ThinWalls),
-    /// It takes smaller sizes.
+    /// Smaller sizes are needed.
     Lower(Vec<Source>),
     Failed(CoarseError),
 }
 
-/// What an attempt may answer beside a mesh.
+/// What an attempt may return instead of a mesh.
 #[derive(Clone, Copy)]
 pub(super) struct Allowed {
-    /// That it takes smaller sizes.
+    /// A request for smaller sizes.
     pub lower: bool,
-    /// That walls are thin: only the first time, as each time may lower the sizes as far as the settings allow.
+    /// Thin regions: only in the first attempt, because each time may lower the sizes as far as the
+    /// settings allow.
     pub thin: bool,
 }
 
-/// Attempts until no sizes need to be lowered, or may be: the attempts are told whether they may ask for it.
+/// Repeats `attempt` until no sizes need to be lowered, or none may be.
 pub(super) fn corrected(
     settings: &mut CoarseSettings,
+    work: &Work,
     attempt: impl Fn(&CoarseSettings, Allowed) -> Attempt,
 ) -> Result<CoarseMesh, CoarseError> {
     let mut corrections = 0;
     let mut thin_walls = None;
     loop {
+        work.proceed()?;
         let allowed = Allowed { lower: corrections < MOST_CORRECTIONS, thin: thin_walls.is_none() };
         match attempt(settings, allowed) {
             Attempt::Made(mut coarse) => {
@@ -218,13 +247,14 @@ pub(super) fn corrected(
 
 /// Why there is no surface mesh, or none that can be filled.
 pub(super) enum Unmeshed {
-    /// It takes smaller sizes.
+    /// Smaller sizes are needed.
     Lower(Vec<Source>),
     Failed(CoarseError),
 }
 
 impl Unmeshed {
-    /// What to do about an error, if sizes may be lowered; `segments` are the ends of those on curves.
+    /// Lowers the sizes after an error if that is allowed and may help; `segments` are the ends of
+    /// those on curves.
     fn of(error: CoarseError, segments: &[[Point; 2]], size: &dyn SizeField, may_lower: bool) -> Self {
         let lower = if may_lower { error.remedy(segments, size) } else { Vec::new() };
         if lower.is_empty() { Self::Failed(error) } else { Self::Lower(lower) }
@@ -240,13 +270,14 @@ impl From<Unmeshed> for Attempt {
     }
 }
 
-/// Meshes the surface of a geometry; also the ends of the segments on its curves.
+/// Meshes the surface of a geometry; also returns the ends of the segments on its curves.
 pub(super) fn mesh_surface(
     model: &CsgModel,
     size: &dyn SizeField,
     may_lower: bool,
 ) -> Result<(SurfaceMesh, Vec<[Point; 2]>), Unmeshed> {
     let CsgModel { geometry, features, projector } = model;
+    size.work().step(0.0, SURFACE_SHARE, features.patches.len() as u64);
     let curves = mesh_curves(features, projector, size).map_err(|error| Unmeshed::Failed(error.into()))?;
     if may_lower {
         let mut lower = crowded(&curves, features, size);
@@ -272,11 +303,13 @@ fn attempt(
     samples: &GeometricSamples,
     settings: &CoarseSettings,
     allowed: Allowed,
+    work: &Work,
 ) -> Attempt {
     let CsgModel { geometry, features, projector } = model;
     let own = GeometricSize::of_samples(geometry, features, &settings.size, samples);
     let periodic = PeriodicSize::new(&own, features, settings.size.grading);
     let size: &dyn SizeField = if features.identified.is_empty() { &own } else { &periodic };
+    let size = &WatchedSize::new(size, work);
     let (surface, segments) = match mesh_surface(model, size, allowed.lower) {
         Ok(made) => made,
         Err(unmeshed) => return unmeshed.into(),
@@ -298,8 +331,13 @@ fn attempt(
     }
 }
 
-/// Fills the bodies inside a surface mesh, and improves the result. `regions` are the bodies behind and in front of a patch;
-/// without `smoothness` all of the boundary stays as flat as it is.
+/// Fraction of the time after which the surface mesh is done, for a coarse mesh of 100,000 tets.
+const SURFACE_SHARE: f64 = 0.2;
+/// Fraction of the time after which the bodies are filled.
+const VOLUME_SHARE: f64 = 0.4;
+
+/// Fills the bodies inside a surface mesh, and improves the result. `regions` returns the bodies
+/// behind and in front of a patch. Without `smoothness` the boundary is not moved.
 pub(super) fn fill(
     surface: SurfaceMesh,
     regions: impl Fn(PatchId) -> [Option<BodyId>; 2],
@@ -307,12 +345,17 @@ pub(super) fn fill(
     smoothness: Option<&dyn Smoothness>,
     effort: Option<Effort>,
 ) -> Result<CoarseMesh, CoarseError> {
+    size.work().proceed()?;
+    size.work().step(SURFACE_SHARE, VOLUME_SHARE, 1);
     let (mut mesh, volume) = fill_bodies(surface, regions, size)?;
+    size.work().proceed()?;
+    size.work().step(VOLUME_SHARE, 1.0, 1);
     let settings = improve::Settings::of(effort.unwrap_or_else(|| effort_for(mesh.tets.len())));
     let improved = match smoothness {
         Some(smoothness) => improve::make_refinable(&mut mesh, size, smoothness, &settings),
         None => improve::improve(&mut mesh, size, &settings),
     };
+    size.work().proceed()?;
     let report = CoarseReport {
         vertices: mesh.points.len() as u64,
         tets: mesh.tets.len() as u64,
@@ -333,8 +376,8 @@ fn fill_bodies(
     regions: impl Fn(PatchId) -> [Option<BodyId>; 2],
     size: &dyn SizeField,
 ) -> Result<(Mesh, volume::Report), CoarseError> {
-    // Points of the user inside a body are on no triangle: the volume mesher gets them apart, and puts
-    // them behind the others.
+    // User points inside a body are on no triangle: the volume mesher receives them separately and
+    // numbers them after the others.
     let mut used = vec![false; surface.points.len()];
     for triangle in &surface.triangles {
         triangle.vertices.iter().for_each(|v| used[v.index()] = true);
@@ -397,10 +440,10 @@ fn fill_bodies(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::size::UniformSize;
+    use crate::ground::size::UniformSize;
 
     #[test]
-    fn curves_that_may_not_be_cut_finer_are_told_by_their_solids() {
+    fn curves_that_stay_too_near_are_reported_with_their_solids() {
         let ring = "algebraic3d\n\
             solid rod = cylinder (0, 0, 0; 0, 0, 1; 1);\n\
             solid hole = orthobrick (-0.7, -0.7, -1; 0.7, 0.7, 2);\n\

@@ -1,30 +1,32 @@
-//! How many tets a size field will give, told from a mesh that another one gave.
+//! Predicts the number of tets for a size field from a mesh made with another one.
 //!
-//! The number of tets is nearly proportional to ∫ dV/h³ over the bodies. A mesh at hand, whatever its sizes, serves as the places to
-//! integrate at, and its own number of tets as the factor.
+//! The number of tets is nearly proportional to ∫ dV/h³ over the bodies. The existing mesh,
+//! whatever its sizes, serves for the quadrature, and its number of tets calibrates the factor.
 
 use super::coarse::{CoarseMesh, CoarseSettings};
 use super::model::Model;
 use crate::Point;
-use crate::kernel::simplex::volume6;
-use crate::mesh::{Mesh, TET_EDGES};
-use crate::size::{SizeField, SizeSettings};
+use crate::ground::kernel::simplex::volume6;
+use crate::ground::mesh::{Mesh, TET_EDGES};
+use crate::ground::size::{SizeField, SizeSettings};
 use rayon::prelude::*;
 
-/// Tets are halved until they are no longer than this, in units of the size in their middles: within such a one the size differs by
-/// the grading only.
+/// Tets are bisected until they are no longer than this, in units of the size at their centroid;
+/// within such a tet the size varies by the grading only.
 const LONGEST: f64 = 2.0;
 
-/// A tet is halved in a row so often at most: a tet a thousand times as long as the size.
+/// Maximum depth of bisection: enough for a tet a thousand times as long as the size.
 const MOST_HALVINGS: u32 = 30;
 
-/// Steps towards the wanted number at most.
+/// Maximum number of secant steps.
 const MOST_STEPS: usize = 4;
 
-/// A number this near, as a logarithm, is as good as the estimate, and well inside what counts as reached.
+/// Tolerance of the logarithm of the number: as good as the estimate, and well inside the accepted
+/// range.
 const NEAR: f64 = 0.08;
 
-/// The scale at which `goal` tets are to be expected, from a mesh `made` with these settings; `None` without a size field.
+/// Returns the scale at which `goal` tets are expected, from a mesh `made` with these settings;
+/// `None` without a size field.
 pub(super) fn scale_for(
     model: &Model,
     settings: &CoarseSettings,
@@ -38,7 +40,8 @@ pub(super) fn scale_for(
     };
     let count = made.report.tets as f64;
     let (mut scale, base) = (settings.size.scale, integral_at(settings.size.scale)?);
-    // By logarithms: the number falls with the third power of the scale, less so where something else bounds the sizes.
+    // Secant steps in logarithms: the number of tets falls with the third power of the scale, more
+    // slowly where something else bounds the sizes.
     let mut error = (count / goal).ln();
     let mut slope = -3.0;
     for _ in 0..MOST_STEPS {
@@ -56,8 +59,8 @@ pub(super) fn scale_for(
     scale.is_finite().then_some(scale)
 }
 
-/// The settings at another scale: what was lowered on the way at this one is larger in proportion at a larger one, and small enough at
-/// a smaller one.
+/// The settings at another scale. Sources added at this scale grow in proportion at a larger one,
+/// and are small enough at a smaller one.
 fn at_scale(settings: &SizeSettings, scale: f64, own_sources: usize) -> SizeSettings {
     let mut sizes = SizeSettings { scale, ..settings.clone() };
     for source in &mut sizes.sources[own_sources..] {
@@ -68,9 +71,10 @@ fn at_scale(settings: &SizeSettings, scale: f64, own_sources: usize) -> SizeSett
 
 /// ∫ dV/h³ over a mesh.
 fn integral(mesh: &Mesh, size: &dyn SizeField) -> f64 {
-    let of_tet =
-        |tet: &[crate::mesh::VertexId; 4]| over_tet(tet.map(|v| mesh.points[v.index()]), size, MOST_HALVINGS);
-    // Summed in order, so that threads do not change it.
+    let of_tet = |tet: &[crate::ground::mesh::VertexId; 4]| {
+        over_tet(tet.map(|v| mesh.points[v.index()]), size, MOST_HALVINGS)
+    };
+    // Summed in order, so that the result does not depend on the threads.
     mesh.tets.par_iter().map(of_tet).collect::<Vec<f64>>().iter().sum()
 }
 
@@ -98,7 +102,7 @@ fn over_tet(corners: [Point; 4], size: &dyn SizeField, halvings: u32) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::size::UniformSize;
+    use crate::ground::size::UniformSize;
 
     #[test]
     fn the_integral_of_a_constant_is_the_volume_and_of_a_growing_size_that_of_calculus() {

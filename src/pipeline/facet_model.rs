@@ -1,33 +1,36 @@
-//! Surfaces of triangles as what is to be meshed.
+//! Triangulated surfaces as input for the mesher.
 
 use super::coarse::{self, Allowed, Attempt, CoarseError, CoarseMesh, CoarseSettings};
-use super::input::InputSettings;
+use super::error::Error;
+use super::settings::InputSettings;
 use crate::Point;
-use crate::error::Failure;
-use crate::facets::{
-    FacetModel, FacetPatch, FacetSize, FacetSmoothness, Facets, Marks, RemeshSettings, keep, remesh,
+use crate::files::surface::{self, Surface};
+use crate::ground::mesh::{Class, Label, Names, Segment, VertexId};
+use crate::ground::progress::Work;
+use crate::ground::projector::Projector;
+use crate::ground::size::{Closeness, Source, WatchedSize};
+use crate::mesher::facets::{
+    FacetError, FacetModel, FacetPatch, FacetSize, FacetSmoothness, Facets, Marks, RemeshSettings, keep,
+    remesh,
 };
-use crate::geometry::Projector;
-use crate::improve::Smoothness;
-use crate::io::surface::{self, Surface};
-use crate::mesh::{Class, Label, Names, Segment, VertexId};
-use crate::size::{Closeness, Source};
-use crate::surface::SurfaceMesh;
-use crate::surface::closeness::{ThinWalls, Walls, thin_walls};
+use crate::mesher::improve::Smoothness;
+use crate::mesher::surface::SurfaceMesh;
+use crate::mesher::surface::closeness::{ThinWalls, Walls, thin_walls};
 use csg::{BodyId, CornerId, CurveId, PatchId};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Solids bounded by facets, with what their files name.
+/// Solids bounded by facets, with the names in their files.
 #[derive(Clone, Debug)]
 pub struct FacetSolid {
     /// Bodies, patches, curves and corners.
     pub model: FacetModel,
     /// Numbers and names of the bodies and patches.
     pub names: Names,
-    /// Points inside that are to be vertices.
+    /// Points inside that become vertices of the mesh.
     pub kept_points: Vec<Point>,
-    /// Edges inside that are to be edges of the mesh; with `keep_surface` only, for else their ends need not be vertices.
+    /// Edges inside that become edges of the mesh; only with `keep_surface`, because otherwise
+    /// their ends need not be vertices.
     pub kept_edges: Vec<[Point; 2]>,
     /// Whether the facets themselves are the surface mesh.
     pub keep_surface: bool,
@@ -37,15 +40,15 @@ impl FacetSolid {
     /// Reads one or several surfaces.
     ///
     /// # Errors
-    /// Files that cannot be read, or whose triangles bound no bodies, with the place.
+    /// Files that cannot be read, or whose triangles do not bound bodies, with the location.
     pub fn read(
         paths: &[impl AsRef<Path>],
         settings: &InputSettings,
         note: &mut dyn FnMut(&str),
-    ) -> Result<Self, Failure> {
+    ) -> Result<Self, Error> {
         let mut surfaces = Vec::new();
         for path in paths {
-            let surface = surface::read(path.as_ref()).map_err(Failure::input)?;
+            let surface = surface::read(path.as_ref())?;
             let name = path.as_ref().display();
             surface.notes.iter().for_each(|text| note(&format!("{name}: {text}")));
             if surface.regions.iter().any(|region| region.max_volume.is_some()) {
@@ -61,33 +64,51 @@ impl FacetSolid {
             }
             surfaces.push(surface);
         }
-        let facets: Vec<Facets> = surfaces.iter().map(facets_of).collect();
-        let model = FacetModel::new(&facets, &settings.facets).map_err(|error| match paths {
-            [path] => Failure::input(format!("{}: {error}", path.as_ref().display())),
-            _ => Failure::input(error),
-        })?;
         let stems: Vec<String> = paths
             .iter()
             .map(|p| p.as_ref().file_stem().unwrap_or_default().to_string_lossy().into())
             .collect();
-        let names = names(&model, &surfaces, &stems);
+        Self::of(surfaces, &stems, settings).map_err(|error| {
+            let path = if let [path] = paths { Some(path.as_ref().to_path_buf()) } else { None };
+            Error::Facets { path, error: Box::new(error) }
+        })
+    }
+
+    /// Makes solids of surfaces, with a name for each surface.
+    ///
+    /// # Errors
+    /// Triangles that do not bound bodies, with the location.
+    pub fn of(
+        surfaces: Vec<Surface>,
+        stems: &[String],
+        settings: &InputSettings,
+    ) -> Result<Self, FacetError> {
+        let facets: Vec<Facets> = surfaces.iter().map(facets_of).collect();
+        let model = FacetModel::new(&facets, &settings.facets)?;
+        let names = names(&model, &surfaces, stems);
         let edges = surfaces.iter().filter(|_| settings.keep_surface).flat_map(|s| &s.loose_edges);
         let kept_edges = edges.copied().collect();
         let kept_points = surfaces.into_iter().flat_map(|surface| surface.loose_points).collect();
         Ok(Self { model, names, kept_points, kept_edges, keep_surface: settings.keep_surface })
     }
 
-    /// Projection to patches and curves. Facets that are kept need none: what lies between points of a facet lies on it.
+    /// Projection to patches and curves. Kept facets need none, because points between those of a
+    /// facet lie on it.
     pub fn projector(&self) -> Projector {
         if self.keep_surface { Projector::Flat } else { self.model.projector.clone().into() }
     }
 
-    /// Makes a coarse mesh with the given sizes, which are lowered where surfaces come too near each other.
-    pub(super) fn coarse_mesh(&self, settings: &mut CoarseSettings) -> Result<CoarseMesh, CoarseError> {
-        coarse::corrected(settings, |settings, allowed| self.attempt(settings, allowed))
+    /// Makes a coarse mesh with the given sizes, which are lowered where surfaces are too close to
+    /// each other.
+    pub(super) fn coarse_mesh(
+        &self,
+        settings: &mut CoarseSettings,
+        work: &Work,
+    ) -> Result<CoarseMesh, CoarseError> {
+        coarse::corrected(settings, work, |settings, allowed| self.attempt(settings, allowed, work))
     }
 
-    fn attempt(&self, settings: &CoarseSettings, allowed: Allowed) -> Attempt {
+    fn attempt(&self, settings: &CoarseSettings, allowed: Allowed, work: &Work) -> Attempt {
         let size = FacetSize::new(&self.model, &settings.size);
         let regions = |id: PatchId| [self.model.patch(id).inside, self.model.patch(id).outside];
         if allowed.thin && !self.keep_surface {
@@ -105,10 +126,10 @@ impl FacetSolid {
         self.add_kept_edges(&mut surface);
         let smoothness = FacetSmoothness(&self.model.projector);
         let smoothness: Option<&dyn Smoothness> = if self.keep_surface { None } else { Some(&smoothness) };
-        match coarse::fill(surface, regions, &size, smoothness, settings.effort) {
+        match coarse::fill(surface, regions, &WatchedSize::new(&size, work), smoothness, settings.effort) {
             Ok(made) => Attempt::Made(Box::new(made)),
             Err(error) => {
-                // Where triangles cross, smaller sizes were tried already.
+                // If triangles intersect, smaller sizes were tried already.
                 let crossed = matches!(error, CoarseError::NotClosed { .. });
                 let meeting = if crossed { self.model.crossings() } else { Vec::new() };
                 if let Some(&first) = meeting.first() {
@@ -121,7 +142,7 @@ impl FacetSolid {
         }
     }
 
-    /// Thin walls between the facets themselves.
+    /// Finds thin regions between the facets themselves.
     fn thin_walls(
         &self,
         size: &FacetSize,
@@ -132,7 +153,7 @@ impl FacetSolid {
         thin_walls(&Walls { mesh: &keep(&self.model), regions, project: &project, size, closeness })
     }
 
-    /// Points on no triangle are kept as vertices inside.
+    /// Adds points on no triangle as vertices inside.
     fn add_kept_points(&self, surface: &mut SurfaceMesh) {
         for (index, point) in self.kept_points.iter().enumerate() {
             surface.points.push(*point);
@@ -140,9 +161,9 @@ impl FacetSolid {
         }
     }
 
-    /// Edges on no triangle are kept as segments inside, each of a curve of its own.
+    /// Adds edges on no triangle as segments inside, each with its own curve.
     fn add_kept_edges(&self, surface: &mut SurfaceMesh) {
-        // Zero and its negative are one place.
+        // Adding zero turns −0 into 0, so that equal points have equal bits.
         let key = |p: &Point| p.coords.add_scalar(0.0).data.0[0].map(f64::to_bits);
         let mut at: BTreeMap<[u64; 3], VertexId> = if self.kept_edges.is_empty() {
             BTreeMap::new()
@@ -174,13 +195,14 @@ fn facets_of(surface: &Surface) -> Facets {
 }
 
 fn marks_of(surface: &Surface) -> Marks {
-    // TetGen's attributes are numbers of any kind; those of regions are small whole ones.
+    // TetGen's attributes are any numbers; those of regions are small integers.
     let regions = surface.regions.iter().map(|region| (region.place, region.attribute.round() as i64));
     Marks { holes: surface.holes.clone(), regions: regions.collect() }
 }
 
-/// Bodies have the numbers that their file gives to all of them, else their places; and are named as their files. Where files tell groups of triangles apart, these are the boundaries; elsewhere
-/// each patch is one.
+/// Numbers and names of bodies and patches. Bodies have the numbers of their file if it numbers all
+/// of them, else consecutive ones, and the names of their files. If files have groups of triangles,
+/// the groups are the boundaries; else each patch is one.
 fn names(model: &FacetModel, surfaces: &[Surface], stems: &[String]) -> Names {
     let all_numbered = surfaces.len() == 1 && model.bodies.iter().all(|b| b.number.is_some_and(|n| n > 0));
     let mut bodies: Vec<Label> = Vec::new();
@@ -188,7 +210,10 @@ fn names(model: &FacetModel, surfaces: &[Surface], stems: &[String]) -> Names {
         let stem = &stems[body.file as usize];
         let taken = |name: &String| bodies.iter().any(|body| body.name() == Some(name));
         let numbered = (2..).map(|k| format!("{stem}_{k}"));
-        let name = std::iter::once(stem.clone()).chain(numbered).find(|name| !taken(name)).expect("endless");
+        let name = std::iter::once(stem.clone())
+            .chain(numbered)
+            .find(|name| !taken(name))
+            .expect("an unused name in an endless list");
         let number = body.number.filter(|_| all_numbered).and_then(|number| u32::try_from(number).ok());
         bodies.push(Label::new(number.unwrap_or(bodies.len() as u32 + 1), name));
     }
@@ -209,7 +234,8 @@ fn names(model: &FacetModel, surfaces: &[Surface], stems: &[String]) -> Names {
     Names { bodies, patches: model.patches.iter().enumerate().map(patch).collect() }
 }
 
-/// The number that a file gives to a group, if it is the only file and gives each a positive one; else its place.
+/// The number of a group in its file, if that is the only file and numbers all groups positively;
+/// else its index from 1.
 fn group_number(surfaces: &[Surface], groups: &[(usize, usize)], at: usize) -> u32 {
     let own = |&(file, group): &(usize, usize)| {
         u32::try_from(surfaces[file].group_numbers[group]).ok().filter(|&number| number > 0)

@@ -1,152 +1,74 @@
-//! Methods 2 and 3 on all ranks: a coarse mesh, partitioned, distributed, refined or meshed anew inside its refined skins, checked.
+//! Methods 2 and 3 on all ranks: a coarse mesh is partitioned, distributed, refined or meshed
+//! inside its refined skins, and checked.
 
-use super::coarse::{CoarseMesh, CoarseReport, CoarseSettings};
-use super::decompose::{self, CutSettings};
+use super::coarse::CoarseMesh;
+use super::decompose;
+use super::error::{Error, InvalidMesh, RequestError};
+use super::geometry::Geometry;
 use super::mend;
 use super::model::Model;
-use super::part::{Evened, Part, even_out};
-use super::room::{self, Disk};
-use super::skins::{self, Refused};
-use super::target::Outcome;
-use super::wanted::{Wanted, mesh_as_wanted};
-use crate::across;
-use crate::check::{self, Checksum, PartReport, ShapeReport};
-use crate::comm::Communicator;
-use crate::dist::{self, BareMesh, DistMesh};
-use crate::error::{Failure, Status, agree};
-use crate::geometry::Projector;
-use crate::improve::Effort;
-use crate::kernel::tree;
-use crate::mesh::stream::MeshStream;
-use crate::mesh::{GlobalId, Mesh, Names, Rank};
-use crate::migrate::BareStream;
-use crate::partition::ties::Ties;
-use crate::partition::{self, Metrics};
-use crate::periodic::{self, PeriodicMap};
-use crate::progress::Progress;
-use crate::refine::{self, Bends, RefineError, RefinedMesh};
-use crate::size::Source;
+use super::part::{Part, even_out};
+use super::result::{CoarseResult, Generated, Level, Refinement, Refused};
+use super::room::{self};
+use super::settings::{CutSettings, GenerateSettings, Method};
+use super::skins;
+use super::verify::verify;
+use super::wanted::mesh_as_wanted;
+use crate::ground::comm::Communicator;
+use crate::ground::kernel::tree;
+use crate::ground::mesh::periodic::{self, PeriodicMap};
+use crate::ground::mesh::stream::MeshStream;
+use crate::ground::mesh::{GlobalId, Mesh, Names};
+use crate::ground::progress::{Progress, Stage, Work};
+use crate::ground::projector::Projector;
+use crate::ground::size::Source;
+use crate::mesher::improve::Effort;
+use crate::parallel::check::{self, Checksum, PartReport};
+use crate::parallel::distribution::{self, BareMesh, DistMesh};
+use crate::parallel::interfaces;
+use crate::parallel::migrate::BareStream;
+use crate::parallel::partition::ties::Ties;
+use crate::parallel::partition::{self};
+use crate::parallel::refine::{self, Bends, PeriodicCheck, RefineError, RefinedMesh};
 
-/// What becomes of the parts of a coarse mesh.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub enum Method {
-    /// They are refined uniformly (the thesis' second method).
-    #[default]
-    Refine,
-    /// Their skins are, and each is meshed inside (the third).
-    Surface,
-    /// The geometry itself is cut, and each piece is meshed (the first).
-    Decompose(CutSettings),
-}
-
-/// What is to be made.
-#[derive(Clone, Debug)]
-pub struct GenerateSettings {
-    /// What becomes of the coarse mesh.
-    pub method: Method,
-    /// How the coarse mesh is made.
-    pub coarse: CoarseSettings,
-    /// How many tets.
-    pub wanted: Wanted,
-    /// The memory to use for fine vertices on each machine, bytes; without it, what the machine has left.
-    pub memory: Option<u64>,
-    /// What is to be written, to refuse what does not fit before anything is refined.
-    pub disk: Option<Disk>,
-    /// Whether to refuse a partition that has periodic faces and their images in different parts.
-    pub periodic_together: bool,
-}
-
-/// What rank 0 found out on the way.
-#[derive(Clone, Debug)]
-pub struct CoarseResult {
-    /// The coarse mesh, and the part of each of its tets.
-    pub mesh: Mesh,
-    /// The edges that refinement bends.
-    pub bends: Bends,
-    /// The part of each tet.
-    pub parts: Vec<Rank>,
-    /// Its numbers.
-    pub report: CoarseReport,
-    /// How the wanted number came out, if one was wanted.
-    pub outcome: Option<Outcome>,
-    /// How good the partition is.
-    pub partition: Metrics,
-    /// What is periodic in the mesh.
-    pub periodic: PeriodicMap,
-}
-
-/// A refined, checked mesh on each rank.
-#[derive(Debug)]
-pub struct Generated {
-    /// This rank's part.
-    pub part: Part,
-    /// Pieces that each coarse edge was cut into.
-    pub pieces: u32,
-    /// The shapes of the tets of each level of refinement, from the coarse mesh to the last: the same on all ranks.
-    pub levels: Vec<Level>,
-    /// Numbers and names of bodies and boundaries.
-    pub names: Names,
-    /// The check of the whole mesh, the same on all ranks.
-    pub check: PartReport,
-    /// What identifies the mesh, whatever the ranks: the same on all.
-    pub checksum: Checksum,
-    /// What became of periodic faces, if there are any: the same on all.
-    pub periodic: Option<periodic::Checked>,
-    /// Skins that the mesher refused, if parts were meshed inside theirs: the same on all.
-    pub refused: Option<Refused>,
-    /// What was done for tets across interfaces, if parts were meshed each on its own and some were bad: the same on all ranks.
-    pub across: Option<across::Report>,
-    /// What was done to make parts even that were meshed each on its own: the same on all.
-    pub evened: Option<Evened>,
-    /// On rank 0 alone.
-    pub coarse: Option<CoarseResult>,
-}
-
-/// The tets of one level of refinement.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Level {
-    /// Pieces of each coarse edge.
-    pub pieces: u32,
-    /// The number of tets.
-    pub tets: u64,
-    /// Their shapes.
-    pub shape: ShapeReport,
-}
-
-/// Rounds in which the coarse mesh is made finer because refined tets turned out inverted only now.
+/// Maximum number of restarts with a finer coarse mesh after inverted refined tets were found.
 const MOST_ROUNDS: usize = 4;
 
-/// **Collective.** Makes the mesh; only rank 0 needs the `model` and shows `progress`.
+/// **Collective.** Makes the mesh; only rank 0 needs the geometry and reports `progress`.
 ///
 /// # Errors
-/// The same on all ranks: no coarse mesh, more parts than tets, too many vertices on a rank, inverted
-/// tets that no finer coarse mesh mends, a faulty mesh.
+/// The same on all ranks: no coarse mesh, more parts than tets, too many vertices on a rank,
+/// inverted tets that no finer coarse mesh avoids, a faulty mesh.
 pub fn generate(
     comm: &dyn Communicator,
-    model: Option<&Model>,
+    geometry: Option<&Geometry>,
     settings: &GenerateSettings,
     progress: &Progress,
-) -> Result<Generated, Failure> {
+) -> Result<Generated, Error> {
+    let model = geometry.map(|geometry| &geometry.model);
     if let Method::Decompose(cuts) = &settings.method {
         return decomposed(comm, model, cuts, settings, progress);
     }
     let mut sources: Vec<Source> = Vec::new();
     for round in 0.. {
         let made = model.map(|model| coarse_mesh(comm.size(), model, settings, &sources, progress));
-        let mut coarse = agree(comm, made.transpose())?;
+        let mut coarse = comm.agree(made.transpose())?;
         let pieces = broadcast_pieces(comm, coarse.as_ref().map(|(pieces, _)| *pieces))?;
         let (names, projector) = broadcast_geometry(comm, model)?;
         let given = coarse.as_ref().map(|(_, made)| (made.mesh.clone(), made.parts.clone()));
-        let dist = progress.stage("distribute", || dist::distribute(comm, given))?;
-        agree(comm, room::refuse_without_disk(comm.rank(), &dist, pieces, settings.disk.as_ref()))?;
+        let dist = progress.stage(Stage::Distribute, |_| distribution::distribute(comm, given))?;
+        comm.agree(
+            room::refuse_oversized(comm.rank(), &dist, pieces, settings.disk.as_ref()).map_err(Error::from),
+        )?;
         if settings.method == Method::Surface {
             let coarse = coarse.take().map(|(_, made)| made);
             return fill(comm, Parts { model, coarse, dist, projector, names, pieces }, settings, progress);
         }
-        let keep = room::what_fits(comm, &dist, pieces, settings.memory, progress)?;
+        let keep = room::vertices_to_keep(comm, &dist, pieces, settings.memory, progress)?;
         let bends = broadcast_bends(comm, coarse.as_ref().map(|(_, made)| &made.bends))?;
-        let how = refine::Settings { bends, ..refine::Settings::default() };
-        let survey = progress.stage("levels", || survey(comm, &dist, &projector, pieces, &how))?;
+        let how = refine::Settings { bends, nested: settings.nested, ..refine::Settings::default() };
+        let survey =
+            progress.stage(Stage::Levels, |work| survey(comm, &dist, &projector, pieces, &how, work))?;
         let mut levels = match survey {
             Surveyed::Sound(levels) => levels,
             Surveyed::Inverted(bad, _) if round < MOST_ROUNDS => {
@@ -156,19 +78,20 @@ pub fn generate(
             Surveyed::Inverted(_, error) => return Err(error),
         };
         let how = refine::Settings { keep, ..how };
-        // Until the last rank is done.
-        let (refined, bad) = progress.stage("refine", || {
-            let refined = refine::refine(dist, &projector, pieces, &how);
+        // The stage lasts until all ranks are done.
+        let (refined, bad) = progress.stage(Stage::Refine, |work| {
+            let refined = refine::refine_watched(dist, &projector, pieces, &how, work);
             inverted_anywhere(comm, &refined).map(|bad| (refined, bad))
         })?;
         if !bad.is_empty() && round < MOST_ROUNDS {
             lower(&mut sources, coarse.as_ref(), &bad);
             continue;
         }
-        let part = agree(comm, refined.map_err(Failure::from))?;
+        let part = comm.agree(refined.map_err(Error::from))?;
         let map = broadcast_periodic(comm, coarse.as_ref().map(|(_, made)| &made.periodic))?;
         let part = part.with_periodic(map.clone()).with_singular(broadcast_singular(comm, model)?);
-        let (check, checksum) = progress.stage("check", || verdict(comm, &part, &projector))?;
+        let (check, checksum) =
+            progress.stage(Stage::Check, |work| verdict(comm, &part, &projector, work))?;
         let periodic = periodic_verdict(comm, &part, &map, &projector)?;
         levels.extend(check.shape.clone().map(|shape| Level { pieces, tets: check.tets, shape }));
         let coarse = coarse.take().map(|(_, mut made)| {
@@ -190,12 +113,13 @@ pub fn generate(
             across,
             evened,
             coarse,
+            refinement: Some(Refinement { projector, settings: how }),
         });
     }
     unreachable!("the loop ends by itself")
 }
 
-/// A coarse mesh on all ranks, and what rank 0 knows of it.
+/// A distributed coarse mesh, with rank 0's data about it.
 struct Parts<'a> {
     model: Option<&'a Model>,
     coarse: Option<CoarseResult>,
@@ -211,9 +135,9 @@ fn fill(
     parts: Parts,
     settings: &GenerateSettings,
     progress: &Progress,
-) -> Result<Generated, Failure> {
+) -> Result<Generated, Error> {
     let Parts { model, coarse, dist, projector, names, pieces } = parts;
-    agree(comm, skins::refuse_periodic(model))?;
+    comm.agree(skins::refuse_periodic(model).map_err(Error::from))?;
     if matches!(model, Some(Model::Given(given)) if !given.links.is_empty()) {
         progress
             .note("note: the method `surface` keeps no periodic faces: those of the mesh are like others");
@@ -224,27 +148,27 @@ fn fill(
     let effort = settings.coarse.effort.unwrap_or(Effort::Standard);
     let (part, refused) =
         skins::mesh_skins(comm, &dist, &projector, pieces, sizes.as_deref(), effort, progress)?;
-    // The boundary is that of the method `refine`, with no lines of cuts.
-    let across = across::Settings { merge_angle: None, ..across::Settings::default() };
+    // The boundary is that of the method `refine`, without lines where cuts meet it.
+    let across = interfaces::Settings { merge_angle: None, ..interfaces::Settings::default() };
     let whole = Whole { names, projector, pieces, coarse, refused: Some(refused) };
     stored(comm, part, whole, &across, progress)
 }
 
-/// **Collective.** Meshes the pieces that the geometry is cut into.
+/// **Collective.** Meshes the pieces of the geometry.
 fn decomposed(
     comm: &dyn Communicator,
     model: Option<&Model>,
     cuts: &CutSettings,
     settings: &GenerateSettings,
     progress: &Progress,
-) -> Result<Generated, Failure> {
+) -> Result<Generated, Error> {
     let (names, projector) = broadcast_geometry(comm, model)?;
     let (part, pieces, coarse) = decompose::mesh_pieces(comm, model, cuts, settings, progress)?;
     let whole = Whole { names, projector, pieces, coarse, refused: None };
-    stored(comm, part, whole, &across::Settings::default(), progress)
+    stored(comm, part, whole, &interfaces::Settings::default(), progress)
 }
 
-/// What goes with parts that were meshed each on its own.
+/// Data that accompanies separately meshed parts.
 struct Whole {
     names: Names,
     projector: Projector,
@@ -253,87 +177,106 @@ struct Whole {
     refused: Option<Refused>,
 }
 
-/// **Collective.** Improves parts that were meshed each on its own across their interfaces, makes them even, and checks them.
+/// **Collective.** Improves separately meshed parts across their interfaces, balances them, and
+/// checks them.
 fn stored(
     comm: &dyn Communicator,
     part: BareMesh,
     whole: Whole,
-    across: &across::Settings,
+    across: &interfaces::Settings,
     progress: &Progress,
-) -> Result<Generated, Failure> {
+) -> Result<Generated, Error> {
     let Whole { names, projector, pieces, coarse, refused } = whole;
-    let (part, across) = progress.stage("interfaces", || across::improve_across(comm, part, across))?;
+    let (part, across) =
+        progress.stage(Stage::Interfaces, |_| interfaces::improve_across(comm, part, across))?;
     let (part, evened) = even_out(comm, part, progress)?;
     let part = BareStream::new(part);
-    let (check, checksum) = progress.stage("check", || verdict(comm, &part, &projector))?;
+    let (check, checksum) = progress.stage(Stage::Check, |work| verdict(comm, &part, &projector, work))?;
     let level = check.shape.clone().map(|shape| Level { pieces, tets: check.tets, shape });
     let (levels, part) = (level.into_iter().collect(), Part::Stored(Box::new(part)));
     let periodic = None;
-    Ok(Generated { part, pieces, levels, names, check, checksum, periodic, refused, across, evened, coarse })
+    Ok(Generated {
+        part,
+        pieces,
+        levels,
+        names,
+        check,
+        checksum,
+        periodic,
+        refused,
+        across,
+        evened,
+        coarse,
+        refinement: None,
+    })
 }
 
-/// Asks for smaller sizes around coarse tets with inverted children, on the rank that has them.
+/// Adds sources around coarse tets with inverted children, on the rank that has the coarse mesh.
 fn lower(sources: &mut Vec<Source>, coarse: Option<&(u32, CoarseResult)>, bad: &[GlobalId]) {
     if let Some((_, made)) = coarse {
         sources.extend(mend::lowered(&made.mesh, bad));
     }
 }
 
-/// What the levels before the last are like.
+/// The result of refining to the levels before the last.
 enum Surveyed {
     /// All children are positive.
     Sound(Vec<Level>),
     /// These coarse tets have inverted children.
-    Inverted(Vec<GlobalId>, Failure),
+    Inverted(Vec<GlobalId>, Error),
 }
 
-/// **Collective.** Refines to each level before the last in turn, from none on, and measures all tets: a seventh of the work on the last,
-/// and what would be inverted there mostly is so earlier.
+/// **Collective.** Refines to each level before the last, and measures all tets. This takes a
+/// seventh of the work for the last level, and finds most inverted tets early.
 fn survey(
     comm: &dyn Communicator,
     dist: &DistMesh,
     projector: &Projector,
     pieces: u32,
     how: &refine::Settings,
-) -> Result<Surveyed, Failure> {
+    work: &Work,
+) -> Result<Surveyed, Error> {
     let odd = pieces >> pieces.trailing_zeros();
     let doubled = (0..pieces.trailing_zeros()).map(|k| odd << k);
     let mut levels = Vec::new();
-    for n in (odd > 1).then_some(1).into_iter().chain(doubled) {
+    let pieces: Vec<u32> = (odd > 1).then_some(1).into_iter().chain(doubled).collect();
+    let tets = |n: u32| u64::from(n).pow(3);
+    work.step(0.0, 1.0, pieces.iter().map(|&n| tets(n)).sum());
+    for n in pieces {
+        comm.agree(work.proceed().map_err(Error::from))?;
         let refined = refine::refine(dist.clone(), projector, n, how);
         let bad = inverted_anywhere(comm, &refined)?;
-        let part = match agree(comm, refined.map_err(Failure::from)) {
+        let part = match comm.agree(refined.map_err(Error::from)) {
             Err(error) if !bad.is_empty() => return Ok(Surveyed::Inverted(bad, error)),
             other => other?,
         };
         let check = check::check(comm, &part, None, &check::Settings::default())?;
         levels.extend(check.shape.map(|shape| Level { pieces: n, tets: check.tets, shape }));
+        work.add(tets(n));
     }
     Ok(Surveyed::Sound(levels))
 }
 
-/// The coarse mesh, partitioned, and the pieces of its edges.
+/// Makes and partitions the coarse mesh; also returns the subdivisions of its edges.
 fn coarse_mesh(
     parts: u32,
     model: &Model,
     settings: &GenerateSettings,
     sources: &[Source],
     progress: &Progress,
-) -> Result<(u32, CoarseResult), Failure> {
-    let (pieces, made, outcome) = progress
-        .stage("mesh", || mesh_as_wanted(parts, model, &settings.coarse, settings.wanted, sources))?;
+) -> Result<(u32, CoarseResult), Error> {
+    let (pieces, made, outcome) = progress.stage(Stage::Mesh, |work| {
+        mesh_as_wanted(parts, model, &settings.coarse, settings.wanted, sources, work)
+    })?;
     let map = periodic_map(model, &made.mesh)?;
-    let (assigned, metrics) = progress.stage("partition", || {
-        let ties = if parts > 1 { periodic::ties(&made.mesh, &map) } else { Ties::default() };
+    let (assigned, metrics) = progress.stage(Stage::Partition, |_| {
+        let ties = if parts > 1 { partition::periodic_ties(&made.mesh, &map) } else { Ties::default() };
         partition::partition_tied(&made.mesh, parts, &ties, &partition::Settings::default())
     })?;
     if settings.periodic_together && metrics.lost_ties > 0 {
-        return Err(Failure::input(format!(
-            "{} of the {} coarse tets beside periodic faces cannot be in one part with those at their images, which Elmer needs: use \
-             fewer parts or a finer coarse mesh, or insist with --allow-split-periodic",
-            metrics.lost_ties,
-            made.mesh.tets.len()
-        )));
+        return Err(
+            RequestError::SplitPeriodic { lost: metrics.lost_ties, tets: made.mesh.tets.len() }.into()
+        );
     }
     let CoarseMesh { mesh, bends, report } = made;
     Ok((
@@ -342,57 +285,54 @@ fn coarse_mesh(
     ))
 }
 
-/// What is periodic in a coarse mesh.
-fn periodic_map(model: &Model, mesh: &Mesh) -> Result<PeriodicMap, Failure> {
+/// The periodic entities of a coarse mesh.
+fn periodic_map(model: &Model, mesh: &Mesh) -> Result<PeriodicMap, Error> {
     let map = match model {
         Model::Csg(model) => PeriodicMap::of(mesh, periodic::links(&model.features), &model.features.bounds),
         Model::Given(given) => PeriodicMap::of(mesh, given.links.clone(), &tree::bounds(&mesh.points)),
         Model::Facets(_) => Ok(PeriodicMap::default()),
     };
-    map.map_err(|error| Failure::new(Status::NoValidMesh, error))
+    map.map_err(Error::from)
 }
 
-/// **Collective.** What is periodic in the coarse mesh, which rank 0 knows.
-fn broadcast_periodic(comm: &dyn Communicator, map: Option<&PeriodicMap>) -> Result<PeriodicMap, Failure> {
+/// **Collective.** Broadcasts the periodic entities of the coarse mesh from rank 0.
+fn broadcast_periodic(comm: &dyn Communicator, map: Option<&PeriodicMap>) -> Result<PeriodicMap, Error> {
     let mut numbers = map.map(PeriodicMap::encode).unwrap_or_default();
     comm.broadcast(0, &mut numbers)?;
     Ok(PeriodicMap::decode(&numbers))
 }
 
-/// **Collective.** Checks that all images are where they belong.
+/// **Collective.** Checks that all periodic copies are where the motions put them.
 fn periodic_verdict(
     comm: &dyn Communicator,
     part: &RefinedMesh,
     map: &PeriodicMap,
     projector: &Projector,
-) -> Result<Option<periodic::Checked>, Failure> {
+) -> Result<Option<PeriodicCheck>, Error> {
     if map.links.is_empty() {
         return Ok(None);
     }
-    /// Both points of a pair may be as far off as one from its surface, and moving one rounds.
+    /// Tolerance factor: each point of a pair may be off its surface, and the motion rounds.
     const ROOM: f64 = 4.0;
-    let checked = periodic::check(comm, part, map)?;
-    // Points of a mesh without geometry are not projected: they are as far off as the coarse ones may be.
+    let checked = refine::check_periodic(comm, part, map)?;
+    // Without geometry points are not projected: they may be as far off as those of the coarse
+    // mesh.
     let tolerance = if matches!(projector, Projector::Flat) { map.distance } else { projector.tolerance() };
     if checked.lost > 0 || checked.furthest > ROOM * tolerance {
-        let message = format!(
-            "{} vertices of periodic faces have no partner, others are {:e} off; nothing was written",
-            checked.lost, checked.furthest
-        );
-        return Err(Failure::new(Status::NoValidMesh, message));
+        return Err(InvalidMesh::Periodic { lost: checked.lost, furthest: checked.furthest }.into());
     }
     Ok(Some(checked))
 }
 
-/// **Collective.** The pieces that rank 0 chose.
-fn broadcast_pieces(comm: &dyn Communicator, pieces: Option<u32>) -> Result<u32, Failure> {
+/// **Collective.** Broadcasts the subdivisions of coarse edges from rank 0.
+fn broadcast_pieces(comm: &dyn Communicator, pieces: Option<u32>) -> Result<u32, Error> {
     let mut pieces = vec![pieces.unwrap_or(1)];
     comm.broadcast(0, &mut pieces)?;
     Ok(pieces[0])
 }
 
-/// **Collective.** The bent edges that rank 0 knows.
-fn broadcast_bends(comm: &dyn Communicator, bends: Option<&Bends>) -> Result<Bends, Failure> {
+/// **Collective.** Broadcasts the edge displacements from rank 0.
+fn broadcast_bends(comm: &dyn Communicator, bends: Option<&Bends>) -> Result<Bends, Error> {
     let (mut ids, mut middles): (Vec<GlobalId>, Vec<[f64; 3]>) =
         bends.map(|bends| bends.edges().iter().copied().unzip()).unwrap_or_default();
     comm.broadcast(0, &mut ids)?;
@@ -400,8 +340,8 @@ fn broadcast_bends(comm: &dyn Communicator, bends: Option<&Bends>) -> Result<Ben
     Ok(ids.into_iter().zip(middles).collect())
 }
 
-/// **Collective.** What rank 0's geometry tags as singular.
-fn broadcast_singular(comm: &dyn Communicator, model: Option<&Model>) -> Result<csg::Singular, Failure> {
+/// **Collective.** Broadcasts the singular entities of rank 0's geometry.
+fn broadcast_singular(comm: &dyn Communicator, model: Option<&Model>) -> Result<csg::Singular, Error> {
     let csg::Singular { mut patches, mut curves, mut corners } = match model {
         Some(Model::Csg(model)) => model.features.singular(&model.geometry),
         _ => csg::Singular::default(),
@@ -418,7 +358,7 @@ fn broadcast_factors<Id>(
     factors: &mut Vec<(Id, i32)>,
     number: impl Fn(&Id) -> u32,
     id: impl Fn(u32) -> Id,
-) -> Result<(), Failure> {
+) -> Result<(), Error> {
     let mut numbers: Vec<[i64; 2]> =
         factors.iter().map(|(id, factor)| [number(id).into(), (*factor).into()]).collect();
     comm.broadcast(0, &mut numbers)?;
@@ -426,23 +366,23 @@ fn broadcast_factors<Id>(
     Ok(())
 }
 
-/// **Collective.** The names and the surfaces that rank 0 has read.
-fn broadcast_geometry(comm: &dyn Communicator, model: Option<&Model>) -> Result<(Names, Projector), Failure> {
+/// **Collective.** Broadcasts the names and the surfaces from rank 0.
+fn broadcast_geometry(comm: &dyn Communicator, model: Option<&Model>) -> Result<(Names, Projector), Error> {
     let mut bytes = model.map(|m| m.projector().encode()).unwrap_or_default();
     comm.broadcast_bytes(0, &mut bytes)?;
     let names = model.map(Model::names).unwrap_or_default();
     let mut text = serde_json::to_vec(&names).expect("plain data");
     comm.broadcast_bytes(0, &mut text)?;
-    let names = serde_json::from_slice(&text).expect("what rank 0 wrote");
-    let projector = Projector::decode(&bytes).expect("what rank 0 encoded");
+    let names = serde_json::from_slice(&text).expect("JSON from rank 0");
+    let projector = Projector::decode(&bytes).expect("a projector encoded by rank 0");
     Ok((names, projector))
 }
 
-/// **Collective.** The coarse tets with inverted children on any rank.
+/// **Collective.** Gathers the coarse tets with inverted children on any rank.
 fn inverted_anywhere(
     comm: &dyn Communicator,
     refined: &Result<RefinedMesh, RefineError>,
-) -> Result<Vec<GlobalId>, Failure> {
+) -> Result<Vec<GlobalId>, Error> {
     let mine: &[GlobalId] = match refined {
         Err(RefineError::Inverted { coarse, .. }) => coarse,
         _ => &[],
@@ -450,22 +390,16 @@ fn inverted_anywhere(
     Ok(comm.all_gather(mine)?.concat())
 }
 
-/// **Collective.** Checks every child, every boundary vertex and every face between tets.
+/// **Collective.** Checks all tets, boundary vertices and faces between tets.
 fn verdict(
     comm: &dyn Communicator,
     part: &dyn MeshStream,
     projector: &Projector,
-) -> Result<(PartReport, Checksum), Failure> {
-    let report = check::check(comm, part, Some(projector), &check::Settings::default())?;
-    let checksum = check::checksum_of_all(comm, part)?;
-    if report.faults > 0 {
-        let faults: Vec<String> = report.described.iter().map(ToString::to_string).collect();
-        let message =
-            format!("the mesh has {} faults, nothing was written:\n  {}", report.faults, faults.join("\n  "));
-        return Err(Failure::new(Status::NoValidMesh, message));
-    }
+    work: &Work,
+) -> Result<(PartReport, Checksum), Error> {
+    let (report, checksum) = verify(comm, part, Some(projector), work)?;
     if checksum.open != 0 {
-        return Err(Failure::new(Status::NoValidMesh, "faces of the mesh do not match; nothing was written"));
+        return Err(InvalidMesh::OpenFaces.into());
     }
     Ok((report, checksum))
 }
@@ -473,13 +407,13 @@ fn verdict(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::comm::thread;
+    use crate::ground::comm::thread;
 
     #[test]
     fn edges_that_rank_0_bends_are_bent_alike_on_all_ranks() {
         let bends: Bends = [(7, [0.5, 0.0, -1.25]), (1 << 40, [0.1, 0.2, 0.3])].into_iter().collect();
-        let heard =
+        let received =
             thread::run(3, |comm| broadcast_bends(comm, (comm.rank() == 0).then_some(&bends)).unwrap());
-        assert_eq!(heard.unwrap(), vec![bends; 3]);
+        assert_eq!(received.unwrap(), vec![bends; 3]);
     }
 }

@@ -1,71 +1,61 @@
-//! Coarse meshes whose snapped lattices are valid: where a child would be inverted or poor, the sizes are lowered; what then remains is mended by
-//! bending edges.
+//! Makes coarse meshes whose snapped lattices are valid. Where a child would be inverted or poor,
+//! the sizes are lowered; remaining bad children are repaired by curving edges.
 
 use super::coarse::{CoarseError, CoarseMesh};
+use super::error::Error;
 use super::model::Model;
-use crate::dist::{self, DistError};
-use crate::geometry::Projector;
-use crate::mesh::{GlobalId, Mesh, TET_EDGES};
-use crate::refine::{self, Bends, Least, RefineError, Trial};
-use crate::size::Source;
+use crate::ground::mesh::{GlobalId, Mesh, TET_EDGES};
+use crate::ground::projector::Projector;
+use crate::ground::size::Source;
+use crate::parallel::distribution;
+use crate::parallel::refine::{self, Bends, Least, Trial};
 
-/// Why no coarse mesh was found that can be refined.
-#[derive(Debug, thiserror::Error)]
-pub enum MendError {
-    /// There is no coarse mesh at all.
-    #[error(transparent)]
-    Coarse(#[from] CoarseError),
-    /// The coarse mesh cannot be refined.
-    #[error(transparent)]
-    Refine(#[from] RefineError),
-    /// The coarse mesh is not one.
-    #[error(transparent)]
-    Dist(#[from] DistError),
-}
-
-/// Rounds of lowering sizes before the mender gives up.
+/// Maximum number of rounds of lowering sizes.
 const MOST_ROUNDS: u64 = 20;
 
-/// Rounds in which sizes are lowered also where children would only be poor.
+/// Rounds in which sizes are lowered for poor children too, not only for inverted ones.
 const POOR_ROUNDS: u64 = 5;
 
-/// Lattices are tried with as many pieces an edge at most. With 4 the 4 levels of NETGEN's `matrix` at `very-coarse` had 712
-/// inverted tets that no trial had shown; with 16 the directions at vertices are near their limits.
+/// Maximum number of subdivisions of an edge in refinement tests. 4 are too few: NETGEN's `matrix`
+/// at `very-coarse` then has 712 inverted tets at 4 levels. With 16 the directions at vertices are
+/// near their limits.
 const TRIED_PIECES: u32 = 16;
 
-/// What the worst child must keep of the coarse mesh's smallest dihedral angle, and of its worst mean ratio without snapping.
+/// Fraction of the coarse mesh's smallest dihedral angle, and of its worst mean ratio without
+/// snapping, that the worst child must keep.
 const KEPT: f64 = 0.6;
 
-/// Mean ratios better than this may lose more: curvature alone costs that much where there are few elements to a radius.
+/// Mean ratios above this may lose more: curvature alone causes that loss where there are few
+/// elements per radius.
 const GOOD: f64 = 0.35;
 
-/// Tets around an inverted child are asked to be smaller by this.
+/// Factor on the sizes around an inverted child.
 const LOWERED: f64 = 0.6;
 
-/// What worst children must have more than what is asked for not to be worked on again, and what is enough, when edges are bent: in
-/// mean ratio, and in units of the regular tet's angle.
+/// Margin above the required quality below which a child is improved again, and surplus that
+/// suffices, for curved edges: in mean ratio, and in units of the regular tet's angle.
 const BENT: [f64; 2] = [0.01, 0.03];
 
-/// So many tets at most are worth bending edges around: each takes a tenth of a second.
+/// Edges are curved for at most this many bad tets, because each takes a tenth of a second.
 const MOST_BENT: usize = 100;
 
-/// Makes coarse meshes with `make`, which is given the places where sizes must be lowered, until the lattice
-/// of `pieces` an edge has no inverted child, and no poor one. Where some stay, the best of the meshes is taken and edges are bent.
-/// What `make` says of its mesh is passed on.
+/// Makes coarse meshes with `make`, which receives the sources where sizes must be lowered, until
+/// the lattice of `pieces` subdivisions an edge has neither inverted nor poor children. If some
+/// remain, edges of the best mesh are curved. The second value of `make` is passed through.
 ///
 /// # Errors
-/// What failed in the end.
+/// The last failure.
 pub fn refinable<T>(
     model: &Model,
     pieces: u32,
     mut make: impl FnMut(&[Source]) -> Result<(CoarseMesh, T), CoarseError>,
-) -> Result<(CoarseMesh, T), MendError> {
+) -> Result<(CoarseMesh, T), Error> {
     let mut sources = Vec::new();
     let mut best: Option<(Trial, (CoarseMesh, T))> = None;
     for round in 0.. {
         let mut made = make(&sources)?;
         made.0.report.size_corrections += round;
-        let tried = try_out(model, &made.0, pieces.min(TRIED_PIECES))?;
+        let tried = refinement_test(model, &made.0, pieces.min(TRIED_PIECES))?;
         for tets in [&tried.inverted, &tried.poor] {
             sources.extend(lowered(&made.0.mesh, tets));
         }
@@ -94,30 +84,30 @@ pub fn refinable<T>(
     unreachable!("the loop ends by itself")
 }
 
-/// What is wanted of the children of a coarse mesh.
+/// The required quality of the children of a coarse mesh.
 fn least(coarse: &CoarseMesh) -> Least {
     let quality = &coarse.report.quality;
     Least { mean_ratio: KEPT * quality.worst_refined.min(GOOD), dihedral: KEPT * quality.smallest_dihedral }
 }
 
-/// What refinement would make of a coarse mesh.
-fn try_out(model: &Model, coarse: &CoarseMesh, pieces: u32) -> Result<Trial, MendError> {
-    // What is not snapped cannot invert.
+/// Refinement test of a coarse mesh: finds its bad children.
+fn refinement_test(model: &Model, coarse: &CoarseMesh, pieces: u32) -> Result<Trial, Error> {
+    // Without snapping no child can be inverted.
     let projector = model.projector();
     if pieces == 1 || projector == Projector::Flat {
         return Ok(Trial::default());
     }
-    let part = dist::from_serial(coarse.mesh.clone())?;
+    let part = distribution::from_serial(coarse.mesh.clone())?;
     Ok(refine::trial(&part, &projector, pieces, &Bends::default(), least(coarse))?)
 }
 
-/// Bends edges of a coarse mesh for which a trial found bad children, if that makes the worst of them better.
-fn bend(model: &Model, coarse: &mut CoarseMesh, before: &Trial, pieces: u32) -> Result<(), MendError> {
+/// Curves edges of a coarse mesh with bad children, if that improves the worst of them.
+fn bend(model: &Model, coarse: &mut CoarseMesh, before: &Trial, pieces: u32) -> Result<(), Error> {
     if before.poor.len() + before.inverted.len() > MOST_BENT {
         return Ok(());
     }
     let (part, projector, least) =
-        (dist::from_serial(coarse.mesh.clone())?, model.projector(), least(coarse));
+        (distribution::from_serial(coarse.mesh.clone())?, model.projector(), least(coarse));
     let [margin, enough] = BENT;
     let settings = refine::mend::Settings { pieces, least, margin, enough, ..Default::default() };
     let bends = refine::mend(&part, &projector, &settings)?.bends;
@@ -129,8 +119,8 @@ fn bend(model: &Model, coarse: &mut CoarseMesh, before: &Trial, pieces: u32) -> 
     Ok(())
 }
 
-/// Sources that ask for smaller tets where these are: at their corners and the middles of their edges, as
-/// one in the middle would not reach the boundary through the grading.
+/// Sources for smaller tets around the given ones: at their corners and edge midpoints, because one
+/// at the centre would not affect the boundary through the grading.
 pub fn lowered(mesh: &Mesh, tets: &[GlobalId]) -> Vec<Source> {
     let sources = |tet: &GlobalId| {
         let corners = mesh.tets[*tet as usize].map(|v| mesh.points[v.index()]);

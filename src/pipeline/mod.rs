@@ -1,29 +1,38 @@
-//! The stages in order: the one place that knows all of them.
+//! The pipeline from input to checked mesh: the only module that knows all stages.
 
 pub mod coarse;
 pub mod decompose;
+pub mod error;
 mod estimate;
 mod facet_model;
 pub mod generate;
+mod geometry;
 pub mod input;
+pub mod inspect;
 pub mod mend;
+mod mesher;
 pub mod model;
 pub mod moved;
 pub mod names;
 pub mod part;
+#[cfg(test)]
+mod periodic_tests;
+pub mod quality;
+pub mod result;
 pub mod room;
+pub mod settings;
 mod skins;
 pub mod target;
+mod verify;
 pub mod wanted;
 
-pub use coarse::{CoarseError, CoarseMesh, CoarseReport, CoarseSettings};
-pub use decompose::CutSettings;
+pub use coarse::{CoarseError, CoarseReport, CoarseSettings};
 pub use facet_model::FacetSolid;
-pub use generate::{GenerateSettings, Generated, Method, generate};
-pub use model::{CsgModel, Entities, GivenMesh, Model};
+pub use generate::generate;
+pub use geometry::Geometry;
+pub use mesher::Mesher;
+pub use model::Entities;
 pub use moved::{Repartitioned, repartition};
 pub use names::names;
-pub use part::Part;
-pub use room::Disk;
-pub use skins::Refused;
-pub use wanted::Wanted;
+pub use result::{CoarseResult, Generated, Hierarchy, Level, Refused};
+pub use settings::{CutSettings, Disk, GenerateSettings, InputSettings, Method, Wanted};

@@ -1,61 +1,40 @@
-//! What is to be meshed.
+//! The model: any kind of input of the mesher.
 
 use super::coarse::{CoarseError, CoarseMesh, CoarseReport, CoarseSettings};
 use super::facet_model::FacetSolid;
-use crate::facets::FacetSize;
-use crate::geometry::Projector;
-use crate::kernel::quality::QualitySummary;
-use crate::mesh::{Mesh, Names};
-use crate::periodic::Link;
-use crate::size::{GeometricSize, SizeField, SizeSettings};
-use csg::{Features, Geometry};
+use crate::ground::mesh::QualitySummary;
+use crate::ground::mesh::periodic::Link;
+use crate::ground::mesh::{Mesh, Names};
+use crate::ground::progress::Work;
+use crate::ground::projector::Projector;
+use crate::ground::size::{GeometricSize, SizeField, SizeSettings};
+use crate::mesher::facets::FacetSize;
+use crate::mesher::model::CsgModel;
+use csg::Geometry;
 
-/// What is to be meshed, or came meshed.
+/// The input of the mesher.
 #[derive(Clone, Debug)]
 pub enum Model {
-    /// Solids of surfaces.
+    /// Solids of analytic surfaces.
     Csg(Box<CsgModel>),
-    /// Solids of triangles.
+    /// Solids bounded by triangles.
     Facets(Box<FacetSolid>),
-    /// A mesh that came without its geometry.
+    /// An existing mesh without geometry.
     Given(Box<GivenMesh>),
 }
 
-/// A geometry with everything that was found out about it.
-#[derive(Clone, Debug)]
-pub struct CsgModel {
-    /// What the file says.
-    pub geometry: Geometry,
-    /// Its corners, curves and patches.
-    pub features: Features,
-    /// Projection to them.
-    pub projector: csg::Projector,
-}
-
-impl CsgModel {
-    /// Finds the features of a geometry.
-    ///
-    /// # Errors
-    /// What cannot be meshed, with its place.
-    pub fn new(geometry: Geometry) -> Result<Self, csg::FeatureError> {
-        let features = Features::find(&geometry)?;
-        let projector = csg::Projector::new(&geometry, &features);
-        Ok(Self { geometry, features, projector })
-    }
-}
-
-/// A coarse mesh as it came: its boundary is all that is known of its geometry.
+/// An existing coarse mesh; its boundary faces are its only geometry.
 #[derive(Clone, Debug)]
 pub struct GivenMesh {
     /// The mesh.
     pub mesh: Mesh,
     /// Numbers and names of its bodies and boundaries.
     pub names: Names,
-    /// Its patches that are periodic images of others.
+    /// Its patches that are periodic copies of others.
     pub links: Vec<Link>,
 }
 
-/// How many entities a geometry has.
+/// Number of entities of a geometry.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct Entities {
     /// Bodies.
@@ -72,7 +51,7 @@ impl Model {
     /// Finds the features of a geometry.
     ///
     /// # Errors
-    /// What cannot be meshed, with its place.
+    /// A geometry that cannot be meshed, with the location.
     pub fn from_csg(geometry: Geometry) -> Result<Self, csg::FeatureError> {
         Ok(Self::Csg(Box::new(CsgModel::new(geometry)?)))
     }
@@ -95,7 +74,7 @@ impl Model {
         }
     }
 
-    /// How many entities it has.
+    /// Number of its entities.
     pub fn entities(&self) -> Entities {
         match self {
             Self::Csg(model) => Entities {
@@ -114,7 +93,8 @@ impl Model {
         }
     }
 
-    /// The sizes that a coarse mesh is made by, before they are lowered anywhere; `None` of a given mesh.
+    /// The size field of the first coarse mesh, before sizes are lowered; `None` for an existing
+    /// mesh.
     pub(super) fn size_field(&self, settings: &SizeSettings) -> Option<Box<dyn SizeField + '_>> {
         match self {
             Self::Csg(model) => {
@@ -125,14 +105,15 @@ impl Model {
         }
     }
 
-    /// Makes a coarse mesh with the given sizes; see [`coarse::mesh`](super::coarse::mesh). A given mesh is taken as it is.
+    /// Makes a coarse mesh with the given sizes, see [`coarse::mesh`](super::coarse::mesh). An
+    /// existing mesh is used unchanged.
     ///
     /// # Errors
-    /// What failed in the end, with its place.
-    pub fn coarse_mesh(&self, settings: &mut CoarseSettings) -> Result<CoarseMesh, CoarseError> {
+    /// The last failure, with its location.
+    pub fn coarse_mesh(&self, settings: &mut CoarseSettings, work: &Work) -> Result<CoarseMesh, CoarseError> {
         match self {
-            Self::Csg(model) => super::coarse::mesh(model, settings),
-            Self::Facets(solid) => solid.coarse_mesh(settings),
+            Self::Csg(model) => super::coarse::mesh(model, settings, work),
+            Self::Facets(solid) => solid.coarse_mesh(settings, work),
             Self::Given(given) => Ok(given.coarse_mesh()),
         }
     }
@@ -140,7 +121,7 @@ impl Model {
 
 impl GivenMesh {
     fn entities(&self) -> Entities {
-        use crate::mesh::Class;
+        use crate::ground::mesh::Class;
         let corners = self.mesh.classes.iter().filter(|class| matches!(class, Class::Corner(_))).count();
         let curves = self.mesh.segments.iter().map(|s| s.curve.index() + 1).max().unwrap_or(0);
         let Names { bodies, patches } = &self.names;

@@ -1,18 +1,18 @@
-//! A partition on the disk, partitioned anew: read, moved, checked, on any number of ranks.
+//! Repartitions a mesh on disk: reads, moves and checks it on any number of ranks.
 
-use crate::check::{self, Checksum, PartReport};
-use crate::comm::Communicator;
-use crate::dist::BareMesh;
-use crate::error::{Failure, Status, agree};
-use crate::io::elmer::{self, LoadError};
-use crate::mesh::Names;
-use crate::migrate::{self, BareStream, MigrateError, Moved};
-use crate::partition::PartitionError;
-use crate::progress::Progress;
-use crate::repartition::{self, Method, Metrics, RepartitionError};
+use super::error::{Error, InvalidMesh, RequestError};
+use super::verify::verify;
+use crate::files::elmer::{self};
+use crate::ground::comm::Communicator;
+use crate::ground::mesh::Names;
+use crate::ground::progress::{Progress, Stage, Work};
+use crate::parallel::check::{self, Checksum, PartReport};
+use crate::parallel::distribution::BareMesh;
+use crate::parallel::migrate::{self, BareStream, Moved};
+use crate::parallel::repartition::{self, Method, Metrics};
 use std::path::{Path, PathBuf};
 
-/// A mesh that was read in parts and is in others now.
+/// A repartitioned mesh.
 #[derive(Debug)]
 pub struct Repartitioned {
     /// This rank's part.
@@ -21,55 +21,54 @@ pub struct Repartitioned {
     pub names: Names,
     /// The folder with the files that were read.
     pub folder: PathBuf,
-    /// The partition that was read. All fields but `part` are the same on all ranks.
+    /// Quality of the old partition. All fields but `part` are the same on all ranks.
     pub before: Metrics,
-    /// The new one.
+    /// Quality of the new partition.
     pub after: Metrics,
-    /// What moved between ranks.
+    /// The amount of data moved between ranks.
     pub moved: Moved,
-    /// What was found of the files that users should know, a sentence each.
+    /// Messages about the files, one sentence each.
     pub notes: Vec<String>,
     /// The check of the whole mesh.
     pub check: PartReport,
-    /// What identifies the mesh, before and after the move.
+    /// Checksum of the mesh, the same before and after the move.
     pub checksum: Checksum,
 }
 
-/// **Collective.** Reads the partition in `dir`, and gives each rank one of as many parts as there are ranks. With `periodic_together` a mesh
-/// with periodic faces is refused unless there is one part: pairs are not read, so that faces and their images would come to be in different parts.
+/// **Collective.** Reads the partition in `dir` and redistributes it to one part for each rank.
+///
+/// With `periodic_together` a mesh with periodic faces is refused unless there is one part: the
+/// pairs are not read, so faces and their copies could be in different parts.
 ///
 /// # Errors
-/// The same on all ranks: files that cannot be read or hold no valid mesh; more parts than tets; periodic faces; memory.
+/// The same on all ranks: files that cannot be read or have no valid mesh; more parts than tets;
+/// periodic faces; not enough memory.
 pub fn repartition(
     comm: &dyn Communicator,
     dir: &Path,
     method: Method,
     periodic_together: bool,
     progress: &Progress,
-) -> Result<Repartitioned, Failure> {
-    let loaded = progress.stage("read", || elmer::load(comm, dir))?;
+) -> Result<Repartitioned, Error> {
+    let loaded = progress.stage(Stage::Read, |_| elmer::load(comm, dir))?;
     if periodic_together && loaded.is_periodic && comm.size() > 1 {
-        return Err(Failure::input(format!(
-            "{} has periodic faces, and parts are chosen without regard to them, so that Elmer's `Periodic BC` would be wrong: make other \
-             parts of it with `tetmill generate`, which reads pairs, or insist with --allow-split-periodic",
-            loaded.folder.display()
-        )));
+        return Err(RequestError::PeriodicRepartition(loaded.folder).into());
     }
     let (mesh, parts) = (loaded.mesh, comm.size());
-    let (to, before, after) = progress.stage("partition", || {
+    let (to, before, after) = progress.stage(Stage::Partition, |_| {
         let to = repartition::repartition(comm, &mesh, parts, method)?;
         let before = repartition::measure(comm, &mesh, &loaded.part, loaded.parts)?;
         let after = repartition::measure(comm, &mesh, &to, parts)?;
-        Ok::<_, Failure>((to, before, after))
+        Ok::<_, Error>((to, before, after))
     })?;
     let stream = BareStream::new(BareMesh::from(mesh));
     let checksum = check::checksum_of_all(comm, &stream)?;
-    let (bare, mine) = progress.stage("move", || {
+    let (bare, mine) = progress.stage(Stage::Move, |_| {
         migrate::migrate_bare(comm, stream.into_mesh(), &to, &migrate::Settings::default())
     })?;
     let [tets, bytes] = comm.all_reduce_sum_u64([mine.tets, mine.bytes])?;
     let part = BareStream::new(bare);
-    let check = progress.stage("check", || verdict(comm, &part, checksum))?;
+    let check = progress.stage(Stage::Check, |work| verdict(comm, &part, checksum, work))?;
     Ok(Repartitioned {
         part,
         names: loaded.names,
@@ -83,47 +82,13 @@ pub fn repartition(
     })
 }
 
-/// **Collective.** Checks every tet, and that the mesh is the one that was read.
-fn verdict(comm: &dyn Communicator, part: &BareStream, before: Checksum) -> Result<PartReport, Failure> {
-    let report = check::check(comm, part, None, &check::Settings::default())?;
-    let after = check::checksum_of_all(comm, part)?;
-    let described = report.described.iter().map(ToString::to_string).collect::<Vec<_>>().join("; ");
-    let sound = if report.faults > 0 {
-        Err(format!("the mesh has {} faults, nothing was written: {described}", report.faults))
-    } else if after != before {
-        Err(format!("the mesh is {after} after the move, {before} before; nothing was written"))
-    } else {
-        Ok(report)
-    };
-    agree(comm, sound.map_err(|message| Failure::new(Status::NoValidMesh, message)))
-}
-
-impl From<LoadError> for Failure {
-    fn from(error: LoadError) -> Self {
-        let status = if matches!(error, LoadError::Comm(_)) { Status::Rank } else { Status::Input };
-        Self::new(status, error)
-    }
-}
-
-impl From<RepartitionError> for Failure {
-    fn from(error: RepartitionError) -> Self {
-        match error {
-            RepartitionError::Partition(error @ PartitionError::MoreParts { .. }) => Self::input(error),
-            RepartitionError::Partition(error) => error.into(),
-            RepartitionError::Elsewhere { message, .. } => Self::input(message),
-            RepartitionError::Comm(error) => error.into(),
-        }
-    }
-}
-
-impl From<MigrateError> for Failure {
-    fn from(error: MigrateError) -> Self {
-        let status = match error {
-            MigrateError::OutOfMemory { .. } | MigrateError::TooMany { .. } => Status::Resources,
-            MigrateError::Elsewhere { .. } => Status::Resources,
-            MigrateError::Comm(_) => Status::Rank,
-            _ => Status::NoValidMesh,
-        };
-        Self::new(status, error)
-    }
+/// **Collective.** Checks all tets, and that the mesh is unchanged.
+fn verdict(
+    comm: &dyn Communicator,
+    part: &BareStream,
+    before: Checksum,
+    work: &Work,
+) -> Result<PartReport, Error> {
+    let (report, after) = verify(comm, part, None, work)?;
+    if after == before { Ok(report) } else { Err(InvalidMesh::Changed { before, after }.into()) }
 }

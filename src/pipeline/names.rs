@@ -1,9 +1,9 @@
 //! Numbers and names of bodies and boundaries.
 
-use crate::mesh::{Label, Names};
+use crate::ground::mesh::{Label, Names};
 use csg::{Features, Geometry};
 
-/// The numbers and names that the writers use: a body's material, else the name of its solid.
+/// The numbers and names in output files: a body has the name of its material, else of its solid.
 pub fn names(geometry: &Geometry, features: &Features) -> Names {
     let body = |body: &csg::Body| {
         Label::new(body.number, body.material.clone().unwrap_or_else(|| body.name.clone()))

@@ -1,27 +1,27 @@
-//! A rank's part of what was made, as it is kept.
+//! A rank's part of the result, and the balance between parts.
 
-use crate::comm::Communicator;
-use crate::dist::{BareMesh, owner, settle};
-use crate::error::{Failure, Status};
-use crate::mesh::Rank;
-use crate::mesh::stream::MeshStream;
-use crate::migrate::{self, BareStream};
-use crate::progress::Progress;
-use crate::refine::RefinedMesh;
-use crate::repartition::smooth::{self, smooth};
-use crate::repartition::{self, Method, diffuse, islands};
+use super::error::Error;
+use crate::ground::comm::Communicator;
+use crate::ground::mesh::Rank;
+use crate::ground::mesh::stream::MeshStream;
+use crate::ground::progress::{Progress, Stage};
+use crate::parallel::distribution::{BareMesh, owner, settle};
+use crate::parallel::migrate::{self, BareStream};
+use crate::parallel::refine::RefinedMesh;
+use crate::parallel::repartition::smooth::{self, smooth};
+use crate::parallel::repartition::{self, Method, diffuse, islands};
 
-/// The part of the mesh that a rank has.
+/// A rank's part of the mesh.
 #[derive(Debug)]
 pub enum Part {
-    /// A lattice in each coarse tet: tets are computed as they are asked for.
+    /// A lattice in each coarse tet; its tets are computed on request.
     Refined(Box<RefinedMesh>),
-    /// Tets that were meshed, and are kept.
+    /// Stored tets.
     Stored(Box<BareStream>),
 }
 
 impl Part {
-    /// For the checker, the writers and all else that reads a mesh.
+    /// The part as a stream for the checker, the writers and other readers.
     pub fn stream(&self) -> &dyn MeshStream {
         match self {
             Self::Refined(part) => &**part,
@@ -29,7 +29,7 @@ impl Part {
         }
     }
 
-    /// Whether all coordinates are kept, see [`Keep`](crate::refine::Keep).
+    /// Whether all coordinates are stored, see [`Keep`](crate::parallel::refine::Keep).
     pub fn keeps_all(&self) -> bool {
         match self {
             Self::Refined(part) => part.keeps_all(),
@@ -38,24 +38,25 @@ impl Part {
     }
 }
 
-/// How evenly a mesh lies on the ranks: the same on all.
+/// Load balance of a mesh, the same on all ranks.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Balance {
     /// Vertices in more than one part, each counted once.
     pub shared_vertices: u64,
-    /// Tets of the largest part over the mean.
+    /// Number of tets in the largest part, relative to the mean.
     pub tets: f64,
-    /// The largest share of its vertices that a part owns, over the mean.
+    /// The largest fraction of its vertices that a part owns, relative to the mean.
     pub owned: f64,
-    /// Connected pieces of all parts, if tets were meshed on the ranks: else those of the coarse parts.
+    /// Number of connected components of all parts, if the parts are stored; `None` if they were
+    /// refined from coarse parts.
     pub pieces: Option<u64>,
 }
 
-/// **Collective.** Counts what the parts have.
+/// **Collective.** Measures the balance of the parts.
 ///
 /// # Errors
-/// What the ranks cannot say.
-pub fn balance(comm: &dyn Communicator, part: &Part) -> Result<Balance, Failure> {
+/// If a collective operation fails.
+pub fn balance(comm: &dyn Communicator, part: &Part) -> Result<Balance, Error> {
     let pieces = match part {
         Part::Refined(_) => None,
         Part::Stored(part) => Some(repartition::islands::pieces(comm, part.mesh())?),
@@ -80,54 +81,60 @@ pub fn balance(comm: &dyn Communicator, part: &Part) -> Result<Balance, Failure>
     })
 }
 
-/// Parts that were meshed each on its own are made even where the largest is larger than the mean by more than this factor.
+/// Separately meshed parts are balanced if the largest exceeds the mean by more than this factor.
 const UNEVEN: f64 = 1.05;
 
-/// What was done to make parts even: the same on all ranks.
+/// The result of balancing parts, the same on all ranks.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Evened {
-    /// Tets of the largest part over the mean, before.
+    /// Number of tets in the largest part, relative to the mean, before.
     pub imbalance: f64,
-    /// Tets that went to other ranks.
+    /// Number of tets moved to other ranks.
     pub moved: u64,
 }
 
-/// Moves to neighbours at most, before tets are dealt out from nothing: what has to go far goes a part further each time.
+/// Maximum number of diffusion steps to neighbours before repartitioning from scratch: each step
+/// moves tets only one part further.
 const MOST_MOVES: usize = 4;
 
-/// Cuts are ragged by a tet or two only: twice the steps and four times the rounds share a sixth fewer vertices, in three times the time.
+/// Cuts are ragged by a tet or two only. Twice the steps and four times the rounds would share a
+/// sixth fewer vertices, in three times the time.
 const SMOOTHING: smooth::Settings =
     smooth::Settings { steps: 4, rounds: 2, single_moves: 4, imbalance: UNEVEN };
 
-/// Moves of islands at most: one may have gone where another has just left.
+/// Maximum number of moves of disconnected components: one may have gone to a place that another
+/// has just left.
 const MOST_JOINS: usize = 3;
 
-/// **Collective.** Moves tets where the parts are too uneven, to neighbours, and if that is not enough, by a partition from nothing; smooths the cuts between
-/// parts, which are ragged where tets beside them were improved, and brings small pieces of parts to those around them.
+/// **Collective.** Balances uneven parts by moving tets to neighbours, and if that is not enough,
+/// by repartitioning from scratch.
+///
+/// Also smooths the cuts between parts, which are ragged where tets beside them were improved, and
+/// moves small disconnected components to the parts around them.
 ///
 /// # Errors
-/// The same on all ranks: no mesh, memory.
+/// The same on all ranks: an invalid mesh, or not enough memory.
 pub(super) fn even_out(
     comm: &dyn Communicator,
     mut part: BareMesh,
     progress: &Progress,
-) -> Result<(BareMesh, Option<Evened>), Failure> {
-    let uneven = |part: &BareMesh| Ok::<_, Failure>(imbalance(&comm.all_gather_one(part.tets.len() as f64)?));
+) -> Result<(BareMesh, Option<Evened>), Error> {
+    let uneven = |part: &BareMesh| Ok::<_, Error>(imbalance(&comm.all_gather_one(part.tets.len() as f64)?));
     if comm.size() == 1 || part.totals.tets < u64::from(comm.size()) {
         return Ok((part, None));
     }
-    progress.stage("even out", || {
+    progress.stage(Stage::EvenOut, |_| {
         let before = uneven(&part)?;
         let (mut moved, mut imbalance) = (0, before);
         for step in 0..=MOST_MOVES {
-            let mesh = settle(comm, part).map_err(|error| Failure::new(Status::NoValidMesh, error))?;
+            let mesh = settle(comm, part)?;
             let mut to = match step {
                 _ if imbalance <= UNEVEN => vec![mesh.rank; mesh.tets.len()],
                 MOST_MOVES => repartition::repartition(comm, &mesh, comm.size(), Method::default())?,
                 _ => diffuse(comm, &mesh)?,
             };
             smooth(comm, &mesh, None, &mut to, comm.size(), &SMOOTHING)?;
-            part = join(comm, go(comm, mesh.into(), &to, &mut moved)?, &mut moved)?;
+            part = join(comm, migrate_counted(comm, mesh.into(), &to, &mut moved)?, &mut moved)?;
             imbalance = uneven(&part)?;
             if imbalance <= UNEVEN {
                 break;
@@ -138,39 +145,45 @@ pub(super) fn even_out(
     })
 }
 
-/// **Collective.** Moves tets, and counts them.
-fn go(comm: &dyn Communicator, part: BareMesh, to: &[Rank], moved: &mut u64) -> Result<BareMesh, Failure> {
+/// **Collective.** Moves tets to other ranks, and counts them.
+fn migrate_counted(
+    comm: &dyn Communicator,
+    part: BareMesh,
+    to: &[Rank],
+    moved: &mut u64,
+) -> Result<BareMesh, Error> {
     let (part, mine) = migrate::migrate_bare(comm, part, to, &migrate::Settings::default())?;
     *moved += comm.all_reduce_sum_u64([mine.tets])?[0];
     Ok(part)
 }
 
-/// **Collective.** Moves small pieces of parts to those around them.
-fn join(comm: &dyn Communicator, mut part: BareMesh, moved: &mut u64) -> Result<BareMesh, Failure> {
+/// **Collective.** Moves small disconnected components to the parts around them.
+fn join(comm: &dyn Communicator, mut part: BareMesh, moved: &mut u64) -> Result<BareMesh, Error> {
     for _ in 0..MOST_JOINS {
         let to = islands(&part);
         if comm.all_reduce_sum_u64([u64::from(to.iter().any(|rank| *rank != part.rank))])? == [0] {
             break;
         }
-        part = go(comm, part, &to, moved)?;
+        part = migrate_counted(comm, part, &to, moved)?;
     }
     Ok(part)
 }
 
-/// **Collective.** Brings the tets on both sides of interfaces between bodies together, if parts stay even.
-fn join_interfaces(comm: &dyn Communicator, part: BareMesh, moved: &mut u64) -> Result<BareMesh, Failure> {
+/// **Collective.** Brings the tets on both sides of interfaces between bodies into one part, if
+/// parts stay balanced.
+fn join_interfaces(comm: &dyn Communicator, part: BareMesh, moved: &mut u64) -> Result<BareMesh, Error> {
     let last = part.tet_bodies.iter().map(|body| u64::from(body.0)).max().unwrap_or(0);
-    // Bodies are counted from 0: this is the only one.
+    // Bodies count from 0: there is only one.
     if comm.all_reduce_max_u64([last])? == [0] {
         return Ok(part);
     }
-    let mesh = settle(comm, part).map_err(|error| Failure::new(Status::NoValidMesh, error))?;
+    let mesh = settle(comm, part)?;
     let mut to = vec![mesh.rank; mesh.tets.len()];
     repartition::join_interfaces(comm, &mesh, &mut to, comm.size(), UNEVEN)?;
-    go(comm, mesh.into(), &to, moved)
+    migrate_counted(comm, mesh.into(), &to, moved)
 }
 
-/// The largest over the mean.
+/// The maximum divided by the mean.
 fn imbalance(all: &[f64]) -> f64 {
     let mean = all.iter().sum::<f64>() / all.len() as f64;
     all.iter().copied().fold(0.0, f64::max) / mean

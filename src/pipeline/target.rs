@@ -1,48 +1,50 @@
-//! Sizes that give a wanted number of tets.
+//! Finds sizes for a requested number of tets.
 
 use super::coarse::{CoarseError, CoarseMesh, CoarseSettings};
 use super::estimate;
 use super::model::Model;
+use crate::ground::progress::Work;
 
-/// How a coarse mesh with a wanted number of tets came out.
+/// Whether a coarse mesh has the requested number of tets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Outcome {
-    /// As many as asked for, or as few more as were promised: 1.5 times for a coarse mesh, 1.3 times in all.
+    /// In the accepted range: up to 1.5 times the number for a coarse mesh, 1.3 times in total.
     Reached,
-    /// The least that the geometry allows is more.
+    /// The coarsest mesh of the geometry has more tets.
     Least,
-    /// The number jumps over the range: this is the next above.
+    /// No size gives a number in the range: this is the next larger one.
     Jumped,
 }
 
-/// What is aimed at, in units of the target: inside what fits, which begins there or a little below.
+/// The number to aim at, relative to the target: inside the accepted range, which begins near 1.
 const AIM: f64 = 1.15;
 
-/// Meshes made to find the sizes at most: a bracket is cut by half or better each time.
+/// Maximum number of trial meshes; each at least halves the bracket.
 const MOST_TRIES: usize = 24;
 
-/// Estimates are asked for so often.
+/// Number of trials that use the estimate.
 const TRUSTED_TRIES: usize = 4;
 
-/// Sizes that are this many times larger than what the settings say change nothing any more.
+/// Scales beyond this have no effect on the mesh.
 const LARGEST_SCALE: f64 = 1e3;
 
-/// A bracket of sizes narrower than this factor will not come to lie on another number.
+/// A bracket of scales narrower than this factor is not divided further.
 const NARROW: f64 = 1.002;
 
-/// Makes a coarse mesh whose number of tets `fits`, near the `target` or up to half above it, by scaling all sizes; or the
-/// least above the target.
+/// Makes a coarse mesh whose number of tets `fits`, near the `target` or up to half above it, by
+/// scaling all sizes; otherwise the one with the least number above the target.
 ///
-/// Bounds that the user or the file sets (`maxh`) stay upper bounds.
+/// Upper bounds set by the user or the file (`maxh`) are respected.
 ///
 /// # Errors
-/// As [`Model::coarse_mesh`].
+/// Those of [`Model::coarse_mesh`].
 pub fn mesh_to_target(
     model: &Model,
     settings: &mut CoarseSettings,
     target: u64,
     fits: &dyn Fn(u64) -> bool,
+    work: &Work,
 ) -> Result<(CoarseMesh, Outcome), CoarseError> {
     let goal = AIM * target as f64;
     let sources = settings.size.sources.len();
@@ -50,10 +52,12 @@ pub fn mesh_to_target(
     let mut coarse: Option<(f64, f64)> = None;
     let mut finest_failure: Option<CoarseError> = None;
     for tries in 0..MOST_TRIES {
+        work.proceed()?;
         settings.size.sources.truncate(sources);
-        let made = match model.coarse_mesh(settings) {
+        let made = match model.coarse_mesh(settings, work) {
             Ok(made) => made,
-            // Sizes that are too large for the geometry, whatever was corrected: as too few tets.
+            // The sizes are too large for the geometry despite all corrections: treat this as too
+            // few tets.
             Err(error) => {
                 coarse = Some((settings.size.scale, 0.5 * target as f64));
                 finest_failure = Some(error);
@@ -67,7 +71,7 @@ pub fn mesh_to_target(
             return Ok((made, Outcome::Reached));
         }
         let scale = settings.size.scale;
-        // A bracket that estimates do not narrow is narrowed without them.
+        // If estimates do not narrow the bracket, continue without them.
         let expected = (tries < TRUSTED_TRIES)
             .then(|| estimate::scale_for(model, settings, &made, sources, goal))
             .flatten();
@@ -92,12 +96,12 @@ pub fn mesh_to_target(
             Ok((made, Outcome::Jumped))
         }
         (None, Some(error)) => Err(error),
-        (None, None) => model.coarse_mesh(settings).map(|made| (made, Outcome::Jumped)),
+        (None, None) => model.coarse_mesh(settings, work).map(|made| (made, Outcome::Jumped)),
     }
 }
 
-/// The scale to try next: the one that is `expected` to give the number, where there is one within what is known; else by the third
-/// power of the scale, with which the number of tets goes.
+/// The scale to try next: the `expected` one if it is inside the bracket, else from the number of
+/// tets, which goes with the third power of the scale.
 fn next_scale(
     scale: f64,
     goal: f64,
@@ -108,7 +112,7 @@ fn next_scale(
 ) -> f64 {
     match (fine, coarse) {
         (Some((low, made)), Some((high, few))) => {
-            // Linear between the logarithms, kept off the ends so that the bracket shrinks.
+            // Linear between the logarithms, kept away from the ends so that the bracket shrinks.
             let (low_log, high_log) = (low.ln(), high.ln());
             let (many, few) = ((made.report.tets as f64).ln(), few.max(1.0).ln());
             let share = match expected {
@@ -117,7 +121,7 @@ fn next_scale(
             };
             (low_log + share.clamp(0.15, 0.85) * (high_log - low_log)).exp()
         }
-        // Still too many: coarser, faster and faster, as some numbers hardly depend on the sizes.
+        // Still too many: coarsen ever faster, because some numbers hardly depend on the sizes.
         (Some(_), None) => (scale * (count / goal).cbrt().max(1.5).powi(2).min(16.0)).min(LARGEST_SCALE),
         _ => {
             let finer = expected.map_or((count / goal).cbrt(), |expected| expected / scale);

@@ -1,50 +1,38 @@
-//! How many tets are wanted, and the coarse mesh and the pieces of its edges that give them.
+//! Chooses the coarse mesh and the subdivisions of its edges for a requested number of tets.
 //!
-//! T coarse tets become T·n³. Any n is possible, but the lattice of its odd part has no midpoints to come from and is interpolated
-//! point by point: n = m·2ᵏ with m small. So T is steered to where some such n fits, from few enough coarse tets that making them takes no time to
-//! speak of, and not so few that they are badly shaped, or a part gets too few to be balanced.
+//! T coarse tets become T·n³. Any n is possible, but the lattice of its odd factor has no midpoints
+//! and is interpolated point by point, so n = m·2ᵏ with small m. T is adjusted until such an n
+//! fits: small enough that the coarse mesh takes little time, but large enough for good shapes and
+//! balanced parts.
 
 use super::coarse::{CoarseMesh, CoarseSettings};
-use super::mend::{self, MendError};
+use super::error::Error;
+use super::mend;
 use super::model::Model;
+use super::settings::Wanted;
 use super::target::{Outcome, mesh_to_target};
-use crate::refine::lattice::MAX_PIECES;
-use crate::refine::pieces_for;
-use crate::size::Source;
+use crate::ground::progress::Work;
+use crate::ground::size::Source;
+use crate::parallel::refine::lattice::MAX_PIECES;
+use crate::parallel::refine::pieces_for;
 
-/// How many tets are wanted.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Wanted {
-    /// What the sizes give, with edges cut into this many pieces.
-    Sizes {
-        /// Pieces of each coarse edge.
-        pieces: u32,
-    },
-    /// A coarse mesh with this many, and its edges cut into this many pieces.
-    Coarse {
-        /// Tets of the coarse mesh.
-        tets: u64,
-        /// Pieces of each coarse edge.
-        pieces: u32,
-    },
-    /// This many in all, to 1.3 times as many: pieces are chosen.
-    Elements(u64),
-}
-
-/// Below this many coarse tets a mesh that is to have many is not refined, but made finer. The shaft's mesh of 1.4·10⁹ tets has
-/// a smallest dihedral angle of 18° from 5,800 coarse tets.
+/// The coarse mesh of a large mesh has at least this many tets. The shaft's mesh of 1.4·10⁹ tets
+/// has a smallest dihedral angle of 18° from 5,800 coarse tets.
 const LEAST_COARSE: u64 = 5_000;
 
-/// And below this many for each part: METIS keeps parts of 100 tets within a few percent of each other.
+/// It also has at least this many tets for each part: METIS balances parts of 100 tets within a few
+/// percent.
 const LEAST_OF_PART: u64 = 100;
 
-/// The largest odd factor of the pieces that are chosen: with it every n from 8 on is within a ninth of such a one.
+/// The largest odd factor of the subdivisions: every n from 8 on is within a ninth of such a
+/// number.
 const MOST_ODD: u32 = 15;
 
-/// A wanted number is delivered to within this factor above it, ten times the numerator and the denominator.
+/// The accepted factor above the requested number, as numerator and denominator.
 const ROOM: [u64; 2] = [13, 10];
 
-/// The least pieces, with a small odd factor, that make of `tets` coarse tets `count` to 1.3·`count`.
+/// The least number of subdivisions with a small odd factor that turns `tets` coarse tets into
+/// `count` to 1.3·`count`.
 fn pieces_within(tets: u64, count: u64) -> Option<u32> {
     let made = |n: u32| u128::from(tets) * u128::from(n).pow(3);
     let most = u128::from(count) * u128::from(ROOM[0]) / u128::from(ROOM[1]);
@@ -56,41 +44,45 @@ fn is_cheap(n: u32) -> bool {
     n >> n.trailing_zeros() <= MOST_ODD
 }
 
-/// The most pieces with a small odd factor for which `count` tets come of `coarse` tets or more.
+/// The largest number of subdivisions with a small odd factor at which `count` tets need `coarse`
+/// coarse tets or more.
 fn most_pieces(count: u64, coarse: u64) -> u32 {
     let fits = |n: &u32| is_cheap(*n) && u128::from(*n).pow(3) * u128::from(coarse) <= u128::from(count);
     (1..=MAX_PIECES).rev().find(fits).unwrap_or(1)
 }
 
-/// What came of a wish: the pieces of each coarse edge, the coarse mesh, and how the wanted number came out, if one was wanted.
+/// The subdivisions of each coarse edge, the coarse mesh, and whether the requested number was
+/// reached, if one was requested.
 pub(super) type Granted = (u32, CoarseMesh, Option<Outcome>);
 
-/// Makes a coarse mesh that can be refined as wanted, for so many parts. `sources` are added to the sizes.
+/// Makes a coarse mesh that can be refined as requested, for this number of parts. `sources` are
+/// added to the sizes.
 ///
 /// # Errors
-/// No coarse mesh, or none whose children are positive.
+/// No coarse mesh, or none without inverted children.
 pub(super) fn mesh_as_wanted(
     parts: u32,
     model: &Model,
     settings: &CoarseSettings,
     wanted: Wanted,
     sources: &[Source],
-) -> Result<Granted, MendError> {
+    work: &Work,
+) -> Result<Granted, Error> {
     let with = |more: &[Source]| {
         let mut coarse = settings.clone();
         coarse.size.sources.extend(sources.iter().chain(more));
         coarse
     };
     let to_target = |tets: u64, pieces: u32, fits: &dyn Fn(u64) -> bool| {
-        mend::refinable(model, pieces, |more| mesh_to_target(model, &mut with(more), tets, fits))
+        mend::refinable(model, pieces, |more| mesh_to_target(model, &mut with(more), tets, fits, work))
     };
     match wanted {
         Wanted::Elements(count) if let Model::Given(given) = model => {
             let pieces = pieces_for(given.mesh.tets.len() as u64, count);
-            Ok((pieces, model.coarse_mesh(&mut settings.clone())?, None))
+            Ok((pieces, model.coarse_mesh(&mut settings.clone(), work)?, None))
         }
         Wanted::Sizes { pieces } => {
-            let make = |more: &[Source]| Ok((model.coarse_mesh(&mut with(more))?, None));
+            let make = |more: &[Source]| Ok((model.coarse_mesh(&mut with(more), work)?, None));
             let (made, outcome) = mend::refinable(model, pieces, make)?;
             Ok((pieces, made, outcome))
         }
@@ -102,7 +94,7 @@ pub(super) fn mesh_as_wanted(
             let mut pieces = most_pieces(count, LEAST_COARSE.max(LEAST_OF_PART * u64::from(parts)));
             loop {
                 let tets = count.div_ceil(u64::from(pieces).pow(3));
-                // A coarse mesh near what was aimed at, with whatever pieces fit.
+                // Accept a coarse mesh near the goal for which some number of subdivisions fits.
                 let near = |made: u64| made >= tets / 2 && made <= 2 * tets;
                 let fits = |made: u64| near(made) && pieces_within(made, count).is_some();
                 let (made, outcome) = to_target(tets, pieces, &fits)?;
@@ -112,7 +104,7 @@ pub(super) fn mesh_as_wanted(
                 if pieces == 1 {
                     return Ok((pieces, made, Some(outcome)));
                 }
-                // Too fine a coarse mesh for so many pieces: fewer pieces reach the number.
+                // The coarse mesh is too fine for this many subdivisions: fewer reach the number.
                 pieces = (pieces - 1).min(most_pieces(count, made.report.tets));
             }
         }
@@ -128,7 +120,7 @@ mod tests {
         assert_eq!(pieces_within(5_800, 1_400_000_000), Some(64));
         assert_eq!(pieces_within(5_000, 5_000), Some(1));
         assert_eq!(pieces_within(6_501, 5_000), None);
-        // 17 and 19 pieces are passed over for 18 and 20.
+        // 17 and 19 subdivisions are skipped for 18 and 20.
         assert_eq!(pieces_within(1_000, 17_u64.pow(3) * 1_000), Some(18));
         assert_eq!(pieces_within(9, 10_000_000_000), None);
     }

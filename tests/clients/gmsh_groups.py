@@ -1,4 +1,4 @@
-"""Prints what Gmsh finds in a mesh: by name, or `#tag` without one, the number of elements and their measure."""
+"""Prints the groups that Gmsh reads from a mesh: name, or `#tag` without one, number of elements and their measure."""
 
 import json
 import sys

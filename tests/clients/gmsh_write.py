@@ -1,4 +1,4 @@
-"""Writes meshes by Gmsh into a folder: two boxes whose surfaces and volumes are in several groups, one end periodic to the other."""
+"""Writes meshes with Gmsh: two boxes with surfaces and volumes in several groups, and one end periodic to the other."""
 
 import os
 import sys

@@ -1,4 +1,4 @@
-"""Prints what meshio finds in a Gmsh mesh: by name, or `#tag` without one, the number of elements and their measure."""
+"""Prints the groups that meshio reads from a Gmsh mesh: name, or `#tag` without one, number of elements and their measure."""
 
 import json
 import sys

@@ -1,4 +1,4 @@
-"""Writes periodic meshes of first and second order by NETGEN into a folder."""
+"""Writes periodic meshes of first and second order with NETGEN."""
 
 import os
 import sys

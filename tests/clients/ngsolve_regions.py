@@ -1,4 +1,4 @@
-"""Prints what NGSolve finds in a mesh: by name the number of elements and their measure, and checks that names select them."""
+"""Prints the regions that NGSolve reads from a mesh, with number of elements and measure, and checks that names select them."""
 
 import json
 import re
@@ -14,10 +14,10 @@ for key, kind, names in (("boundaries", BND, mesh.GetBoundaries()), ("bodies", V
     sizes = Counter()
     for name, size in zip(names, Integrate(CF(1), mesh, kind, region_wise=True)):
         sizes[name] += size
-    # Materials of unused numbers have no elements.
+    # Materials with unused numbers have no elements.
     found[key] = {name: [counts[name], sizes[name]] for name in sizes if counts[name]}
 
-# What a user writes: a region by name, and a Dirichlet condition on it.
+# Typical use: a region by name, and a Dirichlet condition on it.
 for name, (_, area) in list(found["boundaries"].items())[:20]:
     region = Integrate(CF(1), mesh, definedon=mesh.Boundaries(re.escape(name)))
     assert abs(region - area) < 1e-9, (name, region, area)

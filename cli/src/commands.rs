@@ -1,0 +1,528 @@
+//! The commands: from the options to a written mesh and a summary.
+
+mod decompose;
+mod extras;
+mod outputs;
+mod repartition;
+mod write;
+
+use decompose::cut_settings;
+pub use decompose::run_decompose;
+pub use extras::{long_version, run_completions, run_man};
+use outputs::Outputs;
+pub use repartition::run_repartition;
+use write::{note_losses, place_of, read_back, refuse_unknown, write_formats};
+
+use crate::failure::{Failure, Status, agree};
+use crate::options::{
+    Check, FileFormat, Format, Generate, InputOptions, Inspect, MeshFile, Method, Quality, SizeOptions,
+};
+use crate::report::{LevelReport, MeshReport, PartitionReport, Processes, Report, processes};
+use crate::terminal::Terminal;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+use tetmill::comm::{Communicator, grouped, mpi, thread};
+use tetmill::files::{Destination, elmer, mesh_size, picture, refuse_missing, serial};
+use tetmill::mesh::{MeshStream, Watched};
+
+use tetmill::progress::{Progress, Silent, Stage};
+use tetmill::run::{Balance, CoarseSettings, Disk, GenerateSettings, Outcome, Wanted, balance, generate};
+use tetmill::size::{Closeness, SizeSettings};
+use tetmill::{Generated, Geometry, InputSettings, files, quality};
+
+/// `tetmill generate`
+pub fn run_generate(options: &Generate) -> Result<(), Failure> {
+    set_threads(options.run.threads)?;
+    refuse_unknown(&options.run)?;
+    let start = Instant::now();
+    on_ranks(options.ranks, options.parts, |comm| generate_on(comm, options, start))
+}
+
+/// Runs a command on one rank for each part.
+///
+/// There are `parts` parts, by default as many as ranks. Under `mpirun` the ranks are processes; if
+/// the number of parts differs, some processes run several parts or none.
+fn on_ranks(
+    ranks: Option<u32>,
+    parts: Option<u32>,
+    command: impl Fn(&dyn Communicator) -> Result<(), Failure> + Sync,
+) -> Result<(), Failure> {
+    if mpi::launched() {
+        let done = mpi::run(|comm| {
+            let done = match (ranks, parts) {
+                (Some(ranks), _) if ranks != comm.size() => Err(Failure::input(format!(
+                    "-n {ranks} differs from the {} ranks started by mpirun: leave out -n",
+                    comm.size()
+                ))),
+                (_, Some(parts)) if parts != comm.size() => {
+                    let ran = grouped::run(comm, parts, &command).map_err(Failure::from);
+                    agree(comm, ran.and_then(|results| results.into_iter().collect()))
+                }
+                _ => command(comm),
+            };
+            done.map_err(|failure| print_once(comm, failure))
+        });
+        return done.map_err(Failure::input)?;
+    }
+    let results = thread::run(parts.or(ranks).unwrap_or(1), command)?;
+    results.into_iter().collect()
+}
+
+/// **Collective.** Prints a failure common to all ranks on rank 0, and returns it without its
+/// message.
+///
+/// The barrier keeps the other ranks alive until it is printed: the launcher kills all processes
+/// when one ends with an error.
+fn print_once(comm: &dyn Communicator, failure: Failure) -> Failure {
+    if comm.rank() == 0 {
+        eprintln!("tetmill: {failure}");
+    }
+    match comm.barrier() {
+        Ok(()) => Failure::new(failure.status, ""),
+        Err(error) => error.into(),
+    }
+}
+
+fn method_of(options: &Generate) -> Result<tetmill::Method, Failure> {
+    match options.method {
+        Method::Refine => Ok(tetmill::Method::Refine),
+        Method::Surface => Ok(tetmill::Method::Surface),
+        Method::Decompose => cut_settings(&options.planes).map(tetmill::Method::Decompose),
+    }
+}
+
+fn set_threads(threads: Option<u32>) -> Result<(), Failure> {
+    let threads = threads.unwrap_or(0) as usize;
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .stack_size(thread::POOL_STACK)
+        .build_global()
+        .map_err(|error| Failure::new(Status::Resources, format!("cannot start {threads} threads: {error}")))
+}
+
+/// **Collective.** `tetmill generate` on one rank.
+fn generate_on(comm: &dyn Communicator, options: &Generate, start: Instant) -> Result<(), Failure> {
+    let first = comm.rank() == 0;
+    let target = options.output.clone().unwrap_or_else(|| {
+        options.input.files[0].with_extension("").file_name().map_or_else(|| "mesh".into(), PathBuf::from)
+    });
+    let stem = target.join(options.input.files[0].file_stem().unwrap_or("mesh".as_ref()));
+    let outputs = agree(comm, prepared(comm, || outputs_of(options, &target, &stem, comm.size())))?;
+    let terminal = Terminal::new(options.run.quiet || !first);
+    let progress = Progress::new(&terminal);
+    let geometry = first
+        .then(|| {
+            progress.stage(Stage::Read, |_| read_sized_geometry(&options.input, &options.size, &progress))
+        })
+        .transpose();
+    let geometry = agree(comm, geometry)?;
+    let coarse = agree(comm, coarse_settings(&options.size, first))?;
+    let disk = Some(disk_for(&options.run.format, &target));
+    let method = agree(comm, method_of(options))?;
+    let settings = GenerateSettings {
+        method,
+        coarse,
+        wanted: wanted(options),
+        memory: options.memory,
+        disk,
+        nested: options.nested,
+        periodic_together: options.run.format.contains(&Format::Elmer) && !options.run.allow_split_periodic,
+    };
+    let made = generate(comm, geometry.as_ref(), &settings, &progress)?;
+    let (written, halo) = progress.stage(Stage::Write, |work| {
+        write_formats(comm, made.part.stream(), &made.names, &options.run, [&target, &stem], &progress, work)
+    })?;
+    read_back(comm, &options.run, &target, &progress)?;
+    match &options.picture {
+        Some(_) if !made.part.keeps_all() => progress
+            .note("note: no picture was drawn, because the coordinates of the mesh do not fit in memory"),
+        Some(file) => draw(comm, made.part.stream(), options.cut, file)?,
+        None => {}
+    }
+    let balanced = balance(comm, &made.part)?;
+    let took = processes(comm)?;
+    let Some(geometry) = geometry else { return Ok(()) };
+    let mut report = summary(&geometry, &name_of(&options.input), &made, took, comm.size(), balanced);
+    report.halo = halo;
+    terminal.finish();
+    report.stages = progress.times();
+    report.seconds = start.elapsed().as_secs_f64();
+    report.add_written(written);
+    show_report(&report, options.run.report.as_deref(), &outputs, options.run.quiet, wanted_count(options))
+}
+
+/// The files that `generate` reads and writes.
+fn outputs_of(options: &Generate, target: &Path, stem: &Path, parts: u32) -> Outputs {
+    reading(&options.input, &options.size)
+        .and_reading(options.planes.planes_from.as_ref())
+        .folder(target, stem, &options.run, parts)
+        .file("--report", options.run.report.as_ref())
+        .file("--picture", options.picture.as_ref())
+}
+
+/// Prepares the outputs on rank 0, which creates the files; returns empty outputs on other ranks.
+fn prepared(comm: &dyn Communicator, outputs: impl FnOnce() -> Outputs) -> Result<Outputs, Failure> {
+    if comm.rank() != 0 {
+        return Ok(Outputs::default());
+    }
+    let outputs = outputs();
+    outputs.prepare()?;
+    Ok(outputs)
+}
+
+/// The files that the mesher reads.
+fn reading(input: &InputOptions, size: &SizeOptions) -> Outputs {
+    Outputs::reading(&input.files).and_reading(size.mesh_size_file.as_ref())
+}
+
+/// Reads the input and prints its notes.
+fn read_geometry(options: &InputOptions, progress: &Progress) -> Result<Geometry, Failure> {
+    let mut settings = InputSettings { keep_surface: options.keep_surface, ..InputSettings::default() };
+    if let Some(degrees) = options.feature_angle {
+        settings.facets.feature_angle = degrees.to_radians();
+    }
+    Ok(Geometry::read(&options.files, &settings, &mut |note| progress.note(note))?)
+}
+
+/// Reads the input; sizes are an error if it is a mesh already.
+fn read_sized_geometry(
+    options: &InputOptions,
+    size: &SizeOptions,
+    progress: &Progress,
+) -> Result<Geometry, Failure> {
+    let geometry = read_geometry(options, progress)?;
+    let SizeOptions { preset, maxh, minh, grading, closeness, effort, coarse, mesh_size_file } = size;
+    let sized =
+        [maxh, minh, grading, closeness].iter().any(|length| length.is_some()) || mesh_size_file.is_some();
+    if geometry.is_mesh() && (sized || preset.is_some() || effort.is_some() || coarse.is_some()) {
+        return Err(Failure::input(format!(
+            "{} is a mesh already and is taken as it is: leave out --preset, --maxh, --minh, --grading, \
+             --closeness, --mesh-size-file, --effort and --coarse",
+            name_of(options)
+        )));
+    }
+    Ok(geometry)
+}
+
+/// The names of the inputs, separated by commas.
+fn name_of(options: &InputOptions) -> String {
+    let names: Vec<String> = options.files.iter().map(|file| file.display().to_string()).collect();
+    names.join(", ")
+}
+
+/// Settings of the coarse mesh. Only the rank with `reads` set, which makes the mesh, reads the
+/// mesh-size file.
+fn coarse_settings(options: &SizeOptions, reads: bool) -> Result<CoarseSettings, Failure> {
+    let mut settings = SizeSettings::from(options.preset.unwrap_or_default());
+    settings.maxh = options.maxh;
+    settings.minh = options.minh.unwrap_or(settings.minh);
+    settings.grading = options.grading.unwrap_or(settings.grading);
+    if let Some(ratio) = options.closeness {
+        settings.closeness = Closeness::of_ratio(ratio);
+    }
+    if let Some(file) = options.mesh_size_file.as_ref().filter(|_| reads) {
+        settings.sources = mesh_size::read(file).map_err(Failure::input)?;
+    }
+    Ok(CoarseSettings { size: settings, effort: options.effort })
+}
+
+fn wanted(options: &Generate) -> Wanted {
+    match options.elements {
+        Some(count) => Wanted::Elements(count),
+        None => wanted_coarse(&options.size, options.pieces.unwrap_or(1 << options.levels)),
+    }
+}
+
+fn wanted_coarse(size: &SizeOptions, pieces: u32) -> Wanted {
+    match size.coarse {
+        Some(tets) => Wanted::Coarse { tets, pieces },
+        None => Wanted::Sizes { pieces },
+    }
+}
+
+fn wanted_count(options: &Generate) -> Option<u64> {
+    options.elements.or(options.size.coarse)
+}
+
+/// Estimates the disk space of the formats, in bytes for each vertex, tet and boundary triangle.
+/// Text formats are estimated by short lines.
+fn disk_for(formats: &[Format], folder: &Path) -> Disk {
+    let bytes = |format: &Format| match format {
+        Format::Elmer => [60, 40, 40],
+        Format::Vtu => [32, 44, 30],
+        Format::Msh => [65, 60, 50],
+        Format::Medit => [60, 40, 30],
+        Format::Vol => [58, 40, 42],
+        Format::Geomview => [0, 0, 30],
+        Format::None => [0; 3],
+    };
+    let has_short_ids =
+        |format: &Format| matches!(format, Format::Elmer | Format::Msh | Format::Medit | Format::Vol);
+    let sum = |sum: [u64; 3], more: [u64; 3]| [0, 1, 2].map(|k| sum[k] + more[k]);
+    Disk {
+        folder: std::path::absolute(folder).unwrap_or_else(|_| folder.to_path_buf()),
+        bytes: formats.iter().map(bytes).fold([0; 3], sum),
+        // Formats other than VTU have 32-bit ids.
+        most: formats.iter().any(has_short_ids).then_some(i32::MAX as u64),
+    }
+}
+
+/// **Collective.** Draws the surface of the mesh, or of the part behind a plane.
+///
+/// The colours are those of the parts, or of the patches if there is one part.
+fn draw(
+    comm: &dyn Communicator,
+    part: &dyn MeshStream,
+    cut: Option<picture::Cut>,
+    file: &Path,
+) -> Result<(), Failure> {
+    let color_by = if comm.size() > 1 { picture::ColorBy::Part } else { picture::ColorBy::Patch };
+    let scene = picture::scene_of_part(part, &picture::Look { color_by, cut });
+    let drawn = match picture::gather(comm, &scene)? {
+        Some(scene) => picture::write_png(&picture::render(&scene, &picture::Settings::default()), file),
+        None => Ok(()),
+    };
+    agree(comm, drawn.map_err(Failure::from))
+}
+
+fn summary(
+    geometry: &Geometry,
+    input: &str,
+    made: &Generated,
+    took: Processes,
+    ranks: u32,
+    balance: Balance,
+) -> Report {
+    let coarse = made.coarse.as_ref().expect("rank 0 made the coarse mesh");
+    Report {
+        version: env!("CARGO_PKG_VERSION").into(),
+        geometry: input.to_owned(),
+        entities: geometry.entities(),
+        ranks,
+        threads: rayon::current_num_threads(),
+        levels: made.pieces.ilog2(),
+        pieces: made.pieces,
+        coarse: coarse.report.clone(),
+        wanted: coarse.outcome,
+        mesh: MeshReport::new(&made.check, made.checksum.to_string()),
+        quality_by_level: made.levels.iter().map(LevelReport::new).collect(),
+        partition: PartitionReport::new(&coarse.partition, balance),
+        periodic: made.periodic,
+        skins: made.refused.clone(),
+        across: made.across,
+        evened: made.evened,
+        halo: None,
+        stages: Vec::new(),
+        seconds: 0.0,
+        peak_memory: took.memory(),
+        processes: took,
+        files: 0,
+        bytes: 0,
+    }
+}
+
+/// Prints the summary and writes the report file.
+fn show_report(
+    report: &Report,
+    file: Option<&Path>,
+    outputs: &Outputs,
+    quiet: bool,
+    wanted: Option<u64>,
+) -> Result<(), Failure> {
+    if !quiet {
+        outputs.show(format_args!("{report}\n"))?;
+    }
+    if let (Some(wanted), Some(outcome)) = (wanted, report.wanted) {
+        let got = report.coarse.tets;
+        match outcome {
+            Outcome::Reached => {}
+            Outcome::Least => eprintln!(
+                "note: {wanted} tets were requested; {got} coarse tets are the least that this geometry allows"
+            ),
+            Outcome::Jumped => eprintln!(
+                "note: {wanted} tets were requested; no size gives this number, the next larger is {got} coarse tets"
+            ),
+        }
+    }
+    write_report(file, report)
+}
+
+/// Writes the report file if one was requested.
+fn write_report(file: Option<&Path>, report: &impl serde::Serialize) -> Result<(), Failure> {
+    match file {
+        Some(file) => write_whole(file, &(serde_json::to_string_pretty(report).expect("plain data") + "\n")),
+        None => Ok(()),
+    }
+}
+
+/// Writes to the standard output.
+fn show(text: std::fmt::Arguments) -> Result<(), Failure> {
+    Outputs::default().show(text)
+}
+
+/// Writes a text file. An existing file is unchanged if this fails.
+fn write_whole(file: &Path, text: &str) -> Result<(), Failure> {
+    files::write_file(file, text.len() as u64, |output| output.write(text.as_bytes()))?;
+    Ok(())
+}
+
+/// The output format, by option or extension; an error if the destination does not support it.
+fn format_of(options: &MeshFile) -> Result<serial::Format, Failure> {
+    let format = match options.format {
+        Some(FileFormat::Vtu) => serial::Format::Vtu,
+        Some(FileFormat::Msh) => serial::Format::Gmsh,
+        Some(FileFormat::Mesh) => serial::Format::Medit,
+        Some(FileFormat::Vol) => serial::Format::Netgen,
+        Some(FileFormat::Off) => serial::Format::Off,
+        None => serial::Format::of(&options.output)?,
+    };
+    format.fits(&options.output)?;
+    Ok(format)
+}
+
+/// `tetmill mesh`
+pub fn run_mesh(options: &MeshFile) -> Result<(), Failure> {
+    let start = Instant::now();
+    for file in &options.input.files {
+        refuse_missing(file)?;
+    }
+    let format = format_of(options)?;
+    if options.boundary.is_some() && format != serial::Format::Vtu {
+        return Err(Failure::input("--boundary: only VTU supports it; write a .vtu"));
+    }
+    let place = place_of(options.boundary);
+    let second = format.second(&options.output).filter(|_| place == files::vtu::Boundary::Beside);
+    let outputs = reading(&options.input, &options.size)
+        .file("-o", Some(&options.output))
+        .file("-o", second.as_ref())
+        .file("--report", options.report.as_ref())
+        .file("--picture", options.picture.as_ref());
+    outputs.prepare()?;
+    set_threads(options.threads)?;
+    let comm = thread::alone();
+    let terminal = Terminal::new(options.quiet);
+    let progress = Progress::new(&terminal);
+    let geometry =
+        progress.stage(Stage::Read, |_| read_sized_geometry(&options.input, &options.size, &progress))?;
+    let settings = GenerateSettings {
+        method: tetmill::Method::default(),
+        coarse: coarse_settings(&options.size, true)?,
+        wanted: wanted_coarse(&options.size, 1),
+        memory: None,
+        disk: None,
+        nested: false,
+        periodic_together: false,
+    };
+    let made = generate(&comm, Some(&geometry), &settings, &progress)?;
+    let (part, file) = (made.part.stream(), &options.output);
+    let written = progress.stage(Stage::Write, |work| {
+        let part = &Watched::new(part, work, 1);
+        match format {
+            serial::Format::Vtu => files::vtu::write_with(&comm, part, &made.names, file, place),
+            _ => serial::write_as(part, &made.names, format, file),
+        }
+    })?;
+    note_losses(&made.names, format, file, &progress);
+    if let Some(file) = &options.picture {
+        draw(&comm, made.part.stream(), options.cut, file)?;
+    }
+    let balanced = balance(&comm, &made.part)?;
+    let mut report = summary(&geometry, &name_of(&options.input), &made, processes(&comm)?, 1, balanced);
+    terminal.finish();
+    report.stages = progress.times();
+    report.seconds = start.elapsed().as_secs_f64();
+    report.add_written(written);
+    show_report(&report, options.report.as_deref(), &outputs, options.quiet, options.size.coarse)
+}
+
+/// `tetmill check`
+pub fn run_check(options: &Check) -> Result<(), Failure> {
+    let checked = elmer::check_elmer(&options.directory).map_err(Failure::input)?;
+    let mut faulty = Vec::new();
+    for (layout, faults) in &checked {
+        let folder = layout.folder().display();
+        if options.json {
+            let result = serde_json::json!({
+                "mesh": folder.to_string(), "ok": faults.is_empty(), "text": faults.to_string()
+            });
+            show(format_args!("{result}\n"))?;
+        } else if faults.is_empty() {
+            show(format_args!("{folder}: no faults\n"))?;
+        } else {
+            show(format_args!("{folder}: {faults}\n"))?;
+        }
+        if !faults.is_empty() {
+            faulty.push(folder.to_string());
+        }
+    }
+    if faulty.is_empty() {
+        Ok(())
+    } else {
+        Err(Failure::new(Status::Faults, format!("faults in {}", faulty.join(", "))))
+    }
+}
+
+/// `tetmill quality`
+pub fn run_quality(options: &Quality) -> Result<(), Failure> {
+    let outputs = Outputs::reading(&options.meshes).file("--picture", options.picture.as_ref());
+    outputs.prepare()?;
+    if let Some(file) = &options.picture {
+        refuse_other_pictures(file)?;
+    }
+    if options.json && outputs.take_stdout() {
+        return Err(Failure::input(
+            "--json and --picture both write to the standard output; give a file name",
+        ));
+    }
+    let (mut meshes, mut unreadable) = (Vec::new(), Vec::new());
+    // One at a time: each is measured by all threads, and only one must fit in memory.
+    for path in &options.meshes {
+        match files::volume::read(path) {
+            Ok(read) => meshes.push(quality::Quality::of_file(path.display().to_string(), &read)),
+            Err(error) => unreadable.push(error.to_string()),
+        }
+    }
+    if options.json {
+        let json = serde_json::json!({ "version": env!("CARGO_PKG_VERSION"), "meshes": meshes });
+        show(format_args!("{}\n", serde_json::to_string_pretty(&json).expect("plain data")))?;
+    } else if !meshes.is_empty() {
+        outputs.show(format_args!("{}", quality::table(&meshes)))?;
+    }
+    if let Some(file) = &options.picture {
+        write_whole(file, &quality::histograms(&meshes))?;
+    }
+    if !unreadable.is_empty() {
+        return Err(Failure::input(unreadable.join("\n")));
+    }
+    let faulty: Vec<String> = meshes
+        .iter()
+        .filter(|mesh| mesh.inverted > 0)
+        .map(|mesh| format!("{} inverted tets in {}", mesh.inverted, mesh.mesh))
+        .collect();
+    if faulty.is_empty() { Ok(()) } else { Err(Failure::new(Status::Faults, faulty.join(", "))) }
+}
+
+/// Refuses extensions other than `.svg` for histograms; pipes and devices have none.
+fn refuse_other_pictures(file: &Path) -> Result<(), Failure> {
+    let is_file = matches!(Destination::of(file), Ok(Destination::File(_)));
+    if is_file && file.extension().is_none_or(|ending| ending != "svg") {
+        return Err(Failure::input(format!("histograms are drawn as .svg, not {}", file.display())));
+    }
+    Ok(())
+}
+
+/// `tetmill inspect`
+pub fn run_inspect(options: &Inspect) -> Result<(), Failure> {
+    let progress = Progress::new(&Silent);
+    let geometry = read_geometry(&options.input, &progress)?;
+    let Some(seen) = geometry.inspect() else {
+        let name = name_of(&options.input);
+        return Err(Failure::input(format!("{name} is a mesh, not a geometry: use `tetmill quality`")));
+    };
+    if options.json {
+        show(format_args!("{}\n", serde_json::to_string_pretty(&seen).expect("plain data")))?;
+    } else {
+        show(format_args!("{seen}"))?;
+    }
+    Ok(())
+}

@@ -1,0 +1,59 @@
+//! The command `tetmill` as a library: other programs can run it with their own arguments.
+//!
+//! ```no_run
+//! let status = tetmill_cli::run(["tetmill", "generate", "part.geo", "--levels", "2"]);
+//! # let _: std::process::ExitCode = status;
+//! ```
+//!
+//! The library `tetmill` does all meshing. This crate has the options, the printed texts and the
+//! exit statuses.
+#![forbid(unsafe_code)]
+
+mod cancel;
+mod commands;
+mod failure;
+mod options;
+mod report;
+mod terminal;
+
+use clap::Parser;
+use options::{Cli, Command};
+use std::ffi::OsString;
+use std::process::ExitCode;
+
+/// Runs the command and returns its exit status, 0 on success. `tetmill help COMMAND` lists the
+/// others.
+///
+/// The first argument is the name of the program. Results go to the standard output, messages to
+/// the standard error.
+pub fn run(arguments: impl IntoIterator<Item = impl Into<OsString> + Clone>) -> ExitCode {
+    let cli = match Cli::try_parse_from(arguments) {
+        Ok(cli) => cli,
+        Err(error) => {
+            // A closed standard error cannot be reported anywhere.
+            let _ = error.print();
+            return ExitCode::from(error.exit_code() as u8);
+        }
+    };
+    cancel::listen();
+    let done = match cli.command {
+        Command::Decompose(options) => commands::run_decompose(&options),
+        Command::Generate(options) => commands::run_generate(&options),
+        Command::Mesh(options) => commands::run_mesh(&options),
+        Command::Repartition(options) => commands::run_repartition(&options),
+        Command::Inspect(options) => commands::run_inspect(&options),
+        Command::Check(options) => commands::run_check(&options),
+        Command::Quality(options) => commands::run_quality(&options),
+        Command::Completions(options) => commands::run_completions(&options),
+        Command::Man(options) => commands::run_man(&options),
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            if !failure.message.is_empty() {
+                eprintln!("tetmill: {failure}");
+            }
+            ExitCode::from(failure.status as u8)
+        }
+    }
+}

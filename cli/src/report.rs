@@ -1,0 +1,392 @@
+//! The summary of a run, as text and as JSON. JSON keys are stable: they are only added to.
+
+pub mod halo;
+pub mod moved;
+pub mod processes;
+
+pub use halo::HaloReport;
+pub use processes::{Processes, processes};
+
+use serde::Serialize;
+use std::fmt;
+use tetmill::check::PartReport;
+use tetmill::files::Written;
+use tetmill::memory::sized;
+use tetmill::progress::StageTime;
+use tetmill::run::{
+    Balance, CoarseReport, Entities, Evened, Level, Metrics, Outcome, PeriodicCheck, Refused,
+};
+
+/// Report of a run.
+#[derive(Clone, Debug, Serialize)]
+pub struct Report {
+    /// Version of tetmill.
+    pub version: String,
+    /// The input files.
+    pub geometry: String,
+    /// The geometry's entities.
+    pub entities: Entities,
+    /// Number of ranks, in-process or MPI, which is the number of parts.
+    pub ranks: u32,
+    /// Threads in each process.
+    pub threads: usize,
+    /// Levels of uniform refinement: log₂ of `pieces`, rounded down.
+    pub levels: u32,
+    /// Subdivisions of each coarse edge.
+    pub pieces: u32,
+    /// The coarse mesh.
+    pub coarse: CoarseReport,
+    /// Whether the requested number of coarse tets was reached: `reached`, `least` or `jumped`;
+    /// null if none was requested.
+    pub wanted: Option<Outcome>,
+    /// The fine mesh.
+    pub mesh: MeshReport,
+    /// The shapes of all tets at each level of refinement, from the coarse mesh to the fine one.
+    pub quality_by_level: Vec<LevelReport>,
+    /// The partition.
+    pub partition: PartitionReport,
+    /// Check of the periodic faces; null if there are none.
+    pub periodic: Option<PeriodicCheck>,
+    /// Surfaces of parts that the mesher refused; null if the parts were refined.
+    pub skins: Option<Refused>,
+    /// Improvement of interfaces; null if nothing was done.
+    pub across: Option<tetmill::run::InterfaceReport>,
+    /// Balancing of the parts; null if nothing was done.
+    pub evened: Option<Evened>,
+    /// The ghosts that were written; null if none were requested.
+    pub halo: Option<HaloReport>,
+    /// The stages in order.
+    pub stages: Vec<StageTime>,
+    /// Seconds from start to end.
+    pub seconds: f64,
+    /// Peak resident memory of all processes together, bytes; null if the system does not report
+    /// it.
+    pub peak_memory: Option<u64>,
+    /// Time and memory of the processes.
+    pub processes: Processes,
+    /// Files written.
+    pub files: u64,
+    /// Bytes written.
+    pub bytes: u64,
+}
+/// Report of the mesh.
+#[derive(Clone, Debug, Serialize)]
+pub struct MeshReport {
+    /// Vertices.
+    pub vertices: u64,
+    /// Tets.
+    pub tets: u64,
+    /// Triangles on patches.
+    pub boundary: u64,
+    /// Volume.
+    pub volume: f64,
+    /// Volume of each body.
+    pub body_volumes: Vec<f64>,
+    /// The least mean ratio.
+    pub worst_mean_ratio: f64,
+    /// The mean of the mean ratios.
+    pub mean_mean_ratio: f64,
+    /// The smallest dihedral angle, degrees.
+    pub smallest_dihedral: f64,
+    /// The 1st percentile of each tet's smallest dihedral angle, degrees.
+    pub first_percentile_dihedral: f64,
+    /// The largest dihedral angle, degrees.
+    pub largest_dihedral: f64,
+    /// The largest distance of a boundary vertex from its patch; null if none was measured.
+    pub furthest_off_surface: Option<f64>,
+    /// Identifies the mesh, whatever the number of ranks and threads.
+    pub checksum: String,
+}
+
+impl MeshReport {
+    /// Creates the report from the check of a mesh.
+    pub fn new(check: &PartReport, checksum: String) -> Self {
+        let shape = check.shape.as_ref();
+        Self {
+            vertices: check.vertices,
+            tets: check.tets,
+            boundary: check.boundary,
+            volume: check.volume,
+            body_volumes: check.body_volumes.clone(),
+            worst_mean_ratio: shape.map_or(0.0, |s| s.worst_ratio.value),
+            mean_mean_ratio: check.mean_ratio().unwrap_or(0.0),
+            smallest_dihedral: shape.map_or(0.0, |s| s.smallest_angle.value),
+            first_percentile_dihedral: shape.map_or(0.0, |s| s.smallest_angle_percentile(0.01)),
+            largest_dihedral: shape.map_or(0.0, |s| s.largest_angle.value),
+            furthest_off_surface: check.furthest.map(|f| f.distance),
+            checksum,
+        }
+    }
+}
+
+/// Shapes of all tets of one level of refinement.
+#[derive(Clone, Debug, Serialize)]
+pub struct LevelReport {
+    /// Subdivisions of each coarse edge.
+    pub pieces: u32,
+    /// Tets.
+    pub tets: u64,
+    /// The least mean ratio.
+    pub worst_mean_ratio: f64,
+    /// The 1st percentile of the mean ratios.
+    pub first_percentile_mean_ratio: f64,
+    /// The mean of the mean ratios.
+    pub mean_mean_ratio: f64,
+    /// The smallest dihedral angle, degrees.
+    pub smallest_dihedral: f64,
+    /// The 1st percentile of each tet's smallest dihedral angle, degrees.
+    pub first_percentile_dihedral: f64,
+    /// The largest dihedral angle, degrees.
+    pub largest_dihedral: f64,
+    /// The 99th percentile of each tet's largest dihedral angle, degrees.
+    pub last_percentile_dihedral: f64,
+}
+
+impl LevelReport {
+    /// Creates the report of a level.
+    pub fn new(level: &Level) -> Self {
+        let shape = &level.shape;
+        Self {
+            pieces: level.pieces,
+            tets: level.tets,
+            worst_mean_ratio: shape.worst_ratio.value,
+            first_percentile_mean_ratio: shape.ratio_percentile(0.01),
+            mean_mean_ratio: shape.mean_ratio(),
+            smallest_dihedral: shape.smallest_angle.value,
+            first_percentile_dihedral: shape.smallest_angle_percentile(0.01),
+            largest_dihedral: shape.largest_angle.value,
+            last_percentile_dihedral: shape.largest_angle_percentile(0.99),
+        }
+    }
+}
+
+/// The partition of the mesh.
+#[derive(Clone, Debug, Serialize)]
+pub struct PartitionReport {
+    /// Name of the method.
+    pub method: String,
+    /// The number of parts.
+    pub parts: u32,
+    /// Tets in the largest part over the mean.
+    pub imbalance: f64,
+    /// Coarse faces between parts.
+    pub edge_cut: u64,
+    /// Triangles between bodies whose coarse tets are in different parts. Not counted for parts
+    /// that were meshed separately.
+    pub cut_interfaces: u64,
+    /// Coarse tets at periodic faces that are in another part than Elmer needs.
+    pub split_periodic: u64,
+    /// Connected components of all parts.
+    pub pieces: u64,
+    /// Fine vertices in more than one part, each counted once.
+    pub shared_vertices: u64,
+    /// Largest fraction of its vertices that a part owns, relative to the mean of all parts.
+    pub owner_imbalance: f64,
+}
+
+impl PartitionReport {
+    /// Combines the metrics of the coarse partition with the balance of the fine mesh.
+    pub fn new(metrics: &Metrics, balance: Balance) -> Self {
+        Self {
+            method: metrics.method.map_or("planes through the geometry".into(), |method| method.to_string()),
+            parts: metrics.parts,
+            imbalance: balance.tets,
+            edge_cut: metrics.edge_cut as u64,
+            cut_interfaces: metrics.cut_interfaces as u64,
+            split_periodic: metrics.lost_ties as u64,
+            pieces: balance.pieces.unwrap_or(metrics.pieces as u64),
+            shared_vertices: balance.shared_vertices,
+            owner_imbalance: balance.owned,
+        }
+    }
+}
+
+impl Report {
+    /// Adds the files that were written.
+    pub fn add_written(&mut self, written: Written) {
+        self.files += written.files;
+        self.bytes += written.bytes;
+    }
+}
+
+/// Writes the line about thin regions.
+fn write_thin_walls(f: &mut fmt::Formatter<'_>, coarse: &CoarseReport) -> fmt::Result {
+    let walls = &coarse.thin_walls;
+    let Some(thinnest) = walls.thinnest else { return Ok(()) };
+    write!(f, "           walls as thin as {thinnest:.3e}: ")?;
+    match walls.limited {
+        0 => write!(f, "sizes lowered there")?,
+        limited if limited < walls.places => {
+            write!(f, "sizes lowered there, except where this takes far more tets (--closeness forces it)")?;
+        }
+        _ => write!(f, "too thin, sizes not lowered (--closeness forces it, at the cost of many tets)")?,
+    }
+    writeln!(f)
+}
+
+/// A count with blanks between groups of three digits.
+fn grouped(count: u64) -> String {
+    let digits = count.to_string();
+    let first = digits.len() % 3;
+    let (head, tail) = digits.split_at(first);
+    let mut groups: Vec<&str> = if head.is_empty() { Vec::new() } else { vec![head] };
+    groups.extend((0..tail.len() / 3).map(|i| &tail[3 * i..3 * i + 3]));
+    groups.join(" ")
+}
+
+/// A count with its noun.
+pub fn counted(count: u64, one: &str, several: &str) -> String {
+    format!("{} {}", grouped(count), if count == 1 { one } else { several })
+}
+
+/// The subdivision of coarse edges as text.
+fn cut_into(pieces: u32) -> String {
+    if pieces == 1 {
+        "not refined".into()
+    } else if pieces.is_power_of_two() {
+        counted(pieces.ilog2().into(), "level", "levels")
+    } else {
+        format!("{pieces} pieces an edge")
+    }
+}
+
+impl fmt::Display for Report {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Entities { bodies, corners, curves, patches } = self.entities;
+        writeln!(
+            f,
+            "geometry   {}: {}, {}, {}, {}",
+            self.geometry,
+            counted(bodies as u64, "body", "bodies"),
+            counted(patches as u64, "patch", "patches"),
+            counted(curves as u64, "curve", "curves"),
+            counted(corners as u64, "corner", "corners")
+        )?;
+        let coarse = &self.coarse;
+        write!(f, "coarse     {} tets, {} vertices", grouped(coarse.tets), grouped(coarse.vertices))?;
+        writeln!(
+            f,
+            ", worst mean ratio {:.3}, mean {:.3}",
+            coarse.quality.worst_mean_ratio, coarse.quality.average_mean_ratio
+        )?;
+        if coarse.illegal_repaired + coarse.illegal_left > 0 {
+            writeln!(
+                f,
+                "           {} that refinement would flatten repaired, {} left",
+                counted(coarse.illegal_repaired, "tet", "tets"),
+                coarse.illegal_left
+            )?;
+        }
+        if coarse.bent_edges > 0 {
+            let edges = counted(coarse.bent_edges, "edge", "edges");
+            writeln!(f, "           {edges} curved for better refined tets")?;
+        }
+        write_thin_walls(f, coarse)?;
+        let mesh = &self.mesh;
+        writeln!(
+            f,
+            "mesh       {} tets, {} vertices, {} boundary triangles, {}",
+            grouped(mesh.tets),
+            grouped(mesh.vertices),
+            grouped(mesh.boundary),
+            cut_into(self.pieces)
+        )?;
+        writeln!(
+            f,
+            "quality    mean ratio {:.3} at worst, {:.3} in the mean; dihedral angles {:.1}° to {:.1}°, 1st percentile {:.1}°",
+            mesh.worst_mean_ratio,
+            mesh.mean_mean_ratio,
+            mesh.smallest_dihedral,
+            mesh.largest_dihedral,
+            mesh.first_percentile_dihedral
+        )?;
+        if self.quality_by_level.len() > 1 {
+            let worst: Vec<String> = self
+                .quality_by_level
+                .iter()
+                .map(|l| format!("{:.1}° {:.1}°", l.smallest_dihedral, l.first_percentile_dihedral))
+                .collect();
+            writeln!(f, "by level   smallest dihedral angle and 1st percentile: {}", worst.join(", "))?;
+        }
+        write!(f, "checked    every tet positive; volume {}", mesh.volume)?;
+        if let Some(distance) = mesh.furthest_off_surface {
+            write!(f, "; boundary vertices within {distance:.1e} of their patch")?;
+        }
+        writeln!(f)?;
+        if let Some(PeriodicCheck { pairs, furthest, .. }) = self.periodic {
+            let parts = match self.partition.split_periodic {
+                _ if self.ranks == 1 => String::new(),
+                0 => "; each face in one part with its image".into(),
+                lost => format!(
+                    "; {lost} coarse tets NOT in one part with their images: no `Periodic BC` of Elmer"
+                ),
+            };
+            writeln!(
+                f,
+                "periodic   {} pairs of vertices, within {furthest:.1e} of their motions{parts}",
+                grouped(pairs)
+            )?;
+        }
+        if self.ranks > 1 {
+            let p = &self.partition;
+            writeln!(
+                f,
+                "partition  {} parts by {}, imbalance {:.3}, {} coarse faces cut, {} vertices shared",
+                p.parts,
+                p.method,
+                p.imbalance,
+                grouped(p.edge_cut),
+                grouped(p.shared_vertices)
+            )?;
+        }
+        if let Some(across) = &self.across {
+            writeln!(
+                f,
+                "interfaces {} beside them improved in {}, {} sent to other parts for it; smallest angle {:.1}°, was {:.1}°; {} below {}°, were {}",
+                counted(across.tets, "tet", "tets"),
+                counted(across.rounds.into(), "round", "rounds"),
+                grouped(across.moved),
+                across.smallest_after,
+                across.smallest_before,
+                counted(across.bad_after, "tet", "tets"),
+                across.angle,
+                grouped(across.bad_before)
+            )?;
+        }
+        if let Some(Evened { imbalance, moved }) = self.evened {
+            let moved = counted(moved, "tet", "tets");
+            writeln!(f, "evened     {moved} went to other parts; the imbalance was {imbalance:.3}")?;
+        }
+        if let Some(Refused { skins, first: Some((rank, reason)) }) = &self.skins {
+            writeln!(
+                f,
+                "skins      {skins} refused by the mesher and filled by the lattice; that of rank {rank}: {reason}"
+            )?;
+        }
+        if let Some(halo) = &self.halo {
+            write!(f, "{halo}")?;
+        }
+        let stages: Vec<String> =
+            self.stages.iter().map(|s| format!("{} {:.2}", s.name, s.seconds)).collect();
+        writeln!(f, "seconds    {} in all: {}", format_args!("{:.2}", self.seconds), stages.join(", "))?;
+        write!(f, "{}", self.processes)?;
+        if self.files > 0 {
+            writeln!(f, "written    {}, {}", counted(self.files, "file", "files"), sized(self.bytes))?;
+        }
+        write!(f, "checksum   {}", mesh.checksum)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_grouped_and_nouns_agree_with_them() {
+        assert_eq!(grouped(1_234_567), "1 234 567");
+        assert_eq!(grouped(12), "12");
+        assert_eq!(grouped(123_456), "123 456");
+        assert_eq!(counted(1, "body", "bodies"), "1 body");
+        assert_eq!(counted(1200, "body", "bodies"), "1 200 bodies");
+    }
+}

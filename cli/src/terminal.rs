@@ -1,0 +1,72 @@
+//! Progress display: a bar on a terminal, one line for each stage otherwise, nothing if quiet.
+
+use crate::cancel;
+use indicatif::{ProgressBar, ProgressStyle};
+use std::io::IsTerminal;
+use std::time::Duration;
+use tetmill::progress::{Observer, Stage};
+
+/// Shows the stages of a run on the standard error.
+#[derive(Debug)]
+pub struct Terminal {
+    bar: Option<ProgressBar>,
+    lines: bool,
+}
+
+/// Length of the bar: a stage in thousandths.
+const LENGTH: u64 = 1000;
+
+impl Terminal {
+    /// Creates the display; it shows nothing if `quiet`.
+    pub fn new(quiet: bool) -> Self {
+        let terminal = std::io::stderr().is_terminal();
+        let bar = (!quiet && terminal).then(|| {
+            let template = "{spinner} {msg:12} [{bar:30}] {percent:>3} %  {elapsed}  {eta} left";
+            let style = ProgressStyle::with_template(template).expect("the template is well formed");
+            let bar = ProgressBar::new(LENGTH).with_style(style.progress_chars("=> "));
+            bar.enable_steady_tick(Duration::from_millis(120));
+            bar
+        });
+        Self { bar, lines: !quiet && !terminal }
+    }
+
+    /// Removes the bar.
+    pub fn finish(&self) {
+        if let Some(bar) = &self.bar {
+            bar.finish_and_clear();
+        }
+    }
+}
+
+impl Observer for Terminal {
+    fn begin(&self, stage: Stage) {
+        if let Some(bar) = &self.bar {
+            bar.reset();
+            bar.set_message(stage.name());
+        }
+    }
+
+    fn advance(&self, _: Stage, fraction: f64) {
+        if let Some(bar) = &self.bar {
+            bar.set_position((fraction * LENGTH as f64) as u64);
+        }
+    }
+
+    fn end(&self, stage: Stage, seconds: f64) {
+        if self.lines {
+            eprintln!("{:<12} {seconds:8.2} s", stage.name());
+        }
+    }
+
+    fn is_cancelled(&self) -> bool {
+        cancel::is_cancelled()
+    }
+
+    fn note(&self, text: &str) {
+        match &self.bar {
+            Some(bar) => bar.suspend(|| eprintln!("{text}")),
+            None if self.lines => eprintln!("{text}"),
+            None => {}
+        }
+    }
+}

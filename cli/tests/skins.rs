@@ -1,0 +1,62 @@
+//! `generate -m surface`: parts meshed inside their refined surfaces.
+
+use crate::common::{judged_report, own, report_of, tetmill};
+
+/// Smallest dihedral angle, that of the coarse mesh, and volume of a mesh that passes both
+/// checkers.
+fn made(name: &str, ranks: u32, pieces: u32) -> [f64; 3] {
+    let report = judged_report("surface", name, ranks, &["--pieces", &pieces.to_string()]);
+    assert_eq!(report["skins"]["skins"], 0, "{name}: {}", report["skins"]);
+    let [angle, volume] = ["smallest_dihedral", "volume"].map(|key| report["mesh"][key].as_f64().unwrap());
+    [angle, report["coarse"]["quality"]["smallest_dihedral"].as_f64().unwrap(), volume]
+}
+
+#[test]
+fn parts_of_own_geometries_are_meshed_inside_their_skins() {
+    let names = [
+        "nozzle",
+        "fibres",
+        "tee",
+        "boss_fillet",
+        "ice_cream",
+        "gear",
+        "probe_tank",
+        "layers",
+        "vase",
+        "dome",
+    ];
+    for (name, ranks) in names.into_iter().zip([2, 3, 4, 8, 16, 32].into_iter().cycle()) {
+        let [angle, coarse, volume] = made(name, ranks, 2);
+        // Part surfaces keep the angles of the coarse triangles.
+        assert!(angle > f64::min(8.0, 0.9 * coarse), "{name} on {ranks} ranks: {angle}°, coarse {coarse}°");
+        let refined = report_of(&own(name), &["--preset", "coarse", "--pieces", "2"]);
+        let expected = refined["mesh"]["volume"].as_f64().unwrap();
+        assert!((volume / expected - 1.0).abs() < 1e-12, "{name}: {volume}, refined {expected}");
+    }
+}
+
+#[test]
+fn many_pieces_on_few_and_on_many_ranks_fill_the_same_volume() {
+    let [few, many] = [1, 24].map(|ranks| made("nozzle", ranks, 5)[2]);
+    assert!((few / many - 1.0).abs() < 1e-12);
+}
+
+#[test]
+fn triangles_of_others_are_meshed_in_parts() {
+    let Some(file) = crate::common::shared("netgen-tutorials/part1.stl") else { return };
+    let report = |arguments: &[&str]| {
+        report_of(&file, &[&["--preset", "coarse", "--pieces", "2"], arguments].concat())
+    };
+    let [refined, filled] = [report(&[]), report(&["-m", "surface", "-n", "4"])];
+    assert_eq!(filled["skins"]["skins"], 0);
+    let volume = |report: &serde_json::Value| report["mesh"]["volume"].as_f64().unwrap();
+    assert!((volume(&filled) / volume(&refined) - 1.0).abs() < 1e-12);
+    assert!(filled["mesh"]["smallest_dihedral"].as_f64().unwrap() > 10.0);
+}
+
+#[test]
+fn periodic_faces_are_refused_by_name() {
+    let output = tetmill().arg("generate").arg(own("unit_cell")).args(["-m", "surface"]).output().unwrap();
+    assert_eq!(output.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&output.stderr).contains("identify periodic"));
+}

@@ -1,0 +1,20 @@
+//! The program as users run it: geometries, ranks, the command line, MPI.
+
+mod cli;
+mod common;
+mod decompose;
+mod geometries;
+mod habits;
+mod inputs;
+mod mpirun;
+mod outputs;
+mod parts;
+mod quality;
+mod random_scenes;
+mod ranks;
+mod repartition;
+mod scenes;
+mod skins;
+mod swept;
+mod tutorials;
+mod vtu_clients;

@@ -1,0 +1,139 @@
+//! Numbers of entities in text files: from 1 without gaps, and contiguous per part. Elmer sizes its
+//! tables by the range of ids in a part, and formats that number vertices by their order in the
+//! file need the vertices of a part to be contiguous.
+
+use crate::files::WriteError;
+use crate::ground::comm::Communicator;
+use crate::ground::mesh::ghosts::GhostTet;
+use crate::ground::mesh::stream::{MeshStream, VertexBlock};
+use crate::ground::mesh::{GlobalId, Rank};
+use std::ops::Range;
+
+/// The numbers of one part's entities, from 1; ghosts have the numbers of their own part.
+#[derive(Debug)]
+pub(super) struct Numbering {
+    /// By local vertex index.
+    pub vertices: Vec<u32>,
+    /// The numbers of the vertices that this part owns.
+    owned: Range<u64>,
+    /// The number of the part's first tet; the others follow in local order.
+    first_tet: u64,
+    /// Index of the first ghost tet, and the numbers of ghost tets.
+    ghosts: (u64, Vec<u64>),
+    /// Number of vertices of this part, or of its ghosts, that other parts have too.
+    pub shared: u64,
+}
+
+impl Numbering {
+    /// Whether this part owns the vertex with this local index.
+    pub fn owns(&self, local: usize) -> bool {
+        self.owned.contains(&self.vertices[local].into())
+    }
+
+    /// The number of a tet by its index within the part.
+    pub fn tet(&self, index: u64) -> u64 {
+        let (first_ghost, numbers) = &self.ghosts;
+        match index.checked_sub(*first_ghost) {
+            None => self.first_tet + index,
+            Some(ghost) => numbers[ghost as usize],
+        }
+    }
+}
+
+/// **Collective.** Numbers vertices and tets such that those owned by a part are contiguous: parts
+/// in rank order, entities in local order.
+///
+/// Takes two gathers of counts and one message to each neighbour, 16 bytes for each copy of a
+/// vertex. Callers ensure that the totals fit 32 bits.
+pub(super) fn number(comm: &dyn Communicator, part: &dyn MeshStream) -> Result<Numbering, WriteError> {
+    let rank = part.rank();
+    let mut vertices = vec![0; part.counts().vertices as usize];
+    let mut owned = 0;
+    let mut shared = 0;
+    for_each_vertex(part, |local, id, block| {
+        shared += u64::from(!block.holders.is_empty() || !watchers(part, local).is_empty());
+        if block.owner(id, rank) == rank {
+            owned += 1;
+            vertices[local as usize] = owned;
+        }
+    });
+
+    let own_tets = part.ghosts().map_or(part.counts().tets, |ghosts| ghosts.first_tet);
+    let [vertices_before] = comm.exclusive_scan([u64::from(owned)])?;
+    for number in vertices.iter_mut().filter(|number| **number > 0) {
+        *number += vertices_before as u32;
+    }
+    receive_numbers(comm, part, &mut vertices)?;
+    let mut next = 1;
+    let first_tets = comm.all_gather_one(own_tets)?.into_iter().map(|tets| {
+        next += tets;
+        next - tets
+    });
+    let first_tets: Vec<u64> = first_tets.collect();
+    let of_ghost = |tet: &GhostTet| first_tets[tet.owner as usize] + tet.index;
+    let numbers = part.ghosts().map(|ghosts| ghosts.tets.iter().map(of_ghost).collect()).unwrap_or_default();
+    let owned = vertices_before + 1..vertices_before + 1 + u64::from(owned);
+    Ok(Numbering {
+        vertices,
+        owned,
+        first_tet: first_tets[rank as usize],
+        ghosts: (own_tets, numbers),
+        shared,
+    })
+}
+
+/// The ranks that have a vertex in ghost tets only.
+pub(super) fn watchers(part: &dyn MeshStream, local: u32) -> &[Rank] {
+    part.ghosts().map_or(&[], |ghosts| ghosts.watchers_of(local))
+}
+
+/// Calls `f(local index, global id, its block)` for each vertex in local order.
+fn for_each_vertex(part: &dyn MeshStream, mut f: impl FnMut(u32, GlobalId, &VertexBlock)) {
+    for index in 0..part.vertex_blocks() {
+        let block = part.vertex_block(index);
+        for (local, id) in block.local.clone().zip(block.first_id..) {
+            f(local, id, &block);
+        }
+    }
+}
+
+/// **Collective.** Owners send the numbers of shared vertices to the ranks that have copies or
+/// ghosts of them.
+fn receive_numbers(
+    comm: &dyn Communicator,
+    part: &dyn MeshStream,
+    vertices: &mut [u32],
+) -> Result<(), WriteError> {
+    let rank = part.rank();
+    let mut to_each: Vec<Vec<u64>> = vec![Vec::new(); part.ranks() as usize];
+    let mut missing: Vec<(GlobalId, u32)> = Vec::new();
+    for_each_vertex(part, |local, id, block| {
+        if block.owner(id, rank) == rank {
+            let others = block.holders.iter().filter(|&&holder| holder != rank);
+            for &other in others.chain(watchers(part, local)) {
+                to_each[other as usize].extend([id, u64::from(vertices[local as usize])]);
+            }
+        } else {
+            missing.push((id, local));
+        }
+    });
+    missing.sort_unstable();
+
+    let messages = (0..).zip(to_each).filter(|(_, numbers)| !numbers.is_empty()).collect();
+    let mut received = 0;
+    for (from, numbers) in comm.exchange::<u64>(messages)? {
+        for pair in numbers.chunks_exact(2) {
+            let place = missing.binary_search_by_key(&pair[0], |(id, _)| *id).unwrap_or_else(|_| {
+                panic!("rank {from} sends the number of vertex {}, which rank {rank} does not have", pair[0])
+            });
+            vertices[missing[place].1 as usize] = pair[1] as u32;
+            received += 1;
+        }
+    }
+    assert_eq!(
+        received,
+        missing.len(),
+        "rank {rank} has shared vertices whose numbers their owners do not send"
+    );
+    Ok(())
+}

@@ -1,0 +1,212 @@
+//! Assembles a mesh from the content of a file: used vertices, orientation, bodies, boundary,
+//! classes.
+
+use super::raw::{Label, Raw};
+use super::{VolumeMesh, boundary, classify, orient, periodic};
+use crate::files::input::{Fault, counted};
+use crate::ground::mesh::topology::{self, Faces};
+use crate::ground::mesh::{self, BoundaryTriangle, Mesh, TetId, VertexId};
+use csg::{BodyId, PatchId};
+use std::collections::BTreeMap;
+
+/// The faces of all tets, with the tets on both sides.
+pub(super) struct FaceTable {
+    /// Sorted faces, and the faces of each tet.
+    pub faces: Faces,
+    /// The tets beside each face; `u32::MAX` if there is none.
+    pub tets: Vec<[u32; 2]>,
+}
+
+/// Makes a mesh of a file's content.
+pub(super) fn assemble(mut raw: Raw) -> Result<VolumeMesh, Fault> {
+    check_corners(&raw)?;
+    drop_unused(&mut raw);
+    let Raw { points, tets, tet_labels, .. } = &raw;
+    let mut tets: Vec<[VertexId; 4]> = tets.iter().map(|t| t.map(VertexId)).collect();
+    let faces = topology::faces(points.len(), &tets);
+    let face_tets = topology::face_tets(faces.faces.len(), &faces.tet_faces).map_err(|face| {
+        let [a, b, c] = faces.faces[face.index()].map(|v| v.0);
+        Fault::file(format!(
+            "more than two tetrahedra have the face of the vertices {a}, {b}, {c} (counted from 0)"
+        ))
+    })?;
+    let mut table = FaceTable { faces, tets: face_tets };
+    let turned = orient::orient(points, &mut tets, &mut table);
+    let (labels, body_of) = numbered(tet_labels);
+    let bodies: Vec<BodyId> = body_of.into_iter().map(BodyId).collect();
+    let mut notes = std::mem::take(&mut raw.notes);
+    let found = boundary::find(&raw, &tets, &bodies, &table, &mut notes);
+    let (patch_keys, patch_of) = numbered(&found.keys);
+    let triangles: Vec<BoundaryTriangle> = found
+        .triangles
+        .iter()
+        .zip(patch_of)
+        .map(|(vertices, patch)| BoundaryTriangle { vertices: *vertices, patch: PatchId(patch) })
+        .collect();
+    if raw.higher_order > 0 {
+        notes.push(format!(
+            "the mesh is of higher order: only the corners of {} are kept, so curved edges become straight",
+            counted(raw.higher_order, "element")
+        ));
+    }
+    if turned > 0 {
+        let all = if turned == tets.len() { "all " } else { "" };
+        notes.push(format!("{all}{turned} tets stored in negative orientation turned round"));
+    }
+    let patch_labels: Vec<Label> = patch_keys.iter().map(|key| key.label).collect();
+    let names = crate::ground::mesh::Names {
+        bodies: names_of(&labels, &raw.body_names, "body", &mut notes),
+        patches: names_of(&patch_labels, &raw.patch_names, "boundary", &mut notes),
+    };
+    let mut mesh = Mesh { points: raw.points, tets, bodies, triangles, ..Mesh::default() };
+    classify::classify(&mut mesh, &raw.edges, &raw.edge_labels, &mut notes);
+    let inverted = orient::not_positive(&mesh.points, &mesh.tets).into_iter().map(TetId).collect();
+    let links = periodic::links(&mesh, &raw.periodic, &mut notes);
+    Ok(VolumeMesh { mesh, names, turned, inverted, links, notes })
+}
+
+/// Checks that element vertices exist, and that the four corners of a tet differ.
+fn check_corners(raw: &Raw) -> Result<(), Fault> {
+    let count = raw.points.len();
+    if u32::try_from(count).is_err() || raw.tets.len() > topology::MAX_TETS {
+        return Err(Fault::file(format!(
+            "{count} vertices and {} tets are too many to be read",
+            raw.tets.len()
+        )));
+    }
+    if raw.tets.is_empty() {
+        return Err(Fault::file("the mesh has no tetrahedra"));
+    }
+    fn check<const N: usize>(kind: &str, elements: &[[u32; N]], count: usize) -> Result<(), Fault> {
+        let bad = elements.iter().enumerate().find(|(_, e)| e.iter().any(|&v| v as usize >= count));
+        bad.map_or(Ok(()), |(k, element)| {
+            let vertex = element.iter().max().expect("an element has vertices");
+            Err(Fault::file(format!(
+                "{kind} {} names vertex {}, and the file has {count}",
+                k + 1,
+                u64::from(*vertex) + 1
+            )))
+        })
+    }
+    check("tetrahedron", &raw.tets, count)?;
+    check("triangle", &raw.triangles, count)?;
+    check("edge", &raw.edges, count)?;
+    raw.periodic.iter().try_for_each(|periodic| check("periodic pair", &periodic.pairs, count))?;
+    let twice = |t: &[u32; 4]| (0..4).any(|i| t[..i].contains(&t[i]));
+    match raw.tets.iter().position(twice) {
+        Some(k) => {
+            Err(Fault::file(format!("tetrahedron {} has the same vertex twice: {:?}", k + 1, raw.tets[k])))
+        }
+        None => Ok(()),
+    }
+}
+
+/// Drops vertices that no tet uses, with the triangles, edges and periodic pairs on them.
+fn drop_unused(raw: &mut Raw) {
+    const UNUSED: u32 = u32::MAX;
+    let mut to_kept = vec![UNUSED; raw.points.len()];
+    raw.tets.iter().flatten().for_each(|&v| to_kept[v as usize] = 0);
+    let unused = to_kept.iter().filter(|&&place| place == UNUSED).count();
+    if unused == 0 {
+        return;
+    }
+    for (kept, place) in (0..).zip(to_kept.iter_mut().filter(|place| **place != UNUSED)) {
+        *place = kept;
+    }
+    let mut places = to_kept.iter();
+    raw.points.retain(|_| places.next() != Some(&UNUSED));
+    raw.tets.iter_mut().flatten().for_each(|v| *v = to_kept[*v as usize]);
+    let before = raw.triangles.len() + raw.edges.len();
+    drop_hanging(&mut raw.triangles, &mut raw.triangle_labels, &to_kept, UNUSED);
+    drop_hanging(&mut raw.edges, &mut raw.edge_labels, &to_kept, UNUSED);
+    for periodic in &mut raw.periodic {
+        periodic.pairs.iter_mut().flatten().for_each(|v| *v = to_kept[*v as usize]);
+        periodic.pairs.retain(|pair| !pair.contains(&UNUSED));
+    }
+    let hanging = before - raw.triangles.len() - raw.edges.len();
+    let mut note = format!("{} that no tet uses left out", counted(unused, "vertex"));
+    if hanging > 0 {
+        note += &format!(", with {} on them", counted(hanging, "triangle or edge"));
+    }
+    raw.notes.push(note);
+}
+
+fn drop_hanging<const N: usize, L: Copy>(
+    elements: &mut Vec<[u32; N]>,
+    labels: &mut Vec<L>,
+    to_kept: &[u32],
+    unused: u32,
+) {
+    let mut kept = 0;
+    for k in 0..elements.len() {
+        let element = elements[k].map(|v| to_kept[v as usize]);
+        if element.iter().all(|&v| v != unused) {
+            elements[kept] = element;
+            labels[kept] = labels[k];
+            kept += 1;
+        }
+    }
+    elements.truncate(kept);
+    labels.truncate(kept);
+}
+
+/// Returns the distinct keys, sorted, and for each item the index of its key.
+pub(super) fn numbered<K: Ord + Copy>(keys: &[K]) -> (Vec<K>, Vec<u32>) {
+    let mut places: BTreeMap<K, u32> = BTreeMap::new();
+    let mut last = None;
+    for key in keys {
+        if last.replace(key) != Some(key) {
+            places.insert(*key, 0);
+        }
+    }
+    for (k, place) in (0..).zip(places.values_mut()) {
+        *place = k;
+    }
+    let of_item = keys.iter().map(|key| places[key]).collect();
+    (places.into_keys().collect(), of_item)
+}
+
+/// The largest number that the writers support.
+const MOST: i64 = i32::MAX as i64;
+
+/// Assigns a number from 1 and names to each label. Labels without a valid number get numbers above
+/// the largest one, a different one for each entity.
+fn names_of(
+    labels: &[Label],
+    given: &BTreeMap<i64, Vec<String>>,
+    kind: &str,
+    notes: &mut Vec<String>,
+) -> Vec<mesh::Label> {
+    let valid = |number: i64| (1..=MOST).contains(&number);
+    let mut next = labels.iter().map(|l| l.number).filter(|&n| valid(n)).max().unwrap_or(0) + 1;
+    let mut replaced: BTreeMap<[i64; 2], i64> = BTreeMap::new();
+    let mut names = Vec::with_capacity(labels.len());
+    for label in labels {
+        let number = if valid(label.number) {
+            label.number
+        } else {
+            let entity = if label.number == 0 { label.entity } else { 0 };
+            *replaced.entry([label.number, entity]).or_insert_with(|| {
+                let number = next;
+                next += 1;
+                if label.number != 0 && given.get(&label.number).is_none() {
+                    notes.push(format!("{kind} number {} of the file is {number} here", label.number));
+                }
+                number
+            })
+        };
+        let mut own = given.get(&label.number).cloned().unwrap_or_default();
+        own.retain(|name| !name.is_empty());
+        // More labels than free numbers do not fit in memory.
+        names.push(mesh::Label { number: number.min(MOST) as u32, names: own });
+    }
+    let in_no_group: Vec<i64> = (replaced.iter())
+        .filter(|([number, entity], _)| *number == 0 && *entity != 0)
+        .map(|(_, number)| *number)
+        .collect();
+    if let (Some(first), Some(last)) = (in_no_group.iter().min(), in_no_group.iter().max()) {
+        let range = if first == last { format!("{first}") } else { format!("{first} to {last}") };
+        notes.push(format!("{kind} without number in the file: {range} here"));
+    }
+    names
+}

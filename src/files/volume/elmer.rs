@@ -1,0 +1,71 @@
+//! Reads an Elmer mesh, serial or partitioned, with the reader of `check`.
+
+use super::assemble::assemble;
+use super::raw::{Label, PeriodicPairs, Raw, Shape};
+use super::{VolumeMesh, gmsh::Ids};
+use crate::files::elmer::{ElmerMesh, PairsOfNodes, names_of, pairs_of, read_corners};
+use crate::files::input::{Fault, ReadError};
+use std::collections::BTreeSet;
+use std::path::Path;
+
+/// Reads the mesh of a folder with its periodic pairs; names come from `mesh.names` there or in the
+/// parent of a partition.
+pub(super) fn read(folder: &Path) -> Result<VolumeMesh, ReadError> {
+    let (mesh, of_second_order) = read_corners(folder)?;
+    let at = mesh.layout.folder().to_path_buf();
+    let mut raw = joined(&mesh, pairs_of(&at)?).map_err(|fault| fault.in_file(&at, b""))?;
+    raw.higher_order = of_second_order;
+    [raw.body_names, raw.patch_names] = names_of(&at);
+    assemble(raw).map_err(|fault| fault.in_file(&at, b""))
+}
+
+/// Joins all parts; nodes and elements are sorted by id.
+fn joined(mesh: &ElmerMesh, pairs: PairsOfNodes) -> Result<Raw, Fault> {
+    let mut nodes: Vec<_> = mesh.parts.iter().flat_map(|part| &part.nodes).collect();
+    nodes.sort_by_key(|node| node.id);
+    nodes.dedup_by_key(|node| node.id);
+    if let Some(node) = nodes.iter().find(|node| node.point.iter().any(|x| !x.is_finite())) {
+        return Err(Fault::file(format!("node {} has a coordinate that is not a finite number", node.id)));
+    }
+    let ids: Vec<u64> = nodes.iter().map(|node| node.id.into()).collect();
+    let ids = Ids::new(&ids)?;
+    let mut raw = Raw { points: nodes.iter().map(|node| node.point).collect(), ..Raw::default() };
+    let place = |id: u32, what: &str, of: u32| {
+        ids.place(id.into())
+            .ok_or_else(|| Fault::file(format!("{what} {of} names node {id}, which is not there")))
+    };
+    for (identification, pairs) in pairs {
+        let places = |[image, of]: [u32; 2]| {
+            let node = |id: u32| place(id, "a pair of identification", identification);
+            Ok([node(image)?, node(of)?])
+        };
+        let pairs = pairs.into_iter().map(places).collect::<Result<_, Fault>>()?;
+        raw.periodic.push(PeriodicPairs { identification: identification.into(), pairs });
+    }
+    let mut elements: Vec<_> = mesh.parts.iter().flat_map(|part| &part.elements).collect();
+    elements.sort_by_key(|element| element.id);
+    for element in elements {
+        let mut corners = [0; 4];
+        for (corner, node) in corners.iter_mut().zip(element.nodes) {
+            *corner = place(node, "element", element.id)?;
+        }
+        raw.add(Shape::Tet, &corners, Label::number(element.body.into())).map_err(Fault::file)?;
+    }
+    let mut triangles: Vec<_> = mesh.parts.iter().flat_map(|part| &part.boundary).collect();
+    triangles.sort_by_key(|triangle| triangle.id);
+    let mut seen = BTreeSet::new();
+    for triangle in triangles {
+        // A triangle between two parts may be in both.
+        let mut key = triangle.nodes;
+        key.sort_unstable();
+        if !seen.insert(key) {
+            continue;
+        }
+        let mut corners = [0; 3];
+        for (corner, node) in corners.iter_mut().zip(triangle.nodes) {
+            *corner = place(node, "boundary element", triangle.id)?;
+        }
+        raw.add(Shape::Triangle, &corners, Label::number(triangle.boundary.into())).map_err(Fault::file)?;
+    }
+    Ok(raw)
+}

@@ -1,0 +1,143 @@
+//! Reads tetrahedral meshes of other programs: Gmsh, NETGEN, Medit, TetGen, VTU and Elmer.
+//!
+//! [`read`] returns a classified [`Mesh`]: bodies from the numbers of tets; patches from the
+//! numbers of triangles and the bodies on both sides; curves where patches meet and along the edges
+//! in the file; corners where curves end or meet. Faces on the outside and between bodies without a
+//! triangle in the file become patches of their own. [`VolumeMesh::notes`] lists repairs and
+//! omissions.
+//!
+//! **Orientation.** NETGEN stores tets negatively, and its `.mesh` files do not record that. So the
+//! orientation of most tets is taken as the convention of the file. The other tets are reversed if
+//! this makes neighbours agree: the writer ignored the order of vertices. If neighbours agree
+//! already, such tets are truly inverted: they are kept and listed in [`VolumeMesh::inverted`].
+//!
+//! *Not* checked: other overlaps of tets. Of second-order elements only the corners are kept.
+
+mod assemble;
+mod boundary;
+mod classify;
+mod elmer;
+mod gmsh;
+mod gmsh4;
+mod gmsh_periodic;
+#[cfg(test)]
+mod group_tests;
+mod groups;
+mod medit;
+mod medit_binary;
+mod netgen;
+#[cfg(test)]
+mod order_tests;
+mod orient;
+mod periodic;
+mod pvtu;
+mod raw;
+#[cfg(test)]
+mod samples;
+#[cfg(test)]
+mod tests;
+mod tetgen;
+mod vtu;
+mod vtu_arrays;
+#[cfg(test)]
+mod vtu_tests;
+
+pub use super::input::{Place, ReadError};
+
+use super::arrays::{ArrayError, MeshArrays, check};
+use super::input::{Fault, ending, load, refuse_missing};
+use crate::ground::mesh::periodic::Link;
+use crate::ground::mesh::{Mesh, Names, TetId};
+use raw::{Label, NamesByNumber, Raw};
+use std::collections::BTreeMap;
+use std::io::Read;
+use std::path::Path;
+
+/// Files that [`read`] accepts.
+pub const KNOWN: &str = ".vtu, .pvtu, .msh (Gmsh), .vol and .vol.gz (NETGEN), .mesh and .meshb (Medit), \
+    .ele, .node and .face (TetGen), and the folder of an Elmer mesh";
+
+/// A tetrahedral mesh read from a file or from arrays.
+#[derive(Clone, Debug, Default)]
+pub struct VolumeMesh {
+    /// The mesh; its tets are positively oriented except the inverted ones.
+    pub mesh: Mesh,
+    /// Numbers and names, from 1. Patches with the same boundary number between different bodies
+    /// share it.
+    pub names: Names,
+    /// Number of tets whose vertices were reordered for a positive orientation.
+    pub turned: usize,
+    /// Tets that are not positively oriented: inverted or flat.
+    pub inverted: Vec<TetId>,
+    /// Periodic copies of patches, with their masters.
+    pub links: Vec<Link>,
+    /// Repairs, additions and omissions, one sentence each.
+    pub notes: Vec<String>,
+}
+
+/// Reads a mesh in the format of the file's extension, see [`KNOWN`].
+///
+/// # Errors
+/// Unknown formats; malformed or truncated content, with line or byte; elements other than tets and
+/// their boundaries; faces of more than two tets; I/O errors.
+pub fn read(path: &Path) -> Result<VolumeMesh, ReadError> {
+    refuse_missing(path)?;
+    if path.is_dir() {
+        return elmer::read(path);
+    }
+    let parse: fn(&[u8]) -> Result<Raw, Fault> = match ending(path).as_str() {
+        "vtu" => return vtu::read(path),
+        "pvtu" => return pvtu::read(path),
+        "ele" | "node" | "face" => return tetgen::read(path),
+        "gz" if ending(Path::new(path.file_stem().unwrap_or_default())) == "vol" => {
+            let content = load(path)?;
+            let mut text = Vec::new();
+            flate2::read::MultiGzDecoder::new(&content[..])
+                .read_to_end(&mut text)
+                .map_err(ReadError::io(path))?;
+            return finish(netgen::parse(&text), path, &text);
+        }
+        "msh" => gmsh::parse,
+        "vol" => netgen::parse,
+        "mesh" => medit::parse,
+        "meshb" => medit_binary::parse,
+        _ => return Err(ReadError::UnknownFormat { path: path.to_path_buf(), known: KNOWN }),
+    };
+    let content = load(path)?;
+    finish(parse(&content), path, &content)
+}
+
+fn finish(raw: Result<Raw, Fault>, path: &Path, content: &[u8]) -> Result<VolumeMesh, ReadError> {
+    raw.and_then(assemble::assemble).map_err(|fault| fault.in_file(path, content))
+}
+
+/// Makes a mesh of arrays in memory.
+///
+/// # Errors
+/// Indices out of range, coordinates that are not finite, lists of the wrong length, faces of more
+/// than two tets.
+pub fn of_arrays(arrays: &MeshArrays) -> Result<VolumeMesh, ArrayError> {
+    let lengths = [
+        ("body numbers", arrays.bodies.len(), arrays.tets.len()),
+        ("boundary numbers", arrays.boundaries.len(), arrays.triangles.len()),
+    ];
+    check(arrays.points, lengths)?;
+    let labels = |numbers: &[u32], count: usize| -> Vec<Label> {
+        let number = |index: usize| numbers.get(index).copied().map_or(1, i64::from);
+        (0..count).map(|index| Label::number(number(index))).collect()
+    };
+    let names = |names: &BTreeMap<u32, String>| -> NamesByNumber {
+        names.iter().map(|(number, name)| (i64::from(*number), vec![name.clone()])).collect()
+    };
+    let raw = Raw {
+        points: arrays.points.iter().map(|&p| p.into()).collect(),
+        tets: arrays.tets.to_vec(),
+        tet_labels: labels(arrays.bodies, arrays.tets.len()),
+        triangles: arrays.triangles.to_vec(),
+        triangle_labels: labels(arrays.boundaries, arrays.triangles.len()),
+        body_names: names(&arrays.body_names),
+        patch_names: names(&arrays.boundary_names),
+        ..Raw::default()
+    };
+    Ok(assemble::assemble(raw)?)
+}

@@ -1,0 +1,148 @@
+//! VTK's XML files of unstructured grids with one piece: tets, and triangles on their boundary.
+//!
+//! Arrays may be text, base64 (inline or appended) or raw, and compressed by zlib. Body and
+//! boundary numbers come from the first known cell array, see [`LABELS`]; boundaries from
+//! `BoundaryId` if there is one. Cells marked as copies by `vtkGhostType` are skipped. Files of
+//! tetmill have names of bodies and boundaries in `FieldData`, and by default the boundary in a
+//! second file, `STEM.boundary.vtu`, which is read too.
+
+use super::raw::{Label, Raw, Shape};
+use super::vtu_arrays::{Document, Section};
+use super::{VolumeMesh, finish};
+use crate::files::input::{Fault, ReadError, load};
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// Cell arrays with numbers of bodies and boundaries: ours, then those of Gmsh, of meshio for Gmsh
+/// and Medit, and of Elmer.
+const LABELS: [&str; 6] =
+    ["BodyId", "CellEntityIds", "gmsh:physical", "medit:ref", "GeometryIds", "BoundaryId"];
+
+/// Reads the file, and the boundary file beside it.
+pub(super) fn read(path: &Path) -> Result<VolumeMesh, ReadError> {
+    let content = load(path)?;
+    let mut raw = parse(&content).map_err(|fault| fault.in_file(path, &content))?;
+    let beside = path.with_extension("boundary.vtu");
+    if raw.raw.triangles.is_empty() && !raw.vertex_ids.is_empty() && beside.exists() {
+        let content = load(&beside)?;
+        let boundary = parse(&content).map_err(|fault| fault.in_file(&beside, &content))?;
+        add_boundary(&mut raw, boundary).map_err(|fault| fault.in_file(&beside, &content))?;
+    }
+    finish(Ok(raw.raw), path, &content)
+}
+
+/// A file's mesh, with the global ids of its vertices and tets if it has them.
+#[derive(Default)]
+pub(super) struct Grid {
+    pub raw: Raw,
+    pub vertex_ids: Vec<i64>,
+    pub tet_ids: Vec<i64>,
+}
+
+/// The numbers of cells in the first of these arrays that exists.
+fn labels(document: &Document, names: &[&str], cells: usize) -> Result<Option<Vec<i64>>, Fault> {
+    let array = names.iter().find_map(|name| document.array(Section::CellData, Some(name)));
+    let labels = array.map(|array| array.ints()).transpose()?;
+    if labels.as_ref().is_some_and(|labels| labels.len() != cells) {
+        return Err(Fault::file("the array of body numbers has another length than the cells"));
+    }
+    Ok(labels)
+}
+
+pub(super) fn parse(content: &[u8]) -> Result<Grid, Fault> {
+    let document = Document::read(content)?;
+    let coordinates = document.required(Section::Points, None)?.floats()?;
+    let (points, rest) = coordinates.as_chunks::<3>();
+    if !rest.is_empty() {
+        return Err(Fault::file("the number of coordinates is not a multiple of three"));
+    }
+    if points.iter().flatten().any(|x| !x.is_finite()) {
+        return Err(Fault::file("a coordinate is not a finite number"));
+    }
+    let connectivity = document.required(Section::Cells, Some("connectivity"))?.ints()?;
+    let offsets = document.required(Section::Cells, Some("offsets"))?.ints()?;
+    let types = document.required(Section::Cells, Some("types"))?.ints()?;
+    if offsets.len() != types.len() {
+        return Err(Fault::file(format!("{} offsets and {} types of cells", offsets.len(), types.len())));
+    }
+    let of_tets = labels(&document, &LABELS, types.len())?;
+    let of_triangles = labels(&document, &["BoundaryId"], types.len())?;
+    let of_triangles = of_triangles.as_ref().or(of_tets.as_ref());
+    let ids = document.ids(Section::CellData, "GlobalElementId")?;
+    let mut tet_ids = Vec::new();
+    let copies =
+        document.array(Section::CellData, Some("vtkGhostType")).map(|array| array.ints()).transpose()?;
+    let is_copy =
+        |cell: usize| copies.as_ref().and_then(|copies| copies.get(cell)).is_some_and(|c| c & 1 == 1);
+    let mut raw =
+        Raw { points: points.iter().map(|p| p.map(|x| x + 0.0).into()).collect(), ..Raw::default() };
+    let mut nodes = Vec::new();
+    let mut begin = 0;
+    for (cell, (&end, &kind)) in offsets.iter().zip(&types).enumerate() {
+        let vertices = usize::try_from(end).ok().and_then(|end| connectivity.get(begin..end));
+        let vertices =
+            vertices.ok_or_else(|| Fault::file(format!("the offset {end} of cell {cell} is wrong")))?;
+        begin = end as usize;
+        if is_copy(cell) {
+            continue;
+        }
+        nodes.clear();
+        for &vertex in vertices {
+            let index = u32::try_from(vertex).ok().filter(|&v| (v as usize) < points.len());
+            nodes.push(index.ok_or_else(|| {
+                Fault::file(format!(
+                    "cell {cell} names vertex {vertex}, and the file has {}, from 0",
+                    points.len()
+                ))
+            })?);
+        }
+        let labels = if shape(kind) == Shape::Triangle { of_triangles } else { of_tets.as_ref() };
+        let label = Label::number(labels.map_or(0, |labels| labels[cell]));
+        raw.add(shape(kind), &nodes, label)
+            .map_err(|message| Fault::file(format!("cell {cell} is {message}")))?;
+        tet_ids.extend(ids.get(cell).filter(|_| shape(kind) == Shape::Tet));
+    }
+    raw.add_names(document.names()?);
+    if document.array(Section::PointData, Some("PeriodicId")).is_some() {
+        raw.notes.push(
+            "the pairs of periodic vertices (PeriodicId) are left out: the mesh is not periodic here".into(),
+        );
+    }
+    Ok(Grid { raw, vertex_ids: document.ids(Section::PointData, "GlobalNodeId")?, tet_ids })
+}
+
+/// The shape of a VTK cell type.
+fn shape(kind: i64) -> Shape {
+    match kind {
+        1 | 2 => Shape::Point,
+        3 | 4 | 21 => Shape::Edge,
+        5 | 22 => Shape::Triangle,
+        10 | 24 => Shape::Tet,
+        8 | 9 | 23 | 28 => Shape::Other("quadrangle"),
+        11 | 12 | 25 | 29 => Shape::Other("hexahedron"),
+        13 | 26 => Shape::Other("prism"),
+        14 | 27 => Shape::Other("pyramid"),
+        _ => Shape::Other("cell of another type"),
+    }
+}
+
+/// Adds the triangles of a separate file; vertices are matched by their ids.
+pub(super) fn add_boundary(grid: &mut Grid, boundary: Grid) -> Result<(), Fault> {
+    let places: BTreeMap<i64, u32> = grid.vertex_ids.iter().copied().zip(0..).collect();
+    let to_place = |&v: &u32| {
+        let id = boundary.vertex_ids.get(v as usize);
+        let place =
+            id.and_then(|id| places.get(id)).filter(|&&place| (place as usize) < grid.raw.points.len());
+        place.copied().ok_or_else(|| Fault::file(format!("vertex {v} is none of the mesh beside the file")))
+    };
+    for (triangle, label) in boundary.raw.triangles.iter().zip(&boundary.raw.triangle_labels) {
+        let mut vertices = [0; 3];
+        for (place, v) in vertices.iter_mut().zip(triangle) {
+            *place = to_place(v)?;
+        }
+        grid.raw.triangles.push(vertices);
+        grid.raw.triangle_labels.push(*label);
+    }
+    grid.raw.add_names([boundary.raw.body_names, boundary.raw.patch_names]);
+    Ok(())
+}

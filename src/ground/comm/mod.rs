@@ -1,0 +1,118 @@
+//! Ranks that exchange messages: one small trait, two backends.
+//!
+//! A **rank** is one of several programs, or threads of one program, that do the same work on
+//! different parts of a mesh. They meet in **collective** operations: every rank calls them, in the
+//! same order.
+//!
+//! ```
+//! use tetmill::comm::{Communicator, thread};
+//!
+//! let sums = thread::run(3, |comm: &dyn Communicator| {
+//!     let mine = u64::from(comm.rank()) + 1;
+//!     comm.all_reduce_sum_u64([mine]).unwrap()[0]
+//! });
+//! assert_eq!(sums.unwrap(), [6, 6, 6]);
+//! ```
+//!
+//! | backend | ranks are | when one fails |
+//! |---|---|---|
+//! | [`thread`] | threads of this process | the others get [`CommError::RankFailed`] |
+//! | [`mpi`] (feature `mpi`) | processes that `mpirun` started | the job ends with a message |
+//! | [`grouped`] | threads of the ranks of another communicator, as many as wanted | as in that one |
+//!
+//! Messages are slices of plain numbers; [`pack`] puts several slices into one message. Both
+//! backends pass one suite, [`conformance`].
+//!
+//! Not here: point-to-point messages outside a collective operation, subgroups of ranks, and calls
+//! from several threads of one rank (a communicator is not `Sync`).
+
+pub mod agree;
+#[doc(hidden)]
+pub mod conformance;
+pub mod grouped;
+pub mod launch;
+#[cfg(feature = "mpi")]
+pub mod mpi;
+#[cfg(not(feature = "mpi"))]
+#[path = "mpi_disabled.rs"]
+pub mod mpi;
+pub mod pack;
+pub mod thread;
+pub mod typed;
+
+/// A rank of the communicator; also the index of the part on that rank.
+pub type Rank = u32;
+
+use crate::ground::error::{ErrorKind, HasKind};
+
+/// Why this rank cannot continue although it had no error of its own.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum CommError {
+    /// Another rank panicked or returned early.
+    #[error("rank {0} failed")]
+    RankFailed(Rank),
+    /// Zero ranks were requested, or the system cannot start a thread.
+    #[error("cannot start {ranks} ranks: {reason}")]
+    NotStarted {
+        /// The requested number of ranks.
+        ranks: u32,
+        /// The reason, or the system's message.
+        reason: String,
+    },
+    /// Another rank had an error, and all ranks agreed to stop.
+    #[error("rank {rank}: {message}")]
+    Elsewhere {
+        /// The lowest rank that had an error, the same on all ranks.
+        rank: Rank,
+        /// The kind of its error.
+        kind: ErrorKind,
+        /// The text of its error.
+        message: String,
+    },
+}
+
+impl HasKind for CommError {
+    fn kind(&self) -> ErrorKind {
+        match self {
+            Self::Elsewhere { kind, .. } => *kind,
+            Self::RankFailed(_) | Self::NotStarted { .. } => ErrorKind::Rank,
+        }
+    }
+}
+
+/// A group of ranks. Object-safe: messages are bytes; the methods on `dyn Communicator` take slices
+/// of plain numbers.
+///
+/// All functions except `rank` and `size` are **Collective**: every rank calls them, in the same
+/// order. If a rank panics, they return (or panic with) [`CommError::RankFailed`] elsewhere and
+/// never hang.
+pub trait Communicator {
+    /// *Local.* This rank.
+    fn rank(&self) -> Rank;
+    /// *Local.* The number of ranks.
+    fn size(&self) -> u32;
+    /// **Collective.** Returns when all have called it.
+    fn barrier(&self) -> Result<(), CommError>;
+    /// **Collective.** Replaces `bytes` on each rank by those of `root`.
+    fn broadcast_bytes(&self, root: Rank, bytes: &mut Vec<u8>) -> Result<(), CommError>;
+    /// **Collective.** `root` receives the message of each rank, by rank; the others get an empty
+    /// list.
+    fn gather_bytes(&self, root: Rank, bytes: &[u8]) -> Result<Vec<Vec<u8>>, CommError>;
+    /// **Collective.** Each rank receives the message of each rank, by rank.
+    fn all_gather_bytes(&self, bytes: &[u8]) -> Result<Vec<Vec<u8>>, CommError>;
+    /// **Collective.** The same for messages of equal length on all ranks, concatenated; cheap for
+    /// short messages. Sums and scans are built on it, so that they always add in rank order.
+    fn all_gather_equal_bytes(&self, bytes: &[u8]) -> Result<Vec<u8>, CommError>;
+    /// **Collective.** `root` passes one message per rank; each rank receives its own.
+    ///
+    /// # Panics
+    /// If `root` passes no messages, or not one per rank.
+    fn scatter_bytes(&self, root: Rank, messages: Option<Vec<Vec<u8>>>) -> Result<Vec<u8>, CommError>;
+    /// **Collective.** Sparse exchange: sends messages to some ranks (itself allowed), and receives
+    /// those sent to this rank by ascending sender, several of one sender in sending order. The
+    /// cost is proportional to the messages, not to the square of the ranks.
+    ///
+    /// # Panics
+    /// If a message is for a rank that does not exist.
+    fn exchange_bytes(&self, messages: Vec<(Rank, Vec<u8>)>) -> Result<Vec<(Rank, Vec<u8>)>, CommError>;
+}

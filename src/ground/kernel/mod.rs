@@ -1,0 +1,15 @@
+//! Geometric kernel: exact signs, simplices, shape measures, search, orderings.
+
+pub(crate) mod fixed;
+pub(crate) mod hash;
+pub mod hilbert;
+mod integers;
+pub(crate) mod nearest;
+pub(crate) mod places;
+pub mod predicates;
+pub mod quality;
+pub mod random;
+pub mod simplex;
+pub mod sphere;
+pub(crate) mod tree;
+pub(crate) mod vector;

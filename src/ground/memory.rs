@@ -1,0 +1,78 @@
+//! Memory and time used by this process, and memory available on the machine.
+
+/// The peak resident set of this process in bytes; `None` if the system does not report it.
+pub fn peak_bytes() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find(|line| line.starts_with("VmHWM:"))?;
+    let kib: u64 = line.split_whitespace().nth(1)?.parse().ok()?;
+    Some(kib * 1024)
+}
+
+/// Processor seconds of all threads of this process so far, including ended ones; `None` if the
+/// system does not report them.
+pub fn cpu_seconds() -> Option<f64> {
+    /// Ticks of `/proc` in a second.
+    const TICKS: f64 = 100.0;
+    let stat = std::fs::read_to_string("/proc/self/stat").ok()?;
+    // The program name, in brackets, may contain blanks; user and system time are the 12th and 13th
+    // words after it.
+    let words: Vec<&str> = stat.rsplit(')').next()?.split_whitespace().collect();
+    let ticks = |k: usize| words.get(k)?.parse::<f64>().ok();
+    Some((ticks(11)? + ticks(12)?) / TICKS)
+}
+
+/// The memory available on this machine in bytes; `None` if the system does not report it.
+pub fn available_bytes() -> Option<u64> {
+    let text = std::fs::read_to_string("/proc/meminfo").ok()?;
+    let line = text.lines().find(|line| line.starts_with("MemAvailable:"))?;
+    let kib: u64 = line.split_whitespace().nth(1)?.parse().ok()?;
+    Some(kib * 1024)
+}
+
+/// The host name, to identify ranks that share memory; empty if the system does not report it.
+pub fn machine() -> String {
+    std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default()
+}
+
+/// Formats bytes with a suitable unit.
+pub fn sized(bytes: u64) -> String {
+    let units = ["B", "kB", "MB", "GB", "TB"];
+    let power = (bytes.max(1).ilog10() / 3).min(4);
+    let value = bytes as f64 / 1000f64.powi(power as i32);
+    let decimals = if power == 0 { 0 } else { 1 };
+    format!("{value:.decimals$} {}", units[power as usize])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bytes_are_shown_in_the_unit_that_suits() {
+        assert_eq!(sized(999), "999 B");
+        assert_eq!(sized(1_500_000), "1.5 MB");
+    }
+
+    #[test]
+    fn processor_time_passes_with_work() {
+        let Some(before) = cpu_seconds() else {
+            eprintln!("skipped: this system has no /proc/self/stat");
+            return;
+        };
+        let start = std::time::Instant::now();
+        while cpu_seconds().unwrap() < before + 0.02 {
+            assert!(start.elapsed().as_secs() < 60, "no processor time in a minute of work");
+        }
+    }
+
+    #[test]
+    fn the_peak_grows_with_what_is_touched() {
+        let Some(before) = peak_bytes() else {
+            eprintln!("skipped: this system has no /proc/self/status");
+            return;
+        };
+        let block = std::hint::black_box(vec![1u8; 1 << 28]);
+        let after = peak_bytes().unwrap();
+        assert!(after >= before && after >= block.len() as u64, "{before} {after}");
+    }
+}

@@ -1,0 +1,88 @@
+//! The edges of a triangulated surface, with any number of triangles at each.
+
+/// An edge of a triangle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct Use {
+    /// The ends, the lower first.
+    pub ends: [u32; 2],
+    /// The triangle.
+    pub triangle: u32,
+    /// Which of its sides: that opposite this corner.
+    pub side: u8,
+    /// Whether the triangle runs from the lower to the higher end.
+    pub along: bool,
+}
+
+/// All edges: the uses of one are neighbours, ordered by triangle.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Edges {
+    pub uses: Vec<Use>,
+    /// Where the uses of each edge begin, and the end of the last.
+    pub starts: Vec<u32>,
+    /// By triangle and side, the edge.
+    pub of_side: Vec<[u32; 3]>,
+}
+
+impl Edges {
+    pub fn new(triangles: &[[u32; 3]]) -> Self {
+        let mut uses = Vec::with_capacity(3 * triangles.len());
+        for (t, v) in triangles.iter().enumerate() {
+            for side in 0..3 {
+                let (a, b) = (v[(side + 1) % 3], v[(side + 2) % 3]);
+                let ends = [a.min(b), a.max(b)];
+                uses.push(Use { ends, triangle: t as u32, side: side as u8, along: a < b });
+            }
+        }
+        uses.sort_unstable();
+        let mut edges = Self { uses, starts: vec![0], of_side: vec![[0; 3]; triangles.len()] };
+        for uses in edges.uses.chunk_by(|a, b| a.ends == b.ends) {
+            let edge = edges.starts.len() as u32 - 1;
+            for u in uses {
+                edges.of_side[u.triangle as usize][u.side as usize] = edge;
+            }
+            edges.starts.push(edges.starts[edge as usize] + uses.len() as u32);
+        }
+        edges
+    }
+
+    pub fn len(&self) -> usize {
+        self.starts.len() - 1
+    }
+
+    /// The uses of an edge.
+    pub fn uses(&self, edge: usize) -> &[Use] {
+        &self.uses[self.starts[edge] as usize..self.starts[edge + 1] as usize]
+    }
+
+    /// The two triangles at an edge, if there are two.
+    pub fn pair(&self, edge: usize) -> Option<[u32; 2]> {
+        match self.uses(edge) {
+            [a, b] => Some([a.triangle, b.triangle]),
+            _ => None,
+        }
+    }
+}
+
+/// Sets that grow together, numbered by their least member.
+#[derive(Clone, Debug)]
+pub(crate) struct Sets(Vec<u32>);
+
+impl Sets {
+    pub fn new(count: usize) -> Self {
+        Self((0..count as u32).collect())
+    }
+
+    pub fn find(&mut self, mut x: u32) -> u32 {
+        while self.0[x as usize] != x {
+            let up = self.0[self.0[x as usize] as usize];
+            self.0[x as usize] = up;
+            x = up;
+        }
+        x
+    }
+
+    pub fn join(&mut self, a: u32, b: u32) {
+        let (a, b) = (self.find(a), self.find(b));
+        self.0[a.max(b) as usize] = a.min(b);
+    }
+}

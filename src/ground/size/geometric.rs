@@ -1,0 +1,403 @@
+//! The size field that a geometry and a user's settings ask for.
+
+use super::{Closeness, Preset, SizeField, SizeFunction, Source, SourceTree};
+use crate::{Point, Vector};
+use csg::solid::prune_in;
+use csg::{Body, BodyId, Curve, CurveId, Cutout, Features, Geometry, Interval, Solid, SurfaceId};
+
+/// What the user asks of the size, beside what the geometry says.
+#[derive(Clone, Debug)]
+pub struct SizeSettings {
+    /// Upper bound everywhere (length), if any.
+    pub maxh: Option<f64>,
+    /// Lower bound of what curvature, short curves and grading ask for (length).
+    pub minh: f64,
+    /// Elements per radius of curvature.
+    pub curvature_safety: f64,
+    /// The least number of segments wanted on a curve.
+    pub segments_per_curve: f64,
+    /// Growth of the size per unit of distance.
+    pub grading: f64,
+    /// How small the sizes are in thin walls.
+    pub closeness: Closeness,
+    /// All sizes but the bounds `maxh` are multiplied by this; below 1 those too. How a wanted number of
+    /// tets is reached.
+    pub scale: f64,
+    /// Further sources, taken as they are.
+    pub sources: Vec<Source>,
+    /// A further upper bound, if any, by place.
+    pub function: Option<SizeFunction>,
+}
+
+impl From<Preset> for SizeSettings {
+    fn from(preset: Preset) -> Self {
+        Self {
+            maxh: None,
+            minh: 0.0,
+            curvature_safety: preset.curvature_safety(),
+            segments_per_curve: preset.segments_per_curve(),
+            grading: preset.grading(),
+            closeness: preset.closeness(),
+            scale: 1.0,
+            sources: Vec::new(),
+            function: None,
+        }
+    }
+}
+
+impl Default for SizeSettings {
+    fn default() -> Self {
+        Preset::default().into()
+    }
+}
+
+impl SizeSettings {
+    /// How small the sizes are in thin walls, under [`scale`](Self::scale): where fewer tets are wanted, walls get fewer too; where
+    /// more are, the walls need no more than they have.
+    pub fn scaled_closeness(&self) -> Closeness {
+        Closeness { ratio: self.closeness.ratio * self.scale.max(1.0), ..self.closeness }
+    }
+
+    /// A bound set by the user or the file under [`scale`](Self::scale).
+    fn scaled_bound(&self, bound: f64) -> f64 {
+        bound * self.scale.min(1.0)
+    }
+}
+
+/// What a geometry asks of the size under some settings, but for their own sources: sampled once, it serves fields with any.
+#[derive(Clone, Debug)]
+pub struct GeometricSamples {
+    /// The size where nothing asks for less.
+    maximum: f64,
+    /// Bodies with a bound of their own.
+    body_bounds: Vec<(BodyId, f64)>,
+    sources: Vec<Source>,
+}
+
+impl GeometricSamples {
+    /// Samples curves and patches.
+    pub fn new(geometry: &Geometry, features: &Features, settings: &SizeSettings) -> Self {
+        let diagonal = features.bounds.diagonal();
+        // Where all bodies have bounds, no size above the largest is ever wanted, and none has to be graded down to it.
+        let of_body = |body: &Body| settings.scaled_bound(body.maxh.unwrap_or(f64::INFINITY));
+        let maximum = settings
+            .scaled_bound(settings.maxh.unwrap_or(f64::INFINITY))
+            .min(diagonal * settings.scale)
+            .min(geometry.bodies.iter().map(of_body).reduce(f64::max).unwrap_or(f64::INFINITY));
+        let body_bounds: Vec<(BodyId, f64)> = geometry
+            .bodies
+            .iter()
+            .enumerate()
+            .map(|(i, body)| (BodyId::new(i), of_body(body)))
+            .filter(|(_, bound)| *bound < maximum)
+            .collect();
+        let sampler = Sampler { geometry, features, settings, maximum, body_bounds: &body_bounds };
+        let mut sources = Vec::new();
+        for (i, curve) in features.curves.iter().enumerate() {
+            let bound = settings.scaled_bound(features.edge_bound(geometry, CurveId::new(i)));
+            sampler.sample_curve(curve, bound, &mut sources);
+        }
+        sampler.sample_patches(&mut sources);
+        Self { maximum, body_bounds, sources }
+    }
+}
+
+/// Sizes from the bounds in the file, curvature, short curves and the user's settings.
+#[derive(Clone, Debug)]
+pub struct GeometricSize<'a> {
+    geometry: &'a Geometry,
+    tree: SourceTree,
+    /// Bodies with a bound of their own.
+    body_bounds: Vec<(BodyId, f64)>,
+    function: Option<SizeFunction>,
+}
+
+impl<'a> GeometricSize<'a> {
+    /// Samples curves and patches for the sources of the field.
+    pub fn new(geometry: &'a Geometry, features: &Features, settings: &SizeSettings) -> Self {
+        Self::of_samples(geometry, features, settings, &GeometricSamples::new(geometry, features, settings))
+    }
+
+    /// The field of samples that were taken under the same settings but for their sources.
+    pub fn of_samples(
+        geometry: &'a Geometry,
+        features: &Features,
+        settings: &SizeSettings,
+        samples: &GeometricSamples,
+    ) -> Self {
+        let sources = [&*settings.sources, &*samples.sources].concat();
+        let tree = SourceTree::new(features.bounds, settings.grading, samples.maximum, &sources);
+        Self { geometry, tree, body_bounds: samples.body_bounds.clone(), function: settings.function.clone() }
+    }
+}
+
+impl SizeField for GeometricSize<'_> {
+    fn size_at(&self, point: &Point) -> f64 {
+        let inside =
+            |body: &BodyId| contains(self.geometry, &self.geometry.bodies[body.index()].solid, point);
+        let size = self.tree.size_at(point);
+        let size = self.function.as_ref().map_or(size, |function| function.bound(size, point));
+        self.body_bounds
+            .iter()
+            .filter(|(body, bound)| *bound < size && inside(body))
+            .fold(size, |size, (_, bound)| size.min(*bound))
+    }
+}
+
+/// How far the size may grow from one sample to the next, in sizes, and the distance of samples in sizes at most: the field between them is then
+/// too large by at most half of that. At a grading of 0.7 and a distance of one size, a ball lost a quarter of its volume.
+const SAMPLE_GROWTH: f64 = 0.3;
+
+/// Distance of samples at most, as a fraction of the diagonal, where a surface's curvature varies: what
+/// lies between is not seen.
+const COARSEST_SAMPLE: f64 = 1.0 / 32.0;
+
+/// How far beside a surface a point is taken to tell the regions on both sides, as a fraction of the diagonal.
+const SIDE_STEP: f64 = 1e-6;
+
+/// What is nearer to the apex of a cone is the apex, as a fraction of the diagonal: corners there are within rounding, samples
+/// a thousandth away and more.
+const APEX: f64 = 1e-6;
+
+struct Sampler<'a> {
+    geometry: &'a Geometry,
+    features: &'a Features,
+    settings: &'a SizeSettings,
+    maximum: f64,
+    body_bounds: &'a [(BodyId, f64)],
+}
+
+impl Sampler<'_> {
+    /// Distance of neighbouring samples where the size is `size`.
+    fn spacing(&self, size: f64) -> f64 {
+        size * (SAMPLE_GROWTH / self.settings.grading).min(1.0)
+    }
+
+    /// The size that a curvature (1/length) asks for.
+    fn size_of_curvature(&self, curvature: f64) -> f64 {
+        (self.settings.scale / (self.settings.curvature_safety * curvature)).max(self.settings.minh)
+    }
+
+    /// The size that a surface asks for at a point on it.
+    fn size_on(&self, surface: SurfaceId, point: &Point) -> f64 {
+        let bound = self.geometry.surface_info[surface.index()].maxh.unwrap_or(f64::INFINITY);
+        let shape = &self.geometry.surfaces[surface.index()];
+        // An apex has no curvature; the points beside it say how small is small enough.
+        let beside = APEX * self.features.bounds.diagonal();
+        let is_apex = shape.apex().is_some_and(|apex| (point - apex).norm() <= beside);
+        let curvature = if is_apex { 0.0 } else { shape.curvature(point) };
+        self.settings.scaled_bound(bound).min(self.size_of_curvature(curvature))
+    }
+
+    /// The size that a cutout asks for, infinity if it asks for none.
+    fn cutout_bound(&self, cutout: Option<u32>) -> f64 {
+        let bound = cutout.and_then(|i| self.geometry.cutouts[i as usize].maxh);
+        bound.map_or(f64::INFINITY, |bound| self.settings.scaled_bound(bound))
+    }
+
+    /// The least size that a cutout of a surface asks for, infinity if it has none.
+    fn least_cutout_bound(&self, surface: SurfaceId) -> f64 {
+        let cutouts = (0..).zip(&self.geometry.cutouts).filter(|(_, cutout)| cutout.surface == surface);
+        cutouts.map(|(i, _)| self.cutout_bound(Some(i))).fold(f64::INFINITY, f64::min)
+    }
+
+    /// Sources along a curve: its own curvature, its length, the bound that the file sets for it, and the surfaces of the
+    /// patches beside it.
+    fn sample_curve(&self, curve: &Curve, bound: f64, sources: &mut Vec<Source>) {
+        let trace = &curve.trace;
+        let length: f64 = trace.windows(2).map(|w| (w[1] - w[0]).norm()).sum();
+        let whole = (self.settings.scale * length / self.settings.segments_per_curve)
+            .max(self.settings.minh)
+            .min(bound);
+        let curvatures = trace_curvatures(trace, curve.ends.is_none());
+        for (i, w) in trace.windows(2).enumerate() {
+            let beside = curve.fins.iter().map(|fin| self.features.patch(fin.patch));
+            let size = beside
+                .map(|patch| self.size_on(patch.surface, &w[0]).min(self.cutout_bound(patch.cutout)))
+                .fold(whole.min(self.size_of_curvature(curvatures[i].max(curvatures[i + 1]))), f64::min);
+            if size >= self.maximum {
+                continue;
+            }
+            let pieces = ((w[1] - w[0]).norm() / self.spacing(size)).ceil().max(1.0) as usize;
+            for piece in 0..=pieces {
+                let point = w[0] + (w[1] - w[0]) * (piece as f64 / pieces as f64);
+                sources.push(Source { point, size });
+            }
+        }
+    }
+
+    /// Sources on the patches whose size is below the maximum: cells around the surfaces are split until
+    /// they are small against the size, and hold one source each.
+    fn sample_patches(&self, sources: &mut Vec<Source>) {
+        let mut surfaces: Vec<SurfaceId> = self.features.patches.iter().map(|p| p.surface).collect();
+        surfaces.sort_unstable();
+        surfaces.dedup();
+        let bounds = &self.features.bounds;
+        // Room around it, so that no patch lies on the rim of the outermost cell.
+        let edge = 1.02 * (bounds.max - bounds.min).max();
+        let bodies = self.geometry.bodies.iter().enumerate();
+        let bodies = bodies.map(|(i, body)| (BodyId::new(i), body.solid.clone())).collect();
+        let mut samples = Vec::new();
+        self.sample_cell(&surfaces, bodies, bounds.center(), edge, &mut samples);
+        // Surface by surface: neighbours in the tree are neighbours on a surface.
+        samples.sort_by_key(|sample| sample.0);
+        sources.extend(samples.into_iter().map(|sample| sample.1));
+    }
+
+    /// Sources for those of the `wanted` surfaces that bound what is left of the bodies in a cell.
+    ///
+    /// One descent for all surfaces, with bodies pruned as in the search for features: most of an infinite surface bounds nothing, and what is
+    /// at a sample is told from few surfaces, however many the bodies have.
+    fn sample_cell(
+        &self,
+        wanted: &[SurfaceId],
+        bodies: Vec<(BodyId, Solid)>,
+        center: Point,
+        edge: f64,
+        samples: &mut Vec<(SurfaceId, Source)>,
+    ) {
+        let mut open = wanted.to_vec();
+        let cell = [0, 1, 2].map(|i| Interval { lo: center[i] - 0.5 * edge, hi: center[i] + 0.5 * edge });
+        open.retain(|surface| self.geometry.surfaces[surface.index()].value_range(&cell).contains_zero());
+        // Most cells end here, before what costs more.
+        if open.is_empty() {
+            return;
+        }
+        let bodies = self.pruned(bodies, &center, edge);
+        let mut here: Vec<SurfaceId> = bodies.iter().flat_map(|body| body.1.surfaces()).collect();
+        here.sort_unstable();
+        open.retain(|surface| here.binary_search(surface).is_ok());
+        open.retain(|&surface| self.is_coarse(surface, &bodies, &center, edge, samples));
+        // Where a surface is singular (apex of a cone) the size there is nearly zero: no cell is worth going on.
+        let least = 1e-3 * self.features.bounds.diagonal() * self.settings.scale.min(1.0);
+        if open.is_empty() || edge < least {
+            return;
+        }
+        for child in 0..8 {
+            let side = |axis: usize| if child >> axis & 1 == 1 { 0.25 * edge } else { -0.25 * edge };
+            let middle = center + Vector::new(side(0), side(1), side(2));
+            self.sample_cell(&open, bodies.clone(), middle, 0.5 * edge, samples);
+        }
+    }
+
+    /// What is left of bodies in a cell and around it, as far as its samples may be.
+    fn pruned(&self, bodies: Vec<(BodyId, Solid)>, center: &Point, edge: f64) -> Vec<(BodyId, Solid)> {
+        /// A sample is at most an edge from the middle; with rounding.
+        const REACH: f64 = 1.01;
+        let reach = REACH * edge + 2.0 * self.side_step();
+        let cell = [0, 1, 2].map(|i| Interval { lo: center[i] - reach, hi: center[i] + reach });
+        prune_in(&self.geometry.surfaces, &cell, bodies)
+    }
+
+    /// Whether a cell is too large for the size of a surface that may pass through it; if it is not and the surface is near, adds its source.
+    fn is_coarse(
+        &self,
+        surface: SurfaceId,
+        bodies: &[(BodyId, Solid)],
+        center: &Point,
+        edge: f64,
+        samples: &mut Vec<(SurfaceId, Source)>,
+    ) -> bool {
+        let shape = &self.geometry.surfaces[surface.index()];
+        let Ok(point) = shape.project(center) else { return true };
+        if (point - center).norm() > edge {
+            return false;
+        }
+        let own =
+            self.size_on(surface, &point).min(self.least_body_bound()).min(self.least_cutout_bound(surface));
+        let constant = self.constant_size(surface);
+        if own >= self.maximum && constant {
+            return false;
+        }
+        let coarsest =
+            if constant { f64::INFINITY } else { COARSEST_SAMPLE * self.features.bounds.diagonal() };
+        if edge > coarsest.min(self.spacing(own)) {
+            return true;
+        }
+        let size = self.size_of_sample(surface, bodies, &point);
+        samples.extend(size.map(|size| (surface, Source { point, size })));
+        false
+    }
+
+    /// How far beside a surface a point is taken to tell the regions on both sides.
+    fn side_step(&self) -> f64 {
+        SIDE_STEP * self.features.bounds.diagonal()
+    }
+
+    fn least_body_bound(&self) -> f64 {
+        self.body_bounds.iter().map(|(_, bound)| *bound).fold(f64::INFINITY, f64::min)
+    }
+
+    /// Whether the size is the same all over a surface, so that one look tells.
+    fn constant_size(&self, surface: SurfaceId) -> bool {
+        matches!(
+            self.geometry.surfaces[surface.index()],
+            csg::Surface::Plane(_) | csg::Surface::Sphere(_) | csg::Surface::Cylinder(_)
+        )
+    }
+
+    /// The size at a point of a surface, if a patch is there; `bodies` is what is left of them around it.
+    fn size_of_sample(&self, surface: SurfaceId, bodies: &[(BodyId, Solid)], point: &Point) -> Option<f64> {
+        let step = self.side_step();
+        let normal = self.geometry.surfaces[surface.index()].normal(point);
+        let body_at = |p: Point| bodies.iter().find(|b| contains(self.geometry, &b.1, &p)).map(|b| b.0);
+        let sides = [point - step * normal, point + step * normal].map(body_at);
+        if sides[0] == sides[1] {
+            return None;
+        }
+        let is_in =
+            |cutout: &Cutout, step: f64| contains(self.geometry, &cutout.solid, &(point + step * normal));
+        let is_here =
+            |cutout: &Cutout| cutout.surface == surface && is_in(cutout, -step) != is_in(cutout, step);
+        let cutout = (0..).zip(&self.geometry.cutouts).find(|(_, cutout)| is_here(cutout)).map(|(i, _)| i);
+        let bounds = self.body_bounds.iter().filter(|(body, _)| sides.contains(&Some(*body)));
+        let on_surface = self.size_on(surface, point).min(self.cutout_bound(cutout));
+        let size = bounds.map(|(_, b)| *b).fold(on_surface, f64::min);
+        (size < self.maximum).then_some(size)
+    }
+}
+
+fn contains(geometry: &Geometry, solid: &Solid, point: &Point) -> bool {
+    solid.holds(&|surface| geometry.surfaces[surface.index()].value(point) > 0.0)
+}
+
+/// Curvature at each point of a trace: that of the circle through it and its neighbours.
+fn trace_curvatures(trace: &[Point], closed: bool) -> Vec<f64> {
+    let last = trace.len() - 1;
+    let at = |i: usize| {
+        let (before, after) = match i {
+            0 if closed => (last - 1, 1),
+            _ if i == last && closed => (last - 1, 1),
+            0 => (0, 1),
+            _ if i == last => (last - 1, last),
+            _ => (i - 1, i + 1),
+        };
+        let (u, v) = (trace[i] - trace[before], trace[after] - trace[i]);
+        let w = trace[after] - trace[before];
+        let product = u.norm() * v.norm() * w.norm();
+        if product > 0.0 { 2.0 * u.cross(&v).norm() / product } else { 0.0 }
+    };
+    (0..=last).map(at).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_circle_has_the_curvature_of_its_radius() {
+        let trace: Vec<Point> = (0..=32)
+            .map(|i| f64::from(i % 32) * std::f64::consts::TAU / 32.0)
+            .map(|a| Point::new(2.0 * a.cos(), 2.0 * a.sin(), 1.0))
+            .collect();
+        for curvature in trace_curvatures(&trace, true) {
+            assert!((curvature - 0.5).abs() < 1e-9, "{curvature}");
+        }
+    }
+
+    #[test]
+    fn a_straight_trace_of_two_points_has_no_curvature() {
+        let trace = [Point::new(0., 0., 0.), Point::new(1., 0., 0.)];
+        assert_eq!(trace_curvatures(&trace, false), [0.0, 0.0]);
+    }
+}

@@ -1,0 +1,51 @@
+//! Triangulated surfaces as geometry: patches, curves and corners, projection, and remeshing.
+//!
+//! CAD programs export solids as triangles (STL), which are accurate enough but mostly slivers.
+//! [`FacetModel::new`] receives such **facets** of one or several files and finds
+//!
+//! * the **bodies** they bound (`regions`): regions with a winding number other than zero; a closed
+//!   surface inside another is a void or a body by its orientation, and files that share facets get
+//!   interfaces;
+//! * **patches**, bounded by sharp edges, by changes of group, and by edges with other than two
+//!   facets (`features`); the **curves** between patches, and the **corners** at their ends.
+//!
+//! [`FacetProjector`] projects points onto them. [`remesh`](remesh()) makes a surface mesh by a
+//! size field, by local changes of the facets; [`keep`](keep()) uses the facets unchanged. Both
+//! return a [`SurfaceMesh`](crate::mesher::surface::SurfaceMesh) for
+//! [`ClosedSurface`](crate::mesher::volume::ClosedSurface).
+//!
+//! *Not* repaired are gaps, holes, and facets that intersect. They are errors with their positions,
+//! here or in the volume mesher.
+
+mod close_curves;
+mod error;
+mod features;
+mod join;
+mod keep;
+mod model;
+#[cfg(test)]
+mod projector_tests;
+mod rays;
+mod regions;
+mod remesh;
+#[cfg(test)]
+mod remesh_tests;
+#[cfg(test)]
+mod samples;
+mod sharp;
+mod size;
+mod smoothness;
+#[cfg(test)]
+mod tests;
+
+pub use crate::ground::projector::FacetProjector;
+pub use error::FacetError;
+pub use keep::keep;
+#[cfg(test)]
+pub use model::FacetBody;
+pub use model::{FacetCurve, FacetModel, FacetPatch, Facets, Marks, Settings};
+#[cfg(test)]
+pub use remesh::{RemeshReport, deviation};
+pub use remesh::{RemeshSettings, remesh};
+pub use size::FacetSize;
+pub use smoothness::FacetSmoothness;

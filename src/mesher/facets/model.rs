@@ -1,0 +1,268 @@
+//! Construction of bodies, patches, curves and corners from triangles.
+
+use super::features::{self, Found};
+use super::join::{self, Joined};
+use super::regions::Regions;
+use super::{FacetError, regions};
+use crate::Point;
+use crate::ground::kernel::tree;
+use crate::ground::mesh::{BoundaryTriangle, VertexId};
+use crate::ground::projector::facets::edges::Edges;
+use crate::ground::projector::facets::normals;
+use crate::ground::projector::facets::{FacetProjector, Source};
+use crate::mesher::surface::crossings;
+use csg::{Aabb, BodyId, CornerId, PatchId};
+
+/// A triangulated surface as read from a file: closed, its triangles in any order.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Facets {
+    /// The points; equal ones are merged.
+    pub points: Vec<Point>,
+    /// The triangles, as indices of points.
+    pub triangles: Vec<[u32; 3]>,
+    /// The group of each triangle (the solid of an STL file); missing ones are 0. Patches end at
+    /// changes of group.
+    pub groups: Vec<u32>,
+    /// Points that mark solid regions and holes, for files with unoriented triangles. If `None`,
+    /// orientation decides.
+    pub marks: Option<Marks>,
+}
+
+/// Marks of regions by a point in each (TetGen's `.poly`). Bounded regions without a mark are
+/// bodies.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Marks {
+    /// Points in regions that are not bodies.
+    pub holes: Vec<Point>,
+    /// Points in bodies, with the bodies' numbers.
+    pub regions: Vec<(Point, i64)>,
+}
+
+/// Thresholds for finding patches, curves and corners.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Settings {
+    /// Facets that turn by more than this (radians) are in different patches. Coarse exports have
+    /// at least 12 facets per circle, 30° each; chamfers turn by 45°.
+    pub feature_angle: f64,
+    /// Edges above this angle (radians) are sharp too, unless there is a similar edge nearby, as on
+    /// a round surface. It has no effect if it is at least `feature_angle`.
+    pub least_angle: f64,
+    /// Curves have a corner if they turn by more than this (radians).
+    pub corner_angle: f64,
+    /// A vertex without sharp edges is a corner if its angle defect or excess is more than this
+    /// (radians). The vertices of an icosahedron have 60°; the tip of a cone of 60° half-angle has
+    /// 48°, of 45° half-angle 105°.
+    pub tip_angle: f64,
+    /// Chains of sharp edges that end inside a patch are ignored up to this length (fraction of the
+    /// bounding-box diagonal).
+    pub shortest_end: f64,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            feature_angle: 40_f64.to_radians(),
+            least_angle: 14_f64.to_radians(),
+            corner_angle: 40_f64.to_radians(),
+            tip_angle: 65_f64.to_radians(),
+            shortest_end: 0.05,
+        }
+    }
+}
+
+/// A body bounded by facets.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FacetBody {
+    /// The index of the surface that it belongs to; the smallest one if it is inside several.
+    pub file: u32,
+    /// The number assigned by its file.
+    pub number: Option<i64>,
+}
+
+/// A patch: facets connected over edges that are not sharp.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct FacetPatch {
+    /// The body that its normals point away from.
+    pub inside: Option<BodyId>,
+    /// The body that its normals point into.
+    pub outside: Option<BodyId>,
+    /// The surfaces that contain it, each with its group there; several if they share facets.
+    pub labels: Vec<(u32, u32)>,
+}
+
+/// A curve: a chain of edges between corners, or a closed one.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FacetCurve {
+    /// Its first and last corner; `None` if it is closed without a corner.
+    pub ends: Option<[CornerId; 2]>,
+    /// Its points as indices of the model's points; a closed curve ends with its first point.
+    pub vertices: Vec<u32>,
+}
+
+/// Facets and the bodies, patches, curves and corners found in them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FacetModel {
+    /// The points used by facets, each position once.
+    pub points: Vec<Point>,
+    /// The facets on their patches, with normals from the patch's `inside` to its `outside`.
+    pub triangles: Vec<BoundaryTriangle>,
+    /// The points that are corners.
+    pub corners: Vec<u32>,
+    /// The curves.
+    pub curves: Vec<FacetCurve>,
+    /// The patches.
+    pub patches: Vec<FacetPatch>,
+    /// The bodies.
+    pub bodies: Vec<FacetBody>,
+    /// The bounding box of all points.
+    pub bounds: Aabb,
+    /// Projection to patches and curves.
+    pub projector: FacetProjector,
+    /// Estimated rounding error of the coordinates, from their digits (length).
+    pub rounding: f64,
+}
+
+impl FacetModel {
+    /// Finds bodies, patches, curves and corners of one or several surfaces.
+    ///
+    /// Each bounded region with a winding number other than zero is a body. In one file, a surface
+    /// inside another makes a void if its normals point into the void, else a body inside a body.
+    /// Surfaces with inconsistent orientation are reoriented.
+    ///
+    /// # Errors
+    /// With positions, if known:
+    /// - [`FacetError::Open`] if edges have only one facet,
+    /// - [`FacetError::Overlap`] if facets at a common edge overlap,
+    /// - [`FacetError::NotOrientable`] if facets cannot be oriented consistently,
+    /// - [`FacetError::NoRay`] if regions cannot be determined because surfaces touch,
+    /// - [`FacetError::NoBody`] and [`FacetError::Empty`] if there are no bodies or no facets,
+    /// - [`FacetError::NotFinite`], [`FacetError::NoSuchPoint`] and [`FacetError::TooLarge`] for
+    ///   invalid numbers.
+    ///
+    /// Facets that intersect are not an error here; the volume mesher reports them.
+    pub fn new(files: &[Facets], settings: &Settings) -> Result<Self, FacetError> {
+        let mut joined = join::join(files)?;
+        let mut regions = regions::find(&mut joined, files)?;
+        if regions.files.is_empty() {
+            return Err(FacetError::NoBody);
+        }
+        drop_unbounding(&mut joined, &mut regions.sides);
+        // Normals point out of `inside`: a body rather than none, and of two bodies the lower one.
+        for (triangle, sides) in joined.triangles.iter_mut().zip(&mut regions.sides) {
+            if sides[0].map_or(u32::MAX, |b| b) > sides[1].map_or(u32::MAX, |b| b) {
+                triangle.swap(0, 1);
+                sides.swap(0, 1);
+            }
+        }
+        let edges = Edges::new(&joined.triangles);
+        let keys = keys(&joined, &regions.sides);
+        let bounds = tree::bounds(&joined.points);
+        let rounding = normals::rounding(&joined.points);
+        let (normals, _) = normals::trusted(&joined.points, &joined.triangles, &edges, rounding);
+        let found = features::find(
+            &features::Input {
+                points: &joined.points,
+                triangles: &joined.triangles,
+                edges: &edges,
+                normals: &normals,
+                keys: &keys,
+                rounding,
+                diagonal: bounds.diagonal(),
+            },
+            settings,
+        );
+        Ok(assemble(joined, &regions, found, bounds, rounding))
+    }
+
+    /// The midpoints of the edges of facets that intersect improperly, by exact predicates.
+    /// Remeshing may remove such intersections if they come from rounding; kept facets with
+    /// intersections are rejected by the volume mesher.
+    pub fn crossings(&self) -> Vec<Point> {
+        crossings(&self.points, &self.triangles)
+    }
+
+    /// The patch with this id.
+    pub fn patch(&self, patch: PatchId) -> &FacetPatch {
+        &self.patches[patch.index()]
+    }
+}
+
+/// Removes triangles without a body on either side.
+fn drop_unbounding(joined: &mut Joined, sides: &mut Vec<[Option<u32>; 2]>) {
+    let keep: Vec<bool> = sides.iter().map(|s| *s != [None; 2]).collect();
+    let mut of = keep.iter();
+    joined.triangles.retain(|_| *of.next().unwrap_or(&true));
+    of = keep.iter();
+    joined.layers.retain(|_| *of.next().unwrap_or(&true));
+    of = keep.iter();
+    sides.retain(|_| *of.next().unwrap_or(&true));
+}
+
+/// Assigns a number to each combination of regions and groups; patches do not mix them.
+fn keys(joined: &Joined, sides: &[[Option<u32>; 2]]) -> Vec<u32> {
+    let key = |t: usize| {
+        let labels: Vec<(u32, u32)> = joined.layers[t].iter().map(|l| (l.file, l.group)).collect();
+        (sides[t], labels)
+    };
+    let all: Vec<_> = (0..sides.len()).map(key).collect();
+    let mut different = all.clone();
+    different.sort_unstable();
+    different.dedup();
+    all.iter().map(|k| different.binary_search(k).unwrap_or(0) as u32).collect()
+}
+
+fn assemble(joined: Joined, regions: &Regions, found: Found, bounds: Aabb, rounding: f64) -> FacetModel {
+    let mut patches: Vec<Option<FacetPatch>> = vec![None; found.patches];
+    for (t, &patch) in found.patch_of.iter().enumerate() {
+        patches[patch as usize].get_or_insert_with(|| {
+            let [inside, outside] = regions.sides[t].map(|b| b.map(BodyId));
+            let mut labels: Vec<(u32, u32)> = joined.layers[t].iter().map(|l| (l.file, l.group)).collect();
+            labels.dedup();
+            FacetPatch { inside, outside, labels }
+        });
+    }
+    let corner = |v: u32| found.corners.binary_search(&v).ok().map(CornerId::new);
+    let curves: Vec<FacetCurve> = found
+        .chains
+        .into_iter()
+        .map(|chain| {
+            let [first, last] = [chain.vertices[0], chain.vertices[chain.vertices.len() - 1]];
+            let ends = corner(first).zip(corner(last)).map(|(a, b)| [a, b]);
+            FacetCurve { ends, vertices: chain.vertices }
+        })
+        .collect();
+    let mut on_curve: Vec<CornerId> = curves.iter().filter_map(|c| c.ends).flatten().collect();
+    on_curve.sort_unstable();
+    let is_tip = |i: &usize| on_curve.binary_search(&CornerId::new(*i)).is_err();
+    let tips = (0..found.corners.len()).filter(is_tip).map(|i| found.corners[i]).collect();
+    let triangles = joined
+        .triangles
+        .iter()
+        .zip(&found.patch_of)
+        .map(|(v, &p)| BoundaryTriangle { vertices: v.map(VertexId), patch: PatchId(p) })
+        .collect();
+    let projector = FacetProjector::new(Source {
+        points: joined.points.clone(),
+        triangles: joined.triangles,
+        patch_of: found.patch_of,
+        patches: found.patches as u32,
+        curves: curves.iter().map(|c| c.vertices.clone()).collect(),
+        tips,
+    });
+    FacetModel {
+        points: joined.points,
+        triangles,
+        corners: found.corners,
+        curves,
+        patches: patches.into_iter().flatten().collect(),
+        bodies: bodies_of(regions),
+        bounds,
+        projector,
+        rounding,
+    }
+}
+
+fn bodies_of(regions: &Regions) -> Vec<FacetBody> {
+    let Regions { files, numbers, .. } = regions;
+    files.iter().zip(numbers).map(|(&file, &number)| FacetBody { file, number }).collect()
+}

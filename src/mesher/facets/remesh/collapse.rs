@@ -1,0 +1,188 @@
+//! Collapse of short edges: one end is merged into the other.
+
+use super::polyline::Polyline;
+use super::sheet::{Kind, NONE, Sheet};
+
+/// Largest turning angle of a curve along a segment (radians): a circle keeps at least six
+/// segments.
+pub(super) const MOST_TURN: f64 = std::f64::consts::FRAC_PI_3 * 1.001;
+
+/// Largest edge length after a collapse, in units of the wanted size, unless the edge was longer
+/// before.
+const LONG: f64 = 1.4;
+
+/// Least shape after a collapse, unless the triangles were worse before: that of an isosceles
+/// triangle with an angle of 13°.
+const POOR: f64 = 0.35;
+
+/// Collapses edges shorter than `short`, in units of the wanted size, the shortest first; returns
+/// their number.
+pub(super) fn collapse_short(sheet: &mut Sheet, short: f64) -> usize {
+    let mut collapsed = 0;
+    loop {
+        let mut edges: Vec<(f64, u32, u32)> = Vec::new();
+        for t in sheet.living() {
+            let v = sheet.at(t).v;
+            for [a, b] in [[v[0], v[1]], [v[1], v[2]], [v[2], v[0]]] {
+                let length = sheet.length(a, b);
+                if length < short {
+                    edges.push((length, a.min(b), a.max(b)));
+                }
+            }
+        }
+        edges.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.2).cmp(&(b.1, b.2))));
+        edges.dedup();
+        let before = collapsed;
+        for (_, a, b) in edges {
+            let both_live = !sheet.around[a as usize].is_empty() && !sheet.around[b as usize].is_empty();
+            if both_live && sheet.length(a, b) < short && collapse_either(sheet, a, b, LONG) {
+                collapsed += 1;
+            }
+        }
+        if collapsed == before {
+            return collapsed;
+        }
+    }
+}
+
+/// Merges one end of an edge into the other; the end classified on the lower dimension stays.
+pub(super) fn collapse_either(sheet: &mut Sheet, a: u32, b: u32, long: f64) -> bool {
+    for (from, to) in [(a, b), (b, a)] {
+        if may_collapse(sheet, from, to, long) {
+            collapse(sheet, from, to);
+            return true;
+        }
+    }
+    false
+}
+
+/// Whether `from` can be merged into `to`.
+fn may_collapse(sheet: &Sheet, from: u32, to: u32, long: f64) -> bool {
+    let Some(first) = sheet.at_edge(from, to).next() else { return false };
+    let triangle = sheet.at(first);
+    let mark = triangle.side(from, to).map_or(NONE, |side| triangle.curve[side]);
+    match sheet.kinds[from as usize] {
+        Kind::Corner(_) => return false,
+        Kind::Curve(curve, _) if mark != curve.0 => return false,
+        Kind::Curve(..) if !may_shorten(sheet, from, to, mark) => return false,
+        _ => {}
+    }
+    keeps_topology(sheet, from, to) && keeps_shape(sheet, from, to, long)
+}
+
+/// Whether a curve stays valid if its vertex `from` is merged into its neighbour `to`.
+fn may_shorten(sheet: &Sheet, from: u32, to: u32, curve: u32) -> bool {
+    let polyline: &Polyline = &sheet.polylines[curve as usize];
+    let here = sheet.place_on(from, curve);
+    let next = here + polyline.way(here, sheet.place_on(to, curve));
+    let Some(other) = along_curve(sheet, from, curve).into_iter().find(|&w| w != to) else {
+        return false;
+    };
+    let before = here + polyline.way(here, sheet.place_on(other, curve));
+    // If both neighbours are on one side, the loop has only two segments and would vanish.
+    if (next - here) * (before - here) >= 0.0 {
+        return false;
+    }
+    polyline.turn(before, next - before) <= MOST_TURN
+        && (!polyline.is_loop() || (next - before).abs() < 0.4 * polyline.length())
+}
+
+/// The neighbours of a vertex along a curve, ascending.
+pub(super) fn along_curve(sheet: &Sheet, v: u32, curve: u32) -> Vec<u32> {
+    let mut found = Vec::new();
+    for &t in &sheet.around[v as usize] {
+        let triangle = sheet.at(t);
+        for side in 0..3 {
+            let w = triangle.v[side];
+            if triangle.curve[side] == curve && w != v {
+                let other = triangle.v.into_iter().find(|&x| x != v && x != w);
+                found.extend(other);
+            }
+        }
+    }
+    found.sort_unstable();
+    found.dedup();
+    found
+}
+
+/// Whether the triangles stay a surface (the link condition: Dey, Edelsbrunner, Guha, Nekhayev
+/// 1999) and curves stay distinct.
+fn keeps_topology(sheet: &Sheet, from: u32, to: u32) -> bool {
+    let (mut near, mut far) = (Vec::new(), Vec::new());
+    sheet.neighbours(from, &mut near);
+    sheet.neighbours(to, &mut far);
+    let common = near.iter().filter(|v| far.binary_search(v).is_ok()).count();
+    let mut apexes = Vec::new();
+    for t in sheet.at_edge(from, to) {
+        let triangle = sheet.at(t);
+        let (i, j) = (triangle.corner(from), triangle.corner(to));
+        let (Some(i), Some(j)) = (i, j) else { return false };
+        // The side at `from` is merged into that at `to`, so a curve on it would be lost.
+        if triangle.curve[j] != NONE {
+            return false;
+        }
+        apexes.push(triangle.v[3 - i - j]);
+    }
+    apexes.sort_unstable();
+    let different = apexes.len();
+    apexes.dedup();
+    // The changed triangles must not exist already, as they do if a closed component has four
+    // triangles left.
+    let is_new = |&t: &u32| {
+        let v = sheet.at(t).v;
+        v.contains(&to)
+            || !sheet.around[to as usize]
+                .iter()
+                .any(|&s| sheet.at(s).v.iter().all(|w| *w == to || (*w != from && v.contains(w))))
+    };
+    common == different && apexes.len() == different && sheet.around[from as usize].iter().all(is_new)
+}
+
+/// Whether the triangles around `from` stay valid if it moves to `to`.
+fn keeps_shape(sheet: &Sheet, from: u32, to: u32, long: f64) -> bool {
+    let mut worst = 1.0_f64;
+    let mut before = 1.0_f64;
+    for &t in &sheet.around[from as usize] {
+        let triangle = sheet.at(t);
+        before = before.min(sheet.value_at(t));
+        if triangle.v.contains(&to) {
+            continue;
+        }
+        let v = triangle.v.map(|w| if w == from { to } else { w });
+        let p = sheet.corners(v);
+        for w in triangle.v.into_iter().filter(|&w| w != from) {
+            if sheet.length(to, w) > long.max(1.05 * sheet.length(from, w)) {
+                return false;
+            }
+        }
+        worst = worst.min(sheet.value(v, triangle.curve));
+        if worst < POOR.min(before) || !sheet.fits(triangle.patch, &p, sheet.mean_size(v)) {
+            return false;
+        }
+    }
+    worst >= POOR.min(before)
+}
+
+/// Merges `from` into `to`.
+fn collapse(sheet: &mut Sheet, from: u32, to: u32) {
+    let mut kept: Vec<(u32, u32)> = Vec::new();
+    for t in std::mem::take(&mut sheet.around[from as usize]) {
+        let triangle = sheet.at(t);
+        if let (Some(i), Some(j)) = (triangle.corner(from), triangle.corner(to)) {
+            // The side at `from` is merged into the side at `to`, which may be on a curve.
+            kept.push((triangle.v[3 - i - j], triangle.curve[i]));
+            sheet.remove_triangle(t);
+        } else if let Some(k) = triangle.corner(from) {
+            sheet.triangles[t as usize].v[k] = to;
+            sheet.around[to as usize].push(t);
+        }
+    }
+    for (apex, curve) in kept {
+        let beside: Vec<u32> = sheet.at_edge(to, apex).collect();
+        for t in beside {
+            if let Some(side) = sheet.at(t).side(to, apex) {
+                sheet.triangles[t as usize].curve[side] = curve;
+            }
+        }
+    }
+}

@@ -1,0 +1,82 @@
+//! Splits of long edges at their midpoints.
+
+use super::collapse::MOST_TURN;
+use super::sheet::{Kind, NONE, Sheet, Triangle};
+use crate::Point;
+
+/// Splits edges longer than `long`, in units of the wanted size, and segments along which a curve
+/// turns too far, the longest first; returns the number of splits in one pass.
+pub(super) fn split_long(sheet: &mut Sheet, long: f64) -> usize {
+    let mut edges: Vec<(f64, u32, u32)> = Vec::new();
+    for t in sheet.living() {
+        let triangle = sheet.at(t);
+        for side in 0..3 {
+            let (a, b) = (triangle.v[(side + 1) % 3], triangle.v[(side + 2) % 3]);
+            let length = sheet.length(a, b);
+            if length > long || turns_far(sheet, a, b, triangle.curve[side]) {
+                edges.push((length, a.min(b), a.max(b)));
+            }
+        }
+    }
+    edges.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then((a.1, a.2).cmp(&(b.1, b.2))));
+    edges.dedup();
+    let mut splits = 0;
+    for (_, a, b) in edges {
+        if sheet.at_edge(a, b).next().is_some() {
+            let (point, kind) = middle(sheet, a, b);
+            split(sheet, a, b, point, kind);
+            splits += 1;
+        }
+    }
+    splits
+}
+
+fn turns_far(sheet: &Sheet, a: u32, b: u32, curve: u32) -> bool {
+    if curve == NONE {
+        return false;
+    }
+    let polyline = &sheet.polylines[curve as usize];
+    let from = sheet.place_on(a, curve);
+    polyline.turn(from, polyline.way(from, sheet.place_on(b, curve))) > MOST_TURN
+}
+
+/// The midpoint of an edge on its curve or patch, with its classification.
+pub(super) fn middle(sheet: &Sheet, a: u32, b: u32) -> (Point, Kind) {
+    let t = sheet.at_edge(a, b).next().map(|t| sheet.at(t)).expect("an edge has a triangle");
+    let side = t.side(a, b).expect("the triangle has both ends");
+    let mean = nalgebra::center(&sheet.points[a as usize], &sheet.points[b as usize]);
+    if t.curve[side] == NONE {
+        let point = match sheet.model.projector.flat_normal(t.patch) {
+            Some(_) => mean,
+            None => sheet.model.projector.project_patch(t.patch, &mean),
+        };
+        return (point, Kind::Patch(t.patch));
+    }
+    let polyline = &sheet.polylines[t.curve[side] as usize];
+    let from = sheet.place_on(a, t.curve[side]);
+    let place = polyline.wrapped(from + 0.5 * polyline.way(from, sheet.place_on(b, t.curve[side])));
+    (polyline.at(place), Kind::Curve(csg::CurveId(t.curve[side]), place))
+}
+
+/// Inserts a vertex on an edge: each triangle at the edge becomes two.
+pub(super) fn split(sheet: &mut Sheet, a: u32, b: u32, point: Point, kind: Kind) -> u32 {
+    let v = sheet.add_vertex(point, kind);
+    let at: Vec<u32> = sheet.at_edge(a, b).collect();
+    for t in at {
+        let old = *sheet.at(t);
+        let (Some(i), Some(j)) = (old.corner(a), old.corner(b)) else { continue };
+        let apex = 3 - i - j;
+        // The first triangle gets v in place of b, the second in place of a.
+        let (mut first, mut second): (Triangle, Triangle) = (old, old);
+        first.v[j] = v;
+        first.curve[i] = NONE;
+        second.v[i] = v;
+        second.curve[j] = NONE;
+        first.curve[apex] = old.curve[apex];
+        sheet.triangles[t as usize] = first;
+        sheet.around[b as usize].retain(|&s| s != t);
+        sheet.around[v as usize].push(t);
+        sheet.add_triangle(second);
+    }
+    v
+}

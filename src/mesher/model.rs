@@ -1,0 +1,26 @@
+//! A CSG geometry with its features and its projector.
+
+use csg::{Features, Geometry};
+
+/// A geometry with its features, ready for meshing.
+#[derive(Clone, Debug)]
+pub struct CsgModel {
+    /// The parsed geometry.
+    pub geometry: Geometry,
+    /// Its corners, curves and patches.
+    pub features: Features,
+    /// Projection onto patches, curves and corners.
+    pub projector: csg::Projector,
+}
+
+impl CsgModel {
+    /// Finds the features of a geometry.
+    ///
+    /// # Errors
+    /// [`csg::FeatureError`] with a position, if the geometry has features that cannot be meshed.
+    pub fn new(geometry: Geometry) -> Result<Self, csg::FeatureError> {
+        let features = Features::find(&geometry)?;
+        let projector = csg::Projector::new(&geometry, &features);
+        Ok(Self { geometry, features, projector })
+    }
+}

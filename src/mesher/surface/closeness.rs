@@ -1,0 +1,351 @@
+//! Sizes for thin regions.
+//!
+//! One layer of tets fills the space between two facing patches. If edges along the patches are
+//! much longer than the region is thick, these tets are flat, so the size is lowered to a multiple
+//! of the thickness. The thickness is measured on a first triangulation, for analytic surfaces and
+//! facets alike: at sample points of each triangle a **shrinking ball** (Ma, Bae, Choi 2012),
+//! tangent to the triangle from inside the body, shrinks until no other patch is inside the ball. If
+//! the triangle and the other patch touch the ball on opposite sides, their distance is the
+//! thickness. A ray would suffice for parallel walls; the ball also finds edges and bends that come
+//! near.
+//!
+//! Patches with a common curve or corner are excluded: they form a wedge, whose thickness tapers to
+//! zero for any size.
+
+use super::SurfaceMesh;
+use crate::ground::kernel::nearest::{at, in_triangle};
+use crate::ground::kernel::simplex::area_vector;
+use crate::ground::kernel::tree::{Tree, bounds};
+use crate::ground::mesh::Class;
+use crate::ground::size::{Closeness, SizeField, Source, thinned};
+use crate::{Point, Vector};
+use csg::{Aabb, BodyId, PatchId};
+use rayon::prelude::*;
+
+/// A size is lowered only if the wanted size is below this fraction of it.
+const WORTH: f64 = 0.85;
+
+/// Largest distance of neighbouring sources, in units of their size.
+const SPACING: f64 = 1.5;
+
+/// Largest ratio by which surfaces may be closer than the triangles that approximate them.
+const SAG: f64 = 1.25;
+
+/// The most halvings of a triangle in each direction.
+const MOST_HALVINGS: u32 = 24;
+
+/// The ball is final if its radius shrinks by less than this fraction.
+const SETTLED: f64 = 0.01;
+
+/// The most shrinking steps; each uses the nearest point, so a few suffice.
+const MOST_SHRINKS: usize = 12;
+
+/// Triangles of one patch face each other if the cosine of the angle between their normals is below
+/// this (120°).
+const OPPOSITE: f64 = -0.5;
+
+/// Input of [`thin_walls`]: a first surface mesh, its geometry and the sizes.
+pub struct Walls<'a> {
+    /// The triangulation.
+    pub mesh: &'a SurfaceMesh,
+    /// The bodies behind and in front of each patch.
+    pub regions: &'a (dyn Fn(PatchId) -> [Option<BodyId>; 2] + Sync),
+    /// Projection onto the patch itself.
+    pub project: &'a (dyn Fn(PatchId, &Point) -> Point + Sync),
+    /// The sizes to be lowered.
+    pub size: &'a dyn SizeField,
+    /// The resolution wanted across thin regions.
+    pub closeness: Closeness,
+}
+
+/// Statistics of regions that are thin compared with the sizes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
+pub struct ThinWalls {
+    /// Sample points at which the size is too large for the thickness.
+    pub places: u64,
+    /// Those that need a smaller size than [`Closeness::most`] allows.
+    pub limited: u64,
+    /// The least thickness among them (length).
+    pub thinnest: Option<f64>,
+}
+
+/// Sources that lower the sizes in thin regions, and statistics of these regions.
+pub fn thin_walls(walls: &Walls) -> (Vec<Source>, ThinWalls) {
+    let mut found = ThinWalls::default();
+    if !walls.closeness.ratio.is_finite() {
+        return (Vec::new(), found);
+    }
+    let prober = Prober::new(walls);
+    let places: Vec<Vec<Place>> = (0..walls.mesh.triangles.len() as u32)
+        .into_par_iter()
+        .map(|t| {
+            let mut places = Vec::new();
+            prober.probe_triangle(t, &mut places);
+            places
+        })
+        .collect();
+    let places = places.concat();
+    found.places = places.len() as u64;
+    found.limited = places.iter().filter(|place| place.limited).count() as u64;
+    found.thinnest = places.iter().map(|place| place.thickness).min_by(f64::total_cmp);
+    (thinned(places.into_iter().filter_map(|place| place.source).collect()), found)
+}
+
+#[derive(Clone, Copy)]
+struct Place {
+    source: Option<Source>,
+    thickness: f64,
+    limited: bool,
+}
+
+struct Prober<'a> {
+    walls: &'a Walls<'a>,
+    corners: Vec<[Point; 3]>,
+    /// Unit normals; zero for triangles without area.
+    normals: Vec<Vector>,
+    /// The triangles of each patch with their tree; `tree` is a tree of the patches. One tree of
+    /// all triangles would be slow near sharp wedges, which have very many triangles of excluded
+    /// patches.
+    patches: Vec<(Vec<u32>, Tree)>,
+    tree: Tree,
+    /// For each patch, those with a common curve or corner, ascending.
+    adjacent: Vec<Vec<PatchId>>,
+}
+
+impl<'a> Prober<'a> {
+    fn new(walls: &'a Walls<'a>) -> Self {
+        let mesh = walls.mesh;
+        let corners: Vec<[Point; 3]> =
+            mesh.triangles.iter().map(|t| t.vertices.map(|v| mesh.points[v.index()])).collect();
+        let normal = |[a, b, c]: &[Point; 3]| area_vector(a, b, c).try_normalize(0.0);
+        let adjacent = adjacent_patches(mesh);
+        let mut of_patch = vec![Vec::new(); adjacent.len()];
+        (0..).zip(&mesh.triangles).for_each(|(t, triangle)| of_patch[triangle.patch.index()].push(t));
+        let boxes = |triangles: &[u32]| -> Vec<Aabb> {
+            triangles.iter().map(|&t| bounds(&corners[t as usize])).collect()
+        };
+        let around = |triangles: &Vec<u32>| {
+            let whole = |a: Aabb, b: Aabb| Aabb { min: a.min.inf(&b.min), max: a.max.sup(&b.max) };
+            let nowhere =
+                Aabb { min: Point::from([f64::INFINITY; 3]), max: Point::from([f64::NEG_INFINITY; 3]) };
+            boxes(triangles).into_iter().fold(nowhere, whole)
+        };
+        Self {
+            walls,
+            normals: corners.iter().map(|p| normal(p).unwrap_or_else(Vector::zeros)).collect(),
+            tree: Tree::new(&of_patch.iter().map(around).collect::<Vec<_>>()),
+            patches: of_patch
+                .into_iter()
+                .map(|triangles| {
+                    let tree = Tree::new(&boxes(&triangles));
+                    (triangles, tree)
+                })
+                .collect(),
+            adjacent,
+            corners,
+        }
+    }
+
+    /// Adds the sample points of a triangle at which the opposite wall is too close.
+    fn probe_triangle(&self, t: u32, places: &mut Vec<Place>) {
+        let normal = self.normals[t as usize];
+        let [behind, before] = (self.walls.regions)(self.walls.mesh.triangles[t as usize].patch);
+        for (body, into) in [(behind, -normal), (before, normal)] {
+            if body.is_some() && normal != Vector::zeros() {
+                self.probe(t, into, self.corners[t as usize], 2 * MOST_HALVINGS, places);
+            }
+        }
+    }
+
+    /// Probes a part of a triangle, which is halved while it is long compared with the size it
+    /// needs.
+    fn probe(&self, t: u32, into: Vector, part: [Point; 3], halvings: u32, places: &mut Vec<Place>) {
+        let Closeness { ratio, most } = self.walls.closeness;
+        let [a, b, c] = part;
+        let middle = Point::from((a.coords + b.coords + c.coords) / 3.0);
+        let size = self.walls.size.size_at(&middle);
+        let length = |k: usize| (part[(k + 2) % 3] - part[(k + 1) % 3]).norm();
+        let longest = (0..3).fold(0, |best, k| if length(k) > length(best) { k } else { best });
+        let Some(thickness) = self.thickness(t, &middle, into, self.limit(size, length(longest))) else {
+            return;
+        };
+        let wanted = ratio * thickness;
+        let lowered = lowered(size, wanted, most);
+        let spacing = SPACING * lowered;
+        if length(longest) > spacing && halvings > 0 {
+            let [i, j, k] = [longest, (longest + 1) % 3, (longest + 2) % 3];
+            let cut = nalgebra::center(&part[j], &part[k]);
+            self.probe(t, into, [part[i], part[j], cut], halvings - 1, places);
+            self.probe(t, into, [part[i], cut, part[k]], halvings - 1, places);
+        } else if wanted < WORTH * size {
+            let source = (lowered < WORTH * size).then_some(Source { point: middle, size: lowered });
+            places.push(Place { source, thickness, limited: wanted < lowered });
+        }
+    }
+
+    /// The thickness above which a wall needs no smaller size at a part of a triangle and all its
+    /// subdivisions.
+    fn limit(&self, size: f64, longest: f64) -> f64 {
+        let ratio = self.walls.closeness.ratio;
+        if longest > SPACING * WORTH * size {
+            // Over the triangle the thickness may vary by up to its length.
+            return size / ratio + 0.5 * longest;
+        }
+        SAG * WORTH * size / ratio
+    }
+
+    /// The nearest point to a ball's centre, within the ball, on patches that may be opposite to a
+    /// triangle; with its triangle.
+    fn nearest(&self, t: u32, center: &Point, radius: f64) -> Option<(u32, Point)> {
+        let patch = self.walls.mesh.triangles[t as usize].patch;
+        let adjacent = &self.adjacent[patch.index()];
+        let normal = self.normals[t as usize];
+        let foot = |s: u32| at(&self.corners[s as usize], in_triangle(center, &self.corners[s as usize]));
+        let mut best: Option<(f64, u32)> = None;
+        self.tree.nearest_within(center, radius * radius, |other| {
+            let other = PatchId(other);
+            if adjacent.binary_search(&other).is_ok() {
+                return f64::INFINITY;
+            }
+            let (triangles, tree) = &self.patches[other.index()];
+            let squared = |k: u32| {
+                let s = triangles[k as usize];
+                let faces = other != patch || normal.dot(&self.normals[s as usize]) < OPPOSITE;
+                if faces { (foot(s) - center).norm_squared() } else { f64::INFINITY }
+            };
+            let limit = best.map_or(radius * radius, |(distance, _)| distance);
+            let Some((k, distance)) = tree.nearest_within(center, limit, squared) else {
+                return f64::INFINITY;
+            };
+            let found = (distance, triangles[k as usize]);
+            best = Some(best.map_or(found, |best| if found < best { found } else { best }));
+            distance
+        });
+        best.map(|(_, s)| (s, foot(s)))
+    }
+
+    /// The distance from a point of a triangle to the opposite wall, if it is less than `limit`.
+    fn thickness(&self, t: u32, from: &Point, into: Vector, limit: f64) -> Option<f64> {
+        let patch = self.walls.mesh.triangles[t as usize].patch;
+        let mut radius = 0.5 * limit;
+        let mut touched: Option<(u32, Point)> = None;
+        for _ in 0..MOST_SHRINKS {
+            let Some((s, point)) = self.nearest(t, &(from + into * radius), radius) else { break };
+            let way = point - from;
+            let smaller = way.norm_squared() / (2.0 * into.dot(&way));
+            touched = Some((s, point));
+            if !(smaller > 0.0 && smaller < (1.0 - SETTLED) * radius) {
+                break;
+            }
+            radius = smaller;
+        }
+        let (s, point) = touched?;
+        let center = from + into * radius;
+        if (from - center).dot(&(point - center)) > 0.0 {
+            return None;
+        }
+        // The triangles are chords, so the distance is measured on the surfaces.
+        let project = self.walls.project;
+        let ends = [project(patch, from), project(self.walls.mesh.triangles[s as usize].patch, &point)];
+        Some((ends[1] - ends[0]).norm()).filter(|&d| d > 0.0 && d < limit)
+    }
+}
+
+/// The size that replaces `size` if a smaller size is wanted.
+///
+/// It is the wanted size, if that is at most `most` times smaller. Beyond that the reduction
+/// decreases and vanishes at about twice the factor, because a partial reduction costs many tets
+/// that are still flat.
+fn lowered(size: f64, wanted: f64, most: f64) -> f64 {
+    let beyond = size / (wanted * most);
+    if beyond <= 1.0 { wanted } else { size * (beyond.powi(3) / most).min(1.0) }
+}
+
+/// For each patch, those with a common curve or corner, ascending.
+fn adjacent_patches(mesh: &SurfaceMesh) -> Vec<Vec<PatchId>> {
+    let patches = mesh.triangles.iter().map(|t| t.patch.index() + 1).max().unwrap_or(0);
+    // Keys: curves first, then corners.
+    let on = |class: Class| match class {
+        Class::Curve(curve) => Some((0, curve.0)),
+        Class::Corner(corner) => Some((1, corner.0)),
+        _ => None,
+    };
+    let mut uses: Vec<((u8, u32), PatchId)> = Vec::new();
+    for t in &mesh.triangles {
+        uses.extend(t.vertices.iter().filter_map(|v| Some((on(mesh.classes[v.index()])?, t.patch))));
+    }
+    // A curve of a single segment has no interior vertex, but its end corners are shared.
+    uses.sort_unstable();
+    uses.dedup();
+    let mut adjacent = vec![Vec::new(); patches];
+    for group in uses.chunk_by(|a, b| a.0 == b.0) {
+        for (_, patch) in group {
+            adjacent[patch.index()].extend(group.iter().map(|(_, other)| *other).filter(|o| o != patch));
+        }
+    }
+    for list in &mut adjacent {
+        list.sort_unstable();
+        list.dedup();
+    }
+    adjacent
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ground::size::UniformSize;
+    use crate::mesher::facets::{FacetModel, Facets, keep};
+
+    /// A box as facets.
+    fn slab([x, y, z]: [f64; 3]) -> FacetModel {
+        let points = (0..8)
+            .map(|i| Point::new(x * f64::from(i & 1), y * f64::from(i >> 1 & 1), z * f64::from(i >> 2 & 1)));
+        let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+        let triangles = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+        let facets = Facets { points: points.collect(), triangles, ..Facets::default() };
+        FacetModel::new(&[facets], &crate::mesher::facets::Settings::default()).unwrap()
+    }
+
+    fn found(model: &FacetModel, size: f64, closeness: Closeness) -> (Vec<Source>, ThinWalls) {
+        thin_walls(&Walls {
+            mesh: &keep(model),
+            regions: &|patch| [model.patch(patch).inside, model.patch(patch).outside],
+            project: &|_, point| *point,
+            size: &UniformSize(size),
+            closeness,
+        })
+    }
+
+    #[test]
+    fn a_plate_gets_sources_all_over_and_a_block_none() {
+        let closeness = Closeness { ratio: 2.0, most: 8.0 };
+        let (sources, walls) = found(&slab([4.0, 4.0, 0.25]), 1.0, closeness);
+        assert!(walls.thinnest.is_some_and(|d| (d - 0.25).abs() < 1e-12), "{walls:?}");
+        assert_eq!(walls.limited, 0);
+        assert!(sources.iter().all(|s| (s.size - 0.5).abs() < 1e-12));
+        // Every point of the large faces is within one spacing and one thinning cell of a source.
+        for (i, j) in (0..9).flat_map(|i| (0..9).map(move |j| (i, j))) {
+            let p = Point::new(0.5 * f64::from(i), 0.5 * f64::from(j), 0.0);
+            let nearest = sources.iter().map(|s| (s.point - p).norm()).fold(f64::INFINITY, f64::min);
+            assert!(nearest < (SPACING + 1.0) * 0.5, "{p}: {nearest}");
+        }
+        let (sources, walls) = found(&slab([1.0, 1.0, 1.0]), 1.0, closeness);
+        assert!(sources.is_empty() && walls == ThinWalls::default());
+    }
+
+    #[test]
+    fn regions_too_thin_to_resolve_are_counted_and_left_unchanged() {
+        let paper = slab([4.0, 4.0, 0.001]);
+        let (sources, walls) = found(&paper, 1.0, Closeness { ratio: 2.0, most: 8.0 });
+        assert!(sources.is_empty() && walls.limited > 0 && walls.limited == walls.places, "{walls:?}");
+        assert!(found(&paper, 1.0, Closeness::OFF).1 == ThinWalls::default());
+    }
+
+    #[test]
+    fn the_reduction_vanishes_for_extremely_thin_regions() {
+        let factor = |needed: f64| 1.0 / lowered(1.0, 1.0 / needed, 8.0);
+        assert_eq!([factor(1.0), factor(4.0), factor(8.0)], [1.0, 4.0, 8.0]);
+        assert!((factor(12.0) - 8.0 / 1.5_f64.powi(3)).abs() < 1e-12);
+        assert_eq!([factor(16.0), factor(1e6)], [1.0, 1.0]);
+    }
+}

@@ -1,0 +1,150 @@
+//! Surface meshes of geometries given by a few lines of text.
+
+use super::*;
+use crate::ground::size::{GeometricSize, SizeSettings, UniformSize};
+use crate::mesher::surface::curves::{crowded, mesh_curves};
+use crate::mesher::surface::narrow::narrow;
+
+/// A geometry with its features.
+fn read(text: &str) -> (Geometry, Features, Projector) {
+    let geometry = csg::language::parse_geometry(text, "test.geo").expect("a geometry").geometry;
+    let features = Features::find(&geometry).expect("features");
+    let projector = Projector::new(&geometry, &features);
+    (geometry, features, projector)
+}
+
+/// The surface mesh of a geometry at moderate sizes.
+fn meshed(text: &str) -> Result<(SurfaceMesh, Features), SurfaceError> {
+    let (geometry, features, projector) = read(text);
+    let size = GeometricSize::new(&geometry, &features, &SizeSettings::default());
+    let curves = mesh_curves(&features, &projector, &size).expect("curves");
+    let (mesh, _) = mesh_patches(&geometry, &features, curves, &size, &Settings::default())?;
+    assert_eq!(mesh.check(&features, &projector), []);
+    Ok((mesh, features))
+}
+
+#[test]
+fn the_tip_of_a_skew_cone_has_no_tiny_triangles() {
+    // The computed apex is some ulp off the point in which the plane cuts the cone.
+    let (mesh, features) = meshed(
+        "algebraic3d
+solid c = cone (-0.4018, -0.3177, 0.2946; 0.5526; -0.3036, 0.0514, 1.6624; 0)
+    and plane (-0.4018, -0.3177, 0.2946; -0.0982, -0.3691, -1.3678)
+    and plane (-0.3036, 0.0514, 1.6624; 0.0982, 0.3691, 1.3678);
+tlo c;",
+    )
+    .unwrap();
+    assert_eq!([features.corners.len(), features.curves.len(), features.patches.len()], [1, 1, 2]);
+    let point = |v: VertexId| mesh.points[v.index()];
+    let sides = mesh.triangles.iter().flat_map(|t| {
+        let [a, b, c] = t.vertices.map(point);
+        [(b - a).norm(), (c - b).norm(), (a - c).norm()]
+    });
+    let shortest = sides.fold(f64::INFINITY, f64::min);
+    assert!(shortest > 1e-4, "{shortest}");
+}
+
+#[test]
+fn a_lens_between_arcs_that_leave_a_corner_at_a_small_angle_needs_shorter_segments_if_it_is_inverted() {
+    // Two arcs with the same ends are a hundredth of a sagitta apart, and only one has two
+    // segments.
+    let radius = |middle: f64| (1.0 + middle * middle).sqrt();
+    let lens = |counts: [usize; 2]| {
+        let mut made = Made::new(vec![
+            Surface::Plane(Plane { point: Point::origin(), normal: Vector::z() }),
+            Surface::Cylinder(Cylinder {
+                point: Point::new(0.0, -1.0, 0.0),
+                axis: Vector::z(),
+                radius: radius(1.0),
+            }),
+            Surface::Cylinder(Cylinder {
+                point: Point::new(0.0, -1.01, 0.0),
+                axis: Vector::z(),
+                radius: radius(1.01),
+            }),
+        ]);
+        let ends = [-1.0, 1.0].map(|x| made.corner(Point::new(x, 0.0, 0.0), &[0, 1, 2]));
+        let arc = |middle: f64| {
+            let half = 1.0_f64.atan2(middle);
+            move |t: f64| {
+                let turn = half * (2.0 * t - 1.0);
+                Point::new(radius(middle) * turn.sin(), radius(middle) * turn.cos() - middle, 0.0)
+            }
+        };
+        let outer = made.arc([0, 1], ends, counts[0], arc(1.0));
+        let inner = made.arc([0, 2], ends, counts[1], arc(1.01));
+        made.patch(0, false, &[(outer, false), (inner, true)], &[]);
+        made
+    };
+    let coarse = lens([1, 2]);
+    let failed = mesh_patches(
+        &coarse.geometry,
+        &coarse.features,
+        coarse.curves,
+        &UniformSize(0.5),
+        &Settings::default(),
+    );
+    let failed = failed.unwrap_err();
+    assert!(
+        matches!(&failed, SurfaceError::TooCoarse { segments, .. } if !segments.is_empty()),
+        "{failed:?}"
+    );
+    lens([64, 64]).mesh(&UniformSize(0.5));
+}
+
+#[test]
+fn internally_tangent_circles_have_vertices_at_the_same_distances_from_the_point_of_contact() {
+    let (_, features, projector) = read(
+        "algebraic3d
+solid shaft = cylinder (0, 0, 0; 0, 0, 1; 1) and plane (0, 0, 0; 0, 0, -1) and plane (0, 0, 1; 0, 0, 1);
+solid pin = cylinder (0.2, 0, 0; 0.2, 0, 1; 0.8) and plane (0, 0, 1; 0, 0, -1) and plane (0, 0, 2; 0, 0, 1);
+solid eccentric = shaft or pin;
+tlo eccentric;",
+    );
+    let size = UniformSize(0.25);
+    let curves = mesh_curves(&features, &projector, &size).expect("curves");
+    let cusp = features.corners[0].point;
+    // For each curve, the distances of its vertices from the cusp, up to about half a radius.
+    let ending = (0..).zip(&features.curves).filter(|(_, curve)| curve.ends.is_some());
+    let distances = ending.map(|(id, _)| {
+        let of_curve = curves.segments.iter().filter(|s| s.curve == CurveId(id));
+        let mut near: Vec<f64> = of_curve
+            .map(|s| (curves.points[s.vertices[1].index()] - cusp).norm())
+            .filter(|d| *d < 0.6)
+            .collect();
+        near.sort_by(f64::total_cmp);
+        near
+    });
+    let [outer, inner] =
+        <[Vec<f64>; 2]>::try_from(distances.collect::<Vec<_>>()).expect("two curves end at the cusp");
+    assert!(outer.len() > 4 && outer.len() == inner.len());
+    assert!(outer.iter().zip(&inner).all(|(p, q)| (p - q).abs() < 1e-12), "{outer:?} {inner:?}");
+    // Near the cusp the chords are closer to each other than to their curves, but in order.
+    let near = |source: &crate::ground::size::Source| (source.point - cusp).norm() < 0.6;
+    assert!(!crowded(&curves, &features, &size).iter().any(near));
+}
+
+#[test]
+fn segments_along_a_narrow_band_are_shortened_but_not_those_across_a_gap() {
+    // A disk whose rim is a band, and two blocks whose tops are one patch with a gap.
+    let disk = "algebraic3d
+solid disk = cylinder (0, 0, 0; 0, 0, 1; 1) and plane (0, 0, 0; 0, 0, -1) and plane (0, 0, 0.1; 0, 0, 1);
+tlo disk;";
+    let blocks = "algebraic3d
+solid low = orthobrick (0, 0, 0; 2, 1, 1);
+solid high = orthobrick (2.1, 0, 0; 4.1, 1, 1);
+solid blocks = low or high;
+tlo blocks;";
+    let found = |text: &str| {
+        let (_, features, projector) = read(text);
+        let size = UniformSize(0.5);
+        let curves = mesh_curves(&features, &projector, &size).expect("curves");
+        narrow(&curves, &features, &projector, &size)
+    };
+    let sources = found(disk);
+    assert!(
+        !sources.is_empty() && sources.iter().all(|source| (0.17..0.35).contains(&source.size)),
+        "{sources:?}"
+    );
+    assert_eq!(found(blocks), []);
+}

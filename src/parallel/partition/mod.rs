@@ -1,0 +1,211 @@
+//! Serial partitioning: assigns the tets of a coarse mesh to ranks.
+//!
+//! Parts should be of equal size, with few faces between them: on each such face lie many vertices
+//! of the refined mesh that ranks must share. The coarse mesh is partitioned once; all its tets are
+//! refined alike, so the balance is kept.
+//!
+//! | method | cut | needs |
+//! |---|---|---|
+//! | [`Method::Metis`] | small | feature `metis` |
+//! | [`Method::Coordinates`] | 1.3 to 1.8 times that; on a plain box no larger | nothing |
+//!
+//! Deterministic: the same mesh gives the same parts. Every part has a tet; parts need not be
+//! connected.
+
+pub mod dual;
+#[cfg(feature = "metis")]
+mod graph;
+#[cfg(not(feature = "metis"))]
+#[path = "graph_disabled.rs"]
+mod graph;
+pub mod metrics;
+mod periodic;
+mod rcb;
+pub mod ties;
+pub mod weighted;
+
+pub use metrics::Metrics;
+pub use periodic::periodic_ties;
+
+use crate::ground::error::{ErrorKind, HasKind};
+use crate::ground::mesh::topology::Faces;
+use crate::ground::mesh::{FaceId, Mesh, Rank, sorted_face, topology};
+use ties::{Clusters, Ties};
+
+/// A partitioning method.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Method {
+    /// Multilevel recursive bisection of the dual graph by METIS (Karypis and Kumar 1998).
+    Metis,
+    /// Recursive bisection of the tet centroids across the longest side of their box (Berger and
+    /// Bokhari 1987).
+    Coordinates,
+}
+
+impl std::fmt::Display for Method {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Metis => "METIS recursive bisection",
+            Self::Coordinates => "recursive coordinate bisection",
+        })
+    }
+}
+
+/// Parameters of [`partition`].
+#[derive(Clone, Copy, Debug)]
+pub struct Settings {
+    /// The method; METIS if it is built in.
+    pub method: Method,
+    /// Seed of METIS' random choices, not negative.
+    pub seed: i32,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        let method = if cfg!(feature = "metis") { Method::Metis } else { Method::Coordinates };
+        Self { method, seed: 1 }
+    }
+}
+
+/// Why a mesh cannot be partitioned.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum PartitionError {
+    /// Zero parts were requested.
+    #[error("the number of parts must be at least 1")]
+    NoParts,
+    /// There are fewer tets than parts.
+    #[error("{parts} parts need at least as many tets, but the mesh has {tets}: ask for a finer coarse mesh")]
+    MoreParts {
+        /// The requested parts.
+        parts: u32,
+        /// The number of tets.
+        tets: usize,
+    },
+    /// Too many tets for 32-bit positions.
+    #[error("{tets} tets are more than {}, the most that can be partitioned", topology::MAX_TETS)]
+    TooManyTets {
+        /// The number of tets.
+        tets: usize,
+    },
+    /// A face has more than two tets, so the mesh is not a manifold.
+    #[error("face {vertices:?} belongs to more than two tets")]
+    NotAMesh {
+        /// The vertices of the face.
+        vertices: [u32; 3],
+    },
+    /// METIS was requested in a build without it.
+    #[error(
+        "this program was built without METIS: rebuild with the feature `metis`, or choose coordinate bisection"
+    )]
+    NoMetis,
+    /// METIS failed.
+    #[error("METIS cannot partition {tets} tets into {parts} parts: {reason}")]
+    Metis {
+        /// The number of tets.
+        tets: usize,
+        /// The requested parts.
+        parts: u32,
+        /// The error of METIS.
+        reason: String,
+    },
+}
+
+impl HasKind for PartitionError {
+    fn kind(&self) -> ErrorKind {
+        match self {
+            Self::TooManyTets { .. } => ErrorKind::Resources,
+            Self::NotAMesh { .. } => ErrorKind::NoMesh,
+            Self::NoParts | Self::MoreParts { .. } | Self::NoMetis | Self::Metis { .. } => ErrorKind::Input,
+        }
+    }
+}
+
+/// Assigns each tet of `mesh` a part below `parts`. The two tets of an interface between bodies are
+/// in the same part as far as balance allows.
+///
+/// # Errors
+/// [`PartitionError`] if `parts` is 0 or above the number of tets, if a face has three tets, or if
+/// METIS fails.
+pub fn partition(
+    mesh: &Mesh,
+    parts: u32,
+    settings: &Settings,
+) -> Result<(Vec<Rank>, Metrics), PartitionError> {
+    partition_tied(mesh, parts, &Ties::default(), settings)
+}
+
+/// [`partition`] that also puts tied tets into the same part. [`Metrics::lost_ties`] counts the
+/// violated ties: some may be if there are about as many parts as tets.
+///
+/// # Errors
+/// As [`partition`].
+pub fn partition_tied(
+    mesh: &Mesh,
+    parts: u32,
+    ties: &Ties,
+    settings: &Settings,
+) -> Result<(Vec<Rank>, Metrics), PartitionError> {
+    let tets = mesh.tets.len();
+    if parts == 0 {
+        return Err(PartitionError::NoParts);
+    }
+    if tets < parts as usize {
+        return Err(PartitionError::MoreParts { parts, tets });
+    }
+    if tets > topology::MAX_TETS {
+        return Err(PartitionError::TooManyTets { tets });
+    }
+    let listed = topology::faces(mesh.points.len(), &mesh.tets);
+    let face_tets = tets_at_faces(&listed)?;
+    let dual = dual::dual(&listed, &face_tets);
+    let interfaces = interfaces(mesh, &listed, &face_tets);
+    let clusters = if parts > 1 { Clusters::new(tets, ties, &interfaces, parts) } else { None };
+    let mut part = match (settings.method, &clusters) {
+        _ if parts == 1 => vec![0; tets],
+        (Method::Metis, None) => graph::bisect(&dual, parts, settings.seed)?,
+        (Method::Metis, Some(clusters)) => {
+            let of_cluster = graph::bisect_weighted(&clusters.graph(&dual), parts, settings.seed)?;
+            clusters.of.iter().map(|&cluster| of_cluster[cluster as usize]).collect()
+        }
+        (Method::Coordinates, _) => rcb::bisect(mesh, parts),
+    };
+    if let Some(clusters) = &clusters {
+        clusters.gather(&mut part);
+        ties::settle_around(&dual, clusters, ties, parts, &mut part);
+    }
+    let repaired = metrics::fill_empty_parts(&dual, &mut part, parts);
+    let mut metrics = metrics::measure(&dual, &part, parts, Some(settings.method), repaired);
+    metrics.cut_interfaces =
+        interfaces.iter().filter(|[a, b]| part[*a as usize] != part[*b as usize]).count();
+    metrics.lost_ties = ties::lost(ties, &part);
+    Ok((part, metrics))
+}
+
+/// The two tets of each boundary triangle between bodies.
+fn interfaces(mesh: &Mesh, listed: &Faces, face_tets: &[[u32; 2]]) -> Vec<[u32; 2]> {
+    let sides = mesh.triangles.iter().filter_map(|triangle| {
+        let face = listed.faces.binary_search(&sorted_face(triangle.vertices)).ok()?;
+        Some(face_tets[face]).filter(|tets| tets[1] != u32::MAX)
+    });
+    sides.collect()
+}
+
+/// Measures an existing partition.
+///
+/// # Errors
+/// [`PartitionError::NotAMesh`] if a face has three tets.
+pub fn assess(mesh: &Mesh, part: &[Rank], parts: u32) -> Result<Metrics, PartitionError> {
+    let listed = topology::faces(mesh.points.len(), &mesh.tets);
+    let dual = dual::dual(&listed, &tets_at_faces(&listed)?);
+    Ok(metrics::measure(&dual, part, parts, None, 0))
+}
+
+/// The tets of each listed face.
+fn tets_at_faces(listed: &Faces) -> Result<Vec<[u32; 2]>, PartitionError> {
+    topology::face_tets(listed.faces.len(), &listed.tet_faces).map_err(|face: FaceId| {
+        PartitionError::NotAMesh { vertices: listed.faces[face.index()].map(|v| v.0) }
+    })
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,73 @@
+//! Size estimate of a refined part, computed from the coarse part without refining it.
+
+use super::lattice::Lattice;
+use crate::ground::mesh::{GlobalId, Rank};
+use crate::parallel::distribution::{DistMesh, Shared};
+
+/// Counts of fine vertices and tets of one part.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Census {
+    /// Tets.
+    pub tets: u64,
+    /// Local vertices, shared ones included.
+    pub held: u64,
+    /// Vertices shared with other ranks.
+    pub shared: u64,
+    /// Vertices owned by this rank.
+    pub owned: u64,
+    /// Bytes of coordinates: with [`Keep::All`](super::Keep::All), and with
+    /// [`Keep::Boundary`](super::Keep::Boundary).
+    pub bytes: [u64; 2],
+    /// The other ranks that share some of its vertices, ascending.
+    pub neighbours: Vec<Rank>,
+}
+
+impl Census {
+    /// The fraction of its local vertices that a part owns.
+    pub fn owned_share(&self) -> f64 {
+        self.owned as f64 / self.held.max(1) as f64
+    }
+}
+
+/// *Local.* Counts what this rank's part would contain with `n` subdivisions per edge.
+pub fn census(mesh: &DistMesh, n: u32) -> Census {
+    let lattice = Lattice::new(n);
+    let [on_boundary @ .., inside_tet] = lattice.points_inside().map(u64::from);
+    let totals = [mesh.totals.vertices, mesh.totals.edges, mesh.totals.faces];
+    let kinds: [(&[GlobalId], &Shared); 3] = [
+        (&mesh.vertex_ids, &mesh.shared_vertices),
+        (&mesh.edge_ids, &mesh.shared_edges),
+        (&mesh.face_ids, &mesh.shared_faces),
+    ];
+    let mut census =
+        Census { tets: mesh.tets.len() as u64 * u64::from(lattice.children()), ..Census::default() };
+    let mut first = 0;
+    for ((ids, shared), (size, total)) in kinds.into_iter().zip(on_boundary.into_iter().zip(totals)) {
+        census.held += ids.len() as u64 * size;
+        census.shared += shared.len() as u64 * size;
+        census.owned += (ids.len() - shared.len()) as u64 * size;
+        for (local, holders) in shared.iter() {
+            let first_id = first + ids[local as usize] * size;
+            census.owned += owned(holders, mesh.rank, first_id, size);
+            census.neighbours.extend(holders.iter().filter(|&&holder| holder != mesh.rank));
+        }
+        first += total * size;
+    }
+    let inside = mesh.tets.len() as u64 * inside_tet;
+    census.bytes = [census.held + inside, census.held].map(|vertices| 24 * vertices);
+    census.held += inside;
+    census.owned += inside;
+    census.neighbours.sort_unstable();
+    census.neighbours.dedup();
+    census
+}
+
+/// The number of ids in `first..first + size` that `rank` owns: those congruent to its position
+/// among the sharing ranks (see [`owner`](crate::parallel::distribution::owner)).
+fn owned(holders: &[Rank], rank: Rank, first: GlobalId, size: u64) -> u64 {
+    let count = holders.len() as u64;
+    let place =
+        holders.binary_search(&rank).expect("a rank is among the holders of its shared entities") as u64;
+    let skipped = (place + count - first % count) % count;
+    size.saturating_sub(skipped).div_ceil(count)
+}

@@ -1,0 +1,328 @@
+//! The refined part: stored coordinates; tets, boundary and ids computed on demand.
+
+use super::diagonal::TetDiagonals;
+use super::lattice::{
+    OCTAHEDRON, UPRIGHT, UPSIDE_DOWN, corner_place, for_each_face_child, octahedron_child_on_face,
+};
+use super::numbering::{Entity, Numbering, ascending};
+use super::periodic::fine_images;
+use super::tet::{Inside, Lattices};
+use crate::ground::mesh::periodic::{Link, PeriodicMap};
+use crate::ground::mesh::stream::{
+    BoundaryBlock, Counts, LocalBlock, MeshStream, NO_TET, SingularTags, TetBlock, VertexBlock,
+};
+use crate::ground::mesh::{Class, GlobalId, Rank, TET_FACES, TetId};
+use crate::parallel::distribution::{BoundaryFace, DistMesh};
+use std::borrow::Cow;
+use std::sync::Arc;
+
+/// One rank's part of a refined mesh, made by [`refine`](super::refine()).
+///
+/// Tet blocks and boundary blocks correspond to the coarse tets and the coarse boundary triangles,
+/// in their order. Vertex blocks are the coarse vertices, then edges, then faces, then tets.
+#[derive(Clone)]
+pub struct RefinedMesh {
+    coarse: DistMesh,
+    numbering: Numbering,
+    inside: Inside,
+    periodic: Arc<PeriodicMap>,
+    singular: csg::Singular,
+}
+
+impl std::fmt::Debug for RefinedMesh {
+    /// Prints sizes only: the coordinates can be gigabytes.
+    fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let (rank, pieces, counts) = (self.rank(), self.pieces(), self.counts());
+        out.debug_struct("RefinedMesh")
+            .field("rank", &rank)
+            .field("pieces", &pieces)
+            .field("counts", &counts)
+            .finish()
+    }
+}
+
+impl RefinedMesh {
+    pub(super) fn new(coarse: DistMesh, numbering: Numbering, inside: Inside) -> Self {
+        Self { coarse, numbering, inside, periodic: Arc::default(), singular: csg::Singular::default() }
+    }
+
+    /// Adds the periodic pairs of the whole coarse mesh.
+    pub fn with_periodic(mut self, map: PeriodicMap) -> Self {
+        self.periodic = Arc::new(map);
+        self
+    }
+
+    /// Adds the singular patches and corners for solvers.
+    pub fn with_singular(self, singular: csg::Singular) -> Self {
+        Self { singular, ..self }
+    }
+
+    /// The numbering of the fine vertices.
+    pub fn numbering(&self) -> &Numbering {
+        &self.numbering
+    }
+
+    /// The coarse mesh.
+    pub fn coarse(&self) -> &DistMesh {
+        &self.coarse
+    }
+
+    /// Subdivisions per coarse edge.
+    pub fn pieces(&self) -> u32 {
+        self.numbering.lattice().n()
+    }
+
+    /// Bytes stored in addition to the coarse mesh.
+    pub fn bytes(&self) -> u64 {
+        let coordinates = size_of_val(&*self.inside.points) as u64;
+        coordinates + (self.coarse.tets.len() * self.inside.diagonals.bytes_per_tet()) as u64
+    }
+
+    /// The number of fine tets of this part.
+    pub fn tets(&self) -> u64 {
+        self.coarse.tets.len() as u64 * u64::from(self.numbering.lattice().children())
+    }
+
+    /// Appends the children of `tet` behind the fine triangles of its face opposite corner `face`,
+    /// by index in the part.
+    fn parents_on_face(&self, tet: TetId, face: usize, parents: &mut Vec<u64>) {
+        let lattice = self.numbering.lattice();
+        let vertices = self.coarse.tets[tet.index()];
+        let corners = ascending(TET_FACES[face], |corner| vertices[corner].0);
+        let diagonals = self.inside.diagonals.of_tet(tet.0);
+        let first = u64::from(tet.0) * u64::from(lattice.children());
+        for_each_face_child(lattice.n(), |j, k, upright| {
+            let child = if upright {
+                lattice.upright_behind_face(corners, j, k)
+            } else {
+                let cell = lattice.octahedron_behind_face(corners, j, k);
+                let diagonal = diagonals.get(lattice.octahedron_row(cell[1], cell[2]) + cell[0]);
+                lattice.octahedron_child(cell) + octahedron_child_on_face(diagonal, face)
+            };
+            parents.push(first + u64::from(child));
+        });
+    }
+
+    /// The local number of a boundary face in `tet`.
+    fn face_of(&self, tet: TetId, boundary: &BoundaryFace) -> usize {
+        let faces = &self.coarse.tet_faces[tet.index()];
+        faces.iter().position(|f| *f == boundary.face).expect("a boundary face is a face of its parents")
+    }
+}
+
+impl MeshStream for RefinedMesh {
+    fn rank(&self) -> Rank {
+        self.coarse.rank
+    }
+
+    fn ranks(&self) -> u32 {
+        self.coarse.ranks
+    }
+
+    fn counts(&self) -> Counts {
+        let children = u64::from(self.numbering.lattice().face_children());
+        Counts {
+            vertices: u64::from(self.numbering.vertices()),
+            tets: self.tets(),
+            boundary: self.coarse.boundary.len() as u64 * children,
+        }
+    }
+
+    fn totals(&self) -> Counts {
+        self.numbering.totals()
+    }
+
+    fn points(&self) -> &[[f64; 3]] {
+        &self.inside.points
+    }
+
+    fn vertex_blocks(&self) -> usize {
+        self.numbering.blocks()
+    }
+
+    fn vertex_block(&self, index: usize) -> VertexBlock<'_> {
+        let entity = self.numbering.block(index);
+        VertexBlock {
+            local: self.numbering.inside(entity),
+            first_id: self.numbering.first_id_in(&self.coarse, entity),
+            holders: entity.holders(&self.coarse),
+            on_boundary: !matches!(entity.class(&self.coarse), Class::Body(_)),
+        }
+    }
+
+    fn vertex_id(&self, local: u32) -> GlobalId {
+        let (entity, within) = self.numbering.locate(local);
+        self.numbering.first_id_in(&self.coarse, entity) + u64::from(within)
+    }
+
+    fn tet_blocks(&self) -> usize {
+        self.coarse.tets.len()
+    }
+
+    fn tet_block(&self, index: usize, block: &mut TetBlock) {
+        let mut ids = Vec::new();
+        self.numbering.lattice_ids(&self.coarse, TetId::new(index), &mut ids);
+        self.children(index, block);
+        block.tets.iter_mut().flatten().for_each(|corner| *corner = ids[*corner as usize]);
+    }
+
+    fn local_block(&self, index: usize, block: &mut LocalBlock) {
+        self.numbering.lattice_ids(&self.coarse, TetId::new(index), &mut block.vertices);
+        self.children(index, &mut block.tets);
+    }
+
+    fn block_ids(&self, block: &LocalBlock, ids: &mut Vec<GlobalId>) {
+        let children = u64::from(self.numbering.lattice().children());
+        let tet = (block.tets.first_local / children) as u32;
+        let inside = self.numbering.inside(Entity { dimension: 3, id: tet });
+        let first = self.numbering.first_id(3, self.coarse.tet_ids[tet as usize]);
+        // Nearly all vertices are interior to the tet; locating any other id needs divisions.
+        let id = |&vertex: &u32| match vertex.checked_sub(inside.start) {
+            Some(within) => first + u64::from(within),
+            None => self.vertex_id(vertex),
+        };
+        ids.clear();
+        ids.extend(block.vertices.iter().map(id));
+    }
+
+    fn block_points(&self, block: &LocalBlock, points: &mut Vec<[f64; 3]>) {
+        if !self.keeps_all() {
+            let tet = block.tets.first_local / u64::from(self.numbering.lattice().children());
+            self.lattices().all(TetId(tet as u32), self.inside.flat[tet as usize], points);
+            return;
+        }
+        points.clear();
+        points.extend(block.vertices.iter().map(|&vertex| self.inside.points[vertex as usize]));
+    }
+
+    fn vertex_points(&self, index: usize) -> Cow<'_, [[f64; 3]]> {
+        let entity = self.numbering.block(index);
+        if entity.dimension == 3 && !self.keeps_all() {
+            return self.lattices().inside(TetId(entity.id), self.inside.flat[entity.id as usize]).into();
+        }
+        let local = self.numbering.inside(entity);
+        Cow::Borrowed(&self.inside.points[local.start as usize..local.end as usize])
+    }
+
+    fn boundary_blocks(&self) -> usize {
+        self.coarse.boundary.len()
+    }
+
+    fn boundary_block(&self, index: usize, block: &mut BoundaryBlock) {
+        let face = &self.coarse.boundary[index];
+        let (tet, behind) = match face.parents {
+            [Some(tet), _] => (tet, true),
+            [None, Some(tet)] => (tet, false),
+            [None, None] => panic!("boundary face {:?} has no tet in this part", face.face),
+        };
+        block.triangles.clear();
+        self.numbering.for_each_triangle(&self.coarse, tet, self.face_of(tet, face), |[p, q, r]| {
+            block.triangles.push(if behind { [p, q, r] } else { [p, r, q] });
+        });
+        let mut parents = [Vec::new(), Vec::new()];
+        for (parent, indices) in face.parents.iter().zip(&mut parents) {
+            match *parent {
+                Some(tet) => self.parents_on_face(tet, self.face_of(tet, face), indices),
+                None => indices.resize(block.triangles.len(), NO_TET),
+            }
+        }
+        let [behind, before] = parents;
+        block.parents.clear();
+        block.parents.extend(behind.into_iter().zip(before).map(|(p, q)| [p, q]));
+        block.bodies = face.parents.map(|parent| Some(self.coarse.tet_bodies[parent?.index()]));
+        block.patch = Some(face.patch);
+    }
+
+    fn links(&self) -> &[Link] {
+        &self.periodic.links
+    }
+
+    fn images(&self, index: usize) -> Vec<(u32, GlobalId)> {
+        fine_images(&self.periodic.pairs[index], &self.coarse, &self.numbering)
+    }
+
+    fn singular(&self) -> SingularTags {
+        let factor = |class: &Class| match class {
+            Class::Corner(corner) => {
+                self.singular.corners.iter().find(|(id, _)| id == corner).map(|tag| tag.1)
+            }
+            _ => None,
+        };
+        let vertices =
+            (0..).zip(&self.coarse.vertex_classes).filter_map(|(v, class)| Some((v, factor(class)?)));
+        SingularTags {
+            patches: self.singular.patches.clone(),
+            vertices: if self.singular.corners.is_empty() { Vec::new() } else { vertices.collect() },
+        }
+    }
+
+    fn origins(&self) -> Vec<(u32, GlobalId)> {
+        fine_images(&self.periodic.origins, &self.coarse, &self.numbering)
+    }
+}
+
+impl RefinedMesh {
+    /// Whether all coordinates are stored, see [`Keep`](super::Keep).
+    pub fn keeps_all(&self) -> bool {
+        self.inside.points.len() == self.numbering.vertices() as usize
+    }
+
+    /// The diagonals of the octahedra of a coarse tet.
+    pub(super) fn diagonals(&self, tet: TetId) -> TetDiagonals<'_> {
+        self.inside.diagonals.of_tet(tet.0)
+    }
+
+    fn lattices(&self) -> Lattices<'_> {
+        Lattices { mesh: &self.coarse, numbering: &self.numbering, points: &self.inside.points }
+    }
+
+    /// Fills `block` with the children of a coarse tet, by lattice points.
+    fn children(&self, tet: usize, block: &mut TetBlock) {
+        let lattice = self.numbering.lattice();
+        let children = lattice.children();
+        let diagonals = self.inside.diagonals.of_tet(tet as u32);
+        block.tets.clear();
+        block.tets.reserve(children as usize);
+        for (c, d, cells) in lattice.rows() {
+            let first = lattice.octahedron_row(c, d);
+            push_row(rows_around(lattice, c, d), cells, &mut block.tets, |octahedron| {
+                diagonals.get(first + octahedron)
+            });
+        }
+        block.first_id = self.coarse.tet_ids[tet] * u64::from(children);
+        block.first_local = tet as u64 * u64::from(children);
+        block.body = Some(self.coarse.tet_bodies[tet]);
+    }
+}
+
+/// The starts of the four rows of points around a row of cells, numbered as in [`corner_place`].
+fn rows_around(lattice: super::lattice::Lattice, c: u32, d: u32) -> [u32; 4] {
+    let inside = c + d + 2 <= lattice.n();
+    let row = |c, d| lattice.row(c, d);
+    [row(c, d), row(c + 1, d), row(c, d + 1), if inside { row(c + 1, d + 1) } else { 0 }]
+}
+
+/// Appends the children of a row of cells, by lattice points.
+fn push_row(rows: [u32; 4], cells: u32, tets: &mut Vec<[u32; 4]>, diagonal: impl Fn(u32) -> u8) {
+    // The last row of a layer has no fourth row of points; none of its children uses it.
+    let corner = |code: u8| {
+        let (row, shift) = corner_place(code);
+        rows[row] + shift as u32
+    };
+    // Written out because closures in `map` are not always inlined, and this is the innermost loop.
+    let along = |[p, q, r, s]: [u32; 4], cell: u32| [p + cell, q + cell, r + cell, s + cell];
+    let upright = UPRIGHT.map(corner);
+    tets.extend((0..cells).map(|cell| along(upright, cell)));
+    // A single cell (as for n = 1) has no octahedron.
+    if cells == 1 {
+        return;
+    }
+    let octahedron = OCTAHEDRON.map(|children| children.map(|child| child.map(corner)));
+    for cell in 0..cells - 1 {
+        // Diagonals are below 3; the remainder only removes the bounds check.
+        let [p, q, r, s] = octahedron[usize::from(diagonal(cell) % 3)];
+        tets.extend_from_slice(&[along(p, cell), along(q, cell), along(r, cell), along(s, cell)]);
+    }
+    let upside_down = UPSIDE_DOWN.map(corner);
+    tets.extend((0..cells.saturating_sub(2)).map(|cell| along(upside_down, cell)));
+}

@@ -1,0 +1,107 @@
+//! Refinement test of a coarse mesh: refines its curved tets, a chunk at a time, and reports bad
+//! children.
+
+use super::mend::extract;
+use super::snap;
+use super::tet::inverted;
+use super::{Bends, RefineError, RefinedMesh, Settings, refine_unchecked};
+use crate::ground::mesh::stream::{MeshStream, TetBlock};
+use crate::ground::mesh::{GlobalId, TetId};
+use crate::ground::projector::Projector;
+use crate::parallel::check::shape::{BATCH, Batch, Extremes, Shapes};
+use crate::parallel::distribution::DistMesh;
+use rayon::prelude::*;
+
+/// The number of tets refined at a time; bounds the memory of a refinement test.
+pub(super) const CHUNK: usize = 8192;
+
+/// Lower bounds for the quality of children.
+#[derive(Clone, Copy, Debug)]
+pub struct Least {
+    /// The smallest acceptable mean ratio.
+    pub mean_ratio: f64,
+    /// The smallest acceptable dihedral angle, degrees.
+    pub dihedral: f64,
+}
+
+/// The dihedral angle of the regular tet, degrees.
+const REGULAR: f64 = 70.528_779_365_509_31;
+
+impl Least {
+    /// By how much the worst children exceed the bounds: the smaller of the surplus in mean ratio
+    /// and that in dihedral angle, divided by the angle of the regular tet.
+    pub(super) fn excess(&self, worst: &Extremes) -> f64 {
+        let dihedral = worst.smallest.clamp(-1.0, 1.0).acos().to_degrees();
+        f64::min(worst.mean_ratio - self.mean_ratio, (dihedral - self.dihedral) / REGULAR)
+    }
+}
+
+/// The result of [`trial`].
+#[derive(Clone, Debug, Default)]
+pub struct Trial {
+    /// Coarse tets whose children are positive, but one below the bounds; ascending.
+    pub poor: Vec<GlobalId>,
+    /// The smallest dihedral angle of the children of poor tets, degrees; 0 if there are none.
+    pub smallest_dihedral: f64,
+    /// Coarse tets with children that are not positive, ascending.
+    pub inverted: Vec<GlobalId>,
+    /// The error that describes the first of the inverted tets.
+    pub error: Option<RefineError>,
+}
+
+/// *Local, on the whole mesh.* Refines the coarse tets curved by projection or `bends` with
+/// `pieces` subdivisions per edge, and finds those with a child below `least`.
+///
+/// # Errors
+/// [`RefineError::Projection`] and [`RefineError::OutOfMemory`], as [`refine()`](super::refine()).
+pub fn trial(
+    mesh: &DistMesh,
+    projector: &Projector,
+    pieces: u32,
+    bends: &Bends,
+    least: Least,
+) -> Result<Trial, RefineError> {
+    let mut found = Trial::default();
+    let settings = Settings { bends: bends.clone(), ..Settings::default() };
+    let mut worst_of_poor = Extremes::NONE;
+    for chunk in curved(mesh, projector, bends).chunks(CHUNK) {
+        let (refined, bad) = refine_unchecked(extract(mesh, chunk), projector, pieces, &settings)?;
+        let id = |at: usize| mesh.tet_ids[chunk[at] as usize];
+        found.inverted.extend(bad.iter().map(|bad| bad.tet));
+        let worst: Vec<Extremes> =
+            (0..chunk.len()).into_par_iter().map(|at| worst_children(&refined, at)).collect();
+        let is_poor =
+            |at: &usize| least.excess(&worst[*at]) < 0.0 && found.inverted.binary_search(&id(*at)).is_err();
+        let poor: Vec<usize> = (0..chunk.len()).filter(is_poor).collect();
+        worst_of_poor = poor.iter().fold(worst_of_poor, |all, &at| all.with(worst[at]));
+        found.poor.extend(poor.into_iter().map(id));
+        if found.error.is_none() && !bad.is_empty() {
+            found.error = Some(inverted(&bad, settings.described));
+        }
+    }
+    if !found.poor.is_empty() {
+        found.smallest_dihedral = worst_of_poor.smallest.acos().to_degrees();
+    }
+    Ok(found)
+}
+
+/// The tets whose lattices are not affine, ascending.
+pub(super) fn curved(mesh: &DistMesh, projector: &Projector, bends: &Bends) -> Vec<u32> {
+    let is_curved = |tet: &u32| !snap::is_flat(mesh, projector, bends, TetId(*tet));
+    (0..mesh.tets.len() as u32).filter(is_curved).collect()
+}
+
+/// The worst mean ratio and the extreme dihedral angles of the children of a coarse tet.
+pub(super) fn worst_children(refined: &RefinedMesh, tet: usize) -> Extremes {
+    let (mut block, mut batch, mut shapes) = (TetBlock::default(), Batch::default(), Shapes::default());
+    refined.tet_block(tet, &mut block);
+    let points = refined.points();
+    let mut worst = Extremes::NONE;
+    for tets in block.tets.chunks(BATCH) {
+        batch.clear();
+        tets.iter().for_each(|tet| batch.push(0, tet.map(|v| points[v as usize])));
+        batch.volumes(&mut shapes);
+        worst = worst.with(batch.shapes(&mut shapes));
+    }
+    worst
+}

@@ -1,0 +1,128 @@
+//! Meshing of the interior of a skin.
+
+use super::{LatticeSkin, Skin, SkinTriangle};
+use crate::ground::mesh::stream::{MeshStream, TetBlock};
+use crate::ground::mesh::{BoundaryTriangle, Class, Mesh, Segment, VertexId};
+use crate::ground::projector::Projector;
+use crate::ground::size::SizeField;
+use crate::mesher::improve::{self, improve};
+use crate::mesher::volume::{self, ClosedSurface, SurfaceFaults, VolumeError};
+use crate::parallel::distribution::DistMesh;
+use crate::parallel::refine::{self, RefineError, refine};
+use csg::{BodyId, CornerId, CurveId};
+
+/// The tets of a part. Vertices are those of its skin, in their order, then the interior ones.
+#[derive(Clone, Debug, Default)]
+pub struct Filled {
+    /// The tets, by vertex.
+    pub tets: Vec<[u32; 4]>,
+    /// The bodies of the tets.
+    pub bodies: Vec<BodyId>,
+    /// Coordinates of the interior vertices.
+    pub inside: Vec<[f64; 3]>,
+    /// The error of the volume mesher if the tets are those of the lattice instead.
+    pub refused: Option<FillError>,
+}
+
+/// Why the interior of a skin cannot be meshed.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum FillError {
+    /// The skin does not bound a region.
+    #[error(transparent)]
+    Surface(#[from] SurfaceFaults),
+    /// The volume mesher failed.
+    #[error(transparent)]
+    Volume(#[from] VolumeError),
+    /// Interior edges were split, so the part would not conform to its neighbours.
+    #[error("{0} prescribed interior edges were split")]
+    CutEdges(usize),
+}
+
+/// *Local.* [`fill`], or the tets of the lattice if the volume mesher rejects the skin.
+///
+/// # Errors
+/// [`RefineError`] if the lattice is not valid either.
+pub fn fill_or_refine(
+    mesh: &DistMesh,
+    projector: &Projector,
+    skin: &LatticeSkin,
+    size: &dyn SizeField,
+    settings: &improve::Settings,
+) -> Result<Filled, RefineError> {
+    match fill(&skin.skin, size, settings) {
+        Ok(filled) => Ok(filled),
+        Err(refused) => {
+            let filled = fill_by_lattice(mesh, projector, skin)?;
+            Ok(Filled { refused: Some(refused), ..filled })
+        }
+    }
+}
+
+/// *Local.* Meshes the interior of a skin by a size field and improves the tets.
+///
+/// # Errors
+/// [`FillError`] if the skin is not closed or the volume mesher fails.
+pub fn fill(skin: &Skin, size: &dyn SizeField, settings: &improve::Settings) -> Result<Filled, FillError> {
+    if skin.triangles.is_empty() {
+        return Ok(Filled::default());
+    }
+    let (on_triangles, inside) = skin.points.split_at(skin.on_triangles);
+    let corners = skin.triangles.iter().map(|t| t.vertices).collect();
+    let beside = skin.triangles.iter().map(|t| t.beside).collect();
+    let loose = skin.loose_edges();
+    let surface = ClosedSurface::new(on_triangles.to_vec(), corners, beside)?
+        .with_kept_points(inside.to_vec())
+        .with_kept_edges(loose.clone());
+    let (filled, report) = volume::mesh(&surface, size, &volume::Settings::default())?;
+    if report.on_kept_edges > 0 {
+        return Err(FillError::CutEdges(report.on_kept_edges));
+    }
+    let patched = |t: &SkinTriangle| {
+        let (patch, _) = t.patch?;
+        Some(BoundaryTriangle { vertices: t.vertices.map(VertexId), patch })
+    };
+    // Of the classes only the distinction between fixed and movable vertices matters here.
+    let mut classes = vec![Class::Corner(CornerId(0)); skin.points.len()];
+    classes.resize(filled.points.len(), Class::Body(BodyId(0)));
+    let segment = |ends: [u32; 2]| Segment { vertices: ends.map(VertexId), curve: CurveId(0) };
+    let mut made = Mesh {
+        points: filled.points,
+        classes,
+        tets: filled.tets.into_iter().map(|t| t.map(VertexId)).collect(),
+        bodies: filled.bodies,
+        triangles: skin.triangles.iter().filter_map(patched).collect(),
+        segments: loose.into_iter().map(segment).collect(),
+    };
+    improve(&mut made, size, settings);
+    Ok(Filled {
+        tets: made.tets.into_iter().map(|t| t.map(|v| v.0)).collect(),
+        bodies: made.bodies,
+        inside: made.points[skin.points.len()..].iter().map(|p| [p.x, p.y, p.z]).collect(),
+        refused: None,
+    })
+}
+
+/// The tets of the lattice.
+fn fill_by_lattice(
+    mesh: &DistMesh,
+    projector: &Projector,
+    skin: &LatticeSkin,
+) -> Result<Filled, RefineError> {
+    const NONE: u32 = u32::MAX;
+    let LatticeSkin { skin, numbering, lattice } = skin;
+    let refined = refine(mesh.clone(), projector, numbering.lattice().n(), &refine::Settings::default())?;
+    let mut place = vec![NONE; numbering.vertices() as usize];
+    (0..).zip(lattice).for_each(|(new, &v)| place[v as usize] = new);
+    let mut filled = Filled::default();
+    for (v, new) in place.iter_mut().enumerate().filter(|(_, new)| **new == NONE) {
+        *new = (skin.points.len() + filled.inside.len()) as u32;
+        filled.inside.push(refined.points()[v]);
+    }
+    let mut block = TetBlock::default();
+    for index in 0..refined.tet_blocks() {
+        refined.tet_block(index, &mut block);
+        filled.tets.extend(block.tets.iter().map(|tet| tet.map(|v| place[v as usize])));
+        filled.bodies.resize(filled.tets.len(), mesh.tet_bodies[index]);
+    }
+    Ok(filled)
+}

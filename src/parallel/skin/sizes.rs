@@ -1,0 +1,110 @@
+//! The size field inside a part: prescribed at the vertices of its coarse tets, linear between
+//! them.
+
+use crate::ground::comm::{CommError, Communicator};
+use crate::ground::kernel::simplex::squared_distance;
+use crate::ground::kernel::tree::{Tree, bounds};
+use crate::ground::mesh::{Mesh, TET_EDGES, TET_FACES, VertexId};
+use crate::ground::size::SizeField;
+use crate::parallel::distribution::DistMesh;
+use crate::{Point, Vector};
+use csg::Aabb;
+
+/// A size field that is linear on the coarse tets of a part.
+pub struct PartSizes {
+    points: Vec<Point>,
+    coarse: Vec<[VertexId; 4]>,
+    /// By vertex.
+    sizes: Vec<f64>,
+    /// By tet.
+    weights: Vec<Weights>,
+    tets: Tree,
+}
+
+/// Barycentric coordinates in a tet as functions of the point: gradients of the coordinates of the
+/// last three corners, and the first corner, where these are zero.
+#[derive(Clone, Copy)]
+struct Weights {
+    first: Point,
+    others: [Vector; 3],
+}
+
+impl Weights {
+    fn of(corners: &[Point; 4]) -> Self {
+        let [u, v, w] = [1, 2, 3].map(|k| corners[k] - corners[0]);
+        let volume = u.dot(&v.cross(&w));
+        Self { first: corners[0], others: [v.cross(&w), w.cross(&u), u.cross(&v)].map(|n| n / volume) }
+    }
+
+    fn at(&self, point: &Point) -> [f64; 4] {
+        let way = point - self.first;
+        let [b, c, d] = self.others.map(|n| n.dot(&way));
+        [1.0 - (b + c + d), b, c, d]
+    }
+}
+
+impl PartSizes {
+    /// A size field from the coarse tets and the sizes at their vertices.
+    pub fn new(points: Vec<Point>, coarse: Vec<[VertexId; 4]>, sizes: Vec<f64>) -> Self {
+        let corners = |tet: &[VertexId; 4]| tet.map(|v| points[v.index()]);
+        let boxes: Vec<Aabb> = coarse.iter().map(|tet| bounds(&corners(tet))).collect();
+        let weights = coarse.iter().map(|tet| Weights::of(&corners(tet))).collect();
+        Self { weights, tets: Tree::new(&boxes), points, coarse, sizes }
+    }
+
+    /// The coarse tet that contains a point, or the nearest one (near a curved boundary the refined
+    /// skin is outside the coarse tets). `None` if there are no tets.
+    pub fn tet_at(&self, point: &Point) -> Option<u32> {
+        let is_inside = |tet: u32| self.weights[tet as usize].at(point).iter().all(|&w| w >= 0.0);
+        let nearest = || Some(self.tets.nearest(point, |tet| self.squared_distance(point, tet))?.0);
+        self.tets.find(point, is_inside).or_else(nearest)
+    }
+
+    fn squared_distance(&self, point: &Point, tet: u32) -> f64 {
+        let corners = self.coarse[tet as usize].map(|v| self.points[v.index()]);
+        let to_face = |face: [usize; 3]| squared_distance(point, face.map(|k| &corners[k]));
+        TET_FACES.map(to_face).into_iter().fold(f64::INFINITY, f64::min)
+    }
+}
+
+impl SizeField for PartSizes {
+    fn size_at(&self, point: &Point) -> f64 {
+        // Any size will do in a part without tets.
+        let Some(tet) = self.tet_at(point) else { return f64::INFINITY };
+        let weights = self.weights[tet as usize].at(point).map(|w| w.max(0.0));
+        let sizes = self.coarse[tet as usize].map(|v| self.sizes[v.index()]);
+        let sum: f64 = weights.iter().sum();
+        weights.iter().zip(sizes).map(|(w, s)| w * s).sum::<f64>() / sum
+    }
+}
+
+/// The sizes at the vertices of a coarse mesh for meshing it `pieces` times as finely: `field`
+/// times a constant such that it matches the mesh on (geometric) average, or the mean length of the
+/// edges at the vertex if there is no field.
+pub fn at_vertices(mesh: &Mesh, field: Option<&dyn SizeField>, pieces: u32) -> Vec<f64> {
+    let mut sums = vec![(0.0, 0_u32); mesh.points.len()];
+    for tet in &mesh.tets {
+        for [a, b] in TET_EDGES.map(|edge| edge.map(|k| tet[k].index())) {
+            let length = (mesh.points[b] - mesh.points[a]).norm();
+            for v in [a, b] {
+                sums[v] = (sums[v].0 + length, sums[v].1 + 1);
+            }
+        }
+    }
+    let lengths = sums.into_iter().map(|(sum, count)| sum / f64::from(count) / f64::from(pieces));
+    let Some(field) = field else { return lengths.collect() };
+    let wanted: Vec<f64> = mesh.points.iter().map(|p| field.size_at(p)).collect();
+    let logarithms: f64 = lengths.zip(&wanted).map(|(length, wanted)| (length / wanted).ln()).sum();
+    let factor = (logarithms / wanted.len() as f64).exp();
+    wanted.into_iter().map(|wanted| factor * wanted).collect()
+}
+
+/// **Collective.** Sends each rank the values of rank 0 for the vertices of its part.
+///
+/// # Errors
+/// [`CommError`] if another rank fails.
+pub fn scatter(comm: &dyn Communicator, mesh: &DistMesh, all: Option<&[f64]>) -> Result<Vec<f64>, CommError> {
+    let requested = comm.gather(0, &mesh.vertex_ids)?;
+    let of = |ids: &Vec<u64>, all: &[f64]| ids.iter().map(|&id| all[id as usize]).collect();
+    comm.scatter(0, all.map(|all| requested.iter().map(|ids| of(ids, all)).collect()))
+}

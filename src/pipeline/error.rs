@@ -1,0 +1,355 @@
+//! Why a run ends without a mesh.
+
+use super::coarse::CoarseError;
+use crate::Point;
+use crate::files::WriteError;
+use crate::files::arrays::ArrayError;
+use crate::files::elmer::LoadError;
+use crate::files::input::ReadError;
+use crate::files::{surface, volume};
+use crate::ground::comm::CommError;
+use crate::ground::error::{ErrorKind, HasKind};
+use crate::ground::memory::sized;
+use crate::ground::mesh::Rank;
+use crate::ground::mesh::periodic::MapError;
+use crate::ground::progress::Cancelled;
+use crate::mesher::facets::FacetError;
+use crate::parallel::check::{Checksum, Fault};
+use crate::parallel::decompose::{CutError, LooseEdge, TooManyParts};
+use crate::parallel::distribution::{DistError, SettleError};
+use crate::parallel::halo::HaloError;
+use crate::parallel::migrate::MigrateError;
+use crate::parallel::partition::PartitionError;
+use crate::parallel::refine::RefineError;
+use crate::parallel::repartition::RepartitionError;
+use crate::parallel::skin::FillError;
+use csg::FeatureError;
+use csg::language::Diagnostics;
+use std::path::PathBuf;
+
+/// Why a run ends without a mesh, by the stage that failed.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A file cannot be read.
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    /// A partitioned mesh cannot be read.
+    #[error(transparent)]
+    Load(LoadError),
+    /// The text of a geometry has errors.
+    #[error(transparent)]
+    Language(#[from] Diagnostics),
+    /// A geometry cannot be meshed.
+    #[error("{}{error}", prefix(.path))]
+    Features {
+        /// The file of the geometry, if it came from one.
+        path: Option<PathBuf>,
+        /// The reason, with the location.
+        error: Box<FeatureError>,
+    },
+    /// Triangles do not bound bodies.
+    #[error("{}{error}", prefix(.path))]
+    Facets {
+        /// The file of the triangles, if they came from one.
+        path: Option<PathBuf>,
+        /// The reason, with the location.
+        error: Box<FacetError>,
+    },
+    /// The input cannot be meshed.
+    #[error(transparent)]
+    Input(#[from] InputError),
+    /// The request cannot be met for this input.
+    #[error(transparent)]
+    Request(#[from] RequestError),
+    /// There is no coarse mesh.
+    #[error(transparent)]
+    Coarse(Box<CoarseError>),
+    /// The geometry cannot be cut into pieces.
+    #[error(transparent)]
+    Cut(Box<CutError>),
+    /// A part cannot be meshed inside its surface.
+    #[error("part {part} (from 0) cannot be meshed: {error}")]
+    Fill {
+        /// The part.
+        part: Rank,
+        /// The reason.
+        error: Box<FillError>,
+    },
+    /// Periodic faces of the coarse mesh do not match.
+    #[error(transparent)]
+    Periodic(Box<MapError>),
+    /// The coarse mesh cannot be partitioned.
+    #[error(transparent)]
+    Partition(#[from] PartitionError),
+    /// The mesh cannot be distributed.
+    #[error(transparent)]
+    Distribute(DistError),
+    /// Shared entities cannot be numbered.
+    #[error(transparent)]
+    Settle(SettleError),
+    /// The mesh cannot be refined.
+    #[error(transparent)]
+    Refine(RefineError),
+    /// The mesh cannot be repartitioned.
+    #[error(transparent)]
+    Repartition(RepartitionError),
+    /// Tets cannot be moved to other ranks.
+    #[error(transparent)]
+    Migrate(MigrateError),
+    /// Ghosts cannot be determined.
+    #[error(transparent)]
+    Halo(HaloError),
+    /// Memory, disk or a format is too small.
+    #[error(transparent)]
+    Room(#[from] RoomError),
+    /// The mesh that was made is not valid.
+    #[error(transparent)]
+    Invalid(Box<InvalidMesh>),
+    /// A file cannot be written.
+    #[error(transparent)]
+    Write(WriteError),
+    /// The observer cancelled the run.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+    /// Another rank met an error, or the ranks cannot communicate.
+    #[error(transparent)]
+    Comm(#[from] CommError),
+}
+
+fn prefix(path: &Option<PathBuf>) -> String {
+    path.as_ref().map_or_else(String::new, |path| format!("{}: ", path.display()))
+}
+
+/// The input cannot be meshed.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum InputError {
+    /// The extension of a file is that of no known format.
+    #[error(
+        "cannot tell by its name what {} holds; known are geometries (.geo), surfaces ({}) and meshes ({})",
+        .0.display(), surface::KNOWN, volume::KNOWN
+    )]
+    UnknownFormat(PathBuf),
+    /// Invalid arrays of a surface or mesh.
+    #[error(transparent)]
+    Arrays(#[from] ArrayError),
+    /// Several files, of which at least one is not a surface.
+    #[error("several files are taken together only if all of them are surfaces")]
+    SeveralFiles,
+    /// A mesh with tets that are not positively oriented.
+    #[error(
+        "{}{count} tets are inverted or flat, the first of them number {} (counted from 1) at ({}, {}, {})",
+        prefix(.path), first + 1, corner.x, corner.y, corner.z
+    )]
+    Inverted {
+        /// The file, if the mesh came from one.
+        path: Option<PathBuf>,
+        /// Number of such tets.
+        count: usize,
+        /// The first of them, from 0.
+        first: usize,
+        /// A corner of it.
+        corner: Point,
+    },
+}
+
+/// The request cannot be met for this input.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum RequestError {
+    /// A method that does not keep periodic faces, for a geometry that has some.
+    #[error("periodic faces (`identify periodic`) are kept by the method `refine` only")]
+    PeriodicMethod,
+    /// Periodic faces cannot be in one part with their copies.
+    #[error(
+        "{lost} of the {tets} coarse tets beside periodic faces cannot be in one part with those at their images, which \
+         Elmer needs: use fewer parts or a finer coarse mesh"
+    )]
+    SplitPeriodic {
+        /// Number of coarse tets in the wrong part.
+        lost: usize,
+        /// Number of all coarse tets.
+        tets: usize,
+    },
+    /// Repartitioning ignores periodic faces.
+    #[error(
+        "{} has periodic faces, and parts are chosen without regard to them, so that Elmer's `Periodic BC` would be wrong",
+        .0.display()
+    )]
+    PeriodicRepartition(PathBuf),
+    /// Only CSG geometries can be cut into pieces.
+    #[error(
+        "only geometries (.geo) can be cut; for triangles and meshes take the methods `refine` or `surface`"
+    )]
+    NotCuttable,
+    /// Tags that name bodies, which would be divided in a geometry of the pieces.
+    #[error(
+        "`boundarycondition` and `singular` name bodies, of which only pieces would be left: take them out of the file, or \
+         `generate -m decompose`, which keeps them"
+    )]
+    TaggedBodies,
+    /// The user's planes make another number of pieces.
+    #[error(
+        "the planes cut the geometry into {pieces} pieces, for {parts} parts; each plane cuts every piece that it meets"
+    )]
+    Planes {
+        /// Number of pieces.
+        pieces: usize,
+        /// Number of requested parts.
+        parts: u32,
+    },
+    /// The geometry is too small for this many parts.
+    #[error(transparent)]
+    Parts(#[from] TooManyParts),
+    /// The method `decompose` does not keep edges inside bodies.
+    #[error(transparent)]
+    LooseEdge(#[from] LooseEdge),
+}
+
+/// The fine mesh does not fit; reported before it is made.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum RoomError {
+    /// More entities than a format can number.
+    #[error(
+        "{tets} tets with {vertices} vertices are more than {most}, the most that a format numbers: choose another format, or ask for fewer"
+    )]
+    TooMany {
+        /// Tets of the fine mesh.
+        tets: u64,
+        /// Its vertices.
+        vertices: u64,
+        /// The largest number that all formats support.
+        most: u64,
+    },
+    /// The disk has too little space.
+    #[error(
+        "the files take {} or more and {} has {} free: write elsewhere, take another format, or ask for fewer tets",
+        sized(*.needed), .folder.display(), sized(*.available)
+    )]
+    Disk {
+        /// Lower estimate of the size of the files in bytes.
+        needed: u64,
+        /// The output folder.
+        folder: PathBuf,
+        /// Free bytes there.
+        available: u64,
+    },
+    /// A machine has too little memory.
+    #[error(
+        "the fine vertices take {}, those on boundaries and interfaces alone {}, and this machine has {} left: take fewer \
+         levels or tets, or more machines",
+        sized(*.all), sized(*.least), sized(*.available)
+    )]
+    Memory {
+        /// Bytes of all fine vertices on this machine.
+        all: u64,
+        /// Bytes of those that must be stored.
+        least: u64,
+        /// Free bytes.
+        available: u64,
+    },
+}
+
+/// Faults of the finished mesh; nothing is written.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum InvalidMesh {
+    /// Tets, boundary triangles or vertices have faults.
+    #[error("the mesh has {count} faults, nothing was written:\n  {}", list(.first))]
+    Faults {
+        /// Number of faults.
+        count: u64,
+        /// The first faults.
+        first: Vec<Fault>,
+    },
+    /// The faces of tets do not match.
+    #[error("faces of the mesh do not match; nothing was written")]
+    OpenFaces,
+    /// Vertices of periodic faces are not where the motion puts them.
+    #[error(
+        "{lost} vertices of periodic faces have no partner, others are {furthest:e} off; nothing was written"
+    )]
+    Periodic {
+        /// Number of vertices without a partner.
+        lost: u64,
+        /// The largest distance of a vertex from its place according to the motion.
+        furthest: f64,
+    },
+    /// Moving tets changed the mesh.
+    #[error("moving tets changed the mesh: checksum {before} before, {after} after; nothing was written")]
+    Changed {
+        /// Its checksum before.
+        before: Checksum,
+        /// Its checksum after.
+        after: Checksum,
+    },
+}
+
+fn list(faults: &[Fault]) -> String {
+    faults.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n  ")
+}
+
+impl HasKind for Error {
+    fn kind(&self) -> ErrorKind {
+        match self {
+            Self::Read(_) | Self::Language(_) | Self::Input(_) | Self::Request(_) => ErrorKind::Input,
+            Self::Features { .. } | Self::Facets { .. } => ErrorKind::Input,
+            Self::Coarse(error) => error.kind(),
+            Self::Cut(error) => error.kind(),
+            Self::Fill { .. } => ErrorKind::NoMesh,
+            Self::Periodic(_) | Self::Invalid(_) => ErrorKind::NoMesh,
+            Self::Room(_) => ErrorKind::Resources,
+            Self::Cancelled(_) => ErrorKind::Cancelled,
+            Self::Load(error) => error.kind(),
+            Self::Partition(error) => error.kind(),
+            Self::Distribute(error) => error.kind(),
+            Self::Settle(error) => error.kind(),
+            Self::Refine(error) => error.kind(),
+            Self::Repartition(error) => error.kind(),
+            Self::Migrate(error) => error.kind(),
+            Self::Halo(error) => error.kind(),
+            Self::Write(error) => error.kind(),
+            Self::Comm(error) => error.kind(),
+        }
+    }
+}
+
+impl From<FeatureError> for Error {
+    fn from(error: FeatureError) -> Self {
+        Self::Features { path: None, error: Box::new(error) }
+    }
+}
+
+impl From<FacetError> for Error {
+    fn from(error: FacetError) -> Self {
+        Self::Facets { path: None, error: Box::new(error) }
+    }
+}
+
+/// Conversions of the stages' errors. Variants that are an error of another stage, a cancelled run
+/// or a failure of another rank are converted to that, so that a caller finds each in one place.
+macro_rules! stages {
+    ($($error:ident => $variant:ident ($($inner:ident)*);)*) => {$(
+        impl From<$error> for Error {
+            fn from(error: $error) -> Self {
+                match error {
+                    $($error::$inner(inner) => inner.into(),)*
+                    error => Self::$variant(error.into()),
+                }
+            }
+        }
+    )*};
+}
+
+stages! {
+    LoadError => Load (Read Comm);
+    CoarseError => Coarse (Cancelled);
+    CutError => Cut (Distribute Refine);
+    DistError => Distribute (Comm);
+    SettleError => Settle (Comm);
+    RefineError => Refine (Cancelled);
+    RepartitionError => Repartition (Comm);
+    MigrateError => Migrate (Settle Comm);
+    HaloError => Halo (Comm);
+    WriteError => Write (Cancelled Comm);
+    InvalidMesh => Invalid ();
+    MapError => Periodic ();
+}

@@ -1,0 +1,190 @@
+//! The results of a run.
+
+use super::coarse::CoarseReport;
+use super::error::Error;
+use super::part::{Evened, Part};
+use super::target::Outcome;
+use crate::ground::comm::Communicator;
+use crate::ground::mesh::ghosts::{By, Ghosts};
+use crate::ground::mesh::periodic::PeriodicMap;
+use crate::ground::mesh::stream::MeshStream;
+use crate::ground::mesh::{Arrays, Mesh, Names, Rank, Sharing};
+use crate::ground::projector::Projector;
+use crate::parallel::check::{Checksum, PartReport, ShapeReport};
+use crate::parallel::distribution::{DistMesh, settle};
+use crate::parallel::interfaces;
+use crate::parallel::partition::Metrics;
+use crate::parallel::refine::{self, Bends, PeriodicCheck, RefinedMesh, parents};
+use crate::parallel::{halo, migrate};
+
+/// Rank 0's coarse mesh with its statistics.
+#[derive(Clone, Debug)]
+pub struct CoarseResult {
+    /// The coarse mesh.
+    pub mesh: Mesh,
+    /// The edge displacements for refinement.
+    pub bends: Bends,
+    /// The part of each tet.
+    pub parts: Vec<Rank>,
+    /// Its statistics.
+    pub report: CoarseReport,
+    /// Whether the requested number of tets was reached, if one was requested.
+    pub outcome: Option<Outcome>,
+    /// Quality of the partition.
+    pub partition: Metrics,
+    /// The periodic entities of the mesh.
+    pub periodic: PeriodicMap,
+}
+
+/// A checked mesh on each rank.
+#[derive(Debug)]
+pub struct Generated {
+    /// This rank's part.
+    pub part: Part,
+    /// Subdivisions of each coarse edge.
+    pub pieces: u32,
+    /// The shapes of the tets of each refinement level, from the coarse mesh to the last; the same
+    /// on all ranks.
+    pub levels: Vec<Level>,
+    /// Numbers and names of bodies and boundaries.
+    pub names: Names,
+    /// The check of the whole mesh, the same on all ranks.
+    pub check: PartReport,
+    /// Checksum of the mesh, independent of the number of ranks; the same on all ranks.
+    pub checksum: Checksum,
+    /// The check of periodic faces, if there are any; the same on all ranks.
+    pub periodic: Option<PeriodicCheck>,
+    /// Skins that the mesher could not fill, if parts were meshed inside skins; the same on all
+    /// ranks.
+    pub refused: Option<Refused>,
+    /// Result of the improvement across interfaces, if parts were meshed separately and had bad
+    /// tets there; the same on all ranks.
+    pub across: Option<interfaces::Report>,
+    /// Result of balancing separately meshed parts; the same on all ranks.
+    pub evened: Option<Evened>,
+    /// On rank 0 only.
+    pub coarse: Option<CoarseResult>,
+    /// How other levels are refined, if parts were refined.
+    pub(super) refinement: Option<Refinement>,
+}
+
+/// Everything needed to refine other levels.
+#[derive(Clone, Debug)]
+pub(super) struct Refinement {
+    pub projector: Projector,
+    pub settings: refine::Settings,
+}
+
+/// The levels of a refinement on one rank, for multigrid.
+///
+/// All levels are refined from the same coarse part, so the parents of a vertex or tet are on its
+/// own rank. All levels are snapped to the geometry: a coarser level is not a subset of the finest
+/// one.
+#[derive(Debug)]
+pub struct Hierarchy {
+    /// From the coarsest to the finest level; each splits coarse edges into twice as many
+    /// subdivisions as the one before.
+    pub levels: Vec<RefinedMesh>,
+    nested: bool,
+}
+
+impl Hierarchy {
+    /// *Local.* The two parents of each vertex of a level (from 1) in the level before, by local
+    /// index: the ends of the edge whose midpoint it is, or twice the same vertex. Linear
+    /// interpolation is the mean of both.
+    ///
+    /// # Panics
+    /// If this level or the one before does not exist.
+    pub fn vertex_parents(&self, level: usize) -> Vec<[u32; 2]> {
+        parents::of_vertices(&self.levels[level], &self.levels[level - 1]).expect("levels of one refinement")
+    }
+
+    /// *Local.* The tet of the level before that contains each tet of a level (from 1), by index
+    /// within the part; `None` unless the mesh is [`nested`](crate::Mesher::nested).
+    ///
+    /// # Panics
+    /// If this level or the one before does not exist.
+    pub fn tet_parents(&self, level: usize) -> Option<Vec<u64>> {
+        let (fine, coarse) = (&self.levels[level], &self.levels[level - 1]);
+        self.nested.then(|| parents::of_tets(fine, coarse).expect("levels of one refinement"))
+    }
+}
+
+impl Generated {
+    /// This rank's part as a stream for the checker, the writers and other readers.
+    pub fn stream(&self) -> &dyn MeshStream {
+        self.part.stream()
+    }
+
+    /// *Local.* A copy of this rank's part as flat arrays.
+    pub fn arrays(&self) -> Arrays {
+        Arrays::of(self.stream())
+    }
+
+    /// *Local.* The vertices shared with other ranks, and their owners.
+    pub fn sharing(&self) -> Sharing {
+        Sharing::of(self.stream())
+    }
+
+    /// **Collective.** The tets of other parts adjacent to this one, with their vertices.
+    ///
+    /// # Errors
+    /// If a part and its ghosts have more vertices than local ids.
+    pub fn ghosts(&self, comm: &dyn Communicator, by: By) -> Result<Ghosts, Error> {
+        Ok(halo::halo(comm, self.stream(), by)?)
+    }
+
+    /// **Collective.** This rank's part with all edges and faces of its tets, their global ids,
+    /// classification and sharing ranks: for elements with unknowns there. Takes about 150 bytes a
+    /// tet.
+    ///
+    /// # Errors
+    /// If there are more tets than local ids, or not enough memory.
+    pub fn with_edges_and_faces(&self, comm: &dyn Communicator) -> Result<DistMesh, Error> {
+        let bare = match &self.part {
+            Part::Refined(part) => comm.agree(migrate::bare(part))?,
+            Part::Stored(part) => part.mesh().clone(),
+        };
+        Ok(settle(comm, bare)?)
+    }
+
+    /// *Local.* This rank's part of all refinement levels, the last being the mesh itself: coarse
+    /// edges are split into m, 2m, 4m, … subdivisions, m odd. `None` if the parts were meshed
+    /// separately.
+    ///
+    /// # Errors
+    /// If there is not enough memory.
+    pub fn into_hierarchy(self) -> Result<Option<Hierarchy>, Error> {
+        let (Part::Refined(finest), Some(Refinement { projector, settings })) = (self.part, self.refinement)
+        else {
+            return Ok(None);
+        };
+        let n = finest.pieces();
+        let mut levels = Vec::new();
+        for k in (1..=n.trailing_zeros()).rev() {
+            levels.push(refine::refine(finest.coarse().clone(), &projector, n >> k, &settings)?);
+        }
+        levels.push(*finest);
+        Ok(Some(Hierarchy { levels, nested: settings.nested }))
+    }
+}
+
+/// The tets of one refinement level.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Level {
+    /// Subdivisions of each coarse edge.
+    pub pieces: u32,
+    /// The number of tets.
+    pub tets: u64,
+    /// Their shapes.
+    pub shape: ShapeReport,
+}
+
+/// Skins that the mesher could not fill, and that the lattice filled instead.
+#[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize)]
+pub struct Refused {
+    /// Number of these skins.
+    pub skins: u64,
+    /// The rank and the error of the first of them.
+    pub first: Option<(u32, String)>,
+}

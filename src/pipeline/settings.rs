@@ -1,0 +1,93 @@
+//! Settings of a run.
+
+use super::coarse::CoarseSettings;
+use crate::mesher::facets;
+use crate::parallel::decompose::{self, CutPlane};
+use std::path::PathBuf;
+
+/// How surfaces are read.
+#[derive(Clone, Debug, Default)]
+pub struct InputSettings {
+    /// How patches, curves and corners of facets are distinguished.
+    pub facets: facets::Settings,
+    /// Whether the triangles of surfaces are kept; else the surface is remeshed by the size field.
+    pub keep_surface: bool,
+}
+
+/// How a geometry is cut.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct CutSettings {
+    /// How planes are chosen, unless the user sets them.
+    pub plan: decompose::Settings,
+    /// The user's planes; each cuts all pieces that it meets.
+    pub planes: Vec<CutPlane>,
+}
+
+/// How the parts are meshed.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum Method {
+    /// Parts of a coarse mesh are refined uniformly (the thesis' second method).
+    #[default]
+    Refine,
+    /// The skins of coarse parts are refined, and each part is meshed inside its skin (third
+    /// method).
+    Surface,
+    /// The geometry is cut into pieces, and each piece is meshed (first method).
+    Decompose(CutSettings),
+}
+
+/// All settings of a run.
+#[derive(Clone, Debug, Default)]
+pub struct GenerateSettings {
+    /// How the parts are meshed.
+    pub method: Method,
+    /// How the coarse mesh is made.
+    pub coarse: CoarseSettings,
+    /// The requested number of tets.
+    pub wanted: Wanted,
+    /// The memory for fine vertices on each machine, in bytes; by default its free memory.
+    pub memory: Option<u64>,
+    /// The planned output, so that a mesh that does not fit is refused before refinement.
+    pub disk: Option<Disk>,
+    /// Whether all octahedra of a coarse tet are split along one diagonal, so that the refinement
+    /// levels are nested. Costs quality near curved boundaries.
+    pub nested: bool,
+    /// Whether to refuse a partition with periodic faces and their copies in different parts.
+    pub periodic_together: bool,
+}
+
+/// The requested number of tets.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Wanted {
+    /// As the sizes yield, with refinement.
+    Sizes {
+        /// Subdivisions of each coarse edge.
+        pieces: u32,
+    },
+    /// A coarse mesh with this many tets, with refinement.
+    Coarse {
+        /// Tets of the coarse mesh.
+        tets: u64,
+        /// Subdivisions of each coarse edge.
+        pieces: u32,
+    },
+    /// This many to 1.3 times as many in total; the subdivisions are chosen.
+    Elements(u64),
+}
+
+/// The planned output. The sizes are lower estimates, because the writers check exactly.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Disk {
+    /// The folder.
+    pub folder: PathBuf,
+    /// Bytes for each vertex, tet and boundary triangle.
+    pub bytes: [u64; 3],
+    /// The largest number of vertices or tets that all formats support.
+    pub most: Option<u64>,
+}
+
+impl Default for Wanted {
+    fn default() -> Self {
+        Self::Sizes { pieces: 1 }
+    }
+}

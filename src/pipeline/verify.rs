@@ -1,0 +1,34 @@
+//! The check of a finished mesh.
+
+use super::error::{Error, InvalidMesh};
+use crate::ground::comm::Communicator;
+use crate::ground::mesh::Watched;
+use crate::ground::mesh::stream::MeshStream;
+use crate::ground::progress::Work;
+use crate::ground::projector::Projector;
+use crate::parallel::check::{self, Checksum, PartReport};
+
+/// The check and the checksum each read all tets.
+const PASSES: u64 = 2;
+
+/// **Collective.** Checks all tets, and all boundary vertices if there is a `projector`, and
+/// computes the checksum.
+///
+/// # Errors
+/// On all ranks: a mesh with faults; a cancelled run.
+pub(super) fn verify(
+    comm: &dyn Communicator,
+    part: &dyn MeshStream,
+    projector: Option<&Projector>,
+    work: &Work,
+) -> Result<(PartReport, Checksum), Error> {
+    let part = &Watched::new(part, work, PASSES);
+    let report = check::check(comm, part, projector, &check::Settings::default())?;
+    let checksum = check::checksum_of_all(comm, part)?;
+    // A cancelled check has not seen all tets.
+    comm.agree(work.proceed().map_err(Error::from))?;
+    if report.faults > 0 {
+        return Err(InvalidMesh::Faults { count: report.faults, first: report.described }.into());
+    }
+    Ok((report, checksum))
+}
