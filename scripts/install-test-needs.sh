@@ -1,23 +1,24 @@
 #!/usr/bin/env bash
-# Installs what the tests need beside Rust: MPI, libclang (for its bindings), TetGen, Python with numpy, and the programs that read our
-# files, as modules of Python: Gmsh, NGSolve with NETGEN, meshio, scikit-fem, MFEM.
-# Debian and Ubuntu by apt; elsewhere it says what is missing. Does nothing where all is there.
+# Installs the programs that the tests need besides Rust: MPI, libclang (for its bindings), TetGen,
+# Python with numpy, and Python modules that read our files: Gmsh, NGSolve with NETGEN, meshio,
+# scikit-fem, MFEM. Uses apt on Debian and Ubuntu; elsewhere it lists the missing packages. Does
+# nothing if all are installed.
 set -euo pipefail
 
 missing=()
 command -v mpicc >/dev/null && command -v mpirun >/dev/null || missing+=(libopenmpi-dev openmpi-bin)
-# libclang-cpp, which other packages bring along, is another library.
+# libclang-cpp, a dependency of other packages, is a different library.
 compgen -G '/usr/lib/llvm-*/lib/libclang[.-][s0-9]*' >/dev/null || compgen -G '/usr/lib/*/libclang[.-][s0-9]*' >/dev/null \
     || missing+=(libclang-dev)
 [ -e /usr/include/tetgen.h ] || missing+=(libtet1.5-dev)
 command -v cc >/dev/null && command -v c++ >/dev/null || missing+=(build-essential)
 command -v pkg-config >/dev/null || missing+=(pkg-config)
 command -v python3 >/dev/null || missing+=(python3 python3-numpy)
-# Without these tests are skipped, aloud: they are no reason to give up where there is no apt.
+# Tests that need these are skipped with a message, so a system without apt is no error.
 if command -v apt-get >/dev/null; then
     command -v tetgen >/dev/null || missing+=(tetgen)
     python3 -m pip --version >/dev/null 2>&1 || missing+=(python3-pip)
-    # What the wheels of Gmsh and NETGEN need of the system.
+    # System libraries of the wheels of Gmsh and NETGEN.
     libraries=$(PATH=$PATH:/sbin:/usr/sbin ldconfig -p)
     for library in GL.so.1:libgl1 GLU.so.1:libglu1-mesa Xrender.so.1:libxrender1 Xcursor.so.1:libxcursor1 Xft.so.2:libxft2 \
         Xinerama.so.1:libxinerama1 Xfixes.so.3:libxfixes3 fontconfig.so.1:libfontconfig1 gomp.so.1:libgomp1; do
@@ -37,11 +38,11 @@ if [ ${#missing[@]} -gt 0 ]; then
     "${sudo[@]}" apt-get install -y -qq --no-install-recommends "${missing[@]}"
 fi
 
-# The module and the package that has it.
+# Module and package.
 for module in numpy:numpy gmsh:gmsh ngsolve:ngsolve netgen.csg:netgen-mesher meshio:meshio skfem:scikit-fem mfem.ser:mfem; do
     python3 -c "import ${module%%:*}" 2>/dev/null && continue
     package=${module##*:}
     python3 -m pip install --quiet "$package" 2>/dev/null \
         || python3 -m pip install --quiet --break-system-packages "$package" \
-        || echo "no $package: tests that need it are skipped" >&2
+        || echo "no $package: tests that need it will be skipped" >&2
 done

@@ -1,10 +1,11 @@
 #!/usr/bin/env bash
-# Installs what the tests need and runs all of them: in-process ranks and MPI, TetGen beside our mesher.
+# Installs the programs that the tests need and runs all tests: in-process ranks, MPI, comparison
+# with TetGen.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 scripts/install-test-needs.sh
 
-# Open MPI refuses root and more ranks than cores unless told otherwise.
+# By default Open MPI refuses to run as root or with more ranks than cores.
 export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 OMPI_MCA_rmaps_base_oversubscribe=1
 
 if cargo nextest --version >/dev/null 2>&1; then
@@ -13,7 +14,12 @@ else
     run() { cargo test --no-fail-fast --lib --bins --tests "$@"; }
 fi
 
-run --workspace --features tetmill/mpi
-cargo test --workspace --features tetmill/mpi --doc
-# Without the feature the twin module takes the place of MPI: what is about MPI is run again.
-run -p tetmill mpi
+# `mpi` is a feature of the library and of the program; both have tests that depend on it.
+run --workspace --features mpi
+cargo test --workspace --features mpi --doc
+# Each example checks its own result.
+for example in examples/*.rs; do
+    cargo run --quiet --features mpi --example "$(basename "$example" .rs)" >/dev/null
+done
+# Without the feature a replacement module is compiled: run the tests about MPI again.
+run -p tetmill -p tetmill-cli mpi
