@@ -7,7 +7,7 @@
 //!
 //! ```no_run
 //! use tetmill::files::picture;
-//! use tetmill::internals::plain::PlainPart;
+//! use tetmill::internals::PlainPart;
 //! # let mesh = tetmill::mesh::Mesh::default();
 //! let look = picture::Look { color_by: picture::ColorBy::Patch, cut: None };
 //! let scene = picture::scene_of_part(&PlainPart::whole(&mesh), &look);
