@@ -5,6 +5,7 @@
 //! grows with the skin, not with the tets.
 
 use super::chunks::{items, split};
+use crate::ground::kernel::simplex::ascending;
 use crate::ground::mesh::TET_FACES;
 use crate::ground::mesh::stream::{BoundaryBlock, MeshStream, TetBlock};
 use csg::{BodyId, PatchId};
@@ -44,7 +45,7 @@ pub fn skin(part: &dyn MeshStream, keep: impl Fn(&[[f64; 3]; 4]) -> bool + Sync)
             for face in TET_FACES {
                 let vertices = face.map(|k| tet[k]);
                 if vertices.iter().all(|&v| may_be_skin[v as usize]) {
-                    found.push((sorted(vertices), SkinFace { vertices, body }));
+                    found.push((ascending(vertices), SkinFace { vertices, body }));
                 }
             }
         }
@@ -70,19 +71,14 @@ pub fn patches(part: &dyn MeshStream, faces: &[SkinFace]) -> Vec<Option<PatchId>
     for index in 0..part.boundary_blocks() {
         part.boundary_block(index, &mut block);
         let patch = block.patch.expect("a boundary block has a patch");
-        known.extend(block.triangles.iter().map(|triangle| (sorted(*triangle), patch)));
+        known.extend(block.triangles.iter().map(|triangle| (ascending(*triangle), patch)));
     }
     known.par_sort_unstable();
     let find = |face: &SkinFace| {
-        let place = known.binary_search_by_key(&sorted(face.vertices), |(key, _)| *key).ok()?;
+        let place = known.binary_search_by_key(&ascending(face.vertices), |(key, _)| *key).ok()?;
         Some(known[place].1)
     };
     faces.par_iter().map(find).collect()
-}
-
-fn sorted(mut face: [u32; 3]) -> [u32; 3] {
-    face.sort_unstable();
-    face
 }
 
 /// Concatenates what `find` appends for each tet block, in order.

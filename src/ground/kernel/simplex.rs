@@ -9,6 +9,23 @@ pub const TET_FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 
 /// The edges of a tet, in lexicographic order.
 pub const TET_EDGES: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
 
+/// For a directed edge i→j of a tet, the other two vertices k, l such that (i, j, k, l) is an even
+/// permutation.
+#[rustfmt::skip]
+pub(crate) const OPPOSITE_EDGE: [[[usize; 2]; 4]; 4] = [
+    [[0, 0], [2, 3], [3, 1], [1, 2]],
+    [[3, 2], [0, 0], [0, 3], [2, 0]],
+    [[1, 3], [3, 0], [0, 0], [0, 1]],
+    [[2, 1], [0, 2], [1, 0], [0, 0]],
+];
+
+/// The vertices of a triangle, ascending: a key that does not depend on its orientation.
+#[inline(always)]
+pub(crate) fn ascending([a, b, c]: [u32; 3]) -> [u32; 3] {
+    let (low, high) = (a.min(b), a.max(b));
+    [low.min(c), high.min(c).max(low), high.max(c)]
+}
+
 /// Six times the signed volume of the tet a, b, c, d: (b−a)×(c−a)·(d−a). Not an exact sign.
 #[inline]
 pub fn volume6(a: &Point, b: &Point, c: &Point, d: &Point) -> f64 {

@@ -13,7 +13,8 @@
 use crate::Point;
 use crate::ground::kernel::hilbert::hilbert_key;
 use crate::ground::mesh::{Class, Mesh, VertexId, are_sides, sorted_edge};
-use crate::mesher::improve::complex::{Complex, NONE};
+use crate::mesher::half_face::NONE;
+use crate::mesher::improve::complex::Complex;
 use csg::BodyId;
 use rayon::prelude::*;
 

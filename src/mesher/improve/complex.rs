@@ -3,12 +3,11 @@
 
 use crate::Point;
 use crate::ground::kernel::predicates::{Sign, orient3d, volume6_and_error};
-use crate::ground::mesh::{TET_EDGES, TET_FACES, VertexId};
+use crate::ground::kernel::simplex::{OPPOSITE_EDGE, TET_EDGES, TET_FACES, ascending};
+use crate::ground::mesh::VertexId;
+use crate::mesher::half_face::{Marks, NONE, Ring};
 use crate::mesher::improve::objective::{self, Objective};
 use csg::BodyId;
-
-/// No tet or vertex.
-pub(super) const NONE: u32 = u32::MAX;
 
 /// Tets with adjacency.
 ///
@@ -43,9 +42,7 @@ pub(super) struct Complex {
     vertex_tet: Vec<u32>,
     /// Free slots; the last one is used first.
     dead: Vec<u32>,
-    /// Tets with `marks[t] == mark` are marked.
-    marks: Vec<u32>,
-    mark: u32,
+    marks: Marks,
     /// Scratch memory: faces without a neighbour during a replacement.
     open: Vec<OpenFace>,
 }
@@ -54,20 +51,6 @@ struct OpenFace {
     key: [u32; 3],
     across: u32,
     locked: bool,
-}
-
-/// For local vertices i and j, the other two k and l such that (i, j, k, l) is an even permutation.
-const OTHERS: [[[usize; 2]; 4]; 4] = [
-    [[0, 0], [2, 3], [3, 1], [1, 2]],
-    [[3, 2], [0, 0], [0, 3], [2, 0]],
-    [[1, 3], [3, 0], [0, 0], [0, 1]],
-    [[2, 1], [0, 2], [1, 0], [0, 0]],
-];
-
-#[inline(always)]
-fn sorted([a, b, c]: [u32; 3]) -> [u32; 3] {
-    let (low, high) = (a.min(b), a.max(b));
-    [low.min(c), high.min(c).max(low), high.max(c)]
 }
 
 #[inline(always)]
@@ -117,8 +100,7 @@ impl Complex {
             locked: vec![0; tets.len()],
             vertex_tet: vec![NONE; count],
             dead: Vec::new(),
-            marks: vec![0; tets.len()],
-            mark: 0,
+            marks: Marks::default(),
             open: Vec::new(),
             tets,
         };
@@ -140,7 +122,7 @@ impl Complex {
         let mut starts = vec![0_u32; self.points.len() + 1];
         for &tet in &self.tets {
             for face in 0..4 {
-                starts[sorted(face_of(tet, face))[0] as usize + 1] += 1;
+                starts[ascending(face_of(tet, face))[0] as usize + 1] += 1;
             }
         }
         for v in 0..self.points.len() {
@@ -150,7 +132,7 @@ impl Complex {
         let mut next = starts.clone();
         for (t, &tet) in self.tets.iter().enumerate() {
             for face in 0..4 {
-                let [low, middle, high] = sorted(face_of(tet, face));
+                let [low, middle, high] = ascending(face_of(tet, face));
                 let slot = &mut next[low as usize];
                 faces[*slot as usize] =
                     (u64::from(middle) << 32 | u64::from(high), 4 * t as u32 + face as u32);
@@ -249,9 +231,8 @@ impl Complex {
     /// an even permutation. False, with an incomplete ring, if the edge is on a locked face or the
     /// ring has more than `limit` tets.
     pub fn ring(&self, tet: u32, i: usize, j: usize, limit: usize, ring: &mut Ring) -> bool {
-        ring.tets.clear();
-        ring.vertices.clear();
-        let [k, l] = OTHERS[i][j];
+        ring.clear();
+        let [k, l] = OPPOSITE_EDGE[i][j];
         let (mut t, mut leave, mut behind) = (tet, k, self.tets[tet as usize][k]);
         let mut ahead = self.tets[tet as usize][l];
         loop {
@@ -279,8 +260,8 @@ impl Complex {
         if first == NONE {
             return;
         }
-        self.mark += 1;
-        self.marks[first as usize] = self.mark;
+        self.marks.clear(self.tets.len());
+        self.marks.add(first);
         star.push(first);
         let mut done = 0;
         while let Some(&t) = star.get(done) {
@@ -290,9 +271,8 @@ impl Complex {
                     continue;
                 }
                 if let Some((next, _)) = self.neighbour(t, face)
-                    && self.marks[next as usize] != self.mark
+                    && self.marks.add(next)
                 {
-                    self.marks[next as usize] = self.mark;
                     star.push(next);
                 }
             }
@@ -367,9 +347,9 @@ impl Complex {
 
     /// Frees the slots of `old` and collects the faces of their cavity in `open`.
     fn remove_tets(&mut self, old: &[u32]) {
-        self.mark += 1;
+        self.marks.clear(self.tets.len());
         for &t in old {
-            self.marks[t as usize] = self.mark;
+            self.marks.add(t);
         }
         self.open.clear();
         for &t in old {
@@ -377,8 +357,8 @@ impl Complex {
             for face in 0..4 {
                 let across = self.across[t as usize][face];
                 let locked = self.is_locked(t, face);
-                if locked || self.marks[across as usize / 4] != self.mark {
-                    self.open.push(OpenFace { key: sorted(face_of(tet, face)), across, locked });
+                if locked || !self.marks.contains(across / 4) {
+                    self.open.push(OpenFace { key: ascending(face_of(tet, face)), across, locked });
                 }
             }
         }
@@ -402,13 +382,13 @@ impl Complex {
         self.locked.push(0);
         self.scores.push(0.0);
         self.bodies.push(BodyId(0));
-        self.marks.push(0);
+        self.marks.push();
         self.tets.len() as u32 - 1
     }
 
     /// Links a face of a new tet to its partner if that is in `waiting`, else adds it there.
     fn match_face(&mut self, waiting: &mut Vec<OpenFace>, slot: u32, face: usize) {
-        let key = sorted(face_of(self.tets[slot as usize], face));
+        let key = ascending(face_of(self.tets[slot as usize], face));
         let here = 4 * slot + face as u32;
         let Some(k) = waiting.iter().position(|open| open.key == key) else {
             waiting.push(OpenFace { key, across: here, locked: false });
@@ -444,7 +424,7 @@ impl Complex {
                 if !self.is_alive(n) || self.across[n as usize][g] != 4 * t + face as u32 {
                     return Err(format!("tets {t} and {n} disagree on being neighbours"));
                 }
-                if sorted(face_of(tet, face)) != sorted(face_of(self.tets[n as usize], g)) {
+                if ascending(face_of(tet, face)) != ascending(face_of(self.tets[n as usize], g)) {
                     return Err(format!("tets {t} and {n} disagree on their face"));
                 }
                 if self.is_locked(t, face) != self.is_locked(n, g) {
@@ -459,15 +439,6 @@ impl Complex {
         }
         Ok(())
     }
-}
-
-/// The ring of tets and vertices around an edge; see [`Complex::ring`].
-#[derive(Default)]
-pub(super) struct Ring {
-    /// The tets, in order around the edge.
-    pub tets: Vec<u32>,
-    /// The vertices, one for each tet.
-    pub vertices: Vec<u32>,
 }
 
 #[cfg(test)]

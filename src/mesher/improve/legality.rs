@@ -22,8 +22,9 @@
 //! Compare NETGEN's illegal tets and Zienkiewicz's rule for curved quadratic elements, which
 //! exclude the same tets for the same reason.
 
+use crate::ground::kernel::simplex::ascending;
 use crate::ground::mesh::{Mesh, TET_EDGES, VertexId};
-use crate::mesher::improve::complex::NONE;
+use crate::mesher::half_face::NONE;
 use crate::mesher::improve::limits::TetLimits;
 use crate::{Point, Vector};
 use csg::{CurveId, Features, Geometry, PatchId, Surface};
@@ -160,7 +161,7 @@ impl Legality {
         for v in 0..mesh.points.len() {
             legality.starts[v + 1] = legality.starts[v + 1].max(legality.starts[v]);
         }
-        let triangles = mesh.triangles.iter().map(|t| sorted(t.vertices.map(|v| v.0)));
+        let triangles = mesh.triangles.iter().map(|t| ascending(t.vertices.map(|v| v.0)));
         let mut flattening: Vec<[u32; 3]> = triangles.filter(|&t| legality.flattens(t)).collect();
         flattening.sort_unstable();
         flattening.dedup();
@@ -218,7 +219,7 @@ impl Legality {
             }
             block.starts.push(block.ends.len() as u32);
         }
-        let renumbered = self.flattening.iter().map(|t| sorted(t.map(|v| to_block[v as usize])));
+        let renumbered = self.flattening.iter().map(|t| ascending(t.map(|v| to_block[v as usize])));
         block.flattening = renumbered.filter(|t| t[2] != NONE).collect();
         block.flattening.sort_unstable();
         vertices.iter().for_each(|&v| to_block[v as usize] = NONE);
@@ -284,13 +285,8 @@ impl Legality {
     }
 
     fn is_flattening(&self, triangle: [u32; 3]) -> bool {
-        self.flattening.binary_search(&sorted(triangle)).is_ok()
+        self.flattening.binary_search(&ascending(triangle)).is_ok()
     }
-}
-
-fn sorted(mut key: [u32; 3]) -> [u32; 3] {
-    key.sort_unstable();
-    key
 }
 
 /// The distinct directions at a vertex, up to sign; parallel ones are merged. Directions beyond 64,
@@ -384,8 +380,8 @@ mod tests {
         let mesh = ball(4);
         let legality = Legality::new(&mesh, &UnitSphere);
         let on_sphere = |t: &[VertexId; 4]| {
-            let key = |f: [usize; 3]| sorted(f.map(|k| t[k].0));
-            let faces: Vec<_> = mesh.triangles.iter().map(|t| sorted(t.vertices.map(|v| v.0))).collect();
+            let key = |f: [usize; 3]| ascending(f.map(|k| t[k].0));
+            let faces: Vec<_> = mesh.triangles.iter().map(|t| ascending(t.vertices.map(|v| v.0))).collect();
             TET_FACES.iter().filter(|f| faces.contains(&key(**f))).count()
         };
         let mut illegal = 0;

@@ -5,7 +5,7 @@ use crate::Vector;
 use crate::ground::kernel::quality::{Diagonal, squared_lengths, worst_child_of};
 use crate::ground::kernel::simplex::{area_vector, largest_cosine, volume6};
 use crate::ground::mesh::TET_FACES;
-use crate::mesher::improve::complex::NONE;
+use crate::mesher::half_face::NONE;
 use crate::mesher::improve::legality::Legality;
 use crate::mesher::improve::limits::TetLimits;
 

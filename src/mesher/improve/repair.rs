@@ -11,7 +11,8 @@
 
 use crate::Point;
 use crate::ground::mesh::{TET_EDGES, TET_FACES};
-use crate::mesher::improve::complex::{Complex, Ring};
+use crate::mesher::half_face::Ring;
+use crate::mesher::improve::complex::Complex;
 use crate::mesher::improve::insert::Inserter;
 use crate::mesher::improve::objective::Objective;
 use crate::mesher::improve::smooth::Smoother;

@@ -3,9 +3,10 @@
 use crate::ground::mesh::QualitySummary;
 use crate::ground::mesh::{Mesh, VertexId};
 use crate::ground::size::SizeField;
+use crate::mesher::half_face::NONE;
 use crate::mesher::improve::blocks::{Block, Cut, Finished, Triangles, merge_blocks, remove_unused};
 use crate::mesher::improve::collapse::Collapser;
-use crate::mesher::improve::complex::{Complex, NONE};
+use crate::mesher::improve::complex::Complex;
 use crate::mesher::improve::insert::Inserter;
 use crate::mesher::improve::legality::{Legality, Smoothness};
 use crate::mesher::improve::objective::{Measure, Objective, score_of_ratio};

@@ -6,7 +6,8 @@
 //! the shortest vector in the convex hull of the gradients of the least ones; the step ends where,
 //! by the gradients, another tet becomes the worst.
 
-use crate::mesher::improve::complex::{Complex, NONE, place};
+use crate::mesher::half_face::NONE;
+use crate::mesher::improve::complex::{Complex, place};
 use crate::mesher::improve::limits::TetLimits;
 use crate::mesher::improve::objective::Objective;
 use crate::mesher::improve::swap::least_after;

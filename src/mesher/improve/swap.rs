@@ -8,7 +8,8 @@
 //! with one face it is the flip 2-3).
 
 use crate::ground::mesh::{TET_EDGES, TET_FACES};
-use crate::mesher::improve::complex::{Complex, Ring, place};
+use crate::mesher::half_face::Ring;
+use crate::mesher::improve::complex::{Complex, place};
 use crate::mesher::improve::objective::{INVERTED, Objective};
 
 /// Longer rings are skipped: the work grows as n³, and long rings seldom have a better filling

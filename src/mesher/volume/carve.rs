@@ -1,7 +1,8 @@
 //! Assigns tets to bodies by flood fill between locked faces, and removes the tets outside.
 
 use super::constraints::Constraints;
-use super::tetrahedra::{NO_BODY, NONE, Tetrahedra};
+use super::tetrahedra::{NO_BODY, Tetrahedra};
+use crate::mesher::half_face::NONE;
 use csg::BodyId;
 
 /// Label of tets outside all bodies until they are removed.

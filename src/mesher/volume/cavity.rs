@@ -9,9 +9,10 @@
 //! cavity until every face is visible from the point, by exact predicates.
 
 use super::crossing::edges_of_tet;
-use super::tetrahedra::{NONE, Tetrahedra};
+use super::tetrahedra::Tetrahedra;
 use crate::Point;
 use crate::ground::kernel::predicates::{Sign, orient3d};
+use crate::mesher::half_face::NONE;
 
 /// A face of the cavity's boundary, oriented outward, and the half-face behind it.
 #[derive(Clone, Copy, Debug)]

@@ -3,10 +3,10 @@
 use super::constraints::edges;
 use super::sectors::{self, EdgeFault};
 use super::surface_faults::{SurfaceFault, SurfaceFaults};
-use super::tetrahedra::sorted;
 use super::{finish, intersect};
 use crate::Point;
 use crate::ground::kernel::predicates::{Sign, orient2d};
+use crate::ground::kernel::simplex::ascending;
 use csg::BodyId;
 use std::collections::BTreeSet;
 
@@ -220,7 +220,7 @@ impl LeftOut {
 
 /// Pairs of triangles with the same corners: the first one with each of the others.
 fn doubles(triangles: &[[u32; 3]]) -> Vec<[u32; 2]> {
-    let mut order: Vec<([u32; 3], u32)> = triangles.iter().map(|&t| sorted(t)).zip(0..).collect();
+    let mut order: Vec<([u32; 3], u32)> = triangles.iter().map(|&t| ascending(t)).zip(0..).collect();
     order.sort_unstable();
     let mut pairs: Vec<[u32; 2]> = order
         .chunk_by(|a, b| a.0 == b.0)

@@ -23,8 +23,9 @@ use super::crossing::{Crossing, crossings, edges_of_tet, tets_around};
 use super::flips::FLAT;
 use super::recover::{DEEPEST, Recovery};
 use super::steiner::middle_first;
-use super::tetrahedra::{NONE, Ring, sorted};
 use crate::ground::kernel::predicates::Sign;
+use crate::ground::kernel::simplex::ascending;
+use crate::mesher::half_face::{NONE, Ring};
 use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -457,7 +458,7 @@ impl Trace {
         for (tet, [r, _]) in pairs(ring) {
             if on.contains(&r) {
                 count += 1;
-                if let Entry::Vacant(new) = self.faces.entry(sorted([x, y, r])) {
+                if let Entry::Vacant(new) = self.faces.entry(ascending([x, y, r])) {
                     new.insert([x, y, r]);
                     // The neighbouring face has the edge in the opposite direction.
                     self.add_side(tet, [r, y]);

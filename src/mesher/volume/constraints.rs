@@ -1,8 +1,8 @@
 //! The edges and faces that must stay in the mesh: those of the surface, and the parts of split
 //! ones.
 
-use super::tetrahedra::sorted;
 use crate::ground::kernel::hash::WordHash;
+use crate::ground::kernel::simplex::ascending;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 /// A triangle of the surface, or a part of it if Steiner points split it.
@@ -60,7 +60,7 @@ impl Constraints {
     pub fn add(&mut self, vertices: [u32; 3], triangle: u32) -> u32 {
         let facet = self.facets.len() as u32;
         self.facets.push(Facet { vertices, triangle, gone: false });
-        self.by_vertices.insert(sorted(vertices), facet);
+        self.by_vertices.insert(ascending(vertices), facet);
         for edge in edges(vertices) {
             *self.edge_uses.entry(edge).or_insert(0) += 1;
         }
@@ -75,7 +75,7 @@ impl Constraints {
         let f = &mut self.facets[facet as usize];
         f.gone = true;
         let vertices = f.vertices;
-        self.by_vertices.remove(&sorted(vertices));
+        self.by_vertices.remove(&ascending(vertices));
         for edge in edges(vertices) {
             self.release(edge);
         }
@@ -84,7 +84,7 @@ impl Constraints {
     /// The facet with these vertices.
     #[inline]
     pub fn facet(&self, face: [u32; 3]) -> Option<u32> {
-        self.by_vertices.get(&sorted(face)).copied()
+        self.by_vertices.get(&ascending(face)).copied()
     }
 
     /// Whether these are the ends of an edge of a facet.

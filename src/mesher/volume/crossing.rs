@@ -1,7 +1,8 @@
 //! The faces, edges and vertices of the mesh that a missing edge crosses.
 
-use super::tetrahedra::{NONE, Ring, Tetrahedra};
+use super::tetrahedra::Tetrahedra;
 use crate::ground::kernel::predicates::Sign;
+use crate::mesher::half_face::{NONE, Ring};
 
 /// An entity of the mesh that a missing edge crosses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -85,12 +85,12 @@ mod tests {
     fn check_delaunay_by(points: &[Point], mesh: Tetrahedra) {
         assert_eq!(mesh.check(), Vec::<String>::new());
         assert_eq!(mesh.points.len(), points.len() + 4);
-        assert!(mesh.at_vertex.iter().all(|&t| t != super::super::tetrahedra::NONE));
+        assert!(mesh.at_vertex.iter().all(|&t| t != crate::mesher::half_face::NONE));
         for t in mesh.alive() {
             let [a, b, c, d] = mesh.corners(t);
             for half_face in 4 * t..4 * t + 4 {
                 let other = mesh.across(half_face);
-                if other != super::super::tetrahedra::NONE {
+                if other != crate::mesher::half_face::NONE {
                     let e = mesh.point(mesh.apex(other));
                     assert_ne!(insphere(a, b, c, d, e), Sign::Positive, "face {:?}", mesh.face(half_face));
                 }

@@ -2,10 +2,11 @@
 
 use super::constraints::Constraints;
 use super::near::nearest_pair;
-use super::tetrahedra::{NONE, Tetrahedra};
+use super::tetrahedra::Tetrahedra;
 use super::{ClosedSurface, VolumeError, VolumeMesh};
 use crate::Point;
 use crate::ground::kernel::hilbert::hilbert_order;
+use crate::mesher::half_face::NONE;
 use csg::BodyId;
 
 /// A power of two that scales the largest coordinate to near 1.

@@ -4,8 +4,9 @@
 //! are never flipped (see [`Constraints`]).
 
 use super::constraints::Constraints;
-use super::tetrahedra::{NONE, Ring, Tetrahedra};
+use super::tetrahedra::Tetrahedra;
 use crate::ground::kernel::quality::mean_ratio;
+use crate::mesher::half_face::{NONE, Ring};
 
 /// Longer rings are not triangulated: the search is cubic, and edges with long rings are better
 /// removed after their neighbours. A typical ring has five or six tets.

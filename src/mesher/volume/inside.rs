@@ -3,8 +3,9 @@
 use super::constraints::Constraints;
 use super::sector::{GOOD_ENOUGH, Sector};
 use super::small::{self, Effort};
-use super::tetrahedra::{NONE, Tetrahedra};
+use super::tetrahedra::Tetrahedra;
 use crate::ground::kernel::quality::mean_ratio;
+use crate::mesher::half_face::NONE;
 
 /// Passes over all points: a deleted point may enable others to be deleted.
 const ROUNDS: usize = 2;

@@ -7,8 +7,9 @@
 //! this terminates (Lawson 1977; Joe 1989). It may stop before the mesh is Delaunay if no flip is
 //! possible.
 
-use super::tetrahedra::{NONE, Ring, Tetrahedra};
+use super::tetrahedra::Tetrahedra;
 use crate::ground::kernel::predicates::Sign;
+use crate::mesher::half_face::{NONE, Ring};
 
 /// Flips faces that are not locally Delaunay as long as possible; returns the number of flips.
 pub(super) fn legalize(mesh: &mut Tetrahedra) -> usize {

@@ -13,10 +13,11 @@
 
 use super::cavity::{Cavity, Walk, walk};
 use super::legalize::legalize;
-use super::tetrahedra::{NONE, Tetrahedra};
+use super::tetrahedra::Tetrahedra;
 use crate::ground::kernel::hilbert::random_rounds;
 use crate::ground::kernel::simplex::{area_vector, squared_distance};
 use crate::ground::size::SizeField;
+use crate::mesher::half_face::NONE;
 use crate::{Point, Vector};
 use rayon::prelude::*;
 

@@ -17,7 +17,9 @@ use super::carve::is_even;
 use super::constraints::Constraints;
 use super::polygon::{Projection, triangulate};
 use super::sector::{Sector, find_apex};
-use super::tetrahedra::{NONE, Tetrahedra, sorted};
+use super::tetrahedra::Tetrahedra;
+use crate::ground::kernel::simplex::ascending;
+use crate::mesher::half_face::NONE;
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -86,8 +88,8 @@ fn move_off(
         };
         new.extend(sector.star(mesh, apex).into_iter().map(|tet| (tet, sector.body)));
     }
-    let fresh: Vec<[u32; 3]> = patches.values().flatten().map(|&face| sorted(face)).collect();
-    let is_facet = |face| fresh.contains(&sorted(face)) || constraints.facet(face).is_some();
+    let fresh: Vec<[u32; 3]> = patches.values().flatten().map(|&face| ascending(face)).collect();
+    let is_facet = |face| fresh.contains(&ascending(face)) || constraints.facet(face).is_some();
     let mut made = Vec::new();
     if !mesh.rebuild(&star, &new, &is_facet, &mut made) {
         mesh.forget_points(points);

@@ -13,8 +13,9 @@ use super::flips::Flips;
 use super::inside::{cavity, delete_one, refill};
 use super::relax::{better, distance, relax, room};
 use super::sector::{Sector, best_own, find_place, worst};
-use super::tetrahedra::{NONE, Tetrahedra};
+use super::tetrahedra::Tetrahedra;
 use crate::Point;
+use crate::mesher::half_face::NONE;
 use std::collections::BTreeSet;
 
 /// The most passes without progress; each smooths one more ring of points. Searches for fillings,

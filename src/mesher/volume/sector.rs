@@ -3,11 +3,13 @@
 
 use super::carve::is_even;
 use super::clearance::{Plane, deepest_point};
-use super::tetrahedra::{NONE, Tetrahedra, sorted};
+use super::tetrahedra::Tetrahedra;
 use crate::ground::kernel::fixed::Fixed;
 use crate::ground::kernel::predicates::Sign;
 use crate::ground::kernel::quality::mean_ratio;
 use crate::ground::kernel::simplex::area_vector;
+use crate::ground::kernel::simplex::ascending;
+use crate::mesher::half_face::NONE;
 use crate::{Point, Vector};
 
 /// Least worst mean ratio at which a sector is filled from one of its own vertices without trying a
@@ -58,7 +60,7 @@ impl Sector {
         for &facet in &self.fresh {
             // A facet opposite to a face of the same corners encloses nothing: both are coplanar up
             // to rounding.
-            let turned = |face: &[u32; 3]| sorted(*face) == sorted(facet) && !is_even(*face, facet);
+            let turned = |face: &[u32; 3]| ascending(*face) == ascending(facet) && !is_even(*face, facet);
             match self.skin.iter().position(turned) {
                 Some(i) => drop(self.skin.swap_remove(i)),
                 None => self.skin.push(facet),

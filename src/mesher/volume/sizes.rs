@@ -6,8 +6,9 @@
 //! jump sizes are smaller than requested.
 
 use super::points::{Filler, State};
-use super::tetrahedra::{NONE, Tetrahedra};
+use super::tetrahedra::Tetrahedra;
 use crate::Point;
+use crate::mesher::half_face::NONE;
 
 /// Sizes are lowered only if they are too large by this factor.
 const LOWER: f64 = 1.05;

@@ -11,10 +11,11 @@ use super::clearance::{Plane, deepest_point};
 use super::constraints::{Facet, Place, edges};
 use super::crossing::{Crossing, tets_around};
 use super::recover::Recovery;
-use super::tetrahedra::{NONE, Tetrahedra};
+use super::tetrahedra::Tetrahedra;
 use crate::ground::kernel::fixed::{Fixed, Volume, bits_of, share, volume};
 use crate::ground::kernel::predicates::Sign;
 use crate::ground::kernel::simplex::{area_vector, volume6};
+use crate::mesher::half_face::NONE;
 use crate::{Point, Vector};
 use std::collections::BTreeSet;
 

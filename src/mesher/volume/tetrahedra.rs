@@ -1,42 +1,20 @@
 //! The mesh data structure of the volume mesher: flat arrays of tets and their adjacency.
 //!
-//! A **half-face** is a face of one tet, stored as one number: 4·tet + index of the opposite
-//! vertex. `across` maps each half-face to the one on the other side, so a step through a face also
-//! gives the entry face of the next tet. A **locked** face belongs to the boundary and stays.
+//! `across` maps each half-face to the one on the other side, so a step through a face also gives
+//! the entry face of the next tet. A **locked** face belongs to the boundary and stays.
 
 use crate::Point;
 use crate::ground::kernel::fixed::Fixed;
 use crate::ground::kernel::predicates::{Sign, insphere, orient3d};
+use crate::ground::kernel::simplex::{OPPOSITE_EDGE, TET_FACES, ascending};
 use crate::ground::kernel::sphere::Circumsphere;
-use crate::ground::mesh::TET_FACES;
-
-/// No tet, vertex or half-face.
-pub(super) const NONE: u32 = u32::MAX;
+use crate::mesher::half_face::{Marks, NONE, Ring};
 
 /// The most tets, because half-faces are `u32`.
 pub(super) const MAX_TETS: usize = (u32::MAX / 4) as usize;
 
 /// The label of a tet without a known body.
 pub(super) const NO_BODY: u32 = u32::MAX;
-
-/// For a directed edge i→j of a tet, the other two vertices k, l such that (i, j, k, l) is an even
-/// permutation.
-#[rustfmt::skip]
-pub(super) const OPPOSITE_EDGE: [[[usize; 2]; 4]; 4] = [
-    [[0, 0], [2, 3], [3, 1], [1, 2]],
-    [[3, 2], [0, 0], [0, 3], [2, 0]],
-    [[1, 3], [3, 0], [0, 0], [0, 1]],
-    [[2, 1], [0, 2], [1, 0], [0, 0]],
-];
-
-/// The tets around an edge a→b, in right-handed order.
-///
-/// Tet i is (a, b, `vertices[i]`, `vertices[i + 1]`).
-#[derive(Clone, Debug, Default)]
-pub(super) struct Ring {
-    pub tets: Vec<u32>,
-    pub vertices: Vec<u32>,
-}
 
 /// Tets with adjacency, locked faces and bodies.
 #[derive(Clone, Debug, Default)]
@@ -65,8 +43,7 @@ pub(super) struct Tetrahedra {
     free: Vec<u32>,
     /// The circumsphere of each tet, computed on first use: vertices of tets must not move.
     spheres: Vec<Circumsphere>,
-    marks: Vec<u32>,
-    epoch: u32,
+    marks: Marks,
     scratch: Vec<([u32; 3], u32, bool)>,
 }
 
@@ -232,31 +209,23 @@ impl Tetrahedra {
 
     /// Clears all marks.
     pub fn clear_marks(&mut self) {
-        self.marks.resize(self.tets.len(), 0);
-        if self.epoch == u32::MAX {
-            self.marks.fill(0);
-            self.epoch = 0;
-        }
-        self.epoch += 1;
+        self.marks.clear(self.tets.len());
     }
 
     /// Marks a tet; false if it was marked already.
     #[inline]
     pub fn mark(&mut self, tet: u32) -> bool {
-        let mark = &mut self.marks[tet as usize];
-        let fresh = *mark != self.epoch;
-        *mark = self.epoch;
-        fresh
+        self.marks.add(tet)
     }
 
     #[inline]
     pub fn unmark(&mut self, tet: u32) {
-        self.marks[tet as usize] = 0;
+        self.marks.remove(tet);
     }
 
     #[inline]
     pub fn is_marked(&self, tet: u32) -> bool {
-        self.marks[tet as usize] == self.epoch
+        self.marks.contains(tet)
     }
 
     /// Adds a tet without neighbours; returns its slot.
@@ -277,7 +246,7 @@ impl Tetrahedra {
             self.locked.push(0);
             self.bodies.push(NO_BODY);
             self.spheres.push(Circumsphere::UNKNOWN);
-            self.marks.push(0);
+            self.marks.push();
             (self.tets.len() - 1) as u32
         })
     }
@@ -351,8 +320,7 @@ impl Tetrahedra {
 
     /// The ring around edge a→b of `tet`; false if the edge is on the boundary of the mesh.
     pub fn ring(&self, tet: u32, a: u32, b: u32, ring: &mut Ring) -> bool {
-        ring.tets.clear();
-        ring.vertices.clear();
+        ring.clear();
         let mut t = tet;
         loop {
             let (Some(i), Some(j)) = (self.index_of(t, a), self.index_of(t, b)) else {
@@ -392,7 +360,7 @@ impl Tetrahedra {
                 let half_face = 4 * t + i;
                 let other = self.across(half_face);
                 if other == NONE || !self.is_marked(other >> 2) {
-                    faces.push((sorted(self.face(half_face)), other, self.is_locked(half_face)));
+                    faces.push((ascending(self.face(half_face)), other, self.is_locked(half_face)));
                 } else {
                     assert!(!self.is_locked(half_face), "locked face {:?} removed", self.face(half_face));
                 }
@@ -405,7 +373,7 @@ impl Tetrahedra {
         for &tet in new {
             let t = self.add_tet(tet, body);
             slots.push(t);
-            faces.extend((0..4).map(|i| (sorted(self.face(4 * t + i)), 4 * t + i, false)));
+            faces.extend((0..4).map(|i| (ascending(self.face(4 * t + i)), 4 * t + i, false)));
         }
         self.match_faces(&mut faces, outer);
         self.scratch = faces;
@@ -449,12 +417,12 @@ impl Tetrahedra {
         for half_face in old.iter().flat_map(|&t| 4 * t..4 * t + 4) {
             let other = self.across(half_face);
             if other != NONE && !self.is_marked(other >> 2) {
-                faces.push((sorted(self.face(half_face)), Some(other)));
+                faces.push((ascending(self.face(half_face)), Some(other)));
             }
         }
         let outer = faces.len();
         for (tet, _) in new {
-            faces.extend(TET_FACES.map(|face| (sorted(face.map(|i| tet[i])), None)));
+            faces.extend(TET_FACES.map(|face| (ascending(face.map(|i| tet[i])), None)));
         }
         let mut keys: Vec<[u32; 3]> = faces.iter().map(|f| f.0).collect();
         keys.sort_unstable();
@@ -499,7 +467,7 @@ impl Tetrahedra {
                 }
                 if !self.is_alive(other >> 2) || self.across(other) != half_face {
                     faults.push(format!("half-face {half_face} sees {other}, not the other way"));
-                } else if sorted(self.face(half_face)) != sorted(self.face(other)) {
+                } else if ascending(self.face(half_face)) != ascending(self.face(other)) {
                     faults.push(format!("half-faces {half_face} and {other} have other vertices"));
                 } else if self.is_locked(half_face) != self.is_locked(other) {
                     faults.push(format!("half-face {half_face} is locked from one side"));
@@ -513,13 +481,4 @@ impl Tetrahedra {
         }
         faults
     }
-}
-
-/// The vertices of a face, ascending.
-#[inline]
-pub(super) fn sorted([a, b, c]: [u32; 3]) -> [u32; 3] {
-    let (a, b) = if a < b { (a, b) } else { (b, a) };
-    let (b, c) = if b < c { (b, c) } else { (c, b) };
-    let (a, b) = if a < b { (a, b) } else { (b, a) };
-    [a, b, c]
 }

@@ -7,6 +7,7 @@
 use super::{Filled, Skin};
 use crate::ground::comm::pack::{put_ascending, put_varint, take_ascending, take_varint};
 use crate::ground::comm::{CommError, Communicator};
+use crate::ground::kernel::simplex::ascending;
 use crate::ground::kernel::simplex::from_lowest;
 use crate::ground::mesh::stream::Counts;
 use crate::ground::mesh::{Class, GlobalId, Rank, TET_FACES, TetId, VertexId};
@@ -152,17 +153,11 @@ fn bodies_inside(skin: &Skin, filled: &Filled) -> Vec<Class> {
     classes
 }
 
-fn sorted([a, b, c]: [u32; 3]) -> [u32; 3] {
-    let mut key = [a, b, c];
-    key.sort_unstable();
-    key
-}
-
 /// The faces of tets on patches, ascending.
 fn sides(skin: &Skin, filled: &Filled) -> Vec<Side> {
     let patched = skin.triangles.iter().filter(|t| t.patch.is_some());
     let triangles: HashMap<[u32; 3], usize> =
-        patched.clone().zip(0..).map(|(t, k)| (sorted(t.vertices), k)).collect();
+        patched.clone().zip(0..).map(|(t, k)| (ascending(t.vertices), k)).collect();
     let patched: Vec<_> = patched.collect();
     let mut sides = Vec::with_capacity(patched.len());
     for (tet, corners) in (0..).map(TetId).zip(&filled.tets) {
@@ -172,7 +167,7 @@ fn sides(skin: &Skin, filled: &Filled) -> Vec<Side> {
             continue;
         }
         for (face, outward) in (0..).zip(TET_FACES.map(|face| face.map(|k| corners[k]))) {
-            let Some(&k) = triangles.get(&sorted(outward)) else { continue };
+            let Some(&k) = triangles.get(&ascending(outward)) else { continue };
             let is_back = from_lowest(outward) == from_lowest(patched[k].vertices);
             let (patch, back) = patched[k].patch.expect("only triangles on patches are listed");
             sides.push(Side { tet, face, patch, behind: is_back == back });
