@@ -92,7 +92,7 @@ pub mod comm {
 /// Meshes: ids and entities, a part as arrays, as blocks or as a stream, shared vertices and ghosts.
 pub mod mesh {
     pub use crate::ground::mesh::ghosts::{By, GhostTet, GhostVertex, Ghosts, RankLists};
-    pub use crate::ground::mesh::periodic::Link;
+    pub use crate::ground::mesh::periodic::{Link, Pair, Pairs, PeriodicMap};
     pub use crate::ground::mesh::stream::{
         BoundaryBlock, Counts, LocalBlock, MeshStream, NO_TET, SingularTags, TetBlock, VertexBlock,
     };
@@ -161,7 +161,9 @@ pub mod run {
     pub use crate::parallel::refine::PeriodicCheck;
     pub use crate::parallel::refine::lattice::MAX_PIECES;
     pub use crate::pipeline::decompose::{Planned, planned};
-    pub use crate::pipeline::inspect::Inspection;
+    pub use crate::pipeline::inspect::{
+        BodyLine, CurveLine, Inspection, PatchLine, PeriodicLine, SingularLine,
+    };
     pub use crate::pipeline::part::{Balance, Evened, Part, balance};
     pub use crate::pipeline::target::Outcome;
     pub use crate::pipeline::{
@@ -200,11 +202,13 @@ pub mod internals {
     pub use crate::ground::kernel::random::Random;
     pub use crate::ground::kernel::simplex;
     pub use crate::ground::mesh::topology;
-    pub use crate::ground::projector::Projector;
-    pub use crate::ground::size::{GeometricSize, UniformSize};
+    pub use crate::ground::projector::{FacetProjector, Projector};
+    pub use crate::ground::size::{GeometricSamples, GeometricSize, SizeField, UniformSize};
     pub use crate::mesher::model::CsgModel;
-    pub use crate::mesher::{improve, surface, volume};
+    pub use crate::mesher::{facets, improve, surface, volume};
     pub use crate::parallel::{distribution, migrate, partition, refine, repartition};
-    pub use crate::pipeline::model::Model;
+    pub use crate::pipeline::coarse::CoarseMesh;
+    pub use crate::pipeline::facet_model::FacetSolid;
+    pub use crate::pipeline::model::{GivenMesh, Model};
     pub use crate::pipeline::target::mesh_to_target;
 }

@@ -42,7 +42,7 @@ pub mod volume;
 pub mod vtu;
 
 pub use input::{Place, ReadError, refuse_missing};
-pub use output::{Destination, folder_of, is_same_place, remove_abandoned, write_file};
+pub use output::{Destination, Output, folder_of, is_same_place, remove_abandoned, write_file};
 
 use crate::ground::comm::{CommError, Communicator};
 use crate::ground::error::{ErrorKind, HasKind};

@@ -22,7 +22,7 @@ use crate::ground::size::{SizeField, Source, SourceTree};
 use crate::mesher::improve::{self, Effort};
 use crate::mesher::model::CsgModel;
 use crate::mesher::surface::{self, SurfaceMesh};
-use crate::parallel::decompose::{self, CutModel, Cuts, Evidence};
+use crate::parallel::decompose::{self, CutModel, CutPlane, Cuts, Evidence};
 use crate::parallel::distribution::BareMesh;
 use crate::parallel::partition;
 use crate::parallel::refine::Bends;
@@ -77,10 +77,8 @@ fn fill(part: Rank, message: &[u8], effort: Effort) -> Result<(Skin, Filled), Er
 
 /// A cut geometry, with the coarse mesh from which the planes were chosen.
 pub struct Planned {
-    /// The planes.
-    pub cuts: Cuts,
-    /// The pieces.
-    pub model: CutModel,
+    cuts: Cuts,
+    model: CutModel,
     coarse: CoarseMesh,
     /// Subdivisions of each coarse edge.
     pieces: u32,
@@ -135,6 +133,16 @@ fn plan_cuts(
 }
 
 impl Planned {
+    /// The planes.
+    pub fn planes(&self) -> &[CutPlane] {
+        &self.cuts.planes
+    }
+
+    /// The number of bodies of the cut geometry.
+    pub fn bodies(&self) -> usize {
+        self.model.pieces.len()
+    }
+
     /// The pieces as the text of a geometry; `source` is the text of the whole.
     ///
     /// # Errors

@@ -4,7 +4,7 @@ pub mod coarse;
 pub mod decompose;
 pub mod error;
 mod estimate;
-mod facet_model;
+pub(crate) mod facet_model;
 pub mod generate;
 mod geometry;
 pub mod input;

@@ -32,8 +32,8 @@ pub fn run_decompose(options: &Decompose) -> Result<(), Failure> {
     if !options.quiet {
         let file = options.output.display();
         let parts = counted(options.parts.into(), "part", "parts");
-        let planes = counted(planned.cuts.planes.len() as u64, "plane", "planes");
-        let bodies = counted(planned.model.pieces.len() as u64, "body", "bodies");
+        let planes = counted(planned.planes().len() as u64, "plane", "planes");
+        let bodies = counted(planned.bodies() as u64, "body", "bodies");
         outputs.show(format_args!("{file}: {parts} by {planes}, {bodies}\n"))?;
     }
     Ok(())

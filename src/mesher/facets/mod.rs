@@ -41,11 +41,9 @@ mod tests;
 pub use crate::ground::projector::FacetProjector;
 pub use error::FacetError;
 pub use keep::keep;
+pub use model::{FacetBody, FacetCurve, FacetModel, FacetPatch, Facets, Marks, Settings};
 #[cfg(test)]
-pub use model::FacetBody;
-pub use model::{FacetCurve, FacetModel, FacetPatch, Facets, Marks, Settings};
-#[cfg(test)]
-pub use remesh::{RemeshReport, deviation};
-pub use remesh::{RemeshSettings, remesh};
+pub use remesh::deviation;
+pub use remesh::{RemeshReport, RemeshSettings, remesh};
 pub use size::FacetSize;
 pub use smoothness::FacetSmoothness;
