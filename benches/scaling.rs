@@ -18,7 +18,7 @@ use tetmill::check;
 use tetmill::comm::Rank;
 use tetmill::comm::{CommError, Communicator, thread};
 use tetmill::internals::refine::{Census, census};
-use tetmill::internals::{Model, distribution, mesh_to_target, partition, refine};
+use tetmill::internals::{Budget, Model, distribution, mesh_to_target, partition, refine};
 use tetmill::mesh::{DistMesh, Mesh};
 use tetmill::progress::Work;
 use tetmill::run::CoarseSettings;
@@ -145,7 +145,8 @@ fn main() {
 fn coarse_mesh(model: &Model, tets: u64) -> Mesh {
     let mut settings = CoarseSettings::default();
     let fits = |made| made >= tets && made <= tets + tets / 2;
-    let (made, _) = mesh_to_target(model, &mut settings, tets, &fits, Work::unwatched()).expect("a mesh");
+    let (made, _) = mesh_to_target(model, &mut settings, tets, &fits, &Budget::default(), Work::unwatched())
+        .expect("a mesh");
     made.mesh
 }
 

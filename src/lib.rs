@@ -210,5 +210,6 @@ pub mod internals {
     pub use crate::pipeline::coarse::CoarseMesh;
     pub use crate::pipeline::facet_model::FacetSolid;
     pub use crate::pipeline::model::{GivenMesh, Model};
+    pub use crate::pipeline::retries::Budget;
     pub use crate::pipeline::target::mesh_to_target;
 }

@@ -6,11 +6,11 @@ use csg::BodyId;
 use csg::language::parse_geometry;
 use std::time::Instant;
 use tetmill::Point;
-use tetmill::internals::Model;
 use tetmill::internals::distribution::from_serial;
 use tetmill::internals::partition::partition;
 use tetmill::internals::refine::refine;
 use tetmill::internals::volume::{ClosedSurface, Settings};
+use tetmill::internals::{Budget, Model};
 use tetmill::internals::{UniformSize, partition as parts, refine, volume};
 use tetmill::mesh::{Mesh, MeshStream, TetBlock};
 use tetmill::progress::Work;
@@ -23,7 +23,10 @@ fn model(name: &str) -> Model {
 }
 
 fn coarse(model: &Model, preset: Preset) -> Mesh {
-    model.coarse_mesh(&mut SizeSettings::from(preset).into(), Work::unwatched()).unwrap().mesh
+    model
+        .coarse_mesh(&mut SizeSettings::from(preset).into(), &Budget::default(), Work::unwatched())
+        .unwrap()
+        .mesh
 }
 
 /// Meshes a surface with sizes from its triangles and checks the result.

@@ -4,7 +4,7 @@ use crate::folders::own_geometries;
 use crate::samples::skin_of;
 use csg::language::parse_geometry;
 use std::path::Path;
-use tetmill::internals::{CsgModel, Model};
+use tetmill::internals::{Budget, CsgModel, Model};
 use tetmill::mesh::{BoundaryTriangle, Mesh};
 use tetmill::progress::Work;
 use tetmill::size::{Preset, SizeSettings};
@@ -45,7 +45,10 @@ fn check_surface(geometry: &Path, preset: Preset) {
     let source = std::fs::read_to_string(geometry).unwrap();
     let parsed = parse_geometry(&source, &geometry.to_string_lossy()).unwrap();
     let model = Model::from_csg(parsed.geometry).unwrap();
-    let mesh = model.coarse_mesh(&mut SizeSettings::from(preset).into(), Work::unwatched()).unwrap().mesh;
+    let mesh = model
+        .coarse_mesh(&mut SizeSettings::from(preset).into(), &Budget::default(), Work::unwatched())
+        .unwrap()
+        .mesh;
     let tets = mesh.tets.iter().zip(&mesh.bodies).map(|(t, body)| (t.map(|v| v.0), Some(*body)));
     let skin = skin_of(&mesh.points, &tets.collect::<Vec<_>>(), 1);
     skin.surface().unwrap_or_else(|faults| panic!("{what}: {faults}"));

@@ -1,5 +1,6 @@
 //! Makes one classified, refinable tetrahedral mesh of a geometry, on one rank.
 
+use super::retries::{Budget, CORRECTIONS};
 use crate::Point;
 use crate::ground::error::{ErrorKind, HasKind};
 use crate::ground::mesh::QualitySummary;
@@ -178,10 +179,6 @@ pub struct CoarseMesh {
     pub report: CoarseReport,
 }
 
-/// Maximum number of restarts with smaller sizes. Each lowers them by a factor of about 1.7, so
-/// that gaps of a thousandth of the initial size are resolved.
-pub(super) const MOST_CORRECTIONS: u64 = 14;
-
 /// Factor applied to the size where an attempt failed.
 const LOWERED: f64 = 0.6;
 
@@ -190,9 +187,14 @@ const LOWERED: f64 = 0.6;
 ///
 /// # Errors
 /// The last failure, with its location.
-pub fn mesh(model: &CsgModel, settings: &mut CoarseSettings, work: &Work) -> Result<CoarseMesh, CoarseError> {
+pub fn mesh(
+    model: &CsgModel,
+    settings: &mut CoarseSettings,
+    budget: &Budget,
+    work: &Work,
+) -> Result<CoarseMesh, CoarseError> {
     let samples = GeometricSamples::new(&model.geometry, &model.features, &settings.size);
-    corrected(settings, work, |settings, allowed| attempt(model, &samples, settings, allowed, work))
+    corrected(settings, budget, work, |settings, allowed| attempt(model, &samples, settings, allowed, work))
 }
 
 /// The result of one attempt at a coarse mesh.
@@ -218,6 +220,7 @@ pub(super) struct Allowed {
 /// Repeats `attempt` until no sizes need to be lowered, or none may be.
 pub(super) fn corrected(
     settings: &mut CoarseSettings,
+    budget: &Budget,
     work: &Work,
     attempt: impl Fn(&CoarseSettings, Allowed) -> Attempt,
 ) -> Result<CoarseMesh, CoarseError> {
@@ -225,7 +228,9 @@ pub(super) fn corrected(
     let mut thin_walls = None;
     loop {
         work.proceed()?;
-        let allowed = Allowed { lower: corrections < MOST_CORRECTIONS, thin: thin_walls.is_none() };
+        budget.spend();
+        let lower = corrections < CORRECTIONS && !budget.is_spent();
+        let allowed = Allowed { lower, thin: thin_walls.is_none() };
         match attempt(settings, allowed) {
             Attempt::Made(mut coarse) => {
                 coarse.report.size_corrections = corrections;

@@ -1,12 +1,11 @@
 //! Method 1 on all ranks: a geometry is cut into pieces, and each piece is meshed on its rank.
 
-use super::coarse::{
-    CoarseError, CoarseMesh, CoarseSettings, MOST_CORRECTIONS, Unmeshed, mesh_surface, smaller_at,
-};
+use super::coarse::{CoarseError, CoarseMesh, CoarseSettings, Unmeshed, mesh_surface, smaller_at};
 use super::error::{Error, RequestError};
 use super::geometry::Geometry;
 use super::model::Model;
 use super::result::CoarseResult;
+use super::retries::{Budget, CORRECTIONS};
 use super::settings::Wanted;
 use super::settings::{CutSettings, GenerateSettings};
 use super::skins::refuse_periodic;
@@ -113,8 +112,9 @@ fn plan_cuts(
     let Model::Csg(whole) = model else {
         return Err(RequestError::NotCuttable.into());
     };
-    let (pieces, coarse, outcome) =
-        progress.stage(Stage::Mesh, |work| mesh_as_wanted(parts, model, settings, wanted, &[], work))?;
+    let (pieces, coarse, outcome) = progress.stage(Stage::Mesh, |work| {
+        mesh_as_wanted(parts, model, settings, wanted, &[], &Budget::default(), work)
+    })?;
     progress.stage(Stage::Cut, |_| {
         let evidence = Evidence::of(&coarse.mesh, whole, pieces, parts)?;
         let mut settings = cuts.clone();
@@ -247,12 +247,12 @@ fn fine_surface(model: &CsgModel, base: &dyn SizeField) -> Result<SurfaceMesh, C
     let mut corrections = 0;
     loop {
         let size = Lowered { base, sources: SourceTree::new(bounds, GRADING, bounds.diagonal(), &sources) };
-        match mesh_surface(model, &size, corrections < MOST_CORRECTIONS) {
+        match mesh_surface(model, &size, corrections < CORRECTIONS) {
             Ok((surface, _)) => {
                 // The ranks could not fill this surface, and would find out too late.
                 let mut unfit = surface::crossings(&surface.points, &surface.triangles);
                 unfit.extend(coincident(&surface));
-                if unfit.is_empty() || corrections == MOST_CORRECTIONS {
+                if unfit.is_empty() || corrections == CORRECTIONS {
                     return Ok(surface);
                 }
                 sources.extend(unfit.into_iter().map(|point| smaller_at(point, &size)));

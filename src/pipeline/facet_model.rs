@@ -2,6 +2,7 @@
 
 use super::coarse::{self, Allowed, Attempt, CoarseError, CoarseMesh, CoarseSettings};
 use super::error::Error;
+use super::retries::Budget;
 use super::settings::InputSettings;
 use crate::Point;
 use crate::files::surface::{self, Surface};
@@ -103,9 +104,10 @@ impl FacetSolid {
     pub(super) fn coarse_mesh(
         &self,
         settings: &mut CoarseSettings,
+        budget: &Budget,
         work: &Work,
     ) -> Result<CoarseMesh, CoarseError> {
-        coarse::corrected(settings, work, |settings, allowed| self.attempt(settings, allowed, work))
+        coarse::corrected(settings, budget, work, |settings, allowed| self.attempt(settings, allowed, work))
     }
 
     fn attempt(&self, settings: &CoarseSettings, allowed: Allowed, work: &Work) -> Attempt {

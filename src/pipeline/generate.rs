@@ -9,6 +9,7 @@ use super::mend;
 use super::model::Model;
 use super::part::{Part, even_out};
 use super::result::{CoarseResult, Generated, Level, Refinement, Refused};
+use super::retries::{Budget, REFINEMENTS};
 use super::room::{self};
 use super::settings::{CutSettings, GenerateSettings, Method};
 use super::skins;
@@ -31,9 +32,6 @@ use crate::parallel::partition::ties::Ties;
 use crate::parallel::partition::{self};
 use crate::parallel::refine::{self, Bends, PeriodicCheck, RefineError, RefinedMesh};
 
-/// Maximum number of restarts with a finer coarse mesh after inverted refined tets were found.
-const MOST_ROUNDS: usize = 4;
-
 /// **Collective.** Makes the mesh; only rank 0 needs the geometry and reports `progress`.
 ///
 /// # Errors
@@ -49,9 +47,9 @@ pub fn generate(
     if let Method::Decompose(cuts) = &settings.method {
         return decomposed(comm, model, cuts, settings, progress);
     }
-    let mut sources: Vec<Source> = Vec::new();
+    let (mut sources, budget) = (Vec::<Source>::new(), Budget::default());
     for round in 0.. {
-        let made = model.map(|model| coarse_mesh(comm.size(), model, settings, &sources, progress));
+        let made = model.map(|model| coarse_mesh(comm.size(), model, settings, &sources, &budget, progress));
         let mut coarse = comm.agree(made.transpose())?;
         let pieces = broadcast_pieces(comm, coarse.as_ref().map(|(pieces, _)| *pieces))?;
         let (names, projector) = broadcast_geometry(comm, model)?;
@@ -71,7 +69,7 @@ pub fn generate(
             progress.stage(Stage::Levels, |work| survey(comm, &dist, &projector, pieces, &how, work))?;
         let mut levels = match survey {
             Surveyed::Sound(levels) => levels,
-            Surveyed::Inverted(bad, _) if round < MOST_ROUNDS => {
+            Surveyed::Inverted(bad, _) if round < REFINEMENTS => {
                 lower(&mut sources, coarse.as_ref(), &bad);
                 continue;
             }
@@ -83,7 +81,7 @@ pub fn generate(
             let refined = refine::refine_watched(dist, &projector, pieces, &how, work);
             inverted_anywhere(comm, &refined).map(|bad| (refined, bad))
         })?;
-        if !bad.is_empty() && round < MOST_ROUNDS {
+        if !bad.is_empty() && round < REFINEMENTS {
             lower(&mut sources, coarse.as_ref(), &bad);
             continue;
         }
@@ -263,10 +261,11 @@ fn coarse_mesh(
     model: &Model,
     settings: &GenerateSettings,
     sources: &[Source],
+    budget: &Budget,
     progress: &Progress,
 ) -> Result<(u32, CoarseResult), Error> {
     let (pieces, made, outcome) = progress.stage(Stage::Mesh, |work| {
-        mesh_as_wanted(parts, model, &settings.coarse, settings.wanted, sources, work)
+        mesh_as_wanted(parts, model, &settings.coarse, settings.wanted, sources, budget, work)
     })?;
     let map = periodic_map(model, &made.mesh)?;
     let (assigned, metrics) = progress.stage(Stage::Partition, |_| {

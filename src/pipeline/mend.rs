@@ -4,17 +4,12 @@
 use super::coarse::{CoarseError, CoarseMesh};
 use super::error::Error;
 use super::model::Model;
+use super::retries::{Budget, INVERTED, POOR};
 use crate::ground::mesh::{GlobalId, Mesh, TET_EDGES};
 use crate::ground::projector::Projector;
 use crate::ground::size::Source;
 use crate::parallel::distribution;
 use crate::parallel::refine::{self, Bends, Least, Trial};
-
-/// Maximum number of rounds of lowering sizes.
-const MOST_ROUNDS: u64 = 20;
-
-/// Rounds in which sizes are lowered for poor children too, not only for inverted ones.
-const POOR_ROUNDS: u64 = 5;
 
 /// Maximum number of subdivisions of an edge in refinement tests. 4 are too few: NETGEN's `matrix`
 /// at `very-coarse` then has 712 inverted tets at 4 levels. With 16 the directions at vertices are
@@ -48,6 +43,7 @@ const MOST_BENT: usize = 100;
 pub fn refinable<T>(
     model: &Model,
     pieces: u32,
+    budget: &Budget,
     mut make: impl FnMut(&[Source]) -> Result<(CoarseMesh, T), CoarseError>,
 ) -> Result<(CoarseMesh, T), Error> {
     let mut sources = Vec::new();
@@ -66,7 +62,7 @@ pub fn refinable<T>(
             if best.as_ref().is_none_or(|(before, _)| tried.smallest_dihedral > before.smallest_dihedral) {
                 best = Some((tried, made));
             }
-        } else if round == MOST_ROUNDS {
+        } else if round == INVERTED || budget.is_spent() {
             let mut coarse = made.0;
             bend(model, &mut coarse, &tried, pieces.min(TRIED_PIECES))?;
             return match tried.error {
@@ -74,7 +70,7 @@ pub fn refinable<T>(
                 _ => Ok((coarse, made.1)),
             };
         }
-        if round >= POOR_ROUNDS
+        if (round >= POOR || budget.is_spent())
             && let Some((tried, mut made)) = best
         {
             bend(model, &mut made.0, &tried, pieces.min(TRIED_PIECES))?;

@@ -2,6 +2,7 @@
 
 use super::coarse::{CoarseError, CoarseMesh, CoarseReport, CoarseSettings};
 use super::facet_model::FacetSolid;
+use super::retries::Budget;
 use crate::ground::mesh::QualitySummary;
 use crate::ground::mesh::periodic::Link;
 use crate::ground::mesh::{Mesh, Names};
@@ -110,10 +111,15 @@ impl Model {
     ///
     /// # Errors
     /// The last failure, with its location.
-    pub fn coarse_mesh(&self, settings: &mut CoarseSettings, work: &Work) -> Result<CoarseMesh, CoarseError> {
+    pub fn coarse_mesh(
+        &self,
+        settings: &mut CoarseSettings,
+        budget: &Budget,
+        work: &Work,
+    ) -> Result<CoarseMesh, CoarseError> {
         match self {
-            Self::Csg(model) => super::coarse::mesh(model, settings, work),
-            Self::Facets(solid) => solid.coarse_mesh(settings, work),
+            Self::Csg(model) => super::coarse::mesh(model, settings, budget, work),
+            Self::Facets(solid) => solid.coarse_mesh(settings, budget, work),
             Self::Given(given) => Ok(given.coarse_mesh()),
         }
     }

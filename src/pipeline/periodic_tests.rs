@@ -6,6 +6,7 @@ use crate::ground::mesh::periodic::{self, PeriodicMap};
 use crate::ground::progress::{Progress, Silent, Work};
 use crate::ground::size::{PeriodicSize, Preset, SizeField, SizeSettings, Source};
 use crate::pipeline::model::Model;
+use crate::pipeline::retries::Budget;
 use crate::pipeline::{CoarseSettings, GenerateSettings, Generated, Geometry, Method, Wanted, generate};
 use crate::{Point, Vector};
 use std::path::Path;
@@ -120,7 +121,8 @@ fn a_mesh_that_is_fine_at_one_face_is_fine_at_its_image() {
 fn a_map_survives_its_encoding_and_a_mesh_that_is_not_periodic_has_none() {
     let model = model("rotor_sector");
     let mut settings = CoarseSettings::from(SizeSettings::from(Preset::VeryCoarse));
-    let mut mesh = model.model.coarse_mesh(&mut settings, Work::unwatched()).unwrap().mesh;
+    let mut mesh =
+        model.model.coarse_mesh(&mut settings, &Budget::default(), Work::unwatched()).unwrap().mesh;
     let Model::Csg(csg) = &model.model else { panic!("a geometry") };
     let map = PeriodicMap::of(&mesh, periodic::links(&csg.features), &csg.features.bounds).unwrap();
     assert_eq!(PeriodicMap::decode(&map.encode()), map);

@@ -3,6 +3,7 @@
 use super::coarse::{CoarseError, CoarseMesh, CoarseSettings};
 use super::estimate;
 use super::model::Model;
+use super::retries::{Budget, TARGETS};
 use crate::ground::progress::Work;
 
 /// Whether a coarse mesh has the requested number of tets.
@@ -19,9 +20,6 @@ pub enum Outcome {
 
 /// The number to aim at, relative to the target: inside the accepted range, which begins near 1.
 const AIM: f64 = 1.15;
-
-/// Maximum number of trial meshes; each at least halves the bracket.
-const MOST_TRIES: usize = 24;
 
 /// Number of trials that use the estimate.
 const TRUSTED_TRIES: usize = 4;
@@ -44,6 +42,7 @@ pub fn mesh_to_target(
     settings: &mut CoarseSettings,
     target: u64,
     fits: &dyn Fn(u64) -> bool,
+    budget: &Budget,
     work: &Work,
 ) -> Result<(CoarseMesh, Outcome), CoarseError> {
     let goal = AIM * target as f64;
@@ -51,10 +50,13 @@ pub fn mesh_to_target(
     let mut fine: Option<(f64, CoarseMesh)> = None;
     let mut coarse: Option<(f64, f64)> = None;
     let mut finest_failure: Option<CoarseError> = None;
-    for tries in 0..MOST_TRIES {
+    for tries in 0..TARGETS {
         work.proceed()?;
+        if tries > 0 && budget.is_spent() {
+            break;
+        }
         settings.size.sources.truncate(sources);
-        let made = match model.coarse_mesh(settings, work) {
+        let made = match model.coarse_mesh(settings, budget, work) {
             Ok(made) => made,
             // The sizes are too large for the geometry despite all corrections: treat this as too
             // few tets.
@@ -96,7 +98,7 @@ pub fn mesh_to_target(
             Ok((made, Outcome::Jumped))
         }
         (None, Some(error)) => Err(error),
-        (None, None) => model.coarse_mesh(settings, work).map(|made| (made, Outcome::Jumped)),
+        (None, None) => model.coarse_mesh(settings, budget, work).map(|made| (made, Outcome::Jumped)),
     }
 }
 

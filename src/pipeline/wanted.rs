@@ -9,6 +9,7 @@ use super::coarse::{CoarseMesh, CoarseSettings};
 use super::error::Error;
 use super::mend;
 use super::model::Model;
+use super::retries::Budget;
 use super::settings::Wanted;
 use super::target::{Outcome, mesh_to_target};
 use crate::ground::progress::Work;
@@ -66,6 +67,7 @@ pub(super) fn mesh_as_wanted(
     settings: &CoarseSettings,
     wanted: Wanted,
     sources: &[Source],
+    budget: &Budget,
     work: &Work,
 ) -> Result<Granted, Error> {
     let with = |more: &[Source]| {
@@ -74,16 +76,18 @@ pub(super) fn mesh_as_wanted(
         coarse
     };
     let to_target = |tets: u64, pieces: u32, fits: &dyn Fn(u64) -> bool| {
-        mend::refinable(model, pieces, |more| mesh_to_target(model, &mut with(more), tets, fits, work))
+        mend::refinable(model, pieces, budget, |more| {
+            mesh_to_target(model, &mut with(more), tets, fits, budget, work)
+        })
     };
     match wanted {
         Wanted::Elements(count) if let Model::Given(given) = model => {
             let pieces = pieces_for(given.mesh.tets.len() as u64, count);
-            Ok((pieces, model.coarse_mesh(&mut settings.clone(), work)?, None))
+            Ok((pieces, model.coarse_mesh(&mut settings.clone(), budget, work)?, None))
         }
         Wanted::Sizes { pieces } => {
-            let make = |more: &[Source]| Ok((model.coarse_mesh(&mut with(more), work)?, None));
-            let (made, outcome) = mend::refinable(model, pieces, make)?;
+            let make = |more: &[Source]| Ok((model.coarse_mesh(&mut with(more), budget, work)?, None));
+            let (made, outcome) = mend::refinable(model, pieces, budget, make)?;
             Ok((pieces, made, outcome))
         }
         Wanted::Coarse { tets, pieces } => {

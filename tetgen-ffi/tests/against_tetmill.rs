@@ -16,7 +16,7 @@ use tetmill::Point;
 use tetmill::internals::Model;
 use tetmill::internals::improve::{Settings, improve};
 use tetmill::internals::volume::ClosedSurface;
-use tetmill::internals::{Random, UniformSize, volume};
+use tetmill::internals::{Budget, Random, UniformSize, volume};
 use tetmill::mesh::{BoundaryTriangle, Class, Mesh, QualitySummary, VertexId};
 use tetmill::progress::Work;
 use tetmill::size::{Effort, Preset, SizeSettings};
@@ -58,7 +58,7 @@ fn coarse(name: &str, preset: Preset) -> Mesh {
     let path = format!("{}/../geometries/{name}.geo", env!("CARGO_MANIFEST_DIR"));
     let source = std::fs::read_to_string(&path).unwrap();
     let model = Model::from_csg(parse_geometry(&source, &path).unwrap().geometry).unwrap();
-    model.coarse_mesh(&mut SizeSettings::from(preset).into(), Work::unwatched()).unwrap().mesh
+    model.coarse_mesh(&mut SizeSettings::from(preset).into(), &Budget::default(), Work::unwatched()).unwrap().mesh
 }
 
 /// Improved tets inside a bare surface, with sizes from its triangles.

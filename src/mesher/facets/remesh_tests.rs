@@ -12,6 +12,7 @@ use crate::mesher::volume::ClosedSurface;
 use crate::mesher::{improve, volume};
 use crate::pipeline::CoarseSettings;
 use crate::pipeline::model::Model;
+use crate::pipeline::retries::Budget;
 use csg::BodyId;
 use std::collections::BTreeMap;
 
@@ -339,7 +340,10 @@ fn surfaces_of_meshed_geometries_are_remeshed_well() {
         let text = std::fs::read_to_string(file).unwrap();
         let geometry = csg::language::parse_geometry(&text, name).unwrap().geometry;
         let solid = Model::from_csg(geometry).unwrap();
-        let skin = solid.coarse_mesh(&mut CoarseSettings::default(), Work::unwatched()).unwrap().mesh;
+        let skin = solid
+            .coarse_mesh(&mut CoarseSettings::default(), &Budget::default(), Work::unwatched())
+            .unwrap()
+            .mesh;
         let found = model(&[Facets {
             points: skin.points,
             triangles: skin.triangles.iter().map(|t| t.vertices.map(|v| v.0)).collect(),

@@ -7,6 +7,7 @@ use crate::ground::progress::{Progress, Silent, Work};
 use crate::mesher::model::CsgModel;
 use crate::parallel::skin::Skin;
 use crate::pipeline::model::Model;
+use crate::pipeline::retries::Budget;
 use crate::pipeline::{CoarseSettings, CutSettings, GenerateSettings, Geometry, Method, Wanted, generate};
 use crate::{Point, Vector};
 use csg::BodyId;
@@ -28,7 +29,10 @@ fn model(source: &str) -> CsgModel {
 
 fn evidence(model: &CsgModel, parts: u32) -> Evidence {
     let whole = Geometry::from(Model::Csg(Box::new(model.clone())));
-    let made = whole.model.coarse_mesh(&mut CoarseSettings::default(), Work::unwatched()).expect("a mesh");
+    let made = whole
+        .model
+        .coarse_mesh(&mut CoarseSettings::default(), &Budget::default(), Work::unwatched())
+        .expect("a mesh");
     Evidence::of(&made.mesh, model, 2, parts).expect("a mesh that can be refined")
 }
 

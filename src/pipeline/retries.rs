@@ -1,0 +1,88 @@
+//! Why and how often a coarse mesh is made again: nested loops with one budget.
+//!
+//! | loop | makes the mesh again because | by | at most |
+//! |---|---|---|---|
+//! | [`generate`](super::generate()) | a rank found inverted tets in the full refinement | smaller sizes there | [`REFINEMENTS`] |
+//! | `mend::refinable` | a test refinement on rank 0 found inverted tets | smaller sizes there | [`INVERTED`] |
+//! | | or poor ones | smaller sizes there | [`POOR`] |
+//! | `target::mesh_to_target` | it has not the requested number of tets | scaled sizes | [`TARGETS`] |
+//! | `coarse::corrected` | curves or triangles cross, or a body cannot be filled | smaller sizes there | [`CORRECTIONS`] |
+//!
+//! An inner loop runs in each round of the outer ones. Their product would be 26,880 meshes, so all
+//! share a [`Budget`]. Once it is spent, each loop ends with the best mesh that it has, or with the
+//! last error. Budgets count meshes, not seconds, so that results do not depend on the machine.
+//!
+//! Nearly all runs need one to ten meshes. Most attempts end early, at the curves or at the surface:
+//! only complete ones take as long as a coarse mesh.
+
+use std::cell::Cell;
+
+/// Maximum number of restarts after the full refinement. Few are needed, because the test
+/// refinement finds nearly all inverted tets.
+pub(super) const REFINEMENTS: usize = 4;
+
+/// Maximum number of rounds in which sizes are lowered because of inverted tets. Sizes fall by
+/// 0.6²⁰ ≈ 1/27,000.
+pub(super) const INVERTED: u64 = 20;
+
+/// Maximum number of rounds in which sizes are lowered because of poor tets too.
+pub(super) const POOR: u64 = 5;
+
+/// Maximum number of meshes for a requested number of tets; each at least halves the bracket.
+pub(super) const TARGETS: usize = 24;
+
+/// Maximum number of restarts where curves or surfaces are too close. Each lowers sizes by a factor
+/// of about 1.7, so that gaps of a thousandth of the initial size are resolved.
+pub(super) const CORRECTIONS: u64 = 14;
+
+/// The number of coarse meshes of a run that may be begun. The most that any geometry of the tests
+/// and of NETGEN's tutorials needs is 96.
+const MESHES: u32 = 200;
+
+/// The number of coarse meshes that a run may still begin.
+#[derive(Debug)]
+pub struct Budget(Cell<u32>);
+
+impl Default for Budget {
+    fn default() -> Self {
+        Self(Cell::new(MESHES))
+    }
+}
+
+impl Budget {
+    /// Counts a mesh that is begun.
+    pub(super) fn spend(&self) {
+        self.0.set(self.0.get().saturating_sub(1));
+    }
+
+    /// Whether no further mesh should be begun.
+    pub(super) fn is_spent(&self) -> bool {
+        self.0.get() == 0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ground::progress::Work;
+    use crate::ground::size::SizeSettings;
+    use crate::pipeline::coarse::CoarseSettings;
+    use crate::pipeline::geometry::Geometry;
+    use crate::pipeline::target::{Outcome, mesh_to_target};
+
+    #[test]
+    fn a_spent_budget_ends_the_search_for_a_number_of_tets_with_the_mesh_that_is_there() {
+        let ball = "algebraic3d\nsolid ball = sphere (0, 0, 0; 1);\ntlo ball;\n";
+        let geometry = Geometry::from_text(ball).unwrap();
+        let search = |budget: &Budget| {
+            let mut settings = CoarseSettings::from(SizeSettings::default());
+            let fits = |tets: u64| (3_000..3_300).contains(&tets);
+            mesh_to_target(&geometry.model, &mut settings, 3_000, &fits, budget, Work::unwatched()).unwrap()
+        };
+        let (budget, small) = (Budget::default(), Budget(Cell::new(1)));
+        assert_eq!(search(&budget).1, Outcome::Reached);
+        assert!(budget.0.get() < MESHES - 1, "one mesh was enough: the test needs another number");
+        assert_eq!(search(&small).1, Outcome::Jumped);
+        assert!(small.is_spent());
+    }
+}
