@@ -3,6 +3,7 @@
 use crate::cancel;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::IsTerminal;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 use tetmill::progress::{Observer, Stage};
 
@@ -11,6 +12,8 @@ use tetmill::progress::{Observer, Stage};
 pub struct Terminal {
     bar: Option<ProgressBar>,
     lines: bool,
+    /// Tets of the current stage, 0 if it does not count them.
+    tets: AtomicU64,
 }
 
 /// Length of the bar: a stage in thousandths.
@@ -21,13 +24,13 @@ impl Terminal {
     pub fn new(quiet: bool) -> Self {
         let terminal = std::io::stderr().is_terminal();
         let bar = (!quiet && terminal).then(|| {
-            let template = "{spinner} {msg:12} [{bar:30}] {percent:>3} %  {elapsed}  {eta} left";
+            let template = "{spinner} {prefix:12} [{bar:30}] {percent:>3} %  {elapsed}  {eta} left  {msg}";
             let style = ProgressStyle::with_template(template).expect("the template is well formed");
             let bar = ProgressBar::new(LENGTH).with_style(style.progress_chars("=> "));
             bar.enable_steady_tick(Duration::from_millis(120));
             bar
         });
-        Self { bar, lines: !quiet && !terminal }
+        Self { bar, lines: !quiet && !terminal, tets: AtomicU64::new(0) }
     }
 
     /// Removes the bar.
@@ -42,13 +45,24 @@ impl Observer for Terminal {
     fn begin(&self, stage: Stage) {
         if let Some(bar) = &self.bar {
             bar.reset();
-            bar.set_message(stage.name());
+            bar.set_prefix(stage.name());
+            bar.set_message("");
         }
+        self.tets.store(0, Ordering::Relaxed);
+    }
+
+    fn expect(&self, _: Stage, tets: u64) {
+        self.tets.store(tets, Ordering::Relaxed);
     }
 
     fn advance(&self, _: Stage, fraction: f64) {
         if let Some(bar) = &self.bar {
             bar.set_position((fraction * LENGTH as f64) as u64);
+            let tets = fraction * self.tets.load(Ordering::Relaxed) as f64;
+            let seconds = bar.elapsed().as_secs_f64();
+            if tets > 0.0 && seconds > 0.0 {
+                bar.set_message(format!("{:.2} million tets/s", tets / seconds * 1e-6));
+            }
         }
     }
 

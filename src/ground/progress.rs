@@ -81,6 +81,9 @@ impl fmt::Display for Stage {
 pub trait Observer: Sync {
     /// A stage begins.
     fn begin(&self, _stage: Stage) {}
+    /// A stage that has begun goes through this many tets of this rank: with the progress this gives
+    /// a rate. Not called by stages that count nothing or something else.
+    fn expect(&self, _stage: Stage, _tets: u64) {}
     /// The progress of a stage, 0 to 1. Called by any thread; never decreases within a stage.
     fn advance(&self, _stage: Stage, _fraction: f64) {}
     /// A stage has ended after this many seconds.
@@ -209,6 +212,11 @@ impl<'a> Work<'a> {
     pub fn step(&self, from: f64, to: f64, units: u64) {
         store(&self.step, [from, to]);
         self.substep(0.0, 1.0, units);
+    }
+
+    /// Reports the number of tets that the stage goes through.
+    pub(crate) fn expect(&self, tets: u64) {
+        self.observer.expect(self.stage, tets);
     }
 
     /// Starts a part of `units` units between two fractions of the current step.

@@ -58,7 +58,10 @@ fn coarse(name: &str, preset: Preset) -> Mesh {
     let path = format!("{}/../geometries/{name}.geo", env!("CARGO_MANIFEST_DIR"));
     let source = std::fs::read_to_string(&path).unwrap();
     let model = Model::from_csg(parse_geometry(&source, &path).unwrap().geometry).unwrap();
-    model.coarse_mesh(&mut SizeSettings::from(preset).into(), &Budget::default(), Work::unwatched()).unwrap().mesh
+    model
+        .coarse_mesh(&mut SizeSettings::from(preset).into(), &Budget::default(), Work::unwatched())
+        .unwrap()
+        .mesh
 }
 
 /// Improved tets inside a bare surface, with sizes from its triangles.

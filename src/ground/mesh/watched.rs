@@ -16,6 +16,7 @@ pub struct Watched<'a> {
 impl<'a> Watched<'a> {
     /// *Local.* `work` is complete when all tets have been read `passes` times.
     pub fn new(part: &'a dyn MeshStream, work: &'a Work<'a>, passes: u64) -> Self {
+        work.expect(part.counts().tets);
         work.step(0.0, 1.0, passes * part.tet_blocks() as u64);
         Self { part, work }
     }
