@@ -3,13 +3,13 @@
 use super::nearest::in_segment;
 use crate::{Point, Vector};
 
-/// The faces of a tet, each opposite the vertex of its index, outward for a positively oriented tet.
+/// The faces of a tet: face i is opposite vertex i, outward if the tet is positively oriented.
 pub const TET_FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
 
 /// The edges of a tet, in lexicographic order.
 pub const TET_EDGES: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
 
-/// Six times the signed volume of the tet a, b, c, d: (b−a)×(c−a)·(d−a). Not an exact sign.
+/// Six times the signed volume of the tet a, b, c, d: (b−a)×(c−a)·(d−a). Its sign is not exact.
 #[inline]
 pub fn volume6(a: &Point, b: &Point, c: &Point, d: &Point) -> f64 {
     (b - a).cross(&(c - a)).dot(&(d - a))
@@ -64,7 +64,8 @@ pub fn largest_cosine(p: &[Point; 4]) -> f64 {
     dihedral_cosines(p).into_iter().fold(-1.0, f64::max)
 }
 
-/// The corners of a triangle from the lowest on, in the same sense: its name among those that are looked for.
+/// The corners of a triangle rotated so that the smallest is first: a key that keeps the
+/// orientation.
 pub fn from_lowest<T: Ord>([a, b, c]: [T; 3]) -> [T; 3] {
     if a < b && a < c {
         [a, b, c]
