@@ -316,9 +316,9 @@ impl fmt::Display for Report {
         if let Some(PeriodicCheck { pairs, furthest, .. }) = self.periodic {
             let parts = match self.partition.split_periodic {
                 _ if self.ranks == 1 => String::new(),
-                0 => "; each face in one part with its image".into(),
+                0 => "; each face in one part with its partner".into(),
                 lost => format!(
-                    "; {lost} coarse tets NOT in one part with their images: no `Periodic BC` of Elmer"
+                    "; {lost} coarse tets NOT in one part with those at the partner faces: no `Periodic BC` of Elmer"
                 ),
             };
             writeln!(
