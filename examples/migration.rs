@@ -1,4 +1,5 @@
-//! Moves tets between ranks so that unequal work is shared evenly: tets near one corner take ten times the time of others.
+//! Moves tets between ranks to balance the work: tets near one corner take ten times as long as
+//! others.
 //!
 //! ```sh
 //! cargo run --release --example migration

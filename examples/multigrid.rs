@@ -4,8 +4,9 @@
 //! cargo run --release --example multigrid
 //! ```
 //!
-//! Each vertex of a level has two parents on the level before, so that interpolation of linear elements is the mean of two values and needs no
-//! message. The number of cycles does not grow with the level.
+//! Each vertex of a level has two parents on the coarser level, so interpolation of linear elements
+//! is the mean of two values and needs no messages. The number of cycles does not grow with the
+//! level.
 
 mod common;
 
@@ -77,7 +78,8 @@ fn solve(comm: &dyn Communicator, levels: &[Level], mut load: Vec<f64>) -> Resul
     unreachable!("the loop ends")
 }
 
-/// **Collective.** One V-cycle for a residual that all holders of a vertex agree on: the correction.
+/// **Collective.** The correction by one V-cycle; all copies of a vertex must have the same
+/// residual.
 fn cycle_on(comm: &dyn Communicator, levels: &[Level], residual: Vec<f64>) -> Result<Vec<f64>, CommError> {
     let (level, coarser) = levels.split_last().expect("there is a level");
     let mut x = vec![0.0; residual.len()];

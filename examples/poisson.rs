@@ -1,12 +1,12 @@
-//! Poisson's equation on a ball, with linear elements, assembled and solved by conjugate gradients across 4 ranks.
+//! Poisson's equation on a ball with linear elements, solved by conjugate gradients across 4 ranks.
 //!
 //! ```sh
 //! cargo run --release --example poisson
 //! ```
 //!
-//! The exact solution is known; the error falls by four from level to level, as the square of the element size. Each rank assembles its own
-//! tets. What several ranks contribute to a shared vertex is added by [`Sharing::sum`], and each vertex counts in scalar products once, on the
-//! rank that owns it.
+//! The exact solution is known: the error decreases as the square of the element size, by four from
+//! level to level. Each rank assembles its own tets. [`Sharing::sum`] adds the contributions of
+//! several ranks to a shared vertex. In scalar products each vertex is counted once, by its owner.
 
 mod common;
 
@@ -50,7 +50,9 @@ fn main() -> Result<(), Error> {
     Ok(())
 }
 
-/// **Collective.** Solves with the exact solution prescribed on the boundary. Returns the values at this rank's vertices and the iterations.
+/// **Collective.** Solves with the exact solution prescribed on the boundary.
+///
+/// Returns the values at the vertices of this rank and the number of iterations.
 fn solve(comm: &dyn Communicator, mesh: &Arrays, sharing: &Sharing) -> Result<(Vec<f64>, usize), CommError> {
     let (matrix, mut load) = assemble(mesh, source);
     sharing.sum(comm, &mut load)?;
@@ -94,9 +96,9 @@ fn solve(comm: &dyn Communicator, mesh: &Arrays, sharing: &Sharing) -> Result<(V
     Ok((x, iterations))
 }
 
-/// **Collective.** The root of the integral of the squared error, with the middle of each edge's third as a rule of second order.
+/// **Collective.** The L² norm of the error, by a quadrature rule of second order.
 fn error_of(comm: &dyn Communicator, mesh: &Arrays, solution: &[f64]) -> Result<f64, CommError> {
-    // Four points inside, exact for quadratic polynomials (Keast 1986).
+    // Four points in each tet, exact for quadratic polynomials (Keast 1986).
     const NEAR: f64 = 0.585_410_196_624_968_5;
     const FAR: f64 = 0.138_196_601_125_010_5;
     let mut sum = 0.0;

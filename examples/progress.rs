@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use tetmill::progress::{Observer, Stage};
 use tetmill::{Error, Geometry, Mesher};
 
-/// Prints every quarter of each stage, and cancels the run in the middle of a stage if there is one to cancel in.
+/// Prints every quarter of each stage, and cancels the run in the middle of a given stage, if any.
 struct Printer {
     cancel_in: Option<Stage>,
     cancelled: AtomicBool,

@@ -1,4 +1,4 @@
-//! Sizes that a program computes: small elements along a line through a block, where a weld would be.
+//! Sizes by a function: small elements along a line through a block, for example a weld.
 //!
 //! ```sh
 //! cargo run --release --example sizes
@@ -16,7 +16,7 @@ fn main() -> Result<(), Error> {
     let block = Geometry::from_text("algebraic3d solid block = orthobrick (0, 0, 0; 2, 1, 1); tlo block;")?;
     let mesh = Mesher::new().size(wanted).generate(&block)?.arrays();
 
-    // The mean length of edges beside what was asked for in their middle, near the line and far from it.
+    // The mean ratio of edge length and wanted size at the middle, near the line and far from it.
     let mut near = (0.0, 0);
     let mut far = (0.0, 0);
     for tet in 0..mesh.tets.len() {

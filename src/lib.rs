@@ -1,8 +1,9 @@
 //! From solid geometry to very large, partitioned tetrahedral meshes, in parallel.
 //!
-//! A **geometry** ([`Geometry`]) is read from a file (`.geo`, STL, meshes of other programs), from text, or from arrays. It
-//! consists of **bodies**, which are meshed, the **patches** around and between them, the **curves** where patches meet,
-//! and **corners**. A [`Mesher`] makes the mesh, on one rank or on many:
+//! A **geometry** ([`Geometry`]) is read from a file (`.geo`, STL, meshes of other programs), from
+//! text, or from arrays. It consists of **bodies**, which are meshed, the **patches** around and
+//! between them, the **curves** where patches meet, and **corners**. A [`Mesher`] makes the mesh,
+//! on one rank or on many:
 //!
 //! ```
 //! use tetmill::comm::{Communicator, thread};
@@ -40,14 +41,16 @@
 //!
 //! # How a mesh is made
 //!
-//! Rank 0 makes a **coarse mesh** and partitions it. Each rank then refines its part: a coarse edge is cut into n
-//! **pieces**, a coarse tet into n³ children, and new vertices on the boundary are moved onto the geometry. Fine ids are
-//! arithmetic on coarse ids, so refinement needs no message, and the mesh is the same, bit by bit, for any number of ranks
-//! and threads. Other [methods](Method) mesh the inside of the parts by the size field instead.
+//! Rank 0 makes a **coarse mesh** and partitions it. Each rank then refines its part: a coarse edge
+//! is cut into n **pieces**, a coarse tet into n³ children, and new vertices on the boundary are
+//! moved onto the geometry. Fine ids are computed from coarse ids, so refinement needs no messages,
+//! and the mesh is the same, bit by bit, for any number of ranks and threads. Other
+//! [methods](Method) mesh the inside of the parts by the size field instead.
 //!
-//! A refined mesh is not stored. A part is a **stream** ([`mesh::MeshStream`]) that computes blocks of tets when they are
-//! read; [`Generated::arrays`] copies all of it, [`mesh::blocks`] reads it in pieces of bounded size, and the writers of
-//! [`files`] read it directly. So meshes of 10⁹ tets fit a laptop.
+//! A refined mesh is not stored. A part is a **stream** ([`mesh::MeshStream`]) that computes blocks
+//! of tets when they are read. [`Generated::arrays`] copies all of it, [`mesh::blocks`] reads it in
+//! blocks of bounded size, and the writers of [`files`] read it directly. So meshes of 10⁹ tets fit
+//! a laptop.
 //!
 //! # Where to go
 //!
@@ -63,14 +66,16 @@
 //! | a progress bar, a cancel button | [`progress`] |
 //! | to match on what went wrong | [`error`], [`error::HasKind`] |
 //!
-//! Whole programs are in the folder `examples`: Poisson's equation across ranks, a multigrid cycle, sizes by a function.
+//! Complete programs are in the folder `examples`: Poisson's equation across ranks, a multigrid
+//! cycle, sizes by a function.
 //!
 //! # What is guaranteed
 //!
-//! Every tet is positively oriented, by exact arithmetic, also after refinement; each boundary vertex is on its patch,
-//! curve or corner, within a tolerance that the report states; parts fit together. A mesh that does not pass the
-//! check is not returned but an error. *Not* guaranteed are lower bounds on angles: thin walls and sharp
-//! edges of the geometry leave sharp tets. The number of tets is met only as far as [`Mesher::tets`] says.
+//! Every tet is positively oriented in exact arithmetic, also after refinement. Each boundary
+//! vertex is on its patch, curve or corner, within a tolerance that the report states. The parts
+//! fit together. If a mesh does not pass the check, an error is returned instead. *Not* guaranteed
+//! are lower bounds on angles: thin regions and sharp edges of the geometry cause flat tets.
+//! [`Mesher::tets`] states how close the number of tets comes to its target.
 #![forbid(unsafe_code)]
 
 pub mod files;
@@ -89,7 +94,7 @@ pub mod comm {
     pub use crate::ground::comm::{CommError, Communicator, Rank, grouped, mpi, thread};
 }
 
-/// Meshes: ids and entities, a part as arrays, as blocks or as a stream, shared vertices and ghosts.
+/// Meshes: ids and entities, parts as arrays, blocks or streams, shared vertices and ghosts.
 pub mod mesh {
     pub use crate::ground::mesh::ghosts::{By, GhostTet, GhostVertex, Ghosts, RankLists};
     pub use crate::ground::mesh::periodic::{Link, Pair, Pairs, PeriodicMap};
@@ -107,7 +112,7 @@ pub mod mesh {
     pub use csg::{BodyId, CornerId, CurveId, PatchId};
 }
 
-/// How sizes are chosen, and how much is done for shapes.
+/// Element sizes, and the effort of mesh improvement.
 pub mod size {
     pub use crate::ground::size::{Closeness, Preset, SizeFunction, SizeSettings, Source};
     pub use crate::mesher::improve::Effort;
@@ -118,12 +123,12 @@ pub mod memory {
     pub use crate::ground::memory::{available_bytes, cpu_seconds, machine, peak_bytes, sized};
 }
 
-/// How far a run is, and how to cancel it.
+/// Progress reports and cancellation of a run.
 pub mod progress {
     pub use crate::ground::progress::{Cancelled, Observer, Progress, Silent, Stage, StageTime, Work};
 }
 
-/// What can go wrong, by stage.
+/// The errors, by stage.
 pub mod error {
     pub use crate::files::WriteError;
     pub use crate::files::arrays::ArrayError;
@@ -153,7 +158,7 @@ pub mod error {
     pub use csg::language::Diagnostics;
 }
 
-/// The settings of [`Mesher`] and what was made, in full.
+/// All settings and results of a [`Mesher`].
 pub mod run {
     pub use crate::parallel::decompose::{Candidates, CutPlane, Settings as PlanSettings};
     pub use crate::parallel::interfaces::Report as InterfaceReport;
@@ -172,7 +177,7 @@ pub mod run {
     };
 }
 
-/// Tets to other ranks: where they should go, and moving them.
+/// Repartitioning: new destinations of tets, and their migration.
 pub mod repartition {
     pub use crate::parallel::migrate::{Moved, Settings as MoveSettings, bare, migrate, migrate_bare};
     pub use crate::parallel::repartition::metrics::{Metrics, measure};
@@ -188,12 +193,12 @@ pub mod check {
     };
 }
 
-/// The shapes of the tets of meshes, in the measures of several programs.
+/// Shape measures of meshes, as several programs define them.
 pub mod quality {
     pub use crate::pipeline::quality::{Quality, histograms, measure, table};
 }
 
-/// Stages on their own, for this project's benches and tests: not for others, and without any promise.
+/// Separate stages for the benches and tests of this project, without any promise of stability.
 #[doc(hidden)]
 pub mod internals {
     pub use crate::files::plain::PlainPart;

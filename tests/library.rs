@@ -12,7 +12,8 @@ fn ball() -> Geometry {
     Geometry::from_text(BALL).expect("a geometry")
 }
 
-/// The corners and triangles of the unit cube, seen from outside counterclockwise, and the number of each side.
+/// The corners and triangles of the unit cube, counterclockwise from outside, and the number of
+/// each triangle's side.
 fn cube() -> (Vec<[f64; 3]>, Vec<[u32; 3]>, Vec<u32>) {
     let points = (0..8).map(|i| [0, 1, 2].map(|axis| f64::from(i >> axis & 1))).collect();
     let sides = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];

@@ -17,7 +17,7 @@ use crate::failure::{Failure, Status, agree};
 use crate::options::{
     Check, FileFormat, Format, Generate, InputOptions, Inspect, MeshFile, Method, Quality, SizeOptions,
 };
-use crate::report::{LevelReport, MeshReport, PartitionReport, Processes, Report, processes};
+use crate::report::{LevelReport, MeshReport, PartitionReport, Processes, Report, counted, processes};
 use crate::terminal::Terminal;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -51,8 +51,8 @@ fn on_ranks(
         let done = mpi::run(|comm| {
             let done = match (ranks, parts) {
                 (Some(ranks), _) if ranks != comm.size() => Err(Failure::input(format!(
-                    "-n {ranks} differs from the {} ranks started by mpirun: leave out -n",
-                    comm.size()
+                    "-n {ranks} differs from the {} started by mpirun: leave out -n",
+                    counted(comm.size().into(), "rank", "ranks")
                 ))),
                 (_, Some(parts)) if parts != comm.size() => {
                     let ran = grouped::run(comm, parts, &command).map_err(Failure::from);
@@ -97,7 +97,10 @@ fn set_threads(threads: Option<u32>) -> Result<(), Failure> {
         .num_threads(threads)
         .stack_size(thread::POOL_STACK)
         .build_global()
-        .map_err(|error| Failure::new(Status::Resources, format!("cannot start {threads} threads: {error}")))
+        .map_err(|error| {
+            let threads = counted(threads as u64, "thread", "threads");
+            Failure::new(Status::Resources, format!("cannot start {threads}: {error}"))
+        })
 }
 
 /// **Collective.** `tetmill generate` on one rank.
@@ -333,15 +336,16 @@ fn show_report(
         outputs.show(format_args!("{report}\n"))?;
     }
     if let (Some(wanted), Some(outcome)) = (wanted, report.wanted) {
-        let got = report.coarse.tets;
+        let wanted = counted(wanted, "tet", "tets");
+        let got = counted(report.coarse.tets, "coarse tet", "coarse tets");
         match outcome {
             Outcome::Reached => {}
-            Outcome::Least => eprintln!(
-                "note: {wanted} tets were requested; {got} coarse tets are the least that this geometry allows"
-            ),
-            Outcome::Jumped => eprintln!(
-                "note: {wanted} tets were requested; no size gives this number, the next larger is {got} coarse tets"
-            ),
+            Outcome::Least => {
+                eprintln!("note: {wanted} requested; the least that this geometry allows is {got}")
+            }
+            Outcome::Jumped => {
+                eprintln!("note: {wanted} requested; no size gives this number, the next larger is {got}")
+            }
         }
     }
     write_report(file, report)
@@ -497,7 +501,10 @@ pub fn run_quality(options: &Quality) -> Result<(), Failure> {
     let faulty: Vec<String> = meshes
         .iter()
         .filter(|mesh| mesh.inverted > 0)
-        .map(|mesh| format!("{} inverted tets in {}", mesh.inverted, mesh.mesh))
+        .map(|mesh| {
+            let tets = counted(mesh.inverted as u64, "inverted tet", "inverted tets");
+            format!("{tets} in {}", mesh.mesh)
+        })
         .collect();
     if faulty.is_empty() { Ok(()) } else { Err(Failure::new(Status::Faults, faulty.join(", "))) }
 }

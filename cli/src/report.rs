@@ -239,6 +239,16 @@ pub fn counted(count: u64, one: &str, several: &str) -> String {
     format!("{} {}", grouped(count), if count == 1 { one } else { several })
 }
 
+/// A number of tets as text.
+fn tets(count: u64) -> String {
+    counted(count, "tet", "tets")
+}
+
+/// A number of vertices as text.
+fn vertices(count: u64) -> String {
+    counted(count, "vertex", "vertices")
+}
+
 /// The subdivision of coarse edges as text.
 fn cut_into(pieces: u32) -> String {
     if pieces == 1 {
@@ -263,7 +273,7 @@ impl fmt::Display for Report {
             counted(corners as u64, "corner", "corners")
         )?;
         let coarse = &self.coarse;
-        write!(f, "coarse     {} tets, {} vertices", grouped(coarse.tets), grouped(coarse.vertices))?;
+        write!(f, "coarse     {}, {}", tets(coarse.tets), vertices(coarse.vertices))?;
         writeln!(
             f,
             ", worst mean ratio {:.3}, mean {:.3}",
@@ -273,7 +283,7 @@ impl fmt::Display for Report {
             writeln!(
                 f,
                 "           {} that refinement would flatten repaired, {} left",
-                counted(coarse.illegal_repaired, "tet", "tets"),
+                tets(coarse.illegal_repaired),
                 coarse.illegal_left
             )?;
         }
@@ -285,10 +295,10 @@ impl fmt::Display for Report {
         let mesh = &self.mesh;
         writeln!(
             f,
-            "mesh       {} tets, {} vertices, {} boundary triangles, {}",
-            grouped(mesh.tets),
-            grouped(mesh.vertices),
-            grouped(mesh.boundary),
+            "mesh       {}, {}, {}, {}",
+            tets(mesh.tets),
+            vertices(mesh.vertices),
+            counted(mesh.boundary, "boundary triangle", "boundary triangles"),
             cut_into(self.pieces)
         )?;
         writeln!(
@@ -316,45 +326,46 @@ impl fmt::Display for Report {
         if let Some(PeriodicCheck { pairs, furthest, .. }) = self.periodic {
             let parts = match self.partition.split_periodic {
                 _ if self.ranks == 1 => String::new(),
-                0 => "; each face in one part with its image".into(),
+                0 => "; each face in one part with its partner".into(),
                 lost => format!(
-                    "; {lost} coarse tets NOT in one part with their images: no `Periodic BC` of Elmer"
+                    "; {} NOT in one part with those at the partner faces: no `Periodic BC` of Elmer",
+                    counted(lost, "coarse tet", "coarse tets")
                 ),
             };
             writeln!(
                 f,
-                "periodic   {} pairs of vertices, within {furthest:.1e} of their motions{parts}",
-                grouped(pairs)
+                "periodic   {}, within {furthest:.1e} of their motions{parts}",
+                counted(pairs, "pair of vertices", "pairs of vertices")
             )?;
         }
         if self.ranks > 1 {
             let p = &self.partition;
             writeln!(
                 f,
-                "partition  {} parts by {}, imbalance {:.3}, {} coarse faces cut, {} vertices shared",
-                p.parts,
+                "partition  {} by {}, imbalance {:.3}, {} cut, {} shared",
+                counted(p.parts.into(), "part", "parts"),
                 p.method,
                 p.imbalance,
-                grouped(p.edge_cut),
-                grouped(p.shared_vertices)
+                counted(p.edge_cut, "coarse face", "coarse faces"),
+                vertices(p.shared_vertices)
             )?;
         }
         if let Some(across) = &self.across {
             writeln!(
                 f,
                 "interfaces {} beside them improved in {}, {} sent to other parts for it; smallest angle {:.1}°, was {:.1}°; {} below {}°, were {}",
-                counted(across.tets, "tet", "tets"),
+                tets(across.tets),
                 counted(across.rounds.into(), "round", "rounds"),
                 grouped(across.moved),
                 across.smallest_after,
                 across.smallest_before,
-                counted(across.bad_after, "tet", "tets"),
+                tets(across.bad_after),
                 across.angle,
                 grouped(across.bad_before)
             )?;
         }
         if let Some(Evened { imbalance, moved }) = self.evened {
-            let moved = counted(moved, "tet", "tets");
+            let moved = tets(moved);
             writeln!(f, "evened     {moved} went to other parts; the imbalance was {imbalance:.3}")?;
         }
         if let Some(Refused { skins, first: Some((rank, reason)) }) = &self.skins {

@@ -57,7 +57,7 @@ fn inverted_tets_are_a_fault_with_status_1() {
     let output = tetmill().arg("quality").args([&good, &folded]).output().unwrap();
     let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(1), "{stderr}");
-    assert!(stderr.contains("1 inverted tets in") && stderr.contains("folded.mesh"), "{stderr}");
+    assert!(stderr.contains("1 inverted tet in") && stderr.contains("folded.mesh"), "{stderr}");
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
     let inverted = text.lines().find(|line| line.starts_with("inverted tets")).unwrap();
     assert_eq!(inverted.split_whitespace().collect::<Vec<_>>(), ["inverted", "tets", "0", "1"]);

@@ -17,8 +17,8 @@
 //!    bounding box; `number`: assigns boundary numbers and names.
 //! 7. `periodic`: matches periodic copies.
 //! 8. `check`: verifies consistency; `contact`: decides whether points of tangency matter; `touch`:
-//!    rejects corners and edges that touch the interior of a patch; `cusp`: rejects patches that end
-//!    in too sharp a cusp.
+//!    rejects corners and edges that touch the interior of a patch; `cusp`: rejects patches that
+//!    end in too sharp a cusp.
 //!
 //! NETGEN follows edges from special points. We trace all pairs and classify afterwards: no
 //! decision depends on a tolerance during tracing; special positions (three surfaces through one

@@ -83,7 +83,9 @@ pub fn assemble(mesh: &Arrays, source: impl Fn([f64; 3]) -> f64) -> (Matrix, Vec
     (Matrix::of_entries(mesh.points.len(), entries), load)
 }
 
-/// **Collective.** The vertices on the outer boundary. A rank may hold a vertex there without a triangle beside it.
+/// **Collective.** The vertices on the outer boundary.
+///
+/// A rank may have such a vertex without a boundary triangle at it.
 pub fn on_boundary(
     comm: &dyn Communicator,
     mesh: &Arrays,
@@ -99,7 +101,7 @@ pub fn on_boundary(
     Ok(is_on)
 }
 
-/// **Collective.** The scalar product over the vertices of the whole mesh, each counted by its owner.
+/// **Collective.** The scalar product over all vertices of the mesh, each counted by its owner.
 pub fn inner(comm: &dyn Communicator, sharing: &Sharing, x: &[f64], y: &[f64]) -> Result<f64, CommError> {
     let not_owned: f64 = sharing
         .vertices()

@@ -48,7 +48,7 @@ pub(super) fn pairs(
         let [of, number, key] = *pair;
         let place = numbers.binary_search_by_key(&of, |known| known[0]);
         let place =
-            place.unwrap_or_else(|_| panic!("vertex {of}, of which {number} is an image, is on no boundary"));
+            place.unwrap_or_else(|_| panic!("vertex {of}, the master of {number}, is on no boundary"));
         *pair = [number, numbers[place][1], key];
     }
     let mut pairs = comm.gather(0, &pairs)?.concat();

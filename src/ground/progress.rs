@@ -81,8 +81,8 @@ impl fmt::Display for Stage {
 pub trait Observer: Sync {
     /// A stage begins.
     fn begin(&self, _stage: Stage) {}
-    /// A stage that has begun goes through this many tets of this rank: with the progress this gives
-    /// a rate. Not called by stages that count nothing or something else.
+    /// A stage that has begun goes through this many tets of this rank: with the progress this
+    /// gives a rate. Not called by stages that count nothing or something else.
     fn expect(&self, _stage: Stage, _tets: u64) {}
     /// The progress of a stage, 0 to 1. Called by any thread; never decreases within a stage.
     fn advance(&self, _stage: Stage, _fraction: f64) {}

@@ -1,6 +1,7 @@
 //! Common parts of the two tet meshes of the mesher, `volume::tetrahedra` and `improve::complex`.
 //!
-//! A **half-face** is a face of one tet, stored as one number: 4·tet + index of the opposite vertex.
+//! A **half-face** is a face of one tet, stored as one number: 4·tet + index of the opposite
+//! vertex.
 //!
 //! The meshes themselves stay separate, because they store different data for each tet (exact
 //! positions and circumspheres; scores and passes), a walk crosses locked faces in one and ends

@@ -161,7 +161,7 @@ pub enum RequestError {
     PeriodicMethod,
     /// Periodic faces cannot be in one part with their copies.
     #[error(
-        "{lost} of the {tets} coarse tets beside periodic faces cannot be in one part with those at their images, which \
+        "{lost} of the {tets} coarse tets at periodic faces cannot be in one part with those at the partner faces, which \
          Elmer needs: use fewer parts or a finer coarse mesh"
     )]
     SplitPeriodic {
@@ -183,7 +183,7 @@ pub enum RequestError {
     NotCuttable,
     /// Tags that name bodies, which would be divided in a geometry of the pieces.
     #[error(
-        "`boundarycondition` and `singular` name bodies, of which only pieces would be left: take them out of the file, or \
+        "`boundarycondition` and `singular` refer to bodies, which the planes would cut: remove them from the file, or use \
          `generate -m decompose`, which keeps them"
     )]
     TaggedBodies,

@@ -1,5 +1,6 @@
 //! Describes a geometry's entities, as text and as JSON.
 
+use crate::files::input::counted;
 use crate::ground::mesh::{Label, VertexId};
 use crate::mesher::facets::FacetModel;
 use crate::mesher::model::CsgModel;
@@ -242,7 +243,7 @@ impl fmt::Display for Inspection {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let [min, max] = self.bounds;
         writeln!(f, "box {min:?} to {max:?}")?;
-        writeln!(f, "\n{} bodies", self.bodies.len())?;
+        writeln!(f, "\n{}", counted(self.bodies.len(), "body"))?;
         for body in &self.bodies {
             let maxh = body.maxh.map_or(String::new(), |h| format!("  maxh {h}"));
             let line = body.line.map_or(String::new(), |line| format!(" line {line}"));
@@ -250,8 +251,8 @@ impl fmt::Display for Inspection {
         }
         writeln!(
             f,
-            "\n{} patches (boundary number, name, surface, bodies behind and in front, curves)",
-            self.patches.len()
+            "\n{} (boundary number, name, surface, bodies behind and in front, curves)",
+            counted(self.patches.len(), "patch")
         )?;
         for patch in &self.patches {
             let [behind, front] = patch.bodies;
@@ -263,26 +264,27 @@ impl fmt::Display for Inspection {
             let cutout = patch.cutout.as_ref().map_or(String::new(), |solid| format!("  cut out by {solid}"));
             writeln!(
                 f,
-                "  {:>4}  {:16} {surface:36} {behind} | {front}  {} curves{maxh}{cutout}",
+                "  {:>4}  {:16} {surface:36} {behind} | {front}  {}{maxh}{cutout}",
                 patch.boundary,
                 patch.name.as_deref().unwrap_or("-"),
-                patch.curves.len()
+                counted(patch.curves.len(), "curve")
             )?;
         }
-        writeln!(f, "\n{} curves (length, corners, boundary numbers beside)", self.curves.len())?;
+        let curves = counted(self.curves.len(), "curve");
+        writeln!(f, "\n{curves} (length, corners, boundary numbers beside)")?;
         for (i, curve) in self.curves.iter().enumerate() {
             let ends = curve.corners.map_or("closed".into(), |[a, b]| format!("{a} to {b}"));
             writeln!(f, "  {i:>4}  {:<12.6} {ends:12} {:?}", curve.length, curve.boundaries)?;
         }
-        writeln!(f, "\n{} corners", self.corners.len())?;
+        writeln!(f, "\n{}", counted(self.corners.len(), "corner"))?;
         for (i, [x, y, z]) in self.corners.iter().enumerate() {
             writeln!(f, "  {i:>4}  ({x}, {y}, {z})")?;
         }
         if !self.periodic.is_empty() {
             writeln!(
                 f,
-                "\n{} periodic patches (identification, boundary numbers, motion)",
-                self.periodic.len()
+                "\n{} (identification, boundary numbers, motion)",
+                counted(self.periodic.len(), "periodic patch")
             )?;
         }
         for line in &self.periodic {
@@ -293,7 +295,8 @@ impl fmt::Display for Inspection {
             writeln!(f, "  {:>4}  {of} to {image}, {turned}moved by ({x}, {y}, {z})", line.identification)?;
         }
         if !self.singular.is_empty() {
-            writeln!(f, "\n{} singular patches, curves and corners (number, factor)", self.singular.len())?;
+            let entities = counted(self.singular.len(), "singular entity");
+            writeln!(f, "\n{entities} (patch, curve or corner, factor)")?;
         }
         for SingularLine { kind, number, factor } in &self.singular {
             writeln!(f, "  {kind} {number}, factor {factor}")?;

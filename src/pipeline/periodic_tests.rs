@@ -130,7 +130,7 @@ fn a_map_survives_its_encoding_and_a_mesh_that_is_not_periodic_has_none() {
     mesh.points[image] += Vector::new(1e-6, 0.0, 0.0);
     let error =
         PeriodicMap::of(&mesh, periodic::links(&csg.features), &csg.features.bounds).unwrap_err().to_string();
-    assert!(error.contains("has no image on patch"), "{error}");
+    assert!(error.contains("has no partner on patch"), "{error}");
 }
 
 /// The numbers on the lines of a file between two words.

@@ -12,8 +12,8 @@
 //! share a [`Budget`]. Once it is spent, each loop ends with the best mesh that it has, or with the
 //! last error. Budgets count meshes, not seconds, so that results do not depend on the machine.
 //!
-//! Nearly all runs need one to ten meshes. Most attempts end early, at the curves or at the surface:
-//! only complete ones take as long as a coarse mesh.
+//! Nearly all runs need one to ten meshes. Most attempts end early, at the curves or at the
+//! surface: only complete ones take as long as a coarse mesh.
 
 use std::cell::Cell;
 

@@ -6,7 +6,7 @@ use super::{on_ranks, prepared, set_threads, write_report};
 use crate::failure::{Failure, agree};
 use crate::options::{Format, PartitionMethod, Repartition};
 use crate::report::moved::MoveReport;
-use crate::report::processes;
+use crate::report::{counted, processes};
 use crate::terminal::Terminal;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -26,7 +26,8 @@ pub fn run_repartition(options: &Repartition) -> Result<(), Failure> {
         // Before a thread is started for each part.
         let tets = elmer::stated_elements(&options.directory).map_err(Failure::input)?;
         if u64::from(parts) > tets {
-            return Err(Failure::input(format!("{parts} parts, but only {tets} tets")));
+            let [parts, tets] = [counted(parts.into(), "part", "parts"), counted(tets, "tet", "tets")];
+            return Err(Failure::input(format!("{parts}, but only {tets}")));
         }
     }
     let start = Instant::now();

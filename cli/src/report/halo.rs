@@ -1,6 +1,6 @@
 //! Report of the halo of a partitioned mesh.
 
-use super::grouped;
+use super::counted;
 use serde::Serialize;
 use std::fmt;
 use tetmill::comm::{CommError, Communicator};
@@ -35,7 +35,8 @@ impl HaloReport {
 
 impl fmt::Display for HaloReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (tets, vertices) = (grouped(self.tets), grouped(self.vertices));
-        writeln!(f, "halo       by {}: {tets} ghost tets, {vertices} ghost vertices", self.by)
+        let tets = counted(self.tets, "ghost tet", "ghost tets");
+        let vertices = counted(self.vertices, "ghost vertex", "ghost vertices");
+        writeln!(f, "halo       by {}: {tets}, {vertices}", self.by)
     }
 }

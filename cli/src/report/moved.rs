@@ -1,6 +1,6 @@
 //! Report of a repartition.
 
-use super::{HaloReport, MeshReport, Processes, counted, grouped};
+use super::{HaloReport, MeshReport, Processes, counted, tets, vertices};
 use serde::Serialize;
 use std::fmt;
 use tetmill::files::Written;
@@ -83,11 +83,11 @@ impl MoveReport {
 fn write_metrics(f: &mut fmt::Formatter<'_>, name: &str, metrics: &Metrics) -> fmt::Result {
     writeln!(
         f,
-        "{name:<10} {}, imbalance {:.3}, {} faces cut, {} vertices shared, neighbours {:.1} in the mean and {} at most",
+        "{name:<10} {}, imbalance {:.3}, {} cut, {} shared, neighbours {:.1} in the mean and {} at most",
         counted(metrics.parts.into(), "part", "parts"),
         metrics.imbalance,
-        grouped(metrics.edge_cut),
-        grouped(metrics.shared_vertices),
+        counted(metrics.edge_cut, "face", "faces"),
+        vertices(metrics.shared_vertices),
         metrics.mean_neighbours,
         metrics.most_neighbours
     )
@@ -98,18 +98,18 @@ impl fmt::Display for MoveReport {
         let mesh = &self.mesh;
         writeln!(
             f,
-            "mesh       {}: {} tets, {} vertices, {} boundary triangles",
+            "mesh       {}: {}, {}, {}",
             self.input,
-            grouped(mesh.tets),
-            grouped(mesh.vertices),
-            grouped(mesh.boundary)
+            tets(mesh.tets),
+            vertices(mesh.vertices),
+            counted(mesh.boundary, "boundary triangle", "boundary triangles")
         )?;
         write_metrics(f, "before", &self.before)?;
         write_metrics(f, "after", &self.after)?;
         writeln!(
             f,
             "moved      {} between {}, {}, by {}",
-            counted(self.moved_tets, "tet", "tets"),
+            tets(self.moved_tets),
             counted(self.ranks.into(), "rank", "ranks"),
             sized(self.moved_bytes),
             self.method

@@ -379,7 +379,7 @@ fn orientation_of_copy(
 /// Checks that different chains of identifications map each entity to the same place.
 ///
 /// # Errors
-/// [`FeatureError::NotPeriodic`] at the first point with two different images.
+/// [`FeatureError::NotPeriodic`] at the first point with two different periodic copies.
 fn check_consistency(
     geometry: &Geometry,
     features: &Features,

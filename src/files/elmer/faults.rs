@@ -114,7 +114,9 @@ impl fmt::Display for FaultKind {
             Self::WrongParent => "wrong or missing parent",
             Self::Inward => "boundary element with inward normal",
             Self::NotPeriodic => "periodic nodes that do not match",
-            Self::PeriodicSplit => "node of a periodic face in a part without a face and its image there",
+            Self::PeriodicSplit => {
+                "node of a periodic face in a part that has no face with its partner there"
+            }
         })
     }
 }

@@ -2,7 +2,7 @@
 //! nodes by projection (`Periodic BC`). Other programs can read the pairs from here.
 //!
 //! ```text
-//! # node, the node that it is the image of, identification
+//! # node, its master, identification
 //! # motion 1 1 0 0 1 0 1 0 0 0 0 1 0        identification, three rows of the matrix
 //! 87 3 1
 //! ```
@@ -38,7 +38,7 @@ pub(super) fn periodic_text(
     if part.rank() != 0 {
         return Ok(None);
     }
-    let mut text = String::from("# node, the node that it is the image of, identification\n");
+    let mut text = String::from("# node, its master, identification\n");
     let mut last = 0;
     for link in part.links() {
         // Patches of one identification are adjacent and have the same motion.
@@ -113,13 +113,13 @@ pub(super) fn check_pairs(mesh: &ElmerMesh, faults: &mut Faults) -> Result<(), R
             let motion = motions.get(&number).ok_or_else(|| broken(&path, index))?;
             pairs.entry(number).or_default().push([image, of]);
             let (Some(there), Some(here)) = (points.get(&image), points.get(&of)) else {
-                let what = || format!("of the pair of nodes {image} and {of} one is not in the mesh");
+                let what = || format!("one of the paired nodes {image} and {of} is not in the mesh");
                 faults.add(FaultKind::NoSuchNode, path.clone(), index + 1, what);
                 continue;
             };
             let off = (motion * here.to_homogeneous() - there.coords).norm();
             if off.is_nan() || off > tolerance {
-                let what = || format!("node {image} is {off:e} off the image of node {of}");
+                let what = || format!("node {image} is {off:e} off the moved position of its partner {of}");
                 faults.add(FaultKind::NotPeriodic, path.clone(), index + 1, what);
             }
         }

@@ -186,11 +186,13 @@ pub(crate) fn shown(bytes: &[u8]) -> String {
     String::from_utf8_lossy(&bytes[..bytes.len().min(LONGEST)]).escape_debug().collect()
 }
 
-/// `1 triangle`, `2 triangles`, `3 vertices`.
+/// A count with its noun: `1 triangle`, `2 triangles`, `3 vertices`, `4 bodies`, `5 patches`.
 pub(crate) fn counted(count: usize, what: &str) -> String {
-    match (count, what) {
+    match (count, what.strip_suffix('y')) {
         (1, _) => format!("1 {what}"),
-        (_, "vertex") => format!("{count} vertices"),
+        (_, Some(stem)) => format!("{count} {stem}ies"),
+        _ if what == "vertex" => format!("{count} vertices"),
+        _ if what.ends_with("ch") => format!("{count} {what}es"),
         _ => format!("{count} {what}s"),
     }
 }
@@ -198,6 +200,17 @@ pub(crate) fn counted(count: usize, what: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn nouns_agree_with_their_counts() {
+        let nouns = ["triangle", "vertex", "body", "periodic patch"];
+        assert_eq!(
+            nouns.map(|noun| counted(1, noun)),
+            ["1 triangle", "1 vertex", "1 body", "1 periodic patch"]
+        );
+        let plurals = ["0 triangles", "0 vertices", "0 bodies", "0 periodic patches"];
+        assert_eq!(nouns.map(|noun| counted(0, noun)), plurals);
+    }
 
     #[test]
     fn a_fault_names_its_line_or_byte() {

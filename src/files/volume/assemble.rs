@@ -51,7 +51,8 @@ pub(super) fn assemble(mut raw: Raw) -> Result<VolumeMesh, Fault> {
     }
     if turned > 0 {
         let all = if turned == tets.len() { "all " } else { "" };
-        notes.push(format!("{all}{turned} tets stored in negative orientation turned round"));
+        let tets = counted(turned, "tet");
+        notes.push(format!("{all}{tets} stored in negative orientation turned round"));
     }
     let patch_labels: Vec<Label> = patch_keys.iter().map(|key| key.label).collect();
     let names = crate::ground::mesh::Names {

@@ -1,27 +1,31 @@
-//! Points with more bits than doubles have, and exact signs with them.
+//! Fixed-point coordinates with more bits than doubles, and exact signs for them.
 //!
-//! A point that is to lie exactly on an edge or in a triangle between points with double coordinates needs more bits than those. Weights that are
-//! fractions of a power of two (dyadic numbers) keep it within integers: a [`Fixed`] point has three of 256 bits, in one unit for all
-//! points, so that differences, products and signs are those of machine words, without rounding and without division. That points so built need
-//! no rational numbers is what makes them simpler than implicit ones (Attene 2020, "Indirect predicates for geometric constructions"), whose places are
-//! given by what they are constructed from; the price is that they lie near the place wanted, not on it.
+//! A point exactly on an edge or in a triangle between points with double coordinates needs more
+//! bits than a double has. If its weights are dyadic (fractions of a power of two), integers
+//! suffice: a [`Fixed`] point has three coordinates of 256 bits, in one unit for all points, so
+//! differences, products and signs need neither rounding nor division. Unlike implicit points,
+//! which are represented by their construction (Attene 2020, "Indirect predicates for geometric
+//! constructions"), such points need no rational numbers. The price is that they lie near the
+//! wanted position, not at it.
 //!
-//! Coordinates must be below 2¹⁰ in size and multiples of 2⁻²⁴⁰: of a double of size 10⁻⁵⁶ or more all bits have room.
+//! Coordinates must be multiples of 2⁻²⁴⁰ and below 2¹⁰ in magnitude: a double of magnitude 10⁻⁵⁶
+//! or more is represented exactly.
 
 use super::integers::{Parts, Words, add, is_negative, mul, parts, sign, sub, volume6};
 use super::predicates::{Sign, volume6_and_error};
 use crate::Point;
 
-/// The unit is 2 to minus this.
+/// The unit is 2⁻²⁴⁰.
 const FRACTION: i32 = 240;
 
-/// What the exponents of [`Parts`] are too large by.
+/// The bias of the exponents of [`Parts`].
 const EXPONENT_BIAS: i32 = 1075;
 
-/// Coordinates are below 2 to this in size, in units: differences have a bit more, and six volumes below 6·2⁷⁵³ fit 768 bits.
+/// Maximum bits of a coordinate's magnitude, in units: differences have one more, and six times a
+/// volume, below 6·2⁷⁵³, fits 768 bits.
 const LARGEST: u32 = 250;
 
-/// More than the distance, along an axis, between a fixed point with coordinates up to 1 and its rounding (3·2⁻⁵³).
+/// An upper bound of the rounding error of coordinates up to 1, which is 3·2⁻⁵³.
 const ROUNDING: f64 = 1.0 / (1u64 << 50) as f64;
 
 /// Six times a volume.
@@ -32,45 +36,47 @@ pub type Volume = Words<12>;
 pub struct Fixed([Words<4>; 3]);
 
 impl Fixed {
-    /// The same point; none where its coordinates do not fit.
+    /// The same point; `None` if its coordinates do not fit.
     pub fn of(point: &Point) -> Option<Self> {
         let [x, y, z] = parts(point).map(shifted);
         Some(Self([x?, y?, z?]))
     }
 
-    /// The nearest doubles, or those beside them; the same point if its coordinates are doubles.
+    /// The point rounded to doubles, not always to the nearest; exact if its coordinates are
+    /// doubles.
     pub fn rounded(&self) -> Point {
         Point::from(self.0.map(to_double))
     }
 
-    /// What leads from `origin` here.
+    /// The difference from `origin` to this point.
     #[must_use]
     pub fn minus(&self, origin: &Self) -> Self {
         Self([0, 1, 2].map(|k| sub(self.0[k], origin.0[k])))
     }
 
-    /// What is there from here on.
+    /// The point at a difference from this one.
     #[must_use]
     pub fn plus(&self, difference: &Self) -> Self {
         Self([0, 1, 2].map(|k| add(self.0[k], difference.0[k])))
     }
 
-    /// Half of a difference; none where the unit is too large for it.
+    /// Half of a difference; `None` if that is not a multiple of the unit.
     pub fn halved(&self) -> Option<Self> {
         let is_even = self.0.iter().all(|x| x[0] & 1 == 0);
         is_even.then(|| Self(self.0.map(half)))
     }
 
-    /// Half of a difference or the next number of units below it; none where nothing is left of it.
+    /// Half of a difference, rounded down to units; `None` if all coordinates become 0 or −1 unit.
     pub fn nearly_halved(&self) -> Option<Self> {
         let halves = self.0.map(half);
         halves.iter().any(|&x| x != [0; 4] && x != [u64::MAX; 4]).then_some(Self(halves))
     }
 
-    /// The point a + Σ tₖ·wayₖ, where tₖ has these bits after the point and then a one; none where the unit is too large. All have equally many
-    /// bits.
+    /// The point self + Σ tₖ·wayₖ, where tₖ is the binary fraction `bits[k]` followed by a one;
+    /// `None` if a halved way is not a multiple of the unit.
     ///
-    /// So no tₖ is 0 or 1, and each is nearer than half the last bit to every number that begins so.
+    /// All slices must have the same length. No tₖ is 0 or 1, and each is within half the last bit
+    /// of every number that starts with these bits.
     pub fn along<const K: usize>(&self, ways: [Self; K], bits: [&[bool]; K]) -> Option<Self> {
         let (mut place, mut ways) = (*self, ways);
         for i in 0..=bits[0].len() {
@@ -84,7 +90,7 @@ impl Fixed {
         Some(place)
     }
 
-    /// What sorts points along an axis.
+    /// A key that sorts points along an axis.
     pub fn key(&self, axis: usize) -> impl Ord + use<> {
         let [a, b, c, d] = self.0[axis];
         (d as i64, c, b, a)
@@ -113,15 +119,15 @@ fn to_double(x: Words<4>) -> f64 {
     in_units(x, FRACTION)
 }
 
-/// A volume as a double, to some units in its last place.
+/// A volume as a double, accurate to some units in the last place.
 pub fn rounded_volume(volume: Volume) -> f64 {
     in_units(volume, 3 * FRACTION)
 }
 
-/// The double near a number of units of 2 to minus `fraction`.
+/// A double near x·2^−fraction.
 fn in_units<const N: usize>(x: Words<N>, fraction: i32) -> f64 {
     let size = if is_negative(&x) { sub([0; N], x) } else { x };
-    // The lowest first, so that only what is lost beside the highest is lost.
+    // Lowest word first, so that rounding errors are relative to the result.
     let sum = (0..).zip(size).fold(0.0, |sum, (k, word)| sum + word as f64 * 2f64.powi(64 * k - fraction));
     if is_negative(&x) { -sum } else { sum }
 }
@@ -139,7 +145,7 @@ pub fn volume([a, b, c, d]: [&Fixed; 4]) -> Volume {
 /// The sign of (b−a)×(c−a)·(d−a).
 pub fn orient3d_fixed([a, b, c, d]: [&Fixed; 4]) -> Sign {
     let differences = [b, c, d].map(|p| p.minus(a).0);
-    // Most have few bits: the lower half is empty.
+    // Most differences have few bits, so their lower half is zero.
     if differences.iter().flatten().all(|x| x[0] == 0 && x[1] == 0) {
         sign(volume6::<2, 4, 6>(&differences.map(|d| d.map(|x| [x[2], x[3]]))))
     } else {
@@ -147,17 +153,18 @@ pub fn orient3d_fixed([a, b, c, d]: [&Fixed; 4]) -> Sign {
     }
 }
 
-/// The sign of (b−a)×(c−a) across a coordinate plane.
+/// The sign of (b−a)×(c−a) in the coordinate plane of axes i and j.
 pub fn orient2d_fixed([i, j]: [usize; 2], [a, b, c]: [&Fixed; 3]) -> Sign {
     let (u, v) = (b.minus(a).0, c.minus(a).0);
     sign(sub(mul::<4, 4, 8>(u[i], v[j]), mul::<4, 4, 8>(u[j], v[i])))
 }
 
-/// The sign of [`orient3d`](super::predicates::orient3d) for points whose coordinates may be rounded ones; none where that leaves it open.
+/// The sign of [`orient3d_fixed`] from rounded coordinates; `None` if rounding may have changed it.
 pub fn orient3d_rounded([a, b, c, d]: [&Point; 4]) -> Option<Sign> {
     let edges = [b, c, d].map(|p| [p.x - a.x, p.y - a.y, p.z - a.z]);
     let (volume, error) = volume6_and_error(edges);
-    // Of absolute values all terms are positive: what they grow by where each may be larger bounds what rounding changes.
+    // With absolute values all terms are positive: their increase when every difference grows by
+    // its rounding error bounds the change of the volume.
     let [u, v, w] = edges.map(|edge| edge.map(f64::abs));
     let permanent = |[u, v, w]: [[f64; 3]; 3]| {
         u[0] * (v[1] * w[2] + v[2] * w[1])
@@ -165,7 +172,7 @@ pub fn orient3d_rounded([a, b, c, d]: [&Point; 4]) -> Option<Sign> {
             + u[2] * (v[0] * w[1] + v[1] * w[0])
     };
     let size = permanent([u, v, w].map(|edge| edge.map(|x| x + 2.0 * ROUNDING)));
-    // The last term for the rounding of the two sizes themselves.
+    // The last term is for rounding in the two permanents.
     let error = 2.0 * error + (size - permanent([u, v, w])) + 32.0 * f64::EPSILON * size;
     if volume > error {
         Some(Sign::Positive)
@@ -176,7 +183,7 @@ pub fn orient3d_rounded([a, b, c, d]: [&Point; 4]) -> Option<Sign> {
     }
 }
 
-/// The first bits after the point of the share that the size of a volume has in that of some, itself among them.
+/// The first binary digits of |part| / Σ|all|, where `all` includes `part`.
 pub fn share<const N: usize>(part: Volume, all: [Volume; N], bits: usize) -> Vec<bool> {
     let size = |x: Volume| if is_negative(&x) { sub([0; 12], x) } else { x };
     let whole = all.into_iter().map(size).fold([0; 12], add);
@@ -194,7 +201,7 @@ pub fn share<const N: usize>(part: Volume, all: [Volume; N], bits: usize) -> Vec
         .collect()
 }
 
-/// The first bits after the point of a number from 0 to 1.
+/// The first binary digits of a number from 0 to 1.
 pub fn bits_of(number: f64, bits: usize) -> Vec<bool> {
     let mut rest = number;
     (0..bits)
@@ -220,7 +227,7 @@ mod tests {
     }
 
     #[test]
-    fn doubles_are_held_as_they_are() {
+    fn doubles_are_represented_exactly() {
         for x in [0.0, -0.0, 1.0, -1.0, 0.1, -1e-9, 1e-56, 1023.9] {
             let p = Point::new(x, -x, 0.3);
             assert_eq!(Fixed::of(&p).map(|f| f.rounded()), Some(p), "{x}");
@@ -244,7 +251,7 @@ mod tests {
             assert_eq!(orient2d_fixed([0, 1], [&a, &b, &on_edge]), Sign::Zero);
             let inside = a.along([b.minus(&a), c.minus(&a)], [&s, &t]).unwrap();
             assert_eq!(orient3d_fixed([&a, &b, &c, &inside]), Sign::Zero);
-            // The rounded point is beside, nearly always, and the filter knows that it does not know.
+            // The rounded point is nearly always off the plane, and the filter must be uncertain.
             assert_eq!(orient3d_rounded([&a, &b, &c, &inside].map(|p| p.rounded()).each_ref()), None);
         }
         let unit = Fixed::of(&Point::new(2f64.powi(-240), 0.0, 0.0)).unwrap();
@@ -252,7 +259,7 @@ mod tests {
     }
 
     #[test]
-    fn what_the_filter_says_is_so_whatever_the_points_were_rounded_from() {
+    fn certain_signs_of_rounded_points_are_those_of_the_exact_points() {
         let mut random = Random::new(8);
         let mut certain = 0;
         for case in 0..2000 {
@@ -261,7 +268,7 @@ mod tests {
             let places = [0; 4].map(|_| {
                 let p = Fixed::of(&(origin + random_point(&mut random).coords * (0.05 * near))).unwrap();
                 let q = Fixed::of(&random_point(&mut random)).unwrap();
-                // A little away, by less than doubles tell.
+                // Moved by less than double precision resolves.
                 p.along([q.minus(&p)], [&[false; 55]]).unwrap()
             });
             let exact = orient3d_fixed(places.each_ref());

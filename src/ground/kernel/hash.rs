@@ -5,8 +5,9 @@ use std::hash::{BuildHasherDefault, Hasher};
 /// The hasher for maps keyed by vertex numbers or positions.
 pub(crate) type WordHash = BuildHasherDefault<WordHasher>;
 
-/// Mixes a few words; much faster than the standard hash, which also resists keys chosen to
-/// collide.
+/// A hasher that mixes a few words.
+///
+/// It is much faster than the standard hasher, which also resists keys chosen to collide.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct WordHasher(u64);
 
@@ -24,6 +25,6 @@ impl Hasher for WordHasher {
     }
 
     fn write_usize(&mut self, _: usize) {
-        // Array lengths: always the same.
+        // Only lengths of arrays arrive here, which are the same for all keys.
     }
 }

@@ -1,12 +1,13 @@
-//! Orders of points that keep neighbours together: along the Hilbert curve, and in random rounds of it.
+//! Orders of points that keep neighbours together: along the Hilbert curve, at once or in random
+//! rounds.
 
 use crate::Point;
 use crate::ground::kernel::random::mix;
 
-/// Bits per coordinate of a key: three times that fits 64 bits.
+/// Bits per coordinate of a key; three coordinates fit 64 bits.
 const BITS: u32 = 21;
 
-/// Where the cell with these coordinates (each below 2^21) lies on the Hilbert curve (Skilling 2004).
+/// The position of a cell on the Hilbert curve (Skilling 2004); its coordinates are below 2²¹.
 pub fn hilbert_key(cell: [u32; 3]) -> u64 {
     let mut x = cell;
     let mut q = 1u32 << (BITS - 1);
@@ -37,7 +38,7 @@ pub fn hilbert_key(cell: [u32; 3]) -> u64 {
     (0..BITS).rev().fold(0u64, |key, bit| x.iter().fold(key, |key, v| (key << 1) | u64::from((v >> bit) & 1)))
 }
 
-/// Keys of all points, relative to the smallest cube around them.
+/// The keys of all points in a cube around them.
 fn keys(points: &[Point]) -> Vec<u64> {
     let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
     for p in points {
@@ -51,7 +52,7 @@ fn keys(points: &[Point]) -> Vec<u64> {
     points.iter().map(|p| hilbert_key([0, 1, 2].map(|k| ((p[k] - low[k]) * cells) as u32))).collect()
 }
 
-/// The indices of the points in the order in which the Hilbert curve visits them; ties by index.
+/// The indices of the points in order along the Hilbert curve; ties by index.
 pub fn hilbert_order(points: &[Point]) -> Vec<u32> {
     let keys = keys(points);
     let mut order: Vec<u32> = (0..points.len() as u32).collect();
@@ -59,14 +60,17 @@ pub fn hilbert_order(points: &[Point]) -> Vec<u32> {
     order
 }
 
-/// A biased random insertion order (Amenta, Choi, Rote 2003): rounds of doubling size, drawn at random
-/// with a fixed seed, each along the Hilbert curve. Keeps incremental Delaunay near linear for any input.
+/// A biased randomized insertion order (Amenta, Choi, Rote 2003).
+///
+/// The points are drawn with a fixed seed into rounds of doubling size, each ordered along the
+/// Hilbert curve. This keeps incremental Delaunay meshing near linear for any input.
 pub fn random_rounds(points: &[Point]) -> Vec<u32> {
-    /// Points in the first round: few enough for long walks to cost nothing.
+    /// Points in the first round: few enough that long walks cost nothing.
     const FIRST: usize = 64;
     let keys = keys(points);
     let rounds = (points.len() / FIRST).checked_ilog2().unwrap_or(0);
-    // Of random bits, the number of trailing ones is k with probability 2^-(k+1): the last round takes half.
+    // Random bits have k trailing ones with probability 2^−(k+1), so half the points are in the
+    // last round.
     let round = |i: u32| rounds - mix(u64::from(i)).trailing_ones().min(rounds);
     let mut order: Vec<u32> = (0..points.len() as u32).collect();
     order.sort_unstable_by_key(|&i| (round(i), keys[i as usize], i));

@@ -1,27 +1,31 @@
-//! Exact signs by integers of fixed width (Fortune, Van Wyk 1996), for the near ties that floating-point filters leave.
+//! Exact signs by integers of fixed width (Fortune, Van Wyk 1996), for the near ties that
+//! floating-point filters leave.
 //!
-//! The coordinates of a few points that are near each other are multiples of one power of two, and their differences are
-//! so few of these units that a determinant fits in a few machine words. Two's complement arithmetic on such words never rounds,
-//! knows no underflow, and costs the same for a tie as for a near tie: an in-sphere test near a sphere takes 0.12 µs in the narrow
-//! width and 0.2 µs in the wide one, filter included, where floating-point expansions (Shewchuk 1997) take 1.5 to
-//! 2.6 µs and more. Points for which even the wide one does not suffice have coordinates of very different size, and are
-//! left to the expansions.
+//! The coordinates of a few points that are near each other are multiples of one power of two, and
+//! their differences are small multiples, so a determinant fits a few machine words. Integer
+//! arithmetic on them neither rounds nor underflows, and a tie costs the same as a near tie: an
+//! in-sphere test near the sphere takes 0.12 to 0.2 µs, but floating-point expansions (Shewchuk
+//! 1997) take 1.5 µs or more. Points whose coordinates differ too much in magnitude for the wide
+//! width are left to the expansions.
 
 use super::predicates::Sign;
 use crate::Point;
 
-/// Differences of up to this many bits fit the **narrow** width: one word for a difference, two for a product of two, five for the
-/// in-sphere determinant, which is below 4·(3·2¹²⁴)·(3·2¹⁸⁷) < 2³¹⁹.
+/// The maximum bits of a difference in the **narrow** width.
+///
+/// A difference takes one word, a product of two takes two, and the in-sphere determinant, below
+/// 4·(3·2¹²⁴)·(3·2¹⁸⁷) < 2³¹⁹, takes five.
 const NARROW: u32 = 62;
 
-/// Coordinates of up to this many bits fit the **wide** width, twice the narrow one: their differences are below 2¹²⁶, and the in-sphere
-/// determinant below 4·(3·2²⁵²)·(3·2³⁷⁹) < 2⁶³⁹.
+/// The maximum bits of a coordinate in the **wide** width, twice the narrow one.
+///
+/// Differences are below 2¹²⁶, and the in-sphere determinant is below 4·(3·2²⁵²)·(3·2³⁷⁹) < 2⁶³⁹.
 const WIDE: u32 = 125;
 
 /// An integer in two's complement, lowest word first.
 pub(super) type Words<const N: usize> = [u64; N];
 
-/// The sign of (b−a)×(c−a)·(d−a); none where the coordinates do not fit.
+/// The sign of (b−a)×(c−a)·(d−a); `None` if the coordinates do not fit.
 pub(super) fn orient3d(a: &Point, b: &Point, c: &Point, d: &Point) -> Option<Sign> {
     let differences = differences([b, c, d], a)?;
     Some(if is_narrow(&differences) {
@@ -31,8 +35,8 @@ pub(super) fn orient3d(a: &Point, b: &Point, c: &Point, d: &Point) -> Option<Sig
     })
 }
 
-/// Positive where `e` lies inside the circumsphere of the positively oriented tet a, b, c, d; none where the coordinates do not
-/// fit.
+/// Positive if `e` is inside the circumsphere of the positively oriented tet a, b, c, d; `None` if
+/// the coordinates do not fit.
 pub(super) fn insphere(a: &Point, b: &Point, c: &Point, d: &Point, e: &Point) -> Option<Sign> {
     let differences = differences([a, b, c, d], e)?;
     Some(if is_narrow(&differences) {
@@ -42,7 +46,8 @@ pub(super) fn insphere(a: &Point, b: &Point, c: &Point, d: &Point, e: &Point) ->
     })
 }
 
-/// What separates points from an origin, in the largest unit that all coordinates are multiples of.
+/// The differences of points from an origin, in the largest power of two that divides all
+/// coordinates.
 fn differences<const N: usize>(points: [&Point; N], origin: &Point) -> Option<[[i128; 3]; N]> {
     let parts = points.map(parts);
     let origin = self::parts(origin);
@@ -50,7 +55,7 @@ fn differences<const N: usize>(points: [&Point; N], origin: &Point) -> Option<[[
     let mut fit = true;
     let mut integer = |p: Parts| {
         let shift = (p.exponent - unit) as u32;
-        // Zeros are multiples of everything.
+        // Zero is a multiple of any unit.
         if p.mantissa == 0 {
             0
         } else if shift + 64 - p.mantissa.unsigned_abs().leading_zeros() <= WIDE {
@@ -79,13 +84,13 @@ pub(super) struct Parts {
 pub(super) fn parts(point: &Point) -> [Parts; 3] {
     /// Stored bits of the mantissa of a double.
     const STORED: u32 = f64::MANTISSA_DIGITS - 1;
-    /// What no number has: it makes the unit of zeros no smaller, and that of infinities too large to fit.
+    /// Beyond all exponents: zeros must not affect the unit, and infinities must never fit.
     const LARGE: i32 = 1 << 20;
     [point.x, point.y, point.z].map(|x| {
         let bits = x.to_bits();
         let exponent = (bits >> STORED) as i32 & 0x7ff;
         let fraction = bits & ((1 << STORED) - 1);
-        // Subnormal numbers have no hidden bit, and the exponent of the least normal ones.
+        // Subnormal numbers have no hidden bit and the exponent of the smallest normal numbers.
         let mantissa = if exponent == 0 { fraction } else { fraction | 1 << STORED };
         let exponent = exponent.max(1);
         if mantissa == 0 {
@@ -99,7 +104,7 @@ pub(super) fn parts(point: &Point) -> [Parts; 3] {
 }
 
 fn is_narrow(differences: &[[i128; 3]]) -> bool {
-    // Of a negative number the complement has as many bits as matter.
+    // The width of a negative number is that of its complement.
     let bits = differences.iter().flatten().fold(0, |bits, &x| bits | x ^ (x >> 127));
     bits >> NARROW == 0
 }
@@ -108,7 +113,7 @@ fn words(x: i128) -> Words<2> {
     [x as u64, (x >> 64) as u64]
 }
 
-/// u·v×w of a difference's words D, a product's P = 2·D, a volume's T = D + P.
+/// u·v×w, with D words for a difference, P = 2·D for a product, and T = D + P for the volume.
 #[inline(always)]
 pub(super) fn volume6<const D: usize, const P: usize, const T: usize>(
     [u, v, w]: &[[Words<D>; 3]; 3],
@@ -118,8 +123,10 @@ pub(super) fn volume6<const D: usize, const P: usize, const T: usize>(
     add(add(mul::<D, P, T>(u[0], x), mul::<D, P, T>(u[1], y)), mul::<D, P, T>(u[2], z))
 }
 
-/// The determinant of the rows (difference, its square), with minors that are shared (Shewchuk 1997, section 4.4), negated for our
-/// orientation. Words as for [`volume6`], and F = P + T.
+/// The determinant with rows (difference, its square), negated for our orientation.
+///
+/// Minors are shared (Shewchuk 1997, section 4.4). The numbers of words are those of [`volume6`],
+/// and F = P + T.
 #[inline(always)]
 fn in_sphere_determinant<const D: usize, const P: usize, const T: usize, const F: usize>(
     [a, b, c, d]: &[[Words<D>; 3]; 4],
@@ -173,7 +180,7 @@ pub(super) fn sub<const N: usize>(mut a: Words<N>, b: Words<N>) -> Words<N> {
     a
 }
 
-/// Subtracts from as many of the lowest words as there are.
+/// Subtracts `b` modulo the width of `from`.
 #[inline(always)]
 fn take_away(from: &mut [u64], b: &[u64]) {
     let mut borrow = false;
@@ -192,13 +199,13 @@ pub(super) fn mul<const A: usize, const B: usize, const N: usize>(a: Words<A>, b
     for i in 0..A {
         let mut carry = 0;
         for j in 0..B {
-            // At most (2⁶⁴ − 1)² + 2·(2⁶⁴ − 1), which just fits.
+            // At most (2⁶⁴ − 1)² + 2·(2⁶⁴ − 1) = 2¹²⁸ − 1.
             let sum = u128::from(a[i]) * u128::from(b[j]) + u128::from(product[i + j]) + u128::from(carry);
             (product[i + j], carry) = (sum as u64, (sum >> 64) as u64);
         }
         product[i + B] = carry;
     }
-    // Read without sign, a negative number is 2^(64·words) too large.
+    // As an unsigned number, a negative one is too large by 2^(64·words).
     if is_negative(&a) {
         take_away(&mut product[A..], &b);
     }
@@ -230,7 +237,8 @@ mod tests {
         }
     }
 
-    /// Whether both signs, and those behind the filters, are those of the expansions, and how many the integers found.
+    /// Whether the signs, by integers and by the filtered predicates, agree with the expansions,
+    /// and how many signs the integers gave.
     fn agrees([a, b, c, d, e]: [&Point; 5]) -> (bool, usize) {
         let volume = sign_of(-robust::orient3d(coord(a), coord(b), coord(c), coord(d)));
         let ball = sign_of(-robust::insphere(coord(a), coord(b), coord(c), coord(d), coord(e)));
@@ -241,7 +249,7 @@ mod tests {
     }
 
     #[test]
-    fn coordinates_of_too_different_size_are_left_alone() {
+    fn coordinates_of_too_different_magnitude_are_refused() {
         let [o, x, y] = [[0., 0., 0.], [1., 0., 0.], [0., 1., 0.]].map(Point::from);
         for (z, fits) in
             [(2f64.powi(-124), true), (2f64.powi(-125), false), (5e-324, false), (f64::NAN, false)]
@@ -249,7 +257,7 @@ mod tests {
             let z = Point::new(0., 0., z);
             assert_eq!(orient3d(&o, &x, &y, &z).is_some(), fits, "{z}");
         }
-        // Far from 1 everything fits that is of one size.
+        // Far from 1, points of one magnitude fit.
         for size in [5e-324, 1e-300, 1e300] {
             let [x, y, z, e] = [x, y, Point::new(0., 0., 1.), Point::new(1., 1., 1.)].map(|p| p * size);
             assert_eq!(orient3d(&o, &x, &y, &z), Some(Sign::Positive));
@@ -257,8 +265,10 @@ mod tests {
         }
     }
 
-    /// Few values for each coordinate, so that many points are coplanar and cospherical; as integers, tenths, or with noise in the
-    /// last bits, from 2⁻⁴⁰ to 2⁴⁰, at the origin or off it.
+    /// Points with few values per coordinate, so that many are coplanar and cospherical.
+    ///
+    /// The values are integers, tenths, or tenths with noise in the last bits, scaled by 2⁻⁴⁰ to
+    /// 2⁴⁰, at the origin or off it.
     fn grid_points() -> impl Strategy<Value = [Point; 5]> {
         let corner = || prop::array::uniform3(-2..3i32);
         (prop::array::uniform5(corner()), -40..40i32, 0..3usize, any::<bool>(), any::<u64>()).prop_map(
@@ -277,7 +287,7 @@ mod tests {
         )
     }
 
-    /// Points of a sphere up to rounding, near to each other or not.
+    /// Points on a sphere up to rounding, near each other or not.
     fn sphere_points() -> impl Strategy<Value = [Point; 5]> {
         let corner = || prop::array::uniform3(-1.0..1.0f64);
         (prop::array::uniform5(corner()), 0..30i32, corner()).prop_map(|(points, near, shift)| {
@@ -288,7 +298,7 @@ mod tests {
         })
     }
 
-    /// Coordinates of any size between 2⁻⁷⁰ and 2³⁰, each for itself.
+    /// Coordinates of independent magnitudes from 2⁻⁷⁰ to 2³⁰.
     fn scattered_points() -> impl Strategy<Value = [Point; 5]> {
         let number = || (-1.0..1.0f64, -70..30i32).prop_map(|(x, e)| x * 2f64.powi(e));
         prop::array::uniform5((number(), number(), number()).prop_map(|(x, y, z)| Point::new(x, y, z)))
@@ -315,7 +325,7 @@ mod tests {
         fn products_are_those_of_machine_integers(a in any::<i64>(), b in any::<i64>(), c in any::<i64>()) {
             let ab = i128::from(a) * i128::from(b);
             prop_assert_eq!(mul::<1, 1, 2>([a as u64], [b as u64]), words(ab));
-            // (ab + c)·1 and −(ab + c) by way of wider words.
+            // −(ab + c) as a product of wider words.
             let sum = ab.wrapping_add(i128::from(c));
             let wide = mul::<2, 1, 3>(words(sum), [u64::MAX]);
             prop_assert_eq!([wide[0], wide[1]], words(sum.wrapping_neg()));

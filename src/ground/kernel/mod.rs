@@ -1,4 +1,4 @@
-//! Geometric kernel: exact signs, simplices, shape measures, search, orderings.
+//! Geometric kernel: exact predicates, simplices, shape measures, search, orderings.
 
 pub(crate) mod fixed;
 pub(crate) mod hash;

@@ -2,12 +2,14 @@
 
 use crate::Point;
 
-/// A triangle lower than this part of its longest side is taken as its sides: its plane is rounding.
+/// A triangle whose height is below this fraction of its longest side is treated as its sides,
+/// because its plane is dominated by rounding.
 const NEEDLE: f64 = 1e-9;
 
-/// The barycentric weights of the point of a triangle nearest to `p`; exactly 0 at corners that a side or corner is away from.
+/// The barycentric weights of the point of a triangle nearest to `p`.
 ///
-/// The regions of corners and sides by dot products as in Ericson 2005, section 5.1.5.
+/// If that point is on a side or corner, the weights of the other corners are exactly 0. The
+/// regions of corners and sides are found by dot products, as in Ericson 2005, section 5.1.5.
 #[inline]
 pub(crate) fn in_triangle(p: &Point, [a, b, c]: &[Point; 3]) -> [f64; 3] {
     let (ab, ac, ap) = (b - a, c - a, p - a);
@@ -25,7 +27,7 @@ pub(crate) fn in_triangle(p: &Point, [a, b, c]: &[Point; 3]) -> [f64; 3] {
     if d6 >= 0.0 && d5 <= d6 {
         return [0.0, 0.0, 1.0];
     }
-    // Twice the squared area times the weights of c, b and a.
+    // The weights of c, b and a, times the square of twice the area.
     let vc = d1 * d4 - d3 * d2;
     let vb = d5 * d2 - d1 * d6;
     let va = d3 * d6 - d5 * d4;
@@ -49,7 +51,7 @@ pub(crate) fn in_triangle(p: &Point, [a, b, c]: &[Point; 3]) -> [f64; 3] {
     [1.0 - v - w, v, w]
 }
 
-/// The same for the sides alone.
+/// The same for the sides only.
 #[cold]
 fn in_sides(p: &Point, corners: [&Point; 3]) -> [f64; 3] {
     let mut best = (f64::INFINITY, [0.0; 3]);
@@ -64,7 +66,7 @@ fn in_sides(p: &Point, corners: [&Point; 3]) -> [f64; 3] {
     best.1
 }
 
-/// Where on a segment, from 0 to 1, its nearest point to `p` is, and its squared distance.
+/// The parameter, from 0 to 1, of the point of a segment nearest to `p`, and the squared distance.
 #[inline]
 pub(crate) fn in_segment(p: &Point, a: &Point, b: &Point) -> (f64, f64) {
     let (along, to) = (b - a, p - a);
@@ -73,7 +75,7 @@ pub(crate) fn in_segment(p: &Point, a: &Point, b: &Point) -> (f64, f64) {
     (t, (to - along * t).norm_squared())
 }
 
-/// The point with these weights. Exactly a corner where it is one.
+/// The point with these weights; exact at corners.
 #[inline]
 pub(crate) fn at(corners: &[Point; 3], weights: [f64; 3]) -> Point {
     let [a, b, c] = corners;

@@ -3,7 +3,7 @@
 use crate::Point;
 use std::collections::HashMap;
 
-/// Points in the cells of a grid whose width is the distance below which points are equal.
+/// Points in a grid whose cells are as wide as the distance up to which points are equal.
 #[derive(Debug)]
 pub struct Places {
     distance: f64,
@@ -11,7 +11,7 @@ pub struct Places {
 }
 
 impl Places {
-    /// Stores points with their numbers; `find` uses the given `distance` (length).
+    /// Stores points with their numbers; points within `distance` (length) are equal.
     pub fn new(points: impl IntoIterator<Item = (u32, Point)>, distance: f64) -> Self {
         let mut places = Self { distance, cells: HashMap::new() };
         for (number, point) in points {
@@ -24,7 +24,7 @@ impl Places {
         [0, 1, 2].map(|axis| (point[axis] / self.distance).floor() as i64)
     }
 
-    /// The number of the nearest point within the distance, the smallest number on ties.
+    /// The number of the nearest point within the distance; the smallest number on ties.
     pub fn find(&self, at: &Point) -> Option<u32> {
         let cell = self.cell(at);
         let cells = (0..27).map(|i| [0, 1, 2].map(|axis| cell[axis] + i / [1, 3, 9][axis] % 3 - 1));

@@ -1,11 +1,13 @@
-//! Exact signs, the only place where they come from.
+//! Exact orientation and in-sphere predicates.
 //!
-//! In space: floating point with a bound of its error (Shewchuk 1997), then integers of fixed width (`integers`), and where the coordinates
-//! do not fit those, the adaptive expansions of Shewchuk. In the plane the latter alone.
+//! In space, a predicate is evaluated in floating point with an error bound (Shewchuk 1997), then
+//! in integers of fixed width (`integers`), and by Shewchuk's adaptive expansions if the
+//! coordinates do not fit these. In the plane only the expansions are used.
 //!
-//! Exact as long as products of the coordinates' differences neither overflow nor underflow in floating point: callers bring their
-//! input to a box of ordinary size first. With the box near 1, as the volume mesher has it, products of five differences
-//! underflow only where points are nearer than 10⁻⁶⁰.
+//! The signs are exact if products of coordinate differences neither overflow nor underflow in
+//! floating point, so callers scale their input to a box of ordinary size first. In a box of size
+//! near 1, as in the volume mesher, products of five differences underflow only if points are
+//! closer than 10⁻⁶⁰.
 
 use super::integers;
 use crate::Point;
@@ -23,7 +25,7 @@ pub enum Sign {
 }
 
 impl Sign {
-    /// The sign of a number that was computed exactly enough for its sign to be right.
+    /// The sign of a number whose computed sign is known to be right.
     fn of(value: f64) -> Self {
         if value > 0.0 {
             Self::Positive
@@ -34,7 +36,7 @@ impl Sign {
         }
     }
 
-    /// Positive becomes negative and the other way round.
+    /// The opposite sign.
     #[must_use]
     pub fn flipped(self) -> Self {
         match self {
@@ -48,16 +50,17 @@ impl Sign {
 /// ε = 2⁻⁵³, the relative error of one rounding.
 const HALF_ULP: f64 = f64::EPSILON / 2.0;
 
-/// The bound A of Shewchuk's `orient3d` (1997, section 4.3), relative to the sum of absolute values.
+/// The bound A of Shewchuk's `orient3d` (1997, section 4.3), relative to the sum of magnitudes.
 const ORIENT3D_ERROR: f64 = (7.0 + 56.0 * HALF_ULP) * HALF_ULP;
 
-/// The bound A of Shewchuk's `insphere` (1997, section 4.4), likewise.
+/// The bound A of Shewchuk's `insphere` (1997, section 4.4), relative to the sum of magnitudes.
 const IN_SPHERE_ERROR: f64 = (16.0 + 224.0 * HALF_ULP) * HALF_ULP;
 
-/// Six times the volume of a tet in floating point, and a bound of its error; from the edges that leave one corner.
+/// Six times the volume of a tet in floating point and its error bound, from the edges at one
+/// corner.
 ///
-/// A filter for loops over many tets: where the volume exceeds the bound its sign is certain, elsewhere
-/// [`orient3d`] settles it. The edges must be single rounded differences of coordinates.
+/// It is a filter for loops over many tets: if the volume exceeds the bound, its sign is certain,
+/// otherwise use [`orient3d`]. The edges must be differences of coordinates, each rounded once.
 #[inline(always)]
 pub fn volume6_and_error([u, v, w]: [[f64; 3]; 3]) -> (f64, f64) {
     let [a, b] = [v[1] * w[2], v[2] * w[1]];
@@ -75,11 +78,11 @@ fn coord(p: &Point) -> Coord3D<f64> {
     Coord3D { x: p.x, y: p.y, z: p.z }
 }
 
-/// The sign of (b−a)×(c−a)·(d−a): positive where the tet a, b, c, d is positively oriented.
+/// The sign of (b−a)×(c−a)·(d−a): positive if the tet a, b, c, d is positively oriented.
 #[inline]
 pub fn orient3d(a: &Point, b: &Point, c: &Point, d: &Point) -> Sign {
     let (volume, error) = volume6_and_error([b, c, d].map(|p| [p.x - a.x, p.y - a.y, p.z - a.z]));
-    // Nearly always certain: only the rest is worth a call.
+    // Nearly always certain, so only the exact sign is a call.
     if volume > error {
         Sign::Positive
     } else if volume < -error {
@@ -95,8 +98,9 @@ fn exact_orient3d(a: &Point, b: &Point, c: &Point, d: &Point) -> Sign {
         .unwrap_or_else(|| Sign::of(-robust::orient3d(coord(a), coord(b), coord(c), coord(d))))
 }
 
-/// Positive where `e` lies inside the circumsphere of the positively oriented tet a, b, c, d; negative where that is negatively
-/// oriented.
+/// Positive if `e` is inside the circumsphere of the tet a, b, c, d; negative if it is outside.
+///
+/// The signs are reversed if the tet is negatively oriented.
 #[inline]
 pub fn insphere(a: &Point, b: &Point, c: &Point, d: &Point, e: &Point) -> Sign {
     let (determinant, error) = in_sphere_and_error([a, b, c, d].map(|p| [p.x - e.x, p.y - e.y, p.z - e.z]));
@@ -109,7 +113,7 @@ pub fn insphere(a: &Point, b: &Point, c: &Point, d: &Point, e: &Point) -> Sign {
     }
 }
 
-/// The determinant of the in-sphere test in floating point, and a bound of its error, from the edges that lead to four corners.
+/// The in-sphere determinant in floating point and its error bound, from the edges to four corners.
 #[inline]
 fn in_sphere_and_error(edges: [[f64; 3]; 4]) -> (f64, f64) {
     let minor = |p: [f64; 3], q: [f64; 3]| {
@@ -141,14 +145,14 @@ fn exact_insphere(a: &Point, b: &Point, c: &Point, d: &Point, e: &Point) -> Sign
         .unwrap_or_else(|| Sign::of(-robust::insphere(coord(a), coord(b), coord(c), coord(d), coord(e))))
 }
 
-/// The sign of the area of the planar triangle a, b, c: positive counter-clockwise.
+/// The sign of the area of the planar triangle a, b, c: positive if it is counter-clockwise.
 #[inline]
 pub fn orient2d(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> Sign {
     let coord = |p: [f64; 2]| robust::Coord { x: p[0], y: p[1] };
     Sign::of(robust::orient2d(coord(a), coord(b), coord(c)))
 }
 
-/// Positive where `d` lies inside the circumcircle of the counter-clockwise triangle a, b, c.
+/// Positive if `d` is inside the circumcircle of the counter-clockwise triangle a, b, c.
 #[inline]
 #[cfg(test)]
 pub fn incircle(a: [f64; 2], b: [f64; 2], c: [f64; 2], d: [f64; 2]) -> Sign {

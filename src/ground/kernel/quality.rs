@@ -1,15 +1,15 @@
 //! Shape measures of tets: 1 for the regular tet, 0 for a flat one, negative for an inverted one.
 //!
-//! A coarse tet that is going to be refined is as good as the worst of its **children**. Cut at the
-//! midpoints of its edges it leaves four tets similar to itself and an octahedron, which one of its three
-//! **diagonals** cuts into four more. Opposite ones of those are congruent, so that a diagonal adds two
-//! shapes, and every finer level repeats the same three (Bey 2000; Freudenthal 1942). [`worst_child_squares`]
-//! knows the worst of them before anything is refined, from the six edge lengths and the volume alone.
+//! A coarse tet that will be refined is as good as the worst of its **children**. Cutting it at the
+//! midpoints of its edges gives four tets similar to itself and an octahedron, which one of its
+//! three **diagonals** cuts into four more. Opposite ones of these are congruent, so a diagonal
+//! adds two shapes, and every finer level repeats the same three (Bey 2000; Freudenthal 1942).
+//! [`worst_child_squares`] computes the worst of them before refinement, from the six edge lengths.
 
 use super::simplex::volume6;
 use crate::Point;
 
-/// The mean ratio 12·(3V)^(2/3) / Σl² with the sign of the volume (Liu, Joe 1994).
+/// The mean ratio 12·(3V)^(2/3) / Σl², with the sign of the volume (Liu, Joe 1994).
 pub fn mean_ratio(a: &Point, b: &Point, c: &Point, d: &Point) -> f64 {
     let v6 = volume6(a, b, c, d);
     let squares: f64 = squared_lengths(&[*a, *b, *c, *d]).iter().sum();
@@ -33,7 +33,9 @@ impl Diagonal {
     pub const ALL: [Self; 3] = [Self::Mid01To23, Self::Mid02To13, Self::Mid03To12];
 }
 
-/// The squared edge lengths in the order of [`TET_EDGES`](super::simplex::TET_EDGES): the opposite of edge k is edge 5−k.
+/// The squared edge lengths in the order of [`TET_EDGES`](super::simplex::TET_EDGES).
+///
+/// The edge opposite edge k is edge 5−k.
 #[inline]
 pub fn squared_lengths(p: &[Point; 4]) -> [f64; 6] {
     [
@@ -46,29 +48,32 @@ pub fn squared_lengths(p: &[Point; 4]) -> [f64; 6] {
     ]
 }
 
-/// The sum of squared edge lengths of the worst child when `diagonal` is taken, in units in which a
-/// child similar to the tet has the tet's own sum.
+/// The sum of squared edge lengths of the worst child for a diagonal.
 ///
-/// All children of one level have the same volume, so the one with the largest sum has the least mean
-/// ratio. Let S be the tet's sum and a, b the squared lengths of the two edges whose midpoints the
-/// diagonal joins. The diagonal's squared length is (S − 2a − 2b)/4. A child of the octahedron has it, half
-/// of each of the four other edges, and half of one of the two: at the worst the sum 2S − 2(a+b) − min(a,b).
+/// The unit is such that a child similar to the tet has the tet's own sum. All children of one
+/// level have the same volume, so the one with the largest sum has the smallest mean ratio. Let S
+/// be the tet's sum and a, b the squared lengths of the two edges whose midpoints the diagonal
+/// joins. The diagonal's squared length is (S − 2a − 2b)/4. A child of the octahedron has the
+/// diagonal, half of each of the four other edges, and half of one of the two. So the worst sum is
+/// 2S − 2(a+b) − min(a,b).
 #[inline]
 pub fn worst_child_squares(squares: &[f64; 6], diagonal: Diagonal) -> f64 {
     worst_child_of(squares.iter().sum(), squares, diagonal)
 }
 
-/// [`worst_child_squares`] where the sum of the squares is known.
+/// [`worst_child_squares`] with a known sum of the squares.
 #[inline(always)]
 pub fn worst_child_of(sum: f64, squares: &[f64; 6], diagonal: Diagonal) -> f64 {
     let (a, b) = (squares[diagonal as usize], squares[5 - diagonal as usize]);
     sum.max(2.0 * sum - 2.0 * (a + b) - a.min(b))
 }
 
-/// The mean ratio of the worst tet of all levels (the tet itself, and its children along the diagonal
-/// that makes the worst of them best), with the sign of the volume, and that diagonal: the first of equal ones.
+/// The mean ratio of the worst tet of all levels, with the sign of the volume, and the best
+/// diagonal.
 ///
-/// It is 6/7 for the regular tet, and 1 at most: no tet's children along one diagonal are all regular.
+/// The levels are the tet itself and its children along the diagonal whose worst child is best, the
+/// first of equal ones. The mean ratio is 6/7 for the regular tet and below 1 for all: the children
+/// along one diagonal are never all regular.
 #[cfg(test)]
 pub fn refined_quality(p: &[Point; 4]) -> (f64, Diagonal) {
     let squares = squared_lengths(p);
@@ -85,11 +90,11 @@ pub fn refined_quality(p: &[Point; 4]) -> (f64, Diagonal) {
     (quality, best.1)
 }
 
-/// The eight children of a tet cut along a diagonal: four at its corners, four round the diagonal.
+/// The eight children of a tet cut along a diagonal: four at its corners, four around the diagonal.
 #[cfg(test)]
 pub fn children(p: &[Point; 4], diagonal: Diagonal) -> [[Point; 4]; 8] {
     let mid = |i: usize, j: usize| nalgebra::center(&p[i], &p[j]);
-    // Renumbered by an even permutation so that the diagonal joins the edges 01 and 23.
+    // An even permutation after which the diagonal joins the edges 01 and 23.
     let [a, b, c, d] = match diagonal {
         Diagonal::Mid01To23 => [0, 1, 2, 3],
         Diagonal::Mid02To13 => [0, 2, 3, 1],
@@ -152,7 +157,7 @@ mod tests {
             let mut best_worst = f64::NEG_INFINITY;
             for diagonal in Diagonal::ALL {
                 let worst = children(&p, diagonal).iter().map(ratio).fold(f64::INFINITY, f64::min);
-                prop_assert!(worst > 0.0, "children stand as the parent does");
+                prop_assert!(worst > 0.0, "children are oriented like the parent");
                 best_worst = best_worst.max(worst);
                 if diagonal == best {
                     prop_assert!((worst - quality).abs() < 1e-9 * quality);

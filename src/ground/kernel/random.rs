@@ -1,4 +1,4 @@
-//! A small generator of pseudo-random numbers with a fixed sequence for each seed.
+//! A small pseudo-random number generator with a fixed sequence for each seed.
 
 /// SplitMix64 (Steele, Lea, Flood 2014): the same numbers on every machine.
 #[derive(Clone, Debug)]

@@ -3,7 +3,7 @@
 use super::nearest::in_segment;
 use crate::{Point, Vector};
 
-/// The faces of a tet, each opposite the vertex of its index, outward for a positively oriented tet.
+/// The faces of a tet: face i is opposite vertex i, outward if the tet is positively oriented.
 pub const TET_FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
 
 /// The edges of a tet, in lexicographic order.
@@ -26,7 +26,7 @@ pub(crate) fn ascending([a, b, c]: [u32; 3]) -> [u32; 3] {
     [low.min(c), high.min(c).max(low), high.max(c)]
 }
 
-/// Six times the signed volume of the tet a, b, c, d: (b−a)×(c−a)·(d−a). Not an exact sign.
+/// Six times the signed volume of the tet a, b, c, d: (b−a)×(c−a)·(d−a). Its sign is not exact.
 #[inline]
 pub fn volume6(a: &Point, b: &Point, c: &Point, d: &Point) -> f64 {
     (b - a).cross(&(c - a)).dot(&(d - a))
@@ -81,7 +81,8 @@ pub fn largest_cosine(p: &[Point; 4]) -> f64 {
     dihedral_cosines(p).into_iter().fold(-1.0, f64::max)
 }
 
-/// The corners of a triangle from the lowest on, in the same sense: its name among those that are looked for.
+/// The corners of a triangle rotated so that the smallest is first: a key that keeps the
+/// orientation.
 pub fn from_lowest<T: Ord>([a, b, c]: [T; 3]) -> [T; 3] {
     if a < b && a < c {
         [a, b, c]

@@ -1,49 +1,53 @@
-//! Circumspheres of tets, kept to be asked often: a certified filter before the exact in-sphere sign.
+//! Cached circumspheres of tets: a certified filter before the exact in-sphere predicate.
 //!
-//! A Delaunay insertion asks each tet more than once whether a point lies inside its circumsphere. Centre and radius,
-//! computed once, answer with eight operations and one load of 32 bytes, where the determinant needs the corners and a
-//! hundred operations. Rounding makes them uncertain; so two squared radii are kept between which the true one lies, for
-//! all that rounding may have done to centre, radius and question. A point between them is left to
-//! [`predicates::insphere`](crate::ground::kernel::predicates::insphere).
+//! Delaunay insertion tests each tet more than once for points inside its circumsphere. With centre
+//! and radius computed once, a test takes eight operations and one load of 32 bytes; the
+//! determinant needs the corners and a hundred operations. Two squared radii enclose the true one
+//! with all rounding errors of centre, radius and test. A point between them needs the exact sign
+//! of [`predicates::insphere`](crate::ground::kernel::predicates::insphere).
 
 use crate::{Point, Vector};
 
-/// What is known of the sphere through the corners of a tet.
+/// The sphere through the corners of a tet, with bounds of its radius.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Circumsphere {
     center: [f64; 3],
-    /// A point whose squared distance is below this lies inside; NaN where nothing was computed yet.
+    /// A point with a smaller squared distance is inside; NaN if the sphere was not computed yet.
     inner: f32,
-    /// A point whose squared distance is above this lies outside.
+    /// A point with a larger squared distance is outside.
     outer: f32,
 }
 
 /// ε = 2⁻⁵³, the relative error of one rounding.
 const HALF_ULP: f64 = f64::EPSILON / 2.0;
 
-/// How much the squared radius may be wrong, relative to it, in units of ε·L³/V: L is the longest of the three edges
-/// at the first corner, V six times the volume.
+/// The relative error bound of the squared radius in units of ε·L³/V.
 ///
-/// The centre is a + N/2V with N = u²·v×w + v²·w×u + w²·u×v = u²·v×w + u×(w²v − v²w). By the usual bounds the error of N is below 140·ε·L⁴, that of V
-/// below 50·ε·L³, and L ≤ 2R; so the error e of the centre, but for its last addition, is below κR with κ = 200·ε·L³/V, and so is
-/// that of R. A point at the distance d has a computed squared distance within 6ε of (d ± e)². All this makes less than
-/// 4κ + 6ε; the rest of the constant is for terms of second order.
+/// L is the longest of the three edges at the first corner, and V is six times the volume. The
+/// centre is a + N/2V with N = u²·v×w + v²·w×u + w²·u×v = u²·v×w + u×(w²v − v²w). By the usual
+/// bounds the error of N is below 140·ε·L⁴, that of V below 50·ε·L³, and L ≤ 2R. So the error e of
+/// the centre, without its last addition, is below κR with κ = 200·ε·L³/V, and so is that of R. The
+/// computed squared distance of a point at distance d is (d ± e)² with a relative error of 6ε. The
+/// sum is less than 4κ + 6ε; the rest of the constant is for second-order terms.
 const SHAPE_ERROR: f64 = 2000.0 * HALF_ULP;
 
-/// The same for the last addition, which rounds the centre's coordinates: in units of ε·(1 + |a|/R), for they are below |a| + R.
+/// The same for the last addition, in units of ε·(1 + |a|/R), because it rounds coordinates below
+/// |a| + R.
 const PLACE_ERROR: f64 = 16.0 * HALF_ULP;
 
-/// A sphere that is less certain than this, relative, is left to the exact sign always: the bounds above are of first order.
+/// Spheres with a larger relative error always need the exact sign, because the bounds above are of
+/// first order.
 const LARGEST_ERROR: f64 = 0.05;
 
-/// Squared radii outside this range do not fit the two bounds with room to round: such spheres are left to the exact sign.
+/// Spheres with squared radii outside this range always need the exact sign, because the two bounds
+/// are in single precision.
 const SQUARED_RADII: std::ops::Range<f64> = 1e-30..1e30;
 
-/// More than the relative error of rounding to single precision.
+/// An upper bound of the relative error of rounding to single precision.
 const SINGLE_ERROR: f64 = 2e-7;
 
 impl Circumsphere {
-    /// Nothing is known yet.
+    /// A sphere that was not computed yet.
     pub const UNKNOWN: Self = Self { center: [0.0; 3], inner: f32::NAN, outer: f32::NAN };
 
     /// The sphere through four points.
@@ -53,7 +57,7 @@ impl Circumsphere {
         let squares = [u.norm_squared(), v.norm_squared(), w.norm_squared()];
         let vw = v.cross(&w);
         let volume = u.dot(&vw);
-        // N of the bound above, its last two terms brought together.
+        // N/2V, see `SHAPE_ERROR`.
         let offset = (squares[0] * vw + u.cross(&(squares[2] * v - squares[1] * w))) * (0.5 / volume);
         let center = a + offset;
         let radius2 = offset.norm_squared();
@@ -62,7 +66,7 @@ impl Circumsphere {
         let place = PLACE_ERROR * (1.0 + (a.x.abs() + a.y.abs() + a.z.abs()) / radius2.sqrt());
         let error = shape + place;
         let center = [center.x, center.y, center.z];
-        // Written so that NaN, from flat tets, is uncertain.
+        // NaN, from flat tets, must fail this condition.
         if error < LARGEST_ERROR && SQUARED_RADII.contains(&radius2) {
             let error = error + SINGLE_ERROR;
             Self { center, inner: (radius2 * (1.0 - error)) as f32, outer: (radius2 * (1.0 + error)) as f32 }
@@ -71,13 +75,13 @@ impl Circumsphere {
         }
     }
 
-    /// Whether [`Circumsphere::of`] made it.
+    /// Whether the sphere was computed.
     #[inline]
     pub fn is_known(&self) -> bool {
         !self.inner.is_nan()
     }
 
-    /// Whether a point lies strictly inside (true) or outside (false), if that is certain.
+    /// Whether a point is strictly inside (true) or outside (false); `None` if that is uncertain.
     #[inline]
     pub fn holds(&self, point: &Point) -> Option<bool> {
         let [x, y, z] = [point.x - self.center[0], point.y - self.center[1], point.z - self.center[2]];
@@ -97,7 +101,7 @@ impl Circumsphere {
         Point::from(self.center)
     }
 
-    /// The squared radius to six digits; infinite where it is uncertain.
+    /// The squared radius to six digits; infinite if it is uncertain.
     #[inline]
     pub fn squared_radius(&self) -> f64 {
         f64::from(self.outer)
@@ -125,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn a_flat_tet_is_sure_of_nothing() {
+    fn the_sphere_of_a_flat_tet_is_always_uncertain() {
         let p = [[0., 0., 0.], [1., 0., 0.], [0., 1., 0.], [1., 1., 0.]].map(Point::from);
         let sphere = Circumsphere::of(p.each_ref());
         assert!(sphere.is_known());
@@ -134,7 +138,7 @@ mod tests {
         }
     }
 
-    /// Tets from round to nearly flat, from large to tiny and far from the origin.
+    /// Tets from well-shaped to nearly flat, large or small, near the origin or far from it.
     fn any_case() -> impl Strategy<Value = ([Point; 4], Point)> {
         let corner = || prop::array::uniform3(-1.0..1.0f64);
         (prop::array::uniform4(corner()), corner(), 0..40i32, 0..40i32, corner()).prop_map(
@@ -151,12 +155,12 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig { cases: 4096, rng_seed: RngSeed::Fixed(3), ..ProptestConfig::default() })]
         #[test]
-        fn what_is_certain_is_true((tet, point) in any_case(), nudge in -60..-20i32, in_or_out in any::<bool>()) {
+        fn certain_answers_are_exact((tet, point) in any_case(), nudge in -60..-20i32, in_or_out in any::<bool>()) {
             let [a, b, c, d] = tet.each_ref();
             let positive = orient3d(a, b, c, d);
             prop_assume!(positive != Sign::Zero);
             let sphere = Circumsphere::of([a, b, c, d]);
-            // The point as it is, and brought very near to the sphere.
+            // The point itself, and moved very close to the sphere.
             let radius = sphere.squared_radius().sqrt();
             let to = (point - sphere.center()).normalize();
             let factor = 1.0 + 2f64.powi(nudge) * if in_or_out { 1.0 } else { -1.0 };

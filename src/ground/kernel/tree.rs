@@ -1,8 +1,8 @@
 //! A tree of boxes for nearest-item queries.
 //!
-//! An own implementation because the f64 twin of parry3d is not faster (projection to a torus of
-//! 10⁴ facets: about 2 µs per point in both). Here the caller defines the distance to an item, so
-//! facets and segments use the same structure; equal distances are resolved by item number.
+//! The caller defines the distance to an item, so facets and segments use the same structure. The
+//! f64 version of parry3d is not faster (projection to a torus of 10⁴ facets: about 2 µs per point
+//! in both). Equal distances are resolved by item number.
 
 use crate::Point;
 use csg::Aabb;
@@ -23,9 +23,9 @@ pub(crate) struct Tree {
 struct Node {
     low: [f64; 3],
     high: [f64; 3],
-    /// The index of the first of two adjacent children, or of the items.
+    /// The index of the first of two adjacent children, or of the first item.
     first: u32,
-    /// The number of items; 0 for children.
+    /// The number of items; 0 if the node has children.
     count: u32,
 }
 
@@ -66,7 +66,7 @@ impl Tree {
         self.build(boxes, children + 1, from + half, to);
     }
 
-    /// The first item found that satisfies `is_it`, among all whose box contains the point.
+    /// An item whose box contains the point and that satisfies `is_it`, if any.
     pub fn find(&self, point: &Point, mut is_it: impl FnMut(u32) -> bool) -> Option<u32> {
         self.nodes.first()?;
         let mut stack = [0u32; 64];
@@ -90,10 +90,9 @@ impl Tree {
         None
     }
 
-    /// The item nearest to a point by a squared distance that is at least that to the item's box;
-    /// the first on ties.
+    /// The item nearest to a point, the first on ties; `None` if the tree is empty.
     ///
-    /// `None` if the tree is empty.
+    /// `distance` is squared, and at least that to the item's box.
     pub fn nearest(&self, point: &Point, distance: impl FnMut(u32) -> f64) -> Option<(u32, f64)> {
         self.nearest_within(point, f64::INFINITY, distance)
     }
@@ -167,7 +166,7 @@ mod tests {
     use crate::ground::kernel::random::Random;
 
     #[test]
-    fn what_is_found_is_what_trying_all_finds() {
+    fn the_tree_finds_the_same_items_as_a_search_of_all() {
         let mut random = Random::new(7);
         let mut point = || Point::from([0, 1, 2].map(|_| random.unit()));
         let boxes: Vec<Aabb> = (0..200)

@@ -1,16 +1,18 @@
 //! Loops in the widest vector registers of the machine: the only file that uses pulp.
 //!
-//! The program is built for any machine of its architecture, so the compiler may use only what all
-//! of them have (on x86-64: two numbers at a time). Here a loop is compiled several times, and the
-//! variant for the machine is chosen at run time. Rust never fuses a product and a sum, so all
+//! The program is built for any machine of its architecture, so the compiler may use only registers
+//! that all of them have (on x86-64, of two numbers). Here a loop is compiled several times, and
+//! the variant for the machine is chosen at run time. Rust never fuses a product and a sum, so all
 //! variants give the same bits.
 
 /// A loop over plain slices of numbers that profits from wide registers.
 pub trait Wide {
     /// The result.
     type Output;
-    /// Runs the loop. Must be `#[inline(always)]`, and so must everything that it calls: other
-    /// functions are compiled for the base architecture.
+    /// Runs the loop.
+    ///
+    /// This function and all that it calls must be `#[inline(always)]`, because other functions are
+    /// compiled for the base architecture.
     fn run(self) -> Self::Output;
 }
 

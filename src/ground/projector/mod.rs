@@ -1,4 +1,5 @@
-//! What the boundary of a mesh lies on: all that refinement, the check and other ranks know of a geometry.
+//! Projection to patches and curves: all that refinement, the check and other ranks know of a
+//! geometry.
 
 pub mod facets;
 
@@ -9,14 +10,14 @@ use csg::{CurveId, PatchId, ProjectionFailed};
 
 /// Projection of points to the patches and curves that they are classified on.
 ///
-/// A function of the point and the entity alone, bit for bit the same on all ranks and threads.
+/// The result depends only on the point and the entity, bit by bit, on all ranks and threads.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum Projector {
     /// The surfaces of a CSG geometry.
     Csg(csg::Projector),
-    /// Triangles that stand for the true surface.
+    /// Triangles that approximate the surface.
     Facets(FacetProjector),
-    /// The faces of a mesh that came without geometry: all that lies on them stays where it is.
+    /// The faces of a mesh without geometry: points on them are not moved.
     #[default]
     Flat,
 }
@@ -39,7 +40,7 @@ const FACETS: u8 = 1;
 const FLAT: u8 = 2;
 
 impl Projector {
-    /// How far a projected point may be from its patch or curve, a length.
+    /// The maximum distance of a projected point from its patch or curve (length).
     pub fn tolerance(&self) -> f64 {
         match self {
             Self::Csg(projector) => projector.tolerance(),
@@ -51,7 +52,7 @@ impl Projector {
     /// The point of `patch` nearest to `point`.
     ///
     /// # Errors
-    /// Where there is no nearest one, as in the centre of a sphere.
+    /// [`ProjectionFailed`] if no nearest point is found, as at the centre of a sphere.
     #[inline]
     pub fn project_patch(&self, patch: PatchId, point: &Point) -> Result<Point, ProjectionFailed> {
         match self {
@@ -64,7 +65,7 @@ impl Projector {
     /// The point of `curve` nearest to `point`, to first order.
     ///
     /// # Errors
-    /// Where there is none.
+    /// [`ProjectionFailed`] if no nearest point is found.
     #[inline]
     pub fn project_curve(&self, curve: CurveId, point: &Point) -> Result<Point, ProjectionFailed> {
         match self {
@@ -83,7 +84,7 @@ impl Projector {
         }
     }
 
-    /// Whether means of points of `patch` lie on it, so that none need be projected.
+    /// Whether means of points of `patch` lie on it, so that they need no projection.
     pub fn is_flat_patch(&self, patch: PatchId) -> bool {
         match self {
             Self::Csg(projector) => is_plane(projector.patch_surface(patch)),
@@ -92,7 +93,7 @@ impl Projector {
         }
     }
 
-    /// Whether means of points of `curve` lie on it, so that none need be projected.
+    /// Whether means of points of `curve` lie on it, so that they need no projection.
     pub fn is_straight_curve(&self, curve: CurveId) -> bool {
         match self {
             Self::Csg(projector) => projector.curve_surfaces(curve).into_iter().all(is_plane),
@@ -101,7 +102,8 @@ impl Projector {
         }
     }
 
-    /// Everything as bytes, to be sent to other ranks: one that tells the kind, then the projector's own.
+    /// Encodes the projector for other ranks: one byte for the kind, then the bytes of the
+    /// projector.
     pub fn encode(&self) -> Vec<u8> {
         let (kind, content) = match self {
             Self::Csg(projector) => (CSG, bytemuck::cast_slice(&projector.encode()).to_vec()),
@@ -111,7 +113,7 @@ impl Projector {
         [vec![kind], content].concat()
     }
 
-    /// The inverse of [`encode`](Self::encode); `None` for anything else.
+    /// The inverse of [`encode`](Self::encode); `None` if the bytes are invalid.
     pub fn decode(bytes: &[u8]) -> Option<Self> {
         match bytes.split_first()? {
             (&CSG, content) if content.len() % size_of::<f64>() == 0 => {

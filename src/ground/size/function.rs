@@ -9,8 +9,9 @@ use std::sync::Arc;
 pub struct SizeFunction(Arc<dyn Fn(Point) -> f64 + Send + Sync>);
 
 impl SizeFunction {
-    /// Wraps a function, which is called from several threads. Values that are not positive,
-    /// including NaN, impose no bound.
+    /// Wraps a function, which is called from several threads.
+    ///
+    /// Values that are not positive, including NaN, impose no bound.
     pub fn new(function: impl Fn(Point) -> f64 + Send + Sync + 'static) -> Self {
         Self(Arc::new(function))
     }

@@ -1,31 +1,32 @@
-//! The size field that a geometry and a user's settings ask for.
+//! The size field of a geometry and a user's settings.
 
 use super::{Closeness, Preset, SizeField, SizeFunction, Source, SourceTree};
 use crate::{Point, Vector};
 use csg::solid::prune_in;
 use csg::{Body, BodyId, Curve, CurveId, Cutout, Features, Geometry, Interval, Solid, SurfaceId};
 
-/// What the user asks of the size, beside what the geometry says.
+/// The user's settings of the size field.
 #[derive(Clone, Debug)]
 pub struct SizeSettings {
     /// Upper bound everywhere (length), if any.
     pub maxh: Option<f64>,
-    /// Lower bound of what curvature, short curves and grading ask for (length).
+    /// Lower bound of the sizes from curvature, short curves and grading (length).
     pub minh: f64,
     /// Elements per radius of curvature.
     pub curvature_safety: f64,
-    /// The least number of segments wanted on a curve.
+    /// The minimum number of segments of a curve.
     pub segments_per_curve: f64,
     /// Growth of the size per unit of distance.
     pub grading: f64,
-    /// How small the sizes are in thin walls.
+    /// How far sizes are lowered in thin regions.
     pub closeness: Closeness,
-    /// All sizes but the bounds `maxh` are multiplied by this; below 1 those too. How a wanted number of
-    /// tets is reached.
+    /// The factor of all sizes, used to reach a target number of tets.
+    ///
+    /// The bounds `maxh` are multiplied only by factors below 1.
     pub scale: f64,
-    /// Further sources, taken as they are.
+    /// Further sources, which `scale` does not change.
     pub sources: Vec<Source>,
-    /// A further upper bound, if any, by place.
+    /// A further upper bound by position, if any.
     pub function: Option<SizeFunction>,
 }
 
@@ -52,22 +53,26 @@ impl Default for SizeSettings {
 }
 
 impl SizeSettings {
-    /// How small the sizes are in thin walls, under [`scale`](Self::scale): where fewer tets are wanted, walls get fewer too; where
-    /// more are, the walls need no more than they have.
+    /// How far sizes are lowered in thin regions, under [`scale`](Self::scale).
+    ///
+    /// With a scale above 1, thin regions get fewer tets too; with a scale below 1, they do not
+    /// need more.
     pub fn scaled_closeness(&self) -> Closeness {
         Closeness { ratio: self.closeness.ratio * self.scale.max(1.0), ..self.closeness }
     }
 
-    /// A bound set by the user or the file under [`scale`](Self::scale).
+    /// A bound by the user or the file, under [`scale`](Self::scale).
     fn scaled_bound(&self, bound: f64) -> f64 {
         bound * self.scale.min(1.0)
     }
 }
 
-/// What a geometry asks of the size under some settings, but for their own sources: sampled once, it serves fields with any.
+/// The samples of a geometry under some settings, without the sources of the settings.
+///
+/// Fields that differ in these sources can share the samples.
 #[derive(Clone, Debug)]
 pub struct GeometricSamples {
-    /// The size where nothing asks for less.
+    /// The size if no source imposes a smaller one.
     maximum: f64,
     /// Bodies with a bound of their own.
     body_bounds: Vec<(BodyId, f64)>,
@@ -78,7 +83,7 @@ impl GeometricSamples {
     /// Samples curves and patches.
     pub fn new(geometry: &Geometry, features: &Features, settings: &SizeSettings) -> Self {
         let diagonal = features.bounds.diagonal();
-        // Where all bodies have bounds, no size above the largest is ever wanted, and none has to be graded down to it.
+        // If all bodies have bounds, the largest of these bounds all sizes.
         let of_body = |body: &Body| settings.scaled_bound(body.maxh.unwrap_or(f64::INFINITY));
         let maximum = settings
             .scaled_bound(settings.maxh.unwrap_or(f64::INFINITY))
@@ -113,12 +118,13 @@ pub struct GeometricSize<'a> {
 }
 
 impl<'a> GeometricSize<'a> {
-    /// Samples curves and patches for the sources of the field.
+    /// Samples curves and patches and builds the field.
     pub fn new(geometry: &'a Geometry, features: &Features, settings: &SizeSettings) -> Self {
         Self::of_samples(geometry, features, settings, &GeometricSamples::new(geometry, features, settings))
     }
 
-    /// The field of samples that were taken under the same settings but for their sources.
+    /// Builds the field from samples that were taken with the same settings, except for their
+    /// sources.
     pub fn of_samples(
         geometry: &'a Geometry,
         features: &Features,
@@ -144,19 +150,25 @@ impl SizeField for GeometricSize<'_> {
     }
 }
 
-/// How far the size may grow from one sample to the next, in sizes, and the distance of samples in sizes at most: the field between them is then
-/// too large by at most half of that. At a grading of 0.7 and a distance of one size, a ball lost a quarter of its volume.
+/// The maximum growth of the size from one sample to the next, relative to the size.
+///
+/// The field between samples is too large by at most half of that. Samples are at most one size
+/// apart; with that distance at a grading of 0.7, a ball would lose a quarter of its volume.
 const SAMPLE_GROWTH: f64 = 0.3;
 
-/// Distance of samples at most, as a fraction of the diagonal, where a surface's curvature varies: what
-/// lies between is not seen.
+/// The maximum distance of samples on surfaces of varying curvature, as a fraction of the diagonal.
+///
+/// Finer variations of the curvature are missed.
 const COARSEST_SAMPLE: f64 = 1.0 / 32.0;
 
-/// How far beside a surface a point is taken to tell the regions on both sides, as a fraction of the diagonal.
+/// The distance from a surface at which the regions on both sides are found, as a fraction of the
+/// diagonal.
 const SIDE_STEP: f64 = 1e-6;
 
-/// What is nearer to the apex of a cone is the apex, as a fraction of the diagonal: corners there are within rounding, samples
-/// a thousandth away and more.
+/// The distance from the apex of a cone up to which a point is treated as the apex, as a fraction
+/// of the diagonal.
+///
+/// Corners at the apex are within rounding of it; samples are at least a thousandth away.
 const APEX: f64 = 1e-6;
 
 struct Sampler<'a> {
@@ -168,41 +180,41 @@ struct Sampler<'a> {
 }
 
 impl Sampler<'_> {
-    /// Distance of neighbouring samples where the size is `size`.
+    /// The distance of neighbouring samples for a size.
     fn spacing(&self, size: f64) -> f64 {
         size * (SAMPLE_GROWTH / self.settings.grading).min(1.0)
     }
 
-    /// The size that a curvature (1/length) asks for.
+    /// The size for a curvature (1/length).
     fn size_of_curvature(&self, curvature: f64) -> f64 {
         (self.settings.scale / (self.settings.curvature_safety * curvature)).max(self.settings.minh)
     }
 
-    /// The size that a surface asks for at a point on it.
+    /// The size that a surface imposes at a point on it.
     fn size_on(&self, surface: SurfaceId, point: &Point) -> f64 {
         let bound = self.geometry.surface_info[surface.index()].maxh.unwrap_or(f64::INFINITY);
         let shape = &self.geometry.surfaces[surface.index()];
-        // An apex has no curvature; the points beside it say how small is small enough.
+        // The curvature of an apex is undefined; the points near it determine the size.
         let beside = APEX * self.features.bounds.diagonal();
         let is_apex = shape.apex().is_some_and(|apex| (point - apex).norm() <= beside);
         let curvature = if is_apex { 0.0 } else { shape.curvature(point) };
         self.settings.scaled_bound(bound).min(self.size_of_curvature(curvature))
     }
 
-    /// The size that a cutout asks for, infinity if it asks for none.
+    /// The bound of a cutout, infinity if it has none.
     fn cutout_bound(&self, cutout: Option<u32>) -> f64 {
         let bound = cutout.and_then(|i| self.geometry.cutouts[i as usize].maxh);
         bound.map_or(f64::INFINITY, |bound| self.settings.scaled_bound(bound))
     }
 
-    /// The least size that a cutout of a surface asks for, infinity if it has none.
+    /// The smallest bound of the cutouts of a surface, infinity if there is none.
     fn least_cutout_bound(&self, surface: SurfaceId) -> f64 {
         let cutouts = (0..).zip(&self.geometry.cutouts).filter(|(_, cutout)| cutout.surface == surface);
         cutouts.map(|(i, _)| self.cutout_bound(Some(i))).fold(f64::INFINITY, f64::min)
     }
 
-    /// Sources along a curve: its own curvature, its length, the bound that the file sets for it, and the surfaces of the
-    /// patches beside it.
+    /// Adds sources along a curve, from its curvature, length and bound, and from the surfaces of
+    /// the adjacent patches.
     fn sample_curve(&self, curve: &Curve, bound: f64, sources: &mut Vec<Source>) {
         let trace = &curve.trace;
         let length: f64 = trace.windows(2).map(|w| (w[1] - w[0]).norm()).sum();
@@ -226,28 +238,31 @@ impl Sampler<'_> {
         }
     }
 
-    /// Sources on the patches whose size is below the maximum: cells around the surfaces are split until
-    /// they are small against the size, and hold one source each.
+    /// Adds sources on the patches whose size is below the maximum.
+    ///
+    /// Cells around the surfaces are split until they are small relative to the size; each gives
+    /// one source.
     fn sample_patches(&self, sources: &mut Vec<Source>) {
         let mut surfaces: Vec<SurfaceId> = self.features.patches.iter().map(|p| p.surface).collect();
         surfaces.sort_unstable();
         surfaces.dedup();
         let bounds = &self.features.bounds;
-        // Room around it, so that no patch lies on the rim of the outermost cell.
+        // A margin, so that no patch is on the boundary of the root cell.
         let edge = 1.02 * (bounds.max - bounds.min).max();
         let bodies = self.geometry.bodies.iter().enumerate();
         let bodies = bodies.map(|(i, body)| (BodyId::new(i), body.solid.clone())).collect();
         let mut samples = Vec::new();
         self.sample_cell(&surfaces, bodies, bounds.center(), edge, &mut samples);
-        // Surface by surface: neighbours in the tree are neighbours on a surface.
+        // By surface, so that neighbours in the order are neighbours on a surface.
         samples.sort_by_key(|sample| sample.0);
         sources.extend(samples.into_iter().map(|sample| sample.1));
     }
 
-    /// Sources for those of the `wanted` surfaces that bound what is left of the bodies in a cell.
+    /// Adds sources for those of the `wanted` surfaces that bound the pruned bodies in a cell.
     ///
-    /// One descent for all surfaces, with bodies pruned as in the search for features: most of an infinite surface bounds nothing, and what is
-    /// at a sample is told from few surfaces, however many the bodies have.
+    /// One descent serves all surfaces. The bodies are pruned as in the search for features: most
+    /// of an infinite surface bounds nothing, and few surfaces decide which regions meet at a
+    /// sample, however many the bodies have.
     fn sample_cell(
         &self,
         wanted: &[SurfaceId],
@@ -259,7 +274,7 @@ impl Sampler<'_> {
         let mut open = wanted.to_vec();
         let cell = [0, 1, 2].map(|i| Interval { lo: center[i] - 0.5 * edge, hi: center[i] + 0.5 * edge });
         open.retain(|surface| self.geometry.surfaces[surface.index()].value_range(&cell).contains_zero());
-        // Most cells end here, before what costs more.
+        // Most cells end here, before the expensive pruning.
         if open.is_empty() {
             return;
         }
@@ -268,7 +283,7 @@ impl Sampler<'_> {
         here.sort_unstable();
         open.retain(|surface| here.binary_search(surface).is_ok());
         open.retain(|&surface| self.is_coarse(surface, &bodies, &center, edge, samples));
-        // Where a surface is singular (apex of a cone) the size there is nearly zero: no cell is worth going on.
+        // Near a singular point (apex of a cone) the size tends to zero, so the depth is limited.
         let least = 1e-3 * self.features.bounds.diagonal() * self.settings.scale.min(1.0);
         if open.is_empty() || edge < least {
             return;
@@ -280,16 +295,18 @@ impl Sampler<'_> {
         }
     }
 
-    /// What is left of bodies in a cell and around it, as far as its samples may be.
+    /// The bodies pruned in a cell, enlarged by the distance at which its samples may be.
     fn pruned(&self, bodies: Vec<(BodyId, Solid)>, center: &Point, edge: f64) -> Vec<(BodyId, Solid)> {
-        /// A sample is at most an edge from the middle; with rounding.
+        /// The distance of a sample from the centre in edges, with a margin for rounding.
         const REACH: f64 = 1.01;
         let reach = REACH * edge + 2.0 * self.side_step();
         let cell = [0, 1, 2].map(|i| Interval { lo: center[i] - reach, hi: center[i] + reach });
         prune_in(&self.geometry.surfaces, &cell, bodies)
     }
 
-    /// Whether a cell is too large for the size of a surface that may pass through it; if it is not and the surface is near, adds its source.
+    /// Whether a cell is too large for the size of a surface that may pass through it.
+    ///
+    /// If it is not and the surface is near, adds its source.
     fn is_coarse(
         &self,
         surface: SurfaceId,
@@ -319,7 +336,7 @@ impl Sampler<'_> {
         false
     }
 
-    /// How far beside a surface a point is taken to tell the regions on both sides.
+    /// The distance from a surface at which the regions on both sides are found.
     fn side_step(&self) -> f64 {
         SIDE_STEP * self.features.bounds.diagonal()
     }
@@ -328,7 +345,7 @@ impl Sampler<'_> {
         self.body_bounds.iter().map(|(_, bound)| *bound).fold(f64::INFINITY, f64::min)
     }
 
-    /// Whether the size is the same all over a surface, so that one look tells.
+    /// Whether the size from curvature is constant on a surface, so that one point is enough.
     fn constant_size(&self, surface: SurfaceId) -> bool {
         matches!(
             self.geometry.surfaces[surface.index()],
@@ -336,7 +353,7 @@ impl Sampler<'_> {
         )
     }
 
-    /// The size at a point of a surface, if a patch is there; `bodies` is what is left of them around it.
+    /// The size at a point of a surface, if a patch is there; `bodies` are those pruned around it.
     fn size_of_sample(&self, surface: SurfaceId, bodies: &[(BodyId, Solid)], point: &Point) -> Option<f64> {
         let step = self.side_step();
         let normal = self.geometry.surfaces[surface.index()].normal(point);
@@ -361,7 +378,7 @@ fn contains(geometry: &Geometry, solid: &Solid, point: &Point) -> bool {
     solid.holds(&|surface| geometry.surfaces[surface.index()].value(point) > 0.0)
 }
 
-/// Curvature at each point of a trace: that of the circle through it and its neighbours.
+/// The curvature at each point of a trace: that of the circle through it and its neighbours.
 fn trace_curvatures(trace: &[Point], closed: bool) -> Vec<f64> {
     let last = trace.len() - 1;
     let at = |i: usize| {

@@ -1,8 +1,9 @@
-//! Target edge length anywhere.
+//! Target edge length as a function of position.
 //!
-//! The wanted size is the smallest of a global bound and of **sources**: places where geometry or user
-//! ask for a size, from where it may grow by the **grading** per unit of distance. The field is therefore
-//! Lipschitz: `|size(p) − size(q)| ≤ grading·|p − q|`, except across a body's own bound.
+//! The size is the minimum of a global bound and of **sources**: points at which the geometry or
+//! the user prescribes a size, which grows from there by the **grading** per unit of distance. So
+//! the field is Lipschitz continuous, `|size(p) − size(q)| ≤ grading·|p − q|`, except across the
+//! surface of a body with a bound of its own.
 
 mod function;
 mod geometric;
@@ -24,15 +25,18 @@ pub use watched::WatchedSize;
 use crate::Point;
 use crate::ground::progress::Work;
 
-/// Gives the target edge length at any point.
+/// The target edge length at any point.
 pub trait SizeField: Sync {
-    /// The wanted edge length at `point`, positive. The volume mesher also takes infinity: let sizes grow from the surface.
+    /// The target edge length at `point`, positive.
     ///
-    /// The field may jump: the volume mesher limits its growth from the finer side. It is asked at points only, in the volume last of all in the
-    /// middle of each tet, so that a finer place is overlooked only if it is smaller than the tets around it.
+    /// For the volume mesher it may be infinite: sizes then grow from the surface. The field may
+    /// jump, because the volume mesher limits its growth from the finer side. It is sampled at
+    /// points, in the volume at last at the centre of each tet, so a finer region is missed only if
+    /// it
+    /// is smaller than the tets around it.
     fn size_at(&self, point: &Point) -> f64;
 
-    /// The work that meshing by this field belongs to: stages that take long report how far they are, and ask whether to go on.
+    /// The work through which long stages report progress and can be cancelled.
     fn work(&self) -> &Work<'_> {
         Work::unwatched()
     }

@@ -1,4 +1,4 @@
-//! Sizes that are the same at a place and at its images.
+//! Sizes that are equal at a point and at its periodic copies.
 
 use super::SizeField;
 use crate::Point;
@@ -6,8 +6,11 @@ use crate::ground::progress::Work;
 use csg::{Aabb, Features};
 use nalgebra::Isometry3;
 
-/// The least of the sizes that another field gives at a place and at its images under the motions of all identifications, their
-/// inverses and, up to three identifications, their products: so the fourth edge of a cell knows what the first wants.
+/// The minimum of a size field over a point and its periodic copies.
+///
+/// The copies are made by the motions of all identifications, their inverses and, with up to three
+/// identifications, their products. Without products, an edge of a periodic cell and the diagonally
+/// opposite one could have different sizes.
 pub struct PeriodicSize<'a> {
     inner: &'a dyn SizeField,
     motions: Vec<Isometry3<f64>>,
@@ -15,11 +18,12 @@ pub struct PeriodicSize<'a> {
     grading: f64,
 }
 
-/// With more identifications than this, places are moved by one of them at a time: the products would be too many.
+/// With more identifications, products of motions are not used because there would be too many.
 const MOST_WITH_PRODUCTS: usize = 3;
 
 impl<'a> PeriodicSize<'a> {
-    /// `inner` grows by `grading` per unit of distance outside the bodies.
+    /// Wraps `inner`, which must grow by at least `grading` per unit of distance outside the
+    /// bounds.
     pub fn new(inner: &'a dyn SizeField, features: &Features, grading: f64) -> Self {
         let steps = features.identified.iter().map(|identified| identified.motion);
         let mut motions = vec![Isometry3::identity()];
@@ -41,13 +45,13 @@ impl SizeField for PeriodicSize<'_> {
     fn size_at(&self, point: &Point) -> f64 {
         let own = self.inner.size_at(point);
         self.motions.iter().fold(own, |size, motion| {
-            let image = motion * point;
-            let nearest = image.coords.sup(&self.bounds.min.coords).inf(&self.bounds.max.coords);
-            // Far outside no field asks for less.
-            if self.grading * (image.coords - nearest).norm() >= size {
+            let copy = motion * point;
+            let nearest = copy.coords.sup(&self.bounds.min.coords).inf(&self.bounds.max.coords);
+            // Far outside the bounds, the field cannot be below `size`.
+            if self.grading * (copy.coords - nearest).norm() >= size {
                 return size;
             }
-            size.min(self.inner.size_at(&image))
+            size.min(self.inner.size_at(&copy))
         })
     }
 }

@@ -1,32 +1,32 @@
-//! The named fineness levels that NETGEN's users know, with NETGEN's numbers.
+//! NETGEN's named fineness levels, with its parameters except for curvature at the two coarsest.
 
-/// How small the sizes are where a body is thin.
+/// How far sizes are lowered in thin regions of a body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Closeness {
-    /// The size there at most, in units of the thickness; infinity leaves thin walls as they are.
+    /// The largest size there, in units of the thickness; infinity for no limit.
     pub ratio: f64,
-    /// The size is lowered by this factor at most, and less where more would be needed: so that a sheet of paper does not become a
-    /// mesh of its thickness unasked.
+    /// The size is lowered at most by this factor, so that a sheet of paper is not meshed at the
+    /// size of its thickness by default.
     pub most: f64,
 }
 
 impl Closeness {
-    /// Thin walls are not looked for.
+    /// Thin regions do not affect the sizes.
     pub const OFF: Self = Self { ratio: f64::INFINITY, most: 1.0 };
 
-    /// What a user asks for by a number: sizes of so many thicknesses, down to a 200th of what they would be; 0 for none.
+    /// Sizes of `ratio` thicknesses, lowered by a factor of 200 at most; 0 for no limit.
     pub fn of_ratio(ratio: f64) -> Self {
         if ratio > 0.0 { Self { ratio, most: 200.0 } } else { Self::OFF }
     }
 }
 
-/// A named fineness.
+/// A named fineness level.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Preset {
-    /// Curvature radius × 1, grading 0.7.
+    /// Curvature radius / 1.75, grading 0.7.
     VeryCoarse,
-    /// Curvature radius / 1.5, grading 0.5.
+    /// Curvature radius / 1.75, grading 0.5.
     Coarse,
     /// Curvature radius / 2, grading 0.3.
     #[default]
@@ -38,7 +38,7 @@ pub enum Preset {
 }
 
 impl Preset {
-    /// All, from coarse to fine, with their names.
+    /// All presets, from coarse to fine, with their names.
     pub const ALL: [(Self, &str); 5] = [
         (Self::VeryCoarse, "very-coarse"),
         (Self::Coarse, "coarse"),
@@ -49,7 +49,8 @@ impl Preset {
 
     /// Elements per radius of curvature: the size there is `1 / (safety · curvature)`.
     ///
-    /// Below 1.75 a ball loses more than 15 % of its volume. (NETGEN takes 1 and 1.5 for the first two, and loses 38 % and 16 %.)
+    /// Below 1.75 a ball loses more than 15 % of its volume: NETGEN takes 1 and 1.5 for the first
+    /// two presets, and loses 38 % and 16 %.
     pub fn curvature_safety(self) -> f64 {
         match self {
             Self::VeryCoarse | Self::Coarse => 1.75,
@@ -59,7 +60,7 @@ impl Preset {
         }
     }
 
-    /// The least number of segments wanted on a curve.
+    /// The minimum number of segments of a curve.
     pub fn segments_per_curve(self) -> f64 {
         match self {
             Self::VeryCoarse => 0.3,
@@ -70,7 +71,7 @@ impl Preset {
         }
     }
 
-    /// How small the sizes are in thin walls.
+    /// How far sizes are lowered in thin regions.
     pub fn closeness(self) -> Closeness {
         match self {
             Self::VeryCoarse => Closeness::OFF,
@@ -96,7 +97,7 @@ impl Preset {
 impl std::str::FromStr for Preset {
     type Err = String;
 
-    /// Hyphens and underscores are the same.
+    /// Parses a name; hyphens and underscores are equivalent.
     fn from_str(name: &str) -> Result<Self, String> {
         let name = name.replace('_', "-");
         Self::ALL

@@ -1,4 +1,4 @@
-//! The smallest size over many graded sources, found fast.
+//! An octree that stores the smallest size over many graded sources.
 
 use super::Source;
 use super::sources::{NO_LESS, Sources, Start};
@@ -10,8 +10,8 @@ use std::collections::HashMap;
 
 /// An octree that interpolates the field of graded sources between the corners of its cells.
 ///
-/// Cells are split until they are small against the least size in them, or until the
-/// field is nearly linear in them, which it is away from its sources.
+/// Cells are split until they are small relative to the smallest size in them, or until the field
+/// is nearly linear in them, as it is far from the sources.
 #[derive(Clone, Debug)]
 pub struct SourceTree {
     bounds: Aabb,
@@ -29,7 +29,7 @@ enum Cell {
 }
 
 impl Cell {
-    /// The same cell of a tree whose cells have all been moved on by `shift` places.
+    /// The same cell after all cells of its tree are moved by `shift` indices.
     fn shifted(&self, shift: u32) -> Cell {
         match self {
             Cell::Split(first) => Cell::Split(first + shift),
@@ -38,47 +38,55 @@ impl Cell {
     }
 }
 
-/// A cell whose edge is below this multiple of the least size in it is not split: a source in its middle is then overlooked by
-/// half a diagonal, `√3/2·grading` of that multiple of its size, at most.
+/// A cell whose edge is below this multiple of the smallest size in it is not split.
+///
+/// A source in its centre is half a diagonal away from the corners, so the relative error there is
+/// at most `√3/2·grading` times this multiple.
 const SMALL: f64 = 0.7;
 
-/// A cell whose edge is above this multiple of the least size in it is split: what the middle and the corners do not show
-/// of the field is then less than `√3·grading` of it.
+/// A cell whose edge is above this multiple of the smallest size in it is split.
+///
+/// So the field in a cell differs from its values at centre and corners by less than `√3·grading`
+/// of the smallest size.
 const LARGE: f64 = 1.0;
 
-/// That multiple is so much more where the middle and the corners do show the least size.
+/// The factor of [`LARGE`] if the smallest size is nearly attained at the centre or a corner.
 const SHOWN: f64 = 2.0;
 
-/// Above this grading the multiples are less, so that the field is as true as there: at a grading of 0.7 sizes were 40 % too large on
-/// a ball.
+/// Above this grading the multiples are lowered to keep the error: without this, sizes on a ball
+/// are 40 % too large at a grading of 0.7.
 const STEEP: f64 = 0.45;
 
-/// Between them, a cell is split if its middle tells that interpolation is wrong by more than this part, and the least size is
-/// shown if it is not below what is known by more than that.
+/// The relative tolerance of interpolation.
+///
+/// Between the two multiples, a cell is split if the error at its centre is larger. The smallest
+/// size counts as attained if it is lower than the known values by no more than this.
 const BENT: f64 = 0.04;
 
-/// The uppermost levels are built in parallel below this depth: 64 pieces.
+/// The 64 subtrees below this depth are built in parallel.
 const PARALLEL_DEPTH: u32 = 2;
 
-/// A cell as it is built.
+/// A cell during construction.
 #[derive(Clone, Copy)]
 struct Draft {
     min: Point,
     edge: f64,
     corners: [f64; 8],
-    /// The field is nowhere less in it.
+    /// A lower bound of the field in the cell.
     least: f64,
-    /// Where searches in it begin.
+    /// The start of searches in the cell.
     start: Start,
 }
 
-/// The field at corners where it is known, by the bits of their coordinates: cells share corners.
+/// The values at corners computed before, by the bits of the coordinates, because cells share
+/// corners.
 type Known = HashMap<[u64; 3], f64, WordHash>;
 
 impl SourceTree {
-    /// Builds the tree over `bounds` (outside it, the value of the nearest point of the box is graded on).
+    /// Builds the tree over `bounds`.
     ///
-    /// `grading` is the growth per unit of distance, `maximum` the size where no source asks for less.
+    /// Outside, the size grows from the nearest point of the box. `grading` is the growth per unit
+    /// of distance, `maximum` the size if no source imposes a smaller one.
     pub fn new(bounds: Aabb, grading: f64, maximum: f64, sources: &[Source]) -> Self {
         let side = (bounds.max - bounds.min).max().max(f64::MIN_POSITIVE);
         let center = bounds.center();
@@ -118,26 +126,26 @@ impl SourceTree {
     }
 }
 
-/// The cells of a draft and all below it, itself first.
+/// The cells of the subtree below a draft, its root first.
 fn grow(sources: &Sources, root: Draft) -> Vec<Cell> {
     let mut cells = vec![Cell::Split(0)];
     let mut open = vec![(0, root)];
     let mut known = Known::default();
     for _ in 0..PARALLEL_DEPTH {
-        open = open.iter().flat_map(|draft| settle(sources, &mut cells, draft, &mut known)).collect();
+        open = open.iter().flat_map(|draft| finish(sources, &mut cells, draft, &mut known)).collect();
     }
     let below = |(_, draft): &(usize, Draft)| {
         let mut cells = vec![Cell::Split(0)];
         let mut open = vec![(0, *draft)];
         let mut known = Known::default();
         while let Some(next) = open.pop() {
-            open.extend(settle(sources, &mut cells, &next, &mut known));
+            open.extend(finish(sources, &mut cells, &next, &mut known));
         }
         cells
     };
     let parts: Vec<Vec<Cell>> = open.par_iter().map(below).collect();
     for ((at, _), part) in open.iter().zip(&parts) {
-        // The first of a part takes its place, the others follow all that are there.
+        // The root of a part replaces its placeholder, the others are appended.
         let shift = cells.len() as u32 - 1;
         cells[*at] = part[0].shifted(shift);
         cells.extend(part[1..].iter().map(|cell| cell.shifted(shift)));
@@ -145,8 +153,8 @@ fn grow(sources: &Sources, root: Draft) -> Vec<Cell> {
     cells
 }
 
-/// Makes a leaf of a cell, or splits it; the places and drafts of its parts.
-fn settle(
+/// Makes a cell a leaf, or splits it and returns the indices and drafts of its children.
+fn finish(
     sources: &Sources,
     cells: &mut Vec<Cell>,
     (at, draft): &(usize, Draft),
@@ -166,12 +174,13 @@ fn settle(
     }
 }
 
-/// The eight parts of a cell in which interpolation is not good enough.
+/// The eight children of a cell, or `None` if interpolation in the cell is accurate enough.
 fn split(sources: &Sources, draft: &Draft, known: &mut Known) -> Option<[Draft; 8]> {
     let Draft { min, edge, corners, least, start } = *draft;
     let far = min + Vector::repeat(edge);
     let least_corner = corners.iter().copied().fold(f64::INFINITY, f64::min);
-    // No point is further than half a diagonal from all corners, nor than √5/4 of an edge from all of these and the middle.
+    // Each point of the cell is within half a diagonal of a corner, and within √5/4 of an edge of a
+    // corner or the centre.
     let reach = edge * sources.grading();
     let (small, large) = limits(sources.grading());
     if edge < small * least.max(least_corner - 0.5 * 3.0_f64.sqrt() * reach) {
@@ -216,7 +225,7 @@ fn limits(grading: f64) -> (f64, f64) {
     (SMALL * part, LARGE * part)
 }
 
-/// The field at the 27 corners of the parts of a cell, x fastest.
+/// The field at the 27 corners of the children of a cell, x fastest.
 fn lattice(draft: &Draft, middle: f64, field: &dyn Fn(Point) -> f64, known: &mut Known) -> [f64; 27] {
     std::array::from_fn(|i| {
         let step = [i % 3, i / 3 % 3, i / 9];
@@ -265,7 +274,7 @@ mod tests {
         let bounds = Aabb { min: Point::new(0., 0., 0.), max: Point::new(1., 1., 1.) };
         let (grading, maximum) = (0.3, 0.5);
         let tree = SourceTree::new(bounds, grading, maximum, &sources);
-        // At a source itself all corners of its cell may be half of a diagonal away.
+        // A source may be half a diagonal away from all corners of its cell.
         let most = 0.5 * 3.0_f64.sqrt() * SMALL * grading + BENT;
         let mut sum = 0.0;
         for p in scattered(3000) {

@@ -1,51 +1,52 @@
-//! Graded sources, and the least size that any of them asks for at a place.
+//! Graded sources, and the smallest size that they impose at a point.
 
 use crate::Point;
 use csg::Aabb;
 
-/// A place that asks for a size: at distance d from it the size is at most `size + grading·d`.
+/// A point with a prescribed size: at distance d from it, the size is at most `size + grading·d`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Source {
-    /// Where.
+    /// The position.
     pub point: Point,
-    /// The size wanted there, positive.
+    /// The size at this point, positive.
     pub size: f64,
 }
 
-/// A hierarchy of boxes around sources, each with the least size in it, for searches by branch and bound.
+/// A hierarchy of boxes around sources, each with its smallest size, for branch-and-bound searches.
 #[derive(Debug)]
 pub(super) struct Sources {
     grading: f64,
-    /// The size where no source asks for less.
+    /// The size if no source imposes a smaller one.
     maximum: f64,
-    /// In the order of the leaves.
+    /// The sources, in the order of the leaves.
     sources: Vec<Source>,
-    /// In pre-order: the first child of a node follows it.
+    /// The nodes in pre-order: the first child of a node follows it.
     nodes: Vec<Node>,
 }
 
 #[derive(Debug)]
 struct Node {
     bounds: Aabb,
-    /// The least size below.
+    /// The smallest size of the sources in the node.
     least: f64,
-    /// A leaf's range of sources; of other nodes that of all below.
+    /// The range of the sources in the node.
     range: [u32; 2],
     /// The second child, 0 for a leaf.
     second: u32,
-    /// The coordinate along `axis` at which its sources are parted.
+    /// The axis along which the children are split, at `cut`.
     axis: u32,
     cut: f64,
 }
 
-/// Sources of a leaf.
+/// The maximum number of sources in a leaf.
 const LEAF: usize = 6;
 
-/// What could undercut the best so far by less than this part is not looked at: from the middle of a ball all sources on it
-/// are alike.
+/// Nodes that could improve the best size by less than this fraction are skipped, because all
+/// sources on a ball are equally near to its centre.
 pub(super) const NO_LESS: f64 = 0.01;
 
-/// Nodes that a search begins at, at most: more save little, and are copied for each cell.
+/// The maximum number of nodes at which a search starts: more save little time, and they are copied
+/// for each cell.
 const START: usize = 8;
 
 impl Sources {
@@ -54,7 +55,7 @@ impl Sources {
         self.grading
     }
 
-    /// The hierarchy of the sources that ask for less than `maximum`.
+    /// Builds the hierarchy of the sources with sizes below `maximum`.
     pub fn new(grading: f64, maximum: f64, sources: &[Source]) -> Self {
         let sources = sources.iter().copied().filter(|s| s.size < maximum).collect();
         let mut made = Self { grading, maximum, sources, nodes: Vec::new() };
@@ -92,13 +93,15 @@ impl Sources {
         }
     }
 
-    /// Where searches begin that know nothing of their place.
+    /// The start of searches anywhere: the root.
     pub fn whole(&self) -> Start {
         Start { nodes: [0; START], count: usize::from(!self.nodes.is_empty()), near: None }
     }
 
-    /// Where searches in a box begin whose field is nowhere above `most`: `from` without what asks for more everywhere there, and
-    /// as far down as there is room.
+    /// The start of searches in a box, for sizes below `most`.
+    ///
+    /// These are the nodes below `from` that may impose such a size in the box, as far down the
+    /// hierarchy as [`START`] nodes allow.
     pub fn start_in(&self, min: &Point, max: &Point, most: f64, from: &Start) -> Start {
         let mut start = Start { count: 0, ..*from };
         let mut open = [0; START];
@@ -108,7 +111,7 @@ impl Sources {
             count -= 1;
             let index = open[count];
             let node = &self.nodes[index as usize];
-            if self.asks_less(node.least, &node.bounds.min, &node.bounds.max, (min, max), most).is_none() {
+            if self.imposes_less(node.least, &node.bounds.min, &node.bounds.max, (min, max), most).is_none() {
                 continue;
             }
             if node.second == 0 || start.count + count + 2 > START {
@@ -122,9 +125,11 @@ impl Sources {
         start
     }
 
-    /// What sources in the box from `low` to `high` of `size` or more may ask for in another box, as the square of the distance, if that may
-    /// be less than `most`.
-    fn asks_less(
+    /// The squared distance of two boxes, if sources in the first may impose less than `most` in
+    /// the second.
+    ///
+    /// The sources are in the box from `low` to `high`, and their sizes are at least `size`.
+    fn imposes_less(
         &self,
         size: f64,
         low: &Point,
@@ -138,19 +143,22 @@ impl Sources {
         (room > 0.0 && self.grading * self.grading * square < room * room).then_some(square)
     }
 
-    /// The least size anywhere in a box, which may be a point, or up to a hundredth more; and the index of the source that asks for it.
+    /// The smallest size in a box, which may be a point, and the index of the source that imposes
+    /// it.
+    ///
+    /// The size may be too large by [`NO_LESS`] of it.
     pub fn least_in(&self, min: &Point, max: &Point, start: &Start) -> (f64, Option<u32>) {
         let mut best = (self.maximum, None);
         let consider = |index: u32, best: &mut (f64, Option<u32>)| {
             let Source { point, size } = &self.sources[index as usize];
-            if let Some(square) = self.asks_less(*size, point, point, (min, max), best.0) {
+            if let Some(square) = self.imposes_less(*size, point, point, (min, max), best.0) {
                 *best = (size + self.grading * square.sqrt(), Some(index));
             }
         };
         if let Some(near) = start.near {
             consider(near, &mut best);
         }
-        // Never more than the depth of the hierarchy wait below each node of the start.
+        // The depth of the hierarchy limits the open nodes below each start.
         let mut open = [0_u32; START + 64];
         let mut count = start.count;
         open[..count].copy_from_slice(&start.nodes[..count]);
@@ -159,7 +167,7 @@ impl Sources {
             let index = open[count];
             let Node { range, second, axis, cut, least, bounds } = &self.nodes[index as usize];
             if self
-                .asks_less(*least, &bounds.min, &bounds.max, (min, max), (1.0 - NO_LESS) * best.0)
+                .imposes_less(*least, &bounds.min, &bounds.max, (min, max), (1.0 - NO_LESS) * best.0)
                 .is_none()
             {
                 continue;
@@ -168,7 +176,7 @@ impl Sources {
                 (range[0]..range[1]).for_each(|index| consider(index, &mut best));
                 continue;
             }
-            // The nearer child is looked into first.
+            // The nearer child is put last and so searched first.
             let axis = *axis as usize;
             let swap = 0.5 * (min[axis] + max[axis]) < *cut;
             let (first, second) = (index + 1, *second);
@@ -179,17 +187,20 @@ impl Sources {
     }
 }
 
-/// Where a search begins: nodes that may hold the source that asks for least, and one that may be it, which saves time.
+/// The start of a search: nodes that may contain the source of the smallest size, and a first guess
+/// of it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Start {
     nodes: [u32; START],
     count: usize,
-    /// Index of a source.
+    /// Index of the guessed source, if any.
     pub near: Option<u32>,
 }
 
-/// Of sources in one cell of a grid that is as wide as they are large, or half so, the smallest: facets may be far smaller than
-/// the sizes that they ask for, and both sides of a wall ask for the same.
+/// The smallest source of each cell of grids, one grid for each power of two.
+///
+/// A source is in the grid whose cell width is its size rounded down to a power of two. Facets may
+/// be much smaller than their sizes, and both sides of a thin region have the same sizes.
 pub(crate) fn thinned(sources: Vec<Source>) -> Vec<Source> {
     let keyed = |s: Source| {
         let level = s.size.log2().floor();

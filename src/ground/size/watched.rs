@@ -4,8 +4,9 @@ use super::SizeField;
 use crate::Point;
 use crate::ground::progress::Work;
 
-/// A field with the work that is done with it. All stages of meshing have the field, so all can
-/// report progress and be cancelled.
+/// A size field with the [`Work`] of its run.
+///
+/// All stages of meshing have the field, so all can report progress and be cancelled.
 pub struct WatchedSize<'a> {
     field: &'a dyn SizeField,
     work: &'a Work<'a>,

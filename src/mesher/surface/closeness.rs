@@ -4,8 +4,8 @@
 //! much longer than the region is thick, these tets are flat, so the size is lowered to a multiple
 //! of the thickness. The thickness is measured on a first triangulation, for analytic surfaces and
 //! facets alike: at sample points of each triangle a **shrinking ball** (Ma, Bae, Choi 2012),
-//! tangent to the triangle from inside the body, shrinks until no other patch is inside the ball. If
-//! the triangle and the other patch touch the ball on opposite sides, their distance is the
+//! tangent to the triangle from inside the body, shrinks until no other patch is inside the ball.
+//! If the triangle and the other patch touch the ball on opposite sides, their distance is the
 //! thickness. A ray would suffice for parallel walls; the ball also finds edges and bends that come
 //! near.
 //!

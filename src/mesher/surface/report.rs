@@ -20,7 +20,8 @@ pub struct PatchReport {
     pub mean_quality: f64,
     /// The least angle, degrees.
     pub min_angle: f64,
-    /// The largest angle between a triangle's normal and the surface's at one of its vertices, degrees.
+    /// The largest angle between the normals of triangle and surface at a triangle's vertex,
+    /// degrees.
     pub worst_normal: f64,
     /// Triangles with two edges on one smooth curve that had to be split.
     pub flattening_repaired: usize,
@@ -67,7 +68,8 @@ impl Report {
         self.patches.iter().map(|p| p.min_angle).fold(60.0, f64::min)
     }
 
-    /// The largest angle between a triangle's normal and the surface's at one of its vertices, degrees.
+    /// The largest angle between the normals of triangle and surface at a triangle's vertex,
+    /// degrees.
     pub fn worst_normal(&self) -> f64 {
         self.patches.iter().map(|p| p.worst_normal).fold(0.0, f64::max)
     }

@@ -23,7 +23,7 @@ use rayon::prelude::*;
 pub enum LevelError {
     /// The finer mesh does not have twice the subdivisions per edge.
     #[error(
-        "{fine} pieces per edge do not follow {coarse}: the finer level needs twice as many as the coarser"
+        "a level with {fine} pieces per coarse edge cannot follow one with {coarse}: it needs twice as many"
     )]
     Pieces {
         /// Subdivisions per edge of the finer mesh.

@@ -23,7 +23,7 @@ use super::faults::FaultKind;
 use super::names::{NamesByNumber, names_of};
 use super::periodic;
 use super::read::{Layout, only_layout};
-use crate::files::input::ReadError;
+use crate::files::input::{ReadError, counted};
 use crate::ground::comm::{CommError, Communicator};
 use crate::ground::error::{ErrorKind, HasKind};
 use crate::ground::mesh::{Label, Names, Rank};
@@ -106,10 +106,12 @@ pub fn load(comm: &dyn Communicator, dir: &Path) -> Result<Loaded, LoadError> {
     let [turned] = comm.all_reduce_sum_u64([turned])?;
     let mut notes = Vec::new();
     if turned > 0 {
-        notes.push(format!("{turned} tets stored in negative orientation turned round"));
+        let tets = counted(turned as usize, "tet");
+        notes.push(format!("{tets} stored in negative orientation turned round"));
     }
     if found.bare_faces > 0 {
-        notes.push(format!("{} outer faces have no boundary element, and get none", found.bare_faces));
+        let faces = counted(found.bare_faces as usize, "outer face");
+        notes.push(format!("{faces} without a boundary element, and none was added"));
     }
     let left_out = |kind: fn(u32) -> bool| -> u64 {
         let lines = own.files().flat_map(|files| &files.left_out);

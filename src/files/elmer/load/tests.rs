@@ -222,8 +222,8 @@ fn negative_tets_are_reversed_and_missing_boundaries_noted() {
         assert_eq!(
             loaded[0].notes,
             [
-                "1 tets stored in negative orientation turned round",
-                "1 outer faces have no boundary element, and get none"
+                "1 tet stored in negative orientation turned round",
+                "1 outer face without a boundary element, and none was added"
             ]
         );
     }

@@ -26,7 +26,7 @@ pub struct PeriodicMap {
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum MapError {
     /// A vertex has no periodic copy.
-    #[error("vertex {vertex} at ({}, {}, {}) of a periodic face has no image on patch {}", .place.x, .place.y, .place.z, .patch.0)]
+    #[error("vertex {vertex} at ({}, {}, {}) of a periodic face has no partner on patch {}", .place.x, .place.y, .place.z, .patch.0)]
     Vertex {
         /// The vertex.
         vertex: u32,
@@ -36,7 +36,7 @@ pub enum MapError {
         patch: PatchId,
     },
     /// A triangle has no periodic copy.
-    #[error("a triangle of patch {} at ({}, {}, {}) is not the image of a triangle, or one has none", .patch.0, .place.x, .place.y, .place.z)]
+    #[error("the triangles of patch {} near ({}, {}, {}) do not match those of its partner", .patch.0, .place.x, .place.y, .place.z)]
     Triangle {
         /// The patch of the copy.
         patch: PatchId,

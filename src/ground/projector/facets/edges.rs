@@ -1,25 +1,25 @@
-//! The edges of a triangulated surface, with any number of triangles at each.
+//! The edges of a triangulated surface, each with any number of triangles.
 
-/// An edge of a triangle.
+/// The use of an edge by a triangle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Use {
-    /// The ends, the lower first.
+    /// The ends, the lower number first.
     pub ends: [u32; 2],
     /// The triangle.
     pub triangle: u32,
-    /// Which of its sides: that opposite this corner.
+    /// The side of the triangle: the corner opposite the edge.
     pub side: u8,
-    /// Whether the triangle runs from the lower to the higher end.
+    /// Whether the triangle's orientation goes from the lower to the higher end.
     pub along: bool,
 }
 
-/// All edges: the uses of one are neighbours, ordered by triangle.
+/// All edges; the uses of each are consecutive, ordered by triangle.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Edges {
     pub uses: Vec<Use>,
-    /// Where the uses of each edge begin, and the end of the last.
+    /// The index of the first use of each edge, and the number of all uses.
     pub starts: Vec<u32>,
-    /// By triangle and side, the edge.
+    /// The edge by triangle and side.
     pub of_side: Vec<[u32; 3]>,
 }
 
@@ -63,7 +63,7 @@ impl Edges {
     }
 }
 
-/// Sets that grow together, numbered by their least member.
+/// Disjoint sets (union-find), represented by their smallest member.
 #[derive(Clone, Debug)]
 pub(crate) struct Sets(Vec<u32>);
 

@@ -9,13 +9,13 @@ use crate::{Point, Vector};
 use csg::{CurveId, PatchId};
 use edges::Edges;
 
-/// Patches and curves as facets and polylines, and projection to them: all that refinement needs to know.
+/// Patches as facets and curves as polylines, with projection to them.
 ///
-/// Projection is a function of the point and the entity alone, bit for bit the same on all ranks and threads.
+/// The result depends only on the point and the entity, bit by bit, on all ranks and threads.
 ///
-/// **A patch goes on beyond its rim**, in the tangent plane there. The chord of a curve that bends into its
-/// patch lies beside the patch; the points of a fine mesh behind that chord would else all fall on the rim, on top of
-/// those of the curve.
+/// **A patch is extended beyond its rim** by the tangent planes there. The chord of a curve that
+/// bends into its patch is outside the patch. Without the extension, all fine vertices between
+/// chord and curve would be projected onto the rim and coincide with vertices of the curve.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FacetProjector {
     source: Source,
@@ -24,17 +24,17 @@ pub struct FacetProjector {
     tolerance: f64,
 }
 
-/// What a projector is made from: what travels between ranks.
+/// The data of a projector, which is also what ranks exchange.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Source {
     pub points: Vec<Point>,
     pub triangles: Vec<[u32; 3]>,
-    /// By triangle.
+    /// The patch of each triangle.
     pub patch_of: Vec<u32>,
     pub patches: u32,
-    /// By curve: its vertices; a closed one ends where it begins.
+    /// The vertices of each curve; a closed curve ends with its first vertex.
     pub curves: Vec<Vec<u32>>,
-    /// Corners on no curve, ascending.
+    /// Corners on no curve, in ascending order.
     pub tips: Vec<u32>,
 }
 
@@ -45,9 +45,10 @@ struct PatchFacets {
     facets: Vec<[Point; 3]>,
     /// Unit normals of the patch at the corners of its facets.
     normals: Vec<[Vector; 3]>,
-    /// Bit k: the side opposite corner k is on the rim of the patch; bit 3 + k: corner k is.
+    /// Bit k: the side opposite corner k is on the rim of the patch; bit 3 + k: corner k is on the
+    /// rim.
     rim: Vec<u8>,
-    /// The normal of the plane that all facets lie in, up to the tolerance.
+    /// The normal of the common plane of all facets up to the tolerance, if there is one.
     flat: Option<Vector>,
 }
 
@@ -59,16 +60,17 @@ struct Polyline {
     straight: bool,
 }
 
-/// A foot on a patch.
+/// The foot of a projection to a patch.
 pub(crate) struct Foot {
-    /// The projection.
+    /// The projected point.
     pub point: Point,
     /// The unit normal of the patch there.
     pub normal: Vector,
 }
 
-/// As for analytic surfaces: a point is on one within this part of the diagonal of the box of the facets, or within
-/// [`COORDINATE_ROUNDING`] of its largest coordinate, whichever is larger.
+/// The tolerance as a fraction of the diagonal of the facets' box, as for analytic surfaces.
+///
+/// The tolerance is at least [`COORDINATE_ROUNDING`] times the largest coordinate.
 const ON_SURFACE: f64 = 1e-12;
 /// Four units in the last place.
 const COORDINATE_ROUNDING: f64 = 4.0 * f64::EPSILON;
@@ -97,7 +99,7 @@ impl FacetProjector {
         Self { source, patches, curves, tolerance }
     }
 
-    /// How far a projected point may be from facets and polylines by rounding, a length.
+    /// The maximum distance of a projected point from facets and polylines by rounding (length).
     pub fn tolerance(&self) -> f64 {
         self.tolerance
     }
@@ -112,7 +114,7 @@ impl FacetProjector {
         self.curves.len()
     }
 
-    /// The point of the facets of `patch` nearest to `point`; beside the patch, of the plane in which it goes on.
+    /// The point of `patch`, extended by tangent planes at its rim, nearest to `point`.
     pub fn project_patch(&self, patch: PatchId, point: &Point) -> Point {
         self.foot(patch, point).point
     }
@@ -128,12 +130,12 @@ impl FacetProjector {
         }
     }
 
-    /// The distance of `point` from where `patch` is or goes on.
+    /// The distance of `point` from `patch`, extended by tangent planes at its rim.
     pub fn patch_distance(&self, patch: PatchId, point: &Point) -> f64 {
         (self.project_patch(patch, point) - point).norm()
     }
 
-    /// The distance of `point` from the facets of `patch` themselves.
+    /// The distance of `point` from the facets of `patch`, without extension.
     pub fn facet_distance(&self, patch: PatchId, point: &Point) -> f64 {
         let patch = &self.patches[patch.index()];
         let (nearest, weights) = patch.nearest(point);
@@ -145,7 +147,8 @@ impl FacetProjector {
         (self.project_curve(curve, point) - point).norm()
     }
 
-    /// Whether all facets of a patch are in one plane up to [`tolerance`](Self::tolerance): nothing need be projected then.
+    /// Whether all facets of a patch are in one plane up to [`tolerance`](Self::tolerance), so that
+    /// points need no projection.
     pub fn is_flat_patch(&self, patch: PatchId) -> bool {
         self.flat_normal(patch).is_some()
     }
@@ -155,12 +158,14 @@ impl FacetProjector {
         self.curves[curve.index()].straight
     }
 
-    /// The unit normal of a patch near a point: that of the facets, smoothed over them; outward from its `inside`.
+    /// The unit normal of a patch near a point, interpolated over the facets, outward from its
+    /// `inside`.
     pub fn normal(&self, patch: PatchId, near: &Point) -> Vector {
         self.foot(patch, near).normal
     }
 
-    /// The unit tangent of a curve near a point: its segment's, at a vertex the mean of two.
+    /// The unit tangent of a curve near a point: that of the segment, or the mean of two at a
+    /// vertex.
     pub fn tangent(&self, curve: CurveId, near: &Point) -> Option<Vector> {
         let curve = &self.curves[curve.index()];
         let (segment, t) = curve.nearest(near);
@@ -181,7 +186,8 @@ impl FacetProjector {
         }
     }
 
-    /// Whether a point is a corner on no curve, such as the tip of a cone, where patches have no normal.
+    /// Whether a point is a corner on no curve, such as the apex of a cone, at which patches have
+    /// no normal.
     pub fn is_tip(&self, point: &Point) -> bool {
         self.source.tips.iter().any(|&v| self.source.points[v as usize] == *point)
     }
@@ -200,7 +206,8 @@ impl FacetProjector {
         self.patches[patch.index()].foot(point, self.tolerance)
     }
 
-    /// Everything as bytes, to be sent to other ranks: counts, then coordinates, then indices, all little-endian.
+    /// Encodes the projector for other ranks: counts, then coordinates, then indices, all
+    /// little-endian.
     pub fn encode(&self) -> Vec<u8> {
         let s = &self.source;
         let counts = [s.points.len(), s.triangles.len(), s.patches as usize, s.curves.len(), s.tips.len()];
@@ -216,7 +223,7 @@ impl FacetProjector {
         out
     }
 
-    /// The inverse of [`encode`](Self::encode); `None` for anything else.
+    /// The inverse of [`encode`](Self::encode); `None` if the bytes are invalid.
     pub fn decode(bytes: &[u8]) -> Option<Self> {
         let mut reader = Reader(bytes);
         let mut counts = [0; 5];
@@ -247,7 +254,7 @@ impl FacetProjector {
     }
 }
 
-/// Takes bytes off the front of a slice.
+/// Reads bytes from the front of a slice.
 struct Reader<'a>(&'a [u8]);
 
 impl Reader<'_> {
@@ -277,7 +284,7 @@ impl PatchFacets {
         for (i, &t) in members.iter().enumerate() {
             for side in 0..3 {
                 let uses = edges.uses(edges.of_side[t as usize][side] as usize);
-                // A curve with the patch on both sides is no end of it.
+                // A curve with the patch on both sides is not on the rim.
                 if uses.iter().filter(|u| Some(source.patch_of[u.triangle as usize]) == own).count() == 1 {
                     rim[i] |= 1 << side;
                     on_rim.extend(uses[0].ends);
@@ -326,7 +333,7 @@ impl PatchFacets {
                 return Foot { point: foot, normal };
             }
             if let (None, Some(k)) = (corner, side) {
-                // Orthogonal to the rim, so that the next step finds the same foot.
+                // Orthogonal to the rim, so that the next iteration finds the same foot.
                 let along = facet[(k + 2) % 3] - facet[(k + 1) % 3];
                 let across = normal - along * (normal.dot(&along) / along.norm_squared());
                 normal = across.try_normalize(0.0).unwrap_or(normal);
@@ -341,8 +348,10 @@ impl PatchFacets {
     }
 }
 
-/// Steps to a point beyond the rim at most. Beside a side of it there are two; beside a corner each shortens the distance by the
-/// angle between the normals there.
+/// The maximum number of iterations for a point beyond the rim.
+///
+/// Two are enough beyond a side; beyond a corner, each reduces the distance by the angle between
+/// the normals there.
 const MOST_STEPS: usize = 30;
 
 /// The normal of the largest facet if all corners lie in its plane, up to `tolerance`.
@@ -369,7 +378,7 @@ impl Polyline {
         Self { tree: Tree::new(&boxes), points, straight }
     }
 
-    /// The nearest segment, and where on it from 0 to 1.
+    /// The nearest segment, and the parameter of the nearest point on it, from 0 to 1.
     fn nearest(&self, point: &Point) -> (usize, f64) {
         let on = |i: u32| in_segment(point, &self.points[i as usize], &self.points[i as usize + 1]);
         let (segment, _) = self.tree.nearest(point, |i| on(i).1).expect("a curve has segments");

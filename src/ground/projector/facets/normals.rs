@@ -1,24 +1,25 @@
-//! Directions of facets that can be trusted.
+//! Reliable normals of facets.
 //!
-//! Files of single precision, or with seven digits, move each vertex by a **rounding** that a needle or a cap of the same
-//! height does not survive: its normal may be anything. Such facets are **slivers**; they take the normal of the facet across their
-//! longest side, in whose plane they lie up to the rounding.
+//! Files in single precision or with seven digits move each vertex by a **rounding**. A needle or
+//! cap of about this height is a **sliver**: its normal is arbitrary. It takes the normal of the
+//! facet across its longest side, because it is in the plane of that facet up to the rounding.
 
 use super::edges::Edges;
 use crate::ground::kernel::simplex::area_vector;
 use crate::{Point, Vector};
 
-/// A facet lower than this many roundings is a sliver: the normal of any other is right within about 2°.
+/// A facet whose height is at most this many roundings is a sliver; the normals of others are
+/// accurate to about 2°.
 pub(crate) const SLIVER_HEIGHT: f64 = 50.0;
 
 /// Relative rounding of coordinates in single precision.
 const SINGLE: f64 = 6e-8;
 /// Relative rounding of coordinates with seven digits.
 const SEVEN_DIGITS: f64 = 5e-7;
-/// Relative rounding of others.
+/// Relative rounding of other coordinates.
 const DOUBLE: f64 = 1e-15;
 
-/// How far a vertex may be from where it was meant to be, a length: judged from the digits that the coordinates have.
+/// The rounding of the vertices (length), estimated from the digits of the coordinates.
 pub(crate) fn rounding(points: &[Point]) -> f64 {
     let largest = points.iter().map(|p| p.coords.amax()).fold(0.0, f64::max);
     let all = |holds: &dyn Fn(f64) -> bool| points.iter().all(|p| p.iter().all(|&x| holds(x)));
@@ -32,7 +33,8 @@ pub(crate) fn rounding(points: &[Point]) -> f64 {
     relative * largest
 }
 
-/// The unit normals of all facets, those of slivers borrowed; and which are slivers.
+/// The unit normals of all facets, those of slivers from other facets, and whether each is a
+/// sliver.
 pub(crate) fn trusted(
     points: &[Point],
     triangles: &[[u32; 3]],
@@ -54,7 +56,7 @@ pub(crate) fn trusted(
     let normals = (0..triangles.len())
         .map(|t| {
             let (mut at, mut sign) = (t, 1.0);
-            // Chains of slivers end soon; one that goes round ends where it began.
+            // Chains of slivers are short, but they can be cyclic.
             for _ in 0..LONGEST_CHAIN {
                 if !sliver[at] {
                     return sign * own(at);
@@ -74,11 +76,14 @@ pub(crate) fn trusted(
     (normals, sliver)
 }
 
-/// Slivers in a row that are followed to the facet whose normal they take.
+/// The maximum number of slivers between a sliver and the facet whose normal it takes.
 const LONGEST_CHAIN: usize = 64;
 
-/// For each corner of each facet of one patch, the unit normal of the patch there: the mean over the patch's facets at the
-/// vertex, by their angles (Thürmer, Wüthrich 1998), slivers left out where there are others. At `tips` (ascending), each facet's own.
+/// The unit normals of a patch at the corners of its facets.
+///
+/// The normal at a vertex is the mean over the patch's facets there, weighted by their angles
+/// (Thürmer, Wüthrich 1998), without slivers unless all are slivers. At `tips` (in ascending
+/// order), each facet has its own normal.
 pub(crate) fn of_corners(
     points: &[Point],
     facets: &[[u32; 3]],

@@ -72,7 +72,8 @@ pub(super) fn icosahedron(shift: f64) -> Start {
             corners.push(turned * (Vector::from(v) / (1.0 + g * g).sqrt()));
         }
     }
-    // Faces are the triples at mutual edge distance 2/√(1+g²), outward by the sign of their determinant.
+    // Faces are the triples at mutual edge distance 2/√(1+g²), oriented outward by the sign of
+    // their determinant.
     let edge = 4.0 / (1.0 + g * g);
     let close = |a: usize, b: usize| (corners[a] - corners[b]).norm_squared() < 1.2 * edge;
     let mut triangles = Vec::new();
