@@ -104,7 +104,7 @@ fn main() {
     let number = |k: usize, other: usize| args.get(k).copied().unwrap_or(other);
     let (cells, pieces, ranks) = (number(0, 20), number(1, 6) as u32, number(2, 16) as u32);
     let mesh = cube(cells);
-    let settings = partition::Settings { method: partition::Method::Coordinates, ..Default::default() };
+    let settings = partition::Settings { method: partition::Method::Bisection, ..Default::default() };
     let (part, _) = partition::partition(&mesh, ranks, &settings).expect("a partition");
     let parts = thread::run(ranks, |comm| {
         let given = (comm.rank() == 0).then(|| (mesh.clone(), part.clone()));
@@ -161,7 +161,7 @@ fn main() {
     let (start, wall) = (cpu_seconds(), std::time::Instant::now());
     let settled = thread::run(ranks, |comm| {
         let mesh = parts[comm.rank() as usize].lock().unwrap().take().expect("a part");
-        let settled = distribution::settle(comm, mesh).expect("a mesh");
+        let settled = distribution::number_shared(comm, mesh).expect("a mesh");
         settled.edges.len() as u64
     });
     let edges: u64 = settled.expect("no rank fails").iter().sum();

@@ -17,7 +17,7 @@ use std::time::Instant;
 use tetmill::check;
 use tetmill::comm::Rank;
 use tetmill::comm::{CommError, Communicator, thread};
-use tetmill::internals::refine::{Census, census};
+use tetmill::internals::refine::{PredictedCounts, predicted_counts};
 use tetmill::internals::{Budget, Model, distribution, mesh_to_target, partition, refine};
 use tetmill::mesh::{DistMesh, Mesh};
 use tetmill::progress::Work;
@@ -138,7 +138,7 @@ fn main() {
             "| ranks | tets of a rank, mean and most | GB of coordinates, most | GB of those on boundaries and interfaces | shared %, mean and most | owned share, most over mean | neighbours, mean and most |"
         );
         println!("|---|---|---|---|---|---|---|");
-        counted.iter().for_each(|(ranks, parts)| census_row(*ranks, parts, n));
+        counted.iter().for_each(|(ranks, parts)| predicted_row(*ranks, parts, n));
     }
 }
 
@@ -217,12 +217,12 @@ fn row(model: &Model, mesh: &Mesh, ranks: u32, n: u32) -> Vec<DistMesh> {
 }
 
 /// Size estimate of the parts with `n` subdivisions an edge, without refining them.
-fn census_row(ranks: u32, parts: &[DistMesh], n: u32) {
-    let all: Vec<Census> = parts.iter().map(|part| census(part, n)).collect();
-    let mean = |of: &dyn Fn(&Census) -> f64| all.iter().map(of).sum::<f64>() / all.len() as f64;
-    let most = |of: &dyn Fn(&Census) -> f64| all.iter().map(of).fold(0.0, f64::max);
-    let shared = |c: &Census| 100.0 * c.shared as f64 / c.held as f64;
-    let neighbours = |c: &Census| c.neighbours.len() as f64;
+fn predicted_row(ranks: u32, parts: &[DistMesh], n: u32) {
+    let all: Vec<PredictedCounts> = parts.iter().map(|part| predicted_counts(part, n)).collect();
+    let mean = |of: &dyn Fn(&PredictedCounts) -> f64| all.iter().map(of).sum::<f64>() / all.len() as f64;
+    let most = |of: &dyn Fn(&PredictedCounts) -> f64| all.iter().map(of).fold(0.0, f64::max);
+    let shared = |c: &PredictedCounts| 100.0 * c.shared as f64 / c.held as f64;
+    let neighbours = |c: &PredictedCounts| c.neighbours.len() as f64;
     println!(
         "| {ranks} | {:.3e} {:.3e} | {:.2} | {:.3} | {:.2} {:.2} | {:.3} | {:.1} {:.0} |",
         mean(&|c| c.tets as f64),
@@ -231,7 +231,7 @@ fn census_row(ranks: u32, parts: &[DistMesh], n: u32) {
         most(&|c| c.bytes[1] as f64) / 1e9,
         mean(&shared),
         most(&shared),
-        most(&Census::owned_share) / mean(&Census::owned_share),
+        most(&PredictedCounts::owned_share) / mean(&PredictedCounts::owned_share),
         mean(&neighbours),
         most(&neighbours),
     );

@@ -210,8 +210,8 @@ impl Report {
 }
 
 /// Writes the line about thin regions.
-fn write_thin_walls(f: &mut fmt::Formatter<'_>, coarse: &CoarseReport) -> fmt::Result {
-    let walls = &coarse.thin_walls;
+fn write_thin_regions(f: &mut fmt::Formatter<'_>, coarse: &CoarseReport) -> fmt::Result {
+    let walls = &coarse.thin_regions;
     let Some(thinnest) = walls.thinnest else { return Ok(()) };
     write!(f, "           walls as thin as {thinnest:.3e}: ")?;
     match walls.limited {
@@ -287,11 +287,11 @@ impl fmt::Display for Report {
                 coarse.illegal_left
             )?;
         }
-        if coarse.bent_edges > 0 {
-            let edges = counted(coarse.bent_edges, "edge", "edges");
+        if coarse.curved_edges > 0 {
+            let edges = counted(coarse.curved_edges, "edge", "edges");
             writeln!(f, "           {edges} curved for better refined tets")?;
         }
-        write_thin_walls(f, coarse)?;
+        write_thin_regions(f, coarse)?;
         let mesh = &self.mesh;
         writeln!(
             f,

@@ -70,7 +70,7 @@ mod trace;
 
 pub use check::Inconsistency;
 pub use error::{FeatureError, Named, Place};
-pub use periodic::{CurveCopy, Identified, Origin, Origins};
+pub use periodic::{CurveCopy, Master, Masters, PeriodicMatch};
 pub(crate) use seam::find_seams;
 pub use singular::Singular;
 use trace::curve_curvature;
@@ -149,7 +149,7 @@ pub struct Features {
     /// The bounding box of the bodies.
     pub bounds: Aabb,
     /// Matched periodic entities, one item per identification of the geometry.
-    pub identified: Vec<Identified>,
+    pub identified: Vec<PeriodicMatch>,
 }
 
 impl Curve {

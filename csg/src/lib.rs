@@ -20,8 +20,8 @@ pub mod solid;
 mod surface;
 
 pub use features::{
-    Corner, Curve, CurveCopy, FeatureError, Features, Fin, Identified, Inconsistency, Origin, Origins, Patch,
-    Singular,
+    Corner, Curve, CurveCopy, FeatureError, Features, Fin, Inconsistency, Master, Masters, Patch,
+    PeriodicMatch, Singular,
 };
 pub use geometry::{
     Aabb, Body, BodyId, BoundaryLabel, BoundaryOverride, CornerId, CurveId, Cutout, Geometry, Identification,

@@ -5,7 +5,7 @@ use crate::primitive::{
     Cone, Cylinder, Ellipse, Ellipsoid, EllipticCone, EllipticCylinder, Nappe, Plane, Revolved, Section,
     Sphere, Sweep, Torus,
 };
-use crate::{CurveId, Features, Geometry, Origin, PatchId, Point, Surface, SurfaceId, Vector};
+use crate::{CurveId, Features, Geometry, Master, PatchId, Point, Surface, SurfaceId, Vector};
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 
 /// A projection to a surface or a curve that did not converge.
@@ -41,8 +41,8 @@ struct PeriodicCopy {
 }
 
 impl PeriodicCopy {
-    fn all(masters: &[Option<Origin>]) -> Vec<Self> {
-        let copy = |(id, master): (u32, &Option<Origin>)| {
+    fn all(masters: &[Option<Master>]) -> Vec<Self> {
+        let copy = |(id, master): (u32, &Option<Master>)| {
             master.map(|master| Self { ids: [id, master.index as u32], motion: master.motion })
         };
         (0..).zip(masters).filter_map(copy).collect()
@@ -81,7 +81,7 @@ impl Projector {
         let largest = bounds.min.coords.amax().max(bounds.max.coords.amax());
         let rounding = f64::max(ON_SURFACE * bounds.diagonal(), COORDINATE_ROUNDING * largest);
         let gap = GAP_ROOM * widest_gap(geometry, features);
-        let masters = features.origins();
+        let masters = features.masters();
         Self {
             curve_copies: PeriodicCopy::all(&masters.curves),
             patch_copies: PeriodicCopy::all(&masters.patches),

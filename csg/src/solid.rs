@@ -62,12 +62,12 @@ impl Solid {
 
     /// Whether the solid contains a point for which `positive` returns the sign of each surface's
     /// function.
-    pub fn holds(&self, positive: &dyn Fn(SurfaceId) -> bool) -> bool {
+    pub fn contains(&self, positive: &dyn Fn(SurfaceId) -> bool) -> bool {
         match self {
             Self::Half { surface, positive: side } => positive(*surface) == *side,
-            Self::And(members) => members.iter().all(|m| m.holds(positive)),
-            Self::Or(members) => members.iter().any(|m| m.holds(positive)),
-            Self::Not(solid) => !solid.holds(positive),
+            Self::And(members) => members.iter().all(|m| m.contains(positive)),
+            Self::Or(members) => members.iter().any(|m| m.contains(positive)),
+            Self::Not(solid) => !solid.contains(positive),
         }
     }
 

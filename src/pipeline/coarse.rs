@@ -10,12 +10,12 @@ use crate::ground::size::{GeometricSamples, GeometricSize, SizeField, SizeSettin
 use crate::ground::size::{PeriodicSize, WatchedSize};
 use crate::mesher::improve::{self, Effort, GeometrySmoothness, Smoothness};
 use crate::mesher::model::CsgModel;
-use crate::mesher::surface::closeness::{ThinWalls, Walls, thin_walls};
+use crate::mesher::surface::closeness::{ThinRegions, Walls, thin_regions};
 use crate::mesher::surface::curves::{CurveError, crowded, mesh_curves};
 use crate::mesher::surface::narrow::narrow;
 use crate::mesher::surface::{self, SurfaceError, SurfaceMesh};
 use crate::mesher::volume::{self, ClosedSurface, SurfaceFaults, VolumeError};
-use crate::parallel::refine::Bends;
+use crate::parallel::refine::EdgeDisplacements;
 use csg::features::{Named, Place};
 use csg::{BodyId, PatchId};
 
@@ -139,9 +139,9 @@ pub struct CoarseReport {
     /// refined tets would have been inverted.
     pub size_corrections: u64,
     /// Number of edges that refinement curves to avoid inverted or poor tets.
-    pub bent_edges: u64,
+    pub curved_edges: u64,
     /// Thin regions in which the sizes were lowered.
-    pub thin_walls: ThinWalls,
+    pub thin_regions: ThinRegions,
 }
 
 /// How a coarse mesh is made.
@@ -174,7 +174,7 @@ pub struct CoarseMesh {
     /// The mesh.
     pub mesh: Mesh,
     /// Edge displacements for refinement, by the edge ids that distribution assigns.
-    pub bends: Bends,
+    pub displacements: EdgeDisplacements,
     /// Its statistics.
     pub report: CoarseReport,
 }
@@ -201,7 +201,7 @@ pub fn mesh(
 pub(super) enum Attempt {
     Made(Box<CoarseMesh>),
     /// Thin regions were found: sources for those that can be resolved.
-    Thin(Vec<Source>, ThinWalls),
+    Thin(Vec<Source>, ThinRegions),
     /// Smaller sizes are needed.
     Lower(Vec<Source>),
     Failed(CoarseError),
@@ -225,21 +225,21 @@ pub(super) fn corrected(
     attempt: impl Fn(&CoarseSettings, Allowed) -> Attempt,
 ) -> Result<CoarseMesh, CoarseError> {
     let mut corrections = 0;
-    let mut thin_walls = None;
+    let mut thin_regions = None;
     loop {
         work.proceed()?;
         budget.spend();
         let lower = corrections < CORRECTIONS && !budget.is_spent();
-        let allowed = Allowed { lower, thin: thin_walls.is_none() };
+        let allowed = Allowed { lower, thin: thin_regions.is_none() };
         match attempt(settings, allowed) {
             Attempt::Made(mut coarse) => {
                 coarse.report.size_corrections = corrections;
-                coarse.report.thin_walls = thin_walls.unwrap_or_default();
+                coarse.report.thin_regions = thin_regions.unwrap_or_default();
                 return Ok(*coarse);
             }
             Attempt::Thin(sources, found) => {
                 settings.size.sources.extend(sources);
-                thin_walls = Some(found);
+                thin_regions = Some(found);
             }
             Attempt::Lower(sources) => {
                 settings.size.sources.extend(sources);
@@ -324,7 +324,7 @@ fn attempt(
         let project = |patch, point: &Point| projector.project_patch(patch, point).unwrap_or(*point);
         let closeness = settings.size.scaled_closeness();
         let walls = Walls { mesh: &surface, regions: &regions, project: &project, size, closeness };
-        let (sources, found) = thin_walls(&walls);
+        let (sources, found) = thin_regions(&walls);
         if found.places > 0 {
             return Attempt::Thin(sources, found);
         }
@@ -372,7 +372,7 @@ pub(super) fn fill(
         steiner_points: volume.steiner_inside as u64,
         ..CoarseReport::default()
     };
-    Ok(CoarseMesh { mesh, report, bends: Bends::default() })
+    Ok(CoarseMesh { mesh, report, displacements: EdgeDisplacements::default() })
 }
 
 /// Fills the bodies inside a surface mesh.

@@ -21,10 +21,10 @@ use crate::ground::size::{SizeField, Source, SourceTree};
 use crate::mesher::improve::{self, Effort};
 use crate::mesher::model::CsgModel;
 use crate::mesher::surface::{self, SurfaceMesh};
-use crate::parallel::decompose::{self, CutModel, CutPlane, Cuts, Evidence};
+use crate::parallel::decompose::{self, CutModel, CutPlane, CutStatistics, Cuts};
 use crate::parallel::distribution::BareMesh;
 use crate::parallel::partition;
-use crate::parallel::refine::Bends;
+use crate::parallel::refine::EdgeDisplacements;
 use crate::parallel::skin::{self, Filled, PartSizes, Skin};
 use crate::{Point, Vector};
 use csg::{Aabb, BodyId};
@@ -116,11 +116,11 @@ fn plan_cuts(
         mesh_as_wanted(parts, model, settings, wanted, &[], &Budget::default(), work)
     })?;
     progress.stage(Stage::Cut, |_| {
-        let evidence = Evidence::of(&coarse.mesh, whole, pieces, parts)?;
+        let statistics = CutStatistics::of(&coarse.mesh, whole, pieces, parts)?;
         let mut settings = cuts.clone();
         for seed in 0..MOST_PLANS {
             settings.plan = decompose::Settings { seed, through_corners: seed == 0, ..settings.plan };
-            let cuts = plan(&evidence, parts, &settings)?;
+            let cuts = plan(&statistics, parts, &settings)?;
             match CutModel::new(whole, &cuts, candidates(&coarse.mesh, &cuts)) {
                 Ok(model) => return Ok(Planned { cuts, model, coarse, pieces, outcome }),
                 // Other planes may work.
@@ -185,8 +185,8 @@ fn cut(
     let boundary = surface.triangles.iter().filter(|t| pieces_of.is_old(t.patch)).count() as u64;
     let assigned: Vec<Rank> = mesh.tets.iter().map(|tet| cuts.leaf_of(&centre(&mesh, tet)) as Rank).collect();
     let partition = partition::assess(&mesh, &assigned, parts)?;
-    let (bends, periodic) = (Bends::default(), PeriodicMap::default());
-    let coarse = CoarseResult { mesh, bends, parts: assigned, report, outcome, partition, periodic };
+    let (displacements, periodic) = (EdgeDisplacements::default(), PeriodicMap::default());
+    let coarse = CoarseResult { mesh, displacements, parts: assigned, report, outcome, partition, periodic };
     Ok(Cut { pieces, coarse, messages, boundary })
 }
 
@@ -195,11 +195,11 @@ fn centre(mesh: &Mesh, tet: &[VertexId; 4]) -> Point {
 }
 
 /// The user's planes, or planes chosen from the coarse mesh.
-fn plan(evidence: &Evidence, parts: u32, settings: &CutSettings) -> Result<Cuts, RequestError> {
+fn plan(statistics: &CutStatistics, parts: u32, settings: &CutSettings) -> Result<Cuts, RequestError> {
     if settings.planes.is_empty() {
-        return decompose::plan(evidence, parts, &settings.plan).map_err(RequestError::from);
+        return decompose::plan(statistics, parts, &settings.plan).map_err(RequestError::from);
     }
-    let cuts = Cuts::by_planes(&settings.planes, evidence);
+    let cuts = Cuts::by_planes(&settings.planes, statistics);
     if cuts.leaves.len() != parts as usize {
         return Err(RequestError::Planes { pieces: cuts.leaves.len(), parts });
     }

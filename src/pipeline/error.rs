@@ -16,7 +16,7 @@ use crate::ground::progress::Cancelled;
 use crate::mesher::facets::FacetError;
 use crate::parallel::check::{Checksum, Fault};
 use crate::parallel::decompose::{CutError, LooseEdge, TooManyParts};
-use crate::parallel::distribution::{DistError, SettleError};
+use crate::parallel::distribution::{DistError, NumberError};
 use crate::parallel::halo::HaloError;
 use crate::parallel::migrate::MigrateError;
 use crate::parallel::partition::PartitionError;
@@ -87,7 +87,7 @@ pub enum Error {
     Distribute(DistError),
     /// Shared entities cannot be numbered.
     #[error(transparent)]
-    Settle(SettleError),
+    Number(NumberError),
     /// The mesh cannot be refined.
     #[error(transparent)]
     Refine(RefineError),
@@ -126,7 +126,7 @@ fn prefix(path: &Option<PathBuf>) -> String {
 pub enum InputError {
     /// The extension of a file is that of no known format.
     #[error(
-        "cannot tell by its name what {} holds; known are geometries (.geo), surfaces ({}) and meshes ({})",
+        "cannot tell by its name what {} contains; known are geometries (.geo), surfaces ({}) and meshes ({})",
         .0.display(), surface::KNOWN, volume::KNOWN
     )]
     UnknownFormat(PathBuf),
@@ -301,7 +301,7 @@ impl HasKind for Error {
             Self::Load(error) => error.kind(),
             Self::Partition(error) => error.kind(),
             Self::Distribute(error) => error.kind(),
-            Self::Settle(error) => error.kind(),
+            Self::Number(error) => error.kind(),
             Self::Refine(error) => error.kind(),
             Self::Repartition(error) => error.kind(),
             Self::Migrate(error) => error.kind(),
@@ -344,10 +344,10 @@ stages! {
     CoarseError => Coarse (Cancelled);
     CutError => Cut (Distribute Refine);
     DistError => Distribute (Comm);
-    SettleError => Settle (Comm);
+    NumberError => Number (Comm);
     RefineError => Refine (Cancelled);
     RepartitionError => Repartition (Comm);
-    MigrateError => Migrate (Settle Comm);
+    MigrateError => Migrate (Number Comm);
     HaloError => Halo (Comm);
     WriteError => Write (Cancelled Comm);
     InvalidMesh => Invalid ();

@@ -16,7 +16,7 @@ use crate::mesher::facets::{
 };
 use crate::mesher::improve::Smoothness;
 use crate::mesher::surface::SurfaceMesh;
-use crate::mesher::surface::closeness::{ThinWalls, Walls, thin_walls};
+use crate::mesher::surface::closeness::{ThinRegions, Walls, thin_regions};
 use csg::{BodyId, CornerId, CurveId, PatchId};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -114,7 +114,7 @@ impl FacetSolid {
         let size = FacetSize::new(&self.model, &settings.size);
         let regions = |id: PatchId| [self.model.patch(id).inside, self.model.patch(id).outside];
         if allowed.thin && !self.keep_surface {
-            let (sources, found) = self.thin_walls(&size, &regions, settings.size.scaled_closeness());
+            let (sources, found) = self.thin_regions(&size, &regions, settings.size.scaled_closeness());
             if found.places > 0 {
                 return Attempt::Thin(sources, found);
             }
@@ -145,14 +145,14 @@ impl FacetSolid {
     }
 
     /// Finds thin regions between the facets themselves.
-    fn thin_walls(
+    fn thin_regions(
         &self,
         size: &FacetSize,
         regions: &(dyn Fn(PatchId) -> [Option<BodyId>; 2] + Sync),
         closeness: Closeness,
-    ) -> (Vec<Source>, ThinWalls) {
+    ) -> (Vec<Source>, ThinRegions) {
         let project = |_, point: &Point| *point;
-        thin_walls(&Walls { mesh: &keep(&self.model), regions, project: &project, size, closeness })
+        thin_regions(&Walls { mesh: &keep(&self.model), regions, project: &project, size, closeness })
     }
 
     /// Adds points on no triangle as vertices inside.

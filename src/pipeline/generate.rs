@@ -30,7 +30,7 @@ use crate::parallel::interfaces;
 use crate::parallel::migrate::BareStream;
 use crate::parallel::partition::ties::Ties;
 use crate::parallel::partition::{self};
-use crate::parallel::refine::{self, Bends, PeriodicCheck, RefineError, RefinedMesh};
+use crate::parallel::refine::{self, EdgeDisplacements, PeriodicCheck, RefineError, RefinedMesh};
 
 /// **Collective.** Makes the mesh; only rank 0 needs the geometry and reports `progress`.
 ///
@@ -63,8 +63,9 @@ pub fn generate(
             return fill(comm, Parts { model, coarse, dist, projector, names, pieces }, settings, progress);
         }
         let keep = room::vertices_to_keep(comm, &dist, pieces, settings.memory, progress)?;
-        let bends = broadcast_bends(comm, coarse.as_ref().map(|(_, made)| &made.bends))?;
-        let how = refine::Settings { bends, nested: settings.nested, ..refine::Settings::default() };
+        let displacements =
+            broadcast_displacements(comm, coarse.as_ref().map(|(_, made)| &made.displacements))?;
+        let how = refine::Settings { displacements, nested: settings.nested, ..refine::Settings::default() };
         let survey =
             progress.stage(Stage::Levels, |work| survey(comm, &dist, &projector, pieces, &how, work))?;
         let mut levels = match survey {
@@ -94,7 +95,7 @@ pub fn generate(
         levels.extend(check.shape.clone().map(|shape| Level { pieces, tets: check.tets, shape }));
         let coarse = coarse.take().map(|(_, mut made)| {
             made.report.size_corrections += round as u64;
-            made.report.bent_edges = made.bends.edges().len() as u64;
+            made.report.curved_edges = made.displacements.edges().len() as u64;
             made
         });
         let part = Part::Refined(Box::new(part));
@@ -277,10 +278,18 @@ fn coarse_mesh(
             RequestError::SplitPeriodic { lost: metrics.lost_ties, tets: made.mesh.tets.len() }.into()
         );
     }
-    let CoarseMesh { mesh, bends, report } = made;
+    let CoarseMesh { mesh, displacements, report } = made;
     Ok((
         pieces,
-        CoarseResult { mesh, bends, parts: assigned, report, outcome, partition: metrics, periodic: map },
+        CoarseResult {
+            mesh,
+            displacements,
+            parts: assigned,
+            report,
+            outcome,
+            partition: metrics,
+            periodic: map,
+        },
     ))
 }
 
@@ -331,9 +340,12 @@ fn broadcast_pieces(comm: &dyn Communicator, pieces: Option<u32>) -> Result<u32,
 }
 
 /// **Collective.** Broadcasts the edge displacements from rank 0.
-fn broadcast_bends(comm: &dyn Communicator, bends: Option<&Bends>) -> Result<Bends, Error> {
+fn broadcast_displacements(
+    comm: &dyn Communicator,
+    displacements: Option<&EdgeDisplacements>,
+) -> Result<EdgeDisplacements, Error> {
     let (mut ids, mut middles): (Vec<GlobalId>, Vec<[f64; 3]>) =
-        bends.map(|bends| bends.edges().iter().copied().unzip()).unwrap_or_default();
+        displacements.map(|displacements| displacements.edges().iter().copied().unzip()).unwrap_or_default();
     comm.broadcast(0, &mut ids)?;
     comm.broadcast(0, &mut middles)?;
     Ok(ids.into_iter().zip(middles).collect())
@@ -410,9 +422,11 @@ mod tests {
 
     #[test]
     fn edges_that_rank_0_bends_are_bent_alike_on_all_ranks() {
-        let bends: Bends = [(7, [0.5, 0.0, -1.25]), (1 << 40, [0.1, 0.2, 0.3])].into_iter().collect();
-        let received =
-            thread::run(3, |comm| broadcast_bends(comm, (comm.rank() == 0).then_some(&bends)).unwrap());
-        assert_eq!(received.unwrap(), vec![bends; 3]);
+        let displacements: EdgeDisplacements =
+            [(7, [0.5, 0.0, -1.25]), (1 << 40, [0.1, 0.2, 0.3])].into_iter().collect();
+        let received = thread::run(3, |comm| {
+            broadcast_displacements(comm, (comm.rank() == 0).then_some(&displacements)).unwrap()
+        });
+        assert_eq!(received.unwrap(), vec![displacements; 3]);
     }
 }

@@ -9,7 +9,7 @@ use crate::ground::mesh::{GlobalId, Mesh, TET_EDGES};
 use crate::ground::projector::Projector;
 use crate::ground::size::Source;
 use crate::parallel::distribution;
-use crate::parallel::refine::{self, Bends, Least, Trial};
+use crate::parallel::refine::{self, EdgeDisplacements, Least, Trial};
 
 /// Maximum number of subdivisions of an edge in refinement tests. 4 are too few: NETGEN's `matrix`
 /// at `very-coarse` then has 712 inverted tets at 4 levels. With 16 the directions at vertices are
@@ -66,7 +66,7 @@ pub fn refinable<T>(
             let mut coarse = made.0;
             bend(model, &mut coarse, &tried, pieces.min(TRIED_PIECES))?;
             return match tried.error {
-                Some(error) if coarse.bends.is_empty() => Err(error.into()),
+                Some(error) if coarse.displacements.is_empty() => Err(error.into()),
                 _ => Ok((coarse, made.1)),
             };
         }
@@ -94,7 +94,7 @@ fn refinement_test(model: &Model, coarse: &CoarseMesh, pieces: u32) -> Result<Tr
         return Ok(Trial::default());
     }
     let part = distribution::from_serial(coarse.mesh.clone())?;
-    Ok(refine::trial(&part, &projector, pieces, &Bends::default(), least(coarse))?)
+    Ok(refine::trial(&part, &projector, pieces, &EdgeDisplacements::default(), least(coarse))?)
 }
 
 /// Curves edges of a coarse mesh with bad children, if that improves the worst of them.
@@ -106,11 +106,11 @@ fn bend(model: &Model, coarse: &mut CoarseMesh, before: &Trial, pieces: u32) -> 
         (distribution::from_serial(coarse.mesh.clone())?, model.projector(), least(coarse));
     let [margin, enough] = BENT;
     let settings = refine::mend::Settings { pieces, least, margin, enough, ..Default::default() };
-    let bends = refine::mend(&part, &projector, &settings)?.bends;
-    let after = refine::trial(&part, &projector, pieces, &bends, least)?;
+    let displacements = refine::mend(&part, &projector, &settings)?.displacements;
+    let after = refine::trial(&part, &projector, pieces, &displacements, least)?;
     let is_better = after.poor.is_empty() || after.smallest_dihedral > before.smallest_dihedral;
     if after.inverted.is_empty() && is_better {
-        coarse.bends = bends;
+        coarse.displacements = displacements;
     }
     Ok(())
 }

@@ -5,11 +5,11 @@ use crate::ground::comm::Communicator;
 use crate::ground::mesh::Rank;
 use crate::ground::mesh::stream::MeshStream;
 use crate::ground::progress::{Progress, Stage};
-use crate::parallel::distribution::{BareMesh, owner, settle};
+use crate::parallel::distribution::{BareMesh, number_shared, owner};
 use crate::parallel::migrate::{self, BareStream};
 use crate::parallel::refine::RefinedMesh;
 use crate::parallel::repartition::smooth::{self, smooth};
-use crate::parallel::repartition::{self, Method, diffuse, islands};
+use crate::parallel::repartition::{self, Method, absorb_small_components, diffuse};
 
 /// A rank's part of the mesh.
 #[derive(Debug)]
@@ -59,7 +59,7 @@ pub struct Balance {
 pub fn balance(comm: &dyn Communicator, part: &Part) -> Result<Balance, Error> {
     let pieces = match part {
         Part::Refined(_) => None,
-        Part::Stored(part) => Some(repartition::islands::pieces(comm, part.mesh())?),
+        Part::Stored(part) => Some(repartition::components::pieces(comm, part.mesh())?),
     };
     let part = part.stream();
     let counts = part.counts();
@@ -127,7 +127,7 @@ pub(super) fn even_out(
         let before = uneven(&part)?;
         let (mut moved, mut imbalance) = (0, before);
         for step in 0..=MOST_MOVES {
-            let mesh = settle(comm, part)?;
+            let mesh = number_shared(comm, part)?;
             let mut to = match step {
                 _ if imbalance <= UNEVEN => vec![mesh.rank; mesh.tets.len()],
                 MOST_MOVES => repartition::repartition(comm, &mesh, comm.size(), Method::default())?,
@@ -160,7 +160,7 @@ fn migrate_counted(
 /// **Collective.** Moves small disconnected components to the parts around them.
 fn join(comm: &dyn Communicator, mut part: BareMesh, moved: &mut u64) -> Result<BareMesh, Error> {
     for _ in 0..MOST_JOINS {
-        let to = islands(&part);
+        let to = absorb_small_components(&part);
         if comm.all_reduce_sum_u64([u64::from(to.iter().any(|rank| *rank != part.rank))])? == [0] {
             break;
         }
@@ -177,7 +177,7 @@ fn join_interfaces(comm: &dyn Communicator, part: BareMesh, moved: &mut u64) -> 
     if comm.all_reduce_max_u64([last])? == [0] {
         return Ok(part);
     }
-    let mesh = settle(comm, part)?;
+    let mesh = number_shared(comm, part)?;
     let mut to = vec![mesh.rank; mesh.tets.len()];
     repartition::join_interfaces(comm, &mesh, &mut to, comm.size(), UNEVEN)?;
     migrate_counted(comm, mesh.into(), &to, moved)

@@ -76,7 +76,7 @@ fn images_are_where_the_motions_put_them_at_every_level_and_on_every_rank() {
 fn all_corners_of_a_cell_are_one_vertex_in_the_end() {
     let parts = made(&model("unit_cell"), 1, 1);
     let part = parts[0].part.stream();
-    let origins = part.origins();
+    let origins = part.masters();
     let corner = |p: &[f64; 3]| p.iter().all(|&x| x == 0.0 || x == 1.0);
     let mut first: Vec<u64> =
         origins.iter().filter(|(v, _)| corner(&part.points()[*v as usize])).map(|o| o.1).collect();

@@ -11,10 +11,10 @@ use crate::ground::mesh::stream::MeshStream;
 use crate::ground::mesh::{Arrays, Mesh, Names, Rank, Sharing};
 use crate::ground::projector::Projector;
 use crate::parallel::check::{Checksum, PartReport, ShapeReport};
-use crate::parallel::distribution::{DistMesh, settle};
+use crate::parallel::distribution::{DistMesh, number_shared};
 use crate::parallel::interfaces;
 use crate::parallel::partition::Metrics;
-use crate::parallel::refine::{self, Bends, PeriodicCheck, RefinedMesh, parents};
+use crate::parallel::refine::{self, EdgeDisplacements, PeriodicCheck, RefinedMesh, parents};
 use crate::parallel::{halo, migrate};
 
 /// Rank 0's coarse mesh with its statistics.
@@ -23,7 +23,7 @@ pub struct CoarseResult {
     /// The coarse mesh.
     pub mesh: Mesh,
     /// The edge displacements for refinement.
-    pub bends: Bends,
+    pub displacements: EdgeDisplacements,
     /// The part of each tet.
     pub parts: Vec<Rank>,
     /// Its statistics.
@@ -145,7 +145,7 @@ impl Generated {
             Part::Refined(part) => comm.agree(migrate::bare(part))?,
             Part::Stored(part) => part.mesh().clone(),
         };
-        Ok(settle(comm, bare)?)
+        Ok(number_shared(comm, bare)?)
     }
 
     /// *Local.* This rank's part of all refinement levels, the last being the mesh itself: coarse

@@ -10,7 +10,7 @@ use crate::ground::progress::Progress;
 use crate::parallel::distribution::DistMesh;
 use crate::parallel::refine::lattice::Lattice;
 use crate::parallel::refine::numbering::fine_totals;
-use crate::parallel::refine::{Keep, census};
+use crate::parallel::refine::{Keep, predicted_counts};
 use std::path::Path;
 
 /// *Local.* Refuses, on rank 0, a mesh that exceeds the disk or the numbers of a format.
@@ -58,7 +58,7 @@ pub(super) fn vertices_to_keep(
         let here = machines.iter().zip(&needs).filter(|(name, _)| **name == machine.as_bytes());
         Ok(here.map(|(_, need)| need).sum())
     };
-    let [all, least] = census(part, pieces).bytes;
+    let [all, least] = predicted_counts(part, pieces).bytes;
     let (all, least) = (on_machine(all)?, on_machine(least)?);
     let Some(available) = memory.or_else(memory::available_bytes) else { return Ok(Keep::All) };
     let fits = if least > available { Err(RoomError::Memory { all, least, available }) } else { Ok(()) };

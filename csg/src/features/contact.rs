@@ -284,7 +284,7 @@ fn has_wedge(geometry: &Geometry, contact: &Contact) -> bool {
         }
         let body = |place: Point| {
             let positive = |s: SurfaceId| geometry.surfaces[s.index()].value(&place) > 0.0;
-            geometry.bodies.iter().position(|body| body.solid.holds(&positive))
+            geometry.bodies.iter().position(|body| body.solid.contains(&positive))
         };
         let [below, between, above] = [-0.5, 0.5, 1.5].map(|part| body(p + way * part));
         below != between && between != above

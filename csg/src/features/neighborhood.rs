@@ -52,7 +52,7 @@ pub(super) fn region(
     at: &Point,
     positive: &dyn Fn(SurfaceId) -> bool,
 ) -> Result<Option<BodyId>, FeatureError> {
-    let mut holding = leaf.bodies.iter().filter(|(_, solid)| solid.holds(positive)).map(|(body, _)| *body);
+    let mut holding = leaf.bodies.iter().filter(|(_, solid)| solid.contains(positive)).map(|(body, _)| *body);
     let first = holding.next();
     match (first, holding.next()) {
         (Some(a), Some(b)) => {
@@ -106,7 +106,7 @@ fn cutout_at(
     [behind, before]: [&dyn Fn(SurfaceId) -> bool; 2],
 ) -> Option<u32> {
     let mut here = leaf.cutouts.iter().filter(|(i, _)| geometry.cutouts[*i as usize].surface == surface);
-    here.find(|(_, solid)| solid.holds(behind) != solid.holds(before)).map(|(i, _)| *i)
+    here.find(|(_, solid)| solid.contains(behind) != solid.contains(before)).map(|(i, _)| *i)
 }
 
 /// The sheet of a surface at one of its points; `None` if the surface is not a boundary there.

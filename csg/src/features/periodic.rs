@@ -29,7 +29,7 @@ pub struct CurveCopy {
 
 /// The entities matched by one `identify periodic` statement.
 #[derive(Clone, Debug)]
-pub struct Identified {
+pub struct PeriodicMatch {
     /// The motion that maps the first surface to the second.
     pub motion: Isometry3<f64>,
     /// Corners and their copies.
@@ -42,7 +42,7 @@ pub struct Identified {
 
 /// The entity of which another is, directly or indirectly, a periodic copy.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Origin {
+pub struct Master {
     /// Its index among entities of its kind.
     pub index: usize,
     /// The motion that maps the origin to the copy.
@@ -53,13 +53,13 @@ pub struct Origin {
 
 /// The origin of each periodic copy; `None` for entities that are not copies.
 #[derive(Clone, Debug, Default)]
-pub struct Origins {
+pub struct Masters {
     /// By corner.
-    pub corners: Vec<Option<Origin>>,
+    pub corners: Vec<Option<Master>>,
     /// By curve.
-    pub curves: Vec<Option<Origin>>,
+    pub curves: Vec<Option<Master>>,
     /// By patch.
-    pub patches: Vec<Option<Origin>>,
+    pub patches: Vec<Option<Master>>,
 }
 
 /// A master, its copy, the motion between them, and whether a curve is reversed.
@@ -67,25 +67,25 @@ type Link = (usize, usize, Isometry3<f64>, bool);
 
 impl Features {
     /// The origins of all periodic copies.
-    pub fn origins(&self) -> Origins {
+    pub fn masters(&self) -> Masters {
         let mut links: [Vec<Link>; 3] = Default::default();
-        for Identified { motion, corners, curves, patches } in &self.identified {
+        for PeriodicMatch { motion, corners, curves, patches } in &self.identified {
             links[0].extend(corners.iter().map(|[a, b]| (a.index(), b.index(), *motion, false)));
             links[1].extend(curves.iter().map(|c| (c.master.index(), c.copy.index(), *motion, c.reversed)));
             links[2].extend(patches.iter().map(|[a, b]| (a.index(), b.index(), *motion, false)));
         }
-        Origins {
-            corners: origins_along(self.corners.len(), &links[0]),
-            curves: origins_along(self.curves.len(), &links[1]),
-            patches: origins_along(self.patches.len(), &links[2]),
+        Masters {
+            corners: masters_along(self.corners.len(), &links[0]),
+            curves: masters_along(self.curves.len(), &links[1]),
+            patches: masters_along(self.patches.len(), &links[2]),
         }
     }
 }
 
 /// Follows the links from entities that are not copies. In a ring all entities are copies; then the
 /// one with the smallest index is the origin.
-fn origins_along(count: usize, links: &[Link]) -> Vec<Option<Origin>> {
-    let mut origins: Vec<Option<Origin>> = vec![None; count];
+fn masters_along(count: usize, links: &[Link]) -> Vec<Option<Master>> {
+    let mut origins: Vec<Option<Master>> = vec![None; count];
     let mut steps: BTreeMap<usize, Vec<Link>> = BTreeMap::new();
     let mut is_image = vec![false; count];
     for &(of, image, motion, reversed) in links.iter().filter(|link| link.0 != link.1) {
@@ -103,7 +103,7 @@ fn origins_along(count: usize, links: &[Link]) -> Vec<Option<Origin>> {
         while let Some((at, motion, reversed)) = open.pop() {
             for &(_, next, step, turned) in &steps[&at] {
                 if !std::mem::replace(&mut reached[next], true) {
-                    let origin = Origin { index: start, motion: step * motion, reversed: reversed != turned };
+                    let origin = Master { index: start, motion: step * motion, reversed: reversed != turned };
                     origins[next] = Some(origin);
                     open.push((next, origin.motion, origin.reversed));
                 }
@@ -129,8 +129,8 @@ pub(super) fn identify(
     geometry: &Geometry,
     features: &Features,
     tolerances: &Tolerances,
-) -> Result<Vec<Identified>, FeatureError> {
-    let mut all: Vec<Identified> = Vec::new();
+) -> Result<Vec<PeriodicMatch>, FeatureError> {
+    let mut all: Vec<PeriodicMatch> = Vec::new();
     for (index, identification) in geometry.identifications.iter().enumerate() {
         let [first, second] = [0, 1].map(|i| Named {
             solid: identification.solids[i].clone(),
@@ -268,8 +268,9 @@ fn matched(
     sides: &[Side; 2],
     motion: Isometry3<f64>,
     tolerances: &Tolerances,
-) -> Result<Identified, Unmatched> {
-    let mut identified = Identified { motion, corners: Vec::new(), curves: Vec::new(), patches: Vec::new() };
+) -> Result<PeriodicMatch, Unmatched> {
+    let mut identified =
+        PeriodicMatch { motion, corners: Vec::new(), curves: Vec::new(), patches: Vec::new() };
     let [from, to] = sides;
     for &of in &from.corners {
         let place = features.corner(of).point;
@@ -383,12 +384,12 @@ fn orientation_of_copy(
 fn check_consistency(
     geometry: &Geometry,
     features: &Features,
-    identified: &[Identified],
+    identified: &[PeriodicMatch],
     tolerances: &Tolerances,
 ) -> Result<(), FeatureError> {
     let with = Features { identified: identified.to_vec(), ..features.clone() };
-    let origins = with.origins();
-    let to = |origins: &[Option<Origin>], index: usize| {
+    let origins = with.masters();
+    let to = |origins: &[Option<Master>], index: usize| {
         origins[index].map_or((index, Isometry3::identity()), |o| (o.index, o.motion))
     };
     for (identification, all) in geometry.identifications.iter().zip(identified) {

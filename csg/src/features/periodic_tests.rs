@@ -24,8 +24,8 @@ const ALL: &str = "identify periodic l r; identify periodic f b; identify period
 #[test]
 fn a_cube_with_three_periods_has_one_corner_three_curves_and_three_patches() {
     let features = find(&cube(&format!("tlo cell; {ALL}"))).unwrap();
-    let origins = features.origins();
-    let copies = |list: &[Option<super::Origin>]| list.iter().flatten().count();
+    let origins = features.masters();
+    let copies = |list: &[Option<super::Master>]| list.iter().flatten().count();
     assert_eq!([&origins.corners, &origins.curves, &origins.patches].map(|o| copies(o)), [7, 9, 3]);
     for (i, origin) in origins.corners.iter().enumerate().filter_map(|(i, o)| Some((i, (*o)?))) {
         let first = features.corner(CornerId::new(origin.index)).point;
@@ -66,7 +66,7 @@ fn sheared_and_turned_faces_are_found() {
     let motion = turned.identified[0].motion;
     assert!((motion * Point::new(1.0, 0.0, 0.5) - Point::new(0.0, 1.0, 0.5)).norm() < 1e-15);
     // The axis is its own copy.
-    assert_eq!(turned.origins().curves.iter().flatten().count(), 3);
+    assert_eq!(turned.masters().curves.iter().flatten().count(), 3);
 }
 
 #[test]

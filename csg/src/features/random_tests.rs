@@ -85,7 +85,7 @@ fn body(solid: Solid) -> Body {
 
 fn body_at(geometry: &Geometry, at: &Point) -> Option<BodyId> {
     let positive = |s: SurfaceId| geometry.surfaces[s.index()].value(at) > 0.0;
-    geometry.bodies.iter().position(|b| b.solid.holds(&positive)).map(BodyId::new)
+    geometry.bodies.iter().position(|b| b.solid.contains(&positive)).map(BodyId::new)
 }
 
 /// Whether all surfaces except those in `but` are far from a point.

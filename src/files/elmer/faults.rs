@@ -218,7 +218,7 @@ fn check_counts(mesh: &ElmerMesh, faults: &mut Faults) {
     if let Layout::Partitioned { folder, parts } = &mesh.layout {
         let name = folder.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
         if name.strip_prefix("partitioning.").is_some_and(|n| n != parts.to_string()) {
-            faults.add(FaultKind::PartCount, folder.clone(), 0, || format!("holds {parts} parts"));
+            faults.add(FaultKind::PartCount, folder.clone(), 0, || format!("contains {parts} parts"));
         }
     }
     mesh.parts.iter().for_each(|part| check_header(part, faults));

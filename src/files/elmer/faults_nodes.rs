@@ -34,7 +34,7 @@ impl NodeTable {
     }
 
     /// Whether one of the part's own elements uses the node at this index in `.nodes`.
-    pub fn holds(&self, place: usize) -> bool {
+    pub fn contains(&self, place: usize) -> bool {
         self.held[place]
     }
 
@@ -224,7 +224,7 @@ fn check_owner(
     copies: &[(u32, u32, u32)],
     faults: &mut Faults,
 ) {
-    for &(id, part, place) in copies.iter().filter(|copy| !nodes[copy.1 as usize].holds(copy.2 as usize)) {
+    for &(id, part, place) in copies.iter().filter(|copy| !nodes[copy.1 as usize].contains(copy.2 as usize)) {
         for (k, line) in tables[part as usize].find(id).filter(|(_, line)| line.parts[0] == part + 1) {
             let what = || format!("node {id} (line {} of .nodes), owner {}", place + 1, line.parts[0]);
             faults.add(FaultKind::OwnerWatches, mesh.parts[part as usize].file("shared"), k + 1, what);

@@ -48,10 +48,10 @@ pub enum ReadError {
         known: &'static str,
     },
     /// No Elmer mesh in the folder.
-    #[error("{} holds no Elmer mesh: neither mesh.header, nor part.1.header, nor partitioning.N", .0.display())]
+    #[error("{} contains no Elmer mesh: neither mesh.header, nor part.1.header, nor partitioning.N", .0.display())]
     NoElmerMesh(PathBuf),
     /// More than one Elmer mesh in the folder.
-    #[error("{} holds several meshes; name one of them: {}", dir.display(), list(found))]
+    #[error("{} contains several meshes; name one of them: {}", dir.display(), list(found))]
     SeveralElmerMeshes {
         /// The folder.
         dir: PathBuf,

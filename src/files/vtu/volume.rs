@@ -180,7 +180,7 @@ fn write_triangles(file: &PieceFile, part: &dyn MeshStream, names: &Names) -> Re
 fn write_periodic_ids(file: &PieceFile, part: &dyn MeshStream) -> Result<(), WriteError> {
     let mut ids: Vec<u64> =
         (0..part.vertex_blocks()).flat_map(|index| part.vertex_block(index).ids()).collect();
-    for (local, origin) in part.origins() {
+    for (local, origin) in part.masters() {
         ids[local as usize] = origin;
     }
     file.array("PeriodicId")?.0.write(bytemuck::cast_slice(&ids))

@@ -83,7 +83,7 @@ impl Circumsphere {
 
     /// Whether a point is strictly inside (true) or outside (false); `None` if that is uncertain.
     #[inline]
-    pub fn holds(&self, point: &Point) -> Option<bool> {
+    pub fn contains(&self, point: &Point) -> Option<bool> {
         let [x, y, z] = [point.x - self.center[0], point.y - self.center[1], point.z - self.center[2]];
         let squared = x * x + y * y + z * z;
         if squared > f64::from(self.outer) {
@@ -122,10 +122,10 @@ mod tests {
         assert!(sphere.is_known() && !Circumsphere::UNKNOWN.is_known());
         assert_eq!(sphere.center(), Point::new(0.5, 0.5, 0.5));
         assert!((sphere.squared_radius() - 0.75).abs() < 1e-6);
-        assert_eq!(sphere.holds(&Point::new(0.9, 0.9, 0.9)), Some(true));
-        assert_eq!(sphere.holds(&Point::new(1.01, 1.0, 1.0)), Some(false));
-        assert_eq!(sphere.holds(&Point::new(1.0, 1.0, 1.0)), None, "on it");
-        assert_eq!(Circumsphere::UNKNOWN.holds(&p[0]), None);
+        assert_eq!(sphere.contains(&Point::new(0.9, 0.9, 0.9)), Some(true));
+        assert_eq!(sphere.contains(&Point::new(1.01, 1.0, 1.0)), Some(false));
+        assert_eq!(sphere.contains(&Point::new(1.0, 1.0, 1.0)), None, "on it");
+        assert_eq!(Circumsphere::UNKNOWN.contains(&p[0]), None);
     }
 
     #[test]
@@ -134,7 +134,7 @@ mod tests {
         let sphere = Circumsphere::of(p.each_ref());
         assert!(sphere.is_known());
         for point in [Point::new(0.5, 0.5, 0.0), Point::new(9.0, 9.0, 9.0)] {
-            assert_eq!(sphere.holds(&point), None);
+            assert_eq!(sphere.contains(&point), None);
         }
     }
 
@@ -167,7 +167,7 @@ mod tests {
             for p in [point, sphere.center() + to * (radius * factor)] {
                 let exact = insphere(a, b, c, d, &p);
                 let exact = if positive == Sign::Positive { exact } else { exact.flipped() };
-                match sphere.holds(&p) {
+                match sphere.contains(&p) {
                     Some(true) => prop_assert_eq!(exact, Sign::Positive),
                     Some(false) => prop_assert_eq!(exact, Sign::Negative),
                     None => {}

@@ -178,12 +178,12 @@ mod tests {
         let tree = Tree::new(&boxes);
         for _ in 0..500 {
             let p = point();
-            let holds = |i: u32| {
+            let contains = |i: u32| {
                 let b = &boxes[i as usize];
                 (0..3).all(|k| b.min[k] <= p[k] && p[k] <= b.max[k])
             };
-            let held: Vec<u32> = (0..200).filter(|&i| holds(i)).collect();
-            assert_eq!(tree.find(&p, holds).is_some(), !held.is_empty());
+            let held: Vec<u32> = (0..200).filter(|&i| contains(i)).collect();
+            assert_eq!(tree.find(&p, contains).is_some(), !held.is_empty());
             for &i in &held {
                 assert_eq!(tree.find(&p, |item| item == i), Some(i));
             }

@@ -172,7 +172,7 @@ pub trait MeshStream: Sync {
     }
     /// All vertices of this part that are periodic copies, each once, with the global ids of their
     /// masters, which are not copies.
-    fn origins(&self) -> Vec<(u32, GlobalId)> {
+    fn masters(&self) -> Vec<(u32, GlobalId)> {
         Vec::new()
     }
     /// The ghosts, if the stream has any: their tets are the last tets of the stream, and their

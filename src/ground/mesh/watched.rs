@@ -101,8 +101,8 @@ impl MeshStream for Watched<'_> {
         self.part.singular()
     }
 
-    fn origins(&self) -> Vec<(u32, GlobalId)> {
-        self.part.origins()
+    fn masters(&self) -> Vec<(u32, GlobalId)> {
+        self.part.masters()
     }
 
     fn ghosts(&self) -> Option<&Ghosts> {

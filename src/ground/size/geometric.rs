@@ -375,7 +375,7 @@ impl Sampler<'_> {
 }
 
 fn contains(geometry: &Geometry, solid: &Solid, point: &Point) -> bool {
-    solid.holds(&|surface| geometry.surfaces[surface.index()].value(point) > 0.0)
+    solid.contains(&|surface| geometry.surfaces[surface.index()].value(point) > 0.0)
 }
 
 /// The curvature at each point of a trace: that of the circle through it and its neighbours.

@@ -44,7 +44,7 @@ const MOST_SHRINKS: usize = 12;
 /// this (120°).
 const OPPOSITE: f64 = -0.5;
 
-/// Input of [`thin_walls`]: a first surface mesh, its geometry and the sizes.
+/// Input of [`thin_regions`]: a first surface mesh, its geometry and the sizes.
 pub struct Walls<'a> {
     /// The triangulation.
     pub mesh: &'a SurfaceMesh,
@@ -60,7 +60,7 @@ pub struct Walls<'a> {
 
 /// Statistics of regions that are thin compared with the sizes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
-pub struct ThinWalls {
+pub struct ThinRegions {
     /// Sample points at which the size is too large for the thickness.
     pub places: u64,
     /// Those that need a smaller size than [`Closeness::most`] allows.
@@ -70,8 +70,8 @@ pub struct ThinWalls {
 }
 
 /// Sources that lower the sizes in thin regions, and statistics of these regions.
-pub fn thin_walls(walls: &Walls) -> (Vec<Source>, ThinWalls) {
-    let mut found = ThinWalls::default();
+pub fn thin_regions(walls: &Walls) -> (Vec<Source>, ThinRegions) {
+    let mut found = ThinRegions::default();
     if !walls.closeness.ratio.is_finite() {
         return (Vec::new(), found);
     }
@@ -306,8 +306,8 @@ mod tests {
         FacetModel::new(&[facets], &crate::mesher::facets::Settings::default()).unwrap()
     }
 
-    fn found(model: &FacetModel, size: f64, closeness: Closeness) -> (Vec<Source>, ThinWalls) {
-        thin_walls(&Walls {
+    fn found(model: &FacetModel, size: f64, closeness: Closeness) -> (Vec<Source>, ThinRegions) {
+        thin_regions(&Walls {
             mesh: &keep(model),
             regions: &|patch| [model.patch(patch).inside, model.patch(patch).outside],
             project: &|_, point| *point,
@@ -330,7 +330,7 @@ mod tests {
             assert!(nearest < (SPACING + 1.0) * 0.5, "{p}: {nearest}");
         }
         let (sources, walls) = found(&slab([1.0, 1.0, 1.0]), 1.0, closeness);
-        assert!(sources.is_empty() && walls == ThinWalls::default());
+        assert!(sources.is_empty() && walls == ThinRegions::default());
     }
 
     #[test]
@@ -338,7 +338,7 @@ mod tests {
         let paper = slab([4.0, 4.0, 0.001]);
         let (sources, walls) = found(&paper, 1.0, Closeness { ratio: 2.0, most: 8.0 });
         assert!(sources.is_empty() && walls.limited > 0 && walls.limited == walls.places, "{walls:?}");
-        assert!(found(&paper, 1.0, Closeness::OFF).1 == ThinWalls::default());
+        assert!(found(&paper, 1.0, Closeness::OFF).1 == ThinRegions::default());
     }
 
     #[test]

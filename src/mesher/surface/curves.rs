@@ -41,7 +41,7 @@ pub fn mesh_curves(
 ) -> Result<SurfaceMesh, CurveError> {
     let samplings: Vec<Sampling> = features.curves.iter().map(|c| Sampling::new(c, size)).collect();
     let mut counts: Vec<usize> = features.curves.iter().zip(&samplings).map(|(c, s)| s.segments(c)).collect();
-    let masters = features.origins();
+    let masters = features.masters();
     let master = |i: usize| masters.curves[i].map_or(i, |master| master.index);
     // A periodic copy gets the same segments as its master, so subdividing one subdivides the
     // other. That can make a third curve coincide with one of them; repeat until nothing changes.

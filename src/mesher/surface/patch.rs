@@ -44,7 +44,7 @@ pub fn mesh_patches(
     settings: &Settings,
 ) -> Result<(SurfaceMesh, Report), SurfaceError> {
     let input = Input::new(geometry, features, &curves, size, settings);
-    let masters = features.origins().patches;
+    let masters = features.masters().patches;
     let first = |p: usize| {
         let meshed = masters[p].is_none().then(|| input.mesh(PatchId::new(p)));
         size.work().add(1);

@@ -186,13 +186,13 @@ impl Tetrahedra {
     /// [`ranks`](Self::ranks) it must be the vertex being inserted.
     #[inline]
     pub fn is_in_sphere(&mut self, tet: u32, point: &Point) -> bool {
-        self.spheres[tet as usize].holds(point).unwrap_or_else(|| self.is_in_sphere_slow(tet, point))
+        self.spheres[tet as usize].contains(point).unwrap_or_else(|| self.is_in_sphere_slow(tet, point))
     }
 
     /// The slow path of [`Tetrahedra::is_in_sphere`], if the stored sphere does not decide.
     #[inline(never)]
     fn is_in_sphere_slow(&mut self, tet: u32, point: &Point) -> bool {
-        self.keep_sphere(tet).holds(point).unwrap_or_else(|| {
+        self.keep_sphere(tet).contains(point).unwrap_or_else(|| {
             let [a, b, c, d] = self.corners(tet);
             match insphere(a, b, c, d, point) {
                 Sign::Zero => !self.ranks.is_empty() && super::ties::is_inside(self, tet, self.inserted),

@@ -12,17 +12,17 @@
 //! of the result.
 
 pub mod cut;
-mod evidence;
 mod plan;
 mod scan;
 mod skins;
+mod statistics;
 mod text;
 
 #[cfg(test)]
 mod tests;
 
 pub use cut::{CutError, CutModel};
-pub use evidence::Evidence;
 pub use plan::{Candidates, CutPlane, Cuts, Settings, TooManyParts, plan};
 pub use skins::{LooseEdge, pack, skins, unpack};
+pub use statistics::CutStatistics;
 pub use text::geo_text;

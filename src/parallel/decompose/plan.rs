@@ -14,9 +14,9 @@
 //!
 //! A plane may cut several pieces.
 
-use super::Evidence;
-use super::evidence::{Crossed, Sample};
+use super::CutStatistics;
 use super::scan::{Scan, is_met};
+use super::statistics::{Crossed, Sample};
 use crate::ground::kernel::random::Random;
 use crate::ground::kernel::tree;
 use crate::{Point, Vector};
@@ -104,7 +104,7 @@ impl Half {
     }
 
     /// Whether a point belongs to it; points on the plane belong to the side opposite the normal.
-    fn holds(self, planes: &[CutPlane], point: &Point) -> bool {
+    fn contains(self, planes: &[CutPlane], point: &Point) -> bool {
         planes[self.plane].is_positive(point) == self.positive
     }
 }
@@ -112,8 +112,8 @@ impl Half {
 impl Cuts {
     /// The piece that contains a point.
     pub fn leaf_of(&self, point: &Point) -> usize {
-        let holds = |leaf: &Vec<Half>| leaf.iter().all(|half| half.holds(&self.planes, point));
-        self.leaves.iter().position(holds).expect("the pieces fill space")
+        let contains = |leaf: &Vec<Half>| leaf.iter().all(|half| half.contains(&self.planes, point));
+        self.leaves.iter().position(contains).expect("the pieces fill space")
     }
 
     /// The pieces whose half-spaces each have one of the points inside or within `room`.
@@ -124,8 +124,8 @@ impl Cuts {
 
     /// The pieces made by successive planes: each plane cuts all pieces that have samples on both
     /// sides of it.
-    pub fn by_planes(planes: &[CutPlane], evidence: &Evidence) -> Self {
-        let mut leaves = vec![(Vec::new(), evidence.samples.iter().collect::<Vec<&Sample>>())];
+    pub fn by_planes(planes: &[CutPlane], statistics: &CutStatistics) -> Self {
+        let mut leaves = vec![(Vec::new(), statistics.samples.iter().collect::<Vec<&Sample>>())];
         for (plane, cut) in planes.iter().enumerate() {
             leaves = leaves
                 .into_iter()
@@ -231,9 +231,9 @@ const SHALLOW: f64 = 0.6;
 ///
 /// # Errors
 /// [`TooManyParts`] if there are too few samples to separate the parts.
-pub fn plan(evidence: &Evidence, parts: u32, settings: &Settings) -> Result<Cuts, TooManyParts> {
+pub fn plan(statistics: &CutStatistics, parts: u32, settings: &Settings) -> Result<Cuts, TooManyParts> {
     let mut cuts = Cuts::default();
-    let all = Piece { halves: Vec::new(), samples: evidence.samples.iter().collect(), parts };
+    let all = Piece { halves: Vec::new(), samples: statistics.samples.iter().collect(), parts };
     let mut waiting = vec![all];
     while let Some(piece) = waiting.pop() {
         if piece.parts == 1 {
@@ -243,7 +243,7 @@ pub fn plan(evidence: &Evidence, parts: u32, settings: &Settings) -> Result<Cuts
         if piece.samples.len() < 2 * piece.parts as usize {
             return Err(TooManyParts { parts });
         }
-        let plane = piece.best_plane(&cuts, evidence, settings);
+        let plane = piece.best_plane(&cuts, statistics, settings);
         let index = cuts.planes.iter().position(|known| *known == plane).unwrap_or(cuts.planes.len());
         let children = piece.cut(&plane, index);
         if children.iter().any(|child| child.samples.is_empty()) {
@@ -320,12 +320,12 @@ impl<'a> Piece<'a> {
         f64::from(self.parts / 2) / f64::from(self.parts)
     }
 
-    fn best_plane(&self, cuts: &Cuts, evidence: &Evidence, settings: &Settings) -> CutPlane {
+    fn best_plane(&self, cuts: &Cuts, statistics: &CutStatistics, settings: &Settings) -> CutPlane {
         let directions = self.directions(settings, settings.seed << 32 | cuts.planes.len() as u64);
         if settings.candidates == Candidates::Median {
             return Scan::new(&self.samples, directions[0][0]).places(self.share(), 0.0)[0];
         }
-        let crossed = evidence.within(|point| self.holds(cuts, point));
+        let crossed = statistics.within(|point| self.contains(cuts, point));
         let others = Others::of(self, cuts, &crossed);
         let mut scans: Vec<Vec<Scan>> = Vec::new();
         let mut best: Option<(Cost, CutPlane)> = None;
@@ -414,8 +414,8 @@ impl<'a> Piece<'a> {
         points
     }
 
-    fn holds(&self, cuts: &Cuts, point: &Point) -> bool {
-        self.halves.iter().all(|half| half.holds(&cuts.planes, point))
+    fn contains(&self, cuts: &Cuts, point: &Point) -> bool {
+        self.halves.iter().all(|half| half.contains(&cuts.planes, point))
     }
 
     /// Unit normals of candidate planes, in groups: later groups are tried only if no plane of the

@@ -1,8 +1,8 @@
 //! The samples of a piece, sorted along a direction: finds the samples behind a plane, and those it
 //! cuts, by bisection.
 
-use super::evidence::Sample;
 use super::plan::{CutPlane, SAME, Spot};
+use super::statistics::Sample;
 use crate::{Point, Vector};
 
 /// The number of positions tried for a plane in one direction.

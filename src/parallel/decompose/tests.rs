@@ -27,13 +27,13 @@ fn model(source: &str) -> CsgModel {
         .expect("features")
 }
 
-fn evidence(model: &CsgModel, parts: u32) -> Evidence {
+fn statistics(model: &CsgModel, parts: u32) -> CutStatistics {
     let whole = Geometry::from(Model::Csg(Box::new(model.clone())));
     let made = whole
         .model
         .coarse_mesh(&mut CoarseSettings::default(), &Budget::default(), Work::unwatched())
         .expect("a mesh");
-    Evidence::of(&made.mesh, model, 2, parts).expect("a mesh that can be refined")
+    CutStatistics::of(&made.mesh, model, 2, parts).expect("a mesh that can be refined")
 }
 
 fn plane(point: [f64; 3], normal: [f64; 3]) -> CutPlane {
@@ -54,10 +54,10 @@ fn settings(planes: Vec<CutPlane>) -> GenerateSettings {
 }
 
 /// The shares of the samples in each piece, times the number of pieces.
-fn shares(cuts: &Cuts, evidence: &Evidence) -> Vec<f64> {
+fn shares(cuts: &Cuts, statistics: &CutStatistics) -> Vec<f64> {
     let mut shares = vec![0.0; cuts.leaves.len()];
-    let one = cuts.leaves.len() as f64 / evidence.samples.len() as f64;
-    evidence.samples.iter().for_each(|sample| shares[cuts.leaf_of(&sample.point)] += one);
+    let one = cuts.leaves.len() as f64 / statistics.samples.len() as f64;
+    statistics.samples.iter().for_each(|sample| shares[cuts.leaf_of(&sample.point)] += one);
     shares
 }
 
@@ -65,33 +65,33 @@ fn shares(cuts: &Cuts, evidence: &Evidence) -> Vec<f64> {
 fn a_bar_is_cut_across_into_equal_parts_of_any_number() {
     let bar = model(BAR);
     for parts in [1, 2, 3, 4] {
-        let evidence = evidence(&bar, parts);
-        let cuts = plan(&evidence, parts, &Settings::default()).expect("enough tets");
+        let statistics = statistics(&bar, parts);
+        let cuts = plan(&statistics, parts, &Settings::default()).expect("enough tets");
         assert_eq!((cuts.leaves.len(), cuts.planes.len()), (parts as usize, parts as usize - 1));
         for plane in &cuts.planes {
             assert!(plane.normal.x.abs() > 0.999, "{parts} parts: {plane:?}");
         }
-        let shares = shares(&cuts, &evidence);
+        let shares = shares(&cuts, &statistics);
         assert!(shares.iter().all(|share| (share - 1.0).abs() < 0.05), "{parts} parts: {shares:?}");
-        assert_eq!(plan(&evidence, parts, &Settings::default()).expect("the same"), cuts);
+        assert_eq!(plan(&statistics, parts, &Settings::default()).expect("the same"), cuts);
     }
 }
 
 #[test]
 fn more_parts_than_can_be_told_apart_are_refused() {
     let bar = model(BAR);
-    let few = evidence(&bar, 1);
+    let few = statistics(&bar, 1);
     let parts = few.samples.len() as u32;
     assert_eq!(plan(&few, parts, &Settings::default()), Err(TooManyParts { parts }));
 }
 
 #[test]
 fn planes_of_the_user_cut_what_they_meet() {
-    let evidence = evidence(&model(BAR), 4);
+    let statistics = statistics(&model(BAR), 4);
     let across = plane([1.0, 0.0, 0.0], [1.0, 0.0, 0.0]);
     let outside = plane([9.0, 0.0, 0.0], [1.0, 0.0, 0.0]);
     let along = plane([0.0, 0.5, 0.0], [0.0, 1.0, 0.0]);
-    let cuts = Cuts::by_planes(&[across, outside, along], &evidence);
+    let cuts = Cuts::by_planes(&[across, outside, along], &statistics);
     assert_eq!(cuts.leaves.len(), 4);
     let leaves =
         [[0.5, 0.2], [0.5, 0.8], [2.0, 0.2], [2.0, 0.8]].map(|[x, y]| cuts.leaf_of(&Point::new(x, y, 0.5)));
@@ -101,7 +101,7 @@ fn planes_of_the_user_cut_what_they_meet() {
 #[test]
 fn what_lies_on_the_geometry_keeps_its_patch_and_cuts_lie_in_their_body() {
     let whole = model(PEARL);
-    let cuts = Cuts::by_planes(&[plane([0.0, 0.0, 0.1], [0.0, 0.6, 0.8])], &evidence(&whole, 2));
+    let cuts = Cuts::by_planes(&[plane([0.0, 0.0, 0.1], [0.0, 0.6, 0.8])], &statistics(&whole, 2));
     let all: Vec<(usize, BodyId)> =
         [0, 1].into_iter().flat_map(|part| [0, 1].map(|b| (part, BodyId(b)))).collect();
     let cut = CutModel::new(&whole, &cuts, all).expect("pieces");
@@ -127,7 +127,7 @@ fn what_lies_on_the_geometry_keeps_its_patch_and_cuts_lie_in_their_body() {
 #[test]
 fn a_piece_that_was_forgotten_is_found_out() {
     let whole = model(PEARL);
-    let cuts = Cuts::by_planes(&[plane([0.0, 0.0, 0.1], [0.0, 0.6, 0.8])], &evidence(&whole, 2));
+    let cuts = Cuts::by_planes(&[plane([0.0, 0.0, 0.1], [0.0, 0.6, 0.8])], &statistics(&whole, 2));
     let pieces = vec![(0, BodyId(0)), (0, BodyId(1)), (1, BodyId(1))];
     assert!(matches!(CutModel::new(&whole, &cuts, pieces), Err(CutError::NewFace { .. })));
 }
@@ -141,7 +141,7 @@ tlo fichera;";
 fn a_cut_in_a_plane_of_the_file_is_no_boundary_where_a_body_goes_on() {
     let whole = model(FICHERA);
     let along = plane([0.0; 3], [0.0, -1.0, 0.0]);
-    let cuts = Cuts::by_planes(&[along], &evidence(&whole, 2));
+    let cuts = Cuts::by_planes(&[along], &statistics(&whole, 2));
     let cut = CutModel::new(&whole, &cuts, vec![(0, BodyId(0)), (1, BodyId(0))]).expect("pieces");
     assert_eq!(cut.faces.iter().filter(|face| matches!(face, cut::Face::Cut(_))).count(), 1);
     let on_patches =
@@ -162,7 +162,7 @@ fn a_cut_in_a_plane_of_the_file_is_no_boundary_where_a_body_goes_on() {
 #[test]
 fn the_text_of_the_pieces_is_a_geometry_of_the_same_volume_and_names() {
     let whole = model(PEARL);
-    let cuts = Cuts::by_planes(&[plane([0.0, 0.0, 0.1], [0.0, 0.6, 0.8])], &evidence(&whole, 2));
+    let cuts = Cuts::by_planes(&[plane([0.0, 0.0, 0.1], [0.0, 0.6, 0.8])], &statistics(&whole, 2));
     let pieces: Vec<(usize, BodyId)> =
         [0, 1].into_iter().flat_map(|part| [0, 1].map(|b| (part, BodyId(b)))).collect();
     let text = geo_text(PEARL, &whole.geometry, &cuts, &pieces);

@@ -51,11 +51,12 @@ impl ClassifiedEdge {
 /// A part with only tets, vertices and classification: a third of a [`DistMesh`] in memory.
 ///
 /// The only edges and faces are those classified on curves and patches. The others follow from the
-/// tets, as do the ids and holders of all edges and faces ([`settle`](super::settle())). Migration
-/// and writers need no more. Local ids ascend with global ids.
+/// tets, as do the ids and holders of all edges and faces
+/// ([`number_shared`](super::number_shared())). Migration and writers need no more. Local ids
+/// ascend with global ids.
 ///
 /// ```text
-///     DistMesh ── drop edges and faces ──► BareMesh ── migrate ──► BareMesh ── settle ──► DistMesh
+///     DistMesh ── drop edges and faces ──► BareMesh ── migrate ──► BareMesh ── number_shared ──► DistMesh
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct BareMesh {

@@ -34,8 +34,8 @@ impl Faults {
         if self.count == 0 { Ok(()) } else { Err(CheckError::Faults(self)) }
     }
 
-    fn expect(&mut self, holds: bool, text: impl FnOnce() -> String) {
-        if !holds {
+    fn expect(&mut self, contains: bool, text: impl FnOnce() -> String) {
+        if !contains {
             self.add(text);
         }
     }

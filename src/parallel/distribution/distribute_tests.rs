@@ -70,7 +70,7 @@ fn a_part_for_every_tet_and_scattered_parts_are_distributed_too() {
 fn each_entity_has_the_same_id_class_and_vertices_for_every_number_of_ranks() {
     let mesh = two_bodies(3);
     let entities = |ranks: u32| {
-        let settings = Settings { method: Method::Coordinates, ..Settings::default() };
+        let settings = Settings { method: Method::Bisection, ..Settings::default() };
         let (part, _) = partition::partition(&mesh, ranks, &settings).unwrap();
         let mut edges = BTreeMap::new();
         let mut faces = BTreeMap::new();

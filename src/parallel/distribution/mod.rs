@@ -13,20 +13,20 @@
 //!
 //! [`distribute()`] makes it from a mesh on rank 0; [`DistMesh::check`] verifies that the ranks
 //! agree. A part read from files or moved between ranks has only tets and vertices, a [`BareMesh`]:
-//! [`settle()`] constructs its edges and faces.
+//! [`number_shared()`] constructs its edges and faces.
 
 mod bare;
 mod check;
 mod classify;
 mod distribute;
+mod number_shared;
 mod piece;
-mod settle;
 mod shared;
 
 pub use bare::{BareMesh, ClassifiedEdge, Side};
 pub use check::{CheckError, Faults};
 pub use distribute::{DistError, distribute, from_serial};
-pub use settle::{SettleError, settle};
+pub use number_shared::{NumberError, number_shared};
 pub use shared::owner;
 
 use crate::Point;

@@ -69,7 +69,7 @@ impl HasKind for HaloError {
 pub fn halo(comm: &dyn Communicator, part: &dyn MeshStream, by: By) -> Result<Ghosts, HaloError> {
     let interface = Interface::new(part);
     let to = leaving::leaving(comm, &interface, by)?;
-    let origins: BTreeMap<u32, GlobalId> = part.origins().into_iter().collect();
+    let origins: BTreeMap<u32, GlobalId> = part.masters().into_iter().collect();
     // Vertices of this part that others may watch, by id; they need not be shared.
     let mut sent: BTreeMap<GlobalId, u32> = BTreeMap::new();
     let mut messages = Vec::new();

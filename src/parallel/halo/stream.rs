@@ -150,10 +150,10 @@ impl MeshStream for WithHalo<'_> {
         self.part.singular()
     }
 
-    fn origins(&self) -> Vec<(u32, GlobalId)> {
+    fn masters(&self) -> Vec<(u32, GlobalId)> {
         let ghosts = (self.ghosts.first_vertex..).zip(&self.ghosts.vertices);
         let images = ghosts.filter(|(_, vertex)| vertex.origin != vertex.id);
-        let mut origins = self.part.origins();
+        let mut origins = self.part.masters();
         origins.extend(images.map(|(local, vertex)| (local, vertex.origin)));
         origins
     }

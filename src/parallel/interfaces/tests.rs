@@ -7,7 +7,7 @@ use crate::ground::mesh::Rank;
 use crate::ground::size::UniformSize;
 use crate::mesher::improve::Settings as Improve;
 use crate::parallel::check::{self, PartReport, check, checksum_of_all};
-use crate::parallel::distribution::{distribute, settle};
+use crate::parallel::distribution::{distribute, number_shared};
 use crate::parallel::refine::fixtures::{Fixture, ball, cube, cylinder};
 use crate::parallel::refine::{self, refine};
 use crate::parallel::skin;
@@ -25,7 +25,7 @@ fn filled(comm: &dyn Communicator, fixture: &Fixture, h: f64) -> BareMesh {
 
 /// The check report of a distributed mesh.
 fn checked(comm: &dyn Communicator, fixture: &Fixture, mesh: BareMesh) -> PartReport {
-    let whole = settle(comm, mesh).expect("a mesh");
+    let whole = number_shared(comm, mesh).expect("a mesh");
     whole.check(comm).expect("a distributed mesh, with ids without gaps");
     let mesh = refine(whole, &fixture.projector, 1, &refine::Settings::default()).expect("positive tets");
     let report =

@@ -19,7 +19,7 @@
 //! | data | how it moves |
 //! |---|---|
 //! | tets, bodies, boundary faces, edges on curves and patches | with the tets |
-//! | interior edges and faces | not at all: they follow from the tets, their ids and holders from [`settle`] |
+//! | interior edges and faces | not at all: they follow from the tets, their ids and holders from [`number_shared`] |
 //! | names, periodic maps, singular tags | not at all: all ranks have them, by ids that migration keeps |
 //!
 //! Not here: the choice of destinations, see [`repartition`](crate::parallel::repartition).
@@ -41,7 +41,7 @@ pub use stream::BareStream;
 use crate::ground::comm::{CommError, Communicator};
 use crate::ground::error::{ErrorKind, HasKind};
 use crate::ground::mesh::{GlobalId, Rank};
-use crate::parallel::distribution::{BareMesh, DistMesh, SettleError, settle};
+use crate::parallel::distribution::{BareMesh, DistMesh, NumberError, number_shared};
 
 /// Why tets cannot be moved.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -94,7 +94,7 @@ pub enum MigrateError {
     },
     /// The edges and faces of the new parts cannot be numbered.
     #[error(transparent)]
-    Settle(#[from] SettleError),
+    Number(#[from] NumberError),
     /// Another rank met an error, or the ranks cannot communicate.
     #[error(transparent)]
     Comm(#[from] CommError),
@@ -105,7 +105,7 @@ impl HasKind for MigrateError {
         match self {
             Self::OutOfMemory { .. } | Self::TooMany { .. } => ErrorKind::Resources,
             Self::Destinations { .. } | Self::Ranks { .. } | Self::NoSuchRank { .. } => ErrorKind::Input,
-            Self::Settle(error) => error.kind(),
+            Self::Number(error) => error.kind(),
             Self::Comm(error) => error.kind(),
         }
     }
@@ -148,7 +148,7 @@ pub fn migrate(
     destination: &[Rank],
 ) -> Result<DistMesh, MigrateError> {
     let (moved, _) = migrate_bare(comm, mesh.into(), destination, &Settings::default())?;
-    Ok(settle(comm, moved)?)
+    Ok(number_shared(comm, moved)?)
 }
 
 /// **Collective.** [`migrate`] without edges and faces, which is many times faster; also returns

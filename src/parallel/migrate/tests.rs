@@ -96,7 +96,7 @@ fn refined_twice(fixture: &fixtures::Fixture, ranks: u32, plans: [fn(u64, u32) -
                 crate::parallel::check::check(comm, &stream, Some(&fixture.projector), &check_settings)
                     .unwrap();
             assert_eq!(report.faults, 0, "{:?}", report.described);
-            coarse = settle(comm, stream.into_mesh()).unwrap();
+            coarse = number_shared(comm, stream.into_mesh()).unwrap();
             coarse.check(comm).unwrap();
         }
         sums

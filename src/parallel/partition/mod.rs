@@ -7,7 +7,7 @@
 //! | method | cut | needs |
 //! |---|---|---|
 //! | [`Method::Metis`] | small | feature `metis` |
-//! | [`Method::Coordinates`] | 1.3 to 1.8 times that; on a plain box no larger | nothing |
+//! | [`Method::Bisection`] | 1.3 to 1.8 times that; on a plain box no larger | nothing |
 //!
 //! Deterministic: the same mesh gives the same parts. Every part has a tet; parts need not be
 //! connected.
@@ -39,14 +39,14 @@ pub enum Method {
     Metis,
     /// Recursive bisection of the tet centroids across the longest side of their box (Berger and
     /// Bokhari 1987).
-    Coordinates,
+    Bisection,
 }
 
 impl std::fmt::Display for Method {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(match self {
             Self::Metis => "METIS recursive bisection",
-            Self::Coordinates => "recursive coordinate bisection",
+            Self::Bisection => "recursive coordinate bisection",
         })
     }
 }
@@ -62,7 +62,7 @@ pub struct Settings {
 
 impl Default for Settings {
     fn default() -> Self {
-        let method = if cfg!(feature = "metis") { Method::Metis } else { Method::Coordinates };
+        let method = if cfg!(feature = "metis") { Method::Metis } else { Method::Bisection };
         Self { method, seed: 1 }
     }
 }
@@ -167,7 +167,7 @@ pub fn partition_tied(
             let of_cluster = graph::bisect_weighted(&clusters.graph(&dual), parts, settings.seed)?;
             clusters.of.iter().map(|&cluster| of_cluster[cluster as usize]).collect()
         }
-        (Method::Coordinates, _) => rcb::bisect(mesh, parts),
+        (Method::Bisection, _) => rcb::bisect(mesh, parts),
     };
     if let Some(clusters) = &clusters {
         clusters.gather(&mut part);

@@ -3,7 +3,7 @@ use crate::ground::mesh::fixtures::{lattice_box, lattice_cube};
 use crate::ground::mesh::{TetId, VertexId};
 
 const METHODS: &[Method] =
-    if cfg!(feature = "metis") { &[Method::Metis, Method::Coordinates] } else { &[Method::Coordinates] };
+    if cfg!(feature = "metis") { &[Method::Metis, Method::Bisection] } else { &[Method::Bisection] };
 
 fn with(method: Method) -> Settings {
     Settings { method, ..Settings::default() }
@@ -26,7 +26,7 @@ fn parts_are_balanced_and_repeatable() {
 
 #[test]
 fn a_cube_is_cut_in_half_by_coordinates() {
-    let (part, metrics) = partition(&lattice_cube(4), 2, &with(Method::Coordinates)).unwrap();
+    let (part, metrics) = partition(&lattice_cube(4), 2, &with(Method::Bisection)).unwrap();
     // The plane x = 1/2 cuts 4 × 4 cells with two faces each.
     assert_eq!((metrics.edge_cut, metrics.pieces, metrics.smallest, metrics.largest), (32, 2, 192, 192));
     assert_eq!(part.iter().filter(|&&p| p == 0).count(), 192);
@@ -37,7 +37,7 @@ fn a_cube_is_cut_in_half_by_coordinates() {
 fn metis_cuts_less_than_coordinates() {
     let mesh = lattice_box([16, 8, 8], |_| 0);
     let cut = |method| partition(&mesh, 7, &with(method)).unwrap().1.edge_cut;
-    assert!(cut(Method::Metis) < cut(Method::Coordinates));
+    assert!(cut(Method::Metis) < cut(Method::Bisection));
 }
 
 #[cfg(feature = "metis")]
@@ -56,7 +56,7 @@ fn metis_may_be_called_from_many_threads() {
 fn without_metis_it_is_refused_and_not_the_default() {
     let mesh = lattice_cube(2);
     assert_eq!(partition(&mesh, 2, &with(Method::Metis)).unwrap_err(), PartitionError::NoMetis);
-    assert_eq!(partition(&mesh, 2, &Settings::default()).unwrap().1.method, Some(Method::Coordinates));
+    assert_eq!(partition(&mesh, 2, &Settings::default()).unwrap().1.method, Some(Method::Bisection));
 }
 
 #[test]
@@ -95,7 +95,7 @@ fn empty_parts_are_filled_from_the_largest() {
     let mut part = vec![1; 48];
     part[TetId(0).index()] = 3;
     assert_eq!(metrics::fill_empty_parts(&dual, &mut part, 5), 3);
-    let measured = metrics::measure(&dual, &part, 5, Some(Method::Coordinates), 3);
+    let measured = metrics::measure(&dual, &part, 5, Some(Method::Bisection), 3);
     assert_eq!((measured.smallest, measured.largest, measured.repaired), (1, 44, 3));
 }
 

@@ -16,7 +16,7 @@
 //! Success is not guaranteed: the remaining bad tets are reported, and
 //! [`refine()`](super::refine()) rejects the mesh.
 
-use super::bend::Bends;
+use super::displacements::EdgeDisplacements;
 use super::snap::{self, Coordinates};
 use super::tet::BadTet;
 use super::trial::{CHUNK, Least, curved, worst_children};
@@ -55,8 +55,8 @@ impl Default for Settings {
 /// The result of [`mend()`].
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Mended {
-    /// The edge displacements, for [`Settings::bends`](super::Settings::bends) on all ranks.
-    pub bends: Bends,
+    /// The edge displacements, for [`Settings`](super::Settings::displacements) on all ranks.
+    pub displacements: EdgeDisplacements,
     /// Coarse tets with insufficient children in the first refinement test, ascending.
     pub before: Vec<GlobalId>,
     /// Coarse tets with insufficient children in the last refinement test, ascending.
@@ -80,8 +80,15 @@ const STEPS: [f64; 2] = [0.12, 0.01];
 /// # Errors
 /// [`RefineError::Projection`] and [`RefineError::OutOfMemory`], as [`refine()`](super::refine()).
 pub fn mend(mesh: &DistMesh, projector: &Projector, settings: &Settings) -> Result<Mended, RefineError> {
-    let mut trial = Trial { mesh, projector, settings, pieces: settings.pieces, bends: Bends::default() };
-    let mut tried: BTreeSet<u32> = curved(mesh, projector, &Bends::default()).into_iter().collect();
+    let mut trial = Trial {
+        mesh,
+        projector,
+        settings,
+        pieces: settings.pieces,
+        displacements: EdgeDisplacements::default(),
+    };
+    let mut tried: BTreeSet<u32> =
+        curved(mesh, projector, &EdgeDisplacements::default()).into_iter().collect();
     let mut before: Option<Vec<GlobalId>> = None;
     let mut left = Vec::new();
     for pieces in ladder(settings.pieces) {
@@ -92,7 +99,7 @@ pub fn mend(mesh: &DistMesh, projector: &Projector, settings: &Settings) -> Resu
         left = trial.bad(&tried)?;
     }
     let left = trial.ids(&left);
-    Ok(Mended { bends: trial.bends, before: before.unwrap_or_default(), left })
+    Ok(Mended { displacements: trial.displacements, before: before.unwrap_or_default(), left })
 }
 
 /// The numbers of subdivisions to test for `n`: n, halved while above [`FINEST`], preceded by half
@@ -112,7 +119,7 @@ struct Trial<'a> {
     projector: &'a Projector,
     settings: &'a Settings,
     pieces: u32,
-    bends: Bends,
+    displacements: EdgeDisplacements,
 }
 
 impl Trial<'_> {
@@ -174,8 +181,11 @@ impl Trial<'_> {
     }
 
     fn refine(&self, part: DistMesh) -> Result<(RefinedMesh, Vec<BadTet>), RefineError> {
-        let settings =
-            RefineSettings { described: 0, bends: self.bends.clone(), ..RefineSettings::default() };
+        let settings = RefineSettings {
+            described: 0,
+            displacements: self.displacements.clone(),
+            ..RefineSettings::default()
+        };
         refine_unchecked(part, self.projector, self.pieces, &settings)
     }
 
@@ -211,7 +221,7 @@ impl Trial<'_> {
         let id = self.mesh.edge_ids[edge.index()];
         let [p, q] = self.mesh.edges[edge.index()].map(|v| self.mesh.points[v.index()]);
         let length = (p - q).norm();
-        let before = self.bends.get(id);
+        let before = self.displacements.get(id);
         let mut best = (self.badness(&part)?, before);
         let mut step = STEPS[0];
         while step > STEPS[1] && best.0 > 0.0 {
@@ -219,7 +229,7 @@ impl Trial<'_> {
             for (axis, sign) in [(0, 1.0), (0, -1.0), (1, 1.0), (1, -1.0), (2, 1.0), (2, -1.0)] {
                 let mut displacement: Coordinates = best.1.unwrap_or_default();
                 displacement[axis] += sign * step * length;
-                self.bends.set(id, Some(displacement));
+                self.displacements.set(id, Some(displacement));
                 let badness = self.badness(&part)?;
                 if badness < better.0 {
                     better = (badness, Some(displacement));
@@ -232,7 +242,7 @@ impl Trial<'_> {
             }
         }
         let changed = best.1 != before;
-        self.bends.set(id, best.1);
+        self.displacements.set(id, best.1);
         Ok(changed)
     }
 }

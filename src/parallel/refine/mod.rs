@@ -17,16 +17,16 @@
 //!
 //! [`MeshStream`]: crate::ground::mesh::stream::MeshStream
 
-pub mod bend;
 pub mod blend;
-pub mod census;
 pub mod diagonal;
+pub mod displacements;
 pub mod lattice;
 pub mod mend;
 pub mod numbering;
 pub mod parents;
 pub mod periodic;
 mod periodic_check;
+pub mod predicted;
 pub mod refined;
 mod run;
 pub mod snap;
@@ -34,10 +34,10 @@ pub mod stored;
 mod tet;
 pub mod trial;
 
-pub use bend::Bends;
-pub use census::{Census, census};
+pub use displacements::EdgeDisplacements;
 pub use mend::{Mended, mend};
 pub use periodic_check::{PeriodicCheck, check_periodic};
+pub use predicted::{PredictedCounts, predicted_counts};
 pub use refined::RefinedMesh;
 pub use stored::StoredMesh;
 pub use trial::{Least, Trial, trial};
@@ -63,7 +63,7 @@ pub struct Settings {
     /// The maximum number of faults that an error describes one by one.
     pub described: usize,
     /// Displacements of coarse edges, the same on all ranks.
-    pub bends: Bends,
+    pub displacements: EdgeDisplacements,
     /// Which coordinates to store.
     pub keep: Keep,
     /// Whether all octahedra of a coarse tet are cut along the same diagonal, the best of the
@@ -85,7 +85,7 @@ pub enum Keep {
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { described: 8, bends: Bends::default(), keep: Keep::All, nested: false }
+        Self { described: 8, displacements: EdgeDisplacements::default(), keep: Keep::All, nested: false }
     }
 }
 

@@ -256,7 +256,7 @@ impl MeshStream for RefinedMesh {
         }
     }
 
-    fn origins(&self) -> Vec<(u32, GlobalId)> {
+    fn masters(&self) -> Vec<(u32, GlobalId)> {
         fine_images(&self.periodic.origins, &self.coarse, &self.numbering)
     }
 }

@@ -78,7 +78,7 @@ fn a_thousand_ranks_make_the_mesh_that_one_makes() {
         let made = thread::run(ranks, |comm| {
             let mesh = (comm.rank() == 0).then(|| (fixture.mesh.clone(), rank_of.clone()));
             let part = distribute(comm, mesh).expect("a classified mesh");
-            let counted = census(&part, 3);
+            let counted = predicted_counts(&part, 3);
             let part = refine(part, &fixture.projector, 3, &Settings::default()).expect("refinable");
             assert_eq!((counted.tets, counted.held), (part.counts().tets, part.counts().vertices));
             let [owned] = comm.all_reduce_sum_u64([counted.owned]).expect("all ranks");
@@ -93,8 +93,9 @@ fn a_thousand_ranks_make_the_mesh_that_one_makes() {
 #[test]
 fn parts_own_like_shares_of_what_they_hold() {
     for ranks in [16, 128, 1024] {
-        let counted: Vec<Census> = parts_of_cube(16, ranks).iter().map(|part| census(part, 16)).collect();
-        let shares: Vec<f64> = counted.iter().map(Census::owned_share).collect();
+        let counted: Vec<PredictedCounts> =
+            parts_of_cube(16, ranks).iter().map(|part| predicted_counts(part, 16)).collect();
+        let shares: Vec<f64> = counted.iter().map(PredictedCounts::owned_share).collect();
         let mean = shares.iter().sum::<f64>() / f64::from(ranks);
         let largest = shares.iter().copied().fold(0.0, f64::max);
         assert!(largest < 1.1 * mean, "{ranks} parts: {largest} beside {mean}");

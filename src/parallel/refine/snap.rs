@@ -14,8 +14,8 @@
 //! error stays within 5 ulp per coordinate, below one in practice: far below 10⁻¹² of the bounding
 //! box unless the geometry is some thousand box diagonals away from the origin.
 
-use super::bend::Bends;
 use super::blend::{Blend, barycentric, split};
+use super::displacements::EdgeDisplacements;
 use super::lattice::Lattice;
 use super::numbering::Numbering;
 use super::{Keep, RefineError, Settings};
@@ -61,10 +61,15 @@ impl Place {
 }
 
 /// Whether the lattice of a tet is affine: no displaced edge, no edge or face on curved geometry.
-pub fn is_flat(mesh: &DistMesh, projector: &Projector, bends: &Bends, tet: TetId) -> bool {
+pub fn is_flat(
+    mesh: &DistMesh,
+    projector: &Projector,
+    displacements: &EdgeDisplacements,
+    tet: TetId,
+) -> bool {
     let free = |class| Place::of(class, projector) == Place::Free;
-    let bent = |edge: &EdgeId| bends.get(mesh.edge_ids[edge.index()]).is_some();
-    (bends.is_empty() || !mesh.tet_edges[tet.index()].iter().any(bent))
+    let bent = |edge: &EdgeId| displacements.get(mesh.edge_ids[edge.index()]).is_some();
+    (displacements.is_empty() || !mesh.tet_edges[tet.index()].iter().any(bent))
         && mesh.tet_edges[tet.index()].iter().all(|edge| free(mesh.edge_classes[edge.index()]))
         && mesh.tet_faces[tet.index()].iter().all(|face| free(mesh.face_classes[face.index()]))
 }
@@ -97,7 +102,7 @@ pub fn boundary_first(
         *coordinates = (*point).into();
     }
     let (edges, rest) = rest.split_at_mut(face_base - edge_base);
-    let mut failed = fill_edges(mesh, projector, &settings.bends, vertices, edges);
+    let mut failed = fill_edges(mesh, projector, &settings.displacements, vertices, edges);
     if failed.is_empty() {
         let faces = &mut rest[..tet_base - face_base];
         failed = fill_faces(mesh, projector, numbering, &*vertices, &*edges, faces);
@@ -111,7 +116,7 @@ pub fn boundary_first(
 fn fill_edges(
     mesh: &DistMesh,
     projector: &Projector,
-    bends: &Bends,
+    displacements: &EdgeDisplacements,
     vertices: &[Coordinates],
     edges: &mut [Coordinates],
 ) -> Vec<ProjectionFailed> {
@@ -122,7 +127,8 @@ fn fill_edges(
     let fill = |(edge, inside): (usize, &mut [Coordinates])| {
         let ends = mesh.edges[edge].map(|v| vertices[v.index()]);
         let place = Place::of(mesh.edge_classes[edge], projector);
-        let bend = bends.get(mesh.edge_ids[edge]).filter(|_| may_bend(mesh.edge_classes[edge], projector));
+        let bend =
+            displacements.get(mesh.edge_ids[edge]).filter(|_| may_bend(mesh.edge_classes[edge], projector));
         fill_edge(ends, inside, bend, |point| place.snap(projector, point)).err()
     };
     edges.par_chunks_mut(edge_points).enumerate().filter_map(fill).collect()

@@ -113,7 +113,7 @@ impl MeshStream for StoredMesh {
     fn singular(&self) -> SingularTags {
         self.refined.singular()
     }
-    fn origins(&self) -> Vec<(u32, GlobalId)> {
-        self.refined.origins()
+    fn masters(&self) -> Vec<(u32, GlobalId)> {
+        self.refined.masters()
     }
 }

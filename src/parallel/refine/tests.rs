@@ -249,10 +249,15 @@ fn the_least_pieces_that_make_enough_tets_are_chosen() {
 
 /// The checksum and the report of a mesh that is refined in parts.
 fn in_parts(fixture: &Fixture, n: u32, ranks: u32) -> (Checksum, PartReport) {
-    with_bends(fixture, n, ranks, &Bends::default())
+    with_displacements(fixture, n, ranks, &EdgeDisplacements::default())
 }
 
-fn with_bends(fixture: &Fixture, n: u32, ranks: u32, bends: &Bends) -> (Checksum, PartReport) {
+fn with_displacements(
+    fixture: &Fixture,
+    n: u32,
+    ranks: u32,
+    displacements: &EdgeDisplacements,
+) -> (Checksum, PartReport) {
     // Tets dealt out in threes: ragged parts that touch in vertices, edges and faces.
     let rank_of: Vec<Rank> = (0..fixture.mesh.tets.len() as u32).map(|t| t / 3 % ranks).collect();
     let settings = crate::parallel::check::Settings::default();
@@ -260,7 +265,7 @@ fn with_bends(fixture: &Fixture, n: u32, ranks: u32, bends: &Bends) -> (Checksum
         let mesh = (comm.rank() == 0).then(|| (fixture.mesh.clone(), rank_of.clone()));
         let part = distribute(comm, mesh).expect("a classified mesh");
         part.check(comm).expect("a distributed mesh");
-        let bent = Settings { bends: bends.clone(), ..Settings::default() };
+        let bent = Settings { displacements: displacements.clone(), ..Settings::default() };
         let part = refine(part, &fixture.projector, n, &bent).expect("refinable");
         let report = check(comm, &part, Some(&fixture.projector), &settings).expect("all ranks");
         (checksum_of_all(comm, &part).expect("all ranks"), report)
@@ -339,20 +344,20 @@ fn bent_edges_make_room_beside_a_hollow_sphere() {
     let settings = mend::Settings { pieces: 8, ..mend::Settings::default() };
     let mended = mend(&coarse, &fixture.projector, &settings).expect("projects");
     assert_eq!((mended.before, mended.left), (bad, vec![]));
-    let (sum, report) = with_bends(&fixture, 8, 1, &mended.bends);
+    let (sum, report) = with_displacements(&fixture, 8, 1, &mended.displacements);
     assert_eq!((report.faults, sum.open), (0, 0), "{:?}", report.described);
-    assert_eq!(with_bends(&fixture, 8, 3, &mended.bends).0, sum);
+    assert_eq!(with_displacements(&fixture, 8, 3, &mended.displacements).0, sum);
 }
 
 #[test]
 fn bent_edges_make_angles_larger_that_are_too_small() {
     let fixture = shell(1.0, 2.6);
     let coarse = whole(&fixture.mesh);
-    let tried = |bends: &Bends, dihedral: f64| {
+    let tried = |displacements: &EdgeDisplacements, dihedral: f64| {
         let least = Least { mean_ratio: 0.0, dihedral };
-        trial(&coarse, &fixture.projector, 8, bends, least).expect("projects")
+        trial(&coarse, &fixture.projector, 8, displacements, least).expect("projects")
     };
-    let before = tried(&Bends::default(), 90.0);
+    let before = tried(&EdgeDisplacements::default(), 90.0);
     assert!(before.inverted.is_empty());
     let wanted = before.smallest_dihedral + 1.0;
     let least = Least { mean_ratio: 0.0, dihedral: wanted };
@@ -360,7 +365,7 @@ fn bent_edges_make_angles_larger_that_are_too_small() {
     let mended = mend(&coarse, &fixture.projector, &settings).expect("projects");
     assert!(!mended.before.is_empty());
     assert!(mended.left.is_empty(), "{:?}", mended.left);
-    let after = tried(&mended.bends, wanted);
+    let after = tried(&mended.displacements, wanted);
     assert!(after.inverted.is_empty() && after.poor.is_empty(), "{:?}", after.poor);
 }
 

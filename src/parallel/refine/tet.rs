@@ -47,8 +47,9 @@ pub fn fill(
     let mut diagonals = Diagonals::new(mesh.tets.len(), lattice.octahedra());
     let bytes_per_tet = diagonals.bytes_per_tet();
     let (before, inside) = points.split_at_mut(numbering.bases()[2]);
-    let flat: Vec<bool> =
-        (0..mesh.tets.len()).map(|tet| is_flat(mesh, projector, &settings.bends, TetId::new(tet))).collect();
+    let flat: Vec<bool> = (0..mesh.tets.len())
+        .map(|tet| is_flat(mesh, projector, &settings.displacements, TetId::new(tet)))
+        .collect();
     let insides = match lattice.tet_points() as usize {
         _ if inside.is_empty() => {
             Either::Left((0..mesh.tets.len()).into_par_iter().map(|_| &mut [] as &mut [Coordinates]))

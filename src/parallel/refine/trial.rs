@@ -4,7 +4,7 @@
 use super::mend::extract;
 use super::snap;
 use super::tet::inverted;
-use super::{Bends, RefineError, RefinedMesh, Settings, refine_unchecked};
+use super::{EdgeDisplacements, RefineError, RefinedMesh, Settings, refine_unchecked};
 use crate::ground::mesh::stream::{MeshStream, TetBlock};
 use crate::ground::mesh::{GlobalId, TetId};
 use crate::ground::projector::Projector;
@@ -49,7 +49,7 @@ pub struct Trial {
     pub error: Option<RefineError>,
 }
 
-/// *Local, on the whole mesh.* Refines the coarse tets curved by projection or `bends` with
+/// *Local, on the whole mesh.* Refines the coarse tets curved by projection or `displacements` with
 /// `pieces` subdivisions per edge, and finds those with a child below `least`.
 ///
 /// # Errors
@@ -58,13 +58,13 @@ pub fn trial(
     mesh: &DistMesh,
     projector: &Projector,
     pieces: u32,
-    bends: &Bends,
+    displacements: &EdgeDisplacements,
     least: Least,
 ) -> Result<Trial, RefineError> {
     let mut found = Trial::default();
-    let settings = Settings { bends: bends.clone(), ..Settings::default() };
+    let settings = Settings { displacements: displacements.clone(), ..Settings::default() };
     let mut worst_of_poor = Extremes::NONE;
-    for chunk in curved(mesh, projector, bends).chunks(CHUNK) {
+    for chunk in curved(mesh, projector, displacements).chunks(CHUNK) {
         let (refined, bad) = refine_unchecked(extract(mesh, chunk), projector, pieces, &settings)?;
         let id = |at: usize| mesh.tet_ids[chunk[at] as usize];
         found.inverted.extend(bad.iter().map(|bad| bad.tet));
@@ -86,8 +86,8 @@ pub fn trial(
 }
 
 /// The tets whose lattices are not affine, ascending.
-pub(super) fn curved(mesh: &DistMesh, projector: &Projector, bends: &Bends) -> Vec<u32> {
-    let is_curved = |tet: &u32| !snap::is_flat(mesh, projector, bends, TetId(*tet));
+pub(super) fn curved(mesh: &DistMesh, projector: &Projector, displacements: &EdgeDisplacements) -> Vec<u32> {
+    let is_curved = |tet: &u32| !snap::is_flat(mesh, projector, displacements, TetId(*tet));
     (0..mesh.tets.len() as u32).filter(is_curved).collect()
 }
 

@@ -11,8 +11,9 @@
 //! | [`Method::Smoothed`] | one of these, then fewer faces between parts by [`smooth`] | smaller still |
 //! | [`Method::Clusters`] | METIS on a coarse graph of clusters of tets, gathered on rank 0 (feature `metis`), then [`smooth`] | smallest |
 //!
-//! In addition, [`diffuse()`] balances uneven parts with little migration, and [`islands()`] moves
-//! small disconnected components of parts to the surrounding part.
+//! In addition, [`diffuse()`] balances uneven parts with little migration, and
+//! [`absorb_small_components`] moves small disconnected components of parts to the part around
+//! them.
 //!
 //! All methods depend only on the mesh and the number of parts, not on the current distribution.
 //! The number of parts may differ from the number of ranks, but only parts below the number of
@@ -21,18 +22,18 @@
 
 pub mod bisection;
 mod clusters;
+pub mod components;
 pub mod curve;
 pub mod diffuse;
 mod interfaces;
-pub mod islands;
 pub mod metrics;
 pub mod smooth;
 #[cfg(test)]
 mod tests;
 
+pub use components::absorb_small_components;
 pub use diffuse::diffuse;
 pub use interfaces::join_interfaces;
-pub use islands::islands;
 pub use metrics::{Metrics, measure};
 
 use crate::ground::comm::{CommError, Communicator};

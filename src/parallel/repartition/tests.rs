@@ -253,13 +253,13 @@ fn tets_pass_through_parts_that_have_few() {
     assert!(sizes.iter().all(|&size| (48..=68).contains(&size)), "{sizes:?}");
 }
 
-/// The parts after one call of `islands`, and the number of components then.
+/// The parts after one call of `absorb_small_components`, and the number of components then.
 fn joined(mesh: &Mesh, part: &[Rank], ranks: u32) -> (Vec<Rank>, u64) {
     let (part, pieces) = on_parts(mesh, part, ranks, |comm, mesh| {
         let mesh = BareMesh::from(mesh);
-        let to = islands(&mesh);
+        let to = absorb_small_components(&mesh);
         let (mesh, _) = migrate_bare(comm, mesh, &to, &migrate::Settings::default()).unwrap();
-        let pieces = islands::pieces(comm, &mesh).unwrap();
+        let pieces = components::pieces(comm, &mesh).unwrap();
         (mesh.tet_ids.iter().map(|&id| (id, comm.rank())).collect(), pieces)
     });
     (part, pieces[0])

@@ -7,7 +7,7 @@ use crate::ground::mesh::{Class, GlobalId, Rank};
 use crate::ground::size::{SizeField, UniformSize};
 use crate::mesher::improve::Settings;
 use crate::parallel::check::{Checksum, PartReport, check, checksum_of_all};
-use crate::parallel::distribution::{DistMesh, distribute, settle};
+use crate::parallel::distribution::{DistMesh, distribute, number_shared};
 use crate::parallel::refine::fixtures::{Fixture, ball, cube, cylinder};
 use crate::parallel::refine::{self, refine};
 use std::collections::BTreeMap;
@@ -42,7 +42,7 @@ fn filled(
         let refused = usize::from(filled.refused.is_some());
         let boundary = skin.numbering.totals().boundary;
         let bare = number(comm, skin.skin, filled, boundary).expect("all ranks");
-        let whole = settle(comm, bare).expect("a mesh");
+        let whole = number_shared(comm, bare).expect("a mesh");
         whole.check(comm).expect("a distributed mesh");
         let mesh = refine(whole, &fixture.projector, 1, &refine::Settings::default()).expect("positive tets");
         let report =

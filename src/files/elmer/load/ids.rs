@@ -124,7 +124,7 @@ fn request(
     let mut previous = 0;
     for (&(_, place), line) in nodes.iter().zip(shared) {
         let node = &part.files.nodes[place as usize];
-        let watched = !part.nodes.holds(place as usize);
+        let watched = !part.nodes.contains(place as usize);
         let bits = u64::from(watched) << 1 | u64::from(line.is_some());
         put_varint(&mut message, u64::from(node.id - previous) << 2 | bits);
         previous = node.id;
@@ -369,7 +369,7 @@ fn read_replies(
                 new_ids.nodes[number as usize][place as usize] = node;
                 let count = take_varint(rest) as usize;
                 let holders: Vec<Rank> = take_ascending(rest, count).map(|rank| rank as Rank).collect();
-                if part.nodes.holds(place as usize) && count > 0 {
+                if part.nodes.contains(place as usize) && count > 0 {
                     new_ids.holders.push((node, holders));
                 }
             }

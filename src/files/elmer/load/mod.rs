@@ -27,7 +27,7 @@ use crate::files::input::{ReadError, counted};
 use crate::ground::comm::{CommError, Communicator};
 use crate::ground::error::{ErrorKind, HasKind};
 use crate::ground::mesh::{Label, Names, Rank};
-use crate::parallel::distribution::{DistMesh, SettleError, settle};
+use crate::parallel::distribution::{DistMesh, NumberError, number_shared};
 use own::OwnParts;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -60,11 +60,11 @@ pub enum LoadError {
     Read(#[from] ReadError),
     /// The tets do not form a mesh.
     #[error("{}: {error}", folder.display())]
-    Settle {
+    Number {
         /// The folder with the files.
         folder: PathBuf,
         /// Why.
-        error: SettleError,
+        error: NumberError,
     },
     /// Another rank met an error, or the ranks cannot communicate.
     #[error(transparent)]
@@ -74,7 +74,7 @@ pub enum LoadError {
 impl HasKind for LoadError {
     fn kind(&self) -> ErrorKind {
         match self {
-            Self::Read(_) | Self::Settle { .. } => ErrorKind::Input,
+            Self::Read(_) | Self::Number { .. } => ErrorKind::Input,
             Self::Comm(error) => error.kind(),
         }
     }
@@ -100,7 +100,8 @@ pub fn load(comm: &dyn Communicator, dir: &Path) -> Result<Loaded, LoadError> {
     let assembled = comm.agree(own.assemble(comm, new_ids, &bodies).map_err(LoadError::from))?;
     let own::Assembled { bare, of_tet, local, turned } = assembled;
     let folder = layout.folder().to_path_buf();
-    let mut mesh = settle(comm, bare).map_err(|error| LoadError::Settle { folder: folder.clone(), error })?;
+    let mut mesh =
+        number_shared(comm, bare).map_err(|error| LoadError::Number { folder: folder.clone(), error })?;
     let found = faces::find_boundary(comm, &own, &of_tet, &local, &mut mesh)?;
 
     let [turned] = comm.all_reduce_sum_u64([turned])?;
@@ -165,7 +166,7 @@ fn expect_parts(layout: Layout) -> Result<Layout, ReadError> {
     match named {
         Some(named) if named != *parts => {
             let path = folder.join(format!("part.{}.header", named.min(parts + 1)));
-            let source = std::io::Error::other(format!("the folder holds {parts} parts of {named}"));
+            let source = std::io::Error::other(format!("the folder contains {parts} parts of {named}"));
             Err(ReadError::Io { path, source })
         }
         _ => Ok(layout),

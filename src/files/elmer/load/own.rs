@@ -161,7 +161,7 @@ impl OwnParts {
     fn number_vertices(&self, ids: &[Vec<GlobalId>]) -> (Vec<Vec<VertexId>>, Vec<(GlobalId, TetPlace)>) {
         let mut nodes: Vec<(GlobalId, TetPlace)> = Vec::new();
         for (part, ids) in (0..).zip(ids) {
-            let held = |place: &u32| self.list[part as usize].nodes.holds(*place as usize);
+            let held = |place: &u32| self.list[part as usize].nodes.contains(*place as usize);
             let places = (0..).zip(ids).filter(|(place, _)| held(place));
             nodes.extend(places.map(|(place, &id)| (id, TetPlace { part, place })));
         }

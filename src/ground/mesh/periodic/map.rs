@@ -79,7 +79,7 @@ impl PeriodicMap {
         }
         map.origins =
             Pairs([0, 1, 2].map(|dimension| {
-                origins(map.pairs.iter().flat_map(|pairs| pairs.0[dimension].iter().copied()))
+                masters(map.pairs.iter().flat_map(|pairs| pairs.0[dimension].iter().copied()))
             }));
         Ok(map)
     }
@@ -217,7 +217,7 @@ fn pair<const N: usize>(image: u64, of: u64, images: [&VertexId; N]) -> Pair {
 }
 
 /// For each copy the master at the end of its chain; in a cycle the smallest entity.
-fn origins(pairs: impl Iterator<Item = Pair>) -> Vec<Pair> {
+fn masters(pairs: impl Iterator<Item = Pair>) -> Vec<Pair> {
     let mut steps: BTreeMap<u64, Vec<Pair>> = BTreeMap::new();
     let mut is_image: BTreeMap<u64, bool> = BTreeMap::new();
     for pair in pairs.filter(|pair| pair.image != pair.of) {

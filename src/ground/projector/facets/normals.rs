@@ -22,7 +22,7 @@ const DOUBLE: f64 = 1e-15;
 /// The rounding of the vertices (length), estimated from the digits of the coordinates.
 pub(crate) fn rounding(points: &[Point]) -> f64 {
     let largest = points.iter().map(|p| p.coords.amax()).fold(0.0, f64::max);
-    let all = |holds: &dyn Fn(f64) -> bool| points.iter().all(|p| p.iter().all(|&x| holds(x)));
+    let all = |contains: &dyn Fn(f64) -> bool| points.iter().all(|p| p.iter().all(|&x| contains(x)));
     let relative = if all(&|x| f64::from(x as f32) == x) {
         SINGLE
     } else if all(&|x| format!("{x:.6e}").parse() == Ok(x)) {

@@ -41,7 +41,7 @@ struct Piece {
 
 /// Cut statistics of a geometry.
 #[derive(Clone, Debug, Default)]
-pub struct Evidence {
+pub struct CutStatistics {
     /// Samples of the tet density.
     pub samples: Vec<Sample>,
     faces: Vec<Face>,
@@ -55,7 +55,7 @@ const MOST_PIECES: u32 = 4;
 /// The approximate number of samples per part.
 const SAMPLES: usize = 600;
 
-impl Evidence {
+impl CutStatistics {
     /// Collects the statistics from a coarse mesh whose edges will be split into `pieces`, for
     /// `parts` parts. The boundary is refined because coarse triangles do not resolve how planes
     /// meet it.
@@ -63,7 +63,7 @@ impl Evidence {
     /// # Errors
     /// [`CutError::Distribute`] or [`CutError::Refine`] if the mesh cannot be refined.
     pub fn of(mesh: &Mesh, whole: &CsgModel, pieces: u32, parts: u32) -> Result<Self, CutError> {
-        let mut evidence = Self::default();
+        let mut statistics = Self::default();
         let in_tet = (SAMPLES * parts as usize).div_ceil(mesh.tets.len().max(1));
         // C(k + 2, 3) points in a tet with k per edge.
         let k = (1_usize..).find(|k| k * (k + 1) * (k + 2) / 6 >= in_tet).unwrap_or(1);
@@ -72,7 +72,7 @@ impl Evidence {
             let edge = TET_EDGES.map(|[a, b]| (corners[b] - corners[a]).norm()).iter().sum::<f64>() / 6.0;
             let width = edge / k as f64;
             let near = width.max(CLEAR * edge / f64::from(pieces));
-            evidence.samples.extend(grid(&corners, k).map(|point| Sample { point, width, near }));
+            statistics.samples.extend(grid(&corners, k).map(|point| Sample { point, width, near }));
         }
         let comm = thread::alone();
         let given = (mesh.clone(), vec![0; mesh.tets.len()]);
@@ -87,28 +87,28 @@ impl Evidence {
             let normal = (corners[1] - corners[0]).cross(&(corners[2] - corners[0]));
             let size = finer * (edge(a, b) + edge(b, c) + edge(c, a)) / 3.0;
             let (area, normal) = (0.5 * normal.norm(), normal.normalize());
-            evidence.faces.push(Face { corners, normal, cells: area / (size * size), size });
+            statistics.faces.push(Face { corners, normal, cells: area / (size * size), size });
         }
         for ([a, b], _) in skin.edges.iter().filter(|(_, class)| matches!(class, Class::Curve(_))) {
             let ends = [*a, *b].map(|v| skin.points[v as usize]);
-            evidence.curves.push(Piece { ends, size: finer * edge(*a, *b) });
+            statistics.curves.push(Piece { ends, size: finer * edge(*a, *b) });
         }
         let size_near = |point: &Point| {
             let to = |face: &Face| (face.corners[0] - point).norm_squared();
-            let nearest = evidence.faces.iter().min_by(|a, b| to(a).total_cmp(&to(b)));
+            let nearest = statistics.faces.iter().min_by(|a, b| to(a).total_cmp(&to(b)));
             nearest.map_or(0.0, |face| face.size)
         };
         let corners = whole.features.corners.iter();
-        evidence.corners = corners.map(|corner| (corner.point, size_near(&corner.point))).collect();
-        Ok(evidence)
+        statistics.corners = corners.map(|corner| (corner.point, size_near(&corner.point))).collect();
+        Ok(statistics)
     }
 
     /// The statistics inside a piece of space.
-    pub(super) fn within(&self, holds: impl Fn(&Point) -> bool) -> Crossed<'_> {
+    pub(super) fn within(&self, contains: impl Fn(&Point) -> bool) -> Crossed<'_> {
         Crossed {
-            faces: self.faces.iter().filter(|face| face.corners.iter().any(&holds)).collect(),
-            curves: self.curves.iter().filter(|piece| piece.ends.iter().any(&holds)).collect(),
-            corners: self.corners.iter().filter(|corner| holds(&corner.0)).collect(),
+            faces: self.faces.iter().filter(|face| face.corners.iter().any(&contains)).collect(),
+            curves: self.curves.iter().filter(|piece| piece.ends.iter().any(&contains)).collect(),
+            corners: self.corners.iter().filter(|corner| contains(&corner.0)).collect(),
         }
     }
 }

@@ -12,12 +12,12 @@ use crate::ground::mesh::GlobalId;
 /// Computed once, on the whole coarse mesh ([`mend`](super::mend::mend())), and sent to all ranks.
 /// Keyed by global edge id, so all ranks that share an edge displace it alike. Few edges need it.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Bends {
+pub struct EdgeDisplacements {
     /// Sorted by edge id.
     edges: Vec<(GlobalId, Coordinates)>,
 }
 
-impl Bends {
+impl EdgeDisplacements {
     /// The displacement of the midpoint of `edge`, `None` if the edge is straight.
     #[inline]
     pub fn get(&self, edge: GlobalId) -> Option<Coordinates> {
@@ -45,10 +45,10 @@ impl Bends {
     }
 }
 
-impl FromIterator<(GlobalId, Coordinates)> for Bends {
+impl FromIterator<(GlobalId, Coordinates)> for EdgeDisplacements {
     fn from_iter<I: IntoIterator<Item = (GlobalId, Coordinates)>>(edges: I) -> Self {
-        let mut bends = Self::default();
-        edges.into_iter().for_each(|(edge, displacement)| bends.set(edge, Some(displacement)));
-        bends
+        let mut displacements = Self::default();
+        edges.into_iter().for_each(|(edge, displacement)| displacements.set(edge, Some(displacement)));
+        displacements
     }
 }

@@ -10,7 +10,7 @@ fn dropped_and_reconstructed(mesh: &Mesh, part: &[Rank], ranks: u32) -> Vec<[Dis
     thread::run(ranks, |comm| {
         let given = (comm.rank() == 0).then(|| (mesh.clone(), part.to_vec()));
         let known = distribute(comm, given).unwrap();
-        let settled = settle(comm, known.clone().into()).unwrap();
+        let settled = number_shared(comm, known.clone().into()).unwrap();
         settled.check(comm).unwrap();
         [known, settled]
     })
@@ -107,13 +107,13 @@ fn a_face_of_three_ranks_is_refused_on_all() {
             tet_bodies: vec![BodyId(0)],
             ..BareMesh::default()
         };
-        settle(comm, bare).unwrap_err()
+        number_shared(comm, bare).unwrap_err()
     })
     .unwrap();
-    assert_eq!(errors[0], SettleError::FaceOfManyRanks { vertices: [0, 1, 2], holders: 3 });
+    assert_eq!(errors[0], NumberError::FaceOfManyRanks { vertices: [0, 1, 2], holders: 3 });
     assert_eq!(
         errors[2],
-        SettleError::Comm(CommError::Elsewhere {
+        NumberError::Comm(CommError::Elsewhere {
             rank: 0,
             kind: errors[0].kind(),
             message: errors[0].to_string()

@@ -20,7 +20,7 @@ const NONE: u32 = u32::MAX;
 
 /// *Local.* A rank for each tet: the neighbouring rank for tets of small components next to other
 /// parts, otherwise this one.
-pub fn islands(mesh: &BareMesh) -> Vec<Rank> {
+pub fn absorb_small_components(mesh: &BareMesh) -> Vec<Rank> {
     let components = Components::of(mesh);
     let mut sizes = vec![0; components.count as usize];
     components.component.iter().for_each(|&component| sizes[component as usize] += 1);

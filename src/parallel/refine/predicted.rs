@@ -6,7 +6,7 @@ use crate::parallel::distribution::{DistMesh, Shared};
 
 /// Counts of fine vertices and tets of one part.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Census {
+pub struct PredictedCounts {
     /// Tets.
     pub tets: u64,
     /// Local vertices, shared ones included.
@@ -22,7 +22,7 @@ pub struct Census {
     pub neighbours: Vec<Rank>,
 }
 
-impl Census {
+impl PredictedCounts {
     /// The fraction of its local vertices that a part owns.
     pub fn owned_share(&self) -> f64 {
         self.owned as f64 / self.held.max(1) as f64
@@ -30,7 +30,7 @@ impl Census {
 }
 
 /// *Local.* Counts what this rank's part would contain with `n` subdivisions per edge.
-pub fn census(mesh: &DistMesh, n: u32) -> Census {
+pub fn predicted_counts(mesh: &DistMesh, n: u32) -> PredictedCounts {
     let lattice = Lattice::new(n);
     let [on_boundary @ .., inside_tet] = lattice.points_inside().map(u64::from);
     let totals = [mesh.totals.vertices, mesh.totals.edges, mesh.totals.faces];
@@ -39,27 +39,29 @@ pub fn census(mesh: &DistMesh, n: u32) -> Census {
         (&mesh.edge_ids, &mesh.shared_edges),
         (&mesh.face_ids, &mesh.shared_faces),
     ];
-    let mut census =
-        Census { tets: mesh.tets.len() as u64 * u64::from(lattice.children()), ..Census::default() };
+    let mut counts = PredictedCounts {
+        tets: mesh.tets.len() as u64 * u64::from(lattice.children()),
+        ..PredictedCounts::default()
+    };
     let mut first = 0;
     for ((ids, shared), (size, total)) in kinds.into_iter().zip(on_boundary.into_iter().zip(totals)) {
-        census.held += ids.len() as u64 * size;
-        census.shared += shared.len() as u64 * size;
-        census.owned += (ids.len() - shared.len()) as u64 * size;
+        counts.held += ids.len() as u64 * size;
+        counts.shared += shared.len() as u64 * size;
+        counts.owned += (ids.len() - shared.len()) as u64 * size;
         for (local, holders) in shared.iter() {
             let first_id = first + ids[local as usize] * size;
-            census.owned += owned(holders, mesh.rank, first_id, size);
-            census.neighbours.extend(holders.iter().filter(|&&holder| holder != mesh.rank));
+            counts.owned += owned(holders, mesh.rank, first_id, size);
+            counts.neighbours.extend(holders.iter().filter(|&&holder| holder != mesh.rank));
         }
         first += total * size;
     }
     let inside = mesh.tets.len() as u64 * inside_tet;
-    census.bytes = [census.held + inside, census.held].map(|vertices| 24 * vertices);
-    census.held += inside;
-    census.owned += inside;
-    census.neighbours.sort_unstable();
-    census.neighbours.dedup();
-    census
+    counts.bytes = [counts.held + inside, counts.held].map(|vertices| 24 * vertices);
+    counts.held += inside;
+    counts.owned += inside;
+    counts.neighbours.sort_unstable();
+    counts.neighbours.dedup();
+    counts
 }
 
 /// The number of ids in `first..first + size` that `rank` owns: those congruent to its position

@@ -26,7 +26,7 @@ use crate::ground::mesh::{Class, EdgeId, FaceId, GlobalId, Rank, VertexId};
 
 /// Why the edges and faces of a part cannot be numbered.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum SettleError {
+pub enum NumberError {
     /// Too many tets on a rank for 32-bit positions.
     #[error(
         "rank {rank} has {tets} tets, but a part can have {} at most: use more ranks",
@@ -51,7 +51,7 @@ pub enum SettleError {
     Comm(#[from] CommError),
 }
 
-impl HasKind for SettleError {
+impl HasKind for NumberError {
     fn kind(&self) -> ErrorKind {
         match self {
             Self::TooManyTets { .. } => ErrorKind::Resources,
@@ -65,13 +65,13 @@ impl HasKind for SettleError {
 /// holders.
 ///
 /// # Errors
-/// [`SettleError::TooManyTets`] if a rank has too many tets, [`SettleError::FaceOfManyRanks`] if
+/// [`NumberError::TooManyTets`] if a rank has too many tets, [`NumberError::FaceOfManyRanks`] if
 /// more than two ranks have the same face. All ranks return an error; the others one that names the
 /// failed rank.
-pub fn settle(comm: &dyn Communicator, bare: BareMesh) -> Result<DistMesh, SettleError> {
+pub fn number_shared(comm: &dyn Communicator, bare: BareMesh) -> Result<DistMesh, NumberError> {
     let (rank, tets) = (bare.rank, bare.tets.len());
     let fits = tets <= topology::MAX_TETS;
-    comm.agree(if fits { Ok(()) } else { Err(SettleError::TooManyTets { rank, tets }) })?;
+    comm.agree(if fits { Ok(()) } else { Err(NumberError::TooManyTets { rank, tets }) })?;
     let edges = topology::edges(bare.points.len(), &bare.tets);
     let faces = topology::faces(bare.points.len(), &bare.tets);
 
@@ -184,7 +184,7 @@ impl Numbered {
 
 /// Numbers the edges and faces in lexicographic order, and writes the reply to each sender in the
 /// order of its request.
-fn number(requests: &[(Rank, Vec<u8>)]) -> Result<Numbered, SettleError> {
+fn number(requests: &[(Rank, Vec<u8>)]) -> Result<Numbered, NumberError> {
     let (mut records, mut edges, mut faces) =
         (Vec::new(), Vec::<GlobalId>::new(), Vec::<[GlobalId; 2]>::new());
     for (sender, (_, request)) in requests.iter().enumerate() {
@@ -234,7 +234,7 @@ fn number(requests: &[(Rank, Vec<u8>)]) -> Result<Numbered, SettleError> {
         let non_manifold = faces_here.chunk_by(|a, b| a.0 == b.0).find(|run| run.len() > 2);
         if let Some(run) = non_manifold {
             let (vertices, holders) = ([group[0].vertex, run[0].0[0], run[0].0[1]], run.len());
-            return Err(SettleError::FaceOfManyRanks { vertices, holders });
+            return Err(NumberError::FaceOfManyRanks { vertices, holders });
         }
     }
     Ok(numbered)
@@ -382,5 +382,5 @@ fn boundary(sides: &[Side], tet_faces: &[[FaceId; 4]]) -> Vec<BoundaryFace> {
 }
 
 #[cfg(test)]
-#[path = "settle_tests.rs"]
+#[path = "number_tests.rs"]
 mod tests;
