@@ -141,7 +141,7 @@ fn main() {
             let mesh = slot.lock().unwrap().take().expect("a part");
             let to = &destinations[comm.rank() as usize];
             let (mesh, moved) =
-                migrate::migrate_bare(comm, mesh, to, &migrate::Settings::default()).expect("memory");
+                migrate::migrate_bare(comm, mesh, to, &migrate::MoveSettings::default()).expect("memory");
             *slot.lock().unwrap() = Some(mesh);
             moved
         });

@@ -160,8 +160,8 @@ pub mod error {
 
 /// All settings and results of a [`Mesher`].
 pub mod run {
-    pub use crate::parallel::decompose::{Candidates, CutPlane, Settings as PlanSettings};
-    pub use crate::parallel::interfaces::Report as InterfaceReport;
+    pub use crate::parallel::decompose::{Candidates, CutPlane, PlanSettings};
+    pub use crate::parallel::interfaces::InterfaceReport;
     pub use crate::parallel::partition::Metrics;
     pub use crate::parallel::refine::PeriodicCheck;
     pub use crate::parallel::refine::lattice::MAX_PIECES;
@@ -179,7 +179,7 @@ pub mod run {
 
 /// Repartitioning: new destinations of tets, and their migration.
 pub mod repartition {
-    pub use crate::parallel::migrate::{Moved, Settings as MoveSettings, bare, migrate, migrate_bare};
+    pub use crate::parallel::migrate::{MoveSettings, Moved, bare, migrate, migrate_bare};
     pub use crate::parallel::repartition::metrics::{Metrics, measure};
     pub use crate::parallel::repartition::{Geometric, Method, repartition, repartition_weighted};
     pub use crate::pipeline::{Repartitioned, repartition as repartition_files};

@@ -119,7 +119,7 @@ fn plan_cuts(
         let statistics = CutStatistics::of(&coarse.mesh, whole, pieces, parts)?;
         let mut settings = cuts.clone();
         for seed in 0..MOST_PLANS {
-            settings.plan = decompose::Settings { seed, through_corners: seed == 0, ..settings.plan };
+            settings.plan = decompose::PlanSettings { seed, through_corners: seed == 0, ..settings.plan };
             let cuts = plan(&statistics, parts, &settings)?;
             match CutModel::new(whole, &cuts, candidates(&coarse.mesh, &cuts)) {
                 Ok(model) => return Ok(Planned { cuts, model, coarse, pieces, outcome }),

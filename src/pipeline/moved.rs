@@ -64,7 +64,7 @@ pub fn repartition(
     let stream = BareStream::new(BareMesh::from(mesh));
     let checksum = check::checksum_of_all(comm, &stream)?;
     let (bare, mine) = progress.stage(Stage::Move, |_| {
-        migrate::migrate_bare(comm, stream.into_mesh(), &to, &migrate::Settings::default())
+        migrate::migrate_bare(comm, stream.into_mesh(), &to, &migrate::MoveSettings::default())
     })?;
     let [tets, bytes] = comm.all_reduce_sum_u64([mine.tets, mine.bytes])?;
     let part = BareStream::new(bare);

@@ -152,7 +152,7 @@ fn migrate_counted(
     to: &[Rank],
     moved: &mut u64,
 ) -> Result<BareMesh, Error> {
-    let (part, mine) = migrate::migrate_bare(comm, part, to, &migrate::Settings::default())?;
+    let (part, mine) = migrate::migrate_bare(comm, part, to, &migrate::MoveSettings::default())?;
     *moved += comm.all_reduce_sum_u64([mine.tets])?[0];
     Ok(part)
 }

@@ -59,7 +59,7 @@ pub struct Generated {
     pub refused: Option<Refused>,
     /// Result of the improvement across interfaces, if parts were meshed separately and had bad
     /// tets there; the same on all ranks.
-    pub across: Option<interfaces::Report>,
+    pub across: Option<interfaces::InterfaceReport>,
     /// Result of balancing separately meshed parts; the same on all ranks.
     pub evened: Option<Evened>,
     /// On rank 0 only.

@@ -18,7 +18,7 @@ pub struct InputSettings {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct CutSettings {
     /// How planes are chosen, unless the user sets them.
-    pub plan: decompose::Settings,
+    pub plan: decompose::PlanSettings,
     /// The user's planes; each cuts all pieces that it meets.
     pub planes: Vec<CutPlane>,
 }

@@ -22,7 +22,7 @@ mod text;
 mod tests;
 
 pub use cut::{CutError, CutModel};
-pub use plan::{Candidates, CutPlane, Cuts, Settings, TooManyParts, plan};
+pub use plan::{Candidates, CutPlane, Cuts, PlanSettings, TooManyParts, plan};
 pub use skins::{LooseEdge, pack, skins, unpack};
 pub use statistics::CutStatistics;
 pub use text::geo_text;

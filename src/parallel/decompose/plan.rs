@@ -163,7 +163,7 @@ pub enum Candidates {
 
 /// Parameters of `plan`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Settings {
+pub struct PlanSettings {
     /// The directions of candidate planes.
     pub candidates: Candidates,
     /// The maximum error of the share of tets on one side of a plane, as a fraction of the smaller
@@ -177,7 +177,7 @@ pub struct Settings {
     pub through_corners: bool,
 }
 
-impl Default for Settings {
+impl Default for PlanSettings {
     /// An allowance of two percent, as in the thesis.
     fn default() -> Self {
         Self { candidates: Candidates::All, allowance: 0.02, tries: 12, seed: 0, through_corners: true }
@@ -231,7 +231,7 @@ const SHALLOW: f64 = 0.6;
 ///
 /// # Errors
 /// [`TooManyParts`] if there are too few samples to separate the parts.
-pub fn plan(statistics: &CutStatistics, parts: u32, settings: &Settings) -> Result<Cuts, TooManyParts> {
+pub fn plan(statistics: &CutStatistics, parts: u32, settings: &PlanSettings) -> Result<Cuts, TooManyParts> {
     let mut cuts = Cuts::default();
     let all = Piece { halves: Vec::new(), samples: statistics.samples.iter().collect(), parts };
     let mut waiting = vec![all];
@@ -320,7 +320,7 @@ impl<'a> Piece<'a> {
         f64::from(self.parts / 2) / f64::from(self.parts)
     }
 
-    fn best_plane(&self, cuts: &Cuts, statistics: &CutStatistics, settings: &Settings) -> CutPlane {
+    fn best_plane(&self, cuts: &Cuts, statistics: &CutStatistics, settings: &PlanSettings) -> CutPlane {
         let directions = self.directions(settings, settings.seed << 32 | cuts.planes.len() as u64);
         if settings.candidates == Candidates::Median {
             return Scan::new(&self.samples, directions[0][0]).places(self.share(), 0.0)[0];
@@ -361,7 +361,7 @@ impl<'a> Piece<'a> {
         with_others: bool,
         others: &Others,
         allowance: f64,
-        settings: &Settings,
+        settings: &PlanSettings,
     ) -> Vec<(CutPlane, Vec<&'a Sample>)> {
         let (share, again) = (self.share(), AGAIN * allowance);
         let exact = others.spots.iter().filter(|spot| settings.through_corners && spot.is_exact);
@@ -420,7 +420,7 @@ impl<'a> Piece<'a> {
 
     /// Unit normals of candidate planes, in groups: later groups are tried only if no plane of the
     /// earlier ones is good.
-    fn directions(&self, settings: &Settings, seed: u64) -> Vec<Vec<Vector>> {
+    fn directions(&self, settings: &PlanSettings, seed: u64) -> Vec<Vec<Vector>> {
         let axes = || vec![Vector::x(), Vector::y(), Vector::z()];
         match settings.candidates {
             Candidates::Axes => vec![axes()],

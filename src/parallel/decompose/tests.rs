@@ -66,14 +66,14 @@ fn a_bar_is_cut_across_into_equal_parts_of_any_number() {
     let bar = model(BAR);
     for parts in [1, 2, 3, 4] {
         let statistics = statistics(&bar, parts);
-        let cuts = plan(&statistics, parts, &Settings::default()).expect("enough tets");
+        let cuts = plan(&statistics, parts, &PlanSettings::default()).expect("enough tets");
         assert_eq!((cuts.leaves.len(), cuts.planes.len()), (parts as usize, parts as usize - 1));
         for plane in &cuts.planes {
             assert!(plane.normal.x.abs() > 0.999, "{parts} parts: {plane:?}");
         }
         let shares = shares(&cuts, &statistics);
         assert!(shares.iter().all(|share| (share - 1.0).abs() < 0.05), "{parts} parts: {shares:?}");
-        assert_eq!(plan(&statistics, parts, &Settings::default()).expect("the same"), cuts);
+        assert_eq!(plan(&statistics, parts, &PlanSettings::default()).expect("the same"), cuts);
     }
 }
 
@@ -82,7 +82,7 @@ fn more_parts_than_can_be_told_apart_are_refused() {
     let bar = model(BAR);
     let few = statistics(&bar, 1);
     let parts = few.samples.len() as u32;
-    assert_eq!(plan(&few, parts, &Settings::default()), Err(TooManyParts { parts }));
+    assert_eq!(plan(&few, parts, &PlanSettings::default()), Err(TooManyParts { parts }));
 }
 
 #[test]

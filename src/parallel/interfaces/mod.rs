@@ -78,7 +78,7 @@ impl Default for Settings {
 
 /// Statistics of `improve_across`, the same on all ranks.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
-pub struct Report {
+pub struct InterfaceReport {
     /// The angle below which tets are bad, degrees.
     pub angle: f64,
     /// The number of rounds.
@@ -111,7 +111,7 @@ pub fn improve_across(
     comm: &dyn Communicator,
     mut mesh: BareMesh,
     settings: &Settings,
-) -> Result<(BareMesh, Option<Report>), MigrateError> {
+) -> Result<(BareMesh, Option<InterfaceReport>), MigrateError> {
     let largest = |angles: &[f64]| angles.iter().copied().fold(0.0, f64::max);
     let choices = [&settings.angles, &settings.angles_if_many];
     let first = settings.angles.first().copied().unwrap_or(0.0);
@@ -120,7 +120,8 @@ pub fn improve_across(
     let [tets] = comm.all_reduce_sum_u64([mesh.tets.len() as u64])?;
     let (angles, bad) = if worse > tets / 100 { (choices[1], many) } else { (choices[0], few) };
     let angle = largest(angles);
-    let mut report = Report { angle, smallest_before: smallest, bad_before: bad, ..Report::default() };
+    let mut report =
+        InterfaceReport { angle, smallest_before: smallest, bad_before: bad, ..InterfaceReport::default() };
     for (round, &angle) in (0..).zip(angles) {
         let bad = regions::bad_tets(&mesh, angle);
         if comm.all_reduce_sum_u64([bad.len() as u64])? == [0] {
@@ -128,11 +129,12 @@ pub fn improve_across(
         }
         let regions = regions::around(comm, &mesh, &bad, round)?;
         let mine = regions.tets_to(comm, &mesh)?;
-        let (moved, sent) = migrate::migrate_bare(comm, mesh, &regions.to, &migrate::Settings::default())?;
+        let (moved, sent) =
+            migrate::migrate_bare(comm, mesh, &regions.to, &migrate::MoveSettings::default())?;
         let reworked = rework::rework(&moved, &mine, settings);
         let counts = [mine.len() as u64, sent.tets, reworked.merged];
         let (improved, destination) = renumber::put_back(comm, moved, reworked)?;
-        (mesh, _) = migrate::migrate_bare(comm, improved, &destination, &migrate::Settings::default())?;
+        (mesh, _) = migrate::migrate_bare(comm, improved, &destination, &migrate::MoveSettings::default())?;
         let [tets, moved, merged] = comm.all_reduce_sum_u64(counts)?;
         report.rounds += 1;
         report.tets += tets;

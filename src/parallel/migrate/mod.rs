@@ -113,13 +113,13 @@ impl HasKind for MigrateError {
 
 /// Parameters of [`migrate_bare`].
 #[derive(Clone, Copy, Debug)]
-pub struct Settings {
+pub struct MoveSettings {
     /// The maximum bytes of one array of a message or of the new part; larger arrays are treated
     /// like failed allocations.
     pub array_limit: u64,
 }
 
-impl Default for Settings {
+impl Default for MoveSettings {
     fn default() -> Self {
         Self { array_limit: u64::MAX }
     }
@@ -147,7 +147,7 @@ pub fn migrate(
     mesh: DistMesh,
     destination: &[Rank],
 ) -> Result<DistMesh, MigrateError> {
-    let (moved, _) = migrate_bare(comm, mesh.into(), destination, &Settings::default())?;
+    let (moved, _) = migrate_bare(comm, mesh.into(), destination, &MoveSettings::default())?;
     Ok(number_shared(comm, moved)?)
 }
 
@@ -160,7 +160,7 @@ pub fn migrate_bare(
     comm: &dyn Communicator,
     mesh: BareMesh,
     destination: &[Rank],
-    settings: &Settings,
+    settings: &MoveSettings,
 ) -> Result<(BareMesh, Moved), MigrateError> {
     comm.agree(expect_ranks(&mesh, comm.size()).and_then(|()| expect_destinations(&mesh, destination)))?;
     let room = rebuild::Room { rank: mesh.rank, limit: settings.array_limit };

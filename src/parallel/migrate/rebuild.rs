@@ -6,7 +6,7 @@
 
 use super::owners::Holders;
 use super::pack::{Kept, Message};
-use super::{MigrateError, Settings};
+use super::{MigrateError, MoveSettings};
 use crate::ground::mesh::{GlobalId, Rank, TetId, VertexId};
 use crate::parallel::distribution::{BareMesh, ClassifiedEdge, Shared, Side};
 use csg::BodyId;
@@ -65,7 +65,7 @@ pub(super) fn rebuild(
     kept: &Kept,
     mut incoming: Vec<Message>,
     received: Vec<Holders>,
-    settings: &Settings,
+    settings: &MoveSettings,
 ) -> Result<BareMesh, MigrateError> {
     let room = Room { rank: mesh.rank, limit: settings.array_limit };
     let old_shared = std::mem::take(&mut mesh.shared);

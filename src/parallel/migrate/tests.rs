@@ -88,7 +88,7 @@ fn refined_twice(fixture: &fixtures::Fixture, ranks: u32, plans: [fn(u64, u32) -
                 refine::refine(coarse, &fixture.projector, 2, &refine::Settings::default()).unwrap();
             let fine = bare(&refined).unwrap();
             let to: Vec<Rank> = fine.tet_ids.iter().map(|&id| plan(id, ranks)).collect();
-            let (moved, _) = migrate_bare(comm, fine, &to, &Settings::default()).unwrap();
+            let (moved, _) = migrate_bare(comm, fine, &to, &MoveSettings::default()).unwrap();
             let stream = BareStream::new(moved);
             *sum = checksum_of_all(comm, &stream).unwrap();
             assert_eq!(*sum, checksum_of_all(comm, &refined).unwrap());
@@ -169,7 +169,7 @@ fn a_rank_without_memory_for_its_new_part_stops_all_with_one_message() {
         // The bytes that rank 1 receives and rank 0 sends.
         let to = vec![1; part.tets.len()];
         [1, 0].map(|poor| {
-            let settings = Settings { array_limit: if comm.rank() == poor { 300 } else { u64::MAX } };
+            let settings = MoveSettings { array_limit: if comm.rank() == poor { 300 } else { u64::MAX } };
             migrate_bare(comm, part.clone().into(), &to, &settings).unwrap_err()
         })
     })
@@ -190,7 +190,7 @@ fn a_mesh_of_other_ranks_is_refused() {
     let mesh = from_serial(lattice_cube(1)).unwrap();
     let errors = thread::run(2, |comm| {
         let part = BareMesh { rank: comm.rank(), ..mesh.clone().into() };
-        migrate_bare(comm, part, &[0; 6], &Settings::default()).unwrap_err()
+        migrate_bare(comm, part, &[0; 6], &MoveSettings::default()).unwrap_err()
     });
     assert!(errors.unwrap().iter().all(|error| *error == MigrateError::Ranks { expected: 1, ranks: 2 }));
 }

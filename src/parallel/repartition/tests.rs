@@ -258,7 +258,7 @@ fn joined(mesh: &Mesh, part: &[Rank], ranks: u32) -> (Vec<Rank>, u64) {
     let (part, pieces) = on_parts(mesh, part, ranks, |comm, mesh| {
         let mesh = BareMesh::from(mesh);
         let to = absorb_small_components(&mesh);
-        let (mesh, _) = migrate_bare(comm, mesh, &to, &migrate::Settings::default()).unwrap();
+        let (mesh, _) = migrate_bare(comm, mesh, &to, &migrate::MoveSettings::default()).unwrap();
         let pieces = components::pieces(comm, &mesh).unwrap();
         (mesh.tet_ids.iter().map(|&id| (id, comm.rank())).collect(), pieces)
     });
