@@ -129,7 +129,8 @@ fn least_squares_step(a: &Surface, b: &Surface, at: &Point) -> Option<crate::Vec
         }
         values.fixed_rows_mut::<3>(2).copy_from(&cross);
     }
-    // Along a curve of contact one direction is free: drop small singular values.
+    // Along a curve of contact one direction is free: drop singular values
+    // that vanish up to the error of the position, a root of that of the surfaces.
     let svd = matrix.svd(true, true);
     svd.solve(&values, 1e-6).ok().map(|step| -step)
 }

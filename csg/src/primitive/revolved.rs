@@ -45,6 +45,7 @@ impl Revolved {
     /// The support point in a unit direction; `None` if it is on the unused part of the ellipse.
     pub(crate) fn support(&self, direction: &Vector) -> Option<Point> {
         let across = reject(direction, &self.axis);
+        // On the axis all directions support equally far: any will do.
         let outward = across.try_normalize(1e-9).unwrap_or_else(|| tangents(&self.axis).0);
         let [distance, height] = self.profile.support([direction.dot(&outward), direction.dot(&self.axis)]);
         (distance >= 0.0).then(|| self.point + outward * distance + self.axis * height)

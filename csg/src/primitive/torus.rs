@@ -12,6 +12,7 @@ impl Torus {
     /// The support point in a unit direction.
     pub(crate) fn support(&self, direction: &Vector) -> Point {
         let across = reject(direction, &self.axis);
+        // On the axis all directions support equally far: any will do.
         let outward = across.try_normalize(1e-9).unwrap_or_else(|| tangents(&self.axis).0);
         self.center + outward * self.major + direction * self.minor
     }

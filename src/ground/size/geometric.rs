@@ -283,7 +283,8 @@ impl Sampler<'_> {
         here.sort_unstable();
         open.retain(|surface| here.binary_search(surface).is_ok());
         open.retain(|&surface| self.is_coarse(surface, &bodies, &center, edge, samples));
-        // Near a singular point (apex of a cone) the size tends to zero, so the depth is limited.
+        // Near a singular point (apex of a cone) the size tends to zero, so the depth is limited:
+        // sizes below a thousandth of the geometry come from sources, not from curvature.
         let least = 1e-3 * self.features.bounds.diagonal() * self.settings.scale.min(1.0);
         if open.is_empty() || edge < least {
             return;

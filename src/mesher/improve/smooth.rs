@@ -238,6 +238,7 @@ fn shortest_in_hull(vectors: &[Vector], weights: &mut Vec<f64>) -> Vector {
         let most = most.expect("the weights sum to one");
         let across = vectors[most] - vectors[least];
         let excess = across.dot(&shortest);
+        // The direction is only a start for a line search: a thousandth is exact enough.
         if excess <= 1e-3 * shortest.norm_squared() {
             break;
         }

@@ -255,7 +255,8 @@ fn sagittas(mesh: &SurfaceMesh, features: &Features) -> Vec<f64> {
         let angle = turn(&curve.trace, curve.ends.is_none()) / group.len() as f64;
         let chord =
             |s: &Segment| (mesh.points[s.vertices[1].index()] - mesh.points[s.vertices[0].index()]).norm();
-        // Equal metric lengths need not turn equally: the angle is doubled for safety.
+        // Equal metric lengths need not turn equally: the angle is doubled for safety, up to 1.2,
+        // before the tangent grows without bound. Below 10⁻⁹ the curve is straight up to rounding.
         let share = if angle < 1e-9 { 0.0 } else { (0.5 * angle).min(1.2).tan() };
         out.extend(group.iter().map(|s| 0.5 * chord(s) * share));
     }

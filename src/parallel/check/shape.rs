@@ -277,6 +277,7 @@ fn cube_root(x: f64) -> f64 {
     let slope = inverse * inverse;
     let root = x * slope;
     let root = root - (root * root * root - x) * (1.0 / 3.0) * slope;
+    // Below this the cubes of the iteration underflow.
     if x > 1e-290 { root } else { 0.0 }
 }
 

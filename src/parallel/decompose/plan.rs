@@ -504,6 +504,7 @@ fn random_directions(count: usize, seed: u64) -> Vec<Vector> {
     let mut number = || 2.0 * random.unit() - 1.0;
     std::iter::from_fn(|| Some(Vector::new(number(), number(), number())))
         .filter(|v| v.norm_squared() <= 1.0)
+        // Few points are so near the centre, where rounding makes the directions uneven.
         .filter_map(|v| v.try_normalize(1e-3))
         .take(count)
         .collect()

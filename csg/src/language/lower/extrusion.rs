@@ -249,6 +249,7 @@ fn check_side(arc: &Arc, index: usize, axis: Vector, up: Vector) -> Result<(), S
     let [p, q, r] = arc.points;
     let [start, end] = [(q - p).normalize(), (r - q).normalize()];
     let [y, at_end] = [frame(start, up)?[1], frame(end, up)?[1]];
+    // Cosines equal to a thousandth: a turn by more reverses y' or tilts the section visibly.
     let same = |before: Vector, after: Vector| (y.dot(&before) - at_end.dot(&after)).abs() <= 1e-3;
     if !same(axis, axis) || !same(start.cross(&axis), end.cross(&axis)) {
         let message = format!(

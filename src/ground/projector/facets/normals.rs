@@ -106,6 +106,7 @@ pub(crate) fn of_corners(
             let some = at_vertex.iter().filter(|(_, t, _)| all || !sliver[*t]);
             some.map(|share| normals[share.1] * angle(share)).sum()
         };
+        // Normals that cancel to 10⁻⁹ have no direction but that of rounding.
         let normal = sum(false).try_normalize(1e-9).or_else(|| sum(true).try_normalize(0.0));
         let normal = normal.filter(|_| tips.binary_search(&at_vertex[0].0).is_err());
         for &(_, t, k) in at_vertex {

@@ -71,6 +71,7 @@ fn slide(sheet: &mut Sheet, v: u32, curve: u32, place: f64) -> bool {
     let (lp, lq) = (metric(p, to_p), metric(q, to_q));
     // Towards the longer segment, by half the difference.
     let share = 0.5 * (lq - lp) / (lp + lq);
+    // A smaller shift is not worth the projections.
     if share.abs() < 1e-3 {
         return false;
     }
@@ -95,7 +96,8 @@ fn slide(sheet: &mut Sheet, v: u32, curve: u32, place: f64) -> bool {
     false
 }
 
-/// The sum of 1/shape² around a vertex, dominated by the worst triangles.
+/// The sum of 1/shape² around a vertex, dominated by the worst triangles. Shapes below 10⁻⁶ count
+/// as that, so that sums with several of them can still be compared.
 pub(super) fn energy(sheet: &Sheet, v: u32) -> f64 {
     let price = |&t: &u32| 1.0 / shape(&sheet.corners(sheet.at(t).v)).max(1e-6).powi(2);
     sheet.around[v as usize].iter().map(price).sum()
