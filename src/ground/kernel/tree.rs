@@ -90,6 +90,31 @@ impl Tree {
         None
     }
 
+    /// Calls `visit` for each item whose box may meet a segment, until it returns false.
+    pub fn along(&self, from: &Point, to: &Point, mut visit: impl FnMut(u32) -> bool) {
+        if self.nodes.is_empty() {
+            return;
+        }
+        let mut stack = [0u32; 64];
+        let mut height = 1;
+        while height > 0 {
+            height -= 1;
+            let node = &self.nodes[stack[height] as usize];
+            if !may_meet(node, from, to) {
+                continue;
+            }
+            if node.count > 0 {
+                let items = &self.items[node.first as usize..(node.first + node.count) as usize];
+                if !items.iter().all(|&item| visit(item)) {
+                    return;
+                }
+                continue;
+            }
+            [stack[height], stack[height + 1]] = [node.first + 1, node.first];
+            height += 2;
+        }
+    }
+
     /// The item nearest to a point, the first on ties; `None` if the tree is empty.
     ///
     /// `distance` is squared, and at least that to the item's box.
@@ -151,6 +176,32 @@ fn squared_gap(node: &Node, point: &Point) -> f64 {
     sum
 }
 
+/// Whether a segment may meet a box: false only if an axis of the box, or one perpendicular to it
+/// and to the segment, separates them (Ericson, Real-Time Collision Detection, 2005, 5.3.3).
+fn may_meet(node: &Node, from: &Point, to: &Point) -> bool {
+    /// Bounds the rounding of the products relative to the square of the largest length.
+    const ROUNDING: f64 = 1e-14;
+    let mut half = [0.0; 3];
+    let mut way = [0.0; 3];
+    let mut apart = [0.0; 3];
+    for k in 0..3 {
+        if from[k].max(to[k]) < node.low[k] || from[k].min(to[k]) > node.high[k] {
+            return false;
+        }
+        half[k] = 0.5 * (node.high[k] - node.low[k]);
+        way[k] = 0.5 * (to[k] - from[k]);
+        apart[k] = 0.5 * (from[k] + to[k]) - 0.5 * (node.low[k] + node.high[k]);
+    }
+    let largest = [half, way, apart].concat().into_iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+    let coordinates = from.coords.amax().max(to.coords.amax());
+    let slack = ROUNDING * largest * (largest + coordinates);
+    (0..3).all(|k| {
+        let [i, j] = [(k + 1) % 3, (k + 2) % 3];
+        let reach = half[i] * way[j].abs() + half[j] * way[i].abs();
+        (apart[i] * way[j] - apart[j] * way[i]).abs() <= reach + slack
+    })
+}
+
 /// The smallest box around points.
 pub(crate) fn bounds<'a>(points: impl IntoIterator<Item = &'a Point>) -> Aabb {
     let (mut min, mut max) = (Point::from([f64::INFINITY; 3]), Point::from([f64::NEG_INFINITY; 3]));
@@ -164,6 +215,43 @@ pub(crate) fn bounds<'a>(points: impl IntoIterator<Item = &'a Point>) -> Aabb {
 mod tests {
     use super::*;
     use crate::ground::kernel::random::Random;
+
+    #[test]
+    fn all_boxes_along_a_segment_are_visited_and_few_others() {
+        let mut random = Random::new(3);
+        let mut point = || Point::from([0, 1, 2].map(|_| random.unit()));
+        let boxes: Vec<Aabb> = (0..500)
+            .map(|_| {
+                let corner = point();
+                bounds(&[corner, corner + (point() - corner) * 0.1])
+            })
+            .collect();
+        let tree = Tree::new(&boxes);
+        for _ in 0..100 {
+            let [from, to] = [point() * 1.5, point() * 1.5];
+            let mut visited = Vec::new();
+            tree.along(&from, &to, |item| {
+                visited.push(item);
+                true
+            });
+            visited.sort_unstable();
+            // Points of the segment: their boxes must be among those visited.
+            for step in 0..=1000 {
+                let p = from + (to - from) * (f64::from(step) / 1000.0);
+                let contains = |b: &Aabb| (0..3).all(|k| b.min[k] <= p[k] && p[k] <= b.max[k]);
+                let missed =
+                    (0..500).find(|&i| contains(&boxes[i as usize]) && visited.binary_search(&i).is_err());
+                assert_eq!(missed, None);
+            }
+            assert!(visited.len() < 250, "{} of 500 boxes", visited.len());
+        }
+        let mut calls = 0;
+        tree.along(&Point::origin(), &Point::new(1.0, 1.0, 1.0), |_| {
+            calls += 1;
+            false
+        });
+        assert!(calls <= 1, "the visit ends when it is told to");
+    }
 
     #[test]
     fn the_tree_finds_the_same_items_as_a_search_of_all() {

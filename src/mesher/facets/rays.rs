@@ -5,7 +5,9 @@ use super::regions::normal;
 use crate::ground::kernel::predicates::{Sign, orient3d};
 use crate::ground::kernel::random::Random;
 use crate::ground::kernel::simplex::volume6;
+use crate::ground::kernel::tree::{Tree, bounds};
 use crate::{Point, Vector};
+use csg::Aabb;
 
 /// The intersection of a ray with a triangle.
 pub(super) struct Hit {
@@ -13,6 +15,12 @@ pub(super) struct Hit {
     pub triangle: u32,
     /// Whether the ray crosses from behind to the front.
     pub along: bool,
+}
+
+/// A tree of all triangles, for the rays.
+pub(super) fn tree_of(joined: &Joined) -> Tree {
+    let corners = |t: &[u32; 3]| t.map(|v| joined.points[v as usize]);
+    Tree::new(&joined.triangles.iter().map(|t| bounds(&corners(t))).collect::<Vec<Aabb>>())
 }
 
 /// The most rays tried from a triangle: a ray is degenerate only by chance, if it meets an edge or
@@ -24,19 +32,19 @@ const APART: f64 = 1e-13;
 
 /// The triangles along a ray from the centroid of `start`, which is the first, in order; `None` if
 /// all rays are degenerate.
-pub(super) fn shoot_from_triangle(joined: &Joined, start: u32) -> Option<Vec<Hit>> {
+pub(super) fn shoot_from_triangle(joined: &Joined, tree: &Tree, start: u32) -> Option<Vec<Hit>> {
     let [a, b, c] = joined.triangles[start as usize].map(|v| joined.points[v as usize].coords);
     let up = normal(joined, start).try_normalize(0.0)?;
-    shoot(joined, Point::from((a + b + c) / 3.0), up, Some(start))
+    shoot(joined, tree, Point::from((a + b + c) / 3.0), up, Some(start))
 }
 
 /// The triangles along a ray from a point, in order; `None` if all rays are degenerate, for example
 /// if the point is on a triangle.
-pub(super) fn shoot_from_point(joined: &Joined, from: Point) -> Option<Vec<Hit>> {
-    shoot(joined, from, Vector::z(), None)
+pub(super) fn shoot_from_point(joined: &Joined, tree: &Tree, from: Point) -> Option<Vec<Hit>> {
+    shoot(joined, tree, from, Vector::z(), None)
 }
 
-fn shoot(joined: &Joined, from: Point, up: Vector, start: Option<u32>) -> Option<Vec<Hit>> {
+fn shoot(joined: &Joined, tree: &Tree, from: Point, up: Vector, start: Option<u32>) -> Option<Vec<Hit>> {
     let corners = |t: u32| joined.triangles[t as usize].map(|v| &joined.points[v as usize]);
     let reach = joined.points.iter().map(|p| (p - from).norm()).fold(0.0, f64::max);
     let mut random = Random::new(u64::from(start.unwrap_or(0)));
@@ -45,8 +53,18 @@ fn shoot(joined: &Joined, from: Point, up: Vector, start: Option<u32>) -> Option
         let to = from + (up + aside).normalize() * (2.0 * reach);
         let mut hits: Vec<Hit> =
             start.map(|triangle| Hit { at: 0.0, triangle, along: true }).into_iter().collect();
-        for t in (0..joined.triangles.len() as u32).filter(|&t| Some(t) != start) {
-            hits.extend(meet(&from, &to, corners(t), t)?);
+        let mut degenerate = false;
+        tree.along(&from, &to, |t| {
+            if Some(t) != start {
+                match meet(&from, &to, corners(t), t) {
+                    Some(hit) => hits.extend(hit),
+                    None => degenerate = true,
+                }
+            }
+            !degenerate
+        });
+        if degenerate {
+            return None;
         }
         hits.sort_by(|g, h| g.at.total_cmp(&h.at));
         hits.windows(2).all(|w| w[1].at - w[0].at > APART).then_some(hits)

@@ -9,10 +9,11 @@
 
 use super::FacetError;
 use super::join::{Joined, Layer};
-use super::rays::{shoot_from_point, shoot_from_triangle};
+use super::rays::{Hit, shoot_from_point, shoot_from_triangle, tree_of};
 use super::{Facets, Marks};
 use crate::ground::kernel::predicates::{Sign, orient3d};
 use crate::ground::kernel::simplex::{area_vector, volume6};
+use crate::ground::kernel::tree::Tree;
 use crate::ground::projector::facets::edges::{Edges, Sets, Use};
 use crate::{Point, Vector};
 use std::cmp::Ordering;
@@ -45,7 +46,8 @@ pub(super) fn find(joined: &mut Joined, files: &[Facets]) -> Result<Regions, Fac
     for edge in 0..edges.len() {
         join_sectors(joined, edges.uses(edge), &mut sets)?;
     }
-    let outside = join_components(joined, edges, &mut sets)?;
+    let tree = &tree_of(joined);
+    let outside = join_components(joined, tree, edges, &mut sets)?;
     let region: Vec<u32> = (0..2 * joined.triangles.len() as u32).map(|s| sets.find(s)).collect();
     let outside = sets.find(outside);
     let mut solid_in = vec![Vec::new(); region.len()];
@@ -55,9 +57,9 @@ pub(super) fn find(joined: &mut Joined, files: &[Facets]) -> Result<Regions, Fac
             None => solids(joined, edges, &region, outside, file)?,
             Some(marks) => {
                 for &(place, number) in &marks.regions {
-                    numbered.push((region_at(joined, &region, outside, place)?, number));
+                    numbered.push((region_at(joined, tree, &region, outside, place)?, number));
                 }
-                marked_solids(joined, &region, outside, file, marks)?
+                marked_solids(joined, tree, &region, outside, file, marks)?
             }
         };
         solid.into_iter().for_each(|r| solid_in[r as usize].push(file));
@@ -66,14 +68,21 @@ pub(super) fn find(joined: &mut Joined, files: &[Facets]) -> Result<Regions, Fac
 }
 
 /// The region that contains a point.
-fn region_at(joined: &Joined, region: &[u32], outside: u32, place: Point) -> Result<u32, FacetError> {
-    let hits = shoot_from_point(joined, place).ok_or(FacetError::NoRay(place))?;
+fn region_at(
+    joined: &Joined,
+    tree: &Tree,
+    region: &[u32],
+    outside: u32,
+    place: Point,
+) -> Result<u32, FacetError> {
+    let hits = shoot_from_point(joined, tree, place).ok_or(FacetError::NoRay(place))?;
     Ok(hits.first().map_or(outside, |hit| region[side_of(hit.triangle, !hit.along) as usize]))
 }
 
 /// The regions that one surface separates from the outside, except marked holes.
 fn marked_solids(
     joined: &Joined,
+    tree: &Tree,
     region: &[u32],
     outside: u32,
     file: u32,
@@ -81,7 +90,7 @@ fn marked_solids(
 ) -> Result<Vec<u32>, FacetError> {
     let mut open = vec![outside];
     for &hole in &marks.holes {
-        open.push(region_at(joined, region, outside, hole)?);
+        open.push(region_at(joined, tree, region, outside, hole)?);
     }
     // Merge regions that are separated by other surfaces only.
     let mut sets = Sets::new(region.len());
@@ -161,9 +170,9 @@ fn sort_pages(joined: &Joined, pages: &mut [Use]) -> bool {
 
 /// Joins the regions of disconnected components; returns a side that faces the outside of all.
 ///
-/// A ray is shot from each component. Behind its last triangle of the component begins the
-/// surrounding region, which is the region in front of the next triangle on the ray.
-fn join_components(joined: &Joined, edges: &Edges, sets: &mut Sets) -> Result<u32, FacetError> {
+/// A ray is shot from each component. Between two of its triangles it stays in one region, and
+/// behind the last one it is outside of all.
+fn join_components(joined: &Joined, tree: &Tree, edges: &Edges, sets: &mut Sets) -> Result<u32, FacetError> {
     let mut component = Sets::new(joined.triangles.len());
     for edge in 0..edges.len() {
         edges.uses(edge).windows(2).for_each(|w| component.join(w[0].triangle, w[1].triangle));
@@ -177,17 +186,16 @@ fn join_components(joined: &Joined, edges: &Edges, sets: &mut Sets) -> Result<u3
         }
     }
     let mut outside = None;
-    for (p, start) in largest.iter().enumerate() {
-        let Some((_, start)) = *start else { continue };
+    for (_, start) in largest.into_iter().flatten() {
         let corner = joined.points[joined.triangles[start as usize][0] as usize];
-        let hits = shoot_from_triangle(joined, start).ok_or(FacetError::NoRay(corner))?;
-        let last = hits.iter().rposition(|h| components[h.triangle as usize] == p as u32).unwrap_or(0);
-        let around = side_of(hits[last].triangle, hits[last].along);
-        match (hits.get(last + 1), outside) {
-            (Some(next), _) => sets.join(around, side_of(next.triangle, !next.along)),
-            (None, Some(outside)) => sets.join(around, outside),
-            (None, None) => outside = Some(around),
+        let hits = shoot_from_triangle(joined, tree, start).ok_or(FacetError::NoRay(corner))?;
+        let [behind, before] =
+            [false, true].map(|front| move |hit: &Hit| side_of(hit.triangle, hit.along == front));
+        for pair in hits.windows(2) {
+            sets.join(before(&pair[0]), behind(&pair[1]));
         }
+        let end = hits.last().map(before).expect("the ray starts on a triangle");
+        sets.join(end, *outside.get_or_insert(end));
     }
     outside.ok_or(FacetError::Empty)
 }

@@ -73,6 +73,30 @@ fn a_surface_inside_another_is_a_void_or_a_body_by_its_orientation() {
     closed(&nested, &keep(&nested));
 }
 
+/// Rays between components whose largest triangles face each other lead in a circle.
+#[test]
+fn components_that_face_each_other_are_all_found() {
+    let corners = [[0., 0., 0.], [0., 4., 0.], [0., 0., 4.], [-1., 1., 1.]].map(Point::from);
+    let tet = |s: &mut Soup, moved: &dyn Fn(Point) -> Point, mirrored: bool| {
+        for [a, b, c] in [[0, 1, 2], [0, 3, 1], [1, 3, 2], [0, 2, 3]] {
+            let [b, c] = if mirrored { [c, b] } else { [b, c] };
+            s.add([a, b, c].map(|v: usize| moved(corners[v])));
+        }
+    };
+    let facing = soup(|s| {
+        tet(s, &|p| p, false);
+        tet(s, &|p| Point::new(1.0 - p.x, p.y, p.z), true);
+    });
+    assert_eq!(counts(&model(&[facing]))[3], 2);
+    let many = soup(|s| {
+        for k in 0..216 {
+            let center = [k % 6, k / 6 % 6, k / 36].map(|i| 3.0 * f64::from(i));
+            s.sphere(Point::from(center), 1.0, 8, 6, false);
+        }
+    });
+    assert_eq!(counts(&model(&[many]))[3], 216);
+}
+
 #[test]
 fn two_files_that_share_facets_have_an_interface() {
     let one = soup(|s| s.brick([0.0; 3], [1.0; 3], false));
