@@ -3,15 +3,14 @@
 pub mod halo;
 pub mod moved;
 pub mod processes;
+mod summary;
 
 pub use halo::HaloReport;
 pub use processes::{Processes, processes};
 
 use serde::Serialize;
-use std::fmt;
 use tetmill::check::PartReport;
 use tetmill::files::Written;
-use tetmill::memory::sized;
 use tetmill::progress::StageTime;
 use tetmill::run::{
     Balance, CoarseReport, Entities, Evened, Level, Metrics, Outcome, PeriodicCheck, Refused,
@@ -209,21 +208,6 @@ impl Report {
     }
 }
 
-/// Writes the line about thin regions.
-fn write_thin_regions(f: &mut fmt::Formatter<'_>, coarse: &CoarseReport) -> fmt::Result {
-    let walls = &coarse.thin_regions;
-    let Some(thinnest) = walls.thinnest else { return Ok(()) };
-    write!(f, "           walls as thin as {thinnest:.3e}: ")?;
-    match walls.limited {
-        0 => write!(f, "sizes lowered there")?,
-        limited if limited < walls.places => {
-            write!(f, "sizes lowered there, except where this takes far more tets (--closeness forces it)")?;
-        }
-        _ => write!(f, "too thin, sizes not lowered (--closeness forces it, at the cost of many tets)")?,
-    }
-    writeln!(f)
-}
-
 /// A count with blanks between groups of three digits.
 fn grouped(count: u64) -> String {
     let digits = count.to_string();
@@ -247,145 +231,6 @@ fn tets(count: u64) -> String {
 /// A number of vertices as text.
 fn vertices(count: u64) -> String {
     counted(count, "vertex", "vertices")
-}
-
-/// The subdivision of coarse edges as text.
-fn cut_into(pieces: u32) -> String {
-    if pieces == 1 {
-        "not refined".into()
-    } else if pieces.is_power_of_two() {
-        counted(pieces.ilog2().into(), "level", "levels")
-    } else {
-        format!("{pieces} pieces an edge")
-    }
-}
-
-impl fmt::Display for Report {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Entities { bodies, corners, curves, patches } = self.entities;
-        writeln!(
-            f,
-            "geometry   {}: {}, {}, {}, {}",
-            self.geometry,
-            counted(bodies as u64, "body", "bodies"),
-            counted(patches as u64, "patch", "patches"),
-            counted(curves as u64, "curve", "curves"),
-            counted(corners as u64, "corner", "corners")
-        )?;
-        let coarse = &self.coarse;
-        write!(f, "coarse     {}, {}", tets(coarse.tets), vertices(coarse.vertices))?;
-        writeln!(
-            f,
-            ", worst mean ratio {:.3}, mean {:.3}",
-            coarse.quality.worst_mean_ratio, coarse.quality.average_mean_ratio
-        )?;
-        if coarse.illegal_repaired + coarse.illegal_left > 0 {
-            writeln!(
-                f,
-                "           {} that refinement would flatten repaired, {} left",
-                tets(coarse.illegal_repaired),
-                coarse.illegal_left
-            )?;
-        }
-        if coarse.curved_edges > 0 {
-            let edges = counted(coarse.curved_edges, "edge", "edges");
-            writeln!(f, "           {edges} curved for better refined tets")?;
-        }
-        write_thin_regions(f, coarse)?;
-        let mesh = &self.mesh;
-        writeln!(
-            f,
-            "mesh       {}, {}, {}, {}",
-            tets(mesh.tets),
-            vertices(mesh.vertices),
-            counted(mesh.boundary, "boundary triangle", "boundary triangles"),
-            cut_into(self.pieces)
-        )?;
-        writeln!(
-            f,
-            "quality    mean ratio {:.3} at worst, {:.3} in the mean; dihedral angles {:.1}° to {:.1}°, 1st percentile {:.1}°",
-            mesh.worst_mean_ratio,
-            mesh.mean_mean_ratio,
-            mesh.smallest_dihedral,
-            mesh.largest_dihedral,
-            mesh.first_percentile_dihedral
-        )?;
-        if self.quality_by_level.len() > 1 {
-            let worst: Vec<String> = self
-                .quality_by_level
-                .iter()
-                .map(|l| format!("{:.1}° {:.1}°", l.smallest_dihedral, l.first_percentile_dihedral))
-                .collect();
-            writeln!(f, "by level   smallest dihedral angle and 1st percentile: {}", worst.join(", "))?;
-        }
-        write!(f, "checked    every tet positive; volume {}", mesh.volume)?;
-        if let Some(distance) = mesh.furthest_off_surface {
-            write!(f, "; boundary vertices within {distance:.1e} of their patch")?;
-        }
-        writeln!(f)?;
-        if let Some(PeriodicCheck { pairs, furthest, .. }) = self.periodic {
-            let parts = match self.partition.split_periodic {
-                _ if self.ranks == 1 => String::new(),
-                0 => "; each face in one part with its partner".into(),
-                lost => format!(
-                    "; {} NOT in one part with those at the partner faces: no `Periodic BC` of Elmer",
-                    counted(lost, "coarse tet", "coarse tets")
-                ),
-            };
-            writeln!(
-                f,
-                "periodic   {}, within {furthest:.1e} of their motions{parts}",
-                counted(pairs, "pair of vertices", "pairs of vertices")
-            )?;
-        }
-        if self.ranks > 1 {
-            let p = &self.partition;
-            writeln!(
-                f,
-                "partition  {} by {}, imbalance {:.3}, {} cut, {} shared",
-                counted(p.parts.into(), "part", "parts"),
-                p.method,
-                p.imbalance,
-                counted(p.edge_cut, "coarse face", "coarse faces"),
-                vertices(p.shared_vertices)
-            )?;
-        }
-        if let Some(across) = &self.across {
-            writeln!(
-                f,
-                "interfaces {} beside them improved in {}, {} sent to other parts for it; smallest angle {:.1}°, was {:.1}°; {} below {}°, were {}",
-                tets(across.tets),
-                counted(across.rounds.into(), "round", "rounds"),
-                grouped(across.moved),
-                across.smallest_after,
-                across.smallest_before,
-                tets(across.bad_after),
-                across.angle,
-                grouped(across.bad_before)
-            )?;
-        }
-        if let Some(Evened { imbalance, moved }) = self.evened {
-            let moved = tets(moved);
-            writeln!(f, "evened     {moved} went to other parts; the imbalance was {imbalance:.3}")?;
-        }
-        if let Some(Refused { skins, first: Some((rank, reason)) }) = &self.skins {
-            writeln!(
-                f,
-                "skins      {skins} refused by the mesher and filled by the lattice; that of rank {rank}: {reason}"
-            )?;
-        }
-        if let Some(halo) = &self.halo {
-            write!(f, "{halo}")?;
-        }
-        let stages: Vec<String> =
-            self.stages.iter().map(|s| format!("{} {:.2}", s.name, s.seconds)).collect();
-        writeln!(f, "seconds    {} in all: {}", format_args!("{:.2}", self.seconds), stages.join(", "))?;
-        write!(f, "{}", self.processes)?;
-        if self.files > 0 {
-            writeln!(f, "written    {}, {}", counted(self.files, "file", "files"), sized(self.bytes))?;
-        }
-        write!(f, "checksum   {}", mesh.checksum)
-    }
 }
 
 #[cfg(test)]
