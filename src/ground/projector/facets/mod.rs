@@ -48,7 +48,7 @@ struct PatchFacets {
     /// Bit k: the side opposite corner k is on the rim of the patch; bit 3 + k: corner k is on the
     /// rim.
     rim: Vec<u8>,
-    /// The normal of the common plane of all facets up to the tolerance, if there is one.
+    /// The normal of the common plane of all facets, if there is one.
     flat: Option<Vector>,
 }
 
@@ -72,6 +72,12 @@ pub(crate) struct Foot {
 ///
 /// The tolerance is at least [`COORDINATE_ROUNDING`] times the largest coordinate.
 const ON_SURFACE: f64 = 1e-12;
+
+/// Patches are flat and curves straight if they are so up to this fraction of the tolerance. Means
+/// of their points, which are not projected, are then within half the tolerance: the points may be
+/// on one side of the plane, the facets at the mean on the other.
+const ON_PLANE: f64 = 0.25;
+
 /// Four units in the last place.
 const COORDINATE_ROUNDING: f64 = 4.0 * f64::EPSILON;
 
@@ -90,11 +96,12 @@ impl FacetProjector {
         let patch = |members: &Vec<u32>| {
             let of = |all: &[Vector]| -> Vec<Vector> { members.iter().map(|&t| all[t as usize]).collect() };
             let sliver: Vec<bool> = members.iter().map(|&t| slivers[t as usize]).collect();
-            PatchFacets::new(&source, &edges, members, &of(&normals), &sliver, tolerance)
+            PatchFacets::new(&source, &edges, members, &of(&normals), &sliver, ON_PLANE * tolerance)
         };
         let patches = members.iter().map(patch).collect();
-        let polyline =
-            |c: &Vec<u32>| Polyline::new(c.iter().map(|&v| source.points[v as usize]).collect(), tolerance);
+        let polyline = |c: &Vec<u32>| {
+            Polyline::new(c.iter().map(|&v| source.points[v as usize]).collect(), ON_PLANE * tolerance)
+        };
         let curves = source.curves.iter().map(polyline).collect();
         Self { source, patches, curves, tolerance }
     }
@@ -147,13 +154,13 @@ impl FacetProjector {
         (self.project_curve(curve, point) - point).norm()
     }
 
-    /// Whether all facets of a patch are in one plane up to [`tolerance`](Self::tolerance), so that
-    /// points need no projection.
+    /// Whether all facets of a patch are in one plane up to a quarter of the
+    /// [`tolerance`](Self::tolerance), so that means of its points need no projection.
     pub fn is_flat_patch(&self, patch: PatchId) -> bool {
         self.flat_normal(patch).is_some()
     }
 
-    /// Whether a curve is straight up to [`tolerance`](Self::tolerance).
+    /// Whether a curve is straight up to a quarter of the [`tolerance`](Self::tolerance).
     pub fn is_straight_curve(&self, curve: CurveId) -> bool {
         self.curves[curve.index()].straight
     }
