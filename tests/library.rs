@@ -94,6 +94,18 @@ fn edges_and_faces_are_numbered_over_all_ranks() {
 }
 
 #[test]
+fn a_boundary_is_found_by_its_name_and_a_misspelt_name_is_an_error() {
+    let text = "algebraic3d solid b = sphere (0, 0, 0; 1) -bcname=wall; tlo b -material=air;";
+    let mesh = Mesher::new().generate(&Geometry::from_text(text).unwrap()).unwrap();
+    let wall = mesh.names.patches_named("wall").unwrap();
+    assert!(mesh.arrays().triangle_patches.iter().all(|patch| wall.contains(patch)));
+    assert_eq!(mesh.names.bodies_named("air").unwrap(), [mesh.arrays().tet_bodies[0]]);
+    let error = mesh.names.patches_named("wal").unwrap_err();
+    assert_eq!(error.kind(), ErrorKind::Input);
+    assert!(error.to_string().contains("did you mean `wall`?"), "{error}");
+}
+
+#[test]
 fn surfaces_in_memory_keep_their_numbers_and_names() {
     let (points, triangles, numbers) = cube();
     let names = BTreeMap::from([(10, "floor".to_owned())]);

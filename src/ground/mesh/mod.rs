@@ -18,7 +18,7 @@ pub use super::comm::Rank;
 pub use super::kernel::simplex::{TET_EDGES, TET_FACES};
 pub use arrays::Arrays;
 pub use ids::{EdgeId, FaceId, GlobalId, TetId, VertexId};
-pub use names::{Label, Names};
+pub use names::{Label, Names, UnknownName};
 pub use quality::QualitySummary;
 pub use sharing::{Neighbour, Sharing};
 pub use watched::Watched;
