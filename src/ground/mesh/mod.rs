@@ -20,6 +20,7 @@ pub use arrays::Arrays;
 pub use ids::{EdgeId, FaceId, GlobalId, TetId, VertexId};
 pub use names::{Label, Names, UnknownName};
 pub use quality::QualitySummary;
+pub(crate) use sharing::add_received;
 pub use sharing::{Neighbour, Sharing};
 pub use watched::Watched;
 
