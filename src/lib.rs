@@ -63,7 +63,7 @@
 //! | multigrid | [`Generated::into_hierarchy`], [`Hierarchy`] |
 //! | tets moved to other ranks | [`repartition`] |
 //! | the patches of a boundary name | [`mesh::Names::patches_named`] |
-//! | files | [`files`] |
+//! | files, with a solution | [`files`], [`files::vtu::write_fields`] |
 //! | MPI, in a program of your own | [`comm::mpi`] |
 //! | a progress bar, a cancel button | [`progress`] |
 //! | to match on what went wrong | [`error`], [`error::HasKind`] |
@@ -138,6 +138,7 @@ pub mod error {
     pub use crate::files::arrays::ArrayError;
     pub use crate::files::elmer::LoadError;
     pub use crate::files::input::ReadError;
+    pub use crate::files::vtu::FieldError;
     pub use crate::ground::comm::CommError;
     pub use crate::ground::comm::launch::LaunchError;
     pub use crate::ground::error::{ErrorKind, HasKind};
