@@ -69,7 +69,7 @@
 //! | to match on what went wrong | [`error`], [`error::HasKind`] |
 //!
 //! Whole programs are in the folder `examples`: Poisson's equation across ranks, a multigrid cycle,
-//! sizes by a function.
+//! sizes by a function, heat conduction in a program that initialises MPI itself.
 //!
 //! The library prints nothing. [`Geometry::notes`] has the warnings of a geometry's text and what
 //! was repaired while reading a file: a program should show them.
