@@ -10,7 +10,7 @@
 
 mod common;
 
-use common::{assemble, gradients, inner, on_boundary};
+use common::{assemble, conjugate_gradients, gradients, on_boundary};
 use tetmill::comm::{CommError, Communicator, thread};
 use tetmill::mesh::{Arrays, Sharing};
 use tetmill::{Error, Geometry, Mesher};
@@ -56,44 +56,10 @@ fn main() -> Result<(), Error> {
 fn solve(comm: &dyn Communicator, mesh: &Arrays, sharing: &Sharing) -> Result<(Vec<f64>, usize), CommError> {
     let (matrix, mut load) = assemble(mesh, source);
     sharing.sum(comm, &mut load)?;
-    let mut diagonal = matrix.diagonal();
-    sharing.sum(comm, &mut diagonal)?;
     let fixed = on_boundary(comm, mesh, sharing)?;
-    // The product with the matrix of the whole mesh, zero where the solution is prescribed.
-    let product = |x: &[f64]| -> Result<Vec<f64>, CommError> {
-        let mut y = matrix.times(x);
-        sharing.sum(comm, &mut y)?;
-        y.iter_mut().zip(&fixed).filter(|(_, fixed)| **fixed).for_each(|(y, _)| *y = 0.0);
-        Ok(y)
-    };
-
-    let mut x: Vec<f64> = mesh
-        .points
-        .iter()
-        .zip(&fixed)
-        .map(|(&point, fixed)| if *fixed { exact(point) } else { 0.0 })
-        .collect();
-    let ax = product(&x)?;
-    let mut r: Vec<f64> = (0..x.len()).map(|v| if fixed[v] { 0.0 } else { load[v] - ax[v] }).collect();
-    let precondition = |r: &[f64]| -> Vec<f64> { r.iter().zip(&diagonal).map(|(r, d)| r / d).collect() };
-    let mut p = precondition(&r);
-    let mut rz = inner(comm, sharing, &r, &p)?;
-    let enough = 1e-20 * rz;
-    let mut iterations = 0;
-    while rz > enough {
-        let ap = product(&p)?;
-        let step = rz / inner(comm, sharing, &p, &ap)?;
-        for v in 0..x.len() {
-            x[v] += step * p[v];
-            r[v] -= step * ap[v];
-        }
-        let z = precondition(&r);
-        let next = inner(comm, sharing, &r, &z)?;
-        p.iter_mut().zip(z).for_each(|(p, z)| *p = z + next / rz * *p);
-        rz = next;
-        iterations += 1;
-    }
-    Ok((x, iterations))
+    let prescribed = |vertex: usize| if fixed[vertex] { exact(mesh.points[vertex]) } else { 0.0 };
+    let start = (0..mesh.points.len()).map(prescribed).collect();
+    conjugate_gradients(comm, sharing, &matrix, &load, &fixed, start)
 }
 
 /// **Collective.** The L² norm of the error, by a quadrature rule of second order.

@@ -7,7 +7,9 @@
 //!
 //! ```
 //! use tetmill::comm::{Communicator, thread};
-//! use tetmill::{Error, Geometry, Mesher};
+//! use tetmill::{Geometry, Mesher};
+//!
+//! type Error = Box<dyn std::error::Error + Send + Sync>;
 //!
 //! let part = Geometry::from_text(
 //!     "algebraic3d
@@ -15,6 +17,10 @@
 //!      solid dome = sphere (0, 0, 0; 1) and base;
 //!      tlo dome;",
 //! )?;
+//! // Warnings of the language, repairs of a file.
+//! for note in part.notes() {
+//!     eprintln!("{note}");
+//! }
 //!
 //! // Three ranks, here threads of this process. Each gets its part of the same mesh.
 //! let owned = thread::run(3, |comm| -> Result<u64, Error> {
@@ -22,10 +28,8 @@
 //!
 //!     // The part as flat arrays: points, tets, bodies, boundary triangles and their patches.
 //!     let arrays = mesh.arrays();
-//!     let on_base = |index: &usize| {
-//!         let patch = arrays.triangle_patches[*index];
-//!         mesh.names.patches[patch.index()].name() == Some("fixed")
-//!     };
+//!     let fixed = mesh.names.patches_named("fixed")?; // an error if no boundary has the name
+//!     let on_base = |index: &usize| fixed.contains(&arrays.triangle_patches[*index]);
 //!     for triangle in (0..arrays.triangles.len()).filter(on_base) {
 //!         assert!(arrays.triangles[triangle].iter().all(|&v| arrays.points[v as usize][2].abs() < 1e-9));
 //!     }
@@ -61,13 +65,17 @@
 //! | one layer of tets of other parts | [`Generated::ghosts`] |
 //! | multigrid | [`Generated::into_hierarchy`], [`Hierarchy`] |
 //! | tets moved to other ranks | [`repartition`] |
-//! | files | [`files`] |
+//! | the patches of a boundary name | [`mesh::Names::patches_named`] |
+//! | files, with a solution | [`files`], [`files::vtu::write_fields`] |
 //! | MPI, in a program of your own | [`comm::mpi`] |
 //! | a progress bar, a cancel button | [`progress`] |
 //! | to match on what went wrong | [`error`], [`error::HasKind`] |
 //!
 //! Complete programs are in the folder `examples`: Poisson's equation across ranks, a multigrid
-//! cycle, sizes by a function.
+//! cycle, sizes by a function, heat conduction in a program that initialises MPI itself.
+//!
+//! The library prints nothing. [`Geometry::notes`] has the warnings of a geometry's text and what
+//! was repaired while reading a file: a program should show them.
 //!
 //! # What is guaranteed
 //!
@@ -134,9 +142,11 @@ pub mod error {
     pub use crate::files::arrays::ArrayError;
     pub use crate::files::elmer::LoadError;
     pub use crate::files::input::ReadError;
+    pub use crate::files::vtu::FieldError;
     pub use crate::ground::comm::CommError;
     pub use crate::ground::comm::launch::LaunchError;
     pub use crate::ground::error::{ErrorKind, HasKind};
+    pub use crate::ground::mesh::UnknownName;
     pub use crate::ground::mesh::periodic::MapError;
     pub use crate::ground::progress::Cancelled;
     pub use crate::mesher::facets::FacetError;

@@ -10,9 +10,10 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use tetmill::Point;
 use tetmill::comm::{Communicator, thread};
+use tetmill::files::vtu::{self, Field, On};
 use tetmill::files::{serial, volume};
 use tetmill::internals::{PlainPart, simplex};
-use tetmill::mesh::{BoundaryTriangle, Class, Label, Mesh, Names, TET_FACES, VertexId};
+use tetmill::mesh::{Arrays, BoundaryTriangle, Class, Label, Mesh, Names, TET_FACES, VertexId};
 
 /// Number of elements and total area or volume, by name.
 type Sizes = BTreeMap<String, (u64, f64)>;
@@ -106,6 +107,11 @@ fn squares(bodies: u32) -> Mesh {
 
 fn patch_count(mesh: &Mesh) -> u32 {
     mesh.triangles.iter().map(|t| t.patch.0 + 1).max().unwrap()
+}
+
+/// A number for each patch, and no names.
+fn numbered_patches(mesh: &Mesh) -> Vec<Label> {
+    (1..=patch_count(mesh)).map(Label::unnamed).collect()
 }
 
 /// The expected contents of a mesh, by the keys of its labels.
@@ -246,6 +252,47 @@ fn meshio_finds_all_names_and_areas() {
         let Some(found) = MESHIO.find(path) else { return };
         assert_alike(&found, &sizes(mesh, names, by_group), case);
     });
+}
+
+#[test]
+fn meshio_finds_the_values_of_points_and_tets() {
+    let mesh = squares(1);
+    let names = Names { bodies: vec![Label::new(1, "box")], patches: numbered_patches(&mesh) };
+    for ranks in [1, 4] {
+        let dir = tempfile::tempdir().unwrap();
+        let tet_to_rank: Vec<u32> = (0..mesh.tets.len() as u32).map(|tet| tet / 7 % ranks).collect();
+        thread::run(ranks, |comm| {
+            let part = PlainPart::part(&mesh, &tet_to_rank, ranks, comm.rank());
+            let arrays = Arrays::of(&part);
+            let heights: Vec<f64> = arrays.points.iter().map(|point| point[2]).collect();
+            let ids: Vec<f64> = arrays.tet_ids.iter().map(|&id| id as f64).collect();
+            let center = |tet: usize| {
+                let corners = arrays.corners(tet);
+                [0, 1, 2].map(|axis| corners.iter().map(|corner| corner[axis]).sum::<f64>() / 4.0)
+            };
+            let centers: Vec<[f64; 3]> = (0..arrays.tets.len()).map(center).collect();
+            let fields = [
+                Field { name: "height", on: On::Points, values: &heights, components: 1 },
+                Field { name: "center", on: On::Cells, values: centers.as_flattened(), components: 3 },
+                Field { name: "index", on: On::Cells, values: &ids, components: 1 },
+            ];
+            vtu::write_fields(comm, &part, &names, &dir.path().join("box"), &fields).unwrap();
+        })
+        .unwrap();
+        let files: Vec<String> = match ranks {
+            1 => vec!["box.vtu".to_owned()],
+            _ => (1..=ranks).map(|part| format!("box.parts/part.{part}.vtu")).collect(),
+        };
+        let mut tets = 0;
+        for file in files {
+            let Some(found) = Client("meshio_fields.py").run(&dir.path().join(file)) else { return };
+            tets += found.trim().parse::<usize>().unwrap();
+        }
+        assert_eq!(tets, mesh.tets.len());
+        // Values do not disturb our own reader.
+        let file = if ranks == 1 { "box.vtu" } else { "box.pvtu" };
+        assert_eq!(volume::read(&dir.path().join(file)).unwrap().mesh.tets.len(), mesh.tets.len());
+    }
 }
 
 #[test]

@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 use tetmill::comm::thread;
 use tetmill::error::{ErrorKind, HasKind};
-use tetmill::mesh::{Arrays, By, Sharing, blocks};
-use tetmill::{Error, Geometry, InputSettings, MeshArrays, Mesher, SurfaceArrays};
+use tetmill::mesh::{Arrays, By, EdgeId, FaceId, Sharing, VertexId, blocks};
+use tetmill::{Error, Geometry, InputSettings, MeshArrays, Mesher, Method, SurfaceArrays};
 
 const BALL: &str = "algebraic3d solid b = sphere (0, 0, 0; 1); tlo b;";
 
@@ -92,6 +92,71 @@ fn edges_and_faces_are_numbered_over_all_ranks() {
         let [v, e, f, t] = [totals.vertices, totals.edges, totals.faces, totals.tets].map(|n| n as i64);
         assert_eq!(v - e + f - t, 1, "Euler's number of a ball");
     }
+}
+
+#[test]
+fn edges_and_faces_have_one_owner_each_and_ids_without_gaps() {
+    let ball = ball();
+    let refined = Mesher::new().max_size(0.6).levels(1);
+    let surface = Mesher::new().max_size(0.6).method(Method::Surface);
+    for mesher in [refined, surface] {
+        let parts = thread::run(3, |comm| {
+            let mesh = mesher.generate_on(comm, Some(&ball)).unwrap();
+            let (arrays, sharing) = (mesh.arrays(), mesh.sharing());
+            let mesh = mesh.with_edges_and_faces(comm).unwrap();
+            let points: Vec<[f64; 3]> = mesh.points.iter().map(|&point| point.into()).collect();
+            let tets: Vec<[u32; 4]> = mesh.tets.iter().map(|tet| tet.map(|v| v.0)).collect();
+            assert_eq!((&points, &mesh.vertex_ids), (&arrays.points, &arrays.vertex_ids));
+            assert_eq!((&tets, &mesh.tet_ids), (&arrays.tets, &arrays.tet_ids));
+            let vertices = 0..points.len() as u32;
+            assert!(vertices.into_iter().all(|v| mesh.owns_vertex(VertexId(v)) == sharing.is_owned(v)));
+
+            let owned: Vec<bool> = (0..mesh.edges.len() as u32).map(|e| mesh.owns_edge(EdgeId(e))).collect();
+            let mut copies = vec![1.0; owned.len()];
+            mesh.shared_edges.sum(comm, &mut copies).unwrap();
+            let mut flags = owned.clone();
+            mesh.shared_edges.any(comm, &mut flags).unwrap();
+            assert!(flags.iter().all(|&flag| flag), "each edge has an owner");
+            let holders = |e: usize| mesh.edge_holders(EdgeId(e as u32)).len() as f64;
+            assert!(copies.iter().enumerate().all(|(e, &copies)| copies == holders(e)));
+
+            let ids = |ids: &[u64], owned: &dyn Fn(u32) -> bool| {
+                (0..).zip(ids).filter(|(local, _)| owned(*local)).map(|(_, &id)| id).collect::<Vec<_>>()
+            };
+            let edges = ids(&mesh.edge_ids, &|e| owned[e as usize]);
+            (edges, ids(&mesh.face_ids, &|f| mesh.owns_face(FaceId(f))), mesh.totals)
+        });
+        let (mut edges, mut faces, mut totals) = (Vec::new(), Vec::new(), None);
+        for (of_rank, faces_of_rank, of_mesh) in parts.unwrap() {
+            edges.extend(of_rank);
+            faces.extend(faces_of_rank);
+            totals = Some(of_mesh);
+        }
+        edges.sort_unstable();
+        faces.sort_unstable();
+        assert!(edges.into_iter().eq(0..totals.unwrap().edges));
+        assert!(faces.into_iter().eq(0..totals.unwrap().faces));
+    }
+}
+
+#[test]
+#[should_panic(expected = "but the part of rank 0 has")]
+fn a_slice_that_is_not_one_value_for_each_vertex_panics_with_a_sentence() {
+    let mesh = Mesher::new().generate(&ball()).unwrap();
+    let mut values = vec![0.0; mesh.arrays().points.len() - 1];
+    let _ = mesh.sharing().sum(&thread::alone(), &mut values);
+}
+
+#[test]
+fn a_boundary_is_found_by_its_name_and_a_misspelt_name_is_an_error() {
+    let text = "algebraic3d solid b = sphere (0, 0, 0; 1) -bcname=wall; tlo b -material=air;";
+    let mesh = Mesher::new().generate(&Geometry::from_text(text).unwrap()).unwrap();
+    let wall = mesh.names.patches_named("wall").unwrap();
+    assert!(mesh.arrays().triangle_patches.iter().all(|patch| wall.contains(patch)));
+    assert_eq!(mesh.names.bodies_named("air").unwrap(), [mesh.arrays().tet_bodies[0]]);
+    let error = mesh.names.patches_named("wal").unwrap_err();
+    assert_eq!(error.kind(), ErrorKind::Input);
+    assert!(error.to_string().contains("did you mean `wall`?"), "{error}");
 }
 
 #[test]

@@ -1,4 +1,5 @@
-//! Linear elements for Poisson's equation: what the examples share.
+//! Linear elements for Poisson's equation, and conjugate gradients across ranks: what the examples
+//! share.
 #![allow(dead_code)]
 
 use tetmill::comm::{CommError, Communicator};
@@ -66,6 +67,15 @@ pub fn dot(u: [f64; 3], v: [f64; 3]) -> f64 {
 
 /// This rank's contributions to the stiffness matrix of the Laplacian and to the load of a source.
 pub fn assemble(mesh: &Arrays, source: impl Fn([f64; 3]) -> f64) -> (Matrix, Vec<f64>) {
+    assemble_with(mesh, |_| 1.0, source)
+}
+
+/// Like [`assemble`], with a coefficient for each tet.
+pub fn assemble_with(
+    mesh: &Arrays,
+    coefficient: impl Fn(usize) -> f64,
+    source: impl Fn([f64; 3]) -> f64,
+) -> (Matrix, Vec<f64>) {
     let mut entries = Vec::with_capacity(16 * mesh.tets.len());
     let mut load = vec![0.0; mesh.points.len()];
     for (index, vertices) in mesh.tets.iter().enumerate() {
@@ -73,7 +83,8 @@ pub fn assemble(mesh: &Arrays, source: impl Fn([f64; 3]) -> f64) -> (Matrix, Vec
         let (gradients, volume) = gradients(corners);
         for (i, &row) in vertices.iter().enumerate() {
             for (j, &column) in vertices.iter().enumerate() {
-                entries.push((row, column, volume * dot(gradients[i], gradients[j])));
+                let value = coefficient(index) * volume * dot(gradients[i], gradients[j]);
+                entries.push((row, column, value));
             }
             // The integral of the source's interpolant with the shape function of this corner.
             let values = corners.map(&source);
@@ -111,4 +122,50 @@ pub fn inner(comm: &dyn Communicator, sharing: &Sharing, x: &[f64], y: &[f64]) -
         .sum();
     let all: f64 = x.iter().zip(y).map(|(a, b)| a * b).sum();
     Ok(comm.all_reduce_sum_f64([all - not_owned])?[0])
+}
+
+/// **Collective.** Solves a system by conjugate gradients with the diagonal as preconditioner, from
+/// a start that has the prescribed values of the `fixed` vertices. The load is summed over the
+/// ranks, the matrix is not. Returns the values at this rank's vertices and the number of
+/// iterations.
+pub fn conjugate_gradients(
+    comm: &dyn Communicator,
+    sharing: &Sharing,
+    matrix: &Matrix,
+    load: &[f64],
+    fixed: &[bool],
+    start: Vec<f64>,
+) -> Result<(Vec<f64>, usize), CommError> {
+    let mut diagonal = matrix.diagonal();
+    sharing.sum(comm, &mut diagonal)?;
+    // The product with the matrix of the whole mesh, zero where the solution is prescribed.
+    let product = |x: &[f64]| -> Result<Vec<f64>, CommError> {
+        let mut y = matrix.times(x);
+        sharing.sum(comm, &mut y)?;
+        y.iter_mut().zip(fixed).filter(|(_, fixed)| **fixed).for_each(|(y, _)| *y = 0.0);
+        Ok(y)
+    };
+
+    let mut x = start;
+    let ax = product(&x)?;
+    let mut r: Vec<f64> = (0..x.len()).map(|v| if fixed[v] { 0.0 } else { load[v] - ax[v] }).collect();
+    let precondition = |r: &[f64]| -> Vec<f64> { r.iter().zip(&diagonal).map(|(r, d)| r / d).collect() };
+    let mut p = precondition(&r);
+    let mut rz = inner(comm, sharing, &r, &p)?;
+    let enough = 1e-20 * rz;
+    let mut iterations = 0;
+    while rz > enough {
+        let ap = product(&p)?;
+        let step = rz / inner(comm, sharing, &p, &ap)?;
+        for v in 0..x.len() {
+            x[v] += step * p[v];
+            r[v] -= step * ap[v];
+        }
+        let z = precondition(&r);
+        let next = inner(comm, sharing, &r, &z)?;
+        p.iter_mut().zip(z).for_each(|(p, z)| *p = z + next / rz * *p);
+        rz = next;
+        iterations += 1;
+    }
+    Ok((x, iterations))
 }

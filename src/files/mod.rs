@@ -138,6 +138,12 @@ pub enum WriteError {
         .0.display()
     )]
     TwoFiles(PathBuf),
+    /// A path for VTU files with the extension of another format.
+    #[error("VTU files end in .vtu or .pvtu, but the path is {}: end it in .vtu, or leave out the ending", .0.display())]
+    ForeignEnding(PathBuf),
+    /// Fields that do not fit the mesh.
+    #[error(transparent)]
+    Field(#[from] vtu::FieldError),
     /// The file's extension is that of no known format.
     #[error("cannot tell the format of {} by its name; known are {}; or name it with --format", .0.display(), serial::KNOWN)]
     UnknownFormat(PathBuf),

@@ -138,6 +138,9 @@ impl Generated {
     /// classification and sharing ranks: for elements with unknowns there. Takes about 150 bytes a
     /// tet.
     ///
+    /// The global ids of edges and faces are 0 to their number in the whole mesh, without gaps.
+    /// Local numbers of vertices and tets are those of [`arrays`](Self::arrays).
+    ///
     /// # Errors
     /// If there are more tets than local ids, or not enough memory.
     pub fn with_edges_and_faces(&self, comm: &dyn Communicator) -> Result<DistMesh, Error> {

@@ -3,7 +3,7 @@
 use crate::failure::{Failure, Status, agree};
 use crate::options::{Boundary, Format, Halo, RunOptions};
 use crate::report::HaloReport;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use tetmill::comm::Communicator;
 use tetmill::files::{Written, elmer, serial, vtu};
 use tetmill::mesh::{By, MeshStream, Names, Watched, WithHalo};
@@ -56,19 +56,24 @@ pub(super) fn write_formats(
     let with_halo = ghosts.as_ref().map(|(_, ghosts)| WithHalo::new(part, ghosts));
     let part: &dyn MeshStream = with_halo.as_ref().map_or(part, |with_halo| with_halo);
     let part = &Watched::new(part, work, options.format.iter().map(passes).sum());
-    let joined = |ending: &str, format: serial::Format| {
+    let with_ending = |ending: &str| {
         // No `with_extension`: names may contain dots.
         let mut file = stem.as_os_str().to_os_string();
         file.push(ending);
-        let file = Path::new(&file);
-        note_losses(names, format, file, progress);
-        serial::write_joined(comm, part, names, format, file)
+        PathBuf::from(file)
+    };
+    let joined = |ending: &str, format: serial::Format| {
+        let file = with_ending(ending);
+        note_losses(names, format, &file, progress);
+        serial::write_joined(comm, part, names, format, &file)
     };
     let mut written = Written::default();
     for format in &options.format {
         written += match format {
             Format::Elmer => elmer::write(comm, part, names, dir)?,
-            Format::Vtu => vtu::write_with(comm, part, names, stem, place_of(options.boundary))?,
+            Format::Vtu => {
+                vtu::write_with(comm, part, names, &with_ending(".vtu"), place_of(options.boundary))?
+            }
             Format::Msh => joined(".msh", serial::Format::Gmsh)?,
             Format::Medit => joined(".mesh", serial::Format::Medit)?,
             Format::Vol => joined(".vol", serial::Format::Netgen)?,

@@ -168,3 +168,13 @@ pub(super) enum Statement {
         name: Name,
     },
 }
+
+impl Statement {
+    /// The name of the solid that the statement defines, even with errors.
+    pub fn solid_name(&self) -> Option<&str> {
+        match self {
+            Self::Solid { name, .. } | Self::Broken { name } => Some(&name.text),
+            _ => None,
+        }
+    }
+}

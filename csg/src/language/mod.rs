@@ -34,6 +34,7 @@ mod suggest;
 mod token;
 
 pub use diagnostic::{Diagnostic, Diagnostics, Kind};
+pub use suggest::did_you_mean;
 
 use crate::Geometry;
 use diagnostic::Report;

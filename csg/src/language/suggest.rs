@@ -62,7 +62,13 @@ pub(super) fn begins_statement(word: &str) -> bool {
 }
 
 /// A help line with the nearest of `candidates`, or an empty string if none is near.
-pub(super) fn did_you_mean<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) -> String {
+///
+/// ```
+/// use csg::language::did_you_mean;
+/// assert_eq!(did_you_mean("wal", ["inlet", "wall"]), "did you mean `wall`?");
+/// assert_eq!(did_you_mean("outlet", ["wall"]), "");
+/// ```
+pub fn did_you_mean<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) -> String {
     // Up to a third of the letters may differ (at least one): `spere` suggests `sphere`, but `box`
     // does not suggest `cone`.
     let allowed = (word.chars().count() / 3).max(1);

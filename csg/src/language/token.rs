@@ -38,7 +38,7 @@ pub(super) fn tokenize<'a>(source: &'a str, report: &mut Report) -> Vec<Token<'a
     let mut end = Span { line: 1, column: 1 };
     for (line, text) in (1u32..).zip(lines(source)) {
         let mut scanner = Scanner { text, at: 0, span: Span { line, column: 1 } };
-        while let Some(token) = scanner.next_token(report) {
+        while let Some(token) = scanner.next_token(&tokens, report) {
             tokens.push(token);
         }
         end = scanner.span;
@@ -70,7 +70,8 @@ impl<'a> Scanner<'a> {
         taken
     }
 
-    fn next_token(&mut self, report: &mut Report) -> Option<Token<'a>> {
+    /// The next token of the line, which follows the tokens `before`.
+    fn next_token(&mut self, before: &[Token<'a>], report: &mut Report) -> Option<Token<'a>> {
         self.take_while(is_blank);
         let span = self.span;
         let kind = match self.rest().chars().next()? {
@@ -79,14 +80,14 @@ impl<'a> Scanner<'a> {
                 TokenKind::Word(self.take_while(|c| c.is_ascii_alphanumeric() || c == '_'))
             }
             c if c.is_ascii_digit() || c == '.' => self.number(report),
-            '"' => {
+            quote @ ('"' | '\'') => {
                 // Take the whole string, so that one mistake gives one message.
                 self.take_one();
-                self.take_while(|c| c != '"');
-                if self.rest().starts_with('"') {
+                let content = self.take_while(|c| c != quote);
+                if self.rest().starts_with(quote) {
                     self.take_one();
                 }
-                report.syntax(span, "there are no quoted strings", "write -material=air");
+                report.syntax(span, "there are no quoted strings", &unquoted_help(before, content));
                 TokenKind::Bad
             }
             c => {
@@ -152,9 +153,28 @@ fn is_blank(c: char) -> bool {
     matches!(c, ' ' | '\t' | '\u{b}' | '\u{c}' | '\u{feff}')
 }
 
+/// How to write the content of a quoted string that follows the tokens `before`.
+fn unquoted_help(before: &[Token<'_>], content: &str) -> String {
+    let content = content.trim();
+    let is_word = content.starts_with(|c: char| c.is_ascii_alphabetic());
+    let word = if is_word {
+        content.replace(|c: char| !c.is_ascii_alphanumeric(), "_")
+    } else if content.parse::<f64>().is_ok_and(f64::is_finite) {
+        content.to_owned()
+    } else {
+        "WORD, a word of letters, digits and _ that begins with a letter".to_owned()
+    };
+    match before.last_chunk().map(|tokens| tokens.map(|token| token.kind)) {
+        Some([TokenKind::Mark('-'), TokenKind::Word(flag), TokenKind::Mark('=')]) => {
+            format!("write -{flag}={word}")
+        }
+        _ if word.starts_with("WORD") => format!("write {word}"),
+        _ => format!("write {word} without quotes"),
+    }
+}
+
 fn stray_help(c: char) -> &'static str {
     match c {
-        '\'' => "there are no quoted strings: write -material=air",
         '+' => "numbers take no leading +, and there is no arithmetic",
         '*' | '/' | '^' => "there is no arithmetic: write the value itself; a comment begins with #",
         '{' | '}' => "solids are grouped by ( )",

@@ -58,8 +58,10 @@ pub(super) enum Section {
 #[derive(Clone, Debug)]
 pub(super) struct Array {
     pub section: Section,
-    pub name: &'static str,
+    pub name: String,
     pub kind: Kind,
+    /// Numbers for each point or cell.
+    pub components: usize,
     /// Length in numbers.
     pub len: u64,
 }
@@ -67,8 +69,11 @@ pub(super) struct Array {
 impl Array {
     /// The attributes that are the same in pieces and in their index file.
     pub fn attributes(&self) -> String {
-        let components = if self.section == Section::Points { " NumberOfComponents=\"3\"" } else { "" };
-        format!("type=\"{}\" Name=\"{}\"{components}", self.kind.name(), self.name)
+        let components = match self.components {
+            1 => String::new(),
+            count => format!(" NumberOfComponents=\"{count}\""),
+        };
+        format!("type=\"{}\" Name=\"{}\"{components}", self.kind.name(), escaped(&self.name))
     }
 
     fn bytes(&self) -> u64 {
@@ -127,18 +132,24 @@ impl Piece {
             fields: Vec::new(),
             hides_fields: false,
         };
-        piece.add(Section::Points, "Points", Kind::F64, 3 * points);
+        piece.add_field(Section::Points, "Points", 3, points);
         piece.add(Section::Cells, "connectivity", id, corners);
         piece.add(Section::Cells, "offsets", id, cells);
         piece.add(Section::Cells, "types", Kind::U8, cells);
         piece
     }
 
-    pub fn add(&mut self, section: Section, name: &'static str, kind: Kind, len: u64) {
-        self.arrays.push(Array { section, name, kind, len });
+    pub fn add(&mut self, section: Section, name: &str, kind: Kind, len: u64) {
+        self.arrays.push(Array { section, name: name.to_owned(), kind, components: 1, len });
     }
 
-    /// Calls `f(name, attributes, arrays)` for each section.
+    /// Adds an array of real numbers with several components for each of `count` points or cells.
+    pub fn add_field(&mut self, section: Section, name: &str, components: usize, count: u64) {
+        let len = components as u64 * count;
+        self.arrays.push(Array { section, name: name.to_owned(), kind: Kind::F64, components, len });
+    }
+
+    /// Calls `f(name, attributes, arrays)` for each section, whose arrays must be adjacent.
     pub fn for_each_section(&self, mut f: impl FnMut(&str, &str, &[Array])) {
         for arrays in self.arrays.chunk_by(|a, b| a.section == b.section) {
             let section = arrays[0].section;
@@ -231,9 +242,18 @@ impl PieceFile<'_> {
 
     /// Opens the cell array of this name at its beginning, if there is one.
     pub fn cell_array(&self, name: &str) -> Result<Option<(Output, Kind)>, WriteError> {
-        let is_it = |array: &Array| array.section == Section::CellData && array.name == name;
-        let place = self.piece.arrays.iter().position(is_it);
+        let place = self.place_in(Section::CellData, name);
         place.map(|place| self.array_at(place, 0)).transpose()
+    }
+
+    /// Opens the array of a field at its beginning.
+    pub fn field(&self, section: Section, name: &str) -> Result<Output, WriteError> {
+        let place = self.place_in(section, name);
+        Ok(self.array_at(place.expect("an array of the piece"), 0)?.0)
+    }
+
+    fn place_in(&self, section: Section, name: &str) -> Option<usize> {
+        self.piece.arrays.iter().position(|array| array.section == section && array.name == name)
     }
 
     fn array_at(&self, place: usize, numbers: u64) -> Result<(Output, Kind), WriteError> {

@@ -1,6 +1,7 @@
 //! The triangles on patches of a part.
 
 use super::arrays::{Kind, Piece, Section};
+use super::fields::{self, Field, On};
 use crate::files::{WriteError, patch_number};
 use crate::ground::mesh::Names;
 use crate::ground::mesh::stream::{BoundaryBlock, MeshStream, NO_TET};
@@ -39,10 +40,11 @@ impl Surface {
         }
     }
 
-    /// Describes the arrays of the triangles.
-    pub fn piece(&self) -> Piece {
+    /// Describes the arrays of the triangles, with the fields on points.
+    pub fn piece(&self, fields: &[Field<'_>]) -> Piece {
         let mut piece = Piece::new(self.vertices, 0, self.triangles);
         piece.add(Section::PointData, "GlobalNodeId", Kind::I64, self.vertices);
+        fields::add(&mut piece, fields, On::Points, self.vertices);
         piece.add(Section::CellData, "BoundaryId", Kind::I32, self.triangles);
         piece.add(Section::CellData, "PartitionId", Kind::I32, self.triangles);
         if self.several_parts {
@@ -59,13 +61,14 @@ impl Surface {
         piece: &Piece,
         part: &dyn MeshStream,
         names: &Names,
+        fields: &[Field<'_>],
         path: &Path,
     ) -> Result<u64, WriteError> {
         // A part may keep only some of its points, and its boundary uses no others.
         let used = |v: &u32| self.to_surface.get(*v as usize).is_some_and(|place| *place != UNUSED);
         let file = piece.create(path)?;
-        let points: Vec<[f64; 3]> =
-            (0..part.points().len() as u32).filter(used).map(|v| part.points()[v as usize]).collect();
+        let vertices = (0..part.points().len() as u32).filter(used);
+        let points: Vec<[f64; 3]> = vertices.clone().map(|v| part.points()[v as usize]).collect();
         file.array("Points")?.0.write(bytemuck::cast_slice(&points))?;
 
         let mut ids = Vec::new();
@@ -85,6 +88,7 @@ impl Surface {
         }
         file.fill("PartitionId", |_| u64::from(part.rank()) + 1)?;
         file.fill_cells(0)?;
+        fields::write_at(&file, fields, vertices)?;
         file.finish()
     }
 }

@@ -10,6 +10,7 @@
 //! tets     GlobalElementId  BodyId  PartitionId  vtkGhostType (halo only: 1 on ghosts)
 //!                                    A ghost's PartitionId is its owner's.
 //! triangles                 BoundaryId  PartitionId  vtkGhostType (1 on the second copy of an interface triangle)
+//! values   of the caller, on points and tets: `write_fields`
 //! fields   one for each name, `Body NAME` or `Boundary NAME`: the numbers with this name
 //! ```
 //! With [`Boundary::In`] the triangles follow the tets in the same files: all cells have `BodyId`,
@@ -24,7 +25,10 @@
 
 mod arrays;
 mod boundary;
+mod fields;
 mod volume;
+
+pub use fields::{Field, FieldError, On};
 
 use arrays::{Piece, escaped};
 
@@ -48,12 +52,13 @@ pub enum Boundary {
     In,
 }
 
-/// **Collective.** Writes the part of each rank and, with several, the index files. `stem` may end
-/// in `.vtu` or `.pvtu`. All ranks get the totals.
+/// **Collective.** Writes the part of each rank and, with several, the index files. `stem` is the
+/// path without ending, or with `.vtu` or `.pvtu`; other dots in the name are kept. All ranks get
+/// the totals.
 ///
 /// # Errors
-/// A body or patch without a number, not enough disk space, or an I/O error. All ranks get the
-/// error, and old files are kept.
+/// The ending of another format, a body or patch without a number, not enough disk space, or an I/O
+/// error. All ranks get the error, and old files are kept.
 pub fn write(
     comm: &dyn Communicator,
     part: &dyn MeshStream,
@@ -74,15 +79,79 @@ pub fn write_with(
     stem: &Path,
     boundary: Boundary,
 ) -> Result<Written, WriteError> {
+    write_all(comm, part, names, stem, boundary, &[])
+}
+
+/// **Collective.** Like [`write()`], with values on vertices and tets, such as a solution. Fields
+/// on vertices are in the files of the triangles, too.
+///
+/// Each rank passes the values of its part, in the order of its [`Arrays`](crate::mesh::Arrays).
+/// Names, order and components must be the same on all ranks. Copies of a vertex should have the
+/// same value on all their ranks.
+///
+/// ```
+/// use tetmill::files::vtu::{self, Field, On};
+/// use tetmill::{Geometry, Mesher, comm::thread};
+/// # let folder = tempfile::tempdir()?;
+/// # let folder = folder.path();
+///
+/// let ball = Geometry::from_text("algebraic3d solid ball = sphere (0, 0, 0; 1); tlo ball;")?;
+/// let mesh = Mesher::new().generate(&ball)?;
+/// let arrays = mesh.arrays();
+/// let heights: Vec<f64> = arrays.points.iter().map(|point| point[2]).collect();
+/// let flux = [0.0, 0.0, -1.0].repeat(arrays.tets.len());
+/// let fields = [
+///     Field { name: "height", on: On::Points, values: &heights, components: 1 },
+///     Field { name: "flux", on: On::Cells, values: &flux, components: 3 },
+/// ];
+/// vtu::write_fields(&thread::alone(), mesh.stream(), &mesh.names, &folder.join("ball"), &fields)?;
+/// # assert!(folder.join("ball.vtu").exists());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// # Errors
+/// Those of [`write()`], and [`FieldError`]: a wrong number of values, an empty or repeated name,
+/// or different fields on two ranks. All ranks get an error.
+pub fn write_fields(
+    comm: &dyn Communicator,
+    part: &dyn MeshStream,
+    names: &Names,
+    stem: &Path,
+    fields: &[Field<'_>],
+) -> Result<Written, WriteError> {
+    fields::check(comm, part, fields)?;
+    write_all(comm, part, names, stem, Boundary::Beside, fields)
+}
+
+/// Endings of other formats of meshes, geometries and results.
+const FOREIGN: [&str; 27] = [
+    "vtk", "vtp", "vti", "vtr", "vts", "vtm", "vtmb", "vtkhdf", "pvd", "pvtp", "xdmf", "xmf", "h5", "hdf",
+    "exo", "med", "msh", "mesh", "meshb", "vol", "off", "stl", "obj", "ply", "csv", "vtx", "geo",
+];
+
+/// **Collective.** Writes the files; fields are checked, and there are none with [`Boundary::In`].
+fn write_all(
+    comm: &dyn Communicator,
+    part: &dyn MeshStream,
+    names: &Names,
+    stem: &Path,
+    boundary: Boundary,
+    fields: &[Field<'_>],
+) -> Result<Written, WriteError> {
     let (folder, name) = folder_and_name(stem)?;
     let name = name.to_str().ok_or_else(|| {
         WriteError::io(stem)(io::Error::new(io::ErrorKind::InvalidInput, "the name is not in Unicode"))
     })?;
+    if let Some((_, ending)) = name.rsplit_once('.')
+        && FOREIGN.iter().any(|foreign| ending.eq_ignore_ascii_case(foreign))
+    {
+        return Err(WriteError::ForeignEnding(stem.to_path_buf()));
+    }
     let name = [".pvtu", ".vtu"].iter().find_map(|end| name.strip_suffix(end)).unwrap_or(name);
 
-    let mut tets = volume::piece(part, boundary);
+    let mut tets = volume::piece(part, boundary, fields);
     let surface = (boundary == Boundary::Beside).then(|| boundary::Surface::of(part));
-    let mut triangles = surface.as_ref().map(boundary::Surface::piece);
+    let mut triangles = surface.as_ref().map(|surface| surface.piece(fields));
     let (of_bodies, of_boundaries) =
         (numbers_by_name("Body", &names.bodies), numbers_by_name("Boundary", &names.patches));
     tets.fields.clone_from(&of_bodies);
@@ -97,9 +166,9 @@ pub fn write_with(
             ["part", "boundary"].map(|kind| piece_path(name, kind, part.rank() + 1))
         };
         let mut written =
-            Written { files: 1, bytes: volume::write(&tets, part, names, &stage.join(tets_path))? };
+            Written { files: 1, bytes: volume::write(&tets, part, names, fields, &stage.join(tets_path))? };
         if let (Some(surface), Some(triangles)) = (&surface, &triangles) {
-            let bytes = surface.write(triangles, part, names, &stage.join(triangles_path))?;
+            let bytes = surface.write(triangles, part, names, fields, &stage.join(triangles_path))?;
             written += Written { files: 1, bytes };
         }
         if part.ranks() > 1 && part.rank() == 0 {

@@ -244,3 +244,114 @@ fn the_main_name_of_each_number_comes_first() {
     let contrary = [label(1, &["a", "b"]), label(2, &["b", "a"])];
     assert_eq!(numbers_by_name("Body", &contrary).len(), 2);
 }
+
+#[test]
+#[cfg(target_endian = "little")]
+fn fields_follow_the_arrays_of_the_mesh() {
+    let mesh = cube(4);
+    for ranks in [1, 3] {
+        let dir = tempfile::tempdir().unwrap();
+        let stem = dir.path().join("m.vtu");
+        together(ranks, |comm| {
+            let part = PlainPart::part(&mesh, &scattered(&mesh, ranks), ranks, comm.rank());
+            let arrays = crate::ground::mesh::Arrays::of(&part);
+            let heights: Vec<f64> = arrays.points.iter().map(|p| p[2]).collect();
+            let centers: Vec<f64> = (0..arrays.tets.len())
+                .flat_map(|t| {
+                    let corners = arrays.corners(t);
+                    [0, 1, 2].map(|axis| corners.iter().map(|c| c[axis]).sum::<f64>() / 4.0)
+                })
+                .collect();
+            let fields = [
+                Field { name: "a<b", on: On::Points, values: &heights, components: 1 },
+                Field { name: "center", on: On::Cells, values: &centers, components: 3 },
+            ];
+            write_fields(comm, &part, &names(), &stem, &fields).unwrap();
+        });
+        let pieces = |kind: &str| -> Vec<_> {
+            let of_rank = |rank: u32| match ranks {
+                1 => format!("m{kind}.vtu"),
+                _ => piece_path("m", if kind.is_empty() { "part" } else { "boundary" }, rank + 1),
+            };
+            (0..ranks).map(|rank| arrays(&dir.path().join(of_rank(rank)))).collect()
+        };
+        for piece in pieces("") {
+            assert_eq!(
+                piece["a&lt;b"],
+                piece["Points"].iter().skip(2).step_by(3).copied().collect::<Vec<_>>()
+            );
+            let corner = |tet: usize, k: usize, axis: usize| {
+                piece["Points"][3 * piece["connectivity"][4 * tet + k] as usize + axis]
+            };
+            assert_eq!(piece["center"].len(), 3 * piece["types"].len());
+            for (k, &value) in piece["center"].iter().enumerate() {
+                assert_eq!(value, (0..4).map(|c| corner(k / 3, c, k % 3)).sum::<f64>() / 4.0);
+            }
+        }
+        for piece in pieces(".boundary") {
+            assert_eq!(
+                piece["a&lt;b"],
+                piece["Points"].iter().skip(2).step_by(3).copied().collect::<Vec<_>>()
+            );
+            assert!(!piece.contains_key("center"));
+        }
+        if ranks > 1 {
+            let list = fs::read_to_string(dir.path().join("m.pvtu")).unwrap();
+            let declared = "<PDataArray type=\"Float64\" Name=\"center\" NumberOfComponents=\"3\"/>";
+            assert!(list.contains(declared) && list.contains("Name=\"a&lt;b\"/>"), "{list}");
+        }
+    }
+}
+
+#[test]
+fn fields_that_do_not_fit_are_refused_on_all_ranks() {
+    let mesh = two_tets();
+    let dir = tempfile::tempdir().unwrap();
+    let refusal = |fields: &(dyn Fn(u32) -> Vec<Field<'static>> + Sync)| {
+        let errors = together(2, |comm| {
+            let part = PlainPart::part(&mesh, &[0, 1], 2, comm.rank());
+            write_fields(comm, &part, &names(), &dir.path().join("m"), &fields(comm.rank())).unwrap_err()
+        });
+        let kinds = errors.iter().map(crate::ground::error::HasKind::kind);
+        assert!(kinds.into_iter().all(|kind| kind == crate::ground::error::ErrorKind::Input));
+        errors.iter().find(|error| matches!(error, WriteError::Field(_))).unwrap().to_string()
+    };
+    let field = |name, values| Field { name, on: On::Points, values, components: 1 };
+    const FOUR: &[f64] = &[0.0; 4];
+    let length = refusal(&|rank| vec![field("u", &FOUR[..if rank == 0 { 4 } else { 3 }])]);
+    assert!(
+        length.starts_with("the field `u` has 3 values, but rank 1 has 4 vertices, which take 4:"),
+        "{length}"
+    );
+    let cells = refusal(&|_| vec![Field { name: "q", on: On::Cells, values: FOUR, components: 3 }]);
+    assert!(cells.contains("has 1 tets, which take 3"), "{cells}");
+    assert!(refusal(&|_| vec![field(" ", FOUR)]).contains("cannot name a field"));
+    assert!(refusal(&|_| vec![field("a\nb", FOUR)]).contains("cannot name a field"));
+    assert!(refusal(&|_| vec![field("BodyId", FOUR)]).contains("gives to an array of the mesh"));
+    assert!(
+        refusal(&|_| vec![field("u", FOUR), field("u", FOUR)])
+            .contains("two fields on vertices have the name `u`")
+    );
+    assert!(refusal(&|_| vec![Field { components: 0, ..field("u", &[]) }]).contains("a scalar has 1"));
+    let differ = refusal(&|rank| vec![field(if rank == 0 { "u" } else { "v" }, FOUR)]);
+    assert!(differ.starts_with("rank 1 passes other fields than rank 0"), "{differ}");
+    assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 0);
+}
+
+#[test]
+fn endings_of_other_formats_are_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    let write_to = |name: &str| {
+        let (comm, mesh) = (crate::ground::comm::thread::alone(), two_tets());
+        write(&comm, &PlainPart::whole(&mesh), &names(), &dir.path().join(name))
+    };
+    for name in ["a.vtk", "a.VTK", "a.b.msh"] {
+        let error = write_to(name).unwrap_err().to_string();
+        assert!(error.starts_with("VTU files end in .vtu or .pvtu, but the path is "), "{error}");
+    }
+    assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 0);
+    for (name, file) in [("a", "a.vtu"), ("b.pvtu", "b.vtu"), ("run.0001", "run.0001.vtu")] {
+        write_to(name).unwrap();
+        assert!(dir.path().join(file).exists(), "{name}");
+    }
+}

@@ -3,6 +3,7 @@
 use super::Boundary;
 use super::arrays::{Kind, Piece, PieceFile, Section};
 use super::boundary::Triangles;
+use super::fields::{self, Field, On};
 use crate::files::chunks::{items, split, write_chunks};
 use crate::files::{WriteError, body_number};
 use crate::ground::mesh::Names;
@@ -18,10 +19,11 @@ const NO_ID: u64 = u64::MAX;
 /// Tets or vertices that one thread encodes at a time.
 const PER_CHUNK: u64 = 1 << 14;
 
-/// Describes the arrays of a part's tets, and of its triangles with [`Boundary::In`].
+/// Describes the arrays of a part's tets with fields, and of its triangles with [`Boundary::In`],
+/// which has no fields.
 ///
 /// MFEM takes the first cell array as the element attributes if `Scalars` names it `material`.
-pub(super) fn piece(part: &dyn MeshStream, boundary: Boundary) -> Piece {
+pub(super) fn piece(part: &dyn MeshStream, boundary: Boundary, fields: &[Field<'_>]) -> Piece {
     let counts = part.counts();
     let (mixed, several) = (boundary == Boundary::In, part.ranks() > 1);
     let mut piece = Piece::new(counts.vertices, counts.tets, if mixed { counts.boundary } else { 0 });
@@ -33,6 +35,7 @@ pub(super) fn piece(part: &dyn MeshStream, boundary: Boundary) -> Piece {
     if !part.links().is_empty() {
         piece.add(Section::PointData, "PeriodicId", Kind::I64, counts.vertices);
     }
+    fields::add(&mut piece, fields, On::Points, counts.vertices);
     // MFEM reads only files of one part without triangles.
     let for_mfem = !mixed && !several;
     piece.hides_fields = for_mfem;
@@ -57,6 +60,7 @@ pub(super) fn piece(part: &dyn MeshStream, boundary: Boundary) -> Piece {
     if part.ghosts().is_some() || (mixed && several) {
         add(GHOST_TYPE, Kind::U8);
     }
+    fields::add(&mut piece, fields, On::Cells, cells);
     piece
 }
 
@@ -65,6 +69,7 @@ pub(super) fn write(
     piece: &Piece,
     part: &dyn MeshStream,
     names: &Names,
+    fields: &[Field<'_>],
     path: &Path,
 ) -> Result<u64, WriteError> {
     let file = piece.create(path)?;
@@ -99,6 +104,7 @@ pub(super) fn write(
             Ok(())
         })?;
     }
+    fields::write(&file, fields)?;
     file.finish()
 }
 

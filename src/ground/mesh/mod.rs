@@ -18,8 +18,9 @@ pub use super::comm::Rank;
 pub use super::kernel::simplex::{TET_EDGES, TET_FACES};
 pub use arrays::Arrays;
 pub use ids::{EdgeId, FaceId, GlobalId, TetId, VertexId};
-pub use names::{Label, Names};
+pub use names::{Label, Names, UnknownName};
 pub use quality::QualitySummary;
+pub(crate) use sharing::add_received;
 pub use sharing::{Neighbour, Sharing};
 pub use watched::Watched;
 

@@ -27,6 +27,8 @@ use bytemuck::Pod;
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Sharing {
     rank: Rank,
+    /// The number of vertices of the part.
+    count: usize,
     /// Local indices, ascending.
     vertices: Vec<u32>,
     /// All ranks that share each of them, this one included, ascending.
@@ -49,7 +51,8 @@ impl Sharing {
     /// *Local.* Lists the shared vertices of a part.
     pub fn of(part: &dyn MeshStream) -> Self {
         let rank = part.rank();
-        let mut sharing = Self { rank, ..Self::default() };
+        let count = part.counts().vertices as usize;
+        let mut sharing = Self { rank, count, ..Self::default() };
         let mut with: Vec<(Rank, GlobalId, u32)> = Vec::new();
         for index in 0..part.vertex_blocks() {
             let block = part.vertex_block(index);
@@ -105,11 +108,22 @@ impl Sharing {
     ///
     /// # Errors
     /// [`CommError`] if another rank fails.
+    ///
+    /// # Panics
+    /// If `values` does not have one value for each vertex of the part.
     pub fn exchange<T: Pod>(
         &self,
         comm: &dyn Communicator,
         values: &[T],
     ) -> Result<Vec<(u32, Rank, T)>, CommError> {
+        assert_eq!(
+            values.len(),
+            self.count,
+            "the values are {}, but the part of rank {} has {} vertices: pass one value for each, shared or not",
+            values.len(),
+            self.rank,
+            self.count
+        );
         let message = |neighbour: &Neighbour| {
             let values = neighbour.vertices.iter().map(|&vertex| values[vertex as usize]).collect();
             (neighbour.rank, values)
@@ -129,15 +143,12 @@ impl Sharing {
     ///
     /// # Errors
     /// [`CommError`] if another rank fails.
+    ///
+    /// # Panics
+    /// If `values` does not have one value for each vertex of the part.
     pub fn sum(&self, comm: &dyn Communicator, values: &mut [f64]) -> Result<(), CommError> {
-        let came = self.exchange(comm, values)?;
-        let mut parts: Vec<(u32, Rank, f64)> =
-            self.vertices.iter().map(|&vertex| (vertex, self.rank, values[vertex as usize])).collect();
-        parts.extend(came);
-        parts.sort_unstable_by_key(|&(vertex, rank, _)| (vertex, rank));
-        for of_vertex in parts.chunk_by(|a, b| a.0 == b.0) {
-            values[of_vertex[0].0 as usize] = of_vertex.iter().map(|(_, _, value)| value).sum();
-        }
+        let received = self.exchange(comm, values)?;
+        add_received(self.rank, &self.vertices, received, values);
         Ok(())
     }
 
@@ -146,11 +157,24 @@ impl Sharing {
     ///
     /// # Errors
     /// [`CommError`] if another rank fails.
+    ///
+    /// # Panics
+    /// If `flags` does not have one flag for each vertex of the part.
     pub fn any(&self, comm: &dyn Communicator, flags: &mut [bool]) -> Result<(), CommError> {
         let bytes: Vec<u8> = flags.iter().map(|&flag| u8::from(flag)).collect();
         for (vertex, _, flag) in self.exchange(comm, &bytes)? {
             flags[vertex as usize] |= flag != 0;
         }
         Ok(())
+    }
+}
+
+/// Replaces the values of the shared entities `ids` by their sums with the values received from
+/// other ranks. The terms are added in rank order, so all ranks get the same bits.
+pub(crate) fn add_received(rank: Rank, ids: &[u32], mut received: Vec<(u32, Rank, f64)>, values: &mut [f64]) {
+    received.extend(ids.iter().map(|&id| (id, rank, values[id as usize])));
+    received.sort_unstable_by_key(|&(id, rank, _)| (id, rank));
+    for terms in received.chunk_by(|a, b| a.0 == b.0) {
+        values[terms[0].0 as usize] = terms.iter().map(|(_, _, value)| value).sum();
     }
 }

@@ -79,6 +79,11 @@ pub struct Totals {
 /// that share it. Tets are never shared. Local ids ascend with global ids, for each kind. Edges and
 /// faces list their vertices by ascending global id.
 ///
+/// The global ids of each kind are 0 to the number of such entities of the whole mesh, without gaps
+/// ([`totals`](Self::totals)), and do not depend on the partition: they can number unknowns. The
+/// local ids of vertices and tets agree with those of [`Arrays`](crate::mesh::Arrays) of the same
+/// part, and the owners of vertices with those of [`Sharing`](crate::mesh::Sharing).
+///
 /// Ghost tets are not stored here.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct DistMesh {

@@ -2,7 +2,7 @@
 
 use super::{DistMesh, Shared};
 use crate::ground::comm::{CommError, Communicator};
-use crate::ground::mesh::{EdgeId, FaceId, GlobalId, Rank, VertexId};
+use crate::ground::mesh::{EdgeId, FaceId, GlobalId, Rank, VertexId, add_received};
 use bytemuck::Pod;
 use std::collections::BTreeMap;
 
@@ -82,6 +82,49 @@ impl Shared {
         Ok(received)
     }
 
+    /// **Collective.** Replaces the value of each shared entity by the sum over its holders, in
+    /// rank order, so all of them get the same bits. `values` has one value for each entity of the
+    /// kind (vertex, edge or face) of the part, by local id.
+    ///
+    /// # Errors
+    /// [`CommError`] if another rank fails.
+    ///
+    /// # Panics
+    /// If `values` has no value for a shared entity.
+    pub fn sum(&self, comm: &dyn Communicator, values: &mut [f64]) -> Result<(), CommError> {
+        self.assert_covered_by(values.len());
+        let received = self.exchange(comm, |id| values[id as usize])?;
+        add_received(comm.rank(), &self.ids, received, values);
+        Ok(())
+    }
+
+    /// **Collective.** Sets the flag of each shared entity on all its holders if it is set on any.
+    /// `flags` has one flag for each entity of the kind of the part, by local id.
+    ///
+    /// # Errors
+    /// [`CommError`] if another rank fails.
+    ///
+    /// # Panics
+    /// If `flags` has no flag for a shared entity.
+    pub fn any(&self, comm: &dyn Communicator, flags: &mut [bool]) -> Result<(), CommError> {
+        self.assert_covered_by(flags.len());
+        for (id, _, flag) in self.exchange(comm, |id| u8::from(flags[id as usize]))? {
+            flags[id as usize] |= flag != 0;
+        }
+        Ok(())
+    }
+
+    /// Asserts that an array has an entry for each shared entity.
+    fn assert_covered_by(&self, entries: usize) {
+        let needed = self.ids.last().map_or(0, |&last| last as usize + 1);
+        assert!(
+            entries >= needed,
+            "the array has {entries} entries, but the entity with local id {} is shared: pass one entry for \
+             each vertex, edge or face of the part, shared or not",
+            needed.max(1) - 1
+        );
+    }
+
     /// Appends an entity; local ids must ascend.
     pub fn push(&mut self, id: u32, holders: impl IntoIterator<Item = Rank>) {
         if self.offsets.is_empty() {
@@ -110,9 +153,34 @@ impl DistMesh {
         self.shared_faces.holders_of(face.0).unwrap_or(std::slice::from_ref(&self.rank))
     }
 
-    /// The owner of a vertex of the mesh, by its own global id.
+    /// The rank that owns a vertex, chosen by its global id.
     pub fn vertex_owner(&self, vertex: VertexId) -> Rank {
         owner(self.vertex_holders(vertex), self.vertex_ids[vertex.index()])
+    }
+
+    /// The rank that owns an edge, chosen by its global id.
+    pub fn edge_owner(&self, edge: EdgeId) -> Rank {
+        owner(self.edge_holders(edge), self.edge_ids[edge.index()])
+    }
+
+    /// The rank that owns a face, chosen by its global id.
+    pub fn face_owner(&self, face: FaceId) -> Rank {
+        owner(self.face_holders(face), self.face_ids[face.index()])
+    }
+
+    /// Whether this rank owns a vertex.
+    pub fn owns_vertex(&self, vertex: VertexId) -> bool {
+        self.vertex_owner(vertex) == self.rank
+    }
+
+    /// Whether this rank owns an edge.
+    pub fn owns_edge(&self, edge: EdgeId) -> bool {
+        self.edge_owner(edge) == self.rank
+    }
+
+    /// Whether this rank owns a face.
+    pub fn owns_face(&self, face: FaceId) -> bool {
+        self.face_owner(face) == self.rank
     }
 
     /// The other ranks that share a vertex with this one, ascending.

@@ -4,6 +4,7 @@ use super::super::ast::{Flag, FlagValue};
 use super::super::diagnostic::Report;
 use crate::geometry::Span;
 use crate::language::suggest::did_you_mean;
+use std::collections::BTreeSet;
 
 /// The flags of a statement. The last of repeated flags applies.
 pub(super) struct Flags<'a> {
@@ -15,8 +16,15 @@ pub(super) type Idle = (&'static str, &'static str);
 
 impl<'a> Flags<'a> {
     /// Checks names: `known` flags are read later, `idle` flags have no effect here, all others are
-    /// unknown.
-    pub fn new(flags: &'a [Flag], known: &[&str], idle: &[Idle], report: &mut Report) -> Self {
+    /// unknown. An unknown flag without a value that is the name of one of `solids` is an error:
+    /// the author means a difference, as in `block - hole`.
+    pub fn new(
+        flags: &'a [Flag],
+        known: &[&str],
+        idle: &[Idle],
+        solids: &BTreeSet<&str>,
+        report: &mut Report,
+    ) -> Self {
         for flag in flags {
             let name = flag.name.as_str();
             if known.contains(&name) {
@@ -24,6 +32,12 @@ impl<'a> Flags<'a> {
             }
             if let Some((_, help)) = idle.iter().find(|(idle, _)| *idle == name) {
                 report.warn(flag.span, format!("the flag -{name} has no effect here"), help);
+                continue;
+            }
+            if flag.value == FlagValue::Nothing && solids.contains(name) {
+                let message = format!("there is no operator `-`, and `{name}` is a solid, not a flag");
+                let help = format!("write `and not {name}` in the definition of the solid");
+                report.meaning(flag.span, message, &help);
                 continue;
             }
             let mut help = did_you_mean(name, known.iter().copied());

@@ -21,7 +21,7 @@ mod statement;
 mod swept;
 mod unify;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::ast::{Name, Statement};
 use super::diagnostic::{Report, Reported};
@@ -31,9 +31,10 @@ use crate::geometry::{Aabb, Body, BoundaryLabel, Cutout, Span, UserPoint};
 use forest::Forest;
 
 /// Lowers statements; the geometry is complete if `report` has no errors.
-pub(super) fn lower(statements: &[Statement], report: &mut Report) -> Geometry {
+pub(super) fn lower<'r>(statements: &'r [Statement], report: &'r mut Report) -> Geometry {
     let mut lowering = Lowering {
         report,
+        solid_names: statements.iter().filter_map(Statement::solid_name).collect(),
         forest: Forest::default(),
         solids: BTreeMap::new(),
         curves: [BTreeMap::new(), BTreeMap::new()],
@@ -56,6 +57,8 @@ pub(super) fn lower(statements: &[Statement], report: &mut Report) -> Geometry {
 /// State of the lowering after the statements so far.
 struct Lowering<'r> {
     report: &'r mut Report,
+    /// The names of all solids of the file, also of those defined later.
+    solid_names: BTreeSet<&'r str>,
     forest: Forest,
     /// The index of each named solid in the definitions.
     solids: BTreeMap<String, usize>,

@@ -82,7 +82,7 @@ impl Lowering<'_> {
     fn apply_flags(&mut self, index: usize, root: NodeId, flags: &[Flag]) -> Result<(), Reported> {
         const ON_TLO: &str = "it belongs on the `tlo`";
         let idle = [("col", ON_TLO), ("transparent", ON_TLO), ("material", ON_TLO), ("layer", ON_TLO)];
-        let flags = Flags::new(flags, &["maxh", "bc", "bcname"], &idle, self.report);
+        let flags = Flags::new(flags, &["maxh", "bc", "bcname"], &idle, &self.solid_names, self.report);
         let maxh = flags.maxh(self.report);
         let numbers = flags.boundary_numbers(self.report);
         let names = flags.boundary_names(self.report);

@@ -34,7 +34,7 @@ impl Lowering<'_> {
             Statement::IdentifyCloseSurfaces { solids, flags, span } => {
                 self.known_with_surfaces(solids)?;
                 let known = ["tlo", "direction", "reflevels", "reflevels1", "reflevels2", "slices"];
-                let flags = Flags::new(flags, &known, &[], self.report);
+                let flags = Flags::new(flags, &known, &[], &self.solid_names, self.report);
                 if let (Some(tlo), Some(span)) = (flags.word("tlo", self.report), flags.span("tlo")) {
                     self.tlo_named(&Name { text: tlo.to_owned(), span })?;
                 }
@@ -74,7 +74,13 @@ impl Lowering<'_> {
         const ON_SOLID: &str =
             "it belongs on the `solid`; `boundarycondition` numbers the boundaries of a tlo";
         let known = ["col", "transparent", "material", "layer", "maxh"];
-        let flags = Flags::new(flags, &known, &[("bc", ON_SOLID), ("bcname", ON_SOLID)], self.report);
+        let flags = Flags::new(
+            flags,
+            &known,
+            &[("bc", ON_SOLID), ("bcname", ON_SOLID)],
+            &self.solid_names,
+            self.report,
+        );
         let definition = self.solid_named(name)?;
         let same = |tlo: &&Tlo| tlo.definition == definition && matches!(tlo.kind, TloKind::Body(_));
         if let Some(first) = self.tlos.iter().find(same) {
@@ -115,7 +121,7 @@ impl Lowering<'_> {
     fn top_level_surface(&mut self, name: &Name, surface: &Name, flags: &[Flag]) -> Result<(), Reported> {
         let known = ["col", "transparent", "maxh", "layer", "bc", "bcname"];
         let idle = [("material", "surfaces have no material")];
-        let flags = Flags::new(flags, &known, &idle, self.report);
+        let flags = Flags::new(flags, &known, &idle, &self.solid_names, self.report);
         let definition = self.solid_named(name)?;
         let of_surface = self.solid_named(surface)?;
         let one_value = "a surface has one -bc and one -bcname, not a list";
@@ -150,7 +156,7 @@ impl Lowering<'_> {
     }
 
     fn user_point(&mut self, point: &Point, flags: &[Flag], span: Span) -> Result<(), Reported> {
-        let flags = Flags::new(flags, &["factor"], &[], self.report);
+        let flags = Flags::new(flags, &["factor"], &[], &self.solid_names, self.report);
         if flags.has_factor(self.report) {
             self.report.warn(span, "the -factor of the point has no effect", ONLY_HP);
         }
@@ -174,7 +180,8 @@ impl Lowering<'_> {
         let known: &[&str] = if is_edge { &["factor", "maxh", "tlo"] } else { &["factor"] };
         let idle =
             [("maxh", "it bounds the size along singular edges"), ("tlo", "it selects singular edges")];
-        let flags = Flags::new(flags, known, if is_edge { &[] } else { &idle }, self.report);
+        let flags =
+            Flags::new(flags, known, if is_edge { &[] } else { &idle }, &self.solid_names, self.report);
         let mut surfaces = Vec::new();
         for solid in solids {
             let definition = self.solid_named(solid)?;

@@ -89,7 +89,9 @@ impl Parser<'_, '_> {
         }
         let Span { line, column } = open;
         let help = match self.peek().kind {
-            TokenKind::Mark('-') => "flags follow the whole solid, after its parentheses",
+            TokenKind::Mark('-') => {
+                "a difference is `a and not b`; flags follow the whole solid, after its parentheses"
+            }
             _ => "only `and`, `or` and `not` combine solids",
         };
         let wanted = format!("`)` for the `(` of line {line}, column {column}");

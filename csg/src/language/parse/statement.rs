@@ -35,7 +35,10 @@ impl Parser<'_, '_> {
         }
         let help = match self.peek().kind {
             TokenKind::Word("and" | "or" | "not") => {
-                "flags follow the whole solid: define this part as a separate `solid`"
+                "flags follow the whole solid: define this part as a separate `solid`; a difference is `a and not b`"
+            }
+            TokenKind::Mark('(') => {
+                "only `and`, `or` and `not` combine solids; a difference is `a and not b`"
             }
             _ => "every statement ends with `;`",
         };

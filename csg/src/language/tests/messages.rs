@@ -109,11 +109,42 @@ fn flags_within_a_solid_are_explained() {
         30,
         &["expected `)`", "flags follow the whole solid"],
     );
-    expect_error("solid a = sphere (0,0,0; 1) -material=\"air\";", 39, &["there are no quoted strings"]);
     expect_error("solid a = sphere (0,0,0; 1) -maxh=;", 35, &["expected the value of the flag"]);
     expect_error("solid a = sphere (0,0,0; 1) - -maxh=1;", 31, &["expected the name of a flag"]);
     expect_error("solid a = sphere (0,0,0; 1) -bc=[1,2;", 37, &["expected `]`, found `;`"]);
     expect_error("solid a = -b;", 11, &["expected a solid, found `-`", "write `a and not b`"]);
+}
+
+#[test]
+fn a_solid_behind_a_minus_sign_is_an_error() {
+    let solids = "solid block = orthobrick (0,0,0; 1,1,1); solid hole = sphere (0,0,0; 0.5);";
+    let difference = ["there is no operator `-`, and `hole` is a solid", "write `and not hole`"];
+    expect_error(&format!("{solids} solid part = block - hole; tlo part;"), 95, &difference);
+    expect_error(&format!("{solids} solid part = block -hole; tlo part;"), 95, &difference);
+    expect_error(&format!("{solids} tlo block - hole;"), 86, &difference);
+    // The solid may be defined later in the file.
+    let later = "solid a = sphere (0,0,0; 1) - b; solid b = sphere (1,0,0; 1); tlo a;";
+    expect_error(later, 29, &["`b` is a solid", "write `and not b`"]);
+    // In places where no flag can be, the help also has the difference.
+    for part in ["(block - hole)", "block - hole and block", "block - sphere (0,0,0; 1)"] {
+        let text = error(&format!("{solids} solid part = {part}; tlo block;"));
+        assert!(text.contains("a difference is `a and not b`"), "{text}");
+    }
+    // A known flag is a flag, and other unknown flags are warnings.
+    geometry("solid maxh = sphere (0,0,0; 1) -maxh=1; tlo maxh -maxh=0.5;");
+    assert!(warning("solid a = sphere (0,0,0; 1) -holes; tlo a;").contains("-holes is ignored"));
+}
+
+#[test]
+fn quoted_strings_are_answered_with_the_words_of_the_file() {
+    let no_quotes = "there are no quoted strings";
+    let sphere = "solid a = sphere (0,0,0; 1)";
+    expect_error(&format!("{sphere} -material=\"air\";"), 39, &[no_quotes, "help: write -material=air"]);
+    expect_error(&format!("{sphere} -bcname='fixed wall';"), 37, &[no_quotes, "write -bcname=fixed_wall"]);
+    expect_error(&format!("{sphere} -bcname=[\"in\", out];"), 38, &["write in without quotes"]);
+    expect_error("boundaryconditionname a a \"wall\";", 27, &["write wall without quotes"]);
+    expect_error(&format!("{sphere} -maxh=\"0.5\";"), 35, &["write -maxh=0.5"]);
+    expect_error(&format!("{sphere} -bcname=\"\";"), 37, &["write -bcname=WORD, a word of letters"]);
 }
 
 #[test]
