@@ -4,6 +4,7 @@ use super::coarse::{CoarseError, CoarseMesh, CoarseSettings, Unmeshed, mesh_surf
 use super::error::{Error, RequestError};
 use super::geometry::Geometry;
 use super::model::Model;
+use super::options;
 use super::result::CoarseResult;
 use super::retries::{Budget, CORRECTIONS};
 use super::settings::Wanted;
@@ -97,6 +98,8 @@ pub fn planned(
     wanted: Wanted,
     progress: &Progress,
 ) -> Result<Planned, Error> {
+    options::refuse_planes(&cuts.planes)?;
+    options::refuse_impossible_coarse(settings, wanted)?;
     plan_cuts(parts, &geometry.model, cuts, settings, wanted, progress)
 }
 

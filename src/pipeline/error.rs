@@ -156,6 +156,16 @@ pub enum InputError {
 /// The request cannot be met for this input.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RequestError {
+    /// An option has a value that no mesh can have.
+    #[error("`{name}` cannot be {value}: possible are {allowed}")]
+    Option {
+        /// The function of [`Mesher`](crate::Mesher) or the setting.
+        name: &'static str,
+        /// Its value.
+        value: String,
+        /// The values that it can have.
+        allowed: String,
+    },
     /// A method that does not keep periodic faces, for a geometry that has some.
     #[error("periodic faces (`identify periodic`) are kept by the method `refine` only")]
     PeriodicMethod,

@@ -7,6 +7,7 @@ use super::error::{Error, InvalidMesh, RequestError};
 use super::geometry::Geometry;
 use super::mend;
 use super::model::Model;
+use super::options;
 use super::part::{Part, even_out};
 use super::result::{CoarseResult, Generated, Level, Refinement, Refused};
 use super::retries::{Budget, REFINEMENTS};
@@ -43,6 +44,7 @@ pub fn generate(
     settings: &GenerateSettings,
     progress: &Progress,
 ) -> Result<Generated, Error> {
+    comm.agree(options::refuse_impossible(settings))?;
     let model = geometry.map(|geometry| &geometry.model);
     if let Method::Decompose(cuts) = &settings.method {
         return decomposed(comm, model, cuts, settings, progress);

@@ -13,6 +13,9 @@ use crate::mesher::improve::Effort;
 
 /// Makes meshes; unset options have the defaults of the command line.
 ///
+/// If an option is set twice, the last value counts. Numbers are checked when meshing begins: one
+/// that no mesh can have is [`RequestError::Option`](crate::error::RequestError::Option).
+///
 /// ```
 /// use tetmill::{Geometry, Mesher};
 ///
@@ -97,15 +100,19 @@ impl<'a> Mesher<'a> {
         self.with_size(|settings| settings.function = Some(SizeFunction::new(size)))
     }
 
-    /// Refines the coarse mesh this many times, each time every tet into eight.
+    /// Refines the coarse mesh this many times, each time every tet into eight: the same as
+    /// [`pieces`](Self::pieces) of 2 to the power `levels`.
     ///
-    /// # Panics
-    /// Beyond 31 levels; those beyond 10 are refused when meshing.
+    /// At most 10 levels are possible ([`MAX_PIECES`](crate::run::MAX_PIECES)); more are refused
+    /// when meshing. Replaces earlier `levels` and `pieces`, and [`tets`](Self::tets).
     pub fn levels(self, levels: u32) -> Self {
-        self.pieces(1 << levels)
+        self.pieces(1_u32.checked_shl(levels).unwrap_or(u32::MAX))
     }
 
     /// Splits each coarse edge into `pieces`, so each coarse tet into `pieces`³.
+    ///
+    /// 1 to [`MAX_PIECES`](crate::run::MAX_PIECES) are possible; other numbers are refused when
+    /// meshing. Replaces earlier `pieces` and [`levels`](Self::levels), and [`tets`](Self::tets).
     pub fn pieces(self, pieces: u32) -> Self {
         self.with(|settings| match &mut settings.wanted {
             Wanted::Coarse { pieces: of_coarse, .. } => *of_coarse = pieces,
@@ -114,6 +121,9 @@ impl<'a> Mesher<'a> {
     }
 
     /// Chooses sizes for a coarse mesh of `tets` to 1.5 times as many.
+    ///
+    /// [`levels`](Self::levels) or [`pieces`](Self::pieces), set before or after, refine it.
+    /// Replaces an earlier `coarse_tets`, and [`tets`](Self::tets).
     pub fn coarse_tets(self, tets: u64) -> Self {
         self.with(|settings| {
             let pieces = match settings.wanted {
@@ -125,6 +135,9 @@ impl<'a> Mesher<'a> {
     }
 
     /// Chooses sizes and refinement for a total of `tets` to 1.3 times as many.
+    ///
+    /// Replaces earlier [`coarse_tets`](Self::coarse_tets), [`levels`](Self::levels) and
+    /// [`pieces`](Self::pieces); each of them replaces it if set later.
     pub fn tets(self, tets: u64) -> Self {
         self.with(|settings| settings.wanted = Wanted::Elements(tets))
     }

@@ -14,6 +14,7 @@ mod mesher;
 pub mod model;
 pub mod moved;
 pub mod names;
+mod options;
 pub mod part;
 #[cfg(test)]
 mod periodic_tests;

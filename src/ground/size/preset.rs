@@ -15,8 +15,9 @@ impl Closeness {
     pub const OFF: Self = Self { ratio: f64::INFINITY, most: 1.0 };
 
     /// What a user asks for by a number: sizes of so many thicknesses, down to a 200th of what they would be; 0 for none.
+    /// A negative ratio is kept, and refused when meshing.
     pub fn of_ratio(ratio: f64) -> Self {
-        if ratio > 0.0 { Self { ratio, most: 200.0 } } else { Self::OFF }
+        if ratio == 0.0 { Self::OFF } else { Self { ratio, most: 200.0 } }
     }
 }
 

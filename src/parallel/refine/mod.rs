@@ -215,9 +215,17 @@ fn refine_reporting(
     Ok((RefinedMesh::new(mesh, numbering, inside), bad))
 }
 
+/// Passes on a number of subdivisions per edge that a lattice can have.
+///
+/// # Errors
+/// [`RefineError::Pieces`] unless it is 1 to [`MAX_PIECES`](lattice::MAX_PIECES).
+pub fn possible_pieces(n: u32) -> Result<u32, RefineError> {
+    if (1..=lattice::MAX_PIECES).contains(&n) { Ok(n) } else { Err(RefineError::Pieces { n }) }
+}
+
 /// The smallest number of subdivisions per edge with which `coarse` tets become at least `wanted`.
 ///
-/// Returns `MAX_PIECES + 1`, which [`refine()`] rejects, if no lattice suffices.
+/// Returns `MAX_PIECES + 1`, which [`possible_pieces`] rejects, if no lattice suffices.
 pub fn pieces_for(coarse: u64, wanted: u64) -> u32 {
     let enough = |n: &u32| u128::from(coarse) * u128::from(*n).pow(3) >= u128::from(wanted);
     (1..=lattice::MAX_PIECES).find(enough).unwrap_or(lattice::MAX_PIECES + 1)
