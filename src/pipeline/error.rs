@@ -166,6 +166,17 @@ pub enum RequestError {
         /// The values that it can have.
         allowed: String,
     },
+    /// Rank 0 was given no geometry.
+    #[error("rank 0 has no geometry to mesh")]
+    NoGeometry,
+    /// The ranks have different settings.
+    #[error("rank {rank} has another setting than rank 0: {option}")]
+    OtherSettings {
+        /// The lowest rank whose settings differ from those of rank 0.
+        rank: Rank,
+        /// The first option that differs.
+        option: &'static str,
+    },
     /// A method that does not keep periodic faces, for a geometry that has some.
     #[error("periodic faces (`identify periodic`) are kept by the method `refine` only")]
     PeriodicMethod,

@@ -35,17 +35,22 @@ use crate::parallel::refine::{self, Bends, PeriodicCheck, RefineError, RefinedMe
 
 /// **Collective.** Makes the mesh; only rank 0 needs the geometry and reports `progress`.
 ///
+/// The settings must be the same on all ranks, except the sources, the size function and `disk`,
+/// which rank 0 alone uses, and `memory`.
+///
 /// # Errors
-/// The same on all ranks: no coarse mesh, more parts than tets, too many vertices on a rank,
-/// inverted tets that no finer coarse mesh avoids, a faulty mesh.
+/// The same on all ranks: impossible or different settings, no geometry on rank 0, no coarse mesh,
+/// more parts than tets, too many vertices on a rank, inverted tets that no finer coarse mesh
+/// avoids, a faulty mesh.
 pub fn generate(
     comm: &dyn Communicator,
     geometry: Option<&Geometry>,
     settings: &GenerateSettings,
     progress: &Progress,
 ) -> Result<Generated, Error> {
+    options::refuse_different(comm, geometry.is_some(), settings)?;
     comm.agree(options::refuse_impossible(settings))?;
-    let model = geometry.map(|geometry| &geometry.model);
+    let model = geometry.filter(|_| comm.rank() == 0).map(|geometry| &geometry.model);
     if let Method::Decompose(cuts) = &settings.method {
         return decomposed(comm, model, cuts, settings, progress);
     }

@@ -85,7 +85,8 @@ impl<'a> Mesher<'a> {
         self.with_size(|settings| settings.closeness = Closeness::of_ratio(ratio))
     }
 
-    /// Adds sizes at places, from which sizes grow by the grading.
+    /// Adds sizes at places, from which sizes grow by the grading. On several ranks those of rank 0
+    /// count.
     pub fn sources(self, sources: impl IntoIterator<Item = Source>) -> Self {
         self.with_size(|settings| settings.sources.extend(sources))
     }
@@ -93,9 +94,13 @@ impl<'a> Mesher<'a> {
     /// An upper bound of the coarse mesh's size (length) by place. Values that are not positive are
     /// ignored.
     ///
-    /// The function is called very often, by several threads. If it changes faster than the
-    /// grading, elements may be badly shaped; a small region finer than the elements around it may
-    /// be missed.
+    /// A [`Point`] has the coordinates `x`, `y` and `z`, and converts `into()` a `[f64; 3]`. The
+    /// function is called very often, by several threads, on rank 0 only. If it changes faster than
+    /// the grading, elements may be badly shaped; a small region finer than the elements around it
+    /// may be missed.
+    ///
+    /// The settings own the function, so it cannot borrow local data: `move` data into it, or share
+    /// data by an [`Arc`](std::sync::Arc).
     pub fn size(self, size: impl Fn(Point) -> f64 + Send + Sync + 'static) -> Self {
         self.with_size(|settings| settings.function = Some(SizeFunction::new(size)))
     }
@@ -179,26 +184,23 @@ impl<'a> Mesher<'a> {
         self.generate_on(&thread::alone(), Some(geometry))
     }
 
-    /// **Collective.** Makes the mesh in one part for each rank; each rank gets its own. Only rank
-    /// 0 needs the geometry, and all ranks must have the same settings.
+    /// **Collective.** Makes the mesh in one part for each rank; each rank gets its own.
+    ///
+    /// Only rank 0 uses the geometry, [`sources`](Self::sources) and the function
+    /// [`size`](Self::size); those of other ranks are ignored. All other options except
+    /// [`memory`](Self::memory) must be the same on all ranks, which is checked.
     ///
     /// # Errors
-    /// On all ranks: no valid mesh, with the location; more parts than coarse tets; not enough
-    /// memory; cancelled. The failing rank has the original error, others [`Error::Comm`] with its
-    /// text.
-    ///
-    /// # Panics
-    /// If rank 0 has no geometry.
+    /// On all ranks: options that are impossible or differ between ranks; no geometry on rank 0; no
+    /// valid mesh, with the location; more parts than coarse tets; not enough memory; cancelled.
+    /// The failing rank has the original error, others [`Error::Comm`] with its text.
     pub fn generate_on(
         &self,
         comm: &dyn Communicator,
         geometry: Option<&Geometry>,
     ) -> Result<Generated, Error> {
-        let first = comm.rank() == 0;
-        assert!(!first || geometry.is_some(), "rank 0 has no geometry to be meshed");
-        let geometry = geometry.filter(|_| first);
         let cancel = CancelOnly(self.observer);
-        let progress = Progress::new(if first { self.observer } else { &cancel });
+        let progress = Progress::new(if comm.rank() == 0 { self.observer } else { &cancel });
         generate(comm, geometry, &self.settings, &progress)
     }
 }

@@ -3,11 +3,15 @@
 use super::coarse::CoarseSettings;
 use super::error::{Error, RequestError};
 use super::settings::{GenerateSettings, InputSettings, Method, Wanted};
+use crate::ground::comm::Communicator;
+use crate::ground::kernel::hash::WordHasher;
 use crate::ground::size::{SizeSettings, Source};
 use crate::mesher::facets;
 use crate::parallel::decompose::CutPlane;
 use crate::parallel::refine::possible_pieces;
 use std::f64::consts::PI;
+use std::fmt::Debug;
+use std::hash::Hasher;
 
 const POSITIVE: &str = "positive numbers";
 const NOT_NEGATIVE: &str = "0 and positive numbers";
@@ -54,6 +58,59 @@ pub(super) fn refuse_impossible_coarse(coarse: &CoarseSettings, wanted: Wanted) 
         Wanted::Elements(0) => return Err(refused("tets", 0, "1 and more").into()),
         Wanted::Elements(_) => 1,
     };
+    Ok(())
+}
+
+/// Options that must be the same on all ranks, with a number for each value.
+///
+/// Sources and the size function are used on rank 0 only, like the geometry. The memory belongs to
+/// a machine, and the disk to rank 0.
+fn compared(settings: &GenerateSettings) -> [(&'static str, u64); 9] {
+    let GenerateSettings { method, coarse: CoarseSettings { size, effort }, wanted, nested, .. } = settings;
+    let preset = (size.curvature_safety, size.segments_per_curve, size.scale);
+    [
+        ("method", value_of(method)),
+        ("nested", value_of(nested)),
+        ("effort", value_of(effort)),
+        ("tets, coarse_tets, levels or pieces", value_of(wanted)),
+        ("max_size", value_of(&size.maxh)),
+        ("min_size", value_of(&size.minh)),
+        ("grading", value_of(&size.grading)),
+        ("closeness", value_of(&size.closeness)),
+        ("preset", value_of(&preset)),
+    ]
+}
+
+/// A number that is the same for equal values, on all ranks of a job.
+fn value_of(setting: &dyn Debug) -> u64 {
+    let mut hasher = WordHasher::default();
+    hasher.write(format!("{setting:?}").as_bytes());
+    hasher.finish()
+}
+
+/// **Collective.** Refuses a run without a geometry on rank 0, or whose ranks have different
+/// settings: they would make different meshes, or wait for each other without end.
+///
+/// # Errors
+/// The same on all ranks.
+pub(super) fn refuse_different(
+    comm: &dyn Communicator,
+    has_geometry: bool,
+    settings: &GenerateSettings,
+) -> Result<(), Error> {
+    let mine = compared(settings);
+    let mut numbers = [u64::from(has_geometry); 10];
+    numbers.iter_mut().zip(&mine).for_each(|(number, (_, value))| *number = *value);
+    let all = comm.all_gather_one(numbers)?;
+    let [first @ .., has_geometry] = all[0];
+    if has_geometry == 0 {
+        return Err(RequestError::NoGeometry.into());
+    }
+    for (rank, values) in (0..).zip(&all) {
+        if let Some(differs) = first.iter().zip(values).position(|(first, value)| first != value) {
+            return Err(RequestError::OtherSettings { rank, option: mine[differs].0 }.into());
+        }
+    }
     Ok(())
 }
 
@@ -116,8 +173,10 @@ pub(super) fn refuse_impossible_input(settings: &InputSettings) -> Result<(), Re
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::ground::comm::thread;
     use crate::ground::error::{ErrorKind, HasKind};
     use crate::ground::size::Preset;
+    use crate::mesher::improve::Effort;
     use crate::parallel::refine::RefineError;
     use crate::parallel::refine::lattice::MAX_PIECES;
     use crate::{Geometry, Mesher, Point};
@@ -193,13 +252,88 @@ mod tests {
         }
     }
 
-    #[test]
-    fn a_mesh_that_no_lattice_refines_to_the_number_is_refused() {
+    /// A mesh of one tet.
+    fn tet() -> Geometry {
         let points = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
         let arrays = crate::MeshArrays { points: &points, tets: &[[0, 1, 2, 3]], ..Default::default() };
-        let tet = Geometry::from_mesh(&arrays).unwrap();
-        let error = Mesher::new().tets(10_000_000_000).generate(&tet).expect_err("1024³ are too few");
+        Geometry::from_mesh(&arrays).unwrap()
+    }
+
+    #[test]
+    fn a_mesh_that_no_lattice_refines_to_the_number_is_refused() {
+        let error = Mesher::new().tets(10_000_000_000).generate(&tet()).expect_err("1024³ are too few");
         assert!(matches!(error, Error::Refine(RefineError::Pieces { .. })), "{error}");
+    }
+
+    /// The refusal that all ranks return alike.
+    fn common_refusal(run: impl Fn(&dyn Communicator) -> Result<(), Error> + Sync) -> RequestError {
+        let errors = thread::run(3, |comm| run(comm).expect_err("it is refused")).unwrap();
+        let refusals = errors.into_iter().map(|error| match error {
+            Error::Request(refusal) => refusal,
+            error => panic!("{error}"),
+        });
+        refusals.reduce(|first, other| if first == other { first } else { panic!("{other}") }).unwrap()
+    }
+
+    #[test]
+    fn a_run_without_geometry_is_refused_on_all_ranks() {
+        let tet = tet();
+        let refusal = common_refusal(|comm| {
+            let mine = Some(&tet).filter(|_| comm.rank() > 0);
+            Mesher::new().generate_on(comm, mine).map(|_| ())
+        });
+        assert_eq!(refusal, RequestError::NoGeometry);
+    }
+
+    #[test]
+    fn options_that_differ_between_ranks_are_refused_on_all_ranks_by_name() {
+        let tet = tet();
+        type Change = for<'a> fn(Mesher<'a>) -> Mesher<'a>;
+        let changes: [(Change, &str); 9] = [
+            (|mesher| mesher.method(Method::Surface), "method"),
+            (|mesher| mesher.nested(), "nested"),
+            (|mesher| mesher.effort(Effort::Quick), "effort"),
+            (|mesher| mesher.levels(1), "tets, coarse_tets, levels or pieces"),
+            (|mesher| mesher.max_size(0.5), "max_size"),
+            (|mesher| mesher.min_size(0.5), "min_size"),
+            (|mesher| mesher.grading(0.5), "grading"),
+            (|mesher| mesher.closeness(0.5), "closeness"),
+            (|mesher| mesher.preset(Preset::Fine), "grading"),
+        ];
+        for (change, option) in changes {
+            let refusal = common_refusal(|comm| {
+                let mesher = if comm.rank() == 2 { change(Mesher::new()) } else { Mesher::new() };
+                mesher.generate_on(comm, Some(&tet)).map(|_| ())
+            });
+            assert_eq!(refusal, RequestError::OtherSettings { rank: 2, option });
+            assert!(refusal.to_string().starts_with("rank 2 has another setting than rank 0: "));
+        }
+    }
+
+    #[test]
+    fn sources_and_functions_are_needed_on_rank_0_only() {
+        let ball = Geometry::from_text("algebraic3d solid b = sphere (0, 0, 0; 1); tlo b;").unwrap();
+        let meshes = thread::run(2, |comm| {
+            let mesher = match comm.rank() {
+                0 => Mesher::new().size(|_| 0.5).sources([Source { point: Point::origin(), size: 0.4 }]),
+                _ => Mesher::new().size(|_| panic!("only rank 0 calls its function")),
+            };
+            mesher.generate_on(comm, (comm.rank() == 0).then_some(&ball)).unwrap().check.tets
+        });
+        let meshes = meshes.unwrap();
+        assert_eq!(meshes[0], meshes[1]);
+    }
+
+    #[test]
+    fn an_impossible_source_of_rank_0_ends_all_ranks() {
+        let tet = tet();
+        let errors = thread::run(2, |comm| {
+            let size = if comm.rank() == 0 { 0.0 } else { 1.0 };
+            let mesher = Mesher::new().sources([Source { point: Point::origin(), size }]);
+            mesher.generate_on(comm, Some(&tet)).map(|_| ()).unwrap_err().to_string()
+        });
+        let errors = errors.unwrap();
+        assert_eq!(errors[1], format!("rank 0: {}", errors[0]));
     }
 
     #[test]
