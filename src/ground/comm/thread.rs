@@ -11,6 +11,7 @@ use super::{CommError, Communicator};
 use crate::ground::comm::Rank;
 use std::cell::Cell;
 use std::marker::PhantomData;
+use std::ops::Deref;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread;
@@ -243,6 +244,14 @@ impl ThreadComm {
     /// If there is no such rank.
     fn expect_rank(&self, rank: Rank) {
         assert!(rank < self.world.size, "rank {} names rank {rank} of {}", self.rank, self.world.size);
+    }
+}
+
+impl Deref for ThreadComm {
+    type Target = dyn Communicator;
+
+    fn deref(&self) -> &Self::Target {
+        self
     }
 }
 
