@@ -256,14 +256,14 @@ pub enum RoomError {
     },
     /// A machine has too little memory.
     #[error(
-        "the fine vertices take {}, those on boundaries and interfaces alone {}, and this machine has {} left: take fewer \
-         levels or tets, or more machines",
+        "the fine mesh takes {}, without the vertices inside coarse tets {}, and this machine has {} left: take fewer levels \
+         or tets, or more machines",
         sized(*.all), sized(*.least), sized(*.available)
     )]
     Memory {
-        /// Bytes of all fine vertices on this machine.
+        /// Bytes of the fine mesh on this machine.
         all: u64,
-        /// Bytes of those that must be stored.
+        /// Bytes of the fine mesh without the vertices inside coarse tets.
         least: u64,
         /// Free bytes.
         available: u64,

@@ -72,8 +72,9 @@ pub fn generate(
         let keep = room::vertices_to_keep(comm, &dist, pieces, settings.memory, progress)?;
         let bends = broadcast_bends(comm, coarse.as_ref().map(|(_, made)| &made.bends))?;
         let how = refine::Settings { bends, nested: settings.nested, ..refine::Settings::default() };
-        let survey =
-            progress.stage(Stage::Levels, |work| survey(comm, &dist, &projector, pieces, &how, work))?;
+        let survey = progress.stage(Stage::Levels, |work| {
+            survey(comm, &dist, &projector, pieces, (&how, settings.memory), work)
+        })?;
         let mut levels = match survey {
             Surveyed::Sound(levels) => levels,
             Surveyed::Inverted(bad, _) if round < REFINEMENTS => {
@@ -238,7 +239,7 @@ fn survey(
     dist: &DistMesh,
     projector: &Projector,
     pieces: u32,
-    how: &refine::Settings,
+    (how, memory): (&refine::Settings, Option<u64>),
     work: &Work,
 ) -> Result<Surveyed, Error> {
     let odd = pieces >> pieces.trailing_zeros();
@@ -249,7 +250,10 @@ fn survey(
     work.step(0.0, 1.0, pieces.iter().map(|&n| tets(n)).sum());
     for n in pieces {
         comm.agree(work.proceed().map_err(Error::from))?;
-        let refined = refine::refine(dist.clone(), projector, n, how);
+        // Level by level, because all vertices of a lower level may fit.
+        let (keep, _) = room::keep_of_level(comm, dist, n, memory)?;
+        let how = refine::Settings { keep, ..how.clone() };
+        let refined = refine::refine(dist.clone(), projector, n, &how);
         let bad = inverted_anywhere(comm, &refined)?;
         let part = match comm.agree(refined.map_err(Error::from)) {
             Err(error) if !bad.is_empty() => return Ok(Surveyed::Inverted(bad, error)),

@@ -165,7 +165,7 @@ impl<'a> Mesher<'a> {
         self.with(|settings| settings.nested = true)
     }
 
-    /// The memory for fine vertices on each machine (bytes), instead of its free memory.
+    /// The memory for the fine mesh on each machine (bytes), instead of its free memory.
     pub fn memory(self, bytes: u64) -> Self {
         self.with(|settings| settings.memory = Some(bytes))
     }

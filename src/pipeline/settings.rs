@@ -45,7 +45,7 @@ pub struct GenerateSettings {
     pub coarse: CoarseSettings,
     /// The requested number of tets.
     pub wanted: Wanted,
-    /// The memory for fine vertices on each machine, in bytes; by default its free memory.
+    /// The memory for the fine mesh on each machine, in bytes; by default its free memory.
     pub memory: Option<u64>,
     /// The planned output, so that a mesh that does not fit is refused before refinement.
     pub disk: Option<Disk>,

@@ -1,5 +1,6 @@
 //! Size estimate of a refined part, computed from the coarse part without refining it.
 
+use super::diagonal::Diagonals;
 use super::lattice::Lattice;
 use crate::ground::mesh::{GlobalId, Rank};
 use crate::parallel::distribution::{DistMesh, Shared};
@@ -15,7 +16,7 @@ pub struct Census {
     pub shared: u64,
     /// Vertices owned by this rank.
     pub owned: u64,
-    /// Bytes of coordinates: with [`Keep::All`](super::Keep::All), and with
+    /// Bytes of coordinates and diagonals: with [`Keep::All`](super::Keep::All), and with
     /// [`Keep::Boundary`](super::Keep::Boundary).
     pub bytes: [u64; 2],
     /// The other ranks that share some of its vertices, ascending.
@@ -54,7 +55,8 @@ pub fn census(mesh: &DistMesh, n: u32) -> Census {
         first += total * size;
     }
     let inside = mesh.tets.len() as u64 * inside_tet;
-    census.bytes = [census.held + inside, census.held].map(|vertices| 24 * vertices);
+    let diagonals = (mesh.tets.len() * Diagonals::bytes_of_tet(lattice.octahedra())) as u64;
+    census.bytes = [census.held + inside, census.held].map(|vertices| 24 * vertices + diagonals);
     census.held += inside;
     census.owned += inside;
     census.neighbours.sort_unstable();

@@ -210,7 +210,7 @@ fn refine_reporting(
     let points = snap::boundary_first(&mesh, projector, &numbering, settings)?;
     work.expect(mesh.tets.len() as u64 * u64::from(n).pow(3));
     work.step(0.0, 1.0, mesh.tets.len() as u64);
-    let (inside, bad) = tet::fill(&mesh, projector, &numbering, points, settings, work);
+    let (inside, bad) = tet::fill(&mesh, projector, &numbering, points, settings, work)?;
     work.proceed()?;
     Ok((RefinedMesh::new(mesh, numbering, inside), bad))
 }
