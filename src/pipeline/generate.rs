@@ -145,8 +145,7 @@ fn fill(
     let Parts { model, coarse, dist, projector, names, pieces } = parts;
     comm.agree(skins::refuse_periodic(model).map_err(Error::from))?;
     if matches!(model, Some(Model::Given(given)) if !given.links.is_empty()) {
-        progress
-            .note("note: the method `surface` keeps no periodic faces: those of the mesh are like others");
+        progress.note("the method `surface` keeps no periodic faces: those of the mesh are like others");
     }
     let sizes = model
         .zip(coarse.as_ref())
