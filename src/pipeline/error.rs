@@ -331,6 +331,10 @@ impl HasKind for Error {
             Self::Comm(error) => error.kind(),
         }
     }
+
+    fn is_elsewhere(&self) -> bool {
+        matches!(self, Self::Comm(error) if error.is_elsewhere())
+    }
 }
 
 impl From<FeatureError> for Error {

@@ -78,6 +78,10 @@ impl HasKind for CommError {
             Self::RankFailed(_) | Self::NotStarted { .. } => ErrorKind::Rank,
         }
     }
+
+    fn is_elsewhere(&self) -> bool {
+        matches!(self, Self::RankFailed(_) | Self::Elsewhere { .. })
+    }
 }
 
 /// A group of ranks. Object-safe: messages are bytes; the methods on `dyn Communicator` take slices

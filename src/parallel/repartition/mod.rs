@@ -122,6 +122,10 @@ impl HasKind for RepartitionError {
             Self::Comm(error) => error.kind(),
         }
     }
+
+    fn is_elsewhere(&self) -> bool {
+        matches!(self, Self::Comm(error) if error.is_elsewhere())
+    }
 }
 
 /// **Collective.** A part (below `parts`) for each tet of this rank's part.
