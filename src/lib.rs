@@ -139,7 +139,7 @@ pub mod error {
     pub use crate::mesher::surface::curves::CurveError;
     pub use crate::mesher::volume::{SurfaceFaults, VolumeError};
     pub use crate::parallel::decompose::{CutError, LooseEdge, TooManyParts};
-    pub use crate::parallel::distribution::{DistError, SettleError};
+    pub use crate::parallel::distribution::{CheckError, DistError, SettleError};
     pub use crate::parallel::halo::HaloError;
     pub use crate::parallel::migrate::MigrateError;
     pub use crate::parallel::partition::PartitionError;

@@ -1,4 +1,5 @@
-//! Method 1 on all ranks: a geometry is cut into pieces, and each piece is meshed on its rank.
+//! The method `decompose` on all ranks: a geometry is cut into pieces, and each piece is meshed on
+//! its rank.
 
 use super::coarse::{CoarseError, CoarseMesh, CoarseSettings, Unmeshed, mesh_surface, smaller_at};
 use super::error::{Error, RequestError};

@@ -1,5 +1,5 @@
-//! Methods 2 and 3 on all ranks: a coarse mesh is partitioned, distributed, refined or meshed
-//! inside its refined skins, and checked.
+//! The methods `refine` and `surface` on all ranks: a coarse mesh is partitioned, distributed,
+//! refined or meshed inside its refined skins, and checked.
 
 use super::coarse::CoarseMesh;
 use super::decompose;

@@ -5,7 +5,7 @@ pub mod decompose;
 pub mod error;
 mod estimate;
 pub(crate) mod facet_model;
-pub mod generate;
+mod generate;
 mod geometry;
 pub mod input;
 pub mod inspect;

@@ -178,7 +178,7 @@ pub struct Settings {
 }
 
 impl Default for Settings {
-    /// An allowance of two percent, as in the thesis.
+    /// An allowance of two percent.
     fn default() -> Self {
         Self { candidates: Candidates::All, allowance: 0.02, tries: 12, seed: 0, through_corners: true }
     }

@@ -62,7 +62,7 @@ pub enum Method {
     /// Multilevel bisection by METIS (Karypis and Kumar 1998) of a graph of clusters, each a
     /// segment of the Hilbert curve; smoothed likewise.
     Clusters {
-        /// Clusters per part, at most [`MOST_CLUSTERS`] in all. The graph on rank 0 has this many
+        /// Clusters per part, at most 2²¹ in all. The graph on rank 0 has this many
         /// vertices per part.
         per_part: u32,
     },
