@@ -16,7 +16,6 @@ mod common;
 
 use common::{assemble_with, conjugate_gradients, dot, gradients};
 use std::collections::{BTreeMap, HashMap};
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use tetmill::comm::mpi::{self, rsmpi};
 use tetmill::comm::{CommError, Communicator, Rank, thread};
@@ -55,20 +54,12 @@ fn main() -> Result<(), Failure> {
     if !mpi::launched() {
         return thread::run(4, |comm| run(comm, &folder))?.into_iter().collect();
     }
-    let (universe, threading) =
+    // Without this the other ranks would wait without end for one that panics.
+    mpi::abort_on_panic();
+    let (universe, _) =
         rsmpi::initialize_with_threading(rsmpi::Threading::Funneled).ok_or("MPI is initialised already")?;
-    if threading < rsmpi::Threading::Funneled {
-        return Err("this MPI library does not support threads".into());
-    }
-    // The messages of the program go through `world`, those of tetmill through a duplicate. The
-    // duplicate is dropped before `universe`, which finalises MPI.
-    let world = universe.world();
-    let comm = mpi::duplicate_of(&world);
-    match catch_unwind(AssertUnwindSafe(|| run(&comm, &folder))) {
-        Ok(result) => result,
-        // The other ranks would wait for this one without end.
-        Err(_) => world.abort(5),
-    }
+    // The messages of the program go through `world`, those of tetmill through a duplicate.
+    run(&mpi::duplicate_of(&universe.world())?, &folder)
 }
 
 /// **Collective.** All errors that it returns are errors on all ranks, so none waits for another.

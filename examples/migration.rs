@@ -11,7 +11,7 @@ use tetmill::{Error, Geometry, Mesher};
 
 fn main() -> Result<(), Error> {
     let block = Geometry::from_text("algebraic3d solid block = orthobrick (0, 0, 0; 1, 1, 1); tlo block;")?;
-    let shares = thread::run(4, |comm| -> Result<_, Error> {
+    let shares = thread::try_run(4, |comm| -> Result<_, Error> {
         let mesh = Mesher::new().max_size(0.2).levels(1).generate_on(comm, Some(&block))?;
         let mesh = mesh.with_edges_and_faces(comm)?;
         let work = |point: &tetmill::Point| if point.coords.norm() < 0.6 { 10 } else { 1 };
@@ -23,7 +23,6 @@ fn main() -> Result<(), Error> {
         let after = mesh.tets.iter().map(|tet| u64::from(work(&mesh.points[tet[0].index()]))).sum::<u64>();
         Ok((before, after, mesh.tets.len()))
     })?;
-    let shares = shares.into_iter().collect::<Result<Vec<_>, _>>()?;
     let mean = shares.iter().map(|share| share.1).sum::<u64>() as f64 / shares.len() as f64;
     for (rank, (before, after, tets)) in shares.iter().enumerate() {
         println!("rank {rank}: work {before} before, {after} after, in {tets} tets");

@@ -23,7 +23,7 @@
 //! }
 //!
 //! // Three ranks, here threads of this process. Each gets its part of the same mesh.
-//! let owned = thread::run(3, |comm| -> Result<u64, Error> {
+//! let owned = thread::try_run(3, |comm| -> Result<u64, Error> {
 //!     let mesh = Mesher::new().max_size(0.4).levels(2).generate_on(comm, Some(&part))?;
 //!
 //!     // The part as flat arrays: points, tets, bodies, boundary triangles and their patches.
@@ -38,8 +38,8 @@
 //!     let sharing = mesh.sharing();
 //!     Ok((0..arrays.points.len() as u32).filter(|&vertex| sharing.is_owned(vertex)).count() as u64)
 //! })?;
-//! let owned: u64 = owned.into_iter().collect::<Result<Vec<u64>, Error>>()?.iter().sum();
-//! assert_eq!(owned, Mesher::new().max_size(0.4).levels(2).generate(&part)?.stream().totals().vertices);
+//! let alone = Mesher::new().max_size(0.4).levels(2).generate(&part)?;
+//! assert_eq!(owned.iter().sum::<u64>(), alone.stream().totals().vertices);
 //! # Ok::<(), Error>(())
 //! ```
 //!
@@ -154,7 +154,7 @@ pub mod error {
     pub use crate::mesher::surface::curves::CurveError;
     pub use crate::mesher::volume::{SurfaceFaults, VolumeError};
     pub use crate::parallel::decompose::{CutError, LooseEdge, TooManyParts};
-    pub use crate::parallel::distribution::{DistError, NumberError};
+    pub use crate::parallel::distribution::{CheckError, DistError, NumberError};
     pub use crate::parallel::halo::HaloError;
     pub use crate::parallel::migrate::MigrateError;
     pub use crate::parallel::partition::PartitionError;

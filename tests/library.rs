@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use tetmill::comm::thread;
-use tetmill::error::{ErrorKind, HasKind};
+use tetmill::error::{ErrorKind, HasKind, RefineError, RequestError};
 use tetmill::mesh::{Arrays, By, EdgeId, FaceId, Sharing, VertexId, blocks};
 use tetmill::{Error, Geometry, InputSettings, MeshArrays, Mesher, Method, SurfaceArrays};
 
@@ -257,4 +257,42 @@ fn parents_are_on_the_same_rank_and_lead_to_the_coarse_mesh() {
         comm.barrier().unwrap();
     });
     assert_eq!(checked.unwrap().len(), 3);
+}
+
+#[test]
+fn a_failed_run_has_the_error_of_rank_0_and_options_that_differ_have_their_name() {
+    let ball = ball();
+    let refused = thread::try_run(3, |comm| -> Result<u64, Error> {
+        Ok(Mesher::new().levels(11).generate_on(comm, Some(&ball))?.check.tets)
+    });
+    assert!(matches!(refused, Err(Error::Refine(RefineError::Pieces { n: 2048 }))), "{refused:?}");
+    let refused = thread::try_run(3, |comm| -> Result<u64, Error> {
+        Ok(Mesher::new().levels(comm.rank()).generate_on(comm, Some(&ball))?.check.tets)
+    });
+    let Err(Error::Request(RequestError::OtherSettings { rank: 1, option })) = refused else {
+        panic!("{refused:?}")
+    };
+    assert!(option.contains("levels"), "{option}");
+    let refused = thread::try_run(3, |comm| Mesher::new().generate_on(comm, None).map(|_| ()));
+    assert!(matches!(refused, Err(Error::Request(RequestError::NoGeometry))), "{refused:?}");
+    let refused = Mesher::new().max_size(0.0).generate(&ball).map(|_| ());
+    assert!(
+        matches!(refused, Err(Error::Request(RequestError::Option { name: "max_size", .. }))),
+        "{refused:?}"
+    );
+}
+
+#[test]
+fn notes_have_no_prefix() {
+    struct Notes(std::sync::Mutex<Vec<String>>);
+    impl tetmill::progress::Observer for Notes {
+        fn note(&self, text: &str) {
+            self.0.lock().unwrap().push(text.to_owned());
+        }
+    }
+    let notes = Notes(Default::default());
+    let mesher = Mesher::new().levels(4).observer(&notes);
+    mesher.memory(2_000_000).generate(&ball()).unwrap();
+    let notes = notes.0.into_inner().unwrap();
+    assert!(!notes.is_empty() && notes.iter().all(|text| !text.starts_with("note")), "{notes:?}");
 }

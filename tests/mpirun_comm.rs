@@ -55,8 +55,11 @@ fn as_a_rank() {
         return;
     };
     #[cfg(feature = "mpi")]
-    if body == "own" {
-        return on_a_communicator_of_its_own();
+    match body.as_str() {
+        "own" => return on_a_communicator_of_its_own(),
+        "own panic" => return panics_with_mpi_of_its_own(),
+        "own without threads" => return without_threads(),
+        _ => {}
     }
     #[cfg(feature = "mpi")]
     tetmill::comm::mpi::run_with_chunks(SMALL_CHUNK, |comm| run_body(&body, comm)).unwrap();
@@ -98,6 +101,10 @@ fn run_body(body: &str, comm: &dyn Communicator) {
             assert!(mesh == start);
             println!("rank {} has its tets back", comm.rank());
         }
+        "no geometry" => {
+            let refused = Mesher::new().generate_on(comm, None).expect_err("there is no geometry");
+            println!("rank {}: {refused}", comm.rank());
+        }
         "panic" => {
             assert_ne!(comm.rank(), 1, "this rank fails on purpose");
             comm.barrier().unwrap();
@@ -113,10 +120,44 @@ fn on_a_communicator_of_its_own() {
     use tetmill::comm::mpi::{duplicate_of, rsmpi};
     let (universe, _) =
         rsmpi::initialize_with_threading(rsmpi::Threading::Funneled).expect("MPI can be initialised");
-    let comm = duplicate_of(&universe.world());
+    let comm = duplicate_of(&universe.world()).expect("MPI allows threads");
     let ball = Geometry::from_text("algebraic3d solid b = sphere (0, 0, 0; 1); tlo b;").expect("a geometry");
     let mesh = Mesher::new().levels(1).generate_on(&comm, Some(&ball)).expect("a mesh");
+    // Methods for numbers are found on the type itself.
+    assert_eq!(comm.all_reduce_sum_u64([1]).expect("ranks").as_slice(), [u64::from(comm.size())]);
     println!("rank {} of a program has {}", comm.rank(), mesh.checksum);
+    // MPI is finalised first.
+    drop(universe);
+    drop(comm);
+    println!("the communicator is dropped");
+}
+
+/// The program initialises MPI itself, and one rank panics, in a thread that is not the first.
+#[cfg(feature = "mpi")]
+fn panics_with_mpi_of_its_own() {
+    use tetmill::comm::mpi::{abort_on_panic, duplicate_of, rsmpi};
+    abort_on_panic();
+    let (universe, _) =
+        rsmpi::initialize_with_threading(rsmpi::Threading::Funneled).expect("MPI can be initialised");
+    let comm = duplicate_of(&universe.world()).expect("MPI allows threads");
+    let thread = std::thread::spawn({
+        let rank = comm.rank();
+        move || assert_ne!(rank, 1, "this rank fails on purpose")
+    });
+    thread.join().expect("no panic");
+    comm.barrier().expect("ranks");
+    println!("the barrier was passed");
+}
+
+/// The program initialises MPI without threads.
+#[cfg(feature = "mpi")]
+fn without_threads() {
+    use tetmill::comm::mpi::{duplicate_of, rsmpi};
+    let universe = rsmpi::initialize().expect("MPI can be initialised");
+    let granted = rsmpi::environment::threading_support();
+    let refused = duplicate_of(&universe.world()).err();
+    assert_eq!(refused.is_some(), granted < rsmpi::Threading::Funneled, "{granted:?}");
+    println!("{granted:?}: {}", refused.map_or("taken".into(), |error| error.to_string()));
 }
 
 /// Tets around one edge, half a turn, with one patch.
@@ -187,5 +228,34 @@ fn a_program_with_mpi_of_its_own_gets_the_same_mesh() {
     let alone = Mesher::new().levels(1).generate(&ball).expect("a mesh");
     for rank in 0..3 {
         assert!(text.contains(&format!("rank {rank} of a program has {}", alone.checksum)), "{text}");
+    }
+    assert_eq!(text.matches("the communicator is dropped").count(), 3, "{text}");
+}
+
+#[test]
+fn a_panic_in_a_program_with_mpi_of_its_own_ends_the_job() {
+    let Some(output) = mpirun(3, "own panic") else { return };
+    let text = text(&output);
+    assert!(!output.status.success(), "{text}");
+    assert!(text.contains("this rank fails on purpose"), "{text}");
+    assert!(text.contains("rank 1 panicked: the job ends"), "{text}");
+    assert!(!text.contains("the barrier was passed"), "{text}");
+}
+
+#[test]
+fn mpi_without_threads_is_refused() {
+    let Some(output) = mpirun(2, "own without threads") else { return };
+    let text = text(&output);
+    assert!(output.status.success(), "{text}");
+    assert!(text.contains("MPI_THREAD_FUNNELED") || text.contains(": taken"), "{text}");
+}
+
+#[test]
+fn a_program_without_geometry_on_rank_0_ends_on_all_ranks() {
+    let Some(output) = mpirun(3, "no geometry") else { return };
+    let text = text(&output);
+    assert!(output.status.success(), "{text}");
+    for rank in 0..3 {
+        assert!(text.contains(&format!("rank {rank}: rank 0 has no geometry")), "{text}");
     }
 }

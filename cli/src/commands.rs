@@ -137,8 +137,9 @@ fn generate_on(comm: &dyn Communicator, options: &Generate, start: Instant) -> R
     })?;
     read_back(comm, &options.run, &target, &progress)?;
     match &options.picture {
-        Some(_) if !made.part.keeps_all() => progress
-            .note("note: no picture was drawn, because the coordinates of the mesh do not fit in memory"),
+        Some(_) if !made.part.keeps_all() => {
+            progress.note("no picture was drawn, because the coordinates of the mesh do not fit in memory")
+        }
         Some(file) => draw(comm, made.part.stream(), options.cut, file)?,
         None => {}
     }

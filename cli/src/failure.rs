@@ -81,6 +81,13 @@ pub fn agree<T>(comm: &dyn Communicator, result: Result<T, Failure>) -> Result<T
 /// Names the options that help against an error, to be appended to its message.
 fn hint(error: &Error) -> Option<String> {
     let hint = match error {
+        Error::Request(RequestError::Option { name, .. }) => match *name {
+            "max_size" => "; the option is --maxh",
+            "min_size" => "; the options are --minh and --maxh",
+            "coarse_tets" => "; the option is --coarse",
+            "planes" => "; they come from --planes-from",
+            _ => return None,
+        },
         Error::Request(RequestError::PeriodicMethod) => ": leave out `-m`, or the identification",
         Error::Request(RequestError::SplitPeriodic { .. }) => ", or insist with --allow-split-periodic",
         Error::Request(RequestError::PeriodicRepartition(_)) => {

@@ -2,6 +2,7 @@
 
 use crate::cancel;
 use indicatif::{ProgressBar, ProgressStyle};
+use std::borrow::Cow;
 use std::io::IsTerminal;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
@@ -78,9 +79,27 @@ impl Observer for Terminal {
 
     fn note(&self, text: &str) {
         match &self.bar {
-            Some(bar) => bar.suspend(|| eprintln!("{text}")),
-            None if self.lines => eprintln!("{text}"),
+            Some(bar) => bar.suspend(|| eprintln!("{}", prefixed(text))),
+            None if self.lines => eprintln!("{}", prefixed(text)),
             None => {}
         }
+    }
+}
+
+/// A note with its prefix, except warnings of a geometry, which are those of a compiler:
+/// `FILE:LINE:` first, as editors expect.
+fn prefixed(text: &str) -> Cow<'_, str> {
+    if text.contains(": warning: ") { text.into() } else { format!("note: {text}").into() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn notes_have_a_prefix_and_warnings_begin_with_their_place() {
+        assert_eq!(prefixed("plate.stl: 3 points in no face"), "note: plate.stl: 3 points in no face");
+        let warning = "a.geo:2:5: warning: the unknown flag -mat is ignored";
+        assert_eq!(prefixed(warning), warning);
     }
 }

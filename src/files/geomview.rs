@@ -1,4 +1,4 @@
-//! Geomview's OOGL: the skin of each part in its own colour, like the partitions in the thesis.
+//! Geomview's OOGL: the skin of each part in its own colour.
 //!
 //! ```text
 //! STEM.off                      one part

@@ -175,6 +175,10 @@ impl HasKind for WriteError {
             _ => ErrorKind::Input,
         }
     }
+
+    fn is_elsewhere(&self) -> bool {
+        matches!(self, Self::Comm(error) if error.is_elsewhere())
+    }
 }
 
 impl WriteError {

@@ -31,4 +31,9 @@ impl ErrorKind {
 pub trait HasKind: fmt::Display {
     /// Its kind.
     fn kind(&self) -> ErrorKind;
+
+    /// Whether this rank stopped only because another rank did, whose error says why.
+    fn is_elsewhere(&self) -> bool {
+        false
+    }
 }

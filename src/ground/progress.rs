@@ -88,7 +88,8 @@ pub trait Observer: Sync {
     fn advance(&self, _stage: Stage, _fraction: f64) {}
     /// A stage has ended after this many seconds.
     fn end(&self, _stage: Stage, _seconds: f64) {}
-    /// A one-line message for the user.
+    /// A message for the user, without a prefix such as "note"; one line except the warnings about
+    /// a geometry ([`Geometry::notes`](crate::Geometry::notes)).
     fn note(&self, _text: &str) {}
     /// Whether the run should be cancelled. Called often, by any thread; once true it must stay
     /// true. If one rank cancels, the run ends on all.

@@ -1,9 +1,11 @@
-//! Method 1 on all ranks: a geometry is cut into pieces, and each piece is meshed on its rank.
+//! The method `decompose` on all ranks: a geometry is cut into pieces, and each piece is meshed on
+//! its rank.
 
 use super::coarse::{CoarseError, CoarseMesh, CoarseSettings, Unmeshed, mesh_surface, smaller_at};
 use super::error::{Error, RequestError};
 use super::geometry::Geometry;
 use super::model::Model;
+use super::options;
 use super::result::CoarseResult;
 use super::retries::{Budget, CORRECTIONS};
 use super::settings::Wanted;
@@ -97,6 +99,8 @@ pub fn planned(
     wanted: Wanted,
     progress: &Progress,
 ) -> Result<Planned, Error> {
+    options::refuse_planes(&cuts.planes)?;
+    options::refuse_impossible_coarse(settings, wanted)?;
     plan_cuts(parts, &geometry.model, cuts, settings, wanted, progress)
 }
 

@@ -156,6 +156,27 @@ pub enum InputError {
 /// The request cannot be met for this input.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RequestError {
+    /// An option has a value that no mesh can have.
+    #[error("`{name}` cannot be {value}: possible are {allowed}")]
+    Option {
+        /// The function of [`Mesher`](crate::Mesher) or the setting.
+        name: &'static str,
+        /// Its value.
+        value: String,
+        /// The values that it can have.
+        allowed: String,
+    },
+    /// Rank 0 was given no geometry.
+    #[error("rank 0 has no geometry to mesh")]
+    NoGeometry,
+    /// The ranks have different settings.
+    #[error("rank {rank} has another setting than rank 0: {option}")]
+    OtherSettings {
+        /// The lowest rank whose settings differ from those of rank 0.
+        rank: Rank,
+        /// The first option that differs.
+        option: &'static str,
+    },
     /// A method that does not keep periodic faces, for a geometry that has some.
     #[error("periodic faces (`identify periodic`) are kept by the method `refine` only")]
     PeriodicMethod,
@@ -235,14 +256,14 @@ pub enum RoomError {
     },
     /// A machine has too little memory.
     #[error(
-        "the fine vertices take {}, those on boundaries and interfaces alone {}, and this machine has {} left: take fewer \
-         levels or tets, or more machines",
+        "the fine mesh takes {}, without the vertices inside coarse tets {}, and this machine has {} left: take fewer levels \
+         or tets, or more machines",
         sized(*.all), sized(*.least), sized(*.available)
     )]
     Memory {
-        /// Bytes of all fine vertices on this machine.
+        /// Bytes of the fine mesh on this machine.
         all: u64,
-        /// Bytes of those that must be stored.
+        /// Bytes of the fine mesh without the vertices inside coarse tets.
         least: u64,
         /// Free bytes.
         available: u64,
@@ -309,6 +330,10 @@ impl HasKind for Error {
             Self::Write(error) => error.kind(),
             Self::Comm(error) => error.kind(),
         }
+    }
+
+    fn is_elsewhere(&self) -> bool {
+        matches!(self, Self::Comm(error) if error.is_elsewhere())
     }
 }
 

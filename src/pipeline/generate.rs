@@ -1,5 +1,5 @@
-//! Methods 2 and 3 on all ranks: a coarse mesh is partitioned, distributed, refined or meshed
-//! inside its refined skins, and checked.
+//! The methods `refine` and `surface` on all ranks: a coarse mesh is partitioned, distributed,
+//! refined or meshed inside its refined skins, and checked.
 
 use super::coarse::CoarseMesh;
 use super::decompose;
@@ -7,6 +7,7 @@ use super::error::{Error, InvalidMesh, RequestError};
 use super::geometry::Geometry;
 use super::mend;
 use super::model::Model;
+use super::options;
 use super::part::{Part, even_out};
 use super::result::{CoarseResult, Generated, Level, Refinement, Refused};
 use super::retries::{Budget, REFINEMENTS};
@@ -34,16 +35,22 @@ use crate::parallel::refine::{self, EdgeDisplacements, PeriodicCheck, RefineErro
 
 /// **Collective.** Makes the mesh; only rank 0 needs the geometry and reports `progress`.
 ///
+/// The settings must be the same on all ranks, except the sources, the size function and `disk`,
+/// which rank 0 alone uses, and `memory`.
+///
 /// # Errors
-/// The same on all ranks: no coarse mesh, more parts than tets, too many vertices on a rank,
-/// inverted tets that no finer coarse mesh avoids, a faulty mesh.
+/// The same on all ranks: impossible or different settings, no geometry on rank 0, no coarse mesh,
+/// more parts than tets, too many vertices on a rank, inverted tets that no finer coarse mesh
+/// avoids, a faulty mesh.
 pub fn generate(
     comm: &dyn Communicator,
     geometry: Option<&Geometry>,
     settings: &GenerateSettings,
     progress: &Progress,
 ) -> Result<Generated, Error> {
-    let model = geometry.map(|geometry| &geometry.model);
+    options::refuse_different(comm, geometry.is_some(), settings)?;
+    comm.agree(options::refuse_impossible(settings))?;
+    let model = geometry.filter(|_| comm.rank() == 0).map(|geometry| &geometry.model);
     if let Method::Decompose(cuts) = &settings.method {
         return decomposed(comm, model, cuts, settings, progress);
     }
@@ -66,8 +73,9 @@ pub fn generate(
         let displacements =
             broadcast_displacements(comm, coarse.as_ref().map(|(_, made)| &made.displacements))?;
         let how = refine::Settings { displacements, nested: settings.nested, ..refine::Settings::default() };
-        let survey =
-            progress.stage(Stage::Levels, |work| survey(comm, &dist, &projector, pieces, &how, work))?;
+        let survey = progress.stage(Stage::Levels, |work| {
+            survey(comm, &dist, &projector, pieces, (&how, settings.memory), work)
+        })?;
         let mut levels = match survey {
             Surveyed::Sound(levels) => levels,
             Surveyed::Inverted(bad, _) if round < REFINEMENTS => {
@@ -138,8 +146,7 @@ fn fill(
     let Parts { model, coarse, dist, projector, names, pieces } = parts;
     comm.agree(skins::refuse_periodic(model).map_err(Error::from))?;
     if matches!(model, Some(Model::Given(given)) if !given.links.is_empty()) {
-        progress
-            .note("note: the method `surface` keeps no periodic faces: those of the mesh are like others");
+        progress.note("the method `surface` keeps no periodic faces: those of the mesh are like others");
     }
     let sizes = model
         .zip(coarse.as_ref())
@@ -232,7 +239,7 @@ fn survey(
     dist: &DistMesh,
     projector: &Projector,
     pieces: u32,
-    how: &refine::Settings,
+    (how, memory): (&refine::Settings, Option<u64>),
     work: &Work,
 ) -> Result<Surveyed, Error> {
     let odd = pieces >> pieces.trailing_zeros();
@@ -243,7 +250,10 @@ fn survey(
     work.step(0.0, 1.0, pieces.iter().map(|&n| tets(n)).sum());
     for n in pieces {
         comm.agree(work.proceed().map_err(Error::from))?;
-        let refined = refine::refine(dist.clone(), projector, n, how);
+        // Level by level, because all vertices of a lower level may fit.
+        let (keep, _) = room::keep_of_level(comm, dist, n, memory)?;
+        let how = refine::Settings { keep, ..how.clone() };
+        let refined = refine::refine(dist.clone(), projector, n, &how);
         let bad = inverted_anywhere(comm, &refined)?;
         let part = match comm.agree(refined.map_err(Error::from)) {
             Err(error) if !bad.is_empty() => return Ok(Surveyed::Inverted(bad, error)),

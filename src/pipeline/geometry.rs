@@ -5,6 +5,7 @@ use super::facet_model::FacetSolid;
 use super::input;
 use super::inspect::Inspection;
 use super::model::{Entities, Model};
+use super::options;
 use super::settings::InputSettings;
 use crate::files::arrays::{MeshArrays, SurfaceArrays};
 use crate::files::{surface, volume};
@@ -62,6 +63,7 @@ impl Geometry {
             note(text);
             notes.push(text.to_owned());
         };
+        options::refuse_impossible_input(settings)?;
         let model = input::read(paths, settings, &mut keep)?;
         Ok(Self { model, notes })
     }
@@ -89,6 +91,7 @@ impl Geometry {
     /// # Errors
     /// Inconsistent arrays, and triangles that do not bound bodies, with the location.
     pub fn from_surface(surface: &SurfaceArrays, settings: &InputSettings) -> Result<Self, Error> {
+        options::refuse_impossible_input(settings)?;
         let mut surface = surface::of_arrays(surface).map_err(InputError::from)?;
         let notes = std::mem::take(&mut surface.notes);
         let solid = FacetSolid::of(vec![surface], &["body".to_owned()], settings)?;

@@ -13,6 +13,9 @@ use crate::mesher::improve::Effort;
 
 /// Makes meshes; unset options have the defaults of the command line.
 ///
+/// If an option is set twice, the last value counts. Numbers are checked when meshing begins: one
+/// that no mesh can have is [`RequestError::Option`](crate::error::RequestError::Option).
+///
 /// ```
 /// use tetmill::{Geometry, Mesher};
 ///
@@ -82,7 +85,8 @@ impl<'a> Mesher<'a> {
         self.with_size(|settings| settings.closeness = Closeness::of_ratio(ratio))
     }
 
-    /// Adds sizes at places, from which sizes grow by the grading.
+    /// Adds sizes at places, from which sizes grow by the grading. On several ranks those of rank 0
+    /// count.
     pub fn sources(self, sources: impl IntoIterator<Item = Source>) -> Self {
         self.with_size(|settings| settings.sources.extend(sources))
     }
@@ -90,22 +94,30 @@ impl<'a> Mesher<'a> {
     /// An upper bound of the coarse mesh's size (length) by place. Values that are not positive are
     /// ignored.
     ///
-    /// The function is called very often, by several threads. If it changes faster than the
-    /// grading, elements may be badly shaped; a small region finer than the elements around it may
-    /// be missed.
+    /// A [`Point`] has the coordinates `x`, `y` and `z`, and converts `into()` a `[f64; 3]`. The
+    /// function is called very often, by several threads, on rank 0 only. If it changes faster than
+    /// the grading, elements may be badly shaped; a small region finer than the elements around it
+    /// may be missed.
+    ///
+    /// The settings own the function, so it cannot borrow local data: `move` data into it, or share
+    /// data by an [`Arc`](std::sync::Arc).
     pub fn size(self, size: impl Fn(Point) -> f64 + Send + Sync + 'static) -> Self {
         self.with_size(|settings| settings.function = Some(SizeFunction::new(size)))
     }
 
-    /// Refines the coarse mesh this many times, each time every tet into eight.
+    /// Refines the coarse mesh this many times, each time every tet into eight: the same as
+    /// [`pieces`](Self::pieces) of 2 to the power `levels`.
     ///
-    /// # Panics
-    /// Beyond 31 levels; those beyond 10 are refused when meshing.
+    /// At most 10 levels are possible ([`MAX_PIECES`](crate::run::MAX_PIECES)); more are refused
+    /// when meshing. Replaces earlier `levels` and `pieces`, and [`tets`](Self::tets).
     pub fn levels(self, levels: u32) -> Self {
-        self.pieces(1 << levels)
+        self.pieces(1_u32.checked_shl(levels).unwrap_or(u32::MAX))
     }
 
     /// Splits each coarse edge into `pieces`, so each coarse tet into `pieces`³.
+    ///
+    /// 1 to [`MAX_PIECES`](crate::run::MAX_PIECES) are possible; other numbers are refused when
+    /// meshing. Replaces earlier `pieces` and [`levels`](Self::levels), and [`tets`](Self::tets).
     pub fn pieces(self, pieces: u32) -> Self {
         self.with(|settings| match &mut settings.wanted {
             Wanted::Coarse { pieces: of_coarse, .. } => *of_coarse = pieces,
@@ -114,6 +126,9 @@ impl<'a> Mesher<'a> {
     }
 
     /// Chooses sizes for a coarse mesh of `tets` to 1.5 times as many.
+    ///
+    /// [`levels`](Self::levels) or [`pieces`](Self::pieces), set before or after, refine it.
+    /// Replaces an earlier `coarse_tets`, and [`tets`](Self::tets).
     pub fn coarse_tets(self, tets: u64) -> Self {
         self.with(|settings| {
             let pieces = match settings.wanted {
@@ -125,6 +140,9 @@ impl<'a> Mesher<'a> {
     }
 
     /// Chooses sizes and refinement for a total of `tets` to 1.3 times as many.
+    ///
+    /// Replaces earlier [`coarse_tets`](Self::coarse_tets), [`levels`](Self::levels) and
+    /// [`pieces`](Self::pieces); each of them replaces it if set later.
     pub fn tets(self, tets: u64) -> Self {
         self.with(|settings| settings.wanted = Wanted::Elements(tets))
     }
@@ -147,7 +165,7 @@ impl<'a> Mesher<'a> {
         self.with(|settings| settings.nested = true)
     }
 
-    /// The memory for fine vertices on each machine (bytes), instead of its free memory.
+    /// The memory for the fine mesh on each machine (bytes), instead of its free memory.
     pub fn memory(self, bytes: u64) -> Self {
         self.with(|settings| settings.memory = Some(bytes))
     }
@@ -166,26 +184,23 @@ impl<'a> Mesher<'a> {
         self.generate_on(&thread::alone(), Some(geometry))
     }
 
-    /// **Collective.** Makes the mesh in one part for each rank; each rank gets its own. Only rank
-    /// 0 needs the geometry, and all ranks must have the same settings.
+    /// **Collective.** Makes the mesh in one part for each rank; each rank gets its own.
+    ///
+    /// Only rank 0 uses the geometry, [`sources`](Self::sources) and the function
+    /// [`size`](Self::size); those of other ranks are ignored. All other options except
+    /// [`memory`](Self::memory) must be the same on all ranks, which is checked.
     ///
     /// # Errors
-    /// On all ranks: no valid mesh, with the location; more parts than coarse tets; not enough
-    /// memory; cancelled. The failing rank has the original error, others [`Error::Comm`] with its
-    /// text.
-    ///
-    /// # Panics
-    /// If rank 0 has no geometry.
+    /// On all ranks: options that are impossible or differ between ranks; no geometry on rank 0; no
+    /// valid mesh, with the location; more parts than coarse tets; not enough memory; cancelled.
+    /// The failing rank has the original error, others [`Error::Comm`] with its text.
     pub fn generate_on(
         &self,
         comm: &dyn Communicator,
         geometry: Option<&Geometry>,
     ) -> Result<Generated, Error> {
-        let first = comm.rank() == 0;
-        assert!(!first || geometry.is_some(), "rank 0 has no geometry to be meshed");
-        let geometry = geometry.filter(|_| first);
         let cancel = CancelOnly(self.observer);
-        let progress = Progress::new(if first { self.observer } else { &cancel });
+        let progress = Progress::new(if comm.rank() == 0 { self.observer } else { &cancel });
         generate(comm, geometry, &self.settings, &progress)
     }
 }

@@ -5,7 +5,7 @@ pub mod decompose;
 pub mod error;
 mod estimate;
 pub(crate) mod facet_model;
-pub mod generate;
+mod generate;
 mod geometry;
 pub mod input;
 pub mod inspect;
@@ -14,6 +14,7 @@ mod mesher;
 pub mod model;
 pub mod moved;
 pub mod names;
+mod options;
 pub mod part;
 #[cfg(test)]
 mod periodic_tests;

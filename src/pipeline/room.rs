@@ -51,6 +51,29 @@ pub(super) fn vertices_to_keep(
     memory: Option<u64>,
     progress: &Progress,
 ) -> Result<Keep, Error> {
+    let (keep, [all, available]) = keep_of_level(comm, part, pieces, memory)?;
+    if keep == Keep::Boundary {
+        progress.note(&format!(
+            "the fine mesh takes {}, above the {} there are: vertices inside coarse tets are computed anew wherever they \
+             are needed",
+            sized(all),
+            sized(available)
+        ));
+    }
+    Ok(keep)
+}
+
+/// **Collective.** Decides which vertices of a refinement level this machine can store; also
+/// returns the bytes of all of them on this machine, and the free bytes.
+///
+/// # Errors
+/// If not even the boundary vertices fit; on all ranks, with the numbers.
+pub(super) fn keep_of_level(
+    comm: &dyn Communicator,
+    part: &DistMesh,
+    pieces: u32,
+    memory: Option<u64>,
+) -> Result<(Keep, [u64; 2]), Error> {
     let machine = memory::machine();
     let machines = comm.all_gather_bytes(machine.as_bytes())?;
     let on_machine = |bytes: u64| -> Result<u64, Error> {
@@ -60,25 +83,70 @@ pub(super) fn vertices_to_keep(
     };
     let [all, least] = predicted_counts(part, pieces).bytes;
     let (all, least) = (on_machine(all)?, on_machine(least)?);
-    let Some(available) = memory.or_else(memory::available_bytes) else { return Ok(Keep::All) };
+    let Some(available) = memory.or_else(memory::available_bytes) else {
+        return Ok((Keep::All, [all, u64::MAX]));
+    };
     let fits = if least > available { Err(RoomError::Memory { all, least, available }) } else { Ok(()) };
     comm.agree(fits.map_err(Error::from))?;
-    if all <= available {
-        return Ok(Keep::All);
-    }
-    progress.note(&format!(
-        "note: the fine vertices take {}, above the {} there are: those inside coarse tets are computed anew wherever they \
-         are needed",
-        sized(all),
-        sized(available)
-    ));
-    Ok(Keep::Boundary)
+    Ok((if all <= available { Keep::All } else { Keep::Boundary }, [all, available]))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::ground::comm::thread;
+    use crate::ground::error::{ErrorKind, HasKind};
+    use crate::ground::progress::{Silent, Stage};
     use crate::parallel::refine::fixtures::{cube, whole};
+    use crate::{Geometry, Mesher};
+    use std::sync::Mutex;
+
+    /// Six tets and 8 subdivisions: 729 vertices, 6·35 of them inside, and 6 tets of 84 octahedra.
+    #[test]
+    fn vertices_and_diagonals_count_toward_the_memory() {
+        let part = whole(&cube(1, false).mesh);
+        let kept = |memory| {
+            let progress = Progress::new(&Silent);
+            vertices_to_keep(&thread::alone(), &part, 8, Some(memory), &progress)
+        };
+        let diagonals = 6 * 84 / 4;
+        assert_eq!(kept(24 * 729 + diagonals).unwrap(), Keep::All);
+        assert_eq!(kept(24 * 729 + diagonals - 1).unwrap(), Keep::Boundary);
+        let least = 24 * (729 - 6 * 35) + diagonals;
+        assert_eq!(kept(least).unwrap(), Keep::Boundary);
+        assert_eq!(kept(least - 1).unwrap_err().kind(), ErrorKind::Resources);
+    }
+
+    /// Collects notes and stages.
+    #[derive(Default)]
+    struct Listener(Mutex<(Vec<String>, Vec<Stage>)>);
+
+    impl crate::progress::Observer for Listener {
+        fn begin(&self, stage: Stage) {
+            self.0.lock().unwrap().1.push(stage);
+        }
+        fn note(&self, text: &str) {
+            self.0.lock().unwrap().0.push(text.to_owned());
+        }
+    }
+
+    #[test]
+    fn little_memory_is_noted_or_refused_before_the_levels_and_changes_no_mesh() {
+        let ball = Geometry::from_text("algebraic3d solid b = sphere (0, 0, 0; 1); tlo b;").unwrap();
+        let mesher = Mesher::new().levels(3);
+        let made = mesher.generate(&ball).unwrap();
+        let [all, least] = predicted_counts(&whole(&made.coarse.as_ref().unwrap().mesh), 8).bytes;
+        let listener = Listener::default();
+        let little = mesher.clone().memory((all + least) / 2).observer(&listener).generate(&ball).unwrap();
+        assert_eq!(little.checksum, made.checksum);
+        let (notes, _) = listener.0.into_inner().unwrap();
+        assert!(notes.len() == 1 && notes[0].starts_with("the fine mesh takes "), "{notes:?}");
+        let listener = Listener::default();
+        let refused = mesher.memory(least - 1).observer(&listener).generate(&ball).unwrap_err();
+        assert!(matches!(refused, Error::Room(RoomError::Memory { .. })), "{refused}");
+        let (_, stages) = listener.0.into_inner().unwrap();
+        assert!(!stages.contains(&Stage::Levels), "{stages:?}");
+    }
 
     #[test]
     fn what_the_disk_cannot_hold_is_refused_with_the_numbers() {

@@ -26,13 +26,13 @@ pub struct CutSettings {
 /// How the parts are meshed.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum Method {
-    /// Parts of a coarse mesh are refined uniformly (the thesis' second method).
+    /// Parts of a coarse mesh are refined uniformly.
     #[default]
     Refine,
-    /// The skins of coarse parts are refined, and each part is meshed inside its skin (third
-    /// method).
+    /// The surfaces of coarse parts are refined, and each part is meshed inside its surface by the
+    /// sizes.
     Surface,
-    /// The geometry is cut into pieces, and each piece is meshed (first method).
+    /// The geometry is cut into pieces, and each piece is meshed.
     Decompose(CutSettings),
 }
 
@@ -45,7 +45,7 @@ pub struct GenerateSettings {
     pub coarse: CoarseSettings,
     /// The requested number of tets.
     pub wanted: Wanted,
-    /// The memory for fine vertices on each machine, in bytes; by default its free memory.
+    /// The memory for the fine mesh on each machine, in bytes; by default its free memory.
     pub memory: Option<u64>,
     /// The planned output, so that a mesh that does not fit is refused before refinement.
     pub disk: Option<Disk>,

@@ -1,4 +1,5 @@
-//! Method 3 on all ranks: distributed coarse parts are meshed inside their refined skins.
+//! The method `surface` on all ranks: distributed coarse parts are meshed inside their refined
+//! skins.
 
 use super::error::{Error, RequestError};
 use super::model::Model;

@@ -15,7 +15,7 @@ use super::target::{Outcome, mesh_to_target};
 use crate::ground::progress::Work;
 use crate::ground::size::Source;
 use crate::parallel::refine::lattice::MAX_PIECES;
-use crate::parallel::refine::pieces_for;
+use crate::parallel::refine::{pieces_for, possible_pieces};
 
 /// The coarse mesh of a large mesh has at least this many tets. The shaft's mesh of 1.4·10⁹ tets
 /// has a smallest dihedral angle of 18° from 5,800 coarse tets.
@@ -82,7 +82,7 @@ pub(super) fn mesh_as_wanted(
     };
     match wanted {
         Wanted::Elements(count) if let Model::Given(given) = model => {
-            let pieces = pieces_for(given.mesh.tets.len() as u64, count);
+            let pieces = possible_pieces(pieces_for(given.mesh.tets.len() as u64, count))?;
             Ok((pieces, model.coarse_mesh(&mut settings.clone(), budget, work)?, None))
         }
         Wanted::Sizes { pieces } => {

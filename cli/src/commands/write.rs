@@ -99,7 +99,7 @@ fn passes(format: &Format) -> u64 {
 /// Notes the names and numbers that a file cannot store.
 pub(super) fn note_losses(names: &Names, format: serial::Format, file: &Path, progress: &Progress) {
     for loss in serial::losses(names, format) {
-        progress.note(&format!("note: {}: {loss}", file.display()));
+        progress.note(&format!("{}: {loss}", file.display()));
     }
 }
 

@@ -16,8 +16,11 @@ pub enum LaunchError {
     /// MPI can be initialised only once in a process.
     #[error("MPI was initialised before in this process")]
     AlreadyInitialised,
-    /// The MPI library does not allow threads other than the one that calls it.
-    #[error("this MPI library does not support threads (it grants less than MPI_THREAD_FUNNELED)")]
+    /// MPI was initialised without threads other than the one that calls it.
+    #[error(
+        "MPI grants less than MPI_THREAD_FUNNELED, and meshing uses threads: initialise MPI with this level, or take an MPI \
+         library that supports it"
+    )]
     NoThreads,
 }
 

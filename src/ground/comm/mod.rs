@@ -17,7 +17,7 @@
 //! | backend | ranks are | when one fails |
 //! |---|---|---|
 //! | [`thread`] | threads of this process | the others get [`CommError::RankFailed`] |
-//! | [`mpi`] (feature `mpi`) | processes that `mpirun` started | the job ends with a message |
+//! | [`mpi`] (feature `mpi`) | processes that `mpirun` started | the job ends with a message, as [`mpi`] says |
 //! | [`grouped`] | threads of the ranks of another communicator, as many as wanted | as in that one |
 //!
 //! Messages are slices of plain numbers; [`pack`] puts several slices into one message. Both
@@ -78,14 +78,23 @@ impl HasKind for CommError {
             Self::RankFailed(_) | Self::NotStarted { .. } => ErrorKind::Rank,
         }
     }
+
+    fn is_elsewhere(&self) -> bool {
+        matches!(self, Self::RankFailed(_) | Self::Elsewhere { .. })
+    }
 }
 
 /// A group of ranks. Object-safe: messages are bytes; the methods on `dyn Communicator` take slices
 /// of plain numbers.
 ///
+/// The methods on `dyn Communicator`, such as `all_reduce_sum_f64`, can be called on a
+/// [`ThreadComm`](thread::ThreadComm) and an `MpiComm` too, which dereference to it. For another
+/// type, or in a function that is generic over communicators, write `let comm: &dyn Communicator =
+/// &comm;` first.
+///
 /// All functions except `rank` and `size` are **Collective**: every rank calls them, in the same
 /// order. If a rank panics, they return (or panic with) [`CommError::RankFailed`] elsewhere and
-/// never hang.
+/// never hang; for processes see the [`mpi`] backend.
 pub trait Communicator {
     /// *Local.* This rank.
     fn rank(&self) -> Rank;

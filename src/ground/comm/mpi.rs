@@ -5,8 +5,10 @@
 //! than the limit (possibly empty), which marks the end. MPI keeps the order of messages between
 //! two ranks.
 //!
-//! MPI cannot continue without a rank. So no function here returns [`CommError::RankFailed`]: a
-//! rank that panics ends the job.
+//! MPI cannot continue without a rank. So no function here returns [`CommError::RankFailed`]. With
+//! [`run`] a rank that panics ends the job. A program that initialises MPI itself must call
+//! [`abort_on_panic`] for that: otherwise the other ranks wait for the rank without end, and so
+//! does the rank itself in `MPI_Finalize`.
 
 /// The crate whose communicators [`duplicate_of`] takes.
 pub use ::mpi as rsmpi;
@@ -16,13 +18,14 @@ use super::{CommError, Communicator};
 use crate::ground::comm::Rank;
 use mpi::collective::CommunicatorCollectives;
 use mpi::datatype::PartitionMut;
-use mpi::environment::Threading;
+use mpi::environment::{Threading, is_finalized, is_initialized, threading_support};
 use mpi::point_to_point::{Destination, Source};
 use mpi::request::multiple_scope;
 use mpi::topology::{Communicator as _, SimpleCommunicator};
 use mpi::traits::Root;
 use std::cell::Cell;
 use std::collections::BTreeMap;
+use std::ops::Deref;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// The longest chunk in bytes: well below the 2³¹ that MPI can count, displacements included.
@@ -66,38 +69,68 @@ pub fn run_with_chunks<R>(chunk: usize, body: impl FnOnce(&dyn Communicator) -> 
         return Err(LaunchError::NoThreads);
     }
     let world = universe.world();
-    let comm = MpiComm { chunk, exchanges: Cell::new(0), world };
+    let comm = MpiComm { chunk, exchanges: Cell::new(0), world: Some(world) };
     match catch_unwind(AssertUnwindSafe(|| body(&comm))) {
         Ok(result) => Ok(result),
-        Err(_) => {
-            eprintln!("rank {} panicked: the job ends", comm.rank());
-            // The launcher drops output that it has not forwarded yet when it ends the job.
-            std::thread::sleep(BEFORE_ABORT);
-            comm.world.abort(RANK_FAILED)
-        }
+        Err(_) => end_job(comm.world()),
     }
 }
 
-/// **Collective.** The communicator for a program that initialised MPI itself: a duplicate of the
-/// program's, so that their messages do not mix. It must not outlive MPI.
+/// Ends the job after a panic, whose message is on the standard error.
+fn end_job(world: &SimpleCommunicator) -> ! {
+    eprintln!("rank {} panicked: the job ends", world.rank());
+    // The launcher drops output that it has not forwarded yet when it ends the job.
+    std::thread::sleep(BEFORE_ABORT);
+    world.abort(RANK_FAILED)
+}
+
+/// *Local.* Makes panics of this process end the whole job with status 5, after the panic's
+/// message: for programs that initialise MPI themselves. [`run`] does not need it.
 ///
-/// MPI must have been initialised with at least `MPI_THREAD_FUNNELED`, since meshing uses other
-/// threads too, and by the calling thread.
+/// Installs a panic hook, which first calls the hook before it. Every panic of every thread ends
+/// the job while MPI is initialised, including panics that the program would catch. Call it on all
+/// ranks, before or after MPI is initialised.
+pub fn abort_on_panic() {
+    let report = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |panic| {
+        report(panic);
+        if is_initialized() && !is_finalized() {
+            end_job(&SimpleCommunicator::world());
+        }
+    }));
+}
+
+/// **Collective.** The communicator for a program that initialised MPI itself: a duplicate of the
+/// program's, so that their messages do not mix.
+///
+/// MPI must have been initialised by the calling thread, with at least `MPI_THREAD_FUNNELED`,
+/// because meshing uses other threads too. The communicator cannot be used after MPI is finalised;
+/// it may be dropped then.
+///
+/// A rank that panics does not end the job unless [`abort_on_panic`] was called: the other ranks
+/// wait for it.
 ///
 /// ```no_run
-/// use tetmill::comm::mpi::{duplicate_of, rsmpi};
+/// use tetmill::comm::mpi::{abort_on_panic, duplicate_of, rsmpi};
 /// # use tetmill::{Geometry, Mesher};
 ///
-/// # fn main() -> Result<(), tetmill::Error> {
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// abort_on_panic();
 /// let (universe, _) = rsmpi::initialize_with_threading(rsmpi::Threading::Funneled).expect("MPI");
-/// let comm = duplicate_of(&universe.world());
+/// let comm = duplicate_of(&universe.world())?;
 /// # let part = Geometry::from_file("part.geo")?;
 /// let mesh = Mesher::new().levels(3).generate_on(&comm, Some(&part))?;
 /// # Ok(())
 /// # }
 /// ```
-pub fn duplicate_of(communicator: &impl mpi::traits::Communicator) -> MpiComm {
-    MpiComm { chunk: CHUNK, exchanges: Cell::new(0), world: communicator.duplicate() }
+///
+/// # Errors
+/// [`LaunchError::NoThreads`] if MPI was initialised with less than `MPI_THREAD_FUNNELED`.
+pub fn duplicate_of(communicator: &impl mpi::traits::Communicator) -> Result<MpiComm, LaunchError> {
+    if threading_support() < Threading::Funneled {
+        return Err(LaunchError::NoThreads);
+    }
+    Ok(MpiComm { chunk: CHUNK, exchanges: Cell::new(0), world: Some(communicator.duplicate()) })
 }
 
 /// Time for the launcher to forward a last message; without it, about one run in thirty lost the
@@ -106,7 +139,8 @@ const BEFORE_ABORT: std::time::Duration = std::time::Duration::from_millis(300);
 
 /// One rank of an MPI job.
 pub struct MpiComm {
-    world: SimpleCommunicator,
+    /// `None` only while it is dropped.
+    world: Option<SimpleCommunicator>,
     /// The longest chunk in bytes.
     chunk: usize,
     /// The number of exchanges so far.
@@ -123,7 +157,28 @@ fn rank_of(number: i32) -> Rank {
     Rank::try_from(number).expect("MPI's ranks are not negative")
 }
 
+impl Drop for MpiComm {
+    /// Frees the communicator, unless MPI is finalised: it must not be called then.
+    fn drop(&mut self) {
+        if is_finalized() {
+            std::mem::forget(self.world.take());
+        }
+    }
+}
+
+impl Deref for MpiComm {
+    type Target = dyn Communicator;
+
+    fn deref(&self) -> &Self::Target {
+        self
+    }
+}
+
 impl MpiComm {
+    fn world(&self) -> &SimpleCommunicator {
+        self.world.as_ref().expect("taken by `drop` only")
+    }
+
     /// The chunks of a message, of which only the last is shorter than the limit.
     fn chunks<'a>(&self, message: &'a [u8]) -> impl Iterator<Item = &'a [u8]> + use<'a> {
         let end = if message.len().is_multiple_of(self.chunk) { Some(&message[..0]) } else { None };
@@ -131,12 +186,12 @@ impl MpiComm {
     }
 
     fn send(&self, to: Rank, message: &[u8]) {
-        let process = self.world.process_at_rank(number(to));
+        let process = self.world().process_at_rank(number(to));
         self.chunks(message).for_each(|chunk| process.send_with_tag(chunk, TAG_ROOTED));
     }
 
     fn receive(&self, from: Rank) -> Vec<u8> {
-        let process = self.world.process_at_rank(number(from));
+        let process = self.world().process_at_rank(number(from));
         let mut message = Vec::new();
         loop {
             let (chunk, _) = process.receive_vec_with_tag::<u8>(TAG_ROOTED);
@@ -150,7 +205,7 @@ impl MpiComm {
 
     /// Receives one chunk of an exchange, if one is there.
     fn receive_chunk(&self, tag: i32, inbox: &mut Inbox) {
-        let Some((message, status)) = self.world.any_process().immediate_matched_probe_with_tag(tag) else {
+        let Some((message, status)) = self.world().any_process().immediate_matched_probe_with_tag(tag) else {
             std::thread::yield_now();
             return;
         };
@@ -187,20 +242,20 @@ fn u8_datatype() -> mpi::datatype::SystemDatatype {
 
 impl Communicator for MpiComm {
     fn rank(&self) -> Rank {
-        rank_of(self.world.rank())
+        rank_of(self.world().rank())
     }
 
     fn size(&self) -> u32 {
-        rank_of(self.world.size())
+        rank_of(self.world().size())
     }
 
     fn barrier(&self) -> Result<(), CommError> {
-        self.world.barrier();
+        self.world().barrier();
         Ok(())
     }
 
     fn broadcast_bytes(&self, root: Rank, bytes: &mut Vec<u8>) -> Result<(), CommError> {
-        let process = self.world.process_at_rank(number(root));
+        let process = self.world().process_at_rank(number(root));
         let mut length = bytes.len() as u64;
         process.broadcast_into(&mut length);
         // The root has this length already.
@@ -220,7 +275,7 @@ impl Communicator for MpiComm {
 
     fn all_gather_bytes(&self, bytes: &[u8]) -> Result<Vec<Vec<u8>>, CommError> {
         let mut lengths = vec![0u64; self.size() as usize];
-        self.world.all_gather_into(&(bytes.len() as u64), &mut lengths[..]);
+        self.world().all_gather_into(&(bytes.len() as u64), &mut lengths[..]);
         let total: u64 = lengths.iter().sum();
         if total == 0 {
             return Ok(vec![Vec::new(); lengths.len()]);
@@ -241,7 +296,7 @@ impl Communicator for MpiComm {
         // An empty slice may have address 1, which Open MPI takes for MPI_IN_PLACE: pass a valid
         // address.
         let bytes = if bytes.is_empty() { &[0u8][..0] } else { bytes };
-        self.world.all_gather_varcount_into(bytes, &mut parts);
+        self.world().all_gather_varcount_into(bytes, &mut parts);
         let mut rest = &all[..];
         let mut next = |length: u64| {
             let (message, after) = rest.split_at(length as usize);
@@ -259,7 +314,7 @@ impl Communicator for MpiComm {
             return Ok(self.all_gather_bytes(bytes)?.concat());
         }
         let mut all = vec![0; bytes.len() * self.size() as usize];
-        self.world.all_gather_into(bytes, &mut all[..]);
+        self.world().all_gather_into(bytes, &mut all[..]);
         Ok(all)
     }
 
@@ -287,7 +342,7 @@ impl Communicator for MpiComm {
         }
         multiple_scope(messages.len(), |scope, sends| {
             for (to, message) in messages.iter().filter(|(to, _)| *to != self.rank()) {
-                let process = self.world.process_at_rank(number(*to));
+                let process = self.world().process_at_rank(number(*to));
                 for chunk in self.chunks(message) {
                     sends.add(process.immediate_synchronous_send_with_tag(scope, chunk, tag));
                 }
@@ -297,7 +352,7 @@ impl Communicator for MpiComm {
                 self.receive_chunk(tag, &mut inbox);
             }
         });
-        let mut barrier = self.world.immediate_barrier();
+        let mut barrier = self.world().immediate_barrier();
         while let Err(not_yet) = barrier.test() {
             barrier = not_yet;
             self.receive_chunk(tag, &mut inbox);

@@ -9,8 +9,10 @@
 
 use super::{CommError, Communicator};
 use crate::ground::comm::Rank;
+use crate::ground::error::HasKind;
 use std::cell::Cell;
 use std::marker::PhantomData;
+use std::ops::Deref;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread;
@@ -198,6 +200,32 @@ pub fn run<R: Send>(ranks: u32, body: impl Fn(&dyn Communicator) -> R + Sync) ->
     Ok(results.into_iter().flatten().collect())
 }
 
+/// [`run`] for functions that return a `Result`: the results by rank, or the error of the run.
+///
+/// If several ranks have an error, it is that of the lowest rank with an error of its own. A rank
+/// that stopped because of another one ([`CommError::Elsewhere`], [`CommError::RankFailed`]) only
+/// has the text of that one's error.
+///
+/// # Errors
+/// Those of `body` and of [`run`].
+pub fn try_run<T, E>(ranks: u32, body: impl Fn(&dyn Communicator) -> Result<T, E> + Sync) -> Result<Vec<T>, E>
+where
+    T: Send,
+    E: HasKind + From<CommError> + Send,
+{
+    let (mut values, mut failure) = (Vec::with_capacity(ranks as usize), None::<E>);
+    for result in run(ranks, body)? {
+        match result {
+            Ok(value) => values.push(value),
+            Err(error) if failure.as_ref().is_none_or(|f| f.is_elsewhere() && !error.is_elsewhere()) => {
+                failure = Some(error);
+            }
+            Err(_) => {}
+        }
+    }
+    failure.map_or(Ok(values), Err)
+}
+
 impl ThreadComm {
     /// Deposits messages, waits for the other ranks, and returns what was made of all of them.
     ///
@@ -243,6 +271,14 @@ impl ThreadComm {
     /// If there is no such rank.
     fn expect_rank(&self, rank: Rank) {
         assert!(rank < self.world.size, "rank {} names rank {rank} of {}", self.rank, self.world.size);
+    }
+}
+
+impl Deref for ThreadComm {
+    type Target = dyn Communicator;
+
+    fn deref(&self) -> &Self::Target {
+        self
     }
 }
 

@@ -92,3 +92,27 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn methods_for_numbers_are_found_on_the_type_itself() {
+    let comm = alone();
+    assert_eq!(comm.all_reduce_sum_f64([1.5]), Ok([1.5]));
+    assert_eq!(comm.agree::<u32, CommError>(Ok(1)), Ok(1));
+}
+
+#[test]
+fn the_error_of_a_run_is_that_of_the_rank_that_failed() {
+    let refused = CommError::NotStarted { ranks: 5, reason: "on purpose".into() };
+    for failing in 0..3 {
+        let run = try_run(3, |comm| {
+            let mine = if comm.rank() == failing { Err(refused.clone()) } else { Ok(()) };
+            comm.agree(mine)
+        });
+        assert_eq!(run, Err(refused.clone()));
+    }
+    assert_eq!(try_run(3, |comm| Ok::<_, CommError>(comm.rank())), Ok(vec![0, 1, 2]));
+    // Without an agreement the others get `RankFailed`.
+    let left = try_run(2, |comm| if comm.rank() == 1 { Err(refused.clone()) } else { comm.barrier() });
+    assert_eq!(left, Err(refused));
+    assert!(matches!(try_run(0, |_| Ok::<_, CommError>(())), Err(CommError::NotStarted { .. })));
+}

@@ -14,9 +14,10 @@ impl Closeness {
     /// Thin regions do not affect the sizes.
     pub const OFF: Self = Self { ratio: f64::INFINITY, most: 1.0 };
 
-    /// Sizes of `ratio` thicknesses, lowered by a factor of 200 at most; 0 for no limit.
+    /// Sizes of `ratio` thicknesses, lowered by a factor of 200 at most; 0 for no limit. A negative
+    /// ratio is kept, and refused when meshing.
     pub fn of_ratio(ratio: f64) -> Self {
-        if ratio > 0.0 { Self { ratio, most: 200.0 } } else { Self::OFF }
+        if ratio == 0.0 { Self::OFF } else { Self { ratio, most: 200.0 } }
     }
 }
 

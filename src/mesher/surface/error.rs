@@ -4,7 +4,8 @@ use super::SurfaceMesh;
 use crate::Point;
 use csg::{CurveId, PatchId, ProjectionFailed};
 
-/// Why a patch could not be meshed. Segments are indices into [`SurfaceMesh::segments`].
+/// Why a patch could not be meshed. Segments are indices into those of the
+/// surface mesh.
 #[derive(Clone, Debug, thiserror::Error)]
 pub enum SurfaceError {
     /// Segments are too long for their surroundings: they cross each other, pass through vertices,

@@ -1,4 +1,5 @@
-//! Method 1: planes cut the geometry into one piece per part, and each rank meshes its piece.
+//! The method `decompose`: planes cut the geometry into one piece per part, and each rank meshes
+//! its piece.
 //!
 //! ```text
 //!     geometry ──► planes ──► pieces ──► surface mesh of all ──► skins of the parts ──► tets ──► ids

@@ -178,7 +178,7 @@ pub struct PlanSettings {
 }
 
 impl Default for PlanSettings {
-    /// An allowance of two percent, as in the thesis.
+    /// An allowance of two percent.
     fn default() -> Self {
         Self { candidates: Candidates::All, allowance: 0.02, tries: 12, seed: 0, through_corners: true }
     }

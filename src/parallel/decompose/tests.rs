@@ -40,7 +40,7 @@ fn plane(point: [f64; 3], normal: [f64; 3]) -> CutPlane {
     CutPlane { point: point.into(), normal: Vector::from(normal) }
 }
 
-/// Method 1 with these planes, or with automatic ones if there are none.
+/// The method `decompose` with these planes, or with automatic ones if there are none.
 fn settings(planes: Vec<CutPlane>) -> GenerateSettings {
     GenerateSettings {
         method: Method::Decompose(CutSettings { planes, ..CutSettings::default() }),

@@ -66,6 +66,10 @@ impl HasKind for CheckError {
             Self::Comm(error) => error.kind(),
         }
     }
+
+    fn is_elsewhere(&self) -> bool {
+        matches!(self, Self::Comm(error) if error.is_elsewhere())
+    }
 }
 
 impl DistMesh {

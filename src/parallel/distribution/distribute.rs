@@ -108,6 +108,10 @@ impl HasKind for DistError {
             _ => ErrorKind::NoMesh,
         }
     }
+
+    fn is_elsewhere(&self) -> bool {
+        matches!(self, Self::Comm(error) if error.is_elsewhere())
+    }
 }
 
 /// **Collective.** Sends each rank the tets that `part` assigns to it. Rank 0 passes the mesh and

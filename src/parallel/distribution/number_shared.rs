@@ -59,6 +59,10 @@ impl HasKind for NumberError {
             Self::Comm(error) => error.kind(),
         }
     }
+
+    fn is_elsewhere(&self) -> bool {
+        matches!(self, Self::Comm(error) if error.is_elsewhere())
+    }
 }
 
 /// **Collective.** Constructs the edges and faces of each part, with their ids, classes and

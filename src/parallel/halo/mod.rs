@@ -58,6 +58,10 @@ impl HasKind for HaloError {
             Self::Comm(error) => error.kind(),
         }
     }
+
+    fn is_elsewhere(&self) -> bool {
+        matches!(self, Self::Comm(error) if error.is_elsewhere())
+    }
 }
 
 /// **Collective.** The ghosts of this rank's part: all adjacent tets of other parts, with their

@@ -109,6 +109,10 @@ impl HasKind for MigrateError {
             Self::Comm(error) => error.kind(),
         }
     }
+
+    fn is_elsewhere(&self) -> bool {
+        matches!(self, Self::Comm(error) if error.is_elsewhere())
+    }
 }
 
 /// Parameters of [`migrate_bare`].

@@ -16,11 +16,18 @@ pub struct Diagonals {
 }
 
 impl Diagonals {
-    /// Creates diagonals for `tets` tets of `octahedra` octahedra each, all set to 0.
-    pub fn new(tets: usize, octahedra: u32) -> Self {
+    /// Creates diagonals for `tets` tets of `octahedra` octahedra each, all set to 0; `None` if
+    /// there is not enough memory.
+    pub fn new(tets: usize, octahedra: u32) -> Option<Self> {
+        let bytes_per_tet = Self::bytes_of_tet(octahedra);
+        let bytes = bytemuck::allocation::try_zeroed_vec(tets * bytes_per_tet).ok()?;
+        Some(Self { bytes_per_tet, bytes })
+    }
+
+    /// The number of bytes for a tet of `octahedra` octahedra.
+    pub fn bytes_of_tet(octahedra: u32) -> usize {
         // At least one byte per tet, so that each tet has a chunk.
-        let bytes_per_tet = octahedra.div_ceil(4).max(1) as usize;
-        Self { bytes_per_tet, bytes: vec![0; tets * bytes_per_tet] }
+        octahedra.div_ceil(4).max(1) as usize
     }
 
     /// The number of bytes per tet.
@@ -111,7 +118,7 @@ mod tests {
 
     #[test]
     fn diagonals_are_kept_in_two_bits_each() {
-        let mut diagonals = Diagonals::new(2, 5);
+        let mut diagonals = Diagonals::new(2, 5).unwrap();
         let of = |octahedron: u32| (octahedron % 3) as u8;
         let bytes_per_tet = diagonals.bytes_per_tet();
         let second = &mut diagonals.bytes_mut()[bytes_per_tet..];

@@ -210,14 +210,22 @@ fn refine_reporting(
     let points = snap::boundary_first(&mesh, projector, &numbering, settings)?;
     work.expect(mesh.tets.len() as u64 * u64::from(n).pow(3));
     work.step(0.0, 1.0, mesh.tets.len() as u64);
-    let (inside, bad) = tet::fill(&mesh, projector, &numbering, points, settings, work);
+    let (inside, bad) = tet::fill(&mesh, projector, &numbering, points, settings, work)?;
     work.proceed()?;
     Ok((RefinedMesh::new(mesh, numbering, inside), bad))
 }
 
+/// Passes on a number of subdivisions per edge that a lattice can have.
+///
+/// # Errors
+/// [`RefineError::Pieces`] unless it is 1 to [`MAX_PIECES`](lattice::MAX_PIECES).
+pub fn possible_pieces(n: u32) -> Result<u32, RefineError> {
+    if (1..=lattice::MAX_PIECES).contains(&n) { Ok(n) } else { Err(RefineError::Pieces { n }) }
+}
+
 /// The smallest number of subdivisions per edge with which `coarse` tets become at least `wanted`.
 ///
-/// Returns `MAX_PIECES + 1`, which [`refine()`] rejects, if no lattice suffices.
+/// Returns `MAX_PIECES + 1`, which [`possible_pieces`] rejects, if no lattice suffices.
 pub fn pieces_for(coarse: u64, wanted: u64) -> u32 {
     let enough = |n: &u32| u128::from(coarse) * u128::from(*n).pow(3) >= u128::from(wanted);
     (1..=lattice::MAX_PIECES).find(enough).unwrap_or(lattice::MAX_PIECES + 1)

@@ -8,8 +8,8 @@
 //! Points in an edge or face are numbered by the ascending global ids of its vertices, points in a
 //! tet by the order of its vertices. So all ranks that share an entity agree without messages.
 
-use super::RefineError;
-use super::lattice::{Lattice, MAX_PIECES, for_each_face_child};
+use super::lattice::{Lattice, for_each_face_child};
+use super::{RefineError, possible_pieces};
 use crate::ground::kernel::simplex::from_lowest;
 use crate::ground::mesh::stream::Counts;
 use crate::ground::mesh::{Class, EdgeId, GlobalId, Rank, TET_EDGES, TET_FACES, TetId};
@@ -106,10 +106,7 @@ impl Numbering {
     /// [`RefineError::Pieces`] if n is out of range, [`RefineError::TooManyVertices`] if local ids
     /// exceed `u32`.
     pub fn new(mesh: &DistMesh, n: u32) -> Result<Self, RefineError> {
-        if n == 0 || n > MAX_PIECES {
-            return Err(RefineError::Pieces { n });
-        }
-        let lattice = Lattice::new(n);
+        let lattice = Lattice::new(possible_pieces(n)?);
         let sizes = lattice.points_inside();
         let counts = [mesh.points.len(), mesh.edges.len(), mesh.faces.len(), mesh.tets.len()];
         let all = [mesh.totals.vertices, mesh.totals.edges, mesh.totals.faces, mesh.totals.tets];

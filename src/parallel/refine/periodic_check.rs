@@ -8,7 +8,7 @@ use crate::ground::mesh::GlobalId;
 use crate::ground::mesh::periodic::PeriodicMap;
 use crate::ground::mesh::stream::MeshStream;
 
-/// The result of [`check_periodic`].
+/// The check of the periodic faces of a mesh.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct PeriodicCheck {
     /// The number of pairs; a vertex on several parts counts once per part.

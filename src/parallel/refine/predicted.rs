@@ -1,5 +1,6 @@
 //! Size estimate of a refined part, computed from the coarse part without refining it.
 
+use super::diagonal::Diagonals;
 use super::lattice::Lattice;
 use crate::ground::mesh::{GlobalId, Rank};
 use crate::parallel::distribution::{DistMesh, Shared};
@@ -15,7 +16,7 @@ pub struct PredictedCounts {
     pub shared: u64,
     /// Vertices owned by this rank.
     pub owned: u64,
-    /// Bytes of coordinates: with [`Keep::All`](super::Keep::All), and with
+    /// Bytes of coordinates and diagonals: with [`Keep::All`](super::Keep::All), and with
     /// [`Keep::Boundary`](super::Keep::Boundary).
     pub bytes: [u64; 2],
     /// The other ranks that share some of its vertices, ascending.
@@ -56,7 +57,8 @@ pub fn predicted_counts(mesh: &DistMesh, n: u32) -> PredictedCounts {
         first += total * size;
     }
     let inside = mesh.tets.len() as u64 * inside_tet;
-    counts.bytes = [counts.held + inside, counts.held].map(|vertices| 24 * vertices);
+    let diagonals = (mesh.tets.len() * Diagonals::bytes_of_tet(lattice.octahedra())) as u64;
+    counts.bytes = [counts.held + inside, counts.held].map(|vertices| 24 * vertices + diagonals);
     counts.held += inside;
     counts.owned += inside;
     counts.neighbours.sort_unstable();

@@ -35,6 +35,9 @@ pub struct Inside {
 
 /// Computes the points inside the tets (storing those that are kept), chooses the diagonals, and
 /// checks every child. Also returns the coarse tets that have children which are not positive.
+///
+/// # Errors
+/// [`RefineError::OutOfMemory`] if the diagonals do not fit.
 pub fn fill(
     mesh: &DistMesh,
     projector: &Projector,
@@ -42,9 +45,11 @@ pub fn fill(
     mut points: Box<[Coordinates]>,
     settings: &Settings,
     work: &Work,
-) -> (Inside, Vec<BadTet>) {
+) -> Result<(Inside, Vec<BadTet>), RefineError> {
     let lattice = numbering.lattice();
-    let mut diagonals = Diagonals::new(mesh.tets.len(), lattice.octahedra());
+    let bytes = mesh.tets.len() * Diagonals::bytes_of_tet(lattice.octahedra());
+    let mut diagonals = Diagonals::new(mesh.tets.len(), lattice.octahedra())
+        .ok_or(RefineError::OutOfMemory { rank: mesh.rank, bytes: bytes as u64 })?;
     let bytes_per_tet = diagonals.bytes_per_tet();
     let (before, inside) = points.split_at_mut(numbering.bases()[2]);
     let flat: Vec<bool> = (0..mesh.tets.len())
@@ -83,7 +88,7 @@ pub fn fill(
         .map_init(|| Block::new(lattice), fill_one)
         .flatten_iter()
         .collect();
-    (Inside { points, diagonals, flat }, bad)
+    Ok((Inside { points, diagonals, flat }, bad))
 }
 
 /// Recomputes the lattice points of a coarse tet from its boundary, bitwise as [`fill`].

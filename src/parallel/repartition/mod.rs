@@ -63,7 +63,7 @@ pub enum Method {
     /// Multilevel bisection by METIS (Karypis and Kumar 1998) of a graph of clusters, each a
     /// segment of the Hilbert curve; smoothed likewise.
     Clusters {
-        /// Clusters per part, at most [`MOST_CLUSTERS`] in all. The graph on rank 0 has this many
+        /// Clusters per part, at most 2²¹ in all. The graph on rank 0 has this many
         /// vertices per part.
         per_part: u32,
     },
@@ -122,6 +122,10 @@ impl HasKind for RepartitionError {
             Self::Partition(error) => error.kind(),
             Self::Comm(error) => error.kind(),
         }
+    }
+
+    fn is_elsewhere(&self) -> bool {
+        matches!(self, Self::Comm(error) if error.is_elsewhere())
     }
 }
 

@@ -1,18 +1,20 @@
-//! Method 3: each rank meshes its part inside the part's refined surface.
+//! The method `surface`: each rank meshes its part inside the part's refined surface.
 //!
 //! A coarse mesh is partitioned. The **skin** of a part is its surface (where the body ends or
-//! another part begins) and its faces on patches. It is refined as in Method 2, by a lattice that
-//! is projected to the geometry. So both sides of an interface have the same triangles, with the
-//! same vertex names, without messages. Then each rank fills its skin with tets by the size field.
+//! another part begins) and its faces on patches. It is refined as in the method `refine`, by a
+//! lattice that is projected to the geometry. So both sides of an interface have the same
+//! triangles, with the same vertex names, without messages. Then each rank fills its skin with tets
+//! by the size field.
 //!
 //! ```text
 //!     coarse part ──► skin ──► refined skin ──► tets by the sizes ──► ids ──► part of the whole
 //!                     (no message)                 (no message)      (a scan, an exchange)
 //! ```
 //!
-//! Compared with Method 2, which makes n³ children of a coarse tet, the interior follows the size
-//! field, takes the time of volume meshing, and depends on the partition. A skin that the volume
-//! mesher rejects is filled with the lattice of Method 2 instead, so no rank fails for this reason.
+//! Compared with the method `refine`, which makes n³ children of a coarse tet, the interior follows
+//! the size field, takes the time of volume meshing, and depends on the partition. A skin that the
+//! volume mesher rejects is filled with the lattice of `refine` instead, so no rank fails for this
+//! reason.
 
 mod extract;
 mod fill;

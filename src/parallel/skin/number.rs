@@ -1,8 +1,9 @@
 //! Global ids for parts that were meshed independently.
 //!
-//! Each vertex of a skin has a name that is the same on all ranks that share it: in Method 3 its
-//! global id in the lattice of the whole mesh, in Method 1 its index in the surface mesh. Its owner
-//! assigns the new id, without gaps, and sends it to the other ranks: one scan, one exchange.
+//! Each vertex of a skin has a name that is the same on all ranks that share it: with the method
+//! `surface` its global id in the lattice of the whole mesh, with `decompose` its index in the
+//! surface mesh. Its owner assigns the new id, without gaps, and sends it to the other ranks: one
+//! scan, one exchange.
 
 use super::{Filled, Skin};
 use crate::ground::comm::pack::{put_ascending, put_varint, take_ascending, take_varint};

@@ -78,6 +78,10 @@ impl HasKind for LoadError {
             Self::Comm(error) => error.kind(),
         }
     }
+
+    fn is_elsewhere(&self) -> bool {
+        matches!(self, Self::Comm(error) if error.is_elsewhere())
+    }
 }
 
 /// Makes an error of a fault; `line` counts from 1.

@@ -60,7 +60,7 @@ pub fn same_place(bounds: &Aabb) -> f64 {
 
 impl PeriodicMap {
     /// The pairs of a coarse mesh; `bounds` are those of the geometry. Edges and faces are numbered
-    /// as in [`crate::parallel::distribution::distribute`].
+    /// as in `distribute`.
     ///
     /// # Errors
     /// [`MapError`] if a vertex or triangle has no partner.
