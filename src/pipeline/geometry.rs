@@ -10,6 +10,7 @@ use crate::files::arrays::{MeshArrays, SurfaceArrays};
 use crate::files::{surface, volume};
 use crate::ground::mesh::Names;
 use std::path::Path;
+use std::str::FromStr;
 
 /// The input of the mesher: solids of analytic surfaces, solids bounded by triangles, or an
 /// existing tetrahedral mesh.
@@ -25,6 +26,15 @@ pub struct Geometry {
 impl From<Model> for Geometry {
     fn from(model: Model) -> Self {
         Self { model, notes: Vec::new() }
+    }
+}
+
+/// Reads the text of a geometry, not a path: see [`Geometry::from_text`].
+impl FromStr for Geometry {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self, Error> {
+        Self::from_text(text)
     }
 }
 
