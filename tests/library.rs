@@ -9,7 +9,7 @@ use tetmill::{Error, Geometry, InputSettings, MeshArrays, Mesher, Method, Surfac
 const BALL: &str = "algebraic3d solid b = sphere (0, 0, 0; 1); tlo b;";
 
 fn ball() -> Geometry {
-    Geometry::from_text(BALL).expect("a geometry")
+    BALL.parse().expect("a geometry")
 }
 
 /// The corners and triangles of the unit cube, counterclockwise from outside, and the number of

@@ -11,6 +11,7 @@ use crate::files::arrays::{MeshArrays, SurfaceArrays};
 use crate::files::{surface, volume};
 use crate::ground::mesh::Names;
 use std::path::Path;
+use std::str::FromStr;
 
 /// The input of the mesher: solids of analytic surfaces, solids bounded by triangles, or an
 /// existing tetrahedral mesh.
@@ -26,6 +27,15 @@ pub struct Geometry {
 impl From<Model> for Geometry {
     fn from(model: Model) -> Self {
         Self { model, notes: Vec::new() }
+    }
+}
+
+/// Reads the text of a geometry, not a path: see [`Geometry::from_text`].
+impl FromStr for Geometry {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self, Error> {
+        Self::from_text(text)
     }
 }
 
