@@ -22,9 +22,6 @@ use tetmill::comm::{CommError, Communicator, Rank, thread};
 use tetmill::files::vtu::{self, Field, On};
 use tetmill::mesh::{Arrays, By, EdgeId, Ghosts, TET_FACES};
 use tetmill::{Generated, Geometry, Mesher};
-// The trait of the crate `mpi` has the name of tetmill's. `as _` makes its methods callable without
-// a second `Communicator`.
-use rsmpi::traits::Communicator as _;
 
 type Failure = Box<dyn std::error::Error + Send + Sync>;
 

@@ -7,9 +7,7 @@
 //!
 //! ```
 //! use tetmill::comm::{Communicator, thread};
-//! use tetmill::{Geometry, Mesher};
-//!
-//! type Error = Box<dyn std::error::Error + Send + Sync>;
+//! use tetmill::{Error, Geometry, Mesher};
 //!
 //! let part = Geometry::from_text(
 //!     "algebraic3d

@@ -10,8 +10,8 @@ use crate::files::{surface, volume};
 use crate::ground::comm::CommError;
 use crate::ground::error::{ErrorKind, HasKind};
 use crate::ground::memory::sized;
-use crate::ground::mesh::Rank;
 use crate::ground::mesh::periodic::MapError;
+use crate::ground::mesh::{Rank, UnknownName};
 use crate::ground::progress::Cancelled;
 use crate::mesher::facets::FacetError;
 use crate::parallel::check::{Checksum, Fault};
@@ -62,6 +62,9 @@ pub enum Error {
     /// The request cannot be met for this input.
     #[error(transparent)]
     Request(#[from] RequestError),
+    /// A body or boundary of a name that does not exist was asked for.
+    #[error(transparent)]
+    Name(#[from] UnknownName),
     /// There is no coarse mesh.
     #[error(transparent)]
     Coarse(Box<CoarseError>),
@@ -312,7 +315,7 @@ impl HasKind for Error {
     fn kind(&self) -> ErrorKind {
         match self {
             Self::Read(_) | Self::Language(_) | Self::Input(_) | Self::Request(_) => ErrorKind::Input,
-            Self::Features { .. } | Self::Facets { .. } => ErrorKind::Input,
+            Self::Features { .. } | Self::Facets { .. } | Self::Name(_) => ErrorKind::Input,
             Self::Coarse(error) => error.kind(),
             Self::Cut(error) => error.kind(),
             Self::Fill { .. } => ErrorKind::NoMesh,
