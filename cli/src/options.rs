@@ -179,8 +179,8 @@ pub struct Generate {
     /// How planes are chosen
     #[command(flatten)]
     pub planes: PlaneOptions,
-    /// Memory for fine vertices on each machine (bytes, such as 8e9) [default: the free memory]. If
-    /// they do not fit, coordinates inside coarse tets are recomputed in each pass
+    /// Memory for the fine mesh on each machine (bytes, such as 8e9) [default: the free memory]. If
+    /// it does not fit, coordinates inside coarse tets are recomputed in each pass
     #[arg(long, value_name = "BYTES", value_parser = count)]
     pub memory: Option<u64>,
     /// Sizes of the coarse mesh

@@ -70,6 +70,14 @@ fn more_parts_than_tets_are_refused_with_both_numbers() {
 }
 
 #[test]
+fn a_least_size_above_the_largest_is_refused_with_the_options() {
+    let (output, stderr) = generate_text(BALL, &["--minh", "2", "--maxh", "1", "-f", "none"]);
+    assert_eq!(output.status.code(), Some(2), "{stderr}");
+    assert!(stderr.contains("`min_size` cannot be 2: possible are 0 to max_size, which is 1"), "{stderr}");
+    assert!(stderr.contains("--minh and --maxh"), "{stderr}");
+}
+
+#[test]
 fn a_mesh_beyond_the_memory_is_refused_before_it_is_made() {
     // 163 tets with 512 subdivisions an edge: 89 GB of coordinates, of which 1 GB on boundaries and
     // interfaces of coarse tets.
