@@ -122,7 +122,7 @@ fn degenerate() -> Vec<Part> {
         ("leaning_cones", [0, 3, 4], cones[0], cones[1]),
         ("eccentric", [1, 4, 5], 1.25 * PI, 5.0 * PI),
         ("teardrop", [6, 9, 5], cam[0], 2.0 * cam[0] + cam[1]),
-        ("displacements", [0, 4, 5], 0.09 * PI * (PI + 1.0) + 0.018 * PI, 0.6 * PI * (PI + 1.0) + 0.27 * PI),
+        ("bends", [0, 4, 5], 0.09 * PI * (PI + 1.0) + 0.018 * PI, 0.6 * PI * (PI + 1.0) + 0.27 * PI),
         (
             "ice_cream",
             [0, 2, 3],

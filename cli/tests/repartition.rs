@@ -88,7 +88,7 @@ fn what_cannot_be_read_or_parted_is_refused_and_nothing_is_written() {
         assert_eq!(stderr.matches(expected).count(), 1, "{stderr}");
         assert!(!stderr.contains("panicked") && !out.exists(), "{stderr}");
     };
-    refused("100000", "100000 parts");
+    refused("100000", "100 000 parts");
     let file = |kind: &str| start.join(format!("partitioning.3/part.3.{kind}"));
     let text = std::fs::read_to_string(file("elements")).unwrap();
     std::fs::write(file("elements"), text.replacen(" 504 ", " 508 ", 1)).unwrap();
