@@ -56,72 +56,19 @@ pub fn generate(
     }
     let (mut sources, budget) = (Vec::<Source>::new(), Budget::default());
     for round in 0.. {
-        let made = model.map(|model| coarse_mesh(comm.size(), model, settings, &sources, &budget, progress));
-        let mut coarse = comm.agree(made.transpose())?;
-        let pieces = broadcast_pieces(comm, coarse.as_ref().map(|(pieces, _)| *pieces))?;
-        let (names, projector) = broadcast_geometry(comm, model)?;
-        let given = coarse.as_ref().map(|(_, made)| (made.mesh.clone(), made.parts.clone()));
-        let dist = progress.stage(Stage::Distribute, |_| distribution::distribute(comm, given))?;
-        comm.agree(
-            room::refuse_oversized(comm.rank(), &dist, pieces, settings.disk.as_ref()).map_err(Error::from),
-        )?;
+        let parts = coarse_parts(comm, model, settings, &sources, &budget, progress)?;
         if settings.method == Method::Surface {
-            let coarse = coarse.take().map(|(_, made)| made);
-            return fill(comm, Parts { model, coarse, dist, projector, names, pieces }, settings, progress);
+            return fill(comm, parts, settings, progress);
         }
-        let keep = room::vertices_to_keep(comm, &dist, pieces, settings.memory, progress)?;
-        let displacements =
-            broadcast_displacements(comm, coarse.as_ref().map(|(_, made)| &made.displacements))?;
-        let how = refine::Settings { displacements, nested: settings.nested, ..refine::Settings::default() };
-        let survey = progress.stage(Stage::Levels, |work| {
-            survey(comm, &dist, &projector, pieces, (&how, settings.memory), work)
-        })?;
-        let mut levels = match survey {
-            Surveyed::Sound(levels) => levels,
-            Surveyed::Inverted(bad, _) if round < REFINEMENTS => {
-                lower(&mut sources, coarse.as_ref(), &bad);
-                continue;
+        match refined(comm, parts, settings, round < REFINEMENTS, progress)? {
+            Refined::Sound(mut made) => {
+                if let Some(coarse) = &mut made.coarse {
+                    coarse.report.size_corrections += round as u64;
+                }
+                return Ok(*made);
             }
-            Surveyed::Inverted(_, error) => return Err(error),
-        };
-        let how = refine::Settings { keep, ..how };
-        // The stage lasts until all ranks are done.
-        let (refined, bad) = progress.stage(Stage::Refine, |work| {
-            let refined = refine::refine_watched(dist, &projector, pieces, &how, work);
-            inverted_anywhere(comm, &refined).map(|bad| (refined, bad))
-        })?;
-        if !bad.is_empty() && round < REFINEMENTS {
-            lower(&mut sources, coarse.as_ref(), &bad);
-            continue;
+            Refined::Inverted(lowered) => sources.extend(lowered),
         }
-        let part = comm.agree(refined.map_err(Error::from))?;
-        let map = broadcast_periodic(comm, coarse.as_ref().map(|(_, made)| &made.periodic))?;
-        let part = part.with_periodic(map.clone()).with_singular(broadcast_singular(comm, model)?);
-        let (check, checksum) =
-            progress.stage(Stage::Check, |work| verdict(comm, &part, &projector, work))?;
-        let periodic = periodic_verdict(comm, &part, &map, &projector)?;
-        levels.extend(check.shape.clone().map(|shape| Level { pieces, tets: check.tets, shape }));
-        let coarse = coarse.take().map(|(_, mut made)| {
-            made.report.size_corrections += round as u64;
-            made.report.curved_edges = made.displacements.edges().len() as u64;
-            made
-        });
-        let part = Part::Refined(Box::new(part));
-        let (refused, across, evened) = (None, None, None);
-        return Ok(Generated {
-            part,
-            pieces,
-            levels,
-            names,
-            check,
-            checksum,
-            periodic,
-            refused,
-            across,
-            evened,
-            coarse,
-            refinement: Some(Refinement { projector, settings: how }),
-        });
     }
     unreachable!("the loop ends by itself")
 }
@@ -134,6 +81,93 @@ struct Parts<'a> {
     projector: Projector,
     names: Names,
     pieces: u32,
+}
+
+/// **Collective.** Makes a coarse mesh on rank 0, partitions and distributes it. `sources` are added
+/// to the sizes.
+fn coarse_parts<'a>(
+    comm: &dyn Communicator,
+    model: Option<&'a Model>,
+    settings: &GenerateSettings,
+    sources: &[Source],
+    budget: &Budget,
+    progress: &Progress,
+) -> Result<Parts<'a>, Error> {
+    let made = model.map(|model| coarse_mesh(comm.size(), model, settings, sources, budget, progress));
+    let (pieces, coarse) = comm.agree(made.transpose())?.unzip();
+    let pieces = broadcast_pieces(comm, pieces)?;
+    let (names, projector) = broadcast_geometry(comm, model)?;
+    let given = coarse.as_ref().map(|made| (made.mesh.clone(), made.parts.clone()));
+    let dist = progress.stage(Stage::Distribute, |_| distribution::distribute(comm, given))?;
+    let fits = room::refuse_oversized(comm.rank(), &dist, pieces, settings.disk.as_ref());
+    comm.agree(fits.map_err(Error::from))?;
+    Ok(Parts { model, coarse, dist, projector, names, pieces })
+}
+
+/// The result of refining a coarse mesh.
+enum Refined {
+    /// A checked mesh.
+    Sound(Box<Generated>),
+    /// Tets would be inverted: rank 0's sources for smaller sizes there.
+    Inverted(Vec<Source>),
+}
+
+/// **Collective.** Refines the parts and checks the mesh. Inverted tets are an error unless sizes
+/// `may_lower`.
+fn refined(
+    comm: &dyn Communicator,
+    parts: Parts,
+    settings: &GenerateSettings,
+    may_lower: bool,
+    progress: &Progress,
+) -> Result<Refined, Error> {
+    let Parts { model, mut coarse, dist, projector, names, pieces } = parts;
+    let lowered = |coarse: Option<CoarseResult>, bad: &[GlobalId]| {
+        Refined::Inverted(coarse.map_or_else(Vec::new, |made| mend::lowered(&made.mesh, bad)))
+    };
+    let keep = room::vertices_to_keep(comm, &dist, pieces, settings.memory, progress)?;
+    let displacements = broadcast_displacements(comm, coarse.as_ref().map(|made| &made.displacements))?;
+    let how = refine::Settings { displacements, nested: settings.nested, ..refine::Settings::default() };
+    let survey = progress.stage(Stage::Levels, |work| {
+        survey(comm, &dist, &projector, pieces, (&how, settings.memory), work)
+    })?;
+    let mut levels = match survey {
+        Surveyed::Sound(levels) => levels,
+        Surveyed::Inverted(bad, _) if may_lower => return Ok(lowered(coarse, &bad)),
+        Surveyed::Inverted(_, error) => return Err(error),
+    };
+    let how = refine::Settings { keep, ..how };
+    // The stage lasts until all ranks are done.
+    let (refined, bad) = progress.stage(Stage::Refine, |work| {
+        let refined = refine::refine_watched(dist, &projector, pieces, &how, work);
+        inverted_anywhere(comm, &refined).map(|bad| (refined, bad))
+    })?;
+    if !bad.is_empty() && may_lower {
+        return Ok(lowered(coarse, &bad));
+    }
+    let part = comm.agree(refined.map_err(Error::from))?;
+    let map = broadcast_periodic(comm, coarse.as_ref().map(|made| &made.periodic))?;
+    let part = part.with_periodic(map.clone()).with_singular(broadcast_singular(comm, model)?);
+    let (check, checksum) = progress.stage(Stage::Check, |work| verdict(comm, &part, &projector, work))?;
+    let periodic = periodic_verdict(comm, &part, &map, &projector)?;
+    levels.extend(check.shape.clone().map(|shape| Level { pieces, tets: check.tets, shape }));
+    if let Some(made) = &mut coarse {
+        made.report.curved_edges = made.displacements.edges().len() as u64;
+    }
+    Ok(Refined::Sound(Box::new(Generated {
+        part: Part::Refined(Box::new(part)),
+        pieces,
+        levels,
+        names,
+        check,
+        checksum,
+        periodic,
+        refused: None,
+        across: None,
+        evened: None,
+        coarse,
+        refinement: Some(Refinement { projector, settings: how }),
+    })))
 }
 
 /// **Collective.** Meshes the parts inside their refined skins.
@@ -215,13 +249,6 @@ fn stored(
         coarse,
         refinement: None,
     })
-}
-
-/// Adds sources around coarse tets with inverted children, on the rank that has the coarse mesh.
-fn lower(sources: &mut Vec<Source>, coarse: Option<&(u32, CoarseResult)>, bad: &[GlobalId]) {
-    if let Some((_, made)) = coarse {
-        sources.extend(mend::lowered(&made.mesh, bad));
-    }
 }
 
 /// The result of refining to the levels before the last.
