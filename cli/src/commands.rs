@@ -3,6 +3,7 @@
 mod decompose;
 mod extras;
 mod outputs;
+mod ranks;
 mod repartition;
 mod write;
 
@@ -10,6 +11,8 @@ use decompose::cut_settings;
 pub use decompose::run_decompose;
 pub use extras::{long_version, run_completions, run_man};
 use outputs::Outputs;
+pub use ranks::on_one_rank;
+use ranks::{on_ranks, set_threads};
 pub use repartition::run_repartition;
 use write::{note_losses, place_of, read_back, refuse_unknown, write_formats};
 
@@ -21,10 +24,9 @@ use crate::report::{LevelReport, MeshReport, PartitionReport, Processes, Report,
 use crate::terminal::Terminal;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
-use tetmill::comm::{Communicator, grouped, mpi, thread};
+use tetmill::comm::{Communicator, thread};
 use tetmill::files::{Destination, elmer, mesh_size, picture, refuse_missing, serial};
 use tetmill::mesh::{MeshStream, Watched};
-
 use tetmill::progress::{Progress, Silent, Stage};
 use tetmill::run::{Balance, CoarseSettings, Disk, GenerateSettings, Outcome, Wanted, balance, generate};
 use tetmill::size::{Closeness, SizeSettings};
@@ -38,69 +40,12 @@ pub fn run_generate(options: &Generate) -> Result<(), Failure> {
     on_ranks(options.ranks, options.parts, |comm| generate_on(comm, options, start))
 }
 
-/// Runs a command on one rank for each part.
-///
-/// There are `parts` parts, by default as many as ranks. Under `mpirun` the ranks are processes; if
-/// the number of parts differs, some processes run several parts or none.
-fn on_ranks(
-    ranks: Option<u32>,
-    parts: Option<u32>,
-    command: impl Fn(&dyn Communicator) -> Result<(), Failure> + Sync,
-) -> Result<(), Failure> {
-    if mpi::launched() {
-        let done = mpi::run(|comm| {
-            let done = match (ranks, parts) {
-                (Some(ranks), _) if ranks != comm.size() => Err(Failure::input(format!(
-                    "-n {ranks} differs from the {} started by mpirun: leave out -n",
-                    counted(comm.size().into(), "rank", "ranks")
-                ))),
-                (_, Some(parts)) if parts != comm.size() => {
-                    let ran = grouped::run(comm, parts, &command).map_err(Failure::from);
-                    agree(comm, ran.and_then(|results| results.into_iter().collect()))
-                }
-                _ => command(comm),
-            };
-            done.map_err(|failure| print_once(comm, failure))
-        });
-        return done.map_err(Failure::input)?;
-    }
-    let results = thread::run(parts.or(ranks).unwrap_or(1), command)?;
-    results.into_iter().collect()
-}
-
-/// **Collective.** Prints a failure common to all ranks on rank 0, and returns it without its
-/// message.
-///
-/// The barrier keeps the other ranks alive until it is printed: the launcher kills all processes
-/// when one ends with an error.
-fn print_once(comm: &dyn Communicator, failure: Failure) -> Failure {
-    if comm.rank() == 0 {
-        eprintln!("tetmill: {failure}");
-    }
-    match comm.barrier() {
-        Ok(()) => Failure::new(failure.status, ""),
-        Err(error) => error.into(),
-    }
-}
-
 fn method_of(options: &Generate) -> Result<tetmill::Method, Failure> {
     match options.method {
         Method::Refine => Ok(tetmill::Method::Refine),
         Method::Surface => Ok(tetmill::Method::Surface),
         Method::Decompose => cut_settings(&options.planes).map(tetmill::Method::Decompose),
     }
-}
-
-fn set_threads(threads: Option<u32>) -> Result<(), Failure> {
-    let threads = threads.unwrap_or(0) as usize;
-    rayon::ThreadPoolBuilder::new()
-        .num_threads(threads)
-        .stack_size(thread::POOL_STACK)
-        .build_global()
-        .map_err(|error| {
-            let threads = counted(threads as u64, "thread", "threads");
-            Failure::new(Status::Resources, format!("cannot start {threads}: {error}"))
-        })
 }
 
 /// **Collective.** `tetmill generate` on one rank.

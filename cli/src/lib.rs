@@ -37,15 +37,15 @@ pub fn run(arguments: impl IntoIterator<Item = impl Into<OsString> + Clone>) -> 
     };
     cancel::listen();
     let done = match cli.command {
-        Command::Decompose(options) => commands::run_decompose(&options),
+        Command::Decompose(options) => commands::on_one_rank(|| commands::run_decompose(&options)),
         Command::Generate(options) => commands::run_generate(&options),
-        Command::Mesh(options) => commands::run_mesh(&options),
+        Command::Mesh(options) => commands::on_one_rank(|| commands::run_mesh(&options)),
         Command::Repartition(options) => commands::run_repartition(&options),
-        Command::Inspect(options) => commands::run_inspect(&options),
-        Command::Check(options) => commands::run_check(&options),
-        Command::Quality(options) => commands::run_quality(&options),
-        Command::Completions(options) => commands::run_completions(&options),
-        Command::Man(options) => commands::run_man(&options),
+        Command::Inspect(options) => commands::on_one_rank(|| commands::run_inspect(&options)),
+        Command::Check(options) => commands::on_one_rank(|| commands::run_check(&options)),
+        Command::Quality(options) => commands::on_one_rank(|| commands::run_quality(&options)),
+        Command::Completions(options) => commands::on_one_rank(|| commands::run_completions(&options)),
+        Command::Man(options) => commands::on_one_rank(|| commands::run_man(&options)),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

@@ -172,6 +172,28 @@ mod with_mpi {
     }
 
     #[test]
+    fn serial_commands_run_once_and_all_ranks_end_with_their_status() {
+        let dir = tempfile::tempdir().unwrap();
+        let mesh = dir.path().join("tee.vtu");
+        let part = own("tee");
+        let run = |arguments: &[&std::ffi::OsStr]| Some(mpirun(3)?.args(arguments).output().unwrap());
+        let Some(inspected) = run(&["inspect".as_ref(), part.as_ref()]) else { return };
+        let alone = tetmill().arg("inspect").arg(&part).output().unwrap();
+        assert_eq!(String::from_utf8_lossy(&inspected.stdout), String::from_utf8_lossy(&alone.stdout));
+        let made = run(&["mesh".as_ref(), part.as_ref(), "-o".as_ref(), mesh.as_ref()]).unwrap();
+        assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
+        assert_eq!(String::from_utf8_lossy(&made.stdout).matches("checksum").count(), 1);
+        assert!(mesh.exists());
+        let missing = dir.path().join("missing.geo");
+        for command in ["mesh", "inspect", "check", "quality"] {
+            let refused = run(&[command.as_ref(), missing.as_ref()]).unwrap();
+            let stderr = String::from_utf8_lossy(&refused.stderr).into_owned();
+            assert_eq!(refused.status.code(), Some(2), "{command}: {stderr}");
+            assert_eq!(stderr.matches("tetmill: ").count(), 1, "{command}: {stderr}");
+        }
+    }
+
+    #[test]
     fn a_number_of_ranks_that_contradicts_mpirun_is_refused() {
         let Some(mut command) = mpirun(2) else { return };
         let output =
