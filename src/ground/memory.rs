@@ -21,8 +21,25 @@ pub fn cpu_seconds() -> Option<f64> {
     Some((ticks(11)? + ticks(12)?) / TICKS)
 }
 
-/// The memory available on this machine in bytes; `None` if the system does not report it.
+/// The memory available to this process in bytes: that of the machine, or less if the process has a
+/// limit (`ulimit -v`); `None` if the system does not report it.
 pub fn available_bytes() -> Option<u64> {
+    let on_machine = available_on_machine()?;
+    Some(left_of_limit().map_or(on_machine, |left| left.min(on_machine)))
+}
+
+/// What is left of the limit on the address space of this process, if it has one.
+fn left_of_limit() -> Option<u64> {
+    let limits = std::fs::read_to_string("/proc/self/limits").ok()?;
+    let line = limits.lines().find_map(|line| line.strip_prefix("Max address space"))?;
+    let limit: u64 = line.split_whitespace().next()?.parse().ok()?;
+    // Pages of 4 KiB, the only size on the usual machines.
+    let pages = std::fs::read_to_string("/proc/self/statm").ok()?;
+    let used = 4096 * pages.split_whitespace().next()?.parse::<u64>().ok()?;
+    Some(limit.saturating_sub(used))
+}
+
+fn available_on_machine() -> Option<u64> {
     let text = std::fs::read_to_string("/proc/meminfo").ok()?;
     let line = text.lines().find(|line| line.starts_with("MemAvailable:"))?;
     let kib: u64 = line.split_whitespace().nth(1)?.parse().ok()?;

@@ -8,6 +8,7 @@ use super::model::Model;
 use super::options;
 use super::result::CoarseResult;
 use super::retries::{Budget, CORRECTIONS};
+use super::room;
 use super::settings::Wanted;
 use super::settings::{CutSettings, GenerateSettings};
 use super::skins::refuse_periodic;
@@ -116,6 +117,7 @@ fn plan_cuts(
     let Model::Csg(whole) = model else {
         return Err(RequestError::NotCuttable.into());
     };
+    room::refuse_too_fine(model, &settings.size, None)?;
     let (pieces, coarse, outcome) = progress.stage(Stage::Mesh, |work| {
         mesh_as_wanted(parts, model, settings, wanted, &[], &Budget::default(), work)
     })?;

@@ -230,7 +230,7 @@ pub enum RequestError {
 }
 
 /// The fine mesh does not fit; reported before it is made.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RoomError {
     /// More entities than a format can number.
     #[error(
@@ -243,6 +243,22 @@ pub enum RoomError {
         vertices: u64,
         /// The largest number that all formats support.
         most: u64,
+    },
+    /// The requested sizes need more coarse tets than the memory can hold.
+    #[error(
+        "elements of at most {size} make {tets} or more, as a coarse mesh of {} or more, and this machine has {} free: choose \
+         larger sizes, or refine a coarser mesh by levels",
+        sized(*.needed), sized(*.available)
+    )]
+    Coarse {
+        /// The largest size that is allowed (length).
+        size: f64,
+        /// Least number of tets with this size, as text: it may be beyond all integers.
+        tets: String,
+        /// Lower estimate of their memory in bytes.
+        needed: u64,
+        /// Free bytes.
+        available: u64,
     },
     /// The disk has too little space.
     #[error(

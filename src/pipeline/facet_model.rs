@@ -6,7 +6,8 @@ use super::retries::Budget;
 use super::settings::InputSettings;
 use crate::Point;
 use crate::files::surface::{self, Surface};
-use crate::ground::mesh::{Class, Label, Names, Segment, VertexId};
+use crate::ground::kernel::simplex::volume6;
+use crate::ground::mesh::{BoundaryTriangle, Class, Label, Names, Segment, VertexId};
 use crate::ground::progress::Work;
 use crate::ground::projector::Projector;
 use crate::ground::size::{Closeness, Source, WatchedSize};
@@ -38,6 +39,18 @@ pub struct FacetSolid {
 }
 
 impl FacetSolid {
+    /// The volume of all bodies.
+    pub(super) fn volume(&self) -> f64 {
+        let surface = keep(&self.model);
+        let of = |t: &BoundaryTriangle| {
+            let [a, b, c] = t.vertices.map(|v| &surface.points[v.index()]);
+            volume6(&self.model.bounds.min, a, b, c) / 6.0
+        };
+        // Interfaces have bodies on both sides, which cancel.
+        let outer = |t: &&BoundaryTriangle| self.model.patch(t.patch).outside.is_none();
+        surface.triangles.iter().filter(outer).map(of).sum::<f64>().abs()
+    }
+
     /// Reads one or several surfaces.
     ///
     /// # Errors

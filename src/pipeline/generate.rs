@@ -302,6 +302,7 @@ fn coarse_mesh(
     budget: &Budget,
     progress: &Progress,
 ) -> Result<(u32, CoarseResult), Error> {
+    room::refuse_too_fine(model, &settings.coarse.size, settings.memory)?;
     let (pieces, made, outcome) = progress.stage(Stage::Mesh, |work| {
         mesh_as_wanted(parts, model, &settings.coarse, settings.wanted, sources, budget, work)
     })?;

@@ -3,6 +3,8 @@
 use super::coarse::{CoarseError, CoarseMesh, CoarseReport, CoarseSettings};
 use super::facet_model::FacetSolid;
 use super::retries::Budget;
+use crate::Point;
+use crate::ground::kernel::random::Random;
 use crate::ground::mesh::QualitySummary;
 use crate::ground::mesh::periodic::Link;
 use crate::ground::mesh::{Mesh, Names};
@@ -11,7 +13,7 @@ use crate::ground::projector::Projector;
 use crate::ground::size::{GeometricSize, SizeField, SizeSettings};
 use crate::mesher::facets::FacetSize;
 use crate::mesher::model::CsgModel;
-use csg::Geometry;
+use csg::{Aabb, Geometry, SurfaceId};
 
 /// The input of the mesher.
 #[derive(Clone, Debug)]
@@ -94,6 +96,30 @@ impl Model {
         }
     }
 
+    /// A lower estimate of the number of coarse tets for the upper bounds of the sizes alone,
+    /// without curvature and sources; and the least of these bounds.
+    pub(super) fn least_tets(&self, settings: &SizeSettings) -> (f64, f64) {
+        /// Largest mean volume of tets of edge length 1: twice that of the regular tet.
+        const LARGEST: f64 = 0.24;
+        let (volumes, bounds) = match self {
+            Self::Csg(model) => {
+                let of_body = |body: &csg::Body| settings.bound_of(body.maxh);
+                let bounds: Vec<f64> = model.geometry.bodies.iter().map(of_body).collect();
+                // Volumes take some time: none is larger than that of the box.
+                let least = bounds.iter().copied().fold(f64::INFINITY, f64::min);
+                let extent = model.features.bounds.max - model.features.bounds.min;
+                if extent.product() < ALWAYS_FEW * LARGEST * least.powi(3) {
+                    return (0.0, least);
+                }
+                (sampled_volumes(model), bounds)
+            }
+            Self::Facets(solid) => (vec![solid.volume()], vec![settings.bound_of(None)]),
+            Self::Given(_) => return (0.0, f64::INFINITY),
+        };
+        let tets = volumes.iter().zip(&bounds).map(|(volume, h)| volume / (LARGEST * h.powi(3)));
+        (tets.sum(), bounds.iter().copied().fold(f64::INFINITY, f64::min))
+    }
+
     /// The size field of the first coarse mesh, before sizes are lowered; `None` for an existing
     /// mesh.
     pub(super) fn size_field(&self, settings: &SizeSettings) -> Option<Box<dyn SizeField + '_>> {
@@ -123,6 +149,25 @@ impl Model {
             Self::Given(given) => Ok(given.coarse_mesh()),
         }
     }
+}
+
+/// So many coarse tets fit any machine.
+const ALWAYS_FEW: f64 = 1e6;
+
+/// Volumes of the bodies, by random points in their common box: small bodies may be missed.
+fn sampled_volumes(CsgModel { geometry, features, .. }: &CsgModel) -> Vec<f64> {
+    const SAMPLES: usize = 2000;
+    let Aabb { min, max } = features.bounds;
+    let mut random = Random::new(1);
+    let mut volumes = vec![0.0; geometry.bodies.len()];
+    for _ in 0..SAMPLES {
+        let point = Point::from((max - min).map(|width| width * random.unit()) + min.coords);
+        let positive = |surface: SurfaceId| geometry.surfaces[surface.index()].value(&point) > 0.0;
+        if let Some(body) = geometry.bodies.iter().position(|body| body.solid.contains(&positive)) {
+            volumes[body] += (max - min).product() / SAMPLES as f64;
+        }
+    }
+    volumes
 }
 
 impl GivenMesh {

@@ -1,12 +1,14 @@
 //! Predicts from the coarse mesh whether a fine mesh fits memory and disk.
 
 use super::error::{Error, RoomError};
+use super::model::Model;
 use super::settings::Disk;
 use crate::ground::comm::Communicator;
 use crate::ground::memory::{self, sized};
 use crate::ground::mesh::Rank;
 use crate::ground::mesh::stream::Counts;
 use crate::ground::progress::Progress;
+use crate::ground::size::SizeSettings;
 use crate::parallel::distribution::DistMesh;
 use crate::parallel::refine::lattice::Lattice;
 use crate::parallel::refine::numbering::fine_totals;
@@ -37,6 +39,27 @@ pub(super) fn refuse_oversized(
         }
         _ => Ok(()),
     }
+}
+
+/// *Local.* Refuses sizes with which not even the coarse mesh fits the memory, before anything is
+/// meshed.
+///
+/// # Errors
+/// If it does not fit; the error has the numbers.
+pub(super) fn refuse_too_fine(
+    model: &Model,
+    sizes: &SizeSettings,
+    memory: Option<u64>,
+) -> Result<(), RoomError> {
+    /// Memory of a coarse tet while it is made: measured are 300 to 400 bytes.
+    const BYTES: f64 = 150.0;
+    let Some(available) = memory.or_else(memory::available_bytes) else { return Ok(()) };
+    let (tets, size) = model.least_tets(sizes);
+    let needed = BYTES * tets;
+    if needed <= available as f64 {
+        return Ok(());
+    }
+    Err(RoomError::Coarse { size, tets: format!("{tets:.1e} tets"), needed: needed as u64, available })
 }
 
 /// **Collective.** Decides which vertices of the fine mesh this machine can store, before anything
@@ -100,6 +123,24 @@ mod tests {
     use crate::parallel::refine::fixtures::{cube, whole};
     use crate::{Geometry, Mesher};
     use std::sync::Mutex;
+
+    #[test]
+    fn sizes_that_no_memory_holds_are_refused_before_anything_is_meshed() {
+        let cube = "algebraic3d solid c = orthobrick (0, 0, 0; 1, 1, 1); tlo c;";
+        for (geometry, size) in [
+            (Geometry::from_text(cube).unwrap(), 1e-9),
+            (Geometry::from_text(&cube.replace("tlo c", "tlo c -maxh=1e-5")).unwrap(), 1e-5),
+        ] {
+            let error = Mesher::new().max_size(size).generate(&geometry).unwrap_err();
+            assert_eq!(error.kind(), ErrorKind::Resources, "{error}");
+            assert!(error.to_string().contains("tets or more"), "{error}");
+        }
+        // A million tets need 0.3 GB.
+        let sizes = SizeSettings { maxh: Some(0.02), ..SizeSettings::default() };
+        let cube = Geometry::from_text(cube).unwrap();
+        assert_eq!(refuse_too_fine(&cube.model, &sizes, Some(300_000_000)), Ok(()));
+        assert!(refuse_too_fine(&cube.model, &sizes, Some(30_000_000)).is_err());
+    }
 
     /// Six tets and 8 subdivisions: 729 vertices, 6·35 of them inside, and 6 tets of 84 octahedra.
     #[test]

@@ -61,6 +61,11 @@ impl SizeSettings {
         Closeness { ratio: self.closeness.ratio * self.scale.max(1.0), ..self.closeness }
     }
 
+    /// The largest size in a body with a bound in the file, or without one.
+    pub(crate) fn bound_of(&self, body: Option<f64>) -> f64 {
+        self.scaled_bound(self.maxh.unwrap_or(f64::INFINITY).min(body.unwrap_or(f64::INFINITY)))
+    }
+
     /// A bound by the user or the file, under [`scale`](Self::scale).
     fn scaled_bound(&self, bound: f64) -> f64 {
         bound * self.scale.min(1.0)
