@@ -83,8 +83,8 @@ struct Parts<'a> {
     pieces: u32,
 }
 
-/// **Collective.** Makes a coarse mesh on rank 0, partitions and distributes it. `sources` are added
-/// to the sizes.
+/// **Collective.** Makes a coarse mesh on rank 0, partitions and distributes it. `sources` are
+/// added to the sizes.
 fn coarse_parts<'a>(
     comm: &dyn Communicator,
     model: Option<&'a Model>,
