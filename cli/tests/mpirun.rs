@@ -186,7 +186,11 @@ mod with_mpi {
         assert!(mesh.exists());
         let missing = dir.path().join("missing.geo");
         for command in ["mesh", "inspect", "check", "quality"] {
-            let refused = run(&[command.as_ref(), missing.as_ref()]).unwrap();
+            let mut arguments = vec![command.as_ref(), missing.as_ref()];
+            if command == "mesh" {
+                arguments.extend(["-o".as_ref(), mesh.as_os_str()]);
+            }
+            let refused = run(&arguments).unwrap();
             let stderr = String::from_utf8_lossy(&refused.stderr).into_owned();
             assert_eq!(refused.status.code(), Some(2), "{command}: {stderr}");
             assert_eq!(stderr.matches("tetmill: ").count(), 1, "{command}: {stderr}");

@@ -135,11 +135,11 @@ mod tests {
             assert_eq!(error.kind(), ErrorKind::Resources, "{error}");
             assert!(error.to_string().contains("tets or more"), "{error}");
         }
-        // A million tets need 0.3 GB.
-        let sizes = SizeSettings { maxh: Some(0.02), ..SizeSettings::default() };
+        // Some four million tets, of 150 bytes.
+        let sizes = SizeSettings { maxh: Some(0.01), ..SizeSettings::default() };
         let cube = Geometry::from_text(cube).unwrap();
-        assert_eq!(refuse_too_fine(&cube.model, &sizes, Some(300_000_000)), Ok(()));
-        assert!(refuse_too_fine(&cube.model, &sizes, Some(30_000_000)).is_err());
+        assert_eq!(refuse_too_fine(&cube.model, &sizes, Some(700_000_000)), Ok(()));
+        assert!(refuse_too_fine(&cube.model, &sizes, Some(500_000_000)).is_err());
     }
 
     /// Six tets and 8 subdivisions: 729 vertices, 6·35 of them inside, and 6 tets of 84 octahedra.
