@@ -180,8 +180,8 @@ pub mod run {
     pub use crate::pipeline::part::{Balance, Evened, Part, balance};
     pub use crate::pipeline::target::Outcome;
     pub use crate::pipeline::{
-        CoarseReport, CoarseResult, CoarseSettings, CutSettings, Disk, Entities, GenerateSettings, Level,
-        Refused, Wanted, generate,
+        CoarseReport, CoarseResult, CoarseSettings, CutCusp, CutSettings, Disk, Entities, GenerateSettings,
+        Level, Refused, Wanted, generate,
     };
 }
 

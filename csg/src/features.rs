@@ -54,6 +54,7 @@ mod check;
 mod contact;
 mod cross;
 mod cusp;
+mod cut_cusps;
 mod error;
 mod extent;
 mod neighborhood;
@@ -69,6 +70,7 @@ mod touch;
 mod trace;
 
 pub use check::Inconsistency;
+pub use cut_cusps::{Cusp, CutCusp, find_and_cut_cusps};
 pub use error::{FeatureError, Named, Place};
 pub use periodic::{CurveCopy, Master, Masters, PeriodicMatch};
 pub(crate) use seam::find_seams;
@@ -128,6 +130,8 @@ pub struct Patch {
     /// The curves of its boundary, and whether each is traversed in its own direction with the
     /// patch on the left. Empty for a whole closed surface (sphere, torus, ellipsoid).
     pub boundary: Vec<(CurveId, bool)>,
+    /// The corners in its interior, on none of its curves: points where other boundaries touch it.
+    pub corners: Vec<CornerId>,
     /// An interior point of each component without boundary curves, to start the advancing front.
     pub seeds: Vec<Point>,
     /// Boundary-condition number, from 1. Unique per patch unless the file assigns one number to
@@ -193,10 +197,10 @@ impl Features {
 fn find_in(geometry: &Geometry, tree: &Octree, tolerances: &Tolerances) -> Result<Features, FeatureError> {
     let traces = seed::trace_all(geometry, tree, tolerances);
     let (arcs, nodes) = arcs::feature_arcs(geometry, tree, &traces, tolerances)?;
-    contact::check(geometry, tree, tolerances)?;
-    touch::check(geometry, tree, &arcs, &nodes, tolerances)?;
+    let touching = contact::check(geometry, tree, tolerances)?;
+    let inner = touch::find(geometry, tree, &arcs, &nodes, &touching, tolerances)?;
     let arcs = assemble::join(geometry, arcs, &nodes, tolerances)?;
-    let mut features = assemble::entities(geometry, tree, &arcs, &nodes, tolerances)?;
+    let mut features = assemble::entities(geometry, tree, &arcs, &nodes, &inner, tolerances)?;
     number::number(geometry, &mut features.patches);
     features.identified = periodic::identify(geometry, &features, tolerances)?;
     features.check()?;

@@ -1,5 +1,6 @@
 //! A CSG geometry with its features and its projector.
 
+use csg::features::{CutCusp, find_and_cut_cusps};
 use csg::{Features, Geometry};
 
 /// A geometry with its features, ready for meshing.
@@ -11,6 +12,8 @@ pub struct CsgModel {
     pub features: Features,
     /// Projection onto patches, curves and corners.
     pub projector: csg::Projector,
+    /// The parts of bodies that were left out because they have no angle.
+    pub cut_cusps: Vec<CutCusp>,
 }
 
 impl CsgModel {
@@ -18,9 +21,9 @@ impl CsgModel {
     ///
     /// # Errors
     /// [`csg::FeatureError`] with a position, if the geometry has features that cannot be meshed.
-    pub fn new(geometry: Geometry) -> Result<Self, csg::FeatureError> {
-        let features = Features::find(&geometry)?;
+    pub fn new(mut geometry: Geometry) -> Result<Self, csg::FeatureError> {
+        let (features, cut_cusps) = find_and_cut_cusps(&mut geometry)?;
         let projector = csg::Projector::new(&geometry, &features);
-        Ok(Self { geometry, features, projector })
+        Ok(Self { geometry, features, projector, cut_cusps })
     }
 }

@@ -142,6 +142,34 @@ pub struct CoarseReport {
     pub curved_edges: u64,
     /// Thin regions in which the sizes were lowered.
     pub thin_regions: ThinRegions,
+    /// Cusps without angle that were cut off bodies.
+    pub cut_cusps: Vec<CutCusp>,
+}
+
+/// A cusp without angle that was cut off bodies.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct CutCusp {
+    /// A point where the surfaces touch.
+    pub point: [f64; 3],
+    /// The radius of the ball around the point, or of the tube around the curve of contact.
+    pub radius: f64,
+    /// Whether the surfaces touch along a curve.
+    pub is_curve: bool,
+    /// The number of the body that was cut; null for all.
+    pub body: Option<u32>,
+}
+
+impl CutCusp {
+    fn of(model: &CsgModel) -> Vec<Self> {
+        let body = |id: csg::BodyId| model.geometry.bodies[id.index()].number;
+        let cusps = model.cut_cusps.iter().map(|cusp| Self {
+            point: cusp.place.0.into(),
+            radius: cusp.radius,
+            is_curve: cusp.is_curve,
+            body: cusp.body.as_ref().map(|cut| body(cut.0)),
+        });
+        cusps.collect()
+    }
 }
 
 /// How a coarse mesh is made.
@@ -194,7 +222,11 @@ pub fn mesh(
     work: &Work,
 ) -> Result<CoarseMesh, CoarseError> {
     let samples = GeometricSamples::new(&model.geometry, &model.features, &settings.size);
-    corrected(settings, budget, work, |settings, allowed| attempt(model, &samples, settings, allowed, work))
+    let mut coarse = corrected(settings, budget, work, |settings, allowed| {
+        attempt(model, &samples, settings, allowed, work)
+    })?;
+    coarse.report.cut_cusps = CutCusp::of(model);
+    Ok(coarse)
 }
 
 /// The result of one attempt at a coarse mesh.
@@ -281,7 +313,7 @@ pub(super) fn mesh_surface(
     size: &dyn SizeField,
     may_lower: bool,
 ) -> Result<(SurfaceMesh, Vec<[Point; 2]>), Unmeshed> {
-    let CsgModel { geometry, features, projector } = model;
+    let CsgModel { geometry, features, projector, .. } = model;
     size.work().step(0.0, SURFACE_SHARE, features.patches.len() as u64);
     let curves = mesh_curves(features, projector, size).map_err(|error| Unmeshed::Failed(error.into()))?;
     if may_lower {
@@ -310,7 +342,7 @@ fn attempt(
     allowed: Allowed,
     work: &Work,
 ) -> Attempt {
-    let CsgModel { geometry, features, projector } = model;
+    let CsgModel { geometry, features, projector, .. } = model;
     let own = GeometricSize::of_samples(geometry, features, &settings.size, samples);
     let periodic = PeriodicSize::new(&own, features, settings.size.grading);
     let size: &dyn SizeField = if features.identified.is_empty() { &own } else { &periodic };

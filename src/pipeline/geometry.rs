@@ -84,8 +84,10 @@ impl Geometry {
     /// Syntax errors, and geometries that cannot be meshed, with the location.
     pub fn from_text(text: &str) -> Result<Self, Error> {
         let parsed = csg::language::parse_geometry(text, "geometry")?;
-        let notes = parsed.warnings.iter().map(ToString::to_string).collect();
-        Ok(Self { model: Model::from_csg(parsed.geometry)?, notes })
+        let mut notes: Vec<String> = parsed.warnings.iter().map(ToString::to_string).collect();
+        let Self { model, notes: of_features } = Self::from_csg(parsed.geometry)?;
+        notes.extend(of_features);
+        Ok(Self { model, notes })
     }
 
     /// Takes a geometry built by the program.
@@ -93,7 +95,9 @@ impl Geometry {
     /// # Errors
     /// A geometry that cannot be meshed, with the location.
     pub fn from_csg(geometry: csg::Geometry) -> Result<Self, Error> {
-        Ok(Model::from_csg(geometry)?.into())
+        let model = Model::from_csg(geometry)?;
+        let notes = model.cut_cusps().iter().map(ToString::to_string).collect();
+        Ok(Self { model, notes })
     }
 
     /// Takes closed triangulated surfaces.

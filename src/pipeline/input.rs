@@ -71,8 +71,10 @@ fn read_csg(path: &Path, note: &mut dyn FnMut(&str)) -> Result<Model, Error> {
     let bytes = read_bytes(path)?;
     let parsed = csg::language::parse_geometry_bytes(&bytes, &path.display().to_string())?;
     parsed.warnings.iter().for_each(|warning| note(&warning.to_string()));
-    Model::from_csg(parsed.geometry)
-        .map_err(|error| Error::Features { path: Some(path.to_path_buf()), error: Box::new(error) })
+    let model = Model::from_csg(parsed.geometry)
+        .map_err(|error| Error::Features { path: Some(path.to_path_buf()), error: Box::new(error) })?;
+    model.cut_cusps().iter().for_each(|cusp| note(&format!("{}: {cusp}", path.display())));
+    Ok(model)
 }
 
 fn read_mesh(path: &Path, note: &mut dyn FnMut(&str)) -> Result<Model, Error> {

@@ -28,7 +28,7 @@ pub mod target;
 mod verify;
 pub mod wanted;
 
-pub use coarse::{CoarseError, CoarseReport, CoarseSettings};
+pub use coarse::{CoarseError, CoarseReport, CoarseSettings, CutCusp};
 pub use facet_model::FacetSolid;
 pub use generate::generate;
 pub use geometry::Geometry;

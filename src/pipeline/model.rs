@@ -59,6 +59,14 @@ impl Model {
         Ok(Self::Csg(Box::new(CsgModel::new(geometry)?)))
     }
 
+    /// The cusps without angle that were cut off its bodies.
+    pub fn cut_cusps(&self) -> &[csg::features::CutCusp] {
+        match self {
+            Self::Csg(model) => &model.cut_cusps,
+            Self::Facets(_) | Self::Given(_) => &[],
+        }
+    }
+
     /// Projection to its patches and curves.
     pub fn projector(&self) -> Projector {
         match self {

@@ -25,10 +25,12 @@ const PATIENCE: Duration = Duration::from_secs(120);
 /// Meshes the scene of a seed in a folder and checks the mesh.
 pub fn run(seed: u64, style: Style, dir: &Path) -> Outcome {
     let scene = Scene::new(seed, style);
-    let [geo, mesh, log] = ["geo", "mesh", "log"].map(|e| dir.join(format!("{style:?}-{seed}.{e}")));
+    let [geo, mesh, log, report] =
+        ["geo", "mesh", "log", "json"].map(|e| dir.join(format!("{style:?}-{seed}.{e}")));
     std::fs::write(&geo, &scene.text).expect("the folder can be written to");
     let mut command = Command::new(env!("CARGO_BIN_EXE_tetmill"));
     command.arg("mesh").arg(&geo).arg("-o").arg(&mesh).args(["-q", "-t", "1"]);
+    command.arg("--report").arg(&report);
     command.stdout(Stdio::null()).stderr(std::fs::File::create(&log).expect("the folder can be written to"));
     let mut child = command.spawn().expect("the program starts");
     let began = Instant::now();
@@ -47,7 +49,7 @@ pub fn run(seed: u64, style: Style, dir: &Path) -> Outcome {
     let reason = stderr.lines().next().unwrap_or_default().to_owned();
     match status.code() {
         Some(0) => {
-            let made = Mesh::read(&mesh);
+            let made = Mesh::read(&mesh, &report);
             made.fault(&scene).map_or(Outcome::Meshed { tets: made.tets.len() }, Outcome::Failed)
         }
         Some(2) if stderr.contains("contains nothing") && is_empty(&scene) => Outcome::Empty,

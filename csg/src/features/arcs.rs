@@ -311,7 +311,8 @@ fn classify(
     const OTHER_PARTS: [[f64; 3]; 2] = [[0.27, 0.37, 0.46], [0.81, 0.69, 0.58]];
     let neighborhood_at = |part: f64| {
         let (at, forward) = sample(geometry, pair, &points, part, tolerances);
-        neighborhood(geometry, tree, pair, &at, &forward, tolerances).map(|found| (at, found))
+        let found = neighborhood(geometry, tree, pair, &at, &forward, tolerances);
+        found.map(|found| (at, found)).map_err(|error| error.along(&points))
     };
     // If the pair is not relevant, a feature here belongs to other surfaces through the curve.
     let (middle, Some(found)) = neighborhood_at(0.52)? else { return Ok(None) };
@@ -380,13 +381,11 @@ pub(super) fn loose_curve(geometry: &Geometry, pair: [SurfaceId; 2], at: &Point)
     /// From this sine of the angle on, tracing is reliable.
     const STEEP: f64 = 1e-2;
     let [a, b] = pair.map(|s| geometry.surfaces[s.index()].normal(at));
-    let [first, second] = pair.map(|s| Named::surface(geometry, s));
-    let place = Place(*at);
     if a.cross(&b).norm() < STEEP {
-        FeatureError::Tangent { first, second, place }
-    } else {
-        FeatureError::LooseCurve { first, second, place }
+        return FeatureError::tangent(geometry, pair, *at, None);
     }
+    let [first, second] = pair.map(|s| Named::surface(geometry, s));
+    FeatureError::LooseCurve { first, second, place: Place(*at) }
 }
 
 impl Arc {

@@ -83,11 +83,14 @@ fn taken(arc: &Arc, end: usize) -> Arc {
 }
 
 /// Makes the geometric entities from joined arcs, and from closed surfaces without arcs.
+///
+/// `inner` are corners inside sheets.
 pub(super) fn entities(
     geometry: &Geometry,
     tree: &Octree,
     arcs: &[Arc],
     nodes: &Nodes,
+    inner: &[(Sheet, Point)],
     tolerances: &Tolerances,
 ) -> Result<Features, FeatureError> {
     let mut corners: Vec<Corner> = Vec::new();
@@ -112,6 +115,14 @@ pub(super) fn entities(
     for (sheet, seed) in closed_sheets(geometry, tree, &patches, tolerances)? {
         patches.entry(sheet).or_insert_with(|| patch(&sheet)).seeds.push(seed);
     }
+    for (sheet, point) in inner {
+        let known = corners.iter().position(|c| (c.point - point).norm() <= tolerances.merge);
+        let id = CornerId::new(known.unwrap_or(corners.len()));
+        if known.is_none() {
+            corners.push(corner(geometry, tree, *point, tolerances));
+        }
+        patches.entry(*sheet).or_insert_with(|| patch(sheet)).corners.push(id);
+    }
     let patches: Vec<Patch> = patches.into_values().collect();
     // The coarse box cells do not detect all empty bodies, but a body of zero volume has no
     // boundary.
@@ -135,7 +146,7 @@ pub(super) fn entities(
     }
     let bounds = Aabb { min: Point::origin(), max: Point::origin() };
     let mut features = Features { corners, curves, patches, bounds, identified: Vec::new() };
-    features.bounds = super::extent::extent(geometry, tree, &features, tolerances)?;
+    features.bounds = super::extent::extent(geometry, tree, &features, tolerances);
     Ok(features)
 }
 
@@ -155,6 +166,7 @@ fn patch(sheet: &Sheet) -> Patch {
         outside: sheet.outside,
         cutout: sheet.cutout,
         boundary: Vec::new(),
+        corners: Vec::new(),
         seeds: Vec::new(),
         bc: 0,
         name: None,

@@ -2,11 +2,11 @@
 
 use super::neighborhood::{Tolerances, region};
 use super::octree::{Leaf, Octree, is_flat};
-use super::{FeatureError, Inconsistency, Named, Place};
+use super::{FeatureError, Inconsistency};
 use crate::interval::{Cell, middle};
 use crate::primitive::quadric::tangents;
 use crate::project::project_to_both;
-use crate::{Geometry, Interval, Point, Seam, Surface, SurfaceId};
+use crate::{BodyId, Geometry, Interval, Point, Seam, Surface, SurfaceId, Vector};
 use nalgebra::{Matrix2, Vector2};
 
 /// A point where two surfaces are tangent or cannot be separated.
@@ -106,7 +106,7 @@ pub(super) fn on_seam(geometry: &Geometry, seam: &Seam, cell: &Cell, contacts: &
 ///
 /// The shortest least-squares solution of the linearized equations: both values vanish and the
 /// gradients are parallel.
-fn least_squares_step(a: &Surface, b: &Surface, at: &Point) -> Option<crate::Vector> {
+fn least_squares_step(a: &Surface, b: &Surface, at: &Point) -> Option<Vector> {
     let (ga, gb) = (a.gradient(at), b.gradient(at));
     let (ha, hb) = (a.hessian(at), b.hessian(at));
     let mut matrix = nalgebra::SMatrix::<f64, 5, 3>::zeros();
@@ -140,15 +140,10 @@ fn least_squares_step(a: &Surface, b: &Surface, at: &Point) -> Option<crate::Vec
 /// If the sheets are tangent with different curvatures, a wedge lies between them. Up to three
 /// different regions lie below, in and above the wedge. The contact matters if both sheets separate
 /// regions.
-fn is_harmless(
-    geometry: &Geometry,
-    tree: &Octree,
-    contact: &Contact,
-    tolerances: &Tolerances,
-) -> Result<bool, FeatureError> {
-    let Some(leaf) = tree.leaf(&contact.point) else { return Ok(true) };
+fn is_harmless(geometry: &Geometry, tree: &Octree, contact: &Contact, tolerances: &Tolerances) -> bool {
+    let Some(leaf) = tree.leaf(&contact.point) else { return true };
     if contact.kind == Kind::Apex || !leaf.has_both(contact.pair) {
-        return Ok(true);
+        return true;
     }
     let wedges = possible_wedges(geometry, contact);
     // For surfaces through the point, try both sides.
@@ -164,11 +159,12 @@ fn is_harmless(
             Some(i) => sides >> i & 1 == 1,
             None => geometry.surfaces[s.index()].value(&contact.point) > 0.0,
         };
-        if !depends_on_one(geometry, leaf, contact, &wedges, &other_side)? {
-            return Ok(false);
+        // An error belongs to sides that do not occur: bodies overlap on them.
+        if matches!(depends_on_one(geometry, leaf, contact, &wedges, &other_side), Ok(false)) {
+            return false;
         }
     }
-    Ok(true)
+    true
 }
 
 /// Whether the region depends on the side of only one of the two surfaces, over the given pairs of
@@ -199,29 +195,10 @@ fn depends_on_one(
 
 /// The pairs of sides (positive or not) of the two surfaces that occur near a contact.
 fn possible_wedges(geometry: &Geometry, contact: &Contact) -> Vec<[bool; 2]> {
-    /// Curvatures count as equal if they differ by less than this fraction of their sum.
-    const SAME_CURVATURE: f64 = 1e-6;
     let [a, b] = contact.pair.map(|s| &geometry.surfaces[s.index()]);
-    let at = &contact.point;
-    let (na, nb) = (a.normal(at), b.normal(at));
-    let turned = na.dot(&nb) < 0.0;
-    let sign = if turned { -1.0 } else { 1.0 };
-    let (ha, hb) = (a.hessian(at) / a.gradient(at).norm(), b.hessian(at) / b.gradient(at).norm() * sign);
-    // The heights of the sheets over the common tangent plane are minus one half of these forms.
-    let (u, v) = tangents(&na);
-    let form = |x: &Vector2<f64>| u * x.x + v * x.y;
-    let (e, f) = (form(&Vector2::x()), form(&Vector2::y()));
-    let difference = hb - ha;
-    let matrix = Matrix2::new(
-        e.dot(&(difference * e)),
-        e.dot(&(difference * f)),
-        f.dot(&(difference * e)),
-        f.dot(&(difference * f)),
-    );
-    let size = ha.amax() + hb.amax();
-    let eigenvalues = matrix.symmetric_eigenvalues();
-    let least = SAME_CURVATURE * size;
-    let (first_above, second_above) = (eigenvalues.max() > least, eigenvalues.min() < -least);
+    let turned = a.normal(&contact.point).dot(&b.normal(&contact.point)) < 0.0;
+    let [lowest, highest] = curvature_differences(geometry, contact);
+    let (first_above, second_above) = (highest > SAME_CURVATURE, lowest < -SAME_CURVATURE);
     let osculating = !first_above && !second_above;
     let mut sides = vec![[false, false], [true, true]];
     // Between the sheets: below the upper one, above the lower one.
@@ -239,61 +216,151 @@ fn possible_wedges(geometry: &Geometry, contact: &Contact) -> Vec<[bool; 2]> {
     sides
 }
 
-/// Rejects contacts with a wedge of zero angle between the sheets.
+/// Curvatures count as equal if they differ by less than this fraction of their sum.
+const SAME_CURVATURE: f64 = 1e-6;
+
+/// The smallest and the largest difference of the curvatures of the two sheets in a direction of
+/// their common tangent plane, relative to the sum of the curvatures.
 ///
-/// If other surfaces through the contact leave the regions ambiguous, the neighborhood is sampled.
-///
-/// # Errors
-/// [`FeatureError::Tangent`] at the first such contact.
-pub(super) fn check(geometry: &Geometry, tree: &Octree, tolerances: &Tolerances) -> Result<(), FeatureError> {
-    for contact in &tree.contacts {
-        if !is_harmless(geometry, tree, contact, tolerances)? && has_wedge(geometry, contact) {
-            return Err(tangent_error(geometry, contact));
-        }
-    }
-    Ok(())
+/// The difference is positive where the first sheet is above, as seen along its gradient.
+fn curvature_differences(geometry: &Geometry, contact: &Contact) -> [f64; 2] {
+    let [a, b] = contact.pair.map(|s| &geometry.surfaces[s.index()]);
+    let at = &contact.point;
+    let size = [a, b].map(|s| s.hessian(at).amax() / s.gradient(at).norm());
+    curvature_differences_at([a, b], at).map(|difference| difference / (size[0] + size[1]))
 }
 
-/// Whether both sheets are boundaries, one above the other, somewhere around a contact.
+/// The smallest and the largest difference of the curvatures of two tangent surfaces in a direction
+/// of their common tangent plane, 1/length.
+pub(super) fn curvature_differences_at([a, b]: [&Surface; 2], at: &Point) -> [f64; 2] {
+    let (na, nb) = (a.normal(at), b.normal(at));
+    let sign = if na.dot(&nb) < 0.0 { -1.0 } else { 1.0 };
+    let (ha, hb) = (a.hessian(at) / a.gradient(at).norm(), b.hessian(at) / b.gradient(at).norm() * sign);
+    // The heights of the sheets over the common tangent plane are minus one half of these forms.
+    let (u, v) = tangents(&na);
+    let form = |x: &Vector2<f64>| u * x.x + v * x.y;
+    let (e, f) = (form(&Vector2::x()), form(&Vector2::y()));
+    let difference = hb - ha;
+    let matrix = Matrix2::new(
+        e.dot(&(difference * e)),
+        e.dot(&(difference * f)),
+        f.dot(&(difference * e)),
+        f.dot(&(difference * f)),
+    );
+    let eigenvalues = matrix.symmetric_eigenvalues();
+    [eigenvalues.min(), eigenvalues.max()]
+}
+
+/// Finds the points where boundaries touch, and rejects those between which no tets fit.
+///
+/// Returns the points where the space between the sheets is outside all bodies and opens like that
+/// between a ball and a plate. If other surfaces through the contact leave the regions ambiguous,
+/// the neighborhood is sampled.
+///
+/// # Errors
+/// [`FeatureError::Tangent`] at the first contact with a wedge of zero angle inside a body, or one
+/// that opens too slowly for the triangles of the two sheets to stay apart.
+pub(super) fn check(
+    geometry: &Geometry,
+    tree: &Octree,
+    tolerances: &Tolerances,
+) -> Result<Vec<Point>, FeatureError> {
+    let mut touching: Vec<Point> = Vec::new();
+    for contact in &tree.contacts {
+        if is_harmless(geometry, tree, contact, tolerances) {
+            continue;
+        }
+        match wedge(geometry, contact) {
+            Wedge::None => {}
+            Wedge::Open => {
+                if !touching.iter().any(|p| (p - contact.point).norm() <= tolerances.merge) {
+                    touching.push(contact.point);
+                }
+            }
+            Wedge::Closed(between) => return Err(tangent_error(geometry, contact, between)),
+        }
+    }
+    Ok(touching)
+}
+
+/// What lies between two tangent sheets.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Wedge {
+    /// The sheets are not both boundaries.
+    None,
+    /// The exterior, and triangles that approximate the sheets stay apart.
+    Open,
+    /// A body, or the exterior with less space than triangles need.
+    Closed(Option<BodyId>),
+}
+
+/// What lies between the sheets around a contact.
 ///
 /// Samples a small circle instead of the point itself because other surfaces may pass through the
 /// contact: in a block with rounded edges, a plane, a ball and two rods touch at one point, and
 /// each is a boundary in its own sector.
-fn has_wedge(geometry: &Geometry, contact: &Contact) -> bool {
-    /// Radius of the circle relative to the radius of curvature: the gap between the sheets is half
-    /// its square.
-    const CIRCLE: f64 = 1e-3;
+fn wedge(geometry: &Geometry, contact: &Contact) -> Wedge {
     /// Number of samples.
     const DIRECTIONS: u32 = 61;
+    /// The sheets separate in all directions if the differences of their curvatures have one sign
+    /// and are at least this.
+    const DEFINITE: f64 = 1e-2;
+    let normal = geometry.surfaces[contact.pair[0].index()].normal(&contact.point);
+    let (u, v) = tangents(&normal);
+    let mut found = Wedge::None;
+    for k in 0..DIRECTIONS {
+        let angle = std::f64::consts::TAU * f64::from(k) / f64::from(DIRECTIONS) + 0.1;
+        match wedge_towards(geometry, contact, &normal, &(u * angle.cos() + v * angle.sin())) {
+            Wedge::None => {}
+            Wedge::Open => found = Wedge::Open,
+            closed => return closed,
+        }
+    }
+    let [lowest, highest] = curvature_differences(geometry, contact);
+    if found == Wedge::Open && lowest < DEFINITE && highest > -DEFINITE { Wedge::Closed(None) } else { found }
+}
+
+/// What lies between the sheets beside a contact, in one direction of their tangent plane.
+fn wedge_towards(geometry: &Geometry, contact: &Contact, normal: &Vector, direction: &Vector) -> Wedge {
+    /// Distance from the contact relative to the radius of curvature: the gap between the sheets is
+    /// half its square.
+    const CIRCLE: f64 = 1e-3;
     /// Sheets closer than this fraction of the squared radius continue each other.
-    const APART: f64 = 1e-3;
+    const APART: f64 = 1e-5;
+    /// The gap must be this many times larger than the sagittas of chords that are inside it.
+    const ROOM: f64 = 1.5;
     let [a, b] = contact.pair.map(|s| &geometry.surfaces[s.index()]);
     let at = &contact.point;
-    let curvature = a.curvature(at).max(b.curvature(at));
-    let normal = a.normal(at);
-    let (u, v) = tangents(&normal);
-    let radius = CIRCLE / curvature;
-    (0..DIRECTIONS).any(|k| {
-        let angle = std::f64::consts::TAU * f64::from(k) / f64::from(DIRECTIONS) + 0.1;
-        let beside = at + (u * angle.cos() + v * angle.sin()) * radius;
-        let (Some(p), Some(q)) = (on_line(a, &beside, &normal), on_line(b, &beside, &normal)) else {
-            return true;
-        };
-        let way = q - p;
-        if way.norm() <= APART * CIRCLE * radius {
-            return false;
-        }
-        let body = |place: Point| {
-            let positive = |s: SurfaceId| geometry.surfaces[s.index()].value(&place) > 0.0;
-            geometry.bodies.iter().position(|body| body.solid.contains(&positive))
-        };
-        let [below, between, above] = [-0.5, 0.5, 1.5].map(|part| body(p + way * part));
-        below != between && between != above
-    })
+    let radius = CIRCLE / a.curvature(at).max(b.curvature(at));
+    let beside = at + direction * radius;
+    let (Some(p), Some(q)) = (on_line(a, &beside, normal), on_line(b, &beside, normal)) else {
+        return Wedge::Closed(None);
+    };
+    let way = q - p;
+    let gap = way.norm();
+    if gap <= APART * CIRCLE * radius {
+        return Wedge::None;
+    }
+    let body = |place: Point| {
+        let positive = |s: SurfaceId| geometry.surfaces[s.index()].value(&place) > 0.0;
+        geometry.bodies.iter().position(|body| body.solid.contains(&positive))
+    };
+    let [below, between, above] = [-0.5, 0.5, 1.5].map(|part| body(p + way * part));
+    if below == between || between == above {
+        return Wedge::None;
+    }
+    // A sheet that bends toward the other has its chords in the gap.
+    let height = |p: &Point| (p - at).dot(&way) / gap;
+    let sagittas = height(&p).max(0.0) + (-height(&q)).max(0.0);
+    if between.is_none() && gap > ROOM * sagittas {
+        Wedge::Open
+    } else {
+        Wedge::Closed(between.map(BodyId::new))
+    }
 }
 
 /// The intersection of a surface with a line that crosses it near `start`.
-fn on_line(surface: &Surface, start: &Point, direction: &crate::Vector) -> Option<Point> {
+fn on_line(surface: &Surface, start: &Point, direction: &Vector) -> Option<Point> {
     /// Newton's method starts within a millionth of the radius of curvature.
     const STEPS: usize = 5;
     let mut at = *start;
@@ -316,13 +383,18 @@ pub(super) fn explain(
         return error;
     };
     let is_near = |contact: &&Contact| (contact.point - place.0).norm() <= 2.0 * contact.reach;
-    let matters = |contact: &&Contact| matches!(is_harmless(geometry, tree, contact, tolerances), Ok(false));
+    let matters = |contact: &&Contact| !is_harmless(geometry, tree, contact, tolerances);
     let reason = tree.contacts.iter().filter(is_near).find(matters);
-    reason.map_or(error, |contact| tangent_error(geometry, contact))
+    reason.map_or(error, |contact| {
+        let between = match wedge(geometry, contact) {
+            Wedge::Closed(between) => between,
+            _ => None,
+        };
+        tangent_error(geometry, contact, between)
+    })
 }
 
 /// The error for a contact that matters.
-fn tangent_error(geometry: &Geometry, contact: &Contact) -> FeatureError {
-    let [first, second] = contact.pair.map(|s| Named::surface(geometry, s));
-    FeatureError::Tangent { first, second, place: Place(contact.point) }
+fn tangent_error(geometry: &Geometry, contact: &Contact, between: Option<BodyId>) -> FeatureError {
+    FeatureError::tangent(geometry, contact.pair, contact.point, between)
 }

@@ -6,6 +6,7 @@
 //! distance grows with the third or fourth power (as between the rim of a rod and the circle where
 //! a torus touches the rod's end), the tip is thinner than rounding over the length of a triangle.
 
+use super::cut_cusps::Cusp;
 use super::{Curve, FeatureError, Features, Named, Place, curve_curvature};
 use crate::project::{at_distance, project_to_both};
 use crate::{CornerId, CurveId, Geometry, Point};
@@ -14,6 +15,8 @@ use std::collections::BTreeMap;
 /// Distance from the corner at which the curves are compared, relative to the smallest of their
 /// radii of curvature and lengths. Usual mesh sizes are two to ten times larger.
 const REACH: f64 = 0.1;
+/// Radius at which a cusp may be cut off, relative to the same.
+const CUT: f64 = 0.2;
 /// Smallest angle at the corner between the points of the two curves at that distance. A line and a
 /// circle have 0.05, curves that separate with the fourth power 3·10⁻⁵.
 const LEAST_ANGLE: f64 = 2e-3;
@@ -38,30 +41,41 @@ pub(super) fn check(geometry: &Geometry, features: &Features) -> Result<(), Feat
                 let [c, d] = [first, second].map(|end| features.curve(end.0));
                 let is_beside = |curve: &Curve, patch| curve.fins.iter().any(|fin| fin.patch == patch);
                 let Some(fin) = c.fins.iter().find(|fin| is_beside(d, fin.patch)) else { continue };
-                let angles = angles(geometry, [(c, first.1), (d, second.1)]);
-                if !angles.is_some_and(|[near, far]| far < LEAST_ANGLE && near < FALLING * far) {
+                let ends = [(c, first.1), (d, second.1)];
+                let reach = reach(geometry, &ends);
+                let is_sharp = |[near, far]: [f64; 2]| far < LEAST_ANGLE && near < FALLING * far;
+                if !angles(geometry, ends, REACH * reach).is_some_and(is_sharp) {
                     continue;
                 }
                 let of_patch = features.patch(fin.patch).surface;
-                let [first, second] = [c, d].map(|curve| {
+                let surfaces = [c, d].map(|curve| {
                     let other = curve.surfaces.iter().find(|s| **s != of_patch);
-                    Named::surface(geometry, *other.unwrap_or(&of_patch))
+                    *other.unwrap_or(&of_patch)
                 });
-                return Err(FeatureError::Cusp {
-                    first,
-                    second,
-                    place: Place(features.corner(corner).point),
-                });
+                let point = features.corner(corner).point;
+                let [first, second] = surfaces.map(|s| Named::surface(geometry, s));
+                let cusp = Cusp { surfaces, between: None, point, arc: Vec::new(), reach: CUT * reach };
+                return Err(FeatureError::Cusp { first, second, place: Place(point), cusp: Box::new(cusp) });
             }
         }
     }
     Ok(())
 }
 
+/// The smallest radius of curvature or length of two curves that end at a corner.
+fn reach(geometry: &Geometry, ends: &[(&Curve, usize); 2]) -> f64 {
+    let of = |(curve, end): &(&Curve, usize)| {
+        let trace = &curve.trace;
+        let [p, q] = if *end == 0 { [0, 1] } else { [trace.len() - 1, trace.len() - 2] }.map(|i| trace[i]);
+        curve.length().min(1.0 / curve_curvature(geometry, curve, &nalgebra::center(&p, &q)))
+    };
+    of(&ends[0]).min(of(&ends[1]))
+}
+
 /// The angles at a corner between the points of two curves at half and at full distance.
 ///
 /// `None` if a curve cannot be followed that far.
-fn angles(geometry: &Geometry, ends: [(&Curve, usize); 2]) -> Option<[f64; 2]> {
+fn angles(geometry: &Geometry, ends: [(&Curve, usize); 2], far: f64) -> Option<[f64; 2]> {
     let traces = ends.map(|(curve, end)| {
         let mut trace = curve.trace.clone();
         if end == 1 {
@@ -69,11 +83,6 @@ fn angles(geometry: &Geometry, ends: [(&Curve, usize); 2]) -> Option<[f64; 2]> {
         }
         trace
     });
-    let mut reach = f64::INFINITY;
-    for ((curve, _), trace) in ends.iter().zip(&traces) {
-        let middle = nalgebra::center(&trace[0], &trace[1]);
-        reach = reach.min(curve.length()).min(1.0 / curve_curvature(geometry, curve, &middle));
-    }
     let angle = |distance: f64| {
         let [p, q] = [0, 1].map(|i| {
             let [a, b] = ends[i].0.surfaces.map(|s| &geometry.surfaces[s.index()]);
@@ -82,6 +91,5 @@ fn angles(geometry: &Geometry, ends: [(&Curve, usize); 2]) -> Option<[f64; 2]> {
         });
         Some((p? - q?).norm() / distance)
     };
-    let far = REACH * reach;
     Some([angle(0.5 * far)?, angle(far)?])
 }

@@ -1,7 +1,8 @@
 //! Errors of the feature search.
 
 use super::Inconsistency;
-use crate::{Geometry, Point, SurfaceId};
+use super::cut_cusps::Cusp;
+use crate::{BodyId, Geometry, Point, SurfaceId};
 use std::fmt;
 
 /// A named object of the file: the name of a solid and the line of the solid or its primitive.
@@ -70,7 +71,8 @@ pub enum FeatureError {
     /// Two surfaces are tangent and both are boundaries there, with a wedge of zero angle between
     /// them.
     #[error(
-        "surfaces of {first} and {second} touch at {place} without crossing: move one of them or let them overlap"
+        "surfaces of {first} and {second} touch at {place} without an angle between them: move one of them or let them \
+         overlap"
     )]
     Tangent {
         /// One surface.
@@ -79,19 +81,8 @@ pub enum FeatureError {
         second: Named,
         /// Where they touch.
         place: Place,
-    },
-    /// A corner, the apex of a cone or an edge touches the interior of a face: the body is not a
-    /// manifold there.
-    #[error(
-        "a corner or an edge of {first} touches a face of {second} at {place}: move one of them or let them overlap"
-    )]
-    Touch {
-        /// The solid whose corner or edge touches.
-        first: Named,
-        /// The solid whose face is touched.
-        second: Named,
-        /// Where they touch.
-        place: Place,
+        /// What [`find_and_cut_cusps`](super::find_and_cut_cusps) needs to know.
+        cusp: Box<Cusp>,
     },
     /// A face ends in a cusp that is too sharp for triangles.
     #[error(
@@ -105,6 +96,8 @@ pub enum FeatureError {
         second: Named,
         /// The tip.
         place: Place,
+        /// What [`find_and_cut_cusps`](super::find_and_cut_cusps) needs to know.
+        cusp: Box<Cusp>,
     },
     /// A feature curve has a loose end: tracing stopped, or no other curve continues it.
     #[error("the intersection of surfaces of {first} and {second} could not be followed past {place}")]
@@ -177,4 +170,26 @@ pub enum FeatureError {
     /// The features found are inconsistent.
     #[error("the corners, curves and patches found are inconsistent: {0}")]
     Inconsistent(#[from] Inconsistency),
+}
+
+impl FeatureError {
+    /// Two surfaces are tangent at a point, with a body or the exterior between them.
+    pub(super) fn tangent(
+        geometry: &Geometry,
+        surfaces: [SurfaceId; 2],
+        point: Point,
+        between: Option<BodyId>,
+    ) -> Self {
+        let [first, second] = surfaces.map(|s| Named::surface(geometry, s));
+        let cusp = Cusp { surfaces, between, point, arc: Vec::new(), reach: f64::INFINITY };
+        Self::Tangent { first, second, place: Place(point), cusp: Box::new(cusp) }
+    }
+
+    /// The same error, found on an arc along which the surfaces are tangent.
+    pub(super) fn along(mut self, arc: &[Point]) -> Self {
+        if let Self::Tangent { cusp, .. } = &mut self {
+            cusp.arc = arc.to_vec();
+        }
+        self
+    }
 }

@@ -1,8 +1,8 @@
 //! The bounding box of all bodies.
 
+use super::Features;
 use super::neighborhood::{Tolerances, sheet_at};
 use super::octree::Octree;
-use super::{FeatureError, Features};
 use crate::project::project_to_both;
 use crate::{Aabb, Geometry, Point, Surface, SurfaceId, Vector};
 
@@ -16,7 +16,7 @@ pub(super) fn extent(
     tree: &Octree,
     features: &Features,
     tolerances: &Tolerances,
-) -> Result<Aabb, FeatureError> {
+) -> Aabb {
     let mut points: Vec<Point> = features.corners.iter().map(|c| c.point).collect();
     for curve in &features.curves {
         let closed = curve.ends.is_none();
@@ -43,7 +43,7 @@ pub(super) fn extent(
     for (i, surface) in geometry.surfaces.iter().enumerate() {
         for axis in [Vector::x(), Vector::y(), Vector::z()] {
             for point in [surface.support(&axis), surface.support(&-axis)].into_iter().flatten() {
-                if may_be_boundary(geometry, tree, SurfaceId::new(i), &point, tolerances)? {
+                if may_be_boundary(geometry, tree, SurfaceId::new(i), &point, tolerances) {
                     points.push(point);
                 }
             }
@@ -54,7 +54,7 @@ pub(super) fn extent(
         bounds.min = bounds.min.inf(point);
         bounds.max = bounds.max.sup(point);
     }
-    Ok(bounds)
+    bounds
 }
 
 /// Whether a surface is a boundary at a point, for some choice of sides of the other surfaces
@@ -65,21 +65,19 @@ fn may_be_boundary(
     id: SurfaceId,
     point: &Point,
     tolerances: &Tolerances,
-) -> Result<bool, FeatureError> {
-    let Some(leaf) = tree.leaf(point) else { return Ok(false) };
+) -> bool {
+    let Some(leaf) = tree.leaf(point) else { return false };
     let touches =
         |s: &SurfaceId| *s != id && geometry.surfaces[s.index()].distance(point) <= tolerances.on_surface;
     let touching: Vec<SurfaceId> = leaf.surfaces.iter().copied().filter(touches).collect();
-    for sides in 0..1_u32 << touching.len().min(8) {
+    (0..1_u32 << touching.len().min(8)).any(|sides| {
         let other_side = |s: SurfaceId| match touching.iter().position(|&t| t == s) {
             Some(i) => sides >> i & 1 == 1,
             None => geometry.surfaces[s.index()].value(point) > 0.0,
         };
-        if sheet_at(geometry, tree, id, point, &other_side)?.is_some() {
-            return Ok(true);
-        }
-    }
-    Ok(false)
+        // An error belongs to sides that do not occur: bodies overlap on them.
+        matches!(sheet_at(geometry, tree, id, point, &other_side), Ok(Some(_)))
+    })
 }
 
 /// The point between two points of a curve at which `sign` times a coordinate is largest (ternary

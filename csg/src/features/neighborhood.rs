@@ -231,9 +231,10 @@ pub(super) fn neighborhood(
         let along_gradient = geometry.surfaces[ray.surface.index()].gradient(at).dot(&up) > 0.0;
         let (behind, front) = if along_gradient { (before, after) } else { (after, before) };
         if let Some(sheet) = Sheet::between(ray.surface, behind, front) {
-            // Two sheets in the same direction bound a wedge of zero angle.
-            if let Some(other) = leaving.iter().find(|r| (r.direction - ray.direction).norm() <= SAME_ANGLE) {
-                return Err(tangent_rays(geometry, [other, ray], at));
+            // Two sheets in the same direction bound a wedge of zero angle: no tets fit into it.
+            let tangent = leaving.iter().find(|r| (r.direction - ray.direction).norm() <= SAME_ANGLE);
+            if let Some(other) = tangent.filter(|other| before.is_some() || !stay_apart([other, ray])) {
+                return Err(tangent_rays(geometry, [other, ray], at, before));
             }
             leaving.push(ray);
             let cutout =
@@ -248,9 +249,17 @@ pub(super) fn neighborhood(
     Ok(Some(Neighborhood { surfaces, sheets }))
 }
 
-fn tangent_rays(geometry: &Geometry, rays: [&Ray; 2], at: &Point) -> FeatureError {
-    let [first, second] = rays.map(|ray| Named::surface(geometry, ray.surface));
-    FeatureError::Tangent { first, second, place: Place(*at) }
+/// Whether the chords of two tangent rays, in counterclockwise order, stay apart.
+fn stay_apart([low, high]: [&Ray; 2]) -> bool {
+    /// The gap must be this many times larger than the sagittas of chords that are inside it.
+    const ROOM: f64 = 1.5;
+    // A ray that bends toward the other has its chords in the gap.
+    high.curvature - low.curvature > ROOM * (low.curvature.max(0.0) + (-high.curvature).max(0.0))
+}
+
+/// The error for two rays in the same direction, with the body between them.
+fn tangent_rays(geometry: &Geometry, rays: [&Ray; 2], at: &Point, between: Option<BodyId>) -> FeatureError {
+    FeatureError::tangent(geometry, rays.map(|ray| ray.surface), *at, between)
 }
 
 /// Two unit vectors perpendicular to `axis`; rotating the first to the second is counterclockwise.
@@ -300,7 +309,7 @@ fn sorted_rays(
             let is_seam = geometry.seam([first.min(second), first.max(second)]).is_some();
             let apart = SAME_CURVATURE * (two[1].curvature.abs() + two[0].curvature.abs());
             if !is_seam && two[1].curvature - two[0].curvature <= apart {
-                return Err(tangent_rays(geometry, [&two[0], &two[1]], at));
+                return Err(tangent_rays(geometry, [&two[0], &two[1]], at, None));
             }
         }
         start = end;

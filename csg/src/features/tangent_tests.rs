@@ -83,28 +83,92 @@ fn a_plane_two_rods_and_a_ball_touching_at_a_point_form_a_rounded_corner() {
     assert_eq!(counts(&find(corner)), [13, 21, 0, 10]);
 }
 
+/// A rod of radius 1 and length 1 along z.
+fn rod(x: f64) -> String {
+    format!("cylinder ({x},0,0; {x},0,1; 1) and plane (0,0,0; 0,0,-1) and plane (0,0,1; 0,0,1)")
+}
+
+#[test]
+fn boundaries_that_touch_from_outside_share_a_corner_or_a_curve() {
+    let cases = [
+        ("solid a = sphere (0,0,0; 1); solid b = sphere (2,0,0; 1); tlo a; tlo b;", [1, 0, 0, 2]),
+        ("solid a = sphere (0,0,0; 1); solid b = sphere (2.0000000005,0,0; 1); tlo a; tlo b;", [1, 0, 0, 2]),
+        ("solid a = sphere (0,0,0; 1) or orthobrick (-2,-2,-2; 2,2,-1); tlo a;", [9, 12, 0, 7]),
+        // A ball in a hole of more than twice its radius.
+        (
+            "solid a = sphere (0,0,0; 1) and not sphere (0,0,0; 0.9) or sphere (0,0,-0.6; 0.3); tlo a;",
+            [1, 0, 0, 3],
+        ),
+        (&format!("solid a = {}; solid b = {}; tlo a; tlo b;", rod(0.0), rod(2.0)), [2, 5, 0, 6]),
+        (
+            "solid a = torus (0,0,0.5; 0,0,1; 2; 0.5); solid b = orthobrick (-3,-3,-1; 3,3,0); solid c = a or b; tlo c;",
+            [8, 12, 1, 7],
+        ),
+    ];
+    for (source, expected) in cases {
+        let features = find(source);
+        assert_eq!(counts(&features), expected, "{source}");
+        let is_inner = |corner: usize| {
+            let of = features.patches.iter().filter(|p| p.corners.iter().any(|c| c.index() == corner));
+            of.count()
+        };
+        let ends = features.curves.iter().flat_map(|curve| curve.ends.into_iter().flatten());
+        let ends: Vec<usize> = ends.map(|c| c.index()).collect();
+        for corner in (0..features.corners.len()).filter(|c| !ends.contains(c)) {
+            assert_eq!(is_inner(corner), 2, "{source}: both boundaries have the corner inside");
+        }
+    }
+}
+
+#[test]
+fn cusps_inside_bodies_are_cut_off_with_a_note() {
+    let block = "orthobrick (-3,-3,-1; 4,3,3)";
+    let rods = format!("solid a = {}; solid b = {};", rod(0.0), rod(2.0));
+    let cases = [
+        // The body to be cut, whether along a curve, and corners, curves, closed curves and patches.
+        (
+            "solid a = sphere (0,0,0; 1) and not sphere (0.5,0,0; 0.5); tlo a;".to_owned(),
+            "a",
+            false,
+            [0, 0, 2, 3],
+        ),
+        (
+            format!(
+                "solid a = sphere (0,0,1; 1) or orthobrick (-3,-3,-1; 4,3,0); solid rest = {block} and not a; tlo a; tlo rest;"
+            ),
+            "rest",
+            false,
+            [13, 20, 2, 15],
+        ),
+        (
+            format!("{rods} solid rest = {block} and not a and not b; tlo a; tlo b; tlo rest;"),
+            "rest",
+            true,
+            [18, 33, 2, 21],
+        ),
+    ];
+    for (source, body, is_curve, expected) in cases {
+        let mut geometry = super::tests::geometry(&source);
+        let (features, cusps) = super::find_and_cut_cusps(&mut geometry).unwrap();
+        assert_eq!(counts(&features), expected, "{source}");
+        let [cusp] = &cusps[..] else { panic!("{cusps:?}") };
+        assert_eq!((cusp.body.as_ref().unwrap().1.solid.as_str(), cusp.is_curve), (body, is_curve));
+        assert!(cusp.radius > 0.05 && cusp.radius < 0.35, "{cusp}");
+        assert!(cusp.to_string().contains(&format!("solid `{body}`")), "{cusp}");
+    }
+}
+
 #[test]
 fn wedges_of_zero_angle_are_rejected_with_both_names_and_coordinates() {
-    let rod =
-        |x: f64| format!("cylinder ({x},0,0; {x},0,1; 1) and plane (0,0,0; 0,0,-1) and plane (0,0,1; 0,0,1)");
-    let rods = format!("solid a = {};\nsolid b = {}; tlo a; tlo b;", rod(0.0), rod(2.0));
     let cases = [
-        (
-            "solid a = sphere (0,0,0; 1);\nsolid b = sphere (2,0,0; 1); tlo a; tlo b;",
-            "surfaces of solid `a` (line 2) and solid `b` (line 3) touch at (1.000000, ",
-        ),
-        (
-            "solid a = sphere (0,0,0; 1);\nsolid b = sphere (2.0000000005,0,0; 1); tlo a; tlo b;",
-            "surfaces of solid `a` (line 2) and solid `b` (line 3) touch at (1.000000, ",
-        ),
         (
             "solid a = sphere (0,0,0; 1) and not sphere (0.5,0,0; 0.5); tlo a;",
             "surfaces of solid `a` (line 2) and solid `a` (line 2) touch at (1.000000, ",
         ),
-        (&rods, "surfaces of solid `b` (line 3) and solid `a` (line 2) touch at (1.000000, "),
+        // A ball in a hole hardly larger: triangles of the two would intersect.
         (
-            "solid a = torus (0,0,0.5; 0,0,1; 2; 0.5);\nsolid b = orthobrick (-3,-3,-1; 3,3,0); solid c = a or b; tlo c;",
-            "surfaces of solid `a` (line 2) and solid `b` (line 3) touch at (",
+            "solid a = orthobrick (-2,-2,-2; 2,2,2) and not sphere (0,0,0; 1) or sphere (0,0,-0.1; 0.9); tlo a;",
+            "surfaces of solid `a` (line 2) and solid `a` (line 2) touch at (0.000000, 0.000000, -1.000000)",
         ),
         // A plane tangent to a torus at its inner equator cuts it into lobes that meet at a point.
         (
@@ -137,11 +201,11 @@ fn cones_tangent_along_a_line_may_also_meet_in_an_ellipse() {
     assert_eq!(counts(&find(&cones_on_a_line([3.0, 4.0], 1.0, "a and b"))), [0, 0, 3, 4]);
     assert_eq!(counts(&find(&cones_on_a_line([3.0, 3.0], 1.0, "a or b"))), [0, 0, 2, 3]);
     assert_eq!(counts(&find(&cones_on_a_line([3.0, 4.0], -1.0, "a and not b"))), [0, 0, 2, 3]);
-    for (side, solid) in [(1.0, "a and not b"), (-1.0, "a or b")] {
-        let error = refused(&cones_on_a_line([3.0, 4.0], side, solid));
-        let names = error.contains("(line 2)") && error.contains("(line 3)");
-        assert!(names && error.contains("without crossing"), "{error}");
-    }
+    let error = refused(&cones_on_a_line([3.0, 4.0], 1.0, "a and not b"));
+    let names = error.contains("(line 2)") && error.contains("(line 3)");
+    assert!(names && error.contains("without an angle"), "{error}");
+    // From outside they share the line.
+    assert_eq!(counts(&find(&cones_on_a_line([3.0, 4.0], -1.0, "a or b"))), [2, 5, 0, 4]);
 }
 
 #[test]
@@ -159,25 +223,28 @@ fn a_cone_tangent_to_a_rod_along_a_line_exchanges_sides_with_it() {
 }
 
 #[test]
-fn corners_and_edges_that_touch_the_interior_of_a_face_are_rejected() {
+fn corners_and_edges_may_touch_the_interior_of_a_face() {
     let tip = |z: f64| format!("cone (0,0,{z}; 0.5; 0,0,{}; 0) and plane (0,0,{z}; 0,0,1)", z - 1.0);
     let block = "solid block = orthobrick (-1,-1,-1; 1,1,0);";
     let cases = [
         // The corner of a tetrahedron on a plate; the rim of a disk on a ball.
         (
             format!("{block}\nsolid top = polyhedron (0.25,0,0; 0,0,1; 0.5,0,1; 0,0.5,1; ; 1,3,2; 1,2,4; 1,4,3; 2,3,4); solid s = block or top; tlo s;"),
-            "(0.250000, 0.000000, 0.000000)",
+            [0.25, 0.0, 0.0], 1,
         ),
         (
             "solid ball = sphere (0,0,0; 0.5);\nsolid disk = cylinder (0,1,0; 0.3,1,0; 0.5) and plane (0,1,0; -1,0,0) and plane (0.3,1,0; 1,0,0);
                 solid s = ball or disk and plane (0.1,0,0; 1,0,0); tlo s;"
                 .to_owned(),
-            "(0.000000, 0.500000, 0.000000)",
+            [0.0, 0.5, 0.0], 1,
         ),
     ];
-    for (source, place) in cases {
-        let error = refused(&source);
-        assert!(error.contains("touch") && error.contains(place), "{error} does not name {place}: {source}");
+    for (source, place, patches) in cases {
+        let features = find(&source);
+        let place = crate::Point::from(place);
+        let corner = features.corners.iter().position(|c| (c.point - place).norm() < 1e-9).unwrap();
+        let inside = features.patches.iter().filter(|p| p.corners.iter().any(|c| c.index() == corner));
+        assert_eq!(inside.count(), patches, "{source}");
     }
     // Inside the plate, or away from it, the apex is allowed.
     let sunk = format!(

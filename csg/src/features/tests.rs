@@ -4,7 +4,7 @@ use super::trace::curve_tangent;
 use super::*;
 use crate::{Projector, Vector, language};
 
-fn geometry(source: &str) -> Geometry {
+pub(super) fn geometry(source: &str) -> Geometry {
     let source = format!("algebraic3d\n{source}");
     language::parse_geometry(&source, "test.geo").unwrap_or_else(|e| panic!("{e}")).geometry
 }
@@ -265,7 +265,8 @@ fn invalid_geometries_are_rejected_with_coordinates() {
             "solid `a` (line 2) and solid `b` (line 2) overlap near",
         ),
         (
-            "solid plate = orthobrick (-2,-2,-1; 2,2,0);\nsolid ball = sphere (0,0,1; 1);\nsolid a = plate or ball; tlo a;",
+            "solid plate = orthobrick (-2,-2,-1; 2,2,0);\nsolid ball = sphere (0,0,1; 1);\nsolid a = plate or ball;
+            solid gap = orthobrick (-2,-2,-1; 2,2,1) and not a; tlo a; tlo gap;",
             "surfaces of solid `plate` (line 2) and solid `ball` (line 3) touch at (0.000000, ",
         ),
         (

@@ -1,30 +1,32 @@
-//! Corners and edges that touch the interior of a patch.
+//! Corners inside patches: a ball that stands on a plate, the corner of a block on a face, a rim
+//! that touches a face.
 //!
-//! The solid is not a manifold there: the patch contains a vertex that is on none of its curves. An
-//! isolated apex of a cone is allowed, because it is a corner of its own.
+//! The boundary is not a manifold there: the patch contains a vertex that is on none of its curves.
 
 use super::arcs::{Arc, Nodes};
-use super::neighborhood::{Tolerances, sheet_at};
+use super::neighborhood::{Sheet, Tolerances, sheet_at};
 use super::octree::Octree;
-use super::{FeatureError, Named, Place, assemble};
+use super::{FeatureError, assemble};
 use crate::primitive::quadric::tangents;
 use crate::{Geometry, Point, SurfaceId};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Rejects the first corner or edge that touches the interior of a patch.
+/// The sheets that contain a corner in their interior, with its coordinates.
 ///
-/// If no arc on a surface leaves a point of that surface, the surface is a boundary either all
-/// around the point or nowhere near it.
+/// Candidates are the ends of arcs and the points `touching` where surfaces are tangent. If no arc
+/// on a surface leaves a point of that surface, the surface is a boundary either all around the
+/// point or nowhere near it.
 ///
 /// # Errors
-/// [`FeatureError::Touch`] with the touching and the touched surface.
-pub(super) fn check(
+/// Those of [`sheet_at`].
+pub(super) fn find(
     geometry: &Geometry,
     tree: &Octree,
     arcs: &[Arc],
     nodes: &Nodes,
+    touching: &[Point],
     tolerances: &Tolerances,
-) -> Result<(), FeatureError> {
+) -> Result<Vec<(Sheet, Point)>, FeatureError> {
     let mut leaving: BTreeMap<usize, BTreeSet<SurfaceId>> = BTreeMap::new();
     for arc in arcs {
         for node in arc.ends.into_iter().flatten().flatten() {
@@ -34,29 +36,30 @@ pub(super) fn check(
                 .extend(arc.neighborhood.sheets.iter().map(|(sheet, _)| sheet.surface));
         }
     }
-    for (node, surfaces) in leaving {
-        let point = nodes.point(node);
+    let is_node =
+        |point: &Point| leaving.keys().any(|&node| (nodes.point(node) - point).norm() <= tolerances.merge);
+    let alone = touching.iter().filter(|point| !is_node(point)).map(|&point| (point, BTreeSet::new()));
+    let ends = leaving.iter().map(|(&node, surfaces)| (nodes.point(node), surfaces.clone()));
+    let mut found = Vec::new();
+    for (point, surfaces) in ends.chain(alone) {
         for touched in assemble::corner(geometry, tree, point, tolerances).surfaces {
-            if !surfaces.contains(&touched)
-                && is_boundary_all_around(geometry, tree, touched, &point, tolerances)?
-            {
-                let touching = *surfaces.first().expect("something ends at the place");
-                let [first, second] = [touching, touched].map(|s| Named::surface(geometry, s));
-                return Err(FeatureError::Touch { first, second, place: Place(point) });
+            if !surfaces.contains(&touched) {
+                let sheet = sheet_around(geometry, tree, touched, &point, tolerances)?;
+                found.extend(sheet.map(|sheet| (sheet, point)));
             }
         }
     }
-    Ok(())
+    Ok(found)
 }
 
-/// Whether a surface is a boundary on all sides of one of its points.
-fn is_boundary_all_around(
+/// The sheet of a surface around one of its points, if it is the same on all sides.
+fn sheet_around(
     geometry: &Geometry,
     tree: &Octree,
     id: SurfaceId,
     point: &Point,
     tolerances: &Tolerances,
-) -> Result<bool, FeatureError> {
+) -> Result<Option<Sheet>, FeatureError> {
     /// Distance of the sample points in units of the merge tolerance, small enough that no other
     /// surface intervenes.
     const BESIDE: f64 = 100.0;
@@ -64,17 +67,20 @@ fn is_boundary_all_around(
     const DIRECTIONS: u32 = 16;
     let surface = &geometry.surfaces[id.index()];
     if surface.has_apex_at(point, tolerances.merge) {
-        return Ok(false);
+        return Ok(None);
     }
+    let mut around = None;
     let (u, v) = tangents(&surface.normal(point));
     for k in 0..DIRECTIONS {
         let angle = std::f64::consts::TAU * (f64::from(k) + 0.137) / f64::from(DIRECTIONS);
         let beside = point + (u * angle.cos() + v * angle.sin()) * (BESIDE * tolerances.merge);
-        let Ok(beside) = surface.project(&beside) else { return Ok(false) };
+        let Ok(beside) = surface.project(&beside) else { return Ok(None) };
         let other_side = |s: SurfaceId| geometry.surfaces[s.index()].value(&beside) > 0.0;
-        if sheet_at(geometry, tree, id, &beside, &other_side)?.is_none() {
-            return Ok(false);
+        let sheet = sheet_at(geometry, tree, id, &beside, &other_side)?;
+        if sheet.is_none() || around.is_some_and(|known| sheet != Some(known)) {
+            return Ok(None);
         }
+        around = sheet;
     }
-    Ok(true)
+    Ok(around)
 }

@@ -99,6 +99,8 @@ struct Input<'a> {
     ranges: Vec<Range<usize>>,
     /// For each segment, the directions of the curve at its ends, into the segment.
     tangents: Vec<[Vector; 2]>,
+    /// The vertex of each corner.
+    corners: Vec<u32>,
     /// Vertices on corners without curves, with their corners.
     isolated: Vec<(u32, usize)>,
 }
@@ -120,6 +122,12 @@ impl<'a> Input<'a> {
                 ends_here[v.index()] = true;
             }
         }
+        let mut corners = vec![u32::MAX; features.corners.len()];
+        for (v, class) in curves.classes.iter().enumerate() {
+            if let Class::Corner(c) = class {
+                corners[c.index()] = v as u32;
+            }
+        }
         let isolated = curves
             .classes
             .iter()
@@ -129,8 +137,9 @@ impl<'a> Input<'a> {
                 _ => None,
             })
             .collect();
+        let tangents = Vec::new();
         let mut input =
-            Self { geometry, features, curves, size, settings, ranges, tangents: Vec::new(), isolated };
+            Self { geometry, features, curves, size, settings, ranges, tangents, corners, isolated };
         input.tangents = (0..curves.segments.len()).map(|s| input.tangents_of(s)).collect();
         input
     }
@@ -182,7 +191,9 @@ impl<'a> Input<'a> {
         let surface = &self.geometry.surfaces[patch.surface.index()];
         let on_curves = patch.boundary.iter().flat_map(|(curve, _)| self.ranges[curve.index()].clone());
         let ends = on_curves.flat_map(|s| self.curves.segments[s].vertices).map(|v| v.0);
-        let mut vertices: Vec<u32> = ends.chain(self.isolated.iter().map(|isolated| isolated.0)).collect();
+        let inner = patch.corners.iter().map(|corner| self.corners[corner.index()]);
+        let isolated = self.isolated.iter().map(|isolated| isolated.0);
+        let mut vertices: Vec<u32> = ends.chain(inner).chain(isolated).collect();
         vertices.sort_unstable();
         vertices.dedup();
         let place = |v: u32| self.curves.points[v as usize];
@@ -295,13 +306,15 @@ impl<'a> Part<'a> {
         segments.sort_unstable();
         segments.dedup();
         let ends = segments.iter().flat_map(|&s| input.curves.segments[s].vertices).map(|v| v.0);
-        let isolated = input.isolated.iter().filter(|&&(v, corner)| {
-            input.features.corners[corner].surfaces.contains(&patch.surface) && here(point(VertexId(v)))
-        });
+        let isolated = input
+            .isolated
+            .iter()
+            .filter(|&&(_, corner)| input.features.corners[corner].surfaces.contains(&patch.surface));
+        let inner = patch.corners.iter().map(|corner| input.corners[corner.index()]);
+        let alone = isolated.map(|&(v, _)| v).chain(inner).filter(|&v| here(point(VertexId(v))));
         // In the order of the segments, so that consecutive vertices are close.
         let mut vertices: Vec<u32> = Vec::new();
-        let mut sorted: Vec<(u32, usize)> =
-            ends.chain(isolated.map(|&(v, _)| v)).enumerate().map(|(k, v)| (v, k)).collect();
+        let mut sorted: Vec<(u32, usize)> = ends.chain(alone).enumerate().map(|(k, v)| (v, k)).collect();
         sorted.sort_unstable();
         sorted.dedup_by_key(|(v, _)| *v);
         sorted.sort_unstable_by_key(|&(_, k)| k);

@@ -25,6 +25,7 @@ fn projector(surfaces: Vec<Surface>, curves: &[[u32; 2]], bounds: [P; 2]) -> Pro
         outside: None,
         cutout: None,
         boundary: Vec::new(),
+        corners: Vec::new(),
         seeds: Vec::new(),
         bc: surface as u32 + 1,
         name: None,

@@ -112,6 +112,7 @@ impl Made {
             outside: None,
             cutout: None,
             boundary: boundary.to_vec(),
+            corners: Vec::new(),
             seeds: seeds.to_vec(),
             bc: 1,
             name: None,
