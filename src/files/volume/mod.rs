@@ -39,6 +39,7 @@ mod tests;
 mod tetgen;
 mod vtu;
 mod vtu_arrays;
+mod vtu_tags;
 #[cfg(test)]
 mod vtu_tests;
 

@@ -292,13 +292,13 @@ fn broken_vtu_files_are_refused() {
         "LZ4",
     );
     refused("m.vtu", file.replace("Name=\"offsets\"", "Name=\"o\""), "", "no array offsets in Cells");
-    refused("m.vtu", file.replace("<Piece", "<Piece/>\n<Piece"), ":7", "several pieces");
-    refused("m.vtu", "<VTKFile>", "", "no piece");
+    refused("m.vtu", file.replace("</Piece>", "</Piece>\n<Piece/>"), ":22", "several pieces");
+    refused("m.vtu", "<VTKFile/>", "", "no piece");
     let raw = vtu(Stored::AppendedRaw);
-    refused("m.vtu", &raw[..raw.len() - 100], "", "cut off");
+    refused("m.vtu", &raw[..raw.len() - 100], ":*", "cut off");
     let text = String::from_utf8(vtu(Stored::Text)).unwrap();
-    refused("m.vtu", text.replace("10  10", "12  12"), "", "cell 6 is a hexahedron");
-    refused("m.vtu", text.replace("22  26", "22  99"), "", "the offset 99 of cell 7");
+    refused("m.vtu", text.replace("10  10", "12  12"), ":12", "cell 6 is a hexahedron");
+    refused("m.vtu", text.replace("22  26", "22  99"), ":9", "offsets up to 99 need 99");
 }
 
 #[test]
