@@ -10,7 +10,7 @@ use super::raw::{Label, Raw, Shape};
 use super::vtu_arrays::{Array, Document, Section};
 use super::{VolumeMesh, finish};
 use crate::Point;
-use crate::files::input::{Fault, ReadError, load};
+use crate::files::input::{Fault, ReadError, coordinate, load};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -59,11 +59,13 @@ fn points(document: &Document) -> Result<Vec<Point>, Fault> {
     let coordinates = array.floats()?;
     let count = document.counts.points;
     array.check_count(coordinates.len(), count.saturating_mul(3), &format!("{count} points"))?;
-    if let Some(place) = coordinates.iter().position(|x| !x.is_finite()) {
-        return Err(array.wrong(format!("a coordinate of point {} is not a finite number", place / 3)));
-    }
     let (points, _) = coordinates.as_chunks::<3>();
-    Ok(points.iter().map(|p| p.map(|x| x + 0.0).into()).collect())
+    let checked = |(k, [x, y, z]): (usize, &[f64; 3])| {
+        let wrong = |message| array.wrong(format!("point {k}: {message}"));
+        let checked = |x: f64| coordinate(x).map_err(wrong);
+        Ok(Point::new(checked(*x)?, checked(*y)?, checked(*z)?))
+    };
+    points.iter().enumerate().map(checked).collect()
 }
 
 /// The cells of a piece: the vertices of all cells, and where those of each end.
@@ -129,6 +131,9 @@ pub(super) fn parse(content: &[u8]) -> Result<Grid, Fault> {
         let label = Label::number(labels.map_or(0, |labels| labels[cell]));
         raw.add(shape(kind), &nodes, label)
             .map_err(|message| cells.arrays[1].wrong(format!("cell {cell} is {message}")))?;
+        if shape(kind) == Shape::Tet {
+            raw.tet_numbers.push(cell as u64);
+        }
         tet_ids.extend(ids.get(cell).filter(|_| shape(kind) == Shape::Tet));
     }
     raw.add_names(document.names()?);
