@@ -5,9 +5,9 @@
 //! distinguishes faces (the solids of an STL, the groups or materials of an OBJ, the facet markers
 //! of TetGen). Polygons are triangulated by constrained Delaunay triangulation in their plane, so
 //! they need not be convex. Points with equal coordinates are merged, triangles that lose a corner
-//! by that and copies of faces are dropped, and unused points are listed separately. STL has no connectivity, so only
-//! there points that are merely close are merged too, if that closes gaps. [`Surface::notes`]
-//! reports all of this.
+//! by that and copies of faces are dropped, and unused points are listed separately. STL has no
+//! connectivity, so only there points that are merely close are merged too, if that closes gaps.
+//! [`Surface::notes`] reports all of this.
 //!
 //! *Not* checked here: whether the surface is closed, oriented, or self-intersecting. Normals in
 //! the files are ignored.

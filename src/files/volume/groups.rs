@@ -40,8 +40,8 @@ impl Groups {
         usize::try_from(set - 1).map_or(&[], |place| &self.sets[place])
     }
 
-    /// Merges the copies of an element that version 2 has, one for each of its groups. Returns which
-    /// elements were removed, if there may be any.
+    /// Merges the copies of an element that version 2 has, one for each of its groups. Returns
+    /// which elements were removed, if there may be any.
     fn join_copies<const N: usize>(
         &mut self,
         elements: &mut Vec<[u32; N]>,

@@ -239,6 +239,9 @@ fn a_compressed_netgen_mesh_is_read() {
     let content = encoder.finish().unwrap();
     reads_two_tets("m.vol.gz", &content);
     assert!(read_as("m.vol.gz", &content[..content.len() / 2]).unwrap_err().starts_with("cannot read"));
+    let mut encoder = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::default());
+    encoder.write_all(&vec![b'\n'; 1 << 22]).unwrap();
+    refused("m.vol.gz", encoder.finish().unwrap(), "", "more than 256 times its size");
 }
 
 #[test]
