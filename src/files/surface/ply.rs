@@ -305,11 +305,11 @@ impl Faces {
     }
 }
 
-/// The list of vertices of an element, with the properties before and after it.
-fn vertex_list<'e>(
-    element: &'e Element,
-    data: &Data,
-) -> Result<(&'e [Property], [Number; 2], &'e [Property]), Fault> {
+/// The types of the length and the numbers of a list, with the properties before and after it.
+type List<'e> = (&'e [Property], [Number; 2], &'e [Property]);
+
+/// The list of vertices of an element.
+fn vertex_list<'e>(element: &'e Element, data: &Data) -> Result<List<'e>, Fault> {
     let list = element.property(&[b"vertex_indices", b"vertex_index"]);
     let kinds = list.and_then(|k| Some([element.properties[k].length?, element.properties[k].number]));
     match list.zip(kinds.filter(|[_, number]| number.is_whole())) {
