@@ -122,8 +122,14 @@ fn check_volume(path: &Path) {
 pub fn elmer(input: &[u8]) {
     const SERIAL: [&str; 6] =
         ["mesh.header", "mesh.nodes", "mesh.elements", "mesh.boundary", "mesh.names", "mesh.periodic"];
-    const PART: [&str; 6] =
-        ["part.1.header", "part.1.nodes", "part.1.elements", "part.1.boundary", "part.1.shared", "mesh.periodic"];
+    const PART: [&str; 6] = [
+        "part.1.header",
+        "part.1.nodes",
+        "part.1.elements",
+        "part.1.boundary",
+        "part.1.shared",
+        "mesh.periodic",
+    ];
     // The first byte selects the layout.
     let Some((first, input)) = input.split_first() else { return };
     let (names, others) = if first & 1 == 0 { (SERIAL, PART) } else { (PART, SERIAL) };
