@@ -458,7 +458,7 @@ pub fn run_quality(options: &Quality) -> Result<(), Failure> {
 /// Refuses extensions other than `.svg` for histograms; pipes and devices have none.
 fn refuse_other_pictures(file: &Path) -> Result<(), Failure> {
     let is_file = matches!(Destination::of(file), Ok(Destination::File(_)));
-    if is_file && file.extension().is_none_or(|ending| ending != "svg") {
+    if is_file && file.extension().is_none_or(|ending| !ending.eq_ignore_ascii_case("svg")) {
         return Err(Failure::input(format!("histograms are drawn as .svg, not {}", file.display())));
     }
     Ok(())

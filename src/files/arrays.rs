@@ -1,6 +1,6 @@
 //! Surfaces and meshes in memory.
 
-use super::input::Fault;
+use super::input::{Fault, coordinate};
 use std::collections::BTreeMap;
 
 /// The triangles of one or several closed surfaces.
@@ -53,8 +53,9 @@ pub(super) fn check(
     points: &[[f64; 3]],
     lengths: impl IntoIterator<Item = (&'static str, usize, usize)>,
 ) -> Result<(), ArrayError> {
-    if let Some(bad) = points.iter().position(|point| point.iter().any(|x| !x.is_finite())) {
-        return Err(ArrayError(format!("point {bad} has a coordinate that is not a finite number")));
+    for (k, point) in points.iter().enumerate() {
+        let checked = point.iter().try_for_each(|&x| coordinate(x).map(drop));
+        checked.map_err(|message| ArrayError(format!("point {k}: {message}")))?;
     }
     for (what, length, expected) in lengths {
         if length != 0 && length != expected {

@@ -10,14 +10,16 @@
 //! The lines are optional. Numbers may be on any number of lines. `#` starts a comment, an
 //! extension of NETGEN's format.
 
-use super::input::ReadError;
+use super::input::{ReadError, coordinate};
 use crate::Point;
 use crate::ground::size::Source;
 use std::path::Path;
 
-/// Maximum number of sources in a file, including those along lines: 50 times what any mesh on one
-/// computer needs.
-const MOST_SOURCES: usize = 20_000_000;
+/// Maximum number of sources along the lines of a file, 32 MB of them: a short file with a tiny
+/// size must not fill the memory.
+const MOST_SOURCES: usize = 1_000_000;
+/// Maximum number of points or lines that a file may announce.
+const MOST_COUNT: f64 = 1e9;
 
 /// Reads the sources of a mesh-size file; lines become sources one size apart.
 ///
@@ -39,12 +41,18 @@ fn parse(text: &str) -> Result<Vec<Source>, (usize, String)> {
     if words.is_at_end() {
         return Ok(sources);
     }
+    let mut along_lines = 0.0;
     for _ in 0..words.count("the number of lines")? {
         let [from, to] = [words.point("the first end of a line")?, words.point("the second end of a line")?];
         let size = words.size()?;
         let pieces = ((to - from).norm() / size).ceil().max(1.0);
-        if pieces + sources.len() as f64 > MOST_SOURCES as f64 {
-            return Err((words.line, format!("the size {size} is too small for a line from {from} to {to}")));
+        along_lines += pieces + 1.0;
+        if along_lines > MOST_SOURCES as f64 {
+            let most = format!("lines can have {MOST_SOURCES} points with sizes in all");
+            return Err((
+                words.line,
+                format!("the size {size} is too small for a line from {from} to {to}: {most}"),
+            ));
         }
         let at = |piece: usize| from + (to - from) * (piece as f64 / pieces);
         sources.extend((0..=pieces as usize).map(|piece| Source { point: at(piece), size }));
@@ -92,14 +100,18 @@ impl<'a> Words<'a> {
 
     fn count(&mut self, what: &str) -> Result<usize, (usize, String)> {
         let number = self.number(what)?;
-        if number.fract() != 0.0 || !(0.0..=MOST_SOURCES as f64).contains(&number) {
+        if number.fract() != 0.0 || !(0.0..=MOST_COUNT).contains(&number) {
             return Err((self.line, format!("{number} is not {what}")));
         }
         Ok(number as usize)
     }
 
+    fn coordinate(&mut self, what: &str) -> Result<f64, (usize, String)> {
+        coordinate(self.number(what)?).map_err(|message| (self.line, message))
+    }
+
     fn point(&mut self, what: &str) -> Result<Point, (usize, String)> {
-        Ok(Point::new(self.number(what)?, self.number(what)?, self.number(what)?))
+        Ok(Point::new(self.coordinate(what)?, self.coordinate(what)?, self.coordinate(what)?))
     }
 
     fn size(&mut self) -> Result<f64, (usize, String)> {
@@ -134,6 +146,9 @@ mod tests {
             ("1\n0 0 0 inf", 2, "expected a size, found `inf`"),
             ("2\n0 0 0 1\n0 0", 3, "ends before a point"),
             ("0\n1\n0 0 0 1 0 0 1e-300", 3, "too small"),
+            ("0\n2\n0 0 0 6 0 0 1e-5\n0 0 0 6 0 0 1e-5\n", 4, "1000000 points"),
+            ("1\n0 0 1e999 1\n", 2, "found `1e999`"),
+            ("1\n0 0 1e61 1\n", 2, "larger than 1e60"),
             ("0\n0\n\n7", 4, "unexpected `7` after"),
         ];
         for (text, line, reason) in cases {

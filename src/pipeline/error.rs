@@ -139,6 +139,18 @@ pub enum InputError {
     /// Several files, of which at least one is not a surface.
     #[error("several files are taken together only if all of them are surfaces")]
     SeveralFiles,
+    /// Two files share a face, but not its triangles.
+    #[error(
+        "{} and {} overlap at ({}, {}, {}): where surfaces touch, both need the same triangles, and no option makes them \
+         the same; export both from one model that shares the face, or move them apart",
+        files[0].display(), files[1].display(), place.x, place.y, place.z
+    )]
+    Overlap {
+        /// The two files.
+        files: Box<[PathBuf; 2]>,
+        /// The midpoint of an edge where triangles of both overlap.
+        place: Point,
+    },
     /// A mesh with tets that are not positively oriented.
     #[error(
         "{}{count} tets are inverted or flat, the first of them number {} (counted from 1) at ({}, {}, {})",

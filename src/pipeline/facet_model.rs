@@ -1,7 +1,7 @@
 //! Triangulated surfaces as input for the mesher.
 
 use super::coarse::{self, Allowed, Attempt, CoarseError, CoarseMesh, CoarseSettings};
-use super::error::Error;
+use super::error::{Error, InputError};
 use super::retries::Budget;
 use super::settings::InputSettings;
 use crate::Point;
@@ -83,6 +83,12 @@ impl FacetSolid {
             .map(|p| p.as_ref().file_stem().unwrap_or_default().to_string_lossy().into())
             .collect();
         Self::of(surfaces, &stems, settings).map_err(|error| {
+            if let FacetError::Overlap { place, files: [a, b] } = error
+                && a != b
+            {
+                let files = [a, b].map(|file| paths[file].as_ref().to_path_buf());
+                return InputError::Overlap { files: Box::new(files), place }.into();
+            }
             let path = if let [path] = paths { Some(path.as_ref().to_path_buf()) } else { None };
             Error::Facets { path, error: Box::new(error) }
         })
@@ -257,4 +263,38 @@ fn group_number(surfaces: &[Surface], groups: &[(usize, usize)], at: usize) -> u
     };
     let all_own = surfaces.len() == 1 && groups.iter().all(|group| own(group).is_some());
     own(&groups[at]).filter(|_| all_own).unwrap_or(at as u32 + 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A unit cube from x = `from`, whose face at x = 1 has this diagonal.
+    fn cube(from: u32, diagonal: [[u32; 3]; 2]) -> String {
+        let mut text = String::from("OFF\n8 7 0\n");
+        for k in 0..8 {
+            text += &format!("{} {} {}\n", from + (k & 1), k >> 1 & 1, k >> 2);
+        }
+        let [low, high] = ["4 0 4 6 2\n", "4 1 3 7 5\n"];
+        let other = if from == 0 { low } else { high };
+        let shared = diagonal.map(|[a, b, c]| format!("3 {a} {b} {c}\n")).concat();
+        text + other + &shared + "4 0 1 5 4\n4 2 6 7 3\n4 0 2 3 1\n4 4 5 7 6\n"
+    }
+
+    #[test]
+    fn files_that_share_a_face_with_other_triangles_are_named() {
+        let dir = tempfile::tempdir().unwrap();
+        let paths = ["a.off", "b.off"].map(|name| dir.path().join(name));
+        let read = |second: [[u32; 3]; 2]| {
+            std::fs::write(&paths[0], cube(0, [[1, 3, 7], [1, 7, 5]])).unwrap();
+            std::fs::write(&paths[1], cube(1, second)).unwrap();
+            FacetSolid::read(&paths, &InputSettings::default(), &mut |_| ())
+        };
+        assert_eq!(read([[0, 4, 6], [0, 6, 2]]).unwrap().model.bodies.len(), 2);
+        let error = read([[0, 4, 2], [4, 6, 2]]).unwrap_err();
+        let Error::Input(InputError::Overlap { files, place }) = &error else { panic!("{error}") };
+        assert_eq!((files.as_slice(), place.x), (paths.as_slice(), 1.0));
+        let said = error.to_string();
+        assert!(said.contains("a.off and ") && said.contains("both need the same triangles"), "{said}");
+    }
 }

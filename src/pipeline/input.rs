@@ -19,8 +19,7 @@ enum Kind {
 
 /// The kind by the file's extension; a folder is an Elmer mesh.
 fn kind(path: &Path) -> Result<Kind, Error> {
-    let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
-    match ending.as_str() {
+    match files::input::ending(path).as_str() {
         _ if path.is_dir() => Ok(Kind::Mesh),
         "geo" => Ok(Kind::Csg),
         "stl" | "off" | "obj" | "ply" | "poly" | "smesh" => Ok(Kind::Surface),

@@ -157,13 +157,15 @@ fn files_of(input: &Path) -> Vec<PathBuf> {
     if input.is_dir() {
         return elmer::only_layout(input).map(files_of_layout).unwrap_or_default();
     }
-    let beside: &[&str] = match input.extension().and_then(|ending| ending.to_str()) {
-        Some("ele" | "node" | "face") => &["ele", "node", "face"],
-        Some("poly") => &["poly", "node"],
-        Some("smesh") => &["smesh", "node"],
+    let ending = input.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+    let beside: &[&str] = match ending.as_str() {
+        "ele" | "node" | "face" => &["ele", "node", "face"],
+        "poly" | "smesh" => &["node"],
         _ => return vec![input.to_path_buf()],
     };
-    beside.iter().map(|ending| input.with_extension(ending)).collect()
+    let others = beside.iter().flat_map(|ending| [ending.to_string(), ending.to_ascii_uppercase()]);
+    let others = others.map(|ending| input.with_extension(ending)).filter(|path| path != input);
+    std::iter::once(input.to_path_buf()).chain(others).collect()
 }
 
 /// The files of an Elmer mesh without `mesh.names`, which is only overwritten with the same names.

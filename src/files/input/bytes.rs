@@ -1,6 +1,6 @@
 //! Parses binary data as numbers.
 
-use super::Fault;
+use super::{Fault, coordinate};
 use crate::Point;
 
 /// The rest of some binary data.
@@ -100,11 +100,7 @@ impl<'a> Bytes<'a> {
 
     /// Checks a number of `size` bytes that was just read.
     pub fn finite(&self, number: f64, size: usize) -> Result<f64, Fault> {
-        if number.is_finite() {
-            // Adding zero turns −0 into 0, so that equal points have equal bits.
-            return Ok(number + 0.0);
-        }
-        Err(Fault::byte(self.at - size, format!("a coordinate is not a finite number: {number}")))
+        coordinate(number).map_err(|message| Fault::byte(self.at - size, message))
     }
 
     /// Checks that the rest of the data can hold this many items of at least this size.

@@ -124,10 +124,7 @@ impl Fault {
     pub fn in_file(self, path: &Path, content: &[u8]) -> ReadError {
         let place = match self.at {
             At::File => Place::File,
-            At::Text(offset) => {
-                let before = &content[..offset.min(content.len())];
-                Place::Line(before.iter().filter(|&&b| b == b'\n').count() as u64 + 1)
-            }
+            At::Text(offset) => Place::Line(line_of(content, offset)),
             At::Byte(offset) => Place::Byte(offset as u64),
         };
         ReadError::Content { path: path.to_path_buf(), place, message: self.message }
@@ -175,9 +172,40 @@ pub(crate) fn load(path: &Path) -> Result<Vec<u8>, ReadError> {
     Ok(content)
 }
 
+/// The largest coordinate: products of five differences, as in tests of circumspheres, are finite.
+const LARGEST: f64 = 1e60;
+
+/// Checks a coordinate; adding zero turns −0 into 0, so that equal points have equal bits.
+///
+/// # Errors
+/// The message, if no mesh can be made of it.
+pub(crate) fn coordinate(x: f64) -> Result<f64, String> {
+    if x.abs() <= LARGEST {
+        return Ok(x + 0.0);
+    }
+    let reason =
+        if x.is_finite() { format!("larger than {LARGEST:e}") } else { "not a finite number".into() };
+    Err(format!("a coordinate is {reason}: {x:e}"))
+}
+
+/// The file beside `path` with another extension, in upper case if only that exists.
+pub(crate) fn beside(path: &Path, other: &str) -> PathBuf {
+    if ending(path) == other {
+        return path.to_path_buf();
+    }
+    let [lower, upper] = [other.to_owned(), other.to_ascii_uppercase()].map(|e| path.with_extension(e));
+    if upper.exists() && !lower.exists() { upper } else { lower }
+}
+
 /// The extension of a file name, in lower case without the dot.
 pub(crate) fn ending(path: &Path) -> String {
     path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase()
+}
+
+/// The line at an offset of a text, from 1.
+pub(crate) fn line_of(content: &[u8], offset: usize) -> u64 {
+    let before = &content[..offset.min(content.len())];
+    before.iter().filter(|&&b| b == b'\n').count() as u64 + 1
 }
 
 /// The start of some bytes, escaped for a message.

@@ -1,6 +1,6 @@
 //! Splits text into words and numbers.
 
-use super::{Fault, shown};
+use super::{Fault, coordinate, shown};
 use crate::Point;
 
 /// The rest of a text: words separated by blanks and line ends, without comments.
@@ -123,8 +123,11 @@ impl<'a> Words<'a> {
 
     /// Parses the next three words as a point.
     pub fn point(&mut self, what: &str) -> Result<Point, Fault> {
-        // Adding zero turns −0 into 0, so that equal points have equal bits.
-        Ok(Point::new(self.float(what)? + 0.0, self.float(what)? + 0.0, self.float(what)? + 0.0))
+        Ok(Point::new(self.coordinate(what)?, self.coordinate(what)?, self.coordinate(what)?))
+    }
+
+    fn coordinate(&mut self, what: &str) -> Result<f64, Fault> {
+        coordinate(self.float(what)?).map_err(|message| self.fault(message))
     }
 
     /// Parses the next word as an integer.

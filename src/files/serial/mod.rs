@@ -6,6 +6,7 @@ mod groups;
 mod netgen;
 mod runs;
 
+use super::input::ending;
 use super::joined::{self, Section, TextFormat, Whole};
 use super::output::Destination;
 use super::text::Line;
@@ -13,7 +14,6 @@ use super::{WriteError, Written, geomview, vtu};
 use crate::ground::comm::{Communicator, thread};
 use crate::ground::mesh::Names;
 use crate::ground::mesh::stream::MeshStream;
-use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
 /// The extensions that [`Format::of`] knows.
@@ -41,12 +41,12 @@ impl Format {
     /// # Errors
     /// If the extension is missing or unknown.
     pub fn of(path: &Path) -> Result<Self, WriteError> {
-        match path.extension().and_then(OsStr::to_str) {
-            Some("vtu") => Ok(Self::Vtu),
-            Some("msh") => Ok(Self::Gmsh),
-            Some("mesh") => Ok(Self::Medit),
-            Some("vol") => Ok(Self::Netgen),
-            Some("off") => Ok(Self::Off),
+        match ending(path).as_str() {
+            "vtu" => Ok(Self::Vtu),
+            "msh" => Ok(Self::Gmsh),
+            "mesh" => Ok(Self::Medit),
+            "vol" => Ok(Self::Netgen),
+            "off" => Ok(Self::Off),
             _ => Err(WriteError::UnknownFormat(path.to_path_buf())),
         }
     }
@@ -60,7 +60,7 @@ impl Format {
     pub fn fits(self, path: &Path) -> Result<(), WriteError> {
         let is_file = |path: &Path| matches!(Destination::of(path), Ok(Destination::File(_)));
         let Some(second) = self.second(path) else { return Ok(()) };
-        if path.extension() != Some(OsStr::new("vtu")) || !is_file(path) {
+        if ending(path) != "vtu" || !is_file(path) {
             return Err(WriteError::TwoFiles(path.to_path_buf()));
         }
         if is_file(&second) { Ok(()) } else { Err(WriteError::NoRegularFile(second)) }

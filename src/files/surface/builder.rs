@@ -3,6 +3,7 @@
 use super::Surface;
 use super::merge::Merger;
 use super::polygon::{self, PolygonFault};
+use super::repeated::{self, Place};
 use crate::Point;
 use crate::files::input::{Fault, counted};
 
@@ -14,6 +15,10 @@ pub(super) struct Builder {
     merged: usize,
     collapsed: usize,
     corners: Vec<u32>,
+    /// The key and the place of each face with triangles.
+    faces: Vec<(repeated::Key, usize)>,
+    /// The face of each triangle.
+    face_of: Vec<u32>,
 }
 
 impl Builder {
@@ -38,7 +43,15 @@ impl Builder {
     /// Starts with distinct points.
     pub fn of_distinct(points: Vec<Point>) -> Self {
         let surface = Surface { points, ..Surface::default() };
-        Self { surface, to_merged: None, merged: 0, collapsed: 0, corners: Vec::new() }
+        Self {
+            surface,
+            to_merged: None,
+            merged: 0,
+            collapsed: 0,
+            corners: Vec::new(),
+            faces: Vec::new(),
+            face_of: Vec::new(),
+        }
     }
 
     /// The points.
@@ -63,9 +76,21 @@ impl Builder {
         self.surface.groups.len() as u32 - 1
     }
 
-    /// Adds a polygon by the file's indices of its corners. With fewer than three distinct corners
-    /// it counts as collapsed.
-    pub fn polygon(&mut self, corners: &[u32], group: u32) -> Result<(), PolygonFault> {
+    /// Begins a face at this place of the file; the polygons and triangles that follow are its own.
+    /// `corners` are merged points.
+    pub fn face(&mut self, corners: &[u32], at: usize) {
+        let key = repeated::key(corners, self.surface.unoriented);
+        self.faces.push((key, at));
+    }
+
+    /// The order of corners is arbitrary: faces with either order are the same.
+    pub fn set_unoriented(&mut self) {
+        self.surface.unoriented = true;
+    }
+
+    /// Adds a polygon at this place of the file by the file's indices of its corners. With fewer
+    /// than three distinct corners it counts as collapsed.
+    pub fn polygon(&mut self, corners: &[u32], group: u32, at: usize) -> Result<(), PolygonFault> {
         let mut ring = std::mem::take(&mut self.corners);
         ring.clear();
         ring.extend(corners.iter().map(|&v| self.merged(v)));
@@ -73,6 +98,7 @@ impl Builder {
         while ring.len() > 1 && ring.first() == ring.last() {
             ring.pop();
         }
+        self.face(&ring, at);
         let done = match ring[..] {
             [] | [_] | [_, _] => {
                 self.collapsed += 1;
@@ -88,7 +114,7 @@ impl Builder {
         done
     }
 
-    /// Adds triangles of merged points.
+    /// Adds triangles of merged points to the last face.
     pub fn triangles(&mut self, triangles: &[[u32; 3]], group: u32) {
         for &[a, b, c] in triangles {
             if a == b || b == c || c == a {
@@ -96,23 +122,26 @@ impl Builder {
             } else {
                 self.surface.triangles.push([a, b, c]);
                 self.surface.group.push(group);
+                self.face_of.push(self.faces.len() as u32 - 1);
             }
         }
     }
 
-    /// Drops unused points and empty groups, and notes what was changed.
-    pub fn finish(self) -> Surface {
-        let Self { mut surface, merged, collapsed, .. } = self;
+    /// Drops repeated faces, unused points and empty groups, and notes what was changed; `place`
+    /// turns the places of faces into text.
+    pub fn finish(self, place: Place) -> Surface {
+        let Self { mut surface, merged, collapsed, faces, face_of, .. } = self;
+        let repeated = repeated::leave_out(&mut surface, &faces, &face_of, place);
         drop_unused(&mut surface);
         drop_empty_groups(&mut surface);
-        let mut note = |count: usize, what: &str, done: &str| {
-            if count > 0 {
-                surface.notes.push(format!("{} {done}", counted(count, what)));
-            }
+        let note = |count: usize, what: &str, done: &str| {
+            (count > 0).then(|| format!("{} {done}", counted(count, what)))
         };
-        note(merged, "point", "at the very place of others merged with them");
-        note(collapsed, "face", "with fewer than three different corners left out");
-        note(surface.loose_points.len(), "point", "in no face");
+        let loose = surface.loose_points.len();
+        surface.notes.extend(note(merged, "point", "at the very place of others merged with them"));
+        surface.notes.extend(note(collapsed, "face", "with fewer than three different corners left out"));
+        surface.notes.extend(repeated);
+        surface.notes.extend(note(loose, "point", "in no face"));
         surface
     }
 }

@@ -5,9 +5,9 @@
 //! distinguishes faces (the solids of an STL, the groups or materials of an OBJ, the facet markers
 //! of TetGen). Polygons are triangulated by constrained Delaunay triangulation in their plane, so
 //! they need not be convex. Points with equal coordinates are merged, triangles that lose a corner
-//! by that are dropped, and unused points are listed separately. STL has no connectivity, so only
-//! there points that are merely close are merged too, if that closes gaps. [`Surface::notes`]
-//! reports all of this.
+//! by that and copies of faces are dropped, and unused points are listed separately. STL has no
+//! connectivity, so only there points that are merely close are merged too, if that closes gaps.
+//! [`Surface::notes`] reports all of this.
 //!
 //! *Not* checked here: whether the surface is closed, oriented, or self-intersecting. Normals in
 //! the files are ignored.
@@ -21,6 +21,7 @@ mod off;
 mod ply;
 mod poly;
 mod polygon;
+mod repeated;
 mod stl;
 #[cfg(test)]
 mod tests;
@@ -137,7 +138,9 @@ pub fn of_arrays(arrays: &SurfaceArrays) -> Result<Surface, ArrayError> {
         }
         let number = arrays.numbers.get(index).copied().unwrap_or(numbers[0]);
         let group = numbers.binary_search(&number).expect("all numbers are listed");
-        builder.triangles(&[corners.map(|corner| builder.merged(corner))], group as u32);
+        let corners = corners.map(|corner| builder.merged(corner));
+        builder.face(&corners, index);
+        builder.triangles(&[corners], group as u32);
     }
-    Ok(builder.finish())
+    Ok(builder.finish(&|triangle| format!("triangle {triangle}")))
 }

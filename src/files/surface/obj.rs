@@ -5,7 +5,7 @@
 
 use super::Surface;
 use super::builder::Builder;
-use crate::files::input::{Fault, Words, counted, shown};
+use crate::files::input::{Fault, Words, counted, line_of, shown};
 use std::collections::BTreeMap;
 
 pub(super) fn parse(content: &[u8]) -> Result<Surface, Fault> {
@@ -37,7 +37,7 @@ pub(super) fn parse(content: &[u8]) -> Result<Surface, Fault> {
     if total == 0 {
         return Err(Fault::file("the file has no faces"));
     }
-    let mut surface = faces.builder.finish();
+    let mut surface = faces.builder.finish(&|offset| format!("line {}", line_of(content, offset)));
     faces.labels.name(&mut surface);
     if skipped > 0 {
         surface.notes.push(format!("{} left out", counted(skipped, "line, point or free-form element")));
@@ -110,7 +110,7 @@ impl Faces {
         }
         let group = self.labels.group(&mut self.builder);
         self.builder
-            .polygon(&self.corners, group)
+            .polygon(&self.corners, group, begin.offset())
             .map_err(|fault| begin.fault(format!("the face cannot be cut into triangles: {fault}")))
     }
 }

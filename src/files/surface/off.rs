@@ -4,7 +4,7 @@
 
 use super::Surface;
 use super::builder::Builder;
-use crate::files::input::{Fault, Words, shown};
+use crate::files::input::{Fault, Words, line_of, shown};
 
 pub(super) fn parse(content: &[u8]) -> Result<Surface, Fault> {
     let mut words = Words::with_comments(content);
@@ -33,7 +33,7 @@ pub(super) fn parse(content: &[u8]) -> Result<Surface, Fault> {
             corners.push(words.vertex(0, count)?);
         }
         builder
-            .polygon(&corners, group)
+            .polygon(&corners, group, begin.offset())
             .map_err(|fault| begin.fault(format!("the face cannot be cut into triangles: {fault}")))?;
         // The rest of the line is a colour.
         words.rest_of_line();
@@ -41,7 +41,7 @@ pub(super) fn parse(content: &[u8]) -> Result<Surface, Fault> {
     if faces == 0 {
         return Err(Fault::file("the file has no faces"));
     }
-    Ok(builder.finish())
+    Ok(builder.finish(&|offset| format!("line {}", line_of(content, offset))))
 }
 
 /// Parses the keyword, which is optional; returns whether points have more than coordinates.

@@ -3,7 +3,7 @@
 use super::Surface;
 use super::builder::Builder;
 use crate::Point;
-use crate::files::input::{Bytes, Fault, Words, shown};
+use crate::files::input::{Bytes, Fault, Words, coordinate, line_of, shown};
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Number {
@@ -94,6 +94,22 @@ impl Data<'_> {
         }
     }
 
+    /// The end of the last number.
+    fn offset(&self) -> usize {
+        match self {
+            Self::Text(words) => words.offset(),
+            Self::Binary(bytes) => bytes.offset(),
+        }
+    }
+
+    /// A fault at this offset.
+    fn fault_at(&self, offset: usize, message: String) -> Fault {
+        match self {
+            Self::Text(_) => Fault::text(offset, message),
+            Self::Binary(_) => Fault::byte(offset, message),
+        }
+    }
+
     fn fault(&self, message: impl Into<String>) -> Fault {
         match self {
             Self::Text(words) => words.fault(message),
@@ -145,27 +161,26 @@ pub(super) fn parse(content: &[u8]) -> Result<Surface, Fault> {
         match element.name.as_slice() {
             b"vertex" => read_points(element, count, &mut data, &mut points)?,
             b"face" => read_faces(element, count, vertices, &mut data, &mut faces)?,
+            b"tristrips" => read_strips(element, count, vertices, &mut data, &mut faces)?,
             _ => (0..count).try_for_each(|_| skip(&element.properties, &mut data))?,
         }
     }
     if faces.ends.is_empty() {
-        let strips = elements.iter().any(|e| e.name == b"tristrips");
-        return Err(Fault::file(if strips {
-            "the file has strips of triangles (`tristrips`), which are not read; write faces"
-        } else {
-            "the file has no faces"
-        }));
+        return Err(Fault::file("the file has no faces"));
     }
     let mut builder = Builder::new(points)?;
     let group = builder.group("surface".into(), 1);
     let mut begin = 0;
-    for (k, &end) in faces.ends.iter().enumerate() {
+    for (&end, &at) in faces.ends.iter().zip(&faces.places) {
         builder
-            .polygon(&faces.corners[begin..end], group)
-            .map_err(|fault| Fault::file(format!("face {k} cannot be cut into triangles: {fault}")))?;
+            .polygon(&faces.corners[begin..end], group, at)
+            .map_err(|fault| data.fault_at(at, format!("the face cannot be cut into triangles: {fault}")))?;
         begin = end;
     }
-    Ok(builder.finish())
+    Ok(builder.finish(&|offset| match data {
+        Data::Text(_) => format!("line {}", line_of(content, offset)),
+        Data::Binary(_) => format!("byte {offset}"),
+    }))
 }
 
 fn header(content: &[u8]) -> Result<(Vec<Element>, Data<'_>), Fault> {
@@ -267,11 +282,7 @@ fn read_points(
                 continue;
             };
             let number = data.number(property.number)?;
-            if !number.is_finite() {
-                return Err(data.fault(format!("a coordinate is not a finite number: {number}")));
-            }
-            // Adding zero turns −0 into 0, so that equal points have equal bits.
-            point[axis] = number + 0.0;
+            point[axis] = coordinate(number).map_err(|message| data.fault(message))?;
         }
         points.push(point.into());
     }
@@ -283,6 +294,78 @@ fn read_points(
 struct Faces {
     corners: Vec<u32>,
     ends: Vec<usize>,
+    /// The place of each polygon in the file.
+    places: Vec<usize>,
+}
+
+impl Faces {
+    fn end(&mut self, at: usize) {
+        self.ends.push(self.corners.len());
+        self.places.push(at);
+    }
+}
+
+/// The types of the length and the numbers of a list, with the properties before and after it.
+type List<'e> = (&'e [Property], [Number; 2], &'e [Property]);
+
+/// The list of vertices of an element.
+fn vertex_list<'e>(element: &'e Element, data: &Data) -> Result<List<'e>, Fault> {
+    let list = element.property(&[b"vertex_indices", b"vertex_index"]);
+    let kinds = list.and_then(|k| Some([element.properties[k].length?, element.properties[k].number]));
+    match list.zip(kinds.filter(|[_, number]| number.is_whole())) {
+        Some((k, kinds)) => Ok((&element.properties[..k], kinds, &element.properties[k + 1..])),
+        None => {
+            let name = shown(&element.name);
+            let what = format!("the element `{name}` has no list `vertex_indices` of whole numbers");
+            Err(data.fault_at(0, what))
+        }
+    }
+}
+
+/// Reads the number of a vertex.
+fn vertex(data: &mut Data, kind: Number, vertices: u64) -> Result<u32, Fault> {
+    let vertex = data.number(kind)?;
+    checked_vertex(data, vertex, vertices)
+}
+
+fn checked_vertex(data: &Data, vertex: f64, vertices: u64) -> Result<u32, Fault> {
+    if (0.0..vertices as f64).contains(&vertex) {
+        return Ok(vertex as u32);
+    }
+    Err(data.fault(format!("there is no vertex {vertex}: the file has {vertices}, from 0")))
+}
+
+/// Reads strips of triangles: each vertex makes a triangle with the two before it, every other one
+/// in reverse order. The number −1 begins a new strip.
+fn read_strips(
+    element: &Element,
+    count: usize,
+    vertices: u64,
+    data: &mut Data,
+    faces: &mut Faces,
+) -> Result<(), Fault> {
+    let (before, [length, kind], after) = vertex_list(element, data)?;
+    for _ in 0..count {
+        skip(before, data)?;
+        let mut strip: Vec<u32> = Vec::new();
+        for _ in 0..data.length(length, kind)? {
+            let number = data.number(kind)?;
+            let at = data.offset();
+            if number == -1.0 || (kind == Number::U32 && number == f64::from(u32::MAX)) {
+                strip.clear();
+                continue;
+            }
+            strip.push(checked_vertex(data, number, vertices)?);
+            let &[.., a, b, c] = &strip[..] else { continue };
+            // A vertex that is repeated continues the strip elsewhere.
+            if a != b && b != c && c != a {
+                faces.corners.extend(if strip.len() % 2 == 1 { [a, b, c] } else { [b, a, c] });
+                faces.end(at);
+            }
+        }
+        skip(after, data)?;
+    }
+    Ok(())
 }
 
 fn read_faces(
@@ -292,26 +375,17 @@ fn read_faces(
     data: &mut Data,
     faces: &mut Faces,
 ) -> Result<(), Fault> {
-    let list = element.property(&[b"vertex_indices", b"vertex_index"]);
-    let list =
-        list.filter(|&k| element.properties[k].length.is_some() && element.properties[k].number.is_whole());
-    let list = list.ok_or(Fault::file("the element `face` has no list `vertex_indices` of whole numbers"))?;
-    let (before, rest) = element.properties.split_at(list);
-    let (property, after) = rest.split_first().expect("the list is there");
+    let (before, [length, kind], after) = vertex_list(element, data)?;
     faces.ends.reserve(count);
     for _ in 0..count {
         skip(before, data)?;
-        let sides = data.length(property.length.expect("a list"), property.number)?;
+        let sides = data.length(length, kind)?;
+        let at = data.offset();
         for _ in 0..sides {
-            let vertex = data.number(property.number)?;
-            if !(0.0..vertices as f64).contains(&vertex) {
-                return Err(
-                    data.fault(format!("there is no vertex {vertex}: the file has {vertices}, from 0"))
-                );
-            }
-            faces.corners.push(vertex as u32);
+            let vertex = vertex(data, kind, vertices)?;
+            faces.corners.push(vertex);
         }
-        faces.ends.push(faces.corners.len());
+        faces.end(at);
         skip(after, data)?;
     }
     Ok(())

@@ -6,7 +6,7 @@ use super::facet::{self, Fill};
 use super::{ReadError, Region, Surface};
 use crate::Point;
 use crate::files::input::tetgen_nodes::{self, Nodes};
-use crate::files::input::{Fault, Words, float, int, load, shown};
+use crate::files::input::{Fault, Words, beside, float, int, line_of, load, shown};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -25,20 +25,21 @@ pub(super) fn read(path: &Path, kind: Kind) -> Result<Surface, ReadError> {
     let mut words = Words::with_comments(&content);
     let mut nodes = tetgen_nodes::read(&mut words).map_err(|fault| fault.in_file(path, &content))?;
     if nodes.points.is_empty() {
-        let beside = path.with_extension("node");
+        let beside = beside(path, "node");
         let content = load(&beside)?;
         nodes = tetgen_nodes::read(&mut Words::with_comments(&content))
             .map_err(|fault| fault.in_file(&beside, &content))?;
     }
-    parse(words, nodes, kind).map_err(|fault| fault.in_file(path, &content))
+    parse(words, nodes, kind, &content).map_err(|fault| fault.in_file(path, &content))
 }
 
 /// Parses the sections after the points.
-pub(super) fn parse(mut words: Words, nodes: Nodes, kind: Kind) -> Result<Surface, Fault> {
+fn parse(mut words: Words, nodes: Nodes, kind: Kind, content: &[u8]) -> Result<Surface, Fault> {
     let Nodes { base, points } = nodes;
     let count = points.len();
     let mut facets =
         Facets { builder: Builder::new(points)?, base, count, groups: BTreeMap::new(), edges: Vec::new() };
+    facets.builder.set_unoriented();
     let facet_count = words.count("facets", 1)?;
     let has_markers = words.next_in_line().is_some_and(|flag| flag != b"0");
     words.rest_of_line();
@@ -53,9 +54,8 @@ pub(super) fn parse(mut words: Words, nodes: Nodes, kind: Kind) -> Result<Surfac
     }
     let holes = holes(&mut words)?;
     let regions = regions(&mut words)?;
-    let mut surface = facets.builder.finish();
+    let mut surface = facets.builder.finish(&|offset| format!("line {}", line_of(content, offset)));
     (surface.holes, surface.regions, surface.loose_edges) = (holes, regions, facets.edges);
-    surface.unoriented = true;
     Ok(surface)
 }
 
@@ -123,12 +123,13 @@ impl Facets {
                 self.edges.extend(pairs.map(|pair| [builder.place(pair[0]), builder.place(pair[1])]));
                 Ok(())
             }
-            [corners] if holes.is_empty() => builder.polygon(corners, group).map_err(located),
+            [corners] if holes.is_empty() => builder.polygon(corners, group, at.offset()).map_err(located),
             _ => {
                 let merged = |v: &u32| builder.merged(*v);
                 let loops: Vec<Vec<u32>> = loops.iter().map(|l| l.iter().map(merged).collect()).collect();
                 let fill = Fill::Enclosed(holes);
                 let triangles = facet::triangulate(builder.points(), &loops, &fill).map_err(located)?;
+                builder.face(&loops.concat(), at.offset());
                 builder.triangles(&triangles, group);
                 Ok(())
             }

@@ -5,9 +5,10 @@
 
 use super::builder::Builder;
 use super::merge::Merger;
+use super::repeated::Place;
 use super::{Surface, gaps};
 use crate::Point;
-use crate::files::input::{Bytes, Fault, Words, counted, shown};
+use crate::files::input::{Bytes, Fault, Words, counted, line_of, shown};
 
 /// Bytes before the first triangle of a binary file: 80 of free text, and the number of triangles.
 const HEAD: usize = 84;
@@ -19,8 +20,11 @@ const PER_TRIANGLE: usize = 50;
 struct Facets {
     merger: Merger,
     triangles: Vec<[u32; 3]>,
+    /// The place of each triangle in the file.
+    places: Vec<usize>,
     solid: Vec<u32>,
     names: Vec<String>,
+    is_binary: bool,
 }
 
 impl Facets {
@@ -53,7 +57,10 @@ pub(super) fn parse(content: &[u8]) -> Result<Surface, Fault> {
     if facets.triangles.is_empty() {
         return Err(Fault::file("the file has no triangles"));
     }
-    Ok(joined(facets))
+    let is_binary = facets.is_binary;
+    Ok(joined(facets, &|offset| {
+        if is_binary { format!("byte {offset}") } else { format!("line {}", line_of(content, offset)) }
+    }))
 }
 
 fn is_text(content: &[u8]) -> bool {
@@ -62,8 +69,8 @@ fn is_text(content: &[u8]) -> bool {
 }
 
 /// Merges close points where that closes gaps, and builds the surface.
-fn joined(facets: Facets) -> Surface {
-    let Facets { merger, mut triangles, solid, names } = facets;
+fn joined(facets: Facets, place: Place) -> Surface {
+    let Facets { merger, mut triangles, places, solid, names, .. } = facets;
     let points = merger.into_points();
     let closed = gaps::close(&points, &mut triangles);
     let mut builder = Builder::of_distinct(points);
@@ -76,10 +83,11 @@ fn joined(facets: Facets) -> Surface {
         };
         builder.group(name, k as i64 + 1);
     }
-    for (triangle, solid) in triangles.iter().zip(solid) {
+    for ((triangle, solid), at) in triangles.iter().zip(solid).zip(places) {
+        builder.face(triangle, at);
         builder.triangles(&[*triangle], solid);
     }
-    let mut surface = builder.finish();
+    let mut surface = builder.finish(place);
     if let Some(closed) = closed {
         // Merged points are not loose points of the file.
         surface.loose_points.clear();
@@ -96,10 +104,12 @@ fn joined(facets: Facets) -> Surface {
 }
 
 fn binary(content: &[u8], count: usize) -> Result<Facets, Fault> {
-    let mut facets = Facets { names: vec![String::new()], solid: vec![0; count], ..Facets::default() };
+    let mut facets =
+        Facets { names: vec![String::new()], solid: vec![0; count], is_binary: true, ..Facets::default() };
     facets.triangles.reserve(count);
     let mut bytes = Bytes::new(content, HEAD, false);
     for _ in 0..count {
+        facets.places.push(bytes.offset());
         bytes.take(12, "a normal")?;
         let mut triangle = [0; 3];
         for corner in &mut triangle {
@@ -135,6 +145,7 @@ fn solid(words: &mut Words, facets: &mut Facets) -> Result<(), Fault> {
         if !word.eq_ignore_ascii_case(b"facet") {
             return Err(words.fault(format!("expected `facet` or `endsolid`, found `{}`", shown(word))));
         }
+        facets.places.push(words.offset());
         // The normal is everything before `outer loop`; it is often wrong and not needed.
         const MOST: usize = 5;
         let mut before = 0;

@@ -166,13 +166,14 @@ fn equal_points_are_merged_and_collapsed_faces_dropped_with_notes() {
     let text = "OFF\n6 3 0\n0 0 0\n1 0 0\n0 1 0\n-0 0 0\n9 9 9\n0 1 0\n3 0 1 2\n3 0 3 1\n4 3 1 2 5\n";
     let surface = read_as("a.off", text).unwrap();
     assert_eq!(surface.points.len(), 3);
-    assert_eq!(surface.triangles, [[0, 1, 2], [0, 1, 2]]);
+    assert_eq!(surface.triangles, [[0, 1, 2]]);
     assert_eq!(surface.loose_points, [Point::new(9., 9., 9.)]);
     assert_eq!(
         surface.notes,
         [
             "2 points at the very place of others merged with them",
             "1 face with fewer than three different corners left out",
+            "1 face listed before left out, the first at line 11: it is at line 9",
             "1 point in no face",
         ]
     );
@@ -295,6 +296,103 @@ fn broken_ply_files_are_refused_with_their_place() {
     refused("a.ply", format!("{small}3 0 1 -1\n"), ":13", "no vertex -1");
     refused("a.ply", format!("{small}200 0 1 2\n"), ":13", "200 entries");
     refused("a.ply", format!("{}3 0 1 2\n", small.replace("1 0 0", "inf 0 0")), ":11", "not a finite number");
+}
+
+/// A PLY with the strips of a tet: a header with this format, and a list of `int`.
+fn strips_head(format: &str) -> String {
+    format!(
+        "ply\nformat {format} 1.0\nelement vertex 4\nproperty double x\nproperty double y\nproperty double z\n\
+         element tristrips 1\nproperty list int int vertex_indices\nend_header\n"
+    )
+}
+
+/// Two strips, and a vertex that is repeated to turn a corner.
+const STRIPS: [i32; 10] = [0, 2, 1, 3, -1, 1, 1, 0, 3, 2];
+
+#[test]
+fn ply_strips_become_triangles_in_text_and_binary() {
+    // The first strip is (0 2 1) and (1 2 3), the second (1 0 3) reversed, and (0 3 2).
+    let numbers: Vec<String> = STRIPS.iter().map(i32::to_string).collect();
+    let mut text = strips_head("ascii");
+    POINTS.iter().for_each(|[x, y, z]| text += &format!("{x} {y} {z}\n"));
+    text += &format!("10 {}\n", numbers.join(" "));
+    assert!(reads_tet("a.ply", &text).notes.is_empty());
+    refused("a.ply", text.replace(" 3 2\n", " 4 2\n"), ":14", "no vertex 4: the file has 4, from 0");
+    refused("a.ply", text.replace("10 0", "11 0"), ":15", "the file ends before a value");
+    refused("a.ply", text.replace("10 0 2 1 3 -1 1 1 0 3 2", "2 0 1"), "", "no faces");
+    for big in [false, true] {
+        let head = strips_head(if big { "binary_big_endian" } else { "binary_little_endian" });
+        let int = |n: i32| if big { n.to_be_bytes() } else { n.to_le_bytes() };
+        let double = |x: f64| if big { x.to_be_bytes() } else { x.to_le_bytes() };
+        let mut bytes = head.into_bytes();
+        bytes.extend(POINTS.iter().flatten().flat_map(|&x| double(x)));
+        bytes.extend(int(10));
+        bytes.extend(STRIPS.iter().flat_map(|&n| int(n)));
+        reads_tet("a.ply", &bytes);
+        // Without a sign the mark of a new strip is the largest number.
+        let at = bytes.windows(7).position(|w| w == b"int int").unwrap() + 4;
+        bytes.insert(at, b'u');
+        reads_tet("a.ply", &bytes);
+    }
+}
+
+#[test]
+fn a_face_that_a_file_has_twice_is_left_out_with_its_place() {
+    let [a, b, c, d] = ["0 2 1", "0 1 3", "0 3 2", "1 2 3"];
+    let points = "0 0 0\n1 0 0\n0 1 0\n0 0 1\n";
+    let note = |at: &str, before: &str| {
+        format!("1 face listed before left out, the first at {at}: it is at {before}")
+    };
+    let off = format!("OFF\n4 5 0\n{points}3 {a}\n3 {b}\n3 {c}\n3 {d}\n3 3 0 1\n");
+    assert_eq!(reads_tet("a.off", off).notes, [note("line 11", "line 8")]);
+    let obj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\ng a\nf 1 3 2\nf 1 2 4\nf 1 4 3\ng b\nf 2 3 4\nf 3 4 2\n";
+    assert_eq!(reads_tet("a.obj", obj).notes, [note("line 11", "line 10")]);
+    let head = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n\
+        element face 5\nproperty list uchar int vertex_index\nend_header\n";
+    let ply = format!("{head}{points}3 {a}\n3 {b}\n3 {c}\n3 {d}\n3 {a}\n");
+    assert_eq!(reads_tet("a.ply", ply).notes, [note("line 18", "line 14")]);
+    let twice = [FACES.as_slice(), &FACES[..1]].concat();
+    assert_eq!(reads_tet("a.stl", stl_text("a", &twice)).notes, [note("line 30", "line 2")]);
+    assert_eq!(reads_tet("a.stl", stl_binary(b"", &POINTS, &twice)).notes, [note("byte 284", "byte 84")]);
+    // TetGen's facets have no direction.
+    let nodes = "4 3 0 0\n0 0 0 0\n1 1 0 0\n2 0 1 0\n3 0 0 1\n";
+    let smesh = format!("{nodes}5 0\n3 {a}\n3 {b}\n3 {c}\n3 {d}\n3 0 1 2\n0\n0\n");
+    assert_eq!(reads_tet("a.smesh", smesh).notes, [note("line 11", "line 7")]);
+}
+
+#[test]
+fn a_polygon_twice_is_left_out_wherever_it_begins() {
+    let cube = "OFF\n8 7 12\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n0 0 1\n1 0 1\n1 1 1\n0 1 1\n\
+        4 3 2 1 0\n4 4 5 6 7\n4 0 1 5 4\n4 1 2 6 5\n4 2 3 7 6\n4 3 0 4 7\n4 5 6 7 4\n";
+    let surface = read_as("a.off", cube).unwrap();
+    assert_eq!((surface.triangles.len(), surface.notes.len()), (12, 1));
+}
+
+#[test]
+fn a_face_of_two_solids_that_touch_is_kept_in_both_directions() {
+    let text = "OFF\n5 8 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n0 0 -1\n\
+        3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n3 0 1 2\n3 1 0 4\n3 2 1 4\n3 0 2 4\n";
+    let surface = read_as("a.off", text).unwrap();
+    assert_eq!((surface.triangles.len(), surface.notes.len()), (8, 0));
+}
+
+#[test]
+fn coordinates_without_a_mesh_are_refused_with_their_place() {
+    for number in ["1e999", "1e61", "-1e999"] {
+        let text = stl_text("a", &FACES).replacen("vertex 1", &format!("vertex {number}"), 1);
+        refused("a.stl", text, ":6", "a");
+        refused("a.off", format!("OFF\n{}", OFF.replacen("1 0 0", &format!("{number} 0 0"), 1)), ":4", "a");
+        refused("a.obj", format!("v 0 0 0\nv 0 {number} 0\nv 0 0 1\nf 1 2 3\n"), ":2", "a");
+        refused("a.poly", POLY.replacen("2 4 0 0", &format!("2 4 {number} 0"), 1), ":4", "a");
+        refused("a.smesh", format!("3 3\n0 0 0 0\n1 1 0 0\n2 0 1 {number}\n1\n3 0 1 2\n"), ":4", "a");
+        let head = strips_head("ascii").replace("tristrips", "face");
+        refused(
+            "a.ply",
+            format!("{head}0 0 0\n0 {number} 0\n1 1 1\n0 1 0\n3 0 1 2\n"),
+            ":11",
+            "a coordinate is",
+        );
+    }
 }
 
 /// A cube 0 … 4 with a square window through its top facet, in TetGen's format.

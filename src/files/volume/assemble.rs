@@ -5,7 +5,7 @@ use super::raw::{Label, Raw};
 use super::{VolumeMesh, boundary, classify, orient, periodic};
 use crate::files::input::{Fault, counted};
 use crate::ground::mesh::topology::{self, Faces};
-use crate::ground::mesh::{self, BoundaryTriangle, Mesh, TetId, VertexId};
+use crate::ground::mesh::{self, BoundaryTriangle, FaceId, Mesh, TetId, VertexId};
 use csg::{BodyId, PatchId};
 use std::collections::BTreeMap;
 
@@ -24,12 +24,9 @@ pub(super) fn assemble(mut raw: Raw) -> Result<VolumeMesh, Fault> {
     let Raw { points, tets, tet_labels, .. } = &raw;
     let mut tets: Vec<[VertexId; 4]> = tets.iter().map(|t| t.map(VertexId)).collect();
     let faces = topology::faces(points.len(), &tets);
-    let face_tets = topology::face_tets(faces.faces.len(), &faces.tet_faces).map_err(|face| {
-        let [a, b, c] = faces.faces[face.index()].map(|v| v.0);
-        Fault::file(format!(
-            "more than two tetrahedra have the face of the vertices {a}, {b}, {c} (counted from 0)"
-        ))
-    })?;
+    let face_tets = topology::face_tets(faces.faces.len(), &faces.tet_faces)
+        .map_err(|face| crowded(&raw, &faces, face))?;
+    refuse_equal(&raw, &faces, &face_tets)?;
     let mut table = FaceTable { faces, tets: face_tets };
     let turned = orient::orient(points, &mut tets, &mut table);
     let (labels, body_of) = numbered(tet_labels);
@@ -96,10 +93,51 @@ fn check_corners(raw: &Raw) -> Result<(), Fault> {
     let twice = |t: &[u32; 4]| (0..4).any(|i| t[..i].contains(&t[i]));
     match raw.tets.iter().position(twice) {
         Some(k) => {
-            Err(Fault::file(format!("tetrahedron {} has the same vertex twice: {:?}", k + 1, raw.tets[k])))
+            let number = raw.tet_number(k);
+            Err(Fault::file(format!("tetrahedron {number} has the same vertex twice: {:?}", raw.tets[k])))
         }
         None => Ok(()),
     }
+}
+
+/// The fault of a face with more than two tets.
+fn crowded(raw: &Raw, faces: &Faces, face: FaceId) -> Fault {
+    let tets: Vec<usize> = (0..raw.tets.len()).filter(|&tet| faces.tet_faces[tet].contains(&face)).collect();
+    for (k, &first) in tets.iter().enumerate() {
+        if let Some(&second) = tets[k + 1..].iter().find(|&&t| is_same(faces, first, t)) {
+            return equal(raw, [first, second]);
+        }
+    }
+    let [a, b, c] = faces.faces[face.index()].map(|v| raw.points[v.index()]);
+    let numbers: Vec<String> = tets.iter().take(3).map(|&tet| raw.tet_number(tet).to_string()).collect();
+    Fault::file(format!(
+        "more than two tetrahedra have the same face, with corners {a}, {b}, {c}: numbers {}{}",
+        numbers.join(", "),
+        if tets.len() > numbers.len() { " and more" } else { "" }
+    ))
+}
+
+/// Refuses two tets with the same vertices that share all faces with each other only.
+fn refuse_equal(raw: &Raw, faces: &Faces, face_tets: &[[u32; 2]]) -> Result<(), Fault> {
+    let twice = faces.tet_faces.iter().zip(0_u32..).find_map(|([face, ..], tet)| {
+        let [first, second] = face_tets[face.index()];
+        let is_twice = first == tet && second != u32::MAX && is_same(faces, first as usize, second as usize);
+        is_twice.then_some([first as usize, second as usize])
+    });
+    twice.map_or(Ok(()), |tets| Err(equal(raw, tets)))
+}
+
+/// Whether two tets have the same vertices, and so the same faces.
+fn is_same(faces: &Faces, first: usize, second: usize) -> bool {
+    faces.tet_faces[first].iter().all(|face| faces.tet_faces[second].contains(face))
+}
+
+fn equal(raw: &Raw, [first, second]: [usize; 2]) -> Fault {
+    let [a, b] = [first, second].map(|tet| raw.tet_number(tet));
+    let at = raw.points[raw.tets[first][0] as usize];
+    Fault::file(format!(
+        "the tetrahedra {a} and {b} have the same four vertices, the first of them at {at}: remove one of them"
+    ))
 }
 
 /// Drops vertices that no tet uses, with the triangles, edges and periodic pairs on them.

@@ -95,7 +95,7 @@ fn derive(
         }
         let kind = usize::from(sides.outside.is_some());
         counts[kind] += 1;
-        let label = Label { entity: DERIVED[kind], number: largest + 1 + kind as i64 };
+        let label = Label { entity: DERIVED[kind], number: largest.saturating_add(1 + kind as i64) };
         found.triangles.push(sides.face);
         found.keys.push(PatchKey { label, inside: sides.inside, outside: sides.outside });
     }

@@ -4,7 +4,7 @@ use super::assemble::assemble;
 use super::raw::{Label, PeriodicPairs, Raw, Shape};
 use super::{VolumeMesh, gmsh::Ids};
 use crate::files::elmer::{ElmerMesh, PairsOfNodes, names_of, pairs_of, read_corners};
-use crate::files::input::{Fault, ReadError};
+use crate::files::input::{Fault, ReadError, coordinate};
 use std::collections::BTreeSet;
 use std::path::Path;
 
@@ -12,6 +12,7 @@ use std::path::Path;
 /// parent of a partition.
 pub(super) fn read(folder: &Path) -> Result<VolumeMesh, ReadError> {
     let (mesh, of_second_order) = read_corners(folder)?;
+    check_coordinates(&mesh)?;
     let at = mesh.layout.folder().to_path_buf();
     let mut raw = joined(&mesh, pairs_of(&at)?).map_err(|fault| fault.in_file(&at, b""))?;
     raw.higher_order = of_second_order;
@@ -19,14 +20,22 @@ pub(super) fn read(folder: &Path) -> Result<VolumeMesh, ReadError> {
     assemble(raw).map_err(|fault| fault.in_file(&at, b""))
 }
 
+/// Refuses coordinates of which no mesh can be made; each node has a line.
+fn check_coordinates(mesh: &ElmerMesh) -> Result<(), ReadError> {
+    for part in &mesh.parts {
+        for (node, line) in part.nodes.iter().zip(1..) {
+            let checked = node.point.iter().try_for_each(|&x| coordinate(x).map(drop));
+            checked.map_err(|message| ReadError::line(part.file("nodes"), line, message))?;
+        }
+    }
+    Ok(())
+}
+
 /// Joins all parts; nodes and elements are sorted by id.
 fn joined(mesh: &ElmerMesh, pairs: PairsOfNodes) -> Result<Raw, Fault> {
     let mut nodes: Vec<_> = mesh.parts.iter().flat_map(|part| &part.nodes).collect();
     nodes.sort_by_key(|node| node.id);
     nodes.dedup_by_key(|node| node.id);
-    if let Some(node) = nodes.iter().find(|node| node.point.iter().any(|x| !x.is_finite())) {
-        return Err(Fault::file(format!("node {} has a coordinate that is not a finite number", node.id)));
-    }
     let ids: Vec<u64> = nodes.iter().map(|node| node.id.into()).collect();
     let ids = Ids::new(&ids)?;
     let mut raw = Raw { points: nodes.iter().map(|node| node.point).collect(), ..Raw::default() };
@@ -50,6 +59,7 @@ fn joined(mesh: &ElmerMesh, pairs: PairsOfNodes) -> Result<Raw, Fault> {
             *corner = place(node, "element", element.id)?;
         }
         raw.add(Shape::Tet, &corners, Label::number(element.body.into())).map_err(Fault::file)?;
+        raw.tet_numbers.push(element.id.into());
     }
     let mut triangles: Vec<_> = mesh.parts.iter().flat_map(|part| &part.boundary).collect();
     triangles.sort_by_key(|triangle| triangle.id);

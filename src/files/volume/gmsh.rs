@@ -266,7 +266,7 @@ fn elements_text(words: &mut Words, file: &mut gmsh4::Parts, raw: &mut Raw) -> R
     let count = words.count("elements", 4)?;
     let mut nodes = Vec::new();
     for _ in 0..count {
-        words.int("the id of an element")?;
+        let number = words.int("the id of an element")?;
         let code = words.int("the type of an element")?;
         let (shape, size) = known_type(code).map_err(|message| words.fault(message))?;
         let tags = words.count("tags", 1)?;
@@ -284,6 +284,9 @@ fn elements_text(words: &mut Words, file: &mut gmsh4::Parts, raw: &mut Raw) -> R
             nodes.push(ids.place(id).ok_or_else(|| words.fault(format!("there is no node {id}")))?);
         }
         raw.add(shape, &nodes, label).map_err(|message| words.fault(message))?;
+        if shape == Shape::Tet {
+            raw.tet_numbers.push(number.unsigned_abs());
+        }
     }
     Ok(())
 }
@@ -313,7 +316,7 @@ fn elements_binary(
             return Err(bytes.fault("a block of no elements"));
         }
         for _ in 0..count {
-            bytes.i32("the id of an element")?;
+            let number = bytes.i32("the id of an element")?;
             let mut first_tags = [0; 2];
             for k in 0..tags {
                 let tag = bytes.i32("a tag")?;
@@ -329,6 +332,9 @@ fn elements_binary(
                 nodes.push(place.ok_or_else(|| bytes.fault(format!("there is no node {id}")))?);
             }
             raw.add(shape, &nodes, label).map_err(|message| bytes.fault(message))?;
+            if shape == Shape::Tet {
+                raw.tet_numbers.push(number.unsigned_abs().into());
+            }
         }
         done += count;
     }

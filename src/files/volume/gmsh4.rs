@@ -205,14 +205,19 @@ fn elements(source: &mut Source, parts: &mut Parts, raw: &mut Raw) -> Result<(),
         let count = source.count("elements", 1 + size, 8 * (1 + size))?;
         let label = label(entities, &mut groups[shape.dimension()], dimension, tag);
         for _ in 0..count {
-            source.size("the id of an element")?;
+            let number = source.size("the id of an element")?;
             nodes.clear();
             for _ in 0..size {
                 let id = source.size("the id of a node")?;
                 nodes.push(ids.place(id).ok_or_else(|| source.fault(format!("there is no node {id}")))?);
             }
             match (label, shape) {
-                (Some(label), _) => raw.add(shape, &nodes, label).map_err(|message| source.fault(message))?,
+                (Some(label), _) => {
+                    raw.add(shape, &nodes, label).map_err(|message| source.fault(message))?;
+                    if shape == Shape::Tet {
+                        raw.tet_numbers.push(number);
+                    }
+                }
                 (None, Shape::Triangle) => between_parts += 1,
                 (None, _) => {}
             }

@@ -40,8 +40,13 @@ impl Groups {
         usize::try_from(set - 1).map_or(&[], |place| &self.sets[place])
     }
 
-    /// Merges the copies of an element that version 2 has, one for each of its groups.
-    fn join_copies<const N: usize>(&mut self, elements: &mut Vec<[u32; N]>, labels: &mut Vec<Label>) {
+    /// Merges the copies of an element that version 2 has, one for each of its groups. Returns
+    /// which elements were removed, if there may be any.
+    fn join_copies<const N: usize>(
+        &mut self,
+        elements: &mut Vec<[u32; N]>,
+        labels: &mut Vec<Label>,
+    ) -> Option<Vec<bool>> {
         let mut first_set: BTreeMap<i64, i64> = BTreeMap::new();
         let mut with_several: BTreeSet<i64> = BTreeSet::new();
         for label in labels.iter() {
@@ -50,7 +55,7 @@ impl Groups {
             }
         }
         if with_several.is_empty() {
-            return;
+            return None;
         }
         let key = |k: usize| {
             let mut corners = elements[k];
@@ -80,6 +85,7 @@ impl Groups {
         elements.retain(|_| kept.next() == Some(true));
         let mut kept = is_copy.iter().map(|is_copy| !is_copy);
         labels.retain(|_| kept.next() == Some(true));
+        Some(is_copy)
     }
 
     /// Replaces set indices in labels by body or boundary numbers, and returns the names of each
@@ -154,7 +160,10 @@ impl Groups {
 /// Finishes a file; `groups` are those of triangles and of tets.
 pub(super) fn finish([of_triangles, of_tets]: [&mut Groups; 2], raw: &mut Raw) {
     of_triangles.join_copies(&mut raw.triangles, &mut raw.triangle_labels);
-    of_tets.join_copies(&mut raw.tets, &mut raw.tet_labels);
+    if let Some(is_copy) = of_tets.join_copies(&mut raw.tets, &mut raw.tet_labels) {
+        let mut kept = is_copy.iter().map(|is_copy| !is_copy);
+        raw.tet_numbers.retain(|_| kept.next() == Some(true));
+    }
     raw.patch_names = of_triangles.number(&mut raw.triangle_labels, "boundaries", &mut raw.notes);
     raw.body_names = of_tets.number(&mut raw.tet_labels, "bodies", &mut raw.notes);
 }

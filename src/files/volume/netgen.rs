@@ -23,7 +23,9 @@ pub(super) fn parse(content: &[u8]) -> Result<Raw, Fault> {
             }
             b"volumeelements" => volume_elements(&mut words, &mut raw)?,
             b"edgesegmentsgi2" => segments(&mut words, 10, |n| ([n[2], n[3]], n[8]), &mut raw)?,
-            b"edgesegmentsgi3" => segments(&mut words, 7, |n| ([n[0], n[1]], n[6] + 1), &mut raw)?,
+            b"edgesegmentsgi3" => {
+                segments(&mut words, 7, |n| ([n[0], n[1]], n[6].saturating_add(1)), &mut raw)?
+            }
             b"points" => {
                 let count = words.count("points", 3)?;
                 raw.points = Vec::with_capacity(count);

@@ -6,7 +6,7 @@
 
 use super::raw::Raw;
 use super::vtu::{Grid, add_boundary, parse};
-use super::vtu_arrays::{check_type, next_tag};
+use super::vtu_tags::{Tags, check_place, check_type};
 use super::{VolumeMesh, finish};
 use crate::Point;
 use crate::files::input::{Fault, ReadError, counted, load};
@@ -44,28 +44,22 @@ fn read_pieces(path: &Path) -> Result<Grid, ReadError> {
 
 /// The piece files that an index file lists.
 fn sources(list: &[u8]) -> Result<Vec<PathBuf>, Fault> {
-    let (mut sources, mut at, mut is_vtk) = (Vec::new(), 0, false);
-    while let Some(tag) = next_tag(list, at) {
-        at = tag.end;
+    const OTHER_FORMAT: &str = "no piece in a VTK file of type PUnstructuredGrid: another format?";
+    let mut tags = Tags::new(list);
+    let mut sources = Vec::new();
+    while let Some(tag) = tags.next()? {
+        check_place(&tag)?;
         match tag.name {
-            "VTKFile" => {
-                check_type(&tag, "PUnstructuredGrid")?;
-                is_vtk = true;
-            }
+            "VTKFile" => check_type(&tag, "PUnstructuredGrid")?,
+            _ if tag.parent.is_empty() => return Err(tag.fault(OTHER_FORMAT)),
             "Piece" => {
-                let source = tag.text("Source");
-                sources
-                    .push(source.ok_or_else(|| Fault::text(tag.begin, "a piece without a source"))?.into());
+                let source = tag.text("Source").ok_or_else(|| tag.fault("a piece without a source"))?;
+                sources.push(source.into());
             }
             _ => {}
         }
     }
-    if !is_vtk || sources.is_empty() {
-        return Err(Fault::file(
-            "no piece in a VTK file of type PUnstructuredGrid: cut off, or another format",
-        ));
-    }
-    Ok(sources)
+    if sources.is_empty() { Err(Fault::file(OTHER_FORMAT)) } else { Ok(sources) }
 }
 
 /// Joins all pieces.

@@ -64,6 +64,8 @@ pub(super) struct Raw {
     pub points: Vec<Point>,
     pub tets: Vec<[u32; 4]>,
     pub tet_labels: Vec<Label>,
+    /// Numbers of the tets in the file, for messages; empty if they are consecutive from 1.
+    pub tet_numbers: Vec<u64>,
     pub triangles: Vec<[u32; 3]>,
     pub triangle_labels: Vec<Label>,
     pub edges: Vec<[u32; 2]>,
@@ -107,6 +109,11 @@ impl Raw {
         };
         self.higher_order += usize::from(nodes.len() > corners);
         Ok(())
+    }
+
+    /// The number of a tet in the file.
+    pub fn tet_number(&self, tet: usize) -> u64 {
+        self.tet_numbers.get(tet).copied().unwrap_or(tet as u64 + 1)
     }
 
     /// Adds names that are not there yet.

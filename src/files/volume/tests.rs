@@ -239,6 +239,9 @@ fn a_compressed_netgen_mesh_is_read() {
     let content = encoder.finish().unwrap();
     reads_two_tets("m.vol.gz", &content);
     assert!(read_as("m.vol.gz", &content[..content.len() / 2]).unwrap_err().starts_with("cannot read"));
+    let mut encoder = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::default());
+    encoder.write_all(&vec![b'\n'; 1 << 22]).unwrap();
+    refused("m.vol.gz", encoder.finish().unwrap(), "", "more than 256 times its size");
 }
 
 #[test]
@@ -292,13 +295,13 @@ fn broken_vtu_files_are_refused() {
         "LZ4",
     );
     refused("m.vtu", file.replace("Name=\"offsets\"", "Name=\"o\""), "", "no array offsets in Cells");
-    refused("m.vtu", file.replace("<Piece", "<Piece/>\n<Piece"), ":7", "several pieces");
-    refused("m.vtu", "<VTKFile>", "", "no piece");
+    refused("m.vtu", file.replace("</Piece>", "</Piece>\n<Piece/>"), ":22", "several pieces");
+    refused("m.vtu", "<VTKFile/>", "", "no piece");
     let raw = vtu(Stored::AppendedRaw);
-    refused("m.vtu", &raw[..raw.len() - 100], "", "cut off");
+    refused("m.vtu", &raw[..raw.len() - 100], ":*", "cut off");
     let text = String::from_utf8(vtu(Stored::Text)).unwrap();
-    refused("m.vtu", text.replace("10  10", "12  12"), "", "cell 6 is a hexahedron");
-    refused("m.vtu", text.replace("22  26", "22  99"), "", "the offset 99 of cell 7");
+    refused("m.vtu", text.replace("10  10", "12  12"), ":12", "cell 6 is a hexahedron");
+    refused("m.vtu", text.replace("22  26", "22  99"), ":9", "offsets up to 99 need 99");
 }
 
 #[test]
@@ -339,8 +342,11 @@ fn broken_files_are_refused_with_their_place() {
             .replace("1 2 3 4 7\n2 3 4 5 7", "1 2 3 4 7 1 2 3 5 7 1 2 3 4 7")
             .replace("Tetrahedra\n2", "Tetrahedra\n3"),
         "",
-        "more than two tetrahedra have the face",
+        "the tetrahedra 1 and 3 have the same four vertices",
     );
+    let crowded = MEDIT.replace("5\n0 0 0 1", "6\n0 0 0 1").replace("Corners", "2 2 2 1\nCorners");
+    let crowded = crowded.replace("Tetrahedra\n2", "Tetrahedra\n3\n2 3 4 6 7");
+    refused("m.mesh", crowded, "", "more than two tetrahedra have the same face");
     refused("m.mesh", "MFEM mesh v1.0\n", ":1", "MFEM");
     refused("m.mesh", MEDIT.split("Triangles").next().unwrap(), "", "no tetrahedra");
     let mut cyclic = meshb(2, false);
@@ -350,6 +356,85 @@ fn broken_files_are_refused_with_their_place() {
     refused("m.meshb", b"abcdefgh", ", byte 0", "not a binary Medit mesh");
     let said = read_as("m.cgns", "x").unwrap_err();
     assert!(said.contains(".meshb") && said.contains("Elmer"), "{said}");
+}
+
+#[test]
+fn a_tet_twice_is_refused_with_the_numbers_of_both() {
+    // Alone, and in a mesh.
+    let alone = MSH22.replace("10 4 4 7 1 1 1 20 30 40 41", "10 4 2 7 1 20 10 30 40");
+    refused("m.msh", alone, "", "the tetrahedra 9 and 10 have the same four vertices, the first of them at");
+    let third = "$Elements\n11\n99 4 2 7 1 20 30 40 41\n";
+    refused("m.msh", MSH22.replace("$Elements\n10\n", third), "", "the tetrahedra 99 and 10 have");
+    let text = MSH41.replace("8 2 3 4 5\n", "8 4 3 2 1\n");
+    refused("m.msh", text, "", "the tetrahedra 7 and 8 have");
+    let ele = ("m.ele", &b"2 4 0\n5 0 1 2 3\n6 3 2 1 0\n"[..]);
+    let said = read_all(&[ele, ("m.node", NODE.as_bytes())]).unwrap_err();
+    assert!(said.contains("the tetrahedra 5 and 6 have"), "{said}");
+    let found = crate::error::Error::from(read(Path::new("none.msh")).unwrap_err());
+    assert_eq!(crate::ground::error::HasKind::kind(&found), crate::ground::error::ErrorKind::Input);
+}
+
+#[test]
+fn coordinates_without_a_mesh_are_refused_with_their_line() {
+    for number in ["1e999", "-1e999", "1e61"] {
+        refused("m.msh", MSH22.replace("20 1 0 0", &format!("20 {number} 0 0")), ":12", "a");
+        refused("m.msh", MSH41.replace("\n1 0 0 0.5", &format!("\n{number} 0 0 0.5")), ":22", "a");
+        refused("m.vol", VOL.replace("\n1 0 0\n0 1", &format!("\n{number} 0 0\n0 1")), ":26", "a");
+        refused("m.mesh", MEDIT.replace("1 0 0 1", &format!("{number} 0 0 1")), ":9", "a");
+        let node = NODE.replace("1 1 0 0", &format!("1 {number} 0 0"));
+        refused("m.node", node, ":3", "a");
+        let text = String::from_utf8(vtu(Stored::Text)).unwrap();
+        refused("m.vtu", text.replacen(" 1.0", &format!(" {number}"), 1), ":6", "the array `Points`");
+    }
+    for version in [1, 2] {
+        let mut file = meshb(version, false);
+        let one = if version == 1 { 1_f32.to_le_bytes().to_vec() } else { 1_f64.to_le_bytes().to_vec() };
+        let at = file.windows(one.len()).position(|w| w == one).unwrap();
+        // The largest exponent: infinity.
+        let end = at + one.len();
+        file[end - 2..end].copy_from_slice(if version == 1 { &[0x80, 0x7f] } else { &[0xf0, 0x7f] });
+        refused("m.meshb", file, &format!(", byte {at}"), "not a finite number");
+    }
+}
+
+#[test]
+fn elmer_coordinates_without_a_mesh_are_refused_with_their_line() {
+    let (mesh, names) = two_bodies();
+    let dir = tempfile::tempdir().unwrap();
+    elmer::write(&thread::alone(), &PlainPart::whole(&mesh), &names, dir.path()).unwrap();
+    let path = dir.path().join("mesh.nodes");
+    let text = fs::read_to_string(&path).unwrap();
+    let mut lines: Vec<String> = text.lines().map(String::from).collect();
+    for number in ["1e999", "nan", "1e61"] {
+        lines[4] = format!("5 -1 {number} 0 0");
+        fs::write(&path, lines.join("\n")).unwrap();
+        let said = read(dir.path()).unwrap_err().to_string();
+        assert!(said.contains("nodes:5: a coordinate is"), "{said}");
+    }
+}
+
+#[test]
+fn endings_in_upper_case_are_those_of_their_formats() {
+    reads_two_tets("M.MSH", MSH22);
+    reads_two_tets("M.Mesh", MEDIT);
+    reads_two_tets("M.VTU", vtu(Stored::Inline));
+    let upper = [("M.ELE", ELE.as_bytes()), ("M.NODE", NODE.as_bytes()), ("M.FACE", FACE.as_bytes())];
+    assert_eq!(read_all(&upper).unwrap().names.patches, [Label::unnamed(5)]);
+    let (mesh, names) = two_bodies();
+    for name in ["M.MSH", "M.MESH", "M.VOL", "M.VTU"] {
+        assert_eq!(written(&mesh, &names, name).mesh.tets.len(), mesh.tets.len(), "{name}");
+    }
+    assert_eq!(written(&mesh, &names, "M.VTU").names, names);
+}
+
+#[test]
+fn numbers_at_the_end_of_their_range_do_not_overflow() {
+    let most = i64::MAX;
+    let segment = VOL
+        .replace("edgesegmentsgi2\n1\n1 0 1 2 -1 -1 1 2 3 0 3 1.5", "edgesegmentsgi3\n1\n1 2 0 0 0 0 1e30");
+    read_as("m.vol", segment).unwrap();
+    read_as("m.mesh", MEDIT.replace("1 3 2 5\n", &format!("1 3 2 {most}\n"))).unwrap();
+    read_as("m.mesh", MEDIT.replace("1 3 2 5\n1 2 4 5\n", &format!("1 3 2 {most}\n1 3 2 5\n"))).unwrap();
 }
 
 #[test]

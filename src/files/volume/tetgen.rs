@@ -3,12 +3,12 @@
 use super::raw::{Label, Raw, Shape};
 use super::{VolumeMesh, finish};
 use crate::files::input::tetgen_nodes;
-use crate::files::input::{Fault, ReadError, Words, float, load, shown};
+use crate::files::input::{Fault, ReadError, Words, beside, float, load, shown};
 use std::path::Path;
 
 /// Reads the files with the name of `path` and TetGen's extensions.
 pub(super) fn read(path: &Path) -> Result<VolumeMesh, ReadError> {
-    let [node, ele, face] = ["node", "ele", "face"].map(|ending| path.with_extension(ending));
+    let [node, ele, face] = ["node", "ele", "face"].map(|ending| beside(path, ending));
     let content = load(&node)?;
     let nodes = tetgen_nodes::read(&mut Words::with_comments(&content))
         .map_err(|fault| fault.in_file(&node, &content))?;
@@ -36,11 +36,12 @@ fn tets(content: &[u8], base: i64, raw: &mut Raw) -> Result<usize, Fault> {
     words.rest_of_line();
     let mut nodes = Vec::new();
     for _ in 0..count {
-        words.int("the number of a tetrahedron")?;
+        let number = words.int("the number of a tetrahedron")?;
         read_nodes(&mut words, corners as usize, base, raw.points.len(), &mut nodes)?;
         let label = if has_region { region(&mut words)? } else { Label::default() };
         words.rest_of_line();
         raw.add(Shape::Tet, &nodes, label).map_err(|message| words.fault(message))?;
+        raw.tet_numbers.push(number.unsigned_abs());
     }
     Ok(corners as usize)
 }

@@ -7,9 +7,10 @@
 //! second file, `STEM.boundary.vtu`, which is read too.
 
 use super::raw::{Label, Raw, Shape};
-use super::vtu_arrays::{Document, Section};
+use super::vtu_arrays::{Array, Document, Section};
 use super::{VolumeMesh, finish};
-use crate::files::input::{Fault, ReadError, load};
+use crate::Point;
+use crate::files::input::{Fault, ReadError, coordinate, load};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -40,66 +41,99 @@ pub(super) struct Grid {
 }
 
 /// The numbers of cells in the first of these arrays that exists.
-fn labels(document: &Document, names: &[&str], cells: usize) -> Result<Option<Vec<i64>>, Fault> {
+fn labels(document: &Document, names: &[&str]) -> Result<Option<Vec<i64>>, Fault> {
     let array = names.iter().find_map(|name| document.array(Section::CellData, Some(name)));
-    let labels = array.map(|array| array.ints()).transpose()?;
-    if labels.as_ref().is_some_and(|labels| labels.len() != cells) {
-        return Err(Fault::file("the array of body numbers has another length than the cells"));
+    array.map(|array| of_cells(document, array)).transpose()
+}
+
+/// The whole numbers of an array with one number for each cell.
+fn of_cells(document: &Document, array: &Array) -> Result<Vec<i64>, Fault> {
+    let (numbers, cells) = (array.ints()?, document.counts.cells);
+    array.check_count(numbers.len(), cells, &format!("{cells} cells"))?;
+    Ok(numbers)
+}
+
+/// The points of a piece.
+fn points(document: &Document) -> Result<Vec<Point>, Fault> {
+    let array = document.required(Section::Points, None)?;
+    let coordinates = array.floats()?;
+    let count = document.counts.points;
+    array.check_count(coordinates.len(), count.saturating_mul(3), &format!("{count} points"))?;
+    let (points, _) = coordinates.as_chunks::<3>();
+    let checked = |(k, [x, y, z]): (usize, &[f64; 3])| {
+        let wrong = |message| array.wrong(format!("point {k}: {message}"));
+        let checked = |x: f64| coordinate(x).map_err(wrong);
+        Ok(Point::new(checked(*x)?, checked(*y)?, checked(*z)?))
+    };
+    points.iter().enumerate().map(checked).collect()
+}
+
+/// The cells of a piece: the vertices of all cells, and where those of each end.
+struct Cells<'d, 'a> {
+    connectivity: Vec<i64>,
+    offsets: Vec<i64>,
+    types: Vec<i64>,
+    /// For faults: the arrays of the vertices and of their ends.
+    arrays: [&'d Array<'a>; 2],
+}
+
+impl<'d, 'a> Cells<'d, 'a> {
+    fn of(document: &'d Document<'a>) -> Result<Self, Fault> {
+        let array = |name| document.required(Section::Cells, Some(name));
+        let arrays = [array("connectivity")?, array("offsets")?];
+        let connectivity = arrays[0].ints()?;
+        let offsets = of_cells(document, arrays[1])?;
+        let types = of_cells(document, array("types")?)?;
+        let last = offsets.last().copied().unwrap_or(0);
+        let needed = u64::try_from(last).unwrap_or(0);
+        arrays[0].check_count(connectivity.len(), needed, &format!("offsets up to {last}"))?;
+        Ok(Self { connectivity, offsets, types, arrays })
     }
-    Ok(labels)
+
+    /// The vertices of a cell, which begin where those of the previous one end.
+    fn vertices(&self, cell: usize, count: usize, nodes: &mut Vec<u32>) -> Result<(), Fault> {
+        let end = self.offsets[cell];
+        let begin = if cell == 0 { 0 } else { self.offsets[cell - 1] };
+        let range = usize::try_from(begin).ok().zip(usize::try_from(end).ok());
+        let vertices = range.and_then(|(begin, end)| self.connectivity.get(begin..end));
+        let wrong = || self.arrays[1].wrong(format!("the offset {end} of cell {cell} is wrong"));
+        nodes.clear();
+        for &vertex in vertices.ok_or_else(wrong)? {
+            let index = u32::try_from(vertex).ok().filter(|&v| (v as usize) < count);
+            let missing = || {
+                let message = format!("cell {cell} names vertex {vertex}, and the file has {count}, from 0");
+                self.arrays[0].wrong(message)
+            };
+            nodes.push(index.ok_or_else(missing)?);
+        }
+        Ok(())
+    }
 }
 
 pub(super) fn parse(content: &[u8]) -> Result<Grid, Fault> {
     let document = Document::read(content)?;
-    let coordinates = document.required(Section::Points, None)?.floats()?;
-    let (points, rest) = coordinates.as_chunks::<3>();
-    if !rest.is_empty() {
-        return Err(Fault::file("the number of coordinates is not a multiple of three"));
-    }
-    if points.iter().flatten().any(|x| !x.is_finite()) {
-        return Err(Fault::file("a coordinate is not a finite number"));
-    }
-    let connectivity = document.required(Section::Cells, Some("connectivity"))?.ints()?;
-    let offsets = document.required(Section::Cells, Some("offsets"))?.ints()?;
-    let types = document.required(Section::Cells, Some("types"))?.ints()?;
-    if offsets.len() != types.len() {
-        return Err(Fault::file(format!("{} offsets and {} types of cells", offsets.len(), types.len())));
-    }
-    let of_tets = labels(&document, &LABELS, types.len())?;
-    let of_triangles = labels(&document, &["BoundaryId"], types.len())?;
+    let mut raw = Raw { points: points(&document)?, ..Raw::default() };
+    let cells = Cells::of(&document)?;
+    let of_tets = labels(&document, &LABELS)?;
+    let of_triangles = labels(&document, &["BoundaryId"])?;
     let of_triangles = of_triangles.as_ref().or(of_tets.as_ref());
     let ids = document.ids(Section::CellData, "GlobalElementId")?;
     let mut tet_ids = Vec::new();
-    let copies =
-        document.array(Section::CellData, Some("vtkGhostType")).map(|array| array.ints()).transpose()?;
-    let is_copy =
-        |cell: usize| copies.as_ref().and_then(|copies| copies.get(cell)).is_some_and(|c| c & 1 == 1);
-    let mut raw =
-        Raw { points: points.iter().map(|p| p.map(|x| x + 0.0).into()).collect(), ..Raw::default() };
+    let copies = labels(&document, &["vtkGhostType"])?;
+    let is_copy = |cell: usize| copies.as_ref().is_some_and(|copies| copies[cell] & 1 == 1);
     let mut nodes = Vec::new();
-    let mut begin = 0;
-    for (cell, (&end, &kind)) in offsets.iter().zip(&types).enumerate() {
-        let vertices = usize::try_from(end).ok().and_then(|end| connectivity.get(begin..end));
-        let vertices =
-            vertices.ok_or_else(|| Fault::file(format!("the offset {end} of cell {cell} is wrong")))?;
-        begin = end as usize;
+    for (cell, &kind) in cells.types.iter().enumerate() {
+        cells.vertices(cell, raw.points.len(), &mut nodes)?;
         if is_copy(cell) {
             continue;
-        }
-        nodes.clear();
-        for &vertex in vertices {
-            let index = u32::try_from(vertex).ok().filter(|&v| (v as usize) < points.len());
-            nodes.push(index.ok_or_else(|| {
-                Fault::file(format!(
-                    "cell {cell} names vertex {vertex}, and the file has {}, from 0",
-                    points.len()
-                ))
-            })?);
         }
         let labels = if shape(kind) == Shape::Triangle { of_triangles } else { of_tets.as_ref() };
         let label = Label::number(labels.map_or(0, |labels| labels[cell]));
         raw.add(shape(kind), &nodes, label)
-            .map_err(|message| Fault::file(format!("cell {cell} is {message}")))?;
+            .map_err(|message| cells.arrays[1].wrong(format!("cell {cell} is {message}")))?;
+        if shape(kind) == Shape::Tet {
+            raw.tet_numbers.push(cell as u64);
+        }
         tet_ids.extend(ids.get(cell).filter(|_| shape(kind) == Shape::Tet));
     }
     raw.add_names(document.names()?);

@@ -1,8 +1,7 @@
-//! The frame of a `.vtu` file, tag by tag, and the numbers of its arrays.
-//!
-//! The tags are parsed by hand, because a file with raw appended data is not well-formed XML.
+//! The arrays of a `.vtu` file, and their numbers.
 
 use super::raw::NamesByNumber;
+use super::vtu_tags::{Tag, Tags, check_place, check_type};
 use crate::files::input::{Bytes, Fault, Words, shown};
 use std::io::Read;
 
@@ -16,8 +15,8 @@ pub(super) enum Section {
     FieldData,
 }
 
-/// Start of a comment with fields: MFEM's reader accepts fields nowhere else (see `io::vtu`).
-const HIDDEN_FIELDS: &[u8] = b"<!-- <FieldData>";
+/// The message for files without any piece.
+const OTHER_FORMAT: &str = "no piece of a VTK file of type UnstructuredGrid: another format?";
 /// Prefixes of the names of our fields: bodies, boundaries.
 const NAMES: [&str; 2] = ["Body ", "Boundary "];
 
@@ -31,6 +30,8 @@ enum Format {
 
 /// A `DataArray`.
 pub(super) struct Array<'a> {
+    /// The offset of its tag.
+    at: usize,
     section: Section,
     name: String,
     kind: String,
@@ -49,8 +50,32 @@ struct Frame<'a> {
     /// Whether lengths have eight bytes instead of four.
     long_lengths: bool,
     compressed: bool,
-    /// Offset of the appended data after the underscore, and whether it is base64.
-    appended: Option<(usize, bool)>,
+    appended: Option<Appended<'a>>,
+}
+
+/// The data of all arrays that are not between their tags.
+#[derive(Clone, Copy)]
+struct Appended<'a> {
+    /// What follows the underscore, up to the closing tag.
+    data: &'a [u8],
+    base64: bool,
+}
+
+impl<'a> Appended<'a> {
+    /// Finds the data; also returns the offset of the closing tag.
+    ///
+    /// Raw data may contain anything, so that tag is the last one of its kind.
+    fn of(tag: &Tag, content: &'a [u8]) -> Result<(Self, usize), Fault> {
+        const END: &[u8] = b"</AppendedData";
+        let rest = &content[tag.end..];
+        let length = rest.windows(END.len()).rposition(|window| window == END).ok_or_else(|| {
+            Fault::text(content.len(), "the file ends before `</AppendedData>`: it is cut off")
+        })?;
+        let blanks = rest.len() - rest.trim_ascii_start().len();
+        let data = rest[..length].get(blanks..).and_then(|data| data.strip_prefix(b"_"));
+        let data = data.ok_or_else(|| tag.fault("the appended data does not begin with `_`"))?;
+        Ok((Self { data, base64: tag.attribute("encoding") == Some("base64") }, tag.end + length))
+    }
 }
 
 /// All arrays of a file.
@@ -58,155 +83,58 @@ pub(super) struct Document<'a> {
     arrays: Vec<Array<'a>>,
     /// The names of the global-id arrays of points and cells, declared by their sections.
     global_ids: Vec<(Section, String)>,
+    /// What the piece announces.
+    pub counts: Counts,
 }
 
-/// A tag: name, attributes, and its range in the file.
-pub(super) struct Tag<'a> {
-    pub name: &'a str,
-    attributes: &'a str,
-    pub begin: usize,
-    pub end: usize,
-}
-
-impl Tag<'_> {
-    /// The value of an attribute with XML references resolved.
-    pub fn text(&self, name: &str) -> Option<String> {
-        self.attribute(name).map(unescaped)
-    }
-
-    pub fn attribute(&self, name: &str) -> Option<&str> {
-        let mut rest = self.attributes;
-        while let Some((before, after)) = rest.split_once('=') {
-            let quote = after.trim_start().chars().next().filter(|c| *c == '"' || *c == '\'')?;
-            let (value, behind) = after.trim_start()[1..].split_once(quote)?;
-            if before.trim() == name {
-                return Some(value);
-            }
-            rest = behind;
-        }
-        None
-    }
-}
-
-/// Resolves XML references; invalid ones are kept as text.
-fn unescaped(text: &str) -> String {
-    let mut plain = String::with_capacity(text.len());
-    let mut rest = text;
-    while let Some((before, after)) = rest.split_once('&') {
-        plain.push_str(before);
-        let reference = after.split_once(';').and_then(|(name, behind)| Some((character(name)?, behind)));
-        match reference {
-            Some((c, behind)) => {
-                plain.push(c);
-                rest = behind;
-            }
-            None => {
-                plain.push('&');
-                rest = after;
-            }
-        }
-    }
-    plain + rest
-}
-
-/// The character of the reference `&name;`.
-fn character(name: &str) -> Option<char> {
-    let code = |digits: &str, radix| u32::from_str_radix(digits, radix).ok().and_then(char::from_u32);
-    match name {
-        "amp" => Some('&'),
-        "lt" => Some('<'),
-        "gt" => Some('>'),
-        "quot" => Some('"'),
-        "apos" => Some('\''),
-        _ => match name.strip_prefix('#')? {
-            digits if digits.starts_with(['x', 'X']) => code(&digits[1..], 16),
-            digits => code(digits, 10),
-        },
-    }
-}
-
-/// Returns the next tag after an offset. Declarations and comments are skipped, except fields in a
-/// comment.
-pub(super) fn next_tag(content: &[u8], mut at: usize) -> Option<Tag<'_>> {
-    loop {
-        let begin = at + content[at..].iter().position(|&b| b == b'<')?;
-        if content[begin..].starts_with(HIDDEN_FIELDS) {
-            at = begin + 1;
-            continue;
-        }
-        if content[begin..].starts_with(b"<!--") {
-            at = begin + content[begin..].windows(3).position(|w| w == b"-->")? + 3;
-            continue;
-        }
-        let end = begin + content[begin..].iter().position(|&b| b == b'>')? + 1;
-        let text = std::str::from_utf8(&content[begin + 1..end - 1]).ok()?;
-        if text.starts_with(['?', '!']) {
-            at = end;
-            continue;
-        }
-        let (name, attributes) = text.split_once(char::is_whitespace).unwrap_or((text, ""));
-        return Some(Tag { name: name.trim_end_matches('/'), attributes, begin, end });
-    }
+/// The numbers of points and cells that a piece announces.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Counts {
+    pub points: u64,
+    pub cells: u64,
 }
 
 impl<'a> Document<'a> {
-    /// Parses all tags up to the appended data.
+    /// Parses all tags.
+    ///
+    /// # Errors
+    /// Elements that are not closed, or not in their places; anything but a file with one piece.
     pub fn read(content: &'a [u8]) -> Result<Self, Fault> {
+        let mut tags = Tags::new(content);
         let mut frame = Frame { content, ..Frame::default() };
-        let mut arrays: Vec<Array> = Vec::new();
-        let mut section = None;
-        let mut global_ids = Vec::new();
-        let (mut at, mut pieces, mut is_vtk) = (0, 0, false);
-        while let Some(tag) = next_tag(content, at) {
-            at = tag.end;
+        let mut document = Self { arrays: Vec::new(), global_ids: Vec::new(), counts: Counts::default() };
+        let mut pieces = 0;
+        while let Some(tag) = tags.next()? {
+            check_place(&tag)?;
             match tag.name {
-                "VTKFile" => {
-                    frame = header(&tag, frame)?;
-                    is_vtk = true;
-                }
+                "VTKFile" => frame = header(&tag, frame)?,
+                _ if tag.parent.is_empty() => return Err(tag.fault(OTHER_FORMAT)),
                 "Piece" => {
                     pieces += 1;
                     if pieces > 1 {
-                        return Err(Fault::text(tag.begin, "a file of several pieces is not read"));
+                        return Err(tag.fault("a file of several pieces is not read"));
                     }
+                    document.counts =
+                        Counts { points: tag.count("NumberOfPoints")?, cells: tag.count("NumberOfCells")? };
                 }
-                "Points" => section = Some(Section::Points),
-                "Cells" => section = Some(Section::Cells),
                 "PointData" | "CellData" => {
                     let of = if tag.name == "CellData" { Section::CellData } else { Section::PointData };
-                    global_ids.extend(tag.text("GlobalIds").map(|name| (of, name)));
-                    section = Some(of);
+                    document.global_ids.extend(tag.text("GlobalIds").map(|name| (of, name)));
                 }
-                "FieldData" => section = Some(Section::FieldData),
-                "/Points" | "/Cells" | "/PointData" | "/CellData" | "/FieldData" => section = None,
-                "DataArray" => {
-                    let Some(section) = section else { continue };
-                    let is_ours = |name: &str| NAMES.iter().any(|kind| name.starts_with(kind));
-                    if section == Section::FieldData && !tag.attribute("Name").is_some_and(is_ours) {
-                        continue;
-                    }
-                    let inline = &content[tag.end..];
-                    let inline = &inline[..inline.iter().position(|&b| b == b'<').unwrap_or(inline.len())];
-                    arrays.push(Array::of(&tag, section, inline, frame)?);
-                }
+                "DataArray" => document.arrays.extend(Array::of(&tag, frame)?),
                 "AppendedData" => {
-                    let base64 = tag.attribute("encoding") == Some("base64");
-                    let mark = content[at..].iter().position(|&b| b == b'_');
-                    let mark =
-                        mark.ok_or_else(|| Fault::text(at, "the appended data does not begin with `_`"))?;
-                    frame.appended = Some((at + mark + 1, base64));
-                    break;
+                    let (appended, end) = Appended::of(&tag, content)?;
+                    frame.appended = Some(appended);
+                    tags.go_to(end);
                 }
                 _ => {}
             }
         }
-        if !is_vtk || pieces == 0 {
-            return Err(Fault::file(
-                "no piece of a VTK file of type UnstructuredGrid: cut off, or another format",
-            ));
+        if pieces == 0 {
+            return Err(Fault::file(OTHER_FORMAT));
         }
-        arrays.iter_mut().for_each(|array| array.frame.appended = frame.appended);
-        Ok(Self { arrays, global_ids })
+        document.arrays.iter_mut().for_each(|array| array.frame.appended = frame.appended);
+        Ok(document)
     }
 
     /// The global ids of points or cells: the array declared by the section, else the one with this
@@ -214,8 +142,11 @@ impl<'a> Document<'a> {
     pub fn ids(&self, section: Section, name: &str) -> Result<Vec<i64>, Fault> {
         let declared = self.global_ids.iter().find(|(of, _)| *of == section).map(|(_, name)| name.as_str());
         let array = declared.and_then(|name| self.array(section, Some(name)));
-        let array = array.or_else(|| self.array(section, Some(name)));
-        array.map_or(Ok(Vec::new()), Array::ints)
+        let Some(array) = array.or_else(|| self.array(section, Some(name))) else { return Ok(Vec::new()) };
+        let (ids, Counts { points, cells }) = (array.ints()?, self.counts);
+        let (count, what) = if section == Section::CellData { (cells, "cells") } else { (points, "points") };
+        array.check_count(ids.len(), count, &format!("{count} {what}"))?;
+        Ok(ids)
     }
 
     /// The names of bodies and boundaries in our fields.
@@ -245,14 +176,6 @@ impl<'a> Document<'a> {
     }
 }
 
-/// Refuses a VTK file of another type.
-pub(super) fn check_type(tag: &Tag, wanted: &str) -> Result<(), Fault> {
-    match tag.attribute("type").filter(|kind| *kind != wanted) {
-        Some(kind) => Err(Fault::text(tag.begin, format!("a VTK file of type {kind}; {wanted} is needed"))),
-        None => Ok(()),
-    }
-}
-
 fn header<'a>(tag: &Tag, frame: Frame<'a>) -> Result<Frame<'a>, Fault> {
     check_type(tag, "UnstructuredGrid")?;
     let compressed = match tag.attribute("compressor") {
@@ -271,26 +194,51 @@ fn header<'a>(tag: &Tag, frame: Frame<'a>) -> Result<Frame<'a>, Fault> {
 }
 
 impl<'a> Array<'a> {
-    fn of(tag: &Tag, section: Section, inline: &'a [u8], frame: Frame<'a>) -> Result<Self, Fault> {
-        let wrong = |message: String| Fault::text(tag.begin, message);
+    /// The array of this tag; `None` if it is not read.
+    fn of(tag: &Tag, frame: Frame<'a>) -> Result<Option<Self>, Fault> {
+        let section = match tag.parent {
+            "Points" => Section::Points,
+            "Cells" => Section::Cells,
+            "PointData" => Section::PointData,
+            "CellData" => Section::CellData,
+            "FieldData" => Section::FieldData,
+            _ => return Ok(None),
+        };
+        let is_ours = |name: &str| NAMES.iter().any(|kind| name.starts_with(kind));
+        if section == Section::FieldData && !tag.attribute("Name").is_some_and(is_ours) {
+            return Ok(None);
+        }
         let format = match tag.attribute("format") {
             Some("ascii") => Format::Text,
             Some("binary") => Format::Base64,
             Some("appended") => {
                 let offset = tag.attribute("offset").and_then(|offset| offset.parse().ok());
-                Format::Appended(offset.ok_or_else(|| wrong("the array has no offset".into()))?)
+                Format::Appended(offset.ok_or_else(|| tag.fault("the array has no offset"))?)
             }
             other => {
-                return Err(wrong(format!("the format `{}` of an array is not known", other.unwrap_or(""))));
+                let message = format!("the format `{}` of an array is not known", other.unwrap_or(""));
+                return Err(tag.fault(message));
             }
         };
+        let inline = &frame.content[tag.end..];
+        let inline = &inline[..inline.iter().position(|&b| b == b'<').unwrap_or(inline.len())];
         let name = tag.text("Name").unwrap_or_default();
         let kind = tag.attribute("type").unwrap_or_default().to_string();
-        Ok(Self { section, name, kind, format, inline, frame })
+        Ok(Some(Self { at: tag.begin, section, name, kind, format, inline, frame }))
     }
 
-    fn wrong(&self, message: &str) -> Fault {
-        Fault::file(format!("the array `{}`: {message}", self.name))
+    /// A fault at the array.
+    pub fn wrong(&self, message: impl std::fmt::Display) -> Fault {
+        let name = if self.name.is_empty() { format!("{:?}", self.section) } else { self.name.clone() };
+        Fault::text(self.at, format!("the array `{name}`: {message}"))
+    }
+
+    /// Refuses other counts of numbers than expected.
+    pub fn check_count(&self, found: usize, expected: u64, what: &str) -> Result<(), Fault> {
+        if found as u64 == expected {
+            return Ok(());
+        }
+        Err(self.wrong(format!("it has {found} numbers, and {what} need {expected}")))
     }
 
     /// Returns its numbers as floats.
@@ -310,8 +258,8 @@ impl<'a> Array<'a> {
         let data = self.data()?;
         let bytes = Bytes::new(&data, 0, self.frame.big_endian);
         match self.kind.as_str() {
-            "Float32" => numbers(bytes, 4, |b| b.f32("a number").map(f64::from)),
-            "Float64" => numbers(bytes, 8, |b| b.f64("a number")),
+            "Float32" => self.numbers(bytes, 4, |b| b.f32("a number").map(f64::from)),
+            "Float64" => self.numbers(bytes, 8, |b| b.f64("a number")),
             _ => Ok(self.ints()?.into_iter().map(|n| n as f64).collect()),
         }
     }
@@ -332,38 +280,47 @@ impl<'a> Array<'a> {
         let bytes = Bytes::new(&data, 0, self.frame.big_endian);
         const WHAT: &str = "a number";
         match self.kind.as_str() {
-            "Int8" => numbers(bytes, 1, |b| b.i8(WHAT).map(i64::from)),
-            "UInt8" => numbers(bytes, 1, |b| b.u8(WHAT).map(i64::from)),
-            "Int16" => numbers(bytes, 2, |b| b.i16(WHAT).map(i64::from)),
-            "UInt16" => numbers(bytes, 2, |b| b.u16(WHAT).map(i64::from)),
-            "Int32" => numbers(bytes, 4, |b| b.i32(WHAT).map(i64::from)),
-            "UInt32" => numbers(bytes, 4, |b| b.u32(WHAT).map(i64::from)),
-            "Int64" => numbers(bytes, 8, |b| b.i64(WHAT)),
-            "UInt64" => numbers(bytes, 8, |b| b.u64(WHAT).map(|n| n as i64)),
-            other => Err(self.wrong(&format!("its type is `{other}`, and whole numbers are needed"))),
+            "Int8" => self.numbers(bytes, 1, |b| b.i8(WHAT).map(i64::from)),
+            "UInt8" => self.numbers(bytes, 1, |b| b.u8(WHAT).map(i64::from)),
+            "Int16" => self.numbers(bytes, 2, |b| b.i16(WHAT).map(i64::from)),
+            "UInt16" => self.numbers(bytes, 2, |b| b.u16(WHAT).map(i64::from)),
+            "Int32" => self.numbers(bytes, 4, |b| b.i32(WHAT).map(i64::from)),
+            "UInt32" => self.numbers(bytes, 4, |b| b.u32(WHAT).map(i64::from)),
+            "Int64" => self.numbers(bytes, 8, |b| b.i64(WHAT)),
+            "UInt64" => self.numbers(bytes, 8, |b| b.u64(WHAT).map(|n| n as i64)),
+            other => Err(self.wrong(format!("its type is `{other}`, and whole numbers are needed"))),
         }
+    }
+
+    /// Parses bytes as numbers of this size.
+    fn numbers<T>(
+        &self,
+        mut bytes: Bytes,
+        size: usize,
+        next: impl Fn(&mut Bytes) -> Result<T, Fault>,
+    ) -> Result<Vec<T>, Fault> {
+        let length = bytes.left();
+        if !length.is_multiple_of(size) {
+            return Err(self.wrong(format!("its {length} bytes are no numbers of {size} bytes each")));
+        }
+        (0..length / size).map(|_| next(&mut bytes)).collect()
     }
 
     /// Returns its bytes, uncompressed and without the preceding length.
     fn data(&self) -> Result<Vec<u8>, Fault> {
         let decoded;
         let stored: &[u8] = match (self.format, self.frame.appended) {
-            (Format::Appended(offset), Some((begin, base64))) => {
-                let content = self.frame.content;
-                let at = begin.checked_add(offset).filter(|&at| at <= content.len());
-                let rest =
-                    &content[at.ok_or_else(|| self.wrong("its offset is beyond the end of the file"))?..];
+            (Format::Appended(offset), Some(Appended { data, base64 })) => {
+                let beyond = || self.wrong("its offset is beyond the end of the appended data");
+                let rest = data.get(offset..).ok_or_else(beyond)?;
                 if base64 {
-                    decoded =
-                        self.decode(&rest[..rest.iter().position(|&b| b == b'<').unwrap_or(rest.len())])?;
+                    decoded = self.decode(rest)?;
                     &decoded
                 } else {
                     rest
                 }
             }
-            (Format::Appended(_), None) => {
-                return Err(self.wrong("the file has no appended data: it is cut off"));
-            }
+            (Format::Appended(_), None) => return Err(self.wrong("the file has no appended data")),
             _ => {
                 decoded = self.decode(self.inline)?;
                 &decoded
@@ -371,7 +328,11 @@ impl<'a> Array<'a> {
         };
         let mut bytes = Bytes::new(stored, 0, self.frame.big_endian);
         let data = if self.frame.compressed { self.inflated(&mut bytes) } else { self.plain(&mut bytes) };
-        data.map_err(|_| self.wrong("its data is cut off or not what its header says"))
+        let data = data.map_err(|_| self.wrong("its data is cut off or not what its header says"))?;
+        if self.format == Format::Base64 && bytes.left() > 0 {
+            return Err(self.wrong(format!("its data is {} bytes longer than its header says", bytes.left())));
+        }
+        Ok(data)
     }
 
     fn length(&self, bytes: &mut Bytes) -> Result<u64, Fault> {
@@ -389,22 +350,23 @@ impl<'a> Array<'a> {
     fn inflated(&self, bytes: &mut Bytes) -> Result<Vec<u8>, Fault> {
         let blocks = self.length(bytes)?;
         let size = self.length(bytes)?;
-        let _last = self.length(bytes)?;
+        let partial = self.length(bytes)?;
         let blocks = bytes.count(blocks, "blocks", if self.frame.long_lengths { 8 } else { 4 })?;
         let mut lengths = Vec::with_capacity(blocks);
         for _ in 0..blocks {
             lengths.push(self.length(bytes)?);
         }
         let mut data = Vec::new();
-        for length in lengths {
+        for (k, length) in lengths.into_iter().enumerate() {
+            let size = if k + 1 == blocks && partial > 0 { partial } else { size };
             let length = bytes.count(length, "bytes", 1)?;
             let block = bytes.take(length, "a block")?;
             let before = data.len() as u64;
             // One byte more than allowed reveals a block that is too long.
             let inflated =
                 flate2::read::ZlibDecoder::new(block).take(size.saturating_add(1)).read_to_end(&mut data);
-            if inflated.is_err() || data.len() as u64 - before > size {
-                return Err(bytes.fault("a block that cannot be inflated"));
+            if inflated.is_err() || data.len() as u64 - before != size {
+                return Err(bytes.fault("a block that cannot be inflated to its size"));
             }
         }
         Ok(data)
@@ -431,7 +393,7 @@ impl<'a> Array<'a> {
                     (bits, count) = (0, 0);
                     continue;
                 }
-                _ => return Err(self.wrong(&format!("`{}` is not base64", shown(&[b])))),
+                _ => return Err(self.wrong(format!("`{}` is not base64", shown(&[b])))),
             };
             bits = bits << 6 | u32::from(value);
             count += 1;
@@ -442,12 +404,4 @@ impl<'a> Array<'a> {
         }
         Ok(bytes)
     }
-}
-
-fn numbers<T>(
-    mut bytes: Bytes,
-    size: usize,
-    next: impl Fn(&mut Bytes) -> Result<T, Fault>,
-) -> Result<Vec<T>, Fault> {
-    (0..bytes.left() / size).map(|_| next(&mut bytes)).collect()
 }

@@ -147,7 +147,9 @@ fn write_all(
     {
         return Err(WriteError::ForeignEnding(stem.to_path_buf()));
     }
-    let name = [".pvtu", ".vtu"].iter().find_map(|end| name.strip_suffix(end)).unwrap_or(name);
+    let is_ours = |ending: &str| ["vtu", "pvtu"].iter().any(|ours| ending.eq_ignore_ascii_case(ours));
+    let (name, ending) = name.rsplit_once('.').filter(|(_, ending)| is_ours(ending)).unwrap_or((name, ""));
+    let ending = if ending.eq_ignore_ascii_case("vtu") { ending } else { "vtu" };
 
     let mut tets = volume::piece(part, boundary, fields);
     let surface = (boundary == Boundary::Beside).then(|| boundary::Surface::of(part));
@@ -159,7 +161,7 @@ fn write_all(
     let needed = tets.bytes() + triangles.as_ref().map_or(0, Piece::bytes);
     let written = write_together(comm, &folder, needed, is_part_file, |stage| {
         let [tets_path, triangles_path] = if part.ranks() == 1 {
-            [format!("{name}.vtu"), format!("{name}.boundary.vtu")]
+            [format!("{name}.{ending}"), format!("{name}.boundary.vtu")]
         } else {
             let folder = stage.join(format!("{name}.parts"));
             fs::create_dir_all(&folder).map_err(WriteError::io(&folder))?;

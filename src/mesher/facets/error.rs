@@ -48,10 +48,15 @@ pub enum FacetError {
     },
     /// Two triangles at a common edge overlap.
     #[error(
-        "two triangles overlap at their common edge, at ({}, {}, {}): surfaces that touch must have the same triangles there",
-        .0.x, .0.y, .0.z
+        "two triangles{} overlap at their common edge, at ({}, {}, {}): surfaces that touch must have the same triangles there",
+        of_surfaces(*.files), place.x, place.y, place.z
     )]
-    Overlap(Point),
+    Overlap {
+        /// The midpoint of the edge.
+        place: Point,
+        /// The surfaces of the two triangles, from 0.
+        files: [usize; 2],
+    },
     /// Triangles cannot be oriented consistently.
     #[error(
         "the surface is not orientable: triangles that meet at ({}, {}, {}) cannot be oriented consistently",
@@ -68,4 +73,8 @@ pub enum FacetError {
     /// The triangles bound no space.
     #[error("the triangles bound no space")]
     NoBody,
+}
+
+fn of_surfaces([a, b]: [usize; 2]) -> String {
+    if a == b { String::new() } else { format!(" of surfaces {a} and {b} (from 0)") }
 }

@@ -125,8 +125,10 @@ fn middle(joined: &Joined, edge: &Use) -> Point {
 /// Joins the sides that face each other across the sectors at an edge.
 fn join_sectors(joined: &Joined, uses: &[Use], sets: &mut Sets) -> Result<(), FacetError> {
     let mut pages: Vec<Use> = uses.to_vec();
-    if uses.len() > 2 && !sort_pages(joined, &mut pages) {
-        return Err(FacetError::Overlap(middle(joined, &uses[0])));
+    if uses.len() > 2
+        && let Err(pair) = sort_pages(joined, &mut pages)
+    {
+        return Err(FacetError::Overlap { place: middle(joined, &uses[0]), files: files_of(joined, pair) });
     }
     for i in 0..pages.len() {
         let (page, next) = (&pages[i], &pages[(i + 1) % pages.len()]);
@@ -136,9 +138,19 @@ fn join_sectors(joined: &Joined, uses: &[Use], sets: &mut Sets) -> Result<(), Fa
     Ok(())
 }
 
-/// Sorts the pages of an edge in a right-handed turn, starting with the first; false if two
-/// coincide.
-fn sort_pages(joined: &Joined, pages: &mut [Use]) -> bool {
+/// The surfaces of two triangles: two different ones if possible.
+fn files_of(joined: &Joined, triangles: [u32; 2]) -> [usize; 2] {
+    let [of_first, of_second] =
+        triangles.map(|t| joined.layers[t as usize].iter().map(|layer| layer.file as usize));
+    let pairs = of_first.flat_map(|a| of_second.clone().map(move |b| [a, b]));
+    pairs.max_by_key(|[a, b]| a != b).map_or([0; 2], |[a, b]| [a.min(b), a.max(b)])
+}
+
+/// Sorts the pages of an edge in a right-handed turn, starting with the first.
+///
+/// # Errors
+/// If two coincide: their triangles.
+fn sort_pages(joined: &Joined, pages: &mut [Use]) -> Result<(), [u32; 2]> {
     let point = |v: u32| &joined.points[v as usize];
     let apex = |u: &Use| point(joined.triangles[u.triangle as usize][u.side as usize]);
     let [a, b] = pages[0].ends.map(point);
@@ -147,7 +159,7 @@ fn sort_pages(joined: &Joined, pages: &mut [Use]) -> bool {
     let step = (b - a).amax();
     let aside = (0..3).map(|k| a + Vector::ith(k, step));
     let Some(beside) = aside.into_iter().find(|p| orient3d(a, b, apex(&first), p) != Sign::Zero) else {
-        return false;
+        return Err([first.triangle; 2]);
     };
     let first_side = orient3d(a, b, &beside, apex(&first));
     // 0: same half-plane as the first; 1: less than half a turn; 2: half a turn; 3: more.
@@ -165,7 +177,10 @@ fn sort_pages(joined: &Joined, pages: &mut [Use]) -> bool {
         })
     };
     pages.sort_by(compare);
-    pages.windows(2).all(|w| compare(&w[0], &w[1]) != Ordering::Equal)
+    match pages.windows(2).find(|w| compare(&w[0], &w[1]) == Ordering::Equal) {
+        Some(pair) => Err([pair[0].triangle, pair[1].triangle]),
+        None => Ok(()),
+    }
 }
 
 /// Joins the regions of disconnected components; returns a side that faces the outside of all.

@@ -1,0 +1,4 @@
+//! Wavefront OBJ.
+#![no_main]
+
+libfuzzer_sys::fuzz_target!(|input: &[u8]| tetmill_fuzz::surface(&["a.obj"], input));

@@ -1,0 +1,4 @@
+//! STL, text and binary.
+#![no_main]
+
+libfuzzer_sys::fuzz_target!(|input: &[u8]| tetmill_fuzz::surface(&["a.stl"], input));

@@ -1,0 +1,4 @@
+//! NETGEN's `.vol`.
+#![no_main]
+
+libfuzzer_sys::fuzz_target!(|input: &[u8]| tetmill_fuzz::volume(&["a.vol"], input));
