@@ -2,7 +2,7 @@
 
 use super::contact::{Contact, Kind};
 use super::neighborhood::Tolerances;
-use super::octree::Octree;
+use super::octree::{Octree, can_meet};
 use super::trace::{Trace, along, step_box};
 use crate::interval::Cell;
 use crate::project::project_to_both;
@@ -233,7 +233,8 @@ impl Finder<'_> {
             self.found.extend(ends);
         }
         let cell = step_box(p, q);
-        if !self.third.value_range(&cell).contains_zero() {
+        // A surface beside one of the two, such as a parallel plane, is excluded by their difference.
+        if [self.a, self.b].iter().any(|near| !can_meet(near, self.third, &cell)) {
             return;
         }
         if depth == LOCAL && !(self.is_relevant)(&cell) {
