@@ -167,6 +167,11 @@ impl Features {
     /// [`FeatureError`], with coordinates, if the geometry cannot be meshed.
     pub fn find(geometry: &Geometry) -> Result<Self, FeatureError> {
         let root = bounds::bounding_cell(geometry)?;
+        let [min, max] = [root.map(|side| side.lo), root.map(|side| side.hi)].map(Point::from);
+        let first = || Named::body(geometry, BodyId(0));
+        Aabb { min, max }
+            .refuse_out_of_range()
+            .map_err(|range| FeatureError::OutOfRange { first: first(), range })?;
         let diagonal = root.iter().map(|side| side.width().powi(2)).sum::<f64>().sqrt();
         let largest = root.iter().map(crate::Interval::magnitude).fold(0.0, f64::max);
         let tolerances = Tolerances::new(diagonal, largest);

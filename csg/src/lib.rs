@@ -25,7 +25,7 @@ pub use features::{
 };
 pub use geometry::{
     Aabb, Body, BodyId, BoundaryLabel, BoundaryOverride, CornerId, CurveId, Cutout, Geometry, Identification,
-    PatchId, Seam, SingularPlace, Singularity, Span, SurfaceId, SurfaceInfo, UserPoint,
+    OutOfRange, PatchId, Seam, SingularPlace, Singularity, Span, SurfaceId, SurfaceInfo, UserPoint,
 };
 pub use interval::Interval;
 pub use project::{ProjectionFailed, Projector};

@@ -1,6 +1,7 @@
 //! A CSG geometry with its features and its projector.
 
-use csg::{Features, Geometry};
+use crate::Point;
+use csg::{Features, Geometry, SurfaceId};
 
 /// A geometry with its features, ready for meshing.
 #[derive(Clone, Debug)]
@@ -22,5 +23,11 @@ impl CsgModel {
         let features = Features::find(&geometry)?;
         let projector = csg::Projector::new(&geometry, &features);
         Ok(Self { geometry, features, projector })
+    }
+
+    /// Whether a point is in a body.
+    pub(crate) fn contains(&self, point: &Point) -> bool {
+        let positive = |surface: SurfaceId| self.geometry.surfaces[surface.index()].value(point) > 0.0;
+        self.geometry.bodies.iter().any(|body| body.solid.contains(&positive))
     }
 }

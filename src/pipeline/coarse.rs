@@ -1,5 +1,7 @@
 //! Makes one classified, refinable tetrahedral mesh of a geometry, on one rank.
 
+use super::error::RoomError;
+use super::expected;
 use super::retries::{Budget, CORRECTIONS};
 use crate::Point;
 use crate::ground::error::{ErrorKind, HasKind};
@@ -66,6 +68,9 @@ pub enum CoarseError {
     /// A body could not be filled.
     #[error(transparent)]
     Volume(VolumeError),
+    /// More tets are expected than the memory can hold.
+    #[error(transparent)]
+    Room(#[from] RoomError),
     /// The observer cancelled the run.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
@@ -84,6 +89,7 @@ impl HasKind for CoarseError {
     fn kind(&self) -> ErrorKind {
         match self {
             Self::FacetsMeet { .. } => ErrorKind::Input,
+            Self::Room(_) => ErrorKind::Resources,
             Self::Cancelled(_) => ErrorKind::Cancelled,
             _ => ErrorKind::NoMesh,
         }
@@ -194,7 +200,9 @@ pub fn mesh(
     work: &Work,
 ) -> Result<CoarseMesh, CoarseError> {
     let samples = GeometricSamples::new(&model.geometry, &model.features, &settings.size);
-    corrected(settings, budget, work, |settings, allowed| attempt(model, &samples, settings, allowed, work))
+    corrected(settings, budget, work, |settings, allowed| {
+        attempt(model, &samples, settings, allowed, (budget, work))
+    })
 }
 
 /// The result of one attempt at a coarse mesh.
@@ -308,13 +316,17 @@ fn attempt(
     samples: &GeometricSamples,
     settings: &CoarseSettings,
     allowed: Allowed,
-    work: &Work,
+    (budget, work): (&Budget, &Work),
 ) -> Attempt {
     let CsgModel { geometry, features, projector } = model;
     let own = GeometricSize::of_samples(geometry, features, &settings.size, samples);
     let periodic = PeriodicSize::new(&own, features, settings.size.grading);
     let size: &dyn SizeField = if features.identified.is_empty() { &own } else { &periodic };
     let size = &WatchedSize::new(size, work);
+    let expected = expected::tets(&features.bounds, size, expected::FEW, || |p: &Point| model.contains(p));
+    if let Err(error) = budget.expect(expected, work) {
+        return Attempt::Failed(error.into());
+    }
     let (surface, segments) = match mesh_surface(model, size, allowed.lower) {
         Ok(made) => made,
         Err(unmeshed) => return unmeshed.into(),

@@ -136,6 +136,14 @@ pub enum InputError {
     /// Invalid arrays of a surface or mesh.
     #[error(transparent)]
     Arrays(#[from] ArrayError),
+    /// A mesh that is too large or too small for double precision.
+    #[error("{}{range}", prefix(.path))]
+    OutOfRange {
+        /// The file, if the mesh came from one.
+        path: Option<PathBuf>,
+        /// The length that is out of range.
+        range: csg::OutOfRange,
+    },
     /// Several files, of which at least one is not a surface.
     #[error("several files are taken together only if all of them are surfaces")]
     SeveralFiles,
@@ -246,7 +254,7 @@ pub enum RoomError {
     },
     /// The requested sizes need more coarse tets than the memory can hold.
     #[error(
-        "elements of at most {size} make {tets} or more, as a coarse mesh of {} or more, and this machine has {} free: choose \
+        "elements of at most {size:?} make {tets} or more, as a coarse mesh of {} or more, and this machine has {} free: choose \
          larger sizes, or refine a coarser mesh by levels",
         sized(*.needed), sized(*.available)
     )]
@@ -256,6 +264,20 @@ pub enum RoomError {
         /// Least number of tets with this size, as text: it may be beyond all integers.
         tets: String,
         /// Lower estimate of their memory in bytes.
+        needed: u64,
+        /// Free bytes.
+        available: u64,
+    },
+    /// More coarse tets are expected than the memory can hold.
+    #[error(
+        "the sizes make about {tets}, as a coarse mesh of {} or more, and this machine has {} free: choose larger sizes, or \
+         refine a coarser mesh by levels",
+        sized(*.needed), sized(*.available)
+    )]
+    Expected {
+        /// The expected number, as text: it may be beyond all integers.
+        tets: String,
+        /// Estimate of their memory in bytes.
         needed: u64,
         /// Free bytes.
         available: u64,
@@ -385,7 +407,7 @@ macro_rules! stages {
 
 stages! {
     LoadError => Load (Read Comm);
-    CoarseError => Coarse (Cancelled);
+    CoarseError => Coarse (Room Cancelled);
     CutError => Cut (Distribute Refine);
     DistError => Distribute (Comm);
     NumberError => Number (Comm);

@@ -7,6 +7,7 @@ use super::settings::InputSettings;
 use crate::files;
 use crate::files::input::ReadError;
 use crate::files::volume::VolumeMesh;
+use crate::ground::kernel::tree;
 use std::path::Path;
 
 /// The kind of content of a file.
@@ -83,6 +84,9 @@ fn read_mesh(path: &Path, note: &mut dyn FnMut(&str)) -> Result<Model, Error> {
 
 /// Takes a mesh, from a file or not, as a model: its tets must be positive.
 pub(super) fn given(read: VolumeMesh, path: Option<&Path>) -> Result<Model, InputError> {
+    if let Err(range) = tree::bounds(&read.mesh.points).refuse_out_of_range() {
+        return Err(InputError::OutOfRange { path: path.map(Path::to_path_buf), range });
+    }
     if let Some(tet) = read.inverted.first() {
         let corner = read.mesh.points[read.mesh.tets[tet.index()][0].index()];
         let path = path.map(Path::to_path_buf);

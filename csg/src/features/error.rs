@@ -1,7 +1,7 @@
 //! Errors of the feature search.
 
 use super::Inconsistency;
-use crate::{Geometry, Point, SurfaceId};
+use crate::{Geometry, OutOfRange, Point, SurfaceId};
 use std::fmt;
 
 /// A named object of the file: the name of a solid and the line of the solid or its primitive.
@@ -57,6 +57,14 @@ pub enum FeatureError {
     /// A body is unbounded.
     #[error("{0} is not bounded: cut it with planes or other solids")]
     Unbounded(Named),
+    /// The bodies are too large or too small for double precision.
+    #[error("{first}: {range}")]
+    OutOfRange {
+        /// The first body.
+        first: Named,
+        /// The length that is out of range.
+        range: OutOfRange,
+    },
     /// The interiors of two bodies intersect.
     #[error("{first} and {second} overlap near {place}: subtract one from the other")]
     Overlap {
