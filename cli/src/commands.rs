@@ -228,8 +228,9 @@ fn draw(
 ) -> Result<(), Failure> {
     let color_by = if comm.size() > 1 { picture::ColorBy::Part } else { picture::ColorBy::Patch };
     let scene = picture::scene_of_part(part, &picture::Look { color_by, cut });
+    let view = cut.as_ref().map_or_else(picture::Settings::default, picture::Settings::facing);
     let drawn = match picture::gather(comm, &scene)? {
-        Some(scene) => picture::write_png(&picture::render(&scene, &picture::Settings::default()), file),
+        Some(scene) => picture::write_png(&picture::render(&scene, &view), file),
         None => Ok(()),
     };
     agree(comm, drawn.map_err(Failure::from))

@@ -69,7 +69,7 @@ mod touch;
 mod trace;
 
 pub use check::Inconsistency;
-pub use error::{FeatureError, Named, Place};
+pub use error::{FeatureError, Named, Pair, Place};
 pub use periodic::{CurveCopy, Master, Masters, PeriodicMatch};
 pub(crate) use seam::find_seams;
 pub use singular::Singular;
@@ -154,7 +154,7 @@ pub struct Features {
 
 impl Curve {
     /// The length of the polyline through the trace; its relative error is second order in the
-    /// angle between chords.
+    /// angle between chords. [`Projector::curve_length`](crate::Projector::curve_length) is exact.
     pub fn length(&self) -> f64 {
         self.trace.windows(2).map(|ends| (ends[1] - ends[0]).norm()).sum()
     }

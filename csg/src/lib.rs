@@ -14,6 +14,7 @@ pub mod features;
 mod geometry;
 mod interval;
 pub mod language;
+mod length;
 pub mod primitive;
 pub mod project;
 pub mod solid;

@@ -18,7 +18,7 @@ use crate::mesher::surface::narrow::narrow;
 use crate::mesher::surface::{self, SurfaceError, SurfaceMesh};
 use crate::mesher::volume::{self, ClosedSurface, SurfaceFaults, VolumeError};
 use crate::parallel::refine::EdgeDisplacements;
-use csg::features::{Named, Place};
+use csg::features::{Named, Pair, Place};
 use csg::{BodyId, PatchId};
 
 /// Why there is no coarse mesh.
@@ -32,8 +32,9 @@ pub enum CoarseError {
     Surface(#[from] SurfaceError),
     /// Curves remain too close to each other, however short their segments.
     #[error(
-        "an edge between surfaces of {first} and {second} comes too near another at {place} for any segments that were tried: surfaces \
-         touch there to a high order, or leave too narrow a face; move one of them or let them overlap"
+        "an edge between surfaces of {} comes too near another at {place} for any segments that were tried: surfaces \
+         touch there to a high order, or leave too narrow a face; move one of them or let them overlap",
+        Pair(.first, .second)
     )]
     TooNear {
         /// One surface.

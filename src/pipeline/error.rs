@@ -124,6 +124,15 @@ fn prefix(path: &Option<PathBuf>) -> String {
     path.as_ref().map_or_else(String::new, |path| format!("{}: ", path.display()))
 }
 
+/// A lower estimate of bytes as text; the largest number stands for all beyond it.
+fn at_least(bytes: u64) -> String {
+    if bytes == u64::MAX {
+        "more bytes than any machine has".into()
+    } else {
+        format!("{} or more", sized(bytes))
+    }
+}
+
 /// The input cannot be meshed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum InputError {
@@ -133,6 +142,13 @@ pub enum InputError {
         .0.display(), surface::KNOWN, volume::KNOWN
     )]
     UnknownFormat(PathBuf),
+    /// A CAD file, which cannot be read.
+    #[error(
+        "{} is a CAD file, which cannot be read: export the part as STL or OBJ from the CAD program (with small angular \
+         tolerance), or mesh it with Gmsh (`gmsh -3 PART.step -o PART.msh`) and give the .msh",
+        .0.display()
+    )]
+    Cad(PathBuf),
     /// Invalid arrays of a surface or mesh.
     #[error(transparent)]
     Arrays(#[from] ArrayError),
@@ -254,9 +270,9 @@ pub enum RoomError {
     },
     /// The requested sizes need more coarse tets than the memory can hold.
     #[error(
-        "elements of at most {size:?} make {tets} or more, as a coarse mesh of {} or more, and this machine has {} free: choose \
+        "elements of at most {size:?} make {tets} or more, as a coarse mesh of {}, and this machine has {} free: choose \
          larger sizes, or refine a coarser mesh by levels",
-        sized(*.needed), sized(*.available)
+        at_least(*.needed), sized(*.available)
     )]
     Coarse {
         /// The largest size that is allowed (length).
@@ -270,9 +286,9 @@ pub enum RoomError {
     },
     /// More coarse tets are expected than the memory can hold.
     #[error(
-        "the sizes make about {tets}, as a coarse mesh of {} or more, and this machine has {} free: choose larger sizes, or \
+        "the sizes make about {tets}, as a coarse mesh of {}, and this machine has {} free: choose larger sizes, or \
          refine a coarser mesh by levels",
-        sized(*.needed), sized(*.available)
+        at_least(*.needed), sized(*.available)
     )]
     Expected {
         /// The expected number, as text: it may be beyond all integers.

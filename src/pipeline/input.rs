@@ -26,6 +26,7 @@ fn kind(path: &Path) -> Result<Kind, Error> {
         "geo" => Ok(Kind::Csg),
         "stl" | "off" | "obj" | "ply" | "poly" | "smesh" => Ok(Kind::Surface),
         "vtu" | "pvtu" | "msh" | "vol" | "gz" | "mesh" | "meshb" | "ele" | "node" | "face" => Ok(Kind::Mesh),
+        "step" | "stp" | "iges" | "igs" | "brep" => Err(InputError::Cad(path.to_path_buf()).into()),
         _ => Err(InputError::UnknownFormat(path.to_path_buf()).into()),
     }
 }

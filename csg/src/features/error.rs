@@ -8,9 +8,31 @@ use std::fmt;
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Named {
     /// The name of the solid.
-    pub solid: String,
+    pub solid: Box<str>,
     /// The line, from 1.
     pub line: u32,
+    /// For a surface, its kind, and the column of its primitive, from 1. Boxed to keep errors small.
+    pub surface: Option<Box<(&'static str, u32)>>,
+}
+
+/// Two objects of an error: surfaces of one solid are told apart by their primitives.
+#[derive(Clone, Copy, Debug)]
+pub struct Pair<'a>(pub &'a Named, pub &'a Named);
+
+impl fmt::Display for Pair<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let Self(first, second) = self;
+        match (first.surface.as_deref(), second.surface.as_deref()) {
+            (Some((one, at)), Some((other, beside))) if first.solid == second.solid => {
+                let (solid, [line, second_line]) = (&first.solid, [first.line, second.line]);
+                write!(
+                    f,
+                    "solid `{solid}`, its {one} ({line}:{at}) and its {other} ({second_line}:{beside}),"
+                )
+            }
+            _ => write!(f, "{first} and {second}"),
+        }
+    }
 }
 
 impl fmt::Display for Named {
@@ -23,13 +45,32 @@ impl Named {
     /// The solid in which a surface first occurs.
     pub fn surface(geometry: &Geometry, id: SurfaceId) -> Self {
         let info = &geometry.surface_info[id.index()];
-        Self { solid: info.solid.clone(), line: info.span.line }
+        let kind = geometry.surfaces[id.index()].kind();
+        let surface = Some(Box::new((kind, info.span.column)));
+        Self { solid: info.solid.as_str().into(), line: info.span.line, surface }
     }
 
     /// The solid of a body.
     pub(super) fn body(geometry: &Geometry, id: crate::BodyId) -> Self {
         let body = &geometry.bodies[id.index()];
-        Self { solid: body.name.clone(), line: body.span.line }
+        Self { solid: body.name.as_str().into(), line: body.span.line, surface: None }
+    }
+}
+
+/// What touches and what it touches, in words.
+struct Touching<'a>(&'a Named, &'a Named);
+
+impl fmt::Display for Touching<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let Self(first, second) = self;
+        match (first.surface.as_deref(), second.surface.as_deref()) {
+            (Some((one, at)), Some((other, beside))) if first.solid == second.solid => {
+                let (solid, [line, second_line]) = (&first.solid, [first.line, second.line]);
+                write!(f, "a corner or an edge of solid `{solid}`, on its {one} ({line}:{at}), ")?;
+                write!(f, "touches a face on its {other} ({second_line}:{beside})")
+            }
+            _ => write!(f, "a corner or an edge of {first} touches a face of {second}"),
+        }
     }
 }
 
@@ -52,10 +93,14 @@ pub enum FeatureError {
     #[error("the geometry has no top-level object that is a solid")]
     NoBody,
     /// Bodies without interior: at least one, not necessarily all.
-    #[error("{} contains nothing: its parts do not meet", .0[0])]
+    #[error(
+        "{} contains nothing: its parts do not meet; the normals of its planes must point outward, away from the solid", .0[0]
+    )]
     Empty(Vec<Named>),
     /// A body is unbounded.
-    #[error("{0} is not bounded: cut it with planes or other solids")]
+    #[error(
+        "{0} is not bounded: cut it with planes, whose normals point outward, away from the solid, or with other solids"
+    )]
     Unbounded(Named),
     /// The bodies are too large or too small for double precision.
     #[error("{first}: {range}")]
@@ -78,7 +123,7 @@ pub enum FeatureError {
     /// Two surfaces are tangent and both are boundaries there, with a wedge of zero angle between
     /// them.
     #[error(
-        "surfaces of {first} and {second} touch at {place} without crossing: move one of them or let them overlap"
+        "surfaces of {} touch at {place} without crossing: move one of them or let them overlap", Pair(.first, .second)
     )]
     Tangent {
         /// One surface.
@@ -90,9 +135,7 @@ pub enum FeatureError {
     },
     /// A corner, the apex of a cone or an edge touches the interior of a face: the body is not a
     /// manifold there.
-    #[error(
-        "a corner or an edge of {first} touches a face of {second} at {place}: move one of them or let them overlap"
-    )]
+    #[error("{} at {place}: move one of them or let them overlap", Touching(.first, .second))]
     Touch {
         /// The solid whose corner or edge touches.
         first: Named,
@@ -103,8 +146,8 @@ pub enum FeatureError {
     },
     /// A face ends in a cusp that is too sharp for triangles.
     #[error(
-        "a face between surfaces of {first} and {second} ends at {place} in a cusp too sharp for triangles: move one of \
-         them or let them overlap"
+        "a face between surfaces of {} ends at {place} in a cusp too sharp for triangles: move one of \
+         them or let them overlap", Pair(.first, .second)
     )]
     Cusp {
         /// A surface beside one of the curves of the cusp.
@@ -115,7 +158,7 @@ pub enum FeatureError {
         place: Place,
     },
     /// A feature curve has a loose end: tracing stopped, or no other curve continues it.
-    #[error("the intersection of surfaces of {first} and {second} could not be followed past {place}")]
+    #[error("the intersection of surfaces of {} could not be followed past {place}", Pair(.first, .second))]
     LooseCurve {
         /// One surface.
         first: Named,
@@ -126,7 +169,8 @@ pub enum FeatureError {
     },
     /// Separating two surfaces needs too many cells.
     #[error(
-        "surfaces of {first} and {second} could not be separated near {place}: they are too close or nearly tangent; move one of them"
+        "surfaces of {} could not be separated near {place}: they are too close or nearly tangent; move one of them",
+        Pair(.first, .second)
     )]
     TooIntricate {
         /// One surface.

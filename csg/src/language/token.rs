@@ -23,6 +23,8 @@ pub(super) enum TokenKind<'a> {
 pub(super) struct Token<'a> {
     pub kind: TokenKind<'a>,
     pub span: Span,
+    /// The position behind its last character.
+    pub end: Span,
 }
 
 /// The lines of a text, terminated by LF, CR LF or CR.
@@ -43,7 +45,7 @@ pub(super) fn tokenize<'a>(source: &'a str, report: &mut Report) -> Vec<Token<'a
         }
         end = scanner.span;
     }
-    tokens.push(Token { kind: TokenKind::End, span: end });
+    tokens.push(Token { kind: TokenKind::End, span: end, end });
     tokens
 }
 
@@ -101,7 +103,7 @@ impl<'a> Scanner<'a> {
                 }
             }
         };
-        Some(Token { kind, span })
+        Some(Token { kind, span, end: self.span })
     }
 
     /// Scans a number: digits, optional decimal point, optional exponent.

@@ -1,6 +1,6 @@
 //! Rasterizes triangles: a depth buffer, flat shading, and edges as thin lines.
 
-use super::scene::{Scene, Triangle};
+use super::scene::{Cut, Scene, Triangle};
 use crate::files::color::Color;
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -25,6 +25,28 @@ pub struct Settings {
     pub background: Color,
     /// Margin around the scene, as a fraction of the image.
     pub margin: f32,
+}
+
+impl Settings {
+    /// A view of the face that a cut opens: the tets that are drawn are behind the plane.
+    pub fn facing(cut: &Cut) -> Self {
+        /// Beside and above the normal, so that other faces are visible too (degrees).
+        const ASIDE: [f64; 2] = [30.0, 20.0];
+        /// Largest elevation, so that the picture has an upper end (degrees).
+        const STEEPEST: f64 = 65.0;
+        let normal = Vector3::from(cut.normal);
+        let level = normal.xy().norm();
+        let rise = normal.z.atan2(level).to_degrees();
+        let default = Self::default();
+        // The normal of a level cut has no azimuth.
+        let azimuth = if level > 1e-6 * normal.norm() {
+            normal.y.atan2(normal.x).to_degrees() - ASIDE[0]
+        } else {
+            default.azimuth
+        };
+        let elevation = (rise + ASIDE[1]).clamp(-STEEPEST, STEEPEST);
+        Self { azimuth, elevation, ..default }
+    }
 }
 
 impl Default for Settings {
