@@ -11,7 +11,8 @@ pub struct Named {
     pub solid: Box<str>,
     /// The line, from 1.
     pub line: u32,
-    /// For a surface, its kind, and the column of its primitive, from 1. Boxed to keep errors small.
+    /// For a surface, its kind, and the column of its primitive, from 1; boxed, as errors are to be
+    /// small.
     pub surface: Option<Box<(&'static str, u32)>>,
 }
 
@@ -94,12 +95,12 @@ pub enum FeatureError {
     NoBody,
     /// Bodies without interior: at least one, not necessarily all.
     #[error(
-        "{} contains nothing: its parts do not meet; the normals of its planes must point outward, away from the solid", .0[0]
+        "{} contains nothing: its parts do not meet; the normal of a plane points out of the solid", .0[0]
     )]
     Empty(Vec<Named>),
     /// A body is unbounded.
     #[error(
-        "{0} is not bounded: cut it with planes, whose normals point outward, away from the solid, or with other solids"
+        "{0} is not bounded: cut it with planes or other solids; the normal of a plane points out of the solid"
     )]
     Unbounded(Named),
     /// The bodies are too large or too small for double precision.

@@ -30,8 +30,8 @@ pub struct Settings {
 impl Settings {
     /// A view of the face that a cut opens: the tets that are drawn are behind the plane.
     pub fn facing(cut: &Cut) -> Self {
-        /// Beside and above the normal, so that other faces are visible too (degrees).
-        const ASIDE: [f64; 2] = [30.0, 20.0];
+        /// Beside the normal, so that other faces are visible too (degrees).
+        const ASIDE: f64 = 30.0;
         /// Largest elevation, so that the picture has an upper end (degrees).
         const STEEPEST: f64 = 65.0;
         let normal = Vector3::from(cut.normal);
@@ -40,11 +40,11 @@ impl Settings {
         let default = Self::default();
         // The normal of a level cut has no azimuth.
         let azimuth = if level > 1e-6 * normal.norm() {
-            normal.y.atan2(normal.x).to_degrees() - ASIDE[0]
+            normal.y.atan2(normal.x).to_degrees() + ASIDE
         } else {
             default.azimuth
         };
-        let elevation = (rise + ASIDE[1]).clamp(-STEEPEST, STEEPEST);
+        let elevation = (rise + default.elevation).clamp(-STEEPEST, STEEPEST);
         Self { azimuth, elevation, ..default }
     }
 }
@@ -256,6 +256,18 @@ mod tests {
 
     const RED: Color = [1.0, 0.0, 0.0];
     const BLUE: Color = [0.0, 0.0, 1.0];
+
+    #[test]
+    fn the_view_of_a_cut_faces_it_from_any_side() {
+        let axes = [[1.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 0.5], [1.0, -1.0, 3.0]];
+        for normal in axes.into_iter().flat_map(|n| [n, n.map(|x| -x)]) {
+            let [_, _, away] = directions(&Settings::facing(&Cut { point: [0.0; 3], normal }));
+            let cosine = -away.dot(&Vector3::from(normal).normalize());
+            assert!(cosine > 0.6, "{normal:?}: {cosine}");
+        }
+        let facing = Settings::facing(&Cut { point: [0.0; 3], normal: [0.0, -1.0, 0.0] });
+        assert_eq!(facing, Settings::default());
+    }
 
     /// Seen from the x direction, with y to the right and z up; no margin, no lines.
     fn settings() -> Settings {

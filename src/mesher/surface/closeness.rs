@@ -340,6 +340,16 @@ mod tests {
     }
 
     #[test]
+    fn a_long_thin_bar_is_probed_in_proportion_to_its_length() {
+        let places = |length| {
+            let closeness = Closeness { ratio: 2.0, most: 8.0 };
+            found(&slab([length, 1.0, 0.25]), 1.0, closeness).1.places as f64
+        };
+        let [short, long] = [64.0, 1024.0].map(places);
+        assert!(long < 24.0 * short, "{short}, {long}");
+    }
+
+    #[test]
     fn regions_too_thin_to_resolve_are_counted_and_left_unchanged() {
         let paper = slab([4.0, 4.0, 0.001]);
         let (sources, walls) = found(&paper, 1.0, Closeness { ratio: 2.0, most: 8.0 });

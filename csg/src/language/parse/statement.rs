@@ -42,8 +42,8 @@ impl Parser<'_, '_> {
             }
             _ => "every statement ends with `;`",
         };
-        // Flags and operators are wrong where they are; otherwise `;` is missing after the last word,
-        // perhaps lines before the next one.
+        // Flags and operators are wrong where they are; otherwise `;` is missing behind the last
+        // word, perhaps lines before the next one.
         let next = self.peek();
         let is_missing = match next.kind {
             TokenKind::Word(word) => begins_statement(word),
