@@ -10,7 +10,7 @@
 //! The lines are optional. Numbers may be on any number of lines. `#` starts a comment, an
 //! extension of NETGEN's format.
 
-use super::input::ReadError;
+use super::input::{ReadError, shown};
 use crate::Point;
 use crate::ground::size::Source;
 use std::path::Path;
@@ -60,7 +60,9 @@ fn parse(text: &str, least: f64) -> Result<Vec<Source>, (usize, String)> {
     }
     match words.next() {
         None => Ok(sources),
-        Some(word) => Err((words.line, format!("unexpected `{word}` after the last line"))),
+        Some(word) => {
+            Err((words.line, format!("unexpected `{}` after the last line", shown(word.as_bytes()))))
+        }
     }
 }
 
@@ -98,7 +100,7 @@ impl<'a> Words<'a> {
             return Err((self.line, format!("the file ends before {what}")));
         };
         let number = word.parse().ok().filter(|number: &f64| number.is_finite());
-        number.ok_or_else(|| (self.line, format!("expected {what}, found `{word}`")))
+        number.ok_or_else(|| (self.line, format!("expected {what}, found `{}`", shown(word.as_bytes()))))
     }
 
     fn count(&mut self, what: &str) -> Result<usize, (usize, String)> {

@@ -28,7 +28,7 @@ impl fmt::Display for Pair<'_> {
                 let (solid, [line, second_line]) = (&first.solid, [first.line, second.line]);
                 write!(
                     f,
-                    "solid `{solid}`, its {one} ({line}:{at}) and its {other} ({second_line}:{beside}),"
+                    "solid `{solid:.60}`, its {one} ({line}:{at}) and its {other} ({second_line}:{beside}),"
                 )
             }
             _ => write!(f, "{first} and {second}"),
@@ -38,7 +38,8 @@ impl fmt::Display for Pair<'_> {
 
 impl fmt::Display for Named {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        write!(f, "solid `{}` (line {})", self.solid, self.line)
+        // Names may be as long as the file.
+        write!(f, "solid `{:.60}` (line {})", self.solid, self.line)
     }
 }
 
@@ -67,7 +68,7 @@ impl fmt::Display for Touching<'_> {
         match (first.surface.as_deref(), second.surface.as_deref()) {
             (Some((one, at)), Some((other, beside))) if first.solid == second.solid => {
                 let (solid, [line, second_line]) = (&first.solid, [first.line, second.line]);
-                write!(f, "a corner or an edge of solid `{solid}`, on its {one} ({line}:{at}), ")?;
+                write!(f, "a corner or an edge of solid `{solid:.60}`, on its {one} ({line}:{at}), ")?;
                 write!(f, "touches a face on its {other} ({second_line}:{beside})")
             }
             _ => write!(f, "a corner or an edge of {first} touches a face of {second}"),

@@ -99,7 +99,7 @@ fn wedges_of_zero_angle_are_rejected_with_both_names_and_coordinates() {
         ),
         (
             "solid a = sphere (0,0,0; 1) and not sphere (0.5,0,0; 0.5); tlo a;",
-            "surfaces of solid `a` (line 2) and solid `a` (line 2) touch at (1.000000, ",
+            "surfaces of solid `a`, its sphere (2:11) and its sphere (2:37), touch at (1.000000, ",
         ),
         (&rods, "surfaces of solid `b` (line 3) and solid `a` (line 2) touch at (1.000000, "),
         (
@@ -109,7 +109,7 @@ fn wedges_of_zero_angle_are_rejected_with_both_names_and_coordinates() {
         // A plane tangent to a torus at its inner equator cuts it into lobes that meet at a point.
         (
             "solid a = torus (0,0,0; 0,0,1; 2; 0.5) and plane (1.5,0,0; 1,0,0); tlo a;",
-            "surfaces of solid `a` (line 2) and solid `a` (line 2) touch at (1.500000, ",
+            "surfaces of solid `a`, its torus (2:11) and its plane (2:44), touch at (1.500000, ",
         ),
     ];
     for (source, message) in cases {
@@ -139,7 +139,7 @@ fn cones_tangent_along_a_line_may_also_meet_in_an_ellipse() {
     assert_eq!(counts(&find(&cones_on_a_line([3.0, 4.0], -1.0, "a and not b"))), [0, 0, 2, 3]);
     for (side, solid) in [(1.0, "a and not b"), (-1.0, "a or b")] {
         let error = refused(&cones_on_a_line([3.0, 4.0], side, solid));
-        let names = error.contains("(line 2)") && error.contains("(line 3)");
+        let names = error.contains("(2:11)") && error.contains("(3:11)");
         assert!(names && error.contains("without crossing"), "{error}");
     }
 }

@@ -226,7 +226,8 @@ mod tests {
         for end in ["\n", "\r\n", "\r"] {
             let source = format!("a # solid ä \u{fffd}{end}b#");
             let tokens = tokenize(&source, &mut Report::default());
-            assert_eq!(tokens[1], Token { kind: Word("b"), span: Span { line: 2, column: 1 } }, "{end:?}");
+            let [span, behind] = [1, 2].map(|column| Span { line: 2, column });
+            assert_eq!(tokens[1], Token { kind: Word("b"), span, end: behind }, "{end:?}");
             assert_eq!(tokens.len(), 3);
         }
     }
