@@ -40,7 +40,7 @@ fn sizes_that_no_machine_can_mesh_are_refused_with_their_numbers() {
     let sizes = dir.path().join("sizes.txt");
     std::fs::write(&sizes, "2\n0.5 0.5 0.5 0.1\n0.5 0.5 0.5 1e-200\n").unwrap();
     let line = dir.path().join("line.txt");
-    std::fs::write(&line, "0\n1\n0 0 0 1 1 1 1e-7\n").unwrap();
+    std::fs::write(&line, "0\n1\n0 0 0 1 1 1 1e-6\n").unwrap();
     for name in ["cube.geo", "cube.obj"] {
         let unit = cube(dir.path(), name, 1.0);
         assert_refused(&mesh(&unit, &["--maxh", "1e-300"]), 2, "--maxh");
@@ -48,7 +48,20 @@ fn sizes_that_no_machine_can_mesh_are_refused_with_their_numbers() {
         assert_refused(&mesh(&unit, &["--grading", "1e9"]), 2, "positive numbers up to 10");
         let [sizes, line] = [&sizes, &line].map(|file| file.to_str().unwrap());
         assert_refused(&mesh(&unit, &["--mesh-size-file", sizes]), 2, "sizes.txt:3: the size 1e-200");
-        assert_refused(&mesh(&unit, &["--mesh-size-file", line]), 4, "the sizes make about");
+        assert_refused(&mesh(&unit, &["--mesh-size-file", line]), 2, "line.txt:3: ");
+    }
+}
+
+#[test]
+fn sizes_from_a_file_that_exceed_the_memory_are_refused_before_meshing() {
+    let dir = tempfile::tempdir().unwrap();
+    let line = dir.path().join("line.txt");
+    std::fs::write(&line, "0\n1\n0 0 0 1 1 1 3e-4\n").unwrap();
+    for name in ["cube.geo", "cube.obj"] {
+        let mut command = tetmill();
+        command.arg("generate").arg(cube(dir.path(), name, 1.0)).arg("--mesh-size-file").arg(&line);
+        let output = command.args(["-f", "none", "--memory", "1e8"]).output().unwrap();
+        assert_refused(&output, 4, "the sizes make about 1.");
     }
 }
 

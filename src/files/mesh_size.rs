@@ -19,6 +19,10 @@ use std::path::Path;
 /// computer needs.
 const MOST_SOURCES: usize = 20_000_000;
 
+/// Maximum number of sources along a line: at a grading of 0.3 they need 60 million tets, and the
+/// size field itself takes gigabytes.
+const MOST_ON_LINE: f64 = 200_000.0;
+
 /// Reads the sources of a mesh-size file; lines become sources one size apart.
 ///
 /// # Errors
@@ -52,7 +56,7 @@ fn parse(text: &str, least: f64) -> Result<Vec<Source>, (usize, String)> {
         let [from, to] = [words.point("the first end of a line")?, words.point("the second end of a line")?];
         let size = words.size()?;
         let pieces = ((to - from).norm() / size).ceil().max(1.0);
-        if pieces + sources.len() as f64 > MOST_SOURCES as f64 {
+        if pieces > MOST_ON_LINE || pieces + sources.len() as f64 > MOST_SOURCES as f64 {
             return Err((words.line, format!("the size {size} is too small for a line from {from} to {to}")));
         }
         let at = |piece: usize| from + (to - from) * (piece as f64 / pieces);
