@@ -209,14 +209,19 @@ fn processes_conform() {
     }
 }
 
-#[test]
-fn a_rank_that_panics_ends_the_job_with_its_message() {
-    let Some(output) = mpirun(3, "panic") else { return };
+/// A body in which rank 1 panics ends with its message, and no rank passes the barrier.
+fn assert_a_panic_ends_the_job(body: &str) {
+    let Some(output) = mpirun(3, body) else { return };
     let text = text(&output);
     assert!(!output.status.success(), "{text}");
     assert!(text.contains("this rank fails on purpose"), "{text}");
     assert!(text.contains("rank 1 panicked: the job ends"), "{text}");
     assert!(!text.contains("the barrier was passed"), "{text}");
+}
+
+#[test]
+fn a_rank_that_panics_ends_the_job_with_its_message() {
+    assert_a_panic_ends_the_job("panic");
 }
 
 #[test]
@@ -234,12 +239,7 @@ fn a_program_with_mpi_of_its_own_gets_the_same_mesh() {
 
 #[test]
 fn a_panic_in_a_program_with_mpi_of_its_own_ends_the_job() {
-    let Some(output) = mpirun(3, "own panic") else { return };
-    let text = text(&output);
-    assert!(!output.status.success(), "{text}");
-    assert!(text.contains("this rank fails on purpose"), "{text}");
-    assert!(text.contains("rank 1 panicked: the job ends"), "{text}");
-    assert!(!text.contains("the barrier was passed"), "{text}");
+    assert_a_panic_ends_the_job("own panic");
 }
 
 #[test]

@@ -64,7 +64,7 @@ fn generate_on(comm: &dyn Communicator, options: &Generate, start: Instant) -> R
         })
         .transpose();
     let geometry = agree(comm, geometry)?;
-    let coarse = agree(comm, coarse_settings(&options.size, first))?;
+    let coarse = agree(comm, coarse_settings(&options.size, geometry.as_ref()))?;
     let disk = Some(disk_for(&options.run.format, &target));
     let method = agree(comm, method_of(options))?;
     let settings = GenerateSettings {
@@ -159,9 +159,9 @@ fn name_of(options: &InputOptions) -> String {
     names.join(", ")
 }
 
-/// Settings of the coarse mesh. Only the rank with `reads` set, which makes the mesh, reads the
+/// Settings of the coarse mesh. Only the rank with the geometry, which makes the mesh, reads the
 /// mesh-size file.
-fn coarse_settings(options: &SizeOptions, reads: bool) -> Result<CoarseSettings, Failure> {
+fn coarse_settings(options: &SizeOptions, geometry: Option<&Geometry>) -> Result<CoarseSettings, Failure> {
     let mut settings = SizeSettings::from(options.preset.unwrap_or_default());
     settings.maxh = options.maxh;
     settings.minh = options.minh.unwrap_or(settings.minh);
@@ -169,8 +169,9 @@ fn coarse_settings(options: &SizeOptions, reads: bool) -> Result<CoarseSettings,
     if let Some(ratio) = options.closeness {
         settings.closeness = Closeness::of_ratio(ratio);
     }
-    if let Some(file) = options.mesh_size_file.as_ref().filter(|_| reads) {
-        settings.sources = mesh_size::read(file).map_err(Failure::input)?;
+    if let (Some(file), Some(geometry)) = (&options.mesh_size_file, geometry) {
+        let least = geometry.least_size().unwrap_or(0.0);
+        settings.sources = mesh_size::read_from(file, least).map_err(Failure::input)?;
     }
     Ok(CoarseSettings { size: settings, effort: options.effort })
 }
@@ -227,8 +228,9 @@ fn draw(
 ) -> Result<(), Failure> {
     let color_by = if comm.size() > 1 { picture::ColorBy::Part } else { picture::ColorBy::Patch };
     let scene = picture::scene_of_part(part, &picture::Look { color_by, cut });
+    let view = cut.as_ref().map_or_else(picture::Settings::default, picture::Settings::facing);
     let drawn = match picture::gather(comm, &scene)? {
-        Some(scene) => picture::write_png(&picture::render(&scene, &picture::Settings::default()), file),
+        Some(scene) => picture::write_png(&picture::render(&scene, &view), file),
         None => Ok(()),
     };
     agree(comm, drawn.map_err(Failure::from))
@@ -356,7 +358,7 @@ pub fn run_mesh(options: &MeshFile) -> Result<(), Failure> {
         progress.stage(Stage::Read, |_| read_sized_geometry(&options.input, &options.size, &progress))?;
     let settings = GenerateSettings {
         method: tetmill::Method::default(),
-        coarse: coarse_settings(&options.size, true)?,
+        coarse: coarse_settings(&options.size, Some(&geometry))?,
         wanted: wanted_coarse(&options.size, 1),
         memory: None,
         disk: None,

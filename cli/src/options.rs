@@ -74,7 +74,7 @@ pub struct SizeOptions {
     /// Smallest element size due to curvature and short curves (length)
     #[arg(long, value_name = "H", value_parser = positive)]
     pub minh: Option<f64>,
-    /// Growth of the size per unit of distance [default: set by --preset]
+    /// Growth of the size per unit of distance, at most 10 [default: set by --preset]
     #[arg(long, value_name = "G", value_parser = positive)]
     pub grading: Option<f64>,
     /// Largest element size in thin regions, relative to their thickness: 1 gives one layer of good

@@ -34,7 +34,7 @@ fn broken_files_are_refused_with_their_place() {
     refused("solid a = sphere (0,0,0; 1);", ":1:1", "algebraic3d");
     refused("algebraic3d\nsolid a = sphere (0,0,0 1);\ntlo a;", ":2:", "");
     refused("algebraic3d\nsolid a = sphere (0,0,0; -1);\ntlo a;", ":2:", "radius");
-    refused("algebraic3d\nsolid a = sphere (0,0,0; 1)\ntlo a;", ":3:", "");
+    refused("algebraic3d\nsolid a = sphere (0,0,0; 1)\ntlo a;", ":2:28", "");
     refused("algebraic3d\nsolid a = sphere (0,0,0; 1);\ntlo b;", ":3:5", "`b`");
     refused("algebraic3d\nsolid a = spere (0,0,0; 1);\ntlo a;", ":2:", "spere");
     refused("algebraic3d\nsolid a = sphere (0,0,0; 1e);\ntlo a;", ":2:", "");

@@ -8,6 +8,10 @@ pub use folders::{geometries_in, own, own_geometries, shared};
 use std::path::Path;
 use std::process::{Command, Output};
 
+/// Own geometries that tests mesh in parts.
+pub const OWN_IN_PARTS: [&str; 10] =
+    ["nozzle", "fibres", "tee", "boss_fillet", "ice_cream", "gear", "probe_tank", "layers", "vase", "dome"];
+
 /// The program built with these tests.
 pub fn tetmill() -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_tetmill"));

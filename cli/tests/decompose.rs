@@ -1,6 +1,6 @@
 //! `generate -m decompose` and `tetmill decompose`: geometries cut by planes.
 
-use crate::common::{judged_report, own, report_of, succeed, tetmill};
+use crate::common::{OWN_IN_PARTS, judged_report, own, report_of, succeed, tetmill};
 
 /// Number of tets, smallest dihedral angle and volume of a mesh that passes both checkers.
 fn made(name: &str, ranks: u32, more: &[&str]) -> [f64; 3] {
@@ -10,19 +10,7 @@ fn made(name: &str, ranks: u32, more: &[&str]) -> [f64; 3] {
 
 #[test]
 fn own_geometries_are_cut_and_their_pieces_meshed() {
-    let names = [
-        "nozzle",
-        "fibres",
-        "tee",
-        "boss_fillet",
-        "ice_cream",
-        "gear",
-        "probe_tank",
-        "layers",
-        "vase",
-        "dome",
-    ];
-    for (name, ranks) in names.into_iter().zip([2, 3, 4, 8].into_iter().cycle()) {
+    for (name, ranks) in OWN_IN_PARTS.into_iter().zip([2, 3, 4, 8].into_iter().cycle()) {
         let [tets, angle, volume] = made(name, ranks, &["--pieces", "2"]);
         assert!(tets > 0.0 && angle > 0.5, "{name} on {ranks} ranks: {angle}°");
         let refined = report_of(&own(name), &["--preset", "coarse", "--pieces", "2"]);

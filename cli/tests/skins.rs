@@ -1,6 +1,6 @@
 //! `generate -m surface`: parts meshed inside their refined surfaces.
 
-use crate::common::{judged_report, own, report_of, tetmill};
+use crate::common::{OWN_IN_PARTS, judged_report, own, report_of, tetmill};
 
 /// Smallest dihedral angle, that of the coarse mesh, and volume of a mesh that passes both
 /// checkers.
@@ -13,19 +13,7 @@ fn made(name: &str, ranks: u32, pieces: u32) -> [f64; 3] {
 
 #[test]
 fn parts_of_own_geometries_are_meshed_inside_their_skins() {
-    let names = [
-        "nozzle",
-        "fibres",
-        "tee",
-        "boss_fillet",
-        "ice_cream",
-        "gear",
-        "probe_tank",
-        "layers",
-        "vase",
-        "dome",
-    ];
-    for (name, ranks) in names.into_iter().zip([2, 3, 4, 8, 16, 32].into_iter().cycle()) {
+    for (name, ranks) in OWN_IN_PARTS.into_iter().zip([2, 3, 4, 8, 16, 32].into_iter().cycle()) {
         let [angle, coarse, volume] = made(name, ranks, 2);
         // Part surfaces keep the angles of the coarse triangles.
         assert!(angle > f64::min(8.0, 0.9 * coarse), "{name} on {ranks} ranks: {angle}°, coarse {coarse}°");

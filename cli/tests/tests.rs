@@ -14,6 +14,7 @@ mod random_scenes;
 mod ranks;
 mod repartition;
 mod scenes;
+mod sizes;
 mod skins;
 mod swept;
 mod tutorials;

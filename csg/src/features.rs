@@ -71,7 +71,7 @@ mod trace;
 
 pub use check::Inconsistency;
 pub use cut_cusps::{Cusp, CutCusp, find_and_cut_cusps};
-pub use error::{FeatureError, Named, Place};
+pub use error::{FeatureError, Named, Pair, Place};
 pub use periodic::{CurveCopy, Master, Masters, PeriodicMatch};
 pub(crate) use seam::find_seams;
 pub use singular::Singular;
@@ -158,7 +158,7 @@ pub struct Features {
 
 impl Curve {
     /// The length of the polyline through the trace; its relative error is second order in the
-    /// angle between chords.
+    /// angle between chords. [`Projector::curve_length`](crate::Projector::curve_length) is exact.
     pub fn length(&self) -> f64 {
         self.trace.windows(2).map(|ends| (ends[1] - ends[0]).norm()).sum()
     }
@@ -171,6 +171,11 @@ impl Features {
     /// [`FeatureError`], with coordinates, if the geometry cannot be meshed.
     pub fn find(geometry: &Geometry) -> Result<Self, FeatureError> {
         let root = bounds::bounding_cell(geometry)?;
+        let [min, max] = [root.map(|side| side.lo), root.map(|side| side.hi)].map(Point::from);
+        let first = || Named::body(geometry, BodyId(0));
+        Aabb { min, max }
+            .refuse_out_of_range()
+            .map_err(|range| FeatureError::OutOfRange { first: first(), range })?;
         let diagonal = root.iter().map(|side| side.width().powi(2)).sum::<f64>().sqrt();
         let largest = root.iter().map(crate::Interval::magnitude).fold(0.0, f64::max);
         let tolerances = Tolerances::new(diagonal, largest);

@@ -1,6 +1,7 @@
 //! The geometry described by a `.geo` file: surfaces, bodies and the options that apply to them.
 
 use crate::{Point, Solid, Surface};
+use std::ops::RangeInclusive;
 
 /// Declares the id of one kind of geometric entity: an index into the list of that kind.
 macro_rules! entity_id {
@@ -69,6 +70,38 @@ impl Aabb {
     /// The center of the box.
     pub fn center(&self) -> Point {
         nalgebra::center(&self.min, &self.max)
+    }
+}
+
+/// Extents that can be meshed (length): exact predicates overflow and underflow in double precision
+/// beyond them, and single precision stores sizes.
+const POSSIBLE_EXTENTS: RangeInclusive<f64> = 1e-25..=1e30;
+
+/// A geometry is too large or too small for double precision.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error(
+    "a length of {0:.1e} is out of range: extents from {start:.0e} to {end:.0e} are possible, so choose another unit of length",
+    start = POSSIBLE_EXTENTS.start(), end = POSSIBLE_EXTENTS.end()
+)]
+pub struct OutOfRange(pub f64);
+
+impl Aabb {
+    /// Refuses a box around a geometry whose extent or position is out of the range of double
+    /// precision.
+    ///
+    /// # Errors
+    /// If it is out of range; the error has the diagonal or the coordinate.
+    pub fn refuse_out_of_range(&self) -> Result<(), OutOfRange> {
+        let largest = self.min.coords.amax().max(self.max.coords.amax());
+        // The diagonal may overflow and underflow.
+        let extent = (self.max - self.min).amax();
+        if largest > *POSSIBLE_EXTENTS.end() {
+            Err(OutOfRange(largest))
+        } else if extent < *POSSIBLE_EXTENTS.start() {
+            Err(OutOfRange(extent))
+        } else {
+            Ok(())
+        }
     }
 }
 

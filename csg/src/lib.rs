@@ -14,6 +14,7 @@ pub mod features;
 mod geometry;
 mod interval;
 pub mod language;
+mod length;
 pub mod primitive;
 pub mod project;
 pub mod solid;
@@ -25,7 +26,7 @@ pub use features::{
 };
 pub use geometry::{
     Aabb, Body, BodyId, BoundaryLabel, BoundaryOverride, CornerId, CurveId, Cutout, Geometry, Identification,
-    PatchId, Seam, SingularPlace, Singularity, Span, SurfaceId, SurfaceInfo, UserPoint,
+    OutOfRange, PatchId, Seam, SingularPlace, Singularity, Span, SurfaceId, SurfaceInfo, UserPoint,
 };
 pub use interval::Interval;
 pub use project::{ProjectionFailed, Projector};

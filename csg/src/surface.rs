@@ -57,6 +57,24 @@ macro_rules! dispatch {
 }
 
 impl Surface {
+    /// Its kind in words.
+    pub fn kind(&self) -> &'static str {
+        match self {
+            Self::Plane(_) => "plane",
+            Self::Sphere(_) => "sphere",
+            Self::Cylinder(_) => "cylinder",
+            Self::Cone(_) => "cone",
+            Self::Torus(_) => "torus",
+            Self::Ellipsoid(_) => "ellipsoid",
+            Self::EllipticCylinder(_) => "elliptic cylinder",
+            Self::EllipticCone(_) => "elliptic cone",
+            Self::Nappe(_) => "nappe of a cone",
+            Self::Revolved(_) => "turned ellipse",
+            Self::Sweep(s) if s.is_round() => "section moved along a circle",
+            Self::Sweep(_) => "section moved along an ellipse",
+        }
+    }
+
     /// The function at `point`: zero on the surface, negative inside.
     ///
     /// Its gradient has unit length on the surface for most kinds; `value / |gradient|` is the

@@ -10,7 +10,7 @@
 //! The lines are optional. Numbers may be on any number of lines. `#` starts a comment, an
 //! extension of NETGEN's format.
 
-use super::input::{ReadError, coordinate};
+use super::input::{ReadError, coordinate, shown};
 use crate::Point;
 use crate::ground::size::Source;
 use std::path::Path;
@@ -21,18 +21,31 @@ const MOST_SOURCES: usize = 1_000_000;
 /// Maximum number of points or lines that a file may announce.
 const MOST_COUNT: f64 = 1e9;
 
+/// Maximum number of sources along a line: at a grading of 0.3 they need 60 million tets, and the
+/// size field itself takes gigabytes.
+const MOST_ON_LINE: f64 = 200_000.0;
+
 /// Reads the sources of a mesh-size file; lines become sources one size apart.
 ///
 /// # Errors
 /// Malformed content, with the line.
 pub fn read(path: &Path) -> Result<Vec<Source>, ReadError> {
+    read_from(path, 0.0)
+}
+
+/// [`read`], which refuses sizes below `least`, the smallest of the geometry
+/// ([`Geometry::least_size`](crate::Geometry::least_size)).
+///
+/// # Errors
+/// Malformed content and too small sizes, with the line.
+pub fn read_from(path: &Path, least: f64) -> Result<Vec<Source>, ReadError> {
     let text = std::fs::read(path).map_err(ReadError::io(path))?;
-    parse(&String::from_utf8_lossy(&text))
+    parse(&String::from_utf8_lossy(&text), least)
         .map_err(|(line, reason)| ReadError::line(path, line as u64, reason))
 }
 
-fn parse(text: &str) -> Result<Vec<Source>, (usize, String)> {
-    let mut words = Words::new(text);
+fn parse(text: &str, least: f64) -> Result<Vec<Source>, (usize, String)> {
+    let mut words = Words::new(text, least);
     let mut sources = Vec::new();
     for _ in 0..words.count("the number of points")? {
         let point = words.point("a point")?;
@@ -47,8 +60,8 @@ fn parse(text: &str) -> Result<Vec<Source>, (usize, String)> {
         let size = words.size()?;
         let pieces = ((to - from).norm() / size).ceil().max(1.0);
         along_lines += pieces + 1.0;
-        if along_lines > MOST_SOURCES as f64 {
-            let most = format!("lines can have {MOST_SOURCES} points with sizes in all");
+        if pieces > MOST_ON_LINE || along_lines > MOST_SOURCES as f64 {
+            let most = format!("a line can have {MOST_ON_LINE} points with sizes, all lines {MOST_SOURCES}");
             return Err((
                 words.line,
                 format!("the size {size} is too small for a line from {from} to {to}: {most}"),
@@ -59,7 +72,9 @@ fn parse(text: &str) -> Result<Vec<Source>, (usize, String)> {
     }
     match words.next() {
         None => Ok(sources),
-        Some(word) => Err((words.line, format!("unexpected `{word}` after the last line"))),
+        Some(word) => {
+            Err((words.line, format!("unexpected `{}` after the last line", shown(word.as_bytes()))))
+        }
     }
 }
 
@@ -67,17 +82,19 @@ fn parse(text: &str) -> Result<Vec<Source>, (usize, String)> {
 struct Words<'a> {
     rest: Vec<(usize, &'a str)>,
     line: usize,
+    /// The smallest possible size.
+    least: f64,
 }
 
 impl<'a> Words<'a> {
-    fn new(text: &'a str) -> Self {
+    fn new(text: &'a str, least: f64) -> Self {
         let words = text.lines().enumerate().flat_map(|(i, line)| {
             let content = line.split('#').next().unwrap_or_default();
             content.split_whitespace().map(move |word| (i + 1, word))
         });
         let mut rest: Vec<_> = words.collect();
         rest.reverse();
-        Self { rest, line: 1 }
+        Self { rest, line: 1, least }
     }
 
     fn is_at_end(&self) -> bool {
@@ -95,7 +112,7 @@ impl<'a> Words<'a> {
             return Err((self.line, format!("the file ends before {what}")));
         };
         let number = word.parse().ok().filter(|number: &f64| number.is_finite());
-        number.ok_or_else(|| (self.line, format!("expected {what}, found `{word}`")))
+        number.ok_or_else(|| (self.line, format!("expected {what}, found `{}`", shown(word.as_bytes()))))
     }
 
     fn count(&mut self, what: &str) -> Result<usize, (usize, String)> {
@@ -119,6 +136,13 @@ impl<'a> Words<'a> {
         if size <= 0.0 {
             return Err((self.line, format!("the size {size} is not positive")));
         }
+        if size < self.least {
+            let least = self.least;
+            let reason = format!(
+                "the size {size:?} is below {least:.1e}, the smallest that coordinates of the geometry resolve"
+            );
+            return Err((self.line, reason));
+        }
         Ok(size)
     }
 }
@@ -129,11 +153,11 @@ mod tests {
 
     #[test]
     fn points_and_lines_become_sources() {
-        let sources = parse("2 # points\n0 0 0 0.1\n1 0\n0 0.5\n1\n0 0 0  0 3 0  1\n").unwrap();
+        let sources = parse("2 # points\n0 0 0 0.1\n1 0\n0 0.5\n1\n0 0 0  0 3 0  1\n", 0.0).unwrap();
         assert_eq!(sources.len(), 2 + 4);
         assert_eq!(sources[1], Source { point: Point::new(1.0, 0.0, 0.0), size: 0.5 });
         assert_eq!(sources[4], Source { point: Point::new(0.0, 2.0, 0.0), size: 1.0 });
-        assert_eq!(parse("1\n0 0 0 1").unwrap().len(), 1);
+        assert_eq!(parse("1\n0 0 0 1", 0.0).unwrap().len(), 1);
     }
 
     #[test]
@@ -144,15 +168,16 @@ mod tests {
             ("1\n0 0 x 1", 2, "expected a point, found `x`"),
             ("1\n0 0 0\n0", 3, "0 is not positive"),
             ("1\n0 0 0 inf", 2, "expected a size, found `inf`"),
+            ("1\n0 0\n0 1e-200", 3, "1e-200 is below 1.0e-14"),
             ("2\n0 0 0 1\n0 0", 3, "ends before a point"),
-            ("0\n1\n0 0 0 1 0 0 1e-300", 3, "too small"),
-            ("0\n2\n0 0 0 6 0 0 1e-5\n0 0 0 6 0 0 1e-5\n", 4, "1000000 points"),
+            ("0\n1\n0 0 0 1 0 0 1e-13", 3, "too small"),
+            ("0\n1\n0 0 0 6 0 0 1e-5\n", 3, "200000 points"),
             ("1\n0 0 1e999 1\n", 2, "found `1e999`"),
             ("1\n0 0 1e61 1\n", 2, "larger than 1e60"),
             ("0\n0\n\n7", 4, "unexpected `7` after"),
         ];
         for (text, line, reason) in cases {
-            let (found, said) = parse(text).unwrap_err();
+            let (found, said) = parse(text, 1e-14).unwrap_err();
             assert!(found == line && said.contains(reason), "{text:?}: line {found}, {said}");
         }
     }

@@ -215,6 +215,11 @@ impl<'a> Work<'a> {
         self.substep(0.0, 1.0, units);
     }
 
+    /// Sends a message for the user to the observer.
+    pub(crate) fn note(&self, text: &str) {
+        self.observer.note(text);
+    }
+
     /// Reports the number of tets that the stage goes through.
     pub(crate) fn expect(&self, tets: u64) {
         self.observer.expect(self.stage, tets);

@@ -1,7 +1,8 @@
 //! A CSG geometry with its features and its projector.
 
+use crate::Point;
 use csg::features::{CutCusp, find_and_cut_cusps};
-use csg::{Features, Geometry};
+use csg::{Features, Geometry, SurfaceId};
 
 /// A geometry with its features, ready for meshing.
 #[derive(Clone, Debug)]
@@ -25,5 +26,11 @@ impl CsgModel {
         let (features, cut_cusps) = find_and_cut_cusps(&mut geometry)?;
         let projector = csg::Projector::new(&geometry, &features);
         Ok(Self { geometry, features, projector, cut_cusps })
+    }
+
+    /// Whether a point is in a body.
+    pub(crate) fn contains(&self, point: &Point) -> bool {
+        let positive = |surface: SurfaceId| self.geometry.surfaces[surface.index()].value(point) > 0.0;
+        self.geometry.bodies.iter().any(|body| body.solid.contains(&positive))
     }
 }

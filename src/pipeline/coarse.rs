@@ -1,5 +1,7 @@
 //! Makes one classified, refinable tetrahedral mesh of a geometry, on one rank.
 
+use super::error::RoomError;
+use super::expected;
 use super::retries::{Budget, CORRECTIONS};
 use crate::Point;
 use crate::ground::error::{ErrorKind, HasKind};
@@ -16,7 +18,7 @@ use crate::mesher::surface::narrow::narrow;
 use crate::mesher::surface::{self, SurfaceError, SurfaceMesh};
 use crate::mesher::volume::{self, ClosedSurface, SurfaceFaults, VolumeError};
 use crate::parallel::refine::EdgeDisplacements;
-use csg::features::{Named, Place};
+use csg::features::{Named, Pair, Place};
 use csg::{BodyId, PatchId};
 
 /// Why there is no coarse mesh.
@@ -30,8 +32,9 @@ pub enum CoarseError {
     Surface(#[from] SurfaceError),
     /// Curves remain too close to each other, however short their segments.
     #[error(
-        "an edge between surfaces of {first} and {second} comes too near another at {place} for any segments that were tried: surfaces \
-         touch there to a high order, or leave too narrow a face; move one of them or let them overlap"
+        "an edge between surfaces of {} comes too near another at {place} for any segments that were tried: surfaces \
+         touch there to a high order, or leave too narrow a face; move one of them or let them overlap",
+        Pair(.first, .second)
     )]
     TooNear {
         /// One surface.
@@ -66,6 +69,9 @@ pub enum CoarseError {
     /// A body could not be filled.
     #[error(transparent)]
     Volume(VolumeError),
+    /// More tets are expected than the memory can hold.
+    #[error(transparent)]
+    Room(#[from] RoomError),
     /// The observer cancelled the run.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
@@ -84,6 +90,7 @@ impl HasKind for CoarseError {
     fn kind(&self) -> ErrorKind {
         match self {
             Self::FacetsMeet { .. } => ErrorKind::Input,
+            Self::Room(_) => ErrorKind::Resources,
             Self::Cancelled(_) => ErrorKind::Cancelled,
             _ => ErrorKind::NoMesh,
         }
@@ -223,7 +230,7 @@ pub fn mesh(
 ) -> Result<CoarseMesh, CoarseError> {
     let samples = GeometricSamples::new(&model.geometry, &model.features, &settings.size);
     let mut coarse = corrected(settings, budget, work, |settings, allowed| {
-        attempt(model, &samples, settings, allowed, work)
+        attempt(model, &samples, settings, allowed, (budget, work))
     })?;
     coarse.report.cut_cusps = CutCusp::of(model);
     Ok(coarse)
@@ -340,13 +347,17 @@ fn attempt(
     samples: &GeometricSamples,
     settings: &CoarseSettings,
     allowed: Allowed,
-    work: &Work,
+    (budget, work): (&Budget, &Work),
 ) -> Attempt {
     let CsgModel { geometry, features, projector, .. } = model;
     let own = GeometricSize::of_samples(geometry, features, &settings.size, samples);
     let periodic = PeriodicSize::new(&own, features, settings.size.grading);
     let size: &dyn SizeField = if features.identified.is_empty() { &own } else { &periodic };
     let size = &WatchedSize::new(size, work);
+    let expected = expected::tets(&features.bounds, size, expected::FEW, || |p: &Point| model.contains(p));
+    if let Err(error) = budget.expect(expected, work) {
+        return Attempt::Failed(error.into());
+    }
     let (surface, segments) = match mesh_surface(model, size, allowed.lower) {
         Ok(made) => made,
         Err(unmeshed) => return unmeshed.into(),

@@ -117,9 +117,10 @@ fn plan_cuts(
     let Model::Csg(whole) = model else {
         return Err(RequestError::NotCuttable.into());
     };
+    options::refuse_unresolved(model, &settings.size)?;
     room::refuse_too_fine(model, &settings.size, None)?;
     let (pieces, coarse, outcome) = progress.stage(Stage::Mesh, |work| {
-        mesh_as_wanted(parts, model, settings, wanted, &[], &Budget::default(), work)
+        mesh_as_wanted(parts, model, settings, wanted, &[], &Budget::new(None, wanted), work)
     })?;
     progress.stage(Stage::Cut, |_| {
         let statistics = CutStatistics::of(&coarse.mesh, whole, pieces, parts)?;

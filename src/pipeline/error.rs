@@ -124,6 +124,15 @@ fn prefix(path: &Option<PathBuf>) -> String {
     path.as_ref().map_or_else(String::new, |path| format!("{}: ", path.display()))
 }
 
+/// A lower estimate of bytes as text; the largest number stands for all beyond it.
+fn at_least(bytes: u64) -> String {
+    if bytes == u64::MAX {
+        "more bytes than any machine has".into()
+    } else {
+        format!("{} or more", sized(bytes))
+    }
+}
+
 /// The input cannot be meshed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum InputError {
@@ -133,9 +142,24 @@ pub enum InputError {
         .0.display(), surface::KNOWN, volume::KNOWN
     )]
     UnknownFormat(PathBuf),
+    /// A CAD file, which cannot be read.
+    #[error(
+        "{} is a CAD file, which cannot be read: export the part as STL or OBJ from the CAD program (with small angular \
+         tolerance), or mesh it with Gmsh (`gmsh -3 PART.step -o PART.msh`) and give the .msh",
+        .0.display()
+    )]
+    Cad(PathBuf),
     /// Invalid arrays of a surface or mesh.
     #[error(transparent)]
     Arrays(#[from] ArrayError),
+    /// A mesh that is too large or too small for double precision.
+    #[error("{}{range}", prefix(.path))]
+    OutOfRange {
+        /// The file, if the mesh came from one.
+        path: Option<PathBuf>,
+        /// The length that is out of range.
+        range: csg::OutOfRange,
+    },
     /// Several files, of which at least one is not a surface.
     #[error("several files are taken together only if all of them are surfaces")]
     SeveralFiles,
@@ -258,9 +282,9 @@ pub enum RoomError {
     },
     /// The requested sizes need more coarse tets than the memory can hold.
     #[error(
-        "elements of at most {size} make {tets} or more, as a coarse mesh of {} or more, and this machine has {} free: choose \
+        "elements of at most {size:?} make {tets} or more, as a coarse mesh of {}, and this machine has {} free: choose \
          larger sizes, or refine a coarser mesh by levels",
-        sized(*.needed), sized(*.available)
+        at_least(*.needed), sized(*.available)
     )]
     Coarse {
         /// The largest size that is allowed (length).
@@ -268,6 +292,20 @@ pub enum RoomError {
         /// Least number of tets with this size, as text: it may be beyond all integers.
         tets: String,
         /// Lower estimate of their memory in bytes.
+        needed: u64,
+        /// Free bytes.
+        available: u64,
+    },
+    /// More coarse tets are expected than the memory can hold.
+    #[error(
+        "the sizes make about {tets}, as a coarse mesh of {}, and this machine has {} free: choose larger sizes, or \
+         refine a coarser mesh by levels",
+        at_least(*.needed), sized(*.available)
+    )]
+    Expected {
+        /// The expected number, as text: it may be beyond all integers.
+        tets: String,
+        /// Estimate of their memory in bytes.
         needed: u64,
         /// Free bytes.
         available: u64,
@@ -397,7 +435,7 @@ macro_rules! stages {
 
 stages! {
     LoadError => Load (Read Comm);
-    CoarseError => Coarse (Cancelled);
+    CoarseError => Coarse (Room Cancelled);
     CutError => Cut (Distribute Refine);
     DistError => Distribute (Comm);
     NumberError => Number (Comm);

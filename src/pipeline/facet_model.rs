@@ -2,6 +2,7 @@
 
 use super::coarse::{self, Allowed, Attempt, CoarseError, CoarseMesh, CoarseSettings};
 use super::error::{Error, InputError};
+use super::expected;
 use super::retries::Budget;
 use super::settings::InputSettings;
 use crate::Point;
@@ -12,8 +13,8 @@ use crate::ground::progress::Work;
 use crate::ground::projector::Projector;
 use crate::ground::size::{Closeness, Source, WatchedSize};
 use crate::mesher::facets::{
-    FacetError, FacetModel, FacetPatch, FacetSize, FacetSmoothness, Facets, Marks, RemeshSettings, keep,
-    remesh,
+    FacetBodies, FacetError, FacetModel, FacetPatch, FacetSize, FacetSmoothness, Facets, Marks,
+    RemeshSettings, keep, remesh,
 };
 use crate::mesher::improve::Smoothness;
 use crate::mesher::surface::SurfaceMesh;
@@ -41,14 +42,13 @@ pub struct FacetSolid {
 impl FacetSolid {
     /// The volume of all bodies.
     pub(super) fn volume(&self) -> f64 {
-        let surface = keep(&self.model);
         let of = |t: &BoundaryTriangle| {
-            let [a, b, c] = t.vertices.map(|v| &surface.points[v.index()]);
+            let [a, b, c] = t.vertices.map(|v| &self.model.points[v.index()]);
             volume6(&self.model.bounds.min, a, b, c) / 6.0
         };
         // Interfaces have bodies on both sides, which cancel.
         let outer = |t: &&BoundaryTriangle| self.model.patch(t.patch).outside.is_none();
-        surface.triangles.iter().filter(outer).map(of).sum::<f64>().abs()
+        self.model.triangles.iter().filter(outer).map(of).sum::<f64>().abs()
     }
 
     /// Reads one or several surfaces.
@@ -126,11 +126,20 @@ impl FacetSolid {
         budget: &Budget,
         work: &Work,
     ) -> Result<CoarseMesh, CoarseError> {
-        coarse::corrected(settings, budget, work, |settings, allowed| self.attempt(settings, allowed, work))
+        coarse::corrected(settings, budget, work, |settings, allowed| {
+            self.attempt(settings, allowed, budget, work)
+        })
     }
 
-    fn attempt(&self, settings: &CoarseSettings, allowed: Allowed, work: &Work) -> Attempt {
+    fn attempt(&self, settings: &CoarseSettings, allowed: Allowed, budget: &Budget, work: &Work) -> Attempt {
         let size = FacetSize::new(&self.model, &settings.size);
+        let expected = expected::tets(&self.model.bounds, &size, expected::FEW, || {
+            let bodies = FacetBodies::new(&self.model);
+            move |p: &Point| bodies.contain(p)
+        });
+        if let Err(error) = budget.expect(expected, work) {
+            return Attempt::Failed(error.into());
+        }
         let regions = |id: PatchId| [self.model.patch(id).inside, self.model.patch(id).outside];
         if allowed.thin && !self.keep_surface {
             let (sources, found) = self.thin_regions(&size, &regions, settings.size.scaled_closeness());

@@ -54,7 +54,7 @@ pub fn generate(
     if let Method::Decompose(cuts) = &settings.method {
         return decomposed(comm, model, cuts, settings, progress);
     }
-    let (mut sources, budget) = (Vec::<Source>::new(), Budget::default());
+    let (mut sources, budget) = (Vec::<Source>::new(), Budget::new(settings.memory, settings.wanted));
     for round in 0.. {
         let parts = coarse_parts(comm, model, settings, &sources, &budget, progress)?;
         if settings.method == Method::Surface {
@@ -302,6 +302,7 @@ fn coarse_mesh(
     budget: &Budget,
     progress: &Progress,
 ) -> Result<(u32, CoarseResult), Error> {
+    options::refuse_unresolved(model, &settings.coarse.size)?;
     room::refuse_too_fine(model, &settings.coarse.size, settings.memory)?;
     let (pieces, made, outcome) = progress.stage(Stage::Mesh, |work| {
         mesh_as_wanted(parts, model, &settings.coarse, settings.wanted, sources, budget, work)

@@ -143,6 +143,12 @@ impl Geometry {
         matches!(self.model, Model::Given(_))
     }
 
+    /// The smallest element size that its coordinates resolve (length); `None` for a tetrahedral
+    /// mesh.
+    pub fn least_size(&self) -> Option<f64> {
+        self.model.least_size()
+    }
+
     /// Its bodies, patches, curves and corners in detail; `None` for a tetrahedral mesh.
     pub fn inspect(&self) -> Option<Inspection> {
         match &self.model {

@@ -7,6 +7,7 @@ use super::settings::InputSettings;
 use crate::files;
 use crate::files::input::ReadError;
 use crate::files::volume::VolumeMesh;
+use crate::ground::kernel::tree;
 use std::path::Path;
 
 /// The kind of content of a file.
@@ -24,6 +25,7 @@ fn kind(path: &Path) -> Result<Kind, Error> {
         "geo" => Ok(Kind::Csg),
         "stl" | "off" | "obj" | "ply" | "poly" | "smesh" => Ok(Kind::Surface),
         "vtu" | "pvtu" | "msh" | "vol" | "gz" | "mesh" | "meshb" | "ele" | "node" | "face" => Ok(Kind::Mesh),
+        "step" | "stp" | "iges" | "igs" | "brep" => Err(InputError::Cad(path.to_path_buf()).into()),
         _ => Err(InputError::UnknownFormat(path.to_path_buf()).into()),
     }
 }
@@ -84,6 +86,9 @@ fn read_mesh(path: &Path, note: &mut dyn FnMut(&str)) -> Result<Model, Error> {
 
 /// Takes a mesh, from a file or not, as a model: its tets must be positive.
 pub(super) fn given(read: VolumeMesh, path: Option<&Path>) -> Result<Model, InputError> {
+    if let Err(range) = tree::bounds(&read.mesh.points).refuse_out_of_range() {
+        return Err(InputError::OutOfRange { path: path.map(Path::to_path_buf), range });
+    }
     if let Some(tet) = read.inverted.first() {
         let corner = read.mesh.points[read.mesh.tets[tet.index()][0].index()];
         let path = path.map(Path::to_path_buf);

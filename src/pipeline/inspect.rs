@@ -5,7 +5,7 @@ use crate::ground::mesh::{Label, VertexId};
 use crate::mesher::facets::FacetModel;
 use crate::mesher::model::CsgModel;
 use crate::pipeline::FacetSolid;
-use csg::{BodyId, Curve, Features, PatchId, Singular};
+use csg::{BodyId, Curve, CurveId, Features, PatchId, Singular};
 use serde::Serialize;
 use std::fmt;
 
@@ -100,7 +100,7 @@ pub struct CurveLine {
 impl Inspection {
     /// Describes a CSG geometry.
     pub fn of_csg(model: &CsgModel) -> Self {
-        let CsgModel { geometry, features, .. } = model;
+        let CsgModel { geometry, features, projector, .. } = model;
         let number = |body: Option<BodyId>| body.map_or(0, |b| geometry.bodies[b.index()].number);
         let patch = |patch: &csg::Patch| {
             let info = &geometry.surface_info[patch.surface.index()];
@@ -108,7 +108,7 @@ impl Inspection {
             PatchLine {
                 boundary: patch.bc,
                 name: patch.name.clone(),
-                surface: kind(&geometry.surfaces[patch.surface.index()]),
+                surface: geometry.surfaces[patch.surface.index()].kind(),
                 solid: Some(info.solid.clone()),
                 line: Some(info.span.line),
                 bodies: [number(patch.inside), number(patch.outside)],
@@ -118,8 +118,8 @@ impl Inspection {
             }
         };
         let boundary = |id: PatchId| features.patch(id).bc;
-        let curve = |curve: &Curve| CurveLine {
-            length: curve.length(),
+        let curve = |(index, curve): (usize, &Curve)| CurveLine {
+            length: projector.curve_length(CurveId::new(index), &curve.trace),
             corners: curve.ends.map(|ends| ends.map(|c| c.index())),
             boundaries: curve.fins.iter().map(|fin| boundary(fin.patch)).collect(),
         };
@@ -133,7 +133,7 @@ impl Inspection {
             bounds: [features.bounds.min.into(), features.bounds.max.into()],
             bodies: geometry.bodies.iter().map(body).collect(),
             patches: features.patches.iter().map(patch).collect(),
-            curves: features.curves.iter().map(curve).collect(),
+            curves: features.curves.iter().enumerate().map(curve).collect(),
             corners: features.corners.iter().map(|c| c.point.into()).collect(),
             periodic: periodic_lines(features),
             singular: singular_lines(model),
@@ -222,21 +222,9 @@ fn patches_beside(model: &FacetModel) -> Vec<Vec<PatchId>> {
     model.curves.iter().map(beside).collect()
 }
 
-fn kind(surface: &csg::Surface) -> &'static str {
-    match surface {
-        csg::Surface::Plane(_) => "plane",
-        csg::Surface::Sphere(_) => "sphere",
-        csg::Surface::Cylinder(_) => "cylinder",
-        csg::Surface::Cone(_) => "cone",
-        csg::Surface::Torus(_) => "torus",
-        csg::Surface::Ellipsoid(_) => "ellipsoid",
-        csg::Surface::EllipticCylinder(_) => "elliptic cylinder",
-        csg::Surface::EllipticCone(_) => "elliptic cone",
-        csg::Surface::Nappe(_) => "nappe of a cone",
-        csg::Surface::Revolved(_) => "turned ellipse",
-        csg::Surface::Sweep(s) if s.is_round() => "section moved along a circle",
-        csg::Surface::Sweep(_) => "section moved along an ellipse",
-    }
+/// A number rounded to nine digits.
+fn nine_digits(number: f64) -> f64 {
+    format!("{number:.8e}").parse().unwrap_or(number)
 }
 
 impl fmt::Display for Inspection {
@@ -274,7 +262,7 @@ impl fmt::Display for Inspection {
         writeln!(f, "\n{curves} (length, corners, boundary numbers beside)")?;
         for (i, curve) in self.curves.iter().enumerate() {
             let ends = curve.corners.map_or("closed".into(), |[a, b]| format!("{a} to {b}"));
-            writeln!(f, "  {i:>4}  {:<12.6} {ends:12} {:?}", curve.length, curve.boundaries)?;
+            writeln!(f, "  {i:>4}  {:<12?} {ends:12} {:?}", nine_digits(curve.length), curve.boundaries)?;
         }
         writeln!(f, "\n{}", counted(self.corners.len(), "corner"))?;
         for (i, [x, y, z]) in self.corners.iter().enumerate() {

@@ -4,6 +4,7 @@ pub mod coarse;
 pub mod decompose;
 pub mod error;
 mod estimate;
+mod expected;
 pub(crate) mod facet_model;
 mod generate;
 mod geometry;

@@ -10,7 +10,7 @@ use crate::ground::mesh::periodic::Link;
 use crate::ground::mesh::{Mesh, Names};
 use crate::ground::progress::Work;
 use crate::ground::projector::Projector;
-use crate::ground::size::{GeometricSize, SizeField, SizeSettings};
+use crate::ground::size::{GeometricSize, LEAST_SIZE, SizeField, SizeSettings};
 use crate::mesher::facets::FacetSize;
 use crate::mesher::model::CsgModel;
 use csg::{Aabb, Geometry, SurfaceId};
@@ -104,28 +104,43 @@ impl Model {
         }
     }
 
+    /// The box around a geometry; `None` for an existing mesh.
+    fn extent(&self) -> Option<&Aabb> {
+        match self {
+            Self::Csg(model) => Some(&model.features.bounds),
+            Self::Facets(solid) => Some(&solid.model.bounds),
+            Self::Given(_) => None,
+        }
+    }
+
+    /// The smallest size that coordinates resolve; `None` for an existing mesh.
+    pub(super) fn least_size(&self) -> Option<f64> {
+        self.extent().map(|bounds| LEAST_SIZE * bounds.diagonal())
+    }
+
     /// A lower estimate of the number of coarse tets for the upper bounds of the sizes alone,
     /// without curvature and sources; and the least of these bounds.
     pub(super) fn least_tets(&self, settings: &SizeSettings) -> (f64, f64) {
         /// Largest mean volume of tets of edge length 1: twice that of the regular tet.
         const LARGEST: f64 = 0.24;
-        let (volumes, bounds) = match self {
-            Self::Csg(model) => {
-                let of_body = |body: &csg::Body| settings.bound_of(body.maxh);
-                let bounds: Vec<f64> = model.geometry.bodies.iter().map(of_body).collect();
-                // Volumes take some time: none is larger than that of the box.
-                let least = bounds.iter().copied().fold(f64::INFINITY, f64::min);
-                let extent = model.features.bounds.max - model.features.bounds.min;
-                if extent.product() < ALWAYS_FEW * LARGEST * least.powi(3) {
-                    return (0.0, least);
-                }
-                (sampled_volumes(model), bounds)
-            }
-            Self::Facets(solid) => (vec![solid.volume()], vec![settings.bound_of(None)]),
-            Self::Given(_) => return (0.0, f64::INFINITY),
+        let Some(extent) = self.extent() else { return (0.0, f64::INFINITY) };
+        let of_body = |body: &csg::Body| settings.bound_of(body.maxh);
+        let bounds: Vec<f64> = match self {
+            Self::Csg(model) => model.geometry.bodies.iter().map(of_body).collect(),
+            _ => vec![settings.bound_of(None)],
+        };
+        let least = bounds.iter().copied().fold(f64::INFINITY, f64::min);
+        // Volumes take some time: none is larger than that of the box.
+        if (extent.max - extent.min).product() < ALWAYS_FEW * LARGEST * least.powi(3) {
+            return (0.0, least);
+        }
+        let volumes = match self {
+            Self::Csg(model) => sampled_volumes(model),
+            Self::Facets(solid) => vec![solid.volume()],
+            Self::Given(_) => Vec::new(),
         };
         let tets = volumes.iter().zip(&bounds).map(|(volume, h)| volume / (LARGEST * h.powi(3)));
-        (tets.sum(), bounds.iter().copied().fold(f64::INFINITY, f64::min))
+        (tets.sum(), least)
     }
 
     /// The size field of the first coarse mesh, before sizes are lowered; `None` for an existing

@@ -2,6 +2,7 @@
 
 use super::coarse::CoarseSettings;
 use super::error::{Error, RequestError};
+use super::model::Model;
 use super::settings::{GenerateSettings, InputSettings, Method, Wanted};
 use crate::ground::comm::Communicator;
 use crate::ground::kernel::hash::WordHasher;
@@ -14,6 +15,9 @@ use std::fmt::Debug;
 use std::hash::Hasher;
 
 const POSITIVE: &str = "positive numbers";
+/// Steeper sizes need ever more samples of the surface, and make no fewer tets.
+const MOST_GRADING: f64 = 10.0;
+
 const NOT_NEGATIVE: &str = "0 and positive numbers";
 
 fn refused(name: &'static str, value: impl ToString, allowed: impl ToString) -> RequestError {
@@ -39,6 +43,25 @@ pub(super) fn refuse_impossible(settings: &GenerateSettings) -> Result<(), Error
         refuse_planes(&cuts.planes)?;
     }
     refuse_impossible_coarse(&settings.coarse, settings.wanted)
+}
+
+/// *Local.* Refuses sizes that the coordinates of a geometry cannot resolve.
+///
+/// # Errors
+/// The first such size.
+pub(super) fn refuse_unresolved(model: &Model, size: &SizeSettings) -> Result<(), RequestError> {
+    let Some(least) = model.least_size() else { return Ok(()) };
+    let allowed = format_args!("{least:.1e} and more: coordinates of this geometry resolve no smaller sizes");
+    if let Some(largest) = size.maxh.filter(|&largest| largest < least) {
+        return Err(refused("max_size", format_args!("{largest:?}"), allowed));
+    }
+    match size.sources.iter().find(|source| source.size < least) {
+        Some(Source { point, size }) => {
+            let value = format!("size {size:?} at ({}, {}, {})", point.x, point.y, point.z);
+            Err(refused("sources", value, allowed))
+        }
+        None => Ok(()),
+    }
 }
 
 /// *Local.* Refuses settings that no coarse mesh can have.
@@ -120,7 +143,10 @@ fn refuse_sizes(size: &SizeSettings) -> Result<(), RequestError> {
     if let Some(largest) = size.maxh.filter(|&largest| size.minh > largest) {
         return Err(refused("min_size", size.minh, format_args!("0 to max_size, which is {largest}")));
     }
-    positive("grading", size.grading)?;
+    if !(size.grading > 0.0 && size.grading <= MOST_GRADING) {
+        let allowed = format_args!("positive numbers up to {MOST_GRADING}");
+        return Err(refused("grading", size.grading, allowed));
+    }
     // An infinite ratio ignores thin regions, which a user requests by 0.
     if !(size.closeness.ratio > 0.0 && size.closeness.most >= 1.0) {
         return Err(refused("closeness", size.closeness.ratio, NOT_NEGATIVE));
@@ -203,6 +229,10 @@ mod tests {
             assert_eq!(refusal(new().min_size(bad)), "min_size");
             assert_eq!(refusal(new().closeness(bad)), "closeness");
         }
+        assert_eq!(refusal(new().grading(11.0)), "grading");
+        // The ball's diagonal is 3.5.
+        assert_eq!(refusal(new().max_size(1e-300)), "max_size");
+        assert_eq!(refusal(new().sources([Source { point: Point::origin(), size: 3e-14 }])), "sources");
         assert_eq!(refusal(new().min_size(0.5).max_size(0.4)), "min_size");
         assert_eq!(refusal(new().tets(0)), "tets");
         assert_eq!(refusal(new().coarse_tets(0)), "coarse_tets");
@@ -221,7 +251,7 @@ mod tests {
         let size = SizeSettings { grading: f64::NAN, ..SizeSettings::default() };
         assert_eq!(
             refuse_sizes(&size).unwrap_err().to_string(),
-            "`grading` cannot be NaN: possible are positive numbers"
+            "`grading` cannot be NaN: possible are positive numbers up to 10"
         );
     }
 

@@ -15,6 +15,10 @@
 //! Nearly all runs need one to ten meshes. Most attempts end early, at the curves or at the
 //! surface: only complete ones take as long as a coarse mesh.
 
+use super::error::RoomError;
+use super::room;
+use super::settings::Wanted;
+use crate::ground::progress::Work;
 use std::cell::Cell;
 
 /// Maximum number of restarts after the full refinement. Few are needed, because the test
@@ -39,25 +43,56 @@ pub(super) const CORRECTIONS: u64 = 14;
 /// walls of a tenth of their radius, of which fewer tets were requested than they can have.
 const MESHES: u32 = 200;
 
-/// The number of coarse meshes that a run may still begin.
+/// What the coarse meshes of a run may still use.
 #[derive(Debug)]
-pub struct Budget(Cell<u32>);
+pub struct Budget {
+    /// The number of meshes that may still be begun.
+    meshes: Cell<u32>,
+    /// The memory in bytes; by default the free memory.
+    memory: Option<u64>,
+    /// The number of tets that was last announced to the user; infinite if none is to be.
+    announced: Cell<f64>,
+}
 
 impl Default for Budget {
     fn default() -> Self {
-        Self(Cell::new(MESHES))
+        Self { meshes: Cell::new(MESHES), memory: None, announced: Cell::new(f64::INFINITY) }
     }
 }
 
+/// Fewer tets are not announced: they take less than a second.
+const WORTH_ANNOUNCING: f64 = 1e5;
+
+/// A number of tets is announced if it is this many times the last one.
+const ANNOUNCED_AGAIN: f64 = 1.5;
+
 impl Budget {
+    /// The budget of a run that may use this memory. The expected number of tets is announced
+    /// unless the user requests a number.
+    pub(super) fn new(memory: Option<u64>, wanted: Wanted) -> Self {
+        let announced = if matches!(wanted, Wanted::Sizes { .. }) { 0.0 } else { f64::INFINITY };
+        Self { memory, announced: Cell::new(announced), ..Self::default() }
+    }
+
+    /// Refuses an expected number of tets that the memory cannot hold, and announces it if it is
+    /// news.
+    pub(super) fn expect(&self, tets: f64, work: &Work) -> Result<(), RoomError> {
+        room::refuse_expected(tets, self.memory)?;
+        if tets > WORTH_ANNOUNCING && tets > ANNOUNCED_AGAIN * self.announced.get() {
+            work.note(&format!("about {} tets are expected in the coarse mesh", room::rounded(tets)));
+            self.announced.set(tets);
+        }
+        Ok(())
+    }
+
     /// Counts a mesh that is begun.
     pub(super) fn spend(&self) {
-        self.0.set(self.0.get().saturating_sub(1));
+        self.meshes.set(self.meshes.get().saturating_sub(1));
     }
 
     /// Whether no further mesh should be begun.
     pub(super) fn is_spent(&self) -> bool {
-        self.0.get() == 0
+        self.meshes.get() == 0
     }
 }
 
@@ -79,9 +114,9 @@ mod tests {
             let fits = |tets: u64| (3_000..3_300).contains(&tets);
             mesh_to_target(&geometry.model, &mut settings, 3_000, &fits, budget, Work::unwatched()).unwrap()
         };
-        let (budget, small) = (Budget::default(), Budget(Cell::new(1)));
+        let (budget, small) = (Budget::default(), Budget { meshes: Cell::new(1), ..Budget::default() });
         assert_eq!(search(&budget).1, Outcome::Reached);
-        assert!(budget.0.get() < MESHES - 1, "one mesh was enough: the test needs another number");
+        assert!(budget.meshes.get() < MESHES - 1, "one mesh was enough: the test needs another number");
         assert_eq!(search(&small).1, Outcome::Jumped);
         assert!(small.is_spent());
     }

@@ -58,6 +58,7 @@ pub fn mesh_to_target(
         settings.size.sources.truncate(sources);
         let made = match model.coarse_mesh(settings, budget, work) {
             Ok(made) => made,
+            Err(error @ (CoarseError::Room(_) | CoarseError::Cancelled(_))) => return Err(error),
             // The sizes are too large for the geometry despite all corrections: treat this as too
             // few tets.
             Err(error) => {

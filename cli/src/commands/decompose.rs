@@ -22,7 +22,7 @@ pub fn run_decompose(options: &Decompose) -> Result<(), Failure> {
     let geometry =
         progress.stage(Stage::Read, |_| read_sized_geometry(&options.input, &options.size, &progress))?;
     let cuts = cut_settings(&options.planes)?;
-    let coarse = coarse_settings(&options.size, true)?;
+    let coarse = coarse_settings(&options.size, Some(&geometry))?;
     let wanted = wanted_coarse(&options.size, options.pieces);
     let planned = planned(options.parts, &geometry, &cuts, &coarse, wanted, &progress)?;
     let source = read_text(&options.input.files[0])?;

@@ -30,7 +30,14 @@ pub fn on_ranks(
         });
         return done.map_err(Failure::input)?;
     }
-    let results = thread::run(parts.or(ranks).unwrap_or(1), command)?;
+    let ranks = parts.or(ranks).unwrap_or(1);
+    if ranks > thread::MOST_RANKS {
+        return Err(Failure::input(format!(
+            "{ranks} ranks in one process: at most {} are possible, more with mpirun",
+            thread::MOST_RANKS
+        )));
+    }
+    let results = thread::run(ranks, command)?;
     results.into_iter().collect()
 }
 

@@ -110,7 +110,10 @@ impl Report {
         }
         write!(f, "checked    every tet positive; volume {}", mesh.volume)?;
         if let Some(distance) = mesh.furthest_off_surface {
-            write!(f, "; boundary vertices within {distance:.1e} of their patch")?;
+            match distance {
+                0.0 => write!(f, "; boundary vertices exactly on their patches, which are flat")?,
+                _ => write!(f, "; boundary vertices within {distance:.1e} of their patch")?,
+            }
         }
         writeln!(f)
     }

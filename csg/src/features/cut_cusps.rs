@@ -8,7 +8,7 @@
 //! of all bodies.
 
 use super::contact::curvature_differences_at;
-use super::{FeatureError, Features, Named, Place};
+use super::{FeatureError, Features, Named, Pair, Place};
 use crate::geometry::SurfaceInfo;
 use crate::primitive::{Cylinder, Plane, Sphere, Torus, quadric::tangents};
 use crate::{BodyId, Geometry, Point, Solid, Surface, SurfaceId, Vector};
@@ -50,7 +50,8 @@ pub struct CutCusp {
 impl fmt::Display for CutCusp {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let Self { first, second, place, radius, .. } = self;
-        write!(f, "surfaces of {first} and {second} touch at {place} without an angle between them: ")?;
+        let pair = Pair(first, second);
+        write!(f, "surfaces of {pair} touch at {place} without an angle between them: ")?;
         match &self.body {
             Some((_, body)) => write!(f, "{body} ends there")?,
             None => write!(f, "the bodies end there")?,

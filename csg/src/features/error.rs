@@ -2,21 +2,45 @@
 
 use super::Inconsistency;
 use super::cut_cusps::Cusp;
-use crate::{BodyId, Geometry, Point, SurfaceId};
+use crate::{BodyId, Geometry, OutOfRange, Point, SurfaceId};
 use std::fmt;
 
 /// A named object of the file: the name of a solid and the line of the solid or its primitive.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Named {
     /// The name of the solid.
-    pub solid: String,
+    pub solid: Box<str>,
     /// The line, from 1.
     pub line: u32,
+    /// For a surface, its kind, and the column of its primitive, from 1; boxed, as errors are to be
+    /// small.
+    pub surface: Option<Box<(&'static str, u32)>>,
+}
+
+/// Two objects of an error: surfaces of one solid are told apart by their primitives.
+#[derive(Clone, Copy, Debug)]
+pub struct Pair<'a>(pub &'a Named, pub &'a Named);
+
+impl fmt::Display for Pair<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let Self(first, second) = self;
+        match (first.surface.as_deref(), second.surface.as_deref()) {
+            (Some((one, at)), Some((other, beside))) if first.solid == second.solid => {
+                let (solid, [line, second_line]) = (&first.solid, [first.line, second.line]);
+                write!(
+                    f,
+                    "solid `{solid:.60}`, its {one} ({line}:{at}) and its {other} ({second_line}:{beside}),"
+                )
+            }
+            _ => write!(f, "{first} and {second}"),
+        }
+    }
 }
 
 impl fmt::Display for Named {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        write!(f, "solid `{}` (line {})", self.solid, self.line)
+        // Names may be as long as the file.
+        write!(f, "solid `{:.60}` (line {})", self.solid, self.line)
     }
 }
 
@@ -24,13 +48,15 @@ impl Named {
     /// The solid in which a surface first occurs.
     pub fn surface(geometry: &Geometry, id: SurfaceId) -> Self {
         let info = &geometry.surface_info[id.index()];
-        Self { solid: info.solid.clone(), line: info.span.line }
+        let kind = geometry.surfaces[id.index()].kind();
+        let surface = Some(Box::new((kind, info.span.column)));
+        Self { solid: info.solid.as_str().into(), line: info.span.line, surface }
     }
 
     /// The solid of a body.
     pub(super) fn body(geometry: &Geometry, id: crate::BodyId) -> Self {
         let body = &geometry.bodies[id.index()];
-        Self { solid: body.name.clone(), line: body.span.line }
+        Self { solid: body.name.as_str().into(), line: body.span.line, surface: None }
     }
 }
 
@@ -53,11 +79,23 @@ pub enum FeatureError {
     #[error("the geometry has no top-level object that is a solid")]
     NoBody,
     /// Bodies without interior: at least one, not necessarily all.
-    #[error("{} contains nothing: its parts do not meet", .0[0])]
+    #[error(
+        "{} contains nothing: its parts do not meet; the normal of a plane points out of the solid", .0[0]
+    )]
     Empty(Vec<Named>),
     /// A body is unbounded.
-    #[error("{0} is not bounded: cut it with planes or other solids")]
+    #[error(
+        "{0} is not bounded: cut it with planes or other solids; the normal of a plane points out of the solid"
+    )]
     Unbounded(Named),
+    /// The bodies are too large or too small for double precision.
+    #[error("{first}: {range}")]
+    OutOfRange {
+        /// The first body.
+        first: Named,
+        /// The length that is out of range.
+        range: OutOfRange,
+    },
     /// The interiors of two bodies intersect.
     #[error("{first} and {second} overlap near {place}: subtract one from the other")]
     Overlap {
@@ -71,8 +109,8 @@ pub enum FeatureError {
     /// Two surfaces are tangent and both are boundaries there, with a wedge of zero angle between
     /// them.
     #[error(
-        "surfaces of {first} and {second} touch at {place} without an angle between them: move one of them or let them \
-         overlap"
+        "surfaces of {} touch at {place} without an angle between them: move one of them or let them overlap",
+        Pair(.first, .second)
     )]
     Tangent {
         /// One surface.
@@ -86,8 +124,8 @@ pub enum FeatureError {
     },
     /// A face ends in a cusp that is too sharp for triangles.
     #[error(
-        "a face between surfaces of {first} and {second} ends at {place} in a cusp too sharp for triangles: move one of \
-         them or let them overlap"
+        "a face between surfaces of {} ends at {place} in a cusp too sharp for triangles: move one of \
+         them or let them overlap", Pair(.first, .second)
     )]
     Cusp {
         /// A surface beside one of the curves of the cusp.
@@ -100,7 +138,7 @@ pub enum FeatureError {
         cusp: Box<Cusp>,
     },
     /// A feature curve has a loose end: tracing stopped, or no other curve continues it.
-    #[error("the intersection of surfaces of {first} and {second} could not be followed past {place}")]
+    #[error("the intersection of surfaces of {} could not be followed past {place}", Pair(.first, .second))]
     LooseCurve {
         /// One surface.
         first: Named,
@@ -111,7 +149,8 @@ pub enum FeatureError {
     },
     /// Separating two surfaces needs too many cells.
     #[error(
-        "surfaces of {first} and {second} could not be separated near {place}: they are too close or nearly tangent; move one of them"
+        "surfaces of {} could not be separated near {place}: they are too close or nearly tangent; move one of them",
+        Pair(.first, .second)
     )]
     TooIntricate {
         /// One surface.

@@ -133,8 +133,9 @@ pub(super) fn identify(
     let mut all: Vec<PeriodicMatch> = Vec::new();
     for (index, identification) in geometry.identifications.iter().enumerate() {
         let [first, second] = [0, 1].map(|i| Named {
-            solid: identification.solids[i].clone(),
+            solid: identification.solids[i].as_str().into(),
             line: geometry.surface_info[identification.surfaces[i].index()].span.line,
+            surface: None,
         });
         let line = identification.span.line;
         let sides = identification.surfaces.map(|s| Side::new(features, s));

@@ -152,7 +152,7 @@ fn cusps_inside_bodies_are_cut_off_with_a_note() {
         let (features, cusps) = super::find_and_cut_cusps(&mut geometry).unwrap();
         assert_eq!(counts(&features), expected, "{source}");
         let [cusp] = &cusps[..] else { panic!("{cusps:?}") };
-        assert_eq!((cusp.body.as_ref().unwrap().1.solid.as_str(), cusp.is_curve), (body, is_curve));
+        assert_eq!((cusp.body.as_ref().unwrap().1.solid.as_ref(), cusp.is_curve), (body, is_curve));
         assert!(cusp.radius > 0.05 && cusp.radius < 0.35, "{cusp}");
         assert!(cusp.to_string().contains(&format!("solid `{body}`")), "{cusp}");
     }
@@ -163,17 +163,17 @@ fn wedges_of_zero_angle_are_rejected_with_both_names_and_coordinates() {
     let cases = [
         (
             "solid a = sphere (0,0,0; 1) and not sphere (0.5,0,0; 0.5); tlo a;",
-            "surfaces of solid `a` (line 2) and solid `a` (line 2) touch at (1.000000, ",
+            "surfaces of solid `a`, its sphere (2:11) and its sphere (2:37), touch at (1.000000, ",
         ),
         // A ball in a hole hardly larger: triangles of the two would intersect.
         (
             "solid a = orthobrick (-2,-2,-2; 2,2,2) and not sphere (0,0,0; 1) or sphere (0,0,-0.1; 0.9); tlo a;",
-            "surfaces of solid `a` (line 2) and solid `a` (line 2) touch at (0.000000, 0.000000, -1.000000)",
+            "surfaces of solid `a`, its sphere (2:54) and its sphere (2:81), touch at (0.000000, 0.000000, -1.000000)",
         ),
         // A plane tangent to a torus at its inner equator cuts it into lobes that meet at a point.
         (
             "solid a = torus (0,0,0; 0,0,1; 2; 0.5) and plane (1.5,0,0; 1,0,0); tlo a;",
-            "surfaces of solid `a` (line 2) and solid `a` (line 2) touch at (1.500000, ",
+            "surfaces of solid `a`, its torus (2:11) and its plane (2:44), touch at (1.500000, ",
         ),
     ];
     for (source, message) in cases {
@@ -202,7 +202,7 @@ fn cones_tangent_along_a_line_may_also_meet_in_an_ellipse() {
     assert_eq!(counts(&find(&cones_on_a_line([3.0, 3.0], 1.0, "a or b"))), [0, 0, 2, 3]);
     assert_eq!(counts(&find(&cones_on_a_line([3.0, 4.0], -1.0, "a and not b"))), [0, 0, 2, 3]);
     let error = refused(&cones_on_a_line([3.0, 4.0], 1.0, "a and not b"));
-    let names = error.contains("(line 2)") && error.contains("(line 3)");
+    let names = error.contains("(2:11)") && error.contains("(3:11)");
     assert!(names && error.contains("without an angle"), "{error}");
     // From outside they share the line.
     assert_eq!(counts(&find(&cones_on_a_line([3.0, 4.0], -1.0, "a or b"))), [2, 5, 0, 4]);

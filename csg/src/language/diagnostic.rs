@@ -53,6 +53,8 @@ pub struct Diagnostic {
 
 /// Longest excerpt of a source line in characters; a file may be a single line of megabytes.
 const SHOWN_CHARACTERS: usize = 100;
+/// Longest word of a message in characters: a number may have a million digits.
+const LONGEST_WORD: usize = 60;
 /// Number of characters before the position in the excerpt of a long line.
 const SHOWN_BEFORE: usize = 60;
 
@@ -83,6 +85,19 @@ fn shown_piece(line: &str, column: u32) -> (String, String) {
     shown.extend(line.chars().skip(first).take(SHOWN_CHARACTERS).map(printable));
     before.extend(line.chars().skip(first).take(at - first).map(|c| if c == '\t' { '\t' } else { ' ' }));
     (shown, before)
+}
+
+/// A text whose long words are cut.
+fn with_short_words(text: &str) -> String {
+    let shortened = |word: &str| match word.char_indices().nth(LONGEST_WORD) {
+        None => word.to_owned(),
+        Some(_) => {
+            let (begin, end) = (word.chars().take(LONGEST_WORD / 2), word.chars().next_back());
+            let end = end.filter(|c| !c.is_alphanumeric());
+            format!("{}...{}", begin.collect::<String>(), end.map_or_else(String::new, String::from))
+        }
+    };
+    text.split(' ').map(shortened).collect::<Vec<_>>().join(" ")
 }
 
 /// The diagnostics of an invalid file; at least one is not a warning.
@@ -146,7 +161,7 @@ impl Report {
         *count += 1;
         if *count <= most {
             let help = (!help.is_empty()).then(|| help.to_owned());
-            self.notes.push(Note { kind, span, message: message.into(), help });
+            self.notes.push(Note { kind, span, message: with_short_words(&message.into()), help });
         }
         Reported
     }
@@ -238,6 +253,13 @@ mod tests {
         let caret = lines[2].chars().position(|c| c == '^').unwrap();
         assert_eq!(lines[1].chars().nth(caret), Some('!'));
         assert!(lines[1].len() < 120);
+    }
+
+    #[test]
+    fn long_words_of_messages_are_cut() {
+        let text = format!("the number {} is too large: `{}`", "9".repeat(1_000_000), "a".repeat(100));
+        let expected = format!("the number {}... is too large: `{}...`", "9".repeat(30), "a".repeat(29));
+        assert_eq!(with_short_words(&text), expected);
     }
 
     #[test]

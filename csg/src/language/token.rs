@@ -23,6 +23,8 @@ pub(super) enum TokenKind<'a> {
 pub(super) struct Token<'a> {
     pub kind: TokenKind<'a>,
     pub span: Span,
+    /// The position behind its last character.
+    pub end: Span,
 }
 
 /// The lines of a text, terminated by LF, CR LF or CR.
@@ -43,7 +45,7 @@ pub(super) fn tokenize<'a>(source: &'a str, report: &mut Report) -> Vec<Token<'a
         }
         end = scanner.span;
     }
-    tokens.push(Token { kind: TokenKind::End, span: end });
+    tokens.push(Token { kind: TokenKind::End, span: end, end });
     tokens
 }
 
@@ -101,7 +103,7 @@ impl<'a> Scanner<'a> {
                 }
             }
         };
-        Some(Token { kind, span })
+        Some(Token { kind, span, end: self.span })
     }
 
     /// Scans a number: digits, optional decimal point, optional exponent.
@@ -224,7 +226,8 @@ mod tests {
         for end in ["\n", "\r\n", "\r"] {
             let source = format!("a # solid ä \u{fffd}{end}b#");
             let tokens = tokenize(&source, &mut Report::default());
-            assert_eq!(tokens[1], Token { kind: Word("b"), span: Span { line: 2, column: 1 } }, "{end:?}");
+            let [span, behind] = [1, 2].map(|column| Span { line: 2, column });
+            assert_eq!(tokens[1], Token { kind: Word("b"), span, end: behind }, "{end:?}");
             assert_eq!(tokens.len(), 3);
         }
     }

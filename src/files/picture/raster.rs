@@ -1,6 +1,6 @@
 //! Rasterizes triangles: a depth buffer, flat shading, and edges as thin lines.
 
-use super::scene::{Scene, Triangle};
+use super::scene::{Cut, Scene, Triangle};
 use crate::files::color::Color;
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -25,6 +25,28 @@ pub struct Settings {
     pub background: Color,
     /// Margin around the scene, as a fraction of the image.
     pub margin: f32,
+}
+
+impl Settings {
+    /// A view of the face that a cut opens: the tets that are drawn are behind the plane.
+    pub fn facing(cut: &Cut) -> Self {
+        /// Beside the normal, so that other faces are visible too (degrees).
+        const ASIDE: f64 = 30.0;
+        /// Largest elevation, so that the picture has an upper end (degrees).
+        const STEEPEST: f64 = 65.0;
+        let normal = Vector3::from(cut.normal);
+        let level = normal.xy().norm();
+        let rise = normal.z.atan2(level).to_degrees();
+        let default = Self::default();
+        // The normal of a level cut has no azimuth.
+        let azimuth = if level > 1e-6 * normal.norm() {
+            normal.y.atan2(normal.x).to_degrees() + ASIDE
+        } else {
+            default.azimuth
+        };
+        let elevation = (rise + default.elevation).clamp(-STEEPEST, STEEPEST);
+        Self { azimuth, elevation, ..default }
+    }
 }
 
 impl Default for Settings {
@@ -234,6 +256,18 @@ mod tests {
 
     const RED: Color = [1.0, 0.0, 0.0];
     const BLUE: Color = [0.0, 0.0, 1.0];
+
+    #[test]
+    fn the_view_of_a_cut_faces_it_from_any_side() {
+        let axes = [[1.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 0.5], [1.0, -1.0, 3.0]];
+        for normal in axes.into_iter().flat_map(|n| [n, n.map(|x| -x)]) {
+            let [_, _, away] = directions(&Settings::facing(&Cut { point: [0.0; 3], normal }));
+            let cosine = -away.dot(&Vector3::from(normal).normalize());
+            assert!(cosine > 0.6, "{normal:?}: {cosine}");
+        }
+        let facing = Settings::facing(&Cut { point: [0.0; 3], normal: [0.0, -1.0, 0.0] });
+        assert_eq!(facing, Settings::default());
+    }
 
     /// Seen from the x direction, with y to the right and z up; no margin, no lines.
     fn settings() -> Settings {

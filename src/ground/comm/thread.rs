@@ -22,7 +22,7 @@ const STACK: usize = 4 << 20;
 
 /// The maximum number of ranks. With twice as many, threads and guard pages exceed Linux's limit of
 /// mappings per process, which ends it.
-const MOST_RANKS: u32 = 8192;
+pub const MOST_RANKS: u32 = 8192;
 
 /// Messages with their destination or source rank.
 type Messages = Vec<(Rank, Vec<u8>)>;

@@ -161,6 +161,10 @@ impl SizeField for GeometricSize<'_> {
 /// apart; with that distance at a grading of 0.7, a ball would lose a quarter of its volume.
 const SAMPLE_GROWTH: f64 = 0.3;
 
+/// The maximum number of samples along one step of a curve: meshes of smaller segments fit no
+/// memory.
+const MOST_SAMPLES: f64 = 1e5;
+
 /// The maximum distance of samples on surfaces of varying curvature, as a fraction of the diagonal.
 ///
 /// Finer variations of the curvature are missed.
@@ -235,7 +239,7 @@ impl Sampler<'_> {
             if size >= self.maximum {
                 continue;
             }
-            let pieces = ((w[1] - w[0]).norm() / self.spacing(size)).ceil().max(1.0) as usize;
+            let pieces = ((w[1] - w[0]).norm() / self.spacing(size)).ceil().clamp(1.0, MOST_SAMPLES) as usize;
             for piece in 0..=pieces {
                 let point = w[0] + (w[1] - w[0]) * (piece as f64 / pieces as f64);
                 sources.push(Source { point, size });

@@ -25,6 +25,10 @@ pub use watched::WatchedSize;
 use crate::Point;
 use crate::ground::progress::Work;
 
+/// The smallest size that coordinates resolve, as a fraction of the diagonal of a geometry: 45
+/// roundings.
+pub(crate) const LEAST_SIZE: f64 = 1e-14;
+
 /// The target edge length at any point.
 pub trait SizeField: Sync {
     /// The target edge length at `point`, positive.

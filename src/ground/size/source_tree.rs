@@ -1,7 +1,7 @@
 //! An octree that stores the smallest size over many graded sources.
 
-use super::Source;
 use super::sources::{NO_LESS, Sources, Start};
+use super::{LEAST_SIZE, Source};
 use crate::ground::kernel::hash::WordHash;
 use crate::{Point, Vector};
 use csg::Aabb;
@@ -92,7 +92,11 @@ impl SourceTree {
         let center = bounds.center();
         let half = Vector::repeat(0.5 * side);
         let cube = Aabb { min: center - half, max: center + half };
-        let sources = Sources::new(grading, maximum, sources);
+        // Smaller ones could be 0 in the leaves, and cells would be split without end.
+        let least = LEAST_SIZE * side;
+        let sources: Vec<Source> =
+            sources.iter().map(|source| Source { size: source.size.max(least), ..*source }).collect();
+        let sources = Sources::new(grading, maximum, &sources);
         let corner = |c: usize| {
             let point = cube.min + octant(c, side);
             sources.least_in(&point, &point, &sources.whole()).0

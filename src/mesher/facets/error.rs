@@ -1,6 +1,7 @@
 //! Errors of facet models.
 
 use crate::Point;
+use csg::OutOfRange;
 
 /// Why facets bound no bodies.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -24,6 +25,9 @@ pub enum FacetError {
         /// The point, from 0.
         point: usize,
     },
+    /// The surfaces are too large or too small for double precision.
+    #[error(transparent)]
+    OutOfRange(#[from] OutOfRange),
     /// A triangle refers to a point that does not exist.
     #[error("triangle {triangle} of surface {file} refers to point {point}, which does not exist")]
     NoSuchPoint {

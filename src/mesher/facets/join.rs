@@ -2,6 +2,7 @@
 
 use super::{FacetError, Facets};
 use crate::Point;
+use crate::ground::kernel::tree::bounds;
 use std::cmp::Ordering;
 
 /// The use of a triangle by one surface.
@@ -29,7 +30,7 @@ pub(super) struct Joined {
 ///
 /// # Errors
 /// [`FacetError::NotFinite`], [`FacetError::NoSuchPoint`] and [`FacetError::TooLarge`] for invalid
-/// numbers, [`FacetError::Empty`] if no triangle is left.
+/// numbers, [`FacetError::Empty`] if no triangle is left, [`FacetError::OutOfRange`].
 pub(super) fn join(files: &[Facets]) -> Result<Joined, FacetError> {
     check_numbers(files)?;
     let points: Vec<Point> = files.iter().flat_map(|f| &f.points).map(|p| p.map(|x| x + 0.0)).collect();
@@ -50,6 +51,7 @@ pub(super) fn join(files: &[Facets]) -> Result<Joined, FacetError> {
     if all.is_empty() {
         return Err(FacetError::Empty);
     }
+    bounds(&points).refuse_out_of_range()?;
     Ok(merge_equal(points, &all))
 }
 

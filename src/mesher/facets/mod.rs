@@ -17,6 +17,7 @@
 //! *Not* repaired are gaps, holes, and facets that intersect. They are errors with their positions,
 //! here or in the volume mesher.
 
+mod bodies;
 mod close_curves;
 mod error;
 mod features;
@@ -39,6 +40,7 @@ mod smoothness;
 mod tests;
 
 pub use crate::ground::projector::FacetProjector;
+pub use bodies::FacetBodies;
 pub use error::FacetError;
 pub use keep::keep;
 pub use model::{FacetBody, FacetCurve, FacetModel, FacetPatch, Facets, Marks, Settings};

@@ -26,6 +26,31 @@ fn model(files: &[Facets]) -> FacetModel {
     FacetModel::new(files, &Settings::default()).unwrap()
 }
 
+/// A box 1024 times as long as wide took 40 times as many splits as triangles were left.
+#[test]
+fn a_long_thin_box_takes_splits_in_proportion_to_its_length() {
+    for length in [128.0, 1024.0] {
+        let model = model(&[soup(|soup| soup.brick([0.0; 3], [length, 1.0, 1.0], false))]);
+        let size = FacetSize::new(&model, &SizeSettings { maxh: Some(0.5), ..SizeSettings::default() });
+        let (mesh, report) = remesh(&model, &size, &RemeshSettings::default());
+        check(&model, &mesh);
+        assert!(report.splits < 6 * mesh.triangles.len(), "{length}: {} splits", report.splits);
+    }
+}
+
+/// Points on the inside are in a body, also of a brick with a hollow, others are not.
+#[test]
+fn points_are_in_bodies_or_not() {
+    let hollow = model(&[soup(|soup| {
+        soup.brick([0.0; 3], [3.0; 3], false);
+        soup.brick([1.0; 3], [2.0; 3], true);
+    })]);
+    let bodies = FacetBodies::new(&hollow);
+    let contained = |p: [f64; 3]| bodies.contain(&Point::from(p));
+    assert!(contained([0.5, 0.61, 0.72]) && contained([2.5, 1.3, 1.4]) && contained([0.5, 1.3, 1.4]));
+    assert!(!contained([1.5, 1.3, 1.4]) && !contained([-0.5, 1.3, 1.4]) && !contained([3.5, 0.6, 0.7]));
+}
+
 /// Asserts that segments, triangles and classes are consistent and that vertices lie on their
 /// curves and patches.
 fn check(model: &FacetModel, mesh: &SurfaceMesh) {

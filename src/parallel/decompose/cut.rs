@@ -135,7 +135,7 @@ impl CutModel {
             match CsgModel::new(cut_geometry(&whole.geometry, cuts, &pieces, whole.projector.tolerance())) {
                 Err(FeatureError::Empty(empty)) => pieces.retain(|&(part, body)| {
                     let name = piece_name(&whole.geometry.bodies[body.index()], part);
-                    empty.iter().all(|named| named.solid != name)
+                    empty.iter().all(|named| *named.solid != *name)
                 }),
                 made => break made?,
             }

@@ -86,11 +86,20 @@ impl<'a> Parser<'a, '_> {
     }
 
     fn expected_with_help(&mut self, wanted: &str, help: &str) -> Reported {
-        let token = self.peek();
-        if token.kind == TokenKind::Bad {
-            return Reported;
+        self.expected_at(self.peek().span, wanted, help)
+    }
+
+    /// Reports at a position that the next token is not `wanted`.
+    fn expected_at(&mut self, span: Span, wanted: &str, help: &str) -> Reported {
+        match self.peek().kind {
+            TokenKind::Bad => Reported,
+            kind => self.report.syntax(span, format!("expected {wanted}, found {}", describe(kind)), help),
         }
-        self.report.syntax(token.span, format!("expected {wanted}, found {}", describe(token.kind)), help)
+    }
+
+    /// The position behind the last token that was taken.
+    fn behind(&self) -> Span {
+        self.tokens[self.at.saturating_sub(1)].end
     }
 
     fn mark(&mut self, mark: char) -> Parsed<Span> {

@@ -2,7 +2,7 @@
 
 use super::{Parsed, Parser};
 use crate::language::ast::Statement;
-use crate::language::suggest::{did_you_mean, is_reserved};
+use crate::language::suggest::{begins_statement, did_you_mean, is_reserved};
 use crate::language::token::TokenKind;
 
 impl Parser<'_, '_> {
@@ -42,7 +42,15 @@ impl Parser<'_, '_> {
             }
             _ => "every statement ends with `;`",
         };
-        Err(self.expected_with_help("`;` at the end of the statement", help))
+        // Flags and operators are wrong where they are; otherwise `;` is missing behind the last
+        // word, perhaps lines before the next one.
+        let next = self.peek();
+        let is_missing = match next.kind {
+            TokenKind::Word(word) => begins_statement(word),
+            kind => kind == TokenKind::End,
+        };
+        let span = if is_missing { self.behind() } else { next.span };
+        Err(self.expected_at(span, "`;` at the end of the statement", help))
     }
 
     fn solid_definition(&mut self) -> Parsed<Statement> {

@@ -87,14 +87,15 @@ fn keywords_cannot_be_names() {
 }
 
 #[test]
-fn a_missing_semicolon_is_reported_at_the_next_word() {
+fn a_missing_semicolon_is_reported_where_it_is_missing() {
     expect_error(
         "solid a = sphere (0,0,0; 1) tlo a;",
-        29,
+        28,
         &["expected `;` at the end of the statement, found `tlo`"],
     );
+    expect_error("solid a = sphere (0,0,0; 1)\n\ntlo a;", 28, &["expected `;`", "found `tlo`"]);
     expect_error("solid a = sphere (0,0,0; 1); tlo a", 35, &["expected `;`", "found the end of the file"]);
-    expect_error("solid a = sphere (0,0,0; 1); tlo a solid b = a;", 36, &["expected `;`", "found `solid`"]);
+    expect_error("solid a = sphere (0,0,0; 1); tlo a solid b = a;", 35, &["expected `;`", "found `solid`"]);
 }
 
 #[test]

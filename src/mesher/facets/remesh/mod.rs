@@ -69,8 +69,9 @@ impl SizeField for Sizes<'_> {
 /// Growth of sizes away from intersections.
 const LOWERED_GRADING: f64 = 1.0;
 
-/// The most rounds of splits until all edges are short enough; each halves long edges.
-const MOST_SPLITS: usize = 40;
+/// The most rounds of splits until all edges are short enough; each halves long edges, except that
+/// two rounds may be needed in thin triangles.
+const MOST_SPLITS: usize = 80;
 
 /// The most times that sizes are lowered at intersections before the mesh is returned as it is.
 const MOST_CORRECTIONS: usize = 14;

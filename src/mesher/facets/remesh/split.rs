@@ -3,6 +3,7 @@
 use super::collapse::MOST_TURN;
 use super::sheet::{Kind, NONE, Sheet, Triangle};
 use crate::Point;
+use std::collections::HashSet;
 
 /// Splits edges longer than `long`, in units of the wanted size, and segments along which a curve
 /// turns too far, the longest first; returns the number of splits in one pass.
@@ -18,10 +19,11 @@ pub(super) fn split_long(sheet: &mut Sheet, long: f64) -> usize {
             }
         }
     }
-    edges.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then((a.1, a.2).cmp(&(b.1, b.2))));
+    edges.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then((b.1, b.2).cmp(&(a.1, a.2))));
     edges.dedup();
+    let later = later(sheet, &edges, long);
     let mut splits = 0;
-    for (_, a, b) in edges {
+    for (_, a, b) in edges.into_iter().rev().filter(|(_, a, b)| !later.contains(&[*a, *b])) {
         if sheet.at_edge(a, b).next().is_some() {
             let (point, kind) = middle(sheet, a, b);
             split(sheet, a, b, point, kind);
@@ -29,6 +31,35 @@ pub(super) fn split_long(sheet: &mut Sheet, long: f64) -> usize {
         }
     }
     splits
+}
+
+/// In a triangle whose long sides are this many times its short one, only the shorter of the long
+/// sides is split.
+///
+/// If both are split, one of the parts is as thin and half as wide: a face of 4096 × 1 gets
+/// millions of triangles that are collapsed again. Flips remove the longest side.
+const NEEDLE: f64 = 32.0;
+
+/// The edges to be split in a later pass; `edges` is ascending.
+fn later(sheet: &Sheet, edges: &[(f64, u32, u32)], long: f64) -> HashSet<[u32; 2]> {
+    let mut later = HashSet::new();
+    for &(_, a, b) in edges {
+        let waits = sheet.at_edge(a, b).any(|t| {
+            let v = sheet.at(t).v;
+            let sides = [[v[0], v[1]], [v[1], v[2]], [v[2], v[0]]].map(|[a, b]| [a.min(b), a.max(b)]);
+            let mut sides = sides.map(|[a, b]| (sheet.length(a, b), a, b));
+            // Equal lengths in the order of the edges.
+            sides.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then((b.1, b.2).cmp(&(a.1, a.2))));
+            let [short, second, first] = sides;
+            (first.1, first.2) == (a, b)
+                && second.0 > long.max(NEEDLE * short.0)
+                && !later.contains(&[second.1, second.2])
+        });
+        if waits {
+            later.insert([a, b]);
+        }
+    }
+    later
 }
 
 fn turns_far(sheet: &Sheet, a: u32, b: u32, curve: u32) -> bool {
