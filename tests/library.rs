@@ -199,7 +199,7 @@ fn arrays_that_do_not_fit_are_refused_with_the_place() {
     assert_eq!(refusal(&points, &triangles, &numbers[..3]), "3 boundary numbers for 12 elements");
     let mut infinite = points.clone();
     infinite[2][1] = f64::INFINITY;
-    assert!(refusal(&infinite, &triangles, &[]).starts_with("point 2 "));
+    assert!(refusal(&infinite, &triangles, &[]).starts_with("point 2: "));
     triangles[5][0] = 8;
     assert_eq!(refusal(&points, &triangles, &[]), "triangle 5 names point 8, and there are 8");
     triangles.pop();

@@ -1,8 +1,8 @@
 //! Makes one classified, refinable tetrahedral mesh of a geometry, on one rank.
 
-use super::error::RoomError;
 use super::expected;
 use super::retries::{Budget, CORRECTIONS};
+use super::room_error::RoomError;
 use crate::Point;
 use crate::ground::error::{ErrorKind, HasKind};
 use crate::ground::mesh::QualitySummary;

@@ -120,7 +120,8 @@ fn plan_cuts(
     options::refuse_unresolved(model, &settings.size)?;
     room::refuse_too_fine(model, &settings.size, None)?;
     let (pieces, coarse, outcome) = progress.stage(Stage::Mesh, |work| {
-        mesh_as_wanted(parts, model, settings, wanted, &[], &Budget::new(None, wanted), work)
+        let budget = Budget::new(None, matches!(wanted, Wanted::Sizes { .. }));
+        mesh_as_wanted(parts, model, settings, wanted, &[], &budget, work)
     })?;
     progress.stage(Stage::Cut, |_| {
         let statistics = CutStatistics::of(&coarse.mesh, whole, pieces, parts)?;

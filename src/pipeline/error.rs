@@ -1,6 +1,7 @@
 //! Why a run ends without a mesh.
 
 use super::coarse::CoarseError;
+use super::room_error::RoomError;
 use crate::Point;
 use crate::files::WriteError;
 use crate::files::arrays::ArrayError;
@@ -9,7 +10,6 @@ use crate::files::input::ReadError;
 use crate::files::{surface, volume};
 use crate::ground::comm::CommError;
 use crate::ground::error::{ErrorKind, HasKind};
-use crate::ground::memory::sized;
 use crate::ground::mesh::periodic::MapError;
 use crate::ground::mesh::{Rank, UnknownName};
 use crate::ground::progress::Cancelled;
@@ -122,15 +122,6 @@ pub enum Error {
 
 fn prefix(path: &Option<PathBuf>) -> String {
     path.as_ref().map_or_else(String::new, |path| format!("{}: ", path.display()))
-}
-
-/// A lower estimate of bytes as text; the largest number stands for all beyond it.
-fn at_least(bytes: u64) -> String {
-    if bytes == u64::MAX {
-        "more bytes than any machine has".into()
-    } else {
-        format!("{} or more", sized(bytes))
-    }
 }
 
 /// The input cannot be meshed.
@@ -263,80 +254,6 @@ pub enum RequestError {
     /// The method `decompose` does not keep edges inside bodies.
     #[error(transparent)]
     LooseEdge(#[from] LooseEdge),
-}
-
-/// The fine mesh does not fit; reported before it is made.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum RoomError {
-    /// More entities than a format can number.
-    #[error(
-        "{tets} tets with {vertices} vertices are more than {most}, the most that a format numbers: choose another format, or ask for fewer"
-    )]
-    TooMany {
-        /// Tets of the fine mesh.
-        tets: u64,
-        /// Its vertices.
-        vertices: u64,
-        /// The largest number that all formats support.
-        most: u64,
-    },
-    /// The requested sizes need more coarse tets than the memory can hold.
-    #[error(
-        "elements of at most {size:?} make {tets} or more, as a coarse mesh of {}, and this machine has {} free: choose \
-         larger sizes, or refine a coarser mesh by levels",
-        at_least(*.needed), sized(*.available)
-    )]
-    Coarse {
-        /// The largest size that is allowed (length).
-        size: f64,
-        /// Least number of tets with this size, as text: it may be beyond all integers.
-        tets: String,
-        /// Lower estimate of their memory in bytes.
-        needed: u64,
-        /// Free bytes.
-        available: u64,
-    },
-    /// More coarse tets are expected than the memory can hold.
-    #[error(
-        "the sizes make about {tets}, as a coarse mesh of {}, and this machine has {} free: choose larger sizes, or \
-         refine a coarser mesh by levels",
-        at_least(*.needed), sized(*.available)
-    )]
-    Expected {
-        /// The expected number, as text: it may be beyond all integers.
-        tets: String,
-        /// Estimate of their memory in bytes.
-        needed: u64,
-        /// Free bytes.
-        available: u64,
-    },
-    /// The disk has too little space.
-    #[error(
-        "the files take {} or more and {} has {} free: write elsewhere, take another format, or ask for fewer tets",
-        sized(*.needed), .folder.display(), sized(*.available)
-    )]
-    Disk {
-        /// Lower estimate of the size of the files in bytes.
-        needed: u64,
-        /// The output folder.
-        folder: PathBuf,
-        /// Free bytes there.
-        available: u64,
-    },
-    /// A machine has too little memory.
-    #[error(
-        "the fine mesh takes {}, without the vertices inside coarse tets {}, and this machine has {} left: take fewer levels \
-         or tets, or more machines",
-        sized(*.all), sized(*.least), sized(*.available)
-    )]
-    Memory {
-        /// Bytes of the fine mesh on this machine.
-        all: u64,
-        /// Bytes of the fine mesh without the vertices inside coarse tets.
-        least: u64,
-        /// Free bytes.
-        available: u64,
-    },
 }
 
 /// Faults of the finished mesh; nothing is written.

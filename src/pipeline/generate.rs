@@ -12,7 +12,7 @@ use super::part::{Part, even_out};
 use super::result::{CoarseResult, Generated, Level, Refinement, Refused};
 use super::retries::{Budget, REFINEMENTS};
 use super::room::{self};
-use super::settings::{CutSettings, GenerateSettings, Method};
+use super::settings::{CutSettings, GenerateSettings, Method, Wanted};
 use super::skins;
 use super::verify::verify;
 use super::wanted::mesh_as_wanted;
@@ -54,7 +54,8 @@ pub fn generate(
     if let Method::Decompose(cuts) = &settings.method {
         return decomposed(comm, model, cuts, settings, progress);
     }
-    let (mut sources, budget) = (Vec::<Source>::new(), Budget::new(settings.memory, settings.wanted));
+    let announces = matches!(settings.wanted, Wanted::Sizes { .. });
+    let (mut sources, budget) = (Vec::<Source>::new(), Budget::new(settings.memory, announces));
     for round in 0.. {
         let parts = coarse_parts(comm, model, settings, &sources, &budget, progress)?;
         if settings.method == Method::Surface {

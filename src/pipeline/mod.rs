@@ -23,6 +23,7 @@ pub mod quality;
 pub mod result;
 pub mod retries;
 mod room;
+pub mod room_error;
 pub mod settings;
 mod skins;
 pub mod target;

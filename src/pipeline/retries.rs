@@ -15,9 +15,8 @@
 //! Nearly all runs need one to ten meshes. Most attempts end early, at the curves or at the
 //! surface: only complete ones take as long as a coarse mesh.
 
-use super::error::RoomError;
-use super::room;
-use super::settings::Wanted;
+use super::expected::{refuse_expected, rounded};
+use super::room_error::RoomError;
 use crate::ground::progress::Work;
 use std::cell::Cell;
 
@@ -67,19 +66,19 @@ const WORTH_ANNOUNCING: f64 = 1e5;
 const ANNOUNCED_AGAIN: f64 = 1.5;
 
 impl Budget {
-    /// The budget of a run that may use this memory. The expected number of tets is announced
-    /// unless the user requests a number.
-    pub(super) fn new(memory: Option<u64>, wanted: Wanted) -> Self {
-        let announced = if matches!(wanted, Wanted::Sizes { .. }) { 0.0 } else { f64::INFINITY };
+    /// The budget of a run that may use this memory. The expected number of tets is announced if
+    /// the user did not request a number.
+    pub(super) fn new(memory: Option<u64>, announces: bool) -> Self {
+        let announced = if announces { 0.0 } else { f64::INFINITY };
         Self { memory, announced: Cell::new(announced), ..Self::default() }
     }
 
     /// Refuses an expected number of tets that the memory cannot hold, and announces it if it is
     /// news.
     pub(super) fn expect(&self, tets: f64, work: &Work) -> Result<(), RoomError> {
-        room::refuse_expected(tets, self.memory)?;
+        refuse_expected(tets, self.memory)?;
         if tets > WORTH_ANNOUNCING && tets > ANNOUNCED_AGAIN * self.announced.get() {
-            work.note(&format!("about {} tets are expected in the coarse mesh", room::rounded(tets)));
+            work.note(&format!("about {} tets are expected in the coarse mesh", rounded(tets)));
             self.announced.set(tets);
         }
         Ok(())

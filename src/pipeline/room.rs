@@ -1,7 +1,9 @@
 //! Predicts from the coarse mesh whether a fine mesh fits memory and disk.
 
-use super::error::{Error, RoomError};
+use super::error::Error;
+use super::expected::rounded;
 use super::model::Model;
+use super::room_error::RoomError;
 use super::settings::Disk;
 use crate::ground::comm::Communicator;
 use crate::ground::memory::{self, sized};
@@ -61,42 +63,6 @@ pub(super) fn refuse_too_fine(
     }
     let tets = format!("{} tets", rounded(tets));
     Err(RoomError::Coarse { size, tets, needed: needed as u64, available })
-}
-
-/// *Local.* Refuses an expected number of coarse tets that do not fit the memory.
-///
-/// # Errors
-/// If they do not fit; the error has the numbers.
-pub(super) fn refuse_expected(tets: f64, memory: Option<u64>) -> Result<(), RoomError> {
-    /// Memory of a coarse tet while it is made, with some room for the error of the expectation.
-    const BYTES: f64 = 250.0;
-    let needed = BYTES * tets;
-    match memory.or_else(memory::available_bytes) {
-        Some(available) if needed > available as f64 => {
-            let tets = format!("{} tets", rounded(tets));
-            Err(RoomError::Expected { tets, needed: needed as u64, available })
-        }
-        _ => Ok(()),
-    }
-}
-
-/// An expected number as text, with two digits.
-pub(super) fn rounded(count: f64) -> String {
-    match count {
-        f64::INFINITY => "countless".into(),
-        1e6..1e9 => format!("{} million", two_digits(count / 1e6)),
-        1e9..1e12 => format!("{} billion", two_digits(count / 1e9)),
-        1e4..1e6 => format!("{} 000", two_digits(count / 1e3)),
-        _ => format!("{count:.1e}"),
-    }
-}
-
-fn two_digits(number: f64) -> String {
-    match number {
-        ..9.95 => format!("{number:.1}"),
-        ..99.5 => format!("{number:.0}"),
-        _ => format!("{:.0}", 10.0 * (number / 10.0).round()),
-    }
 }
 
 /// **Collective.** Decides which vertices of the fine mesh this machine can store, before anything

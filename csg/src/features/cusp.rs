@@ -1,4 +1,4 @@
-//! Faces that end in a cusp too sharp for triangles.
+//! Curves that leave a corner too much alike for triangles.
 //!
 //! Two curves of a patch may leave a corner in the same direction, so that the patch has no angle
 //! there. If their distance grows quadratically, as between a line and a circle, triangles of the
@@ -27,7 +27,7 @@ const FALLING: f64 = 0.35;
 /// Rejects the first cusp that is too sharp.
 ///
 /// # Errors
-/// [`FeatureError::Cusp`] with the surfaces beside the two curves other than that of the patch.
+/// [`FeatureError::Cusp`] with the surfaces beside the two curves other than that of a common patch.
 pub(super) fn check(geometry: &Geometry, features: &Features) -> Result<(), FeatureError> {
     let mut ends: BTreeMap<CornerId, Vec<(CurveId, usize)>> = BTreeMap::new();
     for (i, curve) in features.curves.iter().enumerate() {
@@ -39,18 +39,18 @@ pub(super) fn check(geometry: &Geometry, features: &Features) -> Result<(), Feat
         for (k, first) in ends.iter().enumerate() {
             for second in &ends[k + 1..] {
                 let [c, d] = [first, second].map(|end| features.curve(end.0));
-                let is_beside = |curve: &Curve, patch| curve.fins.iter().any(|fin| fin.patch == patch);
-                let Some(fin) = c.fins.iter().find(|fin| is_beside(d, fin.patch)) else { continue };
                 let ends = [(c, first.1), (d, second.1)];
                 let reach = reach(geometry, &ends);
                 let is_sharp = |[near, far]: [f64; 2]| far < LEAST_ANGLE && near < FALLING * far;
                 if !angles(geometry, ends, REACH * reach).is_some_and(is_sharp) {
                     continue;
                 }
-                let of_patch = features.patch(fin.patch).surface;
+                // Curves without a common patch are on boundaries that touch at the corner.
+                let common = c.fins.iter().find(|fin| d.fins.iter().any(|other| other.patch == fin.patch));
+                let of_patch = common.map(|fin| features.patch(fin.patch).surface);
                 let surfaces = [c, d].map(|curve| {
-                    let other = curve.surfaces.iter().find(|s| **s != of_patch);
-                    *other.unwrap_or(&of_patch)
+                    let other = curve.surfaces.iter().find(|s| Some(**s) != of_patch);
+                    *other.unwrap_or(&curve.surfaces[0])
                 });
                 let point = features.corner(corner).point;
                 let [first, second] = surfaces.map(|s| Named::surface(geometry, s));

@@ -69,11 +69,17 @@ const MOST: usize = 100;
 /// # Errors
 /// As [`Features::find`], for everything else.
 pub fn find_and_cut_cusps(geometry: &mut Geometry) -> Result<(Features, Vec<CutCusp>), FeatureError> {
-    let mut cut_cusps = Vec::new();
+    let own = geometry.surfaces.len();
+    let mut cut_cusps: Vec<CutCusp> = Vec::new();
+    let mut first = None;
     loop {
-        let error = match Features::find(geometry) {
-            Ok(features) => return Ok((features, cut_cusps)),
-            Err(error) => error,
+        let error = match (Features::find(geometry), first.take()) {
+            (Ok(features), Some(error)) if leaves_slivers(&features, own, &cut_cusps) => return Err(error),
+            (Ok(features), _) => return Ok((features, cut_cusps)),
+            (Err(error), earlier) => {
+                first = earlier.or_else(|| Some(error.clone()));
+                error
+            }
         };
         let (FeatureError::Tangent { cusp, .. } | FeatureError::Cusp { cusp, .. }) = &error else {
             return Err(error);
@@ -81,6 +87,16 @@ pub fn find_and_cut_cusps(geometry: &mut Geometry) -> Result<(Features, Vec<CutC
         let cut = if cut_cusps.len() < MOST { cut_off(geometry, cusp, &cut_cusps) } else { None };
         cut_cusps.push(cut.ok_or(error)?);
     }
+}
+
+/// Whether a cut ends in curves that are very short: surfaces in contact of high order are still
+/// too close at the cut. Surfaces from index `own` on are those of the cuts.
+fn leaves_slivers(features: &Features, own: usize, cut_cusps: &[CutCusp]) -> bool {
+    /// Least length of a curve on a cut, relative to the smallest radius.
+    const SHORTEST: f64 = 0.01;
+    let least = cut_cusps.iter().map(|cut| cut.radius).fold(f64::INFINITY, f64::min);
+    let is_cut = |s: &SurfaceId| s.index() >= own;
+    features.curves.iter().any(|c| c.surfaces.iter().any(is_cut) && c.length() < SHORTEST * least)
 }
 
 /// Takes a small neighborhood of a cusp out of the bodies; `None` if that cannot help.

@@ -168,7 +168,7 @@ fn wedges_of_zero_angle_are_rejected_with_both_names_and_coordinates() {
         // A ball in a hole hardly larger: triangles of the two would intersect.
         (
             "solid a = orthobrick (-2,-2,-2; 2,2,2) and not sphere (0,0,0; 1) or sphere (0,0,-0.1; 0.9); tlo a;",
-            "surfaces of solid `a`, its sphere (2:54) and its sphere (2:81), touch at (0.000000, 0.000000, -1.000000)",
+            "surfaces of solid `a`, its sphere (2:48) and its sphere (2:69), touch at (0.000000, 0.000000, -1.000000)",
         ),
         // A plane tangent to a torus at its inner equator cuts it into lobes that meet at a point.
         (

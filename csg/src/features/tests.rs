@@ -270,8 +270,8 @@ fn invalid_geometries_are_rejected_with_coordinates() {
             "surfaces of solid `plate` (line 2) and solid `ball` (line 3) touch at (0.000000, ",
         ),
         (
-            "solid a = orthobrick (-2,-2,-1; 2,2,0)\n  or sphere (0,0,1; 1);\ntlo a;",
-            "surfaces of solid `a`, its plane (2:11) and its sphere (3:6), touch at (0.000000, ",
+            "solid a = orthobrick (-2,-2,-1; 2,2,0)\n  and not sphere (0,0,-0.25; 0.25);\ntlo a;",
+            "surfaces of solid `a`, its plane (2:11) and its sphere (3:11), touch at (0.000000, ",
         ),
         (
             "solid a = sphere (0,0,0; 1); tlo a;\npoint (2, 0, 0);",

@@ -183,8 +183,11 @@ pub(crate) fn coordinate(x: f64) -> Result<f64, String> {
     if x.abs() <= LARGEST {
         return Ok(x + 0.0);
     }
-    let reason =
-        if x.is_finite() { format!("larger than {LARGEST:e}") } else { "not a finite number".into() };
+    let reason = if x.is_finite() {
+        format!("larger than {LARGEST:e}, choose another unit of length")
+    } else {
+        "not a finite number".into()
+    };
     Err(format!("a coordinate is {reason}: {x:e}"))
 }
 
