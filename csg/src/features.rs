@@ -17,8 +17,7 @@
 //!    bounding box; `number`: assigns boundary numbers and names.
 //! 7. `periodic`: matches periodic copies.
 //! 8. `check`: verifies consistency; `contact`: decides whether points of tangency matter; `touch`:
-//!    rejects corners and edges that touch the interior of a patch; `cusp`: rejects patches that
-//!    end in too sharp a cusp.
+//!    finds the corners inside patches; `cusp`: rejects curves that leave a corner too much alike.
 //!
 //! NETGEN follows edges from special points. We trace all pairs and classify afterwards: no
 //! decision depends on a tolerance during tracing; special positions (three surfaces through one
@@ -33,11 +32,12 @@
 //! curves are found by exclusion (`seed`): parts of cells are split until each is covered by a
 //! trace or proved to contain no curve.
 //!
-//! The following are rejected with their coordinates: surfaces that are tangent where both are
-//! boundaries with a wedge of zero angle between them, along a line (two parallel rods in contact)
-//! or at a point (a ball on a plate, a torus cut by a tangent plane); a corner or an edge that
-//! touches the interior of a face; a face that ends in a cusp between curves of equal curvature;
-//! bodies that overlap or are unbounded.
+//! Boundaries that touch with the exterior between them share a corner or a curve of contact. The
+//! following are rejected with their coordinates: tangent boundaries with a body between them,
+//! which has no angle there, along a curve or at a point; tangent boundaries between which the
+//! exterior opens too slowly; curves of equal curvature that leave a corner in one direction;
+//! bodies that overlap or are unbounded. Except for the last, [`find_and_cut_cusps`] takes a small
+//! ball or tube out of the bodies, after which they have features.
 //!
 //! Three or more surfaces in contact of high order at one point are rejected too, but the error may
 //! name another reason.

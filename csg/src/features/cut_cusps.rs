@@ -105,6 +105,7 @@ fn cut_off(geometry: &mut Geometry, cusp: &Cusp, before: &[CutCusp]) -> Option<C
         before.iter().filter(|cut_cusp| (cut_cusp.place.0 - cusp.point).norm() < 0.5 * cut_cusp.radius);
     // If something is left after the body between was cut, all bodies are.
     let body = match known.next_back() {
+        None if cusp.arc.is_empty() && !separates(geometry, cusp) => None,
         None => cusp.between,
         Some(cut_cusp) => {
             cut_cusp.body.as_ref()?;
@@ -128,6 +129,16 @@ fn cut_off(geometry: &mut Geometry, cusp: &Cusp, before: &[CutCusp]) -> Option<C
     let is_curve = !cusp.arc.is_empty();
     let body = body.map(|body| (body, Named::body(geometry, body)));
     Some(CutCusp { first, second, place: Place(cusp.point), radius, is_curve, body })
+}
+
+/// Whether the surfaces of a cusp separate in all directions, so that their boundaries can keep the
+/// common point.
+fn separates(geometry: &Geometry, cusp: &Cusp) -> bool {
+    /// Least ratio of the differences of curvatures in two directions.
+    const LEAST_RATIO: f64 = 1e-2;
+    let surfaces = cusp.surfaces.map(|s| &geometry.surfaces[s.index()]);
+    let [low, high] = curvature_differences_at(surfaces, &cusp.point);
+    low * high > 0.0 && low.abs().min(high.abs()) >= LEAST_RATIO * low.abs().max(high.abs())
 }
 
 /// The radius at which a cusp is cut off; `None` if it has hardly any angle there.
