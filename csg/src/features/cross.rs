@@ -233,7 +233,7 @@ impl Finder<'_> {
             self.found.extend(ends);
         }
         let cell = step_box(p, q);
-        // A surface beside one of the two, such as a parallel plane, is excluded by their difference.
+        // A surface beside one of the two, such as a parallel plane, is excluded by a difference.
         if [self.a, self.b].iter().any(|near| !can_meet(near, self.third, &cell)) {
             return;
         }

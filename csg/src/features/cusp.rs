@@ -27,7 +27,7 @@ const FALLING: f64 = 0.35;
 /// Rejects the first cusp that is too sharp.
 ///
 /// # Errors
-/// [`FeatureError::Cusp`] with the surfaces beside the two curves other than that of a common patch.
+/// [`FeatureError::Cusp`] with the surfaces beside the two curves, without that of a common patch.
 pub(super) fn check(geometry: &Geometry, features: &Features) -> Result<(), FeatureError> {
     let mut ends: BTreeMap<CornerId, Vec<(CurveId, usize)>> = BTreeMap::new();
     for (i, curve) in features.curves.iter().enumerate() {

@@ -192,7 +192,8 @@ fn inside(geometry: &mut Geometry, surface: Surface, cusp: &Cusp) -> Solid {
     Solid::Half { surface: SurfaceId::new(geometry.surfaces.len() - 1), positive: false }
 }
 
-/// A tube around the arc of contact, longer than it by the radius at both ends; `None` if that is neither a line nor a circle.
+/// A tube around the arc of contact, longer than it by the radius at both ends; `None` if that is
+/// neither a line nor a circle.
 fn tube(geometry: &mut Geometry, cusp: &Cusp, radius: f64) -> Option<Solid> {
     /// Largest distance of the points of the arc from a line or a circle, relative to their
     /// distances.

@@ -125,7 +125,7 @@ fn cusps_inside_bodies_are_cut_off_with_a_note() {
     let block = "orthobrick (-3,-3,-1; 4,3,3)";
     let rods = format!("solid a = {}; solid b = {};", rod(0.0), rod(2.0));
     let cases = [
-        // The body to be cut, whether along a curve, and corners, curves, closed curves and patches.
+        // The body to be cut, whether along a curve, and the numbers of entities.
         (
             "solid a = sphere (0,0,0; 1) and not sphere (0.5,0,0; 0.5); tlo a;".to_owned(),
             "a",
