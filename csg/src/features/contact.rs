@@ -1,6 +1,6 @@
 //! Points where two surfaces are tangent, and whether they affect the features.
 
-use super::neighborhood::{Tolerances, region};
+use super::neighborhood::{Tolerances, region, stay_apart};
 use super::octree::{Leaf, Octree, is_flat};
 use super::{FeatureError, Inconsistency};
 use crate::interval::{Cell, middle};
@@ -327,8 +327,6 @@ fn wedge_towards(geometry: &Geometry, contact: &Contact, normal: &Vector, direct
     const CIRCLE: f64 = 1e-3;
     /// Sheets closer than this fraction of the squared radius continue each other.
     const APART: f64 = 1e-5;
-    /// The gap must be this many times larger than the sagittas of chords that are inside it.
-    const ROOM: f64 = 1.5;
     let [a, b] = contact.pair.map(|s| &geometry.surfaces[s.index()]);
     let at = &contact.point;
     let radius = CIRCLE / a.curvature(at).max(b.curvature(at));
@@ -349,10 +347,8 @@ fn wedge_towards(geometry: &Geometry, contact: &Contact, normal: &Vector, direct
     if below == between || between == above {
         return Wedge::None;
     }
-    // A sheet that bends toward the other has its chords in the gap.
     let height = |p: &Point| (p - at).dot(&way) / gap;
-    let sagittas = height(&p).max(0.0) + (-height(&q)).max(0.0);
-    if between.is_none() && gap > ROOM * sagittas {
+    if between.is_none() && stay_apart(height(&p), height(&q)) {
         Wedge::Open
     } else {
         Wedge::Closed(between.map(BodyId::new))

@@ -160,7 +160,7 @@ fn radius(geometry: &Geometry, cusp: &Cusp) -> Option<f64> {
     // Along an arc, and where the surfaces cross, they separate to the sides only.
     let rate = if low < 0.2 * high { high } else { low };
     let mut radius = cusp.reach.min(ANGLE / rate).min(LARGEST / bend);
-    let others = geometry.surfaces[..].iter().map(|s| s.distance(at)).filter(|&d| d > 1e-6 * radius);
+    let others = geometry.surfaces.iter().map(|s| s.distance(at)).filter(|&d| d > 1e-6 * radius);
     let nearest = others.fold(f64::INFINITY, f64::min);
     radius = radius.min((ROOM[0] * nearest).max(ROOM[1] * radius));
     let normal = a.normal(at);

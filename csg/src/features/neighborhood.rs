@@ -233,7 +233,9 @@ pub(super) fn neighborhood(
         if let Some(sheet) = Sheet::between(ray.surface, behind, front) {
             // Two sheets in the same direction bound a wedge of zero angle: no tets fit into it.
             let tangent = leaving.iter().find(|r| (r.direction - ray.direction).norm() <= SAME_ANGLE);
-            if let Some(other) = tangent.filter(|other| before.is_some() || !stay_apart([other, ray])) {
+            if let Some(other) =
+                tangent.filter(|other| before.is_some() || !stay_apart(other.curvature, ray.curvature))
+            {
                 return Err(tangent_rays(geometry, [other, ray], at, before));
             }
             leaving.push(ray);
@@ -249,12 +251,13 @@ pub(super) fn neighborhood(
     Ok(Some(Neighborhood { surfaces, sheets }))
 }
 
-/// Whether the chords of two tangent rays, in counterclockwise order, stay apart.
-fn stay_apart([low, high]: [&Ray; 2]) -> bool {
+/// Whether the chords of two tangent curves or sheets stay apart, given the heights of the lower
+/// and the upper one over their common tangent, or numbers in proportion to them.
+pub(super) fn stay_apart(low: f64, high: f64) -> bool {
     /// The gap must be this many times larger than the sagittas of chords that are inside it.
     const ROOM: f64 = 1.5;
-    // A ray that bends toward the other has its chords in the gap.
-    high.curvature - low.curvature > ROOM * (low.curvature.max(0.0) + (-high.curvature).max(0.0))
+    // One that bends toward the other has its chords in the gap.
+    high - low > ROOM * (low.max(0.0) + (-high).max(0.0))
 }
 
 /// The error for two rays in the same direction, with the body between them.
