@@ -204,7 +204,7 @@ fn find_in(geometry: &Geometry, tree: &Octree, tolerances: &Tolerances) -> Resul
     let (arcs, nodes) = arcs::feature_arcs(geometry, tree, &traces, tolerances)?;
     let touching = contact::check(geometry, tree, tolerances)?;
     let inner = touch::find(geometry, tree, &arcs, &nodes, &touching, tolerances)?;
-    let arcs = assemble::join(geometry, arcs, &nodes, tolerances)?;
+    let arcs = assemble::join(geometry, arcs, &nodes, &inner, tolerances)?;
     let mut features = assemble::entities(geometry, tree, &arcs, &nodes, &inner, tolerances)?;
     number::number(geometry, &mut features.patches);
     features.identified = periodic::identify(geometry, &features, tolerances)?;

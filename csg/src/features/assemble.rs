@@ -10,7 +10,8 @@ use std::collections::{BTreeMap, HashMap};
 
 /// Joins arcs that continue each other at nodes without other arcs.
 ///
-/// Each returned arc ends at corners or is closed.
+/// Each returned arc ends at corners or is closed. Points of the user, and those where another sheet
+/// touches the curve (`inner`), are corners too.
 ///
 /// # Errors
 /// [`FeatureError::LooseCurve`] or [`FeatureError::Tangent`] if only one arc ends at a node.
@@ -18,6 +19,7 @@ pub(super) fn join(
     geometry: &Geometry,
     arcs: Vec<Arc>,
     nodes: &Nodes,
+    inner: &[(Sheet, Point)],
     tolerances: &Tolerances,
 ) -> Result<Vec<Arc>, FeatureError> {
     let mut ends: BTreeMap<usize, Vec<(usize, usize)>> = BTreeMap::new();
@@ -32,8 +34,10 @@ pub(super) fn join(
         if let [(arc, _)] = ends[..] {
             return Err(loose_curve(geometry, arcs[arc].pair, &point));
         }
-        let is_user_point = geometry.user_points.iter().any(|u| (u.point - point).norm() <= tolerances.merge);
-        if let ([first, second], false) = (&ends[..], is_user_point) {
+        let given = geometry.user_points.iter().map(|user| user.point);
+        let mut own = given.chain(inner.iter().map(|(_, point)| *point));
+        let is_corner = own.any(|own| (own - point).norm() <= tolerances.merge);
+        if let ([first, second], false) = (&ends[..], is_corner) {
             let (into, out) = (taken(&arcs[first.0], 1 - first.1), taken(&arcs[second.0], second.1));
             if into.continues_in(geometry, &out) {
                 mates.insert(*first, *second);

@@ -64,43 +64,74 @@ impl fmt::Display for CutCusp {
 /// Most cusps cut off in one geometry; each needs another search for the features.
 const MOST: usize = 100;
 
+/// Factors of the radii, tried in this order while cuts end in slivers.
+const WIDER: [f64; 2] = [1.0, 2.0];
+
 /// Finds the features of a geometry, from which cusps without angle are cut off as far as needed.
 ///
 /// # Errors
 /// As [`Features::find`], for everything else.
 pub fn find_and_cut_cusps(geometry: &mut Geometry) -> Result<(Features, Vec<CutCusp>), FeatureError> {
+    let mut first = match Features::find(geometry) {
+        Ok(features) => return Ok((features, Vec::new())),
+        Err(error) => error,
+    };
+    for wider in WIDER {
+        let mut cut = geometry.clone();
+        match cut_all_off(&mut cut, first.clone(), wider) {
+            Ok(Some(found)) => {
+                *geometry = cut;
+                return Ok(found);
+            }
+            Ok(None) => (),
+            Err(error) => {
+                first = error;
+                break;
+            }
+        }
+    }
+    Err(first)
+}
+
+/// Cuts off the cusp of an error and all that are found afterwards; `None` if the cuts end in
+/// slivers.
+///
+/// # Errors
+/// The first error that is no cusp, or a cusp that cannot be cut off.
+fn cut_all_off(
+    geometry: &mut Geometry,
+    mut error: FeatureError,
+    wider: f64,
+) -> Result<Option<(Features, Vec<CutCusp>)>, FeatureError> {
     let own = geometry.surfaces.len();
     let mut cut_cusps: Vec<CutCusp> = Vec::new();
-    let mut first = None;
     loop {
-        let error = match (Features::find(geometry), first.take()) {
-            (Ok(features), Some(error)) if leaves_slivers(&features, own, &cut_cusps) => return Err(error),
-            (Ok(features), _) => return Ok((features, cut_cusps)),
-            (Err(error), earlier) => {
-                first = earlier.or_else(|| Some(error.clone()));
-                error
-            }
-        };
         let (FeatureError::Tangent { cusp, .. } | FeatureError::Cusp { cusp, .. }) = &error else {
             return Err(error);
         };
-        let cut = if cut_cusps.len() < MOST { cut_off(geometry, cusp, &cut_cusps) } else { None };
+        let cut = if cut_cusps.len() < MOST { cut_off(geometry, cusp, &cut_cusps, wider) } else { None };
         cut_cusps.push(cut.ok_or(error)?);
+        match Features::find(geometry) {
+            Ok(features) if leaves_slivers(&features, own, &cut_cusps) => return Ok(None),
+            Ok(features) => return Ok(Some((features, cut_cusps))),
+            Err(next) => error = next,
+        }
     }
 }
 
 /// Whether a cut ends in curves that are very short: surfaces in contact of high order are still
 /// too close at the cut. Surfaces from index `own` on are those of the cuts.
 fn leaves_slivers(features: &Features, own: usize, cut_cusps: &[CutCusp]) -> bool {
-    /// Least length of a curve on a cut, relative to the smallest radius.
-    const SHORTEST: f64 = 0.01;
+    /// Least length of a curve on a cut, relative to the smallest radius. Surfaces that separate
+    /// with the fourth power have an angle of 1.1° there.
+    const SHORTEST: f64 = 0.005;
     let least = cut_cusps.iter().map(|cut| cut.radius).fold(f64::INFINITY, f64::min);
     let is_cut = |s: &SurfaceId| s.index() >= own;
     features.curves.iter().any(|c| c.surfaces.iter().any(is_cut) && c.length() < SHORTEST * least)
 }
 
 /// Takes a small neighborhood of a cusp out of the bodies; `None` if that cannot help.
-fn cut_off(geometry: &mut Geometry, cusp: &Cusp, before: &[CutCusp]) -> Option<CutCusp> {
+fn cut_off(geometry: &mut Geometry, cusp: &Cusp, before: &[CutCusp], wider: f64) -> Option<CutCusp> {
     let mut known =
         before.iter().filter(|cut_cusp| (cut_cusp.place.0 - cusp.point).norm() < 0.5 * cut_cusp.radius);
     // If something is left after the body between was cut, all bodies are.
@@ -112,7 +143,7 @@ fn cut_off(geometry: &mut Geometry, cusp: &Cusp, before: &[CutCusp]) -> Option<C
             None
         }
     };
-    let radius = radius(geometry, cusp)?;
+    let radius = radius(geometry, cusp, wider)?;
     let left_out = if cusp.arc.is_empty() {
         let ball = Surface::Sphere(Sphere { center: cusp.point, radius });
         inside(geometry, ball, cusp)
@@ -142,7 +173,7 @@ fn separates(geometry: &Geometry, cusp: &Cusp) -> bool {
 }
 
 /// The radius at which a cusp is cut off; `None` if it has hardly any angle there.
-fn radius(geometry: &Geometry, cusp: &Cusp) -> Option<f64> {
+fn radius(geometry: &Geometry, cusp: &Cusp, wider: f64) -> Option<f64> {
     /// The wanted angle between the surfaces at the cut, radians (14°).
     const ANGLE: f64 = 0.25;
     /// The least angle (1.5°).
@@ -159,7 +190,7 @@ fn radius(geometry: &Geometry, cusp: &Cusp) -> Option<f64> {
     let [low, high] = [rates[0].min(rates[1]), rates[0].max(rates[1])];
     // Along an arc, and where the surfaces cross, they separate to the sides only.
     let rate = if low < 0.2 * high { high } else { low };
-    let mut radius = cusp.reach.min(ANGLE / rate).min(LARGEST / bend);
+    let mut radius = wider * cusp.reach.min(ANGLE / rate).min(LARGEST / bend);
     let others = geometry.surfaces.iter().map(|s| s.distance(at)).filter(|&d| d > 1e-6 * radius);
     let nearest = others.fold(f64::INFINITY, f64::min);
     radius = radius.min((ROOM[0] * nearest).max(ROOM[1] * radius));

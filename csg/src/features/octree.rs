@@ -342,7 +342,7 @@ impl PairClassifier<'_> {
     }
 }
 
-/// Whether two surfaces that both pass through a box may meet in it.
+/// Whether two surfaces may meet in a box.
 ///
 /// Evaluates the ranges of both functions, and of the linear combination whose gradient at the
 /// center is smallest: it separates nearly parallel sheets.
@@ -350,17 +350,19 @@ pub(super) fn can_meet(a: &Surface, b: &Surface, cell: &Cell) -> bool {
     if let Some(swept) = Swept::new(a, b, cell) {
         return swept.can_meet();
     }
+    if !(a.value_range(cell).contains_zero() && b.value_range(cell).contains_zero()) {
+        return false;
+    }
     let center = middle(cell);
     let (ga, gb) = (a.gradient(&center), b.gradient(&center));
     let factor = ga.dot(&gb) / gb.norm_squared();
+    // On the axis of a cylinder there is no gradient.
     if !factor.is_finite() {
         return true;
     }
     let difference =
         if a.is_quadric() && b.is_quadric() { quadratic_difference } else { difference_by_mean_value };
     difference(a, b, factor, cell).contains_zero()
-        && a.value_range(cell).contains_zero()
-        && b.value_range(cell).contains_zero()
 }
 
 /// A range of `a - factor * b` over a box, by the mean-value form.

@@ -1,6 +1,7 @@
 //! Features of tangent surfaces, and of cones with their apexes.
 
 use super::tests::{counts, find, refused};
+use crate::Interval;
 
 #[test]
 fn fillets_and_caps_have_seams_even_with_rounded_decimals() {
@@ -104,6 +105,8 @@ fn boundaries_that_touch_from_outside_share_a_corner_or_a_curve() {
             "solid a = torus (0,0,0.5; 0,0,1; 2; 0.5); solid b = orthobrick (-3,-3,-1; 3,3,0); solid c = a or b; tlo c;",
             [8, 12, 1, 7],
         ),
+        // A ball touches the end of a rod at its rim, which gets a corner there.
+        (&format!("solid a = {} or sphere (1,0,2; 1); tlo a;", rod(0.0)), [1, 1, 1, 4]),
     ];
     for (source, expected) in cases {
         let features = find(source);
@@ -118,6 +121,15 @@ fn boundaries_that_touch_from_outside_share_a_corner_or_a_curve() {
             assert_eq!(is_inner(corner), 2, "{source}: both boundaries have the corner inside");
         }
     }
+}
+
+#[test]
+fn a_cylinder_is_excluded_on_its_axis_where_it_has_no_gradient() {
+    let cell = [-0.1, -0.1, 0.0].map(|low| Interval::new(low, low + 0.2));
+    let geometry = super::tests::geometry(&format!("solid a = {}; tlo a;", rod(0.0)));
+    let [round, end] = [0, 1].map(|i| &geometry.surfaces[i]);
+    assert_eq!([round.kind(), end.kind()], ["cylinder", "plane"]);
+    assert!(!super::octree::can_meet(end, round, &cell));
 }
 
 #[test]
