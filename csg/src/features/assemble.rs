@@ -10,8 +10,8 @@ use std::collections::{BTreeMap, HashMap};
 
 /// Joins arcs that continue each other at nodes without other arcs.
 ///
-/// Each returned arc ends at corners or is closed. Points of the user, and those where another sheet
-/// touches the curve (`inner`), are corners too.
+/// Each returned arc ends at corners or is closed. Points of the user, and those where another
+/// sheet touches the curve (`inner`), are corners too.
 ///
 /// # Errors
 /// [`FeatureError::LooseCurve`] or [`FeatureError::Tangent`] if only one arc ends at a node.
@@ -187,20 +187,24 @@ fn closed_sheets(
     patches: &BTreeMap<Sheet, Patch>,
     tolerances: &Tolerances,
 ) -> Result<Vec<(Sheet, Point)>, FeatureError> {
+    /// Distance of the point from other surfaces, in units of the tolerance: ample if possible,
+    /// else just enough, as for the walls of a very thin shell.
+    const CLEARANCES: [f64; 2] = [1e3, 10.0];
     let mut found = Vec::new();
     for (i, surface) in geometry.surfaces.iter().enumerate() {
         let id = SurfaceId::new(i);
         if patches.keys().any(|sheet| sheet.surface == id) {
             continue;
         }
-        let is_clear = |point: &Point| {
+        let is_clear = |point: &Point, clearance: f64| {
             let clear = |s: &SurfaceId| {
-                *s == id || geometry.surfaces[s.index()].distance(point) > 1e3 * tolerances.on_surface
+                *s == id || geometry.surfaces[s.index()].distance(point) > clearance * tolerances.on_surface
             };
             tree.leaf(point).is_some_and(|leaf| leaf.surfaces.iter().all(clear))
         };
-        let mut points = scattered_directions().filter_map(|d| surface.support(&d));
-        if let Some(seed) = points.find(is_clear) {
+        let points: Vec<Point> = scattered_directions().filter_map(|d| surface.support(&d)).collect();
+        let clear = |clearance| points.iter().copied().find(|point| is_clear(point, clearance));
+        if let Some(seed) = CLEARANCES.into_iter().find_map(clear) {
             let other_side = |s: SurfaceId| geometry.surfaces[s.index()].value(&seed) > 0.0;
             found.extend(sheet_at(geometry, tree, id, &seed, &other_side)?.map(|sheet| (sheet, seed)));
         }

@@ -96,6 +96,14 @@ fn closed_surfaces_without_curves_get_a_seed() {
 }
 
 #[test]
+fn the_walls_of_a_shell_may_be_very_thin() {
+    for inner in [0.99, 0.9999, 0.999999, 0.9999999] {
+        let shell = format!("solid s = sphere (0,0,0; 1) and not sphere (0,0,0; {inner}); tlo s;");
+        assert_eq!(counts(&find(&shell)), [0, 0, 0, 2], "{inner}");
+    }
+}
+
+#[test]
 fn an_interface_is_one_patch_with_the_earlier_body_inside() {
     let features = find(&format!(
         "{CUBE} solid ball = sphere (0.5, 0.5, 0.5; 0.2); solid rest = cube and not ball; tlo rest; tlo ball;"
