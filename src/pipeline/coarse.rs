@@ -13,7 +13,7 @@ use crate::ground::size::{PeriodicSize, WatchedSize};
 use crate::mesher::improve::{self, Effort, GeometrySmoothness, Smoothness};
 use crate::mesher::model::CsgModel;
 use crate::mesher::surface::closeness::{ThinRegions, Walls, thin_regions};
-use crate::mesher::surface::curves::{CurveError, crowded, mesh_curves};
+use crate::mesher::surface::curves::{CurveError, Gap, crowded, mesh_curves};
 use crate::mesher::surface::narrow::narrow;
 use crate::mesher::surface::{self, SurfaceError, SurfaceMesh};
 use crate::mesher::volume::{self, ClosedSurface, SurfaceFaults, VolumeError};
@@ -251,6 +251,8 @@ pub(super) enum Attempt {
 pub(super) struct Allowed {
     /// A request for smaller sizes.
     pub lower: bool,
+    /// Whether no sizes were lowered so far, so that a gap is news.
+    pub first: bool,
     /// Thin regions: only in the first attempt, because each time may lower the sizes as far as the
     /// settings allow.
     pub thin: bool,
@@ -269,7 +271,7 @@ pub(super) fn corrected(
         work.proceed()?;
         budget.spend();
         let lower = corrections < CORRECTIONS && !budget.is_spent();
-        let allowed = Allowed { lower, thin: thin_regions.is_none() };
+        let allowed = Allowed { lower, first: corrections == 0, thin: thin_regions.is_none() };
         match attempt(settings, allowed) {
             Attempt::Made(mut coarse) => {
                 coarse.report.size_corrections = corrections;
@@ -291,8 +293,8 @@ pub(super) fn corrected(
 
 /// Why there is no surface mesh, or none that can be filled.
 pub(super) enum Unmeshed {
-    /// Smaller sizes are needed.
-    Lower(Vec<Source>),
+    /// Smaller sizes are needed, because of a very narrow gap if one is given.
+    Lower(Vec<Source>, Option<Gap>),
     Failed(CoarseError),
 }
 
@@ -301,14 +303,14 @@ impl Unmeshed {
     /// those on curves.
     fn of(error: CoarseError, segments: &[[Point; 2]], size: &dyn SizeField, may_lower: bool) -> Self {
         let lower = if may_lower { error.remedy(segments, size) } else { Vec::new() };
-        if lower.is_empty() { Self::Failed(error) } else { Self::Lower(lower) }
+        if lower.is_empty() { Self::Failed(error) } else { Self::Lower(lower, None) }
     }
 }
 
 impl From<Unmeshed> for Attempt {
     fn from(unmeshed: Unmeshed) -> Self {
         match unmeshed {
-            Unmeshed::Lower(sources) => Self::Lower(sources),
+            Unmeshed::Lower(sources, _) => Self::Lower(sources),
             Unmeshed::Failed(error) => Self::Failed(error),
         }
     }
@@ -324,10 +326,12 @@ pub(super) fn mesh_surface(
     size.work().step(0.0, SURFACE_SHARE, features.patches.len() as u64);
     let curves = mesh_curves(features, projector, size).map_err(|error| Unmeshed::Failed(error.into()))?;
     if may_lower {
-        let mut lower = crowded(&curves, features, size);
+        let crowded = crowded(&curves, features, size);
+        let gap = crowded.gap(features, projector, size);
+        let mut lower = crowded.sources;
         lower.extend(narrow(&curves, features, projector, size));
         if !lower.is_empty() {
-            return Err(Unmeshed::Lower(lower));
+            return Err(Unmeshed::Lower(lower, gap));
         }
     }
     let ends = |s: &Segment| s.vertices.map(|v| curves.points[v.index()]);
@@ -360,7 +364,12 @@ fn attempt(
     }
     let (surface, segments) = match mesh_surface(model, size, allowed.lower) {
         Ok(made) => made,
-        Err(unmeshed) => return unmeshed.into(),
+        Err(unmeshed) => {
+            if let (true, Unmeshed::Lower(_, Some(gap))) = (allowed.first, &unmeshed) {
+                work.note(&gap_note(model, gap, size));
+            }
+            return unmeshed.into();
+        }
     };
     let regions = |id| [features.patch(id).inside, features.patch(id).outside];
     if allowed.thin {
@@ -377,6 +386,23 @@ fn attempt(
         Ok(made) => Attempt::Made(Box::new(made)),
         Err(error) => Unmeshed::of(error, &segments, size, allowed.lower).into(),
     }
+}
+
+/// A warning of a gap that decides how many tets are around it.
+fn gap_note(model: &CsgModel, gap: &Gap, size: &dyn SizeField) -> String {
+    let [of, beside] = gap.curves.map(|curve| model.features.curve(curve).surfaces);
+    let own = |surfaces: [csg::SurfaceId; 2], other: [csg::SurfaceId; 2]| {
+        let own = surfaces.into_iter().find(|s| !other.contains(s)).unwrap_or(surfaces[0]);
+        Named::surface(&model.geometry, own)
+    };
+    let (first, second) = (own(of, beside), own(beside, of));
+    let (width, times) = (gap.width, size.size_at(&gap.at) / gap.width);
+    format!(
+        "edges of {} are only {width:.3e} apart at {}, {times:.0} times closer than the size there: this gap decides the \
+         number of tets; close or widen it if they are too many",
+        Pair(&first, &second),
+        Place(gap.at)
+    )
 }
 
 /// Fraction of the time after which the surface mesh is done, for a coarse mesh of 100,000 tets.

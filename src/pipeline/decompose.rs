@@ -265,7 +265,7 @@ fn fine_surface(model: &CsgModel, base: &dyn SizeField) -> Result<SurfaceMesh, C
                 }
                 sources.extend(unfit.into_iter().map(|point| smaller_at(point, &size)));
             }
-            Err(Unmeshed::Lower(lower)) => sources.extend(lower),
+            Err(Unmeshed::Lower(lower, _)) => sources.extend(lower),
             Err(Unmeshed::Failed(error)) => return Err(error),
         }
         corrections += 1;

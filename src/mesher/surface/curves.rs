@@ -208,7 +208,7 @@ fn turn(trace: &[Point], closed: bool) -> f64 {
 /// largest distance of chord and curve), else disjoint patches would overlap in the mesh. Each
 /// source is below the length that was used, because with steep grading a chord is longer than the
 /// size at its middle.
-pub fn crowded(mesh: &SurfaceMesh, features: &Features, size: &dyn SizeField) -> Vec<Source> {
+pub fn crowded(mesh: &SurfaceMesh, features: &Features, size: &dyn SizeField) -> Crowded {
     let sagittas = sagittas(mesh, features);
     let ends = |i: usize| mesh.segments[i].vertices.map(|v| mesh.points[v.index()]);
     // Sweep along x: the interval of each chord, extended by its clearance.
@@ -221,7 +221,7 @@ pub fn crowded(mesh: &SurfaceMesh, features: &Features, size: &dyn SizeField) ->
         .collect();
     let mut order: Vec<usize> = (0..spans.len()).collect();
     order.sort_by(|&i, &j| spans[i][0].total_cmp(&spans[j][0]).then(i.cmp(&j)));
-    let mut sources = Vec::new();
+    let mut found = Crowded::default();
     for (k, &i) in order.iter().enumerate() {
         for &j in order[k + 1..].iter().take_while(|&&j| spans[j][0] <= spans[i][1]) {
             let [s, t] = [&mesh.segments[i], &mesh.segments[j]];
@@ -233,11 +233,51 @@ pub fn crowded(mesh: &SurfaceMesh, features: &Features, size: &dyn SizeField) ->
             if is_near && !cusp::are_aligned(mesh, features, [s, t]) {
                 let [a, b] = ends(if sagittas[i] >= sagittas[j] { i } else { j });
                 let used = size.size_at(&at).min((b - a).norm());
-                sources.push(Source { point: at, size: SHORTENED * used });
+                found.sources.push(Source { point: at, size: SHORTENED * used });
+                found.pairs.push([s.curve, t.curve]);
             }
         }
     }
-    sources
+    found
+}
+
+/// Places at which segments are too long for the distance of two curves.
+#[derive(Debug, Default)]
+pub struct Crowded {
+    /// Sources that shorten them.
+    pub sources: Vec<Source>,
+    /// The two curves of each source.
+    pub pairs: Vec<[CurveId; 2]>,
+}
+
+/// A place where two curves without a common corner are very close to each other.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Gap {
+    /// The curves.
+    pub curves: [CurveId; 2],
+    /// A point between them.
+    pub at: Point,
+    /// Their distance there.
+    pub width: f64,
+}
+
+impl Crowded {
+    /// The narrowest gap below a hundredth of the size, which decides how many tets are around it.
+    pub fn gap(&self, features: &Features, projector: &Projector, size: &dyn SizeField) -> Option<Gap> {
+        /// Largest ratio of gap and size.
+        const NARROW: f64 = 0.01;
+        let meet = |curves: [CurveId; 2]| {
+            let [c, d] = curves.map(|c| features.curve(c).ends.unwrap_or([CornerId(u32::MAX); 2]));
+            curves[0] == curves[1] || c.iter().any(|end| end.0 != u32::MAX && d.contains(end))
+        };
+        let gaps = self.sources.iter().zip(&self.pairs).filter_map(|(source, &curves)| {
+            let [a, b] = curves.map(|curve| projector.project_curve(curve, &source.point));
+            let (a, b) = (a.ok()?, b.ok()?);
+            Some(Gap { curves, at: nalgebra::center(&a, &b), width: (a - b).norm() })
+        });
+        let narrow = gaps.filter(|gap| !meet(gap.curves) && gap.width < NARROW * size.size_at(&gap.at));
+        narrow.min_by(|a, b| a.width.total_cmp(&b.width))
+    }
 }
 
 /// Factor by which a chord too close to another is shortened: its sagitta falls to about a third.
@@ -342,8 +382,8 @@ mod tests {
             mesh
         };
         let long = crowded(&cut(1.0), &features, &UniformSize(0.5));
-        assert!(!long.is_empty() && long.iter().all(|source| source.size <= 0.3));
-        assert!(crowded(&cut(0.2), &features, &UniformSize(0.2)).is_empty());
+        assert!(!long.sources.is_empty() && long.sources.iter().all(|source| source.size <= 0.3));
+        assert!(crowded(&cut(0.2), &features, &UniformSize(0.2)).sources.is_empty());
     }
 
     #[test]

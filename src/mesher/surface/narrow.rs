@@ -43,14 +43,19 @@ pub fn narrow(
                 .extend(mesh.segments_of(curve).map(|segment| Side::new(mesh, projector, id, segment, sign)));
         }
         sides.sort_by(|a, b| a.low.x.total_cmp(&b.low.x));
-        for (k, a) in sides.iter().enumerate() {
-            for b in sides[k + 1..].iter().take_while(|b| b.low.x <= a.high.x) {
+        for k in 1..sides.len() {
+            let (before, after) = sides.split_at_mut(k);
+            let a = &mut before[k - 1];
+            let last = a.high.x;
+            for b in after.iter_mut().take_while(|b| b.low.x <= last) {
                 if (1..3).all(|i| a.low[i] <= b.high[i] && b.low[i] <= a.high[i]) && may_face(features, a, b)
                 {
-                    sources.extend(a.facing_sources(b, size).chain(b.facing_sources(a, size)));
+                    a.measure(b);
+                    b.measure(a);
                 }
             }
         }
+        sources.extend(sides.iter().flat_map(|side| side.sources(size)));
     }
     sources
 }
@@ -71,7 +76,13 @@ struct Side<'a> {
     /// The box of everything that may be too close.
     low: Point,
     high: Point,
+    /// The width of the band at points along the segment, as far as it has been measured.
+    widths: [f64; SAMPLES],
 }
+
+/// Number of points of a segment at which the width of the band is measured; between two it changes
+/// little.
+const SAMPLES: usize = 5;
 
 impl<'a> Side<'a> {
     /// `sign` is positive if the patch is on the left of the segment as seen against the gradient
@@ -90,28 +101,34 @@ impl<'a> Side<'a> {
         let inward = (normal.cross(&along) * sign).try_normalize(0.0).unwrap_or_default();
         let room = Vector::repeat(0.5 * length / LONG);
         let (low, high) = (ends[0].inf(&ends[1]) - room, ends[0].sup(&ends[1]) + room);
-        Self { segment, ends, length, inward, low, high }
+        Self { segment, ends, length, inward, low, high, widths: [f64::INFINITY; SAMPLES] }
     }
 
-    /// Sources along this segment where `other` faces it across a narrow band.
-    fn facing_sources<'b>(
-        &'b self,
-        other: &'b Self,
-        used: &'b dyn SizeField,
-    ) -> impl Iterator<Item = Source> + 'b {
-        /// Number of sampled intervals; within one the width of the band changes little.
-        const PARTS: u32 = 4;
+    fn samples(&self) -> [Point; SAMPLES] {
+        let way = self.ends[1] - self.ends[0];
+        std::array::from_fn(|k| self.ends[0] + way * (k as f64 / (SAMPLES - 1) as f64))
+    }
+
+    /// Measures the width of the band where `other` is on its opposite side. Of all segments there
+    /// the nearest counts.
+    fn measure(&mut self, other: &Self) {
         let [from, to] = other.ends;
         let along = to - from;
-        (0..=PARTS).filter_map(move |part| {
-            let point = self.ends[0] + (self.ends[1] - self.ends[0]) * (f64::from(part) / f64::from(PARTS));
+        for (point, width) in self.samples().iter().zip(&mut self.widths) {
             let foot = ((point - from).dot(&along) / along.norm_squared()).clamp(0.0, 1.0);
             let way = from + along * foot - point;
-            let width = way.norm();
-            let is_inside = way.dot(&self.inward) > 0.0 && way.dot(&other.inward) < 0.0;
+            if way.dot(&self.inward) > 0.0 && way.dot(&other.inward) < 0.0 {
+                *width = width.min(way.norm());
+            }
+        }
+    }
+
+    /// Sources along this segment where the band is narrow.
+    fn sources<'b>(&'b self, used: &'b dyn SizeField) -> impl Iterator<Item = Source> + 'b {
+        self.samples().into_iter().zip(self.widths).filter_map(move |(point, width)| {
             let is_narrow = LONG * width < self.length && width > NARROWEST * self.length;
             let size = || (SHORT * width).min(SHORTENED * self.length.min(used.size_at(&point)));
-            (is_inside && is_narrow).then(|| Source { point, size: size() })
+            is_narrow.then(|| Source { point, size: size() })
         })
     }
 }

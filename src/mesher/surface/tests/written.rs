@@ -121,7 +121,27 @@ tlo eccentric;",
     assert!(outer.iter().zip(&inner).all(|(p, q)| (p - q).abs() < 1e-12), "{outer:?} {inner:?}");
     // Near the cusp the chords are closer to each other than to their curves, but in order.
     let near = |source: &crate::ground::size::Source| (source.point - cusp).norm() < 0.6;
-    assert!(!crowded(&curves, &features, &size).iter().any(near));
+    assert!(!crowded(&curves, &features, &size).sources.iter().any(near));
+}
+
+#[test]
+fn a_gap_far_below_the_size_is_named() {
+    let gap = |step: f64| {
+        let (_, features, projector) = read(&format!(
+            "algebraic3d
+solid low = cylinder (0, 0, 0; 0, 0, 1; 1) and plane (0, 0, 0; 0, 0, -1) and plane (0, 0, 1; 0, 0, 1);
+solid high = cylinder (0, 0, 1; 0, 0, 2; {}) and plane (0, 0, 1; 0, 0, -1) and plane (0, 0, 2; 0, 0, 1);
+solid step = low or high;
+tlo step;",
+            1.0 + step
+        ));
+        let size = UniformSize(0.5);
+        let curves = mesh_curves(&features, &projector, &size).expect("curves");
+        crowded(&curves, &features, &size).gap(&features, &projector, &size)
+    };
+    assert_eq!(gap(0.02), None);
+    let gap = gap(1e-3).expect("a gap");
+    assert!((gap.width - 1e-3).abs() < 1e-9 && (gap.at.z - 1.0).abs() < 1e-9, "{gap:?}");
 }
 
 #[test]
@@ -135,16 +155,25 @@ solid low = orthobrick (0, 0, 0; 2, 1, 1);
 solid high = orthobrick (2.1, 0, 0; 4.1, 1, 1);
 solid blocks = low or high;
 tlo blocks;";
-    let found = |text: &str| {
+    let found_at = |text: &str, size: f64| {
         let (_, features, projector) = read(text);
-        let size = UniformSize(0.5);
+        let size = UniformSize(size);
         let curves = mesh_curves(&features, &projector, &size).expect("curves");
         narrow(&curves, &features, &projector, &size)
     };
+    let found = |text: &str| found_at(text, 0.5);
     let sources = found(disk);
     assert!(
         !sources.is_empty() && sources.iter().all(|source| (0.17..0.35).contains(&source.size)),
         "{sources:?}"
     );
     assert_eq!(found(blocks), []);
+    // A step of a thousandth of the radius: the band is too narrow, and segments that are not
+    // opposite each other are farther apart than it is wide.
+    let step = "algebraic3d
+solid low = cylinder (0, 0, 0; 0, 0, 1; 1) and plane (0, 0, 0; 0, 0, -1) and plane (0, 0, 1; 0, 0, 1);
+solid high = cylinder (0, 0, 1; 0, 0, 2; 1.001) and plane (0, 0, 1; 0, 0, -1) and plane (0, 0, 2; 0, 0, 1);
+solid step = low or high;
+tlo step;";
+    assert_eq!(found_at(step, 0.03), []);
 }
