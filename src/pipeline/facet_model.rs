@@ -132,7 +132,8 @@ impl FacetSolid {
     }
 
     fn attempt(&self, settings: &CoarseSettings, allowed: Allowed, budget: &Budget, work: &Work) -> Attempt {
-        let size = FacetSize::new(&self.model, &settings.size);
+        let sizes_of = if self.keep_surface { FacetSize::of_kept } else { FacetSize::new };
+        let size = sizes_of(&self.model, &settings.size);
         let expected = expected::tets(&self.model.bounds, &size, expected::FEW, || {
             let bodies = FacetBodies::new(&self.model);
             move |p: &Point| bodies.contain(p)
