@@ -45,7 +45,8 @@ impl FacetSize {
     /// curved or narrow places of a coarse surface could not be connected to it.
     pub fn of_kept(model: &FacetModel, settings: &SizeSettings) -> Self {
         let maximum = maximum(model, settings);
-        let tree = SourceTree::new(model.bounds, settings.grading, maximum, &thinned(settings.sources.clone()));
+        let tree =
+            SourceTree::new(model.bounds, settings.grading, maximum, &thinned(settings.sources.clone()));
         Self { tree, function: settings.function.clone() }
     }
 
