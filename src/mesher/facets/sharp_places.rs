@@ -68,7 +68,7 @@ fn wedges(model: &FacetModel) -> Vec<SharpPlace> {
                 let out = across(u.triangle, u.side);
                 let angle = out.dot(&second).atan2(out.dot(&first)).rem_euclid(TAU);
                 let patch = model.patch(model.triangles[u.triangle as usize].patch);
-                // The normal of a facet along the edge points counterclockwise: its outside is next.
+                // The normal of a facet along the edge is counterclockwise: its outside is next.
                 let next = if u.along { patch.outside } else { patch.inside };
                 (angle, next.is_some())
             })
