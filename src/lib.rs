@@ -182,7 +182,7 @@ pub mod run {
     pub use crate::pipeline::target::Outcome;
     pub use crate::pipeline::{
         CoarseReport, CoarseResult, CoarseSettings, CutCusp, CutSettings, Disk, Entities, GenerateSettings,
-        Level, Refused, Wanted, generate,
+        Level, Refused, SharpPlace, SharpPlaces, Wanted, generate,
     };
 }
 

@@ -10,6 +10,7 @@ use crate::ground::mesh::{Class, Mesh, Segment, VertexId, are_sides};
 use crate::ground::progress::{Cancelled, Work};
 use crate::ground::size::{GeometricSamples, GeometricSize, SizeField, SizeSettings, Source};
 use crate::ground::size::{PeriodicSize, WatchedSize};
+use crate::mesher::facets::SharpPlaces;
 use crate::mesher::improve::{self, Effort, GeometrySmoothness, Smoothness};
 use crate::mesher::model::CsgModel;
 use crate::mesher::surface::closeness::{ThinRegions, Walls, thin_regions};
@@ -151,6 +152,8 @@ pub struct CoarseReport {
     pub thin_regions: ThinRegions,
     /// Cusps without angle that were cut off bodies.
     pub cut_cusps: Vec<CutCusp>,
+    /// Places where the triangles of the input are sharper than 10°.
+    pub sharp_places: SharpPlaces,
 }
 
 /// A cusp without angle that was cut off bodies.

@@ -11,10 +11,10 @@ use crate::ground::kernel::simplex::volume6;
 use crate::ground::mesh::{BoundaryTriangle, Class, Label, Names, Segment, VertexId};
 use crate::ground::progress::Work;
 use crate::ground::projector::Projector;
-use crate::ground::size::{Closeness, Source, WatchedSize};
+use crate::ground::size::{Closeness, SizeSettings, Source, WatchedSize};
 use crate::mesher::facets::{
     FacetBodies, FacetError, FacetModel, FacetPatch, FacetSize, FacetSmoothness, Facets, Marks,
-    RemeshSettings, keep, remesh,
+    RemeshSettings, SharpPlaces, keep, remesh,
 };
 use crate::mesher::improve::Smoothness;
 use crate::mesher::surface::SurfaceMesh;
@@ -126,13 +126,21 @@ impl FacetSolid {
         budget: &Budget,
         work: &Work,
     ) -> Result<CoarseMesh, CoarseError> {
-        coarse::corrected(settings, budget, work, |settings, allowed| {
+        let mut coarse = coarse::corrected(settings, budget, work, |settings, allowed| {
             self.attempt(settings, allowed, budget, work)
-        })
+        })?;
+        coarse.report.sharp_places = SharpPlaces::of(&self.model);
+        Ok(coarse)
+    }
+
+    /// The size field.
+    pub(super) fn size_field(&self, settings: &SizeSettings) -> FacetSize {
+        let of = if self.keep_surface { FacetSize::of_kept } else { FacetSize::new };
+        of(&self.model, settings)
     }
 
     fn attempt(&self, settings: &CoarseSettings, allowed: Allowed, budget: &Budget, work: &Work) -> Attempt {
-        let size = FacetSize::new(&self.model, &settings.size);
+        let size = self.size_field(&settings.size);
         let expected = expected::tets(&self.model.bounds, &size, expected::FEW, || {
             let bodies = FacetBodies::new(&self.model);
             move |p: &Point| bodies.contain(p)

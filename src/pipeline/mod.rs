@@ -30,6 +30,7 @@ pub mod target;
 mod verify;
 pub mod wanted;
 
+pub use crate::mesher::facets::{SharpPlace, SharpPlaces};
 pub use coarse::{CoarseError, CoarseReport, CoarseSettings, CutCusp};
 pub use facet_model::FacetSolid;
 pub use generate::generate;

@@ -11,7 +11,6 @@ use crate::ground::mesh::{Mesh, Names};
 use crate::ground::progress::Work;
 use crate::ground::projector::Projector;
 use crate::ground::size::{GeometricSize, LEAST_SIZE, SizeField, SizeSettings};
-use crate::mesher::facets::FacetSize;
 use crate::mesher::model::CsgModel;
 use csg::{Aabb, Geometry, SurfaceId};
 
@@ -150,7 +149,7 @@ impl Model {
             Self::Csg(model) => {
                 Some(Box::new(GeometricSize::new(&model.geometry, &model.features, settings)))
             }
-            Self::Facets(solid) => Some(Box::new(FacetSize::new(&solid.model, settings))),
+            Self::Facets(solid) => Some(Box::new(solid.size_field(settings))),
             Self::Given(_) => None,
         }
     }

@@ -3,7 +3,7 @@
 use super::{Report, counted, grouped, tets, vertices};
 use std::fmt;
 use tetmill::memory::sized;
-use tetmill::run::{CoarseReport, Entities, Evened, PeriodicCheck, Refused};
+use tetmill::run::{CoarseReport, Entities, Evened, PeriodicCheck, Refused, SharpPlace};
 
 /// Writes the line about thin regions.
 fn write_thin_regions(f: &mut fmt::Formatter<'_>, coarse: &CoarseReport) -> fmt::Result {
@@ -18,6 +18,14 @@ fn write_thin_regions(f: &mut fmt::Formatter<'_>, coarse: &CoarseReport) -> fmt:
         _ => write!(f, "too thin, sizes not lowered (--closeness forces it, at the cost of many tets)")?,
     }
     writeln!(f)
+}
+
+/// Writes the line about places where the input is sharp.
+fn write_sharp_places(f: &mut fmt::Formatter<'_>, coarse: &CoarseReport) -> fmt::Result {
+    let places = &coarse.sharp_places;
+    let Some(SharpPlace { point: [x, y, z], angle, .. }) = places.sharpest.first() else { return Ok(()) };
+    let count = counted(places.count, "place", "places");
+    writeln!(f, "           the surface is sharper than 10° at {count}, {angle:.2}° at ({x}, {y}, {z})")
 }
 
 /// The subdivision of coarse edges as text.
@@ -77,7 +85,8 @@ impl Report {
             let edges = counted(coarse.curved_edges, "edge", "edges");
             writeln!(f, "           {edges} curved for better refined tets")?;
         }
-        write_thin_regions(f, coarse)
+        write_thin_regions(f, coarse)?;
+        write_sharp_places(f, coarse)
     }
 
     /// The lines `mesh`, `quality`, `by level` and `checked`.

@@ -34,6 +34,7 @@ mod remesh_tests;
 #[cfg(test)]
 mod samples;
 mod sharp;
+mod sharp_places;
 mod size;
 mod smoothness;
 #[cfg(test)]
@@ -47,5 +48,6 @@ pub use model::{FacetBody, FacetCurve, FacetModel, FacetPatch, Facets, Marks, Se
 #[cfg(test)]
 pub use remesh::deviation;
 pub use remesh::{RemeshReport, RemeshSettings, remesh};
+pub use sharp_places::{SharpPlace, SharpPlaces};
 pub use size::FacetSize;
 pub use smoothness::FacetSmoothness;

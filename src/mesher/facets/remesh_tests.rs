@@ -331,6 +331,21 @@ fn kept_facets_are_filled_as_they_are() {
     assert_eq!(mesh.points[..surface.points.len()], surface.points[..]);
 }
 
+/// Two sheets a hundredth of their facets apart, and curves of the same facets: finer tets inside
+/// than the facets are would only be slivers.
+#[test]
+fn kept_facets_get_no_finer_sizes_than_their_edges() {
+    let slab = model(&[soup(|s| s.plate_with_hole(1.0, 0.98, 0.01, 32))]);
+    let user = SizeSettings { maxh: Some(0.5), ..SizeSettings::default() };
+    let size = FacetSize::of_kept(&slab, &user);
+    let ([high, low], inside) = ([0.01, 0.0].map(|z| Point::new(0.98, 0.0, z)), Point::new(0.99, 0.0, 0.005));
+    assert_eq!([high, low, inside].map(|p| size.size_at(&p)), [0.5; 3]);
+    assert!(FacetSize::new(&slab, &user).size_at(&inside) < 0.05);
+    let surface = keep(&slab);
+    let (_, report) = volume::mesh(&closed(&slab, &surface), &size, &volume::Settings::default()).unwrap();
+    assert!(report.points_inside < surface.triangles.len(), "{report:?}");
+}
+
 #[test]
 fn facets_that_intersect_are_found_and_refused_by_the_mesher() {
     let crossed = model(&[soup(|s| {

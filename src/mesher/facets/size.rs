@@ -30,13 +30,23 @@ impl FacetSize {
     /// Samples facets and curves for sources: curvature, short curves, and curves close to each
     /// other.
     pub fn new(model: &FacetModel, settings: &SizeSettings) -> Self {
-        let bound = settings.maxh.unwrap_or(f64::INFINITY) * settings.scale.min(1.0);
-        let maximum = bound.min(model.bounds.diagonal() * settings.scale);
+        let maximum = maximum(model, settings);
         let mut sources = settings.sources.clone();
         sample_facets(model, settings, maximum, &mut sources);
         sample_curves(model, settings, maximum, &mut sources);
         close_curves::sample(model, settings, maximum, &mut sources);
         let tree = SourceTree::new(model.bounds, settings.grading, maximum, &thinned(sources));
+        Self { tree, function: settings.function.clone() }
+    }
+
+    /// The size field for facets that are kept: that of the user alone.
+    ///
+    /// The volume mesher limits sizes by the growth from the kept edges. Finer tets than those at
+    /// curved or narrow places of a coarse surface could not be connected to it.
+    pub fn of_kept(model: &FacetModel, settings: &SizeSettings) -> Self {
+        let maximum = maximum(model, settings);
+        let tree =
+            SourceTree::new(model.bounds, settings.grading, maximum, &thinned(settings.sources.clone()));
         Self { tree, function: settings.function.clone() }
     }
 
@@ -66,6 +76,12 @@ impl SizeField for FacetSize {
         let size = self.tree.size_at(point);
         self.function.as_ref().map_or(size, |function| function.bound(size, point))
     }
+}
+
+/// The size far from all sources.
+fn maximum(model: &FacetModel, settings: &SizeSettings) -> f64 {
+    let bound = settings.maxh.unwrap_or(f64::INFINITY) * settings.scale.min(1.0);
+    bound.min(model.bounds.diagonal() * settings.scale)
 }
 
 fn size_of_curvature(settings: &SizeSettings, curvature: f64) -> f64 {

@@ -25,7 +25,7 @@
 use crate::ground::kernel::simplex::ascending;
 use crate::ground::mesh::{Mesh, TET_EDGES, VertexId};
 use crate::mesher::half_face::NONE;
-use crate::mesher::improve::limits::TetLimits;
+use crate::mesher::improve::limits::{HARM, TetLimits};
 use crate::{Point, Vector};
 use csg::{CurveId, Features, Geometry, PatchId, Surface};
 use std::ops::Range;
@@ -37,6 +37,10 @@ pub trait Smoothness: Sync {
     fn normal(&self, patch: PatchId, at: &Point) -> Option<Vector>;
     /// The unit tangent of a curve at a point on it, of either sign; `None` if it has none there.
     fn tangent(&self, curve: CurveId, at: &Point) -> Option<Vector>;
+    /// Strength of the penalty for tets with corners that shrink when refined.
+    fn harm(&self) -> f64 {
+        HARM
+    }
 }
 
 /// The smoothness of the patches and curves of a geometry.
@@ -123,6 +127,8 @@ pub(super) struct Legality {
     spokes: Vec<Spoke>,
     /// The boundary triangles with two edges on one curve or on tangent curves, sorted.
     flattening: Vec<[u32; 3]>,
+    /// See [`Smoothness::harm`].
+    harm: f64,
 }
 
 /// A boundary edge from the first to the second vertex, and one entity that contains it.
@@ -154,6 +160,7 @@ impl Legality {
             ends: Vec::new(),
             spokes: Vec::new(),
             flattening: Vec::new(),
+            harm: smoothness.harm(),
         };
         for at_vertex in incidences(mesh).chunk_by(|a, b| a.0 == b.0) {
             legality.add_vertex(mesh, smoothness, at_vertex);
@@ -207,8 +214,8 @@ impl Legality {
     /// `to_block` has one entry per vertex; all are [`NONE`], before and after.
     pub fn of_block(&self, vertices: &[u32], to_block: &mut [u32]) -> Self {
         (0..).zip(vertices).for_each(|(new, &v)| to_block[v as usize] = new);
-        let mut block =
-            Self { starts: vec![0], ends: Vec::new(), spokes: Vec::new(), flattening: Vec::new() };
+        let (harm, starts) = (self.harm, vec![0]);
+        let mut block = Self { starts, ends: Vec::new(), spokes: Vec::new(), flattening: Vec::new(), harm };
         for &v in vertices {
             for k in self.spokes(v) {
                 let end = to_block[self.ends[k] as usize];
@@ -272,7 +279,7 @@ impl Legality {
             };
             planes[0] & planes[1] & planes[2] != 0 || collinear(0, 1) || collinear(1, 2) || collinear(0, 2)
         });
-        (illegal, TetLimits::new(spokes.map(|corner| corner.map(|s| s.and_then(|s| s.limit)))))
+        (illegal, TetLimits::new(spokes.map(|corner| corner.map(|s| s.and_then(|s| s.limit))), self.harm))
     }
 
     /// Whether two edges of a triangle are on curves that are tangent at their common vertex, so
