@@ -7,6 +7,7 @@ use crate::primitive::{
 };
 use crate::{CurveId, Features, Geometry, Master, PatchId, Point, Surface, SurfaceId, Vector};
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
+use std::collections::BTreeSet;
 
 /// A projection to a surface or a curve that did not converge.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
@@ -80,7 +81,7 @@ impl Projector {
         let bounds = &features.bounds;
         let largest = bounds.min.coords.amax().max(bounds.max.coords.amax());
         let rounding = f64::max(ON_SURFACE * bounds.diagonal(), COORDINATE_ROUNDING * largest);
-        let gap = GAP_ROOM * widest_gap(geometry, features);
+        let gap = GAP_ROOM * widest_gap(geometry, features, rounding);
         let masters = features.masters();
         Self {
             curve_copies: PeriodicCopy::all(&masters.curves),
@@ -195,17 +196,30 @@ impl Projector {
 /// A gap between surfaces can be wider between the points of a trace than at them by this factor.
 const GAP_ROOM: f64 = 1.25;
 
-/// The largest distance between a curve and the surfaces of its adjacent patches.
-fn widest_gap(geometry: &Geometry, features: &Features) -> f64 {
-    let gap = |curve: &crate::Curve| {
-        let beside = curve.fins.iter().map(|fin| features.patch(fin.patch).surface);
-        let widest = |s: SurfaceId| {
-            let surface = &geometry.surfaces[s.index()];
-            curve.trace.iter().map(|p| surface.distance(p)).fold(0.0, f64::max)
-        };
-        beside.map(widest).fold(0.0, f64::max)
+/// The largest distance of curves and corners from the surfaces of the adjacent patches. `rounding` is the accuracy of points on two surfaces.
+fn widest_gap(geometry: &Geometry, features: &Features, rounding: f64) -> f64 {
+    let surface = |patch: PatchId| &geometry.surfaces[features.patch(patch).surface.index()];
+    let of_curve = |curve: &crate::Curve| {
+        // Tangent surfaces with a gap: the intersection of the curve's own two surfaces is where
+        // points will be projected to, and differs from its ends.
+        let [a, b] = curve.surfaces.map(|s| &geometry.surfaces[s.index()]);
+        let between = curve.trace.windows(2).map(|pair| nalgebra::center(&pair[0], &pair[1]));
+        let between = between.filter_map(|p| project_to_both(a, b, &p, rounding).ok());
+        let points: Vec<Point> = curve.trace.iter().copied().chain(between).collect();
+        let widest = |s: &Surface| points.iter().map(|p| s.distance(p)).fold(0.0, f64::max);
+        curve.fins.iter().map(|fin| widest(surface(fin.patch))).fold(0.0, f64::max)
     };
-    features.curves.iter().map(gap).fold(0.0, f64::max)
+    let bounding: BTreeSet<SurfaceId> = features.patches.iter().map(|patch| patch.surface).collect();
+    let of_corner = |corner: &crate::Corner| {
+        let beside = corner.surfaces.iter().filter(|s| bounding.contains(s));
+        let gaps = beside.map(|s| {
+            let surface = &geometry.surfaces[s.index()];
+            surface.project(&corner.point).map_or(0.0, |foot| (foot - corner.point).norm())
+        });
+        gaps.fold(0.0, f64::max)
+    };
+    let curves = features.curves.iter().map(of_curve);
+    curves.chain(features.corners.iter().map(of_corner)).fold(0.0, f64::max)
 }
 
 /// The first point of a curve at a given distance from the start of its trace; `None` if there is
