@@ -8,6 +8,7 @@ use super::{FeatureError, Named, Place, apex};
 use crate::interval::{Cell, dot, middle, offset};
 use crate::solid::{Pruned, prune_in};
 use crate::{BodyId, Geometry, Interval, Point, Solid, Surface, SurfaceId, Vector};
+use nalgebra::Matrix3;
 use std::cell::OnceCell;
 use std::collections::BTreeMap;
 use std::iter;
@@ -385,9 +386,7 @@ fn quadratic_difference(a: &Surface, b: &Surface, factor: f64, cell: &Cell) -> I
     let (ra, rb) = (a.gradient_range(&at), b.gradient_range(&at));
     let (ha, hb) = (a.hessian(&center), b.hessian(&center) * factor);
     let bend = ha - hb;
-    // Rounding error of the entries, which are sums of few products.
-    let slack = 16.0 * f64::EPSILON * (ha.amax() + hb.amax());
-    let slack = Interval::new(-slack, slack);
+    let slack = rounding_of_difference(&ha, &hb);
     let arm = offset(cell, &center);
     let mut range = a.value_range(&at) - b.value_range(&at) * factor;
     for i in 0..3 {
@@ -414,8 +413,47 @@ pub(super) fn is_monotone(a: &Surface, b: &Surface, cell: &Cell, direction: &Vec
 /// The same as [`is_monotone`], from the ranges of the gradients in space.
 fn is_monotone_in_space(a: &Surface, b: &Surface, cell: &Cell, direction: &Vector) -> bool {
     let (u, v) = (a.gradient_range(cell), b.gradient_range(cell));
-    let cross = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
-    dot(direction, &cross).lo > 0.0
+    if dot(direction, &cross(&u, &v)).lo > 0.0 {
+        return true;
+    }
+    if !(a.is_quadric() && b.is_quadric()) {
+        return false;
+    }
+    // Quadrics that cross at a small angle: the intersection is also that of the first with the
+    // combination whose gradient at the center is smallest. Two balls have a plane in common.
+    let center = middle(cell);
+    let (ga, gb) = (a.gradient(&center), b.gradient(&center));
+    let factor = ga.dot(&gb) / gb.norm_squared();
+    if !factor.is_finite() || factor == 0.0 {
+        return false;
+    }
+    let along = dot(direction, &cross(&u, &gradient_of_difference(a, b, factor, cell))) * -factor;
+    along.lo > 0.0
+}
+
+/// The range of the gradient of `a - factor * b` over a box for two quadrics.
+fn gradient_of_difference(a: &Surface, b: &Surface, factor: f64, cell: &Cell) -> Cell {
+    let center = middle(cell);
+    let at = [0, 1, 2].map(|i| Interval::point(center[i]));
+    let (ra, rb) = (a.gradient_range(&at), b.gradient_range(&at));
+    let (ha, hb) = (a.hessian(&center), b.hessian(&center) * factor);
+    let bend = ha - hb;
+    let slack = rounding_of_difference(&ha, &hb);
+    let arm = offset(cell, &center);
+    [0, 1, 2].map(|i| {
+        let turn = |j: usize| arm[j] * (slack + Interval::point(bend[(i, j)]));
+        ra[i] - rb[i] * factor + turn(0) + turn(1) + turn(2)
+    })
+}
+
+/// The rounding error of the entries of a difference of matrices, which are sums of few products.
+fn rounding_of_difference(a: &Matrix3<f64>, b: &Matrix3<f64>) -> Interval {
+    let slack = 16.0 * f64::EPSILON * (a.amax() + b.amax());
+    Interval::new(-slack, slack)
+}
+
+fn cross(u: &Cell, v: &Cell) -> Cell {
+    [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]]
 }
 
 /// Whether the gradient of a surface is nearly constant over a box.
