@@ -110,7 +110,8 @@ fn main() {
     let (coarse, n) = (number(1, 100_000), number(2, 8));
 
     let text = std::fs::read(geometry).expect("a file");
-    let parsed = tetmill::csg::language::parse_geometry_bytes(&text, geometry).expect("a geometry");
+    let parsed = tetmill::csg::language::parse_geometry_bytes(&text, geometry, &Default::default())
+        .expect("a geometry");
     let model = Model::from_csg(parsed.geometry).expect("features");
     let start = Instant::now();
     let mesh = coarse_mesh(&model, coarse.into());

@@ -126,7 +126,8 @@ fn reading(input: &InputOptions, size: &SizeOptions) -> Outputs {
 
 /// Reads the input and prints its notes.
 fn read_geometry(options: &InputOptions, progress: &Progress) -> Result<Geometry, Failure> {
-    let mut settings = InputSettings { keep_surface: options.keep_surface, ..InputSettings::default() };
+    let InputOptions { keep_surface, merge, .. } = *options;
+    let mut settings = InputSettings { keep_surface, merge, ..InputSettings::default() };
     if let Some(degrees) = options.feature_angle {
         settings.facets.feature_angle = degrees.to_radians();
     }

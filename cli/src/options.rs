@@ -105,6 +105,10 @@ pub struct InputOptions {
     /// Keep the triangles of input surfaces; by default they are remeshed
     #[arg(long)]
     pub keep_surface: bool,
+    /// Take surfaces of a .geo file that are of one kind and at most this far apart as one surface
+    /// (length) [default: 1e-8 of the size of the geometry]
+    #[arg(long, value_name = "LENGTH", value_parser = positive)]
+    pub merge: Option<f64>,
     /// Angle between facets that separates two patches of an input surface (degrees) [default: 40]
     #[arg(long, value_name = "DEGREES", value_parser = angle)]
     pub feature_angle: Option<f64>,

@@ -154,6 +154,9 @@ pub enum InputError {
     /// Several files, of which at least one is not a surface.
     #[error("several files are taken together only if all of them are surfaces")]
     SeveralFiles,
+    /// A length to merge surfaces is given for a file without analytic surfaces.
+    #[error("{}: only surfaces of .geo files can be merged", .0.display())]
+    MergesOnlyCsg(PathBuf),
     /// Two files share a face, but not its triangles.
     #[error(
         "{} and {} overlap at ({}, {}, {}): where surfaces touch, both need the same triangles, and no option makes them \

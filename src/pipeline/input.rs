@@ -42,8 +42,11 @@ pub fn read(
 ) -> Result<Model, Error> {
     refuse_missing(paths)?;
     let kinds = paths.iter().map(|path| kind(path.as_ref())).collect::<Result<Vec<_>, _>>()?;
+    if let (Some(_), Some(other)) = (settings.merge, kinds.iter().position(|kind| *kind != Kind::Csg)) {
+        return Err(InputError::MergesOnlyCsg(paths[other].as_ref().to_path_buf()).into());
+    }
     match (kinds.as_slice(), paths) {
-        ([Kind::Csg], [path]) => read_csg(path.as_ref(), note),
+        ([Kind::Csg], [path]) => read_csg(path.as_ref(), settings, note),
         ([Kind::Mesh], [path]) => read_mesh(path.as_ref(), note),
         (kinds, _) if !kinds.is_empty() && kinds.iter().all(|kind| *kind == Kind::Surface) => {
             FacetSolid::read(paths, settings, note).map(|solid| Model::Facets(Box::new(solid)))
@@ -68,9 +71,10 @@ pub fn read_bytes(path: &Path) -> Result<Vec<u8>, ReadError> {
     std::fs::read(path).map_err(ReadError::io(path))
 }
 
-fn read_csg(path: &Path, note: &mut dyn FnMut(&str)) -> Result<Model, Error> {
+fn read_csg(path: &Path, settings: &InputSettings, note: &mut dyn FnMut(&str)) -> Result<Model, Error> {
     let bytes = read_bytes(path)?;
-    let parsed = csg::language::parse_geometry_bytes(&bytes, &path.display().to_string())?;
+    let settings = csg::language::Settings { merge: settings.merge.unwrap_or_default() };
+    let parsed = csg::language::parse_geometry_bytes(&bytes, &path.display().to_string(), &settings)?;
     parsed.warnings.iter().for_each(|warning| note(&warning.to_string()));
     let model = Model::from_csg(parsed.geometry)
         .map_err(|error| Error::Features { path: Some(path.to_path_buf()), error: Box::new(error) })?;

@@ -193,7 +193,8 @@ pub(super) fn refuse_impossible_input(settings: &InputSettings) -> Result<(), Re
     not_negative("least_angle", least_angle)?;
     not_negative("corner_angle", corner_angle)?;
     not_negative("tip_angle", tip_angle)?;
-    not_negative("shortest_end", shortest_end)
+    not_negative("shortest_end", shortest_end)?;
+    settings.merge.map_or(Ok(()), |merge| not_negative("merge", merge))
 }
 
 #[cfg(test)]

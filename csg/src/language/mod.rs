@@ -48,15 +48,35 @@ pub struct Parsed {
     pub warnings: Vec<Diagnostic>,
 }
 
+/// How a geometry is read.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Settings {
+    /// Surfaces of one kind are taken as one if they are at most this far apart (length). At least
+    /// 10⁻⁸ of the size of the geometry counts.
+    pub merge: f64,
+}
+
 /// Reads a geometry; `file_name` is used in messages only.
 ///
 /// # Errors
 /// All diagnostics, including warnings, if one of them is an error, or if the file contains
 /// something that cannot be meshed yet ([`Kind::Unsupported`]).
 pub fn parse_geometry(source: &str, file_name: &str) -> Result<Parsed, Diagnostics> {
+    parse_geometry_with(source, file_name, &Settings::default())
+}
+
+/// [`parse_geometry`] with settings.
+///
+/// # Errors
+/// As for [`parse_geometry`].
+pub fn parse_geometry_with(
+    source: &str,
+    file_name: &str,
+    settings: &Settings,
+) -> Result<Parsed, Diagnostics> {
     let mut report = Report::default();
     let statements = parse::parse(source, &mut report);
-    let mut geometry = lower::lower(&statements, &mut report);
+    let mut geometry = lower::lower(&statements, settings, &mut report);
     crate::features::find_seams(&mut geometry);
     let failed = report.has_errors();
     let messages = report.finish(source, file_name);
@@ -67,8 +87,12 @@ pub fn parse_geometry(source: &str, file_name: &str) -> Result<Parsed, Diagnosti
 ///
 /// # Errors
 /// As for [`parse_geometry`]. Outside comments, bytes that are not UTF-8 are unknown characters.
-pub fn parse_geometry_bytes(source: &[u8], file_name: &str) -> Result<Parsed, Diagnostics> {
-    parse_geometry(&String::from_utf8_lossy(source), file_name)
+pub fn parse_geometry_bytes(
+    source: &[u8],
+    file_name: &str,
+    settings: &Settings,
+) -> Result<Parsed, Diagnostics> {
+    parse_geometry_with(&String::from_utf8_lossy(source), file_name, settings)
 }
 
 #[cfg(test)]

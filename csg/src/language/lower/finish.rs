@@ -13,8 +13,9 @@ use crate::geometry::{
 use crate::{Geometry, Seam, Solid, SurfaceId};
 
 impl Lowering<'_> {
-    /// The geometry; meaningless if there are errors in the report.
-    pub(super) fn finish(mut self) -> Geometry {
+    /// The geometry; meaningless if there are errors in the report. Surfaces within `merge` (length)
+    /// are taken as one.
+    pub(super) fn finish(mut self, merge: f64) -> Geometry {
         if self.tlos.is_empty() && !self.report.has_errors() {
             let message = "there is no top-level object, hence nothing to mesh";
             self.report.meaning(Span { line: 1, column: 1 }, message, "write `tlo NAME;` for a solid");
@@ -23,7 +24,8 @@ impl Lowering<'_> {
         if self.report.has_errors() {
             return Geometry::default();
         }
-        let classes = Classes::find(&self.forest.surfaces, &used);
+        let classes = Classes::find(&self.forest.surfaces, &used, merge);
+        self.warn_of_gaps(&classes);
         self.warn_of_lost_numbers(&classes, &used);
         let (bodies, cutouts) = self.top_level_objects(&classes);
         self.warn_of_idle_cutouts(&bodies, &cutouts);
@@ -209,6 +211,22 @@ impl Lowering<'_> {
             overrides.push(BoundaryOverride { surfaces, body: BodyId::new(body), label, span });
         }
         overrides
+    }
+
+    /// Warns of surfaces that were taken as one although they are apart, once per pair of solids.
+    fn warn_of_gaps(&mut self, classes: &Classes) {
+        let mut warned = BTreeSet::new();
+        for &(i, gap) in classes.gaps() {
+            let [first, own] = [classes.first(i), i].map(|i| &self.forest.surfaces[i].info);
+            if warned.insert((first.solid.clone(), own.solid.clone())) {
+                let (line, span) = (first.span.line, own.span);
+                let message = format!(
+                    "a surface of `{}` is {gap:.1e} from one of `{}` (line {line}): both are taken as one",
+                    own.solid, first.solid
+                );
+                self.report.warn(span, message, "move one of them further away if both are meant");
+            }
+        }
     }
 
     /// Warns of boundary numbers and names without effect, because the surface belongs to an

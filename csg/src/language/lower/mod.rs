@@ -23,6 +23,7 @@ mod unify;
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use super::Settings;
 use super::ast::{Name, Statement};
 use super::diagnostic::{Report, Reported};
 use super::suggest::did_you_mean;
@@ -31,7 +32,11 @@ use crate::geometry::{Aabb, Body, BoundaryLabel, Cutout, Span, UserPoint};
 use forest::Forest;
 
 /// Lowers statements; the geometry is complete if `report` has no errors.
-pub(super) fn lower<'r>(statements: &'r [Statement], report: &'r mut Report) -> Geometry {
+pub(super) fn lower<'r>(
+    statements: &'r [Statement],
+    settings: &Settings,
+    report: &'r mut Report,
+) -> Geometry {
     let mut lowering = Lowering {
         report,
         solid_names: statements.iter().filter_map(Statement::solid_name).collect(),
@@ -51,7 +56,7 @@ pub(super) fn lower<'r>(statements: &'r [Statement], report: &'r mut Report) -> 
         // Errors are in the report; continue to find further ones.
         let _: Result<(), Reported> = lowering.statement(statement);
     }
-    lowering.finish()
+    lowering.finish(settings.merge)
 }
 
 /// State of the lowering after the statements so far.

@@ -17,6 +17,10 @@ use crate::{Point, Surface, SurfaceId, Vector};
 /// same factor, but with the size of `boundingbox`, which is 1100 by default.
 const EQUAL_SURFACES: f64 = 1e-8;
 
+/// Surfaces that are taken as one are told if they are more than this fraction of the size of the
+/// geometry apart: decimals with ten digits are not.
+const TOLD: f64 = 1e-10;
+
 /// Upper bound of the angle between surfaces that [`Surface::same_as`] considers equal, with a
 /// margin.
 const LARGEST_ANGLE: f64 = 1e-4;
@@ -26,14 +30,17 @@ const LARGEST_ANGLE: f64 = 1e-4;
 pub(super) struct Classes {
     /// For each raw surface, the first equal one and whether it has the opposite inside.
     first: Vec<(usize, bool)>,
+    /// Used raw surfaces that are apart from the first equal one, and by how much (length).
+    gaps: Vec<(usize, f64)>,
     /// The ids of the representatives that are used by bodies, ascending.
     ids: BTreeMap<usize, SurfaceId>,
 }
 
 impl Classes {
-    /// Finds equal surfaces in `raw`; `used` are the indices used by bodies.
-    pub fn find(raw: &[RawSurface], used: &BTreeSet<usize>) -> Self {
-        let place = Place::of(used.iter().filter_map(|&i| raw[i].surface.as_ref()));
+    /// Finds equal surfaces in `raw`; `used` are the indices used by bodies. Surfaces within `merge`
+    /// (length) are equal in any case.
+    pub fn find(raw: &[RawSurface], used: &BTreeSet<usize>, merge: f64) -> Self {
+        let place = Place::of(used.iter().filter_map(|&i| raw[i].surface.as_ref()), merge);
         let mut cells: HashMap<Cell, Vec<usize>> = HashMap::new();
         let mut first = Vec::with_capacity(raw.len());
         for (i, RawSurface { surface, .. }) in raw.iter().enumerate() {
@@ -45,7 +52,7 @@ impl Classes {
             let near = cell.with_neighbors();
             let near = near.iter().filter_map(|cell| cells.get(cell)).flatten();
             let equal = |&j: &usize| {
-                let same_side = surface.same_as(raw[j].surface.as_ref()?, place.tolerance())?;
+                let same_side = surface.same_as(raw[j].surface.as_ref()?, place.tolerance)?;
                 Some((j, !same_side))
             };
             let representative = near.filter_map(equal).min();
@@ -56,7 +63,13 @@ impl Classes {
         }
         let firsts: BTreeSet<usize> = used.iter().map(|&i| first[i].0).collect();
         let ids = firsts.into_iter().enumerate().map(|(id, i)| (i, SurfaceId::new(id))).collect();
-        Self { first, ids }
+        let gaps = used.iter().filter_map(|&i| Some((i, place.gap(raw, [i, first[i].0])?))).collect();
+        Self { first, gaps, ids }
+    }
+
+    /// Raw surfaces that were taken as one with another although they are apart, and by how much.
+    pub fn gaps(&self) -> &[(usize, f64)] {
+        &self.gaps
     }
 
     /// The representative of the raw surface at `index`, and whether its orientation is opposite.
@@ -103,10 +116,12 @@ impl Classes {
 struct Place {
     center: Point,
     size: f64,
+    /// Largest distance between equal surfaces, a length.
+    tolerance: f64,
 }
 
 impl Place {
-    fn of<'a>(surfaces: impl Iterator<Item = &'a Surface>) -> Self {
+    fn of<'a>(surfaces: impl Iterator<Item = &'a Surface>, merge: f64) -> Self {
         let mut min = Vector::repeat(f64::INFINITY);
         let mut max = -min;
         for (point, radius) in surfaces.map(anchor) {
@@ -116,11 +131,26 @@ impl Place {
         if min.x > max.x {
             (min, max) = (Vector::zeros(), Vector::zeros());
         }
-        Self { center: Point::from((min + max) / 2.0), size: (max - min).norm() }
+        let size = (max - min).norm();
+        Self { center: Point::from((min + max) / 2.0), size, tolerance: merge.max(EQUAL_SURFACES * size) }
     }
 
-    fn tolerance(&self) -> f64 {
-        EQUAL_SURFACES * self.size
+    /// How far two equal surfaces are apart (length), to three digits; `None` if that is rounding.
+    fn gap(&self, raw: &[RawSurface], pair: [usize; 2]) -> Option<f64> {
+        /// Halvings of an interval that spans a factor of 10¹⁶.
+        const STEPS: usize = 20;
+        let [a, b] = pair.map(|i| raw[i].surface.as_ref());
+        let (a, b) = (a?, b?);
+        let least = TOLD * self.size;
+        if pair[0] == pair[1] || a.same_as(b, least).is_some() {
+            return None;
+        }
+        let (mut low, mut high) = (least, self.tolerance);
+        for _ in 0..STEPS {
+            let middle = (low * high).sqrt();
+            *(if a.same_as(b, middle).is_some() { &mut high } else { &mut low }) = middle;
+        }
+        Some(high)
     }
 
     /// The hash cell of a surface; equal surfaces are in the same or in adjacent cells.
@@ -144,7 +174,7 @@ impl Place {
             Surface::Revolved(r) => (6, r.point + r.axis * r.profile.center[1]),
             Surface::Sweep(s) => (7, s.center),
         };
-        let width = (4.0 * (EQUAL_SURFACES + LARGEST_ANGLE) * self.size).max(f64::MIN_POSITIVE);
+        let width = (4.0 * (self.tolerance + LARGEST_ANGLE * self.size)).max(f64::MIN_POSITIVE);
         // Arbitrary directions that rarely map points of a regular grid to the same value.
         let directions = [Vector::new(0.618, 0.414, 0.666), Vector::new(-0.532, 0.771, 0.351)];
         let place = directions.map(|d| ((point - self.center).dot(&d) / width).floor() as i64);

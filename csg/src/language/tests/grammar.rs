@@ -148,9 +148,13 @@ fn other_errors_beside_unsupported_ones_are_errors() {
 #[test]
 fn comments_may_have_any_encoding() {
     let source = b"algebraic3d # W\xfcrfel\nsolid a = sphere (0,0,0; 1); tlo a; # \xff\xfe";
-    assert!(parse_geometry_bytes(source, "t.geo").unwrap().warnings.is_empty());
-    let errors =
-        parse_geometry_bytes(b"algebraic3d\nsolid W\xfcrfel = sphere (0,0,0; 1);", "t.geo").unwrap_err();
+    assert!(parse_geometry_bytes(source, "t.geo", &Settings::default()).unwrap().warnings.is_empty());
+    let errors = parse_geometry_bytes(
+        b"algebraic3d\nsolid W\xfcrfel = sphere (0,0,0; 1);",
+        "t.geo",
+        &Settings::default(),
+    )
+    .unwrap_err();
     assert!(errors.to_string().contains("not UTF-8"), "{errors}");
 }
 

@@ -17,7 +17,7 @@ fn folder() -> Option<PathBuf> {
 
 fn read(name: &str) -> Option<Result<Parsed, Diagnostics>> {
     let source = std::fs::read(folder()?.join(name)).expect(name);
-    Some(parse_geometry_bytes(&source, name))
+    Some(parse_geometry_bytes(&source, name, &Settings::default()))
 }
 
 /// Numbers of surfaces and bodies of each tutorial, counted by hand.
