@@ -9,7 +9,7 @@
 use super::bounds::split;
 use super::neighborhood::Tolerances;
 use super::octree::{Leaf, Octree, can_meet, is_monotone};
-use super::trace::{Trace, Tracer};
+use super::trace::{Trace, Tracer, step_box};
 use crate::interval::{Cell, dot, middle};
 use crate::project::project_to_both;
 use crate::{Geometry, Interval, Point, Surface, SurfaceId, Vector};
@@ -36,10 +36,18 @@ const ROOMS: [f64; 4] = [0.5, 0.2, 0.08, 0.03];
 /// leaves along an extrusion path would be split into a hundred parts.
 const FINE: f64 = 0.01;
 
+/// Number of consecutive chords with a common box: a trace beside a contact may have ten thousand,
+/// and as many leaves around it.
+const RUN: usize = 64;
+
 /// A trace with its steps refined to shorter chords.
 struct RefinedTrace {
     trace: Trace,
+    /// The box of each run of steps.
+    step_boxes: Vec<Cell>,
     chords: Vec<Chord>,
+    /// The box of the curve along each run of chords.
+    chord_boxes: Vec<Cell>,
 }
 
 /// A chord of a curve.
@@ -105,12 +113,11 @@ fn search(
             continue;
         }
         let seed = project_to_both(a, b, &middle(&part), tolerances.exact).ok().filter(is_here);
-        if let Some(seed) = seed.filter(|seed| !of_pair.iter().any(|&t| all[t].trace.passes(seed))) {
+        if let Some(seed) = seed.filter(|seed| !of_pair.iter().any(|&t| all[t].passes(seed))) {
             let trace = Tracer::new(geometry, tree, pair, tolerances).trace(&seed);
             // A trace with one point is a contact from which no step continues.
             if trace.points.len() > 1 {
-                let chord = |ends: &[Point]| Chord::new([a, b], [ends[0], ends[1]], tolerances);
-                let mut known = RefinedTrace { chords: trace.points.windows(2).map(chord).collect(), trace };
+                let mut known = RefinedTrace::new(trace, [a, b], tolerances);
                 known.refine([a, b], &leaf.cell, tolerances);
                 cover(&known, &cell, &direction, &mut covered);
                 of_pair.push(all.len());
@@ -133,6 +140,12 @@ impl Chord {
         Self { ends, middle: on, sagitta }
     }
 
+    /// The box of the curve.
+    fn bounds(&self) -> Cell {
+        let [from, to] = self.ends;
+        [0, 1, 2].map(|i| Interval::new(from[i].min(to[i]) - self.sagitta, from[i].max(to[i]) + self.sagitta))
+    }
+
     /// The point at which to bisect the chord for a cell, if the chord is near and still too
     /// coarse.
     fn cut_for(&self, cell: &Cell) -> Option<Point> {
@@ -143,9 +156,31 @@ impl Chord {
 }
 
 impl RefinedTrace {
+    fn new(trace: Trace, pair: [&Surface; 2], tolerances: &Tolerances) -> Self {
+        let steps: Vec<[Point; 2]> = trace.points.windows(2).map(|ends| [ends[0], ends[1]]).collect();
+        let step_boxes = boxes_of_runs(&steps, |[from, to]| step_box(from, to));
+        let chords: Vec<Chord> = steps.into_iter().map(|ends| Chord::new(pair, ends, tolerances)).collect();
+        Self { trace, step_boxes, chord_boxes: boxes_of_runs(&chords, Chord::bounds), chords }
+    }
+
+    /// Whether a point of the intersection of both surfaces lies on this trace.
+    fn passes(&self, point: &Point) -> bool {
+        let is_in = |cell: &Cell| (0..3).all(|i| cell[i].contains(point[i]));
+        let near = self.step_boxes.iter().enumerate().filter(|(_, cell)| is_in(cell));
+        near.map(|(run, _)| run).any(|run| self.trace.passes(run * RUN..(run + 1) * RUN, point))
+    }
+
+    /// The chords that may be in a cell.
+    fn chords_near(&self, cell: &Cell) -> impl Iterator<Item = &Chord> {
+        let meets = |(_, other): &(&[Chord], &Cell)| {
+            (0..3).all(|i| other[i].lo <= cell[i].hi && cell[i].lo <= other[i].hi)
+        };
+        self.chords.chunks(RUN).zip(&self.chord_boxes).filter(meets).flat_map(|(run, _)| run)
+    }
+
     /// Bisects the chords near a cell until they are fine enough.
     fn refine(&mut self, pair: [&Surface; 2], cell: &Cell, tolerances: &Tolerances) {
-        if !self.chords.iter().any(|chord| chord.cut_for(cell).is_some()) {
+        if !self.chords_near(cell).any(|chord| chord.cut_for(cell).is_some()) {
             return;
         }
         let mut open = std::mem::take(&mut self.chords);
@@ -160,7 +195,15 @@ impl RefinedTrace {
                 None => self.chords.push(chord),
             }
         }
+        self.chord_boxes = boxes_of_runs(&self.chords, Chord::bounds);
     }
+}
+
+/// The box of each run of items.
+fn boxes_of_runs<T>(items: &[T], bounds: impl Fn(&T) -> Cell) -> Vec<Cell> {
+    let hull =
+        |a: Cell, b: Cell| [0, 1, 2].map(|i| Interval::new(a[i].lo.min(b[i].lo), a[i].hi.max(b[i].hi)));
+    items.chunks(RUN).filter_map(|run| run.iter().map(&bounds).reduce(hull)).collect()
 }
 
 /// A cell enlarged by a fraction of its sides on each side.
@@ -175,7 +218,7 @@ fn slab(cell: &Cell, direction: &Vector) -> Interval {
 
 /// Adds the slabs that a trace covers in a cell along a direction, and merges adjacent ones.
 fn cover(known: &RefinedTrace, cell: &Cell, direction: &Vector, covered: &mut Vec<Interval>) {
-    for chord in &known.chords {
+    for chord in known.chords_near(cell) {
         if let Some([from, to]) = chord_in(&chord.ends, cell, chord.sagitta) {
             let [x, y] = [from, to].map(|p| p.coords.dot(direction));
             covered.push(Interval::new(x.min(y), x.max(y)));

@@ -6,6 +6,7 @@ use super::octree::{Octree, is_monotone};
 use crate::interval::Cell;
 use crate::project::{project_to_both, shortest_step};
 use crate::{Curve, Geometry, Interval, Point, Surface, SurfaceId, Vector};
+use std::ops::Range;
 
 /// A piece of the intersection curve of two surfaces.
 #[derive(Clone, Debug)]
@@ -35,12 +36,13 @@ const MOST_POINTS: usize = 1_000_000;
 const NEAR_BRANCH: f64 = 1e-2;
 
 impl Trace {
-    /// Whether a point of the intersection of both surfaces lies on this trace.
+    /// Whether a point of the intersection of both surfaces lies on one of some steps.
     ///
     /// In the box of a step, the curve has at most one point on each plane perpendicular to the
     /// step (see [`is_monotone`]).
-    pub fn passes(&self, point: &Point) -> bool {
-        self.points.windows(2).any(|ends| along(ends, point).is_some())
+    pub fn passes(&self, steps: Range<usize>, point: &Point) -> bool {
+        let points = &self.points[steps.start..self.points.len().min(steps.end + 1)];
+        points.windows(2).any(|ends| along(ends, point).is_some())
     }
 
     /// The point at a position (step index plus fraction), on the chord of the step.
