@@ -161,6 +161,7 @@ pub mod error {
     pub use crate::parallel::repartition::RepartitionError;
     pub use crate::parallel::skin::FillError;
     pub use crate::pipeline::CoarseError;
+    pub use crate::pipeline::close::TooClose;
     pub use crate::pipeline::error::{Error, InputError, InvalidMesh, RequestError};
     pub use crate::pipeline::room_error::RoomError;
     pub use csg::FeatureError;

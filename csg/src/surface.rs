@@ -1,7 +1,7 @@
 //! Implicit surfaces: value, derivatives, projection, and ranges over boxes.
 
 use crate::interval::{Cell, middle, offset};
-use crate::primitive::quadric::polish;
+use crate::primitive::quadric::{extremes, polish};
 use crate::primitive::{
     Cone, Cylinder, Ellipsoid, EllipticCone, EllipticCylinder, Nappe, Plane, Primitive, Revolved, Sphere,
     Sweep, Torus, same,
@@ -103,6 +103,16 @@ impl Surface {
     /// The largest absolute principal curvature at a point on or near the surface, 1/length.
     pub fn curvature(&self, point: &Point) -> f64 {
         dispatch!(self, p => p.curvature(point))
+    }
+
+    /// The largest curvature of a normal section at a point on the surface whose center of curvature
+    /// is on the side of `direction`, 1/length; 0 if the surface bends to the other side only.
+    pub fn curvature_towards(&self, point: &Point, direction: &Vector) -> f64 {
+        let gradient = self.gradient(point);
+        let Some(normal) = gradient.try_normalize(0.0) else { return 0.0 };
+        // The height over the tangent plane is minus one half of this form.
+        let [least, most] = extremes(&(self.hessian(point) / gradient.norm()), &normal);
+        if normal.dot(direction) < 0.0 { most.max(0.0) } else { (-least).max(0.0) }
     }
 
     /// The nearest point of the surface.

@@ -1,5 +1,6 @@
 //! Makes one classified, refinable tetrahedral mesh of a geometry, on one rank.
 
+use super::close::{self, CloseSurfaces, TooClose};
 use super::expected;
 use super::retries::{Budget, CORRECTIONS};
 use super::room_error::RoomError;
@@ -14,7 +15,7 @@ use crate::mesher::facets::SharpPlaces;
 use crate::mesher::improve::{self, Effort, GeometrySmoothness, Smoothness};
 use crate::mesher::model::CsgModel;
 use crate::mesher::surface::closeness::{ThinRegions, Walls, thin_regions};
-use crate::mesher::surface::curves::{CurveError, Gap, crowded, mesh_curves};
+use crate::mesher::surface::curves::{CurveError, crowded, mesh_curves};
 use crate::mesher::surface::narrow::narrow;
 use crate::mesher::surface::{self, SurfaceError, SurfaceMesh};
 use crate::mesher::volume::{self, ClosedSurface, SurfaceFaults, VolumeError};
@@ -45,6 +46,9 @@ pub enum CoarseError {
         /// Where the curves are too close.
         place: Place,
     },
+    /// Surfaces are so close to each other that only very small elements keep them apart.
+    #[error(transparent)]
+    TooClose(#[from] TooClose),
     /// The surface mesh does not bound the bodies.
     #[error(
         "the surface mesh does not bound the bodies: {faults}; surfaces may touch there, or leave too thin a wall: move one of them"
@@ -90,7 +94,7 @@ impl From<VolumeError> for CoarseError {
 impl HasKind for CoarseError {
     fn kind(&self) -> ErrorKind {
         match self {
-            Self::FacetsMeet { .. } => ErrorKind::Input,
+            Self::TooClose(_) | Self::FacetsMeet { .. } => ErrorKind::Input,
             Self::Room(_) => ErrorKind::Resources,
             Self::Cancelled(_) => ErrorKind::Cancelled,
             _ => ErrorKind::NoMesh,
@@ -110,11 +114,16 @@ impl CoarseError {
                 };
                 long.iter().map(shorter).collect()
             }
+            _ => self.places().iter().map(|&point| smaller_at(point, size)).collect(),
+        }
+    }
+
+    /// Places where surfaces are too close to each other for the sizes.
+    fn places(&self) -> &[Point] {
+        match self {
             Self::NotClosed { crossing: places, .. }
-            | Self::Volume(VolumeError::NotRecovered { places, .. }) => {
-                places.iter().map(|&point| smaller_at(point, size)).collect()
-            }
-            _ => Vec::new(),
+            | Self::Volume(VolumeError::NotRecovered { places, .. }) => places,
+            _ => &[],
         }
     }
 }
@@ -232,8 +241,12 @@ pub fn mesh(
     work: &Work,
 ) -> Result<CoarseMesh, CoarseError> {
     let samples = GeometricSamples::new(&model.geometry, &model.features, &settings.size);
+    let initial = GeometricSize::of_samples(&model.geometry, &model.features, &settings.size, &samples);
+    if let Some(warning) = close::warning(model, &samples) {
+        work.note(&warning);
+    }
     let mut coarse = corrected(settings, budget, work, |settings, allowed| {
-        attempt(model, &samples, settings, allowed, (budget, work))
+        attempt(model, (&samples, &initial), settings, allowed, (budget, work))
     })?;
     coarse.report.cut_cusps = CutCusp::of(model);
     Ok(coarse)
@@ -297,7 +310,7 @@ pub(super) fn corrected(
 /// Why there is no surface mesh, or none that can be filled.
 pub(super) enum Unmeshed {
     /// Smaller sizes are needed, because of a very narrow gap if one is given.
-    Lower(Vec<Source>, Option<Gap>),
+    Lower(Vec<Source>, Option<CloseSurfaces>),
     Failed(CoarseError),
 }
 
@@ -319,20 +332,31 @@ impl From<Unmeshed> for Attempt {
     }
 }
 
+/// The sizes of an attempt.
+#[derive(Clone, Copy)]
+pub(super) struct Sizes<'a> {
+    pub size: &'a dyn SizeField,
+    /// The same without corrections.
+    pub initial: &'a dyn SizeField,
+}
+
 /// Meshes the surface of a geometry; also returns the ends of the segments on its curves.
 pub(super) fn mesh_surface(
     model: &CsgModel,
-    size: &dyn SizeField,
+    sizes: Sizes,
     may_lower: bool,
 ) -> Result<(SurfaceMesh, Vec<[Point; 2]>), Unmeshed> {
     let CsgModel { geometry, features, projector, .. } = model;
+    let Sizes { size, initial } = sizes;
     size.work().step(0.0, SURFACE_SHARE, features.patches.len() as u64);
     let curves = mesh_curves(features, projector, size).map_err(|error| Unmeshed::Failed(error.into()))?;
     if may_lower {
         let crowded = crowded(&curves, features, size);
-        let gap = crowded.gap(features, projector, size);
-        let mut lower = crowded.sources;
-        lower.extend(narrow(&curves, features, projector, size));
+        let gap = crowded.gap(features, projector);
+        let gap = gap.map(|gap| CloseSurfaces::of_edges(model, &gap, initial)).transpose();
+        let gap = gap.map_err(|error| Unmeshed::Failed(error.into()))?;
+        let mut lower: Vec<Source> = crowded.places.into_iter().map(|place| place.source).collect();
+        lower.extend(narrow(&curves, features, projector, [size, initial]));
         if !lower.is_empty() {
             return Err(Unmeshed::Lower(lower, gap));
         }
@@ -351,7 +375,7 @@ pub(super) fn mesh_surface(
 
 fn attempt(
     model: &CsgModel,
-    samples: &GeometricSamples,
+    (samples, initial): (&GeometricSamples, &dyn SizeField),
     settings: &CoarseSettings,
     allowed: Allowed,
     (budget, work): (&Budget, &Work),
@@ -365,14 +389,15 @@ fn attempt(
     if let Err(error) = budget.expect(expected, work) {
         return Attempt::Failed(error.into());
     }
-    let (surface, segments) = match mesh_surface(model, size, allowed.lower) {
+    let (surface, segments) = match mesh_surface(model, Sizes { size, initial }, allowed.lower) {
         Ok(made) => made,
-        Err(unmeshed) => {
-            if let (true, Unmeshed::Lower(_, Some(gap))) = (allowed.first, &unmeshed) {
-                work.note(&gap_note(model, gap, size));
+        Err(Unmeshed::Lower(sources, gap)) => {
+            if let (true, Some(gap)) = (allowed.first, gap) {
+                gap.warn(work);
             }
-            return unmeshed.into();
+            return Attempt::Lower(sources);
         }
+        Err(Unmeshed::Failed(error)) => return Attempt::Failed(error),
     };
     let regions = |id| [features.patch(id).inside, features.patch(id).outside];
     if allowed.thin {
@@ -387,25 +412,11 @@ fn attempt(
     let smoothness = GeometrySmoothness { geometry, features };
     match fill(surface, regions, size, Some(&smoothness), settings.effort) {
         Ok(made) => Attempt::Made(Box::new(made)),
-        Err(error) => Unmeshed::of(error, &segments, size, allowed.lower).into(),
+        Err(error) => match CloseSurfaces::unresolved(model, samples, error.places()) {
+            Some(walls) => Attempt::Failed(TooClose::new(walls).into()),
+            None => Unmeshed::of(error, &segments, size, allowed.lower).into(),
+        },
     }
-}
-
-/// A warning of a gap that decides how many tets are around it.
-fn gap_note(model: &CsgModel, gap: &Gap, size: &dyn SizeField) -> String {
-    let [of, beside] = gap.curves.map(|curve| model.features.curve(curve).surfaces);
-    let own = |surfaces: [csg::SurfaceId; 2], other: [csg::SurfaceId; 2]| {
-        let own = surfaces.into_iter().find(|s| !other.contains(s)).unwrap_or(surfaces[0]);
-        Named::surface(&model.geometry, own)
-    };
-    let (first, second) = (own(of, beside), own(beside, of));
-    let (width, times) = (gap.width, size.size_at(&gap.at) / gap.width);
-    format!(
-        "edges of {} are only {width:.3e} apart at {}, {times:.0} times closer than the size there: this gap decides the \
-         number of tets; close or widen it if they are too many",
-        Pair(&first, &second),
-        Place(gap.at)
-    )
 }
 
 /// Fraction of the time after which the surface mesh is done, for a coarse mesh of 100,000 tets.
@@ -528,7 +539,9 @@ mod tests {
             tlo ring;\n";
         let geometry = csg::language::parse_geometry(ring, "ring.geo").unwrap().geometry;
         let model = CsgModel::new(geometry).unwrap();
-        let Err(Unmeshed::Failed(error)) = mesh_surface(&model, &UniformSize(1.0), false) else {
+        let Err(Unmeshed::Failed(error)) =
+            mesh_surface(&model, Sizes { size: &UniformSize(1.0), initial: &UniformSize(1.0) }, false)
+        else {
             panic!("segments as long as the radius cross")
         };
         let CoarseError::TooNear { place: Place(at), .. } = &error else { panic!("{error}") };

@@ -1,7 +1,7 @@
 //! The method `decompose` on all ranks: a geometry is cut into pieces, and each piece is meshed on
 //! its rank.
 
-use super::coarse::{CoarseError, CoarseMesh, CoarseSettings, Unmeshed, mesh_surface, smaller_at};
+use super::coarse::{CoarseError, CoarseMesh, CoarseSettings, Sizes, Unmeshed, mesh_surface, smaller_at};
 use super::error::{Error, RequestError};
 use super::geometry::Geometry;
 use super::model::Model;
@@ -255,7 +255,7 @@ fn fine_surface(model: &CsgModel, base: &dyn SizeField) -> Result<SurfaceMesh, C
     let mut corrections = 0;
     loop {
         let size = Lowered { base, sources: SourceTree::new(bounds, GRADING, bounds.diagonal(), &sources) };
-        match mesh_surface(model, &size, corrections < CORRECTIONS) {
+        match mesh_surface(model, Sizes { size: &size, initial: base }, corrections < CORRECTIONS) {
             Ok((surface, _)) => {
                 // The ranks could not fill this surface, and would find out too late.
                 let mut unfit = surface::crossings(&surface.points, &surface.triangles);

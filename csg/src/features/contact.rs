@@ -4,10 +4,9 @@ use super::neighborhood::{Tolerances, region, stay_apart};
 use super::octree::{Leaf, Octree, is_flat};
 use super::{FeatureError, Inconsistency};
 use crate::interval::{Cell, middle};
-use crate::primitive::quadric::tangents;
+use crate::primitive::quadric::{extremes, tangents};
 use crate::project::project_to_both;
 use crate::{BodyId, Geometry, Interval, Point, Seam, Surface, SurfaceId, Vector};
-use nalgebra::{Matrix2, Vector2};
 
 /// A point where two surfaces are tangent or cannot be separated.
 #[derive(Clone, Copy, Debug)]
@@ -237,18 +236,7 @@ pub(super) fn curvature_differences_at([a, b]: [&Surface; 2], at: &Point) -> [f6
     let sign = if na.dot(&nb) < 0.0 { -1.0 } else { 1.0 };
     let (ha, hb) = (a.hessian(at) / a.gradient(at).norm(), b.hessian(at) / b.gradient(at).norm() * sign);
     // The heights of the sheets over the common tangent plane are minus one half of these forms.
-    let (u, v) = tangents(&na);
-    let form = |x: &Vector2<f64>| u * x.x + v * x.y;
-    let (e, f) = (form(&Vector2::x()), form(&Vector2::y()));
-    let difference = hb - ha;
-    let matrix = Matrix2::new(
-        e.dot(&(difference * e)),
-        e.dot(&(difference * f)),
-        f.dot(&(difference * e)),
-        f.dot(&(difference * f)),
-    );
-    let eigenvalues = matrix.symmetric_eigenvalues();
-    [eigenvalues.min(), eigenvalues.max()]
+    extremes(&(hb - ha), &na)
 }
 
 /// Finds the points where boundaries touch, and rejects those between which no tets fit.

@@ -15,11 +15,8 @@ pub fn largest_curvature(gradient: &Vector, hessian: &Matrix3<f64>) -> f64 {
     if length == 0.0 {
         return f64::INFINITY;
     }
-    let (u, v) = tangents(&(gradient / length));
-    let (uu, uv, vv) = (u.dot(&(hessian * u)), u.dot(&(hessian * v)), v.dot(&(hessian * v)));
-    let mean = 0.5 * (uu + vv);
-    let spread = (0.5 * (uu - vv)).hypot(uv);
-    (mean.abs() + spread) / length
+    let [least, most] = extremes(hessian, &(gradient / length));
+    least.abs().max(most.abs()) / length
 }
 
 /// Two unit vectors u, v that form a right-handed orthogonal frame (u, v, `normal`).
@@ -29,6 +26,15 @@ pub fn tangents(normal: &Vector) -> (Vector, Vector) {
     axis[least] = 1.0;
     let u = normal.cross(&axis).normalize();
     (u, normal.cross(&u))
+}
+
+/// The least and the largest value of a quadratic form on unit vectors orthogonal to a unit normal.
+pub fn extremes(form: &Matrix3<f64>, normal: &Vector) -> [f64; 2] {
+    let (u, v) = tangents(normal);
+    let (uu, uv, vv) = (u.dot(&(form * u)), u.dot(&(form * v)), v.dot(&(form * v)));
+    let mean = 0.5 * (uu + vv);
+    let spread = (0.5 * (uu - vv)).hypot(uv);
+    [mean - spread, mean + spread]
 }
 
 /// The component of `vector` orthogonal to the unit vector `axis`.

@@ -7,16 +7,21 @@
 
 mod function;
 mod geometric;
+mod near;
 mod periodic;
 mod preset;
+mod samples;
 mod source_tree;
 mod sources;
 mod watched;
 
 pub use function::SizeFunction;
-pub use geometric::{GeometricSamples, GeometricSize, SizeSettings};
+pub use geometric::{GeometricSize, SizeSettings};
+pub(crate) use near::NearSurfaces;
 pub use periodic::PeriodicSize;
 pub use preset::{Closeness, Preset};
+pub use samples::GeometricSamples;
+pub(crate) use samples::ShortCurve;
 pub use source_tree::SourceTree;
 pub use sources::Source;
 pub(crate) use sources::thinned;
@@ -36,8 +41,7 @@ pub trait SizeField: Sync {
     /// For the volume mesher it may be infinite: sizes then grow from the surface. The field may
     /// jump, because the volume mesher limits its growth from the finer side. It is sampled at
     /// points, in the volume at last at the centre of each tet, so a finer region is missed only if
-    /// it
-    /// is smaller than the tets around it.
+    /// it is smaller than the tets around it.
     fn size_at(&self, point: &Point) -> f64;
 
     /// The work through which long stages report progress and can be cancelled.

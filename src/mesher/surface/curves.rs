@@ -9,6 +9,7 @@ use crate::ground::mesh::{Class, Segment, VertexId};
 use crate::ground::size::{SizeField, Source};
 use crate::{Point, Vector};
 use csg::{CornerId, Curve, CurveId, Features, ProjectionFailed, Projector};
+use std::collections::BTreeMap;
 
 /// Largest turning angle of a segment (radians): a full circle has at least six, so that the chords
 /// resemble it and lattice points are less than 14 % of the radius off before they are snapped.
@@ -231,10 +232,16 @@ pub fn crowded(mesh: &SurfaceMesh, features: &Features, size: &dyn SizeField) ->
             let (distance, at) = segment_distance(ends(i), ends(j));
             let is_near = distance < CLEARANCE * (sagittas[i] + sagittas[j]);
             if is_near && !cusp::are_aligned(mesh, features, [s, t]) {
-                let [a, b] = ends(if sagittas[i] >= sagittas[j] { i } else { j });
-                let used = size.size_at(&at).min((b - a).norm());
-                found.sources.push(Source { point: at, size: SHORTENED * used });
-                found.pairs.push([s.curve, t.curve]);
+                let segment = if sagittas[i] >= sagittas[j] { i } else { j };
+                let [a, b] = ends(segment);
+                let length = (b - a).norm();
+                found.places.push(CrowdedPlace {
+                    segment,
+                    length,
+                    curves: [s.curve, t.curve],
+                    bend: bend([sagittas[i], sagittas[j]], [ends(i), ends(j)]),
+                    source: Source { point: at, size: SHORTENED * size.size_at(&at).min(length) },
+                });
             }
         }
     }
@@ -244,10 +251,22 @@ pub fn crowded(mesh: &SurfaceMesh, features: &Features, size: &dyn SizeField) ->
 /// Places at which segments are too long for the distance of two curves.
 #[derive(Debug, Default)]
 pub struct Crowded {
-    /// Sources that shorten them.
-    pub sources: Vec<Source>,
-    /// The two curves of each source.
-    pub pairs: Vec<[CurveId; 2]>,
+    /// Each place.
+    pub places: Vec<CrowdedPlace>,
+}
+
+/// A place at which a segment is too long for the distance of two curves.
+#[derive(Debug)]
+pub struct CrowdedPlace {
+    /// The source that shortens it.
+    pub source: Source,
+    /// The two curves.
+    curves: [CurveId; 2],
+    /// The segment, and its length.
+    segment: usize,
+    length: f64,
+    /// The sum of sagittas of the two curves at a chord of length 1, for short chords (1/length).
+    bend: f64,
 }
 
 /// A place where two curves without a common corner are very close to each other.
@@ -257,27 +276,46 @@ pub struct Gap {
     pub curves: [CurveId; 2],
     /// A point between them.
     pub at: Point,
-    /// Their distance there.
+    /// Their distance there (length).
     pub width: f64,
+    /// The length of segments that stay apart there.
+    pub needed: f64,
+    /// The number of segments that all such gaps need.
+    pub segments: f64,
 }
 
 impl Crowded {
-    /// The narrowest gap below a hundredth of the size, which decides how many tets are around it.
-    pub fn gap(&self, features: &Features, projector: &Projector, size: &dyn SizeField) -> Option<Gap> {
-        /// Largest ratio of gap and size.
-        const NARROW: f64 = 0.01;
+    /// The gap that needs the shortest segments.
+    pub fn gap(&self, features: &Features, projector: &Projector) -> Option<Gap> {
+        // Curves of the same surfaces cannot be told apart by projection.
         let meet = |curves: [CurveId; 2]| {
-            let [c, d] = curves.map(|c| features.curve(c).ends.unwrap_or([CornerId(u32::MAX); 2]));
-            curves[0] == curves[1] || c.iter().any(|end| end.0 != u32::MAX && d.contains(end))
+            let [c, d] = curves.map(|curve| features.curve(curve));
+            let [ends, other] = [c, d].map(|curve| curve.ends.into_iter().flatten());
+            c.surfaces == d.surfaces || ends.into_iter().any(|end| other.clone().any(|o| o == end))
         };
-        let gaps = self.sources.iter().zip(&self.pairs).filter_map(|(source, &curves)| {
-            let [a, b] = curves.map(|curve| projector.project_curve(curve, &source.point));
-            let (a, b) = (a.ok()?, b.ok()?);
-            Some(Gap { curves, at: nalgebra::center(&a, &b), width: (a - b).norm() })
-        });
-        let narrow = gaps.filter(|gap| !meet(gap.curves) && gap.width < NARROW * size.size_at(&gap.at));
-        narrow.min_by(|a, b| a.width.total_cmp(&b.width))
+        let mut gap: Option<Gap> = None;
+        // The number of pieces of each segment.
+        let mut pieces: BTreeMap<usize, f64> = BTreeMap::new();
+        for place in self.places.iter().filter(|place| !meet(place.curves)) {
+            let [a, b] = place.curves.map(|curve| projector.project_curve(curve, &place.source.point));
+            let (Ok(a), Ok(b)) = (a, b) else { continue };
+            let width = (a - b).norm();
+            let needed = (width / (CLEARANCE * place.bend)).sqrt();
+            let most = pieces.entry(place.segment).or_default();
+            *most = most.max(place.length / needed);
+            if gap.is_none_or(|gap| needed < gap.needed) {
+                let at = nalgebra::center(&a, &b);
+                gap = Some(Gap { curves: place.curves, at, width, needed, segments: 0.0 });
+            }
+        }
+        gap.map(|gap| Gap { segments: pieces.values().sum(), ..gap })
     }
+}
+
+/// The sum of sagittas of two curves at a chord of length 1, from those at their segments.
+fn bend(sagittas: [f64; 2], segments: [[Point; 2]; 2]) -> f64 {
+    let of = |(sagitta, [a, b]): (f64, [Point; 2])| sagitta / (b - a).norm_squared();
+    sagittas.into_iter().zip(segments).map(of).sum()
 }
 
 /// Factor by which a chord too close to another is shortened: its sagitta falls to about a third.
@@ -382,8 +420,8 @@ mod tests {
             mesh
         };
         let long = crowded(&cut(1.0), &features, &UniformSize(0.5));
-        assert!(!long.sources.is_empty() && long.sources.iter().all(|source| source.size <= 0.3));
-        assert!(crowded(&cut(0.2), &features, &UniformSize(0.2)).sources.is_empty());
+        assert!(!long.places.is_empty() && long.places.iter().all(|place| place.source.size <= 0.3));
+        assert!(crowded(&cut(0.2), &features, &UniformSize(0.2)).places.is_empty());
     }
 
     #[test]

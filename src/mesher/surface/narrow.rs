@@ -20,18 +20,19 @@ const SHORT: f64 = 1.8;
 /// ends.
 const SHORTENED: f64 = 0.7;
 /// Bands narrower than this fraction of their segments' length are left unchanged: the thin sides
-/// of plates would get more triangles than the rest.
+/// of plates would get more triangles than the rest. The length is that before any correction, or
+/// short segments at the ends of a band would spread along it from attempt to attempt.
 const NARROWEST: f64 = 1.0 / 12.0;
 
 /// Sources that shorten the segments along narrow bands of patches.
 ///
-/// Curves with a common corner are excluded: between two curves that meet at an angle the band
-/// tapers to zero for any size.
+/// `size` is the field used, `initial` the same without corrections. Curves with a common corner
+/// are excluded: between two curves that meet at an angle the band tapers to zero for any size.
 pub fn narrow(
     mesh: &SurfaceMesh,
     features: &Features,
     projector: &Projector,
-    size: &dyn SizeField,
+    [size, initial]: [&dyn SizeField; 2],
 ) -> Vec<Source> {
     let mut sources = Vec::new();
     for (i, patch) in features.patches.iter().enumerate() {
@@ -55,7 +56,7 @@ pub fn narrow(
                 }
             }
         }
-        sources.extend(sides.iter().flat_map(|side| side.sources(size)));
+        sources.extend(sides.iter().flat_map(|side| side.sources([size, initial])));
     }
     sources
 }
@@ -124,9 +125,10 @@ impl<'a> Side<'a> {
     }
 
     /// Sources along this segment where the band is narrow.
-    fn sources<'b>(&'b self, used: &'b dyn SizeField) -> impl Iterator<Item = Source> + 'b {
+    fn sources<'b>(&'b self, [used, initial]: [&'b dyn SizeField; 2]) -> impl Iterator<Item = Source> + 'b {
         self.samples().into_iter().zip(self.widths).filter_map(move |(point, width)| {
-            let is_narrow = LONG * width < self.length && width > NARROWEST * self.length;
+            let is_narrow =
+                LONG * width < self.length && width > NARROWEST * self.length.max(initial.size_at(&point));
             let size = || (SHORT * width).min(SHORTENED * self.length.min(used.size_at(&point)));
             is_narrow.then(|| Source { point, size: size() })
         })

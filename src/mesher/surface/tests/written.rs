@@ -120,13 +120,13 @@ tlo eccentric;",
     assert!(outer.len() > 4 && outer.len() == inner.len());
     assert!(outer.iter().zip(&inner).all(|(p, q)| (p - q).abs() < 1e-12), "{outer:?} {inner:?}");
     // Near the cusp the chords are closer to each other than to their curves, but in order.
-    let near = |source: &crate::ground::size::Source| (source.point - cusp).norm() < 0.6;
-    assert!(!crowded(&curves, &features, &size).sources.iter().any(near));
+    let crowded = crowded(&curves, &features, &size);
+    assert!(!crowded.places.iter().any(|place| (place.source.point - cusp).norm() < 0.6));
 }
 
 #[test]
-fn a_gap_far_below_the_size_is_named() {
-    let gap = |step: f64| {
+fn a_gap_between_edges_tells_the_segments_that_it_needs() {
+    for step in [0.02, 1e-3] {
         let (_, features, projector) = read(&format!(
             "algebraic3d
 solid low = cylinder (0, 0, 0; 0, 0, 1; 1) and plane (0, 0, 0; 0, 0, -1) and plane (0, 0, 1; 0, 0, 1);
@@ -135,13 +135,17 @@ solid step = low or high;
 tlo step;",
             1.0 + step
         ));
-        let size = UniformSize(0.5);
-        let curves = mesh_curves(&features, &projector, &size).expect("curves");
-        crowded(&curves, &features, &size).gap(&features, &projector, &size)
-    };
-    assert_eq!(gap(0.02), None);
-    let gap = gap(1e-3).expect("a gap");
-    assert!((gap.width - 1e-3).abs() < 1e-9 && (gap.at.z - 1.0).abs() < 1e-9, "{gap:?}");
+        let gap = |size: f64| {
+            let size = UniformSize(size);
+            let curves = mesh_curves(&features, &projector, &size).expect("curves");
+            crowded(&curves, &features, &size).gap(&features, &projector)
+        };
+        let found = gap(0.5).expect("a gap");
+        assert!((found.width - step).abs() < 1e-9 && (found.at.z - 1.0).abs() < 1e-9, "{found:?}");
+        // Two rims of about six radii; the test of chords is stricter by a factor of two.
+        assert!((6.0..25.0).contains(&(found.segments * found.needed)), "{found:?}");
+        assert!(gap(0.7 * found.needed).is_none() && gap(2.0 * found.needed).is_some(), "{found:?}");
+    }
 }
 
 #[test]
@@ -159,7 +163,7 @@ tlo blocks;";
         let (_, features, projector) = read(text);
         let size = UniformSize(size);
         let curves = mesh_curves(&features, &projector, &size).expect("curves");
-        narrow(&curves, &features, &projector, &size)
+        narrow(&curves, &features, &projector, [&size, &size])
     };
     let found = |text: &str| found_at(text, 0.5);
     let sources = found(disk);
