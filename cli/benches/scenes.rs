@@ -5,6 +5,8 @@
 //! cargo bench -p tetmill-cli --bench scenes -- general 200 250   # some seeds of one style; files are kept in target/scenes
 //! ```
 
+#[path = "../tests/limited.rs"]
+mod limited;
 #[path = "../tests/scenes/mod.rs"]
 mod scenes;
 

@@ -10,8 +10,12 @@ use csg::SurfaceId;
 use csg::features::{Named, Pair, Place};
 use std::fmt;
 
-/// A gap or an edge below this fraction of the size around it is told if it lowers the size.
+/// A gap below this fraction of the size around it is told if it lowers the size.
 const NARROW: f64 = 0.01;
+
+/// An edge below this fraction of the size beside it is told: the thickness of a plate may be less
+/// than a hundredth.
+const SHORT: f64 = 0.005;
 
 /// Gaps between edges that need more segments than this are refused: there are some hundred tets for
 /// each. Closer edges are probably meant as one.
@@ -123,7 +127,7 @@ fn note_of_edge(model: &CsgModel, short: &ShortCurve) -> Option<String> {
             size_alone / length
         )
     };
-    (length < NARROW * size_alone).then(note)
+    (length < SHORT * size_alone).then(note)
 }
 
 /// The error for surfaces that are too close to each other.

@@ -12,7 +12,7 @@ pub enum Outcome {
     Meshed {
         tets: u64,
         smallest: f64,
-        /// Whether a message says that the gap decides the number of tets.
+        /// Whether a message says that the gap decides the number of tets, or is closed.
         told: bool,
     },
     /// Refused with status 2, or given up with status 3, with the reason.
@@ -33,7 +33,7 @@ pub fn run(seed: u64, dir: &Path) -> (Pair, f64, Outcome) {
     let [geo, report, mesh, log] = ["geo", "json", "mesh", "log"].map(|e| dir.join(format!("{seed}.{e}")));
     std::fs::write(&geo, &pair.text).expect("the folder can be written to");
     let arguments = |command: &mut std::process::Command| {
-        command.arg("mesh").arg(&geo).arg("-o").arg(&mesh).args(["-q", "-t", "1", "--report"]).arg(&report);
+        command.arg("mesh").arg(&geo).arg("-o").arg(&mesh).args(["-t", "1", "--report"]).arg(&report);
     };
     let ended = limited::run(arguments, &log, PATIENCE);
     let outcome = match ended.status {
@@ -45,7 +45,8 @@ pub fn run(seed: u64, dir: &Path) -> (Pair, f64, Outcome) {
             if (volume - pair.volume).abs() > VOLUME_ERROR * pair.volume.max(1.0) {
                 Outcome::Failed(format!("volume {volume} instead of {}", pair.volume))
             } else {
-                let told = ended.messages.contains("decides the number of tets");
+                let told = ended.messages.contains("decides the number of tets")
+                    || ended.messages.contains("both are taken as one");
                 Outcome::Meshed { tets: number("tets") as u64, smallest: number("smallest_dihedral"), told }
             }
         }

@@ -2,9 +2,10 @@
 
 use super::judge::{Mesh, probe, sure_body};
 use super::scene::{Scene, Style};
+use crate::limited;
 use std::path::Path;
-use std::process::{Command, Stdio};
-use std::time::{Duration, Instant};
+use std::process::Command;
+use std::time::Duration;
 
 /// Result of a scene.
 #[derive(Debug)]
@@ -28,33 +29,21 @@ pub fn run(seed: u64, style: Style, dir: &Path) -> Outcome {
     let [geo, mesh, log, report] =
         ["geo", "mesh", "log", "json"].map(|e| dir.join(format!("{style:?}-{seed}.{e}")));
     std::fs::write(&geo, &scene.text).expect("the folder can be written to");
-    let mut command = Command::new(env!("CARGO_BIN_EXE_tetmill"));
-    command.arg("mesh").arg(&geo).arg("-o").arg(&mesh).args(["-q", "-t", "1"]);
-    command.arg("--report").arg(&report);
-    command.stdout(Stdio::null()).stderr(std::fs::File::create(&log).expect("the folder can be written to"));
-    let mut child = command.spawn().expect("the program starts");
-    let began = Instant::now();
-    let status = loop {
-        match child.try_wait().expect("the program can be waited for") {
-            Some(status) => break status,
-            None if began.elapsed() > PATIENCE => {
-                child.kill().expect("the program can be stopped");
-                child.wait().expect("the program can be waited for");
-                return Outcome::Failed(format!("no end after {PATIENCE:?}"));
-            }
-            None => std::thread::sleep(Duration::from_millis(3)),
-        }
+    let arguments = |command: &mut Command| {
+        command.arg("mesh").arg(&geo).arg("-o").arg(&mesh).args(["-q", "-t", "1"]);
+        command.arg("--report").arg(&report);
     };
-    let stderr = std::fs::read_to_string(&log).expect("the log was written");
-    let reason = stderr.lines().next().unwrap_or_default().to_owned();
-    match status.code() {
+    let ended = limited::run(arguments, &log, PATIENCE);
+    let reason = ended.reason();
+    match ended.status {
         Some(0) => {
             let made = Mesh::read(&mesh, &report);
             made.fault(&scene).map_or(Outcome::Meshed { tets: made.tets.len() }, Outcome::Failed)
         }
-        Some(2) if stderr.contains("contains nothing") && is_empty(&scene) => Outcome::Empty,
+        Some(2) if ended.messages.contains("contains nothing") && is_empty(&scene) => Outcome::Empty,
         Some(2) => Outcome::Refused(reason),
-        other => Outcome::Failed(format!("status {other:?}: {reason}")),
+        Some(other) => Outcome::Failed(format!("status {other}: {reason}")),
+        None => Outcome::Failed(format!("a crash, or no end in {:.0} s: {reason}", ended.seconds)),
     }
 }
 

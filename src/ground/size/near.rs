@@ -63,3 +63,48 @@ impl NearSurfaces {
         is_near.then_some(Self { surfaces, at: *at, gap, size, size_alone, is_resolved })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ground::size::{GeometricSamples, SizeSettings};
+    use csg::Features;
+
+    /// The samples at which another surface limits the size.
+    fn near(text: &str) -> Vec<NearSurfaces> {
+        let geometry = csg::language::parse_geometry(&format!("algebraic3d {text}"), "near.geo").unwrap();
+        let features = Features::find(&geometry.geometry).unwrap();
+        GeometricSamples::new(&geometry.geometry, &features, &SizeSettings::default()).near().to_vec()
+    }
+
+    fn pipe(wall: f64) -> String {
+        format!(
+            "solid pipe = cylinder (0, 0, 0; 0, 0, 1; 1) and not cylinder (0, 0, 0; 0, 0, 1; {})
+                 and plane (0, 0, 0; 0, 0, -1) and plane (0, 0, 1; 0, 0, 1);
+             tlo pipe;",
+            1.0 - wall
+        )
+    }
+
+    #[test]
+    fn the_size_of_a_thin_wall_keeps_its_chords_apart() {
+        for wall in [1e-2, 1e-3] {
+            let near = near(&pipe(wall));
+            assert!(near.iter().all(|near| near.is_resolved && (near.gap / wall - 1.0).abs() < 1e-9));
+            // The sagitta of an edge 1.3 times as long as the size.
+            let sagitta = near.iter().map(|near| (1.3 * near.size).powi(2) / 8.0).fold(0.0, f64::max);
+            assert!((0.4..0.6).contains(&(sagitta / wall)), "{sagitta} at {wall}");
+        }
+        let thinner = near(&pipe(1e-6));
+        assert!(!thinner.is_empty() && thinner.iter().all(|near| !near.is_resolved));
+    }
+
+    #[test]
+    fn surfaces_that_are_no_boundary_or_on_the_convex_side_do_not_limit_the_size() {
+        let balls = "solid balls = sphere (0, 0, 0; 1) or sphere (0, 0, 0.001; 1); tlo balls;";
+        let rod = "solid plate = orthobrick (-2, -2, -1; 2, 2, 0);
+                   solid rod = cylinder (0, 0, 1.001; 1, 0, 1.001; 1) and orthobrick (-1, -2, -1; 1, 2, 3);
+                   solid both = plate or rod; tlo both;";
+        assert_eq!([near(balls), near(rod)], [vec![], vec![]]);
+    }
+}

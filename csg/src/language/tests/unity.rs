@@ -81,3 +81,22 @@ fn many_equal_surfaces_are_found_in_a_large_array() {
     let row = "multitranslate (1,0,0; 19; multitranslate (0,1,0; 19; multitranslate (0,0,1; 19; orthobrick (0,0,0; 1,1,1))))";
     assert_eq!(solid(row).surfaces.len(), 63);
 }
+
+#[test]
+fn surfaces_within_the_length_to_merge_are_one_and_told() {
+    let text = "algebraic3d
+        solid outer = sphere (0, 0, 0; 1);
+        solid inner = sphere (0, 0, 0; 0.9999);
+        tlo outer;
+        solid plate = orthobrick (0.5, -1, -1; 2, 1, 1) and not inner;
+        tlo plate;";
+    let read = |merge: f64| parse_geometry_with(text, "shell.geo", &Settings { merge }).unwrap();
+    let (apart, merged) = (read(0.0), read(2e-4));
+    assert_eq!([apart.geometry.surfaces.len(), merged.geometry.surfaces.len()], [8, 7]);
+    assert!(apart.warnings.is_empty() && merged.warnings.len() == 1, "{:?}", merged.warnings);
+    let told = merged.warnings[0].to_string();
+    assert!(
+        told.contains("of `inner` is 1.0e-4 from one of `outer` (line 2): both are taken as one"),
+        "{told}"
+    );
+}
