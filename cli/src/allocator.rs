@@ -98,7 +98,7 @@ fn report(bytes: usize) {
     let _ = writeln!(
         rest,
         "tetmill: out of memory: {bytes} bytes could not be allocated; take fewer levels or tets, or more machines, \
-         or raise the limit of the process (`ulimit -v`) if it has one"
+         or raise the limit of the process (`ulimit`) if it has one"
     );
     let unused = rest.len();
     let text = &text[..text.len() - unused];

@@ -3,6 +3,7 @@
 mod cli;
 mod common;
 mod decompose;
+mod faults;
 mod flat_parts;
 mod flat_stl;
 mod geometries;
