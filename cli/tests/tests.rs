@@ -3,6 +3,7 @@
 mod cli;
 mod common;
 mod decompose;
+mod encodings;
 mod faults;
 mod flat_parts;
 mod flat_stl;

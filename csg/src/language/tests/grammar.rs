@@ -155,7 +155,8 @@ fn comments_may_have_any_encoding() {
         &Settings::default(),
     )
     .unwrap_err();
-    assert!(errors.to_string().contains("not UTF-8"), "{errors}");
+    let message = errors.to_string();
+    assert!(message.starts_with("t.geo:2:8: error") && message.contains("save it as UTF-8"), "{message}");
 }
 
 #[test]
