@@ -17,8 +17,8 @@ fn names_in_utf_8_arrive_unchanged_in_all_formats() {
     let dir = tempfile::tempdir().unwrap();
     let at = |name: &str| dir.path().join(name);
     fs::write(at("a.geo"), GEOMETRY).unwrap();
-    for file in ["a.msh", "a.vtu", "a.vol"] {
-        succeed(tetmill().arg("mesh").arg(at("a.geo")).arg("-q").arg("-o").arg(at(file)));
+    for (file, options) in [("a.msh", &[][..]), ("a.vtu", &["--boundary", "in"]), ("a.vol", &[])] {
+        succeed(tetmill().arg("mesh").arg(at("a.geo")).arg("-q").args(options).arg("-o").arg(at(file)));
         let bytes = fs::read(at(file)).unwrap();
         for name in NAMES {
             assert!(bytes.windows(name.len()).any(|found| found == name.as_bytes()), "{file}: {name}");
