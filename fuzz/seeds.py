@@ -2,6 +2,7 @@
 """Writes seeds for the fuzz targets into corpus/TARGET: small files of each format and variant."""
 
 import base64
+import gzip
 import struct
 import zlib
 from pathlib import Path
@@ -134,11 +135,16 @@ def medit():
 
 
 def netgen():
-    save("vol", "text", "# a\nmesh3d\ndimension\n3\ngeomtype\n0\nsurfaceelementsgi\n6\n"
+    text = ("# a\nmesh3d\ndimension\n3\ngeomtype\n0\nsurfaceelementsgi\n6\n"
          + rows(FACES, 1, "1 5 7 0 3 ", " 0 0 0") + "volumeelements\n2\n" + rows(TETS, 1, "7 4 ")
          + "edgesegmentsgi2\n1\n1 0 1 2 -1 -1 1 2 3 0 3 1.5\nedgesegmentsgi3\n1\n1 2 0 0 0 0 3 1 1\npoints\n5\n"
          + rows(POINTS) + "materials\n1\n7 points\nbcnames\n1\n5 skin of it\nidentifications\n2\n1 2 1\n3 4 1\n"
          "identificationtypes\n1\n2\nendmesh\n")
+    save("vol", "text", text)
+    save("vol_gz", "file", b"\0" + gzip.compress(text.encode(), mtime=0))
+    save("vol_gz", "damaged", b"\1\0\x40\1" + text.encode())
+    save("vol_gz", "cut", b"\1\0\x40\0" + text.encode())
+    save("vol_gz", "text", b"\2" + text.encode())
 
 
 def vtu(stored, tets=TETS, ids=False):

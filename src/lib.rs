@@ -126,7 +126,9 @@ pub mod size {
 
 /// The memory and the processor time of this process and machine.
 pub mod memory {
-    pub use crate::ground::memory::{available_bytes, cpu_seconds, machine, peak_bytes, sized};
+    pub use crate::ground::memory::{
+        allocation_may_fail, available_bytes, cpu_seconds, machine, peak_bytes, sized,
+    };
 }
 
 /// Progress reports and cancellation of a run.

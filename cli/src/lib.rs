@@ -21,6 +21,12 @@ use options::{Cli, Command};
 use std::ffi::OsString;
 use std::process::ExitCode;
 
+/// The exit status if memory or disk space run out.
+///
+/// [`run`] returns it where it can. An allocator can end a program with it if memory runs out, as
+/// that of the program `tetmill` does.
+pub const OUT_OF_MEMORY: u8 = failure::Status::Resources as u8;
+
 /// Runs the command and returns its exit status, 0 on success. `tetmill help COMMAND` lists the
 /// others.
 ///

@@ -172,6 +172,8 @@ fn surfaces_that_touch_without_the_same_triangles_are_refused_with_the_place() {
         stderr.contains("touch without being the same") && stderr.contains("the first at (1, "),
         "{stderr}"
     );
+    let names = [&large, &small].map(|file| file.display().to_string());
+    assert!(stderr.contains(&format!("triangles of {} and {} intersect", names[0], names[1])), "{stderr}");
 }
 
 #[test]

@@ -3,6 +3,8 @@
 mod cli;
 mod common;
 mod decompose;
+mod encodings;
+mod faults;
 mod flat_parts;
 mod flat_stl;
 mod geometries;

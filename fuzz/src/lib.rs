@@ -3,8 +3,10 @@
 //! A target fails on a panic, an input that takes longer than `-timeout`, or memory out of
 //! proportion to the input.
 
+use flate2::{Compression, write::GzEncoder};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::fs;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -116,6 +118,36 @@ fn check_volume(path: &Path) {
     assert!(mesh.points.iter().flat_map(|point| point.iter()).all(|x| x.is_finite()));
     assert!(mesh.bodies.iter().all(|body| body.index() < read.names.bodies.len()));
     assert!(mesh.triangles.iter().all(|triangle| triangle.patch.index() < read.names.patches.len()));
+}
+
+/// Reads the input as a compressed mesh. The first byte selects what is compressed: nothing, because
+/// the input is the file; all of it; or all of it, with damage to one byte behind that (its place in
+/// two bytes, and the bits to invert).
+pub fn compressed_volume(name: &str, input: &[u8]) {
+    let path = FOLDER.join(name);
+    let bytes = match input {
+        [0, file @ ..] => file.to_vec(),
+        [1, high, low, bits, text @ ..] => {
+            let mut bytes = compressed(text);
+            let at = (usize::from(*high) << 8 | usize::from(*low)) % bytes.len();
+            bytes[at] ^= bits;
+            // Some of the files are cut off instead.
+            if *bits == 0 {
+                bytes.truncate(at);
+            }
+            bytes
+        }
+        [_, text @ ..] => compressed(text),
+        [] => return,
+    };
+    fs::write(&path, bytes).expect("a file for the input");
+    check_volume(&path);
+}
+
+fn compressed(text: &[u8]) -> Vec<u8> {
+    let mut encoder = GzEncoder::new(Vec::new(), Compression::fast());
+    encoder.write_all(text).expect("memory can be written to");
+    encoder.finish().expect("memory can be written to")
 }
 
 /// Reads the input as the files of an Elmer mesh, serial and of one part, and checks it.

@@ -1,5 +1,32 @@
 //! Memory and time used by this process, and memory available on the machine.
 
+use std::cell::Cell;
+
+thread_local! {
+    /// Whether this thread handles failed allocations.
+    static MAY_FAIL: Cell<bool> = const { Cell::new(false) };
+}
+
+/// Runs `allocate`, which handles failed allocations, as [`Vec::try_reserve`] does. Not nested.
+///
+/// A program's allocator can end the program on any other failed allocation, see
+/// [`allocation_may_fail`].
+pub(crate) fn try_to_allocate<T>(allocate: impl FnOnce() -> T) -> T {
+    MAY_FAIL.set(true);
+    let result = allocate();
+    MAY_FAIL.set(false);
+    result
+}
+
+/// Whether this thread handles a failed allocation: it returns an error.
+///
+/// For the global allocator of a program that ends itself if memory runs out, as the program
+/// `tetmill` does, rather than to be aborted by Rust: it must not do so if this returns `true`.
+/// Allocates nothing.
+pub fn allocation_may_fail() -> bool {
+    MAY_FAIL.get()
+}
+
 /// The peak resident set of this process in bytes; `None` if the system does not report it.
 pub fn peak_bytes() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;

@@ -61,14 +61,17 @@ pub enum CoarseError {
     },
     /// The input triangles do not bound bodies.
     #[error(
-        "the surface's own triangles intersect, or touch without being the same: {count} places, the first at ({}, {}, {}); where \
-         surfaces touch, give both the same triangles there (join them in the program that made them), or keep them apart",
-        first.x, first.y, first.z
+        "{} intersect, or touch without being the same: {count} pairs, the first at ({}, {}, {}); no option repairs this: \
+         where surfaces touch, give both the same triangles there (join them in the program that made them), or keep them \
+         apart",
+        triangles_of(.files), first.x, first.y, first.z
     )]
     FacetsMeet {
-        /// Number of intersecting places.
+        /// The files of the first pair if they differ.
+        files: Option<Box<[String; 2]>>,
+        /// Number of pairs of triangles.
         count: usize,
-        /// The first of them: an edge midpoint of an intersecting triangle.
+        /// Where the first pair intersects.
         first: Point,
     },
     /// A body could not be filled.
@@ -80,6 +83,14 @@ pub enum CoarseError {
     /// The observer cancelled the run.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
+}
+
+/// Names triangles that intersect.
+fn triangles_of(files: &Option<Box<[String; 2]>>) -> String {
+    match files.as_deref() {
+        Some([a, b]) => format!("triangles of {a} and {b}"),
+        None => "the surface's own triangles".into(),
+    }
 }
 
 impl From<VolumeError> for CoarseError {

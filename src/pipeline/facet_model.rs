@@ -37,6 +37,8 @@ pub struct FacetSolid {
     pub kept_edges: Vec<[Point; 2]>,
     /// Whether the facets themselves are the surface mesh.
     pub keep_surface: bool,
+    /// The names of the surfaces, for messages.
+    files: Vec<String>,
 }
 
 impl FacetSolid {
@@ -82,7 +84,7 @@ impl FacetSolid {
             .iter()
             .map(|p| p.as_ref().file_stem().unwrap_or_default().to_string_lossy().into())
             .collect();
-        Self::of(surfaces, &stems, settings).map_err(|error| {
+        let solid = Self::of(surfaces, &stems, settings).map_err(|error| {
             if let FacetError::Overlap { place, files: [a, b] } = error
                 && a != b
             {
@@ -91,7 +93,8 @@ impl FacetSolid {
             }
             let path = if let [path] = paths { Some(path.as_ref().to_path_buf()) } else { None };
             Error::Facets { path, error: Box::new(error) }
-        })
+        })?;
+        Ok(Self { files: paths.iter().map(|path| path.as_ref().display().to_string()).collect(), ..solid })
     }
 
     /// Makes solids of surfaces, with a name for each surface.
@@ -109,7 +112,8 @@ impl FacetSolid {
         let edges = surfaces.iter().filter(|_| settings.keep_surface).flat_map(|s| &s.loose_edges);
         let kept_edges = edges.copied().collect();
         let kept_points = surfaces.into_iter().flat_map(|surface| surface.loose_points).collect();
-        Ok(Self { model, names, kept_points, kept_edges, keep_surface: settings.keep_surface })
+        let (keep_surface, files) = (settings.keep_surface, stems.to_vec());
+        Ok(Self { model, names, kept_points, kept_edges, keep_surface, files })
     }
 
     /// Projection to patches and curves. Kept facets need none, because points between those of a
@@ -169,15 +173,26 @@ impl FacetSolid {
             Err(error) => {
                 // If triangles intersect, smaller sizes were tried already.
                 let crossed = matches!(error, CoarseError::NotClosed { .. });
-                let meeting = if crossed { self.model.crossings() } else { Vec::new() };
-                if let Some(&first) = meeting.first() {
-                    return Attempt::Failed(CoarseError::FacetsMeet { count: meeting.len(), first });
+                if let Some(meeting) = crossed.then(|| self.facets_meet()).flatten() {
+                    return Attempt::Failed(meeting);
                 }
                 let may_lower = allowed.lower && !self.keep_surface && !crossed;
                 let lowered = if may_lower { error.remedy(&[], &size) } else { Vec::new() };
                 if lowered.is_empty() { Attempt::Failed(error) } else { Attempt::Lower(lowered) }
             }
         }
+    }
+
+    /// The error for facets that intersect, if any do. Intersections of different files come first.
+    fn facets_meet(&self) -> Option<CoarseError> {
+        let pairs = self.model.intersections();
+        let files = |patches: &[PatchId; 2]| {
+            let [a, b] = patches.map(|patch| self.model.patch(patch).labels.first().map(|label| label.0));
+            a.zip(b).filter(|(a, b)| a != b).map(|(a, b)| [a.min(b), a.max(b)])
+        };
+        let (patches, first) = pairs.iter().find(|(patches, _)| files(patches).is_some()).or(pairs.first())?;
+        let files = files(patches).map(|pair| Box::new(pair.map(|file| self.files[file as usize].clone())));
+        Some(CoarseError::FacetsMeet { files, count: pairs.len(), first: *first })
     }
 
     /// Finds thin regions between the facets themselves.

@@ -78,9 +78,7 @@ impl<'a> Scanner<'a> {
         let span = self.span;
         let kind = match self.rest().chars().next()? {
             '#' => return None,
-            c if c.is_ascii_alphabetic() => {
-                TokenKind::Word(self.take_while(|c| c.is_ascii_alphanumeric() || c == '_'))
-            }
+            c if c.is_alphabetic() => TokenKind::Word(self.take_while(continues_word)),
             c if c.is_ascii_digit() || c == '.' => self.number(report),
             quote @ ('"' | '\'') => {
                 // Take the whole string, so that one mistake gives one message.
@@ -155,12 +153,18 @@ fn is_blank(c: char) -> bool {
     matches!(c, ' ' | '\t' | '\u{b}' | '\u{c}' | '\u{feff}')
 }
 
+/// Whether a word can continue with `c`: a letter or digit of any script, `_`, or an accent that
+/// follows its letter, as in names that were typed on a Mac.
+fn continues_word(c: char) -> bool {
+    c.is_alphanumeric() || c == '_' || matches!(c, '\u{300}'..='\u{36f}')
+}
+
 /// How to write the content of a quoted string that follows the tokens `before`.
 fn unquoted_help(before: &[Token<'_>], content: &str) -> String {
     let content = content.trim();
-    let is_word = content.starts_with(|c: char| c.is_ascii_alphabetic());
+    let is_word = content.starts_with(char::is_alphabetic);
     let word = if is_word {
-        content.replace(|c: char| !c.is_ascii_alphanumeric(), "_")
+        content.replace(|c: char| !continues_word(c), "_")
     } else if content.parse::<f64>().is_ok_and(f64::is_finite) {
         content.to_owned()
     } else {
@@ -182,8 +186,8 @@ fn stray_help(c: char) -> &'static str {
         '{' | '}' => "solids are grouped by ( )",
         '&' | '|' | '!' => "solids are combined by `and`, `or`, `not`",
         '_' => "names begin with a letter",
-        '\u{fffd}' => "the file is not UTF-8; other encodings are allowed in comments only",
-        c if !c.is_ascii() => "non-ASCII characters are allowed in comments only",
+        '\u{fffd}' => "the file is not UTF-8: save it as UTF-8; other encodings are allowed in comments only",
+        c if !c.is_ascii() => "outside comments only letters and digits of names may be non-ASCII",
         _ => "",
     }
 }
@@ -239,8 +243,8 @@ mod tests {
 
     #[test]
     fn columns_count_characters() {
-        let message = first_message("é$");
-        assert!(message.starts_with("t.geo:1:1: "), "{message}");
+        let message = first_message("é球$");
+        assert!(message.starts_with("t.geo:1:3: "), "{message}");
         let tokens = tokenize("é;", &mut Report::default());
         assert_eq!(tokens[1].span, Span { line: 1, column: 2 });
     }
@@ -250,6 +254,17 @@ mod tests {
         assert!(first_message("-material='air'").contains("no quoted strings"));
         assert!(first_message("_a").contains("begin with a letter"));
         assert!(first_message("1*2").contains("no arithmetic"));
+    }
+
+    #[test]
+    fn words_have_letters_of_any_script() {
+        for word in ["würfel_2", "wu\u{308}rfel", "球", "стена1", "Außenwand"] {
+            assert_eq!(kinds(word), [Word(word), End]);
+        }
+        for text in ["–", "（", "２", "\u{308}"] {
+            assert_eq!(kinds(text), [Bad, End], "{text}");
+            assert!(first_message(text).contains("only letters and digits of names"), "{text}");
+        }
     }
 
     #[test]

@@ -75,7 +75,9 @@ impl HasKind for CommError {
     fn kind(&self) -> ErrorKind {
         match self {
             Self::Elsewhere { kind, .. } => *kind,
-            Self::RankFailed(_) | Self::NotStarted { .. } => ErrorKind::Rank,
+            Self::NotStarted { ranks: 0, .. } => ErrorKind::Input,
+            Self::NotStarted { .. } => ErrorKind::Resources,
+            Self::RankFailed(_) => ErrorKind::Rank,
         }
     }
 

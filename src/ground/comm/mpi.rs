@@ -72,16 +72,30 @@ pub fn run_with_chunks<R>(chunk: usize, body: impl FnOnce(&dyn Communicator) -> 
     let comm = MpiComm { chunk, exchanges: Cell::new(0), world: Some(world) };
     match catch_unwind(AssertUnwindSafe(|| body(&comm))) {
         Ok(result) => Ok(result),
-        Err(_) => end_job(comm.world()),
+        Err(_) => end_after_panic(comm.world()),
     }
 }
 
 /// Ends the job after a panic, whose message is on the standard error.
-fn end_job(world: &SimpleCommunicator) -> ! {
+fn end_after_panic(world: &SimpleCommunicator) -> ! {
     eprintln!("rank {} panicked: the job ends", world.rank());
+    abort(world, RANK_FAILED)
+}
+
+fn abort(world: &SimpleCommunicator, status: i32) -> ! {
     // The launcher drops output that it has not forwarded yet when it ends the job.
     std::thread::sleep(BEFORE_ABORT);
-    world.abort(RANK_FAILED)
+    world.abort(status)
+}
+
+/// *Local.* Ends all processes of the job with this exit status, without unwinding. Returns if MPI
+/// is not initialised.
+///
+/// For failures after which this process cannot take part in an agreement, e.g. if memory runs out.
+pub fn end_job(status: i32) {
+    if is_initialized() && !is_finalized() {
+        abort(&SimpleCommunicator::world(), status);
+    }
 }
 
 /// *Local.* Makes panics of this process end the whole job with status 5, after the panic's
@@ -95,7 +109,7 @@ pub fn abort_on_panic() {
     std::panic::set_hook(Box::new(move |panic| {
         report(panic);
         if is_initialized() && !is_finalized() {
-            end_job(&SimpleCommunicator::world());
+            end_after_panic(&SimpleCommunicator::world());
         }
     }));
 }

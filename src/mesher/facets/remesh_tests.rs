@@ -352,7 +352,7 @@ fn facets_that_intersect_are_found_and_refused_by_the_mesher() {
         s.brick([0.0; 3], [2.0; 3], false);
         s.brick([1.0, 0.5, 0.5], [3.0, 1.5, 1.5], false);
     })]);
-    assert!(!crossed.crossings().is_empty());
+    assert!(!crossed.intersections().is_empty());
     let size = sizes(&crossed, 1.0);
     let (surface, report) = remesh(&crossed, &size, &RemeshSettings::default());
     assert!(!report.crossings.is_empty());

@@ -7,6 +7,7 @@
 use super::owners::Holders;
 use super::pack::{Kept, Message};
 use super::{MigrateError, MoveSettings};
+use crate::ground::memory;
 use crate::ground::mesh::{GlobalId, Rank, TetId, VertexId};
 use crate::parallel::distribution::{BareMesh, ClassifiedEdge, Shared, Side};
 use csg::BodyId;
@@ -26,7 +27,8 @@ impl Room {
     pub(super) fn make<T>(self, count: usize) -> Result<Vec<T>, MigrateError> {
         let bytes = count as u64 * size_of::<T>() as u64;
         let mut list = Vec::new();
-        let refused = bytes > self.limit || list.try_reserve_exact(count).is_err();
+        let refused =
+            bytes > self.limit || memory::try_to_allocate(|| list.try_reserve_exact(count)).is_err();
         if refused { Err(MigrateError::OutOfMemory { rank: self.rank, bytes }) } else { Ok(list) }
     }
 
@@ -34,7 +36,8 @@ impl Room {
     /// that.
     fn grow<T: Copy>(self, list: &mut Vec<T>, count: usize, fill: T) -> Result<(), MigrateError> {
         let bytes = count as u64 * size_of::<T>() as u64;
-        if bytes > self.limit || list.try_reserve_exact(count - list.len()).is_err() {
+        let more = count - list.len();
+        if bytes > self.limit || memory::try_to_allocate(|| list.try_reserve_exact(more)).is_err() {
             return Err(MigrateError::OutOfMemory { rank: self.rank, bytes });
         }
         list.resize(count, fill);

@@ -48,6 +48,9 @@ fn run(
     if let Some([vertices, edges]) = weights {
         graph = graph.set_vwgt(vertices).set_adjwgt(edges);
     }
-    graph.set_option(Seed(seed)).part_recursive(&mut part).map_err(|error| refused(&error))?;
+    graph.set_option(Seed(seed)).part_recursive(&mut part).map_err(|error| match error {
+        metis::Error::Memory => PartitionError::MetisMemory { tets, parts },
+        error => refused(&error),
+    })?;
     Ok(part.into_iter().map(|p| Rank::try_from(p).expect("METIS numbers parts from 0")).collect())
 }

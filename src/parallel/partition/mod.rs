@@ -108,12 +108,20 @@ pub enum PartitionError {
         /// The error of METIS.
         reason: String,
     },
+    /// METIS ran out of memory.
+    #[error("METIS ran out of memory for {tets} tets and {parts} parts: take fewer coarse tets")]
+    MetisMemory {
+        /// The number of tets.
+        tets: usize,
+        /// The requested parts.
+        parts: u32,
+    },
 }
 
 impl HasKind for PartitionError {
     fn kind(&self) -> ErrorKind {
         match self {
-            Self::TooManyTets { .. } => ErrorKind::Resources,
+            Self::TooManyTets { .. } | Self::MetisMemory { .. } => ErrorKind::Resources,
             Self::NotAMesh { .. } => ErrorKind::NoMesh,
             Self::NoParts | Self::MoreParts { .. } | Self::NoMetis | Self::Metis { .. } => ErrorKind::Input,
         }

@@ -38,7 +38,11 @@ impl Lowering<'_> {
                 if let (Some(tlo), Some(span)) = (flags.word("tlo", self.report), flags.span("tlo")) {
                     self.tlo_named(&Name { text: tlo.to_owned(), span })?;
                 }
-                Err(self.not_meshed("identify closesurfaces", *span))
+                let message =
+                    "`identify closesurfaces` is ignored: it means prisms, and tetmill makes tets only";
+                let help = "sizes become smaller between near surfaces, so that the gap is meshed with tets";
+                self.report.warn(*span, message, help);
+                Ok(())
             }
             Statement::SingularFace { tlo, solid, flags, span } => {
                 let tlo = self.tlo_named(tlo)?;
@@ -55,11 +59,6 @@ impl Lowering<'_> {
                 Ok(())
             }
         }
-    }
-
-    fn not_meshed(&mut self, construct: &str, span: Span) -> Reported {
-        let message = format!("`{construct}` is understood, but cannot be meshed yet");
-        self.report.unsupported(span, message, "remove this statement to mesh the rest")
     }
 
     fn known_with_surfaces(&mut self, solids: &[Name]) -> Result<(), Reported> {

@@ -108,7 +108,7 @@ pub fn remesh(
         report.crossings = crossings(&mesh.points, &mesh.triangles);
         // No size removes intersections of the facets themselves.
         let is_input_crossed =
-            correction == 0 && !report.crossings.is_empty() && !model.crossings().is_empty();
+            correction == 0 && !report.crossings.is_empty() && !model.intersections().is_empty();
         if report.crossings.is_empty() || correction == MOST_CORRECTIONS || is_input_crossed {
             report.measure(&sheet);
             return (mesh, report);
