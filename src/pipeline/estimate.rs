@@ -3,7 +3,8 @@
 //! The number of tets is nearly proportional to ∫ dV/h³ over the bodies. The existing mesh,
 //! whatever its sizes, serves for the quadrature, and its number of tets calibrates the factor.
 
-use super::coarse::{CoarseMesh, CoarseSettings};
+use super::coarse::CoarseSettings;
+use super::coarse_mesh::CoarseMesh;
 use super::model::Model;
 use crate::Point;
 use crate::ground::kernel::simplex::volume6;

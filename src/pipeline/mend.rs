@@ -1,7 +1,8 @@
 //! Makes coarse meshes whose snapped lattices are valid. Where a child would be inverted or poor,
 //! the sizes are lowered; remaining bad children are repaired by curving edges.
 
-use super::coarse::{CoarseError, CoarseMesh};
+use super::coarse_error::CoarseError;
+use super::coarse_mesh::CoarseMesh;
 use super::error::Error;
 use super::model::Model;
 use super::retries::{Budget, INVERTED, POOR};
@@ -59,10 +60,10 @@ pub fn refinable<T>(
             if tried.poor.is_empty() {
                 return Ok(made);
             }
-            if best.as_ref().is_none_or(|(before, _)| tried.smallest_dihedral > before.smallest_dihedral) {
+            if best.as_ref().is_none_or(|best| is_better((&tried, &made.0), (&best.0, &best.1.0))) {
                 best = Some((tried, made));
             }
-        } else if round == INVERTED || budget.is_spent() {
+        } else if best.is_none() && (round == INVERTED || !budget.has_meshes()) {
             let mut coarse = made.0;
             bend(model, &mut coarse, &tried, pieces.min(TRIED_PIECES))?;
             return match tried.error {
@@ -78,6 +79,13 @@ pub fn refinable<T>(
         }
     }
     unreachable!("the loop ends by itself")
+}
+
+/// Whether the first of two tested meshes is better: by the smallest angle of the poor children,
+/// then by the angles of the coarse tets.
+fn is_better(new: (&Trial, &CoarseMesh), old: (&Trial, &CoarseMesh)) -> bool {
+    let by_children = new.0.smallest_dihedral.total_cmp(&old.0.smallest_dihedral);
+    by_children.then_with(|| new.1.report.quality.compare_angles(&old.1.report.quality)).is_gt()
 }
 
 /// The required quality of the children of a coarse mesh.
