@@ -135,3 +135,23 @@ pub fn lowered(mesh: &Mesh, tets: &[GlobalId]) -> Vec<Source> {
     };
     tets.iter().flat_map(sources).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ground::mesh::QualitySummary;
+
+    #[test]
+    fn the_best_children_decide_which_mesh_is_kept_and_then_the_coarse_angles() {
+        let tried = |smallest_dihedral: f64| Trial { smallest_dihedral, ..Trial::default() };
+        let coarse = |smallest_dihedral: f64| {
+            let mut coarse = CoarseMesh::default();
+            coarse.report.quality = QualitySummary { smallest_dihedral, ..QualitySummary::default() };
+            coarse
+        };
+        let (good, bad) = (coarse(20.0), coarse(10.0));
+        assert!(is_better((&tried(9.0), &bad), (&tried(8.0), &good)));
+        assert!(is_better((&tried(8.0), &good), (&tried(8.0), &bad)));
+        assert!(!is_better((&tried(8.0), &bad), (&tried(8.0), &bad)), "the first of equal ones is kept");
+    }
+}

@@ -133,6 +133,23 @@ mod tests {
     use crate::pipeline::target::{Outcome, mesh_to_target};
 
     #[test]
+    fn retries_may_make_tets_in_proportion_to_the_first_mesh() {
+        let spent_after = |first: u64, retries: &[u64]| {
+            let budget = Budget::default();
+            budget.made(first);
+            retries.iter().for_each(|&tets| budget.made(tets));
+            assert!(budget.has_meshes());
+            budget.is_spent()
+        };
+        assert!(!spent_after(1_000_000, &[]));
+        assert!(!spent_after(1_000_000, &[RETRIED * 1_000_000 - 1]));
+        assert!(spent_after(1_000_000, &[1_000_000; RETRIED as usize]));
+        // Small meshes are made again as often as is worth it.
+        assert!(!spent_after(1000, &[1000; 100]));
+        assert!(spent_after(1000, &[1000; ALWAYS_RETRIED as usize / 1000]));
+    }
+
+    #[test]
     fn a_spent_budget_ends_the_search_for_a_number_of_tets_with_the_mesh_that_is_there() {
         let ball = "algebraic3d\nsolid ball = sphere (0, 0, 0; 1);\ntlo ball;\n";
         let geometry = Geometry::from_text(ball).unwrap();
@@ -142,9 +159,11 @@ mod tests {
             mesh_to_target(&geometry.model, &mut settings, 3_000, &fits, budget, Work::unwatched()).unwrap()
         };
         let (budget, small) = (Budget::default(), Budget { meshes: Cell::new(1), ..Budget::default() });
+        let few_tets = Budget { tets: Cell::new(Some(1)), ..Budget::default() };
         assert_eq!(search(&budget).1, Outcome::Reached);
         assert!(budget.meshes.get() < MESHES - 1, "one mesh was enough: the test needs another number");
         assert_eq!(search(&small).1, Outcome::Jumped);
-        assert!(small.is_spent());
+        assert_eq!(search(&few_tets).1, Outcome::Jumped);
+        assert!(small.is_spent() && few_tets.is_spent() && few_tets.meshes.get() == MESHES - 1);
     }
 }

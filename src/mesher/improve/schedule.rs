@@ -1,5 +1,6 @@
 //! The order of operations: the worst tets first, and only where something changed.
 
+use crate::ground::kernel::simplex::largest_cosine;
 use crate::ground::mesh::QualitySummary;
 use crate::ground::mesh::{Mesh, VertexId};
 use crate::ground::size::SizeField;
@@ -45,10 +46,10 @@ pub struct Settings {
 
 /// A number of steps in proportion to the tets of a block.
 ///
-/// Without it, a surface of triangles much larger than the body is thick takes a hundred times as
-/// long as others: all its tets are bad, no insertion helps, and each is tried in every pass. A heat
-/// exchanger with one layer of tets of 1.3° visited 124 tets for each of its own in 11 s; good
-/// meshes visit fewer than 0.5.
+/// If triangles are much larger than a body is thick, all its tets are bad, few insertions help, and
+/// each tet is tried in every pass. Without the limit, a heat exchanger with one layer of such tets
+/// visited 124 tets for each of its own, in 11 s; good meshes visit fewer than 0.5
+/// (`benches/results/coarser-2026-11-23.md`).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct InsertionSteps {
     /// Steps for any block: about half a second.
@@ -65,7 +66,7 @@ impl InsertionSteps {
 
 impl Default for InsertionSteps {
     fn default() -> Self {
-        Self { of_block: 50_000, of_tet: 2 }
+        Self { of_block: 50_000, of_tet: 1 }
     }
 }
 
@@ -184,6 +185,10 @@ struct Tools {
 /// Below this mean ratio (slivers of 10° or so) all candidate cavities of a tet are tried for
 /// insertion, with edges as short as [`SHORTER`] times the usual limit.
 const TERRIBLE: f64 = 0.35;
+
+/// Cosine of 16°: tets with a smaller dihedral angle are treated like those below [`TERRIBLE`]. In
+/// one layer of tets between independent triangulations, a few of 10° to 15° have mean ratios above.
+const SHARP: f64 = 0.961_261_695_938_318_9;
 
 /// See [`TERRIBLE`].
 const SHORTER: f64 = 0.5;
@@ -323,6 +328,11 @@ fn is_fresh(complex: &Complex, vertex: u32) -> bool {
     complex.touched[vertex as usize] + 1 >= complex.pass
 }
 
+/// See [`SHARP`].
+fn is_sharp(complex: &Complex, tet: u32) -> bool {
+    largest_cosine(&complex.corners(complex.tets[tet as usize])) > SHARP
+}
+
 /// Whether the slot still holds the tet with this score, because ids are reused.
 fn is_still(complex: &Complex, score: f64, tet: u32) -> bool {
     complex.is_alive(tet) && complex.scores[tet as usize].to_bits() == score.to_bits()
@@ -450,7 +460,7 @@ impl Tools {
                 counts.collapses += 1;
                 continue;
             }
-            let is_terrible = score < score_of_ratio(TERRIBLE) && rescues > 0;
+            let is_terrible = (score < score_of_ratio(TERRIBLE) || is_sharp(complex, t)) && rescues > 0;
             rescues -= usize::from(is_terrible);
             let visited = self.inserter.visited();
             let may_insert = counts.insertion_steps < most_steps;
