@@ -93,8 +93,11 @@ pub fn mesh_to_target(
             .flatten();
         if count < target {
             search.coarse = Some((scale, count as f64));
-        } else if search.too_many(scale, made) {
-            break;
+        } else {
+            let share = estimate::share_at(model, settings, &made, sources, LARGEST_SCALE);
+            if search.too_many(scale, made, share) {
+                break;
+            }
         }
         if search.is_narrow() {
             break;
@@ -129,14 +132,16 @@ struct Search {
 }
 
 impl Search {
-    /// Adds a mesh with too many tets. Returns whether larger sizes give hardly fewer.
-    fn too_many(&mut self, scale: f64, made: CoarseMesh) -> bool {
+    /// Adds a mesh with too many tets, of which a `share` is expected at the largest scale. Returns
+    /// whether larger sizes give hardly fewer.
+    fn too_many(&mut self, scale: f64, made: CoarseMesh, share: Option<f64>) -> bool {
         let tets = made.report.tets as f64;
         let is_stuck = |(before, more): (f64, f64)| {
             let is_far = scale >= MUCH_LARGER * before || self.failure.is_some();
             is_far && tets >= HARDLY_FEWER * more
         };
-        self.is_least |= scale >= LARGEST_SCALE || self.fine.is_some_and(is_stuck);
+        let is_bound = share.is_some_and(|share| share >= HARDLY_FEWER);
+        self.is_least |= scale >= LARGEST_SCALE || is_bound || self.fine.is_some_and(is_stuck);
         self.fine = Some((scale, tets));
         let fewest = self.fewest.map_or(made.report.tets, |fewest| fewest.min(made.report.tets));
         self.fewest = Some(fewest);
@@ -197,24 +202,26 @@ mod tests {
     fn the_best_mesh_of_nearly_the_least_number_wins() {
         let mut search = Search::default();
         let best = |search: &Search| search.best.as_ref().unwrap().1.report.tets;
-        search.too_many(1.0, mesh(1000, 20.0));
-        search.too_many(1.5, mesh(500, 8.0));
+        search.too_many(1.0, mesh(1000, 20.0), None);
+        search.too_many(1.5, mesh(500, 8.0), None);
         assert_eq!(best(&search), 500, "half the tets");
-        search.too_many(2.0, mesh(450, 1.0));
+        search.too_many(2.0, mesh(450, 1.0), None);
         assert_eq!(best(&search), 500, "a tenth more tets and a better angle");
-        search.too_many(3.0, mesh(550, 9.0));
+        search.too_many(3.0, mesh(550, 9.0), None);
         assert_eq!(best(&search), 550);
-        search.too_many(3.5, mesh(600, 30.0));
+        search.too_many(3.5, mesh(600, 30.0), None);
         assert_eq!(best(&search), 550, "600 is more than a quarter above 450");
     }
 
     #[test]
     fn sizes_that_give_hardly_fewer_tets_end_the_search() {
         let mut search = Search::default();
-        assert!(!search.too_many(1.0, mesh(1000, 20.0)));
-        assert!(!search.too_many(4.0, mesh(300, 5.0)));
-        assert!(!search.too_many(6.0, mesh(290, 5.0)), "sizes are hardly larger");
-        assert!(search.too_many(18.0, mesh(280, 5.0)));
+        assert!(!search.too_many(1.0, mesh(1000, 20.0), None));
+        assert!(!search.too_many(4.0, mesh(300, 5.0), None));
+        assert!(!search.too_many(6.0, mesh(290, 5.0), None), "sizes are hardly larger");
+        assert!(search.too_many(18.0, mesh(280, 5.0), None));
         assert!(search.is_least);
+        let few = |share: f64| Search::default().too_many(1.0, mesh(1000, 20.0), Some(share));
+        assert!(few(0.95) && !few(0.5));
     }
 }
