@@ -184,8 +184,8 @@ pub mod run {
     pub use crate::pipeline::part::{Balance, Evened, Part, balance};
     pub use crate::pipeline::target::Outcome;
     pub use crate::pipeline::{
-        CoarseReport, CoarseResult, CoarseSettings, CutCusp, CutSettings, Disk, Entities, GenerateSettings,
-        Level, Refused, SharpPlace, SharpPlaces, Wanted, generate,
+        CoarseReport, CoarseResult, CoarseSettings, CutCusp, CutSettings, Disk, Entities, FlatPlace,
+        GenerateSettings, Level, Refused, SharpPlace, SharpPlaces, ThinRegions, Wanted, generate,
     };
 }
 
@@ -224,7 +224,7 @@ pub mod internals {
     pub use crate::mesher::model::CsgModel;
     pub use crate::mesher::{facets, improve, surface, volume};
     pub use crate::parallel::{distribution, migrate, partition, refine, repartition};
-    pub use crate::pipeline::coarse::CoarseMesh;
+    pub use crate::pipeline::coarse_mesh::CoarseMesh;
     pub use crate::pipeline::facet_model::FacetSolid;
     pub use crate::pipeline::model::{GivenMesh, Model};
     pub use crate::pipeline::retries::Budget;

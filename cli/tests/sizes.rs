@@ -1,6 +1,6 @@
 //! Sizes and lengths that cannot be meshed, and the estimate before a long run.
 
-use crate::common::tetmill;
+use crate::common::{read_json, report_of, tetmill};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::process::Output;
@@ -106,4 +106,44 @@ fn the_expected_number_of_tets_is_announced() {
         let [expected, made] = [after(&note, "about"), after(&summary, "coarse")];
         assert!((0.5..2.0).contains(&(expected / made)), "{name}: {expected}, {made}");
     }
+}
+
+/// A pipe of radius 10 with walls of 1 and flanges of 3, as in heat exchangers.
+fn flanged_pipe(dir: &Path) -> PathBuf {
+    let file = dir.join("pipe.geo");
+    let text = "algebraic3d\n\
+        solid ends = plane (0, 0, 0; 0, 0, -1) and plane (0, 0, 40; 0, 0, 1);\n\
+        solid between = plane (0, 0, 3; 0, 0, -1) and plane (0, 0, 37; 0, 0, 1);\n\
+        solid pipe = cylinder (0, 0, 0; 0, 0, 1; 16) and ends and not cylinder (0, 0, 0; 0, 0, 1; 9)\n\
+        and not (between and not cylinder (0, 0, 0; 0, 0, 1; 10));\ntlo pipe;\n";
+    std::fs::write(&file, text).unwrap();
+    file
+}
+
+#[test]
+fn a_thin_wall_has_good_angles_at_all_presets_and_coarser_ones_take_fewer_tets() {
+    let dir = tempfile::tempdir().unwrap();
+    let pipe = flanged_pipe(dir.path());
+    let [very_coarse, coarse, moderate] = ["very-coarse", "coarse", "moderate"].map(|preset| {
+        let report = report_of(&pipe, &["--preset", preset]);
+        let angle = report["mesh"]["smallest_dihedral"].as_f64().unwrap();
+        assert!(angle > 15.0, "{preset}: {angle}°");
+        report["mesh"]["tets"].as_u64().unwrap()
+    });
+    assert!(very_coarse <= coarse && coarse <= moderate, "{very_coarse}, {coarse}, {moderate}");
+}
+
+#[test]
+fn fewer_tets_than_a_thin_wall_allows_are_reported_once_with_the_number_made() {
+    let dir = tempfile::tempdir().unwrap();
+    let pipe = flanged_pipe(dir.path());
+    let report = dir.path().join("report.json");
+    let output = mesh(&pipe, &["--coarse", "50", "--report", report.to_str().unwrap()]);
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{stderr}");
+    assert_eq!(stderr.matches("50 tets requested").count(), 1, "{stderr}");
+    let report = read_json(&report);
+    // Scaled sizes would let the walls nearly touch, with angles of 0.3°.
+    let angle = report["mesh"]["smallest_dihedral"].as_f64().unwrap();
+    assert!(report["wanted"] == "least" && angle > 1.0, "{} {angle}°", report["wanted"]);
 }

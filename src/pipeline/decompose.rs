@@ -1,7 +1,9 @@
 //! The method `decompose` on all ranks: a geometry is cut into pieces, and each piece is meshed on
 //! its rank.
 
-use super::coarse::{CoarseError, CoarseMesh, CoarseSettings, Sizes, Unmeshed, mesh_surface, smaller_at};
+use super::coarse::{CoarseSettings, Sizes, Unmeshed, mesh_surface};
+use super::coarse_error::{CoarseError, smaller_at};
+use super::coarse_mesh::CoarseMesh;
 use super::error::{Error, RequestError};
 use super::geometry::Geometry;
 use super::model::Model;

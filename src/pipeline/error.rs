@@ -1,6 +1,6 @@
 //! Why a run ends without a mesh.
 
-use super::coarse::CoarseError;
+use super::coarse_error::CoarseError;
 use super::room_error::RoomError;
 use crate::Point;
 use crate::files::WriteError;

@@ -3,7 +3,8 @@
 //! The number of tets is nearly proportional to ∫ dV/h³ over the bodies. The existing mesh,
 //! whatever its sizes, serves for the quadrature, and its number of tets calibrates the factor.
 
-use super::coarse::{CoarseMesh, CoarseSettings};
+use super::coarse::CoarseSettings;
+use super::coarse_mesh::CoarseMesh;
 use super::model::Model;
 use crate::Point;
 use crate::ground::kernel::simplex::volume6;
@@ -59,12 +60,30 @@ pub(super) fn scale_for(
     scale.is_finite().then_some(scale)
 }
 
-/// The settings at another scale. Sources added at this scale grow in proportion at a larger one,
-/// and are small enough at a smaller one.
+/// The fraction of the tets of a mesh `made` with these settings that is expected at a larger scale;
+/// `None` without a size field.
+pub(super) fn share_at(
+    model: &Model,
+    settings: &CoarseSettings,
+    made: &CoarseMesh,
+    own_sources: usize,
+    scale: f64,
+) -> Option<f64> {
+    let integral_at = |scale: f64| {
+        let sizes = at_scale(&settings.size, scale, own_sources);
+        model.size_field(&sizes).map(|size| integral(&made.mesh, &*size))
+    };
+    Some(integral_at(scale)? / integral_at(settings.size.scale)?)
+}
+
+/// The settings at another scale. Sources added at this scale grow at a larger one like the sizes in
+/// thin regions, and are small enough at a smaller one.
 fn at_scale(settings: &SizeSettings, scale: f64, own_sources: usize) -> SizeSettings {
     let mut sizes = SizeSettings { scale, ..settings.clone() };
+    let [old, new] = [settings, &sizes].map(|sizes| sizes.scaled_closeness().ratio);
+    let growth = if old.is_finite() { new / old } else { scale / settings.scale };
     for source in &mut sizes.sources[own_sources..] {
-        source.size *= (scale / settings.scale).max(1.0);
+        source.size *= growth.max(1.0);
     }
     sizes
 }

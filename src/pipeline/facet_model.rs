@@ -1,8 +1,11 @@
 //! Triangulated surfaces as input for the mesher.
 
-use super::coarse::{self, Allowed, Attempt, CoarseError, CoarseMesh, CoarseSettings};
+use super::coarse::{self, Allowed, Attempt, CoarseSettings};
+use super::coarse_error::CoarseError;
+use super::coarse_mesh::CoarseMesh;
 use super::error::{Error, InputError};
 use super::expected;
+use super::fill::fill;
 use super::retries::Budget;
 use super::settings::InputSettings;
 use crate::Point;
@@ -168,7 +171,7 @@ impl FacetSolid {
         self.add_kept_edges(&mut surface);
         let smoothness = FacetSmoothness(&self.model.projector);
         let smoothness: Option<&dyn Smoothness> = if self.keep_surface { None } else { Some(&smoothness) };
-        match coarse::fill(surface, regions, &WatchedSize::new(&size, work), smoothness, settings.effort) {
+        match fill(surface, regions, &WatchedSize::new(&size, work), smoothness, settings.effort) {
             Ok(made) => Attempt::Made(Box::new(made)),
             Err(error) => {
                 // If triangles intersect, smaller sizes were tried already.

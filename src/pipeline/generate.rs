@@ -1,7 +1,7 @@
 //! The methods `refine` and `surface` on all ranks: a coarse mesh is partitioned, distributed,
 //! refined or meshed inside its refined skins, and checked.
 
-use super::coarse::CoarseMesh;
+use super::coarse_mesh::CoarseMesh;
 use super::decompose;
 use super::error::{Error, InvalidMesh, RequestError};
 use super::geometry::Geometry;

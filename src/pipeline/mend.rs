@@ -1,7 +1,8 @@
 //! Makes coarse meshes whose snapped lattices are valid. Where a child would be inverted or poor,
 //! the sizes are lowered; remaining bad children are repaired by curving edges.
 
-use super::coarse::{CoarseError, CoarseMesh};
+use super::coarse_error::CoarseError;
+use super::coarse_mesh::CoarseMesh;
 use super::error::Error;
 use super::model::Model;
 use super::retries::{Budget, INVERTED, POOR};
@@ -59,10 +60,10 @@ pub fn refinable<T>(
             if tried.poor.is_empty() {
                 return Ok(made);
             }
-            if best.as_ref().is_none_or(|(before, _)| tried.smallest_dihedral > before.smallest_dihedral) {
+            if best.as_ref().is_none_or(|best| is_better((&tried, &made.0), (&best.0, &best.1.0))) {
                 best = Some((tried, made));
             }
-        } else if round == INVERTED || budget.is_spent() {
+        } else if best.is_none() && (round == INVERTED || !budget.has_meshes()) {
             let mut coarse = made.0;
             bend(model, &mut coarse, &tried, pieces.min(TRIED_PIECES))?;
             return match tried.error {
@@ -78,6 +79,13 @@ pub fn refinable<T>(
         }
     }
     unreachable!("the loop ends by itself")
+}
+
+/// Whether the first of two tested meshes is better: by the smallest angle of the poor children,
+/// then by the angles of the coarse tets.
+fn is_better(new: (&Trial, &CoarseMesh), old: (&Trial, &CoarseMesh)) -> bool {
+    let by_children = new.0.smallest_dihedral.total_cmp(&old.0.smallest_dihedral);
+    by_children.then_with(|| new.1.report.quality.compare_angles(&old.1.report.quality)).is_gt()
 }
 
 /// The required quality of the children of a coarse mesh.
@@ -126,4 +134,24 @@ pub fn lowered(mesh: &Mesh, tets: &[GlobalId]) -> Vec<Source> {
         corners.into_iter().chain(middles).map(move |point| Source { point, size })
     };
     tets.iter().flat_map(sources).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ground::mesh::QualitySummary;
+
+    #[test]
+    fn the_best_children_decide_which_mesh_is_kept_and_then_the_coarse_angles() {
+        let tried = |smallest_dihedral: f64| Trial { smallest_dihedral, ..Trial::default() };
+        let coarse = |smallest_dihedral: f64| {
+            let mut coarse = CoarseMesh::default();
+            coarse.report.quality = QualitySummary { smallest_dihedral, ..QualitySummary::default() };
+            coarse
+        };
+        let (good, bad) = (coarse(20.0), coarse(10.0));
+        assert!(is_better((&tried(9.0), &bad), (&tried(8.0), &good)));
+        assert!(is_better((&tried(8.0), &good), (&tried(8.0), &bad)));
+        assert!(!is_better((&tried(8.0), &bad), (&tried(8.0), &bad)), "the first of equal ones is kept");
+    }
 }

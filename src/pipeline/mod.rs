@@ -2,11 +2,14 @@
 
 pub mod close;
 pub mod coarse;
+pub mod coarse_error;
+pub mod coarse_mesh;
 pub mod decompose;
 pub mod error;
 mod estimate;
 mod expected;
 pub(crate) mod facet_model;
+mod fill;
 mod generate;
 mod geometry;
 pub mod input;
@@ -32,7 +35,10 @@ mod verify;
 pub mod wanted;
 
 pub use crate::mesher::facets::{SharpPlace, SharpPlaces};
-pub use coarse::{CoarseError, CoarseReport, CoarseSettings, CutCusp};
+pub use crate::mesher::surface::closeness::{FlatPlace, ThinRegions};
+pub use coarse::CoarseSettings;
+pub use coarse_error::CoarseError;
+pub use coarse_mesh::{CoarseReport, CutCusp};
 pub use facet_model::FacetSolid;
 pub use generate::generate;
 pub use geometry::Geometry;

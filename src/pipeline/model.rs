@@ -1,6 +1,8 @@
 //! The model: any kind of input of the mesher.
 
-use super::coarse::{CoarseError, CoarseMesh, CoarseReport, CoarseSettings};
+use super::coarse::CoarseSettings;
+use super::coarse_error::CoarseError;
+use super::coarse_mesh::{CoarseMesh, CoarseReport};
 use super::facet_model::FacetSolid;
 use super::retries::Budget;
 use crate::Point;

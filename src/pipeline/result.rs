@@ -1,6 +1,6 @@
 //! The results of a run.
 
-use super::coarse::CoarseReport;
+use super::coarse_mesh::CoarseReport;
 use super::error::Error;
 use super::part::{Evened, Part};
 use super::target::Outcome;

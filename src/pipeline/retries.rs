@@ -9,8 +9,10 @@
 //! | `coarse::corrected` | curves or triangles cross, or a body cannot be filled | smaller sizes there | [`CORRECTIONS`] |
 //!
 //! An inner loop runs in each round of the outer ones. Their product would be 26,880 meshes, so all
-//! share a [`Budget`]. Once it is spent, each loop ends with the best mesh that it has, or with the
-//! last error. Budgets count meshes, not seconds, so that results do not depend on the machine.
+//! share a [`Budget`]: a number of meshes, and a number of tets in proportion to the first mesh.
+//! Once it is spent, each loop ends with the best mesh that it has, or with the last error. The best
+//! mesh is the one with the largest smallest dihedral angle; for equal angles their histogram
+//! decides. Budgets count meshes and tets, not seconds, so that results do not depend on the machine.
 //!
 //! Nearly all runs need one to ten meshes. Most attempts end early, at the curves or at the
 //! surface: only complete ones take as long as a coarse mesh.
@@ -38,15 +40,22 @@ pub(super) const TARGETS: usize = 24;
 /// of about 1.7, so that gaps of a thousandth of the initial size are resolved.
 pub(super) const CORRECTIONS: u64 = 14;
 
-/// The number of coarse meshes of a run that may be begun. The most seen is 107: for pipes with
-/// walls of a tenth of their radius, of which fewer tets were requested than they can have.
+/// The number of coarse meshes of a run that may be begun.
 const MESHES: u32 = 200;
+
+/// All retries together may make this many times the tets of the first mesh.
+const RETRIED: u64 = 4;
+
+/// Retries may make this number of tets in any case: about five seconds of work.
+const ALWAYS_RETRIED: u64 = 200_000;
 
 /// What the coarse meshes of a run may still use.
 #[derive(Debug)]
 pub struct Budget {
     /// The number of meshes that may still be begun.
     meshes: Cell<u32>,
+    /// The number of tets that retries may still make; `None` before the first mesh.
+    tets: Cell<Option<u64>>,
     /// The memory in bytes; by default the free memory.
     memory: Option<u64>,
     /// The number of tets that was last announced to the user; infinite if none is to be.
@@ -55,7 +64,12 @@ pub struct Budget {
 
 impl Default for Budget {
     fn default() -> Self {
-        Self { meshes: Cell::new(MESHES), memory: None, announced: Cell::new(f64::INFINITY) }
+        Self {
+            meshes: Cell::new(MESHES),
+            tets: Cell::new(None),
+            memory: None,
+            announced: Cell::new(f64::INFINITY),
+        }
     }
 }
 
@@ -89,9 +103,23 @@ impl Budget {
         self.meshes.set(self.meshes.get().saturating_sub(1));
     }
 
-    /// Whether no further mesh should be begun.
+    /// Counts the tets of a complete mesh. The first one sets the number for all retries.
+    pub(super) fn made(&self, tets: u64) {
+        let left = match self.tets.get() {
+            None => (RETRIED * tets).max(ALWAYS_RETRIED),
+            Some(left) => left.saturating_sub(tets),
+        };
+        self.tets.set(Some(left));
+    }
+
+    /// Whether a further mesh may be begun if it is needed at all.
+    pub(super) fn has_meshes(&self) -> bool {
+        self.meshes.get() > 0
+    }
+
+    /// Whether no further mesh should be begun that is only to be better.
     pub(super) fn is_spent(&self) -> bool {
-        self.meshes.get() == 0
+        !self.has_meshes() || self.tets.get() == Some(0)
     }
 }
 
@@ -105,6 +133,23 @@ mod tests {
     use crate::pipeline::target::{Outcome, mesh_to_target};
 
     #[test]
+    fn retries_may_make_tets_in_proportion_to_the_first_mesh() {
+        let spent_after = |first: u64, retries: &[u64]| {
+            let budget = Budget::default();
+            budget.made(first);
+            retries.iter().for_each(|&tets| budget.made(tets));
+            assert!(budget.has_meshes());
+            budget.is_spent()
+        };
+        assert!(!spent_after(1_000_000, &[]));
+        assert!(!spent_after(1_000_000, &[RETRIED * 1_000_000 - 1]));
+        assert!(spent_after(1_000_000, &[1_000_000; RETRIED as usize]));
+        // Small meshes are made again as often as is worth it.
+        assert!(!spent_after(1000, &[1000; 100]));
+        assert!(spent_after(1000, &[1000; ALWAYS_RETRIED as usize / 1000]));
+    }
+
+    #[test]
     fn a_spent_budget_ends_the_search_for_a_number_of_tets_with_the_mesh_that_is_there() {
         let ball = "algebraic3d\nsolid ball = sphere (0, 0, 0; 1);\ntlo ball;\n";
         let geometry = Geometry::from_text(ball).unwrap();
@@ -114,9 +159,11 @@ mod tests {
             mesh_to_target(&geometry.model, &mut settings, 3_000, &fits, budget, Work::unwatched()).unwrap()
         };
         let (budget, small) = (Budget::default(), Budget { meshes: Cell::new(1), ..Budget::default() });
+        let few_tets = Budget { tets: Cell::new(Some(1)), ..Budget::default() };
         assert_eq!(search(&budget).1, Outcome::Reached);
         assert!(budget.meshes.get() < MESHES - 1, "one mesh was enough: the test needs another number");
         assert_eq!(search(&small).1, Outcome::Jumped);
-        assert!(small.is_spent());
+        assert_eq!(search(&few_tets).1, Outcome::Jumped);
+        assert!(small.is_spent() && few_tets.is_spent() && few_tets.meshes.get() == MESHES - 1);
     }
 }

@@ -1,6 +1,8 @@
 //! Finds sizes for a requested number of tets.
 
-use super::coarse::{CoarseError, CoarseMesh, CoarseSettings};
+use super::coarse::CoarseSettings;
+use super::coarse_error::CoarseError;
+use super::coarse_mesh::CoarseMesh;
 use super::estimate;
 use super::model::Model;
 use super::retries::{Budget, TARGETS};
@@ -30,8 +32,20 @@ const LARGEST_SCALE: f64 = 1e3;
 /// A bracket of scales narrower than this factor is not divided further.
 const NARROW: f64 = 1.002;
 
+/// Sizes larger by this factor that give hardly fewer tets end the search: the geometry decides the
+/// number.
+const MUCH_LARGER: f64 = 2.0;
+
+/// The fraction of the number of tets that counts as hardly fewer.
+const HARDLY_FEWER: f64 = 0.9;
+
+/// Meshes with up to this many times the least number of tets are candidates if none fits; the best
+/// of them is taken, because the coarsest one may have far worse tets than one with a few more.
+const NEARLY_LEAST: f64 = 1.25;
+
 /// Makes a coarse mesh whose number of tets `fits`, near the `target` or up to half above it, by
-/// scaling all sizes; otherwise the one with the least number above the target.
+/// scaling all sizes. Otherwise the result is the best of the meshes that have nearly the least
+/// number above the target.
 ///
 /// Upper bounds set by the user or the file (`maxh`) are respected.
 ///
@@ -46,89 +60,168 @@ pub fn mesh_to_target(
     work: &Work,
 ) -> Result<(CoarseMesh, Outcome), CoarseError> {
     let goal = AIM * target as f64;
-    let sources = settings.size.sources.len();
-    let mut fine: Option<(f64, CoarseMesh)> = None;
-    let mut coarse: Option<(f64, f64)> = None;
-    let mut finest_failure: Option<CoarseError> = None;
+    let (sources, grading) = (settings.size.sources.len(), settings.size.grading);
+    let mut search = Search::default();
     for tries in 0..TARGETS {
         work.proceed()?;
         if tries > 0 && budget.is_spent() {
             break;
         }
+        // What the last mesh added belongs to its scale.
         settings.size.sources.truncate(sources);
+        settings.size.grading = grading;
+        let scale = settings.size.scale;
         let made = match model.coarse_mesh(settings, budget, work) {
             Ok(made) => made,
             Err(error @ (CoarseError::Room(_) | CoarseError::Cancelled(_))) => return Err(error),
             // The sizes are too large for the geometry despite all corrections: treat this as too
             // few tets.
             Err(error) => {
-                coarse = Some((settings.size.scale, 0.5 * target as f64));
-                finest_failure = Some(error);
-                settings.size.scale =
-                    next_scale(settings.size.scale, goal, 0.5 * goal, None, fine.as_ref(), coarse);
+                search.coarse = Some((scale, 0.5 * target as f64));
+                search.failure = Some(error);
+                settings.size.scale = search.next_scale(scale, goal, 0.5 * goal, None);
                 continue;
             }
         };
-        let count = made.report.tets as f64;
         if fits(made.report.tets) {
             return Ok((made, Outcome::Reached));
         }
-        let scale = settings.size.scale;
+        let count = made.report.tets;
         // If estimates do not narrow the bracket, continue without them.
         let expected = (tries < TRUSTED_TRIES)
             .then(|| estimate::scale_for(model, settings, &made, sources, goal))
             .flatten();
-        if made.report.tets < target {
-            coarse = Some((scale, count));
+        if count < target {
+            search.coarse = Some((scale, count as f64));
         } else {
-            if scale >= LARGEST_SCALE {
-                return Ok((made, Outcome::Least));
+            let share = estimate::share_at(model, settings, &made, sources, LARGEST_SCALE);
+            if search.too_many(scale, made, share) {
+                break;
             }
-            fine = Some((scale, made));
         }
-        if let (Some((low, _)), Some((high, _))) = (&fine, coarse)
-            && high / low < NARROW
-        {
+        if search.is_narrow() {
             break;
         }
-        settings.size.scale = next_scale(scale, goal, count, expected, fine.as_ref(), coarse);
+        settings.size.scale = search.next_scale(scale, goal, count as f64, expected);
     }
-    match (fine, finest_failure) {
+    match (search.best, search.failure) {
         (Some((scale, made)), _) => {
             settings.size.scale = scale;
-            Ok((made, Outcome::Jumped))
+            Ok((made, if search.is_least { Outcome::Least } else { Outcome::Jumped }))
         }
         (None, Some(error)) => Err(error),
         (None, None) => model.coarse_mesh(settings, budget, work).map(|made| (made, Outcome::Jumped)),
     }
 }
 
-/// The scale to try next: the `expected` one if it is inside the bracket, else from the number of
-/// tets, which goes with the third power of the scale.
-fn next_scale(
-    scale: f64,
-    goal: f64,
-    count: f64,
-    expected: Option<f64>,
-    fine: Option<&(f64, CoarseMesh)>,
+/// The state of a search for sizes.
+#[derive(Default)]
+struct Search {
+    /// The largest scale that gave too many tets, and their number.
+    fine: Option<(f64, f64)>,
+    /// The smallest scale that gave too few tets or none, and their number.
     coarse: Option<(f64, f64)>,
-) -> f64 {
-    match (fine, coarse) {
-        (Some((low, made)), Some((high, few))) => {
-            // Linear between the logarithms, kept away from the ends so that the bracket shrinks.
-            let (low_log, high_log) = (low.ln(), high.ln());
-            let (many, few) = ((made.report.tets as f64).ln(), few.max(1.0).ln());
-            let share = match expected {
-                Some(expected) => (expected.ln() - low_log) / (high_log - low_log),
-                None => (many - goal.ln()) / (many - few),
-            };
-            (low_log + share.clamp(0.15, 0.85) * (high_log - low_log)).exp()
+    /// The last failure at a scale.
+    failure: Option<CoarseError>,
+    /// The least number of tets above the target.
+    fewest: Option<u64>,
+    /// The best mesh with nearly that number, and its scale.
+    best: Option<(f64, CoarseMesh)>,
+    /// Whether larger sizes give hardly fewer tets.
+    is_least: bool,
+}
+
+impl Search {
+    /// Adds a mesh with too many tets, of which a `share` is expected at the largest scale. Returns
+    /// whether larger sizes give hardly fewer.
+    fn too_many(&mut self, scale: f64, made: CoarseMesh, share: Option<f64>) -> bool {
+        let tets = made.report.tets as f64;
+        let is_stuck = |(before, more): (f64, f64)| {
+            let is_far = scale >= MUCH_LARGER * before || self.failure.is_some();
+            is_far && tets >= HARDLY_FEWER * more
+        };
+        let is_bound = share.is_some_and(|share| share >= HARDLY_FEWER);
+        self.is_least |= scale >= LARGEST_SCALE || is_bound || self.fine.is_some_and(is_stuck);
+        self.fine = Some((scale, tets));
+        let fewest = self.fewest.map_or(made.report.tets, |fewest| fewest.min(made.report.tets));
+        self.fewest = Some(fewest);
+        let most = NEARLY_LEAST * fewest as f64;
+        let is_best = |best: &CoarseMesh| {
+            best.report.tets as f64 > most || made.report.quality.compare_angles(&best.report.quality).is_gt()
+        };
+        if tets <= most && self.best.as_ref().is_none_or(|(_, best)| is_best(best)) {
+            self.best = Some((scale, made));
         }
-        // Still too many: coarsen ever faster, because some numbers hardly depend on the sizes.
-        (Some(_), None) => (scale * (count / goal).cbrt().max(1.5).powi(2).min(16.0)).min(LARGEST_SCALE),
-        _ => {
-            let finer = expected.map_or((count / goal).cbrt(), |expected| expected / scale);
-            scale * finer.clamp(0.05, 0.9)
+        self.is_least
+    }
+
+    /// Whether the bracket is too narrow to be divided.
+    fn is_narrow(&self) -> bool {
+        self.fine.zip(self.coarse).is_some_and(|((low, _), (high, _))| high / low < NARROW)
+    }
+
+    /// The scale to try next: the `expected` one if it is inside the bracket, else from the number of
+    /// tets, which goes with the third power of the scale.
+    fn next_scale(&self, scale: f64, goal: f64, count: f64, expected: Option<f64>) -> f64 {
+        match (self.fine, self.coarse) {
+            (Some((low, many)), Some((high, few))) => {
+                // Linear between the logarithms, kept away from the ends so that the bracket shrinks.
+                let (low_log, high_log) = (low.ln(), high.ln());
+                let (many, few) = (many.ln(), few.max(1.0).ln());
+                let share = match expected {
+                    Some(expected) => (expected.ln() - low_log) / (high_log - low_log),
+                    None => (many - goal.ln()) / (many - few),
+                };
+                (low_log + share.clamp(0.15, 0.85) * (high_log - low_log)).exp()
+            }
+            // Still too many: coarsen ever faster, because some numbers hardly depend on the sizes.
+            (Some(_), None) => (scale * (count / goal).cbrt().max(1.5).powi(2).min(16.0)).min(LARGEST_SCALE),
+            _ => {
+                let finer = expected.map_or((count / goal).cbrt(), |expected| expected / scale);
+                scale * finer.clamp(0.05, 0.9)
+            }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ground::mesh::QualitySummary;
+    use crate::pipeline::coarse_mesh::CoarseReport;
+
+    fn mesh(tets: u64, smallest_dihedral: f64) -> CoarseMesh {
+        let quality = QualitySummary { smallest_dihedral, ..QualitySummary::default() };
+        CoarseMesh {
+            report: CoarseReport { tets, quality, ..CoarseReport::default() },
+            ..CoarseMesh::default()
+        }
+    }
+
+    #[test]
+    fn the_best_mesh_of_nearly_the_least_number_wins() {
+        let mut search = Search::default();
+        let best = |search: &Search| search.best.as_ref().unwrap().1.report.tets;
+        search.too_many(1.0, mesh(1000, 20.0), None);
+        search.too_many(1.5, mesh(500, 8.0), None);
+        assert_eq!(best(&search), 500, "half the tets");
+        search.too_many(2.0, mesh(450, 1.0), None);
+        assert_eq!(best(&search), 500, "a tenth more tets and a better angle");
+        search.too_many(3.0, mesh(550, 9.0), None);
+        assert_eq!(best(&search), 550);
+        search.too_many(3.5, mesh(600, 30.0), None);
+        assert_eq!(best(&search), 550, "600 is more than a quarter above 450");
+    }
+
+    #[test]
+    fn sizes_that_give_hardly_fewer_tets_end_the_search() {
+        let mut search = Search::default();
+        assert!(!search.too_many(1.0, mesh(1000, 20.0), None));
+        assert!(!search.too_many(4.0, mesh(300, 5.0), None));
+        assert!(!search.too_many(6.0, mesh(290, 5.0), None), "sizes are hardly larger");
+        assert!(search.too_many(18.0, mesh(280, 5.0), None));
+        assert!(search.is_least);
+        let few = |share: f64| Search::default().too_many(1.0, mesh(1000, 20.0), Some(share));
+        assert!(few(0.95) && !few(0.5));
     }
 }

@@ -5,7 +5,8 @@
 //! fits: small enough that the coarse mesh takes little time, but large enough for good shapes and
 //! balanced parts.
 
-use super::coarse::{CoarseMesh, CoarseSettings};
+use super::coarse::CoarseSettings;
+use super::coarse_mesh::CoarseMesh;
 use super::error::Error;
 use super::mend;
 use super::model::Model;

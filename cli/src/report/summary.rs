@@ -3,7 +3,7 @@
 use super::{Report, counted, grouped, tets, vertices};
 use std::fmt;
 use tetmill::memory::sized;
-use tetmill::run::{CoarseReport, Entities, Evened, PeriodicCheck, Refused, SharpPlace};
+use tetmill::run::{CoarseReport, Entities, Evened, FlatPlace, PeriodicCheck, Refused, SharpPlace};
 
 /// Writes the line about thin regions.
 fn write_thin_regions(f: &mut fmt::Formatter<'_>, coarse: &CoarseReport) -> fmt::Result {
@@ -16,6 +16,14 @@ fn write_thin_regions(f: &mut fmt::Formatter<'_>, coarse: &CoarseReport) -> fmt:
             write!(f, "sizes lowered there, except where this takes far more tets (--closeness forces it)")?;
         }
         _ => write!(f, "too thin, sizes not lowered (--closeness forces it, at the cost of many tets)")?,
+    }
+    if let Some(place) = &walls.flattest {
+        let (FlatPlace { point: [x, y, z], thickness, size }, angle) = (place, place.prism_angle());
+        write!(
+            f,
+            "\n           one layer of tets of size {size:.3e} in a wall of {thickness:.3e} has angles below \
+             {angle:.1}°: at ({x:.4e}, {y:.4e}, {z:.4e})"
+        )?;
     }
     writeln!(f)
 }

@@ -6,6 +6,7 @@ use crate::ground::kernel::quality::{Diagonal, squared_lengths, worst_child_squa
 use crate::ground::kernel::simplex::{dihedral_cosines, volume6};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use std::cmp::Ordering;
 
 /// Shape statistics of a mesh's tets.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -91,6 +92,16 @@ impl QualitySummary {
         summary.median = rank(50);
         summary
     }
+
+    /// Compares two meshes: greater is the one with the larger smallest dihedral angle, or for equal
+    /// angles the one with the smaller share of tets in the first bin that differs.
+    pub(crate) fn compare_angles(&self, other: &Self) -> Ordering {
+        let share = |bin: usize, of: &Self, total: &Self| of.histogram[bin] as u128 * total.tets as u128;
+        let bins = 0..self.histogram.len().min(other.histogram.len());
+        let by_bins = bins.map(|k| share(k, other, self).cmp(&share(k, self, other)));
+        let by_angle = self.smallest_dihedral.total_cmp(&other.smallest_dihedral);
+        by_angle.then_with(|| by_bins.fold(Ordering::Equal, Ordering::then))
+    }
 }
 
 fn measure(points: &[Point], tets: &[[VertexId; 4]]) -> Part {
@@ -129,6 +140,22 @@ mod tests {
     use super::*;
     use crate::ground::kernel::quality::mean_ratio;
     use crate::ground::kernel::simplex::dihedral_angles;
+
+    #[test]
+    fn the_smallest_angle_decides_which_mesh_is_better_and_then_the_share_of_small_angles() {
+        let mesh = |smallest_dihedral: f64, histogram: &[usize]| QualitySummary {
+            smallest_dihedral,
+            tets: histogram.iter().sum(),
+            histogram: histogram.to_vec(),
+            ..QualitySummary::default()
+        };
+        let few_bad = mesh(7.0, &[0, 1, 99]);
+        assert!(mesh(8.0, &[0, 60, 40]).compare_angles(&few_bad).is_gt());
+        assert!(mesh(7.0, &[0, 2, 98]).compare_angles(&few_bad).is_lt());
+        // The larger mesh has more small angles, but a smaller share of them.
+        assert!(mesh(7.0, &[0, 2, 298]).compare_angles(&few_bad).is_gt());
+        assert!(mesh(7.0, &[0, 2, 198]).compare_angles(&few_bad).is_eq());
+    }
 
     #[test]
     fn a_summary_counts_every_tet_and_finds_the_worst() {

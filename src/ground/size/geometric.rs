@@ -29,6 +29,12 @@ pub struct SizeSettings {
     pub function: Option<SizeFunction>,
 }
 
+/// The largest size in thin regions that a scale leads to, in units of the thickness: that of one
+/// layer of prisms with a smallest dihedral angle of 15° (see [`Preset::closeness`]). Without it,
+/// the walls of coarse meshes nearly touch: the heat exchanger of
+/// `benches/results/coarser-2026-11-23.md` had angles of 0.3° for two thirds of the tets.
+const FLATTEST: f64 = 4.3;
+
 impl From<Preset> for SizeSettings {
     fn from(preset: Preset) -> Self {
         Self {
@@ -54,10 +60,11 @@ impl Default for SizeSettings {
 impl SizeSettings {
     /// How far sizes are lowered in thin regions, under [`scale`](Self::scale).
     ///
-    /// With a scale above 1, thin regions get fewer tets too; with a scale below 1, they do not
-    /// need more.
+    /// With a scale above 1, thin regions get fewer tets too, up to [`FLATTEST`]; with a scale
+    /// below 1, they do not need more.
     pub fn scaled_closeness(&self) -> Closeness {
-        Closeness { ratio: self.closeness.ratio * self.scale.max(1.0), ..self.closeness }
+        let (Closeness { ratio, most }, scale) = (self.closeness, self.scale.max(1.0));
+        Closeness { ratio: ratio.max((ratio * scale).min(FLATTEST)), most: most * scale }
     }
 
     /// The largest size in a body with a bound in the file, or without one.
@@ -116,4 +123,24 @@ impl SizeField for GeometricSize<'_> {
 
 pub(super) fn contains(geometry: &Geometry, solid: &Solid, point: &Point) -> bool {
     solid.contains(&|surface| geometry.surfaces[surface.index()].value(point) > 0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_scale_coarsens_thin_regions_up_to_one_layer_of_good_prisms() {
+        let at = |ratio: f64, scale: f64| {
+            let closeness = Closeness { ratio, most: 8.0 };
+            SizeSettings { closeness, scale, ..SizeSettings::default() }.scaled_closeness()
+        };
+        assert_eq!(at(2.0, 0.5), Closeness { ratio: 2.0, most: 8.0 });
+        assert_eq!(at(2.0, 1.5), Closeness { ratio: 3.0, most: 12.0 });
+        assert_eq!(at(2.0, 100.0).ratio, FLATTEST);
+        assert_eq!(at(6.0, 100.0).ratio, 6.0, "a larger ratio was requested");
+        assert_eq!(at(f64::INFINITY, 100.0).ratio, f64::INFINITY);
+        let prism = (2.0 / (3.0_f64.sqrt() * FLATTEST)).atan().to_degrees();
+        assert!((14.9..15.1).contains(&prism), "{prism}°");
+    }
 }

@@ -21,6 +21,15 @@ impl Closeness {
     }
 }
 
+/// The size in thin regions of the two coarsest presets, in units of the thickness.
+///
+/// One layer of prisms of height 1 over regular triangles of side k, each split into three tets, has
+/// a smallest dihedral angle of atan(2/(√3·k)): 15° for k = 4.3. Edges are up to √2 longer than the
+/// size, which leaves k = 3; and the triangulations on both sides are independent and curved. The
+/// heat exchanger of `benches/results/coarser-2026-11-23.md` has a smallest angle of 13.5° for 2.5
+/// and 15.1° for 2.2.
+const COARSEST_RATIO: f64 = 2.2;
+
 /// A named fineness level.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
@@ -75,8 +84,7 @@ impl Preset {
     /// How far sizes are lowered in thin regions.
     pub fn closeness(self) -> Closeness {
         match self {
-            Self::VeryCoarse => Closeness::OFF,
-            Self::Coarse => Closeness { ratio: 3.0, most: 4.0 },
+            Self::VeryCoarse | Self::Coarse => Closeness { ratio: COARSEST_RATIO, most: 8.0 },
             Self::Moderate => Closeness { ratio: 2.0, most: 8.0 },
             Self::Fine => Closeness { ratio: 1.5, most: 16.0 },
             Self::VeryFine => Closeness { ratio: 1.0, most: 32.0 },

@@ -30,6 +30,8 @@ pub(super) struct Inserter {
     point: Point,
     /// The least score of the tets of `point` and `faces`.
     worst: f64,
+    /// The number of tets added to cavities so far: the work of all searches.
+    visited: usize,
 }
 
 /// A face of the cavity's surface, oriented so that it forms a positive tet with a point inside.
@@ -97,6 +99,11 @@ impl Inserter {
         (distances.fold(f64::INFINITY, f64::min), sum / (3 * self.faces.len()) as f64)
     }
 
+    /// The number of tets added to cavities so far: the work of all searches.
+    pub fn visited(&self) -> usize {
+        self.visited
+    }
+
     /// The position of the new vertex.
     pub fn point(&self) -> &Point {
         &self.point
@@ -135,6 +142,7 @@ impl Inserter {
     /// Adds a tet to the cavity: shared faces vanish, its other faces become faces of the cavity.
     fn take(&mut self, complex: &Complex, objective: &Objective, tet: u32) {
         self.cavity.push(tet);
+        self.visited += 1;
         for (k, corners) in TET_FACES.iter().enumerate() {
             if let Some(old) = self.faces.iter().position(|f| f.beyond == Some((tet, k))) {
                 self.faces.swap_remove(old);

@@ -64,7 +64,7 @@ mod samples;
 
 pub use legality::{GeometrySmoothness, Smoothness};
 pub use objective::Measure;
-pub use schedule::{Effort, Report, Settings, improve, make_refinable};
+pub use schedule::{Effort, InsertionSteps, Report, Settings, improve, make_refinable};
 
 #[cfg(test)]
 mod tests;

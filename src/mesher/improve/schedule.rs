@@ -1,5 +1,6 @@
 //! The order of operations: the worst tets first, and only where something changed.
 
+use crate::ground::kernel::simplex::largest_cosine;
 use crate::ground::mesh::QualitySummary;
 use crate::ground::mesh::{Mesh, VertexId};
 use crate::ground::size::SizeField;
@@ -32,6 +33,8 @@ pub struct Settings {
     /// The shortest edge made by an insertion, in units of the wanted size or the usual edge length
     /// there, whichever is less.
     pub shortest_edge: f64,
+    /// The most tets that the searches for insertions visit in a block.
+    pub insertion_steps: InsertionSteps,
     /// The most partial fillings visited by reconnections, per pass over a block.
     pub reconnection_steps: usize,
     /// Dihedral angle in degrees that no change may undercut, if no tet is below it at first.
@@ -39,6 +42,32 @@ pub struct Settings {
     pub least_angle: f64,
     /// The number of tets per block, the unit of parallel work; see [`improve`].
     pub block: usize,
+}
+
+/// A number of steps in proportion to the tets of a block.
+///
+/// If triangles are much larger than a body is thick, all its tets are bad, few insertions help, and
+/// each tet is tried in every pass. Without the limit, a heat exchanger with one layer of such tets
+/// visited 124 tets for each of its own, in 11 s; good meshes visit fewer than 0.5
+/// (`benches/results/coarser-2026-11-23.md`).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct InsertionSteps {
+    /// Steps for any block: about half a second.
+    pub of_block: usize,
+    /// Further steps for each tet.
+    pub of_tet: usize,
+}
+
+impl InsertionSteps {
+    fn of(self, tets: usize) -> usize {
+        self.of_block + self.of_tet * tets
+    }
+}
+
+impl Default for InsertionSteps {
+    fn default() -> Self {
+        Self { of_block: 50_000, of_tet: 1 }
+    }
 }
 
 impl Default for Settings {
@@ -101,6 +130,7 @@ impl Settings {
             target,
             change_below: 0.6,
             shortest_edge: 0.6,
+            insertion_steps: InsertionSteps::default(),
             reconnection_steps,
             least_angle: 0.0,
             block: 1 << 15,
@@ -125,6 +155,8 @@ pub struct Report {
     pub collapses: usize,
     /// Vertices added, including those of repairs.
     pub insertions: usize,
+    /// Tets visited by the searches for insertions.
+    pub insertion_steps: usize,
     /// Cavities refilled with other tets of the same vertices.
     pub reconnections: usize,
     /// Illegal tets before; 0 if legality is not considered.
@@ -153,6 +185,10 @@ struct Tools {
 /// Below this mean ratio (slivers of 10° or so) all candidate cavities of a tet are tried for
 /// insertion, with edges as short as [`SHORTER`] times the usual limit.
 const TERRIBLE: f64 = 0.35;
+
+/// Cosine of 16°: tets with a smaller dihedral angle are treated like those below [`TERRIBLE`]. In
+/// one layer of tets between independent triangulations, a few of 10° to 15° have mean ratios above.
+const SHARP: f64 = 0.961_261_695_938_318_9;
 
 /// See [`TERRIBLE`].
 const SHORTER: f64 = 0.5;
@@ -292,6 +328,11 @@ fn is_fresh(complex: &Complex, vertex: u32) -> bool {
     complex.touched[vertex as usize] + 1 >= complex.pass
 }
 
+/// See [`SHARP`].
+fn is_sharp(complex: &Complex, tet: u32) -> bool {
+    largest_cosine(&complex.corners(complex.tets[tet as usize])) > SHARP
+}
+
 /// Whether the slot still holds the tet with this score, because ids are reused.
 fn is_still(complex: &Complex, score: f64, tet: u32) -> bool {
     complex.is_alive(tet) && complex.scores[tet as usize].to_bits() == score.to_bits()
@@ -305,6 +346,7 @@ struct Counts {
     swaps: usize,
     collapses: usize,
     insertions: usize,
+    insertion_steps: usize,
     reconnections: usize,
 }
 
@@ -321,6 +363,7 @@ impl Report {
         self.swaps += counts.swaps;
         self.collapses += counts.collapses;
         self.insertions += counts.insertions;
+        self.insertion_steps += counts.insertion_steps;
         self.reconnections += counts.reconnections;
     }
 }
@@ -335,6 +378,7 @@ impl Tools {
         settings: &Settings,
     ) -> Counts {
         let mut counts = Counts::default();
+        let most_steps = settings.insertion_steps.of(complex.tets.len());
         complex.score_all(objective);
         for pass in 1..=settings.passes {
             complex.pass = pass;
@@ -346,7 +390,7 @@ impl Tools {
                 self.repair(complex, objective, &mut counts);
             }
             self.smooth(complex, objective, settings, &mut counts);
-            self.collapse_and_insert(complex, objective, size, settings, &mut counts);
+            self.collapse_and_insert(complex, objective, size, (settings, most_steps), &mut counts);
             let changes = counts.changes() - before;
             if pass > 1 && (changes as f64) < FEW_CHANGES * complex.tets.len() as f64 {
                 break;
@@ -402,7 +446,7 @@ impl Tools {
         complex: &mut Complex,
         objective: &Objective,
         size: &dyn SizeField,
-        settings: &Settings,
+        (settings, most_steps): (&Settings, usize),
         counts: &mut Counts,
     ) {
         let least = score_of_ratio(settings.change_below.min(settings.target));
@@ -416,9 +460,13 @@ impl Tools {
                 counts.collapses += 1;
                 continue;
             }
-            let is_terrible = score < score_of_ratio(TERRIBLE) && rescues > 0;
+            let is_terrible = (score < score_of_ratio(TERRIBLE) || is_sharp(complex, t)) && rescues > 0;
             rescues -= usize::from(is_terrible);
-            if self.insert(complex, objective, size, settings, t, is_terrible) {
+            let visited = self.inserter.visited();
+            let may_insert = counts.insertion_steps < most_steps;
+            let inserted = may_insert && self.insert(complex, objective, size, settings, t, is_terrible);
+            counts.insertion_steps += self.inserter.visited() - visited;
+            if inserted {
                 counts.insertions += 1;
             } else if self.reconnector.improve(complex, objective, t, &mut steps) {
                 counts.reconnections += 1;

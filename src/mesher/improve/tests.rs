@@ -5,7 +5,7 @@ use super::legality::Legality;
 use super::samples::{
     HollowCube, UnitSphere, ball, cube, fan, half_ball, hollow_cube, refined_on_sphere, two_boxes,
 };
-use super::{Effort, Measure, Report, Settings, Smoothness, improve, make_refinable};
+use super::{Effort, InsertionSteps, Measure, Report, Settings, Smoothness, improve, make_refinable};
 use crate::ground::kernel::simplex::volume;
 use crate::ground::mesh::QualitySummary;
 use crate::ground::mesh::{BoundaryTriangle, Class, Mesh, Segment, VertexId};
@@ -49,6 +49,25 @@ fn check(before: &Mesh, after: &Mesh, report: &Report) {
         }
     }
     assert_eq!(report.after, QualitySummary::of(after));
+}
+
+#[test]
+fn insertions_end_with_their_budget_and_the_mesh_is_valid() {
+    let before = cube(6, 1);
+    let settings = Settings { change_below: 0.9, target: 0.9, ..Settings::default() };
+    let run = |settings: &Settings| {
+        let mut mesh = before.clone();
+        let report = improve(&mut mesh, &UniformSize(0.4), settings);
+        check(&before, &mesh, &report);
+        report.insertion_steps
+    };
+    let full = run(&settings);
+    assert!(full > 10_000, "{full} steps are too few for this test");
+    let insertion_steps = InsertionSteps { of_block: full / 10, of_tet: 0 };
+    let limited = run(&Settings { insertion_steps, ..settings.clone() });
+    assert!(limited >= full / 10 && limited < full / 3, "{limited} of {full} steps");
+    let none = InsertionSteps { of_block: 0, of_tet: 0 };
+    assert_eq!(run(&Settings { insertion_steps: none, ..settings }), 0);
 }
 
 #[test]

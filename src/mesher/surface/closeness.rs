@@ -72,6 +72,27 @@ pub struct ThinRegions {
     pub limited: u64,
     /// The least thickness among them (length).
     pub thinnest: Option<f64>,
+    /// The place where the size remains largest relative to the thickness, if it is too large.
+    pub flattest: Option<FlatPlace>,
+}
+
+/// A place of a thin region whose size remains larger than [`Closeness::ratio`] thicknesses.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct FlatPlace {
+    /// A point on the surface.
+    pub point: [f64; 3],
+    /// The thickness there (length).
+    pub thickness: f64,
+    /// The size there (length).
+    pub size: f64,
+}
+
+impl FlatPlace {
+    /// The smallest dihedral angle of a layer of prisms of this thickness over regular triangles
+    /// of this size, degrees. Tets between independent triangulations have smaller ones.
+    pub fn prism_angle(&self) -> f64 {
+        (2.0 * self.thickness / (3.0_f64.sqrt() * self.size)).atan().to_degrees()
+    }
 }
 
 /// Sources that lower the sizes in thin regions, and statistics of these regions.
@@ -91,16 +112,30 @@ pub fn thin_regions(walls: &Walls) -> (Vec<Source>, ThinRegions) {
         .collect();
     let places = places.concat();
     found.places = places.len() as u64;
-    found.limited = places.iter().filter(|place| place.limited).count() as u64;
+    let limited = || places.iter().filter(|place| place.limited);
+    found.limited = limited().count() as u64;
+    found.flattest = limited().map(Place::flat).max_by(|a, b| {
+        let flatness = |place: &FlatPlace| place.size / place.thickness;
+        flatness(a).total_cmp(&flatness(b)).then_with(|| b.point.partial_cmp(&a.point).expect("finite"))
+    });
     found.thinnest = places.iter().map(|place| place.thickness).min_by(f64::total_cmp);
     (thinned(places.into_iter().filter_map(|place| place.source).collect()), found)
 }
 
 #[derive(Clone, Copy)]
 struct Place {
+    point: Point,
+    /// The size, lowered if that is worth it.
+    size: f64,
     source: Option<Source>,
     thickness: f64,
     limited: bool,
+}
+
+impl Place {
+    fn flat(&self) -> FlatPlace {
+        FlatPlace { point: self.point.into(), thickness: self.thickness, size: self.size }
+    }
 }
 
 struct Prober<'a> {
@@ -186,7 +221,8 @@ impl<'a> Prober<'a> {
             halves.into_iter().for_each(|half| self.probe(t, into, half, halvings - 1, places));
         } else if wanted < WORTH * size {
             let source = (lowered < WORTH * size).then_some(Source { point: middle, size: lowered });
-            places.push(Place { source, thickness, limited: wanted < lowered });
+            let size = source.map_or(size, |source| source.size);
+            places.push(Place { point: middle, size, source, thickness, limited: wanted < lowered });
         }
     }
 
