@@ -31,7 +31,7 @@ class Run:
         (scratch / "tmp").mkdir(exist_ok=True)
         if ranks:
             # Each rank writes its process id, and is the program from then on.
-            start = f'echo $$ > {pids}/$OMPI_COMM_WORLD_RANK.new; mv {pids}/$OMPI_COMM_WORLD_RANK.new {pids}/$OMPI_COMM_WORLD_RANK; '
+            start = f'echo $PMIX_NAMESPACE > {pids}/job; echo $$ > {pids}/$OMPI_COMM_WORLD_RANK.new; mv {pids}/$OMPI_COMM_WORLD_RANK.new {pids}/$OMPI_COMM_WORLD_RANK; '
             script = start + (rank_prefix or "") + ' exec "$@"'
             arguments = ["mpirun", "-n", str(ranks), "sh", "-c", script, "tetmill", *arguments]
             environment.update(OMPI_ALLOW_RUN_AS_ROOT="1", OMPI_ALLOW_RUN_AS_ROOT_CONFIRM="1", OMPI_MCA_rmaps_base_oversubscribe="1")
@@ -207,8 +207,10 @@ def alive(pids):
     return [pid for pid in pids if runs(pid)]
 
 
-def shared_memory():
-    return set(os.listdir("/dev/shm"))
+def segments_of(run):
+    """The segments of shared memory that Open MPI named after the job and has not removed."""
+    job = (run.scratch / "pids" / "job").read_text().strip() if run.ranks else ""
+    return [name for name in os.listdir("/dev/shm") if job and f".{int(job):x}." in name]
 
 
 class Bench:
@@ -248,7 +250,6 @@ class Bench:
             self.prepare(target)
             stack.callback(shutil.rmtree, target)
             old, new = self.with_user(self.old, target), self.with_user(self.new, target)
-            segments = shared_memory()
             began = time.time()
             run = self.inject(fault, target, disk)
             status = run.end()
@@ -256,7 +257,7 @@ class Bench:
             time.sleep(0.2)
             state = state_of(snapshot(target), old, new)
             left = sum(file.stat().st_size for folder in target.glob(STAGING) for file in folder.rglob("*") if file.is_file())
-            processes, segments = alive(run.pids()), shared_memory() - segments
+            processes, segments = alive(run.pids()), segments_of(run)
             if fault.room:
                 (disk / "filler").unlink(missing_ok=True)
                 subprocess.run(["mount", "-o", f"remount,size={4 * needed}m", disk], check=True)

@@ -174,9 +174,9 @@ impl FacetModel {
         Ok(assemble(joined, &regions, found, bounds, rounding))
     }
 
-    /// Pairs of facets that intersect improperly, by exact predicates: their patches, and a point of
-    /// the intersection. Remeshing may remove such intersections if they come from rounding; kept
-    /// facets with intersections are rejected by the volume mesher.
+    /// Pairs of facets that intersect improperly, by exact predicates: their patches, and a point
+    /// of the intersection. Remeshing may remove such intersections if they come from rounding;
+    /// kept facets with intersections are rejected by the volume mesher.
     pub fn intersections(&self) -> Vec<([PatchId; 2], Point)> {
         let corners: Vec<[u32; 3]> = self.triangles.iter().map(|t| t.vertices.map(|v| v.0)).collect();
         let patches = |pair: [u32; 2]| pair.map(|t| self.triangles[t as usize].patch);
