@@ -1,11 +1,12 @@
 //! Makes coarse meshes whose snapped lattices are valid. Where a child would be inverted or poor,
-//! the sizes are lowered; remaining bad children are repaired by curving edges.
+//! the sizes are lowered; remaining bad children are repaired by curving edges. Between facets edges
+//! are curved first, because smaller tets are as bad at a bend.
 
 use super::coarse_error::CoarseError;
 use super::coarse_mesh::CoarseMesh;
 use super::error::Error;
 use super::model::Model;
-use super::retries::{Budget, INVERTED, POOR};
+use super::retries::{Budget, INVERTED, INVERTED_FACETS, POOR};
 use crate::ground::mesh::{GlobalId, Mesh, TET_EDGES};
 use crate::ground::projector::Projector;
 use crate::ground::size::Source;
@@ -47,12 +48,18 @@ pub fn refinable<T>(
     budget: &Budget,
     mut make: impl FnMut(&[Source]) -> Result<(CoarseMesh, T), CoarseError>,
 ) -> Result<(CoarseMesh, T), Error> {
+    let pieces = pieces.min(TRIED_PIECES);
+    let is_faceted = matches!(model, Model::Facets(_));
+    let most_rounds = if is_faceted { INVERTED_FACETS } else { INVERTED };
     let mut sources = Vec::new();
     let mut best: Option<(Trial, (CoarseMesh, T))> = None;
     for round in 0.. {
         let mut made = make(&sources)?;
         made.0.report.size_corrections += round;
-        let tried = refinement_test(model, &made.0, pieces.min(TRIED_PIECES))?;
+        let mut tried = refinement_test(model, &made.0, pieces)?;
+        if is_faceted && !tried.inverted.is_empty() {
+            tried = bend_inverted(model, &mut made.0, tried, pieces)?;
+        }
         for tets in [&tried.inverted, &tried.poor] {
             sources.extend(lowered(&made.0.mesh, tets));
         }
@@ -63,9 +70,11 @@ pub fn refinable<T>(
             if best.as_ref().is_none_or(|best| is_better((&tried, &made.0), (&best.0, &best.1.0))) {
                 best = Some((tried, made));
             }
-        } else if best.is_none() && (round == INVERTED || !budget.has_meshes()) {
+        } else if best.is_none() && (round == most_rounds || !budget.has_meshes()) {
             let mut coarse = made.0;
-            bend(model, &mut coarse, &tried, pieces.min(TRIED_PIECES))?;
+            if !is_faceted {
+                bend(model, &mut coarse, &tried, pieces)?;
+            }
             return match tried.error {
                 Some(error) if coarse.displacements.is_empty() => Err(error.into()),
                 _ => Ok((coarse, made.1)),
@@ -74,7 +83,7 @@ pub fn refinable<T>(
         if (round >= POOR || budget.is_spent())
             && let Some((tried, mut made)) = best
         {
-            bend(model, &mut made.0, &tried, pieces.min(TRIED_PIECES))?;
+            bend(model, &mut made.0, &tried, pieces)?;
             return Ok(made);
         }
     }
@@ -107,8 +116,39 @@ fn refinement_test(model: &Model, coarse: &CoarseMesh, pieces: u32) -> Result<Tr
 
 /// Curves edges of a coarse mesh with bad children, if that improves the worst of them.
 fn bend(model: &Model, coarse: &mut CoarseMesh, before: &Trial, pieces: u32) -> Result<(), Error> {
+    if let Some((displacements, after)) = curved(model, coarse, before, pieces)? {
+        let is_better = after.poor.is_empty() || after.smallest_dihedral > before.smallest_dihedral;
+        if after.inverted.is_empty() && is_better {
+            coarse.displacements = displacements;
+        }
+    }
+    Ok(())
+}
+
+/// Curves edges of a coarse mesh with inverted children, if none are left then. Returns the
+/// refinement test of the mesh, or that with the curved edges if fewer are inverted: sizes need to be
+/// lowered only where curved edges do not help.
+fn bend_inverted(model: &Model, coarse: &mut CoarseMesh, before: Trial, pieces: u32) -> Result<Trial, Error> {
+    Ok(match curved(model, coarse, &before, pieces)? {
+        Some((displacements, after)) if after.inverted.is_empty() => {
+            coarse.displacements = displacements;
+            after
+        }
+        Some((_, after)) if after.inverted.len() < before.inverted.len() => after,
+        _ => before,
+    })
+}
+
+/// Searches curved edges for a coarse mesh with few bad children; returns them with the refinement
+/// test.
+fn curved(
+    model: &Model,
+    coarse: &CoarseMesh,
+    before: &Trial,
+    pieces: u32,
+) -> Result<Option<(EdgeDisplacements, Trial)>, Error> {
     if before.poor.len() + before.inverted.len() > MOST_BENT {
-        return Ok(());
+        return Ok(None);
     }
     let (part, projector, least) =
         (distribution::from_serial(coarse.mesh.clone())?, model.projector(), least(coarse));
@@ -116,11 +156,7 @@ fn bend(model: &Model, coarse: &mut CoarseMesh, before: &Trial, pieces: u32) -> 
     let settings = refine::mend::Settings { pieces, least, margin, enough, ..Default::default() };
     let displacements = refine::mend(&part, &projector, &settings)?.displacements;
     let after = refine::trial(&part, &projector, pieces, &displacements, least)?;
-    let is_better = after.poor.is_empty() || after.smallest_dihedral > before.smallest_dihedral;
-    if after.inverted.is_empty() && is_better {
-        coarse.displacements = displacements;
-    }
-    Ok(())
+    Ok(Some((displacements, after)))
 }
 
 /// Sources for smaller tets around the given ones: at their corners and edge midpoints, because one
