@@ -17,7 +17,7 @@ use crate::mesher::surface::closeness::{ThinRegions, Walls, thin_regions};
 use crate::mesher::surface::curves::{crowded, mesh_curves};
 use crate::mesher::surface::narrow::narrow;
 use crate::mesher::surface::{self, SurfaceError, SurfaceMesh};
-use csg::features::{Named, Pair, Place};
+use csg::features::{Named, Place};
 
 /// How a coarse mesh is made.
 #[derive(Clone, Debug, Default)]
