@@ -196,7 +196,8 @@ impl Projector {
 /// A gap between surfaces can be wider between the points of a trace than at them by this factor.
 const GAP_ROOM: f64 = 1.25;
 
-/// The largest distance of curves and corners from the surfaces of the adjacent patches. `rounding` is the accuracy of points on two surfaces.
+/// The largest distance of curves and corners from the surfaces of the adjacent patches. `rounding`
+/// is the accuracy of points on two surfaces.
 fn widest_gap(geometry: &Geometry, features: &Features, rounding: f64) -> f64 {
     let surface = |patch: PatchId| &geometry.surfaces[features.patch(patch).surface.index()];
     let of_curve = |curve: &crate::Curve| {

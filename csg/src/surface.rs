@@ -105,8 +105,9 @@ impl Surface {
         dispatch!(self, p => p.curvature(point))
     }
 
-    /// The largest curvature of a normal section at a point on the surface whose center of curvature
-    /// is on the side of `direction`, 1/length; 0 if the surface bends to the other side only.
+    /// The largest curvature of a normal section at a point on the surface whose center of
+    /// curvature is on the side of `direction`, 1/length; 0 if the surface bends to the other side
+    /// only.
     pub fn curvature_towards(&self, point: &Point, direction: &Vector) -> f64 {
         let gradient = self.gradient(point);
         let Some(normal) = gradient.try_normalize(0.0) else { return 0.0 };

@@ -17,8 +17,8 @@ const NARROW: f64 = 0.01;
 /// than a hundredth.
 const SHORT: f64 = 0.005;
 
-/// Gaps between edges that need more segments than this are refused: there are some hundred tets for
-/// each. Closer edges are probably meant as one.
+/// Gaps between edges that need more segments than this are refused: there are some hundred tets
+/// for each. Closer edges are probably meant as one.
 const MOST_SEGMENTS: f64 = 1000.0;
 
 /// Two surfaces that stay apart only in small elements.

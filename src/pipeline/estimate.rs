@@ -60,7 +60,8 @@ pub(super) fn scale_for(
     scale.is_finite().then_some(scale)
 }
 
-/// The fraction of the tets of a mesh `made` with these settings that is expected at a larger scale;
+/// The fraction of the tets of a mesh `made` with these settings that is expected at a larger
+/// scale;
 /// `None` without a size field.
 pub(super) fn share_at(
     model: &Model,
@@ -76,8 +77,8 @@ pub(super) fn share_at(
     Some(integral_at(scale)? / integral_at(settings.size.scale)?)
 }
 
-/// The settings at another scale. Sources added at this scale grow at a larger one like the sizes in
-/// thin regions, and are small enough at a smaller one.
+/// The settings at another scale. Sources added at this scale grow at a larger one like the sizes
+/// in thin regions, and are small enough at a smaller one.
 fn at_scale(settings: &SizeSettings, scale: f64, own_sources: usize) -> SizeSettings {
     let mut sizes = SizeSettings { scale, ..settings.clone() };
     let [old, new] = [settings, &sizes].map(|sizes| sizes.scaled_closeness().ratio);

@@ -1,6 +1,6 @@
 //! Makes coarse meshes whose snapped lattices are valid. Where a child would be inverted or poor,
-//! the sizes are lowered; remaining bad children are repaired by curving edges. Between facets edges
-//! are curved first, because smaller tets are as bad at a bend.
+//! the sizes are lowered; remaining bad children are repaired by curving edges. Between facets
+//! edges are curved first, because smaller tets are as bad at a bend.
 
 use super::coarse_error::CoarseError;
 use super::coarse_mesh::CoarseMesh;
@@ -126,8 +126,8 @@ fn bend(model: &Model, coarse: &mut CoarseMesh, before: &Trial, pieces: u32) -> 
 }
 
 /// Curves edges of a coarse mesh with inverted children, if none are left then. Returns the
-/// refinement test of the mesh, or that with the curved edges if fewer are inverted: sizes need to be
-/// lowered only where curved edges do not help.
+/// refinement test of the mesh, or that with the curved edges if fewer are inverted: sizes need to
+/// be lowered only where curved edges do not help.
 fn bend_inverted(model: &Model, coarse: &mut CoarseMesh, before: Trial, pieces: u32) -> Result<Trial, Error> {
     Ok(match curved(model, coarse, &before, pieces)? {
         Some((displacements, after)) if after.inverted.is_empty() => {

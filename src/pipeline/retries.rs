@@ -11,9 +11,10 @@
 //!
 //! An inner loop runs in each round of the outer ones. Their product would be 26,880 meshes, so all
 //! share a [`Budget`]: a number of meshes, and a number of tets in proportion to the first mesh.
-//! Once it is spent, each loop ends with the best mesh that it has, or with the last error. The best
-//! mesh is the one with the largest smallest dihedral angle; for equal angles their histogram
-//! decides. Budgets count meshes and tets, not seconds, so that results do not depend on the machine.
+//! Once it is spent, each loop ends with the best mesh that it has, or with the last error. The
+//! best mesh is the one with the largest smallest dihedral angle; for equal angles their histogram
+//! decides. Budgets count meshes and tets, not seconds, so that results do not depend on the
+//! machine.
 //!
 //! Nearly all runs need one to ten meshes. Most attempts end early, at the curves or at the
 //! surface: only complete ones take as long as a coarse mesh.
@@ -32,8 +33,9 @@ pub(super) const REFINEMENTS: usize = 4;
 pub(super) const INVERTED: u64 = 20;
 
 /// The same for facets. The surface bends by the same angle between two facets however small the
-/// tets are, so smaller sizes remove no inverted tets there: a scan had 9 in the first round and 1914
-/// after twenty. Each round still is another attempt to curve its edges, of which about half succeed.
+/// tets are, so smaller sizes remove no inverted tets there: a scan had 9 in the first round and
+/// 1914 after twenty. Each round still is another attempt to curve its edges, of which about half
+/// succeed.
 pub(super) const INVERTED_FACETS: u64 = 8;
 
 /// Maximum number of rounds in which sizes are lowered because of poor tets too.

@@ -160,12 +160,13 @@ impl Search {
         self.fine.zip(self.coarse).is_some_and(|((low, _), (high, _))| high / low < NARROW)
     }
 
-    /// The scale to try next: the `expected` one if it is inside the bracket, else from the number of
-    /// tets, which goes with the third power of the scale.
+    /// The scale to try next: the `expected` one if it is inside the bracket, else from the number
+    /// of tets, which goes with the third power of the scale.
     fn next_scale(&self, scale: f64, goal: f64, count: f64, expected: Option<f64>) -> f64 {
         match (self.fine, self.coarse) {
             (Some((low, many)), Some((high, few))) => {
-                // Linear between the logarithms, kept away from the ends so that the bracket shrinks.
+                // Linear between the logarithms, kept away from the ends so that the bracket
+                // shrinks.
                 let (low_log, high_log) = (low.ln(), high.ln());
                 let (many, few) = (many.ln(), few.max(1.0).ln());
                 let share = match expected {

@@ -93,8 +93,8 @@ impl QualitySummary {
         summary
     }
 
-    /// Compares two meshes: greater is the one with the larger smallest dihedral angle, or for equal
-    /// angles the one with the smaller share of tets in the first bin that differs.
+    /// Compares two meshes: greater is the one with the larger smallest dihedral angle, or for
+    /// equal angles the one with the smaller share of tets in the first bin that differs.
     pub(crate) fn compare_angles(&self, other: &Self) -> Ordering {
         let share = |bin: usize, of: &Self, total: &Self| of.histogram[bin] as u128 * total.tets as u128;
         let bins = 0..self.histogram.len().min(other.histogram.len());

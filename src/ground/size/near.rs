@@ -32,12 +32,12 @@ const ROOM: f64 = 2.5;
 const WEDGE: f64 = 4.0;
 
 /// Sizes are not lowered by more than this factor because of a gap: the number of triangles there
-/// grows by its square. The wall of a pipe may be 1/4,000 of its radius. Closer surfaces are probably
-/// meant as one.
+/// grows by its square. The wall of a pipe may be 1/4,000 of its radius. Closer surfaces are
+/// probably meant as one.
 const LARGEST_REDUCTION: f64 = 20.0;
 
-/// The distance on both sides of a surface at which it is told whether it is a boundary, in units of
-/// the gap.
+/// The distance on both sides of a surface at which it is told whether it is a boundary, in units
+/// of the gap.
 const SIDE: f64 = 0.25;
 
 impl NearSurfaces {

@@ -23,11 +23,11 @@ impl Closeness {
 
 /// The size in thin regions of the two coarsest presets, in units of the thickness.
 ///
-/// One layer of prisms of height 1 over regular triangles of side k, each split into three tets, has
-/// a smallest dihedral angle of atan(2/(√3·k)): 15° for k = 4.3. Edges are up to √2 longer than the
-/// size, which leaves k = 3; and the triangulations on both sides are independent and curved. The
-/// heat exchanger of `benches/results/coarser-2026-11-23.md` has a smallest angle of 14.2° for 2.5
-/// and 16.1° for 2.2.
+/// One layer of prisms of height 1 over regular triangles of side k, each split into three tets,
+/// has a smallest dihedral angle of atan(2/(√3·k)): 15° for k = 4.3. Edges are up to √2 longer than
+/// the size, which leaves k = 3; and the triangulations on both sides are independent and curved.
+/// The heat exchanger of `benches/results/coarser-2026-11-23.md` has a smallest angle of 14.2° for
+/// 2.5 and 16.1° for 2.2.
 const COARSEST_RATIO: f64 = 2.2;
 
 /// A named fineness level.

@@ -46,9 +46,9 @@ pub struct Settings {
 
 /// A number of steps in proportion to the tets of a block.
 ///
-/// If triangles are much larger than a body is thick, all its tets are bad, few insertions help, and
-/// each tet is tried in every pass. Without the limit, a heat exchanger with one layer of such tets
-/// visited 124 tets for each of its own, in 11 s; good meshes visit fewer than 0.5
+/// If triangles are much larger than a body is thick, all its tets are bad, few insertions help,
+/// and each tet is tried in every pass. Without the limit, a heat exchanger with one layer of such
+/// tets visited 124 tets for each of its own, in 11 s; good meshes visit fewer than 0.5
 /// (`benches/results/coarser-2026-11-23.md`).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct InsertionSteps {
@@ -187,7 +187,8 @@ struct Tools {
 const TERRIBLE: f64 = 0.35;
 
 /// Cosine of 16°: tets with a smaller dihedral angle are treated like those below [`TERRIBLE`]. In
-/// one layer of tets between independent triangulations, a few of 10° to 15° have mean ratios above.
+/// one layer of tets between independent triangulations, a few of 10° to 15° have mean ratios
+/// above.
 const SHARP: f64 = 0.961_261_695_938_318_9;
 
 /// See [`TERRIBLE`].

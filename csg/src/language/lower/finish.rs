@@ -13,8 +13,8 @@ use crate::geometry::{
 use crate::{Geometry, Seam, Solid, SurfaceId};
 
 impl Lowering<'_> {
-    /// The geometry; meaningless if there are errors in the report. Surfaces within `merge` (length)
-    /// are taken as one.
+    /// The geometry; meaningless if there are errors in the report. Surfaces within `merge`
+    /// (length) are taken as one.
     pub(super) fn finish(mut self, merge: f64) -> Geometry {
         if self.tlos.is_empty() && !self.report.has_errors() {
             let message = "there is no top-level object, hence nothing to mesh";

@@ -37,8 +37,8 @@ pub(super) struct Classes {
 }
 
 impl Classes {
-    /// Finds equal surfaces in `raw`; `used` are the indices used by bodies. Surfaces within `merge`
-    /// (length) are equal in any case.
+    /// Finds equal surfaces in `raw`; `used` are the indices used by bodies. Surfaces within
+    /// `merge` (length) are equal in any case.
     pub fn find(raw: &[RawSurface], used: &BTreeSet<usize>, merge: f64) -> Self {
         let place = Place::of(used.iter().filter_map(|&i| raw[i].surface.as_ref()), merge);
         let mut cells: HashMap<Cell, Vec<usize>> = HashMap::new();
