@@ -95,7 +95,7 @@ mod tests {
             let sagitta = near.iter().map(|near| (1.3 * near.size).powi(2) / 8.0).fold(0.0, f64::max);
             assert!((0.4..0.6).contains(&(sagitta / wall)), "{sagitta} at {wall}");
         }
-        let thinner = near(&pipe(1e-6));
+        let thinner = near(&pipe(1e-5));
         assert!(!thinner.is_empty() && thinner.iter().all(|near| !near.is_resolved));
     }
 

@@ -56,6 +56,7 @@ mod objective;
 mod reconnect;
 mod repair;
 mod schedule;
+mod settings;
 mod smooth;
 mod swap;
 
@@ -64,7 +65,8 @@ mod samples;
 
 pub use legality::{GeometrySmoothness, Smoothness};
 pub use objective::Measure;
-pub use schedule::{Effort, InsertionSteps, Report, Settings, improve, make_refinable};
+pub use schedule::{Report, improve, make_refinable};
+pub use settings::{Effort, InsertionSteps, Settings};
 
 #[cfg(test)]
 mod tests;

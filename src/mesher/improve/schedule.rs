@@ -10,133 +10,14 @@ use crate::mesher::improve::collapse::Collapser;
 use crate::mesher::improve::complex::Complex;
 use crate::mesher::improve::insert::Inserter;
 use crate::mesher::improve::legality::{Legality, Smoothness};
-use crate::mesher::improve::objective::{Measure, Objective, score_of_ratio};
+use crate::mesher::improve::objective::{Objective, score_of_ratio};
 use crate::mesher::improve::reconnect::Reconnector;
 use crate::mesher::improve::repair::{Candidate, candidates, repair};
+use crate::mesher::improve::settings::Settings;
 use crate::mesher::improve::smooth::Smoother;
 use crate::mesher::improve::swap::Swapper;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-
-/// Settings of the improvement.
-#[derive(Clone, Debug)]
-pub struct Settings {
-    /// The shape measure.
-    pub measure: Measure,
-    /// The most passes over the mesh.
-    pub passes: u32,
-    /// Tets with a measure below this are swapped and smoothed.
-    pub target: f64,
-    /// Tets that stay below this, and below the target, are also treated by collapses, insertions
-    /// and reconnections.
-    pub change_below: f64,
-    /// The shortest edge made by an insertion, in units of the wanted size or the usual edge length
-    /// there, whichever is less.
-    pub shortest_edge: f64,
-    /// The most tets that the searches for insertions visit in a block.
-    pub insertion_steps: InsertionSteps,
-    /// The most partial fillings visited by reconnections, per pass over a block.
-    pub reconnection_steps: usize,
-    /// Dihedral angle in degrees that no change may undercut, if no tet is below it at first.
-    /// Without it the smallest angle may decrease, although the worst measure increases.
-    pub least_angle: f64,
-    /// The number of tets per block, the unit of parallel work; see [`improve`].
-    pub block: usize,
-}
-
-/// A number of steps in proportion to the tets of a block.
-///
-/// If triangles are much larger than a body is thick, all its tets are bad, few insertions help,
-/// and each tet is tried in every pass. Without the limit, a heat exchanger with one layer of such
-/// tets visited 124 tets for each of its own, in 11 s; good meshes visit fewer than 0.5
-/// (`benches/results/coarser-2026-11-23.md`).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct InsertionSteps {
-    /// Steps for any block: about half a second.
-    pub of_block: usize,
-    /// Further steps for each tet.
-    pub of_tet: usize,
-}
-
-impl InsertionSteps {
-    fn of(self, tets: usize) -> usize {
-        self.of_block + self.of_tet * tets
-    }
-}
-
-impl Default for InsertionSteps {
-    fn default() -> Self {
-        Self { of_block: 50_000, of_tet: 1 }
-    }
-}
-
-impl Default for Settings {
-    fn default() -> Self {
-        Self::of(Effort::default())
-    }
-}
-
-/// Trade-off between time and quality.
-///
-/// On the surface `cube_100k` (benches/results), a hundred thousand tets on one core, meshing takes
-/// 0.14 s and gives a 1st percentile of the smallest dihedral angles of 21°. With improvement the
-/// total is 0.19 s and 31° for quick, 0.22 s and 34° for standard, 0.28 s and 36° for careful, 0.49
-/// s and 37° for thorough.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
-pub enum Effort {
-    /// One pass over bad tets only: removes slivers.
-    Quick,
-    /// All tets except good ones.
-    #[default]
-    Standard,
-    /// Like standard with more passes: for coarse meshes, in which each tet has many descendants.
-    Careful,
-    /// Nearly all tets, until little changes.
-    Thorough,
-}
-
-impl Effort {
-    /// All efforts in ascending order, with their names.
-    pub const ALL: [(Self, &str); 4] = [
-        (Self::Quick, "quick"),
-        (Self::Standard, "standard"),
-        (Self::Careful, "careful"),
-        (Self::Thorough, "thorough"),
-    ];
-}
-
-impl std::str::FromStr for Effort {
-    type Err = String;
-
-    fn from_str(name: &str) -> Result<Self, String> {
-        let found = Self::ALL.iter().find(|(_, n)| *n == name).map(|(effort, _)| *effort);
-        found.ok_or_else(|| format!("unknown effort `{name}`; use {}", Self::ALL.map(|(_, n)| n).join(", ")))
-    }
-}
-
-impl Settings {
-    /// The settings of an effort.
-    pub fn of(effort: Effort) -> Self {
-        let (passes, target, reconnection_steps) = match effort {
-            Effort::Quick => (1, 0.7, 0),
-            Effort::Standard => (3, 0.8, 4_000),
-            Effort::Careful => (8, 0.85, 4_000),
-            Effort::Thorough => (8, 0.9, 40_000),
-        };
-        let measure = Measure::default();
-        Self {
-            measure,
-            passes,
-            target,
-            change_below: 0.6,
-            shortest_edge: 0.6,
-            insertion_steps: InsertionSteps::default(),
-            reconnection_steps,
-            least_angle: 0.0,
-            block: 1 << 15,
-        }
-    }
-}
 
 /// Statistics of the improvement.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -186,11 +67,6 @@ struct Tools {
 /// insertion, with edges as short as [`SHORTER`] times the usual limit.
 const TERRIBLE: f64 = 0.35;
 
-/// Cosine of 16°: tets with a smaller dihedral angle are treated like those below [`TERRIBLE`]. In
-/// one layer of tets between independent triangulations, a few of 10° to 15° have mean ratios
-/// above.
-const SHARP: f64 = 0.961_261_695_938_318_9;
-
 /// See [`TERRIBLE`].
 const SHORTER: f64 = 0.5;
 
@@ -201,6 +77,11 @@ const RESCUES: usize = 100;
 
 /// See [`RESCUES`].
 const TETS_A_RESCUE: usize = 50;
+
+/// Cosine of 16°: tets with a smaller dihedral angle at last get the same treatment as those below
+/// [`TERRIBLE`]. In one layer of tets between independent triangulations, a few of 10° to 15° have
+/// mean ratios above it.
+const SHARP: f64 = 0.961_261_695_938_318_9;
 
 /// Rounds over the mesh: all tets, then those left at the seams between blocks, then those at the
 /// seams of that round, which are few and form one block.
@@ -329,11 +210,6 @@ fn is_fresh(complex: &Complex, vertex: u32) -> bool {
     complex.touched[vertex as usize] + 1 >= complex.pass
 }
 
-/// See [`SHARP`].
-fn is_sharp(complex: &Complex, tet: u32) -> bool {
-    largest_cosine(&complex.corners(complex.tets[tet as usize])) > SHARP
-}
-
 /// Whether the slot still holds the tet with this score, because ids are reused.
 fn is_still(complex: &Complex, score: f64, tet: u32) -> bool {
     complex.is_alive(tet) && complex.scores[tet as usize].to_bits() == score.to_bits()
@@ -397,6 +273,7 @@ impl Tools {
                 break;
             }
         }
+        self.blunt(complex, objective, size, (settings, most_steps), &mut counts);
         counts
     }
 
@@ -461,29 +338,69 @@ impl Tools {
                 counts.collapses += 1;
                 continue;
             }
-            let is_terrible = (score < score_of_ratio(TERRIBLE) || is_sharp(complex, t)) && rescues > 0;
+            let is_terrible = score < score_of_ratio(TERRIBLE) && rescues > 0;
             rescues -= usize::from(is_terrible);
-            let visited = self.inserter.visited();
             let may_insert = counts.insertion_steps < most_steps;
-            let inserted = may_insert && self.insert(complex, objective, size, settings, t, is_terrible);
-            counts.insertion_steps += self.inserter.visited() - visited;
-            if inserted {
-                counts.insertions += 1;
-            } else if self.reconnector.improve(complex, objective, t, &mut steps) {
+            if may_insert && self.insert(complex, objective, size, (settings, is_terrible), t, counts) {
+                continue;
+            }
+            if self.reconnector.improve(complex, objective, t, &mut steps) {
                 counts.reconnections += 1;
             }
         }
     }
 
-    /// Inserts the vertex that raises the worst score around a tet most.
+    /// Insertions at the tets that are still sharp, the sharpest first. They make no sharper ones,
+    /// which the scores alone would allow.
+    fn blunt(
+        &mut self,
+        complex: &mut Complex,
+        objective: &Objective,
+        size: &dyn SizeField,
+        (settings, most_steps): (&Settings, usize),
+        counts: &mut Counts,
+    ) {
+        let least = score_of_ratio(settings.change_below.min(settings.target));
+        let cosine = |complex: &Complex, t: u32| largest_cosine(&complex.corners(complex.tets[t as usize]));
+        let low = complex.living().filter(|&t| complex.scores[t as usize] < least);
+        let mut sharp: Vec<(f64, f64, u32)> = low
+            .map(|t| (cosine(complex, t), complex.scores[t as usize], t))
+            .filter(|&(cosine, ..)| cosine > SHARP)
+            .collect();
+        sharp.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.2.cmp(&b.2)));
+        sharp.truncate(RESCUES + complex.tets.len() / TETS_A_RESCUE);
+        for (cosine, score, t) in sharp {
+            if is_still(complex, score, t) && counts.insertion_steps < most_steps {
+                let strict = Objective { sharpest: cosine.min(objective.sharpest), ..*objective };
+                self.insert(complex, &strict, size, (settings, true), t, counts);
+            }
+        }
+    }
+
+    /// Inserts the vertex that raises the worst score around a tet most, and counts it.
     fn insert(
         &mut self,
         complex: &mut Complex,
         objective: &Objective,
         size: &dyn SizeField,
-        settings: &Settings,
+        (settings, is_terrible): (&Settings, bool),
         tet: u32,
-        is_terrible: bool,
+        counts: &mut Counts,
+    ) -> bool {
+        let visited = self.inserter.visited();
+        let inserted = self.try_insert(complex, objective, size, (settings, is_terrible), tet);
+        counts.insertion_steps += self.inserter.visited() - visited;
+        counts.insertions += usize::from(inserted);
+        inserted
+    }
+
+    fn try_insert(
+        &mut self,
+        complex: &mut Complex,
+        objective: &Objective,
+        size: &dyn SizeField,
+        (settings, is_terrible): (&Settings, bool),
+        tet: u32,
     ) -> bool {
         let (tries, least_edge) = if is_terrible { (usize::MAX, SHORTER) } else { (1, 1.0) };
         let mut best: Option<(f64, Candidate)> = None;
