@@ -59,7 +59,7 @@ impl CloseSurfaces {
         let [first, second] = [own(of, beside), own(beside, of)];
         let Gap { at, width: gap, needed, segments, .. } = *gap;
         let close = Self { first, second, place: Place(at), gap, needed, around: initial.size_at(&at) };
-        if segments > MOST_SEGMENTS { Err(TooClose { close }) } else { Ok(close) }
+        if segments > MOST_SEGMENTS { Err(TooClose::new(close)) } else { Ok(close) }
     }
 
     /// The closest walls that lower the sizes, if they are narrow.
@@ -134,12 +134,12 @@ fn note_of_edge(model: &CsgModel, short: &ShortCurve) -> Option<String> {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{close}: {}", advice(.close))]
 pub struct TooClose {
-    close: CloseSurfaces,
+    close: Box<CloseSurfaces>,
 }
 
 impl TooClose {
     pub(super) fn new(close: CloseSurfaces) -> Self {
-        Self { close }
+        Self { close: Box::new(close) }
     }
 }
 

@@ -128,7 +128,7 @@ pub(super) fn corrected(
 /// Why there is no surface mesh, or none that can be filled.
 pub(super) enum Unmeshed {
     /// Smaller sizes are needed, because of a very narrow gap if one is given.
-    Lower(Vec<Source>, Option<CloseSurfaces>),
+    Lower(Vec<Source>, Option<Box<CloseSurfaces>>),
     Failed(CoarseError),
 }
 
@@ -176,7 +176,7 @@ pub(super) fn mesh_surface(
         let mut lower: Vec<Source> = crowded.places.into_iter().map(|place| place.source).collect();
         lower.extend(narrow(&curves, features, projector, [size, initial]));
         if !lower.is_empty() {
-            return Err(Unmeshed::Lower(lower, gap));
+            return Err(Unmeshed::Lower(lower, gap.map(Box::new)));
         }
     }
     let ends = |s: &Segment| s.vertices.map(|v| curves.points[v.index()]);

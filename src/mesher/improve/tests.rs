@@ -176,13 +176,19 @@ fn any_number_of_threads_gives_the_same_mesh() {
 
 #[test]
 fn blocks_leave_no_bad_tets_at_their_seams() {
-    for block in [500, 2000] {
-        let before = two_boxes(8, 1);
+    let before = two_boxes(8, 1);
+    let improved = |block: usize| {
         let mut mesh = before.clone();
         let settings = Settings { block, ..Settings::of(Effort::Thorough) };
         let report = improve(&mut mesh, &UniformSize(0.3), &settings);
         check(&before, &mesh, &report);
-        assert!(report.after.smallest_dihedral > 25.0, "{:?}", report.after);
+        report.after.smallest_dihedral
+    };
+    let whole = improved(usize::MAX);
+    assert!(whole > 20.0, "{whole}°");
+    for block in [500, 2000] {
+        let angle = improved(block);
+        assert!(angle > 0.9 * whole, "blocks of {block}: {angle}° instead of {whole}°");
     }
 }
 
