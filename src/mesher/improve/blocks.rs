@@ -112,6 +112,12 @@ impl Cut {
         cut
     }
 
+    /// Whether a vertex of a block is on a seam. `vertices` are those that the block had at first;
+    /// added ones are not.
+    pub fn is_on_seam(&self, vertices: &[u32], vertex: u32) -> bool {
+        vertices.get(vertex as usize).is_some_and(|&vertex| self.on_seam[vertex as usize])
+    }
+
     /// Marks the vertices with tets in more than one block; tets outside the round count as one
     /// block.
     fn find_seam(&mut self, mesh: &Mesh) {
@@ -278,8 +284,7 @@ impl Block {
             for v in tet.into_iter().filter(|&v| v as usize >= old) {
                 new_body[v as usize - old] = Some(body);
             }
-            let on_seam = |&v: &u32| (v as usize) < old && cut.on_seam[vertices[v as usize] as usize];
-            if is_bad(complex.scores[t as usize]) && tet.iter().any(on_seam) {
+            if is_bad(complex.scores[t as usize]) && tet.iter().any(|&v| cut.is_on_seam(&vertices, v)) {
                 finished.left.push(finished.tets.len() as u32);
             }
             finished.tets.push(tet);

@@ -148,7 +148,8 @@ fn run(mesh: &mut Mesh, size: &dyn SizeField, legality: Option<&Legality>, setti
                 let counts = if size.work().is_cancelled() {
                     Counts::default()
                 } else {
-                    tools.improve(&mut block.complex, &objective, size, settings)
+                    let Block { complex, vertices, .. } = &mut block;
+                    tools.improve(complex, &objective, size, settings, &|v| cut.is_on_seam(vertices, v))
                 };
                 size.work().add(1);
                 let met = std::mem::take(&mut block.triangles);
@@ -206,6 +207,32 @@ fn worst_first(complex: &Complex, least: f64) -> Vec<(f64, u32)> {
     bad
 }
 
+/// A tet with a small dihedral angle.
+struct Sharp {
+    /// The cosine of the angle.
+    cosine: f64,
+    score: f64,
+    tet: u32,
+}
+
+/// The tets below the target that are sharper than [`SHARP`], the sharpest first.
+fn sharpest_first(complex: &Complex, settings: &Settings) -> Vec<Sharp> {
+    let least = score_of_ratio(settings.change_below.min(settings.target));
+    let measured = |tet: u32| {
+        let cosine = largest_cosine(&complex.corners(complex.tets[tet as usize]));
+        Sharp { cosine, score: complex.scores[tet as usize], tet }
+    };
+    let low = complex.living().filter(|&t| complex.scores[t as usize] < least);
+    let mut sharp: Vec<Sharp> = low.map(measured).filter(|sharp| sharp.cosine > SHARP).collect();
+    sharp.sort_unstable_by(|a, b| b.cosine.total_cmp(&a.cosine).then(a.tet.cmp(&b.tet)));
+    sharp
+}
+
+/// See [`RESCUES`].
+fn most_rescues(complex: &Complex) -> usize {
+    RESCUES + complex.tets.len() / TETS_A_RESCUE
+}
+
 fn is_fresh(complex: &Complex, vertex: u32) -> bool {
     complex.touched[vertex as usize] + 1 >= complex.pass
 }
@@ -246,13 +273,14 @@ impl Report {
 }
 
 impl Tools {
-    /// Improves one block.
+    /// Improves one block; `is_on_seam` returns whether a vertex has tets in other blocks.
     fn improve(
         &mut self,
         complex: &mut Complex,
         objective: &Objective,
         size: &dyn SizeField,
         settings: &Settings,
+        is_on_seam: &dyn Fn(u32) -> bool,
     ) -> Counts {
         let mut counts = Counts::default();
         let most_steps = settings.insertion_steps.of(complex.tets.len());
@@ -273,7 +301,11 @@ impl Tools {
                 break;
             }
         }
-        self.blunt(complex, objective, size, (settings, most_steps), &mut counts);
+        // Those on a seam are left to the next round, whose other operations may do without a
+        // vertex.
+        let mut sharp = sharpest_first(complex, settings);
+        sharp.retain(|sharp| !complex.tets[sharp.tet as usize].iter().any(|&v| is_on_seam(v)));
+        self.blunt(complex, objective, size, (settings, most_steps), sharp, &mut counts);
         counts
     }
 
@@ -329,7 +361,7 @@ impl Tools {
     ) {
         let least = score_of_ratio(settings.change_below.min(settings.target));
         let mut steps = settings.reconnection_steps;
-        let mut rescues = RESCUES + complex.tets.len() / TETS_A_RESCUE;
+        let mut rescues = most_rescues(complex);
         for (score, t) in worst_first(complex, least) {
             if !is_still(complex, score, t) {
                 continue;
@@ -350,26 +382,18 @@ impl Tools {
         }
     }
 
-    /// Insertions at the tets that are still sharp, the sharpest first. They make no sharper ones,
-    /// which the scores alone would allow.
+    /// Insertions at sharp tets. They make no sharper ones, which the scores alone would allow.
     fn blunt(
         &mut self,
         complex: &mut Complex,
         objective: &Objective,
         size: &dyn SizeField,
         (settings, most_steps): (&Settings, usize),
+        mut sharp: Vec<Sharp>,
         counts: &mut Counts,
     ) {
-        let least = score_of_ratio(settings.change_below.min(settings.target));
-        let cosine = |complex: &Complex, t: u32| largest_cosine(&complex.corners(complex.tets[t as usize]));
-        let low = complex.living().filter(|&t| complex.scores[t as usize] < least);
-        let mut sharp: Vec<(f64, f64, u32)> = low
-            .map(|t| (cosine(complex, t), complex.scores[t as usize], t))
-            .filter(|&(cosine, ..)| cosine > SHARP)
-            .collect();
-        sharp.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.2.cmp(&b.2)));
-        sharp.truncate(RESCUES + complex.tets.len() / TETS_A_RESCUE);
-        for (cosine, score, t) in sharp {
+        sharp.truncate(most_rescues(complex));
+        for Sharp { cosine, score, tet: t } in sharp {
             if is_still(complex, score, t) && counts.insertion_steps < most_steps {
                 let strict = Objective { sharpest: cosine.min(objective.sharpest), ..*objective };
                 self.insert(complex, &strict, size, (settings, true), t, counts);
