@@ -354,16 +354,25 @@ pub(super) fn can_meet(a: &Surface, b: &Surface, cell: &Cell) -> bool {
     if !(a.value_range(cell).contains_zero() && b.value_range(cell).contains_zero()) {
         return false;
     }
-    let center = middle(cell);
-    let (ga, gb) = (a.gradient(&center), b.gradient(&center));
-    let factor = ga.dot(&gb) / gb.norm_squared();
+    let factor = factor_of_difference(a, b, cell);
     // On the axis of a cylinder there is no gradient.
     if !factor.is_finite() {
         return true;
     }
-    let difference =
-        if a.is_quadric() && b.is_quadric() { quadratic_difference } else { difference_by_mean_value };
-    difference(a, b, factor, cell).contains_zero()
+    let difference = if a.is_quadric() && b.is_quadric() {
+        QuadricDifference::new(a, b, factor, cell).range()
+    } else {
+        difference_by_mean_value(a, b, factor, cell)
+    };
+    difference.contains_zero()
+}
+
+/// The factor for which the gradient of `a - factor * b` at the center of a box is smallest; not
+/// finite where `b` has no gradient.
+fn factor_of_difference(a: &Surface, b: &Surface, cell: &Cell) -> f64 {
+    let center = middle(cell);
+    let gradient = b.gradient(&center);
+    a.gradient(&center).dot(&gradient) / gradient.norm_squared()
 }
 
 /// A range of `a - factor * b` over a box, by the mean-value form.
@@ -376,28 +385,59 @@ fn difference_by_mean_value(a: &Surface, b: &Surface, factor: f64, cell: &Cell) 
     a.value_range(&at) - b.value_range(&at) * factor + slope(0) + slope(1) + slope(2)
 }
 
-/// A range of `a - factor * b` over a box for two quadrics.
+/// The second-order expansion of `a - factor * b` around the center of a box for two quadrics.
 ///
 /// Their Hessians are constant, so the common part cancels. The walls of a thin pipe are separated
 /// in cells much larger than the wall thickness.
-fn quadratic_difference(a: &Surface, b: &Surface, factor: f64, cell: &Cell) -> Interval {
-    let center = middle(cell);
-    let at = [0, 1, 2].map(|i| Interval::point(center[i]));
-    let (ra, rb) = (a.gradient_range(&at), b.gradient_range(&at));
-    let (ha, hb) = (a.hessian(&center), b.hessian(&center) * factor);
-    let bend = ha - hb;
-    let slack = rounding_of_difference(&ha, &hb);
-    let arm = offset(cell, &center);
-    let mut range = a.value_range(&at) - b.value_range(&at) * factor;
-    for i in 0..3 {
-        range = range
-            + (ra[i] - rb[i] * factor) * arm[i]
-            + arm[i].square() * (slack + Interval::point(0.5 * bend[(i, i)]));
-        for j in i + 1..3 {
-            range = range + arm[i] * arm[j] * (slack + Interval::point(bend[(i, j)]));
+struct QuadricDifference {
+    /// Ranges at the center, which contain the rounding error.
+    value: Interval,
+    gradient: Cell,
+    hessian: Matrix3<f64>,
+    /// The rounding error of the entries of the Hessian, which are sums of few products.
+    slack: Interval,
+    /// The box, relative to the center.
+    arm: Cell,
+}
+
+impl QuadricDifference {
+    fn new(a: &Surface, b: &Surface, factor: f64, cell: &Cell) -> Self {
+        let center = middle(cell);
+        let at = [0, 1, 2].map(|i| Interval::point(center[i]));
+        let (ra, rb) = (a.gradient_range(&at), b.gradient_range(&at));
+        let (ha, hb) = (a.hessian(&center), b.hessian(&center) * factor);
+        let slack = 16.0 * f64::EPSILON * (ha.amax() + hb.amax());
+        Self {
+            value: a.value_range(&at) - b.value_range(&at) * factor,
+            gradient: [0, 1, 2].map(|i| ra[i] - rb[i] * factor),
+            hessian: ha - hb,
+            slack: Interval::new(-slack, slack),
+            arm: offset(cell, &center),
         }
     }
-    range
+
+    /// The range over the box.
+    fn range(&self) -> Interval {
+        let Self { value, gradient, hessian, slack, arm } = self;
+        let mut range = *value;
+        for i in 0..3 {
+            range = range
+                + gradient[i] * arm[i]
+                + arm[i].square() * (*slack + Interval::point(0.5 * hessian[(i, i)]));
+            for j in i + 1..3 {
+                range = range + arm[i] * arm[j] * (*slack + Interval::point(hessian[(i, j)]));
+            }
+        }
+        range
+    }
+
+    /// The range of the gradient over the box.
+    fn gradient_range(&self) -> Cell {
+        [0, 1, 2].map(|i| {
+            let turn = |j: usize| self.arm[j] * (self.slack + Interval::point(self.hessian[(i, j)]));
+            self.gradient[i] + turn(0) + turn(1) + turn(2)
+        })
+    }
 }
 
 /// Whether the intersection of two surfaces runs forward along `direction` everywhere in a box.
@@ -421,35 +461,13 @@ fn is_monotone_in_space(a: &Surface, b: &Surface, cell: &Cell, direction: &Vecto
     }
     // Quadrics that cross at a small angle: the intersection is also that of the first with the
     // combination whose gradient at the center is smallest. Two balls have a plane in common.
-    let center = middle(cell);
-    let (ga, gb) = (a.gradient(&center), b.gradient(&center));
-    let factor = ga.dot(&gb) / gb.norm_squared();
+    let factor = factor_of_difference(a, b, cell);
     if !factor.is_finite() || factor == 0.0 {
         return false;
     }
-    let along = dot(direction, &cross(&u, &gradient_of_difference(a, b, factor, cell))) * -factor;
+    let gradient = QuadricDifference::new(a, b, factor, cell).gradient_range();
+    let along = dot(direction, &cross(&u, &gradient)) * -factor;
     along.lo > 0.0
-}
-
-/// The range of the gradient of `a - factor * b` over a box for two quadrics.
-fn gradient_of_difference(a: &Surface, b: &Surface, factor: f64, cell: &Cell) -> Cell {
-    let center = middle(cell);
-    let at = [0, 1, 2].map(|i| Interval::point(center[i]));
-    let (ra, rb) = (a.gradient_range(&at), b.gradient_range(&at));
-    let (ha, hb) = (a.hessian(&center), b.hessian(&center) * factor);
-    let bend = ha - hb;
-    let slack = rounding_of_difference(&ha, &hb);
-    let arm = offset(cell, &center);
-    [0, 1, 2].map(|i| {
-        let turn = |j: usize| arm[j] * (slack + Interval::point(bend[(i, j)]));
-        ra[i] - rb[i] * factor + turn(0) + turn(1) + turn(2)
-    })
-}
-
-/// The rounding error of the entries of a difference of matrices, which are sums of few products.
-fn rounding_of_difference(a: &Matrix3<f64>, b: &Matrix3<f64>) -> Interval {
-    let slack = 16.0 * f64::EPSILON * (a.amax() + b.amax());
-    Interval::new(-slack, slack)
 }
 
 fn cross(u: &Cell, v: &Cell) -> Cell {
