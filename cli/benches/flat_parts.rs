@@ -10,6 +10,8 @@ mod flat_parts;
 #[path = "../../tests/folders.rs"]
 #[allow(dead_code)]
 mod folders;
+#[path = "../tests/limited.rs"]
+mod limited;
 
 use flat_parts::{Outcome, run};
 

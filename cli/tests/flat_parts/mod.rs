@@ -1,10 +1,11 @@
 //! STL files of flat and needle-like parts: the project's geometries, stretched, rotated, scaled
 //! and rounded as STL writers round.
 
+use crate::limited;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
-use std::time::{Duration, Instant};
+use std::process::Command;
+use std::time::Duration;
 use tetmill::internals::Random;
 
 /// How a part was made, for messages.
@@ -52,24 +53,32 @@ pub fn run(seed: u64, geometries: &[PathBuf], dir: &Path) -> (Part, f64, Outcome
         keep: seed.is_multiple_of(2),
     };
     let [off, stl, report, mesh] = ["off", "stl", "json", "mesh"].map(|e| dir.join(format!("{seed}.{e}")));
-    let mut first = program();
-    first.arg("mesh").arg(geometry).arg("-o").arg(&off).args(["-q", "-t", "1", "--preset", "very-coarse"]);
-    let (status, reason) = status(&mut first, &dir.join(format!("{seed}.log")));
-    if status != Some(0) {
-        return (part, 0.0, Outcome::Failed(format!("the geometry: {status:?} {reason}")));
+    let log = dir.join(format!("{seed}.log"));
+    let surface = |command: &mut Command| {
+        command.arg("mesh").arg(geometry).arg("-o").arg(&off).args([
+            "-q",
+            "-t",
+            "1",
+            "--preset",
+            "very-coarse",
+        ]);
+    };
+    let ended = limited::run(surface, &log, PATIENCE);
+    if ended.status != Some(0) {
+        let reason = format!("the geometry: {:?} {}", ended.status, ended.reason());
+        return (part, 0.0, Outcome::Failed(reason));
     }
     let mut triangles = read_off(&std::fs::read_to_string(&off).expect("the surface was written"));
     transform(&mut triangles, &part, &mut random);
     let text = to_stl(&triangles, part.digits);
     std::fs::write(&stl, &text).expect("the folder can be written to");
 
-    let mut second = program();
-    second.arg("mesh").arg(&stl).arg("-o").arg(&mesh).args(["-q", "-t", "1", "--report"]).arg(&report);
-    second.args(part.keep.then_some("--keep-surface"));
-    let began = Instant::now();
-    let (status, reason) = self::status(&mut second, &dir.join(format!("{seed}.log")));
-    let seconds = began.elapsed().as_secs_f64();
-    let outcome = match status {
+    let arguments = |command: &mut Command| {
+        command.arg("mesh").arg(&stl).arg("-o").arg(&mesh).args(["-q", "-t", "1", "--report"]).arg(&report);
+        command.args(part.keep.then_some("--keep-surface"));
+    };
+    let ended = limited::run(arguments, &log, PATIENCE);
+    let outcome = match ended.status {
         Some(0) => {
             let text = std::fs::read(&report).expect("the report was written");
             let report: serde_json::Value = serde_json::from_slice(&text).expect("the report is JSON");
@@ -81,39 +90,14 @@ pub fn run(seed: u64, geometries: &[PathBuf], dir: &Path) -> (Part, f64, Outcome
                 Outcome::Meshed { tets: number("tets") as u64, smallest: number("smallest_dihedral") }
             }
         }
-        Some(2) => Outcome::Refused(reason),
-        other => Outcome::Failed(format!("status {other:?}: {reason}")),
+        Some(2) => Outcome::Refused(ended.reason()),
+        other => Outcome::Failed(format!("status {other:?}: {}", ended.reason())),
     };
-    (part, seconds, outcome)
-}
-
-fn program() -> Command {
-    Command::new(env!("CARGO_BIN_EXE_tetmill"))
+    (part, ended.seconds, outcome)
 }
 
 fn text_of(path: &Path) -> String {
     std::fs::read_to_string(path).expect("the file was written")
-}
-
-/// The exit status, `None` after the time limit or a signal, and the first line of the messages
-/// that is not a note.
-fn status(command: &mut Command, log: &Path) -> (Option<i32>, String) {
-    command.stdout(Stdio::null()).stderr(std::fs::File::create(log).expect("the folder can be written to"));
-    let mut child = command.spawn().expect("the program starts");
-    let began = Instant::now();
-    let code = loop {
-        match child.try_wait().expect("the program can be waited for") {
-            Some(status) => break status.code(),
-            None if began.elapsed() > PATIENCE => {
-                child.kill().expect("the program can be stopped");
-                child.wait().expect("the program can be waited for");
-                break None;
-            }
-            None => std::thread::sleep(Duration::from_millis(3)),
-        }
-    };
-    let text = text_of(log);
-    (code, text.lines().find(|line| line.starts_with("tetmill:")).unwrap_or_default().to_owned())
 }
 
 /// Reads triangles of an OFF file as the program writes it, with a colour behind each.
