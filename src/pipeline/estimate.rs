@@ -35,10 +35,7 @@ pub(super) fn scale_for(
     own_sources: usize,
     goal: f64,
 ) -> Option<f64> {
-    let integral_at = |scale: f64| {
-        let sizes = at_scale(&settings.size, scale, own_sources);
-        model.size_field(&sizes).map(|size| integral(&made.mesh, &*size))
-    };
+    let integral_at = |scale| integral_at(model, settings, made, own_sources, scale);
     let count = made.report.tets as f64;
     let (mut scale, base) = (settings.size.scale, integral_at(settings.size.scale)?);
     // Secant steps in logarithms: the number of tets falls with the third power of the scale, more
@@ -61,8 +58,7 @@ pub(super) fn scale_for(
 }
 
 /// The fraction of the tets of a mesh `made` with these settings that is expected at a larger
-/// scale;
-/// `None` without a size field.
+/// scale; `None` without a size field.
 pub(super) fn share_at(
     model: &Model,
     settings: &CoarseSettings,
@@ -70,11 +66,20 @@ pub(super) fn share_at(
     own_sources: usize,
     scale: f64,
 ) -> Option<f64> {
-    let integral_at = |scale: f64| {
-        let sizes = at_scale(&settings.size, scale, own_sources);
-        model.size_field(&sizes).map(|size| integral(&made.mesh, &*size))
-    };
+    let integral_at = |scale| integral_at(model, settings, made, own_sources, scale);
     Some(integral_at(scale)? / integral_at(settings.size.scale)?)
+}
+
+/// The integral of the size field at a scale over a mesh; `None` without a size field.
+fn integral_at(
+    model: &Model,
+    settings: &CoarseSettings,
+    made: &CoarseMesh,
+    own_sources: usize,
+    scale: f64,
+) -> Option<f64> {
+    let sizes = at_scale(&settings.size, scale, own_sources);
+    model.size_field(&sizes).map(|size| integral(&made.mesh, &*size))
 }
 
 /// The settings at another scale. Sources added at this scale grow at a larger one like the sizes

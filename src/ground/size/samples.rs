@@ -225,8 +225,9 @@ impl Sampler<'_> {
         let bodies = self.pruned(bodies, &center, edge);
         let mut here: Vec<SurfaceId> = bodies.iter().flat_map(|body| body.1.surfaces()).collect();
         here.sort_unstable();
+        here.dedup();
         open.retain(|surface| here.binary_search(surface).is_ok());
-        open.retain(|&surface| self.is_coarse(surface, &bodies, &center, edge, samples));
+        open.retain(|&surface| self.is_coarse(surface, (&bodies, &here), &center, edge, samples));
         if open.is_empty() || edge < self.least_edge() {
             return;
         }
@@ -259,7 +260,7 @@ impl Sampler<'_> {
     fn is_coarse(
         &self,
         surface: SurfaceId,
-        bodies: &[(BodyId, Solid)],
+        (bodies, here): (&[(BodyId, Solid)], &[SurfaceId]),
         center: &Point,
         edge: f64,
         samples: &mut Samples,
@@ -281,7 +282,7 @@ impl Sampler<'_> {
         if edge > coarsest.min(self.spacing(own)) {
             return true;
         }
-        let near = self.near_surface(surface, bodies, &point, own);
+        let near = self.near_surface(surface, (bodies, here), &point, own);
         if let Some(near) = near
             && near.is_resolved
             && edge > self.spacing(near.size)
@@ -300,18 +301,15 @@ impl Sampler<'_> {
     }
 
     /// The surface that limits the size most at a point of another by being close to it, if any;
-    /// `bodies` are those pruned around the point.
+    /// `bodies` are those pruned around the point, `here` their surfaces.
     fn near_surface(
         &self,
         surface: SurfaceId,
-        bodies: &[(BodyId, Solid)],
+        (bodies, here): (&[(BodyId, Solid)], &[SurfaceId]),
         point: &Point,
         size_alone: f64,
     ) -> Option<NearSurfaces> {
-        let mut others: Vec<SurfaceId> = bodies.iter().flat_map(|body| body.1.surfaces()).collect();
-        others.sort_unstable();
-        others.dedup();
-        let others = others.into_iter().filter(|&other| other != surface);
+        let others = here.iter().copied().filter(|&other| other != surface);
         let sizes = (size_alone, self.settings.scale);
         let near = others.filter_map(|other| {
             let is_boundary = |foot: &Point, step: f64| {
