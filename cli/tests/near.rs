@@ -67,3 +67,14 @@ fn a_gap_that_is_too_small_is_refused_at_once_and_can_be_merged() {
     let merged = String::from_utf8_lossy(&succeed(&mut mesh(&["--merge", "1.1e-6"])).stderr).into_owned();
     assert!(merged.contains("both are taken as one"), "{merged}");
 }
+
+#[test]
+fn a_gap_is_told_once_however_often_the_mesh_is_made() {
+    let dir = tempfile::tempdir().unwrap();
+    let [file, out] = ["pin.geo", "pin.vtu"].map(|name| dir.path().join(name));
+    std::fs::write(&file, pin(1e-3)).unwrap();
+    let mut command = tetmill();
+    command.arg("mesh").arg(&file).args(["-t", "1", "--coarse", "30000", "-o"]).arg(&out);
+    let told = String::from_utf8_lossy(&succeed(&mut command).stderr).into_owned();
+    assert_eq!(told.matches("this gap decides").count(), 1, "{told}");
+}

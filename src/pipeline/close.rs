@@ -2,7 +2,6 @@
 //! errors for those that need far smaller elements than everything around.
 
 use crate::Point;
-use crate::ground::progress::Work;
 use crate::ground::size::{GeometricSamples, NearSurfaces, ShortCurve, SizeField};
 use crate::mesher::model::CsgModel;
 use crate::mesher::surface::curves::Gap;
@@ -83,14 +82,12 @@ impl CloseSurfaces {
         self.gap < NARROW * self.around
     }
 
-    /// Warns of a narrow gap.
-    pub(super) fn warn(&self, work: &Work) {
-        if self.is_narrow() {
-            work.note(&self.note());
-        }
+    /// A warning of a narrow gap.
+    pub(super) fn warning(&self) -> Option<String> {
+        self.is_narrow().then(|| self.note())
     }
 
-    /// A warning.
+    /// See [`Self::warning`].
     fn note(&self) -> String {
         let times = self.around / self.gap;
         format!(

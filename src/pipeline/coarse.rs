@@ -5,7 +5,7 @@ use super::coarse_error::CoarseError;
 use super::coarse_mesh::{CoarseMesh, CutCusp};
 use super::expected;
 use super::fill::{SURFACE_SHARE, fill};
-use super::retries::{Budget, CORRECTIONS};
+use super::retries::{Budget, CORRECTIONS, Once};
 use crate::Point;
 use crate::ground::mesh::Segment;
 use crate::ground::progress::Work;
@@ -48,9 +48,7 @@ pub fn mesh(
 ) -> Result<CoarseMesh, CoarseError> {
     let samples = GeometricSamples::new(&model.geometry, &model.features, &settings.size);
     let initial = GeometricSize::of_samples(&model.geometry, &model.features, &settings.size, &samples);
-    if let Some(warning) = close::warning(model, &samples) {
-        work.note(&warning);
-    }
+    budget.warn(Once::Walls, || close::warning(model, &samples), work);
     let mut coarse = corrected(settings, budget, work, |settings, allowed| {
         attempt(model, (&samples, &initial), settings, allowed, (budget, work))
     })?;
@@ -73,8 +71,6 @@ pub(super) enum Attempt {
 pub(super) struct Allowed {
     /// A request for smaller sizes.
     pub lower: bool,
-    /// Whether no sizes were lowered so far, so that a gap is news.
-    pub first: bool,
     /// Thin regions: only in the first attempt, because each time may lower the sizes as far as the
     /// settings allow.
     pub thin: bool,
@@ -101,7 +97,7 @@ pub(super) fn corrected(
         work.proceed()?;
         budget.spend();
         let lower = corrections < CORRECTIONS && budget.has_meshes();
-        let allowed = Allowed { lower, first: corrections == 0, thin: thin_regions.is_none() };
+        let allowed = Allowed { lower, thin: thin_regions.is_none() };
         match attempt(settings, allowed) {
             Attempt::Made(mut coarse) => {
                 budget.made(coarse.report.tets);
@@ -210,9 +206,7 @@ fn attempt(
     let (surface, segments) = match mesh_surface(model, Sizes { size, initial }, allowed.lower) {
         Ok(made) => made,
         Err(Unmeshed::Lower(sources, gap)) => {
-            if let (true, Some(gap)) = (allowed.first, gap) {
-                gap.warn(work);
-            }
+            budget.warn(Once::Edges, || gap.and_then(|gap| gap.warning()), work);
             return Attempt::Lower(sources);
         }
         Err(Unmeshed::Failed(error)) => return Attempt::Failed(error),

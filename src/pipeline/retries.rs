@@ -68,6 +68,17 @@ pub struct Budget {
     memory: Option<u64>,
     /// The number of tets that was last announced to the user; infinite if none is to be.
     announced: Cell<f64>,
+    /// Whether the warnings of each kind were given.
+    warned: [Cell<bool>; 2],
+}
+
+/// Warnings that a run gives once, however often it makes the mesh.
+#[derive(Clone, Copy)]
+pub(super) enum Once {
+    /// Of walls that are close to each other, and of short edges.
+    Walls,
+    /// Of edges that are close to each other.
+    Edges,
 }
 
 impl Default for Budget {
@@ -77,6 +88,7 @@ impl Default for Budget {
             tets: Cell::new(None),
             memory: None,
             announced: Cell::new(f64::INFINITY),
+            warned: Default::default(),
         }
     }
 }
@@ -104,6 +116,17 @@ impl Budget {
             self.announced.set(tets);
         }
         Ok(())
+    }
+
+    /// Gives a warning, if there is one, unless the run gave one of this kind.
+    pub(super) fn warn(&self, once: Once, warning: impl FnOnce() -> Option<String>, work: &Work) {
+        let warned = &self.warned[once as usize];
+        if !warned.get()
+            && let Some(warning) = warning()
+        {
+            work.note(&warning);
+            warned.set(true);
+        }
     }
 
     /// Counts a mesh that is begun.
