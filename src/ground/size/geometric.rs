@@ -60,7 +60,7 @@ impl Default for SizeSettings {
 impl SizeSettings {
     /// How far sizes are lowered in thin regions, under [`scale`](Self::scale).
     ///
-    /// With a scale above 1, thin regions get fewer tets too, up to [`FLATTEST`]; with a scale
+    /// With a scale above 1, thin regions get fewer tets too, up to a fixed limit; with a scale
     /// below 1, they do not need more.
     pub fn scaled_closeness(&self) -> Closeness {
         let (Closeness { ratio, most }, scale) = (self.closeness, self.scale.max(1.0));

@@ -24,7 +24,7 @@ pub struct Settings {
     /// Dihedral angle in degrees that no change may undercut, if no tet is below it at first.
     /// Without it the smallest angle may decrease, although the worst measure increases.
     pub least_angle: f64,
-    /// The number of tets per block, the unit of parallel work; see [`improve`].
+    /// The number of tets per block, the unit of parallel work; see [`improve`](super::improve).
     pub block: usize,
 }
 
