@@ -16,7 +16,7 @@ use crate::ground::progress::Work;
 use crate::ground::projector::Projector;
 use crate::ground::size::{Closeness, SizeSettings, Source, WatchedSize};
 use crate::mesher::facets::{
-    FacetBodies, FacetError, FacetModel, FacetPatch, FacetSize, FacetSmoothness, Facets, Marks,
+    Crossing, FacetBodies, FacetError, FacetModel, FacetPatch, FacetSize, FacetSmoothness, Facets, Marks,
     RemeshSettings, SharpPlaces, keep, remesh,
 };
 use crate::mesher::improve::Smoothness;
@@ -133,6 +133,14 @@ impl FacetSolid {
         budget: &Budget,
         work: &Work,
     ) -> Result<CoarseMesh, CoarseError> {
+        // Triangles that intersect have no thickness between them: they would be made ever smaller.
+        if !self.keep_surface {
+            let crossings = self.model.intersections();
+            let deep = crossings.iter().any(|crossing| self.model.is_deep(crossing));
+            if let Some(meeting) = self.facets_meet(&crossings).filter(|_| deep) {
+                return Err(meeting);
+            }
+        }
         let mut coarse = coarse::corrected(settings, budget, work, |settings, allowed| {
             self.attempt(settings, allowed, budget, work)
         })?;
@@ -162,21 +170,27 @@ impl FacetSolid {
                 return Attempt::Thin(sources, found);
             }
         }
+        let size = WatchedSize::new(&size, work);
         let mut surface = if self.keep_surface {
             keep(&self.model)
         } else {
             remesh(&self.model, &size, &RemeshSettings::default()).0
         };
+        if let Err(cancelled) = work.proceed() {
+            return Attempt::Failed(cancelled.into());
+        }
         self.add_kept_points(&mut surface);
         self.add_kept_edges(&mut surface);
         let smoothness = FacetSmoothness(&self.model.projector);
         let smoothness: Option<&dyn Smoothness> = if self.keep_surface { None } else { Some(&smoothness) };
-        match fill(surface, regions, &WatchedSize::new(&size, work), smoothness, settings.effort) {
+        match fill(surface, regions, &size, smoothness, settings.effort) {
             Ok(made) => Attempt::Made(Box::new(made)),
             Err(error) => {
                 // If triangles intersect, smaller sizes were tried already.
                 let crossed = matches!(error, CoarseError::NotClosed { .. });
-                if let Some(meeting) = crossed.then(|| self.facets_meet()).flatten() {
+                if let Some(meeting) =
+                    crossed.then(|| self.facets_meet(&self.model.intersections())).flatten()
+                {
                     return Attempt::Failed(meeting);
                 }
                 let may_lower = allowed.lower && !self.keep_surface && !crossed;
@@ -187,15 +201,15 @@ impl FacetSolid {
     }
 
     /// The error for facets that intersect, if any do. Intersections of different files come first.
-    fn facets_meet(&self) -> Option<CoarseError> {
-        let pairs = self.model.intersections();
-        let files = |patches: &[PatchId; 2]| {
-            let [a, b] = patches.map(|patch| self.model.patch(patch).labels.first().map(|label| label.0));
+    fn facets_meet(&self, crossings: &[Crossing]) -> Option<CoarseError> {
+        let files = |crossing: &Crossing| {
+            let file = |patch| self.model.patch(patch).labels.first().map(|label| label.0);
+            let [a, b] = crossing.patches.map(file);
             a.zip(b).filter(|(a, b)| a != b).map(|(a, b)| [a.min(b), a.max(b)])
         };
-        let (patches, first) = pairs.iter().find(|(patches, _)| files(patches).is_some()).or(pairs.first())?;
-        let files = files(patches).map(|pair| Box::new(pair.map(|file| self.files[file as usize].clone())));
-        Some(CoarseError::FacetsMeet { files, count: pairs.len(), first: *first })
+        let first = crossings.iter().find(|crossing| files(crossing).is_some()).or(crossings.first())?;
+        let files = files(first).map(|pair| Box::new(pair.map(|file| self.files[file as usize].clone())));
+        Some(CoarseError::FacetsMeet { files, count: crossings.len(), first: first.at })
     }
 
     /// Finds thin regions between the facets themselves.

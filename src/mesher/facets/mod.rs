@@ -19,6 +19,7 @@
 
 mod bodies;
 mod close_curves;
+mod crossing;
 mod error;
 mod features;
 mod join;
@@ -42,6 +43,7 @@ mod tests;
 
 pub use crate::ground::projector::FacetProjector;
 pub use bodies::FacetBodies;
+pub use crossing::Crossing;
 pub use error::FacetError;
 pub use keep::keep;
 pub use model::{FacetBody, FacetCurve, FacetModel, FacetPatch, Facets, Marks, Settings};

@@ -10,7 +10,6 @@ use crate::ground::mesh::{BoundaryTriangle, VertexId};
 use crate::ground::projector::facets::edges::Edges;
 use crate::ground::projector::facets::normals;
 use crate::ground::projector::facets::{FacetProjector, Source};
-use crate::mesher::volume::intersections;
 use csg::{Aabb, BodyId, CornerId, PatchId};
 
 /// A triangulated surface as read from a file: closed, its triangles in any order.
@@ -172,16 +171,6 @@ impl FacetModel {
             settings,
         );
         Ok(assemble(joined, &regions, found, bounds, rounding))
-    }
-
-    /// Pairs of facets that intersect improperly, by exact predicates: their patches, and a point
-    /// of the intersection. Remeshing may remove such intersections if they come from rounding;
-    /// kept facets with intersections are rejected by the volume mesher.
-    pub fn intersections(&self) -> Vec<([PatchId; 2], Point)> {
-        let corners: Vec<[u32; 3]> = self.triangles.iter().map(|t| t.vertices.map(|v| v.0)).collect();
-        let patches = |pair: [u32; 2]| pair.map(|t| self.triangles[t as usize].patch);
-        let found = intersections(&self.points, &corners).into_iter();
-        found.map(|(pair, place)| (patches(pair), place)).collect()
     }
 
     /// The patch with this id.

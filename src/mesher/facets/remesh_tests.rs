@@ -112,7 +112,7 @@ fn try_closed(model: &FacetModel, mesh: &SurfaceMesh) -> Result<ClosedSurface, v
 }
 
 /// The size field used for a geometry.
-fn sizes(model: &FacetModel, scale: f64) -> FacetSize {
+pub(super) fn sizes(model: &FacetModel, scale: f64) -> FacetSize {
     FacetSize::new(model, &SizeSettings { scale, ..SizeSettings::default() })
 }
 

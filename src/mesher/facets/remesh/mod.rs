@@ -27,6 +27,7 @@ pub use report::RemeshReport;
 
 use super::{FacetModel, FacetSize};
 use crate::Point;
+use crate::ground::progress::Work;
 use crate::ground::size::{SizeField, Source, SourceTree};
 use crate::mesher::surface::{SurfaceMesh, crossings};
 use sheet::Sheet;
@@ -61,6 +62,10 @@ struct Sizes<'a> {
 }
 
 impl SizeField for Sizes<'_> {
+    fn work(&self) -> &Work<'_> {
+        self.wanted.work()
+    }
+
     fn size_at(&self, point: &Point) -> f64 {
         self.wanted.size_at(point).min(self.turn.size_at(point)).min(self.lowered.size_at(point))
     }
@@ -88,7 +93,8 @@ const LOWERED: f64 = 0.6;
 /// curve, and those on patches. Vertices lie on the facets and polylines up to rounding. If
 /// triangles of close patches intersect, the sizes there are lowered and the mesh is refined
 /// further; [`RemeshReport::crossings`] lists intersections that remain, for example because the
-/// facets themselves intersect.
+/// facets themselves intersect. If the work of the size field is cancelled, the mesh is returned as
+/// it is.
 pub fn remesh(
     model: &FacetModel,
     size: &dyn SizeField,
@@ -109,7 +115,8 @@ pub fn remesh(
         // No size removes intersections of the facets themselves.
         let is_input_crossed =
             correction == 0 && !report.crossings.is_empty() && !model.intersections().is_empty();
-        if report.crossings.is_empty() || correction == MOST_CORRECTIONS || is_input_crossed {
+        let is_last = correction == MOST_CORRECTIONS || is_input_crossed || sheet.size.work().is_cancelled();
+        if report.crossings.is_empty() || is_last {
             report.measure(&sheet);
             return (mesh, report);
         }
@@ -130,7 +137,7 @@ fn pass(sheet: &mut Sheet, rounds: usize, settings: &RemeshSettings, report: &mu
             let splits = split::split_long(sheet, settings.long);
             report.splits += splits;
             report.flips += flip::flip_all(sheet);
-            if splits == 0 {
+            if splits == 0 || sheet.size.work().is_cancelled() {
                 break;
             }
         }
