@@ -1,6 +1,6 @@
 //! Tests of the features found in facets as CAD programs export them.
 
-use super::remesh_tests::closed;
+use super::remesh_tests::{closed, sizes};
 use super::samples::{Soup, read_ply, read_stl, shared};
 use super::*;
 use crate::{Point, Vector};
@@ -183,6 +183,47 @@ fn a_needle_with_a_wild_normal_makes_no_curve() {
         }
     }
     assert_eq!(counts(&model(&[bent])), [8, 12, 6, 1]);
+}
+
+/// A box whose bottom has a cap from corner to corner, pushed up by `lift` at its middle.
+fn box_with_cap(lift: f64) -> FacetModel {
+    let (a, b, c, d) =
+        (Point::origin(), Point::new(1.0, 0.0, 0.0), Point::new(1.0, 1.0, 0.0), Point::new(0.0, 1.0, 0.0));
+    // The cap is steep: it is as wide as high.
+    let m = Point::new(0.5 - lift, 0.5 + lift, lift);
+    model(&[soup(|s| {
+        [[a, c, b], [a, m, c], [a, d, m], [m, d, c]].into_iter().for_each(|t| s.add(t));
+        for (axis, upper) in [(0, false), (0, true), (1, false), (1, true), (2, true)] {
+            s.side([0.0; 3], [1.0; 3], axis, upper, false);
+        }
+    })])
+}
+
+#[test]
+fn a_steep_cap_between_facets_that_agree_makes_no_curve() {
+    // Its normal is 35° off those beside it; its corners have 0.7°.
+    let flat = box_with_cap(0.005);
+    assert_eq!(counts(&flat), [8, 12, 6, 1]);
+    let (mesh, report) = remesh(&flat, &sizes(&flat, 0.2), &RemeshSettings::default());
+    assert!(report.crossings.is_empty(), "{report:?}");
+    closed(&flat, &mesh);
+    // A pyramid is no cap.
+    assert!(counts(&box_with_cap(0.3))[2] > 6);
+}
+
+#[test]
+fn the_riser_of_a_low_step_keeps_its_curves() {
+    // Its triangles are needles of 0.6°, at right angles to both treads.
+    let outline = [[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, 1.0], [1.0, 1.01], [0.0, 1.01]];
+    let stairs = soup(|s| {
+        let at = |k: usize, y: f64| Point::new(outline[k % 6][0], y, outline[k % 6][1]);
+        (0..6).for_each(|k| s.quad([at(k, 0.0), at(k + 1, 0.0), at(k + 1, 1.0), at(k, 1.0)]));
+        for k in [4, 5, 0, 1] {
+            s.add([at(3, 0.0), at(k + 1, 0.0), at(k, 0.0)]);
+            s.add([at(3, 1.0), at(k, 1.0), at(k + 1, 1.0)]);
+        }
+    });
+    assert_eq!(counts(&model(&[stairs])), [12, 18, 8, 1]);
 }
 
 #[test]

@@ -9,8 +9,8 @@
 //! thickness. A ray would suffice for parallel walls; the ball also finds edges and bends that come
 //! near.
 //!
-//! Patches with a common curve or corner are excluded: they form a wedge, whose thickness tapers to
-//! zero for any size.
+//! Patches with a common curve or corner are excluded, and triangles of one patch with a common
+//! vertex: they form a wedge, whose thickness tapers to zero for any size.
 
 use super::SurfaceMesh;
 use crate::ground::kernel::nearest::{at, in_triangle};
@@ -253,7 +253,8 @@ impl<'a> Prober<'a> {
             let (triangles, tree) = &self.patches[other.index()];
             let squared = |k: u32| {
                 let s = triangles[k as usize];
-                let faces = other != patch || normal.dot(&self.normals[s as usize]) < OPPOSITE;
+                let faces =
+                    other != patch || normal.dot(&self.normals[s as usize]) < OPPOSITE && !self.meet(t, s);
                 if faces { (foot(s) - center).norm_squared() } else { f64::INFINITY }
             };
             let limit = best.map_or(radius * radius, |(distance, _)| distance);
@@ -265,6 +266,12 @@ impl<'a> Prober<'a> {
             distance
         });
         best.map(|(_, s)| (s, foot(s)))
+    }
+
+    /// Whether two triangles have a common vertex.
+    fn meet(&self, s: u32, t: u32) -> bool {
+        let [s, t] = [s, t].map(|t| self.walls.mesh.triangles[t as usize].vertices);
+        s.iter().any(|v| t.contains(v))
     }
 
     /// The distance from a point of a triangle to the opposite wall, if it is less than `limit`.

@@ -3,6 +3,8 @@
 //! Files in single precision or with seven digits move each vertex by a **rounding**. A needle or
 //! cap of about this height is a **sliver**: its normal is arbitrary. It takes the normal of the
 //! facet across its longest side, because it is in the plane of that facet up to the rounding.
+//! Higher needles and caps are slivers if their normal strays from those beside them, which agree:
+//! scans and decimated surfaces have folds of such facets, which are no edges of the shape.
 
 use super::edges::Edges;
 use crate::ground::kernel::simplex::area_vector;
@@ -41,39 +43,98 @@ pub(crate) fn trusted(
     edges: &Edges,
     rounding: f64,
 ) -> (Vec<Vector>, Vec<bool>) {
-    let corners = |t: usize| triangles[t].map(|v| &points[v as usize]);
-    let shape: Vec<(Vector, usize, f64)> = (0..triangles.len())
-        .map(|t| {
-            let p = corners(t);
-            let area = area_vector(p[0], p[1], p[2]);
-            let length = |k: usize| (p[(k + 2) % 3] - p[(k + 1) % 3]).norm();
-            let longest = (0..3).max_by(|&i, &j| length(i).total_cmp(&length(j))).unwrap_or(0);
-            (area, longest, area.norm() / length(longest).max(f64::MIN_POSITIVE))
-        })
-        .collect();
-    let sliver: Vec<bool> = shape.iter().map(|(_, _, height)| *height <= SLIVER_HEIGHT * rounding).collect();
-    let own = |t: usize| shape[t].0.try_normalize(0.0).unwrap_or_else(Vector::zeros);
-    let normals = (0..triangles.len())
-        .map(|t| {
-            let (mut at, mut sign) = (t, 1.0);
-            // Chains of slivers are short, but they can be cyclic.
-            for _ in 0..LONGEST_CHAIN {
-                if !sliver[at] {
-                    return sign * own(at);
-                }
-                let side = shape[at].1;
-                let edge = edges.of_side[at][side] as usize;
-                let [a, b] = edges.uses(edge) else { break };
-                let (here, there) = if a.triangle as usize == at { (a, b) } else { (b, a) };
-                if here.along == there.along {
-                    sign = -sign;
-                }
-                at = there.triangle as usize;
-            }
-            own(t)
-        })
-        .collect();
+    let shapes: Vec<Shape> = triangles.iter().map(|t| Shape::of(t.map(|v| &points[v as usize]))).collect();
+    let mut sliver: Vec<bool> = shapes.iter().map(|s| s.height <= SLIVER_HEIGHT * rounding).collect();
+    let mut normals = normals_without(&shapes, &sliver, edges);
+    // A sliver beside another one is found after it.
+    for _ in 0..ROUNDS {
+        let astray: Vec<usize> =
+            (0..shapes.len()).filter(|&t| !sliver[t] && is_astray(t, &shapes[t], &normals, edges)).collect();
+        if astray.is_empty() {
+            break;
+        }
+        astray.into_iter().for_each(|t| sliver[t] = true);
+        normals = normals_without(&shapes, &sliver, edges);
+    }
     (normals, sliver)
+}
+
+/// See [`trusted`].
+const ROUNDS: usize = 4;
+
+/// The shape of a facet.
+struct Shape {
+    area: Vector,
+    /// The sides (opposite to the corner of the same number), the longest first.
+    sides: [usize; 3],
+    /// The distance of the corner opposite to the longest side from that side.
+    height: f64,
+    /// The sine of the angles between the longest side and the second and third.
+    sines: [f64; 2],
+}
+
+impl Shape {
+    fn of(p: [&Point; 3]) -> Self {
+        let area = area_vector(p[0], p[1], p[2]);
+        let length = |k: usize| (p[(k + 2) % 3] - p[(k + 1) % 3]).norm().max(f64::MIN_POSITIVE);
+        let mut sides = [0, 1, 2];
+        sides.sort_by(|&i, &j| length(j).total_cmp(&length(i)));
+        let height = area.norm() / length(sides[0]);
+        Self { area, sides, height, sines: [sides[1], sides[2]].map(|side| height / length(side)) }
+    }
+
+    fn normal(&self) -> Vector {
+        self.area.try_normalize(0.0).unwrap_or_else(Vector::zeros)
+    }
+}
+
+/// Whether the normal of a needle or cap strays from those of the facets at its long sides, of
+/// which that at the longest agrees with another.
+///
+/// Scans and decimated surfaces contain such facets; they are higher than the rounding, but no
+/// part of the shape.
+fn is_astray(t: usize, shape: &Shape, normals: &[Vector], edges: &Edges) -> bool {
+    let turn = |side: usize| {
+        let [a, b] = edges.uses(edges.of_side[t][side] as usize) else { return None };
+        let other = if a.triangle as usize == t { b } else { a };
+        let normal = normals[other.triangle as usize];
+        Some(if a.along == b.along { -normal } else { normal })
+    };
+    let long = |&k: &usize| k == 0 || shape.sines[k - 1] < SHARP;
+    let beside: Option<Vec<Vector>> = (0..3).filter(long).map(|k| turn(shape.sides[k])).collect();
+    let Some(beside) = beside.filter(|beside| beside.len() > 1) else { return false };
+    let strays = beside.iter().map(|n| n.angle(&normals[t])).fold(f64::INFINITY, f64::min);
+    let differ = beside[1..].iter().map(|n| n.angle(&beside[0])).fold(f64::INFINITY, f64::min);
+    strays > STRAYS && differ < AGREE * strays
+}
+
+/// Sine of the largest angle of a needle at its tip (10°).
+const SHARP: f64 = 0.174;
+/// The least angle by which a stray normal differs from both others (radians; 20°).
+const STRAYS: f64 = 0.35;
+/// These differ from each other by less than this fraction of it.
+const AGREE: f64 = 0.5;
+
+/// The normals of facets, those of slivers from the facets across their longest sides.
+fn normals_without(shapes: &[Shape], sliver: &[bool], edges: &Edges) -> Vec<Vector> {
+    let normal = |t: usize| {
+        let (mut at, mut sign) = (t, 1.0);
+        // Chains of slivers are short, but they can be cyclic.
+        for _ in 0..LONGEST_CHAIN {
+            if !sliver[at] {
+                return sign * shapes[at].normal();
+            }
+            let edge = edges.of_side[at][shapes[at].sides[0]] as usize;
+            let [a, b] = edges.uses(edge) else { break };
+            let (here, there) = if a.triangle as usize == at { (a, b) } else { (b, a) };
+            if here.along == there.along {
+                sign = -sign;
+            }
+            at = there.triangle as usize;
+        }
+        shapes[t].normal()
+    };
+    (0..shapes.len()).map(normal).collect()
 }
 
 /// The maximum number of slivers between a sliver and the facet whose normal it takes.
