@@ -50,6 +50,16 @@ pub enum CoarseError {
         /// Edge midpoints of triangles that intersect others.
         crossing: Vec<Point>,
     },
+    /// Two patches have edges in common that are on no curve.
+    #[error(
+        "patches are so close to each other at ({}, {}, {}) that they have an edge in common: surfaces touch there to a \
+         high order, or leave too thin a wall; move one of them",
+        .middles[0].x, .middles[0].y, .middles[0].z
+    )]
+    CommonEdges {
+        /// The midpoints of the edges; at least one.
+        middles: Vec<Point>,
+    },
     /// The input triangles do not bound bodies.
     #[error(
         "{} intersect, or touch without being the same: {count} pairs, the first at ({}, {}, {}); no option repairs this: \
@@ -123,7 +133,8 @@ impl CoarseError {
     /// Places where surfaces are too close to each other for the sizes.
     pub(super) fn places(&self) -> &[Point] {
         match self {
-            Self::NotClosed { crossing: places, .. }
+            Self::CommonEdges { middles: places }
+            | Self::NotClosed { crossing: places, .. }
             | Self::Volume(VolumeError::NotRecovered { places, .. }) => places,
             _ => &[],
         }

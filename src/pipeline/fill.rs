@@ -35,6 +35,10 @@ pub(super) fn fill(
 ) -> Result<CoarseMesh, CoarseError> {
     size.work().proceed()?;
     size.work().step(SURFACE_SHARE, VOLUME_SHARE, 1);
+    let common = common_edges(&surface);
+    if !common.is_empty() {
+        return Err(CoarseError::CommonEdges { middles: common });
+    }
     let (mut mesh, volume) = fill_bodies(surface, regions, size)?;
     size.work().proceed()?;
     size.work().step(VOLUME_SHARE, 1.0, 1);
@@ -56,6 +60,30 @@ pub(super) fn fill(
         ..CoarseReport::default()
     };
     Ok(CoarseMesh { mesh, report, displacements: EdgeDisplacements::default() })
+}
+
+/// The midpoints of edges that triangles of different patches have in common, but no curve.
+///
+/// Between two curves a patch has edges straight across; so has another patch between the same
+/// curves if both are almost flat there. The space between them would have no thickness.
+fn common_edges(surface: &SurfaceMesh) -> Vec<Point> {
+    let is_inside = |v: VertexId| matches!(surface.classes[v.index()], Class::Patch(_));
+    let sorted = |[a, b]: [VertexId; 2]| [a.min(b), a.max(b)];
+    let mut on_curves: Vec<[VertexId; 2]> = surface.segments.iter().map(|s| sorted(s.vertices)).collect();
+    on_curves.sort_unstable();
+    let mut across: Vec<([VertexId; 2], PatchId)> = Vec::new();
+    for triangle in &surface.triangles {
+        let [a, b, c] = triangle.vertices;
+        let sides = [[a, b], [b, c], [c, a]].into_iter().filter(|side| !side.iter().any(|&v| is_inside(v)));
+        across.extend(sides.map(|side| (sorted(side), triangle.patch)));
+    }
+    across.sort_unstable();
+    across.dedup();
+    let common = across.chunk_by(|x, y| x.0 == y.0).filter(|group| group.len() > 1).map(|group| group[0].0);
+    let off_curves = common.filter(|edge| on_curves.binary_search(edge).is_err());
+    off_curves
+        .map(|edge| nalgebra::center(&surface.points[edge[0].index()], &surface.points[edge[1].index()]))
+        .collect()
 }
 
 /// Fills the bodies inside a surface mesh.

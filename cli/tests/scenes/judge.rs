@@ -4,6 +4,7 @@ use super::random::van_der_corput;
 use super::scene::{REACH, Scene};
 use super::shape::{Sight, Vec3, add, cross, dot, norm, scale, sub};
 use std::collections::HashMap;
+use std::f64::consts::SQRT_2;
 use std::path::Path;
 
 /// The contents of a Medit file.
@@ -36,9 +37,10 @@ impl Cut {
     }
 
     /// Whether a point may be in the part that was cut off, or within `room` of it. Along a curve
-    /// of contact, two surfaces are near.
+    /// of contact, two surfaces are near; the tube around it has flat ends, whose edges are
+    /// further from the curve than the radius.
     fn may_hold(&self, scene: &Scene, p: Vec3, room: f64) -> bool {
-        let reach = self.radius + room;
+        let reach = room + if self.is_curve { SQRT_2 * self.radius } else { self.radius };
         let mut near = 0;
         scene.body_at(p, &mut |sight: Sight| near += u32::from(sight.distance.abs() <= reach));
         if self.is_curve { near >= 2 } else { norm(sub(p, self.point)) <= reach }

@@ -5,7 +5,7 @@
 //! closed.
 
 use super::contact::{Contact, Kind, diagonal};
-use super::neighborhood::{Tolerances, sheet_at};
+use super::neighborhood::{Sheet, Tolerances, sheet_at};
 use super::octree::{Octree, is_flat};
 use super::{Corner, FeatureError};
 use crate::interval::Cell;
@@ -53,7 +53,7 @@ pub(super) fn add_corners(
     corners: &mut Vec<Corner>,
     tolerances: &Tolerances,
 ) -> Result<(), FeatureError> {
-    for (id, point) in boundaries(geometry, tree, tolerances)? {
+    for (id, point, _) in boundaries(geometry, tree, tolerances)? {
         match corners.iter_mut().find(|c| (c.point - point).norm() <= tolerances.merge) {
             Some(corner) if corner.surfaces.contains(&id) => {}
             Some(corner) => {
@@ -66,43 +66,45 @@ pub(super) fn add_corners(
     Ok(())
 }
 
-/// The cones that are boundaries near their apexes, with the apexes.
+/// The cones that are boundaries near their apexes, with the apexes and the sheets around them.
 pub(super) fn boundaries(
     geometry: &Geometry,
     tree: &Octree,
     tolerances: &Tolerances,
-) -> Result<Vec<(SurfaceId, Point)>, FeatureError> {
+) -> Result<Vec<(SurfaceId, Point, Vec<Sheet>)>, FeatureError> {
     let mut found = Vec::new();
     for (i, cone) in geometry.surfaces.iter().enumerate() {
         let id = SurfaceId::new(i);
         let Some(point) = cone.apex() else { continue };
-        if is_boundary(geometry, tree, id, tolerances)? {
-            found.push((id, point));
+        let sheets = sheets_around(geometry, tree, id, tolerances)?;
+        if !sheets.is_empty() {
+            found.push((id, point, sheets));
         }
     }
     Ok(found)
 }
 
-/// Whether a cone is a boundary near its apex.
-fn is_boundary(
+/// The sheets of a cone near its apex.
+fn sheets_around(
     geometry: &Geometry,
     tree: &Octree,
     id: SurfaceId,
     tolerances: &Tolerances,
-) -> Result<bool, FeatureError> {
+) -> Result<Vec<Sheet>, FeatureError> {
     /// Distance of the sample points in units of the merge tolerance, small enough that no other
     /// surface intervenes.
     const BESIDE: f64 = 100.0;
     let cone = &geometry.surfaces[id.index()];
-    let Some(apex) = cone.apex() else { return Ok(false) };
+    let Some(apex) = cone.apex() else { return Ok(Vec::new()) };
+    let mut found = Vec::new();
     for line in lines(cone) {
         let point = apex + line * (BESIDE * tolerances.merge);
         let other_side = |s: SurfaceId| geometry.surfaces[s.index()].value(&point) > 0.0;
-        if sheet_at(geometry, tree, id, &point, &other_side)?.is_some() {
-            return Ok(true);
-        }
+        found.extend(sheet_at(geometry, tree, id, &point, &other_side)?);
     }
-    Ok(false)
+    found.sort_unstable();
+    found.dedup();
+    Ok(found)
 }
 
 /// Unit directions of lines on the nappes of a cone from the apex, in general position.

@@ -7,6 +7,7 @@ use crate::interval::{Cell, middle};
 use crate::primitive::quadric::{extremes, tangents};
 use crate::project::project_to_both;
 use crate::{BodyId, Geometry, Interval, Point, Seam, Surface, SurfaceId, Vector};
+use nalgebra::Matrix3;
 
 /// A point where two surfaces are tangent or cannot be separated.
 #[derive(Clone, Copy, Debug)]
@@ -61,7 +62,7 @@ pub(super) fn find(
     let reach = diagonal(cell);
     let mut at = center;
     for _ in 0..STEPS {
-        let step = least_squares_step(a, b, &at)?;
+        let step = least_squares_step(a, b, None, &at)?;
         at += step;
         if (at - center).norm() > 2.0 * reach {
             return None;
@@ -70,13 +71,67 @@ pub(super) fn find(
             break;
         }
     }
-    let meets = a.distance(&at).max(b.distance(&at)) <= tolerances.on_surface;
+    if a.distance(&at).max(b.distance(&at)) > tolerances.on_surface || sine(a, b, &at) > TANGENT {
+        return None;
+    }
+    let point = on_a_third_surface(geometry, pair, &at, reach, tolerances).unwrap_or(at);
     let inside = (0..3).all(|i| {
         let room = 0.01 * cell[i].width();
-        Interval::new(cell[i].lo - room, cell[i].hi + room).contains(at[i])
+        Interval::new(cell[i].lo - room, cell[i].hi + room).contains(point[i])
     });
-    let sine = a.normal(&at).cross(&b.normal(&at)).norm();
-    (meets && inside && sine <= TANGENT).then_some(Contact { pair, point: at, reach, kind: Kind::Tangent })
+    inside.then_some(Contact { pair, point, reach, kind: Kind::Tangent })
+}
+
+/// The sine of the angle between two surfaces at a point.
+fn sine(a: &Surface, b: &Surface, at: &Point) -> f64 {
+    a.normal(at).cross(&b.normal(at)).norm()
+}
+
+/// The point of contact on a third surface, if both surfaces are tangent there as well.
+///
+/// If two surfaces have equal curvatures in one direction, rounding determines the contact along it
+/// only to about a thousandth of the radius. A third surface that passes within that distance was
+/// probably meant to pass through it: the end of a rod from which a torus bends away.
+fn on_a_third_surface(
+    geometry: &Geometry,
+    pair: [SurfaceId; 2],
+    contact: &Point,
+    reach: f64,
+    tolerances: &Tolerances,
+) -> Option<Point> {
+    /// Ratio of the differences of curvatures below which the contact is uncertain along a line.
+    const EQUAL: f64 = 1e-2;
+    /// The least share of the larger difference along the third surface: that surface crosses the
+    /// line, instead of containing it.
+    const CROSSING: f64 = 0.1;
+    /// Most steps: convergence is quadratic with the third surface.
+    const STEPS: usize = 8;
+    let [a, b] = pair.map(|s| &geometry.surfaces[s.index()]);
+    let normal = a.normal(contact);
+    let difference = curvature_difference([a, b], contact);
+    let [low, high] = extremes(&difference, &normal).map(f64::abs);
+    if low.min(high) >= EQUAL * low.max(high) {
+        return None;
+    }
+    let cuts_line = |third: &Surface| {
+        let section = normal.cross(&third.normal(contact)).try_normalize(1e-3);
+        section.is_some_and(|s| s.dot(&(difference * s)).abs() >= CROSSING * low.max(high))
+    };
+    let others = geometry.surfaces.iter().enumerate().filter(|(i, _)| pair.iter().all(|s| s.index() != *i));
+    let mut others = others.map(|(_, third)| third);
+    others.find_map(|third| {
+        if third.distance(contact) > reach || !cuts_line(third) {
+            return None;
+        }
+        let mut at = *contact;
+        for _ in 0..STEPS {
+            at += least_squares_step(a, b, Some(third), &at)?;
+        }
+        let is_on_all = [a, b, third].iter().all(|s| s.distance(&at) <= tolerances.exact);
+        let middle = nalgebra::center(&at, contact);
+        let is_tangent = [middle, at].iter().all(|p| sine(a, b, p) <= TANGENT);
+        (is_on_all && is_tangent).then_some(at)
+    })
 }
 
 /// Whether a seam passes through a cell in which both of its surfaces are flat; records it as a
@@ -101,15 +156,15 @@ pub(super) fn on_seam(geometry: &Geometry, seam: &Seam, cell: &Cell, contacts: &
     is_on && is_near
 }
 
-/// One Gauss-Newton step toward a point of tangency.
+/// One Gauss-Newton step toward a point of tangency, on a third surface if there is one.
 ///
-/// The shortest least-squares solution of the linearized equations: both values vanish and the
-/// gradients are parallel.
-fn least_squares_step(a: &Surface, b: &Surface, at: &Point) -> Option<Vector> {
+/// The shortest least-squares solution of the linearized equations: all values vanish and the
+/// gradients of the first two are parallel.
+fn least_squares_step(a: &Surface, b: &Surface, third: Option<&Surface>, at: &Point) -> Option<Vector> {
     let (ga, gb) = (a.gradient(at), b.gradient(at));
     let (ha, hb) = (a.hessian(at), b.hessian(at));
-    let mut matrix = nalgebra::SMatrix::<f64, 5, 3>::zeros();
-    let mut values = nalgebra::SVector::<f64, 5>::zeros();
+    let mut matrix = nalgebra::SMatrix::<f64, 6, 3>::zeros();
+    let mut values = nalgebra::SVector::<f64, 6>::zeros();
     let (la, lb) = (ga.norm(), gb.norm());
     if la == 0.0 || lb == 0.0 {
         return None;
@@ -127,6 +182,12 @@ fn least_squares_step(a: &Surface, b: &Surface, at: &Point) -> Option<Vector> {
             matrix.fixed_view_mut::<3, 1>(2, j).copy_from(&column);
         }
         values.fixed_rows_mut::<3>(2).copy_from(&cross);
+    }
+    if let Some(third) = third {
+        let gradient = third.gradient(at);
+        let length = gradient.norm();
+        matrix.row_mut(5).copy_from(&(gradient.transpose() / length));
+        values[5] = third.value(at) / length;
     }
     // Along a curve of contact one direction is free: drop singular values
     // that vanish up to the error of the position, a root of that of the surfaces.
@@ -232,11 +293,17 @@ fn curvature_differences(geometry: &Geometry, contact: &Contact) -> [f64; 2] {
 /// The smallest and the largest difference of the curvatures of two tangent surfaces in a direction
 /// of their common tangent plane, 1/length.
 pub(super) fn curvature_differences_at([a, b]: [&Surface; 2], at: &Point) -> [f64; 2] {
+    extremes(&curvature_difference([a, b], at), &a.normal(at))
+}
+
+/// The difference of the curvatures of two tangent surfaces as a quadratic form on their common
+/// tangent plane.
+fn curvature_difference([a, b]: [&Surface; 2], at: &Point) -> Matrix3<f64> {
     let (na, nb) = (a.normal(at), b.normal(at));
     let sign = if na.dot(&nb) < 0.0 { -1.0 } else { 1.0 };
     let (ha, hb) = (a.hessian(at) / a.gradient(at).norm(), b.hessian(at) / b.gradient(at).norm() * sign);
     // The heights of the sheets over the common tangent plane are minus one half of these forms.
-    extremes(&(hb - ha), &na)
+    hb - ha
 }
 
 /// Finds the points where boundaries touch, and rejects those between which no tets fit.

@@ -35,6 +35,11 @@ pub(super) fn crossings(
     let [a, b] = trace.pair.map(|s| &geometry.surfaces[s.index()]);
     let mut by_surface: BTreeMap<SurfaceId, Vec<Crossing>> = BTreeMap::new();
     let mut found = Vec::new();
+    // An apex on the curve need not separate the inside of its cone from the outside there.
+    let apexes = geometry.surfaces.iter().filter_map(Surface::apex);
+    let is_on_both = |p: &Point| a.distance(p).max(b.distance(p)) <= tolerances.on_surface;
+    let given: Vec<Point> =
+        geometry.user_points.iter().map(|user| user.point).chain(apexes).filter(is_on_both).collect();
     for (index, ends) in trace.points.windows(2).enumerate() {
         for id in tree.surfaces_in(&step_box(&ends[0], &ends[1])) {
             if trace.pair.contains(&id) {
@@ -71,12 +76,8 @@ pub(super) fn crossings(
                 by_surface.entry(id).or_default().extend(finder.crossings(index, ends));
             }
         }
-        let tangent = tree.tangent_pairs(trace.pair).iter().flatten();
-        let apices = tangent.filter_map(|s| geometry.surfaces[s.index()].apex());
-        let given = geometry.user_points.iter().map(|user| user.point);
-        for point in given.chain(apices) {
-            let on_both = a.distance(&point).max(b.distance(&point)) <= tolerances.on_surface;
-            if let (true, Some(part)) = (on_both, along(ends, &point)) {
+        for &point in &given {
+            if let Some(part) = along(ends, &point) {
                 found.push(Crossing { position: index as f64 + part, point, volume: 0.0 });
             }
         }

@@ -5,11 +5,14 @@
 //! usual size have an angle of some degrees at the tip. If their curvatures are equal and the
 //! distance grows with the third or fourth power (as between the rim of a rod and the circle where
 //! a torus touches the rod's end), the tip is thinner than rounding over the length of a triangle.
+//!
+//! If two surfaces are tangent at the corner and both curves are intersections of these two, a body
+//! between them is a **spike**, whose thickness vanishes with the fourth power.
 
-use super::cut_cusps::Cusp;
+use super::cut_cusps::{Cusp, Parting};
 use super::{Curve, FeatureError, Features, Named, Place, curve_curvature};
 use crate::project::{at_distance, project_to_both};
-use crate::{CornerId, CurveId, Geometry, Point};
+use crate::{CornerId, CurveId, Geometry, Point, SurfaceId, Vector};
 use std::collections::BTreeMap;
 
 /// Distance from the corner at which the curves are compared, relative to the smallest of their
@@ -42,7 +45,9 @@ pub(super) fn check(geometry: &Geometry, features: &Features) -> Result<(), Feat
                 let ends = [(c, first.1), (d, second.1)];
                 let reach = reach(geometry, &ends);
                 let is_sharp = |[near, far]: [f64; 2]| far < LEAST_ANGLE && near < FALLING * far;
-                if !angles(geometry, ends, REACH * reach).is_some_and(is_sharp) {
+                let angles = angles(geometry, ends, REACH * reach);
+                let is_spike = angles.is_some_and(|angles| is_spike(geometry, ends, REACH * reach, angles));
+                if !is_spike && !angles.is_some_and(is_sharp) {
                     continue;
                 }
                 // Curves without a common patch are on boundaries that touch at the corner.
@@ -53,8 +58,12 @@ pub(super) fn check(geometry: &Geometry, features: &Features) -> Result<(), Feat
                     *other.unwrap_or(&curve.surfaces[0])
                 });
                 let point = features.corner(corner).point;
+                let along = parting(geometry, ends, reach, is_spike);
+                // Both surfaces of a spike end there.
+                let surfaces = if is_spike { c.surfaces } else { surfaces };
+                let cusp =
+                    Cusp { surfaces, between: None, point, arc: Vec::new(), reach: CUT * reach, along };
                 let [first, second] = surfaces.map(|s| Named::surface(geometry, s));
-                let cusp = Cusp { surfaces, between: None, point, arc: Vec::new(), reach: CUT * reach };
                 return Err(FeatureError::Cusp { first, second, place: Place(point), cusp: Box::new(cusp) });
             }
         }
@@ -72,24 +81,94 @@ fn reach(geometry: &Geometry, ends: &[(&Curve, usize); 2]) -> f64 {
     of(&ends[0]).min(of(&ends[1]))
 }
 
-/// The angles at a corner between the points of two curves at half and at full distance.
+/// The points of two curves at a distance from their common corner.
 ///
 /// `None` if a curve cannot be followed that far.
-fn angles(geometry: &Geometry, ends: [(&Curve, usize); 2], far: f64) -> Option<[f64; 2]> {
-    let traces = ends.map(|(curve, end)| {
+fn points_at(geometry: &Geometry, ends: [(&Curve, usize); 2], distance: f64) -> Option<[Point; 2]> {
+    let point = |(curve, end): (&Curve, usize)| {
         let mut trace = curve.trace.clone();
         if end == 1 {
             trace.reverse();
         }
-        trace
-    });
+        let [a, b] = curve.surfaces.map(|s| &geometry.surfaces[s.index()]);
+        at_distance(&trace, distance, |at| project_to_both(a, b, at, f64::EPSILON * distance))
+    };
+    let [first, second] = ends;
+    Some([point(first)?, point(second)?])
+}
+
+/// The angles at a corner between the points of two curves at half and at full distance.
+///
+/// `None` if a curve cannot be followed that far.
+fn angles(geometry: &Geometry, ends: [(&Curve, usize); 2], far: f64) -> Option<[f64; 2]> {
     let angle = |distance: f64| {
-        let [p, q] = [0, 1].map(|i| {
-            let [a, b] = ends[i].0.surfaces.map(|s| &geometry.surfaces[s.index()]);
-            let project = |at: &Point| project_to_both(a, b, at, f64::EPSILON * distance);
-            at_distance(&traces[i], distance, project)
-        });
-        Some((p? - q?).norm() / distance)
+        let [p, q] = points_at(geometry, ends, distance)?;
+        Some((p - q).norm() / distance)
     };
     Some([angle(0.5 * far)?, angle(far)?])
+}
+
+/// Whether two curves bound a spike of a body: they leave the corner alike, between the same two
+/// surfaces, which are tangent there.
+///
+/// `angles` are those between the points of the curves at half the distance and at the distance.
+/// Where the curves separate quadratically, the thickness of the spike grows with the fourth power.
+fn is_spike(geometry: &Geometry, ends: [(&Curve, usize); 2], distance: f64, angles: [f64; 2]) -> bool {
+    /// Largest ratio of the angles; 1/2 for quadratic separation.
+    const FALLING: f64 = 0.6;
+    if ends[0].0.surfaces != ends[1].0.surfaces || angles[0] > FALLING * angles[1] {
+        return false;
+    }
+    let dihedral = |part: f64| dihedral(geometry, ends, part * distance);
+    let (Some(half), Some(whole)) = (dihedral(0.5), dihedral(1.0)) else { return false };
+    half < FALLING * whole && whole < LEAST_DIHEDRAL && is_inside(geometry, ends, distance)
+}
+
+/// The least sine of the angle between the two surfaces of a spike at which it may begin (6°).
+const LEAST_DIHEDRAL: f64 = 0.1;
+
+/// The sine of the angle between two surfaces on the first of two curves of their intersection.
+fn dihedral(geometry: &Geometry, ends: [(&Curve, usize); 2], distance: f64) -> Option<f64> {
+    let [p, _] = points_at(geometry, ends, distance)?;
+    let [a, b] = ends[0].0.surfaces.map(|s| geometry.surfaces[s.index()].normal(&p));
+    Some(a.cross(&b).norm())
+}
+
+/// Whether the space between the two surfaces, halfway between the curves, belongs to a body.
+fn is_inside(geometry: &Geometry, ends: [(&Curve, usize); 2], distance: f64) -> bool {
+    let Some([p, q]) = points_at(geometry, ends, distance) else { return false };
+    let on = ends[0].0.surfaces.map(|s| geometry.surfaces[s.index()].project(&nalgebra::center(&p, &q)));
+    let [Ok(a), Ok(b)] = on else { return false };
+    let between = nalgebra::center(&a, &b);
+    let positive = |s: SurfaceId| geometry.surfaces[s.index()].value(&between) > 0.0;
+    geometry.bodies.iter().any(|body| body.solid.contains(&positive))
+}
+
+/// Where two curves that leave a corner alike are far enough apart, and in a spike the surfaces
+/// too.
+///
+/// `None` if that is nowhere within `reach` (about twice of it for a spike), or if they do not leave their tangent.
+fn parting(geometry: &Geometry, ends: [(&Curve, usize); 2], reach: f64, is_spike: bool) -> Option<Parting> {
+    /// Distances, relative to the reach; those above 1 are for spikes.
+    const SHARES: [f64; 10] = [0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 1.0, 1.3, 1.7, 2.2];
+    /// The wanted angle between the points of the curves, seen from the corner, radians.
+    const WANTED: f64 = 2e-3;
+    let corner = ends[0].0.trace[if ends[0].1 == 0 { 0 } else { ends[0].0.trace.len() - 1 }];
+    let towards = |distance: f64| -> Option<Vector> {
+        let [p, q] = points_at(geometry, ends, distance)?;
+        Some((nalgebra::center(&p, &q) - corner) / distance)
+    };
+    // Very near the corner the curves cannot be told apart; their directions change linearly.
+    let (half, whole) = (towards(0.5 * REACH * reach)?, towards(REACH * reach)?);
+    let tangent = (half * 2.0 - whole).try_normalize(0.0)?;
+    SHARES.into_iter().filter(|share| is_spike || *share < 1.0).find_map(|share| {
+        let distance = share * reach;
+        let points = points_at(geometry, ends, distance)?;
+        let aside = points.iter().map(|p| (p - corner).cross(&tangent).norm()).fold(0.0, f64::max);
+        let apart = (points[0] - points[1]).norm();
+        let is_thick = !is_spike || dihedral(geometry, ends, distance)? > LEAST_DIHEDRAL;
+        let along = points.iter().map(|p| (p - corner).dot(&tangent)).fold(f64::INFINITY, f64::min);
+        let parting = Parting { tangent, distance: along, aside, is_spike };
+        (apart > WANTED * distance && apart < aside && is_thick).then_some(parting)
+    })
 }

@@ -28,6 +28,22 @@ pub struct Cusp {
     pub(super) arc: Vec<Point>,
     /// Largest radius at which it may be cut off, from what lies around it.
     pub(super) reach: f64,
+    /// Where two curves leave a corner alike: the direction of both, and how far apart they get.
+    pub(super) along: Option<Parting>,
+}
+
+/// Two curves that part slowly from their common tangent at a corner, and from each other.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Parting {
+    /// The direction of both at the corner.
+    pub tangent: Vector,
+    /// The distance from the corner, along the tangent, at which they are far enough apart for
+    /// triangles.
+    pub distance: f64,
+    /// Their distance from the tangent there.
+    pub aside: f64,
+    /// Whether a body between the same two surfaces ends there.
+    pub is_spike: bool,
 }
 
 /// A part of bodies that was left out because they have no angle there.
@@ -64,8 +80,19 @@ impl fmt::Display for CutCusp {
 /// Most cusps cut off in one geometry; each needs another search for the features.
 const MOST: usize = 100;
 
-/// Factors of the radii, tried in this order while cuts end in slivers.
-const WIDER: [f64; 2] = [1.0, 2.0];
+/// How much is cut off.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Extent {
+    /// All around the cusp, with this factor of the radius.
+    Around(f64),
+    /// Where two curves leave a corner alike, only the layer between the tangent surfaces, in a
+    /// long and thin cylinder about the tangent of the curves; otherwise all around. Spikes are
+    /// always cut off so: at the end of a ball around the tip they are still thin.
+    Layer,
+}
+
+/// The extents, tried in this order while cuts end in slivers.
+const EXTENTS: [Extent; 3] = [Extent::Around(1.0), Extent::Around(2.0), Extent::Layer];
 
 /// Finds the features of a geometry, from which cusps without angle are cut off as far as needed.
 ///
@@ -76,9 +103,9 @@ pub fn find_and_cut_cusps(geometry: &mut Geometry) -> Result<(Features, Vec<CutC
         Ok(features) => return Ok((features, Vec::new())),
         Err(error) => error,
     };
-    for wider in WIDER {
+    for extent in EXTENTS {
         let mut cut = geometry.clone();
-        match cut_all_off(&mut cut, first.clone(), wider) {
+        match cut_all_off(&mut cut, first.clone(), extent) {
             Ok(Some(found)) => {
                 *geometry = cut;
                 return Ok(found);
@@ -101,7 +128,7 @@ pub fn find_and_cut_cusps(geometry: &mut Geometry) -> Result<(Features, Vec<CutC
 fn cut_all_off(
     geometry: &mut Geometry,
     mut error: FeatureError,
-    wider: f64,
+    extent: Extent,
 ) -> Result<Option<(Features, Vec<CutCusp>)>, FeatureError> {
     let own = geometry.surfaces.len();
     let mut cut_cusps: Vec<CutCusp> = Vec::new();
@@ -109,7 +136,7 @@ fn cut_all_off(
         let (FeatureError::Tangent { cusp, .. } | FeatureError::Cusp { cusp, .. }) = &error else {
             return Err(error);
         };
-        let cut = if cut_cusps.len() < MOST { cut_off(geometry, cusp, &cut_cusps, wider) } else { None };
+        let cut = if cut_cusps.len() < MOST { cut_off(geometry, cusp, &cut_cusps, extent) } else { None };
         cut_cusps.push(cut.ok_or(error)?);
         match Features::find(geometry) {
             Ok(features) if leaves_slivers(&features, own, &cut_cusps) => return Ok(None),
@@ -131,7 +158,7 @@ fn leaves_slivers(features: &Features, own: usize, cut_cusps: &[CutCusp]) -> boo
 }
 
 /// Takes a small neighborhood of a cusp out of the bodies; `None` if that cannot help.
-fn cut_off(geometry: &mut Geometry, cusp: &Cusp, before: &[CutCusp], wider: f64) -> Option<CutCusp> {
+fn cut_off(geometry: &mut Geometry, cusp: &Cusp, before: &[CutCusp], extent: Extent) -> Option<CutCusp> {
     let mut known =
         before.iter().filter(|cut_cusp| (cut_cusp.place.0 - cusp.point).norm() < 0.5 * cut_cusp.radius);
     // If something is left after the body between was cut, all bodies are.
@@ -143,12 +170,20 @@ fn cut_off(geometry: &mut Geometry, cusp: &Cusp, before: &[CutCusp], wider: f64)
             None
         }
     };
-    let radius = radius(geometry, cusp, wider)?;
-    let left_out = if cusp.arc.is_empty() {
-        let ball = Surface::Sphere(Sphere { center: cusp.point, radius });
-        inside(geometry, ball, cusp)
-    } else {
-        tube(geometry, cusp, radius)?
+    let (left_out, radius, is_curve) = match (extent, cusp.along) {
+        (extent, Some(parting)) if extent == Extent::Layer || parting.is_spike => {
+            (layer(geometry, cusp, &parting), WIDTH * parting.aside, true)
+        }
+        (extent, _) => {
+            let wider = if let Extent::Around(factor) = extent { factor } else { 1.0 };
+            let radius = radius(geometry, cusp, wider)?;
+            if cusp.arc.is_empty() {
+                let ball = Surface::Sphere(Sphere { center: cusp.point, radius });
+                (inside(geometry, ball, cusp), radius, false)
+            } else {
+                (tube(geometry, cusp, radius)?, radius, true)
+            }
+        }
     };
     for (i, cut) in geometry.bodies.iter_mut().enumerate() {
         if body.is_none_or(|body| body.index() == i) {
@@ -157,7 +192,6 @@ fn cut_off(geometry: &mut Geometry, cusp: &Cusp, before: &[CutCusp], wider: f64)
         }
     }
     let [first, second] = cusp.surfaces.map(|s| Named::surface(geometry, s));
-    let is_curve = !cusp.arc.is_empty();
     let body = body.map(|body| (body, Named::body(geometry, body)));
     Some(CutCusp { first, second, place: Place(cusp.point), radius, is_curve, body })
 }
@@ -221,6 +255,23 @@ fn inside(geometry: &mut Geometry, surface: Surface, cusp: &Cusp) -> Solid {
     geometry.surfaces.push(surface);
     geometry.surface_info.push(info);
     Solid::Half { surface: SurfaceId::new(geometry.surfaces.len() - 1), positive: false }
+}
+
+/// Radius of the cylinder of a layer, relative to the distance of the curves from their tangent.
+const WIDTH: f64 = 1.6;
+
+/// The layer between the two surfaces of a cusp, in a cylinder about the tangent of the curves that
+/// part there.
+fn layer(geometry: &mut Geometry, cusp: &Cusp, parting: &Parting) -> Solid {
+    let Parting { tangent: axis, distance, aside, .. } = *parting;
+    let round = Cylinder { point: cusp.point, axis, radius: WIDTH * aside };
+    let ends = [-axis, axis].map(|normal| Plane { point: cusp.point + normal * distance, normal });
+    let mut parts = vec![inside(geometry, Surface::Cylinder(round), cusp)];
+    parts.extend(ends.map(|end| inside(geometry, Surface::Plane(end), cusp)));
+    let half = |k: usize, positive: bool| Solid::Half { surface: cusp.surfaces[k], positive };
+    let between = [true, false].map(|side| Solid::And(vec![half(0, side), half(1, !side)]));
+    parts.push(Solid::Or(between.to_vec()));
+    Solid::And(parts)
 }
 
 /// A tube around the arc of contact, longer than it by the radius at both ends; `None` if that is

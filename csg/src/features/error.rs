@@ -220,7 +220,7 @@ impl FeatureError {
         between: Option<BodyId>,
     ) -> Self {
         let [first, second] = surfaces.map(|s| Named::surface(geometry, s));
-        let cusp = Cusp { surfaces, between, point, arc: Vec::new(), reach: f64::INFINITY };
+        let cusp = Cusp { surfaces, between, point, arc: Vec::new(), reach: f64::INFINITY, along: None };
         Self::Tangent { first, second, place: Place(point), cusp: Box::new(cusp) }
     }
 

@@ -171,6 +171,22 @@ fn cusps_inside_bodies_are_cut_off_with_a_note() {
 }
 
 #[test]
+fn a_spike_that_tapers_with_the_fourth_power_is_cut_off_where_it_is_thick_enough() {
+    // The tube of the torus lies in the rod and touches its lowest line; then it bends away.
+    let spike = "solid s = torus (0,0,0; 0,0,1; 0.5; 0.25) and not
+        (cylinder (0,0.5,0.25; 1,0.5,0.25; 0.5) and plane (0,0,0; -1,0,0) and plane (0.6,0,0; 1,0,0)); tlo s;";
+    let turned = "solid s = torus (0,0,0; 0,0,1; 0.5; 0.25) and not
+        (cylinder (0,0.5,0.25; 1,0.5,0.25; 0.5) and plane (0,0,0; -1,0,0) and plane (0.6,0,0; 1,0,0));
+        solid t = rotate (0.3, 0.5, 1.1; 0.4, 0.7, 1.1; s); tlo t;";
+    for source in [spike, turned] {
+        let mut geometry = super::tests::geometry(source);
+        let (_, cusps) = super::find_and_cut_cusps(&mut geometry).unwrap();
+        let [cusp] = &cusps[..] else { panic!("{cusps:?}") };
+        assert!(cusp.is_curve && cusp.body.is_none() && cusp.radius > 0.05 && cusp.radius < 0.25, "{cusp}");
+    }
+}
+
+#[test]
 fn wedges_of_zero_angle_are_rejected_with_both_names_and_coordinates() {
     let cases = [
         (
@@ -258,6 +274,13 @@ fn corners_and_edges_may_touch_the_interior_of_a_face() {
         let inside = features.patches.iter().filter(|p| p.corners.iter().any(|c| c.index() == corner));
         assert_eq!(inside.count(), patches, "{source}");
     }
+    // On an edge of the plate.
+    let plates = "orthobrick (-1,-1,1; 0,1,2)";
+    let edge = format!(
+        "solid top = cone (0,0,-1; 1; 0,0,1; 0) and plane (0,0,-1; 0,0,-1) and plane (0,0,1; 0,0,1);
+        solid s = {plates} or top; tlo s;"
+    );
+    assert_eq!(counts(&find(&edge)), [9, 13, 1, 8]);
     // Inside the plate, or away from it, the apex is allowed.
     let sunk = format!(
         "{block} solid top = {}; solid s = block or top and plane (0,0,-0.1; 0,0,-1); tlo s;",

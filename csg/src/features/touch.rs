@@ -1,12 +1,12 @@
 //! Corners inside patches: a ball that stands on a plate, the corner of a block on a face, a rim
-//! that touches a face.
+//! that touches a face, the tip of a cone on an edge.
 //!
 //! The boundary is not a manifold there: the patch contains a vertex that is on none of its curves.
 
 use super::arcs::{Arc, Nodes};
 use super::neighborhood::{Sheet, Tolerances, sheet_at};
 use super::octree::Octree;
-use super::{FeatureError, assemble};
+use super::{FeatureError, apex, assemble};
 use crate::primitive::quadric::tangents;
 use crate::{Geometry, Point, SurfaceId};
 use std::collections::{BTreeMap, BTreeSet};
@@ -38,9 +38,18 @@ pub(super) fn find(
     }
     let is_node =
         |point: &Point| leaving.keys().any(|&node| (nodes.point(node) - point).norm() <= tolerances.merge);
+    let is_leaving = |id: SurfaceId, point: &Point| {
+        let here = |node: &usize| (nodes.point(*node) - point).norm() <= tolerances.merge;
+        leaving.iter().filter(|(node, _)| here(node)).any(|(_, surfaces)| surfaces.contains(&id))
+    };
+    let mut found = Vec::new();
+    for (id, point, sheets) in apex::boundaries(geometry, tree, tolerances)? {
+        if is_node(&point) && !is_leaving(id, &point) {
+            found.extend(sheets.into_iter().map(|sheet| (sheet, point)));
+        }
+    }
     let alone = touching.iter().filter(|point| !is_node(point)).map(|&point| (point, BTreeSet::new()));
     let ends = leaving.iter().map(|(&node, surfaces)| (nodes.point(node), surfaces.clone()));
-    let mut found = Vec::new();
     for (point, surfaces) in ends.chain(alone) {
         for touched in assemble::corner(geometry, tree, point, tolerances).surfaces {
             if !surfaces.contains(&touched) {

@@ -246,12 +246,31 @@ pub(super) fn tangent_along(a: &Surface, b: &Surface, at: &Point, chord: &Vector
 
 /// The curvature of a curve at one of its points, 1/length.
 ///
-/// At an end where its surfaces are tangent, the curvature at the middle of the adjacent trace
-/// step.
+/// Near an end where its surfaces are tangent, the curvature at the middle of the trace step, or that
+/// of the trace if the surfaces are nearly tangent there too.
 pub(super) fn curve_curvature(geometry: &Geometry, curve: &Curve, at: &Point) -> f64 {
     let [a, b] = curve.surfaces.map(|s| &geometry.surfaces[s.index()]);
     let chord = inward(curve, at);
-    if is_transversal(a, b, at, &chord) { curvature(a, b, at) } else { curvature(a, b, &(at + chord * 0.5)) }
+    let middle = at + chord * 0.5;
+    let steady = [*at, middle].into_iter().find(|p| is_transversal(a, b, p, &chord));
+    steady.map_or_else(|| trace_curvature(curve, at, chord.norm()), |p| curvature(a, b, &p))
+}
+
+/// The curvature of the trace next to a point: the turn between its nearest step and the next one
+/// of at least half its length, per distance of their middles.
+fn trace_curvature(curve: &Curve, at: &Point, length: f64) -> f64 {
+    let (trace, step) = (&curve.trace, nearest_step(curve, at));
+    let far = |i: &usize| (trace[*i] - trace[step + 1]).norm() >= 0.5 * length;
+    let far_back = |i: &usize| (trace[*i] - trace[step]).norm() >= 0.5 * length;
+    let own = trace[step + 1] - trace[step];
+    let other = match (step + 2..trace.len()).find(far) {
+        Some(i) => trace[i] - trace[step + 1],
+        None => match (0..step).rev().find(far_back) {
+            Some(i) => trace[step] - trace[i],
+            None => return 0.0,
+        },
+    };
+    own.angle(&other) / (0.5 * (own.norm() + other.norm()))
 }
 
 /// Whether two surfaces cross at an angle large enough to compute the tangent from their gradients.
