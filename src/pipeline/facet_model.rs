@@ -14,7 +14,7 @@ use crate::ground::kernel::simplex::volume6;
 use crate::ground::mesh::{BoundaryTriangle, Class, Label, Names, Segment, VertexId};
 use crate::ground::progress::Work;
 use crate::ground::projector::Projector;
-use crate::ground::size::{Closeness, SizeSettings, Source, WatchedSize};
+use crate::ground::size::{Closeness, SizeField, SizeSettings, Source, WatchedSize};
 use crate::mesher::facets::{
     Crossing, FacetBodies, FacetError, FacetModel, FacetPatch, FacetSize, FacetSmoothness, Facets, Marks,
     RemeshSettings, SharpPlaces, keep, remesh,
@@ -155,7 +155,8 @@ impl FacetSolid {
     }
 
     fn attempt(&self, settings: &CoarseSettings, allowed: Allowed, budget: &Budget, work: &Work) -> Attempt {
-        let size = self.size_field(&settings.size);
+        let own = self.size_field(&settings.size);
+        let size = WatchedSize::new(&own, work);
         let expected = expected::tets(&self.model.bounds, &size, expected::FEW, || {
             let bodies = FacetBodies::new(&self.model);
             move |p: &Point| bodies.contain(p)
@@ -170,7 +171,6 @@ impl FacetSolid {
                 return Attempt::Thin(sources, found);
             }
         }
-        let size = WatchedSize::new(&size, work);
         let mut surface = if self.keep_surface {
             keep(&self.model)
         } else {
@@ -215,7 +215,7 @@ impl FacetSolid {
     /// Finds thin regions between the facets themselves.
     fn thin_regions(
         &self,
-        size: &FacetSize,
+        size: &dyn SizeField,
         regions: &(dyn Fn(PatchId) -> [Option<BodyId>; 2] + Sync),
         closeness: Closeness,
     ) -> (Vec<Source>, ThinRegions) {

@@ -5,18 +5,34 @@ use super::{FacetCurve, FacetModel};
 use crate::Point;
 use crate::ground::kernel::nearest::in_segment;
 use crate::ground::kernel::tree::{Tree, bounds};
-use crate::ground::size::{SizeSettings, Source};
+use crate::ground::size::{SizeSettings, Source, SourceTree};
+use crate::mesher::surface::closeness::lowered;
+use std::cell::OnceCell;
 
 /// Largest edge length, in distances of two curves: a strip of such triangles, one across, has
 /// angles of at least 25°.
 const ACROSS: f64 = 1.8;
+
+/// The size is lowered at most by this factor, and not at all in bands much narrower than that: the
+/// strips that Boolean operations leave would get more triangles than all the rest. A box of
+/// 10⁴ × 1 × 1 is resolved everywhere, one of 10⁶ × 1 × 1 near its ends only.
+const MOST: f64 = 2000.0;
 
 /// The most bisections of a curve segment.
 const MOST_CUTS: u32 = 20;
 
 /// Adds sources along curves that are close, compared with the sizes, to another curve of the same
 /// patch without a common corner.
-pub(super) fn sample(model: &FacetModel, settings: &SizeSettings, maximum: f64, sources: &mut Vec<Source>) {
+///
+/// `size_alone` makes the size field of the sources before.
+pub(super) fn sample(
+    model: &FacetModel,
+    settings: &SizeSettings,
+    size_alone: impl Fn(&[Source]) -> SourceTree,
+    sources: &mut Vec<Source>,
+) {
+    let alone = OnceCell::new();
+    let mut added: Vec<Source> = Vec::new();
     let patches = patches_of_curves(model);
     let point = |v: u32| model.points[v as usize];
     let segments: Vec<(usize, [Point; 2])> = model
@@ -44,33 +60,41 @@ pub(super) fn sample(model: &FacetModel, settings: &SizeSettings, maximum: f64, 
             };
             tree.nearest(p, to).map_or(f64::INFINITY, |(_, squared)| squared.sqrt())
         };
+        let alone = alone.get_or_init(|| size_alone(sources));
+        let sizes = |p: &Point| Sizes {
+            alone: alone.size_at(p),
+            wanted: (ACROSS * settings.scale.min(1.0) * distance(p)).max(settings.minh),
+        };
         for (_, [a, b]) in own_segments {
-            let size_of = |p: &Point| (ACROSS * settings.scale.min(1.0) * distance(p)).max(settings.minh);
-            cut(*a, *b, MOST_CUTS, maximum, &size_of, sources);
+            cut(*a, *b, MOST_CUTS, &sizes, &mut added);
         }
     }
+    sources.extend(added);
+}
+
+/// Sizes at a point of a curve.
+struct Sizes {
+    /// Without close curves.
+    alone: f64,
+    /// For well-shaped triangles between this curve and the nearest one.
+    wanted: f64,
 }
 
 /// Adds a source in the middle of a segment, which is bisected while it is longer than the size
 /// there.
-fn cut(
-    a: Point,
-    b: Point,
-    cuts: u32,
-    maximum: f64,
-    size_of: &impl Fn(&Point) -> f64,
-    sources: &mut Vec<Source>,
-) {
+fn cut(a: Point, b: Point, cuts: u32, sizes: &impl Fn(&Point) -> Sizes, sources: &mut Vec<Source>) {
     let (middle, length) = (nalgebra::center(&a, &b), (b - a).norm());
-    let size = size_of(&middle);
-    // Along the segment the distance changes by at most half its length.
-    if size - ACROSS * 0.5 * length >= maximum || size <= 0.0 {
+    let Sizes { alone, wanted } = sizes(&middle);
+    // Along the segment the distance changes by at most half its length, and the other size hardly
+    // by more.
+    if wanted - 0.5 * ACROSS * length >= alone + 0.5 * length {
         return;
     }
+    let size = lowered(alone, wanted, MOST);
     if length > size && cuts > 0 {
-        cut(a, middle, cuts - 1, maximum, size_of, sources);
-        cut(middle, b, cuts - 1, maximum, size_of, sources);
-    } else if size < maximum {
+        cut(a, middle, cuts - 1, sizes, sources);
+        cut(middle, b, cuts - 1, sizes, sources);
+    } else if size < alone {
         sources.push(Source { point: middle, size });
     }
 }

@@ -34,8 +34,11 @@ impl FacetSize {
         let mut sources = settings.sources.clone();
         sample_facets(model, settings, maximum, &mut sources);
         sample_curves(model, settings, maximum, &mut sources);
-        close_curves::sample(model, settings, maximum, &mut sources);
-        let tree = SourceTree::new(model.bounds, settings.grading, maximum, &thinned(sources));
+        let tree_of = |sources: Vec<Source>| {
+            SourceTree::new(model.bounds, settings.grading, maximum, &thinned(sources))
+        };
+        close_curves::sample(model, settings, |alone| tree_of(alone.to_vec()), &mut sources);
+        let tree = tree_of(sources);
         Self { tree, function: settings.function.clone() }
     }
 

@@ -212,6 +212,17 @@ fn a_steep_cap_between_facets_that_agree_makes_no_curve() {
 }
 
 #[test]
+fn bands_are_resolved_unless_they_are_far_narrower_than_all_else() {
+    let size_halfway = |length: f64| {
+        let needle = model(&[soup(|s| s.brick([0.0; 3], [length, 1.0, 1.0], false))]);
+        sizes(&needle, 1.0).size_at(&Point::new(0.5 * length, 0.0, 0.0))
+    };
+    assert!(size_halfway(100.0) < 2.0);
+    assert!(size_halfway(1e4) < 2.0);
+    assert!(size_halfway(1e6) > 1e4);
+}
+
+#[test]
 fn the_riser_of_a_low_step_keeps_its_curves() {
     // Its triangles are needles of 0.6°, at right angles to both treads.
     let outline = [[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, 1.0], [1.0, 1.01], [0.0, 1.01]];

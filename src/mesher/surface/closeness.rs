@@ -95,7 +95,8 @@ impl FlatPlace {
     }
 }
 
-/// Sources that lower the sizes in thin regions, and statistics of these regions.
+/// Sources that lower the sizes in thin regions, and statistics of these regions; incomplete if the
+/// work of the size field is cancelled.
 pub fn thin_regions(walls: &Walls) -> (Vec<Source>, ThinRegions) {
     let mut found = ThinRegions::default();
     if !walls.closeness.ratio.is_finite() {
@@ -106,7 +107,9 @@ pub fn thin_regions(walls: &Walls) -> (Vec<Source>, ThinRegions) {
         .into_par_iter()
         .map(|t| {
             let mut places = Vec::new();
-            prober.probe_triangle(t, &mut places);
+            if !walls.size.work().is_cancelled() {
+                prober.probe_triangle(t, &mut places);
+            }
             places
         })
         .collect();
@@ -306,7 +309,7 @@ impl<'a> Prober<'a> {
 /// It is the wanted size, if that is at most `most` times smaller. Beyond that the reduction
 /// decreases and vanishes at about twice the factor, because a partial reduction costs many tets
 /// that are still flat.
-fn lowered(size: f64, wanted: f64, most: f64) -> f64 {
+pub(crate) fn lowered(size: f64, wanted: f64, most: f64) -> f64 {
     let beyond = size / (wanted * most);
     if beyond <= 1.0 { wanted } else { size * (beyond.powi(3) / most).min(1.0) }
 }

@@ -32,7 +32,30 @@ pub(crate) fn rounding(points: &[Point]) -> f64 {
     } else {
         DOUBLE
     };
-    relative * largest
+    (relative * largest).max(fixed_point(points, largest).unwrap_or(0.0))
+}
+
+/// Half of the last decimal place of coordinates in fixed point, if they were rounded to it.
+///
+/// Programs write coordinates with six places, or snap those of Boolean results to integers.
+/// Coordinates of a drawing are multiples of a power of ten too, but most of these end in zeros, or
+/// the part has few vertices.
+fn fixed_point(points: &[Point], largest: f64) -> Option<f64> {
+    /// The most decimal places: of more, doubles hold too few multiples to tell.
+    const MOST_PLACES: i32 = 9;
+    /// The fewest vertices from which a conclusion is drawn.
+    const FEWEST: usize = 50;
+    /// The coarsest rounding, relative to the largest coordinate.
+    const COARSEST: f64 = 1e-5;
+    /// The least share of coordinates with a last digit other than zero; nine tenths are expected.
+    const LEAST_SHARE: f64 = 0.6;
+    let coordinates = || points.iter().flat_map(|p| p.iter().copied());
+    let is_whole = |x: f64| (x - x.round()).abs() <= 4.0 * f64::EPSILON * x.abs();
+    let places = (0..=MOST_PLACES).find(|&d| coordinates().all(|x| is_whole(x * 10f64.powi(d))))?;
+    let unit = 10f64.powi(-places);
+    let uneven = coordinates().filter(|x| !is_whole(0.1 * (x / unit).round())).count();
+    let is_rounded = points.len() >= FEWEST && uneven as f64 >= LEAST_SHARE * 3.0 * points.len() as f64;
+    (is_rounded && unit <= COARSEST * largest).then_some(0.5 * unit)
 }
 
 /// The unit normals of all facets, those of slivers from other facets, and whether each is a
@@ -175,4 +198,25 @@ pub(crate) fn of_corners(
         }
     }
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ground::kernel::random::Random;
+
+    #[test]
+    fn the_rounding_of_fixed_point_is_half_of_the_last_place() {
+        let mut random = Random::new(7);
+        let mut coordinate = |unit: f64| (40.0 * random.unit() / unit).round() * unit;
+        let mut points = |unit: f64| -> Vec<Point> {
+            (0..60).map(|_| Point::from([0; 3].map(|_| coordinate(unit)))).collect()
+        };
+        let rounded = points(1e-6);
+        assert!((rounding(&rounded) / 5e-7 - 1.0).abs() < 1e-9, "{}", rounding(&rounded));
+        // Too few to tell, a drawing in tenths, and coordinates of a scan with all digits.
+        assert!(rounding(&rounded[..40]) < 1e-12);
+        assert!(rounding(&points(0.1)) < 1e-3);
+        assert!(rounding(&points(1e-6 / 3.0)) < 1e-12);
+    }
 }
