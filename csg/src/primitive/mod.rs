@@ -108,7 +108,8 @@ pub struct Cone {
     pub slope: f64,
 }
 
-/// A ring torus (major radius larger than minor radius).
+/// A torus. If the minor radius is not less than the major one, it has singular points on its axis,
+/// which must not be on the boundary; what is inside of the inner sheet is inside.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Torus {
     /// The center.

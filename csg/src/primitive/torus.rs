@@ -1,6 +1,7 @@
 //! The torus: ((ρ - R)² + τ² - r²)/2r, with ρ the distance from the axis and τ the height.
 //!
-//! Not smooth on the axis, which a ring torus does not meet.
+//! Not smooth on the axis, which a ring torus does not meet. A torus without a hole meets it in two
+//! points, or one.
 
 use super::quadric::{reject, tangents};
 use super::{Primitive, Torus, reject_range};

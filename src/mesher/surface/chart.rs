@@ -332,8 +332,8 @@ impl Chart {
         }
     }
 
-    /// The point of the surface at a site, up to rounding; `None` for a pole or in the chart of a
-    /// plane.
+    /// The point of the surface at a site, up to rounding; `None` for a pole, in the chart of a
+    /// plane, and on the inner sheet of a torus without a hole, which is on no boundary.
     pub fn point(&self, site: &Site) -> Option<Point> {
         let round = |radius: f64| {
             let (sin, cos) = (TAU * site[0]).sin_cos();
@@ -344,7 +344,11 @@ impl Chart {
             Shape::Central => *site,
             Shape::Around { major } => {
                 let (sin, cos) = (TAU * site[1]).sin_cos();
-                let [x, y] = round(major / self.radii[0] + cos);
+                let distance = major / self.radii[0] + cos;
+                if distance <= 0.0 {
+                    return None;
+                }
+                let [x, y] = round(distance);
                 [x, y, sin * self.radii[0]]
             }
             Shape::Tube { profile } => {

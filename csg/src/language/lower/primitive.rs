@@ -270,12 +270,27 @@ impl Check<'_> {
     fn torus(&mut self, center: &Point, axis: &Vector, major: f64, minor: f64) -> Result<Shape, Reported> {
         let (center, axis) = (self.point(center)?, self.direction("the axis of `torus`", axis)?);
         let (major, minor) = (self.radius("torus", major)?, self.radius("torus", minor)?);
-        if minor >= major {
-            let message = format!("the tube of `torus` has radius {minor}, its center line only {major}");
-            return Err(
-                self.wrong(message, "a torus without a hole intersects itself; give the larger radius first")
-            );
-        }
-        Ok(Shape::of(Surface::Torus(Torus { center, axis, major, minor })))
+        let torus = Torus { center, axis, major, minor };
+        Ok(if minor < major { Shape::of(Surface::Torus(torus)) } else { self.closed_torus(torus) })
+    }
+
+    /// A torus without a hole: everything that the tube sweeps. Its surface has no tangent plane on
+    /// the axis, so a rod about the axis fills the dimples up to a small radius.
+    fn closed_torus(&mut self, torus: Torus) -> Shape {
+        /// Radius of the rod, relative to the radius of the tube.
+        const ROD: f64 = 0.1;
+        /// Largest radius of the rod, relative to that of the center line: its ends stay in the dimples.
+        const LARGEST_ROD: f64 = 0.5;
+        let Torus { center, axis, major, minor } = torus;
+        let radius = (ROD * minor).min(LARGEST_ROD * major);
+        let end = (minor + major - radius).sqrt() * (minor - major + radius).sqrt();
+        let message =
+            format!("the `torus` has no hole: its dimples are filled up to {radius:.3e} from the axis");
+        self.report.warn(self.span, message, "the larger radius comes first if a hole is meant");
+        let cap = |normal: Vector| Surface::Plane(Plane { point: center + normal * end, normal });
+        let rod = Surface::Cylinder(Cylinder { point: center, axis, radius });
+        let surfaces = vec![Surface::Torus(torus), rod, cap(-axis), cap(axis)];
+        let inside = Solid::Or(vec![inside_of(0), Solid::And((1..4).map(inside_of).collect())]);
+        Shape { faces: vec![0; surfaces.len()], surfaces, inside, joints: Vec::new() }
     }
 }

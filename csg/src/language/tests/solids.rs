@@ -90,6 +90,18 @@ fn a_brick_has_six_planes_in_the_order_of_netgen() {
 #[test]
 fn a_torus_is_a_ring() {
     assert_is(&solid("torus (0,0,0; 0,0,3; 2; 0.5)"), |p| (p.x.hypot(p.y) - 2.0).hypot(p.z) < 0.5);
+    // Without a hole, the dimples are filled near the axis.
+    for (major, minor) in [(1.0, 1.0), (0.8, 1.0), (0.1, 1.0)] {
+        let radius = f64::min(0.1, 0.5 * major);
+        let end = (minor - major + radius).sqrt() * (minor + major - radius).sqrt();
+        let text = format!("algebraic3d solid a = torus (0,0,0; 0,0,3; {major}; {minor}); tlo a;");
+        let parsed = parse_geometry(&text, "t.geo").unwrap();
+        assert!(parsed.warnings[0].to_string().contains("no hole"), "{}", parsed.warnings[0]);
+        assert_is(&parsed.geometry, |p| {
+            let distance = p.x.hypot(p.y);
+            (distance - major).hypot(p.z) < minor || distance < radius && p.z.abs() < end
+        });
+    }
 }
 
 const CUBE: &str = "polyhedron (0,0,0; 1,0,0; 1,1,0; 0,1,0; 0,0,1; 1,0,1; 1,1,1; 0,1,1 ;;
