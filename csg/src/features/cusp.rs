@@ -147,7 +147,8 @@ fn is_inside(geometry: &Geometry, ends: [(&Curve, usize); 2], distance: f64) -> 
 /// Where two curves that leave a corner alike are far enough apart, and in a spike the surfaces
 /// too.
 ///
-/// `None` if that is nowhere within `reach` (about twice of it for a spike), or if they do not leave their tangent.
+/// `None` if that is nowhere within `reach` (about twice of it for a spike), or if they do not
+/// leave their tangent.
 fn parting(geometry: &Geometry, ends: [(&Curve, usize); 2], reach: f64, is_spike: bool) -> Option<Parting> {
     /// Distances, relative to the reach; those above 1 are for spikes.
     const SHARES: [f64; 10] = [0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 1.0, 1.3, 1.7, 2.2];

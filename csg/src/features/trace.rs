@@ -246,8 +246,8 @@ pub(super) fn tangent_along(a: &Surface, b: &Surface, at: &Point, chord: &Vector
 
 /// The curvature of a curve at one of its points, 1/length.
 ///
-/// Near an end where its surfaces are tangent, the curvature at the middle of the trace step, or that
-/// of the trace if the surfaces are nearly tangent there too.
+/// Near an end where its surfaces are tangent, the curvature at the middle of the trace step, or
+/// that of the trace if the surfaces are nearly tangent there too.
 pub(super) fn curve_curvature(geometry: &Geometry, curve: &Curve, at: &Point) -> f64 {
     let [a, b] = curve.surfaces.map(|s| &geometry.surfaces[s.index()]);
     let chord = inward(curve, at);

@@ -279,7 +279,8 @@ impl Check<'_> {
     fn closed_torus(&mut self, torus: Torus) -> Shape {
         /// Radius of the rod, relative to the radius of the tube.
         const ROD: f64 = 0.1;
-        /// Largest radius of the rod, relative to that of the center line: its ends stay in the dimples.
+        /// Largest radius of the rod, relative to that of the center line: its ends stay in the
+        /// dimples.
         const LARGEST_ROD: f64 = 0.5;
         let Torus { center, axis, major, minor } = torus;
         let radius = (ROD * minor).min(LARGEST_ROD * major);
