@@ -218,8 +218,9 @@ fn bands_are_resolved_unless_they_are_far_narrower_than_all_else() {
         let needle = model(&[soup(|s| s.brick([0.0; 3], [length, 1.0, 1.0], false))]);
         sizes(&needle, 1.0).size_at(&Point::new(0.5 * length, 0.0, 0.0))
     };
-    assert!(size_halfway(100.0) < 2.0);
-    assert!(size_halfway(1e4) < 2.0);
+    // A size of 1.8 widths, which grows between the places where it is wanted.
+    assert!(size_halfway(100.0) < 2.2);
+    assert!(size_halfway(1e4) < 2.2);
     assert!(size_halfway(1e6) > 1e4);
 }
 
