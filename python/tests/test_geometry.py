@@ -81,6 +81,17 @@ def test_shared_solids_are_one_interface(two_blocks):
     assert (np.sort(sides, axis=1) == [1, 2]).all()
 
 
+def test_a_surface_has_another_name_at_each_body():
+    floor = csg.Plane((0, 0, 0), (0, 0, -1), bc="floor")
+    core = (csg.Sphere((0, 0, 0), 0.5, bc="joint") & floor).named("core")
+    shell = ((csg.Sphere((0, 0, 0), 1, bc="top") & floor) - core).named("shell")
+    mesh = tetmill.Geometry.from_solids(core, shell, boundaries=[(floor, core, "chip")]).generate(maxh=0.3)
+    assert set(mesh.face_names.values()) == {"floor", "joint", "top", "chip"}
+    assert np.linalg.norm(mesh.points[mesh.vertices_named("chip")], axis=1).max() < 0.5 + 1e-9
+    with pytest.raises(ValueError, match="no body"):
+        csg.geo_text(core, boundaries=[(floor, shell, "chip")])
+
+
 def test_wrong_solids_are_refused():
     with pytest.raises(ValueError, match="letters"):
         csg.Sphere((0, 0, 0), 1).named("two words")

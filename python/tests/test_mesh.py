@@ -1,11 +1,13 @@
 """Arrays, blocks, parts, files and pictures of meshes."""
 
+import gc
 import json
 import os
 import pathlib
 import subprocess
 import sys
 import tracemalloc
+import weakref
 
 import numpy as np
 import pytest
@@ -64,6 +66,18 @@ def test_arrays_outlive_their_mesh(ball):
     points, tets = (lambda mesh: (mesh.points, mesh.tets))(ball.generate(maxh=0.4))
     ball.generate(maxh=0.3)
     assert (volumes(points, tets) > 0).all()
+
+
+def test_memory_is_freed_with_the_last_reference(ball):
+    mesh = ball.generate(maxh=0.4, parts=2)
+    assert mesh.tets.size and mesh.parts[0].ghosts().tets.size and mesh.parts[0].owners.size
+    references = [weakref.ref(mesh), weakref.ref(mesh.parts[0])]
+    gc.disable()
+    try:
+        del mesh
+        assert [reference() for reference in references] == [None, None]
+    finally:
+        gc.enable()
 
 
 def test_parts_fit_together(ball):

@@ -127,11 +127,19 @@ class Geometry:
         return geometry
 
     @classmethod
-    def from_solids(cls, *solids: Solid, extra: str = "") -> Geometry:
-        """Makes each solid of `tetmill.csg` a body; `extra` is added to the text."""
+    def from_solids(
+        cls, *solids: Solid, boundaries: Iterable[tuple[Solid, Solid, str | int]] = ()
+    ) -> Geometry:
+        """Makes each solid of `tetmill.csg` a body.
+
+        Args:
+            solids: The bodies, which must not overlap.
+            boundaries: (solid, body, boundary): a name or number for all surfaces of a solid where
+                they bound a body.
+        """
         from .csg import geo_text
 
-        geometry = cls._of(_native.Geometry.from_text(geo_text(*solids) + extra))
+        geometry = cls._of(_native.Geometry.from_text(geo_text(*solids, boundaries=boundaries)))
         warn(geometry.notes)
         return geometry
 

@@ -59,6 +59,20 @@ def _names(of: list[Label]) -> dict[int, str]:
     return {label.number: label.names[0] for label in reversed(of) if label.names}
 
 
+class _Layers:
+    """The ghosts of all parts, made at the first use of any."""
+
+    def __init__(self, native: _native.Mesh) -> None:
+        self._native = native
+        self._made: dict[str, list[Ghosts]] = {}
+
+    def __call__(self, by: str) -> list[Ghosts]:
+        by = arguments.one_of("by", by, ("faces", "vertices"))
+        if by not in self._made:
+            self._made[by] = self._native.ghosts(by)
+        return self._made[by]
+
+
 class Part:
     """One part of a mesh. Shared vertices are in the arrays of each part that has them.
 
@@ -66,18 +80,20 @@ class Part:
     made at the first use.
     """
 
-    def __init__(self, mesh: Mesh, rank: int) -> None:
-        self._mesh = mesh
+    def __init__(self, native: _native.Mesh, rank: int, layers: _Layers) -> None:
+        # Not the `Mesh`, whose memory a circle of references would keep until the next collection.
+        self._native = native
+        self._layers = layers
         #: The rank that made it, from 0.
         self.rank = rank
 
     @cached_property
     def _arrays(self) -> _native.PartArrays:
-        return self._mesh._native.arrays(self.rank)
+        return self._native.arrays(self.rank)
 
     @cached_property
     def _sharing(self) -> _native.PartSharing:
-        return self._mesh._native.sharing(self.rank)
+        return self._native.sharing(self.rank)
 
     @cached_property
     def points(self) -> Floats:
@@ -152,14 +168,14 @@ class Part:
 
         Their vertices are numbered as in this part, followed by `points` of the ghosts.
         """
-        return self._mesh._ghosts(by)[self.rank]
+        return self._layers(by)[self.rank]
 
     def blocks(self, size: int = 1 << 16) -> Iterator[Block]:
         """The tets in blocks of `size` or somewhat more: see `Mesh.blocks`."""
-        return self._mesh._native.blocks(self.rank, arguments.whole("size", size, 1, 2**31 - 1))
+        return self._native.blocks(self.rank, arguments.whole("size", size, 1, 2**31 - 1))
 
     def __repr__(self) -> str:
-        vertices, tets, faces = self._mesh._native.counts(self.rank)
+        vertices, tets, faces = self._native.counts(self.rank)
         return f"<tetmill.Part {self.rank}: {vertices:,} vertices, {tets:,} tets, {faces:,} faces>"
 
 
@@ -172,12 +188,12 @@ class Mesh:
 
     def __init__(self, native: _native.Mesh) -> None:
         self._native = native
-        self._ghost_layers: dict[str, list[Ghosts]] = {}
 
     @cached_property
     def parts(self) -> list[Part]:
         """The parts, by rank."""
-        return [Part(self, rank) for rank in range(self._native.count())]
+        layers = _Layers(self._native)
+        return [Part(self._native, rank, layers) for rank in range(self._native.count())]
 
     @cached_property
     def points(self) -> Floats:
@@ -283,12 +299,6 @@ class Mesh:
         """
         for part in self.parts:
             yield from part.blocks(size)
-
-    def _ghosts(self, by: str) -> list[Ghosts]:
-        by = arguments.one_of("by", by, ("faces", "vertices"))
-        if by not in self._ghost_layers:
-            self._ghost_layers[by] = self._native.ghosts(by)
-        return self._ghost_layers[by]
 
     @cached_property
     def report(self) -> dict[str, Any]:

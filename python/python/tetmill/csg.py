@@ -17,7 +17,7 @@ Planes, cylinders and cones are infinite, as in .geo files; a body must be bound
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -251,8 +251,12 @@ class _Writer:
         self._names[id(solid)] = name
 
 
-def geo_text(*solids: Solid) -> str:
-    """The text of a .geo file with each of the solids as a body."""
+def geo_text(*solids: Solid, boundaries: Iterable[tuple[Solid, Solid, str | int]] = ()) -> str:
+    """The text of a .geo file with each of the solids as a body.
+
+    Each of `boundaries` gives a name or number to all surfaces of its first solid where they bound
+    its second one, a body.
+    """
     if not solids:
         raise ValueError("a geometry needs a solid")
     for solid in solids:
@@ -266,7 +270,14 @@ def geo_text(*solids: Solid) -> str:
         size = "" if solid._maxh is None else f" -maxh={_number(solid._maxh)}"
         material = f" -material={solid._name}" if solid._name else ""
         bodies.append(f"tlo {name}{material}{size};")
-    return "\n".join(["algebraic3d", *writer.lines, *bodies, ""])
+    conditions = []
+    for surface, body, boundary in boundaries:
+        if all(body is not solid for solid in solids):
+            raise ValueError(f"the boundary {boundary!r} is set for a solid that is no body")
+        flagged = surface.bc(boundary)._bc
+        statement = "boundaryconditionname" if isinstance(flagged, str) else "boundarycondition"
+        conditions.append(f"{statement} {writer.name_of(surface)} {writer.name_of(body)} {flagged};")
+    return "\n".join(["algebraic3d", *writer.lines, *bodies, *conditions, ""])
 
 
 _WORDS = frozenset(
