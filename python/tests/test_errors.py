@@ -123,6 +123,11 @@ def test_exceptions_of_callbacks_are_raised_as_they_are(ball, parts):
             ball.generate(maxh=0.3, levels=1, parts=parts, **options)
 
 
+#: Windows has no signals that a process sends to itself, and does not fork.
+posix = pytest.mark.skipif(os.name != "posix", reason="needs signals and fork")
+
+
+@posix
 @pytest.mark.parametrize("options", [{"maxh": 0.02}, {"maxh": 0.1, "levels": 5}, {"maxh": 0.02, "parts": 2}])
 def test_ctrl_c_stops_a_run(ball, options):
     sent = []
@@ -140,6 +145,7 @@ def test_ctrl_c_stops_a_run(ball, options):
     assert len(ball.generate(maxh=0.5).tets) > 0
 
 
+@posix
 def test_ctrl_c_stops_a_size_function(ball):
     def size(points):
         time.sleep(0.001)
@@ -182,6 +188,7 @@ def test_runs_in_threads_do_not_wait_for_each_other(ball):
     assert len(made) == 4 and len(set(made)) == 1
 
 
+@posix
 def test_a_forked_process_is_refused(ball):
     ball.generate(maxh=0.6)
     child = os.fork()
