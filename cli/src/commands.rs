@@ -20,7 +20,7 @@ use crate::failure::{Failure, Status, agree};
 use crate::options::{
     Check, FileFormat, Format, Generate, InputOptions, Inspect, MeshFile, Method, Quality, SizeOptions,
 };
-use crate::report::{LevelReport, MeshReport, PartitionReport, Processes, Report, counted, processes};
+use crate::report::{Report, counted, processes};
 use crate::terminal::Terminal;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -28,9 +28,9 @@ use tetmill::comm::{Communicator, thread};
 use tetmill::files::{Destination, elmer, mesh_size, picture, refuse_missing, serial};
 use tetmill::mesh::{MeshStream, Watched};
 use tetmill::progress::{Progress, Silent, Stage};
-use tetmill::run::{Balance, CoarseSettings, Disk, GenerateSettings, Outcome, Wanted, balance, generate};
+use tetmill::run::{CoarseSettings, Disk, GenerateSettings, Outcome, Wanted, balance, generate};
 use tetmill::size::{Closeness, SizeSettings};
-use tetmill::{Generated, Geometry, InputSettings, files, quality};
+use tetmill::{Geometry, InputSettings, files, quality};
 
 /// `tetmill generate`
 pub fn run_generate(options: &Generate) -> Result<(), Failure> {
@@ -91,7 +91,7 @@ fn generate_on(comm: &dyn Communicator, options: &Generate, start: Instant) -> R
     let balanced = balance(comm, &made.part)?;
     let took = processes(comm)?;
     let Some(geometry) = geometry else { return Ok(()) };
-    let mut report = summary(&geometry, &name_of(&options.input), &made, took, comm.size(), balanced);
+    let mut report = Report::new(&geometry, &name_of(&options.input), &made, took, comm.size(), balanced);
     report.halo = halo;
     terminal.finish();
     report.stages = progress.times();
@@ -237,42 +237,6 @@ fn draw(
     agree(comm, drawn.map_err(Failure::from))
 }
 
-fn summary(
-    geometry: &Geometry,
-    input: &str,
-    made: &Generated,
-    took: Processes,
-    ranks: u32,
-    balance: Balance,
-) -> Report {
-    let coarse = made.coarse.as_ref().expect("rank 0 made the coarse mesh");
-    Report {
-        version: env!("CARGO_PKG_VERSION").into(),
-        geometry: input.to_owned(),
-        entities: geometry.entities(),
-        ranks,
-        threads: rayon::current_num_threads(),
-        levels: made.pieces.ilog2(),
-        pieces: made.pieces,
-        coarse: coarse.report.clone(),
-        wanted: coarse.outcome,
-        mesh: MeshReport::new(&made.check, made.checksum.to_string()),
-        quality_by_level: made.levels.iter().map(LevelReport::new).collect(),
-        partition: PartitionReport::new(&coarse.partition, balance),
-        periodic: made.periodic,
-        skins: made.refused.clone(),
-        across: made.across,
-        evened: made.evened,
-        halo: None,
-        stages: Vec::new(),
-        seconds: 0.0,
-        peak_memory: took.memory(),
-        processes: took,
-        files: 0,
-        bytes: 0,
-    }
-}
-
 /// Prints the summary and writes the report file.
 fn show_report(
     report: &Report,
@@ -380,7 +344,7 @@ pub fn run_mesh(options: &MeshFile) -> Result<(), Failure> {
         draw(&comm, made.part.stream(), options.cut, file)?;
     }
     let balanced = balance(&comm, &made.part)?;
-    let mut report = summary(&geometry, &name_of(&options.input), &made, processes(&comm)?, 1, balanced);
+    let mut report = Report::new(&geometry, &name_of(&options.input), &made, processes(&comm)?, 1, balanced);
     terminal.finish();
     report.stages = progress.times();
     report.seconds = start.elapsed().as_secs_f64();

@@ -13,7 +13,7 @@ mod cancel;
 mod commands;
 mod failure;
 mod options;
-mod report;
+pub mod report;
 mod terminal;
 
 use clap::Parser;
@@ -33,12 +33,17 @@ pub const OUT_OF_MEMORY: u8 = failure::Status::Resources as u8;
 /// The first argument is the name of the program. Results go to the standard output, messages to
 /// the standard error.
 pub fn run(arguments: impl IntoIterator<Item = impl Into<OsString> + Clone>) -> ExitCode {
+    ExitCode::from(status(arguments))
+}
+
+/// [`run`] with the exit status as a number, for programs that do not end with it.
+pub fn status(arguments: impl IntoIterator<Item = impl Into<OsString> + Clone>) -> u8 {
     let cli = match Cli::try_parse_from(arguments) {
         Ok(cli) => cli,
         Err(error) => {
             // A closed standard error cannot be reported anywhere.
             let _ = error.print();
-            return ExitCode::from(error.exit_code() as u8);
+            return error.exit_code() as u8;
         }
     };
     cancel::listen();
@@ -54,12 +59,12 @@ pub fn run(arguments: impl IntoIterator<Item = impl Into<OsString> + Clone>) -> 
         Command::Man(options) => commands::on_one_rank(|| commands::run_man(&options)),
     };
     match done {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(()) => 0,
         Err(failure) => {
             if !failure.message.is_empty() {
                 eprintln!("tetmill: {failure}");
             }
-            ExitCode::from(failure.status as u8)
+            failure.status as u8
         }
     }
 }

@@ -15,6 +15,7 @@ use tetmill::progress::StageTime;
 use tetmill::run::{
     Balance, CoarseReport, Entities, Evened, Level, Metrics, Outcome, PeriodicCheck, Refused,
 };
+use tetmill::{Generated, Geometry};
 
 /// Report of a run.
 #[derive(Clone, Debug, Serialize)]
@@ -201,6 +202,46 @@ impl PartitionReport {
 }
 
 impl Report {
+    /// Creates the report of rank 0, without halo, stages, duration and files.
+    ///
+    /// # Panics
+    /// On other ranks, which have no coarse mesh.
+    pub fn new(
+        geometry: &Geometry,
+        input: &str,
+        made: &Generated,
+        took: Processes,
+        ranks: u32,
+        balance: Balance,
+    ) -> Self {
+        let coarse = made.coarse.as_ref().expect("rank 0 made the coarse mesh");
+        Self {
+            version: env!("CARGO_PKG_VERSION").into(),
+            geometry: input.to_owned(),
+            entities: geometry.entities(),
+            ranks,
+            threads: rayon::current_num_threads(),
+            levels: made.pieces.ilog2(),
+            pieces: made.pieces,
+            coarse: coarse.report.clone(),
+            wanted: coarse.outcome,
+            mesh: MeshReport::new(&made.check, made.checksum.to_string()),
+            quality_by_level: made.levels.iter().map(LevelReport::new).collect(),
+            partition: PartitionReport::new(&coarse.partition, balance),
+            periodic: made.periodic,
+            skins: made.refused.clone(),
+            across: made.across,
+            evened: made.evened,
+            halo: None,
+            stages: Vec::new(),
+            seconds: 0.0,
+            peak_memory: took.memory(),
+            processes: took,
+            files: 0,
+            bytes: 0,
+        }
+    }
+
     /// Adds the files that were written.
     pub fn add_written(&mut self, written: Written) {
         self.files += written.files;

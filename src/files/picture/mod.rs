@@ -20,6 +20,6 @@ mod png_file;
 mod raster;
 mod scene;
 
-pub use png_file::write_png;
+pub use png_file::{png_bytes, write_png};
 pub use raster::{Image, Settings, render};
 pub use scene::{ColorBy, Cut, Look, Scene, Triangle, gather, scene_of_part};

@@ -3,15 +3,22 @@
 use super::raster::Image;
 use crate::files::WriteError;
 use crate::files::output::write_file;
-use std::io;
 use std::path::Path;
 
 /// Writes an image; an existing file is kept on failure. See [`write_file`] for paths that are not
 /// regular files.
 pub fn write_png(image: &Image, path: &Path) -> Result<(), WriteError> {
-    let bytes = encode(image).map_err(|error| WriteError::io(path)(io::Error::other(error)))?;
+    let bytes = png_bytes(image);
     write_file(path, bytes.len() as u64, |output| output.write(&bytes))?;
     Ok(())
+}
+
+/// The content of a PNG file.
+///
+/// # Panics
+/// If the number of pixels is not width times height.
+pub fn png_bytes(image: &Image) -> Vec<u8> {
+    encode(image).expect("the pixels fill the image, and memory takes all bytes")
 }
 
 fn encode(image: &Image) -> Result<Vec<u8>, png::EncodingError> {
@@ -37,7 +44,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("image.png");
         write_png(&image, &path).unwrap();
-        let file = io::BufReader::new(std::fs::File::open(&path).unwrap());
+        let file = std::io::BufReader::new(std::fs::File::open(&path).unwrap());
         let mut reader = png::Decoder::new(file).read_info().unwrap();
         let mut bytes = vec![0; reader.output_buffer_size().unwrap()];
         let info = reader.next_frame(&mut bytes).unwrap();

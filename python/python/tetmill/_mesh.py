@@ -1,0 +1,482 @@
+"""Meshes: arrays, blocks, parts, files and pictures."""
+
+from __future__ import annotations
+
+import html
+import os
+from collections.abc import Callable, Iterator, Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Union
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import _arguments as arguments
+from . import _native
+
+if TYPE_CHECKING:
+    from IPython.display import Image
+
+Ints = NDArray[np.int32]
+Ids = NDArray[np.int64]
+Floats = NDArray[np.float64]
+
+#: A block of tets as a small mesh of its own: see `Mesh.blocks`.
+Block = _native.Block
+#: The tets of other parts beside a part: see `Part.ghosts`.
+Ghosts = _native.PartGhosts
+
+_FORMATS = ("elmer", "vtu", "msh", "medit", "vol", "geomview")
+_ENDINGS = {".vtu": "vtu", ".pvtu": "vtu", ".msh": "msh", ".mesh": "medit", ".vol": "vol", ".off": "geomview"}
+
+
+class Label(NamedTuple):
+    """The number of a body or patch, and its names."""
+
+    number: int
+    names: list[str]
+
+    @property
+    def name(self) -> str | None:
+        """The main name, if any."""
+        return self.names[0] if self.names else None
+
+
+class Written(NamedTuple):
+    """What was written."""
+
+    files: int
+    bytes: int
+
+
+def labels(native: list[tuple[int, list[str]]]) -> list[Label]:
+    """Labels of the library."""
+    return [Label(number, names) for number, names in native]
+
+
+def _names(of: list[Label]) -> dict[int, str]:
+    """The main name of each number; the first one if patches of one number have several."""
+    return {label.number: label.names[0] for label in reversed(of) if label.names}
+
+
+class _Layers:
+    """The ghosts of all parts, made at the first use of any."""
+
+    def __init__(self, native: _native.Mesh) -> None:
+        self._native = native
+        self._made: dict[str, list[Ghosts]] = {}
+
+    def __call__(self, by: str) -> list[Ghosts]:
+        by = arguments.one_of("by", by, ("faces", "vertices"))
+        if by not in self._made:
+            self._made[by] = self._native.ghosts(by)
+        return self._made[by]
+
+
+class Part:
+    """One part of a mesh. Shared vertices are in the arrays of each part that has them.
+
+    All arrays are read-only. They take over the memory of the library, without a copy, and are
+    made at the first use.
+    """
+
+    def __init__(self, native: _native.Mesh, rank: int, layers: _Layers) -> None:
+        # Not the `Mesh`, whose memory a circle of references would keep until the next collection.
+        self._native = native
+        self._layers = layers
+        #: The rank that made it, from 0.
+        self.rank = rank
+
+    @cached_property
+    def _arrays(self) -> _native.PartArrays:
+        return self._native.arrays(self.rank)
+
+    @cached_property
+    def _sharing(self) -> _native.PartSharing:
+        return self._native.sharing(self.rank)
+
+    @cached_property
+    def points(self) -> Floats:
+        """Coordinates, (n, 3)."""
+        return self._arrays.points
+
+    @cached_property
+    def tets(self) -> Ints:
+        """Indices of points, (m, 4); positively oriented: det(v1 - v0, v2 - v0, v3 - v0) > 0."""
+        return self._arrays.tets
+
+    @cached_property
+    def bodies(self) -> Ints:
+        """The body number of each tet, (m,)."""
+        return self._arrays.bodies
+
+    @cached_property
+    def faces(self) -> Ints:
+        """Triangles on patches, (k, 3); their right-hand normals point out of the inner body.
+
+        A triangle between two parts is in the arrays of both.
+        """
+        return self._arrays.faces
+
+    @cached_property
+    def face_tags(self) -> Ints:
+        """The boundary number of each face, (k,), as in files."""
+        return self._arrays.face_tags
+
+    @cached_property
+    def face_patches(self) -> Ints:
+        """The patch of each face, (k,), as an index of `Mesh.patches`."""
+        return self._arrays.face_patches
+
+    @cached_property
+    def face_bodies(self) -> Ints:
+        """Numbers of the bodies of this part behind and in front of each face, (k, 2); 0: none."""
+        return self._arrays.face_bodies
+
+    @cached_property
+    def global_ids(self) -> Ids:
+        """The id of each vertex in the whole mesh: from 0, without gaps."""
+        return self._arrays.vertex_ids
+
+    @cached_property
+    def tet_ids(self) -> Ids:
+        """The id of each tet in the whole mesh."""
+        return self._arrays.tet_ids
+
+    @cached_property
+    def owners(self) -> Ints:
+        """The rank that owns each vertex: one of those that share it."""
+        return self._sharing.owners
+
+    @cached_property
+    def shared(self) -> Ints:
+        """The vertices that other parts have too, ascending."""
+        return self._sharing.vertices
+
+    @property
+    def holders(self) -> tuple[Ids, Ints]:
+        """The ranks of each shared vertex: `ranks[offsets[i]:offsets[i + 1]]` those of `shared[i]`."""
+        return self._sharing.offsets, self._sharing.ranks
+
+    @property
+    def neighbours(self) -> dict[int, Ints]:
+        """By rank, the vertices shared with it; both ranks list them in the same order."""
+        return dict(self._sharing.neighbours)
+
+    def ghosts(self, by: Literal["faces", "vertices"] = "faces") -> Ghosts:
+        """The tets of other parts that share a face or a vertex with this one.
+
+        Their vertices are numbered as in this part, followed by `points` of the ghosts.
+        """
+        return self._layers(by)[self.rank]
+
+    def blocks(self, size: int = 1 << 16) -> Iterator[Block]:
+        """The tets in blocks of `size` or somewhat more: see `Mesh.blocks`."""
+        return self._native.blocks(self.rank, arguments.whole("size", size, 1, 2**31 - 1))
+
+    def __repr__(self) -> str:
+        vertices, tets, faces = self._native.counts(self.rank)
+        return f"<tetmill.Part {self.rank}: {vertices:,} vertices, {tets:,} tets, {faces:,} faces>"
+
+
+class Mesh:
+    """A checked tetrahedral mesh, with one part or several.
+
+    The arrays of a mesh of one part are those of the part: made by the library, read-only, and
+    not copied. Those of several parts are joined by global ids, which copies them.
+    """
+
+    def __init__(self, native: _native.Mesh) -> None:
+        self._native = native
+
+    @cached_property
+    def parts(self) -> list[Part]:
+        """The parts, by rank."""
+        layers = _Layers(self._native)
+        return [Part(self._native, rank, layers) for rank in range(self._native.count())]
+
+    @cached_property
+    def points(self) -> Floats:
+        """Coordinates, (n, 3)."""
+        if len(self.parts) == 1:
+            return self.parts[0].points
+        points = np.empty((self._native.totals()[0], 3))
+        for part in self.parts:
+            points[part.global_ids] = part.points
+        return _frozen(points)
+
+    def _by_tet(self, values: Callable[[Part], NDArray[Any]], width: tuple[int, ...]) -> NDArray[Any]:
+        """Joins values of tets by their ids."""
+        dtype = values(self.parts[0]).dtype
+        joined = np.empty((self._native.totals()[1], *width), dtype)
+        for part in self.parts:
+            joined[part.tet_ids] = values(part)
+        return _frozen(joined)
+
+    @cached_property
+    def tets(self) -> Ints | Ids:
+        """Indices of points, (m, 4); positively oriented: det(v1 - v0, v2 - v0, v3 - v0) > 0."""
+        if len(self.parts) == 1:
+            return self.parts[0].tets
+        ids = _index_type(len(self.points))
+        return self._by_tet(lambda part: part.global_ids[part.tets].astype(ids, copy=False), (4,))
+
+    @cached_property
+    def bodies(self) -> Ints:
+        """The body number of each tet, (m,)."""
+        return self.parts[0].bodies if len(self.parts) == 1 else self._by_tet(lambda part: part.bodies, ())
+
+    @cached_property
+    def _faces(self) -> tuple[NDArray[Any], Ints, Ints]:
+        """The triangles of all parts, each once, with tags and patches."""
+        if len(self.parts) == 1:
+            part = self.parts[0]
+            return part.faces, part.face_tags, part.face_patches
+        ids = _index_type(len(self.points))
+        faces = np.concatenate([part.global_ids[part.faces] for part in self.parts])
+        first = np.unique(np.sort(faces, axis=1), axis=0, return_index=True)[1]
+        first.sort()
+        tags = np.concatenate([part.face_tags for part in self.parts])
+        patches = np.concatenate([part.face_patches for part in self.parts])
+        return _frozen(faces[first].astype(ids)), _frozen(tags[first]), _frozen(patches[first])
+
+    @property
+    def faces(self) -> Ints | Ids:
+        """Triangles on patches, (k, 3); their right-hand normals point out of the inner body."""
+        return self._faces[0]
+
+    @property
+    def face_tags(self) -> Ints:
+        """The boundary number of each face, (k,), as in files."""
+        return self._faces[1]
+
+    @property
+    def face_patches(self) -> Ints:
+        """The patch of each face, (k,), as an index of `patches`."""
+        return self._faces[2]
+
+    @cached_property
+    def patches(self) -> list[Label]:
+        """Numbers and names of the patches. A name or number may belong to several patches."""
+        return labels(self._native.patch_labels())
+
+    @cached_property
+    def body_names(self) -> dict[int, str]:
+        """Names by body number."""
+        return _names(labels(self._native.body_labels()))
+
+    @cached_property
+    def face_names(self) -> dict[int, str]:
+        """Names by boundary number; `patches` has all names."""
+        return _names(self.patches)
+
+    def faces_named(self, name: str) -> NDArray[np.intp]:
+        """The indices of the faces on a boundary.
+
+        Raises:
+            InputError: If no boundary has the name; the message lists the names.
+        """
+        return np.flatnonzero(np.isin(self.face_patches, self._native.patches_named(name)))
+
+    def vertices_named(self, name: str) -> Ints | Ids:
+        """The vertices of the faces on a boundary, ascending, for Dirichlet data."""
+        return _frozen(np.unique(self.faces[self.faces_named(name)]))
+
+    def tets_named(self, name: str) -> NDArray[np.intp]:
+        """The indices of the tets of a body.
+
+        Raises:
+            InputError: If no body has the name; the message lists the names.
+        """
+        return np.flatnonzero(np.isin(self.bodies, self._native.bodies_named(name)))
+
+    def blocks(self, size: int = 1 << 16) -> Iterator[Block]:
+        """The tets of all parts in blocks of `size` or somewhat more, computed when they are read.
+
+        For meshes that do not fit the memory as arrays. A block is a small mesh of its own: `tets`
+        are positions in its `points`, whose numbers in the part are `vertices`. A vertex of
+        several coarse tets is in it several times.
+        """
+        for part in self.parts:
+            yield from part.blocks(size)
+
+    @cached_property
+    def report(self) -> dict[str, Any]:
+        """The report of the command line (`--report`)."""
+        return dict(arguments.as_dict(self._native.report()))
+
+    @property
+    def notes(self) -> list[str]:
+        """Messages of the run."""
+        return self._native.notes()
+
+    @property
+    def checksum(self) -> str:
+        """Identifies the mesh, whatever the number of parts and threads."""
+        return self._native.checksum()
+
+    def quality(self) -> dict[str, Any]:
+        """The shapes of all tets, with the keys of `tetmill quality --json`."""
+        measured = dict(arguments.as_dict(self._native.quality()))
+        del measured["mesh"], measured["notes"]
+        return measured
+
+    def check(self) -> list[str]:
+        """Checks orientation, numbering and boundaries again; returns the faults, none as a rule.
+
+        Every mesh was checked when it was made, also for its distance from the geometry.
+        """
+        count, faults = self._native.check()
+        more = count - len(faults)
+        return faults + ([f"and {more} more"] if more else [])
+
+    def write(
+        self,
+        path: str | os.PathLike[str],
+        format: Literal["elmer", "vtu", "msh", "medit", "vol", "geomview"] | None = None,
+        *,
+        boundary: Literal["beside", "in"] = "beside",
+        halo: Literal["faces", "vertices"] | None = None,
+        progress: Callable[[str, float], object] | None = None,
+    ) -> Written:
+        """Writes the mesh. Existing files are replaced when all is written.
+
+        Args:
+            path: A file, whose ending selects the format: .vtu (also .pvtu), .msh (Gmsh), .mesh
+                (Medit), .vol (NETGEN), .off (the boundary alone). A folder for "elmer".
+            format: The format, whatever the ending.
+            boundary: Where VTU stores boundary triangles: "beside" in files of their own, "in" the
+                same file.
+            halo: Write one layer of neighbouring tets with each part (Elmer and VTU).
+            progress: Called with the name of a stage and its progress, 0 to 1.
+        """
+        from ._geometry import warn
+
+        name = os.fspath(path)
+        if format is None:
+            ending = os.path.splitext(name)[1].lower()
+            if ending not in _ENDINGS:
+                known = ", ".join(_ENDINGS)
+                raise ValueError(f"cannot tell the format of {name!r} by its ending; known are {known}; or set format")
+            chosen = _ENDINGS[ending]
+        else:
+            chosen = arguments.one_of("format", format, _FORMATS)
+        if halo is not None and chosen not in ("elmer", "vtu"):
+            raise ValueError(f"the format {chosen} has no halo elements; write elmer or vtu")
+        target = {
+            "path": name,
+            "format": chosen,
+            "inside": arguments.one_of("boundary", boundary, ("beside", "in")) == "in",
+            "halo": None if halo is None else arguments.one_of("halo", halo, ("faces", "vertices")),
+        }
+        files, size, notes = self._native.write(target, progress)
+        warn(notes)
+        return Written(files, size)
+
+    def picture(
+        self,
+        *,
+        width: int = 1200,
+        height: int = 900,
+        azimuth: float | None = None,
+        elevation: float | None = None,
+        cut: Sequence[float] | None = None,
+        color_by: Literal["patch", "part", "body"] | None = None,
+    ) -> bytes:
+        """Draws the surface of the mesh as PNG.
+
+        Args:
+            width: Pixels.
+            height: Pixels.
+            azimuth: Direction of the viewer about z, from the x axis (degrees).
+            elevation: Of the viewer above the xy-plane (degrees).
+            cut: Draw only the tets behind a plane: a point and a normal, six numbers.
+            color_by: By default the part, or the patch if there is one part.
+        """
+        if cut is not None:
+            plane = arguments.positions("cut", [list(cut)], 6)[0]
+            if not plane[3:].any():
+                raise ValueError("cut has a normal of length 0")
+        chosen = color_by or ("part" if len(self.parts) > 1 else "patch")
+        view = {
+            "width": arguments.whole("width", width, 1, 20_000),
+            "height": arguments.whole("height", height, 1, 20_000),
+            "azimuth": azimuth,
+            "elevation": elevation,
+            "cut": None if cut is None else plane.tolist(),
+            "color_by": arguments.one_of("color_by", chosen, ("patch", "part", "body")),
+        }
+        return self._native.picture(view)
+
+    def plot(self, **view: Any) -> Union[Image, bytes]:
+        """The picture as an image of a notebook; without IPython, the bytes of `picture`."""
+        image = self.picture(**view)
+        try:
+            from IPython.display import Image
+        except ImportError:
+            return image
+        return Image(data=image, format="png")
+
+    def __repr__(self) -> str:
+        vertices, tets, faces = self._native.totals()
+        parts = "" if len(self.parts) == 1 else f" in {len(self.parts)} parts"
+        return f"<tetmill.Mesh: {vertices:,} vertices, {tets:,} tets, {faces:,} faces{parts}>"
+
+    def _repr_html_(self) -> str:
+        mesh = self.report["mesh"]
+        vertices, tets, faces = self._native.totals()
+        rows = {
+            "vertices": f"{vertices:,}",
+            "tets": f"{tets:,}",
+            "faces": f"{faces:,}",
+            "parts": str(len(self.parts)),
+            "volume": f"{mesh['volume']:.6g}",
+            "dihedral angles": f"{mesh['smallest_dihedral']:.1f}° to {mesh['largest_dihedral']:.1f}°",
+            "bodies": ", ".join(self.body_names.values()),
+            "boundaries": ", ".join(dict.fromkeys(self.face_names.values())),
+            "made in": f"{self.report['seconds']:.2f} s",
+        }
+        cells = (f"<tr><th>{name}</th><td>{html.escape(value)}</td></tr>" for name, value in rows.items() if value)
+        return f"<table>{''.join(cells)}</table>"
+
+    # Adapters; each needs its own package.
+
+    def to_meshio(self) -> Any:
+        """A `meshio.Mesh` with the tets, the faces, and their numbers and names."""
+        from . import adapters
+
+        return adapters.to_meshio(self)
+
+    def to_skfem(self) -> Any:
+        """A `skfem.MeshTet` with the names of boundaries and subdomains."""
+        from . import adapters
+
+        return adapters.to_skfem(self)
+
+    def to_pyvista(self) -> Any:
+        """A `pyvista.UnstructuredGrid` of the tets."""
+        from . import adapters
+
+        return adapters.to_pyvista(self)
+
+    def to_ngsolve(self) -> Any:
+        """An `ngsolve.Mesh` with the names of boundaries and materials."""
+        from . import adapters
+
+        return adapters.to_ngsolve(self)
+
+    def to_mfem(self) -> Any:
+        """An `mfem.ser.Mesh` with the numbers of bodies and boundaries."""
+        from . import adapters
+
+        return adapters.to_mfem(self)
+
+
+def _index_type(count: int) -> type[np.int32] | type[np.int64]:
+    return np.int32 if count <= np.iinfo(np.int32).max else np.int64
+
+
+def _frozen(array: NDArray[Any]) -> NDArray[Any]:
+    """The array, read-only like those of the library."""
+    array.setflags(write=False)
+    return array

@@ -1,0 +1,113 @@
+from typing import Any, Callable, Iterator, Sequence, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+__version__: str
+
+Labels = list[tuple[int, list[str]]]
+
+def run_command(arguments: Sequence[str]) -> int: ...
+def set_threads(threads: int) -> None: ...
+
+@final
+class Geometry:
+    @staticmethod
+    def from_files(paths: Sequence[str], input: dict[str, Any]) -> Geometry: ...
+    @staticmethod
+    def from_text(text: str) -> Geometry: ...
+    @staticmethod
+    def from_surface(
+        points: NDArray[np.float64],
+        triangles: NDArray[np.uint32],
+        numbers: NDArray[np.uint32],
+        names: dict[int, str],
+        input: dict[str, Any],
+    ) -> Geometry: ...
+    @staticmethod
+    def from_mesh(
+        points: NDArray[np.float64],
+        tets: NDArray[np.uint32],
+        bodies: NDArray[np.uint32],
+        faces: NDArray[np.uint32],
+        face_tags: NDArray[np.uint32],
+        body_names: dict[int, str],
+        face_names: dict[int, str],
+    ) -> Geometry: ...
+    def notes(self) -> list[str]: ...
+    def entities(self) -> str: ...
+    def inspect(self) -> str | None: ...
+    def is_mesh(self) -> bool: ...
+    def bodies(self) -> Labels: ...
+    def patches(self) -> Labels: ...
+    def generate(self, options: dict[str, Any]) -> Mesh: ...
+
+class PartArrays:
+    points: NDArray[np.float64]
+    vertex_ids: NDArray[np.int64]
+    tets: NDArray[np.int32]
+    tet_ids: NDArray[np.int64]
+    bodies: NDArray[np.int32]
+    faces: NDArray[np.int32]
+    face_tags: NDArray[np.int32]
+    face_patches: NDArray[np.int32]
+    face_bodies: NDArray[np.int32]
+
+class PartSharing:
+    owners: NDArray[np.int32]
+    vertices: NDArray[np.int32]
+    offsets: NDArray[np.int64]
+    ranks: NDArray[np.int32]
+    neighbours: list[tuple[int, NDArray[np.int32]]]
+
+class PartGhosts:
+    points: NDArray[np.float64]
+    vertex_ids: NDArray[np.int64]
+    tets: NDArray[np.int32]
+    tet_ids: NDArray[np.int64]
+    owners: NDArray[np.int32]
+    bodies: NDArray[np.int32]
+
+class Block:
+    points: NDArray[np.float64]
+    vertices: NDArray[np.int32]
+    tets: NDArray[np.int32]
+    tet_ids: NDArray[np.int64]
+    bodies: NDArray[np.int32]
+
+@final
+class Blocks(Iterator[Block]):
+    def __next__(self) -> Block: ...
+
+@final
+class Grid:
+    def __init__(
+        self,
+        origin: Sequence[float],
+        spacing: Sequence[float],
+        values: NDArray[np.float64],
+    ) -> None: ...
+    def at(self, point: Sequence[float]) -> float: ...
+
+@final
+class Mesh:
+    def report(self) -> str: ...
+    def notes(self) -> list[str]: ...
+    def checksum(self) -> str: ...
+    def count(self) -> int: ...
+    def totals(self) -> tuple[int, int, int]: ...
+    def counts(self, rank: int) -> tuple[int, int, int]: ...
+    def body_labels(self) -> Labels: ...
+    def patch_labels(self) -> Labels: ...
+    def patches_named(self, name: str) -> list[int]: ...
+    def bodies_named(self, name: str) -> list[int]: ...
+    def arrays(self, rank: int) -> PartArrays: ...
+    def sharing(self, rank: int) -> PartSharing: ...
+    def ghosts(self, halo: str) -> list[PartGhosts]: ...
+    def blocks(self, rank: int, size: int) -> Blocks: ...
+    def quality(self) -> str: ...
+    def check(self) -> tuple[int, list[str]]: ...
+    def picture(self, view: dict[str, Any]) -> bytes: ...
+    def write(
+        self, target: dict[str, Any], progress: Callable[[str, float], object] | None
+    ) -> tuple[int, int, list[str]]: ...

@@ -1,0 +1,101 @@
+"""Meshes as those of solvers and viewers. Each function imports the package that it is for."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from ._mesh import Mesh
+
+
+def to_skfem(mesh: Mesh) -> Any:
+    """A `skfem.MeshTet`: boundaries and subdomains by name.
+
+    Boundaries are oriented: their normals point out of the inner body. Names of several patches
+    have the faces of all of them.
+    """
+    import skfem
+
+    # scikit-fem sorts the vertices of each tet, in place: it gets an array of its own.
+    made = skfem.MeshTet(
+        np.ascontiguousarray(mesh.points.T),
+        np.array(mesh.tets.T, dtype=np.int64, order="C"),
+        validate=False,
+    )
+    names = dict.fromkeys(name for label in mesh.patches for name in label.names)
+    of_faces = _skfem_facets(made, mesh)
+    boundaries = {name: of_faces[mesh.faces_named(name)] for name in names}
+    bodies = {name: mesh.tets_named(name) for name in mesh.body_names.values()}
+    return made.with_boundaries(boundaries).with_subdomains(bodies)
+
+
+def _skfem_facets(made: Any, mesh: Mesh) -> Any:
+    """The facet of scikit-fem that each face is."""
+    count = len(mesh.points)
+
+    def keys(triangles: Any) -> Any:
+        a, b, c = np.sort(np.asarray(triangles, dtype=np.int64), axis=0)
+        # Each pair of vertices as one number; the third distinguishes faces at an edge.
+        return np.rec.fromarrays([a * count + b, c])
+
+    facets = keys(made.facets)
+    order = np.argsort(facets)
+    return order[np.searchsorted(facets[order], keys(mesh.faces.T))]
+
+
+def to_meshio(mesh: Mesh) -> Any:
+    """A `meshio.Mesh`: tets and triangles with their numbers as `gmsh:physical`, and the names."""
+    import meshio
+
+    cells = [("tetra", mesh.tets), ("triangle", mesh.faces)]
+    names = {name: np.array([number, 3]) for number, name in mesh.body_names.items()}
+    names.update({name: np.array([number, 2]) for number, name in mesh.face_names.items()})
+    tags = [mesh.bodies, mesh.face_tags]
+    data = {"gmsh:physical": tags, "gmsh:geometrical": tags}
+    return meshio.Mesh(mesh.points, cells, cell_data=data, field_data=names)
+
+
+def to_pyvista(mesh: Mesh) -> Any:
+    """A `pyvista.UnstructuredGrid` of the tets, with the body number of each as `body`."""
+    import pyvista
+
+    grid = pyvista.UnstructuredGrid({pyvista.CellType.TETRA: mesh.tets}, np.array(mesh.points))
+    grid.cell_data["body"] = mesh.bodies
+    if len(mesh.parts) > 1:
+        part = np.empty(len(mesh.tets), dtype=np.int32)
+        for of in mesh.parts:
+            part[of.tet_ids] = of.rank
+        grid.cell_data["part"] = part
+    return grid
+
+
+def to_ngsolve(mesh: Mesh) -> Any:
+    """An `ngsolve.Mesh`, by NETGEN's .vol format: names of materials and boundaries are kept."""
+    import ngsolve
+
+    with tempfile.TemporaryDirectory() as folder:
+        path = os.path.join(folder, "mesh.vol")
+        mesh.write(path)
+        return ngsolve.Mesh(path)
+
+
+def to_mfem(mesh: Mesh) -> Any:
+    """An `mfem.ser.Mesh`; attributes are the numbers of bodies and boundaries.
+
+    Faces between bodies are boundary elements, too.
+    """
+    import mfem.ser as mfem
+
+    made = mfem.Mesh(3, len(mesh.points), len(mesh.tets), len(mesh.faces), 3)
+    for point in mesh.points.tolist():
+        made.AddVertex(point)
+    for tet, body in zip(mesh.tets.tolist(), mesh.bodies.tolist()):
+        made.AddTet(tet, body)
+    for face, tag in zip(mesh.faces.tolist(), mesh.face_tags.tolist()):
+        made.AddBdrTriangle(face, tag)
+    made.FinalizeTetMesh(1, 0, True)
+    return made

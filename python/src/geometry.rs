@@ -1,0 +1,213 @@
+//! Geometries, and the start of a run.
+
+use crate::error::exception;
+use crate::mesh::Mesh;
+use crate::options::{Options, Refused};
+use crate::watch::watched;
+use numpy::{PyReadonlyArray1, PyReadonlyArray2};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::Instant;
+use tetmill::comm::{Communicator, thread};
+use tetmill::error::Error;
+use tetmill::progress::{Observer, Progress, StageTime};
+use tetmill::run::{Balance, GenerateSettings, balance, generate};
+use tetmill::{Generated, InputSettings, MeshArrays, SurfaceArrays};
+use tetmill_cli::report::{Processes, Report, processes};
+
+/// The input of the mesher.
+#[pyclass(frozen, module = "tetmill._native")]
+pub struct Geometry {
+    geometry: tetmill::Geometry,
+    /// What reports call it.
+    name: String,
+}
+
+/// The keyword arguments for the input; all keys are present.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+struct Input {
+    keep_surface: bool,
+    merge: Option<f64>,
+    /// Degrees.
+    feature_angle: Option<f64>,
+}
+
+impl Input {
+    fn settings(&self) -> InputSettings {
+        let mut settings =
+            InputSettings { keep_surface: self.keep_surface, merge: self.merge, ..InputSettings::default() };
+        if let Some(degrees) = self.feature_angle {
+            settings.facets.feature_angle = degrees.to_radians();
+        }
+        settings
+    }
+}
+
+/// A number and its names, for bodies and patches.
+pub type Labels = Vec<(u32, Vec<String>)>;
+
+/// Numbers and names by index.
+pub fn labels(of: &[tetmill::mesh::Label]) -> Labels {
+    of.iter().map(|label| (label.number, label.names.clone())).collect()
+}
+
+fn read(
+    py: Python<'_>,
+    name: String,
+    make: impl FnOnce() -> Result<tetmill::Geometry, Error> + Send,
+) -> PyResult<Geometry> {
+    let (geometry, _) = watched(py, None, &Arc::default(), |_| make())?;
+    Ok(Geometry { geometry, name })
+}
+
+#[pymethods]
+impl Geometry {
+    /// Reads one file, or several surfaces.
+    #[staticmethod]
+    fn from_files(py: Python<'_>, paths: Vec<PathBuf>, input: Input) -> PyResult<Self> {
+        let names: Vec<String> = paths.iter().map(|path| path.display().to_string()).collect();
+        read(py, names.join(", "), || tetmill::Geometry::from_files(&paths, &input.settings()))
+    }
+
+    /// Reads the text of a `.geo` file.
+    #[staticmethod]
+    fn from_text(py: Python<'_>, text: &str) -> PyResult<Self> {
+        read(py, "text".into(), || tetmill::Geometry::from_text(text))
+    }
+
+    /// Takes closed surfaces. `numbers` is empty or has one number for each triangle.
+    #[staticmethod]
+    fn from_surface(
+        py: Python<'_>,
+        points: PyReadonlyArray2<'_, f64>,
+        triangles: PyReadonlyArray2<'_, u32>,
+        numbers: PyReadonlyArray1<'_, u32>,
+        names: BTreeMap<u32, String>,
+        input: Input,
+    ) -> PyResult<Self> {
+        let surface = SurfaceArrays {
+            points: bytemuck::cast_slice(points.as_slice()?),
+            triangles: bytemuck::cast_slice(triangles.as_slice()?),
+            numbers: numbers.as_slice()?,
+            names,
+        };
+        read(py, "arrays".into(), || tetmill::Geometry::from_surface(&surface, &input.settings()))
+    }
+
+    /// Takes a tetrahedral mesh. `bodies` and `face_tags` are empty or have one number for each
+    /// tet and face.
+    #[staticmethod]
+    #[expect(clippy::too_many_arguments, reason = "the arrays of a mesh")]
+    fn from_mesh(
+        py: Python<'_>,
+        points: PyReadonlyArray2<'_, f64>,
+        tets: PyReadonlyArray2<'_, u32>,
+        bodies: PyReadonlyArray1<'_, u32>,
+        faces: PyReadonlyArray2<'_, u32>,
+        face_tags: PyReadonlyArray1<'_, u32>,
+        body_names: BTreeMap<u32, String>,
+        face_names: BTreeMap<u32, String>,
+    ) -> PyResult<Self> {
+        let mesh = MeshArrays {
+            points: bytemuck::cast_slice(points.as_slice()?),
+            tets: bytemuck::cast_slice(tets.as_slice()?),
+            bodies: bodies.as_slice()?,
+            triangles: bytemuck::cast_slice(faces.as_slice()?),
+            boundaries: face_tags.as_slice()?,
+            body_names,
+            boundary_names: face_names,
+        };
+        read(py, "arrays".into(), || tetmill::Geometry::from_mesh(&mesh))
+    }
+
+    /// Warnings of the language, and repairs while reading.
+    fn notes(&self) -> Vec<String> {
+        self.geometry.notes().to_vec()
+    }
+
+    /// The numbers of bodies, patches, curves and corners as JSON.
+    fn entities(&self) -> String {
+        serde_json::to_string(&self.geometry.entities()).expect("plain data")
+    }
+
+    /// All bodies, patches, curves and corners as JSON; `None` for a tetrahedral mesh.
+    fn inspect(&self, py: Python<'_>) -> Option<String> {
+        let inspection = py.detach(|| self.geometry.inspect())?;
+        Some(serde_json::to_string(&inspection).expect("plain data"))
+    }
+
+    fn is_mesh(&self) -> bool {
+        self.geometry.is_mesh()
+    }
+
+    /// Numbers and names of the bodies.
+    fn bodies(&self) -> Labels {
+        labels(&self.geometry.names().bodies)
+    }
+
+    /// Numbers and names of the patches.
+    fn patches(&self) -> Labels {
+        labels(&self.geometry.names().patches)
+    }
+
+    /// Makes a mesh.
+    fn generate(&self, py: Python<'_>, options: Options<'_>) -> PyResult<Mesh> {
+        let start = Instant::now();
+        if self.geometry.is_mesh() && options.has_sizes() {
+            return Err(PyValueError::new_err(
+                "the geometry is a mesh already and is taken as it is: leave out preset, maxh, minh, grading, \
+                 closeness, mesh_size_file, sources, size, effort and coarse",
+            ));
+        }
+        let stop = Arc::default();
+        let settings = options.settings(&self.geometry, &stop).map_err(|refused| match refused {
+            Refused::Exception(exception) => exception,
+            Refused::Error(error) => exception(py, &error),
+        })?;
+        let (made, notes) = watched(py, options.progress.as_ref(), &stop, |watcher| {
+            thread::try_run(options.parts, |comm| {
+                let others = watcher.others();
+                let observer: &dyn Observer = if comm.rank() == 0 { watcher } else { &others };
+                run(comm, &self.geometry, &settings, &Progress::new(observer))
+            })
+        })?;
+        let report = self.report(&made, start);
+        Ok(Mesh::new(made.into_iter().map(|run| run.made).collect(), report, notes))
+    }
+}
+
+/// The result of one rank.
+struct Run {
+    made: Generated,
+    balance: Balance,
+    processes: Processes,
+    stages: Vec<StageTime>,
+}
+
+/// **Collective.** Makes the mesh of one rank, and measures what its report needs.
+fn run(
+    comm: &dyn Communicator,
+    geometry: &tetmill::Geometry,
+    settings: &GenerateSettings,
+    progress: &Progress,
+) -> Result<Run, Error> {
+    let made = generate(comm, (comm.rank() == 0).then_some(geometry), settings, progress)?;
+    let balance = balance(comm, &made.part)?;
+    Ok(Run { made, balance, processes: processes(comm)?, stages: progress.times() })
+}
+
+impl Geometry {
+    /// The report of the command line, as JSON.
+    fn report(&self, runs: &[Run], start: Instant) -> String {
+        let Run { made, balance, processes, stages } = &runs[0];
+        let ranks = runs.len() as u32;
+        let mut report = Report::new(&self.geometry, &self.name, made, *processes, ranks, *balance);
+        report.stages = stages.clone();
+        report.seconds = start.elapsed().as_secs_f64();
+        serde_json::to_string(&report).expect("plain data")
+    }
+}

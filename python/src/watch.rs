@@ -1,0 +1,169 @@
+//! Runs of the library: with progress, exceptions of callbacks, and Ctrl-C.
+
+use crate::command;
+use crate::error::exception;
+use pyo3::prelude::*;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread;
+use std::time::{Duration, Instant};
+use tetmill::Error;
+use tetmill::comm::thread::POOL_STACK;
+use tetmill::progress::{Observer, Stage};
+
+/// Interval at which Python looks for signals such as Ctrl-C.
+const PERIOD: Duration = Duration::from_millis(100);
+
+/// Stops a run with the exception of a callback.
+#[derive(Default)]
+pub struct Stop {
+    stopped: AtomicBool,
+    exception: Mutex<Option<PyErr>>,
+}
+
+impl Stop {
+    /// Stops the run. The first exception is kept.
+    pub fn raise(&self, exception: PyErr) {
+        let mut first = self.exception.lock().unwrap_or_else(PoisonError::into_inner);
+        first.get_or_insert(exception);
+        self.stopped.store(true, Ordering::Relaxed);
+    }
+
+    /// Whether the run was stopped.
+    pub fn is_set(&self) -> bool {
+        self.stopped.load(Ordering::Relaxed)
+    }
+
+    fn take(&self) -> Option<PyErr> {
+        self.exception.lock().unwrap_or_else(PoisonError::into_inner).take()
+    }
+}
+
+/// A message from the run to the thread that called it.
+enum Event {
+    Progress(Stage, f64),
+    Note(String),
+}
+
+/// Receives the progress of a run on rank 0.
+pub struct Watcher {
+    events: Sender<Event>,
+    has_progress: bool,
+    stop: Arc<Stop>,
+}
+
+impl Watcher {
+    fn send(&self, event: Event) {
+        // The calling thread listens until the run has ended.
+        let _ = self.events.send(event);
+    }
+
+    fn progress(&self, stage: Stage, fraction: f64) {
+        if self.has_progress {
+            self.send(Event::Progress(stage, fraction));
+        }
+    }
+
+    /// The observer of ranks other than 0.
+    pub fn others(&self) -> Others<'_> {
+        Others(&self.stop)
+    }
+}
+
+impl Observer for Watcher {
+    fn begin(&self, stage: Stage) {
+        self.progress(stage, 0.0);
+    }
+
+    fn advance(&self, stage: Stage, fraction: f64) {
+        // The end reports 1.
+        if fraction < 1.0 {
+            self.progress(stage, fraction);
+        }
+    }
+
+    fn end(&self, stage: Stage, _: f64) {
+        self.progress(stage, 1.0);
+    }
+
+    fn note(&self, text: &str) {
+        self.send(Event::Note(text.to_owned()));
+    }
+
+    fn is_cancelled(&self) -> bool {
+        self.stop.is_set()
+    }
+}
+
+/// The observer of ranks other than 0, which can only be cancelled.
+pub struct Others<'a>(&'a Stop);
+
+impl Observer for Others<'_> {
+    fn is_cancelled(&self) -> bool {
+        self.0.is_set()
+    }
+}
+
+/// Runs `work` in a thread of its own, without the interpreter's lock, and returns its result and
+/// its notes.
+///
+/// Meanwhile the calling thread passes the progress to the callback and looks for signals: Python
+/// handles Ctrl-C in its main thread only.
+pub fn watched<T: Send>(
+    py: Python<'_>,
+    progress: Option<&Py<PyAny>>,
+    stop: &Arc<Stop>,
+    work: impl FnOnce(&Watcher) -> Result<T, Error> + Send,
+) -> PyResult<(T, Vec<String>)> {
+    command::ready()?;
+    let (result, notes) = py.detach(|| {
+        let (events, received) = channel();
+        let watcher = Watcher { events, has_progress: progress.is_some(), stop: Arc::clone(stop) };
+        thread::scope(|scope| {
+            // The watcher is dropped with the closure, which ends the loop of `listen`.
+            let run = move || work(&watcher);
+            let builder = thread::Builder::new().name("tetmill".into()).stack_size(POOL_STACK);
+            let worker = builder.spawn_scoped(scope, run)?;
+            let notes = listen(&received, progress, stop);
+            Ok::<_, std::io::Error>((worker.join(), notes))
+        })
+    })?;
+    // An exception counts more than what the run made of being cancelled.
+    if let Some(exception) = stop.take() {
+        return Err(exception);
+    }
+    match result {
+        Ok(Ok(value)) => Ok((value, notes)),
+        Ok(Err(error)) => Err(exception(py, &error)),
+        Err(panic) => std::panic::resume_unwind(panic),
+    }
+}
+
+/// Passes events on until the run has ended; returns its notes.
+fn listen(received: &Receiver<Event>, progress: Option<&Py<PyAny>>, stop: &Stop) -> Vec<String> {
+    let mut notes = Vec::new();
+    let mut looked = Instant::now();
+    let mut last = (Stage::Read, 0.0);
+    loop {
+        match received.recv_timeout(PERIOD.saturating_sub(looked.elapsed())) {
+            Ok(Event::Note(note)) => notes.push(note),
+            // Reports of several threads may overtake each other.
+            Ok(Event::Progress(stage, fraction))
+                if stage == last.0 && 0.0 < fraction && fraction < last.1 => {}
+            Ok(Event::Progress(stage, fraction)) => {
+                last = (stage, fraction);
+                if let Some(callback) = progress.filter(|_| !stop.is_set()) {
+                    let called = Python::attach(|py| callback.call1(py, (stage.name(), fraction)).map(drop));
+                    called.unwrap_or_else(|exception| stop.raise(exception));
+                }
+            }
+            Err(RecvTimeoutError::Timeout) => {}
+            Err(RecvTimeoutError::Disconnected) => return notes,
+        }
+        if looked.elapsed() >= PERIOD {
+            Python::attach(|py| py.check_signals()).unwrap_or_else(|exception| stop.raise(exception));
+            looked = Instant::now();
+        }
+    }
+}
