@@ -1,0 +1,98 @@
+#!/usr/bin/env bash
+# Tests the C interface: header, installation, examples and wrong use, with address sanitiser, and MPI and PETSc if they are there.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+root=$PWD
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 OMPI_MCA_rmaps_base_oversubscribe=1
+export PATH=$PATH:$HOME/.cargo/bin
+passed=0
+ok() { passed=$((passed + 1)); echo "ok: $*"; }
+skipped() { echo "SKIPPED: $*"; }
+warnings=(-Wall -Wextra -Werror)
+
+# Compiles SOURCE to PROGRAM against the installation in PREFIX, with further arguments.
+compile() { # compiler standard prefix source program arguments...
+    local compiler=$1 standard=$2 prefix=$3 source=$4 program=$5
+    shift 5
+    # shellcheck disable=SC2046
+    PKG_CONFIG_PATH=$prefix/lib/pkgconfig "$compiler" "-std=$standard" "${warnings[@]}" -O1 -g "$source" -o "$program" \
+        $(PKG_CONFIG_PATH=$prefix/lib/pkgconfig pkg-config --cflags --libs tetmill) -Wl,-rpath,"$prefix/lib" "$@" -lm
+}
+
+# The errors that an example prints must agree to eight digits, whatever the number of parts.
+same_errors() { # file of one run, file of another
+    python3 - "$1" "$2" <<'PYTHON'
+import re, sys
+a, b = ([float(x) for x in re.findall(r"error (\S+)", open(name).read())] for name in sys.argv[1:])
+assert len(a) >= 3 and len(a) == len(b) and all(abs(x - y) <= 1e-8 * abs(x) for x, y in zip(a, b)), (a, b)
+PYTHON
+}
+
+# The committed header is what cbindgen generates.
+if command -v cbindgen >/dev/null; then
+    (cd capi && cbindgen --quiet --config cbindgen.toml --output "$work/tetmill.h")
+    diff -u capi/include/tetmill.h "$work/tetmill.h" || {
+        echo "capi/include/tetmill.h is stale: cd capi && cbindgen --config cbindgen.toml --output include/tetmill.h" >&2
+        exit 1
+    }
+    ok "header"
+else
+    skipped "no cbindgen (cargo install cbindgen), so the header is not compared"
+fi
+
+capi/install.sh --prefix "$work/threads" --profile dev >/dev/null
+sanitised=(-fsanitize=address,undefined -fno-sanitize-recover=all)
+
+# Header alone, as C and as C++.
+echo '#include <tetmill.h>' > "$work/header.c"
+cp "$work/header.c" "$work/header.cc"
+cc -std=c99 "${warnings[@]}" -pedantic -I"$work/threads/include" -fsyntax-only "$work/header.c"
+c++ -std=c++11 "${warnings[@]}" -pedantic -I"$work/threads/include" -fsyntax-only "$work/header.cc"
+ok "header in C99 and C++11"
+
+compile cc c99 "$work/threads" capi/tests/wrong_use.c "$work/wrong_use" "${sanitised[@]}"
+(cd "$work" && ./wrong_use)
+ok "wrong use, with address sanitiser and leak check"
+
+compile cc c99 "$work/threads" capi/examples/poisson.c "$work/poisson" "${sanitised[@]}"
+for parts in 1 4 7; do
+    "$work/poisson" $parts > "$work/poisson.$parts"
+done
+same_errors "$work/poisson.1" "$work/poisson.4"
+same_errors "$work/poisson.1" "$work/poisson.7"
+cat "$work/poisson.7"
+ok "Poisson's equation on 1, 4 and 7 parts, with address sanitiser and leak check"
+
+# The static library, by its own list of system libraries.
+private=$(PKG_CONFIG_PATH=$work/threads/lib/pkgconfig pkg-config --libs --static tetmill | sed 's/.*-ltetmill//')
+# shellcheck disable=SC2086
+cc -std=c99 "${warnings[@]}" -O1 capi/examples/poisson.c -I"$work/threads/include" "$work/threads/lib/libtetmill.a" $private -lm \
+    -o "$work/static"
+"$work/static" 2 > "$work/poisson.static"
+same_errors "$work/poisson.1" "$work/poisson.static"
+ok "static library"
+
+if command -v cmake >/dev/null; then
+    mkdir "$work/cmake"
+    cat > "$work/cmake/CMakeLists.txt" <<CMAKE
+cmake_minimum_required(VERSION 3.13)
+project(poisson C)
+find_package(tetmill 0.1 REQUIRED)
+foreach(library tetmill static)
+    add_executable(with_\${library} "$root/capi/examples/poisson.c")
+    target_link_libraries(with_\${library} tetmill::\${library} m)
+endforeach()
+CMAKE
+    cmake -S "$work/cmake" -B "$work/cmake/build" -DCMAKE_PREFIX_PATH="$work/threads" >/dev/null
+    cmake --build "$work/cmake/build" >/dev/null
+    "$work/cmake/build/with_tetmill" 3 > "$work/poisson.cmake"
+    "$work/cmake/build/with_static" 3 >/dev/null
+    same_errors "$work/poisson.1" "$work/poisson.cmake"
+    ok "CMake"
+else
+    skipped "no cmake, so tetmill-config.cmake is not tried"
+fi
+
+echo "$passed passed, 0 failed"
