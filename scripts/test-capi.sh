@@ -65,6 +65,33 @@ same_errors "$work/poisson.1" "$work/poisson.7"
 cat "$work/poisson.7"
 ok "Poisson's equation on 1, 4 and 7 parts, with address sanitiser and leak check"
 
+# MFEM's text, by an independent checker, and by MFEM itself where its Python module is there (one part).
+compile cc c99 "$work/threads" capi/examples/mfem_text.c "$work/mfem_text" "${sanitised[@]}"
+checker=${TETMILL_SHARED:-../shared}/tools/check_mfem.py
+for geometry in geometries/dome.geo geometries/layers.geo; do
+    for parts in 1 2 4 7; do
+        "$work/mfem_text" $geometry $parts "$work/text.$parts"
+        if [ -e "$checker" ]; then
+            python3 "$checker" "$work/text.$parts"
+            ok "MFEM's text of $geometry in $parts parts"
+        fi
+    done
+done
+[ -e "$checker" ] || skipped "there is no $checker, so MFEM's text is not checked"
+if python3 -c 'import mfem.ser' 2>/dev/null; then
+    python3 - "$work/text.1.000000" <<'PYTHON'
+import sys, mfem.ser as mfem
+mesh = mfem.Mesh(sys.argv[1], 1, 0)
+assert mesh.GetNE() > 100 and mesh.GetNBE() > 100, (mesh.GetNE(), mesh.GetNBE())
+assert mesh.CheckElementOrientation(False) == 0 and mesh.CheckBdrElementOrientation(False) == 0
+volume = sum(mesh.GetElementVolume(k) for k in range(mesh.GetNE()))
+print(f"MFEM reads {mesh.GetNE()} tets, {mesh.GetNBE()} triangles, volume {volume:.9g}")
+PYTHON
+    ok "MFEM reads one part"
+else
+    skipped "no Python module mfem (pip install mfem), so MFEM does not read its text"
+fi
+
 # The static library, by its own list of system libraries.
 private=$(PKG_CONFIG_PATH=$work/threads/lib/pkgconfig pkg-config --libs --static tetmill | sed 's/.*-ltetmill//')
 # shellcheck disable=SC2086

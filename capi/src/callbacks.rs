@@ -46,6 +46,13 @@ impl<F> Callback<F> {
 }
 
 pub type Size = Callback<unsafe extern "C" fn(*const f64, *mut c_void) -> f64>;
+impl Size {
+    fn at(&self, xyz: [f64; 3]) -> f64 {
+        // SAFETY: a function of the caller with the pointer that it expects.
+        unsafe { (self.function)(xyz.as_ptr(), self.user) }
+    }
+}
+
 pub type OnProgress = Callback<unsafe extern "C" fn(*const c_char, f64, *mut c_void) -> c_int>;
 pub type IsCancelled = Callback<unsafe extern "C" fn(*mut c_void) -> c_int>;
 
@@ -73,11 +80,8 @@ impl Refusal {
 /// A size function for the library, which refuses wrong values.
 pub fn size_function(size: Size, refusal: Arc<Refusal>) -> impl Fn(Point) -> f64 + Send + Sync + 'static {
     move |point| {
-        // The whole callback is captured, because its pointer alone is not `Send`.
-        let Size { function, user } = *&size;
         let xyz = [point.x, point.y, point.z];
-        // SAFETY: a function of the caller with the pointer that it expects.
-        let value = unsafe { function(xyz.as_ptr(), user) };
+        let value = size.at(xyz);
         if value.is_nan() || value < 0.0 {
             let [x, y, z] = xyz;
             refusal.add(format!(

@@ -25,6 +25,7 @@ mod geometry;
 mod ghosts;
 mod group;
 mod mesh;
+mod mfem;
 #[cfg(feature = "mpi")]
 mod mpi;
 mod options;

@@ -18,6 +18,8 @@ pub struct Part {
     sharing: OnceLock<SharingArrays>,
     /// By faces, by vertices.
     pub ghosts: [OnceLock<GhostArrays>; 2],
+    /// MFEM's text with a NUL at its end.
+    pub mfem: OnceLock<Vec<u8>>,
 }
 
 /// `Arrays` with plain numbers.
@@ -60,6 +62,7 @@ impl Part {
             arrays: OnceLock::new(),
             sharing: OnceLock::new(),
             ghosts: [OnceLock::new(), OnceLock::new()],
+            mfem: OnceLock::new(),
         }
     }
 

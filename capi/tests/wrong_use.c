@@ -143,6 +143,8 @@ static void meshes(const tetmill_geometry *ball) {
     EXPECT(tetmill_part_neighbour_vertices(p, 1, &u, &count), USAGE, "no neighbour 1");
     EXPECT(tetmill_part_ghost_vertices(p, TETMILL_BY_FACES, &xyz, &ids, &count), USAGE, "tetmill_mesh_find_ghosts");
     EXPECT(tetmill_mesh_find_ghosts(m, 7), USAGE, "`by` cannot be 7");
+    EXPECT(tetmill_part_mfem(p, &name, &count), USAGE, "tetmill_mesh_make_mfem");
+    EXPECT(tetmill_mesh_make_mfem(NULL), USAGE, "`mesh`");
     EXPECT(tetmill_mesh_sum(m, NULL), USAGE, "`values`");
     OK(tetmill_part_points(p, &xyz, &vertices));
     {

@@ -3,6 +3,7 @@
 use super::remesh_tests::{closed, sizes};
 use super::samples::{Soup, read_ply, read_stl, shared};
 use super::*;
+use crate::ground::size::SizeField;
 use crate::{Point, Vector};
 use csg::BodyId;
 
