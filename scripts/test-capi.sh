@@ -122,4 +122,39 @@ else
     skipped "no cmake, so tetmill-config.cmake is not tried"
 fi
 
+# Across processes: the same errors on 1, 2 and 4 ranks, and with several parts in a process.
+if command -v mpicc >/dev/null && command -v mpirun >/dev/null; then
+    capi/install.sh --prefix "$work/mpi" --profile dev --mpi >/dev/null
+    compile mpicc c99 "$work/mpi" capi/examples/poisson.c "$work/poisson_mpi"
+    compile mpicc c99 "$work/mpi" capi/tests/mpi_use.c "$work/mpi_use"
+    for ranks in 1 2 4; do
+        mpirun -n $ranks "$work/poisson_mpi" > "$work/poisson.mpi.$ranks"
+        same_errors "$work/poisson.1" "$work/poisson.mpi.$ranks"
+        mpirun -n $ranks "$work/mpi_use" "$work/text.mpi.$ranks"
+    done
+    mpirun -n 2 "$work/poisson_mpi" 5 > "$work/poisson.mpi.5"
+    same_errors "$work/poisson.1" "$work/poisson.mpi.5"
+    mpirun -n 3 "$work/poisson_mpi" 2 > "$work/poisson.mpi.idle"
+    same_errors "$work/poisson.1" "$work/poisson.mpi.idle"
+    ok "Poisson's equation on 1, 2 and 4 MPI ranks, 5 parts on 2, 2 parts on 3; wrong use with MPI"
+    if [ -e "$checker" ]; then
+        python3 "$checker" "$work/text.mpi.4"
+        ok "MFEM's text on 4 MPI ranks"
+    fi
+    if pkg-config --exists PETSc; then
+        # shellcheck disable=SC2046
+        compile mpicc gnu99 "$work/mpi" capi/examples/dmplex.c "$work/dmplex" $(pkg-config --cflags --libs PETSc)
+        for ranks in 1 2 4; do
+            mpirun -n $ranks "$work/dmplex" > "$work/dmplex.$ranks"
+            same_errors "$work/poisson.1" "$work/dmplex.$ranks"
+        done
+        cat "$work/dmplex.4"
+        ok "DMPlex of PETSc on 1, 2 and 4 ranks"
+    else
+        skipped "no PETSc (apt install petsc-dev), so no DMPlex"
+    fi
+else
+    skipped "no MPI, so nothing runs across processes"
+fi
+
 echo "$passed passed, 0 failed"

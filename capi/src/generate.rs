@@ -49,7 +49,7 @@ pub fn generate(geometry: Option<&Geometry>, options: Option<&Options>, group: G
         let mesher = comm.agree(settings.mesher(geometry, &refusal))?;
         run(comm, geometry, &mesher.observer(&watch), &refusal)
     })?;
-    Ok(Mesh::new(made, group))
+    Mesh::new(made, group)
 }
 
 /// **Collective.** Makes the part of a rank.
@@ -62,5 +62,6 @@ fn run(
     let made = mesher.generate_on(comm, geometry).map_err(Fault::from);
     // Only rank 0 calls the size function. A refused value cancels the run, if not too late.
     let refused = if comm.rank() == 0 { refusal.check() } else { Ok(()) };
-    comm.agree(refused.and(made))
+    comm.agree(refused)?;
+    made
 }

@@ -1,6 +1,8 @@
 //! The ranks of a mesh, one for each part.
 
 use crate::fault::Fault;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
 use tetmill::comm::{Communicator, Rank, grouped, thread};
 
 /// The ranks of a mesh: threads of this process, or spread over the processes of an MPI job.
@@ -39,6 +41,17 @@ impl Group {
         let results = grouped::run(&**processes, self.ranks, body).map_err(Fault::from);
         // A process without ranks has no result, and gets the error of the others here.
         processes.agree(results.and_then(|results| results.into_iter().collect()))
+    }
+
+    /// **Collective** over the processes. What process 0 has, for all of them if some have no
+    /// ranks, else what each has.
+    pub fn share<T: Serialize + DeserializeOwned>(&self, mine: Option<T>) -> Result<T, Fault> {
+        if let Some(processes) = self.processes.as_ref().filter(|processes| processes.size() > self.ranks) {
+            let mut bytes = mine.map_or(Vec::new(), |mine| serde_json::to_vec(&mine).expect("plain data"));
+            processes.broadcast_bytes(0, &mut bytes)?;
+            return Ok(serde_json::from_slice(&bytes).expect("as process 0 wrote it"));
+        }
+        Ok(mine.expect("each process has ranks"))
     }
 
     /// Whether this process gives the geometry: all ranks of one process, or process 0.

@@ -6,15 +6,38 @@ use crate::group::Group;
 use crate::part::Part;
 use crate::pointers::{array_mut, free, given, store, text};
 use std::ffi::{CString, c_char};
-use tetmill::mesh::{Counts, Label};
+use tetmill::mesh::{Label, Names};
 use tetmill::{Error, Generated};
 
 /// A mesh: the parts that this process has, and what is known of the whole.
 pub struct Mesh {
     pub parts: Vec<Part>,
     pub group: Group,
+    whole: Whole,
     bodies: Vec<Named>,
     patches: Vec<Named>,
+}
+
+/// What all processes know, also those without a part.
+#[derive(Clone, serde::Serialize, serde::Deserialize)]
+struct Whole {
+    names: Names,
+    /// Vertices, tets, triangles.
+    totals: [u64; 3],
+    volume: f64,
+    least_angle: f64,
+}
+
+impl From<&Generated> for Whole {
+    fn from(made: &Generated) -> Self {
+        let totals = made.stream().totals();
+        Self {
+            names: made.names.clone(),
+            totals: [totals.vertices, totals.tets, totals.boundary],
+            volume: made.check.volume,
+            least_angle: made.check.shape.as_ref().map_or(0.0, |shape| shape.smallest_angle.value),
+        }
+    }
 }
 
 /// A body or patch.
@@ -31,19 +54,16 @@ impl From<&Label> for Named {
 }
 
 impl Mesh {
-    pub fn new(made: Vec<Generated>, group: Group) -> Self {
-        let names = made.first().map(|made| made.names.clone()).unwrap_or_default();
-        Self {
+    /// **Collective** over the processes of the group.
+    pub fn new(made: Vec<Generated>, group: Group) -> Result<Self, Fault> {
+        let whole = group.share(made.first().map(Whole::from))?;
+        Ok(Self {
             parts: made.into_iter().map(Part::new).collect(),
             group,
-            bodies: names.bodies.iter().map(Named::from).collect(),
-            patches: names.patches.iter().map(Named::from).collect(),
-        }
-    }
-
-    /// The first part of this process, which knows the whole too.
-    fn first(&self) -> Result<&Part, Fault> {
-        self.parts.first().ok_or_else(|| Fault::usage("this process has no part of the mesh"))
+            bodies: whole.names.bodies.iter().map(Named::from).collect(),
+            patches: whole.names.patches.iter().map(Named::from).collect(),
+            whole,
+        })
     }
 }
 
@@ -66,12 +86,12 @@ pub unsafe extern "C" fn tetmill_mesh_totals(
     triangles: *mut u64,
 ) -> Status {
     guard(|| {
-        let totals: Counts = given(mesh, "mesh")?.first()?.made.stream().totals();
+        let [all_vertices, all_tets, all_triangles] = given(mesh, "mesh")?.whole.totals;
         // SAFETY: the contract of the header.
         unsafe {
-            store(vertices, totals.vertices, "vertices")?;
-            store(tets, totals.tets, "tets")?;
-            store(triangles, totals.boundary, "triangles")
+            store(vertices, all_vertices, "vertices")?;
+            store(tets, all_tets, "tets")?;
+            store(triangles, all_triangles, "triangles")
         }
     })
 }
@@ -84,12 +104,11 @@ pub unsafe extern "C" fn tetmill_mesh_shape(
     least_angle: *mut f64,
 ) -> Status {
     guard(|| {
-        let check = &given(mesh, "mesh")?.first()?.made.check;
-        let angle = check.shape.as_ref().map_or(f64::NAN, |shape| shape.smallest_angle.value);
+        let whole = &given(mesh, "mesh")?.whole;
         // SAFETY: the contract of the header.
         unsafe {
-            store(volume, check.volume, "volume")?;
-            store(least_angle, angle, "least_angle")
+            store(volume, whole.volume, "volume")?;
+            store(least_angle, whole.least_angle, "least_angle")
         }
     })
 }
@@ -187,7 +206,7 @@ pub unsafe extern "C" fn tetmill_mesh_bodies_named(
     count: *mut usize,
 ) -> Status {
     guard(|| {
-        let names = &given(mesh, "mesh")?.first()?.made.names;
+        let names = &given(mesh, "mesh")?.whole.names;
         // SAFETY: the contract of the header.
         let found = names.bodies_named(unsafe { text(name, "name")? }).map_err(Error::from)?;
         let found: Vec<u32> = found.iter().map(|body| body.0).collect();
@@ -210,7 +229,7 @@ pub unsafe extern "C" fn tetmill_mesh_patches_named(
     count: *mut usize,
 ) -> Status {
     guard(|| {
-        let names = &given(mesh, "mesh")?.first()?.made.names;
+        let names = &given(mesh, "mesh")?.whole.names;
         // SAFETY: the contract of the header.
         let found = names.patches_named(unsafe { text(name, "name")? }).map_err(Error::from)?;
         let found: Vec<u32> = found.iter().map(|patch| patch.0).collect();

@@ -11,8 +11,8 @@ use std::ffi::c_uint;
 use std::mem::ManuallyDrop;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use tetmill::comm::mpi::rsmpi::environment::{is_finalized, is_initialized};
-use tetmill::comm::mpi::rsmpi::ffi::MPI_Comm;
-use tetmill::comm::mpi::rsmpi::raw::FromRaw;
+use tetmill::comm::mpi::rsmpi::ffi::{MPI_Comm, MPI_Comm_test_inter, RSMPI_COMM_NULL};
+use tetmill::comm::mpi::rsmpi::raw::{AsRaw, FromRaw};
 use tetmill::comm::mpi::rsmpi::topology::SimpleCommunicator;
 use tetmill::comm::mpi::{duplicate_of, end_job};
 
@@ -42,13 +42,36 @@ pub unsafe extern "C" fn tetmill_generate_comm(
         if !is_initialized() || is_finalized() {
             return Err(Fault::usage("MPI is not initialised, or finalised already"));
         }
-        // SAFETY: a valid communicator by the contract of the header; it is not freed here.
-        let given = ManuallyDrop::new(unsafe { SimpleCommunicator::from_raw(comm) });
+        // SAFETY: the contract of the header.
+        let given = unsafe { borrowed(comm) }?;
         let own = duplicate_of(&*given).map_err(|error| Fault::usage(error.to_string()))?;
         or_end_job(|| generate(geometry, options, Group::of_processes(Box::new(own), parts)))
     };
     // SAFETY: the contract of the header.
     guard(|| unsafe { store_new(mesh, make, "mesh") })
+}
+
+/// A communicator of the caller, which is not freed here.
+///
+/// # Safety
+/// It is null or valid, and MPI is initialised.
+unsafe fn borrowed(comm: MPI_Comm) -> Result<ManuallyDrop<SimpleCommunicator>, Fault> {
+    let predefined = [SimpleCommunicator::world(), SimpleCommunicator::self_comm()];
+    if let Some(same) = predefined.into_iter().find(|predefined| predefined.as_raw() == comm) {
+        return Ok(ManuallyDrop::new(same));
+    }
+    // SAFETY: MPI itself defines this handle.
+    if comm == unsafe { RSMPI_COMM_NULL } {
+        return Err(Fault::usage("`comm` is MPI_COMM_NULL"));
+    }
+    let mut is_inter = 0;
+    // SAFETY: a valid communicator, by the caller's promise.
+    unsafe { MPI_Comm_test_inter(comm, &mut is_inter) };
+    if is_inter != 0 {
+        return Err(Fault::usage("`comm` is an inter-communicator"));
+    }
+    // SAFETY: a valid communicator of the program, by the caller's promise.
+    Ok(ManuallyDrop::new(unsafe { SimpleCommunicator::from_raw(comm) }))
 }
 
 /// Ends the job if `body` panics.
