@@ -7,11 +7,12 @@
 //! geomview  STEM.off, or STEM.list with a file per part   the surface, a colour per part
 //! serial    FILE.{msh,mesh,vol}                           Gmsh, Medit, NETGEN: all parts in one file
 //!           FILE.{vtu,off}                                one part, format by extension
+//! mfem      a text in memory for each rank                MFEM, parallel
 //! ```
-//! All writers use `output`: files are written to a temporary folder beside the target, and replace
-//! the old ones when every rank has finished. A writer that fails leaves the old files unchanged. A
-//! single-file format can also go to a pipe, a device or the standard output. Numbers in text are
-//! read back bitwise equal.
+//! All writers of files use `output`: files are written to a temporary folder beside the target,
+//! and replace the old ones when every rank has finished. A writer that fails leaves the old files
+//! unchanged. A single-file format can also go to a pipe, a device or the standard output. Numbers
+//! in text are read back bitwise equal.
 
 pub(crate) mod arrays;
 pub(crate) mod chunks;
@@ -25,6 +26,7 @@ mod joined;
 mod joined_tests;
 pub(crate) mod lines;
 pub mod mesh_size;
+pub mod mfem;
 mod number;
 pub(crate) mod once;
 pub(crate) mod output;
