@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # Installs the programs that the tests need besides Rust: MPI, libclang (for its bindings), TetGen,
-# Python with numpy, and Python modules that read our files: Gmsh, NGSolve with NETGEN, meshio,
-# scikit-fem, MFEM. Uses apt on Debian and Ubuntu; elsewhere it lists the missing packages. Does
-# nothing if all are installed.
+# CMake and PETSc for the C interface, Python with numpy, and Python modules that read our files:
+# Gmsh, NGSolve with NETGEN, meshio, scikit-fem, MFEM. Uses apt on Debian and Ubuntu; elsewhere it
+# lists the missing packages. Does nothing if all are installed.
 set -euo pipefail
 
 missing=()
@@ -17,6 +17,8 @@ command -v python3 >/dev/null || missing+=(python3 python3-numpy)
 # Tests that need these are skipped with a message, so a system without apt is no error.
 if command -v apt-get >/dev/null; then
     command -v tetgen >/dev/null || missing+=(tetgen)
+    command -v cmake >/dev/null || missing+=(cmake)
+    pkg-config --exists PETSc 2>/dev/null || missing+=(petsc-dev)
     python3 -m pip --version >/dev/null 2>&1 || missing+=(python3-pip)
     # System libraries of the wheels of Gmsh and NETGEN.
     libraries=$(PATH=$PATH:/sbin:/usr/sbin ldconfig -p)
