@@ -34,8 +34,10 @@ ln -sf "libtetmill.so.$version" "$prefix/lib/$soname"
 ln -sf "$soname" "$prefix/lib/libtetmill.so"
 
 # The system libraries that a program with the static library needs, as Rust names them.
-private=$(echo | rustc --crate-type staticlib --crate-name none --print native-static-libs -o /dev/null - 2>&1 \
+scratch=$(mktemp -d)
+private=$(echo | rustc --crate-type staticlib --crate-name none --print native-static-libs -o "$scratch/none" - 2>&1 \
     | sed -n 's/^note: native-static-libs: //p')
+rm -r "$scratch"
 [[ $private == *-lm* ]] || private+=" -lm"
 for file in tetmill.pc:pkgconfig tetmill-config.cmake:cmake/tetmill tetmill-config-version.cmake:cmake/tetmill; do
     sed -e "s|@PREFIX@|$prefix|; s|@VERSION@|$version|; s|@PRIVATE@|$private|; s|@MPI@|$mpi|; s|@SONAME@|$soname|" \

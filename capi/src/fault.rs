@@ -182,7 +182,7 @@ mod tests {
     #[test]
     fn each_thread_has_its_own_last_error() {
         assert_eq!(guard(|| Err(Fault::usage("here"))), Status::Usage);
-        let other = std::thread::spawn(tetmill_last_status).join().unwrap();
+        let other = std::thread::spawn(|| tetmill_last_status()).join().unwrap();
         assert_eq!((other, tetmill_last_status()), (Status::Ok, Status::Usage));
         assert_eq!(guard(|| Ok(())), Status::Ok);
         assert_eq!(tetmill_last_status(), Status::Usage);

@@ -168,12 +168,21 @@ fn write_group(part: &DistMesh, index: usize, [vertices, edges, faces]: &Group, 
 mod tests {
     use super::*;
     use crate::files::testing::{cube, names, scattered, together, two_tets};
+    use crate::ground::mesh::Mesh;
     use crate::parallel::distribution::distribute;
+    use csg::PatchId;
+
+    /// The mesh with its boundary on one patch: those of the tests have no curves between patches.
+    fn on_one_patch(mut mesh: Mesh) -> Mesh {
+        mesh.triangles.iter_mut().for_each(|triangle| triangle.patch = PatchId(1));
+        mesh
+    }
 
     #[test]
     fn two_tets_on_two_ranks_are_written_as_mfem_reads_them() {
         let texts = together(2, |comm| {
-            let part = distribute(comm, (comm.rank() == 0).then(|| (two_tets(), vec![0, 1]))).unwrap();
+            let part =
+                distribute(comm, (comm.rank() == 0).then(|| (on_one_patch(two_tets()), vec![0, 1]))).unwrap();
             String::from_utf8(part_text(&part, &names()).unwrap()).unwrap()
         });
         let of_rank_1 = "MFEM mesh v1.2\n\ndimension\n3\n\nelements\n1\n1 4 0 1 2 3\n\nboundary\n3\n2 2 0 1 3\n\
@@ -201,7 +210,7 @@ mod tests {
             let mesh = cube(4);
             let triangles = mesh.triangles.len() as u64;
             let parts = together(ranks, |comm| {
-                let whole = (comm.rank() == 0).then(|| (cube(4), scattered(&mesh, ranks)));
+                let whole = (comm.rank() == 0).then(|| (on_one_patch(cube(4)), scattered(&mesh, ranks)));
                 let part = distribute(comm, whole).unwrap();
                 let text = String::from_utf8(part_text(&part, &names()).unwrap()).unwrap();
                 let sizes: Vec<(Vec<Rank>, [usize; 3])> = groups(&part)
@@ -226,7 +235,9 @@ mod tests {
 
     #[test]
     fn a_body_without_a_number_is_refused() {
-        let part = together(1, |comm| distribute(comm, Some((two_tets(), vec![0, 0]))).unwrap()).remove(0);
+        let part =
+            together(1, |comm| distribute(comm, Some((on_one_patch(two_tets()), vec![0, 0]))).unwrap())
+                .remove(0);
         assert!(matches!(part_text(&part, &Names::default()), Err(WriteError::UnknownBody(_))));
     }
 }
