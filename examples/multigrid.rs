@@ -37,11 +37,11 @@ fn main() -> Result<(), Error> {
         let solved = thread::try_run(RANKS, |comm| -> Result<_, Error> {
             let mesh = Mesher::new().max_size(0.5).levels(finest).generate_on(comm, Some(&part))?;
             let vertices = mesh.stream().totals().vertices;
-            let hierarchy = mesh.into_hierarchy()?.expect("the method `refine` has levels");
+            let hierarchy = mesh.hierarchy()?.expect("the method `refine` has levels");
             let mut levels = Vec::new();
             let mut load = Vec::new();
             for (k, level) in hierarchy.levels.iter().enumerate() {
-                let (arrays, sharing) = (Arrays::of(level), Sharing::of(level));
+                let (arrays, sharing) = (Arrays::of(&**level), Sharing::of(&**level));
                 let (matrix, of_level) = assemble(&arrays, |_| 1.0);
                 let mut diagonal = matrix.diagonal();
                 sharing.sum(comm, &mut diagonal)?;

@@ -61,7 +61,7 @@
 //! | sizes, refinement, methods | [`Mesher`], [`size`] |
 //! | elements assembled across ranks | [`mesh::Sharing`], [`Generated::with_edges_and_faces`] |
 //! | one layer of tets of other parts | [`Generated::ghosts`] |
-//! | multigrid | [`Generated::into_hierarchy`], [`Hierarchy`] |
+//! | multigrid | [`Generated::hierarchy`], [`Hierarchy`] |
 //! | tets moved to other ranks | [`repartition`] |
 //! | the patches of a boundary name | [`mesh::Names::patches_named`] |
 //! | files, with a solution | [`files`], [`files::vtu::write_fields`] |
@@ -97,6 +97,7 @@ pub use pipeline::{Generated, Geometry, Hierarchy, InputSettings, Mesher, Method
 
 /// Ranks: threads of this process, or processes of an MPI job.
 pub mod comm {
+    pub use crate::ground::comm::group::Group;
     pub use crate::ground::comm::{CommError, Communicator, Rank, grouped, mpi, thread};
 }
 

@@ -230,10 +230,10 @@ fn parents_are_on_the_same_rank_and_lead_to_the_coarse_mesh() {
     let ball = ball();
     let checked = thread::run(3, |comm| {
         let mesh = Mesher::new().levels(3).nested().generate_on(comm, Some(&ball)).unwrap();
-        let hierarchy = mesh.into_hierarchy().unwrap().expect("levels");
+        let hierarchy = mesh.hierarchy().unwrap().expect("levels");
         assert_eq!(hierarchy.levels.len(), 4);
         for k in 1..4 {
-            let (coarse, fine) = (Arrays::of(&hierarchy.levels[k - 1]), Arrays::of(&hierarchy.levels[k]));
+            let (coarse, fine) = (Arrays::of(&*hierarchy.levels[k - 1]), Arrays::of(&*hierarchy.levels[k]));
             let parents = hierarchy.vertex_parents(k);
             assert_eq!(parents.len(), fine.points.len());
             let mut used = vec![false; coarse.points.len()];
@@ -252,7 +252,7 @@ fn parents_are_on_the_same_rank_and_lead_to_the_coarse_mesh() {
             let mut children = vec![0; coarse.tets.len()];
             hierarchy.tet_parents(k).expect("nested").iter().for_each(|&t| children[t as usize] += 1);
             assert!(children.iter().all(|&count| count == 8));
-            assert_eq!(Sharing::of(&hierarchy.levels[k]).neighbours().len(), 2);
+            assert_eq!(Sharing::of(&*hierarchy.levels[k]).neighbours().len(), 2);
         }
         comm.barrier().unwrap();
     });

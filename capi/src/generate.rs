@@ -3,7 +3,7 @@
 use crate::callbacks::{Refusal, Watch};
 use crate::fault::{Fault, Status, guard};
 use crate::geometry::Geometry;
-use crate::group::{Group, start_threads};
+use crate::group::{Group, of_threads, on_ranks, start_threads};
 use crate::mesh::Mesh;
 use crate::options::Options;
 use crate::pointers::{given, store_new};
@@ -26,7 +26,7 @@ pub unsafe extern "C" fn tetmill_generate(
     parts: c_uint,
     mesh: *mut *mut Mesh,
 ) -> Status {
-    let make = || generate(Some(given(geometry, "geometry")?), options, Group::of_threads(parts)?);
+    let make = || generate(Some(given(geometry, "geometry")?), options, of_threads(parts)?);
     // SAFETY: the contract of the header.
     guard(|| unsafe { store_new(mesh, make, "mesh") })
 }
@@ -44,7 +44,7 @@ pub fn generate(geometry: Option<&Geometry>, options: Option<&Options>, group: G
         refusal: Arc::clone(&refusal),
         cancelled: AtomicBool::new(false),
     };
-    let made = group.run(|comm| {
+    let made = on_ranks(&group, |comm| {
         let geometry = geometry.filter(|_| comm.rank() == 0);
         let mesher = comm.agree(settings.mesher(geometry, &refusal))?;
         run(comm, geometry, &mesher.observer(&watch), &refusal)

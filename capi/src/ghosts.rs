@@ -1,7 +1,7 @@
 //! Tets of other parts beside a part.
 
 use crate::fault::{Fault, Status, guard};
-use crate::group::own;
+use crate::group::{on_ranks, own};
 use crate::mesh::Mesh;
 use crate::part::Part;
 use crate::pointers::{given, store, store_array};
@@ -56,7 +56,7 @@ pub unsafe extern "C" fn tetmill_mesh_find_ghosts(mesh: Option<&Mesh>, by: c_int
     guard(|| {
         let Mesh { parts, group, .. } = given(mesh, "mesh")?;
         let (by, place) = kind(by)?;
-        group.run(|comm| {
+        on_ranks(group, |comm| {
             let part = own(parts, comm.rank(), Part::rank);
             let ghosts = part.made.ghosts(comm, by)?;
             part.ghosts[place].get_or_init(|| ghosts.into());

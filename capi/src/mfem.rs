@@ -1,7 +1,7 @@
 //! MFEM's parallel text.
 
 use crate::fault::{Fault, Status, guard};
-use crate::group::own;
+use crate::group::{on_ranks, own};
 use crate::mesh::Mesh;
 use crate::part::Part;
 use crate::pointers::{given, store};
@@ -16,7 +16,7 @@ use tetmill::files::mfem::part_text;
 pub unsafe extern "C" fn tetmill_mesh_make_mfem(mesh: Option<&Mesh>) -> Status {
     guard(|| {
         let Mesh { parts, group, .. } = given(mesh, "mesh")?;
-        group.run(|comm| {
+        on_ranks(group, |comm| {
             let part = own(parts, comm.rank(), Part::rank);
             let with_edges = part.made.with_edges_and_faces(comm)?;
             let text = part_text(&with_edges, &part.made.names).map_err(Error::from);

@@ -9,15 +9,11 @@ use crate::options::Options;
 use crate::pointers::store_new;
 use std::ffi::c_uint;
 use std::mem::ManuallyDrop;
-use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+use tetmill::comm::mpi::duplicate_of;
 use tetmill::comm::mpi::rsmpi::environment::{is_finalized, is_initialized};
 use tetmill::comm::mpi::rsmpi::ffi::{MPI_Comm, MPI_Comm_test_inter, RSMPI_COMM_NULL};
 use tetmill::comm::mpi::rsmpi::raw::{AsRaw, FromRaw};
 use tetmill::comm::mpi::rsmpi::topology::SimpleCommunicator;
-use tetmill::comm::mpi::{duplicate_of, end_job};
-
-/// The exit status of a job in which a rank failed.
-const RANK_FAILED: i32 = 5;
 
 /// *Collective.* Makes a mesh across the processes of a communicator, of which the library keeps a
 /// duplicate until the mesh is freed.
@@ -45,7 +41,7 @@ pub unsafe extern "C" fn tetmill_generate_comm(
         // SAFETY: the contract of the header.
         let given = unsafe { borrowed(comm) }?;
         let own = duplicate_of(&*given).map_err(|error| Fault::usage(error.to_string()))?;
-        or_end_job(|| generate(geometry, options, Group::of_processes(Box::new(own), parts)))
+        generate(geometry, options, Group::of_processes(Box::new(own), parts))
     };
     // SAFETY: the contract of the header.
     guard(|| unsafe { store_new(mesh, make, "mesh") })
@@ -72,12 +68,4 @@ unsafe fn borrowed(comm: MPI_Comm) -> Result<ManuallyDrop<SimpleCommunicator>, F
     }
     // SAFETY: a valid communicator of the program, by the caller's promise.
     Ok(ManuallyDrop::new(unsafe { SimpleCommunicator::from_raw(comm) }))
-}
-
-/// Ends the job if `body` panics.
-fn or_end_job<T>(body: impl FnOnce() -> T) -> T {
-    catch_unwind(AssertUnwindSafe(body)).unwrap_or_else(|panic| {
-        end_job(RANK_FAILED);
-        resume_unwind(panic)
-    })
 }

@@ -2,7 +2,7 @@
 
 use crate::fault::{Fault, Status, guard};
 use crate::geometry::out_of_range;
-use crate::group::own;
+use crate::group::{on_ranks, own};
 use crate::mesh::Mesh;
 use crate::part::Part;
 use crate::pointers::{array, array_mut, given, store, store_array};
@@ -113,7 +113,7 @@ pub unsafe extern "C" fn tetmill_mesh_sum(mesh: Option<&Mesh>, values: *const *m
         let Mesh { parts, group, .. } = given(mesh, "mesh")?;
         // SAFETY: the contract of the header.
         let values = unsafe { of_parts(parts, values) }?;
-        group.run(|comm| {
+        on_ranks(group, |comm| {
             let part = own(parts, comm.rank(), Part::rank);
             let mut values = own_values(parts, &values, comm.rank());
             Ok(part.sharing().sharing.sum(comm, &mut values)?)
@@ -132,7 +132,7 @@ pub unsafe extern "C" fn tetmill_mesh_any(mesh: Option<&Mesh>, flags: *const *mu
         let Mesh { parts, group, .. } = given(mesh, "mesh")?;
         // SAFETY: the contract of the header.
         let flags = unsafe { of_parts(parts, flags) }?;
-        group.run(|comm| {
+        on_ranks(group, |comm| {
             let part = own(parts, comm.rank(), Part::rank);
             let mut flags = own_values(parts, &flags, comm.rank());
             let mut bools: Vec<bool> = flags.iter().map(|&flag| flag != 0).collect();

@@ -32,6 +32,7 @@ use crate::parallel::migrate::BareStream;
 use crate::parallel::partition::ties::Ties;
 use crate::parallel::partition::{self};
 use crate::parallel::refine::{self, EdgeDisplacements, PeriodicCheck, RefineError, RefinedMesh};
+use std::sync::Arc;
 
 /// **Collective.** Makes the mesh; only rank 0 needs the geometry and reports `progress`.
 ///
@@ -156,7 +157,7 @@ fn refined(
         made.report.curved_edges = made.displacements.edges().len() as u64;
     }
     Ok(Refined::Sound(Box::new(Generated {
-        part: Part::Refined(Box::new(part)),
+        part: Part::Refined(Arc::new(part)),
         pieces,
         levels,
         names,

@@ -10,12 +10,13 @@ use crate::parallel::migrate::{self, BareStream};
 use crate::parallel::refine::RefinedMesh;
 use crate::parallel::repartition::smooth::{self, smooth};
 use crate::parallel::repartition::{self, Method, absorb_small_components, diffuse};
+use std::sync::Arc;
 
 /// A rank's part of the mesh.
 #[derive(Debug)]
 pub enum Part {
     /// A lattice in each coarse tet; its tets are computed on request.
-    Refined(Box<RefinedMesh>),
+    Refined(Arc<RefinedMesh>),
     /// Stored tets.
     Stored(Box<BareStream>),
 }

@@ -16,6 +16,7 @@ use crate::parallel::interfaces;
 use crate::parallel::partition::Metrics;
 use crate::parallel::refine::{self, EdgeDisplacements, PeriodicCheck, RefinedMesh, parents};
 use crate::parallel::{halo, migrate};
+use std::sync::Arc;
 
 /// Rank 0's coarse mesh with its statistics.
 #[derive(Clone, Debug)]
@@ -83,8 +84,8 @@ pub(super) struct Refinement {
 #[derive(Debug)]
 pub struct Hierarchy {
     /// From the coarsest to the finest level; each splits coarse edges into twice as many
-    /// subdivisions as the one before.
-    pub levels: Vec<RefinedMesh>,
+    /// subdivisions as the one before. The finest shares the memory of the mesh.
+    pub levels: Vec<Arc<RefinedMesh>>,
     nested: bool,
 }
 
@@ -157,17 +158,19 @@ impl Generated {
     ///
     /// # Errors
     /// If there is not enough memory.
-    pub fn into_hierarchy(self) -> Result<Option<Hierarchy>, Error> {
-        let (Part::Refined(finest), Some(Refinement { projector, settings })) = (self.part, self.refinement)
+    pub fn hierarchy(&self) -> Result<Option<Hierarchy>, Error> {
+        let (Part::Refined(finest), Some(Refinement { projector, settings })) =
+            (&self.part, &self.refinement)
         else {
             return Ok(None);
         };
         let n = finest.pieces();
         let mut levels = Vec::new();
         for k in (1..=n.trailing_zeros()).rev() {
-            levels.push(refine::refine(finest.coarse().clone(), &projector, n >> k, &settings)?);
+            let level = refine::refine(finest.coarse().clone(), projector, n >> k, settings)?;
+            levels.push(Arc::new(level));
         }
-        levels.push(*finest);
+        levels.push(Arc::clone(finest));
         Ok(Some(Hierarchy { levels, nested: settings.nested }))
     }
 }

@@ -29,6 +29,7 @@
 pub mod agree;
 #[doc(hidden)]
 pub mod conformance;
+pub mod group;
 pub mod grouped;
 pub mod launch;
 #[cfg(feature = "mpi")]
