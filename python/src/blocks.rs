@@ -24,7 +24,8 @@ pub struct Block {
 #[pyclass(frozen, module = "tetmill._native")]
 pub struct Blocks {
     mesh: Py<Mesh>,
-    rank: usize,
+    /// The part by its index in the process.
+    part: usize,
     /// Tets at which a block ends.
     size: usize,
     /// The next block of the library.
@@ -43,13 +44,13 @@ struct Filled {
 
 impl Blocks {
     /// The blocks of a part, from the first one.
-    pub fn new(mesh: Py<Mesh>, rank: usize, size: usize) -> Self {
-        Self { mesh, rank, size, next: AtomicUsize::new(0) }
+    pub fn new(mesh: Py<Mesh>, part: usize, size: usize) -> Self {
+        Self { mesh, part, size, next: AtomicUsize::new(0) }
     }
 
     /// Collects blocks of the library until there are enough tets.
     fn fill(&self) -> Filled {
-        let made = self.mesh.get().made(self.rank);
+        let made = self.mesh.get().made(self.part);
         let stream = made.stream();
         let (mut filled, mut block, mut points) = (Filled::default(), LocalBlock::default(), Vec::new());
         while filled.tets.len() < self.size {

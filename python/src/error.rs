@@ -3,8 +3,67 @@
 use csg::Point;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use std::fmt;
 use tetmill::Error;
+use tetmill::comm::CommError;
 use tetmill::error::{ErrorKind, FeatureError, HasKind, InputError, PartitionError, RequestError};
+
+/// Why a run ends: an exception of Python, or an error of the library.
+pub enum Failure {
+    Exception(PyErr),
+    Error(Error),
+}
+
+impl Failure {
+    /// The exception that tells the caller.
+    pub fn raise(self, py: Python<'_>) -> PyErr {
+        match self {
+            Self::Exception(exception) => exception,
+            Self::Error(error) => exception(py, &error),
+        }
+    }
+}
+
+impl From<PyErr> for Failure {
+    fn from(exception: PyErr) -> Self {
+        Self::Exception(exception)
+    }
+}
+
+impl From<Error> for Failure {
+    fn from(error: Error) -> Self {
+        Self::Error(error)
+    }
+}
+
+impl From<CommError> for Failure {
+    fn from(error: CommError) -> Self {
+        Self::Error(error.into())
+    }
+}
+
+impl fmt::Display for Failure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Exception(exception) => exception.fmt(f),
+            Self::Error(error) => error.fmt(f),
+        }
+    }
+}
+
+/// So that ranks can agree on it.
+impl HasKind for Failure {
+    fn kind(&self) -> ErrorKind {
+        match self {
+            Self::Exception(_) => ErrorKind::Input,
+            Self::Error(error) => error.kind(),
+        }
+    }
+
+    fn is_elsewhere(&self) -> bool {
+        matches!(self, Self::Error(error) if error.is_elsewhere())
+    }
+}
 
 /// The exception of an error: a `tetmill.Error` with the fields that are known.
 pub fn exception(py: Python<'_>, error: &Error) -> PyErr {

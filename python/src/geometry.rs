@@ -1,9 +1,10 @@
 //! Geometries, and the start of a run.
 
-use crate::error::exception;
+use crate::error::Failure;
 use crate::mesh::Mesh;
-use crate::options::{Options, Refused};
-use crate::watch::watched;
+use crate::options::Options;
+use crate::ranks::{Processes, Ranks, agree, on_ranks};
+use crate::watch::{Stop, watched};
 use numpy::{PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -11,12 +12,12 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
-use tetmill::comm::{Communicator, thread};
+use tetmill::comm::Communicator;
 use tetmill::error::Error;
-use tetmill::progress::{Observer, Progress, StageTime};
-use tetmill::run::{Balance, GenerateSettings, balance, generate};
+use tetmill::progress::{Progress, StageTime};
+use tetmill::run::{Balance, GenerateSettings, balance, generate as generate_part};
 use tetmill::{Generated, InputSettings, MeshArrays, SurfaceArrays};
-use tetmill_cli::report::{Processes, Report, processes};
+use tetmill_cli::report::{Report, processes};
 
 /// The input of the mesher.
 #[pyclass(frozen, module = "tetmill._native")]
@@ -60,7 +61,7 @@ fn read(
     name: String,
     make: impl FnOnce() -> Result<tetmill::Geometry, Error> + Send,
 ) -> PyResult<Geometry> {
-    let (geometry, _) = watched(py, None, &Arc::default(), |_| make())?;
+    let (geometry, _) = watched(py, None, &Arc::default(), |_| Ok(make()?))?;
     Ok(Geometry { geometry, name })
 }
 
@@ -153,59 +154,70 @@ impl Geometry {
     fn patches(&self) -> Labels {
         labels(&self.geometry.names().patches)
     }
+}
 
-    /// Makes a mesh.
-    fn generate(&self, py: Python<'_>, options: Options<'_>) -> PyResult<Mesh> {
-        let start = Instant::now();
-        if self.geometry.is_mesh() && options.has_sizes() {
-            return Err(PyValueError::new_err(
-                "the geometry is a mesh already and is taken as it is: leave out preset, maxh, minh, grading, \
-                 closeness, mesh_size_file, sources, size, effort and coarse",
-            ));
-        }
-        let stop = Arc::default();
-        let settings = options.settings(&self.geometry, &stop).map_err(|refused| match refused {
-            Refused::Exception(exception) => exception,
-            Refused::Error(error) => exception(py, &error),
-        })?;
-        let (made, notes) = watched(py, options.progress.as_ref(), &stop, |watcher| {
-            thread::try_run(options.parts, |comm| {
-                let others = watcher.others();
-                let observer: &dyn Observer = if comm.rank() == 0 { watcher } else { &others };
-                run(comm, &self.geometry, &settings, &Progress::new(observer))
-            })
-        })?;
-        let report = self.report(&made, start);
-        Ok(Mesh::new(made.into_iter().map(|run| run.made).collect(), report, notes))
+/// **Collective** over the processes, if there are several. Makes a mesh; process 0 gives the
+/// geometry.
+#[pyfunction]
+pub fn generate(
+    py: Python<'_>,
+    geometry: Option<Bound<'_, Geometry>>,
+    options: Options<'_>,
+) -> PyResult<Mesh> {
+    let start = Instant::now();
+    let ranks = match &options.processes {
+        Some(processes) => Ranks::of_processes(Processes::new(processes)?, options.parts),
+        None => Ranks::of_threads(options.parts.max(1)),
+    };
+    let geometry = geometry.as_ref().map(Bound::get).filter(|_| ranks.is_first());
+    let stop = Arc::default();
+    let settings = agree(py, &ranks, settings(&options, geometry, &stop))?;
+    let (made, notes) = on_ranks(py, &ranks, options.progress.as_ref(), &stop, |comm, progress| {
+        let geometry = geometry.filter(|_| comm.rank() == 0);
+        Ok(run(comm, geometry.map(|of| &of.geometry), &settings, progress)?)
+    })?;
+    let report = made.first().zip(geometry).map(|(first, geometry)| geometry.report(first, &ranks, start));
+    Mesh::new(py, made.into_iter().map(|run| run.made).collect(), ranks, report, notes)
+}
+
+fn settings(
+    options: &Options<'_>,
+    geometry: Option<&Geometry>,
+    stop: &Arc<Stop>,
+) -> Result<GenerateSettings, Failure> {
+    if options.has_sizes() && geometry.is_some_and(Geometry::is_mesh) {
+        let text = "the geometry is a mesh already and is taken as it is: leave out preset, maxh, minh, grading, \
+                    closeness, mesh_size_file, sources, size, effort and coarse";
+        return Err(PyValueError::new_err(text).into());
     }
+    options.settings(geometry.map(|of| &of.geometry), stop)
 }
 
 /// The result of one rank.
 struct Run {
     made: Generated,
     balance: Balance,
-    processes: Processes,
+    processes: processes::Processes,
     stages: Vec<StageTime>,
 }
 
 /// **Collective.** Makes the mesh of one rank, and measures what its report needs.
 fn run(
     comm: &dyn Communicator,
-    geometry: &tetmill::Geometry,
+    geometry: Option<&tetmill::Geometry>,
     settings: &GenerateSettings,
     progress: &Progress,
 ) -> Result<Run, Error> {
-    let made = generate(comm, (comm.rank() == 0).then_some(geometry), settings, progress)?;
+    let made = generate_part(comm, geometry, settings, progress)?;
     let balance = balance(comm, &made.part)?;
-    Ok(Run { made, balance, processes: processes(comm)?, stages: progress.times() })
+    Ok(Run { made, balance, processes: processes::processes(comm)?, stages: progress.times() })
 }
 
 impl Geometry {
-    /// The report of the command line, as JSON.
-    fn report(&self, runs: &[Run], start: Instant) -> String {
-        let Run { made, balance, processes, stages } = &runs[0];
-        let ranks = runs.len() as u32;
-        let mut report = Report::new(&self.geometry, &self.name, made, *processes, ranks, *balance);
+    /// The report of the command line, as JSON, from the result of rank 0.
+    fn report(&self, run: &Run, ranks: &Ranks, start: Instant) -> String {
+        let Run { made, balance, processes, stages } = run;
+        let mut report = Report::new(&self.geometry, &self.name, made, *processes, ranks.ranks(), *balance);
         report.stages = stages.clone();
         report.seconds = start.elapsed().as_secs_f64();
         serde_json::to_string(&report).expect("plain data")

@@ -14,9 +14,11 @@ mod command;
 mod error;
 mod geometry;
 mod ghosts;
+mod levels;
 mod mesh;
 mod options;
 mod picture;
+mod ranks;
 mod size;
 mod watch;
 mod write;
@@ -33,9 +35,11 @@ mod _native {
     #[pymodule_export]
     use crate::command::{run_command, set_threads};
     #[pymodule_export]
-    use crate::geometry::Geometry;
+    use crate::geometry::{Geometry, generate};
     #[pymodule_export]
     use crate::ghosts::PartGhosts;
+    #[pymodule_export]
+    use crate::levels::Level;
     #[pymodule_export]
     use crate::mesh::Mesh;
     #[pymodule_export]

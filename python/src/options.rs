@@ -1,5 +1,6 @@
 //! The options of a run.
 
+use crate::error::Failure;
 use crate::size;
 use crate::watch::Stop;
 use numpy::PyReadonlyArray2;
@@ -7,12 +8,11 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use std::path::PathBuf;
 use std::sync::Arc;
-use tetmill::error::Error;
 use tetmill::files::mesh_size;
 use tetmill::run::{
     Candidates, CoarseSettings, CutPlane, CutSettings, GenerateSettings, PlanSettings, Wanted,
 };
-use tetmill::size::{Closeness, Preset, SizeSettings, Source};
+use tetmill::size::{Closeness, Effort, Preset, SizeSettings, Source};
 use tetmill::{Geometry, Method, Point, Vector};
 
 /// The keyword arguments of `Geometry.generate`; all keys are present.
@@ -20,7 +20,10 @@ use tetmill::{Geometry, Method, Point, Vector};
 #[pyo3(from_item_all)]
 pub struct Options<'py> {
     method: String,
+    /// 0 stands for one in each process.
     pub parts: u32,
+    /// The processes, if there are several.
+    pub processes: Option<Bound<'py, PyAny>>,
     elements: Option<u64>,
     pieces: u32,
     nested: bool,
@@ -42,25 +45,17 @@ pub struct Options<'py> {
     pub progress: Option<Py<PyAny>>,
 }
 
-/// Why options are refused: by Python's rules or by the library.
-pub enum Refused {
-    Exception(PyErr),
-    Error(Error),
-}
-
-impl From<PyErr> for Refused {
-    fn from(exception: PyErr) -> Self {
-        Self::Exception(exception)
-    }
-}
-
 fn unknown(what: &str, value: &str, known: &str) -> PyErr {
     PyValueError::new_err(format!("{what} cannot be {value:?}: possible are {known}"))
 }
 
 impl Options<'_> {
     /// The settings of the library.
-    pub fn settings(&self, geometry: &Geometry, stop: &Arc<Stop>) -> Result<GenerateSettings, Refused> {
+    pub fn settings(
+        &self,
+        geometry: Option<&Geometry>,
+        stop: &Arc<Stop>,
+    ) -> Result<GenerateSettings, Failure> {
         Ok(GenerateSettings {
             method: self.method()?,
             coarse: self.coarse(geometry, stop)?,
@@ -119,7 +114,7 @@ impl Options<'_> {
         }
     }
 
-    fn coarse(&self, geometry: &Geometry, stop: &Arc<Stop>) -> Result<CoarseSettings, Refused> {
+    fn coarse(&self, geometry: Option<&Geometry>, stop: &Arc<Stop>) -> Result<CoarseSettings, Failure> {
         let preset: Preset = match &self.preset {
             Some(name) => name.parse().map_err(PyValueError::new_err)?,
             None => Preset::default(),
@@ -131,9 +126,13 @@ impl Options<'_> {
         if let Some(ratio) = self.closeness {
             size.closeness = Closeness::of_ratio(ratio);
         }
+        // Only rank 0 has a geometry, and reads sizes by place.
+        let Some(geometry) = geometry else {
+            return Ok(CoarseSettings { size, effort: self.effort()? });
+        };
         if let Some(file) = &self.mesh_size_file {
             let least = geometry.least_size().unwrap_or(0.0);
-            size.sources = mesh_size::read_from(file, least).map_err(|error| Refused::Error(error.into()))?;
+            size.sources = mesh_size::read_from(file, least).map_err(|error| Failure::Error(error.into()))?;
         }
         if let Some(sources) = &self.sources {
             let rows: &[[f64; 4]] = bytemuck::cast_slice(sources.as_slice().map_err(PyErr::from)?);
@@ -143,10 +142,11 @@ impl Options<'_> {
         if let Some(function) = &self.size {
             size.function = Some(size::function(function, stop)?);
         }
-        let effort = match &self.effort {
-            Some(name) => Some(name.parse().map_err(PyValueError::new_err)?),
-            None => None,
-        };
-        Ok(CoarseSettings { size, effort })
+        Ok(CoarseSettings { size, effort: self.effort()? })
+    }
+
+    fn effort(&self) -> PyResult<Option<Effort>> {
+        let effort = self.effort.as_ref().map(|name| name.parse());
+        effort.transpose().map_err(PyValueError::new_err)
     }
 }

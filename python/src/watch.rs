@@ -1,14 +1,15 @@
 //! Runs of the library: with progress, exceptions of callbacks, and Ctrl-C.
 
 use crate::command;
-use crate::error::exception;
+use crate::error::Failure;
+use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
+use pyo3::types::PyTuple;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
-use tetmill::Error;
 use tetmill::comm::thread::POOL_STACK;
 use tetmill::progress::{Observer, Stage};
 
@@ -41,9 +42,33 @@ impl Stop {
 }
 
 /// A message from the run to the thread that called it.
-enum Event {
+pub enum Event {
     Progress(Stage, f64),
     Note(String),
+    Call(Call),
+}
+
+/// A method to be called in the thread that called the library, which is the only one that may call
+/// MPI if MPI was initialised for one thread (`MPI_THREAD_FUNNELED`, as PETSc does).
+pub struct Call {
+    pub object: Py<PyAny>,
+    pub method: &'static str,
+    pub arguments: Py<PyTuple>,
+    pub reply: Sender<PyResult<Py<PyAny>>>,
+}
+
+impl Call {
+    fn perform(self, py: Python<'_>, stop: &Stop) {
+        let result = self.object.call_method1(py, self.method, self.arguments);
+        // Ctrl-C does not end an operation in the middle: see the class `Processes`.
+        match self.object.call_method0(py, "take_interrupt").and_then(|taken| taken.is_truthy(py)) {
+            Ok(true) => stop.raise(PyKeyboardInterrupt::new_err(())),
+            Ok(false) => {}
+            Err(exception) => stop.raise(exception),
+        }
+        // The run waits for the reply.
+        let _ = self.reply.send(result);
+    }
 }
 
 /// Receives the progress of a run on rank 0.
@@ -63,6 +88,11 @@ impl Watcher {
         if self.has_progress {
             self.send(Event::Progress(stage, fraction));
         }
+    }
+
+    /// Where methods are sent that the calling thread is to call.
+    pub fn calls(&self) -> Sender<Event> {
+        self.events.clone()
     }
 
     /// The observer of ranks other than 0.
@@ -114,14 +144,15 @@ pub fn watched<T: Send>(
     py: Python<'_>,
     progress: Option<&Py<PyAny>>,
     stop: &Arc<Stop>,
-    work: impl FnOnce(&Watcher) -> Result<T, Error> + Send,
+    work: impl FnOnce(&Watcher) -> Result<T, Failure> + Send,
 ) -> PyResult<(T, Vec<String>)> {
     command::ready()?;
     let (result, notes) = py.detach(|| {
         let (events, received) = channel();
         let watcher = Watcher { events, has_progress: progress.is_some(), stop: Arc::clone(stop) };
         thread::scope(|scope| {
-            // The watcher is dropped with the closure, which ends the loop of `listen`.
+            // The watcher is dropped with the closure, which ends the loop of `listen`: no other sender
+            // outlives it.
             let run = move || work(&watcher);
             let builder = thread::Builder::new().name("tetmill".into()).stack_size(POOL_STACK);
             let worker = builder.spawn_scoped(scope, run)?;
@@ -135,7 +166,7 @@ pub fn watched<T: Send>(
     }
     match result {
         Ok(Ok(value)) => Ok((value, notes)),
-        Ok(Err(error)) => Err(exception(py, &error)),
+        Ok(Err(failure)) => Err(failure.raise(py)),
         Err(panic) => std::panic::resume_unwind(panic),
     }
 }
@@ -148,6 +179,7 @@ fn listen(received: &Receiver<Event>, progress: Option<&Py<PyAny>>, stop: &Stop)
     loop {
         match received.recv_timeout(PERIOD.saturating_sub(looked.elapsed())) {
             Ok(Event::Note(note)) => notes.push(note),
+            Ok(Event::Call(call)) => Python::attach(|py| call.perform(py, stop)),
             // Reports of several threads may overtake each other.
             Ok(Event::Progress(stage, fraction))
                 if stage == last.0 && 0.0 < fraction && fraction < last.1 => {}

@@ -15,8 +15,9 @@ from . import csg
 from ._errors import Cancelled, Error, InputError, NoMeshError, NoteWarning, RankError, ResourceError
 from ._geometry import Entities, Geometry, SizeFunction
 from ._grid import Grid
-from ._mesh import Block, Ghosts, Label, Mesh, Part, Written
+from ._mesh import Mesh, Written
 from ._native import __version__, set_threads
+from ._parts import Block, Ghosts, Label, Level, Part
 
 __all__ = [
     "Block",
@@ -28,6 +29,7 @@ __all__ = [
     "Grid",
     "InputError",
     "Label",
+    "Level",
     "Mesh",
     "NoMeshError",
     "NoteWarning",

@@ -15,9 +15,13 @@ from . import _arguments as arguments
 from . import _native
 from ._errors import NoteWarning
 from ._grid import Grid
-from ._mesh import Label, Mesh, labels
+from ._mesh import Mesh
+from ._mpi import Processes, agreed, communicator
+from ._parts import Label, labels
 
 if TYPE_CHECKING:
+    from mpi4py import MPI
+
     from .csg import Solid
 
 #: Sizes at points: (n, 3) coordinates to (n,) positive numbers.
@@ -110,11 +114,12 @@ class Geometry:
         if not paths:
             raise TypeError("Geometry needs a file; see also from_text, from_surface and from_mesh")
         given = _input(keep_surface, merge, feature_angle)
-        self._native = _native.Geometry.from_files([os.fspath(path) for path in paths], given)
+        # None in a process that only takes part in the meshing.
+        self._native: _native.Geometry | None = _native.Geometry.from_files([os.fspath(path) for path in paths], given)
         warn(self.notes)
 
     @classmethod
-    def _of(cls, native: _native.Geometry) -> Geometry:
+    def _of(cls, native: _native.Geometry | None) -> Geometry:
         geometry = cls.__new__(cls)
         geometry._native = native
         return geometry
@@ -216,38 +221,61 @@ class Geometry:
         warn(geometry.notes)
         return geometry
 
+    @classmethod
+    def on_first(cls, comm: MPI.Comm, make: Callable[[], Geometry]) -> Geometry:
+        """*Collective.* The geometry that `make` returns in process 0, where alone it is called.
+
+        For files that only process 0 can read, or that are large. The result of other processes
+        has no properties; it can only be meshed, together with process 0.
+
+        Args:
+            comm: A communicator of mpi4py.
+            make: Such as `lambda: Geometry("part.geo")`.
+        """
+        processes = communicator(comm)
+        made = agreed(processes, lambda: make() if processes.rank == 0 else None)
+        return cls._of(None) if made is None else made
+
+    @property
+    def _here(self) -> _native.Geometry:
+        if self._native is None:
+            raise RuntimeError("only process 0 has this geometry")
+        return self._native
+
     @property
     def notes(self) -> list[str]:
         """Warnings about the text, repairs, additions and omissions while reading."""
-        return self._native.notes()
+        return self._here.notes()
 
     @property
     def entities(self) -> Entities:
         """The numbers of bodies, patches, curves and corners."""
-        found = arguments.as_dict(self._native.entities())
+        found = arguments.as_dict(self._here.entities())
         return Entities(**{name: found[name] for name in Entities._fields})
 
     @property
     def bodies(self) -> list[Label]:
         """Numbers and names of the bodies."""
-        return labels(self._native.bodies())
+        return labels(self._here.bodies())
 
     @property
     def patches(self) -> list[Label]:
         """Numbers and names of the patches."""
-        return labels(self._native.patches())
+        return labels(self._here.patches())
 
     @property
     def is_mesh(self) -> bool:
         """Whether it is a tetrahedral mesh."""
-        return self._native.is_mesh()
+        return self._here.is_mesh()
 
     def inspect(self) -> dict[str, Any] | None:
         """Its bodies, patches, curves and corners in detail; None for a tetrahedral mesh."""
-        text = self._native.inspect()
+        text = self._here.inspect()
         return None if text is None else dict(arguments.as_dict(text))
 
     def __repr__(self) -> str:
+        if self._native is None:
+            return "<tetmill.Geometry of process 0>"
         bodies, patches, curves, corners = self.entities
         return f"<tetmill.Geometry: {bodies} bodies, {patches} patches, {curves} curves, {corners} corners>"
 
@@ -257,7 +285,7 @@ class Geometry:
         levels: int = 0,
         tets: float | None = None,
         method: Literal["refine", "surface", "decompose"] = "refine",
-        parts: int = 1,
+        parts: int | None = None,
         preset: Literal["very-coarse", "coarse", "moderate", "fine", "very-fine"] | None = None,
         maxh: float | None = None,
         minh: float | None = None,
@@ -274,6 +302,7 @@ class Geometry:
         planes_from: ArrayLike | None = None,
         memory: float | None = None,
         progress: bool | ProgressFunction | None = None,
+        comm: MPI.Comm | None = None,
     ) -> Mesh:
         """Makes a mesh. Options have the names and defaults of the command line.
 
@@ -286,7 +315,8 @@ class Geometry:
             method: "refine": partition the coarse mesh and refine it uniformly; "surface": refine
                 the surface of each part and mesh its inside; "decompose": cut the geometry by
                 planes and mesh each piece.
-            parts: Number of parts, which are made by as many threads.
+            parts: Number of parts: 1, or one in each process of `comm`. They are made by as many
+                threads.
             preset: Fineness, by default "moderate".
             maxh: Largest element size (length).
             minh: Smallest element size due to curvature and short curves (length).
@@ -309,40 +339,54 @@ class Geometry:
             memory: Memory for the fine mesh (bytes); by default the free memory.
             progress: True prints the stages to the standard error. A function is called in this
                 thread with the name of a stage and its progress, 0 to 1.
+            comm: *Collective.* Make the mesh across the processes of this communicator of mpi4py;
+                each gets its parts. Process 0 gives the geometry, `size`, `sources`,
+                `mesh_size_file` and `progress`; those of others are ignored
+                (`Geometry.on_first` reads it there only). All other options must be the same in all processes.
 
         Raises:
             Error: By kind, `InputError`, `NoMeshError`, `ResourceError`, ....
             Exception: Those of the functions `size` and `progress`.
         """
-        if tets is not None and (levels or pieces is not None or coarse is not None):
-            raise ValueError("tets chooses the sizes and the refinement: leave out levels, pieces and coarse")
-        if pieces is not None and levels:
-            raise ValueError("levels and pieces exclude each other")
-        if size is not None and not (callable(size) or isinstance(size, Grid)):
-            raise TypeError(f"size must be a function or a Grid, not {size!r}; a constant size is maxh")
-        levels = arguments.whole("levels", levels, 0, _MOST_LEVELS)
-        options = {
-            "method": arguments.one_of("method", method, _METHODS),
-            "parts": arguments.whole("parts", parts, 1, _MOST_PARTS),
-            "elements": arguments.count("tets", tets),
-            "pieces": 2**levels if pieces is None else arguments.whole("pieces", pieces, 1, _MOST_PIECES),
-            "nested": bool(nested),
-            "planes": arguments.one_of("planes", planes, _PLANES),
-            "planes_from": _rows("planes_from", planes_from, 6),
-            "memory": arguments.count("memory", memory),
-            "preset": None if preset is None else arguments.one_of("preset", preset, _PRESETS),
-            "maxh": arguments.length("maxh", maxh),
-            "minh": arguments.length("minh", minh),
-            "grading": arguments.length("grading", grading),
-            "closeness": arguments.length("closeness", closeness, zero=True),
-            "mesh_size_file": None if mesh_size_file is None else os.fspath(mesh_size_file),
-            "sources": _rows("sources", sources, 4),
-            "effort": None if effort is None else arguments.one_of("effort", effort, _EFFORTS),
-            "coarse": arguments.count("coarse", coarse),
-            "size": size._native if isinstance(size, Grid) else size,
-            "progress": _progress(progress),
-        }
-        mesh = Mesh(self._native.generate(options))
+
+        def options() -> dict[str, Any]:
+            if tets is not None and (levels or pieces is not None or coarse is not None):
+                raise ValueError("tets chooses the sizes and the refinement: leave out levels, pieces and coarse")
+            if pieces is not None and levels:
+                raise ValueError("levels and pieces exclude each other")
+            if size is not None and not (callable(size) or isinstance(size, Grid)):
+                raise TypeError(f"size must be a function or a Grid, not {size!r}; a constant size is maxh")
+            exponent = arguments.whole("levels", levels, 0, _MOST_LEVELS)
+            return {
+                "method": arguments.one_of("method", method, _METHODS),
+                "parts": 0 if parts is None else arguments.whole("parts", parts, 1, _MOST_PARTS),
+                "elements": arguments.count("tets", tets),
+                "pieces": 2**exponent if pieces is None else arguments.whole("pieces", pieces, 1, _MOST_PIECES),
+                "nested": bool(nested),
+                "planes": arguments.one_of("planes", planes, _PLANES),
+                "planes_from": _rows("planes_from", planes_from, 6),
+                "memory": arguments.count("memory", memory),
+                "preset": None if preset is None else arguments.one_of("preset", preset, _PRESETS),
+                "maxh": arguments.length("maxh", maxh),
+                "minh": arguments.length("minh", minh),
+                "grading": arguments.length("grading", grading),
+                "closeness": arguments.length("closeness", closeness, zero=True),
+                "mesh_size_file": None if mesh_size_file is None else os.fspath(mesh_size_file),
+                "sources": _rows("sources", sources, 4),
+                "effort": None if effort is None else arguments.one_of("effort", effort, _EFFORTS),
+                "coarse": arguments.count("coarse", coarse),
+                "size": size._native if isinstance(size, Grid) else size,
+                "progress": _progress(progress),
+            }
+
+        if comm is None:
+            given = options()
+            given["processes"] = None
+        else:
+            processes = communicator(comm)
+            given = agreed(processes, options)
+            given["processes"] = Processes(processes)
+        mesh = Mesh(_native.generate(self._native, given), comm)
         warn(mesh.notes)
         return mesh
 

@@ -13,33 +13,16 @@ from numpy.typing import NDArray
 
 from . import _arguments as arguments
 from . import _native
+from ._parts import Block, Floats, Ids, Ints, Label, Layers, Part, labels
 
 if TYPE_CHECKING:
     from IPython.display import Image
+    from mpi4py import MPI
 
-Ints = NDArray[np.int32]
-Ids = NDArray[np.int64]
-Floats = NDArray[np.float64]
-
-#: A block of tets as a small mesh of its own: see `Mesh.blocks`.
-Block = _native.Block
-#: The tets of other parts beside a part: see `Part.ghosts`.
-Ghosts = _native.PartGhosts
+    from ._distributed import DolfinxMesh
 
 _FORMATS = ("elmer", "vtu", "msh", "medit", "vol", "geomview")
 _ENDINGS = {".vtu": "vtu", ".pvtu": "vtu", ".msh": "msh", ".mesh": "medit", ".vol": "vol", ".off": "geomview"}
-
-
-class Label(NamedTuple):
-    """The number of a body or patch, and its names."""
-
-    number: int
-    names: list[str]
-
-    @property
-    def name(self) -> str | None:
-        """The main name, if any."""
-        return self.names[0] if self.names else None
 
 
 class Written(NamedTuple):
@@ -49,134 +32,9 @@ class Written(NamedTuple):
     bytes: int
 
 
-def labels(native: list[tuple[int, list[str]]]) -> list[Label]:
-    """Labels of the library."""
-    return [Label(number, names) for number, names in native]
-
-
 def _names(of: list[Label]) -> dict[int, str]:
     """The main name of each number; the first one if patches of one number have several."""
     return {label.number: label.names[0] for label in reversed(of) if label.names}
-
-
-class _Layers:
-    """The ghosts of all parts, made at the first use of any."""
-
-    def __init__(self, native: _native.Mesh) -> None:
-        self._native = native
-        self._made: dict[str, list[Ghosts]] = {}
-
-    def __call__(self, by: str) -> list[Ghosts]:
-        by = arguments.one_of("by", by, ("faces", "vertices"))
-        if by not in self._made:
-            self._made[by] = self._native.ghosts(by)
-        return self._made[by]
-
-
-class Part:
-    """One part of a mesh. Shared vertices are in the arrays of each part that has them.
-
-    All arrays are read-only. They take over the memory of the library, without a copy, and are
-    made at the first use.
-    """
-
-    def __init__(self, native: _native.Mesh, rank: int, layers: _Layers) -> None:
-        # Not the `Mesh`, whose memory a circle of references would keep until the next collection.
-        self._native = native
-        self._layers = layers
-        #: The rank that made it, from 0.
-        self.rank = rank
-
-    @cached_property
-    def _arrays(self) -> _native.PartArrays:
-        return self._native.arrays(self.rank)
-
-    @cached_property
-    def _sharing(self) -> _native.PartSharing:
-        return self._native.sharing(self.rank)
-
-    @cached_property
-    def points(self) -> Floats:
-        """Coordinates, (n, 3)."""
-        return self._arrays.points
-
-    @cached_property
-    def tets(self) -> Ints:
-        """Indices of points, (m, 4); positively oriented: det(v1 - v0, v2 - v0, v3 - v0) > 0."""
-        return self._arrays.tets
-
-    @cached_property
-    def bodies(self) -> Ints:
-        """The body number of each tet, (m,)."""
-        return self._arrays.bodies
-
-    @cached_property
-    def faces(self) -> Ints:
-        """Triangles on patches, (k, 3); their right-hand normals point out of the inner body.
-
-        A triangle between two parts is in the arrays of both.
-        """
-        return self._arrays.faces
-
-    @cached_property
-    def face_tags(self) -> Ints:
-        """The boundary number of each face, (k,), as in files."""
-        return self._arrays.face_tags
-
-    @cached_property
-    def face_patches(self) -> Ints:
-        """The patch of each face, (k,), as an index of `Mesh.patches`."""
-        return self._arrays.face_patches
-
-    @cached_property
-    def face_bodies(self) -> Ints:
-        """Numbers of the bodies of this part behind and in front of each face, (k, 2); 0: none."""
-        return self._arrays.face_bodies
-
-    @cached_property
-    def global_ids(self) -> Ids:
-        """The id of each vertex in the whole mesh: from 0, without gaps."""
-        return self._arrays.vertex_ids
-
-    @cached_property
-    def tet_ids(self) -> Ids:
-        """The id of each tet in the whole mesh."""
-        return self._arrays.tet_ids
-
-    @cached_property
-    def owners(self) -> Ints:
-        """The rank that owns each vertex: one of those that share it."""
-        return self._sharing.owners
-
-    @cached_property
-    def shared(self) -> Ints:
-        """The vertices that other parts have too, ascending."""
-        return self._sharing.vertices
-
-    @property
-    def holders(self) -> tuple[Ids, Ints]:
-        """The ranks of each shared vertex: `ranks[offsets[i]:offsets[i + 1]]` those of `shared[i]`."""
-        return self._sharing.offsets, self._sharing.ranks
-
-    @property
-    def neighbours(self) -> dict[int, Ints]:
-        """By rank, the vertices shared with it; both ranks list them in the same order."""
-        return dict(self._sharing.neighbours)
-
-    def ghosts(self, by: Literal["faces", "vertices"] = "faces") -> Ghosts:
-        """The tets of other parts that share a face or a vertex with this one.
-
-        Their vertices are numbered as in this part, followed by `points` of the ghosts.
-        """
-        return self._layers(by)[self.rank]
-
-    def blocks(self, size: int = 1 << 16) -> Iterator[Block]:
-        """The tets in blocks of `size` or somewhat more: see `Mesh.blocks`."""
-        return self._native.blocks(self.rank, arguments.whole("size", size, 1, 2**31 - 1))
-
-    def __repr__(self) -> str:
-        vertices, tets, faces = self._native.counts(self.rank)
-        return f"<tetmill.Part {self.rank}: {vertices:,} vertices, {tets:,} tets, {faces:,} faces>"
 
 
 class Mesh:
@@ -184,22 +42,43 @@ class Mesh:
 
     The arrays of a mesh of one part are those of the part: made by the library, read-only, and
     not copied. Those of several parts are joined by global ids, which copies them.
+
+    A mesh across processes (`comm`) has its own parts in each of them, and its arrays are those of
+    the part of this process: local, with local indices. Counts, names, report and checksum are
+    those of the whole mesh. `check`, `write`, `picture` and `plot` are *Collective* then: all
+    processes must call them.
     """
 
-    def __init__(self, native: _native.Mesh) -> None:
+    def __init__(self, native: _native.Mesh, comm: MPI.Comm | None = None) -> None:
         self._native = native
+        #: The communicator that the mesh was made on, if any.
+        self.comm = comm
 
     @cached_property
     def parts(self) -> list[Part]:
-        """The parts, by rank."""
-        layers = _Layers(self._native)
-        return [Part(self._native, rank, layers) for rank in range(self._native.count())]
+        """The parts, by rank; those of this process if the mesh is across processes."""
+        layers = Layers(self._native)
+        return [Part(self._native, index, rank, layers) for index, rank in enumerate(self._native.own())]
+
+    @property
+    def part_count(self) -> int:
+        """The number of parts of the whole mesh."""
+        return self._native.count()
+
+    @property
+    def _only(self) -> Part | None:
+        """The part whose arrays are those of the mesh; None if parts must be joined."""
+        if len(self.parts) == 1:
+            return self.parts[0]
+        if self.comm is not None and self.comm.size > 1:
+            raise RuntimeError(f"this process has {len(self.parts)} parts: use the arrays of Mesh.parts")
+        return None
 
     @cached_property
     def points(self) -> Floats:
         """Coordinates, (n, 3)."""
-        if len(self.parts) == 1:
-            return self.parts[0].points
+        if self._only is not None:
+            return self._only.points
         points = np.empty((self._native.totals()[0], 3))
         for part in self.parts:
             points[part.global_ids] = part.points
@@ -216,21 +95,21 @@ class Mesh:
     @cached_property
     def tets(self) -> Ints | Ids:
         """Indices of points, (m, 4); positively oriented: det(v1 - v0, v2 - v0, v3 - v0) > 0."""
-        if len(self.parts) == 1:
-            return self.parts[0].tets
+        if self._only is not None:
+            return self._only.tets
         ids = _index_type(len(self.points))
         return self._by_tet(lambda part: part.global_ids[part.tets].astype(ids, copy=False), (4,))
 
     @cached_property
     def bodies(self) -> Ints:
         """The body number of each tet, (m,)."""
-        return self.parts[0].bodies if len(self.parts) == 1 else self._by_tet(lambda part: part.bodies, ())
+        return self._by_tet(lambda part: part.bodies, ()) if self._only is None else self._only.bodies
 
     @cached_property
     def _faces(self) -> tuple[NDArray[Any], Ints, Ints]:
         """The triangles of all parts, each once, with tags and patches."""
-        if len(self.parts) == 1:
-            part = self.parts[0]
+        part = self._only
+        if part is not None:
             return part.faces, part.face_tags, part.face_patches
         ids = _index_type(len(self.points))
         faces = np.concatenate([part.global_ids[part.faces] for part in self.parts])
@@ -270,6 +149,14 @@ class Mesh:
         """Names by boundary number; `patches` has all names."""
         return _names(self.patches)
 
+    def numbers_named(self, name: str) -> list[int]:
+        """The boundary numbers of a name, as in `face_tags` and in files. Other names may have them, too.
+
+        Raises:
+            InputError: If no boundary has the name; the message lists the names.
+        """
+        return sorted({self.patches[patch].number for patch in self._native.patches_named(name)})
+
     def faces_named(self, name: str) -> NDArray[np.intp]:
         """The indices of the faces on a boundary.
 
@@ -279,8 +166,15 @@ class Mesh:
         return np.flatnonzero(np.isin(self.face_patches, self._native.patches_named(name)))
 
     def vertices_named(self, name: str) -> Ints | Ids:
-        """The vertices of the faces on a boundary, ascending, for Dirichlet data."""
-        return _frozen(np.unique(self.faces[self.faces_named(name)]))
+        """The vertices on a boundary, ascending, for Dirichlet data.
+
+        *Collective* if the mesh is across processes: a part may have vertices on a boundary of
+        which only other parts have faces.
+        """
+        patches = self._native.patches_named(name)
+        if self._only is None:
+            return _frozen(np.unique(self.faces[self.faces_named(name)]))
+        return self._native.vertices_on(patches)[0]
 
     def tets_named(self, name: str) -> NDArray[np.intp]:
         """The indices of the tets of a body.
@@ -316,7 +210,10 @@ class Mesh:
         return self._native.checksum()
 
     def quality(self) -> dict[str, Any]:
-        """The shapes of all tets, with the keys of `tetmill quality --json`."""
+        """The shapes of all tets, with the keys of `tetmill quality --json`.
+
+        If the mesh is across processes, of the tets of this one; `report` has those of all.
+        """
         measured = dict(arguments.as_dict(self._native.quality()))
         del measured["mesh"], measured["notes"]
         return measured
@@ -397,7 +294,7 @@ class Mesh:
             plane = arguments.positions("cut", [list(cut)], 6)[0]
             if not plane[3:].any():
                 raise ValueError("cut has a normal of length 0")
-        chosen = color_by or ("part" if len(self.parts) > 1 else "patch")
+        chosen = color_by or ("part" if self.part_count > 1 else "patch")
         view = {
             "width": arguments.whole("width", width, 1, 20_000),
             "height": arguments.whole("height", height, 1, 20_000),
@@ -419,7 +316,7 @@ class Mesh:
 
     def __repr__(self) -> str:
         vertices, tets, faces = self._native.totals()
-        parts = "" if len(self.parts) == 1 else f" in {len(self.parts)} parts"
+        parts = "" if self.part_count == 1 else f" in {self.part_count} parts"
         return f"<tetmill.Mesh: {vertices:,} vertices, {tets:,} tets, {faces:,} faces{parts}>"
 
     def _repr_html_(self) -> str:
@@ -429,7 +326,7 @@ class Mesh:
             "vertices": f"{vertices:,}",
             "tets": f"{tets:,}",
             "faces": f"{faces:,}",
-            "parts": str(len(self.parts)),
+            "parts": str(self.part_count),
             "volume": f"{mesh['volume']:.6g}",
             "dihedral angles": f"{mesh['smallest_dihedral']:.1f}° to {mesh['largest_dihedral']:.1f}°",
             "bodies": ", ".join(self.body_names.values()),
@@ -470,6 +367,34 @@ class Mesh:
         from . import adapters
 
         return adapters.to_mfem(self)
+
+    # Those that take a part from each process.
+
+    def to_dolfinx(
+        self, ghost_mode: Literal["none", "shared_facet", "shared_vertex"] = "none"
+    ) -> DolfinxMesh:
+        """A mesh of DOLFINx with its tags, on `comm` or in this process alone. *Collective.*
+
+        Each tet stays in its process. Tags are the numbers of bodies and boundaries, which
+        `numbers_named` finds. Versions 0.5 and later.
+
+        Args:
+            ghost_mode: Which cells of other processes are ghosts, by DOLFINx's names.
+        """
+        from ._distributed import to_dolfinx
+
+        return to_dolfinx(self, ghost_mode)
+
+    def to_dmplex(self) -> Any:
+        """An interpolated `petsc4py.PETSc.DMPlex`, on `comm` or in this process alone. *Collective.*
+
+        Each tet stays in its process. The labels "Cell Sets" and "Face Sets" have the numbers of
+        bodies and boundaries, which `numbers_named` finds. A face of a boundary has its label in
+        each process that has the face; `DMPlex.labelComplete` adds edges and vertices.
+        """
+        from ._distributed import to_dmplex
+
+        return to_dmplex(self)
 
 
 def _index_type(count: int) -> type[np.int32] | type[np.int64]:

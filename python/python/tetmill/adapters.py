@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ._faces import positions
+
 if TYPE_CHECKING:
     from ._mesh import Mesh
 
@@ -27,24 +29,11 @@ def to_skfem(mesh: Mesh) -> Any:
         validate=False,
     )
     names = dict.fromkeys(name for label in mesh.patches for name in label.names)
-    of_faces = _skfem_facets(made, mesh)
+    # The facet of scikit-fem that each face is.
+    of_faces = positions(mesh.faces, made.facets.T, len(mesh.points))
     boundaries = {name: of_faces[mesh.faces_named(name)] for name in names}
     bodies = {name: mesh.tets_named(name) for name in mesh.body_names.values()}
     return made.with_boundaries(boundaries).with_subdomains(bodies)
-
-
-def _skfem_facets(made: Any, mesh: Mesh) -> Any:
-    """The facet of scikit-fem that each face is."""
-    count = len(mesh.points)
-
-    def keys(triangles: Any) -> Any:
-        a, b, c = np.sort(np.asarray(triangles, dtype=np.int64), axis=0)
-        # Each pair of vertices as one number; the third distinguishes faces at an edge.
-        return np.rec.fromarrays([a * count + b, c])
-
-    facets = keys(made.facets)
-    order = np.argsort(facets)
-    return order[np.searchsorted(facets[order], keys(mesh.faces.T))]
 
 
 def to_meshio(mesh: Mesh) -> Any:

@@ -35,13 +35,13 @@ impl<'c, P: Deref<Target = dyn Communicator + 'c>> Group<P> {
     }
 
     /// *Local.* The processes; `None` if all ranks are threads of this one.
-    pub fn processes(&self) -> Option<&(dyn Communicator + 'c)> {
-        self.processes.as_deref()
+    pub fn processes(&self) -> Option<&P> {
+        self.processes.as_ref()
     }
 
     /// *Local.* Whether this process has rank 0: it gives the geometry.
     pub fn is_first(&self) -> bool {
-        self.processes().is_none_or(|processes| processes.rank() == 0)
+        self.processes.as_deref().is_none_or(|processes| processes.rank() == 0)
     }
 
     /// **Collective** over the processes. Runs `body` on each rank; returns the results of this
@@ -54,7 +54,7 @@ impl<'c, P: Deref<Target = dyn Communicator + 'c>> Group<P> {
         T: Send,
         E: HasKind + From<CommError> + Send,
     {
-        let Some(processes) = self.processes() else { return thread::try_run(self.ranks, body) };
+        let Some(processes) = self.processes.as_deref() else { return thread::try_run(self.ranks, body) };
         if processes.size() == self.ranks {
             return processes.agree(body(processes)).map(|result| vec![result]);
         }
@@ -70,7 +70,7 @@ impl<'c, P: Deref<Target = dyn Communicator + 'c>> Group<P> {
     pub fn share<T: Serialize + DeserializeOwned>(&self, mine: Option<T>) -> Result<T, CommError> {
         const ROOT: Rank = 0;
         let nothing = "process 0 has a rank";
-        let Some(processes) = self.processes() else { return Ok(mine.expect(nothing)) };
+        let Some(processes) = self.processes.as_deref() else { return Ok(mine.expect(nothing)) };
         let mut bytes = serde_json::to_vec(&mine).expect("plain data");
         processes.broadcast_bytes(ROOT, &mut bytes)?;
         let shared: Option<T> = serde_json::from_slice(&bytes).expect("as process 0 wrote it");
