@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Installs the programs that the tests need besides Rust: MPI, libclang (for its bindings), TetGen,
-# CMake and PETSc for the C interface, Python with numpy, and Python modules that read our files:
-# Gmsh, NGSolve with NETGEN, meshio, scikit-fem, MFEM. Uses apt on Debian and Ubuntu; elsewhere it
+# CMake and PETSc for the C interface, DOLFINx and PETSc for the system's Python, and Python modules
+# that read our files: numpy, Gmsh, NGSolve with NETGEN, meshio, scikit-fem, MFEM. Uses apt on Debian and Ubuntu; elsewhere it
 # lists the missing packages. Does nothing if all are installed.
 set -euo pipefail
 
@@ -19,6 +19,10 @@ if command -v apt-get >/dev/null; then
     command -v tetgen >/dev/null || missing+=(tetgen)
     command -v cmake >/dev/null || missing+=(cmake)
     pkg-config --exists PETSc 2>/dev/null || missing+=(petsc-dev)
+    # Python of the system: pip's numpy is too new for its DOLFINx.
+    for module in dolfinx petsc4py mpi4py pytest; do
+        /usr/bin/python3 -c "import $module" 2>/dev/null || missing+=("python3-$module")
+    done
     python3 -m pip --version >/dev/null 2>&1 || missing+=(python3-pip)
     # System libraries of the wheels of Gmsh and NETGEN.
     libraries=$(PATH=$PATH:/sbin:/usr/sbin ldconfig -p)

@@ -43,6 +43,8 @@ mod _native {
     #[pymodule_export]
     use crate::mesh::Mesh;
     #[pymodule_export]
+    use crate::ranks::test_processes;
+    #[pymodule_export]
     use crate::size::Grid;
 
     use super::*;

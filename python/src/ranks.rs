@@ -161,6 +161,14 @@ impl Deref for Processes {
     }
 }
 
+/// **Collective.** The conformance suite of communicators, for the tests.
+#[pyfunction]
+pub fn test_processes(py: Python<'_>, processes: &Bound<'_, PyAny>) -> PyResult<()> {
+    let processes = Processes::new(processes)?;
+    py.detach(|| tetmill::internals::conformance::conformance(&processes));
+    Ok(())
+}
+
 /// **Collective** over the processes. Returns `mine` if no process has a failure, so that none waits
 /// for one that has returned.
 pub fn agree<T: Send>(py: Python<'_>, ranks: &Ranks, mine: Result<T, Failure>) -> PyResult<T> {

@@ -203,3 +203,35 @@ def test_progress_reports_each_stage_in_order(ball):
     for stage in stages:
         fractions = [fraction for of, fraction in seen if of == stage]
         assert fractions == sorted(fractions) and fractions[0] == 0 and fractions[-1] == 1
+
+
+def test_levels_lead_to_the_coarse_mesh(ball):
+    mesh = ball.generate(maxh=0.5, levels=3, parts=2, nested=True)
+    for part in mesh.parts:
+        levels = part.levels()
+        assert [level.pieces for level in levels] == [1, 2, 4, 8]
+        assert levels[0].vertex_parents is None and levels[0].tet_parents is None
+        for coarse, fine in zip(levels, levels[1:]):
+            # Interpolation of a linear function, up to the curvature of the ball.
+            middle = coarse.points[fine.vertex_parents].mean(axis=1)
+            assert np.linalg.norm(middle - fine.points, axis=1).max() < 0.3 / coarse.pieces**2
+            assert (np.bincount(fine.tet_parents, minlength=len(coarse.tets)) == 8).all()
+            assert set(fine.neighbours) == set(part.neighbours)
+        assert (levels[-1].points == part.points).all() and (levels[-1].tets == part.tets).all()
+        assert (levels[-1].owners == part.owners).all()
+
+
+def test_only_refined_meshes_have_levels(ball):
+    mesh = ball.generate(maxh=0.5, levels=1, parts=2, method="surface")
+    with pytest.raises(ValueError, match="refine"):
+        mesh.parts[0].levels()
+    assert ball.generate(maxh=0.5, levels=1).parts[0].levels()[1].tet_parents is None
+
+
+def test_numbers_of_names(core_and_shell):
+    mesh = core_and_shell.generate(maxh=0.5, parts=2)
+    (number,) = mesh.numbers_named("outside")
+    assert mesh.face_names[number] == "outside"
+    assert mesh.part_count == 2 and len(mesh.ghosts()) == 2
+    on_sphere = np.flatnonzero(np.linalg.norm(mesh.points, axis=1) > 1 - 1e-9)
+    assert (mesh.vertices_named("outside") == on_sphere).all()

@@ -40,7 +40,7 @@ def _part(mesh: Mesh) -> Part | None:
     return mesh.parts[0]
 
 
-def _from_owners(part: Part, comm: MPI.Comm, values: Ids) -> Ids:
+def _from_owners(part: Part, comm: MPI.Intracomm, values: Ids) -> Ids:
     """The values of vertices, which are right where this process owns them, right everywhere."""
     from mpi4py import MPI
 
@@ -57,7 +57,7 @@ def _from_owners(part: Part, comm: MPI.Comm, values: Ids) -> Ids:
     return values
 
 
-def _by_owner(mesh: Mesh, part: Part | None, comm: MPI.Comm) -> tuple[Ids, Floats]:
+def _by_owner(mesh: Mesh, part: Part | None, comm: MPI.Intracomm) -> tuple[Ids, Floats]:
     """The global number of each vertex, where each process owns successive ones, and their coordinates."""
     if part is None or comm.size == 1:
         return np.arange(len(mesh.points)), mesh.points
@@ -69,7 +69,7 @@ def _by_owner(mesh: Mesh, part: Part | None, comm: MPI.Comm) -> tuple[Ids, Float
     return _from_owners(part, comm, numbers), part.points[own]
 
 
-def _destinations(part: Part | None, comm: MPI.Comm, count: int, by: str) -> tuple[Ints, Ints]:
+def _destinations(part: Part | None, comm: MPI.Intracomm, count: int, by: str) -> tuple[Ints, Ints]:
     """The ranks that get each cell as a list in CSR form: first this one, then those with it as a ghost."""
     cells, ranks = np.arange(count), np.full(count, comm.rank)
     if part is not None and by in _GHOSTS and comm.size > 1:
@@ -206,7 +206,8 @@ def _plex_faces(plex: Any, cells: int, mesh: Mesh) -> Ids:
     first_edge, first_face = plex.getDepthStratum(1)[0], plex.getDepthStratum(2)[0]
     # The edges of a face have each vertex twice.
     ends = by_depth[1][by_depth[2] - first_edge].reshape(-1, 6) - cells
-    return first_face + positions(mesh.faces, np.sort(ends, axis=1)[:, ::2], len(mesh.points))
+    found: Ids = first_face + positions(mesh.faces, np.sort(ends, axis=1)[:, ::2], len(mesh.points))
+    return found
 
 
 def _label(plex: Any, name: str, points: Ids, values: Ints) -> None:

@@ -222,7 +222,7 @@ class Geometry:
         return geometry
 
     @classmethod
-    def on_first(cls, comm: MPI.Comm, make: Callable[[], Geometry]) -> Geometry:
+    def on_first(cls, comm: MPI.Intracomm, make: Callable[[], Geometry]) -> Geometry:
         """*Collective.* The geometry that `make` returns in process 0, where alone it is called.
 
         For files that only process 0 can read, or that are large. The result of other processes
@@ -302,7 +302,7 @@ class Geometry:
         planes_from: ArrayLike | None = None,
         memory: float | None = None,
         progress: bool | ProgressFunction | None = None,
-        comm: MPI.Comm | None = None,
+        comm: MPI.Intracomm | None = None,
     ) -> Mesh:
         """Makes a mesh. Options have the names and defaults of the command line.
 
@@ -380,13 +380,11 @@ class Geometry:
             }
 
         if comm is None:
-            given = options()
-            given["processes"] = None
+            mesh = Mesh(_native.generate(self._here, {**options(), "processes": None}))
         else:
             processes = communicator(comm)
-            given = agreed(processes, options)
-            given["processes"] = Processes(processes)
-        mesh = Mesh(_native.generate(self._native, given), comm)
+            given = {**agreed(processes, options), "processes": Processes(processes)}
+            mesh = Mesh(_native.generate(self._native, given), comm)
         warn(mesh.notes)
         return mesh
 

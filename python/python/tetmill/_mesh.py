@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from . import _arguments as arguments
 from . import _native
-from ._parts import Block, Floats, Ids, Ints, Label, Layers, Part, labels
+from ._parts import Block, Floats, Ghosts, Ids, Ints, Label, Layers, Part, labels
 
 if TYPE_CHECKING:
     from IPython.display import Image
@@ -49,16 +49,20 @@ class Mesh:
     processes must call them.
     """
 
-    def __init__(self, native: _native.Mesh, comm: MPI.Comm | None = None) -> None:
+    def __init__(self, native: _native.Mesh, comm: MPI.Intracomm | None = None) -> None:
         self._native = native
+        self._layers = Layers(native)
         #: The communicator that the mesh was made on, if any.
         self.comm = comm
 
     @cached_property
     def parts(self) -> list[Part]:
         """The parts, by rank; those of this process if the mesh is across processes."""
-        layers = Layers(self._native)
-        return [Part(self._native, index, rank, layers) for index, rank in enumerate(self._native.own())]
+        return [Part(self._native, index, rank, self._layers) for index, rank in enumerate(self._native.own())]
+
+    def ghosts(self, by: Literal["faces", "vertices"] = "faces") -> list[Ghosts]:
+        """The ghosts of each part of `parts`, see `Part.ghosts`. *Collective* at the first use of each kind."""
+        return self._layers(by)
 
     @property
     def part_count(self) -> int:

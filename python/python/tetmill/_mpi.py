@@ -238,10 +238,10 @@ def communicator(comm: Any) -> MPI.Intracomm:
         raise ImportError("comm needs the package mpi4py, for the MPI library that starts this program") from missing
     if hasattr(comm, "tompi4py"):
         comm = comm.tompi4py()
+    if isinstance(comm, MPI.Comm) and comm == MPI.COMM_NULL:
+        raise ValueError("comm is MPI.COMM_NULL: this process is not in the communicator")
     if not isinstance(comm, MPI.Intracomm):
         raise TypeError(f"comm must be a communicator of mpi4py, such as MPI.COMM_WORLD, not {comm!r}")
-    if comm == MPI.COMM_NULL:
-        raise ValueError("comm is MPI.COMM_NULL: this process is not in the communicator")
     if MPI.Query_thread() < MPI.THREAD_SERIALIZED and not MPI.Is_thread_main():
         raise RuntimeError("MPI was initialised for one thread: make meshes in that one")
     return comm
