@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
 # Tests the C interface: header, installation, examples and wrong use, with address sanitiser, and MPI and PETSc if they are there.
+# MFEM_DIR may name a folder with a parallel build of MFEM, 4.8 or later.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 root=$PWD
@@ -152,6 +153,20 @@ if command -v mpicc >/dev/null && command -v mpirun >/dev/null; then
         ok "DMPlex of PETSc on 1, 2 and 4 ranks"
     else
         skipped "no PETSc (apt install petsc-dev), so no DMPlex"
+    fi
+    if [ -e "${MFEM_DIR:-}/config/config.mk" ]; then
+        mfem() { printf 'include %s\nprint:\n\t@echo $(MFEM_%s)\n' "$MFEM_DIR/config/config.mk" "$1" | make -s -f - print; }
+        # shellcheck disable=SC2046
+        compile mpicxx c++17 "$work/mpi" capi/examples/mfem_poisson.cpp "$work/mfem_poisson" -isystem "$MFEM_DIR" \
+            $(mfem TPLFLAGS | sed 's/-I/-isystem /g') -L"$MFEM_DIR" -lmfem $(mfem EXT_LIBS)
+        for ranks in 1 2 4; do
+            mpirun -n $ranks "$work/mfem_poisson" > "$work/mfem.$ranks"
+            same_errors "$work/mfem.1" "$work/mfem.$ranks"
+        done
+        cat "$work/mfem.4"
+        ok "ParMesh of MFEM on 1, 2 and 4 ranks"
+    else
+        skipped "MFEM_DIR does not name a build of MFEM, so ParMesh does not read the text on several ranks"
     fi
 else
     skipped "no MPI, so nothing runs across processes"

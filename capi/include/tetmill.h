@@ -121,7 +121,7 @@ typedef struct tetmill_mesh tetmill_mesh;
 typedef struct tetmill_options tetmill_options;
 
 /**
- * One part of a mesh.
+ * One part of a mesh, or a refinement level of it (tetmill_part_level).
  *
  * Its arrays are made when they are first requested, and borrowed until the mesh is freed. Local
  * indices of vertices are positions in the array of points.
@@ -364,6 +364,43 @@ tetmill_status tetmill_part_ghost_owners(const tetmill_part *part,
                                          size_t *count);
 
 /**
+ * The number of refinement levels of a part, the coarse mesh and the part itself included.
+ *
+ * TETMILL_STATUS_USAGE unless the mesh was made by the method `refine`. The levels are made now:
+ * the coarser ones have a seventh of the part's tets together.
+ */
+tetmill_status tetmill_part_level_count(const tetmill_part *part, size_t *count);
+
+/**
+ * A refinement level of a part, by its index from 0, the coarsest. Valid until the mesh is freed.
+ *
+ * It is a part itself: the functions for arrays, owners and sharing take it, those for ghosts,
+ * MFEM's text and levels do not. All levels are on the geometry: vertices move when a level is
+ * refined.
+ */
+tetmill_status tetmill_part_level(const tetmill_part *part,
+                                  size_t index,
+                                  const tetmill_part **level);
+
+/**
+ * The two vertices of the level before that each vertex of a level is between, two local indices
+ * for each of `count` vertices; twice the same for a vertex of both levels.
+ *
+ * Linear interpolation is the mean of the values of both. Parents are in the same part.
+ */
+tetmill_status tetmill_level_vertex_parents(const tetmill_part *level,
+                                            const uint32_t **parents,
+                                            size_t *count);
+
+/**
+ * The tet of the level before that each tet of a level is in, by its index in the part. `count` is
+ * 0 unless the option `nested` was set.
+ */
+tetmill_status tetmill_level_tet_parents(const tetmill_part *level,
+                                         const uint64_t **parents,
+                                         size_t *count);
+
+/**
  * Frees a mesh with its parts and all arrays borrowed from them; NULL is ignored.
  *
  * After tetmill_generate_comm, *Collective* unless MPI is finalised.
@@ -449,7 +486,7 @@ tetmill_status tetmill_mesh_patches_named(const tetmill_mesh *mesh,
                                           size_t *count);
 
 /**
- * *Collective.* Makes MFEM's parallel text (v1.2) of each part, which tetmill_part_mfem returns.
+ * *Collective.* Makes MFEM's parallel text of each part, which tetmill_part_mfem returns.
  *
  * Needs about 150 bytes a tet while it runs, and about 60 until the mesh is freed.
  */

@@ -58,7 +58,7 @@ pub unsafe extern "C" fn tetmill_mesh_find_ghosts(mesh: Option<&Mesh>, by: c_int
         let (by, place) = kind(by)?;
         on_ranks(group, |comm| {
             let part = own(parts, comm.rank(), Part::rank);
-            let ghosts = part.made.ghosts(comm, by)?;
+            let ghosts = part.made()?.ghosts(comm, by)?;
             part.ghosts[place].get_or_init(|| ghosts.into());
             Ok(())
         })?;

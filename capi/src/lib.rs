@@ -10,7 +10,7 @@
 //! pointers   the only place that reads or writes the memory of the caller
 //! geometry, options, callbacks     what is meshed, and how
 //! group      the ranks of a mesh: threads of this process, or processes of an MPI job
-//! mesh, part, sharing, ghosts      what was made
+//! mesh, part, levels, sharing, ghosts      what was made
 //! mpi        `tetmill_generate_comm`
 //! ```
 // Each function's contract about pointers is the same, and stated once, at the top of the header.
@@ -24,6 +24,7 @@ mod generate;
 mod geometry;
 mod ghosts;
 mod group;
+mod levels;
 mod mesh;
 mod mfem;
 #[cfg(feature = "mpi")]

@@ -9,7 +9,7 @@ use std::ffi::c_char;
 use tetmill::Error;
 use tetmill::files::mfem::part_text;
 
-/// *Collective.* Makes MFEM's parallel text (v1.2) of each part, which tetmill_part_mfem returns.
+/// *Collective.* Makes MFEM's parallel text of each part, which tetmill_part_mfem returns.
 ///
 /// Needs about 150 bytes a tet while it runs, and about 60 until the mesh is freed.
 #[unsafe(no_mangle)]
@@ -18,8 +18,8 @@ pub unsafe extern "C" fn tetmill_mesh_make_mfem(mesh: Option<&Mesh>) -> Status {
         let Mesh { parts, group, .. } = given(mesh, "mesh")?;
         on_ranks(group, |comm| {
             let part = own(parts, comm.rank(), Part::rank);
-            let with_edges = part.made.with_edges_and_faces(comm)?;
-            let text = part_text(&with_edges, &part.made.names).map_err(Error::from);
+            let with_edges = part.made()?.with_edges_and_faces(comm)?;
+            let text = part_text(&with_edges, &part.made()?.names).map_err(Error::from);
             let mut text = comm.agree(text)?;
             text.push(0);
             part.mfem.get_or_init(|| text);

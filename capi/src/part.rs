@@ -1,25 +1,36 @@
 //! The arrays of a part.
 
-use crate::fault::{Status, guard};
+use crate::fault::{Fault, Status, guard};
 use crate::ghosts::GhostArrays;
+use crate::levels::Parents;
 use crate::pointers::{given, store, store_array};
 use crate::sharing::SharingArrays;
-use std::sync::OnceLock;
-use tetmill::Generated;
-use tetmill::mesh::{Arrays, GlobalId};
+use std::sync::{Arc, OnceLock};
+use tetmill::mesh::{Arrays, GlobalId, MeshStream};
+use tetmill::{Generated, Hierarchy};
 
-/// One part of a mesh.
+/// One part of a mesh, or a refinement level of it (tetmill_part_level).
 ///
 /// Its arrays are made when they are first requested, and borrowed until the mesh is freed. Local
 /// indices of vertices are positions in the array of points.
 pub struct Part {
-    pub made: Generated,
+    source: Source,
+    /// `None` inside if the part has no levels.
+    pub levels: OnceLock<Option<Vec<Part>>>,
+    /// The parents of a level's vertices and tets.
+    pub parents: OnceLock<Parents>,
     arrays: OnceLock<FlatArrays>,
     sharing: OnceLock<SharingArrays>,
     /// By faces, by vertices.
     pub ghosts: [OnceLock<GhostArrays>; 2],
     /// MFEM's text with a NUL at its end.
     pub mfem: OnceLock<Vec<u8>>,
+}
+
+/// Where the arrays of a part come from.
+enum Source {
+    Finest(Box<Generated>),
+    Level(Arc<Hierarchy>, usize),
 }
 
 /// `Arrays` with plain numbers.
@@ -57,8 +68,19 @@ impl From<Arrays> for FlatArrays {
 
 impl Part {
     pub fn new(made: Generated) -> Self {
+        Self::of(Source::Finest(Box::new(made)))
+    }
+
+    /// A refinement level.
+    pub fn of_level(hierarchy: Arc<Hierarchy>, level: usize) -> Self {
+        Self::of(Source::Level(hierarchy, level))
+    }
+
+    fn of(source: Source) -> Self {
         Self {
-            made,
+            source,
+            levels: OnceLock::new(),
+            parents: OnceLock::new(),
             arrays: OnceLock::new(),
             sharing: OnceLock::new(),
             ghosts: [OnceLock::new(), OnceLock::new()],
@@ -66,20 +88,43 @@ impl Part {
         }
     }
 
+    /// The part, unless it is a level.
+    pub fn made(&self) -> Result<&Generated, Fault> {
+        match &self.source {
+            Source::Finest(made) => Ok(made),
+            Source::Level(..) => Err(Fault::usage("`part` is a level of a part")),
+        }
+    }
+
+    /// The levels and this one's index, if it is one.
+    pub fn level(&self) -> Option<(&Hierarchy, usize)> {
+        match &self.source {
+            Source::Finest(_) => None,
+            Source::Level(hierarchy, level) => Some((hierarchy, *level)),
+        }
+    }
+
+    fn stream(&self) -> &dyn MeshStream {
+        match &self.source {
+            Source::Finest(made) => made.stream(),
+            Source::Level(hierarchy, level) => &*hierarchy.levels[*level],
+        }
+    }
+
     pub fn rank(&self) -> u32 {
-        self.made.stream().rank()
+        self.stream().rank()
     }
 
     pub fn vertex_count(&self) -> usize {
-        self.made.stream().counts().vertices as usize
+        self.stream().counts().vertices as usize
     }
 
     fn arrays(&self) -> &FlatArrays {
-        self.arrays.get_or_init(|| self.made.arrays().into())
+        self.arrays.get_or_init(|| Arrays::of(self.stream()).into())
     }
 
     pub fn sharing(&self) -> &SharingArrays {
-        self.sharing.get_or_init(|| SharingArrays::of(self.made.stream()))
+        self.sharing.get_or_init(|| SharingArrays::of(self.stream()))
     }
 }
 

@@ -203,6 +203,71 @@ static void right_use(const tetmill_geometry *ball) {
     tetmill_mesh_free(m);
 }
 
+/* Each level interpolates to the next one, and eight children fill each nested tet. */
+static void levels(const tetmill_geometry *ball) {
+    tetmill_options *o;
+    tetmill_mesh *m;
+    size_t count;
+    OK(tetmill_options_new(&o));
+    OK(tetmill_options_set_levels(o, 2));
+    OK(tetmill_options_set(o, "nested", "true"));
+    OK(tetmill_options_set(o, "maxh", "0.5"));
+    OK(tetmill_generate(ball, o, 2, &m));
+    for (size_t k = 0; k < 2; ++k) {
+        const tetmill_part *p, *level, *before = NULL;
+        OK(tetmill_mesh_part(m, k, &p));
+        OK(tetmill_part_level_count(p, &count));
+        if (count != 3)
+            ++failures;
+        for (size_t l = 0; l < 3; ++l, before = level) {
+            const double *x, *y;
+            const uint32_t *parents, *tets, *owners;
+            const uint64_t *parent_tets;
+            size_t points, coarse_points, fine, coarse;
+            OK(tetmill_part_level(p, l, &level));
+            OK(tetmill_part_points(level, &x, &points));
+            OK(tetmill_part_tets(level, &tets, &fine));
+            OK(tetmill_part_owners(level, &owners, &count));
+            if (count != points)
+                ++failures;
+            if (l == 0) {
+                EXPECT(tetmill_level_vertex_parents(level, &parents, &count), USAGE, "coarsest");
+                continue;
+            }
+            OK(tetmill_part_points(before, &y, &coarse_points));
+            OK(tetmill_part_tets(before, &tets, &coarse));
+            OK(tetmill_level_vertex_parents(level, &parents, &count));
+            if (count != points)
+                ++failures;
+            for (size_t v = 0; v < points; ++v)
+                for (int i = 0; i < 3; ++i) {
+                    const uint32_t a = parents[2 * v], b = parents[2 * v + 1];
+                    if (a >= coarse_points || b >= coarse_points || fabs((y[3 * a + i] + y[3 * b + i]) / 2 - x[3 * v + i]) > 0.1)
+                        ++failures;
+                }
+            OK(tetmill_level_tet_parents(level, &parent_tets, &count));
+            if (count != fine || fine != 8 * coarse || parent_tets[count - 1] >= coarse)
+                ++failures;
+        }
+        EXPECT(tetmill_part_level(p, 3, &level), USAGE, "level 3");
+        EXPECT(tetmill_level_vertex_parents(p, NULL, &count), USAGE, "coarsest");
+        OK(tetmill_part_level(p, 1, &level));
+        EXPECT(tetmill_part_level_count(level, &count), USAGE, "is a level");
+    }
+    tetmill_mesh_free(m);
+    OK(tetmill_options_set(o, "levels", NULL));
+    OK(tetmill_options_set(o, "nested", NULL));
+    OK(tetmill_options_set(o, "method", "surface"));
+    OK(tetmill_generate(ball, o, 1, &m));
+    {
+        const tetmill_part *p;
+        OK(tetmill_mesh_part(m, 0, &p));
+        EXPECT(tetmill_part_level_count(p, &count), USAGE, "refine");
+    }
+    tetmill_mesh_free(m);
+    tetmill_options_free(o);
+}
+
 int main(void) {
     tetmill_geometry *ball;
     if (tetmill_last_status() != TETMILL_STATUS_OK || *tetmill_last_error())
@@ -214,6 +279,7 @@ int main(void) {
     options(ball);
     meshes(ball);
     right_use(ball);
+    levels(ball);
     tetmill_geometry_free(ball);
     tetmill_geometry_free(NULL);
     tetmill_options_free(NULL);

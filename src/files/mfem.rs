@@ -1,7 +1,8 @@
 //! MFEM's parallel text, which `ParMesh(comm, stream)` reads on each rank.
 //!
 //! ```text
-//! MFEM mesh v1.2      dimension, elements, boundary, vertices: the part, by local index
+//! MFEM mesh v1.2      dimension, elements, boundary, vertices: the part, by local index; version
+//!                     1.3 if there are names: attribute_sets, bdr_attribute_sets
 //! mfem_serial_mesh_end
 //! communication_groups    sets of ranks; group 0 is this rank alone
 //! total_shared_...        counts of shared entities
@@ -11,14 +12,14 @@
 //! mfem_mesh_end
 //! ```
 //! An edge whose ends are both shared is not always shared, so the text needs the edges and faces
-//! of a [`DistMesh`]. The version has no names: attributes are the numbers of bodies and
-//! boundaries. Vertices of periodic faces stay separate.
+//! of a [`DistMesh`]. Attributes are the numbers of bodies and boundaries. Vertices of periodic
+//! faces stay separate.
 
 use super::text::Line;
 use super::{WriteError, body_number, patch_number};
-use crate::ground::mesh::{Names, Rank, VertexId};
+use crate::ground::mesh::{Label, Names, Rank, VertexId};
 use crate::parallel::distribution::{DistMesh, Shared};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::Write;
 
 /// MFEM's local numbers are 32-bit integers.
@@ -29,6 +30,9 @@ const TRIANGLE: u64 = 2;
 const TET: u64 = 4;
 
 /// *Local.* A part as the text that MFEM's `ParMesh(comm, stream)` reads on this rank.
+///
+/// Attribute sets have the names of bodies and boundaries, which MFEM 4.8 and later read. Older ones
+/// read the text of a mesh without names: give `Names` from which they were removed.
 ///
 /// A triangle between two parts is in the text of the part with the tet behind it, as in a mesh
 /// that MFEM partitions itself. The files of MFEM's examples are named `NAME.000000`, `NAME.000001`
@@ -55,9 +59,18 @@ pub fn part_text(part: &DistMesh, names: &Names) -> Result<Vec<u8>, WriteError> 
             return Err(WriteError::TooMany { format: "MFEM", what, count: count as u64, limit: MOST });
         }
     }
+    let sets = [&names.bodies, &names.patches].map(|labels| by_name(labels));
+    let has_names = sets.iter().any(|sets| !sets.is_empty());
     let mut text = Vec::new();
+    title(&mut text, "MFEM mesh v1.", if has_names { 3 } else { 2 });
     write_elements(part, names, &mut text)?;
+    if has_names {
+        write_sets("attribute_sets", &sets[0], &mut text);
+    }
     write_boundary(part, names, &mut text)?;
+    if has_names {
+        write_sets("bdr_attribute_sets", &sets[1], &mut text);
+    }
     write_vertices(part, &mut text);
     write_groups(part, &mut text);
     Ok(text)
@@ -76,8 +89,35 @@ fn end(line: &mut Line, vertices: &[VertexId], text: &mut Vec<u8>) {
     line.end(text);
 }
 
+/// The numbers of each name.
+fn by_name(labels: &[Label]) -> BTreeMap<&str, BTreeSet<u32>> {
+    let mut sets: BTreeMap<&str, BTreeSet<u32>> = BTreeMap::new();
+    for label in labels {
+        for name in &label.names {
+            sets.entry(name).or_default().insert(label.number);
+        }
+    }
+    sets
+}
+
+fn write_sets(section: &str, sets: &BTreeMap<&str, BTreeSet<u32>>, text: &mut Vec<u8>) {
+    title(text, &format!("\n{section}\n"), sets.len());
+    let mut line = Line::default();
+    for (name, numbers) in sets {
+        let quoted = name.replace('\\', "\\\\").replace('"', "\\\"");
+        title(text, &format!("\"{quoted}\"\n"), numbers.len());
+        for (index, &number) in numbers.iter().enumerate() {
+            if index > 0 {
+                line.blank();
+            }
+            line.int(number.into());
+        }
+        line.end(text);
+    }
+}
+
 fn write_elements(part: &DistMesh, names: &Names, text: &mut Vec<u8>) -> Result<(), WriteError> {
-    title(text, "MFEM mesh v1.2\n\ndimension\n3\n\nelements\n", part.tets.len());
+    title(text, "\ndimension\n3\n\nelements\n", part.tets.len());
     let mut line = Line::default();
     for (tet, body) in part.tets.iter().zip(&part.tet_bodies) {
         line.int(body_number(Some(*body), names)?).blank().int(TET);
@@ -185,8 +225,9 @@ mod tests {
                 distribute(comm, (comm.rank() == 0).then(|| (on_one_patch(two_tets()), vec![0, 1]))).unwrap();
             String::from_utf8(part_text(&part, &names()).unwrap()).unwrap()
         });
-        let of_rank_1 = "MFEM mesh v1.2\n\ndimension\n3\n\nelements\n1\n1 4 0 1 2 3\n\nboundary\n3\n2 2 0 1 3\n\
-            2 2 0 3 2\n2 2 1 2 3\n\nvertices\n4\n3\n1 0 0\n0 1 0\n0 0 1\n1 1 1\n\nmfem_serial_mesh_end\n\n\
+        let of_rank_1 = "MFEM mesh v1.3\n\ndimension\n3\n\nelements\n1\n1 4 0 1 2 3\n\n\
+            attribute_sets\n2\n\"lower\"\n1\n1\n\"upper\"\n1\n2\n\nboundary\n3\n2 2 0 1 3\n\
+            2 2 0 3 2\n2 2 1 2 3\n\nbdr_attribute_sets\n3\n\"between\"\n1\n3\n\"lid\"\n1\n2\n\"skin\"\n1\n1\n\nvertices\n4\n3\n1 0 0\n0 1 0\n0 0 1\n1 1 1\n\nmfem_serial_mesh_end\n\n\
             communication_groups\nnumber_of_groups 2\n\n\
             # number of entities in each group, followed by ranks in group\n1 1\n2 0 1\n\n\
             total_shared_vertices 3\ntotal_shared_edges 3\ntotal_shared_faces 1\n\n\
@@ -196,6 +237,24 @@ mod tests {
         assert!(texts[0].contains(
             "shared_vertices 3\n1\n2\n3\nshared_edges 3\n1 2\n1 3\n2 3\nshared_faces 1\n2 1 2 3\n"
         ));
+    }
+
+    #[test]
+    fn a_name_has_all_its_numbers_and_quotes_are_escaped() {
+        let labels = [Label::new(7, "a \"b\""), Label::new(2, "a \"b\""), Label::new(7, "c\\d")];
+        let mut text = Vec::new();
+        write_sets("bdr_attribute_sets", &by_name(&labels), &mut text);
+        let expected = "\nbdr_attribute_sets\n2\n\"a \\\"b\\\"\"\n2\n2 7\n\"c\\\\d\"\n1\n7\n";
+        assert_eq!(String::from_utf8(text).unwrap(), expected);
+        let text = together(1, |comm| {
+            let part = distribute(comm, Some((on_one_patch(two_tets()), vec![0, 0]))).unwrap();
+            let mut names = names();
+            names.bodies.iter_mut().chain(&mut names.patches).for_each(|label| label.names.clear());
+            part_text(&part, &names).unwrap()
+        });
+        assert!(
+            text[0].starts_with(b"MFEM mesh v1.2\n") && !String::from_utf8_lossy(&text[0]).contains("sets")
+        );
     }
 
     /// The number after a title.
