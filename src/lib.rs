@@ -150,6 +150,7 @@ pub mod error {
     pub use crate::ground::mesh::UnknownName;
     pub use crate::ground::mesh::periodic::MapError;
     pub use crate::ground::progress::Cancelled;
+    pub use crate::ground::size::BackgroundError;
     pub use crate::mesher::facets::FacetError;
     pub use crate::mesher::surface::SurfaceError;
     pub use crate::mesher::surface::curves::CurveError;

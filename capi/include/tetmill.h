@@ -563,13 +563,28 @@ tetmill_status tetmill_options_set_levels(tetmill_options *options, unsigned int
 tetmill_status tetmill_options_set_elements(tetmill_options *options, uint64_t tets);
 
 /**
- * Sets a function that limits the size of the coarse mesh by place; NULL removes it.
+ * Sets a function that limits the size of the coarse mesh by place; NULL removes it. Replaces a
+ * background mesh.
  *
  * `user` is passed to each call. Both are used while a mesh is made only.
  */
 tetmill_status tetmill_options_set_size(tetmill_options *options,
                                         tetmill_size_callback size,
                                         void *user);
+
+/**
+ * Sets sizes (length) at the points of a tetrahedral background mesh, such as those that an error
+ * estimate asks for, which limit the size of the coarse mesh: linear in each tet, outside the mesh
+ * those of its nearest point. The arrays are copied.
+ *
+ * Replaces a size function. Zero tets remove the sizes.
+ */
+tetmill_status tetmill_options_set_background(tetmill_options *options,
+                                              const double *xyz,
+                                              size_t points,
+                                              const uint32_t *vertices,
+                                              size_t tets,
+                                              const double *sizes);
 
 /**
  * Adds a size (length) at a place, from which sizes grow by the grading.

@@ -7,7 +7,7 @@ use crate::settings::Settings;
 use std::ffi::{c_char, c_uint, c_void};
 use tetmill::Point;
 use tetmill::run::CutPlane;
-use tetmill::size::Source;
+use tetmill::size::{SizeFunction, Source};
 
 /// Options of reading and meshing, with the names and defaults of the command line.
 #[derive(Debug, Default)]
@@ -70,7 +70,8 @@ pub unsafe extern "C" fn tetmill_options_set_elements(options: Option<&mut Optio
     guard(|| given(options, "options")?.0.set("elements", Some(&tets.to_string())))
 }
 
-/// Sets a function that limits the size of the coarse mesh by place; NULL removes it.
+/// Sets a function that limits the size of the coarse mesh by place; NULL removes it. Replaces a
+/// background mesh.
 ///
 /// `user` is passed to each call. Both are used while a mesh is made only.
 #[unsafe(no_mangle)]
@@ -80,7 +81,44 @@ pub unsafe extern "C" fn tetmill_options_set_size(
     user: *mut c_void,
 ) -> Status {
     guard(|| {
-        given(options, "options")?.0.size = Callback::new(size, user);
+        let options = given(options, "options")?;
+        options.0.size = Callback::new(size, user);
+        options.0.background = None;
+        Ok(())
+    })
+}
+
+/// Sets sizes (length) at the points of a tetrahedral background mesh, such as those that an error
+/// estimate asks for, which limit the size of the coarse mesh: linear in each tet, outside the mesh
+/// those of its nearest point. The arrays are copied.
+///
+/// Replaces a size function. Zero tets remove the sizes.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn tetmill_options_set_background(
+    options: Option<&mut Options>,
+    xyz: *const f64,
+    points: usize,
+    vertices: *const u32,
+    tets: usize,
+    sizes: *const f64,
+) -> Status {
+    guard(|| {
+        let options = given(options, "options")?;
+        if tets == 0 {
+            options.0.background = None;
+            return Ok(());
+        }
+        // SAFETY: the contract of the header.
+        let (xyz, vertices, sizes) = unsafe {
+            (
+                array(xyz.cast::<[f64; 3]>(), points, "xyz")?,
+                array(vertices.cast::<[u32; 4]>(), tets, "vertices")?,
+                array(sizes, points, "sizes")?,
+            )
+        };
+        let background = SizeFunction::on_mesh(xyz, vertices, sizes);
+        options.0.background = Some(background.map_err(|error| Fault::input(error.to_string()))?);
+        options.0.size = None;
         Ok(())
     })
 }

@@ -7,7 +7,7 @@ use std::str::FromStr;
 use std::sync::Arc;
 use tetmill::files::mesh_size;
 use tetmill::run::{Candidates, CutPlane, CutSettings, MAX_PIECES, PlanSettings};
-use tetmill::size::{Effort, Preset, Source};
+use tetmill::size::{Effort, Preset, SizeFunction, Source};
 use tetmill::{Error, Geometry, InputSettings, Mesher, Method};
 
 /// All options.
@@ -24,6 +24,7 @@ pub struct Settings {
     coarse: Option<u64>,
     pub sources: Vec<Source>,
     pub size: Option<Size>,
+    pub background: Option<SizeFunction>,
     // How the fine mesh is made.
     method: Option<Kind>,
     elements: Option<u64>,
@@ -242,6 +243,7 @@ impl Settings {
         mesher = with(mesher, self.size, |mesher, size| {
             mesher.size(callbacks::size_function(size, Arc::clone(refusal)))
         });
+        mesher = with(mesher, self.background.clone(), Mesher::size_function);
         mesher.sources(self.sources.iter().copied())
     }
 
@@ -272,11 +274,12 @@ impl Settings {
             || self.coarse.is_some()
             || self.mesh_size_file.is_some()
             || self.size.is_some()
+            || self.background.is_some()
             || !self.sources.is_empty();
         if is_sized && geometry.is_some_and(Geometry::is_mesh) {
             return Err(Fault::input(
                 "the geometry is a mesh already and is taken as it is: leave out the sizes (preset, maxh, minh, \
-                 grading, closeness, mesh-size-file, the size function, sources), effort and coarse",
+                 grading, closeness, mesh-size-file, size function, background mesh, sources), effort and coarse",
             ));
         }
         Ok(())

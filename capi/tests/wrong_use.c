@@ -203,6 +203,39 @@ static void right_use(const tetmill_geometry *ball) {
     tetmill_mesh_free(m);
 }
 
+/* Sizes on the points of one tet. */
+static void background(const tetmill_geometry *ball) {
+    static const double xyz[12] = {-9, -9, -9, 9, -9, -9, -9, 9, -9, -9, -9, 99};
+    static const double sizes[4] = {0.3, 0.3, 0.3, 0.3}, wrong[4] = {0.3, 0.3, -1, 0.3};
+    static const uint32_t tet[4] = {0, 1, 2, 3}, beyond[4] = {0, 1, 2, 4};
+    tetmill_options *o;
+    tetmill_mesh *m;
+    uint64_t vertices, triangles, coarse, fine;
+    OK(tetmill_options_new(&o));
+    OK(tetmill_generate(ball, o, 1, &m));
+    OK(tetmill_mesh_totals(m, &vertices, &coarse, &triangles));
+    tetmill_mesh_free(m);
+    EXPECT(tetmill_options_set_background(NULL, xyz, 4, tet, 1, sizes), USAGE, "`options`");
+    EXPECT(tetmill_options_set_background(o, NULL, 4, tet, 1, sizes), USAGE, "`xyz`");
+    EXPECT(tetmill_options_set_background(o, xyz, 4, beyond, 1, sizes), INPUT, "point 4 of 4");
+    EXPECT(tetmill_options_set_background(o, xyz, 4, tet, 1, wrong), INPUT, "size -1");
+    OK(tetmill_options_set_background(o, xyz, 4, tet, 1, sizes));
+    OK(tetmill_generate(ball, o, 1, &m));
+    OK(tetmill_mesh_totals(m, &vertices, &fine, &triangles));
+    tetmill_mesh_free(m);
+    if (fine < 2 * coarse) {
+        fprintf(stderr, "%llu tets with sizes of 0.3, %llu without\n", (unsigned long long)fine, (unsigned long long)coarse);
+        ++failures;
+    }
+    OK(tetmill_options_set_background(o, NULL, 0, NULL, 0, NULL));
+    OK(tetmill_generate(ball, o, 1, &m));
+    OK(tetmill_mesh_totals(m, &vertices, &fine, &triangles));
+    if (fine != coarse)
+        ++failures;
+    tetmill_mesh_free(m);
+    tetmill_options_free(o);
+}
+
 /* Each level interpolates to the next one, and eight children fill each nested tet. */
 static void levels(const tetmill_geometry *ball) {
     tetmill_options *o;
@@ -280,6 +313,7 @@ int main(void) {
     meshes(ball);
     right_use(ball);
     levels(ball);
+    background(ball);
     tetmill_geometry_free(ball);
     tetmill_geometry_free(NULL);
     tetmill_options_free(NULL);

@@ -45,7 +45,7 @@ mod _native {
     #[pymodule_export]
     use crate::ranks::test_processes;
     #[pymodule_export]
-    use crate::size::Grid;
+    use crate::size::{Background, Grid};
 
     use super::*;
 

@@ -1,7 +1,7 @@
-//! Sizes by place: functions of the user, and values on a grid.
+//! Sizes by place: functions of the user, values on a grid, and values on a mesh.
 
 use crate::watch::Stop;
-use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray3};
+use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use std::sync::Arc;
@@ -38,6 +38,30 @@ impl Grid {
     }
 }
 
+/// Sizes at the points of a tetrahedral mesh.
+#[pyclass(frozen, module = "tetmill._native")]
+pub struct Background(SizeFunction);
+
+#[pymethods]
+impl Background {
+    #[new]
+    fn new(
+        points: PyReadonlyArray2<'_, f64>,
+        tets: PyReadonlyArray2<'_, u32>,
+        sizes: PyReadonlyArray1<'_, f64>,
+    ) -> PyResult<Self> {
+        let (points, tets) =
+            (bytemuck::cast_slice(points.as_slice()?), bytemuck::cast_slice(tets.as_slice()?));
+        let function = SizeFunction::on_mesh(points, tets, sizes.as_slice()?);
+        function.map(Self).map_err(|error| PyValueError::new_err(error.to_string()))
+    }
+
+    /// The size at a point.
+    fn at(&self, point: [f64; 3]) -> f64 {
+        self.0.at(Point::from(point))
+    }
+}
+
 impl Field {
     fn at(&self, point: [f64; 3]) -> f64 {
         let mut cell = [0; 3];
@@ -61,11 +85,14 @@ impl Field {
     }
 }
 
-/// The size function of a grid or of a callable.
+/// The size function of a grid, a background mesh or a callable.
 pub fn function(size: &Bound<'_, PyAny>, stop: &Arc<Stop>) -> PyResult<SizeFunction> {
     if let Ok(grid) = size.cast::<Grid>() {
         let field = Arc::clone(&grid.get().field);
         return Ok(SizeFunction::new(move |point| field.at([point.x, point.y, point.z])));
+    }
+    if let Ok(background) = size.cast::<Background>() {
+        return Ok(background.get().0.clone());
     }
     let (callable, stop) = (size.clone().unbind(), Arc::clone(stop));
     Ok(SizeFunction::new(move |point| {

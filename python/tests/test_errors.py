@@ -219,3 +219,18 @@ def test_nothing_leaks():
     growth, tets = map(int, done.stdout.split())
     # Twenty leaked meshes would take more than 20 times their tets; memory is fragmented.
     assert growth < 4 * tets
+
+
+def test_wrong_background_meshes():
+    points, tets = np.eye(4)[:, :3], [[0, 1, 2, 3]]
+    for sizes, text in (
+        ([1.0, 1.0], "shape"),
+        ([1.0, 1.0, 0.0, 1.0], "point 2 of the background mesh has the size 0"),
+        ([1.0, np.nan, 1.0, 1.0], "point 1"),
+    ):
+        with pytest.raises(ValueError, match=text):
+            tetmill.Background(points, tets, sizes)
+    with pytest.raises(ValueError, match="no tets"):
+        tetmill.Background(points, np.empty((0, 4), dtype=int), np.ones(4))
+    with pytest.raises(ValueError, match="tets"):
+        tetmill.Background(points, [[0, 1, 2, 4]], np.ones(4))

@@ -235,3 +235,22 @@ def test_numbers_of_names(core_and_shell):
     assert mesh.part_count == 2 and len(mesh.ghosts()) == 2
     on_sphere = np.flatnonzero(np.linalg.norm(mesh.points, axis=1) > 1 - 1e-9)
     assert (mesh.vertices_named("outside") == on_sphere).all()
+
+
+def test_sizes_on_the_mesh_before(ball):
+    """As in a loop of adaptive refinement: fine at one pole, by sizes for each point or each tet."""
+    before = ball.generate(maxh=0.4)
+
+    def wanted(points):
+        return 0.06 + 0.3 * np.linalg.norm(points - [0, 0, 1], axis=1)
+
+    centroids = before.points[before.tets].mean(axis=1)
+    for sizes in (wanted(before.points), wanted(centroids)):
+        background = tetmill.Background.of(before, sizes)
+        mesh = ball.generate(size=background)
+        edges = mesh.points[mesh.tets[:, :2]]
+        lengths, middles = np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1), edges.mean(axis=1)
+        near, far = middles[:, 2] > 0.9, middles[:, 2] < -0.5
+        assert 2 * lengths[near].mean() < lengths[far].mean()
+        assert np.median(lengths / background(middles)) < 1.2
+    assert np.allclose(tetmill.Background.of(before, wanted(before.points))(before.points), wanted(before.points))

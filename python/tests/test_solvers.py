@@ -85,3 +85,50 @@ def test_heat_through_a_curved_interface(core_and_shell):
     levels = [core_and_shell.generate(maxh=0.4, levels=level) for level in (0, 1, 2)]
     conductivity = {"core": 5.0, "shell": 1.0}
     assert_second_order([solve(mesh, conductivity, lambda x, k: 1.0, exact, "outside") for mesh in levels])
+
+
+def test_elasticity_of_two_blocks(two_blocks):
+    """Two materials with the same displacement: its stress is continuous at the seam."""
+    first = {"left": (2.0, 1.0), "right": (5.0, 3.0)}
+
+    # u = (s(x), 0, 0) with s' = 0 at the seam, so the traction there is 0 on both sides.
+    def displacement(x):
+        return np.array([1 - np.cos(x[0]), 0 * x[0], 0 * x[0]])
+
+    def solve_elasticity(mesh):
+        grid = mesh.to_skfem()
+        basis = skfem.Basis(grid, skfem.ElementVector(skfem.ElementTetP1()))
+        constant = basis.with_element(skfem.ElementTetP0())
+        lame = []
+        for k in range(2):
+            values = constant.zeros()
+            for body, parameters in first.items():
+                values[grid.subdomains[body]] = parameters[k]
+            lame.append(constant.interpolate(values))
+
+        @skfem.BilinearForm
+        def stiffness(u, v, w):
+            def strain(of):
+                return 0.5 * (of.grad + np.swapaxes(of.grad, 0, 1))
+
+            shear = 2 * w.mu * np.einsum("ij...,ij...->...", strain(u), strain(v))
+            return w.lam * np.einsum("ii...", u.grad) * np.einsum("ii...", v.grad) + shear
+
+        @skfem.LinearForm
+        def load(v, w):
+            return -(w.lam + 2 * w.mu) * np.cos(w.x[0]) * v[0]
+
+        matrix = stiffness.assemble(basis, lam=lame[0], mu=lame[1])
+        right = load.assemble(basis, lam=lame[0], mu=lame[1])
+        dofs = basis.get_dofs(["cold", "hot", "sides"])
+        prescribed = basis.project(displacement)
+        solution = skfem.solve(*skfem.condense(matrix, right, x=prescribed, D=dofs))
+
+        @skfem.Functional
+        def square(w):
+            return ((w.u - displacement(w.x)) ** 2).sum(axis=0)
+
+        return np.sqrt(square.assemble(basis, u=basis.interpolate(solution)))
+
+    levels = [two_blocks.generate(maxh=0.6, levels=level) for level in (0, 1, 2)]
+    assert_second_order([solve_elasticity(mesh) for mesh in levels])

@@ -102,7 +102,13 @@ impl<'a> Mesher<'a> {
     /// The settings own the function, so it cannot borrow local data: `move` data into it, or share
     /// data by an [`Arc`](std::sync::Arc).
     pub fn size(self, size: impl Fn(Point) -> f64 + Send + Sync + 'static) -> Self {
-        self.with_size(|settings| settings.function = Some(SizeFunction::new(size)))
+        self.size_function(SizeFunction::new(size))
+    }
+
+    /// The same by a [`SizeFunction`], e.g. the sizes on a background mesh that an error estimate
+    /// asks for ([`SizeFunction::on_mesh`]).
+    pub fn size_function(self, size: SizeFunction) -> Self {
+        self.with_size(|settings| settings.function = Some(size))
     }
 
     /// Refines the coarse mesh this many times, each time every tet into eight: the same as

@@ -14,12 +14,13 @@ numbers and names.
 from . import csg
 from ._errors import Cancelled, Error, InputError, NoMeshError, NoteWarning, RankError, ResourceError
 from ._geometry import Entities, Geometry, SizeFunction
-from ._grid import Grid
 from ._mesh import Mesh, Written
 from ._native import __version__, set_threads
 from ._parts import Block, Ghosts, Label, Level, Part
+from ._sizes import Background, Grid
 
 __all__ = [
+    "Background",
     "Block",
     "Cancelled",
     "Entities",

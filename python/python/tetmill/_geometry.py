@@ -14,10 +14,10 @@ from numpy.typing import ArrayLike, NDArray
 from . import _arguments as arguments
 from . import _native
 from ._errors import NoteWarning
-from ._grid import Grid
 from ._mesh import Mesh
 from ._mpi import Processes, agreed, communicator
 from ._parts import Label, labels
+from ._sizes import Background, Grid
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -291,7 +291,7 @@ class Geometry:
         minh: float | None = None,
         grading: float | None = None,
         closeness: float | None = None,
-        size: SizeFunction | Grid | None = None,
+        size: SizeFunction | Grid | Background | None = None,
         sources: ArrayLike | None = None,
         mesh_size_file: Path | None = None,
         coarse: float | None = None,
@@ -323,8 +323,8 @@ class Geometry:
             grading: Growth of the size per unit of distance; by default set by the preset.
             closeness: Largest element size in thin regions, relative to their thickness; by
                 default set by the preset.
-            size: Largest element size of the coarse mesh by place: a `Grid`, or a function of
-                points of shape (n, 3) that returns (n,) sizes. The mesher needs sizes one by one,
+            size: Largest element size of the coarse mesh by place: a `Grid`, a `Background`, or a
+                function of points of shape (n, 3) that returns (n,) sizes. The mesher needs sizes one by one,
                 so it calls the function with (1, 3) points, from several threads, three or four
                 times for each coarse tet; `Grid.sample` calls it once.
             sources: Points with sizes, (n, 4), from which sizes grow by the grading.
@@ -354,8 +354,10 @@ class Geometry:
                 raise ValueError("tets chooses the sizes and the refinement: leave out levels, pieces and coarse")
             if pieces is not None and levels:
                 raise ValueError("levels and pieces exclude each other")
-            if size is not None and not (callable(size) or isinstance(size, Grid)):
-                raise TypeError(f"size must be a function or a Grid, not {size!r}; a constant size is maxh")
+            if size is not None and not callable(size):
+                raise TypeError(
+                    f"size must be a function, a Grid or a Background, not {size!r}; a constant size is maxh"
+                )
             exponent = arguments.whole("levels", levels, 0, _MOST_LEVELS)
             return {
                 "method": arguments.one_of("method", method, _METHODS),
@@ -375,7 +377,7 @@ class Geometry:
                 "sources": _rows("sources", sources, 4),
                 "effort": None if effort is None else arguments.one_of("effort", effort, _EFFORTS),
                 "coarse": arguments.count("coarse", coarse),
-                "size": size._native if isinstance(size, Grid) else size,
+                "size": size._native if isinstance(size, (Grid, Background)) else size,
                 "progress": _progress(progress),
             }
 

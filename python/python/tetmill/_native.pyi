@@ -92,6 +92,16 @@ class Grid:
     def at(self, point: Sequence[float]) -> float: ...
 
 @final
+class Background:
+    def __init__(
+        self,
+        points: NDArray[np.float64],
+        tets: NDArray[np.uint32],
+        sizes: NDArray[np.float64],
+    ) -> None: ...
+    def at(self, point: Sequence[float]) -> float: ...
+
+@final
 class Level:
     def pieces(self) -> int: ...
     def counts(self) -> tuple[int, int, int]: ...

@@ -1,5 +1,6 @@
 //! User-defined sizes.
 
+use super::background::{Background, BackgroundError};
 use crate::Point;
 use std::fmt;
 use std::sync::Arc;
@@ -14,6 +15,24 @@ impl SizeFunction {
     /// Values that are not positive, including NaN, impose no bound.
     pub fn new(function: impl Fn(Point) -> f64 + Send + Sync + 'static) -> Self {
         Self(Arc::new(function))
+    }
+
+    /// Sizes at the points of a tetrahedral mesh, such as the sizes that an error estimate of a
+    /// solution asks for: linear in each tet, and outside the mesh those of its nearest point.
+    ///
+    /// The mesh need not be valid, nor fit the geometry. Points are found by a tree of boxes, in
+    /// the time of the logarithm of the number of tets.
+    ///
+    /// # Errors
+    /// No tets, other counts, or values that are impossible.
+    pub fn on_mesh(points: &[[f64; 3]], tets: &[[u32; 4]], sizes: &[f64]) -> Result<Self, BackgroundError> {
+        let background = Background::new(points, tets, sizes)?;
+        Ok(Self::new(move |point| background.at(&point)))
+    }
+
+    /// The value at a point.
+    pub fn at(&self, point: Point) -> f64 {
+        self.0(point)
     }
 
     /// The minimum of `size` and the bound at a point.

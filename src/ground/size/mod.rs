@@ -5,6 +5,7 @@
 //! the field is Lipschitz continuous, `|size(p) − size(q)| ≤ grading·|p − q|`, except across the
 //! surface of a body with a bound of its own.
 
+mod background;
 mod function;
 mod geometric;
 mod near;
@@ -15,6 +16,7 @@ mod source_tree;
 mod sources;
 mod watched;
 
+pub use background::BackgroundError;
 pub use function::SizeFunction;
 pub use geometric::{GeometricSize, SizeSettings};
 pub(crate) use near::NearSurfaces;

@@ -1,14 +1,54 @@
-"""Sizes on a background grid."""
+"""Sizes on a background grid or mesh."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _arguments as arguments
 from . import _native
+
+if TYPE_CHECKING:
+    from ._mesh import Mesh
+
+
+class Background:
+    """Element sizes on a tetrahedral mesh, for `Geometry.generate(size=...)`.
+
+    Such as the sizes that an error estimate of the last solution asks for, on its mesh. Sizes are
+    linear in each tet; outside the mesh those of its nearest point continue.
+
+    Args:
+        points: Coordinates, (n, 3).
+        tets: Indices of points, (m, 4).
+        sizes: One for each point, (n,), or for each tet, (m,): a point then gets the mean of its
+            tets.
+    """
+
+    def __init__(self, points: ArrayLike, tets: ArrayLike, sizes: ArrayLike) -> None:
+        given = arguments.positions("points", points)
+        cells = arguments.indices("tets", tets, 4, len(given))
+        values = np.ascontiguousarray(sizes, dtype=np.float64)
+        if values.shape == (len(cells),) and len(cells) != len(given):
+            counts = np.bincount(cells.ravel(), minlength=len(given))
+            sums = np.bincount(cells.ravel(), np.repeat(values, 4), minlength=len(given))
+            # Points without tets have no influence.
+            values = np.where(counts > 0, sums, 1.0) / np.maximum(counts, 1)
+        elif values.shape != (len(given),):
+            raise ValueError(f"sizes must have the shape ({len(given)},) or ({len(cells)},), not {values.shape}")
+        self._native = _native.Background(given, cells, values)
+
+    @classmethod
+    def of(cls, mesh: Mesh, sizes: ArrayLike) -> Background:
+        """Sizes at the points or tets of a mesh of this package."""
+        return cls(mesh.points, mesh.tets, sizes)
+
+    def __call__(self, points: ArrayLike) -> NDArray[np.float64]:
+        """The sizes at points."""
+        return np.array([self._native.at(point) for point in arguments.positions("points", points).tolist()])
 
 
 def _triple(name: str, values: Sequence[float], least: float = -np.inf) -> NDArray[np.float64]:
