@@ -1,5 +1,6 @@
 //! Parts of a mesh as numpy arrays that take over the memory of the library's vectors.
 
+use crate::mesh::Mesh;
 use bytemuck::allocation::cast_vec;
 use numpy::{Element, IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
 use pyo3::exceptions::PyOverflowError;
@@ -86,6 +87,18 @@ impl PartArrays {
             face_patches: small(py, arrays.triangle_patches.into_iter().map(|patch| patch.0).collect()),
         })
     }
+}
+
+/// The addresses of a part's vectors of points and tets, and of the arrays made of them, for the
+/// tests: they are the same.
+#[pyfunction]
+pub fn test_addresses(py: Python<'_>, mesh: &Mesh) -> PyResult<([usize; 2], [usize; 2])> {
+    let made = mesh.made(0);
+    let vectors = made.arrays();
+    let given = [vectors.points.as_ptr() as usize, vectors.tets.as_ptr() as usize];
+    let arrays = PartArrays::new(py, vectors, &made.names)?;
+    let (points, tets) = (arrays.points.bind(py).data() as usize, arrays.tets.bind(py).data() as usize);
+    Ok((given, [points, tets]))
 }
 
 /// The shared vertices of one part.

@@ -29,7 +29,7 @@ use pyo3::prelude::*;
 #[pymodule]
 mod _native {
     #[pymodule_export]
-    use crate::arrays::{PartArrays, PartSharing};
+    use crate::arrays::{PartArrays, PartSharing, test_addresses};
     #[pymodule_export]
     use crate::blocks::{Block, Blocks};
     #[pymodule_export]

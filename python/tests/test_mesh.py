@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 import tetmill
 from conftest import BALL
+from tetmill import _native
 
 
 def volumes(points, tets):
@@ -254,3 +255,10 @@ def test_sizes_on_the_mesh_before(ball):
         assert 2 * lengths[near].mean() < lengths[far].mean()
         assert np.median(lengths / background(middles)) < 1.2
     assert np.allclose(tetmill.Background.of(before, wanted(before.points))(before.points), wanted(before.points))
+
+
+def test_arrays_are_the_memory_of_the_library(ball):
+    mesh = ball.generate(maxh=0.4, levels=1)
+    given, arrays = _native.test_addresses(mesh._native)
+    assert given == arrays
+    assert mesh.points is mesh.parts[0].points and mesh.tets is mesh.parts[0].tets
