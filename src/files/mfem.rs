@@ -47,7 +47,7 @@ const TET: u64 = 4;
 ///     let mesh = Mesher::new().generate_on(comm, Some(&ball))?;
 ///     Ok(mfem::part_text(&mesh.with_edges_and_faces(comm)?, &mesh.names)?)
 /// })?;
-/// assert!(texts.iter().all(|text| text.starts_with(b"MFEM mesh v1.2\n")));
+/// assert!(texts.iter().all(|text| text.starts_with(b"MFEM mesh v1.3\n")), "the body has a name");
 /// # Ok::<(), Error>(())
 /// ```
 ///

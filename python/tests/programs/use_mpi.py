@@ -4,7 +4,9 @@
 """
 
 import os
+import signal
 import sys
+import threading
 
 import numpy as np
 import tetmill
@@ -96,11 +98,21 @@ def wrong(ball):
     half.Free()
 
 
+def interrupted(ball):
+    """Ctrl-C in one process ends the run in all."""
+    if comm.rank == 0:
+        threading.Timer(0.3, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
+    kind = KeyboardInterrupt if comm.rank == 0 else tetmill.Cancelled
+    raises(kind, "", lambda: ball.generate(maxh=0.03, comm=comm))
+    assert len(ball.generate(maxh=0.5, comm=comm).parts) == 1
+
+
 folder = sys.argv[1]
 given = tetmill.Geometry.from_text(BALL)
 messages()
 arrays(given, meshes(given))
 wrong(given)
+interrupted(given)
 comm.Barrier()
 if comm.rank == 0:
     print("passed")
