@@ -11,16 +11,15 @@ use tetmill::files::mfem::part_text;
 
 /// *Collective.* Makes MFEM's parallel text of each part, which tetmill_part_mfem returns.
 ///
-/// Needs about 150 bytes a tet while it runs, and about 60 until the mesh is freed.
+/// The texts take about 60 bytes a tet until the mesh is freed.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn tetmill_mesh_make_mfem(mesh: Option<&Mesh>) -> Status {
     guard(|| {
         let Mesh { parts, group, .. } = given(mesh, "mesh")?;
         on_ranks(group, |comm| {
             let part = own(parts, comm.rank(), Part::rank);
-            let with_edges = part.made()?.with_edges_and_faces(comm)?;
-            let text = part_text(&with_edges, &part.made()?.names).map_err(Error::from);
-            let mut text = comm.agree(text)?;
+            let made = part.made()?;
+            let mut text = part_text(comm, made.stream(), &made.names).map_err(Error::from)?;
             text.push(0);
             part.mfem.get_or_init(|| text);
             Ok(())

@@ -204,6 +204,7 @@ fn disk_for(formats: &[Format], folder: &Path) -> Disk {
         Format::Msh => [65, 60, 50],
         Format::Medit => [60, 40, 30],
         Format::Vol => [58, 40, 42],
+        Format::Mfem => [50, 24, 18],
         Format::Geomview => [0, 0, 30],
         Format::None => [0; 3],
     };

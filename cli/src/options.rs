@@ -423,6 +423,8 @@ pub enum Format {
     Medit,
     /// NETGEN, DIR/NAME.vol: all parts in one file
     Vol,
+    /// MFEM, parallel: DIR/NAME.000000 and so on, one file for each part
+    Mfem,
     /// Geomview OFF: the boundary, coloured by part
     Geomview,
     /// Nothing

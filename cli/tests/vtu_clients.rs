@@ -1,8 +1,9 @@
-//! VTU files, and joined files, read by MFEM, meshio, scikit-fem, Gmsh and NGSolve.
+//! VTU files, joined files, and MFEM's parallel files, read by MFEM, meshio, scikit-fem, Gmsh and
+//! NGSolve.
 //!
 //! A test is skipped with a message if the Python module is missing.
 
-use crate::common::{own, succeed, tetmill};
+use crate::common::{own, shared, succeed, tetmill};
 use std::path::Path;
 use std::process::Command;
 
@@ -56,6 +57,36 @@ for k in range(mesh.GetNE()):
     volumes[mesh.GetAttribute(k)] += mesh.GetElementVolume(k)
 assert abs(volumes[1] - 16) < 1e-9 and abs(volumes[2] - 3.2) < 1e-9, volumes
 assert mesh.GetNBE() > 0 and mesh.CheckElementOrientation(False) == 0
+";
+    python(&["mfem.ser"], program, dir.path());
+}
+
+#[test]
+fn parts_for_mfem_fit_together_and_keep_their_names() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = |parts: u32| dir.path().join(format!("of{parts}"));
+    for (parts, method) in [(1, "refine"), (4, "refine"), (7, "refine"), (3, "surface")] {
+        let mut run = tetmill();
+        run.args(["generate", "-f", "mfem", "-q", "-n", &parts.to_string(), "--method", method]);
+        succeed(run.args(["-o", out(parts).to_str().unwrap()]).arg(own("layers")));
+        assert_eq!(std::fs::read_dir(out(parts)).unwrap().count(), parts as usize);
+        let text = std::fs::read_to_string(out(parts).join("layers.000000")).unwrap();
+        assert!(text.contains("\nattribute_sets\n3\n") && text.contains("\"film\"\n1\n2\n"));
+        match shared("tools/check_mfem.py") {
+            Some(checker) => {
+                succeed(Command::new("python3").arg(checker).arg(out(parts).join("layers")));
+            }
+            None => eprintln!("SKIPPED: there is no tools/check_mfem.py"),
+        }
+    }
+    let program = "
+import mfem.ser as mfem
+mesh = mfem.Mesh('of1/layers.000000', 1, 0)
+volumes = {n: 0 for n in (1, 2, 3)}
+for k in range(mesh.GetNE()):
+    volumes[mesh.GetAttribute(k)] += mesh.GetElementVolume(k)
+assert abs(volumes[1] - 16) < 1e-9 and abs(volumes[2] - 3.2) < 1e-9, volumes
+assert mesh.CheckElementOrientation(False) == 0 and mesh.CheckBdrElementOrientation(False) == 0
 ";
     python(&["mfem.ser"], program, dir.path());
 }

@@ -4,7 +4,7 @@ use pyo3::prelude::*;
 use std::path::PathBuf;
 use tetmill::comm::Communicator;
 use tetmill::error::Error;
-use tetmill::files::{Written, elmer, geomview, serial, vtu};
+use tetmill::files::{Written, elmer, geomview, mfem, serial, vtu};
 use tetmill::mesh::{By, MeshStream, Names, Watched, WithHalo, halo};
 use tetmill::progress::{Progress, Stage};
 
@@ -60,6 +60,7 @@ pub fn write(
             "msh" => joined(part, serial::Format::Gmsh),
             "medit" => joined(part, serial::Format::Medit),
             "vol" => joined(part, serial::Format::Netgen),
+            "mfem" => mfem::write(comm, part, names, &target.path),
             _ => geomview::write(comm, part, &geomview::Settings::default(), &target.path),
         }
     });

@@ -7,7 +7,7 @@
 //! geomview  STEM.off, or STEM.list with a file per part   the surface, a colour per part
 //! serial    FILE.{msh,mesh,vol}                           Gmsh, Medit, NETGEN: all parts in one file
 //!           FILE.{vtu,off}                                one part, format by extension
-//! mfem      a text in memory for each rank                MFEM, parallel
+//! mfem      a text for each rank, in memory or in a file  MFEM, parallel
 //! ```
 //! All writers of files use `output`: files are written to a temporary folder beside the target,
 //! and replace the old ones when every rank has finished. A writer that fails leaves the old files

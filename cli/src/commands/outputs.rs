@@ -203,6 +203,10 @@ fn entries(format: Format, folder: &Path, stem: &Path, parts: u32) -> Vec<PathBu
         (Format::Msh, _) => named(&[".msh"]),
         (Format::Medit, _) => named(&[".mesh"]),
         (Format::Vol, _) => named(&[".vol"]),
+        (Format::Mfem, parts) => {
+            let ends: Vec<String> = (0..parts).map(|rank| format!(".{rank:06}")).collect();
+            named(&ends.iter().map(String::as_str).collect::<Vec<_>>())
+        }
         (Format::Geomview, 1) => named(&[".off"]),
         (Format::Geomview, _) => named(&[".list", ".parts"]),
     }

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from ._distributed import DolfinxMesh
 
-_FORMATS = ("elmer", "vtu", "msh", "medit", "vol", "geomview")
+_FORMATS = ("elmer", "vtu", "msh", "medit", "vol", "mfem", "geomview")
 _ENDINGS = {".vtu": "vtu", ".pvtu": "vtu", ".msh": "msh", ".mesh": "medit", ".vol": "vol", ".off": "geomview"}
 
 
@@ -234,7 +234,7 @@ class Mesh:
     def write(
         self,
         path: str | os.PathLike[str],
-        format: Literal["elmer", "vtu", "msh", "medit", "vol", "geomview"] | None = None,
+        format: Literal["elmer", "vtu", "msh", "medit", "vol", "mfem", "geomview"] | None = None,
         *,
         boundary: Literal["beside", "in"] = "beside",
         halo: Literal["faces", "vertices"] | None = None,
@@ -244,7 +244,8 @@ class Mesh:
 
         Args:
             path: A file, whose ending selects the format: .vtu (also .pvtu), .msh (Gmsh), .mesh
-                (Medit), .vol (NETGEN), .off (the boundary alone). A folder for "elmer".
+                (Medit), .vol (NETGEN), .off (the boundary alone). A folder for "elmer". For "mfem" the files
+                `path.000000` and so on, one for each part, which MFEM's `ParMesh` reads.
             format: The format, whatever the ending.
             boundary: Where VTU stores boundary triangles: "beside" in files of their own, "in" the
                 same file.
