@@ -488,7 +488,7 @@ tetmill_status tetmill_mesh_patches_named(const tetmill_mesh *mesh,
 /**
  * *Collective.* Makes MFEM's parallel text of each part, which tetmill_part_mfem returns.
  *
- * Needs about 150 bytes a tet while it runs, and about 60 until the mesh is freed.
+ * The texts take about 60 bytes a tet until the mesh is freed.
  */
 tetmill_status tetmill_mesh_make_mfem(const tetmill_mesh *mesh);
 

@@ -86,15 +86,21 @@ pub fn write(
     comm.agree(refuse(part))?;
     let groups = groups(comm, part)?;
     let (folder, name) = folder_and_name(stem)?;
-    let written = write_together(comm, &folder, estimate(part), |_| false, |stage| {
-        let mut file = name.as_os_str().to_os_string();
-        file.push(format!(".{:06}", part.rank()));
-        let mut file = Output::create(&stage.join(file))?;
-        let mut text = Vec::new();
-        write_part(part, names, &groups, &mut text, &mut |text| file.flush_past(FLUSH_AT, text))?;
-        file.write(&text)?;
-        Ok(Written { files: 1, bytes: file.finish()? })
-    })?;
+    let written = write_together(
+        comm,
+        &folder,
+        estimate(part),
+        |_| false,
+        |stage| {
+            let mut file = name.as_os_str().to_os_string();
+            file.push(format!(".{:06}", part.rank()));
+            let mut file = Output::create(&stage.join(file))?;
+            let mut text = Vec::new();
+            write_part(part, names, &groups, &mut text, &mut |text| file.flush_past(FLUSH_AT, text))?;
+            file.write(&text)?;
+            Ok(Written { files: 1, bytes: file.finish()? })
+        },
+    )?;
     sum_written(comm, written)
 }
 
