@@ -169,8 +169,8 @@ pub fn test_processes(py: Python<'_>, processes: &Bound<'_, PyAny>) -> PyResult<
     Ok(())
 }
 
-/// **Collective** over the processes. Returns `mine` if no process has a failure, so that none waits
-/// for one that has returned.
+/// **Collective** over the processes. Returns `mine` if no process has a failure, so that none
+/// waits for one that has returned.
 pub fn agree<T: Send>(py: Python<'_>, ranks: &Ranks, mine: Result<T, Failure>) -> PyResult<T> {
     let agreed = match ranks.processes() {
         Some(processes) => py.detach(|| processes.agree(mine)),

@@ -151,8 +151,8 @@ pub fn watched<T: Send>(
         let (events, received) = channel();
         let watcher = Watcher { events, has_progress: progress.is_some(), stop: Arc::clone(stop) };
         thread::scope(|scope| {
-            // The watcher is dropped with the closure, which ends the loop of `listen`: no other sender
-            // outlives it.
+            // The watcher is dropped with the closure, which ends the loop of `listen`: no other
+            // sender outlives it.
             let run = move || work(&watcher);
             let builder = thread::Builder::new().name("tetmill".into()).stack_size(POOL_STACK);
             let worker = builder.spawn_scoped(scope, run)?;

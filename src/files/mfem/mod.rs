@@ -37,8 +37,8 @@ const TET: u64 = 4;
 
 /// **Collective.** This rank's part as the text that MFEM's `ParMesh(comm, stream)` reads on it.
 ///
-/// Attribute sets have the names of bodies and boundaries, which MFEM 4.8 and later read. Older ones
-/// read the text of a mesh without names: give `Names` from which they were removed.
+/// Attribute sets have the names of bodies and boundaries, which MFEM 4.8 and later read. Older
+/// ones read the text of a mesh without names: give `Names` from which they were removed.
 ///
 /// A triangle between two parts is in the text of the part with the tet behind it, as in a mesh
 /// that MFEM partitions itself.
@@ -57,8 +57,8 @@ const TET: u64 = 4;
 /// ```
 ///
 /// # Errors
-/// A part with ghosts or with more vertices or tets than MFEM can number, or a body or patch without
-/// a number. All ranks get an error.
+/// A part with ghosts or with more vertices or tets than MFEM can number, or a body or patch
+/// without a number. All ranks get an error.
 pub fn part_text(
     comm: &dyn Communicator,
     part: &dyn MeshStream,
@@ -428,7 +428,7 @@ mod tests {
                     let part = distribute(comm, whole).unwrap();
                     let refined = refine(part, &fixture.projector, pieces, &Default::default()).unwrap();
                     let numbered = number_shared(comm, bare(&refined).unwrap()).unwrap();
-                    // Local numbers follow global ids in stored parts only: compare the stored part.
+                    // Local numbers follow global ids in stored parts only: compare that part.
                     let stored = stream(numbered.clone());
                     assert_eq!(groups(comm, &stored).unwrap(), expected(&numbered));
                     let sizes = |groups: &Groups| -> Vec<(Vec<Rank>, [usize; 3])> {

@@ -1,8 +1,9 @@
 //! The vertices, edges and faces that a part shares with others, by the ranks that have them.
 //!
-//! Two ranks may both have the two ends of an edge while only one of them has the edge. So each rank
-//! sends the edges and faces of its tets whose vertices are all shared to each rank that has all of
-//! these vertices: who sends an edge has it. Memory and messages are proportional to interfaces.
+//! Two ranks may both have the two ends of an edge while only one of them has the edge. So each
+//! rank sends the edges and faces of its tets whose vertices are all shared to each rank that has
+//! all of these vertices: who sends an edge has it. Memory and messages are proportional to
+//! interfaces.
 
 use crate::ground::comm::{CommError, Communicator};
 use crate::ground::mesh::stream::{MeshStream, TetBlock};
