@@ -24,8 +24,8 @@ class Background:
     Args:
         points: Coordinates, (n, 3).
         tets: Indices of points, (m, 4).
-        sizes: One for each point, (n,), or for each tet, (m,): a point then gets the mean of its
-            tets.
+        sizes: One for each point, (n,), or for each tet, (m,): a point then gets the smallest of
+            its tets.
     """
 
     def __init__(self, points: ArrayLike, tets: ArrayLike, sizes: ArrayLike) -> None:
@@ -33,10 +33,10 @@ class Background:
         cells = arguments.indices("tets", tets, 4, len(given))
         values = np.ascontiguousarray(sizes, dtype=np.float64)
         if values.shape == (len(cells),) and len(cells) != len(given):
-            counts = np.bincount(cells.ravel(), minlength=len(given))
-            sums = np.bincount(cells.ravel(), np.repeat(values, 4), minlength=len(given))
             # Points without tets have no influence.
-            values = np.where(counts > 0, sums, 1.0) / np.maximum(counts, 1)
+            smallest = np.full(len(given), values.max(initial=1.0))
+            np.minimum.at(smallest, cells.ravel(), np.repeat(values, 4))
+            values = smallest
         elif values.shape != (len(given),):
             raise ValueError(f"sizes must have the shape ({len(given)},) or ({len(cells)},), not {values.shape}")
         self._native = _native.Background(given, cells, values)
