@@ -22,5 +22,5 @@ for example in examples/*.rs; do
     cargo run --quiet --features mpi --example "$(basename "$example" .rs)" >/dev/null
 done
 mpirun -n 3 "${CARGO_TARGET_DIR:-target}/debug/examples/conduction_mpi" >/dev/null
-# Without the feature a replacement module is compiled: run the tests about MPI again.
-run -p tetmill -p tetmill-cli mpi
+# Without the feature a replacement module is compiled: run the program's tests about MPI again.
+run -p tetmill-cli mpi
