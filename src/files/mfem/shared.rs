@@ -26,6 +26,9 @@ pub(super) type Groups = BTreeMap<Vec<Rank>, Group>;
 /// An edge (2) or face (3): ascending global ids of its vertices, and their local indices.
 type Candidate<const N: usize> = ([GlobalId; N], [u32; N]);
 
+/// The local vertices of an edge or face, and the ranks that have it, ascending.
+type Held<const N: usize> = ([u32; N], Vec<Rank>);
+
 /// The index of the vertex block of each shared vertex.
 struct SharedVertices<'a> {
     part: &'a dyn MeshStream,
@@ -134,7 +137,7 @@ fn with_holders<const N: usize>(
     comm: &dyn Communicator,
     shared: &SharedVertices<'_>,
     candidates: Vec<Candidate<N>>,
-) -> Result<Vec<([u32; N], Vec<Rank>)>, CommError> {
+) -> Result<Vec<Held<N>>, CommError> {
     let mut messages: BTreeMap<Rank, Vec<GlobalId>> = BTreeMap::new();
     for (ids, vertices) in &candidates {
         for rank in shared.common(*vertices) {
