@@ -56,17 +56,18 @@ def _operation(function: Function) -> Function:
 class Processes:
     """The processes of a communicator, for the library.
 
-    It calls one method at a time, in the thread that called the library. Messages are bytes-like; results are bytearrays. Messages of more than `chunk` bytes are sent
-    in several parts, of which only the last one is shorter.
+    It calls one method at a time, in the thread that called the library. Messages are bytes-like;
+    results are bytearrays. Messages of more than `chunk` bytes are sent in several parts, of which
+    only the last one is shorter.
     """
 
     def __init__(self, comm: MPI.Intracomm, chunk: int = _CHUNK) -> None:
         from mpi4py import MPI
 
         self._mpi = MPI
-        self._comm = _duplicate(comm)
+        self._duplicate = duplicate_of(comm)
+        self._comm = self._duplicate.comm
         self._chunk = chunk
-        self._exchanges = 0
         self._interrupted = False
         self.rank = self._comm.Get_rank()
         self.size = self._comm.Get_size()
@@ -180,8 +181,7 @@ class Processes:
         and receive; when all messages of this process have been received, enter a nonblocking
         barrier; when all have entered it, no message is in transit.
         """
-        tag = _TAGS_EXCHANGE[self._exchanges % 2]
-        self._exchanges += 1
+        tag = self._duplicate.next_tag()
         received: list[list[bytearray]] = [[] for _ in range(self.size)]
         incomplete = [bytearray() for _ in range(self.size)]
         received[self.rank] = [bytearray(message) for to, message in messages if to == self.rank]
@@ -211,7 +211,24 @@ class Processes:
         return [(source, message) for source, of_rank in enumerate(received) for message in of_rank]
 
 
-def _duplicate(comm: MPI.Intracomm) -> MPI.Intracomm:
+class _Duplicate:
+    """A duplicate of a communicator, which all meshes on it share."""
+
+    def __init__(self, comm: MPI.Intracomm) -> None:
+        from mpi4py import MPI
+
+        self.comm = comm.Dup()
+        # An error of MPI ends the job: no process can go on without the message.
+        self.comm.Set_errhandler(MPI.ERRORS_ARE_FATAL)
+        self._exchanges = 0
+
+    def next_tag(self) -> int:
+        """The tag of the next exchange, whichever mesh it belongs to."""
+        self._exchanges += 1
+        return _TAGS_EXCHANGE[self._exchanges % 2]
+
+
+def duplicate_of(comm: MPI.Intracomm) -> _Duplicate:
     """The duplicate of a communicator for this package, so that messages do not mix.
 
     It is made once, and freed with the communicator.
@@ -220,14 +237,12 @@ def _duplicate(comm: MPI.Intracomm) -> MPI.Intracomm:
 
     global _key
     if _key is None:
-        _key = MPI.Comm.Create_keyval(delete_fn=lambda comm, key, duplicate: duplicate.Free())
+        _key = MPI.Comm.Create_keyval(delete_fn=lambda comm, key, duplicate: duplicate.comm.Free())
     duplicate = comm.Get_attr(_key)
     if duplicate is None:
-        duplicate = comm.Dup()
-        # An error of MPI ends the job: no process can go on without the message.
-        duplicate.Set_errhandler(MPI.ERRORS_ARE_FATAL)
+        duplicate = _Duplicate(comm)
         comm.Set_attr(_key, duplicate)
-    return cast("MPI.Intracomm", duplicate)
+    return cast(_Duplicate, duplicate)
 
 
 def communicator(comm: Any) -> MPI.Intracomm:

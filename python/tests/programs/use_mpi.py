@@ -32,6 +32,13 @@ def messages():
     """All operations, with messages in one piece and in many."""
     for chunk in (1 << 30, 64, 1000):
         _native.test_processes(Processes(comm, chunk))
+    # Exchanges of two meshes in turns: a message of the next one is not taken for one of this.
+    meshes = [Processes(comm), Processes(comm)]
+    after, before = (comm.rank + 1) % comm.size, (comm.rank - 1) % comm.size
+    for turn in range(400):
+        received = meshes[turn % 2].exchange([(after, turn.to_bytes(2, "little"))] if comm.rank != turn % 3 else [])
+        expected = [] if before == turn % 3 else [(before, turn.to_bytes(2, "little"))]
+        assert received == expected, (turn, received)
 
 
 def meshes(ball):
