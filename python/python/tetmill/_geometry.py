@@ -17,7 +17,7 @@ from ._errors import NoteWarning
 from ._mesh import Mesh
 from ._mpi import Processes, agreed, communicator
 from ._parts import Label, labels
-from ._sizes import Background, Grid
+from ._sizes import Background, Grid, Interpolated
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -377,7 +377,7 @@ class Geometry:
                 "sources": _rows("sources", sources, 4),
                 "effort": None if effort is None else arguments.one_of("effort", effort, _EFFORTS),
                 "coarse": arguments.count("coarse", coarse),
-                "size": size._native if isinstance(size, (Grid, Background)) else size,
+                "size": size._native if isinstance(size, Interpolated) else size,
                 "progress": _progress(progress),
             }
 
@@ -386,7 +386,7 @@ class Geometry:
         else:
             processes = communicator(comm)
             given = {**agreed(processes, options), "processes": Processes(processes)}
-            mesh = Mesh(_native.generate(self._native, given), comm)
+            mesh = Mesh(_native.generate(self._native, given), processes)
         warn(mesh.notes)
         return mesh
 

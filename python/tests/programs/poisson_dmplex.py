@@ -92,7 +92,8 @@ def main():
     comm = MPI.COMM_WORLD
     geometry = tetmill.Geometry.from_text(BALL)
     for level in (0, 1, 2):
-        mesh = geometry.generate(maxh=0.5, levels=level, comm=comm)
+        # A communicator of petsc4py does as well.
+        mesh = geometry.generate(maxh=0.5, levels=level, comm=PETSc.COMM_WORLD)
         error = solve(mesh)
         if comm.rank == 0:
             print(f"level {level}: {mesh} error {error:.10e}", flush=True)
