@@ -10,6 +10,7 @@ import numpy as np
 
 from . import _arguments as arguments
 from ._faces import positions
+from ._mpi import Processes
 from ._parts import Floats, Ids, Ints, Part
 
 if TYPE_CHECKING:
@@ -17,7 +18,6 @@ if TYPE_CHECKING:
 
     from ._mesh import Mesh
 
-_TAG = 23
 _GHOSTS: dict[str, Literal["faces", "vertices"]] = {"shared_facet": "faces", "shared_vertex": "vertices"}
 
 
@@ -41,19 +41,14 @@ def _part(mesh: Mesh) -> Part | None:
 
 
 def _from_owners(part: Part, comm: MPI.Intracomm, values: Ids) -> Ids:
-    """The values of vertices, which are right where this process owns them, right everywhere."""
-    from mpi4py import MPI
-
-    received = {rank: np.empty(len(vertices), np.int64) for rank, vertices in part.neighbours.items()}
-    requests = [comm.Irecv(buffer, rank, _TAG) for rank, buffer in received.items()]
-    # A buffer must live until it has been sent.
-    sent = {rank: np.ascontiguousarray(values[vertices]) for rank, vertices in part.neighbours.items()}
-    requests += [comm.Isend(buffer, rank, _TAG) for rank, buffer in sent.items()]
-    MPI.Request.Waitall(requests)
+    """*Collective.* The values of vertices, right where this process owns them, right everywhere."""
+    neighbours = part.neighbours
+    messages = [(rank, values[vertices].tobytes()) for rank, vertices in neighbours.items()]
     values = values.copy()
-    for rank, vertices in part.neighbours.items():
+    for rank, message in Processes(comm).exchange(messages):
+        vertices = neighbours[rank]
         own = part.owners[vertices] == rank
-        values[vertices[own]] = received[rank][own]
+        values[vertices[own]] = np.frombuffer(message, np.int64)[own]
     return values
 
 
@@ -71,19 +66,19 @@ def _by_owner(mesh: Mesh, part: Part | None, comm: MPI.Intracomm) -> tuple[Ids, 
 
 def _destinations(part: Part | None, comm: MPI.Intracomm, count: int, by: str) -> tuple[Ints, Ints]:
     """The ranks that get each cell as a list in CSR form: first this one, then those with it as a ghost."""
-    cells, ranks = np.arange(count), np.full(count, comm.rank)
+    cells, ranks = [np.arange(count)], [np.full(count, comm.rank)]
     if part is not None and by in _GHOSTS and comm.size > 1:
         # Each process tells the owners which of their cells it has as ghosts.
         ghosts = part.ghosts(_GHOSTS[by])
         wanted = [ghosts.tet_ids[ghosts.owners == rank] for rank in range(comm.size)]
         order = np.argsort(part.tet_ids)
         for rank, ids in enumerate(comm.alltoall(wanted)):
-            found = order[np.searchsorted(part.tet_ids, ids, sorter=order)]
-            cells = np.concatenate([cells, found])
-            ranks = np.concatenate([ranks, np.full(len(found), rank)])
-    order = np.argsort(cells, kind="stable")
-    offsets = np.searchsorted(cells[order], np.arange(count + 1))
-    return ranks[order].astype(np.int32), offsets.astype(np.int32)
+            cells.append(order[np.searchsorted(part.tet_ids, ids, sorter=order)])
+            ranks.append(np.full(len(ids), rank))
+    of_cells = np.concatenate(cells)
+    order = np.argsort(of_cells, kind="stable")
+    offsets = np.searchsorted(of_cells[order], np.arange(count + 1))
+    return np.concatenate(ranks)[order].astype(np.int32), offsets.astype(np.int32)
 
 
 def _linear_tets() -> Any:
@@ -97,6 +92,14 @@ def _linear_tets() -> Any:
     return ufl.Mesh(element("Lagrange", "tetrahedron", 1, shape=(3,)))
 
 
+def _lists(values: Ints | Ids, *offsets: Ints) -> Any:
+    """An adjacency list of DOLFINx, by its name in the installed version."""
+    from dolfinx import graph
+
+    make = getattr(graph, "adjacencylist", None) or graph.create_adjacencylist
+    return make(values, *offsets)
+
+
 def _dolfinx_tags(made: Any, dimension: int, entities: Ids, values: Ints, name: str) -> Any:
     """Mesh tags from entities by the numbers of their vertices."""
     import dolfinx
@@ -107,8 +110,7 @@ def _dolfinx_tags(made: Any, dimension: int, entities: Ids, values: Ints, name: 
     entities, values = distribute(of, dimension, entities, values)
     made.topology.create_connectivity(dimension, 0)
     made.topology.create_connectivity(dimension, 3)
-    list_of = getattr(dolfinx.graph, "adjacencylist", None) or dolfinx.graph.create_adjacencylist
-    tags = dolfinx.mesh.meshtags_from_entities(made, dimension, list_of(entities), values.astype(np.int32))
+    tags = dolfinx.mesh.meshtags_from_entities(made, dimension, _lists(entities), values.astype(np.int32))
     tags.name = name
     return tags
 
@@ -126,11 +128,10 @@ def to_dolfinx(mesh: Mesh, ghost_mode: str = "none") -> DolfinxMesh:
     # Old versions always need the ghosts beside faces, and remove them if they are not wanted.
     ghosts = "shared_facet" if "ghost_mode" in known else by
     ranks, offsets = _destinations(part, comm, len(mesh.tets), ghosts)
-    list_of = getattr(dolfinx.graph, "adjacencylist", None) or dolfinx.graph.create_adjacencylist
 
     def keep(*_: Any) -> Any:
         """Each cell stays in its process."""
-        destinations = list_of(ranks, offsets)
+        destinations = _lists(ranks, offsets)
         return getattr(destinations, "_cpp_object", destinations)
 
     given = {"x": points, "partitioner": keep, "e" if "e" in known else "domain": _linear_tets()}

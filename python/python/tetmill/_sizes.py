@@ -15,7 +15,17 @@ if TYPE_CHECKING:
     from ._mesh import Mesh
 
 
-class Background:
+class Interpolated:
+    """Sizes that the library interpolates itself, without calls of Python."""
+
+    _native: _native.Background | _native.Grid
+
+    def __call__(self, points: ArrayLike) -> NDArray[np.float64]:
+        """The sizes at points."""
+        return np.array([self._native.at(point) for point in arguments.positions("points", points).tolist()])
+
+
+class Background(Interpolated):
     """Element sizes on a tetrahedral mesh, for `Geometry.generate(size=...)`.
 
     Such as the sizes that an error estimate of the last solution asks for, on its mesh. Sizes are
@@ -25,7 +35,7 @@ class Background:
         points: Coordinates, (n, 3).
         tets: Indices of points, (m, 4).
         sizes: One for each point, (n,), or for each tet, (m,): a point then gets the smallest of
-            its tets.
+            its tets. As many tets as points have one for each point.
     """
 
     def __init__(self, points: ArrayLike, tets: ArrayLike, sizes: ArrayLike) -> None:
@@ -46,10 +56,6 @@ class Background:
         """Sizes at the points or tets of a mesh of this package."""
         return cls(mesh.points, mesh.tets, sizes)
 
-    def __call__(self, points: ArrayLike) -> NDArray[np.float64]:
-        """The sizes at points."""
-        return np.array([self._native.at(point) for point in arguments.positions("points", points).tolist()])
-
 
 def _triple(name: str, values: Sequence[float], least: float = -np.inf) -> NDArray[np.float64]:
     array = np.asarray(values, dtype=np.float64)
@@ -59,7 +65,7 @@ def _triple(name: str, values: Sequence[float], least: float = -np.inf) -> NDArr
     return array
 
 
-class Grid:
+class Grid(Interpolated):
     """Element sizes on a regular grid, for `Geometry.generate(size=...)`.
 
     `values[i, j, k]` is the size at `origin + (i, j, k) * spacing`. Sizes are interpolated
@@ -101,7 +107,3 @@ class Grid:
             raise ValueError(f"the function returned the shape {values.shape} for {len(points)} points")
         spacing = (high - low) / (np.array(counts) - 1)
         return cls(low.tolist(), spacing.tolist(), values.reshape(counts))
-
-    def __call__(self, points: ArrayLike) -> NDArray[np.float64]:
-        """The sizes at points."""
-        return np.array([self._native.at(point) for point in arguments.positions("points", points).tolist()])
