@@ -31,6 +31,15 @@ assert len(a) >= 3 and len(a) == len(b) and all(abs(x - y) <= 1e-8 * abs(x) for 
 PYTHON
 }
 
+# Runs an example on 1, 2 and 4 ranks; its errors must be those of the output EXPECTED.
+solve_on_ranks() { # example expected
+    for ranks in 1 2 4; do
+        mpirun -n $ranks "$work/$1" > "$work/$1.$ranks"
+        same_errors "$work/$2" "$work/$1.$ranks"
+    done
+    cat "$work/$1.4"
+}
+
 # The committed header is what cbindgen generates.
 if command -v cbindgen >/dev/null; then
     (cd capi && cbindgen --quiet --config cbindgen.toml --output "$work/tetmill.h")
@@ -145,11 +154,7 @@ if command -v mpicc >/dev/null && command -v mpirun >/dev/null; then
     if pkg-config --exists PETSc; then
         # shellcheck disable=SC2046
         compile mpicc gnu99 "$work/mpi" capi/examples/dmplex.c "$work/dmplex" $(pkg-config --cflags --libs PETSc)
-        for ranks in 1 2 4; do
-            mpirun -n $ranks "$work/dmplex" > "$work/dmplex.$ranks"
-            same_errors "$work/poisson.1" "$work/dmplex.$ranks"
-        done
-        cat "$work/dmplex.4"
+        solve_on_ranks dmplex poisson.1
         ok "DMPlex of PETSc on 1, 2 and 4 ranks"
     else
         skipped "no PETSc (apt install petsc-dev), so no DMPlex"
@@ -159,11 +164,7 @@ if command -v mpicc >/dev/null && command -v mpirun >/dev/null; then
         # shellcheck disable=SC2046
         compile mpicxx c++17 "$work/mpi" capi/examples/mfem_poisson.cpp "$work/mfem_poisson" -isystem "$MFEM_DIR" \
             $(mfem TPLFLAGS | sed 's/-I/-isystem /g') -L"$MFEM_DIR" -lmfem $(mfem EXT_LIBS)
-        for ranks in 1 2 4; do
-            mpirun -n $ranks "$work/mfem_poisson" > "$work/mfem.$ranks"
-            same_errors "$work/mfem.1" "$work/mfem.$ranks"
-        done
-        cat "$work/mfem.4"
+        solve_on_ranks mfem_poisson mfem_poisson.1
         ok "ParMesh of MFEM on 1, 2 and 4 ranks"
     else
         skipped "MFEM_DIR does not name a build of MFEM, so ParMesh does not read the text on several ranks"
