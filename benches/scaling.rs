@@ -19,7 +19,7 @@ use tetmill::comm::Rank;
 use tetmill::comm::{CommError, Communicator, thread};
 use tetmill::internals::refine::{PredictedCounts, predicted_counts};
 use tetmill::internals::{Budget, Model, distribution, mesh_to_target, partition, refine};
-use tetmill::mesh::{DistMesh, Mesh};
+use tetmill::mesh::{DistMesh, Mesh, Order};
 use tetmill::progress::Work;
 use tetmill::run::CoarseSettings;
 
@@ -219,7 +219,8 @@ fn row(model: &Model, mesh: &Mesh, ranks: u32, n: u32) -> Vec<DistMesh> {
 
 /// Size estimate of the parts with `n` subdivisions an edge, without refining them.
 fn predicted_row(ranks: u32, parts: &[DistMesh], n: u32) {
-    let all: Vec<PredictedCounts> = parts.iter().map(|part| predicted_counts(part, n)).collect();
+    let all: Vec<PredictedCounts> =
+        parts.iter().map(|part| predicted_counts(part, n, Order::First)).collect();
     let mean = |of: &dyn Fn(&PredictedCounts) -> f64| all.iter().map(of).sum::<f64>() / all.len() as f64;
     let most = |of: &dyn Fn(&PredictedCounts) -> f64| all.iter().map(of).fold(0.0, f64::max);
     let shared = |c: &PredictedCounts| 100.0 * c.shared as f64 / c.held as f64;

@@ -109,7 +109,7 @@ pub mod mesh {
         BoundaryBlock, Counts, LocalBlock, MeshStream, NO_TET, SingularTags, TetBlock, VertexBlock,
     };
     pub use crate::ground::mesh::{
-        Arrays, BoundaryTriangle, Class, EdgeId, FaceId, GlobalId, Label, Mesh, Names, Neighbour,
+        Arrays, BoundaryTriangle, Class, EdgeId, FaceId, GlobalId, Label, Mesh, Names, Neighbour, Order,
         QualitySummary, Segment, Sharing, TET_EDGES, TET_FACES, TetId, VertexId, Watched, blocks,
     };
     pub use crate::parallel::distribution::{BareMesh, BoundaryFace, DistMesh, Shared, Totals};
@@ -184,6 +184,7 @@ pub mod run {
         BodyLine, CurveLine, Inspection, PatchLine, PeriodicLine, SingularLine,
     };
     pub use crate::pipeline::part::{Balance, Evened, Part, balance};
+    pub use crate::pipeline::result::StraightEdge;
     pub use crate::pipeline::target::Outcome;
     pub use crate::pipeline::{
         CoarseReport, CoarseResult, CoarseSettings, CutCusp, CutSettings, Disk, Entities, FlatPlace,

@@ -26,7 +26,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 use tetmill::comm::{Communicator, thread};
 use tetmill::files::{Destination, elmer, mesh_size, picture, refuse_missing, serial};
-use tetmill::mesh::{MeshStream, Watched};
+use tetmill::mesh::{MeshStream, Order, Watched};
 use tetmill::progress::{Progress, Silent, Stage};
 use tetmill::run::{CoarseSettings, Disk, GenerateSettings, Outcome, Wanted, balance, generate};
 use tetmill::size::{Closeness, SizeSettings};
@@ -65,7 +65,8 @@ fn generate_on(comm: &dyn Communicator, options: &Generate, start: Instant) -> R
         .transpose();
     let geometry = agree(comm, geometry)?;
     let coarse = agree(comm, coarse_settings(&options.size, geometry.as_ref()))?;
-    let disk = Some(disk_for(&options.run.format, &target));
+    let coarse = CoarseSettings { order: options.order.order(), ..coarse };
+    let disk = Some(disk_for(&options.run.format, coarse.order, &target));
     let method = agree(comm, method_of(options))?;
     let settings = GenerateSettings {
         method,
@@ -74,6 +75,7 @@ fn generate_on(comm: &dyn Communicator, options: &Generate, start: Instant) -> R
         memory: options.memory,
         disk,
         nested: options.nested,
+        allow_off_surface: options.order.allow_off_surface,
         periodic_together: options.run.format.contains(&Format::Elmer) && !options.run.allow_split_periodic,
     };
     let made = generate(comm, geometry.as_ref(), &settings, &progress)?;
@@ -174,7 +176,7 @@ fn coarse_settings(options: &SizeOptions, geometry: Option<&Geometry>) -> Result
         let least = geometry.least_size().unwrap_or(0.0);
         settings.sources = mesh_size::read_from(file, least).map_err(Failure::input)?;
     }
-    Ok(CoarseSettings { size: settings, effort: options.effort })
+    Ok(CoarseSettings { effort: options.effort, ..settings.into() })
 }
 
 fn wanted(options: &Generate) -> Wanted {
@@ -197,7 +199,7 @@ fn wanted_count(options: &Generate) -> Option<u64> {
 
 /// Estimates the disk space of the formats, in bytes for each vertex, tet and boundary triangle.
 /// Text formats are estimated by short lines.
-fn disk_for(formats: &[Format], folder: &Path) -> Disk {
+fn disk_for(formats: &[Format], order: Order, folder: &Path) -> Disk {
     let bytes = |format: &Format| match format {
         Format::Elmer => [60, 40, 40],
         Format::Vtu => [32, 44, 30],
@@ -213,7 +215,15 @@ fn disk_for(formats: &[Format], folder: &Path) -> Disk {
     let sum = |sum: [u64; 3], more: [u64; 3]| [0, 1, 2].map(|k| sum[k] + more[k]);
     Disk {
         folder: std::path::absolute(folder).unwrap_or_else(|_| folder.to_path_buf()),
-        bytes: formats.iter().map(bytes).fold([0; 3], sum),
+        // Six more nodes of a tet, three of a triangle, of some seven digits.
+        bytes: formats
+            .iter()
+            .map(bytes)
+            .map(|[vertex, tet, triangle]| match order {
+                Order::Second if tet > 0 => [vertex, tet + 42, triangle + 21],
+                _ => [vertex, tet, triangle],
+            })
+            .fold([0; 3], sum),
         // Formats other than VTU have 32-bit ids.
         most: formats.iter().any(has_short_ids).then_some(i32::MAX as u64),
     }
@@ -324,11 +334,15 @@ pub fn run_mesh(options: &MeshFile) -> Result<(), Failure> {
         progress.stage(Stage::Read, |_| read_sized_geometry(&options.input, &options.size, &progress))?;
     let settings = GenerateSettings {
         method: tetmill::Method::default(),
-        coarse: coarse_settings(&options.size, Some(&geometry))?,
+        coarse: CoarseSettings {
+            order: options.order.order(),
+            ..coarse_settings(&options.size, Some(&geometry))?
+        },
         wanted: wanted_coarse(&options.size, 1),
         memory: None,
         disk: None,
         nested: false,
+        allow_off_surface: options.order.allow_off_surface,
         periodic_together: false,
     };
     let made = generate(&comm, Some(&geometry), &settings, &progress)?;

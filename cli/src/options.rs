@@ -5,6 +5,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 use std::path::PathBuf;
 use tetmill::files::picture::Cut;
+use tetmill::mesh::Order;
 use tetmill::run::MAX_PIECES;
 use tetmill::size::{Effort, Preset};
 
@@ -92,6 +93,26 @@ pub struct SizeOptions {
     /// Number of coarse tets: COUNT to 1.5 COUNT, or the least that the geometry allows
     #[arg(long, value_name = "COUNT", value_parser = count)]
     pub coarse: Option<u64>,
+}
+
+/// Options for the order of the elements.
+#[derive(Args, Debug, Clone)]
+pub struct OrderOptions {
+    /// Order of the elements: 1, or 2 for tets of ten nodes, curved along the geometry; each is
+    /// proved valid
+    #[arg(long, value_name = "ORDER", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=2))]
+    pub order: u32,
+    /// With --order 2: leave edges straight, off the surface, where the tets beside them would not
+    /// be valid otherwise; the report lists them
+    #[arg(long)]
+    pub allow_off_surface: bool,
+}
+
+impl OrderOptions {
+    /// The order of the elements.
+    pub fn order(&self) -> Order {
+        Order::of_degree(self.order).expect("one of the orders that the option takes")
+    }
 }
 
 /// Options for the input.
@@ -187,6 +208,9 @@ pub struct Generate {
     /// it does not fit, coordinates inside coarse tets are recomputed in each pass
     #[arg(long, value_name = "BYTES", value_parser = count)]
     pub memory: Option<u64>,
+    /// Order of the elements
+    #[command(flatten)]
+    pub order: OrderOptions,
     /// Sizes of the coarse mesh
     #[command(flatten)]
     pub size: SizeOptions,
@@ -253,6 +277,9 @@ pub struct MeshFile {
     /// Format of the output file; required for - and pipes
     #[arg(short, long, value_enum)]
     pub format: Option<FileFormat>,
+    /// Order of the elements
+    #[command(flatten)]
+    pub order: OrderOptions,
     /// Sizes of the mesh
     #[command(flatten)]
     pub size: SizeOptions,

@@ -128,7 +128,7 @@ impl Options<'_> {
         }
         // Only rank 0 has a geometry, and reads sizes by place.
         let Some(geometry) = geometry else {
-            return Ok(CoarseSettings { size, effort: self.effort()? });
+            return Ok(CoarseSettings { effort: self.effort()?, ..size.into() });
         };
         if let Some(file) = &self.mesh_size_file {
             let least = geometry.least_size().unwrap_or(0.0);
@@ -142,7 +142,7 @@ impl Options<'_> {
         if let Some(function) = &self.size {
             size.function = Some(size::function(function, stop)?);
         }
-        Ok(CoarseSettings { size, effort: self.effort()? })
+        Ok(CoarseSettings { effort: self.effort()?, ..size.into() })
     }
 
     fn effort(&self) -> PyResult<Option<Effort>> {

@@ -15,6 +15,7 @@
 //! ranks; the mesh does not.
 
 use super::lines::{self, ByPatch, TetLine, TriangleLine};
+use super::node_order::arranged;
 use super::number::{Numbering, number};
 use super::once::{LeftOut, left_out};
 use super::output::{Output, folder_and_name, write_file, write_together};
@@ -22,8 +23,8 @@ use super::pairs::pairs;
 use super::text::{FLOAT_CHARS, Line};
 use super::{WriteError, Written, sum_written};
 use crate::ground::comm::Communicator;
-use crate::ground::mesh::Names;
 use crate::ground::mesh::stream::{Counts, MeshStream};
+use crate::ground::mesh::{Names, Order};
 use std::path::Path;
 
 /// The largest number of a vertex or element: readers of these formats use 32-bit integers.
@@ -113,8 +114,30 @@ impl<'a> Whole<'a> {
     }
 
     /// Appends the numbers of vertices, each after a blank.
-    pub fn ids(&self, line: &mut Line, vertices: &[u32]) {
-        vertices.iter().for_each(|&v| _ = line.blank().int(self.numbering.vertices[v as usize].into()));
+    pub fn ids<'v>(&self, line: &mut Line, vertices: impl IntoIterator<Item = &'v u32>) {
+        vertices.into_iter().for_each(|&v| self.id(line, v));
+    }
+
+    /// Appends the number of a vertex after a blank.
+    fn id(&self, line: &mut Line, vertex: u32) {
+        line.blank().int(self.numbering.vertices[vertex as usize].into());
+    }
+
+    /// Appends the numbers of a tet's nodes, those on edges in the given order.
+    pub fn tet_ids(&self, line: &mut Line, tet: &TetLine, order: &[usize; 6]) {
+        self.ids(line, tet.vertices);
+        arranged(tet.edge_nodes, order).for_each(|v| self.id(line, v));
+    }
+
+    /// Appends the numbers of a triangle's nodes.
+    pub fn triangle_ids(&self, line: &mut Line, triangle: &TriangleLine) {
+        self.ids(line, triangle.vertices);
+        self.ids(line, triangle.edge_nodes);
+    }
+
+    /// The order of the elements.
+    pub fn order(&self) -> Order {
+        self.part.order()
     }
 
     /// The number of a triangle, from 1.
@@ -232,6 +255,13 @@ fn places(comm: &dyn Communicator, lengths: &[u64]) -> Result<Vec<u64>, WriteErr
 /// Estimated size of a text file in bytes.
 fn estimate(part: &dyn MeshStream) -> u64 {
     const PER_ENTITY: u64 = 45;
+    const PER_NODE: u64 = 8;
     let counts = part.counts();
-    counts.vertices * (3 * FLOAT_CHARS as u64) + (counts.tets + counts.boundary) * PER_ENTITY
+    let nodes = match part.order() {
+        Order::First => 0,
+        Order::Second => 6 * counts.tets + 3 * counts.boundary,
+    };
+    counts.vertices * (3 * FLOAT_CHARS as u64)
+        + (counts.tets + counts.boundary) * PER_ENTITY
+        + nodes * PER_NODE
 }

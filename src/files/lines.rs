@@ -30,8 +30,11 @@ pub struct TetLine<'a> {
     pub body: BodyId,
     /// Number of the body.
     pub number: u64,
-    /// Local indices of its vertices.
+    /// Local indices of its corners.
     pub vertices: &'a [u32; 4],
+    /// Local indices of the nodes on its edges, in the order of
+    /// [`TET_EDGES`](crate::ground::mesh::TET_EDGES); empty for first order.
+    pub edge_nodes: &'a [u32],
 }
 
 /// A boundary triangle.
@@ -44,8 +47,11 @@ pub struct TriangleLine<'a> {
     pub patch: PatchId,
     /// The boundary number of the patch.
     pub number: u64,
-    /// Local indices of its vertices.
+    /// Local indices of its corners.
     pub vertices: &'a [u32; 3],
+    /// Local indices of the nodes on its edges, in the order of
+    /// [`TRIANGLE_EDGES`](crate::ground::mesh::TRIANGLE_EDGES); empty for first order.
+    pub edge_nodes: &'a [u32],
     /// The tets of the part behind it and in front of it.
     pub parents: &'a [u64; 2],
 }
@@ -87,8 +93,9 @@ pub fn tets(
             part.tet_block(index, &mut block);
             let body = block.body.expect("a tet block has a body");
             let number = body_number(block.body, names)?;
-            for (index, vertices) in (block.first_local..).zip(&block.tets) {
-                format(&mut line, TetLine { index, body, number, vertices });
+            for (place, (index, vertices)) in (block.first_local..).zip(&block.tets).enumerate() {
+                let edge_nodes = block.edge_nodes_of(place);
+                format(&mut line, TetLine { index, body, number, vertices, edge_nodes });
                 line.end(text);
             }
         }
@@ -146,10 +153,11 @@ pub(crate) fn triangles(
     order.visit(part, |block, first| {
         let patch = block.patch.expect("a boundary block has a patch");
         let number = patch_number(block.patch, names)?;
-        for (place, (vertices, parents)) in (first..).zip(block.triangles.iter().zip(&block.parents)) {
-            if !left_out.contains(place) {
-                let bodies = block.bodies;
-                format(&mut line, TriangleLine { index, bodies, patch, number, vertices, parents });
+        for (within, (vertices, parents)) in block.triangles.iter().zip(&block.parents).enumerate() {
+            if !left_out.contains(first + within as u64) {
+                let (bodies, edge_nodes) = (block.bodies, block.edge_nodes_of(within));
+                let triangle = TriangleLine { index, bodies, patch, number, vertices, edge_nodes, parents };
+                format(&mut line, triangle);
                 line.end(&mut text);
                 index += 1;
             }

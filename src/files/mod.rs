@@ -27,6 +27,7 @@ mod joined_tests;
 pub(crate) mod lines;
 pub mod mesh_size;
 pub mod mfem;
+pub(crate) mod node_order;
 mod number;
 pub(crate) mod once;
 pub(crate) mod output;

@@ -7,7 +7,7 @@ use super::expected;
 use super::fill::{SURFACE_SHARE, fill};
 use super::retries::{Budget, CORRECTIONS, Once};
 use crate::Point;
-use crate::ground::mesh::Segment;
+use crate::ground::mesh::{Order, Segment};
 use crate::ground::progress::Work;
 use crate::ground::size::{GeometricSamples, GeometricSize, SizeField, SizeSettings, Source};
 use crate::ground::size::{PeriodicSize, WatchedSize};
@@ -27,11 +27,13 @@ pub struct CoarseSettings {
     /// Effort for the shapes of tets; if `None`, the careful one up to a second of work, else the
     /// standard one.
     pub effort: Option<Effort>,
+    /// The order of the elements of the mesh that is refined from it.
+    pub order: Order,
 }
 
 impl From<SizeSettings> for CoarseSettings {
     fn from(size: SizeSettings) -> Self {
-        Self { size, effort: None }
+        Self { size, effort: None, order: Order::First }
     }
 }
 

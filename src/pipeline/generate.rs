@@ -9,24 +9,25 @@ use super::mend;
 use super::model::Model;
 use super::options;
 use super::part::{Part, even_out};
-use super::result::{CoarseResult, Generated, Level, Refinement, Refused};
+use super::result::{CoarseResult, Generated, Level, Refinement, Refused, StraightEdge};
 use super::retries::{Budget, REFINEMENTS};
 use super::room::{self};
 use super::settings::{CutSettings, GenerateSettings, Method, Wanted};
 use super::skins;
 use super::verify::verify;
 use super::wanted::mesh_as_wanted;
+use crate::Point;
 use crate::ground::comm::Communicator;
 use crate::ground::kernel::tree;
 use crate::ground::mesh::periodic::{self, PeriodicMap};
 use crate::ground::mesh::stream::MeshStream;
-use crate::ground::mesh::{GlobalId, Mesh, Names};
+use crate::ground::mesh::{Class, GlobalId, Mesh, Names, Order};
 use crate::ground::progress::{Progress, Stage, Work};
 use crate::ground::projector::Projector;
 use crate::ground::size::Source;
 use crate::mesher::improve::Effort;
 use crate::parallel::check::{self, Checksum, PartReport};
-use crate::parallel::distribution::{self, BareMesh, DistMesh};
+use crate::parallel::distribution::{self, BareMesh, DistMesh, number_shared};
 use crate::parallel::interfaces;
 use crate::parallel::migrate::BareStream;
 use crate::parallel::partition::ties::Ties;
@@ -101,7 +102,8 @@ fn coarse_parts<'a>(
     let (names, projector) = broadcast_geometry(comm, model)?;
     let given = coarse.as_ref().map(|made| (made.mesh.clone(), made.parts.clone()));
     let dist = progress.stage(Stage::Distribute, |_| distribution::distribute(comm, given))?;
-    let fits = room::refuse_oversized(comm.rank(), &dist, pieces, settings.disk.as_ref());
+    let fits =
+        room::refuse_oversized(comm.rank(), &dist, (pieces, settings.coarse.order), settings.disk.as_ref());
     comm.agree(fits.map_err(Error::from))?;
     Ok(Parts { model, coarse, dist, projector, names, pieces })
 }
@@ -127,9 +129,11 @@ fn refined(
     let lowered = |coarse: Option<CoarseResult>, bad: &[GlobalId]| {
         Refined::Inverted(coarse.map_or_else(Vec::new, |made| mend::lowered(&made.mesh, bad)))
     };
-    let keep = room::vertices_to_keep(comm, &dist, pieces, settings.memory, progress)?;
+    let order = settings.coarse.order;
+    let keep = room::vertices_to_keep(comm, &dist, (pieces, order), settings.memory, progress)?;
     let displacements = broadcast_displacements(comm, coarse.as_ref().map(|made| &made.displacements))?;
-    let how = refine::Settings { displacements, nested: settings.nested, ..refine::Settings::default() };
+    let nested = settings.nested;
+    let how = refine::Settings { displacements, nested, order, ..refine::Settings::default() };
     let survey = progress.stage(Stage::Levels, |work| {
         survey(comm, &dist, &projector, pieces, (&how, settings.memory), work)
     })?;
@@ -140,19 +144,27 @@ fn refined(
     };
     let how = refine::Settings { keep, ..how };
     // The stage lasts until all ranks are done.
-    let (refined, bad) = progress.stage(Stage::Refine, |work| {
-        let refined = refine::refine_watched(dist, &projector, pieces, &how, work);
-        inverted_anywhere(comm, &refined).map(|bad| (refined, bad))
+    let straightens = order == Order::Second && settings.allow_off_surface && !may_lower;
+    let ((refined, straight), bad) = progress.stage(Stage::Refine, |work| {
+        let refined = if straightens {
+            refine::refine_straightening(comm, &dist, &projector, pieces, &how, work)?
+        } else {
+            (refine::refine_watched(dist, &projector, pieces, &how, work), Vec::new())
+        };
+        inverted_anywhere(comm, &refined.0).map(|bad| (refined, bad))
     })?;
     if !bad.is_empty() && may_lower {
         return Ok(lowered(coarse, &bad));
     }
     let part = comm.agree(refined.map_err(Error::from))?;
+    let how = refine::Settings { straight, ..how };
+    let straight = straight_edges(comm, &part, &projector, &how.straight)?;
     let map = broadcast_periodic(comm, coarse.as_ref().map(|made| &made.periodic))?;
     let part = part.with_periodic(map.clone()).with_singular(broadcast_singular(comm, model)?);
-    let (check, checksum) = progress.stage(Stage::Check, |work| verdict(comm, &part, &projector, work))?;
+    let (check, checksum) =
+        progress.stage(Stage::Check, |work| verdict(comm, &part, &projector, &how.straight, work))?;
     let periodic = periodic_verdict(comm, &part, &map, &projector)?;
-    levels.extend(check.shape.clone().map(|shape| Level { pieces, tets: check.tets, shape }));
+    levels.extend(Level::of(pieces, &check));
     if let Some(made) = &mut coarse {
         made.report.curved_edges = made.displacements.edges().len() as u64;
     }
@@ -167,6 +179,7 @@ fn refined(
         refused: None,
         across: None,
         evened: None,
+        straight,
         coarse,
         refinement: Some(Refinement { projector, settings: how }),
     })))
@@ -193,7 +206,7 @@ fn fill(
     // The boundary is that of the method `refine`, without lines where cuts meet it.
     let across = interfaces::Settings { merge_angle: None, ..interfaces::Settings::default() };
     let whole = Whole { names, projector, pieces, coarse, refused: Some(refused) };
-    stored(comm, part, whole, &across, progress)
+    stored(comm, part, whole, &across, settings, progress)
 }
 
 /// **Collective.** Meshes the pieces of the geometry.
@@ -207,7 +220,7 @@ fn decomposed(
     let (names, projector) = broadcast_geometry(comm, model)?;
     let (part, pieces, coarse) = decompose::mesh_pieces(comm, model, cuts, settings, progress)?;
     let whole = Whole { names, projector, pieces, coarse, refused: None };
-    stored(comm, part, whole, &interfaces::Settings::default(), progress)
+    stored(comm, part, whole, &interfaces::Settings::default(), settings, progress)
 }
 
 /// Data that accompanies separately meshed parts.
@@ -226,16 +239,21 @@ fn stored(
     part: BareMesh,
     whole: Whole,
     across: &interfaces::Settings,
+    settings: &GenerateSettings,
     progress: &Progress,
 ) -> Result<Generated, Error> {
     let Whole { names, projector, pieces, coarse, refused } = whole;
     let (part, across) =
         progress.stage(Stage::Interfaces, |_| interfaces::improve_across(comm, part, across))?;
     let (part, evened) = even_out(comm, part, progress)?;
-    let part = BareStream::new(part);
-    let (check, checksum) = progress.stage(Stage::Check, |work| verdict(comm, &part, &projector, work))?;
-    let level = check.shape.clone().map(|shape| Level { pieces, tets: check.tets, shape });
-    let (levels, part) = (level.into_iter().collect(), Part::Stored(Box::new(part)));
+    let (part, straight) = match settings.coarse.order {
+        Order::First => (Part::Stored(Box::new(BareStream::new(part))), Vec::new()),
+        Order::Second => second_order(comm, part, &projector, settings.allow_off_surface, progress)?,
+    };
+    let off: Vec<GlobalId> = straight.iter().map(|edge| edge.node).collect();
+    let (check, checksum) =
+        progress.stage(Stage::Check, |work| verdict(comm, part.stream(), &projector, &off, work))?;
+    let levels = Level::of(pieces, &check).into_iter().collect();
     let periodic = None;
     Ok(Generated {
         part,
@@ -248,8 +266,31 @@ fn stored(
         refused,
         across,
         evened,
+        straight,
         coarse,
         refinement: None,
+    })
+}
+
+/// **Collective.** Adds the nodes on the edges of separately meshed parts, on the geometry.
+fn second_order(
+    comm: &dyn Communicator,
+    part: BareMesh,
+    projector: &Projector,
+    allow_off_surface: bool,
+    progress: &Progress,
+) -> Result<(Part, Vec<StraightEdge>), Error> {
+    progress.stage(Stage::Refine, |work| {
+        let mesh = number_shared(comm, part)?;
+        let how = refine::Settings { order: Order::Second, ..refine::Settings::default() };
+        let (refined, straight) = if allow_off_surface {
+            refine::refine_straightening(comm, &mesh, projector, 1, &how, work)?
+        } else {
+            (refine::refine_watched(mesh, projector, 1, &how, work), Vec::new())
+        };
+        let part = comm.agree(refined.map_err(Error::from))?;
+        let straight = straight_edges(comm, &part, projector, &straight)?;
+        Ok((Part::Refined(Arc::new(part)), straight))
     })
 }
 
@@ -280,16 +321,22 @@ fn survey(
     for n in pieces {
         comm.agree(work.proceed().map_err(Error::from))?;
         // Level by level, because all vertices of a lower level may fit.
-        let (keep, _) = room::keep_of_level(comm, dist, n, memory)?;
-        let how = refine::Settings { keep, ..how.clone() };
-        let refined = refine::refine(dist.clone(), projector, n, &how);
-        let bad = inverted_anywhere(comm, &refined)?;
+        let (keep, _) = room::keep_of_level(comm, dist, (n, how.order), memory)?;
+        let mut how = refine::Settings { keep, ..how.clone() };
+        let mut refined = refine::refine(dist.clone(), projector, n, &how);
+        let mut bad = inverted_anywhere(comm, &refined)?;
+        if !bad.is_empty() && how.order == Order::Second {
+            // Only the last level must be valid in second order: finer tets are less curved.
+            how.order = Order::First;
+            refined = refine::refine(dist.clone(), projector, n, &how);
+            bad = inverted_anywhere(comm, &refined)?;
+        }
         let part = match comm.agree(refined.map_err(Error::from)) {
             Err(error) if !bad.is_empty() => return Ok(Surveyed::Inverted(bad, error)),
             other => other?,
         };
         let check = check::check(comm, &part, None, &check::Settings::default())?;
-        levels.extend(check.shape.map(|shape| Level { pieces: n, tets: check.tets, shape }));
+        levels.extend(Level::of(n, &check));
         work.add(tets(n));
     }
     Ok(Surveyed::Sound(levels))
@@ -447,13 +494,50 @@ fn verdict(
     comm: &dyn Communicator,
     part: &dyn MeshStream,
     projector: &Projector,
+    off_surface: &[GlobalId],
     work: &Work,
 ) -> Result<(PartReport, Checksum), Error> {
-    let (report, checksum) = verify(comm, part, Some(projector), work)?;
+    let (report, checksum) = verify(comm, part, Some(projector), off_surface, work)?;
     if checksum.open != 0 {
         return Err(InvalidMesh::OpenFaces.into());
     }
     Ok((report, checksum))
+}
+
+/// **Collective.** Where the nodes with these global ids are, and how far off the geometry.
+fn straight_edges(
+    comm: &dyn Communicator,
+    part: &RefinedMesh,
+    projector: &Projector,
+    nodes: &[GlobalId],
+) -> Result<Vec<StraightEdge>, Error> {
+    let mut ids = Vec::new();
+    let mut places = Vec::new();
+    for &node in nodes {
+        let Some((entity, within)) = part.numbering().find(part.coarse(), node) else { continue };
+        let place = part.points()[(part.numbering().inside(entity).start + within) as usize];
+        let point = Point::from(place);
+        let snapped = match entity.class(part.coarse()) {
+            Class::Curve(curve) => projector.project_curve(curve, &point),
+            Class::Patch(patch) => projector.project_patch(patch, &point),
+            _ => Ok(point),
+        };
+        ids.push(node);
+        places.push([
+            place[0],
+            place[1],
+            place[2],
+            snapped.map_or(f64::NAN, |snapped| (snapped - point).norm()),
+        ]);
+    }
+    let places = comm.all_gather(&places)?.concat();
+    let found = comm.all_gather(&ids)?.concat().into_iter().zip(places);
+    let edge =
+        |(node, [x, y, z, distance]): (GlobalId, [f64; 4])| StraightEdge { node, place: [x, y, z], distance };
+    let mut edges: Vec<StraightEdge> = found.map(edge).collect();
+    edges.sort_unstable_by_key(|edge| edge.node);
+    edges.dedup_by_key(|edge| edge.node);
+    Ok(edges)
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@ use super::coarse_mesh::CoarseMesh;
 use super::error::Error;
 use super::model::Model;
 use super::retries::{Budget, INVERTED, INVERTED_FACETS, POOR};
-use crate::ground::mesh::{GlobalId, Mesh, TET_EDGES};
+use crate::ground::mesh::{GlobalId, Mesh, Order, TET_EDGES};
 use crate::ground::projector::Projector;
 use crate::ground::size::Source;
 use crate::parallel::distribution;
@@ -26,6 +26,10 @@ const KEPT: f64 = 0.6;
 /// elements per radius.
 const GOOD: f64 = 0.35;
 
+/// Scaled Jacobian that the worst child of second order must have: the threshold of other programs
+/// that optimise such meshes (Gmsh's `HighOrderThresholdMin`).
+const JACOBIAN: f64 = 0.1;
+
 /// Factor on the sizes around an inverted child.
 const LOWERED: f64 = 0.6;
 
@@ -37,18 +41,18 @@ const BENT: [f64; 2] = [0.01, 0.03];
 const MOST_BENT: usize = 100;
 
 /// Makes coarse meshes with `make`, which receives the sources where sizes must be lowered, until
-/// the lattice of `pieces` subdivisions an edge has neither inverted nor poor children. If some
+/// the lattice of `pieces` subdivisions an edge has neither invalid nor poor children. If some
 /// remain, edges of the best mesh are curved. The second value of `make` is passed through.
 ///
 /// # Errors
 /// The last failure.
 pub fn refinable<T>(
     model: &Model,
-    pieces: u32,
+    (pieces, order): (u32, Order),
     budget: &Budget,
     mut make: impl FnMut(&[Source]) -> Result<(CoarseMesh, T), CoarseError>,
 ) -> Result<(CoarseMesh, T), Error> {
-    let pieces = pieces.min(TRIED_PIECES);
+    let how = (pieces.min(TRIED_PIECES / order.degree()), order);
     let is_faceted = matches!(model, Model::Facets(_));
     let most_rounds = if is_faceted { INVERTED_FACETS } else { INVERTED };
     let mut sources = Vec::new();
@@ -56,9 +60,9 @@ pub fn refinable<T>(
     for round in 0.. {
         let mut made = make(&sources)?;
         made.0.report.size_corrections += round;
-        let mut tried = refinement_test(model, &made.0, pieces)?;
+        let mut tried = refinement_test(model, &made.0, how)?;
         if is_faceted && !tried.inverted.is_empty() {
-            tried = bend_inverted(model, &mut made.0, tried, pieces)?;
+            tried = bend_inverted(model, &mut made.0, tried, how)?;
         }
         for tets in [&tried.inverted, &tried.poor] {
             sources.extend(lowered(&made.0.mesh, tets));
@@ -73,7 +77,7 @@ pub fn refinable<T>(
         } else if best.is_none() && (round == most_rounds || !budget.has_meshes()) {
             let mut coarse = made.0;
             if !is_faceted {
-                bend(model, &mut coarse, &tried, pieces)?;
+                bend(model, &mut coarse, &tried, how)?;
             }
             return match tried.error {
                 Some(error) if coarse.displacements.is_empty() => Err(error.into()),
@@ -83,7 +87,7 @@ pub fn refinable<T>(
         if (round >= POOR || budget.is_spent())
             && let Some((tried, mut made)) = best
         {
-            bend(model, &mut made.0, &tried, pieces)?;
+            bend(model, &mut made.0, &tried, how)?;
             return Ok(made);
         }
     }
@@ -100,23 +104,31 @@ fn is_better(new: (&Trial, &CoarseMesh), old: (&Trial, &CoarseMesh)) -> bool {
 /// The required quality of the children of a coarse mesh.
 fn least(coarse: &CoarseMesh) -> Least {
     let quality = &coarse.report.quality;
-    Least { mean_ratio: KEPT * quality.worst_refined.min(GOOD), dihedral: KEPT * quality.smallest_dihedral }
+    Least {
+        mean_ratio: KEPT * quality.worst_refined.min(GOOD),
+        dihedral: KEPT * quality.smallest_dihedral,
+        scaled_jacobian: JACOBIAN,
+    }
 }
 
 /// Refinement test of a coarse mesh: finds its bad children.
-fn refinement_test(model: &Model, coarse: &CoarseMesh, pieces: u32) -> Result<Trial, Error> {
+fn refinement_test(model: &Model, coarse: &CoarseMesh, (pieces, order): How) -> Result<Trial, Error> {
     // Without snapping no child can be inverted.
     let projector = model.projector();
-    if pieces == 1 || projector == Projector::Flat {
+    if pieces * order.degree() == 1 || projector == Projector::Flat {
         return Ok(Trial::default());
     }
     let part = distribution::from_serial(coarse.mesh.clone())?;
-    Ok(refine::trial(&part, &projector, pieces, &EdgeDisplacements::default(), least(coarse))?)
+    let settings = refine::Settings { order, ..refine::Settings::default() };
+    Ok(refine::trial(&part, &projector, pieces, &settings, least(coarse))?)
 }
 
+/// The subdivisions of an edge and the order of the elements of a refinement test.
+type How = (u32, Order);
+
 /// Curves edges of a coarse mesh with bad children, if that improves the worst of them.
-fn bend(model: &Model, coarse: &mut CoarseMesh, before: &Trial, pieces: u32) -> Result<(), Error> {
-    if let Some((displacements, after)) = curved(model, coarse, before, pieces)? {
+fn bend(model: &Model, coarse: &mut CoarseMesh, before: &Trial, how: How) -> Result<(), Error> {
+    if let Some((displacements, after)) = curved(model, coarse, before, how)? {
         let is_better = after.poor.is_empty() || after.smallest_dihedral > before.smallest_dihedral;
         if after.inverted.is_empty() && is_better {
             coarse.displacements = displacements;
@@ -128,8 +140,8 @@ fn bend(model: &Model, coarse: &mut CoarseMesh, before: &Trial, pieces: u32) -> 
 /// Curves edges of a coarse mesh with inverted children, if none are left then. Returns the
 /// refinement test of the mesh, or that with the curved edges if fewer are inverted: sizes need to
 /// be lowered only where curved edges do not help.
-fn bend_inverted(model: &Model, coarse: &mut CoarseMesh, before: Trial, pieces: u32) -> Result<Trial, Error> {
-    Ok(match curved(model, coarse, &before, pieces)? {
+fn bend_inverted(model: &Model, coarse: &mut CoarseMesh, before: Trial, how: How) -> Result<Trial, Error> {
+    Ok(match curved(model, coarse, &before, how)? {
         Some((displacements, after)) if after.inverted.is_empty() => {
             coarse.displacements = displacements;
             after
@@ -145,7 +157,7 @@ fn curved(
     model: &Model,
     coarse: &CoarseMesh,
     before: &Trial,
-    pieces: u32,
+    (pieces, order): How,
 ) -> Result<Option<(EdgeDisplacements, Trial)>, Error> {
     if before.poor.len() + before.inverted.len() > MOST_BENT {
         return Ok(None);
@@ -153,10 +165,11 @@ fn curved(
     let (part, projector, least) =
         (distribution::from_serial(coarse.mesh.clone())?, model.projector(), least(coarse));
     let [margin, enough] = BENT;
-    let settings = refine::mend::Settings { pieces, least, margin, enough, ..Default::default() };
+    let settings = refine::mend::Settings { pieces, least, margin, enough, order, ..Default::default() };
     let displacements = refine::mend(&part, &projector, &settings)?.displacements;
-    let after = refine::trial(&part, &projector, pieces, &displacements, least)?;
-    Ok(Some((displacements, after)))
+    let settings = refine::Settings { displacements, order, ..refine::Settings::default() };
+    let after = refine::trial(&part, &projector, pieces, &settings, least)?;
+    Ok(Some((settings.displacements, after)))
 }
 
 /// Sources for smaller tets around the given ones: at their corners and edge midpoints, because one

@@ -71,12 +71,12 @@ pub(super) fn refuse_unresolved(model: &Model, size: &SizeSettings) -> Result<()
 pub(super) fn refuse_impossible_coarse(coarse: &CoarseSettings, wanted: Wanted) -> Result<(), Error> {
     refuse_sizes(&coarse.size)?;
     match wanted {
-        Wanted::Sizes { pieces } => possible_pieces(pieces)?,
+        Wanted::Sizes { pieces } => possible_pieces(pieces, coarse.order)?,
         Wanted::Coarse { tets, pieces } => {
             if tets == 0 || tets > u64::from(u32::MAX) {
                 return Err(refused("coarse_tets", tets, format_args!("1 to {}", u32::MAX)).into());
             }
-            possible_pieces(pieces)?
+            possible_pieces(pieces, coarse.order)?
         }
         Wanted::Elements(0) => return Err(refused("tets", 0, "1 and more").into()),
         Wanted::Elements(_) => 1,
@@ -88,13 +88,16 @@ pub(super) fn refuse_impossible_coarse(coarse: &CoarseSettings, wanted: Wanted) 
 ///
 /// Sources and the size function are used on rank 0 only, like the geometry. The memory belongs to
 /// a machine, and the disk to rank 0.
-fn compared(settings: &GenerateSettings) -> [(&'static str, u64); 9] {
-    let GenerateSettings { method, coarse: CoarseSettings { size, effort }, wanted, nested, .. } = settings;
+fn compared(settings: &GenerateSettings) -> [(&'static str, u64); 11] {
+    let GenerateSettings { method, coarse, wanted, nested, allow_off_surface, .. } = settings;
+    let CoarseSettings { size, effort, order } = coarse;
     let preset = (size.curvature_safety, size.segments_per_curve, size.scale);
     [
         ("method", value_of(method)),
         ("nested", value_of(nested)),
         ("effort", value_of(effort)),
+        ("order", value_of(order)),
+        ("allow_off_surface", value_of(allow_off_surface)),
         ("tets, coarse_tets, levels or pieces", value_of(wanted)),
         ("max_size", value_of(&size.maxh)),
         ("min_size", value_of(&size.minh)),
@@ -122,7 +125,7 @@ pub(super) fn refuse_different(
     settings: &GenerateSettings,
 ) -> Result<(), Error> {
     let mine = compared(settings);
-    let mut numbers = [u64::from(has_geometry); 10];
+    let mut numbers = [u64::from(has_geometry); 12];
     numbers.iter_mut().zip(&mine).for_each(|(number, (_, value))| *number = *value);
     let all = comm.all_gather_one(numbers)?;
     let [first @ .., has_geometry] = all[0];

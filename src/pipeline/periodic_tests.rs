@@ -30,6 +30,7 @@ fn settings(levels: u32, sources: &[Source]) -> GenerateSettings {
         memory: None,
         disk: None,
         nested: false,
+        allow_off_surface: false,
         periodic_together: false,
     }
 }

@@ -8,9 +8,9 @@ use crate::ground::comm::Communicator;
 use crate::ground::mesh::ghosts::{By, Ghosts};
 use crate::ground::mesh::periodic::PeriodicMap;
 use crate::ground::mesh::stream::MeshStream;
-use crate::ground::mesh::{Arrays, Mesh, Names, Rank, Sharing};
+use crate::ground::mesh::{Arrays, GlobalId, Mesh, Names, Order, Rank, Sharing};
 use crate::ground::projector::Projector;
-use crate::parallel::check::{Checksum, PartReport, ShapeReport};
+use crate::parallel::check::{Checksum, Extreme, PartReport, ShapeReport};
 use crate::parallel::distribution::{DistMesh, number_shared};
 use crate::parallel::interfaces;
 use crate::parallel::partition::Metrics;
@@ -63,6 +63,8 @@ pub struct Generated {
     pub across: Option<interfaces::InterfaceReport>,
     /// Result of balancing separately meshed parts; the same on all ranks.
     pub evened: Option<Evened>,
+    /// The edges of second order that are straight off the surface, the same on all ranks.
+    pub straight: Vec<StraightEdge>,
     /// On rank 0 only.
     pub coarse: Option<CoarseResult>,
     /// How other levels are refined, if parts were refined.
@@ -154,7 +156,7 @@ impl Generated {
 
     /// *Local.* This rank's part of all refinement levels, the last being the mesh itself: coarse
     /// edges are split into m, 2m, 4m, … subdivisions, m odd. `None` if the parts were meshed
-    /// separately.
+    /// separately, or the elements are of second order.
     ///
     /// # Errors
     /// If there is not enough memory.
@@ -164,6 +166,9 @@ impl Generated {
         else {
             return Ok(None);
         };
+        if finest.order() == Order::Second {
+            return Ok(None);
+        }
         let n = finest.pieces();
         let mut levels = Vec::new();
         for k in (1..=n.trailing_zeros()).rev() {
@@ -182,8 +187,31 @@ pub struct Level {
     pub pieces: u32,
     /// The number of tets.
     pub tets: u64,
-    /// Their shapes.
+    /// Their shapes; for second order those of the tets with straight edges.
     pub shape: ShapeReport,
+    /// The smallest scaled Jacobian; `None` for first order, or if a lower level is not valid in
+    /// second order.
+    pub scaled_jacobian: Option<Extreme>,
+}
+
+impl Level {
+    /// The level that a check measured; `None` if it has no shapes.
+    pub(super) fn of(pieces: u32, check: &PartReport) -> Option<Self> {
+        let shape = check.shape.clone()?;
+        Some(Self { pieces, tets: check.tets, shape, scaled_jacobian: check.scaled_jacobian })
+    }
+}
+
+/// An edge of second order on the boundary that is straight, because the tets beside it would not be
+/// valid if its node were on the surface.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct StraightEdge {
+    /// The global id of its node.
+    pub node: GlobalId,
+    /// The node's place.
+    pub place: [f64; 3],
+    /// The node's distance from the surface or curve (length).
+    pub distance: f64,
 }
 
 /// Skins that the mesher could not fill, and that the lattice filled instead.

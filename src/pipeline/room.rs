@@ -7,12 +7,11 @@ use super::room_error::RoomError;
 use super::settings::Disk;
 use crate::ground::comm::Communicator;
 use crate::ground::memory::{self, sized};
-use crate::ground::mesh::Rank;
 use crate::ground::mesh::stream::Counts;
+use crate::ground::mesh::{Order, Rank};
 use crate::ground::progress::Progress;
 use crate::ground::size::SizeSettings;
 use crate::parallel::distribution::DistMesh;
-use crate::parallel::refine::lattice::Lattice;
 use crate::parallel::refine::numbering::fine_totals;
 use crate::parallel::refine::{Keep, predicted_counts};
 use std::path::Path;
@@ -24,11 +23,11 @@ use std::path::Path;
 pub(super) fn refuse_oversized(
     rank: Rank,
     part: &DistMesh,
-    pieces: u32,
+    (pieces, order): (u32, Order),
     disk: Option<&Disk>,
 ) -> Result<(), RoomError> {
     let Some(Disk { folder, bytes, most }) = disk.filter(|_| rank == 0) else { return Ok(()) };
-    let Counts { vertices, tets, boundary } = fine_totals(&part.totals, Lattice::new(pieces));
+    let Counts { vertices, tets, boundary } = fine_totals(&part.totals, pieces, order);
     if let Some(most) = most.filter(|most| tets > *most || vertices > *most) {
         return Err(RoomError::TooMany { tets, vertices, most });
     }
@@ -73,11 +72,11 @@ pub(super) fn refuse_too_fine(
 pub(super) fn vertices_to_keep(
     comm: &dyn Communicator,
     part: &DistMesh,
-    pieces: u32,
+    fineness: (u32, Order),
     memory: Option<u64>,
     progress: &Progress,
 ) -> Result<Keep, Error> {
-    let (keep, [all, available]) = keep_of_level(comm, part, pieces, memory)?;
+    let (keep, [all, available]) = keep_of_level(comm, part, fineness, memory)?;
     if keep == Keep::Boundary {
         progress.note(&format!(
             "the fine mesh takes {}, above the {} there are: vertices inside coarse tets are computed anew wherever they \
@@ -97,7 +96,7 @@ pub(super) fn vertices_to_keep(
 pub(super) fn keep_of_level(
     comm: &dyn Communicator,
     part: &DistMesh,
-    pieces: u32,
+    (pieces, order): (u32, Order),
     memory: Option<u64>,
 ) -> Result<(Keep, [u64; 2]), Error> {
     let machine = memory::machine();
@@ -107,7 +106,7 @@ pub(super) fn keep_of_level(
         let here = machines.iter().zip(&needs).filter(|(name, _)| **name == machine.as_bytes());
         Ok(here.map(|(_, need)| need).sum())
     };
-    let [all, least] = predicted_counts(part, pieces).bytes;
+    let [all, least] = predicted_counts(part, pieces, order).bytes;
     let (all, least) = (on_machine(all)?, on_machine(least)?);
     let Some(available) = memory.or_else(memory::available_bytes) else {
         return Ok((Keep::All, [all, u64::MAX]));
@@ -151,7 +150,7 @@ mod tests {
         let part = whole(&cube(1, false).mesh);
         let kept = |memory| {
             let progress = Progress::new(&Silent);
-            vertices_to_keep(&thread::alone(), &part, 8, Some(memory), &progress)
+            vertices_to_keep(&thread::alone(), &part, (8, Order::First), Some(memory), &progress)
         };
         let diagonals = 6 * 84 / 4;
         assert_eq!(kept(24 * 729 + diagonals).unwrap(), Keep::All);
@@ -179,7 +178,8 @@ mod tests {
         let ball = Geometry::from_text("algebraic3d solid b = sphere (0, 0, 0; 1); tlo b;").unwrap();
         let mesher = Mesher::new().levels(3);
         let made = mesher.generate(&ball).unwrap();
-        let [all, least] = predicted_counts(&whole(&made.coarse.as_ref().unwrap().mesh), 8).bytes;
+        let [all, least] =
+            predicted_counts(&whole(&made.coarse.as_ref().unwrap().mesh), 8, Order::First).bytes;
         let listener = Listener::default();
         let little = mesher.clone().memory((all + least) / 2).observer(&listener).generate(&ball).unwrap();
         assert_eq!(little.checksum, made.checksum);
@@ -197,7 +197,7 @@ mod tests {
         let part = whole(&cube(1, false).mesh);
         let refusal = |bytes, most| {
             let disk = Disk { folder: std::env::temp_dir().join("not/there/yet"), bytes, most };
-            refuse_oversized(0, &part, 2, Some(&disk)).err()
+            refuse_oversized(0, &part, (2, Order::First), Some(&disk)).err()
         };
         assert!(refusal([1, 1, 1], None).is_none());
         let refused = refusal([0, 1 << 50, 0], None).expect("6·8 tets of 2⁵⁰ bytes are 54 PB");

@@ -2,8 +2,8 @@
 
 use super::error::{Error, InvalidMesh};
 use crate::ground::comm::Communicator;
-use crate::ground::mesh::Watched;
 use crate::ground::mesh::stream::MeshStream;
+use crate::ground::mesh::{GlobalId, Watched};
 use crate::ground::progress::Work;
 use crate::ground::projector::Projector;
 use crate::parallel::check::{self, Checksum, PartReport};
@@ -11,8 +11,8 @@ use crate::parallel::check::{self, Checksum, PartReport};
 /// The check and the checksum each read all tets.
 const PASSES: u64 = 2;
 
-/// **Collective.** Checks all tets, and all boundary vertices if there is a `projector`, and
-/// computes the checksum.
+/// **Collective.** Checks all tets, and all boundary vertices if there is a `projector` (except
+/// those that may be `off_surface`), and computes the checksum.
 ///
 /// # Errors
 /// On all ranks: a mesh with faults; a cancelled run.
@@ -20,10 +20,12 @@ pub(super) fn verify(
     comm: &dyn Communicator,
     part: &dyn MeshStream,
     projector: Option<&Projector>,
+    off_surface: &[GlobalId],
     work: &Work,
 ) -> Result<(PartReport, Checksum), Error> {
     let part = &Watched::new(part, work, PASSES);
-    let report = check::check(comm, part, projector, &check::Settings::default())?;
+    let report =
+        check::check(comm, part, projector, &check::Settings { off_surface, ..check::Settings::default() })?;
     let checksum = check::checksum_of_all(comm, part)?;
     // A cancelled check has not seen all tets.
     comm.agree(work.proceed().map_err(Error::from))?;

@@ -13,6 +13,7 @@ use super::model::Model;
 use super::retries::Budget;
 use super::settings::Wanted;
 use super::target::{Outcome, mesh_to_target};
+use crate::ground::mesh::Order;
 use crate::ground::progress::Work;
 use crate::ground::size::Source;
 use crate::parallel::refine::lattice::MAX_PIECES;
@@ -35,11 +36,11 @@ const ROOM: [u64; 2] = [13, 10];
 
 /// The least number of subdivisions with a small odd factor that turns `tets` coarse tets into
 /// `count` to 1.3·`count`.
-fn pieces_within(tets: u64, count: u64) -> Option<u32> {
+fn pieces_within(tets: u64, count: u64, order: Order) -> Option<u32> {
     let made = |n: u32| u128::from(tets) * u128::from(n).pow(3);
     let most = u128::from(count) * u128::from(ROOM[0]) / u128::from(ROOM[1]);
     let first = pieces_for(tets, count);
-    (first..=MAX_PIECES).take_while(|&n| made(n) <= most).find(|&n| is_cheap(n))
+    (first..=MAX_PIECES / order.degree()).take_while(|&n| made(n) <= most).find(|&n| is_cheap(n))
 }
 
 fn is_cheap(n: u32) -> bool {
@@ -48,9 +49,9 @@ fn is_cheap(n: u32) -> bool {
 
 /// The largest number of subdivisions with a small odd factor at which `count` tets need `coarse`
 /// coarse tets or more.
-fn most_pieces(count: u64, coarse: u64) -> u32 {
+fn most_pieces(count: u64, coarse: u64, order: Order) -> u32 {
     let fits = |n: &u32| is_cheap(*n) && u128::from(*n).pow(3) * u128::from(coarse) <= u128::from(count);
-    (1..=MAX_PIECES).rev().find(fits).unwrap_or(1)
+    (1..=MAX_PIECES / order.degree()).rev().find(fits).unwrap_or(1)
 }
 
 /// The subdivisions of each coarse edge, the coarse mesh, and whether the requested number was
@@ -71,24 +72,25 @@ pub(super) fn mesh_as_wanted(
     budget: &Budget,
     work: &Work,
 ) -> Result<Granted, Error> {
+    let order = settings.order;
     let with = |more: &[Source]| {
         let mut coarse = settings.clone();
         coarse.size.sources.extend(sources.iter().chain(more));
         coarse
     };
     let to_target = |tets: u64, pieces: u32, fits: &dyn Fn(u64) -> bool| {
-        mend::refinable(model, pieces, budget, |more| {
+        mend::refinable(model, (pieces, settings.order), budget, |more| {
             mesh_to_target(model, &mut with(more), tets, fits, budget, work)
         })
     };
     match wanted {
         Wanted::Elements(count) if let Model::Given(given) = model => {
-            let pieces = possible_pieces(pieces_for(given.mesh.tets.len() as u64, count))?;
+            let pieces = possible_pieces(pieces_for(given.mesh.tets.len() as u64, count), settings.order)?;
             Ok((pieces, model.coarse_mesh(&mut settings.clone(), budget, work)?, None))
         }
         Wanted::Sizes { pieces } => {
             let make = |more: &[Source]| Ok((model.coarse_mesh(&mut with(more), budget, work)?, None));
-            let (made, outcome) = mend::refinable(model, pieces, budget, make)?;
+            let (made, outcome) = mend::refinable(model, (pieces, settings.order), budget, make)?;
             Ok((pieces, made, outcome))
         }
         Wanted::Coarse { tets, pieces } => {
@@ -96,21 +98,21 @@ pub(super) fn mesh_as_wanted(
             Ok((pieces, made, Some(outcome)))
         }
         Wanted::Elements(count) => {
-            let mut pieces = most_pieces(count, LEAST_COARSE.max(LEAST_OF_PART * u64::from(parts)));
+            let mut pieces = most_pieces(count, LEAST_COARSE.max(LEAST_OF_PART * u64::from(parts)), order);
             loop {
                 let tets = count.div_ceil(u64::from(pieces).pow(3));
                 // Accept a coarse mesh near the goal for which some number of subdivisions fits.
                 let near = |made: u64| made >= tets / 2 && made <= 2 * tets;
-                let fits = |made: u64| near(made) && pieces_within(made, count).is_some();
+                let fits = |made: u64| near(made) && pieces_within(made, count, order).is_some();
                 let (made, outcome) = to_target(tets, pieces, &fits)?;
-                if let Some(pieces) = pieces_within(made.report.tets, count) {
+                if let Some(pieces) = pieces_within(made.report.tets, count, order) {
                     return Ok((pieces, made, Some(Outcome::Reached)));
                 }
                 if pieces == 1 {
                     return Ok((pieces, made, Some(outcome)));
                 }
                 // The coarse mesh is too fine for this many subdivisions: fewer reach the number.
-                pieces = (pieces - 1).min(most_pieces(count, made.report.tets));
+                pieces = (pieces - 1).min(most_pieces(count, made.report.tets, order));
             }
         }
     }
@@ -122,27 +124,28 @@ mod tests {
 
     #[test]
     fn pieces_are_chosen_that_give_the_number_and_little_more() {
-        assert_eq!(pieces_within(5_800, 1_400_000_000), Some(64));
-        assert_eq!(pieces_within(5_000, 5_000), Some(1));
-        assert_eq!(pieces_within(6_501, 5_000), None);
+        assert_eq!(pieces_within(5_800, 1_400_000_000, Order::First), Some(64));
+        assert_eq!(pieces_within(5_000, 5_000, Order::First), Some(1));
+        assert_eq!(pieces_within(6_501, 5_000, Order::First), None);
         // 17 and 19 subdivisions are skipped for 18 and 20.
-        assert_eq!(pieces_within(1_000, 17_u64.pow(3) * 1_000), Some(18));
-        assert_eq!(pieces_within(9, 10_000_000_000), None);
+        assert_eq!(pieces_within(1_000, 17_u64.pow(3) * 1_000, Order::First), Some(18));
+        assert_eq!(pieces_within(9, 10_000_000_000, Order::First), None);
     }
 
     #[test]
     fn nearly_every_coarse_mesh_fits_a_large_number() {
         for count in [100_000_000, 1_400_000_000, 10_000_000_000_u64] {
-            let fitting = (5_000..10_000).filter(|&tets| pieces_within(tets, count).is_some()).count();
+            let fitting =
+                (5_000..10_000).filter(|&tets| pieces_within(tets, count, Order::First).is_some()).count();
             assert!(fitting > 4_000, "{count}: {fitting}");
         }
     }
 
     #[test]
     fn the_most_pieces_leave_enough_coarse_tets() {
-        assert_eq!(most_pieces(1_400_000_000, 5_000), 64);
-        assert_eq!(most_pieces(39_999, 5_000), 1);
-        assert_eq!(most_pieces(40_000, 5_000), 2);
-        assert_eq!(most_pieces(100, 5_000), 1);
+        assert_eq!(most_pieces(1_400_000_000, 5_000, Order::First), 64);
+        assert_eq!(most_pieces(39_999, 5_000, Order::First), 1);
+        assert_eq!(most_pieces(40_000, 5_000, Order::First), 2);
+        assert_eq!(most_pieces(100, 5_000, Order::First), 1);
     }
 }

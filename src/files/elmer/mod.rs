@@ -38,6 +38,8 @@ pub use write::write;
 
 /// Elmer's element code of a four-node tet.
 const TET: u32 = 504;
+/// Elmer's code of the ten-node tet.
+const TET_10: u32 = 510;
 /// The longest line that Elmer reads in `.elements`, `.boundary` and `.shared`: characters,
 /// numbers.
 const MAX_LINE: (usize, usize) = (256, 64);
@@ -45,3 +47,5 @@ const MAX_LINE: (usize, usize) = (256, 64);
 const MAX_ID: u64 = i32::MAX as u64;
 /// Elmer's element code of a three-node triangle.
 const TRIANGLE: u32 = 303;
+/// Elmer's code of the six-node triangle.
+const TRIANGLE_6: u32 = 306;

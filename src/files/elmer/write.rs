@@ -2,8 +2,9 @@
 
 use super::names::names_text;
 use super::periodic::{self, periodic_text};
-use super::{MAX_ID, MAX_LINE, TET, TRIANGLE};
+use super::{MAX_ID, MAX_LINE, TET, TET_10, TRIANGLE, TRIANGLE_6};
 use crate::files::lines::{self, ByPatch, FLUSH_AT};
+use crate::files::node_order::{VTK, arranged};
 use crate::files::number::{Numbering, number, watchers};
 use crate::files::once::{LeftOut, left_out};
 use crate::files::output::{Output, write_text, write_together};
@@ -12,7 +13,7 @@ use crate::files::{WriteError, Written, sum_written};
 use crate::ground::comm::Communicator;
 use crate::ground::mesh::ghosts::Ghosts;
 use crate::ground::mesh::stream::{Counts, MeshStream, NO_TET, vertex_block_of};
-use crate::ground::mesh::{Names, Rank, TET_FACES};
+use crate::ground::mesh::{Names, Order, Rank, TET_FACES};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
@@ -154,9 +155,11 @@ impl Content<'_> {
         let (counts, totals) = (self.part.counts(), self.part.totals());
         let vertex = digits(totals.vertices) as u64 + 1;
         let tet = digits(totals.tets) as u64 + 1;
+        let order = self.part.order();
+        let (of_tet, of_triangle) = (order.tet_nodes() as u64, order.triangle_nodes() as u64);
         counts.vertices * (vertex + 3 + 3 * MEAN_FLOAT)
-            + counts.tets * (tet + 6 + 4 * vertex)
-            + counts.boundary * (tet + 17 + 3 * vertex)
+            + counts.tets * (tet + 6 + of_tet * vertex)
+            + counts.boundary * (tet + 17 + of_triangle * vertex)
             + self.numbering.shared * (vertex + 8)
     }
 
@@ -175,13 +178,14 @@ impl Content<'_> {
     /// The text of the header; `shared` is `None` for a serial mesh.
     fn header_text(&self, shared: Option<u64>) -> String {
         let (counts, boundary) = (self.part.counts(), self.boundary());
+        let [triangle, tet] = types(self.part.order());
         let mut text = format!("{} {} {boundary}\n", counts.vertices, counts.tets);
         if boundary > 0 {
-            text += &format!("2\n{TRIANGLE} {boundary}\n");
+            text += &format!("2\n{triangle} {boundary}\n");
         } else {
             text += "1\n";
         }
-        text += &format!("{TET} {}\n", counts.tets);
+        text += &format!("{tet} {}\n", counts.tets);
         if let Some(shared) = shared {
             text += &format!("{shared} 0\n");
         }
@@ -204,13 +208,15 @@ impl Content<'_> {
 
     fn write_elements(&self, path: &Path) -> Result<u64, WriteError> {
         let mut file = Output::create(path)?;
+        let [_, kind] = types(self.part.order());
         lines::tets(self.part, self.names, &mut file, |line, tet| {
             line.int(self.numbering.tet(tet.index));
             if let Some(ghost) = self.part.ghosts().and_then(|ghosts| ghosts.tet(tet.index)) {
                 line.bytes(b"/").int(u64::from(ghost.owner) + 1);
             }
-            line.blank().int(tet.number).blank().int(TET.into());
-            self.ids(line, tet.vertices);
+            line.blank().int(tet.number).blank().int(kind);
+            self.ids(line, tet.vertices.iter().copied());
+            self.ids(line, arranged(tet.edge_nodes, &VTK));
         })?;
         file.finish()
     }
@@ -218,6 +224,7 @@ impl Content<'_> {
     fn write_boundary(&self, path: &Path) -> Result<u64, WriteError> {
         let mut file = Output::create(path)?;
         let by_patch = ByPatch::of(self.part);
+        let [kind, _] = types(self.part.order());
         let behind_cuts = self.part.ghosts().map(ghost_faces).unwrap_or_default();
         lines::triangles(self.part, self.names, &by_patch, &self.left_out, &mut file, |line, triangle| {
             line.int(triangle.index + 1).blank().int(triangle.number);
@@ -227,14 +234,15 @@ impl Content<'_> {
             let ghost = behind_cuts.get(&ascending(*triangle.vertices));
             let parents = here.chain(ghost).map(|&tet| self.numbering.tet(tet));
             parents.chain([0, 0]).take(2).for_each(|parent| _ = line.blank().int(parent));
-            self.ids(line.blank().int(TRIANGLE.into()), triangle.vertices);
+            line.blank().int(kind);
+            self.ids(line, triangle.vertices.iter().chain(triangle.edge_nodes).copied());
         })?;
         file.finish()
     }
 
     /// Appends the file ids of vertices.
-    fn ids(&self, line: &mut Line, vertices: &[u32]) {
-        vertices.iter().for_each(|&v| _ = line.blank().int(self.numbering.vertices[v as usize].into()));
+    fn ids(&self, line: &mut Line, vertices: impl Iterator<Item = u32>) {
+        vertices.for_each(|v| _ = line.blank().int(self.numbering.vertices[v as usize].into()));
     }
 
     fn write_shared(&self, path: &Path) -> Result<u64, WriteError> {
@@ -282,6 +290,14 @@ impl Content<'_> {
             written.files += 1;
         }
         Ok(written)
+    }
+}
+
+/// Elmer's codes of triangles and tets of an order.
+fn types(order: Order) -> [u64; 2] {
+    match order {
+        Order::First => [TRIANGLE, TET].map(u64::from),
+        Order::Second => [TRIANGLE_6, TET_10].map(u64::from),
     }
 }
 

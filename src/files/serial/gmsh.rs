@@ -11,9 +11,10 @@ use super::runs::Runs;
 use super::{coordinates, listed};
 use crate::files::WriteError;
 use crate::files::joined::{Section, Whole};
+use crate::files::node_order::GMSH;
 use crate::files::text::Line;
 use crate::ground::comm::Communicator;
-use crate::ground::mesh::Names;
+use crate::ground::mesh::{Names, Order};
 
 /// **Collective.** The sections of the file.
 pub(super) fn sections<'a>(
@@ -46,19 +47,20 @@ fn sections_2<'a>(whole: &'a Whole<'a>, patches: Groups, bodies: Groups) -> Vec<
     let counts = whole.totals;
     let head = head("2.2", &patches, &bodies) + &format!("$Nodes\n{}\n", counts.vertices);
     let group = |groups: &Groups, of: usize| u64::from(groups.of[of][0]);
+    let [triangle_type, tet_type] = types(whole.order());
     vec![
         Section::Text(head),
         Section::Vertices(Box::new(|line, number, point| coordinates(line.int(number).blank(), point))),
         Section::Text(format!("$EndNodes\n$Elements\n{}\n", counts.boundary + counts.tets)),
         Section::Triangles(Box::new(move |line, triangle| {
             let group = group(&patches, triangle.patch.index());
-            line.int(whole.triangle(triangle)).bytes(b" 2 2 ").int(group).blank();
-            whole.ids(line.int(u64::from(triangle.patch.0) + 1), triangle.vertices);
+            line.int(whole.triangle(triangle)).blank().int(triangle_type).bytes(b" 2 ").int(group).blank();
+            whole.triangle_ids(line.int(u64::from(triangle.patch.0) + 1), triangle);
         })),
         Section::Tets(Box::new(move |line, tet| {
             let group = group(&bodies, tet.body.index());
-            line.int(counts.boundary + whole.tet(tet)).bytes(b" 4 2 ").int(group).blank();
-            whole.ids(line.int(u64::from(tet.body.0) + 1), tet.vertices);
+            line.int(counts.boundary + whole.tet(tet)).blank().int(tet_type).bytes(b" 2 ").int(group).blank();
+            whole.tet_ids(line.int(u64::from(tet.body.0) + 1), tet, &GMSH);
         })),
         Section::Text("$EndElements\n".into()),
     ]
@@ -77,6 +79,7 @@ fn sections_4<'a>(
     let [blocks] = comm.all_reduce_sum_u64([(of_patches.0.len() + of_bodies.0.len()) as u64])?;
     let first_body = of_bodies.0.first().map_or(1, |run| run.of + 1);
     let (n, elements) = (counts.vertices, counts.boundary + counts.tets);
+    let [triangle_type, tet_type] = types(whole.order());
     let head = head("4.1", patches, bodies)
         + &entities(whole.names, &bounds(comm, whole)?, patches, bodies)
         + &format!("$Nodes\n1 {n} 1 {n}\n3 {first_body} 0 {n}\n");
@@ -86,22 +89,31 @@ fn sections_4<'a>(
         Section::Vertices(Box::new(|line, _, point| coordinates(line, point))),
         Section::Text(format!("$EndNodes\n$Elements\n{blocks} {elements} 1 {elements}\n")),
         Section::Triangles(Box::new(move |line, triangle| {
-            begin_block(line, &of_patches, triangle.index, b"2 ", b" 2 ");
-            whole.ids(line.int(whole.triangle(triangle)), triangle.vertices);
+            begin_block(line, &of_patches, triangle.index, 2, triangle_type);
+            whole.triangle_ids(line.int(whole.triangle(triangle)), triangle);
         })),
         Section::Tets(Box::new(move |line, tet| {
-            begin_block(line, &of_bodies, tet.index, b"3 ", b" 4 ");
-            whole.ids(line.int(counts.boundary + whole.tet(tet)), tet.vertices);
+            begin_block(line, &of_bodies, tet.index, 3, tet_type);
+            whole.tet_ids(line.int(counts.boundary + whole.tet(tet)), tet, &GMSH);
         })),
         Section::Text(String::from("$EndElements\n") + &periodic(whole)),
     ])
 }
 
+/// Gmsh's numbers of triangles and tets of an order.
+fn types(order: Order) -> [u64; 2] {
+    match order {
+        Order::First => [2, 4],
+        Order::Second => [9, 11],
+    }
+}
+
 /// Starts a block before the first element of a run: dimension, entity, type, count.
-fn begin_block(line: &mut Line, runs: &Runs, element: u64, dimension: &[u8], kind: &[u8]) {
+fn begin_block(line: &mut Line, runs: &Runs, element: u64, dimension: u64, kind: u64) {
     let run = runs.find(element);
     if run.first == element {
-        line.bytes(dimension).int(u64::from(run.of) + 1).bytes(kind).int(run.count).bytes(b"\n");
+        line.int(dimension).blank().int(u64::from(run.of) + 1).blank().int(kind);
+        line.blank().int(run.count).bytes(b"\n");
     }
 }
 

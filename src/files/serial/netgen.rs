@@ -8,6 +8,7 @@ use super::{coordinates, listed};
 use crate::files::WriteError;
 use crate::files::domains;
 use crate::files::joined::{Section, Whole};
+use crate::files::node_order::{NETGEN, NETGEN_TRIANGLE, arranged};
 use crate::ground::comm::Communicator;
 use crate::ground::mesh::{Label, Names};
 use std::collections::{BTreeMap, BTreeSet};
@@ -45,12 +46,17 @@ pub(super) fn sections<'a>(
                 let domain = body.and_then(|body| of_domains.get(body.index())).copied().unwrap_or(0);
                 line.blank().int(domain.into());
             }
-            whole.ids(line.bytes(b" 3"), triangle.vertices);
+            whole.ids(line.blank().int(whole.order().triangle_nodes() as u64), triangle.vertices);
+            let edges: Vec<u32> = arranged(triangle.edge_nodes, &NETGEN_TRIANGLE).collect();
+            whole.ids(line, &edges);
         })),
         Section::Text(format!("volumeelements\n{}\n", counts.tets)),
         Section::Tets(Box::new(move |line, tet| {
             let [a, b, c, d] = *tet.vertices;
-            whole.ids(line.int(of_bodies[tet.body.index()].into()).bytes(b" 4"), &[b, a, c, d]);
+            line.int(of_bodies[tet.body.index()].into()).blank().int(whole.order().tet_nodes() as u64);
+            whole.ids(line, &[b, a, c, d]);
+            let edges: Vec<u32> = arranged(tet.edge_nodes, &NETGEN).collect();
+            whole.ids(line, &edges);
         })),
         Section::Text(format!("edgesegmentsgi2\n0\npoints\n{}\n", counts.vertices)),
         Section::Vertices(Box::new(|line, _, point| coordinates(line, point))),

@@ -3,6 +3,7 @@
 use crate::files::WriteError;
 use crate::files::chunks::{items, split, write_chunks};
 use crate::files::output::Output;
+use crate::ground::mesh::Order;
 use crate::ground::progress::Work;
 use std::path::{Path, PathBuf};
 
@@ -91,15 +92,20 @@ pub(super) struct Piece {
     pub attributes: Vec<(Section, &'static str)>,
     /// Numbers by name for the whole file: the names of bodies and boundaries.
     pub fields: Vec<(String, Vec<u32>)>,
+    /// The order of the elements.
+    pub order: Order,
     /// Whether the fields are in a comment. MFEM's reader accepts nothing before, beside or after
     /// the piece; VTK and meshio accept fields only there.
     pub hides_fields: bool,
 }
 
-/// VTK's number for a tet.
-const VTK_TETRA: u64 = 10;
-/// VTK's number for a triangle.
-const VTK_TRIANGLE: u64 = 5;
+/// VTK's numbers for triangles and tets of an order.
+fn types(order: Order) -> [u64; 2] {
+    match order {
+        Order::First => [5, 10],
+        Order::Second => [22, 24],
+    }
+}
 /// Length in bytes of the size that precedes each array.
 const LENGTH: u64 = 8;
 const END: &str = "\n </AppendedData>\n</VTKFile>\n";
@@ -121,8 +127,9 @@ pub(super) fn escaped(text: &str) -> String {
 
 impl Piece {
     /// A piece of tets followed by triangles. Vertex numbers have 32 bits if they fit.
-    pub fn new(points: u64, tets: u64, triangles: u64) -> Self {
-        let (cells, corners) = (tets + triangles, 4 * tets + 3 * triangles);
+    pub fn new(points: u64, tets: u64, triangles: u64, order: Order) -> Self {
+        let (of_tet, of_triangle) = (order.tet_nodes() as u64, order.triangle_nodes() as u64);
+        let (cells, corners) = (tets + triangles, of_tet * tets + of_triangle * triangles);
         let id = if points.max(corners) <= i32::MAX as u64 { Kind::I32 } else { Kind::I64 };
         let mut piece = Self {
             points,
@@ -130,6 +137,7 @@ impl Piece {
             arrays: Vec::new(),
             attributes: Vec::new(),
             fields: Vec::new(),
+            order,
             hides_fields: false,
         };
         piece.add_field(Section::Points, "Points", 3, points);
@@ -286,9 +294,12 @@ impl PieceFile<'_> {
 
     /// Fills the offsets and types of the cells: `tets` tets, then triangles.
     pub fn fill_cells(&self, tets: u64) -> Result<(), WriteError> {
-        let end = |count: u64| 4 * count.min(tets) + 3 * count.saturating_sub(tets);
+        let order = self.piece.order;
+        let (of_tet, of_triangle) = (order.tet_nodes() as u64, order.triangle_nodes() as u64);
+        let end = |count: u64| of_tet * count.min(tets) + of_triangle * count.saturating_sub(tets);
+        let [triangle, tet] = types(order);
         self.fill("offsets", |cell| end(cell + 1))?;
-        self.fill("types", |cell| if cell < tets { VTK_TETRA } else { VTK_TRIANGLE })
+        self.fill("types", |cell| if cell < tets { tet } else { triangle })
     }
 
     /// Flushes the file to disk and returns its length.

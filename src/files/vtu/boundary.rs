@@ -3,8 +3,8 @@
 use super::arrays::{Kind, Piece, Section};
 use super::fields::{self, Field, On};
 use crate::files::{WriteError, patch_number};
-use crate::ground::mesh::Names;
 use crate::ground::mesh::stream::{BoundaryBlock, MeshStream, NO_TET};
+use crate::ground::mesh::{Names, Order};
 use std::path::Path;
 
 /// A vertex that no triangle uses.
@@ -17,6 +17,7 @@ pub(super) struct Surface {
     vertices: u64,
     triangles: u64,
     several_parts: bool,
+    order: Order,
 }
 
 impl Surface {
@@ -25,7 +26,8 @@ impl Surface {
         let mut block = BoundaryBlock::default();
         for index in 0..part.boundary_blocks() {
             part.boundary_block(index, &mut block);
-            block.triangles.iter().flatten().for_each(|&v| to_surface[v as usize] = 0);
+            let nodes = block.triangles.as_flattened().iter().chain(block.edge_nodes.as_flattened());
+            nodes.for_each(|&v| to_surface[v as usize] = 0);
         }
         let mut vertices = 0;
         for place in to_surface.iter_mut().filter(|place| **place != UNUSED) {
@@ -37,12 +39,13 @@ impl Surface {
             vertices: vertices.into(),
             triangles: part.counts().boundary,
             several_parts: part.ranks() > 1,
+            order: part.order(),
         }
     }
 
     /// Describes the arrays of the triangles, with the fields on points.
     pub fn piece(&self, fields: &[Field<'_>]) -> Piece {
-        let mut piece = Piece::new(self.vertices, 0, self.triangles);
+        let mut piece = Piece::new(self.vertices, 0, self.triangles, self.order);
         piece.add(Section::PointData, "GlobalNodeId", Kind::I64, self.vertices);
         fields::add(&mut piece, fields, On::Points, self.vertices);
         piece.add(Section::CellData, "BoundaryId", Kind::I32, self.triangles);
@@ -116,8 +119,9 @@ impl Triangles {
         for index in 0..part.boundary_blocks() {
             part.boundary_block(index, &mut block);
             let number = patch_number(block.patch, names)? as u32;
-            for (corners, parents) in block.triangles.iter().zip(&block.parents) {
-                corners.iter().for_each(|&v| kind.push(vertex(v), &mut triangles.connectivity));
+            for (index, (corners, parents)) in block.triangles.iter().zip(&block.parents).enumerate() {
+                let nodes = corners.iter().chain(block.edge_nodes_of(index));
+                nodes.for_each(|&v| kind.push(vertex(v), &mut triangles.connectivity));
                 triangles.numbers.push(number);
                 // An outer patch has its body behind it. If there is no tet behind, the other part
                 // has the original.

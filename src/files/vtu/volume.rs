@@ -5,6 +5,7 @@ use super::arrays::{Kind, Piece, PieceFile, Section};
 use super::boundary::Triangles;
 use super::fields::{self, Field, On};
 use crate::files::chunks::{items, split, write_chunks};
+use crate::files::node_order::{VTK, arranged};
 use crate::files::{WriteError, body_number};
 use crate::ground::mesh::Names;
 use crate::ground::mesh::stream::{MeshStream, TetBlock};
@@ -26,7 +27,8 @@ const PER_CHUNK: u64 = 1 << 14;
 pub(super) fn piece(part: &dyn MeshStream, boundary: Boundary, fields: &[Field<'_>]) -> Piece {
     let counts = part.counts();
     let (mixed, several) = (boundary == Boundary::In, part.ranks() > 1);
-    let mut piece = Piece::new(counts.vertices, counts.tets, if mixed { counts.boundary } else { 0 });
+    let mut piece =
+        Piece::new(counts.vertices, counts.tets, if mixed { counts.boundary } else { 0 }, part.order());
     piece.attributes = vec![(Section::PointData, " GlobalIds=\"GlobalNodeId\"")];
     piece.add(Section::PointData, "GlobalNodeId", Kind::I64, counts.vertices);
     if several {
@@ -137,8 +139,9 @@ fn write_tets(file: &PieceFile, part: &dyn MeshStream, names: &Names) -> Result<
         for index in items(chunk, per_chunk, part.tet_blocks()) {
             part.tet_block(index, &mut block);
             let body = body_number(block.body, names)?;
-            for (tet, global) in block.tets.iter().zip(block.first_id..) {
-                tet.iter().for_each(|&v| id.push(v.into(), connectivity));
+            for (index, (tet, global)) in block.tets.iter().zip(block.first_id..).enumerate() {
+                let edges = arranged(block.edge_nodes_of(index), &VTK);
+                tet.iter().copied().chain(edges).for_each(|v| id.push(v.into(), connectivity));
                 Kind::I64.push(global, ids);
                 Kind::I32.push(body, bodies);
             }
@@ -166,7 +169,8 @@ fn write_tets(file: &PieceFile, part: &dyn MeshStream, names: &Names) -> Result<
 /// Writes the arrays of the triangles that follow the tets; returns which triangles are copies.
 fn write_triangles(file: &PieceFile, part: &dyn MeshStream, names: &Names) -> Result<Vec<u8>, WriteError> {
     let counts = part.counts();
-    let (mut connectivity, id) = file.array_from("connectivity", 4 * counts.tets)?;
+    let (mut connectivity, id) =
+        file.array_from("connectivity", part.order().tet_nodes() as u64 * counts.tets)?;
     let triangles = Triangles::of(part, names, id, u64::from)?;
     connectivity.write(&triangles.connectivity)?;
     let (mut bodies, kind) = file.array_from("BodyId", counts.tets)?;

@@ -4,6 +4,7 @@ pub(crate) mod fixed;
 pub(crate) mod hash;
 pub mod hilbert;
 mod integers;
+pub mod jacobian;
 pub(crate) mod nearest;
 pub(crate) mod places;
 pub mod predicates;

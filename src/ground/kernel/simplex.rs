@@ -9,6 +9,12 @@ pub const TET_FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 
 /// The edges of a tet, in lexicographic order.
 pub const TET_EDGES: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
 
+/// The edges of a triangle, around it.
+pub const TRIANGLE_EDGES: [[usize; 2]; 3] = [[0, 1], [1, 2], [2, 0]];
+
+/// `EDGE_BETWEEN[i][j]`: the position in [`TET_EDGES`] of the edge between vertices i and j.
+pub const EDGE_BETWEEN: [[usize; 4]; 4] = [[6, 0, 1, 2], [0, 6, 3, 4], [1, 3, 6, 5], [2, 4, 5, 6]];
+
 /// For a directed edge i→j of a tet, the other two vertices k, l such that (i, j, k, l) is an even
 /// permutation.
 #[rustfmt::skip]

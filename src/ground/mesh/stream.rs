@@ -10,9 +10,11 @@
 //! tet block     = the children of one coarse tet: contiguous global ids, one body
 //! boundary block= the children of one boundary triangle, with the fine tets beside them
 //! ```
+//! In a mesh of [second order](Order::Second) the vertices include the nodes on edges, and blocks
+//! list these in addition to the corners of tets and triangles.
 
 use super::ghosts::Ghosts;
-use super::{GlobalId, Rank};
+use super::{GlobalId, Order, Rank};
 use crate::ground::mesh::periodic::Link;
 use crate::ground::progress::Work;
 use csg::{BodyId, PatchId};
@@ -22,7 +24,7 @@ use std::ops::Range;
 /// Counts of one part or of the whole mesh.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
-    /// Vertices (copies counted, in a part).
+    /// Vertices (copies counted, in a part), with the nodes on edges of a mesh of second order.
     pub vertices: u64,
     /// Tets.
     pub tets: u64,
@@ -46,8 +48,11 @@ pub struct VertexBlock<'a> {
 /// The children of one coarse tet.
 #[derive(Clone, Debug, Default)]
 pub struct TetBlock {
-    /// Vertices by local index, positively oriented.
+    /// Corners by local index, positively oriented.
     pub tets: Vec<[u32; 4]>,
+    /// For second order, the nodes on the edges of each tet by local index, in the order of
+    /// [`TET_EDGES`](super::TET_EDGES); otherwise empty.
+    pub edge_nodes: Vec<[u32; 6]>,
     /// Global id of the first; the others are consecutive.
     pub first_id: GlobalId,
     /// Index of the first in the part; the others are consecutive.
@@ -69,8 +74,11 @@ pub struct LocalBlock {
 /// The children of one boundary triangle.
 #[derive(Clone, Debug, Default)]
 pub struct BoundaryBlock {
-    /// Vertices by local index; right-hand normals from the patch's inside to its outside.
+    /// Corners by local index; right-hand normals from the patch's inside to its outside.
     pub triangles: Vec<[u32; 3]>,
+    /// For second order, the nodes on the edges of each triangle by local index, in the order of
+    /// [`TRIANGLE_EDGES`](super::TRIANGLE_EDGES); otherwise empty.
+    pub edge_nodes: Vec<[u32; 3]>,
     /// For each triangle the fine tets of this part behind and in front of it, as indices in the
     /// part (`first_local` + position), or [`NO_TET`]. On each side either all triangles of a block
     /// have a tet or none, and these tets are in one tet block.
@@ -99,6 +107,10 @@ pub trait MeshStream: Sync {
     fn rank(&self) -> Rank;
     /// The number of parts.
     fn ranks(&self) -> u32;
+    /// The order of the elements.
+    fn order(&self) -> Order {
+        Order::First
+    }
     /// Counts of this part.
     fn counts(&self) -> Counts;
     /// Counts of the whole mesh; shared vertices and triangles count once.
@@ -132,6 +144,11 @@ pub trait MeshStream: Sync {
             let first = block.vertices.len() as u32;
             block.vertices.extend(*tet);
             *tet = [first, first + 1, first + 2, first + 3];
+        }
+        for nodes in &mut block.tets.edge_nodes {
+            let first = block.vertices.len() as u32;
+            block.vertices.extend(*nodes);
+            *nodes = [0, 1, 2, 3, 4, 5].map(|k| first + k);
         }
     }
     /// Replaces `ids` by the global ids of the vertices of a block of this stream.
@@ -211,6 +228,22 @@ impl LocalBlock {
     /// The vertices of a tet by local index.
     pub fn tet(&self, index: usize) -> Option<[u32; 4]> {
         self.tets.tets.get(index).map(|tet| tet.map(|k| self.vertices[k as usize]))
+    }
+}
+
+impl TetBlock {
+    /// The nodes on the edges of a tet, if it is of second order.
+    #[inline]
+    pub fn edge_nodes_of(&self, tet: usize) -> &[u32] {
+        self.edge_nodes.get(tet).map_or(&[], |nodes| nodes)
+    }
+}
+
+impl BoundaryBlock {
+    /// The nodes on the edges of a triangle, if it is of second order.
+    #[inline]
+    pub fn edge_nodes_of(&self, triangle: usize) -> &[u32] {
+        self.edge_nodes.get(triangle).map_or(&[], |nodes| nodes)
     }
 }
 

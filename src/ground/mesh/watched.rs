@@ -3,7 +3,7 @@
 use super::ghosts::Ghosts;
 use super::periodic::Link;
 use super::stream::{BoundaryBlock, Counts, LocalBlock, MeshStream, SingularTags, TetBlock, VertexBlock};
-use super::{GlobalId, Rank};
+use super::{GlobalId, Order, Rank};
 use crate::ground::progress::Work;
 use std::borrow::Cow;
 
@@ -29,6 +29,10 @@ impl MeshStream for Watched<'_> {
 
     fn ranks(&self) -> u32 {
         self.part.ranks()
+    }
+
+    fn order(&self) -> Order {
+        self.part.order()
     }
 
     fn counts(&self) -> Counts {

@@ -2,8 +2,8 @@
 
 use super::{Fault, OffSurface, PartReport, Settings};
 use crate::Point;
-use crate::ground::mesh::TET_FACES;
 use crate::ground::mesh::stream::{BoundaryBlock, LocalBlock, MeshStream, NO_TET, TetBlock};
+use crate::ground::mesh::{EDGE_BETWEEN, TET_FACES, TRIANGLE_EDGES};
 use crate::ground::projector::Projector;
 
 /// A side of a boundary block that has tets: the first tet, the block, and whether the tets are
@@ -28,7 +28,8 @@ pub(super) fn check_block(
     stream.boundary_block(index, block);
     let points = stream.points();
     let missing = |v: &&u32| **v as usize >= points.len();
-    if let Some(&vertex) = block.triangles.iter().flatten().find(missing) {
+    let nodes = || block.triangles.as_flattened().iter().chain(block.edge_nodes.as_flattened());
+    if let Some(&vertex) = nodes().find(missing) {
         report.add_fault(Fault::NoSuchVertex { rank: stream.rank(), vertex }, settings.described);
         return report;
     }
@@ -42,7 +43,7 @@ pub(super) fn check_block(
     }
     if let (Some(projector), Some(patch)) = (projector, block.patch) {
         let mut off = Vec::new();
-        for &vertex in block.triangles.iter().flatten() {
+        for &vertex in nodes() {
             let place = points[vertex as usize];
             let distance = projector.patch_distance(patch, &Point::from(place)).abs();
             if report.furthest.is_none_or(|f| distance >= f.distance) {
@@ -50,7 +51,8 @@ pub(super) fn check_block(
                 let this = OffSurface { distance, vertex, patch: patch.0, place };
                 report.furthest = Some(report.furthest.map_or(this, |f| f.further(this)));
             }
-            if distance > projector.tolerance() || distance.is_nan() {
+            let may_be_off = || settings.off_surface.binary_search(&stream.vertex_id(vertex)).is_ok();
+            if (distance > projector.tolerance() || distance.is_nan()) && !may_be_off() {
                 off.push(vertex);
             }
         }
@@ -84,12 +86,18 @@ pub(super) fn check_parents(
     report: &mut PartReport,
 ) {
     stream.boundary_block(side.block as usize, block);
-    for (triangle, parents) in block.triangles.iter().zip(&block.parents) {
+    for (index, (triangle, parents)) in block.triangles.iter().zip(&block.parents).enumerate() {
         let parent = parents[usize::from(!side.behind)];
-        let tet = parent.checked_sub(tets.tets.first_local).and_then(|i| tets.tet(usize::try_from(i).ok()?));
+        let place = parent.checked_sub(tets.tets.first_local).and_then(|i| usize::try_from(i).ok());
         let [p, q, r] = *triangle;
         let outward = if side.behind { [p, q, r] } else { [p, r, q] };
-        if !tet.is_some_and(|tet| has_face(&tet, outward)) {
+        let fits = |place: usize| {
+            let tet = tets.tet(place)?;
+            Some(
+                has_face(&tet, outward) && has_edges(&tet, tets, place, triangle, block.edge_nodes_of(index)),
+            )
+        };
+        if place.and_then(fits) != Some(true) {
             report.add_fault(wrong_parent(stream, *triangle), settings.described);
         }
     }
@@ -99,6 +107,15 @@ pub(super) fn check_parents(
 fn has_face(tet: &[u32; 4], [p, q, r]: [u32; 3]) -> bool {
     let faces = TET_FACES.map(|face| face.map(|k| tet[k]));
     faces.iter().any(|face| [[p, q, r], [q, r, p], [r, p, q]].contains(face))
+}
+
+/// Whether the nodes on the edges of a triangle are those of the tet at `place`.
+fn has_edges(tet: &[u32; 4], tets: &LocalBlock, place: usize, triangle: &[u32; 3], nodes: &[u32]) -> bool {
+    let of_tet = tets.tets.edge_nodes_of(place);
+    nodes.iter().zip(TRIANGLE_EDGES).all(|(node, ends)| {
+        let [p, q] = ends.map(|end| tet.iter().position(|v| *v == triangle[end]).unwrap_or(0));
+        of_tet.get(EDGE_BETWEEN[p][q]).is_some_and(|&k| tets.vertices[k as usize] == *node)
+    })
 }
 
 /// The fault of a triangle that is not a face of its parent tet.

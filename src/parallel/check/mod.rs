@@ -10,6 +10,7 @@
 pub mod angles;
 pub mod boundary;
 pub mod checksum;
+mod curved;
 pub mod part;
 pub mod report;
 pub mod shape;
@@ -32,6 +33,17 @@ pub enum Fault {
         /// The global id of the tet.
         tet: GlobalId,
         /// Its centroid.
+        #[serde(deserialize_with = "lenient::place")]
+        place: [f64; 3],
+    },
+    /// A tet of second order whose Jacobian determinant is not proved positive.
+    NotProved {
+        /// The global id of the tet.
+        tet: GlobalId,
+        /// A lower bound of its scaled Jacobian: about the smallest determinant divided by the largest.
+        #[serde(deserialize_with = "lenient::number")]
+        scaled: f64,
+        /// The centroid of its corners.
         #[serde(deserialize_with = "lenient::place")]
         place: [f64; 3],
     },
@@ -85,6 +97,10 @@ impl std::fmt::Display for Fault {
             Self::NotPositive { tet, place: [x, y, z] } => {
                 write!(out, "tet {tet} at ({x}, {y}, {z}) is inverted or flat")
             }
+            Self::NotProved { tet, scaled, place: [x, y, z] } => write!(
+                out,
+                "the ten-node tet {tet} at ({x}, {y}, {z}) is not proved valid: its scaled Jacobian is {scaled:.3} or more"
+            ),
             Self::NoSuchVertex { rank, vertex } => {
                 write!(out, "part {rank} names a vertex {vertex} it does not have")
             }

@@ -3,8 +3,9 @@
 use super::boundary::{Side, check_block, check_parents, check_range, sides_of};
 use super::report::{Extreme, PartReport, RATIO_BINS, ShapeReport};
 use super::shape::{Batch, Extremes, Shapes};
-use super::{Fault, angles};
+use super::{Fault, angles, curved};
 use crate::ground::comm::{CommError, Communicator};
+use crate::ground::mesh::GlobalId;
 use crate::ground::mesh::stream::{BoundaryBlock, LocalBlock, MeshStream};
 use crate::ground::projector::Projector;
 use rayon::prelude::*;
@@ -12,16 +13,18 @@ use std::ops::Range;
 
 /// Parameters of the check.
 #[derive(Clone, Copy, Debug)]
-pub struct Settings {
+pub struct Settings<'a> {
     /// Whether to measure the shapes of the tets.
     pub shapes: bool,
     /// The maximum number of faults that are described one by one.
     pub described: usize,
+    /// Vertices that may be off the surface: global ids, ascending.
+    pub off_surface: &'a [GlobalId],
 }
 
-impl Default for Settings {
+impl Default for Settings<'_> {
     fn default() -> Self {
-        Self { shapes: true, described: 8 }
+        Self { shapes: true, described: 8, off_surface: &[] }
     }
 }
 
@@ -196,6 +199,7 @@ fn check_chunk(
                 flush(batch, shapes, body, settings, &mut report);
             }
         }
+        curved::check_block(block, points, settings, &mut report);
         for side in sides_of(sides, tets) {
             check_parents(stream, *side, block, boundary, settings, &mut report);
         }
@@ -225,13 +229,7 @@ fn flush(
         }
     }
     report.tets += batch.len() as u64;
-    report.volume += volume6 / 6.0;
-    if let Some(body) = body {
-        if report.body_volumes.len() <= body.index() {
-            report.body_volumes.resize(body.index() + 1, 0.0);
-        }
-        report.body_volumes[body.index()] += volume6 / 6.0;
-    }
+    report.add_volume(body, volume6 / 6.0);
     if settings.shapes {
         let extremes = batch.shapes(shapes);
         add_shapes(batch, shapes, extremes, &mut report.shape);

@@ -3,6 +3,7 @@
 use super::Fault;
 use super::angles::DEGREES;
 use crate::ground::mesh::GlobalId;
+use csg::BodyId;
 use serde::{Deserialize, Serialize};
 
 /// JSON has no NaN or infinity: they are written as null, and read as NaN.
@@ -37,7 +38,7 @@ pub struct Extreme {
 
 impl Extreme {
     /// The smaller of two.
-    fn least(self, other: Self) -> Self {
+    pub(super) fn least(self, other: Self) -> Self {
         let first = self.value < other.value || self.value == other.value && self.tet <= other.tet;
         if first { self } else { other }
     }
@@ -195,11 +196,25 @@ pub struct PartReport {
     pub described: Vec<Fault>,
     /// The shapes of the tets; absent if there are none or shapes were not requested.
     pub shape: Option<ShapeReport>,
+    /// The smallest scaled Jacobian of the tets; absent for first order.
+    #[serde(default)]
+    pub scaled_jacobian: Option<Extreme>,
     /// The boundary vertex furthest from its patch; absent without boundary vertices or geometry.
     pub furthest: Option<OffSurface>,
 }
 
 impl PartReport {
+    /// Adds to the volume of the mesh, and to that of a body.
+    pub(super) fn add_volume(&mut self, body: Option<BodyId>, volume: f64) {
+        self.volume += volume;
+        if let Some(body) = body {
+            if self.body_volumes.len() <= body.index() {
+                self.body_volumes.resize(body.index() + 1, 0.0);
+            }
+            self.body_volumes[body.index()] += volume;
+        }
+    }
+
     /// Merges the results of another part, which comes after this one.
     ///
     /// Associative except for the rounding of the sums of volumes and mean ratios.
@@ -220,6 +235,10 @@ impl PartReport {
             (Some(mine), Some(others)) => mine.merge(&others),
             (mine, others) => *mine = mine.take().or(others),
         }
+        self.scaled_jacobian = match (self.scaled_jacobian, other.scaled_jacobian) {
+            (Some(mine), Some(others)) => Some(mine.least(others)),
+            (mine, others) => mine.or(others),
+        };
         self.furthest = match (self.furthest, other.furthest) {
             (Some(mine), Some(others)) => Some(mine.further(others)),
             (mine, others) => mine.or(others),

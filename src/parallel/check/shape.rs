@@ -35,7 +35,7 @@ pub struct Shapes {
     pub largest: [f64; BATCH],
 }
 
-/// The smallest mean ratio of a batch, and the cosines of its smallest and largest dihedral angles.
+/// The worst shapes of some tets.
 #[derive(Clone, Copy, Debug)]
 pub struct Extremes {
     /// The smallest mean ratio.
@@ -44,11 +44,13 @@ pub struct Extremes {
     pub smallest: f64,
     /// The smallest cosine: that of the largest angle.
     pub largest: f64,
+    /// The smallest scaled Jacobian of tets of second order; 1 for first order.
+    pub scaled_jacobian: f64,
 }
 
 impl Extremes {
     /// The neutral element: no tet is better.
-    pub const NONE: Self = Self { mean_ratio: 1.0, smallest: -1.0, largest: 1.0 };
+    pub const NONE: Self = Self { mean_ratio: 1.0, smallest: -1.0, largest: 1.0, scaled_jacobian: 1.0 };
 
     /// The extremes of the union of two sets of tets.
     pub fn with(self, other: Self) -> Self {
@@ -56,6 +58,7 @@ impl Extremes {
             mean_ratio: self.mean_ratio.min(other.mean_ratio),
             smallest: self.smallest.max(other.smallest),
             largest: self.largest.min(other.largest),
+            scaled_jacobian: self.scaled_jacobian.min(other.scaled_jacobian),
         }
     }
 }
@@ -226,6 +229,7 @@ impl Wide for Measures<'_> {
             mean_ratio: least(&shapes.mean_ratio, 1.0),
             smallest: -least(&shapes.smallest, -1.0),
             largest: least(&shapes.largest, 1.0),
+            scaled_jacobian: 1.0,
         }
     }
 }

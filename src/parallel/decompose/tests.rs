@@ -49,6 +49,7 @@ fn settings(planes: Vec<CutPlane>) -> GenerateSettings {
         memory: None,
         disk: None,
         nested: false,
+        allow_off_surface: false,
         periodic_together: false,
     }
 }

@@ -54,8 +54,20 @@ impl TetDiagonals<'_> {
     /// The diagonal (0 to 2) of an octahedron of the tet.
     #[inline]
     pub fn get(self, octahedron: u32) -> u8 {
-        self.0[octahedron as usize / 4] >> (octahedron % 4 * 2) & 3
+        get(self.0, octahedron)
     }
+}
+
+/// The diagonal of an octahedron in packed diagonals.
+#[inline]
+pub fn get(bytes: &[u8], octahedron: u32) -> u8 {
+    bytes[octahedron as usize / 4] >> (octahedron % 4 * 2) & 3
+}
+
+/// Replaces the diagonal of an octahedron.
+pub fn replace(bytes: &mut [u8], octahedron: u32, diagonal: u8) {
+    bytes[octahedron as usize / 4] &= !(3 << (octahedron % 4 * 2));
+    set(bytes, octahedron, diagonal);
 }
 
 /// Sets the diagonal of an octahedron. The bits must be zero before.

@@ -21,7 +21,7 @@ use super::snap::{self, Coordinates};
 use super::tet::BadTet;
 use super::trial::{CHUNK, Least, curved, worst_children};
 use super::{RefineError, RefinedMesh, Settings as RefineSettings, refine_unchecked};
-use crate::ground::mesh::{EdgeId, GlobalId, TetId};
+use crate::ground::mesh::{EdgeId, GlobalId, Order, TetId};
 use crate::ground::projector::Projector;
 use crate::parallel::distribution::DistMesh;
 use rayon::prelude::*;
@@ -43,12 +43,13 @@ pub struct Settings {
     pub margin: f64,
     /// The search stops improving a child that exceeds the bound by this; units as `margin`.
     pub enough: f64,
+    /// The order of the elements to prepare for.
+    pub order: Order,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        let least = Least { mean_ratio: 0.0, dihedral: 0.0 };
-        Self { pieces: 8, rounds: 8, least, margin: 0.05, enough: 0.2 }
+        Self { pieces: 8, rounds: 8, least: Least::VALID, margin: 0.05, enough: 0.2, order: Order::First }
     }
 }
 
@@ -184,6 +185,7 @@ impl Trial<'_> {
         let settings = RefineSettings {
             described: 0,
             displacements: self.displacements.clone(),
+            order: self.settings.order,
             ..RefineSettings::default()
         };
         refine_unchecked(part, self.projector, self.pieces, &settings)

@@ -18,6 +18,8 @@
 //! [`MeshStream`]: crate::ground::mesh::stream::MeshStream
 
 pub mod blend;
+mod curved;
+mod cut;
 pub mod diagonal;
 pub mod displacements;
 pub mod lattice;
@@ -31,6 +33,7 @@ pub mod refined;
 mod run;
 pub mod snap;
 pub mod stored;
+mod straight;
 mod tet;
 pub mod trial;
 
@@ -40,17 +43,20 @@ pub use periodic_check::{PeriodicCheck, check_periodic};
 pub use predicted::{PredictedCounts, predicted_counts};
 pub use refined::RefinedMesh;
 pub use stored::StoredMesh;
+pub use straight::refine_straightening;
 pub use trial::{Least, Trial, trial};
 
 #[cfg(test)]
 pub(crate) mod fixtures;
+#[cfg(test)]
+mod order_tests;
 #[cfg(test)]
 mod scale_tests;
 #[cfg(test)]
 mod tests;
 
 use crate::ground::error::{ErrorKind, HasKind};
-use crate::ground::mesh::{GlobalId, Rank};
+use crate::ground::mesh::{GlobalId, Order, Rank};
 use crate::ground::progress::{Cancelled, Work};
 use crate::ground::projector::Projector;
 use crate::parallel::check::Fault;
@@ -70,6 +76,10 @@ pub struct Settings {
     /// coarse tet, so that successive levels are nested ([`parents::of_tets`]). Otherwise each
     /// octahedron is cut along its own best diagonal.
     pub nested: bool,
+    /// The order of the elements.
+    pub order: Order,
+    /// Nodes on edges that are not snapped, so that their edges are straight: global ids, ascending.
+    pub straight: Vec<GlobalId>,
 }
 
 /// Which coordinates a refined mesh stores; they are nearly all of its memory.
@@ -85,7 +95,14 @@ pub enum Keep {
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { described: 8, displacements: EdgeDisplacements::default(), keep: Keep::All, nested: false }
+        Self {
+            described: 8,
+            displacements: EdgeDisplacements::default(),
+            keep: Keep::All,
+            nested: false,
+            order: Order::First,
+            straight: Vec::new(),
+        }
     }
 }
 
@@ -93,10 +110,12 @@ impl Default for Settings {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RefineError {
     /// Zero subdivisions per edge, or more than the finest lattice has.
-    #[error("an edge cannot be cut into {n} pieces: 1 to {} are possible", lattice::MAX_PIECES)]
+    #[error("an edge cannot be cut into {n} pieces: 1 to {most} are possible")]
     Pieces {
         /// The requested subdivisions per edge.
         n: u32,
+        /// The most that are possible with elements of this order.
+        most: u32,
     },
     /// Local vertex ids are 32-bit.
     #[error("rank {rank} would hold {needed} vertices, above the {} of one part: take more parts", u32::MAX)]
@@ -206,8 +225,9 @@ fn refine_reporting(
     settings: &Settings,
     work: &Work,
 ) -> Result<(RefinedMesh, Vec<tet::BadTet>), RefineError> {
-    let numbering = numbering::Numbering::new(&mesh, n)?;
-    let points = snap::boundary_first(&mesh, projector, &numbering, settings)?;
+    let numbering = numbering::Numbering::new(&mesh, n, settings.order)?;
+    let mut points = snap::boundary_first(&mesh, projector, &numbering, settings)?;
+    straight::straighten(&mesh, &numbering, &settings.straight, &mut points);
     work.expect(mesh.tets.len() as u64 * u64::from(n).pow(3));
     work.step(0.0, 1.0, mesh.tets.len() as u64);
     let (inside, bad) = tet::fill(&mesh, projector, &numbering, points, settings, work)?;
@@ -215,12 +235,14 @@ fn refine_reporting(
     Ok((RefinedMesh::new(mesh, numbering, inside), bad))
 }
 
-/// Passes on a number of subdivisions per edge that a lattice can have.
+/// Passes on a number of subdivisions per edge that a mesh of this order can have.
 ///
 /// # Errors
-/// [`RefineError::Pieces`] unless it is 1 to [`MAX_PIECES`](lattice::MAX_PIECES).
-pub fn possible_pieces(n: u32) -> Result<u32, RefineError> {
-    if (1..=lattice::MAX_PIECES).contains(&n) { Ok(n) } else { Err(RefineError::Pieces { n }) }
+/// [`RefineError::Pieces`] unless it is 1 to [`MAX_PIECES`](lattice::MAX_PIECES), or half of that
+/// for second order.
+pub fn possible_pieces(n: u32, order: Order) -> Result<u32, RefineError> {
+    let most = lattice::MAX_PIECES / order.degree();
+    if (1..=most).contains(&n) { Ok(n) } else { Err(RefineError::Pieces { n, most }) }
 }
 
 /// The smallest number of subdivisions per edge with which `coarse` tets become at least `wanted`.

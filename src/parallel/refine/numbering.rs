@@ -5,6 +5,9 @@
 //!     local and global alike:
 //!     | coarse vertices | n−1 for each edge | C(n−1,2) for each face | C(n−1,3) for each tet |
 //! ```
+//! n is the number of subdivisions per edge; for second order, whose nodes include the middles of the
+//! edges of all tets, it is twice that: nodes have the ids of the vertices of the next level.
+//!
 //! Points in an edge or face are numbered by the ascending global ids of its vertices, points in a
 //! tet by the order of its vertices. So all ranks that share an entity agree without messages.
 
@@ -12,7 +15,9 @@ use super::lattice::{Lattice, for_each_face_child};
 use super::{RefineError, possible_pieces};
 use crate::ground::kernel::simplex::from_lowest;
 use crate::ground::mesh::stream::Counts;
-use crate::ground::mesh::{Class, EdgeId, GlobalId, Rank, TET_EDGES, TET_FACES, TetId};
+use crate::ground::mesh::{
+    Class, EDGE_BETWEEN, EdgeId, FaceId, GlobalId, Order, Rank, TET_EDGES, TET_FACES, TRIANGLE_EDGES, TetId,
+};
 use crate::parallel::distribution::{DistMesh, Totals};
 use std::ops::Range;
 
@@ -32,6 +37,9 @@ struct Kind {
 /// The numbering of the fine vertices of one part.
 #[derive(Clone, Debug)]
 pub struct Numbering {
+    /// The lattice of the tets.
+    cells: Lattice,
+    /// The lattice of the vertices: finer for second order.
     lattice: Lattice,
     /// By dimension: vertices, edges, faces, tets.
     kinds: [Kind; 4],
@@ -85,8 +93,12 @@ impl Entity {
     }
 }
 
-/// Counts of the whole fine mesh, from those of the coarse mesh.
-pub fn fine_totals(coarse: &Totals, lattice: Lattice) -> Counts {
+/// Counts of the whole fine mesh, from those of the coarse mesh, with `n` subdivisions per edge.
+///
+/// # Panics
+/// If no lattice has so many.
+pub fn fine_totals(coarse: &Totals, n: u32, order: Order) -> Counts {
+    let [cells, lattice] = [n, n * order.degree()].map(Lattice::new);
     let counts = [coarse.vertices, coarse.edges, coarse.faces, coarse.tets];
     Counts {
         vertices: counts
@@ -94,8 +106,8 @@ pub fn fine_totals(coarse: &Totals, lattice: Lattice) -> Counts {
             .zip(lattice.points_inside())
             .map(|(count, size)| count * u64::from(size))
             .sum(),
-        tets: coarse.tets * u64::from(lattice.children()),
-        boundary: coarse.boundary * u64::from(lattice.face_children()),
+        tets: coarse.tets * u64::from(cells.children()),
+        boundary: coarse.boundary * u64::from(cells.face_children()),
     }
 }
 
@@ -105,8 +117,9 @@ impl Numbering {
     /// # Errors
     /// [`RefineError::Pieces`] if n is out of range, [`RefineError::TooManyVertices`] if local ids
     /// exceed `u32`.
-    pub fn new(mesh: &DistMesh, n: u32) -> Result<Self, RefineError> {
-        let lattice = Lattice::new(possible_pieces(n)?);
+    pub fn new(mesh: &DistMesh, n: u32, order: Order) -> Result<Self, RefineError> {
+        let cells = Lattice::new(possible_pieces(n, order)?);
+        let lattice = Lattice::new(n * order.degree());
         let sizes = lattice.points_inside();
         let counts = [mesh.points.len(), mesh.edges.len(), mesh.faces.len(), mesh.tets.len()];
         let all = [mesh.totals.vertices, mesh.totals.edges, mesh.totals.faces, mesh.totals.tets];
@@ -121,10 +134,20 @@ impl Numbering {
             global += all[dimension] * u64::from(kind.size);
             kind
         });
-        Ok(Self { lattice, kinds, vertices: local, totals: fine_totals(&mesh.totals, lattice) })
+        Ok(Self { cells, lattice, kinds, vertices: local, totals: fine_totals(&mesh.totals, n, order) })
     }
 
-    /// The lattice.
+    /// The lattice of the tets.
+    pub fn cells(&self) -> Lattice {
+        self.cells
+    }
+
+    /// The order of the elements.
+    pub fn order(&self) -> Order {
+        if self.cells == self.lattice { Order::First } else { Order::Second }
+    }
+
+    /// The lattice of the vertices.
     pub fn lattice(&self) -> Lattice {
         self.lattice
     }
@@ -193,6 +216,28 @@ impl Numbering {
         let kind = self.kinds[dimension];
         let offset = local - kind.local;
         (Entity { dimension, id: offset / kind.size }, offset % kind.size)
+    }
+
+    /// The coarse entity of this part that contains the fine vertex with this global id, and the
+    /// vertex's index among its interior vertices.
+    pub fn find(&self, mesh: &DistMesh, id: GlobalId) -> Option<(Entity, u32)> {
+        let ids = [&mesh.vertex_ids, &mesh.edge_ids, &mesh.face_ids, &mesh.tet_ids];
+        let has = |dimension: &usize| self.kinds[*dimension].size > 0 && self.kinds[*dimension].global <= id;
+        let dimension = (0..4).rev().find(has)?;
+        let Kind { size, global, .. } = self.kinds[dimension];
+        let (of, within) = ((id - global) / u64::from(size), (id - global) % u64::from(size));
+        let local = ids[dimension].binary_search(&of).ok()?;
+        Some((Entity { dimension, id: local as u32 }, within as u32))
+    }
+
+    /// Local ids of all lattice points of a face, by j + (n + 1)·k.
+    pub fn ids_of_face(&self, mesh: &DistMesh, face: u32) -> Option<Vec<u32>> {
+        let has = |faces: &[FaceId; 4]| faces.iter().position(|f| f.0 == face);
+        let (tet, place) =
+            mesh.tet_faces.iter().enumerate().find_map(|(tet, faces)| Some((tet, has(faces)?)))?;
+        let vertices = mesh.tets[tet];
+        let corners = ascending(TET_FACES[place], |corner| vertices[corner].0);
+        Some(self.face_ids(mesh, TetId::new(tet), corners))
     }
 
     /// Local ids of all lattice points of a tet, in the order of [`Lattice`].
@@ -266,27 +311,34 @@ impl Numbering {
     }
 
     /// Calls `each` with the fine triangles of the face opposite corner `face`, by local ids,
-    /// oriented outward from the tet.
+    /// oriented outward from the tet, and with the nodes on their edges in the order of
+    /// [`TRIANGLE_EDGES`](crate::ground::mesh::TRIANGLE_EDGES); for first order with the corners
+    /// again, which mean nothing.
     pub fn for_each_triangle(
         &self,
         mesh: &DistMesh,
         tet: TetId,
         face: usize,
-        mut each: impl FnMut([u32; 3]),
+        mut each: impl FnMut([u32; 3], [u32; 3]),
     ) {
-        let n = self.lattice.n();
+        let (n, degree) = (self.lattice.n(), self.order().degree());
         let vertices = mesh.tets[tet.index()];
         let corners = ascending(TET_FACES[face], |corner| vertices[corner].0);
         let is_outward = from_lowest(corners) == from_lowest(TET_FACES[face]);
         let ids = self.face_ids(mesh, tet, corners);
-        for_each_face_child(n, |j, k, upright| {
-            let at = |j: u32, k: u32| ids[(j + (n + 1) * k) as usize];
+        for_each_face_child(self.cells.n(), |j, k, upright| {
             let [p, q, r] = if upright {
-                [at(j, k), at(j + 1, k), at(j, k + 1)]
+                [[j, k], [j + 1, k], [j, k + 1]]
             } else {
-                [at(j + 1, k), at(j + 1, k + 1), at(j, k + 1)]
+                [[j + 1, k], [j + 1, k + 1], [j, k + 1]]
             };
-            each(if is_outward { [p, q, r] } else { [p, r, q] });
+            let corners = if is_outward { [p, q, r] } else { [p, r, q] };
+            let at = |[j, k]: [u32; 2]| ids[(j + (n + 1) * k) as usize];
+            let middle = |[p, q]: [usize; 2]| {
+                let [p, q] = [corners[p], corners[q]];
+                at([0, 1].map(|x| (p[x] + q[x]) * degree / 2))
+            };
+            each(corners.map(|corner| at(corner.map(|x| x * degree))), TRIANGLE_EDGES.map(middle));
         });
     }
 
@@ -306,10 +358,8 @@ impl Numbering {
 }
 
 /// The edge of a tet between two of its corners.
-fn edge_between(mesh: &DistMesh, tet: TetId, mut corners: [usize; 2]) -> EdgeId {
-    corners.sort_unstable();
-    let edge = TET_EDGES.iter().position(|e| *e == corners).expect("two corners make an edge");
-    mesh.tet_edges[tet.index()][edge]
+fn edge_between(mesh: &DistMesh, tet: TetId, [p, q]: [usize; 2]) -> EdgeId {
+    mesh.tet_edges[tet.index()][EDGE_BETWEEN[p][q]]
 }
 
 /// Corners of a tet by ascending key.

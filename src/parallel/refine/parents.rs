@@ -15,7 +15,7 @@
 use super::RefinedMesh;
 use super::lattice::{Lattice, OCTAHEDRON, UPRIGHT, UPSIDE_DOWN};
 use crate::ground::mesh::stream::MeshStream;
-use crate::ground::mesh::{Rank, TetId};
+use crate::ground::mesh::{Order, Rank, TetId};
 use rayon::prelude::*;
 
 /// Why two meshes are not levels of one refinement.
@@ -31,6 +31,9 @@ pub enum LevelError {
         /// Subdivisions per edge of the coarser mesh.
         coarse: u32,
     },
+    /// Meshes of second order: their nodes on edges have no linear interpolation.
+    #[error("levels of elements of second order have no parents: use those of first order")]
+    Order,
     /// The meshes are refined from different coarse parts.
     #[error("the meshes on rank {rank} are refined from different parts")]
     Parts {
@@ -40,6 +43,9 @@ pub enum LevelError {
 }
 
 fn expect_levels(fine: &RefinedMesh, coarse: &RefinedMesh) -> Result<(), LevelError> {
+    if fine.order() != Order::First || coarse.order() != Order::First {
+        return Err(LevelError::Order);
+    }
     if fine.pieces() != 2 * coarse.pieces() {
         return Err(LevelError::Pieces { fine: fine.pieces(), coarse: coarse.pieces() });
     }

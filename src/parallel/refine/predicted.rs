@@ -2,7 +2,7 @@
 
 use super::diagonal::Diagonals;
 use super::lattice::Lattice;
-use crate::ground::mesh::{GlobalId, Rank};
+use crate::ground::mesh::{GlobalId, Order, Rank};
 use crate::parallel::distribution::{DistMesh, Shared};
 
 /// Counts of fine vertices and tets of one part.
@@ -31,8 +31,11 @@ impl PredictedCounts {
 }
 
 /// *Local.* Counts what this rank's part would contain with `n` subdivisions per edge.
-pub fn predicted_counts(mesh: &DistMesh, n: u32) -> PredictedCounts {
-    let lattice = Lattice::new(n);
+///
+/// # Panics
+/// If no lattice has so many.
+pub fn predicted_counts(mesh: &DistMesh, n: u32, order: Order) -> PredictedCounts {
+    let [cells, lattice] = [n, n * order.degree()].map(Lattice::new);
     let [on_boundary @ .., inside_tet] = lattice.points_inside().map(u64::from);
     let totals = [mesh.totals.vertices, mesh.totals.edges, mesh.totals.faces];
     let kinds: [(&[GlobalId], &Shared); 3] = [
@@ -41,7 +44,7 @@ pub fn predicted_counts(mesh: &DistMesh, n: u32) -> PredictedCounts {
         (&mesh.face_ids, &mesh.shared_faces),
     ];
     let mut counts = PredictedCounts {
-        tets: mesh.tets.len() as u64 * u64::from(lattice.children()),
+        tets: mesh.tets.len() as u64 * u64::from(cells.children()),
         ..PredictedCounts::default()
     };
     let mut first = 0;
@@ -57,7 +60,7 @@ pub fn predicted_counts(mesh: &DistMesh, n: u32) -> PredictedCounts {
         first += total * size;
     }
     let inside = mesh.tets.len() as u64 * inside_tet;
-    let diagonals = (mesh.tets.len() * Diagonals::bytes_of_tet(lattice.octahedra())) as u64;
+    let diagonals = (mesh.tets.len() * Diagonals::bytes_of_tet(cells.octahedra())) as u64;
     counts.bytes = [counts.held + inside, counts.held].map(|vertices| 24 * vertices + diagonals);
     counts.held += inside;
     counts.owned += inside;

@@ -1,8 +1,9 @@
 //! The refined part: stored coordinates; tets, boundary and ids computed on demand.
 
+use super::curved::steps;
 use super::diagonal::TetDiagonals;
 use super::lattice::{
-    OCTAHEDRON, UPRIGHT, UPSIDE_DOWN, corner_place, for_each_face_child, octahedron_child_on_face,
+    Lattice, OCTAHEDRON, UPRIGHT, UPSIDE_DOWN, corner_place, for_each_face_child, octahedron_child_on_face,
 };
 use super::numbering::{Entity, Numbering, ascending};
 use super::periodic::fine_images;
@@ -11,7 +12,7 @@ use crate::ground::mesh::periodic::{Link, PeriodicMap};
 use crate::ground::mesh::stream::{
     BoundaryBlock, Counts, LocalBlock, MeshStream, NO_TET, SingularTags, TetBlock, VertexBlock,
 };
-use crate::ground::mesh::{Class, GlobalId, Rank, TET_FACES, TetId};
+use crate::ground::mesh::{Class, GlobalId, Order, Rank, TET_FACES, TetId};
 use crate::parallel::distribution::{BoundaryFace, DistMesh};
 use std::borrow::Cow;
 use std::sync::Arc;
@@ -69,7 +70,7 @@ impl RefinedMesh {
 
     /// Subdivisions per coarse edge.
     pub fn pieces(&self) -> u32 {
-        self.numbering.lattice().n()
+        self.numbering.cells().n()
     }
 
     /// Bytes stored in addition to the coarse mesh.
@@ -80,13 +81,13 @@ impl RefinedMesh {
 
     /// The number of fine tets of this part.
     pub fn tets(&self) -> u64 {
-        self.coarse.tets.len() as u64 * u64::from(self.numbering.lattice().children())
+        self.coarse.tets.len() as u64 * u64::from(self.numbering.cells().children())
     }
 
     /// Appends the children of `tet` behind the fine triangles of its face opposite corner `face`,
     /// by index in the part.
     fn parents_on_face(&self, tet: TetId, face: usize, parents: &mut Vec<u64>) {
-        let lattice = self.numbering.lattice();
+        let lattice = self.numbering.cells();
         let vertices = self.coarse.tets[tet.index()];
         let corners = ascending(TET_FACES[face], |corner| vertices[corner].0);
         let diagonals = self.inside.diagonals.of_tet(tet.0);
@@ -119,8 +120,12 @@ impl MeshStream for RefinedMesh {
         self.coarse.ranks
     }
 
+    fn order(&self) -> Order {
+        self.numbering.order()
+    }
+
     fn counts(&self) -> Counts {
-        let children = u64::from(self.numbering.lattice().face_children());
+        let children = u64::from(self.numbering.cells().face_children());
         Counts {
             vertices: u64::from(self.numbering.vertices()),
             tets: self.tets(),
@@ -164,6 +169,7 @@ impl MeshStream for RefinedMesh {
         self.numbering.lattice_ids(&self.coarse, TetId::new(index), &mut ids);
         self.children(index, block);
         block.tets.iter_mut().flatten().for_each(|corner| *corner = ids[*corner as usize]);
+        block.edge_nodes.iter_mut().flatten().for_each(|node| *node = ids[*node as usize]);
     }
 
     fn local_block(&self, index: usize, block: &mut LocalBlock) {
@@ -172,7 +178,7 @@ impl MeshStream for RefinedMesh {
     }
 
     fn block_ids(&self, block: &LocalBlock, ids: &mut Vec<GlobalId>) {
-        let children = u64::from(self.numbering.lattice().children());
+        let children = u64::from(self.numbering.cells().children());
         let tet = (block.tets.first_local / children) as u32;
         let inside = self.numbering.inside(Entity { dimension: 3, id: tet });
         let first = self.numbering.first_id(3, self.coarse.tet_ids[tet as usize]);
@@ -187,7 +193,7 @@ impl MeshStream for RefinedMesh {
 
     fn block_points(&self, block: &LocalBlock, points: &mut Vec<[f64; 3]>) {
         if !self.keeps_all() {
-            let tet = block.tets.first_local / u64::from(self.numbering.lattice().children());
+            let tet = block.tets.first_local / u64::from(self.numbering.cells().children());
             self.lattices().all(TetId(tet as u32), self.inside.flat[tet as usize], points);
             return;
         }
@@ -216,8 +222,14 @@ impl MeshStream for RefinedMesh {
             [None, None] => panic!("boundary face {:?} has no tet in this part", face.face),
         };
         block.triangles.clear();
-        self.numbering.for_each_triangle(&self.coarse, tet, self.face_of(tet, face), |[p, q, r]| {
-            block.triangles.push(if behind { [p, q, r] } else { [p, r, q] });
+        block.edge_nodes.clear();
+        let second = self.order() == Order::Second;
+        self.numbering.for_each_triangle(&self.coarse, tet, self.face_of(tet, face), |corners, nodes| {
+            let ([p, q, r], [pq, qr, rp]) = (corners, nodes);
+            block.triangles.push(if behind { corners } else { [p, r, q] });
+            if second {
+                block.edge_nodes.push(if behind { nodes } else { [rp, qr, pq] });
+            }
         });
         let mut parents = [Vec::new(), Vec::new()];
         for (parent, indices) in face.parents.iter().zip(&mut parents) {
@@ -278,16 +290,19 @@ impl RefinedMesh {
 
     /// Fills `block` with the children of a coarse tet, by lattice points.
     fn children(&self, tet: usize, block: &mut TetBlock) {
-        let lattice = self.numbering.lattice();
-        let children = lattice.children();
+        let cells = self.numbering.cells();
+        let children = cells.children();
         let diagonals = self.inside.diagonals.of_tet(tet as u32);
         block.tets.clear();
+        block.edge_nodes.clear();
         block.tets.reserve(children as usize);
-        for (c, d, cells) in lattice.rows() {
-            let first = lattice.octahedron_row(c, d);
-            push_row(rows_around(lattice, c, d), cells, &mut block.tets, |octahedron| {
-                diagonals.get(first + octahedron)
-            });
+        for (c, d, count) in cells.rows() {
+            let first = cells.octahedron_row(c, d);
+            let diagonal = |octahedron| diagonals.get(first + octahedron);
+            match self.order() {
+                Order::First => push_row(rows_around(cells, c, d), count, &mut block.tets, diagonal),
+                Order::Second => push_nodes(self.numbering.lattice(), [c, d, count], block, diagonal),
+            }
         }
         block.first_id = self.coarse.tet_ids[tet] * u64::from(children);
         block.first_local = tet as u64 * u64::from(children);
@@ -296,10 +311,40 @@ impl RefinedMesh {
 }
 
 /// The starts of the four rows of points around a row of cells, numbered as in [`corner_place`].
-fn rows_around(lattice: super::lattice::Lattice, c: u32, d: u32) -> [u32; 4] {
+fn rows_around(lattice: Lattice, c: u32, d: u32) -> [u32; 4] {
     let inside = c + d + 2 <= lattice.n();
     let row = |c, d| lattice.row(c, d);
     [row(c, d), row(c + 1, d), row(c, d + 1), if inside { row(c + 1, d + 1) } else { 0 }]
+}
+
+/// Appends the ten-node children of a row of `count` cells (·, c, d), by points of the lattice of
+/// nodes.
+fn push_nodes(lattice: Lattice, [c, d, count]: [u32; 3], block: &mut TetBlock, diagonal: impl Fn(u32) -> u8) {
+    // The starts of the rows of nodes around the row of cells; those outside the tet are not used.
+    let row = |i: u32, j: u32| {
+        let (c, d) = (2 * c + i, 2 * d + j);
+        if c + d <= lattice.n() { lattice.row(c, d) } else { 0 }
+    };
+    let rows = [0, 1, 2].map(|j| [0, 1, 2].map(|i| row(i, j)));
+    let places = |corners: [u8; 4]| {
+        steps(corners).map(|[b, c, d]| rows[usize::from(d)][usize::from(c)] + u32::from(b))
+    };
+    let mut push = |places: [u32; 10], cell: u32| {
+        let [p, q, r, s, edges @ ..] = places.map(|place| place + 2 * cell);
+        block.tets.push([p, q, r, s]);
+        block.edge_nodes.push(edges);
+    };
+    let upright = places(UPRIGHT);
+    (0..count).for_each(|cell| push(upright, cell));
+    if count == 1 {
+        return;
+    }
+    let octahedron = OCTAHEDRON.map(|children| children.map(places));
+    for cell in 0..count - 1 {
+        octahedron[usize::from(diagonal(cell))].iter().for_each(|child| push(*child, cell));
+    }
+    let upside_down = places(UPSIDE_DOWN);
+    (0..count.saturating_sub(2)).for_each(|cell| push(upside_down, cell));
 }
 
 /// Appends the children of a row of cells, by lattice points.

@@ -8,7 +8,7 @@ use crate::files;
 use crate::ground::comm::thread;
 use crate::ground::kernel::random::Random;
 use crate::ground::mesh::stream::MeshStream;
-use crate::ground::mesh::{Label, Names};
+use crate::ground::mesh::{Label, Names, Order};
 use crate::parallel::check::{check, check_part, checksum, checksum_of_all};
 use crate::parallel::distribution::{self, distribute};
 use crate::parallel::partition::{self, partition};
@@ -34,7 +34,7 @@ fn ids_of_a_trillion_tets_are_unique_and_in_range() {
     let mut repeated = 0;
     let mut tets = Vec::new();
     for part in &parts {
-        let numbering = Numbering::new(part, lattice::MAX_PIECES).expect("parts small enough");
+        let numbering = Numbering::new(part, lattice::MAX_PIECES, Order::First).expect("parts small enough");
         let totals = numbering.totals();
         assert!(totals.tets > 1_000_000_000_000, "{totals:?}");
         let mut sample = |local: u32| {
@@ -78,7 +78,7 @@ fn a_thousand_ranks_make_the_mesh_that_one_makes() {
         let made = thread::run(ranks, |comm| {
             let mesh = (comm.rank() == 0).then(|| (fixture.mesh.clone(), rank_of.clone()));
             let part = distribute(comm, mesh).expect("a classified mesh");
-            let counted = predicted_counts(&part, 3);
+            let counted = predicted_counts(&part, 3, Order::First);
             let part = refine(part, &fixture.projector, 3, &Settings::default()).expect("refinable");
             assert_eq!((counted.tets, counted.held), (part.counts().tets, part.counts().vertices));
             let [owned] = comm.all_reduce_sum_u64([counted.owned]).expect("all ranks");
@@ -94,7 +94,7 @@ fn a_thousand_ranks_make_the_mesh_that_one_makes() {
 fn parts_own_like_shares_of_what_they_hold() {
     for ranks in [16, 128, 1024] {
         let counted: Vec<PredictedCounts> =
-            parts_of_cube(16, ranks).iter().map(|part| predicted_counts(part, 16)).collect();
+            parts_of_cube(16, ranks).iter().map(|part| predicted_counts(part, 16, Order::First)).collect();
         let shares: Vec<f64> = counted.iter().map(PredictedCounts::owned_share).collect();
         let mean = shares.iter().sum::<f64>() / f64::from(ranks);
         let largest = shares.iter().copied().fold(0.0, f64::max);
@@ -189,5 +189,8 @@ fn a_check_of_all_ranks_takes_parts_that_recompute() {
     let report = &reports.expect("no rank fails")[0];
     assert_eq!(report.faults, 0, "{:?}", report.described);
     let whole = distribution::from_serial(fixture.mesh.clone()).expect("a mesh");
-    assert_eq!(report.vertices, Numbering::new(&whole, 8).expect("few vertices").totals().vertices);
+    assert_eq!(
+        report.vertices,
+        Numbering::new(&whole, 8, Order::First).expect("few vertices").totals().vertices
+    );
 }

@@ -5,7 +5,7 @@ use crate::ground::mesh::periodic::Link;
 use crate::ground::mesh::stream::{
     BoundaryBlock, Counts, LocalBlock, MeshStream, SingularTags, TetBlock, VertexBlock,
 };
-use crate::ground::mesh::{GlobalId, Rank};
+use crate::ground::mesh::{GlobalId, Order, Rank};
 use rayon::prelude::*;
 use std::borrow::Cow;
 
@@ -55,6 +55,9 @@ impl MeshStream for StoredMesh {
     }
     fn ranks(&self) -> u32 {
         self.refined.ranks()
+    }
+    fn order(&self) -> Order {
+        self.refined.order()
     }
     fn counts(&self) -> Counts {
         self.refined.counts()

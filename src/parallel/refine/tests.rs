@@ -206,7 +206,7 @@ fn flat_lattice(n: u32) {
     for tet in 0..fixture.mesh.tets.len() {
         let corners = fixture.mesh.tets[tet].map(|v| fixture.mesh.points[v.index()].coords);
         let mut ids = Vec::new();
-        let numbering = numbering::Numbering::new(mesh.coarse(), n).expect("small");
+        let numbering = numbering::Numbering::new(mesh.coarse(), n, Order::First).expect("small");
         numbering.lattice_ids(mesh.coarse(), crate::ground::mesh::TetId::new(tet), &mut ids);
         for d in 0..=n {
             for c in 0..=n - d {
@@ -235,7 +235,7 @@ fn pieces_beyond_the_finest_lattice_are_refused() {
     for n in [0, 1025] {
         let fixture = cube(1, false);
         let error = refine(whole(&fixture.mesh), &fixture.projector, n, &Settings::default());
-        assert_eq!(error.err(), Some(RefineError::Pieces { n }));
+        assert_eq!(error.err(), Some(RefineError::Pieces { n, most: 1024 }));
     }
 }
 
@@ -354,13 +354,14 @@ fn bent_edges_make_angles_larger_that_are_too_small() {
     let fixture = shell(1.0, 2.6);
     let coarse = whole(&fixture.mesh);
     let tried = |displacements: &EdgeDisplacements, dihedral: f64| {
-        let least = Least { mean_ratio: 0.0, dihedral };
-        trial(&coarse, &fixture.projector, 8, displacements, least).expect("projects")
+        let least = Least { dihedral, ..Least::VALID };
+        let settings = Settings { displacements: displacements.clone(), ..Settings::default() };
+        trial(&coarse, &fixture.projector, 8, &settings, least).expect("projects")
     };
     let before = tried(&EdgeDisplacements::default(), 90.0);
     assert!(before.inverted.is_empty());
     let wanted = before.smallest_dihedral + 1.0;
-    let least = Least { mean_ratio: 0.0, dihedral: wanted };
+    let least = Least { dihedral: wanted, ..Least::VALID };
     let settings = mend::Settings { pieces: 8, least, margin: 0.01, enough: 0.03, ..Default::default() };
     let mended = mend(&coarse, &fixture.projector, &settings).expect("projects");
     assert!(!mended.before.is_empty());

@@ -1,20 +1,18 @@
 //! Inside the coarse tets: coordinates, diagonals, and the sign of every child.
 //!
 //! One pass over the coarse tets. The lattice points of a tet are gathered into three short arrays
-//! (x, y, z). In these the corners of a row of children are runs of consecutive numbers, so plain
-//! loops vectorise.
+//! (x, y, z), so that plain loops over them vectorise.
 
 use super::blend::{Blend, barycentric, split};
+use super::curved;
+use super::cut::{Cut, Cutting};
 use super::diagonal::{self, Diagonals};
-use super::lattice::{Lattice, OCTAHEDRON, UPRIGHT, UPSIDE_DOWN, corner_place};
+use super::lattice::Lattice;
 use super::numbering::Numbering;
-use super::run::Run;
 use super::snap::{Coordinates, is_flat};
 use super::{RefineError, Settings};
-use crate::Point;
-use crate::ground::kernel::predicates::{Sign, orient3d};
 use crate::ground::kernel::vector::{Wide, wide};
-use crate::ground::mesh::{GlobalId, TetId};
+use crate::ground::mesh::{GlobalId, Order, TetId};
 use crate::ground::progress::Work;
 use crate::ground::projector::Projector;
 use crate::parallel::check::Fault;
@@ -46,9 +44,9 @@ pub fn fill(
     settings: &Settings,
     work: &Work,
 ) -> Result<(Inside, Vec<BadTet>), RefineError> {
-    let lattice = numbering.lattice();
-    let bytes = mesh.tets.len() * Diagonals::bytes_of_tet(lattice.octahedra());
-    let mut diagonals = Diagonals::new(mesh.tets.len(), lattice.octahedra())
+    let (cells, lattice) = (numbering.cells(), numbering.lattice());
+    let bytes = mesh.tets.len() * Diagonals::bytes_of_tet(cells.octahedra());
+    let mut diagonals = Diagonals::new(mesh.tets.len(), cells.octahedra())
         .ok_or(RefineError::OutOfMemory { rank: mesh.rank, bytes: bytes as u64 })?;
     let bytes_per_tet = diagonals.bytes_per_tet();
     let (before, inside) = points.split_at_mut(numbering.bases()[2]);
@@ -61,9 +59,12 @@ pub fn fill(
         }
         size => Either::Right(inside.par_chunks_mut(size)),
     };
-    let plan = Plan::new(lattice);
-    let is_cut = lattice.octahedra() > 0;
-    let fill_one = |block: &mut Block, ((tet, inside), bytes): ((usize, &mut [Coordinates]), &mut [u8])| {
+    let (plan, cell_plan) = (Plan::new(lattice), Plan::new(cells));
+    let is_cut = cells.octahedra() > 0;
+    type Scratch = (Block, Cutting);
+    let fill_one = |scratch: &mut Scratch,
+                    ((tet, inside), bytes): ((usize, &mut [Coordinates]), &mut [u8])| {
+        let (block, cutting) = scratch;
         let tet = TetId::new(tet);
         if work.is_cancelled() {
             return None;
@@ -73,19 +74,30 @@ pub fn fill(
         let corners = mesh.tets[tet.index()].map(|v| before[v.index()]);
         let flat = flat[tet.index()];
         block.fill_odd_part(&plan, &corners, flat);
-        block.bad.clear();
+        wide(Fill { block, plan: &plan });
         let is_even = flat || settings.nested;
         let cut =
             if is_even && is_cut { Cut::Evenly(diagonal::best_of_tet(&corners)) } else { Cut::EachBest };
-        wide(FillAndCut { block, plan: &plan, cut, bytes });
+        if settings.order == Order::First {
+            std::mem::swap(&mut block.axes, &mut cutting.axes);
+            cutting.cut(&cell_plan, cut, bytes);
+            std::mem::swap(&mut block.axes, &mut cutting.axes);
+        } else {
+            curved::take_corners(&block.axes, &plan, &cell_plan, &mut cutting.axes);
+            cutting.cut(&cell_plan, cut, bytes);
+            // Straight tets are proved by the check, with all others.
+            if !flat {
+                curved::prove(&block.axes, &plan, cells, settings.nested, bytes, &mut cutting.bad);
+            }
+        }
         let kept = inside.iter_mut();
         kept.zip(block.inside(lattice)).for_each(|(kept, point)| *kept = point);
-        block.verdict(mesh.tet_ids[tet.index()], lattice, settings.described)
+        cutting.verdict(mesh.tet_ids[tet.index()], cells, settings.described)
     };
     let bad: Vec<BadTet> = insides
         .enumerate()
         .zip(diagonals.bytes_mut().par_chunks_mut(bytes_per_tet))
-        .map_init(|| Block::new(lattice), fill_one)
+        .map_init(|| (Block::new(lattice), Cutting::new(cells)), fill_one)
         .flatten_iter()
         .collect();
     Ok((Inside { points, diagonals, flat }, bad))
@@ -129,8 +141,8 @@ impl Lattices<'_> {
 pub struct BadTet {
     /// Its global id.
     pub tet: GlobalId,
-    children: u64,
-    faults: Vec<Fault>,
+    pub(super) children: u64,
+    pub(super) faults: Vec<Fault>,
 }
 
 /// The error that reports these tets.
@@ -143,8 +155,8 @@ pub fn inverted(bad: &[BadTet], described: usize) -> RefineError {
 }
 
 /// The starts of the rows of points, computed once.
-struct Plan {
-    lattice: Lattice,
+pub(super) struct Plan {
+    pub lattice: Lattice,
     /// By c + (n + 1)·d.
     rows: Vec<u32>,
 }
@@ -156,14 +168,15 @@ impl Plan {
         Self { lattice, rows: (0..=n).flat_map(|d| (0..=n).map(move |c| row(d, c))).collect() }
     }
 
+    /// The index of the point (0, c, d).
     #[inline]
-    fn row(&self, c: u32, d: u32) -> usize {
+    pub fn row(&self, c: u32, d: u32) -> usize {
         self.rows[(c + (self.lattice.n() + 1) * d) as usize] as usize
     }
 
     /// The starts of the four rows of points around a row of cells, numbered as in
     /// [`corner_place`]; 0 outside the tet.
-    fn around(&self, c: u32, d: u32) -> [usize; 4] {
+    pub fn around(&self, c: u32, d: u32) -> [usize; 4] {
         let inside = c + d + 2 <= self.lattice.n();
         [
             self.row(c, d),
@@ -190,14 +203,6 @@ const PARENTS: [&[[i32; 3]]; 8] = [
     &[[1, -1, -1], [-1, 1, 1], [-1, 1, -1], [1, -1, 1], [-1, -1, 1], [1, 1, -1]],
 ];
 
-/// How octahedra are cut.
-enum Cut {
-    /// All along this diagonal.
-    Evenly(u8),
-    /// Each along its own best diagonal.
-    EachBest,
-}
-
 /// Computes the interior points of a block with wide registers.
 struct Fill<'a> {
     block: &'a mut Block,
@@ -213,54 +218,22 @@ impl Wide for Fill<'_> {
     }
 }
 
-/// Computes the interior points of a block and cuts its octahedra, with wide registers.
-struct FillAndCut<'a> {
-    block: &'a mut Block,
-    plan: &'a Plan,
-    cut: Cut,
-    bytes: &'a mut [u8],
-}
-
-impl Wide for FillAndCut<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run(self) {
-        let Self { block, plan, cut, bytes } = self;
-        block.fill_inside(plan);
-        match cut {
-            Cut::Evenly(diagonal) => block.cut_evenly(plan, diagonal, bytes),
-            Cut::EachBest => block.cut_each_best(plan, bytes),
-        }
-    }
-}
-
-/// The lattice of one coarse tet: local ids and coordinates of its points, and scratch space.
+/// The lattice of one coarse tet: local ids and coordinates of its points.
 struct Block {
     ids: Vec<u32>,
     /// x, y, z of all points.
     axes: [Vec<f64>; 3],
     /// Interpolation of the odd part of n.
     blend: Blend<4>,
-    /// For a row of octahedra and each diagonal: the worst shape, and 1 if all signs are certain,
-    /// else 0.
-    shapes: [Vec<f64>; 3],
-    certain: [Vec<f64>; 3],
-    /// Children that are not positive, with the indices of their corners.
-    bad: Vec<(u32, [usize; 4])>,
 }
 
 impl Block {
     fn new(lattice: Lattice) -> Self {
         let points = || vec![0.0; lattice.points() as usize];
-        let row = || vec![0.0; lattice.n() as usize];
         Self {
             ids: Vec::new(),
             axes: [points(), points(), points()],
             blend: Blend::new(split(lattice.n()).0),
-            shapes: [row(), row(), row()],
-            certain: [row(), row(), row()],
-            bad: Vec::new(),
         }
     }
 
@@ -358,125 +331,5 @@ impl Block {
     #[inline]
     fn coordinates(&self, i: usize) -> Coordinates {
         [self.axes[0][i], self.axes[1][i], self.axes[2][i]]
-    }
-
-    /// Cuts all octahedra along one diagonal and checks the children.
-    #[inline(always)]
-    fn cut_evenly(&mut self, plan: &Plan, diagonal: u8, bytes: &mut [u8]) {
-        // Four octahedra per byte; bits beyond the last octahedron are never read.
-        bytes.fill(diagonal * 0b0101_0101);
-        for (c, d, cells) in plan.lattice.rows() {
-            let rows = plan.around(c, d);
-            self.check_others(plan, rows, [c, d, cells]);
-            let first = plan.lattice.octahedron_child([0, c, d]);
-            for (child, corners) in (0..).zip(OCTAHEDRON[usize::from(diagonal)]) {
-                self.check_run(rows, corners, cells - 1, first + child, 4);
-            }
-        }
-    }
-
-    /// Cuts each octahedron along its own best diagonal and checks the children.
-    #[inline(always)]
-    fn cut_each_best(&mut self, plan: &Plan, bytes: &mut [u8]) {
-        for (c, d, cells) in plan.lattice.rows() {
-            let rows = plan.around(c, d);
-            self.check_others(plan, rows, [c, d, cells]);
-            let count = cells as usize - 1;
-            self.measure_octahedra(rows, count);
-            let first_child = plan.lattice.octahedron_child([0, c, d]);
-            let first = plan.lattice.octahedron_row(c, d);
-            for i in 0..count {
-                let best = diagonal::best([0, 1, 2].map(|k| self.shapes[k][i]));
-                diagonal::set(bytes, first + i as u32, best);
-                if self.certain[usize::from(best)][i] > 0.0 {
-                    continue;
-                }
-                for (child, corners) in (0..).zip(OCTAHEDRON[usize::from(best)]) {
-                    self.check_one(rows, corners, i, first_child + 4 * i as u32 + child);
-                }
-            }
-        }
-    }
-
-    /// Checks the upright and upside-down children of a row of cells.
-    #[inline(always)]
-    fn check_others(&mut self, plan: &Plan, rows: [usize; 4], [c, d, cells]: [u32; 3]) {
-        let first = plan.lattice.child_row(c, d);
-        self.check_run(rows, UPRIGHT, cells, first, 1);
-        let first = first + cells + 4 * (cells - 1);
-        self.check_run(rows, UPSIDE_DOWN, cells.saturating_sub(2), first, 1);
-    }
-
-    /// Checks the children with these corner codes in the first `count` cells of a row; their
-    /// indices start at `first` with step `stride`.
-    #[inline(always)]
-    fn check_run(&mut self, rows: [usize; 4], corners: [u8; 4], count: u32, first: u32, stride: u32) {
-        if count == 0 || self.run(rows, corners, count as usize).all_positive() {
-            return;
-        }
-        for i in 0..count {
-            self.check_one(rows, corners, i as usize, first + stride * i);
-        }
-    }
-
-    /// Checks one child by exact sign.
-    #[cold]
-    fn check_one(&mut self, rows: [usize; 4], corners: [u8; 4], cell: usize, child: u32) {
-        let at = corners.map(|code| {
-            let (row, shift) = corner_place(code);
-            rows[row] + cell + shift
-        });
-        let [p, q, r, s] = at.map(|i| self.point(i));
-        if orient3d(&p, &q, &r, &s) != Sign::Positive {
-            self.bad.push((child, at));
-        }
-    }
-
-    fn point(&self, i: usize) -> Point {
-        Point::from(self.coordinates(i))
-    }
-
-    /// The corners of the children with these corner codes in the first `count` cells of a row.
-    #[inline(always)]
-    fn run(&self, rows: [usize; 4], corners: [u8; 4], count: usize) -> Run<'_> {
-        let starts = corners.map(|code| {
-            let (row, shift) = corner_place(code);
-            rows[row] + shift
-        });
-        Run { axes: [0, 1, 2].map(|x| starts.map(|start| &self.axes[x][start..][..count])), count }
-    }
-
-    /// For each octahedron and diagonal, the worst shape and whether all signs are certain.
-    #[inline(always)]
-    fn measure_octahedra(&mut self, rows: [usize; 4], count: usize) {
-        if count == 0 {
-            return;
-        }
-        let mut shapes = std::mem::take(&mut self.shapes);
-        let mut certain = std::mem::take(&mut self.certain);
-        for (diagonal, children) in OCTAHEDRON.into_iter().enumerate() {
-            let (shape, sure) = (&mut shapes[diagonal][..count], &mut certain[diagonal][..count]);
-            shape.fill(f64::INFINITY);
-            sure.fill(1.0);
-            for corners in children {
-                self.run(rows, corners, count).measure(shape, sure);
-            }
-        }
-        (self.shapes, self.certain) = (shapes, certain);
-    }
-
-    /// The fault of the tet, if it has children that are not positive.
-    fn verdict(&mut self, tet: GlobalId, lattice: Lattice, described: usize) -> Option<BadTet> {
-        if self.bad.is_empty() {
-            return None;
-        }
-        self.bad.sort_unstable();
-        let first = tet * u64::from(lattice.children());
-        let describe = |&(child, at): &(u32, [usize; 4])| {
-            let [p, q, r, s] = at.map(|i| self.point(i).coords);
-            Fault::NotPositive { tet: first + u64::from(child), place: ((p + q + r + s) / 4.0).into() }
-        };
-        let faults = self.bad.iter().take(described).map(describe).collect();
-        Some(BadTet { tet, children: self.bad.len() as u64, faults })
     }
 }

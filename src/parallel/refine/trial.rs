@@ -5,6 +5,7 @@ use super::mend::extract;
 use super::snap;
 use super::tet::inverted;
 use super::{EdgeDisplacements, RefineError, RefinedMesh, Settings, refine_unchecked};
+use crate::ground::kernel::jacobian;
 use crate::ground::mesh::stream::{MeshStream, TetBlock};
 use crate::ground::mesh::{GlobalId, TetId};
 use crate::ground::projector::Projector;
@@ -22,17 +23,23 @@ pub struct Least {
     pub mean_ratio: f64,
     /// The smallest acceptable dihedral angle, degrees.
     pub dihedral: f64,
+    /// The smallest acceptable scaled Jacobian of children of second order.
+    pub scaled_jacobian: f64,
 }
 
 /// The dihedral angle of the regular tet, degrees.
 const REGULAR: f64 = 70.528_779_365_509_31;
 
 impl Least {
-    /// By how much the worst children exceed the bounds: the smaller of the surplus in mean ratio
-    /// and that in dihedral angle, divided by the angle of the regular tet.
+    /// Every valid child is acceptable.
+    pub const VALID: Self = Self { mean_ratio: 0.0, dihedral: 0.0, scaled_jacobian: 0.0 };
+
+    /// By how much the worst children exceed the bounds: the smallest of the surplus in mean ratio,
+    /// in dihedral angle (divided by the angle of the regular tet), and in scaled Jacobian.
     pub(super) fn excess(&self, worst: &Extremes) -> f64 {
         let dihedral = worst.smallest.clamp(-1.0, 1.0).acos().to_degrees();
-        f64::min(worst.mean_ratio - self.mean_ratio, (dihedral - self.dihedral) / REGULAR)
+        let straight = f64::min(worst.mean_ratio - self.mean_ratio, (dihedral - self.dihedral) / REGULAR);
+        straight.min(worst.scaled_jacobian - self.scaled_jacobian)
     }
 }
 
@@ -49,7 +56,7 @@ pub struct Trial {
     pub error: Option<RefineError>,
 }
 
-/// *Local, on the whole mesh.* Refines the coarse tets curved by projection or `displacements` with
+/// *Local, on the whole mesh.* Refines the coarse tets curved by projection or displacements with
 /// `pieces` subdivisions per edge, and finds those with a child below `least`.
 ///
 /// # Errors
@@ -58,14 +65,13 @@ pub fn trial(
     mesh: &DistMesh,
     projector: &Projector,
     pieces: u32,
-    displacements: &EdgeDisplacements,
+    settings: &Settings,
     least: Least,
 ) -> Result<Trial, RefineError> {
     let mut found = Trial::default();
-    let settings = Settings { displacements: displacements.clone(), ..Settings::default() };
     let mut worst_of_poor = Extremes::NONE;
-    for chunk in curved(mesh, projector, displacements).chunks(CHUNK) {
-        let (refined, bad) = refine_unchecked(extract(mesh, chunk), projector, pieces, &settings)?;
+    for chunk in curved(mesh, projector, &settings.displacements).chunks(CHUNK) {
+        let (refined, bad) = refine_unchecked(extract(mesh, chunk), projector, pieces, settings)?;
         let id = |at: usize| mesh.tet_ids[chunk[at] as usize];
         found.inverted.extend(bad.iter().map(|bad| bad.tet));
         let worst: Vec<Extremes> =
@@ -91,7 +97,7 @@ pub(super) fn curved(mesh: &DistMesh, projector: &Projector, displacements: &Edg
     (0..mesh.tets.len() as u32).filter(is_curved).collect()
 }
 
-/// The worst mean ratio and the extreme dihedral angles of the children of a coarse tet.
+/// The worst shapes of the children of a coarse tet.
 pub(super) fn worst_children(refined: &RefinedMesh, tet: usize) -> Extremes {
     let (mut block, mut batch, mut shapes) = (TetBlock::default(), Batch::default(), Shapes::default());
     refined.tet_block(tet, &mut block);
@@ -102,6 +108,12 @@ pub(super) fn worst_children(refined: &RefinedMesh, tet: usize) -> Extremes {
         tets.iter().for_each(|tet| batch.push(0, tet.map(|v| points[v as usize])));
         batch.volumes(&mut shapes);
         worst = worst.with(batch.shapes(&mut shapes));
+    }
+    for (corners, edges) in block.tets.iter().zip(&block.edge_nodes) {
+        let nodes = jacobian::nodes(*corners, *edges, |v| points[v as usize]);
+        if !jacobian::is_straight(&nodes) {
+            worst.scaled_jacobian = worst.scaled_jacobian.min(jacobian::range(&nodes).scaled());
+        }
     }
     worst
 }

@@ -2,7 +2,7 @@
 //! by the lattice.
 
 use crate::Point;
-use crate::ground::mesh::{Class, FaceId, GlobalId, TetId};
+use crate::ground::mesh::{Class, FaceId, GlobalId, Order, TetId};
 use crate::ground::projector::Projector;
 use crate::parallel::distribution::{DistMesh, Shared};
 use crate::parallel::refine::numbering::Numbering;
@@ -66,7 +66,7 @@ const NONE: u32 = u32::MAX;
 /// [`RefineError::Projection`] and [`RefineError::OutOfMemory`], as
 /// [`refine`](crate::parallel::refine::refine()).
 pub fn skin(mesh: &DistMesh, projector: &Projector, n: u32) -> Result<LatticeSkin, RefineError> {
-    let numbering = Numbering::new(mesh, n)?;
+    let numbering = Numbering::new(mesh, n, Order::First)?;
     let settings = Settings { keep: Keep::Boundary, ..Settings::default() };
     let coordinates = boundary_first(mesh, projector, &numbering, &settings)?;
     let mut triangles = Vec::new();
@@ -178,7 +178,7 @@ fn push_triangles(
 ) {
     let body = |tet: TetId| mesh.tet_bodies[tet.index()];
     let beside = [Some(body(side.tet)), side.front.map(body)];
-    numbering.for_each_triangle(mesh, side.tet, side.face, |vertices| {
+    numbering.for_each_triangle(mesh, side.tet, side.face, |vertices, _| {
         triangles.push(SkinTriangle { vertices, beside, patch: side.patch });
     });
 }
