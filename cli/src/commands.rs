@@ -206,12 +206,13 @@ fn disk_for(formats: &[Format], order: Order, folder: &Path) -> Disk {
         Format::Msh => [65, 60, 50],
         Format::Medit => [60, 40, 30],
         Format::Vol => [58, 40, 42],
+        Format::Inp => [65, 40, 25],
         Format::Mfem => [50, 24, 18],
         Format::Geomview => [0, 0, 30],
         Format::None => [0; 3],
     };
     let has_short_ids =
-        |format: &Format| matches!(format, Format::Elmer | Format::Msh | Format::Medit | Format::Vol);
+        |format: &Format| !matches!(format, Format::Vtu | Format::Mfem | Format::Geomview | Format::None);
     let sum = |sum: [u64; 3], more: [u64; 3]| [0, 1, 2].map(|k| sum[k] + more[k]);
     Disk {
         folder: std::path::absolute(folder).unwrap_or_else(|_| folder.to_path_buf()),
@@ -301,6 +302,7 @@ fn format_of(options: &MeshFile) -> Result<serial::Format, Failure> {
         Some(FileFormat::Msh) => serial::Format::Gmsh,
         Some(FileFormat::Mesh) => serial::Format::Medit,
         Some(FileFormat::Vol) => serial::Format::Netgen,
+        Some(FileFormat::Inp) => serial::Format::Abaqus,
         Some(FileFormat::Off) => serial::Format::Off,
         None => serial::Format::of(&options.output)?,
     };

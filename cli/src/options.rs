@@ -268,7 +268,7 @@ pub struct MeshFile {
     #[command(flatten)]
     pub input: InputOptions,
     /// Output file; its extension selects the format: .vtu, .msh (Gmsh), .mesh (Medit), .vol
-    /// (NETGEN), .off; - is the standard output
+    /// (NETGEN), .inp (Abaqus, CalculiX), .off; - is the standard output
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
     /// Where .vtu output stores boundary triangles [default: beside]
@@ -450,6 +450,8 @@ pub enum Format {
     Medit,
     /// NETGEN, DIR/NAME.vol: all parts in one file
     Vol,
+    /// Abaqus and CalculiX, DIR/NAME.inp: all parts in one file
+    Inp,
     /// MFEM, parallel: DIR/NAME.000000 and so on, one file for each part
     Mfem,
     /// Geomview OFF: the boundary, coloured by part
@@ -469,6 +471,8 @@ pub enum FileFormat {
     Mesh,
     /// NETGEN
     Vol,
+    /// Abaqus and CalculiX
+    Inp,
     /// Geomview OFF: the boundary only
     Off,
 }

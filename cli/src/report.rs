@@ -13,7 +13,7 @@ use tetmill::check::PartReport;
 use tetmill::files::Written;
 use tetmill::progress::StageTime;
 use tetmill::run::{
-    Balance, CoarseReport, Entities, Evened, Level, Metrics, Outcome, PeriodicCheck, Refused,
+    Balance, CoarseReport, Entities, Evened, Level, Metrics, Outcome, PeriodicCheck, Refused, StraightEdge,
 };
 use tetmill::{Generated, Geometry};
 
@@ -34,6 +34,8 @@ pub struct Report {
     pub levels: u32,
     /// Subdivisions of each coarse edge.
     pub pieces: u32,
+    /// The order of the elements: 1, or 2 for ten-node tets.
+    pub order: u32,
     /// The coarse mesh.
     pub coarse: CoarseReport,
     /// Whether the requested number of coarse tets was reached: `reached`, `least` or `jumped`;
@@ -94,13 +96,19 @@ pub struct MeshReport {
     pub largest_dihedral: f64,
     /// The largest distance of a boundary vertex from its patch; null if none was measured.
     pub furthest_off_surface: Option<f64>,
+    /// A lower bound of the scaled Jacobian of all tets; null for order 1.
+    pub scaled_jacobian: Option<f64>,
+    /// Edges on the boundary that are straight, because the tets beside them would not be valid in
+    /// second order otherwise (`--allow-off-surface`): the global ids of their nodes, the places,
+    /// and the distances from the surface or curve.
+    pub straight_edges: Vec<StraightEdge>,
     /// Identifies the mesh, whatever the number of ranks and threads.
     pub checksum: String,
 }
 
 impl MeshReport {
     /// Creates the report from the check of a mesh.
-    pub fn new(check: &PartReport, checksum: String) -> Self {
+    pub fn new(check: &PartReport, straight_edges: Vec<StraightEdge>, checksum: String) -> Self {
         let shape = check.shape.as_ref();
         Self {
             vertices: check.vertices,
@@ -114,6 +122,8 @@ impl MeshReport {
             first_percentile_dihedral: shape.map_or(0.0, |s| s.smallest_angle_percentile(0.01)),
             largest_dihedral: shape.map_or(0.0, |s| s.largest_angle.value),
             furthest_off_surface: check.furthest.map(|f| f.distance),
+            scaled_jacobian: check.scaled_jacobian.map(|least| least.value),
+            straight_edges,
             checksum,
         }
     }
@@ -140,6 +150,9 @@ pub struct LevelReport {
     pub largest_dihedral: f64,
     /// The 99th percentile of each tet's largest dihedral angle, degrees.
     pub last_percentile_dihedral: f64,
+    /// A lower bound of the scaled Jacobian of all tets; null for order 1, and for a level that is
+    /// not valid in second order.
+    pub scaled_jacobian: Option<f64>,
 }
 
 impl LevelReport {
@@ -156,6 +169,7 @@ impl LevelReport {
             first_percentile_dihedral: shape.smallest_angle_percentile(0.01),
             largest_dihedral: shape.largest_angle.value,
             last_percentile_dihedral: shape.largest_angle_percentile(0.99),
+            scaled_jacobian: level.scaled_jacobian.map(|least| least.value),
         }
     }
 }
@@ -223,9 +237,10 @@ impl Report {
             threads: rayon::current_num_threads(),
             levels: made.pieces.ilog2(),
             pieces: made.pieces,
+            order: made.stream().order().degree(),
             coarse: coarse.report.clone(),
             wanted: coarse.outcome,
-            mesh: MeshReport::new(&made.check, made.checksum.to_string()),
+            mesh: MeshReport::new(&made.check, made.straight.clone(), made.checksum.to_string()),
             quality_by_level: made.levels.iter().map(LevelReport::new).collect(),
             partition: PartitionReport::new(&coarse.partition, balance),
             periodic: made.periodic,

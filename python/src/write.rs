@@ -60,6 +60,7 @@ pub fn write(
             "msh" => joined(part, serial::Format::Gmsh),
             "medit" => joined(part, serial::Format::Medit),
             "vol" => joined(part, serial::Format::Netgen),
+            "inp" => joined(part, serial::Format::Abaqus),
             "mfem" => mfem::write(comm, part, names, &target.path),
             _ => geomview::write(comm, part, &geomview::Settings::default(), &target.path),
         }

@@ -49,6 +49,8 @@ type FormatTet<'a> = Box<dyn Fn(&mut Line, &TetLine) + Sync + 'a>;
 pub(super) enum Section<'a> {
     /// Text written by rank 0.
     Text(String),
+    /// Text of this rank.
+    Own(Vec<u8>),
     /// One line for each vertex.
     Vertices(FormatVertex<'a>),
     /// One line for each boundary triangle.
@@ -155,6 +157,7 @@ impl<'a> Whole<'a> {
         match section {
             Section::Text(text) if self.part.rank() == 0 => file.write(text.as_bytes()),
             Section::Text(_) => Ok(()),
+            Section::Own(text) => file.write(text),
             Section::Vertices(format) => {
                 let is_own = |local| self.numbering.owns(local);
                 lines::vertices(self.part, file, is_own, |line, vertex| {

@@ -5,7 +5,7 @@
 //! elmer     DIR/partitioning.N/part.K.*, DIR/mesh.*       every rank writes its part; read and checked
 //! vtu       STEM.vtu, or STEM.pvtu with a file per part   raw binary, for ParaView and meshio
 //! geomview  STEM.off, or STEM.list with a file per part   the surface, a colour per part
-//! serial    FILE.{msh,mesh,vol}                           Gmsh, Medit, NETGEN: all parts in one file
+//! serial    FILE.{msh,mesh,vol,inp}                       Gmsh, Medit, NETGEN, Abaqus: all parts in one file
 //!           FILE.{vtu,off}                                one part, format by extension
 //! mfem      a text for each rank, in memory or in a file  MFEM, parallel
 //! ```
@@ -17,6 +17,7 @@
 pub(crate) mod arrays;
 pub(crate) mod chunks;
 pub(crate) mod color;
+mod corners;
 mod domains;
 pub mod elmer;
 pub mod geomview;

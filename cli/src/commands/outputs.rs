@@ -203,6 +203,7 @@ fn entries(format: Format, folder: &Path, stem: &Path, parts: u32) -> Vec<PathBu
         (Format::Msh, _) => named(&[".msh"]),
         (Format::Medit, _) => named(&[".mesh"]),
         (Format::Vol, _) => named(&[".vol"]),
+        (Format::Inp, _) => named(&[".inp"]),
         (Format::Mfem, parts) => {
             let ends: Vec<String> = (0..parts).map(|rank| format!(".{rank:06}")).collect();
             named(&ends.iter().map(String::as_str).collect::<Vec<_>>())

@@ -77,6 +77,7 @@ pub(super) fn write_formats(
             Format::Msh => joined(".msh", serial::Format::Gmsh)?,
             Format::Medit => joined(".mesh", serial::Format::Medit)?,
             Format::Vol => joined(".vol", serial::Format::Netgen)?,
+            Format::Inp => joined(".inp", serial::Format::Abaqus)?,
             Format::Mfem => files::mfem::write(comm, part, names, stem)?,
             Format::Geomview => {
                 files::geomview::write(comm, part, &files::geomview::Settings::default(), stem)?
@@ -93,8 +94,8 @@ fn passes(format: &Format) -> u64 {
     match format {
         Format::None => 0,
         Format::Msh | Format::Medit | Format::Vol => 2,
-        // For shared edges, for shared faces, and for the file.
-        Format::Mfem => 3,
+        // For the tets beside the boundary, or for shared edges and faces, and for the file.
+        Format::Inp | Format::Mfem => 3,
         Format::Elmer | Format::Vtu | Format::Geomview => 1,
     }
 }

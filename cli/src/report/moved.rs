@@ -61,7 +61,7 @@ impl MoveReport {
             after: done.after,
             moved_tets: done.moved.tets,
             moved_bytes: done.moved.bytes,
-            mesh: MeshReport::new(&done.check, done.checksum.to_string()),
+            mesh: MeshReport::new(&done.check, Vec::new(), done.checksum.to_string()),
             halo: None,
             notes: done.notes.clone(),
             stages: Vec::new(),

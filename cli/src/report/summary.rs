@@ -3,7 +3,9 @@
 use super::{Report, counted, grouped, tets, vertices};
 use std::fmt;
 use tetmill::memory::sized;
-use tetmill::run::{CoarseReport, Entities, Evened, FlatPlace, PeriodicCheck, Refused, SharpPlace};
+use tetmill::run::{
+    CoarseReport, Entities, Evened, FlatPlace, PeriodicCheck, Refused, SharpPlace, StraightEdge,
+};
 
 /// Writes the line about thin regions.
 fn write_thin_regions(f: &mut fmt::Formatter<'_>, coarse: &CoarseReport) -> fmt::Result {
@@ -125,7 +127,26 @@ impl Report {
                 .collect();
             writeln!(f, "by level   smallest dihedral angle and 1st percentile: {}", worst.join(", "))?;
         }
-        write!(f, "checked    every tet positive; volume {}", mesh.volume)?;
+        if let Some(scaled) = mesh.scaled_jacobian {
+            let levels = self.quality_by_level.iter().map(|level| match level.scaled_jacobian {
+                Some(scaled) => format!("{scaled:.2}"),
+                None => "not valid".into(),
+            });
+            let levels: Vec<String> = levels.collect();
+            let by_level =
+                if levels.len() > 1 { format!("; by level {}", levels.join(", ")) } else { String::new() };
+            writeln!(f, "order 2    scaled Jacobian {scaled:.3} at worst{by_level}")?;
+        }
+        if let Some(StraightEdge { place: [x, y, z], .. }) = mesh.straight_edges.first() {
+            let count = counted(mesh.straight_edges.len() as u64, "edge is", "edges are");
+            let furthest = mesh.straight_edges.iter().map(|edge| edge.distance).fold(0.0, f64::max);
+            writeln!(
+                f,
+                "           {count} straight and up to {furthest:.1e} off the surface; the first at ({x:.4e}, {y:.4e}, {z:.4e})"
+            )?;
+        }
+        let proved = if self.order > 1 { " and proved valid" } else { "" };
+        write!(f, "checked    every tet positive{proved}; volume {}", mesh.volume)?;
         if let Some(distance) = mesh.furthest_off_surface {
             match distance {
                 0.0 => write!(f, "; boundary vertices exactly on their patches, which are flat")?,

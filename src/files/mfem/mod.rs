@@ -12,17 +12,22 @@
 //! shared_faces n          on all these ranks
 //! mfem_mesh_end
 //! ```
+//! In a mesh of second order the vertices have no coordinates; `nodes` follows instead, a grid function
+//! of degree 2 with the corners first, then the nodes on edges, in the order in which the elements
+//! first have them: that of MFEM's own table of edges.
+//!
 //! Attributes are the numbers of bodies and boundaries. Vertices of periodic faces stay separate.
 
 mod shared;
 
+use super::corners::Corners;
 use super::lines::FLUSH_AT;
 use super::output::{Output, folder_and_name, write_together};
 use super::text::{FLOAT_CHARS, Line};
 use super::{WriteError, Written, body_number, patch_number, sum_written};
 use crate::ground::comm::Communicator;
-use crate::ground::mesh::stream::{BoundaryBlock, MeshStream, NO_TET, TetBlock};
-use crate::ground::mesh::{Label, Names};
+use crate::ground::mesh::stream::{BoundaryBlock, LocalBlock, MeshStream, NO_TET, TetBlock};
+use crate::ground::mesh::{Label, Names, Order};
 use shared::{Group, Groups, groups};
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::Write;
@@ -65,9 +70,9 @@ pub fn part_text(
     names: &Names,
 ) -> Result<Vec<u8>, WriteError> {
     comm.agree(refuse(part))?;
-    let groups = groups(comm, part)?;
+    let content = Content::of(comm, part, names)?;
     let mut text = Vec::new();
-    let written = write_part(part, names, &groups, &mut text, &mut |_| Ok(()));
+    let written = content.write(&mut text, &mut |_| Ok(()));
     comm.agree(written.map(|()| text))
 }
 
@@ -84,7 +89,7 @@ pub fn write(
     stem: &Path,
 ) -> Result<Written, WriteError> {
     comm.agree(refuse(part))?;
-    let groups = groups(comm, part)?;
+    let content = Content::of(comm, part, names)?;
     let (folder, name) = folder_and_name(stem)?;
     let written = write_together(
         comm,
@@ -96,7 +101,7 @@ pub fn write(
             file.push(format!(".{:06}", part.rank()));
             let mut file = Output::create(&stage.join(file))?;
             let mut text = Vec::new();
-            write_part(part, names, &groups, &mut text, &mut |text| file.flush_past(FLUSH_AT, text))?;
+            content.write(&mut text, &mut |text| file.flush_past(FLUSH_AT, text))?;
             file.write(&text)?;
             Ok(Written { files: 1, bytes: file.finish()? })
         },
@@ -126,27 +131,55 @@ fn refuse(part: &dyn MeshStream) -> Result<(), WriteError> {
 /// Takes text that is complete, and may write and clear it.
 type Flush<'a> = &'a mut dyn FnMut(&mut Vec<u8>) -> Result<(), WriteError>;
 
-fn write_part(
-    part: &dyn MeshStream,
-    names: &Names,
-    groups: &Groups,
-    text: &mut Vec<u8>,
-    flush: Flush<'_>,
-) -> Result<(), WriteError> {
-    let sets = [&names.bodies, &names.patches].map(|labels| by_name(labels));
-    let has_names = sets.iter().any(|sets| !sets.is_empty());
-    title(text, "MFEM mesh v1.", if has_names { 3 } else { 2 });
-    write_elements(part, names, text, flush)?;
-    if has_names {
-        write_sets("attribute_sets", &sets[0], text);
+/// Everything that the text of a part is written from.
+struct Content<'a> {
+    part: &'a dyn MeshStream,
+    names: &'a Names,
+    /// The corners, if the part is of second order.
+    corners: Option<Corners<'a>>,
+    groups: Groups,
+}
+
+impl<'a> Content<'a> {
+    /// **Collective.** Finds what the part shares with others.
+    fn of(comm: &dyn Communicator, part: &'a dyn MeshStream, names: &'a Names) -> Result<Self, WriteError> {
+        let corners = (part.order() == Order::Second).then(|| Corners::of(part));
+        let linear = corners.as_ref().map_or(part, |corners| corners);
+        let groups = groups(comm, linear)?;
+        Ok(Self { part, names, groups, corners })
     }
-    write_boundary(part, names, text, flush)?;
-    if has_names {
-        write_sets("bdr_attribute_sets", &sets[1], text);
+
+    fn write(&self, text: &mut Vec<u8>, flush: Flush<'_>) -> Result<(), WriteError> {
+        let names = self.names;
+        let sets = [&names.bodies, &names.patches].map(|labels| by_name(labels));
+        let has_names = sets.iter().any(|sets| !sets.is_empty());
+        title(text, "MFEM mesh v1.", if has_names { 3 } else { 2 });
+        let linear = self.corners.as_ref().map_or(self.part, |corners| corners);
+        write_elements(linear, names, text, flush)?;
+        if has_names {
+            write_sets("attribute_sets", &sets[0], text);
+        }
+        write_boundary(linear, names, text, flush)?;
+        if has_names {
+            write_sets("bdr_attribute_sets", &sets[1], text);
+        }
+        title(text, "\nvertices\n", linear.counts().vertices as usize);
+        match &self.corners {
+            None => {
+                text.extend(b"3\n");
+                write_points(linear, text, flush)?;
+            }
+            Some(corners) => {
+                text.extend(b"\nnodes\nFiniteElementSpace\nFiniteElementCollection: H1_3D_P2\n");
+                text.extend(b"VDim: 3\nOrdering: 1\n\n");
+                write_points(corners, text, flush)?;
+                write_edge_nodes(self.part, text, flush)?;
+            }
+        }
+        text.extend(b"\nmfem_serial_mesh_end\n\n");
+        write_groups(linear, &self.groups, text);
+        Ok(())
     }
-    write_vertices(part, text, flush)?;
-    write_groups(part, groups, text);
-    Ok(())
 }
 
 /// Appends a title and a count.
@@ -249,9 +282,7 @@ fn write_boundary(
     })
 }
 
-fn write_vertices(part: &dyn MeshStream, text: &mut Vec<u8>, flush: Flush<'_>) -> Result<(), WriteError> {
-    title(text, "\nvertices\n", part.counts().vertices as usize);
-    text.extend(b"3\n");
+fn write_points(part: &dyn MeshStream, text: &mut Vec<u8>, flush: Flush<'_>) -> Result<(), WriteError> {
     let mut line = Line::default();
     for index in 0..part.vertex_blocks() {
         for [x, y, z] in part.vertex_points(index).iter() {
@@ -259,7 +290,25 @@ fn write_vertices(part: &dyn MeshStream, text: &mut Vec<u8>, flush: Flush<'_>) -
         }
         flush(text)?;
     }
-    text.extend(b"\nmfem_serial_mesh_end\n\n");
+    Ok(())
+}
+
+/// Writes the nodes on edges, each with the first tet that has it.
+fn write_edge_nodes(part: &dyn MeshStream, text: &mut Vec<u8>, flush: Flush<'_>) -> Result<(), WriteError> {
+    let mut is_written = vec![false; part.counts().vertices as usize];
+    let (mut line, mut block, mut points) = (Line::default(), LocalBlock::default(), Vec::new());
+    for index in 0..part.tet_blocks() {
+        part.local_block(index, &mut block);
+        part.block_points(&block, &mut points);
+        for &place in block.tets.edge_nodes.iter().flatten() {
+            let node = block.vertices[place as usize] as usize;
+            if !std::mem::replace(&mut is_written[node], true) {
+                let [x, y, z] = points[place as usize];
+                line.float(x).blank().float(y).blank().float(z).end(text);
+            }
+        }
+        flush(text)?;
+    }
     Ok(())
 }
 

@@ -1,6 +1,7 @@
-//! Single-file formats, chosen by the file's extension. Gmsh, Medit and NETGEN files hold the mesh
-//! of all ranks.
+//! Single-file formats, chosen by the file's extension. Gmsh, Medit, NETGEN and Abaqus files hold the
+//! mesh of all ranks.
 
+mod abaqus;
 mod gmsh;
 mod groups;
 mod netgen;
@@ -8,17 +9,17 @@ mod runs;
 
 use super::input::ending;
 use super::joined::{self, Section, TextFormat, Whole};
+use super::node_order::VTK;
 use super::output::Destination;
 use super::text::Line;
 use super::{WriteError, Written, geomview, vtu};
 use crate::ground::comm::{Communicator, thread};
-use crate::ground::mesh::Names;
 use crate::ground::mesh::stream::MeshStream;
+use crate::ground::mesh::{Names, Order};
 use std::path::{Path, PathBuf};
 
 /// The extensions that [`Format::of`] knows.
-pub const KNOWN: &str =
-    ".vtu, .msh (Gmsh), .mesh (Medit), .vol (NETGEN), .off (Geomview: the boundary alone)";
+pub const KNOWN: &str = ".vtu, .msh (Gmsh), .mesh (Medit), .vol (NETGEN), .inp (Abaqus, CalculiX), .off (Geomview: the boundary alone)";
 
 /// A single-file format.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -31,6 +32,8 @@ pub enum Format {
     Medit,
     /// NETGEN's `.vol`.
     Netgen,
+    /// Abaqus' and CalculiX' `.inp`.
+    Abaqus,
     /// Geomview's OFF: boundary only.
     Off,
 }
@@ -46,6 +49,7 @@ impl Format {
             "msh" => Ok(Self::Gmsh),
             "mesh" => Ok(Self::Medit),
             "vol" => Ok(Self::Netgen),
+            "inp" => Ok(Self::Abaqus),
             "off" => Ok(Self::Off),
             _ => Err(WriteError::UnknownFormat(path.to_path_buf())),
         }
@@ -77,6 +81,7 @@ impl Format {
             Self::Gmsh => Some(TextFormat { name: "Gmsh", sections: gmsh::sections }),
             Self::Medit => Some(TextFormat { name: "Medit", sections: medit_sections }),
             Self::Netgen => Some(TextFormat { name: "NETGEN", sections: netgen::sections }),
+            Self::Abaqus => Some(TextFormat { name: "Abaqus", sections: abaqus::sections }),
             Self::Vtu | Self::Off => None,
         }
     }
@@ -115,7 +120,7 @@ pub fn write_as(
     }
 }
 
-/// **Collective.** Writes the mesh of all ranks to one Gmsh, Medit or NETGEN file. Each vertex, tet
+/// **Collective.** Writes the mesh of all ranks to one Gmsh, Medit, NETGEN or Abaqus file. Each vertex, tet
 /// and interface triangle is written once. All ranks get the totals.
 ///
 /// # Errors
@@ -141,6 +146,7 @@ pub fn losses(names: &Names, format: Format) -> Vec<String> {
     match format {
         Format::Gmsh => gmsh::losses(names),
         Format::Netgen => netgen::losses(names),
+        Format::Abaqus => abaqus::losses(names),
         Format::Medit if names.bodies.iter().chain(&names.patches).any(|label| !label.names.is_empty()) => {
             vec!["Medit has no names: bodies and boundaries are known by their numbers alone".into()]
         }
@@ -160,23 +166,33 @@ fn coordinates(line: &mut Line, point: &[f64; 3]) {
     line.float(point[0]).blank().float(point[1]).blank().float(point[2]);
 }
 
+/// The order of the nodes of Medit's elements of second order, by their weights in halves at the
+/// corners: readers assume no other, but the keyword leaves no doubt.
+const TRIANGLE_ORDER: &str = "TrianglesP2Ordering\n6\n2 0 0\n0 2 0\n0 0 2\n1 1 0\n0 1 1\n1 0 1\n";
+const TET_ORDER: &str = "TetrahedraP2Ordering\n10\n2 0 0 0\n0 2 0 0\n0 0 2 0\n0 0 0 2\n1 1 0 0\n0 1 1 0\n\
+    1 0 1 0\n1 0 0 1\n0 1 0 1\n0 0 1 1\n";
+
 /// Medit: the references are boundary and body numbers.
 fn medit_sections<'a>(_: &dyn Communicator, whole: &'a Whole<'a>) -> Result<Vec<Section<'a>>, WriteError> {
     let counts = whole.totals;
+    let (triangles, tets) = match whole.order() {
+        Order::First => ("Triangles".to_string(), "Tetrahedra".to_string()),
+        Order::Second => (format!("{TRIANGLE_ORDER}TrianglesP2"), format!("{TET_ORDER}TetrahedraP2")),
+    };
     Ok(vec![
         Section::Text(format!("MeshVersionFormatted 2\nDimension 3\nVertices\n{}\n", counts.vertices)),
         Section::Vertices(Box::new(|line, _, point| {
             coordinates(line, point);
             line.bytes(b" 0");
         })),
-        Section::Text(format!("Triangles\n{}\n", counts.boundary)),
+        Section::Text(format!("{triangles}\n{}\n", counts.boundary)),
         Section::Triangles(Box::new(|line, triangle| {
-            whole.ids(line, triangle.vertices);
+            whole.triangle_ids(line, triangle);
             line.blank().int(triangle.number);
         })),
-        Section::Text(format!("Tetrahedra\n{}\n", counts.tets)),
+        Section::Text(format!("{tets}\n{}\n", counts.tets)),
         Section::Tets(Box::new(|line, tet| {
-            whole.ids(line, tet.vertices);
+            whole.tet_ids(line, tet, &VTK);
             line.blank().int(tet.number);
         })),
         Section::Text("End\n".into()),

@@ -9,10 +9,11 @@ use crate::ground::mesh::{GlobalId, Rank};
 use csg::BodyId;
 use std::collections::BTreeMap;
 
-/// A ghost tet whose vertices are given by global ids.
+/// A ghost tet whose nodes are given by global ids.
 pub(super) struct Named {
     pub tet: GhostTet,
     pub vertices: [GlobalId; 4],
+    pub edge_nodes: Option<[GlobalId; 6]>,
 }
 
 /// The content of a message.
@@ -25,7 +26,7 @@ pub(super) struct Message {
 /// The vertices of the tets that rank `to` does not have: local indices, ascending.
 pub(super) fn unknown(interface: &Interface, to: Rank, tets: &[Tet]) -> Vec<u32> {
     let is_unknown = |vertex: &u32| interface.holders(*vertex).binary_search(&to).is_err();
-    let mut vertices: Vec<u32> = tets.iter().flat_map(|tet| tet.vertices).filter(is_unknown).collect();
+    let mut vertices: Vec<u32> = tets.iter().flat_map(Tet::nodes).filter(is_unknown).collect();
     vertices.sort_unstable();
     vertices.dedup();
     vertices
@@ -55,6 +56,8 @@ pub(super) fn write(
     put(&mut message, &tets.iter().map(|tet| tet.body.0).collect::<Vec<u32>>());
     let named = tets.iter().map(|tet| tet.vertices.map(|vertex| id(&vertex)));
     put(&mut message, &named.collect::<Vec<[GlobalId; 4]>>());
+    let edges = tets.iter().filter_map(|tet| Some(tet.edge_nodes?.map(|node| id(&node))));
+    put(&mut message, &edges.collect::<Vec<[GlobalId; 6]>>());
     message
 }
 
@@ -96,9 +99,11 @@ pub(super) fn read(from: Rank, message: &[u8]) -> Message {
     let ids: Vec<[u64; 2]> = take(rest);
     let bodies: Vec<u32> = take(rest);
     let named: Vec<[GlobalId; 4]> = take(rest);
-    let tet = |((&[id, index], &body), &vertices): ((&[u64; 2], &u32), &[GlobalId; 4])| Named {
-        tet: GhostTet { id, owner: from, index, body: BodyId(body), vertices: [0; 4] },
-        vertices,
+    let edges: Vec<[GlobalId; 6]> = take(rest);
+    let tet = |(k, (&[id, index], &body)): (usize, (&[u64; 2], &u32))| Named {
+        tet: GhostTet { id, owner: from, index, body: BodyId(body), vertices: [0; 4], edge_nodes: None },
+        vertices: named[k],
+        edge_nodes: edges.get(k).copied(),
     };
-    Message { vertices, tets: ids.iter().zip(&bodies).zip(&named).map(tet).collect() }
+    Message { vertices, tets: ids.iter().zip(&bodies).enumerate().map(tet).collect() }
 }

@@ -112,8 +112,12 @@ fn numbered(interface: &Interface, messages: Vec<Message>) -> Result<Ghosts, Hal
         Ok(place) => first_vertex + place as u32,
         Err(_) => interface.find(id).unwrap_or_else(|| panic!("vertex {id} of a ghost was not sent")),
     };
-    let tets =
-        named.iter().map(|named| GhostTet { vertices: named.vertices.map(find), ..named.tet }).collect();
+    let tet = |named: &message::Named| GhostTet {
+        vertices: named.vertices.map(find),
+        edge_nodes: named.edge_nodes.map(|nodes| nodes.map(find)),
+        ..named.tet
+    };
+    let tets = named.iter().map(tet).collect();
     let mut ghosts = Ghosts { first_vertex, first_tet: counts.tets, tets, ..Ghosts::default() };
     for (vertex, holders) in vertices {
         ghosts.vertices.push(vertex);
