@@ -430,9 +430,14 @@ pub fn run_quality(options: &Quality) -> Result<(), Failure> {
     }
     let faulty: Vec<String> = meshes
         .iter()
-        .filter(|mesh| mesh.inverted > 0)
+        .filter(|mesh| mesh.inverted + mesh.not_valid.unwrap_or(0) > 0)
         .map(|mesh| {
-            let tets = counted(mesh.inverted as u64, "inverted tet", "inverted tets");
+            let tets = match mesh.not_valid {
+                Some(count) if count > 0 => {
+                    counted(count as u64, "invalid curved tet", "invalid curved tets")
+                }
+                _ => counted(mesh.inverted as u64, "inverted tet", "inverted tets"),
+            };
             format!("{tets} in {}", mesh.mesh)
         })
         .collect();

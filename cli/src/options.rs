@@ -46,7 +46,7 @@ pub enum Command {
     Check(Check),
     /// Compare the element quality of tetrahedral meshes, also of other programs
     #[command(
-        after_help = "Exit status: 0 no inverted tets; 1 inverted tets found; 2 a file cannot be read."
+        after_help = "Exit status: 0 no inverted tets, nor curved ones that are not valid; 1 such tets found; 2 a file cannot be read."
     )]
     Quality(Quality),
     /// Print the completion script of a shell

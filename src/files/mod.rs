@@ -31,6 +31,8 @@ pub mod mfem;
 pub(crate) mod node_order;
 mod number;
 pub(crate) mod once;
+#[cfg(test)]
+mod order_tests;
 pub(crate) mod output;
 mod pairs;
 #[cfg(feature = "pictures")]

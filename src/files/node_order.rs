@@ -15,6 +15,9 @@ pub const GMSH: [usize; 6] = [0, 3, 1, 2, 5, 4];
 /// NETGEN, of its own corners, which are ours with the first two swapped: edges 01 02 03 12 13 23.
 pub const NETGEN: [usize; 6] = [0, 3, 4, 1, 2, 5];
 
+/// The edges in lexicographic order: NETGEN's order of the corners in the file.
+pub const LEXICOGRAPHIC: [usize; 6] = [0, 1, 2, 3, 4, 5];
+
 /// NETGEN's triangles: node k is on the edge opposite corner k.
 pub const NETGEN_TRIANGLE: [usize; 3] = [1, 2, 0];
 

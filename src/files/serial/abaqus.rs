@@ -271,7 +271,7 @@ mod tests {
         let text = std::fs::read_to_string(&path).unwrap();
         assert!(text.starts_with(expected), "{text}");
         assert!(text.contains("*ELSET, ELSET=BOUNDARY_1_S1\n1\n"), "{text}");
-        assert!(text.contains("*SURFACE, NAME=LID, TYPE=ELEMENT\nBOUNDARY_2_S1, S1\n"), "{text}");
+        assert!(text.contains("*SURFACE, NAME=LID, TYPE=ELEMENT\nBOUNDARY_2_S2, S2\nBOUNDARY_2_S4, S4\n"), "{text}");
         assert!(text.contains("*ELSET, ELSET=UPPER\nBODY_2\n"), "{text}");
         assert_eq!(losses(&names()), Vec::<String>::new());
         assert_eq!(Format::of(&path).unwrap(), Format::Abaqus);

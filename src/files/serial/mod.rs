@@ -166,18 +166,12 @@ fn coordinates(line: &mut Line, point: &[f64; 3]) {
     line.float(point[0]).blank().float(point[1]).blank().float(point[2]);
 }
 
-/// The order of the nodes of Medit's elements of second order, by their weights in halves at the
-/// corners: readers assume no other, but the keyword leaves no doubt.
-const TRIANGLE_ORDER: &str = "TrianglesP2Ordering\n6\n2 0 0\n0 2 0\n0 0 2\n1 1 0\n0 1 1\n1 0 1\n";
-const TET_ORDER: &str = "TetrahedraP2Ordering\n10\n2 0 0 0\n0 2 0 0\n0 0 2 0\n0 0 0 2\n1 1 0 0\n0 1 1 0\n\
-    1 0 1 0\n1 0 0 1\n0 1 0 1\n0 0 1 1\n";
-
 /// Medit: the references are boundary and body numbers.
 fn medit_sections<'a>(_: &dyn Communicator, whole: &'a Whole<'a>) -> Result<Vec<Section<'a>>, WriteError> {
     let counts = whole.totals;
-    let (triangles, tets) = match whole.order() {
-        Order::First => ("Triangles".to_string(), "Tetrahedra".to_string()),
-        Order::Second => (format!("{TRIANGLE_ORDER}TrianglesP2"), format!("{TET_ORDER}TetrahedraP2")),
+    let [triangles, tets] = match whole.order() {
+        Order::First => ["Triangles", "Tetrahedra"],
+        Order::Second => ["TrianglesP2", "TetrahedraP2"],
     };
     Ok(vec![
         Section::Text(format!("MeshVersionFormatted 2\nDimension 3\nVertices\n{}\n", counts.vertices)),

@@ -20,6 +20,7 @@ pub(super) struct FaceTable {
 /// Makes a mesh of a file's content.
 pub(super) fn assemble(mut raw: Raw) -> Result<VolumeMesh, Fault> {
     check_corners(&raw)?;
+    let mut edge_points = edge_points(&raw)?;
     drop_unused(&mut raw);
     let Raw { points, tets, tet_labels, .. } = &raw;
     let mut tets: Vec<[VertexId; 4]> = tets.iter().map(|t| t.map(VertexId)).collect();
@@ -29,6 +30,13 @@ pub(super) fn assemble(mut raw: Raw) -> Result<VolumeMesh, Fault> {
     refuse_equal(&raw, &faces, &face_tets)?;
     let mut table = FaceTable { faces, tets: face_tets };
     let turned = orient::orient(points, &mut tets, &mut table);
+    for ((edges, tet), of_file) in edge_points.iter_mut().zip(&tets).zip(&raw.tets) {
+        if tet[0].0 != of_file[0] {
+            // The first two corners are swapped.
+            let [a, b, c, d, e, f] = *edges;
+            *edges = [a, d, e, b, c, f];
+        }
+    }
     let (labels, body_of) = numbered(tet_labels);
     let bodies: Vec<BodyId> = body_of.into_iter().map(BodyId).collect();
     let mut notes = std::mem::take(&mut raw.notes);
@@ -41,8 +49,9 @@ pub(super) fn assemble(mut raw: Raw) -> Result<VolumeMesh, Fault> {
         .map(|(vertices, patch)| BoundaryTriangle { vertices: *vertices, patch: PatchId(patch) })
         .collect();
     if raw.higher_order > 0 {
+        let measured = if edge_points.is_empty() { "" } else { ", though they are measured as they are" };
         notes.push(format!(
-            "the mesh is of higher order: only the corners of {} are kept, so curved edges become straight",
+            "the mesh is of higher order: only the corners of {} are kept, so curved edges become straight{measured}",
             counted(raw.higher_order, "element")
         ));
     }
@@ -60,7 +69,25 @@ pub(super) fn assemble(mut raw: Raw) -> Result<VolumeMesh, Fault> {
     classify::classify(&mut mesh, &raw.edges, &raw.edge_labels, &mut notes);
     let inverted = orient::not_positive(&mesh.points, &mesh.tets).into_iter().map(TetId).collect();
     let links = periodic::links(&mesh, &raw.periodic, &mut notes);
-    Ok(VolumeMesh { mesh, names, turned, inverted, links, notes })
+    Ok(VolumeMesh { mesh, names, edge_points, turned, inverted, links, notes })
+}
+
+/// The coordinates of the nodes on the edges of all tets, if all are of second order.
+fn edge_points(raw: &Raw) -> Result<Vec<[[f64; 3]; 6]>, Fault> {
+    let point = |node: u32| raw.points.get(node as usize).map(|p| [p.x, p.y, p.z]);
+    let of_tet = |(tet, nodes): (usize, &[u32; 6])| {
+        if let Some(missing) = nodes.iter().find(|node| point(**node).is_none()) {
+            return Err(Fault::file(format!(
+                "tetrahedron {} names vertex {}, and the file has {}",
+                raw.tet_number(tet),
+                u64::from(*missing) + 1,
+                raw.points.len()
+            )));
+        }
+        Ok(nodes.map(|node| point(node).unwrap_or_default()))
+    };
+    let points = raw.edge_nodes.iter().enumerate().map(of_tet).collect::<Result<Vec<_>, _>>()?;
+    Ok(if points.len() == raw.tets.len() { points } else { Vec::new() })
 }
 
 /// Checks that element vertices exist, and that the four corners of a tet differ.
@@ -145,10 +172,15 @@ fn drop_unused(raw: &mut Raw) {
     const UNUSED: u32 = u32::MAX;
     let mut to_kept = vec![UNUSED; raw.points.len()];
     raw.tets.iter().flatten().for_each(|&v| to_kept[v as usize] = 0);
-    let unused = to_kept.iter().filter(|&&place| place == UNUSED).count();
-    if unused == 0 {
+    if !to_kept.contains(&UNUSED) {
         return;
     }
+    let mut on_edges = vec![false; raw.points.len()];
+    for &node in raw.edge_nodes.iter().flatten() {
+        on_edges[node as usize] = true;
+    }
+    let unused =
+        to_kept.iter().zip(on_edges).filter(|(place, on_edge)| **place == UNUSED && !on_edge).count();
     for (kept, place) in (0..).zip(to_kept.iter_mut().filter(|place| **place != UNUSED)) {
         *place = kept;
     }
@@ -163,6 +195,9 @@ fn drop_unused(raw: &mut Raw) {
         periodic.pairs.retain(|pair| !pair.contains(&UNUSED));
     }
     let hanging = before - raw.triangles.len() - raw.edges.len();
+    if unused + hanging == 0 {
+        return;
+    }
     let mut note = format!("{} that no tet uses left out", counted(unused, "vertex"));
     if hanging > 0 {
         note += &format!(", with {} on them", counted(hanging, "triangle or edge"));

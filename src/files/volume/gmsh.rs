@@ -14,6 +14,7 @@ use super::groups::Groups;
 use super::raw::{Label, Raw, Shape};
 use super::{gmsh_periodic, gmsh4, groups};
 use crate::files::input::{Bytes, Fault, Words, shown};
+use crate::files::node_order::GMSH;
 
 /// Storage of numbers.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -96,7 +97,7 @@ pub(super) fn known_type(code: i64) -> Result<(Shape, usize), String> {
 pub(super) fn parse(content: &[u8]) -> Result<Raw, Fault> {
     let mut words = Words::new(content);
     let (version, storage) = header(&mut words, content)?;
-    let mut raw = Raw::default();
+    let mut raw = Raw { edge_order: Some(&GMSH), ..Raw::default() };
     let mut file = gmsh4::Parts::default();
     while let Some(section) = words.next() {
         words.rest_of_line();

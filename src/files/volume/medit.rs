@@ -2,6 +2,7 @@
 
 use super::raw::{Label, Raw, Shape};
 use crate::files::input::{Fault, Words, shown};
+use crate::files::node_order::VTK;
 
 /// The shape and number of nodes of a block of elements; corners come first.
 pub(super) fn block(keyword: &str) -> Option<(Shape, usize)> {
@@ -47,7 +48,7 @@ pub(super) fn parse(content: &[u8]) -> Result<Raw, Fault> {
         }));
     }
     words.int("the version")?;
-    let mut raw = Raw::default();
+    let mut raw = Raw { edge_order: Some(&VTK), ..Raw::default() };
     let mut nodes = Vec::new();
     let mut has_vertices = false;
     while let Some(word) = words.next() {

@@ -9,6 +9,7 @@
 use super::medit::{block, unread};
 use super::raw::{Label, Raw, Shape};
 use crate::files::input::{Bytes, Fault};
+use crate::files::node_order::VTK;
 
 const DIMENSION: i32 = 3;
 const VERTICES: i32 = 4;
@@ -79,7 +80,7 @@ pub(super) fn parse(content: &[u8]) -> Result<Raw, Fault> {
         return Err(bytes.fault(format!("the version {version} is not known; 1 to 4 are")));
     }
     let mut reader = Reader { bytes, version };
-    let mut raw = Raw::default();
+    let mut raw = Raw { edge_order: Some(&VTK), ..Raw::default() };
     loop {
         let keyword = reader.bytes.i32("a keyword")?;
         if keyword == END {

@@ -11,7 +11,8 @@
 //! this makes neighbours agree: the writer ignored the order of vertices. If neighbours agree
 //! already, such tets are truly inverted: they are kept and listed in [`VolumeMesh::inverted`].
 //!
-//! *Not* checked: other overlaps of tets. Of second-order elements only the corners are kept.
+//! *Not* checked: other overlaps of tets. Of second-order elements the mesh has the corners;
+//! [`VolumeMesh::edge_points`] has the other nodes of the tets.
 
 mod assemble;
 mod boundary;
@@ -66,6 +67,9 @@ pub struct VolumeMesh {
     /// Numbers and names, from 1. Patches with the same boundary number between different bodies
     /// share it.
     pub names: Names,
+    /// The coordinates of the nodes on the edges of each tet in the order of
+    /// [`TET_EDGES`](crate::mesh::TET_EDGES), if all tets are of second order; otherwise empty.
+    pub edge_points: Vec<[[f64; 3]; 6]>,
     /// Number of tets whose vertices were reordered for a positive orientation.
     pub turned: usize,
     /// Tets that are not positively oriented: inverted or flat.

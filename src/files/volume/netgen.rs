@@ -2,12 +2,13 @@
 
 use super::raw::{Label, PeriodicPairs, Raw, Shape};
 use crate::files::input::{Fault, Words, counted};
+use crate::files::node_order::LEXICOGRAPHIC;
 use std::collections::BTreeMap;
 
 pub(super) fn parse(content: &[u8]) -> Result<Raw, Fault> {
     let mut words = Words::with_comments(content);
     words.expect("mesh3d")?;
-    let mut raw = Raw::default();
+    let mut raw = Raw { edge_order: Some(&LEXICOGRAPHIC), ..Raw::default() };
     let mut has_points = false;
     let mut types = Vec::new();
     while let Some(word) = words.next() {

@@ -78,6 +78,7 @@ fn join(pieces: Vec<Grid>) -> Result<Grid, Fault> {
         raw.triangle_labels.extend(of.triangle_labels);
         raw.edges.extend(of.edges.iter().map(|edge| edge.map(|v| places[v as usize])));
         raw.edge_labels.extend(of.edge_labels);
+        raw.edge_nodes.extend(of.edge_nodes.iter().map(|nodes| nodes.map(|v| places[v as usize])));
         raw.higher_order += of.higher_order;
         raw.add_names([of.body_names, of.patch_names]);
         for note in of.notes {
@@ -98,6 +99,9 @@ fn sort_tets(whole: &mut Grid) {
     let mut order: Vec<usize> = (0..whole.tet_ids.len()).collect();
     order.sort_by_key(|&tet| whole.tet_ids[tet]);
     order.dedup_by_key(|&mut tet| whole.tet_ids[tet]);
+    if whole.raw.edge_nodes.len() == whole.raw.tets.len() {
+        whole.raw.edge_nodes = order.iter().map(|&tet| whole.raw.edge_nodes[tet]).collect();
+    }
     whole.raw.tets = order.iter().map(|&tet| whole.raw.tets[tet]).collect();
     whole.raw.tet_labels = order.iter().map(|&tet| whole.raw.tet_labels[tet]).collect();
 }

@@ -74,8 +74,17 @@ pub(super) struct Raw {
     pub body_names: NamesByNumber,
     /// Names of boundaries by number.
     pub patch_names: NamesByNumber,
-    /// Number of higher-order elements, of which only the corners are kept.
+    /// Number of higher-order elements.
     pub higher_order: usize,
+    /// The order of the nodes on the edges of ten-node tets, as in [`node_order`]; `None` if it is
+    /// not known.
+    ///
+    /// [`node_order`]: crate::files::node_order
+    pub edge_order: Option<&'static [usize; 6]>,
+    /// The nodes on the edges of ten-node tets, in the order of
+    /// [`TET_EDGES`](crate::ground::mesh::TET_EDGES); as many as tets, or some are not of second
+    /// order.
+    pub edge_nodes: Vec<[u32; 6]>,
     /// Periodic pairs of the file.
     pub periodic: Vec<PeriodicPairs>,
     pub notes: Vec<String>,
@@ -102,6 +111,13 @@ impl Raw {
             (Shape::Tet, &[a, b, c, d, ..]) => {
                 self.tets.push([a, b, c, d]);
                 self.tet_labels.push(label);
+                if let (Some(order), Some(edges)) = (self.edge_order, nodes[4..].first_chunk::<6>())
+                    && nodes.len() == 10
+                {
+                    let mut arranged = [0; 6];
+                    order.iter().zip(edges).for_each(|(&edge, &node)| arranged[edge] = node);
+                    self.edge_nodes.push(arranged);
+                }
                 4
             }
             (Shape::Other(name), _) => return Err(refusal(name)),

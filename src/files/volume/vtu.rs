@@ -11,6 +11,7 @@ use super::vtu_arrays::{Array, Document, Section};
 use super::{VolumeMesh, finish};
 use crate::Point;
 use crate::files::input::{Fault, ReadError, coordinate, load};
+use crate::files::node_order::VTK;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -112,7 +113,7 @@ impl<'d, 'a> Cells<'d, 'a> {
 
 pub(super) fn parse(content: &[u8]) -> Result<Grid, Fault> {
     let document = Document::read(content)?;
-    let mut raw = Raw { points: points(&document)?, ..Raw::default() };
+    let mut raw = Raw { points: points(&document)?, edge_order: Some(&VTK), ..Raw::default() };
     let cells = Cells::of(&document)?;
     let of_tets = labels(&document, &LABELS)?;
     let of_triangles = labels(&document, &["BoundaryId"])?;

@@ -15,10 +15,11 @@ pub use table::table;
 
 use crate::Point;
 use crate::files::volume::VolumeMesh;
+use crate::ground::kernel::jacobian;
 use crate::ground::kernel::predicates::{Sign, orient3d};
 use crate::ground::kernel::quality::{mean_ratio, squared_lengths};
 use crate::ground::kernel::simplex::{dihedral_angles, volume};
-use crate::ground::mesh::Mesh;
+use crate::ground::mesh::{Mesh, VertexId};
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -48,8 +49,16 @@ pub struct Quality {
     pub volume: f64,
     /// Volume of each body.
     pub body_volumes: Vec<f64>,
-    /// Tets that are not positively oriented.
+    /// Tets that are not positively oriented, by their corners.
     pub inverted: usize,
+    /// The order of the elements: 1, or 2 for ten-node tets. Angles, ratios and badness are those of
+    /// the corners.
+    pub order: u32,
+    /// Tets of second order whose Jacobian determinant is not proved positive; null for order 1.
+    pub not_valid: Option<usize>,
+    /// A lower bound of the scaled Jacobian, the ratio of the smallest determinant of a tet to the
+    /// largest; null for order 1.
+    pub scaled_jacobian: Option<f64>,
     /// The smallest dihedral angle, degrees.
     pub smallest_dihedral: f64,
     /// The 1st percentile of each tet's smallest dihedral angle, degrees.
@@ -191,7 +200,28 @@ fn angle_class(degrees: f64) -> usize {
 impl Quality {
     /// Measures a mesh that was read, under the name of its file.
     pub fn of_file(name: impl Into<String>, read: &VolumeMesh) -> Self {
-        Self { mesh: name.into(), notes: read.notes.clone(), ..measure(&read.mesh) }
+        let straight = Self { mesh: name.into(), notes: read.notes.clone(), ..measure(&read.mesh) };
+        if read.edge_points.is_empty() { straight } else { straight.curved(read) }
+    }
+
+    /// Adds the measures of ten-node tets: their volumes are those of the curved tets.
+    fn curved(mut self, read: &VolumeMesh) -> Self {
+        let mesh = &read.mesh;
+        let range = |(tet, edges): (&[VertexId; 4], &[[f64; 3]; 6])| {
+            let [p, q, r, s] = tet.map(|v| mesh.points[v.index()].coords.into());
+            let [a, b, c, d, e, f] = *edges;
+            jacobian::range(&[p, q, r, s, a, b, c, d, e, f])
+        };
+        let ranges: Vec<jacobian::Range> = mesh.tets.par_iter().zip(&read.edge_points).map(range).collect();
+        self.body_volumes.fill(0.0);
+        for (range, body) in ranges.iter().zip(&mesh.bodies) {
+            self.body_volumes[body.index()] += range.volume6 / 6.0;
+        }
+        self.volume = self.body_volumes.iter().sum();
+        self.order = 2;
+        self.not_valid = Some(ranges.iter().filter(|range| !range.is_positive()).count());
+        self.scaled_jacobian = Some(ranges.iter().map(jacobian::Range::scaled).fold(1.0, f64::min));
+        self
     }
 }
 
@@ -230,6 +260,7 @@ pub fn measure(mesh: &Mesh) -> Quality {
         bodies,
         volume: all.body_volumes.iter().sum(),
         inverted: all.inverted,
+        order: 1,
         smallest_dihedral: rank(0),
         first_percentile_dihedral: rank(1),
         fifth_percentile_dihedral: rank(5),

@@ -18,6 +18,12 @@ pub fn table(meshes: &[Quality]) -> String {
     row("bodies", &|q| q.bodies.to_string());
     row("volume", &|q| number(q.volume));
     row("inverted tets", &|q| q.inverted.to_string());
+    if meshes.iter().any(|q| q.order > 1) {
+        let shown = |value: Option<String>| value.unwrap_or_else(|| "-".into());
+        row("order", &|q| q.order.to_string());
+        row("not valid in order 2", &|q| shown(q.not_valid.map(|count| count.to_string())));
+        row("scaled Jacobian", &|q| shown(q.scaled_jacobian.map(|scaled| format!("{scaled:.4}"))));
+    }
     row("dihedral angle: smallest", &|q| degrees(q.smallest_dihedral));
     row("  1st percentile of tets", &|q| degrees(q.first_percentile_dihedral));
     row("  5th percentile of tets", &|q| degrees(q.fifth_percentile_dihedral));
