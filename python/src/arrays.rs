@@ -56,10 +56,14 @@ pub struct PartArrays {
     points: Py<PyArray2<f64>>,
     vertex_ids: Py<PyArray1<i64>>,
     tets: Py<PyArray2<i32>>,
+    /// The nodes on the edges of tets of second order: 01 02 03 12 13 23; otherwise no rows.
+    tet_edge_nodes: Py<PyArray2<i32>>,
     tet_ids: Py<PyArray1<i64>>,
     /// Numbers of bodies.
     bodies: Py<PyArray1<i32>>,
     faces: Py<PyArray2<i32>>,
+    /// The nodes on the edges of faces of second order: 01 12 20; otherwise no rows.
+    face_edge_nodes: Py<PyArray2<i32>>,
     /// Boundary numbers.
     face_tags: Py<PyArray1<i32>>,
     /// Patches by index.
@@ -79,11 +83,13 @@ impl PartArrays {
             points: rows(py, arrays.points)?,
             vertex_ids: ids(py, arrays.vertex_ids),
             tets: indices(py, arrays.tets)?,
+            tet_edge_nodes: indices(py, arrays.tet_edge_nodes)?,
             tet_ids: ids(py, arrays.tet_ids),
             face_tags: small(py, tags.collect()),
             face_bodies: indices(py, sides.collect())?,
             bodies: small(py, arrays.tet_bodies.into_iter().map(body).collect()),
             faces: indices(py, arrays.triangles)?,
+            face_edge_nodes: indices(py, arrays.triangle_edge_nodes)?,
             face_patches: small(py, arrays.triangle_patches.into_iter().map(|patch| patch.0).collect()),
         })
     }

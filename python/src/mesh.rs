@@ -130,7 +130,8 @@ fn on_patches(part: &dyn MeshStream, patches: &[u32]) -> Vec<bool> {
     for index in 0..part.boundary_blocks() {
         part.boundary_block(index, &mut block);
         if block.patch.is_some_and(|patch| patches.contains(&patch.0)) {
-            block.triangles.iter().flatten().for_each(|&vertex| is_on[vertex as usize] = true);
+            let nodes = block.triangles.as_flattened().iter().chain(block.edge_nodes.as_flattened());
+            nodes.for_each(|&vertex| is_on[vertex as usize] = true);
         }
     }
     is_on

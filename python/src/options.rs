@@ -9,6 +9,7 @@ use pyo3::prelude::*;
 use std::path::PathBuf;
 use std::sync::Arc;
 use tetmill::files::mesh_size;
+use tetmill::mesh::Order;
 use tetmill::run::{
     Candidates, CoarseSettings, CutPlane, CutSettings, GenerateSettings, PlanSettings, Wanted,
 };
@@ -27,6 +28,8 @@ pub struct Options<'py> {
     elements: Option<u64>,
     pieces: u32,
     nested: bool,
+    order: u32,
+    allow_off_surface: bool,
     planes: String,
     /// A point and a normal in each row.
     planes_from: Option<PyReadonlyArray2<'py, f64>>,
@@ -58,10 +61,14 @@ impl Options<'_> {
     ) -> Result<GenerateSettings, Failure> {
         Ok(GenerateSettings {
             method: self.method()?,
-            coarse: self.coarse(geometry, stop)?,
+            coarse: CoarseSettings {
+                order: Order::of_degree(self.order).ok_or_else(|| unknown("order", &self.order.to_string(), "1, 2"))?,
+                ..self.coarse(geometry, stop)?
+            },
             wanted: self.wanted(),
             memory: self.memory,
             nested: self.nested,
+            allow_off_surface: self.allow_off_surface,
             ..GenerateSettings::default()
         })
     }

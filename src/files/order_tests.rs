@@ -198,16 +198,52 @@ fn curved_meshes_are_read_back_as_they_are() {
                 serial::write_joined(comm, &part, &names, format, &dir.path().join(name)).unwrap();
             }
             vtu::write(comm, &part, &names, &dir.path().join("m.vtu")).unwrap();
+            elmer::write(comm, &part, &names, &dir.path().join("elmer")).unwrap();
             let report = check_part(&part, None, &Default::default());
             [report.volume, report.scaled_jacobian.unwrap().value]
         });
         let volume: f64 = expected.iter().map(|[volume, _]| volume).sum();
         let scaled = expected.iter().map(|[_, scaled]| *scaled).fold(1.0, f64::min);
         let vtu = if ranks == 1 { "m.vtu" } else { "m.pvtu" };
-        for name in ["m.msh", "m.vol", "m.mesh", vtu] {
+        for (_, faults) in elmer::check_elmer(&dir.path().join("elmer")).unwrap() {
+            assert!(faults.is_empty(), "{faults}");
+        }
+        for name in ["m.msh", "m.vol", "m.mesh", vtu, "elmer"] {
             let [read, of_read] = volume_of(&dir.path().join(name));
             assert!((read - volume).abs() < 1e-12, "{name}: {read} is not {volume}");
             assert!((of_read - scaled).abs() < 1e-9, "{name}: {of_read} is not {scaled}");
         }
     }
+}
+
+#[test]
+fn faults_of_second_order_in_elmer_files_are_found_with_their_lines() {
+    let fixture = ball(1.0);
+    let settings = Settings { order: Order::Second, ..Settings::default() };
+    let part = refine(whole(&fixture.mesh), &fixture.projector, 1, &settings).unwrap();
+    let names = Names { bodies: vec![Label::unnamed(1)], patches: vec![Label::unnamed(1)] };
+    let found = |file: &str, change: &dyn Fn(&str) -> String| {
+        let dir = tempfile::tempdir().unwrap();
+        elmer::write(&thread::alone(), &part, &names, dir.path()).unwrap();
+        // The serial files are links to those of the part, which stay as they are.
+        let path = dir.path().join(file);
+        let text = fs::read_to_string(&path).unwrap();
+        fs::remove_file(&path).unwrap();
+        let first = text.lines().next().unwrap();
+        fs::write(&path, text.replacen(first, &change(first), 1)).unwrap();
+        let checked = elmer::check_elmer(dir.path()).unwrap();
+        checked.into_iter().map(|(_, faults)| faults.to_string()).collect::<String>()
+    };
+    // The last two nodes of an element change places.
+    let swapped = |line: &str| {
+        let mut words: Vec<&str> = line.split(' ').collect();
+        let last = words.len() - 1;
+        words.swap(last, last - 1);
+        words.join(" ")
+    };
+    let text = found("mesh.elements", &swapped);
+    assert!(text.contains("element of second order that is not valid"), "{text}");
+    assert!(text.contains("mesh.elements:1: edge with different nodes"), "{text}");
+    let text = found("mesh.boundary", &swapped);
+    assert!(text.contains("edge with different nodes in different elements"), "{text}");
 }

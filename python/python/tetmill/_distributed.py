@@ -115,12 +115,18 @@ def _dolfinx_tags(made: Any, dimension: int, entities: Ids, values: Ints, name: 
     return tags
 
 
+def _refuse_second_order(mesh: Mesh, name: str) -> None:
+    if mesh.order != 1:
+        raise ValueError(f"{name} takes meshes of order 1, and this one is of order {mesh.order}")
+
+
 def to_dolfinx(mesh: Mesh, ghost_mode: str = "none") -> DolfinxMesh:
     """See `Mesh.to_dolfinx`."""
     import dolfinx
     from mpi4py import MPI
 
     by = arguments.one_of("ghost_mode", ghost_mode, ("none", *_GHOSTS))
+    _refuse_second_order(mesh, "to_dolfinx")
     comm = MPI.COMM_SELF if mesh.comm is None else mesh.comm
     part = _part(mesh)
     numbers, points = _by_owner(mesh, part, comm)
@@ -150,6 +156,7 @@ def to_dmplex(mesh: Mesh) -> Any:
     """See `Mesh.to_dmplex`."""
     from petsc4py import PETSc
 
+    _refuse_second_order(mesh, "to_dmplex")
     comm = PETSc.COMM_SELF if mesh.comm is None else mesh.comm
     part = _part(mesh)
     plex = PETSc.DMPlex().create(comm)

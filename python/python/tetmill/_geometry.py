@@ -297,6 +297,8 @@ class Geometry:
         coarse: float | None = None,
         pieces: int | None = None,
         nested: bool = False,
+        order: Literal[1, 2] = 1,
+        allow_off_surface: bool = False,
         effort: Literal["quick", "standard", "careful", "thorough"] | None = None,
         planes: Literal["best", "axes", "principal", "random", "median"] = "best",
         planes_from: ArrayLike | None = None,
@@ -332,6 +334,9 @@ class Geometry:
             coarse: Number of coarse tets, to 1.5 times as many.
             pieces: Split each coarse edge into this many, so each coarse tet into its cube.
             nested: Make the tets of each level lie in those of the level before.
+            order: 2 for tets of ten nodes, curved along the geometry; each is proved valid.
+            allow_off_surface: With order 2, leave edges straight where the tets beside them would
+                not be valid otherwise; `report` lists them.
             effort: Effort of mesh improvement; by default "careful" up to 100,000 tets, then
                 "standard".
             planes: Candidate planes of the method "decompose".
@@ -365,6 +370,8 @@ class Geometry:
                 "elements": arguments.count("tets", tets),
                 "pieces": 2**exponent if pieces is None else arguments.whole("pieces", pieces, 1, _MOST_PIECES),
                 "nested": bool(nested),
+                "order": arguments.whole("order", order, 1, 2),
+                "allow_off_surface": bool(allow_off_surface),
                 "planes": arguments.one_of("planes", planes, _PLANES),
                 "planes_from": _rows("planes_from", planes_from, 6),
                 "memory": arguments.count("memory", memory),

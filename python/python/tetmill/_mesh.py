@@ -21,8 +21,16 @@ if TYPE_CHECKING:
 
     from ._distributed import DolfinxMesh
 
-_FORMATS = ("elmer", "vtu", "msh", "medit", "vol", "mfem", "geomview")
-_ENDINGS = {".vtu": "vtu", ".pvtu": "vtu", ".msh": "msh", ".mesh": "medit", ".vol": "vol", ".off": "geomview"}
+_FORMATS = ("elmer", "vtu", "msh", "medit", "vol", "inp", "mfem", "geomview")
+_ENDINGS = {
+    ".vtu": "vtu",
+    ".pvtu": "vtu",
+    ".msh": "msh",
+    ".mesh": "medit",
+    ".vol": "vol",
+    ".inp": "inp",
+    ".off": "geomview",
+}
 
 
 class Written(NamedTuple):
@@ -105,27 +113,49 @@ class Mesh:
         return self._by_tet(lambda part: part.global_ids[part.tets].astype(ids, copy=False), (4,))
 
     @cached_property
+    def order(self) -> int:
+        """The order of the elements: 1, or 2 for tets of ten nodes."""
+        return int(self.report["order"])
+
+    @cached_property
+    def tet_nodes(self) -> Ints | Ids:
+        """All nodes of each tet, (m, 10) in a mesh of order 2: the corners, and then the nodes on the
+        edges 01 12 02 03 13 23, the order of VTK, Abaqus and meshio. In order 1 the same as `tets`."""
+        if self._only is not None:
+            return self._only.tet_nodes
+        if self.order == 1:
+            return self.tets
+        ids = _index_type(len(self.points))
+        return self._by_tet(lambda part: part.global_ids[part.tet_nodes].astype(ids, copy=False), (10,))
+
+    @cached_property
     def bodies(self) -> Ints:
         """The body number of each tet, (m,)."""
         return self._by_tet(lambda part: part.bodies, ()) if self._only is None else self._only.bodies
 
     @cached_property
     def _faces(self) -> tuple[NDArray[Any], Ints, Ints]:
-        """The triangles of all parts, each once, with tags and patches."""
+        """The nodes of the triangles of all parts, each once, with tags and patches."""
         part = self._only
         if part is not None:
-            return part.faces, part.face_tags, part.face_patches
+            return part.face_nodes, part.face_tags, part.face_patches
         ids = _index_type(len(self.points))
-        faces = np.concatenate([part.global_ids[part.faces] for part in self.parts])
-        first = np.unique(np.sort(faces, axis=1), axis=0, return_index=True)[1]
+        faces = np.concatenate([part.global_ids[part.face_nodes] for part in self.parts])
+        first = np.unique(np.sort(faces[:, :3], axis=1), axis=0, return_index=True)[1]
         first.sort()
         tags = np.concatenate([part.face_tags for part in self.parts])
         patches = np.concatenate([part.face_patches for part in self.parts])
         return _frozen(faces[first].astype(ids)), _frozen(tags[first]), _frozen(patches[first])
 
-    @property
+    @cached_property
     def faces(self) -> Ints | Ids:
         """Triangles on patches, (k, 3); their right-hand normals point out of the inner body."""
+        return self._only.faces if self._only is not None else _frozen(np.ascontiguousarray(self._faces[0][:, :3]))
+
+    @property
+    def face_nodes(self) -> Ints | Ids:
+        """All nodes of each face, (k, 6) in a mesh of order 2: the corners, and then the nodes on the
+        edges 01 12 20. In order 1 the same as `faces`."""
         return self._faces[0]
 
     @property
@@ -177,7 +207,7 @@ class Mesh:
         """
         patches = self._native.patches_named(name)
         if self._only is None:
-            return _frozen(np.unique(self.faces[self.faces_named(name)]))
+            return _frozen(np.unique(self.face_nodes[self.faces_named(name)]))
         return self._native.vertices_on(patches)[0]
 
     def tets_named(self, name: str) -> NDArray[np.intp]:
@@ -234,7 +264,7 @@ class Mesh:
     def write(
         self,
         path: str | os.PathLike[str],
-        format: Literal["elmer", "vtu", "msh", "medit", "vol", "mfem", "geomview"] | None = None,
+        format: Literal["elmer", "vtu", "msh", "medit", "vol", "inp", "mfem", "geomview"] | None = None,
         *,
         boundary: Literal["beside", "in"] = "beside",
         halo: Literal["faces", "vertices"] | None = None,
@@ -244,7 +274,7 @@ class Mesh:
 
         Args:
             path: A file, whose ending selects the format: .vtu (also .pvtu), .msh (Gmsh), .mesh
-                (Medit), .vol (NETGEN), .off (the boundary alone). A folder for "elmer". For "mfem" the files
+                (Medit), .vol (NETGEN), .inp (Abaqus, CalculiX), .off (the boundary alone). A folder for "elmer". For "mfem" the files
                 `path.000000` and so on, one for each part, which MFEM's `ParMesh` reads.
             format: The format, whatever the ending.
             boundary: Where VTU stores boundary triangles: "beside" in files of their own, "in" the

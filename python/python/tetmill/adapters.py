@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def to_skfem(mesh: Mesh) -> Any:
-    """A `skfem.MeshTet`: boundaries and subdomains by name.
+    """A `skfem.MeshTet`, or `skfem.MeshTet2` for order 2: boundaries and subdomains by name.
 
     Boundaries are oriented: their normals point out of the inner body. Names of several patches
     have the faces of all of them.
@@ -23,9 +23,9 @@ def to_skfem(mesh: Mesh) -> Any:
     import skfem
 
     # scikit-fem sorts the vertices of each tet, in place: it gets an array of its own.
-    made = skfem.MeshTet(
+    made = (skfem.MeshTet if mesh.order == 1 else skfem.MeshTet2)(
         np.ascontiguousarray(mesh.points.T),
-        np.array(mesh.tets.T, dtype=np.int64, order="C"),
+        np.array(mesh.tet_nodes.T, dtype=np.int64, order="C"),
         validate=False,
     )
     names = dict.fromkeys(name for label in mesh.patches for name in label.names)
@@ -40,7 +40,8 @@ def to_meshio(mesh: Mesh) -> Any:
     """A `meshio.Mesh`: tets and triangles with their numbers as `gmsh:physical`, and the names."""
     import meshio
 
-    cells = [("tetra", mesh.tets), ("triangle", mesh.faces)]
+    tet, triangle = ("tetra", "triangle") if mesh.order == 1 else ("tetra10", "triangle6")
+    cells = [(tet, mesh.tet_nodes), (triangle, mesh.face_nodes)]
     names = {name: np.array([number, 3]) for number, name in mesh.body_names.items()}
     names.update({name: np.array([number, 2]) for number, name in mesh.face_names.items()})
     tags = [mesh.bodies, mesh.face_tags]
@@ -52,7 +53,8 @@ def to_pyvista(mesh: Mesh) -> Any:
     """A `pyvista.UnstructuredGrid` of the tets, with the body number of each as `body`."""
     import pyvista
 
-    grid = pyvista.UnstructuredGrid({pyvista.CellType.TETRA: mesh.tets}, np.array(mesh.points))
+    kind = pyvista.CellType.TETRA if mesh.order == 1 else pyvista.CellType.QUADRATIC_TETRA
+    grid = pyvista.UnstructuredGrid({kind: mesh.tet_nodes}, np.array(mesh.points))
     grid.cell_data["body"] = mesh.bodies
     if len(mesh.parts) > 1:
         part = np.empty(len(mesh.tets), dtype=np.int32)
@@ -78,6 +80,13 @@ def to_mfem(mesh: Mesh) -> Any:
     Faces between bodies are boundary elements, too.
     """
     import mfem.ser as mfem
+
+    if mesh.order == 2:
+        # MFEM makes the grid function of the nodes.
+        with tempfile.TemporaryDirectory() as folder:
+            path = os.path.join(folder, "mesh.msh")
+            mesh.write(path)
+            return mfem.Mesh(path, 1, 0)
 
     made = mfem.Mesh(3, len(mesh.points), len(mesh.tets), len(mesh.faces), 3)
     for point in mesh.points.tolist():

@@ -7,7 +7,7 @@
 //! That the outer surface is closed needs no check: it is the boundary of a set of tets.
 
 use super::read::{ElmerMesh, ElmerPart, Layout, layouts, read_layout};
-use super::{faults_faces, faults_halo, faults_nodes, periodic};
+use super::{faults_curved, faults_faces, faults_halo, faults_nodes, periodic};
 use crate::files::input::ReadError;
 use std::collections::BTreeMap;
 use std::fmt;
@@ -52,6 +52,10 @@ pub enum FaultKind {
     SameElement,
     /// An element is not positively oriented.
     Inverted,
+    /// The Jacobian determinant of a ten-node element is not proved positive.
+    NotValid,
+    /// Elements or boundary elements have different nodes on the same edge.
+    EdgeNodesDiffer,
     /// More than two elements have a face in common.
     CrowdedFace,
     /// Two elements lie on the same side of their common face.
@@ -101,6 +105,8 @@ impl fmt::Display for FaultKind {
             Self::WrongHalo => "halo element that its owner does not have so",
             Self::SameElement => "two elements with the same nodes",
             Self::Inverted => "element inverted or flat",
+            Self::NotValid => "element of second order that is not valid",
+            Self::EdgeNodesDiffer => "edge with different nodes in different elements",
             Self::CrowdedFace => "face of more than two elements",
             Self::Overlap => "two elements on the same side of a face",
             Self::NoBoundary => "face without its boundary element",
@@ -211,6 +217,7 @@ pub fn faults(mesh: &ElmerMesh) -> Faults {
     faults_nodes::check_shared(mesh, &tables, &mut faults);
     faults_halo::check_halo(mesh, &mut faults);
     faults_faces::check_elements_and_boundary(mesh, &tables, &mut faults);
+    faults_curved::check_curved(mesh, &tables, &mut faults);
     faults
 }
 
@@ -230,9 +237,10 @@ pub(super) fn check_header(part: &ElmerPart, faults: &mut Faults) {
     let elements = part.elements.len() + part.halo.len();
     let mut types: BTreeMap<u32, usize> =
         part.left_out.iter().map(|(&code, &count)| (code, count as usize)).collect();
-    *types.entry(super::TRIANGLE).or_default() += part.boundary.len();
+    part.boundary.iter().for_each(|element| *types.entry(element.code()).or_default() += 1);
     let boundary = types.values().sum();
-    types.insert(super::TET, elements);
+    let all = part.elements.iter().chain(part.halo.iter().map(|(element, _)| element));
+    all.for_each(|element| *types.entry(element.code()).or_default() += 1);
     let types: Vec<_> = types.into_iter().filter(|(_, count)| *count > 0).collect();
     let mut stated: Vec<_> = header.types.iter().map(|&(code, n)| (code, n as usize)).collect();
     stated.retain(|(_, count)| *count > 0);

@@ -94,7 +94,7 @@ fn check_uses(part: &ElmerPart, table: &NodeTable, faults: &mut Faults) -> Vec<b
             let what = || format!("boundary element {} has number 0", element.id);
             faults.add(FaultKind::ZeroNumber, part.file("boundary"), part.boundary.line(k), what);
         }
-        for &id in element.nodes.iter().filter(|&&id| table.find(id).is_none()) {
+        for id in element.all_nodes().filter(|&id| table.find(id).is_none()) {
             let what = || format!("boundary element {} uses node {id}", element.id);
             faults.add(FaultKind::NoSuchNode, part.file("boundary"), part.boundary.line(k), what);
         }
@@ -119,7 +119,7 @@ fn check_element(
         let what = || format!("element {} is in body 0", element.id);
         faults.add(FaultKind::ZeroNumber, part.file("elements"), line(), what);
     }
-    for &id in &element.nodes {
+    for id in element.all_nodes() {
         match table.find(id) {
             Some(index) => used[index] = true,
             None => {

@@ -13,6 +13,7 @@
 //! The reference is Elmer's own reader, `fem/src/MeshUtils.F90`.
 
 mod faults;
+mod faults_curved;
 mod faults_faces;
 mod faults_halo;
 mod faults_nodes;
@@ -31,7 +32,6 @@ pub use faults::{Fault, FaultKind, Faults, check_elmer, faults};
 pub use load::{LoadError, Loaded, load};
 pub(crate) use names::names_of;
 pub(crate) use periodic::{PairsOfNodes, pairs_of};
-pub(crate) use read::read_corners;
 pub use read::{BoundaryElement, Element, ElmerMesh, ElmerPart, Header, Layout, Node, Rows, SharedNode};
 pub use read::{layouts, only_layout, read, read_layout, stated_elements};
 pub use write::write;

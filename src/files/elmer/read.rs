@@ -1,7 +1,7 @@
 //! Reading Elmer's files: the whole mesh, unchanged.
 
 use super::parse::{Fields, expect_readable_by_elmer, for_each_line, read_lines, room};
-use super::{MAX_LINE, TET, TRIANGLE};
+use super::{MAX_LINE, TET, TET_10, TRIANGLE, TRIANGLE_6};
 use crate::Point;
 use crate::files::input::ReadError;
 use rayon::prelude::*;
@@ -13,32 +13,40 @@ use std::path::{Path, PathBuf};
 /// Points and two-node edges, which ElmerGrid lists among the boundary elements; they bound no tet.
 const POINTS_AND_EDGES: [u32; 4] = [101, 102, 202, 203];
 
-/// An element shape: its first- and second-order codes, and the mid-edge nodes of second order.
+/// An element shape: its codes of first and second order.
 struct Kind {
     first: u32,
     second: u32,
-    middles: usize,
 }
 
-const TETS: Kind = Kind { first: TET, second: 510, middles: 6 };
-const TRIANGLES: Kind = Kind { first: TRIANGLE, second: 306, middles: 3 };
+const TETS: Kind = Kind { first: TET, second: TET_10 };
+const TRIANGLES: Kind = Kind { first: TRIANGLE, second: TRIANGLE_6 };
 
 /// Which element orders are accepted.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Order {
+enum Orders {
     First,
-    /// Also second order, of which only the corners (the first nodes) are kept.
-    Corners,
+    Both,
 }
 
 impl Kind {
-    /// Number of nodes after the corners of an element with this code.
-    fn middles(&self, code: u32, order: Order) -> Result<usize, String> {
-        match code {
-            _ if code == self.first => Ok(0),
-            _ if code == self.second && order == Order::Corners => Ok(self.middles),
-            _ => Err(format!("the element type is '{code}'; only {} is read here", self.first)),
+    /// Reads the nodes on edges that follow the corners of an element with this code.
+    fn edge_nodes<const N: usize>(
+        &self,
+        code: u32,
+        orders: Orders,
+        fields: &mut Fields,
+    ) -> Result<Option<[u32; N]>, String> {
+        if code == self.second && orders == Orders::Both { ids(fields, "node").map(Some) } else { Ok(None) }
+    }
+
+    /// Refuses other codes.
+    fn expect(&self, code: u32, orders: Orders) -> Result<(), String> {
+        if code == self.first || code == self.second && orders == Orders::Both {
+            return Ok(());
         }
+        let second = if orders == Orders::Both { format!(" or {}", self.second) } else { String::new() };
+        Err(format!("the element type is '{code}'; only {}{second} is read here", self.first))
     }
 }
 
@@ -180,8 +188,22 @@ pub struct Element {
     pub id: u32,
     /// Its body.
     pub body: u32,
-    /// Ids of its nodes.
+    /// Ids of its corners.
     pub nodes: [u32; 4],
+    /// Ids of the nodes on its edges, in Elmer's order, if it is of second order.
+    pub edge_nodes: Option<[u32; 6]>,
+}
+
+impl Element {
+    /// Its element code.
+    pub fn code(&self) -> u32 {
+        if self.edge_nodes.is_some() { TET_10 } else { TET }
+    }
+
+    /// The ids of all nodes.
+    pub fn all_nodes(&self) -> impl Iterator<Item = u32> + '_ {
+        self.nodes.iter().chain(self.edge_nodes.iter().flatten()).copied()
+    }
 }
 
 /// A triangle with a boundary number.
@@ -193,8 +215,22 @@ pub struct BoundaryElement {
     pub boundary: u32,
     /// Ids of the elements beside it; 0 if there is none in this part.
     pub parents: [u32; 2],
-    /// Ids of its nodes.
+    /// Ids of its corners.
     pub nodes: [u32; 3],
+    /// Ids of the nodes on its edges, around it, if it is of second order.
+    pub edge_nodes: Option<[u32; 3]>,
+}
+
+impl BoundaryElement {
+    /// Its element code.
+    pub fn code(&self) -> u32 {
+        if self.edge_nodes.is_some() { TRIANGLE_6 } else { TRIANGLE }
+    }
+
+    /// The ids of all nodes.
+    pub fn all_nodes(&self) -> impl Iterator<Item = u32> + '_ {
+        self.nodes.iter().chain(self.edge_nodes.iter().flatten()).copied()
+    }
 }
 
 /// A shared node with its parts.
@@ -261,19 +297,6 @@ pub fn read(dir: &Path) -> Result<ElmerMesh, ReadError> {
     read_layout(&only_layout(dir)?)
 }
 
-/// Like [`read`], but also accepts second order: returns the mesh of its corners and the number of
-/// second-order elements.
-///
-/// # Errors
-/// Those of [`read`].
-pub(crate) fn read_corners(dir: &Path) -> Result<(ElmerMesh, usize), ReadError> {
-    let mesh = read_ordered(&only_layout(dir)?, Order::Corners)?;
-    let types = mesh.parts.iter().flat_map(|part| &part.header.types);
-    let of_second = types.filter(|(code, _)| [TETS.second, TRIANGLES.second].contains(code));
-    let count = of_second.map(|(_, count)| *count as usize).sum();
-    Ok((mesh, count))
-}
-
 /// Finds the mesh of a folder: its only partition, else `mesh.*`.
 ///
 /// # Errors
@@ -293,14 +316,10 @@ pub fn only_layout(dir: &Path) -> Result<Layout, ReadError> {
 
 /// Reads one mesh, its parts in parallel threads.
 pub fn read_layout(layout: &Layout) -> Result<ElmerMesh, ReadError> {
-    read_ordered(layout, Order::First)
-}
-
-fn read_ordered(layout: &Layout, order: Order) -> Result<ElmerMesh, ReadError> {
     let parts = match layout {
-        Layout::Serial(folder) => vec![read_files(folder.join("mesh"), false, order)?],
+        Layout::Serial(folder) => vec![read_files(folder.join("mesh"), false, Orders::Both)?],
         Layout::Partitioned { folder, parts } => {
-            let read = |k: u32| read_files(folder.join(format!("part.{k}")), true, order);
+            let read = |k: u32| read_files(folder.join(format!("part.{k}")), true, Orders::Both);
             let parts: Vec<_> = (1..=*parts).into_par_iter().map(read).collect();
             parts.into_iter().collect::<Result<_, _>>()?
         }
@@ -325,10 +344,10 @@ pub fn stated_elements(dir: &Path) -> Result<u64, ReadError> {
 }
 
 pub(super) fn read_part(stem: PathBuf, partitioned: bool) -> Result<ElmerPart, ReadError> {
-    read_files(stem, partitioned, Order::First)
+    read_files(stem, partitioned, Orders::First)
 }
 
-fn read_files(stem: PathBuf, partitioned: bool, order: Order) -> Result<ElmerPart, ReadError> {
+fn read_files(stem: PathBuf, partitioned: bool, order: Orders) -> Result<ElmerPart, ReadError> {
     let header = read_header(&file(&stem, "header"), partitioned)?;
     let nodes = read_lines(&file(&stem, "nodes"), header.nodes, node)?;
     let (elements, halo) = read_elements(&file(&stem, "elements"), header.elements, order)?;
@@ -345,7 +364,7 @@ fn read_files(stem: PathBuf, partitioned: bool, order: Order) -> Result<ElmerPar
 pub type Halo = Rows<(Element, u32)>;
 
 /// Reads `.elements`: the part's own elements, and halo elements.
-fn read_elements(path: &Path, expected: u32, order: Order) -> Result<(Rows<Element>, Halo), ReadError> {
+fn read_elements(path: &Path, expected: u32, order: Orders) -> Result<(Rows<Element>, Halo), ReadError> {
     let (mut own, mut halo) = (Rows::default(), Rows::default());
     own.values.reserve_exact(room(path, expected));
     let mut line = 0;
@@ -397,7 +416,7 @@ fn own_boundary(
                 let parents = element.parents.iter().filter(|parent| **parent != 0);
                 let of_halo = !own.is_empty() && parents.clone().count() > 0 && { parents }.all(is_foreign);
                 if of_halo {
-                    *left_out.entry(TRIANGLE).or_default() += 1;
+                    *left_out.entry(element.code()).or_default() += 1;
                 } else {
                     boundary.values.push(element);
                     boundary.lines.push(line);
@@ -465,21 +484,18 @@ fn ids<const N: usize>(fields: &mut Fields, what: &str) -> Result<[u32; N], Stri
     Ok(ids)
 }
 
-fn skip(fields: &mut Fields, nodes: usize) -> Result<(), String> {
-    (0..nodes).try_for_each(|_| fields.int("node").map(drop))
-}
-
 /// Parses an element and the number of its owner if it is a halo element, else 0.
-fn element(line: &[u8], order: Order) -> Result<(Element, u32), String> {
+fn element(line: &[u8], orders: Orders) -> Result<(Element, u32), String> {
     expect_readable_by_elmer(line)?;
     let mut fields = Fields::new(line);
     let (id, owner) = fields.int_and_part("element")?;
     let body = fields.int("body")?;
-    let middles = TETS.middles(fields.int("element type")?, order)?;
+    let code = fields.int("element type")?;
+    TETS.expect(code, orders)?;
     let nodes = ids(&mut fields, "node")?;
-    skip(&mut fields, middles)?;
+    let edge_nodes = TETS.edge_nodes(code, orders, &mut fields)?;
     fields.end()?;
-    Ok((Element { id, body, nodes }, owner.unwrap_or(0)))
+    Ok((Element { id, body, nodes, edge_nodes }, owner.unwrap_or(0)))
 }
 
 /// A line of `.boundary`.
@@ -489,7 +505,7 @@ enum BoundaryLine {
     LeftOut(u32),
 }
 
-fn boundary_line(line: &[u8], order: Order) -> Result<BoundaryLine, String> {
+fn boundary_line(line: &[u8], orders: Orders) -> Result<BoundaryLine, String> {
     expect_readable_by_elmer(line)?;
     let mut fields = Fields::new(line);
     let (id, owner) = fields.int_and_part("boundary element")?;
@@ -499,11 +515,11 @@ fn boundary_line(line: &[u8], order: Order) -> Result<BoundaryLine, String> {
     if POINTS_AND_EDGES.contains(&kind) {
         return Ok(BoundaryLine::LeftOut(kind));
     }
-    let middles = TRIANGLES.middles(kind, order)?;
+    TRIANGLES.expect(kind, orders)?;
     let nodes = ids(&mut fields, "node")?;
-    skip(&mut fields, middles)?;
+    let edge_nodes = TRIANGLES.edge_nodes(kind, orders, &mut fields)?;
     fields.end()?;
-    let element = BoundaryElement { id, boundary, parents, nodes };
+    let element = BoundaryElement { id, boundary, parents, nodes, edge_nodes };
     Ok(if owner.is_some() { BoundaryLine::LeftOut(kind) } else { BoundaryLine::Own(element) })
 }
 

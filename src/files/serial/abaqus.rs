@@ -45,10 +45,12 @@ pub(super) fn sections<'a>(
         Order::First => "C3D4",
         Order::Second => "C3D10",
     };
-    let end = by_name("ELSET", "BODY", &whole.names.bodies)
+    let of_bodies = numbers_by_name(&whole.names.bodies, &body_numbers(comm, whole, &bodies)?);
+    let of_boundaries = numbers_by_name(&whole.names.patches, &kinds.keys().copied().collect());
+    let end = by_name("ELSET", "BODY", &of_bodies)
         + &surfaces(&kinds)
-        + &by_name("NSET", "BOUNDARY", &whole.names.patches)
-        + &surfaces_by_name(&whole.names.patches, &kinds);
+        + &by_name("NSET", "BOUNDARY", &of_boundaries)
+        + &surfaces_by_name(&of_boundaries, &kinds);
     Ok(vec![
         Section::Text("*NODE, NSET=NALL\n".into()),
         Section::Vertices(Box::new(|line, number, point| {
@@ -81,6 +83,14 @@ fn real(number: f64) -> String {
     let rounded = |digits: usize| format!("{number:.digits$e}");
     let shorter = (0..16).rev().map(rounded).find(|text| text.len() <= LONGEST_REAL);
     if exact.len() <= LONGEST_REAL { exact } else { shorter.unwrap_or(exact) }
+}
+
+/// **Collective.** The numbers of bodies that have tets, on any rank.
+fn body_numbers(comm: &dyn Communicator, whole: &Whole, bodies: &Runs) -> Result<BTreeSet<u64>, WriteError> {
+    let number = |of: u32| whole.names.bodies.get(of as usize).map(|label| u64::from(label.number));
+    let mine: BTreeSet<u64> = bodies.0.iter().filter_map(|run| number(run.of)).collect();
+    let mine: Vec<u64> = mine.into_iter().collect();
+    Ok(comm.all_gather(&mine)?.concat().into_iter().collect())
 }
 
 /// The boundary of a part: by boundary number, its nodes, and by number and face, its tets.
@@ -188,10 +198,10 @@ fn faces_of(number: u64, faces: &BTreeSet<u8>) -> String {
     faces.iter().map(|face| format!("BOUNDARY_{number}_S{face}, S{face}\n")).collect()
 }
 
-/// The numbers of each name of bodies or boundaries.
-fn numbers_by_name(labels: &[Label]) -> BTreeMap<String, BTreeSet<u64>> {
+/// The numbers of each name of bodies or boundaries that have elements: a set of none is an error.
+fn numbers_by_name(labels: &[Label], present: &BTreeSet<u64>) -> BTreeMap<String, BTreeSet<u64>> {
     let mut numbers: BTreeMap<String, BTreeSet<u64>> = BTreeMap::new();
-    for label in labels {
+    for label in labels.iter().filter(|label| present.contains(&label.number.into())) {
         for name in &label.names {
             numbers.entry(word(name)).or_default().insert(label.number.into());
         }
@@ -200,9 +210,9 @@ fn numbers_by_name(labels: &[Label]) -> BTreeMap<String, BTreeSet<u64>> {
 }
 
 /// A set for each name, of the sets of its numbers.
-fn by_name(kind: &str, of: &str, labels: &[Label]) -> String {
+fn by_name(kind: &str, of: &str, names: &BTreeMap<String, BTreeSet<u64>>) -> String {
     let mut text = String::new();
-    for (name, numbers) in numbers_by_name(labels) {
+    for (name, numbers) in names {
         write!(text, "*{kind}, {kind}={name}").expect("memory can be written to");
         numbers.iter().for_each(|number| text += &format!("\n{of}_{number}"));
         text.push('\n');
@@ -211,11 +221,11 @@ fn by_name(kind: &str, of: &str, labels: &[Label]) -> String {
 }
 
 /// A surface for each name of boundaries.
-fn surfaces_by_name(patches: &[Label], kinds: &BTreeMap<u64, BTreeSet<u8>>) -> String {
+fn surfaces_by_name(names: &BTreeMap<String, BTreeSet<u64>>, kinds: &BTreeMap<u64, BTreeSet<u8>>) -> String {
     let mut text = String::new();
-    for (name, numbers) in numbers_by_name(patches) {
-        write!(text, "*SURFACE, NAME={name}, TYPE=ELEMENT\n").expect("memory can be written to");
-        for number in &numbers {
+    for (name, numbers) in names {
+        writeln!(text, "*SURFACE, NAME={name}, TYPE=ELEMENT").expect("memory can be written to");
+        for number in numbers {
             text += &kinds.get(number).map(|faces| faces_of(*number, faces)).unwrap_or_default();
         }
     }
@@ -266,13 +276,17 @@ mod tests {
         let path = dir.path().join("m.inp");
         write(&PlainPart::whole(&two_tets()), &names(), &path).unwrap();
         let expected = "*NODE, NSET=NALL\n1, 0, 0, 0\n2, 1, 0, 0\n3, 0, 1, 0\n4, 0, 0, 1\n5, 1, 1, 1\n\
-            *ELEMENT, TYPE=C3D4, ELSET=BODY_1\n1, 1, 2, 3, 4\n*ELEMENT, TYPE=C3D4, ELSET=BODY_2\n2, 2, 3, 4, 5\n\
-            *NSET, NSET=BOUNDARY_1\n1, 2, 3, 4\n*NSET, NSET=BOUNDARY_2\n2, 3, 4, 5\n*NSET, NSET=BOUNDARY_3\n3, 4, 5\n";
-        let text = std::fs::read_to_string(&path).unwrap();
-        assert!(text.starts_with(expected), "{text}");
-        assert!(text.contains("*ELSET, ELSET=BOUNDARY_1_S1\n1\n"), "{text}");
-        assert!(text.contains("*SURFACE, NAME=LID, TYPE=ELEMENT\nBOUNDARY_2_S2, S2\nBOUNDARY_2_S4, S4\n"), "{text}");
-        assert!(text.contains("*ELSET, ELSET=UPPER\nBODY_2\n"), "{text}");
+            *ELEMENT, TYPE=C3D4, ELSET=BODY_1\n1, 1, 2, 3, 4\n2, 2, 3, 4, 5\n\
+            *NSET, NSET=BOUNDARY_1\n1, 2, 3, 4\n*NSET, NSET=BOUNDARY_2\n2, 3, 4, 5\n\
+            *ELSET, ELSET=BOUNDARY_1_S1\n1\n*ELSET, ELSET=BOUNDARY_1_S2\n1\n*ELSET, ELSET=BOUNDARY_1_S4\n1\n\
+            *ELSET, ELSET=BOUNDARY_2_S2\n2\n*ELSET, ELSET=BOUNDARY_2_S3\n2\n*ELSET, ELSET=BOUNDARY_2_S4\n2\n\
+            *ELSET, ELSET=LOWER\nBODY_1\n\
+            *SURFACE, NAME=BOUNDARY_1, TYPE=ELEMENT\nBOUNDARY_1_S1, S1\nBOUNDARY_1_S2, S2\nBOUNDARY_1_S4, S4\n\
+            *SURFACE, NAME=BOUNDARY_2, TYPE=ELEMENT\nBOUNDARY_2_S2, S2\nBOUNDARY_2_S3, S3\nBOUNDARY_2_S4, S4\n\
+            *NSET, NSET=LID\nBOUNDARY_2\n*NSET, NSET=SKIN\nBOUNDARY_1\n\
+            *SURFACE, NAME=LID, TYPE=ELEMENT\nBOUNDARY_2_S2, S2\nBOUNDARY_2_S3, S3\nBOUNDARY_2_S4, S4\n\
+            *SURFACE, NAME=SKIN, TYPE=ELEMENT\nBOUNDARY_1_S1, S1\nBOUNDARY_1_S2, S2\nBOUNDARY_1_S4, S4\n";
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), expected);
         assert_eq!(losses(&names()), Vec::<String>::new());
         assert_eq!(Format::of(&path).unwrap(), Format::Abaqus);
     }

@@ -3,19 +3,19 @@
 use super::assemble::assemble;
 use super::raw::{Label, PeriodicPairs, Raw, Shape};
 use super::{VolumeMesh, gmsh::Ids};
-use crate::files::elmer::{ElmerMesh, PairsOfNodes, names_of, pairs_of, read_corners};
+use crate::files::elmer::{ElmerMesh, PairsOfNodes, names_of, pairs_of, read as read_elmer};
 use crate::files::input::{Fault, ReadError, coordinate};
+use crate::files::node_order::VTK;
 use std::collections::BTreeSet;
 use std::path::Path;
 
 /// Reads the mesh of a folder with its periodic pairs; names come from `mesh.names` there or in the
 /// parent of a partition.
 pub(super) fn read(folder: &Path) -> Result<VolumeMesh, ReadError> {
-    let (mesh, of_second_order) = read_corners(folder)?;
+    let mesh = read_elmer(folder)?;
     check_coordinates(&mesh)?;
     let at = mesh.layout.folder().to_path_buf();
     let mut raw = joined(&mesh, pairs_of(&at)?).map_err(|fault| fault.in_file(&at, b""))?;
-    raw.higher_order = of_second_order;
     [raw.body_names, raw.patch_names] = names_of(&at);
     assemble(raw).map_err(|fault| fault.in_file(&at, b""))
 }
@@ -38,7 +38,11 @@ fn joined(mesh: &ElmerMesh, pairs: PairsOfNodes) -> Result<Raw, Fault> {
     nodes.dedup_by_key(|node| node.id);
     let ids: Vec<u64> = nodes.iter().map(|node| node.id.into()).collect();
     let ids = Ids::new(&ids)?;
-    let mut raw = Raw { points: nodes.iter().map(|node| node.point).collect(), ..Raw::default() };
+    let mut raw = Raw {
+        points: nodes.iter().map(|node| node.point).collect(),
+        edge_order: Some(&VTK),
+        ..Raw::default()
+    };
     let place = |id: u32, what: &str, of: u32| {
         ids.place(id.into())
             .ok_or_else(|| Fault::file(format!("{what} {of} names node {id}, which is not there")))
@@ -54,11 +58,9 @@ fn joined(mesh: &ElmerMesh, pairs: PairsOfNodes) -> Result<Raw, Fault> {
     let mut elements: Vec<_> = mesh.parts.iter().flat_map(|part| &part.elements).collect();
     elements.sort_by_key(|element| element.id);
     for element in elements {
-        let mut corners = [0; 4];
-        for (corner, node) in corners.iter_mut().zip(element.nodes) {
-            *corner = place(node, "element", element.id)?;
-        }
-        raw.add(Shape::Tet, &corners, Label::number(element.body.into())).map_err(Fault::file)?;
+        let places = element.all_nodes().map(|node| place(node, "element", element.id));
+        let places = places.collect::<Result<Vec<u32>, Fault>>()?;
+        raw.add(Shape::Tet, &places, Label::number(element.body.into())).map_err(Fault::file)?;
         raw.tet_numbers.push(element.id.into());
     }
     let mut triangles: Vec<_> = mesh.parts.iter().flat_map(|part| &part.boundary).collect();
@@ -71,11 +73,9 @@ fn joined(mesh: &ElmerMesh, pairs: PairsOfNodes) -> Result<Raw, Fault> {
         if !seen.insert(key) {
             continue;
         }
-        let mut corners = [0; 3];
-        for (corner, node) in corners.iter_mut().zip(triangle.nodes) {
-            *corner = place(node, "boundary element", triangle.id)?;
-        }
-        raw.add(Shape::Triangle, &corners, Label::number(triangle.boundary.into())).map_err(Fault::file)?;
+        let places = triangle.all_nodes().map(|node| place(node, "boundary element", triangle.id));
+        let places = places.collect::<Result<Vec<u32>, Fault>>()?;
+        raw.add(Shape::Triangle, &places, Label::number(triangle.boundary.into())).map_err(Fault::file)?;
     }
     Ok(raw)
 }
