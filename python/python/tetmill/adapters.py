@@ -29,8 +29,10 @@ def to_skfem(mesh: Mesh) -> Any:
         validate=False,
     )
     names = dict.fromkeys(name for label in mesh.patches for name in label.names)
+    # MeshTet2 numbers the corners first, in their order.
+    faces = mesh.faces if mesh.order == 1 else np.searchsorted(np.unique(mesh.tets), mesh.faces)
     # The facet of scikit-fem that each face is.
-    of_faces = positions(mesh.faces, made.facets.T, len(mesh.points))
+    of_faces = positions(faces, made.facets.T, len(mesh.points))
     boundaries = {name: of_faces[mesh.faces_named(name)] for name in names}
     bodies = {name: mesh.tets_named(name) for name in mesh.body_names.values()}
     return made.with_boundaries(boundaries).with_subdomains(bodies)
