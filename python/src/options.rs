@@ -62,7 +62,8 @@ impl Options<'_> {
         Ok(GenerateSettings {
             method: self.method()?,
             coarse: CoarseSettings {
-                order: Order::of_degree(self.order).ok_or_else(|| unknown("order", &self.order.to_string(), "1, 2"))?,
+                order: Order::of_degree(self.order)
+                    .ok_or_else(|| unknown("order", &self.order.to_string(), "1, 2"))?,
                 ..self.coarse(geometry, stop)?
             },
             wanted: self.wanted(),

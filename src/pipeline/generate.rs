@@ -53,6 +53,17 @@ pub fn generate(
     options::refuse_different(comm, geometry.is_some(), settings)?;
     comm.agree(options::refuse_impossible(settings))?;
     let model = geometry.filter(|_| comm.rank() == 0).map(|geometry| &geometry.model);
+    if settings.coarse.order == Order::Second {
+        match model {
+            Some(Model::Given(_)) => progress.note(
+                "the input is a mesh without its geometry: edges of second order are straight, also on its boundary",
+            ),
+            Some(Model::Facets(_)) => progress.note(
+                "the surface of the input consists of plane triangles: boundary nodes of second order are on these",
+            ),
+            _ => {}
+        }
+    }
     if let Method::Decompose(cuts) = &settings.method {
         return decomposed(comm, model, cuts, settings, progress);
     }

@@ -7,6 +7,7 @@ use super::result::Generated;
 use super::settings::{GenerateSettings, Method, Wanted};
 use crate::Point;
 use crate::ground::comm::{Communicator, thread};
+use crate::ground::mesh::Order;
 use crate::ground::progress::{Observer, Progress, Silent, Stage};
 use crate::ground::size::{Closeness, Preset, SizeFunction, SizeSettings, Source};
 use crate::mesher::improve::Effort;
@@ -169,6 +170,29 @@ impl<'a> Mesher<'a> {
     /// costs at most 0.4° of the smallest angle (`benches/results/nested-2026-11-23.md`).
     pub fn nested(self) -> Self {
         self.with(|settings| settings.nested = true)
+    }
+
+    /// The order of the elements. With [`Order::Second`] tets have ten nodes, those on the boundary on
+    /// the geometry, and each tet is proved valid.
+    ///
+    /// ```
+    /// use tetmill::{Geometry, Mesher, mesh::Order};
+    ///
+    /// let ball = Geometry::from_text("algebraic3d solid ball = sphere(0, 0, 0; 1); tlo ball;")?;
+    /// let mesh = Mesher::new().max_size(0.5).order(Order::Second).generate(&ball)?;
+    /// let arrays = mesh.arrays(); // corners in `tets`, the other nodes in `tet_edge_nodes`
+    /// assert_eq!(arrays.tets.len(), arrays.tet_edge_nodes.len());
+    /// assert!(mesh.check.scaled_jacobian.is_some_and(|least| least.value > 0.1));
+    /// # Ok::<(), tetmill::Error>(())
+    /// ```
+    pub fn order(self, order: Order) -> Self {
+        self.with(|settings| settings.coarse.order = order)
+    }
+
+    /// With second order, leaves edges straight where the tets beside them would not be valid
+    /// otherwise: [`Generated::straight`] lists them. Without, this is an error.
+    pub fn allow_off_surface(self) -> Self {
+        self.with(|settings| settings.allow_off_surface = true)
     }
 
     /// The memory for the fine mesh on each machine (bytes), instead of its free memory.
