@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Installs the programs that the tests need besides Rust: MPI, libclang (for its bindings), TetGen,
-# CMake and PETSc for the C interface, DOLFINx and PETSc for the system's Python, and Python modules
+# CalculiX, CMake and PETSc for the C interface, DOLFINx and PETSc for the system's Python, and Python modules
 # that read our files: numpy, Gmsh, NGSolve with NETGEN, meshio, scikit-fem, MFEM. Uses apt on Debian and Ubuntu; elsewhere it
 # lists the missing packages. Does nothing if all are installed.
 set -euo pipefail
@@ -18,6 +18,7 @@ command -v python3 >/dev/null || missing+=(python3 python3-numpy)
 if command -v apt-get >/dev/null; then
     command -v tetgen >/dev/null || missing+=(tetgen)
     command -v cmake >/dev/null || missing+=(cmake)
+    command -v ccx >/dev/null || missing+=(calculix-ccx)
     pkg-config --exists PETSc 2>/dev/null || missing+=(petsc-dev)
     # Python of the system: pip's numpy is too new for its DOLFINx.
     for module in dolfinx petsc4py mpi4py pytest; do

@@ -21,6 +21,7 @@ mod random_scenes;
 mod ranks;
 mod repartition;
 mod scenes;
+mod second_order;
 mod sizes;
 mod skins;
 mod swept;
