@@ -88,6 +88,27 @@ fn ghosts_have_their_nodes() {
 }
 
 #[test]
+fn parts_of_second_order_are_repartitioned_unchanged() {
+    let dir = tempfile::tempdir().unwrap();
+    let [from, to, report] = ["from", "to", "report.json"].map(|name| dir.path().join(name));
+    let mut command = tetmill();
+    succeed(command.arg("generate").arg(own("dome")).args(["--order", "2", "-n", "3", "-q", "-o"]).arg(&from));
+    let mut command = tetmill();
+    command.arg("repartition").arg(&from).args(["-n", "5", "-q", "--halo", "faces", "--check", "-o"]).arg(&to);
+    succeed(command.arg("--report").arg(&report));
+    succeed(tetmill().arg("check").arg(&to));
+    let read = quality(&[&from, &to]);
+    let [before, after] = [&read["meshes"][0], &read["meshes"][1]];
+    for key in ["tets", "vertices", "order", "not_valid"] {
+        assert_eq!(before[key], after[key], "{key}");
+    }
+    for key in ["volume", "scaled_jacobian"] {
+        let [before, after] = [before, after].map(|mesh| mesh[key].as_f64().unwrap());
+        assert!((before / after - 1.0).abs() < 1e-12, "{key}: {before} {after}");
+    }
+}
+
+#[test]
 fn other_orders_are_refused_and_straight_edges_of_meshes_are_told() {
     let output = tetmill().arg("generate").arg(own("dome")).args(["--order", "3"]).output().unwrap();
     assert_eq!(output.status.code(), Some(2));

@@ -22,31 +22,18 @@ struct Kind {
 const TETS: Kind = Kind { first: TET, second: TET_10 };
 const TRIANGLES: Kind = Kind { first: TRIANGLE, second: TRIANGLE_6 };
 
-/// Which element orders are accepted.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Orders {
-    First,
-    Both,
-}
-
 impl Kind {
     /// Reads the nodes on edges that follow the corners of an element with this code.
-    fn edge_nodes<const N: usize>(
-        &self,
-        code: u32,
-        orders: Orders,
-        fields: &mut Fields,
-    ) -> Result<Option<[u32; N]>, String> {
-        if code == self.second && orders == Orders::Both { ids(fields, "node").map(Some) } else { Ok(None) }
+    fn edge_nodes<const N: usize>(&self, code: u32, fields: &mut Fields) -> Result<Option<[u32; N]>, String> {
+        if code == self.second { ids(fields, "node").map(Some) } else { Ok(None) }
     }
 
     /// Refuses other codes.
-    fn expect(&self, code: u32, orders: Orders) -> Result<(), String> {
-        if code == self.first || code == self.second && orders == Orders::Both {
+    fn expect(&self, code: u32) -> Result<(), String> {
+        if code == self.first || code == self.second {
             return Ok(());
         }
-        let second = if orders == Orders::Both { format!(" or {}", self.second) } else { String::new() };
-        Err(format!("the element type is '{code}'; only {}{second} is read here", self.first))
+        Err(format!("the element type is '{code}'; only {} and {} are read here", self.first, self.second))
     }
 }
 
@@ -317,9 +304,9 @@ pub fn only_layout(dir: &Path) -> Result<Layout, ReadError> {
 /// Reads one mesh, its parts in parallel threads.
 pub fn read_layout(layout: &Layout) -> Result<ElmerMesh, ReadError> {
     let parts = match layout {
-        Layout::Serial(folder) => vec![read_files(folder.join("mesh"), false, Orders::Both)?],
+        Layout::Serial(folder) => vec![read_part(folder.join("mesh"), false)?],
         Layout::Partitioned { folder, parts } => {
-            let read = |k: u32| read_files(folder.join(format!("part.{k}")), true, Orders::Both);
+            let read = |k: u32| read_part(folder.join(format!("part.{k}")), true);
             let parts: Vec<_> = (1..=*parts).into_par_iter().map(read).collect();
             parts.into_iter().collect::<Result<_, _>>()?
         }
@@ -344,14 +331,10 @@ pub fn stated_elements(dir: &Path) -> Result<u64, ReadError> {
 }
 
 pub(super) fn read_part(stem: PathBuf, partitioned: bool) -> Result<ElmerPart, ReadError> {
-    read_files(stem, partitioned, Orders::First)
-}
-
-fn read_files(stem: PathBuf, partitioned: bool, order: Orders) -> Result<ElmerPart, ReadError> {
     let header = read_header(&file(&stem, "header"), partitioned)?;
     let nodes = read_lines(&file(&stem, "nodes"), header.nodes, node)?;
-    let (elements, halo) = read_elements(&file(&stem, "elements"), header.elements, order)?;
-    let lines = read_lines(&file(&stem, "boundary"), header.boundary, |line| boundary_line(line, order))?;
+    let (elements, halo) = read_elements(&file(&stem, "elements"), header.elements)?;
+    let lines = read_lines(&file(&stem, "boundary"), header.boundary, boundary_line)?;
     let (boundary, left_out) = own_boundary(lines, &elements, &halo);
     let shared = match header.shared {
         Some(count) => read_lines(&file(&stem, "shared"), count, shared_node)?,
@@ -364,32 +347,28 @@ fn read_files(stem: PathBuf, partitioned: bool, order: Orders) -> Result<ElmerPa
 pub type Halo = Rows<(Element, u32)>;
 
 /// Reads `.elements`: the part's own elements, and halo elements.
-fn read_elements(path: &Path, expected: u32, order: Orders) -> Result<(Rows<Element>, Halo), ReadError> {
+fn read_elements(path: &Path, expected: u32) -> Result<(Rows<Element>, Halo), ReadError> {
     let (mut own, mut halo) = (Rows::default(), Rows::default());
     own.values.reserve_exact(room(path, expected));
     let mut line = 0;
-    for_each_line(
-        path,
-        |line| element(line, order),
-        |elements| {
-            for (element, owner) in elements.drain(..) {
-                line += 1;
-                if owner > 0 {
-                    if halo.values.is_empty() {
-                        // So far each value was on the line of its index.
-                        own.lines.extend(1..line);
-                    }
-                    halo.values.push((element, owner));
-                    halo.lines.push(line);
-                } else {
-                    own.values.push(element);
-                    if !halo.values.is_empty() {
-                        own.lines.push(line);
-                    }
+    for_each_line(path, element, |elements| {
+        for (element, owner) in elements.drain(..) {
+            line += 1;
+            if owner > 0 {
+                if halo.values.is_empty() {
+                    // So far each value was on the line of its index.
+                    own.lines.extend(1..line);
+                }
+                halo.values.push((element, owner));
+                halo.lines.push(line);
+            } else {
+                own.values.push(element);
+                if !halo.values.is_empty() {
+                    own.lines.push(line);
                 }
             }
-        },
-    )?;
+        }
+    })?;
     Ok((own, halo))
 }
 
@@ -485,15 +464,15 @@ fn ids<const N: usize>(fields: &mut Fields, what: &str) -> Result<[u32; N], Stri
 }
 
 /// Parses an element and the number of its owner if it is a halo element, else 0.
-fn element(line: &[u8], orders: Orders) -> Result<(Element, u32), String> {
+fn element(line: &[u8]) -> Result<(Element, u32), String> {
     expect_readable_by_elmer(line)?;
     let mut fields = Fields::new(line);
     let (id, owner) = fields.int_and_part("element")?;
     let body = fields.int("body")?;
     let code = fields.int("element type")?;
-    TETS.expect(code, orders)?;
+    TETS.expect(code)?;
     let nodes = ids(&mut fields, "node")?;
-    let edge_nodes = TETS.edge_nodes(code, orders, &mut fields)?;
+    let edge_nodes = TETS.edge_nodes(code, &mut fields)?;
     fields.end()?;
     Ok((Element { id, body, nodes, edge_nodes }, owner.unwrap_or(0)))
 }
@@ -505,7 +484,7 @@ enum BoundaryLine {
     LeftOut(u32),
 }
 
-fn boundary_line(line: &[u8], orders: Orders) -> Result<BoundaryLine, String> {
+fn boundary_line(line: &[u8]) -> Result<BoundaryLine, String> {
     expect_readable_by_elmer(line)?;
     let mut fields = Fields::new(line);
     let (id, owner) = fields.int_and_part("boundary element")?;
@@ -515,9 +494,9 @@ fn boundary_line(line: &[u8], orders: Orders) -> Result<BoundaryLine, String> {
     if POINTS_AND_EDGES.contains(&kind) {
         return Ok(BoundaryLine::LeftOut(kind));
     }
-    TRIANGLES.expect(kind, orders)?;
+    TRIANGLES.expect(kind)?;
     let nodes = ids(&mut fields, "node")?;
-    let edge_nodes = TRIANGLES.edge_nodes(kind, orders, &mut fields)?;
+    let edge_nodes = TRIANGLES.edge_nodes(kind, &mut fields)?;
     fields.end()?;
     let element = BoundaryElement { id, boundary, parents, nodes, edge_nodes };
     Ok(if owner.is_some() { BoundaryLine::LeftOut(kind) } else { BoundaryLine::Own(element) })

@@ -343,7 +343,7 @@ fn a_line_that_is_no_part_of_a_mesh_is_an_error_with_its_place() {
         (
             "part.1.elements",
             word(2, "808"),
-            "part.1.elements:2: the element type is '808'; only 504 is read here",
+            "part.1.elements:2: the element type is '808'; only 504 and 510 are read here",
         ),
         ("part.1.elements", word(0, "2/x"), "part.1.elements:2: the part behind the slash is not an integer"),
     ] {

@@ -76,6 +76,10 @@ pub struct BareMesh {
     pub shared: Shared,
     /// The tets, positively oriented.
     pub tets: Vec<[VertexId; 4]>,
+    /// For second order, the nodes on the edges of each tet, in the order of
+    /// [`TET_EDGES`](crate::ground::mesh::TET_EDGES); otherwise empty. They are vertices like the
+    /// corners.
+    pub edge_nodes: Vec<[VertexId; 6]>,
     /// Global ids of the tets, ascending.
     pub tet_ids: Vec<GlobalId>,
     /// The bodies of the tets.
@@ -117,6 +121,7 @@ impl From<DistMesh> for BareMesh {
             vertex_classes: mesh.vertex_classes,
             shared: mesh.shared_vertices,
             tets: mesh.tets,
+            edge_nodes: mesh.edge_nodes,
             tet_ids: mesh.tet_ids,
             tet_bodies: mesh.tet_bodies,
         }
@@ -134,7 +139,10 @@ impl BareMesh {
         let Shared { ids, offsets, holders } = &self.shared;
         let vertices =
             size_of_val(&*self.points) + size_of_val(&*self.vertex_ids) + size_of_val(&*self.vertex_classes);
-        let tets = size_of_val(&*self.tets) + size_of_val(&*self.tet_ids) + size_of_val(&*self.tet_bodies);
+        let tets = size_of_val(&*self.edge_nodes)
+            + size_of_val(&*self.tets)
+            + size_of_val(&*self.tet_ids)
+            + size_of_val(&*self.tet_bodies);
         let classified = size_of_val(&*self.sides) + size_of_val(&*self.edges);
         let shared = size_of_val(&**ids) + size_of_val(&**offsets) + size_of_val(&**holders);
         (vertices + tets + classified + shared) as u64

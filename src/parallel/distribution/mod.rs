@@ -115,6 +115,10 @@ pub struct DistMesh {
     pub face_classes: Vec<Class>,
     /// The tets, positively oriented.
     pub tets: Vec<[VertexId; 4]>,
+    /// For second order, the nodes on the edges of each tet, in the order of
+    /// [`TET_EDGES`](crate::ground::mesh::TET_EDGES); otherwise empty. They are vertices like the
+    /// corners; [`edges`](Self::edges) and [`faces`](Self::faces) are those of the corners.
+    pub edge_nodes: Vec<[VertexId; 6]>,
     /// Global ids of the tets, ascending.
     pub tet_ids: Vec<GlobalId>,
     /// The bodies of the tets.

@@ -361,6 +361,7 @@ fn assemble(
         face_ids: face_numbers.ids,
         face_classes,
         tets: bare.tets,
+        edge_nodes: bare.edge_nodes,
         tet_ids: bare.tet_ids,
         tet_bodies: bare.tet_bodies,
         tet_edges,

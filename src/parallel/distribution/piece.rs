@@ -113,6 +113,7 @@ impl Piece {
             "rank {rank}: face ids received and faces of the tets differ in number"
         );
         let mut part = DistMesh {
+            edge_nodes: Vec::new(),
             rank,
             ranks,
             totals: self.totals,

@@ -3,7 +3,7 @@
 use super::MigrateError;
 use super::rebuild::Room;
 use crate::ground::mesh::stream::{BoundaryBlock, MeshStream, NO_TET, TetBlock};
-use crate::ground::mesh::{TetId, VertexId};
+use crate::ground::mesh::{Order, TetId, VertexId};
 use crate::parallel::distribution::{BareMesh, ClassifiedEdge, Side};
 use crate::parallel::refine::RefinedMesh;
 
@@ -31,6 +31,7 @@ pub fn bare(refined: &RefinedMesh) -> Result<BareMesh, MigrateError> {
         vertex_ids: room.make(vertices)?,
         vertex_classes: room.make(vertices)?,
         tets: room.make(tets)?,
+        edge_nodes: room.make(if refined.order() == Order::Second { tets } else { 0 })?,
         tet_ids: room.make(tets)?,
         tet_bodies: room.make(tets)?,
         sides: room.make(counts.boundary as usize)?,
@@ -42,6 +43,7 @@ pub fn bare(refined: &RefinedMesh) -> Result<BareMesh, MigrateError> {
         refined.tet_block(index, &mut block);
         let count = block.tets.len();
         mesh.tets.extend(block.tets.iter().map(|tet| tet.map(VertexId)));
+        mesh.edge_nodes.extend(block.edge_nodes.iter().map(|nodes| nodes.map(VertexId)));
         mesh.tet_ids.extend(block.first_id..block.first_id + count as u64);
         mesh.tet_bodies.resize(mesh.tets.len(), block.body.expect("a coarse tet lies in a body"));
     }

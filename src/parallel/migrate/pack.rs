@@ -2,7 +2,7 @@
 //! list.
 //!
 //! ```text
-//!     counts | vertices: ids, classes, coordinates | tets: ids, bodies, corners | sides | edges
+//!     counts | vertices: ids, classes, coordinates | tets: ids, bodies, corners, nodes | sides | edges
 //! ```
 //! Ids ascend and are sent as differences, one byte each for consecutive ids; bodies as runs;
 //! corners in as many bytes as the number of vertices requires. A compact set of tets takes some 20
@@ -106,7 +106,7 @@ pub(super) fn pack(mesh: &BareMesh, destination: &[Rank], room: Room) -> Result<
 fn used_vertices(mesh: &BareMesh, tets: &[u32], place: &mut [u32]) -> Vec<u32> {
     let mut used = Vec::with_capacity(tets.len() / 2 + 4);
     for &tet in tets {
-        for v in mesh.tets[tet as usize] {
+        for v in nodes_of(mesh, tet as usize) {
             if place[v.index()] == u32::MAX {
                 place[v.index()] = 0;
                 used.push(v.0);
@@ -116,6 +116,11 @@ fn used_vertices(mesh: &BareMesh, tets: &[u32], place: &mut [u32]) -> Vec<u32> {
     used.sort_unstable();
     (0..).zip(&used).for_each(|(at, &v)| place[v as usize] = at);
     used
+}
+
+/// The corners of a tet, and the nodes on its edges if it is of second order.
+fn nodes_of(mesh: &BareMesh, tet: usize) -> impl Iterator<Item = VertexId> + '_ {
+    mesh.tets[tet].iter().chain(mesh.edge_nodes.get(tet).into_iter().flatten()).copied()
 }
 
 /// The edges of a tet (as ascending vertices) whose two ends both satisfy `may`.
@@ -146,7 +151,9 @@ fn classified_edges(mesh: &BareMesh, tets: &[u32]) -> Vec<u32> {
 fn kept_edges(mesh: &BareMesh, stays: &[bool], flags: &mut [u8], leaving: &[u32]) -> Vec<bool> {
     let mut kept = vec![true; mesh.edges.len()];
     leaving.iter().for_each(|&edge| kept[edge as usize] = false);
-    for (tet, _) in mesh.tets.iter().zip(stays).filter(|(_, stays)| **stays) {
+    for (index, (tet, _)) in mesh.tets.iter().zip(stays).enumerate().filter(|(_, (_, stays))| **stays) {
+        let edge_nodes = mesh.edge_nodes.get(index).into_iter().flatten();
+        edge_nodes.for_each(|node| flags[node.index()] |= STAYS);
         let mut at_leaving = 0;
         for v in tet {
             let flags = &mut flags[v.index()];
@@ -195,10 +202,11 @@ fn message(
     room: Room,
 ) -> Result<Vec<u8>, MigrateError> {
     let width = width(vertices.len());
+    let nodes = if mesh.edge_nodes.is_empty() { 4 } else { 10 };
     let mut m: Vec<u8> =
-        room.make(64 + vertices.len() * 28 + tets.len() * (2 + 4 * width) + sides.len() * 6)?;
+        room.make(64 + vertices.len() * 28 + tets.len() * (2 + nodes * width) + sides.len() * 6)?;
     m.push(TETS);
-    for count in [vertices.len(), tets.len(), sides.len(), edges.len()] {
+    for count in [vertices.len(), tets.len(), nodes, sides.len(), edges.len()] {
         put_varint(&mut m, count as u64);
     }
     put_ascending(&mut m, vertices.iter().map(|&v| mesh.vertex_ids[v as usize]));
@@ -211,7 +219,7 @@ fn message(
         put_varint(&mut m, run.len() as u64);
     }
     for &t in tets {
-        for v in mesh.tets[t as usize] {
+        for v in nodes_of(mesh, t as usize) {
             m.extend_from_slice(&place[v.index()].to_le_bytes()[..width]);
         }
     }
@@ -241,6 +249,8 @@ pub(super) struct Message {
     pub tet_ids: Vec<GlobalId>,
     pub tet_bodies: Vec<BodyId>,
     pub tets: Vec<[u32; 4]>,
+    /// Empty for first order.
+    pub edge_nodes: Vec<[u32; 6]>,
     pub sides: Vec<Side>,
     pub edges: Vec<ClassifiedEdge>,
 }
@@ -248,7 +258,7 @@ pub(super) struct Message {
 /// Reads a message.
 pub(super) fn unpack(mut message: &[u8]) -> Message {
     let m = &mut message;
-    let [vertices, tets, sides, edges] = [(); 4].map(|()| take_varint(m) as usize);
+    let [vertices, tets, nodes, sides, edges] = [(); 5].map(|()| take_varint(m) as usize);
     let vertex_ids = take_ascending(m, vertices).collect();
     let vertex_classes = (0..vertices).map(|_| class(take_varint(m))).collect();
     let (coordinates, rest) = m.split_at(vertices * size_of::<[f64; 3]>());
@@ -261,9 +271,9 @@ pub(super) fn unpack(mut message: &[u8]) -> Message {
         tet_bodies.resize(end, body);
     }
     let width = width(vertices);
-    let (corners, rest) = m.split_at(4 * width * tets);
+    let (places, rest) = m.split_at(nodes * width * tets);
     *m = rest;
-    let corner = |bytes: &[u8], k: usize| {
+    let place = |bytes: &[u8], k: usize| {
         let mut number = [0; 4];
         number[..width].copy_from_slice(&bytes[k * width..(k + 1) * width]);
         u32::from_le_bytes(number)
@@ -287,7 +297,12 @@ pub(super) fn unpack(mut message: &[u8]) -> Message {
         points: crate::ground::comm::pack::numbers(coordinates),
         tet_ids,
         tet_bodies,
-        tets: corners.chunks_exact(4 * width).map(|c| [0, 1, 2, 3].map(|k| corner(c, k))).collect(),
+        tets: places.chunks_exact(nodes * width).map(|p| [0, 1, 2, 3].map(|k| place(p, k))).collect(),
+        edge_nodes: (nodes == 10)
+            .then(|| places.chunks_exact(nodes * width).map(|p| [4, 5, 6, 7, 8, 9].map(|k| place(p, k))))
+            .into_iter()
+            .flatten()
+            .collect(),
         sides,
         edges: edges.collect(),
     }

@@ -232,13 +232,23 @@ fn merge_tets(
     keep(&mut mesh.tet_ids, &kept.tets);
     keep(&mut mesh.tet_bodies, &kept.tets);
     keep(&mut mesh.tets, &kept.tets);
+    // A part without tets does not show the order of the mesh.
+    let is_second =
+        !mesh.edge_nodes.is_empty() || incoming.iter().any(|message| !message.edge_nodes.is_empty());
+    if is_second {
+        keep(&mut mesh.edge_nodes, &kept.tets);
+    }
     let staying = mesh.tet_ids.len();
     let count = room.count(staying + arrivals.len(), "tets")?;
     room.grow(&mut mesh.tet_ids, count, 0)?;
     room.grow(&mut mesh.tet_bodies, count, BodyId(0))?;
     room.grow(&mut mesh.tets, count, [VertexId(0); 4])?;
-    let BareMesh { tet_ids: ids, tet_bodies: bodies, tets, .. } = mesh;
+    if is_second {
+        room.grow(&mut mesh.edge_nodes, count, [VertexId(0); 6])?;
+    }
+    let BareMesh { tet_ids: ids, tet_bodies: bodies, tets, edge_nodes, .. } = mesh;
     let renumber = |tet: [VertexId; 4], new: &[u32]| tet.map(|v| VertexId(new[v.index()]));
+    let renumber_edges = |nodes: [VertexId; 6], new: &[u32]| nodes.map(|v| VertexId(new[v.index()]));
     // From the last to the first: kept tets move up, over entries that were moved before.
     let mut from = staying;
     for (before, &(id, message, place)) in arrivals.iter().enumerate().rev() {
@@ -247,13 +257,21 @@ fn merge_tets(
             let to = from + before + 1;
             (ids[to], bodies[to]) = (ids[from], bodies[from]);
             tets[to] = renumber(tets[from], &renumbered.old);
+            if is_second {
+                edge_nodes[to] = renumber_edges(edge_nodes[from], &renumbered.old);
+            }
         }
         let (message, new, place) =
             (&incoming[message as usize], &renumbered.messages[message as usize], place as usize);
         (ids[from + before], bodies[from + before]) = (id, message.tet_bodies[place]);
         tets[from + before] = renumber(message.tets[place].map(VertexId), new);
+        if is_second {
+            edge_nodes[from + before] = renumber_edges(message.edge_nodes[place].map(VertexId), new);
+        }
     }
     tets[..from].iter_mut().for_each(|tet| *tet = renumber(*tet, &renumbered.old));
+    let staying = edge_nodes.get_mut(..from).unwrap_or_default();
+    staying.iter_mut().for_each(|nodes| *nodes = renumber_edges(*nodes, &renumbered.old));
 
     let mut put_sides = |of: &[Side], tet_id: &dyn Fn(usize) -> GlobalId| {
         let mut at = 0;

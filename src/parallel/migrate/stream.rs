@@ -3,7 +3,9 @@
 use crate::ground::mesh::stream::{
     BoundaryBlock, Counts, LocalBlock, MeshStream, NO_TET, TetBlock, VertexBlock,
 };
-use crate::ground::mesh::{Class, GlobalId, Rank, TET_FACES, TetId, VertexId};
+use crate::ground::mesh::{
+    Class, EDGE_BETWEEN, GlobalId, Order, Rank, TET_FACES, TRIANGLE_EDGES, TetId, VertexId,
+};
 use crate::parallel::distribution::BareMesh;
 use csg::PatchId;
 use std::ops::Range;
@@ -15,6 +17,8 @@ const TETS_IN_BLOCK: usize = 512;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Triangle {
     vertices: [VertexId; 3],
+    /// The nodes on its edges, if it is of second order.
+    edge_nodes: Option<[VertexId; 3]>,
     patch: PatchId,
     /// The tets behind and in front of it.
     parents: [Option<TetId>; 2],
@@ -87,7 +91,13 @@ fn triangles(mesh: &BareMesh) -> Vec<Triangle> {
         let [a, b, c] = outward;
         let (vertices, parents) =
             if side.behind { (outward, [Some(side.tet), None]) } else { ([a, c, b], [None, Some(side.tet)]) };
-        sides.push((key, side.behind, Triangle { vertices, patch: side.patch, parents }));
+        let edge_nodes = mesh.edge_nodes.get(side.tet.index()).map(|nodes| {
+            let tet = mesh.tets[side.tet.index()];
+            let place =
+                |v: VertexId| tet.iter().position(|corner| *corner == v).expect("a corner of the tet");
+            TRIANGLE_EDGES.map(|[p, q]| nodes[EDGE_BETWEEN[place(vertices[p])][place(vertices[q])]])
+        });
+        sides.push((key, side.behind, Triangle { vertices, edge_nodes, patch: side.patch, parents }));
     }
     sides.sort_unstable_by_key(|(key, behind, _)| (*key, !behind));
     let join = |sides: &[([VertexId; 3], bool, Triangle)]| {
@@ -109,6 +119,10 @@ impl MeshStream for BareStream {
 
     fn ranks(&self) -> u32 {
         self.mesh.ranks
+    }
+
+    fn order(&self) -> Order {
+        if self.mesh.edge_nodes.is_empty() { Order::First } else { Order::Second }
     }
 
     fn counts(&self) -> Counts {
@@ -155,6 +169,9 @@ impl MeshStream for BareStream {
         let (first, end) = (local.start as usize, local.end as usize);
         block.tets.clear();
         block.tets.extend(self.mesh.tets[first..end].iter().map(|tet| tet.map(|v| v.0)));
+        block.edge_nodes.clear();
+        let edge_nodes = self.mesh.edge_nodes.get(first..end).unwrap_or_default();
+        block.edge_nodes.extend(edge_nodes.iter().map(|nodes| nodes.map(|v| v.0)));
         block.first_id = self.mesh.tet_ids[first];
         block.first_local = u64::from(local.start);
         block.body = Some(self.mesh.tet_bodies[first]);
@@ -173,6 +190,8 @@ impl MeshStream for BareStream {
         let triangle = self.triangles[index];
         block.triangles.clear();
         block.triangles.push(triangle.vertices.map(|v| v.0));
+        block.edge_nodes.clear();
+        block.edge_nodes.extend(triangle.edge_nodes.map(|nodes| nodes.map(|v| v.0)));
         block.parents.clear();
         block.parents.push(triangle.parents.map(|tet| tet.map_or(NO_TET, |tet| u64::from(tet.0))));
         block.bodies = triangle.parents.map(|tet| Some(self.mesh.tet_bodies[tet?.index()]));

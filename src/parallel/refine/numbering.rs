@@ -351,8 +351,11 @@ impl Numbering {
         let edges = (0..).zip(&mesh.edges).zip(&mesh.edge_classes);
         edges.filter(|(_, class)| !matches!(class, Class::Body(_))).flat_map(|((id, ends), class)| {
             let inside = self.inside(Entity { dimension: 1, id });
-            let starts = std::iter::once(ends[0].0).chain(inside.clone());
-            starts.zip(inside.chain([ends[1].0])).map(|(from, to)| ([from, to], *class))
+            // Of second order every second vertex is the node on an edge.
+            let step = self.order().degree() as usize;
+            let starts = std::iter::once(ends[0].0).chain(inside.clone()).step_by(step);
+            let ends = inside.chain([ends[1].0]).skip(step - 1).step_by(step);
+            starts.zip(ends).map(|(from, to)| ([from, to], *class))
         })
     }
 }

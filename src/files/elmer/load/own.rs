@@ -7,10 +7,11 @@ use super::fault;
 use super::ids::NewIds;
 use crate::Point;
 use crate::files::input::ReadError;
+use crate::files::node_order::VTK;
 use crate::ground::comm::Communicator;
 use crate::ground::kernel::predicates::{Sign, orient3d};
 use crate::ground::mesh::stream::Counts;
-use crate::ground::mesh::{Class, GlobalId, Rank, VertexId};
+use crate::ground::mesh::{Class, EDGE_BETWEEN, GlobalId, Rank, TET_EDGES, VertexId};
 use crate::parallel::distribution::{BareMesh, Shared};
 use csg::BodyId;
 use rayon::prelude::*;
@@ -119,6 +120,7 @@ impl OwnParts {
             return Err(self.element_fault(FaultKind::Inverted, at, what));
         }
         let turned = signs.iter().filter(|sign| **sign == Sign::Negative).count() as u64;
+        let edge_nodes = self.edge_nodes(&of_tet, &local, &positive)?;
         let mut shared = Shared::default();
         for (id, holders) in ids.holders {
             let v = vertices.binary_search_by_key(&id, |(id, _)| *id).expect("a node of this rank");
@@ -138,11 +140,44 @@ impl OwnParts {
             vertex_classes: vec![Class::Body(BodyId(0)); vertices.len()],
             shared,
             tets: positive,
+            edge_nodes,
             tet_ids: of_tet.iter().map(|(id, _)| *id).collect(),
             tet_bodies: of_tet.iter().map(body).collect(),
             ..BareMesh::default()
         };
         Ok(Assembled { bare, of_tet: of_tet.into_iter().map(|(_, at)| at).collect(), local, turned })
+    }
+
+    /// The nodes on the edges of the tets; none if the elements are of first order.
+    fn edge_nodes(
+        &self,
+        of_tet: &[(GlobalId, TetPlace)],
+        local: &[Vec<VertexId>],
+        tets: &[[VertexId; 4]],
+    ) -> Result<Vec<[VertexId; 6]>, ReadError> {
+        let is_second = |at: TetPlace| self.element(at).edge_nodes.is_some();
+        let Some(&(_, first)) = of_tet.first() else { return Ok(Vec::new()) };
+        if let Some(&(_, at)) = of_tet.iter().find(|(_, at)| is_second(*at) != is_second(first)) {
+            let what = format!(
+                "element {} is not of the order of element {}",
+                self.element(at).id,
+                self.element(first).id
+            );
+            return Err(self.element_fault(FaultKind::EdgeNodesDiffer, at, what));
+        }
+        let of = |(&(_, at), tet): (&(GlobalId, TetPlace), &[VertexId; 4])| {
+            let (element, part) = (self.element(at), at.part as usize);
+            let vertex = |id: u32| local[part][self.list[part].nodes.find(id).expect("checked before")];
+            let corners = element.nodes.map(vertex);
+            let place = |v: VertexId| tet.iter().position(|corner| *corner == v).expect("the same corners");
+            let mut nodes = [VertexId(0); 6];
+            for (edge, node) in VTK.into_iter().zip(element.edge_nodes?) {
+                let [p, q] = TET_EDGES[edge].map(|corner| place(corners[corner]));
+                nodes[EDGE_BETWEEN[p][q]] = vertex(node);
+            }
+            Some(nodes)
+        };
+        Ok(of_tet.iter().zip(tets).filter_map(of).collect())
     }
 
     /// The element at a position in the files.
