@@ -207,6 +207,7 @@ fn disk_for(formats: &[Format], order: Order, folder: &Path) -> Disk {
         Format::Medit => [60, 40, 30],
         Format::Vol => [58, 40, 42],
         Format::Mfem => [50, 24, 18],
+        Format::Hdf5 => [32, 89, 48],
         Format::Geomview => [0, 0, 30],
         Format::None => [0; 3],
     };

@@ -452,6 +452,8 @@ pub enum Format {
     Vol,
     /// MFEM, parallel: DIR/NAME.000000 and so on, one file for each part
     Mfem,
+    /// HDF5, DIR/NAME.vtkhdf and DIR/NAME.xdmf: all parts in one file for ParaView, DOLFINx, PETSc
+    Hdf5,
     /// Geomview OFF: the boundary, coloured by part
     Geomview,
     /// Nothing

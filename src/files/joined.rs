@@ -93,9 +93,8 @@ impl<'a> Whole<'a> {
         let totals = Counts { boundary, ..part.totals() };
         let own_singular = part.singular().vertices;
         let own_singular = own_singular.iter().filter(|(local, _)| numbering.owns(*local as usize));
-        let own_singular: Vec<[i64; 2]> = own_singular
-            .map(|&(local, factor)| [numbering.vertex(local) as i64, factor.into()])
-            .collect();
+        let own_singular: Vec<[i64; 2]> =
+            own_singular.map(|&(local, factor)| [numbering.vertex(local) as i64, factor.into()]).collect();
         let mut singular: Vec<[i64; 2]> = comm.gather(0, &own_singular)?.concat();
         singular.sort_unstable();
         let singular_vertices = singular.iter().map(|&[number, k]| (number as u64, k as i32)).collect();

@@ -21,7 +21,7 @@ pub(super) struct Numbering {
     /// The numbers of the others, in local order.
     copies: Vec<u64>,
     /// The number of the part's first tet; the others follow in local order.
-    first_tet: u64,
+    pub first_tet: u64,
     /// Index of the first ghost tet, and the numbers of ghost tets.
     ghosts: (u64, Vec<u64>),
     /// Number of vertices of this part, or of its ghosts, that other parts have too.

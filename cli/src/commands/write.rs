@@ -78,6 +78,7 @@ pub(super) fn write_formats(
             Format::Medit => joined(".mesh", serial::Format::Medit)?,
             Format::Vol => joined(".vol", serial::Format::Netgen)?,
             Format::Mfem => files::mfem::write(comm, part, names, stem)?,
+            Format::Hdf5 => files::hdf5::write(comm, part, names, stem)?,
             Format::Geomview => {
                 files::geomview::write(comm, part, &files::geomview::Settings::default(), stem)?
             }
@@ -95,7 +96,7 @@ fn passes(format: &Format) -> u64 {
         Format::Msh | Format::Medit | Format::Vol => 2,
         // For shared edges, for shared faces, and for the file.
         Format::Mfem => 3,
-        Format::Elmer | Format::Vtu | Format::Geomview => 1,
+        Format::Elmer | Format::Vtu | Format::Hdf5 | Format::Geomview => 1,
     }
 }
 
