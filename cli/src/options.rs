@@ -452,7 +452,7 @@ pub enum Format {
     Vol,
     /// MFEM, parallel: DIR/NAME.000000 and so on, one file for each part
     Mfem,
-    /// HDF5, DIR/NAME.vtkhdf and DIR/NAME.xdmf: all parts in one file for ParaView, DOLFINx, PETSc
+    /// HDF5, DIR/NAME.h5 and DIR/NAME.xdmf: all parts in one file for ParaView, DOLFINx, PETSc
     Hdf5,
     /// Geomview OFF: the boundary, coloured by part
     Geomview,

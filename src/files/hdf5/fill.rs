@@ -3,7 +3,7 @@
 use super::tree::Placed;
 use super::{
     BODIES, BOUNDARIES, CONNECTIVITY, COUNTS, Content, ELEMENT_IDS, NODE_IDS, Named, OFFSETS, PARENTS, PARTS,
-    PERIODIC_IDS, POINTS, TRIANGLE_PARTS, TRIANGLES, TYPES, cells, named_path,
+    PERIODIC_IDS, POINTS, TRIANGLE_PARTS, TRIANGLES, TYPES, cells, fields, named_path,
 };
 use crate::files::chunks::{items, split, write_chunks};
 use crate::files::node_order::{VTK, arranged};
@@ -72,6 +72,10 @@ impl Content<'_> {
     /// The names of bodies and boundaries.
     fn named(&self, file: &Datasets) -> Result<(), WriteError> {
         for (kind, labels) in self.labels() {
+            for (path, numbers) in fields(kind, labels) {
+                let numbers: Vec<u32> = numbers.into_iter().collect();
+                file.at(&path, 0)?.write(bytemuck::cast_slice(&numbers))?;
+            }
             let named = Named::of(labels);
             if named.0.is_empty() {
                 continue;

@@ -1,17 +1,18 @@
 //! One HDF5 file for the mesh of all ranks, written by all of them, with an index for XDMF readers.
 //!
 //! ```text
-//! STEM.vtkhdf
+//! STEM.h5
 //!   /VTKHDF               VTK's unstructured grid of one piece: the tets
 //!     Points, Connectivity, Offsets, Types, NumberOf…
 //!     PointData/          GlobalNodeId; PeriodicId (periodic faces only)
 //!     CellData/           GlobalElementId  BodyId  PartitionId
-//!     FieldData/          BodyNumbers and BodyNames, BoundaryNumbers and BoundaryNames, in pairs
+//!     FieldData/          for each name, `Body NAME` or `Boundary NAME`: the numbers with this name
 //!   /geometry/vertices    another name of /VTKHDF/Points   ┐ PETSc's DMPlex, flavour of XDMF
 //!   /viz/topology/cells   the tets, four columns           ┘
 //!   /second_order/cells   the tets, ten columns, instead of /viz for second order
+//!   /names/               BodyNumbers and BodyNames, BoundaryNumbers and BoundaryNames, in pairs
 //!   /boundary/            cells (three or six columns)  BoundaryId  PartitionId  parents
-//! STEM.xdmf               grids `mesh` and `boundary` by reference to STEM.vtkhdf
+//! STEM.xdmf               grids `mesh` and `boundary` by reference to STEM.h5
 //! ```
 //! All datasets are contiguous, so the place of each value in the file is known beforehand: rank 0
 //! writes the metadata (`encode`), and each rank its own vertices and tets at their places, block
@@ -20,6 +21,9 @@
 //!
 //! `parents` has for each boundary triangle the numbers of the tets behind it and in front of it,
 //! -1 for none. A triangle between two parts is written once, see [`once`](super::once).
+//!
+//! The ending `.h5` is the one that PETSc's `DMPlexCreateFromFile` and DOLFINx's reader of XDMF look
+//! for. Names are fixed-length strings, which VTK's reader does not accept as field data.
 //!
 //! `cells` repeats `Connectivity`: VTK requires a list, and PETSc and XDMF a table. Two datasets
 //! with the same bytes are not defined by HDF5, and a program that rewrites one would damage the
@@ -41,13 +45,13 @@ use super::{WriteError, Written, sum_written};
 use crate::ground::comm::Communicator;
 use crate::ground::mesh::stream::{Counts, MeshStream};
 use crate::ground::mesh::{Label, Names, Order};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 use std::path::{Path, PathBuf};
 use tree::{Kind, Tree, Value};
 
 /// The endings of the two files.
-pub const ENDINGS: [&str; 2] = [".vtkhdf", ".xdmf"];
+pub const ENDINGS: [&str; 2] = [".h5", ".xdmf"];
 
 /// Paths of datasets.
 const POINTS: &str = "/VTKHDF/Points";
@@ -91,7 +95,7 @@ struct Content<'a> {
     triangles_before: u64,
 }
 
-/// **Collective.** Writes the mesh of all ranks to `STEM.vtkhdf` and `STEM.xdmf`. All ranks get the
+/// **Collective.** Writes the mesh of all ranks to `STEM.h5` and `STEM.xdmf`. All ranks get the
 /// totals.
 ///
 /// ```
@@ -106,7 +110,7 @@ struct Content<'a> {
 ///     hdf5::write(comm, mesh.stream(), &mesh.names, &stem)?;
 ///     Ok(())
 /// })?;
-/// # assert!(folder.path().join("ball.vtkhdf").exists());
+/// # assert!(folder.path().join("ball.h5").exists());
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 ///
@@ -192,11 +196,15 @@ impl<'a> Content<'a> {
                 tree.add(&named_path(kind, "Numbers"), Kind::I32, &[names.0.len() as u64]);
                 tree.add(&named_path(kind, "Names"), names.text(), &[names.0.len() as u64]);
             }
+            for (path, numbers) in fields(kind, labels) {
+                tree.add(&path, Kind::I32, &[numbers.len() as u64]);
+            }
         }
         tree.attribute("/VTKHDF", "Version", Value::Integers(vec![2, 0]));
         tree.attribute("/VTKHDF", "Type", Value::Text("UnstructuredGrid"));
-        tree.attribute("/VTKHDF/PointData", "GlobalIds", Value::Text("GlobalNodeId"));
-        tree.attribute("/VTKHDF/CellData", "GlobalIds", Value::Text("GlobalElementId"));
+        for ids in [NODE_IDS, ELEMENT_IDS] {
+            tree.attribute(ids, "Attribute", Value::Text("GlobalIds"));
+        }
 
         tree.link(VERTICES, POINTS);
         tree.add(cells(order), Kind::I64, &[totals.tets, of_tet]);
@@ -215,7 +223,20 @@ impl<'a> Content<'a> {
 
 /// The path of the numbers or names of bodies or boundaries.
 fn named_path(kind: &str, what: &str) -> String {
-    format!("/VTKHDF/FieldData/{kind}{what}")
+    format!("/names/{kind}{what}")
+}
+
+/// For each name the path of its field, and the numbers with this name. Paths have slashes between
+/// groups, so a slash in a name becomes `_`.
+fn fields(kind: &str, labels: &[Label]) -> BTreeMap<String, BTreeSet<u32>> {
+    let mut fields: BTreeMap<String, BTreeSet<u32>> = BTreeMap::new();
+    for label in labels {
+        for name in &label.names {
+            let path = format!("/VTKHDF/FieldData/{kind} {}", name.replace('/', "_"));
+            fields.entry(path).or_default().insert(label.number);
+        }
+    }
+    fields
 }
 
 /// Numbers with their names; a number with several names is repeated.

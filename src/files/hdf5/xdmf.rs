@@ -12,7 +12,7 @@ pub(super) fn text(placed: &Placed, order: Order, file: &str) -> String {
     let index = Index { placed, file: &escaped(file) };
     let [triangle, tet] = match order {
         Order::First => ["Triangle", "Tetrahedron"],
-        Order::Second => ["Tri_6", "Tet_10"],
+        Order::Second => ["Triangle_6", "Tetrahedron_10"],
     };
     let mesh = index.grid(
         "mesh",
