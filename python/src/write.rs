@@ -4,7 +4,7 @@ use pyo3::prelude::*;
 use std::path::PathBuf;
 use tetmill::comm::Communicator;
 use tetmill::error::Error;
-use tetmill::files::{Written, elmer, geomview, mfem, serial, vtu};
+use tetmill::files::{Written, elmer, geomview, hdf5, mfem, serial, vtu};
 use tetmill::mesh::{By, MeshStream, Names, Watched, WithHalo, halo};
 use tetmill::progress::{Progress, Stage};
 
@@ -61,6 +61,7 @@ pub fn write(
             "medit" => joined(part, serial::Format::Medit),
             "vol" => joined(part, serial::Format::Netgen),
             "mfem" => mfem::write(comm, part, names, &target.path),
+            "hdf5" => hdf5::write(comm, part, names, &target.path),
             _ => geomview::write(comm, part, &geomview::Settings::default(), &target.path),
         }
     });
