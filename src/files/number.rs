@@ -13,8 +13,8 @@ use std::ops::Range;
 #[derive(Debug)]
 pub(super) struct Numbering {
     /// By local vertex index: its place among the vertices that this part owns, which have
-    /// consecutive numbers; or behind these, among `copies`. So a number that may have 64 bits takes
-    /// 32, except on interfaces.
+    /// consecutive numbers; or behind these, among `copies`. So a number that may have 64 bits
+    /// takes 32, except on interfaces.
     places: Vec<u32>,
     /// The numbers of the vertices that this part owns.
     pub owned: Range<u64>,

@@ -22,8 +22,8 @@
 //! `parents` has for each boundary triangle the numbers of the tets behind it and in front of it,
 //! -1 for none. A triangle between two parts is written once, see [`once`](super::once).
 //!
-//! The ending `.h5` is the one that PETSc's `DMPlexCreateFromFile` and DOLFINx's reader of XDMF look
-//! for. Names are fixed-length strings, which VTK's reader does not accept as field data.
+//! The ending `.h5` is the one that PETSc's `DMPlexCreateFromFile` and DOLFINx's reader of XDMF
+//! look for. Names are fixed-length strings, which VTK's reader does not accept as field data.
 //!
 //! `cells` repeats `Connectivity`: VTK requires a list, and PETSc and XDMF a table. Two datasets
 //! with the same bytes are not defined by HDF5, and a program that rewrites one would damage the
