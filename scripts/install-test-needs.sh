@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Installs the programs that the tests need besides Rust: MPI, libclang (for its bindings), TetGen,
 # CalculiX, CMake and PETSc for the C interface, DOLFINx and PETSc for the system's Python, and Python modules
-# that read our files: numpy, Gmsh, NGSolve with NETGEN, meshio, scikit-fem, MFEM. Uses apt on Debian and Ubuntu; elsewhere it
+# that read our files: numpy, Gmsh, NGSolve with NETGEN, meshio, scikit-fem, MFEM, h5py, VTK. Uses apt on Debian and Ubuntu; elsewhere it
 # lists the missing packages. Does nothing if all are installed.
 set -euo pipefail
 
@@ -46,7 +46,8 @@ if [ ${#missing[@]} -gt 0 ]; then
 fi
 
 # Module and package.
-for module in numpy:numpy gmsh:gmsh ngsolve:ngsolve netgen.csg:netgen-mesher meshio:meshio skfem:scikit-fem mfem.ser:mfem; do
+for module in numpy:numpy gmsh:gmsh ngsolve:ngsolve netgen.csg:netgen-mesher meshio:meshio skfem:scikit-fem mfem.ser:mfem h5py:h5py \
+    vtkmodules:vtk; do
     python3 -c "import ${module%%:*}" 2>/dev/null && continue
     package=${module##*:}
     python3 -m pip install --quiet "$package" 2>/dev/null \

@@ -1,8 +1,8 @@
 //! Exchange of meshes with other programs: names, numbers of elements, and areas by name, in both
 //! directions.
 //!
-//! The programs are the Python modules of Gmsh, NGSolve and meshio. A test is skipped with a
-//! message if its module is missing.
+//! The programs are the Python modules of Gmsh, NGSolve, meshio, h5py, VTK, DOLFINx and PETSc. A
+//! test is skipped with a message if its module is missing.
 
 use csg::{BodyId, PatchId};
 use std::collections::BTreeMap;
@@ -11,9 +11,9 @@ use std::process::Command;
 use tetmill::Point;
 use tetmill::comm::{Communicator, thread};
 use tetmill::files::vtu::{self, Field, On};
-use tetmill::files::{serial, volume};
+use tetmill::files::{hdf5, serial, volume};
 use tetmill::internals::{PlainPart, simplex};
-use tetmill::mesh::{Arrays, BoundaryTriangle, Class, Label, Mesh, Names, TET_FACES, VertexId};
+use tetmill::mesh::{Arrays, BoundaryTriangle, Class, Label, Mesh, MeshStream, Names, TET_FACES, VertexId};
 
 /// Number of elements and total area or volume, by name.
 type Sizes = BTreeMap<String, (u64, f64)>;
@@ -31,8 +31,26 @@ const NGSOLVE: Client = Client("ngsolve_regions.py");
 impl Client {
     /// Runs the script on a file or folder. Returns its output, or `None` if the module is missing.
     fn run(&self, path: &Path) -> Option<String> {
+        self.finish(Command::new("python3"), path)
+    }
+
+    /// Runs the script on processes of the system's Python, the one with DOLFINx and PETSc.
+    fn run_on(&self, ranks: u32, path: &Path) -> Option<String> {
+        if Command::new("mpirun").arg("--version").output().is_err() {
+            eprintln!("SKIPPED: no mpirun");
+            return None;
+        }
+        let mut mpirun = Command::new("mpirun");
+        mpirun.args(["-n", &ranks.to_string(), "/usr/bin/python3"]);
+        // By default Open MPI refuses to run as root or with more ranks than cores.
+        mpirun.envs([("OMPI_ALLOW_RUN_AS_ROOT", "1"), ("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1")]);
+        mpirun.env("OMPI_MCA_rmaps_base_oversubscribe", "1");
+        self.finish(mpirun, path)
+    }
+
+    fn finish(&self, mut python: Command, path: &Path) -> Option<String> {
         let script = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/clients").join(self.0);
-        let output = Command::new("python3").arg(script).arg(path).output().unwrap();
+        let output = python.arg(script).arg(path).output().unwrap();
         let printed = String::from_utf8_lossy(&output.stdout).into_owned();
         let complaint = String::from_utf8_lossy(&output.stderr);
         // The module, or a system library that it needs, is missing.
@@ -197,7 +215,19 @@ const CASES: [(&str, Labels); 4] =
 
 /// Calls `check` for each case with one and two bodies, in one and in seven parts, written with
 /// this extension.
-fn for_each_case(ending: &str, mut check: impl FnMut(&Path, &Mesh, &Names, &str)) {
+fn for_each_case(ending: &str, check: impl FnMut(&Path, &Mesh, &Names, &str)) {
+    let write = |comm: &dyn Communicator, part: &dyn MeshStream, names: &Names, stem: &Path| {
+        let path = stem.with_extension(ending);
+        serial::write_joined(comm, part, names, serial::Format::of(&path).unwrap(), &path).unwrap();
+    };
+    for_each_written(ending, &write, check);
+}
+
+/// **Collective.** Writes a part to a file with this path without its extension.
+type Write<'a> = &'a (dyn Fn(&dyn Communicator, &dyn MeshStream, &Names, &Path) + Sync);
+
+/// Like [`for_each_case`], with files that `write` writes.
+fn for_each_written(ending: &str, write: Write, mut check: impl FnMut(&Path, &Mesh, &Names, &str)) {
     let dir = tempfile::tempdir().unwrap();
     for bodies in [1, 2] {
         let mesh = squares(bodies);
@@ -209,16 +239,14 @@ fn for_each_case(ending: &str, mut check: impl FnMut(&Path, &Mesh, &Names, &str)
                 _ => vec![Label::new(2, "copper"), Label::unnamed(6)],
             };
             let names = Names { bodies: bodies_of[..bodies as usize].to_vec(), patches };
-            let path = dir.path().join(format!("{case}.{ending}"));
-            serial::write(&PlainPart::whole(&mesh), &names, &path).unwrap();
+            let (stem, path) = (dir.path().join(case), dir.path().join(format!("{case}.{ending}")));
+            write(&thread::alone(), &PlainPart::whole(&mesh), &names, &stem);
             check(&path, &mesh, &names, &format!("{case}, {bodies} bodies"));
             let rank_of: Vec<u32> = (0..mesh.tets.len()).map(|tet| (tet / 100 % 7) as u32).collect();
-            let write = |comm: &dyn Communicator| {
-                let part = PlainPart::part(&mesh, &rank_of, 7, comm.rank());
-                let format = serial::Format::of(&path).unwrap();
-                serial::write_joined(comm, &part, &names, format, &path).unwrap();
+            let write_part = |comm: &dyn Communicator| {
+                write(comm, &PlainPart::part(&mesh, &rank_of, 7, comm.rank()), &names, &stem);
             };
-            thread::run(7, write).unwrap();
+            thread::run(7, write_part).unwrap();
             check(&path, &mesh, &names, &format!("{case}, {bodies} bodies in seven parts"));
         }
     }
@@ -252,6 +280,67 @@ fn meshio_finds_all_names_and_areas() {
         let Some(found) = MESHIO.find(path) else { return };
         assert_alike(&found, &sizes(mesh, names, by_group), case);
     });
+}
+
+fn write_hdf5(comm: &dyn Communicator, part: &dyn MeshStream, names: &Names, stem: &Path) {
+    hdf5::write(comm, part, names, stem).unwrap();
+}
+
+#[test]
+fn h5py_finds_all_names_and_areas() {
+    for_each_written("h5", &write_hdf5, |path, mesh, names, case| {
+        let Some(found) = Client("hdf5_sizes.py").find(path) else { return };
+        assert_alike(&found, &sizes(mesh, names, by_group), case);
+    });
+}
+
+#[test]
+fn vtk_finds_all_names_and_volumes() {
+    for_each_written("h5", &write_hdf5, |path, mesh, names, case| {
+        let Some([boundaries, bodies]) = Client("vtkhdf_sizes.py").find(path) else { return };
+        let expected = sizes(mesh, names, by_group);
+        // VTK gets the names of boundaries without triangles.
+        let named = expected[0].keys().filter(|name| !name.starts_with('#'));
+        assert!(boundaries.keys().eq(named), "{case}");
+        assert_alike(&[Sizes::new(), bodies], &[Sizes::new(), expected[1].clone()], case);
+    });
+}
+
+#[test]
+fn dolfinx_and_petsc_read_the_file_on_any_number_of_ranks() {
+    let mesh = squares(2);
+    let by_side = |patch: u32| Label::unnamed(1 + patch % 3);
+    let names = Names {
+        bodies: vec![Label::new(1, "left"), Label::new(4, "right")],
+        patches: (0..patch_count(&mesh)).map(by_side).collect(),
+    };
+    let [areas, volumes] = sizes(&mesh, &names, |label| vec![label.number.to_string()]);
+    let dir = tempfile::tempdir().unwrap();
+    let rank_of: Vec<u32> = (0..mesh.tets.len()).map(|tet| (tet / 100 % 7) as u32).collect();
+    thread::run(7, |comm| {
+        let part = PlainPart::part(&mesh, &rank_of, 7, comm.rank());
+        write_hdf5(comm, &part, &names, &dir.path().join("box"));
+    })
+    .unwrap();
+    let close = |found: &serde_json::Value, expected: &Sizes| {
+        let found: BTreeMap<String, f64> = serde_json::from_value(found.clone()).unwrap();
+        let same = |(name, (_, size)): (&String, &(u64, f64))| (found[name] - size).abs() < 1e-9 * size;
+        assert!(found.keys().eq(expected.keys()) && expected.iter().all(same), "{found:?}, not {expected:?}");
+    };
+    for ranks in [1, 2] {
+        if let Some(printed) = Client("xdmf_dolfinx.py").run_on(ranks, &dir.path().join("box.xdmf")) {
+            let found: serde_json::Value = serde_json::from_str(printed.lines().last().unwrap()).unwrap();
+            assert_eq!(found["tets"], mesh.tets.len());
+            close(&found["areas"], &areas);
+            close(&found["volumes"], &volumes);
+        }
+        if let Some(printed) = Client("hdf5_petsc.py").run_on(ranks, &dir.path().join("box.h5")) {
+            let found: serde_json::Value = serde_json::from_str(printed.lines().last().unwrap()).unwrap();
+            assert_eq!(found["tets"], mesh.tets.len());
+            let volume: f64 = volumes.values().map(|(_, volume)| volume).sum();
+            assert!((found["volume"].as_f64().unwrap() - volume).abs() < 1e-9 * volume, "{found}");
+        }
+    }
 }
 
 #[test]

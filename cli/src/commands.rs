@@ -208,11 +208,13 @@ fn disk_for(formats: &[Format], order: Order, folder: &Path) -> Disk {
         Format::Vol => [58, 40, 42],
         Format::Inp => [65, 40, 25],
         Format::Mfem => [50, 24, 18],
+        Format::Hdf5 => [32, 89, 48],
         Format::Geomview => [0, 0, 30],
         Format::None => [0; 3],
     };
-    let has_short_ids =
-        |format: &Format| !matches!(format, Format::Vtu | Format::Mfem | Format::Geomview | Format::None);
+    let has_short_ids = |format: &Format| {
+        matches!(format, Format::Elmer | Format::Msh | Format::Medit | Format::Vol | Format::Inp)
+    };
     let sum = |sum: [u64; 3], more: [u64; 3]| [0, 1, 2].map(|k| sum[k] + more[k]);
     Disk {
         folder: std::path::absolute(folder).unwrap_or_else(|_| folder.to_path_buf()),

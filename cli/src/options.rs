@@ -454,6 +454,8 @@ pub enum Format {
     Inp,
     /// MFEM, parallel: DIR/NAME.000000 and so on, one file for each part
     Mfem,
+    /// HDF5, DIR/NAME.h5 and DIR/NAME.xdmf: all parts in one file for ParaView, DOLFINx, PETSc
+    Hdf5,
     /// Geomview OFF: the boundary, coloured by part
     Geomview,
     /// Nothing

@@ -92,9 +92,15 @@ fn parts_of_second_order_are_repartitioned_unchanged() {
     let dir = tempfile::tempdir().unwrap();
     let [from, to, report] = ["from", "to", "report.json"].map(|name| dir.path().join(name));
     let mut command = tetmill();
-    succeed(command.arg("generate").arg(own("dome")).args(["--order", "2", "-n", "3", "-q", "-o"]).arg(&from));
+    succeed(
+        command.arg("generate").arg(own("dome")).args(["--order", "2", "-n", "3", "-q", "-o"]).arg(&from),
+    );
     let mut command = tetmill();
-    command.arg("repartition").arg(&from).args(["-n", "5", "-q", "--halo", "faces", "--check", "-o"]).arg(&to);
+    command
+        .arg("repartition")
+        .arg(&from)
+        .args(["-n", "5", "-q", "--halo", "faces", "--check", "-o"])
+        .arg(&to);
     succeed(command.arg("--report").arg(&report));
     succeed(tetmill().arg("check").arg(&to));
     let read = quality(&[&from, &to]);

@@ -4,7 +4,7 @@ use pyo3::prelude::*;
 use std::path::PathBuf;
 use tetmill::comm::Communicator;
 use tetmill::error::Error;
-use tetmill::files::{Written, elmer, geomview, mfem, serial, vtu};
+use tetmill::files::{Written, elmer, geomview, hdf5, mfem, serial, vtu};
 use tetmill::mesh::{By, MeshStream, Names, Watched, WithHalo, halo};
 use tetmill::progress::{Progress, Stage};
 
@@ -62,6 +62,7 @@ pub fn write(
             "vol" => joined(part, serial::Format::Netgen),
             "inp" => joined(part, serial::Format::Abaqus),
             "mfem" => mfem::write(comm, part, names, &target.path),
+            "hdf5" => hdf5::write(comm, part, names, &target.path),
             _ => geomview::write(comm, part, &geomview::Settings::default(), &target.path),
         }
     });

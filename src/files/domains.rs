@@ -39,7 +39,7 @@ pub(super) fn find(comm: &dyn Communicator, whole: &Whole) -> Result<Domains, Wr
     whole.by_patch.visit(whole.part, |block, first| {
         let [behind, in_front] = block.bodies;
         for (place, triangle) in (first..).zip(&block.triangles) {
-            let mut key = triangle.map(|v| u64::from(whole.numbering.vertices[v as usize]));
+            let mut key = triangle.map(|v| whole.numbering.vertex(v));
             key.sort_unstable();
             let directory = (key[0] % ranks as u64) as usize;
             if whole.left_out.contains(place) {

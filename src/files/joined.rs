@@ -95,9 +95,8 @@ impl<'a> Whole<'a> {
         let totals = Counts { boundary, ..part.totals() };
         let own_singular = part.singular().vertices;
         let own_singular = own_singular.iter().filter(|(local, _)| numbering.owns(*local as usize));
-        let own_singular: Vec<[i64; 2]> = own_singular
-            .map(|&(local, factor)| [numbering.vertices[local as usize].into(), factor.into()])
-            .collect();
+        let own_singular: Vec<[i64; 2]> =
+            own_singular.map(|&(local, factor)| [numbering.vertex(local) as i64, factor.into()]).collect();
         let mut singular: Vec<[i64; 2]> = comm.gather(0, &own_singular)?.concat();
         singular.sort_unstable();
         let singular_vertices = singular.iter().map(|&[number, k]| (number as u64, k as i32)).collect();
@@ -122,7 +121,7 @@ impl<'a> Whole<'a> {
 
     /// Appends the number of a vertex after a blank.
     fn id(&self, line: &mut Line, vertex: u32) {
-        line.blank().int(self.numbering.vertices[vertex as usize].into());
+        line.blank().int(self.numbering.vertex(vertex));
     }
 
     /// Appends the numbers of a tet's nodes, those on edges in the given order.
@@ -161,7 +160,7 @@ impl<'a> Whole<'a> {
             Section::Vertices(format) => {
                 let is_own = |local| self.numbering.owns(local);
                 lines::vertices(self.part, file, is_own, |line, vertex| {
-                    format(line, self.numbering.vertices[vertex.index].into(), vertex.point);
+                    format(line, self.numbering.vertex(vertex.index as u32), vertex.point);
                 })
             }
             Section::Triangles(format) => lines::triangles(

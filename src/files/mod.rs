@@ -8,6 +8,7 @@
 //! serial    FILE.{msh,mesh,vol,inp}                       Gmsh, Medit, NETGEN, Abaqus: all parts in one file
 //!           FILE.{vtu,off}                                one part, format by extension
 //! mfem      a text for each rank, in memory or in a file  MFEM, parallel
+//! hdf5      STEM.h5, STEM.xdmf                            one HDF5 file for VTK, DOLFINx and PETSc
 //! ```
 //! All writers of files use `output`: files are written to a temporary folder beside the target,
 //! and replace the old ones when every rank has finished. A writer that fails leaves the old files
@@ -21,6 +22,7 @@ mod corners;
 mod domains;
 pub mod elmer;
 pub mod geomview;
+pub mod hdf5;
 pub(crate) mod input;
 mod joined;
 #[cfg(test)]

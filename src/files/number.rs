@@ -1,4 +1,4 @@
-//! Numbers of entities in text files: from 1 without gaps, and contiguous per part. Elmer sizes its
+//! Numbers of entities in files: from 1 without gaps, and contiguous per part. Elmer sizes its
 //! tables by the range of ids in a part, and formats that number vertices by their order in the
 //! file need the vertices of a part to be contiguous.
 
@@ -12,12 +12,16 @@ use std::ops::Range;
 /// The numbers of one part's entities, from 1; ghosts have the numbers of their own part.
 #[derive(Debug)]
 pub(super) struct Numbering {
-    /// By local vertex index.
-    pub vertices: Vec<u32>,
+    /// By local vertex index: its place among the vertices that this part owns, which have
+    /// consecutive numbers; or behind these, among `copies`. So a number that may have 64 bits
+    /// takes 32, except on interfaces.
+    places: Vec<u32>,
     /// The numbers of the vertices that this part owns.
-    owned: Range<u64>,
+    pub owned: Range<u64>,
+    /// The numbers of the others, in local order.
+    copies: Vec<u64>,
     /// The number of the part's first tet; the others follow in local order.
-    first_tet: u64,
+    pub first_tet: u64,
     /// Index of the first ghost tet, and the numbers of ghost tets.
     ghosts: (u64, Vec<u64>),
     /// Number of vertices of this part, or of its ghosts, that other parts have too.
@@ -27,7 +31,16 @@ pub(super) struct Numbering {
 impl Numbering {
     /// Whether this part owns the vertex with this local index.
     pub fn owns(&self, local: usize) -> bool {
-        self.owned.contains(&self.vertices[local].into())
+        u64::from(self.places[local]) < self.owned.end - self.owned.start
+    }
+
+    /// The number of the vertex with this local index.
+    pub fn vertex(&self, local: u32) -> u64 {
+        let place = u64::from(self.places[local as usize]);
+        match place.checked_sub(self.owned.end - self.owned.start) {
+            None => self.owned.start + place,
+            Some(copy) => self.copies[copy as usize],
+        }
     }
 
     /// The number of a tet by its index within the part.
@@ -44,26 +57,30 @@ impl Numbering {
 /// in rank order, entities in local order.
 ///
 /// Takes two gathers of counts and one message to each neighbour, 16 bytes for each copy of a
-/// vertex. Callers ensure that the totals fit 32 bits.
+/// vertex.
 pub(super) fn number(comm: &dyn Communicator, part: &dyn MeshStream) -> Result<Numbering, WriteError> {
     let rank = part.rank();
-    let mut vertices = vec![0; part.counts().vertices as usize];
-    let mut owned = 0;
-    let mut shared = 0;
+    let mut places = vec![0; part.counts().vertices as usize];
+    let (mut owned, mut shared) = (0, 0);
     for_each_vertex(part, |local, id, block| {
         shared += u64::from(!block.holders.is_empty() || !watchers(part, local).is_empty());
         if block.owner(id, rank) == rank {
+            places[local as usize] = owned;
             owned += 1;
-            vertices[local as usize] = owned;
+        }
+    });
+    let mut next = owned;
+    for_each_vertex(part, |local, id, block| {
+        if block.owner(id, rank) != rank {
+            places[local as usize] = next;
+            next += 1;
         }
     });
 
     let own_tets = part.ghosts().map_or(part.counts().tets, |ghosts| ghosts.first_tet);
     let [vertices_before] = comm.exclusive_scan([u64::from(owned)])?;
-    for number in vertices.iter_mut().filter(|number| **number > 0) {
-        *number += vertices_before as u32;
-    }
-    receive_numbers(comm, part, &mut vertices)?;
+    let owned = vertices_before + 1..vertices_before + 1 + u64::from(owned);
+    let copies = receive_numbers(comm, part, |local| owned.start + u64::from(places[local as usize]))?;
     let mut next = 1;
     let first_tets = comm.all_gather_one(own_tets)?.into_iter().map(|tets| {
         next += tets;
@@ -72,14 +89,8 @@ pub(super) fn number(comm: &dyn Communicator, part: &dyn MeshStream) -> Result<N
     let first_tets: Vec<u64> = first_tets.collect();
     let of_ghost = |tet: &GhostTet| first_tets[tet.owner as usize] + tet.index;
     let numbers = part.ghosts().map(|ghosts| ghosts.tets.iter().map(of_ghost).collect()).unwrap_or_default();
-    let owned = vertices_before + 1..vertices_before + 1 + u64::from(owned);
-    Ok(Numbering {
-        vertices,
-        owned,
-        first_tet: first_tets[rank as usize],
-        ghosts: (own_tets, numbers),
-        shared,
-    })
+    let first_tet = first_tets[rank as usize];
+    Ok(Numbering { places, owned, copies, first_tet, ghosts: (own_tets, numbers), shared })
 }
 
 /// The ranks that have a vertex in ghost tets only.
@@ -97,36 +108,38 @@ fn for_each_vertex(part: &dyn MeshStream, mut f: impl FnMut(u32, GlobalId, &Vert
     }
 }
 
-/// **Collective.** Owners send the numbers of shared vertices to the ranks that have copies or
-/// ghosts of them.
+/// **Collective.** Owners send the numbers of shared vertices, `own_number` of their local indices,
+/// to the ranks that have copies or ghosts of them. Returns the received ones in local order.
 fn receive_numbers(
     comm: &dyn Communicator,
     part: &dyn MeshStream,
-    vertices: &mut [u32],
-) -> Result<(), WriteError> {
+    own_number: impl Fn(u32) -> u64,
+) -> Result<Vec<u64>, WriteError> {
     let rank = part.rank();
     let mut to_each: Vec<Vec<u64>> = vec![Vec::new(); part.ranks() as usize];
+    // The ids of the copies, with their places in local order.
     let mut missing: Vec<(GlobalId, u32)> = Vec::new();
     for_each_vertex(part, |local, id, block| {
         if block.owner(id, rank) == rank {
             let others = block.holders.iter().filter(|&&holder| holder != rank);
             for &other in others.chain(watchers(part, local)) {
-                to_each[other as usize].extend([id, u64::from(vertices[local as usize])]);
+                to_each[other as usize].extend([id, own_number(local)]);
             }
         } else {
-            missing.push((id, local));
+            missing.push((id, missing.len() as u32));
         }
     });
     missing.sort_unstable();
 
     let messages = (0..).zip(to_each).filter(|(_, numbers)| !numbers.is_empty()).collect();
+    let mut copies = vec![0; missing.len()];
     let mut received = 0;
     for (from, numbers) in comm.exchange::<u64>(messages)? {
         for pair in numbers.chunks_exact(2) {
             let place = missing.binary_search_by_key(&pair[0], |(id, _)| *id).unwrap_or_else(|_| {
                 panic!("rank {from} sends the number of vertex {}, which rank {rank} does not have", pair[0])
             });
-            vertices[missing[place].1 as usize] = pair[1] as u32;
+            copies[missing[place].1 as usize] = pair[1];
             received += 1;
         }
     }
@@ -135,5 +148,5 @@ fn receive_numbers(
         missing.len(),
         "rank {rank} has shared vertices whose numbers their owners do not send"
     );
-    Ok(())
+    Ok(copies)
 }

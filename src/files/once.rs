@@ -30,10 +30,28 @@ impl LeftOut {
     }
 }
 
+/// Boundary triangles between this part and others.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Between {
+    /// Those that the other part writes.
+    pub left_out: LeftOut,
+    /// Those that this part writes, by ascending index in it, with the number of the other part's
+    /// tet.
+    beside: Vec<[u64; 2]>,
+}
+
+impl Between {
+    /// The number of the tet of another part at the triangle with this index in the part.
+    pub fn tet_beside(&self, place: u64) -> Option<u64> {
+        let found = self.beside.binary_search_by_key(&place, |triangle| triangle[0]);
+        found.ok().map(|at| self.beside[at][1])
+    }
+}
+
 /// The message to the directory rank of a triangle: its ascending global ids, the body number of
-/// its tet, the side of that tet (0 behind, 1 in front), and the triangle's index in the sender's
-/// part.
-type Message = [u64; 6];
+/// its tet, the side of that tet (0 behind, 1 in front), the triangle's index in the sender's part,
+/// and the tet's number.
+type Message = [u64; 7];
 
 /// **Collective.** Finds the boundary triangles of this part that another part writes. The messages
 /// have the size of the interfaces between bodies that are also cuts between parts.
@@ -45,10 +63,21 @@ pub(crate) fn left_out(
     part: &dyn MeshStream,
     names: &Names,
 ) -> Result<LeftOut, WriteError> {
+    Ok(between(comm, part, names, 0)?.left_out)
+}
+
+/// **Collective.** Like [`left_out`], with the tets of other parts at the triangles that this part
+/// writes; `first_tet` is the number of the part's first tet.
+pub(crate) fn between(
+    comm: &dyn Communicator,
+    part: &dyn MeshStream,
+    names: &Names,
+    first_tet: u64,
+) -> Result<Between, WriteError> {
     if part.ranks() == 1 {
-        return Ok(LeftOut::default());
+        return Ok(Between::default());
     }
-    let candidates = comm.agree(candidates(part, names))?;
+    let candidates = comm.agree(candidates(part, names, first_tet))?;
     let mut to_each: Vec<Vec<Message>> = vec![Vec::new(); comm.size() as usize];
     for message in candidates {
         to_each[(message[0] % u64::from(comm.size())) as usize].push(message);
@@ -59,23 +88,26 @@ pub(crate) fn left_out(
     }
     // The first copy writes: that of the higher body; for equal bodies (a sheet inside one) that
     // with the tet behind.
-    received.sort_unstable_by_key(|([a, b, c, body, side, _], from)| {
+    received.sort_unstable_by_key(|([a, b, c, body, side, ..], from)| {
         ([*a, *b, *c], std::cmp::Reverse(*body), *side, *from)
     });
-    let mut replies: Vec<Vec<u64>> = vec![Vec::new(); comm.size() as usize];
+    // The triangle's index, and the number of the other tet for the part that writes.
+    let mut replies: Vec<Vec<[u64; 2]>> = vec![Vec::new(); comm.size() as usize];
     for copies in received.chunk_by(|a, b| a.0[..3] == b.0[..3]) {
-        for ([.., place], from) in &copies[1..] {
-            replies[*from as usize].push(*place);
+        for (k, ([.., place, _], from)) in copies.iter().enumerate() {
+            let tet = if k == 0 { copies.get(1).map(|([.., tet], _)| *tet) } else { Some(NO_TET) };
+            replies[*from as usize].extend(tet.map(|tet| [*place, tet]));
         }
     }
-    let mut places = comm.all_to_all(replies)?.concat();
-    places.sort_unstable();
-    Ok(LeftOut(places))
+    let mut replies = comm.all_to_all(replies)?.concat();
+    replies.sort_unstable();
+    let (left_out, beside): (Vec<_>, Vec<_>) = replies.into_iter().partition(|[_, tet]| *tet == NO_TET);
+    Ok(Between { left_out: LeftOut(left_out.into_iter().map(|[place, _]| place).collect()), beside })
 }
 
 /// The triangles that another part may have: one tet here, and all vertices shared with one other
 /// rank.
-fn candidates(part: &dyn MeshStream, names: &Names) -> Result<Vec<Message>, WriteError> {
+fn candidates(part: &dyn MeshStream, names: &Names, first_tet: u64) -> Result<Vec<Message>, WriteError> {
     let mut candidates = Vec::new();
     let mut block = BoundaryBlock::default();
     let mut first = 0;
@@ -89,7 +121,7 @@ fn candidates(part: &dyn MeshStream, names: &Names) -> Result<Vec<Message>, Writ
             };
             if let Some([a, b, c]) = ids_if_shared(part, triangle) {
                 let body = super::body_number(block.bodies[side], names)?;
-                candidates.push([a, b, c, body, side as u64, place]);
+                candidates.push([a, b, c, body, side as u64, place, first_tet + parents[side]]);
             }
         }
         first += block.triangles.len() as u64;

@@ -28,7 +28,7 @@ pub(super) fn pairs(
         }
         for (local, id) in block.local.clone().zip(block.ids()) {
             if numbering.owns(local as usize) {
-                numbers[(id % ranks) as usize].push([id, numbering.vertices[local as usize].into()]);
+                numbers[(id % ranks) as usize].push([id, numbering.vertex(local)]);
             }
         }
     }
@@ -36,8 +36,8 @@ pub(super) fn pairs(
     for (index, link) in part.links().iter().enumerate() {
         for (local, of) in part.images(index) {
             if numbering.owns(local as usize) {
-                let number = numbering.vertices[local as usize];
-                requests[(of % ranks) as usize].push([of, number.into(), key(index, link)]);
+                let number = numbering.vertex(local);
+                requests[(of % ranks) as usize].push([of, number, key(index, link)]);
             }
         }
     }

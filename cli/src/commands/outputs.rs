@@ -5,7 +5,7 @@ use crate::options::{Format, RunOptions};
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use tetmill::files::elmer::Layout;
-use tetmill::files::{Destination, WriteError, elmer, folder_of, is_same_place, remove_abandoned};
+use tetmill::files::{Destination, WriteError, elmer, folder_of, hdf5, is_same_place, remove_abandoned};
 
 /// The files that a command reads and writes, with the options that name them.
 #[derive(Default)]
@@ -208,6 +208,7 @@ fn entries(format: Format, folder: &Path, stem: &Path, parts: u32) -> Vec<PathBu
             let ends: Vec<String> = (0..parts).map(|rank| format!(".{rank:06}")).collect();
             named(&ends.iter().map(String::as_str).collect::<Vec<_>>())
         }
+        (Format::Hdf5, _) => named(&hdf5::ENDINGS),
         (Format::Geomview, 1) => named(&[".off"]),
         (Format::Geomview, _) => named(&[".list", ".parts"]),
     }

@@ -79,6 +79,7 @@ pub(super) fn write_formats(
             Format::Vol => joined(".vol", serial::Format::Netgen)?,
             Format::Inp => joined(".inp", serial::Format::Abaqus)?,
             Format::Mfem => files::mfem::write(comm, part, names, stem)?,
+            Format::Hdf5 => files::hdf5::write(comm, part, names, stem)?,
             Format::Geomview => {
                 files::geomview::write(comm, part, &files::geomview::Settings::default(), stem)?
             }
@@ -96,7 +97,7 @@ fn passes(format: &Format) -> u64 {
         Format::Msh | Format::Medit | Format::Vol => 2,
         // For the tets beside the boundary, or for shared edges and faces, and for the file.
         Format::Inp | Format::Mfem => 3,
-        Format::Elmer | Format::Vtu | Format::Geomview => 1,
+        Format::Elmer | Format::Vtu | Format::Hdf5 | Format::Geomview => 1,
     }
 }
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from ._distributed import DolfinxMesh
 
-_FORMATS = ("elmer", "vtu", "msh", "medit", "vol", "inp", "mfem", "geomview")
+_FORMATS = ("elmer", "vtu", "msh", "medit", "vol", "inp", "mfem", "hdf5", "geomview")
 _ENDINGS = {
     ".vtu": "vtu",
     ".pvtu": "vtu",
@@ -264,7 +264,7 @@ class Mesh:
     def write(
         self,
         path: str | os.PathLike[str],
-        format: Literal["elmer", "vtu", "msh", "medit", "vol", "inp", "mfem", "geomview"] | None = None,
+        format: Literal["elmer", "vtu", "msh", "medit", "vol", "inp", "mfem", "hdf5", "geomview"] | None = None,
         *,
         boundary: Literal["beside", "in"] = "beside",
         halo: Literal["faces", "vertices"] | None = None,
@@ -275,7 +275,8 @@ class Mesh:
         Args:
             path: A file, whose ending selects the format: .vtu (also .pvtu), .msh (Gmsh), .mesh
                 (Medit), .vol (NETGEN), .inp (Abaqus, CalculiX), .off (the boundary alone). A folder for "elmer". For "mfem" the files
-                `path.000000` and so on, one for each part, which MFEM's `ParMesh` reads.
+                `path.000000` and so on, one for each part, which MFEM's `ParMesh` reads. For "hdf5" the files
+                `path.h5` and `path.xdmf` with all parts.
             format: The format, whatever the ending.
             boundary: Where VTU stores boundary triangles: "beside" in files of their own, "in" the
                 same file.

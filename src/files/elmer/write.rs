@@ -106,13 +106,13 @@ fn check_shared_lines(part: &dyn MeshStream, numbering: &Numbering) -> Result<()
     for index in 0..part.vertex_blocks() {
         let block = part.vertex_block(index);
         let Some(last) = block.local.end.checked_sub(1).filter(|_| !block.local.is_empty()) else { continue };
-        let longest = block.local.map(|v| numbering.vertices[v as usize]).max().unwrap_or(0);
-        check_shared_line(block.holders, &[], longest, numbering.vertices[last as usize])?;
+        let longest = block.local.map(|v| numbering.vertex(v)).max().unwrap_or(0);
+        check_shared_line(block.holders, &[], longest, numbering.vertex(last))?;
     }
     let Some(ghosts) = part.ghosts() else { return Ok(()) };
     for (k, &local) in ghosts.watched.iter().enumerate() {
         let block = part.vertex_block(vertex_block_of(part, local));
-        let number = numbering.vertices[local as usize];
+        let number = numbering.vertex(local);
         check_shared_line(block.holders, ghosts.watchers.get(k), number, number)?;
     }
     Ok(())
@@ -123,14 +123,14 @@ fn check_shared_lines(part: &dyn MeshStream, numbering: &Numbering) -> Result<()
 fn check_shared_line(
     holders: &[Rank],
     watchers: &[Rank],
-    longest: u32,
-    vertex: u32,
+    longest: u64,
+    vertex: u64,
 ) -> Result<(), WriteError> {
     let count = holders.len() + watchers.len();
     let parts: usize = holders.iter().chain(watchers).map(|&rank| 1 + digits(u64::from(rank) + 1)).sum();
-    let characters = digits(longest.into()) + 1 + digits(count as u64) + parts;
+    let characters = digits(longest) + 1 + digits(count as u64) + parts;
     if characters > MAX_LINE.0 || 2 + count > MAX_LINE.1 {
-        return Err(WriteError::SharedLine { vertex: vertex.into(), parts: count, characters });
+        return Err(WriteError::SharedLine { vertex, parts: count, characters });
     }
     Ok(())
 }
@@ -199,7 +199,7 @@ impl Content<'_> {
             &mut file,
             |_| true,
             |line, vertex| {
-                line.int(self.numbering.vertices[vertex.index].into()).bytes(b" -1");
+                line.int(self.numbering.vertex(vertex.index as u32)).bytes(b" -1");
                 vertex.point.iter().for_each(|&x| _ = line.blank().float(x));
             },
         )?;
@@ -242,7 +242,7 @@ impl Content<'_> {
 
     /// Appends the file ids of vertices.
     fn ids(&self, line: &mut Line, vertices: impl Iterator<Item = u32>) {
-        vertices.for_each(|v| _ = line.blank().int(self.numbering.vertices[v as usize].into()));
+        vertices.for_each(|v| _ = line.blank().int(self.numbering.vertex(v)));
     }
 
     fn write_shared(&self, path: &Path) -> Result<u64, WriteError> {
@@ -264,7 +264,7 @@ impl Content<'_> {
                 let owner = block.owner(id, part.rank());
                 // A vertex that others have only as a ghost has no holders listed: count this part.
                 let count = others + usize::from(block.holders.is_empty());
-                line.int(self.numbering.vertices[local as usize].into()).blank().int(count as u64);
+                line.int(self.numbering.vertex(local)).blank().int(count as u64);
                 line.blank().int(u64::from(owner) + 1);
                 for &other in block.holders.iter().filter(|&&holder| holder != owner).chain(watchers) {
                     line.blank().int(u64::from(other) + 1);

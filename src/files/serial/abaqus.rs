@@ -65,7 +65,7 @@ pub(super) fn sections<'a>(
             }
             line.int(whole.tet(tet));
             let nodes = tet.vertices.iter().copied().chain(arranged(tet.edge_nodes, &VTK));
-            nodes.for_each(|v| _ = line.bytes(b", ").int(whole.numbering.vertices[v as usize].into()));
+            nodes.for_each(|v| _ = line.bytes(b", ").int(whole.numbering.vertex(v)));
         })),
         Section::Own(faces.text().into_bytes()),
         Section::Text(end),
@@ -106,7 +106,7 @@ impl Faces {
         let part = whole.part;
         let mut faces = Self::default();
         let mut beside: Vec<(u64, [u32; 3], u64)> = Vec::new();
-        let number_of = |v: u32| u64::from(whole.numbering.vertices[v as usize]);
+        let number_of = |v: u32| whole.numbering.vertex(v);
         whole.by_patch.visit(part, |block, first| {
             let number = crate::files::patch_number(block.patch, whole.names)?;
             let nodes = faces.nodes.entry(number).or_default();
