@@ -20,6 +20,8 @@ pub(crate) mod color;
 mod domains;
 pub mod elmer;
 pub mod geomview;
+pub mod gmsh4;
+mod groups;
 pub(crate) mod input;
 mod joined;
 #[cfg(test)]
@@ -35,6 +37,7 @@ mod pairs;
 #[cfg(feature = "pictures")]
 pub mod picture;
 pub(crate) mod plain;
+mod runs;
 pub mod serial;
 pub(crate) mod skin;
 pub mod surface;

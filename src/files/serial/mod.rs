@@ -2,9 +2,7 @@
 //! of all ranks.
 
 mod gmsh;
-mod groups;
 mod netgen;
-mod runs;
 
 use super::input::ending;
 use super::joined::{self, Section, TextFormat, Whole};
