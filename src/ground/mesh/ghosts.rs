@@ -26,9 +26,12 @@ pub struct GhostTet {
     /// Its vertices by local index, positively oriented: those of the part, followed by those of
     /// [`Ghosts::vertices`].
     pub vertices: [u32; 4],
+    /// For second order, the nodes on its edges by local index, in the order of
+    /// [`TET_EDGES`](super::TET_EDGES).
+    pub edge_nodes: Option<[u32; 6]>,
 }
 
-/// A vertex that only ghost tets have.
+/// A vertex, or a node on an edge, that only ghost tets have.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GhostVertex {
     /// Its global id.

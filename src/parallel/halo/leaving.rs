@@ -18,6 +18,15 @@ pub(super) struct Tet {
     pub body: BodyId,
     /// By local index.
     pub vertices: [u32; 4],
+    /// For second order, the nodes on its edges by local index.
+    pub edge_nodes: Option<[u32; 6]>,
+}
+
+impl Tet {
+    /// Its vertices, then the nodes on its edges.
+    pub fn nodes(&self) -> impl Iterator<Item = u32> + '_ {
+        self.vertices.iter().chain(self.edge_nodes.iter().flatten()).copied()
+    }
 }
 
 /// A face by the global ids of its vertices, ascending.
@@ -71,7 +80,9 @@ fn each_tet<T: Send>(interface: &Interface, look: impl Fn(&Tet, &mut Vec<T>) + S
             let vertices = block.tet(place).expect("a tet of the block");
             if vertices.iter().any(|&vertex| interface.is_shared(vertex)) {
                 let (index, id) = (block.tets.first_local + place as u64, block.tets.first_id + place as u64);
-                look(&Tet { index, id, body, vertices }, &mut seen);
+                let edge_nodes = block.tets.edge_nodes.get(place);
+                let edge_nodes = edge_nodes.map(|nodes| nodes.map(|k| block.vertices[k as usize]));
+                look(&Tet { index, id, body, vertices, edge_nodes }, &mut seen);
             }
         }
         seen

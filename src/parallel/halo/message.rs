@@ -9,10 +9,11 @@ use crate::ground::mesh::{GlobalId, Rank};
 use csg::BodyId;
 use std::collections::BTreeMap;
 
-/// A ghost tet whose vertices are given by global ids.
+/// A ghost tet whose vertices and nodes on edges are given by global ids.
 pub(super) struct Named {
     pub tet: GhostTet,
     pub vertices: [GlobalId; 4],
+    pub edge_nodes: Option<[GlobalId; 6]>,
 }
 
 /// The content of a message.
@@ -25,7 +26,7 @@ pub(super) struct Message {
 /// The vertices of the tets that rank `to` does not have: local indices, ascending.
 pub(super) fn unknown(interface: &Interface, to: Rank, tets: &[Tet]) -> Vec<u32> {
     let is_unknown = |vertex: &u32| interface.holders(*vertex).binary_search(&to).is_err();
-    let mut vertices: Vec<u32> = tets.iter().flat_map(|tet| tet.vertices).filter(is_unknown).collect();
+    let mut vertices: Vec<u32> = tets.iter().flat_map(Tet::nodes).filter(is_unknown).collect();
     vertices.sort_unstable();
     vertices.dedup();
     vertices
@@ -53,8 +54,7 @@ pub(super) fn write(
     put(&mut message, &holders.flatten().copied().collect::<Vec<Rank>>());
     put(&mut message, &tets.iter().map(|tet| [tet.id, tet.index]).collect::<Vec<[u64; 2]>>());
     put(&mut message, &tets.iter().map(|tet| tet.body.0).collect::<Vec<u32>>());
-    let named = tets.iter().map(|tet| tet.vertices.map(|vertex| id(&vertex)));
-    put(&mut message, &named.collect::<Vec<[GlobalId; 4]>>());
+    put(&mut message, &tets.iter().flat_map(Tet::nodes).map(|node| id(&node)).collect::<Vec<GlobalId>>());
     message
 }
 
@@ -75,7 +75,8 @@ fn places(interface: &Interface, vertices: &[u32]) -> (Vec<[f64; 3]>, Vec<u8>) {
     (points, on_boundary)
 }
 
-/// Reads a message of rank `from`; the tets' `vertices` are not set yet.
+/// Reads a message of rank `from`; the tets' `vertices` and `edge_nodes` are not set
+/// yet.
 pub(super) fn read(from: Rank, message: &[u8]) -> Message {
     let rest = &mut &message[..];
     let ids: Vec<GlobalId> = take(rest);
@@ -95,10 +96,14 @@ pub(super) fn read(from: Rank, message: &[u8]) -> Message {
     }
     let ids: Vec<[u64; 2]> = take(rest);
     let bodies: Vec<u32> = take(rest);
-    let named: Vec<[GlobalId; 4]> = take(rest);
-    let tet = |((&[id, index], &body), &vertices): ((&[u64; 2], &u32), &[GlobalId; 4])| Named {
-        tet: GhostTet { id, owner: from, index, body: BodyId(body), vertices: [0; 4] },
-        vertices,
+    let nodes: Vec<GlobalId> = take(rest);
+    // Of all tets 4 nodes, or of all 10.
+    let per_tet = nodes.len() / ids.len().max(1);
+    let tet = |((&[id, index], &body), nodes): ((&[u64; 2], &u32), &[GlobalId])| Named {
+        tet: GhostTet { id, owner: from, index, body: BodyId(body), vertices: [0; 4], edge_nodes: None },
+        vertices: nodes[..4].try_into().expect("a tet has four vertices"),
+        edge_nodes: nodes[4..].try_into().ok(),
     };
-    Message { vertices, tets: ids.iter().zip(&bodies).zip(&named).map(tet).collect() }
+    let nodes = nodes.chunks_exact(per_tet.max(1));
+    Message { vertices, tets: ids.iter().zip(&bodies).zip(nodes).map(tet).collect() }
 }

@@ -9,7 +9,7 @@
 //! and [`WithHalo`] streams both: the blocks of the part, then those of the ghosts.
 //!
 //! Each rank sends tets with shared vertices to the neighbouring ranks, with the data of vertices
-//! that these do not have. This takes one exchange; by faces another one before it, because ranks
+//! that these do not have, among them the nodes on edges of second order. This takes one exchange; by faces another one before it, because ranks
 //! that have the three vertices of a face need not have the face. A rank **watches** a vertex if it
 //! has the vertex in ghosts only. It notifies the owner, which notifies all holders and watchers,
 //! because Elmer's files list them all. Ghosts are numbered by global ids, so nothing depends on
@@ -112,8 +112,12 @@ fn numbered(interface: &Interface, messages: Vec<Message>) -> Result<Ghosts, Hal
         Ok(place) => first_vertex + place as u32,
         Err(_) => interface.find(id).unwrap_or_else(|| panic!("vertex {id} of a ghost was not sent")),
     };
-    let tets =
-        named.iter().map(|named| GhostTet { vertices: named.vertices.map(find), ..named.tet }).collect();
+    let tet = |named: &message::Named| GhostTet {
+        vertices: named.vertices.map(find),
+        edge_nodes: named.edge_nodes.map(|nodes| nodes.map(find)),
+        ..named.tet
+    };
+    let tets = named.iter().map(tet).collect();
     let mut ghosts = Ghosts { first_vertex, first_tet: counts.tets, tets, ..Ghosts::default() };
     for (vertex, holders) in vertices {
         ghosts.vertices.push(vertex);

@@ -5,7 +5,7 @@ use crate::ground::mesh::periodic::Link;
 use crate::ground::mesh::stream::{
     BoundaryBlock, Counts, LocalBlock, MeshStream, SingularTags, TetBlock, VertexBlock,
 };
-use crate::ground::mesh::{GlobalId, Rank};
+use crate::ground::mesh::{GlobalId, Order, Rank};
 use crate::ground::progress::Work;
 use std::borrow::Cow;
 
@@ -35,6 +35,10 @@ impl MeshStream for WithHalo<'_> {
 
     fn ranks(&self) -> u32 {
         self.part.ranks()
+    }
+
+    fn order(&self) -> Order {
+        self.part.order()
     }
 
     fn counts(&self) -> Counts {
@@ -87,6 +91,8 @@ impl MeshStream for WithHalo<'_> {
         let tet = &self.ghosts.tets[ghost];
         block.tets.clear();
         block.tets.push(tet.vertices);
+        block.edge_nodes.clear();
+        block.edge_nodes.extend(tet.edge_nodes);
         block.first_id = tet.id;
         block.first_local = self.ghosts.first_tet + ghost as u64;
         block.body = Some(tet.body);
@@ -100,6 +106,10 @@ impl MeshStream for WithHalo<'_> {
         block.vertices.clear();
         block.vertices.extend(block.tets.tets[0]);
         block.tets.tets[0] = [0, 1, 2, 3];
+        if let Some(nodes) = block.tets.edge_nodes.first_mut() {
+            block.vertices.extend(*nodes);
+            *nodes = [4, 5, 6, 7, 8, 9];
+        }
     }
 
     fn block_ids(&self, block: &LocalBlock, ids: &mut Vec<GlobalId>) {
