@@ -13,7 +13,8 @@
 //! ```
 //! Tags of nodes and tets are their global ids plus one, in the files of parts too; a shared node
 //! is in the files of all its parts. A triangle between two parts is in one of them (see
-//! [`once`](super::once)). A mesh of one part has no `$PartitionedEntities`.
+//! [`once`](super::once)). A mesh of one part has no
+//! `$PartitionedEntities` and no ghosts.
 //!
 //! In the file of all parts each rank writes its shares of the sections, at offsets that follow
 //! from their lengths. Numbers in binary files have 64 bits.
@@ -242,7 +243,7 @@ fn sections<'a>(share: &'a Share, counts: &Counts, head: Vec<u8>) -> Vec<Section
         }
         last = "Periodic";
     }
-    if part.ghosts().is_some() {
+    if part.ghosts().is_some() && share.plan.is_partitioned() {
         list.push(between(Some(last), "GhostElements", &[counts.ghosts], storage));
         list.push(Section::Ghosts(&share.ghosts));
         last = "GhostElements";

@@ -2,10 +2,11 @@ use super::*;
 use crate::files::testing::{cube, names, scattered, slabs, together, two_tets};
 use crate::files::volume;
 use crate::ground::kernel::simplex;
-use crate::ground::mesh::{Label, Mesh, Rank};
+use crate::ground::mesh::{Label, Mesh, Order, Rank};
 use crate::parallel::distribution::{BareMesh, distribute};
 use crate::parallel::halo::{By, Ghosts, WithHalo, halo};
 use crate::parallel::migrate::BareStream;
+use crate::parallel::refine::{Settings, fixtures, refine};
 use csg::PatchId;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -224,12 +225,56 @@ fn joined_files_are_read_back_from_binary_and_text_alike() {
                 assert!(off.iter().all(|off| off.abs() < 1e-9), "{off:?}");
                 for (text, binary) in of_text.parts.iter().zip(&of_binary.parts) {
                     let (text, binary) = (read(text), read(binary));
+                    let note = "ghost elements of other partitions left out";
+                    assert_eq!(binary.notes.iter().any(|said| said.ends_with(note)), with_halo && ranks > 1);
                     assert_eq!(text.mesh.tets, binary.mesh.tets);
                     assert_eq!(text.mesh.points, binary.mesh.points);
                 }
             }
         }
     }
+}
+
+#[test]
+fn nodes_on_edges_are_in_the_order_of_gmsh_in_tets_triangles_and_ghosts() {
+    let fixture = fixtures::cube(2, false);
+    let folder = tempfile::tempdir().unwrap();
+    let (path, stem) = (folder.path().join("m.msh"), folder.path().join("m"));
+    let names = Names { bodies: vec![Label::unnamed(1)], patches: (1..=6).map(Label::unnamed).collect() };
+    together(2, |comm| {
+        let whole = (comm.rank() == 0).then(|| (fixture.mesh.clone(), slabs(&fixture.mesh, 2)));
+        let part = distribute(comm, whole).unwrap();
+        let settings = Settings { order: Order::Second, ..Settings::default() };
+        let part = refine(part, &fixture.projector, 2, &settings).unwrap();
+        let ghosts = halo(comm, &part, By::Faces).unwrap();
+        let part = WithHalo::new(&part, &ghosts);
+        write(comm, &part, &names, &path, Storage::Text).unwrap();
+        write_parts(comm, &part, &names, &stem, Storage::Text).unwrap();
+    });
+    let mut elements = Vec::new();
+    for name in ["m.msh", "m_1.msh", "m_2.msh"] {
+        let parsed = parse(&fs::read(folder.path().join(name)).unwrap());
+        let point = |node: &u64| -> Vec<f64> {
+            parsed.nodes[node].split(' ').map(|word| word.parse().unwrap()).collect()
+        };
+        for (_, nodes) in parsed.elements.values() {
+            let edges: &[[usize; 2]] = match nodes.len() {
+                6 => &[[0, 1], [1, 2], [2, 0]],
+                10 => &[[0, 1], [1, 2], [2, 0], [0, 3], [2, 3], [1, 3]],
+                other => panic!("{other} nodes"),
+            };
+            let corners = nodes.len() - edges.len();
+            for (node, [i, j]) in nodes[corners..].iter().zip(edges) {
+                let (node, p, q) = (point(node), point(&nodes[*i]), point(&nodes[*j]));
+                assert!((0..3).all(|axis| (p[axis] + q[axis] - 2.0 * node[axis]).abs() < 1e-12));
+            }
+        }
+        elements.push(parsed.elements.len() - parsed.ghosts.len());
+    }
+    // The joined file has its ghosts among the other elements.
+    let joined = parse(&fs::read(&path).unwrap());
+    assert_eq!(joined.elements.len(), elements[1] + elements[2]);
+    assert!(!joined.ghosts.is_empty());
 }
 
 #[test]
