@@ -1,5 +1,5 @@
-//! VTU files, joined files, Gmsh's files of parts, and MFEM's parallel files, read by MFEM, meshio, scikit-fem, Gmsh and
-//! NGSolve.
+//! VTU files, joined files, Gmsh's files of parts, and MFEM's parallel files, read by MFEM, meshio,
+//! scikit-fem, Gmsh and NGSolve.
 //!
 //! A test is skipped with a message if the Python module is missing.
 

@@ -7,6 +7,7 @@
 //! geomview  STEM.off, or STEM.list with a file per part   the surface, a colour per part
 //! serial    FILE.{msh,mesh,vol}                           Gmsh, Medit, NETGEN: all parts in one file
 //!           FILE.{vtu,off}                                one part, format by extension
+//! gmsh4     FILE.msh, or STEM_K.msh for each part           Gmsh 4.1 with partitions, for deal.II and t8code
 //! mfem      a text for each rank, in memory or in a file  MFEM, parallel
 //! ```
 //! All writers of files use `output`: files are written to a temporary folder beside the target,
@@ -162,7 +163,7 @@ pub enum WriteError {
         parts: u32,
     },
     /// A format that cannot distinguish ghosts from a part's own tets.
-    #[error("{0} has no halo elements; write Elmer or VTU, or leave out the halo")]
+    #[error("{0} has no halo elements; write Elmer, VTU or Gmsh 4.1, or leave out the halo")]
     NoHalo(&'static str),
     /// The observer cancelled the run.
     #[error(transparent)]

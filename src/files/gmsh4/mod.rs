@@ -144,8 +144,8 @@ pub fn write_parts(
     sum_written(comm, written)
 }
 
-/// The length of a share in bytes, roughly for text: coordinates take more than in binary, and small
-/// numbers less.
+/// The length of a share in bytes, roughly for text: coordinates take more than in binary, and
+/// small numbers less.
 fn estimate(share: &Share, sections: &[Section]) -> u64 {
     sections.iter().map(|section| share.binary_length(section)).sum()
 }
