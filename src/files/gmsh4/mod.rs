@@ -37,9 +37,8 @@ use crate::ground::comm::Communicator;
 use crate::ground::mesh::Names;
 use crate::ground::mesh::stream::MeshStream;
 use numbers::end_of;
-use plan::{Plan, extend, owns, range_of_all};
+use plan::{NO_TAGS, Plan, Tags, extend, owns, tags_of_all};
 use sections::{Section, Share, between, head_of_link};
-use std::ops::Range;
 use std::path::Path;
 
 /// How numbers are stored.
@@ -150,9 +149,9 @@ fn estimate(share: &Share, sections: &[Section]) -> u64 {
     sections.iter().map(|section| share.binary_length(section)).sum()
 }
 
-/// The number of nodes of the part, with or without copies, and the range of their tags.
-fn nodes(part: &dyn MeshStream, copies: bool) -> (u64, Range<u64>) {
-    let (mut count, mut tags) = (0, u64::MAX..0);
+/// The number of nodes of the part, with or without copies, and their tags.
+fn nodes(part: &dyn MeshStream, copies: bool) -> (u64, Tags) {
+    let (mut count, mut tags) = (0, NO_TAGS);
     for index in 0..part.vertex_blocks() {
         let block = part.vertex_block(index);
         for id in block.ids().filter(|&id| copies || owns(part, &block, id)) {
@@ -168,10 +167,10 @@ fn nodes(part: &dyn MeshStream, copies: bool) -> (u64, Range<u64>) {
 struct Counts {
     node_blocks: u64,
     nodes: u64,
-    node_tags: Range<u64>,
+    node_tags: Tags,
     element_blocks: u64,
     elements: u64,
-    element_tags: Range<u64>,
+    element_tags: Tags,
     /// By link.
     pairs: Vec<u64>,
     ghosts: u64,
@@ -179,12 +178,12 @@ struct Counts {
 
 impl Counts {
     /// Those of one share.
-    fn of(share: &Share, node_tags: Range<u64>) -> Self {
+    fn of(share: &Share, node_tags: Tags) -> Self {
         let plan = share.plan;
         // Ghosts have tags among those of all tets.
-        let mut element_tags = plan.tet_tags.clone();
+        let mut element_tags = plan.tet_tags;
         if plan.own_triangles > 0 {
-            element_tags.end = plan.first_triangle + plan.own_triangles;
+            element_tags[1] = plan.first_triangle + plan.own_triangles - 1;
         }
         Self {
             node_blocks: u64::from(share.nodes > 0),
@@ -206,10 +205,10 @@ impl Counts {
         Ok(Self {
             node_blocks,
             nodes,
-            node_tags: range_of_all(comm, self.node_tags)?,
+            node_tags: tags_of_all(comm, self.node_tags)?,
             element_blocks,
             elements,
-            element_tags: range_of_all(comm, self.element_tags)?,
+            element_tags: tags_of_all(comm, self.element_tags)?,
             pairs: pairs.collect::<Result<_, _>>()?,
             ghosts,
         })
@@ -219,12 +218,9 @@ impl Counts {
 /// The sections of the file in order.
 fn sections<'a>(share: &'a Share, counts: &Counts, head: Vec<u8>) -> Vec<Section<'a>> {
     let (part, storage) = (share.plan.part, share.storage);
-    let with_tags = |blocks, count, tags: &Range<u64>| match count {
-        0 => [blocks, 0, 0, 0],
-        _ => [blocks, count, tags.start, tags.end - 1],
-    };
-    let of_nodes = with_tags(counts.node_blocks, counts.nodes, &counts.node_tags);
-    let of_elements = with_tags(counts.element_blocks, counts.elements, &counts.element_tags);
+    let with_tags = |blocks, count, [least, largest]: Tags| [blocks, count, least.min(largest), largest];
+    let of_nodes = with_tags(counts.node_blocks, counts.nodes, counts.node_tags);
+    let of_elements = with_tags(counts.element_blocks, counts.elements, counts.element_tags);
     let mut list = vec![
         Section::Once(head),
         between(None, "Nodes", &of_nodes, storage),

@@ -38,7 +38,7 @@ pub(super) struct Plan<'a> {
     /// Tag of the first triangle.
     pub first_triangle: u64,
     /// Tags of the tets of all parts.
-    pub tet_tags: Range<u64>,
+    pub tet_tags: Tags,
     /// Number of tets of this part, without ghosts.
     pub own_tets: u64,
     /// Number of triangles that this part writes.
@@ -65,7 +65,7 @@ impl<'a> Plan<'a> {
         let own = [bodies.len() as u64, patches.len() as u64, own_triangles];
         let [volumes_before, surfaces_before, triangles_before] = comm.exclusive_scan(own)?;
         let [volumes, surfaces] = comm.all_reduce_sum_u64([own[0], own[1]])?;
-        let tet_tags = range_of_all(comm, own_tags)?;
+        let tet_tags = tags_of_all(comm, own_tags)?;
         let [first_volume, first_surface] = [names.bodies.len(), names.patches.len()].map(|n| n as u64 + 1);
         let first_ghosts = first_volume + volumes;
         let largest = (first_ghosts + u64::from(part.ranks())).max(first_surface + surfaces);
@@ -85,7 +85,7 @@ impl<'a> Plan<'a> {
             first_volume: (first_volume + volumes_before) as u32,
             first_surface: (first_surface + surfaces_before) as u32,
             first_ghosts: first_ghosts as u32,
-            first_triangle: tet_tags.end + triangles_before,
+            first_triangle: tet_tags[1] + 1 + triangles_before,
             own_tets: count(&tets),
             own_triangles,
             tets,
@@ -140,23 +140,29 @@ pub(super) fn owns(part: &dyn MeshStream, block: &VertexBlock, id: GlobalId) -> 
     block.owner(id, part.rank()) == part.rank()
 }
 
-/// The least range that contains those of all ranks.
-pub(super) fn range_of_all(comm: &dyn Communicator, own: Range<u64>) -> Result<Range<u64>, WriteError> {
-    let of_all = comm.all_reduce_max_u64([!own.start, own.end])?;
-    Ok(!of_all[0]..of_all[1])
+/// The least and the largest tag.
+pub(super) type Tags = [u64; 2];
+
+/// Of no elements.
+pub(super) const NO_TAGS: Tags = [u64::MAX, 0];
+
+/// **Collective.** The least and the largest tag of all ranks.
+pub(super) fn tags_of_all(comm: &dyn Communicator, [least, largest]: Tags) -> Result<Tags, WriteError> {
+    let [least, largest] = comm.all_reduce_max_u64([!least, largest])?;
+    Ok([!least, largest])
 }
 
-/// Extends a range by tags, which are global ids plus one. An empty range is `u64::MAX..0`.
-pub(super) fn extend(tags: &mut Range<u64>, ids: Range<GlobalId>) {
+/// Adds tags, which are global ids plus one.
+pub(super) fn extend(tags: &mut Tags, ids: Range<GlobalId>) {
     if !ids.is_empty() {
-        *tags = tags.start.min(ids.start + 1)..tags.end.max(ids.end + 1);
+        *tags = [tags[0].min(ids.start + 1), tags[1].max(ids.end)];
     }
 }
 
-/// The runs of the part's own tets by body, and the range of their tags.
-fn runs_of_tets(part: &dyn MeshStream) -> (Runs, Range<u64>) {
+/// The runs of the part's own tets by body, and their tags.
+fn runs_of_tets(part: &dyn MeshStream) -> (Runs, Tags) {
     let first_ghost = part.ghosts().map_or(u64::MAX, |ghosts| ghosts.first_tet);
-    let (mut runs, mut tags) = (Runs::default(), u64::MAX..0);
+    let (mut runs, mut tags) = (Runs::default(), NO_TAGS);
     let mut block = TetBlock::default();
     for index in 0..part.tet_blocks() {
         part.tet_block(index, &mut block);
