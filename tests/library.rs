@@ -265,7 +265,7 @@ fn a_failed_run_has_the_error_of_rank_0_and_options_that_differ_have_their_name(
     let refused = thread::try_run(3, |comm| -> Result<u64, Error> {
         Ok(Mesher::new().levels(11).generate_on(comm, Some(&ball))?.check.tets)
     });
-    assert!(matches!(refused, Err(Error::Refine(RefineError::Pieces { n: 2048 }))), "{refused:?}");
+    assert!(matches!(refused, Err(Error::Refine(RefineError::Pieces { n: 2048, .. }))), "{refused:?}");
     let refused = thread::try_run(3, |comm| -> Result<u64, Error> {
         Ok(Mesher::new().levels(comm.rank()).generate_on(comm, Some(&ball))?.check.tets)
     });
