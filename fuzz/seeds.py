@@ -103,6 +103,12 @@ def gmsh():
     partitioned = ("$PartitionedEntities\n2 0\n0 0 1 1\n9 3 4 2 1 2 0 0 0 1 1 1 0 0\n"
                    "5 3 4 1 1 0 0 0 1 1 1 1 7 0\n$EndPartitionedEntities\n")
     save("msh", "41_parts", text.replace("$Nodes", partitioned + "$Nodes"))
+    # One of two parts: a tet of its own and a ghost.
+    ghosts = ("$PartitionedEntities\n2\n1\n6 1\n0 0 1 1\n9 2 3 1 1 0 0 0 1 1 1 1 5 0\n"
+              "5 3 4 1 1 0 0 0 1 1 1 1 7 0\n$EndPartitionedEntities\n")
+    of_part = text.replace("$Nodes", ghosts + "$Nodes").replace("2 8 1 8\n2 3 2 6\n", "3 8 1 8\n2 9 2 6\n")
+    of_part = of_part.replace("3 4 4 2\n" + numbered(TETS, 1), "3 5 4 1\n0 1 2 3 4\n3 6 4 1\n1 2 3 4 5\n")
+    save("msh", "41_ghosts", of_part + "$GhostElements\n1\n1 2 1 1\n$EndGhostElements\n")
     sizes = lambda *numbers: ints(*numbers, kind="Q")
     binary = b"$MeshFormat\n4.1 1 8\n\x01\0\0\0\n$EndMeshFormat\n$Entities\n" + sizes(0, 0, 1, 1)
     for tag, physical, bounds in [(3, 5, ()), (4, 7, (-3,))]:
@@ -112,6 +118,17 @@ def gmsh():
     for head, items in [((2, 3, 2), FACES), ((3, 4, 4), TETS)]:
         binary += ints(*head) + sizes(len(items)) + b"".join(sizes(1, *(v + 1 for v in item)) for item in items)
     save("msh", "41_binary", binary + b"\n$EndElements\n")
+    section = b"$PartitionedEntities\n" + sizes(2, 1) + ints(6, 1) + sizes(0, 0, 1, 1)
+    for tag, dimension, parent, physical in [(9, 2, 3, 5), (5, 3, 4, 7)]:
+        section += ints(tag, dimension, parent) + sizes(1) + ints(1) + struct.pack("<6d", *[0.5] * 6)
+        section += sizes(1) + ints(physical) + sizes(0)
+    binary = binary.replace(b"$Nodes\n", section + b"\n$EndPartitionedEntities\n$Nodes\n")
+    head = b"$Elements\n"
+    binary = binary[: binary.index(head) + len(head)] + sizes(3, 8, 1, 8)
+    for block, items in [((2, 9, 2), FACES), ((3, 5, 4), TETS[:1]), ((3, 6, 4), TETS[1:])]:
+        binary += ints(*block) + sizes(len(items)) + b"".join(sizes(1, *(v + 1 for v in item)) for item in items)
+    binary += b"\n$EndElements\n$GhostElements\n" + sizes(1, 1) + ints(2) + sizes(1) + ints(1)
+    save("msh", "41_binary_ghosts", binary + b"\n$EndGhostElements\n")
 
 
 def medit():

@@ -11,9 +11,11 @@ use std::process::Command;
 use tetmill::Point;
 use tetmill::comm::{Communicator, thread};
 use tetmill::files::vtu::{self, Field, On};
-use tetmill::files::{hdf5, serial, volume};
+use tetmill::files::{gmsh4, hdf5, serial, volume};
 use tetmill::internals::{PlainPart, simplex};
-use tetmill::mesh::{Arrays, BoundaryTriangle, Class, Label, Mesh, MeshStream, Names, TET_FACES, VertexId};
+use tetmill::mesh::{
+    Arrays, BoundaryTriangle, By, Class, Label, Mesh, MeshStream, Names, TET_FACES, VertexId, WithHalo, halo,
+};
 
 /// Number of elements and total area or volume, by name.
 type Sizes = BTreeMap<String, (u64, f64)>;
@@ -272,6 +274,41 @@ fn gmsh_finds_all_names_and_areas() {
         let Some(found) = GMSH.find(path) else { return };
         assert_alike(&found, &sizes(mesh, names, by_group), case);
     });
+}
+
+#[test]
+fn gmsh_opens_parts_in_one_file_and_in_a_file_for_each_with_the_ghosts_of_the_halo() {
+    use gmsh4::Storage::{Binary, Text};
+    let mesh = squares(2);
+    let names = Names {
+        bodies: vec![several(4, &["solid", "copper"]), several(5, &["solid"])],
+        patches: (0..patch_count(&mesh)).map(groups).collect(),
+    };
+    for (ranks, storage) in [(1, Binary), (1, Text), (4, Binary), (4, Text), (7, Binary)] {
+        let dir = tempfile::tempdir().unwrap();
+        let stem = dir.path().join("box");
+        let rank_of: Vec<u32> = (0..mesh.tets.len()).map(|tet| tet as u32 / 50 % ranks).collect();
+        let ghosts = thread::run(ranks, |comm| {
+            let part = PlainPart::part(&mesh, &rank_of, ranks, comm.rank());
+            let ghosts = halo(comm, &part, By::Vertices).unwrap();
+            let part = WithHalo::new(&part, &ghosts);
+            gmsh4::write(comm, &part, &names, &stem.with_extension("msh"), storage).unwrap();
+            gmsh4::write_parts(comm, &part, &names, &stem, storage).unwrap();
+            ghosts.tets.len()
+        })
+        .unwrap();
+        let Some(printed) = Client("gmsh_parts.py").run(&stem) else { return };
+        let found: serde_json::Value = serde_json::from_str(printed.lines().last().unwrap()).unwrap();
+        assert_eq!(found["partitions"], if ranks == 1 { 0 } else { ranks });
+        assert_eq!(found["ghosts"], serde_json::json!(if ranks == 1 { Vec::new() } else { ghosts }));
+        let found = ["boundaries", "bodies"].map(|kind| serde_json::from_value(found[kind].clone()).unwrap());
+        assert_alike(&found, &sizes(&mesh, &names, by_group), &format!("{ranks} ranks, {storage:?}"));
+        if ranks == 1 {
+            // meshio refuses partitions, those of Gmsh too.
+            let Some(found) = MESHIO.find(&stem.with_extension("msh")) else { return };
+            assert_alike(&found, &sizes(&mesh, &names, by_group), "meshio");
+        }
+    }
 }
 
 #[test]

@@ -204,6 +204,7 @@ fn disk_for(formats: &[Format], order: Order, folder: &Path) -> Disk {
         Format::Elmer => [60, 40, 40],
         Format::Vtu => [32, 44, 30],
         Format::Msh => [65, 60, 50],
+        Format::Msh4 | Format::Msh4Parts => [32, 40, 32],
         Format::Medit => [60, 40, 30],
         Format::Vol => [58, 40, 42],
         Format::Inp => [65, 40, 25],
@@ -218,7 +219,7 @@ fn disk_for(formats: &[Format], order: Order, folder: &Path) -> Disk {
     let sum = |sum: [u64; 3], more: [u64; 3]| [0, 1, 2].map(|k| sum[k] + more[k]);
     Disk {
         folder: std::path::absolute(folder).unwrap_or_else(|_| folder.to_path_buf()),
-        // Six more nodes of a tet, three of a triangle, of some seven digits.
+        // Six more nodes of a tet, three of a triangle, of some seven digits or eight bytes.
         bytes: formats
             .iter()
             .map(bytes)
@@ -227,7 +228,7 @@ fn disk_for(formats: &[Format], order: Order, folder: &Path) -> Disk {
                 _ => [vertex, tet, triangle],
             })
             .fold([0; 3], sum),
-        // Formats other than VTU have 32-bit ids.
+        // These formats have 32-bit ids.
         most: formats.iter().any(has_short_ids).then_some(i32::MAX as u64),
     }
 }

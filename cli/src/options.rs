@@ -148,9 +148,12 @@ pub struct RunOptions {
     #[arg(long, value_enum, value_name = "WHERE")]
     pub boundary: Option<Boundary>,
     /// Write one layer of neighbouring tets with each part: halo elements in Elmer, ghost cells in
-    /// VTU
+    /// VTU, ghost elements in msh4 and msh4-parts
     #[arg(long, value_enum, value_name = "BY")]
     pub halo: Option<Halo>,
+    /// Write msh4 and msh4-parts as text [default: binary]
+    #[arg(long)]
+    pub ascii: bool,
     /// Write an Elmer mesh even if periodic faces and their copies are in different parts, where
     /// Elmer's `Periodic BC` gives wrong results
     #[arg(long)]
@@ -444,8 +447,12 @@ pub enum Format {
     Elmer,
     /// VTK: one .vtu for each part and a .pvtu
     Vtu,
-    /// Gmsh, DIR/NAME.msh: all parts in one file
+    /// Gmsh, DIR/NAME.msh: all parts joined in one text file, for most readers
     Msh,
+    /// Gmsh 4.1, DIR/NAME.msh: all parts in one file, as partitions with ghosts
+    Msh4,
+    /// Gmsh 4.1, DIR/NAME_1.msh and so on, one file for each part, with ghosts
+    Msh4Parts,
     /// Medit, DIR/NAME.mesh: all parts in one file
     Medit,
     /// NETGEN, DIR/NAME.vol: all parts in one file

@@ -165,6 +165,16 @@ fn a_path_for_two_things_is_refused_before_any_work() {
 }
 
 #[test]
+fn two_gmsh_files_of_one_name_and_text_of_other_formats_are_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    let said = refused(on_lens("generate", dir.path()).args(["-f", "msh,msh4"]));
+    assert!(said.contains("write the same file"), "{said}");
+    let said = refused(on_lens("generate", dir.path()).args(["-f", "msh", "--ascii"]));
+    assert!(said.contains("add msh4 or msh4-parts"), "{said}");
+    assert!(names(dir.path()).is_empty());
+}
+
+#[test]
 fn an_elmer_mesh_is_not_replaced_by_what_is_made_of_it() {
     let dir = tempfile::tempdir().unwrap();
     let run = |arguments: &str| {

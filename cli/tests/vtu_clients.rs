@@ -1,5 +1,5 @@
-//! VTU files, joined files, MFEM's parallel files, and HDF5 files, read by MFEM, meshio, scikit-fem,
-//! Gmsh, NGSolve and h5py.
+//! VTU files, joined files, Gmsh's files of parts, MFEM's parallel files, and HDF5 files, read by MFEM,
+//! meshio, scikit-fem, Gmsh, NGSolve and h5py.
 //!
 //! A test is skipped with a message if the Python module is missing.
 
@@ -131,6 +131,33 @@ for order, nodes in ((1, (4, 3)), (2, (10, 6))):
             assert file[path].shape == tuple(map(int, shape.split())), path
 ";
     python(&["h5py", "numpy"], program, dir.path());
+}
+
+#[test]
+fn gmsh_reads_parts_of_both_orders_with_their_ghosts() {
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/clients/gmsh_parts.py");
+    let script = script.display();
+    for (parts, more) in [("1", ""), ("4", "--halo vertices"), ("7", "--halo faces --ascii")] {
+        for order in ["1", "2"] {
+            let dir = tempfile::tempdir().unwrap();
+            let mut run = tetmill();
+            run.args(["generate", "-f", "msh4,msh4-parts", "-q", "-n", parts, "--order", order]);
+            succeed(run.args(more.split_whitespace()).arg("-o").arg(dir.path()).arg(own("layers")));
+            let program = format!(
+                "
+import json, subprocess, sys
+printed = subprocess.run([sys.executable, '{script}', 'layers', 'flat'], check=True, stdout=-1, text=True).stdout
+found = json.loads(printed)
+assert found['partitions'] == ({parts} if {parts} > 1 else 0), found
+assert len(found['ghosts']) == ({parts} if '{more}' else 0) and all(found['ghosts']), found
+volumes = dict(sorted((name, size) for name, (count, size) in found['bodies'].items()))
+expected = dict(substrate=16, film=3.2, cover=16)
+assert all(abs(volumes[name] - expected[name]) < 1e-9 for name in expected), volumes
+"
+            );
+            python(&["gmsh", "numpy"], &program, dir.path());
+        }
+    }
 }
 
 #[test]

@@ -220,8 +220,20 @@ pub(super) fn write(
         })?;
         return Ok(Written { files: 1, bytes });
     }
+    write_shares(comm, path, whole.lengths(&sections), |section, file| whole.write(&sections[section], file))
+}
+
+/// **Collective.** Writes one file of sections, of which each rank has a share: all shares of the
+/// first section by rank, then those of the next. `lengths` are those of this rank's shares in
+/// bytes, and `write` writes one of them. All ranks get the totals.
+pub(super) fn write_shares(
+    comm: &dyn Communicator,
+    path: &Path,
+    lengths: Result<Vec<u64>, WriteError>,
+    write: impl Fn(usize, &mut Output) -> Result<(), WriteError>,
+) -> Result<Written, WriteError> {
     let (folder, name) = folder_and_name(path)?;
-    let lengths = comm.agree(whole.lengths(&sections))?;
+    let lengths = comm.agree(lengths)?;
     let places = places(comm, &lengths)?;
     let bytes = lengths.iter().sum();
     write_together(
@@ -231,9 +243,9 @@ pub(super) fn write(
         |_| false,
         |stage| {
             let mut file = Output::shared(&stage.join(name))?;
-            for (section, place) in sections.iter().zip(places) {
+            for (section, place) in places.into_iter().enumerate() {
                 file.go_to(place)?;
-                whole.write(section, &mut file)?;
+                write(section, &mut file)?;
             }
             file.finish()
         },

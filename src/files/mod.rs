@@ -7,6 +7,7 @@
 //! geomview  STEM.off, or STEM.list with a file per part   the surface, a colour per part
 //! serial    FILE.{msh,mesh,vol,inp}                       Gmsh, Medit, NETGEN, Abaqus: all parts in one file
 //!           FILE.{vtu,off}                                one part, format by extension
+//! gmsh4     FILE.msh, or STEM_K.msh for each part           Gmsh 4.1 with partitions, for deal.II and t8code
 //! mfem      a text for each rank, in memory or in a file  MFEM, parallel
 //! hdf5      STEM.h5, STEM.xdmf                            one HDF5 file for VTK, DOLFINx and PETSc
 //! ```
@@ -22,6 +23,8 @@ mod corners;
 mod domains;
 pub mod elmer;
 pub mod geomview;
+pub mod gmsh4;
+mod groups;
 pub mod hdf5;
 pub(crate) mod input;
 mod joined;
@@ -40,6 +43,7 @@ mod pairs;
 #[cfg(feature = "pictures")]
 pub mod picture;
 pub(crate) mod plain;
+mod runs;
 pub mod serial;
 pub(crate) mod skin;
 pub mod surface;
@@ -164,7 +168,7 @@ pub enum WriteError {
         parts: u32,
     },
     /// A format that cannot distinguish ghosts from a part's own tets.
-    #[error("{0} has no halo elements; write Elmer or VTU, or leave out the halo")]
+    #[error("{0} has no halo elements; write Elmer, VTU or Gmsh 4.1, or leave out the halo")]
     NoHalo(&'static str),
     /// The observer cancelled the run.
     #[error(transparent)]

@@ -82,7 +82,12 @@ impl Line {
     /// Ends the line, appends it to `text` and clears it.
     #[inline]
     pub fn end(&mut self, text: &mut Vec<u8>) {
-        self.bytes(b"\n");
+        self.bytes(b"\n").move_to(text);
+    }
+
+    /// Appends the line so far to `text` and clears it.
+    #[inline]
+    pub fn move_to(&mut self, text: &mut Vec<u8>) {
         text.extend_from_slice(&self.text[..self.len]);
         self.len = 0;
     }

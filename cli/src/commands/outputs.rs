@@ -200,7 +200,11 @@ fn entries(format: Format, folder: &Path, stem: &Path, parts: u32) -> Vec<PathBu
         }
         (Format::Vtu, 1) => named(&[".vtu", ".boundary.vtu"]),
         (Format::Vtu, _) => named(&[".pvtu", ".boundary.pvtu", ".parts"]),
-        (Format::Msh, _) => named(&[".msh"]),
+        (Format::Msh | Format::Msh4, _) => named(&[".msh"]),
+        (Format::Msh4Parts, parts) => {
+            let ends: Vec<String> = (1..=parts).map(|part| format!("_{part}.msh")).collect();
+            named(&ends.iter().map(String::as_str).collect::<Vec<_>>())
+        }
         (Format::Medit, _) => named(&[".mesh"]),
         (Format::Vol, _) => named(&[".vol"]),
         (Format::Inp, _) => named(&[".inp"]),

@@ -5,7 +5,7 @@ use crate::options::{Boundary, Format, Halo, RunOptions};
 use crate::report::HaloReport;
 use std::path::{Path, PathBuf};
 use tetmill::comm::Communicator;
-use tetmill::files::{Written, elmer, serial, vtu};
+use tetmill::files::{Written, elmer, gmsh4, serial, vtu};
 use tetmill::mesh::{By, MeshStream, Names, Watched, WithHalo};
 use tetmill::progress::{Progress, Stage, Work};
 use tetmill::{files, mesh as halo};
@@ -15,11 +15,21 @@ pub(super) fn refuse_unknown(options: &RunOptions) -> Result<(), Failure> {
     if options.boundary.is_some() && !options.format.contains(&Format::Vtu) {
         return Err(Failure::input("--boundary: only VTU supports it; add vtu to --format"));
     }
-    let has_halo = |format: &&Format| matches!(format, Format::Elmer | Format::Vtu | Format::None);
+    let is_gmsh4 = |format: &Format| matches!(format, Format::Msh4 | Format::Msh4Parts);
+    if options.ascii && !options.format.iter().any(is_gmsh4) {
+        return Err(Failure::input(
+            "--ascii: only Gmsh 4.1 is text or binary; add msh4 or msh4-parts to --format",
+        ));
+    }
+    if options.format.contains(&Format::Msh) && options.format.contains(&Format::Msh4) {
+        return Err(Failure::input("-f msh and msh4 write the same file, NAME.msh; leave one of them out"));
+    }
+    let has_halo =
+        |format: &&Format| matches!(format, Format::Elmer | Format::Vtu | Format::None) || is_gmsh4(format);
     let without = options.format.iter().find(|format| !has_halo(format));
     match without.filter(|_| options.halo.is_some()) {
         Some(format) => Err(Failure::input(format!(
-            "--halo: the format {} has no halo elements; write elmer or vtu",
+            "--halo: the format {} has no halo elements; write elmer, vtu, msh4 or msh4-parts",
             format!("{format:?}").to_lowercase()
         ))),
         None => Ok(()),
@@ -55,13 +65,15 @@ pub(super) fn write_formats(
     let report = ghosts.as_ref().map(|(by, ghosts)| HaloReport::new(comm, *by, ghosts)).transpose()?;
     let with_halo = ghosts.as_ref().map(|(_, ghosts)| WithHalo::new(part, ghosts));
     let part: &dyn MeshStream = with_halo.as_ref().map_or(part, |with_halo| with_halo);
-    let part = &Watched::new(part, work, options.format.iter().map(passes).sum());
+    let part =
+        &Watched::new(part, work, options.format.iter().map(|format| passes(format, options.ascii)).sum());
     let with_ending = |ending: &str| {
         // No `with_extension`: names may contain dots.
         let mut file = stem.as_os_str().to_os_string();
         file.push(ending);
         PathBuf::from(file)
     };
+    let storage = if options.ascii { gmsh4::Storage::Text } else { gmsh4::Storage::Binary };
     let joined = |ending: &str, format: serial::Format| {
         let file = with_ending(ending);
         note_losses(names, format, &file, progress);
@@ -75,6 +87,15 @@ pub(super) fn write_formats(
                 vtu::write_with(comm, part, names, &with_ending(".vtu"), place_of(options.boundary))?
             }
             Format::Msh => joined(".msh", serial::Format::Gmsh)?,
+            Format::Msh4 => {
+                let file = with_ending(".msh");
+                note_losses(names, serial::Format::Gmsh, &file, progress);
+                gmsh4::write(comm, part, names, &file, storage)?
+            }
+            Format::Msh4Parts => {
+                note_losses(names, serial::Format::Gmsh, &with_ending("_1.msh"), progress);
+                gmsh4::write_parts(comm, part, names, stem, storage)?
+            }
             Format::Medit => joined(".mesh", serial::Format::Medit)?,
             Format::Vol => joined(".vol", serial::Format::Netgen)?,
             Format::Inp => joined(".inp", serial::Format::Abaqus)?,
@@ -91,10 +112,13 @@ pub(super) fn write_formats(
 
 /// Number of passes over the tets: a text file of all parts is formatted twice, first for its
 /// length.
-fn passes(format: &Format) -> u64 {
+fn passes(format: &Format, ascii: bool) -> u64 {
     match format {
         Format::None => 0,
         Format::Msh | Format::Medit | Format::Vol => 2,
+        // For the runs of bodies, and for the file; a text of all parts is formatted twice.
+        Format::Msh4 if ascii => 3,
+        Format::Msh4 | Format::Msh4Parts => 2,
         // For the tets beside the boundary, or for shared edges and faces, and for the file.
         Format::Inp | Format::Mfem => 3,
         Format::Elmer | Format::Vtu | Format::Hdf5 | Format::Geomview => 1,

@@ -11,10 +11,10 @@
 //! A set may be defined in several blocks, which add up: so every rank writes its own.
 
 use super::listed;
-use super::runs::Runs;
 use crate::files::WriteError;
 use crate::files::joined::{Section, Whole};
 use crate::files::node_order::{VTK, arranged};
+use crate::files::runs::Runs;
 use crate::ground::comm::Communicator;
 use crate::ground::mesh::stream::{MeshStream, NO_TET, TetBlock};
 use crate::ground::mesh::{Label, Names, Order};

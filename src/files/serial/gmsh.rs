@@ -6,12 +6,12 @@
 //! is in several groups, or faces are periodic, the file has version 4.1, in which an entity has
 //! any number of groups. Gmsh, meshio and MFEM read both.
 
-use super::groups::Groups;
-use super::runs::Runs;
 use super::{coordinates, listed};
 use crate::files::WriteError;
+use crate::files::groups::{Groups, physical_names};
 use crate::files::joined::{Section, Whole};
 use crate::files::node_order::GMSH;
+use crate::files::runs::Runs;
 use crate::files::text::Line;
 use crate::ground::comm::Communicator;
 use crate::ground::mesh::{Names, Order};
@@ -31,16 +31,7 @@ pub(super) fn sections<'a>(
 
 /// The first lines: version and physical names.
 fn head(version: &str, patches: &Groups, bodies: &Groups) -> String {
-    let mut list = String::new();
-    let mut count = 0;
-    for (dimension, groups) in [(2, patches), (3, bodies)] {
-        for group in groups.list.iter().filter(|group| !group.name.is_empty()) {
-            let name = group.name.replace(['"', '\n', '\r'], "_");
-            list += &format!("{dimension} {} \"{name}\"\n", group.tag);
-            count += 1;
-        }
-    }
-    format!("$MeshFormat\n{version} 0 8\n$EndMeshFormat\n$PhysicalNames\n{count}\n{list}$EndPhysicalNames\n")
+    format!("$MeshFormat\n{version} 0 8\n$EndMeshFormat\n") + &physical_names(patches, bodies)
 }
 
 fn sections_2<'a>(whole: &'a Whole<'a>, patches: Groups, bodies: Groups) -> Vec<Section<'a>> {
@@ -75,7 +66,8 @@ fn sections_4<'a>(
     bodies: &Groups,
 ) -> Result<Vec<Section<'a>>, WriteError> {
     let counts = whole.totals;
-    let (of_patches, of_bodies) = (Runs::of_patches(whole)?, Runs::of_bodies(whole.part));
+    let (of_patches, of_bodies) =
+        (Runs::of_patches(whole.part, &whole.by_patch, &whole.left_out)?, Runs::of_bodies(whole.part));
     let [blocks] = comm.all_reduce_sum_u64([(of_patches.0.len() + of_bodies.0.len()) as u64])?;
     let first_body = of_bodies.0.first().map_or(1, |run| run.of + 1);
     let (n, elements) = (counts.vertices, counts.boundary + counts.tets);

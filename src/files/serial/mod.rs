@@ -3,9 +3,7 @@
 
 mod abaqus;
 mod gmsh;
-mod groups;
 mod netgen;
-mod runs;
 
 use super::input::ending;
 use super::joined::{self, Section, TextFormat, Whole};

@@ -6,7 +6,7 @@ use super::groups::Groups;
 use super::raw::{Label, Raw, Shape};
 use crate::Point;
 use crate::files::input::{Bytes, Fault, Words};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// State shared by the sections of a file.
 #[derive(Default)]
@@ -15,6 +15,8 @@ pub(super) struct Parts {
     pub ids: Option<Ids>,
     /// Entities by dimension and tag.
     entities: BTreeMap<(i64, i64), Entity>,
+    /// Tags of the volumes of ghosts: copies of tets of other parts, in the file of one part.
+    ghosts: BTreeSet<i64>,
     /// Physical groups by dimension.
     pub groups: [Groups; 4],
 }
@@ -116,7 +118,7 @@ pub(super) fn section<'a>(
             source.size("the number of partitions")?;
             let ghosts = source.count("ghost entities", 2, 8)?;
             for _ in 0..ghosts {
-                source.int("the tag of a ghost entity")?;
+                parts.ghosts.insert(source.int("the tag of a ghost entity")?);
                 source.int("a partition")?;
             }
             entities(&mut source, true, parts)?;
@@ -189,21 +191,27 @@ fn nodes(source: &mut Source, raw: &mut Raw) -> Result<Ids, Fault> {
 }
 
 fn elements(source: &mut Source, parts: &mut Parts, raw: &mut Raw) -> Result<(), Fault> {
-    let Parts { ids, entities, groups } = parts;
+    let Parts { ids, entities, ghosts, groups } = parts;
     let ids = ids.as_ref().ok_or_else(|| source.fault(NO_NODES))?;
     let blocks = source.size("the number of blocks")?;
     for what in ["the number of elements", "the least id", "the largest id"] {
         source.size(what)?;
     }
     let mut nodes = Vec::new();
-    let mut between_parts = 0;
+    let (mut between_parts, mut ghost_tets) = (0, 0);
     for _ in 0..blocks {
         let dimension = source.int("a dimension")?;
         let tag = source.int("the tag of an entity")?;
         let code = source.int("the type of elements")?;
         let (shape, size) = known_type(code).map_err(|message| source.fault(message))?;
         let count = source.count("elements", 1 + size, 8 * (1 + size))?;
-        let label = label(entities, &mut groups[shape.dimension()], dimension, tag);
+        let is_ghost = dimension == 3 && ghosts.contains(&tag);
+        let label = if is_ghost {
+            ghost_tets += count;
+            None
+        } else {
+            label(entities, &mut groups[shape.dimension()], dimension, tag)
+        };
         for _ in 0..count {
             let number = source.size("the id of an element")?;
             nodes.clear();
@@ -222,6 +230,9 @@ fn elements(source: &mut Source, parts: &mut Parts, raw: &mut Raw) -> Result<(),
                 (None, _) => {}
             }
         }
+    }
+    if ghost_tets > 0 {
+        raw.notes.push(format!("{ghost_tets} ghost elements of other partitions left out"));
     }
     if between_parts > 0 {
         raw.notes.push(format!("{between_parts} triangles between partitions left out"));

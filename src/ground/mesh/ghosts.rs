@@ -31,7 +31,7 @@ pub struct GhostTet {
     pub edge_nodes: Option<[u32; 6]>,
 }
 
-/// A vertex that only ghost tets have.
+/// A vertex, or a node on an edge, that only ghost tets have.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GhostVertex {
     /// Its global id.

@@ -78,7 +78,8 @@ fn places(interface: &Interface, vertices: &[u32]) -> (Vec<[f64; 3]>, Vec<u8>) {
     (points, on_boundary)
 }
 
-/// Reads a message of rank `from`; the tets' `vertices` are not set yet.
+/// Reads a message of rank `from`; the tets' `vertices` and `edge_nodes` are not set
+/// yet.
 pub(super) fn read(from: Rank, message: &[u8]) -> Message {
     let rest = &mut &message[..];
     let ids: Vec<GlobalId> = take(rest);

@@ -9,11 +9,11 @@
 //! and [`WithHalo`] streams both: the blocks of the part, then those of the ghosts.
 //!
 //! Each rank sends tets with shared vertices to the neighbouring ranks, with the data of vertices
-//! that these do not have. This takes one exchange; by faces another one before it, because ranks
-//! that have the three vertices of a face need not have the face. A rank **watches** a vertex if it
-//! has the vertex in ghosts only. It notifies the owner, which notifies all holders and watchers,
-//! because Elmer's files list them all. Ghosts are numbered by global ids, so nothing depends on
-//! message order.
+//! that these do not have; the nodes on edges of second order are vertices, too. This takes one
+//! exchange; by faces another one before it, because ranks that have the three vertices of a face
+//! need not have the face. A rank **watches** a vertex if it has the vertex in ghosts only. It
+//! notifies the owner, which notifies all holders and watchers, because Elmer's files list them
+//! all. Ghosts are numbered by global ids, so nothing depends on message order.
 
 mod interface;
 mod leaving;

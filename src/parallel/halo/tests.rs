@@ -2,7 +2,7 @@ use super::*;
 use crate::files::plain::PlainPart;
 use crate::files::testing::{cube, scattered, slabs, together, two_tets};
 use crate::ground::mesh::stream::{Counts, LocalBlock, TetBlock};
-use crate::ground::mesh::{Mesh, TET_FACES};
+use crate::ground::mesh::{Mesh, Order, TET_FACES};
 use crate::parallel::distribution::distribute;
 use crate::parallel::migrate::BareStream;
 use crate::parallel::refine::{Keep, Settings, fixtures, refine};
@@ -181,6 +181,52 @@ fn refined_parts_have_the_ghosts_of_their_fine_tets_whether_coordinates_are_kept
             });
         }
     }
+}
+
+/// Length of a record of [`nodes`].
+const RECORD: usize = 1 + 10 * 4;
+
+/// Each tet of second order of a stream from a given block on: its id, and the ids and coordinates
+/// of its nodes.
+fn nodes(stream: &dyn MeshStream, first_block: usize) -> Vec<u64> {
+    let (mut block, mut ids, mut points) = (LocalBlock::default(), Vec::new(), Vec::new());
+    let mut found = Vec::new();
+    for index in first_block..stream.tet_blocks() {
+        stream.local_block(index, &mut block);
+        stream.block_ids(&block, &mut ids);
+        stream.block_points(&block, &mut points);
+        for (k, (tet, edges)) in block.tets.tets.iter().zip(&block.tets.edge_nodes).enumerate() {
+            found.push(block.tets.first_id + k as u64);
+            for &node in tet.iter().chain(edges) {
+                found.push(ids[node as usize]);
+                found.extend(points[node as usize].map(f64::to_bits));
+            }
+        }
+    }
+    found
+}
+
+#[test]
+fn ghosts_of_second_order_have_the_nodes_of_their_tets() {
+    let fixture = fixtures::ball(1.0);
+    together(3, |comm| {
+        let to = scattered(&fixture.mesh, 3);
+        let dist = distribute(comm, (comm.rank() == 0).then(|| (fixture.mesh.clone(), to))).unwrap();
+        for keep in [Keep::All, Keep::Boundary] {
+            let settings = Settings { keep, order: Order::Second, ..Settings::default() };
+            let part = refine(dist.clone(), &fixture.projector, 2, &settings).unwrap();
+            let all = comm.all_gather(&nodes(&part, 0)).unwrap().concat();
+            let of_id: BTreeMap<u64, &[u64]> = all.chunks_exact(RECORD).map(|tet| (tet[0], tet)).collect();
+            for by in [By::Faces, By::Vertices] {
+                let ghosts = halo(comm, &part, by).unwrap();
+                let stream = WithHalo::new(&part, &ghosts);
+                let found = nodes(&stream, part.tet_blocks());
+                assert_eq!(found.len(), ghosts.tets.len() * RECORD);
+                assert!(!found.is_empty() && found.chunks_exact(RECORD).all(|tet| of_id[&tet[0]] == tet));
+                expect_blocks(&stream);
+            }
+        }
+    });
 }
 
 /// Delivers messages in reverse order.

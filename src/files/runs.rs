@@ -1,7 +1,8 @@
 //! Runs of consecutive tets or boundary triangles of one body or patch.
 
-use crate::files::WriteError;
-use crate::files::joined::Whole;
+use super::WriteError;
+use super::lines::ByPatch;
+use super::once::LeftOut;
 use crate::ground::mesh::stream::{MeshStream, TetBlock};
 
 /// Consecutive elements of one body or patch.
@@ -31,18 +32,23 @@ impl Runs {
     }
 
     /// Runs of the triangles that the part writes.
-    pub fn of_patches(whole: &Whole) -> Result<Self, WriteError> {
+    pub fn of_patches(
+        part: &dyn MeshStream,
+        by_patch: &ByPatch,
+        left_out: &LeftOut,
+    ) -> Result<Self, WriteError> {
         let mut runs = Self::default();
-        whole.by_patch.visit(whole.part, |block, first| {
+        by_patch.visit(part, |block, first| {
             let places = first..first + block.triangles.len() as u64;
-            let written = places.filter(|&place| !whole.left_out.contains(place)).count();
+            let written = places.filter(|&place| !left_out.contains(place)).count();
             runs.add(block.patch.expect("a boundary block has a patch").0, written);
             Ok(())
         })?;
         Ok(runs)
     }
 
-    fn add(&mut self, of: u32, count: usize) {
+    /// Appends elements.
+    pub fn add(&mut self, of: u32, count: usize) {
         if count == 0 {
             return;
         }

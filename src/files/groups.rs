@@ -1,4 +1,5 @@
-//! Groups of bodies or boundaries: one for each name, and one for each unnamed number.
+//! Gmsh's physical groups of bodies or boundaries: one for each name, and one for each unnamed
+//! number.
 
 use crate::ground::mesh::Label;
 use std::collections::{BTreeMap, BTreeSet};
@@ -62,6 +63,20 @@ impl Groups {
     pub fn are_apart(&self) -> bool {
         self.of.iter().all(|tags| tags.len() <= 1)
     }
+}
+
+/// Gmsh's section of names, with the dimension and tag of each.
+pub(super) fn physical_names(patches: &Groups, bodies: &Groups) -> String {
+    let mut list = String::new();
+    let mut count = 0;
+    for (dimension, groups) in [(2, patches), (3, bodies)] {
+        for group in groups.list.iter().filter(|group| !group.name.is_empty()) {
+            let name = group.name.replace(['"', '\n', '\r'], "_");
+            list += &format!("{dimension} {} \"{name}\"\n", group.tag);
+            count += 1;
+        }
+    }
+    format!("$PhysicalNames\n{count}\n{list}$EndPhysicalNames\n")
 }
 
 #[cfg(test)]
