@@ -1,5 +1,6 @@
-//! Meshes of second order in every format: the places of nodes in the lines of elements, and reading
-//! back. The edges are straight, so each node is known by its place in the middle of an edge.
+//! Meshes of second order in every format: the places of nodes in the lines of elements, and
+//! reading back. The edges are straight, so each node is known by its place in the middle of an
+//! edge.
 
 use super::serial::{self, Format};
 use super::testing::together;

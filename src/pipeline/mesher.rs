@@ -172,8 +172,8 @@ impl<'a> Mesher<'a> {
         self.with(|settings| settings.nested = true)
     }
 
-    /// The order of the elements. With [`Order::Second`] tets have ten nodes, those on the boundary on
-    /// the geometry, and each tet is proved valid.
+    /// The order of the elements. With [`Order::Second`] tets have ten nodes, those on the boundary
+    /// on the geometry, and each tet is proved valid.
     ///
     /// ```
     /// use tetmill::{Geometry, Mesher, mesh::Order};

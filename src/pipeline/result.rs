@@ -202,8 +202,8 @@ impl Level {
     }
 }
 
-/// An edge of second order on the boundary that is straight, because the tets beside it would not be
-/// valid if its node were on the surface.
+/// An edge of second order on the boundary that is straight, because the tets beside it would not
+/// be valid if its node were on the surface.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct StraightEdge {
     /// The global id of its node.

@@ -55,8 +55,8 @@ pub struct GenerateSettings {
     /// Whether all octahedra of a coarse tet are split along one diagonal, so that the refinement
     /// levels are nested. Costs quality near curved boundaries.
     pub nested: bool,
-    /// Whether edges of second order may be straight off the surface where the tets beside them would
-    /// not be valid otherwise, as the last resort.
+    /// Whether edges of second order may be straight off the surface where the tets beside them
+    /// would not be valid otherwise, as the last resort.
     pub allow_off_surface: bool,
     /// Whether to refuse a partition with periodic faces and their copies in different parts.
     pub periodic_together: bool,

@@ -1,5 +1,5 @@
-//! Faults of second order: elements that are not valid, and edges whose elements have different nodes
-//! on them.
+//! Faults of second order: elements that are not valid, and edges whose elements have different
+//! nodes on them.
 
 use super::faults::{FaultKind, Faults};
 use super::faults_nodes::NodeTable;

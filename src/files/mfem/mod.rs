@@ -12,9 +12,9 @@
 //! shared_faces n          on all these ranks
 //! mfem_mesh_end
 //! ```
-//! In a mesh of second order the vertices have no coordinates; `nodes` follows instead, a grid function
-//! of degree 2 with the corners first, then the nodes on edges, in the order in which the elements
-//! first have them: that of MFEM's own table of edges.
+//! In a mesh of second order the vertices have no coordinates; `nodes` follows instead, a grid
+//! function of degree 2 with the corners first, then the nodes on edges, in the order in which the
+//! elements first have them: that of MFEM's own table of edges.
 //!
 //! Attributes are the numbers of bodies and boundaries. Vertices of periodic faces stay separate.
 

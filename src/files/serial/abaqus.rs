@@ -72,8 +72,8 @@ pub(super) fn sections<'a>(
     ])
 }
 
-/// A number in the fewest digits that read back bitwise equal, or as many as CalculiX reads: at least
-/// 12.
+/// A number in the fewest digits that read back bitwise equal, or as many as CalculiX reads, at
+/// least 12.
 fn real(number: f64) -> String {
     let exact = if number == 0.0 || (1e-5..1e16).contains(&number.abs()) {
         format!("{number}")

@@ -1,5 +1,5 @@
-//! Single-file formats, chosen by the file's extension. Gmsh, Medit, NETGEN and Abaqus files hold the
-//! mesh of all ranks.
+//! Single-file formats, chosen by the file's extension. Gmsh, Medit, NETGEN and Abaqus files hold
+//! the mesh of all ranks.
 
 mod abaqus;
 mod gmsh;
@@ -118,8 +118,8 @@ pub fn write_as(
     }
 }
 
-/// **Collective.** Writes the mesh of all ranks to one Gmsh, Medit, NETGEN or Abaqus file. Each vertex, tet
-/// and interface triangle is written once. All ranks get the totals.
+/// **Collective.** Writes the mesh of all ranks to one Gmsh, Medit, NETGEN or Abaqus file. Each
+/// vertex, tet and interface triangle is written once. All ranks get the totals.
 ///
 /// # Errors
 /// A format for one part only, more vertices or elements than 32 bits can number, a part with

@@ -176,9 +176,9 @@ fn plus(p: [f64; 3], q: [f64; 3]) -> [f64; 3] {
 /// The Bézier coefficients of the determinant and the bound of their error.
 ///
 /// The derivative in the direction of edge 0k is Σ λⱼ dₖⱼ with dₖⱼ = 2(bₖⱼ − b₀ⱼ), where b are the
-/// control points of the map: bₖₖ the corners, bₖⱼ twice the edge node minus the middle of the edge.
-/// A coefficient is the mean of the determinants of d₁ᵢ, d₂ⱼ, d₃ₖ over the orders i, j, k of its
-/// corners.
+/// control points of the map: bₖₖ the corners, bₖⱼ twice the edge node minus the middle of the
+/// edge. A coefficient is the mean of the determinants of d₁ᵢ, d₂ⱼ, d₃ₖ over the orders i, j, k of
+/// its corners.
 #[inline(always)]
 fn coefficients(nodes: &Nodes) -> (Coefficients, f64) {
     let rows = derivatives(nodes);
@@ -265,8 +265,8 @@ fn size(rows: &[[[f64; 3]; 4]; 3]) -> f64 {
 /// Bisections of one tet, at most.
 const BISECTIONS: usize = 256;
 
-/// Sharpens the range by bisecting the piece with the smallest coefficient, until the lower bound is
-/// within a few percent of a value of the determinant.
+/// Sharpens the range by bisecting the piece with the smallest coefficient, until the lower bound
+/// is within a few percent of a value of the determinant.
 fn sharpened(coefficients: Coefficients, error: f64, whole: Range) -> Range {
     const SHARP: f64 = 0.02;
     let mut pieces = vec![coefficients];
@@ -416,7 +416,8 @@ mod tests {
 
     #[test]
     fn what_the_coefficients_leave_open_is_decided_by_bisection() {
-        // Nodes that move around an axis: the smallest coefficient is negative, the determinant not.
+        // Nodes that move around an axis: the smallest coefficient is negative, the determinant
+        // not.
         let mut nodes = straight(UNIT);
         nodes[9] = [0.0, 0.78, 0.78];
         nodes[7] = [0.78, 0.78, 0.0];

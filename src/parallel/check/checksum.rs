@@ -16,8 +16,8 @@
 //! random cochain, without a table of faces.
 //!
 //! In a mesh of second order a face has three more nodes, and a second sum tests that the two tets
-//! beside it have the same: the determinant of three points, one for each edge, made of its node and
-//! of the corner opposite.
+//! beside it have the same: the determinant of three points, one for each edge, made of its node
+//! and of the corner opposite.
 
 use crate::ground::comm::{CommError, Communicator};
 use crate::ground::kernel::simplex::from_lowest;

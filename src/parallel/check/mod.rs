@@ -40,7 +40,8 @@ pub enum Fault {
     NotProved {
         /// The global id of the tet.
         tet: GlobalId,
-        /// A lower bound of its scaled Jacobian: about the smallest determinant divided by the largest.
+        /// A lower bound of its scaled Jacobian: about the smallest determinant divided by the
+        /// largest.
         #[serde(deserialize_with = "lenient::number")]
         scaled: f64,
         /// The centroid of its corners.

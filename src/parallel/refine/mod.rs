@@ -78,7 +78,8 @@ pub struct Settings {
     pub nested: bool,
     /// The order of the elements.
     pub order: Order,
-    /// Nodes on edges that are not snapped, so that their edges are straight: global ids, ascending.
+    /// Nodes on edges that are not snapped, so that their edges are straight: global ids,
+    /// ascending.
     pub straight: Vec<GlobalId>,
 }
 

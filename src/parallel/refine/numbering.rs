@@ -5,8 +5,8 @@
 //!     local and global alike:
 //!     | coarse vertices | n−1 for each edge | C(n−1,2) for each face | C(n−1,3) for each tet |
 //! ```
-//! n is the number of subdivisions per edge; for second order, whose nodes include the middles of the
-//! edges of all tets, it is twice that: nodes have the ids of the vertices of the next level.
+//! n is the number of subdivisions per edge; for second order, whose nodes include the middles of
+//! the edges of all tets, it is twice that: nodes have the ids of the vertices of the next level.
 //!
 //! Points in an edge or face are numbered by the ascending global ids of its vertices, points in a
 //! tet by the order of its vertices. So all ranks that share an entity agree without messages.

@@ -9,8 +9,8 @@ use super::numbering::{Entity, Numbering};
 use super::snap::Coordinates;
 use super::{RefineError, RefinedMesh, Settings, refine_reporting, tet};
 use crate::ground::comm::{CommError, Communicator};
-use crate::ground::kernel::jacobian;
-use crate::ground::mesh::stream::{MeshStream, TetBlock};
+use crate::ground::kernel::jacobian::{self, Nodes};
+use crate::ground::mesh::stream::{LocalBlock, MeshStream};
 use crate::ground::mesh::{GlobalId, TET_EDGES};
 use crate::ground::progress::Work;
 use crate::ground::projector::Projector;
@@ -67,43 +67,46 @@ fn ends_of(mesh: &DistMesh, numbering: &Numbering, entity: Entity, within: u32) 
 }
 
 /// The nodes of coarse tets to be set to the middle of their edges, so that the children are proved
-/// valid: for each child, one by one those that help most.
+/// valid.
 fn needed(refined: &RefinedMesh, bad: &[tet::BadTet]) -> BTreeSet<GlobalId> {
-    let coarse = refined.coarse();
+    // Only nodes on coarse edges and faces are snapped.
     let [.., inside] = refined.numbering().bases();
     let mut needed = BTreeSet::new();
-    let (mut block, mut points) = (TetBlock::default(), Vec::new());
+    let (mut block, mut points) = (LocalBlock::default(), Vec::new());
     for tet in bad {
-        let Ok(index) = coarse.tet_ids.binary_search(&tet.tet) else { continue };
-        let mut local = crate::ground::mesh::stream::LocalBlock::default();
-        refined.local_block(index, &mut local);
-        refined.block_points(&local, &mut points);
-        std::mem::swap(&mut block, &mut local.tets);
-        for (corners, edges) in block.tets.iter().zip(&block.edge_nodes) {
-            let mut nodes = jacobian::nodes(*corners, *edges, |k| points[k as usize]);
-            let mut range = jacobian::range(&nodes);
-            while !range.is_positive() {
-                let with_straight = |edge: usize| {
-                    let [p, q] = TET_EDGES[edge].map(|corner| nodes[corner]);
-                    let mut nodes = nodes;
-                    nodes[4 + edge] = [0, 1, 2].map(|x| 0.5 * (p[x] + q[x]));
-                    (edge, nodes)
-                };
-                let may = |edge: &usize| (local.vertices[edges[*edge] as usize] as usize) < inside;
-                let changed = |(edge, other): &(usize, _)| {
-                    let other: &jacobian::Nodes = other;
-                    other[4 + edge] != nodes[4 + edge]
-                };
-                let tried = (0..6).filter(may).map(with_straight).filter(changed);
-                let ranged = tried.map(|(edge, nodes)| (edge, nodes, jacobian::range(&nodes)));
-                let best = ranged.max_by(|a, b| a.2.least.total_cmp(&b.2.least));
-                let Some((edge, straight, of_straight)) = best else { break };
-                (nodes, range) = (straight, of_straight);
-                needed.insert(refined.vertex_id(local.vertices[edges[edge] as usize]));
-            }
+        let Ok(index) = refined.coarse().tet_ids.binary_search(&tet.tet) else { continue };
+        refined.local_block(index, &mut block);
+        refined.block_points(&block, &mut points);
+        let children = block.tets.tets.iter().zip(&block.tets.edge_nodes);
+        for (corners, edges) in children {
+            let nodes = jacobian::nodes(*corners, *edges, |k| points[k as usize]);
+            let node_of = |edge: usize| block.vertices[edges[edge] as usize];
+            let edges = straight_edges(nodes, |edge| (node_of(edge) as usize) < inside);
+            needed.extend(edges.into_iter().map(|edge| refined.vertex_id(node_of(edge))));
         }
     }
     needed
+}
+
+/// The edges that must be straight for a tet to be valid, one by one those that help most; only
+/// those that `may`.
+fn straight_edges(mut nodes: Nodes, may: impl Fn(usize) -> bool) -> Vec<usize> {
+    let mut chosen = Vec::new();
+    let mut range = jacobian::range(&nodes);
+    while !range.is_positive() {
+        let straightened = |edge: usize| {
+            let [p, q] = TET_EDGES[edge].map(|corner| nodes[corner]);
+            let mut other = nodes;
+            other[4 + edge] = [0, 1, 2].map(|x| 0.5 * (p[x] + q[x]));
+            (other != nodes).then(|| (edge, other, jacobian::range(&other)))
+        };
+        let tried = (0..6).filter(|&edge| may(edge)).filter_map(straightened);
+        let best = tried.max_by(|a, b| a.2.least.total_cmp(&b.2.least));
+        let Some((edge, other, of_other)) = best else { break };
+        (nodes, range) = (other, of_other);
+        chosen.push(edge);
+    }
+    chosen
 }
 
 /// Rounds of making edges straight; each may make tets beside the edges invalid.
@@ -116,7 +119,6 @@ const ROUNDS: usize = 16;
 /// # Errors
 /// [`CommError`] if another rank fails. The errors of refinement are in the result, which may
 /// differ between ranks.
-#[expect(clippy::type_complexity, reason = "two results: of this rank, and of all")]
 pub fn refine_straightening(
     comm: &dyn Communicator,
     mesh: &DistMesh,
@@ -133,9 +135,10 @@ pub fn refine_straightening(
             _ => Vec::new(),
         };
         let before = settings.straight.len();
-        let all: BTreeSet<GlobalId> = comm.all_gather(&mine)?.concat().into_iter().collect();
-        let all: Vec<GlobalId> =
-            settings.straight.iter().copied().chain(all).collect::<BTreeSet<_>>().into_iter().collect();
+        let mut all = settings.straight.clone();
+        all.extend(comm.all_gather(&mine)?.concat());
+        all.sort_unstable();
+        all.dedup();
         if all.len() == before {
             let made = made.and_then(|(refined, bad)| {
                 if bad.is_empty() { Ok(refined) } else { Err(tet::inverted(&bad, settings.described)) }

@@ -51,8 +51,8 @@ pub struct Quality {
     pub body_volumes: Vec<f64>,
     /// Tets that are not positively oriented, by their corners.
     pub inverted: usize,
-    /// The order of the elements: 1, or 2 for ten-node tets. Angles, ratios and badness are those of
-    /// the corners.
+    /// The order of the elements: 1, or 2 for ten-node tets. Angles, ratios and badness are those
+    /// of the corners.
     pub order: u32,
     /// Tets of second order whose Jacobian determinant is not proved positive; null for order 1.
     pub not_valid: Option<usize>,
