@@ -1,6 +1,7 @@
 //! The methods `refine` and `surface` on all ranks: a coarse mesh is partitioned, distributed,
 //! refined or meshed inside its refined skins, and checked.
 
+use super::broadcast;
 use super::coarse_mesh::CoarseMesh;
 use super::decompose;
 use super::error::{Error, InvalidMesh, RequestError};
@@ -32,7 +33,7 @@ use crate::parallel::interfaces;
 use crate::parallel::migrate::BareStream;
 use crate::parallel::partition::ties::Ties;
 use crate::parallel::partition::{self};
-use crate::parallel::refine::{self, EdgeDisplacements, PeriodicCheck, RefineError, RefinedMesh};
+use crate::parallel::refine::{self, PeriodicCheck, RefineError, RefinedMesh};
 use std::sync::Arc;
 
 /// **Collective.** Makes the mesh; only rank 0 needs the geometry and reports `progress`.
@@ -109,8 +110,8 @@ fn coarse_parts<'a>(
 ) -> Result<Parts<'a>, Error> {
     let made = model.map(|model| coarse_mesh(comm.size(), model, settings, sources, budget, progress));
     let (pieces, coarse) = comm.agree(made.transpose())?.unzip();
-    let pieces = broadcast_pieces(comm, pieces)?;
-    let (names, projector) = broadcast_geometry(comm, model)?;
+    let pieces = broadcast::pieces(comm, pieces)?;
+    let (names, projector) = broadcast::geometry(comm, model)?;
     let given = coarse.as_ref().map(|made| (made.mesh.clone(), made.parts.clone()));
     let dist = progress.stage(Stage::Distribute, |_| distribution::distribute(comm, given))?;
     let fits =
@@ -142,7 +143,7 @@ fn refined(
     };
     let order = settings.coarse.order;
     let keep = room::vertices_to_keep(comm, &dist, (pieces, order), settings.memory, progress)?;
-    let displacements = broadcast_displacements(comm, coarse.as_ref().map(|made| &made.displacements))?;
+    let displacements = broadcast::displacements(comm, coarse.as_ref().map(|made| &made.displacements))?;
     let nested = settings.nested;
     let how = refine::Settings { displacements, nested, order, ..refine::Settings::default() };
     let survey = progress.stage(Stage::Levels, |work| {
@@ -170,8 +171,8 @@ fn refined(
     let part = comm.agree(refined.map_err(Error::from))?;
     let how = refine::Settings { straight, ..how };
     let straight = straight_edges(comm, &part, &projector, &how.straight)?;
-    let map = broadcast_periodic(comm, coarse.as_ref().map(|made| &made.periodic))?;
-    let part = part.with_periodic(map.clone()).with_singular(broadcast_singular(comm, model)?);
+    let map = broadcast::periodic(comm, coarse.as_ref().map(|made| &made.periodic))?;
+    let part = part.with_periodic(map.clone()).with_singular(broadcast::singular(comm, model)?);
     let (check, checksum) =
         progress.stage(Stage::Check, |work| verdict(comm, &part, &projector, &how.straight, work))?;
     let periodic = periodic_verdict(comm, &part, &map, &projector)?;
@@ -228,7 +229,7 @@ fn decomposed(
     settings: &GenerateSettings,
     progress: &Progress,
 ) -> Result<Generated, Error> {
-    let (names, projector) = broadcast_geometry(comm, model)?;
+    let (names, projector) = broadcast::geometry(comm, model)?;
     let (part, pieces, coarse) = decompose::mesh_pieces(comm, model, cuts, settings, progress)?;
     let whole = Whole { names, projector, pieces, coarse, refused: None };
     stored(comm, part, whole, &interfaces::Settings::default(), settings, progress)
@@ -402,13 +403,6 @@ fn periodic_map(model: &Model, mesh: &Mesh) -> Result<PeriodicMap, Error> {
     map.map_err(Error::from)
 }
 
-/// **Collective.** Broadcasts the periodic entities of the coarse mesh from rank 0.
-fn broadcast_periodic(comm: &dyn Communicator, map: Option<&PeriodicMap>) -> Result<PeriodicMap, Error> {
-    let mut numbers = map.map(PeriodicMap::encode).unwrap_or_default();
-    comm.broadcast(0, &mut numbers)?;
-    Ok(PeriodicMap::decode(&numbers))
-}
-
 /// **Collective.** Checks that all periodic copies are where the motions put them.
 fn periodic_verdict(
     comm: &dyn Communicator,
@@ -429,63 +423,6 @@ fn periodic_verdict(
         return Err(InvalidMesh::Periodic { lost: checked.lost, furthest: checked.furthest }.into());
     }
     Ok(Some(checked))
-}
-
-/// **Collective.** Broadcasts the subdivisions of coarse edges from rank 0.
-fn broadcast_pieces(comm: &dyn Communicator, pieces: Option<u32>) -> Result<u32, Error> {
-    let mut pieces = vec![pieces.unwrap_or(1)];
-    comm.broadcast(0, &mut pieces)?;
-    Ok(pieces[0])
-}
-
-/// **Collective.** Broadcasts the edge displacements from rank 0.
-fn broadcast_displacements(
-    comm: &dyn Communicator,
-    displacements: Option<&EdgeDisplacements>,
-) -> Result<EdgeDisplacements, Error> {
-    let (mut ids, mut middles): (Vec<GlobalId>, Vec<[f64; 3]>) =
-        displacements.map(|displacements| displacements.edges().iter().copied().unzip()).unwrap_or_default();
-    comm.broadcast(0, &mut ids)?;
-    comm.broadcast(0, &mut middles)?;
-    Ok(ids.into_iter().zip(middles).collect())
-}
-
-/// **Collective.** Broadcasts the singular entities of rank 0's geometry.
-fn broadcast_singular(comm: &dyn Communicator, model: Option<&Model>) -> Result<csg::Singular, Error> {
-    let csg::Singular { mut patches, mut curves, mut corners } = match model {
-        Some(Model::Csg(model)) => model.features.singular(&model.geometry),
-        _ => csg::Singular::default(),
-    };
-    broadcast_factors(comm, &mut patches, |id| id.0, csg::PatchId)?;
-    broadcast_factors(comm, &mut curves, |id| id.0, csg::CurveId)?;
-    broadcast_factors(comm, &mut corners, |id| id.0, csg::CornerId)?;
-    Ok(csg::Singular { patches, curves, corners })
-}
-
-/// **Collective.** Replaces the factors of entities by those of rank 0.
-fn broadcast_factors<Id>(
-    comm: &dyn Communicator,
-    factors: &mut Vec<(Id, i32)>,
-    number: impl Fn(&Id) -> u32,
-    id: impl Fn(u32) -> Id,
-) -> Result<(), Error> {
-    let mut numbers: Vec<[i64; 2]> =
-        factors.iter().map(|(id, factor)| [number(id).into(), (*factor).into()]).collect();
-    comm.broadcast(0, &mut numbers)?;
-    *factors = numbers.iter().map(|&[number, factor]| (id(number as u32), factor as i32)).collect();
-    Ok(())
-}
-
-/// **Collective.** Broadcasts the names and the surfaces from rank 0.
-fn broadcast_geometry(comm: &dyn Communicator, model: Option<&Model>) -> Result<(Names, Projector), Error> {
-    let mut bytes = model.map(|m| m.projector().encode()).unwrap_or_default();
-    comm.broadcast_bytes(0, &mut bytes)?;
-    let names = model.map(Model::names).unwrap_or_default();
-    let mut text = serde_json::to_vec(&names).expect("plain data");
-    comm.broadcast_bytes(0, &mut text)?;
-    let names = serde_json::from_slice(&text).expect("JSON from rank 0");
-    let projector = Projector::decode(&bytes).expect("a projector encoded by rank 0");
-    Ok((names, projector))
 }
 
 /// **Collective.** Gathers the coarse tets with inverted children on any rank.
@@ -549,20 +486,4 @@ fn straight_edges(
     edges.sort_unstable_by_key(|edge| edge.node);
     edges.dedup_by_key(|edge| edge.node);
     Ok(edges)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::ground::comm::thread;
-
-    #[test]
-    fn edges_that_rank_0_bends_are_bent_alike_on_all_ranks() {
-        let displacements: EdgeDisplacements =
-            [(7, [0.5, 0.0, -1.25]), (1 << 40, [0.1, 0.2, 0.3])].into_iter().collect();
-        let received = thread::run(3, |comm| {
-            broadcast_displacements(comm, (comm.rank() == 0).then_some(&displacements)).unwrap()
-        });
-        assert_eq!(received.unwrap(), vec![displacements; 3]);
-    }
 }

@@ -1,5 +1,6 @@
 //! The pipeline from input to checked mesh: the only module that knows all stages.
 
+mod broadcast;
 pub mod close;
 pub mod coarse;
 pub mod coarse_error;
