@@ -1,5 +1,5 @@
-//! VTU files, joined files, MFEM's parallel files, and HDF5 files, read by MFEM, meshio, scikit-fem,
-//! Gmsh, NGSolve and h5py.
+//! VTU files, joined files, MFEM's parallel files, and HDF5 files, read by MFEM, meshio,
+//! scikit-fem, Gmsh, NGSolve and h5py.
 //!
 //! A test is skipped with a message if the Python module is missing.
 
