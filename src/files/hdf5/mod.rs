@@ -20,7 +20,7 @@
 //! on the number of parts; the canonical ids are in `GlobalNodeId` and `GlobalElementId`.
 //!
 //! `parents` has for each boundary triangle the numbers of the tets behind it and in front of it,
-//! -1 for none. A triangle between two parts is written once, see [`once`](super::once).
+//! -1 for none. A triangle between two parts is written once (`files::once`).
 //!
 //! The ending `.h5` is the one that PETSc's `DMPlexCreateFromFile` and DOLFINx's reader of XDMF
 //! look for. Names are fixed-length strings, which VTK's reader does not accept as field data.

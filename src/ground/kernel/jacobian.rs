@@ -231,9 +231,7 @@ fn derivatives(nodes: &Nodes) -> [[[f64; 3]; 4]; 3] {
     let mut control = [[[0.0; 3]; 4]; 4];
     let at = |node: usize, axis: usize| nodes[node][axis] - nodes[0][axis];
     for axis in 0..3 {
-        for corner in 1..4 {
-            control[corner][corner][axis] = at(corner, axis);
-        }
+        (1..4).for_each(|corner| control[corner][corner][axis] = at(corner, axis));
         for (edge, [p, q]) in TET_EDGES.into_iter().enumerate() {
             let point = 2.0 * at(4 + edge, axis) - 0.5 * (at(p, axis) + at(q, axis));
             (control[p][q][axis], control[q][p][axis]) = (point, point);

@@ -72,11 +72,12 @@ pub(super) fn prove(
             let is_valid = |diagonal: u8| {
                 OCTAHEDRON[usize::from(diagonal)].iter().all(|corners| is_proved(&nodes(cell, *corners)))
             };
-            if !nested && !is_valid(diagonal) {
-                if let Some(other) = (0..3).find(|&other| other != diagonal && is_valid(other)) {
-                    diagonal::replace(diagonals, octahedron, other);
-                    diagonal = other;
-                }
+            if !nested
+                && !is_valid(diagonal)
+                && let Some(other) = (0..3).find(|&other| other != diagonal && is_valid(other))
+            {
+                diagonal::replace(diagonals, octahedron, other);
+                diagonal = other;
             }
             let first = cells.octahedron_child([cell, c, d]);
             for (child, corners) in (first..).zip(OCTAHEDRON[usize::from(diagonal)]) {
