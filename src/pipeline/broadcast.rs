@@ -79,10 +79,10 @@ mod tests {
 
     #[test]
     fn edges_that_rank_0_bends_are_bent_alike_on_all_ranks() {
-        let displacements: EdgeDisplacements =
+        let bent: EdgeDisplacements =
             [(7, [0.5, 0.0, -1.25]), (1 << 40, [0.1, 0.2, 0.3])].into_iter().collect();
         let received =
-            thread::run(3, |comm| displacements(comm, (comm.rank() == 0).then_some(&displacements)).unwrap());
-        assert_eq!(received.unwrap(), vec![displacements; 3]);
+            thread::run(3, |comm| displacements(comm, (comm.rank() == 0).then_some(&bent)).unwrap());
+        assert_eq!(received.unwrap(), vec![bent; 3]);
     }
 }

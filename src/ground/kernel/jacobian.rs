@@ -229,13 +229,12 @@ fn coefficients(nodes: &Nodes) -> (Coefficients, f64) {
 fn derivatives(nodes: &Nodes) -> [[[f64; 3]; 4]; 3] {
     // The control points by their two corners, relative to the first corner.
     let mut control = [[[0.0; 3]; 4]; 4];
-    let at = |node: usize, axis: usize| nodes[node][axis] - nodes[0][axis];
-    for axis in 0..3 {
-        (1..4).for_each(|corner| control[corner][corner][axis] = at(corner, axis));
-        for (edge, [p, q]) in TET_EDGES.into_iter().enumerate() {
-            let point = 2.0 * at(4 + edge, axis) - 0.5 * (at(p, axis) + at(q, axis));
-            (control[p][q][axis], control[q][p][axis]) = (point, point);
-        }
+    let at = |node: usize| [0, 1, 2].map(|axis| nodes[node][axis] - nodes[0][axis]);
+    (1..4).for_each(|corner| control[corner][corner] = at(corner));
+    for (edge, [p, q]) in TET_EDGES.into_iter().enumerate() {
+        let (node, p_at, q_at) = (at(4 + edge), at(p), at(q));
+        let point = [0, 1, 2].map(|axis| 2.0 * node[axis] - 0.5 * (p_at[axis] + q_at[axis]));
+        (control[p][q], control[q][p]) = (point, point);
     }
     let mut rows = [[[0.0; 3]; 4]; 3];
     for k in 0..3 {
