@@ -13,7 +13,7 @@
 //! ```
 //! Tags of nodes and tets are their global ids plus one, in the files of parts too; a shared node
 //! is in the files of all its parts. A triangle between two parts is in one of them (see
-//! [`once`](super::once)). A mesh of one part has no
+//! `files::once`). A mesh of one part has no
 //! `$PartitionedEntities` and no ghosts.
 //!
 //! In the file of all parts each rank writes its shares of the sections, at offsets that follow
@@ -112,7 +112,7 @@ pub fn write(
 /// them. Each has the nodes of its elements. All ranks get the totals.
 ///
 /// # Errors
-/// Those of [`write`]. All ranks get the error, and old files are kept.
+/// Those of [`write()`]. All ranks get the error, and old files are kept.
 pub fn write_parts(
     comm: &dyn Communicator,
     part: &dyn MeshStream,
