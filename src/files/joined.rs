@@ -17,7 +17,7 @@
 use super::lines::{self, ByPatch, TetLine, TriangleLine};
 use super::node_order::arranged;
 use super::number::{Numbering, number};
-use super::once::{LeftOut, left_out};
+use super::once::{LeftOut, left_out, share_of_triangles};
 use super::output::{Output, folder_and_name, write_file, write_together};
 use super::pairs::pairs;
 use super::text::{FLOAT_CHARS, Line};
@@ -89,10 +89,7 @@ impl<'a> Whole<'a> {
         let numbering = number(comm, part)?;
         let pairs = pairs(comm, part, &numbering, |index, _| index as u64)?;
         let left_out = left_out(comm, part, names)?;
-        let own_triangles = part.counts().boundary - left_out.len();
-        let [triangles_before] = comm.exclusive_scan([own_triangles])?;
-        let [boundary] = comm.all_reduce_sum_u64([own_triangles])?;
-        let totals = Counts { boundary, ..part.totals() };
+        let (triangles_before, totals) = share_of_triangles(comm, part, &left_out)?;
         let own_singular = part.singular().vertices;
         let own_singular = own_singular.iter().filter(|(local, _)| numbering.owns(*local as usize));
         let own_singular: Vec<[i64; 2]> =
@@ -115,25 +112,18 @@ impl<'a> Whole<'a> {
     }
 
     /// Appends the numbers of vertices, each after a blank.
-    pub fn ids<'v>(&self, line: &mut Line, vertices: impl IntoIterator<Item = &'v u32>) {
-        vertices.into_iter().for_each(|&v| self.id(line, v));
-    }
-
-    /// Appends the number of a vertex after a blank.
-    fn id(&self, line: &mut Line, vertex: u32) {
-        line.blank().int(self.numbering.vertex(vertex));
+    pub fn ids(&self, line: &mut Line, vertices: impl IntoIterator<Item = u32>) {
+        vertices.into_iter().for_each(|vertex| _ = line.blank().int(self.numbering.vertex(vertex)));
     }
 
     /// Appends the numbers of a tet's nodes, those on edges in the given order.
     pub fn tet_ids(&self, line: &mut Line, tet: &TetLine, order: &[usize; 6]) {
-        self.ids(line, tet.vertices);
-        arranged(tet.edge_nodes, order).for_each(|v| self.id(line, v));
+        self.ids(line, tet.vertices.iter().copied().chain(arranged(tet.edge_nodes, order)));
     }
 
     /// Appends the numbers of a triangle's nodes.
     pub fn triangle_ids(&self, line: &mut Line, triangle: &TriangleLine) {
-        self.ids(line, triangle.vertices);
-        self.ids(line, triangle.edge_nodes);
+        self.ids(line, triangle.vertices.iter().chain(triangle.edge_nodes).copied());
     }
 
     /// The order of the elements.

@@ -23,8 +23,8 @@ mod corners;
 mod domains;
 pub mod elmer;
 pub mod geomview;
+mod gmsh;
 pub mod gmsh4;
-mod groups;
 pub mod hdf5;
 pub(crate) mod input;
 mod joined;
@@ -54,7 +54,7 @@ pub mod volume;
 pub mod vtu;
 
 pub use input::{Place, ReadError, refuse_missing};
-pub use output::{Destination, Output, folder_of, is_same_place, remove_abandoned, write_file};
+pub use output::{Destination, Output, folder_of, is_same_place, remove_abandoned, with_ending, write_file};
 
 use crate::ground::comm::{CommError, Communicator};
 use crate::ground::error::{ErrorKind, HasKind};

@@ -6,8 +6,18 @@
 //! [`TET_EDGES`]: crate::ground::mesh::TET_EDGES
 //! [`TRIANGLE_EDGES`]: crate::ground::mesh::TRIANGLE_EDGES
 
+use crate::ground::mesh::Order;
+
 /// VTK, Elmer, Abaqus, CalculiX, Exodus: edges 01 12 02 03 13 23.
 pub const VTK: [usize; 6] = [0, 3, 1, 2, 4, 5];
+
+/// VTK's numbers for triangles and tets of an order.
+pub fn vtk_types(order: Order) -> [u8; 2] {
+    match order {
+        Order::First => [5, 10],
+        Order::Second => [22, 24],
+    }
+}
 
 /// Gmsh: the last two of VTK swapped.
 pub const GMSH: [usize; 6] = [0, 3, 1, 2, 5, 4];

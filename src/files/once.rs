@@ -10,8 +10,8 @@
 //! and the normal is the same as if both tets were in one part.
 
 use super::WriteError;
-use crate::ground::comm::Communicator;
-use crate::ground::mesh::stream::{BoundaryBlock, MeshStream, NO_TET, vertex_block_of};
+use crate::ground::comm::{CommError, Communicator};
+use crate::ground::mesh::stream::{BoundaryBlock, Counts, MeshStream, NO_TET, vertex_block_of};
 use crate::ground::mesh::{GlobalId, Names, Rank};
 
 /// Boundary triangles that another part writes, by ascending index in this part.
@@ -64,6 +64,19 @@ pub(crate) fn left_out(
     names: &Names,
 ) -> Result<LeftOut, WriteError> {
     Ok(between(comm, part, names, 0)?.left_out)
+}
+
+/// **Collective.** The number of triangles that lower ranks write, and the counts of the whole mesh
+/// with each triangle once.
+pub(crate) fn share_of_triangles(
+    comm: &dyn Communicator,
+    part: &dyn MeshStream,
+    left_out: &LeftOut,
+) -> Result<(u64, Counts), CommError> {
+    let own = part.counts().boundary - left_out.len();
+    let [before] = comm.exclusive_scan([own])?;
+    let [boundary] = comm.all_reduce_sum_u64([own])?;
+    Ok((before, Counts { boundary, ..part.totals() }))
 }
 
 /// **Collective.** Like [`left_out`], with the tets of other parts at the triangles that this part

@@ -65,6 +65,21 @@ impl Line {
         self
     }
 
+    /// Appends a number like [`float`](Self::float), but rounded to as many digits as fit into
+    /// `most` characters if the shortest text is longer.
+    pub fn float_within(&mut self, number: f64, most: usize) -> &mut Self {
+        let begin = self.len;
+        self.float(number);
+        if self.len - begin > most {
+            let rounded = |digits: usize| format!("{number:.digits$e}");
+            if let Some(text) = (0..16).rev().map(rounded).find(|text| text.len() <= most) {
+                self.len = begin;
+                self.bytes(text.as_bytes());
+            }
+        }
+        self
+    }
+
     /// Appends text.
     #[inline]
     pub fn bytes(&mut self, text: &[u8]) -> &mut Self {

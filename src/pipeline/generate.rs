@@ -158,11 +158,7 @@ fn refined(
     // The stage lasts until all ranks are done.
     let straightens = order == Order::Second && settings.allow_off_surface && !may_lower;
     let ((refined, straight), bad) = progress.stage(Stage::Refine, |work| {
-        let refined = if straightens {
-            refine::refine_straightening(comm, &dist, &projector, pieces, &how, work)?
-        } else {
-            (refine::refine_watched(dist, &projector, pieces, &how, work), Vec::new())
-        };
+        let refined = refine_part(comm, dist, (&projector, pieces), &how, straightens, work)?;
         inverted_anywhere(comm, &refined.0).map(|bad| (refined, bad))
     })?;
     if !bad.is_empty() && may_lower {
@@ -284,6 +280,22 @@ fn stored(
     })
 }
 
+/// **Collective** if edges may stay straight (`straightens`). Refines a part; also returns the
+/// nodes of the edges that stay straight.
+fn refine_part(
+    comm: &dyn Communicator,
+    part: DistMesh,
+    (projector, pieces): (&Projector, u32),
+    how: &refine::Settings,
+    straightens: bool,
+    work: &Work,
+) -> Result<(Result<RefinedMesh, RefineError>, Vec<GlobalId>), Error> {
+    if straightens {
+        return Ok(refine::refine_straightening(comm, &part, projector, pieces, how, work)?);
+    }
+    Ok((refine::refine_watched(part, projector, pieces, how, work), Vec::new()))
+}
+
 /// **Collective.** Adds the nodes on the edges of separately meshed parts, on the geometry.
 fn second_order(
     comm: &dyn Communicator,
@@ -295,11 +307,7 @@ fn second_order(
     progress.stage(Stage::Refine, |work| {
         let mesh = number_shared(comm, part)?;
         let how = refine::Settings { order: Order::Second, ..refine::Settings::default() };
-        let (refined, straight) = if allow_off_surface {
-            refine::refine_straightening(comm, &mesh, projector, 1, &how, work)?
-        } else {
-            (refine::refine_watched(mesh, projector, 1, &how, work), Vec::new())
-        };
+        let (refined, straight) = refine_part(comm, mesh, (projector, 1), &how, allow_off_surface, work)?;
         let part = comm.agree(refined.map_err(Error::from))?;
         let straight = straight_edges(comm, &part, projector, &straight)?;
         Ok((Part::Refined(Arc::new(part)), straight))

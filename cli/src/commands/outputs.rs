@@ -5,7 +5,9 @@ use crate::options::{Format, RunOptions};
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use tetmill::files::elmer::Layout;
-use tetmill::files::{Destination, WriteError, elmer, folder_of, hdf5, is_same_place, remove_abandoned};
+use tetmill::files::{
+    Destination, WriteError, elmer, folder_of, hdf5, is_same_place, remove_abandoned, with_ending,
+};
 
 /// The files that a command reads and writes, with the options that name them.
 #[derive(Default)]
@@ -181,14 +183,7 @@ const SERIAL: [&str; 4] = ["mesh.header", "mesh.nodes", "mesh.elements", "mesh.b
 
 /// The paths that a format writes in the folder.
 fn entries(format: Format, folder: &Path, stem: &Path, parts: u32) -> Vec<PathBuf> {
-    let named = |ends: &[&str]| {
-        let with_end = |end: &&str| {
-            let mut name = stem.as_os_str().to_owned();
-            name.push(end);
-            name.into()
-        };
-        ends.iter().map(with_end).collect::<Vec<PathBuf>>()
-    };
+    let named = |ends: &[&str]| ends.iter().map(|end| with_ending(stem, end)).collect::<Vec<PathBuf>>();
     match (format, parts) {
         (Format::None, _) => Vec::new(),
         (Format::Elmer, 1) => {

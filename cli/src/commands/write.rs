@@ -3,7 +3,7 @@
 use crate::failure::{Failure, Status, agree};
 use crate::options::{Boundary, Format, Halo, RunOptions};
 use crate::report::HaloReport;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use tetmill::comm::Communicator;
 use tetmill::files::{Written, elmer, gmsh4, serial, vtu};
 use tetmill::mesh::{By, MeshStream, Names, Watched, WithHalo};
@@ -67,12 +67,7 @@ pub(super) fn write_formats(
     let part: &dyn MeshStream = with_halo.as_ref().map_or(part, |with_halo| with_halo);
     let part =
         &Watched::new(part, work, options.format.iter().map(|format| passes(format, options.ascii)).sum());
-    let with_ending = |ending: &str| {
-        // No `with_extension`: names may contain dots.
-        let mut file = stem.as_os_str().to_os_string();
-        file.push(ending);
-        PathBuf::from(file)
-    };
+    let with_ending = |ending: &str| files::with_ending(stem, ending);
     let storage = if options.ascii { gmsh4::Storage::Text } else { gmsh4::Storage::Binary };
     let joined = |ending: &str, format: serial::Format| {
         let file = with_ending(ending);

@@ -4,6 +4,7 @@ use super::parse::{Fields, expect_readable_by_elmer, for_each_line, read_lines, 
 use super::{MAX_LINE, TET, TET_10, TRIANGLE, TRIANGLE_6};
 use crate::Point;
 use crate::files::input::ReadError;
+use crate::files::output::with_ending;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::fs;
@@ -138,10 +139,7 @@ impl ElmerPart {
 }
 
 fn file(stem: &Path, kind: &str) -> PathBuf {
-    let mut path = stem.as_os_str().to_owned();
-    path.push(".");
-    path.push(kind);
-    path.into()
+    with_ending(stem, &format!(".{kind}"))
 }
 
 /// The counts of a part.

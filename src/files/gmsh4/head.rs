@@ -5,11 +5,8 @@ use super::Storage;
 use super::numbers::{Numbers, end_of};
 use super::plan::Plan;
 use crate::files::WriteError;
-use crate::files::groups::{Groups, physical_names};
+use crate::files::gmsh::{Bounds, Groups, bounds, bounds_of_all, physical_names};
 use crate::ground::comm::Communicator;
-
-/// A box: least coordinates, then largest ones.
-type Bounds = [f64; 6];
 
 /// What one part has of the bodies and patches.
 #[derive(Clone, Debug)]
@@ -23,7 +20,7 @@ struct PartEntities {
 
 /// **Collective.** The first sections of a file of all parts; empty on all ranks but the first.
 pub(super) fn of_all(comm: &dyn Communicator, plan: &Plan, storage: Storage) -> Result<Vec<u8>, WriteError> {
-    let own = bounds(plan);
+    let own = bounds(plan.part);
     let whole = bounds_of_all(comm, own)?;
     let (bodies, patches) = (comm.gather(0, &plan.bodies)?, comm.gather(0, &plan.patches)?);
     let bounds = comm.gather(0, &own)?.concat();
@@ -46,7 +43,7 @@ pub(super) fn of_all(comm: &dyn Communicator, plan: &Plan, storage: Storage) -> 
 /// the whole, but only this part's share of them: the length does not grow with the number of
 /// parts.
 pub(super) fn of_part(comm: &dyn Communicator, plan: &Plan, storage: Storage) -> Result<Vec<u8>, WriteError> {
-    let own = bounds(plan);
+    let own = bounds(plan.part);
     let whole = bounds_of_all(comm, own)?;
     let part = PartEntities {
         number: plan.number(),
@@ -127,24 +124,4 @@ fn end_entity(numbers: &mut Numbers, bounds: &Bounds, tags: &[u32]) {
     numbers.size(tags.len() as u64);
     tags.iter().for_each(|&tag| _ = numbers.int(tag));
     numbers.size(0).end();
-}
-
-/// The bounding box of the part.
-fn bounds(plan: &Plan) -> Bounds {
-    let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-    for index in 0..plan.part.vertex_blocks() {
-        for point in plan.part.vertex_points(index).iter() {
-            for axis in 0..3 {
-                low[axis] = low[axis].min(point[axis]);
-                high[axis] = high[axis].max(point[axis]);
-            }
-        }
-    }
-    [low[0], low[1], low[2], high[0], high[1], high[2]]
-}
-
-/// **Collective.** The bounding box of the mesh.
-fn bounds_of_all(comm: &dyn Communicator, [a, b, c, d, e, f]: Bounds) -> Result<Bounds, WriteError> {
-    let ([a, b, c], [d, e, f]) = (comm.all_reduce_min_f64([a, b, c])?, comm.all_reduce_max_f64([d, e, f])?);
-    Ok([a, b, c, d, e, f])
 }

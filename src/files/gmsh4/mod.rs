@@ -31,7 +31,7 @@ mod sections;
 mod tests;
 
 use super::joined::write_shares;
-use super::output::{Output, folder_and_name, write_file, write_together};
+use super::output::{Output, folder_and_name, with_ending, write_file, write_together};
 use super::{WriteError, Written, sum_written};
 use crate::ground::comm::Communicator;
 use crate::ground::mesh::Names;
@@ -133,8 +133,7 @@ pub fn write_parts(
         estimate(&share, &sections),
         |_| false,
         |stage| {
-            let mut file = name.as_os_str().to_os_string();
-            file.push(format!("_{}.msh", plan.number()));
+            let file = with_ending(&name, &format!("_{}.msh", plan.number()));
             let mut file = Output::create(&stage.join(file))?;
             sections.iter().try_for_each(|section| share.write(section, &mut file))?;
             Ok(Written { files: 1, bytes: file.finish()? })

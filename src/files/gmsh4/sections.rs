@@ -6,12 +6,13 @@ use super::plan::{Plan, owns};
 use super::records::Ghost;
 use crate::files::WriteError;
 use crate::files::chunks::{items, split, write_chunks};
+use crate::files::gmsh::types;
 use crate::files::lines::FLUSH_AT;
-use crate::files::node_order::GMSH;
+use crate::files::node_order::{GMSH, arranged};
 use crate::files::output::Output;
+use crate::ground::mesh::GlobalId;
 use crate::ground::mesh::periodic::Link;
 use crate::ground::mesh::stream::LocalBlock;
-use crate::ground::mesh::{GlobalId, Order};
 
 /// Nodes or tets that one thread formats at a time.
 const PER_CHUNK: u64 = 4096;
@@ -195,9 +196,8 @@ impl Share<'_> {
                     self.begin_block(block.tets.first_local + place as u64, &mut numbers);
                     numbers.size(block.tets.first_id + place as u64 + 1);
                     tet.iter().for_each(|&vertex| _ = numbers.size(ids[vertex as usize] + 1));
-                    let edges = block.tets.edge_nodes_of(place);
-                    let edges = GMSH.iter().filter_map(|&edge| edges.get(edge));
-                    edges.for_each(|&vertex| _ = numbers.size(ids[vertex as usize] + 1));
+                    let edges = arranged(block.tets.edge_nodes_of(place), &GMSH);
+                    edges.for_each(|vertex| _ = numbers.size(ids[vertex as usize] + 1));
                     numbers.end();
                 }
             }
@@ -233,14 +233,6 @@ impl Share<'_> {
             file.flush_past(FLUSH_AT, &mut bytes)?;
         }
         file.write(&bytes)
-    }
-}
-
-/// Gmsh's numbers of triangles and tets of an order.
-fn types(order: Order) -> [u32; 2] {
-    match order {
-        Order::First => [2, 4],
-        Order::Second => [9, 11],
     }
 }
 

@@ -6,26 +6,16 @@ use super::{
     PERIODIC_IDS, POINTS, TRIANGLE_PARTS, TRIANGLES, TYPES, cells, fields, named_path,
 };
 use crate::files::chunks::{items, split, write_chunks};
-use crate::files::node_order::{VTK, arranged};
+use crate::files::lines::FLUSH_AT;
+use crate::files::node_order::{VTK, arranged, vtk_types};
 use crate::files::output::Output;
 use crate::files::{WriteError, body_number, patch_number};
-use crate::ground::mesh::Order;
 use crate::ground::mesh::stream::{NO_TET, TetBlock};
 use std::ops::Range;
 use std::path::Path;
 
 /// Tets or vertices that one thread encodes at a time.
 const PER_CHUNK: u64 = 1 << 14;
-/// Bytes of triangles to buffer before a write.
-const FLUSH_AT: usize = 1 << 20;
-
-/// VTK's number for tets of an order.
-fn vtk_type(order: Order) -> u8 {
-    match order {
-        Order::First => 10,
-        Order::Second => 24,
-    }
-}
 
 /// A file that several ranks write.
 struct Datasets<'a> {
@@ -169,9 +159,9 @@ impl Content<'_> {
         let first = self.numbering.first_tet - 1;
         let own = first..first + self.part.counts().tets;
         let offsets = own.start..own.end + u64::from(is_last);
-        let nodes = order.tet_nodes() as u64;
+        let (nodes, [_, vtk_type]) = (order.tet_nodes() as u64, vtk_types(order));
         self.each(&mut file.at(OFFSETS, first)?, offsets, |tet| (nodes * tet).to_ne_bytes())?;
-        self.each(&mut file.at(TYPES, first)?, own.clone(), |_| [vtk_type(order)])?;
+        self.each(&mut file.at(TYPES, first)?, own.clone(), |_| [vtk_type])?;
         let number = (self.part.rank() + 1).to_ne_bytes();
         self.each(&mut file.at(PARTS, first)?, own, |_| number)
     }

@@ -39,15 +39,15 @@ mod xdmf;
 
 use super::lines::ByPatch;
 use super::number::{Numbering, number};
-use super::once::{Between, between};
-use super::output::{folder_and_name, write_text, write_together};
+use super::once::{Between, between, share_of_triangles};
+use super::output::{folder_and_name, with_ending, write_text, write_together};
 use super::{WriteError, Written, sum_written};
 use crate::ground::comm::Communicator;
 use crate::ground::mesh::stream::{Counts, MeshStream};
-use crate::ground::mesh::{Label, Names, Order};
+use crate::ground::mesh::{Label, Names, Order, numbers_by_name};
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use tree::{Kind, Tree, Value};
 
 /// The endings of the two files.
@@ -153,22 +153,12 @@ pub fn write(
     sum_written(comm, written)
 }
 
-fn with_ending(name: &Path, ending: &str) -> PathBuf {
-    // No `with_extension`: names may contain dots.
-    let mut name = name.as_os_str().to_os_string();
-    name.push(ending);
-    name.into()
-}
-
 impl<'a> Content<'a> {
     /// **Collective.** Numbers the entities.
     fn of(comm: &dyn Communicator, part: &'a dyn MeshStream, names: &'a Names) -> Result<Self, WriteError> {
         let numbering = number(comm, part)?;
         let between = between(comm, part, names, numbering.first_tet)?;
-        let own_triangles = part.counts().boundary - between.left_out.len();
-        let [triangles_before] = comm.exclusive_scan([own_triangles])?;
-        let [boundary] = comm.all_reduce_sum_u64([own_triangles])?;
-        let totals = Counts { boundary, ..part.totals() };
+        let (triangles_before, totals) = share_of_triangles(comm, part, &between.left_out)?;
         let by_patch = ByPatch::of(part);
         Ok(Self { part, names, totals, numbering, by_patch, between, triangles_before })
     }
@@ -230,11 +220,9 @@ fn named_path(kind: &str, what: &str) -> String {
 /// groups, so a slash in a name becomes `_`.
 fn fields(kind: &str, labels: &[Label]) -> BTreeMap<String, BTreeSet<u32>> {
     let mut fields: BTreeMap<String, BTreeSet<u32>> = BTreeMap::new();
-    for label in labels {
-        for name in &label.names {
-            let path = format!("/VTKHDF/FieldData/{kind} {}", name.replace('/', "_"));
-            fields.entry(path).or_default().insert(label.number);
-        }
+    for (name, numbers) in numbers_by_name(labels) {
+        let path = format!("/VTKHDF/FieldData/{kind} {}", name.replace('/', "_"));
+        fields.entry(path).or_default().extend(numbers);
     }
     fields
 }

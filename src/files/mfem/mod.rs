@@ -22,12 +22,12 @@ mod shared;
 
 use super::corners::Corners;
 use super::lines::FLUSH_AT;
-use super::output::{Output, folder_and_name, write_together};
+use super::output::{Output, folder_and_name, with_ending, write_together};
 use super::text::{FLOAT_CHARS, Line};
 use super::{WriteError, Written, body_number, patch_number, sum_written};
 use crate::ground::comm::Communicator;
 use crate::ground::mesh::stream::{BoundaryBlock, LocalBlock, MeshStream, NO_TET, TetBlock};
-use crate::ground::mesh::{Label, Names, Order};
+use crate::ground::mesh::{Names, Order, numbers_by_name};
 use shared::{Group, Groups, groups};
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::Write;
@@ -97,8 +97,7 @@ pub fn write(
         estimate(part),
         |_| false,
         |stage| {
-            let mut file = name.as_os_str().to_os_string();
-            file.push(format!(".{:06}", part.rank()));
+            let file = with_ending(&name, &format!(".{:06}", part.rank()));
             let mut file = Output::create(&stage.join(file))?;
             let mut text = Vec::new();
             content.write(&mut text, &mut |text| file.flush_past(FLUSH_AT, text))?;
@@ -151,7 +150,7 @@ impl<'a> Content<'a> {
 
     fn write(&self, text: &mut Vec<u8>, flush: Flush<'_>) -> Result<(), WriteError> {
         let names = self.names;
-        let sets = [&names.bodies, &names.patches].map(|labels| by_name(labels));
+        let sets = [&names.bodies, &names.patches].map(|labels| numbers_by_name(labels));
         let has_names = sets.iter().any(|sets| !sets.is_empty());
         title(text, "MFEM mesh v1.", if has_names { 3 } else { 2 });
         let linear = self.corners.as_ref().map_or(self.part, |corners| corners);
@@ -193,17 +192,6 @@ fn end(line: &mut Line, vertices: &[u32], text: &mut Vec<u8>) {
         line.blank().int(vertex.into());
     }
     line.end(text);
-}
-
-/// The numbers of each name.
-fn by_name(labels: &[Label]) -> BTreeMap<&str, BTreeSet<u32>> {
-    let mut sets: BTreeMap<&str, BTreeSet<u32>> = BTreeMap::new();
-    for label in labels {
-        for name in &label.names {
-            sets.entry(name).or_default().insert(label.number);
-        }
-    }
-    sets
 }
 
 fn write_sets(section: &str, sets: &BTreeMap<&str, BTreeSet<u32>>, text: &mut Vec<u8>) {
@@ -353,8 +341,8 @@ fn write_group(index: usize, group: &Group, text: &mut Vec<u8>) {
 mod tests {
     use super::*;
     use crate::files::testing::{cube, names, scattered, together, two_tets};
-    use crate::ground::mesh::Mesh;
     use crate::ground::mesh::Rank;
+    use crate::ground::mesh::{Label, Mesh};
     use crate::parallel::distribution::{BareMesh, DistMesh, Shared, distribute, number_shared};
     use crate::parallel::migrate::{BareStream, bare};
     use crate::parallel::refine::fixtures::ball;
@@ -400,7 +388,7 @@ mod tests {
     fn a_name_has_all_its_numbers_and_quotes_are_escaped() {
         let labels = [Label::new(7, "a \"b\""), Label::new(2, "a \"b\""), Label::new(7, "c\\d")];
         let mut text = Vec::new();
-        write_sets("bdr_attribute_sets", &by_name(&labels), &mut text);
+        write_sets("bdr_attribute_sets", &numbers_by_name(&labels), &mut text);
         let expected = "\nbdr_attribute_sets\n2\n\"a \\\"b\\\"\"\n2\n2 7\n\"c\\\\d\"\n1\n7\n";
         assert_eq!(String::from_utf8(text).unwrap(), expected);
         let text = together(1, |comm| {

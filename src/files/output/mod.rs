@@ -95,6 +95,14 @@ pub fn folder_and_name(path: &Path) -> Result<(PathBuf, PathBuf), WriteError> {
     Ok((destination::parent(path).to_path_buf(), name.into()))
 }
 
+/// A path whose name goes on with an ending. Unlike [`Path::with_extension`] it replaces nothing:
+/// names may contain dots.
+pub fn with_ending(path: &Path, ending: &str) -> PathBuf {
+    let mut name = path.as_os_str().to_os_string();
+    name.push(ending);
+    name.into()
+}
+
 /// The folder of an output file with links followed; `None` for a path that is written through.
 pub fn folder_of(path: &Path) -> Option<PathBuf> {
     match Destination::of(path) {

@@ -17,7 +17,7 @@ use crate::files::node_order::{VTK, arranged};
 use crate::files::runs::Runs;
 use crate::ground::comm::Communicator;
 use crate::ground::mesh::stream::{MeshStream, NO_TET, TetBlock};
-use crate::ground::mesh::{Label, Names, Order};
+use crate::ground::mesh::{Label, Names, Order, numbers_by_name};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 
@@ -45,8 +45,8 @@ pub(super) fn sections<'a>(
         Order::First => "C3D4",
         Order::Second => "C3D10",
     };
-    let of_bodies = numbers_by_name(&whole.names.bodies, &body_numbers(comm, whole, &bodies)?);
-    let of_boundaries = numbers_by_name(&whole.names.patches, &kinds.keys().copied().collect());
+    let of_bodies = present_by_name(&whole.names.bodies, &body_numbers(comm, whole, &bodies)?);
+    let of_boundaries = present_by_name(&whole.names.patches, &kinds.keys().copied().collect());
     let end = by_name("ELSET", "BODY", &of_bodies)
         + &surfaces(&kinds)
         + &by_name("NSET", "BOUNDARY", &of_boundaries)
@@ -55,7 +55,7 @@ pub(super) fn sections<'a>(
         Section::Text("*NODE, NSET=NALL\n".into()),
         Section::Vertices(Box::new(|line, number, point| {
             line.int(number);
-            point.iter().for_each(|&x| _ = line.bytes(b", ").bytes(real(x).as_bytes()));
+            point.iter().for_each(|&x| _ = line.bytes(b", ").float_within(x, LONGEST_REAL));
         })),
         Section::Tets(Box::new(move |line, tet| {
             let run = bodies.find(tet.index);
@@ -70,19 +70,6 @@ pub(super) fn sections<'a>(
         Section::Own(faces.text().into_bytes()),
         Section::Text(end),
     ])
-}
-
-/// A number in the fewest digits that read back bitwise equal, or as many as CalculiX reads, at
-/// least 12.
-fn real(number: f64) -> String {
-    let exact = if number == 0.0 || (1e-5..1e16).contains(&number.abs()) {
-        format!("{number}")
-    } else {
-        format!("{number:e}")
-    };
-    let rounded = |digits: usize| format!("{number:.digits$e}");
-    let shorter = (0..16).rev().map(rounded).find(|text| text.len() <= LONGEST_REAL);
-    if exact.len() <= LONGEST_REAL { exact } else { shorter.unwrap_or(exact) }
 }
 
 /// **Collective.** The numbers of bodies that have tets, on any rank.
@@ -199,14 +186,14 @@ fn faces_of(number: u64, faces: &BTreeSet<u8>) -> String {
 }
 
 /// The numbers of each name of bodies or boundaries that have elements: a set of none is an error.
-fn numbers_by_name(labels: &[Label], present: &BTreeSet<u64>) -> BTreeMap<String, BTreeSet<u64>> {
-    let mut numbers: BTreeMap<String, BTreeSet<u64>> = BTreeMap::new();
-    for label in labels.iter().filter(|label| present.contains(&label.number.into())) {
-        for name in &label.names {
-            numbers.entry(word(name)).or_default().insert(label.number.into());
-        }
+fn present_by_name(labels: &[Label], present: &BTreeSet<u64>) -> BTreeMap<String, BTreeSet<u64>> {
+    let mut by_word: BTreeMap<String, BTreeSet<u64>> = BTreeMap::new();
+    for (name, numbers) in numbers_by_name(labels) {
+        let numbers = numbers.into_iter().map(u64::from).filter(|number| present.contains(number));
+        by_word.entry(word(name)).or_default().extend(numbers);
     }
-    numbers
+    by_word.retain(|_, numbers| !numbers.is_empty());
+    by_word
 }
 
 /// A set for each name, of the sets of its numbers.
@@ -269,6 +256,7 @@ mod tests {
     use super::*;
     use crate::files::plain::PlainPart;
     use crate::files::testing::{names, two_tets};
+    use crate::files::text::Line;
 
     #[test]
     fn two_tets_are_written_to_the_letter() {
@@ -289,6 +277,12 @@ mod tests {
         assert_eq!(std::fs::read_to_string(&path).unwrap(), expected);
         assert_eq!(losses(&names()), Vec::<String>::new());
         assert_eq!(Format::of(&path).unwrap(), Format::Abaqus);
+    }
+
+    fn real(number: f64) -> String {
+        let (mut line, mut text) = (Line::default(), Vec::new());
+        line.float_within(number, LONGEST_REAL).end(&mut text);
+        String::from_utf8(text).unwrap().trim_end().to_owned()
     }
 
     #[test]

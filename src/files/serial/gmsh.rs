@@ -8,13 +8,13 @@
 
 use super::{coordinates, listed};
 use crate::files::WriteError;
-use crate::files::groups::{Groups, physical_names};
+use crate::files::gmsh::{Bounds, Groups, bounds, bounds_of_all, physical_names, types};
 use crate::files::joined::{Section, Whole};
 use crate::files::node_order::GMSH;
 use crate::files::runs::Runs;
 use crate::files::text::Line;
 use crate::ground::comm::Communicator;
-use crate::ground::mesh::{Names, Order};
+use crate::ground::mesh::Names;
 
 /// **Collective.** The sections of the file.
 pub(super) fn sections<'a>(
@@ -38,7 +38,7 @@ fn sections_2<'a>(whole: &'a Whole<'a>, patches: Groups, bodies: Groups) -> Vec<
     let counts = whole.totals;
     let head = head("2.2", &patches, &bodies) + &format!("$Nodes\n{}\n", counts.vertices);
     let group = |groups: &Groups, of: usize| u64::from(groups.of[of][0]);
-    let [triangle_type, tet_type] = types(whole.order());
+    let [triangle_type, tet_type] = types(whole.order()).map(u64::from);
     vec![
         Section::Text(head),
         Section::Vertices(Box::new(|line, number, point| coordinates(line.int(number).blank(), point))),
@@ -71,9 +71,9 @@ fn sections_4<'a>(
     let [blocks] = comm.all_reduce_sum_u64([(of_patches.0.len() + of_bodies.0.len()) as u64])?;
     let first_body = of_bodies.0.first().map_or(1, |run| run.of + 1);
     let (n, elements) = (counts.vertices, counts.boundary + counts.tets);
-    let [triangle_type, tet_type] = types(whole.order());
+    let [triangle_type, tet_type] = types(whole.order()).map(u64::from);
     let head = head("4.1", patches, bodies)
-        + &entities(whole.names, &bounds(comm, whole)?, patches, bodies)
+        + &entities(whole.names, bounds_of_all(comm, bounds(whole.part))?, patches, bodies)
         + &format!("$Nodes\n1 {n} 1 {n}\n3 {first_body} 0 {n}\n");
     Ok(vec![
         Section::Text(head),
@@ -92,14 +92,6 @@ fn sections_4<'a>(
     ])
 }
 
-/// Gmsh's numbers of triangles and tets of an order.
-fn types(order: Order) -> [u64; 2] {
-    match order {
-        Order::First => [2, 4],
-        Order::Second => [9, 11],
-    }
-}
-
 /// Starts a block before the first element of a run: dimension, entity, type, count.
 fn begin_block(line: &mut Line, runs: &Runs, element: u64, dimension: u64, kind: u64) {
     let run = runs.find(element);
@@ -109,24 +101,10 @@ fn begin_block(line: &mut Line, runs: &Runs, element: u64, dimension: u64, kind:
     }
 }
 
-/// **Collective.** The bounding box of the mesh.
-fn bounds(comm: &dyn Communicator, whole: &Whole) -> Result<String, WriteError> {
-    let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-    for index in 0..whole.part.vertex_blocks() {
-        for point in whole.part.vertex_points(index).iter() {
-            for axis in 0..3 {
-                low[axis] = low[axis].min(point[axis]);
-                high[axis] = high[axis].max(point[axis]);
-            }
-        }
-    }
-    let (low, high) = (comm.all_reduce_min_f64(low)?, comm.all_reduce_max_f64(high)?);
-    Ok(low.iter().chain(&high).map(|x| format!(" {x}")).collect())
-}
-
 /// The section of patches and bodies with their groups. All get the box of the mesh, as Gmsh itself
 /// does for entities without geometry.
-fn entities(names: &Names, bounds: &str, patches: &Groups, bodies: &Groups) -> String {
+fn entities(names: &Names, bounds: Bounds, patches: &Groups, bodies: &Groups) -> String {
+    let bounds: String = bounds.iter().map(|x| format!(" {x}")).collect();
     let mut text = format!("$Entities\n0 0 {} {}\n", names.patches.len(), names.bodies.len());
     for groups in [patches, bodies] {
         for (entity, tags) in (1..).zip(&groups.of) {

@@ -46,17 +46,15 @@ pub(super) fn sections<'a>(
                 let domain = body.and_then(|body| of_domains.get(body.index())).copied().unwrap_or(0);
                 line.blank().int(domain.into());
             }
-            whole.ids(line.blank().int(whole.order().triangle_nodes() as u64), triangle.vertices);
-            let edges: Vec<u32> = arranged(triangle.edge_nodes, &NETGEN_TRIANGLE).collect();
-            whole.ids(line, &edges);
+            line.blank().int(whole.order().triangle_nodes() as u64);
+            let edges = arranged(triangle.edge_nodes, &NETGEN_TRIANGLE);
+            whole.ids(line, triangle.vertices.iter().copied().chain(edges));
         })),
         Section::Text(format!("volumeelements\n{}\n", counts.tets)),
         Section::Tets(Box::new(move |line, tet| {
             let [a, b, c, d] = *tet.vertices;
             line.int(of_bodies[tet.body.index()].into()).blank().int(whole.order().tet_nodes() as u64);
-            whole.ids(line, &[b, a, c, d]);
-            let edges: Vec<u32> = arranged(tet.edge_nodes, &NETGEN).collect();
-            whole.ids(line, &edges);
+            whole.ids(line, [b, a, c, d].into_iter().chain(arranged(tet.edge_nodes, &NETGEN)));
         })),
         Section::Text(format!("edgesegmentsgi2\n0\npoints\n{}\n", counts.vertices)),
         Section::Vertices(Box::new(|line, _, point| coordinates(line, point))),

@@ -2,6 +2,7 @@
 
 use crate::files::WriteError;
 use crate::files::chunks::{items, split, write_chunks};
+use crate::files::node_order::vtk_types;
 use crate::files::output::Output;
 use crate::ground::mesh::Order;
 use crate::ground::progress::Work;
@@ -99,13 +100,6 @@ pub(super) struct Piece {
     pub hides_fields: bool,
 }
 
-/// VTK's numbers for triangles and tets of an order.
-fn types(order: Order) -> [u64; 2] {
-    match order {
-        Order::First => [5, 10],
-        Order::Second => [22, 24],
-    }
-}
 /// Length in bytes of the size that precedes each array.
 const LENGTH: u64 = 8;
 const END: &str = "\n </AppendedData>\n</VTKFile>\n";
@@ -297,7 +291,7 @@ impl PieceFile<'_> {
         let order = self.piece.order;
         let (of_tet, of_triangle) = (order.tet_nodes() as u64, order.triangle_nodes() as u64);
         let end = |count: u64| of_tet * count.min(tets) + of_triangle * count.saturating_sub(tets);
-        let [triangle, tet] = types(order);
+        let [triangle, tet] = vtk_types(order).map(u64::from);
         self.fill("offsets", |cell| end(cell + 1))?;
         self.fill("types", |cell| if cell < tets { tet } else { triangle })
     }

@@ -19,6 +19,7 @@ pub use super::comm::Rank;
 pub use super::kernel::simplex::{EDGE_BETWEEN, TET_EDGES, TET_FACES, TRIANGLE_EDGES};
 pub use arrays::Arrays;
 pub use ids::{EdgeId, FaceId, GlobalId, TetId, VertexId};
+pub(crate) use names::numbers_by_name;
 pub use names::{Label, Names, UnknownName};
 pub use order::Order;
 pub use quality::QualitySummary;

@@ -4,6 +4,7 @@ use crate::ground::error::{ErrorKind, HasKind};
 use csg::language::did_you_mean;
 use csg::{BodyId, PatchId};
 use serde::{Deserialize, Serialize};
+use std::collections::{BTreeMap, BTreeSet};
 
 /// The number of a body or boundary, and its names.
 ///
@@ -109,6 +110,17 @@ impl Names {
     pub fn bodies_named(&self, name: &str) -> Result<Vec<BodyId>, UnknownName> {
         Ok(positions(&self.bodies, name, "body")?.into_iter().map(BodyId).collect())
     }
+}
+
+/// The numbers of each name, by name.
+pub(crate) fn numbers_by_name(labels: &[Label]) -> BTreeMap<&str, BTreeSet<u32>> {
+    let mut numbers: BTreeMap<&str, BTreeSet<u32>> = BTreeMap::new();
+    for label in labels {
+        for name in &label.names {
+            numbers.entry(name).or_default().insert(label.number);
+        }
+    }
+    numbers
 }
 
 /// The positions of the labels with this name.

@@ -19,15 +19,15 @@ pub(super) fn check_block(
     let mut curved_volume6 = 0.0;
     for (id, (corners, edges)) in (tets.first_id..).zip(tets.tets.iter().zip(&tets.edge_nodes)) {
         let nodes = jacobian::nodes(*corners, *edges, |k| points[k as usize]);
-        let least = report.scaled_jacobian.map_or(f64::INFINITY, |least| least.value);
-        // Straight tets count as 1, and only the first of them can be the least.
-        if least <= 1.0 && jacobian::is_straight(&nodes) {
+        // Straight tets count as 1, and only the first tet of all can be the least with that.
+        let is_straight = jacobian::is_straight(&nodes);
+        if is_straight && report.scaled_jacobian.is_some() {
             continue;
         }
         let range = jacobian::range(&nodes);
         let [p, q, r, s] = [0, 1, 2, 3].map(|corner| Point::from(nodes[corner]));
         let place = ((p.coords + q.coords + r.coords + s.coords) / 4.0).into();
-        let scaled = if jacobian::is_straight(&nodes) { 1.0 } else { range.scaled() };
+        let scaled = if is_straight { 1.0 } else { range.scaled() };
         let this = Extreme { value: scaled, tet: id, place };
         report.scaled_jacobian = Some(report.scaled_jacobian.map_or(this, |least| least.least(this)));
         if !range.is_positive() {

@@ -203,6 +203,14 @@ pub struct PartReport {
     pub furthest: Option<OffSurface>,
 }
 
+/// The one that is there, or that of two which `choose` returns.
+fn either<T>(mine: Option<T>, others: Option<T>, choose: fn(T, T) -> T) -> Option<T> {
+    match (mine, others) {
+        (Some(mine), Some(others)) => Some(choose(mine, others)),
+        (mine, others) => mine.or(others),
+    }
+}
+
 impl PartReport {
     /// Adds to the volume of the mesh, and to that of a body.
     pub(super) fn add_volume(&mut self, body: Option<BodyId>, volume: f64) {
@@ -235,14 +243,8 @@ impl PartReport {
             (Some(mine), Some(others)) => mine.merge(&others),
             (mine, others) => *mine = mine.take().or(others),
         }
-        self.scaled_jacobian = match (self.scaled_jacobian, other.scaled_jacobian) {
-            (Some(mine), Some(others)) => Some(mine.least(others)),
-            (mine, others) => mine.or(others),
-        };
-        self.furthest = match (self.furthest, other.furthest) {
-            (Some(mine), Some(others)) => Some(mine.further(others)),
-            (mine, others) => mine.or(others),
-        };
+        self.scaled_jacobian = either(self.scaled_jacobian, other.scaled_jacobian, Extreme::least);
+        self.furthest = either(self.furthest, other.furthest, OffSurface::further);
         self
     }
 

@@ -3,6 +3,7 @@
 //! The nodes of the children of n subdivisions are the points of the lattice of 2n: corners are the
 //! points with even coordinates, and the node on an edge is half way between its ends.
 
+use super::cut::middle;
 use super::diagonal;
 use super::lattice::{Lattice, OCTAHEDRON, UPRIGHT, UPSIDE_DOWN};
 use super::snap::Coordinates;
@@ -59,7 +60,7 @@ pub(super) fn prove(
         let nodes = |cell: u32, corners: [u8; 4]| nodes_at(axes, plan, [cell, c, d], &steps(corners));
         let mut check = |child: u32, nodes: &Nodes| {
             if !is_proved(nodes) {
-                bad.push((child, centroid(nodes)));
+                bad.push((child, middle(&corners(nodes))));
             }
         };
         let first = cells.child_row(c, d);
@@ -100,16 +101,15 @@ fn nodes_at(axes: &[Vec<f64>; 3], plan: &Plan, [b, c, d]: [u32; 3], steps: &Step
     })
 }
 
+fn corners(nodes: &Nodes) -> [Point; 4] {
+    [0, 1, 2, 3].map(|corner| Point::from(nodes[corner]))
+}
+
 /// Whether the corners are positively oriented and the determinant is proved positive everywhere.
 fn is_proved(nodes: &Nodes) -> bool {
     if jacobian::is_straight(nodes) {
         return true;
     }
-    let [p, q, r, s] = [0, 1, 2, 3].map(|corner| Point::from(nodes[corner]));
+    let [p, q, r, s] = corners(nodes);
     orient3d(&p, &q, &r, &s) == Sign::Positive && jacobian::range(nodes).is_positive()
-}
-
-/// The centroid of the corners.
-fn centroid(nodes: &Nodes) -> Coordinates {
-    [0, 1, 2].map(|x| 0.25 * (nodes[0][x] + nodes[1][x] + nodes[2][x] + nodes[3][x]))
 }

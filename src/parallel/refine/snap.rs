@@ -20,7 +20,7 @@ use super::lattice::Lattice;
 use super::numbering::Numbering;
 use super::{Keep, RefineError, Settings};
 use crate::Point;
-use crate::ground::mesh::{Class, EdgeId, TET_EDGES, TET_FACES, TetId};
+use crate::ground::mesh::{Class, EDGE_BETWEEN, EdgeId, TET_FACES, TetId};
 use crate::ground::projector::Projector;
 use crate::parallel::distribution::DistMesh;
 use csg::{CurveId, PatchId, ProjectionFailed};
@@ -218,11 +218,8 @@ fn face_edges(mesh: &DistMesh) -> Vec<[EdgeId; 3]> {
     for (tet, vertices) in mesh.tets.iter().enumerate() {
         for (corners, face) in TET_FACES.into_iter().zip(mesh.tet_faces[tet]) {
             let [p, q, r] = super::numbering::ascending(corners, |corner| vertices[corner].0);
-            face_to_edges[face.index()] = [[p, q], [p, r], [q, r]].map(|mut pair| {
-                pair.sort_unstable();
-                let edge = TET_EDGES.iter().position(|e| *e == pair).expect("two corners make an edge");
-                mesh.tet_edges[tet][edge]
-            });
+            face_to_edges[face.index()] =
+                [[p, q], [p, r], [q, r]].map(|[i, j]| mesh.tet_edges[tet][EDGE_BETWEEN[i][j]]);
         }
     }
     face_to_edges

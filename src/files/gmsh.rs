@@ -1,7 +1,9 @@
-//! Gmsh's physical groups of bodies or boundaries: one for each name, and one for each unnamed
-//! number.
+//! What the writers of Gmsh's files have in common: physical groups of bodies or boundaries (one
+//! for each name, and one for each unnamed number), numbers of shapes, and boxes.
 
-use crate::ground::mesh::Label;
+use crate::ground::comm::{CommError, Communicator};
+use crate::ground::mesh::stream::MeshStream;
+use crate::ground::mesh::{Label, Order};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// A name, or an unnamed number, with its tag in the file.
@@ -63,6 +65,40 @@ impl Groups {
     pub fn are_apart(&self) -> bool {
         self.of.iter().all(|tags| tags.len() <= 1)
     }
+}
+
+/// Gmsh's numbers of triangles and tets of an order.
+pub(super) fn types(order: Order) -> [u32; 2] {
+    match order {
+        Order::First => [2, 4],
+        Order::Second => [9, 11],
+    }
+}
+
+/// A box: least coordinates, then largest ones.
+pub(super) type Bounds = [f64; 6];
+
+/// *Local.* The bounding box of a part.
+pub(super) fn bounds(part: &dyn MeshStream) -> Bounds {
+    let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+    for index in 0..part.vertex_blocks() {
+        for point in part.vertex_points(index).iter() {
+            for axis in 0..3 {
+                low[axis] = low[axis].min(point[axis]);
+                high[axis] = high[axis].max(point[axis]);
+            }
+        }
+    }
+    [low[0], low[1], low[2], high[0], high[1], high[2]]
+}
+
+/// **Collective.** The bounding box of the boxes of all ranks.
+pub(super) fn bounds_of_all(
+    comm: &dyn Communicator,
+    [a, b, c, d, e, f]: Bounds,
+) -> Result<Bounds, CommError> {
+    let ([a, b, c], [d, e, f]) = (comm.all_reduce_min_f64([a, b, c])?, comm.all_reduce_max_f64([d, e, f])?);
+    Ok([a, b, c, d, e, f])
 }
 
 /// Gmsh's section of names, with the dimension and tag of each.
