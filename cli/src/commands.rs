@@ -219,13 +219,18 @@ fn disk_for(formats: &[Format], order: Order, folder: &Path) -> Disk {
     let sum = |sum: [u64; 3], more: [u64; 3]| [0, 1, 2].map(|k| sum[k] + more[k]);
     Disk {
         folder: std::path::absolute(folder).unwrap_or_else(|_| folder.to_path_buf()),
-        // Six more nodes of a tet, three of a triangle, of some seven digits or eight bytes.
         bytes: formats
             .iter()
-            .map(bytes)
-            .map(|[vertex, tet, triangle]| match order {
-                Order::Second if tet > 0 => [vertex, tet + 42, triangle + 21],
-                _ => [vertex, tet, triangle],
+            .map(|format| {
+                let [vertex, tet, triangle] = bytes(format);
+                let [more_of_tet, more_of_triangle] = match (order, format) {
+                    (Order::First, _) | (_, Format::Geomview | Format::None) => [0, 0],
+                    // It has the nodes of the tets twice, for VTK and for PETSc.
+                    (Order::Second, Format::Hdf5) => [96, 24],
+                    // Six and three more nodes, of some seven digits or eight bytes.
+                    (Order::Second, _) => [42, 21],
+                };
+                [vertex, tet + more_of_tet, triangle + more_of_triangle]
             })
             .fold([0; 3], sum),
         // These formats have 32-bit ids.
