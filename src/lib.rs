@@ -179,6 +179,7 @@ pub mod run {
     pub use crate::parallel::partition::Metrics;
     pub use crate::parallel::refine::PeriodicCheck;
     pub use crate::parallel::refine::lattice::MAX_PIECES;
+    pub use crate::parallel::skin::DeliveredSizes;
     pub use crate::pipeline::decompose::{Planned, planned};
     pub use crate::pipeline::inspect::{
         BodyLine, CurveLine, Inspection, PatchLine, PeriodicLine, SingularLine,

@@ -75,6 +75,7 @@ fn generate_on(comm: &dyn Communicator, options: &Generate, start: Instant) -> R
         memory: options.memory,
         disk,
         nested: options.nested,
+        refine: options.refine,
         allow_off_surface: options.order.allow_off_surface,
         periodic_together: options.run.format.contains(&Format::Elmer) && !options.run.allow_split_periodic,
     };
@@ -352,6 +353,7 @@ pub fn run_mesh(options: &MeshFile) -> Result<(), Failure> {
         memory: None,
         disk: None,
         nested: false,
+        refine: 0,
         allow_off_surface: options.order.allow_off_surface,
         periodic_together: false,
     };

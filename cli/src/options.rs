@@ -200,6 +200,10 @@ pub struct Generate {
     /// be a power of two
     #[arg(long, value_name = "N", conflicts_with = "levels", value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_PIECES)))]
     pub pieces: Option<u32>,
+    /// Levels of uniform refinement of the tets that ranks made (methods surface and decompose);
+    /// vertices on the boundary move to the geometry. All sizes are those before
+    #[arg(long, value_name = "L", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=i64::from(MAX_PIECES.ilog2())))]
+    pub refine: u32,
     /// Split all octahedra of a coarse tet along one diagonal (method refine), so that the tets of
     /// each level lie in those of the level before; the angles are hardly smaller
     #[arg(long)]

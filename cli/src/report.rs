@@ -51,6 +51,8 @@ pub struct Report {
     pub periodic: Option<PeriodicCheck>,
     /// Surfaces of parts that the mesher refused; null if the parts were refined.
     pub skins: Option<Refused>,
+    /// Edge lengths relative to the size field; null if the parts were not meshed separately.
+    pub delivered: Option<tetmill::run::DeliveredSizes>,
     /// Improvement of interfaces; null if nothing was done.
     pub across: Option<tetmill::run::InterfaceReport>,
     /// Balancing of the parts; null if nothing was done.
@@ -245,6 +247,7 @@ impl Report {
             partition: PartitionReport::new(&coarse.partition, balance),
             periodic: made.periodic,
             skins: made.refused.clone(),
+            delivered: made.delivered,
             across: made.across,
             evened: made.evened,
             halo: None,

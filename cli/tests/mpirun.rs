@@ -56,7 +56,7 @@ mod with_mpi {
     #[test]
     fn parts_meshed_by_mpi_ranks_are_those_that_threads_mesh() {
         for method in ["surface", "decompose"] {
-            let arguments = ["-m", method, "--preset", "coarse", "--pieces", "2"];
+            let arguments = ["-m", method, "--preset", "coarse", "--pieces", "2", "--refine", "1"];
             for (ranks, parts) in [(4, 4), (2, 5)] {
                 let Some(mut command) = mpirun(ranks) else { return };
                 let dir = tempfile::tempdir().unwrap();

@@ -43,6 +43,41 @@ fn triangles_of_others_are_meshed_in_parts() {
 }
 
 #[test]
+fn parts_that_were_filled_are_refined_onto_the_geometry() {
+    for (method, ranks) in [("surface", 3), ("decompose", 4)] {
+        let report = judged_report(method, "pipe_bend", ranks, &["--pieces", "2", "--refine", "2"]);
+        let levels = report["quality_by_level"].as_array().unwrap();
+        let tets: Vec<u64> = levels.iter().map(|level| level["tets"].as_u64().unwrap()).collect();
+        assert_eq!(tets, [tets[0], 8 * tets[0], 64 * tets[0]], "{method}");
+        assert_eq!(report["mesh"]["tets"], tets[2]);
+        // A bend with an elbow of a quarter torus; flat triangles would lose volume by the square.
+        let level = |k: &str| report_of(&own("pipe_bend"), &["--preset", "coarse", "--levels", k]);
+        let [coarse, fine] = ["1", "3"].map(|k| level(k)["mesh"]["volume"].as_f64().unwrap());
+        let volume = report["mesh"]["volume"].as_f64().unwrap();
+        assert!((volume - fine).abs() < 0.1 * (fine - coarse).abs(), "{method}: {coarse} {fine} {volume}");
+        let sizes = |key: &str| report["delivered"][key].as_f64().unwrap();
+        assert!((0.7..1.3).contains(&sizes("mean")), "{method}: {}", report["delivered"]);
+        assert!(sizes("low") < sizes("mean") && sizes("mean") < sizes("high"));
+    }
+}
+
+#[test]
+fn a_requested_number_counts_the_tets_after_all_refinement() {
+    for (method, more) in [("surface", "0"), ("surface", "1"), ("decompose", "0"), ("decompose", "2")] {
+        let arguments = ["-m", method, "-e", "200000", "-n", "4", "--refine", more];
+        let tets = report_of(&own("tee"), &arguments)["mesh"]["tets"].as_u64().unwrap();
+        assert!((200_000..=260_000).contains(&tets), "{method}, {more}: {tets}");
+    }
+}
+
+#[test]
+fn the_method_refine_has_levels_instead() {
+    let output = tetmill().arg("generate").arg(own("tee")).args(["--refine", "1"]).output().unwrap();
+    assert_eq!(output.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&output.stderr).contains("`refine` cannot be 1"));
+}
+
+#[test]
 fn periodic_faces_are_refused_by_name() {
     let output = tetmill().arg("generate").arg(own("unit_cell")).args(["-m", "surface"]).output().unwrap();
     assert_eq!(output.status.code(), Some(2));

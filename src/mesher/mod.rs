@@ -4,5 +4,6 @@ pub mod facets;
 mod half_face;
 pub mod improve;
 pub mod model;
+pub mod smoothness;
 pub mod surface;
 pub mod volume;

@@ -6,6 +6,7 @@ use super::coarse_error::{CoarseError, smaller_at};
 use super::coarse_mesh::CoarseMesh;
 use super::error::{Error, RequestError};
 use super::geometry::Geometry;
+use super::goal::Goal;
 use super::model::Model;
 use super::options;
 use super::result::CoarseResult;
@@ -23,30 +24,37 @@ use crate::ground::mesh::periodic::PeriodicMap;
 use crate::ground::mesh::{Mesh, Rank, VertexId, sorted_face};
 use crate::ground::progress::{Progress, Stage, Work};
 use crate::ground::size::{SizeField, Source, SourceTree};
-use crate::mesher::improve::{self, Effort};
 use crate::mesher::model::CsgModel;
 use crate::mesher::surface::{self, SurfaceMesh};
 use crate::parallel::decompose::{self, CutModel, CutPlane, CutStatistics, Cuts};
 use crate::parallel::distribution::BareMesh;
 use crate::parallel::partition;
 use crate::parallel::refine::EdgeDisplacements;
-use crate::parallel::skin::{self, Filled, PartSizes, Skin};
+use crate::parallel::skin::{self, DeliveredSizes, Filled, Improvement, PartSizes, Skin};
 use crate::{Point, Vector};
 use csg::{Aabb, BodyId};
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 
-/// Rank 0's result for all ranks.
-struct Cut {
-    pieces: u32,
-    coarse: CoarseResult,
+/// The skins of all pieces.
+struct Skins {
     /// For each rank, its skin and the sizes inside.
     messages: Vec<Vec<u8>>,
     boundary: u64,
 }
 
+/// The pieces before they are refined, on all ranks.
+pub(super) struct Pieces {
+    pub part: BareMesh,
+    /// Subdivisions of each coarse edge.
+    pub pieces: u32,
+    pub delivered: Option<DeliveredSizes>,
+    /// On rank 0 only.
+    pub coarse: Option<CoarseResult>,
+}
+
 /// **Collective.** Cuts the geometry and meshes the surfaces of the pieces on rank 0, then each
-/// piece on its rank.
+/// piece on its rank, repeatedly if a number of tets is requested.
 ///
 /// # Errors
 /// The same on all ranks: a geometry that cannot be cut into this many pieces, pieces that cannot
@@ -56,27 +64,47 @@ pub(super) fn mesh_pieces(
     model: Option<&Model>,
     cuts: &CutSettings,
     settings: &GenerateSettings,
+    how: Improvement,
     progress: &Progress,
-) -> Result<(BareMesh, u32, Option<CoarseResult>), Error> {
-    let cut = comm.agree(model.map(|model| cut(comm.size(), model, cuts, settings, progress)).transpose())?;
-    let mut numbers = cut.as_ref().map_or(vec![0, 0], |cut| vec![u64::from(cut.pieces), cut.boundary]);
+) -> Result<Pieces, Error> {
+    let wanted = settings.before_refinement();
+    let planned = model.map(|model| plan_cuts(comm.size(), model, cuts, &settings.coarse, wanted, progress));
+    let planned = comm.agree(planned.transpose())?;
+    let mut numbers = planned
+        .as_ref()
+        .map_or(vec![0, 0], |planned| vec![u64::from(planned.pieces), planned.coarse.mesh.tets.len() as u64]);
     comm.broadcast(0, &mut numbers)?;
-    let [pieces, boundary] = numbers[..] else { panic!("rank 0 sent two numbers") };
-    let (coarse, messages) = cut.map(|cut| (cut.coarse, cut.messages)).unzip();
-    let message = progress.stage(Stage::Distribute, |_| comm.scatter_bytes(0, messages))?;
-    let effort = settings.coarse.effort.unwrap_or(Effort::Standard);
-    let filled = progress.stage(Stage::Fill, |_| fill(comm.rank(), &message, effort));
-    let (skin, filled) = comm.agree(filled)?;
-    let bare = progress.stage(Stage::Number, |_| skin::number(comm, skin, filled, boundary))?;
-    Ok((bare, pieces as u32, coarse))
+    let [pieces, tets] = numbers[..] else { panic!("rank 0 sent two numbers") };
+    let wanted_sizes = model.zip(planned.as_ref()).map(|(model, planned)| {
+        let field = model.size_field(&settings.coarse.size);
+        skin::at_vertices(&planned.coarse.mesh, field.as_deref(), planned.pieces)
+    });
+    let mut goal = Goal::new(wanted.0, tets * pieces.pow(3));
+    loop {
+        let skins = planned.as_ref().zip(wanted_sizes.as_ref()).map(|(planned, sizes)| {
+            let sizes: Vec<f64> = sizes.iter().map(|size| goal.scale * size).collect();
+            planned.skins(comm.size(), &sizes, progress)
+        });
+        let skins = comm.agree(skins.transpose())?;
+        let mut boundary = vec![skins.as_ref().map_or(0, |skins| skins.boundary)];
+        comm.broadcast(0, &mut boundary)?;
+        let messages = skins.map(|skins| skins.messages);
+        let message = progress.stage(Stage::Distribute, |_| comm.scatter_bytes(0, messages))?;
+        let (skin, sizes) = unpack(&message);
+        let filled = progress.stage(Stage::Fill, |_| fill(comm.rank(), &skin, &sizes, how));
+        let filled = comm.agree(filled)?;
+        if goal.is_reached(comm, filled.tets.len())? {
+            let delivered = skin::delivered(comm, &skin, &filled, &sizes)?;
+            let part = progress.stage(Stage::Number, |_| skin::number(comm, skin, filled, boundary[0]))?;
+            let coarse = planned.map(|planned| planned.result(comm.size())).transpose();
+            return Ok(Pieces { part, pieces: pieces as u32, delivered, coarse: comm.agree(coarse)? });
+        }
+    }
 }
 
-/// Fills the skin of a part from its message.
-fn fill(part: Rank, message: &[u8], effort: Effort) -> Result<(Skin, Filled), Error> {
-    let (skin, sizes) = unpack(message);
-    let filled = skin::fill(&skin, &sizes, &improve::Settings::of(effort));
-    let refused = |error| Error::Fill { part, error: Box::new(error) };
-    filled.map(|filled| (skin, filled)).map_err(refused)
+/// Fills the skin of a part.
+fn fill(part: Rank, skin: &Skin, sizes: &PartSizes, how: Improvement) -> Result<Filled, Error> {
+    skin::fill(skin, sizes, how).map_err(|error| Error::Fill { part, error: Box::new(error) })
 }
 
 /// A cut geometry, with the coarse mesh from which the planes were chosen.
@@ -104,7 +132,7 @@ pub fn planned(
 ) -> Result<Planned, Error> {
     options::refuse_planes(&cuts.planes)?;
     options::refuse_impossible_coarse(settings, wanted)?;
-    plan_cuts(parts, &geometry.model, cuts, settings, wanted, progress)
+    plan_cuts(parts, &geometry.model, cuts, settings, (wanted, 1), progress)
 }
 
 fn plan_cuts(
@@ -112,7 +140,7 @@ fn plan_cuts(
     model: &Model,
     cuts: &CutSettings,
     settings: &CoarseSettings,
-    wanted: Wanted,
+    (wanted, refined): (Wanted, u32),
     progress: &Progress,
 ) -> Result<Planned, Error> {
     refuse_periodic(Some(model))?;
@@ -123,7 +151,7 @@ fn plan_cuts(
     room::refuse_too_fine(model, &settings.size, None)?;
     let (pieces, coarse, outcome) = progress.stage(Stage::Mesh, |work| {
         let budget = Budget::new(None, matches!(wanted, Wanted::Sizes { .. }));
-        mesh_as_wanted(parts, model, settings, wanted, &[], &budget, work)
+        mesh_as_wanted(parts, model, settings, (wanted, refined), &[], &budget, work)
     })?;
     progress.stage(Stage::Cut, |_| {
         let statistics = CutStatistics::of(&coarse.mesh, whole, pieces, parts)?;
@@ -166,39 +194,36 @@ impl Planned {
     }
 }
 
+impl Planned {
+    /// Meshes the skins of the pieces by the sizes at the vertices of the coarse mesh.
+    fn skins(&self, parts: u32, vertex_sizes: &[f64], progress: &Progress) -> Result<Skins, Error> {
+        let mesh = &self.coarse.mesh;
+        let sizes = PartSizes::new(mesh.points.clone(), mesh.tets.clone(), vertex_sizes.to_vec());
+        let surface = progress.stage(Stage::Surface, |_| fine_surface(&self.model.model, &sizes))?;
+        let skins = decompose::skins(&self.model, &surface, parts as usize).map_err(RequestError::from)?;
+        let message = |skin: &Skin| {
+            let mut message = decompose::pack(skin);
+            pack_sizes(&mut message, skin, mesh, vertex_sizes);
+            message
+        };
+        let boundary = surface.triangles.iter().filter(|t| self.model.is_old(t.patch)).count() as u64;
+        Ok(Skins { messages: skins.iter().map(message).collect(), boundary })
+    }
+
+    /// The coarse mesh with the parts that the cuts make of it.
+    fn result(self, parts: u32) -> Result<CoarseResult, Error> {
+        let Self { cuts, coarse: CoarseMesh { mesh, report, .. }, outcome, .. } = self;
+        let assigned: Vec<Rank> =
+            mesh.tets.iter().map(|tet| cuts.leaf_of(&centre(&mesh, tet)) as Rank).collect();
+        let partition = partition::assess(&mesh, &assigned, parts)?;
+        let (displacements, periodic) = (EdgeDisplacements::default(), PeriodicMap::default());
+        Ok(CoarseResult { mesh, displacements, parts: assigned, report, outcome, partition, periodic })
+    }
+}
+
 /// Maximum number of plans. A plan fails if a plane contains an edge or touches a face, so that its
 /// pieces cannot be determined.
 const MOST_PLANS: u64 = 4;
-
-/// Meshes the skins of the pieces, for all ranks.
-fn cut(
-    parts: u32,
-    model: &Model,
-    cuts: &CutSettings,
-    settings: &GenerateSettings,
-    progress: &Progress,
-) -> Result<Cut, Error> {
-    let planned = plan_cuts(parts, model, cuts, &settings.coarse, settings.wanted, progress)?;
-    let Planned { cuts, model: pieces_of, coarse: CoarseMesh { mesh, report, .. }, pieces, outcome } =
-        planned;
-    let field = model.size_field(&settings.coarse.size);
-    let vertex_sizes = skin::at_vertices(&mesh, field.as_deref(), pieces);
-    let sizes = PartSizes::new(mesh.points.clone(), mesh.tets.clone(), vertex_sizes.clone());
-    let surface = progress.stage(Stage::Surface, |_| fine_surface(&pieces_of.model, &sizes))?;
-    let skins = decompose::skins(&pieces_of, &surface, parts as usize).map_err(RequestError::from)?;
-    let message = |skin: &Skin| {
-        let mut message = decompose::pack(skin);
-        pack_sizes(&mut message, skin, &mesh, &vertex_sizes);
-        message
-    };
-    let messages = skins.iter().map(message).collect();
-    let boundary = surface.triangles.iter().filter(|t| pieces_of.is_old(t.patch)).count() as u64;
-    let assigned: Vec<Rank> = mesh.tets.iter().map(|tet| cuts.leaf_of(&centre(&mesh, tet)) as Rank).collect();
-    let partition = partition::assess(&mesh, &assigned, parts)?;
-    let (displacements, periodic) = (EdgeDisplacements::default(), PeriodicMap::default());
-    let coarse = CoarseResult { mesh, displacements, parts: assigned, report, outcome, partition, periodic };
-    Ok(Cut { pieces, coarse, messages, boundary })
-}
 
 fn centre(mesh: &Mesh, tet: &[VertexId; 4]) -> Point {
     Point::from(tet.iter().map(|v| mesh.points[v.index()].coords).sum::<Vector>() / 4.0)
@@ -322,6 +347,7 @@ mod tests {
     use crate::ground::comm::thread;
     use crate::ground::error::{ErrorKind, HasKind};
     use crate::ground::mesh::{BoundaryTriangle, Class};
+    use crate::mesher::improve::{self, Effort};
     use crate::parallel::skin::SkinTriangle;
     use csg::PatchId;
 
@@ -372,7 +398,10 @@ mod tests {
         let failures = thread::run(3, |comm| {
             // Without one triangle.
             let triangles = if comm.rank() == 1 { &closed[..3] } else { &closed };
-            let filled = comm.agree(fill(comm.rank(), &message(triangles), Effort::Quick));
+            let (skin, sizes) = unpack(&message(triangles));
+            let settings = improve::Settings::of(Effort::Quick);
+            let how = Improvement { settings: &settings, smoothness: None };
+            let filled = comm.agree(fill(comm.rank(), &skin, &sizes, how));
             filled.map(|_| ()).unwrap_err()
         });
         let failures = failures.unwrap();

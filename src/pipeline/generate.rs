@@ -4,36 +4,34 @@
 use super::broadcast;
 use super::coarse_mesh::CoarseMesh;
 use super::decompose;
-use super::error::{Error, InvalidMesh, RequestError};
+use super::error::{Error, RequestError};
 use super::geometry::Geometry;
+use super::lattice::{self, Lattice};
 use super::mend;
 use super::model::Model;
 use super::options;
 use super::part::{Part, even_out};
-use super::result::{CoarseResult, Generated, Level, Refinement, Refused, StraightEdge};
+use super::result::{CoarseResult, Generated, Level, Refinement, Refused};
 use super::retries::{Budget, REFINEMENTS};
-use super::room::{self};
+use super::room;
 use super::settings::{CutSettings, GenerateSettings, Method, Wanted};
 use super::skins;
-use super::verify::verify;
 use super::wanted::mesh_as_wanted;
-use crate::Point;
 use crate::ground::comm::Communicator;
 use crate::ground::kernel::tree;
 use crate::ground::mesh::periodic::{self, PeriodicMap};
-use crate::ground::mesh::stream::MeshStream;
-use crate::ground::mesh::{Class, GlobalId, Mesh, Names, Order};
-use crate::ground::progress::{Progress, Stage, Work};
+use crate::ground::mesh::{Mesh, Names, Order};
+use crate::ground::progress::{Progress, Stage};
 use crate::ground::projector::Projector;
 use crate::ground::size::Source;
-use crate::mesher::improve::Effort;
-use crate::parallel::check::{self, Checksum, PartReport};
+use crate::mesher::improve::{self, Effort, Smoothness};
+use crate::mesher::smoothness::smoothness;
 use crate::parallel::distribution::{self, BareMesh, DistMesh, number_shared};
 use crate::parallel::interfaces;
 use crate::parallel::migrate::BareStream;
 use crate::parallel::partition::ties::Ties;
 use crate::parallel::partition::{self};
-use crate::parallel::refine::{self, PeriodicCheck, RefineError, RefinedMesh};
+use crate::parallel::skin::{DeliveredSizes, Improvement};
 use std::sync::Arc;
 
 /// **Collective.** Makes the mesh; only rank 0 needs the geometry and reports `progress`.
@@ -114,8 +112,12 @@ fn coarse_parts<'a>(
     let (names, projector) = broadcast::geometry(comm, model)?;
     let given = coarse.as_ref().map(|made| (made.mesh.clone(), made.parts.clone()));
     let dist = progress.stage(Stage::Distribute, |_| distribution::distribute(comm, given))?;
-    let fits =
-        room::refuse_oversized(comm.rank(), &dist, (pieces, settings.coarse.order), settings.disk.as_ref());
+    let fits = room::refuse_oversized(
+        comm.rank(),
+        &dist,
+        (pieces << settings.refine, settings.coarse.order),
+        settings.disk.as_ref(),
+    );
     comm.agree(fits.map_err(Error::from))?;
     Ok(Parts { model, coarse, dist, projector, names, pieces })
 }
@@ -138,41 +140,22 @@ fn refined(
     progress: &Progress,
 ) -> Result<Refined, Error> {
     let Parts { model, mut coarse, dist, projector, names, pieces } = parts;
-    let lowered = |coarse: Option<CoarseResult>, bad: &[GlobalId]| {
-        Refined::Inverted(coarse.map_or_else(Vec::new, |made| mend::lowered(&made.mesh, bad)))
+    let plan = lattice::Plan {
+        projector: &projector,
+        pieces,
+        displacements: broadcast::displacements(comm, coarse.as_ref().map(|made| &made.displacements))?,
+        periodic: broadcast::periodic(comm, coarse.as_ref().map(|made| &made.periodic))?,
+        singular: broadcast::singular(comm, model)?,
+        may_invert: may_lower,
     };
-    let order = settings.coarse.order;
-    let keep = room::vertices_to_keep(comm, &dist, (pieces, order), settings.memory, progress)?;
-    let displacements = broadcast::displacements(comm, coarse.as_ref().map(|made| &made.displacements))?;
-    let nested = settings.nested;
-    let how = refine::Settings { displacements, nested, order, ..refine::Settings::default() };
-    let survey = progress.stage(Stage::Levels, |work| {
-        survey(comm, &dist, &projector, pieces, (&how, settings.memory), work)
-    })?;
-    let mut levels = match survey {
-        Surveyed::Sound(levels) => levels,
-        Surveyed::Inverted(bad, _) if may_lower => return Ok(lowered(coarse, &bad)),
-        Surveyed::Inverted(_, error) => return Err(error),
-    };
-    let how = refine::Settings { keep, ..how };
-    // The stage lasts until all ranks are done.
-    let straightens = order == Order::Second && settings.allow_off_surface && !may_lower;
-    let ((refined, straight), bad) = progress.stage(Stage::Refine, |work| {
-        let refined = refine_part(comm, dist, (&projector, pieces), &how, straightens, work)?;
-        inverted_anywhere(comm, &refined.0).map(|bad| (refined, bad))
-    })?;
-    if !bad.is_empty() && may_lower {
-        return Ok(lowered(coarse, &bad));
-    }
-    let part = comm.agree(refined.map_err(Error::from))?;
-    let how = refine::Settings { straight, ..how };
-    let straight = straight_edges(comm, &part, &projector, &how.straight)?;
-    let map = broadcast::periodic(comm, coarse.as_ref().map(|made| &made.periodic))?;
-    let part = part.with_periodic(map.clone()).with_singular(broadcast::singular(comm, model)?);
-    let (check, checksum) =
-        progress.stage(Stage::Check, |work| verdict(comm, &part, &projector, &how.straight, work))?;
-    let periodic = periodic_verdict(comm, &part, &map, &projector)?;
-    levels.extend(Level::of(pieces, &check));
+    let Lattice { part, levels, check, checksum, periodic, straight, how } =
+        match lattice::refined(comm, dist, plan, settings, progress)? {
+            lattice::Refined::Sound(lattice) => *lattice,
+            lattice::Refined::Inverted(bad) => {
+                let lowered = coarse.map_or_else(Vec::new, |made| mend::lowered(&made.mesh, &bad));
+                return Ok(Refined::Inverted(lowered));
+            }
+        };
     if let Some(made) = &mut coarse {
         made.report.curved_edges = made.displacements.edges().len() as u64;
     }
@@ -185,6 +168,7 @@ fn refined(
         checksum,
         periodic,
         refused: None,
+        delivered: None,
         across: None,
         evened: None,
         straight,
@@ -208,13 +192,26 @@ fn fill(
     let sizes = model
         .zip(coarse.as_ref())
         .map(|(model, coarse)| skins::wanted_sizes(model, coarse, settings, pieces));
-    let effort = settings.coarse.effort.unwrap_or(Effort::Standard);
-    let (part, refused) =
-        skins::mesh_skins(comm, &dist, &projector, pieces, sizes.as_deref(), effort, progress)?;
+    let (part, refused, delivered) = {
+        let wanted = settings.before_refinement().0;
+        let (settings, smoothness) = improvement(settings, &projector);
+        let how = Improvement { settings: &settings, smoothness: smoothness.as_deref() };
+        skins::mesh_skins(comm, &dist, (&projector, pieces), sizes.as_deref(), wanted, how, progress)?
+    };
     // The boundary is that of the method `refine`, without lines where cuts meet it.
-    let across = interfaces::Settings { merge_angle: None, ..interfaces::Settings::default() };
-    let whole = Whole { names, projector, pieces, coarse, refused: Some(refused) };
-    stored(comm, part, whole, &across, settings, progress)
+    let merge_angle = None;
+    let whole = Whole { model, names, projector, pieces, coarse, refused: Some(refused), delivered };
+    stored(comm, part, whole, merge_angle, settings, progress)
+}
+
+/// How the tets of separately meshed parts are improved.
+fn improvement<'a>(
+    settings: &GenerateSettings,
+    projector: &'a Projector,
+) -> (improve::Settings, Option<Box<dyn Smoothness + 'a>>) {
+    let effort = settings.coarse.effort.unwrap_or(Effort::Standard);
+    let are_refined = settings.refine > 0 || settings.coarse.order == Order::Second;
+    (improve::Settings::of(effort), are_refined.then(|| smoothness(projector)).flatten())
 }
 
 /// **Collective.** Meshes the pieces of the geometry.
@@ -226,140 +223,89 @@ fn decomposed(
     progress: &Progress,
 ) -> Result<Generated, Error> {
     let (names, projector) = broadcast::geometry(comm, model)?;
-    let (part, pieces, coarse) = decompose::mesh_pieces(comm, model, cuts, settings, progress)?;
-    let whole = Whole { names, projector, pieces, coarse, refused: None };
-    stored(comm, part, whole, &interfaces::Settings::default(), settings, progress)
+    let decompose::Pieces { part, pieces, delivered, coarse } = {
+        let (improve, smoothness) = improvement(settings, &projector);
+        let how = Improvement { settings: &improve, smoothness: smoothness.as_deref() };
+        decompose::mesh_pieces(comm, model, cuts, settings, how, progress)?
+    };
+    let whole = Whole { model, names, projector, pieces, coarse, refused: None, delivered };
+    stored(comm, part, whole, interfaces::Settings::default().merge_angle, settings, progress)
 }
 
 /// Data that accompanies separately meshed parts.
-struct Whole {
+struct Whole<'a> {
+    model: Option<&'a Model>,
     names: Names,
     projector: Projector,
     pieces: u32,
     coarse: Option<CoarseResult>,
     refused: Option<Refused>,
+    delivered: Option<DeliveredSizes>,
 }
 
-/// **Collective.** Improves separately meshed parts across their interfaces, balances them, and
-/// checks them.
+/// **Collective.** Improves separately meshed parts across their interfaces, balances them, refines
+/// them if that is requested, and checks them.
 fn stored(
     comm: &dyn Communicator,
     part: BareMesh,
     whole: Whole,
-    across: &interfaces::Settings,
+    merge_angle: Option<f64>,
     settings: &GenerateSettings,
     progress: &Progress,
 ) -> Result<Generated, Error> {
-    let Whole { names, projector, pieces, coarse, refused } = whole;
-    let (part, across) =
-        progress.stage(Stage::Interfaces, |_| interfaces::improve_across(comm, part, across))?;
+    let Whole { model, names, projector, pieces, coarse, refused, delivered } = whole;
+    let (part, across) = progress.stage(Stage::Interfaces, |_| {
+        let (_, smoothness) = improvement(settings, &projector);
+        let across = interfaces::Settings { merge_angle, ..interfaces::Settings::default() };
+        interfaces::improve_across(comm, part, &across, smoothness.as_deref())
+    })?;
     let (part, evened) = even_out(comm, part, progress)?;
-    let (part, straight) = match settings.coarse.order {
-        Order::First => (Part::Stored(Box::new(BareStream::new(part))), Vec::new()),
-        Order::Second => second_order(comm, part, &projector, settings.allow_off_surface, progress)?,
-    };
-    let off: Vec<GlobalId> = straight.iter().map(|edge| edge.node).collect();
-    let (check, checksum) =
-        progress.stage(Stage::Check, |work| verdict(comm, part.stream(), &projector, &off, work))?;
-    let levels = Level::of(pieces, &check).into_iter().collect();
-    let periodic = None;
-    Ok(Generated {
+    let singular = broadcast::singular(comm, model)?;
+    let made = |part, pieces, levels, (check, checksum), straight, refinement| Generated {
         part,
         pieces,
         levels,
         names,
         check,
         checksum,
-        periodic,
+        periodic: None,
         refused,
+        delivered,
         across,
         evened,
         straight,
         coarse,
-        refinement: None,
-    })
-}
-
-/// **Collective** if edges may stay straight (`straightens`). Refines a part; also returns the
-/// nodes of the edges that stay straight.
-fn refine_part(
-    comm: &dyn Communicator,
-    part: DistMesh,
-    (projector, pieces): (&Projector, u32),
-    how: &refine::Settings,
-    straightens: bool,
-    work: &Work,
-) -> Result<(Result<RefinedMesh, RefineError>, Vec<GlobalId>), Error> {
-    if straightens {
-        return Ok(refine::refine_straightening(comm, &part, projector, pieces, how, work)?);
+        refinement,
+    };
+    if settings.refine == 0 && settings.coarse.order == Order::First {
+        let part = Part::Stored(Box::new(BareStream::new(part)));
+        let (check, checksum) = progress
+            .stage(Stage::Check, |work| lattice::verdict(comm, part.stream(), &projector, &[], work))?;
+        let levels = Level::of(pieces, &check).into_iter().collect();
+        return Ok(made(part, pieces, levels, (check, checksum), Vec::new(), None));
     }
-    Ok((refine::refine_watched(part, projector, pieces, how, work), Vec::new()))
-}
-
-/// **Collective.** Adds the nodes on the edges of separately meshed parts, on the geometry.
-fn second_order(
-    comm: &dyn Communicator,
-    part: BareMesh,
-    projector: &Projector,
-    allow_off_surface: bool,
-    progress: &Progress,
-) -> Result<(Part, Vec<StraightEdge>), Error> {
-    progress.stage(Stage::Refine, |work| {
-        let mesh = number_shared(comm, part)?;
-        let how = refine::Settings { order: Order::Second, ..refine::Settings::default() };
-        let (refined, straight) = refine_part(comm, mesh, (projector, 1), &how, allow_off_surface, work)?;
-        let part = comm.agree(refined.map_err(Error::from))?;
-        let straight = straight_edges(comm, &part, projector, &straight)?;
-        Ok((Part::Refined(Arc::new(part)), straight))
-    })
-}
-
-/// The result of refining to the levels before the last.
-enum Surveyed {
-    /// All children are positive.
-    Sound(Vec<Level>),
-    /// These coarse tets have inverted children.
-    Inverted(Vec<GlobalId>, Error),
-}
-
-/// **Collective.** Refines to each level before the last, and measures all tets. This takes a
-/// seventh of the work for the last level, and finds most inverted tets early.
-fn survey(
-    comm: &dyn Communicator,
-    dist: &DistMesh,
-    projector: &Projector,
-    pieces: u32,
-    (how, memory): (&refine::Settings, Option<u64>),
-    work: &Work,
-) -> Result<Surveyed, Error> {
-    let odd = pieces >> pieces.trailing_zeros();
-    let doubled = (0..pieces.trailing_zeros()).map(|k| odd << k);
-    let mut levels = Vec::new();
-    let pieces: Vec<u32> = (odd > 1).then_some(1).into_iter().chain(doubled).collect();
-    let tets = |n: u32| u64::from(n).pow(3);
-    work.step(0.0, 1.0, pieces.iter().map(|&n| tets(n)).sum());
-    for n in pieces {
-        comm.agree(work.proceed().map_err(Error::from))?;
-        // Level by level, because all vertices of a lower level may fit.
-        let (keep, _) = room::keep_of_level(comm, dist, (n, how.order), memory)?;
-        let mut how = refine::Settings { keep, ..how.clone() };
-        let mut refined = refine::refine(dist.clone(), projector, n, &how);
-        let mut bad = inverted_anywhere(comm, &refined)?;
-        if !bad.is_empty() && how.order == Order::Second {
-            // Only the last level must be valid in second order: finer tets are less curved.
-            how.order = Order::First;
-            refined = refine::refine(dist.clone(), projector, n, &how);
-            bad = inverted_anywhere(comm, &refined)?;
-        }
-        let part = match comm.agree(refined.map_err(Error::from)) {
-            Err(error) if !bad.is_empty() => return Ok(Surveyed::Inverted(bad, error)),
-            other => other?,
-        };
-        let check = check::check(comm, &part, None, &check::Settings::default())?;
-        levels.extend(Level::of(n, &check));
-        work.add(tets(n));
-    }
-    Ok(Surveyed::Sound(levels))
+    let how = (1 << settings.refine, settings.coarse.order);
+    let (dist, displacements) = progress.stage(Stage::Levels, |work| {
+        let dist = number_shared(comm, part)?;
+        let displacements = mend::displaced(comm, &dist, &projector, how, work)?;
+        Ok::<_, Error>((dist, displacements))
+    })?;
+    let plan = lattice::Plan {
+        projector: &projector,
+        pieces: 1 << settings.refine,
+        displacements,
+        periodic: PeriodicMap::default(),
+        singular,
+        may_invert: false,
+    };
+    let lattice::Refined::Sound(lattice) = lattice::refined(comm, dist, plan, settings, progress)? else {
+        unreachable!("inverted tets are an error")
+    };
+    let Lattice { part, levels, check, checksum, straight, how, .. } = *lattice;
+    let levels = levels.into_iter().map(|level| Level { pieces: pieces * level.pieces, ..level }).collect();
+    let refinement = Refinement { projector, settings: how };
+    let part = Part::Refined(Arc::new(part));
+    Ok(made(part, pieces << settings.refine, levels, (check, checksum), straight, Some(refinement)))
 }
 
 /// Makes and partitions the coarse mesh; also returns the subdivisions of its edges.
@@ -374,7 +320,7 @@ fn coarse_mesh(
     options::refuse_unresolved(model, &settings.coarse.size)?;
     room::refuse_too_fine(model, &settings.coarse.size, settings.memory)?;
     let (pieces, made, outcome) = progress.stage(Stage::Mesh, |work| {
-        mesh_as_wanted(parts, model, &settings.coarse, settings.wanted, sources, budget, work)
+        mesh_as_wanted(parts, model, &settings.coarse, settings.before_refinement(), sources, budget, work)
     })?;
     let map = periodic_map(model, &made.mesh)?;
     let (assigned, metrics) = progress.stage(Stage::Partition, |_| {
@@ -409,89 +355,4 @@ fn periodic_map(model: &Model, mesh: &Mesh) -> Result<PeriodicMap, Error> {
         Model::Facets(_) => Ok(PeriodicMap::default()),
     };
     map.map_err(Error::from)
-}
-
-/// **Collective.** Checks that all periodic copies are where the motions put them.
-fn periodic_verdict(
-    comm: &dyn Communicator,
-    part: &RefinedMesh,
-    map: &PeriodicMap,
-    projector: &Projector,
-) -> Result<Option<PeriodicCheck>, Error> {
-    if map.links.is_empty() {
-        return Ok(None);
-    }
-    /// Tolerance factor: each point of a pair may be off its surface, and the motion rounds.
-    const ROOM: f64 = 4.0;
-    let checked = refine::check_periodic(comm, part, map)?;
-    // Without geometry points are not projected: they may be as far off as those of the coarse
-    // mesh.
-    let tolerance = if matches!(projector, Projector::Flat) { map.distance } else { projector.tolerance() };
-    if checked.lost > 0 || checked.furthest > ROOM * tolerance {
-        return Err(InvalidMesh::Periodic { lost: checked.lost, furthest: checked.furthest }.into());
-    }
-    Ok(Some(checked))
-}
-
-/// **Collective.** Gathers the coarse tets with inverted children on any rank.
-fn inverted_anywhere(
-    comm: &dyn Communicator,
-    refined: &Result<RefinedMesh, RefineError>,
-) -> Result<Vec<GlobalId>, Error> {
-    let mine: &[GlobalId] = match refined {
-        Err(RefineError::Inverted { coarse, .. }) => coarse,
-        _ => &[],
-    };
-    Ok(comm.all_gather(mine)?.concat())
-}
-
-/// **Collective.** Checks all tets, boundary vertices and faces between tets.
-fn verdict(
-    comm: &dyn Communicator,
-    part: &dyn MeshStream,
-    projector: &Projector,
-    off_surface: &[GlobalId],
-    work: &Work,
-) -> Result<(PartReport, Checksum), Error> {
-    let (report, checksum) = verify(comm, part, Some(projector), off_surface, work)?;
-    if checksum.open != 0 {
-        return Err(InvalidMesh::OpenFaces.into());
-    }
-    Ok((report, checksum))
-}
-
-/// **Collective.** Where the nodes with these global ids are, and how far off the geometry.
-fn straight_edges(
-    comm: &dyn Communicator,
-    part: &RefinedMesh,
-    projector: &Projector,
-    nodes: &[GlobalId],
-) -> Result<Vec<StraightEdge>, Error> {
-    let mut ids = Vec::new();
-    let mut places = Vec::new();
-    for &node in nodes {
-        let Some((entity, within)) = part.numbering().find(part.coarse(), node) else { continue };
-        let place = part.points()[(part.numbering().inside(entity).start + within) as usize];
-        let point = Point::from(place);
-        let snapped = match entity.class(part.coarse()) {
-            Class::Curve(curve) => projector.project_curve(curve, &point),
-            Class::Patch(patch) => projector.project_patch(patch, &point),
-            _ => Ok(point),
-        };
-        ids.push(node);
-        places.push([
-            place[0],
-            place[1],
-            place[2],
-            snapped.map_or(f64::NAN, |snapped| (snapped - point).norm()),
-        ]);
-    }
-    let places = comm.all_gather(&places)?.concat();
-    let found = comm.all_gather(&ids)?.concat().into_iter().zip(places);
-    let edge =
-        |(node, [x, y, z, distance]): (GlobalId, [f64; 4])| StraightEdge { node, place: [x, y, z], distance };
-    let mut edges: Vec<StraightEdge> = found.map(edge).collect();
-    edges.sort_unstable_by_key(|edge| edge.node);
-    edges.dedup_by_key(|edge| edge.node);
-    Ok(edges)
 }

@@ -7,10 +7,12 @@ use super::coarse_mesh::CoarseMesh;
 use super::error::Error;
 use super::model::Model;
 use super::retries::{Budget, INVERTED, INVERTED_FACETS, POOR};
-use crate::ground::mesh::{GlobalId, Mesh, Order, TET_EDGES};
+use crate::ground::comm::Communicator;
+use crate::ground::mesh::{GlobalId, Mesh, Order, QualitySummary, TET_EDGES};
+use crate::ground::progress::Work;
 use crate::ground::projector::Projector;
 use crate::ground::size::Source;
-use crate::parallel::distribution;
+use crate::parallel::distribution::{self, DistMesh};
 use crate::parallel::refine::{self, EdgeDisplacements, Least, Trial};
 
 /// Maximum number of subdivisions of an edge in refinement tests. 4 are too few: NETGEN's `matrix`
@@ -37,7 +39,8 @@ const LOWERED: f64 = 0.6;
 /// suffices, for curved edges: in mean ratio, and in units of the regular tet's angle.
 const BENT: [f64; 2] = [0.01, 0.03];
 
-/// Edges are curved for at most this many bad tets, because each takes a tenth of a second.
+/// Edges of a coarse mesh or part are curved for at most this many bad tets, because each takes a
+/// tenth of a second.
 const MOST_BENT: usize = 100;
 
 /// Makes coarse meshes with `make`, which receives the sources where sizes must be lowered, until
@@ -172,6 +175,51 @@ fn curved(
     Ok(Some((settings.displacements, after)))
 }
 
+/// **Collective.** Searches curved edges for distributed parts whose refinement would have bad
+/// children. Edges that several parts share stay straight.
+///
+/// # Errors
+/// The same on all ranks: points that cannot be projected, not enough memory.
+pub fn displaced(
+    comm: &dyn Communicator,
+    part: &DistMesh,
+    projector: &Projector,
+    (pieces, order): How,
+    work: &Work,
+) -> Result<EdgeDisplacements, Error> {
+    let pieces = pieces.min(TRIED_PIECES / order.degree());
+    if pieces * order.degree() == 1 || *projector == Projector::Flat {
+        return Ok(EdgeDisplacements::default());
+    }
+    let QualitySummary { worst_refined, smallest_dihedral, tets, .. } =
+        QualitySummary::of_tets(&part.points, &part.tets);
+    // A part without tets has no worst one.
+    let mine = if tets == 0 { [1.0, 180.0] } else { [worst_refined, smallest_dihedral] };
+    let [worst_refined, smallest_dihedral] = comm.all_reduce_min_f64(mine)?;
+    let least = Least {
+        mean_ratio: KEPT * worst_refined.min(GOOD),
+        dihedral: KEPT * smallest_dihedral,
+        scaled_jacobian: JACOBIAN,
+    };
+    let settings = refine::Settings { order, ..refine::Settings::default() };
+    let mend = || {
+        let trial = refine::trial(part, projector, pieces, &settings, least)?;
+        work.proceed()?;
+        let local = |id: &GlobalId| part.tet_ids.binary_search(id).expect("a tet of the part") as u32;
+        // Inverted tets come first, if there are too many.
+        let bad = trial.inverted.iter().chain(&trial.poor).take(MOST_BENT).map(local);
+        let mut suspects: Vec<u32> = bad.collect();
+        suspects.sort_unstable();
+        let [margin, enough] = BENT;
+        let settings = refine::mend::Settings { pieces, least, margin, enough, order, ..Default::default() };
+        Ok::<_, Error>(refine::mend_near(part, &suspects, projector, &settings)?.displacements)
+    };
+    let mine = comm.agree(mend())?;
+    let (ids, middles): (Vec<GlobalId>, Vec<[f64; 3]>) = mine.edges().iter().copied().unzip();
+    let ids = comm.all_gather(&ids)?.concat();
+    Ok(ids.into_iter().zip(comm.all_gather(&middles)?.concat()).collect())
+}
+
 /// Sources for smaller tets around the given ones: at their corners and edge midpoints, because one
 /// at the centre would not affect the boundary through the grading.
 pub fn lowered(mesh: &Mesh, tets: &[GlobalId]) -> Vec<Source> {
@@ -188,7 +236,6 @@ pub fn lowered(mesh: &Mesh, tets: &[GlobalId]) -> Vec<Source> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ground::mesh::QualitySummary;
 
     #[test]
     fn the_best_children_decide_which_mesh_is_kept_and_then_the_coarse_angles() {

@@ -159,6 +159,16 @@ impl<'a> Mesher<'a> {
         self.with(|settings| settings.method = method)
     }
 
+    /// Refines the tets of separately meshed parts this many times, each time every tet into eight,
+    /// with the boundary on the geometry.
+    ///
+    /// For the methods [`Surface`](Method::Surface) and [`Decompose`](Method::Decompose);
+    /// the method [`Refine`](Method::Refine) has [`levels`](Self::levels). All sizes are those
+    /// before this refinement, but [`tets`](Self::tets) counts the tets after it.
+    pub fn refine(self, levels: u32) -> Self {
+        self.with(|settings| settings.refine = levels)
+    }
+
     /// The effort for better shapes.
     pub fn effort(self, effort: Effort) -> Self {
         self.with(|settings| settings.coarse.effort = Some(effort))

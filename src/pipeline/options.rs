@@ -42,6 +42,11 @@ pub(super) fn refuse_impossible(settings: &GenerateSettings) -> Result<(), Error
     if let Method::Decompose(cuts) = &settings.method {
         refuse_planes(&cuts.planes)?;
     }
+    if settings.refine > 0 && settings.method == Method::Refine {
+        let allowed = "0: the method `refine` has `levels` and `pieces`";
+        return Err(refused("refine", settings.refine, allowed).into());
+    }
+    possible_pieces(1_u32.checked_shl(settings.refine).unwrap_or(u32::MAX), settings.coarse.order)?;
     refuse_impossible_coarse(&settings.coarse, settings.wanted)
 }
 
@@ -88,8 +93,8 @@ pub(super) fn refuse_impossible_coarse(coarse: &CoarseSettings, wanted: Wanted) 
 ///
 /// Sources and the size function are used on rank 0 only, like the geometry. The memory belongs to
 /// a machine, and the disk to rank 0.
-fn compared(settings: &GenerateSettings) -> [(&'static str, u64); 11] {
-    let GenerateSettings { method, coarse, wanted, nested, allow_off_surface, .. } = settings;
+fn compared(settings: &GenerateSettings) -> [(&'static str, u64); 12] {
+    let GenerateSettings { method, coarse, wanted, refine, nested, allow_off_surface, .. } = settings;
     let CoarseSettings { size, effort, order } = coarse;
     let preset = (size.curvature_safety, size.segments_per_curve, size.scale);
     [
@@ -99,6 +104,7 @@ fn compared(settings: &GenerateSettings) -> [(&'static str, u64); 11] {
         ("order", value_of(order)),
         ("allow_off_surface", value_of(allow_off_surface)),
         ("tets, coarse_tets, levels or pieces", value_of(wanted)),
+        ("refine", u64::from(*refine)),
         ("max_size", value_of(&size.maxh)),
         ("min_size", value_of(&size.minh)),
         ("grading", value_of(&size.grading)),
@@ -125,7 +131,7 @@ pub(super) fn refuse_different(
     settings: &GenerateSettings,
 ) -> Result<(), Error> {
     let mine = compared(settings);
-    let mut numbers = [u64::from(has_geometry); 12];
+    let mut numbers = [u64::from(has_geometry); 13];
     numbers.iter_mut().zip(&mine).for_each(|(number, (_, value))| *number = *value);
     let all = comm.all_gather_one(numbers)?;
     let [first @ .., has_geometry] = all[0];

@@ -27,6 +27,7 @@ fn settings(levels: u32, sources: &[Source]) -> GenerateSettings {
         method: Method::Refine,
         coarse: CoarseSettings::from(size),
         wanted: Wanted::Sizes { pieces: 1 << levels },
+        refine: 0,
         memory: None,
         disk: None,
         nested: false,

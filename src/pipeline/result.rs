@@ -15,6 +15,7 @@ use crate::parallel::distribution::{DistMesh, number_shared};
 use crate::parallel::interfaces;
 use crate::parallel::partition::Metrics;
 use crate::parallel::refine::{self, EdgeDisplacements, PeriodicCheck, RefinedMesh, parents};
+use crate::parallel::skin::DeliveredSizes;
 use crate::parallel::{halo, migrate};
 use std::sync::Arc;
 
@@ -58,6 +59,9 @@ pub struct Generated {
     /// Skins that the mesher could not fill, if parts were meshed inside skins; the same on all
     /// ranks.
     pub refused: Option<Refused>,
+    /// The edge lengths relative to the size field, before interfaces are improved and parts are
+    /// refined, if parts were meshed separately; the same on all ranks.
+    pub delivered: Option<DeliveredSizes>,
     /// Result of the improvement across interfaces, if parts were meshed separately and had bad
     /// tets there; the same on all ranks.
     pub across: Option<interfaces::InterfaceReport>,

@@ -48,6 +48,9 @@ pub struct GenerateSettings {
     pub coarse: CoarseSettings,
     /// The requested number of tets.
     pub wanted: Wanted,
+    /// The number of times that the tets of separately meshed parts are refined; 0 with the method
+    /// `refine`, which has `wanted`.
+    pub refine: u32,
     /// The memory for the fine mesh on each machine, in bytes; by default its free memory.
     pub memory: Option<u64>,
     /// The planned output, so that a mesh that does not fit is refused before refinement.
@@ -60,6 +63,18 @@ pub struct GenerateSettings {
     pub allow_off_surface: bool,
     /// Whether to refuse a partition with periodic faces and their copies in different parts.
     pub periodic_together: bool,
+}
+
+impl GenerateSettings {
+    /// What is requested of the mesh before its parts are refined, and the subdivisions of each
+    /// edge by this refinement.
+    pub(super) fn before_refinement(&self) -> (Wanted, u32) {
+        let wanted = match self.wanted {
+            Wanted::Elements(count) => Wanted::Elements(count.div_ceil(8_u64.pow(self.refine))),
+            wanted => wanted,
+        };
+        (wanted, 1 << self.refine)
+    }
 }
 
 /// The requested number of tets.

@@ -2,42 +2,52 @@
 //! skins.
 
 use super::error::{Error, RequestError};
+use super::goal::Goal;
 use super::model::Model;
 use super::result::{CoarseResult, Refused};
-use super::settings::GenerateSettings;
+use super::settings::{GenerateSettings, Wanted};
 use crate::ground::comm::Communicator;
 use crate::ground::progress::{Progress, Stage};
 use crate::ground::projector::Projector;
-use crate::mesher::improve::{self, Effort};
 use crate::parallel::distribution::{BareMesh, DistMesh};
-use crate::parallel::refine;
-use crate::parallel::skin::{self, Filled, PartSizes};
+use crate::parallel::refine::RefineError;
+use crate::parallel::skin::{self, DeliveredSizes, Filled, Improvement, PartSizes};
 
 /// **Collective.** Fills the skins of all parts. Coarse edges are split into `pieces`, and the
-/// sizes inside are smaller than the coarse sizes by the same factor.
+/// sizes inside are smaller than the coarse sizes by the same factor, or as the goal requires.
 ///
 /// # Errors
 /// The same on all ranks: skins that cannot be snapped or filled.
 pub(super) fn mesh_skins(
     comm: &dyn Communicator,
     dist: &DistMesh,
-    projector: &Projector,
-    pieces: u32,
+    (projector, pieces): (&Projector, u32),
     sizes: Option<&[f64]>,
-    effort: Effort,
+    wanted: Wanted,
+    how: Improvement,
     progress: &Progress,
-) -> Result<(BareMesh, Refused), Error> {
-    let sizes = PartSizes::new(dist.points.clone(), dist.tets.clone(), skin::scatter(comm, dist, sizes)?);
-    let made = progress.stage(Stage::Fill, |_| {
-        let skin = skin::skin(dist, projector, pieces)?;
-        let filled = skin::fill_or_refine(dist, projector, &skin, &sizes, &improve::Settings::of(effort))?;
-        Ok((skin, filled))
-    });
-    let (skin, filled) = comm.agree(made.map_err(|error: refine::RefineError| Error::from(error)))?;
+) -> Result<(BareMesh, Refused, Option<DeliveredSizes>), Error> {
+    let mut sizes = PartSizes::new(dist.points.clone(), dist.tets.clone(), skin::scatter(comm, dist, sizes)?);
+    let mut goal = Goal::new(wanted, dist.totals.tets * u64::from(pieces).pow(3));
+    let agree = |made: Result<_, RefineError>| comm.agree(made.map_err(Error::from));
+    let (skin, filled, delivered) = progress.stage(Stage::Fill, |_| {
+        let skin = agree(skin::skin(dist, projector, pieces))?;
+        let mut before = 1.0;
+        loop {
+            sizes.scale(goal.scale / before);
+            before = goal.scale;
+            let filled = skin::fill_or_refine(dist, projector, &skin, &sizes, how);
+            let filled = comm.agree(filled.map_err(Error::from))?;
+            if goal.is_reached(comm, filled.tets.len())? {
+                let delivered = skin::delivered(comm, &skin.skin, &filled, &sizes)?;
+                return Ok::<_, Error>((skin, filled, delivered));
+            }
+        }
+    })?;
     let refused = Refused::gather(comm, &filled)?;
     let boundary = skin.numbering.totals().boundary;
     let bare = progress.stage(Stage::Number, |_| skin::number(comm, skin.skin, filled, boundary))?;
-    Ok((bare, refused))
+    Ok((bare, refused, delivered))
 }
 
 /// Refuses geometries with periodic faces, on the rank that has the geometry.

@@ -58,8 +58,8 @@ fn most_pieces(count: u64, coarse: u64, order: Order) -> u32 {
 /// reached, if one was requested.
 pub(super) type Granted = (u32, CoarseMesh, Option<Outcome>);
 
-/// Makes a coarse mesh that can be refined as requested, for this number of parts. `sources` are
-/// added to the sizes.
+/// Makes a coarse mesh that can be refined as requested, and then again with `refined` subdivisions
+/// of each edge, for this number of parts. `sources` are added to the sizes.
 ///
 /// # Errors
 /// No coarse mesh, or none without inverted children.
@@ -67,7 +67,7 @@ pub(super) fn mesh_as_wanted(
     parts: u32,
     model: &Model,
     settings: &CoarseSettings,
-    wanted: Wanted,
+    (wanted, refined): (Wanted, u32),
     sources: &[Source],
     budget: &Budget,
     work: &Work,
@@ -79,7 +79,7 @@ pub(super) fn mesh_as_wanted(
         coarse
     };
     let to_target = |tets: u64, pieces: u32, fits: &dyn Fn(u64) -> bool| {
-        mend::refinable(model, (pieces, settings.order), budget, |more| {
+        mend::refinable(model, (pieces * refined, order), budget, |more| {
             mesh_to_target(model, &mut with(more), tets, fits, budget, work)
         })
     };
@@ -90,7 +90,7 @@ pub(super) fn mesh_as_wanted(
         }
         Wanted::Sizes { pieces } => {
             let make = |more: &[Source]| Ok((model.coarse_mesh(&mut with(more), budget, work)?, None));
-            let (made, outcome) = mend::refinable(model, (pieces, settings.order), budget, make)?;
+            let (made, outcome) = mend::refinable(model, (pieces * refined, order), budget, make)?;
             Ok((pieces, made, outcome))
         }
         Wanted::Coarse { tets, pieces } => {

@@ -4,7 +4,8 @@ use super::{Report, counted, grouped, tets, vertices};
 use std::fmt;
 use tetmill::memory::sized;
 use tetmill::run::{
-    CoarseReport, Entities, Evened, FlatPlace, PeriodicCheck, Refused, SharpPlace, StraightEdge,
+    CoarseReport, DeliveredSizes, Entities, Evened, FlatPlace, PeriodicCheck, Refused, SharpPlace,
+    StraightEdge,
 };
 
 /// Writes the line about thin regions.
@@ -188,6 +189,12 @@ impl Report {
                 p.imbalance,
                 counted(p.edge_cut, "coarse face", "coarse faces"),
                 vertices(p.shared_vertices)
+            )?;
+        }
+        if let Some(DeliveredSizes { mean, low, high }) = self.delivered {
+            writeln!(
+                f,
+                "sizes      edges {mean:.2} of the size field in the mean, 90 % of them between {low:.2} and {high:.2}"
             )?;
         }
         if let Some(across) = &self.across {

@@ -70,17 +70,14 @@ const STRAIGHT_SINE: f64 = 0.0087;
 
 impl Smoothness for GeometrySmoothness<'_> {
     fn normal(&self, patch: PatchId, at: &Point) -> Option<Vector> {
-        self.surface_normal(&self.geometry.surfaces[self.features.patch(patch).surface.index()], at)
+        surface_normal(&self.geometry.surfaces[self.features.patch(patch).surface.index()], at)
     }
 
     fn tangent(&self, curve: CurveId, at: &Point) -> Option<Vector> {
         let curve = self.features.curve(curve);
-        let [n, m] = curve.surfaces.map(|s| self.surface_normal(&self.geometry.surfaces[s.index()], at));
-        if let (Some(n), Some(m)) = (n, m) {
-            let direction = n.cross(&m);
-            if direction.norm() > TANGENT_SURFACES {
-                return direction.try_normalize(0.0);
-            }
+        let surfaces = curve.surfaces.map(|s| &self.geometry.surfaces[s.index()]);
+        if let Some(tangent) = tangent_of_normals(surfaces, at) {
+            return Some(tangent);
         }
         let distance = |p: &Point| (p - at).norm_squared();
         let k = (0..curve.trace.len())
@@ -90,19 +87,26 @@ impl Smoothness for GeometrySmoothness<'_> {
     }
 }
 
-impl GeometrySmoothness<'_> {
-    fn surface_normal(&self, surface: &Surface, at: &Point) -> Option<Vector> {
-        let apex = match surface {
-            Surface::Cone(c) => Some((c.point - c.axis * (c.radius / c.slope), c.radius)),
-            Surface::EllipticCone(c) => Some((c.point - c.axis / c.rate, c.radii[0].min(c.radii[1]))),
-            Surface::Nappe(c) => Some((c.apex(), c.radius)),
-            _ => None,
-        };
-        if apex.is_some_and(|(apex, radius)| (at - apex).norm() <= APEX_RADIUS * radius) {
-            return None;
-        }
-        surface.gradient(at).try_normalize(0.0)
+/// The unit normal of a surface at a point on it; `None` at an apex.
+pub fn surface_normal(surface: &Surface, at: &Point) -> Option<Vector> {
+    let apex = match surface {
+        Surface::Cone(c) => Some((c.point - c.axis * (c.radius / c.slope), c.radius)),
+        Surface::EllipticCone(c) => Some((c.point - c.axis / c.rate, c.radii[0].min(c.radii[1]))),
+        Surface::Nappe(c) => Some((c.apex(), c.radius)),
+        _ => None,
+    };
+    if apex.is_some_and(|(apex, radius)| (at - apex).norm() <= APEX_RADIUS * radius) {
+        return None;
     }
+    surface.gradient(at).try_normalize(0.0)
+}
+
+/// The unit tangent of the curve in which two surfaces meet, at a point on it; `None` if they are
+/// tangent there.
+pub fn tangent_of_normals(surfaces: [&Surface; 2], at: &Point) -> Option<Vector> {
+    let [n, m] = surfaces.map(|surface| surface_normal(surface, at));
+    let direction = n?.cross(&m?);
+    if direction.norm() > TANGENT_SURFACES { direction.try_normalize(0.0) } else { None }
 }
 
 /// A boundary edge at one of its ends.
@@ -374,12 +378,7 @@ mod tests {
     fn the_apex_of_a_cone_has_no_tangent_plane() {
         let cone =
             csg::primitive::Cone { point: Point::origin(), axis: Vector::z(), radius: 1.0, slope: -0.5 };
-        let geometry = Geometry { surfaces: vec![Surface::Cone(cone)], ..Geometry::default() };
-        let bounds = csg::Aabb { min: Point::origin(), max: Point::origin() };
-        let features =
-            Features { corners: vec![], curves: vec![], patches: vec![], bounds, identified: Vec::new() };
-        let smoothness = GeometrySmoothness { geometry: &geometry, features: &features };
-        assert_eq!(smoothness.surface_normal(&geometry.surfaces[0], &Point::new(0.0, 0.0, 2.0)), None);
+        assert_eq!(surface_normal(&Surface::Cone(cone), &Point::new(0.0, 0.0, 2.0)), None);
     }
 
     #[test]

@@ -63,7 +63,7 @@ mod swap;
 #[cfg(test)]
 mod samples;
 
-pub use legality::{GeometrySmoothness, Smoothness};
+pub use legality::{GeometrySmoothness, Smoothness, surface_normal, tangent_of_normals};
 pub use objective::Measure;
 pub use schedule::{Report, improve, make_refinable};
 pub use settings::{Effort, InsertionSteps, Settings};

@@ -46,6 +46,7 @@ fn settings(planes: Vec<CutPlane>) -> GenerateSettings {
         method: Method::Decompose(CutSettings { planes, ..CutSettings::default() }),
         coarse: CoarseSettings::default(),
         wanted: Wanted::Sizes { pieces: 1 },
+        refine: 0,
         memory: None,
         disk: None,
         nested: false,

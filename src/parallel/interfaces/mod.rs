@@ -33,7 +33,7 @@ mod rework;
 mod tests;
 
 use crate::ground::comm::{CommError, Communicator};
-use crate::mesher::improve;
+use crate::mesher::improve::{self, Smoothness};
 use crate::parallel::distribution::BareMesh;
 use crate::parallel::migrate::{self, MigrateError};
 
@@ -103,7 +103,8 @@ pub struct InterfaceReport {
 /// change.
 ///
 /// Vertex and tet ids are renumbered without gaps. The parts may be slightly uneven afterwards. The
-/// report is `None` if no tet was bad.
+/// report is `None` if no tet was bad. `smoothness` is that of the geometry if the mesh will be
+/// refined: then no tet becomes one that refinement would flatten.
 ///
 /// # Errors
 /// [`MigrateError`] if memory runs out or another rank fails. All ranks return an error.
@@ -111,6 +112,7 @@ pub fn improve_across(
     comm: &dyn Communicator,
     mut mesh: BareMesh,
     settings: &Settings,
+    smoothness: Option<&dyn Smoothness>,
 ) -> Result<(BareMesh, Option<InterfaceReport>), MigrateError> {
     let largest = |angles: &[f64]| angles.iter().copied().fold(0.0, f64::max);
     let choices = [&settings.angles, &settings.angles_if_many];
@@ -131,7 +133,7 @@ pub fn improve_across(
         let mine = regions.tets_to(comm, &mesh)?;
         let (moved, sent) =
             migrate::migrate_bare(comm, mesh, &regions.to, &migrate::MoveSettings::default())?;
-        let reworked = rework::rework(&moved, &mine, settings);
+        let reworked = rework::rework(&moved, &mine, settings, smoothness);
         let counts = [mine.len() as u64, sent.tets, reworked.merged];
         let (improved, destination) = renumber::put_back(comm, moved, reworked)?;
         (mesh, _) = migrate::migrate_bare(comm, improved, &destination, &migrate::MoveSettings::default())?;

@@ -8,10 +8,10 @@ use crate::ground::kernel::simplex::{from_lowest, largest_cosine};
 use crate::ground::mesh::topology::{self, Faces};
 use crate::ground::mesh::{BoundaryTriangle, Class, GlobalId, Mesh, Rank, Segment};
 use crate::ground::mesh::{TET_EDGES, TET_FACES, TetId, VertexId, sorted_face};
-use crate::mesher::improve;
+use crate::mesher::improve::{self, Smoothness};
 use crate::parallel::distribution::{BareMesh, ClassifiedEdge, Side};
 use crate::parallel::skin::{self, PartSizes};
-use csg::{BodyId, CurveId, PatchId};
+use csg::{BodyId, PatchId};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, HashMap};
 
@@ -63,11 +63,16 @@ const TURNS: usize = 3;
 ///
 /// # Panics
 /// If this rank does not have the tets.
-pub(super) fn rework(part: &BareMesh, given: &[(GlobalId, Rank)], settings: &Settings) -> Reworked {
+pub(super) fn rework(
+    part: &BareMesh,
+    given: &[(GlobalId, Rank)],
+    settings: &Settings,
+    smoothness: Option<&dyn Smoothness>,
+) -> Reworked {
     let place = |id: &GlobalId| part.tet_ids.binary_search(id).expect("the tets are on this rank") as u32;
     let replaced_tets: Vec<(u32, Rank)> = given.iter().map(|(id, from)| (place(id), *from)).collect();
     let mut regions = regions(part, &replaced_tets);
-    regions.par_iter_mut().for_each(|region| region.rework(settings));
+    regions.par_iter_mut().for_each(|region| region.rework(settings, smoothness));
     let mut reworked = Reworked::default();
     regions.into_iter().for_each(|region| region.finish(part.points.len(), &mut reworked));
     reworked.replaced_tets.sort_unstable();
@@ -203,7 +208,7 @@ fn regions(part: &BareMesh, replaced_tets: &[(u32, Rank)]) -> Vec<Region> {
 
 impl Region {
     /// Improves the region and determines the destination of each tet.
-    fn rework(&mut self, settings: &Settings) {
+    fn rework(&mut self, settings: &Settings, smoothness: Option<&dyn Smoothness>) {
         let corners = |tet: &[VertexId; 4]| tet.map(|v| self.mesh.points[v.index()]);
         let sharpest = self.mesh.tets.iter().map(|tet| largest_cosine(&corners(tet))).fold(-1.0, f64::max);
         let least_angle = sharpest.acos().to_degrees() - ROUNDING;
@@ -211,23 +216,27 @@ impl Region {
         let how = improve::Settings { least_angle, reconnection_steps, ..settings.improve.clone() };
         let before =
             PartSizes::new(self.mesh.points.clone(), self.mesh.tets.clone(), usual_lengths(&self.mesh));
-        self.improve(&before, &how);
+        self.improve(&before, &how, smoothness);
         let turns = settings.merge_angle.into_iter().flat_map(|angle| [angle; TURNS]);
         for angle in turns {
             if !self.merge(angle) {
                 break;
             }
-            self.improve(&before, &how);
+            self.improve(&before, &how, smoothness);
         }
         self.ranks = destinations(&self.mesh, &before, &self.ranks);
     }
 
-    fn improve(&mut self, sizes: &PartSizes, how: &improve::Settings) {
-        let on_curves = self.edges.iter().filter(|(_, class)| matches!(class, Class::Curve(_)));
-        let segment =
-            |(ends, _): (&[u32; 2], &Class)| Segment { vertices: ends.map(VertexId), curve: CurveId(0) };
-        self.mesh.segments = on_curves.map(segment).collect();
-        improve::improve(&mut self.mesh, sizes, how);
+    fn improve(&mut self, sizes: &PartSizes, how: &improve::Settings, smoothness: Option<&dyn Smoothness>) {
+        let segment = |(ends, class): (&[u32; 2], &Class)| match *class {
+            Class::Curve(curve) => Some(Segment { vertices: ends.map(VertexId), curve }),
+            _ => None,
+        };
+        self.mesh.segments = self.edges.iter().filter_map(segment).collect();
+        match smoothness {
+            Some(smoothness) => improve::make_refinable(&mut self.mesh, sizes, smoothness, how),
+            None => improve::improve(&mut self.mesh, sizes, how),
+        };
     }
 
     /// Merges boundary vertices; returns whether any were merged.

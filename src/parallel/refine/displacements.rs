@@ -9,8 +9,9 @@ use crate::ground::mesh::GlobalId;
 /// An edge with displacement d is the parabola 4t(1−t)·d off its chord, before projection. Only
 /// edges inside bodies and on curved patches can be displaced.
 ///
-/// Computed once, on the whole coarse mesh ([`mend`](super::mend::mend())), and sent to all ranks.
-/// Keyed by global edge id, so all ranks that share an edge displace it alike. Few edges need it.
+/// Computed once ([`mend`](super::mend::mend()), [`mend_near`](super::mend::mend_near)) and sent to
+/// all ranks. Keyed by global edge id, so all ranks that share an edge displace it alike. Few edges
+/// need it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct EdgeDisplacements {
     /// Sorted by edge id.

@@ -9,8 +9,9 @@
 //! the worst child, and is minimised edge by edge. Edges on curved patches may be displaced too,
 //! along the patch.
 //!
-//! It runs on the whole coarse mesh before distribution, because all ranks that share an edge must
-//! displace it alike, and only near bad tets, which are few in a sound coarse mesh. A coarse mesh
+//! All ranks that share an edge must displace it alike. So [`mend()`] runs on the whole coarse mesh
+//! before distribution; [`mend_near`] runs on a part and leaves its shared edges straight. Both
+//! change only edges near bad tets, which are few in a sound coarse mesh. A coarse mesh
 //! with many bad tets (e.g. tets thicker than a shell) needs a smaller mesh size instead.
 //!
 //! Success is not guaranteed: the remaining bad tets are reported, and
@@ -81,6 +82,22 @@ const STEPS: [f64; 2] = [0.12, 0.01];
 /// # Errors
 /// [`RefineError::Projection`] and [`RefineError::OutOfMemory`], as [`refine()`](super::refine()).
 pub fn mend(mesh: &DistMesh, projector: &Projector, settings: &Settings) -> Result<Mended, RefineError> {
+    let all = curved(mesh, projector, &EdgeDisplacements::default());
+    mend_near(mesh, &all, projector, settings)
+}
+
+/// *Local.* [`mend`] of a part of which only the tets with these local indices may have
+/// insufficient children. Edges shared with other ranks are not displaced, so the displacements of
+/// all ranks together are those for the whole mesh.
+///
+/// # Errors
+/// As [`mend`].
+pub fn mend_near(
+    mesh: &DistMesh,
+    suspects: &[u32],
+    projector: &Projector,
+    settings: &Settings,
+) -> Result<Mended, RefineError> {
     let mut trial = Trial {
         mesh,
         projector,
@@ -88,8 +105,7 @@ pub fn mend(mesh: &DistMesh, projector: &Projector, settings: &Settings) -> Resu
         pieces: settings.pieces,
         displacements: EdgeDisplacements::default(),
     };
-    let mut tried: BTreeSet<u32> =
-        curved(mesh, projector, &EdgeDisplacements::default()).into_iter().collect();
+    let mut tried: BTreeSet<u32> = suspects.iter().copied().collect();
     let mut before: Option<Vec<GlobalId>> = None;
     let mut left = Vec::new();
     for pieces in ladder(settings.pieces) {
@@ -156,8 +172,10 @@ impl Trial<'_> {
                 break;
             }
             let edges = BTreeSet::from_iter(bad.iter().flat_map(|&tet| self.mesh.tet_edges[tet as usize]));
-            let may_bend =
-                |edge: &EdgeId| snap::may_bend(self.mesh.edge_classes[edge.index()], self.projector);
+            let may_bend = |edge: &EdgeId| {
+                let is_shared = self.mesh.shared_edges.holders_of(edge.0).is_some();
+                !is_shared && snap::may_bend(self.mesh.edge_classes[edge.index()], self.projector)
+            };
             let edges: Vec<EdgeId> = edges.into_iter().filter(may_bend).collect();
             let stars = self.stars(&edges);
             let mut changed = false;

@@ -38,7 +38,7 @@ mod tet;
 pub mod trial;
 
 pub use displacements::EdgeDisplacements;
-pub use mend::{Mended, mend};
+pub use mend::{Mended, mend, mend_near};
 pub use periodic_check::{PeriodicCheck, check_periodic};
 pub use predicted::{PredictedCounts, predicted_counts};
 pub use refined::RefinedMesh;

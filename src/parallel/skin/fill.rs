@@ -5,11 +5,11 @@ use crate::ground::mesh::stream::{MeshStream, TetBlock};
 use crate::ground::mesh::{BoundaryTriangle, Class, Mesh, Segment, VertexId};
 use crate::ground::projector::Projector;
 use crate::ground::size::SizeField;
-use crate::mesher::improve::{self, improve};
+use crate::mesher::improve::{self, Smoothness};
 use crate::mesher::volume::{self, ClosedSurface, SurfaceFaults, VolumeError};
 use crate::parallel::distribution::DistMesh;
 use crate::parallel::refine::{self, RefineError, refine};
-use csg::{BodyId, CornerId, CurveId};
+use csg::{BodyId, CornerId};
 
 /// The tets of a part. Vertices are those of its skin, in their order, then the interior ones.
 #[derive(Clone, Debug, Default)]
@@ -22,6 +22,16 @@ pub struct Filled {
     pub inside: Vec<[f64; 3]>,
     /// The error of the volume mesher if the tets are those of the lattice instead.
     pub refused: Option<FillError>,
+}
+
+/// How tets are improved.
+#[derive(Clone, Copy)]
+pub struct Improvement<'a> {
+    /// The settings.
+    pub settings: &'a improve::Settings,
+    /// If the tets will be refined, the smoothness of the geometry, because tets with all edges in
+    /// one tangent plane would be flattened.
+    pub smoothness: Option<&'a dyn Smoothness>,
 }
 
 /// Why the interior of a skin cannot be meshed.
@@ -47,9 +57,9 @@ pub fn fill_or_refine(
     projector: &Projector,
     skin: &LatticeSkin,
     size: &dyn SizeField,
-    settings: &improve::Settings,
+    how: Improvement,
 ) -> Result<Filled, RefineError> {
-    match fill(&skin.skin, size, settings) {
+    match fill(&skin.skin, size, how) {
         Ok(filled) => Ok(filled),
         Err(refused) => {
             let filled = fill_by_lattice(mesh, projector, skin)?;
@@ -62,17 +72,16 @@ pub fn fill_or_refine(
 ///
 /// # Errors
 /// [`FillError`] if the skin is not closed or the volume mesher fails.
-pub fn fill(skin: &Skin, size: &dyn SizeField, settings: &improve::Settings) -> Result<Filled, FillError> {
+pub fn fill(skin: &Skin, size: &dyn SizeField, how: Improvement) -> Result<Filled, FillError> {
     if skin.triangles.is_empty() {
         return Ok(Filled::default());
     }
     let (on_triangles, inside) = skin.points.split_at(skin.on_triangles);
     let corners = skin.triangles.iter().map(|t| t.vertices).collect();
     let beside = skin.triangles.iter().map(|t| t.beside).collect();
-    let loose = skin.loose_edges();
     let surface = ClosedSurface::new(on_triangles.to_vec(), corners, beside)?
         .with_kept_points(inside.to_vec())
-        .with_kept_edges(loose.clone());
+        .with_kept_edges(skin.loose_edges());
     let (filled, report) = volume::mesh(&surface, size, &volume::Settings::default())?;
     if report.on_kept_edges > 0 {
         return Err(FillError::CutEdges(report.on_kept_edges));
@@ -84,16 +93,22 @@ pub fn fill(skin: &Skin, size: &dyn SizeField, settings: &improve::Settings) -> 
     // Of the classes only the distinction between fixed and movable vertices matters here.
     let mut classes = vec![Class::Corner(CornerId(0)); skin.points.len()];
     classes.resize(filled.points.len(), Class::Body(BodyId(0)));
-    let segment = |ends: [u32; 2]| Segment { vertices: ends.map(VertexId), curve: CurveId(0) };
+    let segment = |(ends, class): &([u32; 2], Class)| match *class {
+        Class::Curve(curve) => Some(Segment { vertices: ends.map(VertexId), curve }),
+        _ => None,
+    };
     let mut made = Mesh {
         points: filled.points,
         classes,
         tets: filled.tets.into_iter().map(|t| t.map(VertexId)).collect(),
         bodies: filled.bodies,
         triangles: skin.triangles.iter().filter_map(patched).collect(),
-        segments: loose.into_iter().map(segment).collect(),
+        segments: skin.edges.iter().filter_map(segment).collect(),
     };
-    improve(&mut made, size, settings);
+    match how.smoothness {
+        Some(smoothness) => improve::make_refinable(&mut made, size, smoothness, how.settings),
+        None => improve::improve(&mut made, size, how.settings),
+    };
     Ok(Filled {
         tets: made.tets.into_iter().map(|t| t.map(|v| v.0)).collect(),
         bodies: made.bodies,

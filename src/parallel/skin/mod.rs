@@ -16,6 +16,7 @@
 //! volume mesher rejects is filled with the lattice of `refine` instead, so no rank fails for this
 //! reason.
 
+mod delivered;
 mod extract;
 mod fill;
 mod number;
@@ -24,8 +25,9 @@ mod sizes;
 #[cfg(test)]
 mod tests;
 
+pub use delivered::{DeliveredSizes, delivered};
 pub(crate) use extract::sorted_ends;
 pub use extract::{LatticeSkin, Skin, SkinTriangle, skin};
-pub use fill::{FillError, Filled, fill, fill_or_refine};
+pub use fill::{FillError, Filled, Improvement, fill, fill_or_refine};
 pub use number::number;
 pub use sizes::{PartSizes, at_vertices, scatter};

@@ -52,6 +52,11 @@ impl PartSizes {
         Self { weights, tets: Tree::new(&boxes), points, coarse, sizes }
     }
 
+    /// Multiplies all sizes by a factor.
+    pub fn scale(&mut self, factor: f64) {
+        self.sizes.iter_mut().for_each(|size| *size *= factor);
+    }
+
     /// The coarse tet that contains a point, or the nearest one (near a curved boundary the refined
     /// skin is outside the coarse tets). `None` if there are no tets.
     pub fn tet_at(&self, point: &Point) -> Option<u32> {

@@ -37,8 +37,14 @@ fn filled(
         let mesh = (comm.rank() == 0).then(|| (fixture.mesh.clone(), rank_of.clone()));
         let part = distribute(comm, mesh).expect("a classified mesh");
         let skin = skin(&part, &fixture.projector, n).expect("a skin");
-        let filled =
-            fill_or_refine(&part, &fixture.projector, &skin, size, &Settings::default()).expect("tets");
+        let filled = fill_or_refine(
+            &part,
+            &fixture.projector,
+            &skin,
+            size,
+            Improvement { settings: &Settings::default(), smoothness: None },
+        )
+        .expect("tets");
         let refused = usize::from(filled.refused.is_some());
         let boundary = skin.numbering.totals().boundary;
         let bare = number(comm, skin.skin, filled, boundary).expect("all ranks");
@@ -117,7 +123,9 @@ fn vertices_inside_that_are_corners_are_kept() {
     let skin = skin(part, &fixture.projector, 2).expect("a skin").skin;
     assert_eq!(skin.points.len(), skin.on_triangles + 1);
     assert_eq!(skin.points[skin.on_triangles], fixture.mesh.points[centre]);
-    let filled = fill(&skin, &UniformSize(0.2), &Settings::default()).expect("tets");
+    let filled =
+        fill(&skin, &UniformSize(0.2), Improvement { settings: &Settings::default(), smoothness: None })
+            .expect("tets");
     assert!(filled.tets.iter().flatten().any(|&v| v as usize == skin.on_triangles));
 }
 
