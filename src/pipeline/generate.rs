@@ -117,6 +117,9 @@ fn coarse_parts<'a>(
     let fits =
         room::refuse_oversized(comm.rank(), &dist, (pieces, settings.coarse.order), settings.disk.as_ref());
     comm.agree(fits.map_err(Error::from))?;
+    let of_tet = settings.disk.as_ref().map_or(0, |disk| disk.memory_of_tet);
+    let fineness = (pieces, settings.coarse.order);
+    room::refuse_crowded(comm, &dist, fineness, of_tet, settings.memory)?;
     Ok(Parts { model, coarse, dist, projector, names, pieces })
 }
 

@@ -61,6 +61,18 @@ pub enum RoomError {
         /// Free bytes there.
         available: u64,
     },
+    /// A machine has too little memory for the mesh and its adjacency.
+    #[error(
+        "the fine mesh with its adjacency takes {} of memory, and this machine has {} left: leave out the adjacency, take \
+         fewer levels or tets, or more machines",
+        sized(*.needed), sized(*.available)
+    )]
+    Writers {
+        /// Bytes of the mesh, and of its adjacency while it is written, on this machine.
+        needed: u64,
+        /// Free bytes.
+        available: u64,
+    },
     /// A machine has too little memory.
     #[error(
         "the fine mesh takes {}, without the vertices inside coarse tets {}, and this machine has {} left: take fewer levels \
