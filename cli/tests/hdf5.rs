@@ -129,3 +129,37 @@ fn an_adjacency_that_does_not_fit_the_memory_is_refused_before_refinement() {
     assert!(stderr.contains("leave out the adjacency"), "{stderr}");
     assert!(std::fs::read_dir(dir.path()).unwrap().next().is_none());
 }
+
+#[test]
+fn periodic_ids_are_those_of_the_masters() {
+    let dir = tempfile::tempdir().unwrap();
+    for parts in ["1", "3"] {
+        for order in ["1", "2"] {
+            write(dir.path(), "unit_cell", [order, parts], &["--preset", "very-coarse"]);
+        }
+    }
+    let program = "
+import h5py
+import numpy as np
+for order in (1, 2):
+    for parts in (1, 3):
+        points = h5py.File(f'{order}.{parts}/unit_cell.h5')['VTKHDF']
+        data = points['PointData']
+        ids, masters, points = data['GlobalNodeId'][:], data['PeriodicId'][:], points['Points'][:]
+        # Periodic with period 1 in all directions: a class has the points that are equal modulo 1.
+        keys = np.round(points % 1, 7) % 1
+        classes = np.unique(keys, axis=0, return_inverse=True)[1].ravel()
+        row_of = np.argsort(ids)
+        assert (ids[row_of] == np.arange(len(ids))).all()
+        # Each class has one master, one of its own points.
+        assert (classes[row_of[masters]] == classes).all()
+        assert len(np.unique(masters)) == classes.max() + 1
+        assert (masters[row_of[masters]] == masters).all()
+        sizes = np.bincount(classes)
+        assert sizes.max() == 8 and (sizes == 4).any() and (sizes == 2).sum() > 20, sizes
+        # Points inside are their own masters.
+        inside = ((points > 1e-6) & (points < 1 - 1e-6)).all(axis=1)
+        assert inside.any() and (masters[inside] == ids[inside]).all()
+";
+    python(&["h5py", "numpy"], program, dir.path());
+}
