@@ -294,3 +294,34 @@ assert abs(seven[3]['film'] - 3.2) < 1e-9, seven
 ";
     python(&["ngsolve"], ngsolve, dir.path());
 }
+
+#[test]
+fn ngsolve_counts_corners_as_vertices_in_second_order() {
+    let dir = tempfile::tempdir().unwrap();
+    for parts in ["1", "3"] {
+        for order in ["1", "2"] {
+            let mut run = tetmill();
+            run.args(["generate", "-f", "vol", "-q", "-n", parts, "--order", order]).arg(own("dome"));
+            succeed(run.arg("-o").arg(dir.path().join(format!("{order}.{parts}"))));
+        }
+    }
+    let program = "
+import netgen.meshing
+from ngsolve import CF, H1, Integrate, Mesh
+def load(file):
+    mesh = netgen.meshing.Mesh()
+    mesh.Load(file)
+    return Mesh(mesh)
+for parts in (1, 3):
+    straight, curved = (load(f'{order}.{parts}/dome.vol') for order in (1, 2))
+    corners = {v.nr for e in curved.ngmesh.Elements3D() for v in e.vertices}
+    nodes = {v.nr for e in curved.ngmesh.Elements3D() for v in e.points}
+    assert straight.ne == curved.ne and len(nodes) > 5 * len(corners)
+    assert straight.nv == curved.nv == len(corners) == max(corners), (straight.nv, curved.nv, max(corners))
+    assert H1(curved, order=1).ndof == len(corners) and H1(curved, order=2).ndof == len(nodes)
+    volumes = [Integrate(CF(1), mesh) for mesh in (straight, curved)]
+    # Edges on the dome are curved outwards.
+    assert 1.001 * volumes[0] < volumes[1] < 1.05 * volumes[0], volumes
+";
+    python(&["ngsolve"], program, dir.path());
+}
