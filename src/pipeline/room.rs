@@ -234,7 +234,7 @@ mod tests {
         assert!(refusal([1, 1, 1], None).is_none());
         let refused = refusal([0, 1 << 50, 0], None).expect("6·8 tets of 2⁵⁰ bytes are 54 PB");
         assert!(matches!(refused, RoomError::Disk { .. }));
-        assert!(refused.to_string().contains("take 54043.2 TB or more"), "{refused}");
+        assert!(refused.to_string().contains("take about 54043.2 TB and"), "{refused}");
         assert!(refusal([0; 3], Some(48)).is_none());
         assert!(
             refusal([0; 3], Some(47))

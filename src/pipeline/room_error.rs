@@ -50,11 +50,11 @@ pub enum RoomError {
     },
     /// The disk has too little space.
     #[error(
-        "the files take {} or more and {} has {} free: write elsewhere, take another format, or ask for fewer tets",
+        "the files take about {} and {} has {} free: write elsewhere, take another format, or ask for fewer tets",
         sized(*.needed), .folder.display(), sized(*.available)
     )]
     Disk {
-        /// Lower estimate of the size of the files in bytes.
+        /// Estimate of the size of the files in bytes.
         needed: u64,
         /// The output folder.
         folder: PathBuf,

@@ -110,8 +110,8 @@ pub struct Settings {
     pub adjacency: bool,
 }
 
-/// Memory of a tet while its adjacency is computed and written, in bytes. Measured are 465, with
-/// 2.2 million tets on one rank and on four.
+/// Memory of a tet while its adjacency is computed and written, in bytes. Measured are 473, and 486
+/// of second order (`benches/results/disk-2026-11-25.md`).
 pub const ADJACENCY_MEMORY: u64 = 500;
 
 /// **Collective.** Writes the mesh of all ranks to `STEM.h5` and `STEM.xdmf`. All ranks get the
