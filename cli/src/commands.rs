@@ -1,6 +1,7 @@
 //! The commands: from the options to a written mesh and a summary.
 
 mod decompose;
+mod disk;
 mod extras;
 mod outputs;
 mod ranks;
@@ -9,6 +10,7 @@ mod write;
 
 use decompose::cut_settings;
 pub use decompose::run_decompose;
+use disk::disk_for;
 pub use extras::{long_version, run_completions, run_man};
 use outputs::Outputs;
 pub use ranks::on_one_rank;
@@ -26,9 +28,9 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 use tetmill::comm::{Communicator, thread};
 use tetmill::files::{Destination, elmer, mesh_size, picture, refuse_missing, serial};
-use tetmill::mesh::{MeshStream, Order, Watched};
+use tetmill::mesh::{MeshStream, Watched};
 use tetmill::progress::{Progress, Silent, Stage};
-use tetmill::run::{CoarseSettings, Disk, GenerateSettings, Outcome, Wanted, balance, generate};
+use tetmill::run::{CoarseSettings, GenerateSettings, Outcome, Wanted, balance, generate};
 use tetmill::size::{Closeness, SizeSettings};
 use tetmill::{Geometry, InputSettings, files, quality};
 
@@ -66,7 +68,7 @@ fn generate_on(comm: &dyn Communicator, options: &Generate, start: Instant) -> R
     let geometry = agree(comm, geometry)?;
     let coarse = agree(comm, coarse_settings(&options.size, geometry.as_ref()))?;
     let coarse = CoarseSettings { order: options.order.order(), ..coarse };
-    let disk = Some(disk_for(&options.run.format, coarse.order, &target));
+    let disk = Some(disk_for(&options.run, coarse.order, &target));
     let method = agree(comm, method_of(options))?;
     let settings = GenerateSettings {
         method,
@@ -196,47 +198,6 @@ fn wanted_coarse(size: &SizeOptions, pieces: u32) -> Wanted {
 
 fn wanted_count(options: &Generate) -> Option<u64> {
     options.elements.or(options.size.coarse)
-}
-
-/// Estimates the disk space of the formats, in bytes for each vertex, tet and boundary triangle.
-/// Text formats are estimated by short lines.
-fn disk_for(formats: &[Format], order: Order, folder: &Path) -> Disk {
-    let bytes = |format: &Format| match format {
-        Format::Elmer => [60, 40, 40],
-        Format::Vtu => [32, 44, 30],
-        Format::Msh => [65, 60, 50],
-        Format::Msh4 | Format::Msh4Parts => [32, 40, 32],
-        Format::Medit => [60, 40, 30],
-        Format::Vol => [58, 40, 42],
-        Format::Inp => [65, 40, 25],
-        Format::Mfem => [50, 24, 18],
-        Format::Hdf5 => [32, 89, 48],
-        Format::Geomview => [0, 0, 30],
-        Format::None => [0; 3],
-    };
-    let has_short_ids = |format: &Format| {
-        matches!(format, Format::Elmer | Format::Msh | Format::Medit | Format::Vol | Format::Inp)
-    };
-    let sum = |sum: [u64; 3], more: [u64; 3]| [0, 1, 2].map(|k| sum[k] + more[k]);
-    Disk {
-        folder: std::path::absolute(folder).unwrap_or_else(|_| folder.to_path_buf()),
-        bytes: formats
-            .iter()
-            .map(|format| {
-                let [vertex, tet, triangle] = bytes(format);
-                let [more_of_tet, more_of_triangle] = match (order, format) {
-                    (Order::First, _) | (_, Format::Geomview | Format::None) => [0, 0],
-                    // It has the nodes of the tets twice, for VTK and for PETSc.
-                    (Order::Second, Format::Hdf5) => [96, 24],
-                    // Six and three more nodes, of some seven digits or eight bytes.
-                    (Order::Second, _) => [42, 21],
-                };
-                [vertex, tet + more_of_tet, triangle + more_of_triangle]
-            })
-            .fold([0; 3], sum),
-        // These formats have 32-bit ids.
-        most: formats.iter().any(has_short_ids).then_some(i32::MAX as u64),
-    }
 }
 
 /// **Collective.** Draws the surface of the mesh, or of the part behind a plane.

@@ -258,3 +258,39 @@ fn an_interrupted_command_leaves_nothing_half_written() {
     assert_eq!(stderr.matches("cancelled").count(), 1, "{stderr}");
     assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 0, "{stderr}");
 }
+
+#[test]
+fn files_of_a_run_with_more_parts_are_removed_and_those_of_users_are_kept() {
+    let dir = tempfile::tempdir().unwrap();
+    for (format, of, foreign) in [
+        ("mfem", ["lens.000000", "lens.000001"], ["lens.000008", "lens.000004", "lens.vtu"]),
+        ("msh4-parts", ["lens_1.msh", "lens_2.msh"], ["lens_8.msh", "lens_5.msh", "lens.vtu"]),
+    ] {
+        let out = dir.path().join(format);
+        let run = |parts: &str| {
+            let mut run = on_lens("generate", dir.path());
+            succeed(run.args(["-q", "-f", format, "-n", parts, "-o"]).arg(&out));
+            names(&out)
+        };
+        assert_eq!(run("4").len(), 4);
+        // A file of another mesh behind a gap, and files of other programs.
+        let start = if format == "mfem" { "MFEM mesh v1.2" } else { "$MeshFormat" };
+        for (name, text) in foreign.iter().zip([start, "a user's own", "a user's own"]) {
+            fs::write(out.join(name), text).unwrap();
+        }
+        let mut expected: Vec<&str> = of.into_iter().chain(foreign).collect();
+        expected.sort_unstable();
+        assert_eq!(run("2"), expected, "{format}");
+    }
+}
+
+#[test]
+fn a_file_of_a_run_with_more_parts_is_kept_if_it_is_an_input() {
+    let dir = tempfile::tempdir().unwrap();
+    let third = dir.path().join("lens_3.msh");
+    succeed(on_lens("mesh", dir.path()).arg("-q").arg("-o").arg(&third));
+    let mut run = tetmill();
+    run.args(["generate", "-f", "msh4-parts", "-n", "2", "-o"]).arg(dir.path()).arg(own("lens"));
+    let stderr = refused(run.arg("--mesh-size-file").arg(&third));
+    assert!(stderr.contains("would overwrite the input") && third.exists(), "{stderr}");
+}

@@ -9,6 +9,7 @@ mod flat_parts;
 mod flat_stl;
 mod geometries;
 mod habits;
+mod hdf5;
 mod inputs;
 mod limited;
 mod mpirun;

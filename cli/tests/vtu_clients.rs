@@ -1,24 +1,11 @@
-//! VTU files, joined files, Gmsh's files of parts, MFEM's parallel files, and HDF5 files, read by
-//! MFEM, meshio, scikit-fem, Gmsh, NGSolve and h5py.
+//! VTU files, joined files, Gmsh's files of parts, and MFEM's parallel files, read by MFEM, meshio,
+//! scikit-fem, Gmsh and NGSolve.
 //!
 //! A test is skipped with a message if the Python module is missing.
 
-use crate::common::{own, shared, succeed, tetmill};
+use crate::common::{own, python, shared, succeed, tetmill};
 use std::path::Path;
 use std::process::Command;
-
-/// Runs a Python program in a folder; false if a module is missing.
-fn python(modules: &[&str], program: &str, folder: &Path) -> bool {
-    for module in modules {
-        let found = Command::new("python3").args(["-c", &format!("import {module}")]).output();
-        if !found.is_ok_and(|output| output.status.success()) {
-            eprintln!("SKIPPED: there is no Python module {module}");
-            return false;
-        }
-    }
-    succeed(Command::new("python3").args(["-c", program]).current_dir(folder));
-    true
-}
 
 /// Bodies substrate (1), film (2) and cover (3), with interfaces: volumes 16, 3.2 and 16.
 fn layers(folder: &Path, file: &str, more: &[&str]) {
@@ -89,48 +76,6 @@ assert abs(volumes[1] - 16) < 1e-9 and abs(volumes[2] - 3.2) < 1e-9, volumes
 assert mesh.CheckElementOrientation(False) == 0 and mesh.CheckBdrElementOrientation(False) == 0
 ";
     python(&["mfem.ser"], program, dir.path());
-}
-
-#[test]
-fn one_hdf5_file_has_all_parts_in_both_orders() {
-    let dir = tempfile::tempdir().unwrap();
-    for (order, parts) in [("1", "1"), ("1", "4"), ("2", "1"), ("2", "4")] {
-        let out = dir.path().join(format!("{order}.{parts}"));
-        let mut run = tetmill();
-        run.args(["generate", "-f", "hdf5", "-q", "-n", parts, "--order", order]);
-        succeed(run.args(["-o", out.to_str().unwrap()]).arg(own("layers")));
-        assert_eq!(std::fs::read_dir(out).unwrap().count(), 2);
-    }
-    let program = "
-import re
-import h5py
-import numpy as np
-for order, nodes in ((1, (4, 3)), (2, (10, 6))):
-    for parts in (1, 4):
-        name = f'{order}.{parts}/layers'
-        file = h5py.File(name + '.h5')
-        grid, triangles = file['VTKHDF'], file['boundary/cells'][:]
-        points, tets = grid['Points'][:], grid['Connectivity'][:].reshape(-1, nodes[0])
-        assert triangles.shape[1] == nodes[1] and (grid['Types'][:] == {1: 10, 2: 24}[order]).all()
-        assert sorted(grid['CellData/GlobalElementId'][:]) == list(range(len(tets)))
-        assert set(grid['CellData/PartitionId'][:]) == set(range(1, parts + 1))
-        edges = points[tets[:, 1:4]] - points[tets[:, :1]]
-        volumes, bodies = np.linalg.det(edges) / 6, grid['CellData/BodyId'][:]
-        for body, volume in ((1, 16), (2, 3.2), (3, 16)):
-            assert abs(volumes[bodies == body].sum() - volume) < 1e-9, (order, parts, body)
-        # Planes: nodes on edges are midpoints, in VTK's order.
-        for cells, first in ((tets, 4), (triangles, 3)):
-            pairs = ((0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3))[:cells.shape[1] - first]
-            for node, (a, b) in enumerate(pairs, first):
-                middle = (points[cells[:, a]] + points[cells[:, b]]) / 2
-                assert abs(points[cells[:, node]] - middle).max() < 1e-12, (order, parts, node)
-        # The index refers to datasets of the file, with their shapes.
-        items = re.findall(r'Dimensions=\"([0-9 ]+)\">layers.h5:([^<]+)<', open(name + '.xdmf').read())
-        assert len(items) == 10
-        for shape, path in items:
-            assert file[path].shape == tuple(map(int, shape.split())), path
-";
-    python(&["h5py", "numpy"], program, dir.path());
 }
 
 #[test]
@@ -348,4 +293,35 @@ for a, b in zip(one[3:], seven[3:]):
 assert abs(seven[3]['film'] - 3.2) < 1e-9, seven
 ";
     python(&["ngsolve"], ngsolve, dir.path());
+}
+
+#[test]
+fn ngsolve_counts_corners_as_vertices_in_second_order() {
+    let dir = tempfile::tempdir().unwrap();
+    for parts in ["1", "3"] {
+        for order in ["1", "2"] {
+            let mut run = tetmill();
+            run.args(["generate", "-f", "vol", "-q", "-n", parts, "--order", order]).arg(own("dome"));
+            succeed(run.arg("-o").arg(dir.path().join(format!("{order}.{parts}"))));
+        }
+    }
+    let program = "
+import netgen.meshing
+from ngsolve import CF, H1, Integrate, Mesh
+def load(file):
+    mesh = netgen.meshing.Mesh()
+    mesh.Load(file)
+    return Mesh(mesh)
+for parts in (1, 3):
+    straight, curved = (load(f'{order}.{parts}/dome.vol') for order in (1, 2))
+    corners = {v.nr for e in curved.ngmesh.Elements3D() for v in e.vertices}
+    nodes = {v.nr for e in curved.ngmesh.Elements3D() for v in e.points}
+    assert straight.ne == curved.ne and len(nodes) > 5 * len(corners)
+    assert straight.nv == curved.nv == len(corners) == max(corners), (straight.nv, curved.nv, max(corners))
+    assert H1(curved, order=1).ndof == len(corners) and H1(curved, order=2).ndof == len(nodes)
+    volumes = [Integrate(CF(1), mesh) for mesh in (straight, curved)]
+    # Edges on the dome are curved outwards.
+    assert 1.001 * volumes[0] < volumes[1] < 1.05 * volumes[0], volumes
+";
+    python(&["ngsolve"], program, dir.path());
 }

@@ -20,6 +20,8 @@ pub struct Target {
     inside: bool,
     /// `faces` or `vertices`.
     halo: Option<String>,
+    /// Whether the adjacency is written (HDF5).
+    adjacency: bool,
 }
 
 impl Target {
@@ -62,7 +64,10 @@ pub fn write(
             "vol" => joined(part, serial::Format::Netgen),
             "inp" => joined(part, serial::Format::Abaqus),
             "mfem" => mfem::write(comm, part, names, &target.path),
-            "hdf5" => hdf5::write(comm, part, names, &target.path),
+            "hdf5" => {
+                let settings = hdf5::Settings { adjacency: target.adjacency };
+                hdf5::write_with(comm, part, names, &target.path, settings)
+            }
             _ => geomview::write(comm, part, &geomview::Settings::default(), &target.path),
         }
     });

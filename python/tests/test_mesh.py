@@ -173,6 +173,22 @@ def test_files_are_read_back(ball, tmp_path, name, parts):
     assert again.is_mesh and len(again.generate().tets) == len(mesh.tets)
 
 
+def test_hdf5_files_hold_the_adjacency(ball, tmp_path):
+    h5py = pytest.importorskip("h5py")
+    mesh = ball.generate(maxh=0.5)
+    mesh.write(tmp_path / "with", "hdf5", adjacency=True)
+    mesh.write(tmp_path / "without", "hdf5")
+    with h5py.File(tmp_path / "with.h5") as file:
+        group = file["adjacency"]
+        counts = len(mesh.points), len(group["edges"]), len(group["faces"]), len(mesh.tets)
+        assert counts[0] - counts[1] + counts[2] - counts[3] == 1
+        assert group["tet_edges"].shape == (len(mesh.tets), 6)
+    with h5py.File(tmp_path / "without.h5") as file:
+        assert "adjacency" not in file
+    with pytest.raises(ValueError, match="adjacency"):
+        mesh.write(tmp_path / "a.vtu", adjacency=True)
+
+
 def test_folders_and_halos_are_written(ball, tmp_path):
     mesh = ball.generate(maxh=0.5, parts=2)
     mesh.write(tmp_path / "elmer", "elmer", halo="faces")

@@ -16,7 +16,7 @@
 
 use super::lines::{self, ByPatch, TetLine, TriangleLine};
 use super::node_order::arranged;
-use super::number::{Numbering, number};
+use super::number::{Numbering, number, number_corners_first};
 use super::once::{LeftOut, left_out, share_of_triangles};
 use super::output::{Output, folder_and_name, write_file, write_together};
 use super::pairs::pairs;
@@ -34,6 +34,8 @@ const MOST: u64 = i32::MAX as u64;
 pub(super) struct TextFormat {
     /// Name of the format for messages.
     pub name: &'static str,
+    /// Whether corners are numbered before the nodes on edges.
+    pub corners_first: bool,
     /// **Collective.** Lists the sections of the file in order.
     pub sections: for<'a> fn(&dyn Communicator, &'a Whole<'a>) -> Result<Vec<Section<'a>>, WriteError>,
 }
@@ -51,8 +53,10 @@ pub(super) enum Section<'a> {
     Text(String),
     /// Text of this rank.
     Own(Vec<u8>),
-    /// One line for each vertex.
+    /// One line for each vertex, without those numbered behind all others.
     Vertices(FormatVertex<'a>),
+    /// One line for each vertex that is numbered behind all others.
+    LastVertices(FormatVertex<'a>),
     /// One line for each boundary triangle.
     Triangles(FormatTriangle<'a>),
     /// One line for each tet.
@@ -82,11 +86,12 @@ impl<'a> Whole<'a> {
         comm: &dyn Communicator,
         part: &'a dyn MeshStream,
         names: &'a Names,
-        format: &'static str,
+        format: &TextFormat,
     ) -> Result<Self, WriteError> {
-        let checked = check(part, part.totals(), format);
+        let checked = check(part, part.totals(), format.name);
         comm.agree(checked)?;
-        let numbering = number(comm, part)?;
+        let numbering =
+            if format.corners_first { number_corners_first(comm, part)? } else { number(comm, part)? };
         let pairs = pairs(comm, part, &numbering, |index, _| index as u64)?;
         let left_out = left_out(comm, part, names)?;
         let (triangles_before, totals) = share_of_triangles(comm, part, &left_out)?;
@@ -148,10 +153,11 @@ impl<'a> Whole<'a> {
             Section::Text(_) => Ok(()),
             Section::Own(text) => file.write(text),
             Section::Vertices(format) => {
-                let is_own = |local| self.numbering.owns(local);
-                lines::vertices(self.part, file, is_own, |line, vertex| {
-                    format(line, self.numbering.vertex(vertex.index as u32), vertex.point);
-                })
+                let is_own = |local| self.numbering.owns(local) && !self.numbering.owns_last(local);
+                self.write_vertices(file, is_own, format)
+            }
+            Section::LastVertices(format) => {
+                self.write_vertices(file, |local| self.numbering.owns_last(local), format)
             }
             Section::Triangles(format) => lines::triangles(
                 self.part,
@@ -163,6 +169,18 @@ impl<'a> Whole<'a> {
             ),
             Section::Tets(format) => lines::tets(self.part, self.names, file, |line, tet| format(line, &tet)),
         }
+    }
+
+    /// Writes the lines of some vertices.
+    fn write_vertices(
+        &self,
+        file: &mut Output,
+        chosen: impl Fn(usize) -> bool + Sync,
+        format: &FormatVertex,
+    ) -> Result<(), WriteError> {
+        lines::vertices(self.part, file, chosen, |line, vertex| {
+            format(line, self.numbering.vertex(vertex.index as u32), vertex.point);
+        })
     }
 
     /// Counts the bytes of this rank's share of each section.
@@ -202,7 +220,7 @@ pub(super) fn write(
     path: &Path,
     format: &TextFormat,
 ) -> Result<Written, WriteError> {
-    let whole = Whole::of(comm, part, names, format.name)?;
+    let whole = Whole::of(comm, part, names, format)?;
     let sections = (format.sections)(comm, &whole)?;
     if comm.size() == 1 {
         let bytes = write_file(path, estimate(part), |file| {

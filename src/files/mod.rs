@@ -58,6 +58,7 @@ pub use output::{Destination, Output, folder_of, is_same_place, remove_abandoned
 
 use crate::ground::comm::{CommError, Communicator};
 use crate::ground::error::{ErrorKind, HasKind};
+use crate::ground::memory::sized;
 use crate::ground::mesh::{Label, Names};
 use crate::ground::progress::Cancelled;
 use csg::{BodyId, PatchId};
@@ -102,6 +103,18 @@ pub enum WriteError {
         /// The estimated size.
         needed: u64,
         /// The free space.
+        available: u64,
+    },
+    /// The machine has too little memory for what is computed before it is written.
+    #[error(
+        "the adjacency takes {} of memory and this machine has {} free: leave it out, ask for fewer tets, or take more \
+         machines",
+        sized(*.needed), sized(*.available)
+    )]
+    NoMemory {
+        /// The estimated bytes.
+        needed: u64,
+        /// Free bytes.
         available: u64,
     },
     /// More entities than the format can number.
@@ -181,7 +194,7 @@ pub enum WriteError {
 impl HasKind for WriteError {
     fn kind(&self) -> ErrorKind {
         match self {
-            Self::Io { .. } | Self::NoSpace { .. } => ErrorKind::Resources,
+            Self::Io { .. } | Self::NoSpace { .. } | Self::NoMemory { .. } => ErrorKind::Resources,
             Self::Cancelled(_) => ErrorKind::Cancelled,
             Self::Comm(error) => error.kind(),
             _ => ErrorKind::Input,

@@ -5,19 +5,22 @@
 use crate::files::WriteError;
 use crate::ground::comm::Communicator;
 use crate::ground::mesh::ghosts::GhostTet;
-use crate::ground::mesh::stream::{MeshStream, VertexBlock};
-use crate::ground::mesh::{GlobalId, Rank};
+use crate::ground::mesh::stream::{MeshStream, TetBlock, VertexBlock};
+use crate::ground::mesh::{GlobalId, Order, Rank};
 use std::ops::Range;
 
 /// The numbers of one part's entities, from 1; ghosts have the numbers of their own part.
 #[derive(Debug)]
 pub(super) struct Numbering {
     /// By local vertex index: its place among the vertices that this part owns, which have
-    /// consecutive numbers; or behind these, among `copies`. So a number that may have 64 bits
-    /// takes 32, except on interfaces.
+    /// consecutive numbers, or two ranges of them; or behind these, among `copies`. So a number
+    /// that may have 64 bits takes 32, except on interfaces.
     places: Vec<u32>,
-    /// The numbers of the vertices that this part owns.
+    /// The numbers of the vertices that this part owns, without those in `owned_last`.
     pub owned: Range<u64>,
+    /// The numbers of the vertices that this part owns and that are numbered behind those of all
+    /// parts.
+    owned_last: Range<u64>,
     /// The numbers of the others, in local order.
     copies: Vec<u64>,
     /// The number of the part's first tet; the others follow in local order.
@@ -31,14 +34,20 @@ pub(super) struct Numbering {
 impl Numbering {
     /// Whether this part owns the vertex with this local index.
     pub fn owns(&self, local: usize) -> bool {
-        u64::from(self.places[local]) < self.owned.end - self.owned.start
+        u64::from(self.places[local]) < length(&self.owned) + length(&self.owned_last)
+    }
+
+    /// Whether this part owns the vertex, and it is numbered behind those of all parts.
+    pub fn owns_last(&self, local: usize) -> bool {
+        self.owns(local) && u64::from(self.places[local]) >= length(&self.owned)
     }
 
     /// The number of the vertex with this local index.
     pub fn vertex(&self, local: u32) -> u64 {
         let place = u64::from(self.places[local as usize]);
-        match place.checked_sub(self.owned.end - self.owned.start) {
-            None => self.owned.start + place,
+        let Some(place) = place.checked_sub(length(&self.owned)) else { return self.owned.start + place };
+        match place.checked_sub(length(&self.owned_last)) {
+            None => self.owned_last.start + place,
             Some(copy) => self.copies[copy as usize],
         }
     }
@@ -53,34 +62,72 @@ impl Numbering {
     }
 }
 
+fn length(range: &Range<u64>) -> u64 {
+    range.end - range.start
+}
+
 /// **Collective.** Numbers vertices and tets such that those owned by a part are contiguous: parts
 /// in rank order, entities in local order.
 ///
 /// Takes two gathers of counts and one message to each neighbour, 16 bytes for each copy of a
 /// vertex.
 pub(super) fn number(comm: &dyn Communicator, part: &dyn MeshStream) -> Result<Numbering, WriteError> {
+    number_with(comm, part, |_| false)
+}
+
+/// **Collective.** Like [`number`], but the corners of tets come first, then the nodes on edges:
+/// two contiguous ranges for each part.
+pub(super) fn number_corners_first(
+    comm: &dyn Communicator,
+    part: &dyn MeshStream,
+) -> Result<Numbering, WriteError> {
+    if part.order() == Order::First {
+        return number(comm, part);
+    }
+    let mut is_corner = vec![false; part.counts().vertices as usize];
+    let mut block = TetBlock::default();
+    for index in 0..part.tet_blocks() {
+        part.tet_block(index, &mut block);
+        block.tets.iter().flatten().for_each(|&corner| is_corner[corner as usize] = true);
+    }
+    number_with(comm, part, |local| !is_corner[local as usize])
+}
+
+/// **Collective.** Numbers the vertices that are `last` behind all others. It must be the same on
+/// all ranks that have a vertex.
+fn number_with(
+    comm: &dyn Communicator,
+    part: &dyn MeshStream,
+    last: impl Fn(u32) -> bool,
+) -> Result<Numbering, WriteError> {
     let rank = part.rank();
     let mut places = vec![0; part.counts().vertices as usize];
-    let (mut owned, mut shared) = (0, 0);
+    let (mut shared, mut counts) = (0, [0_u32; 3]);
+    let kind = |local, id, block: &VertexBlock| {
+        if block.owner(id, rank) == rank { usize::from(last(local)) } else { 2 }
+    };
     for_each_vertex(part, |local, id, block| {
         shared += u64::from(!block.holders.is_empty() || !watchers(part, local).is_empty());
-        if block.owner(id, rank) == rank {
-            places[local as usize] = owned;
-            owned += 1;
-        }
+        counts[kind(local, id, block)] += 1;
     });
-    let mut next = owned;
+    let [owned, owned_last, _] = counts;
+    let mut next = [0, owned, owned + owned_last];
     for_each_vertex(part, |local, id, block| {
-        if block.owner(id, rank) != rank {
-            places[local as usize] = next;
-            next += 1;
-        }
+        let next = &mut next[kind(local, id, block)];
+        places[local as usize] = *next;
+        *next += 1;
     });
 
     let own_tets = part.ghosts().map_or(part.counts().tets, |ghosts| ghosts.first_tet);
-    let [vertices_before] = comm.exclusive_scan([u64::from(owned)])?;
-    let owned = vertices_before + 1..vertices_before + 1 + u64::from(owned);
-    let copies = receive_numbers(comm, part, |local| owned.start + u64::from(places[local as usize]))?;
+    let counts = [owned, owned_last].map(u64::from);
+    let [before, last_before] = comm.exclusive_scan(counts)?;
+    let [all, _] = comm.all_reduce_sum_u64(counts)?;
+    let [owned, owned_last] = [(before, counts[0]), (all + last_before, counts[1])]
+        .map(|(before, count)| before + 1..before + 1 + count);
+    let ghosts = (own_tets, Vec::new());
+    let mut numbering =
+        Numbering { places, owned, owned_last, copies: Vec::new(), first_tet: 1, ghosts, shared };
+    numbering.copies = receive_numbers(comm, part, |local| numbering.vertex(local))?;
     let mut next = 1;
     let first_tets = comm.all_gather_one(own_tets)?.into_iter().map(|tets| {
         next += tets;
@@ -88,9 +135,10 @@ pub(super) fn number(comm: &dyn Communicator, part: &dyn MeshStream) -> Result<N
     });
     let first_tets: Vec<u64> = first_tets.collect();
     let of_ghost = |tet: &GhostTet| first_tets[tet.owner as usize] + tet.index;
-    let numbers = part.ghosts().map(|ghosts| ghosts.tets.iter().map(of_ghost).collect()).unwrap_or_default();
-    let first_tet = first_tets[rank as usize];
-    Ok(Numbering { places, owned, copies, first_tet, ghosts: (own_tets, numbers), shared })
+    numbering.ghosts.1 =
+        part.ghosts().map(|ghosts| ghosts.tets.iter().map(of_ghost).collect()).unwrap_or_default();
+    numbering.first_tet = first_tets[rank as usize];
+    Ok(numbering)
 }
 
 /// The ranks that have a vertex in ghost tets only.

@@ -6,8 +6,8 @@
 
 use super::chunks::{items, split};
 use crate::ground::kernel::simplex::ascending;
-use crate::ground::mesh::TET_FACES;
 use crate::ground::mesh::stream::{BoundaryBlock, MeshStream, TetBlock};
+use crate::ground::mesh::{EDGE_BETWEEN, TET_FACES, TRIANGLE_EDGES};
 use csg::{BodyId, PatchId};
 use rayon::prelude::*;
 
@@ -16,6 +16,8 @@ use rayon::prelude::*;
 pub struct SkinFace {
     /// Its vertices by local index, with outward normal.
     pub vertices: [u32; 3],
+    /// For second order, the nodes on its edges by local index, in the order of [`TRIANGLE_EDGES`].
+    pub edge_nodes: Option<[u32; 3]>,
     /// The body of its tet.
     pub body: BodyId,
 }
@@ -41,11 +43,14 @@ pub fn skin(part: &dyn MeshStream, keep: impl Fn(&[[f64; 3]; 4]) -> bool + Sync)
 
     let mut faces = collect(part, |block, found: &mut Vec<([u32; 3], SkinFace)>| {
         let body = block.body.expect("a tet block has a body");
-        for tet in block.tets.iter().filter(|tet| keep(&corners(tet))) {
+        for (index, tet) in block.tets.iter().enumerate().filter(|(_, tet)| keep(&corners(tet))) {
+            let of_tet = block.edge_nodes.get(index);
             for face in TET_FACES {
                 let vertices = face.map(|k| tet[k]);
                 if vertices.iter().all(|&v| may_be_skin[v as usize]) {
-                    found.push((ascending(vertices), SkinFace { vertices, body }));
+                    let node = |[i, j]: [usize; 2], nodes: &[u32; 6]| nodes[EDGE_BETWEEN[face[i]][face[j]]];
+                    let edge_nodes = of_tet.map(|nodes| TRIANGLE_EDGES.map(|ends| node(ends, nodes)));
+                    found.push((ascending(vertices), SkinFace { vertices, edge_nodes, body }));
                 }
             }
         }

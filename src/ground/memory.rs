@@ -1,5 +1,6 @@
 //! Memory and time used by this process, and memory available on the machine.
 
+use crate::ground::comm::{CommError, Communicator};
 use std::cell::Cell;
 
 thread_local! {
@@ -76,6 +77,15 @@ fn available_on_machine() -> Option<u64> {
 /// The host name, to identify ranks that share memory; empty if the system does not report it.
 pub fn machine() -> String {
     std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default()
+}
+
+/// **Collective.** The sum of the bytes of all ranks on this machine.
+pub fn on_machine(comm: &dyn Communicator, bytes: u64) -> Result<u64, CommError> {
+    let machine = machine();
+    let machines = comm.all_gather_bytes(machine.as_bytes())?;
+    let of_ranks = comm.all_gather_one(bytes)?;
+    let here = machines.iter().zip(&of_ranks).filter(|(name, _)| **name == machine.as_bytes());
+    Ok(here.map(|(_, bytes)| bytes).sum())
 }
 
 /// Formats bytes with a suitable unit.

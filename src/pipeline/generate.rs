@@ -119,6 +119,9 @@ fn coarse_parts<'a>(
         settings.disk.as_ref(),
     );
     comm.agree(fits.map_err(Error::from))?;
+    let of_tet = settings.disk.as_ref().map_or(0, |disk| disk.memory_of_tet);
+    let fineness = (pieces, settings.coarse.order);
+    room::refuse_crowded(comm, &dist, fineness, of_tet, settings.memory)?;
     Ok(Parts { model, coarse, dist, projector, names, pieces })
 }
 

@@ -26,7 +26,7 @@ pub(super) fn refuse_oversized(
     (pieces, order): (u32, Order),
     disk: Option<&Disk>,
 ) -> Result<(), RoomError> {
-    let Some(Disk { folder, bytes, most }) = disk.filter(|_| rank == 0) else { return Ok(()) };
+    let Some(Disk { folder, bytes, most, .. }) = disk.filter(|_| rank == 0) else { return Ok(()) };
     let Counts { vertices, tets, boundary } = fine_totals(&part.totals, pieces, order);
     if let Some(most) = most.filter(|most| tets > *most || vertices > *most) {
         return Err(RoomError::TooMany { tets, vertices, most });
@@ -40,6 +40,29 @@ pub(super) fn refuse_oversized(
         }
         _ => Ok(()),
     }
+}
+
+/// **Collective.** Refuses a mesh whose writers take more memory than a machine has; `of_tet` is
+/// what they take for a tet, in bytes.
+///
+/// # Errors
+/// If it does not fit; on all ranks, with the numbers.
+pub(super) fn refuse_crowded(
+    comm: &dyn Communicator,
+    part: &DistMesh,
+    (pieces, order): (u32, Order),
+    of_tet: u64,
+    memory: Option<u64>,
+) -> Result<(), Error> {
+    let counts = predicted_counts(part, pieces, order);
+    let [_, least] = counts.bytes;
+    let writers = of_tet * counts.tets;
+    let needed = memory::on_machine(comm, if writers > 0 { least + writers } else { 0 })?;
+    let fits = match memory.or_else(memory::available_bytes) {
+        Some(available) if needed > available => Err(RoomError::Writers { needed, available }),
+        _ => Ok(()),
+    };
+    comm.agree(fits.map_err(Error::from))
 }
 
 /// *Local.* Refuses sizes with which not even the coarse mesh fits the memory, before anything is
@@ -99,15 +122,8 @@ pub(super) fn keep_of_level(
     (pieces, order): (u32, Order),
     memory: Option<u64>,
 ) -> Result<(Keep, [u64; 2]), Error> {
-    let machine = memory::machine();
-    let machines = comm.all_gather_bytes(machine.as_bytes())?;
-    let on_machine = |bytes: u64| -> Result<u64, Error> {
-        let needs = comm.all_gather_one(bytes)?;
-        let here = machines.iter().zip(&needs).filter(|(name, _)| **name == machine.as_bytes());
-        Ok(here.map(|(_, need)| need).sum())
-    };
     let [all, least] = predicted_counts(part, pieces, order).bytes;
-    let (all, least) = (on_machine(all)?, on_machine(least)?);
+    let (all, least) = (memory::on_machine(comm, all)?, memory::on_machine(comm, least)?);
     let Some(available) = memory.or_else(memory::available_bytes) else {
         return Ok((Keep::All, [all, u64::MAX]));
     };
@@ -192,17 +208,33 @@ mod tests {
         assert!(!stages.contains(&Stage::Levels), "{stages:?}");
     }
 
+    /// 6·8 tets of 100 bytes.
+    #[test]
+    fn what_the_writers_cannot_hold_is_refused_with_the_numbers() {
+        let part = whole(&cube(1, false).mesh);
+        let crowded = |of_tet, memory| {
+            refuse_crowded(&thread::alone(), &part, (2, Order::First), of_tet, Some(memory)).err()
+        };
+        let [_, least] = predicted_counts(&part, 2, Order::First).bytes;
+        assert!(crowded(0, 0).is_none());
+        assert!(crowded(100, 4800 + least).is_none());
+        let refused = crowded(100, 4800 + least - 1).expect("a byte is missing");
+        assert_eq!(refused.kind(), ErrorKind::Resources);
+        assert!(refused.to_string().contains("adjacency"), "{refused}");
+    }
+
     #[test]
     fn what_the_disk_cannot_hold_is_refused_with_the_numbers() {
         let part = whole(&cube(1, false).mesh);
         let refusal = |bytes, most| {
-            let disk = Disk { folder: std::env::temp_dir().join("not/there/yet"), bytes, most };
+            let disk =
+                Disk { folder: std::env::temp_dir().join("not/there/yet"), bytes, most, memory_of_tet: 0 };
             refuse_oversized(0, &part, (2, Order::First), Some(&disk)).err()
         };
         assert!(refusal([1, 1, 1], None).is_none());
         let refused = refusal([0, 1 << 50, 0], None).expect("6·8 tets of 2⁵⁰ bytes are 54 PB");
         assert!(matches!(refused, RoomError::Disk { .. }));
-        assert!(refused.to_string().contains("take 54043.2 TB or more"), "{refused}");
+        assert!(refused.to_string().contains("take about 54043.2 TB and"), "{refused}");
         assert!(refusal([0; 3], Some(48)).is_none());
         assert!(
             refusal([0; 3], Some(47))

@@ -50,15 +50,27 @@ pub enum RoomError {
     },
     /// The disk has too little space.
     #[error(
-        "the files take {} or more and {} has {} free: write elsewhere, take another format, or ask for fewer tets",
+        "the files take about {} and {} has {} free: write elsewhere, take another format, or ask for fewer tets",
         sized(*.needed), .folder.display(), sized(*.available)
     )]
     Disk {
-        /// Lower estimate of the size of the files in bytes.
+        /// Estimate of the size of the files in bytes.
         needed: u64,
         /// The output folder.
         folder: PathBuf,
         /// Free bytes there.
+        available: u64,
+    },
+    /// A machine has too little memory for the mesh and its adjacency.
+    #[error(
+        "the fine mesh with its adjacency takes {} of memory, and this machine has {} left: leave out the adjacency, take \
+         fewer levels or tets, or more machines",
+        sized(*.needed), sized(*.available)
+    )]
+    Writers {
+        /// Bytes of the mesh, and of its adjacency while it is written, on this machine.
+        needed: u64,
+        /// Free bytes.
         available: u64,
     },
     /// A machine has too little memory.

@@ -96,7 +96,7 @@ pub enum Wanted {
     Elements(u64),
 }
 
-/// The planned output. The sizes are lower estimates, because the writers check exactly.
+/// The planned output. The sizes are estimates, because the writers check exactly.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Disk {
     /// The folder.
@@ -105,6 +105,8 @@ pub struct Disk {
     pub bytes: [u64; 3],
     /// The largest number of vertices or tets that all formats support.
     pub most: Option<u64>,
+    /// Bytes of memory for each tet that writers take besides the mesh.
+    pub memory_of_tet: u64,
 }
 
 impl Default for Wanted {

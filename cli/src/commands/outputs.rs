@@ -6,7 +6,8 @@ use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use tetmill::files::elmer::Layout;
 use tetmill::files::{
-    Destination, WriteError, elmer, folder_of, hdf5, is_same_place, remove_abandoned, with_ending,
+    Destination, WriteError, elmer, folder_of, gmsh4, hdf5, is_same_place, mfem, remove_abandoned,
+    with_ending,
 };
 
 /// The files that a command reads and writes, with the options that name them.
@@ -181,7 +182,7 @@ fn files_of_layout(layout: Layout) -> Vec<PathBuf> {
 /// The files of a serial Elmer mesh except the names.
 const SERIAL: [&str; 4] = ["mesh.header", "mesh.nodes", "mesh.elements", "mesh.boundary"];
 
-/// The paths that a format writes in the folder.
+/// The paths that a format writes in the folder, or removes because an earlier run had more parts.
 fn entries(format: Format, folder: &Path, stem: &Path, parts: u32) -> Vec<PathBuf> {
     let named = |ends: &[&str]| ends.iter().map(|end| with_ending(stem, end)).collect::<Vec<PathBuf>>();
     match (format, parts) {
@@ -197,15 +198,15 @@ fn entries(format: Format, folder: &Path, stem: &Path, parts: u32) -> Vec<PathBu
         (Format::Vtu, _) => named(&[".pvtu", ".boundary.pvtu", ".parts"]),
         (Format::Msh | Format::Msh4, _) => named(&[".msh"]),
         (Format::Msh4Parts, parts) => {
-            let ends: Vec<String> = (1..=parts).map(|part| format!("_{part}.msh")).collect();
-            named(&ends.iter().map(String::as_str).collect::<Vec<_>>())
+            let files = (1..=parts).map(|part| with_ending(stem, &format!("_{part}.msh")));
+            files.chain(gmsh4::outdated(stem, parts)).collect()
         }
         (Format::Medit, _) => named(&[".mesh"]),
         (Format::Vol, _) => named(&[".vol"]),
         (Format::Inp, _) => named(&[".inp"]),
         (Format::Mfem, parts) => {
-            let ends: Vec<String> = (0..parts).map(|rank| format!(".{rank:06}")).collect();
-            named(&ends.iter().map(String::as_str).collect::<Vec<_>>())
+            let files = (0..parts).map(|rank| with_ending(stem, &format!(".{rank:06}")));
+            files.chain(mfem::outdated(stem, parts)).collect()
         }
         (Format::Hdf5, _) => named(&hdf5::ENDINGS),
         (Format::Geomview, 1) => named(&[".off"]),

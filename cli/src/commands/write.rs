@@ -5,7 +5,7 @@ use crate::options::{Boundary, Format, Halo, RunOptions};
 use crate::report::HaloReport;
 use std::path::Path;
 use tetmill::comm::Communicator;
-use tetmill::files::{Written, elmer, gmsh4, serial, vtu};
+use tetmill::files::{Written, elmer, gmsh4, hdf5, serial, vtu};
 use tetmill::mesh::{By, MeshStream, Names, Watched, WithHalo};
 use tetmill::progress::{Progress, Stage, Work};
 use tetmill::{files, mesh as halo};
@@ -14,6 +14,9 @@ use tetmill::{files, mesh as halo};
 pub(super) fn refuse_unknown(options: &RunOptions) -> Result<(), Failure> {
     if options.boundary.is_some() && !options.format.contains(&Format::Vtu) {
         return Err(Failure::input("--boundary: only VTU supports it; add vtu to --format"));
+    }
+    if options.adjacency && !options.format.contains(&Format::Hdf5) {
+        return Err(Failure::input("--adjacency: only HDF5 holds it; add hdf5 to --format"));
     }
     let is_gmsh4 = |format: &Format| matches!(format, Format::Msh4 | Format::Msh4Parts);
     if options.ascii && !options.format.iter().any(is_gmsh4) {
@@ -65,8 +68,7 @@ pub(super) fn write_formats(
     let report = ghosts.as_ref().map(|(by, ghosts)| HaloReport::new(comm, *by, ghosts)).transpose()?;
     let with_halo = ghosts.as_ref().map(|(_, ghosts)| WithHalo::new(part, ghosts));
     let part: &dyn MeshStream = with_halo.as_ref().map_or(part, |with_halo| with_halo);
-    let part =
-        &Watched::new(part, work, options.format.iter().map(|format| passes(format, options.ascii)).sum());
+    let part = &Watched::new(part, work, options.format.iter().map(|format| passes(*format, options)).sum());
     let with_ending = |ending: &str| files::with_ending(stem, ending);
     let storage = if options.ascii { gmsh4::Storage::Text } else { gmsh4::Storage::Binary };
     let joined = |ending: &str, format: serial::Format| {
@@ -95,7 +97,10 @@ pub(super) fn write_formats(
             Format::Vol => joined(".vol", serial::Format::Netgen)?,
             Format::Inp => joined(".inp", serial::Format::Abaqus)?,
             Format::Mfem => files::mfem::write(comm, part, names, stem)?,
-            Format::Hdf5 => files::hdf5::write(comm, part, names, stem)?,
+            Format::Hdf5 => {
+                let settings = hdf5::Settings { adjacency: options.adjacency };
+                hdf5::write_with(comm, part, names, stem, settings)?
+            }
             Format::Geomview => {
                 files::geomview::write(comm, part, &files::geomview::Settings::default(), stem)?
             }
@@ -107,15 +112,17 @@ pub(super) fn write_formats(
 
 /// Number of passes over the tets: a text file of all parts is formatted twice, first for its
 /// length.
-fn passes(format: &Format, ascii: bool) -> u64 {
+fn passes(format: Format, options: &RunOptions) -> u64 {
     match format {
         Format::None => 0,
         Format::Msh | Format::Medit | Format::Vol => 2,
         // For the runs of bodies, and for the file; a text of all parts is formatted twice.
-        Format::Msh4 if ascii => 3,
+        Format::Msh4 if options.ascii => 3,
         Format::Msh4 | Format::Msh4Parts => 2,
         // For the tets beside the boundary, or for shared edges and faces, and for the file.
         Format::Inp | Format::Mfem => 3,
+        // For faces, edges, the edges of faces and the tets of vertices, and for the file.
+        Format::Hdf5 if options.adjacency => 5,
         Format::Elmer | Format::Vtu | Format::Hdf5 | Format::Geomview => 1,
     }
 }

@@ -268,6 +268,7 @@ class Mesh:
         *,
         boundary: Literal["beside", "in"] = "beside",
         halo: Literal["faces", "vertices"] | None = None,
+        adjacency: bool = False,
         progress: Callable[[str, float], object] | None = None,
     ) -> Written:
         """Writes the mesh. Existing files are replaced when all is written.
@@ -281,6 +282,7 @@ class Mesh:
             boundary: Where VTU stores boundary triangles: "beside" in files of their own, "in" the
                 same file.
             halo: Write one layer of neighbouring tets with each part (Elmer and VTU).
+            adjacency: Write edges, faces and the lists of what they and vertices belong to (HDF5).
             progress: Called with the name of a stage and its progress, 0 to 1.
         """
         from ._geometry import warn
@@ -296,11 +298,14 @@ class Mesh:
             chosen = arguments.one_of("format", format, _FORMATS)
         if halo is not None and chosen not in ("elmer", "vtu"):
             raise ValueError(f"the format {chosen} has no halo elements; write elmer or vtu")
+        if adjacency and chosen != "hdf5":
+            raise ValueError(f"the format {chosen} holds no adjacency; write hdf5")
         target = {
             "path": name,
             "format": chosen,
             "inside": arguments.one_of("boundary", boundary, ("beside", "in")) == "in",
             "halo": None if halo is None else arguments.one_of("halo", halo, ("faces", "vertices")),
+            "adjacency": bool(adjacency),
         }
         files, size, notes = self._native.write(target, progress)
         warn(notes)

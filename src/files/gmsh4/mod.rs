@@ -31,7 +31,9 @@ mod sections;
 mod tests;
 
 use super::joined::write_shares;
-use super::output::{Output, folder_and_name, with_ending, write_file, write_together};
+use super::output::{
+    Output, files_of_parts, folder_and_name, remove_files, with_ending, write_file, write_together,
+};
 use super::{WriteError, Written, sum_written};
 use crate::ground::comm::Communicator;
 use crate::ground::mesh::Names;
@@ -39,7 +41,7 @@ use crate::ground::mesh::stream::MeshStream;
 use numbers::end_of;
 use plan::{NO_TAGS, Plan, Tags, extend, owns, tags_of_all};
 use sections::{Section, Share, between, head_of_link};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// How numbers are stored.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -109,7 +111,8 @@ pub fn write(
 }
 
 /// **Collective.** Writes a file for each part, `STEM_1.msh`, `STEM_2.msh` and so on, as Gmsh names
-/// them. Each has the nodes of its elements. All ranks get the totals.
+/// them, and removes such files of an earlier run with more parts. Each has the nodes of its
+/// elements. All ranks get the totals.
 ///
 /// # Errors
 /// Those of [`write()`]. All ranks get the error, and old files are kept.
@@ -133,13 +136,23 @@ pub fn write_parts(
         estimate(&share, &sections),
         |_| false,
         |stage| {
-            let file = with_ending(&name, &format!("_{}.msh", plan.number()));
-            let mut file = Output::create(&stage.join(file))?;
+            let mut file = Output::create(&stage.join(file_of(&name, plan.number())))?;
             sections.iter().try_for_each(|section| share.write(section, &mut file))?;
             Ok(Written { files: 1, bytes: file.finish()? })
         },
     )?;
+    remove_files(comm, &folder, || outdated(stem, comm.size()))?;
     sum_written(comm, written)
+}
+
+/// The file of a part, from 1.
+fn file_of(stem: &Path, number: u32) -> PathBuf {
+    with_ending(stem, &format!("_{number}.msh"))
+}
+
+/// *Local.* The files of an earlier run with more parts, which [`write_parts`] removes.
+pub fn outdated(stem: &Path, parts: u32) -> Vec<PathBuf> {
+    files_of_parts(parts + 1, |number| file_of(stem, number), b"$MeshFormat")
 }
 
 /// The length of a share in bytes, roughly for text: coordinates take more than in binary, and

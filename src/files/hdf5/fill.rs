@@ -18,14 +18,14 @@ use std::path::Path;
 const PER_CHUNK: u64 = 1 << 14;
 
 /// A file that several ranks write.
-struct Datasets<'a> {
+pub(super) struct Datasets<'a> {
     placed: &'a Placed,
     path: &'a Path,
 }
 
 impl Datasets<'_> {
     /// Opens the file at a value of a dataset.
-    fn at(&self, dataset: &str, index: u64) -> Result<Output, WriteError> {
+    pub fn at(&self, dataset: &str, index: u64) -> Result<Output, WriteError> {
         let mut output = Output::shared(self.path)?;
         output.go_to(self.placed.place_of(dataset, index))?;
         Ok(output)
@@ -46,6 +46,9 @@ impl Content<'_> {
         self.tets(&file)?;
         self.computed(&file, is_last)?;
         self.triangles(&file)?;
+        if let Some(adjacency) = &self.adjacency {
+            adjacency.fill(&file, is_last)?;
+        }
         Output::shared(path)?.finish().map(drop)
     }
 

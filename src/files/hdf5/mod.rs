@@ -12,6 +12,7 @@
 //!   /second_order/cells   the tets, ten columns, instead of /viz for second order
 //!   /names/               BodyNumbers and BodyNames, BoundaryNumbers and BoundaryNames, in pairs
 //!   /boundary/            cells (three or six columns)  BoundaryId  PartitionId  parents
+//!   /adjacency/           edges, faces and who has them (`Settings::adjacency`)
 //! STEM.xdmf               grids `mesh` and `boundary` by reference to STEM.h5
 //! ```
 //! All datasets are contiguous, so the place of each value in the file is known beforehand: rank 0
@@ -29,6 +30,9 @@
 //! with the same bytes are not defined by HDF5, and a program that rewrites one would damage the
 //! other.
 
+mod adjacency;
+#[cfg(test)]
+mod adjacency_tests;
 mod checksum;
 mod encode;
 mod fill;
@@ -43,8 +47,10 @@ use super::once::{Between, between, share_of_triangles};
 use super::output::{folder_and_name, with_ending, write_text, write_together};
 use super::{WriteError, Written, sum_written};
 use crate::ground::comm::Communicator;
+use crate::ground::memory;
 use crate::ground::mesh::stream::{Counts, MeshStream};
 use crate::ground::mesh::{Label, Names, Order, numbers_by_name};
+use adjacency::Adjacency;
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 use std::path::Path;
@@ -93,7 +99,20 @@ struct Content<'a> {
     /// Triangles of this part that another part writes, and tets of others at those of this part.
     between: Between,
     triangles_before: u64,
+    adjacency: Option<Adjacency>,
 }
+
+/// What the file holds besides the mesh.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Settings {
+    /// The group `/adjacency`: edges and faces, which of them a tet has, and the lists upward.
+    /// Takes [`ADJACENCY_MEMORY`] while the file is written.
+    pub adjacency: bool,
+}
+
+/// Memory of a tet while its adjacency is computed and written, in bytes. Measured are 473, and 486
+/// of second order (`benches/results/disk-2026-11-25.md`).
+pub const ADJACENCY_MEMORY: u64 = 500;
 
 /// **Collective.** Writes the mesh of all ranks to `STEM.h5` and `STEM.xdmf`. All ranks get the
 /// totals.
@@ -123,6 +142,20 @@ pub fn write(
     names: &Names,
     stem: &Path,
 ) -> Result<Written, WriteError> {
+    write_with(comm, part, names, stem, Settings::default())
+}
+
+/// **Collective.** Like [`write()`], with settings, which must be the same on all ranks.
+///
+/// # Errors
+/// Those of [`write()`], and too little memory for the adjacency.
+pub fn write_with(
+    comm: &dyn Communicator,
+    part: &dyn MeshStream,
+    names: &Names,
+    stem: &Path,
+    settings: Settings,
+) -> Result<Written, WriteError> {
     let refused = if part.ghosts().is_some() { Err(WriteError::NoHalo("HDF5")) } else { Ok(()) };
     comm.agree(refused)?;
     let (folder, name) = folder_and_name(stem)?;
@@ -131,7 +164,7 @@ pub fn write(
         WriteError::io(stem)(io::Error::new(io::ErrorKind::InvalidInput, "the name is not in Unicode"))
     })?;
 
-    let content = Content::of(comm, part, names)?;
+    let content = Content::of(comm, part, names, settings)?;
     let placed = content.tree().place();
     let is_first = comm.rank() == 0;
     let needed = if is_first { placed.bytes() } else { 0 };
@@ -155,12 +188,23 @@ pub fn write(
 
 impl<'a> Content<'a> {
     /// **Collective.** Numbers the entities.
-    fn of(comm: &dyn Communicator, part: &'a dyn MeshStream, names: &'a Names) -> Result<Self, WriteError> {
+    fn of(
+        comm: &dyn Communicator,
+        part: &'a dyn MeshStream,
+        names: &'a Names,
+        settings: Settings,
+    ) -> Result<Self, WriteError> {
         let numbering = number(comm, part)?;
         let between = between(comm, part, names, numbering.first_tet)?;
         let (triangles_before, totals) = share_of_triangles(comm, part, &between.left_out)?;
         let by_patch = ByPatch::of(part);
-        Ok(Self { part, names, totals, numbering, by_patch, between, triangles_before })
+        let adjacency = if settings.adjacency {
+            refuse_little_memory(comm, part)?;
+            Some(Adjacency::of(comm, part, &numbering)?)
+        } else {
+            None
+        };
+        Ok(Self { part, names, totals, numbering, by_patch, between, triangles_before, adjacency })
     }
 
     /// The groups and datasets of the file.
@@ -203,12 +247,25 @@ impl<'a> Content<'a> {
         tree.add(BOUNDARIES, Kind::I32, &[totals.boundary]);
         tree.add(TRIANGLE_PARTS, Kind::I32, &[totals.boundary]);
         tree.add(PARENTS, Kind::I64, &[totals.boundary, 2]);
+        if let Some(adjacency) = &self.adjacency {
+            adjacency::add_to(&mut tree, adjacency);
+        }
         tree
     }
 
     fn labels(&self) -> [(&'static str, &'a [Label]); 2] {
         [("Body", &self.names.bodies), ("Boundary", &self.names.patches)]
     }
+}
+
+/// **Collective.** Refuses the adjacency of parts that does not fit the memory of their machine.
+fn refuse_little_memory(comm: &dyn Communicator, part: &dyn MeshStream) -> Result<(), WriteError> {
+    let needed = memory::on_machine(comm, ADJACENCY_MEMORY * part.counts().tets)?;
+    let fits = match memory::available_bytes() {
+        Some(available) if needed > available => Err(WriteError::NoMemory { needed, available }),
+        _ => Ok(()),
+    };
+    comm.agree(fits)
 }
 
 /// The path of the numbers or names of bodies or boundaries.

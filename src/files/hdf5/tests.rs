@@ -4,18 +4,20 @@
 use super::checksum::checksum;
 use super::tree::{Kind, Placed, Tree, Value};
 use super::{
-    BODIES, BOUNDARIES, CONNECTIVITY, Content, OFFSETS, PARENTS, PARTS, POINTS, TRIANGLES, cells, named_path,
-    write,
+    BODIES, BOUNDARIES, CONNECTIVITY, Content, OFFSETS, PARENTS, PARTS, POINTS, Settings, TRIANGLES, cells,
+    named_path, write_with,
 };
 use crate::files::Written;
 use crate::files::plain::PlainPart;
 use crate::files::testing::{cube, names, scattered, slabs, together};
+use crate::ground::comm::Communicator;
+use crate::ground::mesh::stream::MeshStream;
 use crate::ground::mesh::{Label, Mesh, Names, Order, Rank, VertexId};
 use std::fs;
 use std::path::Path;
 
 /// A written file, with the places of its datasets.
-struct Found {
+pub(super) struct Found {
     bytes: Vec<u8>,
     placed: Placed,
 }
@@ -23,11 +25,23 @@ struct Found {
 impl Found {
     /// Writes a mesh in parts and reads the file.
     fn of(mesh: &Mesh, names: &Names, tet_to_rank: &[Rank], ranks: u32, folder: &Path) -> Self {
+        let part = |comm: &dyn Communicator| PlainPart::part(mesh, tet_to_rank, ranks, comm.rank());
+        Self::written(part, names, ranks, Settings::default(), folder)
+    }
+
+    /// Writes the parts of ranks and reads the file.
+    pub fn written<P: MeshStream>(
+        part: impl Fn(&dyn Communicator) -> P + Sync,
+        names: &Names,
+        ranks: u32,
+        settings: Settings,
+        folder: &Path,
+    ) -> Self {
         let stem = folder.join("m");
         let results = together(ranks, |comm| {
-            let part = PlainPart::part(mesh, tet_to_rank, ranks, comm.rank());
-            let written = write(comm, &part, names, &stem).unwrap();
-            (written, Content::of(comm, &part, names).unwrap().tree().place())
+            let part = part(comm);
+            let written = write_with(comm, &part, names, &stem, settings).unwrap();
+            (written, Content::of(comm, &part, names, settings).unwrap().tree().place())
         });
         let bytes = fs::read(folder.join("m.h5")).unwrap();
         let index = fs::read(folder.join("m.xdmf")).unwrap();
@@ -46,7 +60,7 @@ impl Found {
         self.bytes[first..end].chunks_exact(N).map(|bytes| value(bytes.try_into().unwrap())).collect()
     }
 
-    fn longs(&self, dataset: &str) -> Vec<i64> {
+    pub fn longs(&self, dataset: &str) -> Vec<i64> {
         self.values(dataset, i64::from_ne_bytes)
     }
 

@@ -22,16 +22,16 @@ mod shared;
 
 use super::corners::Corners;
 use super::lines::FLUSH_AT;
-use super::output::{Output, folder_and_name, with_ending, write_together};
+use super::output::{Output, files_of_parts, folder_and_name, remove_files, with_ending, write_together};
 use super::text::{FLOAT_CHARS, Line};
 use super::{WriteError, Written, body_number, patch_number, sum_written};
 use crate::ground::comm::Communicator;
 use crate::ground::mesh::stream::{BoundaryBlock, LocalBlock, MeshStream, NO_TET, TetBlock};
-use crate::ground::mesh::{Names, Order, numbers_by_name};
+use crate::ground::mesh::{Names, Order, Rank, numbers_by_name};
 use shared::{Group, Groups, groups};
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// MFEM's local numbers are 32-bit integers.
 const MOST: u64 = i32::MAX as u64;
@@ -77,7 +77,7 @@ pub fn part_text(
 }
 
 /// **Collective.** Writes the text of each rank's part to the file `STEM.` and its rank in six
-/// digits. All ranks get the totals.
+/// digits, and removes such files of an earlier run with more parts. All ranks get the totals.
 ///
 /// # Errors
 /// Those of [`part_text`], not enough disk space, or an I/O error. All ranks get an error, and old
@@ -97,15 +97,25 @@ pub fn write(
         estimate(part),
         |_| false,
         |stage| {
-            let file = with_ending(&name, &format!(".{:06}", part.rank()));
-            let mut file = Output::create(&stage.join(file))?;
+            let mut file = Output::create(&stage.join(file_of(&name, part.rank())))?;
             let mut text = Vec::new();
             content.write(&mut text, &mut |text| file.flush_past(FLUSH_AT, text))?;
             file.write(&text)?;
             Ok(Written { files: 1, bytes: file.finish()? })
         },
     )?;
+    remove_files(comm, &folder, || outdated(stem, comm.size()))?;
     sum_written(comm, written)
+}
+
+/// The file of a rank.
+fn file_of(stem: &Path, rank: Rank) -> PathBuf {
+    with_ending(stem, &format!(".{rank:06}"))
+}
+
+/// *Local.* The files of an earlier run with more parts, which [`write()`] removes.
+pub fn outdated(stem: &Path, parts: u32) -> Vec<PathBuf> {
+    files_of_parts(parts, |rank| file_of(stem, rank), b"MFEM mesh v1.")
 }
 
 /// The length of a text in bytes, at least: short numbers.
@@ -341,7 +351,6 @@ fn write_group(index: usize, group: &Group, text: &mut Vec<u8>) {
 mod tests {
     use super::*;
     use crate::files::testing::{cube, names, scattered, together, two_tets};
-    use crate::ground::mesh::Rank;
     use crate::ground::mesh::{Label, Mesh};
     use crate::parallel::distribution::{BareMesh, DistMesh, Shared, distribute, number_shared};
     use crate::parallel::migrate::{BareStream, bare};

@@ -19,17 +19,22 @@
 //! Symbolic links are followed: their targets are replaced, the links stay. Devices, FIFOs and the
 //! standard output are written through ([`Destination`]).
 //!
+//! Formats with a file for each part in the target folder remove those of an earlier run with more
+//! parts when the new files are in place (`outdated`).
+//!
 //! Not guaranteed: several entries are not replaced atomically. After a power failure between two
 //! renames a new `partitioning.4` may be beside old names until the next writer runs. Nor are
 //! linked entries replaced together with the others.
 
 mod destination;
+mod outdated;
 mod stage;
 mod staging;
 #[cfg(test)]
 mod tests;
 
 pub use destination::{Destination, is_same_place};
+pub use outdated::{files_of_parts, remove_files};
 pub use staging::remove_abandoned;
 
 use super::WriteError;

@@ -3,7 +3,7 @@
 //! A **scene** is a list of coloured triangles, made from a part of a mesh by [`scene_of_part`]:
 //! its skin, or with a **cut** the skin of the tets on one side of a plane, so that whole inner
 //! tets are visible (a crinkle cut). [`render`] draws it in parallel projection from a direction,
-//! scaled to fill the image.
+//! scaled to fill the image. Curved faces of second order are drawn as flat pieces.
 //!
 //! ```no_run
 //! use tetmill::files::picture;
@@ -16,6 +16,7 @@
 //! # Ok::<(), tetmill::files::WriteError>(())
 //! ```
 
+mod curved;
 mod png_file;
 mod raster;
 mod scene;

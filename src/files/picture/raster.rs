@@ -108,6 +108,8 @@ pub fn render(scene: &Scene, settings: &Settings) -> Image {
 struct Drawn {
     corners: [[f32; 3]; 3],
     color: Color,
+    edges: [bool; 3],
+    pieces: u32,
 }
 
 /// The directions right and down in the image, and away from the viewer.
@@ -141,7 +143,8 @@ fn place(scene: &Scene, settings: &Settings, width: u32, height: u32) -> Vec<Dra
     };
     let draw = |(corners, triangle): (&[[f64; 3]; 3], &Triangle)| {
         let corners = corners.map(to_pixel);
-        Drawn { corners, color: triangle.color.map(|c| c * brightness(&corners)) }
+        let Triangle { color, edges, pieces, .. } = *triangle;
+        Drawn { corners, color: color.map(|c| c * brightness(&corners)), edges, pieces }
     };
     turned.iter().zip(&scene.triangles).map(draw).collect()
 }
@@ -196,10 +199,10 @@ impl<'a> Canvas<'a> {
         // distance.
         let heights = [(b, c), (c, a), (a, b)].map(|(p, q)| area.abs() / (q[0] - p[0]).hypot(q[1] - p[1]));
         let line = self.settings.edge_width * SAMPLES as f32;
-        // Lines fade with the size of the triangle, so that small triangles do not become all dark.
+        // Lines fade with the size of the face, so that small faces do not become all dark.
         // The size is the square root of the area: heights differ more between neighbours, which
         // looks blotched.
-        let strength = (area.abs().sqrt() / (FULL_LINES_AT * line)).min(1.0);
+        let strength = (triangle.pieces as f32 * area.abs().sqrt() / (FULL_LINES_AT * line)).min(1.0);
         for y in lines {
             for x in columns.clone() {
                 let p = [x as f32 + 0.5, y as f32 + 0.5, 0.0];
@@ -211,7 +214,7 @@ impl<'a> Canvas<'a> {
                 let sample = (y - self.first) as usize * self.width as usize + x as usize;
                 if z < self.depth[sample] {
                     self.depth[sample] = z;
-                    let on_line = (0..3).any(|k| w[k] * heights[k] < 0.5 * line);
+                    let on_line = (0..3).any(|k| triangle.edges[k] && w[k] * heights[k] < 0.5 * line);
                     self.color[sample] = if on_line {
                         mixed(triangle.color, self.settings.edge_color, strength)
                     } else {
@@ -284,7 +287,8 @@ mod tests {
 
     /// Half of the square −1 … 1 in y and z, at this x.
     fn half(x: f64, color: Color) -> Triangle {
-        Triangle { corners: [[x, -1., -1.], [x, 1., -1.], [x, -1., 1.]], color }
+        let corners = [[x, -1., -1.], [x, 1., -1.], [x, -1., 1.]];
+        Triangle { corners, color, edges: [true; 3], pieces: 1 }
     }
 
     fn at(image: &Image, column: u32, line: u32) -> [u8; 3] {

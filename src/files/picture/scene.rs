@@ -1,5 +1,6 @@
 //! Scenes: the visible triangles of a mesh.
 
+use super::curved;
 use crate::files::color::{Color, of_number};
 use crate::files::skin::{SkinFace, patches, skin};
 use crate::ground::comm::{CommError, Communicator};
@@ -13,6 +14,10 @@ pub struct Triangle {
     pub corners: [[f64; 3]; 3],
     /// Its colour.
     pub color: Color,
+    /// Which edges are drawn as lines, by the opposite corner.
+    pub edges: [bool; 3],
+    /// The number of pieces of an edge of the face that this is a piece of; 1 for a whole face.
+    pub pieces: u32,
 }
 
 /// The triangles to be drawn, in any order.
@@ -58,16 +63,22 @@ pub fn scene_of_part(part: &dyn MeshStream, look: &Look) -> Scene {
         ColorBy::Patch => patches(part, &faces),
         ColorBy::Part | ColorBy::Body => vec![None; faces.len()],
     };
-    let triangle = |(face, patch): (&SkinFace, Option<PatchId>)| Triangle {
-        corners: face.vertices.map(|v| part.points()[v as usize]),
-        color: match (look.color_by, patch) {
-            (ColorBy::Part, _) => of_number(part.rank()),
-            (ColorBy::Body, _) => of_number(face.body.0),
-            (ColorBy::Patch, Some(patch)) => of_number(patch.0),
-            (ColorBy::Patch, None) => of_number(face.body.0).map(|c| 0.65 + 0.35 * c),
-        },
+    let color = |face: &SkinFace, patch: Option<PatchId>| match (look.color_by, patch) {
+        (ColorBy::Part, _) => of_number(part.rank()),
+        (ColorBy::Body, _) => of_number(face.body.0),
+        (ColorBy::Patch, Some(patch)) => of_number(patch.0),
+        (ColorBy::Patch, None) => of_number(face.body.0).map(|c| 0.65 + 0.35 * c),
     };
-    Scene { triangles: faces.iter().zip(on_patches).map(triangle).collect() }
+    let points = |vertices: [u32; 3]| vertices.map(|v| part.points()[v as usize]);
+    let mut triangles = Vec::with_capacity(faces.len());
+    for (face, patch) in faces.iter().zip(on_patches) {
+        let (corners, color) = (points(face.vertices), color(face, patch));
+        match face.edge_nodes {
+            Some(nodes) => curved::pieces(corners, points(nodes), color, &mut triangles),
+            None => triangles.push(Triangle { corners, color, edges: [true; 3], pieces: 1 }),
+        }
+    }
+    Scene { triangles }
 }
 
 fn is_behind(cut: &Cut, tet: &[[f64; 3]; 4]) -> bool {
@@ -77,16 +88,20 @@ fn is_behind(cut: &Cut, tet: &[[f64; 3]; 4]) -> bool {
 
 /// **Collective.** Joins the scenes of all ranks on rank 0; the others get `None`.
 pub fn gather(comm: &dyn Communicator, scene: &Scene) -> Result<Option<Scene>, CommError> {
-    const NUMBERS: usize = 12;
+    const NUMBERS: usize = 16;
     let mut numbers: Vec<f64> = Vec::with_capacity(NUMBERS * scene.triangles.len());
     for triangle in &scene.triangles {
         numbers.extend(triangle.corners.as_flattened());
         numbers.extend(triangle.color.map(f64::from));
+        numbers.extend(triangle.edges.map(|drawn| f64::from(u8::from(drawn))));
+        numbers.push(triangle.pieces.into());
     }
     let all = comm.gather(0, &numbers)?;
     let unpack = |n: &[f64; NUMBERS]| Triangle {
         corners: [[n[0], n[1], n[2]], [n[3], n[4], n[5]], [n[6], n[7], n[8]]],
         color: [n[9] as f32, n[10] as f32, n[11] as f32],
+        edges: [n[12], n[13], n[14]].map(|drawn| drawn != 0.0),
+        pieces: n[15] as u32,
     };
     let triangles = all.iter().flat_map(|numbers| numbers.as_chunks().0.iter().map(unpack)).collect();
     Ok((comm.rank() == 0).then_some(Scene { triangles }))

@@ -76,10 +76,14 @@ impl Format {
     /// The text format, if this one can hold the mesh of all ranks.
     fn text(self) -> Option<TextFormat> {
         match self {
-            Self::Gmsh => Some(TextFormat { name: "Gmsh", sections: gmsh::sections }),
-            Self::Medit => Some(TextFormat { name: "Medit", sections: medit_sections }),
-            Self::Netgen => Some(TextFormat { name: "NETGEN", sections: netgen::sections }),
-            Self::Abaqus => Some(TextFormat { name: "Abaqus", sections: abaqus::sections }),
+            Self::Gmsh => Some(TextFormat { name: "Gmsh", corners_first: false, sections: gmsh::sections }),
+            Self::Medit => Some(TextFormat { name: "Medit", corners_first: false, sections: medit_sections }),
+            Self::Netgen => {
+                Some(TextFormat { name: "NETGEN", corners_first: true, sections: netgen::sections })
+            }
+            Self::Abaqus => {
+                Some(TextFormat { name: "Abaqus", corners_first: false, sections: abaqus::sections })
+            }
             Self::Vtu | Self::Off => None,
         }
     }

@@ -57,7 +57,9 @@ pub(super) fn sections<'a>(
             whole.ids(line, [b, a, c, d].into_iter().chain(arranged(tet.edge_nodes, &NETGEN)));
         })),
         Section::Text(format!("edgesegmentsgi2\n0\npoints\n{}\n", counts.vertices)),
+        // NETGEN counts the vertices up to the largest number of a corner.
         Section::Vertices(Box::new(|line, _, point| coordinates(line, point))),
+        Section::LastVertices(Box::new(|line, _, point| coordinates(line, point))),
         Section::Text(end + "endmesh\n"),
     ])
 }
