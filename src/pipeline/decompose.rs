@@ -154,7 +154,10 @@ fn plan_cuts(
         mesh_as_wanted(parts, model, settings, (wanted, refined), &[], &budget, work)
     })?;
     progress.stage(Stage::Cut, |_| {
-        let statistics = CutStatistics::of(&coarse.mesh, whole, pieces, parts)?;
+        let field = model.size_field(&settings.size);
+        let sizes = skin::at_vertices(&coarse.mesh, field.as_deref(), pieces);
+        let expected = skin::expected_tets(&coarse.mesh, &sizes);
+        let statistics = CutStatistics::of(&coarse.mesh, whole, &expected, pieces, parts)?;
         let mut settings = cuts.clone();
         for seed in 0..MOST_PLANS {
             settings.plan = decompose::PlanSettings { seed, through_corners: seed == 0, ..settings.plan };

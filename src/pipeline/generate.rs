@@ -31,7 +31,7 @@ use crate::parallel::interfaces;
 use crate::parallel::migrate::BareStream;
 use crate::parallel::partition::ties::Ties;
 use crate::parallel::partition::{self};
-use crate::parallel::skin::{DeliveredSizes, Improvement};
+use crate::parallel::skin::{self, DeliveredSizes, Improvement};
 use std::sync::Arc;
 
 /// **Collective.** Makes the mesh; only rank 0 needs the geometry and reports `progress`.
@@ -194,7 +194,7 @@ fn fill(
     }
     let sizes = model
         .zip(coarse.as_ref())
-        .map(|(model, coarse)| skins::wanted_sizes(model, coarse, settings, pieces));
+        .map(|(model, coarse)| skins::wanted_sizes(model, &coarse.mesh, settings, pieces));
     let (part, refused, delivered) = {
         let wanted = settings.before_refinement().0;
         let (settings, smoothness) = improvement(settings, &projector);
@@ -328,7 +328,11 @@ fn coarse_mesh(
     let map = periodic_map(model, &made.mesh)?;
     let (assigned, metrics) = progress.stage(Stage::Partition, |_| {
         let ties = if parts > 1 { partition::periodic_ties(&made.mesh, &map) } else { Ties::default() };
-        partition::partition_tied(&made.mesh, parts, &ties, &partition::Settings::default())
+        // Parts of the method `surface` will have the tets that the sizes require.
+        let weights = (settings.method == Method::Surface).then(|| {
+            skin::expected_tets(&made.mesh, &skins::wanted_sizes(model, &made.mesh, settings, pieces))
+        });
+        partition::partition_weighted(&made.mesh, parts, &ties, weights.as_deref(), &Default::default())
     })?;
     if settings.periodic_together && metrics.lost_ties > 0 {
         return Err(

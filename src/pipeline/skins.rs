@@ -4,9 +4,10 @@
 use super::error::{Error, RequestError};
 use super::goal::Goal;
 use super::model::Model;
-use super::result::{CoarseResult, Refused};
+use super::result::Refused;
 use super::settings::{GenerateSettings, Wanted};
 use crate::ground::comm::Communicator;
+use crate::ground::mesh::Mesh;
 use crate::ground::progress::{Progress, Stage};
 use crate::ground::projector::Projector;
 use crate::parallel::distribution::{BareMesh, DistMesh};
@@ -72,10 +73,10 @@ impl Refused {
 /// The requested sizes at the vertices of the coarse mesh, on the rank that has it.
 pub(super) fn wanted_sizes(
     model: &Model,
-    coarse: &CoarseResult,
+    coarse: &Mesh,
     settings: &GenerateSettings,
     pieces: u32,
 ) -> Vec<f64> {
     let field = model.size_field(&settings.coarse.size);
-    skin::at_vertices(&coarse.mesh, field.as_deref(), pieces)
+    skin::at_vertices(coarse, field.as_deref(), pieces)
 }

@@ -57,22 +57,40 @@ const SAMPLES: usize = 600;
 
 impl CutStatistics {
     /// Collects the statistics from a coarse mesh whose edges will be split into `pieces`, for
-    /// `parts` parts. The boundary is refined because coarse triangles do not resolve how planes
-    /// meet it.
+    /// `parts` parts; each tet becomes as many as `expected`. The boundary is refined because
+    /// coarse triangles do not resolve how planes meet it.
     ///
     /// # Errors
     /// [`CutError::Distribute`] or [`CutError::Refine`] if the mesh cannot be refined.
-    pub fn of(mesh: &Mesh, whole: &CsgModel, pieces: u32, parts: u32) -> Result<Self, CutError> {
+    pub fn of(
+        mesh: &Mesh,
+        whole: &CsgModel,
+        expected: &[f64],
+        pieces: u32,
+        parts: u32,
+    ) -> Result<Self, CutError> {
         let mut statistics = Self::default();
-        let in_tet = (SAMPLES * parts as usize).div_ceil(mesh.tets.len().max(1));
-        // C(k + 2, 3) points in a tet with k per edge.
-        let k = (1_usize..).find(|k| k * (k + 1) * (k + 2) / 6 >= in_tet).unwrap_or(1);
-        for tet in &mesh.tets {
+        let samples = (SAMPLES * parts as usize).max(mesh.tets.len()) as f64;
+        let share = samples / expected.iter().sum::<f64>();
+        let mut before = 0.0;
+        for (tet, expected) in mesh.tets.iter().zip(expected) {
+            // So many that all tets up to this one have their share.
+            let after = before + share * expected;
+            let count = (after.floor() - before.floor()) as usize;
+            before = after;
+            if count == 0 {
+                continue;
+            }
             let corners = tet.map(|v| mesh.points[v.index()]);
             let edge = TET_EDGES.map(|[a, b]| (corners[b] - corners[a]).norm()).iter().sum::<f64>() / 6.0;
+            // C(k + 2, 3) points in a tet with k per edge.
+            let points = |k: usize| k * (k + 1) * (k + 2) / 6;
+            let k = (1_usize..).find(|&k| points(k) >= count).unwrap_or(1);
             let width = edge / k as f64;
             let near = width.max(CLEAR * edge / f64::from(pieces));
-            statistics.samples.extend(grid(&corners, k).map(|point| Sample { point, width, near }));
+            let spread: Vec<Point> = grid(&corners, k).collect();
+            let chosen = (0..count).map(|i| spread[(2 * i + 1) * spread.len() / (2 * count)]);
+            statistics.samples.extend(chosen.map(|point| Sample { point, width, near }));
         }
         let comm = thread::alone();
         let given = (mesh.clone(), vec![0; mesh.tets.len()]);

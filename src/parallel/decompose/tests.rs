@@ -33,7 +33,8 @@ fn statistics(model: &CsgModel, parts: u32) -> CutStatistics {
         .model
         .coarse_mesh(&mut CoarseSettings::default(), &Budget::default(), Work::unwatched())
         .expect("a mesh");
-    CutStatistics::of(&made.mesh, model, 2, parts).expect("a mesh that can be refined")
+    let expected = vec![8.0; made.mesh.tets.len()];
+    CutStatistics::of(&made.mesh, model, &expected, 2, parts).expect("a mesh that can be refined")
 }
 
 fn plane(point: [f64; 3], normal: [f64; 3]) -> CutPlane {

@@ -1,5 +1,6 @@
 //! The dual graph: tets, adjacent if they share a face.
 
+use super::weighted::Graph;
 use crate::ground::mesh::topology::Faces;
 
 /// The neighbours of each tet, in compressed row storage.
@@ -20,6 +21,16 @@ impl Dual {
     /// Whether there are no tets.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
+    }
+
+    /// The graph with weights of the tets.
+    pub fn weighted(&self, weights: &[i32]) -> Graph {
+        Graph {
+            offsets: bytemuck::cast_slice(&self.offsets).to_vec(),
+            neighbours: bytemuck::cast_slice(&self.neighbours).to_vec(),
+            edge_weights: vec![1; self.neighbours.len()],
+            weights: weights.to_vec(),
+        }
     }
 
     /// The neighbours of `tet`: at most four.

@@ -17,7 +17,7 @@ pub struct Metrics {
     pub smallest: usize,
     /// Tets in the largest part.
     pub largest: usize,
-    /// Tets in the largest part over the mean: 1 is perfect.
+    /// Tets in the largest part over the mean: 1 is perfect. With weights, the same of weights.
     pub imbalance: f64,
     /// Faces between parts.
     pub edge_cut: usize,
@@ -49,6 +49,14 @@ pub fn measure(dual: &Dual, part: &[Rank], parts: u32, method: Option<Method>, r
         lost_ties: 0,
         repaired,
     }
+}
+
+/// The largest weight of a part over the mean.
+pub fn imbalance(part: &[Rank], parts: u32, weights: &[f64]) -> f64 {
+    let mut sums = vec![0.0; parts as usize];
+    part.iter().zip(weights).for_each(|(&p, weight)| sums[p as usize] += weight);
+    let mean = sums.iter().sum::<f64>() / f64::from(parts);
+    sums.into_iter().fold(0.0, f64::max) / mean
 }
 
 /// The number of tets in each part.

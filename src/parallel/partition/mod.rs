@@ -153,6 +153,24 @@ pub fn partition_tied(
     ties: &Ties,
     settings: &Settings,
 ) -> Result<(Vec<Rank>, Metrics), PartitionError> {
+    partition_weighted(mesh, parts, ties, None, settings)
+}
+
+/// [`partition_tied`] with parts of equal weight, where `weights` are those of the tets, such as
+/// the numbers of fine tets that they will become. Coordinate bisection ignores them.
+///
+/// # Errors
+/// As [`partition`].
+///
+/// # Panics
+/// If there is not one weight for each tet.
+pub fn partition_weighted(
+    mesh: &Mesh,
+    parts: u32,
+    ties: &Ties,
+    weights: Option<&[f64]>,
+    settings: &Settings,
+) -> Result<(Vec<Rank>, Metrics), PartitionError> {
     let tets = mesh.tets.len();
     if parts == 0 {
         return Err(PartitionError::NoParts);
@@ -168,11 +186,16 @@ pub fn partition_tied(
     let dual = dual::dual(&listed, &face_tets);
     let interfaces = interfaces(mesh, &listed, &face_tets);
     let clusters = if parts > 1 { Clusters::new(tets, ties, &interfaces, parts) } else { None };
+    let whole = weights.map(weighted::whole_weights);
     let mut part = match (settings.method, &clusters) {
         _ if parts == 1 => vec![0; tets],
-        (Method::Metis, None) => graph::bisect(&dual, parts, settings.seed)?,
+        (Method::Metis, None) => match &whole {
+            None => graph::bisect(&dual, parts, settings.seed)?,
+            Some(weights) => graph::bisect_weighted(&dual.weighted(weights), parts, settings.seed)?,
+        },
         (Method::Metis, Some(clusters)) => {
-            let of_cluster = graph::bisect_weighted(&clusters.graph(&dual), parts, settings.seed)?;
+            let graph = clusters.graph(&dual, whole.as_deref());
+            let of_cluster = graph::bisect_weighted(&graph, parts, settings.seed)?;
             clusters.of.iter().map(|&cluster| of_cluster[cluster as usize]).collect()
         }
         (Method::Bisection, _) => rcb::bisect(mesh, parts),
@@ -186,6 +209,9 @@ pub fn partition_tied(
     metrics.cut_interfaces =
         interfaces.iter().filter(|[a, b]| part[*a as usize] != part[*b as usize]).count();
     metrics.lost_ties = ties::lost(ties, &part);
+    if let Some(weights) = weights {
+        metrics.imbalance = metrics::imbalance(&part, parts, weights);
+    }
     Ok((part, metrics))
 }
 

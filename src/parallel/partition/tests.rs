@@ -133,3 +133,19 @@ fn bodies_one_tet_thick_do_not_become_one_part() {
     let (_, metrics) = partition(&mesh, 8, &Settings::default()).unwrap();
     assert!(metrics.imbalance < 1.15, "{}", metrics.imbalance);
 }
+
+/// A bar of cubes along x, of which the first half has tets of weight 9.
+#[test]
+fn parts_have_equal_weight_instead_of_equal_numbers() {
+    let mesh = lattice_cube(6);
+    let is_heavy =
+        |tet: &[VertexId; 4]| tet.iter().map(|v| mesh.points[v.index()].x).sum::<f64>() / 4.0 < 0.5;
+    let weights: Vec<f64> = mesh.tets.iter().map(|tet| if is_heavy(tet) { 9.0 } else { 1.0 }).collect();
+    let (part, metrics) =
+        partition_weighted(&mesh, 4, &Ties::default(), Some(&weights), &Settings::default()).unwrap();
+    assert_eq!(metrics.imbalance, metrics::imbalance(&part, 4, &weights));
+    if cfg!(feature = "metis") {
+        assert!(metrics.imbalance < 1.05, "{metrics:?}");
+        assert!(metrics.largest > 2 * metrics.smallest, "{metrics:?}");
+    }
+}

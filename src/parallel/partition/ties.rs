@@ -78,10 +78,12 @@ impl Clusters {
         Some(Self { of, tets: members, count: count as usize })
     }
 
-    /// The graph of the clusters, weighted by numbers of tets and of faces between them.
-    pub fn graph(&self, dual: &Dual) -> Graph {
+    /// The graph of the clusters, weighted by numbers (or weights) of tets and by numbers of faces
+    /// between them.
+    pub fn graph(&self, dual: &Dual, of_tets: Option<&[i32]>) -> Graph {
         let mut weights = vec![0; self.count];
-        self.of.iter().for_each(|&cluster| weights[cluster as usize] += 1);
+        let weight = |tet: usize| of_tets.map_or(1, |weights| weights[tet]);
+        self.of.iter().enumerate().for_each(|(tet, &cluster)| weights[cluster as usize] += weight(tet));
         let edges = (0..dual.len()).flat_map(|tet| {
             let here = self.of[tet];
             let across = dual.of(tet).iter().filter(move |&&other| other as usize > tet);

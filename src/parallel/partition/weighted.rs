@@ -34,6 +34,15 @@ impl Graph {
     }
 }
 
+/// Positive weights as whole numbers in proportion, with a sum that METIS can add.
+pub fn whole_weights(weights: &[f64]) -> Vec<i32> {
+    /// Half of the largest number; each weight adds at most one by rounding up.
+    const SUM: f64 = (1 << 30) as f64;
+    let sum: f64 = weights.iter().sum();
+    let scale = (SUM - weights.len() as f64) / sum;
+    weights.iter().map(|weight| (weight * scale) as i32 + 1).collect()
+}
+
 /// Parts of about equal weight with a small weighted cut, by METIS' recursive bisection.
 ///
 /// # Errors
@@ -55,6 +64,14 @@ mod tests {
         assert_eq!(graph.offsets, [0, 1, 3, 4]);
         assert_eq!(graph.neighbours, [1, 0, 2, 1]);
         assert_eq!(graph.edge_weights, [9, 9, 1, 1]);
+    }
+
+    #[test]
+    fn whole_weights_are_positive_in_proportion_and_can_be_added() {
+        let whole = whole_weights(&[1.0, 3.0, 1e-30]);
+        assert_eq!(whole[2], 1);
+        assert!((f64::from(whole[1]) / f64::from(whole[0]) - 3.0).abs() < 1e-6);
+        assert!(whole.iter().map(|&w| i64::from(w)).sum::<i64>() <= 1 << 30);
     }
 
     #[cfg(feature = "metis")]

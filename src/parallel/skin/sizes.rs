@@ -2,7 +2,7 @@
 //! them.
 
 use crate::ground::comm::{CommError, Communicator};
-use crate::ground::kernel::simplex::squared_distance;
+use crate::ground::kernel::simplex::{squared_distance, volume6};
 use crate::ground::kernel::tree::{Tree, bounds};
 use crate::ground::mesh::{Mesh, TET_EDGES, TET_FACES, VertexId};
 use crate::ground::size::SizeField;
@@ -102,6 +102,18 @@ pub fn at_vertices(mesh: &Mesh, field: Option<&dyn SizeField>, pieces: u32) -> V
     let logarithms: f64 = lengths.zip(&wanted).map(|(length, wanted)| (length / wanted).ln()).sum();
     let factor = (logarithms / wanted.len() as f64).exp();
     wanted.into_iter().map(|wanted| factor * wanted).collect()
+}
+
+/// The numbers of tets of the given sizes that each tet will become; `sizes` are those at vertices.
+pub fn expected_tets(mesh: &Mesh, sizes: &[f64]) -> Vec<f64> {
+    /// Regular tets of edge length 1 in a unit of volume.
+    const DENSITY: f64 = 6.0 * std::f64::consts::SQRT_2;
+    let expected = |tet: &[VertexId; 4]| {
+        let [a, b, c, d] = tet.map(|v| mesh.points[v.index()]);
+        let density = tet.iter().map(|v| sizes[v.index()].powi(-3)).sum::<f64>() / 4.0;
+        DENSITY * density * volume6(&a, &b, &c, &d).abs() / 6.0
+    };
+    mesh.tets.iter().map(expected).collect()
 }
 
 /// **Collective.** Sends each rank the values of rank 0 for the vertices of its part.
