@@ -3,22 +3,9 @@
 //!
 //! A test is skipped with a message if the Python module is missing.
 
-use crate::common::{own, shared, succeed, tetmill};
+use crate::common::{own, python, shared, succeed, tetmill};
 use std::path::Path;
 use std::process::Command;
-
-/// Runs a Python program in a folder; false if a module is missing.
-fn python(modules: &[&str], program: &str, folder: &Path) -> bool {
-    for module in modules {
-        let found = Command::new("python3").args(["-c", &format!("import {module}")]).output();
-        if !found.is_ok_and(|output| output.status.success()) {
-            eprintln!("SKIPPED: there is no Python module {module}");
-            return false;
-        }
-    }
-    succeed(Command::new("python3").args(["-c", program]).current_dir(folder));
-    true
-}
 
 /// Bodies substrate (1), film (2) and cover (3), with interfaces: volumes 16, 3.2 and 16.
 fn layers(folder: &Path, file: &str, more: &[&str]) {
