@@ -13,6 +13,22 @@ POINTS = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 1)]
 TETS = [(0, 1, 2, 3), (1, 2, 3, 4)]
 FACES = [(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 4), (1, 4, 3), (2, 3, 4)]
 
+# The same mesh of second order: nodes on edges follow the points, one of them off the middle of its edge.
+EDGES = sorted({tuple(sorted((tet[i], tet[j]))) for tet in TETS for i in range(4) for j in range(i)})
+POINTS2 = POINTS + [tuple((x + y) / 2 + (0.01 if k == 0 else 0) for x, y in zip(POINTS[a], POINTS[b]))
+                    for k, (a, b) in enumerate(EDGES)]
+
+
+def curved(elements, *ends):
+    """Elements with the nodes on their edges, whose ends are given in the order of a format."""
+    return [(*element, *(len(POINTS) + EDGES.index(tuple(sorted((element[i], element[j])))) for i, j in ends))
+            for element in elements]
+
+
+# In the order of VTK, which most formats have.
+TETS2 = curved(TETS, (0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3))
+FACES2 = curved(FACES, (0, 1), (1, 2), (2, 0))
+
 
 def save(target, name, *files):
     folder = HERE / "corpus" / target
@@ -131,24 +147,64 @@ def gmsh():
     save("msh", "41_binary_ghosts", binary + b"\n$EndGhostElements\n")
 
 
+def gmsh_second_order():
+    swapped = [(*tet[:8], tet[9], tet[8]) for tet in TETS2]
+    count = len(POINTS2)
+    elements = [(k + 1, 9, 2, 5, 1, *(v + 1 for v in face)) for k, face in enumerate(FACES2)]
+    elements += [(k + 7, 11, 2, 7, 1, *(v + 1 for v in tet)) for k, tet in enumerate(swapped)]
+    points = "".join(f"{k + 1} {x} {y} {z}\n" for k, (x, y, z) in enumerate(POINTS2))
+    save("msh", "22_second", f"$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n{count}\n{points}$EndNodes\n"
+         f"$Elements\n8\n{rows(elements)}$EndElements\n")
+    for order in "<>":
+        binary = b"$MeshFormat\n2.2 1 8\n" + ints(1, order=order) + b"\n$EndMeshFormat\n$Nodes\n%d\n" % count
+        binary += b"".join(struct.pack(order + "i3d", k + 1, *p) for k, p in enumerate(POINTS2))
+        binary += b"\n$EndNodes\n$Elements\n8\n"
+        binary += ints(9, 6, 2, order=order) + b"".join(ints(*e[:1], *e[3:], order=order) for e in elements[:6])
+        binary += ints(11, 2, 2, order=order) + b"".join(ints(*e[:1], *e[3:], order=order) for e in elements[6:])
+        save("msh", "22_binary_second" + str(ord(order)), binary + b"\n$EndElements\n")
+    tags = "".join(f"{k}\n" for k in range(1, count + 1))
+    save("msh", "41_second", "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Entities\n0 0 1 1\n3 0 0 0 1 1 1 1 5 0\n"
+         f"4 0 0 0 1 1 1 1 7 1 -3\n$EndEntities\n$Nodes\n1 {count} 1 {count}\n3 4 0 {count}\n{tags}{rows(POINTS2)}$EndNodes\n"
+         "$Elements\n2 8 1 8\n2 3 9 6\n" + "".join(f"{k + 1} {rows([face], 1)}" for k, face in enumerate(FACES2))
+         + "3 4 11 2\n" + "".join(f"{k + 7} {rows([tet], 1)}" for k, tet in enumerate(swapped)) + "$EndElements\n")
+    sizes = lambda *numbers: ints(*numbers, kind="Q")
+    binary = b"$MeshFormat\n4.1 1 8\n\x01\0\0\0\n$EndMeshFormat\n$Entities\n" + sizes(0, 0, 1, 1)
+    for tag, physical, bounds in [(3, 5, ()), (4, 7, (-3,))]:
+        binary += ints(tag) + struct.pack("<6d", *[0.5] * 6) + sizes(1) + ints(physical) + sizes(len(bounds)) + ints(*bounds)
+    binary += b"\n$EndEntities\n$Nodes\n" + sizes(1, count, 1, count) + ints(3, 4, 0) + sizes(count, *range(1, count + 1))
+    binary += b"".join(struct.pack("<3d", *p) for p in POINTS2) + b"\n$EndNodes\n$Elements\n" + sizes(2, 8, 1, 8)
+    for head, items in [((2, 3, 9), FACES2), ((3, 4, 11), swapped)]:
+        binary += ints(*head) + sizes(len(items)) + b"".join(sizes(1, *(v + 1 for v in item)) for item in items)
+    save("msh", "41_binary_second", binary + b"\n$EndElements\n")
+
+
 def medit():
+    save("mesh", "second", f"MeshVersionFormatted 2\nDimension 3\nVertices\n{len(POINTS2)}\n" + rows(POINTS2, end=" 0")
+         + "TrianglesP2\n6\n" + rows(FACES2, 1, end=" 5") + "TetrahedraP2\n2\n" + rows(TETS2, 1, end=" 7") + "End\n")
     save("mesh", "text", "MeshVersionFormatted 2\nDimension\n3\nVertices\n5\n" + rows(POINTS, end=" 1")
          + "Corners\n1\n1\nEdges\n1\n1 2 3\nTriangles\n6\n" + rows(FACES, 1, end=" 5") + "Tetrahedra\n2\n"
          + rows(TETS, 1, end=" 7") + "End\n")
     for version in range(1, 5):
         for order in "<>":
-            place, size = ("Q" if version >= 3 else "I"), ("q" if version == 4 else "i")
-            real = "f" if version == 1 else "d"
-            binary = ints(1, version, order=order)
-            blocks = [(3, ints(3, order=order)), (4, ints(5, order=order, kind=size) + b"".join(
-                struct.pack(order + 3 * real + size, *p, 0) for p in POINTS)), (20, b"abc")]
-            for code, items, number in [(6, FACES, 5), (8, TETS, 7)]:
-                blocks.append((code, ints(len(items), *(n for item in items for n in (*(v + 1 for v in item), number)),
-                                          order=order, kind=size)))
-            for code, data in blocks:
-                after = len(binary) + 4 + struct.calcsize("=" + place) + len(data)
-                binary += ints(code, order=order) + ints(after, order=order, kind=place) + data
-            save("meshb", f"{version}{ord(order)}", binary + ints(54, order=order) + ints(0, order=order, kind=place))
+            name = f"{version}{ord(order)}"
+            save("meshb", name, meshb(version, order, POINTS, [(20, b"abc")], [(6, FACES, 5), (8, TETS, 7)]))
+            save("meshb", name + "_second", meshb(version, order, POINTS2, [], [(24, FACES2, 5), (30, TETS2, 7)]))
+
+
+def meshb(version, order, points, others, elements):
+    """Medit's binary file with blocks of vertices, of others, and of elements by code, with their number."""
+    place, size = ("Q" if version >= 3 else "I"), ("q" if version == 4 else "i")
+    real = "f" if version == 1 else "d"
+    binary = ints(1, version, order=order)
+    blocks = [(3, ints(3, order=order)), (4, ints(len(points), order=order, kind=size) + b"".join(
+        struct.pack(order + 3 * real + size, *p, 0) for p in points)), *others]
+    for code, items, number in elements:
+        blocks.append((code, ints(len(items), *(n for item in items for n in (*(v + 1 for v in item), number)),
+                                  order=order, kind=size)))
+    for code, data in blocks:
+        after = len(binary) + 4 + struct.calcsize("=" + place) + len(data)
+        binary += ints(code, order=order) + ints(after, order=order, kind=place) + data
+    return binary + ints(54, order=order) + ints(0, order=order, kind=place)
 
 
 def netgen():
@@ -158,25 +214,33 @@ def netgen():
          + rows(POINTS) + "materials\n1\n7 points\nbcnames\n1\n5 skin of it\nidentifications\n2\n1 2 1\n3 4 1\n"
          "identificationtypes\n1\n2\nendmesh\n")
     save("vol", "text", text)
+    # NETGEN's order: of tets 01 02 03 12 13 23 with two corners swapped, of triangles 12 20 01.
+    tets = curved([(b, a, c, d) for a, b, c, d in TETS], (0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3))
+    second = ("mesh3d\ndimension\n3\ngeomtype\n0\nsurfaceelements\n6\n"
+              + rows(curved(FACES, (1, 2), (2, 0), (0, 1)), 1, "1 5 7 0 6 ") + "volumeelements\n2\n" + rows(tets, 1, "7 10 ")
+              + f"points\n{len(POINTS2)}\n" + rows(POINTS2) + "endmesh\n")
+    save("vol", "second", second)
+    save("vol_gz", "second", b"\0" + gzip.compress(second.encode(), mtime=0))
     save("vol_gz", "file", b"\0" + gzip.compress(text.encode(), mtime=0))
     save("vol_gz", "damaged", b"\1\0\x40\1" + text.encode())
     save("vol_gz", "cut", b"\1\0\x40\0" + text.encode())
     save("vol_gz", "text", b"\2" + text.encode())
 
 
-def vtu(stored, tets=TETS, ids=False):
-    cells = [*FACES, *tets]
+def vtu(stored, tets=TETS, ids=False, faces=FACES, points=POINTS):
+    cells = [*faces, *tets]
     corners = [v for cell in cells for v in cell]
     ends = [sum(map(len, cells[:k + 1])) for k in range(len(cells))]
-    numbers = [5] * len(FACES) + [7] * len(tets)
+    numbers = [5] * len(faces) + [7] * len(tets)
+    kinds = {3: 5, 4: 10, 6: 22, 10: 24}
     arrays = [("FieldData", "Body a &amp; b", "Int32", "i", [7]),
-              ("Points", "", "Float64", "d", [x for p in POINTS for x in p]),
+              ("Points", "", "Float64", "d", [x for p in points for x in p]),
               ("Cells", "connectivity", "Int32", "i", corners), ("Cells", "offsets", "Int64", "q", ends),
-              ("Cells", "types", "UInt8", "B", [5] * len(FACES) + [10] * len(tets)),
+              ("Cells", "types", "UInt8", "B", [kinds[len(cell)] for cell in cells]),
               ("CellData", "BodyId", "Int32", "i", numbers)]
     if ids:
-        arrays += [("PointData", "GlobalNodeId", "Int64", "q", range(5)),
-                   ("CellData", "GlobalElementId", "Int64", "q", [-1] * len(FACES) + [0] * len(tets)),
+        arrays += [("PointData", "GlobalNodeId", "Int64", "q", range(len(points))),
+                   ("CellData", "GlobalElementId", "Int64", "q", [-1] * len(faces) + [0] * len(tets)),
                    ("CellData", "vtkGhostType", "UInt8", "B", [0] * len(cells))]
     zipped = ' compressor="vtkZLibDataCompressor"' if stored == "zlib" else ""
     text, body, appended, piece = "", "", b"", False
@@ -195,7 +259,7 @@ def vtu(stored, tets=TETS, ids=False):
         else:
             array = f'{tag}format="binary">{"".join(base64.b64encode(part).decode() for part in data)}</DataArray>'
         if section != "FieldData" and not piece:
-            body += f'<Piece NumberOfPoints="5" NumberOfCells="{len(cells)}">\n'
+            body += f'<Piece NumberOfPoints="{len(points)}" NumberOfCells="{len(cells)}">\n'
             piece = True
         body += f"<{section}>{array}</{section}>\n"
     text = (f'<?xml version="1.0"?>\n<VTKFile type="UnstructuredGrid" version="0.1" byte_order="LittleEndian"{zipped}>\n'
@@ -214,6 +278,10 @@ def vtk():
                  '</PPoints><Piece Source="1.vtu"/><Piece Source="2.vtu"/></PUnstructuredGrid></VTKFile>')
         save("pvtu", stored, index, vtu(stored, TETS[:1]), vtu(stored, TETS[1:]))
         save("pvtu", stored + "_ids", index, vtu(stored, TETS[:1], True), vtu(stored, TETS[1:], True))
+    for stored in ["text", "raw"]:
+        second = lambda tets, ids: vtu(stored, tets, ids, FACES2, POINTS2)
+        save("vtu", stored + "_second", second(TETS2, True))
+        save("pvtu", stored + "_second", index, second(TETS2[:1], False), second(TETS2[1:], False))
     grid = vtu("text", ids=True)
     save("vtu", "beside", grid, grid)
 
@@ -225,6 +293,9 @@ def tetgen():
     save("tetgen", "alone", node, ele)
     second = "".join(f"{k} {' '.join(map(str, tet))} 0 1 2 3 4 0 7\n" for k, tet in enumerate(TETS))
     save("tetgen", "second", node, "2 10 1\n" + second, "1 1\n0 0 2 1 0 1 2 5\n")
+    tets = curved(TETS, (2, 3), (0, 2), (0, 1), (1, 3), (1, 2), (0, 3))
+    save("tetgen", "curved", f"{len(POINTS2)} 3 0 0\n" + numbered(POINTS2), "2 10 1\n" + numbered(tets, end=" 7"),
+         "6 1\n" + numbered(curved(FACES, (1, 2), (2, 0), (0, 1)), end=" 5"))
 
 
 def elmer():
@@ -235,6 +306,15 @@ def elmer():
                        for k, (face, (a, b)) in enumerate(zip(FACES, parents)))
     names = "! ----- names for bodies -----\n$ body = 7\n! ----- names for boundaries -----\n$ skin = 5\n"
     header = "5 2 6\n2\n504 2\n303 6\n"
+    nodes2 = "".join(f"{k + 1} -1 {x} {y} {z}\n" for k, (x, y, z) in enumerate(POINTS2))
+    elements2 = "".join(f"{k + 1} 7 510 {' '.join(str(v + 1) for v in tet)}\n" for k, tet in enumerate(TETS2))
+    boundary2 = "".join(f"{k + 1} 5 {a} {b} 306 {' '.join(str(v + 1) for v in face)}\n"
+                        for k, (face, (a, b)) in enumerate(zip(FACES2, parents)))
+    header2 = f"{len(POINTS2)} 2 6\n2\n510 2\n306 6\n"
+    save("elmer", "serial_second", "0" + header2, nodes2, elements2, boundary2, names)
+    save("elmer", "part_second", "1" + header2 + "3 0\n", nodes2, elements2, boundary2, "1 2 1 2\n2 2 2 1\n6 2 1 2\n")
+    save("elmer", "halo_second", "1" + header2 + "3 0\n", nodes2, elements2.replace("2 7", "2/2 7"), boundary2,
+         "1 2 1 2\n2 2 1 2\n6 2 1 2\n")
     save("elmer", "serial", "0" + header, nodes, elements, boundary, names, "# a\n1 2 1\n")
     save("elmer", "part", "1" + header + "2 0\n", nodes, elements, boundary, "1 2 1 2\n2 2 2 1\n")
     save("elmer", "halo", "1" + header + "2 0\n", nodes, elements.replace("2 7", "2/2 7"), boundary, "1 2 1 2\n2 2 1 2\n")
@@ -244,5 +324,5 @@ def size():
     save("size", "points", "2 # a\n0 0 0 0.1\n1 0 0 5e-2\n1\n0 0 0 1 1 1 0.2\n")
 
 
-for write in [stl, polygons, ply, gmsh, medit, netgen, vtk, tetgen, elmer, size]:
+for write in [stl, polygons, ply, gmsh, gmsh_second_order, medit, netgen, vtk, tetgen, elmer, size]:
     write()

@@ -66,6 +66,10 @@ compile cc c99 "$work/threads" capi/tests/wrong_use.c "$work/wrong_use" "${sanit
 (cd "$work" && ./wrong_use)
 ok "wrong use, with address sanitiser and leak check"
 
+compile cc c99 "$work/threads" capi/tests/second_order.c "$work/second_order" "${sanitised[@]}"
+"$work/second_order"
+ok "second order on 1, 3 and 5 parts, with address sanitiser and leak check"
+
 compile cc c99 "$work/threads" capi/examples/poisson.c "$work/poisson" "${sanitised[@]}"
 for parts in 1 4 7; do
     "$work/poisson" $parts > "$work/poisson.$parts"

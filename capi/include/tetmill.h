@@ -366,8 +366,9 @@ tetmill_status tetmill_part_ghost_owners(const tetmill_part *part,
 /**
  * The number of refinement levels of a part, the coarse mesh and the part itself included.
  *
- * TETMILL_STATUS_USAGE unless the mesh was made by the method `refine`. The levels are made now:
- * the coarser ones have a seventh of the part's tets together.
+ * TETMILL_STATUS_USAGE unless the parts were refined (the method `refine`, or the option `refine`)
+ * and the elements are of order 1. The
+ * levels are made now: the coarser ones have a seventh of the part's tets together.
  */
 tetmill_status tetmill_part_level_count(const tetmill_part *part, size_t *count);
 
@@ -409,7 +410,7 @@ void tetmill_mesh_free(tetmill_mesh *mesh);
 
 /**
  * Stores the counts of the whole mesh: vertices, tets, and triangles on patches, each counted
- * once.
+ * once. In a mesh of order 2 the vertices include the nodes on edges.
  */
 tetmill_status tetmill_mesh_totals(const tetmill_mesh *mesh,
                                    uint64_t *vertices,
@@ -417,7 +418,16 @@ tetmill_status tetmill_mesh_totals(const tetmill_mesh *mesh,
                                    uint64_t *triangles);
 
 /**
+ * Stores the order of the elements of the whole mesh: 1, or 2 if tets have a node on each edge,
+ * too (option `order`).
+ */
+tetmill_status tetmill_mesh_order(const tetmill_mesh *mesh, uint32_t *order);
+
+/**
  * Stores the shape of the whole mesh: its volume, and the smallest dihedral angle in degrees.
+ *
+ * In a mesh of order 2 the volume is that of the curved tets, and the angle that of tets with the
+ * same corners and straight edges.
  */
 tetmill_status tetmill_mesh_shape(const tetmill_mesh *mesh, double *volume, double *least_angle);
 
@@ -537,10 +547,11 @@ void tetmill_options_free(tetmill_options *options);
  * `"2"`. The value NULL sets it back to its default.
  *
  * Sizes: `preset`, `maxh`, `minh`, `grading`, `closeness`, `mesh-size-file`, `effort`, `coarse`.
- * The fine mesh: `method`, `elements`, `levels`, `pieces`, `nested`, `memory`, `planes`. Reading
- * surfaces: `keep-surface`, `merge`, `feature-angle`. The values of `nested` and `keep-surface`
- * are `"true"` and `"false"`. The order of calls does not matter; `elements` excludes `coarse`,
- * `levels` and `pieces`, which is checked when a mesh is made.
+ * The fine mesh: `method`, `elements`, `levels`, `pieces`, `nested`, `refine`, `order`,
+ * `allow-off-surface`, `memory`, `planes`. Reading surfaces: `keep-surface`, `merge`,
+ * `feature-angle`. The values of `nested`, `allow-off-surface` and `keep-surface` are `"true"` and
+ * `"false"`. The sequence of calls does not matter; `elements` excludes `coarse`, `levels` and
+ * `pieces`, which is checked when a mesh is made.
  *
  * Returns TETMILL_STATUS_USAGE for an unknown name or a value that the option cannot have.
  */
@@ -637,12 +648,24 @@ tetmill_status tetmill_part_vertex_ids(const tetmill_part *part,
                                        size_t *count);
 
 /**
- * The vertices of the tets by local index, four for each of `count` tets, positively oriented:
+ * The corners of the tets by local index, four for each of `count` tets, positively oriented:
  * (v1-v0)x(v2-v0).(v3-v0) > 0.
  */
 tetmill_status tetmill_part_tets(const tetmill_part *part,
                                  const uint32_t **vertices,
                                  size_t *count);
+
+/**
+ * All nodes of the tets by local index, `nodes_per_tet` for each of `count` tets: 10 in a mesh of
+ * order 2, otherwise 4, those of tetmill_part_tets.
+ *
+ * First the corners, then the nodes on the edges 01 12 02 03 13 23: the order of VTK and Abaqus.
+ * Nodes on edges are vertices of the part, too, with coordinates, ids and owners.
+ */
+tetmill_status tetmill_part_tet_nodes(const tetmill_part *part,
+                                      const uint32_t **nodes,
+                                      size_t *count,
+                                      size_t *nodes_per_tet);
 
 /**
  * Global ids of the tets: 0 to the number of tets of the whole mesh, without gaps.
@@ -657,7 +680,7 @@ tetmill_status tetmill_part_tet_bodies(const tetmill_part *part,
                                        size_t *count);
 
 /**
- * The triangles on patches by local index, three vertices for each of `count` triangles. Their
+ * The triangles on patches by local index, three corners for each of `count` triangles. Their
  * right-hand normal points from the patch's inside to its outside.
  *
  * A triangle between two parts is in the arrays of both.
@@ -665,6 +688,17 @@ tetmill_status tetmill_part_tet_bodies(const tetmill_part *part,
 tetmill_status tetmill_part_triangles(const tetmill_part *part,
                                       const uint32_t **vertices,
                                       size_t *count);
+
+/**
+ * All nodes of the triangles by local index, `nodes_per_triangle` for each of `count` triangles: 6
+ * in a mesh of order 2, otherwise 3, those of tetmill_part_triangles.
+ *
+ * First the corners, then the nodes on the edges 01 12 20.
+ */
+tetmill_status tetmill_part_triangle_nodes(const tetmill_part *part,
+                                           const uint32_t **nodes,
+                                           size_t *count,
+                                           size_t *nodes_per_triangle);
 
 /**
  * The patch of each triangle, by the index of tetmill_mesh_patch.

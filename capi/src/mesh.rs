@@ -24,6 +24,8 @@ struct Whole {
     names: Names,
     /// Vertices, tets, triangles.
     totals: [u64; 3],
+    /// The degree of the elements.
+    order: u32,
     volume: f64,
     least_angle: f64,
 }
@@ -34,6 +36,7 @@ impl From<&Generated> for Whole {
         Self {
             names: made.names.clone(),
             totals: [totals.vertices, totals.tets, totals.boundary],
+            order: made.stream().order().degree(),
             volume: made.check.volume,
             least_angle: made.check.shape.as_ref().map_or(0.0, |shape| shape.smallest_angle.value),
         }
@@ -77,7 +80,7 @@ pub unsafe extern "C" fn tetmill_mesh_free(mesh: *mut Mesh) {
 }
 
 /// Stores the counts of the whole mesh: vertices, tets, and triangles on patches, each counted
-/// once.
+/// once. In a mesh of order 2 the vertices include the nodes on edges.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn tetmill_mesh_totals(
     mesh: Option<&Mesh>,
@@ -96,7 +99,18 @@ pub unsafe extern "C" fn tetmill_mesh_totals(
     })
 }
 
+/// Stores the order of the elements of the whole mesh: 1, or 2 if tets have a node on each edge,
+/// too (option `order`).
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn tetmill_mesh_order(mesh: Option<&Mesh>, order: *mut u32) -> Status {
+    // SAFETY: the contract of the header.
+    guard(|| unsafe { store(order, given(mesh, "mesh")?.whole.order, "order") })
+}
+
 /// Stores the shape of the whole mesh: its volume, and the smallest dihedral angle in degrees.
+///
+/// In a mesh of order 2 the volume is that of the curved tets, and the angle that of tets with the
+/// same corners and straight edges.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn tetmill_mesh_shape(
     mesh: Option<&Mesh>,

@@ -31,10 +31,11 @@ pub unsafe extern "C" fn tetmill_options_free(options: *mut Options) {
 /// `"2"`. The value NULL sets it back to its default.
 ///
 /// Sizes: `preset`, `maxh`, `minh`, `grading`, `closeness`, `mesh-size-file`, `effort`, `coarse`.
-/// The fine mesh: `method`, `elements`, `levels`, `pieces`, `nested`, `memory`, `planes`. Reading
-/// surfaces: `keep-surface`, `merge`, `feature-angle`. The values of `nested` and `keep-surface`
-/// are `"true"` and `"false"`. The order of calls does not matter; `elements` excludes `coarse`,
-/// `levels` and `pieces`, which is checked when a mesh is made.
+/// The fine mesh: `method`, `elements`, `levels`, `pieces`, `nested`, `refine`, `order`,
+/// `allow-off-surface`, `memory`, `planes`. Reading surfaces: `keep-surface`, `merge`,
+/// `feature-angle`. The values of `nested`, `allow-off-surface` and `keep-surface` are `"true"` and
+/// `"false"`. The sequence of calls does not matter; `elements` excludes `coarse`, `levels` and
+/// `pieces`, which is checked when a mesh is made.
 ///
 /// Returns TETMILL_STATUS_USAGE for an unknown name or a value that the option cannot have.
 #[unsafe(no_mangle)]

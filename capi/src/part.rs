@@ -6,7 +6,7 @@ use crate::levels::Parents;
 use crate::pointers::{given, store, store_array};
 use crate::sharing::SharingArrays;
 use std::sync::{Arc, OnceLock};
-use tetmill::mesh::{Arrays, GlobalId, MeshStream};
+use tetmill::mesh::{Arrays, GlobalId, MeshStream, Order};
 use tetmill::{Generated, Hierarchy};
 
 /// One part of a mesh, or a refinement level of it (tetmill_part_level).
@@ -37,16 +37,27 @@ enum Source {
 struct FlatArrays {
     points: Vec<[f64; 3]>,
     vertex_ids: Vec<GlobalId>,
+    order: Order,
     tets: Vec<[u32; 4]>,
+    /// All nodes, only for second order.
+    tet_nodes: Vec<[u32; 10]>,
     tet_ids: Vec<GlobalId>,
     tet_bodies: Vec<u32>,
     triangles: Vec<[u32; 3]>,
+    /// All nodes, only for second order.
+    triangle_nodes: Vec<[u32; 6]>,
     triangle_patches: Vec<u32>,
     triangle_bodies: Vec<[i32; 2]>,
 }
 
 /// Marks a side of a triangle without a tet of the part.
 const NO_BODY: i32 = -1;
+
+/// All nodes of a tet in the order of VTK: the corners, then the edges 01 12 02 03 13 23. The
+/// library's edges are 01 02 03 12 13 23.
+fn vtk_nodes((&[a, b, c, d], &[ab, ac, ad, bc, bd, cd]): (&[u32; 4], &[u32; 6])) -> [u32; 10] {
+    [a, b, c, d, ab, bc, ac, ad, bd, cd]
+}
 
 impl From<Arrays> for FlatArrays {
     fn from(arrays: Arrays) -> Self {
@@ -56,9 +67,17 @@ impl From<Arrays> for FlatArrays {
         Self {
             points: arrays.points,
             vertex_ids: arrays.vertex_ids,
+            order: arrays.order,
+            tet_nodes: arrays.tets.iter().zip(&arrays.tet_edge_nodes).map(vtk_nodes).collect(),
             tets: arrays.tets,
             tet_ids: arrays.tet_ids,
             tet_bodies: arrays.tet_bodies.into_iter().map(|body| body.0).collect(),
+            triangle_nodes: arrays
+                .triangles
+                .iter()
+                .zip(&arrays.triangle_edge_nodes)
+                .map(|(&[a, b, c], &[ab, bc, ca])| [a, b, c, ab, bc, ca])
+                .collect(),
             triangles: arrays.triangles,
             triangle_patches: arrays.triangle_patches.into_iter().map(|patch| patch.0).collect(),
             triangle_bodies: arrays.triangle_bodies.into_iter().map(bodies).collect(),
@@ -157,7 +176,7 @@ pub unsafe extern "C" fn tetmill_part_vertex_ids(
     guard(|| unsafe { store_array(&given(part, "part")?.arrays().vertex_ids, ids, count, "ids") })
 }
 
-/// The vertices of the tets by local index, four for each of `count` tets, positively oriented:
+/// The corners of the tets by local index, four for each of `count` tets, positively oriented:
 /// (v1-v0)x(v2-v0).(v3-v0) > 0.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn tetmill_part_tets(
@@ -167,6 +186,31 @@ pub unsafe extern "C" fn tetmill_part_tets(
 ) -> Status {
     // SAFETY: the contract of the header.
     guard(|| unsafe { store_array(&given(part, "part")?.arrays().tets, vertices, count, "vertices") })
+}
+
+/// All nodes of the tets by local index, `nodes_per_tet` for each of `count` tets: 10 in a mesh of
+/// order 2, otherwise 4, those of tetmill_part_tets.
+///
+/// First the corners, then the nodes on the edges 01 12 02 03 13 23: the order of VTK and Abaqus.
+/// Nodes on edges are vertices of the part, too, with coordinates, ids and owners.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn tetmill_part_tet_nodes(
+    part: Option<&Part>,
+    nodes: *mut *const u32,
+    count: *mut usize,
+    nodes_per_tet: *mut usize,
+) -> Status {
+    guard(|| {
+        let arrays = given(part, "part")?.arrays();
+        // SAFETY: the contract of the header.
+        unsafe {
+            store(nodes_per_tet, arrays.order.tet_nodes(), "nodes_per_tet")?;
+            match arrays.order {
+                Order::First => store_array(&arrays.tets, nodes, count, "nodes"),
+                Order::Second => store_array(&arrays.tet_nodes, nodes, count, "nodes"),
+            }
+        }
+    })
 }
 
 /// Global ids of the tets: 0 to the number of tets of the whole mesh, without gaps.
@@ -191,7 +235,7 @@ pub unsafe extern "C" fn tetmill_part_tet_bodies(
     guard(|| unsafe { store_array(&given(part, "part")?.arrays().tet_bodies, bodies, count, "bodies") })
 }
 
-/// The triangles on patches by local index, three vertices for each of `count` triangles. Their
+/// The triangles on patches by local index, three corners for each of `count` triangles. Their
 /// right-hand normal points from the patch's inside to its outside.
 ///
 /// A triangle between two parts is in the arrays of both.
@@ -203,6 +247,30 @@ pub unsafe extern "C" fn tetmill_part_triangles(
 ) -> Status {
     // SAFETY: the contract of the header.
     guard(|| unsafe { store_array(&given(part, "part")?.arrays().triangles, vertices, count, "vertices") })
+}
+
+/// All nodes of the triangles by local index, `nodes_per_triangle` for each of `count` triangles: 6
+/// in a mesh of order 2, otherwise 3, those of tetmill_part_triangles.
+///
+/// First the corners, then the nodes on the edges 01 12 20.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn tetmill_part_triangle_nodes(
+    part: Option<&Part>,
+    nodes: *mut *const u32,
+    count: *mut usize,
+    nodes_per_triangle: *mut usize,
+) -> Status {
+    guard(|| {
+        let arrays = given(part, "part")?.arrays();
+        // SAFETY: the contract of the header.
+        unsafe {
+            store(nodes_per_triangle, arrays.order.triangle_nodes(), "nodes_per_triangle")?;
+            match arrays.order {
+                Order::First => store_array(&arrays.triangles, nodes, count, "nodes"),
+                Order::Second => store_array(&arrays.triangle_nodes, nodes, count, "nodes"),
+            }
+        }
+    })
 }
 
 /// The patch of each triangle, by the index of tetmill_mesh_patch.

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use std::str::FromStr;
 use std::sync::Arc;
 use tetmill::files::mesh_size;
+use tetmill::mesh::Order;
 use tetmill::run::{Candidates, CutPlane, CutSettings, MAX_PIECES, PlanSettings};
 use tetmill::size::{Effort, Preset, SizeFunction, Source};
 use tetmill::{Error, Geometry, InputSettings, Mesher, Method};
@@ -31,6 +32,9 @@ pub struct Settings {
     levels: Option<u32>,
     pieces: Option<u32>,
     nested: Option<bool>,
+    refine: Option<u32>,
+    order: Option<Order>,
+    allow_off_surface: Option<bool>,
     memory: Option<u64>,
     planes: Option<Candidates>,
     pub cut_planes: Vec<CutPlane>,
@@ -44,7 +48,7 @@ pub struct Settings {
 }
 
 /// The names of `tetmill_options_set`.
-const NAMES: [&str; 18] = [
+const NAMES: [&str; 21] = [
     "preset",
     "maxh",
     "minh",
@@ -58,6 +62,9 @@ const NAMES: [&str; 18] = [
     "levels",
     "pieces",
     "nested",
+    "refine",
+    "order",
+    "allow-off-surface",
     "memory",
     "planes",
     "keep-surface",
@@ -131,6 +138,10 @@ fn integer(text: &str, least: u32, most: u32) -> Result<u32, String> {
     number.ok_or_else(|| format!("expected {least} to {most}"))
 }
 
+fn order(text: &str) -> Result<Order, String> {
+    text.trim().parse().ok().and_then(Order::of_degree).ok_or_else(|| "expected 1 or 2".into())
+}
+
 fn flag(text: &str) -> Result<bool, String> {
     match text {
         "true" | "1" => Ok(true),
@@ -169,6 +180,9 @@ impl Settings {
             "levels" => self.levels = of(value, |text| integer(text, 0, MAX_PIECES.ilog2()))?,
             "pieces" => self.pieces = of(value, |text| integer(text, 1, MAX_PIECES))?,
             "nested" => self.nested = of(value, flag)?,
+            "refine" => self.refine = of(value, |text| integer(text, 0, MAX_PIECES.ilog2()))?,
+            "order" => self.order = of(value, order)?,
+            "allow-off-surface" => self.allow_off_surface = of(value, flag)?,
             "memory" => self.memory = of(value, count)?,
             "planes" => self.planes = of(value, candidates)?,
             "keep-surface" => self.keep_surface = of(value, flag)?,
@@ -214,7 +228,11 @@ impl Settings {
         if let Some(bytes) = self.memory {
             mesher = mesher.memory(bytes);
         }
-        Ok(if self.nested == Some(true) { mesher.nested() } else { mesher })
+        if self.nested == Some(true) {
+            mesher = mesher.nested();
+        }
+        mesher = mesher.refine(self.refine.unwrap_or(0)).order(self.order.unwrap_or_default());
+        Ok(if self.allow_off_surface == Some(true) { mesher.allow_off_surface() } else { mesher })
     }
 
     fn sized(&self, mut mesher: Mesher<'static>, refusal: &Arc<Refusal>) -> Mesher<'static> {
@@ -306,6 +324,8 @@ mod tests {
             "3",
             "12",
             "true",
+            "2",
+            "true",
             "8e9",
             "axes",
             "1",
@@ -329,6 +349,7 @@ mod tests {
         let refusal = |name, value| Settings::default().set(name, Some(value)).unwrap_err().to_string();
         assert_eq!(refusal("maxh", "nan"), "option maxh cannot be `nan`: expected a positive number");
         assert_eq!(refusal("levels", "11"), "option levels cannot be `11`: expected 0 to 10");
+        assert_eq!(refusal("order", "3"), "option order cannot be `3`: expected 1 or 2");
         assert!(refusal("max-size", "1").contains("there are preset, maxh"));
         assert!(refusal("parts", "4").contains("an argument of tetmill_generate"));
     }

@@ -57,6 +57,14 @@ int main(int argc, char **argv) {
     if (size > 1)
         EXPECT(tetmill_generate_comm(ball, options, MPI_COMM_WORLD, 0, &mesh), INPUT, "levels");
     EXPECT(tetmill_options_set_levels(options, 1), OK, "");
+    EXPECT(tetmill_options_set(options, "order", rank == 1 ? "2" : "1"), OK, "");
+    if (size > 1)
+        EXPECT(tetmill_generate_comm(ball, options, MPI_COMM_WORLD, 0, &mesh), INPUT, "rank 0: order");
+    EXPECT(tetmill_options_set(options, "order", NULL), OK, "");
+    EXPECT(tetmill_options_set(options, "allow-off-surface", rank == 1 ? "true" : "false"), OK, "");
+    if (size > 1)
+        EXPECT(tetmill_generate_comm(ball, options, MPI_COMM_WORLD, 0, &mesh), INPUT, "rank 0: allow_off_surface");
+    EXPECT(tetmill_options_set(options, "allow-off-surface", NULL), OK, "");
     EXPECT(tetmill_options_set_size(options, negative, NULL), OK, "");
     EXPECT(tetmill_generate_comm(ball, options, MPI_COMM_WORLD, 0, &mesh), INPUT, "the size function returned -1");
     EXPECT(tetmill_options_set_size(options, NULL, NULL), OK, "");

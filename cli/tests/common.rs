@@ -33,6 +33,19 @@ pub fn succeed(command: &mut Command) -> Output {
     output
 }
 
+/// Runs a Python program in a folder; prints a message and returns false if a module is missing.
+pub fn python(modules: &[&str], program: &str, folder: &Path) -> bool {
+    for module in modules {
+        let found = Command::new("python3").args(["-c", &format!("import {module}")]).output();
+        if !found.is_ok_and(|output| output.status.success()) {
+            eprintln!("SKIPPED: there is no Python module {module}");
+            return false;
+        }
+    }
+    succeed(Command::new("python3").args(["-c", program]).current_dir(folder));
+    true
+}
+
 /// Checks a written partition by the independent checker, if it is installed, and by `tetmill
 /// check`.
 pub fn judge(dir: &Path, parts: u32) {
@@ -69,17 +82,4 @@ pub fn judged_report(method: &str, name: &str, ranks: u32, more: &[&str]) -> ser
     succeed(&mut command);
     judge(&out, ranks);
     read_json(&report)
-}
-
-/// Runs a Python program in a folder; false if a module is missing.
-pub fn python(modules: &[&str], program: &str, folder: &Path) -> bool {
-    for module in modules {
-        let found = Command::new("python3").args(["-c", &format!("import {module}")]).output();
-        if !found.is_ok_and(|output| output.status.success()) {
-            eprintln!("SKIPPED: there is no Python module {module}");
-            return false;
-        }
-    }
-    succeed(Command::new("python3").args(["-c", program]).current_dir(folder));
-    true
 }

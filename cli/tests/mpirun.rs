@@ -2,7 +2,7 @@
 
 #[cfg(feature = "mpi")]
 mod with_mpi {
-    use crate::common::{judge, own, read_json, report_of, succeed, tetmill};
+    use crate::common::{judge, own, python, read_json, report_of, succeed, tetmill};
     use std::process::Command;
 
     /// `mpirun -n RANKS tetmill`; without `mpirun` prints a message and returns `None`.
@@ -194,6 +194,66 @@ mod with_mpi {
             let stderr = String::from_utf8_lossy(&refused.stderr).into_owned();
             assert_eq!(refused.status.code(), Some(2), "{command}: {stderr}");
             assert_eq!(stderr.matches("tetmill: ").count(), 1, "{command}: {stderr}");
+        }
+    }
+
+    /// Counts the tets of `NAME.h5`, `NAME.msh` and `NAME_1.msh`, … by programs other than ours.
+    const COUNTS: &str = "
+import gmsh
+import h5py
+import numpy as np
+grid = h5py.File('dome.h5')['VTKHDF']
+assert len(grid['Types']) == tets and (grid['Types'][:] == 24).all(), (len(grid['Types']), tets)
+assert grid['Connectivity'].shape == (10 * tets,)
+assert set(grid['CellData/PartitionId'][:]) == set(range(1, parts + 1))
+gmsh.initialize()
+gmsh.option.setNumber('General.Terminal', 0)
+def curved(path):
+    gmsh.clear()
+    gmsh.open(path)
+    kinds, tags, nodes = gmsh.model.mesh.getElements(3)
+    assert list(kinds) == [11], kinds
+    _, determinants, _ = gmsh.model.mesh.getJacobians(11, [0.25, 0.25, 0.25])
+    assert len(determinants) == len(tags[0]) and (determinants > 0).all()
+    return {tag: tuple(of) for tag, of in zip(tags[0], nodes[0].reshape(-1, 10))}
+whole = curved('dome.msh')
+assert len(whole) == tets
+assert gmsh.model.getNumberOfPartitions() == (parts if parts > 1 else 0)
+apart = [curved(f'dome_{part}.msh') for part in range(1, parts + 1)]
+assert all(apart) and sum(map(len, apart)) == tets
+assert {tag: of for part in apart for tag, of in part.items()} == whole
+print('counted')
+";
+
+    #[test]
+    fn mpi_ranks_write_the_curved_mesh_that_other_programs_count() {
+        let arguments = ["--order", "2", "--levels", "1", "--preset", "coarse"];
+        let expected = report_of(&own("dome"), &arguments);
+        for ranks in [1, 3] {
+            let Some(mut command) = mpirun(ranks) else { return };
+            let dir = tempfile::tempdir().unwrap();
+            let (out, file) = (dir.path().join("out"), dir.path().join("report.json"));
+            command.arg("generate").arg(own("dome")).args(arguments).args([
+                "-q",
+                "-f",
+                "hdf5,msh4,msh4-parts",
+            ]);
+            succeed(command.arg("-o").arg(&out).arg("--report").arg(&file));
+            let report = read_json(&file);
+            assert_eq!(report["mesh"]["checksum"], expected["mesh"]["checksum"], "{ranks} ranks");
+            assert_eq!((&report["order"], &report["ranks"]), (&2.into(), &ranks.into()));
+            // Our own reader counts too, where the modules are missing.
+            let files: Vec<_> = (1..=ranks).map(|part| out.join(format!("dome_{part}.msh"))).collect();
+            let output =
+                succeed(tetmill().args(["quality", "--json"]).arg(out.join("dome.msh")).args(&files));
+            let read: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
+            let [whole, parts @ ..] = &read["meshes"].as_array().unwrap()[..] else { panic!("{read}") };
+            let tets = |mesh: &serde_json::Value| mesh["tets"].as_u64().unwrap();
+            assert_eq!((&whole["order"], &whole["not_valid"]), (&2.into(), &0.into()));
+            assert_eq!(tets(whole), tets(&report["mesh"]));
+            assert_eq!(parts.iter().map(tets).sum::<u64>(), tets(whole), "{ranks} ranks");
+            let program = format!("tets, parts = {}, {ranks}\n{COUNTS}", tets(whole));
+            python(&["h5py", "gmsh", "numpy"], &program, &out);
         }
     }
 

@@ -116,6 +116,8 @@ fn check_volume(path: &Path) {
     let corners = mesh.tets.iter().flatten().chain(mesh.triangles.iter().flat_map(|t| &t.vertices));
     assert!(corners.into_iter().all(|vertex| vertex.index() < mesh.points.len()));
     assert!(mesh.points.iter().flat_map(|point| point.iter()).all(|x| x.is_finite()));
+    assert!(read.edge_points.is_empty() || read.edge_points.len() == mesh.tets.len());
+    assert!(read.edge_points.iter().flatten().flatten().all(|x| x.is_finite()));
     assert!(mesh.bodies.iter().all(|body| body.index() < read.names.bodies.len()));
     assert!(mesh.triangles.iter().all(|triangle| triangle.patch.index() < read.names.patches.len()));
 }

@@ -53,6 +53,8 @@ pub fn check_count(vertices: u64) -> PyResult<()> {
 /// The arrays of one part.
 #[pyclass(frozen, get_all, module = "tetmill._native")]
 pub struct PartArrays {
+    /// The degree of the elements.
+    order: u32,
     points: Py<PyArray2<f64>>,
     vertex_ids: Py<PyArray1<i64>>,
     tets: Py<PyArray2<i32>>,
@@ -80,6 +82,7 @@ impl PartArrays {
         let tags = arrays.triangle_patches.iter().map(|patch| number(&names.patches, patch.index()));
         let sides = arrays.triangle_bodies.into_iter().map(|sides| sides.map(|side| side.map_or(0, body)));
         Ok(Self {
+            order: arrays.order.degree(),
             points: rows(py, arrays.points)?,
             vertex_ids: ids(py, arrays.vertex_ids),
             tets: indices(py, arrays.tets)?,

@@ -28,6 +28,7 @@ pub struct Options<'py> {
     elements: Option<u64>,
     pieces: u32,
     nested: bool,
+    refine: u32,
     order: u32,
     allow_off_surface: bool,
     planes: String,
@@ -69,6 +70,7 @@ impl Options<'_> {
             wanted: self.wanted(),
             memory: self.memory,
             nested: self.nested,
+            refine: self.refine,
             allow_off_surface: self.allow_off_surface,
             ..GenerateSettings::default()
         })

@@ -4,7 +4,7 @@ use pyo3::prelude::*;
 use std::path::PathBuf;
 use tetmill::comm::Communicator;
 use tetmill::error::Error;
-use tetmill::files::{Written, elmer, geomview, hdf5, mfem, serial, vtu};
+use tetmill::files::{Written, elmer, geomview, gmsh4, hdf5, mfem, serial, vtu};
 use tetmill::mesh::{By, MeshStream, Names, Watched, WithHalo, halo};
 use tetmill::progress::{Progress, Stage};
 
@@ -18,6 +18,8 @@ pub struct Target {
     format: String,
     /// Whether triangles are in the file of the tets (VTU).
     inside: bool,
+    /// Whether files of Gmsh 4.1 are text.
+    ascii: bool,
     /// `faces` or `vertices`.
     halo: Option<String>,
     /// Whether the adjacency is written (HDF5).
@@ -47,19 +49,31 @@ pub fn write(
     let ghosts = target.halo().map(|by| halo(comm, part, by)).transpose()?;
     let with_halo = ghosts.as_ref().map(|ghosts| WithHalo::new(part, ghosts));
     let part: &dyn MeshStream = with_halo.as_ref().map_or(part, |with_halo| with_halo);
-    let joined = |part: &dyn MeshStream, format: serial::Format| {
+    let note_losses = |format: serial::Format| {
         for loss in serial::losses(names, format) {
             progress.note(&format!("{}: {loss}", target.path.display()));
         }
+    };
+    let joined = |part: &dyn MeshStream, format: serial::Format| {
+        note_losses(format);
         serial::write_joined(comm, part, names, format, &target.path)
     };
     let place = if target.inside { vtu::Boundary::In } else { vtu::Boundary::Beside };
+    let storage = if target.ascii { gmsh4::Storage::Text } else { gmsh4::Storage::Binary };
     let written = progress.stage(Stage::Write, |work| {
         let part = &Watched::new(part, work, 1);
         match target.format.as_str() {
             "elmer" => elmer::write(comm, part, names, &target.path),
             "vtu" => vtu::write_with(comm, part, names, &target.path, place),
             "msh" => joined(part, serial::Format::Gmsh),
+            "msh4" => {
+                note_losses(serial::Format::Gmsh);
+                gmsh4::write(comm, part, names, &target.path, storage)
+            }
+            "msh4-parts" => {
+                note_losses(serial::Format::Gmsh);
+                gmsh4::write_parts(comm, part, names, &target.path, storage)
+            }
             "medit" => joined(part, serial::Format::Medit),
             "vol" => joined(part, serial::Format::Netgen),
             "inp" => joined(part, serial::Format::Abaqus),

@@ -1,6 +1,7 @@
 """Meshes across the processes of MPI jobs, which `mpirun` starts."""
 
 import importlib.util
+import math
 import os
 import re
 import shutil
@@ -74,3 +75,36 @@ def test_heat_with_dolfinx():
         # Boundaries by name: 4 pi r^2, from inside.
         interface, skin = map(float, re.findall(r"areas (\S+) (\S+)", output)[-1])
         assert 3.12 < interface < 3.1416 and 12.5 < skin < 12.5664, output
+
+
+def volumes(output, levels):
+    """The volumes that the solver integrates are those of the reports."""
+    found = [(float(a), float(b)) for a, b in re.findall(r"volumes (\S+) (\S+)", output)]
+    assert len(found) == levels, output
+    for integrated, reported in found:
+        assert integrated == pytest.approx(reported, abs=1e-10), output
+    return found
+
+
+@needs("mpi4py", "petsc4py")
+def test_dmplex_has_curved_tets():
+    outputs = [run(ranks, "second_order_dmplex.py") for ranks in (1, 2, 4)]
+    for output in outputs:
+        # The volume that is missing falls as h⁴, with straight edges as h².
+        coarse, fine = (4 * math.pi / 3 - volume for volume, _ in volumes(output, 2))
+        assert 0 < fine < coarse / 12 and coarse < 5e-3, output
+
+
+@needs("mpi4py", "petsc4py", "dolfinx")
+def test_dolfinx_has_curved_tets_and_its_error_falls_as_h3():
+    for ranks, ghost_mode in [(1, "none"), (2, "none"), (3, "shared_facet")]:
+        output = run(ranks, "second_order_dolfinx.py", ghost_mode)
+        volumes(output, 3)
+        errors_of_levels = errors(output)
+        assert math.log2(errors_of_levels[1] / errors_of_levels[2]) > 2.8, output
+        cores = [float(core) for core in re.findall(r"core (\S+)", output)]
+        areas = [(float(a), float(b)) for a, b in re.findall(r"areas (\S+) (\S+)", output)]
+        for core, (interface, skin) in zip(cores, areas, strict=True):
+            assert core == pytest.approx(math.pi / 6, rel=2e-3), output
+            assert (interface, skin) == pytest.approx((math.pi, 4 * math.pi), rel=2e-3), output
+        assert areas[-1] == pytest.approx((math.pi, 4 * math.pi), rel=1e-5), output

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 import numpy as np
 
 from . import _arguments as arguments
-from ._faces import positions
+from ._faces import edge_keys, positions
 from ._mpi import Processes
-from ._parts import Floats, Ids, Ints, Part
+from ._parts import VTK_TET_EDGES, Floats, Ids, Ints, Part
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -81,15 +81,24 @@ def _destinations(part: Part | None, comm: MPI.Intracomm, count: int, by: str) -
     return np.concatenate(ranks)[order].astype(np.int32), offsets.astype(np.int32)
 
 
-def _linear_tets() -> Any:
-    """The domain of linear tets, in the words of the installed version of FEniCS."""
+def _coordinate_element(order: int) -> Any:
+    """The domain of tets of an order, in the words of the installed version of FEniCS."""
     import ufl
 
     try:
         from basix.ufl import element
     except ImportError:
-        return ufl.Mesh(ufl.VectorElement("Lagrange", "tetrahedron", 1))
-    return ufl.Mesh(element("Lagrange", "tetrahedron", 1, shape=(3,)))
+        return ufl.Mesh(ufl.VectorElement("Lagrange", "tetrahedron", order))
+    return ufl.Mesh(element("Lagrange", "tetrahedron", order, shape=(3,)))
+
+
+def _dolfinx_nodes(cell: str, nodes: Ints | Ids) -> Ids:
+    """The nodes of elements in the order of DOLFINx, from that of VTK."""
+    import dolfinx
+
+    kind = getattr(dolfinx.mesh.CellType, cell)
+    permutation = dolfinx.cpp.io.perm_vtk(kind, nodes.shape[1])
+    return np.ascontiguousarray(nodes[:, permutation], dtype=np.int64)
 
 
 def _lists(values: Ints | Ids, *offsets: Ints) -> Any:
@@ -101,7 +110,7 @@ def _lists(values: Ints | Ids, *offsets: Ints) -> Any:
 
 
 def _dolfinx_tags(made: Any, dimension: int, entities: Ids, values: Ints, name: str) -> Any:
-    """Mesh tags from entities by the numbers of their vertices."""
+    """Mesh tags from entities by the numbers of their nodes."""
     import dolfinx
 
     distribute = dolfinx.io.distribute_entity_data
@@ -115,18 +124,12 @@ def _dolfinx_tags(made: Any, dimension: int, entities: Ids, values: Ints, name: 
     return tags
 
 
-def _refuse_second_order(mesh: Mesh, name: str) -> None:
-    if mesh.order != 1:
-        raise ValueError(f"{name} takes meshes of order 1, and this one is of order {mesh.order}")
-
-
 def to_dolfinx(mesh: Mesh, ghost_mode: str = "none") -> DolfinxMesh:
     """See `Mesh.to_dolfinx`."""
     import dolfinx
     from mpi4py import MPI
 
     by = arguments.one_of("ghost_mode", ghost_mode, ("none", *_GHOSTS))
-    _refuse_second_order(mesh, "to_dolfinx")
     comm = MPI.COMM_SELF if mesh.comm is None else mesh.comm
     part = _part(mesh)
     numbers, points = _by_owner(mesh, part, comm)
@@ -140,15 +143,15 @@ def to_dolfinx(mesh: Mesh, ghost_mode: str = "none") -> DolfinxMesh:
         destinations = _lists(ranks, offsets)
         return getattr(destinations, "_cpp_object", destinations)
 
-    given = {"x": points, "partitioner": keep, "e" if "e" in known else "domain": _linear_tets()}
+    given = {"x": points, "partitioner": keep, "e" if "e" in known else "domain": _coordinate_element(mesh.order)}
     if "ghost_mode" in known:
         given["ghost_mode"] = getattr(dolfinx.mesh.GhostMode, by)
-    cells = np.ascontiguousarray(numbers[mesh.tets])
+    cells = _dolfinx_nodes("tetrahedron", numbers[mesh.tet_nodes])
     made = dolfinx.mesh.create_mesh(comm, cells, **given)
     cell_tags = _dolfinx_tags(made, 3, cells, mesh.bodies, "bodies")
     # A face between two parts is in both; it is given by the part that is behind it.
     once = slice(None) if part is None else part.face_bodies[:, 0] != 0
-    faces = np.ascontiguousarray(numbers[mesh.faces[once]])
+    faces = _dolfinx_nodes("triangle", numbers[mesh.face_nodes[once]])
     return DolfinxMesh(made, cell_tags, _dolfinx_tags(made, 2, faces, mesh.face_tags[once], "boundaries"))
 
 
@@ -156,31 +159,78 @@ def to_dmplex(mesh: Mesh) -> Any:
     """See `Mesh.to_dmplex`."""
     from petsc4py import PETSc
 
-    _refuse_second_order(mesh, "to_dmplex")
     comm = PETSc.COMM_SELF if mesh.comm is None else mesh.comm
     part = _part(mesh)
     plex = PETSc.DMPlex().create(comm)
     plex.setDimension(3)
+    # Vertices of the plex are corners; nodes on edges are coordinates only.
+    corners = np.arange(len(mesh.points)) if mesh.order == 1 else np.unique(mesh.tets)
+    vertices = np.full(len(mesh.points), -1)
+    vertices[corners] = np.arange(len(corners))
     # PETSc's tets have the other orientation.
-    cells = np.ascontiguousarray(mesh.tets[:, [0, 2, 1, 3]], dtype=PETSc.IntType)
-    points = np.ascontiguousarray(mesh.points, dtype=PETSc.RealType)
+    cells = np.ascontiguousarray(vertices[mesh.tets[:, [0, 2, 1, 3]]], dtype=PETSc.IntType)
+    points = np.ascontiguousarray(mesh.points[corners], dtype=PETSc.RealType)
     counts = [_petsc_int(count) for count in (len(cells), len(points), 4)]
     _petsc("DMPlexBuildFromCellList", plex, *counts, ctypes.c_void_p(cells.ctypes.data))
     _petsc("DMPlexBuildCoordinatesFromCellList", plex, _petsc_int(3), ctypes.c_void_p(points.ctypes.data))
     if part is not None and mesh.comm is not None:
         # Points of the plex are the cells, then the vertices: each shared one refers to its owner's.
-        numbers = len(cells) + np.arange(len(points))
+        numbers = len(cells) + vertices
         remote = _from_owners(part, mesh.comm, numbers)
-        leaves = np.flatnonzero(part.owners != part.rank)
+        leaves = corners[part.owners[corners] != part.rank]
         pairs = np.stack([part.owners[leaves], remote[leaves]], axis=1)
         forest = PETSc.SF().create(comm)
         local, pairs = numbers[leaves].astype(PETSc.IntType), pairs.ravel().astype(PETSc.IntType)
         forest.setGraph(len(cells) + len(points), local, pairs)
         plex.setPointSF(forest)
     plex.interpolate()
+    edges, faces = _plex_edges_and_faces(plex, len(cells))
     _label(plex, "Cell Sets", np.arange(len(cells)), mesh.bodies)
-    _label(plex, "Face Sets", _plex_faces(plex, len(cells), mesh), mesh.face_tags)
+    first_face = plex.getDepthStratum(2)[0]
+    of_faces = first_face + positions(vertices[mesh.faces], faces, len(points))
+    _label(plex, "Face Sets", of_faces, mesh.face_tags)
+    if mesh.order == 2:
+        _set_edge_nodes(plex, mesh, vertices, edges)
     return plex
+
+
+def _set_edge_nodes(plex: Any, mesh: Mesh, vertices: Ints | Ids, edges: Ints) -> None:
+    """*Collective.* Makes the coordinates a field of degree 2, with the nodes on edges where they are.
+
+    Args:
+        plex: An interpolated plex of the corners.
+        mesh: Its mesh.
+        vertices: The vertex of the plex of each point of the mesh that is a corner.
+        edges: The vertices at the ends of each edge of the plex.
+    """
+    from petsc4py import PETSc
+
+    # Projects the linear coordinates, so that nodes on edges are in their middles at first.
+    element = PETSc.FE().createLagrange(3, 3, True, 2, PETSc.DETERMINE, comm=plex.comm)
+    # The name and the arguments changed between versions 3.18 and 3.25.
+    if hasattr(plex, "projectCoordinates"):
+        plex.projectCoordinates(element)
+    else:
+        try:
+            plex.setCoordinateDisc(element, localized=False, project=True)
+        except TypeError:
+            plex.setCoordinateDisc(element, project=True)
+    element.destroy()
+    section, coordinates = plex.getCoordinateSection(), plex.getCoordinatesLocal()
+    count = int(vertices.max(initial=-1)) + 1
+    nodes = np.empty(len(edges), dtype=np.int64)
+    keys = edge_keys(edges, count)
+    order = np.argsort(keys)
+    for place, ends in enumerate(VTK_TET_EDGES):
+        wanted = edge_keys(vertices[mesh.tets[:, ends]], count)
+        nodes[order[np.searchsorted(keys[order], wanted)]] = mesh.tet_nodes[:, 4 + place]
+    first = plex.getDepthStratum(1)[0]
+    offsets = np.array([section.getOffset(first + edge) for edge in range(len(edges))], dtype=np.int64)
+    values = coordinates.array.reshape(-1, 3)
+    values[offsets // 3] = mesh.points[nodes]
+    coordinates.array = values.ravel()
+    # The global coordinates are made again from the local ones.
+    plex.setCoordinatesLocal(coordinates)
 
 
 def _petsc_int(value: int) -> Any:
@@ -198,8 +248,8 @@ def _petsc(function: str, plex: Any, *arguments: Any) -> None:
         raise PETSc.Error(code)
 
 
-def _plex_faces(plex: Any, cells: int, mesh: Mesh) -> Ids:
-    """The point of the plex that each face of the mesh is."""
+def _plex_edges_and_faces(plex: Any, cells: int) -> tuple[Ints, Ints]:
+    """The vertices of all edges and faces of an interpolated plex, in its order; vertices follow the cells."""
     from petsc4py import PETSc
 
     # The points of all cones, in the order of the points that have them.
@@ -211,11 +261,10 @@ def _plex_faces(plex: Any, cells: int, mesh: Mesh) -> Ids:
     cones = np.ctypeslib.as_array(pointer, (sum(lengths),)) if sum(lengths) else np.empty(0, PETSc.IntType)
     split = np.split(cones, np.cumsum(lengths)[:-1])
     by_depth = {depth: part.reshape(-1, sizes[depth]) for part, (_, _, depth) in zip(split, strata)}
-    first_edge, first_face = plex.getDepthStratum(1)[0], plex.getDepthStratum(2)[0]
+    edges = by_depth[1] - cells
     # The edges of a face have each vertex twice.
-    ends = by_depth[1][by_depth[2] - first_edge].reshape(-1, 6) - cells
-    found: Ids = first_face + positions(mesh.faces, np.sort(ends, axis=1)[:, ::2], len(mesh.points))
-    return found
+    ends = edges[by_depth[2] - plex.getDepthStratum(1)[0]].reshape(-1, 6)
+    return edges, np.sort(ends, axis=1)[:, ::2]
 
 
 def _label(plex: Any, name: str, points: Ids, values: Ints) -> None:

@@ -1,4 +1,4 @@
-"""Triangles found among others by their vertices."""
+"""Triangles and edges found among others by their vertices."""
 
 from __future__ import annotations
 
@@ -13,6 +13,13 @@ def _keys(triangles: NDArray[Any], vertices: int) -> NDArray[Any]:
     a, b, c = np.sort(triangles.astype(np.int64), axis=1).T
     # Two vertices as one number; three would overflow.
     return np.rec.fromarrays([a * vertices + b, c])
+
+
+def edge_keys(edges: NDArray[Any], vertices: int) -> NDArray[np.int64]:
+    """One number for each edge, whatever the order of its ends."""
+    first, second = np.sort(edges.astype(np.int64), axis=1).T
+    keys: NDArray[np.int64] = first * vertices + second
+    return keys
 
 
 def positions(wanted: NDArray[Any], among: NDArray[Any], vertices: int) -> NDArray[np.intp]:

@@ -297,6 +297,7 @@ class Geometry:
         coarse: float | None = None,
         pieces: int | None = None,
         nested: bool = False,
+        refine: int = 0,
         order: Literal[1, 2] = 1,
         allow_off_surface: bool = False,
         effort: Literal["quick", "standard", "careful", "thorough"] | None = None,
@@ -334,6 +335,8 @@ class Geometry:
             coarse: Number of coarse tets, to 1.5 times as many.
             pieces: Split each coarse edge into this many, so each coarse tet into its cube.
             nested: Make the tets of each level lie in those of the level before.
+            refine: Levels of refinement of the tets that the ranks made (methods "surface" and
+                "decompose"); all sizes are those before.
             order: 2 for tets of ten nodes, curved along the geometry; each is proved valid.
             allow_off_surface: With order 2, leave edges straight where the tets beside them would
                 not be valid otherwise; `report` lists them.
@@ -370,6 +373,7 @@ class Geometry:
                 "elements": arguments.count("tets", tets),
                 "pieces": 2**exponent if pieces is None else arguments.whole("pieces", pieces, 1, _MOST_PIECES),
                 "nested": bool(nested),
+                "refine": arguments.whole("refine", refine, 0, _MOST_LEVELS),
                 "order": arguments.whole("order", order, 1, 2),
                 "allow_off_surface": bool(allow_off_surface),
                 "planes": arguments.one_of("planes", planes, _PLANES),

@@ -21,7 +21,8 @@ if TYPE_CHECKING:
 
     from ._distributed import DolfinxMesh
 
-_FORMATS = ("elmer", "vtu", "msh", "medit", "vol", "inp", "mfem", "hdf5", "geomview")
+_FORMATS = ("elmer", "vtu", "msh", "msh4", "msh4-parts", "medit", "vol", "inp", "mfem", "hdf5", "geomview")
+_GMSH4 = ("msh4", "msh4-parts")
 _ENDINGS = {
     ".vtu": "vtu",
     ".pvtu": "vtu",
@@ -264,11 +265,15 @@ class Mesh:
     def write(
         self,
         path: str | os.PathLike[str],
-        format: Literal["elmer", "vtu", "msh", "medit", "vol", "inp", "mfem", "hdf5", "geomview"] | None = None,
+        format: Literal[
+            "elmer", "vtu", "msh", "msh4", "msh4-parts", "medit", "vol", "inp", "mfem", "hdf5", "geomview"
+        ]
+        | None = None,
         *,
         boundary: Literal["beside", "in"] = "beside",
         halo: Literal["faces", "vertices"] | None = None,
         adjacency: bool = False,
+        ascii: bool = False,
         progress: Callable[[str, float], object] | None = None,
     ) -> Written:
         """Writes the mesh. Existing files are replaced when all is written.
@@ -277,12 +282,14 @@ class Mesh:
             path: A file, whose ending selects the format: .vtu (also .pvtu), .msh (Gmsh), .mesh
                 (Medit), .vol (NETGEN), .inp (Abaqus, CalculiX), .off (the boundary alone). A folder for "elmer". For "mfem" the files
                 `path.000000` and so on, one for each part, which MFEM's `ParMesh` reads. For "hdf5" the files
-                `path.h5` and `path.xdmf` with all parts.
+                `path.h5` and `path.xdmf` with all parts. Gmsh 4.1 with partitions is a file for "msh4", and the files
+                `path_1.msh` and so on, one for each part, for "msh4-parts".
             format: The format, whatever the ending.
             boundary: Where VTU stores boundary triangles: "beside" in files of their own, "in" the
                 same file.
-            halo: Write one layer of neighbouring tets with each part (Elmer and VTU).
+            halo: Write one layer of neighbouring tets with each part (Elmer, VTU and Gmsh 4.1).
             adjacency: Write edges, faces and the lists of what they and vertices belong to (HDF5).
+            ascii: Write files of Gmsh 4.1 as text instead of binary.
             progress: Called with the name of a stage and its progress, 0 to 1.
         """
         from ._geometry import warn
@@ -296,14 +303,17 @@ class Mesh:
             chosen = _ENDINGS[ending]
         else:
             chosen = arguments.one_of("format", format, _FORMATS)
-        if halo is not None and chosen not in ("elmer", "vtu"):
-            raise ValueError(f"the format {chosen} has no halo elements; write elmer or vtu")
+        if halo is not None and chosen not in ("elmer", "vtu", *_GMSH4):
+            raise ValueError(f"the format {chosen} has no halo elements; write elmer, vtu, msh4 or msh4-parts")
         if adjacency and chosen != "hdf5":
             raise ValueError(f"the format {chosen} holds no adjacency; write hdf5")
+        if ascii and chosen not in _GMSH4:
+            raise ValueError("ascii: only Gmsh 4.1 is text or binary; write msh4 or msh4-parts")
         target = {
             "path": name,
             "format": chosen,
             "inside": arguments.one_of("boundary", boundary, ("beside", "in")) == "in",
+            "ascii": bool(ascii),
             "halo": None if halo is None else arguments.one_of("halo", halo, ("faces", "vertices")),
             "adjacency": bool(adjacency),
         }
@@ -417,7 +427,8 @@ class Mesh:
         """A mesh of DOLFINx with its tags, on `comm` or in this process alone. *Collective.*
 
         Each tet stays in its process. Tags are the numbers of bodies and boundaries, which
-        `numbers_named` finds. Versions 0.5 and later.
+        `numbers_named` finds. A mesh of order 2 has coordinate elements of degree 2. Versions 0.5
+        and later.
 
         Args:
             ghost_mode: Which cells of other processes are ghosts, by DOLFINx's names.
@@ -432,6 +443,9 @@ class Mesh:
         Each tet stays in its process. The labels "Cell Sets" and "Face Sets" have the numbers of
         bodies and boundaries, which `numbers_named` finds. A face of a boundary has its label in
         each process that has the face; `DMPlex.labelComplete` adds edges and vertices.
+
+        In a mesh of order 2 the vertices of the plex are the corners of the tets, in the sequence
+        of `points`, and its coordinates are a field of degree 2 on vertices and edges.
         """
         from ._distributed import to_dmplex
 

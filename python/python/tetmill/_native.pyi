@@ -46,6 +46,7 @@ class Geometry:
 def generate(geometry: Geometry | None, options: dict[str, Any]) -> Mesh: ...
 
 class PartArrays:
+    order: int
     points: NDArray[np.float64]
     vertex_ids: NDArray[np.int64]
     tets: NDArray[np.int32]

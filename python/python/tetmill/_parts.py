@@ -22,13 +22,15 @@ Block = _native.Block
 Ghosts = _native.PartGhosts
 
 
+#: The ends of the edges of a tet in the order of VTK.
+VTK_TET_EDGES = [[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]]
 #: Where VTK's nodes on the edges of a tet are in the order of the library: 01 02 03 12 13 23.
 _VTK_EDGES = [0, 3, 1, 2, 4, 5]
 
 
-def _with_edges(corners: Ints, edges: Ints) -> Ints:
+def _with_edges(order: int, corners: Ints, edges: Ints) -> Ints:
     """The corners of elements and the nodes on their edges; the corners alone in a mesh of order 1."""
-    if len(edges) < len(corners) or not len(corners):
+    if order == 1:
         return corners
     nodes = np.concatenate([corners, edges], axis=1)
     nodes.flags.writeable = False
@@ -101,13 +103,13 @@ class _Local:
     def tet_nodes(self) -> Ints:
         """All nodes of each tet, (m, 10) in a mesh of order 2: the corners, and then the nodes on the
         edges 01 12 02 03 13 23, the order of VTK, Abaqus and meshio. In order 1 the same as `tets`."""
-        return _with_edges(self.tets, self._arrays.tet_edge_nodes[:, _VTK_EDGES])
+        return _with_edges(self._arrays.order, self.tets, self._arrays.tet_edge_nodes[:, _VTK_EDGES])
 
     @cached_property
     def face_nodes(self) -> Ints:
         """All nodes of each face, (k, 6) in a mesh of order 2: the corners, and then the nodes on the
         edges 01 12 20. In order 1 the same as `faces`."""
-        return _with_edges(self.faces, self._arrays.face_edge_nodes)
+        return _with_edges(self._arrays.order, self.faces, self._arrays.face_edge_nodes)
 
     @cached_property
     def bodies(self) -> Ints:
