@@ -367,8 +367,8 @@ tetmill_status tetmill_part_ghost_owners(const tetmill_part *part,
  * The number of refinement levels of a part, the coarse mesh and the part itself included.
  *
  * TETMILL_STATUS_USAGE unless the parts were refined (the method `refine`, or the option `refine`)
- * and the elements are of order 1. The
- * levels are made now: the coarser ones have a seventh of the part's tets together.
+ * and the elements are of order 1. The levels are made now: the coarser ones have a seventh of the
+ * part's tets together.
  */
 tetmill_status tetmill_part_level_count(const tetmill_part *part, size_t *count);
 

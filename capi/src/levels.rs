@@ -25,7 +25,7 @@ impl Part {
             self.levels.get_or_init(|| levels);
         }
         let levels = self.levels.get().and_then(Option::as_deref);
-        levels.ok_or_else(|| Fault::usage("only parts that were refined, by the method `refine` or the option `refine`, and are of order 1 have levels"))
+        levels.ok_or_else(|| Fault::usage("only parts that were refined, of order 1, have levels"))
     }
 
     fn all_parents(&self) -> Result<&Parents, Fault> {
@@ -42,8 +42,8 @@ impl Part {
 /// The number of refinement levels of a part, the coarse mesh and the part itself included.
 ///
 /// TETMILL_STATUS_USAGE unless the parts were refined (the method `refine`, or the option `refine`)
-/// and the elements are of order 1. The
-/// levels are made now: the coarser ones have a seventh of the part's tets together.
+/// and the elements are of order 1. The levels are made now: the coarser ones have a seventh of the
+/// part's tets together.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn tetmill_part_level_count(part: Option<&Part>, count: *mut usize) -> Status {
     // SAFETY: the contract of the header.

@@ -70,21 +70,15 @@ pub(super) fn mesh_pieces(
     let wanted = settings.before_refinement();
     let planned = model.map(|model| plan_cuts(comm.size(), model, cuts, &settings.coarse, wanted, progress));
     let planned = comm.agree(planned.transpose())?;
-    let mut numbers = planned
-        .as_ref()
-        .map_or(vec![0, 0], |planned| vec![u64::from(planned.pieces), planned.coarse.mesh.tets.len() as u64]);
-    comm.broadcast(0, &mut numbers)?;
-    let [pieces, tets] = numbers[..] else { panic!("rank 0 sent two numbers") };
-    let wanted_sizes = model.zip(planned.as_ref()).map(|(model, planned)| {
-        let field = model.size_field(&settings.coarse.size);
-        skin::at_vertices(&planned.coarse.mesh, field.as_deref(), planned.pieces)
+    let mut numbers = planned.as_ref().map_or(vec![0.0, 0.0], |planned| {
+        let expected = skin::expected_tets(&planned.coarse.mesh, &planned.sizes).iter().sum();
+        vec![f64::from(planned.pieces), expected]
     });
-    let mut goal = Goal::new(wanted.0, tets * pieces.pow(3));
+    comm.broadcast(0, &mut numbers)?;
+    let [pieces, expected] = numbers[..] else { panic!("rank 0 sent two numbers") };
+    let mut goal = Goal::new(wanted.0, expected);
     loop {
-        let skins = planned.as_ref().zip(wanted_sizes.as_ref()).map(|(planned, sizes)| {
-            let sizes: Vec<f64> = sizes.iter().map(|size| goal.scale * size).collect();
-            planned.skins(comm.size(), &sizes, progress)
-        });
+        let skins = planned.as_ref().map(|planned| planned.skins(comm.size(), goal.scale, progress));
         let skins = comm.agree(skins.transpose())?;
         let mut boundary = vec![skins.as_ref().map_or(0, |skins| skins.boundary)];
         comm.broadcast(0, &mut boundary)?;
@@ -114,6 +108,8 @@ pub struct Planned {
     coarse: CoarseMesh,
     /// Subdivisions of each coarse edge.
     pieces: u32,
+    /// The sizes of the fine mesh at the vertices of the coarse one.
+    sizes: Vec<f64>,
     outcome: Option<Outcome>,
 }
 
@@ -163,7 +159,7 @@ fn plan_cuts(
             settings.plan = decompose::PlanSettings { seed, through_corners: seed == 0, ..settings.plan };
             let cuts = plan(&statistics, parts, &settings)?;
             match CutModel::new(whole, &cuts, candidates(&coarse.mesh, &cuts)) {
-                Ok(model) => return Ok(Planned { cuts, model, coarse, pieces, outcome }),
+                Ok(model) => return Ok(Planned { cuts, model, coarse, pieces, sizes, outcome }),
                 // Other planes may work.
                 Err(_) if settings.planes.is_empty() && seed + 1 < MOST_PLANS => {}
                 Err(error) => return Err(error.into()),
@@ -198,15 +194,16 @@ impl Planned {
 }
 
 impl Planned {
-    /// Meshes the skins of the pieces by the sizes at the vertices of the coarse mesh.
-    fn skins(&self, parts: u32, vertex_sizes: &[f64], progress: &Progress) -> Result<Skins, Error> {
+    /// Meshes the skins of the pieces by the sizes times a scale.
+    fn skins(&self, parts: u32, scale: f64, progress: &Progress) -> Result<Skins, Error> {
         let mesh = &self.coarse.mesh;
-        let sizes = PartSizes::new(mesh.points.clone(), mesh.tets.clone(), vertex_sizes.to_vec());
+        let vertex_sizes: Vec<f64> = self.sizes.iter().map(|size| scale * size).collect();
+        let sizes = PartSizes::new(mesh.points.clone(), mesh.tets.clone(), vertex_sizes.clone());
         let surface = progress.stage(Stage::Surface, |_| fine_surface(&self.model.model, &sizes))?;
         let skins = decompose::skins(&self.model, &surface, parts as usize).map_err(RequestError::from)?;
         let message = |skin: &Skin| {
             let mut message = decompose::pack(skin);
-            pack_sizes(&mut message, skin, mesh, vertex_sizes);
+            pack_sizes(&mut message, skin, mesh, &vertex_sizes);
             message
         };
         let boundary = surface.triangles.iter().filter(|t| self.model.is_old(t.patch)).count() as u64;

@@ -4,8 +4,9 @@
 use super::settings::Wanted;
 use crate::ground::comm::{CommError, Communicator};
 
-/// The number to aim at relative to the requested one, which is the least that is accepted.
-const AIM: f64 = 1.13;
+/// The number to aim at relative to the requested one, which is the least that is accepted. Seven
+/// geometries of 10⁵ and 10⁶ tets get 0.87 to 1.04 of the expected number.
+const AIM: f64 = 1.15;
 
 /// The most tets that are accepted, relative to the requested number.
 const MOST: f64 = 1.3;
@@ -23,12 +24,12 @@ pub(super) struct Goal {
 
 impl Goal {
     /// The goal of a run. With the sizes as they are, `expected` tets are expected.
-    pub fn new(wanted: Wanted, expected: u64) -> Self {
+    pub fn new(wanted: Wanted, expected: f64) -> Self {
         let count = match wanted {
             Wanted::Elements(count) => Some(count),
             Wanted::Sizes { .. } | Wanted::Coarse { .. } => None,
         };
-        let scale = count.map_or(1.0, |count| (expected as f64 / (AIM * count as f64)).cbrt());
+        let scale = count.map_or(1.0, |count| (expected / (AIM * count as f64)).cbrt());
         Self { count, tries: 0, scale }
     }
 
@@ -60,7 +61,7 @@ mod tests {
     fn sizes_are_scaled_until_the_number_is_reached() {
         let comm = thread::alone();
         let made = |scale: f64| (1.5 * 8000.0 / scale.powi(3)) as usize;
-        let mut goal = Goal::new(Wanted::Elements(1000), 8000);
+        let mut goal = Goal::new(Wanted::Elements(1000), 8000.0);
         assert!(!goal.is_reached(&comm, made(goal.scale)).unwrap());
         assert!(goal.is_reached(&comm, made(goal.scale)).unwrap());
         assert!((1000..1300).contains(&made(goal.scale)));
@@ -69,10 +70,10 @@ mod tests {
     #[test]
     fn a_number_out_of_reach_ends_after_some_tries_and_sizes_alone_are_kept() {
         let comm = thread::alone();
-        let mut goal = Goal::new(Wanted::Elements(1000), 1000);
+        let mut goal = Goal::new(Wanted::Elements(1000), 1000.0);
         let tries = (1..).find(|_| goal.is_reached(&comm, 5000).unwrap());
         assert_eq!(tries, Some(TRIES));
-        let mut goal = Goal::new(Wanted::Sizes { pieces: 2 }, 8000);
+        let mut goal = Goal::new(Wanted::Sizes { pieces: 2 }, 8000.0);
         assert!(goal.is_reached(&comm, 1).unwrap() && goal.scale == 1.0);
     }
 }

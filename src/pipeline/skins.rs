@@ -29,7 +29,9 @@ pub(super) fn mesh_skins(
     progress: &Progress,
 ) -> Result<(BareMesh, Refused, Option<DeliveredSizes>), Error> {
     let mut sizes = PartSizes::new(dist.points.clone(), dist.tets.clone(), skin::scatter(comm, dist, sizes)?);
-    let mut goal = Goal::new(wanted, dist.totals.tets * u64::from(pieces).pow(3));
+
+    let expected: f64 = comm.all_gather_one(sizes.expected_tets())?.into_iter().sum();
+    let mut goal = Goal::new(wanted, expected);
     let agree = |made: Result<_, RefineError>| comm.agree(made.map_err(Error::from));
     let (skin, filled, delivered) = progress.stage(Stage::Fill, |_| {
         let skin = agree(skin::skin(dist, projector, pieces))?;

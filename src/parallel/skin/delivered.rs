@@ -3,12 +3,11 @@
 use super::{Filled, PartSizes, Skin};
 use crate::Point;
 use crate::ground::comm::{CommError, Communicator};
-use crate::ground::mesh::VertexId;
-use crate::ground::mesh::topology;
+use crate::ground::mesh::TET_EDGES;
 use crate::ground::size::SizeField;
 
-/// Edge lengths divided by the size field at the middles of the edges, over every k-th edge of each
-/// part. Edges between parts are edges of each.
+/// Edge lengths divided by the size field at the middles of the edges, over the edges of every k-th
+/// tet of each part.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct DeliveredSizes {
     /// The mean ratio.
@@ -24,8 +23,8 @@ const CLASSES: usize = 1024;
 const STEP: f64 = 0.01;
 const MIDDLE: f64 = (CLASSES / 2) as f64;
 
-/// About as many edges of each part are measured; each needs a search in the coarse mesh.
-const SAMPLES: usize = 10_000;
+/// About as many tets of each part are measured; each edge needs a search in the coarse mesh.
+const SAMPLES: usize = 2_000;
 
 /// **Collective.** Measures the edges of filled parts; `None` if no part has tets.
 ///
@@ -37,20 +36,16 @@ pub fn delivered(
     filled: &Filled,
     sizes: &PartSizes,
 ) -> Result<Option<DeliveredSizes>, CommError> {
-    let tets: Vec<[VertexId; 4]> = filled.tets.iter().map(|tet| tet.map(VertexId)).collect();
-    let points: Vec<Point> =
-        skin.points.iter().copied().chain(filled.inside.iter().map(|&p| p.into())).collect();
-    let edges = topology::edges(points.len(), &tets).edges;
-    let ratio = |[a, b]: [VertexId; 2]| {
-        let [p, q] = [a, b].map(|v| points[v.index()]);
-        (p - q).norm() / sizes.size_at(&nalgebra::center(&p, &q))
-    };
+    let inside = |v: usize| Point::from(filled.inside[v - skin.points.len()]);
+    let point = |v: u32| skin.points.get(v as usize).copied().unwrap_or_else(|| inside(v as usize));
     let class = |ratio: f64| (ratio.ln() / STEP + MIDDLE).clamp(0.0, (CLASSES - 1) as f64) as usize;
     let (mut sum, mut counts) = (0.0, [0; CLASSES]);
-    for &edge in edges.iter().step_by((edges.len() / SAMPLES).max(1)) {
-        let ratio = ratio(edge);
-        sum += ratio;
-        counts[class(ratio)] += 1;
+    for tet in filled.tets.iter().step_by((filled.tets.len() / SAMPLES).max(1)) {
+        for [p, q] in TET_EDGES.map(|edge| edge.map(|k| point(tet[k]))) {
+            let ratio = (p - q).norm() / sizes.size_at(&nalgebra::center(&p, &q));
+            sum += ratio;
+            counts[class(ratio)] += 1;
+        }
     }
     let counts = comm.all_reduce_sum_u64(counts)?;
     let sum: f64 = comm.all_gather_one(sum)?.into_iter().sum();
@@ -71,6 +66,7 @@ pub fn delivered(
 mod tests {
     use super::*;
     use crate::ground::comm::thread;
+    use crate::ground::mesh::VertexId;
 
     /// A corner of a cube: three edges of length 1, three of √2.
     #[test]

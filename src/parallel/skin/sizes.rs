@@ -57,6 +57,11 @@ impl PartSizes {
         self.sizes.iter_mut().for_each(|size| *size *= factor);
     }
 
+    /// The number of tets of these sizes that the part will have.
+    pub fn expected_tets(&self) -> f64 {
+        expected_tets_of(&self.points, &self.coarse, &self.sizes).sum()
+    }
+
     /// The coarse tet that contains a point, or the nearest one (near a curved boundary the refined
     /// skin is outside the coarse tets). `None` if there are no tets.
     pub fn tet_at(&self, point: &Point) -> Option<u32> {
@@ -106,14 +111,21 @@ pub fn at_vertices(mesh: &Mesh, field: Option<&dyn SizeField>, pieces: u32) -> V
 
 /// The numbers of tets of the given sizes that each tet will become; `sizes` are those at vertices.
 pub fn expected_tets(mesh: &Mesh, sizes: &[f64]) -> Vec<f64> {
+    expected_tets_of(&mesh.points, &mesh.tets, sizes).collect()
+}
+
+fn expected_tets_of<'a>(
+    points: &'a [Point],
+    tets: &'a [[VertexId; 4]],
+    sizes: &'a [f64],
+) -> impl Iterator<Item = f64> + 'a {
     /// Regular tets of edge length 1 in a unit of volume.
     const DENSITY: f64 = 6.0 * std::f64::consts::SQRT_2;
-    let expected = |tet: &[VertexId; 4]| {
-        let [a, b, c, d] = tet.map(|v| mesh.points[v.index()]);
+    tets.iter().map(move |tet| {
+        let [a, b, c, d] = tet.map(|v| points[v.index()]);
         let density = tet.iter().map(|v| sizes[v.index()].powi(-3)).sum::<f64>() / 4.0;
         DENSITY * density * volume6(&a, &b, &c, &d).abs() / 6.0
-    };
-    mesh.tets.iter().map(expected).collect()
+    })
 }
 
 /// **Collective.** Sends each rank the values of rank 0 for the vertices of its part.
