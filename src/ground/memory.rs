@@ -1,6 +1,7 @@
 //! Memory and time used by this process, and memory available on the machine.
 
 use crate::ground::comm::{CommError, Communicator};
+use bytemuck::Pod;
 use std::cell::Cell;
 
 thread_local! {
@@ -79,13 +80,17 @@ pub fn machine() -> String {
     std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default()
 }
 
-/// **Collective.** The sum of the bytes of all ranks on this machine.
-pub fn on_machine(comm: &dyn Communicator, bytes: u64) -> Result<u64, CommError> {
+/// **Collective.** The sums of the bytes of all ranks on this machine.
+pub fn on_machine<const N: usize>(comm: &dyn Communicator, bytes: [u64; N]) -> Result<[u64; N], CommError>
+where
+    [u64; N]: Pod,
+{
     let machine = machine();
     let machines = comm.all_gather_bytes(machine.as_bytes())?;
     let of_ranks = comm.all_gather_one(bytes)?;
     let here = machines.iter().zip(&of_ranks).filter(|(name, _)| **name == machine.as_bytes());
-    Ok(here.map(|(_, bytes)| bytes).sum())
+    let add = |sums: [u64; N], more: &[u64; N]| std::array::from_fn(|k| sums[k] + more[k]);
+    Ok(here.map(|(_, bytes)| bytes).fold([0; N], add))
 }
 
 /// Formats bytes with a suitable unit.

@@ -14,7 +14,7 @@ use super::retries::{Budget, CORRECTIONS};
 use super::room;
 use super::settings::Wanted;
 use super::settings::{CutSettings, GenerateSettings};
-use super::skins::refuse_periodic;
+use super::skins::{refuse_periodic, wanted_sizes};
 use super::target::Outcome;
 use super::wanted::mesh_as_wanted;
 use crate::ground::comm::Communicator;
@@ -150,8 +150,7 @@ fn plan_cuts(
         mesh_as_wanted(parts, model, settings, (wanted, refined), &[], &budget, work)
     })?;
     progress.stage(Stage::Cut, |_| {
-        let field = model.size_field(&settings.size);
-        let sizes = skin::at_vertices(&coarse.mesh, field.as_deref(), pieces);
+        let sizes = wanted_sizes(model, &coarse.mesh, &settings.size, pieces);
         let expected = skin::expected_tets(&coarse.mesh, &sizes);
         let statistics = CutStatistics::of(&coarse.mesh, whole, &expected, pieces, parts)?;
         let mut settings = cuts.clone();

@@ -43,10 +43,7 @@ pub(super) fn fill(
     size.work().proceed()?;
     size.work().step(VOLUME_SHARE, 1.0, 1);
     let settings = improve::Settings::of(effort.unwrap_or_else(|| effort_for(mesh.tets.len())));
-    let improved = match smoothness {
-        Some(smoothness) => improve::make_refinable(&mut mesh, size, smoothness, &settings),
-        None => improve::improve(&mut mesh, size, &settings),
-    };
+    let improved = improve::improve_for(&mut mesh, size, smoothness, &settings);
     size.work().proceed()?;
     let report = CoarseReport {
         vertices: mesh.points.len() as u64,

@@ -90,6 +90,8 @@ pub fn generate(
 struct Parts<'a> {
     model: Option<&'a Model>,
     coarse: Option<CoarseResult>,
+    /// See [`Coarse::sizes`].
+    sizes: Option<Vec<f64>>,
     dist: DistMesh,
     projector: Projector,
     names: Names,
@@ -107,22 +109,18 @@ fn coarse_parts<'a>(
     progress: &Progress,
 ) -> Result<Parts<'a>, Error> {
     let made = model.map(|model| coarse_mesh(comm.size(), model, settings, sources, budget, progress));
-    let (pieces, coarse) = comm.agree(made.transpose())?.unzip();
-    let pieces = broadcast::pieces(comm, pieces)?;
+    let made = comm.agree(made.transpose())?;
+    let pieces = broadcast::pieces(comm, made.as_ref().map(|made| made.pieces))?;
+    let (coarse, sizes) = made.map(|made| (made.result, made.sizes)).unzip();
     let (names, projector) = broadcast::geometry(comm, model)?;
     let given = coarse.as_ref().map(|made| (made.mesh.clone(), made.parts.clone()));
     let dist = progress.stage(Stage::Distribute, |_| distribution::distribute(comm, given))?;
-    let fits = room::refuse_oversized(
-        comm.rank(),
-        &dist,
-        (pieces << settings.refine, settings.coarse.order),
-        settings.disk.as_ref(),
-    );
+    let fineness = (pieces << settings.refine, settings.coarse.order);
+    let fits = room::refuse_oversized(comm.rank(), &dist, fineness, settings.disk.as_ref());
     comm.agree(fits.map_err(Error::from))?;
     let of_tet = settings.disk.as_ref().map_or(0, |disk| disk.memory_of_tet);
-    let fineness = (pieces, settings.coarse.order);
     room::refuse_crowded(comm, &dist, fineness, of_tet, settings.memory)?;
-    Ok(Parts { model, coarse, dist, projector, names, pieces })
+    Ok(Parts { model, coarse, sizes: sizes.flatten(), dist, projector, names, pieces })
 }
 
 /// The result of refining a coarse mesh.
@@ -142,7 +140,7 @@ fn refined(
     may_lower: bool,
     progress: &Progress,
 ) -> Result<Refined, Error> {
-    let Parts { model, mut coarse, dist, projector, names, pieces } = parts;
+    let Parts { model, mut coarse, dist, projector, names, pieces, .. } = parts;
     let plan = lattice::Plan {
         projector: &projector,
         pieces,
@@ -187,18 +185,15 @@ fn fill(
     settings: &GenerateSettings,
     progress: &Progress,
 ) -> Result<Generated, Error> {
-    let Parts { model, coarse, dist, projector, names, pieces } = parts;
+    let Parts { model, coarse, sizes, dist, projector, names, pieces } = parts;
     comm.agree(skins::refuse_periodic(model).map_err(Error::from))?;
     if matches!(model, Some(Model::Given(given)) if !given.links.is_empty()) {
         progress.note("the method `surface` keeps no periodic faces: those of the mesh are like others");
     }
-    let sizes = model
-        .zip(coarse.as_ref())
-        .map(|(model, coarse)| skins::wanted_sizes(model, &coarse.mesh, settings, pieces));
     let (part, refused, delivered) = {
-        let wanted = settings.before_refinement().0;
-        let (settings, smoothness) = improvement(settings, &projector);
-        let how = Improvement { settings: &settings, smoothness: smoothness.as_deref() };
+        let (wanted, _) = settings.before_refinement();
+        let smoothness = smoothness_if_refined(settings, &projector);
+        let how = Improvement { settings: &of_effort(settings), smoothness: smoothness.as_deref() };
         skins::mesh_skins(comm, &dist, (&projector, pieces), sizes.as_deref(), wanted, how, progress)?
     };
     // The boundary is that of the method `refine`, without lines where cuts meet it.
@@ -207,14 +202,18 @@ fn fill(
     stored(comm, part, whole, merge_angle, settings, progress)
 }
 
-/// How the tets of separately meshed parts are improved.
-fn improvement<'a>(
+/// How carefully the tets of separately meshed parts are improved.
+fn of_effort(settings: &GenerateSettings) -> improve::Settings {
+    improve::Settings::of(settings.coarse.effort.unwrap_or(Effort::Standard))
+}
+
+/// The smoothness of the geometry, if separately meshed parts will be refined or curved.
+fn smoothness_if_refined<'a>(
     settings: &GenerateSettings,
     projector: &'a Projector,
-) -> (improve::Settings, Option<Box<dyn Smoothness + 'a>>) {
-    let effort = settings.coarse.effort.unwrap_or(Effort::Standard);
+) -> Option<Box<dyn Smoothness + 'a>> {
     let are_refined = settings.refine > 0 || settings.coarse.order == Order::Second;
-    (improve::Settings::of(effort), are_refined.then(|| smoothness(projector)).flatten())
+    are_refined.then(|| smoothness(projector)).flatten()
 }
 
 /// **Collective.** Meshes the pieces of the geometry.
@@ -227,8 +226,8 @@ fn decomposed(
 ) -> Result<Generated, Error> {
     let (names, projector) = broadcast::geometry(comm, model)?;
     let decompose::Pieces { part, pieces, delivered, coarse } = {
-        let (improve, smoothness) = improvement(settings, &projector);
-        let how = Improvement { settings: &improve, smoothness: smoothness.as_deref() };
+        let smoothness = smoothness_if_refined(settings, &projector);
+        let how = Improvement { settings: &of_effort(settings), smoothness: smoothness.as_deref() };
         decompose::mesh_pieces(comm, model, cuts, settings, how, progress)?
     };
     let whole = Whole { model, names, projector, pieces, coarse, refused: None, delivered };
@@ -258,7 +257,7 @@ fn stored(
 ) -> Result<Generated, Error> {
     let Whole { model, names, projector, pieces, coarse, refused, delivered } = whole;
     let (part, across) = progress.stage(Stage::Interfaces, |_| {
-        let (_, smoothness) = improvement(settings, &projector);
+        let smoothness = smoothness_if_refined(settings, &projector);
         let across = interfaces::Settings { merge_angle, ..interfaces::Settings::default() };
         interfaces::improve_across(comm, part, &across, smoothness.as_deref())
     })?;
@@ -311,7 +310,16 @@ fn stored(
     Ok(made(part, pieces << settings.refine, levels, (check, checksum), straight, Some(refinement)))
 }
 
-/// Makes and partitions the coarse mesh; also returns the subdivisions of its edges.
+/// A partitioned coarse mesh.
+struct Coarse {
+    /// Subdivisions of each edge.
+    pieces: u32,
+    result: CoarseResult,
+    /// For the method `surface`, the wanted sizes at the vertices.
+    sizes: Option<Vec<f64>>,
+}
+
+/// Makes and partitions the coarse mesh.
 fn coarse_mesh(
     parts: u32,
     model: &Model,
@@ -319,19 +327,19 @@ fn coarse_mesh(
     sources: &[Source],
     budget: &Budget,
     progress: &Progress,
-) -> Result<(u32, CoarseResult), Error> {
+) -> Result<Coarse, Error> {
     options::refuse_unresolved(model, &settings.coarse.size)?;
     room::refuse_too_fine(model, &settings.coarse.size, settings.memory)?;
     let (pieces, made, outcome) = progress.stage(Stage::Mesh, |work| {
         mesh_as_wanted(parts, model, &settings.coarse, settings.before_refinement(), sources, budget, work)
     })?;
     let map = periodic_map(model, &made.mesh)?;
+    let sizes = (settings.method == Method::Surface)
+        .then(|| skins::wanted_sizes(model, &made.mesh, &settings.coarse.size, pieces));
     let (assigned, metrics) = progress.stage(Stage::Partition, |_| {
         let ties = if parts > 1 { partition::periodic_ties(&made.mesh, &map) } else { Ties::default() };
         // Parts of the method `surface` will have the tets that the sizes require.
-        let weights = (settings.method == Method::Surface).then(|| {
-            skin::expected_tets(&made.mesh, &skins::wanted_sizes(model, &made.mesh, settings, pieces))
-        });
+        let weights = sizes.as_ref().map(|sizes| skin::expected_tets(&made.mesh, sizes));
         partition::partition_weighted(&made.mesh, parts, &ties, weights.as_deref(), &Default::default())
     })?;
     if settings.periodic_together && metrics.lost_ties > 0 {
@@ -340,18 +348,16 @@ fn coarse_mesh(
         );
     }
     let CoarseMesh { mesh, displacements, report } = made;
-    Ok((
-        pieces,
-        CoarseResult {
-            mesh,
-            displacements,
-            parts: assigned,
-            report,
-            outcome,
-            partition: metrics,
-            periodic: map,
-        },
-    ))
+    let result = CoarseResult {
+        mesh,
+        displacements,
+        parts: assigned,
+        report,
+        outcome,
+        partition: metrics,
+        periodic: map,
+    };
+    Ok(Coarse { pieces, result, sizes })
 }
 
 /// The periodic entities of a coarse mesh.

@@ -107,11 +107,22 @@ fn is_better(new: (&Trial, &CoarseMesh), old: (&Trial, &CoarseMesh)) -> bool {
 /// The required quality of the children of a coarse mesh.
 fn least(coarse: &CoarseMesh) -> Least {
     let quality = &coarse.report.quality;
+    least_of(quality.worst_refined, quality.smallest_dihedral)
+}
+
+/// The same, by [`QualitySummary::worst_refined`] and [`QualitySummary::smallest_dihedral`].
+fn least_of(worst_refined: f64, smallest_dihedral: f64) -> Least {
     Least {
-        mean_ratio: KEPT * quality.worst_refined.min(GOOD),
-        dihedral: KEPT * quality.smallest_dihedral,
+        mean_ratio: KEPT * worst_refined.min(GOOD),
+        dihedral: KEPT * smallest_dihedral,
         scaled_jacobian: JACOBIAN,
     }
+}
+
+/// How edges are curved for children of this quality.
+fn bent(least: Least, (pieces, order): How) -> refine::mend::Settings {
+    let [margin, enough] = BENT;
+    refine::mend::Settings { pieces, least, margin, enough, order, ..Default::default() }
 }
 
 /// Refinement test of a coarse mesh: finds its bad children.
@@ -167,9 +178,7 @@ fn curved(
     }
     let (part, projector, least) =
         (distribution::from_serial(coarse.mesh.clone())?, model.projector(), least(coarse));
-    let [margin, enough] = BENT;
-    let settings = refine::mend::Settings { pieces, least, margin, enough, order, ..Default::default() };
-    let displacements = refine::mend(&part, &projector, &settings)?.displacements;
+    let displacements = refine::mend(&part, &projector, &bent(least, (pieces, order)))?.displacements;
     let settings = refine::Settings { displacements, order, ..refine::Settings::default() };
     let after = refine::trial(&part, &projector, pieces, &settings, least)?;
     Ok(Some((settings.displacements, after)))
@@ -196,11 +205,7 @@ pub fn displaced(
     // A part without tets has no worst one.
     let mine = if tets == 0 { [1.0, 180.0] } else { [worst_refined, smallest_dihedral] };
     let [worst_refined, smallest_dihedral] = comm.all_reduce_min_f64(mine)?;
-    let least = Least {
-        mean_ratio: KEPT * worst_refined.min(GOOD),
-        dihedral: KEPT * smallest_dihedral,
-        scaled_jacobian: JACOBIAN,
-    };
+    let least = least_of(worst_refined, smallest_dihedral);
     let settings = refine::Settings { order, ..refine::Settings::default() };
     let mend = || {
         let trial = refine::trial(part, projector, pieces, &settings, least)?;
@@ -210,8 +215,7 @@ pub fn displaced(
         let bad = trial.inverted.iter().chain(&trial.poor).take(MOST_BENT).map(local);
         let mut suspects: Vec<u32> = bad.collect();
         suspects.sort_unstable();
-        let [margin, enough] = BENT;
-        let settings = refine::mend::Settings { pieces, least, margin, enough, order, ..Default::default() };
+        let settings = bent(least, (pieces, order));
         Ok::<_, Error>(refine::mend_near(part, &suspects, projector, &settings)?.displacements)
     };
     let mine = comm.agree(mend())?;

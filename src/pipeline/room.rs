@@ -43,7 +43,7 @@ pub(super) fn refuse_oversized(
 }
 
 /// **Collective.** Refuses a mesh whose writers take more memory than a machine has; `of_tet` is
-/// what they take for a tet, in bytes.
+/// what they take for a tet, in bytes; that of rank 0 counts.
 ///
 /// # Errors
 /// If it does not fit; on all ranks, with the numbers.
@@ -54,10 +54,14 @@ pub(super) fn refuse_crowded(
     of_tet: u64,
     memory: Option<u64>,
 ) -> Result<(), Error> {
+    let mut of_tet = vec![of_tet];
+    comm.broadcast(0, &mut of_tet)?;
+    if of_tet == [0] {
+        return Ok(());
+    }
     let counts = predicted_counts(part, pieces, order);
     let [_, least] = counts.bytes;
-    let writers = of_tet * counts.tets;
-    let needed = memory::on_machine(comm, if writers > 0 { least + writers } else { 0 })?;
+    let [needed] = memory::on_machine(comm, [least + of_tet[0] * counts.tets])?;
     let fits = match memory.or_else(memory::available_bytes) {
         Some(available) if needed > available => Err(RoomError::Writers { needed, available }),
         _ => Ok(()),
@@ -122,8 +126,7 @@ pub(super) fn keep_of_level(
     (pieces, order): (u32, Order),
     memory: Option<u64>,
 ) -> Result<(Keep, [u64; 2]), Error> {
-    let [all, least] = predicted_counts(part, pieces, order).bytes;
-    let (all, least) = (memory::on_machine(comm, all)?, memory::on_machine(comm, least)?);
+    let [all, least] = memory::on_machine(comm, predicted_counts(part, pieces, order).bytes)?;
     let Some(available) = memory.or_else(memory::available_bytes) else {
         return Ok((Keep::All, [all, u64::MAX]));
     };

@@ -5,13 +5,13 @@ use super::error::{Error, RequestError};
 use super::goal::Goal;
 use super::model::Model;
 use super::result::Refused;
-use super::settings::{GenerateSettings, Wanted};
+use super::settings::Wanted;
 use crate::ground::comm::Communicator;
 use crate::ground::mesh::Mesh;
 use crate::ground::progress::{Progress, Stage};
 use crate::ground::projector::Projector;
+use crate::ground::size::SizeSettings;
 use crate::parallel::distribution::{BareMesh, DistMesh};
-use crate::parallel::refine::RefineError;
 use crate::parallel::skin::{self, DeliveredSizes, Filled, Improvement, PartSizes};
 
 /// **Collective.** Fills the skins of all parts. Coarse edges are split into `pieces`, and the
@@ -29,12 +29,10 @@ pub(super) fn mesh_skins(
     progress: &Progress,
 ) -> Result<(BareMesh, Refused, Option<DeliveredSizes>), Error> {
     let mut sizes = PartSizes::new(dist.points.clone(), dist.tets.clone(), skin::scatter(comm, dist, sizes)?);
-
     let expected: f64 = comm.all_gather_one(sizes.expected_tets())?.into_iter().sum();
     let mut goal = Goal::new(wanted, expected);
-    let agree = |made: Result<_, RefineError>| comm.agree(made.map_err(Error::from));
     let (skin, filled, delivered) = progress.stage(Stage::Fill, |_| {
-        let skin = agree(skin::skin(dist, projector, pieces))?;
+        let skin = comm.agree(skin::skin(dist, projector, pieces).map_err(Error::from))?;
         let mut before = 1.0;
         loop {
             sizes.scale(goal.scale / before);
@@ -73,12 +71,7 @@ impl Refused {
 }
 
 /// The requested sizes at the vertices of the coarse mesh, on the rank that has it.
-pub(super) fn wanted_sizes(
-    model: &Model,
-    coarse: &Mesh,
-    settings: &GenerateSettings,
-    pieces: u32,
-) -> Vec<f64> {
-    let field = model.size_field(&settings.coarse.size);
+pub(super) fn wanted_sizes(model: &Model, coarse: &Mesh, size: &SizeSettings, pieces: u32) -> Vec<f64> {
+    let field = model.size_field(size);
     skin::at_vertices(coarse, field.as_deref(), pieces)
 }

@@ -260,7 +260,7 @@ impl<'a> Content<'a> {
 
 /// **Collective.** Refuses the adjacency of parts that does not fit the memory of their machine.
 fn refuse_little_memory(comm: &dyn Communicator, part: &dyn MeshStream) -> Result<(), WriteError> {
-    let needed = memory::on_machine(comm, ADJACENCY_MEMORY * part.counts().tets)?;
+    let [needed] = memory::on_machine(comm, [ADJACENCY_MEMORY * part.counts().tets])?;
     let fits = match memory::available_bytes() {
         Some(available) if needed > available => Err(WriteError::NoMemory { needed, available }),
         _ => Ok(()),

@@ -84,6 +84,16 @@ pub struct Segment {
     pub curve: CurveId,
 }
 
+impl Segment {
+    /// The edge of this class; `None` if it is not on a curve.
+    pub(crate) fn of_class(vertices: [VertexId; 2], class: Class) -> Option<Self> {
+        match class {
+            Class::Curve(curve) => Some(Self { vertices, curve }),
+            _ => None,
+        }
+    }
+}
+
 /// The ends of an edge, the lower first.
 pub(crate) fn sorted_edge([a, b]: [VertexId; 2]) -> [VertexId; 2] {
     [a.min(b), a.max(b)]

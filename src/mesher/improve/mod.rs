@@ -65,7 +65,7 @@ mod samples;
 
 pub use legality::{GeometrySmoothness, Smoothness, surface_normal, tangent_of_normals};
 pub use objective::Measure;
-pub use schedule::{Report, improve, make_refinable};
+pub use schedule::{Report, improve, improve_for, make_refinable};
 pub use settings::{Effort, InsertionSteps, Settings};
 
 #[cfg(test)]

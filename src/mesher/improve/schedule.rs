@@ -122,6 +122,23 @@ pub fn make_refinable(
     run(mesh, size, Some(&legality), settings)
 }
 
+/// [`make_refinable`] if the smoothness of the geometry is given, because the mesh will be refined;
+/// otherwise [`improve`].
+///
+/// # Panics
+/// Like [`improve`].
+pub fn improve_for(
+    mesh: &mut Mesh,
+    size: &dyn SizeField,
+    smoothness: Option<&dyn Smoothness>,
+    settings: &Settings,
+) -> Report {
+    match smoothness {
+        Some(smoothness) => make_refinable(mesh, size, smoothness, settings),
+        None => improve(mesh, size, settings),
+    }
+}
+
 fn run(mesh: &mut Mesh, size: &dyn SizeField, legality: Option<&Legality>, settings: &Settings) -> Report {
     let mut report = Report { before: QualitySummary::of(mesh), ..Report::default() };
     if let Some(legality) = legality {

@@ -228,15 +228,9 @@ impl Region {
     }
 
     fn improve(&mut self, sizes: &PartSizes, how: &improve::Settings, smoothness: Option<&dyn Smoothness>) {
-        let segment = |(ends, class): (&[u32; 2], &Class)| match *class {
-            Class::Curve(curve) => Some(Segment { vertices: ends.map(VertexId), curve }),
-            _ => None,
-        };
+        let segment = |(ends, class): (&[u32; 2], &Class)| Segment::of_class(ends.map(VertexId), *class);
         self.mesh.segments = self.edges.iter().filter_map(segment).collect();
-        match smoothness {
-            Some(smoothness) => improve::make_refinable(&mut self.mesh, sizes, smoothness, how),
-            None => improve::improve(&mut self.mesh, sizes, how),
-        };
+        improve::improve_for(&mut self.mesh, sizes, smoothness, how);
     }
 
     /// Merges boundary vertices; returns whether any were merged.

@@ -93,10 +93,7 @@ pub fn fill(skin: &Skin, size: &dyn SizeField, how: Improvement) -> Result<Fille
     // Of the classes only the distinction between fixed and movable vertices matters here.
     let mut classes = vec![Class::Corner(CornerId(0)); skin.points.len()];
     classes.resize(filled.points.len(), Class::Body(BodyId(0)));
-    let segment = |(ends, class): &([u32; 2], Class)| match *class {
-        Class::Curve(curve) => Some(Segment { vertices: ends.map(VertexId), curve }),
-        _ => None,
-    };
+    let segment = |&(ends, class): &([u32; 2], Class)| Segment::of_class(ends.map(VertexId), class);
     let mut made = Mesh {
         points: filled.points,
         classes,
@@ -105,10 +102,7 @@ pub fn fill(skin: &Skin, size: &dyn SizeField, how: Improvement) -> Result<Fille
         triangles: skin.triangles.iter().filter_map(patched).collect(),
         segments: skin.edges.iter().filter_map(segment).collect(),
     };
-    match how.smoothness {
-        Some(smoothness) => improve::make_refinable(&mut made, size, smoothness, how.settings),
-        None => improve::improve(&mut made, size, how.settings),
-    };
+    improve::improve_for(&mut made, size, how.smoothness, how.settings);
     Ok(Filled {
         tets: made.tets.into_iter().map(|t| t.map(|v| v.0)).collect(),
         bodies: made.bodies,

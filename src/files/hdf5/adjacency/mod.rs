@@ -20,6 +20,7 @@ mod sides;
 mod write;
 
 use super::Numbering;
+use crate::files::node_order::VTK;
 use crate::ground::comm::{CommError, Communicator};
 use crate::ground::mesh::stream::{MeshStream, TetBlock};
 use crate::ground::mesh::{EDGE_BETWEEN, TET_EDGES, TET_FACES};
@@ -31,7 +32,15 @@ pub(super) use write::add_to;
 const NONE: u64 = u64::MAX;
 
 /// The columns of `tet_edges`: the edges 01 12 02 03 13 23, as VTK orders the nodes on them.
-const EDGES: [[usize; 2]; 6] = [[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]];
+const EDGES: [[usize; 2]; 6] = {
+    let mut edges = [[0; 2]; 6];
+    let mut column = 0;
+    while column < 6 {
+        edges[column] = TET_EDGES[VTK[column]];
+        column += 1;
+    }
+    edges
+};
 
 /// The columns of `tet_faces`: face k is opposite vertex k.
 const FACES: [[usize; 3]; 4] = TET_FACES;
@@ -121,11 +130,8 @@ fn face_edges(
 
 /// The column of `tet_edges` with the edge between two corners.
 fn column_between([i, j]: [usize; 2]) -> usize {
-    /// By the place in [`TET_EDGES`].
-    const COLUMNS: [usize; 6] = [0, 2, 3, 1, 4, 5];
     let edge = EDGE_BETWEEN[i][j];
-    debug_assert!(TET_EDGES[edge].contains(&i) && EDGES[COLUMNS[edge]].contains(&i));
-    COLUMNS[edge]
+    VTK.iter().position(|&of_column| of_column == edge).expect("each edge has a column")
 }
 
 /// **Collective.** The tets of each vertex of this rank's rows.
