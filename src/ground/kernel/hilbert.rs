@@ -3,6 +3,7 @@
 
 use crate::Point;
 use crate::ground::kernel::random::mix;
+use rayon::prelude::*;
 
 /// Bits per coordinate of a key; three coordinates fit 64 bits.
 const BITS: u32 = 21;
@@ -49,14 +50,14 @@ fn keys(points: &[Point]) -> Vec<u64> {
     }
     let side = (0..3).map(|k| high[k] - low[k]).fold(0.0, f64::max);
     let cells = if side > 0.0 { f64::from((1u32 << BITS) - 1) / side } else { 0.0 };
-    points.iter().map(|p| hilbert_key([0, 1, 2].map(|k| ((p[k] - low[k]) * cells) as u32))).collect()
+    points.par_iter().map(|p| hilbert_key([0, 1, 2].map(|k| ((p[k] - low[k]) * cells) as u32))).collect()
 }
 
 /// The indices of the points in order along the Hilbert curve; ties by index.
 pub fn hilbert_order(points: &[Point]) -> Vec<u32> {
     let keys = keys(points);
     let mut order: Vec<u32> = (0..points.len() as u32).collect();
-    order.sort_unstable_by_key(|&i| (keys[i as usize], i));
+    order.par_sort_unstable_by_key(|&i| (keys[i as usize], i));
     order
 }
 
@@ -73,7 +74,7 @@ pub fn random_rounds(points: &[Point]) -> Vec<u32> {
     // last round.
     let round = |i: u32| rounds - mix(u64::from(i)).trailing_ones().min(rounds);
     let mut order: Vec<u32> = (0..points.len() as u32).collect();
-    order.sort_unstable_by_key(|&i| (round(i), keys[i as usize], i));
+    order.par_sort_unstable_by_key(|&i| (round(i), keys[i as usize], i));
     order
 }
 

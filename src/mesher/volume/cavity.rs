@@ -35,6 +35,8 @@ pub(super) struct Cavity {
     pub vertices: Vec<u32>,
     /// The tets that replace it, after [`Cavity::fill`].
     pub filled: Vec<u32>,
+    /// Whether it reaches the seam of a block, after [`Cavity::grow`].
+    pub meets_seam: bool,
     numbers: Numbers,
     replaced: Vec<Wall>,
     edges: EdgeTable,
@@ -90,6 +92,7 @@ impl Cavity {
         self.tets.clear();
         self.walls.clear();
         self.vertices.clear();
+        self.meets_seam = false;
         mesh.mark(seed);
         self.tets.push(seed);
         for v in mesh.tets[seed as usize] {
@@ -101,8 +104,10 @@ impl Cavity {
             let across = mesh.across[t as usize];
             let locked = mesh.locked[t as usize];
             for (i, other) in (0u32..).zip(across) {
-                if other == NONE || locked >> i & 1 == 1 {
+                let is_locked = locked >> i & 1 == 1;
+                if other == NONE || is_locked {
                     self.walls.push(4 * t + i);
+                    self.meets_seam |= !is_locked;
                 } else if !mesh.is_marked(other >> 2) {
                     if mesh.is_in_sphere(other >> 2, point) {
                         mesh.mark(other >> 2);

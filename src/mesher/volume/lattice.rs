@@ -12,9 +12,8 @@
 //! dihedral angles from 13 to at least 20 degrees before any improvement. One or two front layers
 //! before the lattice give less, because the gap is only farther inside.
 
-use super::cavity::{Walk, walk};
+use super::candidates::Candidate;
 use super::points::Filler;
-use crate::ground::kernel::hilbert::random_rounds;
 use crate::ground::kernel::random::mix;
 use crate::ground::kernel::simplex::{area_vector, volume};
 use crate::ground::mesh::TET_FACES;
@@ -60,15 +59,6 @@ struct Plateau {
     tets: f64,
 }
 
-/// A lattice point that may be inserted.
-struct Candidate {
-    point: Point,
-    /// The wanted size there.
-    size: f64,
-    /// A vertex of the tet that contains the point.
-    vertex: u32,
-}
-
 impl Filler<'_> {
     /// Inserts a lattice for each size that a large fraction of the tets has.
     pub(super) fn add_lattices(&mut self) {
@@ -91,7 +81,7 @@ impl Filler<'_> {
             // but a size requested in a small region only would have thousands of useless points.
             if tets_of_size(space, plateau.size) < PATIENCE * plateau.tets {
                 let candidates = self.candidates(&self.coarse_tets(), plateau.size);
-                self.add_candidates(&candidates);
+                self.add_candidates(candidates);
             }
         }
     }
@@ -137,34 +127,6 @@ impl Filler<'_> {
         };
         let found: Vec<Vec<Candidate>> = tets.par_chunks(CHUNK).map(in_chunk).collect();
         found.into_iter().flatten().collect()
-    }
-
-    /// Inserts points with the filter of the front, in random rounds along the Hilbert curve.
-    ///
-    /// In this order cavities are smaller and the work is a sixth less than in one pass along the
-    /// curve.
-    fn add_candidates(&mut self, candidates: &[Candidate]) {
-        let points: Vec<Point> = candidates.iter().map(|c| c.point).collect();
-        let order = random_rounds(&points);
-        drop(points);
-        let mut last = None;
-        for i in order {
-            if self.stops() {
-                return;
-            }
-            let Candidate { point, size, vertex } = candidates[i as usize];
-            // The last point is a few steps away, unless the boundary is between.
-            let starts = [last, Some(self.mesh.at_vertex[vertex as usize])];
-            let seed = starts.into_iter().flatten().find_map(|from| match walk(self.mesh, from, &point) {
-                Walk::Inside(t) => Some(t),
-                Walk::Blocked(_) => None,
-            });
-            let Some(seed) = seed else { continue };
-            let size = self.grown_size(seed, &point, size);
-            if self.insert(seed, point, size) {
-                last = self.cavity.filled.first().copied();
-            }
-        }
     }
 }
 

@@ -66,7 +66,7 @@ pub(super) struct Filler<'a> {
     /// Tets that were fine before the size at one of their vertices was lowered.
     pub(super) lowered: Vec<u32>,
     /// The reason if the placement stops early.
-    stopped: Option<Stopped>,
+    pub(super) stopped: Option<Stopped>,
 }
 
 /// Limits of the placement; see [`Settings`](super::Settings).
@@ -86,6 +86,17 @@ pub(super) enum State {
     Rejected,
     /// Not larger than wanted.
     Fine,
+}
+
+/// What became of a point.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Placed {
+    /// It is a vertex.
+    Inserted,
+    /// It is too close to another vertex or to the boundary, or outside.
+    Rejected,
+    /// Its cavity reaches the seam of a block.
+    Waits,
 }
 
 /// Why the placement stopped early.
@@ -165,6 +176,15 @@ impl Filler<'_> {
         }
     }
 
+    /// Sets the states of all tets.
+    fn set_states(&mut self) {
+        self.mesh.keep_spheres();
+        let state = |t: u32| {
+            if self.mesh.is_alive(t) && self.is_fine(t) { State::Fine } else { State::Coarse }
+        };
+        self.states = (0..self.mesh.tets.len() as u32).into_par_iter().map(state).collect();
+    }
+
     pub(super) fn is_fine(&self, t: u32) -> bool {
         let radius2 = self.mesh.sphere(t).squared_radius();
         let [a, b, c, d] = self.mesh.tets[t as usize];
@@ -195,7 +215,7 @@ impl Filler<'_> {
     /// there is no dip.
     fn place_points(&mut self) {
         self.lower_all();
-        self.update_states(0..self.mesh.tets.len() as u32);
+        self.set_states();
         let mut open = self.in_random_rounds();
         loop {
             self.advance(open);
@@ -256,7 +276,8 @@ impl Filler<'_> {
     /// edges remain, because circumcentres are behind the facets or too close to them; see
     /// [`NEAREST_COARSE`].
     fn finish(&mut self) {
-        let mut open: Vec<u32> = self.mesh.alive().collect();
+        let is_open = |&t: &u32| self.mesh.is_alive(t) && self.state(t) != State::Fine;
+        let mut open: Vec<u32> = (0..self.mesh.tets.len() as u32).into_par_iter().filter(is_open).collect();
         while let Some(t) = open.pop() {
             if self.stops() {
                 return;
@@ -278,8 +299,10 @@ impl Filler<'_> {
     ///
     /// This finds every dip of the field that is as wide as a tet around it.
     fn fill_dips(&mut self) -> Vec<u32> {
-        let fine: Vec<u32> = self.mesh.alive().filter(|&t| self.state(t) == State::Fine).collect();
-        let dip = |&t: &u32| {
+        let dip = |t: u32| {
+            if !self.mesh.is_alive(t) || self.state(t) != State::Fine {
+                return None;
+            }
             let [a, b, c, d] = self.mesh.corners(t);
             let middle = Point::from((a.coords + b.coords + c.coords + d.coords) * 0.25);
             let size = self.size_near(t, &middle);
@@ -288,7 +311,8 @@ impl Filler<'_> {
             (size.is_nan() || self.mesh.sphere(t).squared_radius() > wanted * wanted)
                 .then_some((t, middle, size))
         };
-        let dips: Vec<(u32, Point, f64)> = fine.par_iter().filter_map(dip).collect();
+        let dips: Vec<(u32, Point, f64)> =
+            (0..self.mesh.tets.len() as u32).into_par_iter().filter_map(dip).collect();
         let mut coarse = Vec::new();
         for (t, middle, size) in dips {
             if self.stops() {
@@ -331,7 +355,7 @@ impl Filler<'_> {
 
     /// Like [`Filler::insert`], and updates the states and sizes of the new tets.
     fn insert_and_update(&mut self, t: u32, point: Point, size: f64) -> bool {
-        let inserted = self.insert(t, point, size);
+        let inserted = self.insert(t, point, size) == Placed::Inserted;
         if inserted {
             let filled = std::mem::take(&mut self.cavity.filled);
             self.update_states(filled.iter().copied());
@@ -343,32 +367,41 @@ impl Filler<'_> {
 
     /// Inserts a point near tet `t`, unless it is too close to a vertex or the boundary; the new
     /// tets are in `cavity.filled`.
-    pub(super) fn insert(&mut self, t: u32, point: Point, size: f64) -> bool {
+    pub(super) fn insert(&mut self, t: u32, point: Point, size: f64) -> Placed {
         // The circumcentre of a flat tet may not be finite; sizes there are meaningless.
         if ![point.x, point.y, point.z].iter().all(|x| x.is_finite()) {
-            return false;
+            return Placed::Rejected;
         }
         self.note_size(&point, size);
         if self.stopped.is_some() || self.is_corner_near(t, &point, size) {
-            return false;
+            return Placed::Rejected;
         }
-        let Walk::Inside(seed) = walk(self.mesh, t, &point) else { return false };
+        let seed = match walk(self.mesh, t, &point) {
+            Walk::Inside(seed) => seed,
+            Walk::Blocked(face) if self.mesh.is_seam(face) => return Placed::Waits,
+            Walk::Blocked(_) => return Placed::Rejected,
+        };
         if seed != t && self.is_corner_near(seed, &point, size) {
-            return false;
+            return Placed::Rejected;
         }
         self.cavity.grow(self.mesh, seed, &point);
         let size = self.cavity.vertices.iter().fold(size, |size, &v| self.grown(size, v, &point));
-        if self.cavity.vertices.iter().any(|&v| self.is_near(v, &point, size))
-            || !self.cavity.make_star_shaped(self.mesh, seed, &point)
+        if self.cavity.vertices.iter().any(|&v| self.is_near(v, &point, size)) {
+            return Placed::Rejected;
+        }
+        if self.cavity.meets_seam {
+            return Placed::Waits;
+        }
+        if !self.cavity.make_star_shaped(self.mesh, seed, &point)
             || self.cavity.walls.iter().any(|&w| self.is_skin_near(w, &point, size))
         {
-            return false;
+            return Placed::Rejected;
         }
         let body = self.mesh.bodies[seed as usize];
         let v = self.mesh.add_point(point);
         self.sizes.push(size);
         self.cavity.fill(self.mesh, v, body);
-        true
+        Placed::Inserted
     }
 
     /// Whether a vertex is too close to a new point, by the wanted size there.

@@ -9,6 +9,7 @@ use super::points::{Filler, State};
 use super::tetrahedra::Tetrahedra;
 use crate::Point;
 use crate::mesher::half_face::NONE;
+use rayon::prelude::*;
 
 /// Sizes are lowered only if they are too large by this factor.
 const LOWER: f64 = 1.05;
@@ -105,8 +106,15 @@ impl Filler<'_> {
 
     /// Limits the sizes of all vertices by the growth from others; see [`Filler::lower_from`].
     pub(super) fn lower_all(&mut self) {
+        let lowers = |&t: &u32| {
+            let tet = self.mesh.tets[t as usize];
+            self.mesh.is_alive(t) && tet.iter().any(|&v| tet.iter().any(|&u| self.limit(v, u).is_some()))
+        };
+        let slots = 0..self.mesh.tets.len() as u32;
+        // Usually there is none. Those before the first change nothing.
+        let Some(first) = slots.clone().into_par_iter().find_first(lowers) else { return };
         let mut open = Vec::new();
-        for t in 0..self.mesh.tets.len() as u32 {
+        for t in first..slots.end {
             if self.mesh.is_alive(t) {
                 let tet = self.mesh.tets[t as usize];
                 tet.iter().for_each(|&v| self.lower(v, &tet, &mut open));
@@ -148,16 +156,22 @@ impl Filler<'_> {
     /// Limits the sizes of neighbours by the growth from a vertex; appends those that changed to
     /// `lowered`.
     fn lower(&mut self, vertex: u32, neighbours: &[u32], lowered: &mut Vec<u32>) {
-        let (point, size) = (self.mesh.points[vertex as usize], self.at(vertex));
         for &v in neighbours {
-            if self.at(v) > size * LOWER {
-                let grown = size + self.limits.growth * (self.mesh.point(v) - point).norm();
-                if self.at(v) > grown * LOWER {
-                    self.sizes[v as usize] = grown;
-                    lowered.push(v);
-                }
+            if let Some(grown) = self.limit(vertex, v) {
+                self.sizes[v as usize] = grown;
+                lowered.push(v);
             }
         }
+    }
+
+    /// The size to which the growth from one vertex lowers that of another, if it does.
+    #[inline]
+    fn limit(&self, from: u32, at: u32) -> Option<f64> {
+        if self.at(at) <= self.at(from) * LOWER {
+            return None;
+        }
+        let grown = self.at(from) + self.limits.growth * (self.mesh.point(at) - self.mesh.point(from)).norm();
+        (self.at(at) > grown * LOWER).then_some(grown)
     }
 }
 

@@ -9,6 +9,7 @@ use crate::ground::kernel::predicates::{Sign, insphere, orient3d};
 use crate::ground::kernel::simplex::{OPPOSITE_EDGE, TET_FACES, ascending};
 use crate::ground::kernel::sphere::Circumsphere;
 use crate::mesher::half_face::{Marks, NONE, Ring};
+use rayon::prelude::*;
 
 /// The most tets, because half-faces are `u32`.
 pub(super) const MAX_TETS: usize = (u32::MAX / 4) as usize;
@@ -40,9 +41,10 @@ pub(super) struct Tetrahedra {
     pub inserted: u32,
     /// Edges that stay without a locked face, sorted, the lower vertex first.
     kept: Vec<[u32; 2]>,
-    free: Vec<u32>,
+    /// The slots without a tet.
+    pub(super) free: Vec<u32>,
     /// The circumsphere of each tet, computed on first use: vertices of tets must not move.
-    spheres: Vec<Circumsphere>,
+    pub(super) spheres: Vec<Circumsphere>,
     marks: Marks,
     scratch: Vec<([u32; 3], u32, bool)>,
 }
@@ -127,9 +129,21 @@ impl Tetrahedra {
         self.locked[(half_face >> 2) as usize] >> (half_face & 3) & 1 == 1
     }
 
+    /// Whether a face is on the seam of a block: its neighbour is not in this mesh; see
+    /// [`blocks`](super::blocks).
+    #[inline]
+    pub fn is_seam(&self, half_face: u32) -> bool {
+        self.across(half_face) == NONE && !self.is_locked(half_face)
+    }
+
     /// Sets the edges that stay without a locked face: sorted, the lower vertex first.
     pub fn keep_edges(&mut self, edges: Vec<[u32; 2]>) {
         self.kept = edges;
+    }
+
+    /// The edges set by [`keep_edges`](Self::keep_edges).
+    pub fn kept_edges(&self) -> &[[u32; 2]] {
+        &self.kept
     }
 
     /// Whether an edge was set by [`keep_edges`](Self::keep_edges).
@@ -180,6 +194,17 @@ impl Tetrahedra {
         let sphere = self.sphere(tet);
         self.spheres[tet as usize] = sphere;
         sphere
+    }
+
+    /// Stores the circumspheres of all tets.
+    pub fn keep_spheres(&mut self) {
+        let mut spheres = std::mem::take(&mut self.spheres);
+        spheres.par_iter_mut().zip(&self.tets).for_each(|(sphere, tet)| {
+            if !sphere.is_known() && tet[0] != NONE {
+                *sphere = Circumsphere::of(tet.each_ref().map(|&v| self.point(v)));
+            }
+        });
+        self.spheres = spheres;
     }
 
     /// Whether a point is strictly inside the circumsphere of a tet, exactly. With

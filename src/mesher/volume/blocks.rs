@@ -1,0 +1,350 @@
+//! Blocks of a mesh that are filled at the same time, each by one thread.
+//!
+//! A block holds some tets of the mesh with their vertices. Faces that it shares with other tets
+//! are its **seam**: without a neighbour in the block, but not locked. A cavity that reaches the
+//! seam may go on behind it, so its point has to wait. Thus tets with a face on the seam stay as
+//! they are, and so do the links of their faces across it. (Marot, Pellerin, Remacle 2019 also cut
+//! the mesh and let such points wait, but their threads change one mesh.)
+//!
+//! Blocks depend on the mesh and the points only, and what happens in a block on the block only, so
+//! the result is the same for any number of threads.
+
+use super::tetrahedra::Tetrahedra;
+use crate::Point;
+use crate::ground::kernel::sphere::Circumsphere;
+use crate::mesher::half_face::NONE;
+use rayon::prelude::*;
+
+/// Boxes that cut space by planes, one box for each block (recursive coordinate bisection: Berger,
+/// Bokhari 1987).
+pub(super) struct Boxes {
+    /// The axis and the coordinate of each plane: a binary heap, with the same depth everywhere.
+    planes: Vec<(usize, f64)>,
+}
+
+impl Boxes {
+    /// Cuts boxes in two, 2^`levels` in the end, so that this part of the points in a box is below
+    /// its plane.
+    pub fn new(points: impl Iterator<Item = Point>, levels: u32, part: f64) -> Self {
+        let mut points: Vec<Point> = points.collect();
+        let mut planes = vec![(0, 0.0); (1 << levels) - 1];
+        bisect(&mut points, part, 0, &mut planes);
+        Self { planes }
+    }
+
+    /// The number of boxes.
+    pub fn len(&self) -> usize {
+        self.planes.len() + 1
+    }
+
+    /// The box of a point.
+    pub fn of(&self, point: &Point) -> usize {
+        let mut at = 0;
+        while let Some(&(axis, cut)) = self.planes.get(at) {
+            at = 2 * at + 1 + usize::from(point[axis] >= cut);
+        }
+        at - self.planes.len()
+    }
+
+    /// Whether a plane that bounds the box of a point is nearer than `reach`.
+    pub fn is_near_side(&self, point: &Point, reach: f64) -> bool {
+        let mut at = 0;
+        while let Some(&(axis, cut)) = self.planes.get(at) {
+            if (point[axis] - cut).abs() < reach {
+                return true;
+            }
+            at = 2 * at + 1 + usize::from(point[axis] >= cut);
+        }
+        false
+    }
+}
+
+/// Finds the plane `at` of the heap and those below it.
+fn bisect(points: &mut [Point], part: f64, at: usize, planes: &mut [(usize, f64)]) {
+    if at >= planes.len() || points.is_empty() {
+        return;
+    }
+    let low = points.iter().fold(points[0], |low, p| low.inf(p));
+    let high = points.iter().fold(points[0], |high, p| high.sup(p));
+    let axis = (high - low).imax();
+    let middle = (part * points.len() as f64) as usize;
+    points.select_nth_unstable_by(middle, |a, b| a[axis].total_cmp(&b[axis]));
+    planes[at] = (axis, points[middle][axis]);
+    let (below, above) = points.split_at_mut(middle);
+    bisect(below, part, 2 * at + 1, planes);
+    bisect(above, part, 2 * at + 2, planes);
+}
+
+/// Tets of a mesh in blocks.
+pub(super) struct Cut {
+    /// The tets of each block.
+    blocks: Vec<Vec<u32>>,
+    /// The block of each slot of the mesh, or [`NONE`], and the index there.
+    places: Vec<[u32; 2]>,
+}
+
+impl Cut {
+    /// Puts each of `tets` into the block in whose box its centroid lies.
+    pub fn new(mesh: &Tetrahedra, tets: &[u32], boxes: &Boxes) -> Self {
+        let block = |&t: &u32| {
+            let [a, b, c, d] = mesh.corners(t);
+            boxes.of(&Point::from((a.coords + b.coords + c.coords + d.coords) * 0.25))
+        };
+        let of_tets: Vec<usize> = tets.par_iter().map(block).collect();
+        let mut cut =
+            Self { blocks: vec![Vec::new(); boxes.len()], places: vec![[NONE; 2]; mesh.tets.len()] };
+        for (&t, block) in tets.iter().zip(of_tets) {
+            cut.places[t as usize] = [block as u32, cut.blocks[block].len() as u32];
+            cut.blocks[block].push(t);
+        }
+        cut
+    }
+
+    /// The number of blocks.
+    pub fn len(&self) -> usize {
+        self.blocks.len()
+    }
+
+    /// The block of a tet, if it is in one, and its number there.
+    pub fn place(&self, tet: u32) -> Option<[u32; 2]> {
+        Some(self.places[tet as usize]).filter(|place| place[0] != NONE)
+    }
+}
+
+/// A block, or what became of it.
+pub(super) struct Block {
+    /// The tets and vertices of the block; added ones follow.
+    pub mesh: Tetrahedra,
+    /// The slots of its first tets in the whole mesh.
+    pub tets: Vec<u32>,
+    /// The numbers of its first vertices in the whole mesh.
+    pub vertices: Vec<u32>,
+}
+
+impl Block {
+    /// Copies one block of a mesh without exact positions and ranks.
+    ///
+    /// `numbers` has one entry per vertex of the whole mesh; all are [`NONE`], before and after.
+    pub fn new(whole: &Tetrahedra, cut: &Cut, block: usize, numbers: &mut [u32]) -> Self {
+        debug_assert!(whole.exact.is_empty() && whole.ranks.is_empty());
+        let tets = cut.blocks[block].clone();
+        let mut vertices = Vec::new();
+        let mut mesh = Tetrahedra::default();
+        for &t in &tets {
+            let slot = mesh.free_slot() as usize;
+            let t = t as usize;
+            mesh.tets[slot] = whole.tets[t].map(|v| {
+                let number = &mut numbers[v as usize];
+                if *number == NONE {
+                    *number = vertices.len() as u32;
+                    vertices.push(v);
+                }
+                *number
+            });
+            mesh.across[slot] = whole.across[t].map(|other| match cut.places.get((other >> 2) as usize) {
+                Some(&[there, slot]) if there as usize == block => 4 * slot + (other & 3),
+                _ => NONE,
+            });
+            mesh.locked[slot] = whole.locked[t];
+            mesh.bodies[slot] = whole.bodies[t];
+            mesh.spheres[slot] = whole.spheres[t];
+        }
+        mesh.points = vertices.iter().map(|&v| whole.points[v as usize]).collect();
+        mesh.at_vertex = vec![NONE; vertices.len()];
+        for (tet, slot) in mesh.tets.iter().zip(0..) {
+            tet.iter().for_each(|&v| mesh.at_vertex[v as usize] = slot);
+        }
+        let kept = whole.kept_edges().iter().map(|edge| edge.map(|v| numbers[v as usize]));
+        let mut kept: Vec<[u32; 2]> =
+            kept.filter(|edge| !edge.contains(&NONE)).map(|[a, b]| [a.min(b), a.max(b)]).collect();
+        kept.sort_unstable();
+        mesh.keep_edges(kept);
+        vertices.iter().for_each(|&v| numbers[v as usize] = NONE);
+        Self { mesh, tets, vertices }
+    }
+}
+
+/// The numbers in the whole mesh of what a block added.
+struct Numbers<'a> {
+    block: &'a Block,
+    first_tet: u32,
+    first_vertex: u32,
+}
+
+impl Numbers<'_> {
+    fn tet(&self, slot: u32) -> u32 {
+        let old = self.block.tets.len() as u32;
+        if slot < old { self.block.tets[slot as usize] } else { self.first_tet + slot - old }
+    }
+
+    fn vertex(&self, v: u32) -> u32 {
+        let old = self.block.vertices.len() as u32;
+        if v < old { self.block.vertices[v as usize] } else { self.first_vertex + v - old }
+    }
+
+    fn half_face(&self, half_face: u32) -> u32 {
+        if half_face == NONE { NONE } else { 4 * self.tet(half_face >> 2) + (half_face & 3) }
+    }
+
+    /// The vertices of a slot of the block, or of a free one.
+    fn vertices(&self, slot: usize) -> [u32; 4] {
+        let tet = self.block.mesh.tets[slot];
+        if tet[0] == NONE { tet } else { tet.map(|v| self.vertex(v)) }
+    }
+}
+
+impl Tetrahedra {
+    /// Puts blocks back: their first tets into the slots from which they were copied, the others
+    /// behind all tets, block by block; likewise the vertices.
+    pub fn absorb(&mut self, blocks: Vec<Block>) {
+        let (mut first_tet, mut first_vertex) = (self.tets.len() as u32, self.points.len() as u32);
+        let mut numbers = Vec::with_capacity(blocks.len());
+        for block in &blocks {
+            numbers.push(Numbers { block, first_tet, first_vertex });
+            first_tet += (block.mesh.tets.len() - block.tets.len()) as u32;
+            first_vertex += (block.mesh.points.len() - block.vertices.len()) as u32;
+        }
+        for numbers in &numbers {
+            self.absorb_old(numbers);
+        }
+        self.append_new(&numbers, first_tet as usize);
+        for Numbers { block, .. } in &numbers {
+            self.points.extend_from_slice(&block.mesh.points[block.vertices.len()..]);
+        }
+        self.at_vertex.resize(self.points.len(), NONE);
+        for numbers in &numbers {
+            for (v, &slot) in (0..).zip(&numbers.block.mesh.at_vertex) {
+                self.at_vertex[numbers.vertex(v) as usize] = numbers.tet(slot);
+            }
+            let free = numbers.block.mesh.free.iter().map(|&slot| numbers.tet(slot));
+            self.free.extend(free);
+        }
+        self.clear_marks();
+    }
+
+    /// Writes the slots from which a block was copied.
+    fn absorb_old(&mut self, numbers: &Numbers) {
+        let Block { mesh, tets, .. } = numbers.block;
+        for (slot, &t) in tets.iter().enumerate() {
+            let t = t as usize;
+            self.tets[t] = numbers.vertices(slot);
+            for (face, &other) in mesh.across[slot].iter().enumerate() {
+                // Faces on the seam keep their links.
+                if other != NONE || mesh.locked[slot] >> face & 1 == 1 {
+                    self.across[t][face] = numbers.half_face(other);
+                }
+            }
+            self.locked[t] = mesh.locked[slot];
+            self.bodies[t] = mesh.bodies[slot];
+            self.spheres[t] = mesh.spheres[slot];
+        }
+    }
+
+    /// Appends the slots that the blocks added.
+    fn append_new(&mut self, numbers: &[Numbers], count: usize) {
+        fn append<T: Copy + Send + Sync>(
+            to: &mut Vec<T>,
+            numbers: &[Numbers],
+            (count, filler): (usize, T),
+            of: impl Fn(&Numbers, usize) -> T + Sync,
+        ) {
+            let mut rest = {
+                let before = to.len();
+                to.resize(count, filler);
+                &mut to[before..]
+            };
+            let mut parts = Vec::with_capacity(numbers.len());
+            for numbers in numbers {
+                let old = numbers.block.tets.len();
+                let (part, others) = rest.split_at_mut(numbers.block.mesh.tets.len() - old);
+                parts.push((numbers, old, part));
+                rest = others;
+            }
+            parts.into_par_iter().for_each(|(numbers, old, part)| {
+                part.iter_mut().zip(old..).for_each(|(here, slot)| *here = of(numbers, slot));
+            });
+        }
+        let half_faces =
+            |numbers: &Numbers, slot: usize| numbers.block.mesh.across[slot].map(|h| numbers.half_face(h));
+        append(&mut self.tets, numbers, (count, [NONE; 4]), |numbers, slot| numbers.vertices(slot));
+        append(&mut self.across, numbers, (count, [NONE; 4]), half_faces);
+        append(&mut self.locked, numbers, (count, 0), |numbers, slot| numbers.block.mesh.locked[slot]);
+        append(&mut self.bodies, numbers, (count, NONE), |numbers, slot| numbers.block.mesh.bodies[slot]);
+        append(&mut self.spheres, numbers, (count, Circumsphere::UNKNOWN), |numbers, slot| {
+            numbers.block.mesh.spheres[slot]
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::cavity::Cavity;
+    use super::super::delaunay::delaunay;
+    use super::*;
+    use crate::ground::kernel::predicates::{Sign, orient3d};
+    use crate::ground::kernel::random::Random;
+
+    fn is_around(mesh: &Tetrahedra, tet: u32, point: &Point) -> bool {
+        (4 * tet..4 * tet + 4).all(|half_face| {
+            let [a, b, c] = mesh.face_points(half_face);
+            orient3d(a, b, c, point) != Sign::Positive
+        })
+    }
+
+    #[test]
+    fn points_inserted_in_blocks_leave_a_valid_delaunay_mesh() {
+        let mut random = Random::new(7);
+        let mut scattered = |count: usize| -> Vec<Point> {
+            (0..count).map(|_| Point::from([(); 3].map(|()| random.unit()))).collect()
+        };
+        let (first, added) = (scattered(2000), scattered(2000));
+        let mut mesh = delaunay(&first, &[]);
+        let boxes = Boxes::new(added.iter().copied(), 2, 0.5);
+        let tets: Vec<u32> = mesh.alive().collect();
+        let cut = Cut::new(&mesh, &tets, &boxes);
+        let mut numbers = vec![NONE; mesh.points.len()];
+        let mut blocks: Vec<Block> = (0..4).map(|b| Block::new(&mesh, &cut, b, &mut numbers)).collect();
+        assert!(numbers.iter().all(|&number| number == NONE));
+        let mut inserted = 0;
+        let mut cavity = Cavity::default();
+        for point in &added {
+            let block = &mut blocks[boxes.of(point)].mesh;
+            let slots: Vec<u32> = block.alive().collect();
+            let Some(seed) = slots.into_iter().find(|&t| is_around(block, t, point)) else { continue };
+            cavity.grow(block, seed, point);
+            if !cavity.meets_seam && cavity.make_star_shaped(block, seed, point) {
+                let v = block.add_point(*point);
+                cavity.fill(block, v, 0);
+                inserted += 1;
+            }
+        }
+        assert!(inserted > 500, "{inserted}");
+        let before = mesh.points.len();
+        mesh.absorb(blocks);
+        assert_eq!(mesh.points.len(), before + inserted);
+        assert_eq!(mesh.check(), Vec::<String>::new());
+        let tets: Vec<u32> = mesh.alive().collect();
+        for t in tets {
+            for other in mesh.across[t as usize].into_iter().filter(|&other| other != NONE) {
+                let apex = *mesh.point(mesh.apex(other));
+                assert!(
+                    !mesh.is_in_sphere(t, &apex),
+                    "the face between {t} and {} is not Delaunay",
+                    other >> 2
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn boxes_hold_equal_parts_and_know_their_sides() {
+        let points =
+            (0..1000).map(|i| Point::new(f64::from(i % 10), f64::from(i / 10 % 10), f64::from(i / 100)));
+        let boxes = Boxes::new(points.clone().map(|p| p + p.coords * 1e-3), 3, 0.5);
+        let mut counts = vec![0; boxes.len()];
+        points.for_each(|p| counts[boxes.of(&(p + p.coords * 1e-3))] += 1);
+        assert_eq!(counts, [125; 8]);
+        assert!(boxes.is_near_side(&Point::new(4.9, 2.0, 2.0), 0.5));
+        assert!(!boxes.is_near_side(&Point::new(2.0, 2.0, 2.0), 0.5));
+    }
+}
