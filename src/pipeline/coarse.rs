@@ -37,6 +37,30 @@ impl From<SizeSettings> for CoarseSettings {
     }
 }
 
+/// The size field of the first attempt, which further attempts lower.
+struct Initial<'a> {
+    samples: GeometricSamples,
+    size: GeometricSize<'a>,
+    /// The number of sources in the settings, and the grading.
+    made_with: (usize, f64),
+}
+
+impl<'a> Initial<'a> {
+    fn new(model: &'a CsgModel, settings: &SizeSettings) -> Self {
+        let CsgModel { geometry, features, .. } = model;
+        let samples = GeometricSamples::new(geometry, features, settings);
+        let size = GeometricSize::of_samples(geometry, features, settings, &samples);
+        Self { samples, size, made_with: (settings.sources.len(), settings.grading) }
+    }
+
+    /// The size field under settings that differ at most by corrections; `None` if it is this one.
+    fn lowered(&self, model: &'a CsgModel, settings: &SizeSettings) -> Option<GeometricSize<'a>> {
+        let CsgModel { geometry, features, .. } = model;
+        ((settings.sources.len(), settings.grading) != self.made_with)
+            .then(|| GeometricSize::of_samples(geometry, features, settings, &self.samples))
+    }
+}
+
 /// Makes a coarse mesh with the given sizes. Where it fails for lack of room between curves or
 /// surfaces, the sizes are lowered and the mesh is made again; `settings` keeps the new sources.
 ///
@@ -48,11 +72,10 @@ pub fn mesh(
     budget: &Budget,
     work: &Work,
 ) -> Result<CoarseMesh, CoarseError> {
-    let samples = GeometricSamples::new(&model.geometry, &model.features, &settings.size);
-    let initial = GeometricSize::of_samples(&model.geometry, &model.features, &settings.size, &samples);
-    budget.warn(Once::Walls, || close::warning(model, &samples), work);
+    let initial = Initial::new(model, &settings.size);
+    budget.warn(Once::Walls, || close::warning(model, &initial.samples), work);
     let mut coarse = corrected(settings, budget, work, |settings, allowed| {
-        attempt(model, (&samples, &initial), settings, allowed, (budget, work))
+        attempt(model, &initial, settings, allowed, (budget, work))
     })?;
     coarse.report.cut_cusps = CutCusp::of(model);
     Ok(coarse)
@@ -191,21 +214,23 @@ pub(super) fn mesh_surface(
 
 fn attempt(
     model: &CsgModel,
-    (samples, initial): (&GeometricSamples, &dyn SizeField),
+    initial: &Initial,
     settings: &CoarseSettings,
     allowed: Allowed,
     (budget, work): (&Budget, &Work),
 ) -> Attempt {
     let CsgModel { geometry, features, projector, .. } = model;
-    let own = GeometricSize::of_samples(geometry, features, &settings.size, samples);
-    let periodic = PeriodicSize::new(&own, features, settings.size.grading);
-    let size: &dyn SizeField = if features.identified.is_empty() { &own } else { &periodic };
+    let lowered = initial.lowered(model, &settings.size);
+    let own = lowered.as_ref().unwrap_or(&initial.size);
+    let periodic = PeriodicSize::new(own, features, settings.size.grading);
+    let size: &dyn SizeField = if features.identified.is_empty() { own } else { &periodic };
     let size = &WatchedSize::new(size, work);
     let expected = expected::tets(&features.bounds, size, expected::FEW, || |p: &Point| model.contains(p));
     if let Err(error) = budget.expect(expected, work) {
         return Attempt::Failed(error.into());
     }
-    let (surface, segments) = match mesh_surface(model, Sizes { size, initial }, allowed.lower) {
+    let (surface, segments) = match mesh_surface(model, Sizes { size, initial: &initial.size }, allowed.lower)
+    {
         Ok(made) => made,
         Err(Unmeshed::Lower(sources, gap)) => {
             budget.warn(Once::Edges, || gap.and_then(|gap| gap.warning()), work);
@@ -226,7 +251,7 @@ fn attempt(
     let smoothness = GeometrySmoothness { geometry, features };
     match fill(surface, regions, size, Some(&smoothness), settings.effort) {
         Ok(made) => Attempt::Made(Box::new(made)),
-        Err(error) => match CloseSurfaces::unresolved(model, samples, error.places()) {
+        Err(error) => match CloseSurfaces::unresolved(model, &initial.samples, error.places()) {
             Some(walls) => Attempt::Failed(TooClose::new(walls).into()),
             None => Unmeshed::of(error, &segments, size, allowed.lower).into(),
         },
