@@ -22,64 +22,62 @@ const MOST_HALVINGS: u32 = 30;
 /// Maximum number of secant steps.
 const MOST_STEPS: usize = 4;
 
-/// Tolerance of the logarithm of the number: as good as the estimate, and well inside the accepted
-/// range.
-const NEAR: f64 = 0.08;
+/// An error of the logarithm of the number from which one more secant step is accurate without
+/// another integral: slopes between scales so close to each other differ by a tenth.
+const NEAR: f64 = 0.3;
 
-/// Returns the scale at which `goal` tets are expected, from a mesh `made` with these settings;
-/// `None` without a size field.
-pub(super) fn scale_for(
-    model: &Model,
-    settings: &CoarseSettings,
-    made: &CoarseMesh,
+/// A mesh from which numbers of tets at other scales are predicted.
+pub(super) struct Estimate<'a> {
+    model: &'a Model,
+    made: &'a CoarseMesh,
+    /// The settings it was made with.
+    settings: &'a CoarseSettings,
+    /// The number of sources in the settings that were not added when it was made.
     own_sources: usize,
-    goal: f64,
-) -> Option<f64> {
-    let integral_at = |scale| integral_at(model, settings, made, own_sources, scale);
-    let count = made.report.tets as f64;
-    let (mut scale, base) = (settings.size.scale, integral_at(settings.size.scale)?);
-    // Secant steps in logarithms: the number of tets falls with the third power of the scale, more
-    // slowly where something else bounds the sizes.
-    let mut error = (count / goal).ln();
-    let mut slope = -3.0;
-    for _ in 0..MOST_STEPS {
-        let next = scale * (-error / slope).clamp(-4.0, 4.0).exp();
-        let next_error = (count * integral_at(next)? / base / goal).ln();
-        let step = (next / scale).ln();
-        if step != 0.0 {
-            slope = ((next_error - error) / step).clamp(-4.0, -0.5);
-        }
-        (scale, error) = (next, next_error);
-        if error.abs() < NEAR {
-            break;
-        }
+    /// The integral with these settings.
+    base: f64,
+}
+
+impl<'a> Estimate<'a> {
+    /// Returns `None` without a size field.
+    pub fn new(
+        model: &'a Model,
+        settings: &'a CoarseSettings,
+        made: &'a CoarseMesh,
+        own_sources: usize,
+    ) -> Option<Self> {
+        let mut estimate = Self { model, made, settings, own_sources, base: 1.0 };
+        estimate.base = estimate.share_at(settings.size.scale)?;
+        Some(estimate)
     }
-    scale.is_finite().then_some(scale)
-}
 
-/// The fraction of the tets of a mesh `made` with these settings that is expected at a larger
-/// scale; `None` without a size field.
-pub(super) fn share_at(
-    model: &Model,
-    settings: &CoarseSettings,
-    made: &CoarseMesh,
-    own_sources: usize,
-    scale: f64,
-) -> Option<f64> {
-    let integral_at = |scale| integral_at(model, settings, made, own_sources, scale);
-    Some(integral_at(scale)? / integral_at(settings.size.scale)?)
-}
+    /// The scale at which `goal` tets are expected.
+    pub fn scale_for(&self, goal: f64) -> Option<f64> {
+        // Secant steps in logarithms: the number of tets falls with the third power of the scale,
+        // more slowly where something else bounds the sizes.
+        let (mut scale, mut slope) = (self.settings.size.scale, -3.0);
+        let mut error = (self.made.report.tets as f64 / goal).ln();
+        let step = |error: f64, slope: f64| (-error / slope).clamp(-4.0, 4.0).exp();
+        for _ in 0..MOST_STEPS {
+            let next = scale * step(error, slope);
+            let next_error = (self.made.report.tets as f64 * self.share_at(next)? / goal).ln();
+            if next != scale {
+                slope = ((next_error - error) / (next / scale).ln()).clamp(-4.0, -0.5);
+            }
+            (scale, error) = (next, next_error);
+            if error.abs() < NEAR {
+                break;
+            }
+        }
+        Some(scale * step(error, slope)).filter(|scale| scale.is_finite())
+    }
 
-/// The integral of the size field at a scale over a mesh; `None` without a size field.
-fn integral_at(
-    model: &Model,
-    settings: &CoarseSettings,
-    made: &CoarseMesh,
-    own_sources: usize,
-    scale: f64,
-) -> Option<f64> {
-    let sizes = at_scale(&settings.size, scale, own_sources);
-    model.size_field(&sizes).map(|size| integral(&made.mesh, &*size))
+    /// The expected number of tets at a scale, as a fraction of those of the mesh.
+    pub fn share_at(&self, scale: f64) -> Option<f64> {
+        let sizes = at_scale(&self.settings.size, scale, self.own_sources);
+        let size = self.model.rough_size_field(&sizes)?;
+        Some(integral(&self.made.mesh, &*size) / self.base)
+    }
 }
 
 /// The settings at another scale. Sources added at this scale grow at a larger one like the sizes

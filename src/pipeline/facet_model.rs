@@ -154,6 +154,12 @@ impl FacetSolid {
         of(&self.model, settings)
     }
 
+    /// The size field with larger errors, which is built in a fraction of the time.
+    pub(super) fn rough_size_field(&self, settings: &SizeSettings) -> FacetSize {
+        let of = if self.keep_surface { FacetSize::of_kept } else { FacetSize::rough };
+        of(&self.model, settings)
+    }
+
     fn attempt(&self, settings: &CoarseSettings, allowed: Allowed, budget: &Budget, work: &Work) -> Attempt {
         let own = self.size_field(&settings.size);
         let size = WatchedSize::new(&own, work);

@@ -156,6 +156,17 @@ impl Model {
         }
     }
 
+    /// The size field with larger errors, which is built in a fraction of the time.
+    pub(super) fn rough_size_field(&self, settings: &SizeSettings) -> Option<Box<dyn SizeField + '_>> {
+        match self {
+            Self::Csg(model) => {
+                Some(Box::new(GeometricSize::rough(&model.geometry, &model.features, settings)))
+            }
+            Self::Facets(solid) => Some(Box::new(solid.rough_size_field(settings))),
+            Self::Given(_) => None,
+        }
+    }
+
     /// Makes a coarse mesh with the given sizes, see [`coarse::mesh`](super::coarse::mesh). An
     /// existing mesh is used unchanged.
     ///

@@ -3,7 +3,7 @@
 use super::coarse::CoarseSettings;
 use super::coarse_error::CoarseError;
 use super::coarse_mesh::CoarseMesh;
-use super::estimate;
+use super::estimate::Estimate;
 use super::model::Model;
 use super::retries::{Budget, TARGETS};
 use crate::ground::progress::Work;
@@ -23,11 +23,26 @@ pub enum Outcome {
 /// The number to aim at, relative to the target: inside the accepted range, which begins near 1.
 const AIM: f64 = 1.15;
 
+/// A mesh predicts the scale for numbers of tets up to this many times its own.
+///
+/// Beyond, its volume differs too much from that of the geometry near curved surfaces, where most
+/// tets will be: from a mesh of 3,417 tets, 1.15 million were predicted where 1.85 million were
+/// made (`benches/results/coarse-count-2026-11-25.md`).
+const FAR: f64 = 32.0;
+
+/// The factor between the goal and the mesh that predicts its scale, or between such meshes, which
+/// together take 7 % of the time.
+const STAGE: f64 = 16.0;
+
 /// Number of trials that use the estimate.
 const TRUSTED_TRIES: usize = 4;
 
 /// Scales beyond this have no effect on the mesh.
 const LARGEST_SCALE: f64 = 1e3;
+
+/// Sizes are multiplied by no less than this at once: the number of tets is to grow by up to
+/// [`FAR`], and it grows at least as fast as sizes fall, except near single points.
+const LEAST_STEP: f64 = 1.0 / FAR;
 
 /// A bracket of scales narrower than this factor is not divided further.
 const NARROW: f64 = 1.002;
@@ -62,9 +77,11 @@ pub fn mesh_to_target(
     let goal = AIM * target as f64;
     let (sources, grading) = (settings.size.sources.len(), settings.size.grading);
     let mut search = Search::default();
+    // The meshes made here, which together may always have as many tets as requested.
+    let mut tets = 0;
     for tries in 0..TARGETS {
         work.proceed()?;
-        if tries > 0 && budget.is_spent() {
+        if tries > 0 && (!budget.has_meshes() || budget.is_spent() && tets >= target) {
             break;
         }
         // What the last mesh added belongs to its scale.
@@ -87,14 +104,16 @@ pub fn mesh_to_target(
             return Ok((made, Outcome::Reached));
         }
         let count = made.report.tets;
+        tets += count;
+        let estimate = Estimate::new(model, settings, &made, sources);
+        let aim = search.aim(goal, count as f64);
         // If estimates do not narrow the bracket, continue without them.
-        let expected = (tries < TRUSTED_TRIES)
-            .then(|| estimate::scale_for(model, settings, &made, sources, goal))
-            .flatten();
+        let expected = estimate.as_ref().filter(|_| tries < TRUSTED_TRIES);
+        let expected = expected.and_then(|estimate| estimate.scale_for(aim));
         if count < target {
             search.coarse = Some((scale, count as f64));
         } else {
-            let share = estimate::share_at(model, settings, &made, sources, LARGEST_SCALE);
+            let share = estimate.and_then(|estimate| estimate.share_at(LARGEST_SCALE));
             if search.too_many(scale, made, share) {
                 break;
             }
@@ -102,7 +121,7 @@ pub fn mesh_to_target(
         if search.is_narrow() {
             break;
         }
-        settings.size.scale = search.next_scale(scale, goal, count as f64, expected);
+        settings.size.scale = search.next_scale(scale, aim, count as f64, expected);
     }
     match (search.best, search.failure) {
         (Some((scale, made)), _) => {
@@ -110,7 +129,11 @@ pub fn mesh_to_target(
             Ok((made, if search.is_least { Outcome::Least } else { Outcome::Jumped }))
         }
         (None, Some(error)) => Err(error),
-        (None, None) => model.coarse_mesh(settings, budget, work).map(|made| (made, Outcome::Jumped)),
+        (None, None) => {
+            let made = model.coarse_mesh(settings, budget, work)?;
+            let outcome = if fits(made.report.tets) { Outcome::Reached } else { Outcome::Jumped };
+            Ok((made, outcome))
+        }
     }
 }
 
@@ -160,6 +183,15 @@ impl Search {
         self.fine.zip(self.coarse).is_some_and(|((low, _), (high, _))| high / low < NARROW)
     }
 
+    /// The number to aim at after a mesh of `count` tets: the goal, or less if it is too far away.
+    fn aim(&self, goal: f64, count: f64) -> f64 {
+        let mut aim = goal;
+        while self.fine.is_none() && aim > FAR * count.max(1.0) {
+            aim /= STAGE;
+        }
+        aim
+    }
+
     /// The scale to try next: the `expected` one if it is inside the bracket, else from the number
     /// of tets, which goes with the third power of the scale.
     fn next_scale(&self, scale: f64, goal: f64, count: f64, expected: Option<f64>) -> f64 {
@@ -179,7 +211,7 @@ impl Search {
             (Some(_), None) => (scale * (count / goal).cbrt().max(1.5).powi(2).min(16.0)).min(LARGEST_SCALE),
             _ => {
                 let finer = expected.map_or((count / goal).cbrt(), |expected| expected / scale);
-                scale * finer.clamp(0.05, 0.9)
+                scale * finer.clamp(LEAST_STEP, 0.9)
             }
         }
     }
@@ -212,6 +244,16 @@ mod tests {
         assert_eq!(best(&search), 550);
         search.too_many(3.5, mesh(600, 30.0), None);
         assert_eq!(best(&search), 550, "600 is more than a quarter above 450");
+    }
+
+    #[test]
+    fn far_goals_are_approached_in_stages_until_there_are_too_many_tets() {
+        let mut search = Search::default();
+        assert_eq!(search.aim(30_000.0, 1000.0), 30_000.0);
+        assert_eq!(search.aim(160_000.0, 1000.0), 10_000.0);
+        assert_eq!(search.aim(2_560_000.0, 1000.0), 10_000.0);
+        search.too_many(1.0, mesh(1_000_000, 20.0), None);
+        assert_eq!(search.aim(160_000.0, 1000.0), 160_000.0);
     }
 
     #[test]

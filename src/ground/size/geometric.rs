@@ -2,7 +2,7 @@
 
 use super::{Closeness, GeometricSamples, Preset, SizeField, SizeFunction, Source, SourceTree};
 use crate::Point;
-use csg::{BodyId, Features, Geometry, Solid};
+use csg::{Aabb, BodyId, Features, Geometry, Solid};
 
 /// The user's settings of the size field.
 #[derive(Clone, Debug)]
@@ -94,6 +94,12 @@ impl<'a> GeometricSize<'a> {
         Self::of_samples(geometry, features, settings, &GeometricSamples::new(geometry, features, settings))
     }
 
+    /// The same field with a [rough](SourceTree::rough) tree.
+    pub(crate) fn rough(geometry: &'a Geometry, features: &Features, settings: &SizeSettings) -> Self {
+        let samples = GeometricSamples::new(geometry, features, settings);
+        Self::with_tree(geometry, features, settings, &samples, SourceTree::rough)
+    }
+
     /// Builds the field from samples that were taken with the same settings, except for their
     /// sources.
     pub fn of_samples(
@@ -102,8 +108,18 @@ impl<'a> GeometricSize<'a> {
         settings: &SizeSettings,
         samples: &GeometricSamples,
     ) -> Self {
+        Self::with_tree(geometry, features, settings, samples, SourceTree::new)
+    }
+
+    fn with_tree(
+        geometry: &'a Geometry,
+        features: &Features,
+        settings: &SizeSettings,
+        samples: &GeometricSamples,
+        tree: fn(Aabb, f64, f64, &[Source]) -> SourceTree,
+    ) -> Self {
         let sources = [&*settings.sources, &*samples.sources].concat();
-        let tree = SourceTree::new(features.bounds, settings.grading, samples.maximum, &sources);
+        let tree = tree(features.bounds, settings.grading, samples.maximum, &sources);
         Self { geometry, tree, body_bounds: samples.body_bounds.clone(), function: settings.function.clone() }
     }
 }
