@@ -1,5 +1,6 @@
 //! Geometric kernel: exact predicates, simplices, shape measures, search, orderings.
 
+pub(crate) mod buckets;
 pub(crate) mod fixed;
 pub(crate) mod hash;
 pub mod hilbert;

@@ -4,8 +4,11 @@
 //! of the vertices. A part whose vertices keep the order of the whole mesh has its edges and faces
 //! in the order of the whole mesh too.
 
+mod list;
+
 use super::{EdgeId, FaceId, TET_EDGES, TET_FACES, VertexId};
-use rayon::prelude::*;
+use crate::ground::kernel::buckets::first;
+use list::{Entry, Listed, list};
 
 /// The maximum number of tets whose edges can be listed: positions in tets are `u32`.
 pub const MAX_TETS: usize = (u32::MAX / 6) as usize;
@@ -28,13 +31,32 @@ pub struct Faces {
     pub tet_faces: Vec<[FaceId; 4]>,
 }
 
+/// The faces of a set of tets, with the tets of each.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct MatchedFaces {
+    /// The faces.
+    pub listed: Faces,
+    /// The one or two tets of each face, ascending; `u32::MAX` for a missing second one.
+    pub tets: Vec<[u32; 2]>,
+}
+
 /// Lists the edges of tets on `vertices` vertices.
 ///
 /// # Panics
 /// With more than [`MAX_TETS`] tets, or if a tet refers to a vertex that does not exist.
 pub fn edges(vertices: usize, tets: &[[VertexId; 4]]) -> Edges {
-    let (edges, places) = list::<2, 1, 6>(vertices, tets, &TET_EDGES);
-    Edges { edges, tet_edges: places.into_iter().map(|ids| ids.map(EdgeId)).collect() }
+    edges_of(list(vertices, tets, &TET_EDGES, |_| ()))
+}
+
+/// [`edges()`], with the last tet of each edge.
+///
+/// # Panics
+/// As [`edges()`].
+pub fn edges_with_tets(vertices: usize, tets: &[[VertexId; 4]]) -> (Edges, Vec<u32>) {
+    let last = |entries: &[Entry]| entries.iter().map(|entry| entry.tet).max().unwrap_or_default();
+    let mut listed = list(vertices, tets, &TET_EDGES, last);
+    let tets = std::mem::take(&mut listed.values);
+    (edges_of(listed), tets)
 }
 
 /// Lists the faces of tets on `vertices` vertices.
@@ -42,8 +64,42 @@ pub fn edges(vertices: usize, tets: &[[VertexId; 4]]) -> Edges {
 /// # Panics
 /// With more than [`MAX_TETS`] tets, or if a tet refers to a vertex that does not exist.
 pub fn faces(vertices: usize, tets: &[[VertexId; 4]]) -> Faces {
-    let (faces, places) = list::<3, 2, 4>(vertices, tets, &TET_FACES);
-    Faces { faces, tet_faces: places.into_iter().map(|ids| ids.map(FaceId)).collect() }
+    faces_of(list(vertices, tets, &TET_FACES, |_| ()))
+}
+
+/// [`faces()`], with the tets of each face.
+///
+/// # Errors
+/// The vertices of the first face that has more than two tets.
+///
+/// # Panics
+/// As [`faces()`].
+pub fn matched_faces(vertices: usize, tets: &[[VertexId; 4]]) -> Result<MatchedFaces, [VertexId; 3]> {
+    /// Marks a face of more than two tets; no tet has this index.
+    const TOO_MANY: [u32; 2] = [u32::MAX; 2];
+    let sides = |entries: &[Entry]| match *entries {
+        [one] => [one.tet, u32::MAX],
+        [one, other] => [one.tet.min(other.tet), one.tet.max(other.tet)],
+        _ => TOO_MANY,
+    };
+    let mut listed = list(vertices, tets, &TET_FACES, sides);
+    let tets = std::mem::take(&mut listed.values);
+    let listed = faces_of(listed);
+    if first(tets.len(), |face| tets[face] == TOO_MANY).is_some() {
+        let face = face_tets(listed.faces.len(), &listed.tet_faces).expect_err("a face has three tets");
+        return Err(listed.faces[face.index()]);
+    }
+    Ok(MatchedFaces { listed, tets })
+}
+
+fn edges_of<T>(listed: Listed<2, 6, T>) -> Edges {
+    let tet_edges = listed.of_tets.into_iter().map(|ids| ids.map(EdgeId)).collect();
+    Edges { edges: listed.entities, tet_edges }
+}
+
+fn faces_of<T>(listed: Listed<3, 4, T>) -> Faces {
+    let tet_faces = listed.of_tets.into_iter().map(|ids| ids.map(FaceId)).collect();
+    Faces { faces: listed.entities, tet_faces }
 }
 
 /// The one or two tets of each face, `u32::MAX` for a missing one.
@@ -59,91 +115,6 @@ pub fn face_tets(faces: usize, tet_faces: &[[FaceId; 4]]) -> Result<Vec<[u32; 2]
         }
     }
     Ok(tets)
-}
-
-/// A sub-entity of a tet: its vertices without the smallest, and its position, `K` × tet + index in
-/// the tet.
-type Entry<const REST: usize> = ([u32; REST], u32);
-
-/// Lists the distinct sub-entities of V vertices, K of them in each tet, and the position in the
-/// list of each tet's. `REST` is V − 1.
-///
-/// Entries are distributed to buckets by their smallest vertex, by counting; each bucket (a few
-/// dozen entries) is sorted.
-fn list<const V: usize, const REST: usize, const K: usize>(
-    vertices: usize,
-    tets: &[[VertexId; 4]],
-    local: &[[usize; V]; K],
-) -> (Vec<[VertexId; V]>, Vec<[u32; K]>) {
-    assert!(
-        tets.len() <= MAX_TETS,
-        "{} tets are more than {MAX_TETS}, the most that can be listed",
-        tets.len()
-    );
-    let sorted = |tet: &[VertexId; 4], k: usize| {
-        let mut entity = local[k].map(|i| tet[i]);
-        entity.sort_unstable();
-        entity
-    };
-    let mut bucket_ends = vec![0u32; vertices + 1];
-    for tet in tets {
-        (0..K).for_each(|k| bucket_ends[sorted(tet, k)[0].index() + 1] += 1);
-    }
-    for v in 0..vertices {
-        bucket_ends[v + 1] += bucket_ends[v];
-    }
-    // Here bucket_ends[v] is the start of bucket v; filling moves it to the end of the bucket.
-    let mut entries: Vec<Entry<REST>> = vec![([0; REST], 0); tets.len() * K];
-    for (t, tet) in tets.iter().enumerate() {
-        for k in 0..K {
-            let entity = sorted(tet, k);
-            let at = &mut bucket_ends[entity[0].index()];
-            let mut rest = [0; REST];
-            rest.iter_mut().zip(&entity[1..]).for_each(|(r, v)| *r = v.0);
-            entries[*at as usize] = (rest, (t * K + k) as u32);
-            *at += 1;
-        }
-    }
-    bucket_ends.truncate(vertices);
-    sort_buckets(&mut entries, &bucket_ends);
-
-    let mut listed: Vec<[VertexId; V]> = Vec::new();
-    let mut places = vec![[0; K]; tets.len()];
-    let mut begin = 0;
-    for (v, &end) in bucket_ends.iter().enumerate() {
-        let mut previous = None;
-        for &(rest, place) in &entries[begin..end as usize] {
-            if previous.replace(rest) != Some(rest) {
-                let mut entity = [VertexId::new(v); V];
-                entity[1..].iter_mut().zip(rest).for_each(|(e, r)| *e = VertexId(r));
-                listed.push(entity);
-            }
-            places[place as usize / K][place as usize % K] = (listed.len() - 1) as u32;
-        }
-        begin = end as usize;
-    }
-    (listed, places)
-}
-
-/// Sorts each bucket, runs of many buckets in parallel.
-fn sort_buckets<const REST: usize>(entries: &mut [Entry<REST>], ends: &[u32]) {
-    /// Buckets per task: enough that a task costs much more than its start.
-    const RUN: usize = 4096;
-    let mut runs = Vec::new();
-    let (mut rest, mut begin) = (entries, 0);
-    for ends in ends.chunks(RUN) {
-        let end = ends[ends.len() - 1];
-        let (run, after) = rest.split_at_mut((end - begin) as usize);
-        runs.push((run, begin, ends));
-        (rest, begin) = (after, end);
-    }
-    runs.into_par_iter().for_each(|(run, first, ends)| {
-        let mut begin = first;
-        for &end in ends {
-            run[(begin - first) as usize..(end - first) as usize].sort_unstable();
-            begin = end;
-        }
-    });
 }
 
 #[cfg(test)]
@@ -171,11 +142,13 @@ mod tests {
         let tets = [[0, 1, 2, 3], [0, 1, 2, 4], [0, 1, 2, 5]].map(|tet: [u32; 4]| tet.map(VertexId));
         let f = faces(6, &tets);
         assert_eq!(face_tets(f.faces.len(), &f.tet_faces), Err(FaceId(0)));
+        assert_eq!(matched_faces(6, &tets), Err([0, 1, 2].map(VertexId)));
     }
 
     #[test]
     fn lists_agree_with_sets_and_each_tet_finds_its_own() {
-        let mesh = lattice_cube(5);
+        // Of several buckets.
+        let mesh = lattice_cube(24);
         let e = edges(mesh.points.len(), &mesh.tets);
         let f = faces(mesh.points.len(), &mesh.tets);
         let mut edge_set = BTreeSet::new();
@@ -196,5 +169,16 @@ mod tests {
         }
         assert!(e.edges.iter().eq(&edge_set));
         assert!(f.faces.iter().eq(&face_set));
+        let matched = matched_faces(mesh.points.len(), &mesh.tets).unwrap();
+        assert_eq!(matched.tets, face_tets(f.faces.len(), &f.tet_faces).unwrap());
+        assert_eq!(matched.listed, f);
+        let (again, last_tets) = edges_with_tets(mesh.points.len(), &mesh.tets);
+        for (t, edges) in (0..).zip(&e.tet_edges) {
+            assert!(edges.iter().all(|edge| last_tets[edge.index()] >= t));
+        }
+        for (edge, &tet) in last_tets.iter().enumerate() {
+            assert!(e.tet_edges[tet as usize].contains(&EdgeId::new(edge)));
+        }
+        assert_eq!(again, e);
     }
 }
