@@ -1,13 +1,17 @@
 //! Distribution of a mesh on rank 0: one part to each rank.
 
-use super::classify::{Classified, Triangle, classify};
+use super::classify::{Classified, Tables, Triangle, classify};
 use super::piece::{Entities, Piece};
+use super::residence::Residence;
 use super::{DistMesh, Shared, Totals};
 use crate::ground::comm::{CommError, Communicator};
 use crate::ground::error::{ErrorKind, HasKind};
-use crate::ground::mesh::topology::{self, Edges, Faces};
+use crate::ground::kernel::buckets::{Buckets, map_each, ranges, tabulate};
+use crate::ground::mesh::topology::{self, MatchedFaces};
 use crate::ground::mesh::{Class, EdgeId, FaceId, GlobalId, Mesh, Rank, VertexId};
 use rayon::prelude::*;
+use std::sync::atomic::AtomicBool;
+use std::sync::atomic::Ordering::Relaxed;
 
 /// Why a mesh cannot be distributed.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -124,9 +128,27 @@ impl HasKind for DistError {
 /// [`DistError`] if the mesh is not a manifold or not fully classified, or if the partition does
 /// not fit it. All ranks return an error; the others one that names rank 0.
 pub fn distribute(comm: &dyn Communicator, mesh: Option<(Mesh, Vec<Rank>)>) -> Result<DistMesh, DistError> {
+    distribute_listed(comm, mesh.map(|(mesh, part)| (mesh, part, None)))
+}
+
+/// **Collective.** [`distribute()`] of a mesh whose faces are listed already.
+///
+/// # Errors
+/// As [`distribute()`].
+pub fn distribute_matched(
+    comm: &dyn Communicator,
+    mesh: Option<(Mesh, Vec<Rank>, MatchedFaces)>,
+) -> Result<DistMesh, DistError> {
+    distribute_listed(comm, mesh.map(|(mesh, part, faces)| (mesh, part, Some(faces))))
+}
+
+fn distribute_listed(
+    comm: &dyn Communicator,
+    mesh: Option<(Mesh, Vec<Rank>, Option<MatchedFaces>)>,
+) -> Result<DistMesh, DistError> {
     let listed = match mesh {
-        Some((mesh, part)) if comm.rank() == 0 => {
-            Listed::new(mesh, &part, comm.size()).map(|listed| Some((listed, part)))
+        Some((mesh, part, faces)) if comm.rank() == 0 => {
+            Listed::new(mesh, &part, comm.size(), faces).map(|listed| Some((listed, part)))
         }
         None if comm.rank() == 0 => Err(DistError::NoMesh),
         _ => Ok(None),
@@ -156,14 +178,14 @@ pub fn from_serial(mesh: Mesh) -> Result<DistMesh, DistError> {
 /// A mesh with its edges and faces, and their classification.
 struct Listed {
     mesh: Mesh,
-    edges: Edges,
-    faces: Faces,
+    tables: Tables,
     classified: Classified,
 }
 
 impl Listed {
-    /// Enumerates and classifies the edges and faces; rejects a mesh that cannot be distributed.
-    fn new(mesh: Mesh, part: &[Rank], ranks: u32) -> Result<Self, DistError> {
+    /// Enumerates and classifies the edges and faces (unless they are given); rejects a mesh that
+    /// cannot be distributed.
+    fn new(mesh: Mesh, part: &[Rank], ranks: u32, faces: Option<MatchedFaces>) -> Result<Self, DistError> {
         let tets = mesh.tets.len();
         if part.len() != tets {
             return Err(DistError::PartsMismatch { tets, parts: part.len() });
@@ -174,22 +196,26 @@ impl Listed {
         if let Some(tet) = part.iter().position(|&rank| rank >= ranks) {
             return Err(DistError::NoSuchRank { tet, part: part[tet], ranks });
         }
-        let mut used = vec![false; mesh.points.len()];
-        mesh.tets.iter().flatten().for_each(|v| used[v.index()] = true);
-        if let Some(vertex) = used.iter().position(|used| !used) {
+        if let Some(vertex) = unused_vertex(&mesh) {
             return Err(DistError::UnusedVertex { vertex });
         }
-        let edges = topology::edges(mesh.points.len(), &mesh.tets);
-        let faces = topology::faces(mesh.points.len(), &mesh.tets);
-        let classified = classify(&mesh, &edges, &faces)?;
-        Ok(Self { mesh, edges, faces, classified })
+        let faces = match faces {
+            Some(faces) => faces,
+            None => topology::matched_faces(mesh.points.len(), &mesh.tets)
+                .map_err(|vertices| DistError::FaceOfThreeTets { vertices: vertices.map(|v| v.0) })?,
+        };
+        let (edges, edge_tets) = topology::edges_with_tets(mesh.points.len(), &mesh.tets);
+        let mut tables = Tables { edges, edge_tets, faces };
+        let classified = classify(&mesh, &tables)?;
+        tables.edge_tets = Vec::new();
+        Ok(Self { mesh, tables, classified })
     }
 
     fn totals(&self) -> Totals {
         Totals {
             vertices: self.mesh.points.len() as u64,
-            edges: self.edges.edges.len() as u64,
-            faces: self.faces.faces.len() as u64,
+            edges: self.classified.edge_classes.len() as u64,
+            faces: self.classified.face_classes.len() as u64,
             tets: self.mesh.tets.len() as u64,
             boundary: self.classified.triangles.len() as u64,
         }
@@ -198,115 +224,37 @@ impl Listed {
     /// The whole mesh as the part of the only rank.
     fn into_only_part(self) -> DistMesh {
         let totals = self.totals();
-        let Self { mesh, edges, faces, classified } = self;
-        let entities = |classes: Vec<Class>| Entities {
-            ids: (0..classes.len() as GlobalId).collect(),
-            classes,
-            shared: Shared::default(),
-        };
+        let Self { mesh, tables, classified } = self;
+        let ids = |count: usize| tabulate(count, |id| id as GlobalId);
+        let entities =
+            |classes: Vec<Class>| Entities { ids: ids(classes.len()), classes, shared: Shared::default() };
         let piece = Piece {
             totals,
             points: mesh.points,
             vertices: entities(mesh.classes),
             edges: entities(classified.edge_classes),
             faces: entities(classified.face_classes),
-            tet_ids: (0..mesh.tets.len() as GlobalId).collect(),
+            tet_ids: ids(mesh.tets.len()),
             tets: mesh.tets,
             bodies: mesh.bodies,
             triangles: classified.triangles,
         };
-        piece.assemble_from(edges, faces, 0, 1)
+        piece.assemble_from(tables.edges, tables.faces, 0, 1)
     }
 }
 
-/// Lists of numbers in compressed row storage.
-struct Rows {
-    offsets: Vec<u32>,
-    items: Vec<u32>,
-}
-
-impl Rows {
-    /// Builds the rows from (row, item) pairs; items keep the order of `pairs`, which is called
-    /// twice.
-    fn collect(rows: usize, pairs: impl Fn(&mut dyn FnMut(u32, u32))) -> Self {
-        let mut offsets = vec![0; rows + 1];
-        pairs(&mut |row, _| offsets[row as usize + 1] += 1);
-        for row in 0..rows {
-            offsets[row + 1] += offsets[row];
-        }
-        let mut items = vec![0; offsets[rows] as usize];
-        let mut ends = offsets.clone();
-        pairs(&mut |row, item| {
-            let end = &mut ends[row as usize];
-            items[*end as usize] = item;
-            *end += 1;
-        });
-        Self { offsets, items }
-    }
-
-    fn len(&self) -> usize {
-        self.offsets.len() - 1
-    }
-
-    fn row(&self, row: usize) -> &[u32] {
-        &self.items[self.offsets[row] as usize..self.offsets[row + 1] as usize]
-    }
-
-    /// The transpose: for each item the rows that contain it, ascending.
-    fn transposed(&self, items: usize) -> Self {
-        Self::collect(items, |pair| {
-            for row in 0..self.len() {
-                self.row(row).iter().for_each(|&item| pair(item, row as u32));
-            }
-        })
-    }
-}
-
-/// The holders of each entity of one kind, and the entities of each rank, both ascending.
-struct Residence {
-    holders: Rows,
-    by_rank: Rows,
-}
-
-/// Finds the holders of the entities that `of_tet` lists for each tet.
-fn residence<const K: usize>(
-    entities: usize,
-    tets_by_rank: &Rows,
-    of_tet: impl Fn(u32) -> [u32; K],
-) -> Residence {
-    let holders = Rows::collect(entities, |pair| {
-        let mut last_holder = vec![Rank::MAX; entities];
-        for rank in 0..tets_by_rank.len() {
-            for &tet in tets_by_rank.row(rank) {
-                for entity in of_tet(tet) {
-                    if std::mem::replace(&mut last_holder[entity as usize], rank as Rank) != rank as Rank {
-                        pair(entity, rank as Rank);
-                    }
-                }
+/// The first vertex that belongs to no tet.
+fn unused_vertex(mesh: &Mesh) -> Option<usize> {
+    let used = tabulate(mesh.points.len(), |_| AtomicBool::new(false));
+    map_each(ranges(mesh.tets.len()), |range| {
+        for vertex in mesh.tets[range].iter().flatten().map(|v| &used[v.index()]) {
+            // Nearly all are set already; threads share what none of them writes.
+            if !vertex.load(Relaxed) {
+                vertex.store(true, Relaxed);
             }
         }
     });
-    let by_rank = holders.transposed(tets_by_rank.len());
-    Residence { holders, by_rank }
-}
-
-impl Residence {
-    /// The entities of `rank`.
-    fn entities(&self, rank: Rank, classes: &[Class]) -> Entities {
-        let ids = self.by_rank.row(rank as usize);
-        let mut shared = Shared::default();
-        for (local, &id) in (0..).zip(ids) {
-            let holders = self.holders.row(id as usize);
-            if holders.len() > 1 {
-                shared.push(local, holders.iter().copied());
-            }
-        }
-        Entities {
-            ids: ids.iter().map(|&id| GlobalId::from(id)).collect(),
-            classes: ids.iter().map(|&id| classes[id as usize]).collect(),
-            shared,
-        }
-    }
+    used.iter().position(|used| !used.load(Relaxed))
 }
 
 /// The data from which rank 0 builds the message for each rank.
@@ -317,8 +265,8 @@ struct Plan {
     face_classes: Vec<Class>,
     triangles: Vec<Triangle>,
     /// Indices into `triangles`.
-    triangles_by_rank: Rows,
-    tets_by_rank: Rows,
+    triangles_by_rank: Buckets,
+    tets_by_rank: Buckets,
     vertices: Residence,
     edges: Residence,
     faces: Residence,
@@ -328,19 +276,23 @@ impl Plan {
     /// Finds the holders of all entities.
     fn new(listed: Listed, part: &[Rank], ranks: u32) -> Self {
         let totals = listed.totals();
-        let Listed { mesh, edges, faces, classified } = listed;
+        let Listed { mesh, tables, classified } = listed;
         let Classified { edge_classes, face_classes, triangles } = classified;
-        let tets_by_rank =
-            Rows::collect(ranks as usize, |pair| (0..).zip(part).for_each(|(tet, &r)| pair(r, tet)));
-        let vertices = residence(mesh.points.len(), &tets_by_rank, |t| mesh.tets[t as usize].map(|v| v.0));
-        let edge_ids = |t: u32| edges.tet_edges[t as usize].map(|EdgeId(id)| id);
-        let face_ids = |t: u32| faces.tet_faces[t as usize].map(|FaceId(id)| id);
-        let edges = residence(edge_classes.len(), &tets_by_rank, edge_ids);
-        let faces = residence(face_classes.len(), &tets_by_rank, face_ids);
-        let triangles_by_rank = Rows::collect(ranks as usize, |pair| {
-            for (index, triangle) in (0..).zip(&triangles) {
-                faces.holders.row(triangle.face.index()).iter().for_each(|&rank| pair(rank, index));
-            }
+        // The ranks list edges and faces again: free all that is not needed here.
+        let (tet_edges, tet_faces) = tables.into_tets();
+        let tets = ranges(mesh.tets.len());
+        let tets_by_rank = Buckets::collect(&tets, ranks as usize, |range| {
+            range.map(|tet| (part[tet] as usize, tet as u32))
+        });
+        let vertex_ids = |tet: usize| mesh.tets[tet].map(|v| v.0);
+        let edge_ids = |tet: usize| tet_edges[tet].map(|EdgeId(id)| id);
+        let face_ids = |tet: usize| tet_faces[tet].map(|FaceId(id)| id);
+        let vertices = Residence::new(mesh.points.len(), part, ranks, vertex_ids);
+        let edges = Residence::new(edge_classes.len(), part, ranks, edge_ids);
+        let faces = Residence::new(face_classes.len(), part, ranks, face_ids);
+        let triangles_by_rank = Buckets::collect(&ranges(triangles.len()), ranks as usize, |range| {
+            let holders = |index: usize| faces.holders(triangles[index].face.0);
+            range.flat_map(move |index| holders(index).iter().map(move |&rank| (rank as usize, index as u32)))
         });
         Self {
             totals,
@@ -356,19 +308,20 @@ impl Plan {
         }
     }
 
-    /// The message for `rank`. `local` is scratch: the local ids of this rank's vertices and faces,
-    /// by global id.
+    /// The message for `rank`. `local` is scratch: the local ids of this rank's vertices, by global
+    /// id.
     fn piece(&self, rank: Rank, local: &mut Vec<u32>) -> Piece {
-        local.resize(self.mesh.points.len().max(self.face_classes.len()), 0);
-        let vertices = self.vertices.by_rank.row(rank as usize);
-        let tets = self.tets_by_rank.row(rank as usize);
+        local.resize(self.mesh.points.len(), 0);
+        let vertices = self.vertices.of_rank(rank);
+        let tets = self.tets_by_rank.of(rank as usize);
         (0..).zip(vertices).for_each(|(index, &v)| local[v as usize] = index);
         let local_tets =
             tets.iter().map(|&t| self.mesh.tets[t as usize].map(|v| VertexId(local[v.index()]))).collect();
-        (0..).zip(self.faces.by_rank.row(rank as usize)).for_each(|(index, &f)| local[f as usize] = index);
-        let triangles = self.triangles_by_rank.row(rank as usize).iter().map(|&t| {
+        let faces = self.faces.of_rank(rank);
+        let triangles = self.triangles_by_rank.of(rank as usize).iter().map(|&t| {
             let triangle = self.triangles[t as usize];
-            Triangle { face: FaceId(local[triangle.face.index()]), ..triangle }
+            let face = faces.binary_search(&triangle.face.0).expect("the rank has the face");
+            Triangle { face: FaceId::new(face), ..triangle }
         });
         Piece {
             totals: self.totals,

@@ -21,11 +21,12 @@ mod classify;
 mod distribute;
 mod number_shared;
 mod piece;
+mod residence;
 mod shared;
 
 pub use bare::{BareMesh, ClassifiedEdge, Side};
 pub use check::{CheckError, Faults};
-pub use distribute::{DistError, distribute, from_serial};
+pub use distribute::{DistError, distribute, distribute_matched, from_serial};
 pub use number_shared::{NumberError, number_shared};
 pub use shared::owner;
 

@@ -21,8 +21,9 @@ use crate::Point;
 use crate::ground::comm::pack::{put_ascending, put_varint, take_ascending, take_varint};
 use crate::ground::comm::{CommError, Communicator};
 use crate::ground::error::{ErrorKind, HasKind};
+use crate::ground::kernel::buckets::tabulate;
 use crate::ground::mesh::topology::{self, Edges, Faces};
-use crate::ground::mesh::{Class, EdgeId, FaceId, GlobalId, Rank, VertexId};
+use crate::ground::mesh::{Class, FaceId, GlobalId, Rank, VertexId};
 
 /// Why the edges and faces of a part cannot be numbered.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -76,7 +77,7 @@ pub fn number_shared(comm: &dyn Communicator, bare: BareMesh) -> Result<DistMesh
     let (rank, tets) = (bare.rank, bare.tets.len());
     let fits = tets <= topology::MAX_TETS;
     comm.agree(if fits { Ok(()) } else { Err(NumberError::TooManyTets { rank, tets }) })?;
-    let edges = topology::edges(bare.points.len(), &bare.tets);
+    let (edges, edge_tets) = topology::edges_with_tets(bare.points.len(), &bare.tets);
     let faces = topology::faces(bare.points.len(), &bare.tets);
 
     let messages = request_messages(&bare, &edges.edges, &faces.faces, comm.size());
@@ -95,7 +96,10 @@ pub fn number_shared(comm: &dyn Communicator, bare: BareMesh) -> Result<DistMesh
         tets: bare.totals.tets,
         boundary: bare.totals.boundary,
     };
-    Ok(assemble(bare, totals, (edges, edge_numbers), (faces, face_numbers)))
+    let body = |edge: usize| Class::Body(bare.tet_bodies[edge_tets[edge] as usize]);
+    let edge_classes = tabulate(edge_tets.len(), body);
+    drop(edge_tets);
+    Ok(assemble(bare, totals, (edges, edge_numbers), edge_classes, (faces, face_numbers)))
 }
 
 /// Global ids of the entities of one kind, ascending, and the holders of the shared ones.
@@ -326,18 +330,17 @@ impl Numbers {
     }
 }
 
-/// Assembles the part.
+/// Assembles the part. `edge_classes` are the bodies of the edges.
 fn assemble(
     bare: BareMesh,
     totals: Totals,
     (Edges { edges, tet_edges }, edge_numbers): (Edges, Numbers),
+    mut edge_classes: Vec<Class>,
     (Faces { faces, tet_faces }, face_numbers): (Faces, Numbers),
 ) -> DistMesh {
-    let mut edge_classes = vec![Class::Body(csg::BodyId(0)); edges.len()];
     let mut face_classes = vec![Class::Body(csg::BodyId(0)); faces.len()];
-    for ((tet_edges, tet_faces), body) in tet_edges.iter().zip(&tet_faces).zip(&bare.tet_bodies) {
-        tet_edges.iter().for_each(|edge: &EdgeId| edge_classes[edge.index()] = Class::Body(*body));
-        tet_faces.iter().for_each(|face: &FaceId| face_classes[face.index()] = Class::Body(*body));
+    for (tet_faces, body) in tet_faces.iter().zip(&bare.tet_bodies) {
+        tet_faces.iter().for_each(|face| face_classes[face.index()] = Class::Body(*body));
     }
     for classified in &bare.edges {
         let edge = edges.binary_search(&classified.vertices).unwrap_or_else(|_| {

@@ -8,7 +8,8 @@ use super::classify::{Triangle, is_odd};
 use super::{BoundaryFace, DistMesh, Shared, Totals, outward};
 use crate::Point;
 use crate::ground::comm::pack::{put, take};
-use crate::ground::mesh::topology::{self, Edges, Faces};
+use crate::ground::kernel::buckets::tabulate;
+use crate::ground::mesh::topology::{self, Edges, Faces, MatchedFaces};
 use crate::ground::mesh::{Class, FaceId, GlobalId, Rank, TetId, VertexId};
 use csg::{BodyId, PatchId};
 
@@ -95,13 +96,15 @@ impl Piece {
     /// Assembles the part of `rank`.
     pub fn assemble(self, rank: Rank, ranks: u32) -> DistMesh {
         let edges = topology::edges(self.points.len(), &self.tets);
-        let faces = topology::faces(self.points.len(), &self.tets);
+        let faces = topology::matched_faces(self.points.len(), &self.tets)
+            .unwrap_or_else(|face| panic!("face {face:?} on rank {rank} has more than two tets"));
         self.assemble_from(edges, faces, rank, ranks)
     }
 
     /// Assembles the part if the edges and faces of the tets are enumerated already.
-    pub fn assemble_from(self, edges: Edges, faces: Faces, rank: Rank, ranks: u32) -> DistMesh {
-        let (Edges { edges, tet_edges }, Faces { faces, tet_faces }) = (edges, faces);
+    pub fn assemble_from(self, edges: Edges, faces: MatchedFaces, rank: Rank, ranks: u32) -> DistMesh {
+        let Edges { edges, tet_edges } = edges;
+        let MatchedFaces { listed: Faces { faces, tet_faces }, tets: face_tets } = faces;
         assert_eq!(
             edges.len(),
             self.edges.ids.len(),
@@ -136,7 +139,7 @@ impl Piece {
             shared_edges: self.edges.shared,
             shared_faces: self.faces.shared,
         };
-        part.boundary = boundary(&part, &self.triangles);
+        part.boundary = boundary(&part, &face_tets, &self.triangles);
         part
     }
 }
@@ -147,17 +150,16 @@ fn triangle([face, patch, odd]: [u32; 3]) -> Triangle {
 
 /// Finds the parents of the triangles. A tet is behind a triangle if its outward face has the
 /// triangle's orientation.
-fn boundary(part: &DistMesh, triangles: &[Triangle]) -> Vec<BoundaryFace> {
-    let sides = topology::face_tets(part.faces.len(), &part.tet_faces)
-        .unwrap_or_else(|face| panic!("face {face:?} on rank {} has more than two tets", part.rank));
+fn boundary(part: &DistMesh, face_tets: &[[u32; 2]], triangles: &[Triangle]) -> Vec<BoundaryFace> {
     let find = |triangle: &Triangle| {
         let mut parents = [None; 2];
-        for tet in sides[triangle.face.index()].into_iter().filter(|&tet| tet != u32::MAX).map(TetId) {
+        let tets = face_tets[triangle.face.index()].into_iter().filter(|&tet| tet != u32::MAX);
+        for tet in tets.map(TetId) {
             let place = part.tet_faces[tet.index()].iter().position(|&face| face == triangle.face);
             let seen = outward(&part.tets[tet.index()], place.expect("a tet beside a face has it"));
             parents[usize::from(is_odd(seen) != triangle.odd)] = Some(tet);
         }
         BoundaryFace { face: triangle.face, patch: triangle.patch, parents }
     };
-    triangles.iter().map(find).collect()
+    tabulate(triangles.len(), |index| find(&triangles[index]))
 }
