@@ -20,6 +20,7 @@ use super::wanted::mesh_as_wanted;
 use crate::ground::comm::Communicator;
 use crate::ground::kernel::tree;
 use crate::ground::mesh::periodic::{self, PeriodicMap};
+use crate::ground::mesh::topology::MatchedFaces;
 use crate::ground::mesh::{Mesh, Names, Order};
 use crate::ground::progress::{Progress, Stage};
 use crate::ground::projector::Projector;
@@ -30,7 +31,7 @@ use crate::parallel::distribution::{self, BareMesh, DistMesh, number_shared};
 use crate::parallel::interfaces;
 use crate::parallel::migrate::BareStream;
 use crate::parallel::partition::ties::Ties;
-use crate::parallel::partition::{self};
+use crate::parallel::partition::{self, PartitionError};
 use crate::parallel::skin::{self, DeliveredSizes, Improvement};
 use std::sync::Arc;
 
@@ -111,16 +112,21 @@ fn coarse_parts<'a>(
     let made = model.map(|model| coarse_mesh(comm.size(), model, settings, sources, budget, progress));
     let made = comm.agree(made.transpose())?;
     let pieces = broadcast::pieces(comm, made.as_ref().map(|made| made.pieces))?;
-    let (coarse, sizes) = made.map(|made| (made.result, made.sizes)).unzip();
     let (names, projector) = broadcast::geometry(comm, model)?;
-    let given = coarse.as_ref().map(|made| (made.mesh.clone(), made.parts.clone()));
-    let dist = progress.stage(Stage::Distribute, |_| distribution::distribute(comm, given))?;
+    let (coarse, sizes, given) = match made {
+        Some(Coarse { result, sizes, faces, .. }) => {
+            let given = (result.mesh.clone(), result.parts.clone(), faces);
+            (Some(result), sizes, Some(given))
+        }
+        None => (None, None, None),
+    };
+    let dist = progress.stage(Stage::Distribute, |_| distribution::distribute_matched(comm, given))?;
     let fineness = (pieces << settings.refine, settings.coarse.order);
     let fits = room::refuse_oversized(comm.rank(), &dist, fineness, settings.disk.as_ref());
     comm.agree(fits.map_err(Error::from))?;
     let of_tet = settings.disk.as_ref().map_or(0, |disk| disk.memory_of_tet);
     room::refuse_crowded(comm, &dist, fineness, of_tet, settings.memory)?;
-    Ok(Parts { model, coarse, sizes: sizes.flatten(), dist, projector, names, pieces })
+    Ok(Parts { model, coarse, sizes, dist, projector, names, pieces })
 }
 
 /// The result of refining a coarse mesh.
@@ -317,6 +323,8 @@ struct Coarse {
     result: CoarseResult,
     /// For the method `surface`, the wanted sizes at the vertices.
     sizes: Option<Vec<f64>>,
+    /// The faces of the mesh, which both partition and distribution need.
+    faces: MatchedFaces,
 }
 
 /// Makes and partitions the coarse mesh.
@@ -336,11 +344,14 @@ fn coarse_mesh(
     let map = periodic_map(model, &made.mesh)?;
     let sizes = (settings.method == Method::Surface)
         .then(|| skins::wanted_sizes(model, &made.mesh, &settings.coarse.size, pieces));
-    let (assigned, metrics) = progress.stage(Stage::Partition, |_| {
-        let ties = if parts > 1 { partition::periodic_ties(&made.mesh, &map) } else { Ties::default() };
+    let (faces, (assigned, metrics)) = progress.stage(Stage::Partition, |_| {
+        let (mesh, how) = (&made.mesh, Default::default());
+        let faces = partition::matched_faces(mesh)?;
+        let ties = if parts > 1 { partition::periodic_ties(mesh, &faces, &map) } else { Ties::default() };
         // Parts of the method `surface` will have the tets that the sizes require.
-        let weights = sizes.as_ref().map(|sizes| skin::expected_tets(&made.mesh, sizes));
-        partition::partition_weighted(&made.mesh, parts, &ties, weights.as_deref(), &Default::default())
+        let weights = sizes.as_ref().map(|sizes| skin::expected_tets(mesh, sizes));
+        let part = partition::partition_matched(mesh, &faces, parts, &ties, weights.as_deref(), &how)?;
+        Ok::<_, PartitionError>((faces, part))
     })?;
     if settings.periodic_together && metrics.lost_ties > 0 {
         return Err(
@@ -357,7 +368,7 @@ fn coarse_mesh(
         partition: metrics,
         periodic: map,
     };
-    Ok(Coarse { pieces, result, sizes })
+    Ok(Coarse { pieces, result, sizes, faces })
 }
 
 /// The periodic entities of a coarse mesh.

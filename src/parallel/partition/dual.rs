@@ -1,7 +1,8 @@
 //! The dual graph: tets, adjacent if they share a face.
 
 use super::weighted::Graph;
-use crate::ground::mesh::topology::Faces;
+use crate::ground::kernel::buckets::{concat, map_each, ranges};
+use crate::ground::mesh::topology::MatchedFaces;
 
 /// The neighbours of each tet, in compressed row storage.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -39,17 +40,31 @@ impl Dual {
     }
 }
 
-/// The dual graph of the tets of `listed`, given the tets of each face.
-pub fn dual(listed: &Faces, face_tets: &[[u32; 2]]) -> Dual {
-    let mut dual = Dual { offsets: Vec::with_capacity(listed.tet_faces.len() + 1), neighbours: Vec::new() };
-    dual.offsets.push(0);
-    for (tet, faces) in (0..).zip(&listed.tet_faces) {
-        let beside = faces.iter().map(|face| {
-            let [first, second] = face_tets[face.index()];
-            if first == tet { second } else { first }
+/// The dual graph of tets, given their faces.
+pub fn dual(faces: &MatchedFaces) -> Dual {
+    let tet_faces = &faces.listed.tet_faces;
+    let beside = |tet: usize| {
+        let others = tet_faces[tet].map(|face| {
+            let [first, second] = faces.tets[face.index()];
+            if first as usize == tet { second } else { first }
         });
-        dual.neighbours.extend(beside.filter(|&other| other != u32::MAX));
-        dual.offsets.push(dual.neighbours.len() as u32);
+        others.into_iter().filter(|&other| other != u32::MAX)
+    };
+    let lists = map_each(ranges(tet_faces.len()), |range| {
+        let mut ends = Vec::with_capacity(range.len());
+        // Nearly all tets have four neighbours.
+        let mut neighbours = Vec::with_capacity(4 * range.len());
+        for tet in range {
+            neighbours.extend(beside(tet));
+            ends.push(neighbours.len() as u32);
+        }
+        (ends, neighbours)
+    });
+    let mut offsets = Vec::with_capacity(tet_faces.len() + 1);
+    offsets.push(0);
+    for (ends, _) in &lists {
+        let start = offsets[offsets.len() - 1];
+        offsets.extend(ends.iter().map(|end| start + end));
     }
-    dual
+    Dual { offsets, neighbours: concat(lists.into_iter().map(|(_, neighbours)| neighbours).collect()) }
 }

@@ -2,9 +2,13 @@
 
 use super::Method;
 use super::dual::Dual;
+use crate::ground::kernel::buckets::{map_each, ranges, tabulate};
 use crate::ground::mesh::Rank;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
+use std::ops::Range;
+use std::sync::atomic::AtomicU32;
+use std::sync::atomic::Ordering::Relaxed;
 
 /// Quality of a partition.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,19 +36,25 @@ pub struct Metrics {
     pub repaired: usize,
 }
 
-/// Measures a partition.
-pub fn measure(dual: &Dual, part: &[Rank], parts: u32, method: Option<Method>, repaired: usize) -> Metrics {
+/// Measures a partition of tets with these faces.
+pub fn measure(
+    faces: &[[u32; 2]],
+    part: &[Rank],
+    parts: u32,
+    method: Option<Method>,
+    repaired: usize,
+) -> Metrics {
     let sizes = sizes(part, parts);
-    let cut = |tet: usize| dual.of(tet).iter().filter(|&&other| part[other as usize] != part[tet]).count();
     let largest = sizes.iter().copied().max().unwrap_or(0);
+    let (edge_cut, pieces) = cut_and_pieces(faces, part);
     Metrics {
         method,
         parts,
         smallest: sizes.iter().copied().min().unwrap_or(0),
         largest,
         imbalance: largest as f64 * f64::from(parts) / part.len().max(1) as f64,
-        edge_cut: (0..part.len()).map(cut).sum::<usize>() / 2,
-        pieces: pieces(dual, part),
+        edge_cut,
+        pieces,
         cut_interfaces: 0,
         lost_ties: 0,
         repaired,
@@ -66,28 +76,69 @@ fn sizes(part: &[Rank], parts: u32) -> Vec<usize> {
     sizes
 }
 
-/// The number of sets of tets that are connected by faces within one part.
-fn pieces(dual: &Dual, part: &[Rank]) -> usize {
-    let mut seen = vec![false; part.len()];
-    let mut to_visit = Vec::new();
-    let mut count = 0;
-    for start in 0..part.len() {
-        if seen[start] {
-            continue;
+/// The number of faces between parts, and the number of sets of tets that are connected by faces
+/// within one part.
+fn cut_and_pieces(faces: &[[u32; 2]], part: &[Rank]) -> (usize, usize) {
+    let sets = Sets::new(part.len());
+    let of_range = |range: Range<usize>| {
+        let (mut cut, mut joined) = (0, 0);
+        for &[first, second] in faces[range].iter().filter(|[_, second]| *second != u32::MAX) {
+            if part[first as usize] == part[second as usize] {
+                joined += usize::from(sets.join(first, second));
+            } else {
+                cut += 1;
+            }
         }
-        count += 1;
-        seen[start] = true;
-        to_visit.push(start);
-        while let Some(tet) = to_visit.pop() {
-            for other in dual.of(tet).iter().map(|&other| other as usize) {
-                if part[other] == part[tet] && !seen[other] {
-                    seen[other] = true;
-                    to_visit.push(other);
-                }
+        (cut, joined)
+    };
+    let found = map_each(ranges(faces.len()), of_range);
+    let (cut, joined) = found.into_iter().fold((0, 0), |sum, one| (sum.0 + one.0, sum.1 + one.1));
+    (cut, part.len() - joined)
+}
+
+/// Disjoint sets that several threads join at once (Anderson and Woll 1991). A set is a tree whose
+/// root has the lowest index; only roots get a parent, so the number of joins does not depend on
+/// the order.
+struct Sets {
+    parents: Vec<AtomicU32>,
+}
+
+impl Sets {
+    fn new(count: usize) -> Self {
+        Self { parents: tabulate(count, |index| AtomicU32::new(index as u32)) }
+    }
+
+    /// The root of an element; halves the path to it.
+    fn root(&self, mut element: u32) -> u32 {
+        loop {
+            let parent = self.parents[element as usize].load(Relaxed);
+            if parent == element {
+                return element;
+            }
+            let above = self.parents[parent as usize].load(Relaxed);
+            if above != parent {
+                // Any ancestor is right, so a value that another thread has stored may be lost.
+                self.parents[element as usize].store(above, Relaxed);
+            }
+            element = above;
+        }
+    }
+
+    /// Joins the sets of two elements; returns whether they were different.
+    fn join(&self, one: u32, other: u32) -> bool {
+        let (mut one, mut other) = (one, other);
+        loop {
+            (one, other) = (self.root(one), self.root(other));
+            if one == other {
+                return false;
+            }
+            let (low, high) = (one.min(other), one.max(other));
+            // Fails if another thread has joined `high` meanwhile.
+            if self.parents[high as usize].compare_exchange(high, low, Relaxed, Relaxed).is_ok() {
+                return true;
             }
         }
     }
-    count
 }
 
 /// Gives each empty part a tet of the currently largest part (the lowest on ties): the tet with the

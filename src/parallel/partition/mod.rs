@@ -28,8 +28,10 @@ pub use metrics::Metrics;
 pub use periodic::periodic_ties;
 
 use crate::ground::error::{ErrorKind, HasKind};
-use crate::ground::mesh::topology::Faces;
-use crate::ground::mesh::{FaceId, Mesh, Rank, sorted_face, topology};
+use crate::ground::kernel::buckets::{map_each, ranges};
+use crate::ground::mesh::topology::MatchedFaces;
+use crate::ground::mesh::{BoundaryTriangle, Mesh, Rank, sorted_face, topology};
+use std::ops::Range;
 use ties::{Clusters, Ties};
 
 /// A partitioning method.
@@ -171,6 +173,12 @@ pub fn partition_weighted(
     weights: Option<&[f64]>,
     settings: &Settings,
 ) -> Result<(Vec<Rank>, Metrics), PartitionError> {
+    refuse_impossible(mesh, parts)?;
+    partition_matched(mesh, &matched_faces(mesh)?, parts, ties, weights, settings)
+}
+
+/// Refuses numbers of parts and tets that cannot be.
+fn refuse_impossible(mesh: &Mesh, parts: u32) -> Result<(), PartitionError> {
     let tets = mesh.tets.len();
     if parts == 0 {
         return Err(PartitionError::NoParts);
@@ -181,14 +189,68 @@ pub fn partition_weighted(
     if tets > topology::MAX_TETS {
         return Err(PartitionError::TooManyTets { tets });
     }
-    let listed = topology::faces(mesh.points.len(), &mesh.tets);
-    let face_tets = tets_at_faces(&listed)?;
-    let dual = dual::dual(&listed, &face_tets);
-    let interfaces = interfaces(mesh, &listed, &face_tets);
-    let clusters = if parts > 1 { Clusters::new(tets, ties, &interfaces, parts) } else { None };
+    Ok(())
+}
+
+/// The faces of a mesh.
+///
+/// # Errors
+/// [`PartitionError::NotAMesh`] if a face has three tets, [`PartitionError::TooManyTets`].
+pub fn matched_faces(mesh: &Mesh) -> Result<MatchedFaces, PartitionError> {
+    let tets = mesh.tets.len();
+    if tets > topology::MAX_TETS {
+        return Err(PartitionError::TooManyTets { tets });
+    }
+    topology::matched_faces(mesh.points.len(), &mesh.tets)
+        .map_err(|vertices| PartitionError::NotAMesh { vertices: vertices.map(|v| v.0) })
+}
+
+/// [`partition_weighted`] of a mesh with these [`matched_faces`].
+///
+/// # Errors
+/// As [`partition`].
+///
+/// # Panics
+/// As [`partition_weighted`].
+pub fn partition_matched(
+    mesh: &Mesh,
+    faces: &MatchedFaces,
+    parts: u32,
+    ties: &Ties,
+    weights: Option<&[f64]>,
+    settings: &Settings,
+) -> Result<(Vec<Rank>, Metrics), PartitionError> {
+    refuse_impossible(mesh, parts)?;
+    let interfaces = interfaces(mesh, faces);
+    let (part, repaired) = match parts {
+        1 => (vec![0; mesh.tets.len()], 0),
+        _ => assign(mesh, faces, &interfaces, parts, ties, weights, settings)?,
+    };
+    let mut metrics = metrics::measure(&faces.tets, &part, parts, Some(settings.method), repaired);
+    metrics.cut_interfaces =
+        interfaces.iter().filter(|[a, b]| part[*a as usize] != part[*b as usize]).count();
+    metrics.lost_ties = ties::lost(ties, &part);
+    if let Some(weights) = weights {
+        metrics.imbalance = metrics::imbalance(&part, parts, weights);
+    }
+    Ok((part, metrics))
+}
+
+/// Assigns each tet one of several parts. Also returns the number of parts that the method left
+/// empty and that were given a tet.
+fn assign(
+    mesh: &Mesh,
+    faces: &MatchedFaces,
+    interfaces: &[[u32; 2]],
+    parts: u32,
+    ties: &Ties,
+    weights: Option<&[f64]>,
+    settings: &Settings,
+) -> Result<(Vec<Rank>, usize), PartitionError> {
+    let dual = dual::dual(faces);
+    let clusters = Clusters::new(mesh.tets.len(), ties, interfaces, parts);
     let whole = weights.map(weighted::whole_weights);
     let mut part = match (settings.method, &clusters) {
-        _ if parts == 1 => vec![0; tets],
         (Method::Metis, None) => match &whole {
             None => graph::bisect(&dual, parts, settings.seed)?,
             Some(weights) => graph::bisect_weighted(&dual.weighted(weights), parts, settings.seed)?,
@@ -205,23 +267,17 @@ pub fn partition_weighted(
         ties::settle_around(&dual, clusters, ties, parts, &mut part);
     }
     let repaired = metrics::fill_empty_parts(&dual, &mut part, parts);
-    let mut metrics = metrics::measure(&dual, &part, parts, Some(settings.method), repaired);
-    metrics.cut_interfaces =
-        interfaces.iter().filter(|[a, b]| part[*a as usize] != part[*b as usize]).count();
-    metrics.lost_ties = ties::lost(ties, &part);
-    if let Some(weights) = weights {
-        metrics.imbalance = metrics::imbalance(&part, parts, weights);
-    }
-    Ok((part, metrics))
+    Ok((part, repaired))
 }
 
 /// The two tets of each boundary triangle between bodies.
-fn interfaces(mesh: &Mesh, listed: &Faces, face_tets: &[[u32; 2]]) -> Vec<[u32; 2]> {
-    let sides = mesh.triangles.iter().filter_map(|triangle| {
-        let face = listed.faces.binary_search(&sorted_face(triangle.vertices)).ok()?;
-        Some(face_tets[face]).filter(|tets| tets[1] != u32::MAX)
-    });
-    sides.collect()
+fn interfaces(mesh: &Mesh, faces: &MatchedFaces) -> Vec<[u32; 2]> {
+    let sides = |triangle: &BoundaryTriangle| {
+        let face = faces.listed.faces.binary_search(&sorted_face(triangle.vertices)).ok()?;
+        Some(faces.tets[face]).filter(|tets| tets[1] != u32::MAX)
+    };
+    let of_range = |range: Range<usize>| mesh.triangles[range].iter().filter_map(sides).collect::<Vec<_>>();
+    map_each(ranges(mesh.triangles.len()), of_range).concat()
 }
 
 /// Measures an existing partition.
@@ -229,16 +285,7 @@ fn interfaces(mesh: &Mesh, listed: &Faces, face_tets: &[[u32; 2]]) -> Vec<[u32; 
 /// # Errors
 /// [`PartitionError::NotAMesh`] if a face has three tets.
 pub fn assess(mesh: &Mesh, part: &[Rank], parts: u32) -> Result<Metrics, PartitionError> {
-    let listed = topology::faces(mesh.points.len(), &mesh.tets);
-    let dual = dual::dual(&listed, &tets_at_faces(&listed)?);
-    Ok(metrics::measure(&dual, part, parts, None, 0))
-}
-
-/// The tets of each listed face.
-fn tets_at_faces(listed: &Faces) -> Result<Vec<[u32; 2]>, PartitionError> {
-    topology::face_tets(listed.faces.len(), &listed.tet_faces).map_err(|face: FaceId| {
-        PartitionError::NotAMesh { vertices: listed.faces[face.index()].map(|v| v.0) }
-    })
+    Ok(metrics::measure(&matched_faces(mesh)?.tets, part, parts, None, 0))
 }
 
 #[cfg(test)]

@@ -2,35 +2,31 @@
 
 use super::ties::{Ties, Touched};
 use crate::ground::mesh::periodic::{Pair, PeriodicMap};
-use crate::ground::mesh::topology;
-use crate::ground::mesh::{FaceId, Mesh, TET_EDGES};
+use crate::ground::mesh::topology::MatchedFaces;
+use crate::ground::mesh::{Mesh, TET_EDGES};
 use std::collections::BTreeMap;
 
 /// A vertex (given twice), or an edge by its ascending vertices.
 type Key = [u32; 2];
 
-/// *Serial.* The ties of a coarse mesh with periodic faces: between the tets of a face and its
-/// periodic copy, and of tets that touch periodic faces in a vertex or edge.
-pub fn periodic_ties(mesh: &Mesh, map: &PeriodicMap) -> Ties {
+/// *Serial.* The ties of a coarse mesh with these faces, some of them periodic: between the tets of
+/// a face and its periodic copy, and of tets that touch periodic faces in a vertex or edge.
+pub fn periodic_ties(mesh: &Mesh, faces: &MatchedFaces, map: &PeriodicMap) -> Ties {
     let mut ties = Ties::default();
     if map.links.is_empty() {
         return ties;
     }
-    let listed = topology::faces(mesh.points.len(), &mesh.tets);
-    // A mesh with a face of three tets has no periodic map.
-    let tets_at =
-        topology::face_tets(listed.faces.len(), &listed.tet_faces).expect("two tets at a face at most");
-    let beside = |face: u64| tets_at[face as usize].into_iter().filter(|&tet| tet != u32::MAX);
+    let beside = |face: u64| faces.tets[face as usize].into_iter().filter(|&tet| tet != u32::MAX);
     for pairs in &map.pairs {
-        let faces = &pairs.0[2];
-        for pair in faces {
+        let periodic = &pairs.0[2];
+        for pair in periodic {
             let together: Vec<u32> = beside(pair.image).chain(beside(pair.of)).collect();
             ties.pairs.extend(together[1..].iter().map(|&tet| [together[0], tet]));
         }
         for side in [|pair: &Pair| pair.image, |pair: &Pair| pair.of] {
             let mut touched: BTreeMap<Key, Touched> = BTreeMap::new();
-            for face in faces.iter().map(side) {
-                for key in keys_of_face(listed.faces[FaceId(face as u32).index()].map(|v| v.0)) {
+            for face in periodic.iter().map(side) {
+                for key in keys_of_face(faces.listed.faces[face as usize].map(|v| v.0)) {
                     touched.entry(key).or_default().with_face.extend(beside(face));
                 }
             }

@@ -90,12 +90,12 @@ fn a_face_of_three_tets_is_refused() {
 #[test]
 fn empty_parts_are_filled_from_the_largest() {
     let mesh = lattice_cube(2);
-    let listed = topology::faces(mesh.points.len(), &mesh.tets);
-    let dual = dual::dual(&listed, &tets_at_faces(&listed).unwrap());
+    let faces = matched_faces(&mesh).unwrap();
+    let dual = dual::dual(&faces);
     let mut part = vec![1; 48];
     part[TetId(0).index()] = 3;
     assert_eq!(metrics::fill_empty_parts(&dual, &mut part, 5), 3);
-    let measured = metrics::measure(&dual, &part, 5, Some(Method::Bisection), 3);
+    let measured = metrics::measure(&faces.tets, &part, 5, Some(Method::Bisection), 3);
     assert_eq!((measured.smallest, measured.largest, measured.repaired), (1, 44, 3));
 }
 

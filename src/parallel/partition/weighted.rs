@@ -2,6 +2,7 @@
 
 use super::{PartitionError, graph};
 use crate::ground::mesh::Rank;
+use rayon::prelude::*;
 
 /// A weighted graph in compressed row storage.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -20,7 +21,7 @@ impl Graph {
     /// A graph from vertex weights and edges `[a, b, weight]`; the weights of repeated edges add.
     pub fn new(weights: Vec<i32>, mut edges: Vec<[u32; 3]>) -> Self {
         edges = edges.into_iter().flat_map(|[a, b, weight]| [[a, b, weight], [b, a, weight]]).collect();
-        edges.sort_unstable();
+        edges.par_sort_unstable();
         let mut graph = Self { offsets: vec![0; weights.len() + 1], weights, ..Self::default() };
         for run in edges.chunk_by(|a, b| a[..2] == b[..2]) {
             graph.offsets[run[0][0] as usize + 1] += 1;
