@@ -243,6 +243,19 @@ impl<'a> Work<'a> {
         self.tell(from + (to - from) * (done as f64 / total as f64).min(1.0));
     }
 
+    /// Reports that the unit at `index` of `count` is done. Call this once for each index, from any
+    /// thread. Neighbouring units are added together, because threads that all add to one number
+    /// wait for each other.
+    #[inline]
+    pub fn add_one(&self, index: usize, count: usize) {
+        /// The maximum number of units added together.
+        const TOGETHER: usize = 256;
+        let together = (count / (4 * TICKS as usize)).clamp(1, TOGETHER);
+        if index.is_multiple_of(together) {
+            self.add(together.min(count - index) as u64);
+        }
+    }
+
     fn tell(&self, fraction: f64) {
         let tick = (fraction.clamp(0.0, 1.0) * f64::from(TICKS)) as u32;
         if self.reported.fetch_max(tick, Ordering::Relaxed) < tick {
@@ -299,5 +312,18 @@ mod tests {
         let reported = listener.0.into_inner().unwrap();
         assert_eq!(reported.len(), TICKS as usize);
         assert!(reported.is_sorted() && reported.last() == Some(&1.0));
+    }
+
+    #[test]
+    fn units_added_together_are_all_counted() {
+        for count in [1, 7, 5000, 100_001] {
+            let listener = Listener::default();
+            Progress::new(&listener).stage(Stage::Refine, |work| {
+                work.step(0.0, 1.0, count as u64);
+                (0..count).rev().for_each(|index| work.add_one(index, count));
+                assert_eq!(work.done.load(Ordering::Relaxed), count as u64);
+            });
+            assert_eq!(listener.0.into_inner().unwrap().last(), Some(&1.0));
+        }
     }
 }

@@ -7,18 +7,21 @@ use super::{GlobalId, Order, Rank};
 use crate::ground::progress::Work;
 use std::borrow::Cow;
 
-/// A part that counts each block of tets read as a unit of work.
+/// A part that counts each block of tets read as a unit of work. Readers go through all blocks.
 pub struct Watched<'a> {
     part: &'a dyn MeshStream,
     work: &'a Work<'a>,
+    /// The number of blocks of tets.
+    blocks: usize,
 }
 
 impl<'a> Watched<'a> {
     /// *Local.* `work` is complete when all tets have been read `passes` times.
     pub fn new(part: &'a dyn MeshStream, work: &'a Work<'a>, passes: u64) -> Self {
         work.expect(part.counts().tets);
-        work.step(0.0, 1.0, passes * part.tet_blocks() as u64);
-        Self { part, work }
+        let blocks = part.tet_blocks();
+        work.step(0.0, 1.0, passes * blocks as u64);
+        Self { part, work, blocks }
     }
 }
 
@@ -64,12 +67,12 @@ impl MeshStream for Watched<'_> {
     }
 
     fn tet_block(&self, index: usize, block: &mut TetBlock) {
-        self.work.add(1);
+        self.work.add_one(index, self.blocks);
         self.part.tet_block(index, block);
     }
 
     fn local_block(&self, index: usize, block: &mut LocalBlock) {
-        self.work.add(1);
+        self.work.add_one(index, self.blocks);
         self.part.local_block(index, block);
     }
 

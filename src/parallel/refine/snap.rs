@@ -20,11 +20,14 @@ use super::lattice::Lattice;
 use super::numbering::Numbering;
 use super::{Keep, RefineError, Settings};
 use crate::Point;
+use crate::ground::kernel::buckets::{map_each, ranges, tabulate};
 use crate::ground::mesh::{Class, EDGE_BETWEEN, EdgeId, TET_FACES, TetId};
 use crate::ground::projector::Projector;
 use crate::parallel::distribution::DistMesh;
 use csg::{CurveId, PatchId, ProjectionFailed};
 use rayon::prelude::*;
+use std::sync::atomic::AtomicU32;
+use std::sync::atomic::Ordering::Relaxed;
 
 /// The coordinates of a point as the fine mesh stores them.
 pub type Coordinates = [f64; 3];
@@ -214,15 +217,22 @@ fn fill_faces(
 
 /// The edges of each face: first to second, first to third and second to third vertex.
 fn face_edges(mesh: &DistMesh) -> Vec<[EdgeId; 3]> {
-    let mut face_to_edges = vec![[EdgeId::default(); 3]; mesh.faces.len()];
-    for (tet, vertices) in mesh.tets.iter().enumerate() {
-        for (corners, face) in TET_FACES.into_iter().zip(mesh.tet_faces[tet]) {
-            let [p, q, r] = super::numbering::ascending(corners, |corner| vertices[corner].0);
-            face_to_edges[face.index()] =
-                [[p, q], [p, r], [q, r]].map(|[i, j]| mesh.tet_edges[tet][EDGE_BETWEEN[i][j]]);
+    let face_to_edges = tabulate(mesh.faces.len(), |_| [const { AtomicU32::new(0) }; 3]);
+    map_each(ranges(mesh.tets.len()), |range| {
+        for tet in range {
+            let vertices = mesh.tets[tet];
+            for (corners, face) in TET_FACES.into_iter().zip(mesh.tet_faces[tet]) {
+                let [p, q, r] = super::numbering::ascending(corners, |corner| vertices[corner].0);
+                let edges = [[p, q], [p, r], [q, r]].map(|[i, j]| mesh.tet_edges[tet][EDGE_BETWEEN[i][j]]);
+                // Both tets of a face store the same.
+                face_to_edges[face.index()]
+                    .iter()
+                    .zip(edges)
+                    .for_each(|(to, edge)| to.store(edge.0, Relaxed));
+            }
         }
-    }
-    face_to_edges
+    });
+    face_to_edges.into_iter().map(|edges| edges.map(|edge| EdgeId(edge.into_inner()))).collect()
 }
 
 /// The lattice points of one triangle, by their weights j, k at the second and third corner.

@@ -11,6 +11,7 @@ use super::lattice::Lattice;
 use super::numbering::Numbering;
 use super::snap::{Coordinates, is_flat};
 use super::{RefineError, Settings};
+use crate::ground::kernel::buckets::tabulate;
 use crate::ground::kernel::vector::{Wide, wide};
 use crate::ground::mesh::{GlobalId, Order, TetId};
 use crate::ground::progress::Work;
@@ -50,12 +51,11 @@ pub fn fill(
         .ok_or(RefineError::OutOfMemory { rank: mesh.rank, bytes: bytes as u64 })?;
     let bytes_per_tet = diagonals.bytes_per_tet();
     let (before, inside) = points.split_at_mut(numbering.bases()[2]);
-    let flat: Vec<bool> = (0..mesh.tets.len())
-        .map(|tet| is_flat(mesh, projector, &settings.displacements, TetId::new(tet)))
-        .collect();
+    let count = mesh.tets.len();
+    let flat = tabulate(count, |tet| is_flat(mesh, projector, &settings.displacements, TetId::new(tet)));
     let insides = match lattice.tet_points() as usize {
         _ if inside.is_empty() => {
-            Either::Left((0..mesh.tets.len()).into_par_iter().map(|_| &mut [] as &mut [Coordinates]))
+            Either::Left((0..count).into_par_iter().map(|_| &mut [] as &mut [Coordinates]))
         }
         size => Either::Right(inside.par_chunks_mut(size)),
     };
@@ -65,11 +65,11 @@ pub fn fill(
     let fill_one = |scratch: &mut Scratch,
                     ((tet, inside), bytes): ((usize, &mut [Coordinates]), &mut [u8])| {
         let (block, cutting) = scratch;
-        let tet = TetId::new(tet);
         if work.is_cancelled() {
             return None;
         }
-        work.add(1);
+        work.add_one(tet, count);
+        let tet = TetId::new(tet);
         block.gather(mesh, numbering, tet, before);
         let corners = mesh.tets[tet.index()].map(|v| before[v.index()]);
         let flat = flat[tet.index()];
