@@ -60,7 +60,7 @@ where
     // Buckets have the vertices that are equal without their last bits.
     let wanted = (tets.len() * K / BUCKET).clamp(1, MOST_BUCKETS);
     let bits = vertices.div_ceil(wanted).next_power_of_two().trailing_zeros();
-    let buckets = (vertices.max(1) - 1 >> bits) + 1;
+    let buckets = ((vertices.max(1) - 1) >> bits) + 1;
     let bucket = |tet: &[VertexId; 4], k: usize| {
         local[k].iter().map(|&i| tet[i]).min().expect("entities have vertices").index() >> bits
     };
