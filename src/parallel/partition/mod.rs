@@ -173,7 +173,6 @@ pub fn partition_weighted(
     weights: Option<&[f64]>,
     settings: &Settings,
 ) -> Result<(Vec<Rank>, Metrics), PartitionError> {
-    refuse_impossible(mesh, parts)?;
     partition_matched(mesh, &matched_faces(mesh)?, parts, ties, weights, settings)
 }
 
@@ -185,9 +184,6 @@ fn refuse_impossible(mesh: &Mesh, parts: u32) -> Result<(), PartitionError> {
     }
     if tets < parts as usize {
         return Err(PartitionError::MoreParts { parts, tets });
-    }
-    if tets > topology::MAX_TETS {
-        return Err(PartitionError::TooManyTets { tets });
     }
     Ok(())
 }
