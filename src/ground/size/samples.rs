@@ -5,6 +5,7 @@ use super::{NearSurfaces, SizeSettings, Source};
 use crate::{Point, Vector};
 use csg::solid::prune_in;
 use csg::{Body, BodyId, Curve, CurveId, Cutout, Features, Geometry, Interval, Solid, SurfaceId};
+use rayon::prelude::*;
 
 /// The samples of a geometry under some settings, without the sources of the settings.
 ///
@@ -51,11 +52,14 @@ impl GeometricSamples {
             .filter(|(_, bound)| *bound < maximum)
             .collect();
         let sampler = Sampler { geometry, features, settings, maximum, body_bounds: &body_bounds };
-        let mut sources = Vec::new();
-        for (i, curve) in features.curves.iter().enumerate() {
+        let of_curve = |i: usize| {
             let bound = settings.scaled_bound(features.edge_bound(geometry, CurveId::new(i)));
-            sampler.sample_curve(curve, bound, &mut sources);
-        }
+            let mut sources = Vec::new();
+            sampler.sample_curve(&features.curves[i], bound, &mut sources);
+            sources
+        };
+        let of_curves: Vec<Vec<Source>> = (0..features.curves.len()).into_par_iter().map(of_curve).collect();
+        let mut sources = of_curves.concat();
         let near = sampler.sample_patches(&mut sources);
         let short = (0..features.curves.len()).map(|i| sampler.shortness(CurveId::new(i)));
         let short = short.min_by(|a, b| (a.length / a.size_alone).total_cmp(&(b.length / b.size_alone)));
@@ -97,6 +101,10 @@ const SIDE_STEP: f64 = 1e-6;
 ///
 /// Corners at the apex are within rounding of it; samples are at least a thousandth away.
 const APEX: f64 = 1e-6;
+
+/// The smallest cell whose children are sampled in parallel, as a fraction of the longest side of
+/// the geometry.
+const PARALLEL_CELL: f64 = 1.0 / 8.0;
 
 /// Samples on surfaces.
 #[derive(Default)]
@@ -231,10 +239,26 @@ impl Sampler<'_> {
         if open.is_empty() || edge < self.least_edge() {
             return;
         }
-        for child in 0..8 {
+        let sample_child = |child: usize, samples: &mut Samples| {
             let side = |axis: usize| if child >> axis & 1 == 1 { 0.25 * edge } else { -0.25 * edge };
             let middle = center + Vector::new(side(0), side(1), side(2));
             self.sample_cell(&open, bodies.clone(), middle, 0.5 * edge, samples);
+        };
+        let bounds = &self.features.bounds;
+        if edge < PARALLEL_CELL * (bounds.max - bounds.min).max() {
+            (0..8).for_each(|child| sample_child(child, samples));
+            return;
+        }
+        let of_child = |child: usize| {
+            let mut of_child = Samples::default();
+            sample_child(child, &mut of_child);
+            of_child
+        };
+        // In the order of the children, as without threads.
+        let of_children: Vec<Samples> = (0..8).into_par_iter().map(of_child).collect();
+        for of_child in of_children {
+            samples.sources.extend(of_child.sources);
+            samples.near.extend(of_child.near);
         }
     }
 
