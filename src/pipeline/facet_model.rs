@@ -14,7 +14,7 @@ use crate::ground::kernel::simplex::volume6;
 use crate::ground::mesh::{BoundaryTriangle, Class, Label, Names, Segment, VertexId};
 use crate::ground::progress::Work;
 use crate::ground::projector::Projector;
-use crate::ground::size::{Closeness, SizeField, SizeSettings, Source, WatchedSize};
+use crate::ground::size::{Accuracy, Closeness, SizeField, SizeSettings, Source, WatchedSize};
 use crate::mesher::facets::{
     Crossing, FacetBodies, FacetError, FacetModel, FacetPatch, FacetSize, FacetSmoothness, Facets, Marks,
     RemeshSettings, SharpPlaces, keep, remesh,
@@ -149,19 +149,15 @@ impl FacetSolid {
     }
 
     /// The size field.
-    pub(super) fn size_field(&self, settings: &SizeSettings) -> FacetSize {
-        let of = if self.keep_surface { FacetSize::of_kept } else { FacetSize::new };
-        of(&self.model, settings)
-    }
-
-    /// The size field with larger errors, which is built in a fraction of the time.
-    pub(super) fn rough_size_field(&self, settings: &SizeSettings) -> FacetSize {
-        let of = if self.keep_surface { FacetSize::of_kept } else { FacetSize::rough };
-        of(&self.model, settings)
+    pub(super) fn size_field(&self, settings: &SizeSettings, accuracy: Accuracy) -> FacetSize {
+        if self.keep_surface {
+            return FacetSize::of_kept(&self.model, settings);
+        }
+        FacetSize::with_accuracy(&self.model, settings, accuracy)
     }
 
     fn attempt(&self, settings: &CoarseSettings, allowed: Allowed, budget: &Budget, work: &Work) -> Attempt {
-        let own = self.size_field(&settings.size);
+        let own = self.size_field(&settings.size, Accuracy::Fine);
         let size = WatchedSize::new(&own, work);
         let expected = expected::tets(&self.model.bounds, &size, expected::FEW, || {
             let bodies = FacetBodies::new(&self.model);

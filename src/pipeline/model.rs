@@ -12,7 +12,7 @@ use crate::ground::mesh::periodic::Link;
 use crate::ground::mesh::{Mesh, Names};
 use crate::ground::progress::Work;
 use crate::ground::projector::Projector;
-use crate::ground::size::{GeometricSize, LEAST_SIZE, SizeField, SizeSettings};
+use crate::ground::size::{Accuracy, GeometricSize, LEAST_SIZE, SizeField, SizeSettings};
 use crate::mesher::model::CsgModel;
 use csg::{Aabb, Geometry, SurfaceId};
 
@@ -146,23 +146,17 @@ impl Model {
 
     /// The size field of the first coarse mesh, before sizes are lowered; `None` for an existing
     /// mesh.
-    pub(super) fn size_field(&self, settings: &SizeSettings) -> Option<Box<dyn SizeField + '_>> {
+    pub(super) fn size_field(
+        &self,
+        settings: &SizeSettings,
+        accuracy: Accuracy,
+    ) -> Option<Box<dyn SizeField + '_>> {
         match self {
             Self::Csg(model) => {
-                Some(Box::new(GeometricSize::new(&model.geometry, &model.features, settings)))
+                let CsgModel { geometry, features, .. } = &**model;
+                Some(Box::new(GeometricSize::with_accuracy(geometry, features, settings, accuracy)))
             }
-            Self::Facets(solid) => Some(Box::new(solid.size_field(settings))),
-            Self::Given(_) => None,
-        }
-    }
-
-    /// The size field with larger errors, which is built in a fraction of the time.
-    pub(super) fn rough_size_field(&self, settings: &SizeSettings) -> Option<Box<dyn SizeField + '_>> {
-        match self {
-            Self::Csg(model) => {
-                Some(Box::new(GeometricSize::rough(&model.geometry, &model.features, settings)))
-            }
-            Self::Facets(solid) => Some(Box::new(solid.rough_size_field(settings))),
+            Self::Facets(solid) => Some(Box::new(solid.size_field(settings, accuracy))),
             Self::Given(_) => None,
         }
     }

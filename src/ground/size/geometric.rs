@@ -1,8 +1,8 @@
 //! The size field of a geometry and a user's settings.
 
-use super::{Closeness, GeometricSamples, Preset, SizeField, SizeFunction, Source, SourceTree};
+use super::{Accuracy, Closeness, GeometricSamples, Preset, SizeField, SizeFunction, Source, SourceTree};
 use crate::Point;
-use csg::{Aabb, BodyId, Features, Geometry, Solid};
+use csg::{BodyId, Features, Geometry, Solid};
 
 /// The user's settings of the size field.
 #[derive(Clone, Debug)]
@@ -91,13 +91,18 @@ pub struct GeometricSize<'a> {
 impl<'a> GeometricSize<'a> {
     /// Samples curves and patches and builds the field.
     pub fn new(geometry: &'a Geometry, features: &Features, settings: &SizeSettings) -> Self {
-        Self::of_samples(geometry, features, settings, &GeometricSamples::new(geometry, features, settings))
+        Self::with_accuracy(geometry, features, settings, Accuracy::Fine)
     }
 
-    /// The same field with a [rough](SourceTree::rough) tree.
-    pub(crate) fn rough(geometry: &'a Geometry, features: &Features, settings: &SizeSettings) -> Self {
+    /// [`new`](Self::new), as accurate as needed.
+    pub(crate) fn with_accuracy(
+        geometry: &'a Geometry,
+        features: &Features,
+        settings: &SizeSettings,
+        accuracy: Accuracy,
+    ) -> Self {
         let samples = GeometricSamples::new(geometry, features, settings);
-        Self::with_tree(geometry, features, settings, &samples, SourceTree::rough)
+        Self::with_tree(geometry, features, settings, &samples, accuracy)
     }
 
     /// Builds the field from samples that were taken with the same settings, except for their
@@ -108,7 +113,7 @@ impl<'a> GeometricSize<'a> {
         settings: &SizeSettings,
         samples: &GeometricSamples,
     ) -> Self {
-        Self::with_tree(geometry, features, settings, samples, SourceTree::new)
+        Self::with_tree(geometry, features, settings, samples, Accuracy::Fine)
     }
 
     fn with_tree(
@@ -116,10 +121,11 @@ impl<'a> GeometricSize<'a> {
         features: &Features,
         settings: &SizeSettings,
         samples: &GeometricSamples,
-        tree: fn(Aabb, f64, f64, &[Source]) -> SourceTree,
+        accuracy: Accuracy,
     ) -> Self {
         let sources = [&*settings.sources, &*samples.sources].concat();
-        let tree = tree(features.bounds, settings.grading, samples.maximum, &sources);
+        let tree =
+            SourceTree::with_accuracy(features.bounds, settings.grading, samples.maximum, &sources, accuracy);
         Self { geometry, tree, body_bounds: samples.body_bounds.clone(), function: settings.function.clone() }
     }
 }

@@ -24,6 +24,7 @@ pub use periodic::PeriodicSize;
 pub use preset::{Closeness, Preset};
 pub use samples::GeometricSamples;
 pub(crate) use samples::ShortCurve;
+pub(crate) use source_tree::Accuracy;
 pub use source_tree::SourceTree;
 pub use sources::Source;
 pub(crate) use sources::thinned;

@@ -63,13 +63,23 @@ const STEEP: f64 = 0.45;
 /// size counts as attained if it is lower than the known values by no more than this.
 const BENT: f64 = 0.04;
 
+/// How closely a tree follows the field.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Accuracy {
+    /// Closely enough for a mesh.
+    Fine,
+    /// With twice the error, which is enough to compare numbers of tets: cells are twice as large, so
+    /// that a quarter of them are built on a surface.
+    Rough,
+}
+
 /// The factor of all these limits in a rough tree.
 const ROUGH: f64 = 2.0;
 
 /// The 64 subtrees below this depth are built in parallel.
 const PARALLEL_DEPTH: u32 = 2;
 
-/// When a cell is split: [`SMALL`], [`LARGE`] and [`BENT`] at a grading and a roughness.
+/// When a cell is split: [`SMALL`], [`LARGE`] and [`BENT`] at a grading and an accuracy.
 #[derive(Clone, Copy)]
 struct Limits {
     small: f64,
@@ -78,7 +88,11 @@ struct Limits {
 }
 
 impl Limits {
-    fn new(grading: f64, roughness: f64) -> Self {
+    fn new(grading: f64, accuracy: Accuracy) -> Self {
+        let roughness = match accuracy {
+            Accuracy::Fine => 1.0,
+            Accuracy::Rough => ROUGH,
+        };
         let part = (STEEP / grading).min(1.0) * roughness;
         Self { small: SMALL * part, large: LARGE * part, bent: BENT * roughness }
     }
@@ -106,17 +120,18 @@ impl SourceTree {
     /// Outside, the size grows from the nearest point of the box. `grading` is the growth per unit
     /// of distance, `maximum` the size if no source imposes a smaller one.
     pub fn new(bounds: Aabb, grading: f64, maximum: f64, sources: &[Source]) -> Self {
-        Self::with_limits(bounds, grading, maximum, sources, Limits::new(grading, 1.0))
+        Self::with_accuracy(bounds, grading, maximum, sources, Accuracy::Fine)
     }
 
-    /// The same with cells twice as large, so that a quarter of the cells are built on a surface.
-    ///
-    /// The relative error is twice that of [`new`](Self::new): enough to compare numbers of tets.
-    pub(crate) fn rough(bounds: Aabb, grading: f64, maximum: f64, sources: &[Source]) -> Self {
-        Self::with_limits(bounds, grading, maximum, sources, Limits::new(grading, ROUGH))
-    }
-
-    fn with_limits(bounds: Aabb, grading: f64, maximum: f64, sources: &[Source], limits: Limits) -> Self {
+    /// [`new`](Self::new), as accurate as needed.
+    pub(crate) fn with_accuracy(
+        bounds: Aabb,
+        grading: f64,
+        maximum: f64,
+        sources: &[Source],
+        accuracy: Accuracy,
+    ) -> Self {
+        let limits = Limits::new(grading, accuracy);
         let side = (bounds.max - bounds.min).max().max(f64::MIN_POSITIVE);
         let center = bounds.center();
         let half = Vector::repeat(0.5 * side);
@@ -316,7 +331,7 @@ mod tests {
         };
         let tree = SourceTree::new(bounds, grading, maximum, &sources);
         agrees(&tree, most, 0.02);
-        let rough = SourceTree::rough(bounds, grading, maximum, &sources);
+        let rough = SourceTree::with_accuracy(bounds, grading, maximum, &sources, Accuracy::Rough);
         agrees(&rough, ROUGH * most, ROUGH * 0.02);
         assert!(2 * rough.cells.len() < tree.cells.len(), "{} cells", rough.cells.len());
     }

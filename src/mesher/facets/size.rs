@@ -7,9 +7,10 @@
 use super::{FacetModel, close_curves};
 use crate::ground::kernel::simplex::area_vector;
 use crate::ground::projector::facets::normals::SLIVER_HEIGHT;
-use crate::ground::size::{Closeness, SizeField, SizeFunction, SizeSettings, Source, SourceTree, thinned};
+use crate::ground::size::{
+    Accuracy, Closeness, SizeField, SizeFunction, SizeSettings, Source, SourceTree, thinned,
+};
 use crate::{Point, Vector};
-use csg::Aabb;
 
 /// Sizes from the curvature of facets and curves, from short curves, and from the user's settings.
 #[derive(Clone, Debug)]
@@ -31,24 +32,18 @@ impl FacetSize {
     /// Samples facets and curves for sources: curvature, short curves, and curves close to each
     /// other.
     pub fn new(model: &FacetModel, settings: &SizeSettings) -> Self {
-        Self::with_tree(model, settings, SourceTree::new)
+        Self::with_accuracy(model, settings, Accuracy::Fine)
     }
 
-    /// The same field with a [rough](SourceTree::rough) tree.
-    pub(crate) fn rough(model: &FacetModel, settings: &SizeSettings) -> Self {
-        Self::with_tree(model, settings, SourceTree::rough)
-    }
-
-    fn with_tree(
-        model: &FacetModel,
-        settings: &SizeSettings,
-        tree: fn(Aabb, f64, f64, &[Source]) -> SourceTree,
-    ) -> Self {
+    /// [`new`](Self::new), as accurate as needed.
+    pub(crate) fn with_accuracy(model: &FacetModel, settings: &SizeSettings, accuracy: Accuracy) -> Self {
         let maximum = maximum(model, settings);
         let mut sources = settings.sources.clone();
         sample_facets(model, settings, maximum, &mut sources);
         sample_curves(model, settings, maximum, &mut sources);
-        let tree_of = |sources: Vec<Source>| tree(model.bounds, settings.grading, maximum, &thinned(sources));
+        let tree_of = |sources: Vec<Source>| {
+            SourceTree::with_accuracy(model.bounds, settings.grading, maximum, &thinned(sources), accuracy)
+        };
         close_curves::sample(model, settings, |alone| tree_of(alone.to_vec()), &mut sources);
         let tree = tree_of(sources);
         Self { tree, function: settings.function.clone() }
