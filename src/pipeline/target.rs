@@ -18,6 +18,8 @@ pub enum Outcome {
     Least,
     /// No size gives a number in the range: this is the next larger one.
     Jumped,
+    /// As many coarse meshes were made as are allowed; this one has fewer tets.
+    Fewer,
 }
 
 /// The number to aim at, relative to the target: inside the accepted range, which begins near 1.
@@ -131,7 +133,11 @@ pub fn mesh_to_target(
         (None, Some(error)) => Err(error),
         (None, None) => {
             let made = model.coarse_mesh(settings, budget, work)?;
-            let outcome = if fits(made.report.tets) { Outcome::Reached } else { Outcome::Jumped };
+            let outcome = match made.report.tets {
+                tets if fits(tets) => Outcome::Reached,
+                tets if tets < target => Outcome::Fewer,
+                _ => Outcome::Jumped,
+            };
             Ok((made, outcome))
         }
     }
