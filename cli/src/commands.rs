@@ -59,7 +59,7 @@ fn generate_on(comm: &dyn Communicator, options: &Generate, start: Instant) -> R
     let stem = target.join(options.input.files[0].file_stem().unwrap_or("mesh".as_ref()));
     let outputs = agree(comm, prepared(comm, || outputs_of(options, &target, &stem, comm.size())))?;
     let terminal = Terminal::new(options.run.quiet || !first);
-    let progress = Progress::new(&terminal);
+    let progress = watched(&terminal, first);
     let geometry = first
         .then(|| {
             progress.stage(Stage::Read, |_| read_sized_geometry(&options.input, &options.size, &progress))
@@ -103,6 +103,12 @@ fn generate_on(comm: &dyn Communicator, options: &Generate, start: Instant) -> R
     report.seconds = start.elapsed().as_secs_f64();
     report.add_written(written);
     show_report(&report, options.run.report.as_deref(), &outputs, options.run.quiet, wanted_count(options))
+}
+
+/// The progress of a run on one rank, on the first with the peak memory of its process.
+fn watched(terminal: &Terminal, first: bool) -> Progress<'_> {
+    let progress = Progress::new(terminal);
+    if first { progress.measuring_memory() } else { progress }
 }
 
 /// The files that `generate` reads and writes.
@@ -241,6 +247,9 @@ fn show_report(
             Outcome::Jumped => {
                 eprintln!("note: {wanted} requested; no size gives this number, the next larger is {got}")
             }
+            Outcome::Fewer => {
+                eprintln!("note: {wanted} requested; the search ended after several coarse meshes with {got}")
+            }
         }
     }
     write_report(file, report)
@@ -301,7 +310,7 @@ pub fn run_mesh(options: &MeshFile) -> Result<(), Failure> {
     set_threads(options.threads)?;
     let comm = thread::alone();
     let terminal = Terminal::new(options.quiet);
-    let progress = Progress::new(&terminal);
+    let progress = watched(&terminal, true);
     let geometry =
         progress.stage(Stage::Read, |_| read_sized_geometry(&options.input, &options.size, &progress))?;
     let settings = GenerateSettings {

@@ -38,8 +38,8 @@ pub struct Report {
     pub order: u32,
     /// The coarse mesh.
     pub coarse: CoarseReport,
-    /// Whether the requested number of coarse tets was reached: `reached`, `least` or `jumped`;
-    /// null if none was requested.
+    /// Whether the requested number of coarse tets was reached: `reached`, `least`, `jumped` or
+    /// `fewer`; null if none was requested.
     pub wanted: Option<Outcome>,
     /// The fine mesh.
     pub mesh: MeshReport,

@@ -3,6 +3,7 @@
 use crate::ground::comm::{CommError, Communicator};
 use bytemuck::Pod;
 use std::cell::Cell;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 thread_local! {
     /// Whether this thread handles failed allocations.
@@ -29,8 +30,27 @@ pub fn allocation_may_fail() -> bool {
     MAY_FAIL.get()
 }
 
+/// The largest peak before [`restart_peak`].
+static EARLIER_PEAK: AtomicU64 = AtomicU64::new(0);
+
 /// The peak resident set of this process in bytes; `None` if the system does not report it.
 pub fn peak_bytes() -> Option<u64> {
+    peak_since_restart().map(|peak| peak.max(EARLIER_PEAK.load(Ordering::Relaxed)))
+}
+
+/// Starts a new peak for [`peak_since_restart`] at the resident set of now, if the system can.
+pub(crate) fn restart_peak() {
+    /// What the system takes as a request to do so, see `proc_pid_clear_refs(5)`.
+    const RESTART: &str = "5";
+    let Some(peak) = peak_since_restart() else { return };
+    EARLIER_PEAK.fetch_max(peak, Ordering::Relaxed);
+    // Without this, the peaks of later stages are those since the start.
+    let _ = std::fs::write("/proc/self/clear_refs", RESTART);
+}
+
+/// The peak resident set of this process in bytes since the last [`restart_peak`]; `None` if the
+/// system does not report it.
+pub(crate) fn peak_since_restart() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find(|line| line.starts_with("VmHWM:"))?;
     let kib: u64 = line.split_whitespace().nth(1)?.parse().ok()?;

@@ -4,6 +4,7 @@
 //! the run. [`Silent`] does nothing. Stages report through a [`Work`], which limits the number of
 //! reports.
 
+use crate::ground::memory;
 use std::cell::RefCell;
 use std::fmt;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
@@ -116,11 +117,15 @@ pub struct StageTime {
     pub name: &'static str,
     /// Wall-clock seconds.
     pub seconds: f64,
+    /// The peak resident memory of the process during the stage, bytes. `None` unless that is
+    /// [measured](Progress::measuring_memory), or if the system does not report it.
+    pub peak_memory: Option<u64>,
 }
 
 /// The stages of one run on one rank: notifies the observer, and records times.
 pub struct Progress<'a> {
     observer: &'a dyn Observer,
+    measures_memory: bool,
     stages: RefCell<Vec<StageTime>>,
 }
 
@@ -133,20 +138,33 @@ impl fmt::Debug for Progress<'_> {
 impl<'a> Progress<'a> {
     /// Progress of a run that has not started.
     pub fn new(observer: &'a dyn Observer) -> Self {
-        Self { observer, stages: RefCell::default() }
+        Self { observer, measures_memory: false, stages: RefCell::default() }
+    }
+
+    /// Measures the peak memory of the process in each stage: for one rank of a process, because
+    /// each stage starts a new peak.
+    pub fn measuring_memory(self) -> Self {
+        Self { measures_memory: true, ..self }
     }
 
     /// Runs one stage, which reports how far it is.
     pub fn stage<T>(&self, stage: Stage, run: impl FnOnce(&Work) -> T) -> T {
         self.observer.begin(stage);
+        if self.measures_memory {
+            memory::restart_peak();
+        }
         let start = Instant::now();
         let result = run(&Work::new(self.observer, stage));
         let seconds = start.elapsed().as_secs_f64();
+        let peak_memory = self.measures_memory.then(memory::peak_since_restart).flatten();
         self.observer.end(stage, seconds);
         let mut stages = self.stages.borrow_mut();
         match stages.iter_mut().find(|time| time.name == stage.name()) {
-            Some(time) => time.seconds += seconds,
-            None => stages.push(StageTime { name: stage.name(), seconds }),
+            Some(time) => {
+                time.seconds += seconds;
+                time.peak_memory = time.peak_memory.max(peak_memory);
+            }
+            None => stages.push(StageTime { name: stage.name(), seconds, peak_memory }),
         }
         result
     }
@@ -298,6 +316,24 @@ mod tests {
         progress.stage(Stage::Write, |_| ());
         let names: Vec<&str> = progress.times().into_iter().map(|s| s.name).collect();
         assert_eq!(names, ["mesh", "write"]);
+    }
+
+    #[test]
+    fn each_stage_has_its_own_peak_if_memory_is_measured() {
+        const BYTES: usize = 200 << 20;
+        let progress = Progress::new(&Silent).measuring_memory();
+        // Touched, so that it is resident.
+        progress.stage(Stage::Mesh, |_| std::hint::black_box(vec![1_u8; BYTES]).len());
+        progress.stage(Stage::Write, |_| ());
+        let [mesh, write] = &progress.times()[..] else { panic!("two stages") };
+        if let (Some(mesh), Some(write)) = (mesh.peak_memory, write.peak_memory) {
+            // Other tests may allocate meanwhile.
+            assert!(mesh as usize > BYTES && write + BYTES as u64 / 2 < mesh, "{mesh} {write}");
+            assert!(memory::peak_bytes() >= Some(mesh));
+        }
+        let unmeasured = Progress::new(&Silent);
+        unmeasured.stage(Stage::Mesh, |_| ());
+        assert_eq!(unmeasured.times()[0].peak_memory, None);
     }
 
     #[test]

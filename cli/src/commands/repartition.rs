@@ -2,7 +2,7 @@
 
 use super::outputs::Outputs;
 use super::write::{read_back, refuse_unknown, write_formats};
-use super::{on_ranks, prepared, set_threads, write_report};
+use super::{on_ranks, prepared, set_threads, watched, write_report};
 use crate::failure::{Failure, agree};
 use crate::options::{Format, PartitionMethod, Repartition};
 use crate::report::moved::MoveReport;
@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 use tetmill::comm::{Communicator, mpi};
 use tetmill::files::elmer;
-use tetmill::progress::{Progress, Stage};
+use tetmill::progress::Stage;
 use tetmill::repartition::{Geometric, Method};
 
 /// `tetmill repartition`
@@ -39,7 +39,7 @@ fn repartition_on(comm: &dyn Communicator, options: &Repartition, start: Instant
     let first = comm.rank() == 0;
     let outputs = agree(comm, prepared(comm, || outputs_of(options, comm.size())))?;
     let terminal = Terminal::new(options.run.quiet || !first);
-    let progress = Progress::new(&terminal);
+    let progress = watched(&terminal, first);
     let method = match options.method {
         None => Method::default(),
         Some(PartitionMethod::Curve) => Method::Geometric(Geometric::Curve),
