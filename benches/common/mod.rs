@@ -1,6 +1,8 @@
 //! Functions shared by the benchmarks.
 #![allow(dead_code)]
 
+pub mod counting;
+
 /// Processor seconds of this process so far, including ended threads; 0 if the system does not
 /// report it.
 pub fn cpu_seconds() -> f64 {
