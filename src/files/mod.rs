@@ -50,6 +50,7 @@ pub mod surface;
 #[cfg(test)]
 pub(crate) mod testing;
 pub(crate) mod text;
+pub mod view;
 pub mod volume;
 pub mod vtu;
 
