@@ -6,6 +6,7 @@ mod extras;
 mod outputs;
 mod ranks;
 mod repartition;
+mod view;
 mod write;
 
 use decompose::cut_settings;
@@ -16,6 +17,7 @@ use outputs::Outputs;
 pub use ranks::on_one_rank;
 use ranks::{on_ranks, set_threads};
 pub use repartition::run_repartition;
+pub use view::run_view;
 use write::{note_losses, place_of, read_back, refuse_unknown, write_formats};
 
 use crate::failure::{Failure, Status, agree};
@@ -93,16 +95,28 @@ fn generate_on(comm: &dyn Communicator, options: &Generate, start: Instant) -> R
         Some(file) => draw(comm, made.part.stream(), options.cut, file)?,
         None => {}
     }
+    let title = view::title_of(&options.input);
+    let page_level =
+        options.report_html.as_ref().map(|_| view::of_generated(comm, &made, &title, view::IN_FILE));
+    let page_level = page_level.transpose()?;
+    let served = options.view.then(|| view::of_generated(comm, &made, &title, view::SERVED)).transpose()?;
     let balanced = balance(comm, &made.part)?;
     let took = processes(comm)?;
-    let Some(geometry) = geometry else { return Ok(()) };
-    let mut report = Report::new(&geometry, &name_of(&options.input), &made, took, comm.size(), balanced);
-    report.halo = halo;
-    terminal.finish();
-    report.stages = progress.times();
-    report.seconds = start.elapsed().as_secs_f64();
-    report.add_written(written);
-    show_report(&report, options.run.report.as_deref(), &outputs, options.run.quiet, wanted_count(options))
+    let done = geometry.map_or(Ok(()), |geometry| {
+        let mut report = Report::new(&geometry, &name_of(&options.input), &made, took, comm.size(), balanced);
+        report.halo = halo;
+        terminal.finish();
+        report.stages = progress.times();
+        report.seconds = start.elapsed().as_secs_f64();
+        report.add_written(written);
+        let (file, quiet) = (options.run.report.as_deref(), options.run.quiet);
+        show_report(&report, file, &outputs, quiet, wanted_count(options))?;
+        if let (Some(file), Some(views)) = (&options.report_html, page_level) {
+            view::write_page(views, Some(&report), file)?;
+        }
+        served.map_or(Ok(()), |views| view::serve(views, options.port))
+    });
+    agree(comm, done)
 }
 
 /// The progress of a run on one rank, on the first with the peak memory of its process.
@@ -118,6 +132,7 @@ fn outputs_of(options: &Generate, target: &Path, stem: &Path, parts: u32) -> Out
         .folder(target, stem, &options.run, parts)
         .file("--report", options.run.report.as_ref())
         .file("--picture", options.picture.as_ref())
+        .file("--report-html", options.report_html.as_ref())
 }
 
 /// Prepares the outputs on rank 0, which creates the files; returns empty outputs on other ranks.

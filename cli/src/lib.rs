@@ -52,6 +52,7 @@ pub fn status(arguments: impl IntoIterator<Item = impl Into<OsString> + Clone>) 
         Command::Generate(options) => commands::run_generate(&options),
         Command::Mesh(options) => commands::on_one_rank(|| commands::run_mesh(&options)),
         Command::Repartition(options) => commands::run_repartition(&options),
+        Command::View(options) => commands::run_view(&options),
         Command::Inspect(options) => commands::on_one_rank(|| commands::run_inspect(&options)),
         Command::Check(options) => commands::on_one_rank(|| commands::run_check(&options)),
         Command::Quality(options) => commands::on_one_rank(|| commands::run_quality(&options)),

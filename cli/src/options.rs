@@ -39,6 +39,13 @@ pub enum Command {
     /// Cut a geometry by planes into parts with equal shares of the tets, and write it as .geo
     #[command(after_help = STATUS)]
     Decompose(Decompose),
+    /// Show a mesh in the browser, or write it as a page that works offline
+    ///
+    /// Meshes are read as they are; geometries and surfaces are meshed first. The page is served on
+    /// the loopback address of this machine only, at an address that others cannot guess, until
+    /// Ctrl-C.
+    #[command(after_help = STATUS)]
+    View(View),
     /// Show the bodies, corners, curves, patches, boundary numbers and names of a geometry
     Inspect(Inspect),
     /// Check a written Elmer mesh and list every fault with its ids and coordinates
@@ -232,9 +239,51 @@ pub struct Generate {
     /// Draw only the tets behind a plane, given by a point and a normal
     #[arg(long, value_name = "X,Y,Z,NX,NY,NZ", value_parser = cut, allow_hyphen_values = true, requires = "picture")]
     pub cut: Option<Cut>,
+    /// Write a page with the report and the mesh to look at; it works offline
+    #[arg(long, value_name = "FILE.html")]
+    pub report_html: Option<PathBuf>,
+    /// Show the mesh in the browser when it is written, until Ctrl-C; levels with more than a
+    /// million tets are shown coarser
+    #[arg(long)]
+    pub view: bool,
+    /// Port of the viewer, for a tunnel from another machine; no browser is started [default: any
+    /// free port]
+    #[arg(long, value_name = "N", requires = "view")]
+    pub port: Option<u16>,
     /// Output and report
     #[command(flatten)]
     pub run: RunOptions,
+}
+
+/// `tetmill view`
+#[derive(Args, Debug)]
+pub struct View {
+    /// The input
+    #[command(flatten)]
+    pub input: InputOptions,
+    /// Write one page that works offline instead of serving it, with at most 200,000 tets inside; -
+    /// is the standard output
+    #[arg(short, long, value_name = "PAGE.html", conflicts_with = "port")]
+    pub output: Option<PathBuf>,
+    /// Number of parts of a geometry [default: 1]
+    #[arg(short = 'n', long, value_name = "RANKS", value_parser = clap::value_parser!(u32).range(1..))]
+    pub ranks: Option<u32>,
+    /// Levels of uniform refinement of a geometry
+    #[arg(long, value_name = "L", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=i64::from(MAX_PIECES.ilog2())))]
+    pub levels: u32,
+    /// Sizes of the mesh of a geometry
+    #[command(flatten)]
+    pub size: SizeOptions,
+    /// Port of the viewer, for a tunnel from another machine; no browser is started [default: any
+    /// free port]
+    #[arg(long, value_name = "N")]
+    pub port: Option<u16>,
+    /// Number of threads [default: number of cores]
+    #[arg(short, long, value_name = "THREADS", value_parser = clap::value_parser!(u32).range(1..))]
+    pub threads: Option<u32>,
+    /// Print the address and errors only
+    #[arg(short, long)]
+    pub quiet: bool,
 }
 
 /// `tetmill repartition`
