@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Installs the programs that the tests need besides Rust: MPI, libclang (for its bindings), TetGen,
 # CalculiX, CMake and PETSc for the C interface, DOLFINx and PETSc for the system's Python, and Python modules
-# that read our files: numpy, Gmsh, NGSolve with NETGEN, meshio, scikit-fem, MFEM, h5py, VTK. Uses apt on Debian and Ubuntu; elsewhere it
+# that read our files: numpy, Gmsh, NGSolve with NETGEN, meshio, scikit-fem, MFEM, h5py, VTK; Chromium and its
+# driver Playwright for the viewer. Uses apt on Debian and Ubuntu; elsewhere it
 # lists the missing packages. Does nothing if all are installed.
 set -euo pipefail
 
@@ -18,6 +19,7 @@ command -v python3 >/dev/null || missing+=(python3 python3-numpy)
 if command -v apt-get >/dev/null; then
     command -v tetgen >/dev/null || missing+=(tetgen)
     command -v cmake >/dev/null || missing+=(cmake)
+    command -v chromium >/dev/null || command -v chromium-browser >/dev/null || missing+=(chromium)
     command -v ccx >/dev/null || missing+=(calculix-ccx)
     pkg-config --exists PETSc 2>/dev/null || missing+=(petsc-dev)
     # Python of the system: pip's numpy is too new for its DOLFINx.
@@ -47,7 +49,7 @@ fi
 
 # Module and package.
 for module in numpy:numpy gmsh:gmsh ngsolve:ngsolve netgen.csg:netgen-mesher meshio:meshio skfem:scikit-fem mfem.ser:mfem h5py:h5py \
-    vtkmodules:vtk; do
+    vtkmodules:vtk playwright:playwright; do
     python3 -c "import ${module%%:*}" 2>/dev/null && continue
     package=${module##*:}
     python3 -m pip install --quiet "$package" 2>/dev/null \

@@ -14,6 +14,8 @@ else
     run() { cargo test --no-fail-fast --lib --bins --tests "$@"; }
 fi
 
+scripts/test-viewer.sh
+
 # `mpi` is a feature of the library and of the program; both have tests that depend on it.
 run --workspace --features mpi
 cargo test --workspace --features mpi --doc

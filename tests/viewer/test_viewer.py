@@ -1,0 +1,351 @@
+"""The viewer in headless Chromium with software WebGL: run by scripts/test-viewer.sh.
+
+Needs Playwright and Chromium. TETMILL is the program to be tested.
+"""
+
+import base64
+import json
+import os
+import re
+import shutil
+import signal
+import socket
+import struct
+import subprocess
+import tempfile
+import time
+import unittest
+import urllib.request
+from pathlib import Path
+
+from playwright.sync_api import sync_playwright
+
+ROOT = Path(__file__).resolve().parents[2]
+TETMILL = os.environ["TETMILL"]
+# SwiftShader draws on the processor: the same picture on every machine.
+ARGUMENTS = ["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-sandbox"]
+
+CUBE = """algebraic3d
+solid cube = orthobrick (0, 0, 0; 1, 1, 1) -bcname=outer -maxh=0.3;
+solid ball = sphere (0.5, 0.5, 0.5; 0.25) -bcname=inner;
+solid core = ball -maxh=0.3;
+solid rest = cube and not ball;
+tlo core;
+tlo rest;
+"""
+HOSTILE = "</script><script>window.hacked=1</script><img src=x onerror=window.hacked=1>"
+
+
+def run(*arguments):
+    return subprocess.run([TETMILL, *map(str, arguments)], check=True, capture_output=True, text=True, cwd=ROOT)
+
+
+def until(page, condition):
+    """Waits for a condition in a page. Playwright's own waiting needs `eval`, which the page forbids."""
+    deadline = time.monotonic() + 20
+    while not page.evaluate(f"Boolean({condition})"):
+        if time.monotonic() > deadline:
+            raise TimeoutError(condition)
+        page.wait_for_timeout(20)
+
+
+def message_of(page_text):
+    """The head of the message in a page."""
+    text = re.search(r'id="data">([^<]*)</script>', page_text)[1]
+    data = base64.b64decode(text)
+    (length,) = struct.unpack_from("<I", data)
+    return json.loads(data[4 : 4 + length])
+
+
+class Viewer(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = Path(tempfile.mkdtemp())
+        cls.geo = cls.folder / "cube.geo"
+        cls.geo.write_text(CUBE)
+        cls.file = cls.folder / "cube.html"
+        run("view", cls.geo, "-n", 3, "-q", "-o", cls.file)
+        cls.driver = sync_playwright().start()
+        chromium = shutil.which("chromium") or shutil.which("chromium-browser")
+        cls.browser = cls.driver.chromium.launch(executable_path=chromium, args=ARGUMENTS)
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.browser.close()
+        cls.driver.stop()
+        shutil.rmtree(cls.folder)
+
+    def open(self, address, offline=False, size=(1000, 700)):
+        """A page with its mesh drawn; any message on the console is a failure at the end of the test."""
+        context = self.browser.new_context(offline=offline, viewport={"width": size[0], "height": size[1]}, color_scheme="light")
+        self.addCleanup(context.close)
+        page = context.new_page()
+        said = []
+        page.on("console", lambda line: said.append(line.text))
+        page.on("pageerror", lambda error: said.append(str(error)))
+        page.on("request", lambda request: self.asked.append(request.url))
+        self.asked = []
+        self.addCleanup(lambda: self.assertEqual(said, []))
+        page.goto(address)
+        until(page, "window.tetmillApp && tetmillApp.mesh && !tetmillApp.waiting")
+        return page
+
+    def drawn(self, page):
+        """A fingerprint of the canvas, and how many of its pixels are drawn."""
+        until(page, "!tetmillApp.waiting")
+        return page.evaluate(
+            """() => { const { gl, canvas } = tetmillApp.drawing, n = canvas.width * canvas.height;
+            const pixels = new Uint8Array(4 * n); let drawn = 0, hash = 0;
+            gl.readPixels(0, 0, canvas.width, canvas.height, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
+            for (let k = 0; k < pixels.length; k += 4) { if (pixels[k + 3]) drawn++;
+              hash = (Math.imul(hash, 31) + pixels[k] + 3 * pixels[k + 1] + 7 * pixels[k + 2] + 11 * pixels[k + 3]) | 0; }
+            return { drawn, hash }; }"""
+        )
+
+    def differs(self, page, act):
+        before = self.drawn(page)
+        act()
+        after = self.drawn(page)
+        self.assertNotEqual(before["hash"], after["hash"])
+        return before["drawn"], after["drawn"]
+
+    def test_a_page_works_without_a_network_and_asks_for_nothing(self):
+        page = self.open(self.file.as_uri(), offline=True)
+        drawn = self.drawn(page)["drawn"]
+        self.assertGreater(drawn, 50_000)
+        self.assertEqual([url for url in self.asked if not url.startswith(("file:", "data:"))], [])
+        self.assertLess(self.file.stat().st_size, 2_000_000)
+
+    def test_the_head_agrees_with_the_run(self):
+        head = message_of(self.file.read_text())
+        report = self.folder / "report.json"
+        run("generate", self.geo, "-n", 3, "-f", "none", "-q", "--report", report)
+        mesh = json.loads(report.read_text())["mesh"]
+        self.assertEqual(sum(head["tets"]), mesh["tets"])
+        self.assertEqual(head["totals"]["vertices"], mesh["vertices"])
+        names = [name for patch in head["patches"] for name in patch["names"]]
+        self.assertIn("inner", names)
+
+    def test_each_toggle_changes_the_picture_and_back(self):
+        page = self.open(self.file.as_uri() + "#explode=0.6&on=boundary,interfaces,volume")
+        for key in ["boundary", "interfaces", "curves", "corners", "vertices", "shared"]:
+            start = self.drawn(page)
+            self.differs(page, lambda: page.click(f"#show-{key}"))
+            self.differs(page, lambda: page.click(f"#show-{key}"))
+            self.assertEqual(self.drawn(page), start, key)
+
+    def test_colours_styles_themes_and_parts_change_the_picture(self):
+        page = self.open(self.file.as_uri())
+        for color in ["patch", "body", "angle", "ratio", "part"]:
+            self.differs(page, lambda: page.select_option("#color", color)) if color != "body" else page.select_option("#color", color)
+        for style in ["filled", "grid", "transparent", "both"]:
+            self.differs(page, lambda: page.select_option("#style", style))
+        before, after = self.differs(page, lambda: page.click("#part-0"))
+        self.assertLess(after, before)
+        page.click("#part-0")
+        page.click("#theme")
+        # The background is that of the page: only the theme changes.
+        until(page, "!tetmillApp.waiting")
+        self.assertEqual(page.evaluate("document.documentElement.dataset.theme"), "dark")
+
+    def test_a_cut_shows_whole_tets_behind_the_plane(self):
+        page = self.open(self.file.as_uri())
+        self.differs(page, lambda: page.click("#cut-x"))
+        wrong = page.evaluate(
+            """() => { const { mesh, faces, state } = tetmillApp, plane = planeOf(mesh, state.cut);
+            return [...faces].filter((f) => dot([0, 1, 2].map((i) => mesh.centers[3 * (f >> 2) + i]), plane.normal) >= plane.offset).length; }"""
+        )
+        self.assertEqual(wrong, 0)
+        inside = page.evaluate("[...tetmillApp.faces].filter((f) => tetmillApp.mesh.neighbours[f] >= 0).length")
+        self.assertGreater(inside, 10)
+        # What is visible is closed: each edge is in an even number of faces.
+        odd = page.evaluate(
+            """() => { const { mesh, faces } = tetmillApp, count = new Map();
+            for (const f of faces) { const v = FACES[f & 3].map((k) => mesh.tets[4 * (f >> 2) + k]);
+              for (let k = 0; k < 3; k++) { const e = [v[k], v[(k + 1) % 3]].sort((a, b) => a - b).join(); count.set(e, (count.get(e) || 0) + 1); } }
+            return [...count.values()].filter((n) => n % 2).length; }"""
+        )
+        self.assertEqual(odd, 0)
+
+    def test_a_click_finds_what_is_there(self):
+        page = self.open(self.file.as_uri())
+        # The middle of the front face of the cube, seen from -y, is on the boundary `outer`.
+        page.keyboard.press("4")
+        box = page.locator("#canvas").bounding_box()
+        found = set()
+        for k in range(24):
+            page.mouse.click(box["x"] + box["width"] / 2 + 5 * k, box["y"] + box["height"] / 2 + 3 * k)
+            about = page.evaluate("tetmillApp.selected && { ...tetmillApp.selected, text: document.getElementById('info').innerText }")
+            found.add(about["kind"])
+            if about["kind"] == "face":
+                self.assertIn("outer", about["text"])
+                facts = page.evaluate(
+                    """(about) => { const { mesh } = tetmillApp, t = mesh.tetIds.indexOf(about.tet);
+                    return { ids: [0, 1, 2, 3].map((k) => mesh.ids[mesh.tets[4 * t + k]]), y: about.edges.flat().map((v) => mesh.points[3 * v + 1] + mesh.center[1]) }; }""",
+                    about,
+                )
+                self.assertTrue(set(about["id"]) <= set(facts["ids"]))
+                self.assertTrue(all(abs(y) < 1e-6 for y in facts["y"]), facts["y"])
+        self.assertIn("face", found)
+        corner = page.evaluate(
+            """() => { const { mesh } = tetmillApp; for (let v = 0; v < mesh.ids.length; v++) {
+            const p = [0, 1, 2].map((i) => Math.abs(mesh.points[3 * v + i] + mesh.center[i])); if (Math.max(...p) < 1e-6) return [mesh.ids[v], ...tetmillApp.toScreen(pointOf(mesh, v))]; } }"""
+        )
+        page.mouse.click(box["x"] + corner[1] + 2, box["y"] + corner[2] - 2)
+        about = page.evaluate("tetmillApp.selected")
+        self.assertEqual((about["kind"], about["id"]), ("vertex", corner[0]))
+        self.assertEqual(about["rows"][0][1], "0, 0, 0")
+
+    def test_the_search_finds_ids_and_names(self):
+        page = self.open(self.file.as_uri())
+        for text, kind in [("t5", "tet"), ("v7", "vertex"), ("inner", "face"), ("t99999999", None), ("<b>", None)]:
+            page.fill("#search", text)
+            page.press("#search", "Enter")
+            self.assertEqual(page.evaluate("tetmillApp.selected.kind ?? null"), kind, text)
+        self.assertIn("Not found", page.inner_text("#info"))
+
+    def test_a_distance_is_that_of_the_vertices(self):
+        page = self.open(self.file.as_uri())
+        page.keyboard.press("4")
+        page.keyboard.press("m")
+        box = page.locator("#canvas").bounding_box()
+        corners = page.evaluate("[[-0.5, -0.5, -0.5], [0.5, -0.5, -0.5]].map((p) => tetmillApp.toScreen(p))")
+        for (x, y), dx in zip(corners, [2, -2]):
+            page.mouse.click(box["x"] + x + dx, box["y"] + y - 2)
+        self.assertIn("Distance", page.inner_text("#info"))
+        self.assertRegex(page.inner_text("#info"), r"Length\s+1\b")
+
+    def test_the_address_shows_the_same_again(self):
+        page = self.open(self.file.as_uri())
+        page.click("#cut-z")
+        page.select_option("#color", "angle")
+        page.click("#part-1")
+        page.keyboard.press("+")
+        until(page, "location.hash.includes('partsOff=1') && location.hash.includes('cut=')")
+        page.wait_for_timeout(300)
+        again = self.open(page.url)
+        # Addresses have five digits: pixels can differ from those before, but not from each other.
+        self.assertEqual(self.drawn(page)["drawn"], self.drawn(again)["drawn"])
+        self.assertEqual(self.drawn(again), self.drawn(self.open(page.url)))
+        nonsense = self.open(self.file.as_uri() + "#turn=x,1&zoom=-1&cut=0,0,0,0&range=2,1&color=<b>&explode=1e99&partsOff=-3,x")
+        self.assertGreater(self.drawn(nonsense)["drawn"], 0)
+
+    def test_the_histogram_selects_and_the_worst_tets_are_the_worst(self):
+        page = self.open(self.file.as_uri())
+        page.locator("#histogram").scroll_into_view_if_needed()
+        box = page.locator("#histogram").bounding_box()
+        page.mouse.move(box["x"] + 2, box["y"] + 40)
+        page.mouse.down()
+        page.mouse.move(box["x"] + box["width"] * 0.55, box["y"] + 40)
+        page.mouse.up()
+        high = page.evaluate("tetmillApp.state.range[1]")
+        self.drawn(page)
+        worst = page.evaluate("Math.max(0, ...[...tetmillApp.faces].map((f) => tetmillApp.mesh.quality[2 * (f >> 2)]))")
+        self.assertTrue(0 < worst <= high, (worst, high))
+        page.keyboard.press("Escape")
+        page.click("#worst-0")
+        least = page.evaluate("Math.min(...tetmillApp.mesh.quality.filter((_, k) => k % 2 === 0))")
+        self.assertEqual(page.evaluate("tetmillApp.mesh.quality[2 * tetmillApp.selected.tetIndex]"), least)
+
+    def test_hostile_names_are_text(self):
+        mesh, file = self.folder / "hostile.msh", self.folder / "hostile.html"
+        run("mesh", self.geo, "-q", "-o", mesh)
+        text = mesh.read_text()
+        self.assertIn('"outer"', text)
+        mesh.write_text(text.replace('"outer"', f'"{HOSTILE}"'))
+        run("view", mesh, "-q", "-o", file)
+        page = self.open(file.as_uri())
+        page.fill("#search", "hacked")
+        page.press("#search", "Enter")
+        self.assertIn("<script>window.hacked=1", page.inner_text("#info"))
+        self.assertIsNone(page.evaluate("window.hacked ?? null"))
+
+    def test_a_report_page_has_the_numbers_of_the_report(self):
+        file, report = self.folder / "report.html", self.folder / "r.json"
+        run("generate", self.geo, "--levels", 1, "-f", "none", "-q", "--report-html", file, "--report", report)
+        page = self.open(file.as_uri())
+        page.keyboard.press("r")
+        text = page.inner_text("#report")
+        self.assertIn(f"{json.loads(report.read_text())['mesh']['tets']:,}", text)
+        self.assertIn("partition", text)
+
+    def test_a_touch_screen_and_a_small_window_work(self):
+        page = self.open(self.file.as_uri(), size=(390, 800))
+        self.assertGreater(self.drawn(page)["drawn"], 10_000)
+        self.assertGreater(page.locator("#canvas").bounding_box()["width"], 380)
+
+    def test_help_opens_and_closes(self):
+        page = self.open(self.file.as_uri())
+        page.keyboard.press("?")
+        self.assertTrue(page.is_visible("#help"))
+        page.keyboard.press("Escape")
+        self.assertFalse(page.is_visible("#help"))
+
+    def test_elmer_parts_and_other_meshes_are_read(self):
+        folder = self.folder / "elmer"
+        run("generate", self.geo, "-n", 3, "-f", "elmer,msh", "-q", "-o", folder)
+        for mesh, parts in [(folder, 3), (folder / "cube.msh", 1)]:
+            file = self.folder / "mesh.html"
+            run("view", mesh, "-q", "-o", file)
+            head, expected = message_of(file.read_text()), message_of(self.file.read_text())
+            self.assertEqual((len(head["tets"]), sum(head["tets"])), (parts, sum(expected["tets"])))
+            page = self.open(file.as_uri())
+            self.assertGreater(self.drawn(page)["drawn"], 50_000)
+
+    def serve(self, *arguments):
+        server = subprocess.Popen([TETMILL, *map(str, arguments)], stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True, cwd=ROOT)
+        self.addCleanup(server.stderr.close)
+        self.addCleanup(server.wait)
+        self.addCleanup(server.kill)
+        for line in server.stderr:
+            if found := re.search(r"http://\S+", line):
+                return server, found[0]
+        self.fail("no address")
+
+    def test_a_served_mesh_has_levels_and_ends_with_ctrl_c(self):
+        server, address = self.serve("generate", self.geo, "-n", 2, "--levels", 2, "-f", "none", "-q", "--view")
+        page = self.open(address)
+        fine = page.evaluate("tetmillApp.mesh.tetCount")
+        self.assertTrue(all(url.startswith(address) or url.startswith("data:") for url in self.asked), self.asked)
+        page.select_option("#level", "2")
+        until(page, "tetmillApp.level === 2 && !tetmillApp.waiting")
+        self.assertEqual(page.evaluate("tetmillApp.mesh.tetCount") * 64, fine)
+        self.assertIn("coarser level", page.inner_text("#note"))
+        server.send_signal(signal.SIGINT)
+        self.assertEqual(server.wait(10), 0)
+
+    def test_requests_without_token_or_with_other_hosts_get_an_error_only(self):
+        _, address = self.serve("view", self.geo, "-q")
+        token, port = re.search(r":(\d+)/([0-9a-f]{32})/", address).group(2), int(re.search(r":(\d+)/", address)[1])
+
+        def ask(raw):
+            with socket.create_connection(("127.0.0.1", port)) as stream:
+                stream.sendall(raw)
+                stream.shutdown(socket.SHUT_WR)
+                answer = b""
+                try:
+                    while chunk := stream.recv(65536):
+                        answer += chunk
+                except ConnectionResetError:
+                    pass
+                return answer
+
+        def get(path, host="127.0.0.1"):
+            return ask(f"GET {path} HTTP/1.1\r\nHost: {host}\r\n\r\n".encode())
+
+        self.assertIn(b"200 OK", get(f"/{token}/"))
+        refused = [get("/"), get("/mesh/0"), get(f"/{'0' * 32}/"), get(f"/{token}/", "evil.example"), get(f"/{token}/../../etc/passwd")]
+        refused += [get(f"/{token}/mesh/9"), get(f"/{token}/mesh/-1"), get(f"/{token}/mesh/0?" + "x" * 100), ask(b"\0" * 64 + b"\r\n\r\n"), ask(b"GET / HTTP/1.1\r\n")]
+        for answer in refused:
+            self.assertRegex(answer.split(b"\r\n")[0], rb"^HTTP/1.1 (400|403|404) ")
+            self.assertLess(len(answer.split(b"\r\n\r\n")[1]), 40)
+        self.assertNotIn(b"200", ask(b"GET /" + b"x" * 20000).split(b"\r\n")[0])
+        # Not on other addresses of this machine.
+        with self.assertRaises(OSError):
+            socket.create_connection((socket.gethostbyname(socket.gethostname()) if socket.gethostbyname(socket.gethostname()) != "127.0.0.1" else "127.0.0.2", port), 2).close()
+        with urllib.request.urlopen(address) as answer:
+            self.assertEqual(answer.headers["X-Frame-Options"], "DENY")
+
+
+if __name__ == "__main__":
+    unittest.main()
