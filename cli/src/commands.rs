@@ -111,11 +111,15 @@ fn generate_on(comm: &dyn Communicator, options: &Generate, start: Instant) -> R
         report.add_written(written);
         let (file, quiet) = (options.run.report.as_deref(), options.run.quiet);
         show_report(&report, file, &outputs, quiet, wanted_count(options))?;
-        if let (Some(file), Some(views)) = (&options.report_html, page_level) {
-            view::write_page(views, Some(&report), file)?;
+        match (&options.report_html, page_level) {
+            (Some(file), Some(views)) => view::write_page(views, Some(&report), file),
+            _ => Ok(()),
         }
-        served.map_or(Ok(()), |views| view::serve(views, options.port))
     });
+    agree(comm, done)?;
+    // The levels that are served do not need the mesh.
+    drop(made);
+    let done = served.filter(|_| first).map_or(Ok(()), |views| view::serve(views, options.port));
     agree(comm, done)
 }
 

@@ -55,8 +55,9 @@ function facts(mesh) {
   const lines = [`${grouped(totals.tets)} tets, ${grouped(totals.vertices)} vertices, ${mesh.parts} ${mesh.parts === 1 ? "part" : "parts"}`];
   const notes = [];
   if (mesh.pieces && mesh.pieces[0] !== mesh.pieces[1]) {
-    notes.push(`Shown is a coarser level of the mesh with ${grouped(mesh.tetCount)} tets: coarse edges in ${mesh.pieces[1]} instead of ${mesh.pieces[0]}. Ids, sizes and quality are those of this level.`);
-  } else if (mesh.hollow && some) {
+    notes.push(`Shown is a coarser level of the mesh${mesh.hollow ? "" : ` with ${grouped(mesh.tetCount)} tets`}: coarse edges in ${mesh.pieces[1]} instead of ${mesh.pieces[0]}. Ids, sizes and quality are those of this level.`);
+  }
+  if (mesh.hollow && some) {
     notes.push(`The mesh is large: only the ${grouped(mesh.tetCount)} tets at its surface and between parts are here. Cuts show it hollow.`);
   }
   return { lines, notes };
@@ -79,7 +80,7 @@ function buildPanel(app) {
   const shared = mesh.holders.reduce((sum, h) => sum + (h > 1), 0);
   panel.replaceChildren(
     element("h1", {}, mesh.title), ...lines.map((line) => element("p", { className: "facts" }, line)), ...notes.map((note) => element("p", { className: "note", id: "note" }, note)),
-    ...(app.levels.length > 1 ? [choice("level", "Level", String(app.level), app.levels.map((pieces, k) => [String(k), pieces === 1 ? "coarse mesh" : `coarse edges in ${pieces}`]), (k) => app.load(Number(k)).catch(failed))] : []),
+    ...(app.levels.length > 1 ? [choice("level", "Level", String(app.level), app.levels.map(([pieces, hollow], k) => [String(k), `${pieces === 1 ? "coarse mesh" : `coarse edges in ${pieces}`}${hollow ? ", surface only" : ""}`]), (k) => app.load(Number(k)).catch(failed))] : []),
     element("input", { id: "search", type: "text", placeholder: "Find t12, v34, or a boundary name", "aria-label": "Find", onkeydown: (event) => event.key === "Enter" && app.find(event.target.value) }),
     section("Shown", true,
       choice("color", "Colour by", state.color, colors, (key) => { state.color = key; if (key in QUALITY) state.measure = key; app.rebuild(); }),

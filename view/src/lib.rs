@@ -38,9 +38,11 @@ pub fn page(message: &[u8]) -> String {
     filled("text/plain", &base64::encode(message))
 }
 
-/// The page that loads messages from the server. `levels` are the subdivisions of coarse edges.
-fn served_page(levels: &[u32]) -> String {
-    filled("application/json", &format!("{levels:?}"))
+/// The page that loads messages from the server.
+fn served_page(levels: &[Level]) -> String {
+    let list: Vec<String> =
+        levels.iter().map(|level| format!("[{}, {}]", level.pieces, level.hollow)).collect();
+    filled("application/json", &format!("[{}]", list.join(", ")))
 }
 
 fn filled(kind: &str, data: &str) -> String {

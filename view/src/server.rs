@@ -28,6 +28,8 @@ const FIELDS: &str = "Connection: close\r\nCache-Control: no-store\r\nX-Content-
 pub struct Level {
     /// Subdivisions of each coarse edge.
     pub pieces: u32,
+    /// Whether only the surface of the mesh is in it.
+    pub hollow: bool,
     /// The mesh as the page reads it.
     pub message: Vec<u8>,
 }
@@ -54,7 +56,7 @@ impl Server {
         let mut random = [0; 16];
         getrandom::fill(&mut random).map_err(io::Error::other)?;
         let token = random.iter().map(|byte| format!("{byte:02x}")).collect();
-        let page = served_page(&levels.iter().map(|level| level.pieces).collect::<Vec<_>>());
+        let page = served_page(&levels);
         Ok(Self { listener, token, page, levels, open: AtomicUsize::new(0) })
     }
 
@@ -150,7 +152,8 @@ mod tests {
 
     /// What a server with one message answers to raw bytes.
     fn answers(asked: impl Fn(&Server) -> Vec<Vec<u8>>) -> Vec<String> {
-        let server = Server::new(None, vec![Level { pieces: 1, message: b"mesh".to_vec() }]).unwrap();
+        let server =
+            Server::new(None, vec![Level { pieces: 1, hollow: false, message: b"mesh".to_vec() }]).unwrap();
         let place = server.listener.local_addr().unwrap();
         let done = AtomicBool::new(false);
         std::thread::scope(|scope| {

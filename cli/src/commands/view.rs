@@ -27,6 +27,9 @@ pub const SERVED: u64 = 1_000_000;
 /// Maximum number of tets at the surface of a mesh that is too large to be shown whole.
 const MOST_HOLLOW: u64 = 3 * SERVED;
 
+/// Maximum number of boundary triangles of a level of which only the surface is shown.
+const MOST_FACES: u64 = 600_000;
+
 /// A level of a mesh on rank 0: its parts, and what is said about them. The finest comes first.
 pub struct Viewed {
     parts: Vec<ViewPart>,
@@ -198,18 +201,22 @@ pub fn of_generated(
     let about = about(title, &made.names, stream);
     let n = made.pieces;
     let coarse = stream.totals().tets / u64::from(n).pow(3);
-    // Halves of the subdivisions, and the coarse mesh.
-    let mut levels: Vec<u32> = (0..=n.trailing_zeros()).map(|k| n >> k).collect();
-    levels.push(1);
-    levels.dedup();
-    levels.retain(|&m| coarse * u64::from(m).pow(3) <= most);
+    // Any number of subdivisions is a level; the check of the mesh is about n and its halves only.
+    let largest = |fits: &dyn Fn(u64) -> bool| (1..=n).rev().find(|&m| fits(m.into()));
+    let finest = largest(&|m| coarse * m.pow(3) <= most);
+    let mut levels: Vec<u32> = std::iter::successors(finest, |&m| (m > 1).then_some(m / 2)).collect();
+    if most == SERVED {
+        // The surface of a finer level.
+        let boundary = stream.totals().boundary / u64::from(n).pow(2);
+        levels.extend(largest(&|m| boundary * m.pow(2) <= MOST_FACES).filter(|&m| Some(m) > finest));
+    }
     let mut views = Vec::new();
     for m in levels {
-        let pieces = Some([n, m]);
+        let about = About { pieces: Some([n, m]), ..about.clone() };
         if m == n {
-            views.append(&mut of_stream(comm, stream, About { pieces, ..about.clone() }, most)?);
+            views.append(&mut of_stream(comm, stream, about, most)?);
         } else if let Some(level) = agree(comm, made.with_pieces(m).map_err(Failure::from))? {
-            views.append(&mut of_stream(comm, &level, About { pieces, ..about.clone() }, most)?);
+            views.append(&mut of_stream(comm, &level, about, most)?);
         }
     }
     if views.is_empty() {
@@ -229,6 +236,7 @@ pub fn write_page(views: Vec<Viewed>, report: Option<&Report>, file: &Path) -> R
 pub fn serve(views: Vec<Viewed>, port: Option<u16>) -> Result<(), Failure> {
     let level = |view: Viewed| tetmill_view::Level {
         pieces: view.about.pieces.map_or(1, |[_, shown]| shown),
+        hollow: view.about.hollow,
         message: message(&view.parts, &view.about),
     };
     let levels = views.into_iter().map(level).collect();

@@ -79,12 +79,16 @@ pub fn part(stream: &dyn MeshStream, fill: Fill) -> ViewPart {
     let (mut block, mut points) = (LocalBlock::default(), Vec::new());
     for index in 0..stream.tet_blocks() {
         stream.local_block(index, &mut block);
-        stream.block_points(&block, &mut points);
+        points.clear();
         let body = block.tets.body.expect("a tet block has a body").0;
         for (place, tet) in block.tets.tets.iter().enumerate() {
             let local = tet.map(|k| block.vertices[k as usize]);
             if fill == Fill::Hollow && !keep(&local) {
                 continue;
+            }
+            // Most blocks of a hollow part have no such tet.
+            if points.is_empty() {
+                stream.block_points(&block, &mut points);
             }
             for (k, vertex) in tet.iter().zip(local) {
                 let new = &mut new_index[vertex as usize];
