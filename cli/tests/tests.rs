@@ -27,4 +27,5 @@ mod sizes;
 mod skins;
 mod swept;
 mod tutorials;
+mod view;
 mod vtu_clients;
