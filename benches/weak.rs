@@ -2,8 +2,8 @@
 //! messages of rank 0 and of the others, with the same number of tets for each rank.
 //!
 //! `cargo bench --bench weak [-- GEOMETRY METHOD TETS MOST]`: a geometry file, `surface` or
-//! `decompose`, coarse tets of a rank, the largest number of ranks. Ranks are threads that share the
-//! cores of this machine, so times are those of a core for a rank.
+//! `decompose`, coarse tets of a rank, the largest number of ranks. Ranks are threads that share
+//! the cores of this machine, so times are those of a core for a rank.
 #![forbid(unsafe_code)]
 #![allow(missing_docs)]
 

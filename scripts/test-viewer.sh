@@ -8,5 +8,6 @@ if ! "$python" -c "import playwright" 2>/dev/null || ! { command -v chromium || 
     echo "no Playwright or no Chromium: the tests of the viewer are skipped" >&2
     exit 0
 fi
-cargo build --quiet -p tetmill-cli
+# With the features of scripts/test.sh, so that nothing is compiled twice.
+cargo build --quiet --workspace --features mpi --bin tetmill
 TETMILL="$(cd "${CARGO_TARGET_DIR:-target}" && pwd)/debug/tetmill" "$python" -m unittest "${@:-tests/viewer/test_viewer.py}"

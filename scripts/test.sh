@@ -14,10 +14,9 @@ else
     run() { cargo test --no-fail-fast --lib --bins --tests "$@"; }
 fi
 
-scripts/test-viewer.sh
-
 # `mpi` is a feature of the library and of the program; both have tests that depend on it.
 run --workspace --features mpi
+scripts/test-viewer.sh
 cargo test --workspace --features mpi --doc
 # Each example checks its own result.
 for example in examples/*.rs; do

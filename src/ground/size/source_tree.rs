@@ -68,8 +68,8 @@ const BENT: f64 = 0.04;
 pub(crate) enum Accuracy {
     /// Closely enough for a mesh.
     Fine,
-    /// With twice the error, which is enough to compare numbers of tets: cells are twice as large, so
-    /// that a quarter of them are built on a surface.
+    /// With twice the error, which is enough to compare numbers of tets: cells are twice as large,
+    /// so that a quarter of them are built on a surface.
     Rough,
 }
 
