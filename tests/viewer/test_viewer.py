@@ -195,6 +195,16 @@ class Viewer(unittest.TestCase):
         about = page.evaluate("tetmillApp.selected")
         self.assertEqual((about["kind"], about["id"]), ("vertex", corner[0]))
         self.assertEqual(about["rows"][0][1], "0, 0, 0")
+        rows = dict(about["rows"])
+        sides = rows["Boundaries"].splitlines()
+        self.assertEqual((len(sides), sum("outer" in side for side in sides)), (3, 3), "the corner of three sides")
+        self.assertEqual(len(rows["Body"].splitlines()), 1)
+        # A vertex of the ball is in both bodies.
+        inner = page.evaluate(
+            """() => { const { mesh } = tetmillApp, inner = mesh.patches.findIndex((p) => p.names.includes("inner"));
+            const f = mesh.facePatches.indexOf(inner), v = mesh.tets[4 * (f >> 2) + FACES[f & 3][0]]; return aboutVertex(mesh, v).rows; }"""
+        )
+        self.assertEqual(len(dict(inner)["Bodies"].splitlines()), 2)
 
     def test_the_search_finds_ids_and_names(self):
         page = self.open(self.file.as_uri())

@@ -21,10 +21,30 @@ function holdersOf(mesh, v) {
   return parts.map((part) => part + 1).join(", ");
 }
 
+/** The boundaries and bodies of the faces and tets that have all these vertices, each once. */
+function placeRows(mesh, vertices) {
+  const wanted = vertices.map((v) => mesh.same[v]), patches = new Set(), bodies = new Set();
+  for (let t = 0; t < mesh.tetCount; t++) {
+    // The places of the vertices among the corners of the tet, as bits.
+    let places = 0, found = 0;
+    for (let k = 0; k < 4; k++) {
+      if (wanted.includes(mesh.same[mesh.tets[4 * t + k]])) { places |= 1 << k; found++; }
+    }
+    if (found < wanted.length) continue;
+    bodies.add(labelOf(mesh.bodies[mesh.tetBodies[t]], mesh.tetBodies[t], "body"));
+    for (let k = 0; k < 4; k++) {
+      const patch = mesh.facePatches[4 * t + k];
+      if (patch >= 0 && !(places >> k & 1)) patches.add(labelOf(mesh.patches[patch], patch, "patch"));
+    }
+  }
+  const row = (one, several, names) => (names.size ? [[names.size === 1 ? one : several, [...names].join("\n")]] : []);
+  return [...row("Boundary", "Boundaries", patches), ...row("Body", "Bodies", bodies)];
+}
+
 function aboutVertex(mesh, v) {
   return {
     kind: "vertex", id: mesh.ids[v], title: `Vertex ${mesh.ids[v]}`, vertices: [v], edges: [],
-    rows: [["Coordinates", coordinates(mesh, v)], ["Parts", holdersOf(mesh, v)]],
+    rows: [["Coordinates", coordinates(mesh, v)], ...placeRows(mesh, [v]), ["Parts", holdersOf(mesh, v)]],
   };
 }
 
@@ -32,7 +52,7 @@ function aboutEdge(mesh, a, b) {
   const [p, q] = [mesh.ids[a], mesh.ids[b]].sort((x, y) => x - y);
   return {
     kind: "edge", id: [p, q], title: `Edge ${p} – ${q}`, vertices: [], edges: [[a, b]],
-    rows: [["Length", short(lengthBetween(mesh, a, b))], ["Ends", `${coordinates(mesh, a)}\n${coordinates(mesh, b)}`]],
+    rows: [["Length", short(lengthBetween(mesh, a, b))], ["Ends", `${coordinates(mesh, a)}\n${coordinates(mesh, b)}`], ...placeRows(mesh, [a, b])],
   };
 }
 
