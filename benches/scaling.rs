@@ -15,7 +15,7 @@ use common::counting::Counting;
 use common::living_cpu_seconds;
 use std::time::Instant;
 use tetmill::check;
-use tetmill::comm::{Communicator, thread};
+use tetmill::comm::thread;
 use tetmill::internals::refine::{PredictedCounts, predicted_counts};
 use tetmill::internals::{Budget, Model, distribution, mesh_to_target, partition, refine};
 use tetmill::mesh::{DistMesh, Mesh, Order};

@@ -27,6 +27,7 @@ mod shared;
 pub use bare::{BareMesh, ClassifiedEdge, Side};
 pub use check::{CheckError, Faults};
 pub use distribute::{DistError, distribute, distribute_matched, from_serial};
+pub(crate) use number_shared::directory_rank;
 pub use number_shared::{NumberError, number_shared};
 pub use shared::owner;
 

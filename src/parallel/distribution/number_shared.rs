@@ -111,7 +111,7 @@ struct Numbers {
 
 /// The directory rank of a vertex: each rank is responsible for a block of ids, all nearly equal in
 /// size.
-fn directory_rank(id: GlobalId, vertices: u64, ranks: u32) -> Rank {
+pub(crate) fn directory_rank(id: GlobalId, vertices: u64, ranks: u32) -> Rank {
     (u128::from(id) * u128::from(ranks) / u128::from(vertices)) as Rank
 }
 

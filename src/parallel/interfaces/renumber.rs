@@ -4,13 +4,13 @@ use super::rework::Reworked;
 use crate::ground::comm::{CommError, Communicator};
 use crate::ground::mesh::stream::Counts;
 use crate::ground::mesh::{GlobalId, Rank, TetId, VertexId};
-use crate::parallel::distribution::{BareMesh, ClassifiedEdge, Shared, Side};
+use crate::parallel::distribution::{BareMesh, ClassifiedEdge, Shared, Side, directory_rank};
+use std::collections::BTreeMap;
 
 /// **Collective.** The part with the reworked tets, and the rank that each tet goes to.
 ///
 /// Ids of removed tets are reused on their rank; additional tets and vertices get the highest ids.
-/// Remaining gaps are closed by moving all higher ids down. So the order of ids is kept, and only
-/// the unused ids have to be gathered on all ranks.
+/// Remaining gaps are closed by moving all higher ids down, so the order of ids is kept.
 ///
 /// # Errors
 /// [`CommError`] if another rank fails.
@@ -43,7 +43,6 @@ pub(super) fn put_back(
     let [more_vertices, more_tets, removed_triangles] = comm.all_reduce_sum_u64(counts)?;
     let gone_ids: Vec<GlobalId> = removed.iter().map(|&v| part.vertex_ids[v as usize]).collect();
     let left_ids: Vec<GlobalId> = left_over.iter().map(|&tet| part.tet_ids[tet as usize]).collect();
-    let gaps = [Gaps::gather(comm, &gone_ids)?, Gaps::gather(comm, &left_ids)?];
 
     // Tets: first in the positions of removed ones, then at the end.
     let places: Vec<u32> =
@@ -74,37 +73,69 @@ pub(super) fn put_back(
     replace_edges(&mut part, &removed, edges);
     drop_vertices(&mut part, &removed);
 
-    gaps[0].close(&mut part.vertex_ids);
-    gaps[1].close(&mut part.tet_ids);
+    let fewer_vertices = close_gaps(comm, &mut part.vertex_ids, &gone_ids, part.totals.vertices)?;
+    let fewer_tets = close_gaps(comm, &mut part.tet_ids, &left_ids, part.totals.tets)?;
     part.totals = Counts {
-        vertices: part.totals.vertices + more_vertices - gaps[0].0.len() as u64,
-        tets: part.totals.tets + more_tets - gaps[1].0.len() as u64,
+        vertices: part.totals.vertices + more_vertices - fewer_vertices,
+        tets: part.totals.tets + more_tets - fewer_tets,
         boundary: part.totals.boundary - removed_triangles,
     };
     Ok((part, to))
 }
 
-/// The unused ids of all ranks, ascending.
-struct Gaps(Vec<GlobalId>);
-
-impl Gaps {
-    /// **Collective.** Gathers the unused ids of all ranks.
-    fn gather(comm: &dyn Communicator, mine: &[GlobalId]) -> Result<Self, CommError> {
-        let mut all = comm.all_gather(mine)?.concat();
-        all.sort_unstable();
-        Ok(Self(all))
+/// **Collective.** Lowers each of the ascending `ids` by the number of ids below it that are unused
+/// on any rank; `unused` are those of this rank, all below `count`. Returns the number of all unused
+/// ids.
+///
+/// Each rank is the directory of a block of ids. It gets the unused ids there, and sends to each
+/// rank those between the first and the last id that the rank has in the block. So messages do not
+/// grow with the number of ranks.
+fn close_gaps(
+    comm: &dyn Communicator,
+    ids: &mut [GlobalId],
+    unused: &[GlobalId],
+    count: u64,
+) -> Result<u64, CommError> {
+    /// The first and the last id of a rank that has none in a block.
+    const NO_IDS: [GlobalId; 2] = [0, 0];
+    let directory = |id: GlobalId| directory_rank(id, count, comm.size());
+    let same_block = |a: &GlobalId, b: &GlobalId| directory(*a) == directory(*b);
+    let (old, new) = ids.split_at_mut(ids.partition_point(|&id| id < count));
+    let mut requests: BTreeMap<Rank, Vec<GlobalId>> = BTreeMap::new();
+    for block in old.chunk_by(same_block) {
+        requests.insert(directory(block[0]), vec![block[0], block[block.len() - 1]]);
+    }
+    for &id in unused {
+        requests.entry(directory(id)).or_insert_with(|| NO_IDS.to_vec()).push(id);
     }
 
-    /// Closes the gaps: lowers each id by the number of unused ids below it.
-    fn close(&self, ids: &mut [GlobalId]) {
+    let requests = comm.exchange::<GlobalId>(requests.into_iter().collect())?;
+    let mut here: Vec<GlobalId> = requests.iter().flat_map(|(_, request)| &request[2..]).copied().collect();
+    here.sort_unstable();
+    let [before] = comm.exclusive_scan([here.len() as u64])?;
+    let [all] = comm.all_reduce_sum_u64([here.len() as u64])?;
+    let reply = |(from, request): &(Rank, Vec<GlobalId>)| {
+        let [start, end] = [0, 1].map(|k| here.partition_point(|&id| id < request[k]));
+        let below = before + start as u64;
+        (*from, std::iter::once(below).chain(here[start..end].iter().copied()).collect())
+    };
+    let replies = comm.exchange::<GlobalId>(requests.iter().map(reply).collect())?;
+    for block in old.chunk_by_mut(same_block) {
+        let place = replies.binary_search_by_key(&directory(block[0]), |(from, _)| *from);
+        let (before, between) = replies[place.expect("each directory rank replies")]
+            .1
+            .split_first()
+            .expect("a reply has a number");
         let mut below = 0;
-        for id in ids {
-            while self.0.get(below).is_some_and(|gap| gap < id) {
+        for id in block {
+            while between.get(below).is_some_and(|gap| gap < id) {
                 below += 1;
             }
-            *id -= below as u64;
+            *id -= before + below as u64;
         }
     }
+    new.iter_mut().for_each(|id| *id -= all);
+    Ok(all)
 }
 
 /// New positions after the removal of some (ascending), `u32::MAX` for the removed ones.
@@ -165,4 +196,45 @@ fn drop_vertices(part: &mut BareMesh, removed: &[u32]) {
     let mut shared = Shared::default();
     old.iter().for_each(|(v, holders)| shared.push(places[v as usize], holders.iter().copied()));
     part.shared = shared;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ground::comm::thread;
+
+    #[test]
+    fn ids_are_lowered_by_the_unused_ones_below_on_any_rank() {
+        const COUNT: u64 = 100;
+        // Unused are 0, 7, 14, ...; rank r has every id whose remainder by `ranks` is r, and a new one.
+        let is_unused = |id: &u64| id.is_multiple_of(7);
+        for ranks in [1, 2, 3, 7, 16] {
+            let closed = thread::run(ranks, |comm| {
+                let rank = u64::from(comm.rank());
+                let mine = || (rank..COUNT).step_by(ranks as usize);
+                let unused: Vec<u64> = mine().filter(is_unused).collect();
+                let mut ids: Vec<u64> = mine().filter(|id| !is_unused(id)).chain([COUNT + rank]).collect();
+                let all = close_gaps(comm, &mut ids, &unused, COUNT).unwrap();
+                assert_eq!(all, 15);
+                ids
+            });
+            let mut closed = closed.unwrap().concat();
+            closed.sort_unstable();
+            assert_eq!(closed, (0..COUNT - 15 + u64::from(ranks)).collect::<Vec<u64>>());
+        }
+    }
+
+    #[test]
+    fn ranks_without_ids_or_without_unused_ones_take_part() {
+        let closed = thread::run(4, |comm| {
+            let (mut ids, unused) = match comm.rank() {
+                0 => (vec![0, 9], vec![]),
+                2 => (vec![5], vec![4, 1, 8]),
+                _ => (vec![], vec![]),
+            };
+            assert_eq!(close_gaps(comm, &mut ids, &unused, 10).unwrap(), 3);
+            ids
+        });
+        assert_eq!(closed.unwrap(), [vec![0, 6], vec![], vec![3], vec![]]);
+    }
 }
