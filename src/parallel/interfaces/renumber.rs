@@ -83,9 +83,10 @@ pub(super) fn put_back(
     Ok((part, to))
 }
 
-/// **Collective.** Lowers each of the ascending `ids` by the number of ids below it that are unused
-/// on any rank; `unused` are those of this rank, all below `count`. Returns the number of all unused
-/// ids.
+/// **Collective.** Lowers each of the ascending `ids` by the number of ids below it that are unused.
+///
+/// `unused` are the unused ids of this rank, all below `count`. Returns the number of those of all
+/// ranks.
 ///
 /// Each rank is the directory of a block of ids. It gets the unused ids there, and sends to each
 /// rank those between the first and the last id that the rank has in the block. So messages do not
@@ -206,7 +207,7 @@ mod tests {
     #[test]
     fn ids_are_lowered_by_the_unused_ones_below_on_any_rank() {
         const COUNT: u64 = 100;
-        // Unused are 0, 7, 14, ...; rank r has every id whose remainder by `ranks` is r, and a new one.
+        // Unused are 0, 7, 14, ...; rank r has the ids with remainder r by `ranks`, and a new one.
         let is_unused = |id: &u64| id.is_multiple_of(7);
         for ranks in [1, 2, 3, 7, 16] {
             let closed = thread::run(ranks, |comm| {
