@@ -83,7 +83,7 @@ pub(super) fn put_back(
     Ok((part, to))
 }
 
-/// **Collective.** Lowers each of the ascending `ids` by the number of ids below it that are unused.
+/// **Collective.** Lowers each of the ascending `ids` by the number of unused ids below it.
 ///
 /// `unused` are the unused ids of this rank, all below `count`. Returns the number of those of all
 /// ranks.
