@@ -21,10 +21,9 @@ enum Kind {
 /// The kind by the file's extension; a folder is an Elmer mesh.
 fn kind(path: &Path) -> Result<Kind, Error> {
     match files::input::ending(path).as_str() {
-        _ if path.is_dir() => Ok(Kind::Mesh),
+        _ if files::volume::is_mesh(path) => Ok(Kind::Mesh),
         "geo" => Ok(Kind::Csg),
         "stl" | "off" | "obj" | "ply" | "poly" | "smesh" => Ok(Kind::Surface),
-        "vtu" | "pvtu" | "msh" | "vol" | "gz" | "mesh" | "meshb" | "ele" | "node" | "face" => Ok(Kind::Mesh),
         "step" | "stp" | "iges" | "igs" | "brep" => Err(InputError::Cad(path.to_path_buf()).into()),
         _ => Err(InputError::UnknownFormat(path.to_path_buf()).into()),
     }

@@ -10,13 +10,13 @@ use crate::options::{InputOptions, View};
 use crate::report::{Report, counted};
 use crate::terminal::Terminal;
 use std::path::{Path, PathBuf};
+use tetmill::Generated;
 use tetmill::comm::Communicator;
 use tetmill::files::view::{About, Fill, ViewPart, gather, message, of_mesh, part};
 use tetmill::files::{elmer, elmer::Layout, refuse_missing, volume};
 use tetmill::mesh::{BareMesh, BareStream, Counts, MeshStream, Names};
 use tetmill::progress::{Progress, Stage};
 use tetmill::run::{GenerateSettings, generate};
-use tetmill::{Generated, Method};
 
 /// Maximum number of tets in a page: with 90 bytes each, below 20 MB.
 pub const IN_FILE: u64 = 200_000;
@@ -43,7 +43,7 @@ pub fn run_view(options: &View) -> Result<(), Failure> {
     }
     set_threads(options.threads)?;
     match &options.input.files[..] {
-        [file] if is_mesh(file) => {
+        [file] if volume::is_mesh(file) => {
             let parts = if file.is_dir() { parts_of(file)? } else { 1 };
             on_ranks(None, Some(parts), |comm| view_mesh(comm, options, file))
         }
@@ -58,14 +58,6 @@ pub fn title_of(input: &InputOptions) -> String {
     input.files.iter().map(name).collect::<Vec<_>>().join(", ")
 }
 
-/// Whether a file has the ending of a mesh, or is the folder of one.
-fn is_mesh(file: &Path) -> bool {
-    const ENDINGS: [&str; 9] = ["vtu", "pvtu", "msh", "vol", "mesh", "meshb", "ele", "node", "face"];
-    let name = file.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
-    let ending = name.strip_suffix(".gz").unwrap_or(&name).rsplit_once('.').map_or("", |(_, ending)| ending);
-    file.is_dir() || ENDINGS.contains(&ending)
-}
-
 fn parts_of(folder: &Path) -> Result<u32, Failure> {
     Ok(match elmer::only_layout(folder)? {
         Layout::Serial(_) => 1,
@@ -77,13 +69,18 @@ fn outputs_of(options: &View) -> Outputs {
     reading(&options.input, &options.size).file("-o", options.output.as_ref())
 }
 
+/// The number of tets up to which a level is shown whole.
+fn most_tets(options: &View) -> u64 {
+    if options.output.is_some() { IN_FILE } else { SERVED }
+}
+
 /// **Collective.** Shows a mesh from a file on one rank, or an Elmer partition on a rank for each
 /// part.
 fn view_mesh(comm: &dyn Communicator, options: &View, file: &Path) -> Result<(), Failure> {
     let first = comm.rank() == 0;
     let outputs = if first { outputs_of(options).prepare() } else { Ok(()) };
     agree(comm, outputs)?;
-    let most = if options.output.is_some() { IN_FILE } else { SERVED };
+    let most = most_tets(options);
     let title = title_of(&options.input);
     let view = if file.is_dir() {
         let loaded = elmer::load(comm, file)?;
@@ -124,18 +121,12 @@ fn view_geometry(comm: &dyn Communicator, options: &View) -> Result<(), Failure>
     });
     let geometry = agree(comm, geometry.transpose())?;
     let settings = GenerateSettings {
-        method: Method::default(),
         coarse: agree(comm, coarse_settings(&options.size, geometry.as_ref()))?,
         wanted: wanted_coarse(&options.size, 1 << options.levels),
-        memory: None,
-        disk: None,
-        nested: false,
-        refine: 0,
-        allow_off_surface: false,
-        periodic_together: false,
+        ..GenerateSettings::default()
     };
     let made = generate(comm, geometry.as_ref(), &settings, &progress)?;
-    let most = if options.output.is_some() { IN_FILE } else { SERVED };
+    let most = most_tets(options);
     let views = of_generated(comm, &made, &title_of(&options.input), most)?;
     terminal.finish();
     finish(comm, views, options)

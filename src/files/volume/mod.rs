@@ -80,6 +80,12 @@ pub struct VolumeMesh {
     pub notes: Vec<String>,
 }
 
+/// Whether a path is a folder, which can be an Elmer mesh, or has the ending of a mesh.
+pub fn is_mesh(path: &Path) -> bool {
+    const ENDINGS: [&str; 10] = ["vtu", "pvtu", "msh", "vol", "gz", "mesh", "meshb", "ele", "node", "face"];
+    path.is_dir() || ENDINGS.contains(&ending(path).as_str())
+}
+
 /// Reads a mesh in the format of the file's extension, see [`KNOWN`].
 ///
 /// # Errors
