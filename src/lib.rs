@@ -98,7 +98,7 @@ pub use pipeline::{Generated, Geometry, Hierarchy, InputSettings, Mesher, Method
 /// Ranks: threads of this process, or processes of an MPI job.
 pub mod comm {
     pub use crate::ground::comm::group::Group;
-    pub use crate::ground::comm::{CommError, Communicator, Rank, grouped, mpi, thread};
+    pub use crate::ground::comm::{CommError, Communicator, Fold, Rank, grouped, mpi, thread};
 }
 
 /// Meshes: ids and entities, parts as arrays, blocks or streams, shared vertices and ghosts.

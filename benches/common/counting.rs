@@ -1,7 +1,7 @@
 //! A communicator that counts its calls and bytes.
 
 use std::cell::Cell;
-use tetmill::comm::{CommError, Communicator, Rank};
+use tetmill::comm::{CommError, Communicator, Fold, Rank};
 
 /// A communicator that counts its calls and bytes.
 pub struct Counting<'a> {
@@ -77,5 +77,9 @@ impl Communicator for Counting<'_> {
         let got = self.inner.exchange_bytes(messages)?;
         self.count(sent, bytes(&got));
         Ok(got)
+    }
+    fn fold(&self, fold: Fold, numbers: &mut [u64]) -> Result<(), CommError> {
+        self.count(size_of_val(numbers), size_of_val(numbers));
+        self.inner.fold(fold, numbers)
     }
 }

@@ -11,14 +11,17 @@ impl dyn Communicator + '_ {
     /// If the ranks cannot communicate.
     pub fn first_failure(&self, mine: Option<(u8, String)>) -> Result<Option<(Rank, u8, String)>, CommError> {
         let (code, message) = mine.unwrap_or_default();
-        let codes = self.all_gather_equal_bytes(&[code])?;
-        let Some(lowest) = codes.iter().position(|&code| code != 0) else {
+        // The lowest rank that fails has the largest number.
+        let ranks_after = u64::from(self.size() - self.rank());
+        let mine = if code == 0 { 0 } else { ranks_after << u8::BITS | u64::from(code) };
+        let [largest] = self.all_reduce_max_u64([mine])?;
+        if largest == 0 {
             return Ok(None);
-        };
-        let rank = Rank::try_from(lowest).expect("ranks are u32");
+        }
+        let rank = self.size() - (largest >> u8::BITS) as Rank;
         let mut message = message.into_bytes();
         self.broadcast_bytes(rank, &mut message)?;
-        Ok(Some((rank, codes[lowest], String::from_utf8_lossy(&message).into_owned())))
+        Ok(Some((rank, largest as u8, String::from_utf8_lossy(&message).into_owned())))
     }
 
     /// **Collective.** Returns `result` if no rank has an error, so that no rank waits for one that

@@ -59,6 +59,11 @@ fn reductions_and_scans_go_by_rank(comm: &dyn Communicator) {
     let x = 0.1 * (rank as f64 + 1.0);
     assert_eq!(comm.all_reduce_min_f64([x, -x]).unwrap(), [0.1, -0.1 * size as f64]);
     assert_eq!(comm.all_reduce_max_f64([x]).unwrap(), [0.1 * size as f64]);
+    // Not-a-number is skipped, unless all ranks have it.
+    let on_rank_0 = if rank == 0 { -x } else { f64::NAN };
+    assert_eq!(comm.all_reduce_min_f64([on_rank_0]).unwrap(), [-0.1]);
+    assert_eq!(comm.all_reduce_max_f64([on_rank_0]).unwrap(), [-0.1]);
+    assert!(comm.all_reduce_max_f64([f64::NAN]).unwrap()[0].is_nan());
     let in_order = (1..=size).map(|i| 0.1 * i as f64).fold(0.0, |sum, x| sum + x);
     assert_eq!(comm.all_reduce_sum_f64([x]).unwrap()[0].to_bits(), in_order.to_bits());
 }

@@ -10,9 +10,10 @@
 //! ranks (if there are fewer ranks than processes) serves: before each operation process 0
 //! broadcasts which it is, so that all can take part.
 
-use super::pack::{put, take};
-use super::{CommError, Communicator};
+use super::pack::{numbers, put, take};
+use super::{CommError, Communicator, Fold};
 use crate::ground::comm::Rank;
+use bytemuck::{cast_slice, cast_slice_mut};
 use std::cell::Cell;
 use std::marker::PhantomData;
 use std::ops::Range;
@@ -37,11 +38,16 @@ enum Operation {
         root: Rank,
     },
     Exchange,
+    Fold {
+        fold: Fold,
+        count: u32,
+    },
     /// No more operations follow: idle processes may return.
     End,
 }
 
 impl Operation {
+    /// A number of its kind, and the root or the count.
     fn code(self) -> [u32; 2] {
         match self {
             Self::Barrier => [0, 0],
@@ -51,10 +57,14 @@ impl Operation {
             Self::Scatter { root } => [4, root],
             Self::Exchange => [5, 0],
             Self::End => [6, 0],
+            Self::Fold { fold: Fold::Sum, count } => [7, count],
+            Self::Fold { fold: Fold::Max, count } => [8, count],
+            Self::Fold { fold: Fold::SumBefore, count } => [9, count],
         }
     }
 
-    fn from_code([kind, root]: [u32; 2]) -> Self {
+    fn from_code([kind, value]: [u32; 2]) -> Self {
+        let (root, count) = (value, value);
         match kind {
             0 => Self::Barrier,
             1 => Self::Broadcast { root },
@@ -63,6 +73,9 @@ impl Operation {
             4 => Self::Scatter { root },
             5 => Self::Exchange,
             6 => Self::End,
+            7 => Self::Fold { fold: Fold::Sum, count },
+            8 => Self::Fold { fold: Fold::Max, count },
+            9 => Self::Fold { fold: Fold::SumBefore, count },
             _ => panic!("unknown operation {kind}"),
         }
     }
@@ -235,6 +248,7 @@ fn perform(
             delivery.own = scattered.into_iter().map(|message| vec![(root, message)]).collect();
         }
         Operation::Exchange => delivery.own = exchange(outer, deal, brought)?,
+        Operation::Fold { fold, count } => delivery = fold_all(outer, fold, count, &brought)?,
     }
     Ok((operation, delivery))
 }
@@ -264,6 +278,31 @@ fn exchange(
         }
     }
     Ok(delivered)
+}
+
+/// **Collective** over the processes. Combines the numbers of the ranks of this process, then those
+/// of the processes.
+fn fold_all(
+    outer: &dyn Communicator,
+    fold: Fold,
+    count: u32,
+    brought: &[Messages],
+) -> Result<Delivery, CommError> {
+    let of_ranks = || brought.iter().flatten().map(|(_, bytes)| numbers::<u64>(bytes));
+    let mut total = vec![0; count as usize];
+    of_ranks().for_each(|values| fold.add(&mut total, &values));
+    outer.fold(fold, &mut total)?;
+    let mut delivery = Delivery::default();
+    if fold == Fold::SumBefore {
+        // `total` is the sum over the ranks of the processes before this one.
+        for values in of_ranks() {
+            delivery.own.push(vec![(0, cast_slice(&total).to_vec())]);
+            fold.add(&mut total, &values);
+        }
+    } else {
+        delivery.shared = cast_slice(&total).to_vec();
+    }
+    Ok(delivery)
 }
 
 /// The synchronisation point of the ranks of a process.
@@ -418,46 +457,20 @@ impl Communicator for GroupComm<'_> {
         }
         self.meet(Operation::Exchange, messages, |delivery, place| std::mem::take(&mut delivery.own[place]))
     }
+
+    fn fold(&self, fold: Fold, numbers: &mut [u64]) -> Result<(), CommError> {
+        let count = u32::try_from(numbers.len()).expect("a few numbers");
+        let own = vec![(0, cast_slice(numbers).to_vec())];
+        self.meet(Operation::Fold { fold, count }, own, |delivery, place| {
+            let result = match fold {
+                Fold::Sum | Fold::Max => &delivery.shared,
+                Fold::SumBefore => &delivery.own[place][0].1,
+            };
+            cast_slice_mut(numbers).copy_from_slice(result);
+        })
+    }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::ground::comm::conformance::conformance;
-    use crate::ground::comm::thread;
-
-    #[test]
-    fn any_number_of_ranks_on_any_number_of_processes_conforms() {
-        for (processes, ranks) in [(1, 1), (1, 5), (2, 2), (2, 3), (3, 8), (3, 1), (5, 3)] {
-            let ran = thread::run(processes, |outer| {
-                let mine = run(outer, ranks, |comm| {
-                    assert_eq!(comm.size(), ranks);
-                    conformance(comm);
-                    comm.rank()
-                });
-                mine.unwrap()
-            });
-            assert_eq!(ran.unwrap().concat(), (0..ranks).collect::<Vec<_>>(), "{processes} processes");
-        }
-    }
-
-    #[test]
-    fn a_rank_that_panics_ends_all_processes() {
-        for failing in 0..4 {
-            let ran = thread::run(2, |outer| {
-                run(outer, 4, |comm| {
-                    comm.barrier().unwrap();
-                    assert_ne!(comm.rank(), failing, "a broken invariant");
-                    comm.barrier().unwrap_err();
-                })
-            });
-            let failed = ran.is_err() || ran.is_ok_and(|results| results.iter().any(Result::is_err));
-            assert!(failed, "rank {failing}");
-        }
-    }
-
-    #[test]
-    fn no_ranks_are_refused() {
-        assert!(run(&thread::alone(), 0, |_| ()).is_err());
-    }
-}
+#[path = "grouped_tests.rs"]
+mod tests;

@@ -29,6 +29,7 @@
 pub mod agree;
 #[doc(hidden)]
 pub mod conformance;
+pub mod fold;
 pub mod group;
 pub mod grouped;
 pub mod launch;
@@ -40,6 +41,8 @@ pub mod mpi;
 pub mod pack;
 pub mod thread;
 pub mod typed;
+
+pub use fold::Fold;
 
 /// A rank of the communicator; also the index of the part on that rank.
 pub type Rank = u32;
@@ -113,7 +116,8 @@ pub trait Communicator {
     /// **Collective.** Each rank receives the message of each rank, by rank.
     fn all_gather_bytes(&self, bytes: &[u8]) -> Result<Vec<Vec<u8>>, CommError>;
     /// **Collective.** The same for messages of equal length on all ranks, concatenated; cheap for
-    /// short messages. Sums and scans are built on it, so that they always add in rank order.
+    /// short messages. Sums of floating-point numbers are built on it, so that they always add in
+    /// rank order.
     fn all_gather_equal_bytes(&self, bytes: &[u8]) -> Result<Vec<u8>, CommError>;
     /// **Collective.** `root` passes one message per rank; each rank receives its own.
     ///
@@ -127,4 +131,11 @@ pub trait Communicator {
     /// # Panics
     /// If a message is for a rank that does not exist.
     fn exchange_bytes(&self, messages: Vec<(Rank, Vec<u8>)>) -> Result<Vec<(Rank, Vec<u8>)>, CommError>;
+    /// **Collective.** Replaces each number by the combination of those of the ranks, entry by
+    /// entry; there are equally many on all ranks.
+    ///
+    /// Backends should override it: the default receives the numbers of all ranks.
+    fn fold(&self, fold: Fold, numbers: &mut [u64]) -> Result<(), CommError> {
+        fold::by_all_gather(self, fold, numbers)
+    }
 }

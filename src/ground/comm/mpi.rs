@@ -14,9 +14,9 @@
 pub use ::mpi as rsmpi;
 
 use super::launch::{Launch, LaunchError, this_process};
-use super::{CommError, Communicator};
+use super::{CommError, Communicator, Fold};
 use crate::ground::comm::Rank;
-use mpi::collective::CommunicatorCollectives;
+use mpi::collective::{CommunicatorCollectives, SystemOperation};
 use mpi::datatype::PartitionMut;
 use mpi::environment::{Threading, is_finalized, is_initialized, threading_support};
 use mpi::point_to_point::{Destination, Source};
@@ -375,5 +375,21 @@ impl Communicator for MpiComm {
         inbox.entry(self.rank()).or_default().complete = to_itself.collect();
         let letters = inbox.into_iter().flat_map(|(from, l)| l.complete.into_iter().map(move |m| (from, m)));
         Ok(letters.collect())
+    }
+
+    fn fold(&self, fold: Fold, numbers: &mut [u64]) -> Result<(), CommError> {
+        let own = numbers.to_vec();
+        match fold {
+            Fold::Sum => self.world().all_reduce_into(&own[..], numbers, SystemOperation::sum()),
+            Fold::Max => self.world().all_reduce_into(&own[..], numbers, SystemOperation::max()),
+            Fold::SumBefore => {
+                self.world().exclusive_scan_into(&own[..], numbers, SystemOperation::sum());
+                // MPI leaves the result on the first rank undefined.
+                if self.rank() == 0 {
+                    numbers.fill(0);
+                }
+            }
+        }
+        Ok(())
     }
 }

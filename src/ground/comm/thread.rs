@@ -7,9 +7,11 @@
 //! All ranks share rayon's global pool but are not threads of it, so a waiting rank occupies no
 //! worker.
 
-use super::{CommError, Communicator};
+use super::pack::numbers;
+use super::{CommError, Communicator, Fold};
 use crate::ground::comm::Rank;
 use crate::ground::error::HasKind;
+use bytemuck::{cast_slice, cast_slice_mut};
 use std::cell::Cell;
 use std::marker::PhantomData;
 use std::ops::Deref;
@@ -35,6 +37,7 @@ enum Operation {
     Gather { root: Rank },
     AllGather,
     AllGatherEqual { bytes: usize },
+    Fold { fold: Fold, count: usize },
     Scatter { root: Rank },
     Exchange,
 }
@@ -65,6 +68,16 @@ fn deliver(operation: Operation, deposits: Vec<Messages>) -> Delivery {
         Operation::AllGatherEqual { bytes } => {
             delivery.shared.reserve(bytes * size);
             sent.for_each(|(_, (_, bytes))| delivery.shared.extend(bytes));
+        }
+        Operation::Fold { fold, count } => {
+            let mut total = vec![0; count];
+            for (_, (_, bytes)) in sent {
+                if fold == Fold::SumBefore {
+                    own.push(vec![(0, cast_slice(&total).to_vec())]);
+                }
+                fold.add(&mut total, &numbers(&bytes));
+            }
+            delivery.shared = cast_slice(&total).to_vec();
         }
         Operation::Gather { .. } | Operation::Scatter { .. } | Operation::Exchange => {
             own.resize(size, Vec::new());
@@ -339,6 +352,18 @@ impl Communicator for ThreadComm {
         messages.iter().for_each(|&(to, _)| self.expect_rank(to));
         let delivery = self.meet(Operation::Exchange, messages)?;
         Ok(self.own(&delivery))
+    }
+
+    fn fold(&self, fold: Fold, numbers: &mut [u64]) -> Result<(), CommError> {
+        let operation = Operation::Fold { fold, count: numbers.len() };
+        let delivery = self.meet(operation, vec![(self.rank, cast_slice(numbers).to_vec())])?;
+        match fold {
+            Fold::Sum | Fold::Max => cast_slice_mut(numbers).copy_from_slice(&delivery.shared),
+            Fold::SumBefore => {
+                self.own(&delivery).iter().for_each(|(_, sum)| cast_slice_mut(numbers).copy_from_slice(sum));
+            }
+        }
+        Ok(())
     }
 }
 

@@ -2,7 +2,8 @@
 //!
 //! Numbers travel in the machine's byte order: all ranks of a job must share it, as MPI jobs do.
 
-use super::{CommError, Communicator, pack::numbers};
+use super::fold::{key, value_of};
+use super::{CommError, Communicator, Fold, pack::numbers};
 use crate::ground::comm::Rank;
 use bytemuck::{Pod, cast_slice};
 
@@ -63,58 +64,43 @@ impl dyn Communicator + '_ {
         Ok(received)
     }
 
-    /// **Collective.** Folds the ranks' values entry by entry, in the order of ranks.
-    fn all_reduce<T: Pod, const N: usize>(
-        &self,
-        values: [T; N],
-        combine: impl Fn(T, T) -> T,
-    ) -> Result<[T; N], CommError> {
-        let all: Vec<T> = numbers(&self.all_gather_equal_bytes(cast_slice(&values))?);
-        let mut reduced = [T::zeroed(); N];
-        reduced.copy_from_slice(&all[..N]);
-        for row in all.chunks_exact(N).skip(1) {
-            for (sum, &value) in reduced.iter_mut().zip(row) {
-                *sum = combine(*sum, value);
-            }
-        }
-        Ok(reduced)
-    }
-
     /// **Collective.** The sums over the ranks, entry by entry.
-    pub fn all_reduce_sum_u64<const N: usize>(&self, values: [u64; N]) -> Result<[u64; N], CommError> {
-        self.all_reduce(values, |a, b| a + b)
+    pub fn all_reduce_sum_u64<const N: usize>(&self, mut values: [u64; N]) -> Result<[u64; N], CommError> {
+        self.fold(Fold::Sum, &mut values)?;
+        Ok(values)
     }
 
     /// **Collective.** The largest of the ranks' values, entry by entry.
-    pub fn all_reduce_max_u64<const N: usize>(&self, values: [u64; N]) -> Result<[u64; N], CommError> {
-        self.all_reduce(values, u64::max)
+    pub fn all_reduce_max_u64<const N: usize>(&self, mut values: [u64; N]) -> Result<[u64; N], CommError> {
+        self.fold(Fold::Max, &mut values)?;
+        Ok(values)
     }
 
     /// **Collective.** The sums over the ranks, entry by entry, added in rank order: bitwise the
     /// same on every rank and in every run.
     pub fn all_reduce_sum_f64<const N: usize>(&self, values: [f64; N]) -> Result<[f64; N], CommError> {
-        self.all_reduce(values, |a, b| a + b)
+        let all: Vec<f64> = numbers(&self.all_gather_equal_bytes(cast_slice(&values))?);
+        let mut sums = [0.0; N];
+        sums.copy_from_slice(&all[..N]);
+        for row in all.chunks_exact(N).skip(1) {
+            sums.iter_mut().zip(row).for_each(|(sum, value)| *sum += value);
+        }
+        Ok(sums)
     }
 
     /// **Collective.** The least of the ranks' values, entry by entry; not-a-number is skipped.
     pub fn all_reduce_min_f64<const N: usize>(&self, values: [f64; N]) -> Result<[f64; N], CommError> {
-        self.all_reduce(values, f64::min)
+        Ok(self.all_reduce_max_f64(values.map(|value| -value))?.map(|value| -value))
     }
 
     /// **Collective.** The largest of the ranks' values, entry by entry; not-a-number is skipped.
     pub fn all_reduce_max_f64<const N: usize>(&self, values: [f64; N]) -> Result<[f64; N], CommError> {
-        self.all_reduce(values, f64::max)
+        Ok(self.all_reduce_max_u64(values.map(key))?.map(value_of))
     }
 
     /// **Collective.** The sums over the ranks before this one, entry by entry; zeros on rank 0.
-    pub fn exclusive_scan<const N: usize>(&self, values: [u64; N]) -> Result<[u64; N], CommError> {
-        let all: Vec<u64> = numbers(&self.all_gather_equal_bytes(cast_slice(&values))?);
-        let mut sums = [0u64; N];
-        for row in all.chunks_exact(N).take(self.rank() as usize) {
-            for (sum, value) in sums.iter_mut().zip(row) {
-                *sum += value;
-            }
-        }
-        Ok(sums)
+    pub fn exclusive_scan<const N: usize>(&self, mut values: [u64; N]) -> Result<[u64; N], CommError> {
+        self.fold(Fold::SumBefore, &mut values)?;
+        Ok(values)
     }
 }
