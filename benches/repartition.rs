@@ -16,14 +16,14 @@ use tetmill::comm::{Communicator, thread};
 use tetmill::files::elmer;
 use tetmill::internals::partition::weighted;
 use tetmill::internals::partition::weighted::Graph;
-use tetmill::internals::topology::face_tets;
-use tetmill::mesh::DistMesh;
+use tetmill::internals::topology::matched_faces;
+use tetmill::mesh::BareMesh;
 use tetmill::repartition;
-use tetmill::repartition::{Geometric, Method, Metrics};
+use tetmill::repartition::{Geometric, Links, Method, Metrics};
 
 /// METIS' recursive bisection of the dual graph of a mesh on one rank.
-fn metis(mesh: &DistMesh, parts: u32) -> Vec<Rank> {
-    let sides = face_tets(mesh.faces.len(), &mesh.tet_faces).expect("a mesh");
+fn metis(mesh: &BareMesh, parts: u32) -> Vec<Rank> {
+    let sides = matched_faces(mesh.points.len(), &mesh.tets).expect("a mesh").tets;
     let inner = sides.into_iter().filter(|[_, second]| *second != u32::MAX);
     let graph = Graph::new(vec![1; mesh.tets.len()], inner.map(|[a, b]| [a, b, 1]).collect());
     weighted::bisect(&graph, parts).expect("METIS is there")
@@ -34,16 +34,17 @@ fn measured(
     dir: &Path,
     ranks: u32,
     parts: u32,
-    partition: impl Fn(&dyn Communicator, &DistMesh) -> Vec<Rank> + Sync,
+    partition: impl Fn(&dyn Communicator, &BareMesh, &Links) -> Vec<Rank> + Sync,
 ) -> (Metrics, f64) {
     let results = thread::run(ranks, |comm| {
-        let loaded = elmer::load(comm, dir).expect("a mesh");
+        let mesh = BareMesh::from(elmer::load(comm, dir).expect("a mesh").mesh);
         comm.barrier().expect("no rank fails");
         let start = cpu_seconds();
-        let part = partition(comm, &loaded.mesh);
+        let links = Links::find(comm, &mesh).expect("a mesh");
+        let part = partition(comm, &mesh, &links);
         comm.barrier().expect("no rank fails");
         let seconds = cpu_seconds() - start;
-        (repartition::measure(comm, &loaded.mesh, &part, parts).expect("no rank fails"), seconds)
+        (repartition::measure(comm, &mesh, &links, &part, parts).expect("no rank fails"), seconds)
     });
     results.expect("no rank fails")[0]
 }
@@ -68,11 +69,11 @@ fn main() {
     ];
     let mut table = String::new();
     for &parts in &parts {
-        let whole = measured(&dir, 1, parts, |_, mesh| metis(mesh, parts));
+        let whole = measured(&dir, 1, parts, |_, mesh, _| metis(mesh, parts));
         let whole_cut = whole.0.edge_cut as f64;
         let by = |method: Method| {
-            measured(&dir, ranks, parts, |comm, mesh| {
-                repartition::repartition(comm, mesh, parts, method).expect("a partition")
+            measured(&dir, ranks, parts, |comm, mesh, links| {
+                repartition::repartition(comm, mesh, links, parts, method).expect("a partition")
             })
         };
         let ours = methods.map(|(name, method)| (name, by(method)));

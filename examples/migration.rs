@@ -6,20 +6,21 @@
 //! ```
 
 use tetmill::comm::thread;
-use tetmill::repartition::{Method, migrate, repartition_weighted};
+use tetmill::repartition::{Links, Method, MoveSettings, migrate_bare, repartition_weighted};
 use tetmill::{Error, Geometry, Mesher};
 
 fn main() -> Result<(), Error> {
     let block = Geometry::from_text("algebraic3d solid block = orthobrick (0, 0, 0; 1, 1, 1); tlo block;")?;
     let shares = thread::try_run(4, |comm| -> Result<_, Error> {
         let mesh = Mesher::new().max_size(0.2).levels(1).generate_on(comm, Some(&block))?;
-        let mesh = mesh.with_edges_and_faces(comm)?;
-        let work = |point: &tetmill::Point| if point.coords.norm() < 0.6 { 10 } else { 1 };
+        let mesh = mesh.stored(comm)?;
+        let work = |&[x, y, z]: &[f64; 3]| if x * x + y * y + z * z < 0.36 { 10 } else { 1 };
         let weights: Vec<u32> = mesh.tets.iter().map(|tet| work(&mesh.points[tet[0].index()])).collect();
         let before: u64 = weights.iter().map(|&w| u64::from(w)).sum();
 
-        let to = repartition_weighted(comm, &mesh, &weights, comm.size(), Method::default())?;
-        let mesh = migrate(comm, mesh, &to)?;
+        let links = Links::find(comm, &mesh)?;
+        let to = repartition_weighted(comm, &mesh, &links, &weights, comm.size(), Method::default())?;
+        let (mesh, _) = migrate_bare(comm, mesh, &to, &MoveSettings::default())?;
         let after = mesh.tets.iter().map(|tet| u64::from(work(&mesh.points[tet[0].index()]))).sum::<u64>();
         Ok((before, after, mesh.tets.len()))
     })?;

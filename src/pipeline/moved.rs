@@ -9,7 +9,7 @@ use crate::ground::progress::{Progress, Stage, Work};
 use crate::parallel::check::{self, Checksum, PartReport};
 use crate::parallel::distribution::BareMesh;
 use crate::parallel::migrate::{self, BareStream, Moved};
-use crate::parallel::repartition::{self, Method, Metrics};
+use crate::parallel::repartition::{self, Links, Method, Metrics};
 use std::path::{Path, PathBuf};
 
 /// A repartitioned mesh.
@@ -54,14 +54,15 @@ pub fn repartition(
     if periodic_together && loaded.is_periodic && comm.size() > 1 {
         return Err(RequestError::PeriodicRepartition(loaded.folder).into());
     }
-    let (mesh, parts) = (loaded.mesh, comm.size());
+    let (mesh, parts) = (BareMesh::from(loaded.mesh), comm.size());
     let (to, before, after) = progress.stage(Stage::Partition, |_| {
-        let to = repartition::repartition(comm, &mesh, parts, method)?;
-        let before = repartition::measure(comm, &mesh, &loaded.part, loaded.parts)?;
-        let after = repartition::measure(comm, &mesh, &to, parts)?;
+        let links = Links::find(comm, &mesh)?;
+        let to = repartition::repartition(comm, &mesh, &links, parts, method)?;
+        let before = repartition::measure(comm, &mesh, &links, &loaded.part, loaded.parts)?;
+        let after = repartition::measure(comm, &mesh, &links, &to, parts)?;
         Ok::<_, Error>((to, before, after))
     })?;
-    let stream = BareStream::new(BareMesh::from(mesh));
+    let stream = BareStream::new(mesh);
     let checksum = check::checksum_of_all(comm, &stream)?;
     let (bare, mine) = progress.stage(Stage::Move, |_| {
         migrate::migrate_bare(comm, stream.into_mesh(), &to, &migrate::MoveSettings::default())

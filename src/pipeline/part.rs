@@ -5,11 +5,11 @@ use crate::ground::comm::Communicator;
 use crate::ground::mesh::Rank;
 use crate::ground::mesh::stream::MeshStream;
 use crate::ground::progress::{Progress, Stage};
-use crate::parallel::distribution::{BareMesh, number_shared, owner};
+use crate::parallel::distribution::{BareMesh, owner};
 use crate::parallel::migrate::{self, BareStream};
 use crate::parallel::refine::RefinedMesh;
 use crate::parallel::repartition::smooth::{self, smooth};
-use crate::parallel::repartition::{self, Method, absorb_small_components, diffuse};
+use crate::parallel::repartition::{self, Links, Method, absorb_small_components, diffuse};
 use std::sync::Arc;
 
 /// A rank's part of the mesh.
@@ -128,14 +128,8 @@ pub(super) fn even_out(
         let before = uneven(&part)?;
         let (mut moved, mut imbalance) = (0, before);
         for step in 0..=MOST_MOVES {
-            let mesh = number_shared(comm, part)?;
-            let mut to = match step {
-                _ if imbalance <= UNEVEN => vec![mesh.rank; mesh.tets.len()],
-                MOST_MOVES => repartition::repartition(comm, &mesh, comm.size(), Method::default())?,
-                _ => diffuse(comm, &mesh)?,
-            };
-            smooth(comm, &mesh, None, &mut to, comm.size(), &SMOOTHING)?;
-            part = join(comm, migrate_counted(comm, mesh.into(), &to, &mut moved)?, &mut moved)?;
+            let to = even_ranks(comm, &part, imbalance, step == MOST_MOVES)?;
+            part = join(comm, migrate_counted(comm, part, &to, &mut moved)?, &mut moved)?;
             imbalance = uneven(&part)?;
             if imbalance <= UNEVEN {
                 break;
@@ -144,6 +138,24 @@ pub(super) fn even_out(
         part = join_interfaces(comm, part, &mut moved)?;
         Ok((part, (moved > 0).then_some(Evened { imbalance: before, moved })))
     })
+}
+
+/// **Collective.** A rank for each tet, so that parts are more even and the cuts between them
+/// smooth.
+fn even_ranks(
+    comm: &dyn Communicator,
+    part: &BareMesh,
+    imbalance: f64,
+    from_scratch: bool,
+) -> Result<Vec<Rank>, Error> {
+    let links = Links::find(comm, part)?;
+    let mut to = match from_scratch {
+        _ if imbalance <= UNEVEN => vec![part.rank; part.tets.len()],
+        true => repartition::repartition(comm, part, &links, comm.size(), Method::default())?,
+        false => diffuse(comm, &links)?,
+    };
+    smooth(comm, &links, &part.tet_ids, None, &mut to, comm.size(), &SMOOTHING)?;
+    Ok(to)
 }
 
 /// **Collective.** Moves tets to other ranks, and counts them.
@@ -178,10 +190,11 @@ fn join_interfaces(comm: &dyn Communicator, part: BareMesh, moved: &mut u64) -> 
     if comm.all_reduce_max_u64([last])? == [0] {
         return Ok(part);
     }
-    let mesh = number_shared(comm, part)?;
-    let mut to = vec![mesh.rank; mesh.tets.len()];
-    repartition::join_interfaces(comm, &mesh, &mut to, comm.size(), UNEVEN)?;
-    migrate_counted(comm, mesh.into(), &to, moved)
+    let mut to = vec![part.rank; part.tets.len()];
+    let links = Links::find(comm, &part)?;
+    repartition::join_interfaces(comm, &part, &links, &mut to, comm.size(), UNEVEN)?;
+    drop(links);
+    migrate_counted(comm, part, &to, moved)
 }
 
 /// The maximum divided by the mean.

@@ -11,7 +11,7 @@ use crate::ground::mesh::stream::MeshStream;
 use crate::ground::mesh::{Arrays, GlobalId, Mesh, Names, Order, Rank, Sharing};
 use crate::ground::projector::Projector;
 use crate::parallel::check::{Checksum, Extreme, PartReport, ShapeReport};
-use crate::parallel::distribution::{DistMesh, number_shared};
+use crate::parallel::distribution::{BareMesh, DistMesh, number_shared};
 use crate::parallel::interfaces;
 use crate::parallel::partition::Metrics;
 use crate::parallel::refine::{self, EdgeDisplacements, PeriodicCheck, RefinedMesh, parents};
@@ -151,11 +151,19 @@ impl Generated {
     /// # Errors
     /// If there are more tets than local ids, or not enough memory.
     pub fn with_edges_and_faces(&self, comm: &dyn Communicator) -> Result<DistMesh, Error> {
-        let bare = match &self.part {
-            Part::Refined(part) => comm.agree(migrate::bare(part))?,
-            Part::Stored(part) => part.mesh().clone(),
-        };
-        Ok(number_shared(comm, bare)?)
+        Ok(number_shared(comm, self.stored(comm)?)?)
+    }
+
+    /// **Collective.** A copy of this rank's part as stored tets, to be repartitioned and moved.
+    /// Takes about 40 bytes a tet.
+    ///
+    /// # Errors
+    /// If there are more tets than local ids, or not enough memory.
+    pub fn stored(&self, comm: &dyn Communicator) -> Result<BareMesh, Error> {
+        match &self.part {
+            Part::Refined(part) => Ok(comm.agree(migrate::bare(part))?),
+            Part::Stored(part) => Ok(part.mesh().clone()),
+        }
     }
 
     /// *Local.* This rank's part with other subdivisions of coarse edges, for example a coarser one

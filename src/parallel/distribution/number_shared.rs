@@ -39,6 +39,12 @@ pub enum NumberError {
         /// Its tets.
         tets: usize,
     },
+    /// A face has more than two tets, so the mesh is not a manifold.
+    #[error("not a manifold: face {vertices:?} has more than two tets")]
+    FaceOfManyTets {
+        /// The global ids of its vertices.
+        vertices: [GlobalId; 3],
+    },
     /// A face is shared by more than two ranks, so the mesh is not a manifold.
     #[error("not a manifold: face {vertices:?} is shared by {holders} ranks, at most 2 are possible")]
     FaceOfManyRanks {
@@ -56,7 +62,7 @@ impl HasKind for NumberError {
     fn kind(&self) -> ErrorKind {
         match self {
             Self::TooManyTets { .. } => ErrorKind::Resources,
-            Self::FaceOfManyRanks { .. } => ErrorKind::NoMesh,
+            Self::FaceOfManyTets { .. } | Self::FaceOfManyRanks { .. } => ErrorKind::NoMesh,
             Self::Comm(error) => error.kind(),
         }
     }

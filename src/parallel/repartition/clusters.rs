@@ -5,30 +5,30 @@
 //! store it. Segments of the curve are compact but not smooth; in return, the graph needs no rounds
 //! of matching between ranks.
 
-use super::metrics::across_faces;
+use super::links::Links;
 use super::{MOST_CLUSTERS, RepartitionError};
 use crate::ground::comm::{CommError, Communicator};
 use crate::ground::mesh::Rank;
-use crate::parallel::distribution::DistMesh;
 use crate::parallel::partition::weighted::{self, Graph};
 
-/// **Collective.** See [`repartition`](super::repartition).
+/// **Collective.** See [`repartition`](super::repartition). `tets` are those of the whole mesh, and
+/// `places` the positions of the local ones on the curve.
 pub(super) fn partition(
     comm: &dyn Communicator,
-    mesh: &DistMesh,
+    tets: u64,
+    links: &Links,
     places: &[u64],
     weights: Option<&[u32]>,
     parts: u32,
     per_part: u32,
 ) -> Result<Vec<Rank>, RepartitionError> {
-    let tets = mesh.totals.tets;
     let clusters = u64::from(parts).saturating_mul(u64::from(per_part.max(1))).min(tets);
     let clusters = clusters.min(MOST_CLUSTERS.max(parts.into()));
     let cluster = |place: u64| (u128::from(place) * u128::from(clusters) / u128::from(tets)) as u32;
     let of_tet: Vec<u32> = places.iter().map(|&place| cluster(place)).collect();
 
     let mut pairs = Vec::new();
-    across_faces(comm, mesh, &of_tet, |a, b| {
+    links.across_faces(comm, &of_tet, |a, b| {
         if a != b {
             pairs.push([a.min(b), a.max(b)]);
         }

@@ -5,8 +5,7 @@
 //! for. Each rank finds those of its own part, without messages.
 
 use crate::ground::comm::{CommError, Communicator};
-use crate::ground::mesh::topology::{self, Faces};
-use crate::ground::mesh::{Rank, VertexId};
+use crate::ground::mesh::{Rank, TET_FACES, VertexId, topology};
 use crate::parallel::distribution::BareMesh;
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
@@ -28,10 +27,13 @@ pub fn absorb_small_components(mesh: &BareMesh) -> Vec<Rank> {
     let most = MOST * mesh.tets.len() as f64;
     let is_small = |component: usize| Some(component) != largest && f64::from(sizes[component]) <= most;
     let mut touched: Vec<BTreeMap<Rank, u32>> = vec![BTreeMap::new(); sizes.len()];
-    for (face, &[tet, other]) in components.faces.faces.iter().zip(&components.tets_at) {
-        let component = components.component[tet as usize] as usize;
-        if other == NONE && is_small(component) {
-            others(mesh, face).for_each(|rank| *touched[component].entry(rank).or_default() += 1);
+    for ((tet, beside), &component) in mesh.tets.iter().zip(&components.beside).zip(&components.component) {
+        let component = component as usize;
+        if is_small(component) {
+            for (local, _) in TET_FACES.iter().zip(beside).filter(|(_, other)| **other == NONE) {
+                let ranks = others(mesh, local.map(|i| tet[i]));
+                ranks.for_each(|rank| *touched[component].entry(rank).or_default() += 1);
+            }
         }
     }
     let most = |touched: &BTreeMap<Rank, u32>| {
@@ -54,15 +56,15 @@ pub fn pieces(comm: &dyn Communicator, mesh: &BareMesh) -> Result<u64, CommError
 }
 
 /// The other ranks that have all three vertices of a face.
-fn others(mesh: &BareMesh, face: &[VertexId; 3]) -> impl Iterator<Item = Rank> {
+fn others(mesh: &BareMesh, face: [VertexId; 3]) -> impl Iterator<Item = Rank> {
     let [a, b, c] = face.map(|v| mesh.vertex_holders(v));
     a.iter().copied().filter(|rank| *rank != mesh.rank && b.contains(rank) && c.contains(rank))
 }
 
 /// The connected components of a part, numbered by their first tets.
 struct Components {
-    faces: Faces,
-    tets_at: Vec<[u32; 2]>,
+    /// For each tet the tet across each face.
+    beside: Vec<[u32; 4]>,
     /// By tet.
     component: Vec<u32>,
     count: u32,
@@ -70,8 +72,7 @@ struct Components {
 
 impl Components {
     fn of(mesh: &BareMesh) -> Self {
-        let faces = topology::faces(mesh.points.len(), &mesh.tets);
-        let tets_at = topology::face_tets(faces.faces.len(), &faces.tet_faces)
+        let beside = topology::neighbours(mesh.points.len(), &mesh.tets)
             .unwrap_or_else(|face| panic!("face {face:?} on rank {} has three tets", mesh.rank));
         let mut component = vec![NONE; mesh.tets.len()];
         let mut count = 0;
@@ -85,11 +86,11 @@ impl Components {
                 if std::mem::replace(&mut component[tet as usize], count) == count {
                     continue;
                 }
-                let beside = faces.tet_faces[tet as usize].iter().flat_map(|face| tets_at[face.index()]);
-                open.extend(beside.filter(|&other| other != NONE && component[other as usize] == NONE));
+                let others = beside[tet as usize].iter().copied();
+                open.extend(others.filter(|&other| other != NONE && component[other as usize] == NONE));
             }
             count += 1;
         }
-        Self { faces, tets_at, component, count }
+        Self { beside, component, count }
     }
 }

@@ -4,7 +4,6 @@
 //! of the curve (whose limits are chosen from samples: Shi and Schaeffer 1992). These reply with
 //! the positions. 24 bytes per tet are sent and 8 received, whatever the number of ranks.
 
-use crate::Vector;
 use crate::ground::comm::{CommError, Communicator};
 use crate::ground::kernel::hilbert::hilbert_key;
 use crate::ground::mesh::{GlobalId, Rank};
@@ -17,7 +16,7 @@ const SAMPLES: usize = 32;
 const MOST: f64 = ((1u32 << 21) - 1) as f64;
 
 /// The centroid of a tet, times four.
-pub fn center(corners: [&Vector; 4]) -> [f64; 3] {
+pub fn center(corners: [&[f64; 3]; 4]) -> [f64; 3] {
     let sum = |axis: usize| corners[0][axis] + corners[1][axis] + corners[2][axis] + corners[3][axis];
     [sum(0), sum(1), sum(2)]
 }

@@ -8,14 +8,9 @@
 //! Messages are as few as parts have neighbours; [`repartition`](super::repartition()) instead
 //! partitions from scratch.
 
-use super::tets_at_faces;
+use super::links::{Links, NONE};
 use crate::ground::comm::{CommError, Communicator};
 use crate::ground::mesh::Rank;
-use crate::parallel::distribution::DistMesh;
-use std::collections::BTreeMap;
-
-/// No tet behind a face.
-const NONE: u32 = u32::MAX;
 
 /// A rank keeps at least this fraction of its tets; tets that only pass through move on in the next
 /// call.
@@ -31,23 +26,18 @@ const SOLVED: f64 = 1e-6;
 ///
 /// # Errors
 /// [`CommError`] if another rank fails.
-pub fn diffuse(comm: &dyn Communicator, mesh: &DistMesh) -> Result<Vec<Rank>, CommError> {
-    let tets = tets_at_faces(mesh);
-    let mut borders: BTreeMap<Rank, Vec<u32>> = BTreeMap::new();
-    for (face, holders) in mesh.shared_faces.iter() {
-        let other = holders.iter().find(|&&holder| holder != mesh.rank).expect("another holder");
-        borders.entry(*other).or_default().push(tets[face as usize][0]);
-    }
-    let mine: Vec<[u64; 2]> = borders.iter().map(|(&rank, list)| [rank.into(), list.len() as u64]).collect();
+pub fn diffuse(comm: &dyn Communicator, links: &Links) -> Result<Vec<Rank>, CommError> {
+    let border = |(rank, ghosts): &(Rank, Vec<u32>)| [u64::from(*rank), ghosts.len() as u64];
+    let mine: Vec<[u64; 2]> = links.with.iter().map(border).collect();
     let graph = Graph { neighbours: comm.all_gather(&mine)? };
-    let loads = comm.all_gather_one(mesh.tets.len() as f64)?;
+    let loads = comm.all_gather_one(links.tets() as f64)?;
     let potential = graph.potential(&loads);
-    let me = mesh.rank as usize;
+    let me = links.rank as usize;
     let flow = |[rank, faces]: &[u64; 2]| *faces as f64 * (potential[me] - potential[*rank as usize]);
     let wanted: f64 = mine.iter().map(flow).filter(|flow| *flow > 0.0).sum();
     let scale = f64::min(1.0, (1.0 - KEPT) * loads[me] / wanted.max(1.0));
     let quotas: Vec<usize> = mine.iter().map(|link| (scale * flow(link)).max(0.0).round() as usize).collect();
-    Ok(assign_layers(mesh, &tets, borders, quotas))
+    Ok(assign_layers(links, quotas))
 }
 
 /// The graph of parts, weighted by the number of shared faces.
@@ -114,28 +104,25 @@ impl Graph {
 
 /// A destination for each tet: fills the quota of each neighbour from the border inward, one layer
 /// per neighbour in turn.
-fn assign_layers(
-    mesh: &DistMesh,
-    tets_of_faces: &[[u32; 2]],
-    borders: BTreeMap<Rank, Vec<u32>>,
-    mut quotas: Vec<usize>,
-) -> Vec<Rank> {
-    let mut to = vec![mesh.rank; mesh.tets.len()];
-    let (ranks, mut layers): (Vec<Rank>, Vec<Vec<u32>>) = borders.into_iter().unzip();
+fn assign_layers(links: &Links, mut quotas: Vec<usize>) -> Vec<Rank> {
+    let mut to = vec![links.rank; links.tets()];
+    let at_border = |ghosts: &Vec<u32>| ghosts.iter().map(|&ghost| links.own(ghost)).collect();
+    let mut layers: Vec<Vec<u32>> = links.with.iter().map(|(_, ghosts)| at_border(ghosts)).collect();
     while quotas.iter().zip(&layers).any(|(quota, layer)| *quota > 0 && !layer.is_empty()) {
-        for ((&rank, quota), layer) in ranks.iter().zip(&mut quotas).zip(&mut layers) {
+        for ((&(rank, _), quota), layer) in links.with.iter().zip(&mut quotas).zip(&mut layers) {
             let mut next = Vec::new();
             for tet in std::mem::take(layer) {
                 if *quota == 0 {
                     break;
                 }
-                if to[tet as usize] != mesh.rank {
+                if to[tet as usize] != links.rank {
                     continue;
                 }
                 to[tet as usize] = rank;
                 *quota -= 1;
-                let beside = mesh.tet_faces[tet as usize].iter().flat_map(|face| tets_of_faces[face.index()]);
-                next.extend(beside.filter(|&other| other != NONE && to[other as usize] == mesh.rank));
+                let local = |other: &u32| *other != NONE && (*other as usize) < links.tets();
+                let beside = links.beside[tet as usize].iter().copied().filter(local);
+                next.extend(beside.filter(|&other| to[other as usize] == links.rank));
             }
             *layer = next;
         }

@@ -4,11 +4,11 @@
 //! the interface, and gets a normal from that one side only. So if a cut runs along an interface,
 //! or crosses it, the tets next to it take the part of the other side.
 
+use super::links::{Links, NONE};
 use super::metrics::sum_by_part;
-use super::smooth::Links;
 use crate::ground::comm::{CommError, Communicator};
-use crate::ground::mesh::{Class, Rank};
-use crate::parallel::distribution::DistMesh;
+use crate::ground::mesh::Rank;
+use crate::parallel::distribution::{BareMesh, Side};
 
 /// Propagation steps, one interface each: bodies one tet thick between others need more than one.
 const STEPS: usize = 8;
@@ -23,20 +23,15 @@ const STEPS: usize = 8;
 /// [`CommError`] if another rank fails.
 pub fn join_interfaces(
     comm: &dyn Communicator,
-    mesh: &DistMesh,
+    mesh: &BareMesh,
+    links: &Links,
     part: &mut Vec<Rank>,
     parts: u32,
     most_imbalance: f64,
 ) -> Result<(), CommError> {
-    let links = Links::new(mesh);
-    let on_interface = |face: usize| matches!(mesh.face_classes[face], Class::Patch(_));
-    let pairs: Vec<(usize, u32)> = (0..mesh.tets.len())
-        .flat_map(|tet| {
-            let beside = mesh.tet_faces[tet].iter().zip(links.beside[tet]);
-            beside.filter(|(face, _)| on_interface(face.index())).map(move |(_, other)| (tet, other))
-        })
-        .filter(|(_, other)| *other != super::smooth::NONE)
-        .collect();
+    let across = |side: &Side| (side.tet.index(), links.beside[side.tet.index()][usize::from(side.face)]);
+    let pairs: Vec<(usize, u32)> =
+        mesh.sides.iter().map(across).filter(|(_, other)| *other != NONE).collect();
     if comm.all_reduce_sum_u64([pairs.len() as u64])? == [0] {
         return Ok(());
     }

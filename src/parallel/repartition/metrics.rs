@@ -1,9 +1,9 @@
 //! Quality of a partition of a distributed mesh.
 
+use super::links::Links;
 use crate::ground::comm::{CommError, Communicator};
-use crate::ground::mesh::topology::face_tets;
 use crate::ground::mesh::{Rank, VertexId};
-use crate::parallel::distribution::{DistMesh, owner};
+use crate::parallel::distribution::{BareMesh, owner};
 use std::collections::BTreeMap;
 
 /// Quality of a partition, the same on all ranks.
@@ -38,7 +38,8 @@ pub struct Metrics {
 /// If `part` does not have one entry below `parts` per tet.
 pub fn measure(
     comm: &dyn Communicator,
-    mesh: &DistMesh,
+    mesh: &BareMesh,
+    links: &Links,
     part: &[Rank],
     parts: u32,
 ) -> Result<Metrics, CommError> {
@@ -47,7 +48,7 @@ pub fn measure(
     part.iter().for_each(|&p| sizes[p as usize] += 1);
     let sizes = sum_by_part(comm, &sizes)?;
     let mut cut = 0;
-    across_faces(comm, mesh, part, |a, b| cut += u64::from(a != b))?;
+    links.across_faces(comm, part, |a, b| cut += u64::from(a != b))?;
     let moving = part.iter().filter(|&&p| p != mesh.rank).count() as u64;
     let (shared, mut pairs) = pairs_at_vertices(comm, mesh, part)?;
     let [edge_cut, moving, shared_vertices] = comm.all_reduce_sum_u64([cut, moving, shared])?;
@@ -116,14 +117,14 @@ pub(super) fn reduce_by_part<const N: usize>(
 /// distinct pairs of parts that share one.
 fn pairs_at_vertices(
     comm: &dyn Communicator,
-    mesh: &DistMesh,
+    mesh: &BareMesh,
     part: &[Rank],
 ) -> Result<(u64, Vec<[Rank; 2]>), CommError> {
     // The parts at vertices that may be in several: vertices with two parts on this rank, and
     // shared vertices.
     let mut first = vec![Rank::MAX; mesh.points.len()];
     let mut wanted = vec![false; mesh.points.len()];
-    mesh.shared_vertices.ids.iter().for_each(|&v| wanted[v as usize] = true);
+    mesh.shared.ids.iter().for_each(|&v| wanted[v as usize] = true);
     let uses = || mesh.tets.iter().zip(part).flat_map(|(tet, &p)| tet.iter().map(move |&v| (v, p)));
     for (VertexId(v), p) in uses() {
         let known = &mut first[v as usize];
@@ -140,12 +141,12 @@ fn pairs_at_vertices(
     // Each owner receives the parts from all ranks.
     let mut messages: BTreeMap<Rank, Vec<[u64; 2]>> = BTreeMap::new();
     let mut known: Vec<[u64; 2]> = Vec::new();
-    let mut shared = mesh.shared_vertices.ids.iter().copied().zip(0..).peekable();
+    let mut shared = mesh.shared.ids.iter().copied().zip(0..).peekable();
     for (v, p) in at {
         let id = mesh.vertex_ids[v as usize];
         while shared.next_if(|(shared, _)| *shared < v).is_some() {}
         let to = match shared.peek() {
-            Some(&(of, place)) if of == v => owner(mesh.shared_vertices.holders_at(place), id),
+            Some(&(of, place)) if of == v => owner(mesh.shared.holders_at(place), id),
             _ => mesh.rank,
         };
         let list = if to == mesh.rank { &mut known } else { messages.entry(to).or_default() };
@@ -171,28 +172,4 @@ fn pairs_at_vertices(
     pairs.sort_unstable();
     pairs.dedup();
     Ok((count, pairs))
-}
-
-/// **Collective.** Calls `visit` with the values of the two tets at each interior face; a face
-/// between ranks is visited on the lower one.
-pub(super) fn across_faces(
-    comm: &dyn Communicator,
-    mesh: &DistMesh,
-    of_tet: &[u32],
-    mut visit: impl FnMut(u32, u32),
-) -> Result<(), CommError> {
-    let sides = face_tets(mesh.faces.len(), &mesh.tet_faces)
-        .unwrap_or_else(|face| panic!("face {face:?} on rank {} has three tets", mesh.rank));
-    for [first, second] in &sides {
-        if *second != u32::MAX {
-            visit(of_tet[*first as usize], of_tet[*second as usize]);
-        }
-    }
-    let beside = |face: u32| of_tet[sides[face as usize][0] as usize];
-    for (face, from, theirs) in mesh.shared_faces.exchange(comm, beside)? {
-        if mesh.rank < from {
-            visit(beside(face), theirs);
-        }
-    }
-    Ok(())
 }

@@ -1,7 +1,7 @@
 //! Partitioning of a mesh that is distributed already, without gathering it.
 //!
 //! ```text
-//!     DistMesh ── repartition ──► destinations ── migrate ──► DistMesh, balanced
+//!     BareMesh ── Links::find ──► neighbours ── repartition ──► destinations ── migrate_bare ──► BareMesh
 //! ```
 //!
 //! | method | how | cut |
@@ -26,6 +26,7 @@ pub mod components;
 pub mod curve;
 pub mod diffuse;
 mod interfaces;
+mod links;
 pub mod metrics;
 pub mod smooth;
 #[cfg(test)]
@@ -34,13 +35,13 @@ mod tests;
 pub use components::absorb_small_components;
 pub use diffuse::diffuse;
 pub use interfaces::join_interfaces;
+pub use links::Links;
 pub use metrics::{Metrics, measure};
 
 use crate::ground::comm::{CommError, Communicator};
 use crate::ground::error::{ErrorKind, HasKind};
 use crate::ground::mesh::Rank;
-use crate::ground::mesh::topology::face_tets;
-use crate::parallel::distribution::DistMesh;
+use crate::parallel::distribution::BareMesh;
 use crate::parallel::partition::PartitionError;
 
 /// A geometric partition, balanced to one tet.
@@ -136,11 +137,12 @@ impl HasKind for RepartitionError {
 /// All ranks return an error.
 pub fn repartition(
     comm: &dyn Communicator,
-    mesh: &DistMesh,
+    mesh: &BareMesh,
+    links: &Links,
     parts: u32,
     method: Method,
 ) -> Result<Vec<Rank>, RepartitionError> {
-    by_method(comm, mesh, None, parts, method)
+    by_method(comm, mesh, links, None, parts, method)
 }
 
 /// **Collective.** [`repartition`] for tets of unequal weight.
@@ -156,19 +158,21 @@ pub fn repartition(
 /// If `weights` does not have one entry per tet.
 pub fn repartition_weighted(
     comm: &dyn Communicator,
-    mesh: &DistMesh,
+    mesh: &BareMesh,
+    links: &Links,
     weights: &[u32],
     parts: u32,
     method: Method,
 ) -> Result<Vec<Rank>, RepartitionError> {
     assert_eq!(weights.len(), mesh.tets.len(), "rank {}: expected one weight per tet", mesh.rank);
-    by_method(comm, mesh, Some(weights), parts, method)
+    by_method(comm, mesh, links, Some(weights), parts, method)
 }
 
 /// **Collective.** Parts of equal weight; without weights, of equal tet count.
 fn by_method(
     comm: &dyn Communicator,
-    mesh: &DistMesh,
+    mesh: &BareMesh,
+    links: &Links,
     weights: Option<&[u32]>,
     parts: u32,
     method: Method,
@@ -178,13 +182,14 @@ fn by_method(
         Method::Geometric(how) | Method::Smoothed(how) => by_place(comm, mesh, weights, parts, how)?,
         Method::Clusters { per_part } => {
             let places = curve::places(comm, centers(mesh), &mesh.tet_ids, |_| 1)?;
-            clusters::partition(comm, mesh, &places, weights, parts, per_part)?
+            clusters::partition(comm, mesh.totals.tets, links, &places, weights, parts, per_part)?
         }
     };
     if parts > 1 && !matches!(method, Method::Geometric(_)) {
-        smooth::smooth(comm, mesh, weights, &mut part, parts, &smooth::Settings::default())?;
+        let settings = smooth::Settings::default();
+        smooth::smooth(comm, links, &mesh.tet_ids, weights, &mut part, parts, &settings)?;
         if weights.is_none() {
-            join_interfaces(comm, mesh, &mut part, parts, JOINED)?;
+            join_interfaces(comm, mesh, links, &mut part, parts, JOINED)?;
         }
     }
     Ok(part)
@@ -193,13 +198,7 @@ fn by_method(
 /// Parts may exceed the mean size by this factor in order to contain interfaces between bodies.
 const JOINED: f64 = 1.02;
 
-/// The tets of each face.
-fn tets_at_faces(mesh: &DistMesh) -> Vec<[u32; 2]> {
-    face_tets(mesh.faces.len(), &mesh.tet_faces)
-        .unwrap_or_else(|face| panic!("face {face:?} on rank {} has three tets", mesh.rank))
-}
-
-fn refuse_too_many(mesh: &DistMesh, parts: u32) -> Result<(), PartitionError> {
+fn refuse_too_many(mesh: &BareMesh, parts: u32) -> Result<(), PartitionError> {
     let tets = mesh.totals.tets as usize;
     match parts {
         0 => Err(PartitionError::NoParts),
@@ -209,14 +208,14 @@ fn refuse_too_many(mesh: &DistMesh, parts: u32) -> Result<(), PartitionError> {
 }
 
 /// The centroids of the tets, times four.
-fn centers(mesh: &DistMesh) -> impl Iterator<Item = [f64; 3]> + Clone + '_ {
-    mesh.tets.iter().map(|tet| curve::center(tet.map(|v| &mesh.points[v.index()].coords)))
+fn centers(mesh: &BareMesh) -> impl Iterator<Item = [f64; 3]> + Clone + '_ {
+    mesh.tets.iter().map(|tet| curve::center(tet.map(|v| &mesh.points[v.index()])))
 }
 
 /// **Collective.** Geometric parts of equal weight; without weights, of equal tet count.
 fn by_place(
     comm: &dyn Communicator,
-    mesh: &DistMesh,
+    mesh: &BareMesh,
     weights: Option<&[u32]>,
     parts: u32,
     method: Geometric,

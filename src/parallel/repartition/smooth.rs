@@ -18,13 +18,12 @@
 //! does not depend on the distribution. Only tets near cuts are visited, and messages are
 //! proportional to the cut at rank boundaries.
 
+use super::links::{Links, NONE};
 use super::metrics::sum_by_part;
-use super::tets_at_faces;
 use crate::ground::comm::pack::{put_varint, take_varint};
 use crate::ground::comm::{CommError, Communicator};
 use crate::ground::kernel::random::mix;
 use crate::ground::mesh::{GlobalId, Rank};
-use crate::parallel::distribution::DistMesh;
 use rayon::prelude::*;
 
 /// Parameters of [`smooth`].
@@ -48,8 +47,6 @@ impl Default for Settings {
     }
 }
 
-/// No neighbour across a face.
-pub(super) const NONE: u32 = u32::MAX;
 /// In [`Band::slot`]: the tet belongs wholly to its own part.
 const PURE: u32 = u32::MAX;
 /// The number of parts whose shares a tet stores. More meet within a few faces only if parts are
@@ -64,34 +61,35 @@ const CORRECTIONS: usize = 12;
 const STILL_MOVING: u64 = 500;
 
 /// **Collective.** Reassigns tets near cuts so that fewer faces are between parts; never increases
-/// the cut. Parts are balanced by weight, or by tet count without weights.
+/// the cut. `ids` are those of the tets. Parts are balanced by weight, or by tet count without
+/// weights.
 ///
 /// # Errors
 /// [`CommError`] if another rank fails.
 pub fn smooth(
     comm: &dyn Communicator,
-    mesh: &DistMesh,
+    links: &Links,
+    ids: &[GlobalId],
     weights: Option<&[u32]>,
     part: &mut Vec<Rank>,
     parts: u32,
     settings: &Settings,
 ) -> Result<(), CommError> {
-    let links = Links::new(mesh);
     let mut state = State { label: links.with_ghosts(comm, part)?, parts, weights };
-    let mut best = state.judge(comm, &links)?;
+    let mut best = state.judge(comm, links)?;
     let allowed = settings.imbalance.max(best.imbalance);
     let mut bonus = vec![0.0; parts as usize];
     for _ in 0..settings.rounds {
-        let moved = state.spread(comm, &links, &mut bonus, settings.steps)?;
-        best.take(state.judge(comm, &links)?, allowed);
+        let moved = state.spread(comm, links, &mut bonus, settings.steps)?;
+        best.take(state.judge(comm, links)?, allowed);
         if !moved {
             break;
         }
     }
     state.label = links.with_ghosts(comm, &best.part)?;
     for _ in 0..settings.single_moves {
-        let moved = state.move_single(comm, &links, &mesh.tet_ids, allowed)?;
-        best.take(state.judge(comm, &links)?, allowed);
+        let moved = state.move_single(comm, links, ids, allowed)?;
+        best.take(state.judge(comm, links)?, allowed);
         if !moved {
             break;
         }
@@ -113,77 +111,6 @@ impl Judged {
         if other.cut < self.cut && other.imbalance <= allowed {
             *self = other;
         }
-    }
-}
-
-/// Face neighbours of tets, also on other ranks. Neighbours on other ranks are **ghosts**, numbered
-/// after the local tets.
-pub(super) struct Links {
-    /// For each tet, the neighbour across each face.
-    pub beside: Vec<[u32; 4]>,
-    /// For each ghost, the local tet next to it.
-    own: Vec<u32>,
-    /// The ghosts of each neighbouring rank, in the order of shared faces, which is the same on
-    /// both ranks.
-    with: Vec<(Rank, Vec<u32>)>,
-}
-
-impl Links {
-    pub fn new(mesh: &DistMesh) -> Self {
-        let sides = tets_at_faces(mesh);
-        let mut ghost = vec![NONE; mesh.faces.len()];
-        let mut own = Vec::with_capacity(mesh.shared_faces.len());
-        let mut with: Vec<(Rank, Vec<u32>)> = (0..mesh.ranks).map(|rank| (rank, Vec::new())).collect();
-        for (place, (face, holders)) in (0..).zip(mesh.shared_faces.iter()) {
-            let other = holders.iter().find(|&&holder| holder != mesh.rank).expect("another holder");
-            ghost[face as usize] = mesh.tets.len() as u32 + place;
-            own.push(sides[face as usize][0]);
-            with[*other as usize].1.push(place);
-        }
-        with.retain(|(_, ghosts)| !ghosts.is_empty());
-        let across = |tet: usize| {
-            mesh.tet_faces[tet].map(|face| match sides[face.index()] {
-                [one, NONE] if one as usize == tet => ghost[face.index()],
-                [one, other] => {
-                    if one as usize == tet {
-                        other
-                    } else {
-                        one
-                    }
-                }
-            })
-        };
-        Self { beside: (0..mesh.tets.len()).into_par_iter().map(across).collect(), own, with }
-    }
-
-    fn tets(&self) -> usize {
-        self.beside.len()
-    }
-
-    /// **Collective.** Extends values of local tets by those of the ghosts.
-    pub fn with_ghosts<T: bytemuck::Pod>(
-        &self,
-        comm: &dyn Communicator,
-        words: &[T],
-    ) -> Result<Vec<T>, CommError> {
-        let mut all = Vec::with_capacity(words.len() + self.own.len());
-        all.extend_from_slice(words);
-        all.resize(words.len() + self.own.len(), T::zeroed());
-        let values =
-            |ghosts: &Vec<u32>| ghosts.iter().map(|&g| words[self.own[g as usize] as usize]).collect();
-        let messages = self.with.iter().map(|(rank, ghosts)| (*rank, values(ghosts))).collect();
-        for (from, received) in comm.exchange::<T>(messages)? {
-            for (&ghost, word) in self.from(from).iter().zip(received) {
-                all[words.len() + ghost as usize] = word;
-            }
-        }
-        Ok(all)
-    }
-
-    /// The ghosts of a rank.
-    fn from(&self, rank: Rank) -> &[u32] {
-        let place = self.with.binary_search_by_key(&rank, |(rank, _)| *rank).expect("a neighbour");
-        &self.with[place].1
     }
 }
 
@@ -291,7 +218,7 @@ impl Band {
         for place in newest..self.tets.len() {
             links.beside[self.tets[place] as usize].iter().for_each(|&n| add(&mut self.tets, n));
         }
-        for (ghost, &own) in links.own.iter().enumerate() {
+        for (ghost, &own) in links.at_ghosts().iter().enumerate() {
             if self.slot[links.tets() + ghost] != PURE {
                 add(&mut self.tets, own);
             }
@@ -304,7 +231,7 @@ impl Band {
             let mut message = Vec::new();
             let mut skipped = 0;
             for &ghost in ghosts {
-                let slot = self.slot[links.own[ghost as usize] as usize];
+                let slot = self.slot[links.own(ghost) as usize];
                 if slot == PURE {
                     skipped += 1;
                     continue;

@@ -1,6 +1,7 @@
 use super::*;
 use crate::ground::comm::thread;
 use crate::ground::mesh::fixtures::{lattice_box, lattice_cube};
+use crate::ground::mesh::topology::{self, face_tets};
 use crate::ground::mesh::{GlobalId, Mesh};
 use crate::parallel::distribution::{BareMesh, distribute, from_serial};
 use crate::parallel::migrate::{self, migrate, migrate_bare};
@@ -20,11 +21,11 @@ fn on_parts<T: Send>(
     mesh: &Mesh,
     part: &[Rank],
     ranks: u32,
-    work: impl Fn(&dyn Communicator, DistMesh) -> (Vec<(GlobalId, Rank)>, T) + Sync,
+    work: impl Fn(&dyn Communicator, BareMesh) -> (Vec<(GlobalId, Rank)>, T) + Sync,
 ) -> (Vec<Rank>, Vec<T>) {
     let results = thread::run(ranks, |comm| {
         let given = (comm.rank() == 0).then(|| (mesh.clone(), part.to_vec()));
-        work(comm, distribute(comm, given).unwrap())
+        work(comm, distribute(comm, given).unwrap().into())
     });
     let (parts, said): (Vec<_>, Vec<T>) = results.unwrap().into_iter().unzip();
     let mut all = parts.concat();
@@ -36,8 +37,9 @@ fn on_parts<T: Send>(
 /// metrics.
 fn anew(mesh: &Mesh, part: &[Rank], ranks: u32, parts: u32, method: Method) -> (Vec<Rank>, Metrics) {
     let (part, metrics) = on_parts(mesh, part, ranks, |comm, mesh| {
-        let part = repartition(comm, &mesh, parts, method).unwrap();
-        let metrics = measure(comm, &mesh, &part, parts).unwrap();
+        let links = Links::find(comm, &mesh).unwrap();
+        let part = repartition(comm, &mesh, &links, parts, method).unwrap();
+        let metrics = measure(comm, &mesh, &links, &part, parts).unwrap();
         (mesh.tet_ids.iter().copied().zip(part).collect(), metrics)
     });
     assert!(metrics.iter().all(|other| other.edge_cut == metrics[0].edge_cut));
@@ -88,10 +90,11 @@ fn weighted_parts_have_equal_weights_whatever_the_method() {
         let weighed = |ranks: u32| {
             let held: Vec<Rank> = (0..tets).map(|tet| tet * 5 % ranks).collect();
             let parts = thread::run(ranks, |comm| {
-                let mesh =
-                    distribute(comm, (comm.rank() == 0).then(|| (mesh.clone(), held.clone()))).unwrap();
+                let given = (comm.rank() == 0).then(|| (mesh.clone(), held.clone()));
+                let mesh = BareMesh::from(distribute(comm, given).unwrap());
+                let links = Links::find(comm, &mesh).unwrap();
                 let weights: Vec<u32> = mesh.tet_ids.iter().map(|&id| weight(id)).collect();
-                let part = repartition_weighted(comm, &mesh, &weights, 5, method).unwrap();
+                let part = repartition_weighted(comm, &mesh, &links, &weights, 5, method).unwrap();
                 mesh.tet_ids.iter().copied().zip(part).collect::<Vec<_>>()
             });
             let mut all = parts.unwrap().concat();
@@ -117,8 +120,9 @@ fn cuts_are_measured_as_the_serial_partitioner_measures_them() {
     let (part, serial) = partition::partition(&mesh, 3, &Settings::default()).unwrap();
     let metrics = thread::run(3, |comm| {
         let given = (comm.rank() == 0).then(|| (mesh.clone(), part.clone()));
-        let mesh = distribute(comm, given).unwrap();
-        measure(comm, &mesh, &vec![comm.rank(); mesh.tets.len()], 3).unwrap()
+        let mesh = BareMesh::from(distribute(comm, given).unwrap());
+        let links = Links::find(comm, &mesh).unwrap();
+        measure(comm, &mesh, &links, &vec![comm.rank(); mesh.tets.len()], 3).unwrap()
     });
     for metrics in metrics.unwrap() {
         assert_eq!(metrics.edge_cut, serial.edge_cut as u64);
@@ -169,9 +173,11 @@ fn neighbours_and_shared_vertices_are_counted_whatever_the_ranks() {
     for ranks in [1, 2, 3, 8] {
         let held: Vec<Rank> = (0..48).map(|tet| tet * 5 % ranks).collect();
         let results = thread::run(ranks, |comm| {
-            let mesh = distribute(comm, (comm.rank() == 0).then(|| (mesh.clone(), held.clone()))).unwrap();
+            let given = (comm.rank() == 0).then(|| (mesh.clone(), held.clone()));
+            let mesh = BareMesh::from(distribute(comm, given).unwrap());
+            let links = Links::find(comm, &mesh).unwrap();
             let part: Vec<Rank> = mesh.tet_ids.iter().map(|id| (id / 6) as Rank).collect();
-            measure(comm, &mesh, &part, 8).unwrap()
+            measure(comm, &mesh, &links, &part, 8).unwrap()
         });
         for metrics in results.unwrap() {
             assert_eq!((metrics.shared_vertices, metrics.edge_cut), (28, 14));
@@ -187,7 +193,9 @@ fn a_mesh_of_two_ranks_grows_to_seven_and_shrinks_to_one() {
         let part = (0..384).map(|tet| tet % 2).collect();
         let mut mesh = distribute(comm, (comm.rank() == 0).then(|| (mesh.clone(), part))).unwrap();
         for parts in [7, 3, 1] {
-            let to = repartition(comm, &mesh, parts, Method::Geometric(Geometric::Curve)).unwrap();
+            let bare = BareMesh::from(mesh.clone());
+            let links = Links::find(comm, &bare).unwrap();
+            let to = repartition(comm, &bare, &links, parts, Method::Geometric(Geometric::Curve)).unwrap();
             mesh = migrate(comm, mesh, &to).unwrap();
             mesh.check(comm).unwrap();
             let fair = 384_usize.div_ceil(parts as usize);
@@ -199,9 +207,10 @@ fn a_mesh_of_two_ranks_grows_to_seven_and_shrinks_to_one() {
 
 #[test]
 fn no_parts_and_more_parts_than_tets_are_refused() {
-    let mesh = from_serial(lattice_cube(1)).unwrap();
-    let refused =
-        |parts| repartition(&thread::alone(), &mesh, parts, Method::Geometric(Geometric::Curve)).unwrap_err();
+    let mesh = BareMesh::from(from_serial(lattice_cube(1)).unwrap());
+    let (alone, curve) = (thread::alone(), Method::Geometric(Geometric::Curve));
+    let links = Links::find(&alone, &mesh).unwrap();
+    let refused = |parts| repartition(&alone, &mesh, &links, parts, curve).unwrap_err();
     assert_eq!(refused(0), PartitionError::NoParts.into());
     assert_eq!(refused(7), PartitionError::MoreParts { parts: 7, tets: 6 }.into());
 }
@@ -212,7 +221,7 @@ fn diffused(mesh: &Mesh, part: &[Rank], ranks: u32, moves: usize) -> Vec<usize> 
         let given = (comm.rank() == 0).then(|| (mesh.clone(), part.to_vec()));
         let mut mesh = distribute(comm, given).unwrap();
         for _ in 0..moves {
-            let to = diffuse(comm, &mesh).unwrap();
+            let to = diffuse(comm, &Links::find(comm, &mesh.clone().into()).unwrap()).unwrap();
             mesh = migrate(comm, mesh, &to).unwrap();
             mesh.check(comm).unwrap();
         }
@@ -256,7 +265,6 @@ fn tets_pass_through_parts_that_have_few() {
 /// The parts after one call of `absorb_small_components`, and the number of components then.
 fn joined(mesh: &Mesh, part: &[Rank], ranks: u32) -> (Vec<Rank>, u64) {
     let (part, pieces) = on_parts(mesh, part, ranks, |comm, mesh| {
-        let mesh = BareMesh::from(mesh);
         let to = absorb_small_components(&mesh);
         let (mesh, _) = migrate_bare(comm, mesh, &to, &migrate::MoveSettings::default()).unwrap();
         let pieces = components::pieces(comm, &mesh).unwrap();
@@ -293,7 +301,7 @@ fn interfaces_are_joined_whoever_holds_the_tets() {
     let mesh = lattice_box([10, 10, 10], |[x, y, _]| u32::from(x > y));
     let tets = mesh.tets.len();
     let cut_interfaces = |part: &[Rank]| {
-        let faces = crate::ground::mesh::topology::faces(mesh.points.len(), &mesh.tets);
+        let faces = topology::faces(mesh.points.len(), &mesh.tets);
         let sides = face_tets(faces.faces.len(), &faces.tet_faces).unwrap();
         let [one, other] = [0, 1].map(|side| move |pair: &[u32; 2]| pair[side] as usize);
         let between = sides.iter().filter(|pair| pair[1] != u32::MAX);
@@ -307,7 +315,8 @@ fn interfaces_are_joined_whoever_holds_the_tets() {
         let held: Vec<Rank> = (0..tets as u32).map(|tet| tet * 7 % ranks).collect();
         let (joined, _) = on_parts(&mesh, &held, ranks, |comm, mesh| {
             let mut to: Vec<Rank> = mesh.tet_ids.iter().map(|&id| part[id as usize]).collect();
-            join_interfaces(comm, &mesh, &mut to, 4, most).unwrap();
+            let links = Links::find(comm, &mesh).unwrap();
+            join_interfaces(comm, &mesh, &links, &mut to, 4, most).unwrap();
             (mesh.tet_ids.iter().copied().zip(to).collect(), ())
         });
         joined

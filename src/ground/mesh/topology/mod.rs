@@ -92,6 +92,18 @@ pub fn matched_faces(vertices: usize, tets: &[[VertexId; 4]]) -> Result<MatchedF
     Ok(MatchedFaces { listed, tets })
 }
 
+/// For each tet the tet across each face, in the order of [`TET_FACES`]; `u32::MAX` if there is
+/// none. It takes a fifth of the memory of [`matched_faces`].
+///
+/// # Errors
+/// The vertices of a face that has more than two tets.
+///
+/// # Panics
+/// As [`edges()`].
+pub fn neighbours(vertices: usize, tets: &[[VertexId; 4]]) -> Result<Vec<[u32; 4]>, [VertexId; 3]> {
+    list::neighbours(vertices, tets)
+}
+
 fn edges_of<T>(listed: Listed<2, 6, T>) -> Edges {
     let tet_edges = listed.of_tets.into_iter().map(|ids| ids.map(EdgeId)).collect();
     Edges { edges: listed.entities, tet_edges }
@@ -143,6 +155,7 @@ mod tests {
         let f = faces(6, &tets);
         assert_eq!(face_tets(f.faces.len(), &f.tet_faces), Err(FaceId(0)));
         assert_eq!(matched_faces(6, &tets), Err([0, 1, 2].map(VertexId)));
+        assert_eq!(neighbours(6, &tets), Err([0, 1, 2].map(VertexId)));
     }
 
     #[test]
@@ -172,6 +185,13 @@ mod tests {
         let matched = matched_faces(mesh.points.len(), &mesh.tets).unwrap();
         assert_eq!(matched.tets, face_tets(f.faces.len(), &f.tet_faces).unwrap());
         assert_eq!(matched.listed, f);
+        let across = |tet: usize, face: &FaceId| {
+            let [one, other] = matched.tets[face.index()];
+            if one as usize == tet { other } else { one }
+        };
+        for (tet, beside) in neighbours(mesh.points.len(), &mesh.tets).unwrap().into_iter().enumerate() {
+            assert!(f.tet_faces[tet].iter().map(|face| across(tet, face)).eq(beside));
+        }
         let (again, last_tets) = edges_with_tets(mesh.points.len(), &mesh.tets);
         for (t, edges) in (0..).zip(&e.tet_edges) {
             assert!(edges.iter().all(|edge| last_tets[edge.index()] >= t));
