@@ -19,7 +19,7 @@ use tetmill::internals::partition::weighted::Graph;
 use tetmill::internals::topology::matched_faces;
 use tetmill::mesh::BareMesh;
 use tetmill::repartition;
-use tetmill::repartition::{Geometric, Links, Method, Metrics};
+use tetmill::repartition::{Geometric, Method, Metrics, Neighbours};
 
 /// METIS' recursive bisection of the dual graph of a mesh on one rank.
 fn metis(mesh: &BareMesh, parts: u32) -> Vec<Rank> {
@@ -34,17 +34,17 @@ fn measured(
     dir: &Path,
     ranks: u32,
     parts: u32,
-    partition: impl Fn(&dyn Communicator, &BareMesh, &Links) -> Vec<Rank> + Sync,
+    partition: impl Fn(&dyn Communicator, &BareMesh, &Neighbours) -> Vec<Rank> + Sync,
 ) -> (Metrics, f64) {
     let results = thread::run(ranks, |comm| {
         let mesh = BareMesh::from(elmer::load(comm, dir).expect("a mesh").mesh);
         comm.barrier().expect("no rank fails");
         let start = cpu_seconds();
-        let links = Links::find(comm, &mesh).expect("a mesh");
-        let part = partition(comm, &mesh, &links);
+        let neighbours = Neighbours::find(comm, &mesh).expect("a mesh");
+        let part = partition(comm, &mesh, &neighbours);
         comm.barrier().expect("no rank fails");
         let seconds = cpu_seconds() - start;
-        (repartition::measure(comm, &mesh, &links, &part, parts).expect("no rank fails"), seconds)
+        (repartition::measure(comm, &mesh, &neighbours, &part, parts).expect("no rank fails"), seconds)
     });
     results.expect("no rank fails")[0]
 }
@@ -72,8 +72,8 @@ fn main() {
         let whole = measured(&dir, 1, parts, |_, mesh, _| metis(mesh, parts));
         let whole_cut = whole.0.edge_cut as f64;
         let by = |method: Method| {
-            measured(&dir, ranks, parts, |comm, mesh, links| {
-                repartition::repartition(comm, mesh, links, parts, method).expect("a partition")
+            measured(&dir, ranks, parts, |comm, mesh, neighbours| {
+                repartition::repartition(comm, mesh, neighbours, parts, method).expect("a partition")
             })
         };
         let ours = methods.map(|(name, method)| (name, by(method)));

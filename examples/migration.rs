@@ -6,7 +6,7 @@
 //! ```
 
 use tetmill::comm::thread;
-use tetmill::repartition::{Links, Method, MoveSettings, migrate_bare, repartition_weighted};
+use tetmill::repartition::{Method, MoveSettings, Neighbours, migrate_bare, repartition_weighted};
 use tetmill::{Error, Geometry, Mesher};
 
 fn main() -> Result<(), Error> {
@@ -18,8 +18,8 @@ fn main() -> Result<(), Error> {
         let weights: Vec<u32> = mesh.tets.iter().map(|tet| work(&mesh.points[tet[0].index()])).collect();
         let before: u64 = weights.iter().map(|&w| u64::from(w)).sum();
 
-        let links = Links::find(comm, &mesh)?;
-        let to = repartition_weighted(comm, &mesh, &links, &weights, comm.size(), Method::default())?;
+        let neighbours = Neighbours::find(comm, &mesh)?;
+        let to = repartition_weighted(comm, &mesh, &neighbours, &weights, comm.size(), Method::default())?;
         let (mesh, _) = migrate_bare(comm, mesh, &to, &MoveSettings::default())?;
         let after = mesh.tets.iter().map(|tet| u64::from(work(&mesh.points[tet[0].index()]))).sum::<u64>();
         Ok((before, after, mesh.tets.len()))

@@ -197,7 +197,9 @@ pub mod run {
 pub mod repartition {
     pub use crate::parallel::migrate::{MoveSettings, Moved, bare, migrate, migrate_bare};
     pub use crate::parallel::repartition::metrics::{Metrics, measure};
-    pub use crate::parallel::repartition::{Geometric, Links, Method, repartition, repartition_weighted};
+    pub use crate::parallel::repartition::{
+        Geometric, Method, Neighbours, repartition, repartition_weighted,
+    };
     pub use crate::pipeline::{Repartitioned, repartition as repartition_files};
 }
 

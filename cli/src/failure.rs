@@ -88,7 +88,9 @@ fn hint(error: &Error) -> Option<String> {
             "planes" => "; they come from --planes-from",
             _ => return None,
         },
-        Error::Request(RequestError::PeriodicMethod) => ": leave out `-m`, or the identification",
+        Error::Request(RequestError::PeriodicMethod) => {
+            ": take one of these, or leave out the identification"
+        }
         Error::Request(RequestError::SplitPeriodic { .. }) => ", or insist with --allow-split-periodic",
         Error::Request(RequestError::PeriodicRepartition(_)) => {
             ": make other parts of it with `tetmill generate`, which reads pairs, or insist with --allow-split-periodic"

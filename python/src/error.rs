@@ -130,7 +130,7 @@ fn hint(error: &Error) -> Option<String> {
             Some(format!("coarse={parts} makes enough coarse tets"))
         }
         Error::Request(RequestError::PeriodicMethod) => {
-            Some("use method=\"refine\", or remove the identification".into())
+            Some("use method=\"refine\" or \"surface\", or remove the identification".into())
         }
         _ => None,
     }

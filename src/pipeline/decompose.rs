@@ -14,7 +14,7 @@ use super::retries::{Budget, CORRECTIONS};
 use super::room;
 use super::settings::Wanted;
 use super::settings::{CutSettings, GenerateSettings};
-use super::skins::{refuse_periodic, wanted_sizes};
+use super::skins::wanted_sizes;
 use super::target::Outcome;
 use super::wanted::mesh_as_wanted;
 use crate::ground::comm::Communicator;
@@ -139,10 +139,12 @@ fn plan_cuts(
     (wanted, refined): (Wanted, u32),
     progress: &Progress,
 ) -> Result<Planned, Error> {
-    refuse_periodic(Some(model))?;
     let Model::Csg(whole) = model else {
         return Err(RequestError::NotCuttable.into());
     };
+    if !whole.features.identified.is_empty() {
+        return Err(RequestError::PeriodicMethod.into());
+    }
     options::refuse_unresolved(model, &settings.size)?;
     room::refuse_too_fine(model, &settings.size, None)?;
     let (pieces, coarse, outcome) = progress.stage(Stage::Mesh, |work| {

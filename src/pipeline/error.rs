@@ -211,17 +211,17 @@ pub enum RequestError {
         option: &'static str,
     },
     /// A method that does not keep periodic faces, for a geometry that has some.
-    #[error("periodic faces (`identify periodic`) are kept by the method `refine` only")]
+    #[error("periodic faces (`identify periodic`) are kept by the methods `refine` and `surface` only")]
     PeriodicMethod,
     /// Periodic faces cannot be in one part with their copies.
     #[error(
-        "{lost} of the {tets} coarse tets at periodic faces cannot be in one part with those at the partner faces, which \
-         Elmer needs: use fewer parts or a finer coarse mesh"
+        "{lost} of the {tets} tets before refinement cannot be in one part with those at the partners of their periodic \
+         faces, which Elmer needs: use fewer parts or a finer coarse mesh"
     )]
     SplitPeriodic {
-        /// Number of coarse tets in the wrong part.
+        /// Number of tets in the wrong part, before refinement.
         lost: usize,
-        /// Number of all coarse tets.
+        /// Number of all tets, before refinement.
         tets: usize,
     },
     /// Repartitioning ignores periodic faces.

@@ -11,6 +11,7 @@ use super::mend;
 use super::model::Model;
 use super::options;
 use super::part::{Part, even_out};
+use super::periodic::Linked;
 use super::result::{CoarseResult, Generated, Level, Refinement, Refused};
 use super::retries::{Budget, REFINEMENTS};
 use super::room;
@@ -192,10 +193,6 @@ fn fill(
     progress: &Progress,
 ) -> Result<Generated, Error> {
     let Parts { model, coarse, sizes, dist, projector, names, pieces } = parts;
-    comm.agree(skins::refuse_periodic(model).map_err(Error::from))?;
-    if matches!(model, Some(Model::Given(given)) if !given.links.is_empty()) {
-        progress.note("the method `surface` keeps no periodic faces: those of the mesh are like others");
-    }
     let (part, refused, delivered) = {
         let (wanted, _) = settings.before_refinement();
         let smoothness = smoothness_if_refined(settings, &projector);
@@ -262,21 +259,22 @@ fn stored(
     progress: &Progress,
 ) -> Result<Generated, Error> {
     let Whole { model, names, projector, pieces, coarse, refused, delivered } = whole;
+    let linked = Linked::broadcast(comm, coarse.as_ref().map(|made| &made.periodic))?;
     let (part, across) = progress.stage(Stage::Interfaces, |_| {
         let smoothness = smoothness_if_refined(settings, &projector);
         let across = interfaces::Settings { merge_angle, ..interfaces::Settings::default() };
-        interfaces::improve_across(comm, part, &across, smoothness.as_deref())
+        interfaces::improve_across(comm, part, linked.links(), &across, smoothness.as_deref())
     })?;
-    let (part, evened) = even_out(comm, part, progress)?;
+    let (part, evened) = even_out(comm, part, linked.links(), progress)?;
     let singular = broadcast::singular(comm, model)?;
-    let made = |part, pieces, levels, (check, checksum), straight, refinement| Generated {
+    let made = |part, pieces, levels, (check, checksum), periodic, straight, refinement| Generated {
         part,
         pieces,
         levels,
         names,
         check,
         checksum,
-        periodic: None,
+        periodic,
         refused,
         delivered,
         across,
@@ -285,35 +283,37 @@ fn stored(
         coarse,
         refinement,
     };
-    if settings.refine == 0 && settings.coarse.order == Order::First {
+    // Periodic pairs belong to edges and faces, which only a lattice has, if of one subdivision.
+    if settings.refine == 0 && settings.coarse.order == Order::First && linked.links().is_empty() {
         let part = Part::Stored(Box::new(BareStream::new(part)));
         let (check, checksum) = progress
             .stage(Stage::Check, |work| lattice::verdict(comm, part.stream(), &projector, &[], work))?;
         let levels = Level::of(pieces, &check).into_iter().collect();
-        return Ok(made(part, pieces, levels, (check, checksum), Vec::new(), None));
+        return Ok(made(part, pieces, levels, (check, checksum), None, Vec::new(), None));
     }
     let how = (1 << settings.refine, settings.coarse.order);
-    let (dist, displacements) = progress.stage(Stage::Levels, |work| {
+    let (dist, periodic, displacements) = progress.stage(Stage::Levels, |work| {
         let dist = number_shared(comm, part)?;
+        let periodic = linked.pairs(comm, &dist)?;
         let displacements = mend::displaced(comm, &dist, &projector, how, work)?;
-        Ok::<_, Error>((dist, displacements))
+        Ok::<_, Error>((dist, periodic, displacements))
     })?;
     let plan = lattice::Plan {
         projector: &projector,
         pieces: 1 << settings.refine,
         displacements,
-        periodic: PeriodicMap::default(),
+        periodic,
         singular,
         may_invert: false,
     };
     let lattice::Refined::Sound(lattice) = lattice::refined(comm, dist, plan, settings, progress)? else {
         unreachable!("inverted tets are an error")
     };
-    let Lattice { part, levels, check, checksum, straight, how, .. } = *lattice;
+    let Lattice { part, levels, check, checksum, periodic, straight, how } = *lattice;
     let levels = levels.into_iter().map(|level| Level { pieces: pieces * level.pieces, ..level }).collect();
     let refinement = Refinement { projector, settings: how };
     let part = Part::Refined(Arc::new(part));
-    Ok(made(part, pieces << settings.refine, levels, (check, checksum), straight, Some(refinement)))
+    Ok(made(part, pieces << settings.refine, levels, (check, checksum), periodic, straight, Some(refinement)))
 }
 
 /// A partitioned coarse mesh.

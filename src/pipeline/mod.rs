@@ -24,6 +24,7 @@ pub mod moved;
 pub mod names;
 mod options;
 pub mod part;
+mod periodic;
 #[cfg(test)]
 mod periodic_tests;
 pub mod quality;

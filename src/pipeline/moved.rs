@@ -9,7 +9,7 @@ use crate::ground::progress::{Progress, Stage, Work};
 use crate::parallel::check::{self, Checksum, PartReport};
 use crate::parallel::distribution::BareMesh;
 use crate::parallel::migrate::{self, BareStream, Moved};
-use crate::parallel::repartition::{self, Links, Method, Metrics};
+use crate::parallel::repartition::{self, Method, Metrics, Neighbours};
 use std::path::{Path, PathBuf};
 
 /// A repartitioned mesh.
@@ -56,10 +56,10 @@ pub fn repartition(
     }
     let (mesh, parts) = (BareMesh::from(loaded.mesh), comm.size());
     let (to, before, after) = progress.stage(Stage::Partition, |_| {
-        let links = Links::find(comm, &mesh)?;
-        let to = repartition::repartition(comm, &mesh, &links, parts, method)?;
-        let before = repartition::measure(comm, &mesh, &links, &loaded.part, loaded.parts)?;
-        let after = repartition::measure(comm, &mesh, &links, &to, parts)?;
+        let neighbours = Neighbours::find(comm, &mesh)?;
+        let to = repartition::repartition(comm, &mesh, &neighbours, parts, method)?;
+        let before = repartition::measure(comm, &mesh, &neighbours, &loaded.part, loaded.parts)?;
+        let after = repartition::measure(comm, &mesh, &neighbours, &to, parts)?;
         Ok::<_, Error>((to, before, after))
     })?;
     let stream = BareStream::new(mesh);

@@ -3,13 +3,15 @@
 use super::error::Error;
 use crate::ground::comm::Communicator;
 use crate::ground::mesh::Rank;
+use crate::ground::mesh::periodic::Link;
 use crate::ground::mesh::stream::MeshStream;
 use crate::ground::progress::{Progress, Stage};
 use crate::parallel::distribution::{BareMesh, owner};
 use crate::parallel::migrate::{self, BareStream};
 use crate::parallel::refine::RefinedMesh;
+use crate::parallel::repartition::periodic::touching;
 use crate::parallel::repartition::smooth::{self, smooth};
-use crate::parallel::repartition::{self, Links, Method, absorb_small_components, diffuse};
+use crate::parallel::repartition::{self, Method, Neighbours, absorb_small_components, diffuse};
 use std::sync::Arc;
 
 /// A rank's part of the mesh.
@@ -111,13 +113,15 @@ const MOST_JOINS: usize = 3;
 /// by repartitioning from scratch.
 ///
 /// Also smooths the cuts between parts, which are ragged where tets beside them were improved, and
-/// moves small disconnected components to the parts around them.
+/// moves small disconnected components to the parts around them. Tets that touch the periodic
+/// patches of `links` stay.
 ///
 /// # Errors
 /// The same on all ranks: an invalid mesh, or not enough memory.
 pub(super) fn even_out(
     comm: &dyn Communicator,
     mut part: BareMesh,
+    links: &[Link],
     progress: &Progress,
 ) -> Result<(BareMesh, Option<Evened>), Error> {
     let uneven = |part: &BareMesh| Ok::<_, Error>(imbalance(&comm.all_gather_one(part.tets.len() as f64)?));
@@ -128,14 +132,16 @@ pub(super) fn even_out(
         let before = uneven(&part)?;
         let (mut moved, mut imbalance) = (0, before);
         for step in 0..=MOST_MOVES {
-            let to = even_ranks(comm, &part, imbalance, step == MOST_MOVES)?;
-            part = join(comm, migrate_counted(comm, part, &to, &mut moved)?, &mut moved)?;
+            let from_scratch = step == MOST_MOVES && links.is_empty();
+            let to = even_ranks(comm, &part, imbalance, from_scratch)?;
+            part = migrate_counted(comm, part, links, to, &mut moved)?;
+            part = join(comm, part, links, &mut moved)?;
             imbalance = uneven(&part)?;
             if imbalance <= UNEVEN {
                 break;
             }
         }
-        part = join_interfaces(comm, part, &mut moved)?;
+        part = join_interfaces(comm, part, links, &mut moved)?;
         Ok((part, (moved > 0).then_some(Evened { imbalance: before, moved })))
     })
 }
@@ -148,53 +154,69 @@ fn even_ranks(
     imbalance: f64,
     from_scratch: bool,
 ) -> Result<Vec<Rank>, Error> {
-    let links = Links::find(comm, part)?;
+    let neighbours = Neighbours::find(comm, part)?;
     let mut to = match from_scratch {
         _ if imbalance <= UNEVEN => vec![part.rank; part.tets.len()],
-        true => repartition::repartition(comm, part, &links, comm.size(), Method::default())?,
-        false => diffuse(comm, &links)?,
+        true => repartition::repartition(comm, part, &neighbours, comm.size(), Method::default())?,
+        false => diffuse(comm, &neighbours)?,
     };
-    smooth(comm, &links, &part.tet_ids, None, &mut to, comm.size(), &SMOOTHING)?;
+    smooth(comm, &neighbours, &part.tet_ids, None, &mut to, comm.size(), &SMOOTHING)?;
     Ok(to)
 }
 
-/// **Collective.** Moves tets to other ranks, and counts them.
+/// **Collective.** Moves tets to other ranks, except at periodic faces, and counts them.
 fn migrate_counted(
     comm: &dyn Communicator,
     part: BareMesh,
-    to: &[Rank],
+    links: &[Link],
+    mut to: Vec<Rank>,
     moved: &mut u64,
 ) -> Result<BareMesh, Error> {
-    let (part, mine) = migrate::migrate_bare(comm, part, to, &migrate::MoveSettings::default())?;
+    for (to, fixed) in to.iter_mut().zip(touching(comm, &part, links)?) {
+        if fixed {
+            *to = part.rank;
+        }
+    }
+    let (part, mine) = migrate::migrate_bare(comm, part, &to, &migrate::MoveSettings::default())?;
     *moved += comm.all_reduce_sum_u64([mine.tets])?[0];
     Ok(part)
 }
 
 /// **Collective.** Moves small disconnected components to the parts around them.
-fn join(comm: &dyn Communicator, mut part: BareMesh, moved: &mut u64) -> Result<BareMesh, Error> {
+fn join(
+    comm: &dyn Communicator,
+    mut part: BareMesh,
+    links: &[Link],
+    moved: &mut u64,
+) -> Result<BareMesh, Error> {
     for _ in 0..MOST_JOINS {
         let to = absorb_small_components(&part);
         if comm.all_reduce_sum_u64([u64::from(to.iter().any(|rank| *rank != part.rank))])? == [0] {
             break;
         }
-        part = migrate_counted(comm, part, &to, moved)?;
+        part = migrate_counted(comm, part, links, to, moved)?;
     }
     Ok(part)
 }
 
 /// **Collective.** Brings the tets on both sides of interfaces between bodies into one part, if
 /// parts stay balanced.
-fn join_interfaces(comm: &dyn Communicator, part: BareMesh, moved: &mut u64) -> Result<BareMesh, Error> {
+fn join_interfaces(
+    comm: &dyn Communicator,
+    part: BareMesh,
+    links: &[Link],
+    moved: &mut u64,
+) -> Result<BareMesh, Error> {
     let last = part.tet_bodies.iter().map(|body| u64::from(body.0)).max().unwrap_or(0);
     // Bodies count from 0: there is only one.
     if comm.all_reduce_max_u64([last])? == [0] {
         return Ok(part);
     }
     let mut to = vec![part.rank; part.tets.len()];
-    let links = Links::find(comm, &part)?;
-    repartition::join_interfaces(comm, &part, &links, &mut to, comm.size(), UNEVEN)?;
-    drop(links);
-    migrate_counted(comm, part, &to, moved)
+    let neighbours = Neighbours::find(comm, &part)?;
+    repartition::join_interfaces(comm, &part, &neighbours, &mut to, comm.size(), UNEVEN)?;
+    drop(neighbours);
+    migrate_counted(comm, part, links, to, moved)
 }
 
 /// The maximum divided by the mean.

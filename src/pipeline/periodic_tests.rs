@@ -387,3 +387,35 @@ fn periodic_partitions_of_elmer_are_read_as_such() {
         assert_eq!(made(&given, 2, 0).remove(0).coarse.unwrap().partition.lost_ties, 0);
     }
 }
+
+#[test]
+fn parts_that_are_filled_separately_are_periodic_and_have_pairs_together() {
+    for (name, links) in GEOMETRIES {
+        for (ranks, refine) in [(1, 0), (3, 0), (4, 1)] {
+            let dir = tempfile::tempdir().unwrap();
+            let model = model(name);
+            let run = |comm: &dyn crate::ground::comm::Communicator| {
+                let model = (comm.rank() == 0).then_some(&model);
+                let coarse = CoarseSettings::from(SizeSettings::from(Preset::Coarse));
+                let settings = GenerateSettings {
+                    method: Method::Surface,
+                    coarse,
+                    refine,
+                    periodic_together: true,
+                    ..settings(1, &[])
+                };
+                let made = generate(comm, model, &settings, &Progress::new(&Silent)).unwrap();
+                elmer::write(comm, made.part.stream(), &made.names, dir.path()).unwrap();
+                made
+            };
+            let parts = thread::run(ranks, run).unwrap();
+            let what = format!("{name}, {ranks} ranks, refined {refine} times");
+            assert!(parts.iter().all(|made| made.part.stream().links().len() == links), "{what}");
+            let checked = parts[0].periodic.expect("faces are periodic");
+            assert!(checked.lost == 0 && checked.furthest < 1e-14, "{what}: {checked:?}");
+            assert!(checked.pairs > 16 << (2 * refine), "{what}: {checked:?}");
+            let (_, faults) = elmer::check_elmer(dir.path()).unwrap().remove(0);
+            assert!(faults.is_empty(), "{what}: {faults}");
+        }
+    }
+}

@@ -1,7 +1,7 @@
 //! The method `surface` on all ranks: distributed coarse parts are meshed inside their refined
 //! skins.
 
-use super::error::{Error, RequestError};
+use super::error::Error;
 use super::goal::Goal;
 use super::model::Model;
 use super::result::Refused;
@@ -49,14 +49,6 @@ pub(super) fn mesh_skins(
     let boundary = skin.numbering.totals().boundary;
     let bare = progress.stage(Stage::Number, |_| skin::number(comm, skin.skin, filled, boundary))?;
     Ok((bare, refused, delivered))
-}
-
-/// Refuses geometries with periodic faces, on the rank that has the geometry.
-pub(super) fn refuse_periodic(model: Option<&Model>) -> Result<(), RequestError> {
-    match model {
-        Some(Model::Csg(model)) if !model.features.identified.is_empty() => Err(RequestError::PeriodicMethod),
-        _ => Ok(()),
-    }
 }
 
 impl Refused {

@@ -33,9 +33,11 @@ mod rework;
 mod tests;
 
 use crate::ground::comm::{CommError, Communicator};
+use crate::ground::mesh::periodic::Link;
 use crate::mesher::improve::{self, Smoothness};
 use crate::parallel::distribution::BareMesh;
 use crate::parallel::migrate::{self, MigrateError};
+use crate::parallel::repartition::periodic::touching;
 
 /// Parameters of `improve_across`.
 #[derive(Clone, Debug)]
@@ -104,13 +106,15 @@ pub struct InterfaceReport {
 ///
 /// Vertex and tet ids are renumbered without gaps. The parts may be slightly uneven afterwards. The
 /// report is `None` if no tet was bad. `smoothness` is that of the geometry if the mesh will be
-/// refined: then no tet becomes one that refinement would flatten.
+/// refined: then no tet becomes one that refinement would flatten. Tets that touch the periodic
+/// patches of `links` do not change.
 ///
 /// # Errors
 /// [`MigrateError`] if memory runs out or another rank fails. All ranks return an error.
 pub fn improve_across(
     comm: &dyn Communicator,
     mut mesh: BareMesh,
+    links: &[Link],
     settings: &Settings,
     smoothness: Option<&dyn Smoothness>,
 ) -> Result<(BareMesh, Option<InterfaceReport>), MigrateError> {
@@ -129,7 +133,8 @@ pub fn improve_across(
         if comm.all_reduce_sum_u64([bad.len() as u64])? == [0] {
             break;
         }
-        let regions = regions::around(comm, &mesh, &bad, round)?;
+        let fixed = touching(comm, &mesh, links)?;
+        let regions = regions::around(comm, &mesh, (&bad, &fixed), round)?;
         let mine = regions.tets_to(comm, &mesh)?;
         let (moved, sent) =
             migrate::migrate_bare(comm, mesh, &regions.to, &migrate::MoveSettings::default())?;

@@ -55,14 +55,14 @@ pub(super) fn bad_tets(mesh: &BareMesh, angle: f64) -> Vec<u32> {
     (0..mesh.tets.len() as u32).filter(is_bad).collect()
 }
 
-/// **Collective.** Regions of [`LAYERS`] layers around the bad tets.
+/// **Collective.** Regions of [`LAYERS`] layers around the bad tets, without the `fixed` ones.
 ///
 /// Each bad tet has a random label, computed from its id and the `round`; labels spread over
 /// vertices, and the smallest wins.
 pub(super) fn around(
     comm: &dyn Communicator,
     mesh: &BareMesh,
-    bad: &[u32],
+    (bad, fixed): (&[u32], &[bool]),
     round: u32,
 ) -> Result<Regions, CommError> {
     let mut labels = vec![NONE; mesh.points.len()];
@@ -78,8 +78,8 @@ pub(super) fn around(
         let all = 0..mesh.tets.len();
         spread(comm, mesh, all, &mut labels)?;
     }
-    let inside: Vec<bool> =
-        mesh.tets.iter().map(|tet| tet.iter().any(|v| labels[v.index()] != NONE)).collect();
+    let is_near = |tet: &[VertexId; 4]| tet.iter().any(|v| labels[v.index()] != NONE);
+    let inside: Vec<bool> = mesh.tets.iter().zip(fixed).map(|(tet, &fixed)| !fixed && is_near(tet)).collect();
     for _ in LAYERS..REACH {
         let of_regions = (0..mesh.tets.len()).filter(|&tet| inside[tet]);
         spread(comm, mesh, of_regions, &mut labels)?;

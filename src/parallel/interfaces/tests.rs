@@ -55,7 +55,7 @@ fn improved_parts_still_fit_and_fill_the_bodies() {
                 let before = filled(comm, &fixture, h);
                 let volume = checked(comm, &fixture, before.clone()).volume;
                 let count = before.tets.len();
-                let (after, report) = improve_across(comm, before, &settings, None).expect("all ranks");
+                let (after, report) = improve_across(comm, before, &[], &settings, None).expect("all ranks");
                 let sizes = comm.all_gather_one(after.tets.len() as f64).expect("all ranks");
                 let sizes = sizes.iter().zip(comm.all_gather_one(count as f64).expect("all ranks"));
                 let most = sizes.map(|(after, before)| after / before).fold(0.0, f64::max);
@@ -79,7 +79,7 @@ fn bodies_side_by_side_keep_the_face_between_them() {
     let made = thread::run(7, |comm| {
         let before = filled(comm, &fixture, 0.2);
         let volumes = checked(comm, &fixture, before.clone()).body_volumes;
-        let (after, report) = improve_across(comm, before, &settings, None).expect("all ranks");
+        let (after, report) = improve_across(comm, before, &[], &settings, None).expect("all ranks");
         (volumes, checked(comm, &fixture, after).body_volumes, report)
     });
     let (before, after, report) = made.expect("no rank fails").swap_remove(0);
@@ -94,7 +94,7 @@ fn parts_without_bad_tets_stay_as_they_are() {
     let settings = with_angles(&[1.0]);
     let same = thread::run(3, |comm| {
         let before = filled(comm, &fixture, 0.3);
-        improve_across(comm, before.clone(), &settings, None).expect("all ranks") == (before, None)
+        improve_across(comm, before.clone(), &[], &settings, None).expect("all ranks") == (before, None)
     });
     assert_eq!(same.expect("no rank fails"), [true; 3]);
 }
@@ -107,7 +107,8 @@ fn the_same_parts_become_the_same_with_any_number_of_threads() {
         let sums = pool.install(|| {
             thread::run(4, |comm| {
                 let mesh = filled(comm, &fixture, 0.3);
-                let (after, _) = improve_across(comm, mesh, &Settings::default(), None).expect("all ranks");
+                let (after, _) =
+                    improve_across(comm, mesh, &[], &Settings::default(), None).expect("all ranks");
                 checksum_of_all(comm, &crate::parallel::migrate::BareStream::new(after)).expect("all ranks")
             })
         });

@@ -5,7 +5,7 @@
 //! store it. Segments of the curve are compact but not smooth; in return, the graph needs no rounds
 //! of matching between ranks.
 
-use super::links::Links;
+use super::neighbours::Neighbours;
 use super::{MOST_CLUSTERS, RepartitionError};
 use crate::ground::comm::{CommError, Communicator};
 use crate::ground::mesh::Rank;
@@ -16,7 +16,7 @@ use crate::parallel::partition::weighted::{self, Graph};
 pub(super) fn partition(
     comm: &dyn Communicator,
     tets: u64,
-    links: &Links,
+    neighbours: &Neighbours,
     places: &[u64],
     weights: Option<&[u32]>,
     parts: u32,
@@ -28,7 +28,7 @@ pub(super) fn partition(
     let of_tet: Vec<u32> = places.iter().map(|&place| cluster(place)).collect();
 
     let mut pairs = Vec::new();
-    links.across_faces(comm, &of_tet, |a, b| {
+    neighbours.across_faces(comm, &of_tet, |a, b| {
         if a != b {
             pairs.push([a.min(b), a.max(b)]);
         }

@@ -8,7 +8,7 @@
 //! Messages are as few as parts have neighbours; [`repartition`](super::repartition()) instead
 //! partitions from scratch.
 
-use super::links::{Links, NONE};
+use super::neighbours::{NONE, Neighbours};
 use crate::ground::comm::{CommError, Communicator};
 use crate::ground::mesh::Rank;
 
@@ -26,18 +26,18 @@ const SOLVED: f64 = 1e-6;
 ///
 /// # Errors
 /// [`CommError`] if another rank fails.
-pub fn diffuse(comm: &dyn Communicator, links: &Links) -> Result<Vec<Rank>, CommError> {
+pub fn diffuse(comm: &dyn Communicator, neighbours: &Neighbours) -> Result<Vec<Rank>, CommError> {
     let border = |(rank, ghosts): &(Rank, Vec<u32>)| [u64::from(*rank), ghosts.len() as u64];
-    let mine: Vec<[u64; 2]> = links.with.iter().map(border).collect();
+    let mine: Vec<[u64; 2]> = neighbours.with.iter().map(border).collect();
     let graph = Graph { neighbours: comm.all_gather(&mine)? };
-    let loads = comm.all_gather_one(links.tets() as f64)?;
+    let loads = comm.all_gather_one(neighbours.tets() as f64)?;
     let potential = graph.potential(&loads);
-    let me = links.rank as usize;
+    let me = neighbours.rank as usize;
     let flow = |[rank, faces]: &[u64; 2]| *faces as f64 * (potential[me] - potential[*rank as usize]);
     let wanted: f64 = mine.iter().map(flow).filter(|flow| *flow > 0.0).sum();
     let scale = f64::min(1.0, (1.0 - KEPT) * loads[me] / wanted.max(1.0));
     let quotas: Vec<usize> = mine.iter().map(|link| (scale * flow(link)).max(0.0).round() as usize).collect();
-    Ok(assign_layers(links, quotas))
+    Ok(assign_layers(neighbours, quotas))
 }
 
 /// The graph of parts, weighted by the number of shared faces.
@@ -49,8 +49,8 @@ struct Graph {
 impl Graph {
     /// The Laplacian of the graph times a vector.
     fn apply(&self, x: &[f64]) -> Vec<f64> {
-        let row = |(i, links): (usize, &Vec<[u64; 2]>)| {
-            links.iter().map(|&[j, faces]| faces as f64 * (x[i] - x[j as usize])).sum()
+        let row = |(i, neighbours): (usize, &Vec<[u64; 2]>)| {
+            neighbours.iter().map(|&[j, faces]| faces as f64 * (x[i] - x[j as usize])).sum()
         };
         self.neighbours.iter().enumerate().map(row).collect()
     }
@@ -104,25 +104,25 @@ impl Graph {
 
 /// A destination for each tet: fills the quota of each neighbour from the border inward, one layer
 /// per neighbour in turn.
-fn assign_layers(links: &Links, mut quotas: Vec<usize>) -> Vec<Rank> {
-    let mut to = vec![links.rank; links.tets()];
-    let at_border = |ghosts: &Vec<u32>| ghosts.iter().map(|&ghost| links.own(ghost)).collect();
-    let mut layers: Vec<Vec<u32>> = links.with.iter().map(|(_, ghosts)| at_border(ghosts)).collect();
+fn assign_layers(neighbours: &Neighbours, mut quotas: Vec<usize>) -> Vec<Rank> {
+    let mut to = vec![neighbours.rank; neighbours.tets()];
+    let at_border = |ghosts: &Vec<u32>| ghosts.iter().map(|&ghost| neighbours.own(ghost)).collect();
+    let mut layers: Vec<Vec<u32>> = neighbours.with.iter().map(|(_, ghosts)| at_border(ghosts)).collect();
     while quotas.iter().zip(&layers).any(|(quota, layer)| *quota > 0 && !layer.is_empty()) {
-        for ((&(rank, _), quota), layer) in links.with.iter().zip(&mut quotas).zip(&mut layers) {
+        for ((&(rank, _), quota), layer) in neighbours.with.iter().zip(&mut quotas).zip(&mut layers) {
             let mut next = Vec::new();
             for tet in std::mem::take(layer) {
                 if *quota == 0 {
                     break;
                 }
-                if to[tet as usize] != links.rank {
+                if to[tet as usize] != neighbours.rank {
                     continue;
                 }
                 to[tet as usize] = rank;
                 *quota -= 1;
-                let local = |other: &u32| *other != NONE && (*other as usize) < links.tets();
-                let beside = links.beside[tet as usize].iter().copied().filter(local);
-                next.extend(beside.filter(|&other| to[other as usize] == links.rank));
+                let local = |other: &u32| *other != NONE && (*other as usize) < neighbours.tets();
+                let beside = neighbours.beside[tet as usize].iter().copied().filter(local);
+                next.extend(beside.filter(|&other| to[other as usize] == neighbours.rank));
             }
             *layer = next;
         }

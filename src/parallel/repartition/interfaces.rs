@@ -4,8 +4,8 @@
 //! the interface, and gets a normal from that one side only. So if a cut runs along an interface,
 //! or crosses it, the tets next to it take the part of the other side.
 
-use super::links::{Links, NONE};
 use super::metrics::sum_by_part;
+use super::neighbours::{NONE, Neighbours};
 use crate::ground::comm::{CommError, Communicator};
 use crate::ground::mesh::Rank;
 use crate::parallel::distribution::{BareMesh, Side};
@@ -24,12 +24,13 @@ const STEPS: usize = 8;
 pub fn join_interfaces(
     comm: &dyn Communicator,
     mesh: &BareMesh,
-    links: &Links,
+    neighbours: &Neighbours,
     part: &mut Vec<Rank>,
     parts: u32,
     most_imbalance: f64,
 ) -> Result<(), CommError> {
-    let across = |side: &Side| (side.tet.index(), links.beside[side.tet.index()][usize::from(side.face)]);
+    let across =
+        |side: &Side| (side.tet.index(), neighbours.beside[side.tet.index()][usize::from(side.face)]);
     let pairs: Vec<(usize, u32)> =
         mesh.sides.iter().map(across).filter(|(_, other)| *other != NONE).collect();
     if comm.all_reduce_sum_u64([pairs.len() as u64])? == [0] {
@@ -37,7 +38,7 @@ pub fn join_interfaces(
     }
     let mut joined = part.clone();
     for _ in 0..STEPS {
-        let all = links.with_ghosts(comm, &joined)?;
+        let all = neighbours.with_ghosts(comm, &joined)?;
         pairs.iter().for_each(|&(tet, other)| joined[tet] = joined[tet].min(all[other as usize]));
         let changed = joined.iter().zip(&all).any(|(new, old)| new != old);
         if comm.all_reduce_max_u64([u64::from(changed)])? == [0] {

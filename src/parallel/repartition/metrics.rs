@@ -1,6 +1,6 @@
 //! Quality of a partition of a distributed mesh.
 
-use super::links::Links;
+use super::neighbours::Neighbours;
 use crate::ground::comm::{CommError, Communicator};
 use crate::ground::mesh::{Rank, VertexId};
 use crate::parallel::distribution::{BareMesh, owner};
@@ -39,7 +39,7 @@ pub struct Metrics {
 pub fn measure(
     comm: &dyn Communicator,
     mesh: &BareMesh,
-    links: &Links,
+    neighbours: &Neighbours,
     part: &[Rank],
     parts: u32,
 ) -> Result<Metrics, CommError> {
@@ -48,7 +48,7 @@ pub fn measure(
     part.iter().for_each(|&p| sizes[p as usize] += 1);
     let sizes = sum_by_part(comm, &sizes)?;
     let mut cut = 0;
-    links.across_faces(comm, part, |a, b| cut += u64::from(a != b))?;
+    neighbours.across_faces(comm, part, |a, b| cut += u64::from(a != b))?;
     let moving = part.iter().filter(|&&p| p != mesh.rank).count() as u64;
     let (shared, mut pairs) = pairs_at_vertices(comm, mesh, part)?;
     let [edge_cut, moving, shared_vertices] = comm.all_reduce_sum_u64([cut, moving, shared])?;

@@ -1,7 +1,7 @@
 //! Partitioning of a mesh that is distributed already, without gathering it.
 //!
 //! ```text
-//!     BareMesh ── Links::find ──► neighbours ── repartition ──► destinations ── migrate_bare ──► BareMesh
+//!     BareMesh ── Neighbours::find ──► neighbours ── repartition ──► destinations ── migrate_bare ──► BareMesh
 //! ```
 //!
 //! | method | how | cut |
@@ -26,8 +26,9 @@ pub mod components;
 pub mod curve;
 pub mod diffuse;
 mod interfaces;
-mod links;
 pub mod metrics;
+mod neighbours;
+pub(crate) mod periodic;
 pub mod smooth;
 #[cfg(test)]
 mod tests;
@@ -35,8 +36,8 @@ mod tests;
 pub use components::absorb_small_components;
 pub use diffuse::diffuse;
 pub use interfaces::join_interfaces;
-pub use links::Links;
 pub use metrics::{Metrics, measure};
+pub use neighbours::Neighbours;
 
 use crate::ground::comm::{CommError, Communicator};
 use crate::ground::error::{ErrorKind, HasKind};
@@ -138,11 +139,11 @@ impl HasKind for RepartitionError {
 pub fn repartition(
     comm: &dyn Communicator,
     mesh: &BareMesh,
-    links: &Links,
+    neighbours: &Neighbours,
     parts: u32,
     method: Method,
 ) -> Result<Vec<Rank>, RepartitionError> {
-    by_method(comm, mesh, links, None, parts, method)
+    by_method(comm, mesh, neighbours, None, parts, method)
 }
 
 /// **Collective.** [`repartition`] for tets of unequal weight.
@@ -159,20 +160,20 @@ pub fn repartition(
 pub fn repartition_weighted(
     comm: &dyn Communicator,
     mesh: &BareMesh,
-    links: &Links,
+    neighbours: &Neighbours,
     weights: &[u32],
     parts: u32,
     method: Method,
 ) -> Result<Vec<Rank>, RepartitionError> {
     assert_eq!(weights.len(), mesh.tets.len(), "rank {}: expected one weight per tet", mesh.rank);
-    by_method(comm, mesh, links, Some(weights), parts, method)
+    by_method(comm, mesh, neighbours, Some(weights), parts, method)
 }
 
 /// **Collective.** Parts of equal weight; without weights, of equal tet count.
 fn by_method(
     comm: &dyn Communicator,
     mesh: &BareMesh,
-    links: &Links,
+    neighbours: &Neighbours,
     weights: Option<&[u32]>,
     parts: u32,
     method: Method,
@@ -182,14 +183,14 @@ fn by_method(
         Method::Geometric(how) | Method::Smoothed(how) => by_place(comm, mesh, weights, parts, how)?,
         Method::Clusters { per_part } => {
             let places = curve::places(comm, centers(mesh), &mesh.tet_ids, |_| 1)?;
-            clusters::partition(comm, mesh.totals.tets, links, &places, weights, parts, per_part)?
+            clusters::partition(comm, mesh.totals.tets, neighbours, &places, weights, parts, per_part)?
         }
     };
     if parts > 1 && !matches!(method, Method::Geometric(_)) {
         let settings = smooth::Settings::default();
-        smooth::smooth(comm, links, &mesh.tet_ids, weights, &mut part, parts, &settings)?;
+        smooth::smooth(comm, neighbours, &mesh.tet_ids, weights, &mut part, parts, &settings)?;
         if weights.is_none() {
-            join_interfaces(comm, mesh, links, &mut part, parts, JOINED)?;
+            join_interfaces(comm, mesh, neighbours, &mut part, parts, JOINED)?;
         }
     }
     Ok(part)

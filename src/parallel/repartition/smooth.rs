@@ -18,8 +18,8 @@
 //! does not depend on the distribution. Only tets near cuts are visited, and messages are
 //! proportional to the cut at rank boundaries.
 
-use super::links::{Links, NONE};
 use super::metrics::sum_by_part;
+use super::neighbours::{NONE, Neighbours};
 use crate::ground::comm::pack::{put_varint, take_varint};
 use crate::ground::comm::{CommError, Communicator};
 use crate::ground::kernel::random::mix;
@@ -68,28 +68,28 @@ const STILL_MOVING: u64 = 500;
 /// [`CommError`] if another rank fails.
 pub fn smooth(
     comm: &dyn Communicator,
-    links: &Links,
+    neighbours: &Neighbours,
     ids: &[GlobalId],
     weights: Option<&[u32]>,
     part: &mut Vec<Rank>,
     parts: u32,
     settings: &Settings,
 ) -> Result<(), CommError> {
-    let mut state = State { label: links.with_ghosts(comm, part)?, parts, weights };
-    let mut best = state.judge(comm, links)?;
+    let mut state = State { label: neighbours.with_ghosts(comm, part)?, parts, weights };
+    let mut best = state.judge(comm, neighbours)?;
     let allowed = settings.imbalance.max(best.imbalance);
     let mut bonus = vec![0.0; parts as usize];
     for _ in 0..settings.rounds {
-        let moved = state.spread(comm, links, &mut bonus, settings.steps)?;
-        best.take(state.judge(comm, links)?, allowed);
+        let moved = state.spread(comm, neighbours, &mut bonus, settings.steps)?;
+        best.take(state.judge(comm, neighbours)?, allowed);
         if !moved {
             break;
         }
     }
-    state.label = links.with_ghosts(comm, &best.part)?;
+    state.label = neighbours.with_ghosts(comm, &best.part)?;
     for _ in 0..settings.single_moves {
-        let moved = state.move_single(comm, links, ids, allowed)?;
-        best.take(state.judge(comm, links)?, allowed);
+        let moved = state.move_single(comm, neighbours, ids, allowed)?;
+        best.take(state.judge(comm, neighbours)?, allowed);
         if !moved {
             break;
         }
@@ -170,14 +170,19 @@ struct Band {
 
 impl Band {
     /// **Collective.** Diffuses the parts for `steps` steps of one face each.
-    fn spread(comm: &dyn Communicator, links: &Links, label: &[Rank], steps: u32) -> Result<Self, CommError> {
+    fn spread(
+        comm: &dyn Communicator,
+        neighbours: &Neighbours,
+        label: &[Rank],
+        steps: u32,
+    ) -> Result<Self, CommError> {
         let at_cut = |tet: &u32| {
-            links.beside[*tet as usize]
+            neighbours.beside[*tet as usize]
                 .iter()
                 .any(|&n| n != NONE && label[n as usize] != label[*tet as usize])
         };
-        let tets: Vec<u32> = (0..links.tets() as u32).into_par_iter().filter(at_cut).collect();
-        let mut listed = vec![false; links.tets()];
+        let tets: Vec<u32> = (0..neighbours.tets() as u32).into_par_iter().filter(at_cut).collect();
+        let mut listed = vec![false; neighbours.tets()];
         tets.iter().for_each(|&tet| listed[tet as usize] = true);
         let slot = vec![PURE; label.len()];
         let mut band = Self { tets, fields: Vec::new(), slot, ghosts: Vec::new(), whole: 1 };
@@ -185,53 +190,53 @@ impl Band {
         for step in 0..steps {
             if step > 0 {
                 let grown = band.tets.len();
-                band.grow(links, newest, &mut listed);
+                band.grow(neighbours, newest, &mut listed);
                 newest = grown;
             }
             let field = |n: u32| match band.slot[n as usize] {
                 PURE => Field::pure(label[n as usize], band.whole),
-                slot if (n as usize) < links.tets() => band.fields[slot as usize],
+                slot if (n as usize) < neighbours.tets() => band.fields[slot as usize],
                 slot => band.ghosts[slot as usize],
             };
             // Mirror boundary condition at missing neighbours, so that no share is lost there.
             let sum = |&tet: &u32| {
-                let [a, b, c, d] = links.beside[tet as usize].map(|n| if n == NONE { tet } else { n });
+                let [a, b, c, d] = neighbours.beside[tet as usize].map(|n| if n == NONE { tet } else { n });
                 Field::sum([tet, a, b, c, d].map(field))
             };
             band.fields = band.tets.par_iter().map(sum).collect();
             (0..).zip(&band.tets).for_each(|(place, &tet)| band.slot[tet as usize] = place);
             band.whole *= 5;
             if step + 1 < steps {
-                band.exchange_ghosts(comm, links)?;
+                band.exchange_ghosts(comm, neighbours)?;
             }
         }
         Ok(band)
     }
 
     /// Adds the neighbours of the newest tets, and those of ghosts.
-    fn grow(&mut self, links: &Links, newest: usize, listed: &mut [bool]) {
+    fn grow(&mut self, neighbours: &Neighbours, newest: usize, listed: &mut [bool]) {
         let mut add = |tets: &mut Vec<u32>, n: u32| {
             if (n as usize) < listed.len() && !std::mem::replace(&mut listed[n as usize], true) {
                 tets.push(n);
             }
         };
         for place in newest..self.tets.len() {
-            links.beside[self.tets[place] as usize].iter().for_each(|&n| add(&mut self.tets, n));
+            neighbours.beside[self.tets[place] as usize].iter().for_each(|&n| add(&mut self.tets, n));
         }
-        for (ghost, &own) in links.at_ghosts().iter().enumerate() {
-            if self.slot[links.tets() + ghost] != PURE {
+        for (ghost, &own) in neighbours.at_ghosts().iter().enumerate() {
+            if self.slot[neighbours.tets() + ghost] != PURE {
                 add(&mut self.tets, own);
             }
         }
     }
 
     /// **Collective.** Exchanges the fields of the ghosts.
-    fn exchange_ghosts(&mut self, comm: &dyn Communicator, links: &Links) -> Result<(), CommError> {
+    fn exchange_ghosts(&mut self, comm: &dyn Communicator, neighbours: &Neighbours) -> Result<(), CommError> {
         let message = |(rank, ghosts): &(Rank, Vec<u32>)| {
             let mut message = Vec::new();
             let mut skipped = 0;
             for &ghost in ghosts {
-                let slot = self.slot[links.own(ghost) as usize];
+                let slot = self.slot[neighbours.own(ghost) as usize];
                 if slot == PURE {
                     skipped += 1;
                     continue;
@@ -246,11 +251,12 @@ impl Band {
             }
             (*rank, message)
         };
-        let messages = links.with.iter().map(message).filter(|(_, message)| !message.is_empty()).collect();
+        let messages =
+            neighbours.with.iter().map(message).filter(|(_, message)| !message.is_empty()).collect();
         self.ghosts.clear();
         for (from, message) in comm.exchange_bytes(messages)? {
             let rest = &mut &message[..];
-            let mut ghosts = links.from(from).iter();
+            let mut ghosts = neighbours.from(from).iter();
             while !rest.is_empty() {
                 let ghost = ghosts.nth(take_varint(rest) as usize).expect("a shared face");
                 let mut field = [(Rank::MAX, 0); KEPT];
@@ -258,7 +264,7 @@ impl Band {
                 for entry in &mut field[..count] {
                     *entry = (take_varint(rest) as Rank, take_varint(rest) as u32);
                 }
-                self.slot[links.tets() + *ghost as usize] = self.ghosts.len() as u32;
+                self.slot[neighbours.tets() + *ghost as usize] = self.ghosts.len() as u32;
                 self.ghosts.push(Field(field));
             }
         }
@@ -306,10 +312,10 @@ impl State<'_> {
     }
 
     /// **Collective.** The current partition with its cut and imbalance.
-    fn judge(&self, comm: &dyn Communicator, links: &Links) -> Result<Judged, CommError> {
-        let tets = links.tets();
+    fn judge(&self, comm: &dyn Communicator, neighbours: &Neighbours) -> Result<Judged, CommError> {
+        let tets = neighbours.tets();
         let cut = |tet: usize| {
-            let faces = links.beside[tet].iter();
+            let faces = neighbours.beside[tet].iter();
             faces.filter(|&&n| n != NONE && self.label[n as usize] != self.label[tet]).count() as u64
         };
         let twice: u64 = (0..tets).into_par_iter().map(cut).sum();
@@ -324,12 +330,12 @@ impl State<'_> {
     fn spread(
         &mut self,
         comm: &dyn Communicator,
-        links: &Links,
+        neighbours: &Neighbours,
         bonus: &mut [f64],
         steps: u32,
     ) -> Result<bool, CommError> {
-        let band = Band::spread(comm, links, &self.label, steps)?;
-        let tets = links.tets();
+        let band = Band::spread(comm, neighbours, &self.label, steps)?;
+        let tets = neighbours.tets();
         let mut outside = self.sizes(tets);
         for &tet in &band.tets {
             outside[self.label[tet as usize] as usize] -= self.weight(tet as usize);
@@ -356,7 +362,7 @@ impl State<'_> {
         for (&tet, &to) in band.tets.iter().zip(&chosen) {
             moved += u64::from(std::mem::replace(&mut part[tet as usize], to) != to);
         }
-        self.label = links.with_ghosts(comm, &part)?;
+        self.label = neighbours.with_ghosts(comm, &part)?;
         let [moved, near] = comm.all_reduce_sum_u64([moved, band.tets.len() as u64])?;
         Ok(moved * STILL_MOVING > near)
     }
@@ -366,15 +372,15 @@ impl State<'_> {
     fn move_single(
         &mut self,
         comm: &dyn Communicator,
-        links: &Links,
+        neighbours: &Neighbours,
         ids: &[GlobalId],
         allowed: f64,
     ) -> Result<bool, CommError> {
-        let tets = links.tets();
+        let tets = neighbours.tets();
         let sizes = sum_by_part(comm, &self.sizes(tets))?;
         let most = allowed * sizes.iter().sum::<u64>() as f64 / f64::from(self.parts);
         let has_room = |tet: usize, part: Rank| ((sizes[part as usize] + self.weight(tet)) as f64) < most;
-        let wish = |tet: usize| self.wish(links, tet, |part| has_room(tet, part));
+        let wish = |tet: usize| self.wish(neighbours, tet, |part| has_room(tet, part));
         let wishes: Vec<(u64, Rank)> = (0..tets)
             .into_par_iter()
             .map(|tet| match wish(tet) {
@@ -384,22 +390,27 @@ impl State<'_> {
             })
             .collect();
         let priorities: Vec<u64> = wishes.iter().map(|(priority, _)| *priority).collect();
-        let priorities = links.with_ghosts(comm, &priorities)?;
+        let priorities = neighbours.with_ghosts(comm, &priorities)?;
         let wins = |tet: usize| {
             let first = |&n: &u32| n == NONE || priorities[n as usize] < priorities[tet];
-            priorities[tet] > 0 && links.beside[tet].iter().all(first)
+            priorities[tet] > 0 && neighbours.beside[tet].iter().all(first)
         };
         let winners: Vec<usize> = (0..tets).into_par_iter().filter(|&tet| wins(tet)).collect();
         let mut part = self.label[..tets].to_vec();
         winners.iter().for_each(|&tet| part[tet] = wishes[tet].1);
-        self.label = links.with_ghosts(comm, &part)?;
+        self.label = neighbours.with_ghosts(comm, &part)?;
         Ok(comm.all_reduce_sum_u64([winners.len() as u64])?[0] > 0)
     }
 
     /// The part to which a tet has more neighbours than to its own, and the difference.
-    fn wish(&self, links: &Links, tet: usize, has_room: impl Fn(Rank) -> bool) -> Option<(u64, Rank)> {
+    fn wish(
+        &self,
+        neighbours: &Neighbours,
+        tet: usize,
+        has_room: impl Fn(Rank) -> bool,
+    ) -> Option<(u64, Rank)> {
         let own = self.label[tet];
-        let beside = links.beside[tet];
+        let beside = neighbours.beside[tet];
         let parts = || beside.iter().filter(|&&n| n != NONE).map(|&n| self.label[n as usize]);
         let count = |part: Rank| parts().filter(|&other| other == part).count();
         let here = count(own);

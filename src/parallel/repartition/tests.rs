@@ -37,9 +37,9 @@ fn on_parts<T: Send>(
 /// metrics.
 fn anew(mesh: &Mesh, part: &[Rank], ranks: u32, parts: u32, method: Method) -> (Vec<Rank>, Metrics) {
     let (part, metrics) = on_parts(mesh, part, ranks, |comm, mesh| {
-        let links = Links::find(comm, &mesh).unwrap();
-        let part = repartition(comm, &mesh, &links, parts, method).unwrap();
-        let metrics = measure(comm, &mesh, &links, &part, parts).unwrap();
+        let neighbours = Neighbours::find(comm, &mesh).unwrap();
+        let part = repartition(comm, &mesh, &neighbours, parts, method).unwrap();
+        let metrics = measure(comm, &mesh, &neighbours, &part, parts).unwrap();
         (mesh.tet_ids.iter().copied().zip(part).collect(), metrics)
     });
     assert!(metrics.iter().all(|other| other.edge_cut == metrics[0].edge_cut));
@@ -92,9 +92,9 @@ fn weighted_parts_have_equal_weights_whatever_the_method() {
             let parts = thread::run(ranks, |comm| {
                 let given = (comm.rank() == 0).then(|| (mesh.clone(), held.clone()));
                 let mesh = BareMesh::from(distribute(comm, given).unwrap());
-                let links = Links::find(comm, &mesh).unwrap();
+                let neighbours = Neighbours::find(comm, &mesh).unwrap();
                 let weights: Vec<u32> = mesh.tet_ids.iter().map(|&id| weight(id)).collect();
-                let part = repartition_weighted(comm, &mesh, &links, &weights, 5, method).unwrap();
+                let part = repartition_weighted(comm, &mesh, &neighbours, &weights, 5, method).unwrap();
                 mesh.tet_ids.iter().copied().zip(part).collect::<Vec<_>>()
             });
             let mut all = parts.unwrap().concat();
@@ -121,8 +121,8 @@ fn cuts_are_measured_as_the_serial_partitioner_measures_them() {
     let metrics = thread::run(3, |comm| {
         let given = (comm.rank() == 0).then(|| (mesh.clone(), part.clone()));
         let mesh = BareMesh::from(distribute(comm, given).unwrap());
-        let links = Links::find(comm, &mesh).unwrap();
-        measure(comm, &mesh, &links, &vec![comm.rank(); mesh.tets.len()], 3).unwrap()
+        let neighbours = Neighbours::find(comm, &mesh).unwrap();
+        measure(comm, &mesh, &neighbours, &vec![comm.rank(); mesh.tets.len()], 3).unwrap()
     });
     for metrics in metrics.unwrap() {
         assert_eq!(metrics.edge_cut, serial.edge_cut as u64);
@@ -175,9 +175,9 @@ fn neighbours_and_shared_vertices_are_counted_whatever_the_ranks() {
         let results = thread::run(ranks, |comm| {
             let given = (comm.rank() == 0).then(|| (mesh.clone(), held.clone()));
             let mesh = BareMesh::from(distribute(comm, given).unwrap());
-            let links = Links::find(comm, &mesh).unwrap();
+            let neighbours = Neighbours::find(comm, &mesh).unwrap();
             let part: Vec<Rank> = mesh.tet_ids.iter().map(|id| (id / 6) as Rank).collect();
-            measure(comm, &mesh, &links, &part, 8).unwrap()
+            measure(comm, &mesh, &neighbours, &part, 8).unwrap()
         });
         for metrics in results.unwrap() {
             assert_eq!((metrics.shared_vertices, metrics.edge_cut), (28, 14));
@@ -194,8 +194,9 @@ fn a_mesh_of_two_ranks_grows_to_seven_and_shrinks_to_one() {
         let mut mesh = distribute(comm, (comm.rank() == 0).then(|| (mesh.clone(), part))).unwrap();
         for parts in [7, 3, 1] {
             let bare = BareMesh::from(mesh.clone());
-            let links = Links::find(comm, &bare).unwrap();
-            let to = repartition(comm, &bare, &links, parts, Method::Geometric(Geometric::Curve)).unwrap();
+            let neighbours = Neighbours::find(comm, &bare).unwrap();
+            let to =
+                repartition(comm, &bare, &neighbours, parts, Method::Geometric(Geometric::Curve)).unwrap();
             mesh = migrate(comm, mesh, &to).unwrap();
             mesh.check(comm).unwrap();
             let fair = 384_usize.div_ceil(parts as usize);
@@ -209,8 +210,8 @@ fn a_mesh_of_two_ranks_grows_to_seven_and_shrinks_to_one() {
 fn no_parts_and_more_parts_than_tets_are_refused() {
     let mesh = BareMesh::from(from_serial(lattice_cube(1)).unwrap());
     let (alone, curve) = (thread::alone(), Method::Geometric(Geometric::Curve));
-    let links = Links::find(&alone, &mesh).unwrap();
-    let refused = |parts| repartition(&alone, &mesh, &links, parts, curve).unwrap_err();
+    let neighbours = Neighbours::find(&alone, &mesh).unwrap();
+    let refused = |parts| repartition(&alone, &mesh, &neighbours, parts, curve).unwrap_err();
     assert_eq!(refused(0), PartitionError::NoParts.into());
     assert_eq!(refused(7), PartitionError::MoreParts { parts: 7, tets: 6 }.into());
 }
@@ -221,7 +222,7 @@ fn diffused(mesh: &Mesh, part: &[Rank], ranks: u32, moves: usize) -> Vec<usize> 
         let given = (comm.rank() == 0).then(|| (mesh.clone(), part.to_vec()));
         let mut mesh = distribute(comm, given).unwrap();
         for _ in 0..moves {
-            let to = diffuse(comm, &Links::find(comm, &mesh.clone().into()).unwrap()).unwrap();
+            let to = diffuse(comm, &Neighbours::find(comm, &mesh.clone().into()).unwrap()).unwrap();
             mesh = migrate(comm, mesh, &to).unwrap();
             mesh.check(comm).unwrap();
         }
@@ -315,8 +316,8 @@ fn interfaces_are_joined_whoever_holds_the_tets() {
         let held: Vec<Rank> = (0..tets as u32).map(|tet| tet * 7 % ranks).collect();
         let (joined, _) = on_parts(&mesh, &held, ranks, |comm, mesh| {
             let mut to: Vec<Rank> = mesh.tet_ids.iter().map(|&id| part[id as usize]).collect();
-            let links = Links::find(comm, &mesh).unwrap();
-            join_interfaces(comm, &mesh, &links, &mut to, 4, most).unwrap();
+            let neighbours = Neighbours::find(comm, &mesh).unwrap();
+            join_interfaces(comm, &mesh, &neighbours, &mut to, 4, most).unwrap();
             (mesh.tet_ids.iter().copied().zip(to).collect(), ())
         });
         joined

@@ -1,10 +1,8 @@
 //! The periodic map of a coarse mesh: its pairs by patch, and the master of each copy.
 
-use super::{Link, Pair, Pairs};
+use super::{Link, Pair, Pairs, PeriodicFaces};
 use crate::Point;
-use crate::ground::kernel::places::Places;
-use crate::ground::mesh::topology;
-use crate::ground::mesh::{Mesh, VertexId};
+use crate::ground::mesh::{GlobalId, Mesh};
 use csg::{Aabb, PatchId};
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 use std::collections::BTreeMap;
@@ -29,7 +27,7 @@ pub enum MapError {
     #[error("vertex {vertex} at ({}, {}, {}) of a periodic face has no partner on patch {}", .place.x, .place.y, .place.z, .patch.0)]
     Vertex {
         /// The vertex.
-        vertex: u32,
+        vertex: GlobalId,
         /// Its position.
         place: Point,
         /// The patch that its copy should be on.
@@ -65,23 +63,22 @@ impl PeriodicMap {
     /// # Errors
     /// [`MapError`] if a vertex or triangle has no partner.
     pub fn of(mesh: &Mesh, links: Vec<Link>, bounds: &Aabb) -> Result<Self, MapError> {
-        let mut map = Self { distance: same_place(bounds), ..Self::default() };
+        let distance = same_place(bounds);
         if links.is_empty() {
-            return Ok(map);
+            return Ok(Self { distance, ..Self::default() });
         }
-        let lists = Lists {
-            edges: topology::edges(mesh.points.len(), &mesh.tets).edges,
-            faces: topology::faces(mesh.points.len(), &mesh.tets).faces,
-        };
-        for link in links {
-            map.pairs.push(lists.pairs(mesh, &link, map.distance)?);
-            map.links.push(link);
-        }
-        map.origins =
-            Pairs([0, 1, 2].map(|dimension| {
-                masters(map.pairs.iter().flat_map(|pairs| pairs.0[dimension].iter().copied()))
-            }));
-        Ok(map)
+        Self::of_faces(&PeriodicFaces::of(mesh, &links), links, distance)
+    }
+
+    /// The pairs of the triangles on periodic patches; those within `distance` are equal.
+    ///
+    /// # Errors
+    /// [`MapError`] if a vertex or triangle has no partner.
+    pub(crate) fn of_faces(faces: &PeriodicFaces, links: Vec<Link>, distance: f64) -> Result<Self, MapError> {
+        let pairs: Vec<Pairs> =
+            links.iter().map(|link| faces.pairs(link, distance)).collect::<Result<_, _>>()?;
+        let origins = [0, 1, 2].map(|kind| masters(pairs.iter().flat_map(|of| of.0[kind].iter().copied())));
+        Ok(Self { links, pairs, origins: Pairs(origins), distance })
     }
 
     /// Encodes the map as numbers for messages: the distance, the links, then for each link and for
@@ -136,84 +133,6 @@ impl PeriodicMap {
         let of_links = links.iter().map(|_| pairs()).collect();
         Self { pairs: of_links, origins: pairs(), links, distance }
     }
-}
-
-/// The edges and faces of a mesh, in the order of their global ids.
-struct Lists {
-    edges: Vec<[VertexId; 2]>,
-    faces: Vec<[VertexId; 3]>,
-}
-
-impl Lists {
-    fn pairs(&self, mesh: &Mesh, link: &Link, distance: f64) -> Result<Pairs, MapError> {
-        let on = |patch: PatchId| mesh.triangles.iter().filter(move |t| t.patch == patch);
-        let vertices = |patch: PatchId| {
-            let mut vertices: Vec<VertexId> = on(patch).flat_map(|t| t.vertices).collect();
-            vertices.sort_unstable();
-            vertices.dedup();
-            vertices
-        };
-        let images = vertices(link.image).into_iter().map(|v| (v.0, mesh.points[v.index()]));
-        let places = Places::new(images, distance);
-        let mut image_of: BTreeMap<VertexId, VertexId> = BTreeMap::new();
-        for v in vertices(link.of) {
-            let place = mesh.points[v.index()];
-            let image = places.find(&(link.motion * place));
-            let image = image.ok_or(MapError::Vertex { vertex: v.0, place, patch: link.image })?;
-            image_of.insert(v, VertexId(image));
-        }
-        let mut pairs: [Vec<Pair>; 3] = Default::default();
-        pairs[0]
-            .extend(image_of.iter().map(|(of, image)| pair(u64::from(image.0), u64::from(of.0), [image])));
-        for triangle in on(link.of) {
-            let of = ascending(triangle.vertices);
-            let image = of.map(|v| image_of[&v]);
-            let face = |vertices: [VertexId; 3]| self.faces.binary_search(&ascending(vertices)).ok();
-            let (Some(f), Some(g)) = (face(of), face(image)) else {
-                let place = link.motion * mesh.points[of[0].index()];
-                return Err(MapError::Triangle { patch: link.image, place });
-            };
-            pairs[2].push(pair(g as u64, f as u64, image.each_ref()));
-            for [i, j] in [[0, 1], [0, 2], [1, 2]] {
-                let edge =
-                    |v: [VertexId; 2]| self.edges.binary_search(&ascending(v)).expect("an edge of a face");
-                let (of, image) = ([of[i], of[j]], [image[i], image[j]]);
-                pairs[1].push(pair(edge(image) as u64, edge(of) as u64, image.each_ref()));
-            }
-        }
-        for kind in &mut pairs {
-            kind.sort_unstable();
-            kind.dedup();
-        }
-        // As many distinct copies as triangles: then each triangle has one.
-        let different = pairs[2].chunk_by(|a, b| a.image == b.image).count();
-        if different != on(link.image).count() || different != on(link.of).count() {
-            let place = on(link.image).next().map_or(Point::origin(), |t| mesh.points[t.vertices[0].index()]);
-            return Err(MapError::Triangle { patch: link.image, place });
-        }
-        Ok(Pairs(pairs))
-    }
-}
-
-/// Ascending ids.
-fn ascending<const N: usize>(mut vertices: [VertexId; N]) -> [VertexId; N] {
-    vertices.sort_unstable();
-    vertices
-}
-
-/// The pair of two entities, from their ids and the copies of the ascending vertices of the master.
-fn pair<const N: usize>(image: u64, of: u64, images: [&VertexId; N]) -> Pair {
-    let mut corners = [0, 1, 2];
-    let sorted = {
-        let mut sorted = images;
-        sorted.sort_unstable();
-        sorted
-    };
-    for (corner, vertex) in sorted.iter().enumerate() {
-        let place = images.iter().position(|v| v == vertex).expect("one of them");
-        corners[corner] = place as u8;
-    }
-    Pair { image, of, corners }
 }
 
 /// For each copy the master at the end of its chain; in a cycle the smallest entity.

@@ -13,9 +13,11 @@
 //! not bitwise, because means are computed on the copy, and a vertex with several periods is moved
 //! by several motions.
 
+mod faces;
 mod map;
 mod pairs;
 
+pub(crate) use faces::{PeriodicFace, PeriodicFaces, is_linked};
 pub use map::{MapError, PeriodicMap, same_place};
 pub use pairs::{Pair, Pairs};
 

@@ -3,7 +3,8 @@
 //! ```text
 //! tets ─► buckets by smallest vertex ─► each bucket sorted and listed ─► position of each tet's
 //! ```
-//! [`list`] lists entities; [`neighbours`] only matches the faces of tets, in a fifth of the memory.
+//! [`list`] lists entities; [`neighbours`] only matches the faces of tets, in a fifth of the
+//! memory.
 //!
 //! A bucket holds the positions in tets of its entities, four bytes for each, and is so small that
 //! it is sorted within the cache of one core. A second loop over the tets takes the positions in

@@ -18,7 +18,7 @@ pub(super) const NONE: u32 = u32::MAX;
 ///
 /// A part takes 16 bytes a tet, and 32 while it is made.
 #[derive(Debug)]
-pub struct Links {
+pub struct Neighbours {
     /// This rank.
     pub(super) rank: Rank,
     /// For each tet, the neighbour across each face.
@@ -38,7 +38,7 @@ struct Candidate {
     local: u32,
 }
 
-impl Links {
+impl Neighbours {
     /// **Collective.** Finds the neighbours of all tets.
     ///
     /// # Errors
