@@ -13,7 +13,7 @@ pip=(python -m pip install --quiet --disable-pip-version-check)
 
 "${pip[@]}" 'maturin>=1.9,<2' mypy pytest numpy
 # Packages that tests solve with or convert to; the tests of one that cannot be installed are skipped.
-for package in scikit-fem meshio pyvista ngsolve mfem mpi4py ipython; do
+for package in scikit-fem meshio pyvista ngsolve mfem mpi4py ipython gmsh; do
     "${pip[@]}" "$package" || echo "no $package: its tests will be skipped" >&2
 done
 

@@ -18,6 +18,7 @@ from ._mesh import Mesh
 from ._mpi import Processes, agreed, communicator
 from ._parts import Label, labels
 from ._sizes import Background, Grid, Interpolated
+from ._step import converted
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -91,7 +92,8 @@ def _input(keep_surface: bool, merge: float | None, feature_angle: float | None)
 class Geometry:
     """Solids to be meshed, surfaces that bound them, or a mesh to be refined and partitioned.
 
-    `Geometry(path)` reads a file: a geometry in NETGEN's language (.geo), surfaces (.stl, .off,
+    `Geometry(path)` reads a file: a geometry in NETGEN's language (.geo), a CAD part (.brep of
+    OpenCASCADE; .step with the package gmsh, in the file's unit of length), surfaces (.stl, .off,
     .obj, .ply, .poly, .smesh; several files become several bodies), or a mesh, used unchanged
     (.msh, .vol, .mesh, .meshb, .vtu, .pvtu, .ele, an Elmer folder).
 
@@ -115,7 +117,8 @@ class Geometry:
             raise TypeError("Geometry needs a file; see also from_text, from_surface and from_mesh")
         given = _input(keep_surface, merge, feature_angle)
         # None in a process that only takes part in the meshing.
-        self._native: _native.Geometry | None = _native.Geometry.from_files([os.fspath(path) for path in paths], given)
+        with converted([os.fspath(path) for path in paths]) as files:
+            self._native: _native.Geometry | None = _native.Geometry.from_files(files, given)
         warn(self.notes)
 
     @classmethod
