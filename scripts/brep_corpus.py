@@ -196,6 +196,7 @@ def thick_box():
     b = box()
     surfaces, _ = edges_of(b)
     occ.addThickSolid(b, [abs(surfaces[0])], -0.1)
+    occ.remove([(3, b)])
 
 
 @part
@@ -203,6 +204,7 @@ def thick_cylinder():
     b = occ.addCylinder(0, 0, 0, 0, 0, 2, 0.5)
     surfaces, _ = edges_of(b)
     occ.addThickSolid(b, [abs(surfaces[-1])], 0.1)
+    occ.remove([(3, b)])
 
 
 @part

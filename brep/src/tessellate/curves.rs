@@ -27,8 +27,14 @@ pub(super) fn divide(
     if is_line && beside.is_empty() {
         return Ok(vec![low, high]);
     }
-    let mut breaks = curve.breaks(edge.range);
-    breaks.insert(0, low);
+    let mut breaks = vec![low];
+    // A range may end beside a knot by rounding.
+    let rounding = 1e-9 * (high - low);
+    for t in curve.breaks(edge.range) {
+        if t - breaks[breaks.len() - 1] > rounding && high - t > rounding {
+            breaks.push(t);
+        }
+    }
     breaks.push(high);
     let pieces = if is_line {
         1
