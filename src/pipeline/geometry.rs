@@ -40,7 +40,7 @@ impl FromStr for Geometry {
 }
 
 impl Geometry {
-    /// Reads a file: a geometry (`.geo`), triangles (`.stl`, `.off`, `.obj`, `.ply`, `.poly`,
+    /// Reads a file: a geometry (`.geo`, `.brep`), triangles (`.stl`, `.off`, `.obj`, `.ply`, `.poly`,
     /// `.smesh`), or a mesh (`.msh`, `.vol`, `.mesh`, `.meshb`, `.vtu`, `.pvtu`, `.ele`, the folder
     /// of an Elmer mesh).
     ///
