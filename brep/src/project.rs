@@ -38,6 +38,16 @@ const HALVINGS: usize = 12;
 /// converged; distances below rounding have no direction.
 const ORTHOGONAL: f64 = 1e-6;
 
+/// Rounding errors of feet, relative to the coordinates.
+const ROUNDING: f64 = 1e-13;
+
+/// Whether a way is not longer than another one, up to the rounding of coordinates of this size:
+/// otherwise points almost on the surface would stop short of their feet.
+fn is_nearer(new: &Vector, old: &Vector, scale: f64) -> bool {
+    let rounding = 2.0 * f64::EPSILON * scale;
+    new.norm() <= old.norm() + rounding
+}
+
 /// The point of a curve, within a range of parameters, at which the distance from `point` has a
 /// minimum near the parameter `start`.
 ///
@@ -46,6 +56,7 @@ pub fn project_to_curve(curve: &Curve<3>, range: [f64; 2], point: &Point, start:
     let clamp = |t: f64| t.clamp(range[0], range[1]);
     let mut t = clamp(start);
     let mut jet = curve.jet(t);
+    let scale = point.coords.amax().max(jet[0].amax());
     for _ in 0..STEPS {
         let way = jet[0] - point.coords;
         let slope = way.dot(&jet[1]);
@@ -60,7 +71,7 @@ pub fn project_to_curve(curve: &Curve<3>, range: [f64; 2], point: &Point, start:
         for _ in 0..HALVINGS {
             let to = clamp(t + share * step);
             let there = curve.jet(to);
-            if (there[0] - point.coords).norm_squared() <= way.norm_squared() {
+            if is_nearer(&(there[0] - point.coords), &way, scale) {
                 next = Some((to, there));
                 break;
             }
@@ -75,7 +86,7 @@ pub fn project_to_curve(curve: &Curve<3>, range: [f64; 2], point: &Point, start:
     }
     let way = jet[0] - point.coords;
     let tangent = jet[1].try_normalize(0.0).unwrap_or_else(Vector::zeros);
-    let rounding = 1e-13 * (1.0 + jet[0].amax());
+    let rounding = ROUNDING * scale;
     let is_end = t == range[0] || t == range[1];
     let is_converged = is_end || way.dot(&tangent).abs() <= ORTHOGONAL * way.norm() + rounding;
     CurveFoot { parameter: t, point: Point::from(jet[0]), tangent, is_converged }
@@ -98,6 +109,7 @@ pub fn project_to_surface(surface: &Surface, point: &Point, start: [f64; 2]) -> 
         return SurfaceFoot { parameters: [u, v], point: foot, normal, is_converged: true };
     }
     let mut jet = surface.jet(u, v, 2);
+    let scale = point.coords.amax().max(jet.d[0][0].amax());
     for _ in 0..STEPS {
         let d = &jet.d;
         let way = d[0][0] - point.coords;
@@ -110,7 +122,7 @@ pub fn project_to_surface(surface: &Surface, point: &Point, start: [f64; 2]) -> 
         for _ in 0..HALVINGS {
             let to = [u + share * step[0], v + share * step[1]];
             let there = surface.jet(to[0], to[1], 2);
-            if (there.d[0][0] - point.coords).norm_squared() <= way.norm_squared() {
+            if is_nearer(&(there.d[0][0] - point.coords), &way, scale) {
                 next = Some((to, there));
                 break;
             }
@@ -119,14 +131,14 @@ pub fn project_to_surface(surface: &Surface, point: &Point, start: [f64; 2]) -> 
         let Some((to, there)) = next else { break };
         let moved = (there.d[0][0] - jet.d[0][0]).norm();
         ([u, v], jet) = (to, there);
-        if moved <= 1e-16 * (1.0 + jet.d[0][0].amax()) {
+        if moved <= f64::EPSILON * scale {
             break;
         }
     }
     let foot = jet.point();
     let way = foot - point;
     let normal = jet.normal().try_normalize(0.0).unwrap_or_else(Vector::zeros);
-    let rounding = 1e-13 * (1.0 + foot.coords.amax());
+    let rounding = ROUNDING * scale;
     let along = way - normal * normal.dot(&way);
     let is_converged = normal == Vector::zeros() || along.norm() <= ORTHOGONAL * way.norm() + rounding;
     SurfaceFoot { parameters: [u, v], point: foot, normal, is_converged }

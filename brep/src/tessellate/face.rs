@@ -1,7 +1,7 @@
 //! Triangulation of one patch in its parameters.
 
 use super::{Tessellation, Triangle};
-use crate::model::{Fin, Model, On, Patch};
+use crate::model::{EdgeCurve, Fin, Model, On, Patch};
 use crate::project::project_to_surface;
 use crate::{BrepError, Point, Surface, Vector};
 use spade::handles::FixedVertexHandle;
@@ -70,7 +70,8 @@ pub(super) fn triangulate(
     for fins in &patch.loops {
         chains.push(chain(model, number, fins, out, tolerances).map_err(Failure::Final)?);
     }
-    let frame = Frame::of(&patch.surface, &chains);
+    let pole = pole(patch, tolerances.diagonal);
+    let frame = Frame::of(&patch.surface, &chains, pole, tolerances.diagonal);
     let mut face = Face {
         patch,
         number,
@@ -177,45 +178,134 @@ fn on_curve(
             let what = format!("edge {} is {gap:.3e} away from it", curve + 1);
             return Err(BrepError::face(number, what, Some(on)));
         }
-        out.gap = out.gap.max(gap);
+        out.gap = out.gap.max(gap).max((surface.point(parameters) - out.points[vertex as usize]).norm());
         side.push((parameters, vertex));
+    }
+    if fin.curve.is_some() {
+        let line = &out.lines[curve];
+        let between = |w: &[(u32, f64)]| {
+            let [a, b] = [w[0].1, w[1].1];
+            (1..SAMPLES).map(move |k| a + (b - a) * f64::from(k) / f64::from(SAMPLES))
+        };
+        let gaps = line.windows(2).flat_map(between).map(|t| gap_at(surface, fin, edge, t));
+        out.gap = gaps.fold(out.gap, f64::max);
     }
     Ok(side)
 }
 
-/// Parameters in units of length.
-struct Frame {
-    origin: [f64; 2],
-    scale: [f64; 2],
+/// Steps between the vertices of a curve at which its distance from a patch is measured.
+const SAMPLES: u32 = 6;
+
+/// The distance of a point of a curve from a patch beside it.
+fn gap_at(surface: &Surface, fin: &Fin, edge: &EdgeCurve, t: f64) -> f64 {
+    let on = Point::from(edge.curve.point(t));
+    let start = fin.curve.as_ref().map_or([0.0; 2], |c| c.point(fin.parameter(t, edge.range)).into());
+    (project_to_surface(surface, &on, start).point - on).norm()
 }
 
-impl Frame {
+/// Parameters in units of length.
+///
+/// At a **pole** the derivative in one direction vanishes, and a side of the patch is one point.
+/// Lengths in that direction are then taken at each value of the other parameter, as in the
+/// sinusoidal projection of a globe: the side becomes one point here too.
+struct Frame<'a> {
+    surface: &'a Surface,
+    origin: [f64; 2],
+    scale: [f64; 2],
+    /// The direction whose derivative vanishes at a pole.
+    pole: Option<usize>,
+    /// Parameters in that direction at which lengths are taken.
+    samples: [f64; 4],
+    /// Shorter derivatives are those of a pole.
+    least: f64,
+}
+
+impl<'a> Frame<'a> {
     /// Scales parameters by the mean length of the derivatives.
-    fn of(surface: &Surface, chains: &[Sides]) -> Self {
+    fn of(surface: &'a Surface, chains: &[Sides], pole: Option<usize>, diagonal: f64) -> Self {
         let all = || chains.iter().flatten().flatten().map(|node| node.0);
         let bound = |i: usize, start: f64, pick: fn(f64, f64) -> f64| all().map(|p| p[i]).fold(start, pick);
         let low = [0, 1].map(|i| bound(i, f64::INFINITY, f64::min));
         let high = [0, 1].map(|i| bound(i, f64::NEG_INFINITY, f64::max));
+        let at = |i: usize, share: f64| low[i] + (high[i] - low[i]) * share;
         let mut sums = [0.0; 2];
         for k in 0..25 {
-            let at = |i: usize, j: usize| low[i] + (high[i] - low[i]) * (0.1 + 0.2 * j as f64);
-            let jet = surface.jet(at(0, k % 5), at(1, k / 5), 1);
+            let [u, v] = [at(0, 0.1 + 0.2 * f64::from(k % 5)), at(1, 0.1 + 0.2 * f64::from(k / 5))];
+            let jet = surface.jet(u, v, 1);
             sums[0] += jet.d[1][0].norm();
             sums[1] += jet.d[0][1].norm();
         }
         let scale = sums.map(|sum| if sum > 0.0 { sum / 25.0 } else { 1.0 });
-        Self { origin: low, scale }
+        let mut origin = low;
+        let mut samples = [0.0; 4];
+        if let Some(i) = pole {
+            origin[i] = at(i, 0.5);
+            samples = [0.125, 0.375, 0.625, 0.875].map(|share| at(i, share));
+        }
+        Self { surface, origin, scale, pole, samples, least: AT_REST * diagonal }
+    }
+
+    /// The length of the derivative in the direction of a pole, at a value of the other parameter.
+    fn rate(&self, i: usize, other: f64) -> f64 {
+        let length = |&s: &f64| {
+            let [u, v] = if i == 0 { [s, other] } else { [other, s] };
+            let d = self.surface.jet(u, v, 1).d;
+            if i == 0 { d[1][0].norm() } else { d[0][1].norm() }
+        };
+        let mean = self.samples.iter().map(length).sum::<f64>() / 4.0;
+        if mean < self.least { 0.0 } else { mean }
     }
 
     fn scaled(&self, p: [f64; 2]) -> Point2<f64> {
+        let mut scale = self.scale;
+        if let Some(i) = self.pole {
+            scale[i] = self.rate(i, p[1 - i]);
+        }
         // Differences below the range of the predicates are zero.
-        let [x, y] = [0, 1].map(|i| (p[i] - self.origin[i]) * self.scale[i]);
+        let [x, y] = [0, 1].map(|i| (p[i] - self.origin[i]) * scale[i]);
         let flushed = |x: f64| if x.abs() < 1e-30 { 0.0 } else { x };
         Point2::new(flushed(x), flushed(y))
     }
+
+    /// The inverse of [`scaled`](Self::scaled).
+    fn parameters(&self, p: Point2<f64>) -> [f64; 2] {
+        let p = [p.x, p.y];
+        let mut out = [0, 1].map(|i| self.origin[i] + p[i] / self.scale[i]);
+        if let Some(i) = self.pole {
+            let rate = self.rate(i, out[1 - i]);
+            out[i] = if rate > 0.0 { self.origin[i] + p[i] / rate } else { self.origin[i] };
+        }
+        out
+    }
+
+    /// The parameters of the corners of a triangle. A corner at a pole has any parameter in the
+    /// direction of the pole: that between the other two suits the triangle.
+    fn corners(&self, triangle: &[(usize, Node); 3]) -> [[f64; 2]; 3] {
+        let mut out = triangle.map(|(_, node)| node.parameters);
+        if let Some(i) = self.pole {
+            for k in 0..3 {
+                if self.rate(i, out[k][1 - i]) == 0.0 {
+                    out[k][i] = 0.5 * (out[(k + 1) % 3][i] + out[(k + 2) % 3][i]);
+                }
+            }
+        }
+        out
+    }
 }
 
-impl Frame {
+/// Derivatives shorter than this (fraction of the diagonal of the model) are those of a pole.
+const AT_REST: f64 = 1e-7;
+
+/// The direction whose derivative vanishes at a side without length.
+fn pole(patch: &Patch, diagonal: f64) -> Option<usize> {
+    let fins = patch.loops.iter().flatten().filter(|fin| matches!(fin.on, On::Corner(_)));
+    fins.filter_map(|fin| fin.curve.as_ref().map(|curve| curve.point(fin.range[0]))).find_map(|p| {
+        let d = patch.surface.jet(p[0], p[1], 1).d;
+        [d[1][0], d[0][1]].iter().position(|d| d.norm() < AT_REST * diagonal)
+    })
+}
+
+impl Frame<'_> {
     /// 1 if the patch is to the left of its loops, else −1.
     fn turn(&self, chains: &[Sides]) -> f64 {
         let double_area = |sides: &Sides| -> f64 {
@@ -235,13 +325,16 @@ struct Face<'a> {
     patch: &'a Patch,
     number: usize,
     plane: Plane,
-    frame: Frame,
+    frame: Frame<'a>,
     /// How often loops use each constraint, by the indices of its ends.
     sides: BTreeMap<[usize; 2], usize>,
     tolerances: &'a Tolerances,
     /// Points of new vertices.
     vertices: Vec<Point>,
 }
+
+/// A point that is wanted: the error there, the edge that it divides, its place, and the triangle.
+type Wanted = (f64, [usize; 2], Point2<f64>, usize);
 
 /// The vertex of a node inside the patch: its index in [`Face::vertices`] is added.
 const INNER: u32 = 1 << 31;
@@ -363,18 +456,20 @@ impl Face<'_> {
                 let what = format!("more than {MOST_TRIANGLES} triangles are needed on it");
                 return Err(Failure::Final(BrepError::face(self.number, what, None)));
             }
-            let mut wanted: Vec<(f64, [usize; 2], [f64; 2], usize)> = Vec::new();
+            let mut wanted: Vec<Wanted> = Vec::new();
             let tangled = self.tangled(&triangles);
             for (index, triangle) in triangles.iter().enumerate() {
-                let mut worst = (0.0, [0; 2], [0.0; 2]);
-                let mut longest = (0.0, [0; 2], [0.0; 2]);
+                let nowhere = Point2::new(0.0, 0.0);
+                let mut worst = (0.0, [0; 2], nowhere);
+                let mut longest = (0.0, [0; 2], nowhere);
                 for k in 0..3 {
                     let ((i, a), (j, b)) = (triangle[(k + 1) % 3], triangle[(k + 2) % 3]);
                     let key = sorted(i, j);
                     if self.sides.contains_key(&key) {
                         continue;
                     }
-                    let middle = [0, 1].map(|c| 0.5 * (a.parameters[c] + b.parameters[c]));
+                    let [p, q] = [a.scaled, b.scaled];
+                    let middle = Point2::new(0.5 * (p.x + q.x), 0.5 * (p.y + q.y));
                     let error = match known.get(&key) {
                         Some(&error) => error,
                         None => {
@@ -398,8 +493,9 @@ impl Face<'_> {
                         if longest.0 > 0.0 {
                             worst = (error, longest.1, longest.2);
                         } else {
-                            let mean = |c: usize| triangle.iter().map(|n| n.1.parameters[c]).sum::<f64>() / 3.0;
-                            worst = (error, [usize::MAX, index], [mean(0), mean(1)]);
+                            let [x, y] = [|n: &Node| n.scaled.x, |n: &Node| n.scaled.y]
+                                .map(|of| triangle.iter().map(|n| of(&n.1)).sum::<f64>() / 3.0);
+                            worst = (error, [usize::MAX, index], Point2::new(x, y));
                         }
                     }
                 }
@@ -417,7 +513,7 @@ impl Face<'_> {
     /// Inserts the wanted points, at most one in each triangle, and returns their number.
     fn insert(
         &mut self,
-        mut wanted: Vec<(f64, [usize; 2], [f64; 2], usize)>,
+        mut wanted: Vec<Wanted>,
         triangles: &[[(usize, Node); 3]],
     ) -> usize {
         let before = self.vertices.len();
@@ -430,12 +526,11 @@ impl Face<'_> {
             }
         }
         let mut is_changed = vec![false; triangles.len()];
-        for (_, key, parameters, index) in wanted {
+        for (_, key, scaled, index) in wanted {
             let both = beside.get(&key).copied().unwrap_or([index; 2]);
             if both.iter().any(|&t| is_changed[t]) {
                 continue;
             }
-            let scaled = self.frame.scaled(parameters);
             if both.iter().any(|&t| self.encroaches(scaled, &triangles[t])) {
                 continue;
             }
@@ -444,6 +539,7 @@ impl Face<'_> {
             }
             both.iter().for_each(|&t| is_changed[t] = true);
             let vertex = INNER + self.vertices.len() as u32;
+            let parameters = self.frame.parameters(scaled);
             if self.plane.insert(Node { scaled, parameters, vertex }).is_ok() {
                 self.vertices.push(self.patch.surface.point(parameters));
             }
@@ -467,7 +563,7 @@ impl Face<'_> {
         &self,
         (i, a): (usize, &Node),
         (j, b): (usize, &Node),
-        middle: [f64; 2],
+        middle: Point2<f64>,
         normals: &mut Vec<Option<Vector>>,
         out: &Tessellation,
     ) -> f64 {
@@ -475,7 +571,7 @@ impl Face<'_> {
             return 0.0;
         }
         let [p, q] = [a, b].map(|n| self.point(n.vertex, out));
-        let on = self.patch.surface.point(middle);
+        let on = self.patch.surface.point(self.frame.parameters(middle));
         let along = q - p;
         let share = ((on - p).dot(&along) / along.norm_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
         let off = (on - p - along * share).norm() / self.tolerances.chord;
@@ -499,7 +595,8 @@ impl Face<'_> {
         if self.patch.surface.is_plane() {
             return 0.0;
         }
-        let mean = |c: usize| triangle.iter().map(|n| n.1.parameters[c]).sum::<f64>() / 3.0;
+        let corners = self.frame.corners(triangle);
+        let mean = |c: usize| corners.iter().map(|p| p[c]).sum::<f64>() / 3.0;
         let jet = self.patch.surface.jet(mean(0), mean(1), 1);
         let [a, b, c] = [0, 1, 2].map(|k| self.point(triangle[k].1.vertex, out));
         let area = (b - a).cross(&(c - a));
@@ -556,7 +653,7 @@ impl Face<'_> {
             let vertices = triangle.map(|(_, node)| id(node.vertex));
             let [a, b, c] = vertices;
             if a != b && b != c && c != a {
-                let parameters = triangle.map(|(_, node)| node.parameters);
+                let parameters = self.frame.corners(&triangle);
                 out.triangles.push(Triangle { vertices, patch: self.number as u32, parameters });
             }
         }
