@@ -41,7 +41,8 @@ impl Basis {
         if degree == 0 || degree > MOST_DEGREE {
             return Err(format!("a B-spline has degree {degree}; 1 to {MOST_DEGREE} are possible"));
         }
-        if knots.len() < 2 || knots.windows(2).any(|w| w[0] >= w[1] || !w[0].is_finite() || !w[1].is_finite()) {
+        if knots.len() < 2 || knots.windows(2).any(|w| w[0] >= w[1] || !w[0].is_finite() || !w[1].is_finite())
+        {
             return Err("the knots of a B-spline must be two or more, ascending".into());
         }
         if multiplicities.iter().any(|&m| m == 0 || m > degree + 1) {
@@ -53,7 +54,8 @@ impl Basis {
         if !is_periodic {
             if sum != poles + degree + 1 {
                 return Err(format!(
-                    "{poles} poles of degree {degree} need {} knots, not {sum}", poles + degree + 1
+                    "{poles} poles of degree {degree} need {} knots, not {sum}",
+                    poles + degree + 1
                 ));
             }
             let basis = Self { degree, knots: flat, is_periodic, poles };
@@ -73,9 +75,8 @@ impl Basis {
         let wrapped = |i: usize| own[i % own.len()] + period * (i / own.len()) as f64;
         let after: Vec<f64> = (0..beyond).map(|i| wrapped(ends + i) + period).collect();
         let rounds = beyond.div_ceil(own.len());
-        let before: Vec<f64> = (0..beyond)
-            .map(|i| wrapped(rounds * own.len() - beyond + i) - period * rounds as f64)
-            .collect();
+        let before: Vec<f64> =
+            (0..beyond).map(|i| wrapped(rounds * own.len() - beyond + i) - period * rounds as f64).collect();
         flat = [before, flat, after].concat();
         let basis = Self { degree, knots: flat, is_periodic, poles };
         if basis.is_sound() { Ok(basis) } else { Err("a periodic B-spline has an empty range".into()) }
@@ -198,7 +199,10 @@ pub struct SplineCurve<const D: usize> {
     /// The basis.
     pub basis: Basis,
     /// The poles.
-    #[serde(bound(serialize = "SVector<f64, D>: Serialize", deserialize = "SVector<f64, D>: Deserialize<'de>"))]
+    #[serde(bound(
+        serialize = "SVector<f64, D>: Serialize",
+        deserialize = "SVector<f64, D>: Deserialize<'de>"
+    ))]
     pub poles: Vec<SVector<f64, D>>,
     /// One positive weight a pole, or none.
     pub weights: Vec<f64>,
@@ -213,8 +217,8 @@ impl<const D: usize> SplineCurve<D> {
         for k in 0..=self.basis.degree {
             let pole = self.basis.pole(span, k);
             let weight = self.weights.get(pole).copied().unwrap_or(1.0);
-            for order in 0..4 {
-                let share = functions[order][k] * weight;
+            for (order, of_order) in functions.iter().enumerate() {
+                let share = of_order[k] * weight;
                 sums[order] += self.poles[pole] * share;
                 weights[order] += share;
             }
@@ -268,9 +272,9 @@ impl SplineSurface {
                     along[j] += pole * in_v[j][l];
                 }
             }
-            for i in 0..=order {
+            for (i, of_order) in in_u.iter().enumerate().take(order + 1) {
                 for j in 0..=order - i {
-                    sums[i][j] += along[j] * in_u[i][k];
+                    sums[i][j] += along[j] * of_order[k];
                 }
             }
         }

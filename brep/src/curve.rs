@@ -80,7 +80,8 @@ impl<const D: usize> Curve<D> {
                 // The third derivative needs the fourth of the basis: a difference of second ones
                 // suffices, because only searches for nearest points use it.
                 let step = 1e-5 * (1.0 + t.abs());
-                let [before, after] = [-step, step].map(|h| offset(&basis.jet(t + h), *distance, direction)[2]);
+                let [before, after] =
+                    [-step, step].map(|h| offset(&basis.jet(t + h), *distance, direction)[2]);
                 [a, b, c, (after - before) / (2.0 * step)]
             }
         }

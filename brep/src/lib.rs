@@ -1,9 +1,9 @@
 //! Boundary representations of CAD programs: reads the BREP text of OpenCASCADE, evaluates and
 //! projects to its curves and surfaces, and tessellates its faces.
 //!
-//! A [`Model`] has **bodies** (solids), **patches** (faces) that bound them, **curves** (edges) that
-//! bound the patches, and **corners** (vertices) at the ends of curves. A face that two solids of a
-//! compound share is one patch, with a body on each side.
+//! A [`Model`] has **bodies** (solids), **patches** (faces) that bound them, **curves** (edges)
+//! that bound the patches, and **corners** (vertices) at the ends of curves. A face that two solids
+//! of a compound share is one patch, with a body on each side.
 //!
 //! [`Tessellation::of`] divides each curve once and triangulates each patch in its parameters, so
 //! that the triangles of neighbouring patches fit.
@@ -20,6 +20,8 @@ mod project;
 mod read;
 mod surface;
 pub mod tessellate;
+#[cfg(test)]
+mod tests;
 
 pub use curve::Curve;
 pub use error::BrepError;

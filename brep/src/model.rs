@@ -165,7 +165,8 @@ impl<'a> Builder<'a> {
         self.uses += 1;
         let line = self.file.shapes[part.shape as usize].line;
         if self.uses > MOST_USES || above.depth >= DEEPEST {
-            let what = format!("shapes are nested more than {DEEPEST} deep or used more than {MOST_USES} times");
+            let what =
+                format!("shapes are nested more than {DEEPEST} deep or used more than {MOST_USES} times");
             return Err(BrepError::Syntax { line, what });
         }
         Ok(Placed {
@@ -288,7 +289,11 @@ impl<'a> Builder<'a> {
                     let what = "an edge inside of it belongs to no loop: imprinted edges are not supported";
                     return Err(BrepError::face(number, what, None));
                 }
-                fins.push(self.fin(number, &edge, (surface, &face.placement.after(&own), placed.is_plane()))?);
+                fins.push(self.fin(
+                    number,
+                    &edge,
+                    (surface, &face.placement.after(&own), placed.is_plane()),
+                )?);
             }
             // Wires list their edges in any order if their orientation is reversed.
             if wire.orientation == Orientation::Reversed {
@@ -325,8 +330,8 @@ impl<'a> Builder<'a> {
         }
         // The sides by the corner where they start.
         let mut starts: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
-        for k in 0..count {
-            starts.entry(self.ends(&fins[k])[0]).or_default().push(k);
+        for (k, fin) in fins.iter().enumerate() {
+            starts.entry(self.ends(fin)[0]).or_default().push(k);
         }
         let mut is_taken = vec![false; count];
         let mut loops = Vec::new();

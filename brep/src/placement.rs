@@ -14,8 +14,10 @@ pub struct Placement {
 
 impl Placement {
     /// The transform that moves nothing.
-    pub const IDENTITY: Self =
-        Self { linear: Matrix3::new(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0), shift: Vector::new(0.0, 0.0, 0.0) };
+    pub const IDENTITY: Self = Self {
+        linear: Matrix3::new(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0),
+        shift: Vector::new(0.0, 0.0, 0.0),
+    };
 
     /// This transform after `first`.
     pub fn after(&self, first: &Self) -> Self {

@@ -31,9 +31,9 @@ pub struct SurfaceFoot {
 }
 
 /// The most steps: a few suffice from a near start.
-const STEPS: usize = 40;
+const STEPS: usize = 100;
 /// Halvings of a step that does not decrease the distance.
-const HALVINGS: usize = 12;
+const HALVINGS: usize = 30;
 /// The cosine of the angle between the surface and the way to a point beyond which a foot is not
 /// converged; distances below rounding have no direction.
 const ORTHOGONAL: f64 = 1e-6;
@@ -51,7 +51,8 @@ fn is_nearer(new: &Vector, old: &Vector, scale: f64) -> bool {
 /// The point of a curve, within a range of parameters, at which the distance from `point` has a
 /// minimum near the parameter `start`.
 ///
-/// Newton's method on the derivative of the squared distance; Gauss-Newton where that is not convex.
+/// Newton's method on the derivative of the squared distance; Gauss-Newton where that is not
+/// convex.
 pub fn project_to_curve(curve: &Curve<3>, range: [f64; 2], point: &Point, start: f64) -> CurveFoot {
     let clamp = |t: f64| t.clamp(range[0], range[1]);
     let mut t = clamp(start);
@@ -144,18 +145,28 @@ pub fn project_to_surface(surface: &Surface, point: &Point, start: [f64; 2]) -> 
     SurfaceFoot { parameters: [u, v], point: foot, normal, is_converged }
 }
 
+/// The least determinant of the second derivatives of half the squared distance, in units of that
+/// of the first fundamental form.
+const LEAST_CONVEX: f64 = 1e-3;
+
 /// The Newton step of a quadratic model, made convex by more of the first fundamental form.
 fn newton_step(gradient: [f64; 2], form: [f64; 3], bend: [f64; 3]) -> Option<[f64; 2]> {
+    let area = form[0] * form[2] - form[1] * form[1];
+    // At poles one derivative vanishes: the other direction alone is moved, below.
+    let is_pole = form[0].min(form[2]) <= 1e-20 * form[0].max(form[2]);
+    let is_regular = !is_pole && area > 1e-14 * form[0] * form[2];
     for share in [1.0, 0.5, 0.0] {
         let [a, b, c] = [0, 1, 2].map(|i| form[i] + share * bend[i]);
         let determinant = a * c - b * b;
-        // At poles one derivative vanishes: the other direction alone is moved.
-        if a > 1e-3 * form[0] && c > 1e-3 * form[2] && determinant > 1e-6 * form[0] * form[2] {
-            let step =
-                [(b * gradient[1] - c * gradient[0]) / determinant, (b * gradient[0] - a * gradient[1]) / determinant];
+        if is_regular && a > 0.0 && c > 0.0 && determinant > LEAST_CONVEX * area {
+            let step = [
+                (b * gradient[1] - c * gradient[0]) / determinant,
+                (b * gradient[0] - a * gradient[1]) / determinant,
+            ];
             return step.iter().all(|s| s.is_finite()).then_some(step);
         }
     }
-    let step = [0, 1].map(|i| if form[2 * i] > 0.0 { -gradient[i] / form[2 * i] } else { 0.0 });
+    let least = 1e-20 * form[0].max(form[2]);
+    let step = [0, 1].map(|i| if form[2 * i] > least { -gradient[i] / form[2 * i] } else { 0.0 });
     step.iter().all(|s| s.is_finite()).then_some(step)
 }

@@ -228,7 +228,10 @@ impl Surface {
                     let image = by.linear * p.xyz() + by.shift * p.w;
                     Vector4::new(image.x, image.y, image.z, p.w)
                 };
-                Self::Spline(SplineSurface { poles: spline.poles.iter().map(pole).collect(), ..spline.clone() })
+                Self::Spline(SplineSurface {
+                    poles: spline.poles.iter().map(pole).collect(),
+                    ..spline.clone()
+                })
             }
             Self::Offset { basis, distance } => {
                 Self::Offset { basis: Box::new(basis.placed(by)), distance: distance * by.scale() * sign }
@@ -255,7 +258,8 @@ fn offset(b: &Jet, distance: f64, d: &mut [[Vector; 4]; 4]) {
     let n_u = b[2][0].cross(&b[0][1]) + b[1][0].cross(&b[1][1]);
     let n_v = b[1][1].cross(&b[0][1]) + b[1][0].cross(&b[0][2]);
     let n_uu = b[3][0].cross(&b[0][1]) + b[2][0].cross(&b[1][1]) * 2.0 + b[1][0].cross(&b[2][1]);
-    let n_uv = b[2][1].cross(&b[0][1]) + b[2][0].cross(&b[0][2]) + b[1][1].cross(&b[1][1]) + b[1][0].cross(&b[1][2]);
+    let n_uv =
+        b[2][1].cross(&b[0][1]) + b[2][0].cross(&b[0][2]) + b[1][1].cross(&b[1][1]) + b[1][0].cross(&b[1][2]);
     let n_vv = b[1][2].cross(&b[0][1]) + b[1][1].cross(&b[0][2]) * 2.0 + b[1][0].cross(&b[0][3]);
     let length = n.norm().max(f64::MIN_POSITIVE);
     let unit = n / length;

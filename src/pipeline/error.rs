@@ -310,7 +310,9 @@ impl HasKind for Error {
     fn kind(&self) -> ErrorKind {
         match self {
             Self::Read(_) | Self::Language(_) | Self::Input(_) | Self::Request(_) => ErrorKind::Input,
-            Self::Features { .. } | Self::Facets { .. } | Self::Brep { .. } | Self::Name(_) => ErrorKind::Input,
+            Self::Features { .. } | Self::Facets { .. } | Self::Brep { .. } | Self::Name(_) => {
+                ErrorKind::Input
+            }
             Self::Coarse(error) => error.kind(),
             Self::Cut(error) => error.kind(),
             Self::Fill { .. } => ErrorKind::NoMesh,

@@ -17,9 +17,8 @@ use crate::ground::progress::Work;
 use crate::ground::projector::{BrepProjector, Projector};
 use crate::ground::size::{Accuracy, Closeness, SizeField, SizeSettings, Source, WatchedSize};
 use crate::mesher::facets::{
-    Crossing, FacetBodies, FacetError, FacetModel, FacetPatch, FacetSize, Facets, Marks,
-    RemeshSettings, SharpPlaces, keep, of_brep,
-    remesh,
+    Crossing, FacetBodies, FacetError, FacetModel, FacetPatch, FacetSize, Facets, Marks, RemeshSettings,
+    SharpPlaces, keep, of_brep, remesh,
 };
 use crate::mesher::smoothness::smoothness;
 use crate::mesher::surface::SurfaceMesh;
@@ -146,13 +145,12 @@ impl FacetSolid {
         let text = read_bytes(path)?;
         let refuse = |error| Error::Brep { path: path.to_path_buf(), error: Box::new(error) };
         let mut brep = brep::Model::read(&text).map_err(refuse)?;
-        let tessellation = brep::Tessellation::of(&mut brep, &brep::Settings::default()).map_err(refuse)?;
+        let (model, exact) = tessellated(&mut brep).map_err(refuse)?;
         brep.notes.iter().for_each(|text| note(&format!("{}: {text}", path.display())));
-        let (model, exact) = of_brep(&brep, &tessellation);
-        model.bounds.refuse_out_of_range().map_err(|range| InputError::OutOfRange {
-            path: Some(path.to_path_buf()),
-            range,
-        })?;
+        model
+            .bounds
+            .refuse_out_of_range()
+            .map_err(|range| InputError::OutOfRange { path: Some(path.to_path_buf()), range })?;
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();
         let body = |i: usize| match i {
             1 => Label::new(1, stem.clone()),
@@ -319,6 +317,27 @@ impl FacetSolid {
             surface.segments.push(Segment { vertices, curve: CurveId::new(self.model.curves.len() + index) });
         }
     }
+}
+
+/// How often a tessellation is made finer because its triangles intersect.
+const FINER: i32 = 3;
+
+/// Facets that approximate a boundary representation, so fine that those of close faces do not
+/// intersect, unless the faces do.
+fn tessellated(brep: &mut brep::Model) -> Result<(FacetModel, BrepProjector), brep::BrepError> {
+    let initial = brep::Settings::default();
+    let mut coarsest = None;
+    for k in 0..FINER {
+        let settings =
+            brep::Settings { chord: initial.chord * 0.1_f64.powi(k), angle: initial.angle * 0.5_f64.powi(k) };
+        let tessellation = brep::Tessellation::of(brep, &settings)?;
+        let made = of_brep(brep, &tessellation);
+        if !made.0.intersections().iter().any(|crossing| made.0.is_deep(crossing)) {
+            return Ok(made);
+        }
+        coarsest.get_or_insert(made);
+    }
+    Ok(coarsest.expect("the first of several"))
 }
 
 fn facets_of(surface: &Surface) -> Facets {

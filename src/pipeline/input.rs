@@ -48,8 +48,9 @@ pub fn read(
     }
     match (kinds.as_slice(), paths) {
         ([Kind::Csg], [path]) => read_csg(path.as_ref(), settings, note),
-        ([Kind::Brep], [path]) => FacetSolid::read_brep(path.as_ref(), settings, note)
-            .map(|solid| Model::Facets(Box::new(solid))),
+        ([Kind::Brep], [path]) => {
+            FacetSolid::read_brep(path.as_ref(), settings, note).map(|solid| Model::Facets(Box::new(solid)))
+        }
         ([Kind::Mesh], [path]) => read_mesh(path.as_ref(), note),
         (kinds, _) if !kinds.is_empty() && kinds.iter().all(|kind| *kind == Kind::Surface) => {
             FacetSolid::read(paths, settings, note).map(|solid| Model::Facets(Box::new(solid)))

@@ -208,7 +208,12 @@ fn round(tokens: &mut Tokens, kind: i64) -> Result<Surface, BrepError> {
 }
 
 /// Poles of a surface, weighted.
-fn net(tokens: &mut Tokens, in_u: usize, in_v: usize, rational: bool) -> Result<Vec<Vector4<f64>>, BrepError> {
+fn net(
+    tokens: &mut Tokens,
+    in_u: usize,
+    in_v: usize,
+    rational: bool,
+) -> Result<Vec<Vector4<f64>>, BrepError> {
     let mut poles = Vec::new();
     for _ in 0..in_u {
         for _ in 0..in_v {

@@ -87,9 +87,10 @@ fn locations(tokens: &mut Tokens) -> Result<Vec<Placement>, BrepError> {
                         break product;
                     }
                     let power = tokens.integer()?;
-                    product = product.after(&power_of(&all[index], power).ok_or_else(|| {
-                        tokens.error("the power of a location must be -1000 to 1000")
-                    })?);
+                    product = product.after(
+                        &power_of(&all[index], power)
+                            .ok_or_else(|| tokens.error("the power of a location must be -1000 to 1000"))?,
+                    );
                 }
             }
             other => return Err(tokens.error(&format!("a location has kind {other}; 1 and 2 are known"))),

@@ -84,7 +84,7 @@ pub(super) fn read(tokens: &mut Tokens, version: u32, mut file: File) -> Result<
         let word = tokens.word()?;
         let line = tokens.line;
         let kind = match word {
-            "Ve" => vertex(tokens, version, &file)?,
+            "Ve" => vertex(tokens, &file)?,
             "Ed" => edge(tokens, version, &file)?,
             "Fa" => face(tokens, &file)?,
             "Wi" => Kind::Wire,
@@ -146,21 +146,13 @@ fn tolerance(tokens: &mut Tokens) -> Result<f64, BrepError> {
     if tolerance >= 0.0 { Ok(tolerance) } else { Err(tokens.error("a tolerance is negative")) }
 }
 
-fn vertex(tokens: &mut Tokens, version: u32, file: &File) -> Result<Kind, BrepError> {
+fn vertex(tokens: &mut Tokens, file: &File) -> Result<Kind, BrepError> {
     let tolerance = tolerance(tokens)?;
     let point = Point::from(tokens.vector::<3>()?);
     // Parameters on curves and surfaces are not needed.
     loop {
-        let kind = if version >= 3 {
-            let kind = tokens.integer()?;
-            if kind != 0 {
-                tokens.number()?;
-            }
-            kind
-        } else {
-            tokens.number()?;
-            tokens.integer()?
-        };
+        tokens.number()?;
+        let kind = tokens.integer()?;
         match kind {
             0 => return Ok(Kind::Vertex { point, tolerance }),
             1 => drop(tokens.index(file.curves.len())?),

@@ -25,8 +25,7 @@ impl<'a> Tokens<'a> {
     pub fn word(&mut self) -> Result<&'a str, BrepError> {
         let rest = &self.text[self.at..];
         let start = rest.iter().position(|c| !c.is_ascii_whitespace()).unwrap_or(rest.len());
-        let length =
-            rest[start..].iter().position(u8::is_ascii_whitespace).unwrap_or(rest.len() - start);
+        let length = rest[start..].iter().position(u8::is_ascii_whitespace).unwrap_or(rest.len() - start);
         if length == 0 {
             return Err(self.error("the file ends too early"));
         }
@@ -94,11 +93,9 @@ impl<'a> Tokens<'a> {
         let word = self.word()?;
         let digits = word.bytes().take_while(u8::is_ascii_digit).count();
         self.at -= word.len() - digits;
-        word[..digits]
-            .parse()
-            .ok()
-            .filter(|&index| index <= most)
-            .ok_or_else(|| self.error(&format!("`{word:.40}` does not start with an index of at most {most}")))
+        word[..digits].parse().ok().filter(|&index| index <= most).ok_or_else(|| {
+            self.error(&format!("`{word:.40}` does not start with an index of at most {most}"))
+        })
     }
 
     /// A flag.

@@ -10,8 +10,8 @@ const FEWEST: usize = 2;
 /// A side of a patch with its surface.
 pub(super) type Beside<'a> = (&'a Surface, &'a Fin);
 
-/// The parameters that divide a curve so that each segment is within `chord` of it, and its tangents
-/// and the normals of the patches beside it differ by at most `angle`.
+/// The parameters that divide a curve so that each segment is within `chord` of it, and its
+/// tangents and the normals of the patches beside it differ by at most `angle`.
 pub(super) fn divide(
     edge: &EdgeCurve,
     beside: &[Beside],
@@ -110,9 +110,8 @@ pub(super) fn diagonal(model: &Model) -> f64 {
         let [low, high] = edge.range;
         points.extend((1..8).map(|k| Point::from(edge.curve.point(low + (high - low) * f64::from(k) / 8.0))));
     }
-    let bound = |worst: f64, pick: fn(f64, f64) -> f64, axis: usize| {
-        points.iter().map(|p| p[axis]).fold(worst, pick)
-    };
+    let bound =
+        |worst: f64, pick: fn(f64, f64) -> f64, axis: usize| points.iter().map(|p| p[axis]).fold(worst, pick);
     let extent = |axis| bound(f64::NEG_INFINITY, f64::max, axis) - bound(f64::INFINITY, f64::min, axis);
     let squared: f64 = (0..3).map(|axis| extent(axis) * extent(axis)).sum();
     squared.sqrt().max(f64::MIN_POSITIVE)

@@ -1,11 +1,12 @@
 //! Triangulation of one patch in its parameters.
 
+use super::chain::{Sides, chain};
+use super::frame::{Frame, Node, pole};
 use super::{Tessellation, Triangle};
-use crate::model::{EdgeCurve, Fin, Model, On, Patch};
-use crate::project::project_to_surface;
-use crate::{BrepError, Point, Surface, Vector};
+use crate::model::{Model, Patch};
+use crate::{BrepError, Point, Vector};
 use spade::handles::FixedVertexHandle;
-use spade::{ConstrainedDelaunayTriangulation, HasPosition, Point2, Triangulation};
+use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// The tolerances of a tessellation.
@@ -25,32 +26,12 @@ pub(super) enum Failure {
     Final(BrepError),
 }
 
-/// A vertex of the triangulation in parameters.
-#[derive(Clone, Copy, Debug)]
-struct Node {
-    /// The parameters in units of length.
-    scaled: Point2<f64>,
-    parameters: [f64; 2],
-    /// The vertex of the tessellation.
-    vertex: u32,
-}
-
-impl HasPosition for Node {
-    type Scalar = f64;
-
-    fn position(&self) -> Point2<f64> {
-        self.scaled
-    }
-}
-
 type Plane = ConstrainedDelaunayTriangulation<Node>;
 
 /// The most triangles of a patch.
 const MOST_TRIANGLES: usize = 400_000;
 /// The most rounds of refinement.
 const MOST_ROUNDS: usize = 200;
-/// Points on a side without length.
-const AT_POLE: usize = 24;
 /// Edges shorter than this (fraction of the diagonal) are not divided for their angle: surfaces may
 /// have kinks.
 const SHORTEST: f64 = 3e-4;
@@ -89,236 +70,8 @@ pub(super) fn triangulate(
     face.finish(out)
 }
 
-/// A loop as parameters and vertices.
-type Chain = Vec<([f64; 2], u32)>;
-
-/// A loop side by side. Each side ends before the first point of the next.
-type Sides = Vec<Chain>;
-
-/// The points of a loop, each once.
-fn chain(
-    model: &Model,
-    number: usize,
-    fins: &[Fin],
-    out: &mut Tessellation,
-    tolerances: &Tolerances,
-) -> Result<Sides, BrepError> {
-    let patch = &model.patches[number];
-    let mut sides: Vec<Chain> = Vec::new();
-    for fin in fins {
-        let mut side: Chain = match fin.on {
-            On::Corner(corner) => at_pole(fin, corner as u32),
-            On::Curve(curve) => on_curve(model, number, fin, curve, out, tolerances)?,
-        };
-        if !fin.is_forward {
-            side.reverse();
-        }
-        sides.push(side);
-    }
-    let mut out_sides = Sides::new();
-    for k in 0..sides.len() {
-        let side = &sides[k];
-        let next = &sides[(k + 1) % sides.len()][0];
-        let (end, vertex) = side[side.len() - 1];
-        out_sides.push(side[..side.len() - 1].to_vec());
-        // Ends that differ in parameters but not in space are joined by a side without length.
-        let middle = [0, 1].map(|i| 0.5 * (end[i] + next.0[i]));
-        let [from, half, to] = [end, middle, next.0].map(|p| patch.surface.point(p));
-        let gap = (half - from).norm().max((to - from).norm());
-        let corner = out.points[vertex as usize];
-        let tolerance = model.corners[vertex as usize].tolerance;
-        let most = (10.0 * tolerance).max(1e-5 * tolerances.diagonal);
-        if gap > most {
-            let what = format!("its edges do not join in the parameters of its surface: the gap is {gap:.3e}");
-            return Err(BrepError::face(number, what, Some(corner)));
-        }
-        let rate = patch.surface.jet(end[0], end[1], 1);
-        let is_pole = [rate.d[1][0], rate.d[0][1]].iter().any(|d| d.norm() < 1e-7 * tolerances.diagonal);
-        if is_pole && (end[0] - next.0[0]).hypot(end[1] - next.0[1]) > 1e-6 {
-            let at = |share: f64| ([0, 1].map(|j| end[j] + share * (next.0[j] - end[j])), vertex);
-            out_sides.push((0..AT_POLE).map(|i| at(i as f64 / AT_POLE as f64)).collect());
-        }
-    }
-    Ok(out_sides)
-}
-
-fn at_pole(fin: &Fin, vertex: u32) -> Chain {
-    let [low, high] = fin.range;
-    let at = |k: usize| low + (high - low) * (k as f64 / AT_POLE as f64);
-    let curve = fin.curve.as_ref().expect("a side without length has parameters");
-    (0..=AT_POLE).map(|k| (curve.point(at(k)).into(), vertex)).collect()
-}
-
-fn on_curve(
-    model: &Model,
-    number: usize,
-    fin: &Fin,
-    curve: usize,
-    out: &mut Tessellation,
-    tolerances: &Tolerances,
-) -> Result<Chain, BrepError> {
-    let surface = &model.patches[number].surface;
-    let edge = &model.curves[curve];
-    let most = (20.0 * edge.tolerance).max(1e-5 * tolerances.diagonal);
-    let line = out.lines[curve].clone();
-    let mut side = Chain::new();
-    for (vertex, t) in line {
-        let on = Point::from(edge.curve.point(t));
-        let mut parameters: [f64; 2] = match &fin.curve {
-            None => project_to_surface(surface, &on, [0.0; 2]).parameters,
-            Some(curve) => curve.point(fin.parameter(t, edge.range)).into(),
-        };
-        let mut gap = (surface.point(parameters) - on).norm();
-        if gap > most {
-            // The two curves may be parametrised differently.
-            let foot = project_to_surface(surface, &on, parameters);
-            (parameters, gap) = (foot.parameters, (foot.point - on).norm());
-        }
-        if gap > most {
-            let what = format!("edge {} is {gap:.3e} away from it", curve + 1);
-            return Err(BrepError::face(number, what, Some(on)));
-        }
-        out.gap = out.gap.max(gap).max((surface.point(parameters) - out.points[vertex as usize]).norm());
-        side.push((parameters, vertex));
-    }
-    if fin.curve.is_some() {
-        let line = &out.lines[curve];
-        let between = |w: &[(u32, f64)]| {
-            let [a, b] = [w[0].1, w[1].1];
-            (1..SAMPLES).map(move |k| a + (b - a) * f64::from(k) / f64::from(SAMPLES))
-        };
-        let gaps = line.windows(2).flat_map(between).map(|t| gap_at(surface, fin, edge, t));
-        out.gap = gaps.fold(out.gap, f64::max);
-    }
-    Ok(side)
-}
-
-/// Steps between the vertices of a curve at which its distance from a patch is measured.
-const SAMPLES: u32 = 6;
-
-/// The distance of a point of a curve from a patch beside it.
-fn gap_at(surface: &Surface, fin: &Fin, edge: &EdgeCurve, t: f64) -> f64 {
-    let on = Point::from(edge.curve.point(t));
-    let start = fin.curve.as_ref().map_or([0.0; 2], |c| c.point(fin.parameter(t, edge.range)).into());
-    (project_to_surface(surface, &on, start).point - on).norm()
-}
-
-/// Parameters in units of length.
-///
-/// At a **pole** the derivative in one direction vanishes, and a side of the patch is one point.
-/// Lengths in that direction are then taken at each value of the other parameter, as in the
-/// sinusoidal projection of a globe: the side becomes one point here too.
-struct Frame<'a> {
-    surface: &'a Surface,
-    origin: [f64; 2],
-    scale: [f64; 2],
-    /// The direction whose derivative vanishes at a pole.
-    pole: Option<usize>,
-    /// Parameters in that direction at which lengths are taken.
-    samples: [f64; 4],
-    /// Shorter derivatives are those of a pole.
-    least: f64,
-}
-
-impl<'a> Frame<'a> {
-    /// Scales parameters by the mean length of the derivatives.
-    fn of(surface: &'a Surface, chains: &[Sides], pole: Option<usize>, diagonal: f64) -> Self {
-        let all = || chains.iter().flatten().flatten().map(|node| node.0);
-        let bound = |i: usize, start: f64, pick: fn(f64, f64) -> f64| all().map(|p| p[i]).fold(start, pick);
-        let low = [0, 1].map(|i| bound(i, f64::INFINITY, f64::min));
-        let high = [0, 1].map(|i| bound(i, f64::NEG_INFINITY, f64::max));
-        let at = |i: usize, share: f64| low[i] + (high[i] - low[i]) * share;
-        let mut sums = [0.0; 2];
-        for k in 0..25 {
-            let [u, v] = [at(0, 0.1 + 0.2 * f64::from(k % 5)), at(1, 0.1 + 0.2 * f64::from(k / 5))];
-            let jet = surface.jet(u, v, 1);
-            sums[0] += jet.d[1][0].norm();
-            sums[1] += jet.d[0][1].norm();
-        }
-        let scale = sums.map(|sum| if sum > 0.0 { sum / 25.0 } else { 1.0 });
-        let mut origin = low;
-        let mut samples = [0.0; 4];
-        if let Some(i) = pole {
-            origin[i] = at(i, 0.5);
-            samples = [0.125, 0.375, 0.625, 0.875].map(|share| at(i, share));
-        }
-        Self { surface, origin, scale, pole, samples, least: AT_REST * diagonal }
-    }
-
-    /// The length of the derivative in the direction of a pole, at a value of the other parameter.
-    fn rate(&self, i: usize, other: f64) -> f64 {
-        let length = |&s: &f64| {
-            let [u, v] = if i == 0 { [s, other] } else { [other, s] };
-            let d = self.surface.jet(u, v, 1).d;
-            if i == 0 { d[1][0].norm() } else { d[0][1].norm() }
-        };
-        let mean = self.samples.iter().map(length).sum::<f64>() / 4.0;
-        if mean < self.least { 0.0 } else { mean }
-    }
-
-    fn scaled(&self, p: [f64; 2]) -> Point2<f64> {
-        let mut scale = self.scale;
-        if let Some(i) = self.pole {
-            scale[i] = self.rate(i, p[1 - i]);
-        }
-        // Differences below the range of the predicates are zero.
-        let [x, y] = [0, 1].map(|i| (p[i] - self.origin[i]) * scale[i]);
-        let flushed = |x: f64| if x.abs() < 1e-30 { 0.0 } else { x };
-        Point2::new(flushed(x), flushed(y))
-    }
-
-    /// The inverse of [`scaled`](Self::scaled).
-    fn parameters(&self, p: Point2<f64>) -> [f64; 2] {
-        let p = [p.x, p.y];
-        let mut out = [0, 1].map(|i| self.origin[i] + p[i] / self.scale[i]);
-        if let Some(i) = self.pole {
-            let rate = self.rate(i, out[1 - i]);
-            out[i] = if rate > 0.0 { self.origin[i] + p[i] / rate } else { self.origin[i] };
-        }
-        out
-    }
-
-    /// The parameters of the corners of a triangle. A corner at a pole has any parameter in the
-    /// direction of the pole: that between the other two suits the triangle.
-    fn corners(&self, triangle: &[(usize, Node); 3]) -> [[f64; 2]; 3] {
-        let mut out = triangle.map(|(_, node)| node.parameters);
-        if let Some(i) = self.pole {
-            for k in 0..3 {
-                if self.rate(i, out[k][1 - i]) == 0.0 {
-                    out[k][i] = 0.5 * (out[(k + 1) % 3][i] + out[(k + 2) % 3][i]);
-                }
-            }
-        }
-        out
-    }
-}
-
-/// Derivatives shorter than this (fraction of the diagonal of the model) are those of a pole.
-const AT_REST: f64 = 1e-7;
-
-/// The direction whose derivative vanishes at a side without length.
-fn pole(patch: &Patch, diagonal: f64) -> Option<usize> {
-    let fins = patch.loops.iter().flatten().filter(|fin| matches!(fin.on, On::Corner(_)));
-    fins.filter_map(|fin| fin.curve.as_ref().map(|curve| curve.point(fin.range[0]))).find_map(|p| {
-        let d = patch.surface.jet(p[0], p[1], 1).d;
-        [d[1][0], d[0][1]].iter().position(|d| d.norm() < AT_REST * diagonal)
-    })
-}
-
-impl Frame<'_> {
-    /// 1 if the patch is to the left of its loops, else −1.
-    fn turn(&self, chains: &[Sides]) -> f64 {
-        let double_area = |sides: &Sides| -> f64 {
-            let points: Vec<Point2<f64>> = sides.iter().flatten().map(|node| self.scaled(node.0)).collect();
-            let next = points.iter().cycle().skip(1);
-            points.iter().zip(next).map(|(p, q)| p.x * q.y - p.y * q.x).sum()
-        };
-        chains.iter().map(double_area).sum::<f64>().signum()
-    }
-}
-
-/// Sides are curved outward by this fraction of their length. Otherwise rounding makes straight ones
-/// concave, and triangles without height remain between their points.
+/// Sides are curved outward by this fraction of their length. Otherwise rounding makes straight
+/// ones concave, and triangles without height remain between their points.
 const BULGE: f64 = 1e-6;
 
 struct Face<'a> {
@@ -399,9 +152,8 @@ impl Face<'_> {
         let outer = self.plane.outer_face();
         inside[outer.index()] = Some(false);
         let mut stack = Vec::new();
-        let cross = |edge: [usize; 2], from: bool| {
-            from ^ (self.sides.get(&edge).copied().unwrap_or(0) % 2 == 1)
-        };
+        let cross =
+            |edge: [usize; 2], from: bool| from ^ (self.sides.get(&edge).copied().unwrap_or(0) % 2 == 1);
         for edge in self.plane.convex_hull() {
             let key = sorted(edge.from().index(), edge.to().index());
             for face in [edge.face(), edge.rev().face()] {
@@ -435,9 +187,14 @@ impl Face<'_> {
     /// The triangles inside the patch, as nodes.
     fn triangles(&self) -> Vec<[(usize, Node); 3]> {
         let inside = self.inside();
-        let of = |face: spade::handles::FaceHandle<'_, spade::handles::InnerTag, Node, (), spade::CdtEdge<()>, ()>| {
-            face.vertices().map(|v| (v.index(), *v.data()))
-        };
+        let of = |face: spade::handles::FaceHandle<
+            '_,
+            spade::handles::InnerTag,
+            Node,
+            (),
+            spade::CdtEdge<()>,
+            (),
+        >| { face.vertices().map(|v| (v.index(), *v.data())) };
         let faces = self.plane.inner_faces();
         faces.filter(|face| inside[face.index()] == Some(true)).map(of).collect()
     }
@@ -507,15 +264,15 @@ impl Face<'_> {
                 return Ok(());
             }
         }
-        Err(Failure::Final(BrepError::face(self.number, "the refinement of its triangles does not end", None)))
+        Err(Failure::Final(BrepError::face(
+            self.number,
+            "the refinement of its triangles does not end",
+            None,
+        )))
     }
 
     /// Inserts the wanted points, at most one in each triangle, and returns their number.
-    fn insert(
-        &mut self,
-        mut wanted: Vec<Wanted>,
-        triangles: &[[(usize, Node); 3]],
-    ) -> usize {
+    fn insert(&mut self, mut wanted: Vec<Wanted>, triangles: &[[(usize, Node); 3]]) -> usize {
         let before = self.vertices.len();
         wanted.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)).then(a.3.cmp(&b.3)));
         let mut beside: BTreeMap<[usize; 2], [usize; 2]> = BTreeMap::new();
@@ -610,7 +367,8 @@ impl Face<'_> {
         off.max(if is_folded { 2.0 } else { 0.0 })
     }
 
-    /// Inner edges whose ends are those of other edges too: different in parameters, equal in space.
+    /// Inner edges whose ends are those of other edges too: different in parameters, equal in
+    /// space.
     fn tangled(&self, triangles: &[[(usize, Node); 3]]) -> BTreeSet<[usize; 2]> {
         // Only edges between vertices on curves or at poles can be.
         let mut uses: BTreeMap<[u32; 2], (usize, BTreeSet<[usize; 2]>)> = BTreeMap::new();

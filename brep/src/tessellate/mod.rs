@@ -3,8 +3,10 @@
 //! Each curve is divided once. Each patch is triangulated in its parameters, scaled to lengths, by
 //! a constrained Delaunay triangulation of its loops, and refined at the midpoints of inner edges.
 
+mod chain;
 mod curves;
 mod face;
+mod frame;
 mod measure;
 
 pub use measure::{area, check, volume};
@@ -61,7 +63,8 @@ impl Tessellation {
     /// each other or loops cross; [`BrepError::Solid`] if a body is not closed.
     pub fn of(model: &mut Model, settings: &Settings) -> Result<Self, BrepError> {
         let diagonal = curves::diagonal(model);
-        let tolerances = face::Tolerances { chord: settings.chord * diagonal, angle: settings.angle, diagonal };
+        let tolerances =
+            face::Tolerances { chord: settings.chord * diagonal, angle: settings.angle, diagonal };
         let mut chords = vec![tolerances.chord; model.curves.len()];
         let mut failed = None;
         for _ in 0..MOST_RETRIES {
@@ -84,7 +87,9 @@ impl Tessellation {
             }
             for patch in conflicts {
                 let fins = model.patches[patch].loops.iter().flatten();
-                for curve in fins.filter_map(|fin| if let crate::On::Curve(c) = fin.on { Some(c) } else { None }) {
+                for curve in
+                    fins.filter_map(|fin| if let crate::On::Curve(c) = fin.on { Some(c) } else { None })
+                {
                     chords[curve] = chords[curve].min(tolerances.chord) * 0.2;
                 }
             }

@@ -113,8 +113,8 @@ impl BrepProjector {
         Self { source, patches, curves }
     }
 
-    /// The maximum distance of a projected point from its face or, on an edge, from the faces beside
-    /// it (length).
+    /// The maximum distance of a projected point from its face or, on an edge, from the faces
+    /// beside it (length).
     pub fn tolerance(&self) -> f64 {
         self.source.tolerance
     }
@@ -159,7 +159,8 @@ impl BrepProjector {
     fn foot_on_curve(&self, curve: CurveId, point: &Point) -> brep::CurveFoot {
         let edge = &self.source.curves[curve.index()];
         let mut range = [edge.line[0].1, edge.line[edge.line.len() - 1].1];
-        if let (Some(period), true) = (edge.curve.period(), edge.line[0].0 == edge.line[edge.line.len() - 1].0)
+        if let (Some(period), true) =
+            (edge.curve.period(), edge.line[0].0 == edge.line[edge.line.len() - 1].0)
         {
             // A whole period: its end is no end.
             range = [range[0] - period, range[1] + period];
@@ -218,7 +219,9 @@ impl BrepProjector {
         let source: Source = serde_json::from_slice(bytes).ok()?;
         let exists = |v: u32| (v as usize) < source.points.len();
         let face = |f: &Face| {
-            f.surface.is_sound() && !f.triangles.is_empty() && f.triangles.iter().all(|t| t.0.into_iter().all(exists))
+            f.surface.is_sound()
+                && !f.triangles.is_empty()
+                && f.triangles.iter().all(|t| t.0.into_iter().all(exists))
         };
         let edge = |e: &Edge| e.curve.is_sound() && e.line.len() >= 2 && e.line.iter().all(|on| exists(on.0));
         (source.surfaces.iter().all(face) && source.curves.iter().all(edge)).then(|| Self::of(source))

@@ -41,7 +41,8 @@ pub fn of_brep(model: &Model, tessellation: &Tessellation) -> (FacetModel, BrepP
     let patch_of: Vec<u32> = tessellation.triangles.iter().map(|t| t.patch).collect();
 
     let corners = corners(model, &curves, &triangles, &normals);
-    let facet_curves: Vec<FacetCurve> = curves.iter().map(|&c| facet_curve(model, tessellation, c, &corners)).collect();
+    let facet_curves: Vec<FacetCurve> =
+        curves.iter().map(|&c| facet_curve(model, tessellation, c, &corners)).collect();
     let ends: BTreeSet<CornerId> = facet_curves.iter().filter_map(|c| c.ends).flatten().collect();
     let is_tip = |i: &usize| !ends.contains(&CornerId::new(*i));
     let tips: Vec<u32> = (0..corners.len()).filter(is_tip).map(|i| corners[i]).collect();
@@ -93,8 +94,8 @@ fn exact_projector(
     BrepProjector::new(&some, &Tessellation { lines, ..tessellation.clone() }, is_reversed)
 }
 
-/// The unit normals at the corners of all triangles, outward; those of the triangles at poles. Their
-/// order is that of the oriented triangles.
+/// The unit normals at the corners of all triangles, outward; those of the triangles at poles.
+/// Their order is that of the oriented triangles.
 fn corner_normals(model: &Model, tessellation: &Tessellation, is_reversed: &[bool]) -> Vec<[Vector; 3]> {
     let of = |t: &brep::Triangle| {
         let sign = if is_reversed[t.patch as usize] { -1.0 } else { 1.0 };
@@ -139,12 +140,7 @@ fn curves_in_use(model: &Model, tessellation: &Tessellation) -> Vec<usize> {
 }
 
 /// The vertices that are corners, ascending.
-fn corners(
-    model: &Model,
-    curves: &[usize],
-    triangles: &[[u32; 3]],
-    normals: &[[Vector; 3]],
-) -> Vec<u32> {
+fn corners(model: &Model, curves: &[usize], triangles: &[[u32; 3]], normals: &[[Vector; 3]]) -> Vec<u32> {
     let mut ends: Vec<Vec<usize>> = vec![Vec::new(); model.corners.len()];
     for &c in curves {
         model.curves[c].ends.iter().for_each(|&end| ends[end].push(c));
