@@ -65,7 +65,7 @@ pub fn check(model: &Model, tessellation: &Tessellation) -> Result<(), BrepError
         None => Ok(()),
         Some(((body, [a, b]), _)) => {
             let [a, b] = [a, b].map(|v| tessellation.points[v as usize]);
-            let what = "its faces do not enclose it: an edge belongs to one of them only";
+            let what = "its faces do not enclose it, or not all are oriented alike";
             Err(BrepError::solid(body, what, Some(nalgebra::center(&a, &b))))
         }
     }
