@@ -1,5 +1,6 @@
 //! The library as programs use it: meshing, files and their readers, MPI.
 
+mod brep;
 mod clients;
 #[allow(dead_code)]
 mod folders;

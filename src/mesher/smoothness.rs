@@ -2,7 +2,7 @@
 
 use super::facets::FacetSmoothness;
 use super::improve::{Smoothness, surface_normal, tangent_of_normals};
-use crate::ground::projector::Projector;
+use crate::ground::projector::{BrepProjector, Projector};
 use crate::{Point, Vector};
 use csg::{CurveId, PatchId};
 
@@ -11,6 +11,7 @@ pub fn smoothness(projector: &Projector) -> Option<Box<dyn Smoothness + '_>> {
     match projector {
         Projector::Csg(projector) => Some(Box::new(CsgSmoothness(projector))),
         Projector::Facets(projector) => Some(Box::new(FacetSmoothness(projector))),
+        Projector::Brep(projector) => Some(Box::new(BrepSmoothness(projector))),
         Projector::Flat => None,
     }
 }
@@ -26,5 +27,19 @@ impl Smoothness for CsgSmoothness<'_> {
 
     fn tangent(&self, curve: CurveId, at: &Point) -> Option<Vector> {
         tangent_of_normals(self.0.curve_surfaces(curve), at)
+    }
+}
+
+/// The smoothness of the faces and edges of a boundary representation. Poles have no normal.
+#[derive(Clone, Copy)]
+pub struct BrepSmoothness<'a>(pub &'a BrepProjector);
+
+impl Smoothness for BrepSmoothness<'_> {
+    fn normal(&self, patch: PatchId, at: &Point) -> Option<Vector> {
+        self.0.normal(patch, at)
+    }
+
+    fn tangent(&self, curve: CurveId, at: &Point) -> Option<Vector> {
+        self.0.tangent(curve, at)
     }
 }

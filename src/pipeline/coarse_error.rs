@@ -75,6 +75,9 @@ pub enum CoarseError {
         /// Where the first pair intersects.
         first: Point,
     },
+    /// A vertex could not be moved onto its face or edge.
+    #[error(transparent)]
+    Projection(#[from] csg::ProjectionFailed),
     /// A body could not be filled.
     #[error(transparent)]
     Volume(VolumeError),

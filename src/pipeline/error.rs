@@ -56,6 +56,14 @@ pub enum Error {
         /// The reason, with the location.
         error: Box<FacetError>,
     },
+    /// The shapes of a CAD file cannot be meshed.
+    #[error("{}: {error}", .path.display())]
+    Brep {
+        /// The file.
+        path: PathBuf,
+        /// The reason, with the location.
+        error: Box<brep::BrepError>,
+    },
     /// The input cannot be meshed.
     #[error(transparent)]
     Input(#[from] InputError),
@@ -129,14 +137,15 @@ fn prefix(path: &Option<PathBuf>) -> String {
 pub enum InputError {
     /// The extension of a file is that of no known format.
     #[error(
-        "cannot tell by its name what {} contains; known are geometries (.geo), surfaces ({}) and meshes ({})",
+        "cannot tell by its name what {} contains; known are geometries (.geo, .brep), surfaces ({}) and meshes ({})",
         .0.display(), surface::KNOWN, volume::KNOWN
     )]
     UnknownFormat(PathBuf),
     /// A CAD file, which cannot be read.
     #[error(
-        "{} is a CAD file, which cannot be read: export the part as STL or OBJ from the CAD program (with small angular \
-         tolerance), or mesh it with Gmsh (`gmsh -3 PART.step -o PART.msh`) and give the .msh",
+        "{} is a CAD file of a kind that cannot be read: convert it to BREP, for example with the Python package gmsh \
+         (`import gmsh; gmsh.initialize(); gmsh.model.occ.importShapes(\"PART.step\"); gmsh.model.occ.synchronize(); \
+         gmsh.write(\"PART.brep\")`), and give the .brep",
         .0.display()
     )]
     Cad(PathBuf),
@@ -301,7 +310,9 @@ impl HasKind for Error {
     fn kind(&self) -> ErrorKind {
         match self {
             Self::Read(_) | Self::Language(_) | Self::Input(_) | Self::Request(_) => ErrorKind::Input,
-            Self::Features { .. } | Self::Facets { .. } | Self::Name(_) => ErrorKind::Input,
+            Self::Features { .. } | Self::Facets { .. } | Self::Brep { .. } | Self::Name(_) => {
+                ErrorKind::Input
+            }
             Self::Coarse(error) => error.kind(),
             Self::Cut(error) => error.kind(),
             Self::Fill { .. } => ErrorKind::NoMesh,

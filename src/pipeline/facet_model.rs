@@ -6,6 +6,7 @@ use super::coarse_mesh::CoarseMesh;
 use super::error::{Error, InputError};
 use super::expected;
 use super::fill::fill;
+use super::input::read_bytes;
 use super::retries::Budget;
 use super::settings::InputSettings;
 use crate::Point;
@@ -13,16 +14,17 @@ use crate::files::surface::{self, Surface};
 use crate::ground::kernel::simplex::volume6;
 use crate::ground::mesh::{BoundaryTriangle, Class, Label, Names, Segment, VertexId};
 use crate::ground::progress::Work;
-use crate::ground::projector::Projector;
+use crate::ground::projector::{BrepProjector, Projector};
 use crate::ground::size::{Accuracy, Closeness, SizeField, SizeSettings, Source, WatchedSize};
 use crate::mesher::facets::{
-    Crossing, FacetBodies, FacetError, FacetModel, FacetPatch, FacetSize, FacetSmoothness, Facets, Marks,
-    RemeshSettings, SharpPlaces, keep, remesh,
+    Crossing, FacetBodies, FacetError, FacetModel, FacetPatch, FacetSize, Facets, Marks, RemeshSettings,
+    SharpPlaces, keep, of_brep, remesh,
 };
-use crate::mesher::improve::Smoothness;
+use crate::mesher::smoothness::smoothness;
 use crate::mesher::surface::SurfaceMesh;
 use crate::mesher::surface::closeness::{ThinRegions, Walls, thin_regions};
 use csg::{BodyId, CornerId, CurveId, PatchId};
+use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -40,6 +42,8 @@ pub struct FacetSolid {
     pub kept_edges: Vec<[Point; 2]>,
     /// Whether the facets themselves are the surface mesh.
     pub keep_surface: bool,
+    /// The exact faces and edges that the facets approximate, if there are any.
+    pub exact: Option<BrepProjector>,
     /// The names of the surfaces, for messages.
     files: Vec<String>,
 }
@@ -116,13 +120,68 @@ impl FacetSolid {
         let kept_edges = edges.copied().collect();
         let kept_points = surfaces.into_iter().flat_map(|surface| surface.loose_points).collect();
         let (keep_surface, files) = (settings.keep_surface, stems.to_vec());
-        Ok(Self { model, names, kept_points, kept_edges, keep_surface, files })
+        Ok(Self { model, names, kept_points, kept_edges, keep_surface, exact: None, files })
     }
 
     /// Projection to patches and curves. Kept facets need none, because points between those of a
     /// facet lie on it.
     pub fn projector(&self) -> Projector {
-        if self.keep_surface { Projector::Flat } else { self.model.projector.clone().into() }
+        match &self.exact {
+            _ if self.keep_surface => Projector::Flat,
+            Some(exact) => exact.clone().into(),
+            None => self.model.projector.clone().into(),
+        }
+    }
+
+    /// Reads a boundary representation (`.brep`).
+    ///
+    /// # Errors
+    /// A file that cannot be read, or whose shapes cannot be meshed, with the location.
+    pub fn read_brep(
+        path: &Path,
+        settings: &InputSettings,
+        note: &mut dyn FnMut(&str),
+    ) -> Result<Self, Error> {
+        let text = read_bytes(path)?;
+        let refuse = |error| Error::Brep { path: path.to_path_buf(), error: Box::new(error) };
+        let mut brep = brep::Model::read(&text).map_err(refuse)?;
+        let (model, exact) = tessellated(&mut brep).map_err(refuse)?;
+        brep.notes.iter().for_each(|text| note(&format!("{}: {text}", path.display())));
+        model
+            .bounds
+            .refuse_out_of_range()
+            .map_err(|range| InputError::OutOfRange { path: Some(path.to_path_buf()), range })?;
+        let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+        let body = |i: usize| match i {
+            1 => Label::new(1, stem.clone()),
+            i => Label::new(i as u32, format!("{stem}_{i}")),
+        };
+        let names = Names {
+            bodies: (1..=model.bodies.len()).map(body).collect(),
+            patches: (1..=model.patches.len()).map(|i| Label::new(i as u32, format!("face{i}"))).collect(),
+        };
+        Ok(Self {
+            model,
+            names,
+            kept_points: Vec::new(),
+            kept_edges: Vec::new(),
+            keep_surface: settings.keep_surface,
+            exact: Some(exact),
+            files: vec![path.display().to_string()],
+        })
+    }
+
+    /// Moves the vertices of a surface mesh from the facets onto the exact faces and edges.
+    fn snap(&self, surface: &mut SurfaceMesh) -> Result<(), CoarseError> {
+        let Some(exact) = self.exact.as_ref().filter(|_| !self.keep_surface) else { return Ok(()) };
+        surface.points.par_iter_mut().zip(&surface.classes).try_for_each(|(point, class)| {
+            *point = match *class {
+                Class::Curve(curve) => exact.project_curve(curve, point)?,
+                Class::Patch(patch) => exact.project_patch(patch, point)?,
+                Class::Corner(_) | Class::Body(_) => *point,
+            };
+            Ok(())
+        })
     }
 
     /// Makes a coarse mesh with the given sizes, which are lowered where surfaces are too close to
@@ -181,11 +240,14 @@ impl FacetSolid {
         if let Err(cancelled) = work.proceed() {
             return Attempt::Failed(cancelled.into());
         }
+        if let Err(error) = self.snap(&mut surface) {
+            return Attempt::Failed(error);
+        }
         self.add_kept_points(&mut surface);
         self.add_kept_edges(&mut surface);
-        let smoothness = FacetSmoothness(&self.model.projector);
-        let smoothness: Option<&dyn Smoothness> = if self.keep_surface { None } else { Some(&smoothness) };
-        match fill(surface, regions, &size, smoothness, settings.effort) {
+        let projector = self.projector();
+        let smoothness = smoothness(&projector);
+        match fill(surface, regions, &size, smoothness.as_deref(), settings.effort) {
             Ok(made) => Attempt::Made(Box::new(made)),
             Err(error) => {
                 // If triangles intersect, smaller sizes were tried already.
@@ -255,6 +317,27 @@ impl FacetSolid {
             surface.segments.push(Segment { vertices, curve: CurveId::new(self.model.curves.len() + index) });
         }
     }
+}
+
+/// How often a tessellation is made finer because its triangles intersect.
+const FINER: i32 = 3;
+
+/// Facets that approximate a boundary representation, so fine that those of close faces do not
+/// intersect, unless the faces do.
+fn tessellated(brep: &mut brep::Model) -> Result<(FacetModel, BrepProjector), brep::BrepError> {
+    let initial = brep::Settings::default();
+    let mut coarsest = None;
+    for k in 0..FINER {
+        let settings =
+            brep::Settings { chord: initial.chord * 0.1_f64.powi(k), angle: initial.angle * 0.5_f64.powi(k) };
+        let tessellation = brep::Tessellation::of(brep, &settings)?;
+        let made = of_brep(brep, &tessellation);
+        if !made.0.intersections().iter().any(|crossing| made.0.is_deep(crossing)) {
+            return Ok(made);
+        }
+        coarsest.get_or_insert(made);
+    }
+    Ok(coarsest.expect("the first of several"))
 }
 
 fn facets_of(surface: &Surface) -> Facets {

@@ -59,7 +59,7 @@ pub fn generate(
             Some(Model::Given(_)) => progress.note(
                 "the input is a mesh without its geometry: edges of second order are straight, also on its boundary",
             ),
-            Some(Model::Facets(_)) => progress.note(
+            Some(Model::Facets(solid)) if solid.exact.is_none() => progress.note(
                 "the surface of the input consists of plane triangles: boundary nodes of second order are on these",
             ),
             _ => {}

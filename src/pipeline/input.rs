@@ -14,6 +14,7 @@ use std::path::Path;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
     Csg,
+    Brep,
     Surface,
     Mesh,
 }
@@ -24,7 +25,8 @@ fn kind(path: &Path) -> Result<Kind, Error> {
         _ if files::volume::is_mesh(path) => Ok(Kind::Mesh),
         "geo" => Ok(Kind::Csg),
         "stl" | "off" | "obj" | "ply" | "poly" | "smesh" => Ok(Kind::Surface),
-        "step" | "stp" | "iges" | "igs" | "brep" => Err(InputError::Cad(path.to_path_buf()).into()),
+        "brep" => Ok(Kind::Brep),
+        "step" | "stp" | "iges" | "igs" => Err(InputError::Cad(path.to_path_buf()).into()),
         _ => Err(InputError::UnknownFormat(path.to_path_buf()).into()),
     }
 }
@@ -46,6 +48,9 @@ pub fn read(
     }
     match (kinds.as_slice(), paths) {
         ([Kind::Csg], [path]) => read_csg(path.as_ref(), settings, note),
+        ([Kind::Brep], [path]) => {
+            FacetSolid::read_brep(path.as_ref(), settings, note).map(|solid| Model::Facets(Box::new(solid)))
+        }
         ([Kind::Mesh], [path]) => read_mesh(path.as_ref(), note),
         (kinds, _) if !kinds.is_empty() && kinds.iter().all(|kind| *kind == Kind::Surface) => {
             FacetSolid::read(paths, settings, note).map(|solid| Model::Facets(Box::new(solid)))

@@ -141,7 +141,7 @@ impl Inspection {
     }
 
     /// Describes triangulated solids.
-    pub fn of_facets(FacetSolid { model, names, .. }: &FacetSolid) -> Self {
+    pub fn of_facets(FacetSolid { model, names, exact, .. }: &FacetSolid) -> Self {
         let beside = patches_beside(model);
         let number = |body: Option<BodyId>| body.map_or(0, |b| names.bodies[b.index()].number);
         let patch = |(index, patch): (usize, &crate::mesher::facets::FacetPatch)| {
@@ -149,7 +149,11 @@ impl Inspection {
             PatchLine {
                 boundary: names.patches[index].number,
                 name: names.patches[index].name().map(str::to_owned),
-                surface: if model.projector.is_flat_patch(id) { "plane" } else { "facets" },
+                surface: match exact {
+                    Some(exact) => exact.kind(id),
+                    None if model.projector.is_flat_patch(id) => "plane",
+                    None => "facets",
+                },
                 solid: None,
                 line: None,
                 bodies: [number(patch.inside), number(patch.outside)],

@@ -56,7 +56,7 @@ pub fn refinable<T>(
     mut make: impl FnMut(&[Source]) -> Result<(CoarseMesh, T), CoarseError>,
 ) -> Result<(CoarseMesh, T), Error> {
     let how = (pieces.min(TRIED_PIECES / order.degree()), order);
-    let is_faceted = matches!(model, Model::Facets(_));
+    let is_faceted = matches!(model, Model::Facets(solid) if solid.exact.is_none());
     let most_rounds = if is_faceted { INVERTED_FACETS } else { INVERTED };
     let mut sources = Vec::new();
     let mut best: Option<(Trial, (CoarseMesh, T))> = None;

@@ -1,8 +1,10 @@
 //! Projection to patches and curves: all that refinement, the check and other ranks know of a
 //! geometry.
 
+pub mod brep;
 pub mod facets;
 
+pub use brep::BrepProjector;
 pub use facets::FacetProjector;
 
 use crate::Point;
@@ -17,6 +19,8 @@ pub enum Projector {
     Csg(csg::Projector),
     /// Triangles that approximate the surface.
     Facets(FacetProjector),
+    /// The faces and edges of a boundary representation.
+    Brep(BrepProjector),
     /// The faces of a mesh without geometry: points on them are not moved.
     #[default]
     Flat,
@@ -34,10 +38,17 @@ impl From<FacetProjector> for Projector {
     }
 }
 
+impl From<BrepProjector> for Projector {
+    fn from(projector: BrepProjector) -> Self {
+        Self::Brep(projector)
+    }
+}
+
 /// The first byte of an encoded projector.
 const CSG: u8 = 0;
 const FACETS: u8 = 1;
 const FLAT: u8 = 2;
+const BREP: u8 = 3;
 
 impl Projector {
     /// The maximum distance of a projected point from its patch or curve (length).
@@ -45,6 +56,7 @@ impl Projector {
         match self {
             Self::Csg(projector) => projector.tolerance(),
             Self::Facets(projector) => projector.tolerance(),
+            Self::Brep(projector) => projector.tolerance(),
             Self::Flat => 0.0,
         }
     }
@@ -58,6 +70,7 @@ impl Projector {
         match self {
             Self::Csg(projector) => projector.project_patch(patch, point),
             Self::Facets(projector) => Ok(projector.project_patch(patch, point)),
+            Self::Brep(projector) => projector.project_patch(patch, point),
             Self::Flat => Ok(*point),
         }
     }
@@ -71,6 +84,7 @@ impl Projector {
         match self {
             Self::Csg(projector) => projector.project_curve(curve, point),
             Self::Facets(projector) => Ok(projector.project_curve(curve, point)),
+            Self::Brep(projector) => projector.project_curve(curve, point),
             Self::Flat => Ok(*point),
         }
     }
@@ -80,6 +94,7 @@ impl Projector {
         match self {
             Self::Csg(projector) => projector.patch_distance(patch, point),
             Self::Facets(projector) => projector.patch_distance(patch, point),
+            Self::Brep(projector) => projector.patch_distance(patch, point),
             Self::Flat => 0.0,
         }
     }
@@ -89,6 +104,7 @@ impl Projector {
         match self {
             Self::Csg(projector) => is_plane(projector.patch_surface(patch)),
             Self::Facets(projector) => projector.is_flat_patch(patch),
+            Self::Brep(projector) => projector.is_flat_patch(patch),
             Self::Flat => true,
         }
     }
@@ -98,6 +114,7 @@ impl Projector {
         match self {
             Self::Csg(projector) => projector.curve_surfaces(curve).into_iter().all(is_plane),
             Self::Facets(projector) => projector.is_straight_curve(curve),
+            Self::Brep(projector) => projector.is_straight_curve(curve),
             Self::Flat => true,
         }
     }
@@ -108,6 +125,7 @@ impl Projector {
         let (kind, content) = match self {
             Self::Csg(projector) => (CSG, bytemuck::cast_slice(&projector.encode()).to_vec()),
             Self::Facets(projector) => (FACETS, projector.encode()),
+            Self::Brep(projector) => (BREP, projector.encode()),
             Self::Flat => (FLAT, Vec::new()),
         };
         [vec![kind], content].concat()
@@ -120,6 +138,7 @@ impl Projector {
                 csg::Projector::decode(&bytemuck::pod_collect_to_vec::<u8, f64>(content)).map(Self::Csg)
             }
             (&FACETS, content) => FacetProjector::decode(content).map(Self::Facets),
+            (&BREP, content) => BrepProjector::decode(content).map(Self::Brep),
             (&FLAT, []) => Some(Self::Flat),
             _ => None,
         }

@@ -21,6 +21,7 @@ mod bodies;
 mod close_curves;
 mod crossing;
 mod error;
+mod exact;
 mod features;
 mod join;
 mod keep;
@@ -45,6 +46,7 @@ pub use crate::ground::projector::FacetProjector;
 pub use bodies::FacetBodies;
 pub use crossing::Crossing;
 pub use error::FacetError;
+pub use exact::of_brep;
 pub use keep::keep;
 pub use model::{FacetBody, FacetCurve, FacetModel, FacetPatch, Facets, Marks, Settings};
 #[cfg(test)]

@@ -83,6 +83,12 @@ const COORDINATE_ROUNDING: f64 = 4.0 * f64::EPSILON;
 
 impl FacetProjector {
     pub(crate) fn new(source: Source) -> Self {
+        Self::with_normals(source, None)
+    }
+
+    /// A projector with unit normals at the corners of all triangles, instead of those of the
+    /// triangles.
+    pub(crate) fn with_normals(source: Source, given: Option<&[[Vector; 3]]>) -> Self {
         let edges = Edges::new(&source.triangles);
         let rounding = normals::rounding(&source.points);
         let (normals, slivers) = normals::trusted(&source.points, &source.triangles, &edges, rounding);
@@ -96,7 +102,12 @@ impl FacetProjector {
         let patch = |members: &Vec<u32>| {
             let of = |all: &[Vector]| -> Vec<Vector> { members.iter().map(|&t| all[t as usize]).collect() };
             let sliver: Vec<bool> = members.iter().map(|&t| slivers[t as usize]).collect();
-            PatchFacets::new(&source, &edges, members, &of(&normals), &sliver, ON_PLANE * tolerance)
+            let mut own =
+                PatchFacets::new(&source, &edges, members, &of(&normals), &sliver, ON_PLANE * tolerance);
+            if let Some(given) = given {
+                own.normals = members.iter().map(|&t| given[t as usize]).collect();
+            }
+            own
         };
         let patches = members.iter().map(patch).collect();
         let polyline = |c: &Vec<u32>| {

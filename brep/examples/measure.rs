@@ -1,0 +1,30 @@
+//! Prints the volumes and areas of the tessellated parts of BREP files.
+
+use brep::{Model, Settings, Tessellation, tessellate};
+
+fn main() {
+    for path in std::env::args().skip(1) {
+        let text = std::fs::read(&path).expect("a file that can be read");
+        let start = std::time::Instant::now();
+        let made = Model::read(&text).and_then(|mut model| {
+            let tessellation = Tessellation::of(&mut model, &Settings::default())?;
+            Ok((model, tessellation))
+        });
+        match made {
+            Err(error) => println!("{path}: {error}"),
+            Ok((model, tessellation)) => {
+                let volumes: Vec<f64> =
+                    (0..model.bodies).map(|b| tessellate::volume(&model, &tessellation, b)).collect();
+                let areas: Vec<f64> =
+                    (0..model.patches.len()).map(|p| tessellate::area(&tessellation, p)).collect();
+                println!(
+                    "{path}: {} patches {} triangles {:.2} s gap {:.1e} volumes {volumes:?} areas {areas:?}",
+                    model.patches.len(),
+                    tessellation.triangles.len(),
+                    start.elapsed().as_secs_f64(),
+                    tessellation.gap
+                );
+            }
+        }
+    }
+}

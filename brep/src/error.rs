@@ -1,0 +1,67 @@
+//! Why a file cannot be read or meshed.
+
+use crate::Point;
+
+/// A BREP file that cannot be read or whose shapes cannot be meshed.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum BrepError {
+    /// The text is not as the format prescribes.
+    #[error("line {line}: {what}")]
+    Syntax {
+        /// The line, from 1.
+        line: usize,
+        /// What is wrong.
+        what: String,
+    },
+    /// A face that cannot be meshed.
+    #[error("face {face}: {what}{}", at(.place))]
+    Face {
+        /// The number of the face in the order of the file, from 1.
+        face: usize,
+        /// What is wrong.
+        what: String,
+        /// A place there.
+        place: Option<Point>,
+    },
+    /// An edge that cannot be meshed.
+    #[error("edge {edge}: {what}{}", at(.place))]
+    Edge {
+        /// The number of the edge in the order of the file, from 1.
+        edge: usize,
+        /// What is wrong.
+        what: String,
+        /// A place there.
+        place: Option<Point>,
+    },
+    /// A solid that cannot be meshed.
+    #[error("solid {solid}: {what}{}", at(.place))]
+    Solid {
+        /// The number of the solid in the order of the file, from 1.
+        solid: usize,
+        /// What is wrong.
+        what: String,
+        /// A place there.
+        place: Option<Point>,
+    },
+    /// The file has no solid.
+    #[error("the file has no solid, only {0}: sew its faces to a solid in the CAD program")]
+    NoSolid(String),
+}
+
+fn at(place: &Option<Point>) -> String {
+    place.map_or(String::new(), |p| format!(" near ({}, {}, {})", p.x, p.y, p.z))
+}
+
+impl BrepError {
+    pub(crate) fn face(face: usize, what: impl Into<String>, place: Option<Point>) -> Self {
+        Self::Face { face: face + 1, what: what.into(), place }
+    }
+
+    pub(crate) fn edge(edge: usize, what: impl Into<String>, place: Option<Point>) -> Self {
+        Self::Edge { edge: edge + 1, what: what.into(), place }
+    }
+
+    pub(crate) fn solid(solid: usize, what: impl Into<String>, place: Option<Point>) -> Self {
+        Self::Solid { solid: solid + 1, what: what.into(), place }
+    }
+}

@@ -1,0 +1,37 @@
+//! Boundary representations of CAD programs: reads the BREP text of OpenCASCADE, evaluates and
+//! projects to its curves and surfaces, and tessellates its faces.
+//!
+//! A [`Model`] has **bodies** (solids), **patches** (faces) that bound them, **curves** (edges)
+//! that bound the patches, and **corners** (vertices) at the ends of curves. A face that two solids
+//! of a compound share is one patch, with a body on each side.
+//!
+//! [`Tessellation::of`] divides each curve once and triangulates each patch in its parameters, so
+//! that the triangles of neighbouring patches fit.
+//!
+//! *Not* here: repair of gaps between faces, and shapes without solids.
+#![forbid(unsafe_code)]
+
+pub mod bspline;
+mod curve;
+mod error;
+mod model;
+mod placement;
+mod project;
+mod read;
+mod surface;
+pub mod tessellate;
+#[cfg(test)]
+mod tests;
+
+pub use curve::Curve;
+pub use error::BrepError;
+pub use model::{Corner, EdgeCurve, Fin, Model, On, Patch};
+pub use placement::Placement;
+pub use project::{CurveFoot, SurfaceFoot, project_to_curve, project_to_surface};
+pub use surface::{Jet, Profile, Surface};
+pub use tessellate::{Settings, Tessellation, Triangle};
+
+/// A point in space.
+pub type Point = nalgebra::Point3<f64>;
+/// A vector in space.
+pub type Vector = nalgebra::Vector3<f64>;

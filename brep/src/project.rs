@@ -1,0 +1,172 @@
+//! Nearest points on curves and surfaces, from a start value.
+
+use crate::curve::Curve;
+use crate::surface::Surface;
+use crate::{Point, Vector};
+
+/// The foot of a projection to a curve.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CurveFoot {
+    /// The parameter.
+    pub parameter: f64,
+    /// The point of that parameter.
+    pub point: Point,
+    /// The unit tangent, or zero where the curve has none.
+    pub tangent: Vector,
+    /// Whether the way to the point is orthogonal to the curve, or the foot is an end.
+    pub is_converged: bool,
+}
+
+/// The foot of a projection to a surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SurfaceFoot {
+    /// The parameters.
+    pub parameters: [f64; 2],
+    /// The point of these parameters.
+    pub point: Point,
+    /// The unit normal along the cross product of the derivatives, or zero at poles.
+    pub normal: Vector,
+    /// Whether the way to the point is orthogonal to the surface.
+    pub is_converged: bool,
+}
+
+/// The most steps: a few suffice from a near start.
+const STEPS: usize = 100;
+/// Halvings of a step that does not decrease the distance.
+const HALVINGS: usize = 30;
+/// The cosine of the angle between the surface and the way to a point beyond which a foot is not
+/// converged; distances below rounding have no direction.
+const ORTHOGONAL: f64 = 1e-6;
+
+/// Rounding errors of feet, relative to the coordinates.
+const ROUNDING: f64 = 1e-13;
+
+/// Whether a way is not longer than another one, up to the rounding of coordinates of this size:
+/// otherwise points almost on the surface would stop short of their feet.
+fn is_nearer(new: &Vector, old: &Vector, scale: f64) -> bool {
+    let rounding = 2.0 * f64::EPSILON * scale;
+    new.norm() <= old.norm() + rounding
+}
+
+/// The point of a curve, within a range of parameters, at which the distance from `point` has a
+/// minimum near the parameter `start`.
+///
+/// Newton's method on the derivative of the squared distance; Gauss-Newton where that is not
+/// convex.
+pub fn project_to_curve(curve: &Curve<3>, range: [f64; 2], point: &Point, start: f64) -> CurveFoot {
+    let clamp = |t: f64| t.clamp(range[0], range[1]);
+    let mut t = clamp(start);
+    let mut jet = curve.jet(t);
+    let scale = point.coords.amax().max(jet[0].amax());
+    for _ in 0..STEPS {
+        let way = jet[0] - point.coords;
+        let slope = way.dot(&jet[1]);
+        let square = jet[1].norm_squared();
+        let convex = square + way.dot(&jet[2]);
+        let step = -slope / if convex > 0.1 * square { convex } else { square };
+        if !step.is_finite() {
+            break;
+        }
+        let mut share = 1.0;
+        let mut next = None;
+        for _ in 0..HALVINGS {
+            let to = clamp(t + share * step);
+            let there = curve.jet(to);
+            if is_nearer(&(there[0] - point.coords), &way, scale) {
+                next = Some((to, there));
+                break;
+            }
+            share *= 0.5;
+        }
+        let Some((to, there)) = next else { break };
+        let moved = (to - t).abs();
+        (t, jet) = (to, there);
+        if moved <= 2.0 * f64::EPSILON * (1.0 + t.abs()) {
+            break;
+        }
+    }
+    let way = jet[0] - point.coords;
+    let tangent = jet[1].try_normalize(0.0).unwrap_or_else(Vector::zeros);
+    let rounding = ROUNDING * scale;
+    let is_end = t == range[0] || t == range[1];
+    let is_converged = is_end || way.dot(&tangent).abs() <= ORTHOGONAL * way.norm() + rounding;
+    CurveFoot { parameter: t, point: Point::from(jet[0]), tangent, is_converged }
+}
+
+/// The point of a surface at which the distance from `point` has a minimum near the parameters
+/// `start`.
+///
+/// Newton's method on the gradient of the squared distance, with a multiple of the first
+/// fundamental form added until the matrix is positive definite. Parameters are not bounded: beyond
+/// their knots, splines continue by their last polynomials.
+pub fn project_to_surface(surface: &Surface, point: &Point, start: [f64; 2]) -> SurfaceFoot {
+    let [mut u, mut v] = start;
+    if let Surface::Plane { origin, axes: [x, y] } = surface {
+        // The axes are orthogonal.
+        let way = point.coords - origin;
+        [u, v] = [x, y].map(|a| way.dot(a) / a.norm_squared());
+        let foot = Point::from(origin + x * u + y * v);
+        let normal = x.cross(y).normalize();
+        return SurfaceFoot { parameters: [u, v], point: foot, normal, is_converged: true };
+    }
+    let mut jet = surface.jet(u, v, 2);
+    let scale = point.coords.amax().max(jet.d[0][0].amax());
+    for _ in 0..STEPS {
+        let d = &jet.d;
+        let way = d[0][0] - point.coords;
+        let gradient = [way.dot(&d[1][0]), way.dot(&d[0][1])];
+        let form = [d[1][0].norm_squared(), d[1][0].dot(&d[0][1]), d[0][1].norm_squared()];
+        let bend = [way.dot(&d[2][0]), way.dot(&d[1][1]), way.dot(&d[0][2])];
+        let Some(step) = newton_step(gradient, form, bend) else { break };
+        let mut share = 1.0;
+        let mut next = None;
+        for _ in 0..HALVINGS {
+            let to = [u + share * step[0], v + share * step[1]];
+            let there = surface.jet(to[0], to[1], 2);
+            if is_nearer(&(there.d[0][0] - point.coords), &way, scale) {
+                next = Some((to, there));
+                break;
+            }
+            share *= 0.5;
+        }
+        let Some((to, there)) = next else { break };
+        let moved = (there.d[0][0] - jet.d[0][0]).norm();
+        ([u, v], jet) = (to, there);
+        if moved <= f64::EPSILON * scale {
+            break;
+        }
+    }
+    let foot = jet.point();
+    let way = foot - point;
+    let normal = jet.normal().try_normalize(0.0).unwrap_or_else(Vector::zeros);
+    let rounding = ROUNDING * scale;
+    let along = way - normal * normal.dot(&way);
+    let is_converged = normal == Vector::zeros() || along.norm() <= ORTHOGONAL * way.norm() + rounding;
+    SurfaceFoot { parameters: [u, v], point: foot, normal, is_converged }
+}
+
+/// The least determinant of the second derivatives of half the squared distance, in units of that
+/// of the first fundamental form.
+const LEAST_CONVEX: f64 = 1e-3;
+
+/// The Newton step of a quadratic model, made convex by more of the first fundamental form.
+fn newton_step(gradient: [f64; 2], form: [f64; 3], bend: [f64; 3]) -> Option<[f64; 2]> {
+    let area = form[0] * form[2] - form[1] * form[1];
+    // At poles one derivative vanishes: the other direction alone is moved, below.
+    let is_pole = form[0].min(form[2]) <= 1e-20 * form[0].max(form[2]);
+    let is_regular = !is_pole && area > 1e-14 * form[0] * form[2];
+    for share in [1.0, 0.5, 0.0] {
+        let [a, b, c] = [0, 1, 2].map(|i| form[i] + share * bend[i]);
+        let determinant = a * c - b * b;
+        if is_regular && a > 0.0 && c > 0.0 && determinant > LEAST_CONVEX * area {
+            let step = [
+                (b * gradient[1] - c * gradient[0]) / determinant,
+                (b * gradient[0] - a * gradient[1]) / determinant,
+            ];
+            return step.iter().all(|s| s.is_finite()).then_some(step);
+        }
+    }
+    let least = 1e-20 * form[0].max(form[2]);
+    let step = [0, 1].map(|i| if form[2 * i] > least { -gradient[i] / form[2 * i] } else { 0.0 });
+    step.iter().all(|s| s.is_finite()).then_some(step)
+}

@@ -1,0 +1,125 @@
+//! The loops of a patch as points in its parameters.
+
+use super::Tessellation;
+use super::face::Tolerances;
+use crate::model::{EdgeCurve, Fin, Model, On};
+use crate::project::project_to_surface;
+use crate::{BrepError, Point, Surface};
+
+/// Points on a side without length.
+const AT_POLE: usize = 24;
+
+/// A loop as parameters and vertices.
+pub(super) type Chain = Vec<([f64; 2], u32)>;
+
+/// A loop side by side. Each side ends before the first point of the next.
+pub(super) type Sides = Vec<Chain>;
+
+/// The points of a loop, each once.
+pub(super) fn chain(
+    model: &Model,
+    number: usize,
+    fins: &[Fin],
+    out: &mut Tessellation,
+    tolerances: &Tolerances,
+) -> Result<Sides, BrepError> {
+    let patch = &model.patches[number];
+    let mut sides: Vec<Chain> = Vec::new();
+    for fin in fins {
+        let mut side: Chain = match fin.on {
+            On::Corner(corner) => at_pole(fin, corner as u32),
+            On::Curve(curve) => on_curve(model, number, fin, curve, out, tolerances)?,
+        };
+        if !fin.is_forward {
+            side.reverse();
+        }
+        sides.push(side);
+    }
+    let mut out_sides = Sides::new();
+    for k in 0..sides.len() {
+        let side = &sides[k];
+        let next = &sides[(k + 1) % sides.len()][0];
+        let (end, vertex) = side[side.len() - 1];
+        out_sides.push(side[..side.len() - 1].to_vec());
+        // Ends that differ in parameters but not in space are joined by a side without length.
+        let middle = [0, 1].map(|i| 0.5 * (end[i] + next.0[i]));
+        let [from, half, to] = [end, middle, next.0].map(|p| patch.surface.point(p));
+        let gap = (half - from).norm().max((to - from).norm());
+        let corner = out.points[vertex as usize];
+        let tolerance = model.corners[vertex as usize].tolerance;
+        let most = (10.0 * tolerance).max(1e-5 * tolerances.diagonal);
+        if gap > most {
+            let what =
+                format!("its edges do not join in the parameters of its surface: the gap is {gap:.3e}");
+            return Err(BrepError::face(number, what, Some(corner)));
+        }
+        let rate = patch.surface.jet(end[0], end[1], 1);
+        let is_pole = [rate.d[1][0], rate.d[0][1]].iter().any(|d| d.norm() < 1e-7 * tolerances.diagonal);
+        if is_pole && (end[0] - next.0[0]).hypot(end[1] - next.0[1]) > 1e-6 {
+            let at = |share: f64| ([0, 1].map(|j| end[j] + share * (next.0[j] - end[j])), vertex);
+            out_sides.push((0..AT_POLE).map(|i| at(i as f64 / AT_POLE as f64)).collect());
+        }
+    }
+    Ok(out_sides)
+}
+
+fn at_pole(fin: &Fin, vertex: u32) -> Chain {
+    let [low, high] = fin.range;
+    let at = |k: usize| low + (high - low) * (k as f64 / AT_POLE as f64);
+    let curve = fin.curve.as_ref().expect("a side without length has parameters");
+    (0..=AT_POLE).map(|k| (curve.point(at(k)).into(), vertex)).collect()
+}
+
+fn on_curve(
+    model: &Model,
+    number: usize,
+    fin: &Fin,
+    curve: usize,
+    out: &mut Tessellation,
+    tolerances: &Tolerances,
+) -> Result<Chain, BrepError> {
+    let surface = &model.patches[number].surface;
+    let edge = &model.curves[curve];
+    let most = (20.0 * edge.tolerance).max(1e-5 * tolerances.diagonal);
+    let line = out.lines[curve].clone();
+    let mut side = Chain::new();
+    for (vertex, t) in line {
+        let on = Point::from(edge.curve.point(t));
+        let mut parameters: [f64; 2] = match &fin.curve {
+            None => project_to_surface(surface, &on, [0.0; 2]).parameters,
+            Some(curve) => curve.point(fin.parameter(t, edge.range)).into(),
+        };
+        let mut gap = (surface.point(parameters) - on).norm();
+        if gap > most {
+            // The two curves may be parametrised differently.
+            let foot = project_to_surface(surface, &on, parameters);
+            (parameters, gap) = (foot.parameters, (foot.point - on).norm());
+        }
+        if gap > most {
+            let what = format!("edge {} is {gap:.3e} away from it", curve + 1);
+            return Err(BrepError::face(number, what, Some(on)));
+        }
+        out.gap = out.gap.max(gap).max((surface.point(parameters) - out.points[vertex as usize]).norm());
+        side.push((parameters, vertex));
+    }
+    if fin.curve.is_some() {
+        let line = &out.lines[curve];
+        let between = |w: &[(u32, f64)]| {
+            let [a, b] = [w[0].1, w[1].1];
+            (1..SAMPLES).map(move |k| a + (b - a) * f64::from(k) / f64::from(SAMPLES))
+        };
+        let gaps = line.windows(2).flat_map(between).map(|t| gap_at(surface, fin, edge, t));
+        out.gap = gaps.fold(out.gap, f64::max);
+    }
+    Ok(side)
+}
+
+/// Steps between the vertices of a curve at which its distance from a patch is measured.
+const SAMPLES: u32 = 6;
+
+/// The distance of a point of a curve from a patch beside it.
+fn gap_at(surface: &Surface, fin: &Fin, edge: &EdgeCurve, t: f64) -> f64 {
+    let on = Point::from(edge.curve.point(t));
+    let start = fin.curve.as_ref().map_or([0.0; 2], |c| c.point(fin.parameter(t, edge.range)).into());
+    (project_to_surface(surface, &on, start).point - on).norm()
+}

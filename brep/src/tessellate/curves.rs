@@ -1,0 +1,118 @@
+//! Division of curves.
+
+use crate::{EdgeCurve, Fin, Model, Point, Surface, Vector};
+
+/// The most vertices on a curve.
+const MOST: usize = 100_000;
+/// A closed curve, or one that bends, has at least this many segments between jumps.
+const FEWEST: usize = 2;
+
+/// A side of a patch with its surface.
+pub(super) type Beside<'a> = (&'a Surface, &'a Fin);
+
+/// The parameters that divide a curve so that each segment is within `chord` of it, and its
+/// tangents and the normals of the patches beside it differ by at most `angle`.
+pub(super) fn divide(
+    edge: &EdgeCurve,
+    beside: &[Beside],
+    (chord, angle): (f64, f64),
+    diagonal: f64,
+) -> Result<Vec<f64>, String> {
+    // Planes have one normal.
+    let beside: Vec<Beside> =
+        beside.iter().copied().filter(|(surface, fin)| !surface.is_plane() && fin.curve.is_some()).collect();
+    let curve = &edge.curve;
+    let [low, high] = edge.range;
+    let is_line = matches!(curve, crate::Curve::Line { .. });
+    if is_line && beside.is_empty() {
+        return Ok(vec![low, high]);
+    }
+    let mut breaks = vec![low];
+    // A range may end beside a knot by rounding.
+    let rounding = 1e-9 * (high - low);
+    for t in curve.breaks(edge.range) {
+        if t - breaks[breaks.len() - 1] > rounding && high - t > rounding {
+            breaks.push(t);
+        }
+    }
+    breaks.push(high);
+    let pieces = if is_line {
+        1
+    } else if edge.ends[0] == edge.ends[1] {
+        4
+    } else {
+        FEWEST
+    };
+    let mut out = vec![low];
+    // Shorter segments are not divided for their angle: curves may have kinks.
+    let shortest = 1e-5 * diagonal;
+    for span in breaks.windows(2) {
+        // Many spans need no more division each.
+        let pieces = if breaks.len() > 8 { 1 } else { pieces };
+        let at = |k: usize| span[0] + (span[1] - span[0]) * (k as f64 / pieces as f64);
+        for k in 0..pieces {
+            let end = if k + 1 == pieces { span[1] } else { at(k + 1) };
+            let mut stack = vec![(at(k), end)];
+            while let Some((a, b)) = stack.pop() {
+                let middle = 0.5 * (a + b);
+                if !(a < middle && middle < b) || is_fine(edge, &beside, [a, b], (chord, angle), shortest) {
+                    out.push(b);
+                } else {
+                    stack.extend([(middle, b), (a, middle)]);
+                }
+                if out.len() + stack.len() > MOST {
+                    return Err(format!("more than {MOST} vertices are needed on it"));
+                }
+            }
+        }
+    }
+    Ok(out)
+}
+
+fn is_fine(
+    edge: &EdgeCurve,
+    beside: &[Beside],
+    [a, b]: [f64; 2],
+    (chord, angle): (f64, f64),
+    shortest: f64,
+) -> bool {
+    let [first, last] = [a, b].map(|t| edge.curve.jet(t));
+    let along = last[0] - first[0];
+    let off = |share: f64| {
+        let way = edge.curve.point(a + share * (b - a)) - first[0];
+        let on = (way.dot(&along) / along.norm_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+        (way - along * on).norm()
+    };
+    let middle = edge.curve.jet(0.5 * (a + b))[1];
+    let turn = first[1].angle(&middle) + middle.angle(&last[1]);
+    let is_short = along.norm() < shortest;
+    let is_straight = is_short || turn <= angle;
+    let is_flat = |beside: &Beside| {
+        let normals = [a, 0.5 * (a + b), b].map(|t| normal(edge, *beside, t));
+        normals.windows(2).map(|n| n[0].angle(&n[1])).sum::<f64>() <= angle
+    };
+    is_straight
+        && (is_short || beside.iter().all(is_flat))
+        && [0.25, 0.5, 0.75].into_iter().all(|share| off(share) <= chord)
+}
+
+/// The cross product of a surface's derivatives at a point of one of its sides.
+fn normal(edge: &EdgeCurve, (surface, fin): Beside, t: f64) -> Vector {
+    let Some(curve) = &fin.curve else { return Vector::zeros() };
+    let [u, v]: [f64; 2] = curve.point(fin.parameter(t, edge.range)).into();
+    surface.jet(u, v, 1).normal()
+}
+
+/// The diagonal of the box around corners and samples of curves; not 0.
+pub(super) fn diagonal(model: &Model) -> f64 {
+    let mut points: Vec<Point> = model.corners.iter().map(|c| c.point).collect();
+    for edge in &model.curves {
+        let [low, high] = edge.range;
+        points.extend((1..8).map(|k| Point::from(edge.curve.point(low + (high - low) * f64::from(k) / 8.0))));
+    }
+    let bound =
+        |worst: f64, pick: fn(f64, f64) -> f64, axis: usize| points.iter().map(|p| p[axis]).fold(worst, pick);
+    let extent = |axis| bound(f64::NEG_INFINITY, f64::max, axis) - bound(f64::INFINITY, f64::min, axis);
+    let squared: f64 = (0..3).map(|axis| extent(axis) * extent(axis)).sum();
+    squared.sqrt().max(f64::MIN_POSITIVE)
+}

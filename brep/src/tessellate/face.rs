@@ -1,0 +1,420 @@
+//! Triangulation of one patch in its parameters.
+
+use super::chain::{Sides, chain};
+use super::frame::{Frame, Node, pole};
+use super::{Tessellation, Triangle};
+use crate::model::{Model, Patch};
+use crate::{BrepError, Point, Vector};
+use spade::handles::FixedVertexHandle;
+use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// The tolerances of a tessellation.
+pub(super) struct Tolerances {
+    /// The largest distance between a surface and its triangles.
+    pub chord: f64,
+    /// The largest angle between normals.
+    pub angle: f64,
+    /// The diagonal of the box of the model.
+    pub diagonal: f64,
+}
+
+/// Why a patch has no triangles.
+pub(super) enum Failure {
+    /// Its loops cross, perhaps because its curves are divided too coarsely.
+    Crossing(BrepError),
+    Final(BrepError),
+}
+
+type Plane = ConstrainedDelaunayTriangulation<Node>;
+
+/// The most triangles of a patch.
+const MOST_TRIANGLES: usize = 400_000;
+/// The most rounds of refinement.
+const MOST_ROUNDS: usize = 200;
+/// Edges shorter than this (fraction of the diagonal) are not divided for their angle: surfaces may
+/// have kinks.
+const SHORTEST: f64 = 3e-4;
+
+/// The least distance of a new point from a side, in lengths of the side.
+const ENCROACHED: f64 = 0.05;
+
+/// Triangulates a patch and appends its vertices and triangles.
+pub(super) fn triangulate(
+    model: &Model,
+    number: usize,
+    out: &mut Tessellation,
+    tolerances: &Tolerances,
+) -> Result<(), Failure> {
+    let patch = &model.patches[number];
+    let mut chains = Vec::new();
+    for fins in &patch.loops {
+        chains.push(chain(model, number, fins, out, tolerances).map_err(Failure::Final)?);
+    }
+    let pole = pole(patch, tolerances.diagonal);
+    let frame = Frame::of(&patch.surface, &chains, pole, tolerances.diagonal);
+    let mut face = Face {
+        patch,
+        number,
+        plane: Plane::new(),
+        frame,
+        sides: BTreeMap::new(),
+        tolerances,
+        vertices: Vec::new(),
+    };
+    let turn = face.frame.turn(&chains);
+    for chain in &chains {
+        face.add_chain(chain, turn, out)?;
+    }
+    face.refine(out)?;
+    face.finish(out)
+}
+
+/// Sides are curved outward by this fraction of their length. Otherwise rounding makes straight
+/// ones concave, and triangles without height remain between their points.
+const BULGE: f64 = 1e-6;
+
+struct Face<'a> {
+    patch: &'a Patch,
+    number: usize,
+    plane: Plane,
+    frame: Frame<'a>,
+    /// How often loops use each constraint, by the indices of its ends.
+    sides: BTreeMap<[usize; 2], usize>,
+    tolerances: &'a Tolerances,
+    /// Points of new vertices.
+    vertices: Vec<Point>,
+}
+
+/// A point that is wanted: the error there, the edge that it divides, its place, and the triangle.
+type Wanted = (f64, [usize; 2], Point2<f64>, usize);
+
+/// The vertex of a node inside the patch: its index in [`Face::vertices`] is added.
+const INNER: u32 = 1 << 31;
+
+fn sorted(a: usize, b: usize) -> [usize; 2] {
+    [a.min(b), a.max(b)]
+}
+
+impl Face<'_> {
+    fn crossing(&self, vertex: u32, out: &Tessellation) -> Failure {
+        let place = out.points.get(vertex as usize).copied();
+        let what = "its loops cross or touch in the parameters of its surface";
+        Failure::Crossing(BrepError::face(self.number, what, place))
+    }
+
+    fn add_chain(&mut self, sides: &Sides, turn: f64, out: &Tessellation) -> Result<(), Failure> {
+        let mut handles: Vec<FixedVertexHandle> = Vec::new();
+        let mut nodes = Vec::new();
+        for (k, side) in sides.iter().enumerate() {
+            let end = self.frame.scaled(sides[(k + 1) % sides.len()][0].0);
+            let start = self.frame.scaled(side[0].0);
+            let (x, y) = (turn * (end.x - start.x), turn * (end.y - start.y));
+            let squared = (x * x + y * y).max(f64::MIN_POSITIVE);
+            for &(parameters, vertex) in side {
+                let p = self.frame.scaled(parameters);
+                let share = turn * ((p.x - start.x) * x + (p.y - start.y) * y) / squared;
+                let out = BULGE * 4.0 * (share * (1.0 - share)).max(0.0);
+                nodes.push(Node { scaled: Point2::new(p.x + out * y, p.y - out * x), parameters, vertex });
+            }
+        }
+        for node in nodes.iter().copied() {
+            let vertex = node.vertex;
+            let count = self.plane.num_vertices();
+            let before = self.plane.locate_vertex(node.scaled).map(|old| old.data().vertex);
+            let handle = self.plane.insert(node).map_err(|_| self.crossing(vertex, out))?;
+            if self.plane.num_vertices() == count && before != Some(vertex) {
+                return Err(self.crossing(vertex, out));
+            }
+            handles.push(handle);
+        }
+        for k in 0..handles.len() {
+            let (a, b) = (handles[k], handles[(k + 1) % handles.len()]);
+            if a == b {
+                continue;
+            }
+            if !self.plane.can_add_constraint(a, b) {
+                return Err(self.crossing(nodes[k].vertex, out));
+            }
+            self.plane.add_constraint(a, b);
+            if self.plane.get_edge_from_neighbors(a, b).is_none_or(|edge| !edge.is_constraint_edge()) {
+                return Err(self.crossing(nodes[k].vertex, out));
+            }
+            *self.sides.entry(sorted(a.index(), b.index())).or_default() += 1;
+        }
+        Ok(())
+    }
+
+    /// Whether each inner face of the triangulation is in the patch: it is if a way from outside
+    /// crosses loops an odd number of times.
+    fn inside(&self) -> Vec<Option<bool>> {
+        let mut inside = vec![None; self.plane.num_all_faces()];
+        let outer = self.plane.outer_face();
+        inside[outer.index()] = Some(false);
+        let mut stack = Vec::new();
+        let cross =
+            |edge: [usize; 2], from: bool| from ^ (self.sides.get(&edge).copied().unwrap_or(0) % 2 == 1);
+        for edge in self.plane.convex_hull() {
+            let key = sorted(edge.from().index(), edge.to().index());
+            for face in [edge.face(), edge.rev().face()] {
+                if let Some(face) = face.as_inner()
+                    && inside[face.index()].is_none()
+                {
+                    inside[face.index()] = Some(cross(key, false));
+                    stack.push(face);
+                }
+            }
+        }
+        while let Some(face) = stack.pop() {
+            let own = inside[face.index()].unwrap_or(false);
+            for edge in face.adjacent_edges() {
+                if let Some(other) = edge.rev().face().as_inner()
+                    && inside[other.index()].is_none()
+                {
+                    let key = sorted(edge.from().index(), edge.to().index());
+                    inside[other.index()] = Some(cross(key, own));
+                    stack.push(other);
+                }
+            }
+        }
+        inside
+    }
+
+    fn point(&self, vertex: u32, out: &Tessellation) -> Point {
+        if vertex >= INNER { self.vertices[(vertex - INNER) as usize] } else { out.points[vertex as usize] }
+    }
+
+    /// The triangles inside the patch, as nodes.
+    fn triangles(&self) -> Vec<[(usize, Node); 3]> {
+        let inside = self.inside();
+        let of = |face: spade::handles::FaceHandle<
+            '_,
+            spade::handles::InnerTag,
+            Node,
+            (),
+            spade::CdtEdge<()>,
+            (),
+        >| { face.vertices().map(|v| (v.index(), *v.data())) };
+        let faces = self.plane.inner_faces();
+        faces.filter(|face| inside[face.index()] == Some(true)).map(of).collect()
+    }
+
+    /// Divides inner edges until the triangles are close to the surface.
+    fn refine(&mut self, out: &Tessellation) -> Result<(), Failure> {
+        // Errors of edges and triangles, which do not change while their ends stay.
+        let mut known: BTreeMap<[usize; 2], f64> = BTreeMap::new();
+        let mut normals: Vec<Option<Vector>> = Vec::new();
+        for _ in 0..MOST_ROUNDS {
+            let triangles = self.triangles();
+            if triangles.is_empty() {
+                return Err(Failure::Final(BrepError::face(self.number, "its loops enclose no area", None)));
+            }
+            if triangles.len() > MOST_TRIANGLES {
+                let what = format!("more than {MOST_TRIANGLES} triangles are needed on it");
+                return Err(Failure::Final(BrepError::face(self.number, what, None)));
+            }
+            let mut wanted: Vec<Wanted> = Vec::new();
+            let tangled = self.tangled(&triangles);
+            for (index, triangle) in triangles.iter().enumerate() {
+                let nowhere = Point2::new(0.0, 0.0);
+                let mut worst = (0.0, [0; 2], nowhere);
+                let mut longest = (0.0, [0; 2], nowhere);
+                for k in 0..3 {
+                    let ((i, a), (j, b)) = (triangle[(k + 1) % 3], triangle[(k + 2) % 3]);
+                    let key = sorted(i, j);
+                    if self.sides.contains_key(&key) {
+                        continue;
+                    }
+                    let [p, q] = [a.scaled, b.scaled];
+                    let middle = Point2::new(0.5 * (p.x + q.x), 0.5 * (p.y + q.y));
+                    let error = match known.get(&key) {
+                        Some(&error) => error,
+                        None => {
+                            let error = self.edge_error((i, &a), (j, &b), middle, &mut normals, out);
+                            known.insert(key, error);
+                            error
+                        }
+                    };
+                    let error = if tangled.contains(&key) { error.max(2.0) } else { error };
+                    let length = a.scaled.distance_2(b.scaled);
+                    if error > worst.0 {
+                        worst = (error, key, middle);
+                    }
+                    if length > longest.0 {
+                        longest = (length, key, middle);
+                    }
+                }
+                if worst.0 <= 1.0 {
+                    let error = self.triangle_error(triangle, out);
+                    if error > 1.0 {
+                        if longest.0 > 0.0 {
+                            worst = (error, longest.1, longest.2);
+                        } else {
+                            let [x, y] = [|n: &Node| n.scaled.x, |n: &Node| n.scaled.y]
+                                .map(|of| triangle.iter().map(|n| of(&n.1)).sum::<f64>() / 3.0);
+                            worst = (error, [usize::MAX, index], Point2::new(x, y));
+                        }
+                    }
+                }
+                if worst.0 > 1.0 {
+                    wanted.push((worst.0, worst.1, worst.2, index));
+                }
+            }
+            if self.insert(wanted, &triangles) == 0 {
+                return Ok(());
+            }
+        }
+        Err(Failure::Final(BrepError::face(
+            self.number,
+            "the refinement of its triangles does not end",
+            None,
+        )))
+    }
+
+    /// Inserts the wanted points, at most one in each triangle, and returns their number.
+    fn insert(&mut self, mut wanted: Vec<Wanted>, triangles: &[[(usize, Node); 3]]) -> usize {
+        let before = self.vertices.len();
+        wanted.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)).then(a.3.cmp(&b.3)));
+        let mut beside: BTreeMap<[usize; 2], [usize; 2]> = BTreeMap::new();
+        for (index, triangle) in triangles.iter().enumerate() {
+            for k in 0..3 {
+                let key = sorted(triangle[k].0, triangle[(k + 1) % 3].0);
+                beside.entry(key).and_modify(|two| two[1] = index).or_insert([index; 2]);
+            }
+        }
+        let mut is_changed = vec![false; triangles.len()];
+        for (_, key, scaled, index) in wanted {
+            let both = beside.get(&key).copied().unwrap_or([index; 2]);
+            if both.iter().any(|&t| is_changed[t]) {
+                continue;
+            }
+            if both.iter().any(|&t| self.encroaches(scaled, &triangles[t])) {
+                continue;
+            }
+            if self.plane.locate_vertex(scaled).is_some() {
+                continue;
+            }
+            both.iter().for_each(|&t| is_changed[t] = true);
+            let vertex = INNER + self.vertices.len() as u32;
+            let parameters = self.frame.parameters(scaled);
+            if self.plane.insert(Node { scaled, parameters, vertex }).is_ok() {
+                self.vertices.push(self.patch.surface.point(parameters));
+            }
+        }
+        self.vertices.len() - before
+    }
+
+    /// Whether a point is so near to a side of the patch that the triangle between them would be
+    /// thin. Sides are not divided, so no number of such points makes the triangles finer there.
+    fn encroaches(&self, point: Point2<f64>, triangle: &[(usize, Node); 3]) -> bool {
+        (0..3).any(|k| {
+            let ((i, a), (j, b)) = (triangle[k], triangle[(k + 1) % 3]);
+            let (x, y) = (b.scaled.x - a.scaled.x, b.scaled.y - a.scaled.y);
+            let across = (point.x - a.scaled.x) * y - (point.y - a.scaled.y) * x;
+            self.sides.contains_key(&sorted(i, j)) && across.abs() < ENCROACHED * (x * x + y * y)
+        })
+    }
+
+    /// The error of an edge, in units of what is allowed.
+    fn edge_error(
+        &self,
+        (i, a): (usize, &Node),
+        (j, b): (usize, &Node),
+        middle: Point2<f64>,
+        normals: &mut Vec<Option<Vector>>,
+        out: &Tessellation,
+    ) -> f64 {
+        if self.patch.surface.is_plane() {
+            return 0.0;
+        }
+        let [p, q] = [a, b].map(|n| self.point(n.vertex, out));
+        let on = self.patch.surface.point(self.frame.parameters(middle));
+        let along = q - p;
+        let share = ((on - p).dot(&along) / along.norm_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+        let off = (on - p - along * share).norm() / self.tolerances.chord;
+        if off > 1.0 || along.norm() < SHORTEST * self.tolerances.diagonal {
+            return off;
+        }
+        normals.resize(normals.len().max(i.max(j) + 1), None);
+        let [m, n] = [(i, a), (j, b)].map(|(i, node)| {
+            *normals[i].get_or_insert_with(|| {
+                let [u, v] = node.parameters;
+                self.patch.surface.jet(u, v, 1).normal().try_normalize(0.0).unwrap_or_else(Vector::zeros)
+            })
+        });
+        let is_pole = m == Vector::zeros() || n == Vector::zeros();
+        let turn = if is_pole { 0.0 } else { m.angle(&n) };
+        off.max(turn / self.tolerances.angle)
+    }
+
+    /// The error of a triangle whose edges are fine.
+    fn triangle_error(&self, triangle: &[(usize, Node); 3], out: &Tessellation) -> f64 {
+        if self.patch.surface.is_plane() {
+            return 0.0;
+        }
+        let corners = self.frame.corners(triangle);
+        let mean = |c: usize| corners.iter().map(|p| p[c]).sum::<f64>() / 3.0;
+        let jet = self.patch.surface.jet(mean(0), mean(1), 1);
+        let [a, b, c] = [0, 1, 2].map(|k| self.point(triangle[k].1.vertex, out));
+        let area = (b - a).cross(&(c - a));
+        let longest = (b - a).norm().max((c - b).norm()).max((a - c).norm());
+        let Some(normal) = area.try_normalize(0.0) else { return 0.0 };
+        let off = normal.dot(&(jet.point() - a)).abs() / self.tolerances.chord;
+        // The normals of slivers are arbitrary.
+        let is_sliver = area.norm() < 1e-2 * longest * self.tolerances.chord.min(longest);
+        let own = jet.normal().try_normalize(0.0).unwrap_or(normal);
+        let is_folded = !is_sliver && longest > SHORTEST * self.tolerances.diagonal && normal.dot(&own) < 0.3;
+        off.max(if is_folded { 2.0 } else { 0.0 })
+    }
+
+    /// Inner edges whose ends are those of other edges too: different in parameters, equal in
+    /// space.
+    fn tangled(&self, triangles: &[[(usize, Node); 3]]) -> BTreeSet<[usize; 2]> {
+        // Only edges between vertices on curves or at poles can be.
+        let mut uses: BTreeMap<[u32; 2], (usize, BTreeSet<[usize; 2]>)> = BTreeMap::new();
+        for triangle in triangles {
+            let v = [0, 1, 2].map(|k| triangle[k].1.vertex);
+            let is_point = v[0] == v[1] || v[1] == v[2] || v[2] == v[0];
+            for k in 0..3 {
+                let (a, b) = (triangle[k], triangle[(k + 1) % 3]);
+                let on_curve = |vertex: u32| vertex < INNER;
+                if !(on_curve(a.1.vertex) || on_curve(b.1.vertex)) {
+                    continue;
+                }
+                let key = [a.1.vertex.min(b.1.vertex), a.1.vertex.max(b.1.vertex)];
+                let entry = uses.entry(key).or_default();
+                entry.0 += usize::from(!is_point);
+                entry.1.insert(sorted(a.0, b.0));
+            }
+        }
+        let mut tangled = BTreeSet::new();
+        for ([v, w], (count, edges)) in uses {
+            let on_loops: usize = edges.iter().filter_map(|edge| self.sides.get(edge)).sum();
+            let inner = edges.iter().filter(|edge| !self.sides.contains_key(*edge));
+            // One triangle on each side of an inner edge, and one inside of a loop.
+            let expected = if on_loops > 0 { on_loops } else { 2 };
+            let is_wrong = v == w || count > expected || (on_loops > 0 && inner.clone().next().is_some());
+            if is_wrong {
+                tangled.extend(inner.copied());
+            }
+        }
+        tangled
+    }
+
+    /// Appends the vertices and triangles.
+    fn finish(self, out: &mut Tessellation) -> Result<(), Failure> {
+        let first = out.points.len() as u32;
+        let triangles = self.triangles();
+        let id = |vertex: u32| if vertex >= INNER { first + vertex - INNER } else { vertex };
+        out.points.extend(&self.vertices);
+        for triangle in triangles {
+            let vertices = triangle.map(|(_, node)| id(node.vertex));
+            let [a, b, c] = vertices;
+            if a != b && b != c && c != a {
+                let parameters = self.frame.corners(&triangle);
+                out.triangles.push(Triangle { vertices, patch: self.number as u32, parameters });
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,138 @@
+//! The plane in which a patch is triangulated.
+
+use super::chain::Sides;
+use crate::Surface;
+use crate::model::{On, Patch};
+use spade::{HasPosition, Point2};
+
+/// A vertex of the triangulation in parameters.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Node {
+    /// The parameters in units of length.
+    pub scaled: Point2<f64>,
+    pub parameters: [f64; 2],
+    /// The vertex of the tessellation.
+    pub vertex: u32,
+}
+
+impl HasPosition for Node {
+    type Scalar = f64;
+
+    fn position(&self) -> Point2<f64> {
+        self.scaled
+    }
+}
+
+/// Parameters in units of length.
+///
+/// At a **pole** the derivative in one direction vanishes, and a side of the patch is one point.
+/// Lengths in that direction are then taken at each value of the other parameter, as in the
+/// sinusoidal projection of a globe: the side becomes one point here too.
+pub(super) struct Frame<'a> {
+    surface: &'a Surface,
+    origin: [f64; 2],
+    scale: [f64; 2],
+    /// The direction whose derivative vanishes at a pole.
+    pole: Option<usize>,
+    /// Parameters in that direction at which lengths are taken.
+    samples: [f64; 4],
+    /// Shorter derivatives are those of a pole.
+    least: f64,
+}
+
+impl<'a> Frame<'a> {
+    /// Scales parameters by the mean length of the derivatives.
+    pub fn of(surface: &'a Surface, chains: &[Sides], pole: Option<usize>, diagonal: f64) -> Self {
+        let all = || chains.iter().flatten().flatten().map(|node| node.0);
+        let bound = |i: usize, start: f64, pick: fn(f64, f64) -> f64| all().map(|p| p[i]).fold(start, pick);
+        let low = [0, 1].map(|i| bound(i, f64::INFINITY, f64::min));
+        let high = [0, 1].map(|i| bound(i, f64::NEG_INFINITY, f64::max));
+        let at = |i: usize, share: f64| low[i] + (high[i] - low[i]) * share;
+        let mut sums = [0.0; 2];
+        for k in 0..25 {
+            let [u, v] = [at(0, 0.1 + 0.2 * f64::from(k % 5)), at(1, 0.1 + 0.2 * f64::from(k / 5))];
+            let jet = surface.jet(u, v, 1);
+            sums[0] += jet.d[1][0].norm();
+            sums[1] += jet.d[0][1].norm();
+        }
+        let scale = sums.map(|sum| if sum > 0.0 { sum / 25.0 } else { 1.0 });
+        let mut origin = low;
+        let mut samples = [0.0; 4];
+        if let Some(i) = pole {
+            origin[i] = at(i, 0.5);
+            samples = [0.125, 0.375, 0.625, 0.875].map(|share| at(i, share));
+        }
+        Self { surface, origin, scale, pole, samples, least: AT_REST * diagonal }
+    }
+
+    /// The length of the derivative in the direction of a pole, at a value of the other parameter.
+    fn rate(&self, i: usize, other: f64) -> f64 {
+        let length = |&s: &f64| {
+            let [u, v] = if i == 0 { [s, other] } else { [other, s] };
+            let d = self.surface.jet(u, v, 1).d;
+            if i == 0 { d[1][0].norm() } else { d[0][1].norm() }
+        };
+        let mean = self.samples.iter().map(length).sum::<f64>() / 4.0;
+        if mean < self.least { 0.0 } else { mean }
+    }
+
+    pub fn scaled(&self, p: [f64; 2]) -> Point2<f64> {
+        let mut scale = self.scale;
+        if let Some(i) = self.pole {
+            scale[i] = self.rate(i, p[1 - i]);
+        }
+        // Differences below the range of the predicates are zero.
+        let [x, y] = [0, 1].map(|i| (p[i] - self.origin[i]) * scale[i]);
+        let flushed = |x: f64| if x.abs() < 1e-30 { 0.0 } else { x };
+        Point2::new(flushed(x), flushed(y))
+    }
+
+    /// The inverse of [`scaled`](Self::scaled).
+    pub fn parameters(&self, p: Point2<f64>) -> [f64; 2] {
+        let p = [p.x, p.y];
+        let mut out = [0, 1].map(|i| self.origin[i] + p[i] / self.scale[i]);
+        if let Some(i) = self.pole {
+            let rate = self.rate(i, out[1 - i]);
+            out[i] = if rate > 0.0 { self.origin[i] + p[i] / rate } else { self.origin[i] };
+        }
+        out
+    }
+
+    /// The parameters of the corners of a triangle. A corner at a pole has any parameter in the
+    /// direction of the pole: that between the other two suits the triangle.
+    pub fn corners(&self, triangle: &[(usize, Node); 3]) -> [[f64; 2]; 3] {
+        let mut out = triangle.map(|(_, node)| node.parameters);
+        if let Some(i) = self.pole {
+            for k in 0..3 {
+                if self.rate(i, out[k][1 - i]) == 0.0 {
+                    out[k][i] = 0.5 * (out[(k + 1) % 3][i] + out[(k + 2) % 3][i]);
+                }
+            }
+        }
+        out
+    }
+}
+
+/// Derivatives shorter than this (fraction of the diagonal of the model) are those of a pole.
+const AT_REST: f64 = 1e-7;
+
+/// The direction whose derivative vanishes at a side without length.
+pub(super) fn pole(patch: &Patch, diagonal: f64) -> Option<usize> {
+    let fins = patch.loops.iter().flatten().filter(|fin| matches!(fin.on, On::Corner(_)));
+    fins.filter_map(|fin| fin.curve.as_ref().map(|curve| curve.point(fin.range[0]))).find_map(|p| {
+        let d = patch.surface.jet(p[0], p[1], 1).d;
+        [d[1][0], d[0][1]].iter().position(|d| d.norm() < AT_REST * diagonal)
+    })
+}
+
+impl Frame<'_> {
+    /// 1 if the patch is to the left of its loops, else −1.
+    pub fn turn(&self, chains: &[Sides]) -> f64 {
+        let double_area = |sides: &Sides| -> f64 {
+            let points: Vec<Point2<f64>> = sides.iter().flatten().map(|node| self.scaled(node.0)).collect();
+            let next = points.iter().cycle().skip(1);
+            points.iter().zip(next).map(|(p, q)| p.x * q.y - p.y * q.x).sum()
+        };
+        chains.iter().map(double_area).sum::<f64>().signum()
+    }
+}

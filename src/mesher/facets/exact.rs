@@ -1,0 +1,187 @@
+//! Facets with given patches, curves and corners: those of a boundary representation.
+
+use super::{FacetBody, FacetCurve, FacetModel, FacetPatch};
+use crate::Vector;
+use crate::ground::kernel::tree;
+use crate::ground::mesh::{BoundaryTriangle, VertexId};
+use crate::ground::projector::BrepProjector;
+use crate::ground::projector::facets::{FacetProjector, Source};
+use brep::{Curve, Model, On, Tessellation};
+use csg::{BodyId, CornerId, PatchId};
+use std::collections::BTreeSet;
+
+/// The normals on both sides of a seam differ by at most this angle (radians), else it is an edge.
+const SMOOTH: f64 = 0.02;
+
+/// Curves of a patch meet in a corner unless their tangents differ by at most this angle (radians).
+const STRAIGHT: f64 = 0.05;
+
+/// Relative rounding of coordinates.
+const ROUNDING: f64 = 1e-15;
+
+/// Takes the tessellation of a model as facets, and its faces and edges as patches and curves.
+///
+/// Seams of smooth surfaces are no curves, and a closed edge has a corner only where it has one in
+/// its shape: both come from the parametrisation alone.
+pub fn of_brep(model: &Model, tessellation: &Tessellation) -> (FacetModel, BrepProjector) {
+    let sides: Vec<[Option<usize>; 2]> = model.patches.iter().map(|patch| patch.bodies).collect();
+    // Normals point out of a body rather than out of none, and of two bodies of the lower one.
+    let is_reversed: Vec<bool> = sides
+        .iter()
+        .map(|[behind, front]| behind.map_or(usize::MAX, |b| b) > front.map_or(usize::MAX, |b| b))
+        .collect();
+    let curves = curves_in_use(model, tessellation);
+    let exact = exact_projector(model, tessellation, &is_reversed, &curves);
+    let normals = corner_normals(model, tessellation, &is_reversed);
+    let oriented = |t: &brep::Triangle| {
+        let [a, b, c] = t.vertices;
+        if is_reversed[t.patch as usize] { [b, a, c] } else { [a, b, c] }
+    };
+    let triangles: Vec<[u32; 3]> = tessellation.triangles.iter().map(oriented).collect();
+    let patch_of: Vec<u32> = tessellation.triangles.iter().map(|t| t.patch).collect();
+
+    let corners = corners(model, &curves, &triangles, &normals);
+    let facet_curves: Vec<FacetCurve> =
+        curves.iter().map(|&c| facet_curve(model, tessellation, c, &corners)).collect();
+    let ends: BTreeSet<CornerId> = facet_curves.iter().filter_map(|c| c.ends).flatten().collect();
+    let is_tip = |i: &usize| !ends.contains(&CornerId::new(*i));
+    let tips: Vec<u32> = (0..corners.len()).filter(is_tip).map(|i| corners[i]).collect();
+    let patches = sides
+        .iter()
+        .zip(&is_reversed)
+        .map(|(&[behind, front], &is_reversed)| {
+            let [inside, outside] = if is_reversed { [front, behind] } else { [behind, front] };
+            let body = |b: Option<usize>| b.map(BodyId::new);
+            FacetPatch { inside: body(inside), outside: body(outside), labels: vec![(0, 0)] }
+        })
+        .collect();
+    let source = Source {
+        points: tessellation.points.clone(),
+        triangles: triangles.clone(),
+        patch_of: patch_of.clone(),
+        patches: model.patches.len() as u32,
+        curves: facet_curves.iter().map(|c| c.vertices.clone()).collect(),
+        tips,
+    };
+    let bounds = tree::bounds(&tessellation.points);
+    let facets = FacetModel {
+        points: tessellation.points.clone(),
+        triangles: triangles
+            .iter()
+            .zip(&patch_of)
+            .map(|(v, &p)| BoundaryTriangle { vertices: v.map(VertexId), patch: PatchId(p) })
+            .collect(),
+        corners,
+        curves: facet_curves,
+        patches,
+        bodies: vec![FacetBody { file: 0, number: None }; model.bodies],
+        rounding: ROUNDING * bounds.min.coords.amax().max(bounds.max.coords.amax()),
+        bounds,
+        projector: FacetProjector::with_normals(source, Some(&normals)),
+    };
+    (facets, exact)
+}
+
+/// A projector to the faces, and to the edges that are curves.
+fn exact_projector(
+    model: &Model,
+    tessellation: &Tessellation,
+    is_reversed: &[bool],
+    curves: &[usize],
+) -> BrepProjector {
+    let some = Model { curves: curves.iter().map(|&c| model.curves[c].clone()).collect(), ..model.clone() };
+    let lines = curves.iter().map(|&c| tessellation.lines[c].clone()).collect();
+    BrepProjector::new(&some, &Tessellation { lines, ..tessellation.clone() }, is_reversed)
+}
+
+/// The unit normals at the corners of all triangles, outward; those of the triangles at poles.
+/// Their order is that of the oriented triangles.
+fn corner_normals(model: &Model, tessellation: &Tessellation, is_reversed: &[bool]) -> Vec<[Vector; 3]> {
+    let of = |t: &brep::Triangle| {
+        let sign = if is_reversed[t.patch as usize] { -1.0 } else { 1.0 };
+        let surface = &model.patches[t.patch as usize].surface;
+        let [a, b, c] = t.vertices.map(|v| tessellation.points[v as usize]);
+        let flat = (b - a).cross(&(c - a)).try_normalize(0.0).unwrap_or_else(Vector::z);
+        let [p, q, r] = t.parameters.map(|[u, v]| {
+            let normal = surface.jet(u, v, 1).normal().try_normalize(0.0);
+            // At poles rounding decides.
+            normal.filter(|n| n.dot(&flat) > 0.5).unwrap_or(flat) * sign
+        });
+        if is_reversed[t.patch as usize] { [q, p, r] } else { [p, q, r] }
+    };
+    tessellation.triangles.iter().map(of).collect()
+}
+
+/// The edges that are curves: all but smooth seams.
+fn curves_in_use(model: &Model, tessellation: &Tessellation) -> Vec<usize> {
+    let mut uses: Vec<Vec<(usize, &brep::Fin)>> = vec![Vec::new(); model.curves.len()];
+    for (p, patch) in model.patches.iter().enumerate() {
+        for fin in patch.loops.iter().flatten() {
+            if let On::Curve(curve) = fin.on {
+                uses[curve].push((p, fin));
+            }
+        }
+    }
+    let is_seam = |c: usize| match uses[c][..] {
+        [(p, one), (q, other)] if p == q => {
+            let normal = |fin: &brep::Fin, t: f64| {
+                let [u, v] = fin.curve.as_ref()?.point(fin.parameter(t, model.curves[c].range)).into();
+                model.patches[p].surface.jet(u, v, 1).normal().try_normalize(0.0)
+            };
+            let is_smooth = |t: f64| match (normal(one, t), normal(other, t)) {
+                (Some(m), Some(n)) => m.angle(&n) < SMOOTH,
+                _ => true,
+            };
+            tessellation.lines[c].iter().all(|&(_, t)| is_smooth(t))
+        }
+        _ => false,
+    };
+    (0..model.curves.len()).filter(|&c| !is_seam(c)).collect()
+}
+
+/// The vertices that are corners, ascending.
+fn corners(model: &Model, curves: &[usize], triangles: &[[u32; 3]], normals: &[[Vector; 3]]) -> Vec<u32> {
+    let mut ends: Vec<Vec<usize>> = vec![Vec::new(); model.corners.len()];
+    for &c in curves {
+        model.curves[c].ends.iter().for_each(|&end| ends[end].push(c));
+    }
+    let is_round = |c: usize| {
+        let edge = &model.curves[c];
+        let [first, last] = edge.range.map(|t| edge.curve.jet(t)[1]);
+        matches!(edge.curve, Curve::Ellipse { .. }) || first.angle(&last) < STRAIGHT
+    };
+    let mut around: Vec<Vec<Vector>> = vec![Vec::new(); model.corners.len()];
+    for (t, n) in triangles.iter().zip(normals) {
+        for (v, normal) in t.iter().zip(n).filter(|(v, _)| (**v as usize) < model.corners.len()) {
+            around[*v as usize].push(*normal);
+        }
+    }
+    // The tip of a cone is a corner; the pole of a sphere is not.
+    let is_tip = |corner: usize| {
+        let all = &around[corner];
+        let mean = all.iter().sum::<Vector>().try_normalize(0.0);
+        mean.is_none_or(|mean| all.iter().any(|n| n.angle(&mean) > TIP))
+    };
+    let is_corner = |corner: &usize| match ends[*corner][..] {
+        [] => !around[*corner].is_empty() && is_tip(*corner),
+        [a, b] if a == b => !is_round(a) || has_degenerate_side(model, *corner),
+        _ => true,
+    };
+    (0..model.corners.len()).filter(is_corner).map(|corner| corner as u32).collect()
+}
+
+/// Normals of triangles at the pole of a sphere differ by less from their mean (radians); those at
+/// the tip of a cone by half of its outer angle.
+const TIP: f64 = 0.35;
+
+fn has_degenerate_side(model: &Model, corner: usize) -> bool {
+    let fins = model.patches.iter().flat_map(|patch| patch.loops.iter().flatten());
+    fins.into_iter().any(|fin| fin.on == On::Corner(corner))
+}
+
+fn facet_curve(model: &Model, tessellation: &Tessellation, curve: usize, corners: &[u32]) -> FacetCurve {
+    let vertices = tessellation.lines[curve].iter().map(|&(v, _)| v).collect();
+    let corner = |end: usize| corners.binary_search(&(end as u32)).ok().map(CornerId::new);
+    let [first, last] = model.curves[curve].ends.map(corner);
+    FacetCurve { ends: first.zip(last).map(|(a, b)| [a, b]), vertices }
+}

@@ -1,0 +1,85 @@
+//! Boundary representations of CAD programs.
+
+use crate::folders::own;
+use std::path::PathBuf;
+use tetmill::comm::thread;
+use tetmill::mesh::Order;
+use tetmill::{Geometry, Mesher, Method};
+
+/// A file of the repository.
+fn file(name: &str) -> PathBuf {
+    own("brep").with_extension("").join(name).with_extension("brep")
+}
+
+/// The volume of the tets of a mesh.
+fn volume(geometry: &Geometry, levels: u32) -> f64 {
+    let mesh = Mesher::new().levels(levels).generate(geometry).unwrap().arrays();
+    let of = |tet: &[u32; 4]| {
+        let [a, b, c, d] = tet.map(|v| tetmill::Point::from(mesh.points[v as usize]));
+        (b - a).cross(&(c - a)).dot(&(d - a)) / 6.0
+    };
+    mesh.tets.iter().map(of).sum()
+}
+
+#[test]
+fn volumes_converge_to_those_of_the_cad_program() {
+    let text = std::fs::read(file("measures").with_extension("json")).unwrap();
+    let measures: serde_json::Value = serde_json::from_slice(&text).unwrap();
+    for (name, measured) in measures.as_object().unwrap() {
+        let exact: f64 = measured["volumes"].as_array().unwrap().iter().map(|v| v.as_f64().unwrap()).sum();
+        let geometry = Geometry::from_file(file(name)).unwrap_or_else(|error| panic!("{name}: {error}"));
+        let [coarse, fine] = [0, 2].map(|levels| (volume(&geometry, levels) - exact).abs() / exact);
+        // Two levels divide the error of chords by 16.
+        assert!(coarse < 0.2 && fine < (coarse / 8.0).max(1e-6), "{name}: {coarse:e} {fine:e}");
+    }
+}
+
+#[test]
+fn all_ranks_project_to_the_same_faces() {
+    for name in ["fragments", "cone", "loft"] {
+        let geometry = Geometry::from_file(file(name)).unwrap();
+        let alone = Mesher::new().levels(2).generate(&geometry).unwrap().checksum;
+        let together = thread::try_run(3, |comm| {
+            Mesher::new().levels(2).generate_on(comm, Some(&geometry)).map(|mesh| mesh.checksum)
+        });
+        assert_eq!(together.unwrap(), vec![alone; 3], "{name}");
+    }
+}
+
+#[test]
+fn second_order_and_the_method_surface_work_on_exact_faces() {
+    let geometry = Geometry::from_file(file("thick_cylinder")).unwrap();
+    Mesher::new().order(Order::Second).levels(1).generate(&geometry).unwrap();
+    let mesher = Mesher::new().method(Method::Surface).levels(1);
+    thread::try_run(2, |comm| mesher.generate_on(comm, Some(&geometry)).map(drop)).unwrap();
+}
+
+#[test]
+fn faces_and_solids_have_numbers_and_kinds() {
+    let geometry = Geometry::from_file(file("box_with_hole")).unwrap();
+    let inspection = geometry.inspect().unwrap();
+    let kinds: Vec<&str> = inspection.patches.iter().map(|patch| patch.surface).collect();
+    assert_eq!(kinds.iter().filter(|kind| **kind == "plane").count(), 6);
+    assert_eq!(kinds.iter().filter(|kind| **kind == "cylinder").count(), 1);
+    assert!(inspection.patches.iter().map(|patch| patch.boundary).eq(1..=7));
+    // The circles of the hole are closed: their corners and the seam come from the parameters.
+    assert_eq!((inspection.corners.len(), inspection.curves.len()), (8, 14));
+}
+
+#[test]
+fn what_cannot_be_read_or_cut_is_refused_with_the_reason() {
+    let geometry = Geometry::from_file(file("cone")).unwrap();
+    let cut = Mesher::new().method(Method::Decompose(Default::default()));
+    let refused = thread::try_run(2, |comm| cut.generate_on(comm, Some(&geometry)).map(drop)).unwrap_err();
+    assert!(refused.to_string().contains("cut"), "{refused}");
+    let folder = tempfile::tempdir().unwrap();
+    let step = folder.path().join("part.step");
+    std::fs::write(&step, "ISO-10303-21;").unwrap();
+    let error = Geometry::from_file(&step).unwrap_err().to_string();
+    assert!(error.contains("gmsh") && error.contains(".brep"), "{error}");
+    let damaged = folder.path().join("part.brep");
+    let text = std::fs::read_to_string(file("cone")).unwrap();
+    std::fs::write(&damaged, text.replace("TShapes", "TShape")).unwrap();
+    let error = Geometry::from_file(&damaged).unwrap_err().to_string();
+    assert!(error.contains("part.brep: line ") && error.contains("`TShapes` is expected"), "{error}");
+}
