@@ -112,7 +112,12 @@ fn generate_on(comm: &dyn Communicator, options: &Generate, start: Instant) -> R
     });
     let report = agree(comm, done)?;
     if let Some((file, mut shown)) = page {
-        shown.about.report = report.map(|report| serde_json::to_value(report).expect("plain data"));
+        let beside = view::beside_report(comm, &made, &shown)?;
+        shown.about.report = report.map(|report| {
+            let mut report = serde_json::to_value(report).expect("plain data");
+            report["page"] = beside;
+            report
+        });
         let message = shown.for_page(comm)?;
         agree(comm, if first { view::write_page(&message, file) } else { Ok(()) })?;
     }

@@ -176,6 +176,11 @@ class Viewer(Browser):
         text = page.inner_text("#report")
         self.assertIn(f"{json.loads(report.read_text())['mesh']['tets']:,}", text)
         self.assertIn("partition", text)
+        self.assertEqual(page.evaluate("[...document.querySelectorAll('#report img')].map((img) => [img.complete, img.naturalWidth])"), [[True, 720]] * 2)
+        counted = page.evaluate("[...document.querySelectorAll('#report svg')].map((svg) => [...svg.querySelectorAll('rect title')].reduce((sum, bar) => sum + Number(bar.textContent.split(': ')[1].replace(/\\D/g, '')), 0))")
+        self.assertEqual(counted, [json.loads(report.read_text())["mesh"]["tets"]] * 2, "all tets are in the histograms")
+        self.assertIn("peak memory", text)
+        self.assertIn("shared vertices", text)
 
     def test_a_touch_screen_and_a_small_window_work(self):
         page = self.open(self.file.as_uri(), size=(390, 800))

@@ -1,6 +1,7 @@
 //! `tetmill view`, and the views of a run.
 
 mod query;
+mod report;
 mod serve;
 mod shown;
 
@@ -11,6 +12,7 @@ use super::{
 use crate::failure::{Failure, agree};
 use crate::options::{InputOptions, View};
 use crate::terminal::Terminal;
+pub use report::beside_report;
 pub use serve::serve;
 pub use shown::{Shown, Tets};
 use std::path::{Path, PathBuf};
