@@ -57,6 +57,10 @@ class Served(Browser):
         total = page.evaluate("tetmillApp.mesh.totals.tets")
         self.assertTrue(total ** (2 / 3) < near["tets"] < 5 * total ** (2 / 3), (near, total))
         self.assertNotEqual(self.drawn(page)["hash"], before["hash"])
+        # Nothing more is asked for as long as nothing changes.
+        asked = lambda: sum("/mesh/cut/" in url for url in self.asked)
+        page.wait_for_timeout(500)
+        self.assertEqual(asked(), 1)
         # A click on the cut finds a tet of the mesh itself, with the id that the mesh has.
         box = page.locator("#canvas").bounding_box()
         page.mouse.click(box["x"] + box["width"] / 2 + 1, box["y"] + box["height"] / 2 + 1)
