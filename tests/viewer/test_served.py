@@ -12,7 +12,7 @@ import urllib.error
 import urllib.request
 from pathlib import Path
 
-from browser import Browser, until
+from browser import Browser, run, until
 
 # Set by a cut: the plane, and what the browser has of the tets near it.
 NEAR = """() => { const { cut, mesh, state } = tetmillApp, near = cut.mesh, plane = planeOf(mesh, state.cut);
@@ -73,6 +73,19 @@ class Served(Browser):
         self.assertEqual(page.evaluate(NEAR)["off"], 0)
         page.click("#cut-fine")
         until(page, "!tetmillApp.waiting && tetmillApp.drawn.length === 1")
+
+    def test_a_large_mesh_from_files_is_hollow_and_its_cuts_are_not(self):
+        folder = self.folder / "large"
+        run("generate", self.geo, "-n", 2, "--pieces", 10, "-f", "vtu", "-q", "-o", folder)
+        _, address = self.serve("view", folder / "cube.pvtu", "-q")
+        page = self.open_served(address)
+        self.assertTrue(page.evaluate("tetmillApp.mesh.hollow"))
+        page.click("#cut-x")
+        until(page, "tetmillApp.cut && !tetmillApp.waiting && tetmillApp.drawn.length === 2")
+        near = page.evaluate(NEAR)
+        self.assertEqual((near["off"], page.evaluate("tetmillApp.cut.mesh.parts")), (0, 2))
+        total = page.evaluate("tetmillApp.mesh.totals.tets")
+        self.assertTrue(total ** (2 / 3) < near["tets"] < 5 * total ** (2 / 3), (near, total))
 
     def test_ghosts_touch_their_part(self):
         _, address = self.serve("generate", self.geo, "-n", 3, "-f", "none", "-q", "--view")

@@ -80,7 +80,7 @@ function buildPanel(app) {
   const shared = mesh.holders.reduce((sum, h) => sum + (h > 1), 0);
   panel.replaceChildren(
     element("h1", {}, mesh.title), ...lines.map((line) => element("p", { className: "facts" }, line)), ...notes.map((note) => element("p", { className: "note", id: "note" }, note)),
-    ...(levels.length > 1 ? [choice("level", "Level", String(app.level), levels.map(([pieces, hollow], k) => [String(k), `${pieces === 1 ? "coarse mesh" : `coarse edges in ${pieces}`}${hollow ? ", surface only" : ""}`]), (k) => { [state.level] = levels[k]; app.load(Number(k)).catch(failed); })] : []),
+    ...(levels.length > 1 ? [choice("level", "Level", String(app.level), levels.map(([pieces, hollow], k) => [String(k), `${pieces === 1 ? "coarse mesh" : `edges in ${pieces}`}${hollow ? ", surface" : ""}`]), (k) => { [state.level] = levels[k]; app.load(Number(k)).catch(failed); })] : []),
     element("input", { id: "search", type: "text", placeholder: "Find t12, v34, or a boundary name", "aria-label": "Find", onkeydown: (event) => event.key === "Enter" && app.find(event.target.value) }),
     section("Shown", true,
       choice("color", "Colour by", state.color, colors, (key) => { state.color = key; if (key in QUALITY) state.measure = key; app.rebuild(); }),

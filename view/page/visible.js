@@ -115,6 +115,16 @@ function trianglesOf(places, clip) {
   return found;
 }
 
+/** Where the corners of a face are: -1 if all are behind a plane, 1 if none is, otherwise 0. */
+function sideOf(mesh, f, { normal, offset }) {
+  let sum = 0;
+  for (const corner of FACES[f & 3]) {
+    const v = 3 * mesh.tets[(f & ~3) + corner];
+    sum += mesh.points[v] * normal[0] + mesh.points[v + 1] * normal[1] + mesh.points[v + 2] * normal[2] > offset ? 1 : -1;
+  }
+  return sum === 3 ? 1 : sum === -3 ? -1 : 0;
+}
+
 /** Whether a face without visible tets on both sides is to be drawn. */
 function isVisible(state, patch, other, volume) {
   if (patch >= 0) return state.boundary && !state.patchesOff.has(patch);
@@ -138,12 +148,21 @@ function facesOf(mesh, state, shown, clip, layer) {
  * `clip` is a plane: then faces on the surface are cut off there, and there are none inside.
  */
 function visibleFaces(mesh, state, shown, { clip = null, layer = false } = {}) {
-  let faces = facesOf(mesh, state, shown, clip, layer), pieces = null;
-  // Most meshes are drawn without this list, which takes most of the time.
-  if (clip || mesh.nodes.length) {
-    const all = faces;
-    [faces, pieces] = [[], []];
-    for (const f of all) for (const piece of trianglesOf(placesOf(mesh, f), clip)) { faces.push(f); pieces.push(piece); }
+  // Most faces are whole and flat: they have no list of pieces, which would take most of the time.
+  const faces = [], pieces = [];
+  for (const f of facesOf(mesh, state, shown, clip, layer)) {
+    const side = clip ? sideOf(mesh, f, clip) : -1;
+    if (side > 0) continue;
+    const places = side === 0 || mesh.nodes.length ? placesOf(mesh, f) : null;
+    if (!places || (side < 0 && places.length === 3)) {
+      faces.push(f);
+      pieces.push(null);
+      continue;
+    }
+    for (const piece of trianglesOf(places, side < 0 ? null : clip)) {
+      faces.push(f);
+      pieces.push(piece);
+    }
   }
   const buffer = new ArrayBuffer(60 * faces.length), numbers = new Float32Array(buffer), bytes = new Uint8Array(buffer);
   const moves = mesh.partCenters.map((_, part) => exploded(mesh, state, part));
@@ -151,7 +170,7 @@ function visibleFaces(mesh, state, shown, { clip = null, layer = false } = {}) {
     const f = faces[at], t = f >> 2, color = faceColor(mesh, state, t, mesh.facePatches[f]), move = moves[mesh.tetPart[t]];
     for (let k = 0; k < 3; k++) {
       const to = 5 * (3 * at + k), byte = 4 * (to + 3);
-      if (pieces) {
+      if (pieces[at]) {
         const { weights, place } = pieces[at][k];
         for (let i = 0; i < 3; i++) { numbers[to + i] = place[i] + move[i]; bytes[byte + 4 + i] = Math.round(255 * weights[i]); }
       } else {
