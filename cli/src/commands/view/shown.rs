@@ -6,7 +6,7 @@ use crate::report::counted;
 use serde_json::json;
 use tetmill::comm::Communicator;
 use tetmill::files::view::{About, Fill, Region, ViewPart, gather, message, part};
-use tetmill::mesh::{By, Counts, MeshStream, WithHalo, halo};
+use tetmill::mesh::{By, Counts, MeshStream, Order, WithHalo, halo};
 use tetmill::run::Levels;
 
 /// Maximum number of tets in a page: with 90 bytes each, below 20 MB.
@@ -24,7 +24,7 @@ const MOST_HOLLOW: u64 = 3 * SERVED;
 /// Maximum number of boundary triangles of a level of which only the surface is shown.
 const MOST_FACES: u64 = 600_000;
 
-/// Maximum number of tets of a cut.
+/// Maximum number of tets of a cut, of first order.
 const IN_CUT: u64 = 400_000;
 
 /// This rank's part of a mesh that is shown.
@@ -114,20 +114,26 @@ impl Shown<'_> {
 
     /// **Collective.** The tets that meet a plane.
     fn cut(&self, comm: &dyn Communicator, pieces: u32, region: Region) -> Result<Vec<u8>, Failure> {
+        let order = match &self.tets {
+            Tets::Levels(levels) => levels.order(),
+            Tets::Stored(streams) => streams.first().map_or(Order::First, |stream| stream.order()),
+        };
+        // Ten-node tets have more bytes, and their faces are drawn in pieces.
+        let most = IN_CUT / u64::from(order.degree()).pow(2);
         let too_many =
-            || Failure::input(format!("the cut has more than {}: zoom in", counted(IN_CUT, "tet", "tets")));
+            || Failure::input(format!("the cut has more than {}: zoom in", counted(most, "tet", "tets")));
         match &self.tets {
             Tets::Levels(levels) => {
-                let cut = levels.cut(comm, pieces, region, IN_CUT)?.ok_or_else(too_many)?;
+                let cut = levels.cut(comm, pieces, region, most)?.ok_or_else(too_many)?;
                 let pieces = Some([levels.pieces(), cut.pieces]);
                 Ok(self.message(comm, &cut.parts, About { pieces, ..self.about.clone() }))
             }
             Tets::Stored(streams) => {
-                let fill = Fill::Near { region, most: IN_CUT };
+                let fill = Fill::Near { region, most };
                 let own: Vec<ViewPart> = streams.iter().map(|stream| part(*stream, fill)).collect();
                 let [found] =
                     comm.all_reduce_sum_u64([own.iter().map(|part| part.tets.len() as u64).sum()])?;
-                if found > IN_CUT {
+                if found > most {
                     return Err(too_many());
                 }
                 Ok(self.message(comm, &gather(comm, own)?, self.about.clone()))
