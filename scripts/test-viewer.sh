@@ -10,4 +10,6 @@ if ! "$python" -c "import playwright" 2>/dev/null || ! { command -v chromium || 
 fi
 # With the features of scripts/test.sh, so that nothing is compiled twice.
 cargo build --quiet --workspace --features mpi --bin tetmill
-TETMILL="$(cd "${CARGO_TARGET_DIR:-target}" && pwd)/debug/tetmill" "$python" -m unittest "${@:-tests/viewer/test_viewer.py}"
+[ $# -gt 0 ] || set -- discover -s tests/viewer
+export PYTHONPATH=tests/viewer PYTHONDONTWRITEBYTECODE=1
+TETMILL="$(cd "${CARGO_TARGET_DIR:-target}" && pwd)/debug/tetmill" "$python" -m unittest "$@"

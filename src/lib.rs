@@ -188,8 +188,8 @@ pub mod run {
     pub use crate::pipeline::result::StraightEdge;
     pub use crate::pipeline::target::Outcome;
     pub use crate::pipeline::{
-        CoarseReport, CoarseResult, CoarseSettings, CutCusp, CutSettings, Disk, Entities, FlatPlace,
-        GenerateSettings, Level, Refused, SharpPlace, SharpPlaces, ThinRegions, Wanted, generate,
+        CoarseReport, CoarseResult, CoarseSettings, Cut, CutCusp, CutSettings, Disk, Entities, FlatPlace,
+        GenerateSettings, Level, Levels, Refused, SharpPlace, SharpPlaces, ThinRegions, Wanted, generate,
     };
 }
 

@@ -96,13 +96,10 @@ fn generate_on(comm: &dyn Communicator, options: &Generate, start: Instant) -> R
         None => {}
     }
     let title = view::title_of(&options.input);
-    let page_level =
-        options.report_html.as_ref().map(|_| view::of_generated(comm, &made, &title, view::IN_FILE));
-    let page_level = page_level.transpose()?;
-    let served = options.view.then(|| view::of_generated(comm, &made, &title, view::SERVED)).transpose()?;
+    let page = options.report_html.as_ref().map(|file| (file, view::shown(&made, &title)));
     let balanced = balance(comm, &made.part)?;
     let took = processes(comm)?;
-    let done = geometry.map_or(Ok(()), |geometry| {
+    let done = geometry.map_or(Ok(None), |geometry| {
         let mut report = Report::new(&geometry, &name_of(&options.input), &made, took, comm.size(), balanced);
         report.halo = halo;
         terminal.finish();
@@ -111,16 +108,20 @@ fn generate_on(comm: &dyn Communicator, options: &Generate, start: Instant) -> R
         report.add_written(written);
         let (file, quiet) = (options.run.report.as_deref(), options.run.quiet);
         show_report(&report, file, &outputs, quiet, wanted_count(options))?;
-        match (&options.report_html, page_level) {
-            (Some(file), Some(views)) => view::write_page(views, Some(&report), file),
-            _ => Ok(()),
-        }
+        Ok(Some(report))
     });
-    agree(comm, done)?;
-    // The levels that are served do not need the mesh.
-    drop(made);
-    let done = served.filter(|_| first).map_or(Ok(()), |views| view::serve(views, options.port));
-    agree(comm, done)
+    let report = agree(comm, done)?;
+    if let Some((file, mut shown)) = page {
+        let beside = view::beside_report(comm, &made, &shown)?;
+        shown.about.report = report.map(|report| {
+            let mut report = serde_json::to_value(report).expect("plain data");
+            report["page"] = beside;
+            report
+        });
+        let message = shown.for_page(comm)?;
+        agree(comm, if first { view::write_page(&message, file) } else { Ok(()) })?;
+    }
+    if options.view { view::serve_generated(comm, made, &title, options.port) } else { Ok(()) }
 }
 
 /// The progress of a run on one rank, on the first with the peak memory of its process.

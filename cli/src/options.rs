@@ -239,11 +239,11 @@ pub struct Generate {
     /// Draw only the tets behind a plane, given by a point and a normal
     #[arg(long, value_name = "X,Y,Z,NX,NY,NZ", value_parser = cut, allow_hyphen_values = true, requires = "picture")]
     pub cut: Option<Cut>,
-    /// Write a page with the report and the mesh to look at; it works offline
+    /// Write a page with the report, pictures, and the mesh to look at; it works offline
     #[arg(long, value_name = "FILE.html")]
     pub report_html: Option<PathBuf>,
-    /// Show the mesh in the browser when it is written, until Ctrl-C; levels with more than a
-    /// million tets are shown coarser
+    /// Show the mesh in the browser when it is written, until Ctrl-C; more than a million tets are
+    /// shown coarser, with the finest ones at a cut
     #[arg(long)]
     pub view: bool,
     /// Port of the viewer, for a tunnel from another machine; no browser is started [default: any

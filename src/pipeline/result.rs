@@ -166,23 +166,6 @@ impl Generated {
         }
     }
 
-    /// *Local.* This rank's part with other subdivisions of coarse edges, for example a coarser one
-    /// to be drawn. `None` if the parts were meshed separately, or the elements are of second
-    /// order.
-    ///
-    /// # Errors
-    /// If there is not enough memory.
-    pub fn with_pieces(&self, pieces: u32) -> Result<Option<RefinedMesh>, Error> {
-        let (Part::Refined(part), Some(Refinement { projector, settings })) = (&self.part, &self.refinement)
-        else {
-            return Ok(None);
-        };
-        if part.order() == Order::Second {
-            return Ok(None);
-        }
-        Ok(Some(refine::refine(part.coarse().clone(), projector, pieces, settings)?))
-    }
-
     /// *Local.* This rank's part of all refinement levels, the last being the mesh itself: coarse
     /// edges are split into m, 2m, 4m, … subdivisions, m odd. `None` if the parts were meshed
     /// separately, or the elements are of second order.

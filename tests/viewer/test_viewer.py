@@ -1,114 +1,12 @@
-"""The viewer in headless Chromium with software WebGL: run by scripts/test-viewer.sh.
+"""Pages of the viewer in headless Chromium: run by scripts/test-viewer.sh."""
 
-Needs Playwright and Chromium. TETMILL is the program to be tested.
-"""
-
-import base64
 import json
-import os
-import re
-import shutil
-import signal
-import socket
-import struct
-import subprocess
-import tempfile
-import time
 import unittest
-import urllib.request
-from pathlib import Path
 
-from playwright.sync_api import sync_playwright
-
-ROOT = Path(__file__).resolve().parents[2]
-TETMILL = os.environ["TETMILL"]
-# SwiftShader draws on the processor: the same picture on every machine.
-ARGUMENTS = ["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-sandbox"]
-
-CUBE = """algebraic3d
-solid cube = orthobrick (0, 0, 0; 1, 1, 1) -bcname=outer -maxh=0.3;
-solid ball = sphere (0.5, 0.5, 0.5; 0.25) -bcname=inner;
-solid core = ball -maxh=0.3;
-solid rest = cube and not ball;
-tlo core;
-tlo rest;
-"""
-HOSTILE = "</script><script>window.hacked=1</script><img src=x onerror=window.hacked=1>"
+from browser import HOSTILE, Browser, message_of, run, until
 
 
-def run(*arguments):
-    return subprocess.run([TETMILL, *map(str, arguments)], check=True, capture_output=True, text=True, cwd=ROOT)
-
-
-def until(page, condition):
-    """Waits for a condition in a page. Playwright's own waiting needs `eval`, which the page forbids."""
-    deadline = time.monotonic() + 20
-    while not page.evaluate(f"Boolean({condition})"):
-        if time.monotonic() > deadline:
-            raise TimeoutError(condition)
-        page.wait_for_timeout(20)
-
-
-def message_of(page_text):
-    """The head of the message in a page."""
-    text = re.search(r'id="data">([^<]*)</script>', page_text)[1]
-    data = base64.b64decode(text)
-    (length,) = struct.unpack_from("<I", data)
-    return json.loads(data[4 : 4 + length])
-
-
-class Viewer(unittest.TestCase):
-    @classmethod
-    def setUpClass(cls):
-        cls.folder = Path(tempfile.mkdtemp())
-        cls.geo = cls.folder / "cube.geo"
-        cls.geo.write_text(CUBE)
-        cls.file = cls.folder / "cube.html"
-        run("view", cls.geo, "-n", 3, "-q", "-o", cls.file)
-        cls.driver = sync_playwright().start()
-        chromium = shutil.which("chromium") or shutil.which("chromium-browser")
-        cls.browser = cls.driver.chromium.launch(executable_path=chromium, args=ARGUMENTS)
-
-    @classmethod
-    def tearDownClass(cls):
-        cls.browser.close()
-        cls.driver.stop()
-        shutil.rmtree(cls.folder)
-
-    def open(self, address, offline=False, size=(1000, 700)):
-        """A page with its mesh drawn; any message on the console is a failure at the end of the test."""
-        context = self.browser.new_context(offline=offline, viewport={"width": size[0], "height": size[1]}, color_scheme="light")
-        self.addCleanup(context.close)
-        page = context.new_page()
-        said = []
-        page.on("console", lambda line: said.append(line.text))
-        page.on("pageerror", lambda error: said.append(str(error)))
-        page.on("request", lambda request: self.asked.append(request.url))
-        self.asked = []
-        self.addCleanup(lambda: self.assertEqual(said, []))
-        page.goto(address)
-        until(page, "window.tetmillApp && tetmillApp.mesh && !tetmillApp.waiting")
-        return page
-
-    def drawn(self, page):
-        """A fingerprint of the canvas, and how many of its pixels are drawn."""
-        until(page, "!tetmillApp.waiting")
-        return page.evaluate(
-            """() => { const { gl, canvas } = tetmillApp.drawing, n = canvas.width * canvas.height;
-            const pixels = new Uint8Array(4 * n); let drawn = 0, hash = 0;
-            gl.readPixels(0, 0, canvas.width, canvas.height, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
-            for (let k = 0; k < pixels.length; k += 4) { if (pixels[k + 3]) drawn++;
-              hash = (Math.imul(hash, 31) + pixels[k] + 3 * pixels[k + 1] + 7 * pixels[k + 2] + 11 * pixels[k + 3]) | 0; }
-            return { drawn, hash }; }"""
-        )
-
-    def differs(self, page, act):
-        before = self.drawn(page)
-        act()
-        after = self.drawn(page)
-        self.assertNotEqual(before["hash"], after["hash"])
-        return before["drawn"], after["drawn"]
-
+class Viewer(Browser):
     def test_a_page_works_without_a_network_and_asks_for_nothing(self):
         page = self.open(self.file.as_uri(), offline=True)
         drawn = self.drawn(page)["drawn"]
@@ -272,12 +170,17 @@ class Viewer(unittest.TestCase):
 
     def test_a_report_page_has_the_numbers_of_the_report(self):
         file, report = self.folder / "report.html", self.folder / "r.json"
-        run("generate", self.geo, "--levels", 1, "-f", "none", "-q", "--report-html", file, "--report", report)
+        run("generate", self.geo, "-n", 2, "--levels", 1, "-f", "none", "-q", "--report-html", file, "--report", report)
         page = self.open(file.as_uri())
         page.keyboard.press("r")
         text = page.inner_text("#report")
         self.assertIn(f"{json.loads(report.read_text())['mesh']['tets']:,}", text)
         self.assertIn("partition", text)
+        self.assertEqual(page.evaluate("[...document.querySelectorAll('#report img')].map((img) => [img.complete, img.naturalWidth])"), [[True, 720]] * 2)
+        counted = page.evaluate("[...document.querySelectorAll('#report svg')].map((svg) => [...svg.querySelectorAll('rect title')].reduce((sum, bar) => sum + Number(bar.textContent.split(': ')[1].replace(/\\D/g, '')), 0))")
+        self.assertEqual(counted, [json.loads(report.read_text())["mesh"]["tets"]] * 2, "all tets are in the histograms")
+        self.assertIn("peak memory", text)
+        self.assertIn("shared vertices", text)
 
     def test_a_touch_screen_and_a_small_window_work(self):
         page = self.open(self.file.as_uri(), size=(390, 800))
@@ -302,60 +205,28 @@ class Viewer(unittest.TestCase):
             page = self.open(file.as_uri())
             self.assertGreater(self.drawn(page)["drawn"], 50_000)
 
-    def serve(self, *arguments):
-        server = subprocess.Popen([TETMILL, *map(str, arguments)], stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True, cwd=ROOT)
-        self.addCleanup(server.stderr.close)
-        self.addCleanup(server.wait)
-        self.addCleanup(server.kill)
-        for line in server.stderr:
-            if found := re.search(r"http://\S+", line):
-                return server, found[0]
-        self.fail("no address")
+    def test_the_pieces_of_a_pvtu_are_parts(self):
+        folder, file = self.folder / "vtu", self.folder / "pvtu.html"
+        run("generate", self.geo, "-n", 3, "-f", "vtu", "--halo", "vertices", "-q", "-o", folder)
+        run("view", folder / "cube.pvtu", "-q", "-o", file)
+        self.assertEqual(message_of(file.read_text())["tets"], message_of(self.file.read_text())["tets"])
 
-    def test_a_served_mesh_has_levels_and_ends_with_ctrl_c(self):
-        server, address = self.serve("generate", self.geo, "-n", 2, "--levels", 2, "-f", "none", "-q", "--view")
-        page = self.open(address)
-        fine = page.evaluate("tetmillApp.mesh.tetCount")
-        self.assertTrue(all(url.startswith(address) or url.startswith("data:") for url in self.asked), self.asked)
-        page.select_option("#level", "2")
-        until(page, "tetmillApp.level === 2 && !tetmillApp.waiting")
-        self.assertEqual(page.evaluate("tetmillApp.mesh.tetCount") * 64, fine)
-        self.assertIn("coarser level", page.inner_text("#note"))
-        server.send_signal(signal.SIGINT)
-        self.assertEqual(server.wait(10), 0)
-
-    def test_requests_without_token_or_with_other_hosts_get_an_error_only(self):
-        _, address = self.serve("view", self.geo, "-q")
-        token, port = re.search(r":(\d+)/([0-9a-f]{32})/", address).group(2), int(re.search(r":(\d+)/", address)[1])
-
-        def ask(raw):
-            with socket.create_connection(("127.0.0.1", port)) as stream:
-                stream.sendall(raw)
-                stream.shutdown(socket.SHUT_WR)
-                answer = b""
-                try:
-                    while chunk := stream.recv(65536):
-                        answer += chunk
-                except ConnectionResetError:
-                    pass
-                return answer
-
-        def get(path, host="127.0.0.1"):
-            return ask(f"GET {path} HTTP/1.1\r\nHost: {host}\r\n\r\n".encode())
-
-        self.assertIn(b"200 OK", get(f"/{token}/"))
-        refused = [get("/"), get("/mesh/0"), get(f"/{'0' * 32}/"), get(f"/{token}/", "evil.example"), get(f"/{token}/../../etc/passwd")]
-        refused += [get(f"/{token}/mesh/9"), get(f"/{token}/mesh/-1"), get(f"/{token}/mesh/0?" + "x" * 100), ask(b"\0" * 64 + b"\r\n\r\n"), ask(b"GET / HTTP/1.1\r\n")]
-        for answer in refused:
-            self.assertRegex(answer.split(b"\r\n")[0], rb"^HTTP/1.1 (400|403|404) ")
-            self.assertLess(len(answer.split(b"\r\n\r\n")[1]), 40)
-        self.assertNotIn(b"200", ask(b"GET /" + b"x" * 20000).split(b"\r\n")[0])
-        # Not on other addresses of this machine.
-        with self.assertRaises(OSError):
-            socket.create_connection((socket.gethostbyname(socket.gethostname()) if socket.gethostbyname(socket.gethostname()) != "127.0.0.1" else "127.0.0.2", port), 2).close()
-        with urllib.request.urlopen(address) as answer:
-            self.assertEqual(answer.headers["X-Frame-Options"], "DENY")
-
+    def test_edges_of_second_order_are_curved(self):
+        ball, mesh, file = self.folder / "ball.geo", self.folder / "ball.msh", self.folder / "ball.html"
+        ball.write_text("algebraic3d\nsolid s = sphere (0, 0, 0; 1) -maxh=1.0;\ntlo s;\n")
+        run("mesh", ball, "--order", 2, "-q", "-o", mesh)
+        run("view", mesh, "-q", "-o", file)
+        page = self.open(file.as_uri())
+        # All drawn corners are on the sphere; those of flat triangles would not be, at most of a
+        # quadratic patch.
+        off = page.evaluate(
+            """() => { const { mesh, state } = tetmillApp, { faces, buffer } = visibleFaces(mesh, state, shownTets(mesh, state, null));
+            const numbers = new Float32Array(buffer), c = mesh.center; let most = 0;
+            for (let k = 0; k < 3 * faces.length; k++) most = Math.max(most, Math.abs(Math.hypot(numbers[5 * k] + c[0], numbers[5 * k + 1] + c[1], numbers[5 * k + 2] + c[2]) - 1));
+            return { most, pieces: faces.length / new Set(faces).size, straight: Math.max(...[...new Set(faces)].map((f) => 1 - norm(add(scaled(FACES[f & 3].map((k) => pointOf(mesh, mesh.tets[4 * (f >> 2) + k])).reduce(add), 1 / 3), c)))) }; }"""
+        )
+        self.assertEqual(off["pieces"], 16)
+        self.assertLess(off["most"], 0.12 * off["straight"], off)
 
 if __name__ == "__main__":
     unittest.main()

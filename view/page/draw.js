@@ -9,11 +9,10 @@ vec4 placed(vec3 p, float nearer) {
 }`;
 
 const FACE_VERTEX = COMMON + `
-in vec3 position; in vec4 color; out vec3 place; out vec3 tint; out vec3 weight; flat out uint face;
+in vec3 position; in vec4 color; in vec4 corner; out vec3 place; out vec3 tint; out vec3 weight; flat out uint face;
 void main() {
-  int k = gl_VertexID % 3;
   face = uint(gl_VertexID / 3);
-  weight = vec3(k == 0, k == 1, k == 2);
+  weight = corner.xyz;
   place = turn * (position - focus);
   tint = color.rgb;
   gl_Position = placed(position, 0.0);
@@ -46,9 +45,10 @@ void main() {
 
 const NUMBER_FRAGMENT = `#version 300 es
 precision highp float; precision highp int;
+uniform uint before;
 in vec3 place; in vec3 tint; in vec3 weight; flat in uint face; out vec4 result;
 void main() {
-  uint n = face + 1u;
+  uint n = before + face + 1u;
   result = vec4(n & 255u, (n >> 8) & 255u, (n >> 16) & 255u, (n >> 24) & 255u) / 255.0;
 }`;
 
@@ -84,13 +84,14 @@ function makeDrawing(canvas) {
     face: program(gl, FACE_VERTEX, FACE_FRAGMENT), number: program(gl, FACE_VERTEX, NUMBER_FRAGMENT),
     line: program(gl, LINE_VERTEX, LINE_FRAGMENT), point: program(gl, POINT_VERTEX, POINT_FRAGMENT),
   };
-  const faces = layer(gl, [["position", 3, gl.FLOAT, 0], ["color", 4, gl.UNSIGNED_BYTE, 12]], 16, 0);
+  // Corners have the weights of the corners of their face, from which the grid is drawn.
+  const faces = () => layer(gl, [["position", 3, gl.FLOAT, 0], ["color", 4, gl.UNSIGNED_BYTE, 12], ["corner", 4, gl.UNSIGNED_BYTE, 16]], 20, 0);
   const lines = () => layer(gl, [["from", 3, gl.FLOAT, 0], ["to", 3, gl.FLOAT, 12]], 24, 1);
   const points = layer(gl, [["position", 3, gl.FLOAT, 0], ["size", 1, gl.FLOAT, 12], ["color", 4, gl.UNSIGNED_BYTE, 16]], 20, 0);
-  return { gl, canvas, programs, faces, curves: lines(), marks: lines(), points, marked: layer(gl, [["position", 3, gl.FLOAT, 0], ["size", 1, gl.FLOAT, 12], ["color", 4, gl.UNSIGNED_BYTE, 16]], 20, 0), target: null };
+  return { gl, canvas, programs, faces: faces(), near: faces(), curves: lines(), marks: lines(), points, marked: layer(gl, [["position", 3, gl.FLOAT, 0], ["size", 1, gl.FLOAT, 12], ["color", 4, gl.UNSIGNED_BYTE, 16]], 20, 0), target: null };
 }
 
-const NAMES = ["position", "color", "from", "to", "size"];
+const NAMES = ["position", "color", "from", "to", "size", "corner"];
 
 function program(gl, vertex, fragment) {
   const made = gl.createProgram();
@@ -133,6 +134,17 @@ function fill(drawing, name, bytes) {
   to.count = bytes.byteLength / to.stride;
 }
 
+/** The bytes of several buffers in one. */
+function joined(buffers) {
+  const all = new Uint8Array(buffers.reduce((sum, { byteLength }) => sum + byteLength, 0));
+  let at = 0;
+  for (const buffer of buffers) {
+    all.set(new Uint8Array(buffer), at);
+    at += buffer.byteLength;
+  }
+  return all;
+}
+
 /** Pixels of the canvas per pixel of the page. */
 const ratioOf = () => Math.min(window.devicePixelRatio || 1, 2);
 
@@ -152,16 +164,25 @@ function setView(drawing, { made, at }, view) {
   gl.uniform1f(at.depth, 1 / view.reach);
 }
 
+/** Draws the faces of the mesh, and those of the layers in front of equal depths. */
 function drawFaces(drawing, name, mode, view, ink) {
-  const { gl } = drawing, used = drawing.programs[name];
+  const { gl, faces, near } = drawing, used = drawing.programs[name];
   setView(drawing, used, view);
   if (name === "face") {
     gl.uniform1i(used.at.mode, mode);
     gl.uniform1f(used.at.alpha, 0.22);
     gl.uniform3fv(used.at.ink, ink);
   }
-  gl.bindVertexArray(drawing.faces.array);
-  gl.drawArrays(gl.TRIANGLES, 0, drawing.faces.count);
+  let before = 0;
+  for (const layer of [faces, near]) {
+    if (name === "number") gl.uniform1ui(used.at.before, before);
+    if (layer === faces && near.count) gl.enable(gl.POLYGON_OFFSET_FILL);
+    gl.polygonOffset(1, 2);
+    gl.bindVertexArray(layer.array);
+    gl.drawArrays(gl.TRIANGLES, 0, layer.count);
+    gl.disable(gl.POLYGON_OFFSET_FILL);
+    before += layer.count / 3;
+  }
 }
 
 function drawLines(drawing, name, view, color, wide, nearer) {
@@ -212,7 +233,7 @@ function draw(drawing, view, style, dark) {
   drawPoints(drawing, "marked", view);
 }
 
-/** The position in `faces` of the face under a pixel of the canvas, or -1. */
+/** The number of the triangle, in the order of drawing, under a pixel of the canvas, or -1. */
 function faceAt(drawing, view, x, y) {
   const { gl, canvas } = drawing;
   const [w, h] = [canvas.width, canvas.height];

@@ -5,13 +5,22 @@ const byId = (id) => document.getElementById(id);
 /** All that the parts of the page share. `tetmillApp` is for tests and the browser's console. */
 const app = {
   canvas: byId("canvas"), overlay: byId("overlay"), panel: byId("panel"), legend: byId("legend"), info: byId("info"),
-  mesh: null, state: null, drawing: null, faces: [], levels: [], level: 0, measuring: false, measured: [], selected: null,
+  mesh: null, state: null, drawing: null, drawn: [], index: null, level: 0, cut: null, ghosts: null, cutNote: "", measuring: false, measured: [], selected: null,
 
   view() {
     const { state, mesh } = this;
     return { turn: state.turn, focus: state.focus, zoom: state.zoom, reach: (2.2 + 4 * state.explode) * mesh.radius + norm(state.focus) };
   },
-  placeOf(v) { return add(pointOf(this.mesh, v), exploded(this.mesh, this.state, this.mesh.vertexPart[v])); },
+  placeOf(v, mesh = this.mesh) { return add(pointOf(mesh, v), exploded(mesh, this.state, mesh.vertexPart[v])); },
+  /** The mesh and the face of a triangle, in the order of drawing. */
+  triangle(at) {
+    for (const { mesh, faces } of this.drawn) {
+      if (at < faces.length) return { mesh, face: faces[at] };
+      at -= faces.length;
+    }
+    return null;
+  },
+  get faces() { return this.drawn[0].faces; },
   toScreen(p) {
     const q = turned(this.state.turn, sub(p, this.state.focus)), half = this.canvas.clientHeight / 2;
     return [this.canvas.clientWidth / 2 + q[0] / this.state.zoom * half, half - q[1] / this.state.zoom * half];
@@ -36,16 +45,22 @@ const app = {
     document.documentElement.dataset.theme = state.dark ? "dark" : "light";
     if (this.changed) {
       this.changed = false;
-      const shown = visibleFaces(mesh, state, shownTets(mesh, state));
-      this.faces = shown.faces;
+      const plane = state.cut.on ? planeOf(mesh, state.cut) : null, finer = isCurrent(this);
+      const visible = (mesh, cutAt, options) => ({ mesh, ...visibleFaces(mesh, state, shownTets(mesh, state, cutAt), options) });
+      this.drawn = [visible(mesh, finer ? null : plane, { clip: finer ? plane : null })];
+      if (finer) this.drawn.push(visible(this.cut.mesh, null, { layer: true }));
+      if (this.ghosts) this.drawn.push(visible(this.ghosts, plane, { layer: true }));
+      const [shown, ...layers] = this.drawn;
       fill(drawing, "faces", shown.buffer);
+      fill(drawing, "near", joined(layers.map(({ buffer }) => buffer)));
       fill(drawing, "points", visiblePoints(mesh, state, shown.faces).buffer);
-      fill(drawing, "curves", visibleCurves(mesh, state).buffer);
+      fill(drawing, "curves", visibleCurves(mesh, state, finer ? plane : null).buffer);
       buildLegend(this);
     }
     this.mark();
     draw(drawing, this.view(), state.style, state.dark);
     drawOverlay(this);
+    askForCut(this);
     clearTimeout(this.saving);
     this.saving = setTimeout(() => {
       this.saved = `#${writeState(state)}`;
@@ -55,11 +70,12 @@ const app = {
   /** Marks what is selected and measured, in front of everything. */
   mark() {
     const { selected, measured } = this;
-    const pairs = [...(selected ? selected.edges : []), ...(measured.length === 2 ? [measured] : [])];
-    fill(this.drawing, "marks", new Float32Array(pairs.flat().flatMap((v) => this.placeOf(v))).buffer);
-    const vertices = [...(selected ? selected.vertices : []), ...measured];
-    const buffer = new ArrayBuffer(20 * vertices.length), numbers = new Float32Array(buffer), colors = new Uint8Array(buffer);
-    vertices.forEach((v, k) => { numbers.set([...this.placeOf(v), 13], 5 * k); colors.set([220, 26, 90, 255], 20 * k + 16); });
+    const placed = (list) => list.map((v) => this.placeOf(v, selected.mesh)), ends = measured.map(({ v, mesh }) => this.placeOf(v, mesh));
+    const lines = [...(selected ? placed(selected.edges.flat()) : []), ...(ends.length === 2 ? ends : [])];
+    fill(this.drawing, "marks", new Float32Array(lines.flat()).buffer);
+    const points = [...(selected ? placed(selected.vertices) : []), ...ends];
+    const buffer = new ArrayBuffer(20 * points.length), numbers = new Float32Array(buffer), colors = new Uint8Array(buffer);
+    points.forEach((p, k) => { numbers.set([...p, 13], 5 * k); colors.set([220, 26, 90, 255], 20 * k + 16); });
     fill(this.drawing, "marked", buffer);
   },
   select(about, look) {
@@ -67,7 +83,7 @@ const app = {
     showInfo(this, about);
     const ends = about ? [...about.vertices, ...about.edges.flat()] : [];
     if (look && ends.length) {
-      const places = ends.map((v) => this.placeOf(v));
+      const places = ends.map((v) => this.placeOf(v, about.mesh));
       this.state.focus = scaled(places.reduce(add), 1 / places.length);
       const size = Math.max(...places.map((p) => norm(sub(p, this.state.focus))));
       this.state.zoom = Math.min(this.state.zoom, size > 0 ? 9 * size : 0.25 * this.mesh.radius);
@@ -104,14 +120,13 @@ const app = {
   },
   click(x, y) {
     if (!this.measuring) return this.select(pick(this, x, y));
-    const v = nearestVertex(this, x, y);
-    if (v === null) return;
+    const end = nearestVertex(this, x, y);
+    if (!end) return;
     if (this.measured.length === 2) this.measured = [];
-    this.measured.push(v);
-    const [a, b] = this.measured;
-    if (b !== undefined) {
-      const apart = sub(pointOf(this.mesh, b), pointOf(this.mesh, a));
-      showInfo(this, { title: "Distance", rows: [["Length", short(norm(apart))], ["x, y, z", apart.map((d) => short(d, 5)).join(", ")], ["Vertices", `${this.mesh.ids[a]}, ${this.mesh.ids[b]}`]] });
+    this.measured.push(end);
+    if (this.measured.length === 2) {
+      const along = apart(this.measured);
+      showInfo(this, { title: "Distance", rows: [["Length", short(norm(along))], ["x, y, z", along.map((d) => short(d, 5)).join(", ")], ["Vertices", this.measured.map(({ mesh, v }) => mesh.ids[v]).join(", ")]] });
     }
     this.redraw();
   },
@@ -122,12 +137,24 @@ const app = {
     this.select(null);
     this.rebuild();
   },
+  /** Loads a level by its place in the list. */
   async load(level) {
-    byId("message").textContent = "Loading the mesh …";
-    const answer = await fetch(`mesh/${level}`);
-    if (!answer.ok) throw new Error(`the server answered ${answer.status}: is tetmill still running?`);
+    byId("message").textContent = this.mesh ? "Loading the level …" : "Loading the mesh …";
+    this.loading = level;
+    const answer = await fetch(`mesh/level/${this.index.levels[level][0]}`);
+    if (!answer.ok) throw new Error(await answer.text());
+    const mesh = decode(await answer.arrayBuffer());
+    // Another level may have been chosen meanwhile.
+    if (this.loading !== level) return;
     this.level = level;
-    this.show(decode(await answer.arrayBuffer()));
+    this.show(mesh);
+  },
+  /** Loads the coarsest level, and then the one of the address or the first choice. */
+  async begin() {
+    await this.load(0);
+    const { levels, start } = this.index, chosen = levels.findIndex(([pieces]) => pieces === this.state.level);
+    const level = chosen < 0 ? start : chosen;
+    if (level > 0) await this.load(level);
   },
   show(mesh) {
     const first = !this.state;
@@ -138,11 +165,12 @@ const app = {
     }
     document.title = `${mesh.title} – tetmill view`;
     byId("message").textContent = "";
-    this.selected = null;
-    this.measured = [];
+    [this.selected, this.measured, this.cut, this.ghosts] = [null, [], null, null];
     buildTop(this);
     this.rebuild();
     if (mesh.report) buildReport(byId("report"), mesh.report);
+    const { ghosts } = this.state;
+    if (this.index && this.index.ghosts && ghosts >= 0 && ghosts < mesh.parts && !mesh.hollow) showGhosts(this, ghosts).catch(failed);
   },
 };
 window.tetmillApp = app;
@@ -238,8 +266,8 @@ async function start() {
   app.drawing = makeDrawing(app.canvas);
   const data = byId("data");
   if (data.type === "text/plain") return app.show(decode(bytesOf(data.textContent)));
-  app.levels = JSON.parse(data.textContent);
-  await app.load(0);
+  app.index = JSON.parse(data.textContent);
+  await app.begin();
 }
 
 const failed = (error) => { byId("message").textContent = `The mesh cannot be shown: ${error.message || error}`; };

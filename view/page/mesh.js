@@ -1,6 +1,7 @@
 // The mesh: decoding of the message, and what is derived from it once.
 
 const KINDS = { f32: Float32Array, f64: Float64Array, u32: Uint32Array, i32: Int32Array, i16: Int16Array, u16: Uint16Array };
+const MOST_U16 = 65535;
 const OUTSIDE = -1, UNKNOWN = -2;
 // The corners of the face opposite each corner of a tet; normals point outwards.
 const FACES = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
@@ -14,7 +15,7 @@ function decode(buffer) {
   mesh.parts = counts.tets.length;
   for (const { name, type, offset, count } of mesh.arrays) {
     const Kind = KINDS[type];
-    const wide = { points: 3, tets: 4, neighbours: 4, patches: 4, quality: 2 }[name] || 1;
+    const wide = { points: 3, tets: 4, neighbours: 4, patches: 4, quality: 2, nodes: 6 }[name] || 1;
     const first = 4 + length + offset;
     // Counts are of the numbers that the writer pushed, one each.
     mesh[name === "patches" ? "facePatches" : name === "bodies" ? "tetBodies" : name] = new Kind(buffer, first, count);
@@ -32,6 +33,7 @@ function decode(buffer) {
       mesh.tets[k] += mesh.firstVertex[p];
       if (mesh.neighbours[k] >= 0) mesh.neighbours[k] += mesh.firstTet[p];
     }
+    for (let k = 6 * t; mesh.nodes.length && k < 6 * t + 6; k++) mesh.nodes[k] += mesh.firstVertex[p];
   }
   return derive(mesh);
 }
@@ -42,7 +44,7 @@ function firsts(counts) {
 }
 
 function partOf(counts, total) {
-  const parts = new Uint16Array(total);
+  const parts = counts.length > MOST_U16 ? new Uint32Array(total) : new Uint16Array(total);
   let at = 0;
   counts.forEach((count, part) => parts.fill(part, at, at += count));
   return parts;
@@ -94,15 +96,15 @@ function findCurves(mesh) {
       const [a, b] = [face[k], face[(k + 1) % 3]];
       const key = Math.min(same[a], same[b]) * count + Math.max(same[a], same[b]);
       const edge = edges.get(key);
-      if (!edge) edges.set(key, { a, b, patch, sharp: false });
+      if (!edge) edges.set(key, { a, b, patch, sharp: false, node: mesh.nodes.length ? nodeOf(mesh, t, FACES[f & 3][k], FACES[f & 3][(k + 1) % 3]) : undefined });
       else if (edge.patch !== patch) edge.sharp = true;
     }
   }
   mesh.curves = [];
   const degree = new Map();
-  for (const { a, b, sharp } of edges.values()) {
+  for (const { a, b, node, sharp } of edges.values()) {
     if (!sharp) continue;
-    mesh.curves.push(a, b);
+    mesh.curves.push([a, b, node]);
     for (const v of [a, b]) degree.set(same[v], (degree.get(same[v]) || 0) + 1);
   }
   mesh.corners = [...degree].filter(([, d]) => d !== 2).map(([v]) => v);

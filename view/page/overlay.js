@@ -34,7 +34,7 @@ function drawOverlay(app) {
   svg(overlay, "path", { d: `M${right - wide} ${low - 6}v6h${wide}v-6`, fill: "none", stroke: "var(--text)", "stroke-width": 1.5 });
   svg(overlay, "text", { x: right - wide / 2, y: low - 6, "text-anchor": "middle" }, short(length));
   if (app.measured.length === 2) {
-    const [a, b] = app.measured, [p, q] = [a, b].map((v) => app.toScreen(app.placeOf(v)));
-    svg(overlay, "text", { x: (p[0] + q[0]) / 2 + 8, y: (p[1] + q[1]) / 2 - 8, "font-weight": 600, "font-size": 14 }, short(lengthBetween(app.mesh, a, b)));
+    const [p, q] = app.measured.map(({ v, mesh }) => app.toScreen(app.placeOf(v, mesh)));
+    svg(overlay, "text", { x: (p[0] + q[0]) / 2 + 8, y: (p[1] + q[1]) / 2 - 8, "font-weight": 600, "font-size": 14 }, short(norm(apart(app.measured))));
   }
 }

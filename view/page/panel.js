@@ -50,21 +50,21 @@ const COLORS = [["patch", "boundary"], ["part", "part"], ["body", "body"], ["ang
 const NORMALS = { x: [1, 0, 0], y: [0, 1, 0], z: [0, 0, 1] };
 
 /** What the numbers at the top say. */
-function facts(mesh) {
-  const { totals } = mesh, some = mesh.tetCount < totals.tets;
+function facts(app) {
+  const { mesh } = app, { totals } = mesh, some = mesh.tetCount < totals.tets;
   const lines = [`${grouped(totals.tets)} tets, ${grouped(totals.vertices)} vertices, ${mesh.parts} ${mesh.parts === 1 ? "part" : "parts"}`];
   const notes = [];
   if (mesh.pieces && mesh.pieces[0] !== mesh.pieces[1]) {
     notes.push(`Shown is a coarser level of the mesh${mesh.hollow ? "" : ` with ${grouped(mesh.tetCount)} tets`}: coarse edges in ${mesh.pieces[1]} instead of ${mesh.pieces[0]}. Ids, sizes and quality are those of this level.`);
   }
   if (mesh.hollow && some) {
-    notes.push(`The mesh is large: only the ${grouped(mesh.tetCount)} tets at its surface and between parts are here. Cuts show it hollow.`);
+    notes.push(`The mesh is large: only the ${grouped(mesh.tetCount)} tets at its surface and between parts are here. ${app.index && app.index.cuts ? "" : " Cuts show it hollow."}`);
   }
   return { lines, notes };
 }
 
 function buildPanel(app) {
-  const { mesh, state, panel } = app, { lines, notes } = facts(mesh);
+  const { mesh, state, panel } = app, { lines, notes } = facts(app), levels = app.index ? app.index.levels : [];
   const show = (key, name, more) => toggle(name, state[key], (on) => { state[key] = on; app.update(); }, { id: `show-${key}`, more });
   const patches = mesh.patches.map((label, index) => ({ index, name: labelOf(label, index, "patch"), more: grouped(mesh.patchFaces[index]) })).filter((e) => mesh.patchFaces[e.index] > 0);
   const parts = mesh.tets.length && mesh.parts > 1 ? mesh.partCenters.map((_, index) => ({ index, name: `Part ${index + 1}` })) : [];
@@ -80,21 +80,23 @@ function buildPanel(app) {
   const shared = mesh.holders.reduce((sum, h) => sum + (h > 1), 0);
   panel.replaceChildren(
     element("h1", {}, mesh.title), ...lines.map((line) => element("p", { className: "facts" }, line)), ...notes.map((note) => element("p", { className: "note", id: "note" }, note)),
-    ...(app.levels.length > 1 ? [choice("level", "Level", String(app.level), app.levels.map(([pieces, hollow], k) => [String(k), `${pieces === 1 ? "coarse mesh" : `coarse edges in ${pieces}`}${hollow ? ", surface only" : ""}`]), (k) => app.load(Number(k)).catch(failed))] : []),
+    ...(levels.length > 1 ? [choice("level", "Level", String(app.level), levels.map(([pieces, hollow], k) => [String(k), `${pieces === 1 ? "coarse mesh" : `edges in ${pieces}`}${hollow ? ", surface" : ""}`]), (k) => { [state.level] = levels[k]; app.load(Number(k)).catch(failed); })] : []),
     element("input", { id: "search", type: "text", placeholder: "Find t12, v34, or a boundary name", "aria-label": "Find", onkeydown: (event) => event.key === "Enter" && app.find(event.target.value) }),
     section("Shown", true,
       choice("color", "Colour by", state.color, colors, (key) => { state.color = key; if (key in QUALITY) state.measure = key; app.rebuild(); }),
       choice("style", "Faces", state.style, [["both", "filled, with grid"], ["filled", "filled"], ["grid", "grid"], ["transparent", "transparent"]], (key) => { state.style = key; app.redraw(); }),
       show("boundary", "Boundary"), ...(parts.length ? [show("interfaces", "Faces between parts")] : []), show("volume", "Tets at the cut"),
-      show("curves", "Curves", grouped(mesh.curves.length / 2)), show("corners", "Corners", grouped(mesh.corners.length)), show("vertices", "Vertices"),
+      show("curves", "Curves", grouped(mesh.curves.length)), show("corners", "Corners", grouped(mesh.corners.length)), show("vertices", "Vertices"),
       ...(shared ? [show("shared", "Shared vertices", grouped(shared))] : [])),
     section("Cut", true,
       toggle("Cut by a plane", state.cut.on, (on) => { state.cut.on = on; app.update(); }, { id: "cut" }),
       element("div", { className: "buttons" }, ...["x", "y", "z"].map((name) => element("button", { id: `cut-${name}`, onclick: () => cutTo(name) }, name)),
         element("button", { onclick: () => cutTo("view") }, "View"), element("button", { onclick: () => { state.cut.normal = scaled(state.cut.normal, -1); state.cut.at *= -1; app.rebuild(); } }, "Flip")),
-      slider("cut-at", "Position", state.cut.at, [-1.02, 1.02], (x) => { state.cut.at = x; state.cut.on = true; document.getElementById("cut").checked = true; app.update(); })),
+      slider("cut-at", "Position", state.cut.at, [-1.02, 1.02], (x) => { state.cut.at = x; state.cut.on = true; document.getElementById("cut").checked = true; app.update(); }),
+      ...(app.index && app.index.cuts ? [toggle("Finest tets at the cut", state.cut.fine, (on) => { state.cut.fine = on; app.update(); }, { id: "cut-fine" }), element("p", { className: "facts", id: "cut-note" }, app.cutNote)] : [])),
     section(`Boundaries (${patches.length})`, true, list(app, patches, state.patchesOff, "patch")),
-    ...(parts.length ? [section(`Parts (${parts.length})`, true, slider("explode", "Exploded", state.explode, [0, 1.5], (x) => { state.explode = x; app.update(); }), list(app, parts, state.partsOff, "part"))] : []),
+    ...(parts.length ? [section(`Parts (${parts.length})`, true, slider("explode", "Exploded", state.explode, [0, 1.5], (x) => { state.explode = x; app.update(); }),
+      ...(app.index && app.index.ghosts && !mesh.hollow ? [choice("ghosts", "Ghosts of", String(state.ghosts), [["-1", "no part"], ...parts.map(({ index, name }) => [String(index), name])], (part) => showGhosts(app, Number(part)).catch(failed))] : []), list(app, parts, state.partsOff, "part"))] : []),
     ...(bodies.length > 1 ? [section(`Bodies (${bodies.length})`, false, list(app, bodies, state.bodiesOff, "body"))] : []),
     ...(mesh.periodic.length ? [section(`Periodic pairs (${mesh.periodic.length})`, false, ...mesh.periodic.map(([a, b], k) => element("div", { className: "legend-row" },
       element("span", { className: "swatch", style: `background:${css(colorOf(k))}` }), `${labelOf(mesh.patches[a], a, "patch")} ↔ ${labelOf(mesh.patches[b], b, "patch")}`)))] : []),

@@ -12,6 +12,9 @@ function coordinates(mesh, v) {
   return [0, 1, 2].map((i) => short(mesh.points[3 * v + i] + mesh.center[i], 7)).join(", ");
 }
 
+/** From the first to the second of two measured vertices. */
+const apart = ([a, b]) => sub(pointOf(b.mesh, b.v), pointOf(a.mesh, a.v));
+
 const lengthBetween = (mesh, a, b) => norm(sub(pointOf(mesh, a), pointOf(mesh, b)));
 
 /** The parts that have a vertex. */
@@ -43,7 +46,7 @@ function placeRows(mesh, vertices) {
 
 function aboutVertex(mesh, v) {
   return {
-    kind: "vertex", id: mesh.ids[v], title: `Vertex ${mesh.ids[v]}`, vertices: [v], edges: [],
+    mesh, kind: "vertex", id: mesh.ids[v], title: `Vertex ${mesh.ids[v]}`, vertices: [v], edges: [],
     rows: [["Coordinates", coordinates(mesh, v)], ...placeRows(mesh, [v]), ["Parts", holdersOf(mesh, v)]],
   };
 }
@@ -51,7 +54,7 @@ function aboutVertex(mesh, v) {
 function aboutEdge(mesh, a, b) {
   const [p, q] = [mesh.ids[a], mesh.ids[b]].sort((x, y) => x - y);
   return {
-    kind: "edge", id: [p, q], title: `Edge ${p} – ${q}`, vertices: [], edges: [[a, b]],
+    mesh, kind: "edge", id: [p, q], title: `Edge ${p} – ${q}`, vertices: [], edges: [[a, b]],
     rows: [["Length", short(lengthBetween(mesh, a, b))], ["Ends", `${coordinates(mesh, a)}\n${coordinates(mesh, b)}`], ...placeRows(mesh, [a, b])],
   };
 }
@@ -67,15 +70,21 @@ function aboutFace(mesh, f) {
   const edges = [0, 1, 2].map((k) => [corners[k], corners[(k + 1) % 3]]);
   const where = patch >= 0 ? "Boundary face" : mesh.neighbours[f] === OUTSIDE ? "Face between parts" : "Face inside";
   return {
-    kind: "face", id: corners.map((v) => mesh.ids[v]), tet: mesh.tetIds[t], patch, title: where, vertices: [], edges,
+    mesh, kind: "face", id: corners.map((v) => mesh.ids[v]), tet: mesh.tetIds[t], patch, title: where, vertices: [], edges,
     rows: [
       ...(patch >= 0 ? [["Boundary", labelOf(mesh.patches[patch], patch, "patch")]] : []),
       ["Body", labelOf(mesh.bodies[mesh.tetBodies[t]], mesh.tetBodies[t], "body")],
-      ["Part", `${mesh.tetPart[t] + 1} of ${mesh.parts}`], ["Tet", String(mesh.tetIds[t])],
+      partRow(mesh, t), ["Tet", String(mesh.tetIds[t])],
       ["Vertices", corners.map((v) => mesh.ids[v]).join(", ")], ["Area", short(area)],
       ["Edges", edges.map(([a, b]) => short(lengthBetween(mesh, a, b), 4)).join(", ")], ...qualityRows(mesh, t),
     ],
   };
+}
+
+/** The part of a tet, or the part that has it as a ghost too. */
+function partRow(mesh, t) {
+  const part = mesh.tetPart[t] + 1;
+  return mesh.owners.length ? ["Part", `${mesh.owners[t] + 1}, a ghost of part ${part}`] : ["Part", `${part} of ${mesh.parts}`];
 }
 
 const TET_EDGES = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
@@ -86,9 +95,9 @@ function aboutTet(mesh, t) {
   const [a, b, c, d] = corners.map((v) => pointOf(mesh, v));
   const lengths = edges.map(([a, b]) => lengthBetween(mesh, a, b));
   return {
-    kind: "tet", id: mesh.tetIds[t], title: `Tet ${mesh.tetIds[t]}`, vertices: [], edges, tetIndex: t,
+    mesh, kind: "tet", id: mesh.tetIds[t], title: `Tet ${mesh.tetIds[t]}`, vertices: [], edges, tetIndex: t,
     rows: [
-      ["Body", labelOf(mesh.bodies[mesh.tetBodies[t]], mesh.tetBodies[t], "body")], ["Part", `${mesh.tetPart[t] + 1} of ${mesh.parts}`],
+      ["Body", labelOf(mesh.bodies[mesh.tetBodies[t]], mesh.tetBodies[t], "body")], partRow(mesh, t),
       ["Vertices", corners.map((v) => mesh.ids[v]).join(", ")],
       ["Volume", short(dot(cross(sub(b, a), sub(c, a)), sub(d, a)) / 6)],
       ["Edges", `${short(Math.min(...lengths), 4)} to ${short(Math.max(...lengths), 4)}`], ...qualityRows(mesh, t),
@@ -100,7 +109,7 @@ function aboutTet(mesh, t) {
 function pick(app, x, y) {
   const ratio = ratioOf(), at = faceAt(app.drawing, app.view(), x * ratio, y * ratio);
   if (at < 0) return null;
-  const { mesh } = app, f = app.faces[at], t = f >> 2;
+  const { mesh, face: f } = app.triangle(at), t = f >> 2;
   const corners = FACES[f & 3].map((k) => mesh.tets[4 * t + k]);
   const screen = corners.map((v) => app.toScreen(add(pointOf(mesh, v), exploded(mesh, app.state, mesh.tetPart[t]))));
   const size = Math.max(...[0, 1, 2].map((k) => Math.hypot(screen[k][0] - screen[(k + 1) % 3][0], screen[k][1] - screen[(k + 1) % 3][1])));
@@ -120,9 +129,9 @@ function pick(app, x, y) {
 function nearestVertex(app, x, y) {
   const ratio = ratioOf(), at = faceAt(app.drawing, app.view(), x * ratio, y * ratio);
   if (at < 0) return null;
-  const { mesh } = app, f = app.faces[at], move = exploded(mesh, app.state, mesh.tetPart[f >> 2]);
+  const { mesh, face: f } = app.triangle(at), move = exploded(mesh, app.state, mesh.tetPart[f >> 2]);
   const distance = (v) => { const [u, w] = app.toScreen(add(pointOf(mesh, v), move)); return Math.hypot(u - x, w - y); };
-  return FACES[f & 3].map((k) => mesh.tets[4 * (f >> 2) + k]).sort((a, b) => distance(a) - distance(b))[0];
+  return { mesh, v: FACES[f & 3].map((k) => mesh.tets[4 * (f >> 2) + k]).sort((a, b) => distance(a) - distance(b))[0] };
 }
 
 /** Finds `t12`, `v34`, or the number or name of a boundary or body. */

@@ -5,7 +5,7 @@ function standardState(mesh) {
     turn: looking(-60, 25), focus: [0, 0, 0], zoom: 0.95 * mesh.radius,
     color: mesh.parts > 1 ? "part" : "patch", style: "both", measure: "angle", range: null,
     boundary: true, interfaces: true, volume: true, curves: true, corners: false, vertices: false, shared: false,
-    cut: { on: false, normal: [0, -1, 0], at: 0 }, explode: 0,
+    cut: { on: false, fine: true, normal: [0, -1, 0], at: 0 }, explode: 0, ghosts: -1,
     patchesOff: new Set(), partsOff: new Set(), bodiesOff: new Set(), dark: matchMedia("(prefers-color-scheme: dark)").matches,
   };
 }
@@ -22,6 +22,9 @@ function writeState(state) {
   for (const key of ["color", "style", "measure"]) q.set(key, state[key]);
   q.set("on", FLAGS.filter((key) => state[key]).join(","));
   if (state.cut.on) q.set("cut", numbers([...state.cut.normal, state.cut.at]));
+  if (!state.cut.fine) q.set("fine", "0");
+  if (state.level) q.set("level", state.level);
+  if (state.ghosts >= 0) q.set("ghosts", state.ghosts);
   if (state.explode) q.set("explode", short(state.explode, 4));
   if (state.range) q.set("range", state.range.join(","));
   for (const key of SETS) if (state[key].size) q.set(key, [...state[key]].join(","));
@@ -44,6 +47,11 @@ function readState(state, text) {
   if (q.get("measure") in QUALITY) state.measure = q.get("measure");
   if (q.has("on")) FLAGS.forEach((key) => { state[key] = q.get("on").split(",").includes(key); });
   state.cut = cut && norm(cut.slice(0, 3)) > 0 ? { on: true, normal: cut.slice(0, 3), at: cut[3] } : { ...state.cut, on: false };
+  state.cut.fine = q.get("fine") !== "0";
+  const level = numbers("level", 1);
+  if (level) [state.level] = level;
+  const ghosts = numbers("ghosts", 1);
+  state.ghosts = ghosts && Number.isInteger(ghosts[0]) ? ghosts[0] : -1;
   state.explode = explode ? Math.min(5, Math.max(0, explode[0])) : 0;
   const range = (q.get("range") || "").split(",").map(Number);
   state.range = range.length === 2 && range[0] < range[1] ? range : null;

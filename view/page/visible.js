@@ -8,10 +8,9 @@ function planeOf(mesh, cut) {
   return { normal, offset: cut.at * reach };
 }
 
-/** Whether each tet is shown: its part, body, quality, and its side of the cut. */
-function shownTets(mesh, state) {
+/** Whether each tet is shown: its part, body, quality, and its side of the plane, if there is one. */
+function shownTets(mesh, state, plane) {
   const shown = new Uint8Array(mesh.tetCount);
-  const plane = state.cut.on ? planeOf(mesh, state.cut) : null;
   const which = state.measure === "ratio" ? 1 : 0, { range } = state;
   for (let t = 0; t < shown.length; t++) {
     if (state.partsOff.has(mesh.tetPart[t]) || state.bodiesOff.has(mesh.tetBodies[t])) continue;
@@ -30,8 +29,9 @@ const exploded = (mesh, state, part) => scaled(mesh.partCenters[part], state.exp
 
 const INSIDE = [214, 219, 224];
 
-/** The colour of a face of a tet. */
+/** The colour of a face of a tet; ghosts have a light colour of the part that they belong to. */
 function faceColor(mesh, state, t, patch) {
+  if (mesh.owners.length && !(state.color in QUALITY)) return colorOf(mesh.owners[t]).map((c) => Math.round(0.6 * c + 0.4 * 255));
   switch (state.color) {
     case "part": return colorOf(mesh.tetPart[t]);
     case "body": return colorOf(mesh.tetBodies[t]);
@@ -49,27 +49,139 @@ function faceColor(mesh, state, t, patch) {
   }
 }
 
-/** The visible faces as triangles: a buffer of x, y, z, colour for each corner, and the face of each. */
-function visibleFaces(mesh, state, shown) {
-  const faces = [];
+const CORNERS = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
+
+/** How often an edge of a curved face is divided for drawing. */
+const DIVIDED = 4;
+// The small triangles of a curved face, as weights of its corners.
+const SMALL = (() => {
+  const at = (i, j) => [1 - (i + j) / DIVIDED, i / DIVIDED, j / DIVIDED], all = [];
+  for (let j = 0; j < DIVIDED; j++) {
+    for (let i = 0; i + j < DIVIDED; i++) {
+      all.push([at(i, j), at(i + 1, j), at(i, j + 1)]);
+      if (i + j + 1 < DIVIDED) all.push([at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)]);
+    }
+  }
+  return all;
+})();
+
+const mixed = (points, weights) => [0, 1, 2].map((i) => points.reduce((sum, p, k) => sum + weights[k] * p[i], 0));
+
+/** The place on a face of second order: corners, then the nodes on the edges 01, 12, 20. */
+function curvedPlace(points, [a, b, c]) {
+  return mixed(points, [a * (2 * a - 1), b * (2 * b - 1), c * (2 * c - 1), 4 * a * b, 4 * b * c, 4 * c * a]);
+}
+
+/** The node on the edge between two corners of a tet. */
+const nodeOf = (mesh, t, i, j) => mesh.nodes[6 * t + TET_EDGES.findIndex((edge) => edge.includes(i) && edge.includes(j))];
+
+/** The corners of a face and, if an edge of it is curved, the nodes on its edges. */
+function placesOf(mesh, f) {
+  const t = f >> 2, face = FACES[f & 3], corners = face.map((k) => pointOf(mesh, mesh.tets[4 * t + k]));
+  if (!mesh.nodes.length) return corners;
+  const nodes = [[0, 1], [1, 2], [2, 0]].map(([i, j]) => pointOf(mesh, nodeOf(mesh, t, face[i], face[j])));
+  const bends = nodes.some((node, k) => isBent(corners[k], node, corners[(k + 1) % 3]));
+  return bends ? [...corners, ...nodes] : corners;
+}
+
+/** Whether a node is visibly off the middle of its edge. */
+const isBent = (a, node, b) => norm(sub(node, scaled(add(a, b), 0.5))) > 0.002 * norm(sub(b, a));
+
+/** The piece of a triangle behind a plane, as weights of its corners: none, three or four. */
+function clipped(places, plane) {
+  const sides = places.map((p) => dot(p, plane.normal) - plane.offset), kept = [];
+  for (let k = 0; k < 3; k++) {
+    const next = (k + 1) % 3;
+    if (sides[k] <= 0) kept.push(CORNERS[k]);
+    if (sides[k] * sides[next] < 0) {
+      const s = sides[k] / (sides[k] - sides[next]);
+      kept.push(add(scaled(CORNERS[k], 1 - s), scaled(CORNERS[next], s)));
+    }
+  }
+  return kept;
+}
+
+/** The triangles of a face as weights of its corners, with their places; cut off at a plane if there is one. */
+function trianglesOf(places, clip) {
+  const found = [], placed = (weights) => (places.length === 3 ? mixed(places, weights) : curvedPlace(places, weights));
+  for (const triangle of places.length === 3 ? [CORNERS] : SMALL) {
+    const corners = triangle.map(placed);
+    const kept = clip ? clipped(corners, clip) : CORNERS;
+    for (let k = 2; k < kept.length; k++) {
+      const piece = kept === CORNERS ? CORNERS : [kept[0], kept[k - 1], kept[k]];
+      found.push(piece.map((weights) => ({ weights: mixed(triangle, weights), place: mixed(corners, weights) })));
+    }
+  }
+  return found;
+}
+
+/** Where the corners of a face are: -1 if all are behind a plane, 1 if none is, otherwise 0. */
+function sideOf(mesh, f, { normal, offset }) {
+  let sum = 0;
+  for (const corner of FACES[f & 3]) {
+    const v = 3 * mesh.tets[(f & ~3) + corner];
+    sum += mesh.points[v] * normal[0] + mesh.points[v + 1] * normal[1] + mesh.points[v + 2] * normal[2] > offset ? 1 : -1;
+  }
+  return sum === 3 ? 1 : sum === -3 ? -1 : 0;
+}
+
+/** Whether a face without visible tets on both sides is to be drawn. */
+function isVisible(state, patch, other, volume) {
+  if (patch >= 0) return state.boundary && !state.patchesOff.has(patch);
+  return other === OUTSIDE ? state.interfaces : volume;
+}
+
+/** The faces to be drawn; those of a `layer` also if their other tet is not here. */
+function facesOf(mesh, state, shown, clip, layer) {
+  const faces = [], volume = state.volume && !clip;
   for (let f = 0; f < mesh.neighbours.length; f++) {
     if (!shown[f >> 2]) continue;
-    const other = mesh.neighbours[f], patch = mesh.facePatches[f];
-    if (other === UNKNOWN || (other >= 0 && shown[other])) continue;
-    if (patch >= 0 ? state.patchesOff.has(patch) || !state.boundary : other === OUTSIDE ? !state.interfaces : !state.volume) continue;
-    faces.push(f);
+    const other = mesh.neighbours[f];
+    if ((other === UNKNOWN && !layer) || (other >= 0 && shown[other])) continue;
+    if (isVisible(state, mesh.facePatches[f], other, volume)) faces.push(f);
   }
-  const buffer = new ArrayBuffer(48 * faces.length), numbers = new Float32Array(buffer), colors = new Uint8Array(buffer);
+  return faces;
+}
+
+/**
+ * The visible faces as triangles: a buffer of x, y, z, colour and weights for each corner, and the face of each triangle.
+ * `clip` is a plane: then faces on the surface are cut off there, and there are none inside.
+ */
+function visibleFaces(mesh, state, shown, { clip = null, layer = false } = {}) {
+  // Most faces are whole and flat: they have no list of pieces, which would take most of the time.
+  const faces = [], pieces = [];
+  for (const f of facesOf(mesh, state, shown, clip, layer)) {
+    const side = clip ? sideOf(mesh, f, clip) : -1;
+    if (side > 0) continue;
+    const places = side === 0 || mesh.nodes.length ? placesOf(mesh, f) : null;
+    if (!places || (side < 0 && places.length === 3)) {
+      faces.push(f);
+      pieces.push(null);
+      continue;
+    }
+    for (const piece of trianglesOf(places, side < 0 ? null : clip)) {
+      faces.push(f);
+      pieces.push(piece);
+    }
+  }
+  const buffer = new ArrayBuffer(60 * faces.length), numbers = new Float32Array(buffer), bytes = new Uint8Array(buffer);
   const moves = mesh.partCenters.map((_, part) => exploded(mesh, state, part));
-  faces.forEach((f, at) => {
-    const t = f >> 2, color = faceColor(mesh, state, t, mesh.facePatches[f]), move = moves[mesh.tetPart[t]];
-    FACES[f & 3].forEach((corner, k) => {
-      const v = 3 * mesh.tets[4 * t + corner], to = 4 * (3 * at + k);
-      for (let i = 0; i < 3; i++) numbers[to + i] = mesh.points[v + i] + move[i];
-      colors.set(color, 4 * (to + 3));
-      colors[4 * (to + 3) + 3] = 255;
-    });
-  });
+  for (let at = 0; at < faces.length; at++) {
+    const f = faces[at], t = f >> 2, color = faceColor(mesh, state, t, mesh.facePatches[f]), move = moves[mesh.tetPart[t]];
+    for (let k = 0; k < 3; k++) {
+      const to = 5 * (3 * at + k), byte = 4 * (to + 3);
+      if (pieces[at]) {
+        const { weights, place } = pieces[at][k];
+        for (let i = 0; i < 3; i++) { numbers[to + i] = place[i] + move[i]; bytes[byte + 4 + i] = Math.round(255 * weights[i]); }
+      } else {
+        const v = 3 * mesh.tets[4 * t + FACES[f & 3][k]];
+        for (let i = 0; i < 3; i++) numbers[to + i] = mesh.points[v + i] + move[i];
+        bytes[byte + 4 + k] = 255;
+      }
+      for (let i = 0; i < 3; i++) bytes[byte + i] = color[i];
+      bytes[byte + 3] = 255;
+    }
+  }
   return { faces: Uint32Array.from(faces), buffer };
 }
 
@@ -112,14 +224,30 @@ function isBehind(mesh, state, vertices) {
   return vertices.every((v) => dot(pointOf(mesh, v), plane.normal) <= plane.offset + 1e-6 * mesh.radius);
 }
 
-/** The ends of visible lines of curves, x, y, z each. */
-function visibleCurves(mesh, state) {
+/** The ends of visible lines of curves, x, y, z each: edges behind the cut, or cut off at `clip`. */
+function visibleCurves(mesh, state, clip) {
   const ends = [];
   if (!state.curves) return new Float32Array();
-  for (let k = 0; k < mesh.curves.length; k += 2) {
-    const [a, b] = [mesh.curves[k], mesh.curves[k + 1]];
-    if (!isBehind(mesh, state, [a, b])) continue;
-    for (const v of [a, b]) ends.push(...add(pointOf(mesh, v), exploded(mesh, state, mesh.vertexPart[a])));
-  }
+  mesh.curves.forEach(([a, b, node]) => {
+    const part = mesh.vertexPart[a];
+    if (clip ? state.partsOff.has(part) : !isBehind(mesh, state, [a, b])) return;
+    const move = exploded(mesh, state, part), [p, q] = [pointOf(mesh, a), pointOf(mesh, b)];
+    const bent = node !== undefined && isBent(p, pointOf(mesh, node), q), steps = bent ? DIVIDED : 1;
+    // On an edge of a face of second order the third weight is zero.
+    const at = (s) => (bent ? curvedPlace([p, q, p, pointOf(mesh, node), p, p], [1 - s, s, 0]) : mixed([p, q], [1 - s, s]));
+    for (let k = 0; k < steps; k++) {
+      const piece = behind(at(k / steps), at((k + 1) / steps), clip);
+      if (piece) for (const end of piece) ends.push(...add(end, move));
+    }
+  });
   return new Float32Array(ends);
+}
+
+/** The piece of a line behind a plane. */
+function behind(p, q, plane) {
+  if (!plane) return [p, q];
+  const [a, b] = [p, q].map((x) => dot(x, plane.normal) - plane.offset);
+  if (a > 0 && b > 0) return null;
+  const at = mixed([p, q], [b / (b - a), a / (a - b)]);
+  return a > 0 ? [at, q] : b > 0 ? [p, at] : [p, q];
 }

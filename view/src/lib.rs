@@ -2,18 +2,22 @@
 //!
 //! A **message** is a mesh as the page reads it; the library `tetmill` makes it
 //! (`tetmill::files::view`). [`page`] puts one into a self-contained file that can be mailed.
-//! A [`Server`] serves the page and several messages, the levels of a mesh, to this machine.
+//! A [`Server`] serves the page and the messages that a [`Source`] makes for its queries, to this
+//! machine.
 //!
 //! *Not* here: anything about meshes. This crate passes bytes on.
 #![forbid(unsafe_code)]
 
-mod base64;
 mod browser;
+mod encode;
 mod request;
 mod server;
+mod source;
 
 pub use browser::open;
-pub use server::{Level, Server};
+pub use encode::base64;
+pub use server::Server;
+pub use source::Source;
 
 const PAGE: &str = include_str!("../page/page.html");
 const STYLE: &str = include_str!("../page/style.css");
@@ -22,6 +26,7 @@ const SCRIPT: &str = concat!(
     include_str!("../page/math.js"),
     include_str!("../page/mesh.js"),
     include_str!("../page/visible.js"),
+    include_str!("../page/layers.js"),
     include_str!("../page/draw.js"),
     include_str!("../page/pick.js"),
     include_str!("../page/overlay.js"),
@@ -35,14 +40,13 @@ const SCRIPT: &str = concat!(
 ///
 /// The message is in base64, so no name in it can end the script or add another one.
 pub fn page(message: &[u8]) -> String {
-    filled("text/plain", &base64::encode(message))
+    filled("text/plain", &base64(message))
 }
 
-/// The page that loads messages from the server.
-fn served_page(levels: &[Level]) -> String {
-    let list: Vec<String> =
-        levels.iter().map(|level| format!("[{}, {}]", level.pieces, level.hollow)).collect();
-    filled("application/json", &format!("[{}]", list.join(", ")))
+/// The page that loads messages from the server. The index, in JSON, is what the page knows from
+/// the start. No text in it can end the script.
+fn served_page(index: &str) -> String {
+    filled("application/json", &index.replace('<', "\\u003c"))
 }
 
 fn filled(kind: &str, data: &str) -> String {
@@ -64,5 +68,8 @@ mod tests {
             assert!(!page.contains(place), "{place}");
         }
         assert_eq!(page.matches("</script>").count(), 2, "no script ends early");
+        let served = served_page(r#"{"title": "</script><script>"}"#);
+        assert_eq!(served.matches("</script>").count(), 2, "no script ends early");
+        assert!(served.contains(r#"{"title": "\u003c/script>\u003cscript>"}"#));
     }
 }

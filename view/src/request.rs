@@ -6,13 +6,16 @@
 /// Maximum size of the head of a request (bytes).
 pub const MOST: usize = 8192;
 
+/// Maximum length of a query.
+const LONGEST: usize = 300;
+
 /// What a valid request asks for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Wanted {
+pub enum Wanted<'a> {
     /// The page.
     Page,
-    /// The message at an index.
-    Message(usize),
+    /// The message that the source makes for a query.
+    Message(&'a str),
 }
 
 /// Why a request is refused: the status and its name.
@@ -46,8 +49,8 @@ impl Refused {
     }
 }
 
-/// Reads the head of a request, up to the empty line. `levels` is the number of messages.
-pub fn parse(head: &[u8], token: &str, levels: usize) -> Result<Wanted, Refused> {
+/// Reads the head of a request, up to the empty line.
+pub fn parse<'a>(head: &'a [u8], token: &str) -> Result<Wanted<'a>, Refused> {
     let text = std::str::from_utf8(head).map_err(|_| Refused::Malformed)?;
     let mut lines = text.split("\r\n");
     let words: Vec<&str> = lines.next().unwrap_or_default().split(' ').collect();
@@ -72,12 +75,15 @@ pub fn parse(head: &[u8], token: &str, levels: usize) -> Result<Wanted, Refused>
     }
     match rest.strip_prefix("mesh/") {
         None if rest.is_empty() => Ok(Wanted::Page),
-        Some(number) if number.len() <= 2 && number.bytes().all(|byte| byte.is_ascii_digit()) => {
-            let index = number.parse().map_err(|_| Refused::NotFound)?;
-            if index < levels { Ok(Wanted::Message(index)) } else { Err(Refused::NotFound) }
-        }
+        Some(query) if is_query(query) => Ok(Wanted::Message(query)),
         _ => Err(Refused::NotFound),
     }
+}
+
+/// Whether a text can be a query: what [`Source`](crate::Source) promises.
+fn is_query(text: &str) -> bool {
+    let fits = |byte: u8| byte.is_ascii_lowercase() || byte.is_ascii_digit() || b"/.,+-".contains(&byte);
+    (1..=LONGEST).contains(&text.len()) && text.bytes().all(fits)
 }
 
 /// Whether a Host header names this machine. The port can differ: it is that of a tunnel.
@@ -98,15 +104,21 @@ fn is_same(a: &str, b: &str) -> bool {
 mod tests {
     use super::*;
 
-    fn ask(target: &str, host: &str) -> Result<Wanted, Refused> {
-        parse(format!("GET {target} HTTP/1.1\r\nHost: {host}\r\n\r\n").as_bytes(), "abc", 2)
+    /// The query of a message, and the empty one for the page.
+    fn ask(target: &str, host: &str) -> Result<String, Refused> {
+        let head = format!("GET {target} HTTP/1.1\r\nHost: {host}\r\n\r\n");
+        parse(head.as_bytes(), "abc").map(|wanted| match wanted {
+            Wanted::Page => String::new(),
+            Wanted::Message(query) => query.to_owned(),
+        })
     }
 
     #[test]
     fn the_page_and_its_messages_are_found() {
-        assert_eq!(ask("/abc/", "127.0.0.1:80"), Ok(Wanted::Page));
-        assert_eq!(ask("/abc/mesh/1", "localhost:9000"), Ok(Wanted::Message(1)));
-        assert_eq!(ask("/abc/", "[::1]:80"), Ok(Wanted::Page));
+        assert_eq!(ask("/abc/", "127.0.0.1:80"), Ok("".into()));
+        assert_eq!(ask("/abc/mesh/level/1", "localhost:9000"), Ok("level/1".into()));
+        assert_eq!(ask("/abc/mesh/cut/4/0,-1e-3,1,2/0.5", "[::1]:80"), Ok("cut/4/0,-1e-3,1,2/0.5".into()));
+        assert_eq!(ask(&format!("/abc/mesh/{}", "9".repeat(300)), "localhost"), Ok("9".repeat(300)));
     }
 
     #[test]
@@ -117,15 +129,11 @@ mod tests {
         {
             assert_eq!(ask(target, host), Err(Refused::Forbidden), "{target}");
         }
-        for target in [
-            "/abc/mesh/2",
-            "/abc/mesh/-1",
-            "/abc/mesh/",
-            "/abc/../x",
-            "/abc/mesh/001",
-            "/abc/?x",
-            "/abc/mesh/0?x",
-        ] {
+        let long = format!("/abc/mesh/{}", "9".repeat(301));
+        let strange =
+            ["/abc/mesh/", "/abc/../x", "/abc/?x", "/abc/mesh/0?x", "/abc/mesh/%2e", "/abc/mesh/LEVEL"];
+        for target in strange.into_iter().chain(["/abc/mesh/<b>", "/abc/mesh/\u{e9}", "/abc/mesh/\0", &long])
+        {
             assert_eq!(ask(target, host), Err(Refused::NotFound), "{target}");
         }
         for host in
@@ -133,7 +141,7 @@ mod tests {
         {
             assert_eq!(ask("/abc/", host), Err(Refused::Forbidden), "{host}");
         }
-        let raw = |text: &[u8]| parse(text, "abc", 2);
+        let raw = |text: &[u8]| parse(text, "abc").map(|_| ());
         assert_eq!(raw(b"GET /abc/ HTTP/1.1\r\n\r\n"), Err(Refused::Forbidden), "no host");
         let twice = b"GET /abc/ HTTP/1.1\r\nHost: localhost\r\nHost: localhost\r\n\r\n";
         assert_eq!(raw(twice), Err(Refused::Forbidden));

@@ -1,7 +1,7 @@
 //! A small HTTP server on the loopback address: one thread for each connection, one answer each.
 
 use crate::request::{MOST, Refused, Wanted, parse};
-use crate::served_page;
+use crate::{Source, served_page};
 use std::io::{self, ErrorKind, Read, Write};
 use std::net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -23,41 +23,32 @@ const CONNECTIONS: usize = 16;
 const FIELDS: &str = "Connection: close\r\nCache-Control: no-store\r\nX-Content-Type-Options: nosniff\r\n\
     X-Frame-Options: DENY\r\nReferrer-Policy: no-referrer\r\nCross-Origin-Resource-Policy: same-origin\r\n";
 
-/// One level of detail of a mesh.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Level {
-    /// Subdivisions of each coarse edge.
-    pub pieces: u32,
-    /// Whether only the surface of the mesh is in it.
-    pub hollow: bool,
-    /// The mesh as the page reads it.
-    pub message: Vec<u8>,
-}
+/// The status of a query that the source refuses.
+const UNANSWERED: &str = "422 Unprocessable Content";
 
-/// A server of one page and the levels of a mesh.
+/// A server of one page and the messages that it queries.
 #[derive(Debug)]
 pub struct Server {
     listener: TcpListener,
     token: String,
     page: String,
-    levels: Vec<Level>,
     open: AtomicUsize,
 }
 
 impl Server {
-    /// A server on a port of the loopback address, or on any free one. The first level is shown
-    /// first.
+    /// A server on a port of the loopback address, or on any free one. `index` is a JSON value that
+    /// the page gets with its script.
     ///
     /// # Errors
     /// If the port is taken or not allowed, or the system has no random numbers.
-    pub fn new(port: Option<u16>, levels: Vec<Level>) -> io::Result<Self> {
+    pub fn new(port: Option<u16>, index: &str) -> io::Result<Self> {
         let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port.unwrap_or(0)))?;
         listener.set_nonblocking(true)?;
         let mut random = [0; 16];
         getrandom::fill(&mut random).map_err(io::Error::other)?;
         let token = random.iter().map(|byte| format!("{byte:02x}")).collect();
-        let page = served_page(&levels);
-        Ok(Self { listener, token, page, levels, open: AtomicUsize::new(0) })
+        let page = served_page(index);
+        Ok(Self { listener, token, page, open: AtomicUsize::new(0) })
     }
 
     /// The address of the page, with the token.
@@ -69,11 +60,11 @@ impl Server {
         Ok(format!("http://{place}/{}/", self.token))
     }
 
-    /// Answers requests until `stop` returns true.
+    /// Answers requests until `stop` returns true, queries by the source.
     ///
     /// # Errors
     /// If the system accepts no more connections.
-    pub fn run(&self, stop: impl Fn() -> bool) -> io::Result<()> {
+    pub fn run(&self, source: &dyn Source, stop: impl Fn() -> bool) -> io::Result<()> {
         std::thread::scope(|scope| {
             while !stop() {
                 if self.open.load(Ordering::Acquire) >= CONNECTIONS {
@@ -85,7 +76,7 @@ impl Server {
                         self.open.fetch_add(1, Ordering::AcqRel);
                         scope.spawn(|| {
                             // A client that went away needs no answer.
-                            let _ = self.answer(stream);
+                            let _ = self.answer(source, stream);
                             self.open.fetch_sub(1, Ordering::AcqRel);
                         });
                     }
@@ -98,15 +89,16 @@ impl Server {
         })
     }
 
-    fn answer(&self, mut stream: TcpStream) -> io::Result<()> {
+    fn answer(&self, source: &dyn Source, mut stream: TcpStream) -> io::Result<()> {
         stream.set_nonblocking(false)?;
         stream.set_write_timeout(Some(WRITING))?;
-        let wanted = head(&mut stream).and_then(|head| parse(&head, &self.token, self.levels.len()));
-        match wanted {
+        let head = head(&mut stream);
+        match head.as_ref().map_err(|refused| *refused).and_then(|head| parse(head, &self.token)) {
             Ok(Wanted::Page) => send(&mut stream, "200 OK", "text/html; charset=utf-8", self.page.as_bytes()),
-            Ok(Wanted::Message(index)) => {
-                send(&mut stream, "200 OK", "application/octet-stream", &self.levels[index].message)
-            }
+            Ok(Wanted::Message(query)) => match source.answer(query) {
+                Ok(message) => send(&mut stream, "200 OK", "application/octet-stream", &message),
+                Err(reason) => send(&mut stream, UNANSWERED, "text/plain; charset=utf-8", reason.as_bytes()),
+            },
             Err(refused) => {
                 let status = refused.status();
                 send(&mut stream, status, "text/plain", format!("{status}\n").as_bytes())
@@ -150,14 +142,17 @@ mod tests {
     use super::*;
     use std::sync::atomic::AtomicBool;
 
-    /// What a server with one message answers to raw bytes.
+    /// What a server whose source knows one query answers to raw bytes.
     fn answers(asked: impl Fn(&Server) -> Vec<Vec<u8>>) -> Vec<String> {
-        let server =
-            Server::new(None, vec![Level { pieces: 1, hollow: false, message: b"mesh".to_vec() }]).unwrap();
+        let server = Server::new(None, "[]").unwrap();
+        let source = |query: &str| match query {
+            "level/1" => Ok(b"mesh".to_vec()),
+            _ => Err("no such level".to_owned()),
+        };
         let place = server.listener.local_addr().unwrap();
         let done = AtomicBool::new(false);
         std::thread::scope(|scope| {
-            scope.spawn(|| server.run(|| done.load(Ordering::Relaxed)).unwrap());
+            scope.spawn(|| server.run(&source, || done.load(Ordering::Relaxed)).unwrap());
             let ask = |bytes: Vec<u8>| {
                 let mut stream = TcpStream::connect(place).unwrap();
                 stream.write_all(&bytes).unwrap();
@@ -178,11 +173,19 @@ mod tests {
         let found = answers(|server| {
             let ask = |path: &str| format!("GET {path} HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n").into_bytes();
             let token = &server.token;
-            vec![ask(&format!("/{token}/")), ask(&format!("/{token}/mesh/0")), ask("/0123/"), ask("/")]
+            let mesh = |query: &str| ask(&format!("/{token}/mesh/{query}"));
+            vec![
+                ask(&format!("/{token}/")),
+                mesh("level/1"),
+                mesh("level/2"),
+                ask("/0123/mesh/level/1"),
+                ask("/"),
+            ]
         });
         assert!(found[0].starts_with("HTTP/1.1 200 OK") && found[0].contains("<canvas"));
         assert!(found[1].ends_with("\r\n\r\nmesh"));
-        for refused in &found[2..] {
+        assert!(found[2].starts_with("HTTP/1.1 422 ") && found[2].ends_with("\r\n\r\nno such level"));
+        for refused in &found[3..] {
             assert!(refused.starts_with("HTTP/1.1 403 Forbidden"));
             assert!(refused.ends_with("\r\n\r\n403 Forbidden\n"), "an error and nothing else");
         }

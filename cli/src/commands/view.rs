@@ -1,40 +1,28 @@
 //! `tetmill view`, and the views of a run.
 
+mod query;
+mod report;
+mod serve;
+mod shown;
+
 use super::outputs::Outputs;
 use super::{
     coarse_settings, on_ranks, read_sized_geometry, reading, set_threads, wanted_coarse, write_whole,
 };
-use crate::cancel;
-use crate::failure::{Failure, Status, agree};
+use crate::failure::{Failure, agree};
 use crate::options::{InputOptions, View};
-use crate::report::{Report, counted};
 use crate::terminal::Terminal;
+pub use report::beside_report;
+pub use serve::serve;
+pub use shown::{Shown, Tets};
 use std::path::{Path, PathBuf};
 use tetmill::Generated;
 use tetmill::comm::Communicator;
-use tetmill::files::view::{About, Fill, ViewPart, gather, message, of_mesh, part};
+use tetmill::files::view::About;
 use tetmill::files::{elmer, elmer::Layout, refuse_missing, volume};
 use tetmill::mesh::{BareMesh, BareStream, Counts, MeshStream, Names};
 use tetmill::progress::{Progress, Stage};
 use tetmill::run::{GenerateSettings, generate};
-
-/// Maximum number of tets in a page: with 90 bytes each, below 20 MB.
-pub const IN_FILE: u64 = 200_000;
-
-/// Maximum number of tets of a level that is served: the browser takes some 300 bytes for each.
-pub const SERVED: u64 = 1_000_000;
-
-/// Maximum number of tets at the surface of a mesh that is too large to be shown whole.
-const MOST_HOLLOW: u64 = 3 * SERVED;
-
-/// Maximum number of boundary triangles of a level of which only the surface is shown.
-const MOST_FACES: u64 = 600_000;
-
-/// A level of a mesh on rank 0: its parts, and what is said about them. The finest comes first.
-pub struct Viewed {
-    parts: Vec<ViewPart>,
-    about: About,
-}
 
 /// `tetmill view`
 pub fn run_view(options: &View) -> Result<(), Failure> {
@@ -69,44 +57,34 @@ fn outputs_of(options: &View) -> Outputs {
     reading(&options.input, &options.size).file("-o", options.output.as_ref())
 }
 
-/// The number of tets up to which a level is shown whole.
-fn most_tets(options: &View) -> u64 {
-    if options.output.is_some() { IN_FILE } else { SERVED }
-}
-
 /// **Collective.** Shows a mesh from a file on one rank, or an Elmer partition on a rank for each
 /// part.
 fn view_mesh(comm: &dyn Communicator, options: &View, file: &Path) -> Result<(), Failure> {
     let first = comm.rank() == 0;
     let outputs = if first { outputs_of(options).prepare() } else { Ok(()) };
     agree(comm, outputs)?;
-    let most = most_tets(options);
     let title = title_of(&options.input);
-    let view = if file.is_dir() {
+    if file.is_dir() {
         let loaded = elmer::load(comm, file)?;
         if first {
             loaded.notes.iter().for_each(|note| eprintln!("note: {note}"));
         }
         let stream = BareStream::new(BareMesh::from(loaded.mesh));
-        of_stream(comm, &stream, about(&title, &loaded.names, &stream), most)?
-    } else {
-        let read = volume::read(file)?;
-        read.notes.iter().for_each(|note| eprintln!("note: {note}"));
-        let tets = read.mesh.tets.len() as u64;
-        let totals = Counts {
-            vertices: read.mesh.points.len() as u64,
-            tets,
-            boundary: read.mesh.triangles.len() as u64,
-        };
-        let fill = fill_of(tets, most);
-        let parts = vec![of_mesh(&read.mesh, fill)];
-        refuse_large(&parts)?;
-        let periodic = read.links.iter().map(|link| [link.image.0, link.of.0]).collect();
-        let hollow = fill == Fill::Hollow;
-        let about = About { title, names: read.names, totals, hollow, periodic, ..About::default() };
-        vec![Viewed { parts, about }]
+        let about = about(&title, &loaded.names, &stream);
+        return finish(comm, &Shown { tets: Tets::Stored(vec![&stream]), about }, options);
+    }
+    let read = volume::read(file)?;
+    read.notes.iter().for_each(|note| eprintln!("note: {note}"));
+    let totals = Counts {
+        vertices: read.mesh.points.len() as u64,
+        tets: read.mesh.tets.len() as u64,
+        boundary: read.mesh.triangles.len() as u64,
     };
-    finish(comm, view, options)
+    let periodic = read.links.iter().map(|link| [link.image.0, link.of.0]).collect();
+    let about = About { title, names: read.names.clone(), totals, periodic, ..About::default() };
+    let streams = tetmill::files::view::streams(&read);
+    let streams = streams.iter().map(|stream| &**stream).collect();
+    finish(comm, &Shown { tets: Tets::Stored(streams), about }, options)
 }
 
 /// **Collective.** Meshes a geometry and shows the mesh.
@@ -126,20 +104,20 @@ fn view_geometry(comm: &dyn Communicator, options: &View) -> Result<(), Failure>
         ..GenerateSettings::default()
     };
     let made = generate(comm, geometry.as_ref(), &settings, &progress)?;
-    let most = most_tets(options);
-    let views = of_generated(comm, &made, &title_of(&options.input), most)?;
     terminal.finish();
-    finish(comm, views, options)
+    let title = title_of(&options.input);
+    match &options.output {
+        Some(_) => finish(comm, &shown(&made, &title), options),
+        None => serve_generated(comm, made, &title, options.port),
+    }
 }
 
-/// **Collective.** Writes or serves the views on rank 0.
-fn finish(comm: &dyn Communicator, views: Vec<Viewed>, options: &View) -> Result<(), Failure> {
-    let done = match &options.output {
-        _ if comm.rank() != 0 => Ok(()),
-        Some(file) => write_page(views, None, file),
-        None => serve(views, options.port),
-    };
-    agree(comm, done)
+/// **Collective.** Writes or serves a mesh.
+fn finish(comm: &dyn Communicator, shown: &Shown, options: &View) -> Result<(), Failure> {
+    let Some(file) = &options.output else { return serve(comm, shown, options.port) };
+    let message = shown.for_page(comm)?;
+    let written = if comm.rank() == 0 { write_page(&message, file) } else { Ok(()) };
+    agree(comm, written)
 }
 
 fn about(title: &str, names: &Names, stream: &dyn MeshStream) -> About {
@@ -152,93 +130,34 @@ fn about(title: &str, names: &Names, stream: &dyn MeshStream) -> About {
     }
 }
 
-fn fill_of(tets: u64, most: u64) -> Fill {
-    if tets <= most { Fill::Full } else { Fill::Hollow }
+/// The mesh of a run as it is shown.
+pub fn shown<'a>(made: &'a Generated, title: &str) -> Shown<'a> {
+    let about = about(title, &made.names, made.stream());
+    let tets = match made.levels_on_demand() {
+        Some(levels) => Tets::Levels(Box::new(levels)),
+        None => Tets::Stored(vec![made.stream()]),
+    };
+    Shown { tets, about }
 }
 
-fn refuse_large(parts: &[ViewPart]) -> Result<(), Failure> {
-    let tets: u64 = parts.iter().map(|part| part.tets.len() as u64).sum();
-    if tets <= MOST_HOLLOW {
-        return Ok(());
-    }
-    Err(Failure::input(format!(
-        "the surface of the mesh has {}, and at most {MOST_HOLLOW} can be shown: show a coarser mesh",
-        counted(tets, "tet", "tets")
-    )))
-}
-
-/// **Collective.** The only level of a mesh that is stored.
-fn of_stream(
+/// **Collective.** Serves the mesh of a run until Ctrl-C.
+pub fn serve_generated(
     comm: &dyn Communicator,
-    stream: &dyn MeshStream,
-    about: About,
-    most: u64,
-) -> Result<Vec<Viewed>, Failure> {
-    let fill = fill_of(stream.totals().tets, most);
-    let parts = gather(comm, &part(stream, fill))?;
-    agree(comm, refuse_large(&parts))?;
-    Ok(vec![Viewed { parts, about: About { hollow: fill == Fill::Hollow, ..about } }])
-}
-
-/// **Collective.** The levels of a mesh with at most this many tets; the finest first. A mesh
-/// without levels, or with too large a coarse mesh, is hollow.
-pub fn of_generated(
-    comm: &dyn Communicator,
-    made: &Generated,
+    made: Generated,
     title: &str,
-    most: u64,
-) -> Result<Vec<Viewed>, Failure> {
-    let stream = made.stream();
-    let about = about(title, &made.names, stream);
-    let n = made.pieces;
-    let coarse = stream.totals().tets / u64::from(n).pow(3);
-    // Any number of subdivisions is a level; the check of the mesh is about n and its halves only.
-    let largest = |fits: &dyn Fn(u64) -> bool| (1..=n).rev().find(|&m| fits(m.into()));
-    let finest = largest(&|m| coarse * m.pow(3) <= most);
-    let mut levels: Vec<u32> = std::iter::successors(finest, |&m| (m > 1).then_some(m / 2)).collect();
-    if most == SERVED {
-        // The surface of a finer level.
-        let boundary = stream.totals().boundary / u64::from(n).pow(2);
-        levels.extend(largest(&|m| boundary * m.pow(2) <= MOST_FACES).filter(|&m| Some(m) > finest));
-    }
-    let mut views = Vec::new();
-    for m in levels {
-        let about = About { pieces: Some([n, m]), ..about.clone() };
-        if m == n {
-            views.append(&mut of_stream(comm, stream, about, most)?);
-        } else if let Some(level) = agree(comm, made.with_pieces(m).map_err(Failure::from))? {
-            views.append(&mut of_stream(comm, &level, about, most)?);
+    port: Option<u16>,
+) -> Result<(), Failure> {
+    match shown(&made, title) {
+        Shown { tets: Tets::Levels(levels), about } => {
+            // Levels do not need the fine mesh, which can be most of the memory.
+            drop(made);
+            serve(comm, &Shown { tets: Tets::Levels(levels), about }, port)
         }
+        stored => serve(comm, &stored, port),
     }
-    if views.is_empty() {
-        return of_stream(comm, stream, about, most);
-    }
-    Ok(views)
 }
 
-/// Writes the finest level as a page, with the report if there is one.
-pub fn write_page(views: Vec<Viewed>, report: Option<&Report>, file: &Path) -> Result<(), Failure> {
-    let mut finest = views.into_iter().next().expect("a mesh has a level");
-    finest.about.report = report.map(|report| serde_json::to_value(report).expect("plain data"));
-    write_whole(file, &tetmill_view::page(&message(&finest.parts, &finest.about)))
-}
-
-/// Serves the levels until Ctrl-C.
-pub fn serve(views: Vec<Viewed>, port: Option<u16>) -> Result<(), Failure> {
-    let level = |view: Viewed| tetmill_view::Level {
-        pieces: view.about.pieces.map_or(1, |[_, shown]| shown),
-        hollow: view.about.hollow,
-        message: message(&view.parts, &view.about),
-    };
-    let levels = views.into_iter().map(level).collect();
-    let failed = |error: std::io::Error| match port {
-        Some(port) => Failure::input(format!("cannot serve on port {port}: {error}; choose another --port")),
-        None => Failure::new(Status::Resources, format!("cannot serve the page: {error}")),
-    };
-    let server = tetmill_view::Server::new(port, levels).map_err(failed)?;
-    let address = server.address().map_err(failed)?;
-    let opened = port.is_none() && tetmill_view::open(&address);
-    let advice = if opened { "" } else { "; open this address in a browser" };
-    eprintln!("viewing at {address} until Ctrl-C{advice}");
-    server.run(cancel::is_cancelled).map_err(failed)
+/// Writes a message as a page.
+pub fn write_page(message: &[u8], file: &Path) -> Result<(), Failure> {
+    write_whole(file, &tetmill_view::page(message))
 }

@@ -46,10 +46,19 @@ pub fn message(parts: &[ViewPart], about: &About) -> Vec<u8> {
     arrays.push("tets", "u32", tets.map(|v| v.to_le_bytes()));
     let neighbours = parts.iter().flat_map(|p| p.neighbours.as_flattened());
     arrays.push("neighbours", "i32", neighbours.map(|n| n.to_le_bytes()));
-    let patches = parts.iter().flat_map(|p| p.patches.as_flattened());
-    arrays.push("patches", "i16", patches.map(|&p| i16::try_from(p).unwrap_or(i16::MAX).to_le_bytes()));
-    let bodies = parts.iter().flat_map(|p| &p.bodies);
-    arrays.push("bodies", "u16", bodies.map(|&b| u16::try_from(b).unwrap_or(u16::MAX).to_le_bytes()));
+    let patches = parts.iter().flat_map(|p| p.patches.as_flattened()).copied();
+    match patches.clone().max() {
+        Some(last) if last > i16::MAX.into() => arrays.push("patches", "i32", patches.map(i32::to_le_bytes)),
+        _ => arrays.push("patches", "i16", patches.map(|p| (p as i16).to_le_bytes())),
+    }
+    let bodies = parts.iter().flat_map(|p| &p.bodies).copied();
+    match bodies.clone().max() {
+        Some(last) if last > u16::MAX.into() => arrays.push("bodies", "u32", bodies.map(u32::to_le_bytes)),
+        _ => arrays.push("bodies", "u16", bodies.map(|b| (b as u16).to_le_bytes())),
+    }
+    let nodes = parts.iter().flat_map(|p| p.nodes.as_flattened());
+    arrays.push("nodes", "u32", nodes.map(|v| v.to_le_bytes()));
+    arrays.push("owners", "u32", parts.iter().flat_map(|p| &p.owners).map(|o| o.to_le_bytes()));
     let quality = parts.iter().flat_map(|p| p.quality.as_flattened());
     arrays.push("quality", "f32", quality.map(|q| q.to_le_bytes()));
     let label = |label: &crate::ground::mesh::Label| json!({ "number": label.number, "names": label.names });
@@ -124,5 +133,22 @@ mod tests {
         let number = |k: usize| u32::from_le_bytes(bytes[start + 4 * k..][..4].try_into().unwrap());
         let read: Vec<u32> = (0..192).map(number).collect();
         assert_eq!(read, part.tets.as_flattened());
+    }
+
+    #[test]
+    fn large_numbers_of_boundaries_and_bodies_are_wider() {
+        let mut part = of_mesh(&cube(2), Fill::Full);
+        let types = |part: &ViewPart| {
+            let bytes = message(std::slice::from_ref(part), &About::default());
+            let length = u32::from_le_bytes(bytes[..4].try_into().unwrap()) as usize;
+            let head: serde_json::Value = serde_json::from_slice(&bytes[4..4 + length]).unwrap();
+            let arrays = head["arrays"].as_array().unwrap().clone();
+            ["patches", "bodies"]
+                .map(|name| arrays.iter().find(|a| a["name"] == name).unwrap()["type"].clone())
+        };
+        (part.patches[0][0], part.bodies[0]) = (32_767, 65_535);
+        assert_eq!(types(&part), ["i16", "u16"]);
+        (part.patches[0][0], part.bodies[0]) = (32_768, 65_536);
+        assert_eq!(types(&part), ["i32", "u32"]);
     }
 }

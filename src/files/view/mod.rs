@@ -3,22 +3,24 @@
 //! A **view part** is one part of a mesh as flat arrays: tets with their neighbours, patches and
 //! quality, from which a viewer draws boundaries, interfaces and cuts without further data. If a
 //! part is too large, it is read **hollow**: only tets with a face on the skin of the part are
-//! stored, so its size grows with the surface. [`gather`] sends all parts to rank 0, and
-//! [`message`](message()) packs them for the page.
-//!
-//! *Not* in a view part: the nodes on edges of second order, and ghosts. Edges are drawn straight.
+//! stored, so its size grows with the surface. For a cut, only the tets **near** a plane are
+//! stored. [`gather()`] sends all parts to rank 0, and [`message`](message()) packs them for the
+//! page.
 
 mod faces;
+mod gather;
 mod message;
+mod part;
+mod region;
+mod streams;
 
+pub use gather::gather;
 pub use message::{About, message};
+pub use part::{of_mesh, part};
+pub use region::Region;
+pub use streams::streams;
 
-use crate::Point;
-use crate::ground::comm::{CommError, Communicator};
-use crate::ground::kernel::quality::mean_ratio;
-use crate::ground::kernel::simplex::dihedral_angles;
-use crate::ground::mesh::stream::{LocalBlock, MeshStream};
-use crate::ground::mesh::{GlobalId, Mesh, TET_FACES};
+use crate::ground::mesh::{GlobalId, Rank};
 
 /// A face without a tet on its other side in this part.
 pub const OUTSIDE: i32 = -1;
@@ -38,6 +40,9 @@ pub struct ViewPart {
     pub ids: Vec<GlobalId>,
     /// Tets by index of `points`, positively oriented.
     pub tets: Vec<[u32; 4]>,
+    /// For second order, the nodes on their edges by index of `points`, in the order of
+    /// [`TET_EDGES`](crate::mesh::TET_EDGES); otherwise empty.
+    pub nodes: Vec<[u32; 6]>,
     /// Their global ids.
     pub tet_ids: Vec<GlobalId>,
     /// The index of the body of each tet.
@@ -46,111 +51,28 @@ pub struct ViewPart {
     pub neighbours: Vec<[i32; 4]>,
     /// The indices of the patches of these faces, or [`NO_PATCH`].
     pub patches: Vec<[i32; 4]>,
+    /// For ghosts the part that each tet belongs to; otherwise empty.
+    pub owners: Vec<Rank>,
     /// The smallest dihedral angle of each tet (degrees) and its mean ratio.
     pub quality: Vec<[f32; 2]>,
 }
 
 /// Which tets of a part are stored.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Fill {
     /// All.
     Full,
     /// Those with a face on the skin of the part or on a patch.
     Hollow,
-}
-
-/// *Local.* Reads a part.
-pub fn part(stream: &dyn MeshStream, fill: Fill) -> ViewPart {
-    let vertices = stream.counts().vertices as usize;
-    let mut on_skin = vec![false; vertices];
-    let mut all_ids = vec![0; vertices];
-    for index in 0..stream.vertex_blocks() {
-        let block = stream.vertex_block(index);
-        let local = block.local.start as usize..block.local.end as usize;
-        on_skin[local.clone()].fill(block.on_boundary || !block.holders.is_empty());
-        all_ids[local].iter_mut().zip(block.ids()).for_each(|(to, id)| *to = id);
-    }
-    let on_skin = |vertices: &[u32]| vertices.iter().all(|&v| on_skin[v as usize]);
-    let keep = |tet: &[u32; 4]| TET_FACES.iter().any(|face| on_skin(&face.map(|k| tet[k])));
-    let mut found = ViewPart::default();
-    let mut new_index = vec![u32::MAX; vertices];
-    // Corners by local index of the stream: its faces are matched by them.
-    let mut corners = Vec::new();
-    let (mut block, mut points) = (LocalBlock::default(), Vec::new());
-    for index in 0..stream.tet_blocks() {
-        stream.local_block(index, &mut block);
-        points.clear();
-        let body = block.tets.body.expect("a tet block has a body").0;
-        for (place, tet) in block.tets.tets.iter().enumerate() {
-            let local = tet.map(|k| block.vertices[k as usize]);
-            if fill == Fill::Hollow && !keep(&local) {
-                continue;
-            }
-            // Most blocks of a hollow part have no such tet.
-            if points.is_empty() {
-                stream.block_points(&block, &mut points);
-            }
-            for (k, vertex) in tet.iter().zip(local) {
-                let new = &mut new_index[vertex as usize];
-                if *new == u32::MAX {
-                    *new = found.points.len() as u32;
-                    found.points.push(points[*k as usize]);
-                    found.ids.push(all_ids[vertex as usize]);
-                }
-            }
-            corners.push(local);
-            found.tets.push(local.map(|vertex| new_index[vertex as usize]));
-            found.tet_ids.push(block.tets.first_id + place as u64);
-            found.bodies.push(body);
-            found.quality.push(quality_of(tet.map(|k| points[k as usize])));
-        }
-    }
-    let boundary = faces::on_patches(stream);
-    (found.neighbours, found.patches) = faces::of_tets(&corners, &boundary, |face| {
-        if fill == Fill::Full || on_skin(face) { OUTSIDE } else { UNKNOWN }
-    });
-    found
-}
-
-/// *Local.* Reads a mesh in one part.
-pub fn of_mesh(mesh: &Mesh, fill: Fill) -> ViewPart {
-    part(&super::plain::PlainPart::whole(mesh), fill)
-}
-
-/// The smallest dihedral angle in degrees, and the mean ratio, which is negative for an inverted
-/// tet.
-fn quality_of(tet: [[f64; 3]; 4]) -> [f32; 2] {
-    let p = tet.map(Point::from);
-    let angle = dihedral_angles(&p).into_iter().fold(f64::INFINITY, f64::min);
-    [angle as f32, mean_ratio(&p[0], &p[1], &p[2], &p[3]) as f32]
-}
-
-/// **Collective.** The parts of all ranks on rank 0, by rank; the others get an empty list.
-///
-/// # Errors
-/// If the ranks cannot communicate.
-pub fn gather(comm: &dyn Communicator, part: &ViewPart) -> Result<Vec<ViewPart>, CommError> {
-    let points = comm.gather(0, &part.points)?;
-    let rest = comm
-        .gather(0, &part.ids)?
-        .into_iter()
-        .zip(comm.gather(0, &part.tets)?)
-        .zip(comm.gather(0, &part.tet_ids)?)
-        .zip(comm.gather(0, &part.bodies)?)
-        .zip(comm.gather(0, &part.neighbours)?)
-        .zip(comm.gather(0, &part.patches)?)
-        .zip(comm.gather(0, &part.quality)?);
-    let join = |(points, ((((((ids, tets), tet_ids), bodies), neighbours), patches), quality))| ViewPart {
-        points,
-        ids,
-        tets,
-        tet_ids,
-        bodies,
-        neighbours,
-        patches,
-        quality,
-    };
-    Ok(points.into_iter().zip(rest).map(join).collect())
+    /// Those that meet a plane inside a box.
+    Near {
+        /// The plane and the box.
+        region: Region,
+        /// The maximum number of tets.
+        most: u64,
+    },
+    /// The ghosts of a stream with a halo, without the tets of the part.
+    Ghosts,
 }
 
 #[cfg(test)]
@@ -158,6 +80,7 @@ mod tests {
     use super::*;
     use crate::files::plain::PlainPart;
     use crate::files::testing::{cube, slabs, together};
+    use crate::parallel::halo::{By, WithHalo, halo};
 
     fn faces_of(part: &ViewPart, is: impl Fn(i32, i32) -> bool) -> usize {
         let both = part.neighbours.iter().flatten().zip(part.patches.iter().flatten());
@@ -189,12 +112,50 @@ mod tests {
     }
 
     #[test]
+    fn near_a_plane_are_the_tets_that_meet_it() {
+        let mesh = cube(4);
+        let region = Region { normal: [1.0, 0.0, 0.0], offset: 0.4, low: [0.0; 3], high: [4.0; 3] };
+        let full = of_mesh(&mesh, Fill::Full);
+        let x = |part: &ViewPart, tet: [u32; 4]| tet.map(|v| part.points[v as usize][0]);
+        let meets = |x: [f64; 4]| x.iter().any(|x| *x <= 0.4) && x.iter().any(|x| *x >= 0.4);
+        let expected = full.tets.iter().filter(|tet| meets(x(&full, **tet))).count();
+        let near = of_mesh(&mesh, Fill::Near { region, most: 1000 });
+        assert_eq!((near.tets.len(), near.tets.iter().all(|tet| meets(x(&near, *tet)))), (expected, true));
+        // One layer of cells inside: its four edges, and the interface of the bodies from both
+        // sides.
+        assert_eq!(faces_of(&near, |_, patch| patch != NO_PATCH), 2 * (16 + 2 * 4));
+        assert!(faces_of(&near, |neighbour, patch| neighbour == UNKNOWN && patch == NO_PATCH) > 0);
+        let half = Region { high: [4.0, 0.4, 4.0], ..region };
+        assert!(of_mesh(&mesh, Fill::Near { region: half, most: 1000 }).tets.len() < expected);
+        assert!(of_mesh(&mesh, Fill::Near { region, most: 5 }).tets.len() > 5, "too many, and said so");
+    }
+
+    #[test]
+    fn ghosts_are_the_tets_around_a_part() {
+        let mesh = cube(4);
+        let results = together(3, |comm| {
+            let stream = PlainPart::part(&mesh, &slabs(&mesh, 3), 3, comm.rank());
+            let ghosts = halo(comm, &stream, By::Vertices).unwrap();
+            (part(&stream, Fill::Full), part(&WithHalo::new(&stream, &ghosts), Fill::Ghosts))
+        });
+        for (rank, (own, ghosts)) in results.iter().enumerate() {
+            assert!(!ghosts.tets.is_empty() && ghosts.owners.len() == ghosts.tets.len());
+            for (tet, owner) in ghosts.tets.iter().zip(&ghosts.owners) {
+                assert_ne!(*owner, rank as u32);
+                assert!(tet.iter().any(|v| own.ids.contains(&ghosts.ids[*v as usize])), "touches the part");
+            }
+            let owned = |(id, owner): (&u64, &u32)| results[*owner as usize].0.tet_ids.contains(id);
+            assert!(ghosts.tet_ids.iter().zip(&ghosts.owners).all(owned));
+        }
+    }
+
+    #[test]
     fn rank_0_gets_all_parts() {
         let mesh = cube(2);
         let results = together(3, |comm| {
             let stream = PlainPart::part(&mesh, &slabs(&mesh, 3), 3, comm.rank());
             let own = part(&stream, Fill::Full);
-            let all = gather(comm, &own).unwrap();
+            let all = gather(comm, vec![own.clone()]).unwrap();
             (own, all)
         });
         let own: Vec<ViewPart> = results.iter().map(|(own, _)| own.clone()).collect();

@@ -69,7 +69,7 @@ pub(super) fn assemble(mut raw: Raw) -> Result<VolumeMesh, Fault> {
     classify::classify(&mut mesh, &raw.edges, &raw.edge_labels, &mut notes);
     let inverted = orient::not_positive(&mesh.points, &mesh.tets).into_iter().map(TetId).collect();
     let links = periodic::links(&mesh, &raw.periodic, &mut notes);
-    Ok(VolumeMesh { mesh, names, edge_points, turned, inverted, links, notes })
+    Ok(VolumeMesh { mesh, names, edge_points, turned, inverted, parts: Vec::new(), links, notes })
 }
 
 /// The coordinates of the nodes on the edges of all tets, if all are of second order.

@@ -49,7 +49,7 @@ pub use super::input::{Place, ReadError};
 use super::arrays::{ArrayError, MeshArrays, check};
 use super::input::{Fault, ending, load, refuse_missing};
 use crate::ground::mesh::periodic::Link;
-use crate::ground::mesh::{Mesh, Names, TetId};
+use crate::ground::mesh::{Mesh, Names, Rank, TetId};
 use raw::{Label, NamesByNumber, Raw};
 use std::collections::BTreeMap;
 use std::io::Read;
@@ -74,6 +74,8 @@ pub struct VolumeMesh {
     pub turned: usize,
     /// Tets that are not positively oriented: inverted or flat.
     pub inverted: Vec<TetId>,
+    /// For each tet the piece of a `.pvtu` that has it, from 0; empty for other formats.
+    pub parts: Vec<Rank>,
     /// Periodic copies of patches, with their masters.
     pub links: Vec<Link>,
     /// Repairs, additions and omissions, one sentence each.

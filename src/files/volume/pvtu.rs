@@ -25,7 +25,7 @@ pub(super) fn read(path: &Path) -> Result<VolumeMesh, ReadError> {
         let boundary = read_pieces(&beside)?;
         add_boundary(&mut whole, boundary).map_err(|fault| fault.in_file(&beside, b""))?;
     }
-    finish(Ok(whole.raw), path, b"")
+    Ok(VolumeMesh { parts: whole.parts, ..finish(Ok(whole.raw), path, b"")? })
 }
 
 /// Reads the pieces of an index file as one grid.
@@ -70,9 +70,10 @@ fn join(pieces: Vec<Grid>) -> Result<Grid, Fault> {
         if have_ids { join_by_id(&pieces, &mut whole)? } else { join_by_place(&pieces, &mut whole.raw)? };
     let have_tet_ids = pieces.iter().all(|piece| piece.tet_ids.len() == piece.raw.tets.len());
     let raw = &mut whole.raw;
-    for (piece, places) in pieces.into_iter().zip(places) {
+    for ((piece, places), number) in pieces.into_iter().zip(places).zip(0..) {
         let of = piece.raw;
         raw.tets.extend(of.tets.iter().map(|tet| tet.map(|v| places[v as usize])));
+        whole.parts.resize(raw.tets.len(), number);
         raw.tet_labels.extend(of.tet_labels);
         raw.triangles.extend(of.triangles.iter().map(|triangle| triangle.map(|v| places[v as usize])));
         raw.triangle_labels.extend(of.triangle_labels);
@@ -103,6 +104,7 @@ fn sort_tets(whole: &mut Grid) {
         whole.raw.edge_nodes = order.iter().map(|&tet| whole.raw.edge_nodes[tet]).collect();
     }
     whole.raw.tets = order.iter().map(|&tet| whole.raw.tets[tet]).collect();
+    whole.parts = order.iter().map(|&tet| whole.parts[tet]).collect();
     whole.raw.tet_labels = order.iter().map(|&tet| whole.raw.tet_labels[tet]).collect();
 }
 

@@ -39,6 +39,8 @@ pub(super) struct Grid {
     pub raw: Raw,
     pub vertex_ids: Vec<i64>,
     pub tet_ids: Vec<i64>,
+    /// The piece of each tet, if several were joined.
+    pub parts: Vec<u32>,
 }
 
 /// The numbers of cells in the first of these arrays that exists.
@@ -143,7 +145,12 @@ pub(super) fn parse(content: &[u8]) -> Result<Grid, Fault> {
             "the pairs of periodic vertices (PeriodicId) are left out: the mesh is not periodic here".into(),
         );
     }
-    Ok(Grid { raw, vertex_ids: document.ids(Section::PointData, "GlobalNodeId")?, tet_ids })
+    Ok(Grid {
+        raw,
+        vertex_ids: document.ids(Section::PointData, "GlobalNodeId")?,
+        tet_ids,
+        parts: Vec::new(),
+    })
 }
 
 /// The shape of a VTK cell type.

@@ -57,6 +57,8 @@ fn the_parts_of_a_mesh_come_back_as_the_mesh() {
             let stem = dir.path().join("a & b");
             let mesh = write_cube(ranks, boundary, &stem);
             let found = read(&stem.with_extension(if ranks == 1 { "vtu" } else { "pvtu" })).unwrap();
+            let parts = if ranks == 1 { Vec::new() } else { scattered(&mesh, ranks) };
+            assert_eq!(found.parts, parts);
             assert_eq!(found.mesh.points, mesh.points);
             assert_eq!((&found.mesh.tets, &found.mesh.bodies), (&mesh.tets, &mesh.bodies));
             assert_eq!(triangles(&found.mesh, &found.names), triangles(&mesh, &names()));
@@ -87,6 +89,7 @@ fn ghosts_of_parts_are_left_out() {
         let found = read(&stem.with_extension("pvtu")).unwrap();
         assert_eq!((found.mesh.points, found.mesh.tets), (mesh.points.clone(), mesh.tets.clone()));
         assert_eq!(found.mesh.triangles.len(), mesh.triangles.len());
+        assert_eq!(found.parts, scattered(&mesh, 3), "of the part, not of its ghosts");
         assert!(found.notes.is_empty(), "{:?}", found.notes);
         fs::remove_file(stem.with_extension("pvtu")).unwrap();
     }

@@ -19,6 +19,20 @@ pub fn conformance(comm: &dyn Communicator) {
     consecutive_exchanges_do_not_mix(comm);
     long_messages_arrive_whole(comm);
     errors_are_agreed_on(comm);
+    a_rest_ends_when_rank_0_says_so(comm);
+}
+
+fn a_rest_ends_when_rank_0_says_so(comm: &dyn Communicator) {
+    for calls in [1, 4] {
+        let mut called = 0;
+        let mut is_over = || {
+            called += 1;
+            called == calls
+        };
+        comm.rest(&mut is_over).unwrap();
+        assert_eq!(called, if comm.rank() == 0 { calls } else { 0 });
+    }
+    comm.barrier().unwrap();
 }
 
 /// A message that encodes its sender, receiver and length.

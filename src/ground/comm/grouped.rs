@@ -42,6 +42,7 @@ enum Operation {
         fold: Fold,
         count: u32,
     },
+    Rest,
     /// No more operations follow: idle processes may return.
     End,
 }
@@ -60,6 +61,7 @@ impl Operation {
             Self::Fold { fold: Fold::Sum, count } => [7, count],
             Self::Fold { fold: Fold::Max, count } => [8, count],
             Self::Fold { fold: Fold::SumBefore, count } => [9, count],
+            Self::Rest => [10, 0],
         }
     }
 
@@ -76,6 +78,7 @@ impl Operation {
             7 => Self::Fold { fold: Fold::Sum, count },
             8 => Self::Fold { fold: Fold::Max, count },
             9 => Self::Fold { fold: Fold::SumBefore, count },
+            10 => Self::Rest,
             _ => panic!("unknown operation {kind}"),
         }
     }
@@ -153,7 +156,7 @@ pub fn run<R: Send>(
     let results: Vec<R> =
         results.into_iter().map(|result| result.unwrap_or_else(|panic| resume_unwind(panic))).collect();
     if deal.some_are_idle() {
-        perform(outer, deal, Operation::End, Vec::new())?;
+        perform(outer, deal, Operation::End, Vec::new(), &mut || true)?;
     }
     Ok(results)
 }
@@ -165,7 +168,7 @@ const STACK: usize = 4 << 20;
 fn serve<R>(outer: &dyn Communicator, deal: Deal) -> Result<Vec<R>, CommError> {
     loop {
         // The operation is received from process 0.
-        if perform(outer, deal, Operation::End, Vec::new())?.0 == Operation::End {
+        if perform(outer, deal, Operation::End, Vec::new(), &mut || true)?.0 == Operation::End {
             return Ok(Vec::new());
         }
     }
@@ -183,12 +186,14 @@ struct Delivery {
 }
 
 /// **Collective** over the processes. Performs an operation with the messages of all ranks of this
-/// process. Also returns the operation, which an idle process does not know.
+/// process. Also returns the operation, which an idle process does not know. `is_over` ends a rest
+/// and is called on process 0, whose leader is rank 0.
 fn perform(
     outer: &dyn Communicator,
     deal: Deal,
     operation: Operation,
     mut brought: Vec<Messages>,
+    is_over: &mut dyn FnMut() -> bool,
 ) -> Result<(Operation, Delivery), CommError> {
     let mut operation = operation;
     if deal.some_are_idle() {
@@ -217,6 +222,7 @@ fn perform(
     match operation {
         Operation::End => {}
         Operation::Barrier => outer.barrier()?,
+        Operation::Rest => outer.rest(is_over)?,
         Operation::Broadcast { root } => {
             let from_root =
                 own.contains(&root).then(|| std::mem::take(&mut brought[(root - own.start) as usize]));
@@ -366,6 +372,17 @@ impl GroupComm<'_> {
         messages: Messages,
         pick_up: impl FnOnce(&mut Delivery, usize) -> T,
     ) -> Result<T, CommError> {
+        self.meet_until(&mut || true, operation, messages, pick_up)
+    }
+
+    /// The same for an operation that `is_over` ends on rank 0.
+    fn meet_until<T>(
+        &self,
+        is_over: &mut dyn FnMut() -> bool,
+        operation: Operation,
+        messages: Messages,
+        pick_up: impl FnOnce(&mut Delivery, usize) -> T,
+    ) -> Result<T, CommError> {
         let place = (self.rank - self.meeting.own.start) as usize;
         let count = self.meeting.own.len();
         let mut state = self.meeting.lock();
@@ -384,7 +401,8 @@ impl GroupComm<'_> {
             }
             let brought = std::mem::replace(&mut state.brought, vec![Vec::new(); count]);
             // The other ranks sleep meanwhile.
-            state.delivery = perform(outer, self.deal, operation, brought).map(|(_, delivery)| delivery);
+            state.delivery =
+                perform(outer, self.deal, operation, brought, is_over).map(|(_, delivery)| delivery);
             (state.arrived, state.operation) = (0, None);
             state.round += 1;
             self.meeting.changed.notify_all();
@@ -412,6 +430,10 @@ impl Communicator for GroupComm<'_> {
 
     fn barrier(&self) -> Result<(), CommError> {
         self.meet(Operation::Barrier, Vec::new(), |_, _| ())
+    }
+
+    fn rest(&self, is_over: &mut dyn FnMut() -> bool) -> Result<(), CommError> {
+        self.meet_until(is_over, Operation::Rest, Vec::new(), |_, _| ())
     }
 
     fn broadcast_bytes(&self, root: Rank, bytes: &mut Vec<u8>) -> Result<(), CommError> {

@@ -48,6 +48,10 @@ pub use fold::Fold;
 pub type Rank = u32;
 
 use crate::ground::error::{ErrorKind, HasKind};
+use std::time::Duration;
+
+/// How long a rank sleeps between two tests while it rests.
+const REST: Duration = Duration::from_millis(5);
 
 /// Why this rank cannot continue although it had no error of its own.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -137,5 +141,19 @@ pub trait Communicator {
     /// Backends should override it: the default receives the numbers of all ranks.
     fn fold(&self, fold: Fold, numbers: &mut [u64]) -> Result<(), CommError> {
         fold::by_all_gather(self, fold, numbers)
+    }
+    /// **Collective.** Waits until `is_over` returns true on rank 0, where it is called every few
+    /// milliseconds; it is not called on other ranks. All ranks sleep meanwhile, while in other
+    /// operations they may wait busily: for programs that wait for a person.
+    fn rest(&self, is_over: &mut dyn FnMut() -> bool) -> Result<(), CommError> {
+        sleep_until(self.rank(), is_over);
+        self.barrier()
+    }
+}
+
+/// *Local.* Sleeps on rank 0 until `is_over` returns true.
+fn sleep_until(rank: Rank, is_over: &mut dyn FnMut() -> bool) {
+    while rank == 0 && !is_over() {
+        std::thread::sleep(REST);
     }
 }

@@ -14,7 +14,7 @@
 pub use ::mpi as rsmpi;
 
 use super::launch::{Launch, LaunchError, this_process};
-use super::{CommError, Communicator, Fold};
+use super::{CommError, Communicator, Fold, REST, sleep_until};
 use crate::ground::comm::Rank;
 use mpi::collective::{CommunicatorCollectives, SystemOperation};
 use mpi::datatype::PartitionMut;
@@ -265,6 +265,17 @@ impl Communicator for MpiComm {
 
     fn barrier(&self) -> Result<(), CommError> {
         self.world().barrier();
+        Ok(())
+    }
+
+    /// MPI libraries wait busily in a barrier, so a nonblocking one is tested now and then.
+    fn rest(&self, is_over: &mut dyn FnMut() -> bool) -> Result<(), CommError> {
+        sleep_until(self.rank(), is_over);
+        let mut barrier = self.world().immediate_barrier();
+        while let Err(not_yet) = barrier.test() {
+            barrier = not_yet;
+            std::thread::sleep(REST);
+        }
         Ok(())
     }
 

@@ -34,6 +34,7 @@ mod run;
 pub mod snap;
 pub mod stored;
 mod straight;
+pub mod subset;
 mod tet;
 pub mod trial;
 
@@ -207,6 +208,19 @@ pub fn refine_watched(
 ) -> Result<RefinedMesh, RefineError> {
     let (refined, bad) = refine_reporting(mesh, projector, n, settings, work)?;
     if bad.is_empty() { Ok(refined) } else { Err(tet::inverted(&bad, settings.described)) }
+}
+
+/// *Local.* [`refine()`] for pictures: bad children are part of the mesh.
+///
+/// # Errors
+/// As [`refine()`], except [`RefineError::Inverted`].
+pub fn refine_as_is(
+    mesh: DistMesh,
+    projector: &Projector,
+    n: u32,
+    settings: &Settings,
+) -> Result<RefinedMesh, RefineError> {
+    Ok(refine_unchecked(mesh, projector, n, settings)?.0)
 }
 
 /// Refines without rejecting bad children; also returns the coarse tets that have some.

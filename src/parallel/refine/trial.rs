@@ -1,8 +1,8 @@
 //! Refinement test of a coarse mesh: refines its curved tets, a chunk at a time, and reports bad
 //! children.
 
-use super::mend::extract;
 use super::snap;
+use super::subset::extract;
 use super::tet::inverted;
 use super::{EdgeDisplacements, RefineError, RefinedMesh, Settings, refine_unchecked};
 use crate::ground::kernel::jacobian;

@@ -2,8 +2,8 @@
 
 const LETTERS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
 
-/// Encodes bytes, with padding.
-pub fn encode(bytes: &[u8]) -> String {
+/// Bytes in base64, with padding.
+pub fn base64(bytes: &[u8]) -> String {
     let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);
     for chunk in bytes.chunks(3) {
         let byte = |k: usize| u32::from(chunk.get(k).copied().unwrap_or(0));
@@ -24,7 +24,7 @@ mod tests {
     fn the_examples_of_the_standard() {
         let examples = [("", ""), ("f", "Zg=="), ("fo", "Zm8="), ("foo", "Zm9v"), ("foobar", "Zm9vYmFy")];
         for (text, encoded) in examples {
-            assert_eq!(encode(text.as_bytes()), encoded);
+            assert_eq!(base64(text.as_bytes()), encoded);
         }
     }
 }
