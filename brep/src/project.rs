@@ -13,7 +13,7 @@ pub struct CurveFoot {
     pub point: Point,
     /// The unit tangent, or zero where the curve has none.
     pub tangent: Vector,
-    /// Whether the way to the point is orthogonal to the curve, or the foot is an end.
+    /// Whether the way to the point is orthogonal to the curve, or the foot is an end or a kink.
     pub is_converged: bool,
 }
 
@@ -26,7 +26,7 @@ pub struct SurfaceFoot {
     pub point: Point,
     /// The unit normal along the cross product of the derivatives, or zero at poles.
     pub normal: Vector,
-    /// Whether the way to the point is orthogonal to the surface.
+    /// Whether the way to the point is orthogonal to the surface, or the foot is a pole or a kink.
     pub is_converged: bool,
 }
 
@@ -89,7 +89,12 @@ pub fn project_to_curve(curve: &Curve<3>, range: [f64; 2], point: &Point, start:
     let tangent = jet[1].try_normalize(0.0).unwrap_or_else(Vector::zeros);
     let rounding = ROUNDING * scale;
     let is_end = t == range[0] || t == range[1];
-    let is_converged = is_end || way.dot(&tangent).abs() <= ORTHOGONAL * way.norm() + rounding;
+    let along = way.dot(&tangent).abs();
+    // At a kink the nearest point is where the distance grows in both directions.
+    let grows = |h: f64| is_nearer(&way, &(curve.point(clamp(t + h)) - point.coords), scale);
+    let step = along / jet[1].norm().max(f64::MIN_POSITIVE);
+    let is_kink = || [-step, step, -0.1 * step, 0.1 * step].into_iter().all(grows);
+    let is_converged = is_end || along <= ORTHOGONAL * way.norm() + rounding || is_kink();
     CurveFoot { parameter: t, point: Point::from(jet[0]), tangent, is_converged }
 }
 
@@ -138,10 +143,18 @@ pub fn project_to_surface(surface: &Surface, point: &Point, start: [f64; 2]) -> 
     }
     let foot = jet.point();
     let way = foot - point;
-    let normal = jet.normal().try_normalize(0.0).unwrap_or_else(Vector::zeros);
+    let normal = jet.normal().unwrap_or_else(Vector::zeros);
     let rounding = ROUNDING * scale;
-    let along = way - normal * normal.dot(&way);
-    let is_converged = normal == Vector::zeros() || along.norm() <= ORTHOGONAL * way.norm() + rounding;
+    let along = (way - normal * normal.dot(&way)).norm();
+    let grows = |[a, b]: [f64; 2]| is_nearer(&way, &(surface.point([u + a, v + b]) - point), scale);
+    let [a, b] =
+        [jet.d[1][0], jet.d[0][1]].map(|d| along / d.norm().max(f64::MIN_POSITIVE)).map(|h| h.min(1.0));
+    // At a kink the nearest point is where the distance grows in all directions.
+    let is_kink = || {
+        let around = [[-a, 0.0], [a, 0.0], [0.0, -b], [0.0, b], [-a, -b], [a, b], [-a, b], [a, -b]];
+        around.into_iter().all(|step| grows(step) && grows(step.map(|h| 0.1 * h)))
+    };
+    let is_converged = normal == Vector::zeros() || along <= ORTHOGONAL * way.norm() + rounding || is_kink();
     SurfaceFoot { parameters: [u, v], point: foot, normal, is_converged }
 }
 

@@ -20,9 +20,16 @@ impl Jet {
         Point::from(self.d[0][0])
     }
 
-    /// The cross product of the first derivatives.
-    pub fn normal(&self) -> Vector {
-        self.d[1][0].cross(&self.d[0][1])
+    /// The unit normal, along the cross product of the first derivatives; `None` at poles, where
+    /// one of them vanishes up to rounding, and where they are parallel.
+    pub fn normal(&self) -> Option<Vector> {
+        /// The shortest derivative, or sine of the angle between them, that is not rounding.
+        const LEAST: f64 = 1e-10;
+        let [a, b] = [self.d[1][0], self.d[0][1]];
+        let (p, q) = (a.norm(), b.norm());
+        let cross = a.cross(&b);
+        let is_regular = p.min(q) > LEAST * p.max(q) && cross.norm() > LEAST * p * q;
+        if is_regular { cross.try_normalize(0.0) } else { None }
     }
 }
 

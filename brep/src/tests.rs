@@ -174,7 +174,7 @@ proptest! {
         let samples = || (0..=40).map(|k| f64::from(k) * 0.04 - 0.1);
         for surface in random.surfaces() {
             let jet = surface.jet(u, v, 1);
-            let point = jet.point() + jet.normal().normalize() * off;
+            let point = jet.point() + jet.normal().unwrap() * off;
             let distance = |p: &[f64; 2]| (surface.point(*p) - point).norm();
             let grid = samples().flat_map(|u| samples().map(move |v| [u, v]));
             let nearest = grid.min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap();

@@ -6,10 +6,10 @@ use super::coarse_mesh::CoarseMesh;
 use super::error::{Error, InputError};
 use super::expected;
 use super::fill::fill;
-use super::input::read_bytes;
 use super::retries::Budget;
 use super::settings::InputSettings;
 use crate::Point;
+use crate::files::input::ReadError;
 use crate::files::surface::{self, Surface};
 use crate::ground::kernel::simplex::volume6;
 use crate::ground::mesh::{BoundaryTriangle, Class, Label, Names, Segment, VertexId};
@@ -142,7 +142,7 @@ impl FacetSolid {
         settings: &InputSettings,
         note: &mut dyn FnMut(&str),
     ) -> Result<Self, Error> {
-        let text = read_bytes(path)?;
+        let text = std::fs::read(path).map_err(ReadError::io(path))?;
         let refuse = |error| Error::Brep { path: path.to_path_buf(), error: Box::new(error) };
         let mut brep = brep::Model::read(&text).map_err(refuse)?;
         let (model, exact) = tessellated(&mut brep).map_err(refuse)?;

@@ -88,7 +88,9 @@ fn is_fine(
     let is_short = along.norm() < shortest;
     let is_straight = is_short || turn <= angle;
     let is_flat = |beside: &Beside| {
-        let normals = [a, 0.5 * (a + b), b].map(|t| normal(edge, *beside, t));
+        // Poles have no normal.
+        let normals = [a, 0.5 * (a + b), b].into_iter().filter_map(|t| normal(edge, *beside, t));
+        let normals: Vec<Vector> = normals.collect();
         normals.windows(2).map(|n| n[0].angle(&n[1])).sum::<f64>() <= angle
     };
     is_straight
@@ -96,10 +98,9 @@ fn is_fine(
         && [0.25, 0.5, 0.75].into_iter().all(|share| off(share) <= chord)
 }
 
-/// The cross product of a surface's derivatives at a point of one of its sides.
-fn normal(edge: &EdgeCurve, (surface, fin): Beside, t: f64) -> Vector {
-    let Some(curve) = &fin.curve else { return Vector::zeros() };
-    let [u, v]: [f64; 2] = curve.point(fin.parameter(t, edge.range)).into();
+/// The normal of a surface at a point of one of its sides, if it has one there.
+fn normal(edge: &EdgeCurve, (surface, fin): Beside, t: f64) -> Option<Vector> {
+    let [u, v]: [f64; 2] = fin.curve.as_ref()?.point(fin.parameter(t, edge.range)).into();
     surface.jet(u, v, 1).normal()
 }
 

@@ -339,7 +339,7 @@ impl Face<'_> {
         let [m, n] = [(i, a), (j, b)].map(|(i, node)| {
             *normals[i].get_or_insert_with(|| {
                 let [u, v] = node.parameters;
-                self.patch.surface.jet(u, v, 1).normal().try_normalize(0.0).unwrap_or_else(Vector::zeros)
+                self.patch.surface.jet(u, v, 1).normal().unwrap_or_else(Vector::zeros)
             })
         });
         let is_pole = m == Vector::zeros() || n == Vector::zeros();
@@ -362,7 +362,7 @@ impl Face<'_> {
         let off = normal.dot(&(jet.point() - a)).abs() / self.tolerances.chord;
         // The normals of slivers are arbitrary.
         let is_sliver = area.norm() < 1e-2 * longest * self.tolerances.chord.min(longest);
-        let own = jet.normal().try_normalize(0.0).unwrap_or(normal);
+        let own = jet.normal().unwrap_or(normal);
         let is_folded = !is_sliver && longest > SHORTEST * self.tolerances.diagonal && normal.dot(&own) < 0.3;
         off.max(if is_folded { 2.0 } else { 0.0 })
     }

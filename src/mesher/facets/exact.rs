@@ -103,7 +103,7 @@ fn corner_normals(model: &Model, tessellation: &Tessellation, is_reversed: &[boo
         let [a, b, c] = t.vertices.map(|v| tessellation.points[v as usize]);
         let flat = (b - a).cross(&(c - a)).try_normalize(0.0).unwrap_or_else(Vector::z);
         let [p, q, r] = t.parameters.map(|[u, v]| {
-            let normal = surface.jet(u, v, 1).normal().try_normalize(0.0);
+            let normal = surface.jet(u, v, 1).normal();
             // At poles rounding decides.
             normal.filter(|n| n.dot(&flat) > 0.5).unwrap_or(flat) * sign
         });
@@ -126,7 +126,7 @@ fn curves_in_use(model: &Model, tessellation: &Tessellation) -> Vec<usize> {
         [(p, one), (q, other)] if p == q => {
             let normal = |fin: &brep::Fin, t: f64| {
                 let [u, v] = fin.curve.as_ref()?.point(fin.parameter(t, model.curves[c].range)).into();
-                model.patches[p].surface.jet(u, v, 1).normal().try_normalize(0.0)
+                model.patches[p].surface.jet(u, v, 1).normal()
             };
             let is_smooth = |t: f64| match (normal(one, t), normal(other, t)) {
                 (Some(m), Some(n)) => m.angle(&n) < SMOOTH,
