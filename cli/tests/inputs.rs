@@ -116,7 +116,7 @@ fn sizes_for_a_mesh_and_mixed_inputs_are_refused() {
     refused(&[mesh.as_os_str(), brick.as_os_str()], "surfaces");
     let step = dir.path().join("part.step");
     std::fs::write(&step, "").unwrap();
-    refused(&[step.as_os_str()], "export the part as STL");
+    refused(&[step.as_os_str()], "convert it to BREP");
     let open = dir.path().join("open.stl");
     let text = std::fs::read_to_string(&brick).unwrap();
     let facets: Vec<&str> = text.split_inclusive("endfacet\n").collect();

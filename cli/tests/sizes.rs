@@ -90,7 +90,7 @@ fn cad_files_are_refused_with_what_to_do() {
     let dir = tempfile::tempdir().unwrap();
     let file = dir.path().join("part.STEP");
     std::fs::write(&file, "ISO-10303-21;").unwrap();
-    assert_refused(&mesh(&file, &[]), 2, "export the part as STL");
+    assert_refused(&mesh(&file, &[]), 2, "convert it to BREP");
 }
 
 #[test]

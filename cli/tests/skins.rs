@@ -78,8 +78,11 @@ fn the_method_refine_has_levels_instead() {
 }
 
 #[test]
-fn periodic_faces_are_refused_by_name() {
-    let output = tetmill().arg("generate").arg(own("unit_cell")).args(["-m", "surface"]).output().unwrap();
+fn periodic_faces_are_kept_by_surface_and_refused_by_decompose() {
+    let report = report_of(&own("unit_cell"), &["-m", "surface", "-n", "2", "--refine", "1"]);
+    assert_eq!(report["periodic"]["lost"], 0);
+    assert!(report["periodic"]["pairs"].as_u64().unwrap() > 100, "{}", report["periodic"]);
+    let output = tetmill().arg("generate").arg(own("unit_cell")).args(["-m", "decompose"]).output().unwrap();
     assert_eq!(output.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&output.stderr).contains("identify periodic"));
 }
