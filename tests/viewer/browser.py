@@ -8,6 +8,7 @@ import json
 import os
 import re
 import shutil
+import signal
 import struct
 import subprocess
 import tempfile
@@ -113,7 +114,13 @@ class Browser(unittest.TestCase):
         return before["drawn"], after["drawn"]
 
     def serve(self, *arguments, launcher=(), env=None):
-        server = subprocess.Popen([*launcher, TETMILL, *map(str, arguments)], env=env, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True, cwd=ROOT)
+        # Background jobs ignore Ctrl-C, and jobs under nohup hang-ups: a server would inherit that and install no handler.
+        def interruptible():
+            for which in (signal.SIGINT, signal.SIGHUP):
+                signal.signal(which, signal.SIG_DFL)
+
+        server = subprocess.Popen([*launcher, TETMILL, *map(str, arguments)], env=env, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True, cwd=ROOT,
+                                  preexec_fn=interruptible)
         self.addCleanup(server.stderr.close)
         self.addCleanup(server.wait)
         self.addCleanup(server.kill)
