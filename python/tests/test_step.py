@@ -1,5 +1,6 @@
 """STEP files, converted by the package gmsh."""
 
+import subprocess
 import sys
 
 import numpy as np
@@ -9,16 +10,21 @@ import tetmill
 gmsh = pytest.importorskip("gmsh", reason="no package gmsh, which reads STEP")
 
 
+# In a process of its own: once OpenCASCADE has read a file in metres, it writes others in metres too.
+MAKE = """
+import gmsh, sys
+gmsh.initialize(interruptible=False)
+gmsh.model.occ.addCylinder(0, 0, 0, 0, 0, 2, 1)
+gmsh.model.occ.synchronize()
+gmsh.write(sys.argv[1])
+"""
+
+
 @pytest.fixture
 def cylinder(tmp_path):
     """A STEP file of a cylinder of radius 1 and height 2, in millimetres."""
-    gmsh.initialize(interruptible=False)
-    gmsh.option.setNumber("General.Terminal", 0)
-    gmsh.model.occ.addCylinder(0, 0, 0, 0, 0, 2, 1)
-    gmsh.model.occ.synchronize()
     path = tmp_path / "cylinder.step"
-    gmsh.write(str(path))
-    gmsh.finalize()
+    subprocess.run([sys.executable, "-c", MAKE, path], check=True, stdout=subprocess.DEVNULL)
     return path
 
 
@@ -28,7 +34,7 @@ def test_a_part_has_its_size_in_the_unit_of_its_file(cylinder, unit):
     assert ".MILLI.,.METRE." in text
     cylinder.write_text(text.replace(".MILLI.,.METRE.", f"{unit},.METRE."))
     mesh = tetmill.Geometry(cylinder).generate(maxh=0.5, levels=1)
-    assert mesh.points.min() == pytest.approx(-1, rel=1e-9) and mesh.points.max() == pytest.approx(2, rel=1e-9)
+    assert np.ptp(mesh.points[:, 2]) == pytest.approx(2, rel=1e-9)
     assert mesh.report["mesh"]["volume"] == pytest.approx(2 * np.pi, rel=0.02)
     # On the true cylinder, also after refinement.
     side = np.unique(mesh.faces[np.isin(mesh.face_tags, [1, 2, 3])])
