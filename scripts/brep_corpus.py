@@ -245,26 +245,24 @@ def ellipse_prism():
     occ.extrude([(2, occ.addPlaneSurface([occ.addCurveLoop([e])]))], 0, 0, 0.5)
 
 
-@part
-def spline_top():
+def under_spline():
+    """A column below a wavy B-spline surface."""
     points = []
     for i in range(5):
         for j in range(5):
             points.append(occ.addPoint(i / 4, j / 4, 1 + 0.15 * math.sin(2 * i) * math.cos(1.7 * j)))
     top = occ.addBSplineSurface(points, 5)
-    out = occ.extrude([(2, top)], 0, 0, -1)
-    assert out
+    return [t for d, t in occ.extrude([(2, top)], 0, 0, -1) if d == 3][0]
+
+
+@part
+def spline_top():
+    under_spline()
 
 
 @part
 def spline_less_cylinder():
-    points = []
-    for i in range(5):
-        for j in range(5):
-            points.append(occ.addPoint(i / 4, j / 4, 1 + 0.15 * math.sin(2 * i) * math.cos(1.7 * j)))
-    top = occ.addBSplineSurface(points, 5)
-    solid = [t for d, t in occ.extrude([(2, top)], 0, 0, -1) if d == 3][0]
-    cut(solid, occ.addCylinder(0.5, 0.5, -1, 0.2, 0, 4, 0.2))
+    cut(under_spline(), occ.addCylinder(0.5, 0.5, -1, 0.2, 0, 4, 0.2))
 
 
 @part

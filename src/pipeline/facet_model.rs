@@ -17,10 +17,11 @@ use crate::ground::progress::Work;
 use crate::ground::projector::{BrepProjector, Projector};
 use crate::ground::size::{Accuracy, Closeness, SizeField, SizeSettings, Source, WatchedSize};
 use crate::mesher::facets::{
-    Crossing, FacetBodies, FacetError, FacetModel, FacetPatch, FacetSize, Facets, Marks, RemeshSettings,
-    SharpPlaces, keep, of_brep, remesh,
+    Crossing, FacetBodies, FacetError, FacetModel, FacetPatch, FacetSize, FacetSmoothness, Facets, Marks,
+    RemeshSettings, SharpPlaces, keep, of_brep, remesh,
 };
-use crate::mesher::smoothness::smoothness;
+use crate::mesher::improve::Smoothness;
+use crate::mesher::smoothness::BrepSmoothness;
 use crate::mesher::surface::SurfaceMesh;
 use crate::mesher::surface::closeness::{ThinRegions, Walls, thin_regions};
 use csg::{BodyId, CornerId, CurveId, PatchId};
@@ -130,6 +131,15 @@ impl FacetSolid {
             _ if self.keep_surface => Projector::Flat,
             Some(exact) => exact.clone().into(),
             None => self.model.projector.clone().into(),
+        }
+    }
+
+    /// The smoothness of the faces; none of kept facets, which are not projected to.
+    fn smoothness(&self) -> Option<Box<dyn Smoothness + '_>> {
+        match &self.exact {
+            _ if self.keep_surface => None,
+            Some(exact) => Some(Box::new(BrepSmoothness(exact))),
+            None => Some(Box::new(FacetSmoothness(&self.model.projector))),
         }
     }
 
@@ -245,8 +255,7 @@ impl FacetSolid {
         }
         self.add_kept_points(&mut surface);
         self.add_kept_edges(&mut surface);
-        let projector = self.projector();
-        let smoothness = smoothness(&projector);
+        let smoothness = self.smoothness();
         match fill(surface, regions, &size, smoothness.as_deref(), settings.effort) {
             Ok(made) => Attempt::Made(Box::new(made)),
             Err(error) => {

@@ -52,11 +52,10 @@ def _convert(path: str, result: str) -> None:
     if not was_ready:
         gmsh.initialize(interruptible=False)
     current = gmsh.model.getCurrent()
-    options = ("General.Terminal", 0.0)
-    loud = gmsh.option.getNumber(options[0])
+    loud = gmsh.option.getNumber("General.Terminal")
     before = gmsh.option.getString("Geometry.OCCTargetUnit")
     try:
-        gmsh.option.setNumber(*options)
+        gmsh.option.setNumber("General.Terminal", 0)
         gmsh.option.setString("Geometry.OCCTargetUnit", unit or "MM")
         gmsh.model.add("tetmill")
         gmsh.model.occ.importShapes(path)
@@ -66,7 +65,7 @@ def _convert(path: str, result: str) -> None:
         raise InputError(f"{path} cannot be read by OpenCASCADE: {error}", file=path) from error
     finally:
         gmsh.model.remove()
-        gmsh.option.setNumber(options[0], loud)
+        gmsh.option.setNumber("General.Terminal", loud)
         gmsh.option.setString("Geometry.OCCTargetUnit", before)
         if was_ready:
             gmsh.model.setCurrent(current)

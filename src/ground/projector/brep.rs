@@ -67,9 +67,14 @@ const COORDINATE_ROUNDING: f64 = 4.0 * f64::EPSILON;
 const GAP_ROOM: f64 = 1.5;
 
 impl BrepProjector {
-    /// The faces and edges of a model with its tessellation; `is_reversed` says which faces have
-    /// normals against those of their surfaces.
-    pub fn new(model: &brep::Model, tessellation: &Tessellation, is_reversed: &[bool]) -> Self {
+    /// The faces of a model with its tessellation, and those of its edges that are `curves`;
+    /// `is_reversed` says which faces have normals against those of their surfaces.
+    pub fn new(
+        model: &brep::Model,
+        tessellation: &Tessellation,
+        is_reversed: &[bool],
+        curves: &[usize],
+    ) -> Self {
         let mut surfaces: Vec<Face> = model
             .patches
             .iter()
@@ -83,17 +88,15 @@ impl BrepProjector {
         for t in &tessellation.triangles {
             surfaces[t.patch as usize].triangles.push((t.vertices, t.parameters));
         }
-        let edge = |(edge, line): (&brep::EdgeCurve, &Vec<(u32, f64)>)| Edge {
-            curve: edge.curve.clone(),
-            line: line.clone(),
-        };
+        let edge =
+            |&c: &usize| Edge { curve: model.curves[c].curve.clone(), line: tessellation.lines[c].clone() };
         let all = bounds(&tessellation.points);
         let largest = all.min.coords.amax().max(all.max.coords.amax());
         let rounding = f64::max(ON_SURFACE * all.diagonal(), COORDINATE_ROUNDING * largest);
         Self::of(Source {
             points: tessellation.points.iter().map(|&p| p.into()).collect(),
             surfaces,
-            curves: model.curves.iter().zip(&tessellation.lines).map(edge).collect(),
+            curves: curves.iter().map(edge).collect(),
             tolerance: rounding.max(GAP_ROOM * tessellation.gap),
         })
     }

@@ -31,7 +31,7 @@ pub fn of_brep(model: &Model, tessellation: &Tessellation) -> (FacetModel, BrepP
         .map(|[behind, front]| behind.map_or(usize::MAX, |b| b) > front.map_or(usize::MAX, |b| b))
         .collect();
     let curves = curves_in_use(model, tessellation);
-    let exact = exact_projector(model, tessellation, &is_reversed, &curves);
+    let exact = BrepProjector::new(model, tessellation, &is_reversed, &curves);
     let normals = corner_normals(model, tessellation, &is_reversed);
     let oriented = |t: &brep::Triangle| {
         let [a, b, c] = t.vertices;
@@ -80,18 +80,6 @@ pub fn of_brep(model: &Model, tessellation: &Tessellation) -> (FacetModel, BrepP
         projector: FacetProjector::with_normals(source, Some(&normals)),
     };
     (facets, exact)
-}
-
-/// A projector to the faces, and to the edges that are curves.
-fn exact_projector(
-    model: &Model,
-    tessellation: &Tessellation,
-    is_reversed: &[bool],
-    curves: &[usize],
-) -> BrepProjector {
-    let some = Model { curves: curves.iter().map(|&c| model.curves[c].clone()).collect(), ..model.clone() };
-    let lines = curves.iter().map(|&c| tessellation.lines[c].clone()).collect();
-    BrepProjector::new(&some, &Tessellation { lines, ..tessellation.clone() }, is_reversed)
 }
 
 /// The unit normals at the corners of all triangles, outward; those of the triangles at poles.
