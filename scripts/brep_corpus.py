@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Makes BREP files of many kinds with Gmsh's OpenCASCADE, and the volumes and areas of their parts.
+"""Makes BREP and STEP files of many kinds with Gmsh's OpenCASCADE, and the volumes and areas of their parts.
 
     python3 scripts/brep_corpus.py FOLDER
 
@@ -383,6 +383,7 @@ def main():
             if not solids:
                 raise RuntimeError("no solid")
             gmsh.write(f"{folder}/{name}.brep")
+            gmsh.write(f"{folder}/{name}.step")
         except Exception as error:
             print(f"{name}: not made: {error}", file=sys.stderr)
             continue

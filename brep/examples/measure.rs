@@ -1,12 +1,14 @@
-//! Prints the volumes and areas of the tessellated parts of BREP files.
+//! Prints the volumes and areas of the tessellated parts of BREP and STEP files.
 
-use brep::{Model, Settings, Tessellation, tessellate};
+use brep::{Model, Settings, Tessellation, Unit, tessellate};
 
 fn main() {
     for path in std::env::args().skip(1) {
         let text = std::fs::read(&path).expect("a file that can be read");
         let start = std::time::Instant::now();
-        let made = Model::read(&text).and_then(|mut model| {
+        let is_step = path.ends_with(".step") || path.ends_with(".stp");
+        let read = if is_step { Model::read_step(&text, Unit::OfFile) } else { Model::read(&text) };
+        let made = read.and_then(|mut model| {
             let tessellation = Tessellation::of(&mut model, &Settings::default())?;
             Ok((model, tessellation))
         });

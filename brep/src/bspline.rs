@@ -123,6 +123,11 @@ impl Basis {
         breaks
     }
 
+    /// The degree.
+    pub fn degree(&self) -> usize {
+        self.degree
+    }
+
     /// The number of poles.
     pub fn poles(&self) -> usize {
         self.poles

@@ -12,12 +12,15 @@
 #![forbid(unsafe_code)]
 
 pub mod bspline;
+mod chart;
 mod curve;
 mod error;
 mod model;
+mod nearest;
 mod placement;
 mod project;
 mod read;
+mod step;
 mod surface;
 pub mod tessellate;
 #[cfg(test)]
@@ -26,8 +29,10 @@ mod tests;
 pub use curve::Curve;
 pub use error::BrepError;
 pub use model::{Corner, EdgeCurve, Fin, Model, On, Patch};
+pub use nearest::{nearest_on_curve, nearest_on_surface};
 pub use placement::Placement;
 pub use project::{CurveFoot, SurfaceFoot, project_to_curve, project_to_surface};
+pub use step::Unit;
 pub use surface::{Jet, Profile, Surface};
 pub use tessellate::{Settings, Tessellation, Triangle};
 

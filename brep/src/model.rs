@@ -2,6 +2,7 @@
 
 use crate::curve::Curve;
 use crate::read::{CurveOnSurface, File, Kind, Orientation, Use, read};
+use crate::step::Unit;
 use crate::surface::Surface;
 use crate::{BrepError, Placement, Point};
 use std::collections::BTreeMap;
@@ -82,6 +83,12 @@ pub struct Model {
     pub patches: Vec<Patch>,
     /// The number of bodies.
     pub bodies: usize,
+    /// The names that the file gives to bodies; empty if it gives none.
+    pub body_names: Vec<Option<String>>,
+    /// The names that the file gives to patches; empty if it gives none.
+    pub patch_names: Vec<Option<String>>,
+    /// The unit of lengths in metres, if the file has one.
+    pub metres: Option<f64>,
     /// What was left out, one sentence each.
     pub notes: Vec<String>,
 }
@@ -99,6 +106,16 @@ impl Model {
         let mut builder = Builder { file: &file, ..Builder::empty(&file) };
         builder.build()?;
         Ok(builder.model)
+    }
+
+    /// Reads a STEP file.
+    ///
+    /// Faces that several solids repeat become one. Coordinates are in `unit`.
+    ///
+    /// # Errors
+    /// As for BREP files.
+    pub fn read_step(text: &[u8], unit: Unit) -> Result<Self, BrepError> {
+        crate::step::read(text, unit)
     }
 }
 

@@ -90,8 +90,9 @@ fn on_curve(
             Some(curve) => curve.point(fin.parameter(t, edge.range)).into(),
         };
         let mut gap = (surface.point(parameters) - on).norm();
-        if gap > most {
-            // The two curves may be parametrised differently.
+        if gap > 1e-9 * tolerances.diagonal {
+            // The two curves may be parametrised differently, and that in the parameters be piecewise
+            // linear.
             let foot = project_to_surface(surface, &on, parameters);
             (parameters, gap) = (foot.parameters, (foot.point - on).norm());
         }

@@ -1,6 +1,6 @@
 //! Division of curves.
 
-use crate::{EdgeCurve, Fin, Model, Point, Surface, Vector};
+use crate::{Corner, EdgeCurve, Fin, Point, Surface, Vector};
 
 /// The most vertices on a curve.
 const MOST: usize = 100_000;
@@ -105,9 +105,9 @@ fn normal(edge: &EdgeCurve, (surface, fin): Beside, t: f64) -> Option<Vector> {
 }
 
 /// The diagonal of the box around corners and samples of curves; not 0.
-pub(super) fn diagonal(model: &Model) -> f64 {
-    let mut points: Vec<Point> = model.corners.iter().map(|c| c.point).collect();
-    for edge in &model.curves {
+pub(crate) fn diagonal(corners: &[Corner], curves: &[EdgeCurve]) -> f64 {
+    let mut points: Vec<Point> = corners.iter().map(|c| c.point).collect();
+    for edge in curves {
         let [low, high] = edge.range;
         points.extend((1..8).map(|k| Point::from(edge.curve.point(low + (high - low) * f64::from(k) / 8.0))));
     }

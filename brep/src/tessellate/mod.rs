@@ -9,6 +9,7 @@ mod face;
 mod frame;
 mod measure;
 
+pub(crate) use curves::diagonal;
 pub use measure::{area, check, volume};
 
 use crate::{BrepError, Model, Point};
@@ -62,7 +63,7 @@ impl Tessellation {
     /// [`BrepError::Face`] and [`BrepError::Edge`] with a place if curves and surfaces do not fit
     /// each other or loops cross; [`BrepError::Solid`] if a body is not closed.
     pub fn of(model: &mut Model, settings: &Settings) -> Result<Self, BrepError> {
-        let diagonal = curves::diagonal(model);
+        let diagonal = diagonal(&model.corners, &model.curves);
         let tolerances =
             face::Tolerances { chord: settings.chord * diagonal, angle: settings.angle, diagonal };
         let mut chords = vec![tolerances.chord; model.curves.len()];

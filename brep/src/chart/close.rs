@@ -1,0 +1,371 @@
+//! Loops that go around a periodic surface, joined to one that bounds the face.
+//!
+//! A loop around a surface bounds no area in its parameters. Two of them, or one and a pole, are
+//! joined by a seam. A surface that is closed in both directions is cut along seams, if no loop
+//! bounds it from outside.
+
+use super::trace::Loop;
+use super::{Chart, Parameters, Side};
+use crate::bspline::{Basis, SplineCurve};
+use crate::model::{Corner, EdgeCurve, Model, On};
+use crate::{BrepError, Curve, Point, Vector};
+
+/// Segments of the curve of a seam.
+const SEGMENTS: usize = 64;
+/// Places that are tried for a seam.
+const PLACES: usize = 12;
+
+/// Joins the loops of a face with seams, which are added to the model.
+///
+/// # Errors
+/// [`BrepError::Face`] for loops that bound no area.
+pub(crate) fn close(
+    chart: &Chart,
+    face: usize,
+    model: &mut Model,
+    loops: Vec<Loop>,
+) -> Result<Vec<Vec<Side>>, BrepError> {
+    let (mut around, mut plain): (Vec<Loop>, Vec<Loop>) = loops.into_iter().partition(|l| l.drift != [0; 2]);
+    let mut closing = Closing { chart, face, model };
+    let mut bounds: Vec<Vec<Side>> = Vec::new();
+    if let Some(first) = around.first() {
+        let Some(direction) = direction(first).filter(|&d| around.iter().all(|l| direction(l) == Some(d)))
+        else {
+            return Err(closing.error("its loops go around its surface in several directions"));
+        };
+        around.sort_by(|a, b| height(a, direction).total_cmp(&height(b, direction)));
+        let holes = plain.iter().map(|l| outline(&l.sides)).collect::<Vec<_>>();
+        bounds = closing.join_all(around, direction, &holes)?;
+    } else if plain.iter().map(|l| area(&l.sides)).max_by(|a, b| a.abs().total_cmp(&b.abs())).is_none_or(|a| a < 0.0)
+        && chart.periods[0].is_some()
+    {
+        let holes = plain.iter().map(|l| outline(&l.sides)).collect::<Vec<_>>();
+        match closing.whole(&holes)? {
+            Some(whole) => bounds.push(whole),
+            None if plain.is_empty() => return Err(closing.error("it has no edges")),
+            None => {}
+        }
+    }
+    if bounds.is_empty() && !plain.is_empty() {
+        let largest = |l: &Loop| area(&l.sides).abs();
+        let outer = (0..plain.len()).max_by(|&a, &b| largest(&plain[a]).total_cmp(&largest(&plain[b])));
+        bounds.push(plain.swap_remove(outer.expect("there are loops")).sides);
+    }
+    for mut hole in plain {
+        move_inside(chart, &bounds, &mut hole.sides);
+        bounds.push(hole.sides);
+    }
+    Ok(bounds)
+}
+
+/// The direction in which a loop goes around once.
+fn direction(one: &Loop) -> Option<usize> {
+    match one.drift {
+        [1 | -1, 0] => Some(0),
+        [0, 1 | -1] => Some(1),
+        _ => None,
+    }
+}
+
+/// The mean of the parameter across a direction.
+fn height(one: &Loop, direction: usize) -> f64 {
+    let all = outline(&one.sides);
+    all.iter().map(|p| p[1 - direction]).sum::<f64>() / all.len() as f64
+}
+
+/// The nodes of a loop, each once.
+fn outline(sides: &[Side]) -> Vec<Parameters> {
+    sides.iter().flat_map(|side| side.nodes[..side.nodes.len() - 1].iter().map(|node| node.1)).collect()
+}
+
+/// The area in the parameters, positive if counterclockwise.
+fn area(sides: &[Side]) -> f64 {
+    let all = outline(sides);
+    let next = all.iter().cycle().skip(1);
+    0.5 * all.iter().zip(next).map(|(p, q)| p[0] * q[1] - p[1] * q[0]).sum::<f64>()
+}
+
+/// Moves a hole by multiples of the periods to where the outer loops contain it.
+fn move_inside(chart: &Chart, bounds: &[Vec<Side>], hole: &mut [Side]) {
+    let outlines: Vec<Vec<Parameters>> = bounds.iter().map(|sides| outline(sides)).collect();
+    let own = hole[0].nodes[hole[0].nodes.len() / 2].1;
+    let moves = |i: usize| if chart.periods[i].is_some() { vec![0, -1, 1, -2, 2] } else { vec![0] };
+    for i in moves(0) {
+        for j in moves(1) {
+            let p = chart.shifted(own, [i, j]);
+            let crossings = outlines.iter().map(|outline| crossings(outline, p)).sum::<usize>();
+            if crossings % 2 == 1 {
+                hole.iter_mut().for_each(|side| side.shift([p[0] - own[0], p[1] - own[1]]));
+                return;
+            }
+        }
+    }
+}
+
+/// How often a line from a point to the right crosses a polygon.
+fn crossings(outline: &[Parameters], p: Parameters) -> usize {
+    let next = outline.iter().cycle().skip(1);
+    let crosses = |a: &Parameters, b: &Parameters| {
+        (a[1] > p[1]) != (b[1] > p[1]) && p[0] < a[0] + (p[1] - a[1]) / (b[1] - a[1]) * (b[0] - a[0])
+    };
+    outline.iter().zip(next).filter(|(a, b)| crosses(a, b)).count()
+}
+
+/// Whether two segments cross.
+fn is_crossing([a, b]: [Parameters; 2], [c, d]: [Parameters; 2]) -> bool {
+    let side = |p: Parameters, q: Parameters, r: Parameters| {
+        (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]) > 0.0
+    };
+    side(a, b, c) != side(a, b, d) && side(c, d, a) != side(c, d, b)
+}
+
+struct Closing<'a> {
+    chart: &'a Chart<'a>,
+    face: usize,
+    model: &'a mut Model,
+}
+
+impl Closing<'_> {
+    fn error(&self, what: &str) -> BrepError {
+        BrepError::face(self.face, what, None)
+    }
+
+    /// Whether a segment crosses loops at any period.
+    fn is_blocked(&self, segment: [Parameters; 2], loops: &[Vec<Parameters>]) -> bool {
+        let rounds = |i: usize| if self.chart.periods[i].is_some() { -2..=2 } else { 0..=0 };
+        let crosses = |outline: &Vec<Parameters>, by: [i32; 2]| {
+            let next = outline.iter().cycle().skip(1);
+            outline.iter().zip(next).any(|(p, q)| {
+                is_crossing(segment, [self.chart.shifted(*p, by), self.chart.shifted(*q, by)])
+            })
+        };
+        loops.iter().any(|outline| {
+            rounds(0).any(|i| rounds(1).any(|j| crosses(outline, [i, j])))
+        })
+    }
+
+    /// Joins loops around a surface in pairs, from the lowest to the highest.
+    fn join_all(
+        &mut self,
+        loops: Vec<Loop>,
+        direction: usize,
+        holes: &[Vec<Parameters>],
+    ) -> Result<Vec<Vec<Side>>, BrepError> {
+        // With the face to the left, a lower loop goes up in u, a left one down in v.
+        let is_lower =
+            |l: &Loop| (l.drift[direction] > 0) == (direction == 0);
+        let mut bounds = Vec::new();
+        let mut open: Option<Loop> = None;
+        let mut first: Option<Loop> = None;
+        for next in loops {
+            match (open.take(), is_lower(&next)) {
+                (None, true) => open = Some(next),
+                (Some(lower), false) => bounds.push(self.join(lower, next, direction, holes)?),
+                // On a surface that is closed across, the face of the highest may end at the lowest.
+                (None, false) if first.is_none() && bounds.is_empty() => first = Some(next),
+                _ => return Err(self.error("its loops do not bound an area of its surface")),
+            }
+        }
+        match (open, first) {
+            (Some(mut lower), Some(upper)) if self.chart.periods[1 - direction].is_some() => {
+                let mut down = [0; 2];
+                down[1 - direction] = -1;
+                let by = self.chart.shifted([0.0; 2], down);
+                lower.sides.iter_mut().for_each(|side| side.shift(by));
+                bounds.push(self.join(lower, upper, direction, holes)?);
+            }
+            (lower, upper) => {
+                for (one, is_upper) in [(lower, true), (upper, false)] {
+                    if let Some(one) = one {
+                        bounds.push(self.join_pole(one, direction, is_upper, holes)?);
+                    }
+                }
+            }
+        }
+        Ok(bounds)
+    }
+
+    /// A loop that starts at its k-th side, moved by the multiples of the periods.
+    fn started(&self, one: &Loop, k: usize, by: [i32; 2]) -> Vec<Side> {
+        let mut sides = one.sides.clone();
+        sides.rotate_left(k);
+        let moved = sides.len() - k;
+        let drift = self.chart.shifted([0.0; 2], one.drift);
+        sides[moved..].iter_mut().for_each(|side| side.shift(drift));
+        let by = self.chart.shifted([0.0; 2], by);
+        sides.iter_mut().for_each(|side| side.shift(by));
+        sides
+    }
+
+    /// Joins a lower and an upper loop by a seam between two of their vertices.
+    fn join(
+        &mut self,
+        lower: Loop,
+        upper: Loop,
+        direction: usize,
+        holes: &[Vec<Parameters>],
+    ) -> Result<Vec<Side>, BrepError> {
+        let period = self.chart.periods[direction].expect("loops go around");
+        let blocking: Vec<Vec<Parameters>> = holes.to_vec();
+        let mut best: Option<(f64, usize, usize, i32)> = None;
+        for a in 0..lower.sides.len() {
+            let from = self.chart.shifted(lower.sides[a].start(), lower.drift);
+            for b in 0..upper.sides.len() {
+                let to = upper.sides[b].start();
+                let rounds = ((from[direction] - to[direction]) / period).round() as i32;
+                let mut by = [0; 2];
+                by[direction] = rounds;
+                let to = self.chart.shifted(to, by);
+                let mut way = (to[direction] - from[direction]).abs();
+                if self.is_blocked([from, to], &blocking) {
+                    way += 10.0 * period;
+                }
+                if best.is_none_or(|(least, ..)| way < least) {
+                    best = Some((way, a, b, rounds));
+                }
+            }
+        }
+        let (_, a, b, rounds) = best.ok_or_else(|| self.error("its loops have no vertices"))?;
+        let mut by = [0; 2];
+        by[direction] = rounds;
+        let first = self.started(&lower, a, [0; 2]);
+        let second = self.started(&upper, b, by);
+        let (from, to) = (first[first.len() - 1].end(), second[0].start());
+        let ends = [self.corner_before(&first[0]), self.corner_before(&second[0])];
+        let seam = self.seam(from, to, ends);
+        let back = [second[second.len() - 1].end(), first[0].start()];
+        let mut out = first;
+        out.push(Side::straight(seam, true, from, to));
+        out.extend(second);
+        out.push(Side::straight(seam, false, back[0], back[1]));
+        Ok(out)
+    }
+
+    /// Joins a loop to a pole.
+    fn join_pole(
+        &mut self,
+        one: Loop,
+        direction: usize,
+        is_upper: bool,
+        holes: &[Vec<Parameters>],
+    ) -> Result<Vec<Side>, BrepError> {
+        let Some(height) = self.chart.surface.pole(1 - direction, is_upper, self.chart.least()) else {
+            return Err(self.error("its loops do not bound an area of its surface"));
+        };
+        let top = |p: Parameters| {
+            let mut top = p;
+            top[1 - direction] = height;
+            top
+        };
+        let is_free = |&k: &usize| {
+            let from = one.sides[k].start();
+            !self.is_blocked([from, top(from)], holes)
+        };
+        let k = (0..one.sides.len()).find(is_free).unwrap_or(0);
+        let mut out = self.started(&one, k, [0; 2]);
+        let (start, end) = (out[0].start(), out[out.len() - 1].end());
+        let pole = self.corner(top(start));
+        let seam = self.seam(end, top(end), [self.corner_before(&out[0]), pole]);
+        out.push(Side::straight(seam, true, end, top(end)));
+        out.push(Side::at_corner(pole, top(end), top(start)));
+        out.push(Side::straight(seam, false, top(start), start));
+        Ok(out)
+    }
+
+    /// The boundary of a whole closed surface in its parameters, with a seam that crosses no hole;
+    /// `None` if the surface is not closed.
+    fn whole(&mut self, holes: &[Vec<Parameters>]) -> Result<Option<Vec<Side>>, BrepError> {
+        let chart = self.chart;
+        let Some(period) = chart.periods[0] else { return Ok(None) };
+        if let Some(other) = chart.periods[1] {
+            let place = |k: usize| [period * (k as f64 + 0.37) / PLACES as f64, other * 0.37 / PLACES as f64];
+            let tries = (0..PLACES * PLACES).map(|k| {
+                let [u, v] = place(k % PLACES);
+                [u, v + other * (k / PLACES) as f64 / PLACES as f64]
+            });
+            let is_free = |[u, v]: &Parameters| {
+                !self.is_blocked([[*u, *v], [u + period, *v]], holes)
+                    && !self.is_blocked([[*u, *v], [*u, v + other]], holes)
+            };
+            let [u, v] = tries.into_iter().find(is_free).unwrap_or(place(0));
+            let corner = self.corner([u, v]);
+            let [along_u, along_v] =
+                [[u + period, v], [u, v + other]].map(|to| self.seam([u, v], to, [corner; 2]));
+            let (east, north) = (u + period, v + other);
+            return Ok(Some(vec![
+                Side::straight(along_u, true, [u, v], [east, v]),
+                Side::straight(along_v, true, [east, v], [east, north]),
+                Side::straight(along_u, false, [east, north], [u, north]),
+                Side::straight(along_v, false, [u, north], [u, v]),
+            ]));
+        }
+        let poles = [false, true].map(|is_upper| chart.surface.pole(1, is_upper, self.chart.least()));
+        let [Some(low), Some(high)] = poles else { return Ok(None) };
+        let place = |k: usize| period * (k as f64 + 0.37) / PLACES as f64;
+        let is_free = |u: &f64| !self.is_blocked([[*u, low], [*u, high]], holes);
+        let u = (0..PLACES).map(place).find(is_free).unwrap_or(place(0));
+        let ends = [self.corner([u, low]), self.corner([u, high])];
+        let seam = self.seam([u, low], [u, high], ends);
+        let east = u + period;
+        Ok(Some(vec![
+            Side::at_corner(ends[0], [u, low], [east, low]),
+            Side::straight(seam, true, [east, low], [east, high]),
+            Side::at_corner(ends[1], [east, high], [u, high]),
+            Side::straight(seam, false, [u, high], [u, low]),
+        ]))
+    }
+
+    /// The corner at the start of a side.
+    fn corner_before(&self, side: &Side) -> usize {
+        match side.on {
+            On::Corner(corner) => corner,
+            On::Curve(curve) => self.model.curves[curve].ends[usize::from(!side.is_forward)],
+        }
+    }
+
+    /// Adds a corner.
+    fn corner(&mut self, at: Parameters) -> usize {
+        let tolerance = 1e-12 * self.chart.diagonal;
+        self.model.corners.push(Corner { point: self.chart.surface.point(at), tolerance });
+        self.model.corners.len() - 1
+    }
+
+    /// Adds a curve along a straight line in the parameters.
+    fn seam(&mut self, from: Parameters, to: Parameters, ends: [usize; 2]) -> usize {
+        let at = |k: usize| [0, 1].map(|i| from[i] + (to[i] - from[i]) * k as f64 / SEGMENTS as f64);
+        let nodes: Vec<[Vector; 2]> = (0..=SEGMENTS)
+            .map(|k| {
+                let [u, v] = at(k);
+                let d = self.chart.surface.jet(u, v, 1).d;
+                [d[0][0], d[1][0] * (to[0] - from[0]) + d[0][1] * (to[1] - from[1])]
+            })
+            .collect();
+        let curve = cubic(&nodes);
+        // Corners of the file need not be on the surface.
+        let off = |k: usize, end: usize| (self.model.corners[end].point - Point::from(nodes[k][0])).norm();
+        let tolerance = off(0, ends[0]).max(off(SEGMENTS, ends[1]));
+        for end in ends {
+            let corner = &mut self.model.corners[end];
+            corner.tolerance = corner.tolerance.max(tolerance);
+        }
+        self.model.curves.push(EdgeCurve { curve, range: [0.0, 1.0], ends, tolerance });
+        self.model.curves.len() - 1
+    }
+}
+
+/// A cubic spline over [0, 1] through points with derivatives.
+fn cubic(nodes: &[[Vector; 2]]) -> Curve<3> {
+    let count = nodes.len() - 1;
+    let knots: Vec<f64> = (0..=count).map(|k| k as f64 / count as f64).collect();
+    let mut multiplicities = vec![2; count + 1];
+    (multiplicities[0], multiplicities[count]) = (4, 4);
+    let third = 1.0 / (3.0 * count as f64);
+    let mut poles = vec![nodes[0][0]];
+    for w in nodes.windows(2) {
+        poles.extend([w[0][0] + w[0][1] * third, w[1][0] - w[1][1] * third]);
+    }
+    poles.push(nodes[count][0]);
+    let basis =
+        Basis::new(3, &knots, &multiplicities, poles.len(), false).expect("the numbers of a cubic spline");
+    Curve::Spline(SplineCurve { basis, poles, weights: Vec::new() })
+}

@@ -1,0 +1,144 @@
+//! Curves in the parameters of surfaces, for files that have none.
+//!
+//! Each edge of a face is followed across the surface in small steps, so its curve in the
+//! parameters is continuous across the seams of periodic surfaces. Loops that go around such a
+//! surface are then joined by seams, or to a pole.
+
+mod close;
+mod trace;
+
+pub(crate) use close::close;
+
+use crate::bspline::{Basis, SplineCurve};
+use crate::model::{Fin, On};
+use crate::nearest::nearest_on_surface;
+use crate::project::project_to_surface;
+use crate::surface::Profile;
+use crate::{Curve, Point, Surface};
+use nalgebra::Vector2;
+
+/// Parameters of a surface.
+pub(crate) type Parameters = [f64; 2];
+
+/// Derivatives shorter than this (fraction of the diagonal of the model) are those of a pole.
+const AT_REST: f64 = 1e-7;
+
+/// A surface on which edges are followed.
+pub(crate) struct Chart<'a> {
+    surface: &'a Surface,
+    periods: [Option<f64>; 2],
+    /// The diagonal of the model.
+    diagonal: f64,
+}
+
+/// A side of a face, as parameters along its loop.
+#[derive(Clone, Debug)]
+pub(crate) struct Side {
+    pub on: On,
+    pub is_forward: bool,
+    /// The parameter of the curve in space, and those of the surface.
+    pub nodes: Vec<(f64, Parameters)>,
+}
+
+impl Side {
+    fn start(&self) -> Parameters {
+        self.nodes[0].1
+    }
+
+    fn end(&self) -> Parameters {
+        self.nodes[self.nodes.len() - 1].1
+    }
+
+    /// A side without length.
+    fn at_corner(corner: usize, from: Parameters, to: Parameters) -> Self {
+        Self { on: On::Corner(corner), is_forward: true, nodes: vec![(0.0, from), (1.0, to)] }
+    }
+
+    /// A side along a straight line in the parameters, on a curve over [0, 1].
+    fn straight(curve: usize, is_forward: bool, from: Parameters, to: Parameters) -> Self {
+        const STEPS: usize = 32;
+        let node = |k: usize| {
+            let share = k as f64 / STEPS as f64;
+            let t = if is_forward { share } else { 1.0 - share };
+            (t, [0, 1].map(|i| from[i] + share * (to[i] - from[i])))
+        };
+        Self { on: On::Curve(curve), is_forward, nodes: (0..=STEPS).map(node).collect() }
+    }
+
+    /// Adds a multiple of the periods.
+    fn shift(&mut self, by: Parameters) {
+        self.nodes.iter_mut().for_each(|node| node.1 = [node.1[0] + by[0], node.1[1] + by[1]]);
+    }
+
+    /// The side as a piecewise linear curve.
+    ///
+    /// # Errors
+    /// If its parameters do not ascend or descend.
+    pub fn fin(mut self) -> Result<Fin, String> {
+        if !self.is_forward {
+            self.nodes.reverse();
+        }
+        let knots: Vec<f64> = self.nodes.iter().map(|node| node.0).collect();
+        let last = knots.len() - 1;
+        let mut multiplicities = vec![1; knots.len()];
+        (multiplicities[0], multiplicities[last]) = (2, 2);
+        let basis = Basis::new(1, &knots, &multiplicities, knots.len(), false)?;
+        let poles = self.nodes.iter().map(|node| Vector2::from(node.1)).collect();
+        let curve = Some(Curve::Spline(SplineCurve { basis, poles, weights: Vec::new() }));
+        Ok(Fin { on: self.on, curve, range: [knots[0], knots[last]], is_forward: self.is_forward })
+    }
+}
+
+impl<'a> Chart<'a> {
+    pub fn new(surface: &'a Surface, diagonal: f64) -> Self {
+        Self { surface, periods: surface.periods(), diagonal }
+    }
+
+    /// Shorter derivatives are those of a pole.
+    fn least(&self) -> f64 {
+        AT_REST * self.diagonal
+    }
+
+    /// The direction whose derivative vanishes at some parameters.
+    fn pole_at(&self, p: Parameters) -> Option<usize> {
+        let d = self.surface.jet(p[0], p[1], 1).d;
+        [d[1][0], d[0][1]].iter().position(|d| d.norm() < self.least())
+    }
+
+    /// Parameters moved by multiples of the periods to be nearest to others.
+    fn unwrapped(&self, p: Parameters, near: Parameters) -> Parameters {
+        [0, 1].map(|i| match self.periods[i] {
+            Some(period) => p[i] + period * ((near[i] - p[i]) / period).round(),
+            None => p[i],
+        })
+    }
+
+    /// The parameters of the nearest point of the whole surface.
+    fn anywhere(&self, point: &Point) -> Parameters {
+        nearest_on_surface(self.surface, point).parameters
+    }
+
+    /// The parameters of the nearest point near a guess.
+    fn near(&self, point: &Point, guess: Parameters) -> Parameters {
+        let Surface::Round { axes, profile, .. } = self.surface else {
+            return project_to_surface(self.surface, point, guess).parameters;
+        };
+        // Some surfaces cross themselves on their axis: the nearest point may be on the other side.
+        let crosses = match *profile {
+            Profile::Line { slope: [a, _], .. } => a != 0.0,
+            Profile::Circle { major, minor } => 0.0 < major && major < minor,
+        };
+        let [x, y, _] = self.surface.local(point).expect("a surface of revolution");
+        let found = if crosses {
+            project_to_surface(self.surface, point, guess).parameters
+        } else {
+            nearest_on_surface(self.surface, point).parameters
+        };
+        let mut found = self.unwrapped(found, guess);
+        // At a pole every angle is right.
+        if x.hypot(y) * axes[0].norm() < self.least() {
+            found[0] = guess[0];
+        }
+        found
+    }
+}

@@ -1,0 +1,183 @@
+//! Nearest points on whole curves and surfaces, without a start value.
+//!
+//! Newton's method starts from the nearest of many samples, of which there are several between any
+//! two knots; analytic kinds have closed forms.
+
+use crate::curve::Curve;
+use crate::project::{CurveFoot, SurfaceFoot, project_to_curve, project_to_surface};
+use crate::surface::{Profile, Surface};
+use crate::{Point, Vector};
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
+
+/// Searches start from this many samples: the nearest ones.
+const STARTS: usize = 4;
+/// The most samples in one direction of a surface.
+const MOST_SAMPLES: usize = 400;
+
+impl Curve<3> {
+    /// The parameters between which the curve is defined, or its period; `None` if it is unbounded.
+    pub fn domain(&self) -> Option<[f64; 2]> {
+        match self {
+            Self::Ellipse { .. } => Some([0.0, TAU]),
+            Self::Spline(spline) => Some(spline.basis.range()),
+            Self::Offset { basis, .. } => basis.domain(),
+            Self::Line { .. } | Self::Parabola { .. } | Self::Hyperbola { .. } => None,
+        }
+    }
+
+    /// Parameters that find all parts of the curve: several between any two knots. Of an unbounded
+    /// curve those of the points that have the height of `point` over its axis.
+    fn samples(&self, point: &Point) -> Vec<f64> {
+        let along = |origin: &Vector, axis: &Vector| (point.coords - origin).dot(axis) / axis.norm_squared();
+        match self {
+            Self::Line { start, direction } => vec![along(start, direction)],
+            Self::Parabola { apex, axes: [_, y] } => vec![along(apex, y), 0.0],
+            Self::Hyperbola { center, axes: [_, y] } => vec![along(center, y).asinh(), 0.0],
+            Self::Ellipse { center, axes: [x, y] } => {
+                let nearest = along(center, y).atan2(along(center, x)).rem_euclid(TAU);
+                let around = (0..16).map(|k| TAU * f64::from(k) / 16.0);
+                std::iter::once(nearest).chain(around).collect()
+            }
+            Self::Spline(spline) => {
+                let breaks = spline.basis.breaks();
+                let each = (spline.basis.degree() + 2).min((MOST_SAMPLES / breaks.len()).max(2));
+                let between = |w: &[f64]| {
+                    let [a, b] = [w[0], w[1]];
+                    (0..each).map(move |k| a + (b - a) * k as f64 / each as f64)
+                };
+                let last = breaks[breaks.len() - 1];
+                breaks.windows(2).flat_map(between).chain([last]).collect()
+            }
+            Self::Offset { basis, .. } => basis.samples(point),
+        }
+    }
+}
+
+/// The smallest items by a key, at most [`STARTS`].
+fn smallest<T: Copy>(items: Vec<T>, key: impl Fn(&T) -> f64) -> Vec<T> {
+    let mut keyed: Vec<(f64, T)> = items.into_iter().map(|item| (key(&item), item)).collect();
+    keyed.sort_by(|a, b| a.0.total_cmp(&b.0));
+    keyed.into_iter().take(STARTS).map(|(_, item)| item).collect()
+}
+
+/// The point of a whole curve that is nearest to a point. The parameter of a periodic one is inside
+/// of its period.
+pub fn nearest_on_curve(curve: &Curve<3>, point: &Point) -> CurveFoot {
+    let range = match (curve.period(), curve.domain()) {
+        // Searches may cross the ends of a period.
+        (Some(period), Some([low, high])) => [low - period, high + period],
+        (None, Some(domain)) => domain,
+        _ => [f64::NEG_INFINITY, f64::INFINITY],
+    };
+    let distance = |t: &f64| (curve.point(*t) - point.coords).norm();
+    let feet = smallest(curve.samples(point), distance)
+        .into_iter()
+        .map(|start| project_to_curve(curve, range, point, start));
+    let mut foot = feet
+        .min_by(|a, b| (a.point - point).norm().total_cmp(&(b.point - point).norm()))
+        .expect("a curve has samples");
+    if let (Some(period), Some([low, _])) = (curve.period(), curve.domain()) {
+        foot.parameter = low + (foot.parameter - low).rem_euclid(period);
+    }
+    foot
+}
+
+/// The point of a whole surface that is nearest to a point, up to local minima between samples.
+pub fn nearest_on_surface(surface: &Surface, point: &Point) -> SurfaceFoot {
+    let distance = |p: &[f64; 2]| (surface.point(*p) - point).norm();
+    let feet = smallest(starts(surface, point), distance)
+        .into_iter()
+        .map(|start| project_to_surface(surface, point, start));
+    feet.min_by(|a, b| (a.point - point).norm().total_cmp(&(b.point - point).norm()))
+        .expect("a surface has samples")
+}
+
+/// Parameters from which the search for a nearest point starts.
+fn starts(surface: &Surface, point: &Point) -> Vec<[f64; 2]> {
+    match surface {
+        Surface::Plane { .. } => vec![[0.0; 2]],
+        Surface::Round { profile, .. } => {
+            let [x, y, z] = surface.local(point).expect("a surface of revolution");
+            let radius = x.hypot(y);
+            let u = y.atan2(x);
+            match *profile {
+                // The line on either side of the axis.
+                Profile::Line { radius: own, slope: [a, b] } => [(radius, u), (-radius, u + PI)]
+                    .map(|(r, u)| [u, ((r - own) * a + z * b) / (a * a + b * b)])
+                    .to_vec(),
+                Profile::Circle { major: 0.0, .. } => vec![[u, z.atan2(radius)]],
+                Profile::Circle { major, .. } => {
+                    [(radius, u), (-radius, u + PI)].map(|(r, u)| [u, z.atan2(r - major)]).to_vec()
+                }
+            }
+        }
+        Surface::Extrusion { curve, direction } => {
+            // The samples of unbounded curves suit a point in their plane.
+            let height = |u: f64| (point.coords - curve.point(u)).dot(direction) / direction.norm_squared();
+            let flat = curve.samples(point).first().map_or(*point, |&u| point - direction * height(u));
+            curve.samples(&flat).into_iter().map(|u| [u, height(u)]).collect()
+        }
+        Surface::Revolution { curve, origin, axis } => {
+            let radial = |p: Vector| p - origin - axis * axis.dot(&(p - origin));
+            let angle = |v: f64| {
+                let (from, to) = (radial(curve.point(v)), radial(point.coords));
+                axis.dot(&from.cross(&to)).atan2(from.dot(&to))
+            };
+            let turned = |v: f64| {
+                let turn = nalgebra::Rotation3::from_scaled_axis(axis * -angle(v));
+                Point::from(turn * (point.coords - origin) + origin)
+            };
+            let mut all = curve.samples(point);
+            // Unbounded curves: the point turned into the plane of the curve.
+            if curve.domain().is_none() {
+                all = curve.samples(&turned(all[0]));
+                all.extend(curve.samples(&turned(all[0] + 1.0)));
+            }
+            all.into_iter().map(|v| [angle(v), v]).collect()
+        }
+        Surface::Spline(spline) => {
+            let [in_u, in_v] = [0, 1].map(|k| {
+                let breaks = spline.bases[k].breaks();
+                let each = (spline.bases[k].degree() + 1).min((MOST_SAMPLES / breaks.len()).max(1));
+                let between = |w: &[f64]| {
+                    let [a, b] = [w[0], w[1]];
+                    (0..each).map(move |i| a + (b - a) * i as f64 / each as f64)
+                };
+                let last = breaks[breaks.len() - 1];
+                breaks.windows(2).flat_map(between).chain([last]).collect::<Vec<f64>>()
+            });
+            in_u.iter().flat_map(|&u| in_v.iter().map(move |&v| [u, v])).collect()
+        }
+        Surface::Offset { basis, .. } => starts(basis, point),
+    }
+}
+
+impl Surface {
+    /// The coordinates of a point in the axes of a surface of revolution with a closed form.
+    pub(crate) fn local(&self, point: &Point) -> Option<[f64; 3]> {
+        let Self::Round { origin, axes, .. } = self else { return None };
+        Some(axes.map(|axis| (point.coords - origin).dot(&axis) / axis.norm_squared()))
+    }
+
+    /// The parameters at the lower or upper end in one direction at which the surface has no length
+    /// in the other one.
+    pub(crate) fn pole(&self, direction: usize, is_upper: bool, least: f64) -> Option<f64> {
+        let end = |[low, high]: [f64; 2]| if is_upper { high } else { low };
+        let at = match self {
+            Self::Round { profile: Profile::Circle { major: 0.0, .. }, .. } if direction == 1 => {
+                end([-FRAC_PI_2, FRAC_PI_2])
+            }
+            Self::Round { profile: Profile::Line { radius, slope: [a, _] }, .. } if direction == 1 => {
+                // The tip is above where the radius shrinks upward.
+                ((*a < 0.0) == is_upper && *a != 0.0).then_some(-radius / a)?
+            }
+            Self::Revolution { curve, .. } if direction == 1 => end(curve.domain()?),
+            Self::Spline(spline) => end(spline.bases[direction].range()),
+            _ => return None,
+        };
+        let parameters = if direction == 1 { [0.1, at] } else { [at, 0.1] };
+        let d = self.jet(parameters[0], parameters[1], 1).d;
+        let across = if direction == 1 { d[1][0] } else { d[0][1] };
+        (across.norm() < least).then_some(at)
+    }
+}

@@ -1,0 +1,202 @@
+//! Faces that solids share.
+//!
+//! STEP files repeat a common face in each of its solids. Corners of different solids at one place
+//! are made one, then edges between the same corners along the same curve, and in the end faces
+//! with the same edges on the same surface.
+
+use super::topology::Shapes;
+use crate::model::{Model, On, Patch};
+use crate::nearest::nearest_on_curve;
+use crate::project::project_to_surface;
+use crate::{EdgeCurve, Point};
+use std::collections::{BTreeMap, HashMap};
+
+/// Corners of different solids at most this far apart are one (fraction of the diagonal) ...
+const SAME: f64 = 1e-7;
+/// ... or at most this many times the accuracy that the file states, ...
+const ROOM: f64 = 10.0;
+/// ... but not further apart than this (fraction of the shortest edge there).
+const SHORT: f64 = 0.05;
+
+/// Makes one of the corners and curves that solids share; faces use them afterwards.
+pub(super) fn glue_edges(shapes: &mut Shapes, diagonal: f64) {
+    let to = corners(shapes, diagonal);
+    for curve in &mut shapes.curves {
+        curve.ends = curve.ends.map(|end| to[end]);
+    }
+    // Curves by their ends.
+    let mut between: BTreeMap<[usize; 2], Vec<usize>> = BTreeMap::new();
+    let mut as_curve: Vec<(usize, bool)> = Vec::with_capacity(shapes.curves.len());
+    for number in 0..shapes.curves.len() {
+        let curve = &shapes.curves[number];
+        let [a, b] = curve.ends;
+        let known = between.entry([a.min(b), a.max(b)]).or_default();
+        let tolerance = tolerance(shapes, shapes.body_of_curve[number], diagonal);
+        let same = known
+            .iter()
+            .filter(|&&other| shapes.body_of_curve[other] != shapes.body_of_curve[number])
+            .find_map(|&other| Some((other, runs_along(curve, &shapes.curves[other], tolerance)?)));
+        as_curve.push(same.unwrap_or((number, true)));
+        if same.is_none() {
+            known.push(number);
+        }
+    }
+    for edge in shapes.faces.iter_mut().flat_map(|face| face.loops.iter_mut().flatten()) {
+        let (curve, is_along) = as_curve[edge.0];
+        *edge = (curve, edge.1 == is_along);
+    }
+}
+
+fn tolerance(shapes: &Shapes, body: usize, diagonal: f64) -> f64 {
+    f64::max(SAME * diagonal, ROOM * shapes.accuracy[body])
+}
+
+/// For each corner the first one at its place of another solid, or itself.
+fn corners(shapes: &Shapes, diagonal: f64) -> Vec<usize> {
+    let mut shortest = vec![f64::INFINITY; shapes.corners.len()];
+    for curve in shapes.curves.iter().filter(|curve| curve.ends[0] != curve.ends[1]) {
+        let [a, b] = curve.ends.map(|end| shapes.corners[end].point);
+        curve.ends.iter().for_each(|&end| shortest[end] = shortest[end].min((b - a).norm()));
+    }
+    let reach = |corner: usize| {
+        tolerance(shapes, shapes.body_of_corner[corner], diagonal).min(SHORT * shortest[corner])
+    };
+    let size = (0..shapes.accuracy.len()).map(|body| tolerance(shapes, body, diagonal)).fold(0.0, f64::max);
+    let cell = |p: &Point| p.coords.map(|x| (x / size).floor() as i64);
+    let mut cells: HashMap<[i64; 3], Vec<usize>> = HashMap::new();
+    let mut to: Vec<usize> = Vec::with_capacity(shapes.corners.len());
+    for (number, corner) in shapes.corners.iter().enumerate() {
+        let own = cell(&corner.point);
+        let around = (0..27).map(|k| [own.x + k % 3 - 1, own.y + k / 3 % 3 - 1, own.z + k / 9 - 1]);
+        let distance = |&other: &usize| (shapes.corners[other].point - corner.point).norm();
+        let same = around
+            .filter_map(|cell| cells.get(&cell))
+            .flatten()
+            .copied()
+            .filter(|&other| shapes.body_of_corner[other] != shapes.body_of_corner[number])
+            .filter(|other| distance(other) <= reach(*other).min(reach(number)))
+            .min_by(|a, b| distance(a).total_cmp(&distance(b)));
+        to.push(same.unwrap_or(number));
+        if same.is_none() {
+            cells.entry(own.into()).or_default().push(number);
+        }
+    }
+    to
+}
+
+/// Whether a curve runs along another one, if both are at the same place.
+fn runs_along(one: &EdgeCurve, other: &EdgeCurve, tolerance: f64) -> Option<bool> {
+    let [low, high] = one.range;
+    let at = |share: f64| Point::from(one.curve.point(low + share * (high - low)));
+    let feet = [0.25, 0.5, 0.75].map(|share| (at(share), nearest_on_curve(&other.curve, &at(share))));
+    if feet.iter().any(|(point, foot)| (foot.point - point).norm() > tolerance) {
+        return None;
+    }
+    let [from, to] = other.range;
+    // The parameters within the range of the other edge.
+    let parameters = feet.map(|(_, foot)| match other.curve.period() {
+        Some(period) => from + (foot.parameter - from).rem_euclid(period),
+        None => foot.parameter,
+    });
+    if parameters.iter().any(|t| *t > to || *t < from) {
+        return None;
+    }
+    let [a, b, c] = parameters;
+    if a < b && b < c {
+        Some(true)
+    } else if a > b && b > c {
+        Some(false)
+    } else {
+        None
+    }
+}
+
+/// Makes one patch of two that solids share, and removes what no patch uses any more. Returns the
+/// index of each patch afterwards.
+pub(super) fn glue_patches(model: &mut Model, tolerance: f64) -> Vec<usize> {
+    let mut by_curves: BTreeMap<Vec<usize>, Vec<usize>> = BTreeMap::new();
+    let mut kept: Vec<Patch> = Vec::new();
+    let mut to = Vec::new();
+    for patch in std::mem::take(&mut model.patches) {
+        let mut key: Vec<usize> = patch.loops.iter().flatten().filter_map(curve_of).collect();
+        key.sort_unstable();
+        let known = by_curves.entry(key).or_default();
+        let own = patch.bodies.iter().flatten().next().copied();
+        let same = known.iter().copied().find(|&other: &usize| {
+            let is_free = kept[other].bodies.contains(&None) && !kept[other].bodies.contains(&own);
+            is_free && is_same_surface(model, &kept[other], &patch, tolerance)
+        });
+        match same {
+            Some(other) => {
+                let free = kept[other].bodies.iter().position(Option::is_none).expect("a free side");
+                kept[other].bodies[free] = own;
+                to.push(other);
+            }
+            None => {
+                known.push(kept.len());
+                to.push(kept.len());
+                kept.push(patch);
+            }
+        }
+    }
+    model.patches = kept;
+    compact(model);
+    to
+}
+
+fn curve_of(fin: &crate::Fin) -> Option<usize> {
+    match fin.on {
+        On::Curve(curve) => Some(curve),
+        On::Corner(_) => None,
+    }
+}
+
+/// Whether two patches with the same curves have the same surface between them.
+fn is_same_surface(model: &Model, one: &Patch, other: &Patch, tolerance: f64) -> bool {
+    if one.surface.is_plane() || other.surface.is_plane() {
+        return one.surface.is_plane() && other.surface.is_plane();
+    }
+    // Points beside the middle of each curve on one patch must be on the other one.
+    one.loops.iter().flatten().filter_map(|fin| Some((fin, curve_of(fin)?))).all(|(fin, curve)| {
+        let edge = &model.curves[curve];
+        let Some(own) = &fin.curve else { return true };
+        let there = other.loops.iter().flatten().find(|fin| fin.on == On::Curve(curve));
+        let Some(start) = there.and_then(|fin| fin.curve.as_ref()) else { return false };
+        let t = 0.5 * (edge.range[0] + edge.range[1]);
+        let [at, along] = [own.jet(t)[0], own.jet(t)[1]];
+        let step = 0.02 * (edge.range[1] - edge.range[0]) * if fin.is_forward { 1.0 } else { -1.0 };
+        let point = one.surface.point([at.x - along.y * step, at.y + along.x * step]);
+        let foot = project_to_surface(&other.surface, &point, start.point(t).into());
+        (foot.point - point).norm() <= 10.0 * tolerance
+    })
+}
+
+/// Removes corners and curves that no patch uses.
+fn compact(model: &mut Model) {
+    let mut is_used = vec![false; model.curves.len()];
+    let mut has_use = vec![false; model.corners.len()];
+    for fin in model.patches.iter().flat_map(|patch| patch.loops.iter().flatten()) {
+        match fin.on {
+            On::Curve(curve) => is_used[curve] = true,
+            On::Corner(corner) => has_use[corner] = true,
+        }
+    }
+    for (curve, _) in model.curves.iter().zip(&is_used).filter(|(_, used)| **used) {
+        curve.ends.iter().for_each(|&end| has_use[end] = true);
+    }
+    let numbers = |used: &[bool]| -> Vec<usize> {
+        used.iter().scan(0, |next, &used| Some(std::mem::replace(next, *next + usize::from(used)))).collect()
+    };
+    let (curve_to, corner_to) = (numbers(&is_used), numbers(&has_use));
+    for fin in model.patches.iter_mut().flat_map(|patch| patch.loops.iter_mut().flatten()) {
+        fin.on = match fin.on {
+            On::Curve(curve) => On::Curve(curve_to[curve]),
+            On::Corner(corner) => On::Corner(corner_to[corner]),
+        };
+    }
+    let mut keep = is_used.into_iter();
+    model.curves.retain(|_| keep.next().unwrap_or(false));
+    model.curves.iter_mut().for_each(|curve| curve.ends = curve.ends.map(|end| corner_to[end]));
+    let mut keep = has_use.into_iter();
+    model.corners.retain(|_| keep.next().unwrap_or(false));
+}

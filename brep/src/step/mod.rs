@@ -1,0 +1,109 @@
+//! Reads STEP files: AP203, AP214, AP242 and others that use the same resources for solids.
+//!
+//! Parameters and curves on surfaces are computed, not read: many programs write none.
+
+mod assembly;
+mod geometry;
+mod glue;
+mod record;
+mod text;
+mod topology;
+mod units;
+
+pub use units::Unit;
+
+use crate::chart::{Chart, close};
+use crate::model::{Fin, Model, On, Patch};
+use crate::tessellate::diagonal;
+use crate::{BrepError, Surface};
+use topology::{Face, Shapes};
+
+/// Reads the solids of a file.
+///
+/// # Errors
+/// [`BrepError::Syntax`] with the line and record, [`BrepError::NoSolid`],
+/// [`BrepError::Face`] for faces whose edges do not bound them.
+pub(crate) fn read(text: &[u8], unit: Unit) -> Result<Model, BrepError> {
+    let records = text::read(text)?;
+    let (solids, metres) = assembly::solids(&records, unit)?;
+    if solids.is_empty() {
+        let count = |kind: &str| record::nodes(&records).filter(|node| node.is(kind)).count();
+        let faces = count("ADVANCED_FACE") + count("FACE_SURFACE");
+        return Err(BrepError::NoSolid(format!("{faces} faces and {} edges", count("EDGE_CURVE"))));
+    }
+    let mut shapes = Shapes::default();
+    for solid in &solids {
+        shapes.add(solid)?;
+    }
+    let mut model = Model { bodies: solids.len(), metres: Some(metres), ..Model::default() };
+    model.body_names = solids.into_iter().map(|solid| solid.name).collect();
+    build(&mut model, shapes)?;
+    let left_out = record::nodes(&records).filter(|node| node.is("SHELL_BASED_SURFACE_MODEL")).count();
+    if left_out > 0 {
+        model.notes.push(format!("{left_out} shells that bound no solid are left out"));
+    }
+    Ok(model)
+}
+
+/// Makes patches of faces.
+fn build(model: &mut Model, mut shapes: Shapes) -> Result<(), BrepError> {
+    let size = diagonal(&shapes.corners, &shapes.curves);
+    glue::glue_edges(&mut shapes, size);
+    (model.corners, model.curves) = (std::mem::take(&mut shapes.corners), std::mem::take(&mut shapes.curves));
+    let mut names = Vec::new();
+    for (number, face) in shapes.faces.into_iter().enumerate() {
+        names.push(face.name.clone());
+        let id = face.id;
+        let patch = patch(model, number, face, size).map_err(|error| match error {
+            BrepError::Face { face, what, place } => {
+                BrepError::Face { face, what: format!("{what} (#{id})"), place }
+            }
+            other => other,
+        })?;
+        model.patches.push(patch);
+    }
+    let to = glue::glue_patches(model, SAME * size);
+    model.patch_names = vec![None; model.patches.len()];
+    for (name, patch) in names.into_iter().zip(to) {
+        model.patch_names[patch] = model.patch_names[patch].take().or(name);
+    }
+    Ok(())
+}
+
+/// Surfaces that differ by at most this (fraction of the diagonal) are one.
+const SAME: f64 = 1e-6;
+
+fn patch(model: &mut Model, number: usize, face: Face, size: f64) -> Result<Patch, BrepError> {
+    let bodies = if face.is_behind { [Some(face.body), None] } else { [None, Some(face.body)] };
+    if face.surface.is_plane() {
+        let fin = |&(curve, is_forward): &(usize, bool)| Fin {
+            on: On::Curve(curve),
+            curve: None,
+            range: model.curves[curve].range,
+            is_forward,
+        };
+        let loops: Vec<Vec<Fin>> = face.loops.iter().map(|edges| edges.iter().map(fin).collect()).collect();
+        if loops.is_empty() {
+            return Err(BrepError::face(number, "it has no edges", None));
+        }
+        return Ok(Patch { surface: face.surface, loops, bodies });
+    }
+    let surface: Surface = face.surface;
+    let chart = Chart::new(&surface, size);
+    let mut loops = Vec::new();
+    for edges in &face.loops {
+        let one = chart.follow(number, &model.curves, edges)?;
+        for &(curve, _) in edges {
+            let edge = &mut model.curves[curve];
+            edge.tolerance = edge.tolerance.max(one.gap);
+        }
+        loops.push(one);
+    }
+    let sides = close(&chart, number, model, loops)?;
+    let fins = |sides: Vec<crate::chart::Side>| -> Result<Vec<Fin>, BrepError> {
+        let all: Result<Vec<Fin>, String> = sides.into_iter().map(crate::chart::Side::fin).collect();
+        all.map_err(|what| BrepError::face(number, what, None))
+    };
+    let loops = sides.into_iter().map(fins).collect::<Result<Vec<_>, _>>()?;
+    Ok(Patch { surface, loops, bodies })
+}
