@@ -88,8 +88,14 @@ pub fn nearest_on_surface(surface: &Surface, point: &Point) -> SurfaceFoot {
     let feet = smallest(starts(surface, point), distance)
         .into_iter()
         .map(|start| project_to_surface(surface, point, start));
-    feet.min_by(|a, b| (a.point - point).norm().total_cmp(&(b.point - point).norm()))
-        .expect("a surface has samples")
+    let mut foot = feet
+        .min_by(|a, b| (a.point - point).norm().total_cmp(&(b.point - point).norm()))
+        .expect("a surface has samples");
+    // Searches may end several periods away.
+    for (parameter, period) in foot.parameters.iter_mut().zip(surface.periods()) {
+        *parameter -= period.map_or(0.0, |period| period * (*parameter / period).round());
+    }
+    foot
 }
 
 /// Parameters from which the search for a nearest point starts.
@@ -101,6 +107,7 @@ fn starts(surface: &Surface, point: &Point) -> Vec<[f64; 2]> {
             let radius = x.hypot(y);
             let u = y.atan2(x);
             match *profile {
+                Profile::Line { slope: [0.0, b], .. } => vec![[u, z / b]],
                 // The line on either side of the axis.
                 Profile::Line { radius: own, slope: [a, b] } => [(radius, u), (-radius, u + PI)]
                     .map(|(r, u)| [u, ((r - own) * a + z * b) / (a * a + b * b)])

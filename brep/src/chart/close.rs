@@ -10,6 +10,8 @@ use crate::bspline::{Basis, SplineCurve};
 use crate::model::{Corner, EdgeCurve, Model, On};
 use crate::{BrepError, Curve, Point, Vector};
 
+const UNBOUNDED: &str = "its loops do not bound an area of its surface";
+
 /// Segments of the curve of a seam.
 const SEGMENTS: usize = 64;
 /// Places that are tried for a seam.
@@ -27,6 +29,7 @@ pub(crate) fn close(
 ) -> Result<Vec<Vec<Side>>, BrepError> {
     let (mut around, mut plain): (Vec<Loop>, Vec<Loop>) = loops.into_iter().partition(|l| l.drift != [0; 2]);
     let mut closing = Closing { chart, face, model };
+    let holes: Vec<Vec<Parameters>> = plain.iter().map(|l| outline(&l.sides)).collect();
     let mut bounds: Vec<Vec<Side>> = Vec::new();
     if let Some(first) = around.first() {
         let Some(direction) = direction(first).filter(|&d| around.iter().all(|l| direction(l) == Some(d)))
@@ -34,28 +37,30 @@ pub(crate) fn close(
             return Err(closing.error("its loops go around its surface in several directions"));
         };
         around.sort_by(|a, b| height(a, direction).total_cmp(&height(b, direction)));
-        let holes = plain.iter().map(|l| outline(&l.sides)).collect::<Vec<_>>();
         bounds = closing.join_all(around, direction, &holes)?;
-    } else if plain.iter().map(|l| area(&l.sides)).max_by(|a, b| a.abs().total_cmp(&b.abs())).is_none_or(|a| a < 0.0)
-        && chart.periods[0].is_some()
-    {
-        let holes = plain.iter().map(|l| outline(&l.sides)).collect::<Vec<_>>();
-        match closing.whole(&holes)? {
-            Some(whole) => bounds.push(whole),
-            None if plain.is_empty() => return Err(closing.error("it has no edges")),
-            None => {}
+    } else {
+        let size = |k: &usize| area(&plain[*k].sides).abs();
+        let outer = (0..plain.len()).max_by(|a, b| size(a).total_cmp(&size(b)));
+        match outer.filter(|&k| area(&plain[k].sides) > 0.0) {
+            Some(outer) => bounds.push(plain.swap_remove(outer).sides),
+            // Only holes: they are in a whole closed surface, which no seam bounds.
+            None if outer.is_none_or(|k| !has_seam(&plain[k].sides)) => {
+                bounds.push(closing.whole(&holes)?);
+            }
+            None => return Err(closing.error("its loops are clockwise")),
         }
-    }
-    if bounds.is_empty() && !plain.is_empty() {
-        let largest = |l: &Loop| area(&l.sides).abs();
-        let outer = (0..plain.len()).max_by(|&a, &b| largest(&plain[a]).total_cmp(&largest(&plain[b])));
-        bounds.push(plain.swap_remove(outer.expect("there are loops")).sides);
     }
     for mut hole in plain {
         move_inside(chart, &bounds, &mut hole.sides);
         bounds.push(hole.sides);
     }
     Ok(bounds)
+}
+
+/// Whether a loop follows an edge in both directions.
+fn has_seam(sides: &[Side]) -> bool {
+    let is_repeated = |(k, side): (usize, &Side)| sides[..k].iter().any(|other| other.on == side.on);
+    sides.iter().enumerate().any(is_repeated)
 }
 
 /// The direction in which a loop goes around once.
@@ -163,7 +168,7 @@ impl Closing<'_> {
                 (Some(lower), false) => bounds.push(self.join(lower, next, direction, holes)?),
                 // On a surface that is closed across, the face of the highest may end at the lowest.
                 (None, false) if first.is_none() && bounds.is_empty() => first = Some(next),
-                _ => return Err(self.error("its loops do not bound an area of its surface")),
+                _ => return Err(self.error(UNBOUNDED)),
             }
         }
         match (open, first) {
@@ -250,7 +255,7 @@ impl Closing<'_> {
         holes: &[Vec<Parameters>],
     ) -> Result<Vec<Side>, BrepError> {
         let Some(height) = self.chart.surface.pole(1 - direction, is_upper, self.chart.least()) else {
-            return Err(self.error("its loops do not bound an area of its surface"));
+            return Err(self.error(UNBOUNDED));
         };
         let top = |p: Parameters| {
             let mut top = p;
@@ -272,11 +277,10 @@ impl Closing<'_> {
         Ok(out)
     }
 
-    /// The boundary of a whole closed surface in its parameters, with a seam that crosses no hole;
-    /// `None` if the surface is not closed.
-    fn whole(&mut self, holes: &[Vec<Parameters>]) -> Result<Option<Vec<Side>>, BrepError> {
+    /// The boundary of a whole closed surface in its parameters, with a seam that crosses no hole.
+    fn whole(&mut self, holes: &[Vec<Parameters>]) -> Result<Vec<Side>, BrepError> {
         let chart = self.chart;
-        let Some(period) = chart.periods[0] else { return Ok(None) };
+        let Some(period) = chart.periods[0] else { return Err(self.error(UNBOUNDED)) };
         if let Some(other) = chart.periods[1] {
             let place = |k: usize| [period * (k as f64 + 0.37) / PLACES as f64, other * 0.37 / PLACES as f64];
             let tries = (0..PLACES * PLACES).map(|k| {
@@ -292,27 +296,27 @@ impl Closing<'_> {
             let [along_u, along_v] =
                 [[u + period, v], [u, v + other]].map(|to| self.seam([u, v], to, [corner; 2]));
             let (east, north) = (u + period, v + other);
-            return Ok(Some(vec![
+            return Ok(vec![
                 Side::straight(along_u, true, [u, v], [east, v]),
                 Side::straight(along_v, true, [east, v], [east, north]),
                 Side::straight(along_u, false, [east, north], [u, north]),
                 Side::straight(along_v, false, [u, north], [u, v]),
-            ]));
+            ]);
         }
         let poles = [false, true].map(|is_upper| chart.surface.pole(1, is_upper, self.chart.least()));
-        let [Some(low), Some(high)] = poles else { return Ok(None) };
+        let [Some(low), Some(high)] = poles else { return Err(self.error(UNBOUNDED)) };
         let place = |k: usize| period * (k as f64 + 0.37) / PLACES as f64;
         let is_free = |u: &f64| !self.is_blocked([[*u, low], [*u, high]], holes);
         let u = (0..PLACES).map(place).find(is_free).unwrap_or(place(0));
         let ends = [self.corner([u, low]), self.corner([u, high])];
         let seam = self.seam([u, low], [u, high], ends);
         let east = u + period;
-        Ok(Some(vec![
+        Ok(vec![
             Side::at_corner(ends[0], [u, low], [east, low]),
             Side::straight(seam, true, [east, low], [east, high]),
             Side::at_corner(ends[1], [east, high], [u, high]),
             Side::straight(seam, false, [u, high], [u, low]),
-        ]))
+        ])
     }
 
     /// The corner at the start of a side.

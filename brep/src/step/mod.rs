@@ -6,17 +6,18 @@ mod assembly;
 mod geometry;
 mod glue;
 mod record;
+mod splines;
 mod text;
 mod topology;
 mod units;
 
 pub use units::Unit;
 
-use crate::chart::{Chart, close};
+use crate::chart::{Chart, Side, close};
 use crate::model::{Fin, Model, On, Patch};
 use crate::tessellate::diagonal;
 use crate::{BrepError, Surface};
-use topology::{Face, Shapes};
+use topology::{Face, Shapes, reversed};
 
 /// Reads the solids of a file.
 ///
@@ -89,21 +90,36 @@ fn patch(model: &mut Model, number: usize, face: Face, size: f64) -> Result<Patc
         return Ok(Patch { surface: face.surface, loops, bodies });
     }
     let surface: Surface = face.surface;
-    let chart = Chart::new(&surface, size);
-    let mut loops = Vec::new();
-    for edges in &face.loops {
+    let sides = bounded(model, number, &surface, &face.loops, size).or_else(|error| {
+        // Some programs write loops of left-handed surfaces the wrong way around.
+        let other: Vec<_> = face.loops.iter().map(|edges| reversed(edges.clone())).collect();
+        bounded(model, number, &surface, &other, size).map_err(|_| error)
+    })?;
+    let fins = |sides: Vec<Side>| -> Result<Vec<Fin>, BrepError> {
+        let all: Result<Vec<Fin>, String> = sides.into_iter().map(Side::fin).collect();
+        all.map_err(|what| BrepError::face(number, what, None))
+    };
+    let loops = sides.into_iter().map(fins).collect::<Result<Vec<_>, _>>()?;
+    Ok(Patch { surface, loops, bodies })
+}
+
+/// Loops of edges in the parameters of a surface, joined so that they bound an area.
+fn bounded(
+    model: &mut Model,
+    number: usize,
+    surface: &Surface,
+    loops: &[Vec<(usize, bool)>],
+    size: f64,
+) -> Result<Vec<Vec<Side>>, BrepError> {
+    let chart = Chart::new(surface, size);
+    let mut followed = Vec::new();
+    for edges in loops {
         let one = chart.follow(number, &model.curves, edges)?;
         for &(curve, _) in edges {
             let edge = &mut model.curves[curve];
             edge.tolerance = edge.tolerance.max(one.gap);
         }
-        loops.push(one);
+        followed.push(one);
     }
-    let sides = close(&chart, number, model, loops)?;
-    let fins = |sides: Vec<crate::chart::Side>| -> Result<Vec<Fin>, BrepError> {
-        let all: Result<Vec<Fin>, String> = sides.into_iter().map(crate::chart::Side::fin).collect();
-        all.map_err(|what| BrepError::face(number, what, None))
-    };
-    let loops = sides.into_iter().map(fins).collect::<Result<Vec<_>, _>>()?;
-    Ok(Patch { surface, loops, bodies })
+    close(&chart, number, model, followed)
 }

@@ -292,7 +292,7 @@ fn size(curve: &Curve<3>) -> f64 {
 }
 
 /// The loop in the other direction.
-fn reversed(mut edges: Vec<(usize, bool)>) -> Vec<(usize, bool)> {
+pub(super) fn reversed(mut edges: Vec<(usize, bool)>) -> Vec<(usize, bool)> {
     edges.reverse();
     edges.iter_mut().for_each(|edge| edge.1 = !edge.1);
     edges
