@@ -9,7 +9,7 @@ use tetmill::files::mesh_size;
 use tetmill::mesh::Order;
 use tetmill::run::{Candidates, CutPlane, CutSettings, MAX_PIECES, PlanSettings};
 use tetmill::size::{Effort, Preset, SizeFunction, Source};
-use tetmill::{Error, Geometry, InputSettings, Mesher, Method};
+use tetmill::{Error, Geometry, InputSettings, Mesher, Method, Unit};
 
 /// All options.
 #[derive(Clone, Debug, Default)]
@@ -42,13 +42,14 @@ pub struct Settings {
     keep_surface: Option<bool>,
     merge: Option<f64>,
     feature_angle: Option<f64>,
+    unit: Option<Unit>,
     // The observer.
     pub progress: Option<OnProgress>,
     pub cancel: Option<IsCancelled>,
 }
 
 /// The names of `tetmill_options_set`.
-const NAMES: [&str; 21] = [
+const NAMES: [&str; 22] = [
     "preset",
     "maxh",
     "minh",
@@ -70,6 +71,7 @@ const NAMES: [&str; 21] = [
     "keep-surface",
     "merge",
     "feature-angle",
+    "unit",
 ];
 
 #[derive(Clone, Copy, Debug)]
@@ -188,6 +190,7 @@ impl Settings {
             "keep-surface" => self.keep_surface = of(value, flag)?,
             "merge" => self.merge = of(value, positive)?,
             "feature-angle" => self.feature_angle = of(value, angle)?,
+            "unit" => self.unit = of(value, Unit::from_str)?,
             "parts" | "ranks" => return Err("the number of parts is an argument of tetmill_generate".into()),
             "threads" => return Err("use tetmill_set_threads".into()),
             _ => return Err(format!("there is no such option; there are {}", NAMES.join(", "))),
@@ -200,6 +203,7 @@ impl Settings {
         let mut settings = InputSettings {
             keep_surface: self.keep_surface.unwrap_or(false),
             merge: self.merge,
+            unit: self.unit.unwrap_or_default(),
             ..InputSettings::default()
         };
         if let Some(degrees) = self.feature_angle {

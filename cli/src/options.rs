@@ -125,7 +125,7 @@ impl OrderOptions {
 /// Options for the input.
 #[derive(Args, Debug, Clone)]
 pub struct InputOptions {
-    /// A geometry (.geo, NETGEN CSG; .brep, OpenCASCADE); surfaces (.stl, .off, .obj, .ply, .poly,
+    /// A geometry (.geo, NETGEN CSG; .step, .stp; .brep, OpenCASCADE); surfaces (.stl, .off, .obj, .ply, .poly,
     /// .smesh; several files become several bodies); or a mesh, used unchanged (.msh, .vol, .mesh,
     /// .meshb, .vtu, .pvtu, .ele, an Elmer folder)
     #[arg(required = true, value_name = "INPUT")]
@@ -137,6 +137,9 @@ pub struct InputOptions {
     /// (length) [default: 1e-8 of the size of the geometry]
     #[arg(long, value_name = "LENGTH", value_parser = positive)]
     pub merge: Option<f64>,
+    /// Unit of lengths for a STEP file: m, cm, mm, um, km, in, ft, or that of the file
+    #[arg(long, value_name = "UNIT", default_value = "file", hide_default_value = true)]
+    pub unit: tetmill::Unit,
     /// Angle between facets that separates two patches of an input surface (degrees) [default: 40]
     #[arg(long, value_name = "DEGREES", value_parser = angle)]
     pub feature_angle: Option<f64>,

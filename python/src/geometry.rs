@@ -35,12 +35,18 @@ struct Input {
     merge: Option<f64>,
     /// Degrees.
     feature_angle: Option<f64>,
+    /// The name of a unit of length, checked by the caller.
+    unit: String,
 }
 
 impl Input {
     fn settings(&self) -> InputSettings {
-        let mut settings =
-            InputSettings { keep_surface: self.keep_surface, merge: self.merge, ..InputSettings::default() };
+        let mut settings = InputSettings {
+            keep_surface: self.keep_surface,
+            merge: self.merge,
+            unit: self.unit.parse().unwrap_or_default(),
+            ..InputSettings::default()
+        };
         if let Some(degrees) = self.feature_angle {
             settings.facets.feature_angle = degrees.to_radians();
         }

@@ -137,15 +137,15 @@ fn prefix(path: &Option<PathBuf>) -> String {
 pub enum InputError {
     /// The extension of a file is that of no known format.
     #[error(
-        "cannot tell by its name what {} contains; known are geometries (.geo, .brep), surfaces ({}) and meshes ({})",
+        "cannot tell by its name what {} contains; known are geometries (.geo, .step, .brep), surfaces ({}) and meshes ({})",
         .0.display(), surface::KNOWN, volume::KNOWN
     )]
     UnknownFormat(PathBuf),
-    /// A CAD file, which cannot be read.
+    /// An IGES file, which cannot be read.
     #[error(
-        "{} is a CAD file of a kind that cannot be read: convert it to BREP, for example with the Python package gmsh \
-         (`import gmsh; gmsh.initialize(); gmsh.model.occ.importShapes(\"PART.step\"); gmsh.model.occ.synchronize(); \
-         gmsh.write(\"PART.brep\")`), and give the .brep",
+        "{} is an IGES file, which cannot be read: save the part as STEP in the CAD program, or convert it with the Python \
+         package gmsh (`import gmsh; gmsh.initialize(); gmsh.model.occ.importShapes(\"PART.iges\"); \
+         gmsh.model.occ.synchronize(); gmsh.write(\"PART.step\")`)",
         .0.display()
     )]
     Cad(PathBuf),

@@ -9,7 +9,6 @@ use super::fill::fill;
 use super::retries::Budget;
 use super::settings::InputSettings;
 use crate::Point;
-use crate::files::input::ReadError;
 use crate::files::surface::{self, Surface};
 use crate::ground::kernel::simplex::volume6;
 use crate::ground::mesh::{BoundaryTriangle, Class, Label, Names, Segment, VertexId};
@@ -143,18 +142,17 @@ impl FacetSolid {
         }
     }
 
-    /// Reads a boundary representation (`.brep`).
+    /// Takes the solids of a boundary representation from a file.
     ///
     /// # Errors
-    /// A file that cannot be read, or whose shapes cannot be meshed, with the location.
-    pub fn read_brep(
+    /// Shapes that cannot be meshed, with the location.
+    pub fn of_brep(
         path: &Path,
+        mut brep: brep::Model,
         settings: &InputSettings,
         note: &mut dyn FnMut(&str),
     ) -> Result<Self, Error> {
-        let text = std::fs::read(path).map_err(ReadError::io(path))?;
         let refuse = |error| Error::Brep { path: path.to_path_buf(), error: Box::new(error) };
-        let mut brep = brep::Model::read(&text).map_err(refuse)?;
         let (model, exact) = tessellated(&mut brep).map_err(refuse)?;
         brep.notes.iter().for_each(|text| note(&format!("{}: {text}", path.display())));
         model
@@ -162,13 +160,10 @@ impl FacetSolid {
             .refuse_out_of_range()
             .map_err(|range| InputError::OutOfRange { path: Some(path.to_path_buf()), range })?;
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-        let body = |i: usize| match i {
-            1 => Label::new(1, stem.clone()),
-            i => Label::new(i as u32, format!("{stem}_{i}")),
-        };
+        let of_body = |i: usize| if i == 1 { stem.to_string() } else { format!("{stem}_{i}") };
         let names = Names {
-            bodies: (1..=model.bodies.len()).map(body).collect(),
-            patches: (1..=model.patches.len()).map(|i| Label::new(i as u32, format!("face{i}"))).collect(),
+            bodies: labels(&brep.body_names, model.bodies.len(), of_body),
+            patches: labels(&brep.patch_names, model.patches.len(), |i| format!("face{i}")),
         };
         Ok(Self {
             model,
@@ -326,6 +321,12 @@ impl FacetSolid {
             surface.segments.push(Segment { vertices, curve: CurveId::new(self.model.curves.len() + index) });
         }
     }
+}
+
+/// Labels with the names of a file, numbered from 1; `other` is the name of those that have none.
+fn labels(given: &[Option<String>], count: usize, other: impl Fn(usize) -> String) -> Vec<Label> {
+    let name = |i: usize| given.get(i - 1).cloned().flatten().unwrap_or_else(|| other(i));
+    (1..=count).map(|i| Label::new(i as u32, name(i))).collect()
 }
 
 /// How often a tessellation is made finer because its triangles intersect.

@@ -15,6 +15,7 @@ use std::path::Path;
 enum Kind {
     Csg,
     Brep,
+    Step,
     Surface,
     Mesh,
 }
@@ -26,7 +27,8 @@ fn kind(path: &Path) -> Result<Kind, Error> {
         "geo" => Ok(Kind::Csg),
         "stl" | "off" | "obj" | "ply" | "poly" | "smesh" => Ok(Kind::Surface),
         "brep" => Ok(Kind::Brep),
-        "step" | "stp" | "iges" | "igs" => Err(InputError::Cad(path.to_path_buf()).into()),
+        "step" | "stp" => Ok(Kind::Step),
+        "iges" | "igs" => Err(InputError::Cad(path.to_path_buf()).into()),
         _ => Err(InputError::UnknownFormat(path.to_path_buf()).into()),
     }
 }
@@ -48,8 +50,9 @@ pub fn read(
     }
     match (kinds.as_slice(), paths) {
         ([Kind::Csg], [path]) => read_csg(path.as_ref(), settings, note),
-        ([Kind::Brep], [path]) => {
-            FacetSolid::read_brep(path.as_ref(), settings, note).map(|solid| Model::Facets(Box::new(solid)))
+        ([Kind::Brep], [path]) => read_brep(path.as_ref(), brep::Model::read, settings, note),
+        ([Kind::Step], [path]) => {
+            read_brep(path.as_ref(), |text| brep::Model::read_step(text, settings.unit), settings, note)
         }
         ([Kind::Mesh], [path]) => read_mesh(path.as_ref(), note),
         (kinds, _) if !kinds.is_empty() && kinds.iter().all(|kind| *kind == Kind::Surface) => {
@@ -84,6 +87,19 @@ fn read_csg(path: &Path, settings: &InputSettings, note: &mut dyn FnMut(&str)) -
         .map_err(|error| Error::Features { path: Some(path.to_path_buf()), error: Box::new(error) })?;
     model.cut_cusps().iter().for_each(|cusp| note(&format!("{}: {cusp}", path.display())));
     Ok(model)
+}
+
+/// Reads a boundary representation.
+fn read_brep(
+    path: &Path,
+    parse: impl FnOnce(&[u8]) -> Result<brep::Model, brep::BrepError>,
+    settings: &InputSettings,
+    note: &mut dyn FnMut(&str),
+) -> Result<Model, Error> {
+    let text = read_bytes(path)?;
+    let refuse = |error| Error::Brep { path: path.to_path_buf(), error: Box::new(error) };
+    let solid = FacetSolid::of_brep(path, parse(&text).map_err(refuse)?, settings, note)?;
+    Ok(Model::Facets(Box::new(solid)))
 }
 
 fn read_mesh(path: &Path, note: &mut dyn FnMut(&str)) -> Result<Model, Error> {

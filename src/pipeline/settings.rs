@@ -15,6 +15,8 @@ pub struct InputSettings {
     /// Surfaces of a `.geo` file that are of one kind and at most this far apart (length) are taken
     /// as one; by default 10⁻⁸ of the size of the geometry.
     pub merge: Option<f64>,
+    /// The unit of lengths for STEP files, which have one of their own.
+    pub unit: brep::Unit,
 }
 
 /// How a geometry is cut.

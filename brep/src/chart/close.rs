@@ -140,13 +140,12 @@ impl Closing<'_> {
         let rounds = |i: usize| if self.chart.periods[i].is_some() { -2..=2 } else { 0..=0 };
         let crosses = |outline: &Vec<Parameters>, by: [i32; 2]| {
             let next = outline.iter().cycle().skip(1);
-            outline.iter().zip(next).any(|(p, q)| {
-                is_crossing(segment, [self.chart.shifted(*p, by), self.chart.shifted(*q, by)])
-            })
+            outline
+                .iter()
+                .zip(next)
+                .any(|(p, q)| is_crossing(segment, [self.chart.shifted(*p, by), self.chart.shifted(*q, by)]))
         };
-        loops.iter().any(|outline| {
-            rounds(0).any(|i| rounds(1).any(|j| crosses(outline, [i, j])))
-        })
+        loops.iter().any(|outline| rounds(0).any(|i| rounds(1).any(|j| crosses(outline, [i, j]))))
     }
 
     /// Joins loops around a surface in pairs, from the lowest to the highest.
@@ -157,8 +156,7 @@ impl Closing<'_> {
         holes: &[Vec<Parameters>],
     ) -> Result<Vec<Vec<Side>>, BrepError> {
         // With the face to the left, a lower loop goes up in u, a left one down in v.
-        let is_lower =
-            |l: &Loop| (l.drift[direction] > 0) == (direction == 0);
+        let is_lower = |l: &Loop| (l.drift[direction] > 0) == (direction == 0);
         let mut bounds = Vec::new();
         let mut open: Option<Loop> = None;
         let mut first: Option<Loop> = None;

@@ -60,7 +60,7 @@ impl Side {
         let node = |k: usize| {
             let share = k as f64 / STEPS as f64;
             let t = if is_forward { share } else { 1.0 - share };
-            (t, [0, 1].map(|i| from[i] + share * (to[i] - from[i])))
+            (t, if k == STEPS { to } else { [0, 1].map(|i| from[i] + share * (to[i] - from[i])) })
         };
         Self { on: On::Curve(curve), is_forward, nodes: (0..=STEPS).map(node).collect() }
     }

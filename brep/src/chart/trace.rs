@@ -84,7 +84,8 @@ impl Chart<'_> {
     ) -> Result<Loop, BrepError> {
         let last = &sides[sides.len() - 1];
         let (end, start) = (last.end(), sides[0].start());
-        let is_edge = sides.len() > 1 || matches!(last.on, On::Curve(c) if curves[c].ends[0] == curves[c].ends[1]);
+        let is_edge =
+            sides.len() > 1 || matches!(last.on, On::Curve(c) if curves[c].ends[0] == curves[c].ends[1]);
         if let Some(direction) = self.pole_at(end).filter(|_| is_edge)
             && (end[direction] - start[direction]).abs() > 1e-9
         {
@@ -185,7 +186,10 @@ impl Chart<'_> {
         if let Some(direction) = self.pole_at(at) {
             let across = 1 - direction;
             let poles = [false, true].map(|is_upper| self.surface.pole(across, is_upper, self.least()));
-            let nearest = poles.into_iter().flatten().min_by(|a, b| (a - at[across]).abs().total_cmp(&(b - at[across]).abs()));
+            let nearest = poles
+                .into_iter()
+                .flatten()
+                .min_by(|a, b| (a - at[across]).abs().total_cmp(&(b - at[across]).abs()));
             at[across] = nearest.unwrap_or(at[across]);
         }
         at

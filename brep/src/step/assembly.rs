@@ -162,16 +162,16 @@ impl<'a> Structure<'a> {
     /// to the second; the child should be the first, but some programs exchange them.
     fn placement(&self, relation: Node<'a>, child: u64) -> Result<Placement, BrepError> {
         let ends = relation.fields("REPRESENTATION_RELATIONSHIP")?;
-        let transformation =
-            relation.fields("REPRESENTATION_RELATIONSHIP_WITH_TRANSFORMATION")?.refers(0)?;
+        let transformation = relation.fields("REPRESENTATION_RELATIONSHIP_WITH_TRANSFORMATION")?.refers(0)?;
         if !transformation.is("ITEM_DEFINED_TRANSFORMATION") {
             return placement(transformation);
         }
         let fields = transformation.fields("ITEM_DEFINED_TRANSFORMATION")?;
         let [from, to] = [placement(fields.refers(2)?)?, placement(fields.refers(3)?)?];
         let own = self.shapes.get(&child);
-        let is_of_child =
-            |end: usize| ends.refers(end).is_ok_and(|e| own.is_some_and(|own| own.iter().any(|s| s.id == e.id)));
+        let is_of_child = |end: usize| {
+            ends.refers(end).is_ok_and(|e| own.is_some_and(|own| own.iter().any(|s| s.id == e.id)))
+        };
         let is_exchanged = !is_of_child(2) && is_of_child(3);
         let [from, to] = if is_exchanged { [to, from] } else { [from, to] };
         let inverse = from.inverse().ok_or_else(|| transformation.error("it is singular"))?;
@@ -267,10 +267,8 @@ fn units(shape: Node) -> Result<Units, BrepError> {
 /// The name of the product of a definition.
 fn name_of(definition: Node) -> Option<String> {
     let formation = definition.get("PRODUCT_DEFINITION")?.refers(2).ok()?;
-    let fields = formation.any(&[
-        "PRODUCT_DEFINITION_FORMATION",
-        "PRODUCT_DEFINITION_FORMATION_WITH_SPECIFIED_SOURCE",
-    ])?;
+    let fields = formation
+        .any(&["PRODUCT_DEFINITION_FORMATION", "PRODUCT_DEFINITION_FORMATION_WITH_SPECIFIED_SOURCE"])?;
     let product = fields.refers(2).ok()?.get("PRODUCT")?;
     product.text(1).and_then(given).or_else(|| product.text(0).and_then(given))
 }

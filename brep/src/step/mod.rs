@@ -7,6 +7,8 @@ mod geometry;
 mod glue;
 mod record;
 mod splines;
+#[cfg(test)]
+mod tests;
 mod text;
 mod topology;
 mod units;

@@ -199,7 +199,9 @@ pub(super) fn spline_surface(node: Node) -> Result<Surface, BrepError> {
     let size = net.iter().flatten().map(|p| (p - net[0][0]).amax()).fold(0.0, f64::max);
     let is_same = |a: &Vector4<f64>, b: &Vector4<f64>| (a - b).amax() <= CLOSED * size;
     let bases = [
-        basis(node, degrees[0], counts[0], &in_u?, |i, j| net[i].iter().zip(&net[j]).all(|(a, b)| is_same(a, b)))?,
+        basis(node, degrees[0], counts[0], &in_u?, |i, j| {
+            net[i].iter().zip(&net[j]).all(|(a, b)| is_same(a, b))
+        })?,
         basis(node, degrees[1], counts[1], &in_v?, |i, j| net.iter().all(|row| is_same(&row[i], &row[j])))?,
     ];
     net.truncate(bases[0].poles());

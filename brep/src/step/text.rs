@@ -310,9 +310,10 @@ pub(super) fn decoded(text: &[u8]) -> String {
 /// The characters of groups of hexadecimal digits.
 fn hex(digits: &[u8], width: usize) -> Option<String> {
     let text = std::str::from_utf8(digits).ok()?;
-    let groups = digits.chunks(width).enumerate().map(|(k, group)| {
-        u32::from_str_radix(text.get(k * width..k * width + group.len())?, 16).ok()
-    });
+    let groups = digits
+        .chunks(width)
+        .enumerate()
+        .map(|(k, group)| u32::from_str_radix(text.get(k * width..k * width + group.len())?, 16).ok());
     let codes: Vec<u32> = groups.collect::<Option<_>>()?;
     if width == 4 {
         let units: Vec<u16> = codes.into_iter().map(|code| code as u16).collect();

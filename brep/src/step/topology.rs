@@ -243,7 +243,9 @@ impl Reader<'_> {
             let extent = (points[1] - points[0]).norm();
             if off > FARTHEST * extent.max(size(curve)) {
                 let [x, y, z] = [p.x, p.y, p.z];
-                return Err(edge.error(format!("its vertex ({x}, {y}, {z}) is {off:.3e} away from its curve")));
+                return Err(
+                    edge.error(format!("its vertex ({x}, {y}, {z}) is {off:.3e} away from its curve"))
+                );
             }
         }
         let [first, last] = feet.map(|foot| foot.parameter);

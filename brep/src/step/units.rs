@@ -13,6 +13,26 @@ pub enum Unit {
     Metres(f64),
 }
 
+impl std::str::FromStr for Unit {
+    type Err = String;
+
+    fn from_str(name: &str) -> Result<Self, String> {
+        let known = |(own, metres): &(&str, f64)| (*own == name).then_some(Self::Metres(*metres));
+        let names = || NAMED.map(|(name, _)| name).join(", ");
+        match name {
+            "file" => Ok(Self::OfFile),
+            _ => NAMED
+                .iter()
+                .find_map(known)
+                .ok_or_else(|| format!("`{name}` is no unit of length; there are file, {}", names())),
+        }
+    }
+}
+
+/// Units by their names, in metres.
+const NAMED: [(&str, f64); 7] =
+    [("m", 1.0), ("cm", 1e-2), ("mm", 1e-3), ("um", 1e-6), ("km", 1e3), ("in", 0.0254), ("ft", 0.3048)];
+
 /// The units of a representation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Units {

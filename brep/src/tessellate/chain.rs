@@ -35,6 +35,13 @@ pub(super) fn chain(
         }
         sides.push(side);
     }
+    // At a pole all sides have the same parameters, without rounding.
+    for k in (0..fins.len()).filter(|&k| fins.len() > 1 && matches!(fins[k].on, On::Corner(_))) {
+        let (before, after) = ((k + fins.len() - 1) % fins.len(), (k + 1) % fins.len());
+        let (start, end) = (sides[k][0].0, sides[k][AT_POLE].0);
+        sides[before].last_mut().expect("a side has two nodes or more").0 = start;
+        sides[after][0].0 = end;
+    }
     let mut out_sides = Sides::new();
     for k in 0..sides.len() {
         let side = &sides[k];
@@ -67,7 +74,14 @@ fn at_pole(fin: &Fin, vertex: u32) -> Chain {
     let [low, high] = fin.range;
     let at = |k: usize| low + (high - low) * (k as f64 / AT_POLE as f64);
     let curve = fin.curve.as_ref().expect("a side without length has parameters");
-    (0..=AT_POLE).map(|k| (curve.point(at(k)).into(), vertex)).collect()
+    let [first, last]: [[f64; 2]; 2] = [low, high].map(|t| curve.point(t).into());
+    let across = usize::from((last[0] - first[0]).abs() > (last[1] - first[1]).abs());
+    let node = |k: usize| {
+        let mut parameters: [f64; 2] = curve.point(at(k)).into();
+        parameters[across] = first[across];
+        (parameters, vertex)
+    };
+    (0..=AT_POLE).map(node).collect()
 }
 
 fn on_curve(

@@ -18,7 +18,6 @@ from ._mesh import Mesh
 from ._mpi import Processes, agreed, communicator
 from ._parts import Label, labels
 from ._sizes import Background, Grid, Interpolated
-from ._step import converted
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -33,6 +32,7 @@ Path = Union[str, "os.PathLike[str]"]
 
 _PRESETS = ("very-coarse", "coarse", "moderate", "fine", "very-fine")
 _EFFORTS = ("quick", "standard", "careful", "thorough")
+_UNITS = ("file", "m", "cm", "mm", "um", "km", "in", "ft")
 _METHODS = ("refine", "surface", "decompose")
 _PLANES = ("best", "axes", "principal", "random", "median")
 _MOST_LEVELS = 10
@@ -78,7 +78,9 @@ def warn(notes: Iterable[str]) -> None:
         warnings.warn(note, NoteWarning, stacklevel=3)
 
 
-def _input(keep_surface: bool, merge: float | None, feature_angle: float | None) -> dict[str, Any]:
+def _input(
+    keep_surface: bool, merge: float | None, feature_angle: float | None, unit: str = "file"
+) -> dict[str, Any]:
     angle = arguments.length("feature_angle", feature_angle)
     if angle is not None and angle > 180:
         raise ValueError(f"feature_angle cannot be {angle}: expected an angle of at most 180 degrees")
@@ -86,14 +88,15 @@ def _input(keep_surface: bool, merge: float | None, feature_angle: float | None)
         "keep_surface": bool(keep_surface),
         "merge": arguments.length("merge", merge),
         "feature_angle": angle,
+        "unit": arguments.one_of("unit", unit, _UNITS),
     }
 
 
 class Geometry:
     """Solids to be meshed, surfaces that bound them, or a mesh to be refined and partitioned.
 
-    `Geometry(path)` reads a file: a geometry in NETGEN's language (.geo), a CAD part (.brep of
-    OpenCASCADE; .step with the package gmsh, in the file's unit of length), surfaces (.stl, .off,
+    `Geometry(path)` reads a file: a geometry in NETGEN's language (.geo), CAD parts (.step, .brep
+    of OpenCASCADE), surfaces (.stl, .off,
     .obj, .ply, .poly, .smesh; several files become several bodies), or a mesh, used unchanged
     (.msh, .vol, .mesh, .meshb, .vtu, .pvtu, .ele, an Elmer folder).
 
@@ -104,6 +107,7 @@ class Geometry:
             (length); by default 1e-8 of the size of the geometry.
         feature_angle: Angle between facets that separates two patches of an input surface
             (degrees); by default 40.
+        unit: Unit of lengths for a STEP file: "m", "cm", "mm", "um", "km", "in", "ft", or "file".
     """
 
     def __init__(
@@ -112,13 +116,14 @@ class Geometry:
         keep_surface: bool = False,
         merge: float | None = None,
         feature_angle: float | None = None,
+        unit: str = "file",
     ) -> None:
         if not paths:
             raise TypeError("Geometry needs a file; see also from_text, from_surface and from_mesh")
-        given = _input(keep_surface, merge, feature_angle)
+        given = _input(keep_surface, merge, feature_angle, unit)
+        files = [os.fspath(path) for path in paths]
         # None in a process that only takes part in the meshing.
-        with converted([os.fspath(path) for path in paths]) as files:
-            self._native: _native.Geometry | None = _native.Geometry.from_files(files, given)
+        self._native: _native.Geometry | None = _native.Geometry.from_files(files, given)
         warn(self.notes)
 
     @classmethod
