@@ -2,7 +2,7 @@
 """tetmill, NETGEN and Gmsh on CAD parts, each with its usual sizes, in one run.
 
   python3 scripts/brep_corpus.py FOLDER       # makes parts, and their volumes by OpenCASCADE
-  python3 benches/cad.py FOLDER [--binary target/release/tetmill] [--only NAME...]
+  python3 benches/cad.py FOLDER [--binary target/release/tetmill] [--format step] [--only NAME...]
 
 Needs the Python packages numpy, gmsh and netgen-mesher (GPL and LGPL: they only run here). Each mesh is made in a process of
 its own, with at most 120 s. Sizes: tetmill and NETGEN at `moderate`; Gmsh with 12 elements a turn (Mesh.MeshSizeFromCurvature) and
@@ -102,6 +102,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=pathlib.Path)
     parser.add_argument("--binary", default="target/release/tetmill")
+    parser.add_argument("--format", choices=["brep", "step"], default="brep")
     parser.add_argument("--only", nargs="*")
     parser.add_argument("--worker", help=argparse.SUPPRESS)
     if "--worker" in sys.argv:
@@ -117,7 +118,7 @@ def main():
     columns = "s | tets | smallest | 1st % | volume"
     print(f"| part | {' | '.join(f'{p}: {columns}' for p in programs)} |\n|{'---|' * (1 + 5 * len(programs))}")
     all_of, failures = {p: [] for p in programs}, []
-    for path in sorted(options.folder.glob("*.brep")):
+    for path in sorted(options.folder.glob(f"*.{options.format}")):
         if options.only and path.stem not in options.only:
             continue
         volume = sum(measures.get(path.stem, {}).get("volumes", []))

@@ -1,10 +1,10 @@
 //! Boundary representations of CAD programs.
 
-use crate::folders::own;
+use crate::folders::{own, shared};
 use std::path::PathBuf;
 use tetmill::comm::thread;
 use tetmill::mesh::Order;
-use tetmill::{Geometry, Mesher, Method};
+use tetmill::{Geometry, InputSettings, MeshArrays, Mesher, Method};
 
 /// A file of the repository.
 fn file(name: &str) -> PathBuf {
@@ -13,7 +13,10 @@ fn file(name: &str) -> PathBuf {
 
 /// The volume of the tets of a mesh.
 fn volume(geometry: &Geometry, levels: u32) -> f64 {
-    let mesh = Mesher::new().levels(levels).generate(geometry).unwrap().arrays();
+    volume_of(&Mesher::new().levels(levels).generate(geometry).unwrap().arrays())
+}
+
+fn volume_of(mesh: &MeshArrays) -> f64 {
     let of = |tet: &[u32; 4]| {
         let [a, b, c, d] = tet.map(|v| tetmill::Point::from(mesh.points[v as usize]));
         (b - a).cross(&(c - a)).dot(&(d - a)) / 6.0
@@ -55,6 +58,46 @@ fn second_order_and_the_method_surface_work_on_exact_faces() {
 }
 
 #[test]
+fn a_step_assembly_has_names_and_is_on_its_faces_in_the_wanted_unit() {
+    let path = own("step").with_extension("").join("assembly.step");
+    let settings = InputSettings { unit: "mm".parse().unwrap(), ..InputSettings::default() };
+    let geometry = Geometry::read(&[path], &settings, &mut |note| panic!("{note}")).unwrap();
+    let mesh = Mesher::new().levels(1).generate(&geometry).unwrap();
+    let names: Vec<&str> = mesh.names.bodies.iter().map(|label| label.names[0].as_str()).collect();
+    assert_eq!(names, ["plate", "bolt", "bolt", "bolt", "bolt"]);
+    // Plate and bolts: the mesh is refined once, so chords are short.
+    let exact = 8000.0 + 4.0 * std::f64::consts::PI * (4.0 * 7.0 + 16.0 * 3.0);
+    let arrays = mesh.arrays();
+    let volume = volume_of(&arrays);
+    assert!((volume / exact - 1.0).abs() < 0.01, "{volume} instead of {exact}");
+    // The first bolt stands on (-5, -5, 20): its lower cylinder has radius 2 above its head of radius 4.
+    let is_on_bolt = |p: &[f64; 3]| {
+        let r = (p[0] + 5.0).hypot(p[1] + 5.0);
+        (23.5..29.5).contains(&p[2]) && r < 3.0 && (r - 2.0).abs() < 1e-12
+    };
+    assert!(arrays.points.iter().filter(|p| is_on_bolt(p)).count() > 10);
+}
+
+#[test]
+fn step_and_brep_of_one_part_have_the_volumes_of_the_cad_program() {
+    let Some(folder) = shared("step") else { return };
+    let text = std::fs::read(folder.join("volumes.json")).unwrap();
+    let parts: serde_json::Value = serde_json::from_slice(&text).unwrap();
+    for (name, part) in parts.as_object().unwrap() {
+        // The blade has ten times as many tets as the others together.
+        for ending in ["step", "brep"].into_iter().filter(|_| name != "blade") {
+            let path = folder.join(name).with_extension(ending);
+            let geometry = Geometry::from_file(&path).unwrap_or_else(|error| panic!("{error}"));
+            let inspection = geometry.inspect().unwrap();
+            assert_eq!(Some(inspection.patches.len() as u64), part["faces"].as_u64(), "{}", path.display());
+            let exact: f64 = part["volumes"].as_array().unwrap().iter().map(|v| v.as_f64().unwrap()).sum();
+            let found = volume(&geometry, 0);
+            assert!((found / exact - 1.0).abs() < 0.02, "{}: {found} {exact}", path.display());
+        }
+    }
+}
+
+#[test]
 fn faces_and_solids_have_numbers_and_kinds() {
     let geometry = Geometry::from_file(file("box_with_hole")).unwrap();
     let inspection = geometry.inspect().unwrap();
@@ -73,10 +116,14 @@ fn what_cannot_be_read_or_cut_is_refused_with_the_reason() {
     let refused = thread::try_run(2, |comm| cut.generate_on(comm, Some(&geometry)).map(drop)).unwrap_err();
     assert!(refused.to_string().contains("cut"), "{refused}");
     let folder = tempfile::tempdir().unwrap();
+    let iges = folder.path().join("part.igs");
+    std::fs::write(&iges, "").unwrap();
+    let error = Geometry::from_file(&iges).unwrap_err().to_string();
+    assert!(error.contains("IGES") && error.contains("STEP"), "{error}");
     let step = folder.path().join("part.step");
-    std::fs::write(&step, "ISO-10303-21;").unwrap();
+    std::fs::write(&step, "ISO-10303-21;\nHEADER;").unwrap();
     let error = Geometry::from_file(&step).unwrap_err().to_string();
-    assert!(error.contains("gmsh") && error.contains(".brep"), "{error}");
+    assert!(error.contains("part.step: line 2: ") && error.contains("incomplete"), "{error}");
     let damaged = folder.path().join("part.brep");
     let text = std::fs::read_to_string(file("cone")).unwrap();
     std::fs::write(&damaged, text.replace("TShapes", "TShape")).unwrap();

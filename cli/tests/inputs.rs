@@ -114,9 +114,12 @@ fn sizes_for_a_mesh_and_mixed_inputs_are_refused() {
     };
     refused(&[mesh.as_os_str(), "--maxh".as_ref(), "0.1".as_ref()], "--maxh");
     refused(&[mesh.as_os_str(), brick.as_os_str()], "surfaces");
+    let iges = dir.path().join("part.igs");
+    std::fs::write(&iges, "").unwrap();
+    refused(&[iges.as_os_str()], "save the part as STEP");
     let step = dir.path().join("part.step");
-    std::fs::write(&step, "").unwrap();
-    refused(&[step.as_os_str()], "convert it to BREP");
+    std::fs::write(&step, "ISO-10303-21;").unwrap();
+    refused(&[step.as_os_str()], "part.step: line 1: the file ends without");
     let open = dir.path().join("open.stl");
     let text = std::fs::read_to_string(&brick).unwrap();
     let facets: Vec<&str> = text.split_inclusive("endfacet\n").collect();
