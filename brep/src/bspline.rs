@@ -13,8 +13,13 @@ pub const MOST_DEGREE: usize = 25;
 /// The highest order of the derivatives that are computed.
 pub const MOST_ORDER: usize = 3;
 
-/// The basis functions that do not vanish at a parameter, with their derivatives: `[order][index]`.
-pub type Functions = [[f64; MOST_DEGREE + 1]; MOST_ORDER + 1];
+/// The basis functions that do not vanish at a parameter, with their derivatives: `[order][index]`,
+/// for degrees below `N`. Most splines have low degrees, and most of the time would go into zeros.
+type Functions<const N: usize> = [[f64; N]; MOST_ORDER + 1];
+/// The lengths of [`Functions`] for cubic splines, for those of degree 7, and for all.
+const LOW: usize = 4;
+const MIDDLE: usize = 8;
+const ALL: usize = MOST_DEGREE + 1;
 
 /// A B-spline basis over a knot sequence.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -158,33 +163,37 @@ impl Basis {
     ///
     /// Piegl, Tiller, algorithm A2.3: each derivative is a difference of functions of lower degree.
     #[inline]
-    fn evaluate(&self, t: f64, order: usize, out: &mut Functions) -> usize {
+    fn evaluate<const N: usize>(&self, t: f64, order: usize, out: &mut Functions<N>) -> usize {
         let (span, t) = self.locate(t);
         let p = self.degree;
         let knots = &self.knots;
-        // lower[d]: the functions of degree d.
-        let mut lower = [[0.0; MOST_DEGREE + 1]; MOST_DEGREE + 1];
-        lower[0][0] = 1.0;
+        // Functions of the degree p - k, for each order k of a derivative.
+        let mut lower = [[0.0; N]; MOST_ORDER + 1];
+        let mut row = [0.0; N];
+        row[0] = 1.0;
         for d in 1..=p {
+            if p - (d - 1) <= MOST_ORDER {
+                lower[p - (d - 1)] = row;
+            }
             let mut carried = 0.0;
             for k in 0..d {
                 let (right, left) = (knots[span + k + 1], knots[span + 1 + k - d]);
-                let share = lower[d - 1][k] / (right - left);
-                lower[d][k] = carried + (right - t) * share;
+                let share = row[k] / (right - left);
+                row[k] = carried + (right - t) * share;
                 carried = (t - left) * share;
             }
-            lower[d][d] = carried;
+            row[d] = carried;
         }
-        out[0][..=p].copy_from_slice(&lower[p][..=p]);
+        out[0] = row;
         for order in 1..=order.min(MOST_ORDER) {
             if order > p {
-                out[order][..=p].fill(0.0);
+                out[order] = [0.0; N];
                 continue;
             }
             // Raise the functions of degree p - order step by step to derivatives of degree p.
-            let mut row = lower[p - order];
+            let mut row = lower[order];
             for d in p - order + 1..=p {
-                let mut next = [0.0; MOST_DEGREE + 1];
+                let mut next = [0.0; N];
                 for k in 0..d {
                     let share = d as f64 * row[k] / (knots[span + k + 1] - knots[span + 1 + k - d]);
                     next[k] -= share;
@@ -192,7 +201,7 @@ impl Basis {
                 }
                 row = next;
             }
-            out[order][..=p].copy_from_slice(&row[..=p]);
+            out[order] = row;
         }
         span
     }
@@ -216,7 +225,16 @@ pub struct SplineCurve<const D: usize> {
 impl<const D: usize> SplineCurve<D> {
     /// The value and the first three derivatives.
     pub fn jet(&self, t: f64) -> [SVector<f64, D>; 4] {
-        let mut functions = [[0.0; MOST_DEGREE + 1]; MOST_ORDER + 1];
+        match self.basis.degree {
+            ..LOW => self.jet_within::<LOW>(t),
+            LOW..MIDDLE => self.jet_within::<MIDDLE>(t),
+            _ => self.jet_within::<ALL>(t),
+        }
+    }
+
+    /// The same for degrees below `N`.
+    fn jet_within<const N: usize>(&self, t: f64) -> [SVector<f64, D>; 4] {
+        let mut functions: Functions<N> = [[0.0; N]; MOST_ORDER + 1];
         let span = self.basis.evaluate(t, MOST_ORDER, &mut functions);
         let (mut sums, mut weights) = ([SVector::zeros(); 4], [0.0; 4]);
         for k in 0..=self.basis.degree {
@@ -262,7 +280,16 @@ pub struct SplineSurface {
 impl SplineSurface {
     /// The value and the derivatives up to a total `order`.
     pub fn jet(&self, u: f64, v: f64, order: usize) -> crate::surface::Jet {
-        let [mut in_u, mut in_v] = [[[0.0; MOST_DEGREE + 1]; MOST_ORDER + 1]; 2];
+        match self.bases[0].degree.max(self.bases[1].degree) {
+            ..LOW => self.jet_within::<LOW>(u, v, order),
+            LOW..MIDDLE => self.jet_within::<MIDDLE>(u, v, order),
+            _ => self.jet_within::<ALL>(u, v, order),
+        }
+    }
+
+    /// The same for degrees below `N`.
+    fn jet_within<const N: usize>(&self, u: f64, v: f64, order: usize) -> crate::surface::Jet {
+        let [mut in_u, mut in_v]: [Functions<N>; 2] = [[[0.0; N]; MOST_ORDER + 1]; 2];
         let [basis_u, basis_v] = &self.bases;
         let span_u = basis_u.evaluate(u, order, &mut in_u);
         let span_v = basis_v.evaluate(v, order, &mut in_v);

@@ -7,6 +7,12 @@ const MOST: usize = 100_000;
 /// A closed curve, or one that bends, has at least this many segments between jumps.
 const FEWEST: usize = 2;
 
+/// The middle of a side, straight in the parameters, is at most this far from its curve, in lengths
+/// of the side.
+const STRAY: f64 = 0.04;
+/// Shorter sides, in lengths of the shortest, are not divided for that.
+const LONG: f64 = 300.0;
+
 /// A side of a patch with its surface.
 pub(super) type Beside<'a> = (&'a Surface, &'a Fin);
 
@@ -93,8 +99,16 @@ fn is_fine(
         let normals: Vec<Vector> = normals.collect();
         normals.windows(2).map(|n| n[0].angle(&n[1])).sum::<f64>() <= angle
     };
+    // Beside poles, straight lines in the parameters bend in space: vertices inside of a patch would
+    // be beyond the edge.
+    let follows = |&(surface, fin): &Beside| {
+        let Some(own) = fin.curve.as_ref().filter(|_| along.norm() > LONG * shortest) else { return true };
+        let [p, q] = [a, b].map(|t| own.point(fin.parameter(t, edge.range)));
+        let between = surface.point((0.5 * (p + q)).into());
+        (between.coords - edge.curve.point(0.5 * (a + b))).norm() <= STRAY * along.norm()
+    };
     is_straight
-        && (is_short || beside.iter().all(is_flat))
+        && (is_short || beside.iter().all(|beside| is_flat(beside) && follows(beside)))
         && [0.25, 0.5, 0.75].into_iter().all(|share| off(share) <= chord)
 }
 

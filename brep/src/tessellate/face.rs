@@ -78,7 +78,7 @@ struct Face<'a> {
     patch: &'a Patch,
     number: usize,
     plane: Plane,
-    frame: Frame<'a>,
+    frame: Frame,
     /// How often loops use each constraint, by the indices of its ends.
     sides: BTreeMap<[usize; 2], usize>,
     tolerances: &'a Tolerances,

@@ -28,21 +28,38 @@ impl HasPosition for Node {
 /// At a **pole** the derivative in one direction vanishes, and a side of the patch is one point.
 /// Lengths in that direction are then taken at each value of the other parameter, as in the
 /// sinusoidal projection of a globe: the side becomes one point here too.
-pub(super) struct Frame<'a> {
-    surface: &'a Surface,
+pub(super) struct Frame {
     origin: [f64; 2],
     scale: [f64; 2],
-    /// The direction whose derivative vanishes at a pole.
-    pole: Option<usize>,
-    /// Parameters in that direction at which lengths are taken.
-    samples: [f64; 4],
-    /// Shorter derivatives are those of a pole.
-    least: f64,
+    pole: Option<Pole>,
 }
 
-impl<'a> Frame<'a> {
+/// Lengths of the derivative in the direction that vanishes at a pole.
+struct Pole {
+    direction: usize,
+    /// The range of the other parameter.
+    range: [f64; 2],
+    /// Mean lengths at equal steps of the other parameter, and 0 at the pole itself.
+    rates: Vec<f64>,
+}
+
+/// Steps between the values of [`Pole::rates`].
+const STEPS: usize = 256;
+
+impl Pole {
+    /// The mean length at a value of the other parameter.
+    fn rate(&self, other: f64) -> f64 {
+        let [low, high] = self.range;
+        let at = ((other - low) / (high - low) * STEPS as f64).clamp(0.0, STEPS as f64);
+        let k = (at as usize).min(STEPS - 1);
+        let share = at - k as f64;
+        self.rates[k] * (1.0 - share) + self.rates[k + 1] * share
+    }
+}
+
+impl Frame {
     /// Scales parameters by the mean length of the derivatives.
-    pub fn of(surface: &'a Surface, chains: &[Sides], pole: Option<usize>, diagonal: f64) -> Self {
+    pub fn of(surface: &Surface, chains: &[Sides], pole: Option<usize>, diagonal: f64) -> Self {
         let all = || chains.iter().flatten().flatten().map(|node| node.0);
         let bound = |i: usize, start: f64, pick: fn(f64, f64) -> f64| all().map(|p| p[i]).fold(start, pick);
         let low = [0, 1].map(|i| bound(i, f64::INFINITY, f64::min));
@@ -57,29 +74,29 @@ impl<'a> Frame<'a> {
         }
         let scale = sums.map(|sum| if sum > 0.0 { sum / 25.0 } else { 1.0 });
         let mut origin = low;
-        let mut samples = [0.0; 4];
-        if let Some(i) = pole {
-            origin[i] = at(i, 0.5);
-            samples = [0.125, 0.375, 0.625, 0.875].map(|share| at(i, share));
-        }
-        Self { surface, origin, scale, pole, samples, least: AT_REST * diagonal }
-    }
-
-    /// The length of the derivative in the direction of a pole, at a value of the other parameter.
-    fn rate(&self, i: usize, other: f64) -> f64 {
-        let length = |&s: &f64| {
-            let [u, v] = if i == 0 { [s, other] } else { [other, s] };
-            let d = self.surface.jet(u, v, 1).d;
-            if i == 0 { d[1][0].norm() } else { d[0][1].norm() }
-        };
-        let mean = self.samples.iter().map(length).sum::<f64>() / 4.0;
-        if mean < self.least { 0.0 } else { mean }
+        let pole = pole.map(|direction| {
+            origin[direction] = at(direction, 0.5);
+            let length = |share: f64, other: f64| {
+                let own = at(direction, share);
+                let [u, v] = if direction == 0 { [own, other] } else { [other, own] };
+                let d = surface.jet(u, v, 1).d;
+                if direction == 0 { d[1][0].norm() } else { d[0][1].norm() }
+            };
+            let mean = |k: usize| {
+                let other = at(1 - direction, k as f64 / STEPS as f64);
+                let mean = [0.125, 0.375, 0.625, 0.875].map(|share| length(share, other)).iter().sum::<f64>() / 4.0;
+                if mean < AT_REST * diagonal { 0.0 } else { mean }
+            };
+            let other = 1 - direction;
+            Pole { direction, range: [low[other], high[other]], rates: (0..=STEPS).map(mean).collect() }
+        });
+        Self { origin, scale, pole }
     }
 
     pub fn scaled(&self, p: [f64; 2]) -> Point2<f64> {
         let mut scale = self.scale;
-        if let Some(i) = self.pole {
-            scale[i] = self.rate(i, p[1 - i]);
+        if let Some(pole) = &self.pole {
+            scale[pole.direction] = pole.rate(p[1 - pole.direction]);
         }
         // Differences below the range of the predicates are zero.
         let [x, y] = [0, 1].map(|i| (p[i] - self.origin[i]) * scale[i]);
@@ -91,8 +108,9 @@ impl<'a> Frame<'a> {
     pub fn parameters(&self, p: Point2<f64>) -> [f64; 2] {
         let p = [p.x, p.y];
         let mut out = [0, 1].map(|i| self.origin[i] + p[i] / self.scale[i]);
-        if let Some(i) = self.pole {
-            let rate = self.rate(i, out[1 - i]);
+        if let Some(pole) = &self.pole {
+            let i = pole.direction;
+            let rate = pole.rate(out[1 - i]);
             out[i] = if rate > 0.0 { self.origin[i] + p[i] / rate } else { self.origin[i] };
         }
         out
@@ -102,9 +120,10 @@ impl<'a> Frame<'a> {
     /// direction of the pole: that between the other two suits the triangle.
     pub fn corners(&self, triangle: &[(usize, Node); 3]) -> [[f64; 2]; 3] {
         let mut out = triangle.map(|(_, node)| node.parameters);
-        if let Some(i) = self.pole {
+        if let Some(pole) = &self.pole {
+            let i = pole.direction;
             for k in 0..3 {
-                if self.rate(i, out[k][1 - i]) == 0.0 {
+                if pole.rate(out[k][1 - i]) == 0.0 {
                     out[k][i] = 0.5 * (out[(k + 1) % 3][i] + out[(k + 2) % 3][i]);
                 }
             }
@@ -125,7 +144,7 @@ pub(super) fn pole(patch: &Patch, diagonal: f64) -> Option<usize> {
     })
 }
 
-impl Frame<'_> {
+impl Frame {
     /// 1 if the patch is to the left of its loops, else −1.
     pub fn turn(&self, chains: &[Sides]) -> f64 {
         let double_area = |sides: &Sides| -> f64 {
