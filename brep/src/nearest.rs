@@ -13,6 +13,8 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 const STARTS: usize = 4;
 /// The most samples in one direction of a surface.
 const MOST_SAMPLES: usize = 400;
+/// Samples of an ellipse.
+const AROUND: u32 = 64;
 
 impl Curve<3> {
     /// The parameters between which the curve is defined, or its period; `None` if it is unbounded.
@@ -35,7 +37,7 @@ impl Curve<3> {
             Self::Hyperbola { center, axes: [_, y] } => vec![along(center, y).asinh(), 0.0],
             Self::Ellipse { center, axes: [x, y] } => {
                 let nearest = along(center, y).atan2(along(center, x)).rem_euclid(TAU);
-                let around = (0..16).map(|k| TAU * f64::from(k) / 16.0);
+                let around = (0..AROUND).map(|k| TAU * f64::from(k) / f64::from(AROUND));
                 std::iter::once(nearest).chain(around).collect()
             }
             Self::Spline(spline) => {
@@ -60,6 +62,14 @@ fn smallest<T: Copy>(items: Vec<T>, key: impl Fn(&T) -> f64) -> Vec<T> {
     keyed.into_iter().take(STARTS).map(|(_, item)| item).collect()
 }
 
+/// The items, in ascending order of a parameter, that are nearer than those beside them.
+fn local_minima<T: Copy>(items: Vec<T>, key: impl Fn(&T) -> f64) -> Vec<T> {
+    let keys: Vec<f64> = items.iter().map(key).collect();
+    let is_least =
+        |k: &usize| (*k == 0 || keys[*k] <= keys[k - 1]) && (k + 1 == keys.len() || keys[*k] <= keys[k + 1]);
+    (0..items.len()).filter(is_least).map(|k| items[k]).collect()
+}
+
 /// The point of a whole curve that is nearest to a point. The parameter of a periodic one is inside
 /// of its period.
 pub fn nearest_on_curve(curve: &Curve<3>, point: &Point) -> CurveFoot {
@@ -70,7 +80,9 @@ pub fn nearest_on_curve(curve: &Curve<3>, point: &Point) -> CurveFoot {
         _ => [f64::NEG_INFINITY, f64::INFINITY],
     };
     let distance = |t: &f64| (curve.point(*t) - point.coords).norm();
-    let feet = smallest(curve.samples(point), distance)
+    let mut samples = curve.samples(point);
+    samples.sort_by(f64::total_cmp);
+    let feet = smallest(local_minima(samples, distance), distance)
         .into_iter()
         .map(|start| project_to_curve(curve, range, point, start));
     let mut foot = feet
@@ -100,6 +112,7 @@ pub fn nearest_on_surface(surface: &Surface, point: &Point) -> SurfaceFoot {
 
 /// Parameters from which the search for a nearest point starts.
 fn starts(surface: &Surface, point: &Point) -> Vec<[f64; 2]> {
+    let nearest_of = |all| local_minima(all, |p: &[f64; 2]| (surface.point(*p) - point).norm());
     match surface {
         Surface::Plane { .. } => vec![[0.0; 2]],
         Surface::Round { profile, .. } => {
@@ -122,7 +135,9 @@ fn starts(surface: &Surface, point: &Point) -> Vec<[f64; 2]> {
             // The samples of unbounded curves suit a point in their plane.
             let height = |u: f64| (point.coords - curve.point(u)).dot(direction) / direction.norm_squared();
             let flat = curve.samples(point).first().map_or(*point, |&u| point - direction * height(u));
-            curve.samples(&flat).into_iter().map(|u| [u, height(u)]).collect()
+            let mut all = curve.samples(&flat);
+            all.sort_by(f64::total_cmp);
+            nearest_of(all.into_iter().map(|u| [u, height(u)]).collect())
         }
         Surface::Revolution { curve, origin, axis } => {
             let radial = |p: Vector| p - origin - axis * axis.dot(&(p - origin));
@@ -130,17 +145,19 @@ fn starts(surface: &Surface, point: &Point) -> Vec<[f64; 2]> {
                 let (from, to) = (radial(curve.point(v)), radial(point.coords));
                 axis.dot(&from.cross(&to)).atan2(from.dot(&to))
             };
-            let turned = |v: f64| {
-                let turn = nalgebra::Rotation3::from_scaled_axis(axis * -angle(v));
-                Point::from(turn * (point.coords - origin) + origin)
-            };
             let mut all = curve.samples(point);
-            // Unbounded curves: the point turned into the plane of the curve.
             if curve.domain().is_none() {
-                all = curve.samples(&turned(all[0]));
-                all.extend(curve.samples(&turned(all[0] + 1.0)));
+                // The nearest circle is about as far away as the point is from the axis, or less.
+                let reach = |&v: &f64| {
+                    let [at, speed, ..] = curve.jet(v);
+                    let lengths = (point.coords - origin).norm() + (at - origin).norm();
+                    lengths / speed.norm().max(f64::MIN_POSITIVE)
+                };
+                let (middle, reach) = (all[0], all.iter().map(reach).fold(0.0, f64::max));
+                all.extend((-100..=100).map(|k| middle + reach * f64::from(k) / 100.0));
             }
-            all.into_iter().map(|v| [angle(v), v]).collect()
+            all.sort_by(f64::total_cmp);
+            nearest_of(all.into_iter().map(|v| [angle(v), v]).collect())
         }
         Surface::Spline(spline) => {
             let [in_u, in_v] = [0, 1].map(|k| {

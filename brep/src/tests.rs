@@ -181,6 +181,16 @@ proptest! {
             let foot = project_to_surface(&surface, &point, nearest);
             prop_assert!(foot.is_converged, "{:e} {off:e} {foot:?} {surface:?}", (foot.point - point).norm());
             prop_assert!((foot.point - point).norm() <= distance(&nearest) + 1e-12);
+            // Samples of sweeps of parabolas and hyperbolas may miss a part that bends much.
+            let is_sampled = match &surface {
+                Surface::Extrusion { curve, .. } | Surface::Revolution { curve, .. } => {
+                    !matches!(curve, Curve::Parabola { .. } | Curve::Hyperbola { .. })
+                }
+                _ => true,
+            };
+            let whole = nearest_on_surface(&surface, &point);
+            let found = (whole.point - point).norm();
+            prop_assert!(!is_sampled || found <= distance(&nearest) + 1e-12, "{found} {whole:?} {surface:?}");
             // From near its parameters, with no knot between, the point is found from which this
             // one was moved.
             let back = project_to_surface(&surface, &point, [u + 0.01, v - 0.01]);
@@ -194,6 +204,7 @@ proptest! {
             let foot = project_to_curve(&curve, [-0.1, 1.5], &point, nearest);
             prop_assert!(foot.is_converged, "{foot:?} {curve:?}");
             prop_assert!((foot.point - point).norm() <= distance(&nearest) + 1e-12);
+            prop_assert!((nearest_on_curve(&curve, &point).point - point).norm() <= distance(&nearest) + 1e-12);
         }
     }
 

@@ -7,7 +7,7 @@ use crate::model::{Model, Patch};
 use crate::{BrepError, Point, Vector};
 use spade::handles::FixedVertexHandle;
 use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 /// The tolerances of a tessellation.
 pub(super) struct Tolerances {
@@ -58,7 +58,7 @@ pub(super) fn triangulate(
         number,
         plane: Plane::new(),
         frame,
-        sides: BTreeMap::new(),
+        sides: HashMap::new(),
         tolerances,
         vertices: Vec::new(),
     };
@@ -80,7 +80,7 @@ struct Face<'a> {
     plane: Plane,
     frame: Frame,
     /// How often loops use each constraint, by the indices of its ends.
-    sides: BTreeMap<[usize; 2], usize>,
+    sides: HashMap<[usize; 2], usize>,
     tolerances: &'a Tolerances,
     /// Points of new vertices.
     vertices: Vec<Point>,
@@ -202,7 +202,7 @@ impl Face<'_> {
     /// Divides inner edges until the triangles are close to the surface.
     fn refine(&mut self, out: &Tessellation) -> Result<(), Failure> {
         // Errors of edges and triangles, which do not change while their ends stay.
-        let mut known: BTreeMap<[usize; 2], f64> = BTreeMap::new();
+        let mut known: HashMap<[usize; 2], f64> = HashMap::new();
         let mut normals: Vec<Option<Vector>> = Vec::new();
         for _ in 0..MOST_ROUNDS {
             let triangles = self.triangles();
@@ -275,7 +275,7 @@ impl Face<'_> {
     fn insert(&mut self, mut wanted: Vec<Wanted>, triangles: &[[(usize, Node); 3]]) -> usize {
         let before = self.vertices.len();
         wanted.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)).then(a.3.cmp(&b.3)));
-        let mut beside: BTreeMap<[usize; 2], [usize; 2]> = BTreeMap::new();
+        let mut beside: HashMap<[usize; 2], [usize; 2]> = HashMap::new();
         for (index, triangle) in triangles.iter().enumerate() {
             for k in 0..3 {
                 let key = sorted(triangle[k].0, triangle[(k + 1) % 3].0);

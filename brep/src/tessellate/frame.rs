@@ -84,7 +84,8 @@ impl Frame {
             };
             let mean = |k: usize| {
                 let other = at(1 - direction, k as f64 / STEPS as f64);
-                let mean = [0.125, 0.375, 0.625, 0.875].map(|share| length(share, other)).iter().sum::<f64>() / 4.0;
+                let mean =
+                    [0.125, 0.375, 0.625, 0.875].map(|share| length(share, other)).iter().sum::<f64>() / 4.0;
                 if mean < AT_REST * diagonal { 0.0 } else { mean }
             };
             let other = 1 - direction;
