@@ -40,6 +40,16 @@ class Served(Browser):
         server.send_signal(signal.SIGINT)
         self.assertEqual(server.wait(10), 0)
 
+    def test_a_server_that_ignores_ctrl_c_ends_with_sigterm(self):
+        server, address = self.serve("view", self.geo, "-q", ignored=[signal.SIGINT, signal.SIGHUP])
+        for which in [signal.SIGINT, signal.SIGHUP]:
+            server.send_signal(which)
+        time.sleep(0.2)
+        with urllib.request.urlopen(address) as answer:
+            self.assertEqual(answer.status, 200)
+        server.send_signal(signal.SIGTERM)
+        self.assertEqual(server.wait(10), 0)
+
     def fine(self, *more):
         """A mesh of 12 subdivisions whose level that is shown is coarser."""
         return self.serve("generate", self.geo, "--pieces", 12, "-f", "none", "-q", "--view", *more)
