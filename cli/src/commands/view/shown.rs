@@ -112,7 +112,7 @@ impl Shown<'_> {
         Ok(self.message(comm, &parts, About { pieces, hollow: fill == Fill::Hollow, ..self.about.clone() }))
     }
 
-    /// **Collective.** The tets that meet a plane.
+    /// **Collective.** The tets at a cut.
     fn cut(&self, comm: &dyn Communicator, pieces: u32, region: Region) -> Result<Vec<u8>, Failure> {
         let order = match &self.tets {
             Tets::Levels(levels) => levels.order(),
