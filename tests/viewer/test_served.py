@@ -140,6 +140,37 @@ class Served(Browser):
         page.wait_for_timeout(400)
         self.assertEqual(sum("/mesh/cut/" in url for url in self.asked), asked)
 
+    def test_a_range_of_quality_selects_at_the_cut_too(self):
+        _, address = self.fine("-n", 2)
+        page = self.open_served(address + "#color=angle")
+        page.click("#cut-y")
+        until(page, AT_CUT)
+        whole = self.drawn(page)["drawn"]
+        page.select_option("#counted", "cut")
+        page.locator("#histogram").scroll_into_view_if_needed()
+        box = page.locator("#histogram").bounding_box()
+        page.mouse.move(box["x"] + 2, box["y"] + 40)
+        page.mouse.down()
+        page.mouse.move(box["x"] + box["width"] * 0.5, box["y"] + 40)
+        page.mouse.up()
+        self.assertLess(self.drawn(page)["drawn"], whole)
+        found = page.evaluate(
+            """() => { const { drawn, cut, state } = tetmillApp, angles = (d) => [...d.faces].map((f) => d.mesh.quality[2 * (f >> 2)]);
+            const [level, near] = drawn.map(angles), kept = [...Array(cut.mesh.tetCount).keys()].filter((t) => cut.mesh.quality[2 * t] <= state.range[1]);
+            return { most: Math.max(...level, ...near), near: near.length, kept: kept.length, all: cut.mesh.tetCount, high: state.range[1], worst: Math.min(...cut.mesh.quality.filter((_, k) => k % 2 === 0)) }; }"""
+        )
+        self.assertLessEqual(found["most"], found["high"])
+        self.assertTrue(0 < found["near"] and 0 < found["kept"] < found["all"], found)
+        # The ten worst are of the cut as well, and a click on one goes there.
+        page.click("#worst-0")
+        about = page.evaluate("({ near: tetmillApp.selected.mesh === tetmillApp.cut.mesh, angle: tetmillApp.selected.mesh.quality[2 * tetmillApp.selected.tetIndex] })")
+        self.assertEqual(about, {"near": True, "angle": found["worst"]})
+        until(page, "location.hash.includes('histogram=cut')")
+        page.keyboard.press("Escape")
+        until(page, "!tetmillApp.waiting && !tetmillApp.state.range && tetmillApp.cut")
+        page.click("#cut-none")
+        until(page, "!tetmillApp.waiting && !tetmillApp.cut && !document.getElementById('counted')")
+
     def test_a_large_mesh_from_files_is_hollow_and_its_cuts_are_not(self):
         folder = self.folder / "large"
         run("generate", self.geo, "-n", 2, "--pieces", 10, "-f", "vtu", "-q", "-o", folder)

@@ -12,7 +12,7 @@ function adopted(layer, mesh) {
 /** Whether the server has finer tets for the cut than the mesh that is shown. */
 function canCutFiner(app) {
   const { mesh, state, index } = app;
-  return Boolean(index && index.cuts && state.cut.on && state.cut.fine && !state.range && (mesh.hollow || (mesh.pieces && mesh.pieces[1] < mesh.pieces[0])));
+  return Boolean(index && index.cuts && state.cut.on && state.cut.fine && (mesh.hollow || (mesh.pieces && mesh.pieces[1] < mesh.pieces[0])));
 }
 
 /** The window around the visible piece of the cut, relative to the centre: its lowest and highest corner; null if none is visible. */
@@ -55,13 +55,19 @@ function isEnough(app) {
 /** Asks for the tets at the cut if those that are here do not suffice. */
 function askForCut(app) {
   if (!canCutFiner(app)) {
-    app.cut = null;
-    sayOfCut(app);
+    if (app.cut || app.cutNote) setCut(app, null);
   } else if (!app.fetching && !isEnough(app)) {
     // One at a time, and none while the slider moves.
     clearTimeout(app.asking);
     app.asking = setTimeout(() => fetchCut(app).catch(failed), 150);
   }
+}
+
+/** Takes the tets at the cut, or none, which the histogram can be of. */
+function setCut(app, cut) {
+  app.cut = cut;
+  sayOfCut(app);
+  buildQuality(app);
 }
 
 /** Subdivisions of coarse edges of the mesh itself. */
@@ -87,8 +93,7 @@ async function fetchCut(app) {
     if (answer.ok) {
       const layer = adopted(decode(await answer.arrayBuffer()), mesh);
       // Another level may be shown by now.
-      if (app.mesh === mesh) app.cut = { key, window, wanted: sizeOf(seen), pieces: layer.pieces ? layer.pieces[1] : 1, mesh: layer };
-      sayOfCut(app);
+      if (app.mesh === mesh) setCut(app, { key, window, wanted: sizeOf(seen), pieces: layer.pieces ? layer.pieces[1] : 1, mesh: layer });
     } else {
       app.refused = askedKey(app, seen);
       sayOfCut(app, `Coarser tets are shown at the cut: ${await answer.text()}`);

@@ -110,7 +110,7 @@ function buildPanel(app) {
     ...(bodies.length > 1 ? [section(`Bodies (${bodies.length})`, false, list(app, bodies, state.bodiesOff, "body"))] : []),
     ...(mesh.periodic.length ? [section(`Periodic pairs (${mesh.periodic.length})`, false, ...mesh.periodic.map(([a, b], k) => element("div", { className: "legend-row" },
       element("span", { className: "swatch", style: `background:${css(colorOf(k))}` }), `${labelOf(mesh.patches[a], a, "patch")} ↔ ${labelOf(mesh.patches[b], b, "patch")}`)))] : []),
-    section("Quality", true, ...qualityControls(app)));
+    section("Quality", true, element("div", { id: "quality" }, ...qualityControls(app))));
 }
 
 /** Shows all, or cuts by a plane across an axis or the view, or by a box. */
@@ -163,8 +163,17 @@ function histogram(mesh, which) {
   return bins;
 }
 
+/** Makes the controls of the quality again: the tets that the histogram counts are others. */
+function buildQuality(app) {
+  const place = document.getElementById("quality");
+  if (place) place.replaceChildren(...qualityControls(app));
+}
+
+/** The mesh that the histogram counts. */
+const countedMesh = ({ mesh, cut, state }) => (cut && state.histogram === "cut" ? cut.mesh : mesh);
+
 function qualityControls(app) {
-  const { mesh, state } = app, top = QUALITY[state.measure].best, unit = QUALITY[state.measure].unit;
+  const { state } = app, mesh = countedMesh(app), top = QUALITY[state.measure].best, unit = QUALITY[state.measure].unit;
   const picture = element("canvas", { width: 516, height: 168, id: "histogram", style: "width:258px;height:84px;touch-action:none;cursor:crosshair", title: "Drag to show only tets of this quality" });
   const said = element("div", { className: "facts", id: "range" });
   const bins = histogram(mesh, state.measure), most = Math.max(...bins, 1);
@@ -202,6 +211,7 @@ function qualityControls(app) {
   const worst = worstTets(mesh, state.measure);
   return [
     choice("measure", "Measure", state.measure, Object.entries(QUALITY).map(([key, q]) => [key, q.title.toLowerCase()]), (key) => { state.measure = key; state.range = null; app.rebuild(); }),
+    ...(app.cut ? [choice("counted", "Tets", state.histogram, [["level", "of the shown level"], ["cut", "at the cut"]], (key) => { state.histogram = key; app.rebuild(); })] : []),
     picture, said, element("div", { className: "facts" }, "The worst tets:"),
     element("div", { className: "worst" }, ...worst.map(([t, value], k) => element("button", { id: `worst-${k}`, onclick: () => app.select(aboutTet(mesh, t), true) },
       element("span", {}, `Tet ${mesh.tetIds[t]}`), element("span", {}, `${short(value, 3)}${unit}`)))),

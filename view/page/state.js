@@ -3,7 +3,7 @@
 function standardState(mesh) {
   return {
     turn: looking(-60, 25), focus: [0, 0, 0], zoom: 0.95 * mesh.radius,
-    color: mesh.parts > 1 ? "part" : "patch", style: "both", measure: "angle", range: null,
+    color: mesh.parts > 1 ? "part" : "patch", style: "both", measure: "angle", range: null, histogram: "level",
     boundary: true, interfaces: true, volume: true, curves: true, corners: false, vertices: false, shared: false,
     cut: { on: false, fine: true, shape: "plane", normal: [0, -1, 0], at: 0, box: [[-0.5, -0.5, -0.5], [0.5, 0.5, 0.5]] }, explode: 0, ghosts: -1,
     patchesOff: new Set(), partsOff: new Set(), bodiesOff: new Set(), dark: matchMedia("(prefers-color-scheme: dark)").matches,
@@ -27,6 +27,7 @@ function writeState(state) {
   if (state.level) q.set("level", state.level);
   if (state.ghosts >= 0) q.set("ghosts", state.ghosts);
   if (state.explode) q.set("explode", short(state.explode, 4));
+  if (state.histogram === "cut") q.set("histogram", "cut");
   if (state.range) q.set("range", state.range.join(","));
   for (const key of SETS) if (state[key].size) q.set(key, [...state[key]].join(","));
   return q.toString().replaceAll("%2C", ",");
@@ -55,6 +56,7 @@ function readState(state, text) {
   const ghosts = numbers("ghosts", 1);
   state.ghosts = ghosts && Number.isInteger(ghosts[0]) ? ghosts[0] : -1;
   state.explode = explode ? Math.min(5, Math.max(0, explode[0])) : 0;
+  state.histogram = q.get("histogram") === "cut" ? "cut" : "level";
   const range = (q.get("range") || "").split(",").map(Number);
   state.range = range.length === 2 && range[0] < range[1] ? range : null;
   for (const key of SETS) state[key] = new Set((q.get(key) || "").split(",").filter(Boolean).map(Number).filter(Number.isInteger));

@@ -108,10 +108,11 @@ function isVisible(state, patch, other, volume) {
 }
 
 /**
- * The faces to be drawn; those of a `layer` also if their other tet is not here. A mesh that is cut off has none inside.
+ * The faces to be drawn; those of a `layer` also if their other tet is not here. A mesh that is cut off has faces inside only
+ * around the tets of a selected quality.
  */
 function facesOf(mesh, state, shown, clip, layer) {
-  const faces = [], volume = state.volume && !clip;
+  const faces = [], volume = state.volume && (!clip || state.range);
   for (let f = 0; f < mesh.neighbours.length; f++) {
     if (!shown[f >> 2]) continue;
     const other = mesh.neighbours[f];
