@@ -171,6 +171,20 @@ class Served(Browser):
         page.click("#cut-none")
         until(page, "!tetmillApp.waiting && !tetmillApp.cut && !document.getElementById('counted')")
 
+    def test_a_cut_with_too_many_tets_of_a_file_is_shown_in_the_middle(self):
+        folder = self.folder / "second"
+        run("generate", self.geo, "-n", 2, "--pieces", 12, "--order", 2, "-f", "vtu", "-q", "-o", folder)
+        _, address = self.serve("view", folder / "cube.pvtu", "-q")
+        page = self.open_served(address + "#box=-0.9,-0.9,-0.9,0.9,0.9,0.9")
+        until(page, AT_CUT)
+        found = page.evaluate("({ tets: tetmillApp.cut.mesh.tetCount, window: tetmillApp.cut.mesh.window, note: document.getElementById('cut-note').textContent })")
+        self.assertTrue(50_000 < found["tets"] <= 100_000, found)
+        self.assertIn("in the middle of the view: zoom in", found["note"])
+        self.assertTrue(all(0 < low < high < 1 for low, high in zip(*found["window"])), found["window"])
+        page.evaluate("tetmillApp.state.zoom *= 0.3; tetmillApp.state.focus = [0, -0.4, 0]; tetmillApp.update()")
+        until(page, f"{AT_CUT} && !tetmillApp.cut.mesh.window")
+        self.assertIn("of the mesh itself", page.inner_text("#cut-note"))
+
     def test_a_large_mesh_from_files_is_hollow_and_its_cuts_are_not(self):
         folder = self.folder / "large"
         run("generate", self.geo, "-n", 2, "--pieces", 10, "-f", "vtu", "-q", "-o", folder)

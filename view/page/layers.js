@@ -49,7 +49,7 @@ function isEnough(app) {
   const { cut, mesh } = app, seen = visibleWindow(app, 1);
   if (!seen || app.refused === askedKey(app, seen)) return true;
   if (!cut || cut.key !== cutKey(app) || !covers(cut.window, seen)) return false;
-  return cut.pieces >= finestOf(mesh) || sizeOf(seen) > 0.6 * cut.wanted;
+  return (cut.pieces >= finestOf(mesh) && !cut.mesh.window) || sizeOf(seen) > 0.6 * cut.wanted;
 }
 
 /** Asks for the tets at the cut if those that are here do not suffice. */
@@ -131,6 +131,7 @@ function sayOfCut(app, text = app.cut ? aboutCut(app) : "") {
 
 function aboutCut({ cut, mesh }) {
   const finest = finestOf(mesh), count = grouped(cut.mesh.tetCount);
+  if (cut.mesh.window) return `At the cut are ${count} tets in the middle of the view: zoom in for the others.`;
   if (cut.pieces < finest) return `At the cut are ${count} tets of the level with coarse edges in ${cut.pieces}, not ${finest}: zoom in for finer ones.`;
   return `At the cut are ${count} tets of the mesh itself.`;
 }

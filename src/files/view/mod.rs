@@ -14,12 +14,14 @@ mod overlap;
 mod part;
 mod region;
 mod streams;
+mod window;
 
 pub use gather::gather;
 pub use message::{About, message};
 pub use part::{of_mesh, part};
 pub use region::{Cutter, Region};
 pub use streams::streams;
+pub use window::fitting;
 
 use crate::ground::mesh::{GlobalId, Rank};
 

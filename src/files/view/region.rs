@@ -62,6 +62,30 @@ impl Region {
         let in_window = |k| spans(tet.map(|point| point[k]), [self.low[k], self.high[k]], slack);
         (0..3).all(in_window) && self.cutter.meets(tet, slack)
     }
+
+    /// The region with its window shrunk about the middle.
+    pub fn shrunk(&self, factor: f64) -> Self {
+        let [middle, half] = self.middle_and_half();
+        let end = |sign: f64| [0, 1, 2].map(|k| middle[k] + sign * factor * half[k]);
+        Self { low: end(-1.0), high: end(1.0), ..*self }
+    }
+
+    /// The least factor of [`shrunk`](Self::shrunk) with which the window meets the bounding box of
+    /// a tet; infinite if none does.
+    pub fn least_factor(&self, tet: &[[f64; 3]; 4]) -> f64 {
+        let [middle, half] = self.middle_and_half();
+        let factor = |k: usize| {
+            let along = tet.map(|point| point[k] - middle[k]);
+            let outside = along.iter().copied().fold(f64::INFINITY, f64::min);
+            let outside = outside.max(along.iter().map(|x| -x).fold(f64::INFINITY, f64::min)).max(0.0);
+            if outside > 0.0 { outside / half[k] } else { 0.0 }
+        };
+        (0..3).map(factor).fold(0.0, f64::max)
+    }
+
+    fn middle_and_half(&self) -> [[f64; 3]; 2] {
+        [1.0, -1.0].map(|sign| [0, 1, 2].map(|k| 0.5 * (self.high[k] + sign * self.low[k])))
+    }
 }
 
 /// Whether the range of some values meets another range, both widened by `slack` together.
@@ -102,5 +126,17 @@ mod tests {
         // The bounding boxes of these overlap.
         assert!(!of(0.4, 9.0).meets(&TET) && of(0.4, 9.0).may_meet(&TET, 0.1));
         assert!(!of(-1.0, 2.0).meets(&TET) && of(-1.0, 2.0).may_meet(&TET, 1.1), "the tet is in the box");
+    }
+
+    #[test]
+    fn a_window_shrinks_to_its_middle() {
+        let region = Region { low: [-3.0, -1.0, -1.0], high: [-1.0, 5.0, 1.0], ..at(0.5) };
+        assert_eq!(region.least_factor(&TET), 2.0, "two away from the middle, and the half is one");
+        assert_eq!(region.shrunk(0.5).low, [-2.5, 0.5, -0.5]);
+        let wide = Region { low: [-3.0, -4.0, -9.0], high: [2.0, 16.0, 9.0], ..at(0.5) };
+        let least = wide.least_factor(&TET);
+        assert_eq!(least, 0.5);
+        assert!(wide.shrunk(1.01 * least).meets(&TET) && !wide.shrunk(0.99 * least).meets(&TET));
+        assert_eq!(Region { low: [2.0; 3], high: [2.0; 3], ..at(0.5) }.least_factor(&TET), f64::INFINITY);
     }
 }
