@@ -42,9 +42,13 @@ impl Cutter {
                 spans(sides, [0.0; 2], slack)
             }
             Self::Box { low, high } => {
-                let is_inside =
-                    |p: &[f64; 3]| (0..3).all(|k| low[k] + slack < p[k] && p[k] < high[k] - slack);
-                !tet.iter().all(is_inside) && overlaps(tet, low.map(|x| x - slack), high.map(|x| x + slack))
+                let holds =
+                    |p: &[f64; 3], more: f64| (0..3).all(|k| low[k] - more < p[k] && p[k] < high[k] + more);
+                // Most tets are decided by their bounding box or a corner, much faster.
+                (0..3).all(|k| spans(tet.map(|p| p[k]), [low[k], high[k]], slack))
+                    && !tet.iter().all(|p| holds(p, -slack))
+                    && (tet.iter().any(|p| holds(p, slack))
+                        || overlaps(tet, low.map(|x| x - slack), high.map(|x| x + slack)))
             }
         }
     }
