@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Makes pictures of the viewer for the guide: viewer-pictures.py TETMILL FOLDER.
 
-Six views in headless Chromium with software WebGL, so they are the same on every machine with the same fonts. Needs Playwright
+Seven views in headless Chromium with software WebGL, so they are the same on every machine with the same fonts. Needs Playwright
 and Pillow, which reduces the colours: each picture has less than 200 kB. To be looked at before they replace those of the guide.
 """
 
@@ -29,12 +29,14 @@ VIEWS = [
     ("viewer", ["view", "-q", "geometries/tee.geo", "-n", "4"], "app.state.color = 'angle'; cut([0, -1, 0], 0); look(-62, 24, 0.86)", (1000, 640)),
     ("viewer-parts", ["view", "-q", "geometries/crankshaft.geo", "-n", "4"], "app.state.explode = 0.5; app.state.shared = true; look(-55, 28, 1.15)", (1000, 640)),
     ("viewer-cut", [*GENERATE, "geometries/tee.geo", "-n", "4", "-e", "1e8"], "cut([0, -1, 0], 0); app.state.color = 'angle'; look(-62, 35, 0.13, [1.5, 0, -0.35])", (1000, 760)),
+    ("viewer-box", [*GENERATE, "geometries/tee.geo", "-n", "4", "-e", "6e4"], "box([-1.02, -0.1, -1.02], [0.4, 1.02, 0.6]); look(-55, 28, 0.78)", (1000, 640)),
     ("viewer-ghosts", ["view", "-q", "geometries/tee.geo", "-n", "4"], "showGhosts(app, 1); look(-60, 25, 0.6)", (1000, 640)),
     ("viewer-curved", [*GENERATE, "geometries/tee.geo", "--order", "2"], "app.state.color = 'body'; look(-35, 30, 0.4)", (1000, 640)),
     ("viewer-report", ["generate", "geometries/tee.geo", "-n", "4", "--levels", "1", "-f", "none", "-q", "--report-html"], "document.getElementById('report').showModal()", (1000, 820)),
 ]
 PRELUDE = """const app = tetmillApp;
 const cut = (normal, at) => Object.assign(app.state.cut, { on: true, normal, at });
+const box = (...corners) => Object.assign(app.state.cut, { on: true, shape: "box", box: corners });
 const look = (azimuth, elevation, zoom, focus = [0, 0, 0]) => Object.assign(app.state, { turn: looking(azimuth, elevation), zoom: zoom * app.mesh.radius, focus });
 // A plain background takes fewer bytes.
 if (!app.state.dark) for (const end of ["a", "b"]) document.documentElement.style.setProperty(`--stage-${end}`, "#ffffff");"""

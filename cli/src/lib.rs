@@ -7,7 +7,7 @@
 //!
 //! The library `tetmill` does all meshing. This crate has the options, the printed texts and the
 //! exit statuses.
-#![forbid(unsafe_code)]
+#![deny(unsafe_code)]
 
 mod cancel;
 mod commands;

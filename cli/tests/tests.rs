@@ -23,6 +23,8 @@ mod ranks;
 mod repartition;
 mod scenes;
 mod second_order;
+#[cfg(unix)]
+mod signals;
 mod sizes;
 mod skins;
 mod swept;

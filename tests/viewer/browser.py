@@ -113,11 +113,11 @@ class Browser(unittest.TestCase):
         self.assertNotEqual(before["hash"], after["hash"])
         return before["drawn"], after["drawn"]
 
-    def serve(self, *arguments, launcher=(), env=None):
-        # Background jobs ignore Ctrl-C, and jobs under nohup hang-ups: a server would inherit that and install no handler.
+    def serve(self, *arguments, launcher=(), env=None, ignored=()):
+        # Background jobs ignore Ctrl-C, and jobs under nohup hang-ups: a server would inherit that.
         def interruptible():
             for which in (signal.SIGINT, signal.SIGHUP):
-                signal.signal(which, signal.SIG_DFL)
+                signal.signal(which, signal.SIG_IGN if which in ignored else signal.SIG_DFL)
 
         server = subprocess.Popen([*launcher, TETMILL, *map(str, arguments)], env=env, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True, cwd=ROOT,
                                   preexec_fn=interruptible)

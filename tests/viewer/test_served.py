@@ -21,6 +21,20 @@ NEAR = """() => { const { cut, mesh, state } = tetmillApp, near = cut.mesh, plan
   for (let t = 0; t < near.tetCount; t++) { const s = sides(t); if (Math.min(...s) > slack || Math.max(...s) < -slack) off++; }
   return { off, tets: near.tetCount, pieces: cut.pieces, drawn: tetmillApp.drawn[1].faces.length, note: document.getElementById("cut-note").textContent }; }"""
 
+# Of a box: tets of the cut that are inside it or apart from it, and tets of the mesh itself with corners on both sides that the cut lacks.
+BOX = """async () => { const { cut, mesh, state } = tetmillApp, near = cut.mesh, [low, high] = boxOf(mesh, state.cut), slack = 1e-5 * mesh.radius;
+  const corners = (m, t) => [0, 1, 2, 3].map((k) => sub(pointOf(m, m.tets[4 * t + k]), sub(mesh.center, m.center)));
+  const isIn = (p, more) => p.every((x, i) => low[i] - more < x && x < high[i] + more);
+  const apart = (all) => [0, 1, 2].some((i) => all.every((p) => p[i] < low[i] - slack) || all.every((p) => p[i] > high[i] + slack));
+  const off = [...Array(near.tetCount).keys()].filter((t) => { const all = corners(near, t); return all.every((p) => isIn(p, -slack)) || apart(all); });
+  const whole = decode(await (await fetch(`mesh/level/${mesh.pieces[0]}`)).arrayBuffer()), ids = new Set(near.tetIds), lacking = [];
+  for (let t = 0; t < whole.tetCount; t++) {
+    const all = corners(whole, t);
+    if (all.some((p) => isIn(p, -slack)) && !all.every((p) => isIn(p, slack)) && !ids.has(whole.tetIds[t])) lacking.push(t);
+  }
+  return { off: off.length, lacking: lacking.length, tets: near.tetCount, pieces: cut.pieces, shown: tetmillApp.drawn[1].faces.length }; }"""
+AT_CUT = "tetmillApp.cut && !tetmillApp.fetching && !tetmillApp.waiting && tetmillApp.drawn.length === 2"
+
 
 class Served(Browser):
     def test_the_coarsest_level_comes_first_and_others_on_demand(self):
@@ -38,6 +52,16 @@ class Served(Browser):
         again = self.open(address + page.evaluate("location.hash").replace("level=1", "level=2"))
         until(again, "tetmillApp.mesh.pieces[1] === 2")
         server.send_signal(signal.SIGINT)
+        self.assertEqual(server.wait(10), 0)
+
+    def test_a_server_that_ignores_ctrl_c_ends_with_sigterm(self):
+        server, address = self.serve("view", self.geo, "-q", ignored=[signal.SIGINT, signal.SIGHUP])
+        for which in [signal.SIGINT, signal.SIGHUP]:
+            server.send_signal(which)
+        time.sleep(0.2)
+        with urllib.request.urlopen(address) as answer:
+            self.assertEqual(answer.status, 200)
+        server.send_signal(signal.SIGTERM)
         self.assertEqual(server.wait(10), 0)
 
     def fine(self, *more):
@@ -67,12 +91,99 @@ class Served(Browser):
         about = page.evaluate("({ near: tetmillApp.selected.mesh === tetmillApp.cut.mesh, text: document.getElementById('info').innerText })")
         self.assertTrue(about["near"], about["text"])
         # The plane moves: the layer is of the new plane.
-        plane = page.evaluate("tetmillApp.cut.plane")
+        plane = page.evaluate("tetmillApp.cut.key")
         page.keyboard.press("]")
-        until(page, f"tetmillApp.cut && tetmillApp.cut.plane !== {json.dumps(plane)} && !tetmillApp.waiting")
+        until(page, f"tetmillApp.cut && tetmillApp.cut.key !== {json.dumps(plane)} && !tetmillApp.waiting")
         self.assertEqual(page.evaluate(NEAR)["off"], 0)
         page.click("#cut-fine")
         until(page, "!tetmillApp.waiting && tetmillApp.drawn.length === 1")
+
+    def test_a_box_has_the_finest_tets_at_its_faces(self):
+        _, address = self.fine("-n", 2)
+        page = self.open_served(address)
+        before = self.drawn(page)
+        page.click("#cut-box")
+        until(page, AT_CUT)
+        found = page.evaluate(BOX)
+        self.assertEqual((found["off"], found["lacking"], found["pieces"]), (0, 0, 12))
+        self.assertIn("of the mesh itself", page.inner_text("#cut-note"))
+        self.assertLess(self.drawn(page)["drawn"], before["drawn"])
+        # The faces of half the size have a quarter of the tets.
+        key = page.evaluate("tetmillApp.cut.key")
+        for axis in "xyz":
+            for end, value in [("low", -0.25), ("high", 0.25)]:
+                page.evaluate("([id, value]) => { const thumb = document.getElementById(id); thumb.value = value; thumb.dispatchEvent(new Event('input')); }", [f"box-{axis}-{end}", value])
+        until(page, f"{AT_CUT} && tetmillApp.cut.key === cutKey(tetmillApp) && tetmillApp.cut.key !== {json.dumps(key)}")
+        smaller = page.evaluate(BOX)
+        self.assertEqual((smaller["off"], smaller["lacking"]), (0, 0))
+        self.assertTrue(0.15 < smaller["tets"] / found["tets"] < 0.4, (smaller, found))
+        # A click on the front of the box finds a tet of the mesh itself.
+        box = page.locator("#canvas").bounding_box()
+        page.mouse.click(box["x"] + box["width"] / 2 + 1, box["y"] + box["height"] / 2 + 1)
+        self.assertTrue(page.evaluate("tetmillApp.selected.mesh === tetmillApp.cut.mesh"))
+        page.click("#cut-fine")
+        until(page, "!tetmillApp.waiting && tetmillApp.drawn.length === 1")
+
+    def test_a_box_seen_closely_has_the_tets_of_the_visible_piece(self):
+        _, address = self.fine("-n", 2)
+        page = self.open_served(address + "#box=-0.5,-0.5,-0.5,0.5,0.5,0.5")
+        until(page, AT_CUT)
+        all_tets = page.evaluate("tetmillApp.cut.mesh.tetCount")
+        page.evaluate("Object.assign(tetmillApp.state, { zoom: 0.1 * tetmillApp.mesh.radius, focus: [0, -0.25, 0], turn: looking(-90, 0) }); tetmillApp.state.cut.box[0][1] = -0.49; tetmillApp.update()")
+        until(page, f"{AT_CUT} && tetmillApp.cut.key === cutKey(tetmillApp)")
+        near = page.evaluate("({ tets: tetmillApp.cut.mesh.tetCount, high: tetmillApp.cut.window[1][1] })")
+        self.assertLess(near["tets"], 0.2 * all_tets)
+        self.assertLess(near["high"], -0.2, "only the face towards the viewer")
+        # Nothing is asked for if the box is out of sight.
+        asked = sum("/mesh/cut/" in url for url in self.asked)
+        page.evaluate("tetmillApp.state.focus = [0, 0, 9]; tetmillApp.state.cut.box[0][1] = -0.4; tetmillApp.update()")
+        page.wait_for_timeout(400)
+        self.assertEqual(sum("/mesh/cut/" in url for url in self.asked), asked)
+
+    def test_a_range_of_quality_selects_at_the_cut_too(self):
+        _, address = self.fine("-n", 2)
+        page = self.open_served(address + "#color=angle")
+        page.click("#cut-y")
+        until(page, AT_CUT)
+        whole = self.drawn(page)["drawn"]
+        page.select_option("#counted", "cut")
+        page.locator("#histogram").scroll_into_view_if_needed()
+        box = page.locator("#histogram").bounding_box()
+        page.mouse.move(box["x"] + 2, box["y"] + 40)
+        page.mouse.down()
+        page.mouse.move(box["x"] + box["width"] * 0.5, box["y"] + 40)
+        page.mouse.up()
+        self.assertLess(self.drawn(page)["drawn"], whole)
+        found = page.evaluate(
+            """() => { const { drawn, cut, state } = tetmillApp, angles = (d) => [...d.faces].map((f) => d.mesh.quality[2 * (f >> 2)]);
+            const [level, near] = drawn.map(angles), kept = [...Array(cut.mesh.tetCount).keys()].filter((t) => cut.mesh.quality[2 * t] <= state.range[1]);
+            return { most: Math.max(...level, ...near), near: near.length, kept: kept.length, all: cut.mesh.tetCount, high: state.range[1], worst: Math.min(...cut.mesh.quality.filter((_, k) => k % 2 === 0)) }; }"""
+        )
+        self.assertLessEqual(found["most"], found["high"])
+        self.assertTrue(0 < found["near"] and 0 < found["kept"] < found["all"], found)
+        # The ten worst are of the cut as well, and a click on one goes there.
+        page.click("#worst-0")
+        about = page.evaluate("({ near: tetmillApp.selected.mesh === tetmillApp.cut.mesh, angle: tetmillApp.selected.mesh.quality[2 * tetmillApp.selected.tetIndex] })")
+        self.assertEqual(about, {"near": True, "angle": found["worst"]})
+        until(page, "location.hash.includes('histogram=cut')")
+        page.keyboard.press("Escape")
+        until(page, "!tetmillApp.waiting && !tetmillApp.state.range && tetmillApp.cut")
+        page.click("#cut-none")
+        until(page, "!tetmillApp.waiting && !tetmillApp.cut && !document.getElementById('counted')")
+
+    def test_a_cut_with_too_many_tets_of_a_file_is_shown_in_the_middle(self):
+        folder = self.folder / "second"
+        run("generate", self.geo, "-n", 2, "--pieces", 12, "--order", 2, "-f", "vtu", "-q", "-o", folder)
+        _, address = self.serve("view", folder / "cube.pvtu", "-q")
+        page = self.open_served(address + "#box=-0.9,-0.9,-0.9,0.9,0.9,0.9")
+        until(page, AT_CUT)
+        found = page.evaluate("({ tets: tetmillApp.cut.mesh.tetCount, window: tetmillApp.cut.mesh.window, note: document.getElementById('cut-note').textContent })")
+        self.assertTrue(50_000 < found["tets"] <= 100_000, found)
+        self.assertIn("in the middle of the view: zoom in", found["note"])
+        self.assertTrue(all(0 < low < high < 1 for low, high in zip(*found["window"])), found["window"])
+        page.evaluate("tetmillApp.state.zoom *= 0.3; tetmillApp.state.focus = [0, -0.4, 0]; tetmillApp.update()")
+        until(page, f"{AT_CUT} && !tetmillApp.cut.mesh.window")
+        self.assertIn("of the mesh itself", page.inner_text("#cut-note"))
 
     def test_a_large_mesh_from_files_is_hollow_and_its_cuts_are_not(self):
         folder = self.folder / "large"
@@ -118,15 +229,18 @@ class Served(Browser):
         self.assertEqual(ask("level/1")[0], 200)
         self.assertEqual(ask(f"cut/12/0,0,1,0.5/{box}")[0], 200)
         bad = ["level/0", "level/13", "level/99999999999", "level/x", "level/1/1", "level", f"cut/12/0,0,0,1/{box}", f"cut/12/0,0,1/{box}", f"cut/12/0,0,1,nan/{box}"]
+        bad += [f"cut/12/0,0,0,1,1/{box}", f"cut/12/0,0,0,1,1,1,1/{box}", f"cut/12/0,0,0,1,-1,1/{box}", f"cut/12/0,0,0,1,1,inf/{box}", f"cut/12/0,0,0,1,1,1e200/{box}"]
+        bad += [f"cut/12/0,0,0,1,1,/{box}", "cut/12/0,0,0,1,1,1", f"cut/12/0,0,0,1,1,1/{box},1", f"cut/13000000000/0,0,0,1,1,1/{box}", f"box/12/0,0,0,1,1,1/{box}"]
         bad += [f"cut/12/0,0,1e999,0/{box}", "cut/12/0,0,1,0/0,0,0,1,1", f"cut/0/0,0,1,0/{box}", "ghosts/1/1", "ghosts/1/-1", "ghosts/12/0", "other/1"]
         for query in bad:
             status, text = ask(query)
             self.assertEqual(status, 422, query)
             self.assertTrue(0 < len(text) < 200 and text.decode().isprintable(), (query, text))
-        for query in ["", "level/1?x", "level/%31", "LEVEL/1", "9" * 301, "level/1%00"]:
+        for query in [f"cut/12/0,0,0,1,1,{'1' * 300}/{box}", f"cut/12/0,0,0;1,1,1/{box}", "", "level/1?x", "level/%31", "LEVEL/1", "9" * 301, "level/1%00"]:
             self.assertEqual(ask(query)[0], 404, query)
         # A cut of nothing is no error, and the server still answers.
-        self.assertEqual(ask(f"cut/12/0,0,1,50/{box}")[0], 200)
+        for nothing in ["0,0,1,50", "50,50,50,51,51,51", "-1e99,-1e99,-1e99,1e99,1e99,1e99"]:
+            self.assertEqual(ask(f"cut/12/{nothing}/{box}")[0], 200, nothing)
 
     @unittest.skipUnless(shutil.which("mpirun"), "no mpirun")
     def test_processes_of_mpi_answer_together_and_sleep_meanwhile(self):

@@ -65,6 +65,50 @@ class Viewer(Browser):
         )
         self.assertEqual(odd, 0)
 
+    def test_a_box_shows_whole_tets_inside_it(self):
+        page = self.open(self.file.as_uri() + "#on=boundary,interfaces,volume")
+        whole, _ = self.differs(page, lambda: page.click("#cut-box"))
+        inside = """() => { const { mesh, faces, state } = tetmillApp, [low, high] = boxOf(mesh, state.cut), tets = new Set([...faces].map((f) => f >> 2));
+            const isIn = (t) => [0, 1, 2].every((i) => low[i] < mesh.centers[3 * t + i] && mesh.centers[3 * t + i] < high[i]);
+            return { off: [...tets].filter((t) => !isIn(t)).length, tets: tets.size, all: [...Array(mesh.tetCount).keys()].filter(isIn).length, edges: tetmillApp.drawing.frame.count, low, high }; }"""
+        found = page.evaluate(inside)
+        self.assertEqual((found["off"], found["edges"]), (0, 12))
+        self.assertTrue(0 < found["tets"] <= found["all"], found)
+        self.assertTrue(all(abs(x + 0.25) < 1e-6 for x in found["low"]) and all(abs(x - 0.25) < 1e-6 for x in found["high"]), found)
+        self.assertLess(self.drawn(page)["drawn"], whole)
+        # The box grows and shrinks by keys, and a thumb that is dragged moves one face.
+        before, after = self.differs(page, lambda: [page.keyboard.press("]") for _ in range(5)])
+        self.assertGreater(after, before)
+        box = page.locator("#box-z-high").bounding_box()
+        place = page.evaluate("(tetmillApp.state.cut.box[1][2] + 1.02) / 2.04") * (box["width"] - 16) + 8
+        page.mouse.move(box["x"] + place, box["y"] + box["height"] / 2)
+        page.mouse.down()
+        page.mouse.move(box["x"] + 8, box["y"] + box["height"] / 2)
+        page.mouse.up()
+        low, high = page.evaluate("tetmillApp.state.cut.box.map((corner) => corner[2])")
+        self.assertAlmostEqual(high - low, 0.01, places=2, msg="a thumb stops at the other one")
+        page.keyboard.press("b")
+        until(page, "!tetmillApp.waiting && !tetmillApp.state.cut.on")
+        self.assertEqual(self.drawn(page)["drawn"], whole)
+
+    def test_a_click_in_a_box_finds_a_tet_inside_and_the_address_keeps_the_box(self):
+        page = self.open(self.file.as_uri())
+        page.click("#cut-box")
+        page.evaluate("tetmillApp.state.cut.box = [[-0.9, -0.35, -0.9], [0.9, 0.7, 0.8]]; tetmillApp.state.turn = looking(-90, 0); tetmillApp.rebuild()")
+        self.drawn(page)
+        box = page.locator("#canvas").bounding_box()
+        page.mouse.click(box["x"] + box["width"] / 2 + 7, box["y"] + box["height"] / 2 + 7)
+        y = page.evaluate("(() => { const { mesh, selected } = tetmillApp, t = mesh.tetIds.indexOf(selected.tet ?? -1); return t < 0 ? null : mesh.centers[3 * t + 1]; })()")
+        self.assertTrue(y is None or y > -0.5 * 0.35, y)
+        until(page, "location.hash.includes('box=-0.9,-0.35,-0.9,0.9,0.7,0.8')")
+        page.wait_for_timeout(300)
+        again, other = self.open(page.url), self.open(page.url)
+        self.assertEqual(again.evaluate("tetmillApp.state.cut.shape"), "box")
+        self.assertEqual(self.drawn(again), self.drawn(other))
+        self.assertEqual(again.get_attribute("#cut-box", "aria-pressed"), "true")
+        nonsense = self.open(self.file.as_uri() + "#box=1,1,1,0,0,0")
+        self.assertFalse(nonsense.evaluate("tetmillApp.state.cut.on"))
+
     def test_a_click_finds_what_is_there(self):
         page = self.open(self.file.as_uri())
         # The middle of the front face of the cube, seen from -y, is on the boundary `outer`.

@@ -88,7 +88,7 @@ function makeDrawing(canvas) {
   const faces = () => layer(gl, [["position", 3, gl.FLOAT, 0], ["color", 4, gl.UNSIGNED_BYTE, 12], ["corner", 4, gl.UNSIGNED_BYTE, 16]], 20, 0);
   const lines = () => layer(gl, [["from", 3, gl.FLOAT, 0], ["to", 3, gl.FLOAT, 12]], 24, 1);
   const points = layer(gl, [["position", 3, gl.FLOAT, 0], ["size", 1, gl.FLOAT, 12], ["color", 4, gl.UNSIGNED_BYTE, 16]], 20, 0);
-  return { gl, canvas, programs, faces: faces(), near: faces(), curves: lines(), marks: lines(), points, marked: layer(gl, [["position", 3, gl.FLOAT, 0], ["size", 1, gl.FLOAT, 12], ["color", 4, gl.UNSIGNED_BYTE, 16]], 20, 0), target: null };
+  return { gl, canvas, programs, faces: faces(), near: faces(), curves: lines(), frame: lines(), marks: lines(), points, marked: layer(gl, [["position", 3, gl.FLOAT, 0], ["size", 1, gl.FLOAT, 12], ["color", 4, gl.UNSIGNED_BYTE, 16]], 20, 0), target: null };
 }
 
 const NAMES = ["position", "color", "from", "to", "size", "corner"];
@@ -227,6 +227,7 @@ function draw(drawing, view, style, dark) {
   gl.depthMask(true);
   gl.disable(gl.BLEND);
   drawLines(drawing, "curves", view, dark && (mode === 1 || mode === 3) ? [0.95, 0.97, 1] : [0.05, 0.08, 0.13], 2.2, 0.002);
+  drawLines(drawing, "frame", view, dark ? [0.42, 0.71, 0.96] : [0.04, 0.38, 0.66], 1.4, 0);
   drawPoints(drawing, "points", view);
   gl.disable(gl.DEPTH_TEST);
   drawLines(drawing, "marks", view, [0.86, 0.1, 0.35], 3, 0);

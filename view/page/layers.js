@@ -12,49 +12,50 @@ function adopted(layer, mesh) {
 /** Whether the server has finer tets for the cut than the mesh that is shown. */
 function canCutFiner(app) {
   const { mesh, state, index } = app;
-  return Boolean(index && index.cuts && state.cut.on && state.cut.fine && !state.range && (mesh.hollow || (mesh.pieces && mesh.pieces[1] < mesh.pieces[0])));
+  return Boolean(index && index.cuts && state.cut.on && state.cut.fine && (mesh.hollow || (mesh.pieces && mesh.pieces[1] < mesh.pieces[0])));
 }
 
-/** The box around the visible piece of the cut, relative to the centre: its lowest and highest corner. */
-function visibleBox(app, margin) {
-  const { mesh, state, canvas } = app, { normal, offset } = planeOf(mesh, state.cut), [right, up, toward] = state.turn;
-  const half = scaled(sub(mesh.high, mesh.low), 0.5 * 1.01), all = [scaled(half, -1), half];
-  const across = dot(normal, toward);
-  // Seen from the side, or with moved parts, any piece can be visible.
-  if (Math.abs(across) < 0.15 || state.explode) return all;
+/** The window around the visible piece of the cut, relative to the centre: its lowest and highest corner; null if none is visible. */
+function visibleWindow(app, margin) {
+  const { mesh, state, canvas } = app, [right, up, toward] = state.turn, half = scaled(halfOf(mesh), 1.01);
+  const around = [0, 1, 2].flatMap((i) => [1, -1].map((sign) => (p) => sign * p[i] - half[i]));
   const high = state.zoom * margin, wide = high * canvas.clientWidth / Math.max(1, canvas.clientHeight);
-  const corners = [[1, 1], [1, -1], [-1, 1], [-1, -1]].map(([x, y]) => {
-    const p = add(state.focus, add(scaled(right, x * wide), scaled(up, y * high)));
-    return add(p, scaled(toward, (offset - dot(normal, p)) / across));
-  });
+  const seen = [[right, wide], [up, high]].flatMap(([along, reach]) => [1, -1].map((sign) => (p) => sign * dot(along, sub(p, state.focus)) - reach));
+  // Of moved parts any piece can be visible.
+  const limits = state.explode ? around : [...around, ...seen];
+  const corners = polygonsOf(mesh, state.cut, toward).flatMap((polygon) => limits.reduce(cutOff, polygon));
+  if (corners.length === 0) return null;
   // The piece of a level plane has no thickness, so rounding needs some.
-  const thick = 1e-3 * mesh.radius * (margin - 1), inside = (x, i) => Math.max(all[0][i], Math.min(all[1][i], x));
-  return [[Math.min, -thick], [Math.max, thick]].map(([pick, more]) => [0, 1, 2].map((i) => inside(pick(...corners.map((p) => p[i])) + more, i)));
+  const thick = 1e-3 * mesh.radius * (margin - 1);
+  return [[Math.min, -thick], [Math.max, thick]].map(([pick, more]) => [0, 1, 2].map((i) => pick(...corners.map((p) => p[i])) + more));
 }
 
 const sizeOf = ([low, high]) => norm(sub(high, low));
 const covers = ([a, b], [low, high]) => low.every((x, i) => a[i] <= x && high[i] <= b[i]);
 
-/** Whether the layer is of the plane of the cut, so that it can be drawn. */
-const isCurrent = (app) => Boolean(app.cut && canCutFiner(app) && app.cut.plane === planeKey(app));
-const planeKey = (app) => [...app.state.cut.normal, app.state.cut.at, app.mesh.center].join();
+/** Whether the layer is of the present cut, so that it can be drawn. */
+const isCurrent = (app) => Boolean(app.cut && canCutFiner(app) && app.cut.key === cutKey(app));
 
-/** What was asked for, roughly: what was refused once is not asked for again. */
-const askedKey = (app, box) => `${planeKey(app)} ${sizeOf(box).toPrecision(2)}`;
-
-/** Whether the tets near the cut that are here cover the visible piece and are fine enough for it. */
-function isEnough(app) {
-  const { cut, mesh } = app, box = visibleBox(app, 1);
-  if (app.refused === askedKey(app, box)) return true;
-  if (!cut || cut.plane !== planeKey(app) || !covers(cut.box, box)) return false;
-  return cut.pieces >= finestOf(mesh) || sizeOf(box) > 0.6 * cut.wanted;
+/** What cuts, as numbers with the centre of the mesh. */
+function cutKey({ mesh, state: { cut } }) {
+  return [cut.shape, ...(cut.shape === "box" ? cut.box.flat() : [...cut.normal, cut.at]), mesh.center].join();
 }
 
-/** Asks for the tets near the cut if those that are here do not suffice. */
+/** What was asked for, roughly: what was refused once is not asked for again. */
+const askedKey = (app, seen) => `${cutKey(app)} ${sizeOf(seen).toPrecision(2)}`;
+
+/** Whether the tets at the cut that are here cover the visible piece and are fine enough for it. */
+function isEnough(app) {
+  const { cut, mesh } = app, seen = visibleWindow(app, 1);
+  if (!seen || app.refused === askedKey(app, seen)) return true;
+  if (!cut || cut.key !== cutKey(app) || !covers(cut.window, seen)) return false;
+  return (cut.pieces >= finestOf(mesh) && !cut.mesh.window) || sizeOf(seen) > 0.6 * cut.wanted;
+}
+
+/** Asks for the tets at the cut if those that are here do not suffice. */
 function askForCut(app) {
   if (!canCutFiner(app)) {
-    app.cut = null;
-    sayOfCut(app);
+    if (app.cut || app.cutNote) setCut(app, null);
   } else if (!app.fetching && !isEnough(app)) {
     // One at a time, and none while the slider moves.
     clearTimeout(app.asking);
@@ -62,24 +63,37 @@ function askForCut(app) {
   }
 }
 
+/** Takes the tets at the cut, or none, which the histogram can be of. */
+function setCut(app, cut) {
+  app.cut = cut;
+  sayOfCut(app);
+  buildQuality(app);
+}
+
 /** Subdivisions of coarse edges of the mesh itself. */
 const finestOf = (mesh) => (mesh.pieces ? mesh.pieces[0] : 1);
 
+/** The query for the tets at the cut in a window. */
+function queryOf({ mesh, state: { cut } }, window) {
+  const placed = (corners) => corners.flatMap((corner) => add(corner, mesh.center).map((x) => short(x, 12))).join(",");
+  if (cut.shape === "box") return `cut/${finestOf(mesh)}/${placed(boxOf(mesh, cut))}/${placed(window)}`;
+  const { normal, offset } = planeOf(mesh, cut);
+  const plane = [...normal, offset + dot(normal, mesh.center)].map((x) => short(x, 14)).join(",");
+  return `cut/${finestOf(mesh)}/${plane}/${placed(window)}`;
+}
+
 async function fetchCut(app) {
-  if (!canCutFiner(app)) return;
-  const { mesh, state } = app, plane = planeKey(app), seen = visibleBox(app, 1), box = visibleBox(app, 1.25);
-  const { normal, offset } = planeOf(mesh, state.cut);
-  const placed = box.map((corner) => add(corner, mesh.center).map((x) => short(x, 12)).join(","));
-  const moved = short(offset + dot(normal, mesh.center), 14);
+  const { mesh } = app, seen = canCutFiner(app) && visibleWindow(app, 1);
+  if (!seen) return;
+  const key = cutKey(app), window = visibleWindow(app, 1.25);
   app.fetching = true;
   sayOfCut(app, "The finest tets at the cut are on their way …");
   try {
-    const answer = await fetch(`mesh/cut/${finestOf(mesh)}/${normal.map((x) => short(x, 14)).join(",")},${moved}/${placed[0]},${placed[1]}`);
+    const answer = await fetch(`mesh/${queryOf(app, window)}`);
     if (answer.ok) {
       const layer = adopted(decode(await answer.arrayBuffer()), mesh);
       // Another level may be shown by now.
-      if (app.mesh === mesh) app.cut = { plane, box, wanted: sizeOf(seen), pieces: layer.pieces ? layer.pieces[1] : 1, mesh: layer };
-      sayOfCut(app);
+      if (app.mesh === mesh) setCut(app, { key, window, wanted: sizeOf(seen), pieces: layer.pieces ? layer.pieces[1] : 1, mesh: layer });
     } else {
       app.refused = askedKey(app, seen);
       sayOfCut(app, `Coarser tets are shown at the cut: ${await answer.text()}`);
@@ -109,13 +123,15 @@ async function showGhosts(app, part) {
 }
 
 /** The note about the cut. */
-function sayOfCut(app, text) {
-  const { cut, mesh } = app;
-  if (text === undefined && cut) {
-    const finest = finestOf(mesh), count = grouped(cut.mesh.tetCount);
-    text = cut.pieces < finest ? `At the cut are ${count} tets of the level with coarse edges in ${cut.pieces}, not ${finest}: zoom in for finer ones.` : `At the cut are ${count} tets of the mesh itself.`;
-  }
-  app.cutNote = text || "";
+function sayOfCut(app, text = app.cut ? aboutCut(app) : "") {
+  app.cutNote = text;
   const note = document.getElementById("cut-note");
-  if (note) note.textContent = app.cutNote;
+  if (note) note.textContent = text;
+}
+
+function aboutCut({ cut, mesh }) {
+  const finest = finestOf(mesh), count = grouped(cut.mesh.tetCount);
+  if (cut.mesh.window) return `At the cut are ${count} tets in the middle of the view: zoom in for the others.`;
+  if (cut.pieces < finest) return `At the cut are ${count} tets of the level with coarse edges in ${cut.pieces}, not ${finest}: zoom in for finer ones.`;
+  return `At the cut are ${count} tets of the mesh itself.`;
 }

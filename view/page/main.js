@@ -45,16 +45,17 @@ const app = {
     document.documentElement.dataset.theme = state.dark ? "dark" : "light";
     if (this.changed) {
       this.changed = false;
-      const plane = state.cut.on ? planeOf(mesh, state.cut) : null, finer = isCurrent(this);
+      const planes = state.cut.on ? planesOf(mesh, state.cut) : null, finer = isCurrent(this);
       const visible = (mesh, cutAt, options) => ({ mesh, ...visibleFaces(mesh, state, shownTets(mesh, state, cutAt), options) });
-      this.drawn = [visible(mesh, finer ? null : plane, { clip: finer ? plane : null })];
+      this.drawn = [visible(mesh, finer ? null : planes, { clip: finer ? planes : null })];
       if (finer) this.drawn.push(visible(this.cut.mesh, null, { layer: true }));
-      if (this.ghosts) this.drawn.push(visible(this.ghosts, plane, { layer: true }));
+      if (this.ghosts) this.drawn.push(visible(this.ghosts, planes, { layer: true }));
       const [shown, ...layers] = this.drawn;
       fill(drawing, "faces", shown.buffer);
       fill(drawing, "near", joined(layers.map(({ buffer }) => buffer)));
       fill(drawing, "points", visiblePoints(mesh, state, shown.faces).buffer);
-      fill(drawing, "curves", visibleCurves(mesh, state, finer ? plane : null).buffer);
+      fill(drawing, "curves", visibleCurves(mesh, state, finer ? planes : null).buffer);
+      fill(drawing, "frame", state.cut.on && state.cut.shape === "box" ? boxEdges(mesh, state.cut).buffer : new ArrayBuffer(0));
       buildLegend(this);
     }
     this.mark();
@@ -189,13 +190,14 @@ function buildTop(app) {
 
 /** What a key does; false if nothing. */
 function key(name) {
-  const { state } = app, flip = (flag) => { state[flag] = !state[flag]; app.rebuild(); };
+  const { state } = app, flip = (flag, of = state) => { of[flag] = !of[flag]; app.rebuild(); };
   if (name in VIEWS) state.turn = looking(...VIEWS[name]);
   else if (name === "0") Object.assign(state, { turn: looking(-60, 25), focus: [0, 0, 0], zoom: (0.95 + 0.6 * state.explode) * app.mesh.radius });
   else if (name === "+" || name === "=") app.zoom(0.85);
   else if (name === "-") app.zoom(1 / 0.85);
-  else if (name === "c") { state.cut.on = !state.cut.on; app.rebuild(); }
-  else if (name === "[" || name === "]") { state.cut.at = Math.min(1.02, Math.max(-1.02, state.cut.at + (name === "]" ? 0.03 : -0.03))); app.rebuild(); }
+  else if (name === "c") flip("on", state.cut);
+  else if (name === "b") cutTo(app, state.cut.on && state.cut.shape === "box" ? "none" : "box");
+  else if (name === "[" || name === "]") { moveCut(state.cut, name === "]" ? 0.03 : -0.03); app.rebuild(); }
   else if (name === "f") { state.style = STYLES[(STYLES.indexOf(state.style) + 1) % STYLES.length]; app.rebuild(); }
   else if (name in { v: 0, s: 0, e: 0, k: 0 }) flip({ v: "vertices", s: "shared", e: "curves", k: "corners" }[name]);
   else if (name === "m") app.measure();

@@ -46,6 +46,28 @@ function slider(id, label, value, [low, high], change) {
     element("input", { id, type: "range", min: low, max: high, step: (high - low) / 400, value, oninput: (event) => change(Number(event.target.value)) }));
 }
 
+/** A slider with two thumbs, for the ends of a range. */
+function rangeSlider(id, label, ends, [low, high], change) {
+  const thumbs = [0, 1].map((k) => element("input", { id: `${id}-${k ? "high" : "low"}`, type: "range", min: low, max: high, step: (high - low) / 408, value: ends[k], "aria-label": `${label}, ${k ? "highest" : "lowest"}` }));
+  const track = element("div", { className: "span" }, ...thumbs);
+  const fill = () => {
+    const [from, to] = thumbs.map((thumb) => (Number(thumb.value) - low) / (high - low));
+    track.style.setProperty("--from", from);
+    track.style.setProperty("--to", to);
+    // Thumbs at one place: the one that can move away is in front.
+    thumbs[0].style.zIndex = from + to > 1 ? 1 : 0;
+  };
+  thumbs.forEach((thumb, k) => thumb.addEventListener("input", () => {
+    // A thumb stops at the other one.
+    const other = Number(thumbs[1 - k].value), value = Number(thumb.value);
+    thumb.value = k ? Math.max(value, other + THINNEST) : Math.min(value, other - THINNEST);
+    fill();
+    change(thumbs.map((thumb) => Number(thumb.value)));
+  }));
+  fill();
+  return element("div", { className: "field" }, element("span", {}, label), track);
+}
+
 const COLORS = [["patch", "boundary"], ["part", "part"], ["body", "body"], ["angle", "smallest angle"], ["ratio", "mean ratio"]];
 const NORMALS = { x: [1, 0, 0], y: [0, 1, 0], z: [0, 0, 1] };
 
@@ -70,13 +92,6 @@ function buildPanel(app) {
   const parts = mesh.tets.length && mesh.parts > 1 ? mesh.partCenters.map((_, index) => ({ index, name: `Part ${index + 1}` })) : [];
   const bodies = mesh.bodies.map((label, index) => ({ index, name: labelOf(label, index, "body") }));
   const colors = mesh.periodic.length ? [...COLORS, ["periodic", "periodic pair"]] : COLORS;
-  const cutTo = (name) => {
-    state.cut.on = true;
-    // The side towards the viewer is hidden, so that the cut is seen.
-    const normal = name === "view" ? state.turn[2] : NORMALS[name];
-    state.cut.normal = dot(normal, state.turn[2]) < 0 ? scaled(normal, -1) : normal;
-    app.rebuild();
-  };
   const shared = mesh.holders.reduce((sum, h) => sum + (h > 1), 0);
   panel.replaceChildren(
     element("h1", {}, mesh.title), ...lines.map((line) => element("p", { className: "facts" }, line)), ...notes.map((note) => element("p", { className: "note", id: "note" }, note)),
@@ -88,19 +103,55 @@ function buildPanel(app) {
       show("boundary", "Boundary"), ...(parts.length ? [show("interfaces", "Faces between parts")] : []), show("volume", "Tets at the cut"),
       show("curves", "Curves", grouped(mesh.curves.length)), show("corners", "Corners", grouped(mesh.corners.length)), show("vertices", "Vertices"),
       ...(shared ? [show("shared", "Shared vertices", grouped(shared))] : [])),
-    section("Cut", true,
-      toggle("Cut by a plane", state.cut.on, (on) => { state.cut.on = on; app.update(); }, { id: "cut" }),
-      element("div", { className: "buttons" }, ...["x", "y", "z"].map((name) => element("button", { id: `cut-${name}`, onclick: () => cutTo(name) }, name)),
-        element("button", { onclick: () => cutTo("view") }, "View"), element("button", { onclick: () => { state.cut.normal = scaled(state.cut.normal, -1); state.cut.at *= -1; app.rebuild(); } }, "Flip")),
-      slider("cut-at", "Position", state.cut.at, [-1.02, 1.02], (x) => { state.cut.at = x; state.cut.on = true; document.getElementById("cut").checked = true; app.update(); }),
-      ...(app.index && app.index.cuts ? [toggle("Finest tets at the cut", state.cut.fine, (on) => { state.cut.fine = on; app.update(); }, { id: "cut-fine" }), element("p", { className: "facts", id: "cut-note" }, app.cutNote)] : [])),
+    section("Cut", true, ...cutControls(app)),
     section(`Boundaries (${patches.length})`, true, list(app, patches, state.patchesOff, "patch")),
     ...(parts.length ? [section(`Parts (${parts.length})`, true, slider("explode", "Exploded", state.explode, [0, 1.5], (x) => { state.explode = x; app.update(); }),
       ...(app.index && app.index.ghosts && !mesh.hollow ? [choice("ghosts", "Ghosts of", String(state.ghosts), [["-1", "no part"], ...parts.map(({ index, name }) => [String(index), name])], (part) => showGhosts(app, Number(part)).catch(failed))] : []), list(app, parts, state.partsOff, "part"))] : []),
     ...(bodies.length > 1 ? [section(`Bodies (${bodies.length})`, false, list(app, bodies, state.bodiesOff, "body"))] : []),
     ...(mesh.periodic.length ? [section(`Periodic pairs (${mesh.periodic.length})`, false, ...mesh.periodic.map(([a, b], k) => element("div", { className: "legend-row" },
       element("span", { className: "swatch", style: `background:${css(colorOf(k))}` }), `${labelOf(mesh.patches[a], a, "patch")} ↔ ${labelOf(mesh.patches[b], b, "patch")}`)))] : []),
-    section("Quality", true, ...qualityControls(app)));
+    section("Quality", true, element("div", { id: "quality" }, ...qualityControls(app))));
+}
+
+/** Shows all, or cuts by a plane across an axis or the view, or by a box. */
+function cutTo(app, name) {
+  const { cut, turn } = app.state;
+  cut.on = name !== "none";
+  if (name === "box") cut.shape = "box";
+  else if (cut.on) {
+    cut.shape = "plane";
+    // The side towards the viewer is hidden, so that the cut is seen.
+    const normal = name === "view" ? turn[2] : NORMALS[name];
+    cut.normal = dot(normal, turn[2]) < 0 ? scaled(normal, -1) : normal;
+  }
+  app.rebuild();
+}
+
+/** The choice that made the cut. */
+function cutName({ on, shape, normal }) {
+  if (!on) return "none";
+  return shape === "box" ? "box" : Object.keys(NORMALS).find((name) => Math.abs(dot(NORMALS[name], normal)) === 1) || "view";
+}
+
+const CUTS = [["none", "None"], ["x", "x"], ["y", "y"], ["z", "z"], ["view", "View"], ["box", "Box"]];
+
+function cutControls(app) {
+  const { cut } = app.state, chosen = cutName(cut), note = app.index && app.index.cuts;
+  const titles = { none: "Show all", view: "A plane across the view", box: "The tets in a box (b)" };
+  const choices = CUTS.map(([name, text]) => element("button", { id: `cut-${name}`, title: titles[name] || `A plane across ${name}`, "aria-pressed": String(name === chosen), onclick: () => cutTo(app, name) }, text));
+  const flip = () => { cut.normal = scaled(cut.normal, -1); cut.at *= -1; app.rebuild(); };
+  const plane = () => [
+    slider("cut-at", "Position", cut.at, [-1.02, 1.02], (x) => { cut.at = x; app.update(); }),
+    element("div", { className: "buttons" }, element("button", { id: "cut-flip", onclick: flip }, "Other side")),
+  ];
+  const box = () => ["x", "y", "z"].map((name, i) => rangeSlider(`box-${name}`, name, cut.box.map((corner) => corner[i]), [-1.02, 1.02], (ends) => {
+    cut.box = cut.box.map((corner, k) => corner.map((at, j) => (j === i ? ends[k] : at)));
+    app.update();
+  }));
+  return [
+    element("div", { className: "choices", role: "group", "aria-label": "Cut" }, ...choices), ...(cut.on ? (cut.shape === "box" ? box() : plane()) : []),
+    ...(cut.on && note ? [toggle("Finest tets at the cut", cut.fine, (on) => { cut.fine = on; app.update(); }, { id: "cut-fine" }), element("p", { className: "facts", id: "cut-note" }, app.cutNote)] : []),
+  ];
 }
 
 const BINS = 36;
@@ -112,8 +163,17 @@ function histogram(mesh, which) {
   return bins;
 }
 
+/** Makes the controls of the quality again: the tets that the histogram counts are others. */
+function buildQuality(app) {
+  const place = document.getElementById("quality");
+  if (place) place.replaceChildren(...qualityControls(app));
+}
+
+/** The mesh that the histogram counts. */
+const countedMesh = ({ mesh, cut, state }) => (cut && state.histogram === "cut" ? cut.mesh : mesh);
+
 function qualityControls(app) {
-  const { mesh, state } = app, top = QUALITY[state.measure].best, unit = QUALITY[state.measure].unit;
+  const { state } = app, mesh = countedMesh(app), top = QUALITY[state.measure].best, unit = QUALITY[state.measure].unit;
   const picture = element("canvas", { width: 516, height: 168, id: "histogram", style: "width:258px;height:84px;touch-action:none;cursor:crosshair", title: "Drag to show only tets of this quality" });
   const said = element("div", { className: "facts", id: "range" });
   const bins = histogram(mesh, state.measure), most = Math.max(...bins, 1);
@@ -151,6 +211,7 @@ function qualityControls(app) {
   const worst = worstTets(mesh, state.measure);
   return [
     choice("measure", "Measure", state.measure, Object.entries(QUALITY).map(([key, q]) => [key, q.title.toLowerCase()]), (key) => { state.measure = key; state.range = null; app.rebuild(); }),
+    ...(app.cut ? [choice("counted", "Tets", state.histogram, [["level", "of the shown level"], ["cut", "at the cut"]], (key) => { state.histogram = key; app.rebuild(); })] : []),
     picture, said, element("div", { className: "facts" }, "The worst tets:"),
     element("div", { className: "worst" }, ...worst.map(([t, value], k) => element("button", { id: `worst-${k}`, onclick: () => app.select(aboutTet(mesh, t), true) },
       element("span", {}, `Tet ${mesh.tetIds[t]}`), element("span", {}, `${short(value, 3)}${unit}`)))),

@@ -1,7 +1,7 @@
 // The report of a run as tables, and the help.
 
 const KEYS = [["drag", "turn"], ["right drag, Shift + drag, two fingers", "move"], ["wheel, pinch, + −", "zoom"], ["click", "what is there"], ["1 … 6", "view along an axis"], ["0", "standard view"],
-  ["c", "cut on or off"], ["[ ]", "move the cut"], ["f", "filled, grid, transparent"], ["v s e k", "vertices, shared vertices, curves, corners"], ["m", "measure between two vertices"], ["d", "dark or light"], ["r", "report, if there is one"], ["Esc", "nothing selected"], ["?", "this help"]];
+  ["c", "cut on or off"], ["b", "cut by a box"], ["[ ]", "move the plane of the cut, make its box smaller or larger"], ["f", "filled, grid, transparent"], ["v s e k", "vertices, shared vertices, curves, corners"], ["m", "measure between two vertices"], ["d", "dark or light"], ["r", "report, if there is one"], ["Esc", "nothing selected"], ["?", "this help"]];
 
 function closing(dialog) {
   return element("p", {}, element("button", { onclick: () => dialog.close(), autofocus: true }, "Close"));

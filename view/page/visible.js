@@ -1,23 +1,12 @@
 // What is visible in a state: faces, edges of curves, vertices.
 
-/** The number that a plane's offset takes from -1 to 1, across the whole mesh. */
-function planeOf(mesh, cut) {
-  const normal = unit(cut.normal);
-  const half = scaled(sub(mesh.high, mesh.low), 0.5);
-  const reach = Math.abs(normal[0]) * half[0] + Math.abs(normal[1]) * half[1] + Math.abs(normal[2]) * half[2];
-  return { normal, offset: cut.at * reach };
-}
-
-/** Whether each tet is shown: its part, body, quality, and its side of the plane, if there is one. */
-function shownTets(mesh, state, plane) {
+/** Whether each tet is shown: its part, body, quality, and whether its centre is behind all planes, if there are any. */
+function shownTets(mesh, state, planes) {
   const shown = new Uint8Array(mesh.tetCount);
   const which = state.measure === "ratio" ? 1 : 0, { range } = state;
   for (let t = 0; t < shown.length; t++) {
     if (state.partsOff.has(mesh.tetPart[t]) || state.bodiesOff.has(mesh.tetBodies[t])) continue;
-    if (plane) {
-      const c = 3 * t, n = plane.normal;
-      if (mesh.centers[c] * n[0] + mesh.centers[c + 1] * n[1] + mesh.centers[c + 2] * n[2] >= plane.offset) continue;
-    }
+    if (planes && !planes.every((plane) => heightAt(mesh.centers, 3 * t, plane) < 0)) continue;
     if (range && !(mesh.quality[2 * t + which] >= range[0] && mesh.quality[2 * t + which] <= range[1])) continue;
     shown[t] = 1;
   }
@@ -87,42 +76,29 @@ function placesOf(mesh, f) {
 /** Whether a node is visibly off the middle of its edge. */
 const isBent = (a, node, b) => norm(sub(node, scaled(add(a, b), 0.5))) > 0.002 * norm(sub(b, a));
 
-/** The piece of a triangle behind a plane, as weights of its corners: none, three or four. */
-function clipped(places, plane) {
-  const sides = places.map((p) => dot(p, plane.normal) - plane.offset), kept = [];
-  for (let k = 0; k < 3; k++) {
-    const next = (k + 1) % 3;
-    if (sides[k] <= 0) kept.push(CORNERS[k]);
-    if (sides[k] * sides[next] < 0) {
-      const s = sides[k] / (sides[k] - sides[next]);
-      kept.push(add(scaled(CORNERS[k], 1 - s), scaled(CORNERS[next], s)));
-    }
-  }
-  return kept;
-}
-
-/** The triangles of a face as weights of its corners, with their places; cut off at a plane if there is one. */
-function trianglesOf(places, clip) {
+/** The triangles of a face as weights of its corners, with their places; only their pieces behind all planes, if there are any. */
+function trianglesOf(places, planes) {
   const found = [], placed = (weights) => (places.length === 3 ? mixed(places, weights) : curvedPlace(places, weights));
   for (const triangle of places.length === 3 ? [CORNERS] : SMALL) {
     const corners = triangle.map(placed);
-    const kept = clip ? clipped(corners, clip) : CORNERS;
+    const kept = (planes || []).reduce((piece, plane) => cutOff(piece, (weights) => heightOver(plane, mixed(corners, weights))), CORNERS);
     for (let k = 2; k < kept.length; k++) {
-      const piece = kept === CORNERS ? CORNERS : [kept[0], kept[k - 1], kept[k]];
-      found.push(piece.map((weights) => ({ weights: mixed(triangle, weights), place: mixed(corners, weights) })));
+      found.push([kept[0], kept[k - 1], kept[k]].map((weights) => ({ weights: mixed(triangle, weights), place: mixed(corners, weights) })));
     }
   }
   return found;
 }
 
-/** Where the corners of a face are: -1 if all are behind a plane, 1 if none is, otherwise 0. */
-function sideOf(mesh, f, { normal, offset }) {
-  let sum = 0;
-  for (const corner of FACES[f & 3]) {
-    const v = 3 * mesh.tets[(f & ~3) + corner];
-    sum += mesh.points[v] * normal[0] + mesh.points[v + 1] * normal[1] + mesh.points[v + 2] * normal[2] > offset ? 1 : -1;
+/** Where the corners of a face are: -1 if all are behind all planes, 1 if all are in front of one, otherwise 0. */
+function sideOf(mesh, f, planes) {
+  let side = -1;
+  for (const plane of planes) {
+    let front = 0;
+    for (const corner of FACES[f & 3]) front += heightAt(mesh.points, 3 * mesh.tets[(f & ~3) + corner], plane) > 0;
+    if (front === 3) return 1;
+    if (front > 0) side = 0;
   }
-  return sum === 3 ? 1 : sum === -3 ? -1 : 0;
+  return side;
 }
 
 /** Whether a face without visible tets on both sides is to be drawn. */
@@ -131,9 +107,12 @@ function isVisible(state, patch, other, volume) {
   return other === OUTSIDE ? state.interfaces : volume;
 }
 
-/** The faces to be drawn; those of a `layer` also if their other tet is not here. */
+/**
+ * The faces to be drawn; those of a `layer` also if their other tet is not here. A mesh that is cut off has faces inside only
+ * around the tets of a selected quality.
+ */
 function facesOf(mesh, state, shown, clip, layer) {
-  const faces = [], volume = state.volume && !clip;
+  const faces = [], volume = state.volume && (!clip || state.range);
   for (let f = 0; f < mesh.neighbours.length; f++) {
     if (!shown[f >> 2]) continue;
     const other = mesh.neighbours[f];
@@ -145,7 +124,7 @@ function facesOf(mesh, state, shown, clip, layer) {
 
 /**
  * The visible faces as triangles: a buffer of x, y, z, colour and weights for each corner, and the face of each triangle.
- * `clip` is a plane: then faces on the surface are cut off there, and there are none inside.
+ * `clip` has planes: then faces are cut off there.
  */
 function visibleFaces(mesh, state, shown, { clip = null, layer = false } = {}) {
   // Most faces are whole and flat: they have no list of pieces, which would take most of the time.
@@ -219,9 +198,8 @@ const HOLDERS = [[0, 114, 178], [230, 159, 0], [204, 121, 167], [213, 94, 0]];
 /** Whether vertices are behind the cut, and in a part that is shown. */
 function isBehind(mesh, state, vertices) {
   if (state.partsOff.has(mesh.vertexPart[vertices[0]])) return false;
-  if (!state.cut.on) return true;
-  const plane = planeOf(mesh, state.cut);
-  return vertices.every((v) => dot(pointOf(mesh, v), plane.normal) <= plane.offset + 1e-6 * mesh.radius);
+  const planes = state.cut.on ? planesOf(mesh, state.cut) : [], slack = 1e-6 * mesh.radius;
+  return planes.every((plane) => vertices.every((v) => heightAt(mesh.points, 3 * v, plane) <= slack));
 }
 
 /** The ends of visible lines of curves, x, y, z each: edges behind the cut, or cut off at `clip`. */
@@ -243,11 +221,15 @@ function visibleCurves(mesh, state, clip) {
   return new Float32Array(ends);
 }
 
-/** The piece of a line behind a plane. */
-function behind(p, q, plane) {
-  if (!plane) return [p, q];
-  const [a, b] = [p, q].map((x) => dot(x, plane.normal) - plane.offset);
-  if (a > 0 && b > 0) return null;
-  const at = mixed([p, q], [b / (b - a), a / (a - b)]);
-  return a > 0 ? [at, q] : b > 0 ? [p, at] : [p, q];
+/** The piece of a line behind all planes, if there are any. */
+function behind(p, q, planes) {
+  let ends = [p, q];
+  for (const plane of planes || []) {
+    const [a, b] = ends.map((x) => heightOver(plane, x));
+    if (a > 0 && b > 0) return null;
+    const at = mixed(ends, [b / (b - a), a / (a - b)]);
+    if (a > 0) ends = [at, ends[1]];
+    else if (b > 0) ends = [ends[0], at];
+  }
+  return ends;
 }

@@ -25,6 +25,7 @@ const SCRIPT: &str = concat!(
     "'use strict';\n",
     include_str!("../page/math.js"),
     include_str!("../page/mesh.js"),
+    include_str!("../page/cut.js"),
     include_str!("../page/visible.js"),
     include_str!("../page/layers.js"),
     include_str!("../page/draw.js"),

@@ -24,6 +24,8 @@ pub struct About {
     pub pieces: Option<[u32; 2]>,
     /// Whether only tets at the skin are stored.
     pub hollow: bool,
+    /// The corners of the window that a cut has tets of, if it has more than are sent.
+    pub window: Option<[[f64; 3]; 2]>,
     /// Pairs of patches, a periodic copy and its master, by index.
     pub periodic: Vec<[u32; 2]>,
     /// The report of the run, if there is one.
@@ -67,7 +69,7 @@ pub fn message(parts: &[ViewPart], about: &About) -> Vec<u8> {
         "center": center, "low": low, "high": high,
         "vertices": all(&|p| p.points.len()), "tets": all(&|p| p.tets.len()),
         "totals": { "vertices": about.totals.vertices, "tets": about.totals.tets, "boundary": about.totals.boundary },
-        "pieces": about.pieces, "hollow": about.hollow, "periodic": about.periodic,
+        "pieces": about.pieces, "hollow": about.hollow, "window": about.window, "periodic": about.periodic,
         "patches": about.names.patches.iter().map(label).collect::<Vec<_>>(),
         "bodies": about.names.bodies.iter().map(label).collect::<Vec<_>>(),
         "report": about.report,

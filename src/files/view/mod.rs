@@ -10,15 +10,18 @@
 mod faces;
 mod gather;
 mod message;
+mod overlap;
 mod part;
 mod region;
 mod streams;
+mod window;
 
 pub use gather::gather;
 pub use message::{About, message};
 pub use part::{of_mesh, part};
-pub use region::Region;
+pub use region::{Cutter, Region};
 pub use streams::streams;
+pub use window::fitting;
 
 use crate::ground::mesh::{GlobalId, Rank};
 
@@ -64,9 +67,9 @@ pub enum Fill {
     Full,
     /// Those with a face on the skin of the part or on a patch.
     Hollow,
-    /// Those that meet a plane inside a box.
+    /// Those that meet a plane or the surface of a box, inside a window.
     Near {
-        /// The plane and the box.
+        /// What they meet, and the window.
         region: Region,
         /// The maximum number of tets.
         most: u64,
@@ -114,7 +117,8 @@ mod tests {
     #[test]
     fn near_a_plane_are_the_tets_that_meet_it() {
         let mesh = cube(4);
-        let region = Region { normal: [1.0, 0.0, 0.0], offset: 0.4, low: [0.0; 3], high: [4.0; 3] };
+        let cutter = Cutter::Plane { normal: [1.0, 0.0, 0.0], offset: 0.4 };
+        let region = Region { cutter, low: [0.0; 3], high: [4.0; 3] };
         let full = of_mesh(&mesh, Fill::Full);
         let x = |part: &ViewPart, tet: [u32; 4]| tet.map(|v| part.points[v as usize][0]);
         let meets = |x: [f64; 4]| x.iter().any(|x| *x <= 0.4) && x.iter().any(|x| *x >= 0.4);
@@ -128,6 +132,19 @@ mod tests {
         let half = Region { high: [4.0, 0.4, 4.0], ..region };
         assert!(of_mesh(&mesh, Fill::Near { region: half, most: 1000 }).tets.len() < expected);
         assert!(of_mesh(&mesh, Fill::Near { region, most: 5 }).tets.len() > 5, "too many, and said so");
+    }
+
+    #[test]
+    fn near_a_box_are_the_tets_at_its_surface() {
+        // Cells have edges of 1/3: the surface meets 4³ − 2³ of them.
+        let near = |low: f64, high: f64| {
+            let cutter = Cutter::Box { low: [low / 3.0; 3], high: [high / 3.0; 3] };
+            let region = Region { cutter, low: [0.0; 3], high: [2.0; 3] };
+            of_mesh(&cube(6), Fill::Near { region, most: 1000 })
+        };
+        assert_eq!(near(1.2, 4.8).tets.len(), 6 * (64 - 8));
+        assert_eq!(faces_of(&near(1.2, 4.8), |neighbour, _| neighbour == OUTSIDE), 0);
+        assert_eq!(near(1.8, 4.2).tets.len(), 276, "some tets of cells at edges are outside");
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! The queries of the page.
 
-use tetmill::files::view::Region;
+use tetmill::files::view::{Cutter, Region};
 use tetmill::run::MAX_PIECES;
 
 /// What the page asks for.
@@ -8,12 +8,13 @@ use tetmill::run::MAX_PIECES;
 pub enum Query {
     /// `level/PIECES`: a level, whole or its surface.
     Level(u32),
-    /// `cut/PIECES/NX,NY,NZ,OFFSET/LOWX,LOWY,LOWZ,HIGHX,HIGHY,HIGHZ`: the tets that meet a plane
-    /// inside a box, at this level or a coarser one.
+    /// `cut/PIECES/CUTTER/LOWX,LOWY,LOWZ,HIGHX,HIGHY,HIGHZ`: the tets that meet a cutter inside a
+    /// window, at this level or a coarser one. The cutter is a plane, `NX,NY,NZ,OFFSET`, or a box
+    /// with its corners as those of the window.
     Cut {
         /// Subdivisions of each coarse edge.
         pieces: u32,
-        /// The plane and the box.
+        /// The cutter and the window.
         region: Region,
     },
     /// `ghosts/PIECES/PART`: the tets of other parts that touch a part, at a level that is shown
@@ -35,20 +36,9 @@ impl Query {
             ["ghosts", pieces, part] => {
                 Some(Self::Ghosts { pieces: pieces_of(pieces)?, part: part.parse().ok()? })
             }
-            ["cut", pieces, plane, bounds] => {
-                let [x, y, z, offset] = numbers(plane)?;
-                let [a, b, c, d, e, f] = numbers(bounds)?;
-                let length = (x * x + y * y + z * z).sqrt();
-                // A plane of such numbers has a direction, and a place that arithmetic can reach.
-                if !(1e-100..1e100).contains(&length) || offset.abs() > 1e100 {
-                    return None;
-                }
-                let region = Region {
-                    normal: [x, y, z].map(|n| n / length),
-                    offset: offset / length,
-                    low: [a, b, c],
-                    high: [d, e, f],
-                };
+            ["cut", pieces, cutter, window] => {
+                let [low, high] = corners(window)?;
+                let region = Region { cutter: plane_of(cutter).or_else(|| box_of(cutter))?, low, high };
                 Some(Self::Cut { pieces: pieces_of(pieces)?, region })
             }
             _ => None,
@@ -58,6 +48,29 @@ impl Query {
 
 fn pieces_of(text: &str) -> Option<u32> {
     text.parse().ok().filter(|pieces| (1..=MAX_PIECES).contains(pieces))
+}
+
+/// Coordinates up to this are products that arithmetic can reach.
+const FARTHEST: f64 = 1e100;
+
+/// A plane with a direction.
+fn plane_of(text: &str) -> Option<Cutter> {
+    let [x, y, z, offset] = numbers(text)?;
+    let length = (x * x + y * y + z * z).sqrt();
+    let is_plane = (1.0 / FARTHEST..FARTHEST).contains(&length) && offset.abs() <= FARTHEST;
+    is_plane.then(|| Cutter::Plane { normal: [x, y, z].map(|n| n / length), offset: offset / length })
+}
+
+/// A box whose first corner is the lowest.
+fn box_of(text: &str) -> Option<Cutter> {
+    let [low, high] = corners(text)?;
+    let is_box = (0..3).all(|k| -FARTHEST <= low[k] && low[k] <= high[k] && high[k] <= FARTHEST);
+    is_box.then_some(Cutter::Box { low, high })
+}
+
+fn corners(text: &str) -> Option<[[f64; 3]; 2]> {
+    let [a, b, c, d, e, f] = numbers(text)?;
+    Some([[a, b, c], [d, e, f]])
 }
 
 /// Exactly `N` finite numbers.
@@ -74,9 +87,12 @@ mod tests {
     fn levels_cuts_and_ghosts_are_read() {
         assert_eq!(Query::parse("level/52"), Some(Query::Level(52)));
         assert_eq!(Query::parse("ghosts/2/0"), Some(Query::Ghosts { pieces: 2, part: 0 }));
-        let region =
-            Region { normal: [0.0, 1.0, 0.0], offset: -0.5, low: [-1.0, 0.0, 0.0], high: [1.0, 1e3, 3.0] };
+        let cutter = Cutter::Plane { normal: [0.0, 1.0, 0.0], offset: -0.5 };
+        let region = Region { cutter, low: [-1.0, 0.0, 0.0], high: [1.0, 1e3, 3.0] };
         let cut = "cut/8/0,2,0,-1/-1,0,0,1,1e3,3";
+        assert_eq!(Query::parse(cut), Some(Query::Cut { pieces: 8, region }));
+        let region = Region { cutter: Cutter::Box { low: [-1.0; 3], high: [0.5, 1.0, -1.0] }, ..region };
+        let cut = "cut/8/-1,-1,-1,0.5,1,-1/-1,0,0,1,1e3,3";
         assert_eq!(Query::parse(cut), Some(Query::Cut { pieces: 8, region }));
     }
 
@@ -108,6 +124,13 @@ mod tests {
             "cut/8/0,0,1,0/0,0,0,1,1,1,1",
             "cut/8/0,0,1,0/0,0,0,1,1,",
             "cut/0/0,0,1,0/0,0,0,1,1,1",
+            "cut/8/0,0,0,1,1/0,0,0,1,1,1",
+            "cut/8/0,0,0,1,1,1,1/0,0,0,1,1,1",
+            "cut/8/0,0,0,1,1,-1/0,0,0,1,1,1",
+            "cut/8/0,0,0,1,1,nan/0,0,0,1,1,1",
+            "cut/8/0,0,0,1,1,1e101/0,0,0,1,1,1",
+            "cut/8/0,0,0,1,1,1/0,0,0,1,1",
+            "box/8/0,0,0,1,1,1/0,0,0,1,1,1",
         ];
         for text in bad {
             assert_eq!(Query::parse(text), None, "{text}");

@@ -5,7 +5,7 @@ use crate::failure::{Failure, agree};
 use crate::report::counted;
 use serde_json::json;
 use tetmill::comm::Communicator;
-use tetmill::files::view::{About, Fill, Region, ViewPart, gather, message, part};
+use tetmill::files::view::{About, Fill, Region, ViewPart, fitting, gather, message, part};
 use tetmill::mesh::{By, Counts, MeshStream, Order, WithHalo, halo};
 use tetmill::run::Levels;
 
@@ -112,7 +112,7 @@ impl Shown<'_> {
         Ok(self.message(comm, &parts, About { pieces, hollow: fill == Fill::Hollow, ..self.about.clone() }))
     }
 
-    /// **Collective.** The tets that meet a plane.
+    /// **Collective.** The tets at a cut.
     fn cut(&self, comm: &dyn Communicator, pieces: u32, region: Region) -> Result<Vec<u8>, Failure> {
         let order = match &self.tets {
             Tets::Levels(levels) => levels.order(),
@@ -120,25 +120,49 @@ impl Shown<'_> {
         };
         // Ten-node tets have more bytes, and their faces are drawn in pieces.
         let most = IN_CUT / u64::from(order.degree()).pow(2);
-        let too_many =
-            || Failure::input(format!("the cut has more than {}: zoom in", counted(most, "tet", "tets")));
         match &self.tets {
-            Tets::Levels(levels) => {
-                let cut = levels.cut(comm, pieces, region, most)?.ok_or_else(too_many)?;
-                let pieces = Some([levels.pieces(), cut.pieces]);
-                Ok(self.message(comm, &cut.parts, About { pieces, ..self.about.clone() }))
-            }
-            Tets::Stored(streams) => {
-                let fill = Fill::Near { region, most };
-                let own: Vec<ViewPart> = streams.iter().map(|stream| part(*stream, fill)).collect();
-                let [found] =
-                    comm.all_reduce_sum_u64([own.iter().map(|part| part.tets.len() as u64).sum()])?;
-                if found > most {
-                    return Err(too_many());
+            Tets::Levels(levels) => match levels.cut(comm, pieces, region, most)? {
+                Some(cut) => {
+                    let pieces = Some([levels.pieces(), cut.pieces]);
+                    Ok(self.message(comm, &cut.parts, About { pieces, ..self.about.clone() }))
                 }
-                Ok(self.message(comm, &gather(comm, own)?, self.about.clone()))
-            }
+                None => {
+                    let coarse = agree(comm, levels.level(1).map_err(Failure::from))?;
+                    self.stored_cut(comm, &[&coarse], Some([levels.pieces(), 1]), region, most)
+                }
+            },
+            Tets::Stored(streams) => self.stored_cut(comm, streams, None, region, most),
         }
+    }
+
+    /// **Collective.** The tets of parts at a cut; if there are too many, those in the middle of
+    /// the window.
+    fn stored_cut(
+        &self,
+        comm: &dyn Communicator,
+        streams: &[&dyn MeshStream],
+        pieces: Option<[u32; 2]>,
+        region: Region,
+        most: u64,
+    ) -> Result<Vec<u8>, Failure> {
+        let near = |region: Region| -> Result<(Vec<ViewPart>, u64), Failure> {
+            let fill = Fill::Near { region, most };
+            let own: Vec<ViewPart> = streams.iter().map(|stream| part(*stream, fill)).collect();
+            let [found] = comm.all_reduce_sum_u64([own.iter().map(|part| part.tets.len() as u64).sum()])?;
+            Ok((own, found))
+        };
+        let (mut own, mut found) = near(region)?;
+        let mut window = None;
+        if found > most {
+            let smaller = fitting(comm, streams, &region, most)?;
+            (own, found) = near(smaller)?;
+            window = Some([smaller.low, smaller.high]);
+        }
+        if found > most {
+            let many = counted(most, "tet", "tets");
+            return Err(Failure::input(format!("the middle of the cut has more than {many}")));
+        }
+        Ok(self.message(comm, &gather(comm, own)?, About { pieces, window, ..self.about.clone() }))
     }
 
     /// **Collective.** The ghosts of one part.
