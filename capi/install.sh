@@ -1,17 +1,19 @@
 #!/usr/bin/env bash
 # Builds the C interface and installs header, shared and static library, pkg-config file and CMake configuration.
 #
-#   capi/install.sh --prefix DIR [--mpi] [--profile NAME]
+#   capi/install.sh --prefix DIR [--mpi] [--profile NAME] [--workspace]
 #
-# --mpi builds with MPI (tetmill_generate_comm); --profile is that of cargo, by default release. Linux and other ELF systems.
+# --mpi builds with MPI (tetmill_generate_comm); --profile is that of cargo, by default release; --workspace builds all packages,
+# as the tests do, which then compile nothing twice. Linux and other ELF systems.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-prefix="" features=() mpi="" profile=release
+prefix="" features=() mpi="" profile=release packages=(-p tetmill -p tetmill-capi)
 while [ $# -gt 0 ]; do
     case $1 in
         --prefix) prefix=${2:?--prefix needs a folder}; shift 2 ;;
         --profile) profile=${2:?--profile needs a name}; shift 2 ;;
+        --workspace) packages=(--workspace); shift ;;
         --mpi) features=(--features mpi); mpi=1; shift ;;
         *) echo "unknown argument $1; see the top of $0" >&2; exit 2 ;;
     esac
@@ -21,7 +23,7 @@ mkdir -p "$prefix"
 prefix=$(cd "$prefix" && pwd)
 
 # With the library beside it, both are built with the same features.
-cargo build --quiet --profile "$profile" -p tetmill -p tetmill-capi "${features[@]}"
+cargo build --quiet --profile "$profile" "${packages[@]}" "${features[@]}"
 built=${CARGO_TARGET_DIR:-target}/$([ "$profile" = dev ] && echo debug || echo "$profile")
 version=$(sed -n '/^\[workspace.package\]/,/^\[/s/^version = "\(.*\)"/\1/p' Cargo.toml)
 soname=libtetmill.so.${version%.*}

@@ -52,7 +52,7 @@ else
     skipped "no cbindgen (cargo install cbindgen), so the header is not compared"
 fi
 
-capi/install.sh --prefix "$work/threads" --profile dev >/dev/null
+capi/install.sh --prefix "$work/threads" --profile dev --workspace >/dev/null
 sanitised=(-fsanitize=address,undefined -fno-sanitize-recover=all)
 
 # Header alone, as C and as C++.
@@ -138,7 +138,7 @@ fi
 
 # Across processes: the same errors on 1, 2 and 4 ranks, and with several parts in a process.
 if command -v mpicc >/dev/null && command -v mpirun >/dev/null; then
-    capi/install.sh --prefix "$work/mpi" --profile dev --mpi >/dev/null
+    capi/install.sh --prefix "$work/mpi" --profile dev --workspace --mpi >/dev/null
     compile mpicc c99 "$work/mpi" capi/examples/poisson.c "$work/poisson_mpi"
     compile mpicc c99 "$work/mpi" capi/tests/mpi_use.c "$work/mpi_use"
     for ranks in 1 2 4; do
