@@ -70,7 +70,7 @@ fn a_step_assembly_has_names_and_is_on_its_faces_in_the_wanted_unit() {
     let arrays = mesh.arrays();
     let volume = volume_of(&arrays);
     assert!((volume / exact - 1.0).abs() < 0.01, "{volume} instead of {exact}");
-    // The first bolt stands on (-5, -5, 20): its lower cylinder has radius 2 above its head of radius 4.
+    // The first bolt stands on (-5, -5, 20): a cylinder of radius 2 above its head.
     let is_on_bolt = |p: &[f64; 3]| {
         let r = (p[0] + 5.0).hypot(p[1] + 5.0);
         (23.5..29.5).contains(&p[2]) && r < 3.0 && (r - 2.0).abs() < 1e-12

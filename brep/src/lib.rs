@@ -1,9 +1,10 @@
 //! Boundary representations of CAD programs: reads STEP files and the BREP text of OpenCASCADE,
 //! evaluates and projects to their curves and surfaces, and tessellates their faces.
 //!
-//! A [`Model`] is read by [`Model::read_step`] or [`Model::read`]. It has **bodies** (solids), **patches** (faces) that bound them, **curves** (edges)
-//! that bound the patches, and **corners** (vertices) at the ends of curves. A face that two solids
-//! share is one patch, with a body on each side.
+//! A [`Model`] is read by [`Model::read_step`] or [`Model::read`]. It has **bodies** (solids),
+//! **patches** (faces) that bound them, **curves** (edges) that bound the patches, and **corners**
+//! (vertices) at the ends of curves. A face that two solids share is one patch, with a body on each
+//! side.
 //!
 //! [`Tessellation::of`] divides each curve once and triangulates each patch in its parameters, so
 //! that the triangles of neighbouring patches fit.

@@ -164,7 +164,7 @@ impl Closing<'_> {
             match (open.take(), is_lower(&next)) {
                 (None, true) => open = Some(next),
                 (Some(lower), false) => bounds.push(self.join(lower, next, direction, holes)?),
-                // On a surface that is closed across, the face of the highest may end at the lowest.
+                // On a surface closed across, the face of the highest may end at the lowest.
                 (None, false) if first.is_none() && bounds.is_empty() => first = Some(next),
                 _ => return Err(self.error(UNBOUNDED)),
             }

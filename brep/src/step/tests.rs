@@ -166,7 +166,7 @@ fn loops_the_wrong_way_around_are_turned() {
 
 #[test]
 fn an_assembly_has_placed_and_named_solids_in_any_unit() {
-    // A plate of 40 × 40 × 5 mm and four bolts, of which each is a product placed in a pair, in inches.
+    // A plate of 40 × 40 × 5 mm and four bolts in two pairs, in inches.
     let bolt = PI * (4.0 * 7.0 + 16.0 * 3.0);
     for (unit, millimetres) in [("file", 25.4), ("mm", 1.0), ("m", 1000.0), ("in", 25.4)] {
         let (model, volumes) = volumes(&assembly(), unit.parse().unwrap());

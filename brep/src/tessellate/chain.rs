@@ -105,8 +105,8 @@ fn on_curve(
         };
         let mut gap = (surface.point(parameters) - on).norm();
         if gap > 1e-9 * tolerances.diagonal {
-            // The two curves may be parametrised differently, and that in the parameters be piecewise
-            // linear.
+            // The two curves may be parametrised differently, and that in the parameters may be
+            // piecewise linear.
             let foot = project_to_surface(surface, &on, parameters);
             (parameters, gap) = (foot.parameters, (foot.point - on).norm());
         }

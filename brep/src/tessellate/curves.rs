@@ -99,8 +99,8 @@ fn is_fine(
         let normals: Vec<Vector> = normals.collect();
         normals.windows(2).map(|n| n[0].angle(&n[1])).sum::<f64>() <= angle
     };
-    // Beside poles, straight lines in the parameters bend in space: vertices inside of a patch would
-    // be beyond the edge.
+    // Beside poles, straight lines in the parameters bend in space: vertices inside of a patch
+    // would be beyond the edge.
     let follows = |&(surface, fin): &Beside| {
         let Some(own) = fin.curve.as_ref().filter(|_| along.norm() > LONG * shortest) else { return true };
         let [p, q] = [a, b].map(|t| own.point(fin.parameter(t, edge.range)));
