@@ -3,8 +3,8 @@
 use crate::folders::{own, shared};
 use std::path::PathBuf;
 use tetmill::comm::thread;
-use tetmill::mesh::Order;
-use tetmill::{Geometry, InputSettings, MeshArrays, Mesher, Method};
+use tetmill::mesh::{Arrays, Order};
+use tetmill::{Geometry, InputSettings, Mesher, Method};
 
 /// A file of the repository.
 fn file(name: &str) -> PathBuf {
@@ -16,7 +16,7 @@ fn volume(geometry: &Geometry, levels: u32) -> f64 {
     volume_of(&Mesher::new().levels(levels).generate(geometry).unwrap().arrays())
 }
 
-fn volume_of(mesh: &MeshArrays) -> f64 {
+fn volume_of(mesh: &Arrays) -> f64 {
     let of = |tet: &[u32; 4]| {
         let [a, b, c, d] = tet.map(|v| tetmill::Point::from(mesh.points[v as usize]));
         (b - a).cross(&(c - a)).dot(&(d - a)) / 6.0

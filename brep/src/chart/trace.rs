@@ -26,6 +26,16 @@ const ROUNDING: f64 = 1e-9;
 /// Edges further from their surface than this (fraction of the diagonal) do not belong to it.
 const FARTHEST: f64 = 2e-3;
 
+/// The most nodes of an edge.
+const MOST_NODES: usize = 20_000;
+
+/// Where an edge leaves its surface.
+struct Lost {
+    place: Point,
+    /// Its distance there; `None` if it is on the surface, but its parameters jump.
+    off: Option<f64>,
+}
+
 /// Nodes of an edge and their largest distance from it.
 type Way = (Vec<(f64, Parameters)>, f64);
 
@@ -55,10 +65,13 @@ impl Chart<'_> {
             let pole = at.and_then(|p| self.pole_at(p)).filter(|_| k > 0);
             let (nodes, off) = match at {
                 Some(at) if pole.is_none() => self.walk(edge, ends, self.near(&point(edge, ends[0]), at)),
-                _ => self.from_middle(edge, ends),
+                _ => self.walk_both_ways(edge, ends),
             }
-            .map_err(|(place, off)| {
-                let what = format!("edge {} is {off:.3e} away from it", number + 1);
+            .map_err(|Lost { place, off }| {
+                let what = match off {
+                    Some(off) => format!("edge {} is {off:.3e} away from it", number + 1),
+                    None => format!("edge {} cannot be followed in its parameters", number + 1),
+                };
                 BrepError::face(face, what, Some(place))
             })?;
             gap = gap.max(off);
@@ -132,7 +145,7 @@ impl Chart<'_> {
     }
 
     /// Follows an edge from its middle to both ends.
-    fn from_middle(&self, edge: &EdgeCurve, [first, last]: [f64; 2]) -> Result<Way, (Point, f64)> {
+    fn walk_both_ways(&self, edge: &EdgeCurve, [first, last]: [f64; 2]) -> Result<Way, Lost> {
         let middle = 0.5 * (first + last);
         let at = self.anywhere(&point(edge, middle));
         let (mut nodes, before) = self.walk(edge, [middle, first], at)?;
@@ -146,7 +159,7 @@ impl Chart<'_> {
     ///
     /// # Errors
     /// The place where the edge leaves the surface, and its distance there.
-    fn walk(&self, edge: &EdgeCurve, [from, to]: [f64; 2], start: Parameters) -> Result<Way, (Point, f64)> {
+    fn walk(&self, edge: &EdgeCurve, [from, to]: [f64; 2], start: Parameters) -> Result<Way, Lost> {
         let whole = to - from;
         let mut nodes = vec![(from, start)];
         let mut gap = (self.surface.point(start) - point(edge, from)).norm();
@@ -162,7 +175,10 @@ impl Chart<'_> {
             let is_good = bend <= OFF * chord + off.max(gap) + ROUNDING * self.diagonal;
             if is_good || step < SMALLEST_STEP {
                 if off > FARTHEST * self.diagonal {
-                    return Err((place, off));
+                    return Err(Lost { place, off: Some(off) });
+                }
+                if nodes.len() > MOST_NODES {
+                    return Err(Lost { place, off: None });
                 }
                 gap = gap.max(off);
                 nodes.push((next, found));
@@ -173,7 +189,7 @@ impl Chart<'_> {
             }
         }
         if gap > FARTHEST * self.diagonal {
-            return Err((point(edge, from), gap));
+            return Err(Lost { place: point(edge, from), off: Some(gap) });
         }
         if let Some(last) = nodes.last_mut() {
             last.1 = self.on_pole(last.1);

@@ -28,8 +28,8 @@ pub(super) const SOLIDS: [&str; 4] =
 
 /// Assemblies may be nested this deep.
 const DEEPEST: usize = 64;
-/// The most placed solids: a small file can place one exponentially often.
-const MOST: usize = 100_000;
+/// The most uses of products and representations: a small file can use one exponentially often.
+const MOST_USES: usize = 200_000;
 
 /// An item of a representation or an occurrence of a product.
 struct Occurrence {
@@ -51,6 +51,7 @@ struct Structure<'a> {
     out: Vec<PlacedSolid<'a>>,
     /// The solids that were found.
     found: BTreeSet<u64>,
+    uses: usize,
 }
 
 /// All solids of a file, in the order of its products, with the unit of the result in metres.
@@ -112,6 +113,7 @@ impl<'a> Structure<'a> {
             unit: None,
             out: Vec::new(),
             found: BTreeSet::new(),
+            uses: 0,
         };
         for node in nodes(records) {
             if let Some(fields) = node.get("SHAPE_DEFINITION_REPRESENTATION") {
@@ -187,16 +189,26 @@ impl<'a> Structure<'a> {
             let Occurrence { child, placement } = &self.children[&product][k];
             let (child, inner) = (*child, placement.unwrap_or(Placement::IDENTITY));
             // The transformation is in the unit of the parent, the placement in that of the result.
-            self.too_deep(depth)?;
+            self.count(depth)?;
             let scaled = self.scaled_shift(product, &inner)?;
             self.add_product(child, &at.after(&scaled), depth - 1)?;
         }
         Ok(())
     }
 
-    fn too_deep(&self, depth: usize) -> Result<(), BrepError> {
-        let what = format!("assemblies are nested more than {DEEPEST} deep, or have more than {MOST} solids");
-        if depth > 0 && self.out.len() < MOST { Ok(()) } else { Err(BrepError::Syntax { line: 1, what }) }
+    /// Counts a use.
+    ///
+    /// # Errors
+    /// If uses are nested too deep, or there are too many.
+    fn count(&mut self, depth: usize) -> Result<(), BrepError> {
+        self.uses += 1;
+        if depth > 0 && self.uses <= MOST_USES {
+            return Ok(());
+        }
+        let what = format!(
+            "parts of assemblies are nested more than {DEEPEST} deep, or used more than {MOST_USES} times"
+        );
+        Err(BrepError::Syntax { line: 1, what })
     }
 
     /// A placement in the unit of a product as one in that of the result.
@@ -234,7 +246,7 @@ impl<'a> Structure<'a> {
             let solids: Vec<Node> = items(shape)?.into_iter().filter(|item| is_solid(*item)).collect();
             let is_alone = solids.len() == 1;
             for solid in solids {
-                self.too_deep(depth)?;
+                self.count(depth)?;
                 self.found.insert(solid.id);
                 let product = name.filter(|_| is_alone || solid.label().is_none());
                 let name = solid.label().or_else(|| product.map(str::to_owned));
@@ -243,7 +255,7 @@ impl<'a> Structure<'a> {
                 self.out.push(PlacedSolid { solid, placement, units, name });
             }
             for mapped in items(shape)?.into_iter().filter_map(|item| item.get("MAPPED_ITEM")) {
-                self.too_deep(depth)?;
+                self.count(depth)?;
                 let map = mapped.refers(1)?.fields("REPRESENTATION_MAP")?;
                 let [from, to] = [placement(map.refers(0)?)?, placement(mapped.refers(2)?)?];
                 let inverse = from.inverse().ok_or_else(|| map.node().error("it is singular"))?;

@@ -58,15 +58,15 @@ pub(super) fn placement(node: Node) -> Result<Placement, BrepError> {
         let (origin, axes) = frame(node)?;
         (origin, axes, 1.0)
     } else {
-        let operator = "CARTESIAN_TRANSFORMATION_OPERATOR_3D";
-        let fields = node.fields(operator)?;
+        let fields = node.fields("CARTESIAN_TRANSFORMATION_OPERATOR_3D")?;
         // Label, name and description come first.
         let axis = |k: usize| fields.may_refer(k)?.map(direction).transpose();
         let z = axis(7)?.unwrap_or_else(Vector::z);
         let x = across(&z, axis(3)?);
-        let y = axis(4)?.unwrap_or_else(|| z.cross(&x));
-        let y = if z.cross(&x).dot(&y) < 0.0 { -z.cross(&x) } else { z.cross(&x) };
-        (point(fields.refers(5)?)?, [x, y, z], fields.length(6).unwrap_or(1.0))
+        let y = z.cross(&x);
+        let is_mirrored = axis(4)?.is_some_and(|given| given.dot(&y) < 0.0);
+        let scale = if fields.is_set(6) { fields.length(6)? } else { 1.0 };
+        (point(fields.refers(5)?)?, [x, if is_mirrored { -y } else { y }, z], scale)
     };
     Ok(Placement { linear: Matrix3::from_columns(&axes) * scale, shift })
 }

@@ -67,7 +67,8 @@ fn corners(shapes: &Shapes, diagonal: f64) -> Vec<usize> {
     let mut to: Vec<usize> = Vec::with_capacity(shapes.corners.len());
     for (number, corner) in shapes.corners.iter().enumerate() {
         let own = cell(&corner.point);
-        let around = (0..27).map(|k| [own.x + k % 3 - 1, own.y + k / 3 % 3 - 1, own.z + k / 9 - 1]);
+        let beside = |at: i64, step: i64| at.saturating_add(step % 3 - 1);
+        let around = (0..27).map(|k| [beside(own.x, k), beside(own.y, k / 3), beside(own.z, k / 9)]);
         let distance = |&other: &usize| (shapes.corners[other].point - corner.point).norm();
         let same = around
             .filter_map(|cell| cells.get(&cell))

@@ -102,6 +102,10 @@ impl<'a> Fields<'a> {
         self.node.error(format!("{wanted} is expected as attribute {} of {}", index + 1, self.name))
     }
 
+    pub fn is_set(&self, index: usize) -> bool {
+        !matches!(self.values.get(index), None | Some(Value::Unset))
+    }
+
     pub fn number(&self, index: usize) -> Result<f64, BrepError> {
         number(self.value(index)?).ok_or_else(|| self.wrong(index, "a number"))
     }

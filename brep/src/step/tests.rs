@@ -213,6 +213,30 @@ fn damaged_files_give_an_error_with_a_line() {
 }
 
 #[test]
+fn a_part_that_contains_itself_ends_with_an_error() {
+    let mut text = Text::new();
+    let frame = text.frame(0.0, 1.0);
+    let unit = text.add("( LENGTH_UNIT() NAMED_UNIT(*) SI_UNIT($,.METRE.) )");
+    let context =
+        text.add(&format!("( GLOBAL_UNIT_ASSIGNED_CONTEXT((#{unit})) REPRESENTATION_CONTEXT('','') )"));
+    // Two items of a representation place the representation itself, and a solid makes it wanted.
+    let (map, shape) = (text.1 + 1, text.1 + 5);
+    text.add(&format!("REPRESENTATION_MAP(#{frame},#{shape})"));
+    let items: Vec<u32> = (0..2).map(|_| text.add(&format!("MAPPED_ITEM('',#{map},#{frame})"))).collect();
+    let shell = text.add("CLOSED_SHELL('',())");
+    let product = "PRODUCT_DEFINITION_SHAPE('','',#100)";
+    text.add(&format!("SHAPE_REPRESENTATION('',(#{},#{},#99),#{context})", items[0], items[1]));
+    assert_eq!(text.1, shape);
+    let text = format!(
+        "{}#99 = MANIFOLD_SOLID_BREP('',#{shell});\n#98 = {product};\n#100 = PRODUCT_DEFINITION('','',$,$);\n\
+         #97 = SHAPE_DEFINITION_REPRESENTATION(#98,#{shape});\nENDSEC;\nEND-ISO-10303-21;\n",
+        text.0
+    );
+    let error = Model::read_step(text.as_bytes(), Unit::OfFile).unwrap_err().to_string();
+    assert!(error.contains("nested more than"), "{error}");
+}
+
+#[test]
 fn errors_name_the_record_and_its_line() {
     let error = |from: &str, to: &str| {
         Model::read_step(assembly().replacen(from, to, 1).as_bytes(), Unit::OfFile).unwrap_err().to_string()

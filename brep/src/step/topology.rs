@@ -100,9 +100,10 @@ impl Reader<'_> {
     }
 
     fn face(&mut self, face: Node, is_outward: bool) -> Result<(), BrepError> {
-        if let Some(oriented) = face.get("ORIENTED_FACE") {
-            return self.face(oriented.refers(2)?, is_outward == oriented.flag(3)?);
-        }
+        let (face, is_outward) = match face.get("ORIENTED_FACE") {
+            Some(oriented) => (oriented.refers(2)?, is_outward == oriented.flag(3)?),
+            None => (face, is_outward),
+        };
         let Some(fields) = face.any(&["ADVANCED_FACE", "FACE_SURFACE"]) else {
             return Err(face.error(format!("{} is no face that can be read", face.kind())));
         };
