@@ -79,6 +79,27 @@ fn a_step_assembly_has_names_and_is_on_its_faces_in_the_wanted_unit() {
 }
 
 #[test]
+fn faces_that_solids_of_a_step_file_repeat_are_interfaces() {
+    // A pin of radius 0.4 in a plate of 2 × 2 × 1 with which it is flush.
+    let geometry = Geometry::from_file(own("step").with_extension("").join("pin.step")).unwrap();
+    let inspection = geometry.inspect().unwrap();
+    assert_eq!((inspection.bodies.len(), inspection.patches.len()), (2, 9));
+    assert!((volume(&geometry, 0) / 4.0 - 1.0).abs() < 1e-12, "chords of the common face cancel");
+    let mesh = Mesher::new().generate(&geometry).unwrap();
+    assert_eq!(mesh.names.bodies.len(), 2);
+}
+
+#[test]
+fn solids_that_touch_otherwise_are_refused_with_their_names() {
+    let geometry = Geometry::from_file(own("step").with_extension("").join("touching.step")).unwrap();
+    let error = Mesher::new().generate(&geometry).unwrap_err().to_string();
+    assert!(
+        error.contains("the solids 1 (") && error.contains("and 2 (") && error.contains("imprint"),
+        "{error}"
+    );
+}
+
+#[test]
 fn step_and_brep_of_one_part_have_the_volumes_of_the_cad_program() {
     let Some(folder) = shared("step") else { return };
     let text = std::fs::read(folder.join("volumes.json")).unwrap();

@@ -75,6 +75,18 @@ pub enum CoarseError {
         /// Where the first pair intersects.
         first: Point,
     },
+    /// Two solids of a CAD file touch or overlap.
+    #[error(
+        "the solids {} ({}) and {} ({}) touch without a common face, or overlap, near ({}, {}, {}): imprint them on each \
+         other in the CAD program (Boolean fragments), or keep them apart",
+        solids[0].0, solids[0].1, solids[1].0, solids[1].1, first.x, first.y, first.z
+    )]
+    SolidsMeet {
+        /// The numbers and names of the solids.
+        solids: Box<[(u32, String); 2]>,
+        /// Where they meet.
+        first: Point,
+    },
     /// A vertex could not be moved onto its face or edge.
     #[error(transparent)]
     Projection(#[from] csg::ProjectionFailed),
@@ -109,7 +121,7 @@ impl From<VolumeError> for CoarseError {
 impl HasKind for CoarseError {
     fn kind(&self) -> ErrorKind {
         match self {
-            Self::TooClose(_) | Self::FacetsMeet { .. } => ErrorKind::Input,
+            Self::TooClose(_) | Self::FacetsMeet { .. } | Self::SolidsMeet { .. } => ErrorKind::Input,
             Self::Room(_) => ErrorKind::Resources,
             Self::Cancelled(_) => ErrorKind::Cancelled,
             _ => ErrorKind::NoMesh,

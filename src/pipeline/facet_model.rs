@@ -270,6 +270,9 @@ impl FacetSolid {
 
     /// The error for facets that intersect, if any do. Intersections of different files come first.
     fn facets_meet(&self, crossings: &[Crossing]) -> Option<CoarseError> {
+        if let Some(meeting) = crossings.iter().find_map(|crossing| self.solids_meet(crossing)) {
+            return Some(meeting);
+        }
         let files = |crossing: &Crossing| {
             let file = |patch| self.model.patch(patch).labels.first().map(|label| label.0);
             let [a, b] = crossing.patches.map(file);
@@ -278,6 +281,22 @@ impl FacetSolid {
         let first = crossings.iter().find(|crossing| files(crossing).is_some()).or(crossings.first())?;
         let files = files(first).map(|pair| Box::new(pair.map(|file| self.files[file as usize].clone())));
         Some(CoarseError::FacetsMeet { files, count: crossings.len(), first: first.at })
+    }
+
+    /// The error for an intersection of faces of two solids of a CAD file.
+    fn solids_meet(&self, crossing: &Crossing) -> Option<CoarseError> {
+        self.exact.as_ref()?;
+        let [a, b] = crossing.patches.map(|id| {
+            let patch = self.model.patch(id);
+            [patch.inside, patch.outside]
+        });
+        let is_common = a.iter().flatten().any(|body| b.contains(&Some(*body)));
+        let solid = |sides: [Option<BodyId>; 2]| {
+            let label = &self.names.bodies[sides.into_iter().flatten().next()?.index()];
+            Some((label.number, label.names.first().cloned().unwrap_or_default()))
+        };
+        let solids = Box::new([solid(a)?, solid(b)?]);
+        (!is_common).then_some(CoarseError::SolidsMeet { solids, first: crossing.at })
     }
 
     /// Finds thin regions between the facets themselves.
