@@ -113,7 +113,7 @@ fn step_and_brep_of_one_part_have_the_volumes_of_the_cad_program() {
             assert_eq!(Some(inspection.patches.len() as u64), part["faces"].as_u64(), "{}", path.display());
             let exact: f64 = part["volumes"].as_array().unwrap().iter().map(|v| v.as_f64().unwrap()).sum();
             let found = volume(&geometry, 0);
-            assert!((found / exact - 1.0).abs() < 0.02, "{}: {found} {exact}", path.display());
+            assert!((found / exact - 1.0).abs() < 0.05, "{}: {found} {exact}", path.display());
         }
     }
 }

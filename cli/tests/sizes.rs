@@ -86,11 +86,11 @@ fn more_ranks_than_threads_are_possible_are_refused_as_an_option() {
 }
 
 #[test]
-fn cad_files_are_refused_with_what_to_do() {
+fn iges_files_are_refused_with_what_to_do() {
     let dir = tempfile::tempdir().unwrap();
-    let file = dir.path().join("part.STEP");
-    std::fs::write(&file, "ISO-10303-21;").unwrap();
-    assert_refused(&mesh(&file, &[]), 2, "convert it to BREP");
+    let file = dir.path().join("part.IGES");
+    std::fs::write(&file, "").unwrap();
+    assert_refused(&mesh(&file, &[]), 2, "save the part as STEP");
 }
 
 #[test]
