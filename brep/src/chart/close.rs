@@ -209,7 +209,6 @@ impl Closing<'_> {
         holes: &[Vec<Parameters>],
     ) -> Result<Vec<Side>, BrepError> {
         let period = self.chart.periods[direction].expect("loops go around");
-        let blocking: Vec<Vec<Parameters>> = holes.to_vec();
         let mut best: Option<(f64, usize, usize, i32)> = None;
         for a in 0..lower.sides.len() {
             let from = self.chart.shifted(lower.sides[a].start(), lower.drift);
@@ -220,7 +219,7 @@ impl Closing<'_> {
                 by[direction] = rounds;
                 let to = self.chart.shifted(to, by);
                 let mut way = (to[direction] - from[direction]).abs();
-                if self.is_blocked([from, to], &blocking) {
+                if self.is_blocked([from, to], holes) {
                     way += 10.0 * period;
                 }
                 if best.is_none_or(|(least, ..)| way < least) {

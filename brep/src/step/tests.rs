@@ -39,6 +39,14 @@ impl Text {
         self.add(&format!("EDGE_CURVE('',#{vertex},#{vertex},#{circle},.T.)"))
     }
 
+    /// A coordinate system with axes z and x.
+    fn frame_at(&mut self, origin: [f64; 3], z: [f64; 3], x: [f64; 3]) -> u32 {
+        let [a, b, c] = origin;
+        let origin = self.point(a, b, c);
+        let [z, x] = [z, x].map(|[a, b, c]| self.add(&format!("DIRECTION('',({a:?},{b:?},{c:?}))")));
+        self.add(&format!("AXIS2_PLACEMENT_3D('',#{origin},#{z},#{x})"))
+    }
+
     /// A bound of one edge.
     fn bound(&mut self, edge: u32, is_forward: bool) -> u32 {
         let flag = if is_forward { "T" } else { "F" };
@@ -151,6 +159,36 @@ fn whole_spheres_and_tori_need_no_edges() {
         let face = text.face(surface, &[bound]);
         assert_near(volumes(&text.solid(&[face]), Unit::OfFile).1[0], exact);
     }
+}
+
+#[test]
+fn an_elbow_needs_no_seam() {
+    // A quarter of a torus: its loops go around the tube, in the other direction than those above.
+    let mut text = Text::new();
+    let mut disks = Vec::new();
+    let mut bounds = Vec::new();
+    // At both ends: the way out, the axis around which the tube's angle grows, and its start.
+    for (out, z, x, is_start) in [
+        ([0.0, -1.0, 0.0], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0], true),
+        ([-1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], false),
+    ] {
+        let center = x.map(|x| 2.0 * x);
+        let [a, b, c] = x.map(|x| 2.5 * x);
+        let point = text.point(a, b, c);
+        let vertex = text.add(&format!("VERTEX_POINT('',#{point})"));
+        let frame = text.frame_at(center, z, x);
+        let circle = text.add(&format!("CIRCLE('',#{frame},0.5)"));
+        let edge = text.add(&format!("EDGE_CURVE('',#{vertex},#{vertex},#{circle},.T.)"));
+        let frame = text.frame_at(center, out, x);
+        let plane = text.add(&format!("PLANE('',#{frame})"));
+        let bound = text.bound(edge, is_start);
+        disks.push(text.face(plane, &[bound]));
+        bounds.push(text.bound(edge, !is_start));
+    }
+    let frame = text.frame(0.0, 1.0);
+    let surface = text.add(&format!("TOROIDAL_SURFACE('',#{frame},2.,0.5)"));
+    disks.push(text.face(surface, &bounds));
+    assert_near(volumes(&text.solid(&disks), Unit::OfFile).1[0], PI * PI / 4.0);
 }
 
 #[test]
