@@ -3,6 +3,7 @@
 //! Newton's method starts from the nearest of many samples, of which there are several between any
 //! two knots; analytic kinds have closed forms.
 
+use crate::bspline::Basis;
 use crate::curve::Curve;
 use crate::project::{CurveFoot, SurfaceFoot, project_to_curve, project_to_surface};
 use crate::surface::{Profile, Surface};
@@ -40,19 +41,22 @@ impl Curve<3> {
                 let around = (0..AROUND).map(|k| TAU * f64::from(k) / f64::from(AROUND));
                 std::iter::once(nearest).chain(around).collect()
             }
-            Self::Spline(spline) => {
-                let breaks = spline.basis.breaks();
-                let each = (spline.basis.degree() + 2).min((MOST_SAMPLES / breaks.len()).max(2));
-                let between = |w: &[f64]| {
-                    let [a, b] = [w[0], w[1]];
-                    (0..each).map(move |k| a + (b - a) * k as f64 / each as f64)
-                };
-                let last = breaks[breaks.len() - 1];
-                breaks.windows(2).flat_map(between).chain([last]).collect()
-            }
+            Self::Spline(spline) => between_knots(&spline.basis, 2),
             Self::Offset { basis, .. } => basis.samples(point),
         }
     }
+}
+
+/// Parameters between any two knots, at least `fewest` and as many more as the degree, and the end.
+fn between_knots(basis: &Basis, fewest: usize) -> Vec<f64> {
+    let breaks = basis.breaks();
+    let each = (basis.degree() + fewest).min((MOST_SAMPLES / breaks.len()).max(fewest));
+    let between = |w: &[f64]| {
+        let [a, b] = [w[0], w[1]];
+        (0..each).map(move |k| a + (b - a) * k as f64 / each as f64)
+    };
+    let last = breaks[breaks.len() - 1];
+    breaks.windows(2).flat_map(between).chain([last]).collect()
 }
 
 /// The smallest items by a key, at most [`STARTS`].
@@ -160,16 +164,7 @@ fn starts(surface: &Surface, point: &Point) -> Vec<[f64; 2]> {
             nearest_of(all.into_iter().map(|v| [angle(v), v]).collect())
         }
         Surface::Spline(spline) => {
-            let [in_u, in_v] = [0, 1].map(|k| {
-                let breaks = spline.bases[k].breaks();
-                let each = (spline.bases[k].degree() + 1).min((MOST_SAMPLES / breaks.len()).max(1));
-                let between = |w: &[f64]| {
-                    let [a, b] = [w[0], w[1]];
-                    (0..each).map(move |i| a + (b - a) * i as f64 / each as f64)
-                };
-                let last = breaks[breaks.len() - 1];
-                breaks.windows(2).flat_map(between).chain([last]).collect::<Vec<f64>>()
-            });
+            let [in_u, in_v] = [0, 1].map(|k| between_knots(&spline.bases[k], 1));
             in_u.iter().flat_map(|&u| in_v.iter().map(move |&v| [u, v])).collect()
         }
         Surface::Offset { basis, .. } => starts(basis, point),
