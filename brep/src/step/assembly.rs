@@ -64,7 +64,9 @@ pub(super) fn solids<'a>(
         structure.unit = Some(metres);
     }
     let placed: BTreeSet<u64> = structure.children.values().flatten().map(|o| o.child).collect();
-    let roots: Vec<u64> = structure.shapes.keys().filter(|id| !placed.contains(id)).copied().collect();
+    // An assembly need not have a shape of its own.
+    let products: BTreeSet<u64> = structure.shapes.keys().chain(structure.children.keys()).copied().collect();
+    let roots: Vec<u64> = products.difference(&placed).copied().collect();
     for root in roots {
         structure.add_product(root, &Placement::IDENTITY, DEEPEST)?;
     }
@@ -190,7 +192,7 @@ impl<'a> Structure<'a> {
             let (child, inner) = (*child, placement.unwrap_or(Placement::IDENTITY));
             // The transformation is in the unit of the parent, the placement in that of the result.
             self.count(depth)?;
-            let scaled = self.scaled_shift(product, &inner)?;
+            let scaled = self.scaled_shift([product, child], &inner)?;
             self.add_product(child, &at.after(&scaled), depth - 1)?;
         }
         Ok(())
@@ -211,9 +213,11 @@ impl<'a> Structure<'a> {
         Err(BrepError::Syntax { line: 1, what })
     }
 
-    /// A placement in the unit of a product as one in that of the result.
-    fn scaled_shift(&mut self, product: u64, inner: &Placement) -> Result<Placement, BrepError> {
-        let Some(shape) = self.shapes.get(&product).and_then(|all| all.first()).copied() else {
+    /// A placement of a child in its parent as one in the unit of the result. Their unit is that of
+    /// the first of both that has a shape.
+    fn scaled_shift(&mut self, products: [u64; 2], inner: &Placement) -> Result<Placement, BrepError> {
+        let shape = products.iter().find_map(|product| self.shapes.get(product)?.first()).copied();
+        let Some(shape) = shape else {
             return Ok(*inner);
         };
         let scale = self.scale(&units(shape)?);

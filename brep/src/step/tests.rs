@@ -251,6 +251,15 @@ fn damaged_files_give_an_error_with_a_line() {
 }
 
 #[test]
+fn an_assembly_without_a_shape_of_its_own_still_places_its_parts() {
+    let whole = assembly();
+    let record = "#3 = SHAPE_DEFINITION_REPRESENTATION(#4,#10);";
+    assert!(whole.contains(record));
+    let read = |text: &str| Model::read_step(text.as_bytes(), "mm".parse().unwrap()).unwrap();
+    assert_eq!(read(&whole.replace(record, "")), read(&whole));
+}
+
+#[test]
 fn a_part_that_contains_itself_ends_with_an_error() {
     let mut text = Text::new();
     let frame = text.frame(0.0, 1.0);
