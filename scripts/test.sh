@@ -3,7 +3,10 @@
 # with TetGen.
 set -euo pipefail
 cd "$(dirname "$0")/.."
-scripts/install-test-needs.sh
+scripts/install-test-needs.sh system
+# The compiler needs no Python modules: they are downloaded while it runs.
+scripts/install-test-needs.sh modules &
+modules=$!
 
 # By default Open MPI refuses to run as root or with more ranks than cores.
 export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 OMPI_MCA_rmaps_base_oversubscribe=1
@@ -16,6 +19,8 @@ fi
 
 # Each build is of the whole workspace: with fewer packages, other crates get other features, and all is compiled again.
 # `mpi` is a feature of the library and of the program; both have tests that depend on it.
+run --no-run --workspace --features mpi --lib --bins --tests
+wait "$modules"
 run --workspace --features mpi --lib --bins --tests
 scripts/test-viewer.sh
 cargo test --workspace --features mpi --doc
