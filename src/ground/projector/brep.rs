@@ -5,6 +5,7 @@ use crate::ground::kernel::tree::{Tree, bounds};
 use crate::{Point, Vector};
 use brep::{Curve, Surface, Tessellation, project_to_curve, project_to_surface};
 use csg::{CurveId, PatchId, ProjectionFailed};
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 /// Faces and edges, each with triangles or segments from which searches for nearest points start.
@@ -111,8 +112,8 @@ impl BrepProjector {
             let points: Vec<Point> = edge.line.iter().map(|&(v, _)| point(v)).collect();
             Segments { tree: Tree::new(&points.windows(2).map(bounds).collect::<Vec<_>>()), points }
         };
-        let patches = source.surfaces.iter().map(triangles).collect();
-        let curves = source.curves.iter().map(segments).collect();
+        let patches = source.surfaces.par_iter().map(triangles).collect();
+        let curves = source.curves.par_iter().map(segments).collect();
         Self { source, patches, curves }
     }
 

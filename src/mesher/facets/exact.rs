@@ -8,6 +8,7 @@ use crate::ground::projector::BrepProjector;
 use crate::ground::projector::facets::{FacetProjector, Source};
 use brep::{Curve, Model, On, Tessellation};
 use csg::{BodyId, CornerId, PatchId};
+use rayon::prelude::*;
 use std::collections::BTreeSet;
 
 /// The normals on both sides of a seam differ by at most this angle (radians), else it is an edge.
@@ -97,7 +98,7 @@ fn corner_normals(model: &Model, tessellation: &Tessellation, is_reversed: &[boo
         });
         if is_reversed[t.patch as usize] { [q, p, r] } else { [p, q, r] }
     };
-    tessellation.triangles.iter().map(of).collect()
+    tessellation.triangles.par_iter().map(of).collect()
 }
 
 /// The edges that are curves: all but smooth seams.
