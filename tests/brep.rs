@@ -16,7 +16,7 @@ fn volume(geometry: &Geometry, levels: u32) -> f64 {
     volume_of(&Mesher::new().levels(levels).generate(geometry).unwrap().arrays())
 }
 
-fn volume_of(mesh: &Arrays) -> f64 {
+pub fn volume_of(mesh: &Arrays) -> f64 {
     let of = |tet: &[u32; 4]| {
         let [a, b, c, d] = tet.map(|v| tetmill::Point::from(mesh.points[v as usize]));
         (b - a).cross(&(c - a)).dot(&(d - a)) / 6.0

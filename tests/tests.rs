@@ -10,5 +10,6 @@ mod library;
 mod mpirun_comm;
 mod readers;
 mod samples;
+mod small_faces;
 mod surfaces;
 mod writers;

@@ -373,3 +373,14 @@ fn splines_with_weighted_poles_survive_serialization() {
     let text = serde_json::to_string(&surface).unwrap();
     assert_eq!(serde_json::from_str::<Surface>(&text).unwrap(), surface);
 }
+
+#[test]
+fn tessellations_do_not_depend_on_the_number_of_threads() {
+    let on = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| ["fragments.brep", "filleted_variable.brep"].map(|name| tessellated(name, 1e-4)))
+    };
+    let [one, several] = [on(1), on(3)];
+    assert!(one.iter().all(|(_, made)| made.triangles.len() > 1000));
+    assert_eq!(one, several);
+}

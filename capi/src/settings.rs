@@ -40,6 +40,7 @@ pub struct Settings {
     pub cut_planes: Vec<CutPlane>,
     // How surfaces are read.
     keep_surface: Option<bool>,
+    keep_small: Option<bool>,
     merge: Option<f64>,
     feature_angle: Option<f64>,
     unit: Option<Unit>,
@@ -49,7 +50,7 @@ pub struct Settings {
 }
 
 /// The names of `tetmill_options_set`.
-const NAMES: [&str; 22] = [
+const NAMES: [&str; 23] = [
     "preset",
     "maxh",
     "minh",
@@ -69,6 +70,7 @@ const NAMES: [&str; 22] = [
     "memory",
     "planes",
     "keep-surface",
+    "keep-small",
     "merge",
     "feature-angle",
     "unit",
@@ -188,6 +190,7 @@ impl Settings {
             "memory" => self.memory = of(value, count)?,
             "planes" => self.planes = of(value, candidates)?,
             "keep-surface" => self.keep_surface = of(value, flag)?,
+            "keep-small" => self.keep_small = of(value, flag)?,
             "merge" => self.merge = of(value, positive)?,
             "feature-angle" => self.feature_angle = of(value, angle)?,
             "unit" => self.unit = of(value, Unit::from_str)?,
@@ -202,6 +205,7 @@ impl Settings {
     pub fn input(&self) -> InputSettings {
         let mut settings = InputSettings {
             keep_surface: self.keep_surface.unwrap_or(false),
+            keep_small: self.keep_small.unwrap_or(false),
             merge: self.merge,
             unit: self.unit.unwrap_or_default(),
             ..InputSettings::default()

@@ -157,8 +157,8 @@ fn reading(input: &InputOptions, size: &SizeOptions) -> Outputs {
 
 /// Reads the input and prints its notes.
 fn read_geometry(options: &InputOptions, progress: &Progress) -> Result<Geometry, Failure> {
-    let InputOptions { keep_surface, merge, unit, .. } = *options;
-    let mut settings = InputSettings { keep_surface, merge, unit, ..InputSettings::default() };
+    let InputOptions { keep_surface, keep_small, merge, unit, .. } = *options;
+    let mut settings = InputSettings { keep_surface, keep_small, merge, unit, ..InputSettings::default() };
     if let Some(degrees) = options.feature_angle {
         settings.facets.feature_angle = degrees.to_radians();
     }

@@ -133,6 +133,10 @@ pub struct InputOptions {
     /// Keep the triangles of input surfaces; by default they are remeshed
     #[arg(long)]
     pub keep_surface: bool,
+    /// Keep edges and faces of CAD files that are far smaller than the elements; by default they
+    /// are merged into their neighbours, with a note
+    #[arg(long)]
+    pub keep_small: bool,
     /// Take surfaces of a .geo file that are of one kind and at most this far apart as one surface
     /// (length) [default: 1e-8 of the size of the geometry]
     #[arg(long, value_name = "LENGTH", value_parser = positive)]

@@ -27,6 +27,7 @@ mod second_order;
 mod signals;
 mod sizes;
 mod skins;
+mod small_faces;
 mod swept;
 mod tutorials;
 mod view;

@@ -32,6 +32,7 @@ pub struct Geometry {
 #[pyo3(from_item_all)]
 struct Input {
     keep_surface: bool,
+    keep_small: bool,
     merge: Option<f64>,
     /// Degrees.
     feature_angle: Option<f64>,
@@ -43,6 +44,7 @@ impl Input {
     fn settings(&self) -> InputSettings {
         let mut settings = InputSettings {
             keep_surface: self.keep_surface,
+            keep_small: self.keep_small,
             merge: self.merge,
             unit: self.unit.parse().unwrap_or_default(),
             ..InputSettings::default()

@@ -1,7 +1,7 @@
 //! A coarse mesh and its statistics.
 
 use crate::ground::mesh::{Mesh, QualitySummary};
-use crate::mesher::facets::SharpPlaces;
+use crate::mesher::facets::{MergedSmall, SharpPlaces};
 use crate::mesher::model::CsgModel;
 use crate::mesher::surface::closeness::ThinRegions;
 use crate::parallel::refine::EdgeDisplacements;
@@ -47,6 +47,8 @@ pub struct CoarseReport {
     pub cut_cusps: Vec<CutCusp>,
     /// Places where the triangles of the input are sharper than 10°.
     pub sharp_places: SharpPlaces,
+    /// Faces and edges of a CAD file that were merged because they are smaller than the elements.
+    pub merged_small: MergedSmall,
 }
 
 /// A cusp without angle that was cut off bodies.

@@ -17,7 +17,7 @@ use crate::ground::projector::{BrepProjector, Projector};
 use crate::ground::size::{Accuracy, Closeness, SizeField, SizeSettings, Source, WatchedSize};
 use crate::mesher::facets::{
     Crossing, FacetBodies, FacetError, FacetModel, FacetPatch, FacetSize, FacetSmoothness, Facets, Marks,
-    RemeshSettings, SharpPlaces, keep, of_brep, remesh,
+    MergedSmall, RemeshSettings, SharpPlaces, Small, keep, merge, of_brep, remesh,
 };
 use crate::mesher::improve::Smoothness;
 use crate::mesher::smoothness::BrepSmoothness;
@@ -27,6 +27,7 @@ use csg::{BodyId, CornerId, CurveId, PatchId};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::sync::Arc;
 
 /// Solids bounded by facets, with the names in their files.
 #[derive(Clone, Debug)]
@@ -44,8 +45,17 @@ pub struct FacetSolid {
     pub keep_surface: bool,
     /// The exact faces and edges that the facets approximate, if there are any.
     pub exact: Option<BrepProjector>,
+    /// The model that they come from, unless its small faces and edges are kept.
+    cad: Option<Arc<Cad>>,
     /// The names of the surfaces, for messages.
     files: Vec<String>,
+}
+
+/// A boundary representation with its tessellation.
+#[derive(Debug)]
+struct Cad {
+    model: brep::Model,
+    tessellation: brep::Tessellation,
 }
 
 impl FacetSolid {
@@ -120,7 +130,7 @@ impl FacetSolid {
         let kept_edges = edges.copied().collect();
         let kept_points = surfaces.into_iter().flat_map(|surface| surface.loose_points).collect();
         let (keep_surface, files) = (settings.keep_surface, stems.to_vec());
-        Ok(Self { model, names, kept_points, kept_edges, keep_surface, exact: None, files })
+        Ok(Self { model, names, kept_points, kept_edges, keep_surface, exact: None, cad: None, files })
     }
 
     /// Projection to patches and curves. Kept facets need none, because points between those of a
@@ -148,12 +158,13 @@ impl FacetSolid {
     /// Shapes that cannot be meshed, with the location.
     pub fn of_brep(
         path: &Path,
-        mut brep: brep::Model,
+        brep: brep::Model,
         settings: &InputSettings,
         note: &mut dyn FnMut(&str),
     ) -> Result<Self, Error> {
         let refuse = |error| Error::Brep { path: path.to_path_buf(), error: Box::new(error) };
-        let (model, exact) = tessellated(&mut brep).map_err(refuse)?;
+        let (cad, (model, exact)) = tessellated(brep).map_err(refuse)?;
+        let brep = &cad.model;
         brep.notes.iter().for_each(|text| note(&format!("{}: {text}", path.display())));
         model
             .bounds
@@ -172,8 +183,33 @@ impl FacetSolid {
             kept_edges: Vec::new(),
             keep_surface: settings.keep_surface,
             exact: Some(exact),
+            cad: (!settings.keep_small && !settings.keep_surface).then(|| Arc::new(cad)),
             files: vec![path.display().to_string()],
         })
+    }
+
+    /// Merges edges and faces of a CAD file that are small beside the elements into their
+    /// neighbours; `None` for the solid if there are none. Elements are as large as the sizes, but
+    /// at most `largest`, and are divided into `pieces` along each edge.
+    pub(super) fn merge_small(
+        &self,
+        settings: &SizeSettings,
+        largest: f64,
+        pieces: u32,
+    ) -> (Option<Self>, MergedSmall) {
+        let Some(cad) = &self.cad else { return (None, MergedSmall::default()) };
+        let factor = f64::max(SMALL, SMALL_IN_PIECES * f64::from(pieces));
+        let size = |model: &FacetModel| -> Box<dyn SizeField> {
+            Box::new(AtMost(FacetSize::with_accuracy(model, settings, Accuracy::Fine), largest))
+        };
+        let (merged, report) = merge(&cad.model, &cad.tessellation, &Small { factor, size: &size });
+        let solid = merged.map(|(model, exact, grouping)| {
+            let label = |faces: &Vec<usize>| self.names.patches[faces[0]].clone();
+            let patches = grouping.patches.iter().map(label).collect();
+            let names = Names { bodies: self.names.bodies.clone(), patches };
+            Self { model, exact: Some(exact), names, ..self.clone() }
+        });
+        (solid, report)
     }
 
     /// Moves the vertices of a surface mesh from the facets onto the exact faces and edges.
@@ -348,25 +384,42 @@ fn labels(given: &[Option<String>], count: usize, other: impl Fn(usize) -> Strin
     (1..=count).map(|i| Label::new(i as u32, name(i))).collect()
 }
 
+/// Faces and edges are small if the elements are at least this many times as large. Merging moves
+/// the boundary of a patch by the width of the face: less than the surface error of curved parts.
+const SMALL: f64 = 20.0;
+
+/// The same for the subdivisions of elements, whose vertices must not meet both sides of a step.
+const SMALL_IN_PIECES: f64 = 4.0;
+
+/// A size field with an upper bound.
+struct AtMost(FacetSize, f64);
+
+impl SizeField for AtMost {
+    fn size_at(&self, point: &Point) -> f64 {
+        self.0.size_at(point).min(self.1)
+    }
+}
+
 /// How often a tessellation is made finer because its triangles intersect.
 const FINER: i32 = 3;
 
 /// Facets that approximate a boundary representation, so fine that those of close faces do not
 /// intersect, unless the faces do.
-fn tessellated(brep: &mut brep::Model) -> Result<(FacetModel, BrepProjector), brep::BrepError> {
+fn tessellated(mut model: brep::Model) -> Result<(Cad, (FacetModel, BrepProjector)), brep::BrepError> {
     let initial = brep::Settings::default();
     let mut coarsest = None;
     for k in 0..FINER {
         let settings =
             brep::Settings { chord: initial.chord * 0.1_f64.powi(k), angle: initial.angle * 0.5_f64.powi(k) };
-        let tessellation = brep::Tessellation::of(brep, &settings)?;
-        let made = of_brep(brep, &tessellation);
+        let tessellation = brep::Tessellation::of(&mut model, &settings)?;
+        let made = of_brep(&model, &tessellation);
         if !made.0.intersections().iter().any(|crossing| made.0.is_deep(crossing)) {
-            return Ok(made);
+            return Ok((Cad { model, tessellation }, made));
         }
-        coarsest.get_or_insert(made);
+        coarsest.get_or_insert((tessellation, made));
     }
-    Ok(coarsest.expect("the first of several"))
+    let (tessellation, made) = coarsest.expect("the first of several");
+    Ok((Cad { model, tessellation }, made))
 }
 
 fn facets_of(surface: &Surface) -> Facets {

@@ -12,6 +12,9 @@ pub struct InputSettings {
     pub facets: facets::Settings,
     /// Whether the triangles of surfaces are kept; else the surface is remeshed by the size field.
     pub keep_surface: bool,
+    /// Whether edges and faces of CAD files that are small beside the elements bound the elements;
+    /// else they are merged into their neighbours.
+    pub keep_small: bool,
     /// Surfaces of a `.geo` file that are of one kind and at most this far apart (length) are taken
     /// as one; by default 10⁻⁸ of the size of the geometry.
     pub merge: Option<f64>,

@@ -8,6 +8,7 @@ mod close;
 mod trace;
 
 pub(crate) use close::close;
+pub(crate) use trace::Loop;
 
 use crate::bspline::{Basis, SplineCurve};
 use crate::model::{Fin, On};

@@ -15,10 +15,11 @@ mod units;
 
 pub use units::Unit;
 
-use crate::chart::{Chart, Side, close};
+use crate::chart::{Chart, Loop, Side, close};
 use crate::model::{Fin, Model, On, Patch};
 use crate::tessellate::diagonal;
-use crate::{BrepError, Surface};
+use crate::{BrepError, EdgeCurve, Surface};
+use rayon::prelude::*;
 use topology::{Face, Shapes, reversed};
 
 /// Reads the solids of a file.
@@ -54,10 +55,15 @@ fn build(model: &mut Model, mut shapes: Shapes) -> Result<(), BrepError> {
     glue::glue_edges(&mut shapes, size);
     (model.corners, model.curves) = (std::mem::take(&mut shapes.corners), std::mem::take(&mut shapes.curves));
     let mut names = Vec::new();
-    for (number, face) in shapes.faces.into_iter().enumerate() {
+    // On all threads: the steps along edges take most of the time.
+    let follow = |(number, face): (usize, &Face)| {
+        (!face.surface.is_plane()).then(|| followed(&model.curves, number, &face.surface, &face.loops, size))
+    };
+    let followed: Vec<_> = shapes.faces.par_iter().enumerate().map(follow).collect();
+    for ((number, face), followed) in shapes.faces.into_iter().enumerate().zip(followed) {
         names.push(face.name.clone());
         let id = face.id;
-        let patch = patch(model, number, face, size).map_err(|error| match error {
+        let patch = patch(model, number, face, followed, size).map_err(|error| match error {
             BrepError::Face { face, what, place } => {
                 BrepError::Face { face, what: format!("{what} (#{id})"), place }
             }
@@ -76,9 +82,16 @@ fn build(model: &mut Model, mut shapes: Shapes) -> Result<(), BrepError> {
 /// Surfaces that differ by at most this (fraction of the diagonal) are one.
 const SAME: f64 = 1e-6;
 
-fn patch(model: &mut Model, number: usize, face: Face, size: f64) -> Result<Patch, BrepError> {
+/// Makes the patch of a face whose loops were followed on its surface; those of planes need not be.
+fn patch(
+    model: &mut Model,
+    number: usize,
+    face: Face,
+    along: Option<Result<Vec<Loop>, BrepError>>,
+    size: f64,
+) -> Result<Patch, BrepError> {
     let bodies = if face.is_behind { [Some(face.body), None] } else { [None, Some(face.body)] };
-    if face.surface.is_plane() {
+    let Some(along) = along else {
         let fin = |&(curve, is_forward): &(usize, bool)| Fin {
             on: On::Curve(curve),
             curve: None,
@@ -90,12 +103,15 @@ fn patch(model: &mut Model, number: usize, face: Face, size: f64) -> Result<Patc
             return Err(BrepError::face(number, "it has no edges", None));
         }
         return Ok(Patch { surface: face.surface, loops, bodies });
-    }
+    };
     let surface: Surface = face.surface;
-    let sides = bounded(model, number, &surface, &face.loops, size).or_else(|error| {
+    let given = along.and_then(|along| bounded(model, number, &surface, along, &face.loops, size));
+    let sides = given.or_else(|error| {
         // Some programs write loops of left-handed surfaces the wrong way around.
         let other: Vec<_> = face.loops.iter().map(|edges| reversed(edges.clone())).collect();
-        bounded(model, number, &surface, &other, size).map_err(|_| error)
+        followed(&model.curves, number, &surface, &other, size)
+            .and_then(|along| bounded(model, number, &surface, along, &other, size))
+            .map_err(|_| error)
     })?;
     let fins = |sides: Vec<Side>| -> Result<Vec<Fin>, BrepError> {
         let all: Result<Vec<Fin>, String> = sides.into_iter().map(Side::fin).collect();
@@ -105,23 +121,32 @@ fn patch(model: &mut Model, number: usize, face: Face, size: f64) -> Result<Patc
     Ok(Patch { surface, loops, bodies })
 }
 
-/// Loops of edges in the parameters of a surface, joined so that they bound an area.
-fn bounded(
-    model: &mut Model,
+/// Loops of edges in the parameters of a surface.
+fn followed(
+    curves: &[EdgeCurve],
     number: usize,
     surface: &Surface,
     loops: &[Vec<(usize, bool)>],
     size: f64,
-) -> Result<Vec<Vec<Side>>, BrepError> {
+) -> Result<Vec<Loop>, BrepError> {
     let chart = Chart::new(surface, size);
-    let mut followed = Vec::new();
-    for edges in loops {
-        let one = chart.follow(number, &model.curves, edges)?;
+    loops.iter().map(|edges| chart.follow(number, curves, edges)).collect()
+}
+
+/// Joins loops in the parameters of a surface so that they bound an area.
+fn bounded(
+    model: &mut Model,
+    number: usize,
+    surface: &Surface,
+    along: Vec<Loop>,
+    loops: &[Vec<(usize, bool)>],
+    size: f64,
+) -> Result<Vec<Vec<Side>>, BrepError> {
+    for (one, edges) in along.iter().zip(loops) {
         for &(curve, _) in edges {
             let edge = &mut model.curves[curve];
             edge.tolerance = edge.tolerance.max(one.gap);
         }
-        followed.push(one);
     }
-    close(&chart, number, model, followed)
+    close(&Chart::new(surface, size), number, model, along)
 }

@@ -15,20 +15,24 @@ pub(super) type Chain = Vec<([f64; 2], u32)>;
 /// A loop side by side. Each side ends before the first point of the next.
 pub(super) type Sides = Vec<Chain>;
 
-/// The points of a loop, each once.
+/// The points of a loop, each once, and the largest distance between a side and its curve.
 pub(super) fn chain(
     model: &Model,
     number: usize,
     fins: &[Fin],
-    out: &mut Tessellation,
+    out: &Tessellation,
     tolerances: &Tolerances,
-) -> Result<Sides, BrepError> {
+) -> Result<(Sides, f64), BrepError> {
     let patch = &model.patches[number];
-    let mut sides: Vec<Chain> = Vec::new();
+    let (mut sides, mut most_gap): (Vec<Chain>, f64) = (Vec::new(), 0.0);
     for fin in fins {
         let mut side: Chain = match fin.on {
             On::Corner(corner) => at_pole(fin, corner as u32),
-            On::Curve(curve) => on_curve(model, number, fin, curve, out, tolerances)?,
+            On::Curve(curve) => {
+                let (side, gap) = on_curve(model, number, fin, curve, out, tolerances)?;
+                most_gap = most_gap.max(gap);
+                side
+            }
         };
         if !fin.is_forward {
             side.reverse();
@@ -67,7 +71,7 @@ pub(super) fn chain(
             out_sides.push((0..AT_POLE).map(|i| at(i as f64 / AT_POLE as f64)).collect());
         }
     }
-    Ok(out_sides)
+    Ok((out_sides, most_gap))
 }
 
 fn at_pole(fin: &Fin, vertex: u32) -> Chain {
@@ -89,15 +93,15 @@ fn on_curve(
     number: usize,
     fin: &Fin,
     curve: usize,
-    out: &mut Tessellation,
+    out: &Tessellation,
     tolerances: &Tolerances,
-) -> Result<Chain, BrepError> {
+) -> Result<(Chain, f64), BrepError> {
     let surface = &model.patches[number].surface;
     let edge = &model.curves[curve];
     let most = (20.0 * edge.tolerance).max(1e-5 * tolerances.diagonal);
-    let line = out.lines[curve].clone();
-    let mut side = Chain::new();
-    for (vertex, t) in line {
+    let line = &out.lines[curve];
+    let (mut side, mut most_gap) = (Chain::new(), 0.0_f64);
+    for &(vertex, t) in line {
         let on = Point::from(edge.curve.point(t));
         let mut parameters: [f64; 2] = match &fin.curve {
             None => project_to_surface(surface, &on, [0.0; 2]).parameters,
@@ -114,19 +118,18 @@ fn on_curve(
             let what = format!("edge {} is {gap:.3e} away from it", curve + 1);
             return Err(BrepError::face(number, what, Some(on)));
         }
-        out.gap = out.gap.max(gap).max((surface.point(parameters) - out.points[vertex as usize]).norm());
+        most_gap = most_gap.max(gap).max((surface.point(parameters) - out.points[vertex as usize]).norm());
         side.push((parameters, vertex));
     }
     if fin.curve.is_some() {
-        let line = &out.lines[curve];
         let between = |w: &[(u32, f64)]| {
             let [a, b] = [w[0].1, w[1].1];
             (1..SAMPLES).map(move |k| a + (b - a) * f64::from(k) / f64::from(SAMPLES))
         };
         let gaps = line.windows(2).flat_map(between).map(|t| gap_at(surface, fin, edge, t));
-        out.gap = gaps.fold(out.gap, f64::max);
+        most_gap = gaps.fold(most_gap, f64::max);
     }
-    Ok(side)
+    Ok((side, most_gap))
 }
 
 /// Steps between the vertices of a curve at which its distance from a patch is measured.

@@ -5,9 +5,10 @@ use super::frame::{Frame, Node, pole};
 use super::{Tessellation, Triangle};
 use crate::model::{Model, Patch};
 use crate::{BrepError, Point, Vector};
+use rayon::prelude::*;
+use rustc_hash::{FxHashMap as HashMap, FxHashSet};
 use spade::handles::FixedVertexHandle;
 use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation};
-use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 /// The tolerances of a tessellation.
 pub(super) struct Tolerances {
@@ -39,17 +40,41 @@ const SHORTEST: f64 = 3e-4;
 /// The least distance of a new point from a side, in lengths of the side.
 const ENCROACHED: f64 = 0.05;
 
-/// Triangulates a patch and appends its vertices and triangles.
+/// The triangles of a patch.
+pub(super) struct Made {
+    /// The vertices inside of the patch.
+    points: Vec<Point>,
+    /// A vertex that is not on a curve is its index in `points` plus [`INNER`].
+    triangles: Vec<Triangle>,
+    /// The largest distance between a side and its curve (length).
+    gap: f64,
+}
+
+impl Made {
+    /// Appends the vertices and triangles to those of other patches.
+    pub fn append_to(self, out: &mut Tessellation) {
+        let first = out.points.len() as u32;
+        let id = |vertex: u32| if vertex >= INNER { first + vertex - INNER } else { vertex };
+        out.points.extend(self.points);
+        let numbered = |t: Triangle| Triangle { vertices: t.vertices.map(id), ..t };
+        out.triangles.extend(self.triangles.into_iter().map(numbered));
+        out.gap = out.gap.max(self.gap);
+    }
+}
+
+/// Triangulates a patch; `out` has the vertices on curves.
 pub(super) fn triangulate(
     model: &Model,
     number: usize,
-    out: &mut Tessellation,
+    out: &Tessellation,
     tolerances: &Tolerances,
-) -> Result<(), Failure> {
+) -> Result<Made, Failure> {
     let patch = &model.patches[number];
-    let mut chains = Vec::new();
+    let (mut chains, mut gap) = (Vec::new(), 0.0_f64);
     for fins in &patch.loops {
-        chains.push(chain(model, number, fins, out, tolerances).map_err(Failure::Final)?);
+        let (sides, off) = chain(model, number, fins, out, tolerances).map_err(Failure::Final)?;
+        chains.push(sides);
+        gap = gap.max(off);
     }
     let pole = pole(patch, tolerances.diagonal);
     let frame = Frame::of(&patch.surface, &chains, pole, tolerances.diagonal);
@@ -58,7 +83,7 @@ pub(super) fn triangulate(
         number,
         plane: Plane::new(),
         frame,
-        sides: HashMap::new(),
+        sides: HashMap::default(),
         tolerances,
         vertices: Vec::new(),
     };
@@ -67,7 +92,7 @@ pub(super) fn triangulate(
         face.add_chain(chain, turn, out)?;
     }
     face.refine(out)?;
-    face.finish(out)
+    Ok(face.finish(gap))
 }
 
 /// Sides are curved outward by this fraction of their length. Otherwise rounding makes straight
@@ -91,6 +116,25 @@ type Wanted = (f64, [usize; 2], Point2<f64>, usize);
 
 /// The vertex of a node inside the patch: its index in [`Face::vertices`] is added.
 const INNER: u32 = 1 << 31;
+
+/// The corners of a triangle in the plane: indices of its vertices, and nodes.
+type Corners = [(usize, Node); 3];
+
+/// Errors in units of what is allowed, which do not change while the vertices stay.
+#[derive(Default)]
+struct Errors {
+    edges: HashMap<[usize; 2], f64>,
+    triangles: HashMap<[usize; 3], f64>,
+    /// The normals at vertices; zero at poles.
+    normals: Vec<Option<Vector>>,
+}
+
+/// Fewer errors are measured by one thread: several would take longer.
+const AT_ONCE: usize = 64;
+
+fn middle(a: &Node, b: &Node) -> Point2<f64> {
+    Point2::new(0.5 * (a.scaled.x + b.scaled.x), 0.5 * (a.scaled.y + b.scaled.y))
+}
 
 fn sorted(a: usize, b: usize) -> [usize; 2] {
     [a.min(b), a.max(b)]
@@ -185,7 +229,7 @@ impl Face<'_> {
     }
 
     /// The triangles inside the patch, as nodes.
-    fn triangles(&self) -> Vec<[(usize, Node); 3]> {
+    fn triangles(&self) -> Vec<Corners> {
         let inside = self.inside();
         let of = |face: spade::handles::FaceHandle<
             '_,
@@ -201,9 +245,7 @@ impl Face<'_> {
 
     /// Divides inner edges until the triangles are close to the surface.
     fn refine(&mut self, out: &Tessellation) -> Result<(), Failure> {
-        // Errors of edges and triangles, which do not change while their ends stay.
-        let mut known: HashMap<[usize; 2], f64> = HashMap::new();
-        let mut normals: Vec<Option<Vector>> = Vec::new();
+        let mut known = Errors::default();
         for _ in 0..MOST_ROUNDS {
             let triangles = self.triangles();
             if triangles.is_empty() {
@@ -213,53 +255,9 @@ impl Face<'_> {
                 let what = format!("more than {MOST_TRIANGLES} triangles are needed on it");
                 return Err(Failure::Final(BrepError::face(self.number, what, None)));
             }
-            let mut wanted: Vec<Wanted> = Vec::new();
             let tangled = self.tangled(&triangles);
-            for (index, triangle) in triangles.iter().enumerate() {
-                let nowhere = Point2::new(0.0, 0.0);
-                let mut worst = (0.0, [0; 2], nowhere);
-                let mut longest = (0.0, [0; 2], nowhere);
-                for k in 0..3 {
-                    let ((i, a), (j, b)) = (triangle[(k + 1) % 3], triangle[(k + 2) % 3]);
-                    let key = sorted(i, j);
-                    if self.sides.contains_key(&key) {
-                        continue;
-                    }
-                    let [p, q] = [a.scaled, b.scaled];
-                    let middle = Point2::new(0.5 * (p.x + q.x), 0.5 * (p.y + q.y));
-                    let error = match known.get(&key) {
-                        Some(&error) => error,
-                        None => {
-                            let error = self.edge_error((i, &a), (j, &b), middle, &mut normals, out);
-                            known.insert(key, error);
-                            error
-                        }
-                    };
-                    let error = if tangled.contains(&key) { error.max(2.0) } else { error };
-                    let length = a.scaled.distance_2(b.scaled);
-                    if error > worst.0 {
-                        worst = (error, key, middle);
-                    }
-                    if length > longest.0 {
-                        longest = (length, key, middle);
-                    }
-                }
-                if worst.0 <= 1.0 {
-                    let error = self.triangle_error(triangle, out);
-                    if error > 1.0 {
-                        if longest.0 > 0.0 {
-                            worst = (error, longest.1, longest.2);
-                        } else {
-                            let [x, y] = [|n: &Node| n.scaled.x, |n: &Node| n.scaled.y]
-                                .map(|of| triangle.iter().map(|n| of(&n.1)).sum::<f64>() / 3.0);
-                            worst = (error, [usize::MAX, index], Point2::new(x, y));
-                        }
-                    }
-                }
-                if worst.0 > 1.0 {
-                    wanted.push((worst.0, worst.1, worst.2, index));
-                }
-            }
+            self.measure(&triangles, &mut known, out);
+            let wanted = self.wanted(&triangles, &known, &tangled);
             if self.insert(wanted, &triangles) == 0 {
                 return Ok(());
             }
@@ -271,11 +269,116 @@ impl Face<'_> {
         )))
     }
 
+    /// The corners at both ends of the side of a triangle that is opposite corner `k`.
+    fn side(triangle: &Corners, k: usize) -> [(usize, Node); 2] {
+        let [a, b] = [triangle[(k + 1) % 3], triangle[(k + 2) % 3]];
+        if a.0 < b.0 { [a, b] } else { [b, a] }
+    }
+
+    /// Measures the errors that are not known yet, on all threads: first those of edges, then those
+    /// of triangles whose edges are fine.
+    fn measure(&self, triangles: &[Corners], known: &mut Errors, out: &Tessellation) {
+        if self.patch.surface.is_plane() {
+            return;
+        }
+        known.normals.resize(self.plane.num_vertices(), None);
+        let mut edges: Vec<[(usize, Node); 2]> = Vec::new();
+        let mut nodes: Vec<(usize, Node)> = Vec::new();
+        for triangle in triangles {
+            for k in 0..3 {
+                let [a, b] = Self::side(triangle, k);
+                let key = [a.0, b.0];
+                if self.sides.contains_key(&key) || known.edges.contains_key(&key) {
+                    continue;
+                }
+                // A placeholder, so that the triangle on the other side does not add it again.
+                known.edges.insert(key, f64::NAN);
+                edges.push([a, b]);
+                for node in [a, b] {
+                    if known.normals[node.0].is_none() {
+                        known.normals[node.0] = Some(Vector::zeros());
+                        nodes.push(node);
+                    }
+                }
+            }
+        }
+        let normal = |node: &(usize, Node)| {
+            let [u, v] = node.1.parameters;
+            self.patch.surface.jet(u, v, 1).normal().unwrap_or_else(Vector::zeros)
+        };
+        let found: Vec<Vector> = nodes.par_iter().with_min_len(AT_ONCE).map(normal).collect();
+        for (node, normal) in nodes.iter().zip(found) {
+            known.normals[node.0] = Some(normal);
+        }
+        let normals = &known.normals;
+        let error = |ends: &[(usize, Node); 2]| self.edge_error(ends, normals, out);
+        let found: Vec<f64> = edges.par_iter().with_min_len(AT_ONCE).map(error).collect();
+        for ([a, b], error) in edges.iter().zip(found) {
+            known.edges.insert([a.0, b.0], error);
+        }
+        let is_fine = |triangle: &Corners| {
+            let is_fine = |k| {
+                let [a, b] = Self::side(triangle, k);
+                known.edges.get(&[a.0, b.0]).is_none_or(|error| *error <= 1.0)
+            };
+            (0..3).all(is_fine) && !known.triangles.contains_key(&triangle.map(|(i, _)| i))
+        };
+        let new: Vec<&Corners> = triangles.iter().filter(|triangle| is_fine(triangle)).collect();
+        let error = |triangle: &&Corners| self.triangle_error(triangle, out);
+        let found: Vec<f64> = new.par_iter().with_min_len(AT_ONCE).map(error).collect();
+        for (triangle, error) in new.into_iter().zip(found) {
+            known.triangles.insert(triangle.map(|(i, _)| i), error);
+        }
+    }
+
+    /// The points that would lower errors above 1: at most one for each triangle.
+    fn wanted(&self, triangles: &[Corners], known: &Errors, tangled: &FxHashSet<[usize; 2]>) -> Vec<Wanted> {
+        let mut wanted: Vec<Wanted> = Vec::new();
+        for (index, triangle) in triangles.iter().enumerate() {
+            let nowhere = Point2::new(0.0, 0.0);
+            let mut worst = (0.0, [0; 2], nowhere);
+            let mut longest = (0.0, [0; 2], nowhere);
+            for k in 0..3 {
+                let [(i, a), (j, b)] = Self::side(triangle, k);
+                let key = [i, j];
+                if self.sides.contains_key(&key) {
+                    continue;
+                }
+                let middle = middle(&a, &b);
+                let error = known.edges.get(&key).copied().unwrap_or(0.0);
+                let error = if tangled.contains(&key) { error.max(2.0) } else { error };
+                let length = a.scaled.distance_2(b.scaled);
+                if error > worst.0 {
+                    worst = (error, key, middle);
+                }
+                if length > longest.0 {
+                    longest = (length, key, middle);
+                }
+            }
+            if worst.0 <= 1.0 {
+                let error = known.triangles.get(&triangle.map(|(i, _)| i)).copied().unwrap_or(0.0);
+                if error > 1.0 {
+                    if longest.0 > 0.0 {
+                        worst = (error, longest.1, longest.2);
+                    } else {
+                        let [x, y] = [|n: &Node| n.scaled.x, |n: &Node| n.scaled.y]
+                            .map(|of| triangle.iter().map(|n| of(&n.1)).sum::<f64>() / 3.0);
+                        worst = (error, [usize::MAX, index], Point2::new(x, y));
+                    }
+                }
+            }
+            if worst.0 > 1.0 {
+                wanted.push((worst.0, worst.1, worst.2, index));
+            }
+        }
+        wanted
+    }
+
     /// Inserts the wanted points, at most one in each triangle, and returns their number.
-    fn insert(&mut self, mut wanted: Vec<Wanted>, triangles: &[[(usize, Node); 3]]) -> usize {
+    fn insert(&mut self, mut wanted: Vec<Wanted>, triangles: &[Corners]) -> usize {
         let before = self.vertices.len();
         wanted.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)).then(a.3.cmp(&b.3)));
-        let mut beside: HashMap<[usize; 2], [usize; 2]> = HashMap::new();
+        let mut beside: HashMap<[usize; 2], [usize; 2]> = HashMap::default();
         for (index, triangle) in triangles.iter().enumerate() {
             for k in 0..3 {
                 let key = sorted(triangle[k].0, triangle[(k + 1) % 3].0);
@@ -306,7 +409,7 @@ impl Face<'_> {
 
     /// Whether a point is so near to a side of the patch that the triangle between them would be
     /// thin. Sides are not divided, so no number of such points makes the triangles finer there.
-    fn encroaches(&self, point: Point2<f64>, triangle: &[(usize, Node); 3]) -> bool {
+    fn encroaches(&self, point: Point2<f64>, triangle: &Corners) -> bool {
         (0..3).any(|k| {
             let ((i, a), (j, b)) = (triangle[k], triangle[(k + 1) % 3]);
             let (x, y) = (b.scaled.x - a.scaled.x, b.scaled.y - a.scaled.y);
@@ -318,40 +421,26 @@ impl Face<'_> {
     /// The error of an edge, in units of what is allowed.
     fn edge_error(
         &self,
-        (i, a): (usize, &Node),
-        (j, b): (usize, &Node),
-        middle: Point2<f64>,
-        normals: &mut Vec<Option<Vector>>,
+        [(i, a), (j, b)]: &[(usize, Node); 2],
+        normals: &[Option<Vector>],
         out: &Tessellation,
     ) -> f64 {
-        if self.patch.surface.is_plane() {
-            return 0.0;
-        }
         let [p, q] = [a, b].map(|n| self.point(n.vertex, out));
-        let on = self.patch.surface.point(self.frame.parameters(middle));
+        let on = self.patch.surface.point(self.frame.parameters(middle(a, b)));
         let along = q - p;
         let share = ((on - p).dot(&along) / along.norm_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
         let off = (on - p - along * share).norm() / self.tolerances.chord;
         if off > 1.0 || along.norm() < SHORTEST * self.tolerances.diagonal {
             return off;
         }
-        normals.resize(normals.len().max(i.max(j) + 1), None);
-        let [m, n] = [(i, a), (j, b)].map(|(i, node)| {
-            *normals[i].get_or_insert_with(|| {
-                let [u, v] = node.parameters;
-                self.patch.surface.jet(u, v, 1).normal().unwrap_or_else(Vector::zeros)
-            })
-        });
+        let [m, n] = [*i, *j].map(|i| normals[i].unwrap_or_else(Vector::zeros));
         let is_pole = m == Vector::zeros() || n == Vector::zeros();
         let turn = if is_pole { 0.0 } else { m.angle(&n) };
         off.max(turn / self.tolerances.angle)
     }
 
     /// The error of a triangle whose edges are fine.
-    fn triangle_error(&self, triangle: &[(usize, Node); 3], out: &Tessellation) -> f64 {
-        if self.patch.surface.is_plane() {
-            return 0.0;
-        }
+    fn triangle_error(&self, triangle: &Corners, out: &Tessellation) -> f64 {
         let corners = self.frame.corners(triangle);
         let mean = |c: usize| corners.iter().map(|p| p[c]).sum::<f64>() / 3.0;
         let jet = self.patch.surface.jet(mean(0), mean(1), 1);
@@ -369,26 +458,28 @@ impl Face<'_> {
 
     /// Inner edges whose ends are those of other edges too: different in parameters, equal in
     /// space.
-    fn tangled(&self, triangles: &[[(usize, Node); 3]]) -> BTreeSet<[usize; 2]> {
-        // Only edges between vertices on curves or at poles can be.
-        let mut uses: BTreeMap<[u32; 2], (usize, BTreeSet<[usize; 2]>)> = BTreeMap::new();
+    fn tangled(&self, triangles: &[Corners]) -> FxHashSet<[usize; 2]> {
+        // Only edges between vertices on curves or at poles can be: by their vertices in space, the
+        // edges in parameters, each with whether it is of a triangle with area.
+        let mut uses: Vec<([u32; 2], [usize; 2], bool)> = Vec::new();
         for triangle in triangles {
             let v = [0, 1, 2].map(|k| triangle[k].1.vertex);
             let is_point = v[0] == v[1] || v[1] == v[2] || v[2] == v[0];
             for k in 0..3 {
                 let (a, b) = (triangle[k], triangle[(k + 1) % 3]);
-                let on_curve = |vertex: u32| vertex < INNER;
-                if !(on_curve(a.1.vertex) || on_curve(b.1.vertex)) {
-                    continue;
+                let [v, w] = [a.1.vertex, b.1.vertex];
+                if v < INNER || w < INNER {
+                    uses.push(([v.min(w), v.max(w)], sorted(a.0, b.0), !is_point));
                 }
-                let key = [a.1.vertex.min(b.1.vertex), a.1.vertex.max(b.1.vertex)];
-                let entry = uses.entry(key).or_default();
-                entry.0 += usize::from(!is_point);
-                entry.1.insert(sorted(a.0, b.0));
             }
         }
-        let mut tangled = BTreeSet::new();
-        for ([v, w], (count, edges)) in uses {
+        uses.sort_unstable();
+        let mut tangled = FxHashSet::default();
+        for of_ends in uses.chunk_by(|a, b| a.0 == b.0) {
+            let [v, w] = of_ends[0].0;
+            let count = of_ends.iter().filter(|used| used.2).count();
+            let mut edges: Vec<[usize; 2]> = of_ends.iter().map(|used| used.1).collect();
+            edges.dedup();
             let on_loops: usize = edges.iter().filter_map(|edge| self.sides.get(edge)).sum();
             let inner = edges.iter().filter(|edge| !self.sides.contains_key(*edge));
             // One triangle on each side of an inner edge, and one inside of a loop.
@@ -401,20 +492,18 @@ impl Face<'_> {
         tangled
     }
 
-    /// Appends the vertices and triangles.
-    fn finish(self, out: &mut Tessellation) -> Result<(), Failure> {
-        let first = out.points.len() as u32;
-        let triangles = self.triangles();
-        let id = |vertex: u32| if vertex >= INNER { first + vertex - INNER } else { vertex };
-        out.points.extend(&self.vertices);
-        for triangle in triangles {
-            let vertices = triangle.map(|(_, node)| id(node.vertex));
+    fn finish(self, gap: f64) -> Made {
+        let of = |triangle: Corners| {
+            let vertices = triangle.map(|(_, node)| node.vertex);
             let [a, b, c] = vertices;
-            if a != b && b != c && c != a {
-                let parameters = self.frame.corners(&triangle);
-                out.triangles.push(Triangle { vertices, patch: self.number as u32, parameters });
-            }
-        }
-        Ok(())
+            let parameters = self.frame.corners(&triangle);
+            (a != b && b != c && c != a).then_some(Triangle {
+                vertices,
+                patch: self.number as u32,
+                parameters,
+            })
+        };
+        let triangles = self.triangles().into_iter().filter_map(of).collect();
+        Made { points: self.vertices, triangles, gap }
     }
 }

@@ -2,6 +2,8 @@
 //!
 //! Each curve is divided once. Each patch is triangulated in its parameters, scaled to lengths, by
 //! a constrained Delaunay triangulation of its loops, and refined at the midpoints of inner edges.
+//! Curves, patches and the errors of their triangles are computed on all threads; the result does
+//! not depend on the number of threads.
 
 mod chain;
 mod curves;
@@ -13,6 +15,7 @@ pub(crate) use curves::diagonal;
 pub use measure::{area, check, volume};
 
 use crate::{BrepError, Model, Point};
+use rayon::prelude::*;
 
 /// How fine a tessellation is.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -71,9 +74,11 @@ impl Tessellation {
         for _ in 0..MOST_RETRIES {
             let mut out = Self::of_curves(model, &chords, settings.angle, diagonal)?;
             let mut conflicts = Vec::new();
-            for patch in 0..model.patches.len() {
-                match face::triangulate(model, patch, &mut out, &tolerances) {
-                    Ok(()) => {}
+            let of_patch = |patch| face::triangulate(model, patch, &out, &tolerances);
+            let made: Vec<_> = (0..model.patches.len()).into_par_iter().map(of_patch).collect();
+            for (patch, made) in made.into_iter().enumerate() {
+                match made {
+                    Ok(made) => made.append_to(&mut out),
                     Err(face::Failure::Crossing(error)) => {
                         conflicts.push(patch);
                         failed = Some(error);
@@ -108,11 +113,16 @@ impl Tessellation {
                 }
             }
         }
-        for (number, (curve, &chord)) in model.curves.iter().zip(chords).enumerate() {
+        let divided = |number: usize| {
+            let (curve, chord) = (&model.curves[number], chords[number]);
             // Finer where loops crossed.
             let angle = angle * (chord / chords[0].max(chord)).sqrt();
-            let parameters = curves::divide(curve, &beside[number], (chord, angle), diagonal)
-                .map_err(|what| BrepError::edge(number, what, Some(model.corners[curve.ends[0]].point)))?;
+            curves::divide(curve, &beside[number], (chord, angle), diagonal)
+                .map_err(|what| BrepError::edge(number, what, Some(model.corners[curve.ends[0]].point)))
+        };
+        let divided: Vec<_> = (0..model.curves.len()).into_par_iter().map(divided).collect();
+        for (curve, parameters) in model.curves.iter().zip(divided) {
+            let parameters = parameters?;
             let last = parameters.len() - 1;
             let mut line = Vec::with_capacity(last + 1);
             for (i, t) in parameters.into_iter().enumerate() {

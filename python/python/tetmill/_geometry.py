@@ -79,13 +79,18 @@ def warn(notes: Iterable[str]) -> None:
 
 
 def _input(
-    keep_surface: bool, merge: float | None, feature_angle: float | None, unit: str = "file"
+    keep_surface: bool,
+    merge: float | None,
+    feature_angle: float | None,
+    unit: str = "file",
+    keep_small: bool = False,
 ) -> dict[str, Any]:
     angle = arguments.length("feature_angle", feature_angle)
     if angle is not None and angle > 180:
         raise ValueError(f"feature_angle cannot be {angle}: expected an angle of at most 180 degrees")
     return {
         "keep_surface": bool(keep_surface),
+        "keep_small": bool(keep_small),
         "merge": arguments.length("merge", merge),
         "feature_angle": angle,
         "unit": arguments.one_of("unit", unit, _UNITS),
@@ -108,6 +113,8 @@ class Geometry:
         feature_angle: Angle between facets that separates two patches of an input surface
             (degrees); by default 40.
         unit: Unit of lengths for a STEP file: "m", "cm", "mm", "um", "km", "in", "ft", or "file".
+        keep_small: Keep edges and faces of CAD files that are far smaller than the elements; by
+            default they are merged into their neighbours, with a warning.
     """
 
     def __init__(
@@ -117,10 +124,11 @@ class Geometry:
         merge: float | None = None,
         feature_angle: float | None = None,
         unit: str = "file",
+        keep_small: bool = False,
     ) -> None:
         if not paths:
             raise TypeError("Geometry needs a file; see also from_text, from_surface and from_mesh")
-        given = _input(keep_surface, merge, feature_angle, unit)
+        given = _input(keep_surface, merge, feature_angle, unit, keep_small)
         files = [os.fspath(path) for path in paths]
         # None in a process that only takes part in the meshing.
         self._native: _native.Geometry | None = _native.Geometry.from_files(files, given)

@@ -3,8 +3,9 @@
 use crate::ground::kernel::nearest::{at, in_segment, in_triangle};
 use crate::ground::kernel::tree::{Tree, bounds};
 use crate::{Point, Vector};
-use brep::{Curve, Surface, Tessellation, project_to_curve, project_to_surface};
+use brep::{Curve, On, Surface, Tessellation, project_to_curve, project_to_surface};
 use csg::{CurveId, PatchId, ProjectionFailed};
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 /// Faces and edges, each with triangles or segments from which searches for nearest points start.
@@ -13,19 +14,29 @@ use serde::{Deserialize, Serialize};
 /// nearest point of the face and not of another part of its surface. The result depends only on the
 /// point and the entity, bit by bit, on all ranks and threads. Beyond its edges a face continues
 /// along its surface: the chord of an edge that bends into its face is outside of the face.
+///
+/// A patch may have several faces, and a curve several edges: a point is then projected to the
+/// nearest of them.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct BrepProjector {
     source: Source,
-    patches: Vec<Triangles>,
-    curves: Vec<Segments>,
+    faces: Vec<Triangles>,
+    edges: Vec<Segments>,
+    /// Whether each patch is plane, and each curve straight.
+    is_flat: Vec<bool>,
+    is_straight: Vec<bool>,
 }
 
 /// The data of a projector, which is also what ranks exchange.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 struct Source {
     points: Vec<[f64; 3]>,
-    surfaces: Vec<Face>,
-    curves: Vec<Edge>,
+    faces: Vec<Face>,
+    edges: Vec<Edge>,
+    /// The faces of each patch.
+    patches: Vec<Vec<u32>>,
+    /// The edges of each curve.
+    curves: Vec<Vec<u32>>,
     tolerance: f64,
 }
 
@@ -36,6 +47,8 @@ struct Face {
     is_reversed: bool,
     /// Vertices and parameters of its triangles.
     triangles: Vec<([u32; 3], [[f64; 2]; 3])>,
+    /// Points of the face are at most this far from its triangles (length).
+    sag: f64,
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -43,6 +56,8 @@ struct Edge {
     curve: Curve<3>,
     /// Vertices with their parameters.
     line: Vec<(u32, f64)>,
+    /// Whether elements are too large to follow it.
+    is_short: bool,
 }
 
 /// The triangles of a face.
@@ -65,17 +80,25 @@ const ON_SURFACE: f64 = 1e-12;
 const COORDINATE_ROUNDING: f64 = 4.0 * f64::EPSILON;
 /// Edges are sampled where they leave their faces; between samples they may be further away.
 const GAP_ROOM: f64 = 1.5;
+/// The same for the distance of faces from their triangles.
+const SAG_ROOM: f64 = 1.5;
+/// Composite patches are flat and curves straight up to this fraction of the tolerance.
+const ON_PLANE: f64 = 0.25;
 
 impl BrepProjector {
-    /// The faces of a model with its tessellation, and those of its edges that are `curves`;
-    /// `is_reversed` says which faces have normals against those of their surfaces.
+    /// The faces of a model with its tessellation, grouped by patch, and its edges by curve.
+    ///
+    /// `is_reversed` says which faces have normals against those of their surfaces, and `is_short`
+    /// which edges elements are too large to follow.
     pub fn new(
         model: &brep::Model,
         tessellation: &Tessellation,
         is_reversed: &[bool],
-        curves: &[usize],
+        patches: &[Vec<usize>],
+        curves: &[Vec<(usize, bool)>],
+        is_short: &[bool],
     ) -> Self {
-        let mut surfaces: Vec<Face> = model
+        let mut faces: Vec<Face> = model
             .patches
             .iter()
             .zip(is_reversed)
@@ -83,20 +106,35 @@ impl BrepProjector {
                 surface: patch.surface.clone(),
                 is_reversed,
                 triangles: Vec::new(),
+                sag: 0.0,
             })
             .collect();
         for t in &tessellation.triangles {
-            surfaces[t.patch as usize].triangles.push((t.vertices, t.parameters));
+            faces[t.patch as usize].triangles.push((t.vertices, t.parameters));
         }
-        let edge =
-            |&c: &usize| Edge { curve: model.curves[c].curve.clone(), line: tessellation.lines[c].clone() };
+        // Only composite patches choose between faces.
+        for &face in patches.iter().filter(|faces| faces.len() > 1).flatten() {
+            faces[face].sag = SAG_ROOM * sag(model, tessellation, face, &faces[face]);
+        }
+        let mut edges = Vec::new();
+        let mut number = |&(edge, _): &(usize, bool)| {
+            edges.push(Edge {
+                curve: model.curves[edge].curve.clone(),
+                line: tessellation.lines[edge].clone(),
+                is_short: is_short[edge],
+            });
+            edges.len() as u32 - 1
+        };
+        let curves = curves.iter().map(|chain| chain.iter().map(&mut number).collect()).collect();
         let all = bounds(&tessellation.points);
         let largest = all.min.coords.amax().max(all.max.coords.amax());
         let rounding = f64::max(ON_SURFACE * all.diagonal(), COORDINATE_ROUNDING * largest);
         Self::of(Source {
             points: tessellation.points.iter().map(|&p| p.into()).collect(),
-            surfaces,
-            curves: curves.iter().map(edge).collect(),
+            faces,
+            edges,
+            patches: patches.iter().map(|faces| faces.iter().map(|&face| face as u32).collect()).collect(),
+            curves,
             tolerance: rounding.max(GAP_ROOM * tessellation.gap),
         })
     }
@@ -111,9 +149,36 @@ impl BrepProjector {
             let points: Vec<Point> = edge.line.iter().map(|&(v, _)| point(v)).collect();
             Segments { tree: Tree::new(&points.windows(2).map(bounds).collect::<Vec<_>>()), points }
         };
-        let patches = source.surfaces.iter().map(triangles).collect();
-        let curves = source.curves.iter().map(segments).collect();
-        Self { source, patches, curves }
+        let faces: Vec<Triangles> = source.faces.par_iter().map(triangles).collect();
+        let edges: Vec<Segments> = source.edges.par_iter().map(segments).collect();
+        let is_flat = |members: &Vec<u32>| {
+            let main = &source.faces[members[0] as usize].surface;
+            let on_main = |p: &Point| {
+                (project_to_surface(main, p, [0.0; 2]).point - p).norm() <= ON_PLANE * source.tolerance
+            };
+            let is_on = |&face: &u32| {
+                source.faces[face as usize].surface.is_plane()
+                    && faces[face as usize].corners.iter().flatten().all(on_main)
+            };
+            main.is_plane() && members[1..].iter().all(is_on)
+        };
+        let is_line = |&edge: &u32| matches!(source.edges[edge as usize].curve, Curve::Line { .. });
+        let is_straight = |members: &Vec<u32>| {
+            let ends: Vec<Point> = members
+                .iter()
+                .flat_map(|&edge| {
+                    let points = &edges[edge as usize].points;
+                    [points[0], points[points.len() - 1]]
+                })
+                .collect();
+            let far = |p: &&Point| (*p - ends[0]).norm();
+            let last = ends.iter().max_by(|p, q| far(p).total_cmp(&far(q))).expect("a curve has edges");
+            let is_on = |p: &Point| in_segment(p, &ends[0], last).1.sqrt() <= ON_PLANE * source.tolerance;
+            members.iter().all(is_line) && (members.len() == 1 || ends.iter().all(is_on))
+        };
+        let is_flat = source.patches.iter().map(is_flat).collect();
+        let is_straight = source.curves.iter().map(is_straight).collect();
+        Self { source, faces, edges, is_flat, is_straight }
     }
 
     /// The maximum distance of a projected point from its face or, on an edge, from the faces
@@ -122,22 +187,50 @@ impl BrepProjector {
         self.source.tolerance
     }
 
-    /// The start of a search on a face: the parameters of the nearest point of its triangles.
-    fn start(&self, patch: PatchId, point: &Point) -> [f64; 2] {
-        let Triangles { tree, corners } = &self.patches[patch.index()];
+    /// The point of the triangles of a face nearest to a point, and its parameters.
+    fn nearest(&self, face: u32, point: &Point) -> (Point, [f64; 2]) {
+        let Triangles { tree, corners } = &self.faces[face as usize];
         let squared = |i: u32| {
             let triangle = &corners[i as usize];
             (at(triangle, in_triangle(point, triangle)) - point).norm_squared()
         };
         let (nearest, _) = tree.nearest(point, squared).expect("a face has triangles");
         let weights = in_triangle(point, &corners[nearest as usize]);
-        let parameters = &self.source.surfaces[patch.index()].triangles[nearest as usize].1;
-        [0, 1].map(|i| (0..3).map(|k| weights[k] * parameters[k][i]).sum())
+        let parameters = &self.source.faces[face as usize].triangles[nearest as usize].1;
+        let start = [0, 1].map(|i| (0..3).map(|k| weights[k] * parameters[k][i]).sum());
+        (at(&corners[nearest as usize], weights), start)
     }
 
+    /// The foot on a face.
+    fn foot_on_face(&self, face: u32, point: &Point) -> brep::SurfaceFoot {
+        let (_, start) = self.nearest(face, point);
+        project_to_surface(&self.source.faces[face as usize].surface, point, start)
+    }
+
+    /// The foot on a patch.
     fn foot(&self, patch: PatchId, point: &Point) -> brep::SurfaceFoot {
-        let start = self.start(patch, point);
-        project_to_surface(&self.source.surfaces[patch.index()].surface, point, start)
+        let members = &self.source.patches[patch.index()];
+        if let [face] = members[..] {
+            return self.foot_on_face(face, point);
+        }
+        // The nearest foot that is on its face, or else the foot from the nearest triangle.
+        let mut best: Option<(f64, brep::SurfaceFoot)> = None;
+        let mut nearest: Option<(f64, brep::SurfaceFoot)> = None;
+        for &face in members {
+            let (near, start) = self.nearest(face, point);
+            let foot = project_to_surface(&self.source.faces[face as usize].surface, point, start);
+            let distance = (near - point).norm();
+            if nearest.is_none_or(|(least, _)| distance < least) {
+                nearest = Some((distance, foot));
+            }
+            let room = self.source.faces[face as usize].sag + self.source.tolerance;
+            let is_on = foot.is_converged && (self.nearest(face, &foot.point).0 - foot.point).norm() <= room;
+            let distance = (foot.point - point).norm();
+            if is_on && best.is_none_or(|(least, _)| distance < least) {
+                best = Some((distance, foot));
+            }
+        }
+        best.or(nearest).expect("a patch has faces").1
     }
 
     /// The point of the surface of `patch` nearest to `point`, near the face.
@@ -149,18 +242,18 @@ impl BrepProjector {
         if foot.is_converged { Ok(foot.point) } else { Err(ProjectionFailed(*point)) }
     }
 
-    /// The nearest segment of an edge and the parameter there.
-    fn start_on_curve(&self, curve: CurveId, point: &Point) -> f64 {
-        let Segments { tree, points } = &self.curves[curve.index()];
+    /// The parameter of the nearest point of the segments of an edge.
+    fn start_on_edge(&self, edge: u32, point: &Point) -> f64 {
+        let Segments { tree, points } = &self.edges[edge as usize];
         let on = |i: u32| in_segment(point, &points[i as usize], &points[i as usize + 1]);
         let (nearest, _) = tree.nearest(point, |i| on(i).1).expect("an edge has segments");
-        let line = &self.source.curves[curve.index()].line;
+        let line = &self.source.edges[edge as usize].line;
         let (low, high) = (line[nearest as usize].1, line[nearest as usize + 1].1);
         low + on(nearest).0 * (high - low)
     }
 
-    fn foot_on_curve(&self, curve: CurveId, point: &Point) -> brep::CurveFoot {
-        let edge = &self.source.curves[curve.index()];
+    fn foot_on_edge(&self, number: u32, point: &Point) -> brep::CurveFoot {
+        let edge = &self.source.edges[number as usize];
         let mut range = [edge.line[0].1, edge.line[edge.line.len() - 1].1];
         if let (Some(period), true) =
             (edge.curve.period(), edge.line[0].0 == edge.line[edge.line.len() - 1].0)
@@ -168,7 +261,18 @@ impl BrepProjector {
             // A whole period: its end is no end.
             range = [range[0] - period, range[1] + period];
         }
-        project_to_curve(&edge.curve, range, point, self.start_on_curve(curve, point))
+        project_to_curve(&edge.curve, range, point, self.start_on_edge(number, point))
+    }
+
+    /// The nearest foot on edges; `None` if there are none.
+    fn nearest_foot(&self, edges: impl Iterator<Item = u32>, point: &Point) -> Option<brep::CurveFoot> {
+        let distance = |foot: &brep::CurveFoot| (foot.point - point).norm();
+        edges.map(|edge| self.foot_on_edge(edge, point)).min_by(|a, b| distance(a).total_cmp(&distance(b)))
+    }
+
+    fn foot_on_curve(&self, curve: CurveId, point: &Point) -> brep::CurveFoot {
+        let edges = self.source.curves[curve.index()].iter().copied();
+        self.nearest_foot(edges, point).expect("a curve has edges")
     }
 
     /// The point of `curve` nearest to `point`.
@@ -186,30 +290,38 @@ impl BrepProjector {
     }
 
     /// The unit normal of a patch near a point, away from the body behind it; `None` at poles.
+    ///
+    /// It is that of the main face of a composite patch: elements are too large to follow the
+    /// others.
     pub fn normal(&self, patch: PatchId, near: &Point) -> Option<Vector> {
-        let normal = self.foot(patch, near).normal;
-        let sign = if self.source.surfaces[patch.index()].is_reversed { -1.0 } else { 1.0 };
-        (normal != Vector::zeros()).then(|| normal * sign)
+        let face = self.source.patches[patch.index()][0];
+        let foot = self.foot_on_face(face, near);
+        let sign = if self.source.faces[face as usize].is_reversed { -1.0 } else { 1.0 };
+        (foot.normal != Vector::zeros()).then(|| foot.normal * sign)
     }
 
-    /// The unit tangent of a curve near a point.
+    /// The unit tangent of a curve near a point, in one of its two directions: that of its long
+    /// edges.
     pub fn tangent(&self, curve: CurveId, near: &Point) -> Option<Vector> {
-        Some(self.foot_on_curve(curve, near).tangent).filter(|t| *t != Vector::zeros())
+        let edges = self.source.curves[curve.index()].iter().copied();
+        let long = edges.clone().filter(|&edge| !self.source.edges[edge as usize].is_short);
+        let foot = self.nearest_foot(long, near).or_else(|| self.nearest_foot(edges, near))?;
+        Some(foot.tangent).filter(|t| *t != Vector::zeros())
     }
 
-    /// The name of the kind of a patch's surface.
+    /// The name of the kind of the surface of a patch: that of its main face.
     pub fn kind(&self, patch: PatchId) -> &'static str {
-        self.source.surfaces[patch.index()].surface.kind()
+        self.source.faces[self.source.patches[patch.index()][0] as usize].surface.kind()
     }
 
     /// Whether a patch is plane.
     pub fn is_flat_patch(&self, patch: PatchId) -> bool {
-        self.source.surfaces[patch.index()].surface.is_plane()
+        self.is_flat[patch.index()]
     }
 
     /// Whether a curve is straight.
     pub fn is_straight_curve(&self, curve: CurveId) -> bool {
-        matches!(self.source.curves[curve.index()].curve, Curve::Line { .. })
+        self.is_straight[curve.index()]
     }
 
     /// Encodes the projector for other ranks, as JSON.
@@ -227,6 +339,44 @@ impl BrepProjector {
                 && f.triangles.iter().all(|t| t.0.into_iter().all(exists))
         };
         let edge = |e: &Edge| e.curve.is_sound() && e.line.len() >= 2 && e.line.iter().all(|on| exists(on.0));
-        (source.surfaces.iter().all(face) && source.curves.iter().all(edge)).then(|| Self::of(source))
+        let members = |all: &[Vec<u32>], count: usize| {
+            all.iter().all(|of| !of.is_empty() && of.iter().all(|&i| (i as usize) < count))
+        };
+        let is_sound = source.faces.iter().all(face)
+            && source.edges.iter().all(edge)
+            && members(&source.patches, source.faces.len())
+            && members(&source.curves, source.edges.len());
+        is_sound.then(|| Self::of(source))
     }
+}
+
+/// The largest distance of a face from its triangles that is found at their middles and between the
+/// vertices of its edges.
+fn sag(model: &brep::Model, tessellation: &Tessellation, number: usize, face: &Face) -> f64 {
+    let of_triangle = |(vertices, parameters): &([u32; 3], [[f64; 2]; 3])| {
+        let corners = vertices.map(|v| tessellation.points[v as usize]);
+        let third = 1.0 / 3.0;
+        let middles = [[third, third, third], [0.5, 0.5, 0.0], [0.0, 0.5, 0.5], [0.5, 0.0, 0.5]];
+        let off = |weights: [f64; 3]| {
+            let [u, v] = [0, 1].map(|i| (0..3).map(|k| weights[k] * parameters[k][i]).sum());
+            (face.surface.point([u, v]) - at(&corners, weights)).norm()
+        };
+        middles.into_iter().map(off).fold(0.0, f64::max)
+    };
+    let fins = model.patches[number].loops.iter().flatten();
+    let edges = fins.filter_map(|fin| if let On::Curve(edge) = fin.on { Some(edge) } else { None });
+    let of_edge = |edge: usize| {
+        let off = |w: &[(u32, f64)]| {
+            let [p, q] = [w[0], w[1]].map(|(v, _)| tessellation.points[v as usize]);
+            let middle = Point::from(model.curves[edge].curve.point(0.5 * (w[0].1 + w[1].1)));
+            in_segment(&middle, &p, &q).1.sqrt()
+        };
+        tessellation.lines[edge].windows(2).map(off).fold(0.0, f64::max)
+    };
+    let on_triangles = if face.surface.is_plane() {
+        0.0
+    } else {
+        face.triangles.iter().map(of_triangle).fold(0.0, f64::max)
+    };
+    edges.map(of_edge).fold(on_triangles, f64::max)
 }

@@ -1,13 +1,15 @@
 //! Facets with given patches, curves and corners: those of a boundary representation.
 
+use super::small::Grouping;
 use super::{FacetBody, FacetCurve, FacetModel, FacetPatch};
 use crate::Vector;
 use crate::ground::kernel::tree;
 use crate::ground::mesh::{BoundaryTriangle, VertexId};
 use crate::ground::projector::BrepProjector;
-use crate::ground::projector::facets::{FacetProjector, Source};
+use crate::ground::projector::facets::{FacetProjector, NO_PATCH, Source};
 use brep::{Curve, Model, On, Tessellation};
 use csg::{BodyId, CornerId, PatchId};
+use rayon::prelude::*;
 use std::collections::BTreeSet;
 
 /// The normals on both sides of a seam differ by at most this angle (radians), else it is an edge.
@@ -19,47 +21,98 @@ const STRAIGHT: f64 = 0.05;
 /// Relative rounding of coordinates.
 const ROUNDING: f64 = 1e-15;
 
+/// What the faces, edges and corners of a file are in shape.
+pub(super) struct Shape {
+    /// Whether the normals of each face are against those of its surface.
+    is_reversed: Vec<bool>,
+    /// The triangles, their normals out of `inside`.
+    triangles: Vec<[u32; 3]>,
+    /// The unit normals at their corners.
+    normals: Vec<[Vector; 3]>,
+    /// The edges that are curves.
+    pub curves: Vec<usize>,
+    /// The vertices that are corners, ascending.
+    pub corners: Vec<u32>,
+}
+
+impl Shape {
+    pub fn new(model: &Model, tessellation: &Tessellation) -> Self {
+        // Normals point out of a body rather than out of none, and of two bodies of the lower one.
+        let of = |patch: &brep::Patch| {
+            let [behind, front] = patch.bodies.map(|body| body.unwrap_or(usize::MAX));
+            behind > front
+        };
+        let is_reversed: Vec<bool> = model.patches.iter().map(of).collect();
+        let curves = curves_in_use(model, tessellation);
+        let normals = corner_normals(model, tessellation, &is_reversed);
+        let oriented = |t: &brep::Triangle| {
+            let [a, b, c] = t.vertices;
+            if is_reversed[t.patch as usize] { [b, a, c] } else { [a, b, c] }
+        };
+        let triangles: Vec<[u32; 3]> = tessellation.triangles.iter().map(oriented).collect();
+        let corners = corners(model, &curves, &triangles, &normals);
+        Self { is_reversed, triangles, normals, curves, corners }
+    }
+
+    /// Each face a patch, and each edge a curve.
+    fn ungrouped(&self, model: &Model) -> Grouping {
+        Grouping {
+            patches: (0..model.patches.len()).map(|face| vec![face]).collect(),
+            curves: self.curves.iter().map(|&edge| vec![(edge, true)]).collect(),
+            is_short: vec![false; model.curves.len()],
+            corners: self.corners.clone(),
+        }
+    }
+}
+
 /// Takes the tessellation of a model as facets, and its faces and edges as patches and curves.
 ///
 /// Seams of smooth surfaces are no curves, and a closed edge has a corner only where it has one in
 /// its shape: both come from the parametrisation alone.
 pub fn of_brep(model: &Model, tessellation: &Tessellation) -> (FacetModel, BrepProjector) {
-    let sides: Vec<[Option<usize>; 2]> = model.patches.iter().map(|patch| patch.bodies).collect();
-    // Normals point out of a body rather than out of none, and of two bodies of the lower one.
-    let is_reversed: Vec<bool> = sides
-        .iter()
-        .map(|[behind, front]| behind.map_or(usize::MAX, |b| b) > front.map_or(usize::MAX, |b| b))
-        .collect();
-    let curves = curves_in_use(model, tessellation);
-    let exact = BrepProjector::new(model, tessellation, &is_reversed, &curves);
-    let normals = corner_normals(model, tessellation, &is_reversed);
-    let oriented = |t: &brep::Triangle| {
-        let [a, b, c] = t.vertices;
-        if is_reversed[t.patch as usize] { [b, a, c] } else { [a, b, c] }
-    };
-    let triangles: Vec<[u32; 3]> = tessellation.triangles.iter().map(oriented).collect();
-    let patch_of: Vec<u32> = tessellation.triangles.iter().map(|t| t.patch).collect();
+    let shape = Shape::new(model, tessellation);
+    grouped(model, tessellation, &shape, &shape.ungrouped(model))
+}
 
-    let corners = corners(model, &curves, &triangles, &normals);
+/// The same with groups of faces and edges as patches and curves.
+///
+/// Facets of faces that joined a main face belong to its patch, but have no influence on its shape
+/// and size: points are projected to the facets of the main face alone.
+pub(super) fn grouped(
+    model: &Model,
+    tessellation: &Tessellation,
+    shape: &Shape,
+    grouping: &Grouping,
+) -> (FacetModel, BrepProjector) {
+    let Shape { is_reversed, triangles, normals, .. } = shape;
+    let Grouping { patches: faces_of, curves: edges_of, is_short, .. } = grouping;
+    let exact = BrepProjector::new(model, tessellation, is_reversed, faces_of, edges_of, is_short);
+    let mut patch_of_face = vec![0; model.patches.len()];
+    let mut is_main = vec![false; model.patches.len()];
+    for (patch, faces) in grouping.patches.iter().enumerate() {
+        faces.iter().for_each(|&face| patch_of_face[face] = patch as u32);
+        is_main[faces[0]] = true;
+    }
+    let faces = || tessellation.triangles.iter().map(|t| t.patch as usize);
+    let corners = grouping.corners.clone();
     let facet_curves: Vec<FacetCurve> =
-        curves.iter().map(|&c| facet_curve(model, tessellation, c, &corners)).collect();
+        grouping.curves.iter().map(|edges| facet_curve(model, tessellation, edges, grouping)).collect();
     let ends: BTreeSet<CornerId> = facet_curves.iter().filter_map(|c| c.ends).flatten().collect();
     let is_tip = |i: &usize| !ends.contains(&CornerId::new(*i));
     let tips: Vec<u32> = (0..corners.len()).filter(is_tip).map(|i| corners[i]).collect();
-    let patches = sides
-        .iter()
-        .zip(&is_reversed)
-        .map(|(&[behind, front], &is_reversed)| {
-            let [inside, outside] = if is_reversed { [front, behind] } else { [behind, front] };
-            let body = |b: Option<usize>| b.map(BodyId::new);
-            FacetPatch { inside: body(inside), outside: body(outside), labels: vec![(0, 0)] }
-        })
-        .collect();
+    let patch = |faces: &Vec<usize>| {
+        let [behind, front] = model.patches[faces[0]].bodies;
+        let [inside, outside] = if is_reversed[faces[0]] { [front, behind] } else { [behind, front] };
+        let body = |b: Option<usize>| b.map(BodyId::new);
+        FacetPatch { inside: body(inside), outside: body(outside), labels: vec![(0, 0)] }
+    };
+    let patches: Vec<FacetPatch> = grouping.patches.iter().map(patch).collect();
+    let shaping = |face: usize| if is_main[face] { patch_of_face[face] } else { NO_PATCH };
     let source = Source {
         points: tessellation.points.clone(),
         triangles: triangles.clone(),
-        patch_of: patch_of.clone(),
-        patches: model.patches.len() as u32,
+        patch_of: faces().map(shaping).collect(),
+        patches: patches.len() as u32,
         curves: facet_curves.iter().map(|c| c.vertices.clone()).collect(),
         tips,
     };
@@ -68,8 +121,11 @@ pub fn of_brep(model: &Model, tessellation: &Tessellation) -> (FacetModel, BrepP
         points: tessellation.points.clone(),
         triangles: triangles
             .iter()
-            .zip(&patch_of)
-            .map(|(v, &p)| BoundaryTriangle { vertices: v.map(VertexId), patch: PatchId(p) })
+            .zip(faces())
+            .map(|(v, face)| BoundaryTriangle {
+                vertices: v.map(VertexId),
+                patch: PatchId(patch_of_face[face]),
+            })
             .collect(),
         corners,
         curves: facet_curves,
@@ -77,7 +133,7 @@ pub fn of_brep(model: &Model, tessellation: &Tessellation) -> (FacetModel, BrepP
         bodies: vec![FacetBody { file: 0, number: None }; model.bodies],
         rounding: ROUNDING * bounds.min.coords.amax().max(bounds.max.coords.amax()),
         bounds,
-        projector: FacetProjector::with_normals(source, Some(&normals)),
+        projector: FacetProjector::with_normals(source, Some(normals)),
     };
     (facets, exact)
 }
@@ -97,7 +153,7 @@ fn corner_normals(model: &Model, tessellation: &Tessellation, is_reversed: &[boo
         });
         if is_reversed[t.patch as usize] { [q, p, r] } else { [p, q, r] }
     };
-    tessellation.triangles.iter().map(of).collect()
+    tessellation.triangles.par_iter().map(of).collect()
 }
 
 /// The edges that are curves: all but smooth seams.
@@ -167,9 +223,32 @@ fn has_degenerate_side(model: &Model, corner: usize) -> bool {
     fins.into_iter().any(|fin| fin.on == On::Corner(corner))
 }
 
-fn facet_curve(model: &Model, tessellation: &Tessellation, curve: usize, corners: &[u32]) -> FacetCurve {
-    let vertices = tessellation.lines[curve].iter().map(|&(v, _)| v).collect();
-    let corner = |end: usize| corners.binary_search(&(end as u32)).ok().map(CornerId::new);
-    let [first, last] = model.curves[curve].ends.map(corner);
-    FacetCurve { ends: first.zip(last).map(|(a, b)| [a, b]), vertices }
+/// The curve of a chain of edges.
+fn facet_curve(
+    model: &Model,
+    tessellation: &Tessellation,
+    edges: &[(usize, bool)],
+    grouping: &Grouping,
+) -> FacetCurve {
+    let (mut vertices, mut small) = (Vec::new(), Vec::new());
+    for &(edge, is_forward) in edges {
+        let mut line: Vec<u32> = tessellation.lines[edge].iter().map(|&(v, _)| v).collect();
+        if !is_forward {
+            line.reverse();
+        }
+        small.extend(vec![edges.len() > 1 && grouping.is_short[edge]; line.len() - 1]);
+        // Each edge starts where the last one ends.
+        vertices.pop();
+        vertices.extend(line);
+    }
+    if small.iter().all(|small| *small) {
+        small.fill(false);
+    }
+    let corner = |(edge, is_end): (usize, bool)| {
+        let end = model.curves[edge].ends[usize::from(is_end)] as u32;
+        grouping.corners.binary_search(&end).ok().map(CornerId::new)
+    };
+    let (first, last) = (edges[0], edges[edges.len() - 1]);
+    let ends = corner((first.0, !first.1)).zip(corner(last)).map(|(a, b)| [a, b]);
+    FacetCurve { ends, vertices, small }
 }

@@ -38,6 +38,7 @@ mod samples;
 mod sharp;
 mod sharp_places;
 mod size;
+mod small;
 mod smoothness;
 #[cfg(test)]
 mod tests;
@@ -54,4 +55,5 @@ pub use remesh::deviation;
 pub use remesh::{RemeshReport, RemeshSettings, remesh};
 pub use sharp_places::{SharpPlace, SharpPlaces};
 pub use size::FacetSize;
+pub use small::{Grouping, MergedEdge, MergedFace, MergedSmall, NamedFace, Small, merge};
 pub use smoothness::FacetSmoothness;

@@ -96,6 +96,15 @@ pub struct FacetCurve {
     pub ends: Option<[CornerId; 2]>,
     /// Its points as indices of the model's points; a closed curve ends with its first point.
     pub vertices: Vec<u32>,
+    /// Whether each step is so short that its direction has no influence; empty if none is.
+    pub small: Vec<bool>,
+}
+
+impl FacetCurve {
+    /// Whether the step from point `i` to the next has no influence on sizes and turns.
+    pub fn is_small(&self, i: usize) -> bool {
+        self.small.get(i).copied().unwrap_or(false)
+    }
 }
 
 /// Facets and the bodies, patches, curves and corners found in them.
@@ -220,7 +229,7 @@ fn assemble(joined: Joined, regions: &Regions, found: Found, bounds: Aabb, round
         .map(|chain| {
             let [first, last] = [chain.vertices[0], chain.vertices[chain.vertices.len() - 1]];
             let ends = corner(first).zip(corner(last)).map(|(a, b)| [a, b]);
-            FacetCurve { ends, vertices: chain.vertices }
+            FacetCurve { ends, vertices: chain.vertices, small: Vec::new() }
         })
         .collect();
     let mut on_curve: Vec<CornerId> = curves.iter().filter_map(|c| c.ends).flatten().collect();

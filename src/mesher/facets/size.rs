@@ -4,7 +4,7 @@
 //! patch's normal per length (compare Rusinkiewicz 2004, who fits a tensor to these). Slivers are
 //! ignored, because their neighbours cover the same area.
 
-use super::{FacetModel, close_curves};
+use super::{FacetCurve, FacetModel, close_curves};
 use crate::ground::kernel::simplex::area_vector;
 use crate::ground::projector::facets::normals::SLIVER_HEIGHT;
 use crate::ground::size::{
@@ -146,8 +146,18 @@ fn sample_curves(model: &FacetModel, settings: &SizeSettings, maximum: f64, sour
         let points: Vec<Point> = curve.vertices.iter().map(|&v| model.points[v as usize]).collect();
         let length: f64 = points.windows(2).map(|w| (w[1] - w[0]).norm()).sum();
         let whole = (settings.scale * length / settings.segments_per_curve).max(settings.minh);
-        let curvatures = curvatures(&points, curve.ends.is_none(), SHORT_SIDE * model.rounding);
-        for (i, w) in points.windows(2).enumerate() {
+        // Short edges of a composite curve bend it, but not for the elements.
+        let curvatures = if curve.small.is_empty() {
+            curvatures(&points, curve.ends.is_none(), SHORT_SIDE * model.rounding)
+        } else {
+            let mut all = vec![0.0; points.len()];
+            for run in runs(curve) {
+                let own = curvatures(&points[run.clone()], false, SHORT_SIDE * model.rounding);
+                all[run].iter_mut().zip(own).for_each(|(all, own)| *all = f64::max(*all, own));
+            }
+            all
+        };
+        for (i, w) in points.windows(2).enumerate().filter(|(i, _)| !curve.is_small(*i)) {
             let curvature = curvatures[i].max(curvatures[i + 1]);
             let size = whole.min(size_of_curvature(settings, curvature));
             if size < maximum {
@@ -157,6 +167,13 @@ fn sample_curves(model: &FacetModel, settings: &SizeSettings, maximum: f64, sour
             }
         }
     }
+}
+
+/// The points of a curve between its short edges.
+fn runs(curve: &FacetCurve) -> impl Iterator<Item = std::ops::Range<usize>> {
+    let steps: Vec<usize> = (0..curve.vertices.len() - 1).filter(|&i| !curve.is_small(i)).collect();
+    let runs: Vec<_> = steps.chunk_by(|a, b| b - a == 1).map(|run| run[0]..run[run.len() - 1] + 2).collect();
+    runs.into_iter()
 }
 
 /// The curvature of a polyline at its points, by the circle through the point and two points on

@@ -24,12 +24,15 @@ pub struct FacetProjector {
     tolerance: f64,
 }
 
+/// The patch of triangles that nothing is projected to.
+pub(crate) const NO_PATCH: u32 = u32::MAX;
+
 /// The data of a projector, which is also what ranks exchange.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Source {
     pub points: Vec<Point>,
     pub triangles: Vec<[u32; 3]>,
-    /// The patch of each triangle.
+    /// The patch of each triangle, or [`NO_PATCH`].
     pub patch_of: Vec<u32>,
     pub patches: u32,
     /// The vertices of each curve; a closed curve ends with its first vertex.
@@ -97,7 +100,9 @@ impl FacetProjector {
         let tolerance = f64::max(ON_SURFACE * all.diagonal(), COORDINATE_ROUNDING * largest);
         let mut members: Vec<Vec<u32>> = vec![Vec::new(); source.patches as usize];
         for (t, &patch) in source.patch_of.iter().enumerate() {
-            members[patch as usize].push(t as u32);
+            if patch != NO_PATCH {
+                members[patch as usize].push(t as u32);
+            }
         }
         let patch = |members: &Vec<u32>| {
             let of = |all: &[Vector]| -> Vec<Vector> { members.iter().map(|&t| all[t as usize]).collect() };

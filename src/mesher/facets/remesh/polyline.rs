@@ -24,11 +24,11 @@ impl Polyline {
         let mut lengths = vec![0.0];
         let mut turns = vec![0.0];
         let mut before = None;
-        for w in points.windows(2) {
+        for (i, w) in points.windows(2).enumerate() {
             let step = w[1] - w[0];
             lengths.push(lengths[lengths.len() - 1] + step.norm());
             turns.push(turns[turns.len() - 1]);
-            if step.norm() > SHORT_STEP * model.rounding {
+            if step.norm() > SHORT_STEP * model.rounding && !curve.is_small(i) {
                 let at = turns.len() - 2;
                 turns[at] += before.map_or(0.0, |b: crate::Vector| b.angle(&step));
                 turns[at + 1] = turns[at];

@@ -1,0 +1,131 @@
+//! Which narrow face joins which neighbour.
+
+use super::Layout;
+use crate::Vector;
+use crate::ground::kernel::nearest::in_segment;
+
+/// A main face is at least this many times as wide as a face that joins it: slivers have 10⁻³ of
+/// their neighbours' width, while a tenth is part of the shape.
+const WIDER: f64 = 20.0;
+
+/// The least angle between the main face and the faces beyond the narrow one (radians): tets
+/// between them have no larger one. Beside chamfers and steps it is 90° and more, in thin sheets 0.
+const WEDGE: f64 = 0.35;
+
+/// The cosine of the angle between edges on opposite sides of a narrow face, at least.
+const PARALLEL: f64 = 0.7;
+
+/// Directions between faces turn by less than this where they are taken as smooth (radians).
+const SMOOTH: f64 = 0.1;
+
+/// The face that a narrow one joins.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Joins {
+    Main(usize),
+    /// Only faces with other names in the file would be left.
+    Named,
+    None,
+}
+
+/// The main face that each face joins, if it `may`: first faces beside a main face, then those
+/// beside faces that have joined one, as the corner between three rounded edges.
+pub(super) fn joins(layout: &Layout, may: &[bool]) -> Vec<Joins> {
+    let mut joins = vec![Joins::None; may.len()];
+    loop {
+        let before = joins.clone();
+        for face in (0..may.len()).filter(|&face| may[face] && !matches!(before[face], Joins::Main(_))) {
+            joins[face] = join(layout, face, may, &before);
+        }
+        if joins == before {
+            return joins;
+        }
+    }
+}
+
+/// The best face for one to join; `joins` has those of others.
+fn join(layout: &Layout, face: usize, may: &[bool], joins: &[Joins]) -> Joins {
+    let mut named = false;
+    // Best first: smooth neighbours, then those with the longest common edges.
+    let mut best: Option<(bool, f64, usize)> = None;
+    for (neighbour, common) in neighbours(layout, face) {
+        let main = match joins[neighbour] {
+            Joins::Main(main) => main,
+            _ if may[neighbour] => continue,
+            _ => neighbour,
+        };
+        let is_wide = layout.widths[main] >= WIDER * layout.widths[face];
+        let is_alike = layout.bodies(main) == layout.bodies(face);
+        if !is_wide || !is_alike || !is_open(layout, face, &common) {
+            continue;
+        }
+        if layout.name(face).is_some() && layout.name(face) != layout.name(main) {
+            named = true;
+            continue;
+        }
+        let length: f64 = common.iter().map(|&c| layout.lengths[c]).sum();
+        let is_smooth = is_smooth(layout, &common);
+        // Lengths that differ by rounding are equal: the first face is taken.
+        let is_better = best.is_none_or(|(smooth, longest, _)| {
+            (is_smooth && !smooth) || (is_smooth == smooth && length > (1.0 + 1e-9) * longest)
+        });
+        if is_better {
+            best = Some((is_smooth, length, main));
+        }
+    }
+    match best {
+        Some((_, _, main)) => Joins::Main(main),
+        None if named => Joins::Named,
+        None => Joins::None,
+    }
+}
+
+/// The neighbours over edges that no third face has, with these edges.
+fn neighbours(layout: &Layout, face: usize) -> Vec<(usize, Vec<usize>)> {
+    let mut found: Vec<(usize, Vec<usize>)> = Vec::new();
+    for &edge in &layout.around[face] {
+        let &[a, b] = &layout.faces_of[edge][..] else { continue };
+        let other = if a == face { b } else { a };
+        if other == face {
+            continue;
+        }
+        match found.iter_mut().find(|(known, _)| *known == other) {
+            Some((_, edges)) => edges.push(edge),
+            None => found.push((other, vec![edge])),
+        }
+    }
+    found.sort_unstable();
+    found
+}
+
+/// Whether two faces continue each other across all their common edges.
+fn is_smooth(layout: &Layout, common: &[usize]) -> bool {
+    layout.segments(common).all(|segment| {
+        let into: Vec<Vector> = layout.into_faces(segment).map(|(_, into)| into).collect();
+        matches!(into[..], [a, b] if a.angle(&-b) < SMOOTH)
+    })
+}
+
+/// Whether no face beyond a narrow one would make a wedge with the main face that has these common
+/// edges with it.
+///
+/// Edges across the narrow face, at its ends, join faces that met the main one before.
+fn is_open(layout: &Layout, face: usize, common: &[usize]) -> bool {
+    let dropped: Vec<[u32; 2]> = layout.segments(common).collect();
+    let kept: Vec<usize> = layout.around[face].iter().copied().filter(|c| !common.contains(c)).collect();
+    layout.segments(&kept).all(|segment| {
+        let [p, q] = layout.ends(segment);
+        let middle = nalgebra::center(&p, &q);
+        let distance = |s: &[u32; 2]| {
+            let [a, b] = layout.ends(*s);
+            in_segment(&middle, &a, &b).1
+        };
+        let nearest = dropped.iter().min_by(|s, t| distance(s).total_cmp(&distance(t)));
+        let &nearest = nearest.expect("neighbours have common edges");
+        let [a, b] = layout.ends(nearest);
+        if (b - a).dot(&(q - p)).abs() < PARALLEL * (b - a).norm() * (q - p).norm() {
+            return true;
+        }
+        let beyond = |s: [u32; 2]| layout.into_faces(s).filter(|(other, _)| *other != face);
+        beyond(nearest).all(|(_, main)| beyond(segment).all(|(_, into)| main.angle(&into) >= WEDGE))
+    })
+}

@@ -1,0 +1,274 @@
+//! Groups of faces and edges, chosen by their sizes and the size of the elements.
+
+use super::chains::{Chain, chains};
+use super::faces::{Joins, joins};
+use super::layout::Layout;
+use crate::Point;
+use crate::ground::projector::BrepProjector;
+use crate::ground::size::SizeField;
+use crate::mesher::facets::FacetModel;
+use crate::mesher::facets::exact::{Shape, grouped};
+use brep::{Model, Tessellation};
+use serde::Serialize;
+
+/// Faces of a file as patches, and its edges as curves.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Grouping {
+    /// The faces of each patch, the main face first.
+    pub patches: Vec<Vec<usize>>,
+    /// The edges of each curve in order, each with whether it is used forward.
+    pub curves: Vec<Vec<(usize, bool)>>,
+    /// Whether each edge is so short that its direction has no influence.
+    pub is_short: Vec<bool>,
+    /// The corners that remain, ascending.
+    pub corners: Vec<u32>,
+}
+
+/// What is small.
+pub struct Small<'a> {
+    /// An edge or face is small if elements are at least this many times as large.
+    pub factor: f64,
+    /// The wanted size of elements of a model.
+    pub size: &'a dyn Fn(&FacetModel) -> Box<dyn SizeField>,
+}
+
+/// A narrow face that was merged into a neighbour.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct MergedFace {
+    /// The number of the face.
+    pub face: usize,
+    /// Its name in the file.
+    pub name: Option<String>,
+    /// The number of the face that it is merged into.
+    pub into: usize,
+    /// Its width (length).
+    pub width: f64,
+}
+
+/// A short edge that was merged into a curve.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct MergedEdge {
+    /// The number of the edge.
+    pub edge: usize,
+    /// All edges of the curve.
+    pub curve: Vec<usize>,
+    /// Its length.
+    pub length: f64,
+}
+
+/// A narrow face that was not merged because of its name.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct NamedFace {
+    /// The number of the face.
+    pub face: usize,
+    /// Its name in the file.
+    pub name: String,
+    /// Its width (length).
+    pub width: f64,
+}
+
+/// Faces and edges that are smaller than the elements.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct MergedSmall {
+    /// Faces that were merged.
+    pub faces: Vec<MergedFace>,
+    /// Edges that were merged.
+    pub edges: Vec<MergedEdge>,
+    /// Narrow faces that were not merged because their neighbours have other names.
+    pub named: Vec<NamedFace>,
+}
+
+/// The most faces or edges that a note lists; the report has all.
+const MOST_LISTED: usize = 5;
+
+impl MergedSmall {
+    /// Sentences for the user.
+    pub fn notes(&self) -> Vec<String> {
+        let list = |items: &mut dyn Iterator<Item = String>, count: usize| {
+            let listed: Vec<String> = items.take(MOST_LISTED).collect();
+            let more = if count > MOST_LISTED {
+                format!(" and {} more", count - MOST_LISTED)
+            } else {
+                String::new()
+            };
+            listed.join(", ") + &more
+        };
+        let named = |face: usize, name: Option<&str>| match name {
+            Some(name) => format!("face {face} `{name}`"),
+            None => format!("face {face}"),
+        };
+        let mut notes = Vec::new();
+        if !self.faces.is_empty() {
+            let mut each = self.faces.iter().map(|merged| {
+                let face = named(merged.face, merged.name.as_deref());
+                format!("{face} ({:.1e} wide) into face {}", merged.width, merged.into)
+            });
+            let listed = list(&mut each, self.faces.len());
+            notes.push(format!(
+                "faces far narrower than the elements are merged: {listed} (--keep-small keeps them)"
+            ));
+        }
+        if !self.edges.is_empty() {
+            let mut each = self.edges.iter().map(|merged| {
+                let others = merged.curve.iter().filter(|other| **other != merged.edge);
+                let others: Vec<String> = others.map(usize::to_string).collect();
+                format!("edge {} ({:.1e}) with {}", merged.edge, merged.length, others.join(" and "))
+            });
+            let listed = list(&mut each, self.edges.len());
+            notes.push(format!(
+                "edges far shorter than the elements are joined: {listed} (--keep-small keeps them)"
+            ));
+        }
+        if !self.named.is_empty() {
+            let mut each = self
+                .named
+                .iter()
+                .map(|kept| format!("{} ({:.1e} wide)", named(kept.face, Some(&kept.name)), kept.width));
+            let listed = list(&mut each, self.named.len());
+            notes.push(format!(
+                "narrow faces are kept, with small elements, because their neighbours have other names: {listed}"
+            ));
+        }
+        notes
+    }
+}
+
+/// The longest edge at an end of a short one is at least this many times as long.
+const LONGER: f64 = 20.0;
+
+/// The faces and edges that may be merged.
+struct Allowed {
+    faces: Vec<bool>,
+    edges: Vec<bool>,
+}
+
+impl Allowed {
+    /// Faces and edges far smaller than one of their neighbours.
+    fn of(layout: &Layout) -> Self {
+        let mut longest = vec![0.0_f64; layout.model.corners.len()];
+        for &edge in &layout.curves {
+            for end in layout.model.curves[edge].ends {
+                longest[end] = longest[end].max(layout.lengths[edge]);
+            }
+        }
+        let is_short = |edge: usize| {
+            let ends = layout.model.curves[edge].ends;
+            let neighbour = ends.into_iter().map(|end| longest[end]).fold(0.0, f64::max);
+            ends[0] != ends[1] && LONGER * layout.lengths[edge] <= neighbour
+        };
+        let mut edges = vec![false; layout.lengths.len()];
+        layout.curves.iter().for_each(|&edge| edges[edge] = is_short(edge));
+        let is_narrow = |face: usize| {
+            let beside = layout.around[face].iter().flat_map(|&edge| &layout.faces_of[edge]);
+            let widest = beside.map(|&other| layout.widths[other]).fold(0.0, f64::max);
+            LONGER * layout.widths[face] <= widest
+        };
+        Self { faces: (0..layout.around.len()).map(is_narrow).collect(), edges }
+    }
+}
+
+/// Merges the small faces and edges of a model; `None` if there are none.
+///
+/// What is merged must be small beside the sizes that the model has without it. Merging less never
+/// makes sizes larger, so faces and edges are taken out until all that are left are small.
+pub fn merge(
+    model: &Model,
+    tessellation: &Tessellation,
+    small: &Small,
+) -> (Option<(FacetModel, BrepProjector, Grouping)>, MergedSmall) {
+    let shape = Shape::new(model, tessellation);
+    let layout = Layout::new(model, tessellation, shape.curves.clone(), &shape.corners);
+    let mut allowed = Allowed::of(&layout);
+    loop {
+        if !allowed.faces.iter().chain(&allowed.edges).any(|allowed| *allowed) {
+            return (None, MergedSmall::default());
+        }
+        let joins = joins(&layout, &allowed.faces);
+        let (grouping, chains) = grouping(&layout, &joins, &allowed.edges);
+        let mut report = report(&layout, &joins, &chains, &allowed.edges);
+        let (facets, exact) = grouped(model, tessellation, &shape, &grouping);
+        let size = (small.size)(&facets);
+        // A narrow face lowers the sizes around it: the largest one is that of all others.
+        let largest = tessellation.points.iter().map(|p| size.size_at(p)).fold(0.0, f64::max);
+        report.named.retain(|kept| small.factor * kept.width <= largest);
+        if report.faces.is_empty() && report.edges.is_empty() {
+            return (None, report);
+        }
+        let is_small = |points: Vec<Point>, extent: f64| {
+            points.into_iter().all(|p| small.factor * extent <= size.size_at(&p))
+        };
+        let point = |v: u32| tessellation.points[v as usize];
+        let mut are_all_small = true;
+        for merged in &report.faces {
+            let face = merged.face - 1;
+            let of_face = tessellation.triangles.iter().filter(|t| t.patch as usize == face);
+            if !is_small(of_face.flat_map(|t| t.vertices.map(point)).collect(), merged.width) {
+                (allowed.faces[face], are_all_small) = (false, false);
+            }
+        }
+        for merged in &report.edges {
+            let line = &tessellation.lines[merged.edge - 1];
+            if !is_small(line.iter().map(|on| point(on.0)).collect(), merged.length) {
+                (allowed.edges[merged.edge - 1], are_all_small) = (false, false);
+            }
+        }
+        if are_all_small {
+            return (Some((facets, exact, grouping)), report);
+        }
+    }
+}
+
+fn grouping(layout: &Layout, joins: &[Joins], is_short: &[bool]) -> (Grouping, Vec<Chain>) {
+    let faces = joins.len();
+    let mut patch_of = vec![usize::MAX; faces];
+    let mut patches: Vec<Vec<usize>> = Vec::new();
+    for face in 0..faces {
+        if !matches!(joins[face], Joins::Main(_)) {
+            patch_of[face] = patches.len();
+            patches.push(vec![face]);
+        }
+    }
+    for face in 0..faces {
+        if let Joins::Main(main) = joins[face] {
+            patch_of[face] = patch_of[main];
+            patches[patch_of[main]].push(face);
+        }
+    }
+    let chains = chains(layout, &patch_of, is_short);
+    let mut has_curve = vec![false; layout.is_corner.len()];
+    for &edge in &layout.curves {
+        layout.model.curves[edge].ends.iter().for_each(|&end| has_curve[end] = true);
+    }
+    let mut is_end = vec![false; layout.is_corner.len()];
+    chains.iter().filter_map(|chain| chain.ends).flatten().for_each(|end| is_end[end] = true);
+    // Tips of cones are corners of no curve.
+    let remains = |&corner: &usize| layout.is_corner[corner] && (is_end[corner] || !has_curve[corner]);
+    let corners = (0..layout.is_corner.len()).filter(remains).map(|corner| corner as u32).collect();
+    let curves = chains.iter().map(|chain| chain.edges.clone()).collect();
+    (Grouping { patches, curves, is_short: is_short.to_vec(), corners }, chains)
+}
+
+fn report(layout: &Layout, joins: &[Joins], chains: &[Chain], is_short: &[bool]) -> MergedSmall {
+    let mut out = MergedSmall::default();
+    for (face, joins) in joins.iter().enumerate() {
+        let (name, width) = (layout.name(face).map(str::to_owned), layout.widths[face]);
+        match *joins {
+            Joins::Main(main) => {
+                out.faces.push(MergedFace { face: face + 1, name, into: main + 1, width });
+            }
+            Joins::Named => {
+                out.named.push(NamedFace { face: face + 1, name: name.unwrap_or_default(), width });
+            }
+            Joins::None => {}
+        }
+    }
+    for chain in chains.iter().filter(|chain| chain.edges.len() > 1) {
+        let curve: Vec<usize> = chain.edges.iter().map(|(edge, _)| edge + 1).collect();
+        for &(edge, _) in chain.edges.iter().filter(|(edge, _)| is_short[*edge]) {
+            let length = layout.lengths[edge];
+            out.edges.push(MergedEdge { edge: edge + 1, curve: curve.clone(), length });
+        }
+    }
+    out.edges.sort_by_key(|merged| merged.edge);
+    out
+}

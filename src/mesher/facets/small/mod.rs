@@ -1,0 +1,30 @@
+//! Virtual merging of short edges and narrow faces of CAD models.
+//!
+//! An edge or face far smaller than the elements forces small elements and poor angles. Faces are
+//! therefore **grouped** into composite patches, and edges into composite curves (virtual topology:
+//! Sheffer 2001; mesh constraint topology: Foucault, Cuillière, François, Léon, Maranzana 2008).
+//! Only the constraints of the mesh change: the geometry, and what vertices are projected to,
+//! remain those of the file.
+//!
+//! A **narrow** face joins a large neighbour, its **main** face, if
+//!
+//! * both have the same bodies on their sides and no different names in the file,
+//! * the main face is far wider, and
+//! * it makes no sharp wedge with the faces on the other side of the narrow one, as both faces of a
+//!   thin sheet would.
+//!
+//! Curves inside a composite patch are dropped. Then corners with two curves left are dropped if
+//! one of the curves is short, or if they do not bend there.
+//!
+//! *Not* merged are short edges between corners at which three or more curves remain: the corner
+//! that would be left is off the faces that it had not touched.
+
+mod chains;
+mod faces;
+mod group;
+mod layout;
+#[cfg(test)]
+mod tests;
+
+pub use group::{Grouping, MergedEdge, MergedFace, MergedSmall, NamedFace, Small, merge};
+pub(super) use layout::Layout;

@@ -1,0 +1,129 @@
+use super::{MergedSmall, Small, merge};
+use crate::Point;
+use crate::ground::size::SizeField;
+use crate::mesher::facets::FacetModel;
+use brep::{Model, Settings, Tessellation, Unit};
+
+/// One size everywhere.
+struct Constant(f64);
+
+impl SizeField for Constant {
+    fn size_at(&self, _: &Point) -> f64 {
+        self.0
+    }
+}
+
+fn read(name: &str) -> Model {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("geometries/step");
+    let text = std::fs::read(folder.join(name).with_extension("step")).unwrap();
+    Model::read_step(&text, Unit::OfFile).unwrap()
+}
+
+/// Merges what is small beside elements of this size.
+fn merged_of(mut model: Model, size: f64) -> (Option<FacetModel>, MergedSmall) {
+    let tessellation = Tessellation::of(&mut model, &Settings::default()).unwrap();
+    let size = |_: &FacetModel| -> Box<dyn SizeField> { Box::new(Constant(size)) };
+    let (merged, report) = merge(&model, &tessellation, &Small { factor: 20.0, size: &size });
+    (merged.map(|(facets, ..)| facets), report)
+}
+
+fn merged(name: &str, size: f64) -> (Option<FacetModel>, MergedSmall) {
+    merged_of(read(name), size)
+}
+
+/// The numbers of patches, curves and corners.
+fn counts(facets: &FacetModel) -> [usize; 3] {
+    [facets.patches.len(), facets.curves.len(), facets.corners.len()]
+}
+
+#[test]
+fn a_sliver_beside_a_coplanar_face_leaves_a_box() {
+    let (facets, report) = merged("sliver_plate", 0.1);
+    assert_eq!(counts(&facets.unwrap()), [6, 12, 8]);
+    let [face] = &report.faces[..] else { panic!("{report:?}") };
+    assert!((face.width - 1e-3).abs() < 1e-9, "{face:?}");
+    // Both ends of the sliver.
+    assert_eq!(report.edges.len(), 2);
+}
+
+#[test]
+fn a_short_part_of_an_edge_is_joined_with_the_rest() {
+    let (facets, report) = merged("split_edge", 0.1);
+    assert_eq!(counts(&facets.unwrap()), [6, 12, 8]);
+    let [edge] = &report.edges[..] else { panic!("{report:?}") };
+    assert!((edge.length - 1e-3).abs() < 1e-9 && edge.curve.len() == 3, "{edge:?}");
+    assert!(report.faces.is_empty());
+}
+
+#[test]
+fn a_chamfer_joins_one_of_its_neighbours() {
+    let (facets, report) = merged("tiny_chamfer", 0.1);
+    assert_eq!(counts(&facets.unwrap()), [6, 12, 8]);
+    assert_eq!((report.faces.len(), report.edges.len()), (1, 2));
+}
+
+#[test]
+fn what_is_not_small_beside_the_elements_is_kept() {
+    for (size, is_merged) in [(0.021, true), (0.019, false)] {
+        let (facets, report) = merged("sliver_plate", size);
+        assert_eq!(facets.is_some(), is_merged);
+        assert_eq!(report == MergedSmall::default(), !is_merged, "{report:?}");
+    }
+}
+
+#[test]
+fn a_sliver_beside_an_interface_joins_the_face_of_its_own_body() {
+    let (facets, report) = merged("sliver_at_interface", 0.1);
+    let facets = facets.unwrap();
+    // Two boxes with a common face: one of 12 faces is left out, and 3 of the 23 edges.
+    assert_eq!((facets.patches.len(), report.faces.len()), (11, 1));
+    let both = facets.patches.iter().filter(|p| p.inside.is_some() && p.outside.is_some());
+    assert_eq!(both.count(), 1, "the interface is one patch of its own");
+    // Each segment of the interface's curves is at three patches, as before.
+    let interface = facets.patches.iter().position(|p| p.outside.is_some()).unwrap();
+    let own = facets.triangles.iter().filter(|t| t.patch.index() == interface);
+    let area: f64 = own
+        .map(|t| {
+            let [a, b, c] = t.vertices.map(|v| facets.points[v.index()]);
+            0.5 * (b - a).cross(&(c - a)).norm()
+        })
+        .sum();
+    assert!((area - 0.999).abs() < 1e-9, "{area}");
+}
+
+#[test]
+fn the_faces_around_a_thin_sheet_are_kept() {
+    let (facets, report) = merged("thin_sheet", 10.0);
+    assert!(facets.is_none() && report == MergedSmall::default(), "{report:?}");
+}
+
+#[test]
+fn a_short_edge_between_corners_of_three_curves_is_kept() {
+    let (facets, report) = merged("short_ridge", 10.0);
+    assert!(facets.is_none() && report == MergedSmall::default(), "{report:?}");
+}
+
+#[test]
+fn names_of_the_file_are_never_lost() {
+    let (_, plain) = merged("sliver_plate", 0.1);
+    let (sliver, main) = (plain.faces[0].face - 1, plain.faces[0].into - 1);
+    let named = |names: [Option<&str>; 2]| {
+        let mut model = read("sliver_plate");
+        model.patch_names = vec![None; model.patches.len()];
+        [sliver, main].into_iter().zip(names).for_each(|(face, name)| {
+            model.patch_names[face] = name.map(str::to_owned);
+        });
+        merged_of(model, 0.1).1
+    };
+    // Another neighbour, at an angle, has the name.
+    for names in [[Some("inlet"), None], [Some("inlet"), Some("wall")]] {
+        let report = named(names);
+        assert!(report.faces.is_empty(), "{report:?}");
+        assert_eq!(report.named.len(), 1);
+        assert_eq!((report.named[0].face, report.named[0].name.as_str()), (sliver + 1, "inlet"));
+    }
+    for names in [[None, Some("wall")], [Some("wall"), Some("wall")]] {
+        let report = named(names);
+        assert_eq!((report.faces[0].into, report.named.len()), (main + 1, 0), "{report:?}");
+    }
+}

@@ -1,0 +1,66 @@
+//! Faces and edges of CAD files that are smaller than the elements.
+
+use crate::brep::volume_of;
+use crate::folders::own;
+use tetmill::comm::thread;
+use tetmill::mesh::Order;
+use tetmill::{Generated, Geometry, InputSettings, Mesher};
+
+fn geometry(name: &str, keep_small: bool) -> Geometry {
+    let path = own("step").with_extension("").join(name).with_extension("step");
+    let settings = InputSettings { keep_small, ..InputSettings::default() };
+    Geometry::read(&[path], &settings, &mut |note| panic!("{note}")).unwrap()
+}
+
+/// The parts with their volumes, and the largest error of the volume: the width of the merged face
+/// times the area of those beside it, and for the cylinder that of its chords.
+const PARTS: [(&str, f64, f64); 5] = [
+    ("sliver_plate", 0.2, 1e-12),
+    ("split_edge", 1.0, 1e-12),
+    ("tiny_chamfer", 1.0 - 0.5e-6, 1e-3),
+    ("sliver_at_interface", 1.6993, 1e-3),
+    ("cylinder_step", 0.785_005_464, 0.04),
+];
+
+#[test]
+fn merged_parts_have_few_good_tets_and_their_volume() {
+    for (name, exact, error) in PARTS {
+        let made = [false, true].map(|keep| Mesher::new().generate(&geometry(name, keep)).unwrap());
+        let report = |mesh: &Generated| mesh.coarse.as_ref().unwrap().report.clone();
+        let [merged, kept] = made.each_ref().map(report);
+        assert!(merged.tets * 20 < kept.tets, "{name}: {} tets instead of {}", merged.tets, kept.tets);
+        let [angle, before] = [&merged, &kept].map(|report| report.quality.smallest_dihedral);
+        assert!(angle > 28.0 && angle > before, "{name}: {angle}° instead of {before}°");
+        let volume = volume_of(&made[0].arrays());
+        assert!((volume - exact).abs() <= error, "{name}: {volume} instead of {exact}");
+        assert!(!merged.merged_small.edges.is_empty(), "{name}");
+        assert!(kept.merged_small.faces.is_empty() && kept.merged_small.edges.is_empty(), "{name}");
+    }
+}
+
+#[test]
+fn refined_and_curved_vertices_of_merged_faces_are_on_the_faces_of_the_file() {
+    // Each run checks that boundary vertices are on their patches.
+    for (name, exact, error) in PARTS {
+        let geometry = geometry(name, false);
+        let fine = Mesher::new().levels(3).generate(&geometry).unwrap();
+        // Three levels divide the error of chords by 64, and that of merged faces by 8.
+        let volume = volume_of(&fine.arrays());
+        assert!((volume - exact).abs() <= (error / 8.0).max(1e-12), "{name}: {volume} instead of {exact}");
+        Mesher::new().order(Order::Second).levels(1).generate(&geometry).unwrap();
+    }
+    // The upper face of the chamfered cube ends 10⁻³ before its edges: no vertex is outside.
+    let arrays = Mesher::new().levels(3).generate(&geometry("tiny_chamfer", false)).unwrap().arrays();
+    let beyond = |p: &[f64; 3]| p[0] + p[2] > 2.0 - 1e-3 + 1e-12;
+    assert!(!arrays.points.iter().any(beyond), "vertices are cut off by the chamfer");
+}
+
+#[test]
+fn merging_does_not_depend_on_ranks() {
+    let geometry = geometry("cylinder_step", false);
+    let alone = Mesher::new().levels(2).generate(&geometry).unwrap().checksum;
+    let together = thread::try_run(3, |comm| {
+        Mesher::new().levels(2).generate_on(comm, Some(&geometry)).map(|mesh| mesh.checksum)
+    });
+    assert_eq!(together.unwrap(), vec![alone; 3]);
+}
