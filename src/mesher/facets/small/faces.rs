@@ -100,7 +100,7 @@ fn neighbours(layout: &Layout, face: usize) -> Vec<(usize, Vec<usize>)> {
 /// Whether two faces continue each other across all their common edges.
 fn is_smooth(layout: &Layout, common: &[usize]) -> bool {
     layout.segments(common).all(|segment| {
-        let into: Vec<Vector> = layout.into_faces(segment).map(|(_, into)| into).collect();
+        let into: Vec<Vector> = layout.faces_beside(segment).map(|(_, into)| into).collect();
         matches!(into[..], [a, b] if a.angle(&-b) < SMOOTH)
     })
 }
@@ -125,7 +125,7 @@ fn is_open(layout: &Layout, face: usize, common: &[usize]) -> bool {
         if (b - a).dot(&(q - p)).abs() < PARALLEL * (b - a).norm() * (q - p).norm() {
             return true;
         }
-        let beyond = |s: [u32; 2]| layout.into_faces(s).filter(|(other, _)| *other != face);
+        let beyond = |s: [u32; 2]| layout.faces_beside(s).filter(|(other, _)| *other != face);
         beyond(nearest).all(|(_, main)| beyond(segment).all(|(_, into)| main.angle(&into) >= WEDGE))
     })
 }

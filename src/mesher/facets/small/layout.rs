@@ -119,7 +119,7 @@ impl<'a> Layout<'a> {
 
     /// The faces at a segment of a curve, each with the unit direction from the segment into its
     /// triangle there.
-    pub fn into_faces(&self, [a, b]: [u32; 2]) -> impl Iterator<Item = (usize, Vector)> {
+    pub fn faces_beside(&self, [a, b]: [u32; 2]) -> impl Iterator<Item = (usize, Vector)> {
         let [p, q] = self.ends([a, b]);
         let along = (q - p).try_normalize(0.0).unwrap_or_else(Vector::zeros);
         let at = self.beside.get(&key(a, b)).map_or(&[][..], Vec::as_slice);
