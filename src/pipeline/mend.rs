@@ -24,15 +24,6 @@ const TRIED_PIECES: u32 = 16;
 /// snapping, that the worst child must keep.
 const KEPT: f64 = 0.6;
 
-/// Smallest dihedral angle that the children should have (degrees), or [`NEARLY`] that of the
-/// coarse mesh. With this bound the children of a crankshaft, a hydraulic block and a valve body
-/// have angles from 19° to 23°, without it from 15° to 19°; up to a fifth more coarse tets.
-const WANTED: f64 = 20.0;
-
-/// Fraction of the coarse mesh's smallest dihedral angle that the children can keep nearly
-/// everywhere if the tets are small enough.
-const NEARLY: f64 = 0.9;
-
 /// Mean ratios above this may lose more: curvature alone causes that loss where there are few
 /// elements per radius.
 const GOOD: f64 = 0.35;
@@ -123,7 +114,7 @@ fn least(coarse: &CoarseMesh) -> Least {
 fn least_of(worst_refined: f64, smallest_dihedral: f64) -> Least {
     Least {
         mean_ratio: KEPT * worst_refined.min(GOOD),
-        dihedral: f64::max(KEPT * smallest_dihedral, WANTED.min(NEARLY * smallest_dihedral)),
+        dihedral: KEPT * smallest_dihedral,
         scaled_jacobian: JACOBIAN,
     }
 }
