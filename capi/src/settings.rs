@@ -338,9 +338,12 @@ mod tests {
             "8e9",
             "axes",
             "1",
+            "true",
             "1e-6",
             "30",
+            "mm",
         ];
+        assert_eq!(NAMES.len(), values.len());
         let mut settings = Settings::default();
         for (name, value) in NAMES.iter().zip(values) {
             settings.set(name, Some(value)).unwrap();
