@@ -241,8 +241,9 @@ fn facet_curve(
         vertices.pop();
         vertices.extend(line);
     }
-    if small.iter().all(|small| *small) {
-        small.fill(false);
+    // A curve of short edges alone follows them, as one without any.
+    if small.iter().all(|step| *step == small[0]) {
+        small.clear();
     }
     let corner = |(edge, is_end): (usize, bool)| {
         let end = model.curves[edge].ends[usize::from(is_end)] as u32;
