@@ -7,21 +7,22 @@ scripts/install-test-needs.sh system
 # The compiler needs no Python modules: they are downloaded while it runs.
 scripts/install-test-needs.sh modules &
 modules=$!
+trap 'kill "$modules" 2>/dev/null || true' EXIT
 
 # By default Open MPI refuses to run as root or with more ranks than cores.
 export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 OMPI_MCA_rmaps_base_oversubscribe=1
 
 if cargo nextest --version >/dev/null 2>&1; then
-    run() { cargo nextest run --no-fail-fast "$@"; }
+    tests=(cargo nextest run)
 else
-    run() { cargo test --no-fail-fast "$@"; }
+    tests=(cargo test)
 fi
 
 # Each build is of the whole workspace: with fewer packages, other crates get other features, and all is compiled again.
 # `mpi` is a feature of the library and of the program; both have tests that depend on it.
-run --no-run --workspace --features mpi --lib --bins --tests
+"${tests[@]}" --no-run --workspace --features mpi --lib --bins --tests
 wait "$modules"
-run --workspace --features mpi --lib --bins --tests
+"${tests[@]}" --no-fail-fast --workspace --features mpi --lib --bins --tests
 scripts/test-viewer.sh
 cargo test --workspace --features mpi --doc
 # Each example checks its own result.
@@ -32,4 +33,4 @@ for example in examples/*.rs; do
 done
 mpirun -n 3 "$built/conduction_mpi" >/dev/null
 # Without the feature a replacement module is compiled: run the program's tests about MPI again.
-run --workspace --test command mpi
+"${tests[@]}" --no-fail-fast --workspace --test command mpi
