@@ -18,12 +18,15 @@ pub(super) struct Tolerances {
     pub angle: f64,
     /// The diagonal of the box of the model.
     pub diagonal: f64,
+    /// Whether patches with folded triangles fail, so that their curves are divided more finely.
+    pub refuses_folds: bool,
 }
 
 /// Why a patch has no triangles.
 pub(super) enum Failure {
-    /// Its loops cross, perhaps because its curves are divided too coarsely.
-    Crossing(BrepError),
+    /// Its loops cross, or its triangles are folded, perhaps because its curves are divided too
+    /// coarsely.
+    Coarse(BrepError),
     Final(BrepError),
 }
 
@@ -32,10 +35,13 @@ type Plane = ConstrainedDelaunayTriangulation<Node>;
 /// The most triangles of a patch.
 const MOST_TRIANGLES: usize = 400_000;
 /// The most rounds of refinement.
-const MOST_ROUNDS: usize = 200;
+const MOST_ROUNDS: usize = 80;
 /// Edges shorter than this (fraction of the diagonal) are not divided for their angle: surfaces may
 /// have kinks.
 const SHORTEST: f64 = 3e-4;
+
+/// The error of a folded triangle.
+const FOLDED: f64 = 2.0;
 
 /// The least distance of a new point from a side, in lengths of the side.
 const ENCROACHED: f64 = 0.05;
@@ -144,7 +150,7 @@ impl Face<'_> {
     fn crossing(&self, vertex: u32, out: &Tessellation) -> Failure {
         let place = out.points.get(vertex as usize).copied();
         let what = "its loops cross or touch in the parameters of its surface";
-        Failure::Crossing(BrepError::face(self.number, what, place))
+        Failure::Coarse(BrepError::face(self.number, what, place))
     }
 
     fn add_chain(&mut self, sides: &Sides, turn: f64, out: &Tessellation) -> Result<(), Failure> {
@@ -259,14 +265,25 @@ impl Face<'_> {
             self.measure(&triangles, &mut known, out);
             let wanted = self.wanted(&triangles, &known, &tangled);
             if self.insert(wanted, &triangles) == 0 {
-                return Ok(());
+                return self.unfolded(&triangles, &known);
             }
         }
-        Err(Failure::Final(BrepError::face(
-            self.number,
-            "the refinement of its triangles does not end",
-            None,
-        )))
+        // Triangles beside coarse sides may be folded however small they are.
+        let what = "the refinement of its triangles does not end";
+        Err(Failure::Coarse(BrepError::face(self.number, what, None)))
+    }
+
+    /// Refuses folded triangles, which only finer sides would unfold.
+    fn unfolded(&self, triangles: &[Corners], known: &Errors) -> Result<(), Failure> {
+        let is_folded = |triangle: &&Corners| {
+            let error = known.triangles.get(&triangle.map(|(i, _)| i));
+            error.is_some_and(|error| *error >= FOLDED)
+        };
+        if !self.tolerances.refuses_folds || !triangles.iter().any(|t| is_folded(&t)) {
+            return Ok(());
+        }
+        let what = "its triangles are folded beside its curves";
+        Err(Failure::Coarse(BrepError::face(self.number, what, None)))
     }
 
     /// The corners at both ends of the side of a triangle that is opposite corner `k`.
@@ -453,7 +470,7 @@ impl Face<'_> {
         let is_sliver = area.norm() < 1e-2 * longest * self.tolerances.chord.min(longest);
         let own = jet.normal().unwrap_or(normal);
         let is_folded = !is_sliver && longest > SHORTEST * self.tolerances.diagonal && normal.dot(&own) < 0.3;
-        off.max(if is_folded { 2.0 } else { 0.0 })
+        off.max(if is_folded { FOLDED } else { 0.0 })
     }
 
     /// Inner edges whose ends are those of other edges too: different in parameters, equal in

@@ -23,7 +23,8 @@ impl HasPosition for Node {
     }
 }
 
-/// Parameters in units of length.
+/// Parameters in units of length. A patch that is far narrower than long is widened: its sides are
+/// divided by the turn along them, and it may turn as much across.
 ///
 /// At a **pole** the derivative in one direction vanishes, and a side of the patch is one point.
 /// Lengths in that direction are then taken at each value of the other parameter, as in the
@@ -42,6 +43,9 @@ struct Pole {
     /// Mean lengths at equal steps of the other parameter, and 0 at the pole itself.
     rates: Vec<f64>,
 }
+
+/// The most times that a patch is as long as wide in the plane.
+const NARROWEST: f64 = 10.0;
 
 /// Steps between the values of [`Pole::rates`].
 const STEPS: usize = 256;
@@ -72,7 +76,11 @@ impl Frame {
             sums[0] += jet.d[1][0].norm();
             sums[1] += jet.d[0][1].norm();
         }
-        let scale = sums.map(|sum| if sum > 0.0 { sum / 25.0 } else { 1.0 });
+        let mut scale = sums.map(|sum| if sum > 0.0 { sum / 25.0 } else { 1.0 });
+        let extents = [0, 1].map(|i| (high[i] - low[i]) * scale[i]);
+        for i in 0..2 {
+            scale[i] *= (extents[1 - i] / (NARROWEST * extents[i].max(f64::MIN_POSITIVE))).max(1.0);
+        }
         let mut origin = low;
         let pole = pole.map(|direction| {
             origin[direction] = at(direction, 0.5);

@@ -59,6 +59,9 @@ pub struct Tessellation {
 /// How often the division of curves is refined because loops of a patch cross.
 const MOST_RETRIES: usize = 6;
 
+/// How often of these, at most, because of folded triangles: at kinks no division unfolds them.
+const UNFOLDING_RETRIES: usize = 3;
+
 impl Tessellation {
     /// Triangulates all patches.
     ///
@@ -67,11 +70,12 @@ impl Tessellation {
     /// each other or loops cross; [`BrepError::Solid`] if a body is not closed.
     pub fn of(model: &mut Model, settings: &Settings) -> Result<Self, BrepError> {
         let diagonal = diagonal(&model.corners, &model.curves);
-        let tolerances =
-            face::Tolerances { chord: settings.chord * diagonal, angle: settings.angle, diagonal };
+        let chord = settings.chord * diagonal;
+        let mut tolerances = face::Tolerances { chord, angle: settings.angle, diagonal, refuses_folds: true };
         let mut chords = vec![tolerances.chord; model.curves.len()];
         let mut failed = None;
-        for _ in 0..MOST_RETRIES {
+        for retry in 0..MOST_RETRIES {
+            tolerances.refuses_folds = retry < UNFOLDING_RETRIES;
             let mut out = Self::of_curves(model, &chords, settings.angle, diagonal)?;
             let mut conflicts = Vec::new();
             let of_patch = |patch| face::triangulate(model, patch, &out, &tolerances);
@@ -79,7 +83,7 @@ impl Tessellation {
             for (patch, made) in made.into_iter().enumerate() {
                 match made {
                     Ok(made) => made.append_to(&mut out),
-                    Err(face::Failure::Crossing(error)) => {
+                    Err(face::Failure::Coarse(error)) => {
                         conflicts.push(patch);
                         failed = Some(error);
                     }
