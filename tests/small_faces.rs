@@ -14,12 +14,14 @@ fn geometry(name: &str, keep_small: bool) -> Geometry {
 
 /// The parts with their volumes, and the largest error of the volume: the width of the merged face
 /// times the area of those beside it, and for the cylinder that of its chords.
-const PARTS: [(&str, f64, f64); 5] = [
+const PARTS: [(&str, f64, f64); 7] = [
     ("sliver_plate", 0.2, 1e-12),
     ("split_edge", 1.0, 1e-12),
     ("tiny_chamfer", 1.0 - 0.5e-6, 1e-3),
     ("sliver_at_interface", 1.6993, 1e-3),
     ("cylinder_step", 0.785_005_464, 0.04),
+    ("rounded_cube", 0.999_997_426, 5e-3),
+    ("rounded_rims", 0.803_649_788, 0.01),
 ];
 
 #[test]

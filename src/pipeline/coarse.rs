@@ -242,7 +242,8 @@ fn attempt(
     if allowed.thin {
         let project = |patch, point: &Point| projector.project_patch(patch, point).unwrap_or(*point);
         let closeness = settings.size.scaled_closeness();
-        let walls = Walls { mesh: &surface, regions: &regions, project: &project, size, closeness };
+        let (mesh, is_ignored) = (&surface, &|_| false);
+        let walls = Walls { mesh, is_ignored, regions: &regions, project: &project, size, closeness };
         let (sources, found) = thin_regions(&walls);
         if found.places > 0 {
             return Attempt::Thin(sources, found);

@@ -343,7 +343,9 @@ impl FacetSolid {
         closeness: Closeness,
     ) -> (Vec<Source>, ThinRegions) {
         let project = |_, point: &Point| *point;
-        thin_regions(&Walls { mesh: &keep(&self.model), regions, project: &project, size, closeness })
+        let is_ignored = |facet| self.model.is_merged(facet);
+        let mesh = &keep(&self.model);
+        thin_regions(&Walls { mesh, is_ignored: &is_ignored, regions, project: &project, size, closeness })
     }
 
     /// Adds points on no triangle as vertices inside.

@@ -1,7 +1,7 @@
 //! Facets with given patches, curves and corners: those of a boundary representation.
 
 use super::small::Grouping;
-use super::{FacetBody, FacetCurve, FacetModel, FacetPatch};
+use super::{FacetBody, FacetCurve, FacetModel, FacetPatch, Merged};
 use crate::Vector;
 use crate::ground::kernel::tree;
 use crate::ground::mesh::{BoundaryTriangle, VertexId};
@@ -116,6 +116,15 @@ pub(super) fn grouped(
         curves: facet_curves.iter().map(|c| c.vertices.clone()).collect(),
         tips,
     };
+    let has_merged = grouping.patches.iter().any(|faces| faces.len() > 1);
+    let merged = has_merged.then(|| {
+        let patch_of = faces().map(|face| patch_of_face[face]).collect();
+        let source = Source { patch_of, ..source.clone() };
+        Merged {
+            is_merged: faces().map(|face| !is_main[face]).collect(),
+            projector: FacetProjector::with_normals(source, Some(normals)),
+        }
+    });
     let bounds = tree::bounds(&tessellation.points);
     let facets = FacetModel {
         points: tessellation.points.clone(),
@@ -134,6 +143,7 @@ pub(super) fn grouped(
         rounding: ROUNDING * bounds.min.coords.amax().max(bounds.max.coords.amax()),
         bounds,
         projector: FacetProjector::with_normals(source, Some(normals)),
+        merged,
     };
     (facets, exact)
 }

@@ -126,11 +126,27 @@ pub struct FacetModel {
     pub bounds: Aabb,
     /// Projection to patches and curves.
     pub projector: FacetProjector,
+    /// The facets of faces that were merged into others, if there are any.
+    pub merged: Option<Merged>,
     /// Estimated rounding error of the coordinates, from their digits (length).
     pub rounding: f64,
 }
 
+/// Facets that belong to a patch but have no influence on its shape and size.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Merged {
+    /// Whether each facet is one of them.
+    pub is_merged: Vec<bool>,
+    /// Projection to patches with these facets too.
+    pub projector: FacetProjector,
+}
+
 impl FacetModel {
+    /// Whether a facet has no influence on the shape and size of its patch.
+    pub(crate) fn is_merged(&self, facet: u32) -> bool {
+        self.merged.as_ref().is_some_and(|merged| merged.is_merged[facet as usize])
+    }
+
     /// Finds bodies, patches, curves and corners of one or several surfaces.
     ///
     /// Each bounded region with a winding number other than zero is a body. In one file, a surface
@@ -259,6 +275,7 @@ fn assemble(joined: Joined, regions: &Regions, found: Found, bounds: Aabb, round
         bodies: bodies_of(regions),
         bounds,
         projector,
+        merged: None,
         rounding,
     }
 }

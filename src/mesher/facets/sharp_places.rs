@@ -53,6 +53,9 @@ fn wedges(model: &FacetModel) -> Vec<SharpPlace> {
     let mut places = Vec::new();
     for edge in 0..edges.len() {
         let uses = edges.uses(edge);
+        if uses.iter().any(|u| model.is_merged(u.triangle)) {
+            continue;
+        }
         let [a, b] = uses[0].ends.map(point);
         let Some(axis) = (b - a).try_normalize(0.0) else { continue };
         let across = |t: u32, side: u8| {

@@ -53,6 +53,8 @@ const OPPOSITE: f64 = -0.5;
 pub struct Walls<'a> {
     /// The triangulation.
     pub mesh: &'a SurfaceMesh,
+    /// Triangles that are no walls: those of faces far smaller than the elements.
+    pub is_ignored: &'a (dyn Fn(u32) -> bool + Sync),
     /// The bodies behind and in front of each patch.
     pub regions: &'a (dyn Fn(PatchId) -> [Option<BodyId>; 2] + Sync),
     /// Projection onto the patch itself.
@@ -107,7 +109,7 @@ pub fn thin_regions(walls: &Walls) -> (Vec<Source>, ThinRegions) {
         .into_par_iter()
         .map(|t| {
             let mut places = Vec::new();
-            if !walls.size.work().is_cancelled() {
+            if !(walls.is_ignored)(t) && !walls.size.work().is_cancelled() {
                 prober.probe_triangle(t, &mut places);
             }
             places
@@ -163,7 +165,9 @@ impl<'a> Prober<'a> {
         let normal = |[a, b, c]: &[Point; 3]| area_vector(a, b, c).try_normalize(0.0);
         let adjacent = adjacent_patches(mesh);
         let mut of_patch = vec![Vec::new(); adjacent.len()];
-        (0..).zip(&mesh.triangles).for_each(|(t, triangle)| of_patch[triangle.patch.index()].push(t));
+        for (t, triangle) in (0..).zip(&mesh.triangles).filter(|(t, _)| !(walls.is_ignored)(*t)) {
+            of_patch[triangle.patch.index()].push(t);
+        }
         let boxes = |triangles: &[u32]| -> Vec<Aabb> {
             triangles.iter().map(|&t| bounds(&corners[t as usize])).collect()
         };
@@ -362,6 +366,7 @@ mod tests {
     fn found(model: &FacetModel, size: f64, closeness: Closeness) -> (Vec<Source>, ThinRegions) {
         thin_regions(&Walls {
             mesh: &keep(model),
+            is_ignored: &|_| false,
             regions: &|patch| [model.patch(patch).inside, model.patch(patch).outside],
             project: &|_, point| *point,
             size: &UniformSize(size),

@@ -4,6 +4,7 @@ use super::Sizes;
 use super::polyline::Polyline;
 use crate::Point;
 use crate::ground::kernel::simplex::area_vector;
+use crate::ground::projector::facets::FacetProjector;
 use crate::ground::size::SizeField;
 use crate::mesher::facets::FacetModel;
 use csg::{CornerId, CurveId, PatchId};
@@ -160,20 +161,13 @@ impl<'a> Sheet<'a> {
     }
 
     /// Whether a triangle follows its patch; see [`FITTING_COSINE`] and [`FITTING_DISTANCE`].
+    ///
+    /// On merged faces it may follow those instead: collapses lead from triangles on a rounded edge
+    /// to triangles across it.
     pub fn fits(&self, patch: PatchId, p: &[Point; 3], size: f64) -> bool {
-        let area = area_vector(&p[0], &p[1], &p[2]);
-        let norm = area.norm();
-        if norm <= 0.0 {
-            return false;
-        }
-        if let Some(normal) = self.model.projector.flat_normal(patch) {
-            return area.dot(&normal) > FITTING_COSINE * norm;
-        }
-        let middle = Point::from((p[0].coords + p[1].coords + p[2].coords) / 3.0);
-        let foot = self.model.projector.foot(patch, &middle);
-        let longest = longest_squared(p).sqrt();
-        area.dot(&foot.normal) >= FITTING_COSINE * norm
-            && (middle - foot.point).norm() <= FITTING_DISTANCE * longest.min(size)
+        let merged = self.model.merged.as_ref();
+        follows(&self.model.projector, patch, p, size)
+            || merged.is_some_and(|merged| follows(&merged.projector, patch, p, size))
     }
 
     /// Whether a triangle of the mesh follows its patch.
@@ -241,6 +235,23 @@ impl<'a> Sheet<'a> {
             Kind::Patch(_) => unreachable!("a vertex on a patch is on no curve"),
         }
     }
+}
+
+/// Whether a triangle follows the facets of a patch.
+fn follows(projector: &FacetProjector, patch: PatchId, p: &[Point; 3], size: f64) -> bool {
+    let area = area_vector(&p[0], &p[1], &p[2]);
+    let norm = area.norm();
+    if norm <= 0.0 {
+        return false;
+    }
+    if let Some(normal) = projector.flat_normal(patch) {
+        return area.dot(&normal) > FITTING_COSINE * norm;
+    }
+    let middle = Point::from((p[0].coords + p[1].coords + p[2].coords) / 3.0);
+    let foot = projector.foot(patch, &middle);
+    let longest = longest_squared(p).sqrt();
+    area.dot(&foot.normal) >= FITTING_COSINE * norm
+        && (middle - foot.point).norm() <= FITTING_DISTANCE * longest.min(size)
 }
 
 /// 4√3·area/Σl²: 1 for the regular triangle, 0 for one without area.

@@ -158,13 +158,29 @@ impl Allowed {
         };
         let mut edges = vec![false; layout.lengths.len()];
         layout.curves.iter().for_each(|&edge| edges[edge] = is_short(edge));
-        let is_narrow = |face: usize| {
-            let beside = layout.around[face].iter().flat_map(|&edge| &layout.faces_of[edge]);
-            let widest = beside.map(|&other| layout.widths[other]).fold(0.0, f64::max);
-            LONGER * layout.widths[face] <= widest
-        };
-        Self { faces: (0..layout.around.len()).map(is_narrow).collect(), edges }
+        let mut faces = vec![false; layout.around.len()];
+        loop {
+            // The corner between rounded edges has only narrow faces beside it.
+            let before = faces.clone();
+            for face in (0..faces.len()).filter(|&face| !before[face]) {
+                faces[face] = LONGER * layout.widths[face] <= widest_near(layout, face, &before);
+            }
+            if faces == before {
+                return Self { faces, edges };
+            }
+        }
     }
+}
+
+/// The width of the widest face beside a face, or beside one of its narrow neighbours.
+fn widest_near(layout: &Layout, face: usize, is_narrow: &[bool]) -> f64 {
+    let beside =
+        |face: usize| layout.around[face].iter().flat_map(|&edge| layout.faces_of[edge].iter().copied());
+    let near = beside(face).flat_map(|other| {
+        let beyond = is_narrow[other].then(|| beside(other));
+        std::iter::once(other).chain(beyond.into_iter().flatten())
+    });
+    near.map(|other| layout.widths[other]).fold(0.0, f64::max)
 }
 
 /// Merges the small faces and edges of a model; `None` if there are none.

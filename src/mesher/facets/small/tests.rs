@@ -63,6 +63,13 @@ fn a_chamfer_joins_one_of_its_neighbours() {
 }
 
 #[test]
+fn rounded_edges_and_the_corners_between_them_join_six_faces() {
+    let (facets, report) = merged("rounded_cube", 0.1);
+    assert_eq!(counts(&facets.unwrap()), [6, 12, 8]);
+    assert_eq!(report.faces.len(), 12 + 8);
+}
+
+#[test]
 fn what_is_not_small_beside_the_elements_is_kept() {
     for (size, is_merged) in [(0.021, true), (0.019, false)] {
         let (facets, report) = merged("sliver_plate", size);
