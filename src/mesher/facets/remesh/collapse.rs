@@ -165,6 +165,7 @@ fn keeps_shape(sheet: &Sheet, from: u32, to: u32, long: f64) -> bool {
 
 /// Merges `from` into `to`.
 fn collapse(sheet: &mut Sheet, from: u32, to: u32) {
+    sheet.change_around(from);
     let mut kept: Vec<(u32, u32)> = Vec::new();
     for t in std::mem::take(&mut sheet.around[from as usize]) {
         let triangle = sheet.at(t);
@@ -185,4 +186,5 @@ fn collapse(sheet: &mut Sheet, from: u32, to: u32) {
             }
         }
     }
+    sheet.change_around(to);
 }

@@ -17,6 +17,7 @@ pub(super) fn flip_all(sheet: &mut Sheet) -> usize {
         queue.extend([[v[0], v[1]], [v[1], v[2]], [v[2], v[0]]].into_iter().filter(|[a, b]| a < b));
     }
     let most = MOST_FLIPS * queue.len();
+    let began = sheet.changes.now();
     let mut flips = 0;
     while let Some([a, b]) = queue.pop_front() {
         if flips < most
@@ -25,6 +26,9 @@ pub(super) fn flip_all(sheet: &mut Sheet) -> usize {
             flips += 1;
             queue.extend([[a, p], [p, b], [b, q], [q, a]]);
         }
+    }
+    if flips < most {
+        sheet.changes.all_flips_since(began);
     }
     flips
 }
@@ -40,7 +44,7 @@ pub(super) fn flip(sheet: &mut Sheet, a: u32, b: u32) -> Option<[u32; 2]> {
     }
     let (i, j) = (first.side(a, b)?, second.side(a, b)?);
     let (p, q) = (first.v[i], second.v[j]);
-    if p == q || sheet.at_edge(p, q).next().is_some() {
+    if p == q || sheet.changes.is_flip_in_vain([a, b, p, q]) || sheet.at_edge(p, q).next().is_some() {
         return None;
     }
     let mark = |t: &Triangle, x: u32, y: u32| t.side(x, y).map_or(NONE, |side| t.curve[side]);
@@ -66,6 +70,7 @@ pub(super) fn flip(sheet: &mut Sheet, a: u32, b: u32) -> Option<[u32; 2]> {
         new.v.iter().for_each(|&v| sheet.around[v as usize].push(old));
         sheet.triangles[old as usize] = new;
     }
+    [a, b, p, q].into_iter().for_each(|v| sheet.changes.change(v));
     Some([p, q])
 }
 

@@ -9,6 +9,7 @@
 //! [`surface`](crate::mesher::surface) has for analytic surfaces), needs a parametrisation without
 //! folds, which noisy facets do not allow.
 
+mod changes;
 mod collapse;
 #[cfg(test)]
 mod deviation;

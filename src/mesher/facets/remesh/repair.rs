@@ -17,8 +17,9 @@ const ROUNDS: usize = 6;
 /// two sides on one smooth curve.
 pub(super) fn repair(sheet: &mut Sheet, report: &mut RemeshReport) {
     for _ in 0..ROUNDS {
-        let off: Vec<(u32, [u32; 3])> =
-            sheet.living().filter(|&t| !sheet.fits_at(t)).map(|t| (t, sheet.at(t).v)).collect();
+        let living: Vec<u32> = sheet.living().collect();
+        let off: Vec<u32> = living.into_iter().filter(|&t| !sheet.still_fits(t)).collect();
+        let off: Vec<(u32, [u32; 3])> = off.into_iter().map(|t| (t, sheet.at(t).v)).collect();
         let splits = off.iter().filter(|(t, v)| sheet.at(*t).v == *v && split_misfit(sheet, *t)).count();
         if splits == 0 {
             break;

@@ -1,6 +1,7 @@
 //! The triangles during remeshing, with any number of them at an edge.
 
 use super::Sizes;
+use super::changes::Changes;
 use super::polyline::Polyline;
 use crate::Point;
 use crate::ground::kernel::simplex::area_vector;
@@ -61,6 +62,8 @@ pub(super) struct Sheet<'a> {
     pub polylines: Vec<Polyline>,
     /// Whether each curve is straight.
     pub straight: Vec<bool>,
+    /// What has changed.
+    pub changes: Changes,
 }
 
 /// A triangle follows its patch if the angle between its normal and that of the facets at its
@@ -106,13 +109,19 @@ impl<'a> Sheet<'a> {
         let straight =
             (0..polylines.len()).map(|c| model.projector.is_straight_curve(CurveId::new(c))).collect();
         let sizes = mesh.points.iter().map(|p| size.size_at(p)).collect();
-        Self { model, size, points: mesh.points, kinds, sizes, around, triangles, polylines, straight }
+        let changes = Changes::new(mesh.points.len());
+        let points = mesh.points;
+        Self { model, size, points, kinds, sizes, around, triangles, polylines, straight, changes }
     }
 
     /// Re-evaluates the sizes at all vertices.
     pub fn update_sizes(&mut self) {
-        for (size, point) in self.sizes.iter_mut().zip(&self.points) {
-            *size = self.size.size_at(point);
+        for v in 0..self.points.len() {
+            let size = self.size.size_at(&self.points[v]);
+            if size != self.sizes[v] {
+                self.sizes[v] = size;
+                self.changes.change(v as u32);
+            }
         }
     }
 
@@ -170,6 +179,23 @@ impl<'a> Sheet<'a> {
             || merged.is_some_and(|merged| follows(&merged.projector, patch, p, size))
     }
 
+    /// Whether a triangle of the mesh follows its patch, which is tested only if it has changed.
+    pub fn still_fits(&mut self, t: u32) -> bool {
+        let known = self.changes.fit(t, self.at(t).v);
+        known.unwrap_or_else(|| {
+            let fits = self.fits_at(t);
+            self.changes.set_fit(t, fits);
+            fits
+        })
+    }
+
+    /// Notes that the triangles around a vertex change.
+    pub fn change_around(&mut self, v: u32) {
+        for &t in &self.around[v as usize] {
+            self.triangles[t as usize].v.iter().for_each(|&w| self.changes.change(w));
+        }
+    }
+
     /// Whether a triangle of the mesh follows its patch.
     pub fn fits_at(&self, t: u32) -> bool {
         let triangle = self.at(t);
@@ -206,6 +232,7 @@ impl<'a> Sheet<'a> {
         self.kinds.push(kind);
         self.sizes.push(self.size.size_at(&point));
         self.around.push(Vec::new());
+        self.changes.add_vertex();
         self.points.len() as u32 - 1
     }
 

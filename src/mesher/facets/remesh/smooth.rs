@@ -22,7 +22,11 @@ pub(super) fn smooth(sheet: &mut Sheet, v: u32) -> bool {
     if sheet.around[v as usize].is_empty() {
         return false;
     }
-    match sheet.kinds[v as usize] {
+    let vertices = sheet.around[v as usize].iter().flat_map(|&t| sheet.at(t).v);
+    if sheet.changes.is_move_in_vain(v, vertices) {
+        return false;
+    }
+    let has_moved = match sheet.kinds[v as usize] {
         Kind::Corner(_) => false,
         Kind::Curve(curve, place) => slide(sheet, v, curve.0, place),
         Kind::Patch(_) if is_good(sheet, v) => false,
@@ -31,7 +35,11 @@ pub(super) fn smooth(sheet: &mut Sheet, v: u32) -> bool {
             let from = sheet.points[v as usize];
             STEPS.iter().any(|&part| try_place(sheet, v, patch, from + (wanted - from) * part))
         }
+    };
+    if !has_moved {
+        sheet.changes.move_was_in_vain(v);
     }
+    has_moved
 }
 
 /// Vertices whose triangles all have a better shape are not moved.
@@ -52,6 +60,7 @@ pub(super) fn try_place(sheet: &mut Sheet, v: u32, patch: PatchId, to: Point) ->
     let from = std::mem::replace(&mut sheet.points[v as usize], to);
     if energy(sheet, v) < (1.0 - GAIN) * before && around_fits(sheet, v) {
         sheet.sizes[v as usize] = sheet.size.size_at(&to);
+        sheet.changes.change(v);
         return true;
     }
     sheet.points[v as usize] = from;
@@ -90,6 +99,7 @@ fn slide(sheet: &mut Sheet, v: u32, curve: u32, place: f64) -> bool {
     if least(sheet) >= worst && around_fits(sheet, v) {
         sheet.kinds[v as usize] = Kind::Curve(csg::CurveId(curve), new);
         sheet.sizes[v as usize] = sheet.size.size_at(&to);
+        sheet.changes.change(v);
         return true;
     }
     sheet.points[v as usize] = from;

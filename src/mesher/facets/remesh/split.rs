@@ -109,5 +109,6 @@ pub(super) fn split(sheet: &mut Sheet, a: u32, b: u32, point: Point, kind: Kind)
         sheet.around[v as usize].push(t);
         sheet.add_triangle(second);
     }
+    sheet.change_around(v);
     v
 }
