@@ -156,6 +156,25 @@ fn incidences(mesh: &Mesh) -> Vec<Incidence> {
     incidences
 }
 
+/// The direction of each of some patches or curves, once.
+fn each<T: PartialEq + Copy>(
+    all: impl Iterator<Item = T>,
+    direction: impl Fn(T) -> Option<Vector>,
+) -> Vec<(T, Option<Vector>)> {
+    let mut found: Vec<(T, Option<Vector>)> = Vec::new();
+    for one in all {
+        if !found.iter().any(|(known, _)| *known == one) {
+            found.push((one, direction(one)));
+        }
+    }
+    found
+}
+
+/// One of the directions of [`each`].
+fn of<T: PartialEq>(found: &[(T, Option<Vector>)], one: T) -> Option<Vector> {
+    found.iter().find(|(known, _)| *known == one).and_then(|(_, direction)| *direction)
+}
+
 impl Legality {
     /// Collects the boundary edges of a mesh.
     pub fn new(mesh: &Mesh, smoothness: &dyn Smoothness) -> Self {
@@ -186,17 +205,20 @@ impl Legality {
         let at = &mesh.points[vertex];
         let mut planes = Directions::default();
         let mut lines = Directions::default();
+        // Projections are slow, and a vertex has many edges on few patches.
+        let normals = each(at_vertex.iter().filter_map(|i| i.2), |patch| smoothness.normal(patch, at));
+        let tangents = each(at_vertex.iter().filter_map(|i| i.3), |curve| smoothness.tangent(curve, at));
         for (_, _, patch, curve) in at_vertex {
-            planes.add(patch.and_then(|p| smoothness.normal(p, at)));
-            lines.add(curve.and_then(|c| smoothness.tangent(c, at)));
+            planes.add(patch.and_then(|p| of(&normals, p)));
+            lines.add(curve.and_then(|c| of(&tangents, c)));
         }
         for edge in at_vertex.chunk_by(|a, b| a.1 == b.1) {
             let along = mesh.points[edge[0].1.index()] - at;
             let mut spoke = Spoke { planes: 0, lines: 0, limit: None };
             for (_, _, patch, curve) in edge {
-                let normal = patch.and_then(|p| smoothness.normal(p, at));
+                let normal = patch.and_then(|p| of(&normals, p));
                 spoke.planes |= planes.bits(normal);
-                let tangent = curve.and_then(|c| smoothness.tangent(c, at));
+                let tangent = curve.and_then(|c| of(&tangents, c));
                 spoke.lines |= lines.bits(tangent);
                 spoke.planes |= planes.bits_orthogonal(tangent);
                 // The curve's entry comes first (`None` sorts before patches) and has priority.
