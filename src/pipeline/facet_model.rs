@@ -17,7 +17,7 @@ use crate::ground::projector::{BrepProjector, Projector};
 use crate::ground::size::{Accuracy, Closeness, SizeField, SizeSettings, Source, WatchedSize};
 use crate::mesher::facets::{
     Crossing, FacetBodies, FacetError, FacetModel, FacetPatch, FacetSize, FacetSmoothness, Facets, Marks,
-    MergedSmall, RemeshSettings, SharpPlaces, Small, keep, merge, of_brep, remesh,
+    MergedSmall, RemeshSettings, SharpPlaces, Small, keep, largest_size, merge, of_brep, remesh,
 };
 use crate::mesher::improve::Smoothness;
 use crate::mesher::smoothness::BrepSmoothness;
@@ -199,10 +199,11 @@ impl FacetSolid {
     ) -> (Option<Self>, MergedSmall) {
         let Some(cad) = &self.cad else { return (None, MergedSmall::default()) };
         let factor = f64::max(SMALL, SMALL_IN_PIECES * f64::from(pieces));
+        let largest = largest.min(largest_size(&self.model, settings));
         let size = |model: &FacetModel| -> Box<dyn SizeField> {
             Box::new(AtMost(FacetSize::with_accuracy(model, settings, Accuracy::Fine), largest))
         };
-        let (merged, report) = merge(&cad.model, &cad.tessellation, &Small { factor, size: &size });
+        let (merged, report) = merge(&cad.model, &cad.tessellation, &Small { factor, largest, size: &size });
         let solid = merged.map(|(model, exact, grouping)| {
             let label = |faces: &Vec<usize>| self.names.patches[faces[0]].clone();
             let patches = grouping.patches.iter().map(label).collect();

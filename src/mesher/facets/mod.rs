@@ -54,6 +54,6 @@ pub use model::{FacetBody, FacetCurve, FacetModel, FacetPatch, Facets, Marks, Me
 pub use remesh::deviation;
 pub use remesh::{RemeshReport, RemeshSettings, remesh};
 pub use sharp_places::{SharpPlace, SharpPlaces};
-pub use size::FacetSize;
+pub use size::{FacetSize, largest_size};
 pub use small::{Grouping, MergedEdge, MergedFace, MergedSmall, NamedFace, Small, merge};
 pub use smoothness::FacetSmoothness;

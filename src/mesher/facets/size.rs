@@ -37,7 +37,7 @@ impl FacetSize {
 
     /// [`new`](Self::new), as accurate as needed.
     pub(crate) fn with_accuracy(model: &FacetModel, settings: &SizeSettings, accuracy: Accuracy) -> Self {
-        let maximum = maximum(model, settings);
+        let maximum = largest_size(model, settings);
         let mut sources = settings.sources.clone();
         sample_facets(model, settings, maximum, &mut sources);
         sample_curves(model, settings, maximum, &mut sources);
@@ -54,7 +54,7 @@ impl FacetSize {
     /// The volume mesher limits sizes by the growth from the kept edges. Finer tets than those at
     /// curved or narrow places of a coarse surface could not be connected to it.
     pub fn of_kept(model: &FacetModel, settings: &SizeSettings) -> Self {
-        let maximum = maximum(model, settings);
+        let maximum = largest_size(model, settings);
         let tree =
             SourceTree::new(model.bounds, settings.grading, maximum, &thinned(settings.sources.clone()));
         Self { tree, function: settings.function.clone() }
@@ -88,8 +88,8 @@ impl SizeField for FacetSize {
     }
 }
 
-/// The size far from all sources.
-fn maximum(model: &FacetModel, settings: &SizeSettings) -> f64 {
+/// The size far from all sources, which no other exceeds.
+pub fn largest_size(model: &FacetModel, settings: &SizeSettings) -> f64 {
     let bound = settings.maxh.unwrap_or(f64::INFINITY) * settings.scale.min(1.0);
     bound.min(model.bounds.diagonal() * settings.scale)
 }

@@ -28,6 +28,8 @@ pub struct Grouping {
 pub struct Small<'a> {
     /// An edge or face is small if elements are at least this many times as large.
     pub factor: f64,
+    /// The largest size of elements.
+    pub largest: f64,
     /// The wanted size of elements of a model.
     pub size: &'a dyn Fn(&FacetModel) -> Box<dyn SizeField>,
 }
@@ -143,8 +145,8 @@ struct Allowed {
 }
 
 impl Allowed {
-    /// Faces and edges far smaller than one of their neighbours.
-    fn of(layout: &Layout) -> Self {
+    /// Faces and edges far smaller than one of their neighbours, at most of this width or length.
+    fn of(layout: &Layout, most: f64) -> Self {
         let mut longest = vec![0.0_f64; layout.model.corners.len()];
         for &edge in &layout.curves {
             for end in layout.model.curves[edge].ends {
@@ -154,7 +156,8 @@ impl Allowed {
         let is_short = |edge: usize| {
             let ends = layout.model.curves[edge].ends;
             let neighbour = ends.into_iter().map(|end| longest[end]).fold(0.0, f64::max);
-            ends[0] != ends[1] && LONGER * layout.lengths[edge] <= neighbour
+            let is_closed = ends[0] == ends[1];
+            !is_closed && layout.lengths[edge] <= most.min(neighbour / LONGER)
         };
         let mut edges = vec![false; layout.lengths.len()];
         layout.curves.iter().for_each(|&edge| edges[edge] = is_short(edge));
@@ -163,7 +166,8 @@ impl Allowed {
             // The corner between rounded edges has only narrow faces beside it.
             let before = faces.clone();
             for face in (0..faces.len()).filter(|&face| !before[face]) {
-                faces[face] = LONGER * layout.widths[face] <= widest_near(layout, face, &before);
+                faces[face] = layout.widths[face] <= most
+                    && LONGER * layout.widths[face] <= widest_near(layout, face, &before);
             }
             if faces == before {
                 return Self { faces, edges };
@@ -194,7 +198,7 @@ pub fn merge(
 ) -> (Option<(FacetModel, BrepProjector, Grouping)>, MergedSmall) {
     let shape = Shape::new(model, tessellation);
     let layout = Layout::new(model, tessellation, shape.curves.clone(), &shape.corners);
-    let mut allowed = Allowed::of(&layout);
+    let mut allowed = Allowed::of(&layout, small.largest / small.factor);
     loop {
         if !allowed.faces.iter().chain(&allowed.edges).any(|allowed| *allowed) {
             return (None, MergedSmall::default());

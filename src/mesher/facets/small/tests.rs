@@ -23,7 +23,8 @@ fn read(name: &str) -> Model {
 fn merged_of(mut model: Model, size: f64) -> (Option<FacetModel>, MergedSmall) {
     let tessellation = Tessellation::of(&mut model, &Settings::default()).unwrap();
     let size = |_: &FacetModel| -> Box<dyn SizeField> { Box::new(Constant(size)) };
-    let (merged, report) = merge(&model, &tessellation, &Small { factor: 20.0, size: &size });
+    let (merged, report) =
+        merge(&model, &tessellation, &Small { factor: 20.0, largest: f64::INFINITY, size: &size });
     (merged.map(|(facets, ..)| facets), report)
 }
 
