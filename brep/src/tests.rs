@@ -366,6 +366,24 @@ fn cut_and_damaged_files_give_errors_or_models_but_no_panic() {
 }
 
 #[test]
+fn huge_numbers_give_errors_or_models_but_no_panic() {
+    let coarse = Settings { chord: 0.05, angle: 1.0 };
+    for name in ["cone", "loft"] {
+        let text = String::from_utf8(file(name)).unwrap();
+        let words: Vec<&str> = text.split(' ').collect();
+        let mut refused = 0;
+        for at in (0..words.len()).filter(|&at| words[at].parse::<f64>().is_ok()) {
+            let mut damaged = words.clone();
+            damaged[at] = "1e308";
+            let model = Model::read(damaged.join(" ").as_bytes());
+            let made = model.and_then(|mut model| Tessellation::of(&mut model, &coarse));
+            refused += usize::from(made.is_err());
+        }
+        assert!(refused > 0, "{name}");
+    }
+}
+
+#[test]
 fn splines_with_weighted_poles_survive_serialization() {
     let bases = [Basis::bezier(1).unwrap(), Basis::bezier(1).unwrap()];
     let poles = [1.0, 2.0, 0.5, 3.0].map(|w| Vector4::new(w, 0.1 + w, 1.0 / 3.0, w)).to_vec();

@@ -34,8 +34,10 @@ type Plane = ConstrainedDelaunayTriangulation<Node>;
 
 /// The most triangles of a patch.
 const MOST_TRIANGLES: usize = 400_000;
+/// The most triangles in all rounds: their number grows by a third or more in each.
+const MOST_VISITS: usize = 4 * MOST_TRIANGLES;
 /// The most rounds of refinement.
-const MOST_ROUNDS: usize = 80;
+const MOST_ROUNDS: usize = 50;
 /// Edges shorter than this (fraction of the diagonal) are not divided for their angle: surfaces may
 /// have kinks.
 const SHORTEST: f64 = 3e-4;
@@ -142,6 +144,10 @@ fn middle(a: &Node, b: &Node) -> Point2<f64> {
     Point2::new(0.5 * (a.scaled.x + b.scaled.x), 0.5 * (a.scaled.y + b.scaled.y))
 }
 
+fn is_finite(p: &Point2<f64>) -> bool {
+    p.x.is_finite() && p.y.is_finite()
+}
+
 fn sorted(a: usize, b: usize) -> [usize; 2] {
     [a.min(b), a.max(b)]
 }
@@ -170,6 +176,11 @@ impl Face<'_> {
         }
         for node in nodes.iter().copied() {
             let vertex = node.vertex;
+            if !is_finite(&node.scaled) {
+                let place = out.points.get(vertex as usize).copied();
+                let what = "its edges have no finite place in the parameters of its surface";
+                return Err(Failure::Final(BrepError::face(self.number, what, place)));
+            }
             let count = self.plane.num_vertices();
             let before = self.plane.locate_vertex(node.scaled).map(|old| old.data().vertex);
             let handle = self.plane.insert(node).map_err(|_| self.crossing(vertex, out))?;
@@ -252,12 +263,14 @@ impl Face<'_> {
     /// Divides inner edges until the triangles are close to the surface.
     fn refine(&mut self, out: &Tessellation) -> Result<(), Failure> {
         let mut known = Errors::default();
+        let mut visits = 0;
         for _ in 0..MOST_ROUNDS {
             let triangles = self.triangles();
+            visits += triangles.len();
             if triangles.is_empty() {
                 return Err(Failure::Final(BrepError::face(self.number, "its loops enclose no area", None)));
             }
-            if triangles.len() > MOST_TRIANGLES {
+            if triangles.len() > MOST_TRIANGLES || visits > MOST_VISITS {
                 let what = format!("more than {MOST_TRIANGLES} triangles are needed on it");
                 return Err(Failure::Final(BrepError::face(self.number, what, None)));
             }
@@ -270,7 +283,7 @@ impl Face<'_> {
         }
         // Triangles beside coarse sides may be folded however small they are.
         let what = "the refinement of its triangles does not end";
-        Err(Failure::Coarse(BrepError::face(self.number, what, None)))
+        Err(self.folded(what))
     }
 
     /// Refuses folded triangles, which only finer sides would unfold.
@@ -282,8 +295,13 @@ impl Face<'_> {
         if !self.tolerances.refuses_folds || !triangles.iter().any(|t| is_folded(&t)) {
             return Ok(());
         }
-        let what = "its triangles are folded beside its curves";
-        Err(Failure::Coarse(BrepError::face(self.number, what, None)))
+        Err(self.folded("its triangles are folded beside its curves"))
+    }
+
+    /// The failure of triangles that finer sides may unfold.
+    fn folded(&self, what: &str) -> Failure {
+        let error = BrepError::face(self.number, what, None);
+        if self.tolerances.refuses_folds { Failure::Coarse(error) } else { Failure::Final(error) }
     }
 
     /// The corners at both ends of the side of a triangle that is opposite corner `k`.
@@ -411,7 +429,7 @@ impl Face<'_> {
             if both.iter().any(|&t| self.encroaches(scaled, &triangles[t])) {
                 continue;
             }
-            if self.plane.locate_vertex(scaled).is_some() {
+            if !is_finite(&scaled) || self.plane.locate_vertex(scaled).is_some() {
                 continue;
             }
             both.iter().for_each(|&t| is_changed[t] = true);

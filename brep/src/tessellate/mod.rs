@@ -62,6 +62,11 @@ const MOST_RETRIES: usize = 6;
 /// How often of these, at most, because of folded triangles: at kinks no division unfolds them.
 const UNFOLDING_RETRIES: usize = 3;
 
+/// Curves are not divided into more points in all than this to try again, ...
+const MOST_POINTS: usize = 30_000;
+/// ... unless the first division has so many times fewer.
+const MOST_GROWTH: usize = 4;
+
 impl Tessellation {
     /// Triangulates all patches.
     ///
@@ -73,10 +78,15 @@ impl Tessellation {
         let chord = settings.chord * diagonal;
         let mut tolerances = face::Tolerances { chord, angle: settings.angle, diagonal, refuses_folds: true };
         let mut chords = vec![tolerances.chord; model.curves.len()];
-        let mut failed = None;
+        let (mut failed, mut most_points) = (None, 0);
         for retry in 0..MOST_RETRIES {
             tolerances.refuses_folds = retry < UNFOLDING_RETRIES;
             let mut out = Self::of_curves(model, &chords, settings.angle, diagonal)?;
+            if retry == 0 {
+                most_points = MOST_POINTS.max(MOST_GROWTH * out.points.len());
+            } else if out.points.len() > most_points {
+                break;
+            }
             let mut conflicts = Vec::new();
             let of_patch = |patch| face::triangulate(model, patch, &out, &tolerances);
             let made: Vec<_> = (0..model.patches.len()).into_par_iter().map(of_patch).collect();
@@ -104,7 +114,7 @@ impl Tessellation {
                 }
             }
         }
-        Err(failed.expect("a conflict was found in each round"))
+        Err(failed.expect("there was a conflict before each retry"))
     }
 
     fn of_curves(model: &Model, chords: &[f64], angle: f64, diagonal: f64) -> Result<Self, BrepError> {

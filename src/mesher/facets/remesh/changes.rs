@@ -38,9 +38,9 @@ impl Changes {
     }
 
     /// Whether a move was tried in vain since the last change of the vertices of its triangles.
-    pub fn is_move_in_vain(&self, v: u32, vertices: impl Iterator<Item = u32>) -> bool {
+    pub fn is_move_in_vain(&self, v: u32, mut vertices: impl Iterator<Item = u32>) -> bool {
         let when = self.moves[v as usize];
-        vertices.into_iter().all(|w| self.changed[w as usize] <= when)
+        vertices.all(|w| self.changed[w as usize] <= when)
     }
 
     pub fn move_was_in_vain(&mut self, v: u32) {
