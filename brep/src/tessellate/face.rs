@@ -34,8 +34,10 @@ type Plane = ConstrainedDelaunayTriangulation<Node>;
 
 /// The most triangles of a patch.
 const MOST_TRIANGLES: usize = 400_000;
-/// The most triangles in all rounds: their number grows by a third or more in each.
-const MOST_VISITS: usize = 4 * MOST_TRIANGLES;
+/// The most triangles in all rounds: 9 to 18 times those of the last one where refinement ends.
+const MOST_VISITS: usize = 10 * MOST_TRIANGLES;
+/// What is wrong if this is not enough.
+const ENDLESS: &str = "the refinement of its triangles does not end";
 /// The most rounds of refinement.
 const MOST_ROUNDS: usize = 50;
 /// Edges shorter than this (fraction of the diagonal) are not divided for their angle: surfaces may
@@ -270,9 +272,12 @@ impl Face<'_> {
             if triangles.is_empty() {
                 return Err(Failure::Final(BrepError::face(self.number, "its loops enclose no area", None)));
             }
-            if triangles.len() > MOST_TRIANGLES || visits > MOST_VISITS {
+            if triangles.len() > MOST_TRIANGLES {
                 let what = format!("more than {MOST_TRIANGLES} triangles are needed on it");
                 return Err(Failure::Final(BrepError::face(self.number, what, None)));
+            }
+            if visits > MOST_VISITS {
+                return Err(Failure::Final(BrepError::face(self.number, ENDLESS, None)));
             }
             let tangled = self.tangled(&triangles);
             self.measure(&triangles, &mut known, out);
@@ -282,8 +287,7 @@ impl Face<'_> {
             }
         }
         // Triangles beside coarse sides may be folded however small they are.
-        let what = "the refinement of its triangles does not end";
-        Err(self.folded(what))
+        Err(self.folded(ENDLESS))
     }
 
     /// Refuses folded triangles, which only finer sides would unfold.
