@@ -56,7 +56,8 @@ pub struct Tessellation {
     pub gap: f64,
 }
 
-/// How often the division of curves is refined because loops of a patch cross.
+/// How often curves are divided, more finely each time because loops of a patch cross or triangles
+/// are folded.
 const MOST_RETRIES: usize = 6;
 
 /// How often of these, at most, because of folded triangles: at kinks no division unfolds them.
