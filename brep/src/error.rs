@@ -46,6 +46,9 @@ pub enum BrepError {
     /// The file has no solid.
     #[error("the file has no solid, only {0}: sew its faces to a solid in the CAD program")]
     NoSolid(String),
+    /// The file is an assembly of parts in other files.
+    #[error("its parts are in other files: {0}: give those, or export the assembly as one file")]
+    OtherFiles(String),
 }
 
 fn at(place: &Option<Point>) -> String {

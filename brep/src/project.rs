@@ -115,7 +115,7 @@ pub fn project_to_surface(surface: &Surface, point: &Point, start: [f64; 2]) -> 
         return SurfaceFoot { parameters: [u, v], point: foot, normal, is_converged: true };
     }
     let mut jet = surface.jet(u, v, 2);
-    let scale = point.coords.amax().max(jet.d[0][0].amax());
+    let scale = point.coords.amax().max(jet.d[0][0].amax()).max(surface.largest_term(v));
     for _ in 0..STEPS {
         let d = &jet.d;
         let way = d[0][0] - point.coords;

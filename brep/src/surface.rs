@@ -246,6 +246,38 @@ impl Surface {
         }
     }
 
+    /// The largest coordinate from which a point is computed: rounding is relative to it.
+    pub(crate) fn largest_term(&self, v: f64) -> f64 {
+        match self {
+            Self::Round { origin, axes, profile } => {
+                let length = axes.iter().map(|axis| axis.norm()).fold(0.0, f64::max);
+                let [radius, height] = match *profile {
+                    Profile::Line { radius, slope: [a, b] } => {
+                        [radius.abs().max((v * a).abs()), (v * b).abs()]
+                    }
+                    Profile::Circle { major, minor } => [major + minor.abs(), minor.abs()],
+                };
+                origin.amax().max(length * radius.max(height))
+            }
+            _ => 0.0,
+        }
+    }
+
+    /// A cone with v = 0 at the height of a point; other surfaces as they are. Files give radii far
+    /// from the part that are a thousand times its size, and their digits are lost.
+    pub(crate) fn measured_from(self, point: &Point) -> Self {
+        match self {
+            Self::Round { origin, axes, profile: Profile::Line { radius, slope: [a, b] } }
+                if a != 0.0 && b != 0.0 =>
+            {
+                let height = (point.coords - origin).dot(&axes[2]) / axes[2].norm_squared();
+                let profile = Profile::Line { radius: radius + height / b * a, slope: [a, b] };
+                Self::Round { origin: origin + axes[2] * height, axes, profile }
+            }
+            other => other,
+        }
+    }
+
     /// Whether evaluation finds all poles that it needs.
     pub fn is_sound(&self) -> bool {
         match self {

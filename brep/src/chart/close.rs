@@ -4,6 +4,7 @@
 //! joined by a seam. A surface that is closed in both directions is cut along seams, if no loop
 //! bounds it from outside.
 
+use super::route::Obstacles;
 use super::trace::Loop;
 use super::{Chart, Parameters, Side};
 use crate::bspline::{Basis, SplineCurve};
@@ -29,7 +30,12 @@ pub(crate) fn close(
 ) -> Result<Vec<Vec<Side>>, BrepError> {
     let (mut around, mut plain): (Vec<Loop>, Vec<Loop>) = loops.into_iter().partition(|l| l.drift != [0; 2]);
     let mut closing = Closing { chart, face, model };
-    let holes: Vec<Vec<Parameters>> = plain.iter().map(|l| outline(&l.sides)).collect();
+    let closed = |l: &Loop| {
+        let mut chain = outline(&l.sides);
+        chain.extend(chain.first().copied());
+        chain
+    };
+    let holes = Obstacles { chart, chains: plain.iter().map(closed).collect() };
     let mut bounds: Vec<Vec<Side>> = Vec::new();
     if let Some(first) = around.first() {
         let Some(direction) = direction(first).filter(|&d| around.iter().all(|l| direction(l) == Some(d)))
@@ -83,6 +89,13 @@ fn outline(sides: &[Side]) -> Vec<Parameters> {
     sides.iter().flat_map(|side| side.nodes[..side.nodes.len() - 1].iter().map(|node| node.1)).collect()
 }
 
+/// The nodes of a loop from its start to its end, which differ by its drift.
+fn chain(sides: &[Side]) -> Vec<Parameters> {
+    let mut chain = outline(sides);
+    chain.extend(sides.last().map(Side::end));
+    chain
+}
+
 /// The area in the parameters, positive if counterclockwise.
 fn area(sides: &[Side]) -> f64 {
     let all = outline(sides);
@@ -116,14 +129,6 @@ fn crossings(outline: &[Parameters], p: Parameters) -> usize {
     outline.iter().zip(next).filter(|(a, b)| crosses(a, b)).count()
 }
 
-/// Whether two segments cross.
-fn is_crossing([a, b]: [Parameters; 2], [c, d]: [Parameters; 2]) -> bool {
-    let side = |p: Parameters, q: Parameters, r: Parameters| {
-        (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]) > 0.0
-    };
-    side(a, b, c) != side(a, b, d) && side(c, d, a) != side(c, d, b)
-}
-
 struct Closing<'a> {
     chart: &'a Chart<'a>,
     face: usize,
@@ -135,25 +140,12 @@ impl Closing<'_> {
         BrepError::face(self.face, what, None)
     }
 
-    /// Whether a segment crosses loops at any period.
-    fn is_blocked(&self, segment: [Parameters; 2], loops: &[Vec<Parameters>]) -> bool {
-        let rounds = |i: usize| if self.chart.periods[i].is_some() { -2..=2 } else { 0..=0 };
-        let crosses = |outline: &Vec<Parameters>, by: [i32; 2]| {
-            let next = outline.iter().cycle().skip(1);
-            outline
-                .iter()
-                .zip(next)
-                .any(|(p, q)| is_crossing(segment, [self.chart.shifted(*p, by), self.chart.shifted(*q, by)]))
-        };
-        loops.iter().any(|outline| rounds(0).any(|i| rounds(1).any(|j| crosses(outline, [i, j]))))
-    }
-
     /// Joins loops around a surface in pairs, from the lowest to the highest.
     fn join_all(
         &mut self,
         loops: Vec<Loop>,
         direction: usize,
-        holes: &[Vec<Parameters>],
+        holes: &Obstacles,
     ) -> Result<Vec<Vec<Side>>, BrepError> {
         // With the face to the left, a lower loop goes up in u, a left one down in v.
         let is_lower = |l: &Loop| (l.drift[direction] > 0) == (direction == 0);
@@ -206,7 +198,7 @@ impl Closing<'_> {
         lower: Loop,
         upper: Loop,
         direction: usize,
-        holes: &[Vec<Parameters>],
+        holes: &Obstacles,
     ) -> Result<Vec<Side>, BrepError> {
         let period = self.chart.periods[direction].expect("loops go around");
         let mut best: Option<(f64, usize, usize, i32)> = None;
@@ -219,7 +211,7 @@ impl Closing<'_> {
                 by[direction] = rounds;
                 let to = self.chart.shifted(to, by);
                 let mut way = (to[direction] - from[direction]).abs();
-                if self.is_blocked([from, to], holes) {
+                if holes.block([from, to]) {
                     way += 10.0 * period;
                 }
                 if best.is_none_or(|(least, ..)| way < least) {
@@ -227,20 +219,51 @@ impl Closing<'_> {
                 }
             }
         }
-        let (_, a, b, rounds) = best.ok_or_else(|| self.error("its loops have no vertices"))?;
+        let (_, a, b, mut rounds) = best.ok_or_else(|| self.error("its loops have no vertices"))?;
+        let first = self.started(&lower, a, [0; 2]);
+        let from = first[first.len() - 1].end();
         let mut by = [0; 2];
         by[direction] = rounds;
-        let first = self.started(&lower, a, [0; 2]);
+        let mut way = vec![self.chart.shifted(upper.sides[b].start(), by)];
+        if holes.block([from, way[0]]) {
+            let mut around = Obstacles { chart: self.chart, chains: holes.chains.clone() };
+            around.chains.extend([&lower, &upper].map(|one| chain(&one.sides)));
+            if let Some(found) = around.way([from, way[0]], direction) {
+                let period_moved = (found[found.len() - 1][direction] - way[0][direction]) / period;
+                rounds += period_moved.round() as i32;
+                way = found;
+            }
+        }
+        by[direction] = rounds;
         let second = self.started(&upper, b, by);
-        let (from, to) = (first[first.len() - 1].end(), second[0].start());
         let ends = [self.corner_before(&first[0]), self.corner_before(&second[0])];
-        let seam = self.seam(from, to, ends);
-        let back = [second[second.len() - 1].end(), first[0].start()];
-        let mut out = first;
-        out.push(Side::straight(seam, true, from, to));
-        out.extend(second);
-        out.push(Side::straight(seam, false, back[0], back[1]));
-        Ok(out)
+        let last = second[second.len() - 1].end();
+        let (forth, back) = self.seams(from, way, ends, last);
+        Ok(first.into_iter().chain(forth).chain(second).chain(back).collect())
+    }
+
+    /// The sides of a seam along bends, and those back: moved so that they begin at `back_from`.
+    fn seams(
+        &mut self,
+        from: Parameters,
+        way: Vec<Parameters>,
+        ends: [usize; 2],
+        back_from: Parameters,
+    ) -> (Vec<Side>, Vec<Side>) {
+        let last = way[way.len() - 1];
+        let by = [0, 1].map(|i| back_from[i] - last[i]);
+        let moved = |p: Parameters| [p[0] + by[0], p[1] + by[1]];
+        let (mut forth, mut back) = (Vec::new(), Vec::new());
+        let (mut at, mut corner) = (from, ends[0]);
+        for (k, &to) in way.iter().enumerate() {
+            let next = if k + 1 == way.len() { ends[1] } else { self.corner(to) };
+            let seam = self.seam(at, to, [corner, next]);
+            forth.push(Side::straight(seam, true, at, to));
+            back.push(Side::straight(seam, false, moved(to), moved(at)));
+            (at, corner) = (to, next);
+        }
+        back.reverse();
+        (forth, back)
     }
 
     /// Joins a loop to a pole.
@@ -249,7 +272,7 @@ impl Closing<'_> {
         one: Loop,
         direction: usize,
         is_upper: bool,
-        holes: &[Vec<Parameters>],
+        holes: &Obstacles,
     ) -> Result<Vec<Side>, BrepError> {
         let Some(height) = self.chart.surface.pole(1 - direction, is_upper, self.chart.least()) else {
             return Err(self.error(UNBOUNDED));
@@ -261,21 +284,31 @@ impl Closing<'_> {
         };
         let is_free = |&k: &usize| {
             let from = one.sides[k].start();
-            !self.is_blocked([from, top(from)], holes)
+            !holes.block([from, top(from)])
         };
-        let k = (0..one.sides.len()).find(is_free).unwrap_or(0);
-        let mut out = self.started(&one, k, [0; 2]);
+        let free = (0..one.sides.len()).find(is_free);
+        let mut out = self.started(&one, free.unwrap_or(0), [0; 2]);
         let (start, end) = (out[0].start(), out[out.len() - 1].end());
-        let pole = self.corner(top(start));
-        let seam = self.seam(end, top(end), [self.corner_before(&out[0]), pole]);
-        out.push(Side::straight(seam, true, end, top(end)));
-        out.push(Side::at_corner(pole, top(end), top(start)));
-        out.push(Side::straight(seam, false, top(start), start));
+        let mut way = vec![top(end)];
+        if free.is_none() {
+            let mut around = Obstacles { chart: self.chart, chains: holes.chains.clone() };
+            around.chains.push(chain(&one.sides));
+            way = around.way([end, top(end)], direction).unwrap_or(way);
+        }
+        let tip = way[way.len() - 1];
+        let drift = [0, 1].map(|i| start[i] - end[i]);
+        let back_from = [tip[0] + drift[0], tip[1] + drift[1]];
+        let pole = self.corner(tip);
+        let ends = [self.corner_before(&out[0]), pole];
+        let (forth, back) = self.seams(end, way, ends, back_from);
+        out.extend(forth);
+        out.push(Side::at_corner(pole, tip, back_from));
+        out.extend(back);
         Ok(out)
     }
 
     /// The boundary of a whole closed surface in its parameters, with a seam that crosses no hole.
-    fn whole(&mut self, holes: &[Vec<Parameters>]) -> Result<Vec<Side>, BrepError> {
+    fn whole(&mut self, holes: &Obstacles) -> Result<Vec<Side>, BrepError> {
         let chart = self.chart;
         let Some(period) = chart.periods[0] else { return Err(self.error(UNBOUNDED)) };
         if let Some(other) = chart.periods[1] {
@@ -285,8 +318,7 @@ impl Closing<'_> {
                 [u, v + other * (k / PLACES) as f64 / PLACES as f64]
             });
             let is_free = |[u, v]: &Parameters| {
-                !self.is_blocked([[*u, *v], [u + period, *v]], holes)
-                    && !self.is_blocked([[*u, *v], [*u, v + other]], holes)
+                !holes.block([[*u, *v], [u + period, *v]]) && !holes.block([[*u, *v], [*u, v + other]])
             };
             let [u, v] = tries.into_iter().find(is_free).unwrap_or(place(0));
             let corner = self.corner([u, v]);
@@ -303,7 +335,7 @@ impl Closing<'_> {
         let poles = [false, true].map(|is_upper| chart.surface.pole(1, is_upper, self.chart.least()));
         let [Some(low), Some(high)] = poles else { return Err(self.error(UNBOUNDED)) };
         let place = |k: usize| period * (k as f64 + 0.37) / PLACES as f64;
-        let is_free = |u: &f64| !self.is_blocked([[*u, low], [*u, high]], holes);
+        let is_free = |u: &f64| !holes.block([[*u, low], [*u, high]]);
         let u = (0..PLACES).map(place).find(is_free).unwrap_or(place(0));
         let ends = [self.corner([u, low]), self.corner([u, high])];
         let seam = self.seam([u, low], [u, high], ends);

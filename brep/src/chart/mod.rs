@@ -5,6 +5,7 @@
 //! surface are then joined by seams, or to a pole.
 
 mod close;
+mod route;
 mod trace;
 
 pub(crate) use close::close;

@@ -7,6 +7,7 @@ mod geometry;
 mod glue;
 mod record;
 mod splines;
+mod split;
 #[cfg(test)]
 mod tests;
 mod text;
@@ -20,6 +21,7 @@ use crate::model::{Fin, Model, On, Patch};
 use crate::tessellate::diagonal;
 use crate::{BrepError, EdgeCurve, Surface};
 use rayon::prelude::*;
+use std::collections::BTreeSet;
 use topology::{Face, Shapes, reversed};
 
 /// Reads the solids of a file.
@@ -31,6 +33,10 @@ pub(crate) fn read(text: &[u8], unit: Unit) -> Result<Model, BrepError> {
     let records = text::read(text)?;
     let (solids, metres) = assembly::solids(&records, unit)?;
     if solids.is_empty() {
+        let files: BTreeSet<String> = record::nodes(&records).filter_map(other_file).collect();
+        if !files.is_empty() {
+            return Err(BrepError::OtherFiles(files.into_iter().collect::<Vec<_>>().join(", ")));
+        }
         let count = |kind: &str| record::nodes(&records).filter(|node| node.is(kind)).count();
         let faces = count("ADVANCED_FACE") + count("FACE_SURFACE");
         return Err(BrepError::NoSolid(format!("{faces} faces and {} edges", count("EDGE_CURVE"))));
@@ -49,10 +55,18 @@ pub(crate) fn read(text: &[u8], unit: Unit) -> Result<Model, BrepError> {
     Ok(model)
 }
 
+/// The name of a file that holds a part (ISO 10303-41, external references).
+fn other_file(node: record::Node) -> Option<String> {
+    let name = node.get("DOCUMENT_FILE")?.text(0)?;
+    name.contains('.').then_some(name)
+}
+
 /// Makes patches of faces.
 fn build(model: &mut Model, mut shapes: Shapes) -> Result<(), BrepError> {
     let size = diagonal(&shapes.corners, &shapes.curves);
     glue::glue_edges(&mut shapes, size);
+    split::divide_at_poles(&mut shapes, size);
+    model.notes.extend(split::drop_spurs(&mut shapes));
     (model.corners, model.curves) = (std::mem::take(&mut shapes.corners), std::mem::take(&mut shapes.curves));
     let mut names = Vec::new();
     // On all threads: the steps along edges take most of the time.

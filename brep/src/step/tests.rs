@@ -1,7 +1,7 @@
 //! Files of other programs and hand-made ones: faces without seams, units, damage.
 
 use super::text::decoded;
-use crate::{BrepError, Model, Settings, Tessellation, Unit, tessellate};
+use crate::{BrepError, Model, Point, Settings, Tessellation, Unit, tessellate};
 use std::f64::consts::PI;
 use std::fmt::Write;
 
@@ -76,11 +76,20 @@ impl Text {
         self.face(plane, &[bound])
     }
 
+    fn shell(&mut self, faces: &[u32]) -> u32 {
+        let faces: Vec<String> = faces.iter().map(|f| format!("#{f}")).collect();
+        self.add(&format!("CLOSED_SHELL('',({}))", faces.join(",")))
+    }
+
     /// The text of a file with one solid.
     fn solid(mut self, faces: &[u32]) -> String {
-        let faces: Vec<String> = faces.iter().map(|f| format!("#{f}")).collect();
-        let shell = self.add(&format!("CLOSED_SHELL('',({}))", faces.join(",")));
+        let shell = self.shell(faces);
         let solid = self.add(&format!("MANIFOLD_SOLID_BREP('part',#{shell})"));
+        self.of_solid(solid)
+    }
+
+    /// The text of a file with a solid.
+    fn of_solid(mut self, solid: u32) -> String {
         let unit = self.add("( LENGTH_UNIT() NAMED_UNIT(*) SI_UNIT(.MILLI.,.METRE.) )");
         let context = self.add(&format!(
             "( GEOMETRIC_REPRESENTATION_CONTEXT(3) GLOBAL_UNIT_ASSIGNED_CONTEXT((#{unit})) \
@@ -136,14 +145,20 @@ fn a_loop_around_a_sphere_or_a_cone_ends_at_its_pole() {
     let faces = [text.face(surface, &[bound]), text.disk(rim, 0.0, false)];
     assert_near(volumes(&text.solid(&faces), Unit::OfFile).1[0], 2.0 / 3.0 * PI);
 
-    // A cone that narrows downward, in degrees by its context: radius 1 at height 0, tip at -1.
-    let mut text = Text::new();
-    let rim = text.circle(1.0, 0.0, 0.5);
-    let frame = text.frame(0.0, 1.0);
-    let surface = text.add(&format!("CONICAL_SURFACE('',#{frame},1.,{:?})", PI / 4.0));
-    let bound = text.bound(rim, false);
-    let faces = [text.face(surface, &[bound]), text.disk(rim, 0.0, true)];
-    assert_near(volumes(&text.solid(&faces), Unit::OfFile).1[0], PI / 3.0);
+    // A cone that narrows downward: radius 1 at height 0, tip at -1. Its radius is given far above.
+    for height in [0.0, 1e6] {
+        let mut text = Text::new();
+        let rim = text.circle(1.0, 0.0, 0.5);
+        let frame = text.frame(height, 1.0);
+        let surface = text.add(&format!("CONICAL_SURFACE('',#{frame},{:?},{:?})", 1.0 + height, PI / 4.0));
+        let bound = text.bound(rim, false);
+        let faces = [text.face(surface, &[bound]), text.disk(rim, 0.0, true)];
+        let (model, volumes) = volumes(&text.solid(&faces), Unit::OfFile);
+        assert_near(volumes[0], PI / 3.0);
+        let foot =
+            crate::project_to_surface(&model.patches[0].surface, &Point::new(0.3, 0.4, -0.5), [1.0, 0.1]);
+        assert!(foot.is_converged && (foot.point - Point::new(0.3, 0.4, -0.5)).norm() < 1e-9, "{foot:?}");
+    }
 }
 
 #[test]
@@ -200,6 +215,92 @@ fn loops_the_wrong_way_around_are_turned() {
     let bounds = [text.bound(low, false), text.bound(high, true)];
     let faces = [text.face(surface, &bounds), text.disk(low, 0.0, false), text.disk(high, 2.0, true)];
     assert_near(volumes(&text.solid(&faces), Unit::OfFile).1[0], 2.0 * PI);
+}
+
+/// A cylinder of radius 1 from z = 0 to 2, whose upper face looks up or down.
+fn cylinder(text: &mut Text, looks_up: bool) -> [u32; 3] {
+    let (low, high) = (text.circle(1.0, 0.0, 0.0), text.circle(1.0, 2.0, 0.0));
+    let frame = text.frame(0.0, 1.0);
+    let surface = text.add(&format!("CYLINDRICAL_SURFACE('',#{frame},1.)"));
+    let bounds = [text.bound(low, true), text.bound(high, false)];
+    [text.face(surface, &bounds), text.disk(low, 0.0, false), text.disk(high, 2.0, looks_up)]
+}
+
+#[test]
+fn a_face_that_points_inside_is_turned() {
+    for (looks_up, notes) in [(true, 0), (false, 1)] {
+        let mut text = Text::new();
+        let faces = cylinder(&mut text, looks_up);
+        let (model, volumes) = volumes(&text.solid(&faces), Unit::OfFile);
+        assert_near(volumes[0], 2.0 * PI);
+        assert_eq!(model.notes.len(), notes, "{:?}", model.notes);
+    }
+}
+
+#[test]
+fn voids_are_voids_however_they_are_oriented() {
+    for (orientation, notes) in [("F", 0), ("T", 1)] {
+        let mut text = Text::new();
+        let faces = cylinder(&mut text, true);
+        let frame = text.frame(1.0, 1.0);
+        let surface = text.add(&format!("SPHERICAL_SURFACE('',#{frame},0.5)"));
+        let bound = text.vertex_bound();
+        let ball = text.face(surface, &[bound]);
+        let [outer, inner] = [text.shell(&faces), text.shell(&[ball])];
+        let void = text.add(&format!("ORIENTED_CLOSED_SHELL('',*,#{inner},.{orientation}.)"));
+        let solid = text.add(&format!("BREP_WITH_VOIDS('part',#{outer},(#{void}))"));
+        let (model, volumes) = volumes(&text.of_solid(solid), Unit::OfFile);
+        assert_near(volumes[0], 2.0 * PI - PI / 6.0);
+        assert_eq!(model.notes.len(), notes, "{:?}", model.notes);
+    }
+}
+
+#[test]
+fn an_edge_through_both_poles_of_a_sphere_is_divided_there() {
+    // The half with x > 0; its only edge starts where y = 1.
+    let mut text = Text::new();
+    let point = text.point(0.0, 1.0, 0.0);
+    let vertex = text.add(&format!("VERTEX_POINT('',#{point})"));
+    let frame = text.frame_at([0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]);
+    let circle = text.add(&format!("CIRCLE('',#{frame},1.)"));
+    let rim = text.add(&format!("EDGE_CURVE('',#{vertex},#{vertex},#{circle},.T.)"));
+    let frame = text.frame(0.0, 1.0);
+    let sphere = text.add(&format!("SPHERICAL_SURFACE('',#{frame},1.)"));
+    let bound = text.bound(rim, true);
+    let half = text.face(sphere, &[bound]);
+    let frame = text.frame_at([0.0; 3], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]);
+    let plane = text.add(&format!("PLANE('',#{frame})"));
+    let bound = text.bound(rim, false);
+    let disk = text.face(plane, &[bound]);
+    let (model, volumes) = volumes(&text.solid(&[half, disk]), Unit::OfFile);
+    assert_near(volumes[0], 2.0 / 3.0 * PI);
+    assert_eq!(model.curves.len(), 3);
+}
+
+#[test]
+fn an_edge_into_a_plane_and_back_is_left_out() {
+    let mut text = Text::new();
+    let faces = cylinder(&mut text, true);
+    let end = text.point(0.3, 0.0, 2.0);
+    let end = text.add(&format!("VERTEX_POINT('',#{end})"));
+    let direction = text.add("DIRECTION('',(-1.,0.,0.))");
+    let vector = text.add(&format!("VECTOR('',#{direction},1.)"));
+    let start = text.point(1.0, 0.0, 2.0);
+    let line = text.add(&format!("LINE('',#{start},#{vector})"));
+    // The vertex and the loop of the upper circle.
+    let uses = |text: &Text, what: &str| -> u32 {
+        let record = text.0.lines().filter(|line| line.contains(what)).nth(1).unwrap();
+        record[1..].split(' ').next().unwrap().parse().unwrap()
+    };
+    let vertex = uses(&text, "VERTEX_POINT");
+    let spur = text.add(&format!("EDGE_CURVE('',#{vertex},#{end},#{line},.T.)"));
+    let [forth, back] = ["T", "F"].map(|flag| text.add(&format!("ORIENTED_EDGE('',*,*,#{spur},.{flag}.)")));
+    let solid = text.solid(&faces);
+    let last = solid.rfind("EDGE_LOOP('',(").unwrap() + "EDGE_LOOP('',(".len();
+    let solid = format!("{}#{forth},#{back},{}", &solid[..last], &solid[last..]);
+    let (model, volumes) = volumes(&solid, Unit::OfFile);
+    assert_near(volumes[0], 2.0 * PI);
+    assert_eq!(model.notes.len(), 1, "{:?}", model.notes);
 }
 
 #[test]
@@ -294,6 +395,10 @@ fn errors_name_the_record_and_its_line() {
     assert!(missing.contains("line ") && missing.contains("there is no #99999"), "{missing}");
     let none = Model::read_step(b"ISO-10303-21;HEADER;ENDSEC;DATA;ENDSEC;END-ISO-10303-21;", Unit::OfFile);
     assert!(matches!(none, Err(BrepError::NoSolid(_))));
+    let parts =
+        b"ISO-10303-21;HEADER;ENDSEC;DATA;#1=DOCUMENT_FILE('part.stp','','',$,'',$);ENDSEC;END-ISO-10303-21;";
+    let other = Model::read_step(parts, Unit::OfFile).unwrap_err().to_string();
+    assert!(other.contains("in other files: part.stp"), "{other}");
     assert!(Model::read_step(b"solid", Unit::OfFile).unwrap_err().to_string().contains("no STEP file"));
 }
 

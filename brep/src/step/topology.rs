@@ -121,6 +121,10 @@ impl Reader<'_> {
                 loops.push(if is_kept { edges } else { reversed(edges) });
             }
         }
+        let own = match loops.first().and_then(|edges| edges.first()) {
+            Some(edge) => own.measured_from(&self.shapes.corners[self.shapes.curves[edge.0].ends[0]].point),
+            None => own,
+        };
         let is_mirrored = self.placement.is_mirrored();
         if is_mirrored {
             loops = loops.into_iter().map(reversed).collect();
@@ -285,7 +289,7 @@ impl Reader<'_> {
 }
 
 /// Vertices further from their curve than this (fraction of its size) do not belong to it.
-const FARTHEST: f64 = 1e-2;
+const FARTHEST: f64 = 5e-2;
 
 /// The size of a bounded curve; 0 of an unbounded one.
 fn size(curve: &Curve<3>) -> f64 {

@@ -1,4 +1,4 @@
-//! Areas, volumes, orientation and closedness of tessellations.
+//! Areas, volumes and closedness of tessellations.
 
 use super::Tessellation;
 use crate::{BrepError, Model, Point};
@@ -20,27 +20,19 @@ pub fn volume(model: &Model, tessellation: &Tessellation, body: usize) -> f64 {
     let of = |t: &super::Triangle| {
         let [behind, front] = model.patches[t.patch as usize].bodies;
         let sign = f64::from(i8::from(behind == Some(body)) - i8::from(front == Some(body)));
-        let [a, b, c] = t.vertices.map(|v| tessellation.points[v as usize] - origin);
-        sign * a.dot(&b.cross(&c)) / 6.0
+        sign * enclosed(&[t.vertices.map(|v| tessellation.points[v as usize])], origin)
     };
     tessellation.triangles.iter().map(of).sum()
 }
 
-/// Turns bodies that are inside out.
-pub(super) fn orient(model: &mut Model, tessellation: &Tessellation) -> Result<(), BrepError> {
-    let volumes: Vec<f64> = (0..model.bodies).map(|body| volume(model, tessellation, body)).collect();
-    for (body, _) in volumes.into_iter().enumerate().filter(|(_, volume)| *volume < 0.0) {
-        model.notes.push(format!("solid {} was inside out", body + 1));
-        for (number, patch) in model.patches.iter_mut().enumerate() {
-            let Some(side) = patch.bodies.iter().position(|b| *b == Some(body)) else { continue };
-            if patch.bodies[1 - side].is_some() {
-                let what = "the solids on its sides have different orientations";
-                return Err(BrepError::face(number, what, None));
-            }
-            patch.bodies.swap(0, 1);
-        }
-    }
-    Ok(())
+/// The volume of the tets between triangles and a point; that within the triangles if they are
+/// closed.
+pub(super) fn enclosed(triangles: &[[Point; 3]], from: Point) -> f64 {
+    let of = |t: &[Point; 3]| {
+        let [a, b, c] = t.map(|p| p - from);
+        a.dot(&b.cross(&c)) / 6.0
+    };
+    triangles.iter().map(of).sum()
 }
 
 /// Checks that the triangles around each body are closed and oriented alike.

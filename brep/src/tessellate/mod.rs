@@ -10,6 +10,7 @@ mod curves;
 mod face;
 mod frame;
 mod measure;
+mod orient;
 
 pub(crate) use curves::diagonal;
 pub use measure::{area, check, volume};
@@ -102,7 +103,7 @@ impl Tessellation {
                 }
             }
             if conflicts.is_empty() {
-                measure::orient(model, &out)?;
+                orient::orient(model, &out)?;
                 measure::check(model, &out)?;
                 return Ok(out);
             }

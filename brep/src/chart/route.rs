@@ -1,0 +1,146 @@
+//! A way for a seam around the holes of a face.
+
+use super::{Chart, Parameters};
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+/// Columns of the grid in each period, and rows between both ends.
+const COLUMNS: i32 = 24;
+const ROWS: i32 = 12;
+/// How far a way stays from holes (fraction of the grid's steps).
+const CLEARANCE: f64 = 0.2;
+
+/// Chains of parameters that a seam must not cross, at any multiple of the periods.
+pub(super) struct Obstacles<'a> {
+    pub chart: &'a Chart<'a>,
+    /// Closed chains repeat their first parameters at the end.
+    pub chains: Vec<Vec<Parameters>>,
+}
+
+impl Obstacles<'_> {
+    /// Whether a segment crosses a chain.
+    pub fn block(&self, segment: [Parameters; 2]) -> bool {
+        let rounds = |i: usize| if self.chart.periods[i].is_some() { -2..=2 } else { 0..=0 };
+        let crosses = |chain: &Vec<Parameters>, by: [i32; 2]| {
+            let moved = |p: Parameters| self.chart.shifted(p, by);
+            chain.windows(2).any(|w| is_crossing(segment, [moved(w[0]), moved(w[1])]))
+        };
+        self.chains.iter().any(|chain| rounds(0).any(|i| rounds(1).any(|j| crosses(chain, [i, j]))))
+    }
+
+    /// The bends of a short way from a vertex of a loop around the surface to another
+    /// vertex, or to a multiple of the period beside it; `None` if there is none on a grid. The
+    /// last of the bends is the end.
+    pub fn way(&self, [from, to]: [Parameters; 2], direction: usize) -> Option<Vec<Parameters>> {
+        let across = 1 - direction;
+        let period = self.chart.periods[direction]?;
+        let steps = {
+            let mut steps = [0.0; 2];
+            (steps[direction], steps[across]) =
+                (period / f64::from(COLUMNS), (to[across] - from[across]) / f64::from(ROWS));
+            steps
+        };
+        let mut nodes = vec![from];
+        for row in 1..ROWS {
+            for column in -COLUMNS..=COLUMNS {
+                let mut node = from;
+                node[direction] += steps[direction] * f64::from(column);
+                node[across] += steps[across] * f64::from(row);
+                nodes.push(node);
+            }
+        }
+        let first_end = nodes.len();
+        for round in -1..=1 {
+            let mut end = to;
+            end[direction] += period * f64::from(round);
+            nodes.push(end);
+        }
+        let scale = self.scale(nodes[first_end / 2]);
+        let length = |a: usize, b: usize| {
+            (0..2).map(|i| (scale[i] * (nodes[a][i] - nodes[b][i])).powi(2)).sum::<f64>().sqrt()
+        };
+        // Ends see the two rows beside them, other nodes their neighbours.
+        let is_near = |a: usize, b: usize| {
+            let apart = [0, 1].map(|i| (nodes[a][i] - nodes[b][i]).abs() / steps[i].abs());
+            let is_end = |k: usize| k == 0 || k >= first_end;
+            if is_end(a) || is_end(b) { apart[across] < 2.5 } else { apart[0].max(apart[1]) < 1.5 }
+        };
+        let mut best = vec![(f64::INFINITY, 0); nodes.len()];
+        best[0].0 = 0.0;
+        let mut queue = BinaryHeap::from([(Reverse(0_u64), 0_usize)]);
+        let mut is_done = vec![false; nodes.len()];
+        // Bits of nonnegative numbers are in the order of the numbers.
+        while let Some((_, node)) = queue.pop() {
+            if std::mem::replace(&mut is_done[node], true) {
+                continue;
+            }
+            if node >= first_end {
+                return Some(self.shortened(&nodes, &best, node, steps));
+            }
+            for other in (0..nodes.len()).filter(|&other| is_near(node, other)) {
+                let reached = best[node].0 + length(node, other);
+                if !is_done[other]
+                    && reached < best[other].0
+                    && !self.block_around([nodes[node], nodes[other]], steps)
+                {
+                    best[other] = (reached, node);
+                    queue.push((Reverse(reached.to_bits()), other));
+                }
+            }
+        }
+        None
+    }
+
+    /// The bends of a way without those that can be left out.
+    fn shortened(
+        &self,
+        nodes: &[Parameters],
+        best: &[(f64, usize)],
+        end: usize,
+        steps: Parameters,
+    ) -> Vec<Parameters> {
+        let mut way = vec![nodes[end]];
+        let mut node = end;
+        while node != 0 {
+            node = best[node].1;
+            way.push(nodes[node]);
+        }
+        way.reverse();
+        let mut kept = Vec::new();
+        let mut at = 0;
+        while at + 1 < way.len() {
+            let seen = |to: &usize| !self.block_around([way[at], way[*to]], steps);
+            at = (at + 2..way.len()).rev().find(seen).unwrap_or(at + 1);
+            kept.push(way[at]);
+        }
+        kept
+    }
+
+    /// Whether a segment, or one beside it, crosses a chain; its ends may be on chains.
+    fn block_around(&self, [a, b]: [Parameters; 2], steps: Parameters) -> bool {
+        let part = |share: f64| [0, 1].map(|i| a[i] + share * (b[i] - a[i]));
+        let [a, b] = [part(1e-6), part(1.0 - 1e-6)];
+        let off = [0, 1].map(|i| CLEARANCE * steps[i].abs());
+        let moved = |p: Parameters, x: f64, y: f64| [p[0] + x * off[0], p[1] + y * off[1]];
+        let middle = part(0.5);
+        self.block([a, b])
+            || [(1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)].into_iter().any(|(x, y)| {
+                let beside = moved(middle, x, y);
+                self.block([a, beside]) || self.block([beside, b])
+            })
+    }
+
+    /// The lengths of both derivatives.
+    fn scale(&self, at: Parameters) -> [f64; 2] {
+        let d = self.chart.surface.jet(at[0], at[1], 1).d;
+        [d[1][0].norm(), d[0][1].norm()]
+    }
+}
+
+/// Whether two segments cross.
+fn is_crossing([a, b]: [Parameters; 2], [c, d]: [Parameters; 2]) -> bool {
+    let side = |p: Parameters, q: Parameters, r: Parameters| {
+        (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]) > 0.0
+    };
+    side(a, b, c) != side(a, b, d) && side(c, d, a) != side(c, d, b)
+}

@@ -1,0 +1,99 @@
+//! Edges that pass through a pole of their surface, divided there, and those that bound no face.
+//!
+//! At a pole of a sphere, or the apex of a cone, the direction around the axis jumps, which a curve
+//! in the parameters can do at its ends only.
+
+use super::topology::Shapes;
+use crate::model::{Corner, EdgeCurve};
+use crate::nearest::nearest_on_curve;
+use crate::{Point, Surface};
+
+/// Edges at most this far from a pole pass through it (fraction of the diagonal).
+const THROUGH: f64 = 1e-7;
+
+/// Divides the edges of all faces at the poles of the faces' surfaces.
+pub(super) fn divide_at_poles(shapes: &mut Shapes, diagonal: f64) {
+    for number in 0..shapes.faces.len() {
+        for pole in poles(&shapes.faces[number].surface, diagonal) {
+            let mut curves: Vec<usize> =
+                shapes.faces[number].loops.iter().flatten().map(|edge| edge.0).collect();
+            curves.sort_unstable();
+            curves.dedup();
+            for curve in curves {
+                if let Some(at) = inner_parameter(&shapes.curves[curve], &pole, THROUGH * diagonal) {
+                    divide(shapes, curve, at, pole);
+                }
+            }
+        }
+    }
+}
+
+fn poles(surface: &Surface, diagonal: f64) -> Vec<Point> {
+    if !matches!(surface, Surface::Round { .. } | Surface::Revolution { .. }) {
+        return Vec::new();
+    }
+    let height = |is_upper: bool| surface.pole(1, is_upper, THROUGH * diagonal);
+    [false, true].into_iter().filter_map(height).map(|v| surface.point([0.0, v])).collect()
+}
+
+/// The parameter at which a curve passes through a point, if it does so away from its ends.
+fn inner_parameter(edge: &EdgeCurve, point: &Point, tolerance: f64) -> Option<f64> {
+    let foot = nearest_on_curve(&edge.curve, point);
+    if (foot.point - point).norm() > tolerance {
+        return None;
+    }
+    let [low, high] = edge.range;
+    let mut at = foot.parameter;
+    if let Some(period) = edge.curve.period() {
+        at = low + (at - low).rem_euclid(period);
+    }
+    let is_inner = low < at && at < high;
+    let is_at_end = |end: f64| (Point::from(edge.curve.point(end)) - point).norm() <= 10.0 * tolerance;
+    (is_inner && !is_at_end(low) && !is_at_end(high)).then_some(at)
+}
+
+/// Divides a curve at a point; all loops follow both halves afterwards.
+fn divide(shapes: &mut Shapes, curve: usize, at: f64, point: Point) {
+    let (corner, second) = (shapes.corners.len(), shapes.curves.len());
+    let edge = &mut shapes.curves[curve];
+    let (tolerance, [low, high]) = (edge.tolerance, edge.range);
+    let half = EdgeCurve { range: [at, high], ends: [corner, edge.ends[1]], ..edge.clone() };
+    (edge.range, edge.ends) = ([low, at], [edge.ends[0], corner]);
+    shapes.curves.push(half);
+    shapes.corners.push(Corner { point, tolerance });
+    for edges in shapes.faces.iter_mut().flat_map(|face| &mut face.loops) {
+        let halves = |&(other, is_forward): &(usize, bool)| match (other == curve, is_forward) {
+            (false, _) => vec![(other, is_forward)],
+            (true, true) => vec![(curve, true), (second, true)],
+            (true, false) => vec![(second, false), (curve, false)],
+        };
+        *edges = edges.iter().flat_map(halves).collect();
+    }
+}
+
+/// Drops edges of planes that a loop follows forth and at once back, and no other loop follows:
+/// they have the face on both sides. Returns a note.
+pub(super) fn drop_spurs(shapes: &mut Shapes) -> Option<String> {
+    let mut uses = vec![0; shapes.curves.len()];
+    let edges = shapes.faces.iter().flat_map(|face| face.loops.iter().flatten());
+    edges.for_each(|edge| uses[edge.0] += 1);
+    let (mut dropped, mut first) = (0, 0);
+    for (number, face) in shapes.faces.iter_mut().enumerate().filter(|(_, face)| face.surface.is_plane()) {
+        for edges in &mut face.loops {
+            let spur = |edges: &[(usize, bool)]| {
+                let next = edges.iter().cycle().skip(1);
+                let mut pairs = edges.iter().zip(next).filter(|_| edges.len() > 2);
+                pairs
+                    .find(|(one, next)| one.0 == next.0 && one.1 != next.1 && uses[one.0] == 2)
+                    .map(|pair| pair.0.0)
+            };
+            while let Some(curve) = spur(edges) {
+                edges.retain(|edge| edge.0 != curve);
+                (dropped, first) = (dropped + 1, if dropped == 0 { number + 1 } else { first });
+            }
+        }
+    }
+    (dropped > 0).then(|| {
+        format!("{dropped} edges with one face on both sides are left out, the first in face {first}")
+    })
+}

@@ -1,0 +1,182 @@
+//! Turns faces and shells that point the wrong way, as files of several CAD programs have them.
+//!
+//! The shells of a body are sets of its patches that curves connect. Patches of a shell are
+//! oriented alike: two that meet at a curve follow it in opposite directions. Shells within no
+//! other, or an even number of others, bound the body from outside and have a positive volume; the
+//! others are voids and have a negative one. A shell lies in another if the winding number of the
+//! other around one of its triangles is odd (Jacobson, Kavan and Sorkine-Hornung 2013, "Robust
+//! inside-outside segmentation using generalized winding numbers", section 3).
+
+use super::{Tessellation, measure::enclosed};
+use crate::{BrepError, Model, Point};
+use std::collections::HashMap;
+use std::f64::consts::TAU;
+
+/// Turns the shells of all bodies so that their volumes have the signs of their nesting, with a
+/// note for each.
+///
+/// # Errors
+/// [`BrepError::Face`] if a shell to be turned has a body on each side.
+pub(super) fn orient(model: &mut Model, tessellation: &Tessellation) -> Result<(), BrepError> {
+    let mut triangles = vec![Vec::new(); model.patches.len()];
+    for triangle in &tessellation.triangles {
+        triangles[triangle.patch as usize].push(triangle.vertices.map(|v| tessellation.points[v as usize]));
+    }
+    let uses = Uses::new(model, tessellation);
+    for body in 0..model.bodies {
+        let connected = shells(model, body, &uses);
+        let turned: Vec<usize> = connected.iter().flat_map(|shell| shell.1.iter().copied()).collect();
+        if let Some(first) = turned.first() {
+            let (solid, count, face) = (body + 1, turned.len(), first + 1);
+            model
+                .notes
+                .push(format!("solid {solid}: {count} of its faces, the first face {face}, pointed inside"));
+            turn(model, body, &turned)?;
+        }
+        let shells: Vec<Shell> =
+            connected.into_iter().map(|(patches, _)| Shell::new(model, body, patches, &triangles)).collect();
+        let is_wrong = |shell: &Shell| {
+            let around =
+                shells.iter().filter(|other| !std::ptr::eq(*other, shell) && other.contains(shell.place));
+            (shell.volume < 0.0) != (around.count() % 2 == 1)
+        };
+        let wrong: Vec<&Shell> = shells.iter().filter(|shell| is_wrong(shell)).collect();
+        if wrong.len() == shells.len() && !wrong.is_empty() {
+            model.notes.push(format!("solid {} was inside out", body + 1));
+        } else {
+            for (is_void, what) in [(true, "voids"), (false, "outer shells")] {
+                let mut of_kind = wrong.iter().filter(|shell| (shell.volume > 0.0) == is_void);
+                let Some(first) = of_kind.next() else { continue };
+                let (count, face) = (1 + of_kind.count(), first.patches[0] + 1);
+                model.notes.push(format!(
+                    "solid {}: {count} of its {what} were inside out, the first from face {face} on",
+                    body + 1
+                ));
+            }
+        }
+        for shell in wrong {
+            turn(model, body, &shell.patches)?;
+        }
+    }
+    Ok(())
+}
+
+/// Patches of one body that curves connect.
+struct Shell {
+    patches: Vec<usize>,
+    /// The triangles, counterclockwise seen from outside the body.
+    triangles: Vec<[Point; 3]>,
+    volume: f64,
+    /// The middle of the largest triangle.
+    place: Point,
+}
+
+impl Shell {
+    fn new(model: &Model, body: usize, patches: Vec<usize>, triangles: &[Vec<[Point; 3]>]) -> Self {
+        let mut own = Vec::new();
+        for &patch in &patches {
+            let is_behind = model.patches[patch].bodies[0] == Some(body);
+            own.extend(
+                triangles[patch].iter().map(|&[a, b, c]| if is_behind { [a, b, c] } else { [a, c, b] }),
+            );
+        }
+        let area = |[a, b, c]: &[Point; 3]| (b - a).cross(&(c - a)).norm();
+        let largest = own.iter().max_by(|s, t| area(s).total_cmp(&area(t)));
+        let place =
+            largest.map_or(Point::origin(), |t| ((t[0].coords + t[1].coords + t[2].coords) / 3.0).into());
+        Self { patches, volume: enclosed(&own, place), triangles: own, place }
+    }
+
+    fn contains(&self, point: Point) -> bool {
+        let winding = self.triangles.iter().map(|t| solid_angle(t, point)).sum::<f64>() / (2.0 * TAU);
+        winding.round().rem_euclid(2.0) == 1.0
+    }
+}
+
+/// Exchanges the sides of patches.
+fn turn(model: &mut Model, body: usize, patches: &[usize]) -> Result<(), BrepError> {
+    for &number in patches {
+        let patch = &mut model.patches[number];
+        let side = patch.bodies.iter().position(|b| *b == Some(body)).expect("a patch of the body");
+        if patch.bodies[1 - side].is_some() {
+            let what = "the solids on its sides have different orientations";
+            return Err(BrepError::face(number, what, None));
+        }
+        patch.bodies.swap(0, 1);
+    }
+    Ok(())
+}
+
+/// The solid angle under which a triangle is seen (steradians, with its orientation), after van
+/// Oosterom and Strackee (1983), "The solid angle of a plane triangle".
+fn solid_angle(triangle: &[Point; 3], from: Point) -> f64 {
+    let [a, b, c] = triangle.map(|p| p - from);
+    let [x, y, z] = [a.norm(), b.norm(), c.norm()];
+    let below = x * y * z + a.dot(&b) * z + b.dot(&c) * x + c.dot(&a) * y;
+    2.0 * a.dot(&b.cross(&c)).atan2(below)
+}
+
+/// The patches that use each curve once, and whether their triangles run along it.
+struct Uses {
+    of_curve: Vec<Vec<(usize, bool)>>,
+    of_patch: Vec<Vec<usize>>,
+}
+
+impl Uses {
+    fn new(model: &Model, tessellation: &Tessellation) -> Self {
+        let first = |line: &Vec<(u32, f64)>| (line[0].0, line[1].0);
+        let starts: HashMap<_, _> =
+            tessellation.lines.iter().enumerate().map(|(curve, line)| (first(line), curve)).collect();
+        let mut of_curve = vec![Vec::new(); model.curves.len()];
+        for t in &tessellation.triangles {
+            for k in 0..3 {
+                let [a, b] = [t.vertices[k], t.vertices[(k + 1) % 3]];
+                for (side, is_forward) in [((a, b), true), ((b, a), false)] {
+                    if let Some(&curve) = starts.get(&side) {
+                        of_curve[curve].push((t.patch as usize, is_forward));
+                    }
+                }
+            }
+        }
+        let mut of_patch = vec![Vec::new(); model.patches.len()];
+        for (curve, uses) in of_curve.iter().enumerate() {
+            uses.iter().for_each(|&(patch, _)| of_patch[patch].push(curve));
+        }
+        Self { of_curve, of_patch }
+    }
+}
+
+/// The sets of patches with the body on one side only that curves connect, and which of each must
+/// be turned so that they are oriented alike: at most half of them.
+fn shells(model: &Model, body: usize, uses: &Uses) -> Vec<(Vec<usize>, Vec<usize>)> {
+    let is_own = |patch: usize| model.patches[patch].bodies.iter().filter(|b| **b == Some(body)).count() == 1;
+    let is_behind = |patch: usize| model.patches[patch].bodies[0] == Some(body);
+    let mut is_turned: Vec<Option<bool>> = vec![None; model.patches.len()];
+    let mut shells = Vec::new();
+    for first in (0..model.patches.len()).filter(|&patch| is_own(patch)) {
+        if is_turned[first].is_some() {
+            continue;
+        }
+        is_turned[first] = Some(false);
+        let mut shell = vec![first];
+        let mut next = 0;
+        while let Some(&patch) = shell.get(next) {
+            next += 1;
+            for &curve in &uses.of_patch[patch] {
+                let own: Vec<_> = uses.of_curve[curve].iter().filter(|of| is_own(of.0)).collect();
+                let [(a, along_a), (b, along_b)] = own[..] else { continue };
+                let other = if *a == patch { *b } else { *a };
+                if is_turned[other].is_none() {
+                    let are_alike = (*along_a == is_behind(*a)) != (*along_b == is_behind(*b));
+                    is_turned[other] = is_turned[patch].map(|turned| turned == are_alike);
+                    shell.push(other);
+                }
+            }
+        }
+        shell.sort_unstable();
+        let (turned, kept): (Vec<usize>, Vec<usize>) =
+            shell.iter().partition(|&&patch| is_turned[patch] == Some(true));
+        shells.push((shell, if turned.len() > kept.len() { kept } else { turned }));
+    }
+    shells
+}
