@@ -106,6 +106,37 @@ fn solids_that_touch_otherwise_are_refused_with_their_names() {
 }
 
 #[test]
+fn chosen_solids_are_meshed_alone() {
+    let path = |name: &str| own("step").with_extension("").join(name);
+    let read = |name: &str, solids: &[&str]| {
+        let solids = solids.iter().map(|&solid| solid.to_owned()).collect();
+        let settings = InputSettings { solids, unit: "mm".parse().unwrap(), ..InputSettings::default() };
+        Geometry::read(&[path(name)], &settings, &mut |note| panic!("{note}"))
+    };
+    // By name, all of it, and by number.
+    let bolt = std::f64::consts::PI * (4.0 * 7.0 + 16.0 * 3.0);
+    for (solids, bodies, exact) in
+        [(&["bolt"][..], 4, 4.0 * bolt), (&["3"], 1, bolt), (&["plate", "2"], 2, 8000.0 + bolt)]
+    {
+        let geometry = read("assembly.step", solids).unwrap();
+        assert_eq!(geometry.inspect().unwrap().bodies.len(), bodies);
+        let found = volume(&geometry, Preset::Moderate, 1);
+        assert!((found / exact - 1.0).abs() < 0.02, "{solids:?}: {found} instead of {exact}");
+    }
+    // A solid that touches another one, and one of two with a common face.
+    let found = volume(&read("touching.step", &["1"]).unwrap(), Preset::Moderate, 0);
+    assert!((found - 1e9).abs() < 1.0, "a cube of a metre: {found}");
+    let plate = read("pin.step", &["1"]).unwrap();
+    assert_eq!(plate.inspect().unwrap().bodies.len(), 1);
+    Mesher::new().generate(&plate).unwrap();
+    let unknown = read("assembly.step", &["nut"]).unwrap_err().to_string();
+    assert!(unknown.contains("no solid `nut`: the file has 5: bolt, plate"), "{unknown}");
+    let settings = InputSettings { solids: vec!["1".into()], ..InputSettings::default() };
+    let other = Geometry::read(&[own("bearing")], &settings, &mut |_| ()).unwrap_err().to_string();
+    assert!(other.contains("only solids of CAD files"), "{other}");
+}
+
+#[test]
 fn step_and_brep_of_one_part_have_the_volumes_of_the_cad_program() {
     let Some(folder) = shared("step") else { return };
     let text = std::fs::read(folder.join("volumes.json")).unwrap();

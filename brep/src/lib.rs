@@ -16,6 +16,7 @@ pub mod bspline;
 mod chart;
 mod curve;
 mod error;
+mod keep;
 mod model;
 mod nearest;
 mod placement;

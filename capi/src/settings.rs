@@ -44,13 +44,14 @@ pub struct Settings {
     merge: Option<f64>,
     feature_angle: Option<f64>,
     unit: Option<Unit>,
+    solids: Vec<String>,
     // The observer.
     pub progress: Option<OnProgress>,
     pub cancel: Option<IsCancelled>,
 }
 
 /// The names of `tetmill_options_set`.
-const NAMES: [&str; 23] = [
+const NAMES: [&str; 24] = [
     "preset",
     "maxh",
     "minh",
@@ -74,6 +75,7 @@ const NAMES: [&str; 23] = [
     "merge",
     "feature-angle",
     "unit",
+    "solid",
 ];
 
 #[derive(Clone, Copy, Debug)]
@@ -194,6 +196,10 @@ impl Settings {
             "merge" => self.merge = of(value, positive)?,
             "feature-angle" => self.feature_angle = of(value, angle)?,
             "unit" => self.unit = of(value, Unit::from_str)?,
+            "solid" => match value {
+                Some(solid) => self.solids.push(solid.to_owned()),
+                None => self.solids.clear(),
+            },
             "parts" | "ranks" => return Err("the number of parts is an argument of tetmill_generate".into()),
             "threads" => return Err("use tetmill_set_threads".into()),
             _ => return Err(format!("there is no such option; there are {}", NAMES.join(", "))),
@@ -208,6 +214,7 @@ impl Settings {
             keep_small: self.keep_small.unwrap_or(false),
             merge: self.merge,
             unit: self.unit.unwrap_or_default(),
+            solids: self.solids.clone(),
             ..InputSettings::default()
         };
         if let Some(degrees) = self.feature_angle {

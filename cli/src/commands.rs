@@ -158,7 +158,9 @@ fn reading(input: &InputOptions, size: &SizeOptions) -> Outputs {
 /// Reads the input and prints its notes.
 fn read_geometry(options: &InputOptions, progress: &Progress) -> Result<Geometry, Failure> {
     let InputOptions { keep_surface, keep_small, merge, unit, .. } = *options;
-    let mut settings = InputSettings { keep_surface, keep_small, merge, unit, ..InputSettings::default() };
+    let solids = options.solids.clone();
+    let mut settings =
+        InputSettings { keep_surface, keep_small, merge, unit, solids, ..InputSettings::default() };
     if let Some(degrees) = options.feature_angle {
         settings.facets.feature_angle = degrees.to_radians();
     }

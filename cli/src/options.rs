@@ -144,6 +144,10 @@ pub struct InputOptions {
     /// Unit of lengths for a STEP file: m, cm, mm, um, km, in, ft, or that of the file
     #[arg(long, value_name = "UNIT", default_value = "file", hide_default_value = true)]
     pub unit: tetmill::Unit,
+    /// Mesh this solid of a CAD file, by its name or number (tetmill inspect lists them); give the
+    /// option again for others [default: all]
+    #[arg(long = "solid", value_name = "NAME")]
+    pub solids: Vec<String>,
     /// Angle between facets that separates two patches of an input surface (degrees) [default: 40]
     #[arg(long, value_name = "DEGREES", value_parser = angle)]
     pub feature_angle: Option<f64>,

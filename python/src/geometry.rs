@@ -38,6 +38,7 @@ struct Input {
     feature_angle: Option<f64>,
     /// The name of a unit of length, checked by the caller.
     unit: String,
+    solids: Vec<String>,
 }
 
 impl Input {
@@ -47,6 +48,7 @@ impl Input {
             keep_small: self.keep_small,
             merge: self.merge,
             unit: self.unit.parse().unwrap_or_default(),
+            solids: self.solids.clone(),
             ..InputSettings::default()
         };
         if let Some(degrees) = self.feature_angle {

@@ -25,6 +25,14 @@ def test_an_unknown_unit_is_refused():
         tetmill.Geometry(GEOMETRIES / "assembly.step", unit="furlong")
 
 
+def test_chosen_solids_are_meshed_alone():
+    for solids, names in [("bolt", ["bolt"] * 4), (1, ["plate"]), (["plate", 3], ["plate", "bolt"])]:
+        geometry = tetmill.Geometry(GEOMETRIES / "assembly.step", solids=solids)
+        assert [label.names[0] for label in geometry.bodies] == names
+    with pytest.raises(tetmill.InputError, match="no solid `nut`"):
+        tetmill.Geometry(GEOMETRIES / "assembly.step", solids=["nut"])
+
+
 # In a process of its own: once OpenCASCADE has read a file in metres, it writes others in metres too.
 MAKE = """
 import gmsh, sys

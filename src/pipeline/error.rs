@@ -166,6 +166,21 @@ pub enum InputError {
     /// A length to merge surfaces is given for a file without analytic surfaces.
     #[error("{}: only surfaces of .geo files can be merged", .0.display())]
     MergesOnlyCsg(PathBuf),
+    /// Solids are chosen in a file without solids.
+    #[error("{}: only solids of CAD files (.step, .stp, .brep) can be chosen", .0.display())]
+    SolidsOnlyOfCad(PathBuf),
+    /// A chosen solid is not in the file.
+    #[error("{}: there is no solid `{name}`: the file has {count}{}", path.display(), called(.names))]
+    NoSuchSolid {
+        /// The file.
+        path: PathBuf,
+        /// The name or number that was given.
+        name: String,
+        /// The number of solids.
+        count: usize,
+        /// The names of the solids, each once.
+        names: String,
+    },
     /// Two files share a face, but not its triangles.
     #[error(
         "{} and {} overlap at ({}, {}, {}): where surfaces touch, both need the same triangles, and no option makes them \
@@ -193,6 +208,10 @@ pub enum InputError {
         /// A corner of it.
         corner: Point,
     },
+}
+
+fn called(names: &str) -> String {
+    if names.is_empty() { String::new() } else { format!(": {names}") }
 }
 
 /// The request cannot be met for this input.

@@ -8,6 +8,7 @@ use super::expected;
 use super::fill::fill;
 use super::retries::Budget;
 use super::settings::InputSettings;
+use super::solids::{self, Cad, tessellated};
 use crate::Point;
 use crate::files::surface::{self, Surface};
 use crate::ground::kernel::simplex::volume6;
@@ -17,7 +18,7 @@ use crate::ground::projector::{BrepProjector, Projector};
 use crate::ground::size::{Accuracy, Closeness, SizeField, SizeSettings, Source, WatchedSize};
 use crate::mesher::facets::{
     Crossing, FacetBodies, FacetError, FacetModel, FacetPatch, FacetSize, FacetSmoothness, Facets, Marks,
-    MergedSmall, RemeshSettings, SharpPlaces, Small, keep, largest_size, merge, of_brep, remesh,
+    MergedSmall, RemeshSettings, SharpPlaces, Small, keep, largest_size, merge, remesh,
 };
 use crate::mesher::improve::Smoothness;
 use crate::mesher::smoothness::BrepSmoothness;
@@ -49,13 +50,6 @@ pub struct FacetSolid {
     cad: Option<Arc<Cad>>,
     /// The names of the surfaces, for messages.
     files: Vec<String>,
-}
-
-/// A boundary representation with its tessellation.
-#[derive(Debug)]
-struct Cad {
-    model: brep::Model,
-    tessellation: brep::Tessellation,
 }
 
 impl FacetSolid {
@@ -237,8 +231,10 @@ impl FacetSolid {
         // Triangles that intersect have no thickness between them: they would be made ever smaller.
         if !self.keep_surface {
             let crossings = self.model.intersections();
-            let deep = crossings.iter().any(|crossing| self.model.is_deep(crossing));
-            if let Some(meeting) = self.facets_meet(&crossings).filter(|_| deep) {
+            let is_deep = crossings.iter().any(|crossing| self.model.is_deep(crossing));
+            let touch =
+                || self.exact.as_ref().is_some_and(|exact| solids::touch(&self.model, exact, &crossings));
+            if let Some(meeting) = self.facets_meet(&crossings).filter(|_| is_deep || touch()) {
                 return Err(meeting);
             }
         }
@@ -401,28 +397,6 @@ impl SizeField for AtMost {
     fn size_at(&self, point: &Point) -> f64 {
         self.0.size_at(point).min(self.1)
     }
-}
-
-/// How often a tessellation is made finer because its triangles intersect.
-const FINER: i32 = 3;
-
-/// Facets that approximate a boundary representation, so fine that those of close faces do not
-/// intersect, unless the faces do.
-fn tessellated(mut model: brep::Model) -> Result<(Cad, (FacetModel, BrepProjector)), brep::BrepError> {
-    let initial = brep::Settings::default();
-    let mut coarsest = None;
-    for k in 0..FINER {
-        let settings =
-            brep::Settings { chord: initial.chord * 0.1_f64.powi(k), angle: initial.angle * 0.5_f64.powi(k) };
-        let tessellation = brep::Tessellation::of(&mut model, &settings)?;
-        let made = of_brep(&model, &tessellation);
-        if !made.0.intersections().iter().any(|crossing| made.0.is_deep(crossing)) {
-            return Ok((Cad { model, tessellation }, made));
-        }
-        coarsest.get_or_insert((tessellation, made));
-    }
-    let (tessellation, made) = coarsest.expect("the first of several");
-    Ok((Cad { model, tessellation }, made))
 }
 
 fn facets_of(surface: &Surface) -> Facets {

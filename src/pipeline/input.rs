@@ -48,6 +48,10 @@ pub fn read(
     if let (Some(_), Some(other)) = (settings.merge, kinds.iter().position(|kind| *kind != Kind::Csg)) {
         return Err(InputError::MergesOnlyCsg(paths[other].as_ref().to_path_buf()).into());
     }
+    let is_cad = |kind: &Kind| matches!(kind, Kind::Brep | Kind::Step);
+    if let (false, Some(other)) = (settings.solids.is_empty(), kinds.iter().position(|kind| !is_cad(kind))) {
+        return Err(InputError::SolidsOnlyOfCad(paths[other].as_ref().to_path_buf()).into());
+    }
     match (kinds.as_slice(), paths) {
         ([Kind::Csg], [path]) => read_csg(path.as_ref(), settings, note),
         ([Kind::Brep], [path]) => read_brep(path.as_ref(), brep::Model::read, settings, note),
@@ -98,8 +102,36 @@ fn read_brep(
 ) -> Result<Model, Error> {
     let text = read_bytes(path)?;
     let refuse = |error| Error::Brep { path: path.to_path_buf(), error: Box::new(error) };
-    let solid = FacetSolid::of_brep(path, parse(&text).map_err(refuse)?, settings, note)?;
+    let mut model = parse(&text).map_err(refuse)?;
+    if !settings.solids.is_empty() {
+        model.keep_bodies(&chosen(path, &model, &settings.solids)?);
+    }
+    let solid = FacetSolid::of_brep(path, model, settings, note)?;
     Ok(Model::Facets(Box::new(solid)))
+}
+
+/// The indices of the bodies that have one of some names or numbers.
+fn chosen(path: &Path, model: &brep::Model, wanted: &[String]) -> Result<Vec<usize>, InputError> {
+    let mut chosen = Vec::new();
+    for name in wanted {
+        let has_name =
+            |body: &usize| model.body_names.get(*body).is_some_and(|own| own.as_ref() == Some(name));
+        let before = chosen.len();
+        chosen.extend((0..model.bodies).filter(has_name));
+        if chosen.len() == before {
+            let number = name.parse().ok().filter(|number| (1..=model.bodies).contains(number));
+            chosen.push(number.ok_or_else(|| no_solid(path, model, name))? - 1);
+        }
+    }
+    Ok(chosen)
+}
+
+fn no_solid(path: &Path, model: &brep::Model, name: &str) -> InputError {
+    let mut names: Vec<&str> = model.body_names.iter().flatten().map(String::as_str).collect();
+    names.sort_unstable();
+    names.dedup();
+    let path = path.to_path_buf();
+    InputError::NoSuchSolid { path, name: name.to_owned(), count: model.bodies, names: names.join(", ") }
 }
 
 fn read_mesh(path: &Path, note: &mut dyn FnMut(&str)) -> Result<Model, Error> {

@@ -35,6 +35,7 @@ mod room;
 pub mod room_error;
 pub mod settings;
 mod skins;
+mod solids;
 pub mod target;
 mod verify;
 pub mod wanted;

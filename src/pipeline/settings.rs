@@ -20,6 +20,8 @@ pub struct InputSettings {
     pub merge: Option<f64>,
     /// The unit of lengths for STEP files, which have one of their own.
     pub unit: brep::Unit,
+    /// The solids of a CAD file that are meshed, each by its name or number; all if there are none.
+    pub solids: Vec<String>,
 }
 
 /// How a geometry is cut.

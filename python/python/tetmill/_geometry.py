@@ -84,6 +84,7 @@ def _input(
     feature_angle: float | None,
     unit: str = "file",
     keep_small: bool = False,
+    solids: str | int | Iterable[str | int] = (),
 ) -> dict[str, Any]:
     angle = arguments.length("feature_angle", feature_angle)
     if angle is not None and angle > 180:
@@ -94,6 +95,7 @@ def _input(
         "merge": arguments.length("merge", merge),
         "feature_angle": angle,
         "unit": arguments.one_of("unit", unit, _UNITS),
+        "solids": [str(solid) for solid in ([solids] if isinstance(solids, (str, int)) else solids)],
     }
 
 
@@ -115,6 +117,8 @@ class Geometry:
         unit: Unit of lengths for a STEP file: "m", "cm", "mm", "um", "km", "in", "ft", or "file".
         keep_small: Keep edges and faces of CAD files that are far smaller than the elements; by
             default they are merged into their neighbours, with a warning.
+        solids: Names or numbers of the solids of a CAD file that are meshed; by default all. Numbers
+            count from 1 in the order of the file.
     """
 
     def __init__(
@@ -125,10 +129,11 @@ class Geometry:
         feature_angle: float | None = None,
         unit: str = "file",
         keep_small: bool = False,
+        solids: str | int | Iterable[str | int] = (),
     ) -> None:
         if not paths:
             raise TypeError("Geometry needs a file; see also from_text, from_surface and from_mesh")
-        given = _input(keep_surface, merge, feature_angle, unit, keep_small)
+        given = _input(keep_surface, merge, feature_angle, unit, keep_small, solids)
         files = [os.fspath(path) for path in paths]
         # None in a process that only takes part in the meshing.
         self._native: _native.Geometry | None = _native.Geometry.from_files(files, given)

@@ -242,6 +242,15 @@ impl BrepProjector {
         if foot.is_converged { Ok(foot.point) } else { Err(ProjectionFailed(*point)) }
     }
 
+    /// Whether a point of the surface of a patch is within its bounds, up to the distance of the
+    /// facets from the surface.
+    pub fn is_within(&self, patch: PatchId, point: &Point) -> bool {
+        self.source.patches[patch.index()].iter().any(|&face| {
+            let source = &self.source.faces[face as usize];
+            (self.nearest(face, point).0 - point).norm() <= source.sag + self.source.tolerance
+        })
+    }
+
     /// The parameter of the nearest point of the segments of an edge.
     fn start_on_edge(&self, edge: u32, point: &Point) -> f64 {
         let Segments { tree, points } = &self.edges[edge as usize];

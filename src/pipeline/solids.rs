@@ -1,0 +1,74 @@
+//! Solids of CAD files as facets, and whether they touch.
+
+use crate::Point;
+use crate::ground::projector::BrepProjector;
+use crate::mesher::facets::{Crossing, FacetModel, of_brep};
+
+/// A boundary representation with its tessellation.
+#[derive(Debug)]
+pub(super) struct Cad {
+    pub model: brep::Model,
+    pub tessellation: brep::Tessellation,
+}
+
+/// How often a tessellation is made finer because its triangles intersect.
+const FINER: i32 = 3;
+
+/// Facets that approximate a boundary representation, so fine that those of close faces do not
+/// intersect, unless the faces do.
+pub(super) fn tessellated(
+    mut model: brep::Model,
+) -> Result<(Cad, (FacetModel, BrepProjector)), brep::BrepError> {
+    let initial = brep::Settings::default();
+    let mut coarsest = None;
+    for k in 0..FINER {
+        let settings =
+            brep::Settings { chord: initial.chord * 0.1_f64.powi(k), angle: initial.angle * 0.5_f64.powi(k) };
+        let tessellation = brep::Tessellation::of(&mut model, &settings)?;
+        let made = of_brep(&model, &tessellation);
+        let crossings = made.0.intersections();
+        if !crossings.iter().any(|crossing| made.0.is_deep(crossing)) {
+            return Ok((Cad { model, tessellation }, made));
+        }
+        let never_ends = touch(&made.0, &made.1, &crossings);
+        coarsest.get_or_insert((tessellation, made));
+        if never_ends {
+            break;
+        }
+    }
+    let (tessellation, made) = coarsest.expect("the first of several");
+    Ok((Cad { model, tessellation }, made))
+}
+
+/// Surfaces at most this far apart touch (fraction of the size of the model).
+const TOUCH: f64 = 1e-8;
+/// Projections onto two surfaces in turn, in search of a common point.
+const TURNS: usize = 30;
+
+/// Whether facets intersect because faces of two solids without a common face do: finer facets
+/// would intersect too.
+pub(super) fn touch(model: &FacetModel, exact: &BrepProjector, crossings: &[Crossing]) -> bool {
+    let size = (model.bounds.max - model.bounds.min).norm();
+    crossings.iter().any(|crossing| {
+        let [a, b] = crossing.patches;
+        let bodies = |patch| [model.patch(patch).inside, model.patch(patch).outside];
+        let has_common = bodies(a).iter().flatten().any(|body| bodies(b).contains(&Some(*body)));
+        !has_common && meet(exact, crossing, size)
+    })
+}
+
+/// Whether two patches have a common point near where their facets intersect.
+fn meet(exact: &BrepProjector, crossing: &Crossing, size: f64) -> bool {
+    let [a, b] = crossing.patches;
+    let mut at = crossing.at;
+    let project = |patch, at: &Point| exact.project_patch(patch, at).ok();
+    for _ in 0..TURNS {
+        let (Some(on_a), Some(on_b)) = (project(a, &at), project(b, &at)) else { return false };
+        if (on_a - on_b).norm() <= TOUCH * size {
+            // Not where only the surfaces beyond the faces meet.
+            return exact.is_within(a, &on_a) && exact.is_within(b, &on_b);
+        }
+        at = nalgebra::center(&on_a, &on_b);
+    }
+    false
+}
