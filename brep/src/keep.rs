@@ -3,7 +3,7 @@
 use crate::model::{Model, On};
 
 impl Model {
-    /// Leaves out all bodies but those of the indices `bodies`, with the patches, curves and corners
+    /// Leaves out all bodies but those of some indices, with the patches, curves and corners
     /// that only others use. Bodies keep their order.
     pub fn keep_bodies(&mut self, bodies: &[usize]) {
         let to = numbers((0..self.bodies).map(|body| bodies.contains(&body)));
