@@ -20,7 +20,7 @@ impl Model {
     }
 
     /// Leaves out curves and corners that no patch uses.
-    fn drop_unused(&mut self) {
+    pub(crate) fn drop_unused(&mut self) {
         let (mut has_curve, mut has_corner) =
             (vec![false; self.curves.len()], vec![false; self.corners.len()]);
         for fin in self.patches.iter().flat_map(|patch| patch.loops.iter().flatten()) {

@@ -349,6 +349,7 @@ mod tests {
             "1e-6",
             "30",
             "mm",
+            "bolt",
         ];
         assert_eq!(NAMES.len(), values.len());
         let mut settings = Settings::default();

@@ -9,7 +9,7 @@ use crate::model::{Model, On, Patch};
 use crate::nearest::nearest_on_curve;
 use crate::project::project_to_surface;
 use crate::{EdgeCurve, Point};
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, HashMap, HashSet};
 
 /// Corners of different solids at most this far apart are one (fraction of the diagonal) ...
 const SAME: f64 = 1e-7;
@@ -17,6 +17,9 @@ const SAME: f64 = 1e-7;
 const ROOM: f64 = 10.0;
 /// ... but not further apart than this (fraction of the shortest edge there).
 const SHORT: f64 = 0.05;
+/// Edges of one solid between the same corners are one if they are at most this far apart (fraction
+/// of the diagonal): the solid touches itself there.
+const SAME_IN_SOLID: f64 = 1e-9;
 
 /// Makes one of the corners and curves that solids share; faces use them afterwards.
 pub(super) fn glue_edges(shapes: &mut Shapes, diagonal: f64) {
@@ -24,6 +27,7 @@ pub(super) fn glue_edges(shapes: &mut Shapes, diagonal: f64) {
     for curve in &mut shapes.curves {
         curve.ends = curve.ends.map(|end| to[end]);
     }
+    let pairs = pairs(shapes);
     // Curves by their ends.
     let mut between: BTreeMap<[usize; 2], Vec<usize>> = BTreeMap::new();
     let mut as_curve: Vec<(usize, bool)> = Vec::with_capacity(shapes.curves.len());
@@ -32,10 +36,15 @@ pub(super) fn glue_edges(shapes: &mut Shapes, diagonal: f64) {
         let [a, b] = curve.ends;
         let known = between.entry([a.min(b), a.max(b)]).or_default();
         let tolerance = tolerance(shapes, shapes.body_of_curve[number], diagonal);
-        let same = known
-            .iter()
-            .filter(|&&other| shapes.body_of_curve[other] != shapes.body_of_curve[number])
-            .find_map(|&other| Some((other, runs_along(curve, &shapes.curves[other], tolerance)?)));
+        let same = known.iter().find_map(|&other| {
+            let is_own = shapes.body_of_curve[other] == shapes.body_of_curve[number];
+            // Both sides of a narrow face of one solid are not one.
+            if is_own && pairs.contains(&[other.min(number), other.max(number)]) {
+                return None;
+            }
+            let room = if is_own { tolerance.min(SAME_IN_SOLID * diagonal) } else { tolerance };
+            Some((other, runs_along(curve, &shapes.curves[other], room)?))
+        });
         as_curve.push(same.unwrap_or((number, true)));
         if same.is_none() {
             known.push(number);
@@ -45,6 +54,16 @@ pub(super) fn glue_edges(shapes: &mut Shapes, diagonal: f64) {
         let (curve, is_along) = as_curve[edge.0];
         *edge = (curve, edge.1 == is_along);
     }
+}
+
+/// The pairs of curves that bound a face alone.
+fn pairs(shapes: &Shapes) -> HashSet<[usize; 2]> {
+    let loops = shapes.faces.iter().flat_map(|face| &face.loops);
+    let pair = |edges: &Vec<(usize, bool)>| match edges[..] {
+        [(a, _), (b, _)] => Some([a.min(b), a.max(b)]),
+        _ => None,
+    };
+    loops.filter_map(pair).collect()
 }
 
 fn tolerance(shapes: &Shapes, body: usize, diagonal: f64) -> f64 {
@@ -141,7 +160,7 @@ pub(super) fn glue_patches(model: &mut Model, tolerance: f64) -> Vec<usize> {
         }
     }
     model.patches = kept;
-    compact(model);
+    model.drop_unused();
     to
 }
 
@@ -170,34 +189,4 @@ fn is_same_surface(model: &Model, one: &Patch, other: &Patch, tolerance: f64) ->
         let foot = project_to_surface(&other.surface, &point, start.point(t).into());
         (foot.point - point).norm() <= 10.0 * tolerance
     })
-}
-
-/// Removes corners and curves that no patch uses.
-fn compact(model: &mut Model) {
-    let mut is_used = vec![false; model.curves.len()];
-    let mut has_use = vec![false; model.corners.len()];
-    for fin in model.patches.iter().flat_map(|patch| patch.loops.iter().flatten()) {
-        match fin.on {
-            On::Curve(curve) => is_used[curve] = true,
-            On::Corner(corner) => has_use[corner] = true,
-        }
-    }
-    for (curve, _) in model.curves.iter().zip(&is_used).filter(|(_, used)| **used) {
-        curve.ends.iter().for_each(|&end| has_use[end] = true);
-    }
-    let numbers = |used: &[bool]| -> Vec<usize> {
-        used.iter().scan(0, |next, &used| Some(std::mem::replace(next, *next + usize::from(used)))).collect()
-    };
-    let (curve_to, corner_to) = (numbers(&is_used), numbers(&has_use));
-    for fin in model.patches.iter_mut().flat_map(|patch| patch.loops.iter_mut().flatten()) {
-        fin.on = match fin.on {
-            On::Curve(curve) => On::Curve(curve_to[curve]),
-            On::Corner(corner) => On::Corner(corner_to[corner]),
-        };
-    }
-    let mut keep = is_used.into_iter();
-    model.curves.retain(|_| keep.next().unwrap_or(false));
-    model.curves.iter_mut().for_each(|curve| curve.ends = curve.ends.map(|end| corner_to[end]));
-    let mut keep = has_use.into_iter();
-    model.corners.retain(|_| keep.next().unwrap_or(false));
 }

@@ -2,6 +2,7 @@
 
 use super::text::decoded;
 use crate::{BrepError, Model, Point, Settings, Tessellation, Unit, tessellate};
+use std::collections::HashMap;
 use std::f64::consts::PI;
 use std::fmt::Write;
 
@@ -301,6 +302,71 @@ fn an_edge_into_a_plane_and_back_is_left_out() {
     let (model, volumes) = volumes(&solid, Unit::OfFile);
     assert_near(volumes[0], 2.0 * PI);
     assert_eq!(model.notes.len(), 1, "{:?}", model.notes);
+}
+
+/// The faces of a unit cube with edges of its own; vertices at the same place are shared.
+fn cube(text: &mut Text, origin: [f64; 3], vertices: &mut HashMap<[i32; 3], u32>) -> Vec<u32> {
+    let mut edges: HashMap<[u32; 2], u32> = HashMap::new();
+    let mut faces = Vec::new();
+    for axis in 0..3 {
+        for is_upper in [false, true] {
+            // Counterclockwise, seen from outside.
+            let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+            let mut square = [[0, 0], [1, 0], [1, 1], [0, 1]];
+            if !is_upper {
+                square.reverse();
+            }
+            let places = square.map(|[a, b]| {
+                let mut at = origin;
+                at[axis] += f64::from(u8::from(is_upper));
+                (at[u], at[v]) = (at[u] + f64::from(a), at[v] + f64::from(b));
+                at
+            });
+            let corners = places.map(|at| {
+                *vertices.entry(at.map(|x| x as i32)).or_insert_with(|| {
+                    let point = text.point(at[0], at[1], at[2]);
+                    text.add(&format!("VERTEX_POINT('',#{point})"))
+                })
+            });
+            let mut used = Vec::new();
+            for k in 0..4 {
+                let (a, b) = (corners[k], corners[(k + 1) % 4]);
+                let way = [0, 1, 2].map(|i| places[(k + 1) % 4][i] - places[k][i]);
+                let edge = *edges.entry([a.min(b), a.max(b)]).or_insert_with(|| {
+                    let start = text.point(places[k][0], places[k][1], places[k][2]);
+                    let direction =
+                        text.add(&format!("DIRECTION('',({:?},{:?},{:?}))", way[0], way[1], way[2]));
+                    let vector = text.add(&format!("VECTOR('',#{direction},1.)"));
+                    let line = text.add(&format!("LINE('',#{start},#{vector})"));
+                    text.add(&format!("EDGE_CURVE('{a}',#{a},#{b},#{line},.T.)"))
+                });
+                let starts = format!("#{edge} = EDGE_CURVE('{a}'");
+                let flag = if text.0.contains(&starts) { "T" } else { "F" };
+                used.push(format!("#{}", text.add(&format!("ORIENTED_EDGE('',*,*,#{edge},.{flag}.)"))));
+            }
+            let edges = text.add(&format!("EDGE_LOOP('',({}))", used.join(",")));
+            let bound = text.add(&format!("FACE_BOUND('',#{edges},.T.)"));
+            let mut normal = [0.0; 3];
+            normal[axis] = if is_upper { 1.0 } else { -1.0 };
+            let mut x = [0.0; 3];
+            x[u] = 1.0;
+            let frame = text.frame_at(places[0], normal, x);
+            let plane = text.add(&format!("PLANE('',#{frame})"));
+            faces.push(text.face(plane, &[bound]));
+        }
+    }
+    faces
+}
+
+#[test]
+fn a_solid_that_touches_itself_has_one_edge_there() {
+    let mut text = Text::new();
+    let mut vertices = HashMap::new();
+    let mut faces = cube(&mut text, [0.0; 3], &mut vertices);
+    faces.extend(cube(&mut text, [1.0, 1.0, 0.0], &mut vertices));
+    let (model, volumes) = volumes(&text.solid(&faces), Unit::OfFile);
+    assert_near(volumes[0], 2.0);
+    assert_eq!((model.curves.len(), model.notes.len()), (23, 0), "{:?}", model.notes);
 }
 
 #[test]

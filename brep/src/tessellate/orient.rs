@@ -25,40 +25,45 @@ pub(super) fn orient(model: &mut Model, tessellation: &Tessellation) -> Result<(
     let uses = Uses::new(model, tessellation);
     for body in 0..model.bodies {
         let connected = shells(model, body, &uses);
-        let turned: Vec<usize> = connected.iter().flat_map(|shell| shell.1.iter().copied()).collect();
-        if let Some(first) = turned.first() {
-            let (solid, count, face) = (body + 1, turned.len(), first + 1);
-            model
-                .notes
-                .push(format!("solid {solid}: {count} of its faces, the first face {face}, pointed inside"));
-            turn(model, body, &turned)?;
-        }
+        turn_faces(model, body, connected.iter().flat_map(|shell| shell.1.iter().copied()).collect())?;
         let shells: Vec<Shell> =
             connected.into_iter().map(|(patches, _)| Shell::new(model, body, patches, &triangles)).collect();
-        let is_wrong = |shell: &Shell| {
-            let around =
-                shells.iter().filter(|other| !std::ptr::eq(*other, shell) && other.contains(shell.place));
-            (shell.volume < 0.0) != (around.count() % 2 == 1)
-        };
-        let wrong: Vec<&Shell> = shells.iter().filter(|shell| is_wrong(shell)).collect();
-        if wrong.len() == shells.len() && !wrong.is_empty() {
-            model.notes.push(format!("solid {} was inside out", body + 1));
-        } else {
-            for (is_void, what) in [(true, "voids"), (false, "outer shells")] {
-                let mut of_kind = wrong.iter().filter(|shell| (shell.volume > 0.0) == is_void);
-                let Some(first) = of_kind.next() else { continue };
-                let (count, face) = (1 + of_kind.count(), first.patches[0] + 1);
-                model.notes.push(format!(
-                    "solid {}: {count} of its {what} were inside out, the first from face {face} on",
-                    body + 1
-                ));
-            }
-        }
-        for shell in wrong {
-            turn(model, body, &shell.patches)?;
-        }
+        turn_shells(model, body, &shells)?;
     }
     Ok(())
+}
+
+/// Turns patches that their neighbours contradict.
+fn turn_faces(model: &mut Model, body: usize, patches: Vec<usize>) -> Result<(), BrepError> {
+    let Some(first) = patches.first() else { return Ok(()) };
+    let (solid, count, face) = (body + 1, patches.len(), first + 1);
+    let what = format!("solid {solid}: {count} of its faces, the first face {face}, pointed inside");
+    model.notes.push(what);
+    turn(model, body, &patches)
+}
+
+/// Turns shells whose volume does not have the sign of their nesting.
+fn turn_shells(model: &mut Model, body: usize, shells: &[Shell]) -> Result<(), BrepError> {
+    let is_wrong = |shell: &&Shell| {
+        let others = shells.iter().filter(|other| !std::ptr::eq(*other, *shell));
+        let around = others.filter(|other| other.contains(shell.place)).count();
+        (shell.volume < 0.0) != (around % 2 == 1)
+    };
+    let wrong: Vec<&Shell> = shells.iter().filter(is_wrong).collect();
+    let solid = body + 1;
+    if wrong.len() == shells.len() && !wrong.is_empty() {
+        model.notes.push(format!("solid {solid} was inside out"));
+    } else {
+        for (is_void, what) in [(true, "voids"), (false, "outer shells")] {
+            let mut of_kind = wrong.iter().filter(|shell| (shell.volume > 0.0) == is_void);
+            let Some(first) = of_kind.next() else { continue };
+            let (count, face) = (1 + of_kind.count(), first.patches[0] + 1);
+            model.notes.push(format!(
+                "solid {solid}: {count} of its {what} were inside out, the first from face {face} on"
+            ));
+        }
+    }
+    wrong.into_iter().try_for_each(|shell| turn(model, body, &shell.patches))
 }
 
 /// Patches of one body that curves connect.
