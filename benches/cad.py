@@ -5,7 +5,7 @@
   python3 benches/cad.py FOLDER [--binary target/release/tetmill] [--format step] [--only NAME...]
 
 Needs the Python packages numpy, gmsh and netgen-mesher (GPL and LGPL: they only run here). Each mesh is made in a process of
-its own, with at most 120 s. Sizes: tetmill and NETGEN at `moderate`; Gmsh with 12 elements a turn (Mesh.MeshSizeFromCurvature) and
+its own, with at most --limit seconds. Sizes: tetmill and NETGEN at `moderate`; Gmsh with 12 elements a turn (Mesh.MeshSizeFromCurvature) and
 HXT. Seconds are of reading and meshing: those of tetmill's whole process, of the others without the start of Python and their libraries. Angles are
 measured by NumPy. The error of the volume is relative to OpenCASCADE's, if `measures.json` has it.
 """
@@ -13,7 +13,6 @@ import argparse, json, pathlib, subprocess, sys, tempfile, time
 
 import numpy as np
 
-LIMIT = 120
 HERE = pathlib.Path(__file__).resolve()
 
 
@@ -60,7 +59,9 @@ def gmsh(path):
 
 def tetmill(path, binary):
     with tempfile.TemporaryDirectory() as folder:
-        command = [binary, "generate", str(path), "-n", "1", "--levels", "0", "-f", "medit", "-o", folder, "-q"]
+        # The others convert lengths to millimetres.
+        unit = [] if path.endswith(".brep") else ["--unit", "mm"]
+        command = [binary, "generate", path, *unit, "-n", "1", "--levels", "0", "-f", "medit", "-o", folder, "-q"]
         start = time.perf_counter()
         done = subprocess.run(command, capture_output=True, text=True)
         seconds = time.perf_counter() - start
@@ -76,18 +77,18 @@ def medit(words, name, columns):
     return np.array(words[first : first + int(words[first - 1]) * columns], float).reshape(-1, columns)
 
 
-def one(program, path, binary):
+def one(program, path, binary, limit):
     """The result of a program in a process of its own, or why there is none."""
     try:
         command = [sys.executable, HERE, "--worker", program, path, "--binary", binary]
-        done = subprocess.run(command, capture_output=True, text=True, timeout=LIMIT)
+        done = subprocess.run(command, capture_output=True, text=True, timeout=limit)
         last = (done.stdout.strip().splitlines() or [""])[-1]
         if done.returncode == 0 and last.startswith("["):
             return json.loads(last), ""
         why = (done.stderr.strip().splitlines() or [f"status {done.returncode}"])[-1]
         return None, why[:150]
     except subprocess.TimeoutExpired:
-        return None, f"more than {LIMIT} s"
+        return None, f"more than {limit:g} s"
 
 
 def cell(result, volume):
@@ -104,6 +105,7 @@ def main():
     parser.add_argument("--binary", default="target/release/tetmill")
     parser.add_argument("--format", choices=["brep", "step"], default="brep")
     parser.add_argument("--only", nargs="*")
+    parser.add_argument("--limit", type=float, default=120, help="seconds for each mesh")
     parser.add_argument("--worker", help=argparse.SUPPRESS)
     if "--worker" in sys.argv:
         at = sys.argv.index("--worker")
@@ -124,7 +126,7 @@ def main():
         volume = sum(measures.get(path.stem, {}).get("volumes", []))
         cells = []
         for program in programs:
-            result, why = one(program, path, options.binary)
+            result, why = one(program, path, options.binary, options.limit)
             if result is not None and result[1] == 0:
                 result, why = None, "no tets"
             cells.append(cell(result, volume))
