@@ -7,6 +7,9 @@ use std::collections::BinaryHeap;
 /// Columns of the grid in each period, and rows between both ends.
 const COLUMNS: i32 = 24;
 const ROWS: i32 = 12;
+/// Grid lines are this far from the ends (fraction of a step), because holes often have edges at
+/// simple fractions.
+const ASIDE: f64 = 0.37;
 /// How far a way stays from holes (fraction of the grid's steps).
 const CLEARANCE: f64 = 0.2;
 
@@ -41,11 +44,11 @@ impl Obstacles<'_> {
             steps
         };
         let mut nodes = vec![from];
-        for row in 1..ROWS {
+        for row in 0..ROWS {
             for column in -COLUMNS..=COLUMNS {
                 let mut node = from;
-                node[direction] += steps[direction] * f64::from(column);
-                node[across] += steps[across] * f64::from(row);
+                node[direction] += steps[direction] * (f64::from(column) + ASIDE);
+                node[across] += steps[across] * (f64::from(row) + ASIDE);
                 nodes.push(node);
             }
         }
@@ -81,7 +84,7 @@ impl Obstacles<'_> {
                 let reached = best[node].0 + length(node, other);
                 if !is_done[other]
                     && reached < best[other].0
-                    && !self.block_around([nodes[node], nodes[other]], steps)
+                    && !self.block_around([nodes[node], nodes[other]], [node == 0, other >= first_end], steps)
                 {
                     best[other] = (reached, node);
                     queue.push((Reverse(reached.to_bits()), other));
@@ -109,17 +112,23 @@ impl Obstacles<'_> {
         let mut kept = Vec::new();
         let mut at = 0;
         while at + 1 < way.len() {
-            let seen = |to: &usize| !self.block_around([way[at], way[*to]], steps);
+            let are_ends = |to: usize| [at == 0, to + 1 == way.len()];
+            let seen = |to: &usize| !self.block_around([way[at], way[*to]], are_ends(*to), steps);
             at = (at + 2..way.len()).rev().find(seen).unwrap_or(at + 1);
             kept.push(way[at]);
         }
         kept
     }
 
-    /// Whether a segment, or one beside it, crosses a chain; its ends may be on chains.
-    fn block_around(&self, [a, b]: [Parameters; 2], steps: Parameters) -> bool {
+    /// Whether a segment, or one beside it, crosses a chain. Ends of the way are on chains.
+    fn block_around(
+        &self,
+        [a, b]: [Parameters; 2],
+        [is_start, is_end]: [bool; 2],
+        steps: Parameters,
+    ) -> bool {
         let part = |share: f64| [0, 1].map(|i| a[i] + share * (b[i] - a[i]));
-        let [a, b] = [part(1e-6), part(1.0 - 1e-6)];
+        let [a, b] = [part(if is_start { 1e-6 } else { 0.0 }), part(if is_end { 1.0 - 1e-6 } else { 1.0 })];
         let off = [0, 1].map(|i| CLEARANCE * steps[i].abs());
         let moved = |p: Parameters, x: f64, y: f64| [p[0] + x * off[0], p[1] + y * off[1]];
         let middle = part(0.5);

@@ -1,8 +1,9 @@
 //! Files of other programs and hand-made ones: faces without seams, units, damage.
 
+mod odd;
+
 use super::text::decoded;
 use crate::{BrepError, Model, Point, Settings, Tessellation, Unit, tessellate};
-use std::collections::HashMap;
 use std::f64::consts::PI;
 use std::fmt::Write;
 
@@ -216,157 +217,6 @@ fn loops_the_wrong_way_around_are_turned() {
     let bounds = [text.bound(low, false), text.bound(high, true)];
     let faces = [text.face(surface, &bounds), text.disk(low, 0.0, false), text.disk(high, 2.0, true)];
     assert_near(volumes(&text.solid(&faces), Unit::OfFile).1[0], 2.0 * PI);
-}
-
-/// A cylinder of radius 1 from z = 0 to 2, whose upper face looks up or down.
-fn cylinder(text: &mut Text, looks_up: bool) -> [u32; 3] {
-    let (low, high) = (text.circle(1.0, 0.0, 0.0), text.circle(1.0, 2.0, 0.0));
-    let frame = text.frame(0.0, 1.0);
-    let surface = text.add(&format!("CYLINDRICAL_SURFACE('',#{frame},1.)"));
-    let bounds = [text.bound(low, true), text.bound(high, false)];
-    [text.face(surface, &bounds), text.disk(low, 0.0, false), text.disk(high, 2.0, looks_up)]
-}
-
-#[test]
-fn a_face_that_points_inside_is_turned() {
-    for (looks_up, notes) in [(true, 0), (false, 1)] {
-        let mut text = Text::new();
-        let faces = cylinder(&mut text, looks_up);
-        let (model, volumes) = volumes(&text.solid(&faces), Unit::OfFile);
-        assert_near(volumes[0], 2.0 * PI);
-        assert_eq!(model.notes.len(), notes, "{:?}", model.notes);
-    }
-}
-
-#[test]
-fn voids_are_voids_however_they_are_oriented() {
-    for (orientation, notes) in [("F", 0), ("T", 1)] {
-        let mut text = Text::new();
-        let faces = cylinder(&mut text, true);
-        let frame = text.frame(1.0, 1.0);
-        let surface = text.add(&format!("SPHERICAL_SURFACE('',#{frame},0.5)"));
-        let bound = text.vertex_bound();
-        let ball = text.face(surface, &[bound]);
-        let [outer, inner] = [text.shell(&faces), text.shell(&[ball])];
-        let void = text.add(&format!("ORIENTED_CLOSED_SHELL('',*,#{inner},.{orientation}.)"));
-        let solid = text.add(&format!("BREP_WITH_VOIDS('part',#{outer},(#{void}))"));
-        let (model, volumes) = volumes(&text.of_solid(solid), Unit::OfFile);
-        assert_near(volumes[0], 2.0 * PI - PI / 6.0);
-        assert_eq!(model.notes.len(), notes, "{:?}", model.notes);
-    }
-}
-
-#[test]
-fn an_edge_through_both_poles_of_a_sphere_is_divided_there() {
-    // The half with x > 0; its only edge starts where y = 1.
-    let mut text = Text::new();
-    let point = text.point(0.0, 1.0, 0.0);
-    let vertex = text.add(&format!("VERTEX_POINT('',#{point})"));
-    let frame = text.frame_at([0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]);
-    let circle = text.add(&format!("CIRCLE('',#{frame},1.)"));
-    let rim = text.add(&format!("EDGE_CURVE('',#{vertex},#{vertex},#{circle},.T.)"));
-    let frame = text.frame(0.0, 1.0);
-    let sphere = text.add(&format!("SPHERICAL_SURFACE('',#{frame},1.)"));
-    let bound = text.bound(rim, true);
-    let half = text.face(sphere, &[bound]);
-    let frame = text.frame_at([0.0; 3], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]);
-    let plane = text.add(&format!("PLANE('',#{frame})"));
-    let bound = text.bound(rim, false);
-    let disk = text.face(plane, &[bound]);
-    let (model, volumes) = volumes(&text.solid(&[half, disk]), Unit::OfFile);
-    assert_near(volumes[0], 2.0 / 3.0 * PI);
-    assert_eq!(model.curves.len(), 3);
-}
-
-#[test]
-fn an_edge_into_a_plane_and_back_is_left_out() {
-    let mut text = Text::new();
-    let faces = cylinder(&mut text, true);
-    let end = text.point(0.3, 0.0, 2.0);
-    let end = text.add(&format!("VERTEX_POINT('',#{end})"));
-    let direction = text.add("DIRECTION('',(-1.,0.,0.))");
-    let vector = text.add(&format!("VECTOR('',#{direction},1.)"));
-    let start = text.point(1.0, 0.0, 2.0);
-    let line = text.add(&format!("LINE('',#{start},#{vector})"));
-    // The vertex and the loop of the upper circle.
-    let uses = |text: &Text, what: &str| -> u32 {
-        let record = text.0.lines().filter(|line| line.contains(what)).nth(1).unwrap();
-        record[1..].split(' ').next().unwrap().parse().unwrap()
-    };
-    let vertex = uses(&text, "VERTEX_POINT");
-    let spur = text.add(&format!("EDGE_CURVE('',#{vertex},#{end},#{line},.T.)"));
-    let [forth, back] = ["T", "F"].map(|flag| text.add(&format!("ORIENTED_EDGE('',*,*,#{spur},.{flag}.)")));
-    let solid = text.solid(&faces);
-    let last = solid.rfind("EDGE_LOOP('',(").unwrap() + "EDGE_LOOP('',(".len();
-    let solid = format!("{}#{forth},#{back},{}", &solid[..last], &solid[last..]);
-    let (model, volumes) = volumes(&solid, Unit::OfFile);
-    assert_near(volumes[0], 2.0 * PI);
-    assert_eq!(model.notes.len(), 1, "{:?}", model.notes);
-}
-
-/// The faces of a unit cube with edges of its own; vertices at the same place are shared.
-fn cube(text: &mut Text, origin: [f64; 3], vertices: &mut HashMap<[i32; 3], u32>) -> Vec<u32> {
-    let mut edges: HashMap<[u32; 2], u32> = HashMap::new();
-    let mut faces = Vec::new();
-    for axis in 0..3 {
-        for is_upper in [false, true] {
-            // Counterclockwise, seen from outside.
-            let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
-            let mut square = [[0, 0], [1, 0], [1, 1], [0, 1]];
-            if !is_upper {
-                square.reverse();
-            }
-            let places = square.map(|[a, b]| {
-                let mut at = origin;
-                at[axis] += f64::from(u8::from(is_upper));
-                (at[u], at[v]) = (at[u] + f64::from(a), at[v] + f64::from(b));
-                at
-            });
-            let corners = places.map(|at| {
-                *vertices.entry(at.map(|x| x as i32)).or_insert_with(|| {
-                    let point = text.point(at[0], at[1], at[2]);
-                    text.add(&format!("VERTEX_POINT('',#{point})"))
-                })
-            });
-            let mut used = Vec::new();
-            for k in 0..4 {
-                let (a, b) = (corners[k], corners[(k + 1) % 4]);
-                let way = [0, 1, 2].map(|i| places[(k + 1) % 4][i] - places[k][i]);
-                let edge = *edges.entry([a.min(b), a.max(b)]).or_insert_with(|| {
-                    let start = text.point(places[k][0], places[k][1], places[k][2]);
-                    let direction =
-                        text.add(&format!("DIRECTION('',({:?},{:?},{:?}))", way[0], way[1], way[2]));
-                    let vector = text.add(&format!("VECTOR('',#{direction},1.)"));
-                    let line = text.add(&format!("LINE('',#{start},#{vector})"));
-                    text.add(&format!("EDGE_CURVE('{a}',#{a},#{b},#{line},.T.)"))
-                });
-                let starts = format!("#{edge} = EDGE_CURVE('{a}'");
-                let flag = if text.0.contains(&starts) { "T" } else { "F" };
-                used.push(format!("#{}", text.add(&format!("ORIENTED_EDGE('',*,*,#{edge},.{flag}.)"))));
-            }
-            let edges = text.add(&format!("EDGE_LOOP('',({}))", used.join(",")));
-            let bound = text.add(&format!("FACE_BOUND('',#{edges},.T.)"));
-            let mut normal = [0.0; 3];
-            normal[axis] = if is_upper { 1.0 } else { -1.0 };
-            let mut x = [0.0; 3];
-            x[u] = 1.0;
-            let frame = text.frame_at(places[0], normal, x);
-            let plane = text.add(&format!("PLANE('',#{frame})"));
-            faces.push(text.face(plane, &[bound]));
-        }
-    }
-    faces
-}
-
-#[test]
-fn a_solid_that_touches_itself_has_one_edge_there() {
-    let mut text = Text::new();
-    let mut vertices = HashMap::new();
-    let mut faces = cube(&mut text, [0.0; 3], &mut vertices);
-    faces.extend(cube(&mut text, [1.0, 1.0, 0.0], &mut vertices));
-    let (model, volumes) = volumes(&text.solid(&faces), Unit::OfFile);
-    assert_near(volumes[0], 2.0);
-    assert_eq!((model.curves.len(), model.notes.len()), (23, 0), "{:?}", model.notes);
 }
 
 #[test]
