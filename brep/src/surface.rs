@@ -250,7 +250,8 @@ impl Surface {
     pub(crate) fn largest_term(&self, v: f64) -> f64 {
         match self {
             Self::Round { origin, axes, profile } => {
-                let length = axes.iter().map(|axis| axis.norm()).fold(0.0, f64::max);
+                // All axes have one length.
+                let length = axes[0].norm();
                 let [radius, height] = match *profile {
                     Profile::Line { radius, slope: [a, b] } => {
                         [radius.abs().max((v * a).abs()), (v * b).abs()]

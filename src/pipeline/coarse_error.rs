@@ -78,8 +78,8 @@ pub enum CoarseError {
     /// Two solids of a CAD file touch or overlap.
     #[error(
         "the solids {} ({}) and {} ({}) touch without a common face, or overlap, near ({}, {}, {}): imprint them on each \
-         other in the CAD program (Boolean fragments), keep them apart, or mesh one of them (--solid {})",
-        solids[0].0, solids[0].1, solids[1].0, solids[1].1, first.x, first.y, first.z, solids[0].0
+         other in the CAD program (Boolean fragments), keep them apart, or mesh one of them alone (--solid)",
+        solids[0].0, solids[0].1, solids[1].0, solids[1].1, first.x, first.y, first.z
     )]
     SolidsMeet {
         /// The numbers and names of the solids.

@@ -319,17 +319,16 @@ impl FacetSolid {
     /// The error for an intersection of faces of two solids of a CAD file.
     fn solids_meet(&self, crossing: &Crossing) -> Option<CoarseError> {
         self.exact.as_ref()?;
-        let [a, b] = crossing.patches.map(|id| {
-            let patch = self.model.patch(id);
-            [patch.inside, patch.outside]
-        });
-        let is_common = a.iter().flatten().any(|body| b.contains(&Some(*body)));
-        let solid = |sides: [Option<BodyId>; 2]| {
-            let label = &self.names.bodies[sides.into_iter().flatten().next()?.index()];
+        if !solids::are_of_different_bodies(&self.model, crossing) {
+            return None;
+        }
+        let solid = |patch: PatchId| {
+            let patch = self.model.patch(patch);
+            let label = &self.names.bodies[patch.inside.or(patch.outside)?.index()];
             Some((label.number, label.names.first().cloned().unwrap_or_default()))
         };
-        let solids = Box::new([solid(a)?, solid(b)?]);
-        (!is_common).then_some(CoarseError::SolidsMeet { solids, first: crossing.at })
+        let [a, b] = crossing.patches.map(solid);
+        Some(CoarseError::SolidsMeet { solids: Box::new([a?, b?]), first: crossing.at })
     }
 
     /// Finds thin regions between the facets themselves.

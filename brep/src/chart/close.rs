@@ -226,9 +226,8 @@ impl Closing<'_> {
         by[direction] = rounds;
         let mut way = vec![self.chart.shifted(upper.sides[b].start(), by)];
         if holes.block([from, way[0]]) {
-            let mut around = Obstacles { chart: self.chart, chains: holes.chains.clone() };
-            around.chains.extend([&lower, &upper].map(|one| chain(&one.sides)));
-            if let Some(found) = around.way([from, way[0]], direction) {
+            let beside = [&lower, &upper].map(|one| chain(&one.sides));
+            if let Some(found) = holes.way([from, way[0]], direction, beside) {
                 let period_moved = (found[found.len() - 1][direction] - way[0][direction]) / period;
                 rounds += period_moved.round() as i32;
                 way = found;
@@ -291,9 +290,7 @@ impl Closing<'_> {
         let (start, end) = (out[0].start(), out[out.len() - 1].end());
         let mut way = vec![top(end)];
         if free.is_none() {
-            let mut around = Obstacles { chart: self.chart, chains: holes.chains.clone() };
-            around.chains.push(chain(&one.sides));
-            way = around.way([end, top(end)], direction).unwrap_or(way);
+            way = holes.way([end, top(end)], direction, [chain(&one.sides)]).unwrap_or(way);
         }
         let tip = way[way.len() - 1];
         let drift = [0, 1].map(|i| start[i] - end[i]);

@@ -31,60 +31,41 @@ impl Obstacles<'_> {
         self.chains.iter().any(|chain| rounds(0).any(|i| rounds(1).any(|j| crosses(chain, [i, j]))))
     }
 
-    /// The bends of a short way from a vertex of a loop around the surface to another
-    /// vertex, or to a multiple of the period beside it; `None` if there is none on a grid. The
-    /// last of the bends is the end.
-    pub fn way(&self, [from, to]: [Parameters; 2], direction: usize) -> Option<Vec<Parameters>> {
-        let across = 1 - direction;
-        let period = self.chart.periods[direction]?;
-        let steps = {
-            let mut steps = [0.0; 2];
-            (steps[direction], steps[across]) =
-                (period / f64::from(COLUMNS), (to[across] - from[across]) / f64::from(ROWS));
-            steps
-        };
-        let mut nodes = vec![from];
-        for row in 0..ROWS {
-            for column in -COLUMNS..=COLUMNS {
-                let mut node = from;
-                node[direction] += steps[direction] * (f64::from(column) + ASIDE);
-                node[across] += steps[across] * (f64::from(row) + ASIDE);
-                nodes.push(node);
-            }
-        }
-        let first_end = nodes.len();
-        for round in -1..=1 {
-            let mut end = to;
-            end[direction] += period * f64::from(round);
-            nodes.push(end);
-        }
-        let scale = self.scale(nodes[first_end / 2]);
-        let length = |a: usize, b: usize| {
-            (0..2).map(|i| (scale[i] * (nodes[a][i] - nodes[b][i])).powi(2)).sum::<f64>().sqrt()
-        };
-        // Ends see the two rows beside them, other nodes their neighbours.
-        let is_near = |a: usize, b: usize| {
-            let apart = [0, 1].map(|i| (nodes[a][i] - nodes[b][i]).abs() / steps[i].abs());
-            let is_end = |k: usize| k == 0 || k >= first_end;
-            if is_end(a) || is_end(b) { apart[across] < 2.5 } else { apart[0].max(apart[1]) < 1.5 }
-        };
-        let mut best = vec![(f64::INFINITY, 0); nodes.len()];
+    /// The bends of a short way from a vertex of a loop around the surface to another vertex, or to
+    /// a multiple of the period beside it, that crosses neither these chains nor those `beside`;
+    /// `None` if there is none on a grid. The last of the bends is the end.
+    pub fn way<const N: usize>(
+        &self,
+        ends: [Parameters; 2],
+        direction: usize,
+        beside: [Vec<Parameters>; N],
+    ) -> Option<Vec<Parameters>> {
+        let grid = Grid::new(ends, direction, self.chart.periods[direction]?);
+        let chains = self.chains.iter().cloned().chain(beside).collect();
+        Obstacles { chart: self.chart, chains }.shortest(&grid)
+    }
+
+    /// The shortest way on a grid (Dijkstra 1959), without the bends that can be left out.
+    fn shortest(&self, grid: &Grid) -> Option<Vec<Parameters>> {
+        let scale = self.scale(grid.nodes[grid.first_end / 2]);
+        let mut best = vec![(f64::INFINITY, 0); grid.nodes.len()];
         best[0].0 = 0.0;
         let mut queue = BinaryHeap::from([(Reverse(0_u64), 0_usize)]);
-        let mut is_done = vec![false; nodes.len()];
+        let mut is_done = vec![false; grid.nodes.len()];
         // Bits of nonnegative numbers are in the order of the numbers.
         while let Some((_, node)) = queue.pop() {
             if std::mem::replace(&mut is_done[node], true) {
                 continue;
             }
-            if node >= first_end {
-                return Some(self.shortened(&nodes, &best, node, steps));
+            if node >= grid.first_end {
+                return Some(self.shortened(grid, &best, node));
             }
-            for other in (0..nodes.len()).filter(|&other| is_near(node, other)) {
-                let reached = best[node].0 + length(node, other);
+            for other in (0..grid.nodes.len()).filter(|&other| grid.are_near(node, other)) {
+                let reached = best[node].0 + grid.length(node, other, scale);
+                let ends = [node == 0, other >= grid.first_end];
                 if !is_done[other]
                     && reached < best[other].0
-                    && !self.block_around([nodes[node], nodes[other]], [node == 0, other >= first_end], steps)
+                    && !self.block_around([grid.nodes[node], grid.nodes[other]], ends, grid.steps)
                 {
                     best[other] = (reached, node);
                     queue.push((Reverse(reached.to_bits()), other));
@@ -95,25 +76,19 @@ impl Obstacles<'_> {
     }
 
     /// The bends of a way without those that can be left out.
-    fn shortened(
-        &self,
-        nodes: &[Parameters],
-        best: &[(f64, usize)],
-        end: usize,
-        steps: Parameters,
-    ) -> Vec<Parameters> {
-        let mut way = vec![nodes[end]];
+    fn shortened(&self, grid: &Grid, best: &[(f64, usize)], end: usize) -> Vec<Parameters> {
+        let mut way = vec![grid.nodes[end]];
         let mut node = end;
         while node != 0 {
             node = best[node].1;
-            way.push(nodes[node]);
+            way.push(grid.nodes[node]);
         }
         way.reverse();
         let mut kept = Vec::new();
         let mut at = 0;
         while at + 1 < way.len() {
             let are_ends = |to: usize| [at == 0, to + 1 == way.len()];
-            let seen = |to: &usize| !self.block_around([way[at], way[*to]], are_ends(*to), steps);
+            let seen = |to: &usize| !self.block_around([way[at], way[*to]], are_ends(*to), grid.steps);
             at = (at + 2..way.len()).rev().find(seen).unwrap_or(at + 1);
             kept.push(way[at]);
         }
@@ -143,6 +118,52 @@ impl Obstacles<'_> {
     fn scale(&self, at: Parameters) -> [f64; 2] {
         let d = self.chart.surface.jet(at[0], at[1], 1).d;
         [d[1][0].norm(), d[0][1].norm()]
+    }
+}
+
+/// Places for the bends of a way.
+struct Grid {
+    /// The start, those between, and the end at three multiples of the period.
+    nodes: Vec<Parameters>,
+    /// The first of the ends.
+    first_end: usize,
+    steps: Parameters,
+    /// The direction across the one in which the loops go around.
+    across: usize,
+}
+
+impl Grid {
+    fn new([from, to]: [Parameters; 2], direction: usize, period: f64) -> Self {
+        let across = 1 - direction;
+        let mut steps = [period / f64::from(COLUMNS); 2];
+        steps[across] = (to[across] - from[across]) / f64::from(ROWS);
+        let mut nodes = vec![from];
+        for row in 0..ROWS {
+            for column in -COLUMNS..=COLUMNS {
+                let mut node = from;
+                node[direction] += steps[direction] * (f64::from(column) + ASIDE);
+                node[across] += steps[across] * (f64::from(row) + ASIDE);
+                nodes.push(node);
+            }
+        }
+        let first_end = nodes.len();
+        for round in -1..=1 {
+            let mut end = to;
+            end[direction] += period * f64::from(round);
+            nodes.push(end);
+        }
+        Self { nodes, first_end, steps, across }
+    }
+
+    /// Ends see the two rows beside them, other nodes their neighbours.
+    fn are_near(&self, a: usize, b: usize) -> bool {
+        let apart = [0, 1].map(|i| (self.nodes[a][i] - self.nodes[b][i]).abs() / self.steps[i].abs());
+        let is_end = |k: usize| k == 0 || k >= self.first_end;
+        if is_end(a) || is_end(b) { apart[self.across] < 2.5 } else { apart[0].max(apart[1]) < 1.5 }
+    }
+
+    fn length(&self, a: usize, b: usize, scale: [f64; 2]) -> f64 {
+        (0..2).map(|i| (scale[i] * (self.nodes[a][i] - self.nodes[b][i])).powi(2)).sum::<f64>().sqrt()
     }
 }
 

@@ -74,6 +74,8 @@ struct Shell {
     volume: f64,
     /// The middle of the largest triangle.
     place: Point,
+    /// The least and the largest coordinates.
+    bounds: [Point; 2],
 }
 
 impl Shell {
@@ -89,10 +91,18 @@ impl Shell {
         let largest = own.iter().max_by(|s, t| area(s).total_cmp(&area(t)));
         let place =
             largest.map_or(Point::origin(), |t| ((t[0].coords + t[1].coords + t[2].coords) / 3.0).into());
-        Self { patches, volume: enclosed(&own, place), triangles: own, place }
+        let corners = || own.iter().flatten();
+        let bounds =
+            [corners().fold(place, |low, p| low.inf(p)), corners().fold(place, |high, p| high.sup(p))];
+        Self { patches, volume: enclosed(&own, place), triangles: own, place, bounds }
     }
 
     fn contains(&self, point: Point) -> bool {
+        // Parts with thousands of voids: a void's box contains hardly any of the others.
+        let [low, high] = self.bounds;
+        if !(0..3).all(|i| (low[i]..=high[i]).contains(&point[i])) {
+            return false;
+        }
         let winding = self.triangles.iter().map(|t| solid_angle(t, point)).sum::<f64>() / (2.0 * TAU);
         winding.round().rem_euclid(2.0) == 1.0
     }
