@@ -21,6 +21,10 @@ const LOW: usize = 4;
 const MIDDLE: usize = 8;
 const ALL: usize = MOST_DEGREE + 1;
 
+/// A spline is closed if its ends differ by at most this (fraction of its size, or of its range of
+/// parameters).
+pub(crate) const CLOSED: f64 = 1e-9;
+
 /// A B-spline basis over a knot sequence.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Basis {
@@ -85,6 +89,40 @@ impl Basis {
         flat = [before, flat, after].concat();
         let basis = Self { degree, knots: flat, is_periodic, poles };
         if basis.is_sound() { Ok(basis) } else { Err("a periodic B-spline has an empty range".into()) }
+    }
+
+    /// The periodic basis of the first poles of a closed spline, if it is one: its last poles repeat
+    /// the first. `is_same` compares two poles.
+    pub(crate) fn closed(&self, is_same: impl Fn(usize, usize) -> bool) -> Option<Self> {
+        if self.is_periodic || self.poles < 4 {
+            return None;
+        }
+        let (degree, poles, flat) = (self.degree, self.poles, &self.knots);
+        let [low, high] = self.range();
+        let counted = |of: &[f64]| -> (Vec<f64>, Vec<usize>) {
+            of.chunk_by(|a, b| a == b).map(|same| (same[0], same.len())).unzip()
+        };
+        let (knots, mut counts) = counted(flat);
+        let last = counts.len() - 1;
+        if counts[0] == degree + 1 && counts[last] == degree + 1 {
+            (counts[0], counts[last]) = (degree, degree);
+            return is_same(0, poles - 1)
+                .then(|| Self::new(degree, &knots, &counts, poles - 1, true).ok())?;
+        }
+        // Knots continue beyond both ends of the range as after a period.
+        let period = high - low;
+        let shift = flat.iter().filter(|k| low <= **k && **k < high).count();
+        let repeats = |i: usize| (flat[i + shift] - flat[i] - period).abs() <= CLOSED * period;
+        let is_periodic = shift < poles
+            && flat[degree + 1] > low
+            && (0..flat.len() - shift).all(repeats)
+            && (0..poles - shift).all(|i| is_same(i, i + shift));
+        if !is_periodic {
+            return None;
+        }
+        let inside: Vec<f64> = flat.iter().copied().filter(|k| (low..=high).contains(k)).collect();
+        let (knots, counts) = counted(&inside);
+        Self::new(degree, &knots, &counts, shift, true).ok()
     }
 
     /// The basis of a Bézier curve over [0, 1].
@@ -326,6 +364,21 @@ impl SplineSurface {
             }
         }
         jet
+    }
+
+    /// The surface, periodic in the directions in which it is closed.
+    pub(crate) fn closed(self) -> Self {
+        let [rows, columns] = [0, 1].map(|k| self.bases[k].poles());
+        let pole = |i: usize, j: usize| self.poles[i * columns + j];
+        let size = self.poles.iter().map(|p| (p - self.poles[0]).amax()).fold(0.0, f64::max);
+        let is_same = |a: Vector4<f64>, b: Vector4<f64>| (a - b).amax() <= CLOSED * size;
+        let [in_u, in_v] = &self.bases;
+        let closed_u = in_u.closed(|a, b| (0..columns).all(|j| is_same(pole(a, j), pole(b, j))));
+        let closed_v = in_v.closed(|a, b| (0..rows).all(|i| is_same(pole(i, a), pole(i, b))));
+        let bases = [closed_u.unwrap_or(in_u.clone()), closed_v.unwrap_or(in_v.clone())];
+        let [u, v] = [0, 1].map(|k| bases[k].poles());
+        let poles = (0..u).flat_map(|i| (0..v).map(move |j| (i, j))).map(|(i, j)| pole(i, j)).collect();
+        Self { bases, poles, ..self }
     }
 
     /// Whether evaluation finds all poles that it needs.

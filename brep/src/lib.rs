@@ -22,6 +22,7 @@ mod nearest;
 mod placement;
 mod project;
 mod read;
+mod shapes;
 mod step;
 mod surface;
 pub mod tessellate;

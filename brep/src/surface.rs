@@ -264,6 +264,14 @@ impl Surface {
         }
     }
 
+    /// The surface, periodic in the directions in which it is closed.
+    pub(crate) fn closed(self) -> Self {
+        match self {
+            Self::Spline(spline) => Self::Spline(spline.closed()),
+            other => other,
+        }
+    }
+
     /// A cone with v = 0 at the height of a point; other surfaces as they are. Files give radii far
     /// from the part that are a thousand times its size, and their digits are lost.
     pub(crate) fn measured_from(self, point: &Point) -> Self {

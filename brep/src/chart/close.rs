@@ -15,6 +15,8 @@ const UNBOUNDED: &str = "its loops do not bound an area of its surface";
 
 /// Segments of the curve of a seam.
 const SEGMENTS: usize = 64;
+/// Pairs of vertices that are tried for a seam.
+const MOST_SEAMS: usize = 100;
 /// Places that are tried for a seam.
 const PLACES: usize = 12;
 
@@ -201,39 +203,38 @@ impl Closing<'_> {
         holes: &Obstacles,
     ) -> Result<Vec<Side>, BrepError> {
         let period = self.chart.periods[direction].expect("loops go around");
-        let mut best: Option<(f64, usize, usize, i32)> = None;
+        let moved = |rounds: i32| {
+            let mut by = [0; 2];
+            by[direction] = rounds;
+            by
+        };
+        // All pairs of vertices, those that are nearest to each other around the surface first.
+        let mut pairs = Vec::new();
         for a in 0..lower.sides.len() {
             let from = self.chart.shifted(lower.sides[a].start(), lower.drift);
             for b in 0..upper.sides.len() {
                 let to = upper.sides[b].start();
                 let rounds = ((from[direction] - to[direction]) / period).round() as i32;
-                let mut by = [0; 2];
-                by[direction] = rounds;
-                let to = self.chart.shifted(to, by);
-                let mut way = (to[direction] - from[direction]).abs();
-                if holes.block([from, to]) {
-                    way += 10.0 * period;
-                }
-                if best.is_none_or(|(least, ..)| way < least) {
-                    best = Some((way, a, b, rounds));
-                }
+                let to = self.chart.shifted(to, moved(rounds));
+                pairs.push(((to[direction] - from[direction]).abs(), a, b, rounds, [from, to]));
             }
         }
-        let (_, a, b, mut rounds) = best.ok_or_else(|| self.error("its loops have no vertices"))?;
+        pairs.sort_by(|p, q| p.0.total_cmp(&q.0));
+        let all = holes.and([&lower, &upper].map(|one| chain(&one.sides)));
+        let free = pairs.iter().take(MOST_SEAMS).find(|pair| !all.separate(pair.4));
+        let Some(&(_, a, b, mut rounds, ends)) = free.or(pairs.first()) else {
+            return Err(self.error("its loops have no vertices"));
+        };
+        let mut way = vec![ends[1]];
+        if free.is_none()
+            && let Some(found) = all.way(ends, direction)
+        {
+            rounds += ((found[found.len() - 1][direction] - ends[1][direction]) / period).round() as i32;
+            way = found;
+        }
         let first = self.started(&lower, a, [0; 2]);
         let from = first[first.len() - 1].end();
-        let mut by = [0; 2];
-        by[direction] = rounds;
-        let mut way = vec![self.chart.shifted(upper.sides[b].start(), by)];
-        if holes.block([from, way[0]]) {
-            let beside = [&lower, &upper].map(|one| chain(&one.sides));
-            if let Some(found) = holes.way([from, way[0]], direction, beside) {
-                let period_moved = (found[found.len() - 1][direction] - way[0][direction]) / period;
-                rounds += period_moved.round() as i32;
-                way = found;
-            }
-        }
-        by[direction] = rounds;
+        let by = moved(rounds);
         let second = self.started(&upper, b, by);
         let ends = [self.corner_before(&first[0]), self.corner_before(&second[0])];
         let last = second[second.len() - 1].end();
@@ -281,16 +282,18 @@ impl Closing<'_> {
             top[1 - direction] = height;
             top
         };
+        let all = holes.and([chain(&one.sides)]);
         let is_free = |&k: &usize| {
-            let from = one.sides[k].start();
-            !holes.block([from, top(from)])
+            let from = self.chart.shifted(one.sides[k].start(), one.drift);
+            !all.separate([from, top(from)])
         };
-        let free = (0..one.sides.len()).find(is_free);
+        let clearance = |k: &usize| all.clearance([one.sides[*k].start(), top(one.sides[*k].start())]);
+        let free = (0..one.sides.len()).filter(is_free).max_by(|a, b| clearance(a).total_cmp(&clearance(b)));
         let mut out = self.started(&one, free.unwrap_or(0), [0; 2]);
         let (start, end) = (out[0].start(), out[out.len() - 1].end());
         let mut way = vec![top(end)];
         if free.is_none() {
-            way = holes.way([end, top(end)], direction, [chain(&one.sides)]).unwrap_or(way);
+            way = all.way([end, top(end)], direction).unwrap_or(way);
         }
         let tip = way[way.len() - 1];
         let drift = [0, 1].map(|i| start[i] - end[i]);
@@ -309,25 +312,20 @@ impl Closing<'_> {
         let chart = self.chart;
         let Some(period) = chart.periods[0] else { return Err(self.error(UNBOUNDED)) };
         if let Some(other) = chart.periods[1] {
-            let place = |k: usize| [period * (k as f64 + 0.37) / PLACES as f64, other * 0.37 / PLACES as f64];
-            let tries = (0..PLACES * PLACES).map(|k| {
-                let [u, v] = place(k % PLACES);
-                [u, v + other * (k / PLACES) as f64 / PLACES as f64]
-            });
-            let is_free = |[u, v]: &Parameters| {
-                !holes.block([[*u, *v], [u + period, *v]]) && !holes.block([[*u, *v], [*u, v + other]])
+            let place = |k: usize| {
+                let share = |k: usize| (k as f64 + 0.37) / PLACES as f64;
+                [period * share(k % PLACES), other * share(k / PLACES)]
             };
-            let [u, v] = tries.into_iter().find(is_free).unwrap_or(place(0));
+            let places = (0..PLACES * PLACES).map(place);
+            let ways = places.clone().find_map(|at| holes.around(at, false));
+            let ways = ways.or_else(|| places.step_by(7).find_map(|at| holes.around(at, true)));
+            let Some(([u, v], [along_u, along_v])) = ways else { return Err(self.error(UNBOUNDED)) };
             let corner = self.corner([u, v]);
-            let [along_u, along_v] =
-                [[u + period, v], [u, v + other]].map(|to| self.seam([u, v], to, [corner; 2]));
             let (east, north) = (u + period, v + other);
-            return Ok(vec![
-                Side::straight(along_u, true, [u, v], [east, v]),
-                Side::straight(along_v, true, [east, v], [east, north]),
-                Side::straight(along_u, false, [east, north], [u, north]),
-                Side::straight(along_v, false, [u, north], [u, v]),
-            ]);
+            let along_v = along_v.into_iter().map(|[u, v]| [u + period, v]).collect();
+            let (low, high) = self.seams([u, v], along_u, [corner; 2], [east, north]);
+            let (right, left) = self.seams([east, v], along_v, [corner; 2], [u, north]);
+            return Ok(low.into_iter().chain(right).chain(high).chain(left).collect());
         }
         let poles = [false, true].map(|is_upper| chart.surface.pole(1, is_upper, self.chart.least()));
         let [Some(low), Some(high)] = poles else { return Err(self.error(UNBOUNDED)) };

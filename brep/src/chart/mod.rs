@@ -16,7 +16,7 @@ use crate::model::{Fin, On};
 use crate::nearest::nearest_on_surface;
 use crate::project::project_to_surface;
 use crate::surface::Profile;
-use crate::{Curve, Point, Surface};
+use crate::{Curve, Point, Surface, Vector};
 use nalgebra::Vector2;
 
 /// Parameters of a surface.
@@ -107,8 +107,18 @@ impl<'a> Chart<'a> {
         [d[1][0], d[0][1]].iter().position(|d| d.norm() < self.least())
     }
 
+    /// The period in u or v.
+    pub fn period(&self, direction: usize) -> Option<f64> {
+        self.periods[direction]
+    }
+
+    /// The unit normal of the surface, if it has one there.
+    pub fn normal(&self, [u, v]: Parameters) -> Option<Vector> {
+        self.surface.jet(u, v, 1).normal()
+    }
+
     /// Parameters moved by multiples of the periods to be nearest to others.
-    fn unwrapped(&self, p: Parameters, near: Parameters) -> Parameters {
+    pub fn unwrapped(&self, p: Parameters, near: Parameters) -> Parameters {
         [0, 1].map(|i| match self.periods[i] {
             Some(period) => p[i] + period * ((near[i] - p[i]) / period).round(),
             None => p[i],

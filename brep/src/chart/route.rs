@@ -10,6 +10,8 @@ const ROWS: i32 = 12;
 /// Grid lines are this far from the ends (fraction of a step), because holes often have edges at
 /// simple fractions.
 const ASIDE: f64 = 0.37;
+/// So much of a segment may be beyond a chain on which it ends.
+const AT_VERTEX: f64 = 1e-6;
 /// How far a way stays from holes (fraction of the grid's steps).
 const CLEARANCE: f64 = 0.2;
 
@@ -31,18 +33,48 @@ impl Obstacles<'_> {
         self.chains.iter().any(|chain| rounds(0).any(|i| rounds(1).any(|j| crosses(chain, [i, j]))))
     }
 
+    /// Whether a segment between two vertices of chains, with a bit left out at both ends, crosses a
+    /// chain.
+    pub fn separate(&self, [a, b]: [Parameters; 2]) -> bool {
+        let part = |share: f64| [0, 1].map(|i| a[i] + share * (b[i] - a[i]));
+        self.block([part(AT_VERTEX), part(1.0 - AT_VERTEX)])
+    }
+
+    /// How far the middle of a segment is from chains (length).
+    pub fn clearance(&self, [a, b]: [Parameters; 2]) -> f64 {
+        let middle = [0, 1].map(|i| 0.5 * (a[i] + b[i]));
+        let scale = self.scale(middle);
+        let distance = |p: &Parameters| {
+            let p = self.chart.unwrapped(*p, middle);
+            (0..2).map(|i| (scale[i] * (p[i] - middle[i])).powi(2)).sum::<f64>().sqrt()
+        };
+        self.chains.iter().flatten().map(distance).fold(f64::INFINITY, f64::min)
+    }
+
+    /// Ways from a place around the surface in u and in v that meet there alone, if there are any:
+    /// straight ones, or with bends. The last bend of each is the place.
+    pub fn around(&self, at: Parameters, may_bend: bool) -> Option<(Parameters, [Vec<Parameters>; 2])> {
+        let ends = [[1, 0], [0, 1]].map(|by| self.chart.shifted(at, by));
+        if !may_bend {
+            let is_free = |end: &Parameters| !self.block([at, *end]);
+            return ends.iter().all(is_free).then(|| (at, ends.map(|end| vec![end])));
+        }
+        let along_u = self.shortest(&Grid::around(at, 0, self.chart.periods)?)?;
+        let first = std::iter::once(at).chain(along_u.iter().copied()).collect();
+        let along_v = self.and([first]).shortest(&Grid::around(at, 1, self.chart.periods)?)?;
+        Some((at, [along_u, along_v]))
+    }
+
+    /// These chains and others.
+    pub fn and<const N: usize>(&self, beside: [Vec<Parameters>; N]) -> Self {
+        Self { chart: self.chart, chains: self.chains.iter().cloned().chain(beside).collect() }
+    }
+
     /// The bends of a short way from a vertex of a loop around the surface to another vertex, or to
-    /// a multiple of the period beside it, that crosses neither these chains nor those `beside`;
-    /// `None` if there is none on a grid. The last of the bends is the end.
-    pub fn way<const N: usize>(
-        &self,
-        ends: [Parameters; 2],
-        direction: usize,
-        beside: [Vec<Parameters>; N],
-    ) -> Option<Vec<Parameters>> {
-        let grid = Grid::new(ends, direction, self.chart.periods[direction]?);
-        let chains = self.chains.iter().cloned().chain(beside).collect();
-        Obstacles { chart: self.chart, chains }.shortest(&grid)
+    /// a multiple of the period beside it, that crosses no chain; `None` if there is none on a grid.
+    /// The last of the bends is the end.
+    pub fn way(&self, ends: [Parameters; 2], direction: usize) -> Option<Vec<Parameters>> {
+        self.shortest(&Grid::new(ends, direction, self.chart.periods[direction]?))
     }
 
     /// The shortest way on a grid (Dijkstra 1959), without the bends that can be left out.
@@ -103,7 +135,8 @@ impl Obstacles<'_> {
         steps: Parameters,
     ) -> bool {
         let part = |share: f64| [0, 1].map(|i| a[i] + share * (b[i] - a[i]));
-        let [a, b] = [part(if is_start { 1e-6 } else { 0.0 }), part(if is_end { 1.0 - 1e-6 } else { 1.0 })];
+        let [a, b] =
+            [part(if is_start { AT_VERTEX } else { 0.0 }), part(if is_end { 1.0 - AT_VERTEX } else { 1.0 })];
         let off = [0, 1].map(|i| CLEARANCE * steps[i].abs());
         let moved = |p: Parameters, x: f64, y: f64| [p[0] + x * off[0], p[1] + y * off[1]];
         let middle = part(0.5);
@@ -128,8 +161,8 @@ struct Grid {
     /// The first of the ends.
     first_end: usize,
     steps: Parameters,
-    /// The direction across the one in which the loops go around.
-    across: usize,
+    /// The end sees nodes within so many steps in each direction.
+    sight: [f64; 2],
 }
 
 impl Grid {
@@ -152,14 +185,38 @@ impl Grid {
             end[direction] += period * f64::from(round);
             nodes.push(end);
         }
-        Self { nodes, first_end, steps, across }
+        let mut sight = [f64::INFINITY; 2];
+        sight[across] = 2.5;
+        Self { nodes, first_end, steps, sight }
     }
 
-    /// Ends see the two rows beside them, other nodes their neighbours.
+    /// Places for a way around a surface that is periodic in both directions, back to its start.
+    fn around(from: Parameters, direction: usize, periods: [Option<f64>; 2]) -> Option<Self> {
+        let [Some(in_u), Some(in_v)] = periods else { return None };
+        let steps = [in_u, in_v].map(|period| period / f64::from(COLUMNS));
+        let mut nodes = vec![from];
+        let across = 1 - direction;
+        for row in -COLUMNS..COLUMNS {
+            for column in -COLUMNS / 2..COLUMNS * 3 / 2 {
+                let mut node = from;
+                node[direction] += steps[direction] * (f64::from(column) + ASIDE);
+                node[across] += steps[across] * (f64::from(row) + ASIDE);
+                nodes.push(node);
+            }
+        }
+        let first_end = nodes.len();
+        let mut end = from;
+        end[direction] += [in_u, in_v][direction];
+        nodes.push(end);
+        Some(Self { nodes, first_end, steps, sight: [2.5; 2] })
+    }
+
+    /// Ends see the nodes beside them, other nodes their neighbours.
     fn are_near(&self, a: usize, b: usize) -> bool {
         let apart = [0, 1].map(|i| (self.nodes[a][i] - self.nodes[b][i]).abs() / self.steps[i].abs());
         let is_end = |k: usize| k == 0 || k >= self.first_end;
-        if is_end(a) || is_end(b) { apart[self.across] < 2.5 } else { apart[0].max(apart[1]) < 1.5 }
+        let sight = if is_end(a) || is_end(b) { self.sight } else { [1.5; 2] };
+        apart[0] < sight[0] && apart[1] < sight[1]
     }
 
     fn length(&self, a: usize, b: usize, scale: [f64; 2]) -> f64 {

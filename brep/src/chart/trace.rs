@@ -26,6 +26,8 @@ const ROUNDING: f64 = 1e-9;
 /// Edges further from their surface than this (fraction of the diagonal) do not belong to it.
 const FARTHEST: f64 = 2e-3;
 
+/// Each step of an edge is divided into so many parts where crossings count.
+const BETWEEN: u32 = 16;
 /// The most nodes of an edge.
 const MOST_NODES: usize = 20_000;
 
@@ -87,6 +89,23 @@ impl Chart<'_> {
         self.closed(face, curves, sides, gap)
     }
 
+    /// Parameters along an edge on the surface, closer than a straight line in them needs; `None` if
+    /// it leaves the surface, or passes through a pole.
+    pub fn along(&self, edge: &EdgeCurve) -> Option<Vec<Parameters>> {
+        let (nodes, _) = self.walk_both_ways(edge, edge.range).ok()?;
+        let mut out = vec![nodes[0].1];
+        for w in nodes.windows(2) {
+            let [(t, p), (u, q)] = [w[0], w[1]];
+            for k in 1..BETWEEN {
+                let share = f64::from(k) / f64::from(BETWEEN);
+                let guess = [0, 1].map(|i| p[i] + share * (q[i] - p[i]));
+                out.push(self.near(&point(edge, t + share * (u - t)), guess));
+            }
+            out.push(q);
+        }
+        out.iter().all(|&p| self.pole_at(p).is_none()).then_some(out)
+    }
+
     /// Closes a loop at its start.
     fn closed(
         &self,
@@ -123,7 +142,7 @@ impl Chart<'_> {
     }
 
     /// Parameters moved by multiples of the periods.
-    pub(super) fn shifted(&self, p: Parameters, by: [i32; 2]) -> Parameters {
+    pub fn shifted(&self, p: Parameters, by: [i32; 2]) -> Parameters {
         [0, 1].map(|i| p[i] + f64::from(by[i]) * self.periods[i].unwrap_or(0.0))
     }
 

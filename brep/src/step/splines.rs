@@ -90,17 +90,13 @@ fn spline(
     }
     let size = poles.iter().map(|p| (p - poles[0]).amax()).fold(0.0, f64::max);
     let is_same = |i: usize, j: usize| {
-        (poles[i] - poles[j]).amax() <= CLOSED * size && weights.get(i) == weights.get(j)
+        (poles[i] - poles[j]).amax() <= crate::bspline::CLOSED * size && weights.get(i) == weights.get(j)
     };
     let basis = basis(node, degree, poles.len(), knots, is_same)?;
     poles.truncate(basis.poles());
     weights.truncate(basis.poles());
     Ok(Curve::Spline(SplineCurve { basis, poles, weights }))
 }
-
-/// A spline is closed if its ends differ by at most this (fraction of its size, or of its range of
-/// parameters).
-const CLOSED: f64 = 1e-9;
 
 /// A basis, periodic if the spline is closed; `is_same` compares two poles.
 fn basis(
@@ -110,48 +106,15 @@ fn basis(
     knots: &Knots,
     is_same: impl Fn(usize, usize) -> bool,
 ) -> Result<Basis, BrepError> {
+    let made = open_basis(node, degree, poles, knots)?;
+    Ok(made.closed(is_same).unwrap_or(made))
+}
+
+fn open_basis(node: Node, degree: usize, poles: usize, knots: &Knots) -> Result<Basis, BrepError> {
     if knots.0.len() != knots.1.len() {
         return Err(node.error("each knot needs a multiplicity"));
     }
-    let made = Basis::new(degree, &knots.0, &knots.1, poles, false).map_err(|what| node.error(what))?;
-    Ok(periodic(degree, poles, knots, is_same).unwrap_or(made))
-}
-
-/// The basis of the first poles of a closed spline, if it is one: its last poles repeat the first.
-fn periodic(
-    degree: usize,
-    poles: usize,
-    (knots, multiplicities): &Knots,
-    is_same: impl Fn(usize, usize) -> bool,
-) -> Option<Basis> {
-    let last = knots.len() - 1;
-    if poles < 4 {
-        return None;
-    }
-    if multiplicities[0] == degree + 1 && multiplicities[last] == degree + 1 {
-        let mut fewer = multiplicities.clone();
-        (fewer[0], fewer[last]) = (degree, degree);
-        return is_same(0, poles - 1).then(|| Basis::new(degree, knots, &fewer, poles - 1, true).ok())?;
-    }
-    // Knots continue beyond both ends of the range as after a period.
-    let flat: Vec<f64> =
-        knots.iter().zip(multiplicities).flat_map(|(&k, &m)| std::iter::repeat_n(k, m)).collect();
-    let [low, high] = [flat[degree], flat[poles]];
-    let period = high - low;
-    let shift = flat.iter().filter(|k| low <= **k && **k < high).count();
-    let repeats = |i: usize| (flat[i + shift] - flat[i] - period).abs() <= CLOSED * period;
-    let is_periodic = shift < poles
-        && flat[degree + 1] > low
-        && (0..flat.len() - shift).all(repeats)
-        && (0..poles - shift).all(|i| is_same(i, i + shift));
-    if !is_periodic {
-        return None;
-    }
-    let inside = |k: &usize| low <= knots[*k] && knots[*k] <= high;
-    let range: Vec<usize> = (0..knots.len()).filter(inside).collect();
-    let own: Vec<f64> = range.iter().map(|&k| knots[k]).collect();
-    let counts: Vec<usize> = range.iter().map(|&k| multiplicities[k]).collect();
-    Basis::new(degree, &own, &counts, shift, true).ok()
+    Basis::new(degree, &knots.0, &knots.1, poles, false).map_err(|what| node.error(what))
 }
 
 /// A B-spline surface of any type.
@@ -196,19 +159,11 @@ pub(super) fn spline_surface(node: Node) -> Result<Surface, BrepError> {
         None => [0, 1].map(|k| implied(node, "SURFACE", degrees[k], counts[k])),
     };
     let [in_u, in_v] = knots;
-    let size = net.iter().flatten().map(|p| (p - net[0][0]).amax()).fold(0.0, f64::max);
-    let is_same = |a: &Vector4<f64>, b: &Vector4<f64>| (a - b).amax() <= CLOSED * size;
-    let bases = [
-        basis(node, degrees[0], counts[0], &in_u?, |i, j| {
-            net[i].iter().zip(&net[j]).all(|(a, b)| is_same(a, b))
-        })?,
-        basis(node, degrees[1], counts[1], &in_v?, |i, j| net.iter().all(|row| is_same(&row[i], &row[j])))?,
-    ];
-    net.truncate(bases[0].poles());
-    net.iter_mut().for_each(|row| row.truncate(bases[1].poles()));
+    let bases =
+        [open_basis(node, degrees[0], counts[0], &in_u?)?, open_basis(node, degrees[1], counts[1], &in_v?)?];
     let is_rational = weights.iter().flatten().any(|w| *w != weights[0][0]);
     if !is_rational {
         net.iter_mut().flatten().for_each(|pole| *pole /= pole.w);
     }
-    Ok(Surface::Spline(SplineSurface { bases, poles: net.concat(), is_rational }))
+    Ok(Surface::Spline(SplineSurface { bases, poles: net.concat(), is_rational }.closed()))
 }

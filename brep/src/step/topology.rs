@@ -1,4 +1,4 @@
-//! Solids, shells, faces, loops, edges and vertices, as a model without patches.
+//! Solids, shells, faces, loops, edges and vertices.
 //!
 //! Source: ISO 10303-42, topology, and ISO 10303-511 (advanced faces).
 
@@ -7,35 +7,9 @@ use super::geometry::{curve, point, surface};
 use super::record::Node;
 use crate::model::{Corner, EdgeCurve};
 use crate::nearest::nearest_on_curve;
-use crate::{BrepError, Curve, Placement, Point, Surface};
+use crate::shapes::{Edges, Face, Shapes, reversed};
+use crate::{BrepError, Curve, Placement, Point};
 use std::collections::HashMap;
-
-/// A face of one solid.
-pub(super) struct Face {
-    /// The number of its record.
-    pub id: u64,
-    pub surface: Surface,
-    /// Loops of edges, each with whether it is used forward; counterclockwise around the normal of
-    /// the surface.
-    pub loops: Vec<Vec<(usize, bool)>>,
-    pub body: usize,
-    /// Whether the body is behind it, seen along the normal of its surface.
-    pub is_behind: bool,
-    pub name: Option<String>,
-}
-
-/// The shapes of all solids, nothing shared between them.
-#[derive(Default)]
-pub(super) struct Shapes {
-    pub corners: Vec<Corner>,
-    pub curves: Vec<EdgeCurve>,
-    pub faces: Vec<Face>,
-    /// The body of each corner and curve.
-    pub body_of_corner: Vec<usize>,
-    pub body_of_curve: Vec<usize>,
-    /// How accurate the data of each body is (length).
-    pub accuracy: Vec<f64>,
-}
 
 /// Reads one solid.
 struct Reader<'s> {
@@ -56,7 +30,7 @@ impl Shapes {
     ///
     /// # Errors
     /// [`BrepError::Syntax`] with the record and line.
-    pub fn add(&mut self, placed: &PlacedSolid) -> Result<(), BrepError> {
+    pub(super) fn add(&mut self, placed: &PlacedSolid) -> Result<(), BrepError> {
         let body = self.accuracy.len();
         self.accuracy.push(placed.units.accuracy * placed.placement.scale());
         let mut reader = Reader {
@@ -141,7 +115,7 @@ impl Reader<'_> {
     }
 
     /// The edges of a loop with length.
-    fn edges(&mut self, bound: Node) -> Result<Vec<(usize, bool)>, BrepError> {
+    fn edges(&mut self, bound: Node) -> Result<Edges, BrepError> {
         if let Some(fields) = bound.get("EDGE_LOOP") {
             let mut edges = Vec::new();
             for used in fields.refers_all(1)? {
@@ -296,11 +270,4 @@ fn size(curve: &Curve<3>) -> f64 {
     let Some([low, high]) = curve.domain() else { return 0.0 };
     let start = curve.point(low);
     (1..8).map(|k| (curve.point(low + (high - low) * f64::from(k) / 8.0) - start).norm()).fold(0.0, f64::max)
-}
-
-/// The loop in the other direction.
-pub(super) fn reversed(mut edges: Vec<(usize, bool)>) -> Vec<(usize, bool)> {
-    edges.reverse();
-    edges.iter_mut().for_each(|edge| edge.1 = !edge.1);
-    edges
 }

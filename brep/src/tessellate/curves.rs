@@ -118,9 +118,10 @@ fn normal(edge: &EdgeCurve, (surface, fin): Beside, t: f64) -> Option<Vector> {
     surface.jet(u, v, 1).normal()
 }
 
-/// The diagonal of the box around corners and samples of curves; not 0.
-pub(crate) fn diagonal(corners: &[Corner], curves: &[EdgeCurve]) -> f64 {
-    let mut points: Vec<Point> = corners.iter().map(|c| c.point).collect();
+/// The diagonal of the box around corners, samples of curves and other points; not 0.
+pub(crate) fn diagonal(corners: &[Corner], curves: &[EdgeCurve], others: Vec<Point>) -> f64 {
+    let mut points = others;
+    points.extend(corners.iter().map(|c| c.point));
     for edge in curves {
         let [low, high] = edge.range;
         points.extend((1..8).map(|k| Point::from(edge.curve.point(low + (high - low) * f64::from(k) / 8.0))));

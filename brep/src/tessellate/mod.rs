@@ -11,6 +11,7 @@ mod face;
 mod frame;
 mod measure;
 mod orient;
+mod overlap;
 
 pub(crate) use curves::diagonal;
 pub use measure::{area, check, volume};
@@ -76,7 +77,7 @@ impl Tessellation {
     /// [`BrepError::Face`] and [`BrepError::Edge`] with a place if curves and surfaces do not fit
     /// each other or loops cross; [`BrepError::Solid`] if a body is not closed.
     pub fn of(model: &mut Model, settings: &Settings) -> Result<Self, BrepError> {
-        let diagonal = diagonal(&model.corners, &model.curves);
+        let diagonal = diagonal(&model.corners, &model.curves, Vec::new());
         let chord = settings.chord * diagonal;
         let mut tolerances = face::Tolerances { chord, angle: settings.angle, diagonal, refuses_folds: true };
         let mut chords = vec![tolerances.chord; model.curves.len()];

@@ -7,8 +7,8 @@
 //! other around one of its triangles is odd (Jacobson, Kavan and Sorkine-Hornung 2013, "Robust
 //! inside-outside segmentation using generalized winding numbers", section 3).
 
-use super::{Tessellation, measure::enclosed};
-use crate::{BrepError, Model, Point};
+use super::{Tessellation, measure::enclosed, overlap};
+use crate::{BrepError, Model, On, Point};
 use std::collections::HashMap;
 use std::f64::consts::TAU;
 
@@ -23,14 +23,16 @@ pub(super) fn orient(model: &mut Model, tessellation: &Tessellation) -> Result<(
         triangles[triangle.patch as usize].push(triangle.vertices.map(|v| tessellation.points[v as usize]));
     }
     let uses = Uses::new(model, tessellation);
+    let mut all = Vec::new();
     for body in 0..model.bodies {
         let connected = shells(model, body, &uses);
         turn_faces(model, body, connected.iter().flat_map(|shell| shell.1.iter().copied()).collect())?;
         let shells: Vec<Shell> =
             connected.into_iter().map(|(patches, _)| Shell::new(model, body, patches, &triangles)).collect();
         turn_shells(model, body, &shells)?;
+        all.push(shells);
     }
-    Ok(())
+    overlap::check(model, &all)
 }
 
 /// Turns patches that their neighbours contradict.
@@ -67,8 +69,10 @@ fn turn_shells(model: &mut Model, body: usize, shells: &[Shell]) -> Result<(), B
 }
 
 /// Patches of one body that curves connect.
-struct Shell {
+pub(super) struct Shell {
     patches: Vec<usize>,
+    /// The largest triangle of each patch: the patch, twice the area, the middle.
+    pub largest: Vec<(usize, f64, Point)>,
     /// The triangles, counterclockwise seen from outside the body.
     triangles: Vec<[Point; 3]>,
     volume: f64,
@@ -81,23 +85,25 @@ struct Shell {
 impl Shell {
     fn new(model: &Model, body: usize, patches: Vec<usize>, triangles: &[Vec<[Point; 3]>]) -> Self {
         let mut own = Vec::new();
+        let mut largest = Vec::new();
         for &patch in &patches {
             let is_behind = model.patches[patch].bodies[0] == Some(body);
-            own.extend(
-                triangles[patch].iter().map(|&[a, b, c]| if is_behind { [a, b, c] } else { [a, c, b] }),
-            );
+            let oriented =
+                triangles[patch].iter().map(|&[a, b, c]| if is_behind { [a, b, c] } else { [a, c, b] });
+            own.extend(oriented);
+            let area = |[a, b, c]: &[Point; 3]| (b - a).cross(&(c - a)).norm();
+            let middle = |[a, b, c]: &[Point; 3]| Point::from((a.coords + b.coords + c.coords) / 3.0);
+            let sized = triangles[patch].iter().map(|t| (patch, area(t), middle(t)));
+            largest.extend(sized.max_by(|s, t| s.1.total_cmp(&t.1)));
         }
-        let area = |[a, b, c]: &[Point; 3]| (b - a).cross(&(c - a)).norm();
-        let largest = own.iter().max_by(|s, t| area(s).total_cmp(&area(t)));
-        let place =
-            largest.map_or(Point::origin(), |t| ((t[0].coords + t[1].coords + t[2].coords) / 3.0).into());
+        let place = largest.iter().max_by(|s, t| s.1.total_cmp(&t.1)).map_or(Point::origin(), |l| l.2);
         let corners = || own.iter().flatten();
         let bounds =
             [corners().fold(place, |low, p| low.inf(p)), corners().fold(place, |high, p| high.sup(p))];
-        Self { patches, volume: enclosed(&own, place), triangles: own, place, bounds }
+        Self { patches, largest, volume: enclosed(&own, place), triangles: own, place, bounds }
     }
 
-    fn contains(&self, point: Point) -> bool {
+    pub fn contains(&self, point: Point) -> bool {
         // Parts with thousands of voids: a void's box contains hardly any of the others.
         let [low, high] = self.bounds;
         if !(0..3).all(|i| (low[i]..=high[i]).contains(&point[i])) {
@@ -114,8 +120,13 @@ fn turn(model: &mut Model, body: usize, patches: &[usize]) -> Result<(), BrepErr
         let patch = &mut model.patches[number];
         let side = patch.bodies.iter().position(|b| *b == Some(body)).expect("a patch of the body");
         if patch.bodies[1 - side].is_some() {
-            let what = "the solids on its sides have different orientations";
-            return Err(BrepError::face(number, what, None));
+            let [a, b] = patch.bodies.map(|body| body.map_or(0, |body| body + 1));
+            let what = format!("the solids {a} and {b} beside it overlap, or one of them is inside out");
+            let place = patch.loops.iter().flatten().next().map(|fin| match fin.on {
+                On::Curve(curve) => model.corners[model.curves[curve].ends[0]].point,
+                On::Corner(corner) => model.corners[corner].point,
+            });
+            return Err(BrepError::face(number, what, place));
         }
         patch.bodies.swap(0, 1);
     }

@@ -3,7 +3,7 @@
 //! At a pole of a sphere, or the apex of a cone, the direction around the axis jumps, which a curve
 //! in the parameters can do at its ends only.
 
-use super::topology::Shapes;
+use super::Shapes;
 use crate::model::{Corner, EdgeCurve};
 use crate::nearest::nearest_on_curve;
 use crate::{Point, Surface};
@@ -20,8 +20,12 @@ pub(super) fn divide_at_poles(shapes: &mut Shapes, diagonal: f64) {
             curves.sort_unstable();
             curves.dedup();
             for curve in curves {
-                if let Some(at) = inner_parameter(&shapes.curves[curve], &pole, THROUGH * diagonal) {
-                    divide(shapes, curve, at, pole);
+                let through = THROUGH * diagonal;
+                if let Some(at) = inner_parameter(&shapes.curves[curve], &pole, through, 10.0 * through) {
+                    let tolerance = shapes.curves[curve].tolerance;
+                    let corner =
+                        shapes.add_corner(Corner { point: pole, tolerance }, shapes.body_of_curve[curve]);
+                    divide(shapes, curve, at, corner);
                 }
             }
         }
@@ -36,8 +40,9 @@ fn poles(surface: &Surface, diagonal: f64) -> Vec<Point> {
     [false, true].into_iter().filter_map(height).map(|v| surface.point([0.0, v])).collect()
 }
 
-/// The parameter at which a curve passes through a point, if it does so away from its ends.
-fn inner_parameter(edge: &EdgeCurve, point: &Point, tolerance: f64) -> Option<f64> {
+/// The parameter at which a curve passes through a point, if it does so further than `at_end` from
+/// its ends.
+pub(super) fn inner_parameter(edge: &EdgeCurve, point: &Point, tolerance: f64, at_end: f64) -> Option<f64> {
     let foot = nearest_on_curve(&edge.curve, point);
     if (foot.point - point).norm() > tolerance {
         return None;
@@ -48,19 +53,20 @@ fn inner_parameter(edge: &EdgeCurve, point: &Point, tolerance: f64) -> Option<f6
         at = low + (at - low).rem_euclid(period);
     }
     let is_inner = low < at && at < high;
-    let is_at_end = |end: f64| (Point::from(edge.curve.point(end)) - point).norm() <= 10.0 * tolerance;
+    let is_at_end = |end: f64| (Point::from(edge.curve.point(end)) - point).norm() <= at_end;
     (is_inner && !is_at_end(low) && !is_at_end(high)).then_some(at)
 }
 
-/// Divides a curve at a point; all loops follow both halves afterwards.
-fn divide(shapes: &mut Shapes, curve: usize, at: f64, point: Point) {
-    let (corner, second) = (shapes.corners.len(), shapes.curves.len());
+/// Divides a curve at a corner; all loops follow both halves afterwards. The first half keeps the
+/// index of the curve.
+pub(super) fn divide(shapes: &mut Shapes, curve: usize, at: f64, corner: usize) {
+    let second = shapes.curves.len();
     let edge = &mut shapes.curves[curve];
-    let (tolerance, [low, high]) = (edge.tolerance, edge.range);
+    let [low, high] = edge.range;
     let half = EdgeCurve { range: [at, high], ends: [corner, edge.ends[1]], ..edge.clone() };
     (edge.range, edge.ends) = ([low, at], [edge.ends[0], corner]);
     shapes.curves.push(half);
-    shapes.corners.push(Corner { point, tolerance });
+    shapes.body_of_curve.push(shapes.body_of_curve[curve]);
     for edges in shapes.faces.iter_mut().flat_map(|face| &mut face.loops) {
         let halves = |&(other, is_forward): &(usize, bool)| match (other == curve, is_forward) {
             (false, _) => vec![(other, is_forward)],

@@ -4,11 +4,12 @@
 //! are made one, then edges between the same corners along the same curve, and in the end faces
 //! with the same edges on the same surface.
 
-use super::topology::Shapes;
-use crate::model::{Model, On, Patch};
-use crate::nearest::nearest_on_curve;
+use super::Shapes;
+use crate::model::{Fin, Model, On, Patch};
+use crate::nearest::{nearest_on_curve, nearest_on_surface};
 use crate::project::project_to_surface;
-use crate::{EdgeCurve, Point};
+use crate::{Curve, EdgeCurve, Point, Surface};
+use nalgebra::Vector2;
 use std::collections::{BTreeMap, HashMap, HashSet};
 
 /// Corners of different solids at most this far apart are one (fraction of the diagonal) ...
@@ -66,7 +67,8 @@ fn pairs(shapes: &Shapes) -> HashSet<[usize; 2]> {
     loops.filter_map(pair).collect()
 }
 
-fn tolerance(shapes: &Shapes, body: usize, diagonal: f64) -> f64 {
+/// Places of a body this far apart are one.
+pub(super) fn tolerance(shapes: &Shapes, body: usize, diagonal: f64) -> f64 {
     f64::max(SAME * diagonal, ROOM * shapes.accuracy[body])
 }
 
@@ -138,9 +140,7 @@ pub(super) fn glue_patches(model: &mut Model, tolerance: f64) -> Vec<usize> {
     let mut kept: Vec<Patch> = Vec::new();
     let mut to = Vec::new();
     for patch in std::mem::take(&mut model.patches) {
-        let mut key: Vec<usize> = patch.loops.iter().flatten().filter_map(curve_of).collect();
-        key.sort_unstable();
-        let known = by_curves.entry(key).or_default();
+        let known = by_curves.entry(bounds(&patch)).or_default();
         let own = patch.bodies.iter().flatten().next().copied();
         let same = known.iter().copied().find(|&other: &usize| {
             let is_free = kept[other].bodies.contains(&None) && !kept[other].bodies.contains(&own);
@@ -164,29 +164,67 @@ pub(super) fn glue_patches(model: &mut Model, tolerance: f64) -> Vec<usize> {
     to
 }
 
-fn curve_of(fin: &crate::Fin) -> Option<usize> {
+/// The curves that bound a patch, in ascending order, without seams, which any program puts elsewhere.
+fn bounds(patch: &Patch) -> Vec<usize> {
+    let mut all: Vec<usize> = patch.loops.iter().flatten().filter_map(curve_of).collect();
+    all.sort_unstable();
+    all.chunk_by(|a, b| a == b).filter(|uses| uses.len() == 1).flatten().copied().collect()
+}
+
+fn curve_of(fin: &Fin) -> Option<usize> {
     match fin.on {
         On::Curve(curve) => Some(curve),
         On::Corner(_) => None,
     }
 }
 
-/// Whether two patches with the same curves have the same surface between them.
+/// How far beside an edge two surfaces are compared (fraction of its length) ...
+const BESIDE: f64 = 0.02;
+/// ... but not further than this (fraction of a period).
+const AROUND: f64 = 0.05;
+
+/// Whether two patches between the same curves have the same surface there.
 fn is_same_surface(model: &Model, one: &Patch, other: &Patch, tolerance: f64) -> bool {
     if one.surface.is_plane() || other.surface.is_plane() {
         return one.surface.is_plane() && other.surface.is_plane();
     }
-    // Points beside the middle of each curve on one patch must be on the other one.
+    // Points of one patch beside the middle of each of its curves must be on the other one.
     one.loops.iter().flatten().filter_map(|fin| Some((fin, curve_of(fin)?))).all(|(fin, curve)| {
-        let edge = &model.curves[curve];
-        let Some(own) = &fin.curve else { return true };
-        let there = other.loops.iter().flatten().find(|fin| fin.on == On::Curve(curve));
-        let Some(start) = there.and_then(|fin| fin.curve.as_ref()) else { return false };
-        let t = 0.5 * (edge.range[0] + edge.range[1]);
-        let [at, along] = [own.jet(t)[0], own.jet(t)[1]];
-        let step = 0.02 * (edge.range[1] - edge.range[0]) * if fin.is_forward { 1.0 } else { -1.0 };
-        let point = one.surface.point([at.x - along.y * step, at.y + along.x * step]);
+        let Some(point) = beside(&model.curves[curve], &one.surface, fin) else { return true };
+        let is_near = |foot: &Point| (foot - point).norm() <= 10.0 * tolerance;
+        let there: Vec<&Fin> =
+            other.loops.iter().flatten().filter(|fin| fin.on == On::Curve(curve)).collect();
+        let [fin @ Fin { curve: Some(start), .. }] = there[..] else {
+            // A seam.
+            return is_near(&nearest_on_surface(&other.surface, &point).point);
+        };
+        let t = middle(fin.range);
         let foot = project_to_surface(&other.surface, &point, start.point(t).into());
-        (foot.point - point).norm() <= 10.0 * tolerance
+        // The other patch may be on the other side of the curve.
+        let way = Vector2::from(foot.parameters) - start.point(t);
+        is_near(&foot.point) && way.dot(&inward(start, fin)) > 0.0
     })
+}
+
+/// A point of a patch beside the middle of a side.
+fn beside(edge: &EdgeCurve, surface: &Surface, fin: &Fin) -> Option<Point> {
+    let own = fin.curve.as_ref()?;
+    let way = inward(own, fin).try_normalize(0.0)?;
+    let at = own.point(middle(fin.range));
+    let d = surface.jet(at.x, at.y, 1).d;
+    let length = edge.curve.jet(middle(edge.range))[1].norm() * (edge.range[1] - edge.range[0]);
+    let speed = (d[1][0] * way.x + d[0][1] * way.y).norm().max(f64::MIN_POSITIVE);
+    let most = |i: usize| surface.periods()[i].map_or(f64::INFINITY, |period| AROUND * period / way[i].abs());
+    let step = (BESIDE * length / speed).min(most(0)).min(most(1));
+    Some(surface.point((at + way * step).into()))
+}
+
+fn middle(range: [f64; 2]) -> f64 {
+    0.5 * (range[0] + range[1])
+}
+
+/// The direction to the left of a side at its middle, in the parameters.
+fn inward(side: &Curve<2>, fin: &Fin) -> Vector2<f64> {
+    let along = side.jet(middle(fin.range))[1];
+    Vector2::new(-along.y, along.x) * if fin.is_forward { 1.0 } else { -1.0 }
 }

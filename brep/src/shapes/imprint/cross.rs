@@ -1,0 +1,200 @@
+//! Edges divided where edges of another face on the same surface meet them.
+
+use super::super::Shapes;
+use super::super::split::{divide, inner_parameter};
+use super::{SAME, room};
+use crate::model::Corner;
+use crate::{EdgeCurve, Point};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Where curves are to be divided: parameters and corners.
+type Divisions = BTreeMap<usize, Vec<(f64, usize)>>;
+
+/// Crossings this close to an end, in tolerances, are there.
+const AT_END: f64 = 2.0;
+
+/// Divides the edges of faces at the vertices of others. Returns whether any was divided.
+pub(super) fn divide_at_vertices(shapes: &mut Shapes, pairs: &[[usize; 2]], size: f64) -> bool {
+    let mut divisions = Divisions::new();
+    let mut boxes = Boxes::default();
+    for &[a, b] in pairs.iter().flat_map(|[a, b]| [[*a, *b], [*b, *a]]).collect::<Vec<_>>().iter() {
+        let own = room(shapes, [a, b], size);
+        let corners: BTreeSet<usize> =
+            shapes.curves_of(a).into_iter().flat_map(|curve| shapes.curves[curve].ends).collect();
+        for curve in shapes.curves_of(b) {
+            let edge = &shapes.curves[curve];
+            let room = own + edge.tolerance;
+            let [low, high] = boxes.of(shapes, curve, room);
+            for &corner in corners.iter().filter(|corner| !edge.ends.contains(corner)) {
+                let point = shapes.corners[corner].point;
+                let is_near = (0..3).all(|axis| low[axis] <= point[axis] && point[axis] <= high[axis]);
+                if let Some(at) = is_near.then(|| inner_parameter(edge, &point, room, room)).flatten() {
+                    divisions.entry(curve).or_default().push((at, corner));
+                }
+            }
+        }
+    }
+    let is_any = !divisions.is_empty();
+    apply(shapes, divisions, size);
+    is_any
+}
+
+/// Divides the edges of faces where they cross each other.
+pub(super) fn divide_at_crossings(shapes: &mut Shapes, pairs: &[[usize; 2]], size: f64) {
+    let mut divisions = Divisions::new();
+    let mut boxes = Boxes::default();
+    let mut added: Vec<usize> = Vec::new();
+    for &pair in pairs {
+        let own = room(shapes, pair, size);
+        let [of_a, of_b] = pair.map(|face| shapes.curves_of(face));
+        for &p in &of_a {
+            for &q in of_b.iter().filter(|&&q| q != p) {
+                let room = own + shapes.curves[p].tolerance + shapes.curves[q].tolerance;
+                let one = boxes.of(shapes, p, room);
+                let other = boxes.of(shapes, q, room);
+                if !overlap(&one, &other) {
+                    continue;
+                }
+                for (at, point) in crossings(&shapes.curves[p], &shapes.curves[q], room) {
+                    let known = added
+                        .iter()
+                        .copied()
+                        .find(|&corner| (shapes.corners[corner].point - point).norm() <= room);
+                    let corner = known.unwrap_or_else(|| {
+                        added.push(
+                            shapes.add_corner(Corner { point, tolerance: room }, shapes.faces[pair[0]].body),
+                        );
+                        added[added.len() - 1]
+                    });
+                    divisions.entry(p).or_default().push((at[0], corner));
+                    divisions.entry(q).or_default().push((at[1], corner));
+                }
+            }
+        }
+    }
+    apply(shapes, divisions, size);
+}
+
+/// Divides curves, each at one corner only where several are close.
+fn apply(shapes: &mut Shapes, divisions: Divisions, size: f64) {
+    for (curve, mut places) in divisions {
+        places.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let room = AT_END * SAME * size;
+        let is_apart = |a: usize, b: usize| (shapes.corners[a].point - shapes.corners[b].point).norm() > room;
+        places.dedup_by(|a, b| !is_apart(a.1, b.1));
+        // From the end: the first part keeps the index.
+        for (at, corner) in places.into_iter().rev() {
+            let on = Point::from(shapes.curves[curve].curve.point(at));
+            let own = &mut shapes.corners[corner];
+            own.tolerance = own.tolerance.max((on - own.point).norm());
+            divide(shapes, curve, at, corner);
+        }
+    }
+}
+
+/// Boxes of curves, computed once each.
+#[derive(Default)]
+struct Boxes(BTreeMap<usize, [Point; 2]>);
+
+impl Boxes {
+    fn of(&mut self, shapes: &Shapes, curve: usize, room: f64) -> [Point; 2] {
+        let own = self.0.entry(curve).or_insert_with(|| bounds(&polyline(&shapes.curves[curve]), 0.0));
+        [own[0].map(|x| x - room), own[1].map(|x| x + room)]
+    }
+}
+
+fn overlap(a: &[Point; 2], b: &[Point; 2]) -> bool {
+    (0..3).all(|axis| a[0][axis] <= b[1][axis] && b[0][axis] <= a[1][axis])
+}
+
+/// A curve between two parameters, and the largest distance of its middle from the chord.
+struct Piece {
+    range: [f64; 2],
+    ends: [Point; 2],
+    sag: f64,
+}
+
+fn bounds(pieces: &[Piece], room: f64) -> [Point; 2] {
+    let mut out = [pieces[0].ends[0]; 2];
+    for piece in pieces {
+        let room = room + 2.0 * piece.sag;
+        for end in piece.ends {
+            out = [out[0].inf(&end.map(|x| x - room)), out[1].sup(&end.map(|x| x + room))];
+        }
+    }
+    out
+}
+
+/// Pieces of a curve without large bends.
+fn polyline(edge: &EdgeCurve) -> Vec<Piece> {
+    /// Pieces of a curve between its breaks.
+    const PIECES: usize = 16;
+    let at = |t: f64| Point::from(edge.curve.point(t));
+    let mut breaks = vec![edge.range[0]];
+    breaks.extend(edge.curve.breaks(edge.range));
+    breaks.push(edge.range[1]);
+    let count = match edge.curve {
+        crate::Curve::Line { .. } => 1,
+        _ => PIECES.div_ceil(breaks.len() - 1).max(4),
+    };
+    let piece = |w: &[f64], k: usize| {
+        let range = [k, k + 1].map(|k| w[0] + (w[1] - w[0]) * k as f64 / count as f64);
+        let ends = range.map(at);
+        let sag = (at(0.5 * (range[0] + range[1])) - nalgebra::center(&ends[0], &ends[1])).norm();
+        Piece { range, ends, sag }
+    };
+    breaks.windows(2).flat_map(|w| (0..count).map(move |k| piece(w, k))).collect()
+}
+
+/// The parameters and places where two curves cross or touch away from their ends.
+fn crossings(one: &EdgeCurve, other: &EdgeCurve, room: f64) -> Vec<([f64; 2], Point)> {
+    let [a, b] = [polyline(one), polyline(other)];
+    let b: Vec<_> = b.iter().map(|piece| (piece, bounds(std::slice::from_ref(piece), 0.0))).collect();
+    let is_at_end = |point: &Point| {
+        [one, other].into_iter().any(|edge| {
+            edge.range.iter().any(|&t| (Point::from(edge.curve.point(t)) - point).norm() <= AT_END * room)
+        })
+    };
+    let mut found: Vec<([f64; 2], Point)> = Vec::new();
+    for p in &a {
+        let own = bounds(std::slice::from_ref(p), room);
+        for (q, _) in b.iter().filter(|(_, there)| overlap(&own, there)) {
+            let start = [p.range, q.range].map(|[low, high]| 0.5 * (low + high));
+            let (at, points) = nearest_pair([one, other], start);
+            let middle = nalgebra::center(&points[0], &points[1]);
+            let is_new = found.iter().all(|(_, known)| (known - middle).norm() > AT_END * room);
+            if (points[1] - points[0]).norm() <= room && is_new && !is_at_end(&middle) {
+                found.push((at, middle));
+            }
+        }
+    }
+    found
+}
+
+/// The parameters at which two curves are nearest to each other, near given ones, and the points.
+/// Gauss-Newton steps within the ranges of both edges.
+fn nearest_pair(edges: [&EdgeCurve; 2], mut at: [f64; 2]) -> ([f64; 2], [Point; 2]) {
+    const STEPS: usize = 60;
+    /// Added to the matrix, as a fraction of its diagonal: parallel tangents make it singular.
+    const DAMPING: f64 = 1e-9;
+    for _ in 0..STEPS {
+        let jets = [0, 1].map(|k| edges[k].curve.jet(at[k]));
+        let way = jets[1][0] - jets[0][0];
+        let [p, q] = [jets[0][1], jets[1][1]];
+        let (pp, qq, pq) =
+            (p.norm_squared() * (1.0 + DAMPING), q.norm_squared() * (1.0 + DAMPING), p.dot(&q));
+        let determinant = pp * qq - pq * pq;
+        let step = [
+            (qq * way.dot(&p) - pq * way.dot(&q)) / determinant,
+            (pq * way.dot(&p) - pp * way.dot(&q)) / determinant,
+        ];
+        let next = [0, 1].map(|k| (at[k] + step[k]).clamp(edges[k].range[0], edges[k].range[1]));
+        let has_moved =
+            (0..2).any(|k| (next[k] - at[k]).abs() > 1e-15 * (edges[k].range[1] - edges[k].range[0]));
+        if !has_moved || next.iter().any(|t| !t.is_finite()) {
+            break;
+        }
+        at = next;
+    }
+    (at, [0, 1].map(|k| Point::from(edges[k].curve.point(at[k]))))
+}

@@ -1,0 +1,341 @@
+//! The regions into which edges divide a face.
+//!
+//! Edges on a surface are a planar graph: around each corner they have an order, and to follow a
+//! region's boundary means to turn left at each corner as far as possible. A region may have several
+//! boundaries. Those that are not connected by edges are matched along straight lines in the
+//! parameters: what two crossings that follow each other on such a line have between them is one
+//! region.
+
+use super::super::{Edges, Shapes};
+use crate::chart::{Chart, Parameters};
+use crate::{Point, Vector};
+use std::collections::{BTreeMap, HashMap};
+
+/// An edge on the surface.
+struct Strip {
+    curve: usize,
+    ends: [usize; 2],
+    /// Parameters along it.
+    nodes: Vec<Parameters>,
+    length: f64,
+    /// Whether it bounds the face, with the face on the left of its direction.
+    own: Option<bool>,
+}
+
+/// A strip with a direction: twice its index, plus one against its curve.
+type Half = usize;
+
+/// Where a line starts and ends on a strip: shares of its nodes, and of the segment between two.
+const PLACE: [f64; 2] = [0.37, 0.41];
+/// Directions around a corner are those of points this far along the strips (fraction of the
+/// shortest there).
+const AROUND: f64 = 0.1;
+
+/// A line must not leave a strip in the direction of the strip (sine of the angle).
+const ALONG: f64 = 1e-6;
+
+/// The loops of each part of a face, divided by the edges `added` that lie inside of it; `None` if
+/// none does.
+pub(super) fn divided(shapes: &Shapes, number: usize, added: &[usize], size: f64) -> Option<Vec<Vec<Edges>>> {
+    let face = &shapes.faces[number];
+    let own: Edges = face.loops.iter().flatten().copied().collect();
+    let is_own = |curve: usize| own.iter().any(|edge| edge.0 == curve);
+    let added: Vec<usize> = added.iter().copied().filter(|&curve| !is_own(curve)).collect();
+    if added.is_empty() || own.len() > shapes.curves_of(number).len() {
+        return None;
+    }
+    let chart = Chart::new(&face.surface, size);
+    let strip = |curve: usize, own: Option<bool>| {
+        let edge = &shapes.curves[curve];
+        let nodes = chart.along(edge)?;
+        let length =
+            nodes.windows(2).map(|w| (face.surface.point(w[1]) - face.surface.point(w[0])).norm()).sum();
+        Some(Strip { curve, ends: edge.ends, nodes, length, own })
+    };
+    let strips: Option<Vec<Strip>> =
+        own.iter().map(|&(curve, is_forward)| strip(curve, Some(is_forward))).collect();
+    let mut strips = strips?;
+    if face.surface.is_plane() && area(&strips) < 0.0 {
+        strips.iter_mut().for_each(|strip| strip.own = strip.own.map(|is_forward| !is_forward));
+    }
+    strips.extend(added.into_iter().filter_map(|curve| strip(curve, None)));
+    loop {
+        if strips.is_empty() {
+            return None;
+        }
+        let sheet = Sheet { shapes, chart: &chart, strips: &strips };
+        let regions = sheet.regions()?;
+        let region = |half: Half| regions.of[half];
+        let separates = |k: usize| {
+            region(2 * k) != region(2 * k + 1)
+                && (regions.is_inside[region(2 * k)] || strips[k].own.is_some())
+        };
+        let kept: Vec<bool> = (0..strips.len()).map(separates).collect();
+        if kept.iter().all(|kept| *kept) {
+            let is_divided = strips.iter().any(|strip| strip.own.is_none());
+            return is_divided.then(|| regions.loops(&strips));
+        }
+        let mut kept = kept.into_iter();
+        strips.retain(|_| kept.next().unwrap_or(false));
+    }
+}
+
+/// Twice the area in the plane inside of the loops that strips of a face make.
+fn area(strips: &[Strip]) -> f64 {
+    let of = |strip: &Strip| {
+        let sum: f64 = strip.nodes.windows(2).map(|w| cross(w[0], w[1])).sum();
+        if strip.own == Some(true) { sum } else { -sum }
+    };
+    strips.iter().map(of).sum()
+}
+
+fn cross(a: Parameters, b: Parameters) -> f64 {
+    a[0] * b[1] - a[1] * b[0]
+}
+
+fn size(a: Parameters) -> f64 {
+    a[0].hypot(a[1])
+}
+
+fn minus(a: Parameters, b: Parameters) -> Parameters {
+    [a[0] - b[0], a[1] - b[1]]
+}
+
+/// Regions of a surface between strips.
+struct Regions {
+    /// The half-edges of each cycle.
+    cycles: Vec<Vec<Half>>,
+    /// The region to the left of each half-edge, named by one of its cycles.
+    of: Vec<usize>,
+    /// Whether a region is a part of the face.
+    is_inside: Vec<bool>,
+}
+
+impl Regions {
+    /// The loops of each part of the face.
+    fn loops(&self, strips: &[Strip]) -> Vec<Vec<Edges>> {
+        let mut parts: BTreeMap<usize, Vec<Edges>> = BTreeMap::new();
+        for cycle in &self.cycles {
+            let region = self.of[cycle[0]];
+            if self.is_inside[region] {
+                let edges = cycle.iter().map(|half| (strips[half / 2].curve, half % 2 == 0));
+                parts.entry(region).or_default().push(edges.collect());
+            }
+        }
+        parts.into_values().collect()
+    }
+}
+
+struct Sheet<'a> {
+    shapes: &'a Shapes,
+    chart: &'a Chart<'a>,
+    strips: &'a [Strip],
+}
+
+impl Sheet<'_> {
+    /// The regions; `None` if there is no order around a corner, or if the boundary of the face has
+    /// the face on both sides.
+    fn regions(&self) -> Option<Regions> {
+        let next = self.next()?;
+        let mut cycle_of = vec![usize::MAX; next.len()];
+        let mut cycles: Vec<Vec<Half>> = Vec::new();
+        for first in 0..next.len() {
+            let mut half = first;
+            let mut cycle = Vec::new();
+            while cycle_of[half] == usize::MAX {
+                cycle_of[half] = cycles.len();
+                cycle.push(half);
+                half = next[half];
+            }
+            if !cycle.is_empty() {
+                cycles.push(cycle);
+            }
+        }
+        let mut region = Groups::new(cycles.len());
+        for hits in self.lines() {
+            for w in hits.windows(2) {
+                region.join(cycle_of[w[0].after], cycle_of[w[1].before]);
+            }
+        }
+        let of: Vec<usize> = cycle_of.iter().map(|&cycle| region.root(cycle)).collect();
+        let mut is_inside = vec![self.strips.iter().all(|strip| strip.own.is_none()); cycles.len()];
+        let sides = |is_left: bool| {
+            let own = self.strips.iter().enumerate().filter_map(|(k, strip)| Some((k, strip.own?)));
+            own.map(move |(k, is_forward)| 2 * k + usize::from(is_forward != is_left))
+        };
+        let mut reached: Vec<usize> = sides(true).map(|half| of[half]).collect();
+        // What is across an added strip is inside, too.
+        while let Some(region) = reached.pop() {
+            if !std::mem::replace(&mut is_inside[region], true) {
+                let across =
+                    (0..of.len()).filter(|half| self.strips[half / 2].own.is_none() && of[*half] == region);
+                reached.extend(across.map(|half| of[half ^ 1]));
+            }
+        }
+        let is_sound = sides(false).all(|half| !is_inside[of[half]]);
+        is_sound.then_some(Regions { cycles, of, is_inside })
+    }
+
+    fn origin(&self, half: Half) -> usize {
+        self.strips[half / 2].ends[half % 2]
+    }
+
+    /// The half-edge after each one along the boundary of the region on its left.
+    fn next(&self) -> Option<Vec<Half>> {
+        let mut around: BTreeMap<usize, Vec<Half>> = BTreeMap::new();
+        for half in 0..2 * self.strips.len() {
+            around.entry(self.origin(half)).or_default().push(half);
+        }
+        let mut next = vec![0; 2 * self.strips.len()];
+        for (corner, halves) in around {
+            let sorted = self.sorted(corner, halves)?;
+            for (k, half) in sorted.iter().enumerate() {
+                // What arrives as the twin goes on clockwise from there.
+                next[half ^ 1] = sorted[(k + sorted.len() - 1) % sorted.len()];
+            }
+        }
+        Some(next)
+    }
+
+    /// Half-edges from a corner, counterclockwise.
+    fn sorted(&self, corner: usize, halves: Vec<Half>) -> Option<Vec<Half>> {
+        let point = self.shapes.corners[corner].point;
+        let first = &self.strips[halves[0] / 2].nodes;
+        let [u, v] = if halves[0].is_multiple_of(2) { first[0] } else { first[first.len() - 1] };
+        let normal = self.chart.normal([u, v])?;
+        let step =
+            AROUND * halves.iter().map(|half| self.strips[half / 2].length).fold(f64::INFINITY, f64::min);
+        let ways: Vec<Vector> = halves.iter().map(|&half| self.ahead(half, step) - point).collect();
+        let x = (ways[0] - normal * normal.dot(&ways[0])).try_normalize(0.0)?;
+        let y = normal.cross(&x);
+        let mut keyed: Vec<(f64, Half)> =
+            ways.iter().zip(halves).map(|(way, half)| (way.dot(&y).atan2(way.dot(&x)), half)).collect();
+        keyed.sort_by(|a, b| a.0.total_cmp(&b.0));
+        Some(keyed.into_iter().map(|(_, half)| half).collect())
+    }
+
+    /// A point of a half-edge at a distance from its origin.
+    fn ahead(&self, half: Half, step: f64) -> Point {
+        let edge = &self.shapes.curves[self.strips[half / 2].curve];
+        let [from, to] = if half.is_multiple_of(2) { edge.range } else { [edge.range[1], edge.range[0]] };
+        let at = |share: f64| Point::from(edge.curve.point(from + share * (to - from)));
+        let origin = at(0.0);
+        let (mut near, mut far) = (0.0, 0.5);
+        for _ in 0..30 {
+            let middle = 0.5 * (near + far);
+            if (at(middle) - origin).norm() < step { near = middle } else { far = middle }
+        }
+        at(far)
+    }
+
+    /// Lines from a strip of each component to one of the first component, as what they cross.
+    fn lines(&self) -> Vec<Vec<Hit>> {
+        let mut component = Groups::new(self.strips.len());
+        let mut at: HashMap<usize, usize> = HashMap::new();
+        for half in 0..2 * self.strips.len() {
+            let known = *at.entry(self.origin(half)).or_insert(half / 2);
+            component.join(known, half / 2);
+        }
+        let first = component.root(0);
+        let mut lines = Vec::new();
+        for k in (0..self.strips.len()).filter(|&k| component.root(k) == k) {
+            let rounds: &[[i32; 2]] = match [0, 1].map(|i| self.chart.period(i)) {
+                // Two regions of a torus may have the same two boundaries.
+                [Some(_), Some(_)] => &[[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1]],
+                _ => &[[0, 0]],
+            };
+            let rounds = rounds.iter().filter(|rounds| k != first || **rounds != [0, 0]);
+            lines.extend(rounds.map(|&rounds| self.line(k, first, rounds)));
+        }
+        lines
+    }
+
+    /// What a line from one strip to another crosses, in its order, with both ends. It goes around
+    /// the surface by `rounds`.
+    fn line(&self, from: usize, to: usize, rounds: [i32; 2]) -> Vec<Hit> {
+        let place = |strip: &Strip| {
+            let last = strip.nodes.len() - 1;
+            let k = ((last as f64 * PLACE[0]) as usize).min(last - 1);
+            let [p, q] = [strip.nodes[k], strip.nodes[k + 1]];
+            (k, [0, 1].map(|i| p[i] + PLACE[1] * (q[i] - p[i])), minus(q, p))
+        };
+        let [(first, start, along), (last, end, back)] = [from, to].map(|k| place(&self.strips[k]));
+        let end = self.chart.shifted(self.chart.unwrapped(end, start), rounds);
+        let way = minus(end, start);
+        let is_along = |side| cross(side, way).abs() <= ALONG * size(side) * size(way);
+        if is_along(along) || is_along(back) {
+            return Vec::new();
+        }
+        let half = |k: usize, is_left: bool| 2 * k + usize::from(!is_left);
+        let mut hits = vec![Hit { at: 0.0, before: 0, after: half(from, cross(along, way) > 0.0) }];
+        hits.push(Hit { at: 1.0, before: half(to, cross(back, way) < 0.0), after: 0 });
+        for (k, strip) in self.strips.iter().enumerate() {
+            for by in self.rounds(strip, start, end) {
+                for (segment, w) in strip.nodes.windows(2).enumerate() {
+                    let [p, q] = [0, 1].map(|i| [w[i][0] + by[0], w[i][1] + by[1]]);
+                    let [a, b] = [p, q].map(|p| cross(way, minus(p, start)));
+                    if (a > 0.0) == (b > 0.0) {
+                        continue;
+                    }
+                    let share = a / (a - b);
+                    let hit = [0, 1].map(|i| p[i] + share * (q[i] - p[i]));
+                    let longest = usize::from(way[0].abs() < way[1].abs());
+                    let at = (hit[longest] - start[longest]) / way[longest];
+                    // The ends of the line are on strips.
+                    let is_end = (k == from && segment == first && at.abs() < 1e-6)
+                        || (k == to && segment == last && (at - 1.0).abs() < 1e-6);
+                    if 0.0 < at && at < 1.0 && !is_end {
+                        let is_from_left = cross(minus(q, p), way) < 0.0;
+                        hits.push(Hit { at, before: half(k, is_from_left), after: half(k, !is_from_left) });
+                    }
+                }
+            }
+        }
+        hits.sort_by(|a, b| a.at.total_cmp(&b.at));
+        hits
+    }
+
+    /// The multiples of the periods at which a strip may cross a line.
+    fn rounds(&self, strip: &Strip, start: Parameters, end: Parameters) -> Vec<Parameters> {
+        let range = |i: usize| {
+            let Some(period) = self.chart.period(i) else { return vec![0.0] };
+            let low = strip.nodes.iter().map(|p| p[i]).fold(f64::INFINITY, f64::min);
+            let high = strip.nodes.iter().map(|p| p[i]).fold(f64::NEG_INFINITY, f64::max);
+            let first = ((start[i].min(end[i]) - high) / period).ceil() as i64;
+            let last = ((start[i].max(end[i]) - low) / period).floor() as i64;
+            (first..=last).map(|k| period * k as f64).collect()
+        };
+        let (in_u, in_v) = (range(0), range(1));
+        in_u.iter().flat_map(|&u| in_v.iter().map(move |&v| [u, v])).collect()
+    }
+}
+
+/// Where a line crosses a strip: its share of the line, and the halves whose left sides are before
+/// and after.
+struct Hit {
+    at: f64,
+    before: Half,
+    after: Half,
+}
+
+/// Disjoint sets.
+struct Groups(Vec<usize>);
+
+impl Groups {
+    fn new(count: usize) -> Self {
+        Self((0..count).collect())
+    }
+
+    fn root(&mut self, mut item: usize) -> usize {
+        while self.0[item] != item {
+            self.0[item] = self.0[self.0[item]];
+            item = self.0[item];
+        }
+        item
+    }
+
+    fn join(&mut self, a: usize, b: usize) {
+        let (a, b) = (self.root(a), self.root(b));
+        self.0[a.max(b)] = a.min(b);
+    }
+}

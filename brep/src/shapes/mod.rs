@@ -1,0 +1,235 @@
+//! Solids by their faces, edges and vertices, without parameters, and the model made of them.
+
+mod glue;
+mod imprint;
+mod split;
+#[cfg(test)]
+mod tests;
+
+use crate::chart::{Chart, Loop, Side, close};
+use crate::model::{Corner, Fin, Model, On, Patch};
+use crate::tessellate::diagonal;
+use crate::{BrepError, EdgeCurve, Surface};
+use rayon::prelude::*;
+use std::collections::BTreeSet;
+
+/// The edges of a loop, each with whether it is used forward.
+pub(crate) type Edges = Vec<(usize, bool)>;
+
+/// A face of one solid.
+#[derive(Clone)]
+pub(crate) struct Face {
+    /// The number of its record.
+    pub id: u64,
+    pub surface: Surface,
+    /// Its loops, counterclockwise around the normal of the surface.
+    pub loops: Vec<Edges>,
+    pub body: usize,
+    /// Whether the body is behind it, seen along the normal of its surface.
+    pub is_behind: bool,
+    pub name: Option<String>,
+}
+
+/// The shapes of all solids, nothing shared between them.
+#[derive(Default)]
+pub(crate) struct Shapes {
+    pub corners: Vec<Corner>,
+    pub curves: Vec<EdgeCurve>,
+    pub faces: Vec<Face>,
+    /// The body of each corner and curve.
+    pub body_of_corner: Vec<usize>,
+    pub body_of_curve: Vec<usize>,
+    /// How accurate the data of each body is (length).
+    pub accuracy: Vec<f64>,
+}
+
+impl Shapes {
+    /// The shapes of a model, one face for each side of a patch that bounds a body.
+    pub fn of(model: &Model) -> Self {
+        let (corners, curves) = (model.corners.clone(), model.curves.clone());
+        let (body_of_corner, body_of_curve) = (vec![0; corners.len()], vec![0; curves.len()]);
+        let mut shapes = Self {
+            corners,
+            curves,
+            faces: Vec::new(),
+            body_of_corner,
+            body_of_curve,
+            accuracy: vec![f64::INFINITY; model.bodies],
+        };
+        for (number, patch) in model.patches.iter().enumerate() {
+            let edge = |fin: &Fin| match fin.on {
+                On::Curve(curve) => Some((curve, fin.is_forward)),
+                On::Corner(_) => None,
+            };
+            let loops: Vec<Edges> =
+                patch.loops.iter().map(|fins| fins.iter().filter_map(edge).collect()).collect();
+            for (side, body) in patch.bodies.iter().enumerate() {
+                let Some(body) = *body else { continue };
+                for &(curve, _) in loops.iter().flatten() {
+                    shapes.body_of_curve[curve] = body;
+                    // Programs give worse edges larger tolerances.
+                    shapes.accuracy[body] = shapes.accuracy[body].min(model.curves[curve].tolerance);
+                    shapes.curves[curve].ends.iter().for_each(|&end| shapes.body_of_corner[end] = body);
+                }
+                shapes.faces.push(Face {
+                    id: number as u64 + 1,
+                    surface: patch.surface.clone().closed(),
+                    loops: loops.clone(),
+                    body,
+                    is_behind: side == 0,
+                    name: None,
+                });
+            }
+        }
+        for accuracy in shapes.accuracy.iter_mut().filter(|accuracy| accuracy.is_infinite()) {
+            *accuracy = 0.0;
+        }
+        shapes
+    }
+
+    /// Whether solids touch on surfaces without a common face.
+    pub fn touch(&self) -> bool {
+        imprint::touch(self, diagonal(&self.corners, &self.curves, Vec::new()))
+    }
+
+    /// Adds a corner of a body.
+    fn add_corner(&mut self, corner: Corner, body: usize) -> usize {
+        self.corners.push(corner);
+        self.body_of_corner.push(body);
+        self.corners.len() - 1
+    }
+
+    /// The curves of a face, each once, in ascending order.
+    fn curves_of(&self, face: usize) -> Vec<usize> {
+        let mut curves: Vec<usize> = self.faces[face].loops.iter().flatten().map(|edge| edge.0).collect();
+        curves.sort_unstable();
+        curves.dedup();
+        curves
+    }
+
+    /// Makes patches of the faces. Solids share faces, edges and vertices afterwards, where they
+    /// touch on a common surface.
+    ///
+    /// # Errors
+    /// [`BrepError::Face`] for faces whose edges do not bound them.
+    pub fn build(mut self, model: &mut Model) -> Result<(), BrepError> {
+        let without_edges = self.faces.iter().filter(|face| face.loops.is_empty());
+        let points = without_edges.flat_map(|face| imprint::whole(&face.surface)).collect();
+        let size = diagonal(&self.corners, &self.curves, points);
+        glue::glue_edges(&mut self, size);
+        split::divide_at_poles(&mut self, size);
+        model.notes.extend(split::drop_spurs(&mut self));
+        let touching = imprint::imprint(&mut self, size);
+        (model.corners, model.curves) = (self.corners, self.curves);
+        let mut names = Vec::new();
+        // On all threads: the steps along edges take most of the time.
+        let follow = |(number, face): (usize, &Face)| {
+            let is_plane = face.surface.is_plane();
+            (!is_plane).then(|| followed(&model.curves, number, &face.surface, &face.loops, size))
+        };
+        let followed: Vec<_> = self.faces.par_iter().enumerate().map(follow).collect();
+        for ((number, face), followed) in self.faces.into_iter().enumerate().zip(followed) {
+            names.push(face.name.clone());
+            let id = face.id;
+            let patch = patch(model, number, face, followed, size).map_err(|error| match error {
+                BrepError::Face { face, what, place } => {
+                    BrepError::Face { face, what: format!("{what} (#{id})"), place }
+                }
+                other => other,
+            })?;
+            model.patches.push(patch);
+        }
+        let to = glue::glue_patches(model, SAME * size);
+        let common: BTreeSet<usize> = touching.into_iter().map(|face| to[face]).collect();
+        let common = common.into_iter().filter(|&patch| !model.patches[patch].bodies.contains(&None)).count();
+        if common > 0 {
+            model
+                .notes
+                .push(format!("solids that touch were imprinted on each other: {common} common faces"));
+        }
+        model.patch_names = vec![None; model.patches.len()];
+        for (name, patch) in names.into_iter().zip(to) {
+            model.patch_names[patch] = model.patch_names[patch].take().or(name);
+        }
+        Ok(())
+    }
+}
+
+/// Surfaces that differ by at most this (fraction of the diagonal) are one.
+const SAME: f64 = 1e-6;
+
+/// Makes the patch of a face whose loops were followed on its surface; those of planes need not be.
+fn patch(
+    model: &mut Model,
+    number: usize,
+    face: Face,
+    along: Option<Result<Vec<Loop>, BrepError>>,
+    size: f64,
+) -> Result<Patch, BrepError> {
+    let bodies = if face.is_behind { [Some(face.body), None] } else { [None, Some(face.body)] };
+    let Some(along) = along else {
+        let fin = |&(curve, is_forward): &(usize, bool)| Fin {
+            on: On::Curve(curve),
+            curve: None,
+            range: model.curves[curve].range,
+            is_forward,
+        };
+        let loops: Vec<Vec<Fin>> = face.loops.iter().map(|edges| edges.iter().map(fin).collect()).collect();
+        if loops.is_empty() {
+            return Err(BrepError::face(number, "it has no edges", None));
+        }
+        return Ok(Patch { surface: face.surface, loops, bodies });
+    };
+    let surface: Surface = face.surface;
+    let given = along.and_then(|along| bounded(model, number, &surface, along, &face.loops, size));
+    let sides = given.or_else(|error| {
+        // Some programs write loops of left-handed surfaces the wrong way around.
+        let other: Vec<_> = face.loops.iter().map(|edges| reversed(edges.clone())).collect();
+        followed(&model.curves, number, &surface, &other, size)
+            .and_then(|along| bounded(model, number, &surface, along, &other, size))
+            .map_err(|_| error)
+    })?;
+    let fins = |sides: Vec<Side>| -> Result<Vec<Fin>, BrepError> {
+        let all: Result<Vec<Fin>, String> = sides.into_iter().map(Side::fin).collect();
+        all.map_err(|what| BrepError::face(number, what, None))
+    };
+    let loops = sides.into_iter().map(fins).collect::<Result<Vec<_>, _>>()?;
+    Ok(Patch { surface, loops, bodies })
+}
+
+/// Loops of edges in the parameters of a surface.
+fn followed(
+    curves: &[EdgeCurve],
+    number: usize,
+    surface: &Surface,
+    loops: &[Edges],
+    size: f64,
+) -> Result<Vec<Loop>, BrepError> {
+    let chart = Chart::new(surface, size);
+    loops.iter().map(|edges| chart.follow(number, curves, edges)).collect()
+}
+
+/// Joins loops in the parameters of a surface so that they bound an area.
+fn bounded(
+    model: &mut Model,
+    number: usize,
+    surface: &Surface,
+    along: Vec<Loop>,
+    loops: &[Edges],
+    size: f64,
+) -> Result<Vec<Vec<Side>>, BrepError> {
+    for (one, edges) in along.iter().zip(loops) {
+        for &(curve, _) in edges {
+            let edge = &mut model.curves[curve];
+            edge.tolerance = edge.tolerance.max(one.gap);
+        }
+    }
+    close(&Chart::new(surface, size), number, model, along)
+}
+
+/// The loop in the other direction.
+pub(crate) fn reversed(mut edges: Edges) -> Edges {
+    edges.reverse();
+    edges.iter_mut().for_each(|edge| edge.1 = !edge.1);
+    edges
+}
