@@ -8,6 +8,9 @@ Needs the Python packages numpy, gmsh and netgen-mesher (GPL and LGPL: they only
 its own, with at most --limit seconds. Sizes: tetmill and NETGEN at `moderate`; Gmsh with 12 elements a turn (Mesh.MeshSizeFromCurvature) and
 HXT. Seconds are of reading and meshing: those of tetmill's whole process, of the others without the start of Python and their libraries. Angles are
 measured by NumPy. The error of the volume is relative to OpenCASCADE's, if `measures.json` has it.
+
+With --imprint, as for the solids that scripts/touching_solids.py makes, Gmsh imprints solids that touch by OpenCASCADE's fragments, and
+NETGEN by its Glue; tetmill does so by itself.
 """
 import argparse, json, pathlib, subprocess, sys, tempfile, time
 
@@ -29,17 +32,20 @@ def shapes(points, tets):
     return [len(tets), float(angles.min()), float(np.percentile(angles, 1)), float(np.abs(volume6).sum() / 6)]
 
 
-def netgen(path):
+def netgen(path, imprints):
     from netgen.meshing import MeshingParameters, meshsize
-    from netgen.occ import OCCGeometry
+    from netgen.occ import Glue, OCCGeometry
     start = time.perf_counter()
-    mesh = OCCGeometry(str(path)).GenerateMesh(mp=MeshingParameters(meshsize.moderate))
+    geometry = OCCGeometry(str(path))
+    if imprints:
+        geometry = OCCGeometry(Glue(list(geometry.shape.solids)))
+    mesh = geometry.GenerateMesh(mp=MeshingParameters(meshsize.moderate))
     seconds = time.perf_counter() - start
     tets = np.array([[v.nr - 1 for v in element.vertices] for element in mesh.Elements3D()]).reshape(-1, 4)
     return [seconds, *shapes(np.array(mesh.Coordinates()), tets)]
 
 
-def gmsh(path):
+def gmsh(path, imprints):
     import gmsh
     gmsh.initialize(interruptible=False)
     for option, value in [
@@ -48,6 +54,8 @@ def gmsh(path):
         gmsh.option.setNumber(option, value)
     start = time.perf_counter()
     gmsh.model.occ.importShapes(str(path))
+    if imprints:
+        gmsh.model.occ.fragment(gmsh.model.occ.getEntities(3), [])
     gmsh.model.occ.synchronize()
     gmsh.model.mesh.generate(3)
     seconds = time.perf_counter() - start
@@ -77,10 +85,11 @@ def medit(words, name, columns):
     return np.array(words[first : first + int(words[first - 1]) * columns], float).reshape(-1, columns)
 
 
-def one(program, path, binary, limit):
+def one(program, path, binary, limit, imprints):
     """The result of a program in a process of its own, or why there is none."""
     try:
-        command = [sys.executable, HERE, "--worker", program, path, "--binary", binary]
+        imprint = ["--imprint"] if imprints else []
+        command = [sys.executable, HERE, *imprint, "--worker", program, path, "--binary", binary]
         done = subprocess.run(command, capture_output=True, text=True, timeout=limit)
         last = (done.stdout.strip().splitlines() or [""])[-1]
         if done.returncode == 0 and last.startswith("["):
@@ -106,11 +115,17 @@ def main():
     parser.add_argument("--format", choices=["brep", "step"], default="brep")
     parser.add_argument("--only", nargs="*")
     parser.add_argument("--limit", type=float, default=120, help="seconds for each mesh")
+    parser.add_argument("--imprint", action="store_true", help="imprint solids that touch on each other")
     parser.add_argument("--worker", help=argparse.SUPPRESS)
     if "--worker" in sys.argv:
         at = sys.argv.index("--worker")
         program, path, binary = sys.argv[at + 1], sys.argv[at + 2], sys.argv[-1]
-        made = {"tetmill": lambda: tetmill(path, binary), "netgen": lambda: netgen(path), "gmsh": lambda: gmsh(path)}
+        imprints = "--imprint" in sys.argv
+        made = {
+            "tetmill": lambda: tetmill(path, binary),
+            "netgen": lambda: netgen(path, imprints),
+            "gmsh": lambda: gmsh(path, imprints),
+        }
         print("\n" + json.dumps(made[program]()), flush=True)
         return
     options = parser.parse_args()
@@ -126,7 +141,7 @@ def main():
         volume = sum(measures.get(path.stem, {}).get("volumes", []))
         cells = []
         for program in programs:
-            result, why = one(program, path, options.binary, options.limit)
+            result, why = one(program, path, options.binary, options.limit, options.imprint)
             if result is not None and result[1] == 0:
                 result, why = None, "no tets"
             cells.append(cell(result, volume))

@@ -1,6 +1,7 @@
 //! Boundary representations of CAD programs.
 
 use crate::folders::{own, shared};
+use std::collections::HashMap;
 use std::path::PathBuf;
 use tetmill::comm::thread;
 use tetmill::mesh::{Arrays, Order};
@@ -95,14 +96,52 @@ fn faces_that_solids_of_a_step_file_repeat_are_interfaces() {
     assert_eq!(mesh.names.bodies.len(), 2);
 }
 
+/// The area of the faces between tets of different bodies.
+fn interface(mesh: &Arrays) -> f64 {
+    let mut sides: HashMap<[u32; 3], Vec<tetmill::mesh::BodyId>> = HashMap::new();
+    for (tet, &body) in mesh.tets.iter().zip(&mesh.tet_bodies) {
+        for skipped in 0..4 {
+            let mut face: Vec<u32> = (0..4).filter(|k| *k != skipped).map(|k| tet[k]).collect();
+            face.sort_unstable();
+            sides.entry([face[0], face[1], face[2]]).or_default().push(body);
+        }
+    }
+    let area = |face: &[u32; 3]| {
+        let [a, b, c] = face.map(|v| tetmill::Point::from(mesh.points[v as usize]));
+        0.5 * (b - a).cross(&(c - a)).norm()
+    };
+    let between = sides.iter().filter(|(_, bodies)| bodies.len() == 2 && bodies[0] != bodies[1]);
+    between.map(|(face, _)| area(face)).sum()
+}
+
 #[test]
-fn solids_that_touch_otherwise_are_refused_with_their_names() {
-    let geometry = Geometry::from_file(own("step").with_extension("").join("touching.step")).unwrap();
+fn solids_that_touch_share_the_common_parts_of_their_faces() {
+    let path = own("step").with_extension("").join("bolted.step");
+    let mut notes = Vec::new();
+    let settings = InputSettings { unit: "mm".parse().unwrap(), ..InputSettings::default() };
+    let geometry = Geometry::read(&[path], &settings, &mut |note| notes.push(note.to_owned())).unwrap();
+    assert!(notes.len() == 1 && notes[0].contains("8 common faces"), "{notes:?}");
+    let mesher = Mesher::new().levels(1);
+    let mesh = mesher.generate(&geometry).unwrap();
+    let names: Vec<&str> = mesh.names.bodies.iter().map(|label| label.names[0].as_str()).collect();
+    assert_eq!(names, ["lower plate", "upper plate", "bolt", "washer", "nut"]);
+    // The volumes of the five solids and the area of their contacts by the CAD program.
+    let arrays = mesh.arrays();
+    let exact = 11_698.407 + 6_498.673 + 1_786.284 + 226.195 + 623.196;
+    let (volume, area) = (volume_of(&arrays), interface(&arrays));
+    assert!((volume / exact - 1.0).abs() < 1e-3, "{volume} instead of {exact}");
+    assert!((area / 1844.642 - 1.0).abs() < 5e-3, "{area} instead of 1844.642");
+    let together =
+        thread::try_run(2, |comm| mesher.generate_on(comm, Some(&geometry)).map(|mesh| mesh.checksum));
+    assert_eq!(together.unwrap(), vec![mesh.checksum; 2]);
+}
+
+#[test]
+fn solids_that_overlap_are_refused_with_their_numbers() {
+    let geometry = Geometry::from_file(own("step").with_extension("").join("overlapping.step")).unwrap();
     let error = Mesher::new().generate(&geometry).unwrap_err().to_string();
-    assert!(
-        error.contains("the solids 1 (") && error.contains("and 2 (") && error.contains("imprint"),
-        "{error}"
-    );
+    let has = |text: &str| error.contains(text);
+    assert!(has("the solids 1 (") && has("and 2 (") && has("cut one out of the other"), "{error}");
 }
 
 #[test]

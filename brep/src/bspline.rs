@@ -91,8 +91,8 @@ impl Basis {
         if basis.is_sound() { Ok(basis) } else { Err("a periodic B-spline has an empty range".into()) }
     }
 
-    /// The periodic basis of the first poles of a closed spline, if it is one: its last poles repeat
-    /// the first. `is_same` compares two poles.
+    /// The periodic basis of the first poles of a closed spline, if it is one: its last poles
+    /// repeat the first. `is_same` compares two poles.
     pub(crate) fn closed(&self, is_same: impl Fn(usize, usize) -> bool) -> Option<Self> {
         if self.is_periodic || self.poles < 4 {
             return None;

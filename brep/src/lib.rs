@@ -4,7 +4,7 @@
 //! A [`Model`] is read by [`Model::read_step`] or [`Model::read`]. It has **bodies** (solids),
 //! **patches** (faces) that bound them, **curves** (edges) that bound the patches, and **corners**
 //! (vertices) at the ends of curves. A face that two solids share is one patch, with a body on each
-//! side.
+//! side. [`Model::imprint`] makes such patches where solids touch in parts of faces.
 //!
 //! [`Tessellation::of`] divides each curve once and triangulates each patch in its parameters, so
 //! that the triangles of neighbouring patches fit.
@@ -16,6 +16,7 @@ pub mod bspline;
 mod chart;
 mod curve;
 mod error;
+mod imprint;
 mod keep;
 mod model;
 mod nearest;

@@ -2,7 +2,6 @@
 
 use crate::curve::Curve;
 use crate::read::{CurveOnSurface, File, Kind, Orientation, Use, read};
-use crate::shapes::Shapes;
 use crate::step::Unit;
 use crate::surface::Surface;
 use crate::{BrepError, Placement, Point};
@@ -106,19 +105,7 @@ impl Model {
         let file = read(text)?;
         let mut builder = Builder { file: &file, ..Builder::empty(&file) };
         builder.build()?;
-        Ok(builder.model.imprinted())
-    }
-
-    /// The model with common faces where its solids touch, if they do.
-    fn imprinted(self) -> Self {
-        let shapes = Shapes::of(&self);
-        if self.bodies < 2 || !shapes.touch() {
-            return self;
-        }
-        let mut imprinted =
-            Self { bodies: self.bodies, metres: self.metres, notes: self.notes.clone(), ..Self::default() };
-        // Where that fails, the file's own faces show where the solids touch.
-        if shapes.build(&mut imprinted).is_ok() { imprinted } else { self }
+        Ok(builder.model)
     }
 
     /// Reads a STEP file.

@@ -75,10 +75,10 @@ pub enum CoarseError {
         /// Where the first pair intersects.
         first: Point,
     },
-    /// Two solids of a CAD file touch or overlap.
+    /// Two solids of a CAD file overlap, or touch where they have no common face.
     #[error(
-        "the solids {} ({}) and {} ({}) touch without a common face, or overlap, near ({}, {}, {}): imprint them on each \
-         other in the CAD program (Boolean fragments), keep them apart, or mesh one of them alone (--solid)",
+        "the solids {} ({}) and {} ({}) overlap, or touch without a common face, near ({}, {}, {}): cut one out of the \
+         other in the CAD program, move one of them, or mesh one alone (--solid)",
         solids[0].0, solids[0].1, solids[1].0, solids[1].1, first.x, first.y, first.z
     )]
     SolidsMeet {

@@ -106,6 +106,7 @@ fn read_brep(
     if !settings.solids.is_empty() {
         model.keep_bodies(&chosen(path, &model, &settings.solids)?);
     }
+    model.imprint();
     let solid = FacetSolid::of_brep(path, model, settings, note)?;
     Ok(Model::Facets(Box::new(solid)))
 }

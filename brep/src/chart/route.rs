@@ -33,8 +33,8 @@ impl Obstacles<'_> {
         self.chains.iter().any(|chain| rounds(0).any(|i| rounds(1).any(|j| crosses(chain, [i, j]))))
     }
 
-    /// Whether a segment between two vertices of chains, with a bit left out at both ends, crosses a
-    /// chain.
+    /// Whether a segment between two vertices of chains, with a bit left out at both ends, crosses
+    /// a chain.
     pub fn separate(&self, [a, b]: [Parameters; 2]) -> bool {
         let part = |share: f64| [0, 1].map(|i| a[i] + share * (b[i] - a[i]));
         self.block([part(AT_VERTEX), part(1.0 - AT_VERTEX)])
@@ -71,8 +71,8 @@ impl Obstacles<'_> {
     }
 
     /// The bends of a short way from a vertex of a loop around the surface to another vertex, or to
-    /// a multiple of the period beside it, that crosses no chain; `None` if there is none on a grid.
-    /// The last of the bends is the end.
+    /// a multiple of the period beside it, that crosses no chain; the last of them is the end.
+    /// `None` if there is none on a grid.
     pub fn way(&self, ends: [Parameters; 2], direction: usize) -> Option<Vec<Parameters>> {
         self.shortest(&Grid::new(ends, direction, self.chart.periods[direction]?))
     }

@@ -89,8 +89,8 @@ impl Chart<'_> {
         self.closed(face, curves, sides, gap)
     }
 
-    /// Parameters along an edge on the surface, closer than a straight line in them needs; `None` if
-    /// it leaves the surface, or passes through a pole.
+    /// Parameters along an edge on the surface, closer than a straight line in them needs; `None`
+    /// if it leaves the surface, or passes through a pole.
     pub fn along(&self, edge: &EdgeCurve) -> Option<Vec<Parameters>> {
         let (nodes, _) = self.walk_both_ways(edge, edge.range).ok()?;
         let mut out = vec![nodes[0].1];

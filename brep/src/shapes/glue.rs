@@ -164,7 +164,8 @@ pub(super) fn glue_patches(model: &mut Model, tolerance: f64) -> Vec<usize> {
     to
 }
 
-/// The curves that bound a patch, in ascending order, without seams, which any program puts elsewhere.
+/// The curves that bound a patch, in ascending order, without seams, which each program puts
+/// elsewhere.
 fn bounds(patch: &Patch) -> Vec<usize> {
     let mut all: Vec<usize> = patch.loops.iter().flatten().filter_map(curve_of).collect();
     all.sort_unstable();

@@ -11,7 +11,6 @@ use crate::model::{Corner, Fin, Model, On, Patch};
 use crate::tessellate::diagonal;
 use crate::{BrepError, EdgeCurve, Surface};
 use rayon::prelude::*;
-use std::collections::BTreeSet;
 
 /// The edges of a loop, each with whether it is used forward.
 pub(crate) type Edges = Vec<(usize, bool)>;
@@ -77,7 +76,7 @@ impl Shapes {
                     loops: loops.clone(),
                     body,
                     is_behind: side == 0,
-                    name: None,
+                    name: model.patch_names.get(number).cloned().flatten(),
                 });
             }
         }
@@ -85,11 +84,6 @@ impl Shapes {
             *accuracy = 0.0;
         }
         shapes
-    }
-
-    /// Whether solids touch on surfaces without a common face.
-    pub fn touch(&self) -> bool {
-        imprint::touch(self, diagonal(&self.corners, &self.curves, Vec::new()))
     }
 
     /// Adds a corner of a body.
@@ -107,19 +101,30 @@ impl Shapes {
         curves
     }
 
-    /// Makes patches of the faces. Solids share faces, edges and vertices afterwards, where they
-    /// touch on a common surface.
+    /// Divides faces and edges of solids that touch on a common surface. Returns the indices of the
+    /// parts of these faces; none if no solids touch.
+    pub fn imprint(&mut self) -> Vec<usize> {
+        let size = self.size();
+        imprint::imprint(self, size)
+    }
+
+    /// The diagonal of the box around all shapes.
+    fn size(&self) -> f64 {
+        let without_edges = self.faces.iter().filter(|face| face.loops.is_empty());
+        let points = without_edges.flat_map(|face| imprint::whole(&face.surface)).collect();
+        diagonal(&self.corners, &self.curves, points)
+    }
+
+    /// Makes patches of the faces; those that two solids repeat become one. Returns the patch of
+    /// each face.
     ///
     /// # Errors
     /// [`BrepError::Face`] for faces whose edges do not bound them.
-    pub fn build(mut self, model: &mut Model) -> Result<(), BrepError> {
-        let without_edges = self.faces.iter().filter(|face| face.loops.is_empty());
-        let points = without_edges.flat_map(|face| imprint::whole(&face.surface)).collect();
-        let size = diagonal(&self.corners, &self.curves, points);
+    pub fn build(mut self, model: &mut Model) -> Result<Vec<usize>, BrepError> {
+        let size = self.size();
         glue::glue_edges(&mut self, size);
         split::divide_at_poles(&mut self, size);
         model.notes.extend(split::drop_spurs(&mut self));
-        let touching = imprint::imprint(&mut self, size);
         (model.corners, model.curves) = (self.corners, self.curves);
         let mut names = Vec::new();
         // On all threads: the steps along edges take most of the time.
@@ -140,18 +145,11 @@ impl Shapes {
             model.patches.push(patch);
         }
         let to = glue::glue_patches(model, SAME * size);
-        let common: BTreeSet<usize> = touching.into_iter().map(|face| to[face]).collect();
-        let common = common.into_iter().filter(|&patch| !model.patches[patch].bodies.contains(&None)).count();
-        if common > 0 {
-            model
-                .notes
-                .push(format!("solids that touch were imprinted on each other: {common} common faces"));
-        }
         model.patch_names = vec![None; model.patches.len()];
-        for (name, patch) in names.into_iter().zip(to) {
+        for (name, &patch) in names.into_iter().zip(&to) {
             model.patch_names[patch] = model.patch_names[patch].take().or(name);
         }
-        Ok(())
+        Ok(to)
     }
 }
 

@@ -1,7 +1,7 @@
 //! Solids that touch, made by hand.
 
 use super::{Edges, Face, Shapes};
-use crate::model::{Corner, Model, On};
+use crate::model::{Corner, Model};
 use crate::surface::Profile;
 use crate::{BrepError, Curve, EdgeCurve, Settings, Surface, Tessellation, Vector, tessellate};
 use std::f64::consts::{PI, TAU};
@@ -50,15 +50,15 @@ impl Solids {
         self.0.faces.push(Face { id, surface, loops, body, is_behind: true, name: None });
     }
 
-    /// A horizontal face that looks up or down, with loops that are counterclockwise seen from above.
+    /// A horizontal face that looks up or down, with loops counterclockwise seen from above.
     fn level(&mut self, z: f64, looks_up: bool, loops: Vec<Edges>) {
         let axes = if looks_up { [X, Y] } else { [Y, X] };
         let turned = |edges: Edges| if looks_up { edges } else { super::reversed(edges) };
         self.face(Surface::Plane { origin: Z * z, axes }, loops.into_iter().map(turned).collect());
     }
 
-    /// An upright wall from z = low to high above a polygon that is counterclockwise seen from above.
-    /// The loops at its lower and upper end.
+    /// An upright wall from z = low to high above a polygon, counterclockwise seen from above. The
+    /// loops at its lower and upper end.
     fn wall(&mut self, polygon: &[Vector], [low, high]: [f64; 2]) -> [Edges; 2] {
         let count = polygon.len();
         let [below, above]: [Vec<usize>; 2] =
@@ -114,6 +114,7 @@ impl Solids {
         let bodies = self.0.accuracy.len();
         let mut model = Model { bodies, ..Model::default() };
         self.0.build(&mut model).unwrap_or_else(|error| panic!("{error}"));
+        model.imprint();
         let tessellation = tessellated(&mut model).unwrap_or_else(|error| panic!("{error}"));
         let volumes = (0..bodies).map(|body| tessellate::volume(&model, &tessellation, body)).collect();
         let shared = (0..model.patches.len()).filter(|&p| !model.patches[p].bodies.contains(&None));
@@ -273,34 +274,4 @@ fn solids_that_overlap_are_refused_by_number() {
     solids.0.build(&mut model).unwrap();
     let error = tessellated(&mut model).expect_err("a block inside of another one");
     assert!(matches!(&error, BrepError::Solid { solid: 2, what, .. } if what.contains("solid 1")), "{error}");
-}
-
-/// A model of two, which share nothing.
-fn together(mut one: Model, other: Model) -> Model {
-    let (corners, curves, body) = (one.corners.len(), one.curves.len(), one.bodies);
-    one.corners.extend(other.corners);
-    let moved = |edge: EdgeCurve| EdgeCurve { ends: edge.ends.map(|end| end + corners), ..edge };
-    one.curves.extend(other.curves.into_iter().map(moved));
-    for mut patch in other.patches {
-        for fin in patch.loops.iter_mut().flatten() {
-            fin.on = match fin.on {
-                On::Curve(curve) => On::Curve(curve + curves),
-                On::Corner(corner) => On::Corner(corner + corners),
-            };
-        }
-        patch.bodies = patch.bodies.map(|own| own.map(|own| own + body));
-        one.patches.push(patch);
-    }
-    one.bodies += other.bodies;
-    one
-}
-
-#[test]
-fn a_model_that_was_read_is_imprinted_as_well() {
-    let [mut plate, mut pin] = [Solids::default(), Solids::default()];
-    plate.prism(&square(Vector::zeros(), 1.0, 0.0), [0.0, 1.0], &[(Vector::zeros(), 0.5)]);
-    pin.pin(Vector::zeros(), 0.5, [-0.5, 1.5], 2.0);
-    let shapes = Shapes::of(&together(plate.measured().0, pin.measured().0));
-    assert!(shapes.touch());
-    assert_measures(Solids(shapes), &[4.0 - PI / 4.0, PI / 2.0], PI);
 }

@@ -1,9 +1,9 @@
 //! Imprints solids on each other where they touch on a common surface.
 //!
-//! The common parts of two such faces are bounded by edges of either face, so no surfaces have to be
-//! intersected: edges are divided where those of the other face meet them, and each face is divided
-//! along the edges of the others that lie inside of it. Afterwards common parts have the same edges
-//! and become one face. Solids that touch in a line or a point alone stay apart.
+//! The common parts of two such faces are bounded by edges of either face, so no surfaces have to
+//! be intersected: edges are divided where those of the other face meet them, and each face is
+//! divided along the edges of the others that lie inside of it. Afterwards common parts have the
+//! same edges and become one face. Solids that touch in a line or a point alone stay apart.
 
 mod contact;
 mod cross;
@@ -29,29 +29,22 @@ fn room(shapes: &Shapes, faces: [usize; 2], size: f64) -> f64 {
 /// How often edges are divided at vertices, some of which are new for other edges.
 const MOST_ROUNDS: usize = 8;
 
-/// Whether solids touch on a common surface, where they have no common face.
-pub(super) fn touch(shapes: &Shapes, size: f64) -> bool {
-    !contacts(shapes, size).is_empty()
-}
-
-/// Pairs of faces that touch and have different edges.
-fn contacts(shapes: &Shapes, size: f64) -> Vec<[usize; 2]> {
-    let mut contacts = contact::contacts(shapes, size);
-    contacts.retain(|[a, b]| shapes.curves_of(*a) != shapes.curves_of(*b));
-    contacts
-}
-
 /// Divides faces of different solids that touch on a common surface, and their edges. Returns the
 /// indices of the parts of these faces.
 pub(super) fn imprint(shapes: &mut Shapes, size: f64) -> Vec<usize> {
-    let mut contacts = contacts(shapes, size);
+    let mut contacts = contact::contacts(shapes, size);
+    // Faces that two solids share have the same edges.
+    retain_different(shapes, &mut contacts);
+    let touching: BTreeSet<usize> = contacts.iter().flatten().copied().collect();
+    if touching.is_empty() {
+        return Vec::new();
+    }
+    glue::glue_edges(shapes, size);
+    retain_different(shapes, &mut contacts);
     for face in contacts.iter().flatten().copied().collect::<BTreeSet<_>>() {
         drop_seams(shapes, face);
     }
-    contacts.retain(|[a, b]| shapes.curves_of(*a) != shapes.curves_of(*b));
-    if contacts.is_empty() {
-        return Vec::new();
-    }
+    retain_different(shapes, &mut contacts);
     measure_gaps(shapes, &contacts);
     let groups = groups(shapes.faces.len(), &contacts);
     let pairs = pairs(shapes, &groups);
@@ -63,7 +56,12 @@ pub(super) fn imprint(shapes: &mut Shapes, size: f64) -> Vec<usize> {
     glue::glue_edges(shapes, size);
     cross::divide_at_crossings(shapes, &pairs, size);
     glue::glue_edges(shapes, size);
-    divide_faces(shapes, &groups, size)
+    divide_faces(shapes, &groups, &touching, size)
+}
+
+/// Leaves out pairs of faces with the same edges.
+fn retain_different(shapes: &Shapes, contacts: &mut Vec<[usize; 2]>) {
+    contacts.retain(|[a, b]| shapes.curves_of(*a) != shapes.curves_of(*b));
 }
 
 /// Sets the tolerances of the edges of faces to their distances from the faces at least.
@@ -144,8 +142,14 @@ fn seam(loops: &[Edges]) -> Option<[(usize, usize); 2]> {
     None
 }
 
-/// Divides faces along the edges of those that touch them. Returns the indices of their parts.
-fn divide_faces(shapes: &mut Shapes, groups: &[Vec<usize>], size: f64) -> Vec<usize> {
+/// Divides faces along the edges of those that touch them. Returns the indices of the parts of
+/// those in `touching`.
+fn divide_faces(
+    shapes: &mut Shapes,
+    groups: &[Vec<usize>],
+    touching: &BTreeSet<usize>,
+    size: f64,
+) -> Vec<usize> {
     let divided = |face: usize| {
         let mut added: Vec<usize> = groups[face].iter().flat_map(|&other| shapes.curves_of(other)).collect();
         added.sort_unstable();
@@ -154,8 +158,8 @@ fn divide_faces(shapes: &mut Shapes, groups: &[Vec<usize>], size: f64) -> Vec<us
     };
     let divided: Vec<_> = (0..shapes.faces.len()).into_par_iter().map(divided).collect();
     let faces = std::mem::take(&mut shapes.faces);
-    let mut touching = Vec::new();
-    for ((face, parts), group) in faces.into_iter().zip(divided).zip(groups) {
+    let mut of_touching = Vec::new();
+    for ((number, face), parts) in faces.into_iter().enumerate().zip(divided) {
         let first = shapes.faces.len();
         match parts {
             Some(parts) => {
@@ -163,9 +167,9 @@ fn divide_faces(shapes: &mut Shapes, groups: &[Vec<usize>], size: f64) -> Vec<us
             }
             None => shapes.faces.push(face),
         }
-        if !group.is_empty() {
-            touching.extend(first..shapes.faces.len());
+        if touching.contains(&number) {
+            of_touching.extend(first..shapes.faces.len());
         }
     }
-    touching
+    of_touching
 }

@@ -1,8 +1,8 @@
 //! The regions into which edges divide a face.
 //!
-//! Edges on a surface are a planar graph: around each corner they have an order, and to follow a
-//! region's boundary means to turn left at each corner as far as possible. A region may have several
-//! boundaries. Those that are not connected by edges are matched along straight lines in the
+//! Edges on a surface are a planar graph: around each corner they have an order, and to follow the
+//! boundary of a region means to turn left at each corner as far as possible. A region may have
+//! several boundaries. Those that no edges connect are matched along straight lines in the
 //! parameters: what two crossings that follow each other on such a line have between them is one
 //! region.
 
