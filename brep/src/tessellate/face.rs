@@ -1,13 +1,12 @@
 //! Triangulation of one patch in its parameters.
 
-use super::chain::{Sides, chain};
+use super::chain::chain;
 use super::frame::{Frame, Node, pole};
 use super::{Tessellation, Triangle};
 use crate::model::{Model, Patch};
 use crate::{BrepError, Point, Vector};
 use rayon::prelude::*;
 use rustc_hash::{FxHashMap as HashMap, FxHashSet};
-use spade::handles::FixedVertexHandle;
 use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation};
 
 /// The tolerances of a tessellation.
@@ -30,7 +29,7 @@ pub(super) enum Failure {
     Final(BrepError),
 }
 
-type Plane = ConstrainedDelaunayTriangulation<Node>;
+pub(super) type Plane = ConstrainedDelaunayTriangulation<Node>;
 
 /// The most triangles of a patch.
 const MOST_TRIANGLES: usize = 400_000;
@@ -96,6 +95,7 @@ pub(super) fn triangulate(
         sides: HashMap::default(),
         tolerances,
         vertices: Vec::new(),
+        known: HashMap::default(),
     };
     let turn = face.frame.turn(&chains);
     for chain in &chains {
@@ -105,20 +105,18 @@ pub(super) fn triangulate(
     Ok(face.finish(gap))
 }
 
-/// Sides are curved outward by this fraction of their length. Otherwise rounding makes straight
-/// ones concave, and triangles without height remain between their points.
-const BULGE: f64 = 1e-6;
-
-struct Face<'a> {
+pub(super) struct Face<'a> {
     patch: &'a Patch,
-    number: usize,
-    plane: Plane,
-    frame: Frame,
+    pub number: usize,
+    pub plane: Plane,
+    pub frame: Frame,
     /// How often loops use each constraint, by the indices of its ends.
-    sides: HashMap<[usize; 2], usize>,
-    tolerances: &'a Tolerances,
+    pub sides: HashMap<[usize; 2], usize>,
+    pub tolerances: &'a Tolerances,
     /// Points of new vertices.
     vertices: Vec<Point>,
+    /// The nodes that were added for each vertex; one on a seam has several.
+    pub known: HashMap<u32, Vec<Node>>,
 }
 
 /// A point that is wanted: the error there, the edge that it divides, its place, and the triangle.
@@ -146,68 +144,15 @@ fn middle(a: &Node, b: &Node) -> Point2<f64> {
     Point2::new(0.5 * (a.scaled.x + b.scaled.x), 0.5 * (a.scaled.y + b.scaled.y))
 }
 
-fn is_finite(p: &Point2<f64>) -> bool {
+pub(super) fn is_finite(p: &Point2<f64>) -> bool {
     p.x.is_finite() && p.y.is_finite()
 }
 
-fn sorted(a: usize, b: usize) -> [usize; 2] {
+pub(super) fn sorted(a: usize, b: usize) -> [usize; 2] {
     [a.min(b), a.max(b)]
 }
 
 impl Face<'_> {
-    fn crossing(&self, vertex: u32, out: &Tessellation) -> Failure {
-        let place = out.points.get(vertex as usize).copied();
-        let what = "its loops cross or touch in the parameters of its surface";
-        Failure::Coarse(BrepError::face(self.number, what, place))
-    }
-
-    fn add_chain(&mut self, sides: &Sides, turn: f64, out: &Tessellation) -> Result<(), Failure> {
-        let mut handles: Vec<FixedVertexHandle> = Vec::new();
-        let mut nodes = Vec::new();
-        for (k, side) in sides.iter().enumerate() {
-            let end = self.frame.scaled(sides[(k + 1) % sides.len()][0].0);
-            let start = self.frame.scaled(side[0].0);
-            let (x, y) = (turn * (end.x - start.x), turn * (end.y - start.y));
-            let squared = (x * x + y * y).max(f64::MIN_POSITIVE);
-            for &(parameters, vertex) in side {
-                let p = self.frame.scaled(parameters);
-                let share = turn * ((p.x - start.x) * x + (p.y - start.y) * y) / squared;
-                let out = BULGE * 4.0 * (share * (1.0 - share)).max(0.0);
-                nodes.push(Node { scaled: Point2::new(p.x + out * y, p.y - out * x), parameters, vertex });
-            }
-        }
-        for node in nodes.iter().copied() {
-            let vertex = node.vertex;
-            if !is_finite(&node.scaled) {
-                let place = out.points.get(vertex as usize).copied();
-                let what = "its edges have no finite place in the parameters of its surface";
-                return Err(Failure::Final(BrepError::face(self.number, what, place)));
-            }
-            let count = self.plane.num_vertices();
-            let before = self.plane.locate_vertex(node.scaled).map(|old| old.data().vertex);
-            let handle = self.plane.insert(node).map_err(|_| self.crossing(vertex, out))?;
-            if self.plane.num_vertices() == count && before != Some(vertex) {
-                return Err(self.crossing(vertex, out));
-            }
-            handles.push(handle);
-        }
-        for k in 0..handles.len() {
-            let (a, b) = (handles[k], handles[(k + 1) % handles.len()]);
-            if a == b {
-                continue;
-            }
-            if !self.plane.can_add_constraint(a, b) {
-                return Err(self.crossing(nodes[k].vertex, out));
-            }
-            self.plane.add_constraint(a, b);
-            if self.plane.get_edge_from_neighbors(a, b).is_none_or(|edge| !edge.is_constraint_edge()) {
-                return Err(self.crossing(nodes[k].vertex, out));
-            }
-            *self.sides.entry(sorted(a.index(), b.index())).or_default() += 1;
-        }
-        Ok(())
-    }
-
     /// Whether each inner face of the triangulation is in the patch: it is if a way from outside
     /// crosses loops an odd number of times.
     fn inside(&self) -> Vec<Option<bool>> {

@@ -11,6 +11,7 @@ mod face;
 mod frame;
 mod measure;
 mod orient;
+mod outline;
 mod overlap;
 
 pub(crate) use curves::diagonal;

@@ -4,6 +4,7 @@ use super::super::Shapes;
 use super::super::split::{divide, inner_parameter};
 use super::{SAME, room};
 use crate::model::Corner;
+use crate::nearest::nearest_on_curve;
 use crate::{EdgeCurve, Point};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -162,8 +163,15 @@ fn crossings(one: &EdgeCurve, other: &EdgeCurve, room: f64) -> Vec<([f64; 2], Po
             let start = [p.range, q.range].map(|[low, high]| 0.5 * (low + high));
             let (at, points) = nearest_pair([one, other], start);
             let middle = nalgebra::center(&points[0], &points[1]);
-            let is_new = found.iter().all(|(_, known)| (known - middle).norm() > AT_END * room);
-            if (points[1] - points[0]).norm() <= room && is_new && !is_at_end(&middle) {
+            // Curves that touch are within the tolerance along a stretch.
+            let joins = |known: f64| {
+                let between = Point::from(one.curve.point(0.5 * (known + at[0])));
+                (nearest_on_curve(&other.curve, &between).point - between).norm() <= room
+            };
+            let is_new = found
+                .iter()
+                .all(|(known, place)| (place - middle).norm() > AT_END * room && !joins(known[0]));
+            if (points[1] - points[0]).norm() <= room && !is_at_end(&middle) && is_new {
                 found.push((at, middle));
             }
         }
@@ -176,7 +184,7 @@ fn crossings(one: &EdgeCurve, other: &EdgeCurve, room: f64) -> Vec<([f64; 2], Po
 fn nearest_pair(edges: [&EdgeCurve; 2], mut at: [f64; 2]) -> ([f64; 2], [Point; 2]) {
     const STEPS: usize = 60;
     /// Added to the matrix, as a fraction of its diagonal: parallel tangents make it singular.
-    const DAMPING: f64 = 1e-9;
+    const DAMPING: f64 = 1e-15;
     for _ in 0..STEPS {
         let jets = [0, 1].map(|k| edges[k].curve.jet(at[k]));
         let way = jets[1][0] - jets[0][0];
