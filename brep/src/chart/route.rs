@@ -231,3 +231,32 @@ fn is_crossing([a, b]: [Parameters; 2], [c, d]: [Parameters; 2]) -> bool {
     };
     side(a, b, c) != side(a, b, d) && side(c, d, a) != side(c, d, b)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Surface, Vector, surface::Profile};
+    use std::f64::consts::TAU;
+
+    #[test]
+    fn seams_of_a_torus_go_around_a_hole_across_all_straight_ones() {
+        let axes = [Vector::x(), Vector::y(), Vector::z()];
+        let profile = Profile::Circle { major: 2.0, minor: 1.0 };
+        let torus = Surface::Round { origin: Vector::zeros(), axes, profile };
+        let chart = Chart::new(&torus, 6.0);
+        // A narrow hole along the diagonal of the parameters, except for a short piece.
+        let (low, high) = (0.3, TAU - 0.3);
+        let hole = [[low, low + 0.05], [low + 0.05, low], [high, high - 0.05], [high - 0.05, high]];
+        let closed = hole.into_iter().chain([hole[0]]).collect();
+        let obstacles = Obstacles { chart: &chart, chains: vec![closed] };
+        let at = [3.0, 1.0];
+        assert!(obstacles.around(at, false).is_none());
+        let (place, ways) = obstacles.around(at, true).expect("a way around both ends of the hole");
+        assert_eq!(place, at);
+        for (way, end) in ways.iter().zip([[at[0] + TAU, at[1]], [at[0], at[1] + TAU]]) {
+            let nodes: Vec<Parameters> = std::iter::once(at).chain(way.iter().copied()).collect();
+            assert!(nodes.len() > 2 && nodes[nodes.len() - 1] == end, "{nodes:?}");
+            assert!(nodes.windows(2).all(|w| !obstacles.block([w[0], w[1]])), "{nodes:?}");
+        }
+    }
+}

@@ -86,6 +86,16 @@ pub(super) fn gap(surface: &Surface, edge: &EdgeCurve) -> f64 {
     points.map(|point| (nearest_on_surface(surface, &point).point - point).norm()).fold(0.0, f64::max)
 }
 
+/// Whether an edge without crossings lies on a surface where the surface is defined, rather than
+/// beside it.
+pub(super) fn lies_on(surface: &Surface, edge: &EdgeCurve, room: f64) -> bool {
+    [0.25, 0.5, 0.75].into_iter().all(|share| {
+        let point = at(edge, share);
+        let foot = nearest_on_surface(surface, &point);
+        is_defined(surface, foot.parameters) && (foot.point - point).norm() <= room
+    })
+}
+
 /// Points of a closed surface without edges.
 pub(in super::super) fn whole(surface: &Surface) -> Vec<Point> {
     const EACH: u32 = 8;

@@ -7,6 +7,8 @@
 //! region.
 
 use super::super::{Edges, Shapes};
+use super::FARTHEST;
+use super::contact::lies_on;
 use crate::chart::{Chart, Parameters};
 use crate::{Point, Vector};
 use std::collections::{BTreeMap, HashMap};
@@ -40,7 +42,11 @@ pub(super) fn divided(shapes: &Shapes, number: usize, added: &[usize], size: f64
     let face = &shapes.faces[number];
     let own: Edges = face.loops.iter().flatten().copied().collect();
     let is_own = |curve: usize| own.iter().any(|edge| edge.0 == curve);
-    let added: Vec<usize> = added.iter().copied().filter(|&curve| !is_own(curve)).collect();
+    let may_divide = |&curve: &usize| {
+        let edge = &shapes.curves[curve];
+        !is_own(curve) && lies_on(&face.surface, edge, FARTHEST * size + edge.tolerance)
+    };
+    let added: Vec<usize> = added.iter().copied().filter(may_divide).collect();
     if added.is_empty() || own.len() > shapes.curves_of(number).len() {
         return None;
     }
