@@ -2,11 +2,10 @@
 
 use crate::model::Model;
 use crate::shapes::Shapes;
-use std::collections::BTreeSet;
 
 impl Model {
     /// Divides faces of solids that touch on a common surface, so that they share the common parts,
-    /// with a note of how many there are. Where that fails, the model stays as it is.
+    /// with a note of how many there are. Where that fails, the model stays as it is, with a note.
     ///
     /// Solids that touch in a line or a point alone, or overlap, are not changed.
     pub fn imprint(&mut self) {
@@ -14,8 +13,7 @@ impl Model {
             return;
         }
         let mut shapes = Shapes::of(self);
-        let touching = shapes.imprint();
-        if touching.is_empty() {
+        if !shapes.imprint() {
             return;
         }
         let mut imprinted = Self {
@@ -25,13 +23,16 @@ impl Model {
             notes: self.notes.clone(),
             ..Self::default()
         };
-        let Ok(to) = shapes.build(&mut imprinted) else { return };
-        let parts: BTreeSet<usize> = touching.into_iter().map(|face| to[face]).collect();
-        let is_common = |patch: &usize| !imprinted.patches[*patch].bodies.contains(&None);
-        let common = parts.into_iter().filter(is_common).count();
-        if common > 0 {
-            let note = format!("solids that touch are imprinted on each other: {common} common faces");
-            imprinted.notes.push(note);
+        if let Err(error) = shapes.build(&mut imprinted) {
+            self.notes.push(format!("solids touch, but cannot be imprinted on each other: {error}"));
+            return;
+        }
+        let common = |model: &Self| model.patches.iter().filter(|p| !p.bodies.contains(&None)).count();
+        let added = common(&imprinted).saturating_sub(common(self));
+        if added > 0 {
+            imprinted
+                .notes
+                .push(format!("solids that touch are imprinted on each other: {added} common faces"));
             *self = imprinted;
         }
     }

@@ -101,9 +101,9 @@ impl Shapes {
         curves
     }
 
-    /// Divides faces and edges of solids that touch on a common surface. Returns the indices of the
-    /// parts of these faces; none if no solids touch.
-    pub fn imprint(&mut self) -> Vec<usize> {
+    /// Divides faces and edges of solids that touch on a common surface. Returns whether there may
+    /// be any.
+    pub fn imprint(&mut self) -> bool {
         let size = self.size();
         imprint::imprint(self, size)
     }
@@ -115,12 +115,11 @@ impl Shapes {
         diagonal(&self.corners, &self.curves, points)
     }
 
-    /// Makes patches of the faces; those that two solids repeat become one. Returns the patch of
-    /// each face.
+    /// Makes patches of the faces; those that two solids repeat become one.
     ///
     /// # Errors
     /// [`BrepError::Face`] for faces whose edges do not bound them.
-    pub fn build(mut self, model: &mut Model) -> Result<Vec<usize>, BrepError> {
+    pub fn build(mut self, model: &mut Model) -> Result<(), BrepError> {
         let size = self.size();
         glue::glue_edges(&mut self, size);
         split::divide_at_poles(&mut self, size);
@@ -146,10 +145,10 @@ impl Shapes {
         }
         let to = glue::glue_patches(model, SAME * size);
         model.patch_names = vec![None; model.patches.len()];
-        for (name, &patch) in names.into_iter().zip(&to) {
+        for (name, patch) in names.into_iter().zip(to) {
             model.patch_names[patch] = model.patch_names[patch].take().or(name);
         }
-        Ok(to)
+        Ok(())
     }
 }
 

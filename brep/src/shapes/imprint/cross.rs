@@ -18,7 +18,7 @@ const AT_END: f64 = 2.0;
 pub(super) fn divide_at_vertices(shapes: &mut Shapes, pairs: &[[usize; 2]], size: f64) -> bool {
     let mut divisions = Divisions::new();
     let mut boxes = Boxes::default();
-    for &[a, b] in pairs.iter().flat_map(|[a, b]| [[*a, *b], [*b, *a]]).collect::<Vec<_>>().iter() {
+    for [a, b] in pairs.iter().flat_map(|&[a, b]| [[a, b], [b, a]]) {
         let own = room(shapes, [a, b], size);
         let corners: BTreeSet<usize> =
             shapes.curves_of(a).into_iter().flat_map(|curve| shapes.curves[curve].ends).collect();
@@ -62,10 +62,10 @@ pub(super) fn divide_at_crossings(shapes: &mut Shapes, pairs: &[[usize; 2]], siz
                         .copied()
                         .find(|&corner| (shapes.corners[corner].point - point).norm() <= room);
                     let corner = known.unwrap_or_else(|| {
-                        added.push(
-                            shapes.add_corner(Corner { point, tolerance: room }, shapes.faces[pair[0]].body),
-                        );
-                        added[added.len() - 1]
+                        let body = shapes.faces[pair[0]].body;
+                        let new = shapes.add_corner(Corner { point, tolerance: room }, body);
+                        added.push(new);
+                        new
                     });
                     divisions.entry(p).or_default().push((at[0], corner));
                     divisions.entry(q).or_default().push((at[1], corner));

@@ -29,15 +29,14 @@ fn room(shapes: &Shapes, faces: [usize; 2], size: f64) -> f64 {
 /// How often edges are divided at vertices, some of which are new for other edges.
 const MOST_ROUNDS: usize = 8;
 
-/// Divides faces of different solids that touch on a common surface, and their edges. Returns the
-/// indices of the parts of these faces.
-pub(super) fn imprint(shapes: &mut Shapes, size: f64) -> Vec<usize> {
+/// Divides faces of different solids that touch on a common surface, and their edges. Returns
+/// whether there are any with different edges.
+pub(super) fn imprint(shapes: &mut Shapes, size: f64) -> bool {
     let mut contacts = contact::contacts(shapes, size);
     // Faces that two solids share have the same edges.
     retain_different(shapes, &mut contacts);
-    let touching: BTreeSet<usize> = contacts.iter().flatten().copied().collect();
-    if touching.is_empty() {
-        return Vec::new();
+    if contacts.is_empty() {
+        return false;
     }
     glue::glue_edges(shapes, size);
     retain_different(shapes, &mut contacts);
@@ -56,7 +55,8 @@ pub(super) fn imprint(shapes: &mut Shapes, size: f64) -> Vec<usize> {
     glue::glue_edges(shapes, size);
     cross::divide_at_crossings(shapes, &pairs, size);
     glue::glue_edges(shapes, size);
-    divide_faces(shapes, &groups, &touching, size)
+    divide_faces(shapes, &groups, size);
+    true
 }
 
 /// Leaves out pairs of faces with the same edges.
@@ -142,14 +142,8 @@ fn seam(loops: &[Edges]) -> Option<[(usize, usize); 2]> {
     None
 }
 
-/// Divides faces along the edges of those that touch them. Returns the indices of the parts of
-/// those in `touching`.
-fn divide_faces(
-    shapes: &mut Shapes,
-    groups: &[Vec<usize>],
-    touching: &BTreeSet<usize>,
-    size: f64,
-) -> Vec<usize> {
+/// Divides faces along the edges of those that touch them.
+fn divide_faces(shapes: &mut Shapes, groups: &[Vec<usize>], size: f64) {
     let divided = |face: usize| {
         let mut added: Vec<usize> = groups[face].iter().flat_map(|&other| shapes.curves_of(other)).collect();
         added.sort_unstable();
@@ -158,18 +152,12 @@ fn divide_faces(
     };
     let divided: Vec<_> = (0..shapes.faces.len()).into_par_iter().map(divided).collect();
     let faces = std::mem::take(&mut shapes.faces);
-    let mut of_touching = Vec::new();
-    for ((number, face), parts) in faces.into_iter().enumerate().zip(divided) {
-        let first = shapes.faces.len();
+    for (face, parts) in faces.into_iter().zip(divided) {
         match parts {
             Some(parts) => {
                 shapes.faces.extend(parts.into_iter().map(|loops| super::Face { loops, ..face.clone() }));
             }
             None => shapes.faces.push(face),
         }
-        if touching.contains(&number) {
-            of_touching.extend(first..shapes.faces.len());
-        }
     }
-    of_touching
 }
