@@ -59,10 +59,22 @@ def solids(r):
             faces = [gmsh.model.getAdjacencies(1, edge)[0][0] for edge in chosen]
             result = occ.chamfer([result[0][1]], chosen, faces, [r.uniform(0.03, 0.1)])
     occ.synchronize()
-    return gmsh.model.getEntities(3)
+    entities = gmsh.model.getEntities(3)
+    if not entities or min(occ.getMass(*entity) for entity in entities) < 1e-9:
+        raise RuntimeError("no solid")
+    return entities
 
 
-def main():
+def measured(entities):
+    """Volumes of solids and areas of faces."""
+    return {
+        "volumes": [occ.getMass(*entity) for entity in entities],
+        "areas": [occ.getMass(*face) for face in gmsh.model.getEntities(2)],
+    }
+
+
+def write_all(name, solids, measured):
+    """Writes a file for each seed, and the measures of all."""
     folder, count = sys.argv[1], int(sys.argv[2]) if len(sys.argv) > 2 else 200
     os.makedirs(folder, exist_ok=True)
     gmsh.initialize()
@@ -70,23 +82,17 @@ def main():
     measures = {}
     for seed in range(count):
         gmsh.clear()
-        gmsh.model.add(f"seed{seed:03}")
+        gmsh.model.add(f"{name}{seed:03}")
         try:
             entities = solids(random.Random(seed))
-            if not entities or min(occ.getMass(*entity) for entity in entities) < 1e-9:
-                raise RuntimeError("no solid")
-            gmsh.write(f"{folder}/seed{seed:03}.step")
+            gmsh.write(f"{folder}/{name}{seed:03}.step")
+            measures[f"{name}{seed:03}"] = measured(entities)
         except Exception as error:
             print(f"seed {seed}: not made: {error}", file=sys.stderr)
-            continue
-        measures[f"seed{seed:03}"] = {
-            "volumes": [occ.getMass(*entity) for entity in entities],
-            "areas": [occ.getMass(*face) for face in gmsh.model.getEntities(2)],
-        }
     with open(f"{folder}/measures.json", "w") as file:
         json.dump(measures, file, indent=1)
     gmsh.finalize()
 
 
 if __name__ == "__main__":
-    main()
+    write_all("seed", solids, measured)

@@ -8,14 +8,9 @@ are 0 to COUNT - 1 (200); a seed for which a Boolean fails, or that leaves no tw
 the solids and the area of their interfaces, after OpenCASCADE imprinted them on each other.
 """
 
-import json
-import os
-import random
-import sys
-
 import gmsh
 
-from random_solids import primitive
+from random_solids import primitive, write_all
 
 occ = gmsh.model.occ
 
@@ -29,7 +24,10 @@ def solids(r):
             new, _ = occ.cut(new, made, removeTool=False)
         made += [entity for entity in new if entity[0] == 3]
     occ.synchronize()
-    return gmsh.model.getEntities(3)
+    entities = gmsh.model.getEntities(3)
+    if len(entities) < 2:
+        raise RuntimeError("fewer than two solids")
+    return entities
 
 
 def measured(entities):
@@ -43,27 +41,5 @@ def measured(entities):
     }
 
 
-def main():
-    folder, count = sys.argv[1], int(sys.argv[2]) if len(sys.argv) > 2 else 200
-    os.makedirs(folder, exist_ok=True)
-    gmsh.initialize()
-    gmsh.option.setNumber("General.Terminal", 0)
-    measures = {}
-    for seed in range(count):
-        gmsh.clear()
-        gmsh.model.add(f"touch{seed:03}")
-        try:
-            entities = solids(random.Random(seed))
-            if len(entities) < 2:
-                raise RuntimeError("fewer than two solids")
-            gmsh.write(f"{folder}/touch{seed:03}.step")
-            measures[f"touch{seed:03}"] = measured(entities)
-        except Exception as error:
-            print(f"seed {seed}: not made: {error}", file=sys.stderr)
-    with open(f"{folder}/measures.json", "w") as file:
-        json.dump(measures, file, indent=1)
-    gmsh.finalize()
-
-
 if __name__ == "__main__":
-    main()
+    write_all("touch", solids, measured)

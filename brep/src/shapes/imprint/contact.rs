@@ -29,9 +29,6 @@ impl Probe {
 /// Pairs of faces of different solids, one in front of the other, that have the same surface and
 /// overlapping boxes.
 pub(super) fn contacts(shapes: &Shapes, size: f64) -> Vec<[usize; 2]> {
-    if shapes.accuracy.len() < 2 {
-        return Vec::new();
-    }
     let probes: Vec<Option<Probe>> =
         (0..shapes.faces.len()).into_par_iter().map(|face| probe(shapes, face, size)).collect();
     let mut order: Vec<(usize, &Probe)> =
