@@ -87,7 +87,8 @@ pub fn project_to_curve(curve: &Curve<3>, range: [f64; 2], point: &Point, start:
     }
     let way = jet[0] - point.coords;
     let tangent = jet[1].try_normalize(0.0).unwrap_or_else(Vector::zeros);
-    let rounding = ROUNDING * scale;
+    // The parameter has rounding errors too; some programs start lines far from the part.
+    let rounding = ROUNDING * scale + 4.0 * f64::EPSILON * t.abs() * jet[1].norm();
     let is_end = t == range[0] || t == range[1];
     let along = way.dot(&tangent).abs();
     // At a kink the nearest point is where the distance grows in both directions.

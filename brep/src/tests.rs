@@ -117,6 +117,18 @@ fn is_derivative(before: Vector, after: Vector, step: f64, derivative: Vector) -
 /// The step of difference quotients.
 const STEP: f64 = 1e-5;
 
+#[test]
+fn projection_to_a_line_that_starts_far_away_converges() {
+    // From a part of a robot: an edge near the origin, on a line that starts 500 m away.
+    let start = Vector::new(-500000.00000000006, 8.261363636363543, 3.9914519976553575);
+    let line = Curve::Line { start, direction: Vector::new(-1000.0, 0.0, 0.0) };
+    for x in [5.432460108626531, 3.1, 4.777] {
+        let point = Point::new(x, start.y, start.z);
+        let foot = project_to_curve(&line, [-500.006, -500.003], &point, -500.004);
+        assert!(foot.is_converged && (foot.point - point).norm() < 1e-9, "{foot:?}");
+    }
+}
+
 proptest! {
     #![proptest_config(seeded())]
 
