@@ -175,7 +175,7 @@ pub mod error {
 
 /// All settings and results of a [`Mesher`].
 pub mod run {
-    pub use crate::mesher::facets::{MergedEdge, MergedFace, MergedSmall, NamedFace};
+    pub use crate::mesher::facets::{MergedEdge, MergedFace, MergedSmall, MergedTip, NamedFace};
     pub use crate::parallel::decompose::{Candidates, CutPlane, PlanSettings};
     pub use crate::parallel::interfaces::InterfaceReport;
     pub use crate::parallel::partition::Metrics;

@@ -83,3 +83,26 @@ fn merging_does_not_depend_on_ranks() {
     });
     assert_eq!(together.unwrap(), vec![alone; 3]);
 }
+
+#[test]
+fn tips_of_faces_are_merged_up_to_the_width_of_small_faces() {
+    // A block of 10 × 4 × 2 without what is outside a cylinder of radius 100 that touches an edge,
+    // or beyond a plane that meets the edge at 1°. Volumes by OpenCASCADE.
+    for (name, exact, tips) in
+        [("runout", 79.835_624_319_385_67, 2), ("tapered_chamfer", 79.948_001_400_892_1, 1)]
+    {
+        let made =
+            [false, true].map(|keep| Mesher::new().max_size(1.0).generate(&geometry(name, keep)).unwrap());
+        let [merged, kept] = made.each_ref().map(|mesh| mesh.coarse.as_ref().unwrap().report.clone());
+        let [angle, before] = [&merged, &kept].map(|report| report.quality.smallest_dihedral);
+        assert!(angle > 10.0 && angle > 5.0 * before, "{name}: {angle}° instead of {before}°");
+        assert_eq!((merged.merged_small.tips.len(), kept.merged_small.tips.len()), (tips, 0), "{name}");
+        let volume = volume_of(&made[0].arrays());
+        assert!((volume - exact).abs() < 0.08, "{name}: {volume} instead of {exact}");
+        // Tips of refined meshes are kept.
+        let fine = Mesher::new().max_size(1.0).levels(2).generate(&geometry(name, false)).unwrap();
+        assert!(fine.coarse.as_ref().unwrap().report.merged_small.tips.is_empty(), "{name}");
+        let volume = volume_of(&fine.arrays());
+        assert!((volume - exact).abs() < 0.03, "{name}: {volume} instead of {exact}");
+    }
+}

@@ -29,6 +29,7 @@ mod surface;
 pub mod tessellate;
 #[cfg(test)]
 mod tests;
+mod tips;
 
 pub use curve::Curve;
 pub use error::BrepError;
@@ -39,6 +40,7 @@ pub use project::{CurveFoot, SurfaceFoot, project_to_curve, project_to_surface};
 pub use step::Unit;
 pub use surface::{Jet, Profile, Surface};
 pub use tessellate::{Settings, Tessellation, Triangle};
+pub use tips::{Cut, Tip};
 
 /// A point in space.
 pub type Point = nalgebra::Point3<f64>;

@@ -184,12 +184,14 @@ impl FacetSolid {
 
     /// Merges edges and faces of a CAD file that are small beside the elements into their
     /// neighbours; `None` for the solid if there are none. Elements are as large as the sizes, but
-    /// at most `largest`, and are divided into `pieces` along each edge.
+    /// at most `largest`, and are divided into `pieces` along each edge. With `tips`, narrow tips
+    /// of faces are merged, too.
     pub(super) fn merge_small(
         &self,
         settings: &SizeSettings,
         largest: f64,
         pieces: u32,
+        tips: bool,
     ) -> (Option<Self>, MergedSmall) {
         let Some(cad) = &self.cad else { return (None, MergedSmall::default()) };
         let factor = f64::max(SMALL, SMALL_IN_PIECES * f64::from(pieces));
@@ -197,7 +199,8 @@ impl FacetSolid {
         let size = |model: &FacetModel| -> Box<dyn SizeField> {
             Box::new(AtMost(FacetSize::with_accuracy(model, settings, Accuracy::Fine), largest))
         };
-        let (merged, report) = merge(&cad.model, &cad.tessellation, &Small { factor, largest, size: &size });
+        let small = Small { factor, largest, tips, tessellated: cad.settings, size: &size };
+        let (merged, report) = merge(&cad.model, &cad.tessellation, &small);
         let solid = merged.map(|(model, exact, grouping)| {
             let label = |faces: &Vec<usize>| self.names.patches[faces[0]].clone();
             let patches = grouping.patches.iter().map(label).collect();

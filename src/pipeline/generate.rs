@@ -83,7 +83,10 @@ fn merge_small(
         // The subdivisions are chosen later: the elements themselves decide.
         Wanted::Elements(count) => (of_count(count), pieces),
     };
-    let (merged, report) = solid.merge_small(&settings.coarse.size, largest, pieces);
+    // With the sizes of a refined mesh, the remeshing of one part with merged tips did not end.
+    let is_refined =
+        pieces > 1 || settings.coarse.order == Order::Second || matches!(wanted, Wanted::Elements(_));
+    let (merged, report) = solid.merge_small(&settings.coarse.size, largest, pieces, !is_refined);
     report.notes().iter().for_each(|text| progress.note(text));
     (merged.map(|solid| Model::Facets(Box::new(solid))), report)
 }

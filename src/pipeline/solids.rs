@@ -8,6 +8,8 @@ use crate::mesher::facets::{Crossing, FacetModel, of_brep};
 #[derive(Debug)]
 pub(super) struct Cad {
     pub model: brep::Model,
+    /// How it is tessellated.
+    pub settings: brep::Settings,
     pub tessellation: brep::Tessellation,
 }
 
@@ -28,16 +30,16 @@ pub(super) fn tessellated(
         let made = of_brep(&model, &tessellation);
         let crossings = made.0.intersections();
         if !crossings.iter().any(|crossing| made.0.is_deep(crossing)) {
-            return Ok((Cad { model, tessellation }, made));
+            return Ok((Cad { model, settings, tessellation }, made));
         }
         let never_ends = touch(&made.0, &made.1, &crossings);
-        coarsest.get_or_insert((tessellation, made));
+        coarsest.get_or_insert((settings, tessellation, made));
         if never_ends {
             break;
         }
     }
-    let (tessellation, made) = coarsest.expect("the first of several");
-    Ok((Cad { model, tessellation }, made))
+    let (settings, tessellation, made) = coarsest.expect("the first of several");
+    Ok((Cad { model, settings, tessellation }, made))
 }
 
 /// Surfaces at most this far apart touch (fraction of the size of the model).

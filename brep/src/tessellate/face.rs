@@ -60,6 +60,21 @@ pub(super) struct Made {
 }
 
 impl Made {
+    /// No triangles yet.
+    pub fn empty(gap: f64) -> Self {
+        Self { points: Vec::new(), triangles: Vec::new(), gap }
+    }
+
+    /// Adds a vertex inside of the patch, and returns its number for triangles.
+    pub fn add_point(&mut self, point: Point) -> u32 {
+        self.points.push(point);
+        INNER + self.points.len() as u32 - 1
+    }
+
+    pub fn add(&mut self, triangle: Triangle) {
+        self.triangles.push(triangle);
+    }
+
     /// Appends the vertices and triangles to those of other patches.
     pub fn append_to(self, out: &mut Tessellation) {
         let first = out.points.len() as u32;
@@ -67,6 +82,7 @@ impl Made {
         out.points.extend(self.points);
         let numbered = |t: Triangle| Triangle { vertices: t.vertices.map(id), ..t };
         out.triangles.extend(self.triangles.into_iter().map(numbered));
+        out.gaps.push(self.gap);
         out.gap = out.gap.max(self.gap);
     }
 }

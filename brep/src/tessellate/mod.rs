@@ -13,12 +13,15 @@ mod measure;
 mod orient;
 mod outline;
 mod overlap;
+mod reuse;
 
 pub(crate) use curves::diagonal;
 pub use measure::{area, check, volume};
 
-use crate::{BrepError, Model, Point};
+use crate::tips::Cut;
+use crate::{BrepError, EdgeCurve, Model, Point};
 use rayon::prelude::*;
+use reuse::Known;
 
 /// How fine a tessellation is.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -57,6 +60,8 @@ pub struct Tessellation {
     pub lines: Vec<Vec<(u32, f64)>>,
     /// The largest distance between a curve and its place on a patch (length).
     pub gap: f64,
+    /// The same for each patch.
+    gaps: Vec<f64>,
 }
 
 /// How often curves are divided, more finely each time because loops of a patch cross or triangles
@@ -78,26 +83,60 @@ impl Tessellation {
     /// [`BrepError::Face`] and [`BrepError::Edge`] with a place if curves and surfaces do not fit
     /// each other or loops cross; [`BrepError::Solid`] if a body is not closed.
     pub fn of(model: &mut Model, settings: &Settings) -> Result<Self, BrepError> {
+        let divided = vec![None; model.curves.len()];
+        Self::with(model, settings, divided, None)
+    }
+
+    /// The same for a model of which tips were cut off. Patches without a tip or a divided curve
+    /// keep the triangles of `before`, the tessellation of the model without cuts.
+    ///
+    /// # Errors
+    /// The same.
+    pub fn of_cut(cut: &mut Cut, before: &Self, settings: &Settings) -> Result<Self, BrepError> {
+        // Parts of curves are divided anew, so that no vertex is close to a cut.
+        let divided = |(curve, of): (&EdgeCurve, &Option<usize>)| {
+            let line = &before.lines[(*of)?];
+            let is_whole = [line[0].1, line[line.len() - 1].1] == curve.range;
+            is_whole.then(|| line.iter().map(|on| on.1).collect())
+        };
+        let divided = cut.model.curves.iter().zip(&cut.parts_of).map(divided).collect();
+        Self::with(&mut cut.model, settings, divided, Some(before))
+    }
+
+    /// Triangulates all patches, with curves `divided` at known parameters at first, and triangles
+    /// of the tessellation `before` where these are the same.
+    fn with(
+        model: &mut Model,
+        settings: &Settings,
+        mut divided: Vec<Option<Vec<f64>>>,
+        before: Option<&Self>,
+    ) -> Result<Self, BrepError> {
         let diagonal = diagonal(&model.corners, &model.curves, Vec::new());
         let chord = settings.chord * diagonal;
         let mut tolerances = face::Tolerances { chord, angle: settings.angle, diagonal, refuses_folds: true };
         let mut chords = vec![tolerances.chord; model.curves.len()];
         let (mut failed, mut most_points) = (None, 0);
+        let mut last: Option<Self> = None;
         for retry in 0..MOST_RETRIES {
             tolerances.refuses_folds = retry < UNFOLDING_RETRIES;
-            let mut out = Self::of_curves(model, &chords, settings.angle, diagonal)?;
+            let mut out = Self::of_curves(model, &divided, &chords, settings.angle, diagonal)?;
             if retry == 0 {
                 most_points = MOST_POINTS.max(MOST_GROWTH * out.points.len());
             } else if out.points.len() > most_points {
                 break;
             }
             let mut conflicts = Vec::new();
-            let of_patch = |patch| face::triangulate(model, patch, &out, &tolerances);
+            let known = last.as_ref().or(before).map(Known::new);
+            let of_patch = |patch| match known.as_ref().and_then(|known| known.made(model, patch, &out)) {
+                Some(made) => Ok(made),
+                None => face::triangulate(model, patch, &out, &tolerances),
+            };
             let made: Vec<_> = (0..model.patches.len()).into_par_iter().map(of_patch).collect();
             for (patch, made) in made.into_iter().enumerate() {
                 match made {
                     Ok(made) => made.append_to(&mut out),
                     Err(face::Failure::Coarse(error)) => {
+                        out.gaps.push(0.0);
                         conflicts.push(patch);
                         failed = Some(error);
                     }
@@ -115,13 +154,21 @@ impl Tessellation {
                     fins.filter_map(|fin| if let crate::On::Curve(c) = fin.on { Some(c) } else { None })
                 {
                     chords[curve] = chords[curve].min(tolerances.chord) * 0.2;
+                    divided[curve] = None;
                 }
             }
+            last = Some(out);
         }
         Err(failed.expect("there was a conflict before each retry"))
     }
 
-    fn of_curves(model: &Model, chords: &[f64], angle: f64, diagonal: f64) -> Result<Self, BrepError> {
+    fn of_curves(
+        model: &Model,
+        known: &[Option<Vec<f64>>],
+        chords: &[f64],
+        angle: f64,
+        diagonal: f64,
+    ) -> Result<Self, BrepError> {
         let mut out = Self { points: model.corners.iter().map(|c| c.point).collect(), ..Self::default() };
         let mut beside: Vec<Vec<curves::Beside>> = vec![Vec::new(); model.curves.len()];
         for patch in &model.patches {
@@ -132,6 +179,9 @@ impl Tessellation {
             }
         }
         let divided = |number: usize| {
+            if let Some(parameters) = &known[number] {
+                return Ok(parameters.clone());
+            }
             let (curve, chord) = (&model.curves[number], chords[number]);
             // Finer where loops crossed.
             let angle = angle * (chord / chords[0].max(chord)).sqrt();

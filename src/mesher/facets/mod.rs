@@ -55,5 +55,5 @@ pub use remesh::deviation;
 pub use remesh::{RemeshReport, RemeshSettings, remesh};
 pub use sharp_places::{SharpPlace, SharpPlaces};
 pub use size::{FacetSize, largest_size};
-pub use small::{Grouping, MergedEdge, MergedFace, MergedSmall, NamedFace, Small, merge};
+pub use small::{Grouping, MergedEdge, MergedFace, MergedSmall, MergedTip, NamedFace, Small, merge};
 pub use smoothness::FacetSmoothness;

@@ -8,6 +8,9 @@ use crate::ground::kernel::nearest::in_segment;
 /// their neighbours' width, while a tenth is part of the shape.
 const WIDER: f64 = 20.0;
 
+/// The same for tips, which are cut off where they are as wide as that.
+const WIDER_THAN_TIPS: f64 = 4.0;
+
 /// The least angle between the main face and the faces beyond the narrow one (radians): tets
 /// between them have no larger one. Beside chamfers and steps it is 90° and more, in thin sheets 0.
 const WEDGE: f64 = 0.35;
@@ -45,6 +48,7 @@ pub(super) fn joins(layout: &Layout, may: &[bool]) -> Vec<Joins> {
 /// The best face for one to join; `joins` has those of others.
 fn join(layout: &Layout, face: usize, may: &[bool], joins: &[Joins]) -> Joins {
     let mut named = false;
+    let is_tip = layout.cuts.iter().any(|cut| cut.tip == face);
     // Best first: smooth neighbours, then those with the longest common edges.
     let mut best: Option<(bool, f64, usize)> = None;
     for (neighbour, common) in neighbours(layout, face) {
@@ -53,7 +57,8 @@ fn join(layout: &Layout, face: usize, may: &[bool], joins: &[Joins]) -> Joins {
             _ if may[neighbour] => continue,
             _ => neighbour,
         };
-        let is_wide = layout.widths[main] >= WIDER * layout.widths[face];
+        let wider = if is_tip { WIDER_THAN_TIPS } else { WIDER };
+        let is_wide = layout.widths[main] >= wider * layout.widths[face];
         let is_alike = layout.bodies(main) == layout.bodies(face);
         if !is_wide || !is_alike || !is_open(layout, face, &common) {
             continue;
@@ -85,7 +90,7 @@ fn neighbours(layout: &Layout, face: usize) -> Vec<(usize, Vec<usize>)> {
     for &edge in &layout.around[face] {
         let &[a, b] = &layout.faces_of[edge][..] else { continue };
         let other = if a == face { b } else { a };
-        if other == face {
+        if other == face || layout.cuts.iter().any(|cut| cut.tip == face && cut.of == other) {
             continue;
         }
         match found.iter_mut().find(|(known, _)| *known == other) {

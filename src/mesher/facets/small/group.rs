@@ -2,14 +2,14 @@
 
 use super::chains::{Chain, chains};
 use super::faces::{Joins, joins};
-use super::layout::Layout;
+use super::layout::{Layout, TipCut};
+use super::report::{MergedEdge, MergedFace, MergedSmall, NamedFace};
 use crate::Point;
 use crate::ground::projector::BrepProjector;
 use crate::ground::size::SizeField;
 use crate::mesher::facets::FacetModel;
 use crate::mesher::facets::exact::{Shape, grouped};
 use brep::{Model, Tessellation};
-use serde::Serialize;
 
 /// Faces of a file as patches, and its edges as curves.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -30,110 +30,17 @@ pub struct Small<'a> {
     pub factor: f64,
     /// The largest size of elements.
     pub largest: f64,
+    /// Whether narrow tips of faces are merged.
+    pub tips: bool,
+    /// How the model was tessellated.
+    pub tessellated: brep::Settings,
     /// The wanted size of elements of a model.
     pub size: &'a dyn Fn(&FacetModel) -> Box<dyn SizeField>,
 }
 
-/// A narrow face that was merged into a neighbour.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct MergedFace {
-    /// The number of the face.
-    pub face: usize,
-    /// Its name in the file.
-    pub name: Option<String>,
-    /// The number of the face that it is merged into.
-    pub into: usize,
-    /// Its width (length).
-    pub width: f64,
-}
-
-/// A short edge that was merged into a curve.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct MergedEdge {
-    /// The number of the edge.
-    pub edge: usize,
-    /// All edges of the curve.
-    pub curve: Vec<usize>,
-    /// Its length.
-    pub length: f64,
-}
-
-/// A narrow face that was not merged because of its name.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct NamedFace {
-    /// The number of the face.
-    pub face: usize,
-    /// Its name in the file.
-    pub name: String,
-    /// Its width (length).
-    pub width: f64,
-}
-
-/// Faces and edges that are smaller than the elements.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct MergedSmall {
-    /// Faces that were merged.
-    pub faces: Vec<MergedFace>,
-    /// Edges that were merged.
-    pub edges: Vec<MergedEdge>,
-    /// Narrow faces that were not merged because their neighbours have other names.
-    pub named: Vec<NamedFace>,
-}
-
-/// The most faces or edges that a note lists; the report has all.
-const MOST_LISTED: usize = 5;
-
-impl MergedSmall {
-    /// Sentences for the user.
-    pub fn notes(&self) -> Vec<String> {
-        let list = |items: &mut dyn Iterator<Item = String>, count: usize| {
-            let listed: Vec<String> = items.take(MOST_LISTED).collect();
-            let more = if count > MOST_LISTED {
-                format!(" and {} more", count - MOST_LISTED)
-            } else {
-                String::new()
-            };
-            listed.join(", ") + &more
-        };
-        let named = |face: usize, name: Option<&str>| match name {
-            Some(name) => format!("face {face} `{name}`"),
-            None => format!("face {face}"),
-        };
-        let mut notes = Vec::new();
-        if !self.faces.is_empty() {
-            let mut each = self.faces.iter().map(|merged| {
-                let face = named(merged.face, merged.name.as_deref());
-                format!("{face} ({:.1e} wide) into face {}", merged.width, merged.into)
-            });
-            let listed = list(&mut each, self.faces.len());
-            notes.push(format!(
-                "faces far narrower than the elements are merged: {listed} (--keep-small keeps them)"
-            ));
-        }
-        if !self.edges.is_empty() {
-            let mut each = self.edges.iter().map(|merged| {
-                let others = merged.curve.iter().filter(|other| **other != merged.edge);
-                let others: Vec<String> = others.map(usize::to_string).collect();
-                format!("edge {} ({:.1e}) with {}", merged.edge, merged.length, others.join(" and "))
-            });
-            let listed = list(&mut each, self.edges.len());
-            notes.push(format!(
-                "edges far shorter than the elements are joined: {listed} (--keep-small keeps them)"
-            ));
-        }
-        if !self.named.is_empty() {
-            let mut each = self
-                .named
-                .iter()
-                .map(|kept| format!("{} ({:.1e} wide)", named(kept.face, Some(&kept.name)), kept.width));
-            let listed = list(&mut each, self.named.len());
-            notes.push(format!(
-                "narrow faces are kept, with small elements, because their neighbours have other names: {listed}"
-            ));
-        }
-        notes
-    }
-}
+/// The same factor for tips that were cut off: they are twice as wide as small faces, and sizes may
+/// be smaller than they were, because edges are shorter.
+const TIP_FACTOR: f64 = 0.25;
 
 /// The longest edge at an end of a short one is at least this many times as long.
 const LONGER: f64 = 20.0;
@@ -187,18 +94,28 @@ fn widest_near(layout: &Layout, face: usize, is_narrow: &[bool]) -> f64 {
     near.map(|other| layout.widths[other]).fold(0.0, f64::max)
 }
 
-/// Merges the small faces and edges of a model; `None` if there are none.
+/// A model with patches and curves of several faces and edges.
+pub type Merged = (FacetModel, BrepProjector, Grouping);
+
+/// Merges the small faces and edges of a model, of which tips may have been cut off.
 ///
 /// What is merged must be small beside the sizes that the model has without it. Merging less never
 /// makes sizes larger, so faces and edges are taken out until all that are left are small.
-pub fn merge(
+///
+/// `cuts` has them: each with its own face, the face that it was cut off, and the edge between.
+pub(super) fn merge_all(
     model: &Model,
     tessellation: &Tessellation,
     small: &Small,
-) -> (Option<(FacetModel, BrepProjector, Grouping)>, MergedSmall) {
+    cuts: Vec<TipCut>,
+) -> (Option<Merged>, MergedSmall) {
     let shape = Shape::new(model, tessellation);
-    let layout = Layout::new(model, tessellation, shape.curves.clone(), &shape.corners);
+    let mut layout = Layout::new(model, tessellation, shape.curves.clone(), &shape.corners);
+    layout.cuts = cuts;
     let mut allowed = Allowed::of(&layout, small.largest / small.factor);
+    for cut in &layout.cuts {
+        (allowed.faces[cut.tip], allowed.edges[cut.edge]) = (true, true);
+    }
     loop {
         if !allowed.faces.iter().chain(&allowed.edges).any(|allowed| *allowed) {
             return (None, MergedSmall::default());
@@ -214,21 +131,25 @@ pub fn merge(
         if report.faces.is_empty() && report.edges.is_empty() {
             return (None, report);
         }
-        let is_small = |points: Vec<Point>, extent: f64| {
-            points.into_iter().all(|p| small.factor * extent <= size.size_at(&p))
+        let is_small = |points: Vec<Point>, extent: f64, is_tip: bool| {
+            let factor = if is_tip { TIP_FACTOR * small.factor } else { small.factor };
+            points.into_iter().all(|p| factor * extent <= size.size_at(&p))
         };
+        let is_tip = |face: usize| layout.cuts.iter().any(|cut| cut.tip == face);
+        let is_cut = |edge: usize| layout.cuts.iter().any(|cut| cut.edge == edge);
         let point = |v: u32| tessellation.points[v as usize];
         let mut are_all_small = true;
         for merged in &report.faces {
             let face = merged.face - 1;
             let of_face = tessellation.triangles.iter().filter(|t| t.patch as usize == face);
-            if !is_small(of_face.flat_map(|t| t.vertices.map(point)).collect(), merged.width) {
+            if !is_small(of_face.flat_map(|t| t.vertices.map(point)).collect(), merged.width, is_tip(face)) {
                 (allowed.faces[face], are_all_small) = (false, false);
             }
         }
         for merged in &report.edges {
             let line = &tessellation.lines[merged.edge - 1];
-            if !is_small(line.iter().map(|on| point(on.0)).collect(), merged.length) {
+            if !is_small(line.iter().map(|on| point(on.0)).collect(), merged.length, is_cut(merged.edge - 1))
+            {
                 (allowed.edges[merged.edge - 1], are_all_small) = (false, false);
             }
         }

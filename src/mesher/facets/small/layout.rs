@@ -7,6 +7,17 @@ use brep::{Model, On, Tessellation};
 use rayon::prelude::*;
 use std::collections::HashMap;
 
+/// A tip that was cut off a face.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(in crate::mesher::facets) struct TipCut {
+    /// The tip as a face of its own.
+    pub tip: usize,
+    /// The face that it was cut off, which it does not join again.
+    pub of: usize,
+    /// The edge between them.
+    pub edge: usize,
+}
+
 /// Adjacencies and measures of a model.
 pub(in crate::mesher::facets) struct Layout<'a> {
     pub model: &'a Model,
@@ -23,6 +34,8 @@ pub(in crate::mesher::facets) struct Layout<'a> {
     pub lengths: Vec<f64>,
     /// The width of each face at its widest place; infinite without edges.
     pub widths: Vec<f64>,
+    /// Tips that were cut off.
+    pub cuts: Vec<TipCut>,
     /// The triangles at each segment of a curve.
     beside: HashMap<[u32; 2], Vec<usize>>,
 }
@@ -74,9 +87,9 @@ impl<'a> Layout<'a> {
                 }
             }
         }
-        let widths = Vec::new();
+        let (widths, cuts) = (Vec::new(), Vec::new());
         let mut out =
-            Self { model, tessellation, curves, is_corner, faces_of, around, lengths, widths, beside };
+            Self { model, tessellation, curves, is_corner, faces_of, around, lengths, widths, cuts, beside };
         out.widths = out.measured_widths();
         out
     }

@@ -13,6 +13,8 @@
 //! * it makes no sharp wedge with the faces on the other side of the narrow one, as both faces of a
 //!   thin sheet would.
 //!
+//! A narrow **tip** of a face is cut off as a face of its own before (`tips`).
+//!
 //! Curves inside a composite patch are dropped. Then corners with two curves left are dropped if
 //! one of the curves is short, or if they do not bend there.
 //!
@@ -23,8 +25,13 @@ mod chains;
 mod faces;
 mod group;
 mod layout;
+mod merge;
+mod report;
 #[cfg(test)]
 mod tests;
+mod tips;
 
-pub use group::{Grouping, MergedEdge, MergedFace, MergedSmall, NamedFace, Small, merge};
+pub use group::{Grouping, Small};
 pub(super) use layout::Layout;
+pub use merge::merge;
+pub use report::{MergedEdge, MergedFace, MergedSmall, MergedTip, NamedFace};

@@ -23,8 +23,14 @@ fn read(name: &str) -> Model {
 fn merged_of(mut model: Model, size: f64) -> (Option<FacetModel>, MergedSmall) {
     let tessellation = Tessellation::of(&mut model, &Settings::default()).unwrap();
     let size = |_: &FacetModel| -> Box<dyn SizeField> { Box::new(Constant(size)) };
-    let (merged, report) =
-        merge(&model, &tessellation, &Small { factor: 20.0, largest: f64::INFINITY, size: &size });
+    let small = Small {
+        factor: 20.0,
+        largest: f64::INFINITY,
+        tips: true,
+        tessellated: Settings::default(),
+        size: &size,
+    };
+    let (merged, report) = merge(&model, &tessellation, &small);
     (merged.map(|(facets, ..)| facets), report)
 }
 
@@ -134,4 +140,51 @@ fn names_of_the_file_are_never_lost() {
         let report = named(names);
         assert_eq!((report.faces[0].into, report.named.len()), (main + 1, 0), "{report:?}");
     }
+}
+
+#[test]
+fn tips_of_faces_are_cut_off_where_they_are_as_wide_as_small_faces() {
+    // A cylinder of radius 100 touches an edge; a plane at 1° meets an edge.
+    // At one end the corner moves along the edge; two tips at one corner leave two corners, and one
+    // edge between them.
+    for (name, sizes, ends, expected) in
+        [("runout", [0.2, 0.1], 2, [8, 18, 12]), ("tapered_chamfer", [1.0, 0.2], 1, [7, 15, 10])]
+    {
+        let more = ends - 1;
+        let [patches, curves, corners] = counts(&unmerged(name));
+        assert_eq!([patches, curves + more, corners + more], expected);
+        for size in sizes {
+            let (facets, report) = merged(name, size);
+            let facets = facets.unwrap();
+            assert_eq!(counts(&facets), expected, "{name}");
+            assert_eq!(report.tips.len(), ends, "{report:?}");
+            assert!(report.faces.is_empty() && report.edges.is_empty(), "{report:?}");
+            for tip in &report.tips {
+                assert!((tip.width - size / 10.0).abs() < 1e-3 * size, "{tip:?}");
+                let [x, y, z] = tip.point;
+                assert!((x - 2.0).abs() < 1e-6 && y.abs() < 1e-6 && (z - 2.0).abs() < 1e-6, "{tip:?}");
+                assert!(tip.face != tip.into && tip.into <= facets.patches.len());
+            }
+            let patches: std::collections::BTreeSet<u32> =
+                facets.triangles.iter().map(|t| t.patch.0).collect();
+            assert_eq!(patches.len(), facets.patches.len());
+        }
+    }
+}
+
+/// Facets of a part with all its faces.
+fn unmerged(name: &str) -> FacetModel {
+    let mut model = read(name);
+    let tessellation = Tessellation::of(&mut model, &Settings::default()).unwrap();
+    crate::mesher::facets::of_brep(&model, &tessellation).0
+}
+
+#[test]
+fn tips_wider_than_small_faces_within_an_element_are_kept() {
+    // The cylinder is 0.02 away from the edge after 2.
+    let (facets, report) = merged("runout", 9.0);
+    assert!(report.tips.is_empty(), "{report:?}");
+    assert!(facets.is_some(), "the faces are narrow as a whole");
+    let (_, report) = merged("pin", 0.1);
+    assert!(report.tips.is_empty(), "{report:?}");
 }

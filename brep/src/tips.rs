@@ -1,0 +1,300 @@
+//! Narrow tips of patches, cut off as patches of their own.
+
+use crate::bspline::{Basis, SplineCurve};
+use crate::model::{Corner, EdgeCurve, Fin, Model, On, Patch};
+use crate::{Curve, Point, Surface};
+use nalgebra::SVector;
+
+/// A corner of a patch between two of its curves, to be cut off from one curve to the other.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tip {
+    /// The patch.
+    pub patch: usize,
+    /// The loop of the patch.
+    pub of_loop: usize,
+    /// The side of the loop that ends in the corner; the next one starts there.
+    pub fin: usize,
+    /// The parameters on the curves of both sides between which to cut; `None` for the other end of
+    /// the curve.
+    pub at: [Option<f64>; 2],
+}
+
+/// A model whose tips are patches of their own.
+#[derive(Clone, Debug)]
+pub struct Cut {
+    /// The model. Patches and curves before keep their numbers; of a divided curve that is the
+    /// first piece.
+    pub model: Model,
+    /// For each tip, its patch.
+    pub patches: Vec<usize>,
+    /// For each tip, the curve along which it was cut.
+    pub curves: Vec<usize>,
+    /// For each curve, that of the first model of which it is a part; `None` for cuts.
+    pub parts_of: Vec<Option<usize>>,
+}
+
+impl Model {
+    /// Cuts tips off their patches, along lines in the parameters. `None` if a curve has two cuts
+    /// in the wrong order.
+    ///
+    /// # Panics
+    /// If there are no such loops and sides, or the sides of a tip are not curves.
+    pub fn cut_tips(&self, tips: &[Tip]) -> Option<Cut> {
+        let mut model = self.clone();
+        let mut divisions: Vec<Vec<(f64, usize)>> = vec![Vec::new(); self.curves.len()];
+        let mut ends = Vec::with_capacity(tips.len());
+        for tip in tips {
+            let sides = self.sides_of(tip);
+            let mut corners = [0; 2];
+            for (k, side) in sides.into_iter().enumerate() {
+                let (curve, far) = self.far_end(side, k == 0);
+                corners[k] = match tip.at[k] {
+                    None => far,
+                    Some(t) => {
+                        let point = Point::from(self.curves[curve].curve.point(t));
+                        model.corners.push(Corner { point, tolerance: 0.0 });
+                        divisions[curve].push((t, model.corners.len() - 1));
+                        model.corners.len() - 1
+                    }
+                };
+            }
+            ends.push(corners);
+        }
+        let mut parts_of: Vec<Option<usize>> = (0..self.curves.len()).map(Some).collect();
+        let pieces: Vec<Vec<usize>> = divisions
+            .iter_mut()
+            .enumerate()
+            .map(|(curve, at)| {
+                at.sort_by(|a, b| a.0.total_cmp(&b.0));
+                divide(&mut model.curves, &mut parts_of, curve, at)
+            })
+            .collect();
+        let mut fins: Vec<Vec<Vec<Vec<Fin>>>> = self
+            .patches
+            .iter()
+            .map(|patch| {
+                let of_loop =
+                    |fins: &Vec<Fin>| fins.iter().map(|fin| divided(fin, &pieces, self, &model)).collect();
+                patch.loops.iter().map(of_loop).collect()
+            })
+            .collect();
+        let (mut patches, mut curves) = (Vec::new(), Vec::new());
+        for (tip, [from, to]) in tips.iter().zip(ends) {
+            let of_loop = &mut fins[tip.patch][tip.of_loop];
+            let next = (tip.fin + 1) % of_loop.len();
+            let arriving = of_loop[tip.fin].pop()?;
+            if of_loop[next].is_empty() {
+                return None;
+            }
+            let leaving = of_loop[next].remove(0);
+            if [(start(&model, &arriving), from), (end(&model, &leaving), to)].iter().any(|(a, b)| a != b) {
+                return None;
+            }
+            let Patch { surface, bodies, .. } = &self.patches[tip.patch];
+            let flat = across(&arriving, &leaving);
+            let ends = [from, to].map(|corner| model.corners[corner].point);
+            model.curves.push(EdgeCurve {
+                curve: on_surface(surface, flat.as_ref(), ends),
+                range: [0.0, 1.0],
+                ends: [from, to],
+                tolerance: 0.0,
+            });
+            parts_of.push(None);
+            let curve = model.curves.len() - 1;
+            let cut = |is_forward: bool| Fin {
+                on: On::Curve(curve),
+                curve: flat.clone(),
+                range: [0.0, 1.0],
+                is_forward,
+            };
+            of_loop[tip.fin].push(cut(true));
+            let loops = vec![vec![arriving, leaving, cut(false)]];
+            model.patches.push(Patch { surface: surface.clone(), loops, bodies: *bodies });
+            curves.push(curve);
+            patches.push(model.patches.len() - 1);
+        }
+        for (patch, loops) in model.patches.iter_mut().zip(fins) {
+            patch.loops = loops.into_iter().map(|fins| fins.concat()).collect();
+        }
+        if !model.patch_names.is_empty() {
+            model.patch_names.resize(model.patches.len(), None);
+        }
+        Some(Cut { model, patches, curves, parts_of })
+    }
+
+    /// The sides of a tip.
+    fn sides_of(&self, tip: &Tip) -> [&Fin; 2] {
+        let fins = &self.patches[tip.patch].loops[tip.of_loop];
+        [&fins[tip.fin], &fins[(tip.fin + 1) % fins.len()]]
+    }
+
+    /// The curve of a side, and the corner at its start or end.
+    fn far_end(&self, fin: &Fin, at_start: bool) -> (usize, usize) {
+        let On::Curve(curve) = fin.on else { panic!("the side of a tip is a curve") };
+        (curve, self.curves[curve].ends[usize::from(fin.is_forward != at_start)])
+    }
+}
+
+/// Divides a curve at parameters in ascending order; returns its pieces in this order.
+fn divide(
+    curves: &mut Vec<EdgeCurve>,
+    parts_of: &mut Vec<Option<usize>>,
+    curve: usize,
+    at: &[(f64, usize)],
+) -> Vec<usize> {
+    let whole = curves[curve].clone();
+    let mut pieces = vec![curve];
+    for &(t, corner) in at {
+        let last = &mut curves[pieces[pieces.len() - 1]];
+        (last.range[1], last.ends[1]) = (t, corner);
+        curves.push(EdgeCurve { range: [t, whole.range[1]], ends: [corner, whole.ends[1]], ..whole.clone() });
+        parts_of.push(Some(curve));
+        pieces.push(curves.len() - 1);
+    }
+    pieces
+}
+
+/// The sides on the pieces of a curve, in the direction of the loop.
+fn divided(fin: &Fin, pieces: &[Vec<usize>], before: &Model, after: &Model) -> Vec<Fin> {
+    let On::Curve(curve) = fin.on else { return vec![fin.clone()] };
+    let range = before.curves[curve].range;
+    let side = |&piece: &usize| Fin {
+        on: On::Curve(piece),
+        range: after.curves[piece].range.map(|t| fin.parameter(t, range)),
+        ..fin.clone()
+    };
+    let mut sides: Vec<Fin> = pieces[curve].iter().map(side).collect();
+    if !fin.is_forward {
+        sides.reverse();
+    }
+    sides
+}
+
+fn start(model: &Model, fin: &Fin) -> usize {
+    model.far_end(fin, true).1
+}
+
+fn end(model: &Model, fin: &Fin) -> usize {
+    model.far_end(fin, false).1
+}
+
+fn line<const D: usize>(from: SVector<f64, D>, to: SVector<f64, D>) -> Curve<D> {
+    Curve::Line { start: from, direction: to - from }
+}
+
+/// A curve between two points of a surface that are close to each other: the cubic polynomial with
+/// the ends and tangents of the image of a line in its parameters.
+fn on_surface(surface: &Surface, flat: Option<&Curve<2>>, [from, to]: [Point; 2]) -> Curve<3> {
+    let straight = line(from.coords, to.coords);
+    let Some(flat) = flat.filter(|_| !surface.is_plane()) else { return straight };
+    let tangent = |t: f64| {
+        let [place, along, ..] = flat.jet(t);
+        let jet = surface.jet(place.x, place.y, 1);
+        jet.d[1][0] * along.x + jet.d[0][1] * along.y
+    };
+    let Ok(basis) = Basis::bezier(3) else { return straight };
+    let poles =
+        vec![from.coords, from.coords + tangent(0.0) / 3.0, to.coords - tangent(1.0) / 3.0, to.coords];
+    Curve::Spline(SplineCurve { basis, poles, weights: Vec::new() })
+}
+
+/// The line in the parameters from the start of one side to the end of the next one.
+fn across(arriving: &Fin, leaving: &Fin) -> Option<Curve<2>> {
+    let place = |fin: &Fin, is_end: bool| {
+        let curve = fin.curve.as_ref()?;
+        Some(curve.point(fin.range[usize::from(is_end == fin.is_forward)]))
+    };
+    Some(line(place(arriving, false)?, place(leaving, true)?))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tessellate::{Settings, Tessellation, area, volume};
+    use crate::{Unit, nearest_on_curve};
+
+    fn read(name: &str) -> Model {
+        let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../geometries/step");
+        let text = std::fs::read(folder.join(name).with_extension("step")).unwrap();
+        Model::read_step(&text, Unit::OfFile).unwrap()
+    }
+
+    /// The tip of a patch at a point, cut at the points of its edges with this first coordinate.
+    fn tip(model: &Model, patch: usize, corner: Point, x: f64) -> Tip {
+        let fins = &model.patches[patch].loops[0];
+        let ends_there = |fin: &Fin| (model.corners[end(model, fin)].point - corner).norm() < 1e-6;
+        let fin = fins.iter().position(ends_there).expect("a side ends in the corner");
+        let at = [fin, (fin + 1) % fins.len()].map(|k| {
+            let curve = model.far_end(&fins[k], true).0;
+            let foot = nearest_on_curve(&model.curves[curve].curve, &Point::new(x, 0.0, 2.0));
+            Some(foot.parameter)
+        });
+        Tip { patch, of_loop: 0, fin, at }
+    }
+
+    /// The numbers of the patches with a tip at (2, 0, 2).
+    fn patches_at_tip(model: &Model, rest: &[usize]) -> Vec<usize> {
+        let corner = Point::new(2.0, 0.0, 2.0);
+        let is_at = |patch: &usize| {
+            let ends = model.patches[*patch].loops[0].iter().map(|fin| model.corners[end(model, fin)].point);
+            !rest.contains(patch) && ends.into_iter().any(|p| (p - corner).norm() < 1e-6)
+        };
+        (0..model.patches.len()).filter(is_at).collect()
+    }
+
+    #[test]
+    fn a_cut_leaves_area_volume_and_numbers() {
+        for (name, tips_of) in [("tapered_chamfer", vec![6]), ("runout", vec![2, 7])] {
+            let mut model = read(name);
+            let all = patches_at_tip(&model, &[]);
+            assert!(tips_of.iter().all(|patch| all.contains(patch)), "{name}: {all:?}");
+            let before = Tessellation::of(&mut model, &Settings::default()).unwrap();
+            let x = |patch: usize| if patch == 2 { 0.9 } else { 5.0 };
+            let tips: Vec<Tip> = tips_of
+                .iter()
+                .map(|&patch| tip(&model, patch, Point::new(2.0, 0.0, 2.0), x(patch)))
+                .collect();
+            let mut cut = model.cut_tips(&tips).unwrap();
+            let (patches, curves) = (model.patches.len(), model.curves.len());
+            assert_eq!(cut.patches, (patches..patches + tips.len()).collect::<Vec<_>>());
+            // Each tip divides two edges and adds one.
+            assert_eq!(cut.model.curves.len(), curves + 3 * tips.len());
+            assert_eq!(cut.parts_of.iter().filter(|of| of.is_none()).count(), tips.len());
+            assert!(cut.curves.iter().all(|&curve| cut.parts_of[curve].is_none()));
+            // The tessellation checks that the body is closed.
+            let after = Tessellation::of_cut(&mut cut, &before, &Settings::default()).unwrap();
+            // Patches that no cut meets keep their triangles.
+            let corners = |t: &Tessellation, patch: u32| -> Vec<[Point; 3]> {
+                let of_patch = t.triangles.iter().filter(|triangle| triangle.patch == patch);
+                of_patch.map(|triangle| triangle.vertices.map(|v| t.points[v as usize])).collect()
+            };
+            let floor = (0..patches as u32)
+                .find(|&patch| corners(&before, patch).iter().flatten().all(|p| p.z < 1e-9));
+            assert_eq!(corners(&before, floor.unwrap()), corners(&after, floor.unwrap()));
+            let of_body = |model: &Model, t: &Tessellation| volume(model, t, 0);
+            assert!((of_body(&model, &before) - of_body(&cut.model, &after)).abs() < 5e-3, "{name}");
+            for ((tip, &new), &line) in tips.iter().zip(&cut.patches).zip(&cut.curves) {
+                let [whole, rest, tip_alone] = [(&before, tip.patch), (&after, tip.patch), (&after, new)]
+                    .map(|(t, patch)| area(t, patch));
+                // Chords differ.
+                assert!((whole - rest - tip_alone).abs() < 0.1 * whole, "{name}: {whole} {rest} {tip_alone}");
+                assert!(tip_alone > 0.0 && tip_alone < 0.5 * whole, "{name}: {whole} {tip_alone}");
+                let surface = &model.patches[tip.patch].surface;
+                for t in [0.0, 0.3, 0.5, 1.0] {
+                    let point = Point::from(cut.model.curves[line].curve.point(t));
+                    let away = (crate::nearest_on_surface(surface, &point).point - point).norm();
+                    assert!(away < 1e-9, "{name}: {away}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn cuts_in_the_wrong_order_are_refused() {
+        let model = read("tapered_chamfer");
+        let one = tip(&model, 6, Point::new(2.0, 0.0, 2.0), 5.0);
+        let other = tip(&model, 6, Point::new(2.0, 0.0, 2.0), 6.0);
+        assert!(model.cut_tips(&[one]).is_some());
+        assert!(model.cut_tips(&[one, other]).is_none(), "only one of them is at the tip");
+    }
+}

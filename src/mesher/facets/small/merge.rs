@@ -1,0 +1,126 @@
+//! Merging with and without tips of faces.
+
+use super::group::{Merged, Small, merge_all};
+use super::layout::{Layout, TipCut};
+use super::report::{MergedSmall, MergedTip};
+use super::tips::{NarrowTip, candidates, narrow, without};
+use crate::ground::kernel::tree::bounds;
+use crate::mesher::facets::FacetModel;
+use crate::mesher::facets::exact::{Shape, of_brep};
+use brep::{BrepError, Cut, Model, Tessellation, Tip};
+
+/// The most times that tips are cut off, each time fewer or narrower.
+const ROUNDS: usize = 6;
+
+/// Tips are not cut where they are thinner than this (fraction of the size of the model): vertices
+/// of CAD files are no more accurate.
+const THINNEST: f64 = 1e-6;
+
+/// Merges the small faces and edges of a model, and narrow tips of faces; `None` if there are none.
+///
+/// Tips are cut off as faces of their own. Those that are not merged then are cut off where they
+/// are narrower, or left.
+pub fn merge(model: &Model, tessellation: &Tessellation, small: &Small) -> (Option<Merged>, MergedSmall) {
+    let mut candidates = if small.tips { candidates(model, tessellation) } else { Vec::new() };
+    if !candidates.is_empty() {
+        let size = (small.size)(&of_brep(model, tessellation).0);
+        let shape = Shape::new(model, tessellation);
+        let widths = Layout::new(model, tessellation, shape.curves.clone(), &shape.corners).widths;
+        let least = THINNEST * bounds(&tessellation.points).diagonal();
+        for _ in 0..ROUNDS {
+            let mut tips = narrow(model, tessellation, &candidates, &*size, small.factor);
+            // A face that is nowhere wider is small as a whole, and thinner tips are rounding.
+            tips.retain(|narrow| least < narrow.width && narrow.width < widths[narrow.tip.patch]);
+            let Some(cut) = cut_off(model, &tips) else { break };
+            match merge_tips(model, tessellation, small, cut, &tips) {
+                Ok(merged) => return merged,
+                Err(failed) => candidates = without(&candidates, &failed),
+            }
+        }
+    }
+    merge_all(model, tessellation, small, Vec::new())
+}
+
+/// The model with tips cut off; `None` if there are none.
+fn cut_off(model: &Model, tips: &[NarrowTip]) -> Option<Cut> {
+    let tips: Vec<Tip> = tips.iter().map(|narrow| narrow.tip).collect();
+    if tips.is_empty() { None } else { model.cut_tips(&tips) }
+}
+
+/// Merges what is small, and tips that were cut off.
+///
+/// # Errors
+/// The candidates of tips that are not merged.
+fn merge_tips(
+    model: &Model,
+    tessellation: &Tessellation,
+    small: &Small,
+    mut cut: Cut,
+    tips: &[NarrowTip],
+) -> Result<(Option<Merged>, MergedSmall), Vec<usize>> {
+    let failed = |has_failed: &dyn Fn(usize, &NarrowTip) -> bool| -> Vec<usize> {
+        let failed = tips.iter().enumerate().filter(|(k, tip)| has_failed(*k, tip));
+        failed.map(|(_, tip)| tip.candidate).collect()
+    };
+    let tessellation = Tessellation::of_cut(&mut cut, tessellation, &small.tessellated).map_err(|error| {
+        let at = failed(&|k, tip| is_at(&error, tip, cut.patches[k], cut.curves[k]));
+        if at.is_empty() { failed(&|_, _| true) } else { at }
+    })?;
+    let cut_off = |(k, narrow): (usize, &NarrowTip)| TipCut {
+        tip: cut.patches[k],
+        of: narrow.tip.patch,
+        edge: cut.curves[k],
+    };
+    let cuts: Vec<TipCut> = tips.iter().enumerate().map(cut_off).collect();
+    let (merged, report) = merge_all(&cut.model, &tessellation, small, cuts);
+    let is_merged = |k: usize| {
+        report.faces.iter().any(|merged| merged.face == cut.patches[k] + 1)
+            && report.edges.iter().any(|merged| merged.edge == cut.curves[k] + 1)
+    };
+    let unmerged = failed(&|k, _| !is_merged(k));
+    if !unmerged.is_empty() {
+        return Err(unmerged);
+    }
+    if merged.as_ref().is_some_and(|(facets, ..)| has_crossings(facets)) {
+        return Err(failed(&|_, _| true));
+    }
+    Ok((merged, of_file(report, model, &cut, tips)))
+}
+
+/// Whether an error is at a tip with this patch, cut along this curve; it is if it has no place.
+fn is_at(error: &BrepError, narrow: &NarrowTip, patch: usize, curve: usize) -> bool {
+    match *error {
+        BrepError::Face { face, .. } => [narrow.tip.patch, patch].contains(&(face - 1)),
+        BrepError::Edge { edge, .. } => curve == edge - 1,
+        _ => true,
+    }
+}
+
+fn has_crossings(facets: &FacetModel) -> bool {
+    facets.intersections().iter().any(|crossing| facets.is_deep(crossing))
+}
+
+/// The report in the numbers of the file: tips are no faces there, and parts of an edge have its
+/// number.
+fn of_file(report: MergedSmall, model: &Model, cut: &Cut, tips: &[NarrowTip]) -> MergedSmall {
+    let is_of_file = |face: usize| face <= model.patches.len();
+    let (faces, cut_off): (Vec<_>, Vec<_>) =
+        report.faces.into_iter().partition(|merged| is_of_file(merged.face));
+    let tip = |(narrow, patch): (&NarrowTip, &usize)| {
+        let merged = cut_off.iter().find(|merged| merged.face == patch + 1)?;
+        let point = model.corners[narrow.corner].point.into();
+        Some(MergedTip { face: narrow.tip.patch + 1, into: merged.into, point, width: narrow.width })
+    };
+    let edge = |edge: usize| cut.parts_of[edge - 1].map(|edge| edge + 1);
+    let mut edges = report.edges;
+    edges.retain_mut(|merged| {
+        let mut curve: Vec<usize> = merged.curve.iter().filter_map(|part| edge(*part)).collect();
+        curve.dedup();
+        merged.curve = curve;
+        let of_file = edge(merged.edge);
+        merged.edge = of_file.unwrap_or(merged.edge);
+        of_file.is_some() && merged.curve.len() > 1
+    });
+    let tips = tips.iter().zip(&cut.patches).filter_map(tip).collect();
+    MergedSmall { faces, tips, edges, named: report.named }
+}

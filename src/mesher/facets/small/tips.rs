@@ -1,0 +1,264 @@
+//! Narrow tips of faces: where two edges meet at a small angle, the face between them is narrower
+//! than the elements for a while.
+//!
+//! Edges that touch tangentially, as at the end of a fillet or a run-out, leave such tips.
+//! Triangles in them are as sharp as the tips, whatever their size. So a tip is cut off where it
+//! becomes wider than a small face may be, and merged as a narrow face of its own.
+
+use crate::Point;
+use crate::ground::kernel::nearest::in_segment;
+use crate::ground::size::SizeField;
+use brep::{EdgeCurve, Fin, Model, On, Tessellation, Tip, project_to_curve};
+
+/// Tips with a larger angle between their triangles are not cut (radians).
+const SHARP: f64 = 0.35;
+
+/// The width at which tips are cut, in widths of small faces: the mesh begins with an edge as short
+/// as that, and half the width would halve the angles. Tips that cannot be merged then are cut
+/// where they are half as wide.
+const WIDTHS: [f64; 2] = [2.0, 1.0];
+
+/// A tip is cut if it is at least this long (units of the element size), so that it is sharper than
+/// 14°.
+const LONG: f64 = 0.4;
+
+/// Steps along an edge for one element.
+const STEPS: f64 = 8.0;
+
+/// The most steps along an edge.
+const MOST_STEPS: usize = 10_000;
+
+/// Bisections of the last step.
+const BISECTIONS: usize = 20;
+
+/// A corner of a face that is so sharp that there may be a narrow tip.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Candidate {
+    tip: Tip,
+    corner: usize,
+    /// Which of [`WIDTHS`] to cut at.
+    attempt: usize,
+}
+
+/// A tip that is cut.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct NarrowTip {
+    pub tip: Tip,
+    /// Its corner.
+    pub corner: usize,
+    /// Its width at the cut (length).
+    pub width: f64,
+    /// The index of its candidate.
+    pub candidate: usize,
+}
+
+/// The corners of faces that are so sharp that there may be a narrow tip.
+pub(super) fn candidates(model: &Model, tessellation: &Tessellation) -> Vec<Candidate> {
+    let mut faces_of: Vec<Vec<usize>> = vec![Vec::new(); model.curves.len()];
+    for (face, patch) in model.patches.iter().enumerate() {
+        for fin in patch.loops.iter().flatten() {
+            if let On::Curve(curve) = fin.on {
+                faces_of[curve].push(face);
+            }
+        }
+    }
+    let angles = angles(model, tessellation);
+    let mut found = Vec::new();
+    for (patch, face) in model.patches.iter().enumerate() {
+        let beyond = |fin: &Fin| match fin.on {
+            On::Curve(curve) => match faces_of[curve][..] {
+                [a, b] if a != b => Some((curve, if a == patch { b } else { a })),
+                _ => None,
+            },
+            On::Corner(_) => None,
+        };
+        for (of_loop, fins) in face.loops.iter().enumerate() {
+            for (fin, arriving) in fins.iter().enumerate() {
+                let leaving = &fins[(fin + 1) % fins.len()];
+                let (Some((a, one)), Some((b, other))) = (beyond(arriving), beyond(leaving)) else {
+                    continue;
+                };
+                let corner = model.curves[a].ends[usize::from(arriving.is_forward)];
+                let is_sharp = angles.get(&(corner, patch)).is_some_and(|angle| *angle < SHARP);
+                if a != b && one != other && is_sharp {
+                    let tip = Tip { patch, of_loop, fin, at: [None; 2] };
+                    found.push(Candidate { tip, corner, attempt: 0 });
+                }
+            }
+        }
+    }
+    found
+}
+
+/// The angle of each face at each corner, as the sum of those of its triangles (radians).
+fn angles(model: &Model, tessellation: &Tessellation) -> std::collections::BTreeMap<(usize, usize), f64> {
+    let mut sums = std::collections::BTreeMap::new();
+    for t in &tessellation.triangles {
+        let p = t.vertices.map(|v| tessellation.points[v as usize]);
+        for k in (0..3).filter(|&k| (t.vertices[k] as usize) < model.corners.len()) {
+            let [u, v] = [1, 2].map(|m| p[(k + m) % 3] - p[k]);
+            *sums.entry((t.vertices[k] as usize, t.patch as usize)).or_default() += u.angle(&v);
+        }
+    }
+    sums
+}
+
+/// Those of the candidates that are narrow for a while, where small faces are as wide as elements
+/// divided by `factor`.
+pub(super) fn narrow(
+    model: &Model,
+    tessellation: &Tessellation,
+    candidates: &[Candidate],
+    size: &dyn SizeField,
+    factor: f64,
+) -> Vec<NarrowTip> {
+    let tip = |(candidate, &Candidate { tip, corner, attempt }): (usize, &Candidate)| {
+        let fins = &model.patches[tip.patch].loops[tip.of_loop];
+        let sides = [&fins[tip.fin], &fins[(tip.fin + 1) % fins.len()]];
+        let [one, other] = [0, 1].map(|k| Side::new(model, tessellation, sides[k], k == 1));
+        let (at, width) = cut(&one, &other, size, factor / WIDTHS[attempt])?;
+        Some(NarrowTip { tip: Tip { at, ..tip }, corner, width, candidate })
+    };
+    let mut taken: Vec<(usize, [f64; 2])> = Vec::new();
+    let mut found = Vec::new();
+    for narrow in candidates.iter().enumerate().filter_map(tip) {
+        let parts = parts(model, &narrow);
+        let overlaps = |(c, [low, high]): &(usize, [f64; 2])| {
+            taken.iter().any(|(d, other)| c == d && *low < other[1] && other[0] < *high)
+        };
+        if !parts.iter().any(overlaps) {
+            taken.extend(parts);
+            found.push(narrow);
+        }
+    }
+    found
+}
+
+/// The candidates after those with these indices, ascending, failed.
+pub(super) fn without(candidates: &[Candidate], failed: &[usize]) -> Vec<Candidate> {
+    let next = |(k, candidate): (usize, &Candidate)| {
+        let attempt = candidate.attempt + usize::from(failed.binary_search(&k).is_ok());
+        (attempt < WIDTHS.len()).then_some(Candidate { attempt, ..*candidate })
+    };
+    candidates.iter().enumerate().filter_map(next).collect()
+}
+
+/// The parts of its edges that belong to a tip.
+fn parts(model: &Model, narrow: &NarrowTip) -> [(usize, [f64; 2]); 2] {
+    let fins = &model.patches[narrow.tip.patch].loops[narrow.tip.of_loop];
+    [0, 1].map(|k| {
+        let fin = &fins[(narrow.tip.fin + k) % fins.len()];
+        let On::Curve(curve) = fin.on else { unreachable!("a candidate has edges on both sides") };
+        let [low, high] = model.curves[curve].range;
+        // The first edge arrives at the tip, the second one leaves it.
+        let is_at_end = fin.is_forward == (k == 0);
+        let part = match narrow.tip.at[k] {
+            None => [low, high],
+            Some(t) if is_at_end => [t, high],
+            Some(t) => [low, t],
+        };
+        (curve, part)
+    })
+}
+
+/// An edge at a tip, seen from the tip.
+struct Side<'a> {
+    edge: &'a EdgeCurve,
+    /// Its points with their parameters, from the tip on.
+    line: Vec<(Point, f64)>,
+}
+
+/// A place where the width of a tip is measured.
+struct Across {
+    /// The parameters on both edges.
+    at: [f64; 2],
+    width: f64,
+    /// Whether the other edge ends there.
+    is_end: bool,
+}
+
+impl<'a> Side<'a> {
+    fn new(model: &'a Model, tessellation: &Tessellation, fin: &Fin, leaves: bool) -> Self {
+        let On::Curve(curve) = fin.on else { unreachable!("a candidate has edges on both sides") };
+        let on = |&(v, t): &(u32, f64)| (tessellation.points[v as usize], t);
+        let mut line: Vec<_> = tessellation.lines[curve].iter().map(on).collect();
+        if fin.is_forward != leaves {
+            line.reverse();
+        }
+        Self { edge: &model.curves[curve], line }
+    }
+
+    /// The parameter nearest to a point.
+    fn nearest(&self, point: &Point) -> f64 {
+        let squared = |w: &[(Point, f64)]| in_segment(point, &w[0].0, &w[1].0);
+        let nearest = self.line.windows(2).map(|w| (squared(w), w)).min_by(|a, b| a.0.1.total_cmp(&b.0.1));
+        let ((share, _), w) = nearest.expect("an edge has two points");
+        let start = w[0].1 + share * (w[1].1 - w[0].1);
+        project_to_curve(&self.edge.curve, self.edge.range, point, start).parameter
+    }
+
+    fn end(&self) -> f64 {
+        self.line[self.line.len() - 1].1
+    }
+
+    /// The width between this edge, at a parameter, and the other one.
+    fn across(&self, other: &Self, t: f64) -> Across {
+        let point = Point::from(self.edge.curve.point(t));
+        let on_other = other.nearest(&point);
+        let width = (other.edge.curve.point(on_other) - point.coords).norm();
+        Across { at: [t, on_other], width, is_end: on_other == other.end() }
+    }
+}
+
+/// Where to cut between two edges that meet in a tip, and the width there, at most that of elements
+/// divided by `factor`; `None` if the tip is not narrow for long enough.
+fn cut(one: &Side, other: &Side, size: &dyn SizeField, factor: f64) -> Option<([Option<f64>; 2], f64)> {
+    let tip = one.line[0].0;
+    let is_narrow = |t: f64| {
+        let across = one.across(other, t);
+        let size = size.size_at(&Point::from(one.edge.curve.point(t)));
+        (!across.is_end && factor * across.width <= size).then_some(across)
+    };
+    let mut last: Option<Across> = None;
+    let mut steps = 0;
+    for w in one.line.windows(2) {
+        let [(p, low), (q, high)] = [w[0], w[1]];
+        let parts = (STEPS * (q - p).norm() / size.size_at(&p)).ceil().clamp(1.0, MOST_STEPS as f64) as usize;
+        for part in 1..=parts {
+            let place = |share: f64| low + (high - low) * share / parts as f64;
+            let (mut good, mut bad) = (place(part as f64 - 1.0), place(part as f64));
+            steps += 1;
+            match is_narrow(bad) {
+                Some(across) if steps < MOST_STEPS => last = Some(across),
+                _ => {
+                    for _ in 0..BISECTIONS {
+                        let middle = 0.5 * (good + bad);
+                        match is_narrow(middle) {
+                            Some(across) => (good, last) = (middle, Some(across)),
+                            None => bad = middle,
+                        }
+                    }
+                    return finished(one, other, tip, last?, size);
+                }
+            }
+        }
+    }
+    finished(one, other, tip, last?, size)
+}
+
+/// The cut, at the ends of edges of which almost nothing would be left.
+fn finished(
+    one: &Side,
+    other: &Side,
+    tip: Point,
+    across: Across,
+    size: &dyn SizeField,
+) -> Option<([Option<f64>; 2], f64)> {
+    let places = [one, other].map(|side| Point::from(side.edge.curve.point(side.end())));
+    let points = [(one, 0), (other, 1)].map(|(side, k)| Point::from(side.edge.curve.point(across.at[k])));
+    if (points[0] - tip).norm() < LONG * size.size_at(&points[0]) {
+        return None;
+    }
+    let at = [0, 1].map(|k| ((places[k] - points[k]).norm() > across.width).then_some(across.at[k]));
+    (at != [None; 2]).then_some((at, across.width))
+}
