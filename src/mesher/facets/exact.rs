@@ -55,7 +55,7 @@ impl Shape {
     }
 
     /// Each face a patch, and each edge a curve.
-    fn ungrouped(&self, model: &Model) -> Grouping {
+    pub fn ungrouped(&self, model: &Model) -> Grouping {
         Grouping {
             patches: (0..model.patches.len()).map(|face| vec![face]).collect(),
             curves: self.curves.iter().map(|&edge| vec![(edge, true)]).collect(),

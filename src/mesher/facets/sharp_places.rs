@@ -86,18 +86,29 @@ fn wedges(model: &FacetModel) -> Vec<SharpPlace> {
     places
 }
 
-/// The angle of each patch at each point of curves, as the sum of those of its facets there.
+/// The angle of each patch at some vertices, as the sum of those of its triangles there (radians).
+pub(super) fn angles(
+    points: &[Point],
+    triangles: impl Iterator<Item = ([u32; 3], u32)>,
+    is_wanted: impl Fn(u32) -> bool,
+) -> BTreeMap<(u32, u32), f64> {
+    let mut sums = BTreeMap::new();
+    for (vertices, patch) in triangles {
+        let corners: [Point; 3] = vertices.map(|v| points[v as usize]);
+        for k in (0..3).filter(|&k| is_wanted(vertices[k])) {
+            let [u, v]: [Vector; 2] = [1, 2].map(|m| corners[(k + m) % 3] - corners[k]);
+            *sums.entry((vertices[k], patch)).or_default() += u.cross(&v).norm().atan2(u.dot(&v));
+        }
+    }
+    sums
+}
+
+/// The angle of each patch at each point of curves.
 fn patch_corners(model: &FacetModel) -> Vec<SharpPlace> {
     let mut on_curve = vec![false; model.points.len()];
     model.curves.iter().flat_map(|c| &c.vertices).for_each(|&v| on_curve[v as usize] = true);
-    let mut sums: BTreeMap<(u32, u32), f64> = BTreeMap::new();
-    for t in &model.triangles {
-        let corners: [Point; 3] = t.vertices.map(|v| model.points[v.index()]);
-        for k in (0..3).filter(|&k| on_curve[t.vertices[k].index()]) {
-            let [u, v]: [Vector; 2] = [1, 2].map(|m| corners[(k + m) % 3] - corners[k]);
-            *sums.entry((t.vertices[k].0, t.patch.0)).or_default() += u.cross(&v).norm().atan2(u.dot(&v));
-        }
-    }
+    let triangles = model.triangles.iter().map(|t| (t.vertices.map(|v| v.0), t.patch.0));
+    let sums = angles(&model.points, triangles, |v| on_curve[v as usize]);
     let place = |((v, _), sum): ((u32, u32), f64)| SharpPlace {
         point: model.points[v as usize].into(),
         angle: sum.to_degrees(),

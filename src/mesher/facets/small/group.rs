@@ -2,14 +2,13 @@
 
 use super::chains::{Chain, chains};
 use super::faces::{Joins, joins};
-use super::layout::{Layout, TipCut};
+use super::layout::Layout;
 use super::report::{MergedEdge, MergedFace, MergedSmall, NamedFace};
 use crate::Point;
 use crate::ground::projector::BrepProjector;
 use crate::ground::size::SizeField;
 use crate::mesher::facets::FacetModel;
 use crate::mesher::facets::exact::{Shape, grouped};
-use brep::{Model, Tessellation};
 
 /// Faces of a file as patches, and its edges as curves.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -101,18 +100,9 @@ pub type Merged = (FacetModel, BrepProjector, Grouping);
 ///
 /// What is merged must be small beside the sizes that the model has without it. Merging less never
 /// makes sizes larger, so faces and edges are taken out until all that are left are small.
-///
-/// `cuts` has them: each with its own face, the face that it was cut off, and the edge between.
-pub(super) fn merge_all(
-    model: &Model,
-    tessellation: &Tessellation,
-    small: &Small,
-    cuts: Vec<TipCut>,
-) -> (Option<Merged>, MergedSmall) {
-    let shape = Shape::new(model, tessellation);
-    let mut layout = Layout::new(model, tessellation, shape.curves.clone(), &shape.corners);
-    layout.cuts = cuts;
-    let mut allowed = Allowed::of(&layout, small.largest / small.factor);
+pub(super) fn merge_all(shape: &Shape, layout: &Layout, small: &Small) -> (Option<Merged>, MergedSmall) {
+    let (model, tessellation) = (layout.model, layout.tessellation);
+    let mut allowed = Allowed::of(layout, small.largest / small.factor);
     for cut in &layout.cuts {
         (allowed.faces[cut.tip], allowed.edges[cut.edge]) = (true, true);
     }
@@ -120,10 +110,10 @@ pub(super) fn merge_all(
         if !allowed.faces.iter().chain(&allowed.edges).any(|allowed| *allowed) {
             return (None, MergedSmall::default());
         }
-        let joins = joins(&layout, &allowed.faces);
-        let (grouping, chains) = grouping(&layout, &joins, &allowed.edges);
-        let mut report = report(&layout, &joins, &chains, &allowed.edges);
-        let (facets, exact) = grouped(model, tessellation, &shape, &grouping);
+        let joins = joins(layout, &allowed.faces);
+        let (grouping, chains) = grouping(layout, &joins, &allowed.edges);
+        let mut report = report(layout, &joins, &chains, &allowed.edges);
+        let (facets, exact) = grouped(model, tessellation, shape, &grouping);
         let size = (small.size)(&facets);
         // A narrow face lowers the sizes around it: the largest one is that of all others.
         let largest = tessellation.points.iter().map(|p| size.size_at(p)).fold(0.0, f64::max);

@@ -2,6 +2,7 @@
 
 use crate::ground::kernel::nearest::in_segment;
 use crate::ground::kernel::tree::{Tree, bounds};
+use crate::mesher::facets::exact::Shape;
 use crate::{Point, Vector};
 use brep::{Model, On, Tessellation};
 use rayon::prelude::*;
@@ -45,14 +46,10 @@ fn key(a: u32, b: u32) -> [u32; 2] {
 }
 
 impl<'a> Layout<'a> {
-    pub fn new(
-        model: &'a Model,
-        tessellation: &'a Tessellation,
-        curves: Vec<usize>,
-        corners: &[u32],
-    ) -> Self {
+    pub fn new(model: &'a Model, tessellation: &'a Tessellation, shape: &Shape, cuts: Vec<TipCut>) -> Self {
+        let curves = shape.curves.clone();
         let mut is_corner = vec![false; model.corners.len()];
-        corners.iter().for_each(|&corner| is_corner[corner as usize] = true);
+        shape.corners.iter().for_each(|&corner| is_corner[corner as usize] = true);
         let mut is_curve = vec![false; model.curves.len()];
         curves.iter().for_each(|&c| is_curve[c] = true);
         let mut faces_of = vec![Vec::new(); model.curves.len()];
@@ -87,7 +84,7 @@ impl<'a> Layout<'a> {
                 }
             }
         }
-        let (widths, cuts) = (Vec::new(), Vec::new());
+        let widths = Vec::new();
         let mut out =
             Self { model, tessellation, curves, is_corner, faces_of, around, lengths, widths, cuts, beside };
         out.widths = out.measured_widths();

@@ -6,7 +6,7 @@ use super::report::{MergedSmall, MergedTip};
 use super::tips::{NarrowTip, candidates, narrow, without};
 use crate::ground::kernel::tree::bounds;
 use crate::mesher::facets::FacetModel;
-use crate::mesher::facets::exact::{Shape, of_brep};
+use crate::mesher::facets::exact::{Shape, grouped};
 use brep::{BrepError, Cut, Model, Tessellation, Tip};
 
 /// The most times that tips are cut off, each time fewer or narrower.
@@ -21,16 +21,16 @@ const THINNEST: f64 = 1e-6;
 /// Tips are cut off as faces of their own. Those that are not merged then are cut off where they
 /// are narrower, or left.
 pub fn merge(model: &Model, tessellation: &Tessellation, small: &Small) -> (Option<Merged>, MergedSmall) {
-    let mut candidates = if small.tips { candidates(model, tessellation) } else { Vec::new() };
+    let shape = Shape::new(model, tessellation);
+    let layout = Layout::new(model, tessellation, &shape, Vec::new());
+    let mut candidates = if small.tips { candidates(&layout) } else { Vec::new() };
     if !candidates.is_empty() {
-        let size = (small.size)(&of_brep(model, tessellation).0);
-        let shape = Shape::new(model, tessellation);
-        let widths = Layout::new(model, tessellation, shape.curves.clone(), &shape.corners).widths;
+        let size = (small.size)(&grouped(model, tessellation, &shape, &shape.ungrouped(model)).0);
         let least = THINNEST * bounds(&tessellation.points).diagonal();
         for _ in 0..ROUNDS {
-            let mut tips = narrow(model, tessellation, &candidates, &*size, small.factor);
+            let mut tips = narrow(&layout, &candidates, &*size, small.factor);
             // A face that is nowhere wider is small as a whole, and thinner tips are rounding.
-            tips.retain(|narrow| least < narrow.width && narrow.width < widths[narrow.tip.patch]);
+            tips.retain(|narrow| least < narrow.width && narrow.width < layout.widths[narrow.tip.patch]);
             let Some(cut) = cut_off(model, &tips) else { break };
             match merge_tips(model, tessellation, small, cut, &tips) {
                 Ok(merged) => return merged,
@@ -38,7 +38,7 @@ pub fn merge(model: &Model, tessellation: &Tessellation, small: &Small) -> (Opti
             }
         }
     }
-    merge_all(model, tessellation, small, Vec::new())
+    merge_all(&shape, &layout, small)
 }
 
 /// The model with tips cut off; `None` if there are none.
@@ -72,7 +72,9 @@ fn merge_tips(
         edge: cut.curves[k],
     };
     let cuts: Vec<TipCut> = tips.iter().enumerate().map(cut_off).collect();
-    let (merged, report) = merge_all(&cut.model, &tessellation, small, cuts);
+    let shape = Shape::new(&cut.model, &tessellation);
+    let layout = Layout::new(&cut.model, &tessellation, &shape, cuts);
+    let (merged, report) = merge_all(&shape, &layout, small);
     let is_merged = |k: usize| {
         report.faces.iter().any(|merged| merged.face == cut.patches[k] + 1)
             && report.edges.iter().any(|merged| merged.edge == cut.curves[k] + 1)

@@ -3,12 +3,14 @@
 //!
 //! Edges that touch tangentially, as at the end of a fillet or a run-out, leave such tips.
 //! Triangles in them are as sharp as the tips, whatever their size. So a tip is cut off where it
-//! becomes wider than a small face may be, and merged as a narrow face of its own.
+//! becomes about as wide as a small face may be, and merged as a narrow face of its own.
 
+use super::layout::Layout;
 use crate::Point;
 use crate::ground::kernel::nearest::in_segment;
 use crate::ground::size::SizeField;
-use brep::{EdgeCurve, Fin, Model, On, Tessellation, Tip, project_to_curve};
+use crate::mesher::facets::sharp_places::angles;
+use brep::{EdgeCurve, Fin, Model, On, Tip, project_to_curve};
 
 /// Tips with a larger angle between their triangles are not cut (radians).
 const SHARP: f64 = 0.35;
@@ -53,20 +55,14 @@ pub(super) struct NarrowTip {
 }
 
 /// The corners of faces that are so sharp that there may be a narrow tip.
-pub(super) fn candidates(model: &Model, tessellation: &Tessellation) -> Vec<Candidate> {
-    let mut faces_of: Vec<Vec<usize>> = vec![Vec::new(); model.curves.len()];
-    for (face, patch) in model.patches.iter().enumerate() {
-        for fin in patch.loops.iter().flatten() {
-            if let On::Curve(curve) = fin.on {
-                faces_of[curve].push(face);
-            }
-        }
-    }
-    let angles = angles(model, tessellation);
+pub(super) fn candidates(layout: &Layout) -> Vec<Candidate> {
+    let (model, tessellation) = (layout.model, layout.tessellation);
+    let triangles = tessellation.triangles.iter().map(|t| (t.vertices, t.patch));
+    let angles = angles(&tessellation.points, triangles, |v| (v as usize) < model.corners.len());
     let mut found = Vec::new();
     for (patch, face) in model.patches.iter().enumerate() {
         let beyond = |fin: &Fin| match fin.on {
-            On::Curve(curve) => match faces_of[curve][..] {
+            On::Curve(curve) => match layout.faces_of[curve][..] {
                 [a, b] if a != b => Some((curve, if a == patch { b } else { a })),
                 _ => None,
             },
@@ -79,7 +75,7 @@ pub(super) fn candidates(model: &Model, tessellation: &Tessellation) -> Vec<Cand
                     continue;
                 };
                 let corner = model.curves[a].ends[usize::from(arriving.is_forward)];
-                let is_sharp = angles.get(&(corner, patch)).is_some_and(|angle| *angle < SHARP);
+                let is_sharp = angles.get(&(corner as u32, patch as u32)).is_some_and(|angle| *angle < SHARP);
                 if a != b && one != other && is_sharp {
                     let tip = Tip { patch, of_loop, fin, at: [None; 2] };
                     found.push(Candidate { tip, corner, attempt: 0 });
@@ -90,39 +86,24 @@ pub(super) fn candidates(model: &Model, tessellation: &Tessellation) -> Vec<Cand
     found
 }
 
-/// The angle of each face at each corner, as the sum of those of its triangles (radians).
-fn angles(model: &Model, tessellation: &Tessellation) -> std::collections::BTreeMap<(usize, usize), f64> {
-    let mut sums = std::collections::BTreeMap::new();
-    for t in &tessellation.triangles {
-        let p = t.vertices.map(|v| tessellation.points[v as usize]);
-        for k in (0..3).filter(|&k| (t.vertices[k] as usize) < model.corners.len()) {
-            let [u, v] = [1, 2].map(|m| p[(k + m) % 3] - p[k]);
-            *sums.entry((t.vertices[k] as usize, t.patch as usize)).or_default() += u.angle(&v);
-        }
-    }
-    sums
-}
-
 /// Those of the candidates that are narrow for a while, where small faces are as wide as elements
 /// divided by `factor`.
 pub(super) fn narrow(
-    model: &Model,
-    tessellation: &Tessellation,
+    layout: &Layout,
     candidates: &[Candidate],
     size: &dyn SizeField,
     factor: f64,
 ) -> Vec<NarrowTip> {
     let tip = |(candidate, &Candidate { tip, corner, attempt }): (usize, &Candidate)| {
-        let fins = &model.patches[tip.patch].loops[tip.of_loop];
-        let sides = [&fins[tip.fin], &fins[(tip.fin + 1) % fins.len()]];
-        let [one, other] = [0, 1].map(|k| Side::new(model, tessellation, sides[k], k == 1));
+        let sides = tip.sides(layout.model);
+        let [one, other] = [0, 1].map(|k| Side::new(layout, sides[k], k == 1));
         let (at, width) = cut(&one, &other, size, factor / WIDTHS[attempt])?;
         Some(NarrowTip { tip: Tip { at, ..tip }, corner, width, candidate })
     };
     let mut taken: Vec<(usize, [f64; 2])> = Vec::new();
     let mut found = Vec::new();
     for narrow in candidates.iter().enumerate().filter_map(tip) {
-        let parts = parts(model, &narrow);
+        let parts = parts(layout.model, &narrow.tip);
         let overlaps = |(c, [low, high]): &(usize, [f64; 2])| {
             taken.iter().any(|(d, other)| c == d && *low < other[1] && other[0] < *high)
         };
@@ -144,15 +125,15 @@ pub(super) fn without(candidates: &[Candidate], failed: &[usize]) -> Vec<Candida
 }
 
 /// The parts of its edges that belong to a tip.
-fn parts(model: &Model, narrow: &NarrowTip) -> [(usize, [f64; 2]); 2] {
-    let fins = &model.patches[narrow.tip.patch].loops[narrow.tip.of_loop];
+fn parts(model: &Model, tip: &Tip) -> [(usize, [f64; 2]); 2] {
+    let sides = tip.sides(model);
     [0, 1].map(|k| {
-        let fin = &fins[(narrow.tip.fin + k) % fins.len()];
+        let fin = sides[k];
         let On::Curve(curve) = fin.on else { unreachable!("a candidate has edges on both sides") };
         let [low, high] = model.curves[curve].range;
         // The first edge arrives at the tip, the second one leaves it.
         let is_at_end = fin.is_forward == (k == 0);
-        let part = match narrow.tip.at[k] {
+        let part = match tip.at[k] {
             None => [low, high],
             Some(t) if is_at_end => [t, high],
             Some(t) => [low, t],
@@ -178,14 +159,14 @@ struct Across {
 }
 
 impl<'a> Side<'a> {
-    fn new(model: &'a Model, tessellation: &Tessellation, fin: &Fin, leaves: bool) -> Self {
+    fn new(layout: &Layout<'a>, fin: &Fin, leaves: bool) -> Self {
         let On::Curve(curve) = fin.on else { unreachable!("a candidate has edges on both sides") };
-        let on = |&(v, t): &(u32, f64)| (tessellation.points[v as usize], t);
-        let mut line: Vec<_> = tessellation.lines[curve].iter().map(on).collect();
+        let on = |&(v, t): &(u32, f64)| (layout.tessellation.points[v as usize], t);
+        let mut line: Vec<_> = layout.tessellation.lines[curve].iter().map(on).collect();
         if fin.is_forward != leaves {
             line.reverse();
         }
-        Self { edge: &model.curves[curve], line }
+        Self { edge: &layout.model.curves[curve], line }
     }
 
     /// The parameter nearest to a point.
