@@ -99,10 +99,31 @@ fn tips_of_faces_are_merged_up_to_the_width_of_small_faces() {
         assert_eq!((merged.merged_small.tips.len(), kept.merged_small.tips.len()), (tips, 0), "{name}");
         let volume = volume_of(&made[0].arrays());
         assert!((volume - exact).abs() < 0.08, "{name}: {volume} instead of {exact}");
-        // Tips of refined meshes are kept.
+    }
+}
+
+#[test]
+fn tips_of_refined_meshes_are_narrow_beside_their_subdivisions() {
+    for (name, exact, before) in
+        [("runout", 79.835_624_319_385_67, 0.1), ("tapered_chamfer", 79.948_001_400_892_1, 2.5)]
+    {
         let fine = Mesher::new().max_size(1.0).levels(2).generate(&geometry(name, false)).unwrap();
-        assert!(fine.coarse.as_ref().unwrap().report.merged_small.tips.is_empty(), "{name}");
+        let tips = &fine.coarse.as_ref().unwrap().report.merged_small.tips;
+        assert!(!tips.is_empty() && tips.iter().all(|tip| tip.width < 1.001 / 16.0), "{tips:?}");
+        let angle = fine.levels.last().unwrap().shape.smallest_angle.value;
+        assert!(angle > 3.0 * before, "{name}: {angle}°");
         let volume = volume_of(&fine.arrays());
-        assert!((volume - exact).abs() < 0.03, "{name}: {volume} instead of {exact}");
+        assert!((volume - exact).abs() < 0.01, "{name}: {volume} instead of {exact}");
+    }
+}
+
+#[test]
+fn tips_are_merged_in_meshes_of_second_order_too() {
+    let mesher = Mesher::new().max_size(1.0).order(Order::Second);
+    for keep in [false, true] {
+        let made = mesher.generate(&geometry("runout", keep)).unwrap();
+        let report = &made.coarse.as_ref().unwrap().report;
+        assert_eq!(report.merged_small.tips.len(), if keep { 0 } else { 2 });
+        assert_eq!(report.quality.smallest_dihedral > 10.0, !keep);
     }
 }

@@ -184,22 +184,21 @@ impl FacetSolid {
 
     /// Merges edges and faces of a CAD file that are small beside the elements into their
     /// neighbours; `None` for the solid if there are none. Elements are as large as the sizes, but
-    /// at most `largest`, and are divided into `pieces` along each edge. With `tips`, narrow tips
-    /// of faces are merged, too.
+    /// at most `largest`, and are divided into `pieces` along each edge.
     pub(super) fn merge_small(
         &self,
         settings: &SizeSettings,
         largest: f64,
         pieces: u32,
-        tips: bool,
     ) -> (Option<Self>, MergedSmall) {
         let Some(cad) = &self.cad else { return (None, MergedSmall::default()) };
-        let factor = f64::max(SMALL, SMALL_IN_PIECES * f64::from(pieces));
+        let in_pieces = SMALL_IN_PIECES * f64::from(pieces);
+        let (factor, tip_factor) = (SMALL.max(in_pieces), TIP.max(in_pieces));
         let largest = largest.min(largest_size(&self.model, settings));
         let size = |model: &FacetModel| -> Box<dyn SizeField> {
             Box::new(AtMost(FacetSize::with_accuracy(model, settings, Accuracy::Fine), largest))
         };
-        let small = Small { factor, largest, tips, tessellated: cad.settings, size: &size };
+        let small = Small { factor, largest, tip_factor, tessellated: cad.settings, size: &size };
         let (merged, report) = merge(&cad.model, &cad.tessellation, &small);
         let solid = merged.map(|(model, exact, grouping)| {
             let label = |faces: &Vec<usize>| self.names.patches[faces[0]].clone();
@@ -388,6 +387,9 @@ fn labels(given: &[Option<String>], count: usize, other: impl Fn(usize) -> Strin
 /// Faces and edges are small if the elements are at least this many times as large. Merging moves
 /// the boundary of a patch by the width of the face: less than the surface error of curved parts.
 const SMALL: f64 = 20.0;
+
+/// The same for tips of faces, of which only the end is as wide.
+const TIP: f64 = 10.0;
 
 /// The same for the subdivisions of elements, whose vertices must not meet both sides of a step.
 const SMALL_IN_PIECES: f64 = 4.0;

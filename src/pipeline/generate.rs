@@ -83,10 +83,8 @@ fn merge_small(
         // The subdivisions are chosen later: the elements themselves decide.
         Wanted::Elements(count) => (of_count(count), pieces),
     };
-    // With the sizes of a refined mesh, the remeshing of one part with merged tips did not end.
-    let is_refined =
-        pieces > 1 || settings.coarse.order == Order::Second || matches!(wanted, Wanted::Elements(_));
-    let (merged, report) = solid.merge_small(&settings.coarse.size, largest, pieces, !is_refined);
+    let pieces = pieces * settings.coarse.order.degree();
+    let (merged, report) = solid.merge_small(&settings.coarse.size, largest, pieces);
     report.notes().iter().for_each(|text| progress.note(text));
     (merged.map(|solid| Model::Facets(Box::new(solid))), report)
 }

@@ -29,17 +29,17 @@ pub struct Small<'a> {
     pub factor: f64,
     /// The largest size of elements.
     pub largest: f64,
-    /// Whether narrow tips of faces are merged.
-    pub tips: bool,
+    /// Tips of faces are cut off where elements are this many times as large as their width.
+    pub tip_factor: f64,
     /// How the model was tessellated.
     pub tessellated: brep::Settings,
     /// The wanted size of elements of a model.
     pub size: &'a dyn Fn(&FacetModel) -> Box<dyn SizeField>,
 }
 
-/// The same factor for tips that were cut off: they are twice as wide as small faces, and sizes may
-/// be smaller than they were, because edges are shorter.
-const TIP_FACTOR: f64 = 0.25;
+/// Part of the factor that tips must have that were cut off: sizes may be smaller than they were,
+/// because edges are shorter.
+const STILL_SMALL: f64 = 0.25;
 
 /// The longest edge at an end of a short one is at least this many times as long.
 const LONGER: f64 = 20.0;
@@ -122,7 +122,7 @@ pub(super) fn merge_all(shape: &Shape, layout: &Layout, small: &Small) -> (Optio
             return (None, report);
         }
         let is_small = |points: Vec<Point>, extent: f64, is_tip: bool| {
-            let factor = if is_tip { TIP_FACTOR * small.factor } else { small.factor };
+            let factor = if is_tip { STILL_SMALL * small.tip_factor } else { small.factor };
             points.into_iter().all(|p| factor * extent <= size.size_at(&p))
         };
         let is_tip = |face: usize| layout.cuts.iter().any(|cut| cut.tip == face);

@@ -23,12 +23,12 @@ const THINNEST: f64 = 1e-6;
 pub fn merge(model: &Model, tessellation: &Tessellation, small: &Small) -> (Option<Merged>, MergedSmall) {
     let shape = Shape::new(model, tessellation);
     let layout = Layout::new(model, tessellation, &shape, Vec::new());
-    let mut candidates = if small.tips { candidates(&layout) } else { Vec::new() };
+    let mut candidates = candidates(&layout);
     if !candidates.is_empty() {
         let size = (small.size)(&grouped(model, tessellation, &shape, &shape.ungrouped(model)).0);
         let least = THINNEST * bounds(&tessellation.points).diagonal();
         for _ in 0..ROUNDS {
-            let mut tips = narrow(&layout, &candidates, &*size, small.factor);
+            let mut tips = narrow(&layout, &candidates, &*size, small.tip_factor);
             // A face that is nowhere wider is small as a whole, and thinner tips are rounding.
             tips.retain(|narrow| least < narrow.width && narrow.width < layout.widths[narrow.tip.patch]);
             let Some(cut) = cut_off(model, &tips) else { break };

@@ -26,7 +26,7 @@ fn merged_of(mut model: Model, size: f64) -> (Option<FacetModel>, MergedSmall) {
     let small = Small {
         factor: 20.0,
         largest: f64::INFINITY,
-        tips: true,
+        tip_factor: 10.0,
         tessellated: Settings::default(),
         size: &size,
     };

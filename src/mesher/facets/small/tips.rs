@@ -15,10 +15,9 @@ use brep::{EdgeCurve, Fin, Model, On, Tip, project_to_curve};
 /// Tips with a larger angle between their triangles are not cut (radians).
 const SHARP: f64 = 0.35;
 
-/// The width at which tips are cut, in widths of small faces: the mesh begins with an edge as short
-/// as that, and half the width would halve the angles. Tips that cannot be merged then are cut
-/// where they are half as wide.
-const WIDTHS: [f64; 2] = [2.0, 1.0];
+/// Tips that cannot be merged are cut again where they are narrower by these factors. The mesh
+/// begins with an edge as short as the cut, so half the width halves the angles.
+const NARROWER: [f64; 2] = [1.0, 0.5];
 
 /// A tip is cut if it is at least this long (units of the element size), so that it is sharper than
 /// 14°.
@@ -38,7 +37,7 @@ const BISECTIONS: usize = 20;
 pub(super) struct Candidate {
     tip: Tip,
     corner: usize,
-    /// Which of [`WIDTHS`] to cut at.
+    /// Which of [`NARROWER`] to cut with.
     attempt: usize,
 }
 
@@ -86,8 +85,7 @@ pub(super) fn candidates(layout: &Layout) -> Vec<Candidate> {
     found
 }
 
-/// Those of the candidates that are narrow for a while, where small faces are as wide as elements
-/// divided by `factor`.
+/// Those of the candidates that are at most as wide as elements divided by `factor` for a while.
 pub(super) fn narrow(
     layout: &Layout,
     candidates: &[Candidate],
@@ -97,7 +95,7 @@ pub(super) fn narrow(
     let tip = |(candidate, &Candidate { tip, corner, attempt }): (usize, &Candidate)| {
         let sides = tip.sides(layout.model);
         let [one, other] = [0, 1].map(|k| Side::new(layout, sides[k], k == 1));
-        let (at, width) = cut(&one, &other, size, factor / WIDTHS[attempt])?;
+        let (at, width) = cut(&one, &other, size, factor / NARROWER[attempt])?;
         Some(NarrowTip { tip: Tip { at, ..tip }, corner, width, candidate })
     };
     let mut taken: Vec<(usize, [f64; 2])> = Vec::new();
@@ -119,7 +117,7 @@ pub(super) fn narrow(
 pub(super) fn without(candidates: &[Candidate], failed: &[usize]) -> Vec<Candidate> {
     let next = |(k, candidate): (usize, &Candidate)| {
         let attempt = candidate.attempt + usize::from(failed.binary_search(&k).is_ok());
-        (attempt < WIDTHS.len()).then_some(Candidate { attempt, ..*candidate })
+        (attempt < NARROWER.len()).then_some(Candidate { attempt, ..*candidate })
     };
     candidates.iter().enumerate().filter_map(next).collect()
 }
