@@ -128,19 +128,28 @@ pub(super) fn merge_all(shape: &Shape, layout: &Layout, small: &Small) -> (Optio
         let is_tip = |face: usize| layout.cuts.iter().any(|cut| cut.tip == face);
         let is_cut = |edge: usize| layout.cuts.iter().any(|cut| cut.edge == edge);
         let point = |v: u32| tessellation.points[v as usize];
+        let points_of_edge =
+            |edge: usize| tessellation.lines[edge].iter().map(|on| point(on.0)).collect::<Vec<_>>();
+        let points_of_face = |face: usize| {
+            let of_face = tessellation.triangles.iter().filter(|t| t.patch as usize == face);
+            of_face.flat_map(|t| t.vertices.map(point)).collect()
+        };
         let mut are_all_small = true;
         for merged in &report.faces {
             let face = merged.face - 1;
-            let of_face = tessellation.triangles.iter().filter(|t| t.patch as usize == face);
-            if !is_small(of_face.flat_map(|t| t.vertices.map(point)).collect(), merged.width, is_tip(face)) {
+            let points = match layout.cuts.iter().find(|cut| cut.tip == face) {
+                // It is narrower elsewhere.
+                Some(cut) => points_of_edge(cut.edge),
+                None => points_of_face(face),
+            };
+            if !is_small(points, merged.width, is_tip(face)) {
                 (allowed.faces[face], are_all_small) = (false, false);
             }
         }
         for merged in &report.edges {
-            let line = &tessellation.lines[merged.edge - 1];
-            if !is_small(line.iter().map(|on| point(on.0)).collect(), merged.length, is_cut(merged.edge - 1))
-            {
-                (allowed.edges[merged.edge - 1], are_all_small) = (false, false);
+            let edge = merged.edge - 1;
+            if !is_small(points_of_edge(edge), merged.length, is_cut(edge)) {
+                (allowed.edges[edge], are_all_small) = (false, false);
             }
         }
         if are_all_small {
