@@ -83,6 +83,7 @@ fn merge_small(
         // The subdivisions are chosen later: the elements themselves decide.
         Wanted::Elements(count) => (of_count(count), pieces),
     };
+    // Nodes of second order divide edges, too.
     let pieces = pieces * settings.coarse.order.degree();
     let (merged, report) = solid.merge_small(&settings.coarse.size, largest, pieces);
     report.notes().iter().for_each(|text| progress.note(text));

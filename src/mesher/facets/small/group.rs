@@ -37,8 +37,8 @@ pub struct Small<'a> {
     pub size: &'a dyn Fn(&FacetModel) -> Box<dyn SizeField>,
 }
 
-/// Part of the factor that tips must have that were cut off: sizes may be smaller than they were,
-/// because edges are shorter.
+/// Share of that factor that must be left after tips were cut off: sizes are smaller then, because
+/// edges are shorter.
 const STILL_SMALL: f64 = 0.25;
 
 /// The longest edge at an end of a short one is at least this many times as long.
