@@ -84,13 +84,14 @@ fn merging_does_not_depend_on_ranks() {
     assert_eq!(together.unwrap(), vec![alone; 3]);
 }
 
+/// Blocks of 10 × 4 × 2 without what is outside a cylinder of radius 100 that touches an edge, or
+/// beyond a plane that meets the edge at 1°, with OpenCASCADE's volumes.
+const TIPPED: [(&str, f64); 2] =
+    [("runout", 79.835_624_319_385_67), ("tapered_chamfer", 79.948_001_400_892_1)];
+
 #[test]
 fn tips_of_faces_are_merged_up_to_the_width_of_small_faces() {
-    // A block of 10 × 4 × 2 without what is outside a cylinder of radius 100 that touches an edge,
-    // or beyond a plane that meets the edge at 1°. Volumes by OpenCASCADE.
-    for (name, exact, tips) in
-        [("runout", 79.835_624_319_385_67, 2), ("tapered_chamfer", 79.948_001_400_892_1, 1)]
-    {
+    for ((name, exact), tips) in TIPPED.into_iter().zip([2, 1]) {
         let made =
             [false, true].map(|keep| Mesher::new().max_size(1.0).generate(&geometry(name, keep)).unwrap());
         let [merged, kept] = made.each_ref().map(|mesh| mesh.coarse.as_ref().unwrap().report.clone());
@@ -104,9 +105,7 @@ fn tips_of_faces_are_merged_up_to_the_width_of_small_faces() {
 
 #[test]
 fn tips_of_refined_meshes_are_narrow_beside_their_subdivisions() {
-    for (name, exact, before) in
-        [("runout", 79.835_624_319_385_67, 0.1), ("tapered_chamfer", 79.948_001_400_892_1, 2.5)]
-    {
+    for ((name, exact), before) in TIPPED.into_iter().zip([0.1, 2.5]) {
         let fine = Mesher::new().max_size(1.0).levels(2).generate(&geometry(name, false)).unwrap();
         let tips = &fine.coarse.as_ref().unwrap().report.merged_small.tips;
         assert!(!tips.is_empty() && tips.iter().all(|tip| tip.width < 1.001 / 16.0), "{tips:?}");

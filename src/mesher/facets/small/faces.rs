@@ -48,7 +48,7 @@ pub(super) fn joins(layout: &Layout, may: &[bool]) -> Vec<Joins> {
 /// The best face for one to join; `joins` has those of others.
 fn join(layout: &Layout, face: usize, may: &[bool], joins: &[Joins]) -> Joins {
     let mut named = false;
-    let is_tip = layout.cuts.iter().any(|cut| cut.tip == face);
+    let is_tip = layout.cut_of(face).is_some();
     // Best first: smooth neighbours, then those with the longest common edges.
     let mut best: Option<(bool, f64, usize)> = None;
     for (neighbour, common) in neighbours(layout, face) {
@@ -90,7 +90,7 @@ fn neighbours(layout: &Layout, face: usize) -> Vec<(usize, Vec<usize>)> {
     for &edge in &layout.around[face] {
         let &[a, b] = &layout.faces_of[edge][..] else { continue };
         let other = if a == face { b } else { a };
-        if other == face || layout.cuts.iter().any(|cut| cut.tip == face && cut.of == other) {
+        if other == face || layout.cut_of(face).is_some_and(|cut| cut.of == other) {
             continue;
         }
         match found.iter_mut().find(|(known, _)| *known == other) {

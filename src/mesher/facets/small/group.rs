@@ -121,12 +121,10 @@ pub(super) fn merge_all(shape: &Shape, layout: &Layout, small: &Small) -> (Optio
         if report.faces.is_empty() && report.edges.is_empty() {
             return (None, report);
         }
-        let is_small = |points: Vec<Point>, extent: f64, is_tip: bool| {
-            let factor = if is_tip { STILL_SMALL * small.tip_factor } else { small.factor };
+        let is_small = |points: Vec<Point>, extent: f64, factor: f64| {
             points.into_iter().all(|p| factor * extent <= size.size_at(&p))
         };
-        let is_tip = |face: usize| layout.cuts.iter().any(|cut| cut.tip == face);
-        let is_cut = |edge: usize| layout.cuts.iter().any(|cut| cut.edge == edge);
+        let tip_factor = STILL_SMALL * small.tip_factor;
         let point = |v: u32| tessellation.points[v as usize];
         let points_of_edge =
             |edge: usize| tessellation.lines[edge].iter().map(|on| point(on.0)).collect::<Vec<_>>();
@@ -137,18 +135,20 @@ pub(super) fn merge_all(shape: &Shape, layout: &Layout, small: &Small) -> (Optio
         let mut are_all_small = true;
         for merged in &report.faces {
             let face = merged.face - 1;
-            let points = match layout.cuts.iter().find(|cut| cut.tip == face) {
+            let (points, factor) = match layout.cut_of(face) {
                 // It is narrower elsewhere.
-                Some(cut) => points_of_edge(cut.edge),
-                None => points_of_face(face),
+                Some(cut) => (points_of_edge(cut.edge), tip_factor),
+                None => (points_of_face(face), small.factor),
             };
-            if !is_small(points, merged.width, is_tip(face)) {
+            if !is_small(points, merged.width, factor) {
                 (allowed.faces[face], are_all_small) = (false, false);
             }
         }
         for merged in &report.edges {
             let edge = merged.edge - 1;
-            if !is_small(points_of_edge(edge), merged.length, is_cut(edge)) {
+            let is_cut = layout.cuts.iter().any(|cut| cut.edge == edge);
+            let factor = if is_cut { tip_factor } else { small.factor };
+            if !is_small(points_of_edge(edge), merged.length, factor) {
                 (allowed.edges[edge], are_all_small) = (false, false);
             }
         }

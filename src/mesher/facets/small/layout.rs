@@ -117,6 +117,11 @@ impl<'a> Layout<'a> {
         (0..self.model.patches.len()).into_par_iter().map(width).collect()
     }
 
+    /// The cut of a face that is a tip.
+    pub fn cut_of(&self, face: usize) -> Option<&TipCut> {
+        self.cuts.iter().find(|cut| cut.tip == face)
+    }
+
     /// The segments of edges, as vertices.
     pub fn segments(&self, edges: &[usize]) -> impl Iterator<Item = [u32; 2]> {
         let lines = edges.iter().map(|&edge| &self.tessellation.lines[edge]);
