@@ -46,9 +46,19 @@ pub enum BrepError {
     /// The file has no solid.
     #[error("the file has no solid, only {0}: sew its faces to a solid in the CAD program")]
     NoSolid(String),
-    /// The file is an assembly of parts in other files.
-    #[error("its parts are in other files: {0}: give those, or export the assembly as one file")]
+    /// Parts of an assembly are in other files, which cannot be read.
+    #[error(
+        "parts of it are in other files, which are not beside it: {0}: put them there, or export the assembly as one file"
+    )]
     OtherFiles(String),
+    /// An error in a file with a part of an assembly.
+    #[error("in its part {file}: {error}")]
+    Part {
+        /// The name of the file.
+        file: String,
+        /// What is wrong there.
+        error: Box<BrepError>,
+    },
 }
 
 fn at(place: &Option<Point>) -> String {
@@ -56,6 +66,14 @@ fn at(place: &Option<Point>) -> String {
 }
 
 impl BrepError {
+    /// The error in a file with a part of an assembly; it names the innermost file.
+    pub(crate) fn in_part(self, file: &str) -> Self {
+        match self {
+            Self::Part { .. } => self,
+            error => Self::Part { file: file.to_owned(), error: Box::new(error) },
+        }
+    }
+
     pub(crate) fn face(face: usize, what: impl Into<String>, place: Option<Point>) -> Self {
         Self::Face { face: face + 1, what: what.into(), place }
     }

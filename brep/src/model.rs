@@ -113,9 +113,23 @@ impl Model {
     /// Faces that several solids repeat become one. Coordinates are in `unit`.
     ///
     /// # Errors
-    /// As for BREP files.
+    /// As for BREP files; [`BrepError::OtherFiles`] if parts of an assembly are in other files.
     pub fn read_step(text: &[u8], unit: Unit) -> Result<Self, BrepError> {
-        crate::step::read(text, unit)
+        Self::read_step_with(text, unit, &|_| Err(std::io::ErrorKind::NotFound.into()))
+    }
+
+    /// Reads a STEP file whose parts may be in other files, which `other` reads by the names that
+    /// they have in this file.
+    ///
+    /// # Errors
+    /// As for one file; [`BrepError::OtherFiles`] with all files that cannot be read, and
+    /// [`BrepError::Part`] for errors in one of them.
+    pub fn read_step_with(
+        text: &[u8],
+        unit: Unit,
+        other: &dyn Fn(&str) -> std::io::Result<Vec<u8>>,
+    ) -> Result<Self, BrepError> {
+        crate::step::read(text, unit, other)
     }
 }
 

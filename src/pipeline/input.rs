@@ -8,6 +8,7 @@ use crate::files;
 use crate::files::input::ReadError;
 use crate::files::volume::VolumeMesh;
 use crate::ground::kernel::tree;
+use std::io;
 use std::path::Path;
 
 /// The kind of content of a file.
@@ -56,7 +57,9 @@ pub fn read(
         ([Kind::Csg], [path]) => read_csg(path.as_ref(), settings, note),
         ([Kind::Brep], [path]) => read_brep(path.as_ref(), brep::Model::read, settings, note),
         ([Kind::Step], [path]) => {
-            read_brep(path.as_ref(), |text| brep::Model::read_step(text, settings.unit), settings, note)
+            let other = |name: &str| read_beside(path.as_ref(), name);
+            let parse = |text: &[u8]| brep::Model::read_step_with(text, settings.unit, &other);
+            read_brep(path.as_ref(), parse, settings, note)
         }
         ([Kind::Mesh], [path]) => read_mesh(path.as_ref(), note),
         (kinds, _) if !kinds.is_empty() && kinds.iter().all(|kind| *kind == Kind::Surface) => {
@@ -109,6 +112,24 @@ fn read_brep(
     model.imprint();
     let solid = FacetSolid::of_brep(path, model, settings, note)?;
     Ok(Model::Facets(Box::new(solid)))
+}
+
+/// Reads a file with parts of an assembly from the folder of the assembly. Folders in its name are
+/// those of the program that wrote it, and on some systems upper and lower case are the same.
+fn read_beside(assembly: &Path, name: &str) -> io::Result<Vec<u8>> {
+    let name = name.rsplit(['/', '\\']).next().unwrap_or(name);
+    let exact = assembly.with_file_name(name);
+    if exact.is_file() {
+        return std::fs::read(exact);
+    }
+    let folder = assembly.parent().filter(|folder| !folder.as_os_str().is_empty());
+    for entry in std::fs::read_dir(folder.unwrap_or(Path::new(".")))? {
+        let entry = entry?;
+        if entry.file_name().eq_ignore_ascii_case(name) {
+            return std::fs::read(entry.path());
+        }
+    }
+    Err(io::ErrorKind::NotFound.into())
 }
 
 /// The indices of the bodies that have one of some names or numbers.

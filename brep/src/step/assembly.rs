@@ -2,12 +2,13 @@
 //!
 //! Source: ISO 10303-203 and the recommended practices of the CAx Implementor Forum. A product is
 //! placed in another one by a NEXT_ASSEMBLY_USAGE_OCCURRENCE, whose CONTEXT_DEPENDENT_SHAPE_
-//! REPRESENTATION has the transformation, or by a MAPPED_ITEM of its representation.
+//! REPRESENTATION has the transformation, or by a MAPPED_ITEM of its representation. A product
+//! without solids may have a document, the name of the file that holds it.
 
 use super::geometry::placement;
 use super::record::{Node, given, nodes};
 use super::text::Records;
-use super::units::{Unit, Units};
+use super::units::Units;
 use crate::{BrepError, Placement};
 use nalgebra::Matrix3;
 use std::collections::{BTreeMap, BTreeSet};
@@ -22,14 +23,36 @@ pub(super) struct PlacedSolid<'a> {
     pub name: Option<String>,
 }
 
+impl PlacedSolid<'_> {
+    /// The solid with the whole at a place.
+    pub fn placed(&self, place: &Placement) -> Self {
+        Self { placement: place.after(&self.placement), name: self.name.clone(), ..*self }
+    }
+}
+
+/// A product in another file at a place.
+pub(super) struct PlacedFile {
+    pub name: String,
+    /// From the coordinates of the file's product, in the unit of the result.
+    pub placement: Placement,
+}
+
+/// What a file holds, in the order of its products.
+pub(super) struct Contents<'a> {
+    pub solids: Vec<PlacedSolid<'a>>,
+    pub files: Vec<PlacedFile>,
+    /// Metres of the unit of the result, if any shape has one.
+    pub unit: Option<f64>,
+}
+
 /// Types of solids, and of surfaces that enclose one.
 pub(super) const SOLIDS: [&str; 4] =
     ["MANIFOLD_SOLID_BREP", "BREP_WITH_VOIDS", "FACETED_BREP", "FACETED_BREP_AND_BREP_WITH_VOIDS"];
 
 /// Assemblies may be nested this deep.
-const DEEPEST: usize = 64;
+pub(super) const DEEPEST: usize = 64;
 /// The most uses of products and representations: a small file can use one exponentially often.
-const MOST_USES: usize = 200_000;
+pub(super) const MOST_USES: usize = 200_000;
 
 /// An item of a representation or an occurrence of a product.
 struct Occurrence {
@@ -46,23 +69,18 @@ struct Structure<'a> {
     same: BTreeMap<u64, Vec<Node<'a>>>,
     children: BTreeMap<u64, Vec<Occurrence>>,
     names: BTreeMap<u64, String>,
-    /// Metres of the unit of the result.
-    unit: Option<f64>,
-    out: Vec<PlacedSolid<'a>>,
+    /// The file that holds a product definition or has the shape for a representation.
+    documents: BTreeMap<u64, String>,
+    out: Contents<'a>,
     /// The solids that were found.
     found: BTreeSet<u64>,
     uses: usize,
 }
 
-/// All solids of a file, in the order of its products, with the unit of the result in metres.
-pub(super) fn solids<'a>(
-    records: &'a Records<'a>,
-    unit: Unit,
-) -> Result<(Vec<PlacedSolid<'a>>, f64), BrepError> {
+/// What a file holds. The unit of the result (metres) is that of the first shape, if none is given.
+pub(super) fn contents<'a>(records: &'a Records<'a>, unit: Option<f64>) -> Result<Contents<'a>, BrepError> {
     let mut structure = Structure::read(records)?;
-    if let Unit::Metres(metres) = unit {
-        structure.unit = Some(metres);
-    }
+    structure.out.unit = unit;
     let placed: BTreeSet<u64> = structure.children.values().flatten().map(|o| o.child).collect();
     // An assembly need not have a shape of its own.
     let products: BTreeSet<u64> = structure.shapes.keys().chain(structure.children.keys()).copied().collect();
@@ -76,7 +94,7 @@ pub(super) fn solids<'a>(
             structure.add_shape(node, &Placement::IDENTITY, None, DEEPEST)?;
         }
     }
-    Ok((structure.out, structure.unit.unwrap_or(1e-3)))
+    Ok(structure.out)
 }
 
 fn is_solid(node: Node) -> bool {
@@ -112,8 +130,8 @@ impl<'a> Structure<'a> {
             same: BTreeMap::new(),
             children: BTreeMap::new(),
             names: BTreeMap::new(),
-            unit: None,
-            out: Vec::new(),
+            documents: documents(records),
+            out: Contents { solids: Vec::new(), files: Vec::new(), unit: None },
             found: BTreeSet::new(),
             uses: 0,
         };
@@ -184,8 +202,18 @@ impl<'a> Structure<'a> {
 
     fn add_product(&mut self, product: u64, at: &Placement, depth: usize) -> Result<(), BrepError> {
         let name = self.names.get(&product).cloned();
-        for shape in self.shapes.get(&product).cloned().unwrap_or_default() {
+        let shapes = self.shapes.get(&product).cloned().unwrap_or_default();
+        let mut ids = std::iter::once(product).chain(shapes.iter().map(|shape| shape.id));
+        let file = ids.find_map(|id| self.documents.get(&id)).cloned();
+        let before = self.out.solids.len();
+        for shape in shapes {
             self.add_shape(shape, at, name.as_deref(), depth)?;
+        }
+        let is_leaf = !self.children.contains_key(&product);
+        if let Some(name) = file.filter(|name| is_step(name) || is_leaf)
+            && self.out.solids.len() == before
+        {
+            self.out.files.push(PlacedFile { name, placement: *at });
         }
         for k in 0..self.children.get(&product).map_or(0, Vec::len) {
             let Occurrence { child, placement } = &self.children[&product][k];
@@ -204,13 +232,7 @@ impl<'a> Structure<'a> {
     /// If uses are nested too deep, or there are too many.
     fn count(&mut self, depth: usize) -> Result<(), BrepError> {
         self.uses += 1;
-        if depth > 0 && self.uses <= MOST_USES {
-            return Ok(());
-        }
-        let what = format!(
-            "parts of assemblies are nested more than {DEEPEST} deep, or used more than {MOST_USES} times"
-        );
-        Err(BrepError::Syntax { line: 1, what })
+        if depth > 0 && self.uses <= MOST_USES { Ok(()) } else { Err(too_many()) }
     }
 
     /// A placement of a child in its parent as one in the unit of the result. Their unit is that of
@@ -227,7 +249,7 @@ impl<'a> Structure<'a> {
     /// The unit of a file as a multiple of that of the result, which is the first one if none was
     /// chosen.
     fn scale(&mut self, units: &Units) -> f64 {
-        units.length / *self.unit.get_or_insert(units.length)
+        units.length / *self.out.unit.get_or_insert(units.length)
     }
 
     /// Adds the solids of a representation and of those with the same coordinates.
@@ -256,7 +278,7 @@ impl<'a> Structure<'a> {
                 let name = solid.label().or_else(|| product.map(str::to_owned));
                 let linear = Matrix3::identity() * scale;
                 let placement = at.after(&Placement { linear, shift: [0.0; 3].into() });
-                self.out.push(PlacedSolid { solid, placement, units, name });
+                self.out.solids.push(PlacedSolid { solid, placement, units, name });
             }
             for mapped in items(shape)?.into_iter().filter_map(|item| item.get("MAPPED_ITEM")) {
                 self.count(depth)?;
@@ -270,6 +292,50 @@ impl<'a> Structure<'a> {
         }
         Ok(())
     }
+}
+
+/// The error for assemblies that are nested too deep or repeat too much.
+pub(super) fn too_many() -> BrepError {
+    let what = format!(
+        "parts of assemblies are nested more than {DEEPEST} deep, or used more than {MOST_USES} times"
+    );
+    BrepError::Syntax { line: 1, what }
+}
+
+/// The files that hold product definitions or representations (CAx Implementor Forum, recommended
+/// practices for external references): a document with the name of a file is assigned to the
+/// definition, or is a property of the representation, or both.
+fn documents(records: &Records) -> BTreeMap<u64, String> {
+    let mut files = BTreeMap::new();
+    for node in nodes(records) {
+        if let Some(fields) = node.get("APPLIED_DOCUMENT_REFERENCE")
+            && let Some(name) = fields.refers(0).ok().and_then(file_of)
+        {
+            let definitions = fields.refers_all(2).unwrap_or_default();
+            files.extend(definitions.into_iter().map(|definition| (definition.id, name.clone())));
+        } else if let Some(fields) = node.get("PROPERTY_DEFINITION_REPRESENTATION")
+            && let Ok([property, shape]) = fields.refers(0).and_then(|p| Ok([p, fields.refers(1)?]))
+            && let Some(definition) = property.get("PROPERTY_DEFINITION")
+            && definition.text(0).is_some_and(|kind| kind == "external definition")
+            && let Some(name) = definition.refers(2).ok().and_then(file_of)
+        {
+            files.insert(shape.id, name);
+        }
+    }
+    files
+}
+
+/// Whether a file is a STEP file by its name. Others may be drawings, or parts in the format of the
+/// program.
+pub(super) fn is_step(name: &str) -> bool {
+    let name = name.to_ascii_lowercase();
+    [".stp", ".step", ".p21"].iter().any(|ending| name.ends_with(ending))
+}
+
+/// The name of the file that a document is.
+fn file_of(document: Node) -> Option<String> {
+    let name = document.get("DOCUMENT_FILE")?.text(0)?;
+    name.contains('.').then_some(name)
 }
 
 /// The units of a representation.

@@ -14,44 +14,102 @@ mod units;
 
 pub use units::Unit;
 
-use crate::BrepError;
 use crate::model::Model;
 use crate::shapes::Shapes;
-use std::collections::BTreeSet;
+use crate::{BrepError, Placement};
+use assembly::{DEEPEST, MOST_USES, PlacedFile};
+use std::collections::BTreeMap;
+use std::io;
 
-/// Reads the solids of a file.
+/// Reads the solids of a file; `other` reads a file with parts of it, by its name in this file.
 ///
 /// # Errors
 /// [`BrepError::Syntax`] with the line and record, [`BrepError::NoSolid`],
-/// [`BrepError::Face`] for faces whose edges do not bound them.
-pub(crate) fn read(text: &[u8], unit: Unit) -> Result<Model, BrepError> {
-    let records = text::read(text)?;
-    let (solids, metres) = assembly::solids(&records, unit)?;
-    if solids.is_empty() {
-        let files: BTreeSet<String> = record::nodes(&records).filter_map(other_file).collect();
-        if !files.is_empty() {
-            return Err(BrepError::OtherFiles(files.into_iter().collect::<Vec<_>>().join(", ")));
+/// [`BrepError::Face`] for faces whose edges do not bound them, [`BrepError::OtherFiles`].
+pub(crate) fn read(
+    text: &[u8],
+    unit: Unit,
+    other: &dyn Fn(&str) -> io::Result<Vec<u8>>,
+) -> Result<Model, BrepError> {
+    let unit = match unit {
+        Unit::OfFile => None,
+        Unit::Metres(metres) => Some(metres),
+    };
+    let mut reader = Reader::new(other, unit);
+    reader.read(text, &[Placement::IDENTITY], DEEPEST)?;
+    reader.model()
+}
+
+/// What was read of a file and of those with its parts.
+struct Reader<'a> {
+    other: &'a dyn Fn(&str) -> io::Result<Vec<u8>>,
+    /// Metres of the unit of the result, if it is known.
+    unit: Option<f64>,
+    shapes: Shapes,
+    /// The names of the bodies.
+    names: Vec<Option<String>>,
+    /// Files that could not be read.
+    missing: Vec<String>,
+    /// Numbers of faces, edges and shells that are in no solid.
+    loose: [usize; 3],
+}
+
+impl<'a> Reader<'a> {
+    fn new(other: &'a dyn Fn(&str) -> io::Result<Vec<u8>>, unit: Option<f64>) -> Self {
+        Self { other, unit, shapes: Shapes::default(), names: Vec::new(), missing: Vec::new(), loose: [0; 3] }
+    }
+
+    /// Adds the solids of a file at each of some places, and those of the files that it names.
+    fn read(&mut self, text: &[u8], places: &[Placement], depth: usize) -> Result<(), BrepError> {
+        let records = text::read(text)?;
+        let contents = assembly::contents(&records, self.unit)?;
+        self.unit = contents.unit;
+        let uses = places.len().saturating_mul(contents.solids.len() + contents.files.len());
+        if uses > MOST_USES || depth == 0 {
+            return Err(assembly::too_many());
+        }
+        for place in places {
+            for solid in &contents.solids {
+                self.shapes.add(&solid.placed(place))?;
+                self.names.push(solid.name.clone());
+            }
         }
         let count = |kind: &str| record::nodes(&records).filter(|node| node.is(kind)).count();
         let faces = count("ADVANCED_FACE") + count("FACE_SURFACE");
-        return Err(BrepError::NoSolid(format!("{faces} faces and {} edges", count("EDGE_CURVE"))));
+        let loose = [faces, count("EDGE_CURVE"), count("SHELL_BASED_SURFACE_MODEL")];
+        self.loose.iter_mut().zip(loose).for_each(|(sum, own)| *sum += own);
+        let mut files: BTreeMap<&str, Vec<Placement>> = BTreeMap::new();
+        // Drawings are no loss.
+        let is_part = |file: &&PlacedFile| contents.solids.is_empty() || assembly::is_step(&file.name);
+        for PlacedFile { name, placement } in contents.files.iter().filter(is_part) {
+            files.entry(name).or_default().extend(places.iter().map(|place| place.after(placement)));
+        }
+        for (name, places) in files {
+            match (self.other)(name) {
+                Ok(text) => self.read(&text, &places, depth - 1).map_err(|error| error.in_part(name))?,
+                Err(error) if error.kind() == io::ErrorKind::NotFound => self.missing.push(name.to_owned()),
+                Err(error) => self.missing.push(format!("{name} ({error})")),
+            }
+        }
+        Ok(())
     }
-    let mut shapes = Shapes::default();
-    for solid in &solids {
-        shapes.add(solid)?;
-    }
-    let mut model = Model { bodies: solids.len(), metres: Some(metres), ..Model::default() };
-    model.body_names = solids.into_iter().map(|solid| solid.name).collect();
-    shapes.build(&mut model)?;
-    let left_out = record::nodes(&records).filter(|node| node.is("SHELL_BASED_SURFACE_MODEL")).count();
-    if left_out > 0 {
-        model.notes.push(format!("{left_out} shells that bound no solid are left out"));
-    }
-    Ok(model)
-}
 
-/// The name of a file that holds a part (ISO 10303-41, external references).
-fn other_file(node: record::Node) -> Option<String> {
-    let name = node.get("DOCUMENT_FILE")?.text(0)?;
-    name.contains('.').then_some(name)
+    /// The model of all that was read.
+    fn model(self) -> Result<Model, BrepError> {
+        if !self.missing.is_empty() {
+            return Err(BrepError::OtherFiles(self.missing.join(", ")));
+        }
+        let [faces, edges, shells] = self.loose;
+        if self.names.is_empty() {
+            return Err(BrepError::NoSolid(format!("{faces} faces and {edges} edges")));
+        }
+        let metres = Some(self.unit.unwrap_or(1e-3));
+        let mut model = Model { bodies: self.names.len(), metres, ..Model::default() };
+        model.body_names = self.names;
+        self.shapes.build(&mut model)?;
+        if shells > 0 {
+            model.notes.push(format!("{shells} shells that bound no solid are left out"));
+        }
+        Ok(model)
+    }
 }
