@@ -5,10 +5,10 @@ use super::broadcast;
 use super::coarse_mesh::CoarseMesh;
 use super::decompose;
 use super::error::{Error, RequestError};
-use super::facet_model::FacetSolid;
 use super::geometry::Geometry;
 use super::lattice::{self, Lattice};
 use super::mend;
+use super::merged;
 use super::model::Model;
 use super::options;
 use super::part::{Part, even_out};
@@ -27,7 +27,6 @@ use crate::ground::mesh::{Mesh, Names, Order};
 use crate::ground::progress::{Progress, Stage};
 use crate::ground::projector::Projector;
 use crate::ground::size::Source;
-use crate::mesher::facets::MergedSmall;
 use crate::mesher::improve::{self, Effort, Smoothness};
 use crate::mesher::smoothness::smoothness;
 use crate::parallel::distribution::{self, BareMesh, DistMesh, number_shared};
@@ -56,42 +55,11 @@ pub fn generate(
     options::refuse_different(comm, geometry.is_some(), settings)?;
     comm.agree(options::refuse_impossible(settings))?;
     let model = geometry.filter(|_| comm.rank() == 0).map(|geometry| &geometry.model);
-    let (merged, report) = match model {
-        Some(Model::Facets(solid)) => merge_small(solid, settings, progress),
-        _ => (None, MergedSmall::default()),
-    };
-    let mut made = generate_of(comm, merged.as_ref().or(model), settings, progress)?;
-    if let Some(coarse) = &mut made.coarse {
-        coarse.report.merged_small = report;
-    }
-    Ok(made)
-}
-
-/// Merges what is small in a CAD file, with a note.
-fn merge_small(
-    solid: &FacetSolid,
-    settings: &GenerateSettings,
-    progress: &Progress,
-) -> (Option<Model>, MergedSmall) {
-    /// The volume of a regular tet with edges of length 1.
-    const TET: f64 = 0.118;
-    let of_count = |tets: u64| (solid.volume() / (TET * tets.max(1) as f64)).cbrt();
-    let (wanted, pieces) = settings.before_refinement();
-    let (largest, pieces) = match wanted {
-        Wanted::Sizes { pieces: own } => (f64::INFINITY, pieces * own),
-        Wanted::Coarse { tets, pieces: own } => (of_count(tets), pieces * own),
-        // The subdivisions are chosen later: the elements themselves decide.
-        Wanted::Elements(count) => (of_count(count), pieces),
-    };
-    // Nodes of second order divide edges, too.
-    let pieces = pieces * settings.coarse.order.degree();
-    let (merged, report) = solid.merge_small(&settings.coarse.size, largest, pieces);
-    report.notes().iter().for_each(|text| progress.note(text));
-    (merged.map(|solid| Model::Facets(Box::new(solid))), report)
+    merged::generate(comm, model, settings, progress)
 }
 
 /// **Collective.** Generates the mesh of rank 0's model.
-fn generate_of(
+pub(super) fn generate_of(
     comm: &dyn Communicator,
     model: Option<&Model>,
     settings: &GenerateSettings,
@@ -415,7 +383,7 @@ fn coarse_mesh(
 }
 
 /// The periodic entities of a coarse mesh.
-fn periodic_map(model: &Model, mesh: &Mesh) -> Result<PeriodicMap, Error> {
+pub(super) fn periodic_map(model: &Model, mesh: &Mesh) -> Result<PeriodicMap, Error> {
     let map = match model {
         Model::Csg(model) => PeriodicMap::of(mesh, periodic::links(&model.features), &model.features.bounds),
         Model::Given(given) => PeriodicMap::of(mesh, given.links.clone(), &tree::bounds(&mesh.points)),

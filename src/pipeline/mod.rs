@@ -19,6 +19,7 @@ pub mod inspect;
 mod lattice;
 pub mod levels;
 pub mod mend;
+mod merged;
 mod mesher;
 pub mod model;
 pub mod moved;

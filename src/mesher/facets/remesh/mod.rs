@@ -82,6 +82,10 @@ const MOST_SPLITS: usize = 80;
 /// The most times that sizes are lowered at intersections before the mesh is returned as it is.
 const MOST_CORRECTIONS: usize = 14;
 
+/// After this many corrections in a row with more intersections than before, the mesh is returned
+/// as it is: smaller triangles only fold more often.
+const MOST_WORSE: usize = 3;
+
 /// Rounds over the mesh after sizes were lowered.
 const CORRECTING_ROUNDS: usize = 3;
 
@@ -93,9 +97,9 @@ const LOWERED: f64 = 0.6;
 /// Corners are the first vertices, in their order, followed by the vertices on curves, curve by
 /// curve, and those on patches. Vertices lie on the facets and polylines up to rounding. If
 /// triangles of close patches intersect, the sizes there are lowered and the mesh is refined
-/// further; [`RemeshReport::crossings`] lists intersections that remain, for example because the
-/// facets themselves intersect. If the work of the size field is cancelled, the mesh is returned as
-/// it is.
+/// further as long as that helps; [`RemeshReport::crossings`] lists intersections that remain, for
+/// example because the facets themselves intersect. If the work of the size field is cancelled, the
+/// mesh is returned as it is.
 pub fn remesh(
     model: &FacetModel,
     size: &dyn SizeField,
@@ -106,6 +110,7 @@ pub fn remesh(
     let mut sheet = Sheet::new(model, sizes);
     let mut lowered = Vec::new();
     let mut report = RemeshReport::default();
+    let (mut before, mut worse) = (usize::MAX, 0);
     for correction in 0.. {
         report.corrections = correction;
         // Only regions with lowered sizes change, so a few rounds suffice.
@@ -116,7 +121,12 @@ pub fn remesh(
         // No size removes intersections of the facets themselves.
         let is_input_crossed =
             correction == 0 && !report.crossings.is_empty() && !model.intersections().is_empty();
-        let is_last = correction == MOST_CORRECTIONS || is_input_crossed || sheet.size.work().is_cancelled();
+        worse = if report.crossings.len() > before { worse + 1 } else { 0 };
+        before = report.crossings.len();
+        let is_last = correction == MOST_CORRECTIONS
+            || worse == MOST_WORSE
+            || is_input_crossed
+            || sheet.size.work().is_cancelled();
         if report.crossings.is_empty() || is_last {
             report.measure(&sheet);
             return (mesh, report);
@@ -134,6 +144,9 @@ fn pass(sheet: &mut Sheet, rounds: usize, settings: &RemeshSettings, report: &mu
     report.flips += flip::flip_all(sheet);
     report.collapses += collapse::collapse_short(sheet, settings.short);
     for _ in 0..rounds {
+        if sheet.size.work().is_cancelled() {
+            return;
+        }
         for _ in 0..MOST_SPLITS {
             let splits = split::split_long(sheet, settings.long);
             report.splits += splits;

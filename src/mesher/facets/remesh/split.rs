@@ -26,11 +26,26 @@ pub(super) fn split_long(sheet: &mut Sheet, long: f64) -> usize {
     for (_, a, b) in edges.into_iter().rev().filter(|(_, a, b)| !later.contains(&[*a, *b])) {
         if sheet.at_edge(a, b).next().is_some() {
             let (point, kind) = middle(sheet, a, b);
-            split(sheet, a, b, point, kind);
-            splits += 1;
+            if shortens(sheet, a, b, &point, &kind) {
+                split(sheet, a, b, point, kind);
+                splits += 1;
+            }
         }
     }
     splits
+}
+
+/// The halves of an edge across a patch are at most this fraction of its length.
+///
+/// Between merged faces the midpoint may be projected to an end of the edge: split again and again,
+/// the edge would get thousands of triangles around that end.
+const SHORTER: f64 = 0.75;
+
+/// Whether a split leaves shorter edges. Edges on curves are split at half their arc length.
+fn shortens(sheet: &Sheet, a: u32, b: u32, middle: &Point, kind: &Kind) -> bool {
+    let [a, b] = [a, b].map(|end| &sheet.points[end as usize]);
+    let longest = (middle - a).norm().max((middle - b).norm());
+    !matches!(kind, Kind::Patch(_)) || longest <= SHORTER * (b - a).norm()
 }
 
 /// In a triangle whose long sides are this many times its short one, only the shorter of the long

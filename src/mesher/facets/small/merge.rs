@@ -10,7 +10,7 @@ use crate::mesher::facets::exact::{Shape, grouped};
 use brep::{BrepError, Cut, Model, Tessellation, Tip};
 
 /// The most times that tips are cut off, each time fewer or narrower.
-const ROUNDS: usize = 6;
+const ROUNDS: usize = 12;
 
 /// Tips are not cut where they are thinner than this (fraction of the size of the model): vertices
 /// of CAD files are no more accurate.

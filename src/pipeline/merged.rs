@@ -1,0 +1,135 @@
+//! Meshes of CAD files with their small faces and edges merged, or as they are if there is none.
+
+use super::error::Error;
+use super::facet_model::FacetSolid;
+use super::generate::generate_of;
+use super::model::Model;
+use super::result::Generated;
+use super::settings::{GenerateSettings, Wanted};
+use crate::ground::comm::Communicator;
+use crate::ground::error::{ErrorKind, HasKind};
+use crate::ground::progress::Progress;
+use crate::mesher::facets::MergedSmall;
+
+/// **Collective.** Merges what is small in rank 0's model, and generates the mesh.
+pub(super) fn generate(
+    comm: &dyn Communicator,
+    model: Option<&Model>,
+    settings: &GenerateSettings,
+    progress: &Progress,
+) -> Result<Generated, Error> {
+    let (merged, report) = match model {
+        Some(Model::Facets(solid)) => merge_small(solid, settings, progress),
+        _ => (None, MergedSmall::default()),
+    };
+    let (mut made, is_merged) = of_merged(comm, merged.as_ref(), model, settings, progress)?;
+    if let Some(coarse) = made.coarse.as_mut().filter(|_| is_merged) {
+        coarse.report.merged_small = report;
+    }
+    Ok(made)
+}
+
+/// **Collective.** Generates the mesh of rank 0's merged model, or if that has no mesh, or there is
+/// none, of its own one; returns whether it was the merged one.
+fn of_merged(
+    comm: &dyn Communicator,
+    merged: Option<&Model>,
+    model: Option<&Model>,
+    settings: &GenerateSettings,
+    progress: &Progress,
+) -> Result<(Generated, bool), Error> {
+    match generate_of(comm, merged.or(model), settings, progress) {
+        Ok(made) => Ok((made, merged.is_some())),
+        Err(error) => {
+            let mut may_help = vec![u8::from(merged.is_some() && may_come_from_merging(&error))];
+            let is_heard = comm.broadcast(0, &mut may_help).is_ok();
+            if !is_heard || may_help != [1] {
+                return Err(error);
+            }
+            progress.note(&format!(
+                "small faces and edges are kept, because there is no mesh with them merged: {error}"
+            ));
+            Ok((generate_of(comm, model, settings, progress)?, false))
+        }
+    }
+}
+
+/// Whether a geometry that has no mesh may have one where nothing is merged.
+fn may_come_from_merging(error: &Error) -> bool {
+    let is_of_mesh =
+        matches!(error, Error::Coarse(_) | Error::Cut(_) | Error::Fill { .. } | Error::Invalid(_));
+    is_of_mesh || (error.is_elsewhere() && error.kind() == ErrorKind::NoMesh)
+}
+
+/// Merges what is small in a CAD file, with a note.
+fn merge_small(
+    solid: &FacetSolid,
+    settings: &GenerateSettings,
+    progress: &Progress,
+) -> (Option<Model>, MergedSmall) {
+    /// The volume of a regular tet with edges of length 1.
+    const TET: f64 = 0.118;
+    let of_count = |tets: u64| (solid.volume() / (TET * tets.max(1) as f64)).cbrt();
+    let (wanted, pieces) = settings.before_refinement();
+    let (largest, pieces) = match wanted {
+        Wanted::Sizes { pieces: own } => (f64::INFINITY, pieces * own),
+        Wanted::Coarse { tets, pieces: own } => (of_count(tets), pieces * own),
+        // The subdivisions are chosen later: the elements themselves decide.
+        Wanted::Elements(count) => (of_count(count), pieces),
+    };
+    // Nodes of second order divide edges, too.
+    let pieces = pieces * settings.coarse.order.degree();
+    let (merged, report) = solid.merge_small(&settings.coarse.size, largest, pieces);
+    report.notes().iter().for_each(|text| progress.note(text));
+    (merged.map(|solid| Model::Facets(Box::new(solid))), report)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::files::surface;
+    use crate::ground::comm::thread;
+    use crate::ground::progress::Silent;
+    use crate::pipeline::settings::InputSettings;
+
+    /// Boxes of edge 2 from these places on the x axis.
+    fn boxes(places: &[f64]) -> Model {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("boxes.off");
+        let mut text = format!("OFF\n{} {} 0\n", 8 * places.len(), 6 * places.len());
+        for x in places {
+            (0..8).for_each(|k| text += &format!("{} {} {}\n", x + f64::from(k & 1), k >> 1 & 1, k >> 2));
+        }
+        for k in 0..places.len() {
+            for face in [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]] {
+                let [a, b, c, d] = face.map(|v| v + 8 * k);
+                text += &format!("4 {a} {b} {c} {d}\n");
+            }
+        }
+        std::fs::write(&path, text).unwrap();
+        let surfaces = vec![surface::read(&path).unwrap()];
+        let solid = FacetSolid::of(surfaces, &["boxes".to_owned()], &InputSettings::default()).unwrap();
+        Model::Facets(Box::new(solid))
+    }
+
+    #[test]
+    fn what_has_no_mesh_when_merged_is_meshed_as_it_is() {
+        let (crossed, sound) = (boxes(&[0.0, 0.5]), boxes(&[0.0]));
+        let run = |merged: Option<&Model>, model: &Model| {
+            thread::run(2, |comm| {
+                let is_first = comm.rank() == 0;
+                let models = [merged, Some(model)].map(|model| model.filter(|_| is_first));
+                let settings = GenerateSettings::default();
+                of_merged(comm, models[0], models[1], &settings, &Progress::new(&Silent))
+                    .map(|(made, is_merged)| (made.check.tets, is_merged))
+                    .map_err(|error| error.to_string())
+            })
+            .unwrap()
+        };
+        let expected = run(None, &sound);
+        assert!(expected.iter().all(Result::is_ok), "{expected:?}");
+        assert_eq!(run(Some(&crossed), &sound), expected);
+        assert!(run(Some(&crossed), &crossed).iter().all(Result::is_err));
+        assert!(run(Some(&sound), &crossed).iter().all(|made| made.as_ref().is_ok_and(|made| made.1)));
+    }
+}
