@@ -3,7 +3,7 @@
 use crate::cancel;
 use tetmill::comm::{CommError, Communicator};
 use tetmill::error::{
-    CutError, Error, ErrorKind, HaloError, HasKind, InputError, PartitionError, RequestError,
+    CutError, Error, ErrorKind, HaloError, HasKind, InputError, PartitionError, RequestError, TooManyParts,
 };
 use tetmill::files::elmer::LoadError;
 use tetmill::files::{ReadError, WriteError};
@@ -88,10 +88,9 @@ fn hint(error: &Error) -> Option<String> {
             "planes" => "; they come from --planes-from",
             _ => return None,
         },
-        Error::Request(RequestError::PeriodicMethod) => {
-            ": take one of these, or leave out the identification"
-        }
-        Error::Request(RequestError::SplitPeriodic { .. }) => ", or insist with --allow-split-periodic",
+        Error::Request(
+            RequestError::SplitPeriodic { .. } | RequestError::Parts(TooManyParts::Separated(_)),
+        ) => ", or insist with --allow-split-periodic",
         Error::Request(RequestError::PeriodicRepartition(_)) => {
             ": make other parts of it with `tetmill generate`, which reads pairs, or insist with --allow-split-periodic"
         }

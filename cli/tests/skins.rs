@@ -78,11 +78,30 @@ fn the_method_refine_has_levels_instead() {
 }
 
 #[test]
-fn periodic_faces_are_kept_by_surface_and_refused_by_decompose() {
-    let report = report_of(&own("unit_cell"), &["-m", "surface", "-n", "2", "--refine", "1"]);
-    assert_eq!(report["periodic"]["lost"], 0);
-    assert!(report["periodic"]["pairs"].as_u64().unwrap() > 100, "{}", report["periodic"]);
-    let output = tetmill().arg("generate").arg(own("unit_cell")).args(["-m", "decompose"]).output().unwrap();
-    assert_eq!(output.status.code(), Some(2));
-    assert!(String::from_utf8_lossy(&output.stderr).contains("identify periodic"));
+fn periodic_faces_are_kept_by_surface_and_decompose() {
+    for method in ["surface", "decompose"] {
+        let report = report_of(&own("unit_cell"), &["-m", method, "-n", "2", "--refine", "1"]);
+        assert_eq!(report["periodic"]["lost"], 0);
+        assert!(report["periodic"]["pairs"].as_u64().unwrap() > 100, "{}", report["periodic"]);
+    }
+    // In three directions every plane separates faces from their copies, which Elmer cannot use.
+    let dir = tempfile::tempdir().unwrap();
+    let refused = |more: &[&str]| {
+        let mut command = tetmill();
+        command.arg("generate").arg(own("unit_cell")).args([
+            "-m",
+            "decompose",
+            "-n",
+            "2",
+            "-f",
+            "elmer",
+            "-o",
+        ]);
+        let output = command.arg(dir.path().join("cell")).args(more).output().unwrap();
+        (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+    };
+    let (status, said) = refused(&[]);
+    assert_eq!(status, Some(2), "{said}");
+    assert!(said.contains("which Elmer needs") && said.contains("--allow-split-periodic"), "{said}");
+    assert_eq!(refused(&["--allow-split-periodic"]).0, Some(0));
 }

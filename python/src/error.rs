@@ -129,9 +129,6 @@ fn hint(error: &Error) -> Option<String> {
         Error::Partition(PartitionError::MoreParts { parts, .. }) => {
             Some(format!("coarse={parts} makes enough coarse tets"))
         }
-        Error::Request(RequestError::PeriodicMethod) => {
-            Some("use method=\"refine\" or \"surface\", or remove the identification".into())
-        }
         _ => None,
     }
 }

@@ -5,6 +5,7 @@ use super::coarse::{CoarseSettings, Sizes, Unmeshed, mesh_surface};
 use super::coarse_error::{CoarseError, smaller_at};
 use super::coarse_mesh::CoarseMesh;
 use super::error::{Error, RequestError};
+use super::generate::periodic_map;
 use super::geometry::Geometry;
 use super::goal::Goal;
 use super::model::Model;
@@ -20,10 +21,9 @@ use super::wanted::mesh_as_wanted;
 use crate::ground::comm::Communicator;
 use crate::ground::comm::pack::{put, take};
 use crate::ground::kernel::tree::bounds;
-use crate::ground::mesh::periodic::PeriodicMap;
 use crate::ground::mesh::{Mesh, Rank, VertexId, sorted_face};
 use crate::ground::progress::{Progress, Stage, Work};
-use crate::ground::size::{SizeField, Source, SourceTree};
+use crate::ground::size::{PeriodicSize, SizeField, Source, SourceTree};
 use crate::mesher::model::CsgModel;
 use crate::mesher::surface::{self, SurfaceMesh};
 use crate::parallel::decompose::{self, CutModel, CutPlane, CutStatistics, Cuts};
@@ -68,7 +68,9 @@ pub(super) fn mesh_pieces(
     progress: &Progress,
 ) -> Result<Pieces, Error> {
     let wanted = settings.before_refinement();
-    let planned = model.map(|model| plan_cuts(comm.size(), model, cuts, &settings.coarse, wanted, progress));
+    let plan = decompose::PlanSettings { together: settings.periodic_together, ..cuts.plan };
+    let cuts = CutSettings { plan, ..cuts.clone() };
+    let planned = model.map(|model| plan_cuts(comm.size(), model, &cuts, &settings.coarse, wanted, progress));
     let planned = comm.agree(planned.transpose())?;
     let mut numbers = planned.as_ref().map_or(vec![0.0, 0.0], |planned| {
         let expected = skin::expected_tets(&planned.coarse.mesh, &planned.sizes).iter().sum();
@@ -90,7 +92,8 @@ pub(super) fn mesh_pieces(
         if goal.is_reached(comm, filled.tets.len())? {
             let delivered = skin::delivered(comm, &skin, &filled, &sizes)?;
             let part = progress.stage(Stage::Number, |_| skin::number(comm, skin, filled, boundary[0]))?;
-            let coarse = planned.map(|planned| planned.result(comm.size())).transpose();
+            let result = |(planned, model): (Planned, &Model)| planned.result(comm.size(), model);
+            let coarse = planned.zip(model).map(result).transpose();
             return Ok(Pieces { part, pieces: pieces as u32, delivered, coarse: comm.agree(coarse)? });
         }
     }
@@ -111,12 +114,14 @@ pub struct Planned {
     /// The sizes of the fine mesh at the vertices of the coarse one.
     sizes: Vec<f64>,
     outcome: Option<Outcome>,
+    /// Number of periodic coarse triangles in another part than their copies.
+    separated: usize,
 }
 
 /// Cuts a geometry into `parts` pieces.
 ///
 /// # Errors
-/// Input without geometry, periodic faces, no coarse mesh, unsuitable planes, pieces that cannot be
+/// Input without geometry, no coarse mesh, unsuitable planes, pieces that cannot be
 /// meshed.
 pub fn planned(
     parts: u32,
@@ -142,9 +147,6 @@ fn plan_cuts(
     let Model::Csg(whole) = model else {
         return Err(RequestError::NotCuttable.into());
     };
-    if !whole.features.identified.is_empty() {
-        return Err(RequestError::PeriodicMethod.into());
-    }
     options::refuse_unresolved(model, &settings.size)?;
     room::refuse_too_fine(model, &settings.size, None)?;
     let (pieces, coarse, outcome) = progress.stage(Stage::Mesh, |work| {
@@ -156,17 +158,26 @@ fn plan_cuts(
         let expected = skin::expected_tets(&coarse.mesh, &sizes);
         let statistics = CutStatistics::of(&coarse.mesh, whole, &expected, pieces, parts)?;
         let mut settings = cuts.clone();
+        let mut refused: Option<Error> = None;
         for seed in 0..MOST_PLANS {
             settings.plan = decompose::PlanSettings { seed, through_corners: seed == 0, ..settings.plan };
-            let cuts = plan(&statistics, parts, &settings)?;
+            let cuts = match plan(&statistics, parts, &settings) {
+                Ok(cuts) => cuts,
+                Err(error) => return Err(refused.unwrap_or(error.into())),
+            };
+            let separated = statistics.separated(&cuts);
+            if settings.plan.together && separated > 0 {
+                let tets = coarse.mesh.tets.len();
+                return Err(RequestError::SplitPeriodic { lost: separated, tets }.into());
+            }
             match CutModel::new(whole, &cuts, candidates(&coarse.mesh, &cuts)) {
-                Ok(model) => return Ok(Planned { cuts, model, coarse, pieces, sizes, outcome }),
+                Ok(model) => return Ok(Planned { cuts, model, coarse, pieces, sizes, outcome, separated }),
                 // Other planes may work.
-                Err(_) if settings.planes.is_empty() && seed + 1 < MOST_PLANS => {}
+                Err(error) if settings.planes.is_empty() => refused = Some(error.into()),
                 Err(error) => return Err(error.into()),
             }
         }
-        unreachable!("the last plan returns")
+        Err(refused.expect("there is a plan"))
     })
 }
 
@@ -212,12 +223,14 @@ impl Planned {
     }
 
     /// The coarse mesh with the parts that the cuts make of it.
-    fn result(self, parts: u32) -> Result<CoarseResult, Error> {
-        let Self { cuts, coarse: CoarseMesh { mesh, report, .. }, outcome, .. } = self;
+    fn result(self, parts: u32, model: &Model) -> Result<CoarseResult, Error> {
+        let Self { cuts, coarse: CoarseMesh { mesh, report, .. }, outcome, separated, .. } = self;
         let assigned: Vec<Rank> =
             mesh.tets.iter().map(|tet| cuts.leaf_of(&centre(&mesh, tet)) as Rank).collect();
-        let partition = partition::assess(&mesh, &assigned, parts)?;
-        let (displacements, periodic) = (EdgeDisplacements::default(), PeriodicMap::default());
+        let periodic = periodic_map(model, &mesh)?;
+        let mut partition = partition::assess(&mesh, &assigned, parts)?;
+        partition.lost_ties = separated;
+        let displacements = EdgeDisplacements::default();
         Ok(CoarseResult { mesh, displacements, parts: assigned, report, outcome, partition, periodic })
     }
 }
@@ -282,7 +295,10 @@ fn fine_surface(model: &CsgModel, base: &dyn SizeField) -> Result<SurfaceMesh, C
     let mut sources: Vec<Source> = Vec::new();
     let mut corrections = 0;
     loop {
-        let size = Lowered { base, sources: SourceTree::new(bounds, GRADING, bounds.diagonal(), &sources) };
+        let sources_of = SourceTree::new(bounds, GRADING, bounds.diagonal(), &sources);
+        let lowered = Lowered { base, sources: sources_of };
+        // Without periodic faces the same as the lowered sizes.
+        let size = PeriodicSize::new(&lowered, &model.features, GRADING);
         match mesh_surface(model, Sizes { size: &size, initial: base }, corrections < CORRECTIONS) {
             Ok((surface, _)) => {
                 // The ranks could not fill this surface, and would find out too late.

@@ -238,9 +238,6 @@ pub enum RequestError {
         /// The first option that differs.
         option: &'static str,
     },
-    /// A method that does not keep periodic faces, for a geometry that has some.
-    #[error("periodic faces (`identify periodic`) are kept by the methods `refine` and `surface` only")]
-    PeriodicMethod,
     /// Periodic faces cannot be in one part with their copies.
     #[error(
         "{lost} of the {tets} tets before refinement cannot be in one part with those at the partners of their periodic \

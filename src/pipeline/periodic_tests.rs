@@ -419,3 +419,31 @@ fn parts_that_are_filled_separately_are_periodic_and_have_pairs_together() {
         }
     }
 }
+
+#[test]
+fn pieces_between_planes_are_periodic_too() {
+    for (name, ranks, refine, together) in
+        [("unit_cell", 4, 1, false), ("sheared_cell", 6, 0, false), ("rotor_sector", 3, 1, true)]
+    {
+        let model = model(name);
+        let settings = GenerateSettings {
+            method: Method::Decompose(Default::default()),
+            refine,
+            periodic_together: together,
+            ..settings(0, &[])
+        };
+        let run = |comm: &dyn crate::ground::comm::Communicator| {
+            let model = (comm.rank() == 0).then_some(&model);
+            generate(comm, model, &settings, &Progress::new(&Silent)).unwrap()
+        };
+        let mut all = thread::run(ranks, run).unwrap();
+        let first = all.remove(0);
+        let periodic = first.periodic.as_ref().unwrap();
+        assert!(
+            periodic.pairs > 20 && periodic.lost == 0 && periodic.furthest < 1e-14,
+            "{name}: {periodic:?}"
+        );
+        let lost = first.coarse.unwrap().partition.lost_ties;
+        assert_eq!(lost == 0, together, "{name}");
+    }
+}

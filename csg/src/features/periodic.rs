@@ -371,7 +371,9 @@ fn orientation_of_copy(
             (on_it - (w[0] + chord * part)).norm() <= SAGITTA * chord.norm() + tolerances.merge
         })?;
         let forward = motion * (a.trace[(at + 1).min(last)] - a.trace[at.saturating_sub(1)]);
-        (surfaces[0].max(surfaces[1]) <= tolerances.merge).then(|| forward.dot(&(near[1] - near[0])) < 0.0)
+        // The middle of a trace of one chord is not on the curve.
+        let off = if last == 1 { SAGITTA * forward.norm() } else { 0.0 } + tolerances.merge;
+        (surfaces[0].max(surfaces[1]) <= off).then(|| forward.dot(&(near[1] - near[0])) < 0.0)
     };
     let places = [last / 4, last / 2, 3 * last / 4].map(|at| at.max(1).min(last.max(2) - 1));
     let reversed = direction_at(places[0])?;

@@ -1,6 +1,6 @@
 //! The cut geometry: each body is cut into one piece for each part that it extends into.
 
-use super::plan::{Cuts, Half};
+use super::cuts::{Cuts, Half};
 use crate::Point;
 use crate::ground::error::{ErrorKind, HasKind};
 use crate::ground::kernel::nearest::in_segment;

@@ -13,6 +13,9 @@
 //! of the result.
 
 pub mod cut;
+mod cuts;
+mod grid;
+mod periodic;
 mod plan;
 mod scan;
 mod skins;
@@ -23,7 +26,8 @@ mod text;
 mod tests;
 
 pub use cut::{CutError, CutModel};
-pub use plan::{Candidates, CutPlane, Cuts, PlanSettings, TooManyParts, plan};
+pub use cuts::{CutPlane, Cuts};
+pub use plan::{Candidates, PlanSettings, TooManyParts, plan};
 pub use skins::{LooseEdge, pack, skins, unpack};
 pub use statistics::CutStatistics;
 pub use text::geo_text;

@@ -12,9 +12,13 @@
 //! - other planes at a small angle, and intersection lines close together on earlier planes: narrow
 //!   strips.
 //!
-//! A plane may cut several pieces.
+//! A plane may cut several pieces. Of a geometry with periodic faces only planes are taken that
+//! keep them periodic.
 
 use super::CutStatistics;
+use super::cuts::{CutPlane, Cuts, Half, Spot, meeting_point, with_half};
+use super::grid::{axes, grid};
+use super::periodic::PeriodicWithin;
 use super::scan::{Scan, is_met};
 use super::statistics::{Crossed, Sample};
 use crate::ground::kernel::random::Random;
@@ -23,127 +27,6 @@ use crate::{Point, Vector};
 use csg::Aabb;
 use nalgebra::{Matrix3, SymmetricEigen};
 use rayon::prelude::*;
-
-/// An oriented cutting plane.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct CutPlane {
-    /// A point on it.
-    pub point: Point,
-    /// Its unit normal.
-    pub normal: Vector,
-}
-
-impl CutPlane {
-    /// The signed distance of a point.
-    pub fn value(&self, point: &Point) -> f64 {
-        self.normal.dot(&(point - self.point))
-    }
-
-    /// Whether a point is on the side of the normal.
-    fn is_positive(&self, point: &Point) -> bool {
-        self.value(point) > 0.0
-    }
-
-    /// The samples behind it and in front of it.
-    fn split<'a>(&self, samples: &[&'a Sample]) -> [Vec<&'a Sample>; 2] {
-        let (positive, negative) = samples.iter().partition(|sample| self.is_positive(&sample.point));
-        [negative, positive]
-    }
-
-    /// Whether its distance from a box is at most `room`.
-    fn comes_near(&self, bounds: &Aabb, room: f64) -> bool {
-        let half = 0.5 * (bounds.max - bounds.min);
-        let reach = half.dot(&self.normal.abs());
-        self.value(&nalgebra::center(&bounds.min, &bounds.max)).abs() <= reach + room
-    }
-
-    /// The cost of the distance from a spot: zero if the plane keeps away or goes exactly through
-    /// it.
-    fn crowds(&self, spot: &Spot) -> f64 {
-        let distance = self.value(&spot.point).abs() / spot.near;
-        if distance > 1.0 || spot.is_exact && distance < SAME {
-            return 0.0;
-        }
-        CORNER * (1.0 - distance) / (ROOM + distance)
-    }
-}
-
-/// A point that planes keep away from.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Spot {
-    pub point: Point,
-    /// Closer than this there is no room for good tets.
-    pub near: f64,
-    /// Whether its coordinates are exact, so that a plane may go through it.
-    pub is_exact: bool,
-}
-
-/// A half-space of a cutting plane.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Half {
-    /// The plane, by index in [`Cuts::planes`].
-    pub plane: usize,
-    /// Whether it is the side of the normal.
-    pub positive: bool,
-}
-
-/// A partition of space into convex pieces, one for each part.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Cuts {
-    /// The planes.
-    pub planes: Vec<CutPlane>,
-    /// The pieces, as intersections of half-spaces.
-    pub leaves: Vec<Vec<Half>>,
-}
-
-impl Half {
-    /// The depth of a point inside the half-space, negative outside.
-    fn depth(self, planes: &[CutPlane], point: &Point) -> f64 {
-        let value = planes[self.plane].value(point);
-        if self.positive { value } else { -value }
-    }
-
-    /// Whether a point belongs to it; points on the plane belong to the side opposite the normal.
-    fn contains(self, planes: &[CutPlane], point: &Point) -> bool {
-        planes[self.plane].is_positive(point) == self.positive
-    }
-}
-
-impl Cuts {
-    /// The piece that contains a point.
-    pub fn leaf_of(&self, point: &Point) -> usize {
-        let contains = |leaf: &Vec<Half>| leaf.iter().all(|half| half.contains(&self.planes, point));
-        self.leaves.iter().position(contains).expect("the pieces fill space")
-    }
-
-    /// The pieces whose half-spaces each have one of the points inside or within `room`.
-    pub fn leaves_near(&self, points: &[Point], room: f64) -> impl Iterator<Item = usize> {
-        let reaches = move |half: &Half| points.iter().any(|point| half.depth(&self.planes, point) > -room);
-        (0..self.leaves.len()).filter(move |&leaf| self.leaves[leaf].iter().all(reaches))
-    }
-
-    /// The pieces made by successive planes: each plane cuts all pieces that have samples on both
-    /// sides of it.
-    pub fn by_planes(planes: &[CutPlane], statistics: &CutStatistics) -> Self {
-        let mut leaves = vec![(Vec::new(), statistics.samples.iter().collect::<Vec<&Sample>>())];
-        for (plane, cut) in planes.iter().enumerate() {
-            leaves = leaves
-                .into_iter()
-                .flat_map(|(halves, samples)| {
-                    let [negative, positive] = cut.split(&samples);
-                    if positive.is_empty() || negative.is_empty() {
-                        return vec![(halves, samples)];
-                    }
-                    vec![
-                        (with_half(&halves, plane, false), negative),
-                        (with_half(&halves, plane, true), positive),
-                    ]
-                })
-                .collect();
-        }
-        Self { planes: planes.to_vec(), leaves: leaves.into_iter().map(|leaf| leaf.0).collect() }
-    }
-}
 
 /// The directions of candidate planes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -175,21 +58,42 @@ pub struct PlanSettings {
     pub seed: u64,
     /// Whether planes may go exactly through corners.
     pub through_corners: bool,
+    /// Whether periodic faces must be in one part with their copies.
+    pub together: bool,
 }
 
 impl Default for PlanSettings {
     /// An allowance of two percent.
     fn default() -> Self {
-        Self { candidates: Candidates::All, allowance: 0.02, tries: 12, seed: 0, through_corners: true }
+        Self {
+            candidates: Candidates::All,
+            allowance: 0.02,
+            tries: 12,
+            seed: 0,
+            through_corners: true,
+            together: false,
+        }
     }
 }
 
-/// The coarse mesh has too few samples for the number of parts.
+/// Why there are no planes for the number of parts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("this geometry cannot be cut into {parts} parts; request fewer parts or smaller sizes")]
-pub struct TooManyParts {
-    /// The requested parts.
-    pub parts: u32,
+pub enum TooManyParts {
+    /// The coarse mesh has too few samples.
+    #[error("this geometry cannot be cut into {0} parts; request fewer parts or smaller sizes")]
+    Samples(u32),
+    /// All planes would cut a periodic face otherwise than its copy.
+    #[error(
+        "no planes cut this geometry into {0} parts so that periodic faces and their copies are cut alike: request \
+         fewer parts, or take the method `surface`"
+    )]
+    Periodic(u32),
+    /// All planes would separate periodic faces from their copies.
+    #[error(
+        "no planes cut this geometry into {0} parts so that each periodic face is in one part with its copy, which \
+         Elmer needs: request fewer parts"
+    )]
+    Separated(u32),
 }
 
 /// A plane with less bad cost than this, in cells, is accepted without trying further directions.
@@ -227,27 +131,32 @@ const ALONG: f64 = 1.0 - 1e-9;
 /// Planes that meet at an angle with a smaller sine than this make slices.
 const SHALLOW: f64 = 0.6;
 
-/// Cuts space into `parts` pieces with equal shares of the samples.
+/// Cuts space into `parts` pieces with equal shares of the samples, or with about equal ones if the
+/// geometry is periodic in several directions.
 ///
 /// # Errors
-/// [`TooManyParts`] if there are too few samples to separate the parts.
+/// [`TooManyParts`] if there are too few samples to separate the parts, or no planes that keep
+/// periodic faces periodic.
 pub fn plan(statistics: &CutStatistics, parts: u32, settings: &PlanSettings) -> Result<Cuts, TooManyParts> {
+    if let Some(cuts) = grid(statistics, parts, settings) {
+        return Ok(cuts);
+    }
     let mut cuts = Cuts::default();
-    let all = Piece { halves: Vec::new(), samples: statistics.samples.iter().collect(), parts };
-    let mut waiting = vec![all];
+    let mut waiting = vec![Piece::whole(statistics, parts)];
     while let Some(piece) = waiting.pop() {
         if piece.parts == 1 {
             cuts.leaves.push(piece.halves);
             continue;
         }
         if piece.samples.len() < 2 * piece.parts as usize {
-            return Err(TooManyParts { parts });
+            return Err(TooManyParts::Samples(parts));
         }
-        let plane = piece.best_plane(&cuts, statistics, settings);
+        let none = if settings.together { TooManyParts::Separated } else { TooManyParts::Periodic };
+        let plane = piece.best_plane(&cuts, statistics, settings).ok_or(none(parts))?;
         let index = cuts.planes.iter().position(|known| *known == plane).unwrap_or(cuts.planes.len());
         let children = piece.cut(&plane, index);
         if children.iter().any(|child| child.samples.is_empty()) {
-            return Err(TooManyParts { parts });
+            return Err(TooManyParts::Samples(parts));
         }
         if index == cuts.planes.len() {
             cuts.planes.push(plane);
@@ -298,13 +207,18 @@ impl Others {
 }
 
 /// A piece of space that will become several parts.
-struct Piece<'a> {
+pub(super) struct Piece<'a> {
     halves: Vec<Half>,
-    samples: Vec<&'a Sample>,
+    pub samples: Vec<&'a Sample>,
     parts: u32,
 }
 
 impl<'a> Piece<'a> {
+    /// All of space.
+    pub fn whole(statistics: &'a CutStatistics, parts: u32) -> Self {
+        Self { halves: Vec::new(), samples: statistics.samples.iter().collect(), parts }
+    }
+
     fn cut(&self, plane: &CutPlane, index: usize) -> [Self; 2] {
         let [negative, positive] = plane.split(&self.samples);
         let child = |samples, positive, parts| {
@@ -320,11 +234,22 @@ impl<'a> Piece<'a> {
         f64::from(self.parts / 2) / f64::from(self.parts)
     }
 
-    fn best_plane(&self, cuts: &Cuts, statistics: &CutStatistics, settings: &PlanSettings) -> CutPlane {
-        let directions = self.directions(settings, settings.seed << 32 | cuts.planes.len() as u64);
+    /// The plane of least cost; `None` if none keeps periodic faces periodic.
+    fn best_plane(
+        &self,
+        cuts: &Cuts,
+        statistics: &CutStatistics,
+        settings: &PlanSettings,
+    ) -> Option<CutPlane> {
+        let periodic =
+            PeriodicWithin::new(&statistics.periodic, &self.halves, &cuts.planes, settings.together);
+        let mut directions = self.directions(settings, settings.seed << 32 | cuts.planes.len() as u64);
         if settings.candidates == Candidates::Median {
-            return Scan::new(&self.samples, directions[0][0]).places(self.share(), 0.0)[0];
+            let plane = Scan::new(&self.samples, directions[0][0]).places(self.share(), 0.0)[0];
+            return periodic.allows(&plane).then_some(plane);
         }
+        let normals = periodic.normals(&directions.concat());
+        directions[0].extend(normals);
         let crossed = statistics.within(|point| self.contains(cuts, point));
         let others = Others::of(self, cuts, &crossed);
         let mut scans: Vec<Vec<Scan>> = Vec::new();
@@ -335,7 +260,9 @@ impl<'a> Piece<'a> {
                     let scan = |normal: &Vector| Scan::new(&self.samples, *normal);
                     scans.push(directions.par_iter().map(scan).collect());
                 }
-                let candidates = self.candidates(&scans[group], group == 0, &others, allowance, settings);
+                let shares = (self.share(), allowance);
+                let mut candidates = self.candidates(&scans[group], group == 0, &others, shares, settings);
+                candidates.retain(|(plane, _)| periodic.allows(plane));
                 let cost = |(plane, met): (CutPlane, Vec<&Sample>)| {
                     (self.cost(&plane, &met, &crossed, &others), plane)
                 };
@@ -349,7 +276,38 @@ impl<'a> Piece<'a> {
                 break;
             }
         }
-        best.expect("there are directions").1
+        best.map(|(_, plane)| plane)
+    }
+
+    /// The plane of least cost across one direction, with about this share of the samples behind
+    /// it, and its cost. The share may be off by a part of the share `width` of a layer.
+    pub fn best_of_scan(
+        &self,
+        scan: &Scan<'a>,
+        (share, width): (f64, f64),
+        cuts: &Cuts,
+        (statistics, periodic): (&CutStatistics, &PeriodicWithin),
+        settings: &PlanSettings,
+    ) -> Option<(f64, CutPlane)> {
+        let crossed = statistics.within(|_| true);
+        let others = Others::of(self, cuts, &crossed);
+        let mut best: Option<(Cost, CutPlane)> = None;
+        // With the usual allowance planes through corners are less than half a layer off, so that
+        // no two layers have the same.
+        for factor in [1.0, AT_WORST, 2.0 * AT_WORST] {
+            let shares = (share, factor * settings.allowance * width / share);
+            let mut candidates =
+                self.candidates(std::slice::from_ref(scan), false, &others, shares, settings);
+            candidates.retain(|(plane, _)| periodic.allows(plane));
+            let cost =
+                |(plane, met): (CutPlane, Vec<&Sample>)| (self.cost(&plane, &met, &crossed, &others), plane);
+            let costs = candidates.into_iter().map(cost);
+            best = best.into_iter().chain(costs).min_by(|a, b| a.0.total().total_cmp(&b.0.total()));
+            if best.as_ref().is_some_and(|(cost, _)| cost.bad < 1.0) {
+                break;
+            }
+        }
+        best.map(|(cost, plane)| (cost.total(), plane))
     }
 
     /// Candidate planes, with the samples that they cut: at positions along some directions, and
@@ -360,10 +318,10 @@ impl<'a> Piece<'a> {
         scans: &[Scan<'a>],
         with_others: bool,
         others: &Others,
-        allowance: f64,
+        (share, allowance): (f64, f64),
         settings: &PlanSettings,
     ) -> Vec<(CutPlane, Vec<&'a Sample>)> {
-        let (share, again) = (self.share(), AGAIN * allowance);
+        let again = AGAIN * allowance;
         let exact = others.spots.iter().filter(|spot| settings.through_corners && spot.is_exact);
         let exact: Vec<&Spot> = exact.collect();
         let across = |scan: &Scan<'a>| {
@@ -421,14 +379,13 @@ impl<'a> Piece<'a> {
     /// Unit normals of candidate planes, in groups: later groups are tried only if no plane of the
     /// earlier ones is good.
     fn directions(&self, settings: &PlanSettings, seed: u64) -> Vec<Vec<Vector>> {
-        let axes = || vec![Vector::x(), Vector::y(), Vector::z()];
         match settings.candidates {
-            Candidates::Axes => vec![axes()],
+            Candidates::Axes => vec![axes().to_vec()],
             Candidates::Principal => vec![self.principal_axes()],
             Candidates::Random => vec![random_directions(settings.tries, seed)],
             Candidates::All => {
                 let others = [self.principal_axes(), random_directions(settings.tries, seed)].concat();
-                vec![axes(), others]
+                vec![axes().to_vec(), others]
             }
             Candidates::Median => {
                 let bounds = self.bounds();
@@ -474,23 +431,20 @@ impl<'a> Piece<'a> {
                 }
             }
         }
-        bad += others.spots.iter().map(|spot| plane.crowds(spot)).sum::<f64>();
+        bad += others.spots.iter().map(|spot| crowds(plane, spot)).sum::<f64>();
         let factor = if plane.normal.amax() < ALONG { OBLIQUE } else { 1.0 };
         Cost { cut: factor * cut.len() as f64, bad: factor * bad }
     }
 }
 
-/// The half-spaces of a piece and one more.
-fn with_half(halves: &[Half], plane: usize, positive: bool) -> Vec<Half> {
-    [halves, &[Half { plane, positive }]].concat()
-}
-
-/// The intersection of three planes, `None` if it is nearly degenerate.
-pub(super) fn meeting_point(planes: [&CutPlane; 3]) -> Option<Point> {
-    let rows = planes.map(|plane| plane.normal.transpose());
-    let offsets = planes.map(|plane| plane.normal.dot(&plane.point.coords));
-    let inverse = Matrix3::from_rows(&rows).try_inverse()?;
-    Some(Point::from(inverse * Vector::from(offsets)))
+/// The cost of the distance of a plane from a spot: zero if it keeps away or goes exactly through
+/// it.
+fn crowds(plane: &CutPlane, spot: &Spot) -> f64 {
+    let distance = plane.value(&spot.point).abs() / spot.near;
+    if distance > 1.0 || spot.is_exact && distance < SAME {
+        return 0.0;
+    }
+    CORNER * (1.0 - distance) / (ROOM + distance)
 }
 
 /// The cost weight of an angle with this sine: from 1 for zero to 0 if it is large enough.

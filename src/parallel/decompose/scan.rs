@@ -1,7 +1,8 @@
 //! The samples of a piece, sorted along a direction: finds the samples behind a plane, and those it
 //! cuts, by bisection.
 
-use super::plan::{CutPlane, SAME, Spot};
+use super::cuts::{CutPlane, Spot};
+use super::plan::SAME;
 use super::statistics::Sample;
 use crate::{Point, Vector};
 

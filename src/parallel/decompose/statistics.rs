@@ -2,7 +2,8 @@
 //! chosen.
 
 use super::CutError;
-use super::plan::{CutPlane, Spot, meeting_point};
+use super::cuts::{CutPlane, Cuts, Spot, meeting_point};
+use super::periodic::{PeriodicFaces, periodic_faces};
 use crate::ground::comm::thread;
 use crate::ground::mesh::{Class, Mesh, TET_EDGES};
 use crate::mesher::model::CsgModel;
@@ -47,6 +48,7 @@ pub struct CutStatistics {
     faces: Vec<Face>,
     curves: Vec<Piece>,
     corners: Vec<(Point, f64)>,
+    pub(super) periodic: Vec<PeriodicFaces>,
 }
 
 /// The maximum number of subdivisions per edge of the boundary.
@@ -69,7 +71,8 @@ impl CutStatistics {
         pieces: u32,
         parts: u32,
     ) -> Result<Self, CutError> {
-        let mut statistics = Self::default();
+        let periodic = periodic_faces(mesh, &whole.features);
+        let mut statistics = Self { periodic, ..Self::default() };
         let samples = (SAMPLES * parts as usize).max(mesh.tets.len()) as f64;
         let share = samples / expected.iter().sum::<f64>();
         let mut before = 0.0;
@@ -119,6 +122,11 @@ impl CutStatistics {
         let corners = whole.features.corners.iter();
         statistics.corners = corners.map(|corner| (corner.point, size_near(&corner.point))).collect();
         Ok(statistics)
+    }
+
+    /// The number of periodic coarse triangles in another piece than their copies.
+    pub fn separated(&self, cuts: &Cuts) -> usize {
+        self.periodic.iter().map(|faces| faces.separated(cuts)).sum()
     }
 
     /// The statistics inside a piece of space.

@@ -85,7 +85,7 @@ fn more_parts_than_can_be_told_apart_are_refused() {
     let bar = model(BAR);
     let few = statistics(&bar, 1);
     let parts = few.samples.len() as u32;
-    assert_eq!(plan(&few, parts, &PlanSettings::default()), Err(TooManyParts { parts }));
+    assert_eq!(plan(&few, parts, &PlanSettings::default()), Err(TooManyParts::Samples(parts)));
 }
 
 #[test]
@@ -304,4 +304,48 @@ fn parts_fill_what_their_surface_encloses_which_is_a_ball_but_for_the_chords() {
         // The volume of a cap is at most its base on the surface times its height.
         assert!(volume < exact && exact - volume < 1.1 * between, "{volume} of {exact}, chords {between}");
     }
+}
+
+/// A geometry of the repository.
+fn own(name: &str) -> CsgModel {
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("geometries/{name}.geo"));
+    model(&std::fs::read_to_string(path).unwrap())
+}
+
+#[test]
+fn planes_cut_periodic_faces_and_their_copies_alike() {
+    for name in ["unit_cell", "sheared_cell", "rotor_sector"] {
+        let model = own(name);
+        for parts in [2, 3, 5, 8] {
+            let statistics = statistics(&model, parts);
+            let cuts = plan(&statistics, parts, &PlanSettings::default()).unwrap();
+            assert_eq!(cuts.leaves.len(), parts as usize, "{name}");
+            for faces in &statistics.periodic {
+                let leaves: Vec<[usize; 2]> =
+                    faces.middles().iter().map(|both| both.each_ref().map(|p| cuts.leaf_of(p))).collect();
+                assert!(!leaves.is_empty(), "{name}");
+                // Each piece of a face is one piece of its copy.
+                for [one, copy] in &leaves {
+                    assert!(leaves.iter().all(|[a, b]| (a == one) == (b == copy)), "{name} in {parts} parts");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn periodic_faces_stay_with_their_copies_on_request() {
+    let together = PlanSettings { together: true, ..PlanSettings::default() };
+    for name in ["sheared_cell", "rotor_sector"] {
+        let statistics = statistics(&own(name), 4);
+        let cuts = plan(&statistics, 4, &together).unwrap();
+        assert_eq!((cuts.leaves.len(), statistics.separated(&cuts)), (4, 0), "{name}");
+        let apart = plan(&statistics, 4, &PlanSettings::default()).unwrap();
+        assert!(statistics.separated(&apart) > 0, "{name}");
+    }
+    // Each plane between faces that are periodic in three directions separates some.
+    let mut statistics = statistics(&own("unit_cell"), 2);
+    assert_eq!(plan(&statistics, 2, &together), Err(TooManyParts::Separated(2)));
+    statistics.periodic.clear();
+    assert_eq!(plan(&statistics, 2, &together).unwrap().leaves.len(), 2);
 }

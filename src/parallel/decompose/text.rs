@@ -1,6 +1,6 @@
 //! Writes the cut geometry as a `.geo` file.
 
-use super::plan::{CutPlane, Cuts, Half};
+use super::cuts::{CutPlane, Cuts, Half};
 use csg::{Body, BodyId, Geometry};
 use std::fmt::Write;
 
