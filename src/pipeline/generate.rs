@@ -5,14 +5,12 @@ use super::broadcast;
 use super::coarse_mesh::CoarseMesh;
 use super::decompose;
 use super::error::{Error, RequestError};
-use super::geometry::Geometry;
 use super::lattice::{self, Lattice};
 use super::mend;
-use super::merged;
 use super::model::Model;
 use super::options;
 use super::part::{Part, even_out};
-use super::periodic::Linked;
+use super::periodic::{Linked, periodic_map};
 use super::result::{CoarseResult, Generated, Level, Refinement, Refused};
 use super::retries::{Budget, REFINEMENTS};
 use super::room;
@@ -20,10 +18,8 @@ use super::settings::{CutSettings, GenerateSettings, Method, Wanted};
 use super::skins;
 use super::wanted::mesh_as_wanted;
 use crate::ground::comm::Communicator;
-use crate::ground::kernel::tree;
-use crate::ground::mesh::periodic::{self, PeriodicMap};
 use crate::ground::mesh::topology::MatchedFaces;
-use crate::ground::mesh::{Mesh, Names, Order};
+use crate::ground::mesh::{Names, Order};
 use crate::ground::progress::{Progress, Stage};
 use crate::ground::projector::Projector;
 use crate::ground::size::Source;
@@ -36,27 +32,6 @@ use crate::parallel::partition::ties::Ties;
 use crate::parallel::partition::{self, PartitionError};
 use crate::parallel::skin::{self, DeliveredSizes, Improvement};
 use std::sync::Arc;
-
-/// **Collective.** Makes the mesh; only rank 0 needs the geometry and reports `progress`.
-///
-/// The settings must be the same on all ranks, except the sources, the size function and `disk`,
-/// which rank 0 alone uses, and `memory`.
-///
-/// # Errors
-/// The same on all ranks: impossible or different settings, no geometry on rank 0, no coarse mesh,
-/// more parts than tets, too many vertices on a rank, inverted tets that no finer coarse mesh
-/// avoids, a faulty mesh.
-pub fn generate(
-    comm: &dyn Communicator,
-    geometry: Option<&Geometry>,
-    settings: &GenerateSettings,
-    progress: &Progress,
-) -> Result<Generated, Error> {
-    options::refuse_different(comm, geometry.is_some(), settings)?;
-    comm.agree(options::refuse_impossible(settings))?;
-    let model = geometry.filter(|_| comm.rank() == 0).map(|geometry| &geometry.model);
-    merged::generate(comm, model, settings, progress)
-}
 
 /// **Collective.** Generates the mesh of rank 0's model.
 pub(super) fn generate_of(
@@ -380,14 +355,4 @@ fn coarse_mesh(
         periodic: map,
     };
     Ok(Coarse { pieces, result, sizes, faces })
-}
-
-/// The periodic entities of a coarse mesh.
-pub(super) fn periodic_map(model: &Model, mesh: &Mesh) -> Result<PeriodicMap, Error> {
-    let map = match model {
-        Model::Csg(model) => PeriodicMap::of(mesh, periodic::links(&model.features), &model.features.bounds),
-        Model::Given(given) => PeriodicMap::of(mesh, given.links.clone(), &tree::bounds(&mesh.points)),
-        Model::Facets(_) => Ok(PeriodicMap::default()),
-    };
-    map.map_err(Error::from)
 }

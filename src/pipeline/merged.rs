@@ -1,9 +1,12 @@
-//! Meshes of CAD files with their small faces and edges merged, or as they are if there is none.
+//! The way into all methods: a CAD file is meshed with its small faces and edges merged, or as it
+//! is if there is no such mesh.
 
 use super::error::Error;
 use super::facet_model::FacetSolid;
 use super::generate::generate_of;
+use super::geometry::Geometry;
 use super::model::Model;
+use super::options;
 use super::result::Generated;
 use super::settings::{GenerateSettings, Wanted};
 use crate::ground::comm::Communicator;
@@ -11,13 +14,24 @@ use crate::ground::error::{ErrorKind, HasKind};
 use crate::ground::progress::Progress;
 use crate::mesher::facets::MergedSmall;
 
-/// **Collective.** Merges what is small in rank 0's model, and generates the mesh.
-pub(super) fn generate(
+/// **Collective.** Makes the mesh; only rank 0 needs the geometry and reports `progress`.
+///
+/// The settings must be the same on all ranks, except the sources, the size function and `disk`,
+/// which rank 0 alone uses, and `memory`.
+///
+/// # Errors
+/// The same on all ranks: impossible or different settings, no geometry on rank 0, no coarse mesh,
+/// more parts than tets, too many vertices on a rank, inverted tets that no finer coarse mesh
+/// avoids, a faulty mesh.
+pub fn generate(
     comm: &dyn Communicator,
-    model: Option<&Model>,
+    geometry: Option<&Geometry>,
     settings: &GenerateSettings,
     progress: &Progress,
 ) -> Result<Generated, Error> {
+    options::refuse_different(comm, geometry.is_some(), settings)?;
+    comm.agree(options::refuse_impossible(settings))?;
+    let model = geometry.filter(|_| comm.rank() == 0).map(|geometry| &geometry.model);
     let (merged, report) = match model {
         Some(Model::Facets(solid)) => merge_small(solid, settings, progress),
         _ => (None, MergedSmall::default()),
@@ -30,7 +44,7 @@ pub(super) fn generate(
 }
 
 /// **Collective.** Generates the mesh of rank 0's merged model, or if that has no mesh, or there is
-/// none, of its own one; returns whether it was the merged one.
+/// none, of its own one; on rank 0 also returns whether it was the merged one.
 fn of_merged(
     comm: &dyn Communicator,
     merged: Option<&Model>,
@@ -92,13 +106,16 @@ mod tests {
     use crate::ground::progress::Silent;
     use crate::pipeline::settings::InputSettings;
 
-    /// Boxes of edge 2 from these places on the x axis.
+    /// Boxes of edge 1 from these places on the diagonal.
     fn boxes(places: &[f64]) -> Model {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("boxes.off");
         let mut text = format!("OFF\n{} {} 0\n", 8 * places.len(), 6 * places.len());
         for x in places {
-            (0..8).for_each(|k| text += &format!("{} {} {}\n", x + f64::from(k & 1), k >> 1 & 1, k >> 2));
+            (0..8).for_each(|k| {
+                let [a, b, c] = [k & 1, k >> 1 & 1, k >> 2].map(|bit| x + f64::from(bit));
+                text += &format!("{a} {b} {c}\n");
+            });
         }
         for k in 0..places.len() {
             for face in [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]] {
@@ -130,6 +147,6 @@ mod tests {
         assert!(expected.iter().all(Result::is_ok), "{expected:?}");
         assert_eq!(run(Some(&crossed), &sound), expected);
         assert!(run(Some(&crossed), &crossed).iter().all(Result::is_err));
-        assert!(run(Some(&sound), &crossed).iter().all(|made| made.as_ref().is_ok_and(|made| made.1)));
+        assert!(run(Some(&sound), &crossed)[0].as_ref().is_ok_and(|made| made.1));
     }
 }

@@ -1,8 +1,8 @@
 //! The builder for all settings, with defaults.
 
 use super::error::Error;
-use super::generate::generate;
 use super::geometry::Geometry;
+use super::merged::generate;
 use super::result::Generated;
 use super::settings::{GenerateSettings, Method, Wanted};
 use crate::Point;

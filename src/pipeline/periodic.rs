@@ -1,10 +1,14 @@
 //! Periodic faces of parts that were filled separately. Their triangles are those of the refined
-//! coarse mesh, so they are periodic; their pairs are found anew when all numbers are final.
+//! coarse mesh, or of pieces that are periodic together; their pairs are found anew when all
+//! numbers are final.
 
 use super::broadcast;
 use super::error::Error;
+use super::model::Model;
 use crate::ground::comm::Communicator;
-use crate::ground::mesh::periodic::{Link, Pairs, PeriodicMap};
+use crate::ground::kernel::tree;
+use crate::ground::mesh::Mesh;
+use crate::ground::mesh::periodic::{self, Link, Pairs, PeriodicMap};
 use crate::parallel::distribution::DistMesh;
 use crate::parallel::repartition::periodic::gather_faces;
 
@@ -50,4 +54,14 @@ impl Linked {
             .transpose();
         broadcast::periodic(comm, comm.agree(map.map_err(Error::from))?.as_ref())
     }
+}
+
+/// The periodic entities of a coarse mesh.
+pub(super) fn periodic_map(model: &Model, mesh: &Mesh) -> Result<PeriodicMap, Error> {
+    let map = match model {
+        Model::Csg(model) => PeriodicMap::of(mesh, periodic::links(&model.features), &model.features.bounds),
+        Model::Given(given) => PeriodicMap::of(mesh, given.links.clone(), &tree::bounds(&mesh.points)),
+        Model::Facets(_) => Ok(PeriodicMap::default()),
+    };
+    map.map_err(Error::from)
 }

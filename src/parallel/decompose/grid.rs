@@ -9,7 +9,6 @@ use super::cuts::{Cuts, Half};
 use super::periodic::{PeriodicWithin, grid_normals};
 use super::plan::{Piece, PlanSettings};
 use super::scan::Scan;
-use crate::Vector;
 
 /// Grids of this many shapes are compared.
 const MOST_SHAPES: usize = 6;
@@ -19,11 +18,13 @@ const MOST_SHAPES: usize = 6;
 pub(super) fn grid(statistics: &CutStatistics, parts: u32, settings: &PlanSettings) -> Option<Cuts> {
     let normals = grid_normals(&statistics.periodic);
     let whole = Piece::whole(statistics, parts);
+    if whole.samples.len() < 2 * parts as usize {
+        return None;
+    }
     let scans: Vec<Scan> = normals.iter().map(|normal| Scan::new(&whole.samples, *normal)).collect();
-    let middles = scans.iter().map(|scan| scan.met_by(&scan.places(0.5, 0.0)[0]).len());
-    let middles: Vec<usize> = middles.collect();
+    // The number of samples that a plane in the middle cuts.
+    let middles: Vec<usize> = scans.iter().map(|scan| scan.met_by(&scan.places(0.5, 0.0)[0]).len()).collect();
     let mut shapes = factors(parts, normals.len());
-    // The number of samples cut by planes in the middle.
     shapes.sort_by_key(|counts| {
         counts.iter().zip(&middles).map(|(&count, cut)| (count as usize - 1) * cut).sum::<usize>()
     });
@@ -87,11 +88,6 @@ fn factors(number: u32, count: usize) -> Vec<Vec<u32>> {
             divides.flat_map(with).collect()
         }
     }
-}
-
-/// The unit vectors along the axes.
-pub(super) fn axes() -> [Vector; 3] {
-    [Vector::x(), Vector::y(), Vector::z()]
 }
 
 #[cfg(test)]

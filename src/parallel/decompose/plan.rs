@@ -17,7 +17,7 @@
 
 use super::CutStatistics;
 use super::cuts::{CutPlane, Cuts, Half, Spot, meeting_point, with_half};
-use super::grid::{axes, grid};
+use super::grid::grid;
 use super::periodic::PeriodicWithin;
 use super::scan::{Scan, is_met};
 use super::statistics::{Crossed, Sample};
@@ -445,6 +445,11 @@ fn crowds(plane: &CutPlane, spot: &Spot) -> f64 {
         return 0.0;
     }
     CORNER * (1.0 - distance) / (ROOM + distance)
+}
+
+/// The unit vectors along the axes.
+fn axes() -> [Vector; 3] {
+    [Vector::x(), Vector::y(), Vector::z()]
 }
 
 /// The cost weight of an angle with this sine: from 1 for zero to 0 if it is large enough.

@@ -59,15 +59,13 @@ fn assembly(parts: &[(&str, f64, Link)]) -> String {
         text.add(&format!("CONTEXT_DEPENDENT_SHAPE_REPRESENTATION(#{relation},#{placed})"));
         let document = text.add(&format!("DOCUMENT_FILE('{file}','','',$,'',$)"));
         match link {
-            Link::Document => {
-                drop(text.add(&format!("APPLIED_DOCUMENT_REFERENCE(#{document},'',(#{part}))")))
-            }
+            Link::Document => text.add(&format!("APPLIED_DOCUMENT_REFERENCE(#{document},'',(#{part}))")),
             Link::Property => {
                 let property =
                     text.add(&format!("PROPERTY_DEFINITION('external definition','',#{document})"));
-                text.add(&format!("PROPERTY_DEFINITION_REPRESENTATION(#{property},#{part_shape})"));
+                text.add(&format!("PROPERTY_DEFINITION_REPRESENTATION(#{property},#{part_shape})"))
             }
-        }
+        };
     }
     text.0 + "ENDSEC;\nEND-ISO-10303-21;\n"
 }
