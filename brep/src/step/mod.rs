@@ -18,7 +18,7 @@ use crate::model::Model;
 use crate::shapes::Shapes;
 use crate::{BrepError, Placement};
 use assembly::{DEEPEST, MOST_USES, PlacedFile};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 
 /// Reads the solids of a file; `other` reads a file with parts of it, by its name in this file.
@@ -49,14 +49,21 @@ struct Reader<'a> {
     /// The names of the bodies.
     names: Vec<Option<String>>,
     /// Files that could not be read.
-    missing: Vec<String>,
+    missing: BTreeSet<String>,
     /// Numbers of faces, edges and shells that are in no solid.
     loose: [usize; 3],
 }
 
 impl<'a> Reader<'a> {
     fn new(other: &'a dyn Fn(&str) -> io::Result<Vec<u8>>, unit: Option<f64>) -> Self {
-        Self { other, unit, shapes: Shapes::default(), names: Vec::new(), missing: Vec::new(), loose: [0; 3] }
+        Self {
+            other,
+            unit,
+            shapes: Shapes::default(),
+            names: Vec::new(),
+            missing: BTreeSet::new(),
+            loose: [0; 3],
+        }
     }
 
     /// Adds the solids of a file at each of some places, and those of the files that it names.
@@ -87,8 +94,12 @@ impl<'a> Reader<'a> {
         for (name, places) in files {
             match (self.other)(name) {
                 Ok(text) => self.read(&text, &places, depth - 1).map_err(|error| error.in_part(name))?,
-                Err(error) if error.kind() == io::ErrorKind::NotFound => self.missing.push(name.to_owned()),
-                Err(error) => self.missing.push(format!("{name} ({error})")),
+                Err(error) if error.kind() == io::ErrorKind::NotFound => {
+                    self.missing.insert(name.to_owned());
+                }
+                Err(error) => {
+                    self.missing.insert(format!("{name} ({error})"));
+                }
             }
         }
         Ok(())
@@ -97,7 +108,8 @@ impl<'a> Reader<'a> {
     /// The model of all that was read.
     fn model(self) -> Result<Model, BrepError> {
         if !self.missing.is_empty() {
-            return Err(BrepError::OtherFiles(self.missing.join(", ")));
+            let files: Vec<String> = self.missing.into_iter().collect();
+            return Err(BrepError::OtherFiles(files.join(", ")));
         }
         let [faces, edges, shells] = self.loose;
         if self.names.is_empty() {
