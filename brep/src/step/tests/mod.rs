@@ -103,6 +103,19 @@ impl Text {
     }
 }
 
+/// The text of a file with a cylinder of radius 1 and height 2 (millimetres) on the origin. The
+/// vertex of its upper circle is at the angle `at`; `is_forward` is the way around of its side's
+/// lower edge, the other one of its upper.
+fn cylinder(at: f64, is_forward: bool) -> String {
+    let mut text = Text::new();
+    let (low, high) = (text.circle(1.0, 0.0, 0.0), text.circle(1.0, 2.0, at));
+    let frame = text.frame(0.0, 1.0);
+    let surface = text.add(&format!("CYLINDRICAL_SURFACE('',#{frame},1.)"));
+    let bounds = [text.bound(low, is_forward), text.bound(high, !is_forward)];
+    let faces = [text.face(surface, &bounds), text.disk(low, 0.0, false), text.disk(high, 2.0, true)];
+    text.solid(&faces)
+}
+
 /// The volumes of the bodies of a file.
 fn volumes(text: &str, unit: Unit) -> (Model, Vec<f64>) {
     let mut model = Model::read_step(text.as_bytes(), unit).unwrap_or_else(|error| panic!("{error}"));
@@ -125,13 +138,7 @@ fn assembly() -> String {
 fn a_cylinder_needs_no_seam() {
     // The vertices of the two circles are not above each other.
     for at in [0.0, 1.0, 4.0] {
-        let mut text = Text::new();
-        let (low, high) = (text.circle(1.0, 0.0, 0.0), text.circle(1.0, 2.0, at));
-        let frame = text.frame(0.0, 1.0);
-        let surface = text.add(&format!("CYLINDRICAL_SURFACE('',#{frame},1.)"));
-        let bounds = [text.bound(low, true), text.bound(high, false)];
-        let faces = [text.face(surface, &bounds), text.disk(low, 0.0, false), text.disk(high, 2.0, true)];
-        let (model, volumes) = volumes(&text.solid(&faces), Unit::OfFile);
+        let (model, volumes) = volumes(&cylinder(at, true), Unit::OfFile);
         assert_near(volumes[0], 2.0 * PI);
         assert_eq!(model.body_names, [Some("part".to_owned())]);
         assert!(model.patch_names.iter().all(|name| name.as_deref() == Some("side")));
@@ -211,13 +218,7 @@ fn an_elbow_needs_no_seam() {
 
 #[test]
 fn loops_the_wrong_way_around_are_turned() {
-    let mut text = Text::new();
-    let (low, high) = (text.circle(1.0, 0.0, 0.0), text.circle(1.0, 2.0, 0.0));
-    let frame = text.frame(0.0, 1.0);
-    let surface = text.add(&format!("CYLINDRICAL_SURFACE('',#{frame},1.)"));
-    let bounds = [text.bound(low, false), text.bound(high, true)];
-    let faces = [text.face(surface, &bounds), text.disk(low, 0.0, false), text.disk(high, 2.0, true)];
-    assert_near(volumes(&text.solid(&faces), Unit::OfFile).1[0], 2.0 * PI);
+    assert_near(volumes(&cylinder(0.0, false), Unit::OfFile).1[0], 2.0 * PI);
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Assemblies whose parts are in other files.
 
-use super::{Text, assert_near};
+use super::{Text, assert_near, cylinder};
 use crate::{BrepError, Model, Settings, Tessellation, Unit, tessellate};
 use std::f64::consts::PI;
 use std::io;
@@ -12,17 +12,6 @@ enum Link {
     Document,
     /// A property of the product's representation.
     Property,
-}
-
-/// The text of a file with a cylinder of radius 1 and height 2 (millimetres) on the origin.
-fn cylinder() -> String {
-    let mut text = Text::new();
-    let (low, high) = (text.circle(1.0, 0.0, 0.0), text.circle(1.0, 2.0, 0.0));
-    let frame = text.frame(0.0, 1.0);
-    let surface = text.add(&format!("CYLINDRICAL_SURFACE('',#{frame},1.)"));
-    let bounds = [text.bound(low, true), text.bound(high, false)];
-    let faces = [text.face(surface, &bounds), text.disk(low, 0.0, false), text.disk(high, 2.0, true)];
-    text.solid(&faces)
 }
 
 /// A product with a shape of its coordinate system alone: its definition and representation.
@@ -73,12 +62,12 @@ fn assembly(parts: &[(&str, f64, Link)]) -> String {
 /// Reads an assembly of `row.stp`, a row of two cylinders, and of a cylinder; both in other files.
 fn read(text: &str) -> Result<Model, BrepError> {
     let other = |name: &str| match name {
-        "cylinder.stp" => Ok(cylinder().into_bytes()),
+        "cylinder.stp" => Ok(cylinder(0.0, true).into_bytes()),
         "row.stp" => {
             let parts = [("cylinder.stp", 0.0, Link::Document), ("cylinder.stp", 1.0, Link::Property)];
             Ok(assembly(&parts).into_bytes())
         }
-        "damaged.stp" => Ok(cylinder().replace("PLANE", "PLAIN").into_bytes()),
+        "damaged.stp" => Ok(cylinder(0.0, true).replace("PLANE", "PLAIN").into_bytes()),
         "itself.stp" => Ok(assembly(&[("itself.stp", 1.0, Link::Document)]).into_bytes()),
         "twice.stp" => Ok(assembly(&[("twice.stp", 1.0, Link::Document); 2]).into_bytes()),
         _ => Err(io::ErrorKind::NotFound.into()),
