@@ -261,13 +261,8 @@ impl<'a> Piece<'a> {
                     scans.push(directions.par_iter().map(scan).collect());
                 }
                 let shares = (self.share(), allowance);
-                let mut candidates = self.candidates(&scans[group], group == 0, &others, shares, settings);
-                candidates.retain(|(plane, _)| periodic.allows(plane));
-                let cost = |(plane, met): (CutPlane, Vec<&Sample>)| {
-                    (self.cost(&plane, &met, &crossed, &others), plane)
-                };
-                let costs: Vec<(Cost, CutPlane)> = candidates.into_par_iter().map(cost).collect();
-                best = best.into_iter().chain(costs).min_by(|a, b| a.0.total().total_cmp(&b.0.total()));
+                let candidates = self.candidates(&scans[group], group == 0, &others, shares, settings);
+                best = self.better(best, candidates, (&crossed, &others), &periodic);
                 if best.as_ref().is_some_and(|(cost, _)| cost.bad < CLEAR_CUT) {
                     break;
                 }
@@ -296,18 +291,28 @@ impl<'a> Piece<'a> {
         // no two layers have the same.
         for factor in [1.0, AT_WORST, 2.0 * AT_WORST] {
             let shares = (share, factor * settings.allowance * width / share);
-            let mut candidates =
-                self.candidates(std::slice::from_ref(scan), false, &others, shares, settings);
-            candidates.retain(|(plane, _)| periodic.allows(plane));
-            let cost =
-                |(plane, met): (CutPlane, Vec<&Sample>)| (self.cost(&plane, &met, &crossed, &others), plane);
-            let costs = candidates.into_iter().map(cost);
-            best = best.into_iter().chain(costs).min_by(|a, b| a.0.total().total_cmp(&b.0.total()));
+            let candidates = self.candidates(std::slice::from_ref(scan), false, &others, shares, settings);
+            best = self.better(best, candidates, (&crossed, &others), periodic);
             if best.as_ref().is_some_and(|(cost, _)| cost.bad < 1.0) {
                 break;
             }
         }
         best.map(|(cost, plane)| (cost.total(), plane))
+    }
+
+    /// The cheapest of the best plane so far and those of the candidates that keep periodic faces
+    /// periodic.
+    fn better(
+        &self,
+        best: Option<(Cost, CutPlane)>,
+        mut candidates: Vec<(CutPlane, Vec<&Sample>)>,
+        (crossed, others): (&Crossed, &Others),
+        periodic: &PeriodicWithin,
+    ) -> Option<(Cost, CutPlane)> {
+        candidates.retain(|(plane, _)| periodic.allows(plane));
+        let cost = |(plane, met): (CutPlane, Vec<&Sample>)| (self.cost(&plane, &met, crossed, others), plane);
+        let costs: Vec<(Cost, CutPlane)> = candidates.into_par_iter().map(cost).collect();
+        best.into_iter().chain(costs).min_by(|a, b| a.0.total().total_cmp(&b.0.total()))
     }
 
     /// Candidate planes, with the samples that they cut: at positions along some directions, and
