@@ -12,7 +12,7 @@ measured by NumPy. The error of the volume is relative to OpenCASCADE's, if `mea
 With --imprint, as for the solids that scripts/touching_solids.py makes, Gmsh imprints solids that touch by OpenCASCADE's fragments, and
 NETGEN by its Glue; tetmill does so by itself.
 """
-import argparse, json, pathlib, subprocess, sys, tempfile, time
+import argparse, json, os, pathlib, signal, subprocess, sys, tempfile, time
 
 import numpy as np
 
@@ -90,13 +90,18 @@ def one(program, path, binary, limit, imprints):
     try:
         imprint = ["--imprint"] if imprints else []
         command = [sys.executable, HERE, *imprint, "--worker", program, path, "--binary", binary]
-        done = subprocess.run(command, capture_output=True, text=True, timeout=limit)
-        last = (done.stdout.strip().splitlines() or [""])[-1]
-        if done.returncode == 0 and last.startswith("["):
+        # With a session of its own, so that programs that it started end with it.
+        pipe = subprocess.PIPE
+        worker = subprocess.Popen(command, stdout=pipe, stderr=pipe, text=True, start_new_session=True)
+        stdout, stderr = worker.communicate(timeout=limit)
+        last = (stdout.strip().splitlines() or [""])[-1]
+        if worker.returncode == 0 and last.startswith("["):
             return json.loads(last), ""
-        why = (done.stderr.strip().splitlines() or [f"status {done.returncode}"])[-1]
+        why = (stderr.strip().splitlines() or [f"status {worker.returncode}"])[-1]
         return None, why[:150]
     except subprocess.TimeoutExpired:
+        os.killpg(worker.pid, signal.SIGKILL)
+        worker.communicate()
         return None, f"more than {limit:g} s"
 
 
