@@ -102,7 +102,7 @@ pub(super) fn triangulate(
         gap = gap.max(off);
     }
     let pole = pole(patch, tolerances.diagonal);
-    let frame = Frame::of(&patch.surface, &chains, pole, tolerances.diagonal);
+    let frame = Frame::of(&patch.surface, &chains, pole, tolerances);
     let mut face = Face {
         patch,
         number,

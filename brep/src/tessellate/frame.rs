@@ -1,6 +1,7 @@
 //! The plane in which a patch is triangulated.
 
 use super::chain::Sides;
+use super::face::Tolerances;
 use crate::Surface;
 use crate::model::{On, Patch};
 use spade::{HasPosition, Point2};
@@ -24,7 +25,8 @@ impl HasPosition for Node {
 }
 
 /// Parameters in units of length. A patch that is far narrower than long is widened: its sides are
-/// divided by the turn along them, and it may turn as much across.
+/// divided by the turn along them, and it may turn as much across. It is not widened more than its
+/// turn across needs, so that the triangles of long spirals join opposite points of their sides.
 ///
 /// At a **pole** the derivative in one direction vanishes, and a side of the patch is one point.
 /// Lengths in that direction are then taken at each value of the other parameter, as in the
@@ -63,7 +65,8 @@ impl Pole {
 
 impl Frame {
     /// Scales parameters by the mean length of the derivatives.
-    pub fn of(surface: &Surface, chains: &[Sides], pole: Option<usize>, diagonal: f64) -> Self {
+    pub fn of(surface: &Surface, chains: &[Sides], pole: Option<usize>, tolerances: &Tolerances) -> Self {
+        let diagonal = tolerances.diagonal;
         let all = || chains.iter().flatten().flatten().map(|node| node.0);
         let bound = |i: usize, start: f64, pick: fn(f64, f64) -> f64| all().map(|p| p[i]).fold(start, pick);
         let low = [0, 1].map(|i| bound(i, f64::INFINITY, f64::min));
@@ -78,8 +81,16 @@ impl Frame {
         }
         let mut scale = sums.map(|sum| if sum > 0.0 { sum / 25.0 } else { 1.0 });
         let extents = [0, 1].map(|i| (high[i] - low[i]) * scale[i]);
+        let nodes = all().count() as f64;
         for i in 0..2 {
-            scale[i] *= (extents[1 - i] / (NARROWEST * extents[i].max(f64::MIN_POSITIVE))).max(1.0);
+            let widest = extents[1 - i] / NARROWEST;
+            if extents[i] < widest {
+                let turn = turn_across(surface, i, low, high);
+                // The mean step along both sides.
+                let step = 2.0 * extents[1 - i] / nodes;
+                let needed = step * (turn / tolerances.angle).max(1.0);
+                scale[i] *= (widest.min(needed) / extents[i].max(f64::MIN_POSITIVE)).max(1.0);
+            }
         }
         let mut origin = low;
         let pole = pole.map(|direction| {
@@ -139,6 +150,20 @@ impl Frame {
         }
         out
     }
+}
+
+/// The largest turn of the normal across a patch in one direction.
+fn turn_across(surface: &Surface, direction: usize, low: [f64; 2], high: [f64; 2]) -> f64 {
+    let normal = |along: u32, across: u32| {
+        let mut shares = [0.1 + 0.2 * f64::from(along); 2];
+        shares[direction] = 0.25 * f64::from(across);
+        let [u, v] = [0, 1].map(|i| low[i] + (high[i] - low[i]) * shares[i]);
+        surface.jet(u, v, 1).normal()
+    };
+    let step = |along, across| {
+        normal(along, across).zip(normal(along, across + 1)).map_or(0.0, |(a, b)| a.angle(&b))
+    };
+    (0..5).map(|along| (0..4).map(|across| step(along, across)).sum::<f64>()).fold(0.0, f64::max)
 }
 
 /// Derivatives shorter than this (fraction of the diagonal of the model) are those of a pole.
