@@ -26,6 +26,7 @@ fn main() {
                     start.elapsed().as_secs_f64(),
                     tessellation.gap
                 );
+                model.notes.iter().for_each(|note| println!("  {note}"));
             }
         }
     }

@@ -44,8 +44,13 @@ pub enum BrepError {
         place: Option<Point>,
     },
     /// The file has no solid.
-    #[error("the file has no solid, only {0}: sew its faces to a solid in the CAD program")]
-    NoSolid(String),
+    #[error("the file has no solid, only {faces} faces and {edges} edges{}", no_solid(*.faces))]
+    NoSolid {
+        /// Its faces.
+        faces: usize,
+        /// Its edges, wires and vertices that bound no solid.
+        edges: usize,
+    },
     /// Parts of an assembly are in other files, which cannot be read.
     #[error(
         "parts of it are in other files, which are not beside it: {0}: put them there, or export the assembly as one file"
@@ -59,6 +64,11 @@ pub enum BrepError {
         /// What is wrong there.
         error: Box<BrepError>,
     },
+}
+
+/// What to do about a file without solids.
+fn no_solid(faces: usize) -> &'static str {
+    if faces > 0 { ": sew its faces to a solid in the CAD program" } else { ": export the part as a solid" }
 }
 
 fn at(place: &Option<Point>) -> String {

@@ -16,17 +16,13 @@ impl Model {
         if !shapes.imprint() {
             return;
         }
-        let mut imprinted = Self {
-            bodies: self.bodies,
-            body_names: self.body_names.clone(),
-            metres: self.metres,
-            notes: self.notes.clone(),
-            ..Self::default()
+        let mut imprinted = match shapes.remake(self) {
+            Ok(imprinted) => imprinted,
+            Err(error) => {
+                self.notes.push(format!("solids touch, but cannot be imprinted on each other: {error}"));
+                return;
+            }
         };
-        if let Err(error) = shapes.build(&mut imprinted) {
-            self.notes.push(format!("solids touch, but cannot be imprinted on each other: {error}"));
-            return;
-        }
         let common = |model: &Self| model.patches.iter().filter(|p| !p.bodies.contains(&None)).count();
         let added = common(&imprinted).saturating_sub(common(self));
         if added > 0 {

@@ -13,6 +13,7 @@
 #![forbid(unsafe_code)]
 
 pub mod bspline;
+mod build;
 mod chart;
 mod curve;
 mod error;

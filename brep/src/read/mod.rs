@@ -87,10 +87,10 @@ fn locations(tokens: &mut Tokens) -> Result<Vec<Placement>, BrepError> {
                         break product;
                     }
                     let power = tokens.integer()?;
-                    product = product.after(
-                        &power_of(&all[index], power)
-                            .ok_or_else(|| tokens.error("the power of a location must be -1000 to 1000"))?,
-                    );
+                    // The innermost factor comes first.
+                    product = power_of(&all[index], power)
+                        .ok_or_else(|| tokens.error("the power of a location must be -1000 to 1000"))?
+                        .after(&product);
                 }
             }
             other => return Err(tokens.error(&format!("a location has kind {other}; 1 and 2 are known"))),

@@ -108,6 +108,10 @@ pub(super) fn read(tokens: &mut Tokens, version: u32, mut file: File) -> Result<
             tokens.word()?;
             continue;
         }
+        // How OpenCASCADE's Draw ends a shape that it saved.
+        if word == "0" && !file.roots.is_empty() {
+            break;
+        }
         match usage(tokens, count, count, &file)? {
             Some(root) => file.roots.push(root),
             None => break,

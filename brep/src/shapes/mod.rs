@@ -60,8 +60,9 @@ impl Shapes {
                 On::Curve(curve) => Some((curve, fin.is_forward)),
                 On::Corner(_) => None,
             };
+            let edges = |fins: &Vec<Fin>| fins.iter().filter_map(edge).collect();
             let loops: Vec<Edges> =
-                patch.loops.iter().map(|fins| fins.iter().filter_map(edge).collect()).collect();
+                patch.loops.iter().map(edges).filter(|edges: &Edges| !edges.is_empty()).collect();
             for (side, body) in patch.bodies.iter().enumerate() {
                 let Some(body) = *body else { continue };
                 for &(curve, _) in loops.iter().flatten() {
@@ -113,6 +114,22 @@ impl Shapes {
         let without_edges = self.faces.iter().filter(|face| face.loops.is_empty());
         let points = without_edges.flat_map(|face| imprint::whole(&face.surface)).collect();
         diagonal(&self.corners, &self.curves, points)
+    }
+
+    /// The model of shapes that were made of an old one.
+    ///
+    /// # Errors
+    /// As for [`Self::build`].
+    pub fn remake(self, old: &Model) -> Result<Model, BrepError> {
+        let mut model = Model {
+            bodies: old.bodies,
+            body_names: old.body_names.clone(),
+            metres: old.metres,
+            notes: old.notes.clone(),
+            ..Model::default()
+        };
+        self.build(&mut model)?;
+        Ok(model)
     }
 
     /// Makes patches of the faces; those that two solids repeat become one.

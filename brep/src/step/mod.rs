@@ -113,7 +113,7 @@ impl<'a> Reader<'a> {
         }
         let [faces, edges, shells] = self.loose;
         if self.names.is_empty() {
-            return Err(BrepError::NoSolid(format!("{faces} faces and {edges} edges")));
+            return Err(BrepError::NoSolid { faces, edges });
         }
         let metres = Some(self.unit.unwrap_or(1e-3));
         let mut model = Model { bodies: self.names.len(), metres, ..Model::default() };

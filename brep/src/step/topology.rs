@@ -220,7 +220,7 @@ impl Reader<'_> {
         for (foot, p) in feet.iter().zip(&points) {
             let off = (foot.point - p).norm();
             let extent = (points[1] - points[0]).norm();
-            if off > FARTHEST * extent.max(size(curve)) {
+            if off > (FARTHEST * extent.max(size(curve))).max(self.shapes.accuracy[self.body]) {
                 let [x, y, z] = [p.x, p.y, p.z];
                 return Err(
                     edge.error(format!("its vertex ({x}, {y}, {z}) is {off:.3e} away from its curve"))
@@ -262,7 +262,8 @@ impl Reader<'_> {
     }
 }
 
-/// Vertices further from their curve than this (fraction of its size) do not belong to it.
+/// Vertices further from their curve than this (fraction of its size), and than the accuracy of the
+/// file, do not belong to it.
 const FARTHEST: f64 = 5e-2;
 
 /// The size of a bounded curve; 0 of an unbounded one.

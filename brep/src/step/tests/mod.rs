@@ -312,7 +312,7 @@ fn errors_name_the_record_and_its_line() {
     let missing = error("EDGE_LOOP('',(#", "EDGE_LOOP('',(#99999");
     assert!(missing.contains("line ") && missing.contains("there is no #99999"), "{missing}");
     let none = Model::read_step(b"ISO-10303-21;HEADER;ENDSEC;DATA;ENDSEC;END-ISO-10303-21;", Unit::OfFile);
-    assert!(matches!(none, Err(BrepError::NoSolid(_))));
+    assert!(matches!(none, Err(BrepError::NoSolid { .. })));
     assert!(Model::read_step(b"solid", Unit::OfFile).unwrap_err().to_string().contains("no STEP file"));
 }
 

@@ -1,17 +1,21 @@
 //! What files of real programs have that they should not.
 
 use super::{Text, assert_near, volumes};
-use crate::Unit;
+use crate::{Model, Settings, Tessellation, Unit};
 use std::collections::HashMap;
 use std::f64::consts::PI;
 
 /// A cylinder of radius 1 from z = 0 to 2, whose upper face looks up or down.
 fn cylinder(text: &mut Text, looks_up: bool) -> [u32; 3] {
-    let (low, high) = (text.circle(1.0, 0.0, 0.0), text.circle(1.0, 2.0, 0.0));
+    cylinder_of_height(text, 2.0, looks_up)
+}
+
+fn cylinder_of_height(text: &mut Text, height: f64, looks_up: bool) -> [u32; 3] {
+    let (low, high) = (text.circle(1.0, 0.0, 0.0), text.circle(1.0, height, 0.0));
     let frame = text.frame(0.0, 1.0);
     let surface = text.add(&format!("CYLINDRICAL_SURFACE('',#{frame},1.)"));
     let bounds = [text.bound(low, true), text.bound(high, false)];
-    [text.face(surface, &bounds), text.disk(low, 0.0, false), text.disk(high, 2.0, looks_up)]
+    [text.face(surface, &bounds), text.disk(low, 0.0, false), text.disk(high, height, looks_up)]
 }
 
 #[test]
@@ -198,4 +202,35 @@ fn a_solid_that_touches_itself_has_one_edge_there() {
     let (model, volumes) = volumes(&text.solid(&faces), Unit::OfFile);
     assert_near(volumes[0], 2.0);
     assert_eq!((model.curves.len(), model.notes.len()), (23, 0), "{:?}", model.notes);
+}
+
+#[test]
+fn a_vertex_away_from_its_curve_is_accepted_within_the_accuracy_of_the_file() {
+    let mut text = Text::new();
+    let faces = cylinder(&mut text, true);
+    let whole = text.solid(&faces).replacen("(1.0,0.0,2.0)", "(1.15,0.0,2.0)", 1);
+    assert!(whole.contains("1.15"));
+    let error = Model::read_step(whole.as_bytes(), Unit::OfFile).unwrap_err().to_string();
+    assert!(error.contains("1.500e-1 away from its curve"), "{error}");
+    let unit = whole.split_once("GLOBAL_UNIT_ASSIGNED_CONTEXT((").unwrap().1.split_once(')').unwrap().0;
+    for (accuracy, is_read) in [(0.1, false), (0.2, true)] {
+        let measure =
+            format!("#9999 = UNCERTAINTY_MEASURE_WITH_UNIT(LENGTH_MEASURE({accuracy}),{unit},'','');\n");
+        let text = whole
+            .replace("GLOBAL_UNIT", "GLOBAL_UNCERTAINTY_ASSIGNED_CONTEXT((#9999)) GLOBAL_UNIT")
+            .replace("ENDSEC;\nEND-ISO", &format!("{measure}ENDSEC;\nEND-ISO"));
+        assert_eq!(Model::read_step(text.as_bytes(), Unit::OfFile).is_ok(), is_read, "{accuracy}");
+    }
+}
+
+#[test]
+fn triangles_of_a_long_strip_join_opposite_points_of_its_sides() {
+    let mut text = Text::new();
+    let faces = cylinder_of_height(&mut text, 1e-3, true);
+    let mut model = Model::read_step(text.solid(&faces).as_bytes(), Unit::OfFile).unwrap();
+    let made = Tessellation::of(&mut model, &Settings { chord: 1e-6, angle: 0.02 }).unwrap();
+    let side = model.patches.iter().position(|patch| !patch.surface.is_plane()).unwrap();
+    let of_side = made.triangles.iter().filter(|t| t.patch as usize == side).count();
+    let on_rims: usize = made.lines.iter().map(|line| line.len()).sum();
+    assert!(of_side > 600 && of_side < on_rims + on_rims / 10, "{of_side} triangles, {on_rims} points");
 }
