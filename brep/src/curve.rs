@@ -93,6 +93,20 @@ impl<const D: usize> Curve<D> {
         self.jet(t)[0]
     }
 
+    /// The largest coordinate from which a point is computed: rounding is relative to it.
+    pub(crate) fn largest_term(&self, t: f64) -> f64 {
+        match self {
+            Self::Line { start, direction } => start.amax().max(t.abs() * direction.amax()),
+            Self::Ellipse { center, axes: [x, y] } => center.amax().max(x.amax()).max(y.amax()),
+            Self::Parabola { apex, axes: [x, y] } => {
+                apex.amax().max(t * t * x.amax()).max(t.abs() * y.amax())
+            }
+            Self::Hyperbola { center, axes: [x, y] } => center.amax().max(t.cosh() * x.amax().max(y.amax())),
+            Self::Offset { basis, .. } => basis.largest_term(t),
+            Self::Spline(_) => 0.0,
+        }
+    }
+
     /// The period, if the curve is periodic.
     pub fn period(&self) -> Option<f64> {
         match self {

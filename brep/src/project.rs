@@ -57,7 +57,7 @@ pub fn project_to_curve(curve: &Curve<3>, range: [f64; 2], point: &Point, start:
     let clamp = |t: f64| t.clamp(range[0], range[1]);
     let mut t = clamp(start);
     let mut jet = curve.jet(t);
-    let scale = point.coords.amax().max(jet[0].amax());
+    let scale = point.coords.amax().max(jet[0].amax()).max(curve.largest_term(t));
     for _ in 0..STEPS {
         let way = jet[0] - point.coords;
         let slope = way.dot(&jet[1]);

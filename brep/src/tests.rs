@@ -259,6 +259,21 @@ fn a_full_circle_as_a_rational_spline_has_one_radius() {
 }
 
 #[test]
+fn points_close_to_short_arcs_of_large_circles_have_feet_on_them() {
+    let (radius, range) = (4000.0, [6.2828, 6.2832]);
+    let axes = [Vector::x() * radius, Vector::y() * radius];
+    let circle = Curve::Ellipse { center: Vector::new(-radius, 0.0, 1.0), axes };
+    for k in 1..400 {
+        let angle = range[0] + (range[1] - range[0]) * f64::from(k) / 400.0;
+        let off = Vector::new(2e-5, 0.0, 3e-5);
+        let point = Point::from(circle.point(angle) + off);
+        let foot = project_to_curve(&circle, range, &point, range[usize::from(k > 200)]);
+        let along = (foot.point - point).dot(&foot.tangent).abs();
+        assert!(foot.is_converged && along < 1e-10, "{angle} {along:e}");
+    }
+}
+
+#[test]
 fn an_offset_in_the_plane_is_to_the_right() {
     let circle = Curve::<2>::Ellipse { center: Vector2::zeros(), axes: [Vector2::x(), Vector2::y()] };
     let offset = Curve::Offset { basis: Box::new(circle), distance: 0.5, direction: Vector2::zeros() };
