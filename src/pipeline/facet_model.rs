@@ -231,14 +231,10 @@ impl FacetSolid {
         work: &Work,
     ) -> Result<CoarseMesh, CoarseError> {
         // Triangles that intersect have no thickness between them: they would be made ever smaller.
-        if !self.keep_surface {
-            let crossings = self.model.intersections();
-            let is_deep = crossings.iter().any(|crossing| self.model.is_deep(crossing));
-            let touch =
-                || self.exact.as_ref().is_some_and(|exact| solids::touch(&self.model, exact, &crossings));
-            if let Some(meeting) = self.facets_meet(&crossings).filter(|_| is_deep || touch()) {
-                return Err(meeting);
-            }
+        if !self.keep_surface
+            && let Some(meeting) = self.deep_meeting()
+        {
+            return Err(meeting);
         }
         let mut coarse = coarse::corrected(settings, budget, work, |settings, allowed| {
             self.attempt(settings, allowed, budget, work)
@@ -301,6 +297,21 @@ impl FacetSolid {
                 if lowered.is_empty() { Attempt::Failed(error) } else { Attempt::Lower(lowered) }
             }
         }
+    }
+
+    /// Whether solids of a CAD file overlap, or touch without a common face: no small face that is
+    /// merged changes that.
+    pub(super) fn has_overlapping_solids(&self) -> bool {
+        let may_have = self.cad.is_some() && self.model.bodies.len() > 1;
+        may_have && matches!(self.deep_meeting(), Some(CoarseError::SolidsMeet { .. }))
+    }
+
+    /// The error for facets that intersect where no finer facets would keep apart.
+    fn deep_meeting(&self) -> Option<CoarseError> {
+        let crossings = self.model.intersections();
+        let is_deep = crossings.iter().any(|crossing| self.model.is_deep(crossing));
+        let touch = || self.exact.as_ref().is_some_and(|exact| solids::touch(&self.model, exact, &crossings));
+        self.facets_meet(&crossings).filter(|_| is_deep || touch())
     }
 
     /// The error for facets that intersect, if any do. Intersections of different files come first.

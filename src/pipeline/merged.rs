@@ -33,7 +33,9 @@ pub fn generate(
     comm.agree(options::refuse_impossible(settings))?;
     let model = geometry.filter(|_| comm.rank() == 0).map(|geometry| &geometry.model);
     let (merged, report) = match model {
-        Some(Model::Facets(solid)) => merge_small(solid, settings, progress),
+        Some(Model::Facets(solid)) if !solid.has_overlapping_solids() => {
+            merge_small(solid, settings, progress)
+        }
         _ => (None, MergedSmall::default()),
     };
     let (mut made, is_merged) = of_merged(comm, merged.as_ref(), model, settings, progress)?;

@@ -42,17 +42,23 @@ pub(super) fn sample(
         .flat_map(|(c, curve)| curve.vertices.windows(2).map(move |w| (c, [point(w[0]), point(w[1])])))
         .collect();
     let tree = Tree::new(&segments.iter().map(|(_, ends)| bounds(ends)).collect::<Vec<_>>());
+    let beside = curves_of_patches(&patches, model.patches.len());
+    let mut related = vec![false; model.curves.len()];
     let mut own = 0;
     for (c, curve) in model.curves.iter().enumerate() {
-        let related: Vec<bool> = (0..model.curves.len())
-            .map(|d| d != c && !have_common_end(curve, &model.curves[d]) && meet(&patches[c], &patches[d]))
-            .collect();
         let count = curve.vertices.len() - 1;
         let own_segments = &segments[own..own + count];
         own += count;
-        if !related.contains(&true) {
+        let others: Vec<usize> = patches[c]
+            .iter()
+            .flat_map(|&patch| &beside[patch as usize])
+            .copied()
+            .filter(|&d| d != c && !have_common_end(curve, &model.curves[d]))
+            .collect();
+        if others.is_empty() {
             continue;
         }
+        others.iter().for_each(|&d| related[d] = true);
         let distance = |p: &Point| {
             let to = |s: u32| {
                 let (d, [a, b]) = &segments[s as usize];
@@ -68,6 +74,7 @@ pub(super) fn sample(
         for (_, [a, b]) in own_segments {
             cut(*a, *b, MOST_CUTS, &sizes, &mut added);
         }
+        others.iter().for_each(|&d| related[d] = false);
     }
     sources.extend(added);
 }
@@ -100,12 +107,17 @@ fn cut(a: Point, b: Point, cuts: u32, sizes: &impl Fn(&Point) -> Sizes, sources:
 }
 
 fn have_common_end(one: &FacetCurve, other: &FacetCurve) -> bool {
-    let ends = |c: &FacetCurve| c.ends.into_iter().flatten().collect::<Vec<_>>();
-    ends(one).iter().any(|e| ends(other).contains(e))
+    let ends = |curve: &FacetCurve| curve.ends.into_iter().flatten();
+    ends(one).any(|end| ends(other).any(|other| other == end))
 }
 
-fn meet(one: &[u32], other: &[u32]) -> bool {
-    one.iter().any(|p| other.contains(p))
+/// The curves adjacent to each patch.
+fn curves_of_patches(patches: &[Vec<u32>], count: usize) -> Vec<Vec<usize>> {
+    let mut curves = vec![Vec::new(); count];
+    for (c, patches) in patches.iter().enumerate() {
+        patches.iter().for_each(|&patch| curves[patch as usize].push(c));
+    }
+    curves
 }
 
 /// The patches adjacent to each curve.
