@@ -1,6 +1,7 @@
 //! The model of the shapes of a BREP file.
 
 use crate::model::{Corner, EdgeCurve, Fin, Model, On, Patch};
+use crate::placement::Placements;
 use crate::read::{CurveOnSurface, File, Kind, Orientation, Use};
 use crate::shapes::Shapes;
 use crate::{BrepError, Placement};
@@ -51,8 +52,7 @@ struct Builder<'a> {
     loose_edges: usize,
     /// Uses of edges that have no curve in the parameters of their surface, which is no plane.
     without_parameters: usize,
-    /// All products of placements, each once.
-    placements: Vec<Placement>,
+    placements: Placements,
 }
 
 /// Compounds may be nested this deep.
@@ -73,6 +73,8 @@ fn composed(outer: Orientation, inner: Orientation) -> Orientation {
 
 impl<'a> Builder<'a> {
     fn new(file: &'a File) -> Self {
+        let mut placements = Placements::default();
+        placements.only(Placement::IDENTITY);
         Self {
             file,
             model: Model::default(),
@@ -83,7 +85,7 @@ impl<'a> Builder<'a> {
             free_faces: 0,
             loose_edges: 0,
             without_parameters: 0,
-            placements: vec![Placement::IDENTITY],
+            placements,
         }
     }
 
@@ -108,12 +110,7 @@ impl<'a> Builder<'a> {
         if location == 0 {
             return *placement;
         }
-        let product = placement.after(&self.file.locations[location]);
-        if let Some(known) = self.placements.iter().find(|known| is_close(known, &product)) {
-            return *known;
-        }
-        self.placements.push(product);
-        product
+        self.placements.only(placement.after(&self.file.locations[location]))
     }
 
     /// The parts of a shape, in order.
@@ -320,7 +317,7 @@ impl<'a> Builder<'a> {
         let on = if *is_degenerate { self.degenerate(face, edge)? } else { self.curve(face, edge)? };
         let matches = |on: &&CurveOnSurface| {
             let there = edge.placement.after(&file.locations[on.location]);
-            on.surface == surface && is_close(&there, placement)
+            on.surface == surface && there.is_close(placement)
         };
         match on_surfaces.iter().find(matches) {
             Some(own) => Ok(Fin {
@@ -413,12 +410,6 @@ fn parameter_gap(one: &Fin, other: &Fin) -> f64 {
         fin.curve.as_ref().map(|curve| curve.point(fin.range[at]))
     };
     end(one, 1).zip(end(other, 0)).map_or(0.0, |(a, b)| (b - a).norm())
-}
-
-/// Whether two placements are equal up to rounding.
-fn is_close(a: &Placement, b: &Placement) -> bool {
-    let size = 1.0 + a.shift.amax().max(b.shift.amax());
-    (a.linear - b.linear).amax() <= 1e-9 && (a.shift - b.shift).amax() <= 1e-9 * size
 }
 
 #[cfg(test)]
