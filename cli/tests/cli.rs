@@ -127,6 +127,15 @@ fn the_quality_of_a_level_is_that_of_a_mesh_with_as_many_levels() {
 }
 
 #[test]
+fn only_meshes_that_are_refined_or_curved_are_prepared_for_it() {
+    let repaired = |options: &[&str]| {
+        crate::common::report_of(&own("crankshaft"), options)["coarse"]["illegal_repaired"].as_u64().unwrap()
+    };
+    assert_eq!(repaired(&["--levels", "0"]), 0);
+    assert!(repaired(&["--levels", "1"]) > 0 && repaired(&["--levels", "0", "--order", "2"]) > 0);
+}
+
+#[test]
 fn four_levels_keep_six_tenths_of_the_smallest_angle() {
     for name in ["dome", "capsule", "lens", "ice_cream"] {
         let report = crate::common::report_of(&own(name), &["--preset", "coarse", "--levels", "4"]);

@@ -11,7 +11,7 @@ use crate::ground::mesh::{Order, Segment};
 use crate::ground::progress::Work;
 use crate::ground::size::{GeometricSamples, GeometricSize, SizeField, SizeSettings, Source};
 use crate::ground::size::{PeriodicSize, WatchedSize};
-use crate::mesher::improve::{Effort, GeometrySmoothness};
+use crate::mesher::improve::{Effort, GeometrySmoothness, Smoothness};
 use crate::mesher::model::CsgModel;
 use crate::mesher::surface::closeness::{ThinRegions, Walls, thin_regions};
 use crate::mesher::surface::curves::{crowded, mesh_curves};
@@ -29,11 +29,14 @@ pub struct CoarseSettings {
     pub effort: Option<Effort>,
     /// The order of the elements of the mesh that is refined from it.
     pub order: Order,
+    /// Whether the mesh stays as it is. Tets that refinement or curved edges would flatten are not
+    /// repaired then, for the sake of better shapes. [`generate`](super::generate()) sets it.
+    pub is_final: bool,
 }
 
 impl From<SizeSettings> for CoarseSettings {
     fn from(size: SizeSettings) -> Self {
-        Self { size, effort: None, order: Order::First }
+        Self { size, ..Self::default() }
     }
 }
 
@@ -250,7 +253,8 @@ fn attempt(
         }
     }
     let smoothness = GeometrySmoothness { geometry, features };
-    match fill(surface, regions, size, Some(&smoothness), settings.effort) {
+    let smoothness = (!settings.is_final).then_some(&smoothness as &dyn Smoothness);
+    match fill(surface, regions, size, smoothness, settings.effort) {
         Ok(made) => Attempt::Made(Box::new(made)),
         Err(error) => match CloseSurfaces::unresolved(model, &initial.samples, error.places()) {
             Some(walls) => Attempt::Failed(TooClose::new(walls).into()),

@@ -281,7 +281,7 @@ impl FacetSolid {
         }
         self.add_kept_points(&mut surface);
         self.add_kept_edges(&mut surface);
-        let smoothness = self.smoothness();
+        let smoothness = self.smoothness().filter(|_| !settings.is_final);
         match fill(surface, regions, &size, smoothness.as_deref(), settings.effort) {
             Ok(made) => Attempt::Made(Box::new(made)),
             Err(error) => {

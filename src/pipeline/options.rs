@@ -95,7 +95,7 @@ pub(super) fn refuse_impossible_coarse(coarse: &CoarseSettings, wanted: Wanted) 
 /// a machine, and the disk to rank 0.
 fn compared(settings: &GenerateSettings) -> [(&'static str, u64); 12] {
     let GenerateSettings { method, coarse, wanted, refine, nested, allow_off_surface, .. } = settings;
-    let CoarseSettings { size, effort, order } = coarse;
+    let CoarseSettings { size, effort, order, .. } = coarse;
     let preset = (size.curvature_safety, size.segments_per_curve, size.scale);
     [
         ("method", value_of(method)),

@@ -73,14 +73,15 @@ pub(super) fn mesh_as_wanted(
     work: &Work,
 ) -> Result<Granted, Error> {
     let order = settings.order;
-    let with = |more: &[Source]| {
-        let mut coarse = settings.clone();
+    let with = |more: &[Source], pieces: u32| {
+        let is_final = pieces * refined == 1 && order == Order::First;
+        let mut coarse = CoarseSettings { is_final, ..settings.clone() };
         coarse.size.sources.extend(sources.iter().chain(more));
         coarse
     };
     let to_target = |tets: u64, pieces: u32, fits: &dyn Fn(u64) -> bool| {
         mend::refinable(model, (pieces * refined, order), budget, |more| {
-            mesh_to_target(model, &mut with(more), tets, fits, budget, work)
+            mesh_to_target(model, &mut with(more, pieces), tets, fits, budget, work)
         })
     };
     match wanted {
@@ -89,7 +90,8 @@ pub(super) fn mesh_as_wanted(
             Ok((pieces, model.coarse_mesh(&mut settings.clone(), budget, work)?, None))
         }
         Wanted::Sizes { pieces } => {
-            let make = |more: &[Source]| Ok((model.coarse_mesh(&mut with(more), budget, work)?, None));
+            let make =
+                |more: &[Source]| Ok((model.coarse_mesh(&mut with(more, pieces), budget, work)?, None));
             let (made, outcome) = mend::refinable(model, (pieces * refined, order), budget, make)?;
             Ok((pieces, made, outcome))
         }
