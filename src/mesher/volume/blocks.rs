@@ -46,6 +46,22 @@ impl Boxes {
         at - self.planes.len()
     }
 
+    /// The axis and the coordinate of the plane that cuts a box of the `level` in two; level 0 has
+    /// one box.
+    pub fn plane(&self, level: u32, index: usize) -> (usize, f64) {
+        self.planes[(1 << level) - 1 + index]
+    }
+
+    /// How often space is cut in two.
+    pub fn levels(&self) -> u32 {
+        self.len().ilog2()
+    }
+
+    /// The 2^`level` boxes by the first planes.
+    pub fn at_level(&self, level: u32) -> Self {
+        Self { planes: self.planes[..(1 << level) - 1].to_vec() }
+    }
+
     /// Whether a plane that bounds the box of a point is nearer than `reach`.
     pub fn is_near_side(&self, point: &Point, reach: f64) -> bool {
         let mut at = 0;
@@ -86,10 +102,7 @@ pub(super) struct Cut {
 impl Cut {
     /// Puts each of `tets` into the block in whose box its centroid lies.
     pub fn new(mesh: &Tetrahedra, tets: &[u32], boxes: &Boxes) -> Self {
-        let block = |&t: &u32| {
-            let [a, b, c, d] = mesh.corners(t);
-            boxes.of(&Point::from((a.coords + b.coords + c.coords + d.coords) * 0.25))
-        };
+        let block = |&t: &u32| boxes.of(&mesh.centroid(t));
         let of_tets: Vec<usize> = tets.par_iter().map(block).collect();
         let mut cut =
             Self { blocks: vec![Vec::new(); boxes.len()], places: vec![[NONE; 2]; mesh.tets.len()] };

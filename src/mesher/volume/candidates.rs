@@ -184,6 +184,7 @@ impl Filler<'_> {
             states: Vec::new(),
             cavity: Cavity::default(),
             lowered: Vec::new(),
+            waiting: Vec::new(),
             stopped: None,
             ..*self
         };

@@ -54,16 +54,19 @@ const JITTER: f64 = 1e-4;
 
 /// A size, and the number of tets of about this size.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Plateau {
+pub(super) struct Plateau {
     size: f64,
-    tets: f64,
+    pub tets: f64,
 }
 
 impl Filler<'_> {
     /// Inserts a lattice for each size that a large fraction of the tets has.
     pub(super) fn add_lattices(&mut self) {
         let coarse = self.coarse_tets();
-        let mut samples: Vec<Plateau> = coarse.iter().map(|&t| self.sample(t)).collect();
+        let mut samples: Vec<Plateau> = coarse.par_iter().map(|&t| self.sample(t)).collect();
+        for (&t, sample) in coarse.iter().zip(&samples) {
+            self.note_size(&self.mesh.centroid(t), sample.size);
+        }
         let total: f64 = samples.iter().map(|s| s.tets).sum();
         let space: f64 = coarse.iter().map(|&t| self.volume(t)).sum();
         if self.stops() || total > self.limits.max_tets as f64 {
@@ -87,16 +90,14 @@ impl Filler<'_> {
     }
 
     /// The tets that are larger than the wanted size.
-    fn coarse_tets(&self) -> Vec<u32> {
-        self.mesh.alive().filter(|&t| !self.is_fine(t)).collect()
+    pub(super) fn coarse_tets(&self) -> Vec<u32> {
+        let is_coarse = |&t: &u32| self.mesh.is_alive(t) && !self.is_fine(t);
+        (0..self.mesh.tets.len() as u32).into_par_iter().filter(is_coarse).collect()
     }
 
     /// The size at the centroid of a tet, and how many tets of that size fill it.
-    fn sample(&mut self, t: u32) -> Plateau {
-        let [a, b, c, d] = self.mesh.corners(t);
-        let middle = Point::from((a.coords + b.coords + c.coords + d.coords) * 0.25);
-        let size = self.size_near(t, &middle);
-        self.note_size(&middle, size);
+    pub(super) fn sample(&self, t: u32) -> Plateau {
+        let size = self.size_near(t, &self.mesh.centroid(t));
         Plateau { size, tets: tets_of_size(self.volume(t), size) }
     }
 

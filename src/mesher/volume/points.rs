@@ -12,6 +12,7 @@
 //! mesh is made Delaunay first (`legalize`) as far as the boundary allows.
 
 use super::cavity::{Cavity, Walk, walk};
+use super::front::Wall;
 use super::legalize::legalize;
 use super::tetrahedra::Tetrahedra;
 use crate::ground::kernel::hilbert::random_rounds;
@@ -65,6 +66,10 @@ pub(super) struct Filler<'a> {
     pub(super) limits: Limits,
     /// Tets that were fine before the size at one of their vertices was lowered.
     pub(super) lowered: Vec<u32>,
+    /// Tets in a block whose points have to wait, because the cavities reach the seam.
+    pub(super) waiting: Vec<u32>,
+    /// If given, points elsewhere are rejected.
+    pub(super) wall: Option<Wall>,
     /// The reason if the placement stops early.
     pub(super) stopped: Option<Stopped>,
 }
@@ -84,6 +89,8 @@ pub(super) enum State {
     Coarse,
     /// Larger than wanted, but all its ideal points were rejected: the front continues behind it.
     Rejected,
+    /// Larger than wanted, but its ideal points and its circumcentre were rejected.
+    Settled,
     /// Not larger than wanted.
     Fine,
 }
@@ -132,6 +139,8 @@ pub(super) fn fill(
         cavity: Cavity::default(),
         limits,
         lowered: Vec::new(),
+        waiting: Vec::new(),
+        wall: None,
         stopped: None,
     };
     filler.size_vertices();
@@ -177,7 +186,7 @@ impl Filler<'_> {
     }
 
     /// Sets the states of all tets.
-    fn set_states(&mut self) {
+    pub(super) fn set_states(&mut self) {
         self.mesh.keep_spheres();
         let state = |t: u32| {
             if self.mesh.is_alive(t) && self.is_fine(t) { State::Fine } else { State::Coarse }
@@ -196,15 +205,15 @@ impl Filler<'_> {
         self.states[t as usize]
     }
 
-    /// The coarse tets in random rounds along the Hilbert curve; later waves inherit this order.
+    /// The coarse tets that are wanted, in random rounds along the Hilbert curve; later waves inherit this order.
     ///
     /// The curve makes neighbouring tets follow each other, for the cache: 2 million tets in the
     /// shaft take 3.7 s instead of 5.7 s. The rounds keep cavities small if tets extend from
     /// boundary to boundary: in a ball all tets have nearly the same circumsphere. With an infinite
     /// field, time then grows by 2.25 per doubling of the surface, instead of 2.5 in one pass along
     /// the curve.
-    fn in_random_rounds(&self) -> Vec<u32> {
-        let is_coarse = |t: &u32| self.state(*t) == State::Coarse;
+    pub(super) fn in_random_rounds(&self, is_wanted: impl Fn(u32) -> bool) -> Vec<u32> {
+        let is_coarse = |&t: &u32| self.state(t) == State::Coarse && is_wanted(t);
         let coarse: Vec<u32> = self.mesh.alive().filter(is_coarse).collect();
         let places: Vec<Point> =
             coarse.iter().map(|&t| *self.mesh.point(self.mesh.tets[t as usize][0])).collect();
@@ -212,11 +221,12 @@ impl Filler<'_> {
     }
 
     /// Runs the front, then inserts circumcentres, then fills dips of the size field; repeats until
-    /// there is no dip.
+    /// there is no dip. Blocks come first if many points are expected.
     fn place_points(&mut self) {
         self.lower_all();
         self.set_states();
-        let mut open = self.in_random_rounds();
+        self.advance_in_blocks();
+        let mut open = self.in_random_rounds(|_| true);
         loop {
             self.advance(open);
             self.finish();
@@ -228,7 +238,7 @@ impl Filler<'_> {
     }
 
     /// Inserts ideal points in waves until no front is left.
-    fn advance(&mut self, mut coarse: Vec<u32>) {
+    pub(super) fn advance(&mut self, mut coarse: Vec<u32>) {
         while !coarse.is_empty() {
             let mut next = Vec::new();
             let mut moved = false;
@@ -275,8 +285,9 @@ impl Filler<'_> {
     /// [`NEAREST`] times the size there. Next to facets much coarser than the wanted size long
     /// edges remain, because circumcentres are behind the facets or too close to them; see
     /// [`NEAREST_COARSE`].
-    fn finish(&mut self) {
-        let is_open = |&t: &u32| self.mesh.is_alive(t) && self.state(t) != State::Fine;
+    pub(super) fn finish(&mut self) {
+        let is_open =
+            |&t: &u32| self.mesh.is_alive(t) && !matches!(self.state(t), State::Fine | State::Settled);
         let mut open: Vec<u32> = (0..self.mesh.tets.len() as u32).into_par_iter().filter(is_open).collect();
         while let Some(t) = open.pop() {
             if self.stops() {
@@ -286,6 +297,10 @@ impl Filler<'_> {
                 continue;
             }
             let center = self.mesh.sphere(t).center();
+            // This size is at least the wanted one, and takes far less time.
+            if self.is_outside_wall(&center, self.grown_size(t, &center, f64::INFINITY)) {
+                continue;
+            }
             let size = self.size_near(t, &center);
             if self.insert_and_update(t, center, size) {
                 open.extend_from_slice(&self.cavity.filled);
@@ -303,8 +318,7 @@ impl Filler<'_> {
             if !self.mesh.is_alive(t) || self.state(t) != State::Fine {
                 return None;
             }
-            let [a, b, c, d] = self.mesh.corners(t);
-            let middle = Point::from((a.coords + b.coords + c.coords + d.coords) * 0.25);
+            let middle = self.mesh.centroid(t);
             let size = self.size_near(t, &middle);
             let wanted = FINE * REGULAR * DIP * size;
             // Invalid sizes are included, so that they are reported.
@@ -355,7 +369,11 @@ impl Filler<'_> {
 
     /// Like [`Filler::insert`], and updates the states and sizes of the new tets.
     fn insert_and_update(&mut self, t: u32, point: Point, size: f64) -> bool {
-        let inserted = self.insert(t, point, size) == Placed::Inserted;
+        let placed = self.insert(t, point, size);
+        let inserted = placed == Placed::Inserted;
+        if placed == Placed::Waits {
+            self.waiting.push(t);
+        }
         if inserted {
             let filled = std::mem::take(&mut self.cavity.filled);
             self.update_states(filled.iter().copied());
@@ -373,7 +391,10 @@ impl Filler<'_> {
             return Placed::Rejected;
         }
         self.note_size(&point, size);
-        if self.stopped.is_some() || self.is_corner_near(t, &point, size) {
+        if self.stopped.is_some()
+            || self.is_outside_wall(&point, size)
+            || self.is_corner_near(t, &point, size)
+        {
             return Placed::Rejected;
         }
         let seed = match walk(self.mesh, t, &point) {
@@ -402,6 +423,10 @@ impl Filler<'_> {
         self.sizes.push(size);
         self.cavity.fill(self.mesh, v, body);
         Placed::Inserted
+    }
+
+    fn is_outside_wall(&self, point: &Point, size: f64) -> bool {
+        self.wall.is_some_and(|wall| !wall.contains(point, size))
     }
 
     /// Whether a vertex is too close to a new point, by the wanted size there.

@@ -134,7 +134,7 @@ impl Filler<'_> {
 
     /// Propagates lowered sizes to neighbours (gradient limiting: Borouchaki, Hecht, Frey 1998);
     /// tets that become coarse are added to `lowered`.
-    fn lower_from(&mut self, mut open: Vec<u32>) {
+    pub(super) fn lower_from(&mut self, mut open: Vec<u32>) {
         let (mut star, mut neighbours) = (Vec::new(), Vec::new());
         while let Some(v) = open.pop() {
             self.mesh.star(v, &mut star);

@@ -97,6 +97,12 @@ impl Tetrahedra {
         [self.point(a), self.point(b), self.point(c), self.point(d)]
     }
 
+    /// The mean of the corners of a tet.
+    pub fn centroid(&self, tet: u32) -> Point {
+        let [a, b, c, d] = self.corners(tet);
+        Point::from((a.coords + b.coords + c.coords + d.coords) * 0.25)
+    }
+
     /// The vertices of a half-face, oriented outward from its tet.
     #[inline]
     pub fn face(&self, half_face: u32) -> [u32; 3] {
