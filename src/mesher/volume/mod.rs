@@ -32,8 +32,9 @@
 //! 5. `keep`, `kept_edges`: insert points and edges requested by the caller.
 //! 6. `points`: fills the inside by the size field: lattices in regions of constant size
 //!    (`lattice`; inserted by all threads in `blocks`, see `candidates`), frontal Delaunay
-//!    elsewhere, after flips that restore the Delaunay property (`legalize`); `front` runs it on all
-//!    threads if many points are expected. The growth of sizes is limited for any field (`sizes`).
+//!    elsewhere, after flips that restore the Delaunay property (`legalize`); `front` runs it in
+//!    blocks on all threads if many points are expected. The growth of sizes is limited for any
+//!    field (`sizes`).
 //!
 //! Not guaranteed: shape. Steps 1 to 5 make whatever tets the surface allows; step 6 makes nearly
 //! all tets well-shaped, but slivers remain: see [`improve`](crate::mesher::improve).
