@@ -187,8 +187,13 @@ impl Filler<'_> {
         Filled { block, sizes, states, stopped }
     }
 
-    /// Puts blocks back, with their sizes and states.
+    /// Puts blocks back, with their sizes and states, unless they have too many tets.
     fn put_back(&mut self, filled: Vec<Filled>) {
+        let tets: usize = filled.iter().map(|filled| filled.block.mesh.len()).sum();
+        if tets > self.limits.max_tets {
+            self.stopped = self.stopped.or(Some(Stopped::TooManyTets));
+            return;
+        }
         let mut uses = vec![0_u32; self.mesh.points.len()];
         for filled in &filled {
             filled.block.vertices.iter().for_each(|&v| uses[v as usize] += 1);
