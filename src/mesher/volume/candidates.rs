@@ -10,7 +10,7 @@
 //! in 32 blocks an eighth is near sides. Without this order two fifths wait.
 
 use super::blocks::{Block, Boxes, Cut};
-use super::cavity::{Cavity, Walk, walk};
+use super::cavity::{Walk, walk};
 use super::points::{Filler, Placed, Stopped};
 use super::tetrahedra::Tetrahedra;
 use crate::Point;
@@ -172,22 +172,12 @@ impl Filler<'_> {
 
     /// Inserts points in a block. They come with the numbers of the tets around them in the block.
     fn add_in_block(&self, mut block: Block, offered: Vec<(u32, Candidate)>) -> Filled {
-        let sizes = block.vertices.iter().map(|&v| self.at(v)).collect();
         let here = |(slot, candidate): (u32, Candidate)| Candidate {
             vertex: block.mesh.tets[slot as usize][0],
             ..candidate
         };
         let candidates: Vec<Candidate> = offered.into_iter().map(here).collect();
-        let mut filler = Filler {
-            mesh: &mut block.mesh,
-            sizes,
-            states: Vec::new(),
-            cavity: Cavity::default(),
-            lowered: Vec::new(),
-            waiting: Vec::new(),
-            stopped: None,
-            ..*self
-        };
+        let mut filler = self.in_block(&mut block);
         let mut waiting = filler.add_one_by_one(&candidates);
         let (sizes, stopped) = (filler.sizes, filler.stopped);
         waiting.iter_mut().for_each(|c| c.vertex = block.vertices[c.vertex as usize]);

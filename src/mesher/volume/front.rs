@@ -12,7 +12,6 @@
 //! threads.
 
 use super::blocks::{Block, Boxes, Cut};
-use super::cavity::Cavity;
 use super::points::{Filler, State, Stopped};
 use crate::ground::kernel::random::Random;
 use crate::mesher::half_face::NONE;
@@ -171,16 +170,7 @@ impl Filler<'_> {
     }
 
     fn fill_block(&self, mut block: Block, work: impl Fn(&mut Filler)) -> Filled {
-        let mut filler = Filler {
-            mesh: &mut block.mesh,
-            sizes: block.vertices.iter().map(|&v| self.at(v)).collect(),
-            states: block.tets.iter().map(|&t| self.state(t)).collect(),
-            cavity: Cavity::default(),
-            lowered: Vec::new(),
-            waiting: Vec::new(),
-            stopped: None,
-            ..*self
-        };
+        let mut filler = self.in_block(&mut block);
         work(&mut filler);
         let Filler { sizes, mut states, stopped, .. } = filler;
         states.resize(block.mesh.tets.len(), State::Coarse);
@@ -230,6 +220,7 @@ impl Filler<'_> {
 #[cfg(test)]
 mod tests {
     use super::super::bound::bound;
+    use super::super::cavity::Cavity;
     use super::super::legalize::legalize;
     use super::super::points::Limits;
     use super::super::samples::*;

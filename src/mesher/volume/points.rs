@@ -11,6 +11,7 @@
 //! Sizes come from `sizes`. The arguments about circumspheres hold for Delaunay meshes only, so the
 //! mesh is made Delaunay first (`legalize`) as far as the boundary allows.
 
+use super::blocks::Block;
 use super::cavity::{Cavity, Walk, walk};
 use super::front::Wall;
 use super::legalize::legalize;
@@ -155,6 +156,23 @@ pub(super) fn fill(
 }
 
 impl Filler<'_> {
+    /// The working state in a block of the mesh; tets have states there if they have them here.
+    pub(super) fn in_block<'b>(&self, block: &'b mut Block) -> Filler<'b>
+    where
+        Self: 'b,
+    {
+        Filler {
+            sizes: block.vertices.iter().map(|&v| self.at(v)).collect(),
+            states: block.tets.iter().filter_map(|&t| self.states.get(t as usize).copied()).collect(),
+            mesh: &mut block.mesh,
+            cavity: Cavity::default(),
+            lowered: Vec::new(),
+            waiting: Vec::new(),
+            stopped: None,
+            ..*self
+        }
+    }
+
     /// Stops the placement if `size` is not positive.
     pub(super) fn note_size(&mut self, point: &Point, size: f64) {
         if size.is_nan() || size <= 0.0 {
