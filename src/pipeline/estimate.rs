@@ -9,7 +9,7 @@ use super::model::Model;
 use crate::Point;
 use crate::ground::kernel::simplex::volume6;
 use crate::ground::mesh::{Mesh, TET_EDGES};
-use crate::ground::size::{Accuracy, SizeField, SizeSettings};
+use crate::ground::size::{Evaluation, SizeField, SizeSettings};
 use rayon::prelude::*;
 
 /// Tets are bisected until they are no longer than this, in units of the size at their centroid;
@@ -75,7 +75,7 @@ impl<'a> Estimate<'a> {
     /// The expected number of tets at a scale, as a fraction of those of the mesh.
     pub fn share_at(&self, scale: f64) -> Option<f64> {
         let sizes = at_scale(&self.settings.size, scale, self.own_sources);
-        let size = self.model.size_field(&sizes, Accuracy::Rough)?;
+        let size = self.model.size_field(&sizes, Evaluation::Rough)?;
         Some(integral(&self.made.mesh, &*size) / self.base)
     }
 }

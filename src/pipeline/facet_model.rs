@@ -15,7 +15,7 @@ use crate::ground::kernel::simplex::volume6;
 use crate::ground::mesh::{BoundaryTriangle, Class, Label, Names, Segment, VertexId};
 use crate::ground::progress::Work;
 use crate::ground::projector::{BrepProjector, Projector};
-use crate::ground::size::{Accuracy, Closeness, SizeField, SizeSettings, Source, WatchedSize};
+use crate::ground::size::{Closeness, Evaluation, SizeField, SizeSettings, Source, WatchedSize};
 use crate::mesher::facets::{
     Crossing, FacetBodies, FacetError, FacetModel, FacetPatch, FacetSize, FacetSmoothness, Facets, Marks,
     MergedSmall, RemeshSettings, SharpPlaces, Small, keep, largest_size, merge, remesh,
@@ -196,7 +196,7 @@ impl FacetSolid {
         let (factor, tip_factor) = (SMALL.max(in_pieces), TIP.max(in_pieces));
         let largest = largest.min(largest_size(&self.model, settings));
         let size = |model: &FacetModel| -> Box<dyn SizeField> {
-            Box::new(AtMost(FacetSize::with_accuracy(model, settings, Accuracy::Fine), largest))
+            Box::new(AtMost(FacetSize::evaluated(model, settings, Evaluation::Searched), largest))
         };
         let small = Small { factor, largest, tip_factor, tessellated: cad.settings, size: &size };
         let (merged, report) = merge(&cad.model, &cad.tessellation, &small);
@@ -244,15 +244,15 @@ impl FacetSolid {
     }
 
     /// The size field.
-    pub(super) fn size_field(&self, settings: &SizeSettings, accuracy: Accuracy) -> FacetSize {
+    pub(super) fn size_field(&self, settings: &SizeSettings, evaluation: Evaluation) -> FacetSize {
         if self.keep_surface {
             return FacetSize::of_kept(&self.model, settings);
         }
-        FacetSize::with_accuracy(&self.model, settings, accuracy)
+        FacetSize::evaluated(&self.model, settings, evaluation)
     }
 
     fn attempt(&self, settings: &CoarseSettings, allowed: Allowed, budget: &Budget, work: &Work) -> Attempt {
-        let own = self.size_field(&settings.size, Accuracy::Fine);
+        let own = self.size_field(&settings.size, Evaluation::Fine);
         let size = WatchedSize::new(&own, work);
         let expected = expected::tets(&self.model.bounds, &size, expected::FEW, || {
             let bodies = FacetBodies::new(&self.model);

@@ -12,7 +12,7 @@ use crate::ground::mesh::periodic::Link;
 use crate::ground::mesh::{Mesh, Names};
 use crate::ground::progress::Work;
 use crate::ground::projector::Projector;
-use crate::ground::size::{Accuracy, GeometricSize, LEAST_SIZE, SizeField, SizeSettings};
+use crate::ground::size::{Evaluation, GeometricSize, LEAST_SIZE, SizeField, SizeSettings};
 use crate::mesher::model::CsgModel;
 use csg::{Aabb, Geometry, SurfaceId};
 
@@ -149,14 +149,14 @@ impl Model {
     pub(super) fn size_field(
         &self,
         settings: &SizeSettings,
-        accuracy: Accuracy,
+        evaluation: Evaluation,
     ) -> Option<Box<dyn SizeField + '_>> {
         match self {
             Self::Csg(model) => {
                 let CsgModel { geometry, features, .. } = &**model;
-                Some(Box::new(GeometricSize::with_accuracy(geometry, features, settings, accuracy)))
+                Some(Box::new(GeometricSize::evaluated(geometry, features, settings, evaluation)))
             }
-            Self::Facets(solid) => Some(Box::new(solid.size_field(settings, accuracy))),
+            Self::Facets(solid) => Some(Box::new(solid.size_field(settings, evaluation))),
             Self::Given(_) => None,
         }
     }

@@ -10,7 +10,7 @@ use crate::ground::comm::Communicator;
 use crate::ground::mesh::Mesh;
 use crate::ground::progress::{Progress, Stage};
 use crate::ground::projector::Projector;
-use crate::ground::size::{Accuracy, SizeSettings};
+use crate::ground::size::{Evaluation, SizeSettings};
 use crate::parallel::distribution::{BareMesh, DistMesh};
 use crate::parallel::skin::{self, DeliveredSizes, Filled, Improvement, PartSizes};
 
@@ -64,6 +64,6 @@ impl Refused {
 
 /// The requested sizes at the vertices of the coarse mesh, on the rank that has it.
 pub(super) fn wanted_sizes(model: &Model, coarse: &Mesh, size: &SizeSettings, pieces: u32) -> Vec<f64> {
-    let field = model.size_field(size, Accuracy::Fine);
+    let field = model.size_field(size, Evaluation::Fine);
     skin::at_vertices(coarse, field.as_deref(), pieces)
 }

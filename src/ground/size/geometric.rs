@@ -1,6 +1,6 @@
 //! The size field of a geometry and a user's settings.
 
-use super::{Accuracy, Closeness, GeometricSamples, Preset, SizeField, SizeFunction, Source, SourceTree};
+use super::{Closeness, Evaluation, GeometricSamples, GradedSize, Preset, SizeField, SizeFunction, Source};
 use crate::Point;
 use csg::{BodyId, Features, Geometry, Solid};
 
@@ -82,7 +82,7 @@ impl SizeSettings {
 #[derive(Clone, Debug)]
 pub struct GeometricSize<'a> {
     geometry: &'a Geometry,
-    tree: SourceTree,
+    graded: GradedSize,
     /// Bodies with a bound of their own.
     body_bounds: Vec<(BodyId, f64)>,
     function: Option<SizeFunction>,
@@ -91,18 +91,18 @@ pub struct GeometricSize<'a> {
 impl<'a> GeometricSize<'a> {
     /// Samples curves and patches and builds the field.
     pub fn new(geometry: &'a Geometry, features: &Features, settings: &SizeSettings) -> Self {
-        Self::with_accuracy(geometry, features, settings, Accuracy::Fine)
+        Self::evaluated(geometry, features, settings, Evaluation::Fine)
     }
 
-    /// [`new`](Self::new), as accurate as needed.
-    pub(crate) fn with_accuracy(
+    /// [`new`](Self::new) for few or many points.
+    pub(crate) fn evaluated(
         geometry: &'a Geometry,
         features: &Features,
         settings: &SizeSettings,
-        accuracy: Accuracy,
+        evaluation: Evaluation,
     ) -> Self {
         let samples = GeometricSamples::new(geometry, features, settings);
-        Self::with_tree(geometry, features, settings, &samples, accuracy)
+        Self::of(geometry, features, settings, &samples, evaluation)
     }
 
     /// Builds the field from samples that were taken with the same settings, except for their
@@ -113,20 +113,25 @@ impl<'a> GeometricSize<'a> {
         settings: &SizeSettings,
         samples: &GeometricSamples,
     ) -> Self {
-        Self::with_tree(geometry, features, settings, samples, Accuracy::Fine)
+        Self::of(geometry, features, settings, samples, Evaluation::Fine)
     }
 
-    fn with_tree(
+    fn of(
         geometry: &'a Geometry,
         features: &Features,
         settings: &SizeSettings,
         samples: &GeometricSamples,
-        accuracy: Accuracy,
+        evaluation: Evaluation,
     ) -> Self {
         let sources = [&*settings.sources, &*samples.sources].concat();
-        let tree =
-            SourceTree::with_accuracy(features.bounds, settings.grading, samples.maximum, &sources, accuracy);
-        Self { geometry, tree, body_bounds: samples.body_bounds.clone(), function: settings.function.clone() }
+        let graded =
+            GradedSize::new(features.bounds, settings.grading, samples.maximum, &sources, evaluation);
+        Self {
+            geometry,
+            graded,
+            body_bounds: samples.body_bounds.clone(),
+            function: settings.function.clone(),
+        }
     }
 }
 
@@ -134,7 +139,7 @@ impl SizeField for GeometricSize<'_> {
     fn size_at(&self, point: &Point) -> f64 {
         let inside =
             |body: &BodyId| contains(self.geometry, &self.geometry.bodies[body.index()].solid, point);
-        let size = self.tree.size_at(point);
+        let size = self.graded.size_at(point);
         let size = self.function.as_ref().map_or(size, |function| function.bound(size, point));
         self.body_bounds
             .iter()

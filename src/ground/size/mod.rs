@@ -8,6 +8,8 @@
 mod background;
 mod function;
 mod geometric;
+mod graded;
+mod lattice;
 mod near;
 mod periodic;
 mod preset;
@@ -19,15 +21,15 @@ mod watched;
 pub use background::BackgroundError;
 pub use function::SizeFunction;
 pub use geometric::{GeometricSize, SizeSettings};
+pub(crate) use graded::{Evaluation, GradedSize};
 pub(crate) use near::NearSurfaces;
 pub use periodic::PeriodicSize;
 pub use preset::{Closeness, Preset};
 pub use samples::GeometricSamples;
 pub(crate) use samples::ShortCurve;
-pub(crate) use source_tree::Accuracy;
 pub use source_tree::SourceTree;
 pub use sources::Source;
-pub(crate) use sources::thinned;
+pub(crate) use sources::{Sources, thinned};
 pub use watched::WatchedSize;
 
 use crate::Point;

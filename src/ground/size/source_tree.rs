@@ -1,12 +1,11 @@
 //! An octree that stores the smallest size over many graded sources.
 
-use super::sources::{NO_LESS, Sources, Start};
+use super::lattice::Lattice;
+use super::sources::{Sources, Start};
 use super::{LEAST_SIZE, Source};
-use crate::ground::kernel::hash::WordHash;
 use crate::{Point, Vector};
 use csg::Aabb;
 use rayon::prelude::*;
-use std::collections::HashMap;
 
 /// An octree that interpolates the field of graded sources between the corners of its cells.
 ///
@@ -63,24 +62,10 @@ const STEEP: f64 = 0.45;
 /// size counts as attained if it is lower than the known values by no more than this.
 const BENT: f64 = 0.04;
 
-/// How closely a tree follows the field.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Accuracy {
-    /// Closely enough for a mesh.
-    Fine,
-    /// With twice the error, which is enough to compare numbers of tets: cells are twice as large,
-    /// so that a quarter of them are built on a surface.
-    Rough,
-}
-
-/// The factor of all these limits in a rough tree.
-const ROUGH: f64 = 2.0;
-
 /// The 64 subtrees below this depth are built in parallel.
 const PARALLEL_DEPTH: u32 = 2;
 
-/// When a cell is split: [`SMALL`], [`LARGE`] and [`BENT`] at a grading and an accuracy.
-#[derive(Clone, Copy)]
+/// When a cell is split: [`SMALL`], [`LARGE`] and [`BENT`] at a grading and a roughness.
 struct Limits {
     small: f64,
     large: f64,
@@ -88,13 +73,19 @@ struct Limits {
 }
 
 impl Limits {
-    fn new(grading: f64, accuracy: Accuracy) -> Self {
-        let roughness = match accuracy {
-            Accuracy::Fine => 1.0,
-            Accuracy::Rough => ROUGH,
-        };
+    fn new(grading: f64, roughness: f64) -> Self {
         let part = (STEEP / grading).min(1.0) * roughness;
         Self { small: SMALL * part, large: LARGE * part, bent: BENT * roughness }
+    }
+
+    /// Whether interpolation in a cell is accurate enough.
+    fn allow(&self, draft: &Draft, maximum: f64) -> bool {
+        let Draft { edge, corners, center, least, .. } = *draft;
+        let least_known = corners.iter().copied().fold(center, f64::min);
+        let large = if least > (1.0 - self.bent) * least_known { SHOWN * self.large } else { self.large };
+        let mean = corners.iter().sum::<f64>() / 8.0;
+        let is_flat = edge < large * least && (mean - center).abs() < self.bent * center;
+        least >= maximum || edge < self.small * least || is_flat
     }
 }
 
@@ -104,15 +95,12 @@ struct Draft {
     min: Point,
     edge: f64,
     corners: [f64; 8],
-    /// A lower bound of the field in the cell.
+    center: f64,
+    /// The smallest size in the cell.
     least: f64,
     /// The start of searches in the cell.
     start: Start,
 }
-
-/// The values at corners computed before, by the bits of the coordinates, because cells share
-/// corners.
-type Known = HashMap<[u64; 3], f64, WordHash>;
 
 impl SourceTree {
     /// Builds the tree over `bounds`.
@@ -120,18 +108,18 @@ impl SourceTree {
     /// Outside, the size grows from the nearest point of the box. `grading` is the growth per unit
     /// of distance, `maximum` the size if no source imposes a smaller one.
     pub fn new(bounds: Aabb, grading: f64, maximum: f64, sources: &[Source]) -> Self {
-        Self::with_accuracy(bounds, grading, maximum, sources, Accuracy::Fine)
+        Self::with_roughness(bounds, grading, maximum, sources, 1.0)
     }
 
-    /// [`new`](Self::new), as accurate as needed.
-    pub(crate) fn with_accuracy(
+    /// [`new`](Self::new) with an error larger by a factor.
+    pub(super) fn with_roughness(
         bounds: Aabb,
         grading: f64,
         maximum: f64,
         sources: &[Source],
-        accuracy: Accuracy,
+        roughness: f64,
     ) -> Self {
-        let limits = Limits::new(grading, accuracy);
+        let limits = Limits::new(grading, roughness);
         let side = (bounds.max - bounds.min).max().max(f64::MIN_POSITIVE);
         let center = bounds.center();
         let half = Vector::repeat(0.5 * side);
@@ -141,13 +129,17 @@ impl SourceTree {
         let sources: Vec<Source> =
             sources.iter().map(|source| Source { size: source.size.max(least), ..*source }).collect();
         let sources = Sources::new(grading, maximum, &sources);
-        let corner = |c: usize| {
-            let point = cube.min + octant(c, side);
-            sources.least_in(&point, &point, &sources.whole()).0
+        // The first child of a cell in which nothing is known.
+        let around = Draft {
+            min: cube.min,
+            edge: 2.0 * side,
+            corners: [maximum; 8],
+            center: maximum,
+            least: 0.0,
+            start: sources.whole(),
         };
-        let corners = [0, 1, 2, 3, 4, 5, 6, 7].map(corner);
-        let root = Draft { min: cube.min, edge: side, corners, least: 0.0, start: sources.whole() };
-        Self { bounds: cube, grading, maximum, cells: grow(&sources, limits, root) }
+        let [root, ..] = children(&sources, &around);
+        Self { bounds: cube, grading, maximum, cells: grow(&sources, &limits, root) }
     }
 
     /// The size at `point`.
@@ -175,20 +167,19 @@ impl SourceTree {
 }
 
 /// The cells of the subtree below a draft, its root first.
-fn grow(sources: &Sources, limits: Limits, root: Draft) -> Vec<Cell> {
+fn grow(sources: &Sources, limits: &Limits, root: Draft) -> Vec<Cell> {
     let mut cells = vec![Cell::Split(0)];
     let mut open = vec![(0, root)];
-    let mut known = Known::default();
     for _ in 0..PARALLEL_DEPTH {
-        open =
-            open.iter().flat_map(|draft| finish((sources, limits), &mut cells, draft, &mut known)).collect();
+        for (at, draft) in std::mem::take(&mut open) {
+            finish((sources, limits), at, &draft, &mut cells, &mut open);
+        }
     }
     let below = |(_, draft): &(usize, Draft)| {
         let mut cells = vec![Cell::Split(0)];
         let mut open = vec![(0, *draft)];
-        let mut known = Known::default();
-        while let Some(next) = open.pop() {
-            open.extend(finish((sources, limits), &mut cells, &next, &mut known));
+        while let Some((at, draft)) = open.pop() {
+            finish((sources, limits), at, &draft, &mut cells, &mut open);
         }
         cells
     };
@@ -202,85 +193,47 @@ fn grow(sources: &Sources, limits: Limits, root: Draft) -> Vec<Cell> {
     cells
 }
 
-/// Makes a cell a leaf, or splits it and returns the indices and drafts of its children.
+/// Makes a cell a leaf, or splits it and adds its children to the open cells.
 fn finish(
-    field: (&Sources, Limits),
+    (sources, limits): (&Sources, &Limits),
+    at: usize,
+    draft: &Draft,
     cells: &mut Vec<Cell>,
-    (at, draft): &(usize, Draft),
-    known: &mut Known,
-) -> Vec<(usize, Draft)> {
-    match split(field, draft, known) {
-        None => {
-            cells[*at] = Cell::Leaf(draft.corners.map(|value| value as f32));
-            Vec::new()
-        }
-        Some(parts) => {
-            let first = cells.len();
-            cells[*at] = Cell::Split(first as u32);
-            cells.extend([Cell::Split(0); 8]);
-            parts.into_iter().enumerate().map(|(i, part)| (first + i, part)).collect()
-        }
+    open: &mut Vec<(usize, Draft)>,
+) {
+    if limits.allow(draft, sources.maximum()) {
+        cells[at] = Cell::Leaf(draft.corners.map(|value| value as f32));
+        return;
     }
+    let first = cells.len();
+    cells[at] = Cell::Split(first as u32);
+    cells.extend([Cell::Split(0); 8]);
+    open.extend((first..).zip(children(sources, draft)));
 }
 
-/// The eight children of a cell, or `None` if interpolation in the cell is accurate enough.
-fn split((sources, limits): (&Sources, Limits), draft: &Draft, known: &mut Known) -> Option<[Draft; 8]> {
-    let Draft { min, edge, corners, least, start } = *draft;
-    let far = min + Vector::repeat(edge);
-    let least_corner = corners.iter().copied().fold(f64::INFINITY, f64::min);
-    // Each point of the cell is within half a diagonal of a corner, and within √5/4 of an edge of a
-    // corner or the centre.
-    let reach = edge * sources.grading();
-    let Limits { small, large, bent } = limits;
-    if edge < small * least.max(least_corner - 0.5 * 3.0_f64.sqrt() * reach) {
-        return None;
-    }
-    let mut start = sources.start_in(&min, &far, least_corner + 3.0_f64.sqrt() * reach, &start);
-    let at = |point: Point, start: &Start| sources.least_in(&point, &point, start);
-    let (middle, near) = at(min + Vector::repeat(0.5 * edge), &start);
-    let least_known = least_corner.min(middle);
-    if edge < small * (least_known - 0.25 * 5.0_f64.sqrt() * reach) {
-        return None;
-    }
-    start.near = near.or(start.near);
-    let (least, nearest) = sources.least_in(&min, &far, &start);
-    let mean = corners.iter().sum::<f64>() / 8.0;
-    let large = if least > (1.0 - bent) * least_known { SHOWN * large } else { large };
-    let flat = edge < large * least && (mean - middle).abs() < bent * middle;
-    if nearest.is_none() || edge < small * least || flat {
-        return None;
-    }
-    let lattice = lattice(draft, middle, &|point| at(point, &start).0, known);
-    let part = |i: usize| {
-        let corner = |c: usize| {
-            let along = |axis: usize| (i >> axis & 1) + (c >> axis & 1);
-            lattice[along(0) + 3 * along(1) + 9 * along(2)]
-        };
-        let corners = [0, 1, 2, 3, 4, 5, 6, 7].map(corner);
+/// The eight children of a cell.
+fn children(sources: &Sources, draft: &Draft) -> [Draft; 8] {
+    let Draft { min, edge, corners, center: size, start, .. } = *draft;
+    let (center, far) = (min + Vector::repeat(0.5 * edge), min + Vector::repeat(edge));
+    // Each point of the cell is within half a diagonal of the centre, and a diagonal of a corner.
+    let half = 0.5 * 3.0_f64.sqrt() * edge * sources.grading();
+    let most = corners.iter().fold(size + half, |most, corner| most.min(corner + 2.0 * half));
+    let start = sources.start_in(&min, &far, most, &start);
+    let mut lattice = Lattice::new(min, edge, sources.grading(), sources.maximum());
+    lattice.add_known(&corners, size);
+    sources.consider(&start, &center, &mut lattice);
+    let child = |i: usize| {
+        let corner = |c: usize| lattice.at_corner([0, 1, 2].map(|axis| (i >> axis & 1) + (c >> axis & 1)));
         Draft {
             min: min + octant(i, 0.5 * edge),
             edge: 0.5 * edge,
-            corners,
-            least: (1.0 - NO_LESS) * least,
+            corners: [0, 1, 2, 3, 4, 5, 6, 7].map(corner),
+            center: lattice.in_center(i),
+            least: lattice.least_in(i),
             start,
         }
     };
-    Some([0, 1, 2, 3, 4, 5, 6, 7].map(part))
-}
-
-/// The field at the 27 corners of the children of a cell, x fastest.
-fn lattice(draft: &Draft, middle: f64, field: &dyn Fn(Point) -> f64, known: &mut Known) -> [f64; 27] {
-    std::array::from_fn(|i| {
-        let step = [i % 3, i / 3 % 3, i / 9];
-        if step.iter().all(|&s| s != 1) {
-            draft.corners[step[0] / 2 + step[1] + 2 * step[2]]
-        } else if step == [1, 1, 1] {
-            middle
-        } else {
-            let point = draft.min + 0.5 * draft.edge * Vector::from(step.map(|s| s as f64));
-            *known.entry([0, 1, 2].map(|axis| point[axis].to_bits())).or_insert_with(|| field(point))
-        }
-    })
+    [0, 1, 2, 3, 4, 5, 6, 7].map(child)
 }
 
 /// The lower corner of an octant: bit 0 of `index` is x, bit 1 y, bit 2 z.
@@ -318,22 +271,25 @@ mod tests {
         let (grading, maximum) = (0.3, 0.5);
         // A source may be half a diagonal away from all corners of its cell.
         let most = 0.5 * 3.0_f64.sqrt() * SMALL * grading + BENT;
-        let agrees = |tree: &SourceTree, most: f64, mean: f64| {
-            let mut sum = 0.0;
-            for p in scattered(3000) {
+        let errors = |size_at: &dyn Fn(&Point) -> f64| -> (f64, f64) {
+            let error = |p: Point| {
                 let exact =
                     sources.iter().map(|s| s.size + grading * (p - s.point).norm()).fold(maximum, f64::min);
-                let error = (tree.size_at(&p) - exact).abs() / exact;
-                assert!(error <= most, "{p}: {error}");
-                sum += error;
-            }
-            assert!(sum / 3000.0 < mean, "{sum}");
+                (size_at(&p) - exact).abs() / exact
+            };
+            let all: Vec<f64> = scattered(3000).map(error).collect();
+            (all.iter().copied().fold(0.0, f64::max), all.iter().sum::<f64>() / 3000.0)
         };
         let tree = SourceTree::new(bounds, grading, maximum, &sources);
-        agrees(&tree, most, 0.02);
-        let rough = SourceTree::with_accuracy(bounds, grading, maximum, &sources, Accuracy::Rough);
-        agrees(&rough, ROUGH * most, ROUGH * 0.02);
+        let (worst, mean) = errors(&|p| tree.size_at(p));
+        assert!(worst <= most && mean < 0.02, "{worst}, {mean}");
+        let rough = SourceTree::with_roughness(bounds, grading, maximum, &sources, 2.0);
+        let (worst, mean) = errors(&|p| rough.size_at(p));
+        assert!(worst <= 2.0 * most && mean < 0.04, "{worst}, {mean}");
         assert!(2 * rough.cells.len() < tree.cells.len(), "{} cells", rough.cells.len());
+        let searched = Sources::new(grading, maximum, &sources);
+        let (worst, mean) = errors(&|p| searched.size_at(p));
+        assert!(worst <= 0.0102 && mean < 0.005, "{worst}, {mean}");
     }
 
     #[test]

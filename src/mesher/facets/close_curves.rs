@@ -5,7 +5,7 @@ use super::{FacetCurve, FacetModel};
 use crate::Point;
 use crate::ground::kernel::nearest::in_segment;
 use crate::ground::kernel::tree::{Tree, bounds};
-use crate::ground::size::{SizeSettings, Source, SourceTree};
+use crate::ground::size::{SizeSettings, Source, Sources, thinned};
 use crate::mesher::surface::closeness::lowered;
 use std::cell::OnceCell;
 
@@ -24,13 +24,8 @@ const MOST_CUTS: u32 = 20;
 /// Adds sources along curves that are close, compared with the sizes, to another curve of the same
 /// patch without a common corner.
 ///
-/// `size_alone` makes the size field of the sources before.
-pub(super) fn sample(
-    model: &FacetModel,
-    settings: &SizeSettings,
-    size_alone: impl Fn(&[Source]) -> SourceTree,
-    sources: &mut Vec<Source>,
-) {
+/// Far from all sources the size is `maximum`.
+pub(super) fn sample(model: &FacetModel, settings: &SizeSettings, maximum: f64, sources: &mut Vec<Source>) {
     let alone = OnceCell::new();
     let mut added: Vec<Source> = Vec::new();
     let patches = patches_of_curves(model);
@@ -66,7 +61,7 @@ pub(super) fn sample(
             };
             tree.nearest(p, to).map_or(f64::INFINITY, |(_, squared)| squared.sqrt())
         };
-        let alone = alone.get_or_init(|| size_alone(sources));
+        let alone = alone.get_or_init(|| Sources::new(settings.grading, maximum, &thinned(sources.clone())));
         let sizes = |p: &Point| Sizes {
             alone: alone.size_at(p),
             wanted: (ACROSS * settings.scale.min(1.0) * distance(p)).max(settings.minh),

@@ -8,14 +8,14 @@ use super::{FacetCurve, FacetModel, close_curves};
 use crate::ground::kernel::simplex::area_vector;
 use crate::ground::projector::facets::normals::SLIVER_HEIGHT;
 use crate::ground::size::{
-    Accuracy, Closeness, SizeField, SizeFunction, SizeSettings, Source, SourceTree, thinned,
+    Closeness, Evaluation, GradedSize, SizeField, SizeFunction, SizeSettings, Source, thinned,
 };
 use crate::{Point, Vector};
 
 /// Sizes from the curvature of facets and curves, from short curves, and from the user's settings.
 #[derive(Clone, Debug)]
 pub struct FacetSize {
-    tree: SourceTree,
+    graded: GradedSize,
     function: Option<SizeFunction>,
 }
 
@@ -32,21 +32,18 @@ impl FacetSize {
     /// Samples facets and curves for sources: curvature, short curves, and curves close to each
     /// other.
     pub fn new(model: &FacetModel, settings: &SizeSettings) -> Self {
-        Self::with_accuracy(model, settings, Accuracy::Fine)
+        Self::evaluated(model, settings, Evaluation::Fine)
     }
 
-    /// [`new`](Self::new), as accurate as needed.
-    pub(crate) fn with_accuracy(model: &FacetModel, settings: &SizeSettings, accuracy: Accuracy) -> Self {
+    /// [`new`](Self::new) for few or many points.
+    pub(crate) fn evaluated(model: &FacetModel, settings: &SizeSettings, evaluation: Evaluation) -> Self {
         let maximum = largest_size(model, settings);
         let mut sources = settings.sources.clone();
         sample_facets(model, settings, maximum, &mut sources);
         sample_curves(model, settings, maximum, &mut sources);
-        let tree_of = |sources: Vec<Source>| {
-            SourceTree::with_accuracy(model.bounds, settings.grading, maximum, &thinned(sources), accuracy)
-        };
-        close_curves::sample(model, settings, |alone| tree_of(alone.to_vec()), &mut sources);
-        let tree = tree_of(sources);
-        Self { tree, function: settings.function.clone() }
+        close_curves::sample(model, settings, maximum, &mut sources);
+        let graded = GradedSize::new(model.bounds, settings.grading, maximum, &thinned(sources), evaluation);
+        Self { graded, function: settings.function.clone() }
     }
 
     /// The size field for facets that are kept: that of the user alone.
@@ -55,9 +52,9 @@ impl FacetSize {
     /// curved or narrow places of a coarse surface could not be connected to it.
     pub fn of_kept(model: &FacetModel, settings: &SizeSettings) -> Self {
         let maximum = largest_size(model, settings);
-        let tree =
-            SourceTree::new(model.bounds, settings.grading, maximum, &thinned(settings.sources.clone()));
-        Self { tree, function: settings.function.clone() }
+        let sources = thinned(settings.sources.clone());
+        let graded = GradedSize::new(model.bounds, settings.grading, maximum, &sources, Evaluation::Fine);
+        Self { graded, function: settings.function.clone() }
     }
 
     /// The size field for which patches and curves turn by `turn` (radians) along an edge.
@@ -83,7 +80,7 @@ const TURN_GRADING: f64 = 1.0;
 
 impl SizeField for FacetSize {
     fn size_at(&self, point: &Point) -> f64 {
-        let size = self.tree.size_at(point);
+        let size = self.graded.size_at(point);
         self.function.as_ref().map_or(size, |function| function.bound(size, point))
     }
 }

@@ -9,6 +9,7 @@ use crate::ground::projector::BrepProjector;
 use crate::ground::size::SizeField;
 use crate::mesher::facets::FacetModel;
 use crate::mesher::facets::exact::{Shape, grouped};
+use rayon::prelude::*;
 
 /// Faces of a file as patches, and its edges as curves.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -116,7 +117,7 @@ pub(super) fn merge_all(shape: &Shape, layout: &Layout, small: &Small) -> (Optio
         let (facets, exact) = grouped(model, tessellation, shape, &grouping);
         let size = (small.size)(&facets);
         // A narrow face lowers the sizes around it: the largest one is that of all others.
-        let largest = tessellation.points.iter().map(|p| size.size_at(p)).fold(0.0, f64::max);
+        let largest = tessellation.points.par_iter().map(|p| size.size_at(p)).reduce(|| 0.0, f64::max);
         report.named.retain(|kept| small.factor * kept.width <= largest);
         if report.faces.is_empty() && report.edges.is_empty() {
             return (None, report);
