@@ -11,6 +11,8 @@ pub(super) struct Changes {
     moves: Vec<u64>,
     /// When the last flips of all edges began.
     flips: u64,
+    /// When the last collapses of all short edges began.
+    collapses: u64,
     /// When each triangle was last compared with its facets, and whether it follows them.
     fits: Vec<(u64, bool)>,
 }
@@ -53,6 +55,18 @@ impl Changes {
         !self.is_since(self.flips, &vertices)
     }
 
+    /// Whether one of these vertices, or of their triangles, has changed since the flips of all edges
+    /// were tried last.
+    pub fn is_since_flips(&self, vertices: &[u32]) -> bool {
+        self.is_since(self.flips, vertices)
+    }
+
+    /// Whether the collapse of an edge was tried in vain since the last change of these vertices,
+    /// which are all those of the triangles at its ends.
+    pub fn is_collapse_in_vain(&self, mut vertices: impl Iterator<Item = u32>) -> bool {
+        vertices.all(|v| self.changed[v as usize] <= self.collapses)
+    }
+
     pub fn now(&self) -> u64 {
         self.now
     }
@@ -60,6 +74,11 @@ impl Changes {
     /// Notes that the flips of all edges were tried, from this time on.
     pub fn all_flips_since(&mut self, began: u64) {
         self.flips = began;
+    }
+
+    /// Notes that the collapses of all short edges were tried, from this time on.
+    pub fn all_collapses_since(&mut self, began: u64) {
+        self.collapses = began;
     }
 
     /// Whether a triangle follows its facets, if that is known.

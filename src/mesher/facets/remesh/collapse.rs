@@ -33,16 +33,25 @@ pub(super) fn collapse_short(sheet: &mut Sheet, short: f64) -> usize {
         edges.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.2).cmp(&(b.1, b.2))));
         edges.dedup();
         let before = collapsed;
+        let began = sheet.changes.now();
         for (_, a, b) in edges {
             let both_live = !sheet.around[a as usize].is_empty() && !sheet.around[b as usize].is_empty();
-            if both_live && sheet.length(a, b) < short && collapse_either(sheet, a, b, LONG) {
+            let is_tried = both_live && sheet.length(a, b) < short && !is_in_vain(sheet, a, b);
+            if is_tried && collapse_either(sheet, a, b, LONG) {
                 collapsed += 1;
             }
         }
+        sheet.changes.all_collapses_since(began);
         if collapsed == before {
             return collapsed;
         }
     }
+}
+
+/// Whether nothing has changed around an edge since its collapse was tried.
+fn is_in_vain(sheet: &Sheet, a: u32, b: u32) -> bool {
+    let around = [a, b].into_iter().flat_map(|end| &sheet.around[end as usize]);
+    sheet.changes.is_collapse_in_vain(around.flat_map(|&t| sheet.at(t).v))
 }
 
 /// Merges one end of an edge into the other; the end classified on the lower dimension stays.

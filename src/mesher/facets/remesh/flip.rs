@@ -1,7 +1,8 @@
 //! Edge flips inside patches, if they improve the worse of the two triangles.
 
 use super::sheet::{NONE, Sheet, Triangle};
-use std::collections::VecDeque;
+use crate::ground::kernel::hash::WordHash;
+use std::collections::{HashSet, VecDeque};
 
 /// Least gain of a flip, so that rounding cannot cause cycles.
 const GAIN: f64 = 1e-6;
@@ -11,12 +12,8 @@ const MOST_FLIPS: usize = 12;
 
 /// Flips edges until nothing improves; returns the number of flips.
 pub(super) fn flip_all(sheet: &mut Sheet) -> usize {
-    let mut queue: VecDeque<[u32; 2]> = VecDeque::new();
-    for t in sheet.living() {
-        let v = sheet.at(t).v;
-        queue.extend([[v[0], v[1]], [v[1], v[2]], [v[2], v[0]]].into_iter().filter(|[a, b]| a < b));
-    }
-    let most = MOST_FLIPS * queue.len();
+    let mut queue = changed_edges(sheet);
+    let most = MOST_FLIPS * 3 * sheet.triangles.len() / 2;
     let began = sheet.changes.now();
     let mut flips = 0;
     while let Some([a, b]) = queue.pop_front() {
@@ -31,6 +28,28 @@ pub(super) fn flip_all(sheet: &mut Sheet) -> usize {
         sheet.changes.all_flips_since(began);
     }
     flips
+}
+
+/// The edges whose flips may not be in vain: a vertex of their triangles has changed since the flips
+/// of all edges were tried.
+fn changed_edges(sheet: &Sheet) -> VecDeque<[u32; 2]> {
+    let is_changed = |vertices: &[u32]| sheet.changes.is_since_flips(vertices);
+    let sides = |v: [u32; 3]| [[v[0], v[1]], [v[1], v[2]], [v[2], v[0]]];
+    // Each edge is taken from the triangle that has it in ascending order. The other one may be the
+    // only one that has changed, at its third vertex.
+    let mut from_other: HashSet<[u32; 2], WordHash> = HashSet::default();
+    for v in sheet.living().map(|t| sheet.at(t).v).filter(|v| is_changed(v)) {
+        from_other
+            .extend(sides(v).iter().filter(|[a, b]| a > b && !is_changed(&[*a, *b])).map(|&[a, b]| [b, a]));
+    }
+    let mut edges = VecDeque::new();
+    for v in sheet.living().map(|t| sheet.at(t).v) {
+        let all = is_changed(&v);
+        edges.extend(
+            sides(v).into_iter().filter(|side| side[0] < side[1] && (all || from_other.contains(side))),
+        );
+    }
+    edges
 }
 
 /// Flips an edge if that is an improvement; returns the ends of the new edge.
