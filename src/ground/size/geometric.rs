@@ -94,7 +94,7 @@ impl<'a> GeometricSize<'a> {
         Self::evaluated(geometry, features, settings, Evaluation::Fine)
     }
 
-    /// [`new`](Self::new) for few or many points.
+    /// [`new`](Self::new), evaluated as needed.
     pub(crate) fn evaluated(
         geometry: &'a Geometry,
         features: &Features,

@@ -35,7 +35,7 @@ impl FacetSize {
         Self::evaluated(model, settings, Evaluation::Fine)
     }
 
-    /// [`new`](Self::new) for few or many points.
+    /// [`new`](Self::new), evaluated as needed.
     pub(crate) fn evaluated(model: &FacetModel, settings: &SizeSettings, evaluation: Evaluation) -> Self {
         let maximum = largest_size(model, settings);
         let mut sources = settings.sources.clone();

@@ -55,8 +55,8 @@ impl Changes {
         !self.is_since(self.flips, &vertices)
     }
 
-    /// Whether one of these vertices, or of their triangles, has changed since the flips of all edges
-    /// were tried last.
+    /// Whether one of these vertices, or of their triangles, has changed since the flips of all
+    /// edges were tried last.
     pub fn is_since_flips(&self, vertices: &[u32]) -> bool {
         self.is_since(self.flips, vertices)
     }

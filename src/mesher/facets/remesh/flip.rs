@@ -30,8 +30,8 @@ pub(super) fn flip_all(sheet: &mut Sheet) -> usize {
     flips
 }
 
-/// The edges whose flips may not be in vain: a vertex of their triangles has changed since the flips
-/// of all edges were tried.
+/// The edges whose flips may not be in vain: a vertex of their triangles has changed since the
+/// flips of all edges were tried.
 fn changed_edges(sheet: &Sheet) -> VecDeque<[u32; 2]> {
     let is_changed = |vertices: &[u32]| sheet.changes.is_since_flips(vertices);
     let sides = |v: [u32; 3]| [[v[0], v[1]], [v[1], v[2]], [v[2], v[0]]];
