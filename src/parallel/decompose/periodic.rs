@@ -72,10 +72,17 @@ impl PeriodicFaces {
         self.triangles.iter().filter(is_apart).count()
     }
 
-    /// The middles of all triangles and of their copies.
+    /// The middles of each two triangles with a common edge, and of their copies.
     #[cfg(test)]
-    pub fn middles(&self) -> Vec<[Point; 2]> {
-        self.triangles.iter().map(PeriodicTriangle::middles).collect()
+    pub fn neighbours(&self) -> Vec<[[Point; 2]; 2]> {
+        let common = |a: &PeriodicTriangle, b: &PeriodicTriangle| {
+            a.corners[0].iter().filter(|p| b.corners[0].contains(p)).count()
+        };
+        let beside = |(k, a): (usize, &PeriodicTriangle)| {
+            let others = self.triangles[k + 1..].iter().filter(|b| common(a, b) == 2);
+            others.map(|b| [a.middles(), b.middles()]).collect::<Vec<_>>()
+        };
+        self.triangles.iter().enumerate().flat_map(beside).collect()
     }
 
     /// Whether the motion maps a plane, with its sides, to itself.
