@@ -22,6 +22,10 @@ use rayon::prelude::*;
 /// threads busy.
 const PER_BLOCK: f64 = 75_000.0;
 
+/// So many blocks for each thread are filled at a time. More keep threads busier, fewer need less
+/// memory: filled blocks are copies of their tets.
+const BATCH: usize = 8;
+
 /// Least number of expected tets, as a fraction of those that exist. Blocks are copied for each
 /// level of walls, which takes longer than it saves if there are fewer, as beside a lattice.
 const LEAST_SHARE: f64 = 0.5;
@@ -62,6 +66,14 @@ struct Filled {
     /// The states of its tets.
     states: Vec<State>,
     stopped: Option<Stopped>,
+}
+
+/// Vertices from which blocks were copied.
+struct OldVertices {
+    /// The number of blocks at each.
+    uses: Vec<u8>,
+    /// Lower sizes than in the mesh, block by block.
+    sizes: Vec<(u32, f64)>,
 }
 
 impl Filler<'_> {
@@ -159,14 +171,22 @@ impl Filler<'_> {
         let tets: Vec<u32> = self.mesh.alive().collect();
         let cut = Cut::new(self.mesh, &tets, boxes);
         drop(tets);
-        let numbers = || vec![NONE; self.mesh.points.len()];
-        let one = |numbers: &mut Vec<u32>, index: usize| {
-            let block = Block::new(self.mesh, &cut, index, numbers);
-            self.fill_block(block, |filler| work(filler, index))
-        };
-        let filled: Vec<Filled> = (0..cut.len()).into_par_iter().map_init(numbers, one).collect();
-        drop(cut);
-        self.put_back(filled);
+        let vertices = self.mesh.points.len();
+        let mut old = OldVertices { uses: vec![0; vertices], sizes: Vec::new() };
+        let batch = BATCH * rayon::current_num_threads();
+        for first in (0..cut.len()).step_by(batch) {
+            let one = |numbers: &mut Vec<u32>, index: usize| {
+                let block = Block::new(self.mesh, &cut, index, numbers);
+                self.fill_block(block, |filler| work(filler, index))
+            };
+            let indices = first..cut.len().min(first + batch);
+            let filled = indices.into_par_iter().map_init(|| vec![NONE; vertices], one).collect();
+            self.put_back(filled, &mut old);
+            if self.stops() {
+                return;
+            }
+        }
+        self.lower_old(old);
     }
 
     fn fill_block(&self, mut block: Block, work: impl Fn(&mut Filler)) -> Filled {
@@ -177,29 +197,23 @@ impl Filler<'_> {
         Filled { block, sizes, states, stopped }
     }
 
-    /// Puts blocks back, with their sizes and states, unless they have too many tets.
-    fn put_back(&mut self, filled: Vec<Filled>) {
+    /// Puts blocks back, with their states and the sizes at new vertices, unless they have too many
+    /// tets. Sizes at old vertices have to wait: they count in the blocks to come.
+    fn put_back(&mut self, filled: Vec<Filled>, old: &mut OldVertices) {
         let tets: usize = filled.iter().map(|filled| filled.block.mesh.len()).sum();
-        if tets > self.limits.max_tets {
+        let before: usize = filled.iter().map(|filled| filled.block.tets.len()).sum();
+        if self.mesh.len() - before + tets > self.limits.max_tets {
             self.stopped = self.stopped.or(Some(Stopped::TooManyTets));
             return;
         }
-        let mut uses = vec![0_u32; self.mesh.points.len()];
-        for filled in &filled {
-            filled.block.vertices.iter().for_each(|&v| uses[v as usize] += 1);
-        }
-        let mut lowered = Vec::new();
         let mut blocks = Vec::with_capacity(filled.len());
         for Filled { block, sizes, states, stopped } in filled {
             self.stopped = self.stopped.or(stopped);
             let (old_sizes, new_sizes) = sizes.split_at(block.vertices.len());
             for (&v, &size) in block.vertices.iter().zip(old_sizes) {
+                old.uses[v as usize] = old.uses[v as usize].saturating_add(1);
                 if size < self.at(v) {
-                    self.sizes[v as usize] = size;
-                    // Around the others all tets are in the block, where their states were updated.
-                    if uses[v as usize] > 1 {
-                        lowered.push(v);
-                    }
+                    old.sizes.push((v, size));
                 }
             }
             self.sizes.extend_from_slice(new_sizes);
@@ -211,6 +225,20 @@ impl Filler<'_> {
             blocks.push(block);
         }
         self.mesh.absorb(blocks);
+    }
+
+    /// Lowers the sizes at old vertices to those that they have in their blocks.
+    fn lower_old(&mut self, OldVertices { uses, sizes }: OldVertices) {
+        let mut lowered = Vec::new();
+        for (v, size) in sizes {
+            if size < self.at(v) {
+                self.sizes[v as usize] = size;
+                // Around the others all tets are in one block, where their states were updated.
+                if uses[v as usize] > 1 {
+                    lowered.push(v);
+                }
+            }
+        }
         self.lower_from(lowered);
         // Those tets are coarse, and the next front finds them.
         self.lowered.clear();
