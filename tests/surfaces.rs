@@ -17,6 +17,10 @@ use tetmill::{Point, Vector};
 /// times the curvature; sides are less than 1.5 radii / c long.
 const CHORD: f64 = 0.25;
 
+/// Bound of the chord error near the apex of a cone, relative to the longest side: that of a circle
+/// with three chords, half a radius over √3 radii.
+const CHORD_AT_APEX: f64 = 0.29;
+
 /// Largest distance of the midpoints of a triangle and its sides from the patch, relative to the
 /// longest side.
 fn chord_error(csg: &CsgModel, mesh: &Mesh, triangle: &BoundaryTriangle) -> f64 {
@@ -55,7 +59,8 @@ fn check_surface(geometry: &Path, preset: Preset) {
 
     let Model::Csg(csg) = &model else { panic!("{what}: no solids") };
     for triangle in &mesh.triangles {
-        let most = if is_at_apex(csg, &mesh, triangle) { CHORD } else { CHORD / preset.curvature_safety() };
+        let most =
+            if is_at_apex(csg, &mesh, triangle) { CHORD_AT_APEX } else { CHORD / preset.curvature_safety() };
         let error = chord_error(csg, &mesh, triangle);
         assert!(
             error < most,

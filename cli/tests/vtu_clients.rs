@@ -314,10 +314,12 @@ def load(file):
     return Mesh(mesh)
 for parts in (1, 3):
     straight, curved = (load(f'{order}.{parts}/dome.vol') for order in (1, 2))
+    # The meshes of both orders may differ by some tets: those to be curved are smoothed for that.
     corners = {v.nr for e in curved.ngmesh.Elements3D() for v in e.vertices}
     nodes = {v.nr for e in curved.ngmesh.Elements3D() for v in e.points}
-    assert straight.ne == curved.ne and len(nodes) > 5 * len(corners)
-    assert straight.nv == curved.nv == len(corners) == max(corners), (straight.nv, curved.nv, max(corners))
+    assert abs(straight.ne - curved.ne) < 0.05 * curved.ne and len(nodes) > 5 * len(corners)
+    assert curved.nv == len(corners) == max(corners), (curved.nv, max(corners))
+    assert straight.nv == len({v.nr for e in straight.ngmesh.Elements3D() for v in e.vertices})
     assert H1(curved, order=1).ndof == len(corners) and H1(curved, order=2).ndof == len(nodes)
     volumes = [Integrate(CF(1), mesh) for mesh in (straight, curved)]
     # Edges on the dome are curved outwards.

@@ -105,8 +105,8 @@ fn is_no_worse(ours: &QualitySummary, theirs: &QualitySummary) -> bool {
 /// Differences of the three numbers that count as a tie.
 ///
 /// The smallest angle is then one of the surface itself, and the means are of meshes whose counts
-/// differ by a tenth. Ties depend on the last bits of the sizes.
-const TIES: [f64; 3] = [0.5, 0.005, 0.005];
+/// differ by up to a fifth. Ties depend on the last bits of the sizes.
+const TIES: [f64; 3] = [0.5, 0.005, 0.01];
 
 fn is_no_worse_or_tied(ours: &QualitySummary, theirs: &QualitySummary) -> bool {
     (0..3).all(|i| shape(ours)[i] >= shape(theirs)[i] - TIES[i])
