@@ -90,7 +90,7 @@ mod mesher;
 mod parallel;
 mod pipeline;
 
-pub use brep::Unit;
+pub use brep::{OverlapTo, Unit};
 pub use csg::{self, Point, Vector};
 pub use files::arrays::{MeshArrays, SurfaceArrays};
 pub use pipeline::error::Error;

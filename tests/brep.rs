@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use tetmill::comm::thread;
 use tetmill::mesh::{Arrays, Order};
 use tetmill::size::Preset;
-use tetmill::{Geometry, InputSettings, Mesher, Method};
+use tetmill::{Geometry, InputSettings, Mesher, Method, OverlapTo};
 
 /// A file of the repository.
 fn file(name: &str) -> PathBuf {
@@ -141,7 +141,50 @@ fn solids_that_overlap_are_refused_with_their_numbers() {
     let geometry = Geometry::from_file(own("step").with_extension("").join("overlapping.step")).unwrap();
     let error = Mesher::new().generate(&geometry).unwrap_err().to_string();
     let has = |text: &str| error.contains(text);
-    assert!(has("the solids 1 (") && has("and 2 (") && has("cut one out of the other"), "{error}");
+    assert!(has("the solids 1 (") && has("and 2 (") && has("--overlap-to smaller"), "{error}");
+}
+
+#[test]
+fn what_solids_have_in_common_is_cut_out_of_all_but_one() {
+    let path = own("step").with_extension("").join("press_fit.step");
+    // The volumes of hub, shaft and screw by the CAD program, with each chosen to keep what it has.
+    for (to, exact) in
+        [(OverlapTo::Smaller, [9553.182, 8930.173, 94.248]), (OverlapTo::First, [9632.123, 8932.387, 13.051])]
+    {
+        let mut notes = Vec::new();
+        let settings =
+            InputSettings { unit: "mm".parse().unwrap(), overlap_to: Some(to), ..InputSettings::default() };
+        let geometry = Geometry::read(&[&path], &settings, &mut |note| notes.push(note.to_owned())).unwrap();
+        assert!(
+            notes[0].contains("solids overlap: cut ") && notes[0].contains("shaft (solid 2)"),
+            "{notes:?}"
+        );
+        let mesher = Mesher::new().levels(1);
+        let mesh = mesher.generate(&geometry).unwrap();
+        let arrays = mesh.arrays();
+        for (body, exact) in exact.into_iter().enumerate() {
+            let own = |k: &usize| arrays.tet_bodies[*k].index() == body;
+            let volume: f64 = (0..arrays.tets.len())
+                .filter(own)
+                .map(|tet| {
+                    let [a, b, c, d] = arrays.corners(tet).map(tetmill::Point::from);
+                    (b - a).dot(&(c - a).cross(&(d - a))) / 6.0
+                })
+                .sum();
+            assert!((volume / exact - 1.0).abs() < 4e-3, "{to:?}, body {body}: {volume} instead of {exact}");
+        }
+        let together =
+            thread::try_run(2, |comm| mesher.generate_on(comm, Some(&geometry)).map(|mesh| mesh.checksum));
+        assert_eq!(together.unwrap(), vec![mesh.checksum; 2]);
+    }
+}
+
+#[test]
+fn only_solids_of_cad_files_are_cut_out_of_each_other() {
+    let settings = InputSettings { overlap_to: Some(OverlapTo::Smaller), ..InputSettings::default() };
+    let path = own("bearing").with_extension("geo");
+    let error = Geometry::read(&[path], &settings, &mut |_| {}).unwrap_err().to_string();
+    assert!(error.contains("can be cut out of each other"), "{error}");
 }
 
 #[test]

@@ -9,7 +9,7 @@ use tetmill::files::mesh_size;
 use tetmill::mesh::Order;
 use tetmill::run::{Candidates, CutPlane, CutSettings, MAX_PIECES, PlanSettings};
 use tetmill::size::{Effort, Preset, SizeFunction, Source};
-use tetmill::{Error, Geometry, InputSettings, Mesher, Method, Unit};
+use tetmill::{Error, Geometry, InputSettings, Mesher, Method, OverlapTo, Unit};
 
 /// All options.
 #[derive(Clone, Debug, Default)]
@@ -45,13 +45,14 @@ pub struct Settings {
     feature_angle: Option<f64>,
     unit: Option<Unit>,
     solids: Vec<String>,
+    overlap_to: Option<OverlapTo>,
     // The observer.
     pub progress: Option<OnProgress>,
     pub cancel: Option<IsCancelled>,
 }
 
 /// The names of `tetmill_options_set`.
-const NAMES: [&str; 24] = [
+const NAMES: [&str; 25] = [
     "preset",
     "maxh",
     "minh",
@@ -76,6 +77,7 @@ const NAMES: [&str; 24] = [
     "feature-angle",
     "unit",
     "solid",
+    "overlap-to",
 ];
 
 #[derive(Clone, Copy, Debug)]
@@ -200,6 +202,7 @@ impl Settings {
                 Some(solid) => self.solids.push(solid.to_owned()),
                 None => self.solids.clear(),
             },
+            "overlap-to" => self.overlap_to = of(value, OverlapTo::from_str)?,
             "parts" | "ranks" => return Err("the number of parts is an argument of tetmill_generate".into()),
             "threads" => return Err("use tetmill_set_threads".into()),
             _ => return Err(format!("there is no such option; there are {}", NAMES.join(", "))),
@@ -215,6 +218,7 @@ impl Settings {
             merge: self.merge,
             unit: self.unit.unwrap_or_default(),
             solids: self.solids.clone(),
+            overlap_to: self.overlap_to,
             ..InputSettings::default()
         };
         if let Some(degrees) = self.feature_angle {

@@ -157,10 +157,17 @@ fn reading(input: &InputOptions, size: &SizeOptions) -> Outputs {
 
 /// Reads the input and prints its notes.
 fn read_geometry(options: &InputOptions, progress: &Progress) -> Result<Geometry, Failure> {
-    let InputOptions { keep_surface, keep_small, merge, unit, .. } = *options;
+    let InputOptions { keep_surface, keep_small, merge, unit, overlap_to, .. } = *options;
     let solids = options.solids.clone();
-    let mut settings =
-        InputSettings { keep_surface, keep_small, merge, unit, solids, ..InputSettings::default() };
+    let mut settings = InputSettings {
+        keep_surface,
+        keep_small,
+        merge,
+        unit,
+        solids,
+        overlap_to,
+        ..InputSettings::default()
+    };
     if let Some(degrees) = options.feature_angle {
         settings.facets.feature_angle = degrees.to_radians();
     }

@@ -148,6 +148,11 @@ pub struct InputOptions {
     /// option again for others [default: all]
     #[arg(long = "solid", value_name = "NAME")]
     pub solids: Vec<String>,
+    /// Give the common part of solids of a CAD file that overlap to the one that is first or last
+    /// in the file, or the smaller one, and cut it out of the others: first, last, smaller
+    /// [default: they are refused]
+    #[arg(long, value_name = "SOLID")]
+    pub overlap_to: Option<tetmill::OverlapTo>,
     /// Angle between facets that separates two patches of an input surface (degrees) [default: 40]
     #[arg(long, value_name = "DEGREES", value_parser = angle)]
     pub feature_angle: Option<f64>,

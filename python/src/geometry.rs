@@ -39,6 +39,8 @@ struct Input {
     /// The name of a unit of length, checked by the caller.
     unit: String,
     solids: Vec<String>,
+    /// A name of the solid that keeps what two have in common, checked by the caller.
+    overlap_to: Option<String>,
 }
 
 impl Input {
@@ -49,6 +51,7 @@ impl Input {
             merge: self.merge,
             unit: self.unit.parse().unwrap_or_default(),
             solids: self.solids.clone(),
+            overlap_to: self.overlap_to.as_deref().and_then(|to| to.parse().ok()),
             ..InputSettings::default()
         };
         if let Some(degrees) = self.feature_angle {

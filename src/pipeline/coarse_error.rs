@@ -77,8 +77,9 @@ pub enum CoarseError {
     },
     /// Two solids of a CAD file overlap, or touch where they have no common face.
     #[error(
-        "the solids {} ({}) and {} ({}) overlap, or touch without a common face, near ({}, {}, {}): cut one out of the \
-         other in the CAD program, move one of them, or mesh one alone (--solid)",
+        "the solids {} ({}) and {} ({}) overlap, or touch without a common face, near ({}, {}, {}): give the \
+         common part to one of them (--overlap-to smaller), cut it off in the CAD program, move one of them, or mesh one \
+         alone (--solid)",
         solids[0].0, solids[0].1, solids[1].0, solids[1].1, first.x, first.y, first.z
     )]
     SolidsMeet {

@@ -169,6 +169,9 @@ pub enum InputError {
     /// Solids are chosen in a file without solids.
     #[error("{}: only solids of CAD files (.step, .stp, .brep) can be chosen", .0.display())]
     SolidsOnlyOfCad(PathBuf),
+    /// What solids have in common is given to one of them in a file without solids.
+    #[error("{}: only solids of CAD files (.step, .stp, .brep) can be cut out of each other", .0.display())]
+    OverlapsOnlyOfCad(PathBuf),
     /// A chosen solid is not in the file.
     #[error("{}: there is no solid `{name}`: the file has {count}{}", path.display(), called(.names))]
     NoSuchSolid {

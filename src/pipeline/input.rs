@@ -50,8 +50,14 @@ pub fn read(
         return Err(InputError::MergesOnlyCsg(paths[other].as_ref().to_path_buf()).into());
     }
     let is_cad = |kind: &Kind| matches!(kind, Kind::Brep | Kind::Step);
-    if let (false, Some(other)) = (settings.solids.is_empty(), kinds.iter().position(|kind| !is_cad(kind))) {
-        return Err(InputError::SolidsOnlyOfCad(paths[other].as_ref().to_path_buf()).into());
+    if let Some(other) = kinds.iter().position(|kind| !is_cad(kind)) {
+        let path = || paths[other].as_ref().to_path_buf();
+        if !settings.solids.is_empty() {
+            return Err(InputError::SolidsOnlyOfCad(path()).into());
+        }
+        if settings.overlap_to.is_some() {
+            return Err(InputError::OverlapsOnlyOfCad(path()).into());
+        }
     }
     match (kinds.as_slice(), paths) {
         ([Kind::Csg], [path]) => read_csg(path.as_ref(), settings, note),
@@ -108,6 +114,9 @@ fn read_brep(
     let mut model = parse(&text).map_err(refuse)?;
     if !settings.solids.is_empty() {
         model.keep_bodies(&chosen(path, &model, &settings.solids)?);
+    }
+    if let Some(to) = settings.overlap_to {
+        model.cut_overlaps(to).map_err(refuse)?;
     }
     model.imprint();
     let solid = FacetSolid::of_brep(path, model, settings, note)?;

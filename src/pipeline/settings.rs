@@ -22,6 +22,9 @@ pub struct InputSettings {
     pub unit: brep::Unit,
     /// The solids of a CAD file that are meshed, each by its name or number; all if there are none.
     pub solids: Vec<String>,
+    /// Which of two solids of a CAD file that overlap keeps the common part; if it is `None`, they
+    /// are refused.
+    pub overlap_to: Option<brep::OverlapTo>,
 }
 
 /// How a geometry is cut.

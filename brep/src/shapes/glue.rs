@@ -55,6 +55,11 @@ pub(super) fn glue_edges(shapes: &mut Shapes, diagonal: f64) {
         let (curve, is_along) = as_curve[edge.0];
         *edge = (curve, edge.1 == is_along);
     }
+    for inner in shapes.faces.iter_mut().map(|face| &mut face.inner) {
+        inner.iter_mut().for_each(|curve| *curve = as_curve[*curve].0);
+        inner.sort_unstable();
+        inner.dedup();
+    }
 }
 
 /// The pairs of curves that bound a face alone.

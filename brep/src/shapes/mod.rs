@@ -2,6 +2,7 @@
 
 mod glue;
 mod imprint;
+mod overlap;
 mod split;
 #[cfg(test)]
 mod tests;
@@ -23,6 +24,8 @@ pub(crate) struct Face {
     pub surface: Surface,
     /// Its loops, counterclockwise around the normal of the surface.
     pub loops: Vec<Edges>,
+    /// Curves on its surface that are to divide it where they are inside of it.
+    pub inner: Vec<usize>,
     pub body: usize,
     /// Whether the body is behind it, seen along the normal of its surface.
     pub is_behind: bool,
@@ -75,6 +78,7 @@ impl Shapes {
                     id: number as u64 + 1,
                     surface: patch.surface.clone().closed(),
                     loops: loops.clone(),
+                    inner: Vec::new(),
                     body,
                     is_behind: side == 0,
                     name: model.patch_names.get(number).cloned().flatten(),
@@ -99,6 +103,13 @@ impl Shapes {
         let mut curves: Vec<usize> = self.faces[face].loops.iter().flatten().map(|edge| edge.0).collect();
         curves.sort_unstable();
         curves.dedup();
+        curves
+    }
+
+    /// The curves of a face and those that are to divide it.
+    fn curves_on(&self, face: usize) -> Vec<usize> {
+        let mut curves = self.curves_of(face);
+        curves.extend(&self.faces[face].inner);
         curves
     }
 

@@ -75,6 +75,11 @@ pub(super) fn divide(shapes: &mut Shapes, curve: usize, at: f64, corner: usize) 
         };
         *edges = edges.iter().flat_map(halves).collect();
     }
+    for inner in shapes.faces.iter_mut().map(|face| &mut face.inner) {
+        if inner.contains(&curve) {
+            inner.push(second);
+        }
+    }
 }
 
 /// Drops edges of planes that a loop follows forth and at once back, and no other loop follows:

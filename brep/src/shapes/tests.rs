@@ -6,13 +6,13 @@ use crate::surface::Profile;
 use crate::{BrepError, Curve, EdgeCurve, Settings, Surface, Tessellation, Vector, tessellate};
 use std::f64::consts::{PI, TAU};
 
-const X: Vector = Vector::new(1.0, 0.0, 0.0);
-const Y: Vector = Vector::new(0.0, 1.0, 0.0);
-const Z: Vector = Vector::new(0.0, 0.0, 1.0);
+pub(super) const X: Vector = Vector::new(1.0, 0.0, 0.0);
+pub(super) const Y: Vector = Vector::new(0.0, 1.0, 0.0);
+pub(super) const Z: Vector = Vector::new(0.0, 0.0, 1.0);
 
 /// Solids, nothing shared between them. Each function adds one.
 #[derive(Default)]
-struct Solids(Shapes);
+pub(super) struct Solids(Shapes);
 
 impl Solids {
     fn body(&mut self) -> usize {
@@ -47,7 +47,7 @@ impl Solids {
     fn face(&mut self, surface: Surface, loops: Vec<Edges>) {
         let body = self.0.accuracy.len() - 1;
         let id = self.0.faces.len() as u64;
-        self.0.faces.push(Face { id, surface, loops, body, is_behind: true, name: None });
+        self.0.faces.push(Face { id, surface, loops, inner: Vec::new(), body, is_behind: true, name: None });
     }
 
     /// A horizontal face that looks up or down, with loops counterclockwise seen from above.
@@ -78,7 +78,7 @@ impl Solids {
     }
 
     /// A prism with holes that are circles (center and radius) through all of it.
-    fn prism(&mut self, polygon: &[Vector], [low, high]: [f64; 2], holes: &[(Vector, f64)]) {
+    pub fn prism(&mut self, polygon: &[Vector], [low, high]: [f64; 2], holes: &[(Vector, f64)]) {
         self.body();
         let [below, above] = self.wall(polygon, [low, high]);
         let (mut floor, mut roof) = (vec![below], vec![above]);
@@ -94,14 +94,14 @@ impl Solids {
         self.level(high, true, roof);
     }
 
-    fn block(&mut self, low: [f64; 3], high: [f64; 3]) {
+    pub fn block(&mut self, low: [f64; 3], high: [f64; 3]) {
         let [a, b] = [low, high];
         let polygon = [[a[0], a[1]], [b[0], a[1]], [b[0], b[1]], [a[0], b[1]]].map(|[x, y]| X * x + Y * y);
         self.prism(&polygon, [a[2], b[2]], &[]);
     }
 
     /// An upright cylinder whose vertices are at an angle.
-    fn pin(&mut self, center: Vector, radius: f64, [low, high]: [f64; 2], at: f64) {
+    pub fn pin(&mut self, center: Vector, radius: f64, [low, high]: [f64; 2], at: f64) {
         self.body();
         let [below, above] = [low, high].map(|z| self.circle(center + Z * z, radius, at));
         self.face(round(center, radius), vec![vec![(below, true)], vec![(above, false)]]);
@@ -109,18 +109,33 @@ impl Solids {
         self.level(high, true, vec![vec![(above, true)]]);
     }
 
+    /// A ball.
+    pub fn ball(&mut self, center: Vector, radius: f64) {
+        self.body();
+        let profile = Profile::Circle { major: 0.0, minor: radius };
+        self.face(Surface::Round { origin: center, axes: [X, Y, Z], profile }, Vec::new());
+    }
+
+    pub fn model(self) -> Model {
+        let mut model = Model { bodies: self.0.accuracy.len(), ..Model::default() };
+        self.0.build(&mut model).unwrap_or_else(|error| panic!("{error}"));
+        model
+    }
+
     /// The model, the volumes of its bodies and the area of its interfaces.
     fn measured(self) -> (Model, Vec<f64>, f64) {
-        let bodies = self.0.accuracy.len();
-        let mut model = Model { bodies, ..Model::default() };
-        self.0.build(&mut model).unwrap_or_else(|error| panic!("{error}"));
-        model.imprint();
-        let tessellation = tessellated(&mut model).unwrap_or_else(|error| panic!("{error}"));
-        let volumes = (0..bodies).map(|body| tessellate::volume(&model, &tessellation, body)).collect();
-        let shared = (0..model.patches.len()).filter(|&p| !model.patches[p].bodies.contains(&None));
-        let area = shared.map(|p| tessellate::area(&tessellation, p)).sum();
-        (model, volumes, area)
+        measured(self.model())
     }
+}
+
+/// A model imprinted, the volumes of its bodies and the area of its interfaces.
+pub(super) fn measured(mut model: Model) -> (Model, Vec<f64>, f64) {
+    model.imprint();
+    let tessellation = tessellated(&mut model).unwrap_or_else(|error| panic!("{error}"));
+    let volumes = (0..model.bodies).map(|body| tessellate::volume(&model, &tessellation, body)).collect();
+    let shared = (0..model.patches.len()).filter(|&p| !model.patches[p].bodies.contains(&None));
+    let area = shared.map(|p| tessellate::area(&tessellation, p)).sum();
+    (model, volumes, area)
 }
 
 fn tessellated(model: &mut Model) -> Result<Tessellation, BrepError> {
@@ -133,7 +148,7 @@ fn round(center: Vector, radius: f64) -> Surface {
     Surface::Round { origin: center, axes: [X, Y, Z], profile }
 }
 
-fn square(center: Vector, half: f64, turned: f64) -> Vec<Vector> {
+pub(super) fn square(center: Vector, half: f64, turned: f64) -> Vec<Vector> {
     let corner = |k: i32| {
         let at = turned + f64::from(k) * PI / 2.0 + PI / 4.0;
         center + (X * at.cos() + Y * at.sin()) * (half * 2.0_f64.sqrt())

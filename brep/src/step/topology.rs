@@ -107,6 +107,7 @@ impl Reader<'_> {
             id: face.id,
             surface: own,
             loops,
+            inner: Vec::new(),
             body: self.body,
             is_behind: (is_along == is_outward) != is_mirrored,
             name: face.label(),

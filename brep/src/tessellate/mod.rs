@@ -17,6 +17,7 @@ mod reuse;
 
 pub(crate) use curves::diagonal;
 pub use measure::{area, check, volume};
+pub(crate) use orient::Shell;
 
 use crate::tips::Cut;
 use crate::{BrepError, EdgeCurve, Model, Point};
@@ -83,6 +84,16 @@ impl Tessellation {
     /// [`BrepError::Face`] and [`BrepError::Edge`] with a place if curves and surfaces do not fit
     /// each other or loops cross; [`BrepError::Solid`] if a body is not closed.
     pub fn of(model: &mut Model, settings: &Settings) -> Result<Self, BrepError> {
+        let (out, shells) = Self::of_overlapping(model, settings)?;
+        overlap::check(model, &shells)?;
+        Ok(out)
+    }
+
+    /// The same for solids that may overlap, with the shells of each solid.
+    pub(crate) fn of_overlapping(
+        model: &mut Model,
+        settings: &Settings,
+    ) -> Result<(Self, Vec<Vec<Shell>>), BrepError> {
         let divided = vec![None; model.curves.len()];
         Self::with(model, settings, divided, None)
     }
@@ -100,7 +111,9 @@ impl Tessellation {
             is_whole.then(|| line.iter().map(|on| on.1).collect())
         };
         let divided = cut.model.curves.iter().zip(&cut.parts_of).map(divided).collect();
-        Self::with(&mut cut.model, settings, divided, Some(before))
+        let (out, shells) = Self::with(&mut cut.model, settings, divided, Some(before))?;
+        overlap::check(&cut.model, &shells)?;
+        Ok(out)
     }
 
     /// Triangulates all patches, with curves `divided` at known parameters at first, and triangles
@@ -110,7 +123,7 @@ impl Tessellation {
         settings: &Settings,
         mut divided: Vec<Option<Vec<f64>>>,
         before: Option<&Self>,
-    ) -> Result<Self, BrepError> {
+    ) -> Result<(Self, Vec<Vec<Shell>>), BrepError> {
         let diagonal = diagonal(&model.corners, &model.curves, Vec::new());
         let chord = settings.chord * diagonal;
         let mut tolerances = face::Tolerances { chord, angle: settings.angle, diagonal, refuses_folds: true };
@@ -144,9 +157,9 @@ impl Tessellation {
                 }
             }
             if conflicts.is_empty() {
-                orient::orient(model, &out)?;
+                let shells = orient::orient(model, &out)?;
                 measure::check(model, &out)?;
-                return Ok(out);
+                return Ok((out, shells));
             }
             for patch in conflicts {
                 let fins = model.patches[patch].loops.iter().flatten();

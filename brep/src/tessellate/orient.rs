@@ -7,17 +7,17 @@
 //! other around one of its triangles is odd (Jacobson, Kavan and Sorkine-Hornung 2013, "Robust
 //! inside-outside segmentation using generalized winding numbers", section 3).
 
-use super::{Tessellation, measure::enclosed, overlap};
+use super::{Tessellation, measure::enclosed};
 use crate::{BrepError, Model, On, Point};
 use std::collections::HashMap;
 use std::f64::consts::TAU;
 
 /// Turns the shells of all bodies so that their volumes have the signs of their nesting, with a
-/// note for each.
+/// note for each. Returns the shells of each body.
 ///
 /// # Errors
 /// [`BrepError::Face`] if a shell to be turned has a body on each side.
-pub(super) fn orient(model: &mut Model, tessellation: &Tessellation) -> Result<(), BrepError> {
+pub(super) fn orient(model: &mut Model, tessellation: &Tessellation) -> Result<Vec<Vec<Shell>>, BrepError> {
     let mut triangles = vec![Vec::new(); model.patches.len()];
     for triangle in &tessellation.triangles {
         triangles[triangle.patch as usize].push(triangle.vertices.map(|v| tessellation.points[v as usize]));
@@ -32,7 +32,7 @@ pub(super) fn orient(model: &mut Model, tessellation: &Tessellation) -> Result<(
         turn_shells(model, body, &shells)?;
         all.push(shells);
     }
-    overlap::check(model, &all)
+    Ok(all)
 }
 
 /// Turns patches that their neighbours contradict.
@@ -69,7 +69,7 @@ fn turn_shells(model: &mut Model, body: usize, shells: &[Shell]) -> Result<(), B
 }
 
 /// Patches of one body that curves connect.
-pub(super) struct Shell {
+pub(crate) struct Shell {
     patches: Vec<usize>,
     /// The largest triangle of each patch: the patch, twice the area, the middle.
     pub largest: Vec<(usize, f64, Point)>,
@@ -101,6 +101,11 @@ impl Shell {
         let bounds =
             [corners().fold(place, |low, p| low.inf(p)), corners().fold(place, |high, p| high.sup(p))];
         Self { patches, largest, volume: enclosed(&own, place), triangles: own, place, bounds }
+    }
+
+    /// Whether the boxes of two shells overlap.
+    pub fn is_near(&self, other: &Self) -> bool {
+        (0..3).all(|i| self.bounds[0][i] <= other.bounds[1][i] && other.bounds[0][i] <= self.bounds[1][i])
     }
 
     pub fn contains(&self, point: Point) -> bool {

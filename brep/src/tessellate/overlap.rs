@@ -22,8 +22,8 @@ pub(super) fn check(model: &Model, shells: &[Vec<Shell>]) -> Result<(), BrepErro
         if let Some((outer, _)) = around {
             let outer = outer + 1;
             let what = format!(
-                "it overlaps solid {outer}, or lies inside of it: cut one out of the other in the CAD program, \
-                 or mesh one of them alone (--solid)"
+                "it overlaps solid {outer}, or lies inside of it: give the common part to one of them \
+                 (--overlap-to smaller), cut it off in the CAD program, or mesh one of them alone (--solid)"
             );
             return Err(BrepError::solid(inner, what, Some(place)));
         }

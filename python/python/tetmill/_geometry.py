@@ -32,6 +32,7 @@ Path = Union[str, "os.PathLike[str]"]
 
 _PRESETS = ("very-coarse", "coarse", "moderate", "fine", "very-fine")
 _EFFORTS = ("quick", "standard", "careful", "thorough")
+_OVERLAP_TO = ("first", "last", "smaller")
 _UNITS = ("file", "m", "cm", "mm", "um", "km", "in", "ft")
 _METHODS = ("refine", "surface", "decompose")
 _PLANES = ("best", "axes", "principal", "random", "median")
@@ -85,6 +86,7 @@ def _input(
     unit: str = "file",
     keep_small: bool = False,
     solids: str | int | Iterable[str | int] = (),
+    overlap_to: str | None = None,
 ) -> dict[str, Any]:
     angle = arguments.length("feature_angle", feature_angle)
     if angle is not None and angle > 180:
@@ -96,6 +98,7 @@ def _input(
         "feature_angle": angle,
         "unit": arguments.one_of("unit", unit, _UNITS),
         "solids": [str(solid) for solid in ([solids] if isinstance(solids, (str, int)) else solids)],
+        "overlap_to": overlap_to and arguments.one_of("overlap_to", overlap_to, _OVERLAP_TO),
     }
 
 
@@ -119,6 +122,8 @@ class Geometry:
             default they are merged into their neighbours, with a warning.
         solids: Names or numbers of the solids of a CAD file that are meshed; by default all. Numbers
             count from 1 in the order of the file.
+        overlap_to: Give the common part of solids of a CAD file that overlap to the "first" or "last"
+            in the file or the "smaller", and cut it out of the others; by default they are refused.
     """
 
     def __init__(
@@ -130,10 +135,11 @@ class Geometry:
         unit: str = "file",
         keep_small: bool = False,
         solids: str | int | Iterable[str | int] = (),
+        overlap_to: str | None = None,
     ) -> None:
         if not paths:
             raise TypeError("Geometry needs a file; see also from_text, from_surface and from_mesh")
-        given = _input(keep_surface, merge, feature_angle, unit, keep_small, solids)
+        given = _input(keep_surface, merge, feature_angle, unit, keep_small, solids, overlap_to)
         files = [os.fspath(path) for path in paths]
         # None in a process that only takes part in the meshing.
         self._native: _native.Geometry | None = _native.Geometry.from_files(files, given)

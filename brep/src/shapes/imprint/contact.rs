@@ -26,9 +26,9 @@ impl Probe {
     }
 }
 
-/// Pairs of faces of different solids, one in front of the other, that have the same surface and
-/// overlapping boxes.
-pub(super) fn contacts(shapes: &Shapes, size: f64) -> Vec<[usize; 2]> {
+/// Pairs of faces of different solids that have the same surface and overlapping boxes: one in
+/// front of the other, or `both_ways` also with the solids on the same side.
+pub(super) fn contacts(shapes: &Shapes, both_ways: bool, size: f64) -> Vec<[usize; 2]> {
     let probes: Vec<Option<Probe>> =
         (0..shapes.faces.len()).into_par_iter().map(|face| probe(shapes, face, size)).collect();
     let mut order: Vec<(usize, &Probe)> =
@@ -40,7 +40,7 @@ pub(super) fn contacts(shapes: &Shapes, size: f64) -> Vec<[usize; 2]> {
         let found = near.filter(|(other, probe)| {
             shapes.faces[face].body != shapes.faces[*other].body
                 && (1..3).all(|axis| one.low[axis] <= probe.high[axis] && probe.low[axis] <= one.high[axis])
-                && touch(shapes, [(face, one), (*other, probe)], size)
+                && touch(shapes, [(face, one), (*other, probe)], both_ways, size)
         });
         found.map(|(other, _)| [face.min(*other), face.max(*other)]).collect::<Vec<_>>()
     };
@@ -85,7 +85,7 @@ pub(super) fn gap(surface: &Surface, edge: &EdgeCurve) -> f64 {
 
 /// Whether an edge without crossings lies on a surface where the surface is defined, rather than
 /// beside it.
-pub(super) fn lies_on(surface: &Surface, edge: &EdgeCurve, room: f64) -> bool {
+pub(in super::super) fn lies_on(surface: &Surface, edge: &EdgeCurve, room: f64) -> bool {
     [0.25, 0.5, 0.75].into_iter().all(|share| {
         let point = at(edge, share);
         let foot = nearest_on_surface(surface, &point);
@@ -124,8 +124,8 @@ fn beside(surface: &Surface, edge: &EdgeCurve) -> Vec<Point> {
 }
 
 /// Whether two faces have the same surface, where both have one, with their bodies on opposite
-/// sides.
-fn touch(shapes: &Shapes, [(a, one), (b, other)]: [(usize, &Probe); 2], size: f64) -> bool {
+/// sides, or `both_ways` on the same one.
+fn touch(shapes: &Shapes, [(a, one), (b, other)]: [(usize, &Probe); 2], both_ways: bool, size: f64) -> bool {
     let faces = [a, b].map(|face| &shapes.faces[face]);
     let room = room(shapes, [a, b], size);
     let are_planes = faces.iter().all(|face| face.surface.is_plane());
@@ -138,7 +138,7 @@ fn touch(shapes: &Shapes, [(a, one), (b, other)]: [(usize, &Probe); 2], size: f6
                 if (foot.point - point).norm() > room {
                     return false;
                 }
-                if !*do_face.get_or_insert_with(|| face_each_other(faces, point)) {
+                if !*do_face.get_or_insert_with(|| both_ways || face_each_other(faces, point)) {
                     return false;
                 }
             }

@@ -11,18 +11,50 @@ use std::collections::{BTreeMap, BTreeSet};
 /// Where curves are to be divided: parameters and corners.
 type Divisions = BTreeMap<usize, Vec<(f64, usize)>>;
 
+/// Crossings this close to another one on the same edge, in tolerances, are there.
+const BESIDE: f64 = 3.0;
 /// Crossings this close to an end, in tolerances, are there.
 const AT_END: f64 = 2.0;
 
+/// Which curves may divide each other.
+#[derive(Clone, Copy)]
+pub(super) enum Pair {
+    /// Those of two faces on one surface.
+    Faces([usize; 2]),
+    /// The curves that are to divide a face, and its edges.
+    Edges(usize),
+    /// The curves that are to divide a face, and these and its edges.
+    Inside(usize),
+}
+
+impl Pair {
+    fn faces(self) -> [usize; 2] {
+        match self {
+            Self::Faces(faces) => faces,
+            Self::Edges(face) | Self::Inside(face) => [face; 2],
+        }
+    }
+
+    fn sides(self, shapes: &Shapes) -> [Vec<usize>; 2] {
+        match self {
+            Self::Faces(faces) => faces.map(|face| shapes.curves_on(face)),
+            Self::Edges(face) => [shapes.faces[face].inner.clone(), shapes.curves_of(face)],
+            Self::Inside(face) => [shapes.faces[face].inner.clone(), shapes.curves_on(face)],
+        }
+    }
+}
+
 /// Divides the edges of faces at the vertices of others. Returns whether any was divided.
-pub(super) fn divide_at_vertices(shapes: &mut Shapes, pairs: &[[usize; 2]], size: f64) -> bool {
+pub(super) fn divide_at_vertices(shapes: &mut Shapes, pairs: &[Pair], size: f64) -> bool {
     let mut divisions = Divisions::new();
     let mut boxes = Boxes::default();
-    for [a, b] in pairs.iter().flat_map(|&[a, b]| [[a, b], [b, a]]) {
-        let own = room(shapes, [a, b], size);
-        let corners: BTreeSet<usize> =
-            shapes.curves_of(a).into_iter().flat_map(|curve| shapes.curves[curve].ends).collect();
-        for curve in shapes.curves_of(b) {
+    for &pair in pairs {
+        let own = room(shapes, pair.faces(), size);
+        let [of_a, of_b] = pair.sides(shapes);
+        let ends = |curves: &[usize]| curves.iter().flat_map(|&curve| shapes.curves[curve].ends).collect();
+        let both: [(&[usize], BTreeSet<usize>); 2] = [(&of_b, ends(&of_a)), (&of_a, ends(&of_b))];
+        for (&curve, corners) in both.iter().flat_map(|(curves, ends)| curves.iter().map(move |c| (c, ends)))
+        {
             let edge = &shapes.curves[curve];
             let room = own + edge.tolerance;
             let [low, high] = boxes.of(shapes, curve, room);
@@ -41,13 +73,13 @@ pub(super) fn divide_at_vertices(shapes: &mut Shapes, pairs: &[[usize; 2]], size
 }
 
 /// Divides the edges of faces where they cross each other.
-pub(super) fn divide_at_crossings(shapes: &mut Shapes, pairs: &[[usize; 2]], size: f64) {
+pub(super) fn divide_at_crossings(shapes: &mut Shapes, pairs: &[Pair], size: f64) {
     let mut divisions = Divisions::new();
     let mut boxes = Boxes::default();
     let mut added: Vec<usize> = Vec::new();
     for &pair in pairs {
-        let own = room(shapes, pair, size);
-        let [of_a, of_b] = pair.map(|face| shapes.curves_of(face));
+        let own = room(shapes, pair.faces(), size);
+        let [of_a, of_b] = pair.sides(shapes);
         for &p in &of_a {
             for &q in of_b.iter().filter(|&&q| q != p) {
                 let room = own + shapes.curves[p].tolerance + shapes.curves[q].tolerance;
@@ -57,12 +89,14 @@ pub(super) fn divide_at_crossings(shapes: &mut Shapes, pairs: &[[usize; 2]], siz
                     continue;
                 }
                 for (at, point) in crossings(&shapes.curves[p], &shapes.curves[q], room) {
-                    let known = added
-                        .iter()
-                        .copied()
-                        .find(|&corner| (shapes.corners[corner].point - point).norm() <= room);
+                    let away = |corner: usize| (shapes.corners[corner].point - point).norm();
+                    // Curves of two faces meet their edge where each face is.
+                    let there = [p, q].into_iter().filter_map(|curve| divisions.get(&curve)).flatten();
+                    let beside = there.map(|known| known.1).filter(|&corner| away(corner) <= BESIDE * room);
+                    let near = added.iter().copied().filter(|&corner| away(corner) <= room);
+                    let known = beside.chain(near).min_by(|&a, &b| away(a).total_cmp(&away(b)));
                     let corner = known.unwrap_or_else(|| {
-                        let body = shapes.faces[pair[0]].body;
+                        let body = shapes.faces[pair.faces()[0]].body;
                         let new = shapes.add_corner(Corner { point, tolerance: room }, body);
                         added.push(new);
                         new

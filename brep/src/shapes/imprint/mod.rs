@@ -9,9 +9,11 @@ mod contact;
 mod cross;
 mod regions;
 
-pub(super) use contact::whole;
+pub(super) use contact::{lies_on, whole};
+pub(super) use regions::is_clockwise;
 
 use super::{Edges, Shapes, glue};
+use cross::Pair;
 use rayon::prelude::*;
 use std::collections::{BTreeSet, HashMap};
 
@@ -21,7 +23,7 @@ const SAME: f64 = 1e-7;
 const FARTHEST: f64 = 1e-5;
 
 /// How far two faces that touch may be apart (length).
-fn room(shapes: &Shapes, faces: [usize; 2], size: f64) -> f64 {
+pub(super) fn room(shapes: &Shapes, faces: [usize; 2], size: f64) -> f64 {
     let accuracy = faces.map(|face| glue::tolerance(shapes, shapes.faces[face].body, size));
     accuracy[0].max(accuracy[1]).clamp(SAME * size, FARTHEST * size)
 }
@@ -32,31 +34,78 @@ const MOST_ROUNDS: usize = 8;
 /// Divides faces of different solids that touch on a common surface, and their edges. Returns
 /// whether there are any with different edges.
 pub(super) fn imprint(shapes: &mut Shapes, size: f64) -> bool {
-    let mut contacts = contact::contacts(shapes, size);
+    let mut contacts = contact::contacts(shapes, false, size);
     // Faces that two solids share have the same edges.
     retain_different(shapes, &mut contacts);
     if contacts.is_empty() {
         return false;
     }
+    divide(shapes, contacts, size);
+    true
+}
+
+/// Divides faces that touch along each other's edges, and faces along the curves inside of them.
+pub(super) fn divide(shapes: &mut Shapes, mut contacts: Vec<[usize; 2]>, size: f64) {
     glue::glue_edges(shapes, size);
     retain_different(shapes, &mut contacts);
-    for face in contacts.iter().flatten().copied().collect::<BTreeSet<_>>() {
+    let is_crossed = |face: &usize| !shapes.faces[*face].inner.is_empty();
+    let crossed: Vec<usize> = (0..shapes.faces.len()).filter(is_crossed).collect();
+    for face in contacts.iter().flatten().chain(&crossed).copied().collect::<BTreeSet<_>>() {
         drop_seams(shapes, face);
     }
     retain_different(shapes, &mut contacts);
     measure_gaps(shapes, &contacts);
     let groups = groups(shapes.faces.len(), &contacts);
-    let pairs = pairs(shapes, &groups);
+    let touching = pairs(shapes, &groups).into_iter().map(Pair::Faces);
+    divide_edges(shapes, &touching.chain(crossed.into_iter().map(Pair::Inside)).collect::<Vec<_>>(), size);
+    divide_faces(shapes, &groups, size);
+}
+
+/// Divides curves where others meet them.
+fn divide_edges(shapes: &mut Shapes, pairs: &[Pair], size: f64) {
     for _ in 0..MOST_ROUNDS {
-        if !cross::divide_at_vertices(shapes, &pairs, size) {
+        if !cross::divide_at_vertices(shapes, pairs, size) {
             break;
         }
     }
     glue::glue_edges(shapes, size);
-    cross::divide_at_crossings(shapes, &pairs, size);
+    cross::divide_at_crossings(shapes, pairs, size);
     glue::glue_edges(shapes, size);
-    divide_faces(shapes, &groups, size);
-    true
+}
+
+/// Of curves that are to divide two faces each, leaves the parts that are inside of both.
+///
+/// Beyond a face they may be tangent to those of its neighbours, so this is done face by face.
+pub(super) fn trim(shapes: &mut Shapes, crossed: &[[usize; 2]], size: f64) {
+    let faces: BTreeSet<usize> = crossed.iter().flatten().copied().collect();
+    faces.iter().for_each(|&face| drop_seams(shapes, face));
+    take_measured_gaps(shapes, &faces);
+    divide_edges(shapes, &faces.into_iter().map(Pair::Edges).collect::<Vec<_>>(), size);
+    let common = |&[a, b]: &[usize; 2]| {
+        let there: BTreeSet<usize> = shapes.faces[b].inner.iter().copied().collect();
+        let common: Vec<usize> =
+            shapes.faces[a].inner.iter().copied().filter(|c| there.contains(c)).collect();
+        let inside = [a, b].map(|face| regions::inside(shapes, face, &common, size));
+        let both: BTreeSet<usize> = inside[0].intersection(&inside[1]).copied().collect();
+        (common, both)
+    };
+    let found: Vec<(Vec<usize>, BTreeSet<usize>)> = crossed.par_iter().map(common).collect();
+    // Faces on one surface have the same curves, of which each has its own part.
+    let (mut all, mut kept) = (BTreeSet::new(), BTreeSet::new());
+    for (faces, (common, both)) in crossed.iter().zip(&found) {
+        for &face in faces {
+            all.extend(common.iter().map(|&curve| (face, curve)));
+            kept.extend(both.iter().map(|&curve| (face, curve)));
+        }
+    }
+    for (number, face) in shapes.faces.iter_mut().enumerate() {
+        face.inner.retain(|&curve| !all.contains(&(number, curve)) || kept.contains(&(number, curve)));
+    }
+}
+
+/// Pairs of faces of different solids on the same surface, whichever way they face.
+pub(super) fn contacts(shapes: &Shapes, size: f64) -> Vec<[usize; 2]> {
+    contact::contacts(shapes, true, size)
 }
 
 /// Leaves out pairs of faces with the same edges.
@@ -76,6 +125,25 @@ fn measure_gaps(shapes: &mut Shapes, contacts: &[[usize; 2]]) {
     for (curve, gap) in gaps {
         let edge = &mut shapes.curves[curve];
         edge.tolerance = edge.tolerance.max(gap);
+    }
+}
+
+/// Sets the tolerances of the edges of faces to their measured distances from all faces: files
+/// state much larger ones, within which other edges end.
+fn take_measured_gaps(shapes: &mut Shapes, faces: &BTreeSet<usize>) {
+    /// Between the places that are measured the distance may be larger.
+    const BETWEEN: f64 = 2.0;
+    let curves: BTreeSet<usize> = faces.iter().flat_map(|&face| shapes.curves_of(face)).collect();
+    let of = |face: usize| {
+        let surface = &shapes.faces[face].surface;
+        let own = shapes.curves_of(face).into_iter().filter(|curve| curves.contains(curve));
+        own.map(|curve| (curve, contact::gap(surface, &shapes.curves[curve]))).collect::<Vec<_>>()
+    };
+    let gaps: Vec<(usize, f64)> = (0..shapes.faces.len()).into_par_iter().flat_map_iter(of).collect();
+    curves.iter().for_each(|&curve| shapes.curves[curve].tolerance = 0.0);
+    for (curve, gap) in gaps {
+        let edge = &mut shapes.curves[curve];
+        edge.tolerance = edge.tolerance.max(BETWEEN * gap);
     }
 }
 
@@ -142,17 +210,55 @@ fn seam(loops: &[Edges]) -> Option<[(usize, usize); 2]> {
     None
 }
 
-/// Divides faces along the edges of those that touch them.
+/// Drops the curves inside of faces that do not divide them, or that no face of another solid
+/// has. Returns the faces that had such curves.
+fn drop_unmatched(shapes: &mut Shapes, divided: &[Option<Vec<Vec<Edges>>>]) -> Vec<usize> {
+    let mut bodies: HashMap<usize, BTreeSet<usize>> = HashMap::new();
+    let mut used: Vec<BTreeSet<usize>> = Vec::new();
+    for (face, parts) in shapes.faces.iter().zip(divided) {
+        let curves: BTreeSet<usize> = match parts {
+            Some(parts) => parts.iter().flatten().flatten().map(|edge| edge.0).collect(),
+            None => face.loops.iter().flatten().map(|edge| edge.0).collect(),
+        };
+        curves.iter().for_each(|&curve| {
+            bodies.entry(curve).or_default().insert(face.body);
+        });
+        used.push(curves);
+    }
+    let mut changed = Vec::new();
+    for (number, face) in shapes.faces.iter_mut().enumerate() {
+        let count = face.inner.len();
+        face.inner.retain(|curve| {
+            used[number].contains(curve) && bodies[curve].iter().any(|&body| body != face.body)
+        });
+        if face.inner.len() < count {
+            changed.push(number);
+        }
+    }
+    changed
+}
+
+/// Divides faces along the edges of those that touch them, and along the curves inside of them that
+/// also divide or bound a face of another solid.
 fn divide_faces(shapes: &mut Shapes, groups: &[Vec<usize>], size: f64) {
-    let divided = |face: usize| {
-        let mut added: Vec<usize> = groups[face].iter().flat_map(|&other| shapes.curves_of(other)).collect();
-        added.sort_unstable();
-        added.dedup();
-        regions::divided(shapes, face, &added, size)
-    };
-    let divided: Vec<_> = (0..shapes.faces.len()).into_par_iter().map(divided).collect();
+    let mut divided = vec![None; shapes.faces.len()];
+    let mut changed: Vec<usize> = (0..shapes.faces.len()).collect();
+    while !changed.is_empty() {
+        let parts = |&face: &usize| {
+            let mut added: Vec<usize> =
+                groups[face].iter().flat_map(|&other| shapes.curves_of(other)).collect();
+            added.extend(&shapes.faces[face].inner);
+            added.sort_unstable();
+            added.dedup();
+            regions::divided(shapes, face, &added, size)
+        };
+        let parts: Vec<_> = changed.par_iter().map(parts).collect();
+        changed.into_iter().zip(parts).for_each(|(face, parts)| divided[face] = parts);
+        changed = drop_unmatched(shapes, &divided);
+    }
     let faces = std::mem::take(&mut shapes.faces);
-    for (face, parts) in faces.into_iter().zip(divided) {
+    for (mut face, parts) in faces.into_iter().zip(divided) {
+        face.inner.clear();
         match parts {
             Some(parts) => {
                 shapes.faces.extend(parts.into_iter().map(|loops| super::Face { loops, ..face.clone() }));

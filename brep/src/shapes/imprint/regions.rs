@@ -11,7 +11,7 @@ use super::FARTHEST;
 use super::contact::lies_on;
 use crate::chart::{Chart, Parameters};
 use crate::{Point, Vector};
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 /// An edge on the surface.
 struct Strip {
@@ -39,32 +39,8 @@ const ALONG: f64 = 1e-6;
 /// The loops of each part of a face, divided by the edges `added` that lie inside of it; `None` if
 /// none does.
 pub(super) fn divided(shapes: &Shapes, number: usize, added: &[usize], size: f64) -> Option<Vec<Vec<Edges>>> {
-    let face = &shapes.faces[number];
-    let own: Edges = face.loops.iter().flatten().copied().collect();
-    let is_own = |curve: usize| own.iter().any(|edge| edge.0 == curve);
-    let may_divide = |&curve: &usize| {
-        let edge = &shapes.curves[curve];
-        !is_own(curve) && lies_on(&face.surface, edge, FARTHEST * size + edge.tolerance)
-    };
-    let added: Vec<usize> = added.iter().copied().filter(may_divide).collect();
-    if added.is_empty() || own.len() > shapes.curves_of(number).len() {
-        return None;
-    }
-    let chart = Chart::new(&face.surface, size);
-    let strip = |curve: usize, own: Option<bool>| {
-        let edge = &shapes.curves[curve];
-        let nodes = chart.along(edge)?;
-        let length =
-            nodes.windows(2).map(|w| (face.surface.point(w[1]) - face.surface.point(w[0])).norm()).sum();
-        Some(Strip { curve, ends: edge.ends, nodes, length, own })
-    };
-    let strips: Option<Vec<Strip>> =
-        own.iter().map(|&(curve, is_forward)| strip(curve, Some(is_forward))).collect();
-    let mut strips = strips?;
-    if face.surface.is_plane() && area(&strips) < 0.0 {
-        strips.iter_mut().for_each(|strip| strip.own = strip.own.map(|is_forward| !is_forward));
-    }
-    strips.extend(added.into_iter().filter_map(|curve| strip(curve, None)));
+    let chart = Chart::new(&shapes.faces[number].surface, size);
+    let mut strips = strips(shapes, &chart, number, added, size)?;
     loop {
         if strips.is_empty() {
             return None;
@@ -84,6 +60,62 @@ pub(super) fn divided(shapes: &Shapes, number: usize, added: &[usize], size: f64
         let mut kept = kept.into_iter();
         strips.retain(|_| kept.next().unwrap_or(false));
     }
+}
+
+/// Those of some curves that are inside of a face, whether or not they divide it.
+pub(super) fn inside(shapes: &Shapes, number: usize, curves: &[usize], size: f64) -> BTreeSet<usize> {
+    let chart = Chart::new(&shapes.faces[number].surface, size);
+    let Some(strips) = strips(shapes, &chart, number, curves, size) else { return BTreeSet::new() };
+    let sheet = Sheet { shapes, chart: &chart, strips: &strips };
+    let Some(regions) = sheet.regions() else { return BTreeSet::new() };
+    let is_inside =
+        |(k, strip): &(usize, &Strip)| strip.own.is_none() && regions.is_inside[regions.of[2 * k]];
+    strips.iter().enumerate().filter(is_inside).map(|(_, strip)| strip.curve).collect()
+}
+
+/// The edges of a face, and those of `added` that lie on its surface; `None` if none of these do.
+fn strips(shapes: &Shapes, chart: &Chart, number: usize, added: &[usize], size: f64) -> Option<Vec<Strip>> {
+    let face = &shapes.faces[number];
+    let own: Edges = face.loops.iter().flatten().copied().collect();
+    let is_own = |curve: usize| own.iter().any(|edge| edge.0 == curve);
+    let may_divide = |&curve: &usize| {
+        let edge = &shapes.curves[curve];
+        !is_own(curve) && lies_on(&face.surface, edge, FARTHEST * size + edge.tolerance)
+    };
+    let added: Vec<usize> = added.iter().copied().filter(may_divide).collect();
+    if added.is_empty() || own.len() > shapes.curves_of(number).len() {
+        return None;
+    }
+    let strip = |curve: usize, own: Option<bool>| {
+        let edge = &shapes.curves[curve];
+        let nodes = chart.along(edge)?;
+        let length =
+            nodes.windows(2).map(|w| (face.surface.point(w[1]) - face.surface.point(w[0])).norm()).sum();
+        Some(Strip { curve, ends: edge.ends, nodes, length, own })
+    };
+    let strips: Option<Vec<Strip>> =
+        own.iter().map(|&(curve, is_forward)| strip(curve, Some(is_forward))).collect();
+    let mut strips = strips?;
+    if face.surface.is_plane() && area(&strips) < 0.0 {
+        strips.iter_mut().for_each(|strip| strip.own = strip.own.map(|is_forward| !is_forward));
+    }
+    strips.extend(added.into_iter().filter_map(|curve| strip(curve, None)));
+    Some(strips)
+}
+
+/// Whether the loops of a plane face are clockwise around its normal.
+pub(in super::super) fn is_clockwise(shapes: &Shapes, number: usize, size: f64) -> bool {
+    let face = &shapes.faces[number];
+    if !face.surface.is_plane() {
+        return false;
+    }
+    let chart = Chart::new(&face.surface, size);
+    let strip = |&(curve, is_forward): &(usize, bool)| {
+        let nodes = chart.along(&shapes.curves[curve])?;
+        Some(Strip { curve, ends: [0; 2], nodes, length: 0.0, own: Some(is_forward) })
+    };
+    let strips: Option<Vec<Strip>> = face.loops.iter().flatten().map(strip).collect();
+    strips.is_some_and(|strips| area(&strips) < 0.0)
 }
 
 /// Twice the area in the plane inside of the loops that strips of a face make.

@@ -1,0 +1,270 @@
+//! Solids that overlap: the common part is left to one of them.
+//!
+//! Where two solids cross, their faces are divided along the curves in which the surfaces
+//! intersect. Then each face is on one side of each other solid. Faces inside of a solid that keeps
+//! the common part are left out, and its own faces there become those of the other solid, too.
+//!
+//! Curves are followed over whole surfaces, as far as the faces' boxes overlap, and trimmed. They
+//! start where triangles of both faces cross: an overlap that is thinner than the error of these
+//! triangles is not found.
+
+mod fit;
+mod poles;
+mod rejoin;
+mod seeds;
+mod sides;
+#[cfg(test)]
+mod tests;
+mod trace;
+
+use super::{Face, Shapes, imprint, reversed};
+use crate::model::{Corner, EdgeCurve};
+use crate::nearest::nearest_on_curve;
+use crate::tessellate::{Shell, Tessellation};
+use crate::{BrepError, Curve, Point};
+use rayon::prelude::*;
+use seeds::Facets;
+use sides::{Side, Uses};
+use std::collections::{BTreeSet, HashSet};
+
+/// Boxes are enlarged by this (fraction of the diagonal): triangles are inside of their surface.
+const ROOM: f64 = 0.01;
+/// Intersections this close to an edge on the other face are that edge (in tolerances).
+const AT_EDGE: f64 = 10.0;
+
+/// What two faces have in common.
+struct Crossing {
+    faces: [usize; 2],
+    /// The curves of each that lie on the surface of the other one.
+    on: [Vec<usize>; 2],
+    /// Other curves of both surfaces, with their ranges, and whether they are closed.
+    added: Vec<(Curve<3>, [f64; 2], bool)>,
+}
+
+impl Shapes {
+    /// Cuts the common part of solids that overlap out of all but the one of least `rank`. The
+    /// triangles and shells are those of the model of these shapes. Returns the pairs of bodies of
+    /// which the first is cut out of the second.
+    ///
+    /// # Errors
+    /// [`BrepError::Solid`] if it cannot be decided what is inside of what, and for a solid of
+    /// which nothing is left.
+    pub fn cut_overlaps(
+        &mut self,
+        tessellation: &Tessellation,
+        shells: &[Vec<Shell>],
+        rank: &[usize],
+    ) -> Result<BTreeSet<[usize; 2]>, BrepError> {
+        let (size, corners) = (self.size(), self.corners.len());
+        let patches = self.faces.iter().map(|face| face.id as usize).max().unwrap_or(0);
+        let facets = Facets::new(tessellation, patches);
+        let contacts = imprint::contacts(self, size);
+        self.orient_planes(size);
+        let crossings = self.crossings(&facets, tessellation, &contacts, size);
+        let crossed: Vec<[usize; 2]> =
+            crossings.iter().filter(|one| !one.added.is_empty()).map(|one| one.faces).collect();
+        crossings.into_iter().for_each(|crossing| self.add_crossing(crossing, size));
+        self.turn_spheres();
+        imprint::trim(self, &crossed, size);
+        imprint::divide(self, contacts, size);
+        let cut = self.assign(shells, rank)?;
+        self.rejoin(corners);
+        Ok(cut)
+    }
+
+    /// Turns loops around planes that are clockwise around the normal.
+    fn orient_planes(&mut self, size: f64) {
+        for face in 0..self.faces.len() {
+            if imprint::is_clockwise(self, face, size) {
+                let loops = std::mem::take(&mut self.faces[face].loops);
+                self.faces[face].loops = loops.into_iter().map(reversed).collect();
+            }
+        }
+    }
+
+    /// Where faces of different bodies cross that have not the same surface.
+    fn crossings(
+        &self,
+        facets: &Facets,
+        tessellation: &Tessellation,
+        contacts: &[[usize; 2]],
+        size: f64,
+    ) -> Vec<Crossing> {
+        let touch: HashSet<[usize; 2]> = contacts.iter().copied().collect();
+        let patch = |face: usize| self.faces[face].id as usize - 1;
+        let mut order: Vec<usize> = (0..self.faces.len()).collect();
+        let low = |face: usize| facets.bounds[patch(face)][0].x;
+        order.sort_by(|&a, &b| low(a).total_cmp(&low(b)));
+        let beside = |k: usize| -> Vec<[usize; 2]> {
+            let face = order[k];
+            let end = facets.bounds[patch(face)][1].x + ROOM * size;
+            let near = order[k + 1..].iter().copied().take_while(|&other| low(other) <= end);
+            let found = near.filter(|&other| {
+                self.faces[face].body != self.faces[other].body
+                    && !touch.contains(&[face.min(other), face.max(other)])
+                    && facets.common([patch(face), patch(other)], ROOM * size).is_some()
+            });
+            found.map(|other| [face.min(other), face.max(other)]).collect()
+        };
+        let mut pairs: Vec<[usize; 2]> = (0..order.len()).into_par_iter().flat_map_iter(beside).collect();
+        pairs.sort_unstable();
+        let cross = |faces: &[usize; 2]| self.crossing(facets, tessellation, *faces, size);
+        pairs.par_iter().map(cross).collect()
+    }
+
+    fn crossing(
+        &self,
+        facets: &Facets,
+        tessellation: &Tessellation,
+        faces: [usize; 2],
+        size: f64,
+    ) -> Crossing {
+        let patches = faces.map(|face| self.faces[face].id as usize - 1);
+        let room = imprint::room(self, faces, size);
+        let on = [0, 1].map(|k| {
+            let there = &facets.bounds[patches[1 - k]];
+            let surface = &self.faces[faces[1 - k]].surface;
+            let curves = self.curves_of(faces[k]).into_iter();
+            let is_near = |curve: &usize| {
+                let points = tessellation.lines[*curve].iter().map(|on| tessellation.points[on.0 as usize]);
+                let first = tessellation.points[tessellation.lines[*curve][0].0 as usize];
+                let [low, high] =
+                    points.fold([first; 2], |[low, high], point| [low.inf(&point), high.sup(&point)]);
+                (0..3).all(|i| low[i] <= there[1][i] + ROOM * size && there[0][i] <= high[i] + ROOM * size)
+            };
+            curves
+                .filter(is_near)
+                .filter(|&curve| imprint::lies_on(surface, &self.curves[curve], room))
+                .collect::<Vec<usize>>()
+        });
+        let mut crossing = Crossing { faces, on, added: Vec::new() };
+        let Some(bounds) = facets.common(patches, ROOM * size) else { return crossing };
+        let pair = trace::Pair { surfaces: faces.map(|face| &self.faces[face].surface), bounds, size };
+        let mut branches: Vec<trace::Branch> = Vec::new();
+        for (place, parameters) in facets.crossings(patches) {
+            let Some(start) = pair.meet(place, parameters) else { continue };
+            let is_known = !pair.contains(&start.point)
+                || branches.iter().any(|branch| pair.is_on(branch, &start))
+                || crossing.on.iter().flatten().any(|&curve| {
+                    let foot = nearest_on_curve(&self.curves[curve].curve, &start.point);
+                    (foot.point - start.point).norm() <= AT_EDGE * room
+                });
+            if !is_known {
+                let mut branch = pair.branch(start);
+                self.move_start(&mut branch, faces);
+                branches.push(branch);
+            }
+        }
+        crossing.added.extend(branches.iter().filter_map(|branch| {
+            let (curve, range) = fit::curve(branch, size)?;
+            Some((curve, range, branch.is_closed))
+        }));
+        crossing
+    }
+
+    /// Moves the start of a closed branch away from the edges of both faces: they are divided at
+    /// vertices that are as close to them as they are to their faces.
+    fn move_start(&self, branch: &mut trace::Branch, faces: [usize; 2]) {
+        /// So many places are compared.
+        const PLACES: usize = 24;
+        if !branch.is_closed {
+            return;
+        }
+        let edges: BTreeSet<usize> = faces.into_iter().flat_map(|face| self.curves_of(face)).collect();
+        let clearance = |k: &usize| {
+            let place = &branch.points[*k].point;
+            let away =
+                |edge: &usize| (nearest_on_curve(&self.curves[*edge].curve, place).point - place).norm();
+            edges.iter().map(away).fold(f64::INFINITY, f64::min)
+        };
+        let count = branch.points.len() - 1;
+        let places = (0..count).step_by(count.div_ceil(PLACES));
+        let best = places.max_by(|a, b| clearance(a).total_cmp(&clearance(b))).unwrap_or(0);
+        branch.points.pop();
+        branch.points.rotate_left(best);
+        branch.points.push(branch.points[0]);
+    }
+
+    /// Adds the curves of a crossing to its faces.
+    fn add_crossing(&mut self, crossing: Crossing, size: f64) {
+        let [a, b] = crossing.faces;
+        let [on_b, on_a] = crossing.on;
+        self.faces[b].inner.extend(on_b);
+        self.faces[a].inner.extend(on_a);
+        let body = self.faces[a].body;
+        let tolerance = fit::ACCURACY * size;
+        for (curve, range, is_closed) in crossing.added {
+            let mut end = |t: f64| {
+                let point = Point::from(curve.point(t));
+                self.add_corner(Corner { point, tolerance }, body)
+            };
+            let first = end(range[0]);
+            let ends = [first, if is_closed { first } else { end(range[1]) }];
+            self.curves.push(EdgeCurve { curve, range, ends, tolerance });
+            self.body_of_curve.push(body);
+            for face in crossing.faces {
+                self.faces[face].inner.push(self.curves.len() - 1);
+            }
+        }
+    }
+
+    /// Leaves out faces inside of solids of lower rank, and gives faces inside of solids of higher
+    /// rank to these, too.
+    fn assign(&mut self, shells: &[Vec<Shell>], rank: &[usize]) -> Result<BTreeSet<[usize; 2]>, BrepError> {
+        let sides = self.sides(shells)?;
+        let mut cut = BTreeSet::new();
+        let mut kept = Vec::new();
+        let mut last_inside = vec![None; rank.len()];
+        for (face, sides) in std::mem::take(&mut self.faces).into_iter().zip(sides) {
+            let body = face.body;
+            let takes = |&&(other, side): &&(usize, Side)| {
+                rank[other] < rank[body] && matches!(side, Side::Inside | Side::Same)
+            };
+            if let Some(&(other, _)) = sides.iter().find(takes) {
+                cut.insert([other, body]);
+                last_inside[body] = Some(other);
+                continue;
+            }
+            let beside = sides.iter().filter(|(_, side)| matches!(side, Side::Inside | Side::Opposite));
+            if let Some(&(other, Side::Inside)) = beside.min_by_key(|(other, _)| rank[*other]) {
+                cut.insert([body, other]);
+                kept.push(Face { body: other, is_behind: !face.is_behind, ..face.clone() });
+            }
+            kept.push(face);
+        }
+        self.faces = kept;
+        let left: HashSet<usize> = self.faces.iter().map(|face| face.body).collect();
+        let gone = (0..rank.len()).find(|body| !left.contains(body) && last_inside[*body].is_some());
+        if let Some((body, Some(other))) = gone.map(|body| (body, last_inside[body])) {
+            let what = format!(
+                "nothing is left of it: it lies inside of solid {}, which keeps what both have: give that to the \
+                 smaller solid, or leave one of them out",
+                other + 1
+            );
+            return Err(BrepError::solid(body, what, None));
+        }
+        Ok(cut)
+    }
+
+    /// The bodies near each face, with the side of them on which it is.
+    fn sides(&self, shells: &[Vec<Shell>]) -> Result<Vec<Vec<(usize, Side)>>, BrepError> {
+        let uses = Uses::new(self);
+        let is_near =
+            |a: &usize, b: &usize| shells[*a].iter().any(|s| shells[*b].iter().any(|t| s.is_near(t)));
+        let bodies = 0..shells.len();
+        let pairs: Vec<[usize; 2]> = bodies
+            .clone()
+            .flat_map(|a| bodies.clone().filter(move |b| *b != a).map(move |b| [a, b]))
+            .filter(|[a, b]| is_near(a, b))
+            .collect();
+        let found: Vec<_> = pairs
+            .par_iter()
+            .map(|&[body, other]| Ok((other, uses.sides(body, other, &shells[other])?)))
+            .collect::<Result<_, BrepError>>()?;
+        let mut sides = vec![Vec::new(); self.faces.len()];
+        for (other, of) in found {
+            of.into_iter().for_each(|(face, side)| sides[face].push((other, side)));
+        }
+        Ok(sides)
+    }
+}

@@ -1,0 +1,118 @@
+//! Solids that overlap, made by hand.
+
+use crate::shapes::tests::{Solids, X, Y, Z, measured, square};
+use crate::{Model, OverlapTo, Vector};
+use std::f64::consts::PI;
+
+fn cut(solids: Solids, to: OverlapTo) -> (Model, Vec<f64>, f64) {
+    let mut model = solids.model();
+    model.cut_overlaps(to).unwrap_or_else(|error| panic!("{error}"));
+    measured(model)
+}
+
+fn assert_near(found: &[f64], exact: &[f64]) {
+    let is_near = |(a, b): (&f64, &f64)| (a - b).abs() <= 2e-3 * exact.iter().copied().fold(0.0, f64::max);
+    assert!(found.len() == exact.len() && found.iter().zip(exact).all(is_near), "{found:?}, not {exact:?}");
+}
+
+#[test]
+fn the_common_part_belongs_to_the_chosen_solid() {
+    for (to, exact) in
+        [(OverlapTo::First, [8.0, 7.0]), (OverlapTo::Last, [7.0, 8.0]), (OverlapTo::Smaller, [8.0, 7.0])]
+    {
+        let mut solids = Solids::default();
+        solids.block([0.0; 3], [2.0; 3]);
+        solids.block([1.0; 3], [3.0; 3]);
+        let (model, volumes, area) = cut(solids, to);
+        assert_near(&volumes, &exact);
+        assert_near(&[area], &[3.0]);
+        assert!(model.notes[0].starts_with("solids overlap: cut solid"), "{:?}", model.notes);
+        // Three faces are divided: 12 and 3.
+        assert_eq!(model.patches.len(), 15);
+    }
+}
+
+#[test]
+fn a_pin_is_cut_out_of_a_block_that_it_passes_through() {
+    let mut solids = Solids::default();
+    solids.block([-2.0, -2.0, 0.0], [2.0, 2.0, 1.0]);
+    solids.pin(X * 0.3, 0.5, [-1.0, 2.0], 0.7);
+    let (model, volumes, area) = cut(solids, OverlapTo::Smaller);
+    assert_near(&volumes, &[16.0 - PI / 4.0, 3.0 * PI / 4.0]);
+    assert_near(&[area], &[PI]);
+    // The pin's wall is divided in three, and no vertex remains where planes of the block meet it.
+    let walls = model.patches.iter().filter(|patch| patch.surface.kind() == "cylinder");
+    assert_eq!(walls.count(), 3);
+    let ends = model.curves.iter().filter(|curve| curve.ends[0] == curve.ends[1]);
+    assert_eq!(ends.count(), 4, "the ends of the pin and of the hole are circles");
+}
+
+#[test]
+fn a_pin_thicker_than_its_hole_keeps_a_ring() {
+    let mut solids = Solids::default();
+    solids.prism(&square(Vector::zeros(), 10.0, 0.0), [0.0, 2.0], &[(Vector::zeros(), 5.0)]);
+    solids.pin(Vector::zeros(), 5.01, [0.0, 2.0], 1.1);
+    let (_, volumes, area) = cut(solids, OverlapTo::Last);
+    let pin = PI * 5.01 * 5.01 * 2.0;
+    assert_near(&volumes, &[800.0 - pin, pin]);
+    assert_near(&[area], &[2.0 * PI * 5.01 * 2.0]);
+}
+
+#[test]
+fn faces_that_lie_in_each_other_are_those_of_the_solid_that_keeps_the_part() {
+    // Three faces of each are in the same planes, with the solids on the same side.
+    let mut solids = Solids::default();
+    solids.block([0.0; 3], [2.0; 3]);
+    solids.block([1.0, 0.0, 0.0], [3.0, 2.0, 3.0]);
+    let (_, volumes, area) = cut(solids, OverlapTo::First);
+    assert_near(&volumes, &[8.0, 8.0]);
+    assert_near(&[area], &[4.0 + 2.0]);
+}
+
+#[test]
+fn of_three_solids_each_place_belongs_to_one() {
+    let mut solids = Solids::default();
+    solids.block([-3.0, -0.5, -0.5], [3.0, 0.5, 0.5]);
+    solids.block([-0.5, -3.0, -0.5], [0.5, 3.0, 0.5]);
+    solids.block([-0.5, -0.5, -3.0], [0.5, 0.5, 3.0]);
+    let (_, volumes, area) = cut(solids, OverlapTo::First);
+    assert_near(&volumes, &[6.0, 5.0, 5.0]);
+    assert_near(&[area], &[4.0]);
+}
+
+#[test]
+fn a_plane_may_pass_through_the_poles_of_a_ball() {
+    let mut solids = Solids::default();
+    solids.block([0.0; 3], [2.0; 3]);
+    solids.ball(Y + Z, 0.7);
+    let (_, volumes, area) = cut(solids, OverlapTo::Smaller);
+    let ball = 4.0 / 3.0 * PI * 0.7_f64.powi(3);
+    assert_near(&volumes, &[8.0 - 0.5 * ball, ball]);
+    assert_near(&[area], &[2.0 * PI * 0.7 * 0.7]);
+}
+
+#[test]
+fn a_solid_inside_another_one_is_a_void_of_that_or_nothing() {
+    let nested = || {
+        let mut solids = Solids::default();
+        solids.block([0.0; 3], [2.0; 3]);
+        solids.block([0.5; 3], [1.0; 3]);
+        solids
+    };
+    let (_, volumes, area) = cut(nested(), OverlapTo::Smaller);
+    assert_near(&volumes, &[8.0 - 0.125, 0.125]);
+    assert_near(&[area], &[1.5]);
+    let error = nested().model().cut_overlaps(OverlapTo::First).unwrap_err().to_string();
+    assert!(error.contains("solid 2: nothing is left of it: it lies inside of solid 1"), "{error}");
+}
+
+#[test]
+fn solids_that_only_touch_are_not_changed() {
+    let mut solids = Solids::default();
+    solids.block([0.0; 3], [2.0; 3]);
+    solids.block([2.0, 0.5, 0.5], [3.0, 1.0, 1.0]);
+    let mut model = solids.model();
+    let before = model.clone();
+    model.cut_overlaps(OverlapTo::First).unwrap();
+    assert_eq!(model, before);
+}

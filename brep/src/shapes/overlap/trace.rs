@@ -1,0 +1,173 @@
+//! Branches of the intersection of two surfaces, followed point by point.
+//!
+//! Each point is on both surfaces up to rounding, by Newton's method in the plane of their normals;
+//! the next one is sought along the cross product of the normals (Patrikalakis and Maekawa 2002,
+//! "Shape Interrogation for Computer Aided Design and Manufacturing", sections 5.8.1 and 5.8.2).
+
+use crate::project::project_to_surface;
+use crate::{Point, Surface, Vector};
+
+/// The most steps of Newton's method; it converges quadratically.
+const NEWTON_STEPS: usize = 30;
+/// Surfaces that meet at a smaller angle (radians) touch each other: no branch is followed.
+const LEAST_ANGLE: f64 = 1e-3;
+/// A branch turns at most by this angle (radians) in a step.
+const MOST_TURN: f64 = 0.2;
+/// The curve between two points is this close to the surfaces (fraction of the diagonal).
+pub(super) const OFF: f64 = 1e-9;
+/// Steps are not shorter (fraction of the diagonal).
+const SHORTEST: f64 = 1e-7;
+/// The first step (fraction of the box around both faces).
+const FIRST_STEP: f64 = 0.02;
+/// A branch has at most this many points in one direction.
+const MOST_POINTS: usize = 20_000;
+
+/// A point of two surfaces.
+#[derive(Clone, Copy)]
+pub(super) struct Meeting {
+    pub point: Point,
+    /// Its parameters on both surfaces.
+    parameters: [[f64; 2]; 2],
+    /// The unit tangent of the branch.
+    pub tangent: Vector,
+}
+
+/// Points along a branch, the first of a closed one also at its end.
+pub(super) struct Branch {
+    pub points: Vec<Meeting>,
+    pub is_closed: bool,
+}
+
+/// Two surfaces within a box.
+pub(super) struct Pair<'a> {
+    pub surfaces: [&'a Surface; 2],
+    pub bounds: [Point; 2],
+    /// The diagonal of the model.
+    pub size: f64,
+}
+
+impl Pair<'_> {
+    pub fn contains(&self, point: &Point) -> bool {
+        (0..3).all(|axis| (self.bounds[0][axis]..=self.bounds[1][axis]).contains(&point[axis]))
+    }
+
+    /// The point of both surfaces nearest to one near them; `None` if there is none, or if the
+    /// surfaces are tangent there.
+    pub fn meet(&self, near: Point, mut parameters: [[f64; 2]; 2]) -> Option<Meeting> {
+        let mut point = near;
+        let rounding = 1e-14 * (self.size + near.coords.amax());
+        for _ in 0..NEWTON_STEPS {
+            let feet = [0, 1].map(|k| project_to_surface(self.surfaces[k], &point, parameters[k]));
+            if feet.iter().any(|foot| !foot.is_converged) {
+                return None;
+            }
+            parameters = feet.map(|foot| foot.parameters);
+            let [m, n] = feet.map(|foot| foot.normal);
+            let [a, b] = feet.map(|foot| (foot.point - point).dot(&foot.normal));
+            let tangent = m.cross(&n);
+            let squared = tangent.norm_squared();
+            // Poles have no normal.
+            if squared.is_nan() || squared < LEAST_ANGLE * LEAST_ANGLE {
+                return None;
+            }
+            let cosine = m.dot(&n);
+            let step = m * ((a - cosine * b) / squared) + n * ((b - cosine * a) / squared);
+            point += step;
+            if step.norm() <= rounding {
+                return Some(Meeting { point, parameters, tangent: tangent / squared.sqrt() });
+            }
+        }
+        None
+    }
+
+    /// The branch through a point, as far as it is inside the box.
+    pub fn branch(&self, start: Meeting) -> Branch {
+        let (mut points, is_closed) = self.follow(start);
+        if !is_closed {
+            let back = Meeting { tangent: -start.tangent, ..start };
+            let (before, _) = self.follow(back);
+            let turned = before.into_iter().skip(1).rev().map(|m| Meeting { tangent: -m.tangent, ..m });
+            points = turned.chain(points).collect();
+        }
+        Branch { points, is_closed }
+    }
+
+    /// Points along a branch in the direction of the tangent, and whether it came back.
+    fn follow(&self, start: Meeting) -> (Vec<Meeting>, bool) {
+        let mut step = FIRST_STEP * (self.bounds[1] - self.bounds[0]).norm();
+        let mut points = vec![start];
+        let mut last = start;
+        while step > SHORTEST * self.size && points.len() < MOST_POINTS {
+            let Some(next) = self.step(&last, step) else {
+                step *= 0.5;
+                continue;
+            };
+            if points.len() > 2 && passes(&last, &next, &start) {
+                points.push(start);
+                return (points, true);
+            }
+            points.push(next);
+            last = next;
+            if !self.contains(&next.point) {
+                break;
+            }
+            step *= 1.5;
+        }
+        (points, false)
+    }
+
+    /// The point after one; `None` if the step is too long.
+    fn step(&self, from: &Meeting, step: f64) -> Option<Meeting> {
+        let found = self.meet(from.point + from.tangent * step, from.parameters)?;
+        let sign = if found.tangent.dot(&from.tangent) < 0.0 { -1.0 } else { 1.0 };
+        let next = Meeting { tangent: found.tangent * sign, ..found };
+        let way = next.point - from.point;
+        let is_near = way.norm() < 1.5 * step && way.dot(&from.tangent) > 0.5 * step;
+        if !is_near || from.tangent.angle(&next.tangent) > MOST_TURN {
+            return None;
+        }
+        let middle = middle([from, &next]);
+        let exact = self.meet(middle, from.parameters)?;
+        ((exact.point - middle).norm() <= OFF * self.size).then_some(next)
+    }
+
+    /// Whether a point of both surfaces is on a branch.
+    pub fn is_on(&self, branch: &Branch, place: &Meeting) -> bool {
+        /// Points beside a chord, in its length, may be on the branch: more than it bends by.
+        const BESIDE: f64 = 0.05;
+        branch.points.windows(2).any(|w| {
+            let way = w[1].point - w[0].point;
+            let to = place.point - w[0].point;
+            let share = (to.dot(&way) / way.norm_squared()).clamp(0.0, 1.0);
+            let on = w[0].point + way * share;
+            if (place.point - on).norm() > BESIDE * way.norm() {
+                return false;
+            }
+            let same = self.meet(on, w[0].parameters);
+            let near = 10.0 * (place.point - on).norm() * MOST_TURN + SHORTEST * self.size;
+            same.is_some_and(|same| (same.point - place.point).norm() <= near)
+        })
+    }
+}
+
+/// The middle of the cubic curve between two points with tangents, whose derivatives have the
+/// length of the arc.
+fn middle(ends: [&Meeting; 2]) -> Point {
+    let length = arc(ends);
+    nalgebra::center(&ends[0].point, &ends[1].point) + (ends[0].tangent - ends[1].tangent) * (length / 8.0)
+}
+
+/// The length of a circular arc between two points with tangents.
+pub(super) fn arc(ends: [&Meeting; 2]) -> f64 {
+    let half = 0.5 * ends[0].tangent.angle(&ends[1].tangent);
+    let chord = (ends[1].point - ends[0].point).norm();
+    if half < 1e-4 { chord } else { chord * half / half.sin() }
+}
+
+/// Whether the way between two points of a branch passes through a third one.
+fn passes(from: &Meeting, to: &Meeting, place: &Meeting) -> bool {
+    let way = to.point - from.point;
+    let share = (place.point - from.point).dot(&way) / way.norm_squared();
+    let beside = (from.point + way * share - place.point).norm();
+    (0.0..=1.0).contains(&share) && beside <= MOST_TURN * way.norm() && from.tangent.dot(&place.tangent) > 0.5
+}
