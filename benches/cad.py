@@ -10,7 +10,8 @@ HXT. Seconds are of reading and meshing: those of tetmill's whole process, of th
 measured by NumPy. The error of the volume is relative to OpenCASCADE's, if `measures.json` has it.
 
 With --imprint, as for the solids that scripts/touching_solids.py makes, Gmsh imprints solids that touch by OpenCASCADE's fragments, and
-NETGEN by its Glue; tetmill does so by itself.
+NETGEN by its Glue; tetmill does so by itself. With --overlap-to, as for those of scripts/overlapping_solids.py, tetmill gives what solids have
+in common to one of them; fragments and glue make a solid of its own of it.
 """
 import argparse, json, os, pathlib, signal, subprocess, sys, tempfile, time
 
@@ -65,11 +66,13 @@ def gmsh(path, imprints):
     return [seconds, *shapes(coordinates.reshape(-1, 3), place[gmsh.model.mesh.getElementsByType(4)[1]].reshape(-1, 4))]
 
 
-def tetmill(path, binary):
+def tetmill(path, binary, overlap_to):
     with tempfile.TemporaryDirectory() as folder:
         # The others convert lengths to millimetres.
         unit = [] if path.endswith(".brep") else ["--unit", "mm"]
-        command = [binary, "generate", path, *unit, "-n", "1", "--levels", "0", "-f", "medit", "-o", folder, "-q"]
+        overlap = ["--overlap-to", overlap_to] if overlap_to else []
+        output = ["-n", "1", "--levels", "0", "-f", "medit", "-o", folder, "-q"]
+        command = [binary, "generate", path, *unit, *overlap, *output]
         start = time.perf_counter()
         done = subprocess.run(command, capture_output=True, text=True)
         seconds = time.perf_counter() - start
@@ -85,15 +88,16 @@ def medit(words, name, columns):
     return np.array(words[first : first + int(words[first - 1]) * columns], float).reshape(-1, columns)
 
 
-def one(program, path, binary, limit, imprints):
+def one(program, path, options):
     """The result of a program in a process of its own, or why there is none."""
     try:
-        imprint = ["--imprint"] if imprints else []
-        command = [sys.executable, HERE, *imprint, "--worker", program, path, "--binary", binary]
+        given = ["--imprint"] if options.imprint else []
+        given += ["--overlap-to", options.overlap_to] if options.overlap_to else []
+        command = [sys.executable, HERE, *given, "--worker", program, path, "--binary", options.binary]
         # With a session of its own, so that programs that it started end with it.
         pipe = subprocess.PIPE
         worker = subprocess.Popen(command, stdout=pipe, stderr=pipe, text=True, start_new_session=True)
-        stdout, stderr = worker.communicate(timeout=limit)
+        stdout, stderr = worker.communicate(timeout=options.limit)
         last = (stdout.strip().splitlines() or [""])[-1]
         if worker.returncode == 0 and last.startswith("["):
             return json.loads(last), ""
@@ -102,7 +106,7 @@ def one(program, path, binary, limit, imprints):
     except subprocess.TimeoutExpired:
         os.killpg(worker.pid, signal.SIGKILL)
         worker.communicate()
-        return None, f"more than {limit:g} s"
+        return None, f"more than {options.limit:g} s"
 
 
 def cell(result, volume):
@@ -121,13 +125,15 @@ def main():
     parser.add_argument("--only", nargs="*")
     parser.add_argument("--limit", type=float, default=120, help="seconds for each mesh")
     parser.add_argument("--imprint", action="store_true", help="imprint solids that touch on each other")
+    parser.add_argument("--overlap-to", choices=["first", "last", "smaller"], help="cut solids that overlap")
     parser.add_argument("--worker", help=argparse.SUPPRESS)
     if "--worker" in sys.argv:
         at = sys.argv.index("--worker")
         program, path, binary = sys.argv[at + 1], sys.argv[at + 2], sys.argv[-1]
         imprints = "--imprint" in sys.argv
+        overlap_to = sys.argv[sys.argv.index("--overlap-to") + 1] if "--overlap-to" in sys.argv else None
         made = {
-            "tetmill": lambda: tetmill(path, binary),
+            "tetmill": lambda: tetmill(path, binary, overlap_to),
             "netgen": lambda: netgen(path, imprints),
             "gmsh": lambda: gmsh(path, imprints),
         }
@@ -146,7 +152,7 @@ def main():
         volume = sum(measures.get(path.stem, {}).get("volumes", []))
         cells = []
         for program in programs:
-            result, why = one(program, path, options.binary, options.limit, options.imprint)
+            result, why = one(program, path, options)
             if result is not None and result[1] == 0:
                 result, why = None, "no tets"
             cells.append(cell(result, volume))

@@ -6,7 +6,7 @@ use crate::shapes::Shapes;
 use crate::tessellate::{Settings, Tessellation, volume};
 
 /// How finely faces are triangulated to find where they cross.
-const SETTINGS: Settings = Settings { chord: 3e-4, angle: 0.1 };
+const SETTINGS: Settings = Settings { chord: 5e-4, angle: 0.15 };
 
 /// Which of two solids that overlap keeps the common part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -549,8 +549,9 @@ void tetmill_options_free(tetmill_options *options);
  * Sizes: `preset`, `maxh`, `minh`, `grading`, `closeness`, `mesh-size-file`, `effort`, `coarse`.
  * The fine mesh: `method`, `elements`, `levels`, `pieces`, `nested`, `refine`, `order`,
  * `allow-off-surface`, `memory`, `planes`. Reading surfaces: `keep-surface`, `keep-small`,
- * `merge`, `feature-angle`, `unit`, `solid`. The values of `nested`, `allow-off-surface`,
- * `keep-surface` and `keep-small` are `"true"` and `"false"`. Each call with `solid` adds a solid.
+ * `merge`, `feature-angle`, `unit`, `solid`, `overlap-to`. The values of `nested`,
+ * `allow-off-surface`, `keep-surface` and `keep-small` are `"true"` and `"false"`. Each call with
+ * `solid` adds a solid.
  * The sequence of calls does not matter otherwise; `elements` excludes `coarse`, `levels` and
  * `pieces`, which is checked when a mesh is made.
  *

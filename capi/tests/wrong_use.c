@@ -88,6 +88,7 @@ static void options(const tetmill_geometry *ball) {
     EXPECT(tetmill_options_set(o, "level", "1"), USAGE, "levels");
     EXPECT(tetmill_options_set(o, "levels", "11"), USAGE, "0 to 10");
     EXPECT(tetmill_options_set(o, "preset", "finest"), USAGE, "very-fine");
+    EXPECT(tetmill_options_set(o, "overlap-to", "larger"), USAGE, "first, last or smaller");
     EXPECT(tetmill_options_set_maxh(o, NAN), USAGE, "option maxh cannot be `NaN`");
     EXPECT(tetmill_options_set_maxh(o, -1), USAGE, "positive");
     EXPECT(tetmill_options_set_elements(o, 0), USAGE, "count");

@@ -33,6 +33,16 @@ def test_chosen_solids_are_meshed_alone():
         tetmill.Geometry(GEOMETRIES / "assembly.step", solids=["nut"])
 
 
+def test_solids_that_overlap_are_cut_out_of_each_other():
+    path = GEOMETRIES / "press_fit.step"
+    with pytest.warns(tetmill.NoteWarning, match="solids overlap: cut "):
+        geometry = tetmill.Geometry(path, unit="mm", overlap_to="smaller")
+    mesh = geometry.generate(levels=1)
+    assert mesh.report["mesh"]["volume"] == pytest.approx(18577.6, rel=5e-3)
+    with pytest.raises(ValueError, match="overlap_to"):
+        tetmill.Geometry(path, overlap_to="larger")
+
+
 # In a process of its own: once OpenCASCADE has read a file in metres, it writes others in metres too.
 MAKE = """
 import gmsh, sys

@@ -44,7 +44,7 @@ pub(super) fn tessellated(
 
 /// Surfaces at most this far apart touch (fraction of the size of the model).
 const TOUCH: f64 = 1e-8;
-/// Projections onto two surfaces in turn, in search of a common point.
+/// Projections onto two surfaces, in search of a common point.
 const TURNS: usize = 30;
 
 /// Whether facets intersect because faces of two solids without a common face do: finer facets
@@ -71,7 +71,23 @@ fn meet(exact: &BrepProjector, crossing: &Crossing, size: f64) -> bool {
             // Not where only the surfaces beyond the faces meet.
             return exact.is_within(a, &on_a) && exact.is_within(b, &on_b);
         }
-        at = nalgebra::center(&on_a, &on_b);
+        at = nearest_common(at, [on_a, on_b]);
     }
     false
+}
+
+/// The point nearest to another one in the planes through its feet on two surfaces, across the ways
+/// to them; the middle of the feet where that is not defined.
+fn nearest_common(at: Point, feet: [Point; 2]) -> Point {
+    /// Planes that meet at a smaller angle (radians) have no common point near.
+    const LEAST_ANGLE: f64 = 1e-3;
+    let ways = feet.map(|foot| foot - at);
+    let [a, b] = ways.map(|way| way.norm());
+    let [m, n] = ways.map(|way| way.try_normalize(0.0).unwrap_or_default());
+    let cosine = m.dot(&n);
+    let squared = 1.0 - cosine * cosine;
+    if a == 0.0 || b == 0.0 || squared < LEAST_ANGLE * LEAST_ANGLE {
+        return nalgebra::center(&feet[0], &feet[1]);
+    }
+    at + m * ((a - cosine * b) / squared) + n * ((b - cosine * a) / squared)
 }

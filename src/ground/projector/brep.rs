@@ -246,8 +246,11 @@ impl BrepProjector {
     /// facets from the surface.
     pub fn is_within(&self, patch: PatchId, point: &Point) -> bool {
         self.source.patches[patch.index()].iter().any(|&face| {
-            let source = &self.source.faces[face as usize];
-            (self.nearest(face, point).0 - point).norm() <= source.sag + self.source.tolerance
+            let (near, parameters) = self.nearest(face, point);
+            let surface = &self.source.faces[face as usize].surface;
+            // The surface is as far from its facets at the same parameters.
+            let sag = (surface.point(parameters) - near).norm();
+            (near - point).norm() <= SAG_ROOM * sag + self.source.tolerance
         })
     }
 

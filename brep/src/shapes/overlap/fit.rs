@@ -1,6 +1,6 @@
-//! The curve through the points of a branch: a line, a circle, or a cubic spline.
+//! The curve through the points of a branch: a line, a circle, or a spline.
 
-use super::trace::{Branch, OFF, arc};
+use super::trace::{Branch, OFF, arc, poles};
 use crate::bspline::{Basis, SplineCurve};
 use crate::{Curve, Point, Vector};
 use std::f64::consts::TAU;
@@ -8,14 +8,22 @@ use std::f64::consts::TAU;
 /// Points are on a line or circle if they are this close to it (fraction of the diagonal).
 const EXACT: f64 = 1e-11;
 
-/// A curve and the range of its parameters from the first to the last point of a branch; `None` if
-/// the branch has one point.
-pub(super) fn curve(branch: &Branch, size: f64) -> Option<(Curve<3>, [f64; 2])> {
+/// A curve along a branch.
+pub(super) struct Fitted {
+    pub curve: Curve<3>,
+    /// The parameters of the first and the last point.
+    pub range: [f64; 2],
+    pub is_closed: bool,
+}
+
+/// The curve along a branch; `None` if that has one point.
+pub(super) fn curve(branch: &Branch, size: f64) -> Option<Fitted> {
     if branch.points.len() < 2 {
         return None;
     }
     let room = EXACT * size;
-    line(branch, room).or_else(|| circle(branch, room)).or_else(|| spline(branch))
+    let found = line(branch, room).or_else(|| circle(branch, room)).or_else(|| spline(branch));
+    found.map(|(curve, range)| Fitted { curve, range, is_closed: branch.is_closed })
 }
 
 /// How far such a curve is from the surfaces at most (fraction of the diagonal).
@@ -56,21 +64,20 @@ fn circle(branch: &Branch, room: f64) -> Option<(Curve<3>, [f64; 2])> {
     (end <= TAU).then_some((curve, [0.0, end]))
 }
 
-/// The cubic spline through all points with their tangents, over the length of the arcs.
+/// The spline of degree 5 through all points with their derivatives, over the length of the branch.
 fn spline(branch: &Branch) -> Option<(Curve<3>, [f64; 2])> {
+    const DEGREE: usize = 5;
     let points = &branch.points;
     let mut knots = vec![0.0];
-    let mut poles = vec![points[0].point.coords];
+    let mut all = vec![points[0].point.coords];
     for w in points.windows(2) {
-        let length = arc([&w[0], &w[1]]);
-        knots.push(knots[knots.len() - 1] + length);
-        poles.push(w[0].point.coords + w[0].tangent * (length / 3.0));
-        poles.push(w[1].point.coords - w[1].tangent * (length / 3.0));
+        let ends = [&w[0], &w[1]];
+        knots.push(knots[knots.len() - 1] + arc(ends));
+        all.extend(&poles(ends)[1..]);
     }
-    poles.push(points[points.len() - 1].point.coords);
-    let mut multiplicities = vec![2; knots.len()];
-    (multiplicities[0], multiplicities[knots.len() - 1]) = (4, 4);
-    let basis = Basis::new(3, &knots, &multiplicities, poles.len(), false).ok()?;
+    let mut multiplicities = vec![DEGREE; knots.len()];
+    (multiplicities[0], multiplicities[knots.len() - 1]) = (DEGREE + 1, DEGREE + 1);
+    let basis = Basis::new(DEGREE, &knots, &multiplicities, all.len(), false).ok()?;
     let range = basis.range();
-    Some((Curve::Spline(SplineCurve { basis, poles, weights: Vec::new() }), range))
+    Some((Curve::Spline(SplineCurve { basis, poles: all, weights: Vec::new() }), range))
 }

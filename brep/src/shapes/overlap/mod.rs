@@ -13,6 +13,7 @@ mod poles;
 mod rejoin;
 mod seeds;
 mod sides;
+mod start;
 #[cfg(test)]
 mod tests;
 mod trace;
@@ -21,24 +22,28 @@ use super::{Face, Shapes, imprint, reversed};
 use crate::model::{Corner, EdgeCurve};
 use crate::nearest::nearest_on_curve;
 use crate::tessellate::{Shell, Tessellation};
-use crate::{BrepError, Curve, Point};
+use crate::{BrepError, Point};
+use fit::Fitted;
 use rayon::prelude::*;
 use seeds::Facets;
 use sides::{Side, Uses};
 use std::collections::{BTreeSet, HashSet};
+use trace::{Branch, Pair};
 
 /// Boxes are enlarged by this (fraction of the diagonal): triangles are inside of their surface.
 const ROOM: f64 = 0.01;
 /// Intersections this close to an edge on the other face are that edge (in tolerances).
 const AT_EDGE: f64 = 10.0;
+/// Two faces cross in at most this many branches.
+const MOST_BRANCHES: usize = 100;
 
 /// What two faces have in common.
 struct Crossing {
     faces: [usize; 2],
     /// The curves of each that lie on the surface of the other one.
     on: [Vec<usize>; 2],
-    /// Other curves of both surfaces, with their ranges, and whether they are closed.
-    added: Vec<(Curve<3>, [f64; 2], bool)>,
+    /// Other curves of both surfaces.
+    added: Vec<Fitted>,
 }
 
 impl Shapes {
@@ -122,26 +127,33 @@ impl Shapes {
         let patches = faces.map(|face| self.faces[face].id as usize - 1);
         let room = imprint::room(self, faces, size);
         let on = [0, 1].map(|k| {
-            let there = &facets.bounds[patches[1 - k]];
             let surface = &self.faces[faces[1 - k]].surface;
-            let curves = self.curves_of(faces[k]).into_iter();
             let is_near = |curve: &usize| {
                 let points = tessellation.lines[*curve].iter().map(|on| tessellation.points[on.0 as usize]);
-                let first = tessellation.points[tessellation.lines[*curve][0].0 as usize];
-                let [low, high] =
-                    points.fold([first; 2], |[low, high], point| [low.inf(&point), high.sup(&point)]);
-                (0..3).all(|i| low[i] <= there[1][i] + ROOM * size && there[0][i] <= high[i] + ROOM * size)
+                facets.is_near(patches[1 - k], points, ROOM * size)
             };
-            curves
-                .filter(is_near)
-                .filter(|&curve| imprint::lies_on(surface, &self.curves[curve], room))
-                .collect::<Vec<usize>>()
+            let near = self.curves_of(faces[k]).into_iter().filter(is_near);
+            near.filter(|&curve| imprint::lies_on(surface, &self.curves[curve], room)).collect()
         });
         let mut crossing = Crossing { faces, on, added: Vec::new() };
-        let Some(bounds) = facets.common(patches, ROOM * size) else { return crossing };
-        let pair = trace::Pair { surfaces: faces.map(|face| &self.faces[face].surface), bounds, size };
-        let mut branches: Vec<trace::Branch> = Vec::new();
-        for (place, parameters) in facets.crossings(patches) {
+        if let Some(bounds) = facets.common(patches, ROOM * size) {
+            let pair = Pair { surfaces: faces.map(|face| &self.faces[face].surface), bounds, size };
+            let branches = self.branches(&pair, facets.crossings(patches), &crossing, room);
+            crossing.added = branches.iter().filter_map(|branch| fit::curve(branch, size)).collect();
+        }
+        crossing
+    }
+
+    /// The branches through some places near two surfaces, except those that are edges.
+    fn branches(
+        &self,
+        pair: &Pair,
+        places: Vec<(Point, [[f64; 2]; 2])>,
+        crossing: &Crossing,
+        room: f64,
+    ) -> Vec<Branch> {
+        let mut branches: Vec<Branch> = Vec::new();
+        for (place, parameters) in places {
             let Some(start) = pair.meet(place, parameters) else { continue };
             let is_known = !pair.contains(&start.point)
                 || branches.iter().any(|branch| pair.is_on(branch, &start))
@@ -149,40 +161,13 @@ impl Shapes {
                     let foot = nearest_on_curve(&self.curves[curve].curve, &start.point);
                     (foot.point - start.point).norm() <= AT_EDGE * room
                 });
-            if !is_known {
+            if !is_known && branches.len() < MOST_BRANCHES {
                 let mut branch = pair.branch(start);
-                self.move_start(&mut branch, faces);
+                self.move_start(pair, &mut branch, crossing.faces, room);
                 branches.push(branch);
             }
         }
-        crossing.added.extend(branches.iter().filter_map(|branch| {
-            let (curve, range) = fit::curve(branch, size)?;
-            Some((curve, range, branch.is_closed))
-        }));
-        crossing
-    }
-
-    /// Moves the start of a closed branch away from the edges of both faces: they are divided at
-    /// vertices that are as close to them as they are to their faces.
-    fn move_start(&self, branch: &mut trace::Branch, faces: [usize; 2]) {
-        /// So many places are compared.
-        const PLACES: usize = 24;
-        if !branch.is_closed {
-            return;
-        }
-        let edges: BTreeSet<usize> = faces.into_iter().flat_map(|face| self.curves_of(face)).collect();
-        let clearance = |k: &usize| {
-            let place = &branch.points[*k].point;
-            let away =
-                |edge: &usize| (nearest_on_curve(&self.curves[*edge].curve, place).point - place).norm();
-            edges.iter().map(away).fold(f64::INFINITY, f64::min)
-        };
-        let count = branch.points.len() - 1;
-        let places = (0..count).step_by(count.div_ceil(PLACES));
-        let best = places.max_by(|a, b| clearance(a).total_cmp(&clearance(b))).unwrap_or(0);
-        branch.points.pop();
-        branch.points.rotate_left(best);
-        branch.points.push(branch.points[0]);
+        branches
     }
 
     /// Adds the curves of a crossing to its faces.
@@ -193,7 +178,7 @@ impl Shapes {
         self.faces[a].inner.extend(on_a);
         let body = self.faces[a].body;
         let tolerance = fit::ACCURACY * size;
-        for (curve, range, is_closed) in crossing.added {
+        for Fitted { curve, range, is_closed } in crossing.added {
             let mut end = |t: f64| {
                 let point = Point::from(curve.point(t));
                 self.add_corner(Corner { point, tolerance }, body)

@@ -50,13 +50,7 @@ impl Facets {
             let bounds = [a.inf(&b).inf(&c), a.sup(&b).sup(&c)];
             of[triangle.patch as usize].push(Facet { points, parameters: triangle.parameters, bounds });
         }
-        let around = |facets: &Vec<Facet>| {
-            let least = Point::from(Vector::repeat(f64::INFINITY));
-            facets.iter().fold([least, -least], |[low, high], facet| {
-                [low.inf(&facet.bounds[0]), high.sup(&facet.bounds[1])]
-            })
-        };
-        let bounds = of.iter().map(around).collect();
+        let bounds = of.iter().map(|facets| around(facets.iter().map(|facet| facet.bounds))).collect();
         Self { of, bounds }
     }
 
@@ -65,6 +59,13 @@ impl Facets {
         let [a, b] = [&self.bounds[a], &self.bounds[b]];
         let (low, high) = (a[0].sup(&b[0]).map(|x| x - room), a[1].inf(&b[1]).map(|x| x + room));
         (0..3).all(|axis| low[axis] <= high[axis]).then_some([low, high])
+    }
+
+    /// Whether points are in a box that is at most `room` from that of a patch.
+    pub fn is_near(&self, patch: usize, points: impl Iterator<Item = Point>, room: f64) -> bool {
+        let [low, high] = around(points.map(|point| [point; 2]));
+        let there = self.bounds[patch];
+        (0..3).all(|i| low[i] <= there[1][i] + room && there[0][i] <= high[i] + room)
     }
 
     /// Places where triangles of two patches cross, each with parameters on both near it.
@@ -97,6 +98,12 @@ impl Facets {
         }
         found
     }
+}
+
+/// The box around boxes.
+fn around(boxes: impl Iterator<Item = [Point; 2]>) -> [Point; 2] {
+    let least = Point::from(Vector::repeat(f64::INFINITY));
+    boxes.fold([least, -least], |[low, high], bounds| [low.inf(&bounds[0]), high.sup(&bounds[1])])
 }
 
 fn overlap(a: &[Point; 2], b: &[Point; 2]) -> bool {

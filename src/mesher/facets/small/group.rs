@@ -116,9 +116,11 @@ pub(super) fn merge_all(shape: &Shape, layout: &Layout, small: &Small) -> (Optio
         let mut report = report(layout, &joins, &chains, &allowed.edges);
         let (facets, exact) = grouped(model, tessellation, shape, &grouping);
         let size = (small.size)(&facets);
-        // A narrow face lowers the sizes around it: the largest one is that of all others.
-        let largest = tessellation.points.par_iter().map(|p| size.size_at(p)).reduce(|| 0.0, f64::max);
-        report.named.retain(|kept| small.factor * kept.width <= largest);
+        if !report.named.is_empty() {
+            // A narrow face lowers the sizes around it: the largest one is that of all others.
+            let largest = tessellation.points.par_iter().map(|p| size.size_at(p)).reduce(|| 0.0, f64::max);
+            report.named.retain(|kept| small.factor * kept.width <= largest);
+        }
         if report.faces.is_empty() && report.edges.is_empty() {
             return (None, report);
         }
