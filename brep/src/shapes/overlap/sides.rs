@@ -11,7 +11,7 @@ use crate::nearest::nearest_on_surface;
 use crate::shapes::imprint::whole;
 use crate::tessellate::Shell;
 use crate::{BrepError, Point, Vector};
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeSet, HashMap};
 use std::f64::consts::TAU;
 
 /// Where a face is with respect to another solid.
@@ -112,26 +112,17 @@ impl<'a> Uses<'a> {
 
     /// The sets of faces that curves which the other body does not have connect.
     fn parts(&self, faces: &[usize], other: usize) -> Vec<Vec<usize>> {
-        let mut part_of: BTreeMap<usize, usize> = BTreeMap::new();
+        let mut left: BTreeSet<usize> = faces.iter().copied().collect();
         let mut parts: Vec<Vec<usize>> = Vec::new();
-        for &first in faces {
-            if part_of.contains_key(&first) {
-                continue;
-            }
-            let body = self.shapes.faces[first].body;
-            part_of.insert(first, parts.len());
+        while let Some(first) = left.pop_first() {
             let mut part = vec![first];
             let mut next = 0;
             while let Some(&face) = part.get(next) {
                 next += 1;
                 let own = self.shapes.curves_of(face).into_iter().filter(|&curve| !self.is_of(curve, other));
-                for (beside, _) in own.flat_map(|curve| &self.of[&curve]) {
-                    let is_new = self.shapes.faces[*beside].body == body && !part_of.contains_key(beside);
-                    if is_new {
-                        part_of.insert(*beside, parts.len());
-                        part.push(*beside);
-                    }
-                }
+                part.extend(
+                    own.flat_map(|curve| &self.of[&curve]).map(|of| of.0).filter(|face| left.remove(face)),
+                );
             }
             parts.push(part);
         }
