@@ -159,7 +159,7 @@ fn what_solids_have_in_common_is_cut_out_of_all_but_one() {
             notes[0].contains("solids overlap: cut ") && notes[0].contains("shaft (solid 2)"),
             "{notes:?}"
         );
-        let mesher = Mesher::new().levels(1);
+        let mesher = Mesher::new().levels(2);
         let mesh = mesher.generate(&geometry).unwrap();
         let arrays = mesh.arrays();
         for (body, exact) in exact.into_iter().enumerate() {

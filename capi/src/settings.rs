@@ -354,6 +354,7 @@ mod tests {
             "30",
             "mm",
             "bolt",
+            "smaller",
         ];
         assert_eq!(NAMES.len(), values.len());
         let mut settings = Settings::default();
