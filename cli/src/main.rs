@@ -6,6 +6,7 @@ mod allocator;
 static ALLOCATOR: allocator::Allocator = allocator::Allocator::new();
 
 fn main() -> std::process::ExitCode {
+    allocator::return_what_is_freed();
     ALLOCATOR.set_aside();
     report_full_files();
     tetmill_cli::run(std::env::args_os())
