@@ -9,8 +9,9 @@ mod tests;
 
 use crate::chart::{Chart, Loop, Side, close};
 use crate::model::{Corner, Fin, Model, On, Patch};
+use crate::nearest::nearest_on_surface;
 use crate::tessellate::diagonal;
-use crate::{BrepError, EdgeCurve, Surface};
+use crate::{BrepError, EdgeCurve, Point, Surface, Vector};
 use rayon::prelude::*;
 
 /// The edges of a loop, each with whether it is used forward.
@@ -30,6 +31,14 @@ pub(crate) struct Face {
     /// Whether the body is behind it, seen along the normal of its surface.
     pub is_behind: bool,
     pub name: Option<String>,
+}
+
+impl Face {
+    /// The unit normal at a place, out of its body.
+    fn outward(&self, place: &Point) -> Vector {
+        let normal = nearest_on_surface(&self.surface, place).normal;
+        if self.is_behind { normal } else { -normal }
+    }
 }
 
 /// The shapes of all solids, nothing shared between them.
@@ -104,6 +113,13 @@ impl Shapes {
         curves.sort_unstable();
         curves.dedup();
         curves
+    }
+
+    /// The curves of a face that are no seams, in ascending order.
+    fn curves_used_once(&self, face: usize) -> Vec<usize> {
+        let mut uses: Vec<usize> = self.faces[face].loops.iter().flatten().map(|edge| edge.0).collect();
+        uses.sort_unstable();
+        uses.chunk_by(|a, b| a == b).filter(|uses| uses.len() == 1).flatten().copied().collect()
     }
 
     /// The curves of a face and those that are to divide it.

@@ -168,9 +168,6 @@ fn is_defined(surface: &Surface, parameters: [f64; 2]) -> bool {
 
 /// Whether the bodies of two faces are on opposite sides at a place of both.
 fn face_each_other(faces: [&Face; 2], place: &Point) -> bool {
-    let [a, b] = faces.map(|face| {
-        let normal = nearest_on_surface(&face.surface, place).normal;
-        if face.is_behind { normal } else { -normal }
-    });
+    let [a, b] = faces.map(|face| face.outward(place));
     a.dot(&b) < 0.0
 }

@@ -138,7 +138,8 @@ impl Boxes {
     }
 }
 
-fn overlap(a: &[Point; 2], b: &[Point; 2]) -> bool {
+/// Whether two boxes overlap.
+pub(in super::super) fn overlap(a: &[Point; 2], b: &[Point; 2]) -> bool {
     (0..3).all(|axis| a[0][axis] <= b[1][axis] && b[0][axis] <= a[1][axis])
 }
 

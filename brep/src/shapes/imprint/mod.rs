@@ -10,6 +10,7 @@ mod cross;
 mod regions;
 
 pub(super) use contact::{lies_on, whole};
+pub(super) use cross::overlap;
 pub(super) use regions::is_clockwise;
 
 use super::{Edges, Shapes, glue};
@@ -113,16 +114,24 @@ fn retain_different(shapes: &Shapes, contacts: &mut Vec<[usize; 2]>) {
     contacts.retain(|[a, b]| shapes.curves_of(*a) != shapes.curves_of(*b));
 }
 
+/// The distances of edges from the faces that they bound, for some faces and curves.
+fn gaps(
+    shapes: &Shapes,
+    faces: BTreeSet<usize>,
+    is_wanted: impl Fn(usize) -> bool + Sync,
+) -> Vec<(usize, f64)> {
+    let of = |face: usize| {
+        let surface = &shapes.faces[face].surface;
+        let own = shapes.curves_of(face).into_iter().filter(|&curve| is_wanted(curve));
+        own.map(|curve| (curve, contact::gap(surface, &shapes.curves[curve]))).collect::<Vec<_>>()
+    };
+    faces.into_par_iter().flat_map_iter(of).collect()
+}
+
 /// Sets the tolerances of the edges of faces to their distances from the faces at least.
 fn measure_gaps(shapes: &mut Shapes, contacts: &[[usize; 2]]) {
     let faces: BTreeSet<usize> = contacts.iter().flatten().copied().collect();
-    let of = |face: usize| {
-        let surface = &shapes.faces[face].surface;
-        let gap = |curve: usize| (curve, contact::gap(surface, &shapes.curves[curve]));
-        shapes.curves_of(face).into_iter().map(gap).collect::<Vec<_>>()
-    };
-    let gaps: Vec<(usize, f64)> = faces.into_par_iter().flat_map_iter(of).collect();
-    for (curve, gap) in gaps {
+    for (curve, gap) in gaps(shapes, faces, |_| true) {
         let edge = &mut shapes.curves[curve];
         edge.tolerance = edge.tolerance.max(gap);
     }
@@ -134,12 +143,7 @@ fn take_measured_gaps(shapes: &mut Shapes, faces: &BTreeSet<usize>) {
     /// Between the places that are measured the distance may be larger.
     const BETWEEN: f64 = 2.0;
     let curves: BTreeSet<usize> = faces.iter().flat_map(|&face| shapes.curves_of(face)).collect();
-    let of = |face: usize| {
-        let surface = &shapes.faces[face].surface;
-        let own = shapes.curves_of(face).into_iter().filter(|curve| curves.contains(curve));
-        own.map(|curve| (curve, contact::gap(surface, &shapes.curves[curve]))).collect::<Vec<_>>()
-    };
-    let gaps: Vec<(usize, f64)> = (0..shapes.faces.len()).into_par_iter().flat_map_iter(of).collect();
+    let gaps = gaps(shapes, (0..shapes.faces.len()).collect(), |curve| curves.contains(&curve));
     curves.iter().for_each(|&curve| shapes.curves[curve].tolerance = 0.0);
     for (curve, gap) in gaps {
         let edge = &mut shapes.curves[curve];

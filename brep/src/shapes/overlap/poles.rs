@@ -26,10 +26,9 @@ impl Shapes {
             };
             let radius = minor.abs() * axes[2].norm();
             // Seams are left out when the face is divided.
-            let mut uses: Vec<usize> = face.loops.iter().flatten().map(|edge| edge.0).collect();
-            uses.sort_unstable();
-            let once = uses.chunk_by(|a, b| a == b).filter(|uses| uses.len() == 1).flatten();
-            let curves: Vec<&EdgeCurve> = once.chain(&face.inner).map(|&curve| &self.curves[curve]).collect();
+            let once = self.curves_used_once(number);
+            let curves: Vec<&EdgeCurve> =
+                once.iter().chain(&face.inner).map(|&curve| &self.curves[curve]).collect();
             let clearance = |axes: &[Vector3<f64>; 3]| {
                 let pole = |sign: f64| Point::from(origin + axes[2] * (sign * minor));
                 let away = |pole: &Point, edge: &&EdgeCurve| {

@@ -1,5 +1,6 @@
 //! Places where triangles of two faces cross.
 
+use crate::shapes::imprint::overlap;
 use crate::tessellate::Tessellation;
 use crate::{Point, Vector};
 
@@ -104,8 +105,4 @@ impl Facets {
 fn around(boxes: impl Iterator<Item = [Point; 2]>) -> [Point; 2] {
     let least = Point::from(Vector::repeat(f64::INFINITY));
     boxes.fold([least, -least], |[low, high], bounds| [low.inf(&bounds[0]), high.sup(&bounds[1])])
-}
-
-fn overlap(a: &[Point; 2], b: &[Point; 2]) -> bool {
-    (0..3).all(|axis| a[0][axis] <= b[1][axis] && b[0][axis] <= a[1][axis])
 }

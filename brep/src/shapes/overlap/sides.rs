@@ -5,7 +5,7 @@
 //! a face leads into the other solid. Faces that share a curve of their own are on the same side.
 //! Only where no curve of the other solid bounds a part of the surface its triangles are asked.
 
-use super::super::{Face, Shapes};
+use super::super::Shapes;
 use crate::model::EdgeCurve;
 use crate::nearest::nearest_on_surface;
 use crate::shapes::imprint::whole;
@@ -106,7 +106,7 @@ impl<'a> Uses<'a> {
                 && own.iter().all(|&curve| is_same(there, curve))
         })?;
         let place = at(&self.shapes.curves[*first]).0;
-        let [a, b] = [face, &self.shapes.faces[there]].map(|face| outward(face, &place));
+        let [a, b] = [face, &self.shapes.faces[there]].map(|face| face.outward(&place));
         Some(if a.dot(&b) > 0.0 { Side::Same } else { Side::Opposite })
     }
 
@@ -224,10 +224,4 @@ impl<'a> Uses<'a> {
 fn at(edge: &EdgeCurve) -> (Point, Vector) {
     let jet = edge.curve.jet(edge.range[0] + PLACE * (edge.range[1] - edge.range[0]));
     (Point::from(jet[0]), jet[1].try_normalize(0.0).unwrap_or_else(Vector::zeros))
-}
-
-/// The unit normal of a face out of its body.
-fn outward(face: &Face, place: &Point) -> Vector {
-    let normal = nearest_on_surface(&face.surface, place).normal;
-    if face.is_behind { normal } else { -normal }
 }

@@ -22,13 +22,7 @@ impl Shapes {
             return;
         }
         // Seams are left out when the faces are divided.
-        let own = |face: usize| {
-            let mut uses: Vec<usize> = self.faces[face].loops.iter().flatten().map(|edge| edge.0).collect();
-            uses.sort_unstable();
-            let once = uses.chunk_by(|a, b| a == b).filter(|uses| uses.len() == 1);
-            once.map(|uses| uses[0]).collect::<Vec<usize>>()
-        };
-        let edges: BTreeSet<usize> = faces.into_iter().flat_map(own).collect();
+        let edges: BTreeSet<usize> = faces.into_iter().flat_map(|face| self.curves_used_once(face)).collect();
         let clearance = |branch: &Branch, k: usize| {
             let place = &branch.points[k].point;
             let away =

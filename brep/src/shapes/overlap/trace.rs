@@ -82,7 +82,7 @@ impl Pair<'_> {
             }
             parameters = feet.map(|foot| foot.parameters);
             let [m, n] = feet.map(|foot| foot.normal);
-            let [a, b] = feet.map(|foot| (foot.point - point).dot(&foot.normal));
+            let off = feet.map(|foot| (foot.point - point).dot(&foot.normal));
             let tangent = m.cross(&n);
             let squared = tangent.norm_squared();
             // Poles have no normal.
@@ -90,13 +90,15 @@ impl Pair<'_> {
                 return None;
             }
             let cosine = m.dot(&n);
-            let step = m * ((a - cosine * b) / squared) + n * ((b - cosine * a) / squared);
+            // The vector across the branch with these components along both normals.
+            let across =
+                |[a, b]: [f64; 2]| m * ((a - cosine * b) / squared) + n * ((b - cosine * a) / squared);
+            let step = across(off);
             point += step;
             if step.norm() <= rounding {
                 let tangent = tangent / squared.sqrt();
-                let [a, b] =
-                    [0, 1].map(|k| self.normal_curvature(k, parameters[k], &feet[k].normal, &tangent));
-                let bend = m * ((a - cosine * b) / squared) + n * ((b - cosine * a) / squared);
+                let curvature = |k: usize| self.normal_curvature(k, parameters[k], &feet[k].normal, &tangent);
+                let bend = across([0, 1].map(curvature));
                 return Some(Meeting { point, parameters, tangent, bend });
             }
         }
