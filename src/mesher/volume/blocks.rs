@@ -177,116 +177,115 @@ impl Block {
     }
 }
 
-/// The numbers in the whole mesh of what a block added.
-struct Numbers<'a> {
-    block: &'a Block,
-    first_tet: u32,
-    first_vertex: u32,
+/// The numbers in the whole mesh of the tets and vertices of a block.
+struct Numbers {
+    /// Those of its first tets.
+    tets: Vec<u32>,
+    /// Those of its first vertices.
+    vertices: Vec<u32>,
+    first_added_tet: u32,
+    first_added_vertex: u32,
+    added_tets: usize,
 }
 
-impl Numbers<'_> {
+impl Numbers {
     fn tet(&self, slot: u32) -> u32 {
-        let old = self.block.tets.len() as u32;
-        if slot < old { self.block.tets[slot as usize] } else { self.first_tet + slot - old }
+        let added = || self.first_added_tet + slot - self.tets.len() as u32;
+        self.tets.get(slot as usize).copied().unwrap_or_else(added)
     }
 
     fn vertex(&self, v: u32) -> u32 {
-        let old = self.block.vertices.len() as u32;
-        if v < old { self.block.vertices[v as usize] } else { self.first_vertex + v - old }
+        let added = || self.first_added_vertex + v - self.vertices.len() as u32;
+        self.vertices.get(v as usize).copied().unwrap_or_else(added)
     }
 
     fn half_face(&self, half_face: u32) -> u32 {
         if half_face == NONE { NONE } else { 4 * self.tet(half_face >> 2) + (half_face & 3) }
-    }
-
-    /// The vertices of a slot of the block, or of a free one.
-    fn vertices(&self, slot: usize) -> [u32; 4] {
-        let tet = self.block.mesh.tets[slot];
-        if tet[0] == NONE { tet } else { tet.map(|v| self.vertex(v)) }
     }
 }
 
 impl Tetrahedra {
     /// Puts blocks back: their first tets into the slots from which they were copied, the others
     /// behind all tets, block by block; likewise the vertices.
+    ///
+    /// The values of the blocks are freed one after the other, because the peak of memory is here.
     pub fn absorb(&mut self, blocks: Vec<Block>) {
-        let (mut first_tet, mut first_vertex) = (self.tets.len() as u32, self.points.len() as u32);
-        let mut numbers = Vec::with_capacity(blocks.len());
-        for block in &blocks {
-            numbers.push(Numbers { block, first_tet, first_vertex });
-            first_tet += (block.mesh.tets.len() - block.tets.len()) as u32;
-            first_vertex += (block.mesh.points.len() - block.vertices.len()) as u32;
+        let (mut first_added_tet, mut first_added_vertex) =
+            (self.tets.len() as u32, self.points.len() as u32);
+        let (mut numbers, mut meshes) = (Vec::with_capacity(blocks.len()), Vec::with_capacity(blocks.len()));
+        for Block { mesh, tets, vertices } in blocks {
+            let added_tets = mesh.tets.len() - tets.len();
+            let added_vertices = mesh.points.len() - vertices.len();
+            numbers.push(Numbers { tets, vertices, first_added_tet, first_added_vertex, added_tets });
+            first_added_tet += added_tets as u32;
+            first_added_vertex += added_vertices as u32;
+            meshes.push(mesh);
         }
-        for numbers in &numbers {
-            self.absorb_old(numbers);
-        }
-        self.append_new(&numbers, first_tet as usize);
-        for Numbers { block, .. } in &numbers {
-            self.points.extend_from_slice(&block.mesh.points[block.vertices.len()..]);
+        let spheres = take(&mut meshes, |mesh| &mut mesh.spheres);
+        put_back(&mut self.spheres, &numbers, spheres, Circumsphere::UNKNOWN, |_, _, _, sphere| sphere);
+        let across = take(&mut meshes, |mesh| &mut mesh.across);
+        put_back(&mut self.across, &numbers, across, [NONE; 4], |block, slot, before, across| {
+            // Faces on the seam keep their links.
+            let is_inner = |face: usize| across[face] != NONE || meshes[block].locked[slot] >> face & 1 == 1;
+            let link =
+                |face| if is_inner(face) { numbers[block].half_face(across[face]) } else { before[face] };
+            [0, 1, 2, 3].map(link)
+        });
+        let tets = take(&mut meshes, |mesh| &mut mesh.tets);
+        put_back(&mut self.tets, &numbers, tets, [NONE; 4], |block, _, _, tet| {
+            if tet[0] == NONE { tet } else { tet.map(|v| numbers[block].vertex(v)) }
+        });
+        let bodies = take(&mut meshes, |mesh| &mut mesh.bodies);
+        put_back(&mut self.bodies, &numbers, bodies, NONE, |_, _, _, body| body);
+        let locked = take(&mut meshes, |mesh| &mut mesh.locked);
+        put_back(&mut self.locked, &numbers, locked, 0, |_, _, _, locked| locked);
+        for (mesh, numbers) in meshes.iter().zip(&numbers) {
+            self.points.extend_from_slice(&mesh.points[numbers.vertices.len()..]);
         }
         self.at_vertex.resize(self.points.len(), NONE);
-        for numbers in &numbers {
-            for (v, &slot) in (0..).zip(&numbers.block.mesh.at_vertex) {
+        for (mesh, numbers) in meshes.iter().zip(&numbers) {
+            for (v, &slot) in (0..).zip(&mesh.at_vertex) {
                 self.at_vertex[numbers.vertex(v) as usize] = numbers.tet(slot);
             }
-            let free = numbers.block.mesh.free.iter().map(|&slot| numbers.tet(slot));
-            self.free.extend(free);
+            self.free.extend(mesh.free.iter().map(|&slot| numbers.tet(slot)));
         }
         self.clear_marks();
     }
+}
 
-    /// Writes the slots from which a block was copied.
-    fn absorb_old(&mut self, numbers: &Numbers) {
-        let Block { mesh, tets, .. } = numbers.block;
-        for (slot, &t) in tets.iter().enumerate() {
-            let t = t as usize;
-            self.tets[t] = numbers.vertices(slot);
-            for (face, &other) in mesh.across[slot].iter().enumerate() {
-                // Faces on the seam keep their links.
-                if other != NONE || mesh.locked[slot] >> face & 1 == 1 {
-                    self.across[t][face] = numbers.half_face(other);
-                }
-            }
-            self.locked[t] = mesh.locked[slot];
-            self.bodies[t] = mesh.bodies[slot];
-            self.spheres[t] = mesh.spheres[slot];
+/// Takes the values of all slots out of each mesh.
+fn take<T>(meshes: &mut [Tetrahedra], values: impl Fn(&mut Tetrahedra) -> &mut Vec<T>) -> Vec<Vec<T>> {
+    meshes.iter_mut().map(|mesh| std::mem::take(values(mesh))).collect()
+}
+
+/// Writes the values of the slots of blocks into those of the whole mesh, which gets further slots.
+/// `convert` gets the block, the slot in it, and the values there in the whole mesh and the block.
+fn put_back<T: Copy + Send + Sync>(
+    to: &mut Vec<T>,
+    numbers: &[Numbers],
+    values: Vec<Vec<T>>,
+    filler: T,
+    convert: impl Fn(usize, usize, T, T) -> T + Sync,
+) {
+    for (block, (numbers, values)) in numbers.iter().zip(&values).enumerate() {
+        for (slot, (&t, &value)) in numbers.tets.iter().zip(values).enumerate() {
+            to[t as usize] = convert(block, slot, to[t as usize], value);
         }
     }
-
-    /// Appends the slots that the blocks added.
-    fn append_new(&mut self, numbers: &[Numbers], count: usize) {
-        fn append<T: Copy + Send + Sync>(
-            to: &mut Vec<T>,
-            numbers: &[Numbers],
-            (count, filler): (usize, T),
-            of: impl Fn(&Numbers, usize) -> T + Sync,
-        ) {
-            let mut rest = {
-                let before = to.len();
-                to.resize(count, filler);
-                &mut to[before..]
-            };
-            let mut parts = Vec::with_capacity(numbers.len());
-            for numbers in numbers {
-                let old = numbers.block.tets.len();
-                let (part, others) = rest.split_at_mut(numbers.block.mesh.tets.len() - old);
-                parts.push((numbers, old, part));
-                rest = others;
-            }
-            parts.into_par_iter().for_each(|(numbers, old, part)| {
-                part.iter_mut().zip(old..).for_each(|(here, slot)| *here = of(numbers, slot));
-            });
-        }
-        let half_faces =
-            |numbers: &Numbers, slot: usize| numbers.block.mesh.across[slot].map(|h| numbers.half_face(h));
-        append(&mut self.tets, numbers, (count, [NONE; 4]), |numbers, slot| numbers.vertices(slot));
-        append(&mut self.across, numbers, (count, [NONE; 4]), half_faces);
-        append(&mut self.locked, numbers, (count, 0), |numbers, slot| numbers.block.mesh.locked[slot]);
-        append(&mut self.bodies, numbers, (count, NONE), |numbers, slot| numbers.block.mesh.bodies[slot]);
-        append(&mut self.spheres, numbers, (count, Circumsphere::UNKNOWN), |numbers, slot| {
-            numbers.block.mesh.spheres[slot]
-        });
+    let before = to.len();
+    to.resize(before + numbers.iter().map(|numbers| numbers.added_tets).sum::<usize>(), filler);
+    let mut rest = &mut to[before..];
+    let mut parts = Vec::with_capacity(numbers.len());
+    for (numbers, values) in numbers.iter().zip(&values) {
+        let (part, others) = rest.split_at_mut(numbers.added_tets);
+        parts.push((part, values, numbers.tets.len()));
+        rest = others;
     }
+    parts.into_par_iter().enumerate().for_each(|(block, (part, values, old))| {
+        for (slot, here) in (old..).zip(part) {
+            *here = convert(block, slot, filler, values[slot]);
+        }
+    });
 }
 
 #[cfg(test)]

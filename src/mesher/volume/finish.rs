@@ -33,7 +33,7 @@ pub(super) fn finish(
     mut kept_edges: Vec<([u32; 2], u32)>,
     scale: f64,
 ) -> VolumeMesh {
-    let Tetrahedra { points: places, tets: slots, bodies: body_of, at_vertex, .. } = mesh;
+    let (places, slots, body_of, at_vertex) = mesh.into_parts();
     let order = hilbert_order(&places);
     let given = surface.points.len();
     let mut points = surface.points.clone();

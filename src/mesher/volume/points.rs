@@ -54,6 +54,10 @@ const NEAREST_COARSE: f64 = 0.2;
 /// size at its centroid by this factor.
 const DIP: f64 = 1.5;
 
+/// With more slots than this without a tet they are removed first, because blocks do not use them.
+/// The Delaunay mesh of the surface of a crankshaft has three of them for each tet inside.
+const MOST_FREE: usize = 100_000;
+
 /// The working state of the point placement.
 pub(super) struct Filler<'a> {
     pub(super) mesh: &'a mut Tetrahedra,
@@ -131,6 +135,9 @@ pub(super) fn fill(
 ) -> Result<usize, Stopped> {
     let before = mesh.points.len();
     legalize(mesh);
+    if mesh.free.len() > MOST_FREE {
+        mesh.remove_free_slots();
+    }
     let mut filler = Filler {
         mesh,
         size,

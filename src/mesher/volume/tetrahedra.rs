@@ -49,6 +49,13 @@ pub(super) struct Tetrahedra {
     scratch: Vec<([u32; 3], u32, bool)>,
 }
 
+/// Removes the values of slots without a number.
+fn keep<T>(values: &mut Vec<T>, slots: &[u32]) {
+    let mut slots = slots.iter();
+    values.retain(|_| slots.next() != Some(&NONE));
+    values.shrink_to_fit();
+}
+
 impl Tetrahedra {
     /// A mesh of points without tets.
     pub fn new(points: Vec<Point>) -> Self {
@@ -280,6 +287,32 @@ impl Tetrahedra {
             self.marks.push();
             (self.tets.len() - 1) as u32
         })
+    }
+
+    /// Removes all slots without a tet; the others keep their order.
+    pub fn remove_free_slots(&mut self) {
+        let mut slots = Vec::with_capacity(self.tets.len());
+        let mut next = 0;
+        for tet in &self.tets {
+            slots.push(if tet[0] == NONE { NONE } else { next });
+            next += u32::from(tet[0] != NONE);
+        }
+        let number = |slot: u32| if slot == NONE { NONE } else { slots[slot as usize] };
+        let half_face = |h: u32| if h == NONE { NONE } else { 4 * number(h >> 2) + (h & 3) };
+        keep(&mut self.across, &slots);
+        self.across.par_iter_mut().for_each(|across| *across = across.map(half_face));
+        self.at_vertex.iter_mut().for_each(|slot| *slot = number(*slot));
+        keep(&mut self.tets, &slots);
+        keep(&mut self.locked, &slots);
+        keep(&mut self.bodies, &slots);
+        keep(&mut self.spheres, &slots);
+        self.free = Vec::new();
+        self.clear_marks();
+    }
+
+    /// The points, the vertices and bodies of the slots, and one tet of each vertex. Frees all else.
+    pub fn into_parts(self) -> (Vec<Point>, Vec<[u32; 4]>, Vec<u32>, Vec<u32>) {
+        (self.points, self.tets, self.bodies, self.at_vertex)
     }
 
     /// Writes a tet into a slot; the caller sets its neighbours and locks.
