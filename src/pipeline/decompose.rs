@@ -222,7 +222,7 @@ impl Planned {
         Ok(Skins { messages: skins.iter().map(message).collect(), boundary })
     }
 
-    /// The coarse mesh with the parts that the cuts make of it.
+    /// The statistics of the coarse mesh and of the parts that the cuts make of it.
     fn result(self, parts: u32, model: &Model) -> Result<CoarseResult, Error> {
         let Self { cuts, coarse: CoarseMesh { mesh, report, .. }, outcome, separated, .. } = self;
         let assigned: Vec<Rank> =
@@ -231,7 +231,7 @@ impl Planned {
         let mut partition = partition::assess(&mesh, &assigned, parts)?;
         partition.lost_ties = separated;
         let displacements = EdgeDisplacements::default();
-        Ok(CoarseResult { mesh, displacements, parts: assigned, report, outcome, partition, periodic })
+        Ok(CoarseResult { displacements, report, outcome, partition, periodic })
     }
 }
 

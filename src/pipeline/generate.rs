@@ -17,9 +17,10 @@ use super::room;
 use super::settings::{CutSettings, GenerateSettings, Method, Wanted};
 use super::skins;
 use super::wanted::mesh_as_wanted;
-use crate::ground::comm::Communicator;
+use crate::Point;
+use crate::ground::comm::{Communicator, Rank};
 use crate::ground::mesh::topology::MatchedFaces;
-use crate::ground::mesh::{Names, Order};
+use crate::ground::mesh::{Mesh, Names, Order};
 use crate::ground::progress::{Progress, Stage};
 use crate::ground::projector::Projector;
 use crate::ground::size::Source;
@@ -101,9 +102,8 @@ fn coarse_parts<'a>(
     let pieces = broadcast::pieces(comm, made.as_ref().map(|made| made.pieces))?;
     let (names, projector) = broadcast::geometry(comm, model)?;
     let (coarse, sizes, given) = match made {
-        Some(Coarse { result, sizes, faces, .. }) => {
-            let given = (result.mesh.clone(), result.parts.clone(), faces);
-            (Some(result), sizes, Some(given))
+        Some(Coarse { mesh, parts, faces, result, sizes, .. }) => {
+            (Some(result), sizes, Some((mesh, parts, faces)))
         }
         None => (None, None, None),
     };
@@ -120,7 +120,7 @@ fn coarse_parts<'a>(
 enum Refined {
     /// A checked mesh.
     Sound(Box<Generated>),
-    /// Tets would be inverted: rank 0's sources for smaller sizes there.
+    /// Tets would be inverted: sources for smaller sizes there.
     Inverted(Vec<Source>),
 }
 
@@ -146,8 +146,7 @@ fn refined(
         match lattice::refined(comm, dist, plan, settings, progress)? {
             lattice::Refined::Sound(lattice) => *lattice,
             lattice::Refined::Inverted(bad) => {
-                let lowered = coarse.map_or_else(Vec::new, |made| mend::lowered(&made.mesh, &bad));
-                return Ok(Refined::Inverted(lowered));
+                return Ok(Refined::Inverted(mend::lowered(bad.into_iter().map(|tet| tet.map(Point::from)))));
             }
         };
     if let Some(made) = &mut coarse {
@@ -306,6 +305,9 @@ fn stored(
 struct Coarse {
     /// Subdivisions of each edge.
     pieces: u32,
+    mesh: Mesh,
+    /// The part of each tet.
+    parts: Vec<Rank>,
     result: CoarseResult,
     /// For the method `surface`, the wanted sizes at the vertices.
     sizes: Option<Vec<f64>>,
@@ -345,14 +347,6 @@ fn coarse_mesh(
         );
     }
     let CoarseMesh { mesh, displacements, report } = made;
-    let result = CoarseResult {
-        mesh,
-        displacements,
-        parts: assigned,
-        report,
-        outcome,
-        partition: metrics,
-        periodic: map,
-    };
-    Ok(Coarse { pieces, result, sizes, faces })
+    let result = CoarseResult { displacements, report, outcome, partition: metrics, periodic: map };
+    Ok(Coarse { pieces, mesh, parts: assigned, result, sizes, faces })
 }

@@ -43,12 +43,15 @@ pub(super) struct Lattice {
     pub how: refine::Settings,
 }
 
+/// The coordinates of the corners of a tet.
+pub(super) type Corners = [[f64; 3]; 4];
+
 /// The result of refining.
 pub(super) enum Refined {
     /// A checked mesh.
     Sound(Box<Lattice>),
-    /// The tets of the given parts whose children would be inverted, of all ranks.
-    Inverted(Vec<GlobalId>),
+    /// The corners of the tets of the given parts whose children would be inverted, of all ranks.
+    Inverted(Vec<Corners>),
 }
 
 /// **Collective.** Refines the parts and checks the mesh.
@@ -116,8 +119,8 @@ fn refine_part(
 enum Surveyed {
     /// All children are positive.
     Sound(Vec<Level>),
-    /// These coarse tets have inverted children.
-    Inverted(Vec<GlobalId>, Error),
+    /// Coarse tets with these corners have inverted children.
+    Inverted(Vec<Corners>, Error),
 }
 
 /// **Collective.** Refines to each level before the last, and measures all tets. This takes a
@@ -182,16 +185,16 @@ fn periodic_verdict(
     Ok(Some(checked))
 }
 
-/// **Collective.** Gathers the coarse tets with inverted children on any rank.
+/// **Collective.** Gathers the corners of the coarse tets with inverted children on any rank.
 fn inverted_anywhere(
     comm: &dyn Communicator,
     refined: &Result<RefinedMesh, RefineError>,
-) -> Result<Vec<GlobalId>, Error> {
-    let mine: &[GlobalId] = match refined {
-        Err(RefineError::Inverted { coarse, .. }) => coarse,
-        _ => &[],
+) -> Result<Vec<Corners>, Error> {
+    let mine: Vec<Corners> = match refined {
+        Err(RefineError::Inverted { corners, .. }) => corners.iter().map(|tet| tet.map(Into::into)).collect(),
+        _ => Vec::new(),
     };
-    Ok(comm.all_gather(mine)?.concat())
+    Ok(comm.all_gather(&mine)?.concat())
 }
 
 /// **Collective.** Checks all tets, boundary vertices and faces between tets.

@@ -7,8 +7,9 @@ use super::coarse_mesh::CoarseMesh;
 use super::error::Error;
 use super::model::Model;
 use super::retries::{Budget, INVERTED, INVERTED_FACETS, POOR};
+use crate::Point;
 use crate::ground::comm::Communicator;
-use crate::ground::mesh::{GlobalId, Mesh, Order, QualitySummary, TET_EDGES};
+use crate::ground::mesh::{GlobalId, Order, QualitySummary, TET_EDGES};
 use crate::ground::progress::Work;
 use crate::ground::projector::Projector;
 use crate::ground::size::Source;
@@ -68,7 +69,9 @@ pub fn refinable<T>(
             tried = bend_inverted(model, &mut made.0, tried, how)?;
         }
         for tets in [&tried.inverted, &tried.poor] {
-            sources.extend(lowered(&made.0.mesh, tets));
+            let mesh = &made.0.mesh;
+            let corners = |&tet: &GlobalId| mesh.tets[tet as usize].map(|v| mesh.points[v.index()]);
+            sources.extend(lowered(tets.iter().map(corners)));
         }
         if tried.inverted.is_empty() {
             if tried.poor.is_empty() {
@@ -224,17 +227,16 @@ pub fn displaced(
     Ok(ids.into_iter().zip(comm.all_gather(&middles)?.concat()).collect())
 }
 
-/// Sources for smaller tets around the given ones: at their corners and edge midpoints, because one
-/// at the centre would not affect the boundary through the grading.
-pub fn lowered(mesh: &Mesh, tets: &[GlobalId]) -> Vec<Source> {
-    let sources = |tet: &GlobalId| {
-        let corners = mesh.tets[*tet as usize].map(|v| mesh.points[v.index()]);
+/// Sources for smaller tets around those with the given corners: at corners and edge midpoints,
+/// because one at the centre would not affect the boundary through the grading.
+pub fn lowered(tets: impl Iterator<Item = [Point; 4]>) -> Vec<Source> {
+    let sources = |corners: [Point; 4]| {
         let lengths = TET_EDGES.map(|[i, j]| (corners[j] - corners[i]).norm());
         let size = LOWERED * lengths.iter().sum::<f64>() / 6.0;
         let middles = TET_EDGES.map(|[i, j]| nalgebra::center(&corners[i], &corners[j]));
         corners.into_iter().chain(middles).map(move |point| Source { point, size })
     };
-    tets.iter().flat_map(sources).collect()
+    tets.flat_map(sources).collect()
 }
 
 #[cfg(test)]

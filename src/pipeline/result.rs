@@ -8,7 +8,7 @@ use crate::ground::comm::Communicator;
 use crate::ground::mesh::ghosts::{By, Ghosts};
 use crate::ground::mesh::periodic::PeriodicMap;
 use crate::ground::mesh::stream::MeshStream;
-use crate::ground::mesh::{Arrays, GlobalId, Mesh, Names, Order, Rank, Sharing};
+use crate::ground::mesh::{Arrays, GlobalId, Names, Order, Sharing};
 use crate::ground::projector::Projector;
 use crate::parallel::check::{Checksum, Extreme, PartReport, ShapeReport};
 use crate::parallel::distribution::{BareMesh, DistMesh, number_shared};
@@ -19,15 +19,11 @@ use crate::parallel::skin::DeliveredSizes;
 use crate::parallel::{halo, migrate};
 use std::sync::Arc;
 
-/// Rank 0's coarse mesh with its statistics.
+/// Statistics of the coarse mesh, on rank 0.
 #[derive(Clone, Debug)]
 pub struct CoarseResult {
-    /// The coarse mesh.
-    pub mesh: Mesh,
     /// The edge displacements for refinement.
     pub displacements: EdgeDisplacements,
-    /// The part of each tet.
-    pub parts: Vec<Rank>,
     /// Its statistics.
     pub report: CoarseReport,
     /// Whether the requested number of tets was reached, if one was requested.

@@ -137,6 +137,7 @@ pub(super) fn keep_of_level(
 
 #[cfg(test)]
 mod tests {
+    use super::super::part::Part;
     use super::*;
     use crate::ground::comm::thread;
     use crate::ground::error::{ErrorKind, HasKind};
@@ -197,8 +198,8 @@ mod tests {
         let ball = Geometry::from_text("algebraic3d solid b = sphere (0, 0, 0; 1); tlo b;").unwrap();
         let mesher = Mesher::new().levels(3);
         let made = mesher.generate(&ball).unwrap();
-        let [all, least] =
-            predicted_counts(&whole(&made.coarse.as_ref().unwrap().mesh), 8, Order::First).bytes;
+        let Part::Refined(part) = &made.part else { panic!("a part that is not refined") };
+        let [all, least] = predicted_counts(part.coarse(), 8, Order::First).bytes;
         let listener = Listener::default();
         let little = mesher.clone().memory((all + least) / 2).observer(&listener).generate(&ball).unwrap();
         assert_eq!(little.checksum, made.checksum);

@@ -155,8 +155,13 @@ impl Cutting {
         (self.shapes, self.certain) = (shapes, certain);
     }
 
-    /// The fault of the tet, if it has children that are not positive.
-    pub fn verdict(&mut self, tet: GlobalId, lattice: Lattice, described: usize) -> Option<BadTet> {
+    /// The fault of the tet with this id and these corners, if it has children that are not positive.
+    pub fn verdict(
+        &mut self,
+        (tet, corners): (GlobalId, [Point; 4]),
+        lattice: Lattice,
+        described: usize,
+    ) -> Option<BadTet> {
         if self.bad.is_empty() {
             return None;
         }
@@ -168,7 +173,7 @@ impl Cutting {
             place,
         };
         let faults = self.bad.iter().take(described).map(describe).collect();
-        Some(BadTet { tet, children: self.bad.len() as u64, faults })
+        Some(BadTet { tet, corners, children: self.bad.len() as u64, faults })
     }
 }
 

@@ -56,6 +56,7 @@ mod scale_tests;
 #[cfg(test)]
 mod tests;
 
+use crate::Point;
 use crate::ground::error::{ErrorKind, HasKind};
 use crate::ground::mesh::{GlobalId, Order, Rank};
 use crate::ground::progress::{Cancelled, Work};
@@ -165,6 +166,8 @@ pub enum RefineError {
         children: u64,
         /// The coarse tets that contain them, ascending.
         coarse: Vec<GlobalId>,
+        /// The corners of these tets.
+        corners: Vec<[Point; 4]>,
         /// Descriptions of the first of them.
         faults: Vec<Fault>,
     },

@@ -319,9 +319,9 @@ fn coarse_tets_whose_children_would_invert_are_named() {
     let Projector::Csg(surfaces) = &projector else { panic!("{projector:?}") };
     let low = tet(corners, Some(surfaces.patch_surface(PatchId(0)).clone()));
     let error = refine(whole(&low.mesh), &low.projector, 8, &Settings::default()).expect_err("inverted");
-    let RefineError::Inverted { children, coarse, faults } = &error else { panic!("{error}") };
+    let RefineError::Inverted { children, coarse, corners: at, faults } = &error else { panic!("{error}") };
     assert!((1..512).contains(children));
-    assert_eq!(coarse, &[0]);
+    assert_eq!((coarse, at), (&vec![0], &vec![corners.map(crate::Point::from)]));
     assert_eq!(faults.len(), 8.min(*children as usize));
     assert!(matches!(faults[0], Fault::NotPositive { tet: 0..512, .. }), "{error}");
 }

@@ -11,6 +11,7 @@ use super::lattice::Lattice;
 use super::numbering::Numbering;
 use super::snap::{Coordinates, is_flat};
 use super::{RefineError, Settings};
+use crate::Point;
 use crate::ground::kernel::buckets::tabulate;
 use crate::ground::kernel::vector::{Wide, wide};
 use crate::ground::mesh::{GlobalId, Order, TetId};
@@ -92,7 +93,8 @@ pub fn fill(
         }
         let kept = inside.iter_mut();
         kept.zip(block.inside(lattice)).for_each(|(kept, point)| *kept = point);
-        cutting.verdict(mesh.tet_ids[tet.index()], cells, settings.described)
+        let corners = mesh.tets[tet.index()].map(|v| mesh.points[v.index()]);
+        cutting.verdict((mesh.tet_ids[tet.index()], corners), cells, settings.described)
     };
     let bad: Vec<BadTet> = insides
         .enumerate()
@@ -141,6 +143,7 @@ impl Lattices<'_> {
 pub struct BadTet {
     /// Its global id.
     pub tet: GlobalId,
+    pub(super) corners: [Point; 4],
     pub(super) children: u64,
     pub(super) faults: Vec<Fault>,
 }
@@ -150,6 +153,7 @@ pub fn inverted(bad: &[BadTet], described: usize) -> RefineError {
     RefineError::Inverted {
         children: bad.iter().map(|b| b.children).sum(),
         coarse: bad.iter().map(|b| b.tet).collect(),
+        corners: bad.iter().map(|b| b.corners).collect(),
         faults: bad.iter().flat_map(|b| b.faults.iter().copied()).take(described).collect(),
     }
 }
