@@ -137,6 +137,49 @@ fn solids_that_touch_share_the_common_parts_of_their_faces() {
 }
 
 #[test]
+fn solids_of_several_files_share_what_they_have_in_common() {
+    let folder = own("step").with_extension("");
+    // A plate with a hole, and the bolt in it, whose head lies on the plate.
+    let paths = ["plate.step", "bolt.step"].map(|name| folder.join(name));
+    let settings = InputSettings { unit: "mm".parse().unwrap(), ..InputSettings::default() };
+    let read = |paths: &[PathBuf], settings: &InputSettings| {
+        let mut notes = Vec::new();
+        let geometry = Geometry::read(paths, settings, &mut |note| notes.push(note.to_owned()));
+        (geometry, notes)
+    };
+    let (geometry, notes) = read(&paths, &settings);
+    assert!(notes.len() == 1 && notes[0].contains("2 common faces"), "{notes:?}");
+    let mesh = Mesher::new().levels(2).generate(&geometry.unwrap()).unwrap();
+    let names: Vec<&str> = mesh.names.bodies.iter().map(|label| label.names[0].as_str()).collect();
+    assert_eq!(names, ["plate", "bolt"]);
+    let pi = std::f64::consts::PI;
+    let bolt = pi * (25.0 * 11.0 + 81.0 * 4.0);
+    let near = |found: f64, exact: f64| assert!((found / exact - 1.0).abs() < 3e-3, "{found}, not {exact}");
+    let arrays = mesh.arrays();
+    near(volume_of(&arrays), (40.0 * 30.0 - 25.0 * pi) * 6.0 + bolt);
+    near(interface(&arrays), 2.0 * pi * 5.0 * 6.0 + pi * (81.0 - 25.0));
+
+    // A file in centimetres after one in millimetres: all are in those.
+    let dir = tempfile::tempdir().unwrap();
+    let large = dir.path().join("large.step");
+    let text = std::fs::read_to_string(&paths[1]).unwrap();
+    assert_eq!(text.matches(".MILLI.,.METRE.").count(), 1);
+    std::fs::write(&large, text.replace(".MILLI.,.METRE.", ".CENTI.,.METRE.")).unwrap();
+    let chosen = InputSettings { solids: vec!["large".into()], ..InputSettings::default() };
+    let (geometry, _) = read(&[paths[0].clone(), large], &chosen);
+    near(volume(&geometry.unwrap(), Preset::Moderate, 2), 1000.0 * bolt);
+
+    let with_brep = [paths[0].clone(), file("sphere")];
+    let (geometry, notes) = read(&with_brep, &settings);
+    assert_eq!(geometry.unwrap().inspect().unwrap().bodies.len(), 2);
+    assert!(notes[0].contains("sphere.brep: a BREP file has no unit"), "{notes:?}");
+
+    let (refused, _) = read(&[paths[0].clone(), own("lens")], &InputSettings::default());
+    let error = refused.unwrap_err().to_string();
+    assert!(error.contains("only if all of them are surfaces, or all CAD files"), "{error}");
+}
+
+#[test]
 fn solids_that_overlap_are_refused_with_their_numbers() {
     let geometry = Geometry::from_file(own("step").with_extension("").join("overlapping.step")).unwrap();
     let error = Mesher::new().generate(&geometry).unwrap_err().to_string();

@@ -14,6 +14,9 @@ use std::collections::BTreeMap;
 pub(crate) fn build(file: &File) -> Result<Model, BrepError> {
     let mut builder = Builder::new(file);
     builder.build()?;
+    if builder.model.bodies == 0 {
+        return builder.enclosed();
+    }
     let Builder { mut model, without_parameters, .. } = builder;
     if without_parameters == 0 {
         return Ok(model);
@@ -48,7 +51,8 @@ struct Builder<'a> {
     curves: BTreeMap<Key, usize>,
     patches: BTreeMap<Key, usize>,
     uses: usize,
-    free_faces: usize,
+    /// Faces of no solid.
+    free: Vec<Placed>,
     loose_edges: usize,
     /// Uses of edges that have no curve in the parameters of their surface, which is no plane.
     without_parameters: usize,
@@ -82,7 +86,7 @@ impl<'a> Builder<'a> {
             curves: BTreeMap::new(),
             patches: BTreeMap::new(),
             uses: 0,
-            free_faces: 0,
+            free: Vec::new(),
             loose_edges: 0,
             without_parameters: 0,
             placements,
@@ -133,7 +137,7 @@ impl<'a> Builder<'a> {
         while let Some(shape) = stack.pop() {
             match self.file.shapes[shape.shape as usize].kind {
                 Kind::Solid => self.add_body(&shape)?,
-                Kind::Face { .. } => self.free_faces += 1,
+                Kind::Face { .. } => self.free.push(shape),
                 Kind::Edge { .. } | Kind::Wire | Kind::Vertex { .. } => self.loose_edges += 1,
                 Kind::Compound | Kind::Shell => {
                     let parts = self.parts(&shape)?;
@@ -141,18 +145,30 @@ impl<'a> Builder<'a> {
                 }
             }
         }
-        let (faces, edges) = (self.free_faces, self.loose_edges);
-        if self.model.bodies == 0 {
-            return Err(BrepError::NoSolid { faces, edges });
-        }
+        let (faces, edges) = (self.free.len(), self.loose_edges);
         let notes = &mut self.model.notes;
-        if faces > 0 {
+        if faces > 0 && self.model.bodies > 0 {
             notes.push(format!("{faces} faces that bound no solid are left out"));
         }
         if edges > 0 {
             notes.push(format!("{edges} edges, wires or vertices of no face are left out"));
         }
         Ok(())
+    }
+
+    /// The solids that the faces of a file without solids enclose.
+    fn enclosed(mut self) -> Result<Model, BrepError> {
+        use Orientation::{External, Internal};
+        for face in std::mem::take(&mut self.free) {
+            let is_inside = matches!(face.orientation, Internal | External);
+            if !is_inside && !self.patches.contains_key(&face.key()) {
+                self.add_side(self.model.bodies, &face)?;
+                self.model.bodies += 1;
+            }
+        }
+        let mut shapes = Shapes::of(&self.model);
+        self.model.bodies = shapes.enclose(self.loose_edges, &mut self.model.notes)?.len();
+        shapes.remake(&self.model)
     }
 
     fn add_body(&mut self, solid: &Placed) -> Result<(), BrepError> {

@@ -44,12 +44,14 @@ pub enum BrepError {
         place: Option<Point>,
     },
     /// The file has no solid.
-    #[error("the file has no solid, only {faces} faces and {edges} edges{}", no_solid(*.faces))]
+    #[error("the file has no solid, only {faces} faces and {edges} edges{}", no_solid(*.faces, .open))]
     NoSolid {
         /// Its faces.
         faces: usize,
         /// Its edges, wires and vertices that bound no solid.
         edges: usize,
+        /// A place on an edge that does not have two faces, so that they enclose nothing.
+        open: Option<Point>,
     },
     /// Parts of an assembly are in other files, which cannot be read.
     #[error(
@@ -67,8 +69,17 @@ pub enum BrepError {
 }
 
 /// What to do about a file without solids.
-fn no_solid(faces: usize) -> &'static str {
-    if faces > 0 { ": sew its faces to a solid in the CAD program" } else { ": export the part as a solid" }
+fn no_solid(faces: usize, open: &Option<Point>) -> String {
+    match open {
+        Some(_) => {
+            let open = at(open);
+            format!(
+                "; the faces enclose none, because not two of them meet at an edge{open}: sew them to a solid in the CAD program"
+            )
+        }
+        None if faces > 0 => ": sew its faces to a solid in the CAD program".to_owned(),
+        None => ": export the part as a solid".to_owned(),
+    }
 }
 
 fn at(place: &Option<Point>) -> String {

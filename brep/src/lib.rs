@@ -18,6 +18,7 @@ mod chart;
 mod curve;
 mod error;
 mod imprint;
+mod join;
 mod keep;
 mod model;
 mod nearest;

@@ -363,6 +363,23 @@ fn a_face_of_two_solids_is_one_patch_with_both_beside_it() {
 }
 
 #[test]
+fn faces_of_no_solid_are_one_if_they_enclose_it() {
+    for name in ["box_with_hole", "thick_cylinder"] {
+        let text = String::from_utf8(file(name)).unwrap();
+        assert_eq!(text.matches("\nSo\n").count(), 1);
+        let volume = |text: &str| {
+            let mut model = Model::read(text.as_bytes()).unwrap();
+            let settings = Settings { chord: 1e-3, angle: angle(1e-3) };
+            let tessellation = Tessellation::of(&mut model, &settings).unwrap();
+            (model.notes.len(), model.bodies, tessellate::volume(&model, &tessellation, 0))
+        };
+        let (solid, faces) = (volume(&text), volume(&text.replace("\nSo\n", "\nCo\n")));
+        assert_eq!((faces.0, faces.1), (1, 1), "{name}");
+        assert!((faces.2 / solid.2 - 1.0).abs() < 1e-3, "{name}: {faces:?}, {solid:?}");
+    }
+}
+
+#[test]
 fn errors_have_the_line() {
     let text = String::from_utf8(file("torus")).unwrap();
     let broken = text.replace("\nEd", "\nXd");

@@ -125,9 +125,9 @@ impl OrderOptions {
 /// Options for the input.
 #[derive(Args, Debug, Clone)]
 pub struct InputOptions {
-    /// A geometry (.geo, NETGEN CSG; .step, .stp; .brep, OpenCASCADE); surfaces (.stl, .off, .obj,
-    /// .ply, .poly, .smesh; several files become several bodies); or a mesh, used unchanged (.msh,
-    /// .vol, .mesh, .meshb, .vtu, .pvtu, .ele, an Elmer folder)
+    /// A geometry (.geo, NETGEN CSG); CAD files (.step, .stp; .brep, OpenCASCADE) or surfaces
+    /// (.stl, .off, .obj, .ply, .poly, .smesh), of which several become one geometry; or a mesh,
+    /// used unchanged (.msh, .vol, .mesh, .meshb, .vtu, .pvtu, .ele, an Elmer folder)
     #[arg(required = true, value_name = "INPUT")]
     pub files: Vec<PathBuf>,
     /// Keep the triangles of input surfaces; by default they are remeshed

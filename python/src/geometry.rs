@@ -80,7 +80,7 @@ fn read(
 
 #[pymethods]
 impl Geometry {
-    /// Reads one file, or several surfaces.
+    /// Reads one file, several surfaces or several CAD files.
     #[staticmethod]
     fn from_files(py: Python<'_>, paths: Vec<PathBuf>, input: Input) -> PyResult<Self> {
         let names: Vec<String> = paths.iter().map(|path| path.display().to_string()).collect();

@@ -160,8 +160,8 @@ pub enum InputError {
         /// The length that is out of range.
         range: csg::OutOfRange,
     },
-    /// Several files, of which at least one is not a surface.
-    #[error("several files are taken together only if all of them are surfaces")]
+    /// Several files that are neither all surfaces nor all CAD files.
+    #[error("several files are taken together only if all of them are surfaces, or all CAD files")]
     SeveralFiles,
     /// A length to merge surfaces is given for a file without analytic surfaces.
     #[error("{}: only surfaces of .geo files can be merged", .0.display())]

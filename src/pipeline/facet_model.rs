@@ -164,12 +164,8 @@ impl FacetSolid {
             .bounds
             .refuse_out_of_range()
             .map_err(|range| InputError::OutOfRange { path: Some(path.to_path_buf()), range })?;
-        let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-        let of_body = |i: usize| if i == 1 { stem.to_string() } else { format!("{stem}_{i}") };
-        let names = Names {
-            bodies: labels(&brep.body_names, model.bodies.len(), of_body),
-            patches: labels(&brep.patch_names, model.patches.len(), |i| format!("face{i}")),
-        };
+        let patches = named(&brep.patch_names, model.patches.len(), |i| format!("face{i}"));
+        let names = Names { bodies: labels(body_names(brep, path)), patches: labels(patches) };
         Ok(Self {
             model,
             names,
@@ -389,10 +385,22 @@ impl FacetSolid {
     }
 }
 
-/// Labels with the names of a file, numbered from 1; `other` is the name of those that have none.
-fn labels(given: &[Option<String>], count: usize, other: impl Fn(usize) -> String) -> Vec<Label> {
+/// The names of the bodies of a CAD file; those without one have that of the file.
+pub(super) fn body_names(brep: &brep::Model, path: &Path) -> Vec<String> {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let of_body = |i: usize| if i == 1 { stem.to_string() } else { format!("{stem}_{i}") };
+    named(&brep.body_names, brep.bodies, of_body)
+}
+
+/// The names of a file, numbered from 1; `other` is the name of those that have none.
+fn named(given: &[Option<String>], count: usize, other: impl Fn(usize) -> String) -> Vec<String> {
     let name = |i: usize| given.get(i - 1).cloned().flatten().unwrap_or_else(|| other(i));
-    (1..=count).map(|i| Label::new(i as u32, name(i))).collect()
+    (1..=count).map(name).collect()
+}
+
+/// Labels with these names, numbered from 1.
+fn labels(names: Vec<String>) -> Vec<Label> {
+    (1..).zip(names).map(|(number, name)| Label::new(number, name)).collect()
 }
 
 /// Faces and edges are small if the elements are at least this many times as large. Merging moves

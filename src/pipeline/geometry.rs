@@ -50,10 +50,11 @@ impl Geometry {
         Self::from_files(&[path], &InputSettings::default())
     }
 
-    /// Reads one file, or several surfaces, each of which becomes a body.
+    /// Reads one file, several surfaces, each of which becomes a body, or several CAD files.
     ///
     /// # Errors
-    /// Those of [`from_file`](Self::from_file), or several files that are not all surfaces.
+    /// Those of [`from_file`](Self::from_file), or several files that are not all surfaces or all
+    /// CAD files.
     pub fn from_files(paths: &[impl AsRef<Path>], settings: &InputSettings) -> Result<Self, Error> {
         Self::read(paths, settings, &mut |_| ())
     }

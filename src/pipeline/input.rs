@@ -1,7 +1,7 @@
 //! Reads the user's files into a model.
 
 use super::error::{Error, InputError};
-use super::facet_model::FacetSolid;
+use super::facet_model::{FacetSolid, body_names};
 use super::model::{GivenMesh, Model};
 use super::settings::InputSettings;
 use crate::files;
@@ -9,7 +9,7 @@ use crate::files::input::ReadError;
 use crate::files::volume::VolumeMesh;
 use crate::ground::kernel::tree;
 use std::io;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// The kind of content of a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,11 +34,12 @@ fn kind(path: &Path) -> Result<Kind, Error> {
     }
 }
 
-/// Reads a geometry, a mesh, or one or several surfaces; `note` receives messages for the user, one
-/// sentence each.
+/// Reads a geometry, a mesh, or one or several surfaces or CAD files; `note` receives messages for
+/// the user, one sentence each.
 ///
 /// # Errors
-/// Files that cannot be read or meshed, with the location; several files that are not all surfaces.
+/// Files that cannot be read or meshed, with the location; several files that are not all surfaces
+/// or all CAD files.
 pub fn read(
     paths: &[impl AsRef<Path>],
     settings: &InputSettings,
@@ -61,15 +62,13 @@ pub fn read(
     }
     match (kinds.as_slice(), paths) {
         ([Kind::Csg], [path]) => read_csg(path.as_ref(), settings, note),
-        ([Kind::Brep], [path]) => read_brep(path.as_ref(), brep::Model::read, settings, note),
-        ([Kind::Step], [path]) => {
-            let other = |name: &str| read_beside(path.as_ref(), name);
-            let parse = |text: &[u8]| brep::Model::read_step_with(text, settings.unit, &other);
-            read_brep(path.as_ref(), parse, settings, note)
-        }
         ([Kind::Mesh], [path]) => read_mesh(path.as_ref(), note),
         (kinds, _) if !kinds.is_empty() && kinds.iter().all(|kind| *kind == Kind::Surface) => {
             FacetSolid::read(paths, settings, note).map(|solid| Model::Facets(Box::new(solid)))
+        }
+        (kinds, _) if !kinds.is_empty() && kinds.iter().all(is_cad) => {
+            let files: Vec<CadFile> = paths.iter().map(AsRef::as_ref).zip(kinds.iter().copied()).collect();
+            read_cad(&files, settings, note)
         }
         _ => Err(InputError::SeveralFiles.into()),
     }
@@ -102,25 +101,62 @@ fn read_csg(path: &Path, settings: &InputSettings, note: &mut dyn FnMut(&str)) -
     Ok(model)
 }
 
-/// Reads a boundary representation.
-fn read_brep(
-    path: &Path,
-    parse: impl FnOnce(&[u8]) -> Result<brep::Model, brep::BrepError>,
-    settings: &InputSettings,
-    note: &mut dyn FnMut(&str),
-) -> Result<Model, Error> {
-    let text = read_bytes(path)?;
-    let refuse = |error| Error::Brep { path: path.to_path_buf(), error: Box::new(error) };
-    let mut model = parse(&text).map_err(refuse)?;
+/// A CAD file and its kind.
+type CadFile<'a> = (&'a Path, Kind);
+
+/// Reads the solids of CAD files. Those of several share what they have in common, as if they were
+/// in one file.
+fn read_cad(files: &[CadFile], settings: &InputSettings, note: &mut dyn FnMut(&str)) -> Result<Model, Error> {
+    let mut model = joined(files, settings, note)?;
+    let paths: Vec<String> = files.iter().map(|(path, _)| path.display().to_string()).collect();
+    let path = &PathBuf::from(paths.join(", "));
     if !settings.solids.is_empty() {
         model.keep_bodies(&chosen(path, &model, &settings.solids)?);
     }
     if let Some(to) = settings.overlap_to {
-        model.cut_overlaps(to).map_err(refuse)?;
+        model.cut_overlaps(to).map_err(|error| refused(path, error))?;
     }
     model.imprint();
     let solid = FacetSolid::of_brep(path, model, settings, note)?;
     Ok(Model::Facets(Box::new(solid)))
+}
+
+fn refused(path: &Path, error: brep::BrepError) -> Error {
+    Error::Brep { path: path.to_path_buf(), error: Box::new(error) }
+}
+
+/// The solids of all files in one model, in the unit of the first file that has one. Of several
+/// files, those without a name have that of their file.
+fn joined(
+    files: &[CadFile],
+    settings: &InputSettings,
+    note: &mut dyn FnMut(&str),
+) -> Result<brep::Model, Error> {
+    let mut unit = settings.unit;
+    let mut joined = brep::Model::default();
+    for &(path, kind) in files {
+        let text = read_bytes(path)?;
+        let model = match kind {
+            Kind::Step => brep::Model::read_step_with(&text, unit, &|name| read_beside(path, name)),
+            _ => brep::Model::read(&text),
+        };
+        let mut model = model.map_err(|error| refused(path, error))?;
+        if let [_] = files {
+            return Ok(model);
+        }
+        model.notes.drain(..).for_each(|text| note(&format!("{}: {text}", path.display())));
+        match model.metres {
+            Some(metres) => unit = brep::Unit::Metres(metres),
+            None if files.iter().any(|(_, kind)| *kind == Kind::Step) => note(&format!(
+                "{}: a BREP file has no unit: its lengths are taken as those of the STEP files",
+                path.display()
+            )),
+            None => {}
+        }
+        model.body_names = body_names(&model, path).into_iter().map(Some).collect();
+        joined.join(model);
+    }
+    Ok(joined)
 }
 
 /// Reads a file with parts of an assembly from the folder of the assembly. Folders in its name are

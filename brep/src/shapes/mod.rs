@@ -1,5 +1,6 @@
 //! Solids by their faces, edges and vertices, without parameters, and the model made of them.
 
+mod enclose;
 mod glue;
 mod imprint;
 mod overlap;

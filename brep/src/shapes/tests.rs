@@ -116,6 +116,10 @@ impl Solids {
         self.face(Surface::Round { origin: center, axes: [X, Y, Z], profile }, Vec::new());
     }
 
+    pub fn into_shapes(self) -> Shapes {
+        self.0
+    }
+
     pub fn model(self) -> Model {
         let mut model = Model { bodies: self.0.accuracy.len(), ..Model::default() };
         self.0.build(&mut model).unwrap_or_else(|error| panic!("{error}"));

@@ -40,14 +40,19 @@ pub(super) struct PlacedFile {
 /// What a file holds, in the order of its products.
 pub(super) struct Contents<'a> {
     pub solids: Vec<PlacedSolid<'a>>,
+    /// Shells and sets of faces of surface models.
+    pub shells: Vec<PlacedSolid<'a>>,
     pub files: Vec<PlacedFile>,
     /// Metres of the unit of the result, if any shape has one.
     pub unit: Option<f64>,
 }
 
-/// Types of solids, and of surfaces that enclose one.
+/// Types of solids.
 pub(super) const SOLIDS: [&str; 4] =
     ["MANIFOLD_SOLID_BREP", "BREP_WITH_VOIDS", "FACETED_BREP", "FACETED_BREP_AND_BREP_WITH_VOIDS"];
+
+/// Types of surface models, which have shells or sets of faces.
+const SURFACES: [&str; 2] = ["SHELL_BASED_SURFACE_MODEL", "FACE_BASED_SURFACE_MODEL"];
 
 /// Assemblies may be nested this deep.
 pub(super) const DEEPEST: usize = 64;
@@ -90,7 +95,8 @@ pub(super) fn contents<'a>(records: &'a Records<'a>, unit: Option<f64>) -> Resul
     }
     // Representations of no product.
     for node in nodes(records).filter(is_shape) {
-        if items(node)?.iter().any(|item| is_solid(*item) && !structure.found.contains(&item.id)) {
+        let is_new = |item: &Node| is_body(*item) && !structure.found.contains(&item.id);
+        if items(node)?.iter().any(is_new) {
             structure.add_shape(node, &Placement::IDENTITY, None, DEEPEST)?;
         }
     }
@@ -99,6 +105,11 @@ pub(super) fn contents<'a>(records: &'a Records<'a>, unit: Option<f64>) -> Resul
 
 fn is_solid(node: Node) -> bool {
     node.any(&SOLIDS).is_some()
+}
+
+/// Whether a record is a solid or a surface model.
+fn is_body(node: Node) -> bool {
+    is_solid(node) || node.any(&SURFACES).is_some()
 }
 
 /// Whether a record is a representation of shapes.
@@ -131,7 +142,7 @@ impl<'a> Structure<'a> {
             children: BTreeMap::new(),
             names: BTreeMap::new(),
             documents: documents(records),
-            out: Contents { solids: Vec::new(), files: Vec::new(), unit: None },
+            out: Contents { solids: Vec::new(), shells: Vec::new(), files: Vec::new(), unit: None },
             found: BTreeSet::new(),
             uses: 0,
         };
@@ -269,16 +280,24 @@ impl<'a> Structure<'a> {
             stack.extend(self.same.get(&shape.id).into_iter().flatten().copied());
             let units = units(shape)?;
             let scale = self.scale(&units);
-            let solids: Vec<Node> = items(shape)?.into_iter().filter(|item| is_solid(*item)).collect();
-            let is_alone = solids.len() == 1;
-            for solid in solids {
+            let bodies: Vec<Node> = items(shape)?.into_iter().filter(|item| is_body(*item)).collect();
+            let is_alone = bodies.iter().filter(|body| is_solid(**body)).count() == 1;
+            for body in bodies {
                 self.count(depth)?;
-                self.found.insert(solid.id);
-                let product = name.filter(|_| is_alone || solid.label().is_none());
-                let name = solid.label().or_else(|| product.map(str::to_owned));
+                self.found.insert(body.id);
+                let product = name.filter(|_| is_alone || body.label().is_none());
+                let name = body.label().or_else(|| product.map(str::to_owned));
                 let linear = Matrix3::identity() * scale;
                 let placement = at.after(&Placement { linear, shift: [0.0; 3].into() });
-                self.out.solids.push(PlacedSolid { solid, placement, units, name });
+                let placed = PlacedSolid { solid: body, placement, units, name };
+                if let Some(fields) = body.any(&SURFACES) {
+                    let shells = fields.refers_all(1)?.into_iter();
+                    let placed =
+                        shells.map(|solid| PlacedSolid { solid, name: placed.name.clone(), ..placed });
+                    self.out.shells.extend(placed);
+                } else {
+                    self.out.solids.push(placed);
+                }
             }
             for mapped in items(shape)?.into_iter().filter_map(|item| item.get("MAPPED_ITEM")) {
                 self.count(depth)?;

@@ -17,7 +17,7 @@ pub use units::Unit;
 use crate::model::Model;
 use crate::shapes::Shapes;
 use crate::{BrepError, Placement};
-use assembly::{DEEPEST, MOST_USES, PlacedFile};
+use assembly::{DEEPEST, MOST_USES, PlacedFile, PlacedSolid};
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 
@@ -48,6 +48,11 @@ struct Reader<'a> {
     shapes: Shapes,
     /// The names of the bodies.
     names: Vec<Option<String>>,
+    /// The faces of surface models, if there is no solid, and the name for each.
+    surfaces: Shapes,
+    surface_names: Vec<Option<String>>,
+    /// Why a surface model cannot be read.
+    surface_fault: Option<BrepError>,
     /// Files that could not be read.
     missing: BTreeSet<String>,
     /// Numbers of faces, edges and shells that are in no solid.
@@ -61,6 +66,9 @@ impl<'a> Reader<'a> {
             unit,
             shapes: Shapes::default(),
             names: Vec::new(),
+            surfaces: Shapes::default(),
+            surface_names: Vec::new(),
+            surface_fault: None,
             missing: BTreeSet::new(),
             loose: [0; 3],
         }
@@ -81,6 +89,7 @@ impl<'a> Reader<'a> {
                 self.names.push(solid.name.clone());
             }
         }
+        self.read_surfaces(&contents.shells, places);
         let count = |kind: &str| record::nodes(&records).filter(|node| node.is(kind)).count();
         let faces = count("ADVANCED_FACE") + count("FACE_SURFACE");
         let loose = [faces, count("EDGE_CURVE"), count("SHELL_BASED_SURFACE_MODEL")];
@@ -105,21 +114,44 @@ impl<'a> Reader<'a> {
         Ok(())
     }
 
+    /// Reads the shells of surface models, unless there are solids.
+    fn read_surfaces(&mut self, shells: &[PlacedSolid], places: &[Placement]) {
+        for (place, shell) in places.iter().flat_map(|place| shells.iter().map(move |shell| (place, shell))) {
+            if !self.names.is_empty() || self.surface_fault.is_some() {
+                return;
+            }
+            match self.surfaces.add_faces(&shell.placed(place)) {
+                Ok(faces) => self.surface_names.extend(vec![shell.name.clone(); faces]),
+                Err(error) => self.surface_fault = Some(error),
+            }
+        }
+    }
+
     /// The model of all that was read.
-    fn model(self) -> Result<Model, BrepError> {
+    fn model(mut self) -> Result<Model, BrepError> {
         if !self.missing.is_empty() {
             let files: Vec<String> = self.missing.into_iter().collect();
             return Err(BrepError::OtherFiles(files.join(", ")));
         }
         let [faces, edges, shells] = self.loose;
-        if self.names.is_empty() {
-            return Err(BrepError::NoSolid { faces, edges });
+        let mut notes = Vec::new();
+        let has_solids = !self.names.is_empty();
+        if !has_solids {
+            if let Some(fault) = self.surface_fault {
+                return Err(fault);
+            }
+            if self.surface_names.is_empty() {
+                return Err(BrepError::NoSolid { faces, edges, open: None });
+            }
+            let first = self.surfaces.enclose(edges, &mut notes)?;
+            self.names = first.into_iter().map(|face| self.surface_names[face].take()).collect();
+            self.shapes = self.surfaces;
         }
         let metres = Some(self.unit.unwrap_or(1e-3));
-        let mut model = Model { bodies: self.names.len(), metres, ..Model::default() };
+        let mut model = Model { bodies: self.names.len(), metres, notes, ..Model::default() };
         model.body_names = self.names;
         self.shapes.build(&mut model)?;
-        if shells > 0 {
+        if shells > 0 && has_solids {
             model.notes.push(format!("{shells} shells that bound no solid are left out"));
         }
         Ok(model)

@@ -80,6 +80,7 @@ impl<'a> Node<'a> {
 pub(super) fn given(label: String) -> Option<String> {
     let label = label.trim();
     let is_none = label.is_empty() || label.eq_ignore_ascii_case("none") || label == "''";
+    let is_none = is_none || label.starts_with("Open CASCADE STEP translator ");
     (!is_none).then(|| label.to_owned())
 }
 

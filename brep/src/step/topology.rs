@@ -31,17 +31,8 @@ impl Shapes {
     /// # Errors
     /// [`BrepError::Syntax`] with the record and line.
     pub(super) fn add(&mut self, placed: &PlacedSolid) -> Result<(), BrepError> {
-        let body = self.accuracy.len();
-        self.accuracy.push(placed.units.accuracy * placed.placement.scale());
-        let mut reader = Reader {
-            shapes: self,
-            body,
-            placement: placed.placement,
-            angle: placed.units.angle,
-            corners: HashMap::new(),
-            curves: HashMap::new(),
-            lines: HashMap::new(),
-        };
+        let mut reader = Reader::new(self, placed);
+        reader.add_body(placed);
         let fields = placed.solid.any(&super::assembly::SOLIDS).expect("a solid");
         // The shell comes after the label, which records of several parts have elsewhere.
         let at = usize::from(placed.solid.kind() == fields.name());
@@ -58,19 +49,56 @@ impl Shapes {
     }
 }
 
-impl Reader<'_> {
-    fn shell(&mut self, shell: Node, is_outward: bool) -> Result<(), BrepError> {
-        if let Some(oriented) = shell.get("ORIENTED_CLOSED_SHELL") {
-            return self.shell_faces(oriented.refers(2)?, is_outward == oriented.flag(3)?);
+impl Shapes {
+    /// Adds the faces of a shell, each as that of a body of its own; returns their number.
+    ///
+    /// # Errors
+    /// [`BrepError::Syntax`] with the record and line.
+    pub(super) fn add_faces(&mut self, placed: &PlacedSolid) -> Result<usize, BrepError> {
+        let mut reader = Reader::new(self, placed);
+        let (faces, is_outward) = faces_of(placed.solid, true)?;
+        for face in &faces {
+            reader.add_body(placed);
+            reader.face(*face, is_outward)?;
         }
-        self.shell_faces(shell, is_outward)
+        Ok(faces.len())
+    }
+}
+
+/// The faces of a shell, and whether they point out of it as their records say.
+fn faces_of(shell: Node, is_outward: bool) -> Result<(Vec<Node>, bool), BrepError> {
+    if let Some(oriented) = shell.get("ORIENTED_CLOSED_SHELL").or_else(|| shell.get("ORIENTED_OPEN_SHELL")) {
+        let is_along = oriented.flag(3)?;
+        return faces_of(oriented.refers(2)?, is_outward == is_along);
+    }
+    let Some(fields) = shell.any(&["CLOSED_SHELL", "OPEN_SHELL", "CONNECTED_FACE_SET"]) else {
+        return Err(shell.error(format!("{} is no closed shell", shell.kind())));
+    };
+    Ok((fields.refers_all(1)?, is_outward))
+}
+
+impl<'s> Reader<'s> {
+    fn new(shapes: &'s mut Shapes, placed: &PlacedSolid) -> Self {
+        Self {
+            shapes,
+            body: 0,
+            placement: placed.placement,
+            angle: placed.units.angle,
+            corners: HashMap::new(),
+            curves: HashMap::new(),
+            lines: HashMap::new(),
+        }
     }
 
-    fn shell_faces(&mut self, shell: Node, is_outward: bool) -> Result<(), BrepError> {
-        let Some(fields) = shell.any(&["CLOSED_SHELL", "OPEN_SHELL", "CONNECTED_FACE_SET"]) else {
-            return Err(shell.error(format!("{} is no closed shell", shell.kind())));
-        };
-        fields.refers_all(1)?.into_iter().try_for_each(|face| self.face(face, is_outward))
+    /// Adds a body, to which all that is read from now on belongs.
+    fn add_body(&mut self, placed: &PlacedSolid) {
+        self.body = self.shapes.accuracy.len();
+        self.shapes.accuracy.push(placed.units.accuracy * placed.placement.scale());
+    }
+
+    fn shell(&mut self, shell: Node, is_outward: bool) -> Result<(), BrepError> {
+        let (faces, is_outward) = faces_of(shell, is_outward)?;
+        faces.into_iter().try_for_each(|face| self.face(face, is_outward))
     }
 
     fn face(&mut self, face: Node, is_outward: bool) -> Result<(), BrepError> {

@@ -310,7 +310,8 @@ impl Tetrahedra {
         self.clear_marks();
     }
 
-    /// The points, the vertices and bodies of the slots, and one tet of each vertex. Frees all else.
+    /// The points, the vertices and bodies of the slots, and one tet of each vertex. All else is
+    /// freed.
     pub fn into_parts(self) -> (Vec<Point>, Vec<[u32; 4]>, Vec<u32>, Vec<u32>) {
         (self.points, self.tets, self.bodies, self.at_vertex)
     }

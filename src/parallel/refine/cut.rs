@@ -155,7 +155,8 @@ impl Cutting {
         (self.shapes, self.certain) = (shapes, certain);
     }
 
-    /// The fault of the tet with this id and these corners, if it has children that are not positive.
+    /// The fault of the tet with this id and these corners, if it has children that are not
+    /// positive.
     pub fn verdict(
         &mut self,
         (tet, corners): (GlobalId, [Point; 4]),

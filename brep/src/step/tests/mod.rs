@@ -246,6 +246,31 @@ fn an_assembly_has_placed_and_named_solids_in_any_unit() {
 }
 
 #[test]
+fn surface_models_that_enclose_solids_are_solids_with_their_names_at_their_places() {
+    let text = assembly();
+    let mut parts = text.split("MANIFOLD_SOLID_BREP(");
+    let mut surfaces = parts.next().unwrap().to_owned();
+    for part in parts {
+        let (label, rest) = part.split_once(",#").unwrap();
+        let (shell, rest) = rest.split_once(')').unwrap();
+        surfaces += &format!("SHELL_BASED_SURFACE_MODEL({label},(#{shell})){rest}");
+    }
+    let (model, found) = volumes(&surfaces, Unit::OfFile);
+    let (solids, exact) = volumes(&text, Unit::OfFile);
+    assert_eq!((model.body_names, model.metres), (solids.body_names, solids.metres));
+    let faces = solids.patches.len();
+    assert_eq!(
+        model.notes,
+        [format!("there is no solid, but {faces} faces enclose 5: they are taken as solids")]
+    );
+    found.iter().zip(&exact).for_each(|(found, exact)| assert_near(*found, *exact));
+
+    // A surface that cannot be read is an error if there is no solid.
+    let damaged = surfaces.replace("CYLINDRICAL_SURFACE", "ROUND_SURFACE");
+    assert!(matches!(Model::read_step(damaged.as_bytes(), Unit::OfFile), Err(BrepError::Syntax { .. })));
+}
+
+#[test]
 fn damaged_files_give_an_error_with_a_line() {
     let text = assembly();
     let refused = |text: &[u8]| match Model::read_step(text, Unit::OfFile) {
