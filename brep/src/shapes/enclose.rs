@@ -18,6 +18,7 @@ impl Shapes {
         let mut solid_of = vec![None; faces];
         self.find_closed(&mut solid_of);
         // Solids that touch have common edges too, so those that are closed do not take part.
+        self.unite(&solid_of);
         glue::glue_edges(self, self.size());
         let open = self.find_closed(&mut solid_of);
         let mut first: Vec<usize> = solid_of.iter().flatten().copied().collect();
@@ -66,6 +67,20 @@ impl Shapes {
             *solid = solid.or(Some(group[face]).filter(|&first| is_closed[first]));
         }
         open
+    }
+
+    /// Gives the faces of each solid the body of its first face: edges of one body are not taken as
+    /// one merely because they are close.
+    fn unite(&mut self, solid_of: &[Option<usize>]) {
+        for number in 0..self.faces.len() {
+            let Some(first) = solid_of[number] else { continue };
+            let body = self.faces[first].body;
+            self.faces[number].body = body;
+            for curve in self.curves_of(number) {
+                self.body_of_curve[curve] = body;
+                self.curves[curve].ends.iter().for_each(|&end| self.body_of_corner[end] = body);
+            }
+        }
     }
 
     /// Gives each face its new body, and leaves out those without one.
