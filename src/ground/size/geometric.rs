@@ -101,7 +101,8 @@ impl<'a> GeometricSize<'a> {
         settings: &SizeSettings,
         evaluation: Evaluation,
     ) -> Self {
-        let samples = GeometricSamples::new(geometry, features, settings);
+        let roughness = evaluation.roughness();
+        let samples = GeometricSamples::with_roughness(geometry, features, settings, roughness);
         Self::of(geometry, features, settings, &samples, evaluation)
     }
 

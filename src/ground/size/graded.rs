@@ -12,10 +12,21 @@ pub(crate) enum Evaluation {
     /// source.
     Searched,
     /// By interpolation with twice the error of a fine one, which is enough to compare numbers of
-    /// tets: cells are twice as large, so that a quarter of them are built on a surface.
+    /// tets: cells are twice as large, so that a quarter of them are built on a surface, from a
+    /// quarter of the samples.
     Rough,
     /// By interpolation that is accurate enough for a mesh.
     Fine,
+}
+
+impl Evaluation {
+    /// The factor of errors, and of the distances of samples.
+    pub fn roughness(self) -> f64 {
+        match self {
+            Self::Searched | Self::Fine => 1.0,
+            Self::Rough => 2.0,
+        }
+    }
 }
 
 /// The smallest size that graded sources impose.
@@ -29,14 +40,11 @@ impl GradedSize {
     /// The field in `bounds` that grows by `grading` per unit of distance from the sources up to
     /// `maximum`.
     pub fn new(bounds: Aabb, grading: f64, maximum: f64, sources: &[Source], evaluation: Evaluation) -> Self {
-        let tree = |roughness| {
-            Self::Interpolated(SourceTree::with_roughness(bounds, grading, maximum, sources, roughness))
-        };
-        match evaluation {
-            Evaluation::Searched => Self::Searched(Sources::new(grading, maximum, sources)),
-            Evaluation::Rough => tree(2.0),
-            Evaluation::Fine => tree(1.0),
+        if evaluation == Evaluation::Searched {
+            return Self::Searched(Sources::new(grading, maximum, sources));
         }
+        let roughness = evaluation.roughness();
+        Self::Interpolated(SourceTree::with_roughness(bounds, grading, maximum, sources, roughness))
     }
 }
 

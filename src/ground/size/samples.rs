@@ -37,6 +37,16 @@ pub(crate) struct ShortCurve {
 impl GeometricSamples {
     /// Samples curves and patches.
     pub fn new(geometry: &Geometry, features: &Features, settings: &SizeSettings) -> Self {
+        Self::with_roughness(geometry, features, settings, 1.0)
+    }
+
+    /// [`new`](Self::new) with distances of neighbouring samples larger by a factor.
+    pub(super) fn with_roughness(
+        geometry: &Geometry,
+        features: &Features,
+        settings: &SizeSettings,
+        roughness: f64,
+    ) -> Self {
         let diagonal = features.bounds.diagonal();
         // If all bodies have bounds, the largest of these bounds all sizes.
         let of_body = |body: &Body| settings.scaled_bound(body.maxh.unwrap_or(f64::INFINITY));
@@ -51,7 +61,7 @@ impl GeometricSamples {
             .map(|(i, body)| (BodyId::new(i), of_body(body)))
             .filter(|(_, bound)| *bound < maximum)
             .collect();
-        let sampler = Sampler { geometry, features, settings, maximum, body_bounds: &body_bounds };
+        let sampler = Sampler { geometry, features, settings, maximum, body_bounds: &body_bounds, roughness };
         let of_curve = |i: usize| {
             let bound = settings.scaled_bound(features.edge_bound(geometry, CurveId::new(i)));
             let mut sources = Vec::new();
@@ -120,12 +130,14 @@ struct Sampler<'a> {
     settings: &'a SizeSettings,
     maximum: f64,
     body_bounds: &'a [(BodyId, f64)],
+    /// The factor of the distances of neighbouring samples.
+    roughness: f64,
 }
 
 impl Sampler<'_> {
     /// The distance of neighbouring samples for a size.
     fn spacing(&self, size: f64) -> f64 {
-        size * (SAMPLE_GROWTH / self.settings.grading).min(1.0)
+        self.roughness * size * (SAMPLE_GROWTH / self.settings.grading).min(1.0)
     }
 
     /// The size for a curvature (1/length).
