@@ -79,7 +79,7 @@ pub(super) fn refuse_too_fine(
     sizes: &SizeSettings,
     memory: Option<u64>,
 ) -> Result<(), RoomError> {
-    /// Memory of a coarse tet while it is made: measured are 300 to 400 bytes.
+    /// Memory of a coarse tet while it is made: measured are 200 to 320 bytes.
     const BYTES: f64 = 150.0;
     let Some(available) = memory.or_else(memory::available_bytes) else { return Ok(()) };
     let (tets, size) = model.least_tets(sizes);

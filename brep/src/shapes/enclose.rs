@@ -72,8 +72,8 @@ impl Shapes {
     /// Gives the faces of each solid the body of its first face: edges of one body are not taken as
     /// one merely because they are close.
     fn unite(&mut self, solid_of: &[Option<usize>]) {
-        for number in 0..self.faces.len() {
-            let Some(first) = solid_of[number] else { continue };
+        for (number, first) in solid_of.iter().enumerate() {
+            let Some(first) = *first else { continue };
             let body = self.faces[first].body;
             self.faces[number].body = body;
             for curve in self.curves_of(number) {

@@ -13,7 +13,7 @@ use crate::{BrepError, Placement};
 use nalgebra::Matrix3;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// A solid at a place.
+/// A solid, or a shell of a surface model, at a place.
 pub(super) struct PlacedSolid<'a> {
     pub solid: Node<'a>,
     /// From the coordinates of its records to those of the result.

@@ -79,7 +79,8 @@ impl<'a> Reader<'a> {
         let records = text::read(text)?;
         let contents = assembly::contents(&records, self.unit)?;
         self.unit = contents.unit;
-        let uses = places.len().saturating_mul(contents.solids.len() + contents.files.len());
+        let bodies = contents.solids.len() + contents.shells.len();
+        let uses = places.len().saturating_mul(bodies + contents.files.len());
         if uses > MOST_USES || depth == 0 {
             return Err(assembly::too_many());
         }

@@ -67,10 +67,11 @@ impl Shapes {
 
 /// The faces of a shell, and whether they point out of it as their records say.
 fn faces_of(shell: Node, is_outward: bool) -> Result<(Vec<Node>, bool), BrepError> {
-    if let Some(oriented) = shell.get("ORIENTED_CLOSED_SHELL").or_else(|| shell.get("ORIENTED_OPEN_SHELL")) {
-        let is_along = oriented.flag(3)?;
-        return faces_of(oriented.refers(2)?, is_outward == is_along);
-    }
+    let oriented = shell.get("ORIENTED_CLOSED_SHELL").or_else(|| shell.get("ORIENTED_OPEN_SHELL"));
+    let (shell, is_outward) = match oriented {
+        Some(oriented) => (oriented.refers(2)?, is_outward == oriented.flag(3)?),
+        None => (shell, is_outward),
+    };
     let Some(fields) = shell.any(&["CLOSED_SHELL", "OPEN_SHELL", "CONNECTED_FACE_SET"]) else {
         return Err(shell.error(format!("{} is no closed shell", shell.kind())));
     };
