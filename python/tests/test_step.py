@@ -43,6 +43,15 @@ def test_solids_that_overlap_are_cut_out_of_each_other():
         tetmill.Geometry(path, overlap_to="larger")
 
 
+def test_solids_of_several_files_share_faces():
+    with pytest.warns(tetmill.NoteWarning, match="2 common faces"):
+        geometry = tetmill.Geometry(GEOMETRIES / "plate.step", GEOMETRIES / "bolt.step", unit="mm")
+    assert [label.names[0] for label in geometry.bodies] == ["plate", "bolt"]
+    mesh = geometry.generate(levels=1)
+    exact = (40 * 30 - 25 * np.pi) * 6 + np.pi * (25 * 11 + 81 * 4)
+    assert mesh.report["mesh"]["volume"] == pytest.approx(exact, rel=5e-3)
+
+
 # In a process of its own: once OpenCASCADE has read a file in metres, it writes others in metres too.
 MAKE = """
 import gmsh, sys

@@ -106,9 +106,9 @@ class Geometry:
     """Solids to be meshed, surfaces that bound them, or a mesh to be refined and partitioned.
 
     `Geometry(path)` reads a file: a geometry in NETGEN's language (.geo), CAD parts (.step, .brep
-    of OpenCASCADE), surfaces (.stl, .off,
-    .obj, .ply, .poly, .smesh; several files become several bodies), or a mesh, used unchanged
-    (.msh, .vol, .mesh, .meshb, .vtu, .pvtu, .ele, an Elmer folder).
+    of OpenCASCADE), surfaces (.stl, .off, .obj, .ply, .poly, .smesh), or a mesh, used unchanged
+    (.msh, .vol, .mesh, .meshb, .vtu, .pvtu, .ele, an Elmer folder). Several CAD files or surfaces,
+    `Geometry("plate.step", "bolt.step")`, are one geometry.
 
     Args:
         paths: The file or files.
