@@ -167,6 +167,7 @@ impl<'a> Builder<'a> {
             }
         }
         let mut shapes = Shapes::of(&self.model);
+        self.model.from_faces = true;
         self.model.bodies = shapes.enclose(self.loose_edges, &mut self.model.notes)?.len();
         shapes.remake(&self.model)
     }

@@ -25,6 +25,7 @@ impl Model {
             patch
         }));
         self.bodies += other.bodies;
+        self.from_faces |= other.from_faces;
         self.metres = self.metres.or(other.metres);
         self.notes.extend(other.notes);
     }

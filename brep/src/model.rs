@@ -83,6 +83,9 @@ pub struct Model {
     pub patches: Vec<Patch>,
     /// The number of bodies.
     pub bodies: usize,
+    /// Whether the bodies were found as those that faces enclose: one whose faces point inside is
+    /// a void of the body around it.
+    pub from_faces: bool,
     /// The names that the file gives to bodies; empty if it gives none.
     pub body_names: Vec<Option<String>>,
     /// The names that the file gives to patches; empty if it gives none.

@@ -151,6 +151,7 @@ impl Shapes {
     pub fn remake(self, old: &Model) -> Result<Model, BrepError> {
         let mut model = Model {
             bodies: old.bodies,
+            from_faces: old.from_faces,
             body_names: old.body_names.clone(),
             metres: old.metres,
             notes: old.notes.clone(),

@@ -149,7 +149,8 @@ impl<'a> Reader<'a> {
             self.shapes = self.surfaces;
         }
         let metres = Some(self.unit.unwrap_or(1e-3));
-        let mut model = Model { bodies: self.names.len(), metres, notes, ..Model::default() };
+        let bodies = self.names.len();
+        let mut model = Model { bodies, from_faces: !has_solids, metres, notes, ..Model::default() };
         model.body_names = self.names;
         self.shapes.build(&mut model)?;
         if shells > 0 && has_solids {

@@ -27,12 +27,54 @@ pub(super) fn orient(model: &mut Model, tessellation: &Tessellation) -> Result<V
     for body in 0..model.bodies {
         let connected = shells(model, body, &uses);
         turn_faces(model, body, connected.iter().flat_map(|shell| shell.1.iter().copied()).collect())?;
-        let shells: Vec<Shell> =
-            connected.into_iter().map(|(patches, _)| Shell::new(model, body, patches, &triangles)).collect();
-        turn_shells(model, body, &shells)?;
-        all.push(shells);
+        let shells = connected.into_iter().map(|(patches, _)| Shell::new(model, body, patches, &triangles));
+        all.push(shells.collect());
+    }
+    if model.from_faces {
+        all = join_voids(model, all);
+    }
+    for (body, shells) in all.iter().enumerate() {
+        turn_shells(model, body, shells)?;
     }
     Ok(all)
+}
+
+/// Makes voids of bodies whose faces point inside and that lie in another one.
+fn join_voids(model: &mut Model, all: Vec<Vec<Shell>>) -> Vec<Vec<Shell>> {
+    let only = |body: usize| all[body].first().filter(|_| all[body].len() == 1);
+    let around = |body: usize| {
+        let void = only(body).filter(|shell| shell.volume < 0.0)?;
+        let solids = (0..all.len()).filter_map(|other| Some((other, only(other)?)));
+        let around = solids.filter(|(_, shell)| shell.volume > 0.0 && shell.contains(void.place));
+        around.min_by(|a, b| a.1.volume.total_cmp(&b.1.volume)).map(|(other, _)| other)
+    };
+    let to: Vec<Option<usize>> = (0..all.len()).map(around).collect();
+    let voids = to.iter().flatten().count();
+    if voids == 0 {
+        return all;
+    }
+    let before = |count: &mut usize, to: &Option<usize>| {
+        let number = *count;
+        *count += usize::from(to.is_none());
+        Some(number)
+    };
+    let solids: Vec<usize> = to.iter().scan(0, before).collect();
+    let numbers: Vec<usize> = to.iter().enumerate().map(|(body, to)| solids[to.unwrap_or(body)]).collect();
+    for patch in &mut model.patches {
+        patch.bodies = patch.bodies.map(|body| body.map(|body| numbers[body]));
+    }
+    let mut is_solid = to.iter().map(Option::is_none);
+    model.body_names.retain(|_| is_solid.next() == Some(true));
+    model.bodies = all.len() - voids;
+    model.notes.push(match voids {
+        1 => "1 of these solids is a void of another one, because its faces point inside".into(),
+        _ => format!("{voids} of these solids are voids of others, because their faces point inside"),
+    });
+    let mut joined: Vec<Vec<Shell>> = (0..model.bodies).map(|_| Vec::new()).collect();
+    for (shells, number) in all.into_iter().zip(numbers) {
+        joined[number].extend(shells);
+    }
+    joined
 }
 
 /// Turns patches that their neighbours contradict.

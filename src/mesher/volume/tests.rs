@@ -29,6 +29,25 @@ pub(super) fn bare(soup: Soup) -> Report {
 }
 
 #[test]
+fn without_its_free_slots_a_mesh_has_the_same_tets() {
+    // Most tets of the Delaunay mesh are in the hole.
+    let mut soup = Soup::default();
+    soup.torus([3.0, 1.0], [40, 20], INSIDE);
+    let surface = soup.surface().unwrap();
+    let (mut mesh, _) = bound::bound(&surface, surface.points(), &mut Report::default()).unwrap();
+    let tets = |mesh: &tetrahedra::Tetrahedra| -> Vec<([u32; 4], u32, u8)> {
+        let of = |t: usize| (mesh.tets[t], mesh.bodies[t], mesh.locked[t]);
+        mesh.alive().map(|t| of(t as usize)).collect()
+    };
+    let before = tets(&mesh);
+    assert!(mesh.free.len() > before.len() / 4, "{} free slots", mesh.free.len());
+    mesh.remove_free_slots();
+    assert_eq!((mesh.tets.len(), mesh.free.len()), (before.len(), 0));
+    assert_eq!(tets(&mesh), before);
+    assert_eq!(mesh.check(), Vec::<String>::new());
+}
+
+#[test]
 fn cubes_with_any_number_of_squares_are_filled() {
     for n in [1, 2, 3, 8, 13u32] {
         let mut soup = Soup::default();

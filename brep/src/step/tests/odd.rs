@@ -1,7 +1,7 @@
 //! What files of real programs have that they should not.
 
 use super::{Text, assert_near, volumes};
-use crate::{Model, Settings, Tessellation, Unit};
+use crate::{BrepError, Model, Settings, Tessellation, Unit};
 use std::collections::HashMap;
 use std::f64::consts::PI;
 
@@ -29,17 +29,41 @@ fn a_face_that_points_inside_is_turned() {
     }
 }
 
+/// A cylinder, and a ball in it, whose shell has an orientation.
+fn cylinder_around_ball(orientation: &str) -> (Text, [u32; 2]) {
+    let mut text = Text::new();
+    let faces = cylinder(&mut text, true);
+    let frame = text.frame(1.0, 1.0);
+    let surface = text.add(&format!("SPHERICAL_SURFACE('',#{frame},0.5)"));
+    let bound = text.vertex_bound();
+    let ball = text.face(surface, &[bound]);
+    let [outer, inner] = [text.shell(&faces), text.shell(&[ball])];
+    let void = text.add(&format!("ORIENTED_CLOSED_SHELL('',*,#{inner},.{orientation}.)"));
+    (text, [outer, void])
+}
+
+#[test]
+fn shells_of_a_surface_model_that_point_inside_are_voids() {
+    let (mut text, [outer, void]) = cylinder_around_ball("F");
+    let model = text.add(&format!("SHELL_BASED_SURFACE_MODEL('part',(#{void},#{outer}))"));
+    let (model, volumes) = volumes(&text.of_solid(model), Unit::OfFile);
+    assert_eq!((volumes.len(), model.body_names), (1, vec![Some("part".to_owned())]));
+    assert_near(volumes[0], 2.0 * PI - PI / 6.0);
+    assert!(model.notes[1].starts_with("1 of these solids is a void"), "{:?}", model.notes);
+
+    // One that points outside is a solid, which overlaps the other.
+    let (mut text, [outer, inner]) = cylinder_around_ball("T");
+    let model = text.add(&format!("SHELL_BASED_SURFACE_MODEL('part',(#{inner},#{outer}))"));
+    let mut model = Model::read_step(text.of_solid(model).as_bytes(), Unit::OfFile).unwrap();
+    assert_eq!(model.bodies, 2);
+    let error = Tessellation::of(&mut model, &Settings { chord: 1e-3, angle: 0.2 }).unwrap_err();
+    assert!(matches!(error, BrepError::Solid { .. }), "{error}");
+}
+
 #[test]
 fn voids_are_voids_however_they_are_oriented() {
     for (orientation, notes) in [("F", 0), ("T", 1)] {
-        let mut text = Text::new();
-        let faces = cylinder(&mut text, true);
-        let frame = text.frame(1.0, 1.0);
-        let surface = text.add(&format!("SPHERICAL_SURFACE('',#{frame},0.5)"));
-        let bound = text.vertex_bound();
-        let ball = text.face(surface, &[bound]);
-        let [outer, inner] = [text.shell(&faces), text.shell(&[ball])];
-        let void = text.add(&format!("ORIENTED_CLOSED_SHELL('',*,#{inner},.{orientation}.)"));
+        let (mut text, [outer, void]) = cylinder_around_ball(orientation);
         let solid = text.add(&format!("BREP_WITH_VOIDS('part',#{outer},(#{void}))"));
         let (model, volumes) = volumes(&text.of_solid(solid), Unit::OfFile);
         assert_near(volumes[0], 2.0 * PI - PI / 6.0);
