@@ -3,7 +3,7 @@
 use crate::model::{Corner, EdgeCurve, Fin, Model, On, Patch};
 use crate::placement::Placements;
 use crate::read::{CurveOnSurface, File, Kind, Orientation, Use};
-use crate::shapes::Shapes;
+use crate::shapes::{Shapes, left_out};
 use crate::{BrepError, Placement};
 use std::collections::BTreeMap;
 
@@ -147,8 +147,8 @@ impl<'a> Builder<'a> {
         }
         let (faces, edges) = (self.free.len(), self.loose_edges);
         let notes = &mut self.model.notes;
-        if faces > 0 && self.model.bodies > 0 {
-            notes.push(format!("{faces} faces that bound no solid are left out"));
+        if self.model.bodies > 0 {
+            notes.extend(left_out(faces));
         }
         if edges > 0 {
             notes.push(format!("{edges} edges, wires or vertices of no face are left out"));

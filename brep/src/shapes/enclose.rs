@@ -1,5 +1,6 @@
 //! Solids of faces that enclose them, for files that have only surfaces.
 
+use super::imprint::Groups;
 use super::{Shapes, glue};
 use crate::{BrepError, Point};
 use std::collections::BTreeMap;
@@ -38,9 +39,7 @@ impl Shapes {
         notes.push(format!(
             "there is no solid, but {enclosing} faces enclose {count}: they are taken as {taken}"
         ));
-        if left > 0 {
-            notes.push(format!("{left} faces that bound no solid are left out"));
-        }
+        notes.extend(left_out(left));
         Ok(first)
     }
 
@@ -52,19 +51,23 @@ impl Shapes {
         for number in (0..self.faces.len()).filter(free) {
             self.faces[number].loops.iter().flatten().for_each(|&(curve, _)| faces_of[curve].push(number));
         }
-        let group = groups(self.faces.len(), &faces_of);
+        // The first face of each set stands for it.
+        let mut group = Groups::new(self.faces.len());
+        for pair in faces_of.iter().flat_map(|faces| faces.windows(2)) {
+            group.join(pair[0], pair[1]);
+        }
         let mut is_closed: Vec<bool> = solid_of.iter().map(Option::is_none).collect();
         let mut open = None;
         for (curve, faces) in self.curves.iter().zip(&faces_of) {
             let Some(&first) = faces.first() else { continue };
             if faces.len() != 2 {
-                is_closed[group[first]] = false;
+                is_closed[group.root(first)] = false;
                 let [low, high] = curve.range;
                 open = open.or(Some(Point::from(curve.curve.point(0.5 * (low + high)))));
             }
         }
         for (face, solid) in solid_of.iter_mut().enumerate() {
-            *solid = solid.or(Some(group[face]).filter(|&first| is_closed[first]));
+            *solid = solid.or(Some(group.root(face)).filter(|&first| is_closed[first]));
         }
         open
     }
@@ -125,25 +128,9 @@ impl Shapes {
     }
 }
 
-/// For each face the first one to which it is connected through edges.
-fn groups(faces: usize, faces_of: &[Vec<usize>]) -> Vec<usize> {
-    let mut beside = vec![Vec::new(); faces];
-    for at_edge in faces_of {
-        for pair in at_edge.windows(2) {
-            beside[pair[0]].push(pair[1]);
-            beside[pair[1]].push(pair[0]);
-        }
-    }
-    let mut group = vec![usize::MAX; faces];
-    for start in 0..faces {
-        let mut open = if group[start] == usize::MAX { vec![start] } else { Vec::new() };
-        while let Some(face) = open.pop() {
-            if std::mem::replace(&mut group[face], start) != start {
-                open.extend(beside[face].iter().copied().filter(|&other| group[other] == usize::MAX));
-            }
-        }
-    }
-    group
+/// The note that some faces are left out, if there are any.
+pub(crate) fn left_out(faces: usize) -> Option<String> {
+    (faces > 0).then(|| format!("{faces} faces that bound no solid are left out"))
 }
 
 #[cfg(test)]

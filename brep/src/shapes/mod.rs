@@ -8,6 +8,8 @@ mod split;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use enclose::left_out;
+
 use crate::chart::{Chart, Loop, Side, close};
 use crate::model::{Corner, Fin, Model, On, Patch};
 use crate::nearest::nearest_on_surface;

@@ -47,9 +47,7 @@ impl Shapes {
         }
         Ok(())
     }
-}
 
-impl Shapes {
     /// Adds the faces of a shell, each as that of a body of its own; returns their number.
     ///
     /// # Errors

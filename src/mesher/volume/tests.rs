@@ -30,7 +30,7 @@ pub(super) fn bare(soup: Soup) -> Report {
 
 #[test]
 fn without_its_free_slots_a_mesh_has_the_same_tets() {
-    // Most tets of the Delaunay mesh are in the hole.
+    // Many tets of the Delaunay mesh are in the hole.
     let mut soup = Soup::default();
     soup.torus([3.0, 1.0], [40, 20], INSIDE);
     let surface = soup.surface().unwrap();

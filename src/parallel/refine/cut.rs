@@ -159,7 +159,7 @@ impl Cutting {
     /// positive.
     pub fn verdict(
         &mut self,
-        (tet, corners): (GlobalId, [Point; 4]),
+        (tet, corners): (GlobalId, impl FnOnce() -> [Point; 4]),
         lattice: Lattice,
         described: usize,
     ) -> Option<BadTet> {
@@ -174,7 +174,7 @@ impl Cutting {
             place,
         };
         let faults = self.bad.iter().take(described).map(describe).collect();
-        Some(BadTet { tet, corners, children: self.bad.len() as u64, faults })
+        Some(BadTet { tet, corners: corners(), children: self.bad.len() as u64, faults })
     }
 }
 

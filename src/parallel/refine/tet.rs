@@ -93,7 +93,7 @@ pub fn fill(
         }
         let kept = inside.iter_mut();
         kept.zip(block.inside(lattice)).for_each(|(kept, point)| *kept = point);
-        let corners = mesh.tets[tet.index()].map(|v| mesh.points[v.index()]);
+        let corners = || mesh.tets[tet.index()].map(|v| mesh.points[v.index()]);
         cutting.verdict((mesh.tet_ids[tet.index()], corners), cells, settings.described)
     };
     let bad: Vec<BadTet> = insides

@@ -11,7 +11,7 @@ mod regions;
 
 pub(super) use contact::{lies_on, whole};
 pub(super) use cross::overlap;
-pub(super) use regions::is_clockwise;
+pub(super) use regions::{Groups, is_clockwise};
 
 use super::{Edges, Shapes, glue};
 use cross::Pair;

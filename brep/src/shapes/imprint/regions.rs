@@ -356,15 +356,15 @@ struct Hit {
     after: Half,
 }
 
-/// Disjoint sets.
-struct Groups(Vec<usize>);
+/// Disjoint sets, each with its least member as root.
+pub(in crate::shapes) struct Groups(Vec<usize>);
 
 impl Groups {
-    fn new(count: usize) -> Self {
+    pub fn new(count: usize) -> Self {
         Self((0..count).collect())
     }
 
-    fn root(&mut self, mut item: usize) -> usize {
+    pub fn root(&mut self, mut item: usize) -> usize {
         while self.0[item] != item {
             self.0[item] = self.0[self.0[item]];
             item = self.0[item];
@@ -372,7 +372,7 @@ impl Groups {
         item
     }
 
-    fn join(&mut self, a: usize, b: usize) {
+    pub fn join(&mut self, a: usize, b: usize) {
         let (a, b) = (self.root(a), self.root(b));
         self.0[a.max(b)] = a.min(b);
     }
