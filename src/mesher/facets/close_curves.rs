@@ -7,7 +7,8 @@ use crate::ground::kernel::nearest::in_segment;
 use crate::ground::kernel::tree::{Tree, bounds};
 use crate::ground::size::{SizeSettings, Source, Sources, thinned};
 use crate::mesher::surface::closeness::lowered;
-use std::cell::OnceCell;
+use rayon::prelude::*;
+use std::ops::Range;
 
 /// Largest edge length, in distances of two curves: a strip of such triangles, one across, has
 /// angles of at least 25°.
@@ -26,52 +27,70 @@ const MOST_CUTS: u32 = 20;
 ///
 /// Far from all sources the size is `maximum`.
 pub(super) fn sample(model: &FacetModel, settings: &SizeSettings, maximum: f64, sources: &mut Vec<Source>) {
-    let alone = OnceCell::new();
-    let mut added: Vec<Source> = Vec::new();
     let patches = patches_of_curves(model);
-    let point = |v: u32| model.points[v as usize];
-    let segments: Vec<(usize, [Point; 2])> = model
-        .curves
-        .iter()
-        .enumerate()
-        .flat_map(|(c, curve)| curve.vertices.windows(2).map(move |w| (c, [point(w[0]), point(w[1])])))
-        .collect();
-    let tree = Tree::new(&segments.iter().map(|(_, ends)| bounds(ends)).collect::<Vec<_>>());
     let beside = curves_of_patches(&patches, model.patches.len());
-    let mut related = vec![false; model.curves.len()];
-    let mut own = 0;
-    for (c, curve) in model.curves.iter().enumerate() {
-        let count = curve.vertices.len() - 1;
-        let own_segments = &segments[own..own + count];
-        own += count;
-        let others: Vec<usize> = patches[c]
-            .iter()
-            .flat_map(|&patch| &beside[patch as usize])
-            .copied()
-            .filter(|&d| d != c && !have_common_end(curve, &model.curves[d]))
-            .collect();
-        if others.is_empty() {
-            continue;
+    let others: Vec<Vec<usize>> = (0..model.curves.len())
+        .into_par_iter()
+        .map(|c| {
+            let around = patches[c].iter().flat_map(|&patch| &beside[patch as usize]).copied();
+            around.filter(|&d| d != c && !have_common_end(&model.curves[c], &model.curves[d])).collect()
+        })
+        .collect();
+    if others.iter().all(Vec::is_empty) {
+        return;
+    }
+    let segments = Segments::new(model);
+    let alone = Sources::new(settings.grading, maximum, &thinned(sources.clone()));
+    let of_curve = |related: &mut Vec<bool>, c: usize| {
+        let mut added = Vec::new();
+        if others[c].is_empty() {
+            return added;
         }
-        others.iter().for_each(|&d| related[d] = true);
-        let distance = |p: &Point| {
-            let to = |s: u32| {
-                let (d, [a, b]) = &segments[s as usize];
-                if related[*d] { in_segment(p, a, b).1 } else { f64::INFINITY }
-            };
-            tree.nearest(p, to).map_or(f64::INFINITY, |(_, squared)| squared.sqrt())
-        };
-        let alone = alone.get_or_init(|| Sources::new(settings.grading, maximum, &thinned(sources.clone())));
+        others[c].iter().for_each(|&d| related[d] = true);
         let sizes = |p: &Point| Sizes {
             alone: alone.size_at(p),
-            wanted: (ACROSS * settings.scale.min(1.0) * distance(p)).max(settings.minh),
+            wanted: (ACROSS * settings.scale.min(1.0) * segments.distance(p, related)).max(settings.minh),
         };
-        for (_, [a, b]) in own_segments {
+        for (_, [a, b]) in &segments.all[segments.of_curve[c].clone()] {
             cut(*a, *b, MOST_CUTS, &sizes, &mut added);
         }
-        others.iter().for_each(|&d| related[d] = false);
+        others[c].iter().for_each(|&d| related[d] = false);
+        added
+    };
+    let curves = (0..model.curves.len()).into_par_iter();
+    let added: Vec<Vec<Source>> = curves.map_init(|| vec![false; model.curves.len()], of_curve).collect();
+    sources.extend(added.concat());
+}
+
+/// The segments of all curves.
+struct Segments {
+    /// Each with its curve.
+    all: Vec<(usize, [Point; 2])>,
+    of_curve: Vec<Range<usize>>,
+    tree: Tree,
+}
+
+impl Segments {
+    fn new(model: &FacetModel) -> Self {
+        let (mut all, mut of_curve) = (Vec::new(), Vec::new());
+        let point = |v: u32| model.points[v as usize];
+        for (c, curve) in model.curves.iter().enumerate() {
+            let first = all.len();
+            all.extend(curve.vertices.windows(2).map(|w| (c, [point(w[0]), point(w[1])])));
+            of_curve.push(first..all.len());
+        }
+        let tree = Tree::new(&all.iter().map(|(_, ends)| bounds(ends)).collect::<Vec<_>>());
+        Self { all, of_curve, tree }
     }
-    sources.extend(added);
+
+    /// The distance from the nearest of some curves; infinite without any.
+    fn distance(&self, p: &Point, is_of_them: &[bool]) -> f64 {
+        let to = |s: u32| {
+            let (curve, [a, b]) = &self.all[s as usize];
+            if is_of_them[*curve] { in_segment(p, a, b).1 } else { f64::INFINITY }
+        };
+        self.tree.nearest(p, to).map_or(f64::INFINITY, |(_, squared)| squared.sqrt())
+    }
 }
 
 /// Sizes at a point of a curve.

@@ -362,15 +362,21 @@ fn facets_that_intersect_are_found_and_refused_by_the_mesher() {
 
 #[test]
 fn the_same_facets_give_the_same_mesh() {
-    let found = model(&[soup(|s| s.plate_with_hole(2.0, 1.0, 0.5, 24))]);
-    let size = sizes(&found, 0.5);
-    let mesh = |threads: usize| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| remesh(&found, &size, &RemeshSettings::default()).0)
-    };
-    let (one, two) = (mesh(1), mesh(2));
-    assert_eq!(one.points, two.points);
-    assert_eq!(one.triangles, two.triangles);
+    let plate = soup(|s| s.plate_with_hole(2.0, 1.0, 0.5, 24));
+    // Many more facets than triangles, and many more triangles than facets.
+    let fine = soup(|s| s.torus(3.0, 1.0, 200, 100));
+    let coarse = soup(|s| s.torus(3.0, 1.0, 20, 10));
+    for (facets, edge) in [(plate, 0.5), (fine, 0.5), (coarse, 0.1)] {
+        let found = model(&[facets]);
+        let size = sizes(&found, edge);
+        let mesh = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| remesh(&found, &size, &RemeshSettings::default()).0)
+        };
+        let (one, three) = (mesh(1), mesh(3));
+        assert_eq!(one.points, three.points);
+        assert_eq!(one.triangles, three.triangles);
+    }
 }
 
 #[test]

@@ -35,7 +35,8 @@ impl Changes {
         self.changed[v as usize] = self.now;
     }
 
-    fn is_since(&self, when: u64, v: &[u32]) -> bool {
+    /// Whether one of these vertices, or of their triangles, has changed since a time.
+    pub fn is_since(&self, when: u64, v: &[u32]) -> bool {
         v.iter().any(|&v| self.changed[v as usize] > when)
     }
 

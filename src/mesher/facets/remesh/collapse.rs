@@ -1,7 +1,9 @@
 //! Collapse of short edges: one end is merged into the other.
 
+use super::ordered::in_order;
 use super::polyline::Polyline;
 use super::sheet::{Kind, NONE, Sheet};
+use rayon::prelude::*;
 
 /// Largest turning angle of a curve along a segment (radians): a circle keeps at least six
 /// segments.
@@ -20,32 +22,42 @@ const POOR: f64 = 0.35;
 pub(super) fn collapse_short(sheet: &mut Sheet, short: f64) -> usize {
     let mut collapsed = 0;
     loop {
-        let mut edges: Vec<(f64, u32, u32)> = Vec::new();
-        for t in sheet.living() {
-            let v = sheet.at(t).v;
-            for [a, b] in [[v[0], v[1]], [v[1], v[2]], [v[2], v[0]]] {
-                let length = sheet.length(a, b);
-                if length < short {
-                    edges.push((length, a.min(b), a.max(b)));
-                }
-            }
-        }
-        edges.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.2).cmp(&(b.1, b.2))));
-        edges.dedup();
+        let edges = shorter(sheet, short);
         let before = collapsed;
         let began = sheet.changes.now();
-        for (_, a, b) in edges {
+        let decide = |sheet: &Sheet, [a, b]: [u32; 2]| {
             let both_live = !sheet.around[a as usize].is_empty() && !sheet.around[b as usize].is_empty();
             let is_tried = both_live && sheet.length(a, b) < short && !is_in_vain(sheet, a, b);
-            if is_tried && collapse_either(sheet, a, b, LONG) {
+            if is_tried { possible(sheet, a, b, LONG) } else { None }
+        };
+        // All triangles that matter have one of the ends.
+        let holds = |sheet: &Sheet, began, ends: [u32; 2], _: &_| !sheet.changes.is_since(began, &ends);
+        in_order(sheet, &edges, decide, holds, |sheet, _, found| {
+            if let Some([from, to]) = found {
+                collapse(sheet, from, to);
                 collapsed += 1;
             }
-        }
+        });
         sheet.changes.all_collapses_since(began);
         if collapsed == before {
             return collapsed;
         }
     }
+}
+
+/// The edges shorter than `short`, the shortest first.
+fn shorter(sheet: &Sheet, short: f64) -> Vec<[u32; 2]> {
+    let mut edges: Vec<(f64, u32, u32)> = sheet.gather(|t, found| {
+        for [a, b] in [[t.v[0], t.v[1]], [t.v[1], t.v[2]], [t.v[2], t.v[0]]] {
+            let length = sheet.length(a, b);
+            if length < short {
+                found.push((length, a.min(b), a.max(b)));
+            }
+        }
+    });
+    edges.par_sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.2).cmp(&(b.1, b.2))));
+    edges.dedup();
+    edges.into_iter().map(|(_, a, b)| [a, b]).collect()
 }
 
 /// Whether nothing has changed around an edge since its collapse was tried.
@@ -54,15 +66,18 @@ fn is_in_vain(sheet: &Sheet, a: u32, b: u32) -> bool {
     sheet.changes.is_collapse_in_vain(around.flat_map(|&t| sheet.at(t).v))
 }
 
-/// Merges one end of an edge into the other; the end classified on the lower dimension stays.
+/// Merges one end of an edge into the other, if that is possible.
 pub(super) fn collapse_either(sheet: &mut Sheet, a: u32, b: u32, long: f64) -> bool {
-    for (from, to) in [(a, b), (b, a)] {
-        if may_collapse(sheet, from, to, long) {
-            collapse(sheet, from, to);
-            return true;
-        }
+    let found = possible(sheet, a, b, long);
+    if let Some([from, to]) = found {
+        collapse(sheet, from, to);
     }
-    false
+    found.is_some()
+}
+
+/// Which end of an edge can be merged into which; the end classified on the lower dimension stays.
+fn possible(sheet: &Sheet, a: u32, b: u32, long: f64) -> Option<[u32; 2]> {
+    [[a, b], [b, a]].into_iter().find(|&[from, to]| may_collapse(sheet, from, to, long))
 }
 
 /// Whether `from` can be merged into `to`.

@@ -15,6 +15,7 @@ mod collapse;
 mod deviation;
 mod finish;
 mod flip;
+mod ordered;
 mod polyline;
 mod repair;
 mod report;
@@ -101,6 +102,15 @@ const LOWERED: f64 = 0.6;
 /// example because the facets themselves intersect. If the work of the size field is cancelled, the
 /// mesh is returned as it is.
 pub fn remesh(
+    model: &FacetModel,
+    size: &dyn SizeField,
+    settings: &RemeshSettings,
+) -> (SurfaceMesh, RemeshReport) {
+    // In a thread of the pool, so that no call of the pool waits for another thread to wake up.
+    rayon::scope(|_| remesh_in_pool(model, size, settings))
+}
+
+fn remesh_in_pool(
     model: &FacetModel,
     size: &dyn SizeField,
     settings: &RemeshSettings,

@@ -3,7 +3,6 @@
 
 use super::report::{RemeshReport, least_angle};
 use super::sheet::{Kind, NONE, Sheet};
-use super::smooth::try_place;
 use super::{collapse, flip, smooth, split};
 use crate::Vector;
 
@@ -17,9 +16,7 @@ const ROUNDS: usize = 6;
 /// two sides on one smooth curve.
 pub(super) fn repair(sheet: &mut Sheet, report: &mut RemeshReport) {
     for _ in 0..ROUNDS {
-        let living: Vec<u32> = sheet.living().collect();
-        let off: Vec<u32> = living.into_iter().filter(|&t| !sheet.still_fits(t)).collect();
-        let off: Vec<(u32, [u32; 3])> = off.into_iter().map(|t| (t, sheet.at(t).v)).collect();
+        let off: Vec<(u32, [u32; 3])> = sheet.misfits().into_iter().map(|t| (t, sheet.at(t).v)).collect();
         let splits = off.iter().filter(|(t, v)| sheet.at(*t).v == *v && split_misfit(sheet, *t)).count();
         if splits == 0 {
             break;
@@ -101,7 +98,9 @@ fn probe(sheet: &mut Sheet, v: u32) -> bool {
     let across = Vector::ith(normal.iamin(), 1.0).cross(&normal).normalize();
     let up = normal.cross(&across);
     let step = 0.1 * sheet.sizes[v as usize];
-    [across, up, -across, -up].iter().any(|d| try_place(sheet, v, patch, here + d * step))
+    let trials = [across, up, -across, -up].map(|direction| here + direction * step);
+    let found = smooth::better_place(sheet, v, patch, trials);
+    found.inspect(|place| smooth::place(sheet, v, place)).is_some()
 }
 
 /// Splits the longest side of a triangle that is too far from its facets, unless it is on a curve;
@@ -120,14 +119,14 @@ fn split_misfit(sheet: &mut Sheet, t: u32) -> bool {
 fn split_if(sheet: &mut Sheet, a: u32, b: u32, passes: impl Fn(f64, f64) -> bool) -> bool {
     let Some(pair) = sheet.pair(a, b) else { return false };
     let before = pair.iter().map(|&t| sheet.value_at(t)).fold(1.0, f64::min);
-    let (point, kind) = split::middle(sheet, a, b);
+    let middle = split::middle(sheet, a, b);
     let mut after = 1.0_f64;
     for t in pair {
         let triangle = *sheet.at(t);
         for end in [a, b] {
             let Some(k) = triangle.corner(end) else { return false };
             let mut p = sheet.corners(triangle.v);
-            p[k] = point;
+            p[k] = middle.point;
             after = after.min(super::sheet::shape(&p));
             if !sheet.fits(triangle.patch, &p, sheet.mean_size(triangle.v)) {
                 return false;
@@ -137,7 +136,7 @@ fn split_if(sheet: &mut Sheet, a: u32, b: u32, passes: impl Fn(f64, f64) -> bool
     if !passes(before, after) {
         return false;
     }
-    let v = split::split(sheet, a, b, point, kind);
+    let v = split::split(sheet, a, b, &middle);
     smooth::smooth(sheet, v);
     true
 }
@@ -157,8 +156,8 @@ fn open_flattening(sheet: &mut Sheet, t: u32, report: &mut RemeshReport) {
         return;
     }
     if triangle.curve[k] == NONE && sheet.pair(a, b).is_some() {
-        let (point, kind) = split::middle(sheet, a, b);
-        let v = split::split(sheet, a, b, point, kind);
+        let middle = split::middle(sheet, a, b);
+        let v = split::split(sheet, a, b, &middle);
         smooth::smooth(sheet, v);
         report.splits += 1;
     }

@@ -9,6 +9,7 @@ use crate::ground::projector::facets::FacetProjector;
 use crate::ground::size::SizeField;
 use crate::mesher::facets::FacetModel;
 use csg::{CornerId, CurveId, PatchId};
+use rayon::prelude::*;
 
 /// No curve, no triangle, no vertex.
 pub(super) const NONE: u32 = u32::MAX;
@@ -66,6 +67,9 @@ pub(super) struct Sheet<'a> {
     pub changes: Changes,
 }
 
+/// How many triangles a thread takes at once when all are visited.
+const GATHERED: usize = 4096;
+
 /// A triangle follows its patch if the angle between its normal and that of the facets at its
 /// centroid is at most 60° (cosine) ...
 const FITTING_COSINE: f64 = 0.5;
@@ -108,7 +112,7 @@ impl<'a> Sheet<'a> {
         }
         let straight =
             (0..polylines.len()).map(|c| model.projector.is_straight_curve(CurveId::new(c))).collect();
-        let sizes = mesh.points.iter().map(|p| size.size_at(p)).collect();
+        let sizes = mesh.points.par_iter().map(|p| size.size_at(p)).collect();
         let changes = Changes::new(mesh.points.len());
         let points = mesh.points;
         Self { model, size, points, kinds, sizes, around, triangles, polylines, straight, changes }
@@ -116,8 +120,8 @@ impl<'a> Sheet<'a> {
 
     /// Re-evaluates the sizes at all vertices.
     pub fn update_sizes(&mut self) {
-        for v in 0..self.points.len() {
-            let size = self.size.size_at(&self.points[v]);
+        let sizes: Vec<f64> = self.points.par_iter().map(|p| self.size.size_at(p)).collect();
+        for (v, size) in sizes.into_iter().enumerate() {
             if size != self.sizes[v] {
                 self.sizes[v] = size;
                 self.changes.change(v as u32);
@@ -129,12 +133,27 @@ impl<'a> Sheet<'a> {
         (0..self.triangles.len() as u32).filter(|&t| self.triangles[t as usize].lives())
     }
 
+    /// What `add` finds at each triangle, in their order.
+    pub fn gather<T: Clone + Send>(&self, add: impl Fn(&Triangle, &mut Vec<T>) + Sync) -> Vec<T> {
+        let blocks = self.triangles.par_chunks(GATHERED).map(|block| {
+            let mut found = Vec::new();
+            block.iter().filter(|t| t.lives()).for_each(|t| add(t, &mut found));
+            found
+        });
+        blocks.collect::<Vec<_>>().concat()
+    }
+
     pub fn at(&self, t: u32) -> &Triangle {
         &self.triangles[t as usize]
     }
 
     pub fn corners(&self, v: [u32; 3]) -> [Point; 3] {
         v.map(|v| self.points[v as usize])
+    }
+
+    /// The corners of a triangle, as they would be if one of them were at `place`.
+    pub fn corners_with(&self, t: u32, moved: u32, place: &Point) -> [Point; 3] {
+        self.at(t).v.map(|v| if v == moved { *place } else { self.points[v as usize] })
     }
 
     /// The length of an edge, in units of the mean wanted size at its ends.
@@ -179,14 +198,14 @@ impl<'a> Sheet<'a> {
             || merged.is_some_and(|merged| follows(&merged.projector, patch, p, size))
     }
 
-    /// Whether a triangle of the mesh follows its patch, which is tested only if it has changed.
-    pub fn still_fits(&mut self, t: u32) -> bool {
-        let known = self.changes.fit(t, self.at(t).v);
-        known.unwrap_or_else(|| {
-            let fits = self.fits_at(t);
-            self.changes.set_fit(t, fits);
-            fits
-        })
+    /// The triangles that do not follow their patches; those that have not changed since the last
+    /// call are not tested again.
+    pub fn misfits(&mut self) -> Vec<u32> {
+        let changed: Vec<u32> =
+            self.living().filter(|&t| self.changes.fit(t, self.at(t).v).is_none()).collect();
+        let fits: Vec<bool> = changed.par_iter().map(|&t| self.fits_at(t)).collect();
+        changed.into_iter().zip(fits).for_each(|(t, fits)| self.changes.set_fit(t, fits));
+        self.living().filter(|&t| self.changes.fit(t, self.at(t).v) == Some(false)).collect()
     }
 
     /// Notes that the triangles around a vertex change.
@@ -210,7 +229,12 @@ impl<'a> Sheet<'a> {
     /// The quality of a triangle, at most 1: its shape, less 1 if two sides on one smooth curve
     /// would make it flatten in refinement.
     pub fn value(&self, v: [u32; 3], curve: [u32; 3]) -> f64 {
-        shape(&self.corners(v)) - if self.flattens(curve) { 1.0 } else { 0.0 }
+        self.value_of(&self.corners(v), curve)
+    }
+
+    /// The quality of a triangle with these corners.
+    pub fn value_of(&self, p: &[Point; 3], curve: [u32; 3]) -> f64 {
+        shape(p) - if self.flattens(curve) { 1.0 } else { 0.0 }
     }
 
     pub fn value_at(&self, t: u32) -> f64 {
@@ -227,10 +251,10 @@ impl<'a> Sheet<'a> {
     }
 
     /// Adds a vertex without triangles; returns its number.
-    pub fn add_vertex(&mut self, point: Point, kind: Kind) -> u32 {
+    pub fn add_vertex(&mut self, point: Point, kind: Kind, size: f64) -> u32 {
         self.points.push(point);
         self.kinds.push(kind);
-        self.sizes.push(self.size.size_at(&point));
+        self.sizes.push(size);
         self.around.push(Vec::new());
         self.changes.add_vertex();
         self.points.len() as u32 - 1

@@ -1,6 +1,7 @@
 //! Moves of vertices on patches and along curves.
 
 use super::collapse::{MOST_TURN, along_curve};
+use super::ordered::in_order;
 use super::sheet::{Kind, Sheet, shape};
 use crate::ground::size::SizeField;
 use crate::{Point, Vector};
@@ -12,34 +13,105 @@ const STEPS: [f64; 3] = [1.0, 0.5, 0.2];
 /// On curves, equal segment lengths have priority as long as shapes are above this.
 const TOLERABLE: f64 = 0.6;
 
-/// Moves all vertices once; returns the number of moves.
+/// Moves all vertices once, in their order; returns the number of moves.
 pub(super) fn smooth_all(sheet: &mut Sheet) -> usize {
-    (0..sheet.points.len() as u32).filter(|&v| smooth(sheet, v)).count()
+    let mut moves = 0;
+    let vertices: Vec<u32> = (0..sheet.points.len() as u32).collect();
+    for block in vertices.chunks(BLOCK) {
+        for level in levels(sheet, block) {
+            let holds = |_: &Sheet, _, _, _: &_| true;
+            let make = |sheet: &mut Sheet, v, trial| moves += usize::from(make(sheet, v, &trial));
+            in_order(sheet, &level, try_move, holds, make);
+        }
+    }
+    moves
+}
+
+/// How many vertices are moved at a time. More would have fewer levels each, but less of them stays
+/// in caches.
+const BLOCK: usize = 8192;
+
+/// Vertices with consecutive numbers in groups, to be moved one group after the other: no two of a
+/// group share a triangle, and of two that share one the lower is in an earlier group. For one
+/// thread one group is enough.
+fn levels(sheet: &Sheet, block: &[u32]) -> Vec<Vec<u32>> {
+    if rayon::current_num_threads() == 1 {
+        return vec![block.to_vec()];
+    }
+    let first = block[0];
+    let mut level = vec![0_u32; block.len()];
+    let mut groups: Vec<Vec<u32>> = Vec::new();
+    for &v in block {
+        let around = &sheet.around[v as usize];
+        let lower = around.iter().flat_map(|&t| sheet.at(t).v).filter(|w| (first..v).contains(w));
+        let own = lower.map(|w| level[(w - first) as usize] + 1).max().unwrap_or(0);
+        level[(v - first) as usize] = own;
+        if groups.len() <= own as usize {
+            groups.push(Vec::new());
+        }
+        groups[own as usize].push(v);
+    }
+    groups
+}
+
+/// What the trial of a move found.
+pub(super) enum Trial {
+    /// Nothing has changed since the last trial.
+    Known,
+    /// No place that is better.
+    Vain,
+    Better(Place),
+}
+
+/// A better place of a vertex.
+pub(super) struct Place {
+    point: Point,
+    kind: Kind,
+    /// The wanted size there.
+    size: f64,
 }
 
 /// Moves a vertex if that improves the triangles around it.
 pub(super) fn smooth(sheet: &mut Sheet, v: u32) -> bool {
-    if sheet.around[v as usize].is_empty() {
-        return false;
+    let trial = try_move(sheet, v);
+    make(sheet, v, &trial)
+}
+
+/// Moves a vertex as its trial found; whether it moves.
+fn make(sheet: &mut Sheet, v: u32, trial: &Trial) -> bool {
+    match trial {
+        Trial::Known => {}
+        Trial::Vain => sheet.changes.move_was_in_vain(v),
+        Trial::Better(to) => place(sheet, v, to),
     }
-    let vertices = sheet.around[v as usize].iter().flat_map(|&t| sheet.at(t).v);
-    if sheet.changes.is_move_in_vain(v, vertices) {
-        return false;
+    matches!(trial, Trial::Better(_))
+}
+
+/// Moves a vertex.
+pub(super) fn place(sheet: &mut Sheet, v: u32, to: &Place) {
+    sheet.points[v as usize] = to.point;
+    sheet.kinds[v as usize] = to.kind;
+    sheet.sizes[v as usize] = to.size;
+    sheet.changes.change(v);
+}
+
+/// Tries to find a better place of a vertex.
+fn try_move(sheet: &Sheet, v: u32) -> Trial {
+    let around = &sheet.around[v as usize];
+    if around.is_empty() || sheet.changes.is_move_in_vain(v, around.iter().flat_map(|&t| sheet.at(t).v)) {
+        return Trial::Known;
     }
-    let has_moved = match sheet.kinds[v as usize] {
-        Kind::Corner(_) => false,
+    let found = match sheet.kinds[v as usize] {
+        Kind::Corner(_) => None,
         Kind::Curve(curve, place) => slide(sheet, v, curve.0, place),
-        Kind::Patch(_) if is_good(sheet, v) => false,
+        Kind::Patch(_) if is_good(sheet, v) => None,
         Kind::Patch(patch) => {
             let wanted = ideal_place(sheet, v, patch);
             let from = sheet.points[v as usize];
-            STEPS.iter().any(|&part| try_place(sheet, v, patch, from + (wanted - from) * part))
+            better_place(sheet, v, patch, STEPS.map(|part| from + (wanted - from) * part))
         }
     };
-    if !has_moved {
-        sheet.changes.move_was_in_vain(v);
-    }
-    has_moved
+    found.map_or(Trial::Vain, Trial::Better)
 }
 
 /// Vertices whose triangles all have a better shape are not moved.
@@ -52,29 +124,31 @@ fn is_good(sheet: &Sheet, v: u32) -> bool {
     sheet.around[v as usize].iter().all(|&t| shape(&sheet.corners(sheet.at(t).v)) > GOOD)
 }
 
-/// Moves a vertex on a patch to the projection of a point if that lowers the energy around it.
-pub(super) fn try_place(sheet: &mut Sheet, v: u32, patch: PatchId, to: Point) -> bool {
+/// The first of some points, projected onto the patch of a vertex, where the energy around the
+/// vertex is lower.
+pub(super) fn better_place<const N: usize>(
+    sheet: &Sheet,
+    v: u32,
+    patch: PatchId,
+    trials: [Point; N],
+) -> Option<Place> {
     let projector = &sheet.model.projector;
-    let to = if projector.flat_normal(patch).is_some() { to } else { projector.project_patch(patch, &to) };
-    let before = energy(sheet, v);
-    let from = std::mem::replace(&mut sheet.points[v as usize], to);
-    if energy(sheet, v) < (1.0 - GAIN) * before && around_fits(sheet, v) {
-        sheet.sizes[v as usize] = sheet.size.size_at(&to);
-        sheet.changes.change(v);
-        return true;
-    }
-    sheet.points[v as usize] = from;
-    false
+    let is_flat = projector.flat_normal(patch).is_some();
+    let most = (1.0 - GAIN) * energy(sheet, v, &sheet.points[v as usize]);
+    let mut trials = trials.into_iter().map(|p| if is_flat { p } else { projector.project_patch(patch, &p) });
+    let point = trials.find(|p| energy(sheet, v, p) < most && around_fits(sheet, v, p))?;
+    Some(Place { point, kind: Kind::Patch(patch), size: sheet.size.size_at(&point) })
 }
 
-/// Moves a vertex along its curve so that its two segments have equal lengths in units of the size.
-fn slide(sheet: &mut Sheet, v: u32, curve: u32, place: f64) -> bool {
+/// The place of a vertex on its curve where its two segments have equal lengths in units of the
+/// size, or nearer to that.
+fn slide(sheet: &Sheet, v: u32, curve: u32, place: f64) -> Option<Place> {
     let ends = along_curve(sheet, v, curve);
-    let &[p, q] = &ends[..] else { return false };
+    let &[p, q] = &ends[..] else { return None };
     let polyline = &sheet.polylines[curve as usize];
     let [to_p, to_q] = [p, q].map(|w| polyline.way(place, sheet.place_on(w, curve)));
     if to_p * to_q >= 0.0 {
-        return false;
+        return None;
     }
     let metric = |w: u32, way: f64| 2.0 * way.abs() / (sheet.sizes[w as usize] + sheet.sizes[v as usize]);
     let (lp, lq) = (metric(p, to_p), metric(q, to_q));
@@ -82,39 +156,42 @@ fn slide(sheet: &mut Sheet, v: u32, curve: u32, place: f64) -> bool {
     let share = 0.5 * (lq - lp) / (lp + lq);
     // A smaller shift is not worth the projections.
     if share.abs() < 1e-3 {
-        return false;
+        return None;
     }
     let shift = if share > 0.0 { share * to_q } else { -share * to_p };
     let new = polyline.wrapped(place + shift);
     let (before, after) = (place + to_p, place + to_q);
     let at = place + shift;
     if polyline.turn(before, at - before).max(polyline.turn(at, after - at)) > MOST_TURN {
-        return false;
+        return None;
     }
     let to = polyline.at(new);
-    let least =
-        |sheet: &Sheet| sheet.around[v as usize].iter().map(|&t| sheet.value_at(t)).fold(1.0, f64::min);
-    let worst = least(sheet).min(TOLERABLE);
-    let from = std::mem::replace(&mut sheet.points[v as usize], to);
-    if least(sheet) >= worst && around_fits(sheet, v) {
-        sheet.kinds[v as usize] = Kind::Curve(csg::CurveId(curve), new);
-        sheet.sizes[v as usize] = sheet.size.size_at(&to);
-        sheet.changes.change(v);
-        return true;
-    }
-    sheet.points[v as usize] = from;
-    false
+    let least = |at: &Point| {
+        let values = sheet.around[v as usize]
+            .iter()
+            .map(|&t| sheet.value_of(&sheet.corners_with(t, v, at), sheet.at(t).curve));
+        values.fold(1.0, f64::min)
+    };
+    let worst = least(&sheet.points[v as usize]).min(TOLERABLE);
+    let is_better = least(&to) >= worst && around_fits(sheet, v, &to);
+    let kind = Kind::Curve(csg::CurveId(curve), new);
+    is_better.then(|| Place { point: to, kind, size: sheet.size.size_at(&to) })
 }
 
-/// The sum of 1/shape² around a vertex, dominated by the worst triangles. Shapes below 10⁻⁶ count
-/// as that, so that sums with several of them can still be compared.
-pub(super) fn energy(sheet: &Sheet, v: u32) -> f64 {
-    let price = |&t: &u32| 1.0 / shape(&sheet.corners(sheet.at(t).v)).max(1e-6).powi(2);
+/// The sum of 1/shape² around a vertex at a place, dominated by the worst triangles. Shapes below
+/// 10⁻⁶ count as that, so that sums with several of them can still be compared.
+fn energy(sheet: &Sheet, v: u32, at: &Point) -> f64 {
+    let price = |&t: &u32| 1.0 / shape(&sheet.corners_with(t, v, at)).max(1e-6).powi(2);
     sheet.around[v as usize].iter().map(price).sum()
 }
 
-pub(super) fn around_fits(sheet: &Sheet, v: u32) -> bool {
-    sheet.around[v as usize].iter().all(|&t| sheet.fits_at(t))
+/// Whether the triangles around a vertex follow their patches if it is at a place.
+fn around_fits(sheet: &Sheet, v: u32, at: &Point) -> bool {
+    let fits = |&t: &u32| {
+        let triangle = sheet.at(t);
+        sheet.fits(triangle.patch, &sheet.corners_with(t, v, at), sheet.mean_size(triangle.v))
+    };
+    sheet.around[v as usize].iter().all(fits)
 }
 
 /// The mean of the positions that make each triangle around the vertex isosceles, with sides of the

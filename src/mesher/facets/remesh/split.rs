@@ -1,38 +1,50 @@
 //! Splits of long edges at their midpoints.
 
 use super::collapse::MOST_TURN;
+use super::ordered::in_order;
 use super::sheet::{Kind, NONE, Sheet, Triangle};
 use crate::Point;
+use crate::ground::size::SizeField;
+use rayon::prelude::*;
 use std::collections::HashSet;
 
 /// Splits edges longer than `long`, in units of the wanted size, and segments along which a curve
 /// turns too far, the longest first; returns the number of splits in one pass.
 pub(super) fn split_long(sheet: &mut Sheet, long: f64) -> usize {
-    let mut edges: Vec<(f64, u32, u32)> = Vec::new();
-    for t in sheet.living() {
-        let triangle = sheet.at(t);
-        for side in 0..3 {
-            let (a, b) = (triangle.v[(side + 1) % 3], triangle.v[(side + 2) % 3]);
-            let length = sheet.length(a, b);
-            if length > long || turns_far(sheet, a, b, triangle.curve[side]) {
-                edges.push((length, a.min(b), a.max(b)));
-            }
-        }
-    }
-    edges.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then((b.1, b.2).cmp(&(a.1, a.2))));
-    edges.dedup();
+    let edges = longer(sheet, long);
     let later = later(sheet, &edges, long);
+    let ends = edges.into_iter().rev().map(|(_, a, b)| [a, b]);
+    let edges: Vec<[u32; 2]> = ends.filter(|ends| !later.contains(ends)).collect();
     let mut splits = 0;
-    for (_, a, b) in edges.into_iter().rev().filter(|(_, a, b)| !later.contains(&[*a, *b])) {
-        if sheet.at_edge(a, b).next().is_some() {
-            let (point, kind) = middle(sheet, a, b);
-            if shortens(sheet, a, b, &point, &kind) {
-                split(sheet, a, b, point, kind);
-                splits += 1;
+    let decide = |sheet: &Sheet, [a, b]: [u32; 2]| {
+        let middle = middle(sheet, a, b);
+        shortens(sheet, a, b, &middle).then_some(middle)
+    };
+    // The midpoint of an edge does not depend on the splits of others.
+    let holds = |_: &Sheet, _, _, _: &_| true;
+    in_order(sheet, &edges, decide, holds, |sheet, [a, b], middle| {
+        if let Some(middle) = middle {
+            split(sheet, a, b, &middle);
+            splits += 1;
+        }
+    });
+    splits
+}
+
+/// The edges that are longer than `long`, or along which a curve turns too far, the shortest first.
+fn longer(sheet: &Sheet, long: f64) -> Vec<(f64, u32, u32)> {
+    let mut edges: Vec<(f64, u32, u32)> = sheet.gather(|t, found| {
+        for side in 0..3 {
+            let (a, b) = (t.v[(side + 1) % 3], t.v[(side + 2) % 3]);
+            let length = sheet.length(a, b);
+            if length > long || turns_far(sheet, a, b, t.curve[side]) {
+                found.push((length, a.min(b), a.max(b)));
             }
         }
-    }
-    splits
+    });
+    edges.par_sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then((b.1, b.2).cmp(&(a.1, a.2))));
+    edges.dedup();
+    edges
 }
 
 /// The halves of an edge across a patch are at most this fraction of its length.
@@ -42,10 +54,10 @@ pub(super) fn split_long(sheet: &mut Sheet, long: f64) -> usize {
 const SHORTER: f64 = 0.75;
 
 /// Whether a split leaves shorter edges. Edges on curves are split at half their arc length.
-fn shortens(sheet: &Sheet, a: u32, b: u32, middle: &Point, kind: &Kind) -> bool {
+fn shortens(sheet: &Sheet, a: u32, b: u32, middle: &Middle) -> bool {
     let [a, b] = [a, b].map(|end| &sheet.points[end as usize]);
-    let longest = (middle - a).norm().max((middle - b).norm());
-    !matches!(kind, Kind::Patch(_)) || longest <= SHORTER * (b - a).norm()
+    let longest = (middle.point - a).norm().max((middle.point - b).norm());
+    !matches!(middle.kind, Kind::Patch(_)) || longest <= SHORTER * (b - a).norm()
 }
 
 /// In a triangle whose long sides are this many times its short one, only the shorter of the long
@@ -86,8 +98,16 @@ fn turns_far(sheet: &Sheet, a: u32, b: u32, curve: u32) -> bool {
     polyline.turn(from, polyline.way(from, sheet.place_on(b, curve))) > MOST_TURN
 }
 
-/// The midpoint of an edge on its curve or patch, with its classification.
-pub(super) fn middle(sheet: &Sheet, a: u32, b: u32) -> (Point, Kind) {
+/// The midpoint of an edge on its curve or patch.
+pub(super) struct Middle {
+    pub point: Point,
+    kind: Kind,
+    /// The wanted size there.
+    size: f64,
+}
+
+/// The midpoint of an edge.
+pub(super) fn middle(sheet: &Sheet, a: u32, b: u32) -> Middle {
     let t = sheet.at_edge(a, b).next().map(|t| sheet.at(t)).expect("an edge has a triangle");
     let side = t.side(a, b).expect("the triangle has both ends");
     let mean = nalgebra::center(&sheet.points[a as usize], &sheet.points[b as usize]);
@@ -96,17 +116,19 @@ pub(super) fn middle(sheet: &Sheet, a: u32, b: u32) -> (Point, Kind) {
             Some(_) => mean,
             None => sheet.model.projector.project_patch(t.patch, &mean),
         };
-        return (point, Kind::Patch(t.patch));
+        return Middle { point, kind: Kind::Patch(t.patch), size: sheet.size.size_at(&point) };
     }
     let polyline = &sheet.polylines[t.curve[side] as usize];
     let from = sheet.place_on(a, t.curve[side]);
     let place = polyline.wrapped(from + 0.5 * polyline.way(from, sheet.place_on(b, t.curve[side])));
-    (polyline.at(place), Kind::Curve(csg::CurveId(t.curve[side]), place))
+    let point = polyline.at(place);
+    let kind = Kind::Curve(csg::CurveId(t.curve[side]), place);
+    Middle { point, kind, size: sheet.size.size_at(&point) }
 }
 
 /// Inserts a vertex on an edge: each triangle at the edge becomes two.
-pub(super) fn split(sheet: &mut Sheet, a: u32, b: u32, point: Point, kind: Kind) -> u32 {
-    let v = sheet.add_vertex(point, kind);
+pub(super) fn split(sheet: &mut Sheet, a: u32, b: u32, middle: &Middle) -> u32 {
+    let v = sheet.add_vertex(middle.point, middle.kind, middle.size);
     let at: Vec<u32> = sheet.at_edge(a, b).collect();
     for t in at {
         let old = *sheet.at(t);
