@@ -8,6 +8,7 @@ pub mod error;
 pub mod kernel;
 pub mod memory;
 pub mod mesh;
+pub mod ordered;
 pub mod progress;
 pub mod projector;
 pub mod size;

@@ -5,6 +5,7 @@ use super::Settings;
 use super::sheet::{DEGENERATE_PRICE, GAIN, Kind, NORMAL_PRICE, Node, Place, Sheet, Stop};
 use super::topology::{NONE, last, next};
 use crate::ground::kernel::predicates::Sign;
+use crate::ground::ordered::over_vertices;
 use crate::{Point, Vector};
 
 /// Edges shorter than this, in units of the wanted size, are collapsed.
@@ -37,7 +38,6 @@ pub(super) struct Improved {
 /// [`Stop::Size`] if the size field returns a value that is not positive and finite.
 pub(super) fn improve(sheet: &mut Sheet, settings: &Settings) -> Result<Improved, Stop> {
     let mut done = Improved { swaps: sheet.legalise_all(), ..Improved::default() };
-    let mut active = Vec::new();
     for round in 0..settings.rounds + MORE_ROUNDS {
         if round >= settings.rounds && !sheet.mesh.living().any(|t| sheet.price_at(t) > NORMAL_PRICE) {
             break;
@@ -49,10 +49,9 @@ pub(super) fn improve(sheet: &mut Sheet, settings: &Settings) -> Result<Improved
         }
         // Vertices move little in response to others: two passes, the second only for those still
         // active.
-        active.clear();
-        active.resize(sheet.nodes.len(), true);
+        let mut moving = Moving { active: vec![true; sheet.nodes.len()], sheet };
         for _ in 0..2 {
-            done.moves += smooth_all(sheet, &mut active);
+            done.moves += smooth_all(&mut moving);
         }
         done.swaps += sheet.legalise_all();
     }
@@ -64,48 +63,55 @@ fn is_free(node: &Node) -> bool {
     matches!(node.kind, Kind::Free | Kind::Helper)
 }
 
-/// Moves each active free vertex to improve its triangles; a vertex that does not move is inactive
-/// until a neighbour moves. Returns the number of moves.
-fn smooth_all(sheet: &mut Sheet, active: &mut [bool]) -> usize {
+/// A sheet whose vertices are moved.
+struct Moving<'s, 'a> {
+    sheet: &'s mut Sheet<'a>,
+    /// Whether each vertex, or one of its neighbours, has moved since it was tried.
+    active: Vec<bool>,
+}
+
+/// Moves each active free vertex to improve its triangles; returns the number of moves.
+fn smooth_all(moving: &mut Moving) -> usize {
+    let is_free = |&v: &u32| is_free(&moving.sheet.nodes[v as usize]);
+    let free: Vec<u32> = (0..moving.sheet.nodes.len() as u32).filter(is_free).collect();
+    let neighbours = |moving: &Moving, v: u32, near: &mut Vec<u32>| {
+        let mut ring = Vec::new();
+        moving.sheet.mesh.around(v, &mut ring);
+        near.extend(ring.into_iter().flat_map(|t| moving.sheet.mesh.at(t).v));
+    };
+    let decide = |moving: &Moving, v: u32| {
+        let mut ring = Vec::new();
+        if moving.active[v as usize] {
+            moving.sheet.mesh.around(v, &mut ring);
+        }
+        let moved = if ring.is_empty() { None } else { smoothed(moving.sheet, v, &ring) };
+        moved.map(|moved| (moved, ring))
+    };
     let mut moves = 0;
-    let mut ring = Vec::new();
-    for v in 0..sheet.nodes.len() as u32 {
-        if !is_free(&sheet.nodes[v as usize]) || !std::mem::replace(&mut active[v as usize], false) {
-            continue;
-        }
-        sheet.mesh.around(v, &mut ring);
-        if !ring.is_empty() && smooth(sheet, v, &ring) {
+    over_vertices(moving, &free, neighbours, decide, |Moving { sheet, active }, v, found| {
+        active[v as usize] = false;
+        if let Some((moved, ring)) = found {
             moves += 1;
-            for &t in &ring {
-                for w in sheet.mesh.at(t).v {
-                    active[w as usize] = true;
-                }
-            }
+            sheet.nodes[v as usize] = moved;
+            ring.into_iter().flat_map(|t| sheet.mesh.at(t).v).for_each(|w| active[w as usize] = true);
         }
-    }
+    });
     moves
 }
 
-/// Moves a vertex towards the position at which its triangles would be regular and of the wanted
+/// A vertex moved towards the position at which its triangles would be regular and of the wanted
 /// size, if that lowers the sum of their squared prices.
-fn smooth(sheet: &mut Sheet, v: u32, ring: &[u32]) -> bool {
+fn smoothed(sheet: &Sheet, v: u32, ring: &[u32]) -> Option<Node> {
     let node = sheet.nodes[v as usize];
-    let Some((worst, sum)) = sheet.star_price(v, &node, ring) else { return false };
+    let (worst, sum) = sheet.star_price(v, &node, ring)?;
     let target = ideal_place(sheet, v, ring);
-    for step in [1.0, 0.5, 0.2] {
+    [1.0, 0.5, 0.2].into_iter().find_map(|step| {
         let place = node.point + (target - node.point) * step;
         // Positions without a unique projection are skipped.
-        let Ok(point) = sheet.surface.project(&place) else { continue };
-        let moved = sheet.node(point, node.size, node.kind);
-        if let Some((new_worst, new_sum)) = sheet.star_price(v, &moved, ring)
-            && new_sum < sum * (1.0 - GAIN)
-            && new_worst <= worst.max(ACCEPTABLE)
-        {
-            sheet.nodes[v as usize] = moved;
-            return true;
-        }
-    }
-    false
+        let moved = sheet.node(sheet.surface.project(&place).ok()?, node.size, node.kind);
+        let (new_worst, new_sum) = sheet.star_price(v, &moved, ring)?;
+        (new_sum < sum * (1.0 - GAIN) && new_worst <= worst.max(ACCEPTABLE)).then_some(moved)
+    })
 }
 
 /// The mean of the apices of regular triangles on the edges around a vertex, with the wanted size
@@ -295,7 +301,9 @@ pub(super) fn repair_flattening(sheet: &mut Sheet) -> Result<(usize, usize), Sto
             let v = sheet.nodes.len() as u32 - 1;
             let mut ring = Vec::new();
             sheet.mesh.around(v, &mut ring);
-            smooth(sheet, v, &ring);
+            if let Some(moved) = smoothed(sheet, v, &ring) {
+                sheet.nodes[v as usize] = moved;
+            }
         }
     }
     Ok((found, left))

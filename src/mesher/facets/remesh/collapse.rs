@@ -1,8 +1,8 @@
 //! Collapse of short edges: one end is merged into the other.
 
-use super::ordered::in_order;
 use super::polyline::Polyline;
-use super::sheet::{Kind, NONE, Sheet};
+use super::sheet::{Kind, NONE, Sheet, now};
+use crate::ground::ordered::in_order;
 use rayon::prelude::*;
 
 /// Largest turning angle of a curve along a segment (radians): a circle keeps at least six
@@ -32,7 +32,7 @@ pub(super) fn collapse_short(sheet: &mut Sheet, short: f64) -> usize {
         };
         // All triangles that matter have one of the ends.
         let holds = |sheet: &Sheet, began, ends: [u32; 2], _: &_| !sheet.changes.is_since(began, &ends);
-        in_order(sheet, &edges, decide, holds, |sheet, _, found| {
+        in_order(sheet, &edges, now, decide, holds, |sheet, _, found| {
             if let Some([from, to]) = found {
                 collapse(sheet, from, to);
                 collapsed += 1;

@@ -1,7 +1,7 @@
 //! Edge flips inside patches, if they improve the worse of the two triangles.
 
-use super::ordered::in_order;
-use super::sheet::{NONE, Sheet, Triangle};
+use super::sheet::{NONE, Sheet, Triangle, now};
+use crate::ground::ordered::in_order;
 use rayon::prelude::*;
 
 /// Least gain of a flip, so that rounding cannot cause cycles.
@@ -31,7 +31,7 @@ pub(super) fn flip_all(sheet: &mut Sheet) -> usize {
                 next.extend([[a, p], [p, b], [b, q], [q, a]]);
             }
         };
-        in_order(sheet, &edges, |sheet, [a, b]| try_flip(sheet, a, b), holds, make);
+        in_order(sheet, &edges, now, |sheet, [a, b]| try_flip(sheet, a, b), holds, make);
         edges = next;
     }
     if flips < most {

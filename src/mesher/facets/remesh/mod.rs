@@ -15,7 +15,6 @@ mod collapse;
 mod deviation;
 mod finish;
 mod flip;
-mod ordered;
 mod polyline;
 mod repair;
 mod report;

@@ -288,6 +288,11 @@ impl<'a> Sheet<'a> {
     }
 }
 
+/// The time of the last change.
+pub(super) fn now(sheet: &Sheet) -> u64 {
+    sheet.changes.now()
+}
+
 /// Whether a triangle follows the facets of a patch.
 fn follows(projector: &FacetProjector, patch: PatchId, p: &[Point; 3], size: f64) -> bool {
     let area = area_vector(&p[0], &p[1], &p[2]);

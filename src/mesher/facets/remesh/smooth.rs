@@ -1,8 +1,8 @@
 //! Moves of vertices on patches and along curves.
 
 use super::collapse::{MOST_TURN, along_curve};
-use super::ordered::in_order;
 use super::sheet::{Kind, Sheet, shape};
+use crate::ground::ordered::over_vertices;
 use crate::ground::size::SizeField;
 use crate::{Point, Vector};
 use csg::PatchId;
@@ -15,43 +15,15 @@ const TOLERABLE: f64 = 0.6;
 
 /// Moves all vertices once, in their order; returns the number of moves.
 pub(super) fn smooth_all(sheet: &mut Sheet) -> usize {
-    let mut moves = 0;
     let vertices: Vec<u32> = (0..sheet.points.len() as u32).collect();
-    for block in vertices.chunks(BLOCK) {
-        for level in levels(sheet, block) {
-            let holds = |_: &Sheet, _, _, _: &_| true;
-            let make = |sheet: &mut Sheet, v, trial| moves += usize::from(make(sheet, v, &trial));
-            in_order(sheet, &level, try_move, holds, make);
-        }
-    }
+    let neighbours = |sheet: &Sheet, v: u32, near: &mut Vec<u32>| {
+        near.extend(sheet.around[v as usize].iter().flat_map(|&t| sheet.at(t).v));
+    };
+    let mut moves = 0;
+    over_vertices(sheet, &vertices, neighbours, try_move, |sheet, v, trial| {
+        moves += usize::from(make(sheet, v, &trial));
+    });
     moves
-}
-
-/// How many vertices are moved at a time. More would have fewer levels each, but less of them stays
-/// in caches.
-const BLOCK: usize = 8192;
-
-/// Vertices with consecutive numbers in groups, to be moved one group after the other: no two of a
-/// group share a triangle, and of two that share one the lower is in an earlier group. For one
-/// thread one group is enough.
-fn levels(sheet: &Sheet, block: &[u32]) -> Vec<Vec<u32>> {
-    if rayon::current_num_threads() == 1 {
-        return vec![block.to_vec()];
-    }
-    let first = block[0];
-    let mut level = vec![0_u32; block.len()];
-    let mut groups: Vec<Vec<u32>> = Vec::new();
-    for &v in block {
-        let around = &sheet.around[v as usize];
-        let lower = around.iter().flat_map(|&t| sheet.at(t).v).filter(|w| (first..v).contains(w));
-        let own = lower.map(|w| level[(w - first) as usize] + 1).max().unwrap_or(0);
-        level[(v - first) as usize] = own;
-        if groups.len() <= own as usize {
-            groups.push(Vec::new());
-        }
-        groups[own as usize].push(v);
-    }
-    groups
 }
 
 /// What the trial of a move found.

@@ -1,9 +1,9 @@
 //! Splits of long edges at their midpoints.
 
 use super::collapse::MOST_TURN;
-use super::ordered::in_order;
-use super::sheet::{Kind, NONE, Sheet, Triangle};
+use super::sheet::{Kind, NONE, Sheet, Triangle, now};
 use crate::Point;
+use crate::ground::ordered::in_order;
 use crate::ground::size::SizeField;
 use rayon::prelude::*;
 use std::collections::HashSet;
@@ -22,7 +22,7 @@ pub(super) fn split_long(sheet: &mut Sheet, long: f64) -> usize {
     };
     // The midpoint of an edge does not depend on the splits of others.
     let holds = |_: &Sheet, _, _, _: &_| true;
-    in_order(sheet, &edges, decide, holds, |sheet, [a, b], middle| {
+    in_order(sheet, &edges, now, decide, holds, |sheet, [a, b], middle| {
         if let Some(middle) = middle {
             split(sheet, a, b, &middle);
             splits += 1;
