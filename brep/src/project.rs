@@ -1,7 +1,7 @@
 //! Nearest points on curves and surfaces, from a start value.
 
 use crate::curve::Curve;
-use crate::surface::Surface;
+use crate::surface::{Jet, Surface};
 use crate::{Point, Vector};
 
 /// The foot of a projection to a curve.
@@ -34,6 +34,14 @@ pub struct SurfaceFoot {
 const STEPS: usize = 100;
 /// Halvings of a step that does not decrease the distance.
 const HALVINGS: usize = 30;
+/// The most searches along parameters that are followed by Newton's steps.
+const CREASES: usize = 4;
+/// The most searches along both parameters: one finds a crease, the next one the place on it.
+const TURNS: usize = 20;
+/// The most doublings of a first step along a parameter.
+const DOUBLINGS: usize = 20;
+/// The most halvings of an interval of a parameter.
+const BISECTIONS: usize = 60;
 /// The cosine of the angle between the surface and the way to a point beyond which a foot is not
 /// converged; distances below rounding have no direction.
 const ORTHOGONAL: f64 = 1e-6;
@@ -106,17 +114,38 @@ pub fn project_to_curve(curve: &Curve<3>, range: [f64; 2], point: &Point, start:
 /// fundamental form added until the matrix is positive definite. Parameters are not bounded: beyond
 /// their knots, splines continue by their last polynomials.
 pub fn project_to_surface(surface: &Surface, point: &Point, start: [f64; 2]) -> SurfaceFoot {
-    let [mut u, mut v] = start;
+    let [u, v] = start;
     if let Surface::Plane { origin, axes: [x, y] } = surface {
         // The axes are orthogonal.
         let way = point.coords - origin;
-        [u, v] = [x, y].map(|a| way.dot(a) / a.norm_squared());
+        let [u, v] = [x, y].map(|a| way.dot(a) / a.norm_squared());
         let foot = Point::from(origin + x * u + y * v);
         let normal = x.cross(y).normalize();
         return SurfaceFoot { parameters: [u, v], point: foot, normal, is_converged: true };
     }
-    let mut jet = surface.jet(u, v, 2);
+    let jet = surface.jet(u, v, 2);
     let scale = point.coords.amax().max(jet.d[0][0].amax()).max(surface.largest_term(v));
+    let mut at = descend(surface, point, [u, v], jet, scale);
+    let mut foot = foot_at(surface, point, at, scale);
+    // Newton's steps end at a crease, an isoparametric line across which the normal jumps, short of
+    // the nearest point on it.
+    for _ in 0..CREASES {
+        if foot.is_converged {
+            return foot;
+        }
+        at = descend_by_axes(surface, point, at, scale);
+        at = descend(surface, point, at, surface.jet(at[0], at[1], 2), scale);
+        let before = std::mem::replace(&mut foot, foot_at(surface, point, at, scale));
+        if (foot.point - before.point).norm() <= ROUNDING * scale {
+            break;
+        }
+    }
+    let is_converged = foot.is_converged || is_kink(surface, point, &foot, scale);
+    SurfaceFoot { is_converged, ..foot }
+}
+
+/// The parameters at which Newton's steps end.
+fn descend(surface: &Surface, point: &Point, [mut u, mut v]: [f64; 2], mut jet: Jet, scale: f64) -> [f64; 2] {
     for _ in 0..STEPS {
         let d = &jet.d;
         let way = d[0][0] - point.coords;
@@ -142,21 +171,83 @@ pub fn project_to_surface(surface: &Surface, point: &Point, start: [f64; 2]) -> 
             break;
         }
     }
+    [u, v]
+}
+
+/// The parameters of a minimum of the distance along both parameters in turn.
+///
+/// Along each the place is where the derivative changes its sign, which may be a jump: so the
+/// search goes to a crease and then along it.
+fn descend_by_axes(surface: &Surface, point: &Point, start: [f64; 2], scale: f64) -> [f64; 2] {
+    let slope = |at: [f64; 2], axis: usize| {
+        let jet = surface.jet(at[0], at[1], 1);
+        let along = if axis == 0 { jet.d[1][0] } else { jet.d[0][1] };
+        ((jet.d[0][0] - point.coords).dot(&along), along.norm())
+    };
+    let mut at = start;
+    for _ in 0..TURNS {
+        let before = surface.point(at);
+        for axis in [0, 1] {
+            let (first, speed) = slope(at, axis);
+            let mut step = -first / (speed * speed);
+            if !step.is_finite() || step == 0.0 {
+                continue;
+            }
+            // Away from the start until the slope changes its sign, then between both.
+            let shifted = |by: f64| {
+                let mut to = at;
+                to[axis] += by;
+                to
+            };
+            let is_before = |by: f64| slope(shifted(by), axis).0 * first > 0.0;
+            let mut low = 0.0;
+            let mut doublings = 0;
+            while is_before(step) && doublings < DOUBLINGS {
+                (low, step, doublings) = (step, 2.0 * step, doublings + 1);
+            }
+            let mut high = step;
+            for _ in 0..BISECTIONS {
+                let middle = 0.5 * (low + high);
+                if middle == low || middle == high {
+                    break;
+                }
+                if is_before(middle) { low = middle } else { high = middle }
+            }
+            let to = shifted(low);
+            if is_nearer(&(surface.point(to) - point), &(surface.point(at) - point), scale) {
+                at = to;
+            }
+        }
+        if (surface.point(at) - before).norm() <= f64::EPSILON * scale {
+            break;
+        }
+    }
+    at
+}
+
+/// The foot with these parameters; it is converged if the way to it is orthogonal to the surface.
+fn foot_at(surface: &Surface, point: &Point, parameters: [f64; 2], scale: f64) -> SurfaceFoot {
+    let jet = surface.jet(parameters[0], parameters[1], 2);
     let foot = jet.point();
     let way = foot - point;
     let normal = jet.normal().unwrap_or_else(Vector::zeros);
-    let rounding = ROUNDING * scale;
     let along = (way - normal * normal.dot(&way)).norm();
+    let is_converged = normal == Vector::zeros() || along <= ORTHOGONAL * way.norm() + ROUNDING * scale;
+    SurfaceFoot { parameters, point: foot, normal, is_converged }
+}
+
+/// Whether the distance grows in all directions from a place, though the way to it is not
+/// orthogonal: it is on a crease.
+fn is_kink(surface: &Surface, point: &Point, foot: &SurfaceFoot, scale: f64) -> bool {
+    let [u, v] = foot.parameters;
+    let jet = surface.jet(u, v, 1);
+    let way = foot.point - point;
+    let along = (way - foot.normal * foot.normal.dot(&way)).norm();
     let grows = |[a, b]: [f64; 2]| is_nearer(&way, &(surface.point([u + a, v + b]) - point), scale);
     let [a, b] =
         [jet.d[1][0], jet.d[0][1]].map(|d| along / d.norm().max(f64::MIN_POSITIVE)).map(|h| h.min(1.0));
-    // At a kink the nearest point is where the distance grows in all directions.
-    let is_kink = || {
-        let around = [[-a, 0.0], [a, 0.0], [0.0, -b], [0.0, b], [-a, -b], [a, b], [-a, b], [a, -b]];
-        around.into_iter().all(|step| grows(step) && grows(step.map(|h| 0.1 * h)))
-    };
-    let is_converged = normal == Vector::zeros() || along <= ORTHOGONAL * way.norm() + rounding || is_kink();
-    SurfaceFoot { parameters: [u, v], point: foot, normal, is_converged }
+    let around = [[-a, 0.0], [a, 0.0], [0.0, -b], [0.0, b], [-a, -b], [a, b], [-a, b], [a, -b]];
+    around.into_iter().all(|step| grows(step) && grows(step.map(|h| 0.1 * h)))
 }
 
 /// The least determinant of the second derivatives of half the squared distance, in units of that

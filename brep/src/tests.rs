@@ -222,6 +222,23 @@ proptest! {
     }
 
     #[test]
+    fn projections_onto_a_crease_end_at_its_nearest_point(
+        shear in -2.0..2.0f64, other in -2.0..2.0f64, slope in 0.02..1.0f64, x in 0.1..0.9f64,
+        up in 0.001..0.5f64, u in 0.0..1.0f64, v in 0.0..2.0f64,
+    ) {
+        // A roof whose ridge is the x-axis: its parameters are sheared, on both sides differently.
+        let row = |u: f64| [[u - shear, -1.0, -slope], [u, 0.0, 0.0], [u + other, 1.0, -slope]];
+        let poles = [row(0.0), row(1.0)].concat();
+        let poles: Vec<Vector4<f64>> = poles.into_iter().map(|[x, y, z]| Vector4::new(x, y, z, 1.0)).collect();
+        let across = Basis::new(1, &[0.0, 1.0, 2.0], &[2, 1, 2], 3, false).unwrap();
+        let along = Basis::new(1, &[0.0, 1.0], &[2, 2], 2, false).unwrap();
+        let roof = Surface::Spline(SplineSurface { bases: [along, across], poles, is_rational: false });
+        let foot = project_to_surface(&roof, &Point::new(x, 0.5 * slope * up, up), [u, v]);
+        let off = (foot.point - Point::new(x, 0.0, 0.0)).norm();
+        prop_assert!(foot.is_converged && off < 1e-7 * up, "{off:e} {foot:?}");
+    }
+
+    #[test]
     fn a_periodic_spline_repeats(mut random in numbers(), t in 0.0..2.5f64) {
         for is_rational in [false, true] {
             let curve = random.spline_curve(is_rational, true);
