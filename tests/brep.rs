@@ -188,6 +188,13 @@ fn solids_that_overlap_are_refused_with_their_numbers() {
 }
 
 #[test]
+fn a_solid_whose_faces_intersect_is_refused_with_their_numbers() {
+    let geometry = Geometry::from_file(own("step").with_extension("").join("pierced.step")).unwrap();
+    let error = Mesher::new().generate(&geometry).unwrap_err().to_string();
+    assert!(error.contains("the faces 1 and ") && error.contains(", 0), at "), "{error}");
+}
+
+#[test]
 fn what_solids_have_in_common_is_cut_out_of_all_but_one() {
     let path = own("step").with_extension("").join("press_fit.step");
     // The volumes of hub, shaft and screw by the CAD program, with each chosen to keep what it has.

@@ -75,6 +75,20 @@ pub enum CoarseError {
         /// Where the first pair intersects.
         first: Point,
     },
+    /// Two faces of one solid of a CAD file intersect, or one face intersects itself.
+    #[error(
+        "{} near ({}, {}, {}), at {count} pairs of triangles however fine these are: mend the solid in the CAD program, \
+         so that its faces meet in their edges alone",
+        faces_intersect(.faces), at.x, at.y, at.z
+    )]
+    FacesMeet {
+        /// The numbers of the faces in the file.
+        faces: [u32; 2],
+        /// Number of pairs of triangles.
+        count: usize,
+        /// Where they intersect deepest.
+        at: Point,
+    },
     /// Two solids of a CAD file overlap, or touch where they have no common face.
     #[error(
         "the solids {} ({}) and {} ({}) overlap, or touch without a common face, near ({}, {}, {}): give the \
@@ -110,6 +124,11 @@ fn triangles_of(files: &Option<Box<[String; 2]>>) -> String {
     }
 }
 
+/// Says that faces intersect.
+fn faces_intersect([a, b]: &[u32; 2]) -> String {
+    if a == b { format!("face {a} intersects itself") } else { format!("the faces {a} and {b} intersect") }
+}
+
 impl From<VolumeError> for CoarseError {
     fn from(error: VolumeError) -> Self {
         match error {
@@ -122,7 +141,10 @@ impl From<VolumeError> for CoarseError {
 impl HasKind for CoarseError {
     fn kind(&self) -> ErrorKind {
         match self {
-            Self::TooClose(_) | Self::FacetsMeet { .. } | Self::SolidsMeet { .. } => ErrorKind::Input,
+            Self::TooClose(_)
+            | Self::FacetsMeet { .. }
+            | Self::FacesMeet { .. }
+            | Self::SolidsMeet { .. } => ErrorKind::Input,
             Self::Room(_) => ErrorKind::Resources,
             Self::Cancelled(_) => ErrorKind::Cancelled,
             _ => ErrorKind::NoMesh,

@@ -315,6 +315,11 @@ impl FacetSolid {
         if let Some(meeting) = crossings.iter().find_map(|crossing| self.solids_meet(crossing)) {
             return Some(meeting);
         }
+        if self.exact.is_some() {
+            let deepest = crossings.iter().max_by(|a, b| a.depth.total_cmp(&b.depth))?;
+            let faces = deepest.patches.map(|patch| self.names.patches[patch.index()].number);
+            return Some(CoarseError::FacesMeet { faces, count: crossings.len(), at: deepest.at });
+        }
         let files = |crossing: &Crossing| {
             let file = |patch| self.model.patch(patch).labels.first().map(|label| label.0);
             let [a, b] = crossing.patches.map(file);

@@ -16,6 +16,10 @@ pub(super) struct Cad {
 /// How often a tessellation is made finer because its triangles intersect.
 const FINER: i32 = 3;
 
+/// Facets that intersect deeper than this, in largest distances of facets from their faces, do so
+/// because the faces do: twice would be enough if the distances were not found by samples.
+const DEEPER: f64 = 5.0;
+
 /// Facets that approximate a boundary representation, so fine that those of close faces do not
 /// intersect, unless the faces do.
 pub(super) fn tessellated(
@@ -26,13 +30,20 @@ pub(super) fn tessellated(
     for k in 0..FINER {
         let settings =
             brep::Settings { chord: initial.chord * 0.1_f64.powi(k), angle: initial.angle * 0.5_f64.powi(k) };
-        let tessellation = brep::Tessellation::of(&mut model, &settings)?;
+        let tessellation = match brep::Tessellation::of(&mut model, &settings) {
+            Ok(tessellation) => tessellation,
+            Err(error) if coarsest.is_none() => return Err(error),
+            // The intersection tells more than that finer facets would be too many.
+            Err(_) => break,
+        };
         let made = of_brep(&model, &tessellation);
         let crossings = made.0.intersections();
         if !crossings.iter().any(|crossing| made.0.is_deep(crossing)) {
             return Ok((Cad { model, settings, tessellation }, made));
         }
-        let never_ends = touch(&made.0, &made.1, &crossings);
+        let most = DEEPER * settings.chord * (made.0.bounds.max - made.0.bounds.min).norm();
+        let never_ends =
+            crossings.iter().any(|crossing| crossing.depth > most) || touch(&made.0, &made.1, &crossings);
         coarsest.get_or_insert((settings, tessellation, made));
         if never_ends {
             break;

@@ -1,6 +1,6 @@
 //! Facets that intersect.
 
-use super::FacetModel;
+use super::{FacetModel, FacetPatch};
 use crate::ground::kernel::nearest::in_segment;
 use crate::ground::kernel::simplex::area_vector;
 use crate::mesher::volume::intersections;
@@ -35,9 +35,17 @@ impl FacetModel {
         intersections(&self.points, &triangles).into_iter().map(crossing).collect()
     }
 
-    /// Whether an intersection is deeper than rounding of the coordinates explains.
+    /// Whether an intersection is deeper than rounding of the coordinates explains, or the accuracy
+    /// that the file states for the edges of faces of one body.
+    ///
+    /// Where edges of a narrow corner are off their place by more than it is wide, its facets fold,
+    /// but not the larger triangles of a mesh.
     pub fn is_deep(&self, crossing: &Crossing) -> bool {
-        crossing.depth > DEEP * self.rounding
+        let [a, b] = crossing.patches.map(|patch| self.patch(patch));
+        let sides = |patch: &FacetPatch| [patch.inside, patch.outside];
+        let are_of_one_body = sides(a).into_iter().flatten().any(|body| sides(b).contains(&Some(body)));
+        let inaccuracy = if are_of_one_body { a.inaccuracy.max(b.inaccuracy) } else { 0.0 };
+        crossing.depth > inaccuracy.max(DEEP * self.rounding)
     }
 }
 
@@ -68,6 +76,7 @@ fn beyond(triangle: &[Point; 3], plane: &[Point; 3]) -> f64 {
 mod tests {
     use super::super::samples::Soup;
     use super::super::{FacetModel, Settings};
+    use crate::Point;
 
     #[test]
     fn the_depth_of_an_intersection_is_the_way_out_of_it() {
@@ -75,8 +84,8 @@ mod tests {
             let mut soup = Soup::default();
             soup.brick([0.0; 3], [1.0, 3.0, 3.0], false);
             // The corner of a tetrahedron in a side of the brick.
-            let [a, b, c, d] = [[1.0 - depth, 1.6, 1.5], [2.0, 1.0, 1.0], [2.0, 2.1, 1.2], [2.0, 1.5, 2.0]]
-                .map(crate::Point::from);
+            let [a, b, c, d] =
+                [[1.0 - depth, 1.6, 1.5], [2.0, 1.0, 1.0], [2.0, 2.1, 1.2], [2.0, 1.5, 2.0]].map(Point::from);
             [[a, c, b], [a, d, c], [a, b, d], [b, c, d]].into_iter().for_each(|t| soup.add(t));
             let model = FacetModel::new(&[soup.facets], &Settings::default()).unwrap();
             let found = model.intersections();
@@ -84,6 +93,25 @@ mod tests {
             assert!(!found.is_empty() && deepest <= depth * (1.0 + 1e-6), "{depth}: {found:?}");
             assert!(deepest > 0.1 * depth, "{depth}: {found:?}");
             assert!(found.iter().any(|crossing| model.is_deep(crossing)));
+        }
+    }
+
+    #[test]
+    fn faces_of_one_body_may_intersect_as_deep_as_their_edges_are_off() {
+        // A fin of one body, 10⁻³ deep in another side of it.
+        let mut soup = Soup::default();
+        soup.brick([0.0; 3], [1.0, 3.0, 3.0], false);
+        let [a, b, c, d] =
+            [[0.999, 1.6, 1.5], [2.0, 1.0, 1.0], [2.0, 2.1, 1.2], [2.0, 1.5, 2.0]].map(Point::from);
+        [[a, c, b], [a, d, c], [a, b, d], [b, c, d]].into_iter().for_each(|t| soup.add(t));
+        let mut model = FacetModel::new(&[soup.facets], &Settings::default()).unwrap();
+        let is_deep =
+            |model: &FacetModel| model.intersections().iter().any(|crossing| model.is_deep(crossing));
+        let body = model.patches[0].inside;
+        for (inside, inaccuracy, deep) in [(body, 1e-2, false), (body, 1e-5, true), (None, 1e-2, true)] {
+            model.patches.iter_mut().for_each(|patch| patch.inaccuracy = inaccuracy);
+            model.patches.iter_mut().skip(1).for_each(|patch| patch.inside = inside);
+            assert_eq!(is_deep(&model), deep, "{inaccuracy}");
         }
     }
 }

@@ -65,6 +65,19 @@ impl Shape {
     }
 }
 
+/// How far the edges of a face are off it, or their ends off them.
+fn inaccuracy(model: &Model, face: usize) -> f64 {
+    let sides = model.patches[face].loops.iter().flatten();
+    let of_side = |on: On| match on {
+        On::Curve(edge) => {
+            let edge = &model.curves[edge];
+            edge.ends.iter().map(|&end| model.corners[end].tolerance).fold(edge.tolerance, f64::max)
+        }
+        On::Corner(corner) => model.corners[corner].tolerance,
+    };
+    sides.map(|side| of_side(side.on)).fold(0.0, f64::max)
+}
+
 /// Takes the tessellation of a model as facets, and its faces and edges as patches and curves.
 ///
 /// Seams of smooth surfaces are no curves, and a closed edge has a corner only where it has one in
@@ -104,7 +117,8 @@ pub(super) fn grouped(
         let [behind, front] = model.patches[faces[0]].bodies;
         let [inside, outside] = if is_reversed[faces[0]] { [front, behind] } else { [behind, front] };
         let body = |b: Option<usize>| b.map(BodyId::new);
-        FacetPatch { inside: body(inside), outside: body(outside), labels: vec![(0, 0)] }
+        let inaccuracy = faces.iter().map(|&face| inaccuracy(model, face)).fold(0.0, f64::max);
+        FacetPatch { inside: body(inside), outside: body(outside), labels: vec![(0, 0)], inaccuracy }
     };
     let patches: Vec<FacetPatch> = grouping.patches.iter().map(patch).collect();
     let shaping = |face: usize| if is_main[face] { patch_of_face[face] } else { NO_PATCH };

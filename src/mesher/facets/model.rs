@@ -79,7 +79,7 @@ pub struct FacetBody {
 }
 
 /// A patch: facets connected over edges that are not sharp.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct FacetPatch {
     /// The body that its normals point away from.
     pub inside: Option<BodyId>,
@@ -87,6 +87,9 @@ pub struct FacetPatch {
     pub outside: Option<BodyId>,
     /// The surfaces that contain it, each with its group there; several if they share facets.
     pub labels: Vec<(u32, u32)>,
+    /// The largest distance of its edges from it, or of their ends from them, that the file states
+    /// (length); 0 for triangles.
+    pub inaccuracy: f64,
 }
 
 /// A curve: a chain of edges between corners, or a closed one.
@@ -235,7 +238,7 @@ fn assemble(joined: Joined, regions: &Regions, found: Found, bounds: Aabb, round
             let [inside, outside] = regions.sides[t].map(|b| b.map(BodyId));
             let mut labels: Vec<(u32, u32)> = joined.layers[t].iter().map(|l| (l.file, l.group)).collect();
             labels.dedup();
-            FacetPatch { inside, outside, labels }
+            FacetPatch { inside, outside, labels, inaccuracy: 0.0 }
         });
     }
     let corner = |v: u32| found.corners.binary_search(&v).ok().map(CornerId::new);
