@@ -3,6 +3,7 @@
 use super::lattice::Lattice;
 use crate::Point;
 use csg::Aabb;
+use rayon::prelude::*;
 use std::ops::Range;
 
 /// A point with a prescribed size: at distance d from it, the size is at most `size + grading·d`.
@@ -247,8 +248,8 @@ pub(crate) fn thinned(sources: Vec<Source>) -> Vec<Source> {
         let cell = [s.point.x, s.point.y, s.point.z].map(|x| (x / width).floor() as i64);
         (level as i32, cell, s)
     };
-    let mut keyed: Vec<_> = sources.into_iter().map(keyed).collect();
-    keyed.sort_by(|a, b| (a.0, a.1).cmp(&(b.0, b.1)).then(a.2.size.total_cmp(&b.2.size)));
+    let mut keyed: Vec<_> = sources.into_par_iter().map(keyed).collect();
+    keyed.par_sort_by(|a, b| (a.0, a.1).cmp(&(b.0, b.1)).then(a.2.size.total_cmp(&b.2.size)));
     keyed.dedup_by_key(|(level, cell, _)| (*level, *cell));
     keyed.into_iter().map(|(_, _, source)| source).collect()
 }

@@ -1,5 +1,7 @@
 //! The edges of a triangulated surface, each with any number of triangles.
 
+use rayon::prelude::*;
+
 /// The use of an edge by a triangle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Use {
@@ -33,7 +35,7 @@ impl Edges {
                 uses.push(Use { ends, triangle: t as u32, side: side as u8, along: a < b });
             }
         }
-        uses.sort_unstable();
+        uses.par_sort_unstable();
         let mut edges = Self { uses, starts: vec![0], of_side: vec![[0; 3]; triangles.len()] };
         for uses in edges.uses.chunk_by(|a, b| a.ends == b.ends) {
             let edge = edges.starts.len() as u32 - 1;

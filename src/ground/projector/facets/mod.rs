@@ -8,6 +8,7 @@ use crate::ground::kernel::tree::{Tree, bounds};
 use crate::{Point, Vector};
 use csg::{CurveId, PatchId};
 use edges::Edges;
+use rayon::prelude::*;
 
 /// Patches as facets and curves as polylines, with projection to them.
 ///
@@ -114,7 +115,7 @@ impl FacetProjector {
             }
             own
         };
-        let patches = members.iter().map(patch).collect();
+        let patches = members.par_iter().map(patch).collect();
         let polyline = |c: &Vec<u32>| {
             Polyline::new(c.iter().map(|&v| source.points[v as usize]).collect(), ON_PLANE * tolerance)
         };

@@ -9,6 +9,7 @@
 use super::edges::Edges;
 use crate::ground::kernel::simplex::area_vector;
 use crate::{Point, Vector};
+use rayon::prelude::*;
 
 /// A facet whose height is at most this many roundings is a sliver; the normals of others are
 /// accurate to about 2°.
@@ -66,13 +67,14 @@ pub(crate) fn trusted(
     edges: &Edges,
     rounding: f64,
 ) -> (Vec<Vector>, Vec<bool>) {
-    let shapes: Vec<Shape> = triangles.iter().map(|t| Shape::of(t.map(|v| &points[v as usize]))).collect();
+    let shapes: Vec<Shape> =
+        triangles.par_iter().map(|t| Shape::of(t.map(|v| &points[v as usize]))).collect();
     let mut sliver: Vec<bool> = shapes.iter().map(|s| s.height <= SLIVER_HEIGHT * rounding).collect();
     let mut normals = normals_without(&shapes, &sliver, edges);
     // A sliver beside another one is found after it.
     for _ in 0..ROUNDS {
-        let astray: Vec<usize> =
-            (0..shapes.len()).filter(|&t| !sliver[t] && is_astray(t, &shapes[t], &normals, edges)).collect();
+        let strays = |&t: &usize| !sliver[t] && is_astray(t, &shapes[t], &normals, edges);
+        let astray: Vec<usize> = (0..shapes.len()).into_par_iter().filter(strays).collect();
         if astray.is_empty() {
             break;
         }
