@@ -182,38 +182,19 @@ fn descend_by_axes(surface: &Surface, point: &Point, start: [f64; 2], scale: f64
     let slope = |at: [f64; 2], axis: usize| {
         let jet = surface.jet(at[0], at[1], 1);
         let along = if axis == 0 { jet.d[1][0] } else { jet.d[0][1] };
-        ((jet.d[0][0] - point.coords).dot(&along), along.norm())
+        ((jet.d[0][0] - point.coords).dot(&along), along.norm_squared())
     };
     let mut at = start;
     for _ in 0..TURNS {
         let before = surface.point(at);
         for axis in [0, 1] {
-            let (first, speed) = slope(at, axis);
-            let mut step = -first / (speed * speed);
+            let (first, square) = slope(at, axis);
+            let step = -first / square;
             if !step.is_finite() || step == 0.0 {
                 continue;
             }
-            // Away from the start until the slope changes its sign, then between both.
-            let shifted = |by: f64| {
-                let mut to = at;
-                to[axis] += by;
-                to
-            };
-            let is_before = |by: f64| slope(shifted(by), axis).0 * first > 0.0;
-            let mut low = 0.0;
-            let mut doublings = 0;
-            while is_before(step) && doublings < DOUBLINGS {
-                (low, step, doublings) = (step, 2.0 * step, doublings + 1);
-            }
-            let mut high = step;
-            for _ in 0..BISECTIONS {
-                let middle = 0.5 * (low + high);
-                if middle == low || middle == high {
-                    break;
-                }
-                if is_before(middle) { low = middle } else { high = middle }
-            }
-            let to = shifted(low);
+            let shifted = |by: f64| [0, 1].map(|k| if k == axis { at[k] + by } else { at[k] });
+            let to = shifted(end_of(step, |by| slope(shifted(by), axis).0 * first > 0.0));
             if is_nearer(&(surface.point(to) - point), &(surface.point(at) - point), scale) {
                 at = to;
             }
@@ -223,6 +204,26 @@ fn descend_by_axes(surface: &Surface, point: &Point, start: [f64; 2], scale: f64
         }
     }
     at
+}
+
+/// About how far a condition holds in the direction of a step, which is doubled while it does.
+fn end_of(mut step: f64, holds: impl Fn(f64) -> bool) -> f64 {
+    let mut low = 0.0;
+    for _ in 0..DOUBLINGS {
+        if !holds(step) {
+            break;
+        }
+        (low, step) = (step, 2.0 * step);
+    }
+    let mut high = step;
+    for _ in 0..BISECTIONS {
+        let middle = 0.5 * (low + high);
+        if middle == low || middle == high {
+            break;
+        }
+        if holds(middle) { low = middle } else { high = middle }
+    }
+    low
 }
 
 /// The foot with these parameters; it is converged if the way to it is orthogonal to the surface.
