@@ -44,7 +44,17 @@ pub fn in_order<S: Sync, T: Copy + Sync, D: Send>(
     }
 }
 
-/// [`in_order`] for changes of vertices that depend on their neighbours alone.
+/// [`in_order`] for decisions that do not depend on the changes before them.
+pub fn independent<S: Sync, T: Copy + Sync, D: Send>(
+    state: &mut S,
+    items: &[T],
+    decide: impl Fn(&S, T) -> D + Sync,
+    make: impl FnMut(&mut S, T, D),
+) {
+    in_order(state, items, |_| 0, decide, |_, _, _, _| true, make);
+}
+
+/// [`in_order`] for changes of vertices, ascending, that depend on their neighbours alone.
 ///
 /// `neighbours` appends the neighbours of a vertex, which the changes must leave as they are.
 pub fn over_vertices<S: Sync, D: Send>(
@@ -54,12 +64,13 @@ pub fn over_vertices<S: Sync, D: Send>(
     decide: impl Fn(&S, u32) -> D + Sync,
     mut make: impl FnMut(&mut S, u32, D),
 ) {
-    let is_alone = rayon::current_num_threads() == 1;
+    // One thread decides on each when its turn comes.
+    if rayon::current_num_threads() == 1 {
+        return independent(state, vertices, decide, make);
+    }
     for block in vertices.chunks(BLOCK) {
-        let groups =
-            if is_alone { vec![block.to_vec()] } else { levels(block, |v, near| neighbours(state, v, near)) };
-        for group in groups {
-            in_order(state, &group, |_| 0, &decide, |_, _, _, _| true, &mut make);
+        for group in levels(block, |v, near| neighbours(state, v, near)) {
+            independent(state, &group, &decide, &mut make);
         }
     }
 }

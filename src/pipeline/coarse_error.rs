@@ -77,7 +77,7 @@ pub enum CoarseError {
     },
     /// Two faces of one solid of a CAD file intersect, or one face intersects itself.
     #[error(
-        "{} near ({}, {}, {}), at {count} pairs of triangles however fine these are: mend the solid in the CAD program, \
+        "{} near ({}, {}, {}), at {count} pairs of triangles: mend the solid in the CAD program, \
          so that its faces meet in their edges alone",
         faces_intersect(.faces), at.x, at.y, at.z
     )]

@@ -333,7 +333,7 @@ impl FacetSolid {
     /// The error for an intersection of faces of two solids of a CAD file.
     fn solids_meet(&self, crossing: &Crossing) -> Option<CoarseError> {
         self.exact.as_ref()?;
-        if !solids::are_of_different_bodies(&self.model, crossing) {
+        if !self.model.are_of_different_bodies(crossing) {
             return None;
         }
         let solid = |patch: PatchId| {

@@ -62,13 +62,7 @@ const TURNS: usize = 30;
 /// would intersect too.
 pub(super) fn touch(model: &FacetModel, exact: &BrepProjector, crossings: &[Crossing]) -> bool {
     let size = (model.bounds.max - model.bounds.min).norm();
-    crossings.iter().any(|crossing| are_of_different_bodies(model, crossing) && meet(exact, crossing, size))
-}
-
-/// Whether no body is beside both patches of facets that intersect.
-pub(super) fn are_of_different_bodies(model: &FacetModel, crossing: &Crossing) -> bool {
-    let [a, b] = crossing.patches.map(|id| [model.patch(id).inside, model.patch(id).outside]);
-    !a.iter().flatten().any(|body| b.contains(&Some(*body)))
+    crossings.iter().any(|crossing| model.are_of_different_bodies(crossing) && meet(exact, crossing, size))
 }
 
 /// Whether two patches have a common point near where their facets intersect.

@@ -1,6 +1,6 @@
 //! Facets that intersect.
 
-use super::{FacetModel, FacetPatch};
+use super::FacetModel;
 use crate::ground::kernel::nearest::in_segment;
 use crate::ground::kernel::simplex::area_vector;
 use crate::mesher::volume::intersections;
@@ -41,11 +41,15 @@ impl FacetModel {
     /// Where edges of a narrow corner are off their place by more than it is wide, its facets fold,
     /// but not the larger triangles of a mesh.
     pub fn is_deep(&self, crossing: &Crossing) -> bool {
-        let [a, b] = crossing.patches.map(|patch| self.patch(patch));
-        let sides = |patch: &FacetPatch| [patch.inside, patch.outside];
-        let are_of_one_body = sides(a).into_iter().flatten().any(|body| sides(b).contains(&Some(body)));
-        let inaccuracy = if are_of_one_body { a.inaccuracy.max(b.inaccuracy) } else { 0.0 };
+        let [a, b] = crossing.patches.map(|patch| self.patch(patch).inaccuracy);
+        let inaccuracy = if self.are_of_different_bodies(crossing) { 0.0 } else { a.max(b) };
         crossing.depth > inaccuracy.max(DEEP * self.rounding)
+    }
+
+    /// Whether no body is beside both patches of facets that intersect.
+    pub fn are_of_different_bodies(&self, crossing: &Crossing) -> bool {
+        let [a, b] = crossing.patches.map(|id| [self.patch(id).inside, self.patch(id).outside]);
+        !a.iter().flatten().any(|body| b.contains(&Some(*body)))
     }
 }
 
@@ -78,16 +82,20 @@ mod tests {
     use super::super::{FacetModel, Settings};
     use crate::Point;
 
+    /// A brick, and a tetrahedron whose corner is this deep in a side of it.
+    fn brick_and_corner(depth: f64) -> FacetModel {
+        let mut soup = Soup::default();
+        soup.brick([0.0; 3], [1.0, 3.0, 3.0], false);
+        let [a, b, c, d] =
+            [[1.0 - depth, 1.6, 1.5], [2.0, 1.0, 1.0], [2.0, 2.1, 1.2], [2.0, 1.5, 2.0]].map(Point::from);
+        [[a, c, b], [a, d, c], [a, b, d], [b, c, d]].into_iter().for_each(|t| soup.add(t));
+        FacetModel::new(&[soup.facets], &Settings::default()).unwrap()
+    }
+
     #[test]
     fn the_depth_of_an_intersection_is_the_way_out_of_it() {
         for depth in [0.25, 1e-3, 1e-9] {
-            let mut soup = Soup::default();
-            soup.brick([0.0; 3], [1.0, 3.0, 3.0], false);
-            // The corner of a tetrahedron in a side of the brick.
-            let [a, b, c, d] =
-                [[1.0 - depth, 1.6, 1.5], [2.0, 1.0, 1.0], [2.0, 2.1, 1.2], [2.0, 1.5, 2.0]].map(Point::from);
-            [[a, c, b], [a, d, c], [a, b, d], [b, c, d]].into_iter().for_each(|t| soup.add(t));
-            let model = FacetModel::new(&[soup.facets], &Settings::default()).unwrap();
+            let model = brick_and_corner(depth);
             let found = model.intersections();
             let deepest = found.iter().map(|crossing| crossing.depth).fold(0.0, f64::max);
             assert!(!found.is_empty() && deepest <= depth * (1.0 + 1e-6), "{depth}: {found:?}");
@@ -98,13 +106,7 @@ mod tests {
 
     #[test]
     fn faces_of_one_body_may_intersect_as_deep_as_their_edges_are_off() {
-        // A fin of one body, 10⁻³ deep in another side of it.
-        let mut soup = Soup::default();
-        soup.brick([0.0; 3], [1.0, 3.0, 3.0], false);
-        let [a, b, c, d] =
-            [[0.999, 1.6, 1.5], [2.0, 1.0, 1.0], [2.0, 2.1, 1.2], [2.0, 1.5, 2.0]].map(Point::from);
-        [[a, c, b], [a, d, c], [a, b, d], [b, c, d]].into_iter().for_each(|t| soup.add(t));
-        let mut model = FacetModel::new(&[soup.facets], &Settings::default()).unwrap();
+        let mut model = brick_and_corner(1e-3);
         let is_deep =
             |model: &FacetModel| model.intersections().iter().any(|crossing| model.is_deep(crossing));
         let body = model.patches[0].inside;

@@ -25,7 +25,7 @@ pub(super) fn flip_all(sheet: &mut Sheet) -> usize {
             if flips < most
                 && let Some(flip) = trial.flip
             {
-                make(sheet, &flip);
+                apply(sheet, &flip);
                 flips += 1;
                 let [p, q] = flip.apexes;
                 next.extend([[a, p], [p, b], [b, q], [q, a]]);
@@ -81,7 +81,7 @@ struct Trial {
 /// Flips an edge if that is an improvement; returns the ends of the new edge.
 pub(super) fn flip(sheet: &mut Sheet, a: u32, b: u32) -> Option<[u32; 2]> {
     let flip = try_flip(sheet, a, b).flip?;
-    make(sheet, &flip);
+    apply(sheet, &flip);
     Some(flip.apexes)
 }
 
@@ -126,7 +126,7 @@ fn improves(sheet: &Sheet, [a, b]: [u32; 2], flip: &Flip) -> bool {
 }
 
 /// Replaces the two triangles.
-fn make(sheet: &mut Sheet, flip: &Flip) {
+fn apply(sheet: &mut Sheet, flip: &Flip) {
     for (old, new) in flip.old.into_iter().zip(flip.new) {
         for v in sheet.at(old).v {
             sheet.around[v as usize].retain(|&x| x != old);

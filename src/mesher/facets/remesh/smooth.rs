@@ -27,7 +27,7 @@ pub(super) fn smooth_all(sheet: &mut Sheet) -> usize {
 }
 
 /// What the trial of a move found.
-pub(super) enum Trial {
+enum Trial {
     /// Nothing has changed since the last trial.
     Known,
     /// No place that is better.

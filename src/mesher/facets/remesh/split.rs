@@ -1,9 +1,9 @@
 //! Splits of long edges at their midpoints.
 
 use super::collapse::MOST_TURN;
-use super::sheet::{Kind, NONE, Sheet, Triangle, now};
+use super::sheet::{Kind, NONE, Sheet, Triangle};
 use crate::Point;
-use crate::ground::ordered::in_order;
+use crate::ground::ordered::independent;
 use crate::ground::size::SizeField;
 use rayon::prelude::*;
 use std::collections::HashSet;
@@ -21,8 +21,7 @@ pub(super) fn split_long(sheet: &mut Sheet, long: f64) -> usize {
         shortens(sheet, a, b, &middle).then_some(middle)
     };
     // The midpoint of an edge does not depend on the splits of others.
-    let holds = |_: &Sheet, _, _, _: &_| true;
-    in_order(sheet, &edges, now, decide, holds, |sheet, [a, b], middle| {
+    independent(sheet, &edges, decide, |sheet, [a, b], middle| {
         if let Some(middle) = middle {
             split(sheet, a, b, &middle);
             splits += 1;

@@ -107,10 +107,6 @@ pub(super) fn merge_all(shape: &Shape, layout: &Layout, small: &Small) -> (Optio
     for cut in &layout.cuts {
         (allowed.faces[cut.tip], allowed.edges[cut.edge]) = (true, true);
     }
-    let mut triangles_of: Vec<Vec<u32>> = vec![Vec::new(); model.patches.len()];
-    for (t, triangle) in tessellation.triangles.iter().enumerate() {
-        triangles_of[triangle.patch as usize].push(t as u32);
-    }
     loop {
         if !allowed.faces.iter().chain(&allowed.edges).any(|allowed| *allowed) {
             return (None, MergedSmall::default());
@@ -135,10 +131,7 @@ pub(super) fn merge_all(shape: &Shape, layout: &Layout, small: &Small) -> (Optio
         let point = |v: u32| tessellation.points[v as usize];
         let points_of_edge =
             |edge: usize| tessellation.lines[edge].iter().map(|on| point(on.0)).collect::<Vec<_>>();
-        let points_of_face = |face: usize| {
-            let of_face = triangles_of[face].iter().map(|&t| tessellation.triangles[t as usize]);
-            of_face.flat_map(|t| t.vertices.map(point)).collect()
-        };
+        let points_of_face = |face: usize| layout.triangles[face].as_flattened().to_vec();
         let mut are_all_small = true;
         for merged in &report.faces {
             let face = merged.face - 1;

@@ -35,6 +35,8 @@ pub(in crate::mesher::facets) struct Layout<'a> {
     pub lengths: Vec<f64>,
     /// The width of each face at its widest place; infinite without edges.
     pub widths: Vec<f64>,
+    /// The corners of the triangles of each face.
+    pub triangles: Vec<Vec<[Point; 3]>>,
     /// Tips that were cut off.
     pub cuts: Vec<TipCut>,
     /// The triangles at each segment of a curve.
@@ -85,18 +87,29 @@ impl<'a> Layout<'a> {
             }
         }
         let widths = Vec::new();
-        let mut out =
-            Self { model, tessellation, curves, is_corner, faces_of, around, lengths, widths, cuts, beside };
+        let mut triangles = vec![Vec::new(); model.patches.len()];
+        for t in &tessellation.triangles {
+            triangles[t.patch as usize].push(t.vertices.map(|v| tessellation.points[v as usize]));
+        }
+        let mut out = Self {
+            model,
+            tessellation,
+            curves,
+            is_corner,
+            faces_of,
+            around,
+            lengths,
+            widths,
+            triangles,
+            cuts,
+            beside,
+        };
         out.widths = out.measured_widths();
         out
     }
 
     /// The width of each face: twice the largest distance of points inside from its edges.
     fn measured_widths(&self) -> Vec<f64> {
-        let mut triangles: Vec<Vec<[Point; 3]>> = vec![Vec::new(); self.model.patches.len()];
-        for t in &self.tessellation.triangles {
-            triangles[t.patch as usize].push(t.vertices.map(|v| self.tessellation.points[v as usize]));
-        }
         let width = |face: usize| {
             let segments: Vec<[Point; 2]> = self.segments(&self.around[face]).map(|s| self.ends(s)).collect();
             if segments.is_empty() {
@@ -112,7 +125,7 @@ impl<'a> Layout<'a> {
                 let middles = [(a, b), (b, c), (c, a)].map(|(p, q)| squared(nalgebra::center(p, q)));
                 middles.into_iter().fold(squared(centroid), f64::max)
             };
-            2.0 * triangles[face].iter().map(of).fold(0.0, f64::max).sqrt()
+            2.0 * self.triangles[face].iter().map(of).fold(0.0, f64::max).sqrt()
         };
         (0..self.model.patches.len()).into_par_iter().map(width).collect()
     }
