@@ -397,6 +397,32 @@ fn faces_of_no_solid_are_one_if_they_enclose_it() {
 }
 
 #[test]
+fn a_finer_patch_leaves_those_that_it_does_not_touch() {
+    let mut model = Model::read(&file("box_with_hole")).unwrap();
+    let before = Tessellation::of(&mut model, &Settings::default()).unwrap();
+    let triangles = |t: &Tessellation, patch: usize| -> Vec<[Point; 3]> {
+        let of_patch = t.triangles.iter().filter(|triangle| triangle.patch as usize == patch);
+        of_patch.map(|triangle| triangle.vertices.map(|v| t.points[v as usize])).collect()
+    };
+    let hole = (0..model.patches.len()).find(|&k| !model.patches[k].surface.is_plane()).unwrap();
+    let mut settings = before.settings().to_vec();
+    settings[hole] = Settings { chord: 1e-5, angle: 0.05 };
+    // The tessellation checks that the body is closed.
+    let after = before.with_settings(&mut model, settings.clone()).unwrap();
+    assert_eq!(after.settings(), settings);
+    let is_same = |patch: &usize| triangles(&before, *patch) == triangles(&after, *patch);
+    let [same, other]: [Vec<usize>; 2] =
+        [true, false].map(|same| (0..model.patches.len()).filter(|patch| is_same(patch) == same).collect());
+    // Four sides of the box have no edge in common with the hole, two have.
+    assert!(same.len() == 4 && other.len() == 3 && other.contains(&hole), "{same:?} {other:?}");
+    let [few, many] = [&before, &after].map(|t| triangles(t, hole).len());
+    assert!(many > 2 * few, "{few} {many}");
+    // What is as fine as before is the same.
+    let again = after.with_settings(&mut model, settings).unwrap();
+    assert_eq!(again.triangles, after.triangles);
+}
+
+#[test]
 fn errors_have_the_line() {
     let text = String::from_utf8(file("torus")).unwrap();
     let broken = text.replace("\nEd", "\nXd");

@@ -42,6 +42,8 @@ pub struct Cut {
     pub curves: Vec<usize>,
     /// For each curve, that of the first model of which it is a part; `None` for cuts.
     pub parts_of: Vec<Option<usize>>,
+    /// For each patch, that of the first model of which it is a part.
+    pub patch_parts_of: Vec<usize>,
 }
 
 impl Model {
@@ -130,7 +132,8 @@ impl Model {
         if !model.patch_names.is_empty() {
             model.patch_names.resize(model.patches.len(), None);
         }
-        Some(Cut { model, patches, curves, parts_of })
+        let patch_parts_of = (0..self.patches.len()).chain(tips.iter().map(|tip| tip.patch)).collect();
+        Some(Cut { model, patches, curves, parts_of, patch_parts_of })
     }
 
     /// The curve of a side, and the corner at its start or end.
@@ -267,7 +270,7 @@ mod tests {
             assert_eq!(cut.parts_of.iter().filter(|of| of.is_none()).count(), tips.len());
             assert!(cut.curves.iter().all(|&curve| cut.parts_of[curve].is_none()));
             // The tessellation checks that the body is closed.
-            let after = Tessellation::of_cut(&mut cut, &before, &Settings::default()).unwrap();
+            let after = Tessellation::of_cut(&mut cut, &before).unwrap();
             // Patches that no cut meets keep their triangles.
             let corners = |t: &Tessellation, patch: u32| -> Vec<[Point; 3]> {
                 let of_patch = t.triangles.iter().filter(|triangle| triangle.patch == patch);

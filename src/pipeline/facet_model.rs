@@ -194,7 +194,7 @@ impl FacetSolid {
         let size = |model: &FacetModel| -> Box<dyn SizeField> {
             Box::new(AtMost(FacetSize::evaluated(model, settings, Evaluation::Searched), largest))
         };
-        let small = Small { factor, largest, tip_factor, tessellated: cad.settings, size: &size };
+        let small = Small { factor, largest, tip_factor, size: &size };
         let (merged, report) = merge(&cad.model, &cad.tessellation, &small);
         let solid = merged.map(|(model, exact, grouping)| {
             let label = |faces: &Vec<usize>| self.names.patches[faces[0]].clone();

@@ -3,54 +3,79 @@
 use crate::Point;
 use crate::ground::projector::BrepProjector;
 use crate::mesher::facets::{Crossing, FacetModel, of_brep};
+use csg::PatchId;
 
 /// A boundary representation with its tessellation.
 #[derive(Debug)]
 pub(super) struct Cad {
     pub model: brep::Model,
-    /// How it is tessellated.
-    pub settings: brep::Settings,
     pub tessellation: brep::Tessellation,
 }
 
-/// How often a tessellation is made finer because its triangles intersect.
-const FINER: i32 = 3;
+/// Faces whose facets have a smaller chord (fraction of the size of the model) get no finer ones.
+const FINEST: f64 = 2e-5;
+
+/// How often faces are made finer because their facets intersect: usually twice, and again where
+/// the finer facets of one face reach through those of another one.
+const MOST_ROUNDS: usize = 12;
 
 /// Facets that intersect deeper than this, in largest distances of facets from their faces, do so
 /// because the faces do: twice would be enough if the distances were not found by samples.
 const DEEPER: f64 = 5.0;
 
-/// Facets that approximate a boundary representation, so fine that those of close faces do not
-/// intersect, unless the faces do.
+/// Facets that approximate a boundary representation. Where those of close faces intersect, these
+/// faces have finer ones, unless the faces themselves intersect.
 pub(super) fn tessellated(
     mut model: brep::Model,
 ) -> Result<(Cad, (FacetModel, BrepProjector)), brep::BrepError> {
-    let initial = brep::Settings::default();
-    let mut coarsest = None;
-    for k in 0..FINER {
-        let settings =
-            brep::Settings { chord: initial.chord * 0.1_f64.powi(k), angle: initial.angle * 0.5_f64.powi(k) };
-        let tessellation = match brep::Tessellation::of(&mut model, &settings) {
-            Ok(tessellation) => tessellation,
-            Err(error) if coarsest.is_none() => return Err(error),
-            // The intersection tells more than that finer facets would be too many.
-            Err(_) => break,
+    let first = brep::Tessellation::of(&mut model, &brep::Settings::default())?;
+    let made = of_brep(&model, &first);
+    let mut finer: Option<(brep::Tessellation, (FacetModel, BrepProjector))> = None;
+    for _ in 0..MOST_ROUNDS {
+        let (tessellation, (facets, exact)) = match &finer {
+            Some((tessellation, made)) => (tessellation, made),
+            None => (&first, &made),
         };
-        let made = of_brep(&model, &tessellation);
-        let crossings = made.0.intersections();
-        if !crossings.iter().any(|crossing| made.0.is_deep(crossing)) {
-            return Ok((Cad { model, settings, tessellation }, made));
+        let mut crossings = facets.intersections();
+        crossings.retain(|crossing| facets.is_deep(crossing));
+        if crossings.is_empty() {
+            let (tessellation, made) = finer.unwrap_or((first, made));
+            return Ok((Cad { model, tessellation }, made));
         }
-        let most = DEEPER * settings.chord * (made.0.bounds.max - made.0.bounds.min).norm();
-        let never_ends =
-            crossings.iter().any(|crossing| crossing.depth > most) || touch(&made.0, &made.1, &crossings);
-        coarsest.get_or_insert((settings, tessellation, made));
-        if never_ends {
+        let Some(settings) = finer_at(&crossings, tessellation.settings(), facets) else { break };
+        if touch(facets, exact, &crossings) {
             break;
         }
+        // The intersection tells more than that finer facets would be too many.
+        let Ok(tessellation) = tessellation.with_settings(&mut model, settings) else { break };
+        let made = of_brep(&model, &tessellation);
+        finer = Some((tessellation, made));
     }
-    let (settings, tessellation, made) = coarsest.expect("the first of several");
-    Ok((Cad { model, settings, tessellation }, made))
+    Ok((Cad { model, tessellation: first }, made))
+}
+
+/// Settings with which facets that intersect are finer, if these may be free of each other.
+fn finer_at(
+    crossings: &[Crossing],
+    settings: &[brep::Settings],
+    facets: &FacetModel,
+) -> Option<Vec<brep::Settings>> {
+    let size = (facets.bounds.max - facets.bounds.min).norm();
+    let mut finer = settings.to_vec();
+    for crossing in crossings {
+        let patches = crossing.patches.map(PatchId::index);
+        let coarser = patches.map(|patch| settings[patch].chord).into_iter().fold(0.0, f64::max);
+        if crossing.depth > DEEPER * coarser * size || coarser < FINEST {
+            return None;
+        }
+        for patch in patches {
+            let brep::Settings { chord, angle } = settings[patch];
+            if chord > FINEST {
+                finer[patch] = brep::Settings { chord: 0.1 * chord, angle: 0.5 * angle };
+            }
+        }
+    }
+    Some(finer)
 }
 
 /// Surfaces at most this far apart touch (fraction of the size of the model).
@@ -95,4 +120,27 @@ fn nearest_common(at: Point, feet: [Point; 2]) -> Point {
         return nalgebra::center(&feet[0], &feet[1]);
     }
     at + m * ((a - cosine * b) / squared) + n * ((b - cosine * a) / squared)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_faces_whose_facets_intersect_are_made_finer() {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/geometries/step/bubbles.step");
+        let read = || brep::Model::read_step(&std::fs::read(path).unwrap(), brep::Unit::OfFile).unwrap();
+        let count = |tessellation: &brep::Tessellation, patch: usize| {
+            tessellation.triangles.iter().filter(|t| t.patch as usize == patch).count()
+        };
+        let (cad, (facets, _)) = tessellated(read()).unwrap();
+        assert_eq!(facets.intersections(), []);
+        let coarse = brep::Tessellation::of(&mut read(), &brep::Settings::default()).unwrap();
+        let chords: Vec<f64> = cad.tessellation.settings().iter().map(|s| s.chord).collect();
+        // The ball and the bubble below its surface; the other bubble is far from both.
+        assert!(chords[0] < 2e-4 && chords[0] == chords[2], "{chords:?}");
+        let counts = [0, 1, 2].map(|patch| [&coarse, &cad.tessellation].map(|t| count(t, patch)));
+        assert!(counts[1][0] == counts[1][1] && counts[1][0] > 100, "{counts:?}");
+        assert!([0, 2].iter().all(|&patch| counts[patch][1] > 3 * counts[patch][0]), "{counts:?}");
+    }
 }

@@ -19,10 +19,12 @@ pub(crate) use curves::diagonal;
 pub use measure::{area, check, volume};
 pub(crate) use orient::Shell;
 
+use crate::model::Patch;
 use crate::tips::Cut;
-use crate::{BrepError, EdgeCurve, Model, Point};
+use crate::{BrepError, EdgeCurve, Fin, Model, On, Point};
 use rayon::prelude::*;
 use reuse::Known;
+use std::collections::BTreeSet;
 
 /// How fine a tessellation is.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -63,6 +65,8 @@ pub struct Tessellation {
     pub gap: f64,
     /// The same for each patch.
     gaps: Vec<f64>,
+    /// How fine each patch is.
+    settings: Vec<Settings>,
 }
 
 /// How often curves are divided, more finely each time because loops of a patch cross or triangles
@@ -76,6 +80,15 @@ const UNFOLDING_RETRIES: usize = 3;
 const MOST_POINTS: usize = 30_000;
 /// ... unless the first division has so many times fewer.
 const MOST_GROWTH: usize = 4;
+
+impl Settings {
+    /// Finer, for curves of a patch whose loops cross or whose triangles are folded.
+    fn finer(self) -> Self {
+        /// By how much chords become smaller.
+        const FACTOR: f64 = 0.2;
+        Self { chord: FACTOR * self.chord, angle: FACTOR.sqrt() * self.angle }
+    }
+}
 
 impl Tessellation {
     /// Triangulates all patches.
@@ -95,15 +108,41 @@ impl Tessellation {
         settings: &Settings,
     ) -> Result<(Self, Vec<Vec<Shell>>), BrepError> {
         let divided = vec![None; model.curves.len()];
+        let settings = vec![*settings; model.patches.len()];
         Self::with(model, settings, divided, None)
     }
 
-    /// The same for a model of which tips were cut off. Patches without a tip or a divided curve
-    /// keep the triangles of `before`, the tessellation of the model without cuts.
+    /// How fine each patch is.
+    pub fn settings(&self) -> &[Settings] {
+        &self.settings
+    }
+
+    /// The same with these settings of each patch. Patches keep their triangles if neither their
+    /// settings nor those of their neighbours are others.
     ///
     /// # Errors
     /// The same.
-    pub fn of_cut(cut: &mut Cut, before: &Self, settings: &Settings) -> Result<Self, BrepError> {
+    ///
+    /// # Panics
+    /// If there are not as many settings as patches.
+    pub fn with_settings(&self, model: &mut Model, settings: Vec<Settings>) -> Result<Self, BrepError> {
+        let [before, now] = [&self.settings, &settings].map(|settings| of_curves(model, settings));
+        let divided = |(curve, line): (usize, &Vec<(u32, f64)>)| {
+            (before[curve] == now[curve]).then(|| line.iter().map(|on| on.1).collect())
+        };
+        let divided = self.lines.iter().enumerate().map(divided).collect();
+        let (out, shells) = Self::with(model, settings, divided, Some(self))?;
+        overlap::check(model, &shells)?;
+        Ok(out)
+    }
+
+    /// The same for a model of which tips were cut off, each as fine as its patch `before`, in the
+    /// tessellation of the model without cuts. Patches without a tip or a divided curve keep their
+    /// triangles.
+    ///
+    /// # Errors
+    /// The same.
+    pub fn of_cut(cut: &mut Cut, before: &Self) -> Result<Self, BrepError> {
         // Parts of curves are divided anew, so that no vertex is close to a cut.
         let divided = |(curve, of): (&EdgeCurve, &Option<usize>)| {
             let line = &before.lines[(*of)?];
@@ -111,6 +150,7 @@ impl Tessellation {
             is_whole.then(|| line.iter().map(|on| on.1).collect())
         };
         let divided = cut.model.curves.iter().zip(&cut.parts_of).map(divided).collect();
+        let settings = cut.patch_parts_of.iter().map(|&patch| before.settings[patch]).collect();
         let (out, shells) = Self::with(&mut cut.model, settings, divided, Some(before))?;
         overlap::check(&cut.model, &shells)?;
         Ok(out)
@@ -120,19 +160,19 @@ impl Tessellation {
     /// of the tessellation `before` where these are the same.
     fn with(
         model: &mut Model,
-        settings: &Settings,
+        settings: Vec<Settings>,
         mut divided: Vec<Option<Vec<f64>>>,
         before: Option<&Self>,
     ) -> Result<(Self, Vec<Vec<Shell>>), BrepError> {
+        assert_eq!(settings.len(), model.patches.len(), "each patch has settings");
         let diagonal = diagonal(&model.corners, &model.curves, Vec::new());
-        let chord = settings.chord * diagonal;
-        let mut tolerances = face::Tolerances { chord, angle: settings.angle, diagonal, refuses_folds: true };
-        let mut chords = vec![tolerances.chord; model.curves.len()];
+        let mut curve_settings = of_curves(model, &settings);
         let (mut failed, mut most_points) = (None, 0);
         let mut last: Option<Self> = None;
         for retry in 0..MOST_RETRIES {
-            tolerances.refuses_folds = retry < UNFOLDING_RETRIES;
-            let mut out = Self::of_curves(model, &divided, &chords, settings.angle, diagonal)?;
+            let refuses_folds = retry < UNFOLDING_RETRIES;
+            let mut out = Self::divided(model, &divided, &curve_settings, diagonal)?;
+            out.settings.clone_from(&settings);
             if retry == 0 {
                 most_points = MOST_POINTS.max(MOST_GROWTH * out.points.len());
             } else if out.points.len() > most_points {
@@ -142,7 +182,12 @@ impl Tessellation {
             let known = last.as_ref().or(before).map(Known::new);
             let of_patch = |patch| match known.as_ref().and_then(|known| known.made(model, patch, &out)) {
                 Some(made) => Ok(made),
-                None => face::triangulate(model, patch, &out, &tolerances),
+                None => {
+                    let Settings { chord, angle } = settings[patch];
+                    let chord = chord * diagonal;
+                    let tolerances = face::Tolerances { chord, angle, diagonal, refuses_folds };
+                    face::triangulate(model, patch, &out, &tolerances)
+                }
             };
             let made: Vec<_> = (0..model.patches.len()).into_par_iter().map(of_patch).collect();
             for (patch, made) in made.into_iter().enumerate() {
@@ -161,44 +206,33 @@ impl Tessellation {
                 measure::check(model, &out)?;
                 return Ok((out, shells));
             }
-            for patch in conflicts {
-                let fins = model.patches[patch].loops.iter().flatten();
-                for curve in
-                    fins.filter_map(|fin| if let crate::On::Curve(c) = fin.on { Some(c) } else { None })
-                {
-                    chords[curve] = chords[curve].min(tolerances.chord) * 0.2;
-                    divided[curve] = None;
-                }
+            let of_conflicts = conflicts.into_iter().flat_map(|patch| curves_of(&model.patches[patch]));
+            for curve in BTreeSet::from_iter(of_conflicts.map(|(curve, _)| curve)) {
+                curve_settings[curve] = curve_settings[curve].finer();
+                divided[curve] = None;
             }
             last = Some(out);
         }
         Err(failed.expect("there was a conflict before each retry"))
     }
 
-    fn of_curves(
+    /// The vertices on curves, which are divided at known parameters or by their settings.
+    fn divided(
         model: &Model,
         known: &[Option<Vec<f64>>],
-        chords: &[f64],
-        angle: f64,
+        settings: &[Settings],
         diagonal: f64,
     ) -> Result<Self, BrepError> {
         let mut out = Self { points: model.corners.iter().map(|c| c.point).collect(), ..Self::default() };
-        let mut beside: Vec<Vec<curves::Beside>> = vec![Vec::new(); model.curves.len()];
-        for patch in &model.patches {
-            for fin in patch.loops.iter().flatten() {
-                if let crate::On::Curve(curve) = fin.on {
-                    beside[curve].push((&patch.surface, fin));
-                }
-            }
-        }
+        let beside = beside(model);
         let divided = |number: usize| {
             if let Some(parameters) = &known[number] {
                 return Ok(parameters.clone());
             }
-            let (curve, chord) = (&model.curves[number], chords[number]);
-            // Finer where loops crossed.
-            let angle = angle * (chord / chords[0].max(chord)).sqrt();
-            curves::divide(curve, &beside[number], (chord, angle), diagonal)
+            let (curve, Settings { chord, angle }) = (&model.curves[number], settings[number]);
+            let beside: Vec<curves::Beside> =
+                beside[number].iter().map(|&(patch, fin)| (&model.patches[patch].surface, fin)).collect();
+            curves::divide(curve, &beside, (chord * diagonal, angle), diagonal)
                 .map_err(|what| BrepError::edge(number, what, Some(model.corners[curve.ends[0]].point)))
         };
         let divided: Vec<_> = (0..model.curves.len()).into_par_iter().map(divided).collect();
@@ -221,4 +255,29 @@ impl Tessellation {
         }
         Ok(out)
     }
+}
+
+/// The curves of a patch, each with its side.
+fn curves_of(patch: &Patch) -> impl Iterator<Item = (usize, &Fin)> {
+    let on_curve = |fin: &Fin| if let On::Curve(curve) = fin.on { Some(curve) } else { None };
+    patch.loops.iter().flatten().filter_map(move |fin| Some((on_curve(fin)?, fin)))
+}
+
+/// For each curve, the patches beside it with their sides.
+fn beside(model: &Model) -> Vec<Vec<(usize, &Fin)>> {
+    let mut beside = vec![Vec::new(); model.curves.len()];
+    for (number, patch) in model.patches.iter().enumerate() {
+        curves_of(patch).for_each(|(curve, fin)| beside[curve].push((number, fin)));
+    }
+    beside
+}
+
+/// For each curve, the finest settings of the patches beside it.
+fn of_curves(model: &Model, settings: &[Settings]) -> Vec<Settings> {
+    let finer =
+        |a: Settings, b: Settings| Settings { chord: a.chord.min(b.chord), angle: a.angle.min(b.angle) };
+    let of_curve = |beside: &Vec<(usize, &Fin)>| {
+        beside.iter().map(|&(patch, _)| settings[patch]).reduce(finer).unwrap_or_default()
+    };
+    beside(model).iter().map(of_curve).collect()
 }

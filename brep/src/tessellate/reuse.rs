@@ -24,8 +24,12 @@ impl<'a> Known<'a> {
         Self { tessellation, triangles }
     }
 
-    /// The triangles of a patch, if its curves are divided as before; `out` has them.
+    /// The triangles of a patch, if it is as fine and its curves are divided as before; `out` has
+    /// them.
     pub fn made(&self, model: &Model, patch: usize, out: &Tessellation) -> Option<Made> {
+        if self.tessellation.settings.get(patch) != out.settings.get(patch) {
+            return None;
+        }
         let triangles = self.triangles.get(patch).filter(|range| !range.is_empty())?;
         let mut to: HashMap<u32, u32> = HashMap::default();
         for fin in model.patches[patch].loops.iter().flatten() {

@@ -32,8 +32,6 @@ pub struct Small<'a> {
     pub largest: f64,
     /// Tips of faces are cut off where elements are this many times as large as their width.
     pub tip_factor: f64,
-    /// How the model was tessellated.
-    pub tessellated: brep::Settings,
     /// The wanted size of elements of a model.
     pub size: &'a dyn Fn(&FacetModel) -> Box<dyn SizeField>,
 }

@@ -62,7 +62,7 @@ fn merge_tips(
         let failed = tips.iter().enumerate().filter(|(k, tip)| has_failed(*k, tip));
         failed.map(|(_, tip)| tip.candidate).collect()
     };
-    let tessellation = Tessellation::of_cut(&mut cut, tessellation, &small.tessellated).map_err(|error| {
+    let tessellation = Tessellation::of_cut(&mut cut, tessellation).map_err(|error| {
         let at = failed(&|k, tip| is_at(&error, tip, cut.patches[k], cut.curves[k]));
         if at.is_empty() { failed(&|_, _| true) } else { at }
     })?;

@@ -23,13 +23,7 @@ fn read(name: &str) -> Model {
 fn merged_of(mut model: Model, size: f64) -> (Option<FacetModel>, MergedSmall) {
     let tessellation = Tessellation::of(&mut model, &Settings::default()).unwrap();
     let size = |_: &FacetModel| -> Box<dyn SizeField> { Box::new(Constant(size)) };
-    let small = Small {
-        factor: 20.0,
-        largest: f64::INFINITY,
-        tip_factor: 10.0,
-        tessellated: Settings::default(),
-        size: &size,
-    };
+    let small = Small { factor: 20.0, largest: f64::INFINITY, tip_factor: 10.0, size: &size };
     let (merged, report) = merge(&model, &tessellation, &small);
     (merged.map(|(facets, ..)| facets), report)
 }
