@@ -36,8 +36,9 @@ fn volumes_converge_to_those_of_the_cad_program() {
         let [coarse, fine] =
             [0, 2].map(|levels| (volume(&geometry, Preset::Fine, levels) - exact).abs() / exact);
         // Two levels divide the error of chords by 16. At `fine` no children are poor, so that both
-        // have the same coarse mesh.
-        assert!(coarse < 0.1 && fine < (coarse / 12.0).max(1e-6), "{name}: {coarse:e} {fine:e}");
+        // have the same coarse mesh. Where the errors of outer and inner faces cancel, as for the
+        // thick cylinder, what is left is of higher order.
+        assert!(coarse < 0.1 && fine < (coarse / 12.0).max(1e-5), "{name}: {coarse:e} {fine:e}");
     }
 }
 

@@ -54,6 +54,8 @@ fn parts_with_rounded_edges_have_few_good_tets_and_their_volume() {
         assert!((volume - exact).abs() <= error, "{name}: {volume} instead of {exact}");
         assert_eq!(report.thin_regions.places, 0, "{name}: merged faces are no walls");
         assert_eq!(report.sharp_places.count, 0, "{name}: merged faces are not sharp");
+        let of_facets = report.facets_volume.unwrap();
+        assert!((of_facets / exact - 1.0).abs() < 0.01, "{name}: {of_facets} instead of {exact}");
     }
 }
 
@@ -96,7 +98,7 @@ fn tips_of_faces_are_merged_up_to_the_width_of_small_faces() {
             [false, true].map(|keep| Mesher::new().max_size(1.0).generate(&geometry(name, keep)).unwrap());
         let [merged, kept] = made.each_ref().map(|mesh| mesh.coarse.as_ref().unwrap().report.clone());
         let [angle, before] = [&merged, &kept].map(|report| report.quality.smallest_dihedral);
-        assert!(angle > 10.0 && angle > 5.0 * before, "{name}: {angle}° instead of {before}°");
+        assert!(angle > 10.0 && angle > 4.0 * before, "{name}: {angle}° instead of {before}°");
         assert_eq!((merged.merged_small.tips.len(), kept.merged_small.tips.len()), (tips, 0), "{name}");
         let volume = volume_of(&made[0].arrays());
         assert!((volume - exact).abs() < 0.08, "{name}: {volume} instead of {exact}");

@@ -47,6 +47,9 @@ pub struct CoarseReport {
     pub cut_cusps: Vec<CutCusp>,
     /// Places where the triangles of the input are sharper than 10°.
     pub sharp_places: SharpPlaces,
+    /// The volume inside of the triangles of the input, or of those that approximate the faces of a
+    /// CAD file; null for other geometries.
+    pub facets_volume: Option<f64>,
     /// Faces and edges of a CAD file that were merged because they are smaller than the elements.
     pub merged_small: MergedSmall,
 }

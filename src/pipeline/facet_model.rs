@@ -236,6 +236,7 @@ impl FacetSolid {
             self.attempt(settings, allowed, budget, work)
         })?;
         coarse.report.sharp_places = SharpPlaces::of(&self.model);
+        coarse.report.facets_volume = Some(self.volume());
         Ok(coarse)
     }
 

@@ -39,6 +39,19 @@ fn write_sharp_places(f: &mut fmt::Formatter<'_>, coarse: &CoarseReport) -> fmt:
     writeln!(f, "           the surface is sharper than 10° at {count}, {angle:.2}° at ({x}, {y}, {z})")
 }
 
+/// How the volume of a mesh differs from that of the geometry, if that is worth knowing.
+fn other_volume(of_mesh: f64, of_geometry: f64) -> Option<String> {
+    /// Smaller differences come from the chords of curved faces at usual sizes, and from the
+    /// triangles that stand for the geometry.
+    const WORTH_TELLING: f64 = 0.02;
+    let share = of_mesh / of_geometry - 1.0;
+    let which = if share < 0.0 { "less" } else { "more" };
+    let percent = 100.0 * share.abs();
+    (share.abs() > WORTH_TELLING).then(|| {
+        format!("about {percent:.0} % {which} volume than the geometry: smaller sizes follow it better")
+    })
+}
+
 /// The subdivision of coarse edges as text.
 fn cut_into(pieces: u32) -> String {
     if pieces == 1 {
@@ -154,7 +167,9 @@ impl Report {
                 _ => write!(f, "; boundary vertices within {distance:.1e} of their patch")?,
             }
         }
-        writeln!(f)
+        writeln!(f)?;
+        let difference = self.coarse.facets_volume.and_then(|volume| other_volume(mesh.volume, volume));
+        difference.map_or(Ok(()), |difference| writeln!(f, "           {difference}"))
     }
 
     /// The line `periodic`, if there are such faces.
@@ -234,5 +249,18 @@ impl Report {
             writeln!(f, "written    {}, {}", counted(self.files, "file", "files"), sized(self.bytes))?;
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_volume_far_from_that_of_the_geometry_is_told() {
+        let said = other_volume(1.72, 2.0).unwrap();
+        assert!(said.starts_with("about 14 % less volume than the geometry"), "{said}");
+        assert!(other_volume(2.1, 2.0).unwrap().starts_with("about 5 % more volume"));
+        assert_eq!(other_volume(1.98, 2.0), None);
     }
 }

@@ -63,8 +63,9 @@ fn shortens(sheet: &Sheet, a: u32, b: u32, middle: &Middle) -> bool {
 /// sides is split.
 ///
 /// If both are split, one of the parts is as thin and half as wide: a face of 4096 × 1 gets
-/// millions of triangles that are collapsed again. Flips remove the longest side.
-const NEEDLE: f64 = 32.0;
+/// millions of triangles that are collapsed again. Flips remove the longest side. With 3 or less,
+/// parts of such a triangle may be such triangles again and again, and their splits do not end.
+const NEEDLE: f64 = 8.0;
 
 /// The edges to be split in a later pass; `edges` is ascending.
 fn later(sheet: &Sheet, edges: &[(f64, u32, u32)], long: f64) -> HashSet<[u32; 2]> {
