@@ -19,7 +19,9 @@ fn parts_of_own_geometries_are_meshed_inside_their_skins() {
         assert!(angle > f64::min(8.0, 0.9 * coarse), "{name} on {ranks} ranks: {angle}°, coarse {coarse}°");
         let refined = report_of(&own(name), &["--preset", "coarse", "--pieces", "2"]);
         let expected = refined["mesh"]["volume"].as_f64().unwrap();
-        assert!((volume / expected - 1.0).abs() < 1e-12, "{name}: {volume}, refined {expected}");
+        // Edges curved for better refined tets may lie otherwise on curved patches.
+        let error = if refined["coarse"]["curved_edges"] == 0 { 1e-12 } else { 1e-4 };
+        assert!((volume / expected - 1.0).abs() < error, "{name}: {volume}, refined {expected}");
     }
 }
 

@@ -25,6 +25,14 @@ const TRIED_PIECES: u32 = 16;
 /// snapping, that the worst child must keep.
 const KEPT: f64 = 0.6;
 
+/// Fraction of the smallest dihedral angle that children should keep where curved edges suffice ...
+const POLISHED: f64 = 0.95;
+/// ... unless they have this angle (degrees).
+const GOOD_ANGLE: f64 = 20.0;
+/// The most subdivisions of an edge in the search for these. With 16 it takes seven times as long,
+/// and children of other numbers have nearly the same angles.
+const POLISHED_PIECES: u32 = 8;
+
 /// Mean ratios above this may lose more: curvature alone causes that loss where there are few
 /// elements per radius.
 const GOOD: f64 = 0.35;
@@ -75,6 +83,7 @@ pub fn refinable<T>(
         }
         if tried.inverted.is_empty() {
             if tried.poor.is_empty() {
+                polish(model, &mut made.0, &tried, how)?;
                 return Ok(made);
             }
             if best.as_ref().is_none_or(|best| is_better((&tried, &made.0), (&best.0, &best.1.0))) {
@@ -122,6 +131,17 @@ fn least_of(worst_refined: f64, smallest_dihedral: f64) -> Least {
     }
 }
 
+/// The dihedral angle (degrees) for which edges are curved, if that of the coarse tets is this:
+/// nearly the same. No smaller sizes are tried for it.
+fn wanted(smallest_dihedral: f64) -> f64 {
+    (POLISHED * smallest_dihedral).min(GOOD_ANGLE)
+}
+
+/// The same with the wanted angle.
+fn polished(least: Least, smallest_dihedral: f64) -> Least {
+    Least { dihedral: least.dihedral.max(wanted(smallest_dihedral)), ..least }
+}
+
 /// How edges are curved for children of this quality.
 fn bent(least: Least, (pieces, order): How) -> refine::mend::Settings {
     let [margin, enough] = BENT;
@@ -137,7 +157,8 @@ fn refinement_test(model: &Model, coarse: &CoarseMesh, (pieces, order): How) -> 
     }
     let part = distribution::from_serial(coarse.mesh.clone())?;
     let settings = refine::Settings { order, ..refine::Settings::default() };
-    Ok(refine::trial(&part, &projector, pieces, &settings, least(coarse))?)
+    let wanted = wanted(coarse.report.quality.smallest_dihedral);
+    Ok(refine::trial(&part, &projector, pieces, &settings, least(coarse), wanted)?)
 }
 
 /// The subdivisions of an edge and the order of the elements of a refinement test.
@@ -151,6 +172,22 @@ fn bend(model: &Model, coarse: &mut CoarseMesh, before: &Trial, how: How) -> Res
             coarse.displacements = displacements;
         }
     }
+    Ok(())
+}
+
+/// Curves edges of a coarse mesh without bad children, where angles of children are smaller than
+/// wanted. Those of faceted geometries are curved already.
+fn polish(model: &Model, coarse: &mut CoarseMesh, before: &Trial, how: How) -> Result<(), Error> {
+    if before.improvable.is_empty() || !coarse.displacements.is_empty() {
+        return Ok(());
+    }
+    let smallest = coarse.report.quality.smallest_dihedral;
+    let (pieces, order) = how;
+    let settings = bent(polished(least(coarse), smallest), (pieces.min(POLISHED_PIECES), order));
+    let part = distribution::from_serial(coarse.mesh.clone())?;
+    // The whole mesh: its ids are its indices.
+    let suspects: Vec<u32> = before.improvable.iter().take(MOST_BENT).map(|id| *id as u32).collect();
+    coarse.displacements = refine::mend_near(&part, &suspects, &model.projector(), &settings)?.displacements;
     Ok(())
 }
 
@@ -183,7 +220,7 @@ fn curved(
         (distribution::from_serial(coarse.mesh.clone())?, model.projector(), least(coarse));
     let displacements = refine::mend(&part, &projector, &bent(least, (pieces, order)))?.displacements;
     let settings = refine::Settings { displacements, order, ..refine::Settings::default() };
-    let after = refine::trial(&part, &projector, pieces, &settings, least)?;
+    let after = refine::trial(&part, &projector, pieces, &settings, least, 0.0)?;
     Ok(Some((settings.displacements, after)))
 }
 
@@ -208,10 +245,10 @@ pub fn displaced(
     // A part without tets has no worst one.
     let mine = if tets == 0 { [1.0, 180.0] } else { [worst_refined, smallest_dihedral] };
     let [worst_refined, smallest_dihedral] = comm.all_reduce_min_f64(mine)?;
-    let least = least_of(worst_refined, smallest_dihedral);
+    let least = polished(least_of(worst_refined, smallest_dihedral), smallest_dihedral);
     let settings = refine::Settings { order, ..refine::Settings::default() };
     let mend = || {
-        let trial = refine::trial(part, projector, pieces, &settings, least)?;
+        let trial = refine::trial(part, projector, pieces, &settings, least, 0.0)?;
         work.proceed()?;
         let local = |id: &GlobalId| part.tet_ids.binary_search(id).expect("a tet of the part") as u32;
         // Inverted tets come first, if there are too many.

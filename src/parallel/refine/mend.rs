@@ -224,13 +224,23 @@ impl Trial<'_> {
     }
 
     /// The objective of the search: over the tets of a part, the sum of the squared shortfall of
-    /// the worst child, plus one for each tet that violates the bounds.
+    /// the worst child, plus one for each tet that violates the bounds, and far more for each with
+    /// an invalid child, so that none is made for better angles elsewhere.
     fn badness(&self, part: &DistMesh) -> Result<f64, RefineError> {
+        const INVALID: f64 = 1e3;
         let (refined, _) = self.refine(part.clone())?;
         let of_tet = |tet| {
-            let excess = self.excess(&refined, tet);
+            let worst = worst_children(&refined, tet);
+            let excess = self.settings.least.excess(&worst);
             let short = f64::max(self.settings.enough - excess, 0.0);
-            if excess > 0.0 { short * short } else { 1.0 + short * short }
+            let penalty = if Least::VALID.excess(&worst) <= 0.0 {
+                INVALID
+            } else if excess <= 0.0 {
+                1.0
+            } else {
+                0.0
+            };
+            penalty + short * short
         };
         Ok((0..part.tets.len()).map(of_tet).sum())
     }

@@ -11,7 +11,7 @@ use crate::parallel::check::{Checksum, PartReport, check, check_part, checksum_o
 use crate::parallel::distribution::distribute;
 use crate::{Point, Vector};
 use csg::PatchId;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 fn refined(fixture: &Fixture, n: u32) -> RefinedMesh {
     refine(whole(&fixture.mesh), &fixture.projector, n, &Settings::default()).expect("a refinable mesh")
@@ -356,10 +356,15 @@ fn bent_edges_make_angles_larger_that_are_too_small() {
     let tried = |displacements: &EdgeDisplacements, dihedral: f64| {
         let least = Least { dihedral, ..Least::VALID };
         let settings = Settings { displacements: displacements.clone(), ..Settings::default() };
-        trial(&coarse, &fixture.projector, 8, &settings, least).expect("projects")
+        trial(&coarse, &fixture.projector, 8, &settings, least, 90.0).expect("projects")
     };
     let before = tried(&EdgeDisplacements::default(), 90.0);
     assert!(before.inverted.is_empty());
+    let few = tried(&EdgeDisplacements::default(), before.smallest_dihedral + 0.5);
+    let both: BTreeSet<_> = few.poor.iter().chain(&few.improvable).copied().collect();
+    assert!(!few.poor.is_empty() && !few.improvable.is_empty());
+    assert_eq!(both.len(), few.poor.len() + few.improvable.len(), "a tet is one or the other");
+    assert_eq!(both.into_iter().collect::<Vec<_>>(), before.poor, "all tets have a child below 90°");
     let wanted = before.smallest_dihedral + 1.0;
     let least = Least { dihedral: wanted, ..Least::VALID };
     let settings = mend::Settings { pieces: 8, least, margin: 0.01, enough: 0.03, ..Default::default() };

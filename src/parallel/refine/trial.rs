@@ -48,6 +48,8 @@ impl Least {
 pub struct Trial {
     /// Coarse tets whose children are positive, but one below the bounds; ascending.
     pub poor: Vec<GlobalId>,
+    /// Others with a child below the angle that is wanted; ascending.
+    pub improvable: Vec<GlobalId>,
     /// The smallest dihedral angle of the children of poor tets, degrees; 0 if there are none.
     pub smallest_dihedral: f64,
     /// Coarse tets with children that are not positive, ascending.
@@ -57,7 +59,8 @@ pub struct Trial {
 }
 
 /// *Local, on the whole mesh.* Refines the coarse tets curved by projection or displacements with
-/// `pieces` subdivisions per edge, and finds those with a child below `least`.
+/// `pieces` subdivisions per edge, and finds those with a child below `least`, and those with a
+/// dihedral angle below `wanted` (degrees).
 ///
 /// # Errors
 /// [`RefineError::Projection`] and [`RefineError::OutOfMemory`], as [`refine()`](super::refine()).
@@ -67,7 +70,9 @@ pub fn trial(
     pieces: u32,
     settings: &Settings,
     least: Least,
+    wanted: f64,
 ) -> Result<Trial, RefineError> {
+    let wanted = Least { dihedral: wanted, ..Least::VALID };
     let mut found = Trial::default();
     let mut worst_of_poor = Extremes::NONE;
     for chunk in curved(mesh, projector, &settings.displacements).chunks(CHUNK) {
@@ -76,9 +81,10 @@ pub fn trial(
         found.inverted.extend(bad.iter().map(|bad| bad.tet));
         let worst: Vec<Extremes> =
             (0..chunk.len()).into_par_iter().map(|at| worst_children(&refined, at)).collect();
-        let is_poor =
-            |at: &usize| least.excess(&worst[*at]) < 0.0 && found.inverted.binary_search(&id(*at)).is_err();
-        let poor: Vec<usize> = (0..chunk.len()).filter(is_poor).collect();
+        let valid = (0..chunk.len()).filter(|&at| found.inverted.binary_search(&id(at)).is_err());
+        let is_below = |least: Least, at: usize| least.excess(&worst[at]) < 0.0;
+        let (poor, others): (Vec<usize>, Vec<usize>) = valid.partition(|&at| is_below(least, at));
+        found.improvable.extend(others.into_iter().filter(|&at| is_below(wanted, at)).map(id));
         worst_of_poor = poor.iter().fold(worst_of_poor, |all, &at| all.with(worst[at]));
         found.poor.extend(poor.into_iter().map(id));
         if found.error.is_none() && !bad.is_empty() {
