@@ -29,8 +29,7 @@ const KEPT: f64 = 0.6;
 const POLISHED: f64 = 0.95;
 /// ... unless they have this angle (degrees).
 const GOOD_ANGLE: f64 = 20.0;
-/// The most subdivisions of an edge in the search for these. With 16 it takes seven times as long,
-/// and children of other numbers have nearly the same angles.
+/// The most subdivisions of an edge in the search for these: the work grows with the cube.
 const POLISHED_PIECES: u32 = 8;
 
 /// Mean ratios above this may lose more: curvature alone causes that loss where there are few
