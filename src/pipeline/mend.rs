@@ -115,30 +115,39 @@ fn is_better(new: (&Trial, &CoarseMesh), old: (&Trial, &CoarseMesh)) -> bool {
     by_children.then_with(|| new.1.report.quality.compare_angles(&old.1.report.quality)).is_gt()
 }
 
-/// The required quality of the children of a coarse mesh.
-fn least(coarse: &CoarseMesh) -> Least {
-    let quality = &coarse.report.quality;
-    least_of(quality.worst_refined, quality.smallest_dihedral)
+/// The quality of children, by that of the coarse tets.
+struct Bounds {
+    /// That is required.
+    least: Least,
+    /// The smallest dihedral angle (degrees) for which edges are curved, but no sizes lowered.
+    wanted: f64,
 }
 
-/// The same, by [`QualitySummary::worst_refined`] and [`QualitySummary::smallest_dihedral`].
-fn least_of(worst_refined: f64, smallest_dihedral: f64) -> Least {
-    Least {
-        mean_ratio: KEPT * worst_refined.min(GOOD),
-        dihedral: KEPT * smallest_dihedral,
-        scaled_jacobian: JACOBIAN,
+impl Bounds {
+    fn of_mesh(coarse: &CoarseMesh) -> Self {
+        let quality = &coarse.report.quality;
+        Self::new(quality.worst_refined, quality.smallest_dihedral)
     }
-}
 
-/// The dihedral angle (degrees) for which edges are curved, if that of the coarse tets is this:
-/// nearly the same. No smaller sizes are tried for it.
-fn wanted(smallest_dihedral: f64) -> f64 {
-    (POLISHED * smallest_dihedral).min(GOOD_ANGLE)
-}
+    /// By [`QualitySummary::worst_refined`] and [`QualitySummary::smallest_dihedral`].
+    fn new(worst_refined: f64, smallest_dihedral: f64) -> Self {
+        let least = Least {
+            mean_ratio: KEPT * worst_refined.min(GOOD),
+            dihedral: KEPT * smallest_dihedral,
+            scaled_jacobian: JACOBIAN,
+        };
+        Self { least, wanted: (POLISHED * smallest_dihedral).min(GOOD_ANGLE) }
+    }
 
-/// The same with the wanted angle.
-fn polished(least: Least, smallest_dihedral: f64) -> Least {
-    Least { dihedral: least.dihedral.max(wanted(smallest_dihedral)), ..least }
+    /// The bounds for curved edges: the wanted angle, and the mean ratio of the tested mesh, which
+    /// should not be given for angles.
+    fn polished(&self, before: &Trial) -> Least {
+        Least {
+            mean_ratio: self.least.mean_ratio.max(before.mean_ratio),
+            dihedral: self.least.dihedral.max(self.wanted),
+            ..self.least
+        }
+    }
 }
 
 /// How edges are curved for children of this quality.
@@ -156,8 +165,8 @@ fn refinement_test(model: &Model, coarse: &CoarseMesh, (pieces, order): How) -> 
     }
     let part = distribution::from_serial(coarse.mesh.clone())?;
     let settings = refine::Settings { order, ..refine::Settings::default() };
-    let wanted = wanted(coarse.report.quality.smallest_dihedral);
-    Ok(refine::trial(&part, &projector, pieces, &settings, least(coarse), wanted)?)
+    let Bounds { least, wanted } = Bounds::of_mesh(coarse);
+    Ok(refine::trial(&part, &projector, pieces, &settings, least, wanted)?)
 }
 
 /// The subdivisions of an edge and the order of the elements of a refinement test.
@@ -180,9 +189,9 @@ fn polish(model: &Model, coarse: &mut CoarseMesh, before: &Trial, how: How) -> R
     if before.improvable.is_empty() || !coarse.displacements.is_empty() {
         return Ok(());
     }
-    let smallest = coarse.report.quality.smallest_dihedral;
     let (pieces, order) = how;
-    let settings = bent(polished(least(coarse), smallest), (pieces.min(POLISHED_PIECES), order));
+    let least = Bounds::of_mesh(coarse).polished(before);
+    let settings = bent(least, (pieces.min(POLISHED_PIECES), order));
     let part = distribution::from_serial(coarse.mesh.clone())?;
     // The whole mesh: its ids are its indices.
     let suspects: Vec<u32> = before.improvable.iter().take(MOST_BENT).map(|id| *id as u32).collect();
@@ -216,7 +225,7 @@ fn curved(
         return Ok(None);
     }
     let (part, projector, least) =
-        (distribution::from_serial(coarse.mesh.clone())?, model.projector(), least(coarse));
+        (distribution::from_serial(coarse.mesh.clone())?, model.projector(), Bounds::of_mesh(coarse).least);
     let displacements = refine::mend(&part, &projector, &bent(least, (pieces, order)))?.displacements;
     let settings = refine::Settings { displacements, order, ..refine::Settings::default() };
     let after = refine::trial(&part, &projector, pieces, &settings, least, 0.0)?;
@@ -244,17 +253,16 @@ pub fn displaced(
     // A part without tets has no worst one.
     let mine = if tets == 0 { [1.0, 180.0] } else { [worst_refined, smallest_dihedral] };
     let [worst_refined, smallest_dihedral] = comm.all_reduce_min_f64(mine)?;
-    let least = polished(least_of(worst_refined, smallest_dihedral), smallest_dihedral);
+    let bounds = Bounds::new(worst_refined, smallest_dihedral);
     let settings = refine::Settings { order, ..refine::Settings::default() };
     let mend = || {
-        let trial = refine::trial(part, projector, pieces, &settings, least, 0.0)?;
+        let trial = refine::trial(part, projector, pieces, &settings, bounds.least, bounds.wanted)?;
         work.proceed()?;
         let local = |id: &GlobalId| part.tet_ids.binary_search(id).expect("a tet of the part") as u32;
-        // Inverted tets come first, if there are too many.
-        let bad = trial.inverted.iter().chain(&trial.poor).take(MOST_BENT).map(local);
-        let mut suspects: Vec<u32> = bad.collect();
-        suspects.sort_unstable();
-        let settings = bent(least, (pieces, order));
+        // The worst come first, if there are too many.
+        let bad = trial.inverted.iter().chain(&trial.poor).chain(&trial.improvable).take(MOST_BENT);
+        let suspects: Vec<u32> = bad.map(local).collect();
+        let settings = bent(bounds.polished(&trial), (pieces, order));
         Ok::<_, Error>(refine::mend_near(part, &suspects, projector, &settings)?.displacements)
     };
     let mine = comm.agree(mend())?;

@@ -168,28 +168,42 @@ impl Trial<'_> {
     /// Displaces the edges of bad tets in sweeps; returns all tets whose shape may have changed.
     fn work_on(&mut self, mut bad: Vec<u32>) -> Result<BTreeSet<u32>, RefineError> {
         let mut touched = BTreeSet::from_iter(bad.iter().copied());
+        // Edges searched with the present displacements around them.
+        let mut settled = BTreeSet::new();
         for _ in 0..self.settings.rounds {
-            if bad.is_empty() {
-                break;
-            }
             let edges = BTreeSet::from_iter(bad.iter().flat_map(|&tet| self.mesh.tet_edges[tet as usize]));
-            let may_bend = |edge: &EdgeId| {
-                let is_shared = self.mesh.shared_edges.holders_of(edge.0).is_some();
-                !is_shared && snap::may_bend(self.mesh.edge_classes[edge.index()], self.projector)
-            };
-            let edges: Vec<EdgeId> = edges.into_iter().filter(may_bend).collect();
-            let stars = self.stars(&edges);
-            let mut changed = false;
-            for (edge, star) in edges.into_iter().zip(&stars) {
-                changed |= self.bend(edge, star)?;
-                touched.extend(star);
-            }
-            if !changed {
+            let is_due = |edge: &EdgeId| self.may_bend(*edge) && !settled.contains(edge);
+            let edges: Vec<EdgeId> = edges.into_iter().filter(is_due).collect();
+            if edges.is_empty() {
                 break;
             }
+            let stars = self.stars(&edges);
+            for batch in disjoint(&stars) {
+                let found: Vec<Option<Coordinates>> = batch
+                    .par_iter()
+                    .map(|&at| self.search(edges[at], &stars[at]))
+                    .collect::<Result<_, _>>()?;
+                for (at, displacement) in batch.into_iter().zip(found) {
+                    let (edge, id) = (edges[at], self.mesh.edge_ids[edges[at].index()]);
+                    if displacement != self.displacements.get(id) {
+                        self.displacements.set(id, displacement);
+                        for around in stars[at].iter().flat_map(|&tet| self.mesh.tet_edges[tet as usize]) {
+                            settled.remove(&around);
+                        }
+                    }
+                    settled.insert(edge);
+                }
+            }
+            touched.extend(stars.into_iter().flatten());
             bad = self.poor(&Vec::from_iter(touched.iter().copied()))?;
         }
         Ok(touched)
+    }
+
+    /// Whether an edge is of this part alone, and neither on a curve nor on a plane.
+    fn may_bend(&self, edge: EdgeId) -> bool {
+        let is_shared = self.mesh.shared_edges.holders_of(edge.0).is_some();
+        !is_shared && snap::may_bend(self.mesh.edge_classes[edge.index()], self.projector)
     }
 
     /// Of the tets given, those whose worst child does not exceed the bounds by the margin;
@@ -201,13 +215,16 @@ impl Trial<'_> {
     }
 
     fn refine(&self, part: DistMesh) -> Result<(RefinedMesh, Vec<BadTet>), RefineError> {
-        let settings = RefineSettings {
+        refine_unchecked(part, self.projector, self.pieces, &self.refinement())
+    }
+
+    fn refinement(&self) -> RefineSettings {
+        RefineSettings {
             described: 0,
             displacements: self.displacements.clone(),
             order: self.settings.order,
             ..RefineSettings::default()
-        };
-        refine_unchecked(part, self.projector, self.pieces, &settings)
+        }
     }
 
     /// The tets around each of the given edges.
@@ -225,10 +242,11 @@ impl Trial<'_> {
 
     /// The objective of the search: over the tets of a part, the sum of the squared shortfall of
     /// the worst child, plus one for each tet that violates the bounds, and far more for each with
-    /// an invalid child, so that none is made for better angles elsewhere.
-    fn badness(&self, part: &DistMesh) -> Result<f64, RefineError> {
+    /// an invalid child, so that none is made for better angles elsewhere. Also by how much the
+    /// worst child of the part exceeds the bounds.
+    fn badness(&self, part: &DistMesh, refinement: &RefineSettings) -> Result<(f64, f64), RefineError> {
         const INVALID: f64 = 1e3;
-        let (refined, _) = self.refine(part.clone())?;
+        let (refined, _) = refine_unchecked(part.clone(), self.projector, self.pieces, refinement)?;
         let of_tet = |tet| {
             let worst = worst_children(&refined, tet);
             let excess = self.settings.least.excess(&worst);
@@ -240,28 +258,33 @@ impl Trial<'_> {
             } else {
                 0.0
             };
-            penalty + short * short
+            (penalty + short * short, excess)
         };
-        Ok((0..part.tets.len()).map(of_tet).sum())
+        let both = |all: (f64, f64), tet: (f64, f64)| (all.0 + tet.0, all.1.min(tet.1));
+        Ok((0..part.tets.len()).map(of_tet).fold((0.0, f64::INFINITY), both))
     }
 
-    /// Minimises the objective over the displacement of one edge: a pattern search along the axes
-    /// with halving steps. Returns whether the displacement changed.
-    fn bend(&mut self, edge: EdgeId, star: &[u32]) -> Result<bool, RefineError> {
+    /// The displacement of one edge that minimises the objective: a pattern search along the axes
+    /// with halving steps. The present one if no tet around the edge is poor (any more).
+    fn search(&self, edge: EdgeId, star: &[u32]) -> Result<Option<Coordinates>, RefineError> {
         let part = extract(self.mesh, star);
         let id = self.mesh.edge_ids[edge.index()];
         let [p, q] = self.mesh.edges[edge.index()].map(|v| self.mesh.points[v.index()]);
         let length = (p - q).norm();
-        let before = self.displacements.get(id);
-        let mut best = (self.badness(&part)?, before);
+        let mut refinement = self.refinement();
+        let (badness, excess) = self.badness(&part, &refinement)?;
+        let mut best = (badness, self.displacements.get(id));
+        if excess >= self.settings.margin {
+            return Ok(best.1);
+        }
         let mut step = STEPS[0];
         while step > STEPS[1] && best.0 > 0.0 {
             let mut better = best;
             for (axis, sign) in [(0, 1.0), (0, -1.0), (1, 1.0), (1, -1.0), (2, 1.0), (2, -1.0)] {
                 let mut displacement: Coordinates = best.1.unwrap_or_default();
                 displacement[axis] += sign * step * length;
-                self.displacements.set(id, Some(displacement));
-                let badness = self.badness(&part)?;
+                refinement.displacements.set(id, Some(displacement));
+                let (badness, _) = self.badness(&part, &refinement)?;
                 if badness < better.0 {
                     better = (badness, Some(displacement));
                 }
@@ -272,8 +295,36 @@ impl Trial<'_> {
                 step /= 2.0;
             }
         }
-        let changed = best.1 != before;
-        self.displacements.set(id, best.1);
-        Ok(changed)
+        Ok(best.1)
+    }
+}
+
+/// The given sets of tets in groups of sets without a common tet: their numbers, each once.
+fn disjoint(sets: &[Vec<u32>]) -> Vec<Vec<usize>> {
+    let mut groups = Vec::new();
+    let mut left: Vec<usize> = (0..sets.len()).collect();
+    while !left.is_empty() {
+        let mut used: BTreeSet<u32> = BTreeSet::new();
+        let (group, later) = left.into_iter().partition(|&at| {
+            let is_free = sets[at].iter().all(|tet| !used.contains(tet));
+            if is_free {
+                used.extend(&sets[at]);
+            }
+            is_free
+        });
+        groups.push(group);
+        left = later;
+    }
+    groups
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn groups_of_disjoint_sets_have_each_set_once() {
+        let sets = [vec![1, 2], vec![2, 3], vec![3, 4], vec![5], vec![1, 5]];
+        assert_eq!(disjoint(&sets), [vec![0, 2, 3], vec![1, 4]]);
     }
 }

@@ -48,8 +48,10 @@ impl Least {
 pub struct Trial {
     /// Coarse tets whose children are positive, but one below the bounds; ascending.
     pub poor: Vec<GlobalId>,
-    /// Others with a child below the angle that is wanted; ascending.
+    /// Others with a child below the angle that is wanted; the smallest angle first.
     pub improvable: Vec<GlobalId>,
+    /// The smallest mean ratio of the children of all tets refined; 0 if there are none.
+    pub mean_ratio: f64,
     /// The smallest dihedral angle of the children of poor tets, degrees; 0 if there are none.
     pub smallest_dihedral: f64,
     /// Coarse tets with children that are not positive, ascending.
@@ -74,7 +76,8 @@ pub fn trial(
 ) -> Result<Trial, RefineError> {
     let wanted = Least { dihedral: wanted, ..Least::VALID };
     let mut found = Trial::default();
-    let mut worst_of_poor = Extremes::NONE;
+    let (mut worst_of_all, mut worst_of_poor) = (None, Extremes::NONE);
+    let mut improvable: Vec<(f64, GlobalId)> = Vec::new();
     for chunk in curved(mesh, projector, &settings.displacements).chunks(CHUNK) {
         let (refined, bad) = refine_unchecked(extract(mesh, chunk), projector, pieces, settings)?;
         let id = |at: usize| mesh.tet_ids[chunk[at] as usize];
@@ -84,13 +87,18 @@ pub fn trial(
         let valid = (0..chunk.len()).filter(|&at| found.inverted.binary_search(&id(at)).is_err());
         let is_below = |least: Least, at: usize| least.excess(&worst[at]) < 0.0;
         let (poor, others): (Vec<usize>, Vec<usize>) = valid.partition(|&at| is_below(least, at));
-        found.improvable.extend(others.into_iter().filter(|&at| is_below(wanted, at)).map(id));
+        let others = others.into_iter().filter(|&at| is_below(wanted, at));
+        improvable.extend(others.map(|at| (worst[at].smallest, id(at))));
+        worst_of_all = worst.iter().copied().chain(worst_of_all).reduce(Extremes::with);
         worst_of_poor = poor.iter().fold(worst_of_poor, |all, &at| all.with(worst[at]));
         found.poor.extend(poor.into_iter().map(id));
         if found.error.is_none() && !bad.is_empty() {
             found.error = Some(inverted(&bad, settings.described));
         }
     }
+    improvable.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+    found.improvable = improvable.into_iter().map(|(_, id)| id).collect();
+    found.mean_ratio = worst_of_all.map_or(0.0, |worst| worst.mean_ratio);
     if !found.poor.is_empty() {
         found.smallest_dihedral = worst_of_poor.smallest.acos().to_degrees();
     }
