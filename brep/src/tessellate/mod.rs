@@ -14,6 +14,7 @@ mod orient;
 mod outline;
 mod overlap;
 mod reuse;
+mod tangent;
 
 pub(crate) use curves::diagonal;
 pub use measure::{area, check, volume};
@@ -81,6 +82,19 @@ const MOST_POINTS: usize = 30_000;
 /// ... unless the first division has so many times fewer.
 const MOST_GROWTH: usize = 4;
 
+/// Why patches have no triangles.
+enum Stop {
+    Final(BrepError),
+    /// Loops of these patches cross, or triangles are folded, however finely curves are divided.
+    Conflicts(BrepError, Vec<usize>),
+}
+
+impl From<BrepError> for Stop {
+    fn from(error: BrepError) -> Self {
+        Self::Final(error)
+    }
+}
+
 impl Settings {
     /// Finer, for curves of a patch whose loops cross or whose triangles are folded.
     fn finer(self) -> Self {
@@ -97,9 +111,7 @@ impl Tessellation {
     /// [`BrepError::Face`] and [`BrepError::Edge`] with a place if curves and surfaces do not fit
     /// each other or loops cross; [`BrepError::Solid`] if a body is not closed.
     pub fn of(model: &mut Model, settings: &Settings) -> Result<Self, BrepError> {
-        let (out, shells) = Self::of_overlapping(model, settings)?;
-        overlap::check(model, &shells)?;
-        Ok(out)
+        Self::without_overlaps(Self::of_overlapping(model, settings)?, model)
     }
 
     /// The same for solids that may overlap, with the shells of each solid.
@@ -131,9 +143,7 @@ impl Tessellation {
             (before[curve] == now[curve]).then(|| line.iter().map(|on| on.1).collect())
         };
         let divided = self.lines.iter().enumerate().map(divided).collect();
-        let (out, shells) = Self::with(model, settings, divided, Some(self))?;
-        overlap::check(model, &shells)?;
-        Ok(out)
+        Self::without_overlaps(Self::with(model, settings, divided, Some(self))?, model)
     }
 
     /// The same for a model of which tips were cut off, each as fine as its patch `before`, in the
@@ -151,8 +161,12 @@ impl Tessellation {
         };
         let divided = cut.model.curves.iter().zip(&cut.parts_of).map(divided).collect();
         let settings = cut.patch_parts_of.iter().map(|&patch| before.settings[patch]).collect();
-        let (out, shells) = Self::with(&mut cut.model, settings, divided, Some(before))?;
-        overlap::check(&cut.model, &shells)?;
+        Self::without_overlaps(Self::with(&mut cut.model, settings, divided, Some(before))?, &cut.model)
+    }
+
+    /// A tessellation if its solids, of which it has the shells, do not overlap.
+    fn without_overlaps((out, shells): (Self, Vec<Vec<Shell>>), model: &Model) -> Result<Self, BrepError> {
+        overlap::check(model, &shells)?;
         Ok(out)
     }
 
@@ -161,18 +175,35 @@ impl Tessellation {
     fn with(
         model: &mut Model,
         settings: Vec<Settings>,
-        mut divided: Vec<Option<Vec<f64>>>,
+        divided: Vec<Option<Vec<f64>>>,
         before: Option<&Self>,
     ) -> Result<(Self, Vec<Vec<Shell>>), BrepError> {
         assert_eq!(settings.len(), model.patches.len(), "each patch has settings");
+        match Self::attempt(model, &settings, divided.clone(), before, &[]) {
+            Ok(made) => Ok(made),
+            Err(Stop::Final(error)) => Err(error),
+            Err(Stop::Conflicts(error, patches)) => {
+                Self::attempt(model, &settings, divided, before, &patches).map_err(|_| error)
+            }
+        }
+    }
+
+    /// The same, with curves that touch at corners of the patches `alike` divided alike there.
+    fn attempt(
+        model: &mut Model,
+        settings: &[Settings],
+        mut divided: Vec<Option<Vec<f64>>>,
+        before: Option<&Self>,
+        alike: &[usize],
+    ) -> Result<(Self, Vec<Vec<Shell>>), Stop> {
         let diagonal = diagonal(&model.corners, &model.curves, Vec::new());
-        let mut curve_settings = of_curves(model, &settings);
+        let mut curve_settings = of_curves(model, settings);
         let (mut failed, mut most_points) = (None, 0);
         let mut last: Option<Self> = None;
         for retry in 0..MOST_RETRIES {
             let refuses_folds = retry < UNFOLDING_RETRIES;
-            let mut out = Self::divided(model, &divided, &curve_settings, diagonal)?;
-            out.settings.clone_from(&settings);
+            let mut out = Self::divided(model, &divided, &curve_settings, diagonal, alike)?;
+            out.settings = settings.to_vec();
             if retry == 0 {
                 most_points = MOST_POINTS.max(MOST_GROWTH * out.points.len());
             } else if out.points.len() > most_points {
@@ -190,38 +221,42 @@ impl Tessellation {
                 }
             };
             let made: Vec<_> = (0..model.patches.len()).into_par_iter().map(of_patch).collect();
+            let mut error = None;
             for (patch, made) in made.into_iter().enumerate() {
                 match made {
                     Ok(made) => made.append_to(&mut out),
-                    Err(face::Failure::Coarse(error)) => {
+                    Err(face::Failure::Coarse(of_patch)) => {
                         out.gaps.push(0.0);
                         conflicts.push(patch);
-                        failed = Some(error);
+                        error = Some(of_patch);
                     }
-                    Err(face::Failure::Final(error)) => return Err(error),
+                    Err(face::Failure::Final(error)) => return Err(error.into()),
                 }
             }
-            if conflicts.is_empty() {
+            let Some(error) = error else {
                 let shells = orient::orient(model, &out)?;
                 measure::check(model, &out)?;
                 return Ok((out, shells));
-            }
-            let of_conflicts = conflicts.into_iter().flat_map(|patch| curves_of(&model.patches[patch]));
+            };
+            let of_conflicts = conflicts.iter().flat_map(|&patch| curves_of(&model.patches[patch]));
             for curve in BTreeSet::from_iter(of_conflicts.map(|(curve, _)| curve)) {
                 curve_settings[curve] = curve_settings[curve].finer();
                 divided[curve] = None;
             }
+            failed = Some(Stop::Conflicts(error, conflicts));
             last = Some(out);
         }
         Err(failed.expect("there was a conflict before each retry"))
     }
 
-    /// The vertices on curves, which are divided at known parameters or by their settings.
+    /// The vertices on curves, which are divided at known parameters or by their settings, and
+    /// alike where they touch at corners of the patches `alike`.
     fn divided(
         model: &Model,
         known: &[Option<Vec<f64>>],
         settings: &[Settings],
         diagonal: f64,
+        alike: &[usize],
     ) -> Result<Self, BrepError> {
         let mut out = Self { points: model.corners.iter().map(|c| c.point).collect(), ..Self::default() };
         let beside = beside(model);
@@ -236,8 +271,11 @@ impl Tessellation {
                 .map_err(|what| BrepError::edge(number, what, Some(model.corners[curve.ends[0]].point)))
         };
         let divided: Vec<_> = (0..model.curves.len()).into_par_iter().map(divided).collect();
+        let mut divided: Vec<Vec<f64>> = divided.into_iter().collect::<Result<_, _>>()?;
+        for &patch in alike {
+            tangent::divide_alike(model, patch, diagonal, &mut divided);
+        }
         for (curve, parameters) in model.curves.iter().zip(divided) {
-            let parameters = parameters?;
             let last = parameters.len() - 1;
             let mut line = Vec::with_capacity(last + 1);
             for (i, t) in parameters.into_iter().enumerate() {

@@ -49,8 +49,9 @@ pub(super) fn joins(layout: &Layout, may: &[bool]) -> Vec<Joins> {
 fn join(layout: &Layout, face: usize, may: &[bool], joins: &[Joins]) -> Joins {
     let mut named = false;
     let is_tip = layout.cut_of(face).is_some();
-    // Best first: smooth neighbours, then those with the longest common edges.
-    let mut best: Option<(bool, f64, usize)> = None;
+    // Best first: those with which a tip leaves no short edge, smooth neighbours, then those with
+    // the longest common edges.
+    let mut best: Option<([bool; 2], f64, usize)> = None;
     for (neighbour, common) in neighbours(layout, face) {
         let main = match joins[neighbour] {
             Joins::Main(main) => main,
@@ -68,13 +69,13 @@ fn join(layout: &Layout, face: usize, may: &[bool], joins: &[Joins]) -> Joins {
             continue;
         }
         let length: f64 = common.iter().map(|&c| layout.lengths[c]).sum();
-        let is_smooth = is_smooth(layout, &common);
+        let is_good = [!is_tip || ends_inside(layout, face, &common), is_smooth(layout, &common)];
         // Lengths that differ by rounding are equal: the first face is taken.
-        let is_better = best.is_none_or(|(smooth, longest, _)| {
-            (is_smooth && !smooth) || (is_smooth == smooth && length > (1.0 + 1e-9) * longest)
+        let is_better = best.is_none_or(|(good, longest, _)| {
+            is_good > good || (is_good == good && length > (1.0 + 1e-9) * longest)
         });
         if is_better {
-            best = Some((is_smooth, length, main));
+            best = Some((is_good, length, main));
         }
     }
     match best {
@@ -82,6 +83,15 @@ fn join(layout: &Layout, face: usize, may: &[bool], joins: &[Joins]) -> Joins {
         None if named => Joins::Named,
         None => Joins::None,
     }
+}
+
+/// Whether the cut of a tip ends inside the edge of which these common edges are a part: without
+/// them two edges are left there, of which the cut is one, and they become one.
+fn ends_inside(layout: &Layout, tip: usize, common: &[usize]) -> bool {
+    let ends = |edge: usize| layout.model.curves[edge].ends;
+    let Some(cut) = layout.cut_of(tip) else { return false };
+    let count = |corner: usize| layout.curves.iter().filter(|&&edge| ends(edge).contains(&corner)).count();
+    common.iter().any(|&edge| ends(edge).iter().any(|end| ends(cut.edge).contains(end) && count(*end) == 3))
 }
 
 /// The neighbours over edges that no third face has, with these edges.

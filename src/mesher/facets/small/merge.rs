@@ -12,9 +12,9 @@ use brep::{BrepError, Cut, Model, Tessellation, Tip};
 /// The most times that tips are cut off, each time fewer or narrower.
 const ROUNDS: usize = 12;
 
-/// Tips are not cut where they are thinner than this (fraction of the size of the model): vertices
-/// of CAD files are no more accurate.
-const THINNEST: f64 = 1e-6;
+/// Tips are not cut where they are thinner than this (fraction of the size of the model): that may
+/// be rounding.
+const THINNEST: f64 = 1e-8;
 
 /// Merges the small faces and edges of a model, and narrow tips of faces; `None` if there are none.
 ///
@@ -29,7 +29,7 @@ pub fn merge(model: &Model, tessellation: &Tessellation, small: &Small) -> (Opti
         let least = THINNEST * bounds(&tessellation.points).diagonal();
         for _ in 0..ROUNDS {
             let mut tips = narrow(&layout, &candidates, &*size, small.tip_factor);
-            // A face that is nowhere wider is small as a whole, and thinner tips are rounding.
+            // A face that is nowhere wider is small as a whole.
             tips.retain(|narrow| least < narrow.width && narrow.width < layout.widths[narrow.tip.patch]);
             let Some(cut) = cut_off(model, &tips) else { break };
             match merge_tips(model, tessellation, small, cut, &tips) {
@@ -64,7 +64,8 @@ fn merge_tips(
     };
     let tessellation = Tessellation::of_cut(&mut cut, tessellation).map_err(|error| {
         let at = failed(&|k, tip| is_at(&error, tip, cut.patches[k], cut.curves[k]));
-        if at.is_empty() { failed(&|_, _| true) } else { at }
+        let beside = failed(&|_, tip| is_beside(&error, tip, model));
+        [at, beside, failed(&|_, _| true)].into_iter().find(|failed| !failed.is_empty()).unwrap_or_default()
     })?;
     let cut_off = |(k, narrow): (usize, &NarrowTip)| TipCut {
         tip: cut.patches[k],
@@ -96,6 +97,14 @@ fn is_at(error: &BrepError, narrow: &NarrowTip, patch: usize, curve: usize) -> b
         BrepError::Edge { edge, .. } => curve == edge - 1,
         _ => true,
     }
+}
+
+/// Whether an error is on a face beside a tip: its curve is divided there.
+fn is_beside(error: &BrepError, narrow: &NarrowTip, model: &Model) -> bool {
+    let BrepError::Face { face, .. } = *error else { return false };
+    let of_face = model.patches.get(face - 1).into_iter().flat_map(|patch| patch.loops.iter().flatten());
+    let curves = narrow.tip.sides(model).map(|side| side.on);
+    of_face.map(|fin| fin.on).any(|on| curves.contains(&on))
 }
 
 fn has_crossings(facets: &FacetModel) -> bool {
