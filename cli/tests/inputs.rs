@@ -187,6 +187,8 @@ fn a_thin_plate_gets_tets_as_small_as_it_is_thin() {
     let resolved = report_of(&plate, &["--closeness", "1.5"]);
     assert_eq!(as_it_is["coarse"]["thin_regions"]["places"], 0);
     assert!((resolved["coarse"]["thin_regions"]["thinnest"].as_f64().unwrap() - 0.2).abs() < 1e-12);
+    let height = resolved["coarse"]["thin_regions"]["thinnest_at"][2].as_f64().unwrap();
+    assert!([0.0, 0.2].iter().any(|face| (height - face).abs() < 1e-12), "{height}");
     let first_percentile = |r: &serde_json::Value| r["mesh"]["first_percentile_dihedral"].as_f64().unwrap();
     assert!(first_percentile(&resolved) > 25.0 && first_percentile(&resolved) > first_percentile(&as_it_is));
 }

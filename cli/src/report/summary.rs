@@ -11,8 +11,8 @@ use tetmill::run::{
 /// Writes the line about thin regions.
 fn write_thin_regions(f: &mut fmt::Formatter<'_>, coarse: &CoarseReport) -> fmt::Result {
     let walls = &coarse.thin_regions;
-    let Some(thinnest) = walls.thinnest else { return Ok(()) };
-    write!(f, "           walls as thin as {thinnest:.3e}: ")?;
+    let (Some(thinnest), Some([x, y, z])) = (walls.thinnest, walls.thinnest_at) else { return Ok(()) };
+    write!(f, "           walls as thin as {thinnest:.3e}, at ({x:.4e}, {y:.4e}, {z:.4e}): ")?;
     match walls.limited {
         0 => write!(f, "sizes lowered there")?,
         limited if limited < walls.places => {

@@ -74,6 +74,8 @@ pub struct ThinRegions {
     pub limited: u64,
     /// The least thickness among them (length).
     pub thinnest: Option<f64>,
+    /// A point on the surface there.
+    pub thinnest_at: Option<[f64; 3]>,
     /// The place where the size remains largest relative to the thickness, if it is too large.
     pub flattest: Option<FlatPlace>,
 }
@@ -123,7 +125,13 @@ pub fn thin_regions(walls: &Walls) -> (Vec<Source>, ThinRegions) {
         let flatness = |place: &FlatPlace| place.size / place.thickness;
         flatness(a).total_cmp(&flatness(b)).then_with(|| b.point.partial_cmp(&a.point).expect("finite"))
     });
-    found.thinnest = places.iter().map(|place| place.thickness).min_by(f64::total_cmp);
+    let by_thickness = |a: &&Place, b: &&Place| {
+        let [p, q] = [a, b].map(|place| <[f64; 3]>::from(place.point));
+        a.thickness.total_cmp(&b.thickness).then_with(|| p.partial_cmp(&q).expect("finite"))
+    };
+    let thinnest = places.iter().min_by(by_thickness);
+    found.thinnest = thinnest.map(|place| place.thickness);
+    found.thinnest_at = thinnest.map(|place| place.point.into());
     (thinned(places.into_iter().filter_map(|place| place.source).collect()), found)
 }
 
