@@ -326,6 +326,11 @@ impl BrepProjector {
         self.source.faces[self.source.patches[patch.index()][0] as usize].surface.kind()
     }
 
+    /// Whether a patch has several faces.
+    pub fn is_composite_patch(&self, patch: PatchId) -> bool {
+        self.source.patches[patch.index()].len() > 1
+    }
+
     /// Whether a patch is plane.
     pub fn is_flat_patch(&self, patch: PatchId) -> bool {
         self.is_flat[patch.index()]

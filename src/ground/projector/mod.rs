@@ -109,6 +109,11 @@ impl Projector {
         }
     }
 
+    /// Whether `patch` has several surfaces, between which the nearest one changes.
+    pub fn is_composite_patch(&self, patch: PatchId) -> bool {
+        matches!(self, Self::Brep(projector) if projector.is_composite_patch(patch))
+    }
+
     /// Whether means of points of `curve` lie on it, so that they need no projection.
     pub fn is_straight_curve(&self, curve: CurveId) -> bool {
         match self {

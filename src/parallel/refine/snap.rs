@@ -77,9 +77,13 @@ pub fn is_flat(
         && mesh.tet_faces[tet.index()].iter().all(|face| free(mesh.face_classes[face.index()]))
 }
 
-/// Whether an edge may be displaced: inside a body, or on a curved patch.
+/// Whether an edge may be displaced: inside a body, or on a curved patch of one surface. On one of
+/// several, points of the edge might leave the surface that they were projected to.
 pub fn may_bend(class: Class, projector: &Projector) -> bool {
-    matches!(class, Class::Body(_)) || matches!(Place::of(class, projector), Place::Patch(_))
+    match Place::of(class, projector) {
+        Place::Patch(patch) => !projector.is_composite_patch(patch),
+        _ => matches!(class, Class::Body(_)),
+    }
 }
 
 /// Allocates the stored fine vertices and computes those on coarse vertices, edges and faces.

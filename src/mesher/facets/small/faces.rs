@@ -3,6 +3,7 @@
 use super::Layout;
 use crate::Vector;
 use crate::ground::kernel::nearest::in_segment;
+use std::cmp::Ordering;
 
 /// A main face is at least this many times as wide as a face that joins it: slivers have 10⁻³ of
 /// their neighbours' width, while a tenth is part of the shape.
@@ -18,6 +19,10 @@ const WEDGE: f64 = 0.35;
 /// The cosine of the angle between edges on opposite sides of a narrow face, at least.
 const PARALLEL: f64 = 0.7;
 
+/// A face is beside a narrow one, and not at its end, if their common edges have at least this
+/// share of the length of the longest ones.
+const ALONG: f64 = 0.25;
+
 /// Directions between faces turn by less than this where they are taken as smooth (radians).
 const SMOOTH: f64 = 0.1;
 
@@ -28,6 +33,16 @@ pub(super) enum Joins {
     /// Only faces with other names in the file would be left.
     Named,
     None,
+}
+
+/// A face that another one could join.
+#[derive(Clone, Copy)]
+struct Candidate {
+    main: usize,
+    /// The length of their common edges.
+    length: f64,
+    leaves_no_cut: bool,
+    is_smooth: bool,
 }
 
 /// The main face that each face joins, if it `may`: first faces beside a main face, then those
@@ -49,9 +64,7 @@ pub(super) fn joins(layout: &Layout, may: &[bool]) -> Vec<Joins> {
 fn join(layout: &Layout, face: usize, may: &[bool], joins: &[Joins]) -> Joins {
     let mut named = false;
     let is_tip = layout.cut_of(face).is_some();
-    // Best first: those with which a tip leaves no short edge, smooth neighbours, then those with
-    // the longest common edges.
-    let mut best: Option<([bool; 2], f64, usize)> = None;
+    let mut candidates: Vec<Candidate> = Vec::new();
     for (neighbour, common) in neighbours(layout, face) {
         let main = match joins[neighbour] {
             Joins::Main(main) => main,
@@ -68,18 +81,28 @@ fn join(layout: &Layout, face: usize, may: &[bool], joins: &[Joins]) -> Joins {
             named = true;
             continue;
         }
-        let length: f64 = common.iter().map(|&c| layout.lengths[c]).sum();
-        let is_good = [!is_tip || ends_inside(layout, face, &common), is_smooth(layout, &common)];
-        // Lengths that differ by rounding are equal: the first face is taken.
-        let is_better = best.is_none_or(|(good, longest, _)| {
-            is_good > good || (is_good == good && length > (1.0 + 1e-9) * longest)
+        candidates.push(Candidate {
+            main,
+            length: common.iter().map(|&c| layout.lengths[c]).sum(),
+            leaves_no_cut: !is_tip || ends_inside(layout, face, &common),
+            is_smooth: is_smooth(layout, &common),
         });
-        if is_better {
-            best = Some((is_good, length, main));
-        }
     }
+    let longest = candidates.iter().map(|candidate| candidate.length).fold(0.0, f64::max);
+    // Best first: those with which a tip leaves no short edge, those along the face and not at its
+    // ends, smooth neighbours, then those with the longest common edges. Lengths that differ by
+    // rounding are equal: the first face is taken.
+    let goodness = |c: &Candidate| [c.leaves_no_cut, c.length >= ALONG * longest, c.is_smooth];
+    let better = |best: Candidate, other: Candidate| {
+        let is_better = match goodness(&other).cmp(&goodness(&best)) {
+            Ordering::Equal => other.length > (1.0 + 1e-9) * best.length,
+            order => order.is_gt(),
+        };
+        if is_better { other } else { best }
+    };
+    let best = candidates.into_iter().reduce(better);
     match best {
-        Some((_, _, main)) => Joins::Main(main),
+        Some(best) => Joins::Main(best.main),
         None if named => Joins::Named,
         None => Joins::None,
     }
