@@ -23,6 +23,7 @@ mod keep;
 mod model;
 mod nearest;
 mod overlaps;
+mod pieces;
 mod placement;
 mod project;
 mod read;
@@ -32,19 +33,18 @@ mod surface;
 pub mod tessellate;
 #[cfg(test)]
 mod tests;
-mod tips;
 
 pub use curve::Curve;
 pub use error::BrepError;
 pub use model::{Corner, EdgeCurve, Fin, Model, On, Patch};
 pub use nearest::{nearest_on_curve, nearest_on_surface};
 pub use overlaps::OverlapTo;
+pub use pieces::{Cut, Piece};
 pub use placement::Placement;
 pub use project::{CurveFoot, SurfaceFoot, project_to_curve, project_to_surface};
 pub use step::Unit;
 pub use surface::{Jet, Profile, Surface};
 pub use tessellate::{Settings, Tessellation, Triangle};
-pub use tips::{Cut, Tip};
 
 /// A point in space.
 pub type Point = nalgebra::Point3<f64>;

@@ -189,12 +189,12 @@ impl FacetSolid {
     ) -> (Option<Self>, MergedSmall) {
         let Some(cad) = &self.cad else { return (None, MergedSmall::default()) };
         let in_pieces = SMALL_IN_PIECES * f64::from(pieces);
-        let (factor, tip_factor) = (SMALL.max(in_pieces), TIP.max(in_pieces));
+        let [factor, still_factor, tip_factor] = [SMALL, STILL_SMALL, TIP].map(|f| f.max(in_pieces));
         let largest = largest.min(largest_size(&self.model, settings));
         let size = |model: &FacetModel| -> Box<dyn SizeField> {
             Box::new(AtMost(FacetSize::evaluated(model, settings, Evaluation::Searched), largest))
         };
-        let small = Small { factor, largest, tip_factor, size: &size };
+        let small = Small { factor, still_factor, largest, tip_factor, size: &size };
         let (merged, report) = merge(&cad.model, &cad.tessellation, &small);
         let solid = merged.map(|(model, exact, grouping)| {
             let label = |faces: &Vec<usize>| self.names.patches[faces[0]].clone();
@@ -412,6 +412,10 @@ fn labels(names: Vec<String>) -> Vec<Label> {
 /// Faces and edges are small if the elements are at least this many times as large. Merging moves
 /// the boundary of a patch by the width of the face: less than the surface error of curved parts.
 const SMALL: f64 = 20.0;
+
+/// The same where sizes are smaller because other faces and edges are kept: what is kept beside them
+/// would have elements as small as itself.
+const STILL_SMALL: f64 = 5.0;
 
 /// The same for tips of faces, of which only the end is as wide.
 const TIP: f64 = 10.0;

@@ -21,7 +21,7 @@ pub use measure::{area, check, volume};
 pub(crate) use orient::Shell;
 
 use crate::model::Patch;
-use crate::tips::Cut;
+use crate::pieces::Cut;
 use crate::{BrepError, EdgeCurve, Fin, Model, On, Point};
 use rayon::prelude::*;
 use reuse::Known;

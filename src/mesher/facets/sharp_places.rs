@@ -1,9 +1,10 @@
 //! Places where the facets themselves are sharper than tets should be.
 
 use super::FacetModel;
+use crate::ground::mesh::BoundaryTriangle;
 use crate::ground::projector::facets::edges::Edges;
 use crate::{Point, Vector};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 use std::f64::consts::TAU;
 
 /// Angles below this (degrees) are reported: some tet there is as sharp.
@@ -103,12 +104,15 @@ pub(super) fn angles(
     sums
 }
 
-/// The angle of each patch at each point of curves.
+/// The angle of each patch at each point of curves, but not where only merged faces are.
 fn patch_corners(model: &FacetModel) -> Vec<SharpPlace> {
     let mut on_curve = vec![false; model.points.len()];
     model.curves.iter().flat_map(|c| &c.vertices).for_each(|&v| on_curve[v as usize] = true);
-    let triangles = model.triangles.iter().map(|t| (t.vertices.map(|v| v.0), t.patch.0));
-    let sums = angles(&model.points, triangles, |v| on_curve[v as usize]);
+    let corners = |t: &BoundaryTriangle| (t.vertices.map(|v| v.0), t.patch.0);
+    let mut sums = angles(&model.points, model.triangles.iter().map(corners), |v| on_curve[v as usize]);
+    let main = (0u32..).zip(&model.triangles).filter(|(i, _)| !model.is_merged(*i)).map(|(_, t)| corners(t));
+    let of_main: HashSet<(u32, u32)> = main.flat_map(|(v, patch)| v.map(|v| (v, patch))).collect();
+    sums.retain(|at, _| of_main.contains(at));
     let place = |((v, _), sum): ((u32, u32), f64)| SharpPlace {
         point: model.points[v as usize].into(),
         angle: sum.to_degrees(),

@@ -19,6 +19,9 @@ const WEDGE: f64 = 0.35;
 /// The cosine of the angle between edges on opposite sides of a narrow face, at least.
 const PARALLEL: f64 = 0.7;
 
+/// Edges at the ends of a narrow face are at most this long (widths).
+const END: f64 = 2.0;
+
 /// A face is beside a narrow one, and not at its end, if their common edges have at least this
 /// share of the length of the longest ones.
 const ALONG: f64 = 0.25;
@@ -42,6 +45,7 @@ struct Candidate {
     /// The length of their common edges.
     length: f64,
     leaves_no_cut: bool,
+    is_at_side: bool,
     is_smooth: bool,
 }
 
@@ -85,14 +89,16 @@ fn join(layout: &Layout, face: usize, may: &[bool], joins: &[Joins]) -> Joins {
             main,
             length: common.iter().map(|&c| layout.lengths[c]).sum(),
             leaves_no_cut: !is_tip || ends_inside(layout, face, &common),
+            is_at_side: layout.along.get(&face).is_none_or(|along| along.contains(&neighbour)),
             is_smooth: is_smooth(layout, &common),
         });
     }
     let longest = candidates.iter().map(|candidate| candidate.length).fold(0.0, f64::max);
-    // Best first: those with which a tip leaves no short edge, those along the face and not at its
-    // ends, smooth neighbours, then those with the longest common edges. Lengths that differ by
-    // rounding are equal: the first face is taken.
-    let goodness = |c: &Candidate| [c.leaves_no_cut, c.length >= ALONG * longest, c.is_smooth];
+    // Best first: those with which a tip leaves no short edge, those at the side where all pieces
+    // of a face are merged, those along the face and not at its ends, smooth neighbours, then those
+    // with the longest common edges. Lengths that differ by rounding are equal: the first face is
+    // taken.
+    let goodness = |c: &Candidate| [c.leaves_no_cut, c.is_at_side, c.length >= ALONG * longest, c.is_smooth];
     let better = |best: Candidate, other: Candidate| {
         let is_better = match goodness(&other).cmp(&goodness(&best)) {
             Ordering::Equal => other.length > (1.0 + 1e-9) * best.length,
@@ -146,10 +152,12 @@ fn is_smooth(layout: &Layout, common: &[usize]) -> bool {
 /// Whether no face beyond a narrow one would make a wedge with the main face that has these common
 /// edges with it.
 ///
-/// Edges across the narrow face, at its ends, join faces that met the main one before.
+/// Edges at the ends of the narrow face, across it or about as short as it is wide, join faces that
+/// met the main one before.
 fn is_open(layout: &Layout, face: usize, common: &[usize]) -> bool {
     let dropped: Vec<[u32; 2]> = layout.segments(common).collect();
-    let kept: Vec<usize> = layout.around[face].iter().copied().filter(|c| !common.contains(c)).collect();
+    let is_side = |edge: &usize| !common.contains(edge) && layout.lengths[*edge] > END * layout.widths[face];
+    let kept: Vec<usize> = layout.around[face].iter().copied().filter(is_side).collect();
     layout.segments(&kept).all(|segment| {
         let [p, q] = layout.ends(segment);
         let middle = nalgebra::center(&p, &q);

@@ -28,6 +28,8 @@ pub struct Grouping {
 pub struct Small<'a> {
     /// An edge or face is small if elements are at least this many times as large.
     pub factor: f64,
+    /// The same where sizes are smaller because others were found too large to be merged.
+    pub still_factor: f64,
     /// The largest size of elements.
     pub largest: f64,
     /// Tips of faces are cut off where elements are this many times as large as their width.
@@ -36,22 +38,22 @@ pub struct Small<'a> {
     pub size: &'a dyn Fn(&FacetModel) -> Box<dyn SizeField>,
 }
 
-/// Share of that factor that must be left after tips were cut off: sizes are smaller then, because
-/// edges are shorter.
+/// Share of the factor of tips that must be left after they were cut off: sizes are smaller then,
+/// because edges are shorter.
 const STILL_SMALL: f64 = 0.25;
 
 /// The longest edge at an end of a short one is at least this many times as long.
 const LONGER: f64 = 20.0;
 
 /// The faces and edges that may be merged.
-struct Allowed {
-    faces: Vec<bool>,
-    edges: Vec<bool>,
+pub(super) struct Allowed {
+    pub faces: Vec<bool>,
+    pub edges: Vec<bool>,
 }
 
 impl Allowed {
     /// Faces and edges far smaller than one of their neighbours, at most of this width or length.
-    fn of(layout: &Layout, most: f64) -> Self {
+    pub fn of(layout: &Layout, most: f64) -> Self {
         let mut longest = vec![0.0_f64; layout.model.corners.len()];
         for &edge in &layout.curves {
             for end in layout.model.curves[edge].ends {
@@ -97,14 +99,16 @@ pub type Merged = (FacetModel, BrepProjector, Grouping);
 
 /// Merges the small faces and edges of a model, of which tips may have been cut off.
 ///
-/// What is merged must be small beside the sizes that the model has without it. Merging less never
-/// makes sizes larger, so faces and edges are taken out until all that are left are small.
+/// What is merged must be small beside the sizes that the model has without all that may be merged,
+/// and still small beside those of what is merged in the end. Merging less never makes sizes larger,
+/// so faces and edges are taken out until all that are left are small.
 pub(super) fn merge_all(shape: &Shape, layout: &Layout, small: &Small) -> (Option<Merged>, MergedSmall) {
     let (model, tessellation) = (layout.model, layout.tessellation);
     let mut allowed = Allowed::of(layout, small.largest / small.factor);
     for cut in &layout.cuts {
         (allowed.faces[cut.tip], allowed.edges[cut.edge]) = (true, true);
     }
+    let mut factor = small.factor;
     loop {
         if !allowed.faces.iter().chain(&allowed.edges).any(|allowed| *allowed) {
             return (None, MergedSmall::default());
@@ -136,7 +140,7 @@ pub(super) fn merge_all(shape: &Shape, layout: &Layout, small: &Small) -> (Optio
             let (points, factor) = match layout.cut_of(face) {
                 // It is narrower elsewhere.
                 Some(cut) => (points_of_edge(cut.edge), tip_factor),
-                None => (points_of_face(face), small.factor),
+                None => (points_of_face(face), factor),
             };
             if !is_small(points, merged.width, factor) {
                 (allowed.faces[face], are_all_small) = (false, false);
@@ -145,7 +149,7 @@ pub(super) fn merge_all(shape: &Shape, layout: &Layout, small: &Small) -> (Optio
         for merged in &report.edges {
             let edge = merged.edge - 1;
             let is_cut = layout.cuts.iter().any(|cut| cut.edge == edge);
-            let factor = if is_cut { tip_factor } else { small.factor };
+            let factor = if is_cut { tip_factor } else { factor };
             if !is_small(points_of_edge(edge), merged.length, factor) {
                 (allowed.edges[edge], are_all_small) = (false, false);
             }
@@ -153,6 +157,7 @@ pub(super) fn merge_all(shape: &Shape, layout: &Layout, small: &Small) -> (Optio
         if are_all_small {
             return (Some((facets, exact, grouping)), report);
         }
+        factor = small.still_factor;
     }
 }
 

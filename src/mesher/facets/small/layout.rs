@@ -39,6 +39,8 @@ pub(in crate::mesher::facets) struct Layout<'a> {
     pub triangles: Vec<Vec<[Point; 3]>>,
     /// Tips that were cut off.
     pub cuts: Vec<TipCut>,
+    /// For pieces of divided faces, the faces along the side where they should be merged.
+    pub along: HashMap<usize, Vec<usize>>,
     /// The triangles at each segment of a curve.
     beside: HashMap<[u32; 2], Vec<usize>>,
 }
@@ -48,7 +50,7 @@ fn key(a: u32, b: u32) -> [u32; 2] {
 }
 
 impl<'a> Layout<'a> {
-    pub fn new(model: &'a Model, tessellation: &'a Tessellation, shape: &Shape, cuts: Vec<TipCut>) -> Self {
+    pub fn new(model: &'a Model, tessellation: &'a Tessellation, shape: &Shape) -> Self {
         let curves = shape.curves.clone();
         let mut is_corner = vec![false; model.corners.len()];
         shape.corners.iter().for_each(|&corner| is_corner[corner as usize] = true);
@@ -101,7 +103,8 @@ impl<'a> Layout<'a> {
             lengths,
             widths,
             triangles,
-            cuts,
+            cuts: Vec::new(),
+            along: HashMap::new(),
             beside,
         };
         out.widths = out.measured_widths();

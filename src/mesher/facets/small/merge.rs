@@ -1,13 +1,14 @@
-//! Merging with and without tips of faces.
+//! Merging with and without divided faces and tips of faces.
 
-use super::group::{Merged, Small, merge_all};
+use super::group::{Allowed, Merged, Small, merge_all};
 use super::layout::{Layout, TipCut};
-use super::report::{MergedSmall, MergedTip};
+use super::report::{MergedEdge, MergedSmall, MergedTip};
+use super::strips::{Division, divisions};
 use super::tips::{NarrowTip, candidates, narrow, without};
 use crate::ground::kernel::tree::bounds;
 use crate::mesher::facets::FacetModel;
 use crate::mesher::facets::exact::{Shape, grouped};
-use brep::{BrepError, Cut, Model, Tessellation, Tip};
+use brep::{BrepError, Cut, Model, Piece, Tessellation};
 
 /// The most times that tips are cut off, each time fewer or narrower.
 const ROUNDS: usize = 12;
@@ -18,33 +19,100 @@ const THINNEST: f64 = 1e-8;
 
 /// Merges the small faces and edges of a model, and narrow tips of faces; `None` if there are none.
 ///
-/// Tips are cut off as faces of their own. Those that are not merged then are cut off where they
-/// are narrower, or left.
+/// Narrow faces along several faces are divided first, unless not all of their pieces are merged.
 pub fn merge(model: &Model, tessellation: &Tessellation, small: &Small) -> (Option<Merged>, MergedSmall) {
     let shape = Shape::new(model, tessellation);
-    let layout = Layout::new(model, tessellation, &shape, Vec::new());
-    let mut candidates = candidates(&layout);
-    if !candidates.is_empty() {
-        let size = (small.size)(&grouped(model, tessellation, &shape, &shape.ungrouped(model)).0);
-        let least = THINNEST * bounds(&tessellation.points).diagonal();
-        for _ in 0..ROUNDS {
-            let mut tips = narrow(&layout, &candidates, &*size, small.tip_factor);
-            // A face that is nowhere wider is small as a whole.
-            tips.retain(|narrow| least < narrow.width && narrow.width < layout.widths[narrow.tip.patch]);
-            let Some(cut) = cut_off(model, &tips) else { break };
-            match merge_tips(model, tessellation, small, cut, &tips) {
-                Ok(merged) => return merged,
-                Err(failed) => candidates = without(&candidates, &failed),
-            }
+    let layout = Layout::new(model, tessellation, &shape);
+    let narrow = Allowed::of(&layout, small.largest / small.factor).faces;
+    let mut divisions = divisions(&layout, &narrow);
+    while !divisions.is_empty() {
+        match merge_divided(model, tessellation, small, &divisions) {
+            Ok(merged) => return merged,
+            Err(failed) => divisions.retain(|division| !failed.contains(&division.face)),
         }
     }
-    merge_all(&shape, &layout, small)
+    with_tips(&layout, &shape, small, merge_all(&shape, &layout, small))
+}
+
+/// Merges what is small, with narrow faces divided into pieces.
+///
+/// # Errors
+/// The faces of which not all pieces are merged.
+fn merge_divided(
+    model: &Model,
+    tessellation: &Tessellation,
+    small: &Small,
+    divisions: &[Division],
+) -> Result<(Option<Merged>, MergedSmall), Vec<usize>> {
+    let divided = |is_one: &dyn Fn(usize) -> bool| -> Vec<usize> {
+        divisions.iter().map(|division| division.face).filter(|&face| is_one(face)).collect()
+    };
+    let all = || divided(&|_| true);
+    let pieces: Vec<Piece> = divisions.iter().flat_map(|division| division.pieces.iter().copied()).collect();
+    let mut cut = model.cut_off(&pieces).ok_or_else(all)?;
+    let tessellation = Tessellation::of_cut(&mut cut, tessellation).map_err(|error| {
+        let BrepError::Face { face, .. } = error else { return all() };
+        let failed = divided(&|divided| cut.patch_parts_of.get(face - 1) == Some(&divided));
+        if failed.is_empty() { all() } else { failed }
+    })?;
+    let shape = Shape::new(&cut.model, &tessellation);
+    let mut layout = Layout::new(&cut.model, &tessellation, &shape);
+    for (part, of) in cut.patch_parts_of.iter().enumerate() {
+        if let Some(division) = divisions.iter().find(|division| division.face == *of) {
+            layout.along.insert(part, division.along.clone());
+        }
+    }
+    let unmerged = |report: &MergedSmall| {
+        let is_merged = |part: usize| report.faces.iter().any(|merged| merged.face == part + 1);
+        let unmerged = divided(&|face| {
+            cut.patch_parts_of.iter().enumerate().any(|(part, of)| *of == face && !is_merged(part))
+        });
+        if unmerged.is_empty() { Ok(()) } else { Err(unmerged) }
+    };
+    let without_tips = merge_all(&shape, &layout, small);
+    unmerged(&without_tips.1)?;
+    let (merged, report) = with_tips(&layout, &shape, small, without_tips);
+    unmerged(&report)?;
+    Ok((merged, divided_of_file(report, &cut)))
+}
+
+/// Merges what is small and tips of faces; `without_tips` is the result without them.
+///
+/// Tips are cut off as faces of their own where they are narrow beside the sizes without them. Those
+/// that are not merged then are cut off where they are narrower, or left.
+fn with_tips(
+    layout: &Layout,
+    shape: &Shape,
+    small: &Small,
+    without_tips: (Option<Merged>, MergedSmall),
+) -> (Option<Merged>, MergedSmall) {
+    let Layout { model, tessellation, .. } = *layout;
+    let mut candidates = candidates(layout);
+    if candidates.is_empty() {
+        return without_tips;
+    }
+    let size = match &without_tips.0 {
+        Some((facets, ..)) => (small.size)(facets),
+        None => (small.size)(&grouped(model, tessellation, shape, &shape.ungrouped(model)).0),
+    };
+    let least = THINNEST * bounds(&tessellation.points).diagonal();
+    for _ in 0..ROUNDS {
+        let mut tips = narrow(layout, &candidates, &*size, small.tip_factor);
+        // A face that is nowhere wider is small as a whole.
+        tips.retain(|narrow| least < narrow.width && narrow.width < layout.widths[narrow.tip.patch]);
+        let Some(cut) = cut_off(model, &tips) else { break };
+        match merge_tips(layout, small, cut, &tips) {
+            Ok(merged) => return merged,
+            Err(failed) => candidates = without(&candidates, &failed),
+        }
+    }
+    without_tips
 }
 
 /// The model with tips cut off; `None` if there are none.
 fn cut_off(model: &Model, tips: &[NarrowTip]) -> Option<Cut> {
-    let tips: Vec<Tip> = tips.iter().map(|narrow| narrow.tip).collect();
-    if tips.is_empty() { None } else { model.cut_tips(&tips) }
+    let tips: Vec<Piece> = tips.iter().map(|narrow| narrow.tip).collect();
+    if tips.is_empty() { None } else { model.cut_off(&tips) }
 }
 
 /// Merges what is small, and tips that were cut off.
@@ -52,12 +120,12 @@ fn cut_off(model: &Model, tips: &[NarrowTip]) -> Option<Cut> {
 /// # Errors
 /// The candidates of tips that are not merged.
 fn merge_tips(
-    model: &Model,
-    tessellation: &Tessellation,
+    uncut: &Layout,
     small: &Small,
     mut cut: Cut,
     tips: &[NarrowTip],
 ) -> Result<(Option<Merged>, MergedSmall), Vec<usize>> {
+    let Layout { model, tessellation, .. } = *uncut;
     let failed = |has_failed: &dyn Fn(usize, &NarrowTip) -> bool| -> Vec<usize> {
         let failed = tips.iter().enumerate().filter(|(k, tip)| has_failed(*k, tip));
         failed.map(|(_, tip)| tip.candidate).collect()
@@ -74,7 +142,8 @@ fn merge_tips(
     };
     let cuts: Vec<TipCut> = tips.iter().enumerate().map(cut_off).collect();
     let shape = Shape::new(&cut.model, &tessellation);
-    let layout = Layout::new(&cut.model, &tessellation, &shape, cuts);
+    let mut layout = Layout::new(&cut.model, &tessellation, &shape);
+    (layout.cuts, layout.along) = (cuts, uncut.along.clone());
     let (merged, report) = merge_all(&shape, &layout, small);
     let is_merged = |k: usize| {
         report.faces.iter().any(|merged| merged.face == cut.patches[k] + 1)
@@ -122,8 +191,21 @@ fn of_file(report: MergedSmall, model: &Model, cut: &Cut, tips: &[NarrowTip]) ->
         let point = model.corners[narrow.corner].point.into();
         Some(MergedTip { face: narrow.tip.patch + 1, into: merged.into, point, width: narrow.width })
     };
+    let tips = tips.iter().zip(&cut.patches).filter_map(tip).collect();
+    MergedSmall { faces, tips, edges: edges_of_file(report.edges, cut), named: report.named }
+}
+
+/// The report in the numbers of the file: pieces of a divided face have its number.
+fn divided_of_file(mut report: MergedSmall, cut: &Cut) -> MergedSmall {
+    let of_file = |face: &mut usize| *face = cut.patch_parts_of[*face - 1] + 1;
+    report.faces.iter_mut().for_each(|merged| of_file(&mut merged.face));
+    report.tips.iter_mut().for_each(|merged| of_file(&mut merged.face));
+    MergedSmall { edges: edges_of_file(report.edges, cut), ..report }
+}
+
+/// Merged edges in the numbers of the file, which has no cuts: parts of an edge have its number.
+fn edges_of_file(mut edges: Vec<MergedEdge>, cut: &Cut) -> Vec<MergedEdge> {
     let edge = |edge: usize| cut.parts_of[edge - 1].map(|edge| edge + 1);
-    let mut edges = report.edges;
     edges.retain_mut(|merged| {
         let mut curve: Vec<usize> = merged.curve.iter().filter_map(|part| edge(*part)).collect();
         curve.dedup();
@@ -132,6 +214,5 @@ fn of_file(report: MergedSmall, model: &Model, cut: &Cut, tips: &[NarrowTip]) ->
         merged.edge = of_file.unwrap_or(merged.edge);
         of_file.is_some() && merged.curve.len() > 1
     });
-    let tips = tips.iter().zip(&cut.patches).filter_map(tip).collect();
-    MergedSmall { faces, tips, edges, named: report.named }
+    edges
 }

@@ -13,7 +13,8 @@
 //! * it makes no sharp wedge with the faces on the other side of the narrow one, as both faces of a
 //!   thin sheet would.
 //!
-//! A narrow **tip** of a face is cut off as a face of its own before (`tips`).
+//! Before that, a narrow face along several others is divided where these change (`strips`), and a
+//! narrow **tip** of a face is cut off as a face of its own (`tips`).
 //!
 //! Curves inside a composite patch are dropped. Then corners with two curves left are dropped if
 //! one of the curves is short, or if they do not bend there.
@@ -27,6 +28,7 @@ mod group;
 mod layout;
 mod merge;
 mod report;
+mod strips;
 #[cfg(test)]
 mod tests;
 mod tips;

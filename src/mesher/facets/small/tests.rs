@@ -23,7 +23,8 @@ fn read(name: &str) -> Model {
 fn merged_of(mut model: Model, size: f64) -> (Option<FacetModel>, MergedSmall) {
     let tessellation = Tessellation::of(&mut model, &Settings::default()).unwrap();
     let size = |_: &FacetModel| -> Box<dyn SizeField> { Box::new(Constant(size)) };
-    let small = Small { factor: 20.0, largest: f64::INFINITY, tip_factor: 10.0, size: &size };
+    let small =
+        Small { factor: 20.0, still_factor: 5.0, largest: f64::INFINITY, tip_factor: 10.0, size: &size };
     let (merged, report) = merge(&model, &tessellation, &small);
     (merged.map(|(facets, ..)| facets), report)
 }
@@ -68,6 +69,24 @@ fn rounded_edges_and_the_corners_between_them_join_six_faces() {
     let (facets, report) = merged("rounded_cube", 0.1);
     assert_eq!(counts(&facets.unwrap()), [6, 12, 8]);
     assert_eq!(report.faces.len(), 12 + 8);
+}
+
+#[test]
+fn a_step_around_a_corner_is_divided_and_joins_the_faces_of_one_side() {
+    // Its front has two faces along each side.
+    let unmerged = counts(&unmerged("cornered_step"));
+    let (facets, report) = merged("cornered_step", 0.1);
+    assert_eq!(counts(&facets.unwrap()), [unmerged[0] - 1, unmerged[1] - 4, unmerged[2] - 3]);
+    let into: Vec<usize> = report.faces.iter().map(|merged| merged.into).collect();
+    assert!(report.faces.iter().all(|merged| merged.face == 5), "both pieces are of face 5: {report:?}");
+    assert_eq!(into, [6, 2]);
+    assert!(report.edges.iter().all(|edge| edge.edge <= 24), "cuts are no edges of the file: {report:?}");
+    // It is not small there.
+    assert!(merged("cornered_step", 0.01).1.faces.is_empty());
+    let mut model = read("cornered_step");
+    model.patch_names = vec![None; model.patches.len()];
+    model.patch_names[4] = Some("front".to_owned());
+    assert!(merged_of(model, 0.1).1.faces.is_empty(), "names of the file are never lost");
 }
 
 #[test]

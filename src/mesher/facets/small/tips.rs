@@ -10,7 +10,7 @@ use crate::Point;
 use crate::ground::kernel::nearest::in_segment;
 use crate::ground::size::SizeField;
 use crate::mesher::facets::sharp_places::angles;
-use brep::{EdgeCurve, Fin, Model, On, Tip, project_to_curve};
+use brep::{EdgeCurve, Fin, Model, On, Piece, project_to_curve};
 
 /// Tips with a larger angle between their triangles are not cut (radians).
 const SHARP: f64 = 0.35;
@@ -35,7 +35,7 @@ const BISECTIONS: usize = 20;
 /// A corner of a face that is so sharp that there may be a narrow tip.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Candidate {
-    tip: Tip,
+    tip: Piece,
     corner: usize,
     /// Which of [`NARROWER`] to cut with.
     attempt: usize,
@@ -44,7 +44,7 @@ pub(super) struct Candidate {
 /// A tip that is cut.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct NarrowTip {
-    pub tip: Tip,
+    pub tip: Piece,
     /// Its corner.
     pub corner: usize,
     /// Its width at the cut (length).
@@ -69,14 +69,15 @@ pub(super) fn candidates(layout: &Layout) -> Vec<Candidate> {
         };
         for (of_loop, fins) in face.loops.iter().enumerate() {
             for (fin, arriving) in fins.iter().enumerate() {
-                let leaving = &fins[(fin + 1) % fins.len()];
+                let sides = [fin, (fin + 1) % fins.len()];
+                let leaving = &fins[sides[1]];
                 let (Some((a, one)), Some((b, other))) = (beyond(arriving), beyond(leaving)) else {
                     continue;
                 };
                 let corner = model.curves[a].ends[usize::from(arriving.is_forward)];
                 let is_sharp = angles.get(&(corner as u32, patch as u32)).is_some_and(|angle| *angle < SHARP);
                 if a != b && one != other && is_sharp {
-                    let tip = Tip { patch, of_loop, fin, at: [None; 2] };
+                    let tip = Piece { patch, of_loop, sides, at: [None; 2] };
                     found.push(Candidate { tip, corner, attempt: 0 });
                 }
             }
@@ -96,7 +97,7 @@ pub(super) fn narrow(
         let sides = tip.sides(layout.model);
         let [one, other] = [0, 1].map(|k| Side::new(layout, sides[k], k == 1));
         let (at, width) = cut(&one, &other, size, factor / NARROWER[attempt])?;
-        Some(NarrowTip { tip: Tip { at, ..tip }, corner, width, candidate })
+        Some(NarrowTip { tip: Piece { at, ..tip }, corner, width, candidate })
     };
     let mut taken: Vec<(usize, [f64; 2])> = Vec::new();
     let mut found = Vec::new();
@@ -123,7 +124,7 @@ pub(super) fn without(candidates: &[Candidate], failed: &[usize]) -> Vec<Candida
 }
 
 /// The parts of its edges that belong to a tip.
-fn parts(model: &Model, tip: &Tip) -> [(usize, [f64; 2]); 2] {
+fn parts(model: &Model, tip: &Piece) -> [(usize, [f64; 2]); 2] {
     let sides = tip.sides(model);
     [0, 1].map(|k| {
         let fin = sides[k];

@@ -1,44 +1,44 @@
-//! Narrow tips of patches, cut off as patches of their own.
+//! Pieces of patches, such as narrow tips, cut off as patches of their own.
 
 use crate::bspline::{Basis, SplineCurve};
 use crate::model::{Corner, EdgeCurve, Fin, Model, On, Patch};
 use crate::{Curve, Point, Surface};
 use nalgebra::SVector;
 
-/// A corner of a patch between two of its curves, to be cut off from one curve to the other.
+/// A piece of a patch, to be cut off from one of its sides to another one.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Tip {
+pub struct Piece {
     /// The patch.
     pub patch: usize,
     /// The loop of the patch.
     pub of_loop: usize,
-    /// The side of the loop that ends in the corner; the next one starts there.
-    pub fin: usize,
-    /// The parameters on the curves of both sides between which to cut; `None` for the other end of
-    /// the curve.
+    /// The first and the last side of the piece in the direction of the loop, which are different.
+    /// Those of a tip follow each other.
+    pub sides: [usize; 2],
+    /// The parameters on the curves of both sides between which to cut; `None` for the start of the
+    /// first one and the end of the last one.
     pub at: [Option<f64>; 2],
 }
 
-impl Tip {
-    /// The side of the loop that ends in the corner, and the one that starts there.
+impl Piece {
+    /// The first and the last side of the piece.
     ///
     /// # Panics
-    /// If the model has no such loop or side.
+    /// If the model has no such loop or sides.
     pub fn sides<'a>(&self, model: &'a Model) -> [&'a Fin; 2] {
-        let fins = &model.patches[self.patch].loops[self.of_loop];
-        [&fins[self.fin], &fins[(self.fin + 1) % fins.len()]]
+        self.sides.map(|side| &model.patches[self.patch].loops[self.of_loop][side])
     }
 }
 
-/// A model whose tips are patches of their own.
+/// A model of which pieces of patches are patches of their own.
 #[derive(Clone, Debug)]
 pub struct Cut {
     /// The model. Patches and curves before keep their numbers; of a divided curve that is the
-    /// first piece.
+    /// first part.
     pub model: Model,
-    /// For each tip, its patch.
+    /// For each piece, its patch.
     pub patches: Vec<usize>,
-    /// For each tip, the curve along which it was cut.
+    /// For each piece, the curve along which it was cut.
     pub curves: Vec<usize>,
     /// For each curve, that of the first model of which it is a part; `None` for cuts.
     pub parts_of: Vec<Option<usize>>,
@@ -47,34 +47,18 @@ pub struct Cut {
 }
 
 impl Model {
-    /// Cuts tips off their patches, along lines in the parameters. `None` if a curve has two cuts
-    /// in the wrong order.
+    /// Cuts pieces off their patches, along lines in the parameters. A piece may have others inside
+    /// that come before it. `None` if cuts cross each other, or pieces come in the wrong order.
     ///
     /// # Panics
-    /// If there are no such loops and sides, or the sides of a tip are not curves.
-    pub fn cut_tips(&self, tips: &[Tip]) -> Option<Cut> {
+    /// If there are no such loops and sides, or the sides at a cut are not curves.
+    pub fn cut_off(&self, pieces: &[Piece]) -> Option<Cut> {
         let mut model = self.clone();
         let mut divisions: Vec<Vec<(f64, usize)>> = vec![Vec::new(); self.curves.len()];
-        let mut ends = Vec::with_capacity(tips.len());
-        for tip in tips {
-            let sides = tip.sides(self);
-            let mut corners = [0; 2];
-            for (k, side) in sides.into_iter().enumerate() {
-                let (curve, far) = self.far_end(side, k == 0);
-                corners[k] = match tip.at[k] {
-                    None => far,
-                    Some(t) => {
-                        let point = Point::from(self.curves[curve].curve.point(t));
-                        model.corners.push(Corner { point, tolerance: 0.0 });
-                        divisions[curve].push((t, model.corners.len() - 1));
-                        model.corners.len() - 1
-                    }
-                };
-            }
-            ends.push(corners);
-        }
+        let ends: Vec<[usize; 2]> =
+            pieces.iter().map(|piece| self.ends_of_cut(piece, &mut model.corners, &mut divisions)).collect();
         let mut parts_of: Vec<Option<usize>> = (0..self.curves.len()).map(Some).collect();
-        let pieces: Vec<Vec<usize>> = divisions
+        let parts: Vec<Vec<usize>> = divisions
             .iter_mut()
             .enumerate()
             .map(|(curve, at)| {
@@ -87,29 +71,21 @@ impl Model {
             .iter()
             .map(|patch| {
                 let of_loop =
-                    |fins: &Vec<Fin>| fins.iter().map(|fin| divided(fin, &pieces, self, &model)).collect();
+                    |fins: &Vec<Fin>| fins.iter().map(|fin| divided(fin, &parts, self, &model)).collect();
                 patch.loops.iter().map(of_loop).collect()
             })
             .collect();
         let (mut patches, mut curves) = (Vec::new(), Vec::new());
-        for (tip, [from, to]) in tips.iter().zip(ends) {
-            let of_loop = &mut fins[tip.patch][tip.of_loop];
-            let next = (tip.fin + 1) % of_loop.len();
-            let arriving = of_loop[tip.fin].pop()?;
-            if of_loop[next].is_empty() {
-                return None;
-            }
-            let leaving = of_loop[next].remove(0);
-            if [(start(&model, &arriving), from), (end(&model, &leaving), to)].iter().any(|(a, b)| a != b) {
-                return None;
-            }
-            let Patch { surface, bodies, .. } = &self.patches[tip.patch];
-            let flat = across(&arriving, &leaving);
-            let ends = [from, to].map(|corner| model.corners[corner].point);
+        for (piece, corners) in pieces.iter().zip(ends) {
+            let of_loop = &mut fins[piece.patch][piece.of_loop];
+            let mut sides = taken(of_loop, piece.sides, corners, &model)?;
+            let Patch { surface, bodies, .. } = &self.patches[piece.patch];
+            let flat = across(&sides[0], &sides[sides.len() - 1]);
+            let places = corners.map(|corner| model.corners[corner].point);
             model.curves.push(EdgeCurve {
-                curve: on_surface(surface, flat.as_ref(), ends),
+                curve: on_surface(surface, flat.as_ref(), places),
                 range: [0.0, 1.0],
-                ends: [from, to],
+                ends: corners,
                 tolerance: 0.0,
             });
             parts_of.push(None);
@@ -120,9 +96,9 @@ impl Model {
                 range: [0.0, 1.0],
                 is_forward,
             };
-            of_loop[tip.fin].push(cut(true));
-            let loops = vec![vec![arriving, leaving, cut(false)]];
-            model.patches.push(Patch { surface: surface.clone(), loops, bodies: *bodies });
+            of_loop[piece.sides[0]].push(cut(true));
+            sides.push(cut(false));
+            model.patches.push(Patch { surface: surface.clone(), loops: vec![sides], bodies: *bodies });
             curves.push(curve);
             patches.push(model.patches.len() - 1);
         }
@@ -132,18 +108,61 @@ impl Model {
         if !model.patch_names.is_empty() {
             model.patch_names.resize(model.patches.len(), None);
         }
-        let patch_parts_of = (0..self.patches.len()).chain(tips.iter().map(|tip| tip.patch)).collect();
+        let patch_parts_of = (0..self.patches.len()).chain(pieces.iter().map(|piece| piece.patch)).collect();
         Some(Cut { model, patches, curves, parts_of, patch_parts_of })
     }
 
+    /// The corners at both ends of the cut of a piece; new ones are added, with the places on the
+    /// curves that they divide.
+    fn ends_of_cut(
+        &self,
+        piece: &Piece,
+        corners: &mut Vec<Corner>,
+        divisions: &mut [Vec<(f64, usize)>],
+    ) -> [usize; 2] {
+        let sides = piece.sides(self);
+        [0, 1].map(|k| {
+            let (curve, end) = self.end_of(sides[k], k == 0);
+            match piece.at[k] {
+                None => end,
+                Some(t) => {
+                    let point = Point::from(self.curves[curve].curve.point(t));
+                    corners.push(Corner { point, tolerance: 0.0 });
+                    divisions[curve].push((t, corners.len() - 1));
+                    corners.len() - 1
+                }
+            }
+        })
+    }
+
     /// The curve of a side, and the corner at its start or end.
-    fn far_end(&self, fin: &Fin, at_start: bool) -> (usize, usize) {
-        let On::Curve(curve) = fin.on else { panic!("the side of a tip is a curve") };
+    fn end_of(&self, fin: &Fin, at_start: bool) -> (usize, usize) {
+        let On::Curve(curve) = fin.on else { panic!("a side at a cut is a curve") };
         (curve, self.curves[curve].ends[usize::from(fin.is_forward != at_start)])
     }
 }
 
-/// Divides a curve at parameters in ascending order; returns its pieces in this order.
+/// Takes the sides between two corners out of a loop, of which there are the parts of each side, from
+/// the `first` side to the `last` one, which is another.
+fn taken(
+    of_loop: &mut [Vec<Fin>],
+    [first, last]: [usize; 2],
+    [from, to]: [usize; 2],
+    model: &Model,
+) -> Option<Vec<Fin>> {
+    let start = of_loop[first].iter().position(|fin| start(model, fin) == from)?;
+    let mut sides = of_loop[first].split_off(start);
+    let mut side = (first + 1) % of_loop.len();
+    while side != last {
+        sides.append(&mut of_loop[side]);
+        side = (side + 1) % of_loop.len();
+    }
+    let end = of_loop[last].iter().position(|fin| end(model, fin) == to)?;
+    sides.extend(of_loop[last].drain(..=end));
+    Some(sides)
+}
+
+/// Divides a curve at parameters in ascending order; returns its parts in this order.
 fn divide(
     curves: &mut Vec<EdgeCurve>,
     parts_of: &mut Vec<Option<usize>>,
@@ -151,27 +170,27 @@ fn divide(
     at: &[(f64, usize)],
 ) -> Vec<usize> {
     let whole = curves[curve].clone();
-    let mut pieces = vec![curve];
+    let mut parts = vec![curve];
     for &(t, corner) in at {
-        let last = &mut curves[pieces[pieces.len() - 1]];
+        let last = &mut curves[parts[parts.len() - 1]];
         (last.range[1], last.ends[1]) = (t, corner);
         curves.push(EdgeCurve { range: [t, whole.range[1]], ends: [corner, whole.ends[1]], ..whole.clone() });
         parts_of.push(Some(curve));
-        pieces.push(curves.len() - 1);
+        parts.push(curves.len() - 1);
     }
-    pieces
+    parts
 }
 
-/// The sides on the pieces of a curve, in the direction of the loop.
-fn divided(fin: &Fin, pieces: &[Vec<usize>], before: &Model, after: &Model) -> Vec<Fin> {
+/// The sides on the parts of a curve, in the direction of the loop.
+fn divided(fin: &Fin, parts: &[Vec<usize>], before: &Model, after: &Model) -> Vec<Fin> {
     let On::Curve(curve) = fin.on else { return vec![fin.clone()] };
     let range = before.curves[curve].range;
-    let side = |&piece: &usize| Fin {
-        on: On::Curve(piece),
-        range: after.curves[piece].range.map(|t| fin.parameter(t, range)),
+    let side = |&part: &usize| Fin {
+        on: On::Curve(part),
+        range: after.curves[part].range.map(|t| fin.parameter(t, range)),
         ..fin.clone()
     };
-    let mut sides: Vec<Fin> = pieces[curve].iter().map(side).collect();
+    let mut sides: Vec<Fin> = parts[curve].iter().map(side).collect();
     if !fin.is_forward {
         sides.reverse();
     }
@@ -179,11 +198,11 @@ fn divided(fin: &Fin, pieces: &[Vec<usize>], before: &Model, after: &Model) -> V
 }
 
 fn start(model: &Model, fin: &Fin) -> usize {
-    model.far_end(fin, true).1
+    model.end_of(fin, true).1
 }
 
 fn end(model: &Model, fin: &Fin) -> usize {
-    model.far_end(fin, false).1
+    model.end_of(fin, false).1
 }
 
 fn line<const D: usize>(from: SVector<f64, D>, to: SVector<f64, D>) -> Curve<D> {
@@ -228,16 +247,17 @@ mod tests {
     }
 
     /// The tip of a patch at a point, cut at the points of its edges with this first coordinate.
-    fn tip(model: &Model, patch: usize, corner: Point, x: f64) -> Tip {
+    fn tip(model: &Model, patch: usize, corner: Point, x: f64) -> Piece {
         let fins = &model.patches[patch].loops[0];
         let ends_there = |fin: &Fin| (model.corners[end(model, fin)].point - corner).norm() < 1e-6;
         let fin = fins.iter().position(ends_there).expect("a side ends in the corner");
-        let at = [fin, (fin + 1) % fins.len()].map(|k| {
-            let curve = model.far_end(&fins[k], true).0;
+        let sides = [fin, (fin + 1) % fins.len()];
+        let at = sides.map(|k| {
+            let curve = model.end_of(&fins[k], true).0;
             let foot = nearest_on_curve(&model.curves[curve].curve, &Point::new(x, 0.0, 2.0));
             Some(foot.parameter)
         });
-        Tip { patch, of_loop: 0, fin, at }
+        Piece { patch, of_loop: 0, sides, at }
     }
 
     /// The numbers of the patches with a tip at (2, 0, 2).
@@ -258,11 +278,11 @@ mod tests {
             assert!(tips_of.iter().all(|patch| all.contains(patch)), "{name}: {all:?}");
             let before = Tessellation::of(&mut model, &Settings::default()).unwrap();
             let x = |patch: usize| if patch == 2 { 0.9 } else { 5.0 };
-            let tips: Vec<Tip> = tips_of
+            let tips: Vec<Piece> = tips_of
                 .iter()
                 .map(|&patch| tip(&model, patch, Point::new(2.0, 0.0, 2.0), x(patch)))
                 .collect();
-            let mut cut = model.cut_tips(&tips).unwrap();
+            let mut cut = model.cut_off(&tips).unwrap();
             let (patches, curves) = (model.patches.len(), model.curves.len());
             assert_eq!(cut.patches, (patches..patches + tips.len()).collect::<Vec<_>>());
             // Each tip divides two edges and adds one.
@@ -302,7 +322,7 @@ mod tests {
         let model = read("tapered_chamfer");
         let one = tip(&model, 6, Point::new(2.0, 0.0, 2.0), 5.0);
         let other = tip(&model, 6, Point::new(2.0, 0.0, 2.0), 6.0);
-        assert!(model.cut_tips(&[one]).is_some());
-        assert!(model.cut_tips(&[one, other]).is_none(), "only one of them is at the tip");
+        assert!(model.cut_off(&[one, other]).is_some());
+        assert!(model.cut_off(&[other, one]).is_none(), "the other one has the tip");
     }
 }
