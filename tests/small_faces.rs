@@ -22,8 +22,8 @@ const PARTS: [(&str, f64, f64); 5] = [
     ("cylinder_step", 0.785_005_464, 0.04),
 ];
 
-/// Parts with rounded edges, one with a low step whose front continues in a wall at its end, and one
-/// with a step around a corner. With their small faces they have up to two million tets.
+/// Parts with rounded edges, one with a low step whose front continues in a wall at its end, and
+/// one with a step around a corner. With their small faces they have up to two million tets.
 const MANY: [(&str, f64, f64); 4] = [
     ("rounded_cube", 0.999_997_426, 5e-3),
     ("rounded_rims", 0.803_649_788, 0.01),

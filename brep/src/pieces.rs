@@ -142,8 +142,8 @@ impl Model {
     }
 }
 
-/// Takes the sides between two corners out of a loop, of which there are the parts of each side, from
-/// the `first` side to the `last` one, which is another.
+/// Takes the sides between two corners out of a loop, of which there are the parts of each side,
+/// from the `first` side to the `last` one, which is another.
 fn taken(
     of_loop: &mut [Vec<Fin>],
     [first, last]: [usize; 2],

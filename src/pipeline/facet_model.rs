@@ -413,8 +413,8 @@ fn labels(names: Vec<String>) -> Vec<Label> {
 /// the boundary of a patch by the width of the face: less than the surface error of curved parts.
 const SMALL: f64 = 20.0;
 
-/// The same where sizes are smaller because other faces and edges are kept: what is kept beside them
-/// would have elements as small as itself.
+/// The same where sizes are smaller because other faces and edges are kept: what is kept beside
+/// them would have elements as small as itself.
 const STILL_SMALL: f64 = 5.0;
 
 /// The same for tips of faces, of which only the end is as wide.

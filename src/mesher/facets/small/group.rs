@@ -100,8 +100,8 @@ pub type Merged = (FacetModel, BrepProjector, Grouping);
 /// Merges the small faces and edges of a model, of which tips may have been cut off.
 ///
 /// What is merged must be small beside the sizes that the model has without all that may be merged,
-/// and still small beside those of what is merged in the end. Merging less never makes sizes larger,
-/// so faces and edges are taken out until all that are left are small.
+/// and still small beside those of what is merged in the end. Merging less never makes sizes
+/// larger, so faces and edges are taken out until all that are left are small.
 pub(super) fn merge_all(shape: &Shape, layout: &Layout, small: &Small) -> (Option<Merged>, MergedSmall) {
     let (model, tessellation) = (layout.model, layout.tessellation);
     let mut allowed = Allowed::of(layout, small.largest / small.factor);

@@ -78,8 +78,8 @@ fn merge_divided(
 
 /// Merges what is small and tips of faces; `without_tips` is the result without them.
 ///
-/// Tips are cut off as faces of their own where they are narrow beside the sizes without them. Those
-/// that are not merged then are cut off where they are narrower, or left.
+/// Tips are cut off as faces of their own where they are narrow beside the sizes without them.
+/// Those that are not merged then are cut off where they are narrower, or left.
 fn with_tips(
     layout: &Layout,
     shape: &Shape,

@@ -54,8 +54,8 @@ pub(super) struct Division {
     pub face: usize,
     /// The pieces that are cut off, those inside others first.
     pub pieces: Vec<Piece>,
-    /// The faces along one side, where all pieces should be merged: with one at each side, a step as
-    /// short as the face is wide would remain between them.
+    /// The faces along one side, where all pieces should be merged: with one at each side, a step
+    /// as short as the face is wide would remain between them.
     pub along: Vec<usize>,
 }
 
