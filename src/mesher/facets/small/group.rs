@@ -40,7 +40,7 @@ pub struct Small<'a> {
 
 /// Share of the factor of tips that must be left after they were cut off: sizes are smaller then,
 /// because edges are shorter.
-const STILL_SMALL: f64 = 0.25;
+const TIP_STILL_SMALL: f64 = 0.25;
 
 /// The longest edge at an end of a short one is at least this many times as long.
 const LONGER: f64 = 20.0;
@@ -97,12 +97,21 @@ fn widest_near(layout: &Layout, face: usize, is_narrow: &[bool]) -> f64 {
 /// A model with patches and curves of several faces and edges.
 pub type Merged = (FacetModel, BrepProjector, Grouping);
 
+/// What was merged.
+pub(super) struct Outcome {
+    /// None if nothing is.
+    pub merged: Option<Merged>,
+    pub report: MergedSmall,
+    /// The sizes of the model after it; none if nothing may be merged.
+    pub size: Option<Box<dyn SizeField>>,
+}
+
 /// Merges the small faces and edges of a model, of which tips may have been cut off.
 ///
 /// What is merged must be small beside the sizes that the model has without all that may be merged,
 /// and still small beside those of what is merged in the end. Merging less never makes sizes
 /// larger, so faces and edges are taken out until all that are left are small.
-pub(super) fn merge_all(shape: &Shape, layout: &Layout, small: &Small) -> (Option<Merged>, MergedSmall) {
+pub(super) fn merge_all(shape: &Shape, layout: &Layout, small: &Small) -> Outcome {
     let (model, tessellation) = (layout.model, layout.tessellation);
     let mut allowed = Allowed::of(layout, small.largest / small.factor);
     for cut in &layout.cuts {
@@ -111,7 +120,7 @@ pub(super) fn merge_all(shape: &Shape, layout: &Layout, small: &Small) -> (Optio
     let mut factor = small.factor;
     loop {
         if !allowed.faces.iter().chain(&allowed.edges).any(|allowed| *allowed) {
-            return (None, MergedSmall::default());
+            return Outcome { merged: None, report: MergedSmall::default(), size: None };
         }
         let joins = joins(layout, &allowed.faces);
         let (grouping, chains) = grouping(layout, &joins, &allowed.edges);
@@ -124,12 +133,12 @@ pub(super) fn merge_all(shape: &Shape, layout: &Layout, small: &Small) -> (Optio
             report.named.retain(|kept| small.factor * kept.width <= largest);
         }
         if report.faces.is_empty() && report.edges.is_empty() {
-            return (None, report);
+            return Outcome { merged: None, report, size: Some(size) };
         }
         let is_small = |points: Vec<Point>, extent: f64, factor: f64| {
             points.into_iter().all(|p| factor * extent <= size.size_at(&p))
         };
-        let tip_factor = STILL_SMALL * small.tip_factor;
+        let tip_factor = TIP_STILL_SMALL * small.tip_factor;
         let point = |v: u32| tessellation.points[v as usize];
         let points_of_edge =
             |edge: usize| tessellation.lines[edge].iter().map(|on| point(on.0)).collect::<Vec<_>>();
@@ -155,7 +164,7 @@ pub(super) fn merge_all(shape: &Shape, layout: &Layout, small: &Small) -> (Optio
             }
         }
         if are_all_small {
-            return (Some((facets, exact, grouping)), report);
+            return Outcome { merged: Some((facets, exact, grouping)), report, size: Some(size) };
         }
         factor = small.still_factor;
     }

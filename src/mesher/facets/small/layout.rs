@@ -4,7 +4,7 @@ use crate::ground::kernel::nearest::in_segment;
 use crate::ground::kernel::tree::{Tree, bounds};
 use crate::mesher::facets::exact::Shape;
 use crate::{Point, Vector};
-use brep::{Model, On, Tessellation};
+use brep::{Fin, Model, On, Tessellation};
 use rayon::prelude::*;
 use std::collections::HashMap;
 
@@ -131,6 +131,29 @@ impl<'a> Layout<'a> {
             2.0 * self.triangles[face].iter().map(of).fold(0.0, f64::max).sqrt()
         };
         (0..self.model.patches.len()).into_par_iter().map(width).collect()
+    }
+
+    /// The edge of a side of a face that is a curve, and the other face there.
+    pub fn beyond(&self, face: usize, side: &Fin) -> Option<(usize, usize)> {
+        let On::Curve(edge) = side.on else { return None };
+        match self.faces_of[edge][..] {
+            [a, b] if a != b => Some((edge, if a == face { b } else { a })),
+            _ => None,
+        }
+    }
+
+    /// The points of a side that is an edge, with their parameters, in the direction of its loop.
+    ///
+    /// # Panics
+    /// If it is a corner.
+    pub fn line(&self, side: &Fin) -> Vec<(Point, f64)> {
+        let On::Curve(edge) = side.on else { panic!("the side is an edge") };
+        let on = |&(v, t): &(u32, f64)| (self.tessellation.points[v as usize], t);
+        let mut line: Vec<_> = self.tessellation.lines[edge].iter().map(on).collect();
+        if !side.is_forward {
+            line.reverse();
+        }
+        line
     }
 
     /// The cut of a face that is a tip.

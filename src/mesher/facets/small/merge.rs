@@ -1,6 +1,6 @@
 //! Merging with and without divided faces and tips of faces.
 
-use super::group::{Allowed, Merged, Small, merge_all};
+use super::group::{Allowed, Merged, Outcome, Small, merge_all};
 use super::layout::{Layout, TipCut};
 use super::report::{MergedEdge, MergedSmall, MergedTip};
 use super::strips::{Division, divisions};
@@ -70,7 +70,7 @@ fn merge_divided(
         if unmerged.is_empty() { Ok(()) } else { Err(unmerged) }
     };
     let without_tips = merge_all(&shape, &layout, small);
-    unmerged(&without_tips.1)?;
+    unmerged(&without_tips.report)?;
     let (merged, report) = with_tips(&layout, &shape, small, without_tips);
     unmerged(&report)?;
     Ok((merged, divided_of_file(report, &cut)))
@@ -84,17 +84,16 @@ fn with_tips(
     layout: &Layout,
     shape: &Shape,
     small: &Small,
-    without_tips: (Option<Merged>, MergedSmall),
+    without_tips: Outcome,
 ) -> (Option<Merged>, MergedSmall) {
     let Layout { model, tessellation, .. } = *layout;
+    let Outcome { merged, report, size } = without_tips;
     let mut candidates = candidates(layout);
     if candidates.is_empty() {
-        return without_tips;
+        return (merged, report);
     }
-    let size = match &without_tips.0 {
-        Some((facets, ..)) => (small.size)(facets),
-        None => (small.size)(&grouped(model, tessellation, shape, &shape.ungrouped(model)).0),
-    };
+    let size =
+        size.unwrap_or_else(|| (small.size)(&grouped(model, tessellation, shape, &shape.ungrouped(model)).0));
     let least = THINNEST * bounds(&tessellation.points).diagonal();
     for _ in 0..ROUNDS {
         let mut tips = narrow(layout, &candidates, &*size, small.tip_factor);
@@ -106,7 +105,7 @@ fn with_tips(
             Err(failed) => candidates = without(&candidates, &failed),
         }
     }
-    without_tips
+    (merged, report)
 }
 
 /// The model with tips cut off; `None` if there are none.
@@ -144,7 +143,7 @@ fn merge_tips(
     let shape = Shape::new(&cut.model, &tessellation);
     let mut layout = Layout::new(&cut.model, &tessellation, &shape);
     (layout.cuts, layout.along) = (cuts, uncut.along.clone());
-    let (merged, report) = merge_all(&shape, &layout, small);
+    let Outcome { merged, report, .. } = merge_all(&shape, &layout, small);
     let is_merged = |k: usize| {
         report.faces.iter().any(|merged| merged.face == cut.patches[k] + 1)
             && report.edges.iter().any(|merged| merged.edge == cut.curves[k] + 1)

@@ -7,7 +7,7 @@
 use super::layout::Layout;
 use crate::Point;
 use crate::ground::kernel::nearest::{self, in_segment, in_triangle};
-use brep::{On, Piece};
+use brep::{Fin, Piece};
 
 /// A face is not divided if one neighbour has at least this share of one of its sides.
 const COVERED: f64 = 0.8;
@@ -27,6 +27,8 @@ struct Side {
     beyond: usize,
     /// Its points with their parameters.
     line: Vec<(Point, f64)>,
+    /// The length of the loop before it.
+    start: f64,
     length: f64,
 }
 
@@ -69,16 +71,12 @@ impl<'a> Strip<'a> {
     /// The face, if it has one loop of edges with other faces beyond them.
     fn new(layout: &'a Layout, face: usize) -> Option<Self> {
         let [fins] = &layout.model.patches[face].loops[..] else { return None };
-        let side = |fin: &brep::Fin| {
-            let On::Curve(curve) = fin.on else { return None };
-            let &[a, b] = &layout.faces_of[curve][..] else { return None };
-            let on = |&(v, t): &(u32, f64)| (layout.tessellation.points[v as usize], t);
-            let mut line: Vec<_> = layout.tessellation.lines[curve].iter().map(on).collect();
-            if !fin.is_forward {
-                line.reverse();
-            }
-            let beyond = if a == face { b } else { a };
-            (a != b).then(|| Side { beyond, line, length: layout.lengths[curve] })
+        let mut end = 0.0;
+        let side = |fin: &Fin| {
+            let (edge, beyond) = layout.beyond(face, fin)?;
+            let (start, length) = (end, layout.lengths[edge]);
+            end += length;
+            Some(Side { beyond, line: layout.line(fin), start, length })
         };
         let sides = fins.iter().map(side).collect::<Option<Vec<Side>>>()?;
         Some(Self { face, width: layout.widths[face], triangles: &layout.triangles[face], sides })
@@ -110,14 +108,13 @@ impl<'a> Strip<'a> {
 
     /// The cuts that do not meet, those of pieces inside others first.
     fn cuts(&self) -> Vec<[Place; 2]> {
-        let starts = self.starts();
         let mut cuts: Vec<[Place; 2]> = Vec::new();
         for side in 0..self.sides.len() {
             if self.sides[self.before(side)].beyond == self.sides[side].beyond {
                 continue;
             }
-            let corner = self.corner(&starts, side);
-            let Some(opposite) = self.opposite(&starts, side) else { continue };
+            let corner = self.corner(side);
+            let Some(opposite) = self.opposite(side) else { continue };
             let cut =
                 if corner.position < opposite.position { [corner, opposite] } else { [opposite, corner] };
             if self.is_long(&cut) && self.is_across(&cut) && cuts.iter().all(|other| !meet(&cut, other)) {
@@ -161,16 +158,6 @@ impl<'a> Strip<'a> {
         }
     }
 
-    /// The positions of the starts of the sides.
-    fn starts(&self) -> Vec<f64> {
-        let mut position = 0.0;
-        let start = |side: &Side| {
-            position += side.length;
-            position - side.length
-        };
-        self.sides.iter().map(start).collect()
-    }
-
     fn is_long(&self, [from, to]: &[Place; 2]) -> bool {
         let between = to.position - from.position;
         between.min(self.length() - between) >= LONG * self.width
@@ -188,35 +175,35 @@ impl<'a> Strip<'a> {
     }
 
     /// The corner at the start of a side.
-    fn corner(&self, starts: &[f64], side: usize) -> Place {
-        Place { position: starts[side], side, at: None, point: self.sides[side].line[0].0 }
+    fn corner(&self, side: usize) -> Place {
+        let Side { start, ref line, .. } = self.sides[side];
+        Place { position: start, side, at: None, point: line[0].0 }
     }
 
     /// The place across the strip from the corner at the start of a side: a corner, or else the
     /// nearest point.
-    fn opposite(&self, starts: &[f64], side: usize) -> Option<Place> {
+    fn opposite(&self, side: usize) -> Option<Place> {
         let count = self.sides.len();
         let corner = self.sides[side].line[0].0;
         let before = self.before(side);
         let others = || (0..count).filter(move |&other| other != side && other != before);
         let distance = |place: &Place| (place.point - corner).norm();
-        let is_near = |place: &Place| distance(place) <= ACROSS[1] * self.width;
         let nearer = |a: &Place, b: &Place| distance(a).total_cmp(&distance(b));
         let corners = others().filter(|&other| other != (side + 1) % count);
-        let nearest = corners.map(|other| self.corner(starts, other)).min_by(nearer);
-        if let Some(corner) = nearest.filter(is_near) {
+        let nearest = corners.map(|other| self.corner(other)).min_by(nearer);
+        if let Some(corner) = nearest.filter(|place| distance(place) <= ACROSS[1] * self.width) {
             return Some(corner);
         }
-        let place = others().map(|other| self.foot(starts, other, &corner)).min_by(nearer)?;
-        let from_start = place.position - starts[place.side];
-        let is_inside = from_start.min(self.sides[place.side].length - from_start) > self.width;
-        (is_inside && is_near(&place)).then_some(place)
+        let place = others().map(|other| self.foot(other, &corner)).min_by(nearer)?;
+        let Side { start, length, .. } = self.sides[place.side];
+        let from_start = place.position - start;
+        (from_start.min(length - from_start) > self.width).then_some(place)
     }
 
     /// The place of a side that is nearest to a point.
-    fn foot(&self, starts: &[f64], side: usize, point: &Point) -> Place {
-        let mut position = starts[side];
-        let mut best = (f64::INFINITY, self.corner(starts, side));
+    fn foot(&self, side: usize, point: &Point) -> Place {
+        let mut position = self.sides[side].start;
+        let mut best = (f64::INFINITY, self.corner(side));
         for w in self.sides[side].line.windows(2) {
             let [(a, start), (b, end)] = [w[0], w[1]];
             let (share, squared) = in_segment(point, &a, &b);

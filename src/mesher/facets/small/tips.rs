@@ -60,13 +60,7 @@ pub(super) fn candidates(layout: &Layout) -> Vec<Candidate> {
     let angles = angles(&tessellation.points, triangles, |v| (v as usize) < model.corners.len());
     let mut found = Vec::new();
     for (patch, face) in model.patches.iter().enumerate() {
-        let beyond = |fin: &Fin| match fin.on {
-            On::Curve(curve) => match layout.faces_of[curve][..] {
-                [a, b] if a != b => Some((curve, if a == patch { b } else { a })),
-                _ => None,
-            },
-            On::Corner(_) => None,
-        };
+        let beyond = |fin: &Fin| layout.beyond(patch, fin);
         for (of_loop, fins) in face.loops.iter().enumerate() {
             for (fin, arriving) in fins.iter().enumerate() {
                 let sides = [fin, (fin + 1) % fins.len()];
@@ -160,9 +154,8 @@ struct Across {
 impl<'a> Side<'a> {
     fn new(layout: &Layout<'a>, fin: &Fin, leaves: bool) -> Self {
         let On::Curve(curve) = fin.on else { unreachable!("a candidate has edges on both sides") };
-        let on = |&(v, t): &(u32, f64)| (layout.tessellation.points[v as usize], t);
-        let mut line: Vec<_> = layout.tessellation.lines[curve].iter().map(on).collect();
-        if fin.is_forward != leaves {
+        let mut line = layout.line(fin);
+        if !leaves {
             line.reverse();
         }
         Self { edge: &layout.model.curves[curve], line }
