@@ -9,12 +9,14 @@ use super::trace::Loop;
 use super::{Chart, Parameters, Side};
 use crate::bspline::{Basis, SplineCurve};
 use crate::model::{Corner, EdgeCurve, Model, On};
-use crate::{BrepError, Curve, Point, Vector};
+use crate::{BrepError, Curve, Vector};
 
 const UNBOUNDED: &str = "its loops do not bound an area of its surface";
 
-/// Segments of the curve of a seam.
-const SEGMENTS: usize = 64;
+/// Segments of the curve of a seam, at least and at most.
+const SEGMENTS: [usize; 2] = [64, 16_384];
+/// The largest distance of the curve of a seam from its surface, as a fraction of the diagonal.
+const SEAM_GAP: f64 = 1e-6;
 /// Pairs of vertices that are tried for a seam.
 const MOST_SEAMS: usize = 100;
 /// Places that are tried for a seam.
@@ -360,24 +362,41 @@ impl Closing<'_> {
 
     /// Adds a curve along a straight line in the parameters.
     fn seam(&mut self, from: Parameters, to: Parameters, ends: [usize; 2]) -> usize {
-        let at = |k: usize| [0, 1].map(|i| from[i] + (to[i] - from[i]) * k as f64 / SEGMENTS as f64);
-        let nodes: Vec<[Vector; 2]> = (0..=SEGMENTS)
-            .map(|k| {
-                let [u, v] = at(k);
-                let d = self.chart.surface.jet(u, v, 1).d;
-                [d[0][0], d[1][0] * (to[0] - from[0]) + d[0][1] * (to[1] - from[1])]
-            })
-            .collect();
-        let curve = cubic(&nodes);
+        let (curve, gap) = along_straight(self.chart, from, to);
         // Corners of the file need not be on the surface.
-        let off = |k: usize, end: usize| (self.model.corners[end].point - Point::from(nodes[k][0])).norm();
-        let tolerance = off(0, ends[0]).max(off(SEGMENTS, ends[1]));
+        let off = |end: usize, at: f64| (self.model.corners[end].point.coords - curve.point(at)).norm();
+        let tolerance = off(ends[0], 0.0).max(off(ends[1], 1.0)).max(gap);
         for end in ends {
             let corner = &mut self.model.corners[end];
             corner.tolerance = corner.tolerance.max(tolerance);
         }
         self.model.curves.push(EdgeCurve { curve, range: [0.0, 1.0], ends, tolerance });
         self.model.curves.len() - 1
+    }
+}
+
+/// A spline over [0, 1] along a straight line in the parameters, and its largest distance from the
+/// point of the surface there, in the middle of its segments.
+fn along_straight(chart: &Chart, from: Parameters, to: Parameters) -> (Curve<3>, f64) {
+    let at = |t: f64| [0, 1].map(|i| from[i] + (to[i] - from[i]) * t);
+    let [mut segments, most] = SEGMENTS;
+    loop {
+        let place = |k: usize| k as f64 / segments as f64;
+        let node = |k: usize| {
+            let [u, v] = at(place(k));
+            let d = chart.surface.jet(u, v, 1).d;
+            [d[0][0], d[1][0] * (to[0] - from[0]) + d[0][1] * (to[1] - from[1])]
+        };
+        let curve = cubic(&(0..=segments).map(node).collect::<Vec<_>>());
+        let gap = |k: usize| {
+            let t = 0.5 * (place(k) + place(k + 1));
+            (chart.surface.point(at(t)).coords - curve.point(t)).norm()
+        };
+        let gap = (0..segments).map(gap).fold(0.0, f64::max);
+        if gap <= SEAM_GAP * chart.diagonal || segments >= most {
+            return (curve, gap);
+        }
+        segments *= 2;
     }
 }
 
@@ -396,4 +415,29 @@ fn cubic(nodes: &[[Vector; 2]]) -> Curve<3> {
     let basis =
         Basis::new(3, &knots, &multiplicities, poles.len(), false).expect("the numbers of a cubic spline");
     Curve::Spline(SplineCurve { basis, poles, weights: Vec::new() })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Surface, surface::Profile};
+    use std::f64::consts::TAU;
+
+    #[test]
+    fn curves_of_seams_are_on_their_surface_however_often_they_bend() {
+        let axes = [Vector::x(), Vector::y(), Vector::z()];
+        let profile = Profile::Circle { major: 2.0, minor: 1.0 };
+        let torus = Surface::Round { origin: Vector::zeros(), axes, profile };
+        let chart = Chart::new(&torus, 6.0);
+        for turns in [1.0, 40.0] {
+            let to = [turns * TAU, TAU];
+            let (curve, gap) = along_straight(&chart, [0.0; 2], to);
+            assert!(gap <= SEAM_GAP * 6.0, "{gap:e}");
+            for k in 0..=1000 {
+                let t = f64::from(k) / 1000.0;
+                let off = (torus.point([t * to[0], t * to[1]]).coords - curve.point(t)).norm();
+                assert!(off <= 1.01 * gap, "{off:e} instead of {gap:e}");
+            }
+        }
+    }
 }
