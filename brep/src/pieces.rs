@@ -28,6 +28,17 @@ impl Piece {
     pub fn sides<'a>(&self, model: &'a Model) -> [&'a Fin; 2] {
         self.sides.map(|side| &model.patches[self.patch].loops[self.of_loop][side])
     }
+
+    /// All sides of the piece, from the first to the last one.
+    ///
+    /// # Panics
+    /// If the model has no such loop.
+    pub fn all_sides<'a>(&self, model: &'a Model) -> impl Iterator<Item = &'a Fin> {
+        let fins = &model.patches[self.patch].loops[self.of_loop];
+        let [first, last] = self.sides;
+        let count = (last + fins.len() - first) % fins.len() + 1;
+        fins.iter().cycle().skip(first).take(count)
+    }
 }
 
 /// A model of which pieces of patches are patches of their own.
@@ -268,6 +279,19 @@ mod tests {
             ends.into_iter().any(|p| (p - corner).norm() < 1e-6)
         };
         (0..model.patches.len()).filter(is_at).collect()
+    }
+
+    #[test]
+    fn sides_of_a_piece_go_on_past_the_end_of_a_loop() {
+        let model = read("tapered_chamfer");
+        let patch = model.patches.iter().position(|patch| patch.loops[0].len() > 3).unwrap();
+        let fins = &model.patches[patch].loops[0];
+        let count = fins.len();
+        let piece = Piece { patch, of_loop: 0, sides: [count - 2, 1], at: [None; 2] };
+        let sides: Vec<On> = piece.all_sides(&model).map(|fin| fin.on).collect();
+        let expected = [count - 2, count - 1, 0, 1].map(|side| fins[side].on);
+        assert_eq!(sides, expected);
+        assert_eq!(piece.sides(&model).map(|fin| fin.on), [sides[0], sides[3]]);
     }
 
     #[test]

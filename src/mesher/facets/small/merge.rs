@@ -4,18 +4,17 @@ use super::group::{Allowed, Merged, Outcome, Small, merge_all};
 use super::layout::{Layout, TipCut};
 use super::report::{MergedEdge, MergedSmall, MergedTip};
 use super::strips::{Division, divisions};
-use super::tips::{NarrowTip, candidates, narrow, without};
-use crate::ground::kernel::tree::bounds;
+use super::tips::{NarrowTip, candidates, narrow};
 use crate::mesher::facets::FacetModel;
 use crate::mesher::facets::exact::{Shape, grouped};
-use brep::{BrepError, Cut, Model, Piece, Tessellation};
+use brep::{BrepError, Cut, Model, On, Piece, Tessellation};
 
-/// The most times that tips are cut off, each time fewer or narrower.
+/// The most times that tips are cut off.
 const ROUNDS: usize = 12;
 
-/// Tips are not cut where they are thinner than this (fraction of the size of the model): that may
-/// be rounding.
-const THINNEST: f64 = 1e-8;
+/// The most times that they are merged. Without a tip the sizes there are larger, and more of the
+/// face is narrow beside them.
+const MERGES: usize = 3;
 
 /// Merges the small faces and edges of a model, and narrow tips of faces; `None` if there are none.
 ///
@@ -78,8 +77,9 @@ fn merge_divided(
 
 /// Merges what is small and tips of faces; `without_tips` is the result without them.
 ///
-/// Tips are cut off as faces of their own where they are narrow beside the sizes without them.
-/// Those that are not merged then are cut off where they are narrower, or left.
+/// Tips are cut off as faces of their own where they are narrow beside the sizes of the model
+/// without them. Those that are not merged then are cut off where they are narrower, or left; those
+/// that are merged are cut off again where they are narrow beside the sizes that this gives.
 fn with_tips(
     layout: &Layout,
     shape: &Shape,
@@ -87,22 +87,27 @@ fn with_tips(
     without_tips: Outcome,
 ) -> (Option<Merged>, MergedSmall) {
     let Layout { model, tessellation, .. } = *layout;
-    let Outcome { merged, report, size } = without_tips;
+    let Outcome { mut merged, mut report, size } = without_tips;
     let mut candidates = candidates(layout);
     if candidates.is_empty() {
         return (merged, report);
     }
-    let size =
+    let mut size =
         size.unwrap_or_else(|| (small.size)(&grouped(model, tessellation, shape, &shape.ungrouped(model)).0));
-    let least = THINNEST * bounds(&tessellation.points).diagonal();
+    let (mut done, mut merges) = (Vec::new(), 0);
     for _ in 0..ROUNDS {
-        let mut tips = narrow(layout, &candidates, &*size, small.tip_factor);
-        // A face that is nowhere wider is small as a whole.
-        tips.retain(|narrow| least < narrow.width && narrow.width < layout.widths[narrow.tip.patch]);
+        let tips = narrow(layout, &candidates, &*size, small.tip_factor, &done);
+        if tips == done || merges == MERGES {
+            break;
+        }
         let Some(cut) = cut_off(model, &tips) else { break };
         match merge_tips(layout, small, cut, &tips) {
-            Ok(merged) => return merged,
-            Err(failed) => candidates = without(&candidates, &failed),
+            Ok(outcome) => {
+                Outcome { merged, report, .. } = outcome;
+                let Some(of_merged) = outcome.size else { break };
+                (size, done, merges) = (of_merged, tips, merges + 1);
+            }
+            Err(failed) => failed.into_iter().for_each(|candidate| candidates[candidate].attempt += 1),
         }
     }
     (merged, report)
@@ -123,7 +128,7 @@ fn merge_tips(
     small: &Small,
     mut cut: Cut,
     tips: &[NarrowTip],
-) -> Result<(Option<Merged>, MergedSmall), Vec<usize>> {
+) -> Result<Outcome, Vec<usize>> {
     let Layout { model, tessellation, .. } = *uncut;
     let failed = |has_failed: &dyn Fn(usize, &NarrowTip) -> bool| -> Vec<usize> {
         let failed = tips.iter().enumerate().filter(|(k, tip)| has_failed(*k, tip));
@@ -143,7 +148,7 @@ fn merge_tips(
     let shape = Shape::new(&cut.model, &tessellation);
     let mut layout = Layout::new(&cut.model, &tessellation, &shape);
     (layout.cuts, layout.along) = (cuts, uncut.along.clone());
-    let Outcome { merged, report, .. } = merge_all(&shape, &layout, small);
+    let Outcome { merged, report, size } = merge_all(&shape, &layout, small);
     let is_merged = |k: usize| {
         report.faces.iter().any(|merged| merged.face == cut.patches[k] + 1)
             && report.edges.iter().any(|merged| merged.edge == cut.curves[k] + 1)
@@ -155,7 +160,7 @@ fn merge_tips(
     if merged.as_ref().is_some_and(|(facets, ..)| has_crossings(facets)) {
         return Err(failed(&|_, _| true));
     }
-    Ok((merged, of_file(report, model, &cut, tips)))
+    Ok(Outcome { merged, report: of_file(report, model, &cut, tips), size })
 }
 
 /// Whether an error is at a tip with this patch, cut along this curve; it is if it has no place.
@@ -171,7 +176,7 @@ fn is_at(error: &BrepError, narrow: &NarrowTip, patch: usize, curve: usize) -> b
 fn is_beside(error: &BrepError, narrow: &NarrowTip, model: &Model) -> bool {
     let BrepError::Face { face, .. } = *error else { return false };
     let of_face = model.patches.get(face - 1).into_iter().flat_map(|patch| patch.loops.iter().flatten());
-    let curves = narrow.tip.sides(model).map(|side| side.on);
+    let curves: Vec<On> = narrow.tip.all_sides(model).map(|side| side.on).collect();
     of_face.map(|fin| fin.on).any(|on| curves.contains(&on))
 }
 

@@ -20,9 +20,14 @@ fn read(name: &str) -> Model {
 }
 
 /// Merges what is small beside elements of this size.
-fn merged_of(mut model: Model, size: f64) -> (Option<FacetModel>, MergedSmall) {
+fn merged_of(model: Model, size: f64) -> (Option<FacetModel>, MergedSmall) {
+    merged_with(model, &|_| size)
+}
+
+/// Merges what is small beside elements of a size that depends on the model.
+fn merged_with(mut model: Model, size: &dyn Fn(&FacetModel) -> f64) -> (Option<FacetModel>, MergedSmall) {
     let tessellation = Tessellation::of(&mut model, &Settings::default()).unwrap();
-    let size = |_: &FacetModel| -> Box<dyn SizeField> { Box::new(Constant(size)) };
+    let size = |model: &FacetModel| -> Box<dyn SizeField> { Box::new(Constant(size(model))) };
     let small =
         Small { factor: 20.0, still_factor: 5.0, largest: f64::INFINITY, tip_factor: 10.0, size: &size };
     let (merged, report) = merge(&model, &tessellation, &small);
@@ -183,6 +188,24 @@ fn tips_of_faces_are_cut_off_where_they_are_as_wide_as_small_faces() {
             assert_eq!(patches.len(), facets.patches.len());
         }
     }
+}
+
+#[test]
+fn a_tip_goes_on_around_a_corner_of_its_side() {
+    // A chamfer at 1° along an edge that turns by 0.6° after 3, where it is 0.05 wide.
+    let (facets, report) = merged("bent_chamfer", 1.0);
+    assert_eq!(counts(&facets.unwrap()), [8, 18, 12]);
+    let [tip] = &report.tips[..] else { panic!("{report:?}") };
+    assert!((tip.width - 0.1).abs() < 1e-3, "{tip:?}");
+}
+
+#[test]
+fn tips_are_cut_again_where_sizes_without_them_are_larger() {
+    let curves = unmerged("runout").curves.len();
+    let size = |model: &FacetModel| if model.curves.len() > curves { 0.15 } else { 0.1 };
+    let (_, report) = merged_with(read("runout"), &size);
+    assert_eq!(report.tips.len(), 2, "{report:?}");
+    assert!(report.tips.iter().all(|tip| (tip.width - 0.015).abs() < 1e-4), "{report:?}");
 }
 
 /// Facets of a part with all its faces.

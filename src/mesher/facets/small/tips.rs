@@ -8,6 +8,7 @@
 use super::layout::Layout;
 use crate::Point;
 use crate::ground::kernel::nearest::in_segment;
+use crate::ground::kernel::tree::bounds;
 use crate::ground::size::SizeField;
 use crate::mesher::facets::sharp_places::angles;
 use brep::{EdgeCurve, Fin, Model, On, Piece, project_to_curve};
@@ -17,7 +18,14 @@ const SHARP: f64 = 0.35;
 
 /// Tips that cannot be merged are cut again where they are narrower by these factors. The mesh
 /// begins with an edge as short as the cut, so half the width halves the angles.
-const NARROWER: [f64; 2] = [1.0, 0.5];
+const NARROWER: [f64; 3] = [1.0, 0.67, 0.33];
+
+/// Tips are not cut where they are thinner than this (fraction of the size of the model): that may
+/// be rounding.
+const THINNEST: f64 = 1e-8;
+
+/// Tips are cut again where they are so much wider.
+const WIDER: f64 = 1.25;
 
 /// A tip is cut if it is at least this long (units of the element size), so that it is sharper than
 /// 14°.
@@ -25,6 +33,9 @@ const LONG: f64 = 0.4;
 
 /// Steps along an edge for one element.
 const STEPS: f64 = 8.0;
+
+/// The cosine of the angle by which the edges of a side turn, at least.
+const STRAIGHT: f64 = 0.7;
 
 /// The most steps along an edge.
 const MOST_STEPS: usize = 10_000;
@@ -37,8 +48,8 @@ const BISECTIONS: usize = 20;
 pub(super) struct Candidate {
     tip: Piece,
     corner: usize,
-    /// Which of [`NARROWER`] to cut with.
-    attempt: usize,
+    /// Which of [`NARROWER`] to cut with; none after the last one.
+    pub attempt: usize,
 }
 
 /// A tip that is cut.
@@ -81,132 +92,208 @@ pub(super) fn candidates(layout: &Layout) -> Vec<Candidate> {
 }
 
 /// Those of the candidates that are at most as wide as elements divided by `factor` for a while.
+///
+/// Tips that are `done` stay as they are, unless they are wider now.
 pub(super) fn narrow(
     layout: &Layout,
     candidates: &[Candidate],
     size: &dyn SizeField,
     factor: f64,
+    done: &[NarrowTip],
 ) -> Vec<NarrowTip> {
-    let tip = |(candidate, &Candidate { tip, corner, attempt }): (usize, &Candidate)| {
-        let sides = tip.sides(layout.model);
-        let [one, other] = [0, 1].map(|k| Side::new(layout, sides[k], k == 1));
-        let (at, width) = cut(&one, &other, size, factor / NARROWER[attempt])?;
-        Some(NarrowTip { tip: Piece { at, ..tip }, corner, width, candidate })
-    };
-    let mut taken: Vec<(usize, [f64; 2])> = Vec::new();
+    let least = THINNEST * bounds(&layout.tessellation.points).diagonal();
+    let parts = |narrow: &NarrowTip| parts(layout.model, &narrow.tip);
+    let mut taken: Vec<(usize, Vec<Part>)> = done.iter().map(|tip| (tip.candidate, parts(tip))).collect();
     let mut found = Vec::new();
-    for narrow in candidates.iter().enumerate().filter_map(tip) {
-        let parts = parts(layout.model, &narrow.tip);
-        let overlaps = |(c, [low, high]): &(usize, [f64; 2])| {
-            taken.iter().any(|(d, other)| c == d && *low < other[1] && other[0] < *high)
-        };
-        if !parts.iter().any(overlaps) {
-            taken.extend(parts);
-            found.push(narrow);
+    for (k, candidate) in candidates.iter().enumerate() {
+        let before = done.iter().find(|tip| tip.candidate == k);
+        let tip = candidate.narrow(layout, size, factor, k).filter(|narrow| {
+            // A face that is nowhere wider is small as a whole.
+            least < narrow.width
+                && narrow.width < layout.widths[narrow.tip.patch]
+                && before.is_none_or(|before| narrow.width > WIDER * before.width)
+                && !taken.iter().any(|(other, taken)| *other != k && overlap(taken, &parts(narrow)))
+        });
+        if let Some(tip) = &tip {
+            taken.push((k, parts(tip)));
         }
+        found.extend(tip.or(before.copied()));
     }
     found
 }
 
-/// The candidates after those with these indices, ascending, failed.
-pub(super) fn without(candidates: &[Candidate], failed: &[usize]) -> Vec<Candidate> {
-    let next = |(k, candidate): (usize, &Candidate)| {
-        let attempt = candidate.attempt + usize::from(failed.binary_search(&k).is_ok());
-        (attempt < NARROWER.len()).then_some(Candidate { attempt, ..*candidate })
-    };
-    candidates.iter().enumerate().filter_map(next).collect()
+/// A part of an edge: its index, and the parameters at both ends, ascending.
+type Part = (usize, [f64; 2]);
+
+fn overlap(one: &[Part], other: &[Part]) -> bool {
+    let is_common = |(a, p): &Part, (b, q): &Part| a == b && p[0] < q[1] && q[0] < p[1];
+    one.iter().any(|a| other.iter().any(|b| is_common(a, b)))
+}
+
+impl Candidate {
+    /// The tip, if it is at most as wide as elements divided by `factor` for a while.
+    fn narrow(
+        &self,
+        layout: &Layout,
+        size: &dyn SizeField,
+        factor: f64,
+        candidate: usize,
+    ) -> Option<NarrowTip> {
+        let Self { tip, corner, attempt } = *self;
+        let narrower = NARROWER.get(attempt)?;
+        let [one, other] = [false, true].map(|leaves| Side::new(layout, &tip, leaves));
+        let (places, width) = cut(&one, &other, size, factor / narrower)?;
+        let tip = Piece { sides: places.map(|place| place.0), at: places.map(|place| place.1), ..tip };
+        Some(NarrowTip { tip, corner, width, candidate })
+    }
 }
 
 /// The parts of its edges that belong to a tip.
-fn parts(model: &Model, tip: &Piece) -> [(usize, [f64; 2]); 2] {
-    let sides = tip.sides(model);
-    [0, 1].map(|k| {
-        let fin = sides[k];
-        let On::Curve(curve) = fin.on else { unreachable!("a candidate has edges on both sides") };
-        let [low, high] = model.curves[curve].range;
-        // The first edge arrives at the tip, the second one leaves it.
-        let is_at_end = fin.is_forward == (k == 0);
-        let part = match tip.at[k] {
-            None => [low, high],
-            Some(t) if is_at_end => [t, high],
-            Some(t) => [low, t],
-        };
-        (curve, part)
-    })
+fn parts(model: &Model, tip: &Piece) -> Vec<Part> {
+    let part = |fin: &Fin| {
+        let On::Curve(curve) = fin.on else { unreachable!("a tip has edges on all sides") };
+        (curve, model.curves[curve].range)
+    };
+    let mut parts: Vec<_> = tip.all_sides(model).map(part).collect();
+    // Along the loop, the first edge begins at its cut, and the last one ends there.
+    let last = parts.len() - 1;
+    for (k, part) in [(0, 0), (1, last)] {
+        let is_forward = tip.sides(model)[k].is_forward;
+        if let Some(t) = tip.at[k] {
+            parts[part].1[if is_forward { k } else { 1 - k }] = t;
+        }
+    }
+    parts
 }
 
-/// An edge at a tip, seen from the tip.
+/// A place on one side of a tip.
+#[derive(Clone, Copy)]
+struct Place {
+    point: Point,
+    /// The index of the edge.
+    edge: usize,
+    /// The parameter on it.
+    at: f64,
+}
+
+/// An edge at a tip and those that continue it, seen from the tip.
 struct Side<'a> {
-    edge: &'a EdgeCurve,
-    /// Its points with their parameters, from the tip on.
-    line: Vec<(Point, f64)>,
+    /// The edges, each with its number in the loop of the face.
+    edges: Vec<(usize, &'a EdgeCurve)>,
+    /// Points on them, from the tip on; where an edge ends and another one begins there are two.
+    line: Vec<Place>,
 }
 
 /// A place where the width of a tip is measured.
 struct Across {
-    /// The parameters on both edges.
-    at: [f64; 2],
+    /// The places on both sides.
+    places: [Place; 2],
     width: f64,
-    /// Whether the other edge ends there.
+    /// Whether the other side ends there.
     is_end: bool,
 }
 
 impl<'a> Side<'a> {
-    fn new(layout: &Layout<'a>, fin: &Fin, leaves: bool) -> Self {
-        let On::Curve(curve) = fin.on else { unreachable!("a candidate has edges on both sides") };
-        let mut line = layout.line(fin);
-        if !leaves {
-            line.reverse();
+    /// The side that arrives at a tip, or that `leaves` it.
+    fn new(layout: &Layout<'a>, tip: &Piece, leaves: bool) -> Self {
+        let fins = &layout.model.patches[tip.patch].loops[tip.of_loop];
+        let mut out = Self { edges: Vec::new(), line: Vec::new() };
+        for step in 0..(fins.len() / 2).max(1) {
+            let side = match leaves {
+                true => (tip.sides[1] + step) % fins.len(),
+                false => (tip.sides[0] + fins.len() - step) % fins.len(),
+            };
+            let Some((curve, _)) = layout.beyond(tip.patch, &fins[side]) else { break };
+            let edge = out.edges.len();
+            let line = layout.line(&fins[side]).into_iter();
+            let mut line: Vec<Place> = line.map(|(point, at)| Place { point, edge, at }).collect();
+            if !leaves {
+                line.reverse();
+            }
+            if !out.continues(&line) {
+                break;
+            }
+            out.edges.push((side, &layout.model.curves[curve]));
+            out.line.extend(line);
         }
-        Self { edge: &layout.model.curves[curve], line }
+        out
     }
 
-    /// The parameter nearest to a point.
-    fn nearest(&self, point: &Point) -> f64 {
-        let squared = |w: &[(Point, f64)]| in_segment(point, &w[0].0, &w[1].0);
-        let nearest = self.line.windows(2).map(|w| (squared(w), w)).min_by(|a, b| a.0.1.total_cmp(&b.0.1));
+    /// Whether a line goes on from the last point without a bend.
+    fn continues(&self, line: &[Place]) -> bool {
+        let [.., before, last] = self.line[..] else { return true };
+        let [along, next] = [last.point - before.point, line[1].point - line[0].point];
+        along.dot(&next) > STRAIGHT * along.norm() * next.norm()
+    }
+
+    /// The nearest place to a point.
+    fn nearest(&self, point: &Point) -> Place {
+        let segments = self.line.windows(2).filter(|w| w[0].edge == w[1].edge);
+        let nearest = segments.map(|w| (in_segment(point, &w[0].point, &w[1].point), w));
+        let nearest = nearest.min_by(|a, b| a.0.1.total_cmp(&b.0.1));
         let ((share, _), w) = nearest.expect("an edge has two points");
-        let start = w[0].1 + share * (w[1].1 - w[0].1);
-        project_to_curve(&self.edge.curve, self.edge.range, point, start).parameter
+        let start = w[0].at + share * (w[1].at - w[0].at);
+        let curve = self.edges[w[0].edge].1;
+        let at = project_to_curve(&curve.curve, curve.range, point, start).parameter;
+        self.place(w[0].edge, at)
     }
 
-    fn end(&self) -> f64 {
-        self.line[self.line.len() - 1].1
+    fn place(&self, edge: usize, at: f64) -> Place {
+        Place { point: Point::from(self.edges[edge].1.curve.point(at)), edge, at }
     }
 
-    /// The width between this edge, at a parameter, and the other one.
-    fn across(&self, other: &Self, t: f64) -> Across {
-        let point = Point::from(self.edge.curve.point(t));
-        let on_other = other.nearest(&point);
-        let width = (other.edge.curve.point(on_other) - point.coords).norm();
-        Across { at: [t, on_other], width, is_end: on_other == other.end() }
+    fn end(&self) -> Place {
+        self.line[self.line.len() - 1]
+    }
+
+    /// The width between this side, at a place, and the other one.
+    fn across(&self, other: &Self, place: Place) -> Across {
+        let opposite = other.nearest(&place.point);
+        let end = other.end();
+        let is_end = (opposite.edge, opposite.at) == (end.edge, end.at);
+        Across { places: [place, opposite], width: (opposite.point - place.point).norm(), is_end }
+    }
+
+    /// The number of the edge in the loop at which to cut, and the parameter there; none at the end
+    /// of an edge, if the place is at most this far from it.
+    fn cut(&self, place: &Place, width: f64) -> (usize, Option<f64>) {
+        let ends = self.line.windows(2).filter(|w| w[0].edge != w[1].edge).map(|w| w[0]);
+        let is_near = |end: &Place| (end.point - place.point).norm() <= width;
+        match ends.chain([self.end()]).find(is_near) {
+            Some(end) => (self.edges[end.edge].0, None),
+            None => (self.edges[place.edge].0, Some(place.at)),
+        }
     }
 }
 
-/// Where to cut between two edges that meet in a tip, and the width there, at most that of elements
+/// A place on the boundary of a face: the number of a side in its loop, and the parameter there, or
+/// none at the end of the side.
+type CutPlace = (usize, Option<f64>);
+
+/// Where to cut between two sides that meet in a tip, and the width there, at most that of elements
 /// divided by `factor`; `None` if the tip is not narrow for long enough.
-fn cut(one: &Side, other: &Side, size: &dyn SizeField, factor: f64) -> Option<([Option<f64>; 2], f64)> {
-    let tip = one.line[0].0;
-    let is_narrow = |t: f64| {
-        let across = one.across(other, t);
-        let size = size.size_at(&Point::from(one.edge.curve.point(t)));
-        (!across.is_end && factor * across.width <= size).then_some(across)
+fn cut(one: &Side, other: &Side, size: &dyn SizeField, factor: f64) -> Option<([CutPlace; 2], f64)> {
+    let tip = one.line[0].point;
+    let is_narrow = |place: Place| {
+        let across = one.across(other, place);
+        (!across.is_end && factor * across.width <= size.size_at(&place.point)).then_some(across)
     };
     let mut last: Option<Across> = None;
     let mut steps = 0;
-    for w in one.line.windows(2) {
-        let [(p, low), (q, high)] = [w[0], w[1]];
-        let parts = (STEPS * (q - p).norm() / size.size_at(&p)).ceil().clamp(1.0, MOST_STEPS as f64) as usize;
+    for w in one.line.windows(2).filter(|w| w[0].edge == w[1].edge) {
+        let [p, q] = [w[0], w[1]];
+        let parts = (STEPS * (q.point - p.point).norm() / size.size_at(&p.point)).ceil();
+        let parts = parts.clamp(1.0, MOST_STEPS as f64) as usize;
         for part in 1..=parts {
-            let place = |share: f64| low + (high - low) * share / parts as f64;
+            let place = |share: f64| p.at + (q.at - p.at) * share / parts as f64;
             let (mut good, mut bad) = (place(part as f64 - 1.0), place(part as f64));
             steps += 1;
-            match is_narrow(bad) {
+            match is_narrow(one.place(p.edge, bad)) {
                 Some(across) if steps < MOST_STEPS => last = Some(across),
                 _ => {
                     for _ in 0..BISECTIONS {
                         let middle = 0.5 * (good + bad);
-                        match is_narrow(middle) {
+                        match is_narrow(one.place(p.edge, middle)) {
                             Some(across) => (good, last) = (middle, Some(across)),
                             None => bad = middle,
                         }
@@ -226,12 +313,12 @@ fn finished(
     tip: Point,
     across: Across,
     size: &dyn SizeField,
-) -> Option<([Option<f64>; 2], f64)> {
-    let places = [one, other].map(|side| Point::from(side.edge.curve.point(side.end())));
-    let points = [(one, 0), (other, 1)].map(|(side, k)| Point::from(side.edge.curve.point(across.at[k])));
-    if (points[0] - tip).norm() < LONG * size.size_at(&points[0]) {
+) -> Option<([CutPlace; 2], f64)> {
+    let Across { places: [place, opposite], width, .. } = across;
+    if (place.point - tip).norm() < LONG * size.size_at(&place.point) {
         return None;
     }
-    let at = [0, 1].map(|k| ((places[k] - points[k]).norm() > across.width).then_some(across.at[k]));
-    (at != [None; 2]).then_some((at, across.width))
+    let cut = [one.cut(&place, width), other.cut(&opposite, width)];
+    let is_whole = |side: &Side, cut: CutPlace| cut == (side.edges[side.edges.len() - 1].0, None);
+    (!is_whole(one, cut[0]) || !is_whole(other, cut[1])).then_some((cut, width))
 }
