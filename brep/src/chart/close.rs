@@ -419,15 +419,13 @@ fn cubic(nodes: &[[Vector; 2]]) -> Curve<3> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::tests::torus;
     use super::*;
-    use crate::{Surface, surface::Profile};
     use std::f64::consts::TAU;
 
     #[test]
     fn curves_of_seams_are_on_their_surface_however_often_they_bend() {
-        let axes = [Vector::x(), Vector::y(), Vector::z()];
-        let profile = Profile::Circle { major: 2.0, minor: 1.0 };
-        let torus = Surface::Round { origin: Vector::zeros(), axes, profile };
+        let torus = torus();
         let chart = Chart::new(&torus, 6.0);
         for turns in [1.0, 40.0] {
             let to = [turns * TAU, TAU];

@@ -154,3 +154,15 @@ impl<'a> Chart<'a> {
         found
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::{Surface, Vector, surface::Profile};
+
+    /// A torus of radii 2 and 1 around the z axis.
+    pub(super) fn torus() -> Surface {
+        let axes = [Vector::x(), Vector::y(), Vector::z()];
+        let profile = Profile::Circle { major: 2.0, minor: 1.0 };
+        Surface::Round { origin: Vector::zeros(), axes, profile }
+    }
+}

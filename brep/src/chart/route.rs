@@ -234,15 +234,13 @@ fn is_crossing([a, b]: [Parameters; 2], [c, d]: [Parameters; 2]) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use super::super::tests::torus;
     use super::*;
-    use crate::{Surface, Vector, surface::Profile};
     use std::f64::consts::TAU;
 
     #[test]
     fn seams_of_a_torus_go_around_a_hole_across_all_straight_ones() {
-        let axes = [Vector::x(), Vector::y(), Vector::z()];
-        let profile = Profile::Circle { major: 2.0, minor: 1.0 };
-        let torus = Surface::Round { origin: Vector::zeros(), axes, profile };
+        let torus = torus();
         let chart = Chart::new(&torus, 6.0);
         // A narrow hole along the diagonal of the parameters, except for a short piece.
         let (low, high) = (0.3, TAU - 0.3);
