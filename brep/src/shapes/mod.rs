@@ -1,6 +1,7 @@
 //! Solids by their faces, edges and vertices, without parameters, and the model made of them.
 
 mod enclose;
+mod exchange;
 mod glue;
 mod imprint;
 mod overlap;

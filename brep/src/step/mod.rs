@@ -137,6 +137,7 @@ impl<'a> Reader<'a> {
         let [faces, edges, shells] = self.loose;
         let mut notes = Vec::new();
         let has_solids = !self.names.is_empty();
+        notes.extend(if has_solids { &mut self.shapes } else { &mut self.surfaces }.exchange_vertices());
         if !has_solids {
             if let Some(fault) = self.surface_fault {
                 return Err(fault);

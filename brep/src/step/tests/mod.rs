@@ -1,6 +1,7 @@
 //! Files of other programs and hand-made ones: faces without seams, units, damage.
 
 mod odd;
+mod order;
 mod parts;
 
 use super::text::decoded;
