@@ -270,6 +270,18 @@ fn chosen_solids_are_meshed_alone() {
 }
 
 #[test]
+fn a_pin_with_little_play_in_its_hole_is_kept_apart_from_it() {
+    // The radii are 1.64 and 1.65: triangles of the usual size would intersect.
+    let geometry = read("loose_pin.step", &[]).unwrap();
+    let mesh = Mesher::new().generate(&geometry).unwrap();
+    let exact = 384.0 + std::f64::consts::PI * (4.0 * 1.64 * 1.64 - 6.0 * 1.65 * 1.65);
+    let found = volume_of(&mesh.arrays());
+    assert!((found / exact - 1.0).abs() < 1e-3, "{found} {exact}");
+    let angle = mesh.coarse.as_ref().unwrap().report.quality.smallest_dihedral;
+    assert!(angle > 18.0, "{angle}°");
+}
+
+#[test]
 fn step_and_brep_of_one_part_have_the_volumes_of_the_cad_program() {
     let Some(folder) = shared("step") else { return };
     let text = std::fs::read(folder.join("volumes.json")).unwrap();

@@ -18,7 +18,7 @@ use crate::ground::projector::{BrepProjector, Projector};
 use crate::ground::size::{Closeness, Evaluation, SizeField, SizeSettings, Source, WatchedSize};
 use crate::mesher::facets::{
     Crossing, FacetBodies, FacetError, FacetModel, FacetPatch, FacetSize, FacetSmoothness, Facets, Marks,
-    MergedSmall, RemeshSettings, SharpPlaces, Small, keep, largest_size, merge, remesh,
+    MergedSmall, RemeshSettings, SharpPlaces, Small, keep, largest_size, merge, remesh_onto,
 };
 use crate::mesher::improve::Smoothness;
 use crate::mesher::smoothness::BrepSmoothness;
@@ -207,7 +207,7 @@ impl FacetSolid {
 
     /// Moves the vertices of a surface mesh from the facets onto the exact faces and edges.
     fn snap(&self, surface: &mut SurfaceMesh) -> Result<(), CoarseError> {
-        let Some(exact) = self.exact.as_ref().filter(|_| !self.keep_surface) else { return Ok(()) };
+        let Some(exact) = &self.exact else { return Ok(()) };
         surface.points.par_iter_mut().zip(&surface.classes).try_for_each(|(point, class)| {
             *point = match *class {
                 Class::Curve(curve) => exact.project_curve(curve, point)?,
@@ -268,13 +268,13 @@ impl FacetSolid {
         let mut surface = if self.keep_surface {
             keep(&self.model)
         } else {
-            remesh(&self.model, &size, &RemeshSettings::default()).0
+            match remesh_onto(&self.model, &size, &RemeshSettings::default(), &|surface| self.snap(surface)) {
+                Ok((surface, _)) => surface,
+                Err(error) => return Attempt::Failed(error),
+            }
         };
         if let Err(cancelled) = work.proceed() {
             return Attempt::Failed(cancelled.into());
-        }
-        if let Err(error) = self.snap(&mut surface) {
-            return Attempt::Failed(error);
         }
         self.add_kept_points(&mut surface);
         self.add_kept_edges(&mut surface);

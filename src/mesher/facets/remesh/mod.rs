@@ -32,6 +32,7 @@ use crate::ground::progress::Work;
 use crate::ground::size::{SizeField, Source, SourceTree};
 use crate::mesher::surface::{SurfaceMesh, crossings};
 use sheet::Sheet;
+use std::convert::Infallible;
 
 /// Settings of remeshing.
 #[derive(Clone, Debug, PartialEq)]
@@ -105,15 +106,37 @@ pub fn remesh(
     size: &dyn SizeField,
     settings: &RemeshSettings,
 ) -> (SurfaceMesh, RemeshReport) {
-    // In a thread of the pool, so that no call of the pool waits for another thread to wake up.
-    rayon::scope(|_| remesh_in_pool(model, size, settings))
+    let stay = |_: &mut SurfaceMesh| Ok::<(), Infallible>(());
+    match remesh_onto(model, size, settings, &stay) {
+        Ok(made) => made,
+        Err(never) => match never {},
+    }
 }
 
-fn remesh_in_pool(
+/// [`remesh`], with the vertices moved by `snap` from the facets to the surfaces that these stand
+/// for: no triangles intersect there.
+///
+/// # Errors
+/// Those of `snap`.
+pub fn remesh_onto<E: Send>(
     model: &FacetModel,
     size: &dyn SizeField,
     settings: &RemeshSettings,
-) -> (SurfaceMesh, RemeshReport) {
+    snap: &Snap<E>,
+) -> Result<(SurfaceMesh, RemeshReport), E> {
+    // In a thread of the pool, so that no call of the pool waits for another thread to wake up.
+    rayon::scope(|_| remesh_in_pool(model, size, settings, snap))
+}
+
+/// Moves the vertices of a surface mesh.
+type Snap<'a, E> = dyn Fn(&mut SurfaceMesh) -> Result<(), E> + Sync + 'a;
+
+fn remesh_in_pool<E>(
+    model: &FacetModel,
+    size: &dyn SizeField,
+    settings: &RemeshSettings,
+    snap: &Snap<E>,
+) -> Result<(SurfaceMesh, RemeshReport), E> {
     let tree = |sources: &[Source]| SourceTree::new(model.bounds, LOWERED_GRADING, f64::INFINITY, sources);
     let sizes = Sizes { wanted: size, turn: FacetSize::of_turn(model, settings.turn), lowered: tree(&[]) };
     let mut sheet = Sheet::new(model, sizes);
@@ -125,7 +148,8 @@ fn remesh_in_pool(
         // Only regions with lowered sizes change, so a few rounds suffice.
         let rounds = if correction == 0 { settings.rounds } else { settings.rounds.min(CORRECTING_ROUNDS) };
         pass(&mut sheet, rounds, settings, &mut report);
-        let mesh = finish::finish(&sheet);
+        let mut mesh = finish::finish(&sheet);
+        snap(&mut mesh)?;
         report.crossings = crossings(&mesh.points, &mesh.triangles);
         // No size removes intersections of the facets themselves.
         let is_input_crossed =
@@ -138,7 +162,7 @@ fn remesh_in_pool(
             || sheet.size.work().is_cancelled();
         if report.crossings.is_empty() || is_last {
             report.measure(&sheet);
-            return (mesh, report);
+            return Ok((mesh, report));
         }
         let lower = |&point: &Point| Source { point, size: LOWERED * sheet.size.size_at(&point) };
         lowered.extend(report.crossings.iter().map(lower).collect::<Vec<_>>());
