@@ -70,8 +70,7 @@ pub fn project_to_curve(curve: &Curve<3>, range: [f64; 2], point: &Point, start:
         let way = jet[0] - point.coords;
         let slope = way.dot(&jet[1]);
         let square = jet[1].norm_squared();
-        let convex = square + way.dot(&jet[2]);
-        let step = -slope / if convex > 0.1 * square { convex } else { square };
+        let step = along_one(slope, square, way.dot(&jet[2]));
         if !step.is_finite() {
             break;
         }
@@ -125,7 +124,7 @@ pub fn project_to_surface(surface: &Surface, point: &Point, start: [f64; 2]) -> 
     }
     let jet = surface.jet(u, v, 2);
     let scale = point.coords.amax().max(jet.d[0][0].amax()).max(surface.largest_term(v));
-    let mut at = descend(surface, point, [u, v], jet, scale);
+    let mut at = descend(surface, [None; 2], point, [u, v], jet, scale);
     let mut foot = foot_at(surface, point, at, scale);
     // Newton's steps end at a crease, an isoparametric line across which the normal jumps, short of
     // the nearest point on it.
@@ -134,7 +133,7 @@ pub fn project_to_surface(surface: &Surface, point: &Point, start: [f64; 2]) -> 
             return foot;
         }
         at = descend_by_axes(surface, point, at, scale);
-        at = descend(surface, point, at, surface.jet(at[0], at[1], 2), scale);
+        at = descend(surface, [None; 2], point, at, surface.jet(at[0], at[1], 2), scale);
         let before = std::mem::replace(&mut foot, foot_at(surface, point, at, scale));
         if (foot.point - before.point).norm() <= ROUNDING * scale {
             break;
@@ -144,19 +143,55 @@ pub fn project_to_surface(surface: &Surface, point: &Point, start: [f64; 2]) -> 
     SurfaceFoot { is_converged, ..foot }
 }
 
+/// The parameters at which the distance from `point` has a minimum in a domain, near `start`.
+pub(crate) fn project_within(surface: &Surface, domain: Domain, point: &Point, start: [f64; 2]) -> [f64; 2] {
+    let at = clamped(start, domain);
+    let jet = surface.jet(at[0], at[1], 2);
+    let scale = point.coords.amax().max(jet.d[0][0].amax()).max(surface.largest_term(at[1]));
+    descend(surface, domain, point, at, jet, scale)
+}
+
+/// The bounds of both parameters.
+pub(crate) type Domain = [Option<[f64; 2]>; 2];
+
+fn clamped(at: [f64; 2], domain: Domain) -> [f64; 2] {
+    [0, 1].map(|i| domain[i].map_or(at[i], |[low, high]| at[i].clamp(low, high)))
+}
+
 /// The parameters at which Newton's steps end.
-fn descend(surface: &Surface, point: &Point, [mut u, mut v]: [f64; 2], mut jet: Jet, scale: f64) -> [f64; 2] {
+fn descend(
+    surface: &Surface,
+    domain: Domain,
+    point: &Point,
+    [mut u, mut v]: [f64; 2],
+    mut jet: Jet,
+    scale: f64,
+) -> [f64; 2] {
     for _ in 0..STEPS {
         let d = &jet.d;
         let way = d[0][0] - point.coords;
         let gradient = [way.dot(&d[1][0]), way.dot(&d[0][1])];
         let form = [d[1][0].norm_squared(), d[1][0].dot(&d[0][1]), d[0][1].norm_squared()];
         let bend = [way.dot(&d[2][0]), way.dot(&d[1][1]), way.dot(&d[0][2])];
-        let Some(step) = newton_step(gradient, form, bend) else { break };
+        // At a bound the other parameter alone is moved, if the distance decreases beyond.
+        let is_held = [0, 1].map(|i| {
+            let at = [u, v][i];
+            domain[i].is_some_and(|[low, high]| {
+                (at <= low && gradient[i] > 0.0) || (at >= high && gradient[i] < 0.0)
+            })
+        });
+        let step = match is_held {
+            [false, false] => newton_step(gradient, form, bend),
+            _ => Some(
+                [0, 1]
+                    .map(|i| if is_held[i] { 0.0 } else { along_one(gradient[i], form[2 * i], bend[2 * i]) }),
+            ),
+        };
+        let Some(step) = step else { break };
         let mut share = 1.0;
         let mut next = None;
         for _ in 0..HALVINGS {
-            let to = [u + share * step[0], v + share * step[1]];
+            let to = clamped([u + share * step[0], v + share * step[1]], domain);
             let there = surface.jet(to[0], to[1], 2);
             if is_nearer(&(there.d[0][0] - point.coords), &way, scale) {
                 next = Some((to, there));
@@ -249,6 +284,12 @@ fn is_kink(surface: &Surface, point: &Point, foot: &SurfaceFoot, scale: f64) -> 
         [jet.d[1][0], jet.d[0][1]].map(|d| along / d.norm().max(f64::MIN_POSITIVE)).map(|h| h.min(1.0));
     let around = [[-a, 0.0], [a, 0.0], [0.0, -b], [0.0, b], [-a, -b], [a, b], [-a, b], [a, -b]];
     around.into_iter().all(|step| grows(step) && grows(step.map(|h| 0.1 * h)))
+}
+
+/// The Newton step of one parameter; Gauss-Newton where the squared distance is not convex.
+fn along_one(gradient: f64, square: f64, bend: f64) -> f64 {
+    let convex = square + bend;
+    -gradient / if convex > 0.1 * square { convex } else { square }
 }
 
 /// The least determinant of the second derivatives of half the squared distance, in units of that

@@ -190,6 +190,20 @@ impl Surface {
         }
     }
 
+    /// The parameters in u and v between which splines are defined: beyond they are extrapolated.
+    pub(crate) fn domain(&self) -> [Option<[f64; 2]>; 2] {
+        let of_curve = |curve: &Curve<3>| curve.domain().filter(|_| curve.period().is_none());
+        match self {
+            Self::Plane { .. } | Self::Round { .. } => [None; 2],
+            Self::Extrusion { curve, .. } => [of_curve(curve), None],
+            Self::Revolution { curve, .. } => [None, of_curve(curve)],
+            Self::Spline(SplineSurface { bases, .. }) => {
+                [0, 1].map(|i| Some(bases[i].range()).filter(|_| bases[i].period().is_none()))
+            }
+            Self::Offset { basis, .. } => basis.domain(),
+        }
+    }
+
     /// Whether it is a plane.
     pub fn is_plane(&self) -> bool {
         matches!(self, Self::Plane { .. })

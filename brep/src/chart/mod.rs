@@ -14,7 +14,7 @@ pub(crate) use trace::Loop;
 use crate::bspline::{Basis, SplineCurve};
 use crate::model::{Fin, On};
 use crate::nearest::nearest_on_surface;
-use crate::project::project_to_surface;
+use crate::project::{SurfaceFoot, project_to_surface, project_within};
 use crate::surface::Profile;
 use crate::{Curve, Point, Surface, Vector};
 use nalgebra::Vector2;
@@ -24,6 +24,11 @@ pub(crate) type Parameters = [f64; 2];
 
 /// Derivatives shorter than this (fraction of the diagonal of the model) are those of a pole.
 const AT_REST: f64 = 1e-7;
+
+/// Feet beyond the knots of a spline by more than this fraction of its domain are doubtful ...
+const BEYOND: f64 = 1e-2;
+/// ... if the domain itself is this close, as a fraction of the diagonal.
+const BESIDE: f64 = 1e-4;
 
 /// A surface on which edges are followed.
 pub(crate) struct Chart<'a> {
@@ -130,10 +135,32 @@ impl<'a> Chart<'a> {
         nearest_on_surface(self.surface, point).parameters
     }
 
+    /// The parameters of the nearest point inside the domain of a spline, if a foot is far outside
+    /// of it and no nearer: extrapolated surfaces turn back.
+    fn within(&self, point: &Point, guess: Parameters, foot: &SurfaceFoot) -> Option<Parameters> {
+        let domain = self.surface.domain();
+        let is_beyond = |i: usize| {
+            let at = foot.parameters[i];
+            domain[i].is_some_and(|[low, high]| (at - high).max(low - at) > BEYOND * (high - low))
+        };
+        if !is_beyond(0) && !is_beyond(1) {
+            return None;
+        }
+        let found = project_within(self.surface, domain, point, guess);
+        let off = (self.surface.point(found) - point).norm();
+        (off <= (foot.point - point).norm().max(BESIDE * self.diagonal)).then_some(found)
+    }
+
+    /// The distance of a point from the whole surface.
+    fn distance(&self, point: &Point) -> f64 {
+        (nearest_on_surface(self.surface, point).point - point).norm()
+    }
+
     /// The parameters of the nearest point near a guess.
     fn near(&self, point: &Point, guess: Parameters) -> Parameters {
         let Surface::Round { axes, profile, .. } = self.surface else {
-            return project_to_surface(self.surface, point, guess).parameters;
+            let found = project_to_surface(self.surface, point, guess);
+            return self.within(point, guess, &found).unwrap_or(found.parameters);
         };
         // Some surfaces cross themselves on their axis: the nearest point may be on the other side.
         let crosses = match *profile {

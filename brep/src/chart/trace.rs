@@ -191,7 +191,10 @@ impl Chart<'_> {
             let chord = (place - point(edge, t)).norm();
             let middle = self.surface.point([0, 1].map(|i| 0.5 * (at[i] + found[i])));
             let bend = (middle - point(edge, 0.5 * (t + next))).norm();
-            let is_good = bend <= OFF * chord + off.max(gap) + ROUNDING * self.diagonal;
+            let little = OFF * chord + ROUNDING * self.diagonal;
+            // Beyond their knots splines continue, and a long step may end at a foot there.
+            let is_near = || off <= gap + little || off <= 2.0 * self.distance(&place);
+            let is_good = bend <= off.max(gap) + little && is_near();
             if is_good || step < SMALLEST_STEP {
                 if off > FARTHEST * self.diagonal {
                     return Err(Lost { place, off: Some(off) });
@@ -247,4 +250,55 @@ impl Chart<'_> {
 
 fn point(edge: &EdgeCurve, t: f64) -> Point {
     Point::from(edge.curve.point(t))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bspline::{Basis, SplineCurve};
+    use crate::{Curve, Surface, Vector};
+    use std::f64::consts::TAU;
+
+    /// A spline through `poles` with these knots, over [0, 1].
+    fn spline(degree: usize, knots: &[f64], poles: Vec<Vector>) -> Curve<3> {
+        let mut multiplicities = vec![1; knots.len()];
+        (multiplicities[0], multiplicities[knots.len() - 1]) = (degree + 1, degree + 1);
+        let basis = Basis::new(degree, knots, &multiplicities, poles.len(), false).unwrap();
+        Curve::Spline(SplineCurve { basis, poles, weights: Vec::new() })
+    }
+
+    /// The wall above most of a circle: its extrapolation passes its start.
+    fn wall() -> (Curve<3>, Surface) {
+        let pole = |k: usize| {
+            let (sine, cosine) = (0.9 * TAU * k as f64 / 9.0).sin_cos();
+            Vector::new(cosine, sine, 0.0)
+        };
+        let knots: Vec<f64> = (0..8).map(|k| f64::from(k) / 7.0).collect();
+        let curve = spline(3, &knots, (0..10).map(pole).collect());
+        (curve.clone(), Surface::Extrusion { curve, direction: Vector::z() })
+    }
+
+    #[test]
+    fn fast_edges_at_the_end_of_an_open_surface_are_followed_inside_of_it() {
+        let (around, wall) = wall();
+        // The edge runs along the wall, ever faster toward its ends.
+        const STEPS: usize = 400;
+        let shares: Vec<f64> = (0..=STEPS).map(|k| k as f64 / STEPS as f64).collect();
+        let points: Vec<Vector> = shares.iter().map(|&u| around.point(u)).collect();
+        let slow = |u: f64| {
+            0.5 + 0.5 * (2.0 * u - 1.0).signum() * (1.0 - (1.0 - (2.0 * u - 1.0).abs()).powf(0.25)).powi(4)
+        };
+        let mut knots: Vec<f64> = shares.iter().map(|&u| slow(u)).collect();
+        knots.dedup();
+        assert_eq!(knots.len(), points.len());
+        let edge =
+            EdgeCurve { curve: spline(1, &knots, points), range: [0.0, 1.0], ends: [0, 1], tolerance: 0.0 };
+        let chart = Chart::new(&wall, 2.0);
+        for range in [[0.0, 1.0], [1.0, 0.0]] {
+            let start = if range[0] == 0.0 { [0.0, 0.0] } else { [1.0, 0.0] };
+            let Ok((nodes, gap)) = chart.walk(&edge, range, start) else { panic!("lost from {start:?}") };
+            assert!(gap < 1e-3, "{gap}");
+            assert!(nodes.iter().all(|node| (-0.01..=1.01).contains(&node.1[0])), "{nodes:?}");
+        }
+    }
 }
