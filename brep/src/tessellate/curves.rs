@@ -7,6 +7,10 @@ const MOST: usize = 100_000;
 /// A closed curve, or one that bends, has at least this many segments between jumps.
 const FEWEST: usize = 2;
 
+/// Vertices on a curve are this far from its ends, and breaks from each other (fraction of the
+/// diagonal).
+const BENT: f64 = 1e-6;
+
 /// The middle of a side, straight in the parameters, is at most this far from its curve, in lengths
 /// of the side.
 const STRAY: f64 = 0.04;
@@ -35,16 +39,19 @@ pub(super) fn divide(
     }
     let mut breaks = vec![low];
     // A range may end beside a knot by rounding.
-    let rounding = 1e-9 * (high - low);
+    let is_near = |a: f64, b: f64| {
+        b - a <= 1e-9 * (high - low) || (curve.point(b) - curve.point(a)).norm() <= BENT * diagonal
+    };
     for t in curve.breaks(edge.range) {
-        if t - breaks[breaks.len() - 1] > rounding && high - t > rounding {
+        if !is_near(breaks[breaks.len() - 1], t) && !is_near(t, high) {
             breaks.push(t);
         }
     }
     breaks.push(high);
+    let is_closed = edge.ends[0] == edge.ends[1];
     let pieces = if is_line {
         1
-    } else if edge.ends[0] == edge.ends[1] {
+    } else if is_closed {
         4
     } else {
         FEWEST
@@ -72,6 +79,8 @@ pub(super) fn divide(
             }
         }
     }
+    // Files bend the ends of curves to their vertices, which may make hooks.
+    out.retain(|&t| is_closed || t == low || t == high || !(is_near(low, t) || is_near(t, high)));
     Ok(out)
 }
 
@@ -131,4 +140,44 @@ pub(crate) fn diagonal(corners: &[Corner], curves: &[EdgeCurve], others: Vec<Poi
     let extent = |axis| bound(f64::NEG_INFINITY, f64::max, axis) - bound(f64::INFINITY, f64::min, axis);
     let squared: f64 = (0..3).map(|axis| extent(axis) * extent(axis)).sum();
     squared.sqrt().max(f64::MIN_POSITIVE)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bspline::{Basis, SplineCurve};
+    use crate::{Curve, Surface};
+
+    /// A polyline over [0, 1].
+    fn polyline(points: &[[f64; 2]]) -> EdgeCurve {
+        let last = points.len() - 1;
+        let knots: Vec<f64> = (0..=last).map(|k| k as f64 / last as f64).collect();
+        let mut multiplicities = vec![1; knots.len()];
+        (multiplicities[0], multiplicities[last]) = (2, 2);
+        let basis = Basis::new(1, &knots, &multiplicities, points.len(), false).unwrap();
+        let poles = points.iter().map(|&[x, y]| Vector::new(x, y, 0.0)).collect();
+        let curve = Curve::Spline(SplineCurve { basis, poles, weights: Vec::new() });
+        EdgeCurve { curve, range: [0.0, 1.0], ends: [0, 1], tolerance: 1e-9 }
+    }
+
+    #[test]
+    fn no_vertices_are_beside_the_ends_of_a_curve_with_hooks() {
+        let hooked = [
+            [0.0, 0.0],
+            [-5e-7, 3e-7],
+            [1e-7, 8e-7],
+            [1.0, 0.0],
+            [2.0, 1.0],
+            [2.0 + 4e-7, 1.0],
+            [2.0, 1.0 - 4e-7],
+        ];
+        let plane = Surface::Plane { origin: Vector::zeros(), axes: [Vector::x(), Vector::y()] };
+        let edge = polyline(&hooked);
+        let fin = Fin { on: crate::On::Curve(0), curve: None, range: edge.range, is_forward: true };
+        let found = divide(&edge, &[(&plane, &fin)], (1e-9, 0.1), 2.0).unwrap();
+        let inner = &found[1..found.len() - 1];
+        assert!(inner.iter().any(|t| (t - 0.5).abs() < 1e-12), "{found:?}");
+        let end = |t: f64| [0.0, 1.0].map(|e| (edge.curve.point(t) - edge.curve.point(e)).norm());
+        assert!(inner.iter().all(|&t| end(t).iter().all(|off| *off > 2e-6)), "{found:?}");
+    }
 }
