@@ -272,7 +272,8 @@ fn chosen_solids_are_meshed_alone() {
 #[test]
 fn a_pin_with_little_play_in_its_hole_is_kept_apart_from_it() {
     // The radii are 1.64 and 1.65: triangles of the usual size would intersect.
-    let geometry = read("loose_pin.step", &[]).unwrap();
+    let path = own("step").with_extension("").join("loose_pin.step");
+    let geometry = Geometry::from_file(path).unwrap();
     let mesh = Mesher::new().generate(&geometry).unwrap();
     let exact = 384.0 + std::f64::consts::PI * (4.0 * 1.64 * 1.64 - 6.0 * 1.65 * 1.65);
     let found = volume_of(&mesh.arrays());
