@@ -18,7 +18,7 @@ use crate::ground::projector::{BrepProjector, Projector};
 use crate::ground::size::{Closeness, Evaluation, SizeField, SizeSettings, Source, WatchedSize};
 use crate::mesher::facets::{
     Crossing, FacetBodies, FacetError, FacetModel, FacetPatch, FacetSize, FacetSmoothness, Facets, Marks,
-    MergedSmall, RemeshSettings, SharpPlaces, Small, keep, largest_size, merge, remesh_onto,
+    MergedSmall, RemeshSettings, SharpPlaces, Small, keep, largest_size, merge, remesh,
 };
 use crate::mesher::improve::Smoothness;
 use crate::mesher::smoothness::BrepSmoothness;
@@ -268,7 +268,7 @@ impl FacetSolid {
         let mut surface = if self.keep_surface {
             keep(&self.model)
         } else {
-            match remesh_onto(&self.model, &size, &RemeshSettings::default(), &|surface| self.snap(surface)) {
+            match remesh(&self.model, &size, &RemeshSettings::default(), &|surface| self.snap(surface)) {
                 Ok((surface, _)) => surface,
                 Err(error) => return Attempt::Failed(error),
             }

@@ -52,7 +52,7 @@ pub use keep::keep;
 pub use model::{FacetBody, FacetCurve, FacetModel, FacetPatch, Facets, Marks, Merged, Settings};
 #[cfg(test)]
 pub use remesh::deviation;
-pub use remesh::{RemeshReport, RemeshSettings, remesh, remesh_onto};
+pub use remesh::{RemeshReport, RemeshSettings, remesh};
 pub use sharp_places::{SharpPlace, SharpPlaces};
 pub use size::{FacetSize, largest_size};
 pub use small::{Grouping, MergedEdge, MergedFace, MergedSmall, MergedTip, NamedFace, Small, merge};

@@ -15,6 +15,7 @@ use crate::pipeline::model::Model;
 use crate::pipeline::retries::Budget;
 use csg::BodyId;
 use std::collections::BTreeMap;
+use std::convert::Infallible;
 
 fn soup(make: impl FnOnce(&mut Soup)) -> Facets {
     let mut soup = Soup::default();
@@ -26,13 +27,19 @@ fn model(files: &[Facets]) -> FacetModel {
     FacetModel::new(files, &Settings::default()).unwrap()
 }
 
+/// The facets remeshed with their vertices on them.
+pub(super) fn remeshed(model: &FacetModel, size: &dyn SizeField) -> (SurfaceMesh, RemeshReport) {
+    let stay = |_: &mut SurfaceMesh| Ok::<(), Infallible>(());
+    remesh(model, size, &RemeshSettings::default(), &stay).unwrap_or_else(|never| match never {})
+}
+
 /// A box 1024 times as long as wide took 40 times as many splits as triangles were left.
 #[test]
 fn a_long_thin_box_takes_splits_in_proportion_to_its_length() {
     for length in [128.0, 1024.0] {
         let model = model(&[soup(|soup| soup.brick([0.0; 3], [length, 1.0, 1.0], false))]);
         let size = FacetSize::new(&model, &SizeSettings { maxh: Some(0.5), ..SizeSettings::default() });
-        let (mesh, report) = remesh(&model, &size, &RemeshSettings::default());
+        let (mesh, report) = remeshed(&model, &size);
         check(&model, &mesh);
         assert!(report.splits < 6 * mesh.triangles.len(), "{length}: {} splits", report.splits);
     }
@@ -189,7 +196,7 @@ struct Outcome {
 /// Remeshes and fills a model; checks what must hold for any solid.
 fn run(model: &FacetModel, scale: f64) -> Outcome {
     let size = sizes(model, scale);
-    let (mesh, surface) = remesh(model, &size, &RemeshSettings::default());
+    let (mesh, surface) = remeshed(model, &size);
     assert_eq!((surface.flattening_left, surface.misfits), (0, 0));
     assert!(surface.crossings.is_empty());
     let edges = mesh.triangles.iter().flat_map(|t| {
@@ -235,7 +242,7 @@ fn simple_solids_are_remeshed_well() {
 #[test]
 fn triangles_between_close_curves_are_as_short_as_the_gap() {
     let found = model(&[soup(|s| s.plate_with_hole(2.0, 1.0, 0.05, 24))]);
-    let (mesh, report) = remesh(&found, &sizes(&found, 1.0), &RemeshSettings::default());
+    let (mesh, report) = remeshed(&found, &sizes(&found, 1.0));
     closed(&found, &mesh);
     assert!(report.min_angle > 20.0, "{report:?}");
 }
@@ -354,7 +361,7 @@ fn facets_that_intersect_are_found_and_refused_by_the_mesher() {
     })]);
     assert!(!crossed.intersections().is_empty());
     let size = sizes(&crossed, 1.0);
-    let (surface, report) = remesh(&crossed, &size, &RemeshSettings::default());
+    let (surface, report) = remeshed(&crossed, &size);
     assert!(!report.crossings.is_empty());
     let faults = try_closed(&crossed, &surface).unwrap_err();
     assert!(faults.crossings().count() > 0, "{faults}");
@@ -371,7 +378,7 @@ fn the_same_facets_give_the_same_mesh() {
         let size = sizes(&found, edge);
         let mesh = |threads: usize| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            pool.install(|| remesh(&found, &size, &RemeshSettings::default()).0)
+            pool.install(|| remeshed(&found, &size).0)
         };
         let (one, three) = (mesh(1), mesh(3));
         assert_eq!(one.points, three.points);
@@ -405,7 +412,7 @@ fn curved_walls_near_each_other_are_kept_apart_by_smaller_sizes() {
         s.sphere(Point::origin(), 1.0, 80, 40, false);
         s.sphere(Point::origin(), 0.96, 80, 40, true);
     })]);
-    let (mesh, report) = remesh(&shell, &sizes(&shell, 1.5), &RemeshSettings::default());
+    let (mesh, report) = remeshed(&shell, &sizes(&shell, 1.5));
     assert!(report.corrections > 0 && report.crossings.is_empty(), "{report:?}");
     closed(&shell, &mesh);
 }

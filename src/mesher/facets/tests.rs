@@ -1,6 +1,6 @@
 //! Tests of the features found in facets as CAD programs export them.
 
-use super::remesh_tests::{closed, sizes};
+use super::remesh_tests::{closed, remeshed, sizes};
 use super::samples::{Soup, read_ply, read_stl, shared};
 use super::*;
 use crate::ground::size::SizeField;
@@ -205,7 +205,7 @@ fn a_steep_cap_between_facets_that_agree_makes_no_curve() {
     // Its normal is 35° off those beside it; its corners have 0.7°.
     let flat = box_with_cap(0.005);
     assert_eq!(counts(&flat), [8, 12, 6, 1]);
-    let (mesh, report) = remesh(&flat, &sizes(&flat, 0.2), &RemeshSettings::default());
+    let (mesh, report) = remeshed(&flat, &sizes(&flat, 0.2));
     assert!(report.crossings.is_empty(), "{report:?}");
     closed(&flat, &mesh);
     // A pyramid is no cap.

@@ -32,7 +32,6 @@ use crate::ground::progress::Work;
 use crate::ground::size::{SizeField, Source, SourceTree};
 use crate::mesher::surface::{SurfaceMesh, crossings};
 use sheet::Sheet;
-use std::convert::Infallible;
 
 /// Settings of remeshing.
 #[derive(Clone, Debug, PartialEq)]
@@ -96,29 +95,15 @@ const LOWERED: f64 = 0.6;
 /// Makes a surface mesh of a model, with edges of about the wanted size.
 ///
 /// Corners are the first vertices, in their order, followed by the vertices on curves, curve by
-/// curve, and those on patches. Vertices lie on the facets and polylines up to rounding. If
-/// triangles of close patches intersect, the sizes there are lowered and the mesh is refined
-/// further as long as that helps; [`RemeshReport::crossings`] lists intersections that remain, for
-/// example because the facets themselves intersect. If the work of the size field is cancelled, the
-/// mesh is returned as it is.
-pub fn remesh(
-    model: &FacetModel,
-    size: &dyn SizeField,
-    settings: &RemeshSettings,
-) -> (SurfaceMesh, RemeshReport) {
-    let stay = |_: &mut SurfaceMesh| Ok::<(), Infallible>(());
-    match remesh_onto(model, size, settings, &stay) {
-        Ok(made) => made,
-        Err(never) => match never {},
-    }
-}
-
-/// [`remesh`], with the vertices moved by `snap` from the facets to the surfaces that these stand
-/// for: no triangles intersect there.
+/// curve, and those on patches. Vertices lie on the facets and polylines up to rounding, from where
+/// `snap` moves them onto the surfaces that these stand for. If triangles of close patches then
+/// intersect, the sizes there are lowered and the mesh is refined further as long as that helps;
+/// [`RemeshReport::crossings`] lists intersections that remain, for example because the facets
+/// themselves intersect. If the work of the size field is cancelled, the mesh is returned as it is.
 ///
 /// # Errors
 /// Those of `snap`.
-pub fn remesh_onto<E: Send>(
+pub fn remesh<E: Send>(
     model: &FacetModel,
     size: &dyn SizeField,
     settings: &RemeshSettings,
