@@ -189,12 +189,13 @@ impl FacetSolid {
     ) -> (Option<Self>, MergedSmall) {
         let Some(cad) = &self.cad else { return (None, MergedSmall::default()) };
         let in_pieces = SMALL_IN_PIECES * f64::from(pieces);
-        let [factor, still_factor, tip_factor] = [SMALL, STILL_SMALL, TIP].map(|f| f.max(in_pieces));
+        let [factor, still_factor] = [SMALL, STILL_SMALL].map(|f| f.max(in_pieces));
+        let tip_factors = [TIP, SMOOTH_TIP].map(|f| f.max(in_pieces));
         let largest = largest.min(largest_size(&self.model, settings));
         let size = |model: &FacetModel| -> Box<dyn SizeField> {
             Box::new(AtMost(FacetSize::evaluated(model, settings, Evaluation::Searched), largest))
         };
-        let small = Small { factor, still_factor, largest, tip_factor, size: &size };
+        let small = Small { factor, still_factor, largest, tip_factors, size: &size };
         let (merged, report) = merge(&cad.model, &cad.tessellation, &small);
         let solid = merged.map(|(model, exact, grouping)| {
             let label = |faces: &Vec<usize>| self.names.patches[faces[0]].clone();
@@ -419,6 +420,9 @@ const STILL_SMALL: f64 = 5.0;
 
 /// The same for tips of faces, of which only the end is as wide.
 const TIP: f64 = 10.0;
+
+/// The same for tips that go on smoothly beyond an edge: without it the shape is almost the same.
+const SMOOTH_TIP: f64 = 4.0;
 
 /// The same for the subdivisions of elements, whose vertices must not meet both sides of a step.
 const SMALL_IN_PIECES: f64 = 4.0;

@@ -142,7 +142,7 @@ fn neighbours(layout: &Layout, face: usize) -> Vec<(usize, Vec<usize>)> {
 }
 
 /// Whether two faces continue each other across all their common edges.
-fn is_smooth(layout: &Layout, common: &[usize]) -> bool {
+pub(super) fn is_smooth(layout: &Layout, common: &[usize]) -> bool {
     layout.segments(common).all(|segment| {
         let into: Vec<Vector> = layout.faces_beside(segment).map(|(_, into)| into).collect();
         matches!(into[..], [a, b] if a.angle(&-b) < SMOOTH)

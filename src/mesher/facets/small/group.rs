@@ -32,8 +32,9 @@ pub struct Small<'a> {
     pub still_factor: f64,
     /// The largest size of elements.
     pub largest: f64,
-    /// Tips of faces are cut off where elements are this many times as large as their width.
-    pub tip_factor: f64,
+    /// Tips of faces are cut off where elements are this many times as large as their width: those
+    /// with sharp edges, and those that go on smoothly beyond an edge.
+    pub tip_factors: [f64; 2],
     /// The wanted size of elements of a model.
     pub size: &'a dyn Fn(&FacetModel) -> Box<dyn SizeField>,
 }
@@ -138,7 +139,7 @@ pub(super) fn merge_all(shape: &Shape, layout: &Layout, small: &Small) -> Outcom
         let is_small = |points: Vec<Point>, extent: f64, factor: f64| {
             points.into_iter().all(|p| factor * extent <= size.size_at(&p))
         };
-        let tip_factor = TIP_STILL_SMALL * small.tip_factor;
+        let tip_factor = TIP_STILL_SMALL * small.tip_factors[0];
         let point = |v: u32| tessellation.points[v as usize];
         let points_of_edge =
             |edge: usize| tessellation.lines[edge].iter().map(|on| point(on.0)).collect::<Vec<_>>();

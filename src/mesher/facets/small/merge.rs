@@ -96,7 +96,7 @@ fn with_tips(
         size.unwrap_or_else(|| (small.size)(&grouped(model, tessellation, shape, &shape.ungrouped(model)).0));
     let (mut done, mut merges) = (Vec::new(), 0);
     for _ in 0..ROUNDS {
-        let tips = narrow(layout, &candidates, &*size, small.tip_factor, &done);
+        let tips = narrow(layout, &candidates, &*size, small.tip_factors, &done);
         if tips == done || merges == MERGES {
             break;
         }

@@ -28,8 +28,13 @@ fn merged_of(model: Model, size: f64) -> (Option<FacetModel>, MergedSmall) {
 fn merged_with(mut model: Model, size: &dyn Fn(&FacetModel) -> f64) -> (Option<FacetModel>, MergedSmall) {
     let tessellation = Tessellation::of(&mut model, &Settings::default()).unwrap();
     let size = |model: &FacetModel| -> Box<dyn SizeField> { Box::new(Constant(size(model))) };
-    let small =
-        Small { factor: 20.0, still_factor: 5.0, largest: f64::INFINITY, tip_factor: 10.0, size: &size };
+    let small = Small {
+        factor: 20.0,
+        still_factor: 5.0,
+        largest: f64::INFINITY,
+        tip_factors: [10.0, 4.0],
+        size: &size,
+    };
     let (merged, report) = merge(&model, &tessellation, &small);
     (merged.map(|(facets, ..)| facets), report)
 }

@@ -5,6 +5,7 @@
 //! Triangles in them are as sharp as the tips, whatever their size. So a tip is cut off where it
 //! becomes about as wide as a small face may be, and merged as a narrow face of its own.
 
+use super::faces::is_smooth;
 use super::layout::Layout;
 use crate::Point;
 use crate::ground::kernel::nearest::in_segment;
@@ -48,6 +49,8 @@ const BISECTIONS: usize = 20;
 pub(super) struct Candidate {
     tip: Piece,
     corner: usize,
+    /// Whether the face goes on smoothly beyond one of the edges there.
+    is_smooth: bool,
     /// Which of [`NARROWER`] to cut with; none after the last one.
     pub attempt: usize,
 }
@@ -83,7 +86,8 @@ pub(super) fn candidates(layout: &Layout) -> Vec<Candidate> {
                 let is_sharp = angles.get(&(corner as u32, patch as u32)).is_some_and(|angle| *angle < SHARP);
                 if a != b && one != other && is_sharp {
                     let tip = Piece { patch, of_loop, sides, at: [None; 2] };
-                    found.push(Candidate { tip, corner, attempt: 0 });
+                    let is_smooth = [a, b].iter().any(|&edge| is_smooth(layout, &[edge]));
+                    found.push(Candidate { tip, corner, is_smooth, attempt: 0 });
                 }
             }
         }
@@ -91,14 +95,15 @@ pub(super) fn candidates(layout: &Layout) -> Vec<Candidate> {
     found
 }
 
-/// Those of the candidates that are at most as wide as elements divided by `factor` for a while.
+/// Those of the candidates that are at most as wide as elements divided by a factor for a while,
+/// the second one if they go on smoothly beyond an edge.
 ///
 /// Tips that are `done` stay as they are, unless they are wider now.
 pub(super) fn narrow(
     layout: &Layout,
     candidates: &[Candidate],
     size: &dyn SizeField,
-    factor: f64,
+    factors: [f64; 2],
     done: &[NarrowTip],
 ) -> Vec<NarrowTip> {
     let least = THINNEST * bounds(&layout.tessellation.points).diagonal();
@@ -107,7 +112,7 @@ pub(super) fn narrow(
     let mut found = Vec::new();
     for (k, candidate) in candidates.iter().enumerate() {
         let before = done.iter().find(|tip| tip.candidate == k);
-        let tip = candidate.narrow(layout, size, factor, k).filter(|narrow| {
+        let tip = candidate.narrow(layout, size, factors, k).filter(|narrow| {
             // A face that is nowhere wider is small as a whole.
             least < narrow.width
                 && narrow.width < layout.widths[narrow.tip.patch]
@@ -131,18 +136,18 @@ fn overlap(one: &[Part], other: &[Part]) -> bool {
 }
 
 impl Candidate {
-    /// The tip, if it is at most as wide as elements divided by `factor` for a while.
+    /// The tip, if it is at most as wide as elements divided by its factor for a while.
     fn narrow(
         &self,
         layout: &Layout,
         size: &dyn SizeField,
-        factor: f64,
+        factors: [f64; 2],
         candidate: usize,
     ) -> Option<NarrowTip> {
-        let Self { tip, corner, attempt } = *self;
-        let narrower = NARROWER.get(attempt)?;
+        let Self { tip, corner, is_smooth, attempt } = *self;
+        let factor = factors[usize::from(is_smooth)] / NARROWER.get(attempt)?;
         let [one, other] = [false, true].map(|leaves| Side::new(layout, &tip, leaves));
-        let (places, width) = cut(&one, &other, size, factor / narrower)?;
+        let (places, width) = cut(&one, &other, size, factor)?;
         let tip = Piece { sides: places.map(|place| place.0), at: places.map(|place| place.1), ..tip };
         Some(NarrowTip { tip, corner, width, candidate })
     }
