@@ -259,7 +259,7 @@ mod tests {
     use crate::{Curve, Surface, Vector};
     use std::f64::consts::TAU;
 
-    /// A spline through `poles` with these knots, over [0, 1].
+    /// A spline over [0, 1] with these knots and poles.
     fn spline(degree: usize, knots: &[f64], poles: Vec<Vector>) -> Curve<3> {
         let mut multiplicities = vec![1; knots.len()];
         (multiplicities[0], multiplicities[knots.len() - 1]) = (degree + 1, degree + 1);
