@@ -130,7 +130,21 @@ impl Basis {
     /// # Errors
     /// A degree out of range.
     pub fn bezier(degree: usize) -> Result<Self, String> {
-        Self::new(degree, &[0.0, 1.0], &[degree + 1, degree + 1], degree + 1, false)
+        Self::clamped(degree, &[0.0, 1.0], 1)
+    }
+
+    /// A basis of which splines begin at their first pole and end at their last one, with this
+    /// multiplicity of the knots between.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn clamped(degree: usize, knots: &[f64], multiplicity: usize) -> Result<Self, String> {
+        let mut multiplicities = vec![multiplicity; knots.len()];
+        if let [first, .., last] = &mut multiplicities[..] {
+            (*first, *last) = (degree + 1, degree + 1);
+        }
+        let poles = multiplicities.iter().sum::<usize>().saturating_sub(degree + 1);
+        Self::new(degree, knots, &multiplicities, poles, false)
     }
 
     /// The number of functions: poles, counting repeated ones of a periodic spline.
@@ -261,6 +275,20 @@ pub struct SplineCurve<const D: usize> {
 }
 
 impl<const D: usize> SplineCurve<D> {
+    /// Moves both ends of a curve without weights to other places, and all between by the linear
+    /// interpolation of these moves: splines reproduce linear functions if each pole has the value
+    /// at the mean of its knots (Greville 1969).
+    pub(crate) fn move_ends(&mut self, ends: [SVector<f64, D>; 2]) {
+        let [low, high] = self.basis.range();
+        let moves = [ends[0] - self.jet(low)[0], ends[1] - self.jet(high)[0]];
+        let degree = self.basis.degree;
+        for (k, pole) in self.poles.iter_mut().enumerate() {
+            let mean = self.basis.knots[k + 1..=k + degree].iter().sum::<f64>() / degree as f64;
+            let share = (mean - low) / (high - low);
+            *pole += moves[0] * (1.0 - share) + moves[1] * share;
+        }
+    }
+
     /// The value and the first three derivatives.
     pub fn jet(&self, t: f64) -> [SVector<f64, D>; 4] {
         match self.basis.degree {

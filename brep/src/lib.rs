@@ -29,6 +29,7 @@ mod project;
 mod read;
 mod shapes;
 mod step;
+mod straight;
 mod surface;
 pub mod tessellate;
 #[cfg(test)]

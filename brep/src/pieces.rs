@@ -1,9 +1,17 @@
 //! Pieces of patches, such as narrow tips, cut off as patches of their own.
 
-use crate::bspline::{Basis, SplineCurve};
 use crate::model::{Corner, EdgeCurve, Fin, Model, On, Patch};
+use crate::straight::along_straight;
+use crate::tessellate::diagonal;
 use crate::{Curve, Point, Surface};
 use nalgebra::SVector;
+
+/// The most segments of the curve of a cut.
+const MOST_SEGMENTS: usize = 64;
+
+/// The largest distance of the curve of a cut from its surface (fraction of the size of the model),
+/// half of what tessellation allows.
+const OFF: f64 = 5e-6;
 
 /// A piece of a patch, to be cut off from one of its sides to another one.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -87,6 +95,7 @@ impl Model {
             })
             .collect();
         let (mut patches, mut curves) = (Vec::new(), Vec::new());
+        let room = OFF * diagonal(&self.corners, &self.curves, Vec::new());
         for (piece, corners) in pieces.iter().zip(ends) {
             let of_loop = &mut fins[piece.patch][piece.of_loop];
             let mut sides = taken(of_loop, piece.sides, corners, &model)?;
@@ -94,16 +103,20 @@ impl Model {
             let flat = across(&sides[0], &sides[sides.len() - 1]);
             let places = corners.map(|corner| model.corners[corner].point);
             model.curves.push(EdgeCurve {
-                curve: on_surface(surface, flat.as_ref(), places),
+                curve: on_surface(surface, flat, places, room),
                 range: [0.0, 1.0],
                 ends: corners,
-                tolerance: 0.0,
+                // It ends on edges that may be off the patch.
+                tolerance: corners
+                    .map(|corner| model.corners[corner].tolerance)
+                    .into_iter()
+                    .fold(0.0, f64::max),
             });
             parts_of.push(None);
             let curve = model.curves.len() - 1;
             let cut = |is_forward: bool| Fin {
                 on: On::Curve(curve),
-                curve: flat.clone(),
+                curve: flat.map(|[from, to]| line(from.into(), to.into())),
                 range: [0.0, 1.0],
                 is_forward,
             };
@@ -137,8 +150,9 @@ impl Model {
             match piece.at[k] {
                 None => end,
                 Some(t) => {
-                    let point = Point::from(self.curves[curve].curve.point(t));
-                    corners.push(Corner { point, tolerance: 0.0 });
+                    let edge = &self.curves[curve];
+                    let point = Point::from(edge.curve.point(t));
+                    corners.push(Corner { point, tolerance: edge.tolerance });
                     divisions[curve].push((t, corners.len() - 1));
                     corners.len() - 1
                 }
@@ -220,29 +234,26 @@ fn line<const D: usize>(from: SVector<f64, D>, to: SVector<f64, D>) -> Curve<D> 
     Curve::Line { start: from, direction: to - from }
 }
 
-/// A curve between two points of a surface that are close to each other: the cubic polynomial with
-/// the ends and tangents of the image of a line in its parameters.
-fn on_surface(surface: &Surface, flat: Option<&Curve<2>>, [from, to]: [Point; 2]) -> Curve<3> {
-    let straight = line(from.coords, to.coords);
-    let Some(flat) = flat.filter(|_| !surface.is_plane()) else { return straight };
-    let tangent = |t: f64| {
-        let [place, along, ..] = flat.jet(t);
-        let jet = surface.jet(place.x, place.y, 1);
-        jet.d[1][0] * along.x + jet.d[0][1] * along.y
-    };
-    let Ok(basis) = Basis::bezier(3) else { return straight };
-    let poles =
-        vec![from.coords, from.coords + tangent(0.0) / 3.0, to.coords - tangent(1.0) / 3.0, to.coords];
-    Curve::Spline(SplineCurve { basis, poles, weights: Vec::new() })
-}
-
-/// The line in the parameters from the start of one side to the end of the next one.
-fn across(arriving: &Fin, leaving: &Fin) -> Option<Curve<2>> {
+/// The line in the parameters from the start of one side to the end of another one.
+fn across(first: &Fin, last: &Fin) -> Option<[[f64; 2]; 2]> {
     let place = |fin: &Fin, is_end: bool| {
         let curve = fin.curve.as_ref()?;
-        Some(curve.point(fin.range[usize::from(is_end == fin.is_forward)]))
+        Some(curve.point(fin.range[usize::from(is_end == fin.is_forward)]).into())
     };
-    Some(line(place(arriving, false)?, place(leaving, true)?))
+    Some([place(first, false)?, place(last, true)?])
+}
+
+/// A curve between two points of a surface, close to the image of a line in its parameters.
+fn on_surface(surface: &Surface, flat: Option<[[f64; 2]; 2]>, ends: [Point; 2], room: f64) -> Curve<3> {
+    let [from, to] = ends.map(|end| end.coords);
+    match flat.filter(|_| !surface.is_plane()) {
+        None => line(from, to),
+        Some(flat) => {
+            let (mut spline, _) = along_straight(surface, flat, [1, MOST_SEGMENTS], room);
+            spline.move_ends([from, to]);
+            Curve::Spline(spline)
+        }
+    }
 }
 
 #[cfg(test)]
@@ -292,6 +303,14 @@ mod tests {
         let expected = [count - 2, count - 1, 0, 1].map(|side| fins[side].on);
         assert_eq!(sides, expected);
         assert_eq!(piece.sides(&model).map(|fin| fin.on), [sides[0], sides[3]]);
+    }
+
+    #[test]
+    fn a_cut_is_as_inaccurate_as_the_edges_on_which_it_ends() {
+        let mut model = read("tapered_chamfer");
+        model.curves.iter_mut().for_each(|edge| edge.tolerance = 1e-3);
+        let cut = model.cut_off(&[tip(&model, 6, Point::new(2.0, 0.0, 2.0), 5.0)]).unwrap();
+        assert_eq!(cut.model.curves[cut.curves[0]].tolerance, 1e-3);
     }
 
     #[test]

@@ -31,6 +31,19 @@ impl Jet {
         let is_regular = p.min(q) > LEAST * p.max(q) && cross.norm() > LEAST * p * q;
         if is_regular { cross.try_normalize(0.0) } else { None }
     }
+
+    /// The larger principal curvature by magnitude (1 / length); `None` where there is no normal.
+    /// Needs derivatives up to order 2.
+    pub fn curvature(&self) -> Option<f64> {
+        let normal = self.normal()?;
+        let [a, b] = [self.d[1][0], self.d[0][1]];
+        let [e, f, g] = [a.dot(&a), a.dot(&b), b.dot(&b)];
+        let [l, m, n] = [self.d[2][0], self.d[1][1], self.d[0][2]].map(|second| normal.dot(&second));
+        let squared = e * g - f * f;
+        let mean = 0.5 * (e * n - 2.0 * f * m + g * l) / squared;
+        let product = (l * n - m * m) / squared;
+        Some(mean.abs() + (mean * mean - product).max(0.0).sqrt())
+    }
 }
 
 /// The curve that a [`Surface::Round`] turns about its axis.

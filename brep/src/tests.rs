@@ -492,3 +492,34 @@ fn tessellations_do_not_depend_on_the_number_of_threads() {
     assert!(one.iter().all(|(_, made)| made.triangles.len() > 1000));
     assert_eq!(one, several);
 }
+
+#[test]
+fn curvatures_are_those_of_the_smaller_circle() {
+    let axes = [Vector::x(), Vector::y(), Vector::z()];
+    let round = |profile| Surface::Round { origin: Vector::zeros(), axes, profile };
+    let curvature = |surface: &Surface, u: f64, v: f64| surface.jet(u, v, 2).curvature().unwrap();
+    let cylinder = round(Profile::Line { radius: 0.25, slope: [0.0, 1.0] });
+    let torus = round(Profile::Circle { major: 2.0, minor: 0.5 });
+    for (u, v) in [(0.3, 0.7), (2.0, -1.0), (4.0, 2.0)] {
+        assert!((curvature(&cylinder, u, v) - 4.0).abs() < 1e-12);
+        assert!((curvature(&torus, u, v) - 2.0).abs() < 1e-12);
+    }
+    let cone = round(Profile::Line { radius: 0.0, slope: [1.0, 1.0] });
+    assert!((curvature(&cone, 1.0, 0.1) * 0.1 * 2.0_f64.sqrt() - 1.0).abs() < 1e-12);
+    assert_eq!(cone.jet(1.0, 0.0, 2).curvature(), None);
+}
+
+#[test]
+fn a_spline_moves_between_its_ends_by_interpolation() {
+    let basis = Basis::clamped(3, &[0.0, 0.3, 1.0], 2).unwrap();
+    let poles: Vec<Vector> =
+        (0..6).map(|k| Vector::new(f64::from(k), f64::from(k * k), -f64::from(k % 2))).collect();
+    let before = SplineCurve { basis, poles, weights: Vec::new() };
+    let mut after = before.clone();
+    let moves = [Vector::new(0.1, 0.0, 2.0), Vector::new(0.0, -3.0, 1.0)];
+    after.move_ends([before.poles[0] + moves[0], before.poles[5] + moves[1]]);
+    for t in [0.0, 0.1, 0.3, 0.8, 1.0] {
+        let expected = before.jet(t)[0] + moves[0] * (1.0 - t) + moves[1] * t;
+        assert!((after.jet(t)[0] - expected).norm() < 1e-12, "{t}");
+    }
+}

@@ -7,9 +7,9 @@
 use super::route::Obstacles;
 use super::trace::Loop;
 use super::{Chart, Parameters, Side};
-use crate::bspline::{Basis, SplineCurve};
 use crate::model::{Corner, EdgeCurve, Model, On};
-use crate::{BrepError, Curve, Vector};
+use crate::straight::along_straight;
+use crate::{BrepError, Curve};
 
 const UNBOUNDED: &str = "its loops do not bound an area of its surface";
 
@@ -362,7 +362,9 @@ impl Closing<'_> {
 
     /// Adds a curve along a straight line in the parameters.
     fn seam(&mut self, from: Parameters, to: Parameters, ends: [usize; 2]) -> usize {
-        let (curve, gap) = along_straight(self.chart, from, to);
+        let room = SEAM_GAP * self.chart.diagonal;
+        let (spline, gap) = along_straight(self.chart.surface, [from, to], SEGMENTS, room);
+        let curve = Curve::Spline(spline);
         // Corners of the file need not be on the surface.
         let off = |end: usize, at: f64| (self.model.corners[end].point.coords - curve.point(at)).norm();
         let tolerance = off(ends[0], 0.0).max(off(ends[1], 1.0)).max(gap);
@@ -372,70 +374,5 @@ impl Closing<'_> {
         }
         self.model.curves.push(EdgeCurve { curve, range: [0.0, 1.0], ends, tolerance });
         self.model.curves.len() - 1
-    }
-}
-
-/// A spline over [0, 1] along a straight line in the parameters, and its largest distance from the
-/// point of the surface there, in the middle of its segments.
-fn along_straight(chart: &Chart, from: Parameters, to: Parameters) -> (Curve<3>, f64) {
-    let at = |t: f64| [0, 1].map(|i| from[i] + (to[i] - from[i]) * t);
-    let [mut segments, most] = SEGMENTS;
-    loop {
-        let place = |k: usize| k as f64 / segments as f64;
-        let node = |k: usize| {
-            let [u, v] = at(place(k));
-            let d = chart.surface.jet(u, v, 1).d;
-            [d[0][0], d[1][0] * (to[0] - from[0]) + d[0][1] * (to[1] - from[1])]
-        };
-        let curve = cubic(&(0..=segments).map(node).collect::<Vec<_>>());
-        let gap = |k: usize| {
-            let t = 0.5 * (place(k) + place(k + 1));
-            (chart.surface.point(at(t)).coords - curve.point(t)).norm()
-        };
-        let gap = (0..segments).map(gap).fold(0.0, f64::max);
-        if gap <= SEAM_GAP * chart.diagonal || segments >= most {
-            return (curve, gap);
-        }
-        segments *= 2;
-    }
-}
-
-/// A cubic spline over [0, 1] through points with derivatives.
-fn cubic(nodes: &[[Vector; 2]]) -> Curve<3> {
-    let count = nodes.len() - 1;
-    let knots: Vec<f64> = (0..=count).map(|k| k as f64 / count as f64).collect();
-    let mut multiplicities = vec![2; count + 1];
-    (multiplicities[0], multiplicities[count]) = (4, 4);
-    let third = 1.0 / (3.0 * count as f64);
-    let mut poles = vec![nodes[0][0]];
-    for w in nodes.windows(2) {
-        poles.extend([w[0][0] + w[0][1] * third, w[1][0] - w[1][1] * third]);
-    }
-    poles.push(nodes[count][0]);
-    let basis =
-        Basis::new(3, &knots, &multiplicities, poles.len(), false).expect("the numbers of a cubic spline");
-    Curve::Spline(SplineCurve { basis, poles, weights: Vec::new() })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::super::tests::torus;
-    use super::*;
-    use std::f64::consts::TAU;
-
-    #[test]
-    fn curves_of_seams_are_on_their_surface_however_often_they_bend() {
-        let torus = torus();
-        let chart = Chart::new(&torus, 6.0);
-        for turns in [1.0, 40.0] {
-            let to = [turns * TAU, TAU];
-            let (curve, gap) = along_straight(&chart, [0.0; 2], to);
-            assert!(gap <= SEAM_GAP * 6.0, "{gap:e}");
-            for k in 0..=1000 {
-                let t = f64::from(k) / 1000.0;
-                let off = (torus.point([t * to[0], t * to[1]]).coords - curve.point(t)).norm();
-                assert!(off <= 1.01 * gap, "{off:e} instead of {gap:e}");
-            }
-        }
     }
 }

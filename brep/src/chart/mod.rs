@@ -86,13 +86,11 @@ impl Side {
             self.nodes.reverse();
         }
         let knots: Vec<f64> = self.nodes.iter().map(|node| node.0).collect();
-        let last = knots.len() - 1;
-        let mut multiplicities = vec![1; knots.len()];
-        (multiplicities[0], multiplicities[last]) = (2, 2);
-        let basis = Basis::new(1, &knots, &multiplicities, knots.len(), false)?;
+        let basis = Basis::clamped(1, &knots, 1)?;
+        let range = basis.range();
         let poles = self.nodes.iter().map(|node| Vector2::from(node.1)).collect();
         let curve = Some(Curve::Spline(SplineCurve { basis, poles, weights: Vec::new() }));
-        Ok(Fin { on: self.on, curve, range: [knots[0], knots[last]], is_forward: self.is_forward })
+        Ok(Fin { on: self.on, curve, range, is_forward: self.is_forward })
     }
 }
 
@@ -183,11 +181,11 @@ impl<'a> Chart<'a> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use crate::{Surface, Vector, surface::Profile};
 
     /// A torus of radii 2 and 1 around the z axis.
-    pub(super) fn torus() -> Surface {
+    pub(crate) fn torus() -> Surface {
         let axes = [Vector::x(), Vector::y(), Vector::z()];
         let profile = Profile::Circle { major: 2.0, minor: 1.0 };
         Surface::Round { origin: Vector::zeros(), axes, profile }

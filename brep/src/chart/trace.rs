@@ -261,9 +261,7 @@ mod tests {
 
     /// A spline over [0, 1] with these knots and poles.
     fn spline(degree: usize, knots: &[f64], poles: Vec<Vector>) -> Curve<3> {
-        let mut multiplicities = vec![1; knots.len()];
-        (multiplicities[0], multiplicities[knots.len() - 1]) = (degree + 1, degree + 1);
-        let basis = Basis::new(degree, knots, &multiplicities, poles.len(), false).unwrap();
+        let basis = Basis::clamped(degree, knots, 1).unwrap();
         Curve::Spline(SplineCurve { basis, poles, weights: Vec::new() })
     }
 

@@ -152,9 +152,7 @@ mod tests {
     fn polyline(points: &[[f64; 2]]) -> EdgeCurve {
         let last = points.len() - 1;
         let knots: Vec<f64> = (0..=last).map(|k| k as f64 / last as f64).collect();
-        let mut multiplicities = vec![1; knots.len()];
-        (multiplicities[0], multiplicities[last]) = (2, 2);
-        let basis = Basis::new(1, &knots, &multiplicities, points.len(), false).unwrap();
+        let basis = Basis::clamped(1, &knots, 1).unwrap();
         let poles = points.iter().map(|&[x, y]| Vector::new(x, y, 0.0)).collect();
         let curve = Curve::Spline(SplineCurve { basis, poles, weights: Vec::new() });
         EdgeCurve { curve, range: [0.0, 1.0], ends: [0, 1], tolerance: 1e-9 }

@@ -75,9 +75,7 @@ fn spline(branch: &Branch) -> Option<(Curve<3>, [f64; 2])> {
         knots.push(knots[knots.len() - 1] + arc(ends));
         all.extend(&poles(ends)[1..]);
     }
-    let mut multiplicities = vec![DEGREE; knots.len()];
-    (multiplicities[0], multiplicities[knots.len() - 1]) = (DEGREE + 1, DEGREE + 1);
-    let basis = Basis::new(DEGREE, &knots, &multiplicities, all.len(), false).ok()?;
+    let basis = Basis::clamped(DEGREE, &knots, DEGREE).ok()?;
     let range = basis.range();
     Some((Curve::Spline(SplineCurve { basis, poles: all, weights: Vec::new() }), range))
 }
