@@ -283,6 +283,18 @@ fn a_pin_with_little_play_in_its_hole_is_kept_apart_from_it() {
 }
 
 #[test]
+fn a_fillet_that_runs_out_to_a_point_gets_few_and_good_elements() {
+    // Its radius grows from 0 to 0.4 over an edge of a cube of 10.
+    let path = own("step").with_extension("").join("vanishing_fillet.step");
+    let mesh = Mesher::new().generate(&Geometry::from_file(path).unwrap()).unwrap();
+    let found = volume_of(&mesh.arrays());
+    assert!((found / 999.878 - 1.0).abs() < 1e-4, "{found}");
+    let angle = mesh.coarse.as_ref().unwrap().report.quality.smallest_dihedral;
+    assert!(angle > 10.0, "{angle}°");
+    assert!(mesh.arrays().tets.len() < 10_000, "{} tets", mesh.arrays().tets.len());
+}
+
+#[test]
 fn step_and_brep_of_one_part_have_the_volumes_of_the_cad_program() {
     let Some(folder) = shared("step") else { return };
     let text = std::fs::read(folder.join("volumes.json")).unwrap();

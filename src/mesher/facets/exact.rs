@@ -1,7 +1,7 @@
 //! Facets with given patches, curves and corners: those of a boundary representation.
 
 use super::small::Grouping;
-use super::{FacetBody, FacetCurve, FacetModel, FacetPatch, Merged};
+use super::{BluntEnd, FacetBody, FacetCurve, FacetModel, FacetPatch, Merged};
 use crate::Vector;
 use crate::ground::kernel::tree;
 use crate::ground::mesh::{BoundaryTriangle, VertexId};
@@ -84,10 +84,11 @@ fn inaccuracy(model: &Model, face: usize) -> f64 {
 /// its shape: both come from the parametrisation alone.
 pub fn of_brep(model: &Model, tessellation: &Tessellation) -> (FacetModel, BrepProjector) {
     let shape = Shape::new(model, tessellation);
-    grouped(model, tessellation, &shape, &shape.ungrouped(model))
+    grouped(model, tessellation, &shape, &shape.ungrouped(model), &[])
 }
 
-/// The same with groups of faces and edges as patches and curves.
+/// The same with groups of faces and edges as patches and curves, and ends of faces without
+/// influence on sizes.
 ///
 /// Facets of faces that joined a main face belong to its patch, but have no influence on its shape
 /// and size: points are projected to the facets of the main face alone.
@@ -96,6 +97,7 @@ pub(super) fn grouped(
     tessellation: &Tessellation,
     shape: &Shape,
     grouping: &Grouping,
+    blunt: &[BluntEnd],
 ) -> (FacetModel, BrepProjector) {
     let Shape { is_reversed, triangles, normals, .. } = shape;
     let Grouping { patches: faces_of, curves: edges_of, is_short, .. } = grouping;
@@ -158,6 +160,10 @@ pub(super) fn grouped(
         bounds,
         projector: FacetProjector::with_normals(source, Some(normals)),
         merged,
+        blunt: blunt
+            .iter()
+            .map(|end| BluntEnd { patch: patch_of_face[end.patch] as usize, ..*end })
+            .collect(),
     };
     (facets, exact)
 }

@@ -49,7 +49,7 @@ pub use crossing::Crossing;
 pub use error::FacetError;
 pub use exact::of_brep;
 pub use keep::keep;
-pub use model::{FacetBody, FacetCurve, FacetModel, FacetPatch, Facets, Marks, Merged, Settings};
+pub use model::{BluntEnd, FacetBody, FacetCurve, FacetModel, FacetPatch, Facets, Marks, Merged, Settings};
 #[cfg(test)]
 pub use remesh::deviation;
 pub use remesh::{RemeshReport, RemeshSettings, remesh};

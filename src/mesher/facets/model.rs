@@ -131,6 +131,8 @@ pub struct FacetModel {
     pub projector: FacetProjector,
     /// The facets of faces that were merged into others, if there are any.
     pub merged: Option<Merged>,
+    /// Where the curvature of patches has no influence on sizes.
+    pub blunt: Vec<BluntEnd>,
     /// Estimated rounding error of the coordinates, from their digits (length).
     pub rounding: f64,
 }
@@ -142,6 +144,26 @@ pub struct Merged {
     pub is_merged: Vec<bool>,
     /// Projection to patches with these facets too.
     pub projector: FacetProjector,
+}
+
+/// The end of a patch around a corner where its curvature has no influence on sizes: its radius
+/// vanishes there with its width.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BluntEnd {
+    /// The index of the patch; in models of which no patches were grouped, of the face.
+    pub patch: usize,
+    /// The corner.
+    pub corner: Point,
+    /// How far it reaches from the corner.
+    pub length: f64,
+}
+
+impl BluntEnd {
+    /// Whether a facet of the patch is in this end.
+    pub fn has(&self, [a, b, c]: &[Point; 3]) -> bool {
+        let middle = (a.coords + b.coords + c.coords) / 3.0;
+        (middle - self.corner.coords).norm() <= self.length
+    }
 }
 
 impl FacetModel {
@@ -279,6 +301,7 @@ fn assemble(joined: Joined, regions: &Regions, found: Found, bounds: Aabb, round
         bounds,
         projector,
         merged: None,
+        blunt: Vec::new(),
         rounding,
     }
 }

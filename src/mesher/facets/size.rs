@@ -97,7 +97,10 @@ fn size_of_curvature(settings: &SizeSettings, curvature: f64) -> f64 {
 
 /// Adds sources on facets whose curvature needs a size below `maximum`.
 fn sample_facets(model: &FacetModel, settings: &SizeSettings, maximum: f64, sources: &mut Vec<Source>) {
-    for (corners, normals) in model.projector.facets() {
+    for (patch, corners, normals) in model.projector.facets() {
+        if model.blunt.iter().any(|end| end.patch == patch && end.has(corners)) {
+            continue;
+        }
         let size = size_of_curvature(settings, curvature(corners, normals, model.rounding));
         if size >= maximum {
             continue;

@@ -216,9 +216,11 @@ impl FacetProjector {
         self.source.tips.iter().any(|&v| self.source.points[v as usize] == *point)
     }
 
-    /// All facets, patch by patch, with the normals of the patch at their corners.
-    pub(crate) fn facets(&self) -> impl Iterator<Item = (&[Point; 3], &[Vector; 3])> {
-        self.patches.iter().flat_map(|p| p.facets.iter().zip(&p.normals))
+    /// All facets, each with the index of its patch and the normals of the patch at their corners.
+    pub(crate) fn facets(&self) -> impl Iterator<Item = (usize, &[Point; 3], &[Vector; 3])> {
+        self.patches.iter().enumerate().flat_map(|(patch, of)| {
+            of.facets.iter().zip(&of.normals).map(move |(corners, normals)| (patch, corners, normals))
+        })
     }
 
     /// The normal of a flat patch.

@@ -126,7 +126,7 @@ pub(super) fn merge_all(shape: &Shape, layout: &Layout, small: &Small) -> Outcom
         let joins = joins(layout, &allowed.faces);
         let (grouping, chains) = grouping(layout, &joins, &allowed.edges);
         let mut report = report(layout, &joins, &chains, &allowed.edges);
-        let (facets, exact) = grouped(model, tessellation, shape, &grouping);
+        let (facets, exact) = grouped(model, tessellation, shape, &grouping, &layout.blunt);
         let size = (small.size)(&facets);
         if !report.named.is_empty() {
             // A narrow face lowers the sizes around it: the largest one is that of all others.

@@ -2,6 +2,7 @@
 
 use crate::ground::kernel::nearest::in_segment;
 use crate::ground::kernel::tree::{Tree, bounds};
+use crate::mesher::facets::BluntEnd;
 use crate::mesher::facets::exact::Shape;
 use crate::{Point, Vector};
 use brep::{Fin, Model, On, Tessellation};
@@ -39,6 +40,8 @@ pub(in crate::mesher::facets) struct Layout<'a> {
     pub triangles: Vec<Vec<[Point; 3]>>,
     /// Tips that were cut off.
     pub cuts: Vec<TipCut>,
+    /// Ends of faces whose curvature has no influence on sizes.
+    pub blunt: Vec<BluntEnd>,
     /// For pieces of divided faces, the faces along the side where they should be merged.
     pub along: HashMap<usize, Vec<usize>>,
     /// The triangles at each segment of a curve.
@@ -104,6 +107,7 @@ impl<'a> Layout<'a> {
             widths,
             triangles,
             cuts: Vec::new(),
+            blunt: Vec::new(),
             along: HashMap::new(),
             beside,
         };

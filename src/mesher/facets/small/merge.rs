@@ -1,10 +1,11 @@
 //! Merging with and without divided faces and tips of faces.
 
+use super::blunt::blunt;
 use super::group::{Allowed, Merged, Outcome, Small, merge_all};
 use super::layout::{Layout, TipCut};
 use super::report::{MergedEdge, MergedSmall, MergedTip};
 use super::strips::{Division, divisions};
-use super::tips::{NarrowTip, candidates, narrow};
+use super::tips::{Candidate, NarrowTip, candidates, narrow};
 use crate::mesher::facets::FacetModel;
 use crate::mesher::facets::exact::{Shape, grouped};
 use brep::{BrepError, Cut, Model, On, Piece, Tessellation};
@@ -30,7 +31,8 @@ pub fn merge(model: &Model, tessellation: &Tessellation, small: &Small) -> (Opti
             Err(failed) => divisions.retain(|division| !failed.contains(&division.face)),
         }
     }
-    with_tips(&layout, &shape, small, merge_all(&shape, &layout, small))
+    let without_tips = merge_all(&shape, &layout, small);
+    with_tips(layout, &shape, small, without_tips)
 }
 
 /// Merges what is small, with narrow faces divided into pieces.
@@ -70,47 +72,82 @@ fn merge_divided(
     };
     let without_tips = merge_all(&shape, &layout, small);
     unmerged(&without_tips.report)?;
-    let (merged, report) = with_tips(&layout, &shape, small, without_tips);
+    let (merged, report) = with_tips(layout, &shape, small, without_tips);
     unmerged(&report)?;
     Ok((merged, divided_of_file(report, &cut)))
 }
 
 /// Merges what is small and tips of faces; `without_tips` is the result without them.
 ///
-/// Tips are cut off as faces of their own where they are narrow beside the sizes of the model
-/// without them. Those that are not merged then are cut off where they are narrower, or left; those
-/// that are merged are cut off again where they are narrow beside the sizes that this gives.
+/// Ends of faces whose radius vanishes are blunt if their tips are merged then.
 fn with_tips(
-    layout: &Layout,
+    mut layout: Layout,
     shape: &Shape,
     small: &Small,
     without_tips: Outcome,
 ) -> (Option<Merged>, MergedSmall) {
-    let Layout { model, tessellation, .. } = *layout;
-    let Outcome { mut merged, mut report, size } = without_tips;
-    let mut candidates = candidates(layout);
-    if candidates.is_empty() {
-        return (merged, report);
+    let Layout { model, tessellation, .. } = layout;
+    let mut candidates = candidates(&layout);
+    let is_merged = |face: usize| without_tips.report.faces.iter().any(|merged| merged.face == face + 1);
+    candidates.retain(|candidate| !is_merged(candidate.face()));
+    let ungrouped = shape.ungrouped(model);
+    let grouping = without_tips.merged.as_ref().map_or(&ungrouped, |merged| &merged.2);
+    let mut ends = blunt(&layout, &candidates, small, |ends| {
+        (small.size)(&grouped(model, tessellation, shape, grouping, ends).0)
+    });
+    while !ends.is_empty() {
+        layout.blunt = ends.iter().map(|(_, end)| *end).collect();
+        let (outcome, tips) =
+            merge_tips(&layout, shape, small, candidates.clone(), merge_all(shape, &layout, small));
+        let count = ends.len();
+        ends.retain(|(candidate, _)| tips.iter().any(|tip| tip.candidate == *candidate));
+        if ends.len() == count {
+            return (outcome.merged, outcome.report);
+        }
     }
-    let mut size =
-        size.unwrap_or_else(|| (small.size)(&grouped(model, tessellation, shape, &shape.ungrouped(model)).0));
-    let (mut done, mut merges) = (Vec::new(), 0);
+    layout.blunt.clear();
+    let (outcome, _) = merge_tips(&layout, shape, small, candidates, without_tips);
+    (outcome.merged, outcome.report)
+}
+
+/// Merges what is small and tips of faces at candidates, which are returned; `outcome` is the one
+/// without them.
+///
+/// Tips are cut off as faces of their own where they are narrow beside the sizes of the model
+/// without them. Those that are not merged then are cut off where they are narrower, or left; those
+/// that are merged are cut off again where they are narrow beside the sizes that this gives.
+fn merge_tips(
+    layout: &Layout,
+    shape: &Shape,
+    small: &Small,
+    mut candidates: Vec<Candidate>,
+    mut outcome: Outcome,
+) -> (Outcome, Vec<NarrowTip>) {
+    let Layout { model, tessellation, .. } = *layout;
+    let mut done = Vec::new();
+    if candidates.is_empty() {
+        return (outcome, done);
+    }
+    let of_file =
+        || (small.size)(&grouped(model, tessellation, shape, &shape.ungrouped(model), &layout.blunt).0);
+    let mut size = outcome.size.take().unwrap_or_else(of_file);
+    let mut merges = 0;
     for _ in 0..ROUNDS {
         let tips = narrow(layout, &candidates, &*size, small.tip_factors, &done);
         if tips == done || merges == MERGES {
             break;
         }
         let Some(cut) = cut_off(model, &tips) else { break };
-        match merge_tips(layout, small, cut, &tips) {
-            Ok(outcome) => {
-                Outcome { merged, report, .. } = outcome;
-                let Some(of_merged) = outcome.size else { break };
-                (size, done, merges) = (of_merged, tips, merges + 1);
+        match merge_cut(layout, small, cut, &tips) {
+            Ok(merged) => {
+                (outcome, done, merges) = (merged, tips, merges + 1);
+                let Some(of_merged) = outcome.size.take() else { break };
+                size = of_merged;
             }
             Err(failed) => failed.into_iter().for_each(|candidate| candidates[candidate].attempt += 1),
         }
     }
-    (merged, report)
+    (outcome, done)
 }
 
 /// The model with tips cut off; `None` if there are none.
@@ -123,12 +160,7 @@ fn cut_off(model: &Model, tips: &[NarrowTip]) -> Option<Cut> {
 ///
 /// # Errors
 /// The candidates of tips that are not merged.
-fn merge_tips(
-    uncut: &Layout,
-    small: &Small,
-    mut cut: Cut,
-    tips: &[NarrowTip],
-) -> Result<Outcome, Vec<usize>> {
+fn merge_cut(uncut: &Layout, small: &Small, mut cut: Cut, tips: &[NarrowTip]) -> Result<Outcome, Vec<usize>> {
     let Layout { model, tessellation, .. } = *uncut;
     let failed = |has_failed: &dyn Fn(usize, &NarrowTip) -> bool| -> Vec<usize> {
         let failed = tips.iter().enumerate().filter(|(k, tip)| has_failed(*k, tip));
@@ -147,7 +179,7 @@ fn merge_tips(
     let cuts: Vec<TipCut> = tips.iter().enumerate().map(cut_off).collect();
     let shape = Shape::new(&cut.model, &tessellation);
     let mut layout = Layout::new(&cut.model, &tessellation, &shape);
-    (layout.cuts, layout.along) = (cuts, uncut.along.clone());
+    (layout.cuts, layout.along, layout.blunt) = (cuts, uncut.along.clone(), uncut.blunt.clone());
     let Outcome { merged, report, size } = merge_all(&shape, &layout, small);
     let is_merged = |k: usize| {
         report.faces.iter().any(|merged| merged.face == cut.patches[k] + 1)

@@ -14,7 +14,8 @@
 //!   thin sheet would.
 //!
 //! Before that, a narrow face along several others is divided where these change (`strips`), and a
-//! narrow **tip** of a face is cut off as a face of its own (`tips`).
+//! narrow **tip** of a face is cut off as a face of its own (`tips`). Ends of fillets that run out
+//! to a point are **blunt** for that: they have no sizes by curvature (`blunt`).
 //!
 //! Curves inside a composite patch are dropped. Then corners with two curves left are dropped if
 //! one of the curves is short, or if they do not bend there.
@@ -22,6 +23,7 @@
 //! *Not* merged are short edges between corners at which three or more curves remain: the corner
 //! that would be left is off the faces that it had not touched.
 
+mod blunt;
 mod chains;
 mod faces;
 mod group;

@@ -229,3 +229,26 @@ fn tips_wider_than_small_faces_within_an_element_are_kept() {
     let (_, report) = merged("pin", 0.1);
     assert!(report.tips.is_empty(), "{report:?}");
 }
+
+#[test]
+fn a_fillet_that_runs_out_to_a_point_has_a_blunt_end() {
+    // Its radius grows from 0 to 0.4 over 10, slowly at first. Sizes by curvature vanish with it.
+    let size = |model: &FacetModel| if model.blunt.is_empty() { 1e-6 } else { 1.0 };
+    let (facets, report) = merged_with(read("vanishing_fillet"), &size);
+    let facets = facets.unwrap();
+    let [end] = &facets.blunt[..] else { panic!("{:?}", facets.blunt) };
+    // There it is 0.05 wide, a twentieth of the elements (by OpenCASCADE).
+    assert!(end.corner.coords.norm() < 1e-6 && (end.length - 1.375).abs() < 0.005, "{end:?}");
+    let [tip] = &report.tips[..] else { panic!("{report:?}") };
+    assert!((tip.width - 0.1).abs() < 1e-3, "{tip:?}");
+    // Where radii do not vanish, sizes by curvature are those that are wanted.
+    assert!(merged("runout", 0.1).0.unwrap().blunt.is_empty());
+}
+
+#[test]
+fn a_tip_may_be_most_of_its_face() {
+    // The chamfer is 0.279 wide at its end, and 0.186 in its middle.
+    let (_, report) = merged("tapered_chamfer", 2.3);
+    let [tip] = &report.tips[..] else { panic!("{report:?}") };
+    assert!((tip.width - 0.23).abs() < 1e-3, "{tip:?}");
+}

@@ -77,15 +77,18 @@ pub(super) fn candidates(layout: &Layout) -> Vec<Candidate> {
         let beyond = |fin: &Fin| layout.beyond(patch, fin);
         for (of_loop, fins) in face.loops.iter().enumerate() {
             for (fin, arriving) in fins.iter().enumerate() {
-                let sides = [fin, (fin + 1) % fins.len()];
-                let leaving = &fins[sides[1]];
-                let (Some((a, one)), Some((b, other))) = (beyond(arriving), beyond(leaving)) else {
+                // Between both edges there may be a pole of the surface.
+                let after = (fin + 1..fin + fins.len()).map(|k| k % fins.len());
+                let Some(next) = after.into_iter().find(|&k| matches!(fins[k].on, On::Curve(_))) else {
+                    continue;
+                };
+                let (Some((a, one)), Some((b, other))) = (beyond(arriving), beyond(&fins[next])) else {
                     continue;
                 };
                 let corner = model.curves[a].ends[usize::from(arriving.is_forward)];
                 let is_sharp = angles.get(&(corner as u32, patch as u32)).is_some_and(|angle| *angle < SHARP);
                 if a != b && one != other && is_sharp {
-                    let tip = Piece { patch, of_loop, sides, at: [None; 2] };
+                    let tip = Piece { patch, of_loop, sides: [fin, next], at: [None; 2] };
                     let is_smooth = [a, b].iter().any(|&edge| is_smooth(layout, &[edge]));
                     found.push(Candidate { tip, corner, is_smooth, attempt: 0 });
                 }
@@ -113,9 +116,7 @@ pub(super) fn narrow(
     for (k, candidate) in candidates.iter().enumerate() {
         let before = done.iter().find(|tip| tip.candidate == k);
         let tip = candidate.narrow(layout, size, factors, k).filter(|narrow| {
-            // A face that is nowhere wider is small as a whole.
             least < narrow.width
-                && narrow.width < layout.widths[narrow.tip.patch]
                 && before.is_none_or(|before| narrow.width > WIDER * before.width)
                 && !taken.iter().any(|(other, taken)| *other != k && overlap(taken, &parts(narrow)))
         });
@@ -136,6 +137,24 @@ fn overlap(one: &[Part], other: &[Part]) -> bool {
 }
 
 impl Candidate {
+    /// The face with the tip.
+    pub(super) fn face(&self) -> usize {
+        self.tip.patch
+    }
+
+    /// The parameters of the face at a place on a side of the loop with the tip; `None` for planes.
+    pub(super) fn parameters(&self, model: &Model, side: usize, at: f64) -> Option<[f64; 2]> {
+        let fin = &model.patches[self.tip.patch].loops[self.tip.of_loop][side];
+        let On::Curve(edge) = fin.on else { return None };
+        let place = fin.curve.as_ref()?.point(fin.parameter(at, model.curves[edge].range));
+        Some(place.into())
+    }
+
+    /// Both sides of the tip.
+    pub(super) fn sides<'a>(&self, layout: &Layout<'a>) -> [Side<'a>; 2] {
+        [false, true].map(|leaves| Side::new(layout, &self.tip, leaves))
+    }
+
     /// The tip, if it is at most as wide as elements divided by its factor for a while.
     fn narrow(
         &self,
@@ -146,7 +165,7 @@ impl Candidate {
     ) -> Option<NarrowTip> {
         let Self { tip, corner, is_smooth, attempt } = *self;
         let factor = factors[usize::from(is_smooth)] / NARROWER.get(attempt)?;
-        let [one, other] = [false, true].map(|leaves| Side::new(layout, &tip, leaves));
+        let [one, other] = self.sides(layout);
         let (places, width) = cut(&one, &other, size, factor)?;
         let tip = Piece { sides: places.map(|place| place.0), at: places.map(|place| place.1), ..tip };
         Some(NarrowTip { tip, corner, width, candidate })
@@ -155,11 +174,12 @@ impl Candidate {
 
 /// The parts of its edges that belong to a tip.
 fn parts(model: &Model, tip: &Piece) -> Vec<Part> {
-    let part = |fin: &Fin| {
-        let On::Curve(curve) = fin.on else { unreachable!("a tip has edges on all sides") };
-        (curve, model.curves[curve].range)
+    let part = |fin: &Fin| match fin.on {
+        On::Curve(curve) => Some((curve, model.curves[curve].range)),
+        // A pole.
+        On::Corner(_) => None,
     };
-    let mut parts: Vec<_> = tip.all_sides(model).map(part).collect();
+    let mut parts: Vec<_> = tip.all_sides(model).filter_map(part).collect();
     // Along the loop, the first edge begins at its cut, and the last one ends there.
     let last = parts.len() - 1;
     for (k, part) in [(0, 0), (1, last)] {
@@ -173,8 +193,8 @@ fn parts(model: &Model, tip: &Piece) -> Vec<Part> {
 
 /// A place on one side of a tip.
 #[derive(Clone, Copy)]
-struct Place {
-    point: Point,
+pub(super) struct Place {
+    pub point: Point,
     /// The index of the edge.
     edge: usize,
     /// The parameter on it.
@@ -182,7 +202,7 @@ struct Place {
 }
 
 /// An edge at a tip and those that continue it, seen from the tip.
-struct Side<'a> {
+pub(super) struct Side<'a> {
     /// The edges, each with its number in the loop of the face.
     edges: Vec<(usize, &'a EdgeCurve)>,
     /// Points on them, from the tip on; where an edge ends and another one begins there are two.
@@ -190,9 +210,9 @@ struct Side<'a> {
 }
 
 /// A place where the width of a tip is measured.
-struct Across {
+pub(super) struct Across {
     /// The places on both sides.
-    places: [Place; 2],
+    pub places: [Place; 2],
     width: f64,
     /// Whether the other side ends there.
     is_end: bool,
@@ -229,6 +249,22 @@ impl<'a> Side<'a> {
         let [.., before, last] = self.line[..] else { return true };
         let [along, next] = [last.point - before.point, line[1].point - line[0].point];
         along.dot(&next) > STRAIGHT * along.norm() * next.norm()
+    }
+
+    /// The point of the tip.
+    pub fn tip(&self) -> Point {
+        self.line[0].point
+    }
+
+    /// About the first place so far from the tip: the number of its edge in the loop, and the
+    /// parameter there.
+    pub fn at_distance(&self, distance: f64) -> Option<(usize, f64)> {
+        let from_tip = |place: &Place| (place.point - self.tip()).norm();
+        let mut segments = self.line.windows(2).filter(|w| w[0].edge == w[1].edge);
+        let w = segments.find(|w| from_tip(&w[1]) >= distance)?;
+        let [near, far] = [from_tip(&w[0]), from_tip(&w[1])];
+        let share = ((distance - near) / (far - near)).clamp(0.0, 1.0);
+        Some((self.edges[w[0].edge].0, w[0].at + share * (w[1].at - w[0].at)))
     }
 
     /// The nearest place to a point.
@@ -278,7 +314,19 @@ type CutPlace = (usize, Option<f64>);
 /// Where to cut between two sides that meet in a tip, and the width there, at most that of elements
 /// divided by `factor`; `None` if the tip is not narrow for long enough.
 fn cut(one: &Side, other: &Side, size: &dyn SizeField, factor: f64) -> Option<([CutPlace; 2], f64)> {
-    let tip = one.line[0].point;
+    let Across { places: [place, opposite], width, .. } = last_narrow(one, other, size, factor)?;
+    if (place.point - one.tip()).norm() < LONG * size.size_at(&place.point) {
+        return None;
+    }
+    // At the ends of edges of which almost nothing would be left.
+    let cut = [one.cut(&place, width), other.cut(&opposite, width)];
+    let is_whole = |side: &Side, cut: CutPlace| cut == (side.edges[side.edges.len() - 1].0, None);
+    (!is_whole(one, cut[0]) || !is_whole(other, cut[1])).then_some((cut, width))
+}
+
+/// The last place from the tip on until which the width between both sides is at most that of
+/// elements divided by `factor`; `None` if it is nowhere.
+pub(super) fn last_narrow(one: &Side, other: &Side, size: &dyn SizeField, factor: f64) -> Option<Across> {
     let is_narrow = |place: Place| {
         let across = one.across(other, place);
         (!across.is_end && factor * across.width <= size.size_at(&place.point)).then_some(across)
@@ -303,27 +351,10 @@ fn cut(one: &Side, other: &Side, size: &dyn SizeField, factor: f64) -> Option<([
                             None => bad = middle,
                         }
                     }
-                    return finished(one, other, tip, last?, size);
+                    return last;
                 }
             }
         }
     }
-    finished(one, other, tip, last?, size)
-}
-
-/// The cut, at the ends of edges of which almost nothing would be left.
-fn finished(
-    one: &Side,
-    other: &Side,
-    tip: Point,
-    across: Across,
-    size: &dyn SizeField,
-) -> Option<([CutPlace; 2], f64)> {
-    let Across { places: [place, opposite], width, .. } = across;
-    if (place.point - tip).norm() < LONG * size.size_at(&place.point) {
-        return None;
-    }
-    let cut = [one.cut(&place, width), other.cut(&opposite, width)];
-    let is_whole = |side: &Side, cut: CutPlace| cut == (side.edges[side.edges.len() - 1].0, None);
-    (!is_whole(one, cut[0]) || !is_whole(other, cut[1])).then_some((cut, width))
+    last
 }
