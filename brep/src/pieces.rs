@@ -21,7 +21,7 @@ pub struct Piece {
     /// The loop of the patch.
     pub of_loop: usize,
     /// The first and the last side of the piece in the direction of the loop, which are different.
-    /// Those of a tip follow each other.
+    /// Those of a tip follow each other, or have a pole between them.
     pub sides: [usize; 2],
     /// The parameters on the curves of both sides between which to cut; `None` for the start of the
     /// first one and the end of the last one.

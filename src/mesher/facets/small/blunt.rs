@@ -7,7 +7,7 @@
 use super::group::Small;
 use super::layout::Layout;
 use super::tips::{Candidate, last_narrow};
-use crate::ground::size::SizeField;
+use crate::ground::size::{SizeField, UniformSize};
 use crate::mesher::facets::BluntEnd;
 
 /// Shares of the length of an end at which its curvatures are compared.
@@ -25,8 +25,11 @@ pub(super) fn blunt(
     small: &Small,
     without: impl FnOnce(&[BluntEnd]) -> Box<dyn SizeField>,
 ) -> Vec<(usize, BluntEnd)> {
-    let largest = Constant(small.largest);
+    let largest = UniformSize(small.largest);
     let vanishing = |candidate: &Candidate| {
+        if layout.model.patches[candidate.face()].surface.is_plane() {
+            return None;
+        }
         let end = end(layout, candidate, &largest, small.factor)?;
         radius_vanishes(layout, candidate, end.length).then_some(end)
     };
@@ -52,9 +55,6 @@ fn end(layout: &Layout, candidate: &Candidate, size: &dyn SizeField, factor: f64
 /// Whether the radius of a face becomes smaller and smaller towards a tip.
 fn radius_vanishes(layout: &Layout, candidate: &Candidate, length: f64) -> bool {
     let patch = &layout.model.patches[candidate.face()];
-    if patch.surface.is_plane() {
-        return false;
-    }
     let [side, _] = candidate.sides(layout);
     let curvature = |share: f64| {
         let (fin, at) = side.at_distance(share * length)?;
@@ -63,13 +63,4 @@ fn radius_vanishes(layout: &Layout, candidate: &Candidate, length: f64) -> bool 
     };
     let [Some(far), Some(near)] = SHARES.map(curvature) else { return false };
     near >= GROWTH * far
-}
-
-/// One size everywhere.
-struct Constant(f64);
-
-impl SizeField for Constant {
-    fn size_at(&self, _: &crate::Point) -> f64 {
-        self.0
-    }
 }

@@ -1,17 +1,7 @@
 use super::{MergedSmall, Small, merge};
-use crate::Point;
-use crate::ground::size::SizeField;
+use crate::ground::size::{SizeField, UniformSize};
 use crate::mesher::facets::FacetModel;
 use brep::{Model, Settings, Tessellation, Unit};
-
-/// One size everywhere.
-struct Constant(f64);
-
-impl SizeField for Constant {
-    fn size_at(&self, _: &Point) -> f64 {
-        self.0
-    }
-}
 
 fn read(name: &str) -> Model {
     let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("geometries/step");
@@ -27,7 +17,7 @@ fn merged_of(model: Model, size: f64) -> (Option<FacetModel>, MergedSmall) {
 /// Merges what is small beside elements of a size that depends on the model.
 fn merged_with(mut model: Model, size: &dyn Fn(&FacetModel) -> f64) -> (Option<FacetModel>, MergedSmall) {
     let tessellation = Tessellation::of(&mut model, &Settings::default()).unwrap();
-    let size = |model: &FacetModel| -> Box<dyn SizeField> { Box::new(Constant(size(model))) };
+    let size = |model: &FacetModel| -> Box<dyn SizeField> { Box::new(UniformSize(size(model))) };
     let small = Small {
         factor: 20.0,
         still_factor: 5.0,

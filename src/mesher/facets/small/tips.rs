@@ -78,8 +78,8 @@ pub(super) fn candidates(layout: &Layout) -> Vec<Candidate> {
         for (of_loop, fins) in face.loops.iter().enumerate() {
             for (fin, arriving) in fins.iter().enumerate() {
                 // Between both edges there may be a pole of the surface.
-                let after = (fin + 1..fin + fins.len()).map(|k| k % fins.len());
-                let Some(next) = after.into_iter().find(|&k| matches!(fins[k].on, On::Curve(_))) else {
+                let mut after = (fin + 1..fin + fins.len()).map(|k| k % fins.len());
+                let Some(next) = after.find(|&k| matches!(fins[k].on, On::Curve(_))) else {
                     continue;
                 };
                 let (Some((a, one)), Some((b, other))) = (beyond(arriving), beyond(&fins[next])) else {
