@@ -164,8 +164,15 @@ fn nested_surface(node: Node, radians: f64, depth: usize) -> Result<Surface, Bre
 
 /// A cylinder, a cone, a sphere or a torus.
 fn round(node: Node, radians: f64) -> Result<Option<Surface>, BrepError> {
-    let with = |fields: Fields, profile| -> Result<Option<Surface>, BrepError> {
-        let (origin, axes) = frame(fields.refers(1)?)?;
+    let with = |fields: Fields, mut profile| -> Result<Option<Surface>, BrepError> {
+        let (origin, mut axes) = frame(fields.refers(1)?)?;
+        if let Profile::Circle { major, .. } = &mut profile
+            && *major < 0.0
+        {
+            // Some programs write the inner side of a torus that crosses itself so: the same circle
+            // seen from the other side.
+            (*major, axes) = (-*major, axes.map(|axis| -axis));
+        }
         Ok(Some(Surface::Round { origin, axes, profile }))
     };
     if let Some(fields) = node.get("CYLINDRICAL_SURFACE") {
@@ -179,7 +186,7 @@ fn round(node: Node, radians: f64) -> Result<Option<Surface>, BrepError> {
         return with(fields, Profile::Circle { major: 0.0, minor: fields.length(2)? });
     }
     if let Some(fields) = node.any(&["TOROIDAL_SURFACE", "DEGENERATE_TOROIDAL_SURFACE"]) {
-        return with(fields, Profile::Circle { major: fields.length(2)?, minor: fields.length(3)? });
+        return with(fields, Profile::Circle { major: fields.number(2)?, minor: fields.length(3)? });
     }
     Ok(None)
 }

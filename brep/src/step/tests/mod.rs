@@ -188,6 +188,21 @@ fn whole_spheres_and_tori_need_no_edges() {
 }
 
 #[test]
+fn a_torus_with_a_negative_radius_is_the_inner_side_of_one_that_crosses_itself() {
+    // A barrel: the arc at distance 2 from the circle of radius 1 on the other side of the axis.
+    let mut text = Text::new();
+    let radius = 3.0_f64.sqrt() - 1.0;
+    let (low, high) = (text.circle(radius, -1.0, 0.0), text.circle(radius, 1.0, 0.0));
+    let frame = text.frame(0.0, 1.0);
+    let surface = text.add(&format!("TOROIDAL_SURFACE('',#{frame},-1.,2.)"));
+    let bounds = [text.bound(low, true), text.bound(high, false)];
+    let faces = [text.face(surface, &bounds), text.disk(low, -1.0, false), text.disk(high, 1.0, true)];
+    let (_, volumes) = volumes(&text.solid(&faces), Unit::OfFile);
+    let exact = PI * (28.0 / 3.0 - 2.0 * (3.0_f64.sqrt() + 2.0 * PI / 3.0));
+    assert_near(volumes[0], exact);
+}
+
+#[test]
 fn an_elbow_needs_no_seam() {
     // A quarter of a torus: its loops go around the tube, in the other direction than those above.
     let mut text = Text::new();
