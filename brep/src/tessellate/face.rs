@@ -23,9 +23,10 @@ pub(super) struct Tolerances {
 
 /// Why a patch has no triangles.
 pub(super) enum Failure {
-    /// Its loops cross, or its triangles are folded, perhaps because its curves are divided too
-    /// coarsely.
-    Coarse(BrepError),
+    /// Its loops cross, perhaps because its curves are divided too coarsely.
+    Crossing(BrepError),
+    /// Its triangles are folded, perhaps because its curves are divided too coarsely.
+    Folded(BrepError),
     Final(BrepError),
 }
 
@@ -266,7 +267,7 @@ impl Face<'_> {
     /// The failure of triangles that finer sides may unfold.
     fn folded(&self, what: &str) -> Failure {
         let error = BrepError::face(self.number, what, None);
-        if self.tolerances.refuses_folds { Failure::Coarse(error) } else { Failure::Final(error) }
+        if self.tolerances.refuses_folds { Failure::Folded(error) } else { Failure::Final(error) }
     }
 
     /// The corners at both ends of the side of a triangle that is opposite corner `k`.

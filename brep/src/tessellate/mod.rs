@@ -23,6 +23,7 @@ pub(crate) use orient::Shell;
 use crate::model::Patch;
 use crate::pieces::Cut;
 use crate::{BrepError, EdgeCurve, Fin, Model, On, Point};
+use face::Failure;
 use rayon::prelude::*;
 use reuse::Known;
 use std::collections::BTreeSet;
@@ -70,9 +71,9 @@ pub struct Tessellation {
     settings: Vec<Settings>,
 }
 
-/// How often curves are divided, more finely each time because loops of a patch cross or triangles
-/// are folded.
-const MOST_RETRIES: usize = 6;
+/// How often curves are divided: more finely each time, because loops of a patch cross or triangles
+/// are folded, or alike where loops of a patch cross a second time.
+const MOST_RETRIES: usize = 7;
 
 /// How often of these, at most, because of folded triangles: at kinks no division unfolds them.
 const UNFOLDING_RETRIES: usize = 3;
@@ -82,17 +83,12 @@ const MOST_POINTS: usize = 30_000;
 /// ... unless the first division has so many times fewer.
 const MOST_GROWTH: usize = 4;
 
-/// Why patches have no triangles.
-enum Stop {
-    Final(BrepError),
-    /// Loops of these patches cross, or triangles are folded, however finely curves are divided.
-    Conflicts(BrepError, Vec<usize>),
-}
-
-impl From<BrepError> for Stop {
-    fn from(error: BrepError) -> Self {
-        Self::Final(error)
-    }
+/// A patch for which curves are divided too coarsely.
+struct Conflict {
+    patch: usize,
+    /// Whether its loops cross; else its triangles are folded.
+    crosses: bool,
+    error: BrepError,
 }
 
 impl Settings {
@@ -122,6 +118,11 @@ impl Tessellation {
         let divided = vec![None; model.curves.len()];
         let settings = vec![*settings; model.patches.len()];
         Self::with(model, settings, divided, None)
+    }
+
+    /// The patch that is furthest from its curves, and how far (length).
+    pub fn widest_gap(&self) -> Option<(usize, f64)> {
+        self.gaps.iter().copied().enumerate().max_by(|a, b| a.1.total_cmp(&b.1))
     }
 
     /// How fine each patch is.
@@ -175,78 +176,86 @@ impl Tessellation {
     fn with(
         model: &mut Model,
         settings: Vec<Settings>,
-        divided: Vec<Option<Vec<f64>>>,
+        mut divided: Vec<Option<Vec<f64>>>,
         before: Option<&Self>,
     ) -> Result<(Self, Vec<Vec<Shell>>), BrepError> {
         assert_eq!(settings.len(), model.patches.len(), "each patch has settings");
-        match Self::attempt(model, &settings, divided.clone(), before, &[]) {
-            Ok(made) => Ok(made),
-            Err(Stop::Final(error)) => Err(error),
-            Err(Stop::Conflicts(error, patches)) => {
-                Self::attempt(model, &settings, divided, before, &patches).map_err(|_| error)
-            }
-        }
-    }
-
-    /// The same, with curves that touch at corners of the patches `alike` divided alike there.
-    fn attempt(
-        model: &mut Model,
-        settings: &[Settings],
-        mut divided: Vec<Option<Vec<f64>>>,
-        before: Option<&Self>,
-        alike: &[usize],
-    ) -> Result<(Self, Vec<Vec<Shell>>), Stop> {
         let diagonal = diagonal(&model.corners, &model.curves, Vec::new());
-        let mut curve_settings = of_curves(model, settings);
+        let mut curve_settings = of_curves(model, &settings);
         let (mut failed, mut most_points) = (None, 0);
         let mut last: Option<Self> = None;
+        let (mut crossed, mut alike) = (Vec::new(), BTreeSet::new());
         for retry in 0..MOST_RETRIES {
-            let refuses_folds = retry < UNFOLDING_RETRIES;
-            let mut out = Self::divided(model, &divided, &curve_settings, diagonal, alike)?;
-            out.settings = settings.to_vec();
+            let mut out = Self::divided(model, &divided, &curve_settings, diagonal, &alike)?;
+            out.settings.clone_from(&settings);
             if retry == 0 {
                 most_points = MOST_POINTS.max(MOST_GROWTH * out.points.len());
             } else if out.points.len() > most_points {
                 break;
             }
-            let mut conflicts = Vec::new();
             let known = last.as_ref().or(before).map(Known::new);
-            let of_patch = |patch| match known.as_ref().and_then(|known| known.made(model, patch, &out)) {
-                Some(made) => Ok(made),
-                None => {
-                    let Settings { chord, angle } = settings[patch];
-                    let chord = chord * diagonal;
-                    let tolerances = face::Tolerances { chord, angle, diagonal, refuses_folds };
-                    face::triangulate(model, patch, &out, &tolerances)
-                }
-            };
-            let made: Vec<_> = (0..model.patches.len()).into_par_iter().map(of_patch).collect();
-            let mut error = None;
-            for (patch, made) in made.into_iter().enumerate() {
-                match made {
-                    Ok(made) => made.append_to(&mut out),
-                    Err(face::Failure::Coarse(of_patch)) => {
-                        out.gaps.push(0.0);
-                        conflicts.push(patch);
-                        error = Some(of_patch);
-                    }
-                    Err(face::Failure::Final(error)) => return Err(error.into()),
-                }
-            }
-            let Some(error) = error else {
+            let conflicts = out.triangulate(model, diagonal, known.as_ref(), retry < UNFOLDING_RETRIES)?;
+            if conflicts.is_empty() {
                 let shells = orient::orient(model, &out)?;
                 measure::check(model, &out)?;
                 return Ok((out, shells));
-            };
-            let of_conflicts = conflicts.iter().flat_map(|&patch| curves_of(&model.patches[patch]));
-            for curve in BTreeSet::from_iter(of_conflicts.map(|(curve, _)| curve)) {
+            }
+            let (mut crosses, mut finer) = (Vec::new(), BTreeSet::new());
+            for Conflict { patch, crosses: is_crossing, error } in conflicts {
+                if is_crossing && crossed.contains(&patch) && alike.insert(patch) {
+                    // Finer curves have not helped.
+                } else {
+                    finer.extend(curves_of(&model.patches[patch]).map(|(curve, _)| curve));
+                }
+                if is_crossing {
+                    crosses.push(patch);
+                }
+                failed = Some(error);
+            }
+            for curve in finer {
                 curve_settings[curve] = curve_settings[curve].finer();
                 divided[curve] = None;
             }
-            failed = Some(Stop::Conflicts(error, conflicts));
+            crossed = crosses;
             last = Some(out);
         }
         Err(failed.expect("there was a conflict before each retry"))
+    }
+
+    /// Triangulates all patches, of which the curves are divided; those that were made before for
+    /// the same division are `known`. Returns those that need another one.
+    fn triangulate(
+        &mut self,
+        model: &Model,
+        diagonal: f64,
+        known: Option<&Known>,
+        refuses_folds: bool,
+    ) -> Result<Vec<Conflict>, BrepError> {
+        let of_patch = |patch| match known.and_then(|known| known.made(model, patch, self)) {
+            Some(made) => Ok(made),
+            None => {
+                let Settings { chord, angle } = self.settings[patch];
+                let chord = chord * diagonal;
+                let tolerances = face::Tolerances { chord, angle, diagonal, refuses_folds };
+                face::triangulate(model, patch, self, &tolerances)
+            }
+        };
+        let made: Vec<_> = (0..model.patches.len()).into_par_iter().map(of_patch).collect();
+        let mut conflicts = Vec::new();
+        for (patch, made) in made.into_iter().enumerate() {
+            let (crosses, error) = match made {
+                Ok(made) => {
+                    made.append_to(self);
+                    continue;
+                }
+                Err(Failure::Crossing(error)) => (true, error),
+                Err(Failure::Folded(error)) => (false, error),
+                Err(Failure::Final(error)) => return Err(error),
+            };
+            self.gaps.push(0.0);
+            conflicts.push(Conflict { patch, crosses, error });
+        }
+        Ok(conflicts)
     }
 
     /// The vertices on curves, which are divided at known parameters or by their settings, and
@@ -256,7 +265,7 @@ impl Tessellation {
         known: &[Option<Vec<f64>>],
         settings: &[Settings],
         diagonal: f64,
-        alike: &[usize],
+        alike: &BTreeSet<usize>,
     ) -> Result<Self, BrepError> {
         let mut out = Self { points: model.corners.iter().map(|c| c.point).collect(), ..Self::default() };
         let beside = beside(model);

@@ -22,7 +22,7 @@ impl Face<'_> {
     fn crossing(&self, vertex: u32, out: &Tessellation) -> Failure {
         let place = out.points.get(vertex as usize).copied();
         let what = "its loops cross or touch in the parameters of its surface";
-        Failure::Coarse(BrepError::face(self.number, what, place))
+        Failure::Crossing(BrepError::face(self.number, what, place))
     }
 
     /// A node of a loop, or the one that was added before for the same vertex, where loops touch
@@ -43,7 +43,7 @@ impl Face<'_> {
     /// Adds a loop as constraints.
     ///
     /// # Errors
-    /// [`Failure::Coarse`] if it crosses itself or one that was added before.
+    /// [`Failure::Crossing`] if it crosses itself or one that was added before.
     pub fn add_chain(&mut self, sides: &Sides, turn: f64, out: &Tessellation) -> Result<(), Failure> {
         let mut handles: Vec<FixedVertexHandle> = Vec::new();
         let mut nodes = Vec::new();
