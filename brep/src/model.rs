@@ -7,6 +7,10 @@ use crate::step::Unit;
 use crate::surface::Surface;
 use crate::{BrepError, Point};
 
+/// Vertices further from their curve and edges further from their surface than this (fraction of
+/// the size of the model) do not belong to it.
+pub(crate) const AWAY: f64 = 2e-3;
+
 /// A corner: a vertex of the file.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Corner {

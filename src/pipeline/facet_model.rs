@@ -52,6 +52,9 @@ pub struct FacetSolid {
     files: Vec<String>,
 }
 
+/// Edges further from their faces than this (fraction of the size of the model) are told.
+const SAID_GAP: f64 = 1e-4;
+
 impl FacetSolid {
     /// The volume of all bodies.
     pub(super) fn volume(&self) -> f64 {
@@ -164,6 +167,16 @@ impl FacetSolid {
             .bounds
             .refuse_out_of_range()
             .map_err(|range| InputError::OutOfRange { path: Some(path.to_path_buf()), range })?;
+        if let Some((face, gap)) = cad.tessellation.widest_gap()
+            && gap > SAID_GAP * model.bounds.diagonal()
+        {
+            note(&format!(
+                "{}: edges are up to {gap:.1e} away from their faces, those of face {} most: the file is no more \
+                 accurate there, and so is the mesh",
+                path.display(),
+                face + 1
+            ));
+        }
         let patches = named(&brep.patch_names, model.patches.len(), |i| format!("face{i}"));
         let names = Names { bodies: labels(body_names(brep, path)), patches: labels(patches) };
         Ok(Self {

@@ -1,7 +1,7 @@
 //! Edges followed across a surface.
 
 use super::{Chart, Parameters, Side};
-use crate::model::{EdgeCurve, On};
+use crate::model::{AWAY, EdgeCurve, On};
 use crate::{BrepError, Point};
 use nalgebra::{Matrix2, Vector2};
 
@@ -23,8 +23,6 @@ const SMALLEST_STEP: f64 = 1e-7;
 const OFF: f64 = 0.02;
 /// The same, as a fraction of the diagonal: shorter distances are rounding.
 const ROUNDING: f64 = 1e-9;
-/// Edges further from their surface than this (fraction of the diagonal) do not belong to it.
-const FARTHEST: f64 = 2e-3;
 
 /// Each step of an edge is divided into so many parts where crossings count.
 const BETWEEN: u32 = 16;
@@ -135,7 +133,7 @@ impl Chart<'_> {
         });
         let back = self.shifted(start, drift);
         let [from, to] = [end, back].map(|p| self.surface.point(p));
-        if (to - from).norm() > FARTHEST * self.diagonal {
+        if (to - from).norm() > AWAY * self.diagonal {
             return Err(BrepError::face(face, "its edges do not form closed loops", Some(from)));
         }
         Ok(Loop { sides, drift, gap })
@@ -196,7 +194,7 @@ impl Chart<'_> {
             let is_near = || off <= gap + little || off <= 2.0 * self.distance(&place);
             let is_good = bend <= off.max(gap) + little && is_near();
             if is_good || step < SMALLEST_STEP {
-                if off > FARTHEST * self.diagonal {
+                if off > AWAY * self.diagonal {
                     return Err(Lost { place, off: Some(off) });
                 }
                 if nodes.len() > MOST_NODES {
@@ -210,7 +208,7 @@ impl Chart<'_> {
                 step *= 0.5;
             }
         }
-        if gap > FARTHEST * self.diagonal {
+        if gap > AWAY * self.diagonal {
             return Err(Lost { place: point(edge, from), off: Some(gap) });
         }
         if let Some(last) = nodes.last_mut() {

@@ -12,7 +12,7 @@ mod tests;
 pub(crate) use enclose::left_out;
 
 use crate::chart::{Chart, Loop, Side, close};
-use crate::model::{Corner, Fin, Model, On, Patch};
+use crate::model::{AWAY, Corner, Fin, Model, On, Patch};
 use crate::nearest::nearest_on_surface;
 use crate::tessellate::diagonal;
 use crate::{BrepError, EdgeCurve, Point, Surface, Vector};
@@ -56,6 +56,9 @@ pub(crate) struct Shapes {
     pub body_of_curve: Vec<usize>,
     /// How accurate the data of each body is (length).
     pub accuracy: Vec<f64>,
+    /// Vertices so far from their curve that it must be little beside the whole model: how far, and
+    /// the error else.
+    pub away: Vec<(f64, BrepError)>,
 }
 
 impl Shapes {
@@ -70,6 +73,7 @@ impl Shapes {
             body_of_corner,
             body_of_curve,
             accuracy: vec![f64::INFINITY; model.bodies],
+            away: Vec::new(),
         };
         for (number, patch) in model.patches.iter().enumerate() {
             let edge = |fin: &Fin| match fin.on {
@@ -170,6 +174,9 @@ impl Shapes {
     /// [`BrepError::Face`] for faces whose edges do not bound them.
     pub fn build(mut self, model: &mut Model) -> Result<(), BrepError> {
         let size = self.size();
+        if let Some((_, error)) = self.away.drain(..).find(|(off, _)| *off > AWAY * size) {
+            return Err(error);
+        }
         glue::glue_edges(&mut self, size);
         split::divide_at_poles(&mut self, size);
         model.notes.extend(split::drop_spurs(&mut self));
@@ -224,6 +231,10 @@ fn patch(
         if loops.is_empty() {
             return Err(BrepError::face(number, "it has no edges", None));
         }
+        face.loops
+            .iter()
+            .flatten()
+            .try_for_each(|&(curve, _)| on_plane(model, number, &face.surface, curve, size))?;
         return Ok(Patch { surface: face.surface, loops, bodies });
     };
     let surface: Surface = face.surface;
@@ -241,6 +252,33 @@ fn patch(
     };
     let loops = sides.into_iter().map(fins).collect::<Result<Vec<_>, _>>()?;
     Ok(Patch { surface, loops, bodies })
+}
+
+/// Gives an edge of a plane the tolerance of its distance from it: some programs round coordinates.
+///
+/// # Errors
+/// [`BrepError::Face`] if it is too far away.
+fn on_plane(
+    model: &mut Model,
+    number: usize,
+    plane: &Surface,
+    curve: usize,
+    size: f64,
+) -> Result<(), BrepError> {
+    const STEPS: u32 = 8;
+    let edge = &mut model.curves[curve];
+    let at = |k: u32| edge.range[0] + (edge.range[1] - edge.range[0]) * f64::from(k) / f64::from(STEPS);
+    let away = |k: u32| {
+        let point = Point::from(edge.curve.point(at(k)));
+        ((nearest_on_surface(plane, &point).point - point).norm(), point)
+    };
+    let (off, place) = (0..=STEPS).map(away).max_by(|a, b| a.0.total_cmp(&b.0)).expect("there are steps");
+    if off > AWAY * size {
+        let what = format!("edge {} is {off:.3e} away from it", curve + 1);
+        return Err(BrepError::face(number, what, Some(place)));
+    }
+    edge.tolerance = edge.tolerance.max(off);
+    Ok(())
 }
 
 /// Loops of edges in the parameters of a surface.

@@ -237,7 +237,7 @@ impl<'s> Reader<'s> {
     /// The ascending range of an edge on its curve, and whether the edge runs along the curve;
     /// `None` if it has no length.
     fn range(
-        &self,
+        &mut self,
         edge: Node,
         curve: &Curve<3>,
         ends: [usize; 2],
@@ -250,9 +250,8 @@ impl<'s> Reader<'s> {
             let extent = (points[1] - points[0]).norm();
             if off > (FARTHEST * extent.max(size(curve))).max(self.shapes.accuracy[self.body]) {
                 let [x, y, z] = [p.x, p.y, p.z];
-                return Err(
-                    edge.error(format!("its vertex ({x}, {y}, {z}) is {off:.3e} away from its curve"))
-                );
+                let what = format!("its vertex ({x}, {y}, {z}) is {off:.3e} away from its curve");
+                self.shapes.away.push((off, edge.error(what)));
             }
         }
         let [first, last] = feet.map(|foot| foot.parameter);
@@ -291,7 +290,7 @@ impl<'s> Reader<'s> {
 }
 
 /// Vertices further from their curve than this (fraction of its size), and than the accuracy of the
-/// file, do not belong to it.
+/// file, belong to it only if the whole model is far larger.
 const FARTHEST: f64 = 5e-2;
 
 /// The size of a bounded curve; 0 of an unbounded one.

@@ -9,6 +9,10 @@ use crate::{BrepError, Point, Surface};
 /// Points on a side without length.
 const AT_POLE: usize = 24;
 
+/// Sides that end so far apart, as a fraction of the loop, are joined by one that the file left out
+/// because it is shorter than its accuracy.
+const SIDE: f64 = 1e-2;
+
 /// A loop as parameters and vertices.
 pub(super) type Chain = Vec<([f64; 2], u32)>;
 
@@ -46,6 +50,10 @@ pub(super) fn chain(
         sides[before].last_mut().expect("a side has two nodes or more").0 = start;
         sides[after][0].0 = end;
     }
+    let extents = [0, 1].map(|i| {
+        let along = sides.iter().flatten().map(|node| node.0[i]);
+        along.clone().fold(f64::NEG_INFINITY, f64::max) - along.fold(f64::INFINITY, f64::min)
+    });
     let mut out_sides = Sides::new();
     for k in 0..sides.len() {
         let side = &sides[k];
@@ -66,7 +74,9 @@ pub(super) fn chain(
         }
         let rate = patch.surface.jet(end[0], end[1], 1);
         let is_pole = [rate.d[1][0], rate.d[0][1]].iter().any(|d| d.norm() < 1e-7 * tolerances.diagonal);
-        if is_pole && (end[0] - next.0[0]).hypot(end[1] - next.0[1]) > 1e-6 {
+        let apart = [0, 1].map(|i| (end[i] - next.0[i]).abs());
+        let is_side = (0..2).any(|i| apart[i] > SIDE * extents[i]);
+        if is_side || (is_pole && apart[0].hypot(apart[1]) > 1e-6) {
             let at = |share: f64| ([0, 1].map(|j| end[j] + share * (next.0[j] - end[j])), vertex);
             out_sides.push((0..AT_POLE).map(|i| at(i as f64 / AT_POLE as f64)).collect());
         }

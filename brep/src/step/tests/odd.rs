@@ -1,7 +1,7 @@
 //! What files of real programs have that they should not.
 
 use super::{Text, assert_near, volumes};
-use crate::{BrepError, Model, Settings, Tessellation, Unit};
+use crate::{BrepError, Model, Settings, Tessellation, Unit, tessellate};
 use std::collections::HashMap;
 use std::f64::consts::PI;
 
@@ -244,6 +244,48 @@ fn a_vertex_away_from_its_curve_is_accepted_within_the_accuracy_of_the_file() {
             .replace("GLOBAL_UNIT", "GLOBAL_UNCERTAINTY_ASSIGNED_CONTEXT((#9999)) GLOBAL_UNIT")
             .replace("ENDSEC;\nEND-ISO", &format!("{measure}ENDSEC;\nEND-ISO"));
         assert_eq!(Model::read_step(text.as_bytes(), Unit::OfFile).is_ok(), is_read, "{accuracy}");
+    }
+}
+
+/// The text of a file of the repository.
+fn file(name: &str) -> String {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../geometries/step");
+    std::fs::read_to_string(folder.join(name).with_extension("step")).unwrap()
+}
+
+#[test]
+fn a_side_that_is_shorter_than_the_accuracy_of_the_file_may_be_missing() {
+    // The arc of radius 1e-4 where the fillet of a cube begins, which grows to 0.4.
+    let mut model = Model::read_step(file("blunt_fillet").as_bytes(), Unit::OfFile).unwrap();
+    let tessellation = Tessellation::of(&mut model, &Settings { chord: 1e-5, angle: 0.05 }).unwrap();
+    // OpenCASCADE's volume.
+    assert_near(1000.0 - tessellate::volume(&model, &tessellation, 0), 1000.0 - 999.8784702171395);
+    let coarse = Tessellation::of(&mut model, &Settings::default()).unwrap();
+    assert!(coarse.triangles.len() < 2000, "{}", coarse.triangles.len());
+}
+
+/// A record, that of a point with three decimals.
+fn rounded(record: &str) -> String {
+    let is_point = record.contains("CARTESIAN_POINT(");
+    let Some((head, list)) = record.split_once("',(").filter(|_| is_point) else {
+        return record.to_owned();
+    };
+    let number = |part: &str| part.trim().parse::<f64>().map_or(part.to_owned(), |x| format!("{x:.3}"));
+    let numbers: Vec<String> = list[..list.find(')').unwrap()].split(',').map(number).collect();
+    format!("{head}',({}))", numbers.join(","))
+}
+
+#[test]
+fn files_with_rounded_coordinates_are_read() {
+    for name in ["bent_chamfer", "bolted", "short_ridge", "tapered_chamfer", "tiny_chamfer"] {
+        let text = file(name);
+        let (_, exact) = volumes(&text, Unit::OfFile);
+        let text = text.split(';').map(rounded).collect::<Vec<_>>().join(";");
+        let (mut model, found) = volumes(&text, Unit::OfFile);
+        found.into_iter().zip(exact).for_each(|(found, exact)| assert_near(found, exact));
+        let tessellation = Tessellation::of(&mut model, &Settings::default()).unwrap();
+        let (_, gap) = tessellation.widest_gap().unwrap();
+        assert!(gap > 1e-5, "{name}: {gap}");
     }
 }
 
