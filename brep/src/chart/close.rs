@@ -39,7 +39,7 @@ pub(crate) fn close(
         chain.extend(chain.first().copied());
         chain
     };
-    let holes = Obstacles { chart, chains: plain.iter().map(closed).collect() };
+    let holes = Obstacles::new(chart, plain.iter().map(closed));
     let mut bounds: Vec<Vec<Side>> = Vec::new();
     if let Some(first) = around.first() {
         let Some(direction) = direction(first).filter(|&d| around.iter().all(|l| direction(l) == Some(d)))

@@ -7,6 +7,8 @@ use std::collections::BinaryHeap;
 /// Columns of the grid in each period, and rows between both ends.
 const COLUMNS: i32 = 24;
 const ROWS: i32 = 12;
+/// Finer grids are tried where there is no way on one.
+const FINER: [i32; 3] = [1, 2, 4];
 /// Grid lines are this far from the ends (fraction of a step), because holes often have edges at
 /// simple fractions.
 const ASIDE: f64 = 0.37;
@@ -17,20 +19,52 @@ const CLEARANCE: f64 = 0.2;
 
 /// Chains of parameters that a seam must not cross, at any multiple of the periods.
 pub(super) struct Obstacles<'a> {
-    pub chart: &'a Chart<'a>,
-    /// Closed chains repeat their first parameters at the end.
-    pub chains: Vec<Vec<Parameters>>,
+    chart: &'a Chart<'a>,
+    chains: Vec<Chain>,
 }
 
-impl Obstacles<'_> {
-    /// Whether a segment crosses a chain.
-    pub fn block(&self, segment: [Parameters; 2]) -> bool {
-        let rounds = |i: usize| if self.chart.periods[i].is_some() { -2..=2 } else { 0..=0 };
-        let crosses = |chain: &Vec<Parameters>, by: [i32; 2]| {
-            let moved = |p: Parameters| self.chart.shifted(p, by);
-            chain.windows(2).any(|w| is_crossing(segment, [moved(w[0]), moved(w[1])]))
+/// Parameters along lines, with the box around them. Closed chains repeat their first ones at the
+/// end.
+#[derive(Clone)]
+struct Chain {
+    nodes: Vec<Parameters>,
+    low: Parameters,
+    high: Parameters,
+}
+
+impl Chain {
+    fn new(nodes: Vec<Parameters>) -> Self {
+        let bound = |start: f64, pick: fn(f64, f64) -> f64| {
+            [0, 1].map(|i| nodes.iter().map(|node| node[i]).fold(start, pick))
         };
-        self.chains.iter().any(|chain| rounds(0).any(|i| rounds(1).any(|j| crosses(chain, [i, j]))))
+        Self { low: bound(f64::INFINITY, f64::min), high: bound(f64::NEG_INFINITY, f64::max), nodes }
+    }
+}
+
+impl<'a> Obstacles<'a> {
+    pub fn new(chart: &'a Chart<'a>, chains: impl Iterator<Item = Vec<Parameters>>) -> Self {
+        Self { chart, chains: chains.map(Chain::new).collect() }
+    }
+
+    /// Whether a segment crosses a chain.
+    pub fn block(&self, [a, b]: [Parameters; 2]) -> bool {
+        // The multiples of the period by which a chain may be moved onto the segment.
+        let rounds = |chain: &Chain, i: usize| {
+            let [low, high] = [a[i].min(b[i]) - chain.high[i], a[i].max(b[i]) - chain.low[i]];
+            match self.chart.periods[i] {
+                Some(period) => (low / period).ceil() as i32..=(high / period).floor() as i32,
+                None if low <= 0.0 && 0.0 <= high => 0..=0,
+                None => 1..=0,
+            }
+        };
+        let crosses = |chain: &Chain, by: [i32; 2]| {
+            let back = self.chart.shifted([0.0; 2], by);
+            let segment = [a, b].map(|p| [p[0] - back[0], p[1] - back[1]]);
+            chain.nodes.windows(2).any(|w| is_crossing(segment, [w[0], w[1]]))
+        };
+        self.chains
+            .iter()
+            .any(|chain| rounds(chain, 0).any(|i| rounds(chain, 1).any(|j| crosses(chain, [i, j]))))
     }
 
     /// Whether a segment between two vertices of chains, with a bit left out at both ends, crosses
@@ -48,7 +82,7 @@ impl Obstacles<'_> {
             let p = self.chart.unwrapped(*p, middle);
             (0..2).map(|i| (scale[i] * (p[i] - middle[i])).powi(2)).sum::<f64>().sqrt()
         };
-        self.chains.iter().flatten().map(distance).fold(f64::INFINITY, f64::min)
+        self.chains.iter().flat_map(|chain| &chain.nodes).map(distance).fold(f64::INFINITY, f64::min)
     }
 
     /// Ways from a place around the surface in u and in v that meet there alone, if there are any:
@@ -67,6 +101,7 @@ impl Obstacles<'_> {
 
     /// These chains and others.
     pub fn and<const N: usize>(&self, beside: [Vec<Parameters>; N]) -> Self {
+        let beside = beside.into_iter().map(Chain::new);
         Self { chart: self.chart, chains: self.chains.iter().cloned().chain(beside).collect() }
     }
 
@@ -74,7 +109,8 @@ impl Obstacles<'_> {
     /// a multiple of the period beside it, that crosses no chain; the last of them is the end.
     /// `None` if there is none on a grid.
     pub fn way(&self, ends: [Parameters; 2], direction: usize) -> Option<Vec<Parameters>> {
-        self.shortest(&Grid::new(ends, direction, self.chart.periods[direction]?))
+        let period = self.chart.periods[direction]?;
+        FINER.into_iter().find_map(|finer| self.shortest(&Grid::new(ends, direction, period, finer)))
     }
 
     /// The shortest way on a grid (Dijkstra 1959), without the bends that can be left out.
@@ -166,13 +202,14 @@ struct Grid {
 }
 
 impl Grid {
-    fn new([from, to]: [Parameters; 2], direction: usize, period: f64) -> Self {
+    fn new([from, to]: [Parameters; 2], direction: usize, period: f64, finer: i32) -> Self {
         let across = 1 - direction;
-        let mut steps = [period / f64::from(COLUMNS); 2];
-        steps[across] = (to[across] - from[across]) / f64::from(ROWS);
+        let (columns, rows) = (COLUMNS * finer, ROWS * finer);
+        let mut steps = [period / f64::from(columns); 2];
+        steps[across] = (to[across] - from[across]) / f64::from(rows);
         let mut nodes = vec![from];
-        for row in 0..ROWS {
-            for column in -COLUMNS..=COLUMNS {
+        for row in 0..rows {
+            for column in -columns..=columns {
                 let mut node = from;
                 node[direction] += steps[direction] * (f64::from(column) + ASIDE);
                 node[across] += steps[across] * (f64::from(row) + ASIDE);
@@ -185,9 +222,8 @@ impl Grid {
             end[direction] += period * f64::from(round);
             nodes.push(end);
         }
-        let mut sight = [f64::INFINITY; 2];
-        sight[across] = 2.5;
-        Self { nodes, first_end, steps, sight }
+        // An end may be the tip of a channel that is narrower than the steps for a while.
+        Self { nodes, first_end, steps, sight: [f64::INFINITY; 2] }
     }
 
     /// Places for a way around a surface that is periodic in both directions, back to its start.
@@ -236,6 +272,8 @@ fn is_crossing([a, b]: [Parameters; 2], [c, d]: [Parameters; 2]) -> bool {
 mod tests {
     use super::super::tests::torus;
     use super::*;
+    use crate::surface::Profile;
+    use crate::{Surface, Vector};
     use std::f64::consts::TAU;
 
     #[test]
@@ -246,7 +284,7 @@ mod tests {
         let (low, high) = (0.3, TAU - 0.3);
         let hole = [[low, low + 0.05], [low + 0.05, low], [high, high - 0.05], [high - 0.05, high]];
         let closed = hole.into_iter().chain([hole[0]]).collect();
-        let obstacles = Obstacles { chart: &chart, chains: vec![closed] };
+        let obstacles = Obstacles::new(&chart, std::iter::once(closed));
         let at = [3.0, 1.0];
         assert!(obstacles.around(at, false).is_none());
         let (place, ways) = obstacles.around(at, true).expect("a way around both ends of the hole");
@@ -256,5 +294,41 @@ mod tests {
             assert!(nodes.len() > 2 && nodes[nodes.len() - 1] == end, "{nodes:?}");
             assert!(nodes.windows(2).all(|w| !obstacles.block([w[0], w[1]])), "{nodes:?}");
         }
+    }
+
+    /// Asserts that there is a way between two places on a cylinder that crosses no chain, and not
+    /// the straight one.
+    fn assert_bent_way(chains: Vec<Vec<Parameters>>, ends: [Parameters; 2]) {
+        let axes = [Vector::x(), Vector::y(), Vector::z()];
+        let profile = Profile::Line { radius: 6.0, slope: [0.0, 1.0] };
+        let cylinder = Surface::Round { origin: Vector::zeros(), axes, profile };
+        let chart = Chart::new(&cylinder, 20.0);
+        let obstacles = Obstacles::new(&chart, chains.into_iter());
+        assert!(obstacles.separate(ends));
+        let way = obstacles.way(ends, 0).expect("a way with bends");
+        let nodes: Vec<Parameters> = std::iter::once(ends[0]).chain(way).collect();
+        assert!(nodes.windows(2).all(|w| !obstacles.separate([w[0], w[1]])), "{nodes:?}");
+    }
+
+    #[test]
+    fn seams_reach_tips_of_channels_that_are_narrower_than_the_grid() {
+        // The chamfer of a hexagonal nut, and a place below the middle of one of its sides.
+        let arc = |k: i32| {
+            let u = f64::from(k) * TAU / 360.0;
+            [u, 6.5 / ((u + TAU / 12.0).rem_euclid(TAU / 6.0) - TAU / 12.0).cos() - 6.3]
+        };
+        let (start, tip) = ([TAU / 2.0, 0.0], arc(150));
+        let circle = (0..=360).map(|k| [f64::from(k) * TAU / 360.0, 0.0]).collect();
+        assert_bent_way(vec![(0..=360).map(arc).collect(), circle], [start, tip]);
+    }
+
+    #[test]
+    fn seams_go_between_slots_that_are_closer_than_rows_of_the_grid() {
+        let slot = |k: i32| {
+            let (left, low) = (f64::from(k % 2) * TAU / 2.0 - 0.1, 1.5 * f64::from(k));
+            let (right, high) = (left + TAU / 2.0 + 0.2, low + 0.6);
+            vec![[left, low], [right, low], [right, high], [left, high], [left, low]]
+        };
+        assert_bent_way((0..14).map(slot).collect(), [[TAU / 4.0, -1.0], [TAU / 4.0, 21.0]]);
     }
 }
