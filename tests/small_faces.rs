@@ -82,6 +82,20 @@ fn refined_and_curved_vertices_of_merged_faces_are_on_the_faces_of_the_file() {
 }
 
 #[test]
+fn a_low_step_beside_a_curved_face_is_merged_at_all_sizes() {
+    let geometry = geometry("step_beside_bend", false);
+    for size in [1.0, 1.5, 2.0, 2.5, 3.0, 4.0] {
+        let made = Mesher::new().max_size(size).generate(&geometry).unwrap();
+        let angle = made.coarse.as_ref().unwrap().report.quality.smallest_dihedral;
+        // Where both sides of an ear were on one curve, its short one stayed: 0.3° to 0.9°.
+        assert!(angle > 20.0, "{angle}° at size {size}");
+        // OpenCASCADE's volume, within that of chords.
+        let volume = volume_of(&made.arrays());
+        assert!((volume / 172.26 - 1.0).abs() < 0.02, "{volume} at size {size}");
+    }
+}
+
+#[test]
 fn merging_does_not_depend_on_ranks() {
     let geometry = geometry("cylinder_step", false);
     let alone = Mesher::new().levels(2).generate(&geometry).unwrap().checksum;

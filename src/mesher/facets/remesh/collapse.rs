@@ -141,8 +141,10 @@ fn keeps_topology(sheet: &Sheet, from: u32, to: u32) -> bool {
         let triangle = sheet.at(t);
         let (i, j) = (triangle.corner(from), triangle.corner(to));
         let (Some(i), Some(j)) = (i, j) else { return false };
-        // The side at `from` is merged into that at `to`, so a curve on it would be lost.
-        if triangle.curve[j] != NONE {
+        // The side at `from` is merged into that at `to`, so a curve on it moves there. It may do
+        // so if it goes on along the collapsed edge: the triangle is an ear of its patch.
+        let is_ear = triangle.curve[i] == NONE && triangle.curve[j] == triangle.curve[3 - i - j];
+        if triangle.curve[j] != NONE && !is_ear {
             return false;
         }
         apexes.push(triangle.v[3 - i - j]);
@@ -194,8 +196,9 @@ fn collapse(sheet: &mut Sheet, from: u32, to: u32) {
     for t in std::mem::take(&mut sheet.around[from as usize]) {
         let triangle = sheet.at(t);
         if let (Some(i), Some(j)) = (triangle.corner(from), triangle.corner(to)) {
-            // The side at `from` is merged into the side at `to`, which may be on a curve.
-            kept.push((triangle.v[3 - i - j], triangle.curve[i]));
+            // The side at `from` is merged into the side at `to`; one of them may be on a curve.
+            let curve = [i, j].into_iter().map(|side| triangle.curve[side]).find(|curve| *curve != NONE);
+            kept.push((triangle.v[3 - i - j], curve.unwrap_or(NONE)));
             sheet.remove_triangle(t);
         } else if let Some(k) = triangle.corner(from) {
             sheet.triangles[t as usize].v[k] = to;
