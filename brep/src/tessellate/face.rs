@@ -7,7 +7,8 @@ use crate::model::{Model, Patch};
 use crate::{BrepError, Point, Vector};
 use rayon::prelude::*;
 use rustc_hash::{FxHashMap as HashMap, FxHashSet};
-use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation};
+use spade::handles::FixedVertexHandle;
+use spade::{ConstrainedDelaunayTriangulation, Point2, PositionInTriangulation, Triangulation};
 
 /// The tolerances of a tessellation.
 pub(super) struct Tolerances {
@@ -395,13 +396,17 @@ impl Face<'_> {
             if both.iter().any(|&t| self.encroaches(scaled, &triangles[t])) {
                 continue;
             }
-            if !is_finite(&scaled) || self.plane.locate_vertex(scaled).is_some() {
+            // Points are sorted by their errors: without a vertex near, each is searched from afar.
+            let near = FixedVertexHandle::from_index(triangles[index][0].0);
+            let is_vertex =
+                || matches!(self.plane.locate_with_hint(scaled, near), PositionInTriangulation::OnVertex(_));
+            if !is_finite(&scaled) || is_vertex() {
                 continue;
             }
             both.iter().for_each(|&t| is_changed[t] = true);
             let vertex = INNER + self.vertices.len() as u32;
             let parameters = self.frame.parameters(scaled);
-            if self.plane.insert(Node { scaled, parameters, vertex }).is_ok() {
+            if self.plane.insert_with_hint(Node { scaled, parameters, vertex }, near).is_ok() {
                 self.vertices.push(self.patch.surface.point(parameters));
             }
         }
