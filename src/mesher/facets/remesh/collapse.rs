@@ -1,7 +1,7 @@
 //! Collapse of short edges: one end is merged into the other.
 
 use super::polyline::Polyline;
-use super::sheet::{Kind, NONE, Sheet, now};
+use super::sheet::{Kind, NONE, Sheet, now, shape};
 use crate::ground::ordered::in_order;
 use rayon::prelude::*;
 
@@ -142,9 +142,14 @@ fn keeps_topology(sheet: &Sheet, from: u32, to: u32) -> bool {
         let (i, j) = (triangle.corner(from), triangle.corner(to));
         let (Some(i), Some(j)) = (i, j) else { return false };
         // The side at `from` is merged into that at `to`, so a curve on it moves there. It may do
-        // so if it goes on along the collapsed edge: the triangle is an ear of its patch.
-        let is_ear = triangle.curve[i] == NONE && triangle.curve[j] == triangle.curve[3 - i - j];
-        if triangle.curve[j] != NONE && !is_ear {
+        // so if it goes on along the collapsed edge: the triangle is an ear of its patch. Only thin
+        // ones are cut off, which no flip improves.
+        let is_ear = || {
+            triangle.curve[i] == NONE
+                && triangle.curve[j] == triangle.curve[3 - i - j]
+                && shape(&sheet.corners(triangle.v)) < POOR
+        };
+        if triangle.curve[j] != NONE && !is_ear() {
             return false;
         }
         apexes.push(triangle.v[3 - i - j]);
