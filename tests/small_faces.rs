@@ -96,6 +96,20 @@ fn a_low_step_beside_a_curved_face_is_merged_at_all_sizes() {
 }
 
 #[test]
+fn a_face_is_narrow_if_it_is_so_beside_the_elements_at_each_place() {
+    // The edge of a block is cut off by a cylinder of radius 100, at most 0.03 wide. A notch of
+    // 0.02 at one end has small elements, where the cut is narrower still.
+    let geometry = geometry("notched_lens", false);
+    let made = Mesher::new().max_size(1.0).generate(&geometry).unwrap();
+    let merged = &made.coarse.as_ref().unwrap().report.merged_small;
+    let [face] = &merged.faces[..] else { panic!("{merged:?}") };
+    assert!((face.width - 0.03).abs() < 1e-3, "{face:?}");
+    // OpenCASCADE's volume.
+    let volume = volume_of(&made.arrays());
+    assert!((volume - 79.999_138_685).abs() < 1e-3, "{volume}");
+}
+
+#[test]
 fn merging_does_not_depend_on_ranks() {
     let geometry = geometry("cylinder_step", false);
     let alone = Mesher::new().levels(2).generate(&geometry).unwrap().checksum;

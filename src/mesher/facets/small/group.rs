@@ -143,16 +143,16 @@ pub(super) fn merge_all(shape: &Shape, layout: &Layout, small: &Small) -> Outcom
         let point = |v: u32| tessellation.points[v as usize];
         let points_of_edge =
             |edge: usize| tessellation.lines[edge].iter().map(|on| point(on.0)).collect::<Vec<_>>();
-        let points_of_face = |face: usize| layout.triangles[face].as_flattened().to_vec();
         let mut are_all_small = true;
         for merged in &report.faces {
             let face = merged.face - 1;
-            let (points, factor) = match layout.cut_of(face) {
+            let is_narrow = match layout.cut_of(face) {
                 // It is narrower elsewhere.
-                Some(cut) => (points_of_edge(cut.edge), tip_factor),
-                None => (points_of_face(face), factor),
+                Some(cut) => is_small(points_of_edge(cut.edge), merged.width, tip_factor),
+                // Elements may be smaller where it is narrower.
+                None => layout.local_widths[face].iter().all(|(p, width)| factor * width <= size.size_at(p)),
             };
-            if !is_small(points, merged.width, factor) {
+            if !is_narrow {
                 (allowed.faces[face], are_all_small) = (false, false);
             }
         }

@@ -38,6 +38,8 @@ pub(in crate::mesher::facets) struct Layout<'a> {
     pub widths: Vec<f64>,
     /// The corners of the triangles of each face.
     pub triangles: Vec<Vec<[Point; 3]>>,
+    /// The width of each face at points of its triangles; infinite without edges.
+    pub local_widths: Vec<Vec<(Point, f64)>>,
     /// Tips that were cut off.
     pub cuts: Vec<TipCut>,
     /// Ends of faces whose curvature has no influence on sizes.
@@ -91,7 +93,6 @@ impl<'a> Layout<'a> {
                 }
             }
         }
-        let widths = Vec::new();
         let mut triangles = vec![Vec::new(); model.patches.len()];
         for t in &tessellation.triangles {
             triangles[t.patch as usize].push(t.vertices.map(|v| tessellation.points[v as usize]));
@@ -104,37 +105,41 @@ impl<'a> Layout<'a> {
             faces_of,
             around,
             lengths,
-            widths,
+            widths: Vec::new(),
             triangles,
+            local_widths: Vec::new(),
             cuts: Vec::new(),
             blunt: Vec::new(),
             along: HashMap::new(),
             beside,
         };
-        out.widths = out.measured_widths();
+        out.local_widths = out.measured_widths();
+        let widest = |of_face: &Vec<(Point, f64)>| of_face.iter().map(|at| at.1).fold(0.0, f64::max);
+        out.widths = out.local_widths.iter().map(widest).collect();
         out
     }
 
-    /// The width of each face: twice the largest distance of points inside from its edges.
-    fn measured_widths(&self) -> Vec<f64> {
-        let width = |face: usize| {
+    /// The width of each face at the centroids and the middles of the sides of its triangles: twice
+    /// the distance from the edges of the face.
+    fn measured_widths(&self) -> Vec<Vec<(Point, f64)>> {
+        let points = |[a, b, c]: &[Point; 3]| {
+            let centroid = Point::from((a.coords + b.coords + c.coords) / 3.0);
+            [centroid, nalgebra::center(a, b), nalgebra::center(b, c), nalgebra::center(c, a)]
+        };
+        let widths = |face: usize| {
+            let points = self.triangles[face].iter().flat_map(points);
             let segments: Vec<[Point; 2]> = self.segments(&self.around[face]).map(|s| self.ends(s)).collect();
             if segments.is_empty() {
-                return f64::INFINITY;
+                return points.map(|p| (p, f64::INFINITY)).collect();
             }
             let tree = Tree::new(&segments.iter().map(bounds).collect::<Vec<_>>());
             let squared = |p: Point| {
                 tree.nearest(&p, |i| in_segment(&p, &segments[i as usize][0], &segments[i as usize][1]).1)
                     .map_or(0.0, |(_, squared)| squared)
             };
-            let of = |[a, b, c]: &[Point; 3]| {
-                let centroid = Point::from((a.coords + b.coords + c.coords) / 3.0);
-                let middles = [(a, b), (b, c), (c, a)].map(|(p, q)| squared(nalgebra::center(p, q)));
-                middles.into_iter().fold(squared(centroid), f64::max)
-            };
-            2.0 * self.triangles[face].iter().map(of).fold(0.0, f64::max).sqrt()
+            points.map(|p| (p, 2.0 * squared(p).sqrt())).collect()
         };
-        (0..self.model.patches.len()).into_par_iter().map(width).collect()
+        (0..self.model.patches.len()).into_par_iter().map(widths).collect()
     }
 
     /// The edge of a side of a face that is a curve, and the other face there.
