@@ -39,8 +39,8 @@ const MOST_TRIANGLES: usize = 400_000;
 const MOST_VISITS: usize = 10 * MOST_TRIANGLES;
 /// What is wrong if this is not enough.
 const ENDLESS: &str = "the refinement of its triangles does not end";
-/// The most rounds of refinement.
-const MOST_ROUNDS: usize = 50;
+/// The most rounds of refinement: on the flank of a thread it goes on from triangle to triangle.
+const MOST_ROUNDS: usize = 400;
 /// Edges shorter than this (fraction of the diagonal) are not divided for their angle: surfaces may
 /// have kinks.
 const SHORTEST: f64 = 3e-4;
