@@ -39,8 +39,10 @@ const MOST_TRIANGLES: usize = 400_000;
 const MOST_VISITS: usize = 10 * MOST_TRIANGLES;
 /// What is wrong if this is not enough.
 const ENDLESS: &str = "the refinement of its triangles does not end";
-/// The most rounds of refinement: on the flank of a thread it goes on from triangle to triangle.
-const MOST_ROUNDS: usize = 400;
+/// The most rounds of refinement, first of all: more are in vain where sides are too coarse.
+const MOST_ROUNDS: usize = 50;
+/// The same with finer sides: on the flank of a thread it goes on from triangle to triangle.
+const MOST_LATE_ROUNDS: usize = 400;
 /// Edges shorter than this (fraction of the diagonal) are not divided for their angle: surfaces may
 /// have kinks.
 const SHORTEST: f64 = 3e-4;
@@ -229,7 +231,8 @@ impl Face<'_> {
     fn refine(&mut self, out: &Tessellation) -> Result<(), Failure> {
         let mut known = Errors::default();
         let mut visits = 0;
-        for _ in 0..MOST_ROUNDS {
+        let rounds = if self.tolerances.refuses_folds { MOST_ROUNDS } else { MOST_LATE_ROUNDS };
+        for _ in 0..rounds {
             let triangles = self.triangles();
             visits += triangles.len();
             if triangles.is_empty() {
